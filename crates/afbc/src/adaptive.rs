@@ -1,0 +1,153 @@
+//! Adaptive fuzzy backstepping of one subsystem: the law (20)-(22) and its adaptation (32)-(34).
+
+use crate::backstepping::{self, Errors, Tracking, proportional};
+use crate::cascade::{Context, Law};
+use crate::fuzzy::{Basis, Membership};
+use crate::math;
+use airframe::{Axis, OutOfRange, PerAxis, Range};
+use nalgebra::Matrix3;
+
+/// Accepted gamma.
+pub const GAMMA: Range = Range::new("gamma", 0.0, 1000.0);
+/// Accepted eta.
+pub const ETA: Range = Range::new("eta", 0.0, 1000.0);
+/// Accepted epsilon \[m/s or rad/s\].
+pub const EPSILON: Range = Range::new("epsilon", 1e-6, 100.0);
+
+/// Gains of one AFBC subsystem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// alpha_1, alpha_2.
+    pub backstepping: backstepping::Gains,
+    /// gamma: adaptation gain of Theta_hat (34).
+    pub gamma: f32,
+    /// eta: adaptation gain of delta_hat (33).
+    pub eta: f32,
+    /// epsilon: width of the robust term's transition (32) \[m/s or rad/s\].
+    pub epsilon: f32,
+    /// Gaussians over both inputs of the fuzzy system (22).
+    pub membership: Membership,
+}
+
+impl Gains {
+    /// Checks every gain.
+    ///
+    /// # Errors
+    /// The first one out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        self.backstepping.validate()?;
+        GAMMA.check(self.gamma)?;
+        ETA.check(self.eta)?;
+        EPSILON.check(self.epsilon)?;
+        self.membership.validate()
+    }
+}
+
+/// What one subsystem has learnt. Starts at zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// Theta_hat, one consequent parameter a rule, laid out as [`Basis::weights`]; in the subsystem's input.
+    pub theta: Matrix3<f32>,
+    /// delta_hat: estimated bound of approximation error and disturbance; in the subsystem's input.
+    pub delta: f32,
+}
+
+/// The three terms of (20).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Terms {
+    /// u_a (22)
+    pub fuzzy: f32,
+    /// u_r (32)
+    pub robust: f32,
+    /// u_pd (21)
+    pub proportional: f32,
+}
+
+impl Terms {
+    /// u (20).
+    #[inline]
+    pub fn sum(&self) -> f32 {
+        self.fuzzy + self.robust + self.proportional
+    }
+}
+
+/// One AFBC subsystem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Subsystem {
+    gains: Gains,
+    basis: Basis,
+    inverse_epsilon: f32,
+}
+
+impl Subsystem {
+    /// The subsystem with these gains.
+    ///
+    /// # Errors
+    /// As [`Gains::validate`].
+    pub fn new(gains: Gains) -> Result<Self, OutOfRange> {
+        gains.validate()?;
+        Ok(Subsystem { gains, basis: Basis::new(gains.membership)?, inverse_epsilon: 1.0 / gains.epsilon })
+    }
+
+    /// (20) and d/dt of the estimate by (33), (34), both from the estimate as it stands.
+    #[inline]
+    pub fn law(&self, errors: &Errors, inputs: [f32; 2], estimate: &Estimate) -> (Terms, Estimate) {
+        let e2 = errors.e2;
+        let w = self.basis.weights(inputs);
+        let s = math::tanh(e2 * self.inverse_epsilon);
+        let terms = Terms {
+            fuzzy: w.dot(&estimate.theta),
+            robust: estimate.delta * s,
+            proportional: proportional(self.gains.backstepping.alpha2, errors),
+        };
+        let rate = Estimate { theta: w * (self.gains.gamma * e2), delta: self.gains.eta * e2 * s };
+        (terms, rate)
+    }
+}
+
+/// AFBC for the six subsystems.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adaptive {
+    subsystems: PerAxis<Subsystem>,
+}
+
+impl Adaptive {
+    /// The law with these gains.
+    ///
+    /// # Errors
+    /// The first gain out of range.
+    pub fn new(gains: PerAxis<Gains>) -> Result<Self, OutOfRange> {
+        let PerAxis { roll, pitch, yaw, z, x, y } = gains;
+        Ok(Adaptive {
+            subsystems: PerAxis {
+                roll: Subsystem::new(roll)?,
+                pitch: Subsystem::new(pitch)?,
+                yaw: Subsystem::new(yaw)?,
+                z: Subsystem::new(z)?,
+                x: Subsystem::new(x)?,
+                y: Subsystem::new(y)?,
+            },
+        })
+    }
+}
+
+impl Law for Adaptive {
+    type Estimate = Estimate;
+
+    #[inline]
+    fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Estimate) -> (f32, Errors) {
+        let subsystem = self.subsystems.get(axis);
+        let errors = Errors::new(subsystem.gains.backstepping.alpha1, tracking);
+        // Section IV: the angle and its rate for attitude, the error and its rate for position.
+        let inputs = match axis {
+            Axis::Roll | Axis::Pitch | Axis::Yaw => [tracking.x1, tracking.x2],
+            Axis::Z | Axis::X | Axis::Y => [errors.e1, errors.e1_dot],
+        };
+        let (terms, rate) = subsystem.law(&errors, inputs, estimate);
+        if context.adapt {
+            estimate.theta += rate.theta * context.dt_s;
+            estimate.delta += rate.delta * context.dt_s;
+        }
+        (terms.sum(), errors)
+    }
+}

@@ -1,0 +1,115 @@
+//! Backstepping of one second-order subsystem (7), and the classical controller that the paper compares with.
+
+use crate::cascade::{Context, Law};
+use crate::model::{Dynamics, Model};
+use airframe::{Axis, OutOfRange, Parameters, PerAxis, Range};
+
+/// Accepted alpha_1 \[1/s\].
+pub const ALPHA1: Range = Range::new("alpha1", 1e-2, 100.0);
+/// Accepted alpha_2, in the subsystem's input per m/s or rad/s.
+pub const ALPHA2: Range = Range::new("alpha2", 0.0, 1000.0);
+
+/// What a subsystem is and what it should be: x_1, x_2 and the reference with two derivatives. In m or rad, and seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tracking {
+    /// x_1
+    pub x1: f32,
+    /// x_2 = d x_1/dt
+    pub x2: f32,
+    /// e_1 = x_1d - x_1 (9), for yaw the short way round.
+    pub e1: f32,
+    /// d x_1d/dt
+    pub x1d_dot: f32,
+    /// d^2 x_1d/dt^2
+    pub x1d_ddot: f32,
+}
+
+/// Backstepping errors of one subsystem.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Errors {
+    /// e_1 (9)
+    pub e1: f32,
+    /// d e_1/dt = d x_1d/dt - x_2
+    pub e1_dot: f32,
+    /// e_2 (12)
+    pub e2: f32,
+}
+
+impl Errors {
+    /// (9), (12): e_2 = d x_1d/dt + alpha_1 e_1 - x_2.
+    #[inline]
+    pub fn new(alpha1: f32, tracking: &Tracking) -> Self {
+        let e1 = tracking.e1;
+        let e1_dot = tracking.x1d_dot - tracking.x2;
+        Errors { e1, e1_dot, e2: e1_dot + alpha1 * e1 }
+    }
+}
+
+/// The ideal law u*_eq (16), for known f, g and dg/dt.
+#[inline]
+pub fn ideal(alpha1: f32, errors: &Errors, x1d_ddot: f32, dynamics: &Dynamics) -> f32 {
+    let Errors { e1, e2, .. } = *errors;
+    let Dynamics { f, g, g_dot } = *dynamics;
+    (e1 + alpha1 * (e2 - alpha1 * e1) + x1d_ddot - f - 0.5 * g_dot / g * e2) / g
+}
+
+/// u_pd (21).
+#[inline]
+pub fn proportional(alpha2: f32, errors: &Errors) -> f32 {
+    alpha2 * errors.e2
+}
+
+/// The two gains of one backstepping subsystem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// alpha_1 \[1/s\].
+    pub alpha1: f32,
+    /// alpha_2, in the subsystem's input per m/s or rad/s.
+    pub alpha2: f32,
+}
+
+impl Gains {
+    /// Checks both gains.
+    ///
+    /// # Errors
+    /// The first one outside [`ALPHA1`], [`ALPHA2`].
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        ALPHA1.check(self.alpha1)?;
+        ALPHA2.check(self.alpha2)
+    }
+}
+
+/// Classical backstepping: u_i = u*_eq,i + alpha_2i e_2i with the nominal model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Backstepping {
+    gains: PerAxis<Gains>,
+    model: Model,
+}
+
+impl Backstepping {
+    /// The baseline for a vehicle with these nominal parameters.
+    ///
+    /// # Errors
+    /// The first parameter or gain out of range.
+    pub fn new(vehicle: &Parameters, gains: PerAxis<Gains>) -> Result<Self, OutOfRange> {
+        vehicle.validate()?;
+        for axis in Axis::ALL {
+            gains.get(axis).validate()?;
+        }
+        Ok(Backstepping { gains, model: Model::new(vehicle) })
+    }
+}
+
+impl Law for Backstepping {
+    /// A fixed law remembers nothing.
+    type Estimate = ();
+
+    #[inline]
+    fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, (): &mut ()) -> (f32, Errors) {
+        let gains = self.gains.get(axis);
+        let errors = Errors::new(gains.alpha1, tracking);
+        let dynamics = self.model.dynamics(axis, context);
+        let u = ideal(gains.alpha1, &errors, tracking.x1d_ddot, &dynamics) + proportional(gains.alpha2, &errors);
+        (u, errors)
+    }
+}

@@ -1,0 +1,227 @@
+//! Six subsystems in one cascade: position gives thrust and desired attitude, attitude gives U1..U3, all give rotor
+//! speeds. Section III-D, Fig. 2.
+
+use crate::allocation::{FORCE_MAX, Mixer};
+use crate::backstepping::{Errors, Tracking};
+use crate::command_filter::{CommandFilter, Filtered};
+use crate::math;
+use airframe::{Axis, Inputs, OutOfRange, Parameters, PerAxis, Range, RotorForces, RotorSpeeds, Setpoint, State};
+
+/// Accepted time between steps \[s\].
+pub const DT: Range = Range::new("dt_s", 1e-4, 0.02);
+
+/// How one subsystem turns its errors into its input. AFBC and the baseline differ in nothing else.
+pub trait Law {
+    /// What the law remembers of one subsystem from step to step.
+    type Estimate: Copy + Default + core::fmt::Debug;
+
+    /// u_i in the subsystem's own unit (N for roll, pitch, yaw and z; m/s2 for x and y), with the errors behind it.
+    /// May update the estimate, if the context lets it.
+    fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Self::Estimate)
+    -> (f32, Errors);
+}
+
+/// What all six subsystems share in one step.
+#[derive(Clone, Copy, Debug)]
+pub struct Context<'a> {
+    /// The state that the step works from.
+    pub state: &'a State,
+    /// omega of (6), as last commanded \[rad/s\].
+    pub rotor_residual_rad_s: f32,
+    /// Time step \[s\].
+    pub dt_s: f32,
+    /// False if estimates must stay as they are.
+    pub adapt: bool,
+}
+
+/// Settings of the cascade around the law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Time between steps \[s\].
+    pub dt_s: f32,
+    /// Bandwidth of the filter on phi_d and theta_d \[rad/s\].
+    pub command_filter_rad_s: f32,
+    /// Largest force of one rotor \[N\].
+    pub rotor_force_max_n: f32,
+}
+
+impl Settings {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// The first one out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        DT.check(self.dt_s)?;
+        crate::command_filter::BANDWIDTH.check(self.command_filter_rad_s)?;
+        FORCE_MAX.check(self.rotor_force_max_n)
+    }
+}
+
+/// A controller: fixed from here on. What changes in flight is in [`Memory`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Controller<L> {
+    law: L,
+    mixer: Mixer,
+    filter: CommandFilter,
+    dt_s: f32,
+    inverse_gravity: f32,
+}
+
+/// What a controller remembers between steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Memory<E> {
+    /// Estimates of each subsystem.
+    pub estimates: PerAxis<E>,
+    /// Filtered phi_d and theta_d; none before the first step.
+    filtered: Option<[Filtered; 2]>,
+    /// The last plausible state and setpoint.
+    state: Option<State>,
+    setpoint: Option<Setpoint>,
+    rotor_residual_rad_s: f32,
+}
+
+/// What went wrong in a step; all false in normal flight.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Health {
+    /// The measurement was implausible (see [`State::is_plausible`]); the last plausible one stood in for it and no
+    /// estimate changed. If there was none yet, the rotors stay still.
+    pub state_rejected: bool,
+    /// The setpoint was implausible; the last plausible one stood in for it, or if there was none yet, a hold of the
+    /// position of that moment.
+    pub setpoint_rejected: bool,
+    /// A rotor was asked for a force outside its limits.
+    pub saturated: bool,
+}
+
+/// What one step decides, and why.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Command {
+    /// omega_i, always finite and never negative.
+    pub speeds: RotorSpeeds,
+    /// F_i, within the rotors' limits.
+    pub forces: RotorForces,
+    /// U1..U4 as the law wants them, before rotor limits.
+    pub inputs: Inputs,
+    /// u5, u6: wanted acceleration along x and y \[m/s2\].
+    pub virtual_m_s2: [f32; 2],
+    /// phi_d, theta_d of (40) \[rad\].
+    pub desired_rad: [f32; 2],
+    /// phi_d, theta_d behind the command filter: what roll and pitch track.
+    pub filtered: [Filtered; 2],
+    /// Errors of each subsystem.
+    pub errors: PerAxis<Errors>,
+    /// What went wrong.
+    pub health: Health,
+}
+
+/// Desired roll and pitch (40) \[rad\] for the wanted horizontal accelerations u5, u6 \[m/s2\] at yaw psi \[rad\].
+#[inline]
+pub fn desired_attitude(u5: f32, u6: f32, yaw_rad: f32, inverse_gravity: f32) -> [f32; 2] {
+    let (sin_psi, cos_psi) = (math::sin(yaw_rad), math::cos(yaw_rad));
+    let tan_theta = (u5 * cos_psi + u6 * sin_psi) * inverse_gravity;
+    // cos(atan t) = 1 / sqrt(1 + t^2)
+    let cos_theta = 1.0 / math::sqrt(1.0 + tan_theta * tan_theta);
+    let tan_phi = (u5 * sin_psi - u6 * cos_psi) * inverse_gravity * cos_theta;
+    [math::atan(tan_phi), math::atan(tan_theta)]
+}
+
+impl<L: Law> Controller<L> {
+    /// A controller for a vehicle with these nominal parameters.
+    ///
+    /// # Errors
+    /// The first parameter or setting out of range.
+    pub fn new(vehicle: Parameters, settings: Settings, law: L) -> Result<Self, OutOfRange> {
+        settings.validate()?;
+        Ok(Controller {
+            law,
+            mixer: Mixer::new(&vehicle, settings.rotor_force_max_n)?,
+            filter: CommandFilter::new(settings.command_filter_rad_s, settings.dt_s)?,
+            dt_s: settings.dt_s,
+            inverse_gravity: 1.0 / vehicle.gravity_m_s2,
+        })
+    }
+
+    /// One step: from what is measured and wanted to rotor speeds. Cannot fail; see [`Health`] for what it does with
+    /// input that is not plausible.
+    pub fn step(&self, memory: &mut Memory<L::Estimate>, state: &State, setpoint: &Setpoint) -> Command {
+        let mut health = Health {
+            state_rejected: !state.is_plausible(),
+            setpoint_rejected: !setpoint.is_plausible(),
+            saturated: false,
+        };
+        if !health.state_rejected {
+            memory.state = Some(*state);
+        }
+        let Some(state) = memory.state else {
+            return Command { health, ..Command::default() };
+        };
+        if !health.setpoint_rejected {
+            memory.setpoint = Some(*setpoint);
+        }
+        let setpoint = *memory.setpoint.get_or_insert(Setpoint::hold(&state));
+
+        let context = Context {
+            state: &state,
+            rotor_residual_rad_s: memory.rotor_residual_rad_s,
+            dt_s: self.dt_s,
+            adapt: !health.state_rejected,
+        };
+        let mut errors = PerAxis::default();
+        let estimates = &mut memory.estimates;
+        let mut input = |axis: Axis, tracking: Tracking| {
+            let (u, e) = self.law.input(axis, &tracking, &context, estimates.get_mut(axis));
+            *errors.get_mut(axis) = e;
+            u
+        };
+
+        // Position: subsystems 4, 5, 6.
+        let (p, v, a) = (setpoint.position_m, setpoint.velocity_m_s, setpoint.acceleration_m_s2);
+        let (xi, xi_dot) = (state.position_m, state.velocity_m_s);
+        let track = |x1, x2, x1d, x1d_dot, x1d_ddot| Tracking { x1, x2, e1: x1d - x1, x1d_dot, x1d_ddot };
+        let u4 = input(Axis::Z, track(xi.z, xi_dot.z, p.z, v.z, a.z));
+        let u5 = input(Axis::X, track(xi.x, xi_dot.x, p.x, v.x, a.x));
+        let u6 = input(Axis::Y, track(xi.y, xi_dot.y, p.y, v.y, a.y));
+
+        // Desired attitude with the derivatives that (12) and (16) ask for.
+        let (eta, eta_dot) = (state.attitude_rad, state.rates_rad_s);
+        let desired_rad = desired_attitude(u5, u6, eta.z, self.inverse_gravity);
+        let [phi_d, theta_d] = desired_rad;
+        let at_rest = |angle| Filtered { angle, rate: 0.0 };
+        let filtered = memory.filtered.unwrap_or([at_rest(eta.x), at_rest(eta.y)]);
+        let [roll_d, pitch_d] = filtered;
+
+        // Attitude: subsystems 1, 2, 3.
+        let roll_d_ddot = self.filter.acceleration(&roll_d, phi_d);
+        let pitch_d_ddot = self.filter.acceleration(&pitch_d, theta_d);
+        let u1 = input(Axis::Roll, track(eta.x, eta_dot.x, roll_d.angle, roll_d.rate, roll_d_ddot));
+        let u2 = input(Axis::Pitch, track(eta.y, eta_dot.y, pitch_d.angle, pitch_d.rate, pitch_d_ddot));
+        let u3 = input(
+            Axis::Yaw,
+            Tracking {
+                x1: eta.z,
+                x2: eta_dot.z,
+                e1: math::wrap_angle(setpoint.yaw_rad - eta.z),
+                x1d_dot: setpoint.yaw_rate_rad_s,
+                x1d_ddot: setpoint.yaw_acceleration_rad_s2,
+            },
+        );
+
+        let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3, thrust_n: u4 };
+        let allocation = self.mixer.allocate(&inputs);
+        let speeds = self.mixer.speeds(&allocation.forces);
+        health.saturated = allocation.saturated;
+
+        memory.filtered = Some([self.filter.advance(&roll_d, phi_d), self.filter.advance(&pitch_d, theta_d)]);
+        memory.rotor_residual_rad_s = speeds.residual_rad_s();
+        Command {
+            speeds,
+            forces: allocation.forces,
+            inputs,
+            virtual_m_s2: [u5, u6],
+            desired_rad,
+            filtered,
+            errors,
+            health,
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! Second-order command filter: a smooth reference with two derivatives from a raw command. Ours.
+//!
+//! (12) needs d phi_d/dt and d theta_d/dt, which the paper does not provide. The filter is critically damped,
+//!
+//! ```text
+//! d^2 x/dt^2 = w^2 (command - x) - 2 w dx/dt
+//! ```
+//!
+//! and is advanced by its exact solution for a command held over the step, so it is stable at any bandwidth.
+
+use crate::math;
+use airframe::{OutOfRange, Range};
+
+/// Accepted bandwidth w \[rad/s\].
+pub const BANDWIDTH: Range = Range::new("command_filter_rad_s", 1.0, 1000.0);
+
+/// The filter's constants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CommandFilter {
+    bandwidth: f32,
+    dt: f32,
+    /// exp(-w dt)
+    decay: f32,
+}
+
+/// The filter's state.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Filtered {
+    /// x \[rad\].
+    pub angle: f32,
+    /// dx/dt \[rad/s\].
+    pub rate: f32,
+}
+
+impl CommandFilter {
+    /// A filter of the given bandwidth \[rad/s\], advanced every `dt_s` seconds (valid in [`crate::cascade::DT`]).
+    ///
+    /// # Errors
+    /// If the bandwidth is outside [`BANDWIDTH`].
+    pub fn new(bandwidth_rad_s: f32, dt_s: f32) -> Result<Self, OutOfRange> {
+        BANDWIDTH.check(bandwidth_rad_s)?;
+        Ok(CommandFilter { bandwidth: bandwidth_rad_s, dt: dt_s, decay: math::exp(-bandwidth_rad_s * dt_s) })
+    }
+
+    /// d^2 x/dt^2 under `command` \[rad/s2\].
+    #[inline]
+    pub fn acceleration(&self, state: &Filtered, command: f32) -> f32 {
+        self.bandwidth * (self.bandwidth * (command - state.angle) - 2.0 * state.rate)
+    }
+
+    /// The state one step later, `command` held meanwhile.
+    #[inline]
+    pub fn advance(&self, state: &Filtered, command: f32) -> Filtered {
+        let offset = state.angle - command;
+        let slope = state.rate + self.bandwidth * offset;
+        Filtered {
+            angle: command + (offset + slope * self.dt) * self.decay,
+            rate: (state.rate - self.bandwidth * slope * self.dt) * self.decay,
+        }
+    }
+}

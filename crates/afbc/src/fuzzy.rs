@@ -1,0 +1,84 @@
+//! Fuzzy basis: 3 Gaussians x 2 inputs = 9 rules, (17)-(19).
+//!
+//! The memberships of one input are three Gaussians of one width s at -c, 0 and c. A product of memberships factorises,
+//! and so does the sum in the denominator of (18): the nine weights are the outer product of two triples that each sum
+//! to one. Within a triple, dividing by the middle Gaussian leaves, with k = c/s^2 and q = exp(-c^2 / 2s^2),
+//!
+//! ```text
+//! [q exp(-k x), 1, q exp(k x)]
+//! ```
+//!
+//! and multiplying by t = exp(-k|x|), which the normalisation undoes, leaves \[q t^2, t, q\] on the positive side: one
+//! exponential an input, of a number never positive, over a sum never below q. So no finite input overflows, divides
+//! zero by zero or loses all its weights, where (18) as printed does from 1.7 rad/s on in `f32`.
+
+use crate::math;
+use airframe::{OutOfRange, Range};
+use nalgebra::{Matrix3, Vector3};
+
+/// Accepted distance of the outer Gaussians, in the input's unit.
+pub const CENTRE: Range = Range::new("centre", 1e-3, 1e3);
+/// Accepted width, in the input's unit.
+pub const WIDTH: Range = Range::new("width", 1e-3, 1e3);
+/// Accepted centre / width. Beyond it neighbouring Gaussians no longer overlap: between them the basis is a switch.
+pub const SPREAD: Range = Range::new("centre / width", 0.1, 6.0);
+
+/// Three Gaussians of one width over one input: exp(-1/2 ((x - c_j)/s)^2), c_j in {-c, 0, c}.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Membership {
+    /// c: distance of the outer Gaussians from zero, in the input's unit.
+    pub centre: f32,
+    /// s: common width, in the input's unit.
+    pub width: f32,
+}
+
+impl Membership {
+    /// Checks centre and width.
+    ///
+    /// # Errors
+    /// The first value out of [`CENTRE`], [`WIDTH`] or [`SPREAD`].
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        CENTRE.check(self.centre)?;
+        WIDTH.check(self.width)?;
+        SPREAD.check(self.centre / self.width)
+    }
+}
+
+/// The basis of one subsystem, its constants worked out from a [`Membership`] that both inputs share.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Basis {
+    /// k = c/s^2
+    k: f32,
+    /// q = exp(-c^2 / 2s^2)
+    q: f32,
+}
+
+impl Basis {
+    /// The basis of `membership`.
+    ///
+    /// # Errors
+    /// As [`Membership::validate`].
+    pub fn new(membership: Membership) -> Result<Self, OutOfRange> {
+        membership.validate()?;
+        let spread = membership.centre / membership.width;
+        Ok(Basis { k: spread / membership.width, q: math::exp(-0.5 * spread * spread) })
+    }
+
+    /// w(x) of (18), one weight a rule: row = the first input's Gaussian, column = the second's, from -c to c.
+    /// Every weight is within \[0, 1\] and they sum to one, for every finite input.
+    #[inline]
+    pub fn weights(&self, inputs: [f32; 2]) -> Matrix3<f32> {
+        let [first, second] = inputs.map(|x| self.triple(x));
+        first * second.transpose()
+    }
+
+    /// The normalised memberships of one input.
+    #[inline]
+    fn triple(&self, x: f32) -> Vector3<f32> {
+        let t = math::exp(-self.k * x.abs());
+        let (near, middle, far) = (self.q, t, self.q * t * t);
+        let scale = 1.0 / (near + middle + far);
+        let (left, right) = if x < 0.0 { (near, far) } else { (far, near) };
+        Vector3::new(left, middle, right) * scale
+    }
+}

@@ -1,0 +1,48 @@
+//! Adaptive fuzzy backstepping control (AFBC) of a quadrotor, after Yacef, Bouhali and Hamerlain, and the classical
+//! backstepping law that it is compared with.
+//!
+//! Frames, units and the meaning of "(n)" are stated in [`airframe`]; corrections to the paper in `docs/paper.md`.
+//!
+//! # Reading order
+//!
+//! 1. [`fuzzy`]: nine rules from two inputs, (17)-(19).
+//! 2. [`backstepping`]: the errors (9)-(13), the ideal law (16), the baseline controller (21).
+//! 3. [`adaptive`]: the law (20)-(22) with its adaptation (32)-(34).
+//! 4. [`cascade`]: six subsystems, the desired attitude (39)-(40) and the command filter make one [`Controller`].
+//! 5. [`allocation`]: U1..U4 to rotor forces and speeds, and back.
+//!
+//! # What to expect
+//!
+//! Parameters are checked once, by name, when a [`Controller`] is built. After that a step cannot fail, allocate or
+//! panic, takes the same path of a few hundred floating-point operations whatever it is given, and gives the same bits
+//! on host and target: all mathematics comes from [`math`].
+//!
+//! ```
+//! use afbc::{Adaptive, Controller, Memory, Profile};
+//! use airframe::{Parameters, Setpoint, State};
+//!
+//! let vehicle = Parameters::PAPER.to_f32();
+//! let controller = Controller::new(vehicle, Profile::Paper.settings(), Adaptive::new(Profile::Paper.gains())?)?;
+//! let mut memory = Memory::default();
+//! let mut above = Setpoint::default();
+//! above.position_m.z = 1.0;
+//! let command = controller.step(&mut memory, &State::default(), &above);
+//! assert!((command.inputs.thrust_n - 18.0).abs() < 1e-5); // alpha_24 alpha_14 e_14 = 6 * 3 * 1 m
+//! # Ok::<(), airframe::OutOfRange>(())
+//! ```
+#![no_std]
+
+pub mod adaptive;
+pub mod allocation;
+pub mod backstepping;
+pub mod cascade;
+pub mod command_filter;
+pub mod fuzzy;
+pub mod math;
+pub mod model;
+mod profile;
+
+pub use adaptive::Adaptive;
+pub use backstepping::Backstepping;
+pub use cascade::{Command, Controller, Health, Law, Memory, Settings};
+pub use profile::Profile;

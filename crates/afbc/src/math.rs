@@ -1,0 +1,53 @@
+//! Where every transcendental function of the control crate comes from.
+//!
+//! Nothing here reaches the platform's own library, so host and target give the same bits. Each function names its
+//! source and its largest error against `f64`, measured over the stated range by `tests/math.rs`.
+//!
+//! `micromath` serves where its error is harmless: sine and cosine turn the virtual controls by the yaw angle and scale
+//! thrust by the tilt, so 1.1e-3 there is a gain error of 0.1 %. It does not serve for `atan` (2.8e-3 rad of tilt would
+//! be a lasting error of 9 mm in the baseline's position), `exp` (not monotone) or `sqrt` (6 %); those are `libm`'s.
+
+use micromath::F32Ext;
+
+/// e^x; libm. Error at most 1.2e-7 relative for -87 <= x <= 0, 0 below -104.
+#[inline]
+pub fn exp(x: f32) -> f32 {
+    libm::expf(x)
+}
+
+/// tanh x; libm. Error at most 1.4e-7 absolute for all x.
+#[inline]
+pub fn tanh(x: f32) -> f32 {
+    libm::tanhf(x)
+}
+
+/// atan x; libm. Error at most 1.2e-7 absolute for all x.
+#[inline]
+pub fn atan(x: f32) -> f32 {
+    libm::atanf(x)
+}
+
+/// Square root; libm, correctly rounded.
+#[inline]
+pub fn sqrt(x: f32) -> f32 {
+    libm::sqrtf(x)
+}
+
+/// sin x; micromath. Error at most 1.2e-3 absolute for |x| <= 1000 rad.
+#[inline]
+pub fn sin(x: f32) -> f32 {
+    F32Ext::sin(x)
+}
+
+/// cos x; micromath. Error at most 1.2e-3 absolute for |x| <= 1000 rad.
+#[inline]
+pub fn cos(x: f32) -> f32 {
+    F32Ext::cos(x)
+}
+
+/// The angle's representative within \[-pi, pi\]; angles already there come back unchanged. For |x| <= 2000 rad.
+#[inline]
+pub fn wrap_angle(x: f32) -> f32 {
+    use core::f32::consts::{PI, TAU};
+    if x.abs() <= PI { x } else { x - TAU * F32Ext::round(x / TAU) }
+}

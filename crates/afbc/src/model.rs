@@ -1,0 +1,79 @@
+//! The nominal model (7) that the baseline inverts: f_i, g_i without disturbances (A_F = A_T = 0).
+
+use crate::cascade::Context;
+use crate::math;
+use airframe::{Axis, Parameters};
+
+/// d x_2/dt = f + g u of one subsystem, and dg/dt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dynamics {
+    /// f_i \[m/s2 or rad/s2\].
+    pub f: f32,
+    /// g_i, per unit of the input; positive (A4).
+    pub g: f32,
+    /// d g_i/dt
+    pub g_dot: f32,
+}
+
+/// Smallest cos(phi) cos(theta) that g_4 is computed with: a tilt of 84 degrees. Ours; the paper assumes A3 instead.
+pub const TILT_COSINE_MIN: f32 = 0.1;
+
+/// Constants a_1..a_5, b_1..b_3, 1/m and g of (6).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Model {
+    a1: f32,
+    a2: f32,
+    a3: f32,
+    a4: f32,
+    a5: f32,
+    b1: f32,
+    b2: f32,
+    b3: f32,
+    mass: f32,
+    gravity: f32,
+}
+
+impl Model {
+    /// The constants of (6) for a vehicle whose parameters are valid.
+    pub fn new(vehicle: &Parameters) -> Self {
+        let Parameters { mass_kg, arm_m, rotor_inertia_kg_m2, thrust_factor_n_s2, drag_factor_n_m_s2, .. } = *vehicle;
+        let (ix, iy, iz) = (vehicle.inertia_kg_m2.x, vehicle.inertia_kg_m2.y, vehicle.inertia_kg_m2.z);
+        Model {
+            a1: (iy - iz) / ix,
+            a2: rotor_inertia_kg_m2 / ix,
+            a3: (iz - ix) / iy,
+            a4: -rotor_inertia_kg_m2 / iy,
+            a5: (ix - iy) / iz,
+            b1: arm_m / ix,
+            b2: arm_m / iy,
+            b3: drag_factor_n_m_s2 / thrust_factor_n_s2 / iz,
+            mass: mass_kg,
+            gravity: vehicle.gravity_m_s2,
+        }
+    }
+
+    /// f_i, g_i and dg_i/dt of `axis`; d eta/dt is taken for Omega as in (6).
+    #[inline]
+    pub fn dynamics(&self, axis: Axis, context: &Context) -> Dynamics {
+        let rates = &context.state.rates_rad_s;
+        let omega = context.rotor_residual_rad_s;
+        let constant = |f, g| Dynamics { f, g, g_dot: 0.0 };
+        match axis {
+            Axis::Roll => constant(rates.y * rates.z * self.a1 + rates.y * self.a2 * omega, self.b1),
+            Axis::Pitch => constant(rates.x * rates.z * self.a3 + rates.x * self.a4 * omega, self.b2),
+            Axis::Yaw => constant(rates.x * rates.y * self.a5, self.b3),
+            Axis::Z => {
+                let (phi, theta) = (context.state.attitude_rad.x, context.state.attitude_rad.y);
+                let (cos_phi, cos_theta) = (math::cos(phi), math::cos(theta));
+                let tilt_cosine_dot = -math::sin(phi) * cos_theta * rates.x - cos_phi * math::sin(theta) * rates.y;
+                Dynamics {
+                    f: -self.gravity,
+                    g: (cos_phi * cos_theta).max(TILT_COSINE_MIN) / self.mass,
+                    g_dot: tilt_cosine_dot / self.mass,
+                }
+            }
+            // The virtual controls u5, u6 are accelerations.
+            Axis::X | Axis::Y => constant(0.0, 1.0),
+        }
+    }
+}

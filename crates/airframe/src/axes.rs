@@ -1,0 +1,85 @@
+//! The six second-order subsystems of (7).
+
+/// One of the six subsystems, in the paper's order i = 1..6.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Axis {
+    /// i = 1: phi, driven by U1.
+    Roll,
+    /// i = 2: theta, driven by U2.
+    Pitch,
+    /// i = 3: psi, driven by U3.
+    Yaw,
+    /// i = 4: height, driven by U4.
+    Z,
+    /// i = 5: driven by the virtual control u5.
+    X,
+    /// i = 6: driven by the virtual control u6.
+    Y,
+}
+
+impl Axis {
+    /// All six, in the paper's order.
+    pub const ALL: [Axis; 6] = [Axis::Roll, Axis::Pitch, Axis::Yaw, Axis::Z, Axis::X, Axis::Y];
+
+    /// Lower-case name, as in scenario files and logs.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Axis::Roll => "roll",
+            Axis::Pitch => "pitch",
+            Axis::Yaw => "yaw",
+            Axis::Z => "z",
+            Axis::X => "x",
+            Axis::Y => "y",
+        }
+    }
+}
+
+/// One `T` for each subsystem, in the paper's order.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[expect(missing_docs, reason = "each field is the axis it is named after")]
+pub struct PerAxis<T> {
+    pub roll: T,
+    pub pitch: T,
+    pub yaw: T,
+    pub z: T,
+    pub x: T,
+    pub y: T,
+}
+
+impl<T> PerAxis<T> {
+    /// Makes each axis' value from its name.
+    pub fn from_fn(mut make: impl FnMut(Axis) -> T) -> Self {
+        PerAxis {
+            roll: make(Axis::Roll),
+            pitch: make(Axis::Pitch),
+            yaw: make(Axis::Yaw),
+            z: make(Axis::Z),
+            x: make(Axis::X),
+            y: make(Axis::Y),
+        }
+    }
+
+    /// The value of `axis`.
+    pub const fn get(&self, axis: Axis) -> &T {
+        match axis {
+            Axis::Roll => &self.roll,
+            Axis::Pitch => &self.pitch,
+            Axis::Yaw => &self.yaw,
+            Axis::Z => &self.z,
+            Axis::X => &self.x,
+            Axis::Y => &self.y,
+        }
+    }
+
+    /// The value of `axis`, to change it.
+    pub const fn get_mut(&mut self, axis: Axis) -> &mut T {
+        match axis {
+            Axis::Roll => &mut self.roll,
+            Axis::Pitch => &mut self.pitch,
+            Axis::Yaw => &mut self.yaw,
+            Axis::Z => &mut self.z,
+            Axis::X => &mut self.x,
+            Axis::Y => &mut self.y,
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! The words that every other crate speaks: what a state, a setpoint, a rotor speed and a vehicle are.
+//! Types and their accepted ranges only; nothing here decides anything.
+//!
+//! # Conventions
+//!
+//! Stated once, here; every other crate refers to this page.
+//!
+//! * **Units** are SI: metres, seconds, kilograms, newtons, radians. Field names carry them.
+//! * **Earth frame**: inertial, right-handed, z up. Gravity points to -z.
+//! * **Body frame**: right-handed, x forward, y left, z up (FLU), origin at the centre of mass.
+//! * **Attitude**: Euler angles eta = \[phi, theta, psi\] = \[roll, pitch, yaw\] of the z-y-x sequence;
+//!   `r_earth_body = Rz(psi) Ry(theta) Rx(phi)` turns body coordinates into earth coordinates. Each angle is
+//!   right-handed about its axis: positive pitch tilts the thrust to +x, positive roll tilts it to -y.
+//! * **Rates**: Omega = \[p, q, r\], the angular velocity of the body in body coordinates.
+//! * **Rotors**: 1 at -y, 2 at +x, 3 at +y, 4 at -x, each at the arm's length. Rotors 1 and 3 push the body
+//!   to positive yaw (they spin negatively about body z), rotors 2 and 4 to negative yaw.
+//! * **Subsystems** i = 1..6 of the paper's (7): roll, pitch, yaw, z, x, y. See [`PerAxis`].
+//!
+//! "(n)" with a number is always an equation of Yacef, Bouhali, Hamerlain, *Adaptive Fuzzy Backstepping Control for
+//! Trajectory Tracking of Unmanned Aerial Quadrotor*, as corrected in `docs/paper.md`.
+#![no_std]
+
+mod actuation;
+mod axes;
+mod motion;
+mod parameters;
+mod range;
+
+pub use actuation::{Inputs, RotorForces, RotorSpeeds};
+pub use axes::{Axis, PerAxis};
+pub use motion::{Setpoint, State};
+pub use parameters::{Parameters, limits};
+pub use range::{OutOfRange, Range};

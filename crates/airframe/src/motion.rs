@@ -1,0 +1,79 @@
+//! Where the vehicle is, and where it should be.
+
+use nalgebra::Vector3;
+
+/// Measured motion of the vehicle: the paper's assumption A1. Frames as in the crate's [conventions](crate).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct State {
+    /// xi = \[x, y, z\], earth frame \[m\].
+    pub position_m: Vector3<f32>,
+    /// d xi/dt, earth frame \[m/s\].
+    pub velocity_m_s: Vector3<f32>,
+    /// eta = \[roll, pitch, yaw\] \[rad\].
+    pub attitude_rad: Vector3<f32>,
+    /// Omega = \[p, q, r\], body frame \[rad/s\]. The paper's model (6) takes d eta/dt for it.
+    pub rates_rad_s: Vector3<f32>,
+}
+
+/// Largest position that a state or setpoint may hold, per coordinate \[m\].
+const POSITION_MAX_M: f32 = 1e5;
+/// Largest speed, per coordinate \[m/s\].
+const VELOCITY_MAX_M_S: f32 = 1e3;
+/// Largest acceleration of a setpoint, per coordinate \[m/s2\].
+const ACCELERATION_MAX_M_S2: f32 = 1e3;
+/// Largest angle: yaw may be unwrapped \[rad\].
+const ANGLE_MAX_RAD: f32 = 1e3;
+/// Largest angular rate or angular acceleration, per coordinate \[rad/s, rad/s2\].
+const RATE_MAX_RAD_S: f32 = 1e3;
+
+/// All coordinates finite and at most `max` in size.
+fn within(vector: &Vector3<f32>, max: f32) -> bool {
+    // NaN fails every comparison, so this refuses it too.
+    vector.x.abs() <= max && vector.y.abs() <= max && vector.z.abs() <= max
+}
+
+impl State {
+    /// True if every value is finite and physically possible: at most 1e5 m, 1e3 m/s, 1e3 rad and 1e3 rad/s in size.
+    /// A controller may use no other state.
+    pub fn is_plausible(&self) -> bool {
+        within(&self.position_m, POSITION_MAX_M)
+            && within(&self.velocity_m_s, VELOCITY_MAX_M_S)
+            && within(&self.attitude_rad, ANGLE_MAX_RAD)
+            && within(&self.rates_rad_s, RATE_MAX_RAD_S)
+    }
+}
+
+/// Desired motion: \[x_d, y_d, z_d, psi_d\] with two derivatives (assumption A5).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Setpoint {
+    /// Earth frame \[m\].
+    pub position_m: Vector3<f32>,
+    /// Earth frame \[m/s\].
+    pub velocity_m_s: Vector3<f32>,
+    /// Earth frame \[m/s2\].
+    pub acceleration_m_s2: Vector3<f32>,
+    /// psi_d \[rad\].
+    pub yaw_rad: f32,
+    /// \[rad/s\]
+    pub yaw_rate_rad_s: f32,
+    /// \[rad/s2\]
+    pub yaw_acceleration_rad_s2: f32,
+}
+
+impl Setpoint {
+    /// Stay where `state` is, with its heading, at rest.
+    pub fn hold(state: &State) -> Self {
+        Setpoint { position_m: state.position_m, yaw_rad: state.attitude_rad.z, ..Setpoint::default() }
+    }
+
+    /// True if every value is finite and within the bounds of [`State::is_plausible`], accelerations at most 1e3 m/s2
+    /// and 1e3 rad/s2.
+    pub fn is_plausible(&self) -> bool {
+        within(&self.position_m, POSITION_MAX_M)
+            && within(&self.velocity_m_s, VELOCITY_MAX_M_S)
+            && within(&self.acceleration_m_s2, ACCELERATION_MAX_M_S2)
+            && self.yaw_rad.abs() <= ANGLE_MAX_RAD
+            && self.yaw_rate_rad_s.abs() <= RATE_MAX_RAD_S
+            && self.yaw_acceleration_rad_s2.abs() <= RATE_MAX_RAD_S
+    }
+}
