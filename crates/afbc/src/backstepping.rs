@@ -1,5 +1,6 @@
 //! Backstepping of one second-order subsystem (7), and the classical controller that the paper compares with.
 
+use crate::adaptive::Estimate;
 use crate::cascade::{Context, Law};
 use crate::model::{Dynamics, Model};
 use airframe::{Axis, OutOfRange, Parameters, PerAxis, Range};
@@ -111,5 +112,9 @@ impl Law for Backstepping {
         let dynamics = self.model.dynamics(axis, context);
         let u = ideal(gains.alpha1, &errors, tracking.x1d_ddot, &dynamics) + proportional(gains.alpha2, &errors);
         (u, errors)
+    }
+
+    fn learnt((): &()) -> Estimate {
+        Estimate::default()
     }
 }

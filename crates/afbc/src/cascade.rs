@@ -1,6 +1,7 @@
 //! Six subsystems in one cascade: position gives thrust and desired attitude, attitude gives U1..U3, all give rotor
 //! speeds. Section III-D, Fig. 2.
 
+use crate::adaptive::Estimate;
 use crate::allocation::{FORCE_MAX, Mixer};
 use crate::backstepping::{Errors, Tracking};
 use crate::command_filter::{CommandFilter, Filtered};
@@ -19,6 +20,9 @@ pub trait Law {
     /// May update the estimate, if the context lets it.
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Self::Estimate)
     -> (f32, Errors);
+
+    /// What `estimate` holds in AFBC's terms, for logs and monitors; zero for a law that learns nothing.
+    fn learnt(estimate: &Self::Estimate) -> Estimate;
 }
 
 /// What all six subsystems share in one step.

@@ -1,0 +1,29 @@
+//! True motion of the vehicle.
+
+use airframe::State;
+use nalgebra::Vector3;
+
+/// True motion, in `f64`; the same quantities and frames as [`airframe::State`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Motion {
+    /// xi, earth frame \[m\].
+    pub position_m: Vector3<f64>,
+    /// d xi/dt, earth frame \[m/s\].
+    pub velocity_m_s: Vector3<f64>,
+    /// eta = \[roll, pitch, yaw\] \[rad\].
+    pub attitude_rad: Vector3<f64>,
+    /// Omega = \[p, q, r\], body frame \[rad/s\]; in the simplified model d eta/dt.
+    pub rates_rad_s: Vector3<f64>,
+}
+
+impl Motion {
+    /// What a perfect sensor measures.
+    pub fn measure(&self) -> State {
+        State {
+            position_m: self.position_m.cast(),
+            velocity_m_s: self.velocity_m_s.cast(),
+            attitude_rad: self.attitude_rad.cast(),
+            rates_rad_s: self.rates_rad_s.cast(),
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! The full rigid body, (1)-(5) as corrected, its attitude a unit quaternion: no singularity.
+
+use crate::motion::Motion;
+use crate::vehicle::Load;
+use libm::{asin, atan2, cos, sin, sqrt};
+use nalgebra::{SVector, Vector3};
+
+/// \[x, y, z, their rates, quaternion w x y z (body to earth), p, q, r\]
+pub type Vector = SVector<f64, 13>;
+
+/// The model's state vector for `motion`.
+pub fn vector(motion: &Motion) -> Vector {
+    let half = motion.attitude_rad * 0.5;
+    let (s_phi, c_phi) = (sin(half.x), cos(half.x));
+    let (s_theta, c_theta) = (sin(half.y), cos(half.y));
+    let (s_psi, c_psi) = (sin(half.z), cos(half.z));
+    let mut x = Vector::zeros();
+    x.fixed_rows_mut::<3>(0).copy_from(&motion.position_m);
+    x.fixed_rows_mut::<3>(3).copy_from(&motion.velocity_m_s);
+    x.fixed_rows_mut::<4>(6).copy_from_slice(&[
+        c_psi * c_theta * c_phi + s_psi * s_theta * s_phi,
+        c_psi * c_theta * s_phi - s_psi * s_theta * c_phi,
+        c_psi * s_theta * c_phi + s_psi * c_theta * s_phi,
+        s_psi * c_theta * c_phi - c_psi * s_theta * s_phi,
+    ]);
+    x.fixed_rows_mut::<3>(10).copy_from(&motion.rates_rad_s);
+    x
+}
+
+/// The motion that a state vector stands for; yaw and roll within -pi to pi, pitch within -pi/2 to pi/2.
+#[inline]
+pub fn motion(v: &Vector) -> Motion {
+    let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
+    Motion {
+        position_m: v.fixed_rows::<3>(0).into(),
+        velocity_m_s: v.fixed_rows::<3>(3).into(),
+        attitude_rad: Vector3::new(
+            atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+            asin((2.0 * (w * y - x * z)).clamp(-1.0, 1.0)),
+            atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+        ),
+        rates_rad_s: v.fixed_rows::<3>(10).into(),
+    }
+}
+
+/// d eta/dt = N(eta)^-1 Omega (1), as corrected. Singular at a pitch of 90 degrees.
+pub fn euler_rates(attitude_rad: &Vector3<f64>, rates_rad_s: &Vector3<f64>) -> Vector3<f64> {
+    let (phi, theta) = (attitude_rad.x, attitude_rad.y);
+    let (p, q, r) = (rates_rad_s.x, rates_rad_s.y, rates_rad_s.z);
+    let across = sin(phi) * q + cos(phi) * r;
+    let psi_dot = across / cos(theta);
+    Vector3::new(p + psi_dot * sin(theta), cos(phi) * q - sin(phi) * r, psi_dot)
+}
+
+/// d/dt of the state vector, under a load that is held.
+#[inline]
+pub fn derivative(v: &Vector, load: &Load) -> Vector {
+    let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
+    let (p, q, r) = (v[10], v[11], v[12]);
+    let body_z = Vector3::new(2.0 * (w * y + x * z), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
+    let acceleration = load.acceleration(&body_z);
+    let angular_acceleration = load.angular_acceleration(&Vector3::new(p, q, r));
+    Vector::from([
+        v[3],
+        v[4],
+        v[5],
+        acceleration.x,
+        acceleration.y,
+        acceleration.z,
+        // Half the product of the quaternion with [0, Omega].
+        0.5 * (-x * p - y * q - z * r),
+        0.5 * (w * p + y * r - z * q),
+        0.5 * (w * q - x * r + z * p),
+        0.5 * (w * r + x * q - y * p),
+        angular_acceleration.x,
+        angular_acceleration.y,
+        angular_acceleration.z,
+    ])
+}
+
+/// Scales the quaternion back to unit length, which integration loses slowly.
+#[inline]
+pub(crate) fn normalise(v: &mut Vector) {
+    let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
+    let scale = 1.0 / sqrt(w * w + x * x + y * y + z * z);
+    v[6] *= scale;
+    v[7] *= scale;
+    v[8] *= scale;
+    v[9] *= scale;
+}

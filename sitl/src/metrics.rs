@@ -1,0 +1,77 @@
+//! Figures of merit of one flight.
+
+use crate::flight::Sample;
+use nalgebra::Vector4;
+
+/// Errors count from here on \[s\]: the start from afar is not tracking.
+pub const SETTLED_S: f64 = 5.0;
+
+/// Figures of merit: each vector is \[x, y, z, psi\] in m and rad, or \[U1, U2, U3, U4\] in N.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Metrics {
+    /// Root mean square error from [`SETTLED_S`] to the end.
+    pub rmse: Vector4<f64>,
+    /// Largest absolute error from [`SETTLED_S`] to the end.
+    pub max_abs: Vector4<f64>,
+    /// Error at the end, reference minus vehicle.
+    pub final_error: Vector4<f64>,
+    /// Mean |change of U| per step over the same time: what chatter costs.
+    pub mean_abs_delta_u: Vector4<f64>,
+}
+
+/// Gathers [`Metrics`] step by step.
+#[derive(Clone, Debug, Default)]
+pub struct Accumulator {
+    errors: u64,
+    changes: u64,
+    sum_squares: Vector4<f64>,
+    max_abs: Vector4<f64>,
+    last_error: Vector4<f64>,
+    sum_abs_delta_u: Vector4<f64>,
+    last_u: Option<Vector4<f64>>,
+}
+
+/// Reference minus vehicle: \[x, y, z, psi\], yaw the short way round.
+pub fn tracking_error(sample: &Sample) -> Vector4<f64> {
+    use core::f64::consts::TAU;
+    let position = sample.reference.position_m - sample.motion.position_m;
+    let yaw = sample.reference.yaw_rad - sample.motion.attitude_rad.z;
+    Vector4::new(position.x, position.y, position.z, yaw - TAU * libm::rint(yaw / TAU))
+}
+
+/// U1..U4 as the rotors give them \[N\].
+pub fn inputs(sample: &Sample) -> Vector4<f64> {
+    let u = afbc::allocation::Mixer::inputs(&sample.command.forces);
+    Vector4::new(u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n).cast()
+}
+
+impl Accumulator {
+    /// Takes one step into account.
+    pub fn add(&mut self, sample: &Sample) {
+        let error = tracking_error(sample);
+        self.last_error = error;
+        // Half a microsecond of slack: times are decimal, steps binary.
+        if sample.time_s < SETTLED_S - 5e-7 {
+            return;
+        }
+        self.errors += 1;
+        self.sum_squares += error.component_mul(&error);
+        self.max_abs = self.max_abs.sup(&error.abs());
+        let u = inputs(sample);
+        if let Some(last) = self.last_u.replace(u) {
+            self.changes += 1;
+            self.sum_abs_delta_u += (u - last).abs();
+        }
+    }
+
+    /// The figures so far; zero where there was nothing to measure.
+    pub fn finish(&self) -> Metrics {
+        let mean = |sum: Vector4<f64>, count: u64| if count == 0 { sum } else { sum / count as f64 };
+        Metrics {
+            rmse: mean(self.sum_squares, self.errors).map(libm::sqrt),
+            max_abs: self.max_abs,
+            final_error: self.last_error,
+            mean_abs_delta_u: mean(self.sum_abs_delta_u, self.changes),
+        }
+    }
+}

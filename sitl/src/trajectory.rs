@@ -1,0 +1,199 @@
+//! Reference trajectories with analytic first and second derivatives (assumption A5).
+//!
+//! Trigonometry is `libm`'s, so a flight gives the same bits on every host.
+
+use airframe::Setpoint;
+use core::f64::consts::{PI, TAU};
+use libm::{cos, sin, sincos};
+use nalgebra::Vector3;
+
+/// The reference at one time, earth frame; the quantities of [`Setpoint`] in `f64`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reference {
+    /// \[m\]
+    pub position_m: Vector3<f64>,
+    /// \[m/s\]
+    pub velocity_m_s: Vector3<f64>,
+    /// \[m/s2\]
+    pub acceleration_m_s2: Vector3<f64>,
+    /// psi_d \[rad\]
+    pub yaw_rad: f64,
+    /// \[rad/s\]
+    pub yaw_rate_rad_s: f64,
+    /// \[rad/s2\]
+    pub yaw_acceleration_rad_s2: f64,
+}
+
+impl Reference {
+    /// Stand still there.
+    pub fn rest(position_m: Vector3<f64>, yaw_rad: f64) -> Self {
+        Reference { position_m, yaw_rad, ..Reference::default() }
+    }
+
+    /// What the controller is told.
+    #[inline]
+    pub fn setpoint(&self) -> Setpoint {
+        Setpoint {
+            position_m: self.position_m.cast(),
+            velocity_m_s: self.velocity_m_s.cast(),
+            acceleration_m_s2: self.acceleration_m_s2.cast(),
+            yaw_rad: self.yaw_rad as f32,
+            yaw_rate_rad_s: self.yaw_rate_rad_s as f32,
+            yaw_acceleration_rad_s2: self.yaw_acceleration_rad_s2 as f32,
+        }
+    }
+}
+
+/// A place to be at rest at a given time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Waypoint {
+    /// \[s\]
+    pub time_s: f64,
+    /// \[m\]
+    pub position_m: Vector3<f64>,
+    /// \[rad\]
+    pub yaw_rad: f64,
+}
+
+/// A sine along one axis: amplitude sin(2 pi t / period + phase).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sine {
+    /// \[m\]
+    pub amplitude_m: f64,
+    /// \[s\]
+    pub period_s: f64,
+    /// \[rad\]
+    pub phase_rad: f64,
+}
+
+impl Sine {
+    /// Value and two derivatives at time `t`.
+    fn at(&self, t: f64) -> [f64; 3] {
+        let rate = TAU / self.period_s;
+        let (s, c) = sincos(rate * t + self.phase_rad);
+        [self.amplitude_m * s, self.amplitude_m * rate * c, -self.amplitude_m * rate * rate * s]
+    }
+}
+
+/// A reference trajectory.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Trajectory {
+    /// Section IV: a tilted ellipse from 2 m to 8 m height, once round in 60 s.
+    Paper,
+    /// One place, one heading.
+    Hover {
+        /// \[m\]
+        position_m: Vector3<f64>,
+        /// \[rad\]
+        yaw_rad: f64,
+    },
+    /// From one place to another at once.
+    Step {
+        /// Before `at_s` \[m\].
+        from_m: Vector3<f64>,
+        /// From `at_s` on \[m\].
+        to_m: Vector3<f64>,
+        /// When \[s\].
+        at_s: f64,
+        /// \[rad\]
+        yaw_rad: f64,
+    },
+    /// Level circle, counter-clockwise from above, starting at +x of the centre.
+    Circle {
+        /// \[m\]
+        centre_m: Vector3<f64>,
+        /// \[m\]
+        radius_m: f64,
+        /// Once round \[s\].
+        period_s: f64,
+        /// \[rad\]
+        yaw_rad: f64,
+    },
+    /// One sine an axis about a centre.
+    Lissajous {
+        /// \[m\]
+        centre_m: Vector3<f64>,
+        /// x, y, z.
+        sines: [Sine; 3],
+        /// \[rad\]
+        yaw_rad: f64,
+    },
+    /// Minimum-jerk motion from rest to rest between waypoints whose times rise; before the first and after the last,
+    /// rest. Position, velocity and acceleration are continuous.
+    Waypoints(Vec<Waypoint>),
+}
+
+impl Trajectory {
+    /// The reference at time `t` \[s\].
+    #[inline]
+    pub fn at(&self, t: f64) -> Reference {
+        match self {
+            Trajectory::Paper => paper(t),
+            Trajectory::Hover { position_m, yaw_rad } => Reference::rest(*position_m, *yaw_rad),
+            Trajectory::Step { from_m, to_m, at_s, yaw_rad } => {
+                Reference::rest(if t < *at_s { *from_m } else { *to_m }, *yaw_rad)
+            }
+            Trajectory::Circle { centre_m, radius_m, period_s, yaw_rad } => {
+                let rate = TAU / period_s;
+                let radius = Vector3::new(cos(rate * t), sin(rate * t), 0.0) * *radius_m;
+                Reference {
+                    position_m: centre_m + radius,
+                    velocity_m_s: Vector3::new(-radius.y, radius.x, 0.0) * rate,
+                    acceleration_m_s2: -radius * (rate * rate),
+                    ..Reference::rest(*centre_m, *yaw_rad)
+                }
+            }
+            Trajectory::Lissajous { centre_m, sines, yaw_rad } => {
+                let [x, y, z] = sines.map(|sine| sine.at(t));
+                let [position, velocity_m_s, acceleration_m_s2] =
+                    [0, 1, 2].map(|order: usize| Vector3::new(x[order], y[order], z[order]));
+                Reference {
+                    position_m: centre_m + position,
+                    velocity_m_s,
+                    acceleration_m_s2,
+                    ..Reference::rest(*centre_m, *yaw_rad)
+                }
+            }
+            Trajectory::Waypoints(waypoints) => between(waypoints, t),
+        }
+    }
+}
+
+/// Section IV, with sin(a + pi/2) = cos a and sin(a + pi) = -sin a written out.
+fn paper(t: f64) -> Reference {
+    let rate = PI / 30.0;
+    let (s, c) = sincos(rate * t);
+    Reference {
+        position_m: Vector3::new(1.0 - c, 2.0 * s, 5.0 - 3.0 * c),
+        velocity_m_s: Vector3::new(s, 2.0 * c, 3.0 * s) * rate,
+        acceleration_m_s2: Vector3::new(c, -2.0 * s, 3.0 * c) * (rate * rate),
+        yaw_rad: -0.43 * s,
+        yaw_rate_rad_s: -0.43 * rate * c,
+        yaw_acceleration_rad_s2: 0.43 * rate * rate * s,
+    }
+}
+
+/// Minimum jerk: 10 s^3 - 15 s^4 + 6 s^5 over each leg.
+fn between(waypoints: &[Waypoint], t: f64) -> Reference {
+    let next = waypoints.partition_point(|waypoint| waypoint.time_s <= t);
+    let before = waypoints[..next].last();
+    let (from, to) = match (before, waypoints.get(next)) {
+        (Some(from), Some(to)) => (from, to),
+        (Some(only), None) | (None, Some(only)) => return Reference::rest(only.position_m, only.yaw_rad),
+        (None, None) => return Reference::default(),
+    };
+    let length = to.time_s - from.time_s;
+    let s = (t - from.time_s) / length;
+    let blend = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
+    let blend_dot = 30.0 * s * s * (1.0 - s) * (1.0 - s) / length;
+    let blend_ddot = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (length * length);
+    let (leg, turn) = (to.position_m - from.position_m, to.yaw_rad - from.yaw_rad);
+    Reference {
+        position_m: from.position_m + leg * blend,
+        velocity_m_s: leg * blend_dot,
+        acceleration_m_s2: leg * blend_ddot,
+        yaw_rad: from.yaw_rad + turn * blend,
+        yaw_rate_rad_s: turn * blend_dot,
+        yaw_acceleration_rad_s2: turn * blend_ddot,
+    }
+}
