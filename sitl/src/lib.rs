@@ -2,6 +2,8 @@
 
 pub mod flight;
 pub mod metrics;
+pub mod output;
 pub mod paper;
+pub mod run;
 pub mod scenario;
 pub mod trajectory;

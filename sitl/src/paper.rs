@@ -85,28 +85,44 @@ impl Uncertainty {
 pub const UNCERTAIN_S: [f64; 2] = [20.0, 40.0];
 
 /// Onset of each gust \[s\].
-pub const GUSTS_S: [(Axis, f64); 6] = [
-    (Axis::X, 7.5),
-    (Axis::Roll, 15.0),
-    (Axis::Y, 22.5),
-    (Axis::Pitch, 30.0),
-    (Axis::Z, 37.5),
-    (Axis::Yaw, 45.0),
-];
+pub const GUSTS_S: [(Axis, f64); 6] =
+    [(Axis::X, 7.5), (Axis::Roll, 15.0), (Axis::Y, 22.5), (Axis::Pitch, 30.0), (Axis::Z, 37.5), (Axis::Yaw, 45.0)];
 
 /// Size of each gust: m/s2 and rad/s2, or N and N m.
 const GUST: f64 = 1.2;
 
-/// The experiment: `None` leaves gusts or uncertainty out.
+/// One reading of the experiment; `None` leaves gusts or uncertainty out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Case {
+    /// How the gusts are read.
+    pub reading: Option<Reading>,
+    /// Which way the parameters are off.
+    pub uncertainty: Option<Uncertainty>,
+}
+
+impl Case {
+    /// The default reading of Section IV.
+    pub const DEFAULT: Self = Case { reading: Some(Reading::Persistent), uncertainty: Some(Uncertainty::DEFAULT) };
+
+    /// Short name: `calm`, `uncertain`, `gusts`, `pulses`, `forces`, or `paper` when both gusts and uncertainty are on.
+    pub const fn name(self) -> &'static str {
+        match (self.reading, self.uncertainty) {
+            (None, None) => "calm",
+            (None, Some(_)) => "uncertain",
+            (Some(Reading::Persistent), None) => "gusts",
+            (Some(Reading::Pulses), None) => "pulses",
+            (Some(Reading::Forces), None) => "forces",
+            (Some(_), Some(_)) => "paper",
+        }
+    }
+}
+
+/// The experiment in one reading, on one model of the vehicle.
 ///
 /// # Errors
 /// None in fact: the paper's parameters are in range.
-pub fn scenario(
-    model: Model,
-    reading: Option<Reading>,
-    uncertainty: Option<Uncertainty>,
-) -> Result<Scenario, OutOfRange> {
-    let gusts = reading.map_or(Vec::new(), |reading| {
+pub fn scenario(model: Model, case: Case) -> Result<Scenario, OutOfRange> {
+    let gusts = case.reading.map_or(Vec::new(), |reading| {
         let (kind, length_s) = match reading {
             Reading::Persistent => (GustKind::Acceleration, f64::INFINITY),
             Reading::Pulses => (GustKind::Acceleration, 1.0),
@@ -114,15 +130,16 @@ pub fn scenario(
         };
         GUSTS_S.map(|(axis, start_s)| Gust { axis, kind, size: GUST, start_s, end_s: start_s + length_s }).to_vec()
     });
-    let changes = uncertainty.map_or(Vec::new(), |Uncertainty { inertia, thrust }| {
+    let changes = case.uncertainty.map_or(Vec::new(), |Uncertainty { inertia, thrust }| {
         let [start_s, end_s] = UNCERTAIN_S;
         let change = |quantity, factor| ParameterChange { quantity, factor, start_s, end_s };
         vec![change(Quantity::Inertia, inertia.factor(0.75)), change(Quantity::ThrustFactor, thrust.factor(0.4))]
     });
     let profile = Profile::Paper;
     Ok(Scenario {
-        name: "paper".into(),
+        name: case.name().into(),
         description: "the paper's flight, Section IV".into(),
+        case: Some(case),
         duration_s: 60.0,
         model,
         vehicle: Parameters::PAPER,

@@ -1,5 +1,6 @@
 //! What is flown: one vehicle, one trajectory, one environment, the controllers to compare.
 
+use crate::paper::Case;
 use crate::trajectory::Trajectory;
 use afbc::{Profile, Settings, adaptive};
 use airframe::{Parameters, PerAxis, Range};
@@ -45,6 +46,8 @@ pub struct Scenario {
     pub name: String,
     /// One line for people.
     pub description: String,
+    /// Which reading of the paper's experiment this is, if it is one.
+    pub case: Option<Case>,
     /// Length of the flight \[s\].
     pub duration_s: f64,
     /// Equations that move the vehicle.

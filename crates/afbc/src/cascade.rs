@@ -76,7 +76,7 @@ pub struct Controller<L> {
 pub struct Memory<E> {
     /// Estimates of each subsystem.
     pub estimates: PerAxis<E>,
-    /// Filtered phi_d and theta_d; none before the first step.
+    /// Filtered phi_d and theta_d; none before the first step, whose command they start from, at rest.
     filtered: Option<[Filtered; 2]>,
     /// The last plausible state and setpoint.
     state: Option<State>,
@@ -191,7 +191,7 @@ impl<L: Law> Controller<L> {
         let desired_rad = desired_attitude(u5, u6, eta.z, self.inverse_gravity);
         let [phi_d, theta_d] = desired_rad;
         let at_rest = |angle| Filtered { angle, rate: 0.0 };
-        let filtered = memory.filtered.unwrap_or([at_rest(eta.x), at_rest(eta.y)]);
+        let filtered = memory.filtered.unwrap_or(desired_rad.map(at_rest));
         let [roll_d, pitch_d] = filtered;
 
         // Attitude: subsystems 1, 2, 3.

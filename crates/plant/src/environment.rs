@@ -95,11 +95,7 @@ impl Environment {
     ///
     /// # Errors
     /// The first parameter out of range, as it stands or at any time under the changes.
-    pub fn new(
-        nominal: Parameters<f64>,
-        changes: Vec<ParameterChange>,
-        gusts: Vec<Gust>,
-    ) -> Result<Self, OutOfRange> {
+    pub fn new(nominal: Parameters<f64>, changes: Vec<ParameterChange>, gusts: Vec<Gust>) -> Result<Self, OutOfRange> {
         let environment = Environment { nominal, changes, gusts };
         nominal.validate()?;
         for change in &environment.changes {
