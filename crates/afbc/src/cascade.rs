@@ -147,6 +147,8 @@ impl<L: Law> Controller<L> {
 
     /// One step: from what is measured and wanted to rotor speeds. Cannot fail; see [`Health`] for what it does with
     /// input that is not plausible.
+    // Always: there is one caller, and copying the command out of a call costs a tenth of a closed-loop step.
+    #[inline(always)]
     pub fn step(&self, memory: &mut Memory<L::Estimate>, state: &State, setpoint: &Setpoint) -> Command {
         let mut health = Health {
             state_rejected: !state.is_plausible(),
