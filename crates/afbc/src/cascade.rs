@@ -6,6 +6,7 @@ use crate::allocation::{FORCE_MAX, Mixer};
 use crate::backstepping::{Errors, Tracking};
 use crate::command_filter::{CommandFilter, Filtered};
 use crate::math;
+use crate::screen::Screen;
 use airframe::{Axis, Inputs, OutOfRange, Parameters, PerAxis, Range, RotorForces, RotorSpeeds, Setpoint, State};
 
 /// Accepted time between steps \[s\].
@@ -78,9 +79,7 @@ pub struct Memory<E> {
     pub estimates: PerAxis<E>,
     /// Filtered phi_d and theta_d; none before the first step, whose command they start from, at rest.
     filtered: Option<[Filtered; 2]>,
-    /// The last plausible state and setpoint.
-    state: Option<State>,
-    setpoint: Option<Setpoint>,
+    screen: Screen,
     rotor_residual_rad_s: f32,
 }
 
@@ -150,22 +149,10 @@ impl<L: Law> Controller<L> {
     // Always: there is one caller, and copying the command out of a call costs a tenth of a closed-loop step.
     #[inline(always)]
     pub fn step(&self, memory: &mut Memory<L::Estimate>, state: &State, setpoint: &Setpoint) -> Command {
-        let mut health = Health {
-            state_rejected: !state.is_plausible(),
-            setpoint_rejected: !setpoint.is_plausible(),
-            saturated: false,
-        };
-        if !health.state_rejected {
-            memory.state = Some(*state);
-        }
-        let Some(state) = memory.state else {
+        let mut health = Health::default();
+        let Some((state, setpoint)) = memory.screen.pass(state, setpoint, &mut health) else {
             return Command { health, ..Command::default() };
         };
-        if !health.setpoint_rejected {
-            memory.setpoint = Some(*setpoint);
-        }
-        let setpoint = *memory.setpoint.get_or_insert(Setpoint::hold(&state));
-
         let context = Context {
             state: &state,
             rotor_residual_rad_s: memory.rotor_residual_rad_s,

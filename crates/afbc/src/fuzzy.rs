@@ -1,8 +1,8 @@
 //! Fuzzy basis: 3 Gaussians x 2 inputs = 9 rules, (17)-(19).
 //!
 //! The memberships of one input are three Gaussians of one width s at -c, 0 and c. A product of memberships factorises,
-//! and so does the sum in the denominator of (18): the nine weights are the outer product of two triples over the product
-//! of their sums. Dividing a triple by its middle Gaussian leaves, with k = c/s^2 and q = exp(-c^2 / 2s^2),
+//! and so does the sum in the denominator of (18): the nine weights are the outer product of two triples that each sum
+//! to one. Dividing a triple by its middle Gaussian leaves, with k = c/s^2 and q = exp(-c^2 / 2s^2),
 //!
 //! ```text
 //! [q exp(-k x), 1, q exp(k x)]
@@ -69,14 +69,17 @@ impl Basis {
     #[inline]
     pub fn weights(&self, inputs: [f32; 2]) -> Matrix3<f32> {
         let [first, second] = inputs.map(|x| self.triple(x));
-        first * (second / (first.sum() * second.sum())).transpose()
+        first * second.transpose()
     }
 
-    /// The memberships of one input up to a common factor: \[q t^2, t, q\], mirrored for a negative input.
+    /// The normalised memberships of one input.
     #[inline]
     fn triple(&self, x: f32) -> Vector3<f32> {
         let t = math::exp(-self.k * x.abs());
         let (near, middle, far) = (self.q, t, self.q * t * t);
-        if x < 0.0 { Vector3::new(near, middle, far) } else { Vector3::new(far, middle, near) }
+        // Each triple by its own sum: so no weight exceeds 1, rounding included.
+        let scale = 1.0 / (near + middle + far);
+        let (left, right) = if x < 0.0 { (near, far) } else { (far, near) };
+        Vector3::new(left, middle, right) * scale
     }
 }

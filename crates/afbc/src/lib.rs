@@ -41,8 +41,10 @@ pub mod fuzzy;
 pub mod math;
 pub mod model;
 mod profile;
+mod screen;
 
 pub use adaptive::Adaptive;
 pub use backstepping::Backstepping;
 pub use cascade::{Command, Controller, Health, Law, Memory, Settings};
 pub use profile::Profile;
+pub use screen::Screen;
