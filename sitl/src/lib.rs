@@ -1,9 +1,11 @@
 //! Software in the loop: scenarios, lockstep flights, logs, figures. See the `sitl` binary for the command line.
 
+pub mod claims;
 pub mod flight;
 pub mod metrics;
 pub mod output;
 pub mod paper;
+pub mod results;
 pub mod run;
 pub mod scenario;
 pub mod trajectory;

@@ -81,6 +81,9 @@ impl Uncertainty {
     ];
 }
 
+/// Length of the experiment \[s\].
+pub const DURATION_S: f64 = 60.0;
+
 /// When parameters are off \[s\].
 pub const UNCERTAIN_S: [f64; 2] = [20.0, 40.0];
 
@@ -140,7 +143,7 @@ pub fn scenario(model: Model, case: Case) -> Result<Scenario, OutOfRange> {
         name: case.name().into(),
         description: "the paper's flight, Section IV".into(),
         case: Some(case),
-        duration_s: 60.0,
+        duration_s: DURATION_S,
         model,
         vehicle: Parameters::PAPER,
         environment: Environment::new(Parameters::PAPER, changes, gusts)?,

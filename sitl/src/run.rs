@@ -1,9 +1,10 @@
 //! One flight with everything that is reported of it.
 
 use crate::flight::{Lost, Sample, fly};
-use crate::metrics::{Accumulator, Metrics};
+use crate::metrics::{Accumulator, Metrics, inputs};
 use crate::scenario::{ControllerKind, Scenario};
 use airframe::OutOfRange;
+use nalgebra::Vector4;
 
 /// A flown scenario under one law.
 #[derive(Clone, Debug)]
@@ -16,6 +17,9 @@ pub struct Run {
     pub metrics: Metrics,
     /// Every `log_every`-th step, and the last one.
     pub log: Vec<Sample>,
+    /// For each row of the log, the lowest and the highest U1..U4 \[N\] of all steps since the row before: chatter is
+    /// faster than the log.
+    pub input_extremes: Vec<[Vector4<f64>; 2]>,
 }
 
 impl Run {
@@ -24,21 +28,30 @@ impl Run {
     /// # Errors
     /// The first parameter, gain or setting out of range; nothing has been flown then.
     pub fn fly(scenario: &Scenario, controller: ControllerKind, log_every: u64) -> Result<Self, OutOfRange> {
+        let log_every = log_every.max(1);
         let mut metrics = Accumulator::default();
-        let mut log = Vec::new();
-        let mut last = None;
+        let (mut log, mut input_extremes) = (Vec::new(), Vec::new());
+        let mut unlogged: Option<(Sample, [Vector4<f64>; 2])> = None;
         let mut step = 0;
         let lost = fly(scenario, controller, |sample| {
             metrics.add(sample);
-            if step % log_every.max(1) == 0 {
+            let u = inputs(sample);
+            let extremes = match unlogged.take() {
+                Some((_, [low, high])) => [u.inf(&low), u.sup(&high)],
+                None => [u, u],
+            };
+            if step % log_every == 0 {
                 log.push(*sample);
-                last = None;
+                input_extremes.push(extremes);
             } else {
-                last = Some(*sample);
+                unlogged = Some((*sample, extremes));
             }
             step += 1;
         })?;
-        log.extend(last);
-        Ok(Run { controller, lost, metrics: metrics.finish(), log })
+        if let Some((last, extremes)) = unlogged {
+            log.push(last);
+            input_extremes.push(extremes);
+        }
+        Ok(Run { controller, lost, metrics: metrics.finish(), log, input_extremes })
     }
 }

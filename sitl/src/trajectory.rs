@@ -144,13 +144,11 @@ impl Trajectory {
                 }
             }
             Trajectory::Lissajous { centre_m, sines, yaw_rad } => {
-                let [x, y, z] = sines.map(|sine| sine.at(t));
-                let [position, velocity_m_s, acceleration_m_s2] =
-                    [0, 1, 2].map(|order: usize| Vector3::new(x[order], y[order], z[order]));
+                let [[x, vx, ax], [y, vy, ay], [z, vz, az]] = sines.map(|sine| sine.at(t));
                 Reference {
-                    position_m: centre_m + position,
-                    velocity_m_s,
-                    acceleration_m_s2,
+                    position_m: centre_m + Vector3::new(x, y, z),
+                    velocity_m_s: Vector3::new(vx, vy, vz),
+                    acceleration_m_s2: Vector3::new(ax, ay, az),
                     ..Reference::rest(*centre_m, *yaw_rad)
                 }
             }
@@ -176,7 +174,7 @@ fn paper(t: f64) -> Reference {
 /// Minimum jerk: 10 s^3 - 15 s^4 + 6 s^5 over each leg.
 fn between(waypoints: &[Waypoint], t: f64) -> Reference {
     let next = waypoints.partition_point(|waypoint| waypoint.time_s <= t);
-    let before = waypoints[..next].last();
+    let before = next.checked_sub(1).and_then(|index| waypoints.get(index));
     let (from, to) = match (before, waypoints.get(next)) {
         (Some(from), Some(to)) => (from, to),
         (Some(only), None) | (None, Some(only)) => return Reference::rest(only.position_m, only.yaw_rad),

@@ -1,7 +1,28 @@
 //! What a flight leaves behind: table, CSV, summary, figures, report.
+//!
+//! [`write()`] fills a folder; [`table()`] is for the terminal. The same flights give the same bytes: nothing here knows the
+//! time of day or the machine.
 
+mod csv;
+mod error;
+mod figures;
+mod files;
+mod report;
+mod summary;
+mod table;
+mod words;
+
+#[cfg(test)]
+mod tests;
+
+pub use error::Error;
+pub use table::table;
+
+use crate::claims::Claim;
+use crate::metrics::SETTLED_S;
 use crate::run::Run;
 use crate::scenario::Scenario;
+use std::path::{Path, PathBuf};
 
 /// One flown law of one scenario.
 #[derive(Clone, Debug)]
@@ -10,4 +31,53 @@ pub struct Flown {
     pub scenario: Scenario,
     /// How it went.
     pub run: Run,
+}
+
+/// Creates the folder `dir` if need be: worth doing before a long flight.
+///
+/// # Errors
+/// If there can be no such folder.
+pub fn prepare(dir: &Path) -> Result<(), Error> {
+    files::Folder::create(dir).map(|_| ())
+}
+
+/// Writes everything about `flown` into the folder `dir`, which is created if need be, and returns the paths written:
+///
+/// * `<stem>-<controller>.csv`: each run's log;
+/// * `fig4-trajectory.svg`, `fig5-outputs.svg`, `fig6-attitude.svg`, `fig7-errors.svg`, `fig8-inputs.svg`: the counterparts
+///   of the paper's figures, all laws overlaid; of several scenarios, each has its own set `<stem>-fig4-trajectory.svg`
+///   etc.;
+/// * `summary.json`: the figures of merit of each run;
+/// * `report.html`: all of it on one page that needs no other file.
+///
+/// The stem is the scenario's name. Scenarios that share a name add what tells them apart: reading, signs, plant,
+/// profile, or else a number. A file appears whole or not at all: each is written under a temporary name first.
+///
+/// # Errors
+/// The first folder or file that could not be written.
+pub fn write(dir: &Path, flown: &[Flown], claims: &[Claim]) -> Result<Vec<PathBuf>, Error> {
+    let folder = files::Folder::create(dir)?;
+    let groups = files::groups(flown);
+    let mut paths = Vec::new();
+    let mut sets = Vec::new();
+    for group in &groups {
+        for (flight, name) in group.flights.iter().zip(&group.csv_names) {
+            paths.push(folder.place(name, |out| csv::write(out, flight))?);
+        }
+        let figures = figures::draw(&group.flights).map_err(|source| folder.error("figures", source))?;
+        for figure in &figures {
+            let name = format!("{}{}.svg", group.figure_prefix, figure.name);
+            paths.push(folder.place(&name, |out| out.write_all(figure.svg.as_bytes()))?);
+        }
+        sets.push(figures);
+    }
+    paths.push(folder.place("summary.json", |out| summary::write(out, flown))?);
+    let page = report::page(&groups, &sets, claims);
+    paths.push(folder.place("report.html", |out| out.write_all(page.as_bytes()))?);
+    Ok(paths)
+}
+
+/// Whether the flight reached the time from which errors count.
+fn settled(run: &Run) -> bool {
+    run.log.last().is_some_and(|last| last.time_s >= SETTLED_S)
 }

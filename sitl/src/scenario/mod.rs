@@ -1,9 +1,22 @@
 //! What is flown: one vehicle, one trajectory, one environment, the controllers to compare.
+//!
+//! A scenario comes from [`crate::paper`], from a file ([`load`]) or from the [`built_in`] ones.
 
+mod built_in;
+mod error;
+mod file;
+mod reader;
+mod words;
+
+pub use built_in::{BUILT_IN, BuiltIn, built_in, similar_built_in};
+pub use error::FileError;
+pub use file::{load, parse};
+
+use crate::flight::{Flight, adaptive_law, backstepping_law};
 use crate::paper::Case;
 use crate::trajectory::Trajectory;
 use afbc::{Profile, Settings, adaptive};
-use airframe::{Parameters, PerAxis, Range};
+use airframe::{OutOfRange, Parameters, PerAxis, Range};
 use plant::{Environment, Model, Motion};
 
 /// Accepted length of a flight \[s\].
@@ -68,4 +81,17 @@ pub struct Scenario {
     pub gains: PerAxis<adaptive::Gains>,
     /// Settings of the cascade.
     pub settings: Settings,
+}
+
+impl Scenario {
+    /// Builds every controller once, just as a flight would.
+    ///
+    /// # Errors
+    /// The first parameter, gain or setting out of range.
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        self.controllers.iter().try_for_each(|kind| match kind {
+            ControllerKind::Afbc => Flight::new(self, adaptive_law(self)?).map(drop),
+            ControllerKind::Backstepping => Flight::new(self, backstepping_law(self)?).map(drop),
+        })
+    }
 }

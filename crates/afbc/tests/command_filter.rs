@@ -1,0 +1,131 @@
+//! Properties of the command filter at every bandwidth and step that is accepted.
+#![allow(clippy::unwrap_used, missing_docs)] // a filter that cannot be built must stop the test
+
+use afbc::cascade::DT;
+use afbc::command_filter::{BANDWIDTH, CommandFilter, Filtered};
+use proptest::prelude::*;
+
+/// Rounding error of one `f32` operation, relative.
+const U: f64 = 1.0 / (1 << 24) as f64;
+
+/// Any accepted bandwidth and step, their bounds drawn often; evenly spread over orders of magnitude.
+fn bandwidth_and_step() -> impl Strategy<Value = (f32, f32)> {
+    let over = |range: airframe::Range| {
+        prop_oneof![
+            4 => (range.min.ln()..=range.max.ln()).prop_map(move |x| x.exp().clamp(range.min, range.max) as f32),
+            1 => Just(range.min as f32),
+            1 => Just(range.max as f32),
+        ]
+    };
+    (over(BANDWIDTH), over(DT))
+}
+
+fn filtered() -> impl Strategy<Value = Filtered> {
+    (-1.6_f32..1.6, -20.0_f32..20.0).prop_map(|(angle, rate)| Filtered { angle, rate })
+}
+
+/// The exact solution of d^2 x/dt^2 = w^2 (command - x) - 2 w dx/dt after time t, in `f64`.
+fn exact(w: f64, t: f64, state: &Filtered, command: f32) -> [f64; 2] {
+    let (c, v) = (f64::from(command), f64::from(state.rate));
+    let offset = f64::from(state.angle) - c;
+    // The general solution c + (A + B t) exp(-w t) with its derivative.
+    let (a, b) = (offset, v + w * offset);
+    let decay = (-w * t).exp();
+    [c + (a + b * t) * decay, (b - w * (a + b * t)) * decay]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 5_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn one_step_is_the_exact_solution((w, dt) in bandwidth_and_step(), state in filtered(), command in -1.6_f32..1.6) {
+        let next = CommandFilter::new(w, dt).unwrap().advance(&state, command);
+        let (w, dt) = (f64::from(w), f64::from(dt));
+        let [angle, rate] = exact(w, dt, &state, command);
+        // The sizes that are added: |command|, |offset|, w dt |offset|, dt |rate|, with 8 roundings, and the decay's
+        // relative error of 1.2e-7 + u w dt for its rounded argument.
+        let offset = f64::from(state.angle - command).abs();
+        let slope = f64::from(state.rate).abs() + w * offset;
+        let decay = (-w * dt).exp();
+        let relative = 8.0 * U + 1.2e-7 + U * w * dt;
+        let angle_size = f64::from(command.abs()) + (offset + slope * dt) * decay;
+        let rate_size = (f64::from(state.rate).abs() + w * slope * dt) * decay;
+        // Rounding of the offset itself: u of both angles, carried by both sums.
+        let carried = U * (f64::from(state.angle.abs()) + f64::from(command.abs())) * (1.0 + w * dt) * decay;
+        prop_assert!((f64::from(next.angle) - angle).abs() <= relative * angle_size + carried, "{next:?} for {angle}, {rate}");
+        prop_assert!((f64::from(next.rate) - rate).abs() <= relative * rate_size + w * (1.0 + w * dt) * carried, "{next:?} for {angle}, {rate}");
+    }
+
+    /// `rate` is the derivative of `angle` and `acceleration` that of `rate`, by differences of the filter's own steps.
+    #[test]
+    fn rate_and_acceleration_are_derivatives(w in 1.0_f32..60.0, state in filtered(), command in -1.6_f32..1.6) {
+        let dt = 1e-3_f32;
+        let filter = CommandFilter::new(w, dt).unwrap();
+        let next = filter.advance(&state, command);
+        let (w, h) = (f64::from(w), f64::from(dt));
+        let mean = |a: f32, b: f32| (f64::from(a) + f64::from(b)) / 2.0;
+        let difference = |a: f32, b: f32| (f64::from(b) - f64::from(a)) / h;
+        // The trapezium rule is off by h^2/12 of the second derivative. The third and fourth derivatives of
+        // (A + B t) exp(-w t) are at most w^2 (3 B + w A) and w^3 (4 B + w A).
+        let offset = f64::from(state.angle - command).abs();
+        let b = f64::from(state.rate).abs() + w * offset;
+        let (third, fourth) = (w * w * (3.0 * b + w * offset), w * w * w * (4.0 * b + w * offset));
+        // A difference quotient amplifies the roundings of what it subtracts by 1/h.
+        let angle_rounding = 16.0 * U * (1.6 + offset + b * h) / h;
+        let rate_rounding = 16.0 * U * (1.0 + w * h) * (f64::from(state.rate).abs() + w * (offset + 1.6)) / h;
+        let rate_error = difference(state.angle, next.angle) - mean(state.rate, next.rate);
+        prop_assert!(rate_error.abs() <= h * h / 12.0 * third + angle_rounding, "{rate_error:e}");
+        let accelerations = mean(filter.acceleration(&state, command), filter.acceleration(&next, command));
+        let acceleration_error = difference(state.rate, next.rate) - accelerations;
+        prop_assert!(acceleration_error.abs() <= h * h / 12.0 * fourth + rate_rounding, "{acceleration_error:e}");
+    }
+
+    #[test]
+    fn it_converges_to_the_command((w, dt) in bandwidth_and_step(), state in filtered(), command in -1.6_f32..1.6) {
+        let filter = CommandFilter::new(w, dt).unwrap();
+        // exp(-25) (1 + 25) is 4e-10 of the start.
+        let steps = (25.0 / (f64::from(w) * f64::from(dt))).ceil() as u32 + 1;
+        let settled = (0..steps).fold(state, |state, _| filter.advance(&state, command));
+        // What is left is rounding: each step rounds the command's own size once, and a slow filter (w dt = 1e-4) sums
+        // the roundings of as many steps as its time constant 1/(w dt) is long.
+        let lasting = 2.0 * U * f64::from(command.abs()) * (1.0 + 2.0 / (f64::from(w) * f64::from(dt)));
+        let left = 4e-10 * (20.0 / f64::from(w) + 4.0);
+        prop_assert!((f64::from(settled.angle) - f64::from(command)).abs() <= lasting + left + 1e-7, "{settled:?} for {command}");
+        prop_assert!(f64::from(settled.rate).abs() <= f64::from(w) * (lasting + left + 1e-7), "{settled:?} for {command}");
+    }
+
+    /// From rest a critically damped filter never passes a command, whatever w dt is.
+    #[test]
+    fn it_does_not_overshoot((w, dt) in bandwidth_and_step(), from in -1.6_f32..1.6, command in -1.6_f32..1.6) {
+        let filter = CommandFilter::new(w, dt).unwrap();
+        let mut state = Filtered { angle: from, rate: 0.0 };
+        let (low, high) = (from.min(command) - 1e-6, from.max(command) + 1e-6);
+        for _ in 0..2000 {
+            state = filter.advance(&state, command);
+            prop_assert!((low..=high).contains(&state.angle), "{state:?} outside {low} to {high}");
+        }
+    }
+
+    /// Commands within +-pi/2, as (40) gives them, keep angle and rate bounded in any order: the filter's impulse
+    /// response w^2 t exp(-w t) is positive with area 1, and that of its rate has the absolute area 2 w / e.
+    #[test]
+    fn bounded_commands_keep_it_bounded(
+        (w, dt) in bandwidth_and_step(), commands in prop::collection::vec(-1.5708_f32..1.5708, 1..300), relay in any::<bool>(),
+    ) {
+        let filter = CommandFilter::new(w, dt).unwrap();
+        let mut state = Filtered::default();
+        for command in commands {
+            let command = if relay { 1.5708_f32.copysign(command) } else { command };
+            state = filter.advance(&state, command);
+            prop_assert!(state.angle.abs() <= 1.5709, "{state:?}");
+            prop_assert!(f64::from(state.rate).abs() <= 2.0 * f64::from(w) / core::f64::consts::E * 1.5709, "{state:?}");
+        }
+    }
+}
+
+#[test]
+fn a_bandwidth_out_of_range_is_refused_by_name() {
+    for bandwidth in [0.0, 0.99, 1000.1, -40.0, f32::NAN, f32::INFINITY] {
+        assert_eq!(CommandFilter::new(bandwidth, 0.001).unwrap_err().range, BANDWIDTH);
+    }
+}

@@ -1,0 +1,192 @@
+//! Properties of the laws: backstepping (9)-(16), (21), and AFBC (20)-(22), (32)-(34).
+#![allow(clippy::unwrap_used, missing_docs)] // a law that cannot be built must stop the test
+
+use afbc::adaptive::{Estimate, Gains, Subsystem};
+use afbc::backstepping::{self, Errors, Tracking, ideal, proportional};
+use afbc::cascade::Context;
+use afbc::fuzzy::{Basis, Membership};
+use afbc::model::Dynamics;
+use afbc::{Adaptive, Law, Profile};
+use airframe::{Axis, PerAxis, State};
+use nalgebra::Matrix3;
+use proptest::prelude::*;
+
+/// Rounding error of one `f32` operation, relative.
+const U: f64 = 1.0 / (1 << 24) as f64;
+
+fn tracking() -> impl Strategy<Value = Tracking> {
+    (-10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0)
+        .prop_map(|(x1, x2, e1, x1d_dot, x1d_ddot)| Tracking { x1, x2, e1, x1d_dot, x1d_ddot })
+}
+
+fn gains() -> impl Strategy<Value = Gains> {
+    let membership = prop_oneof![Just((0.26_f32, 0.1_f32)), Just((10.0, 4.0))];
+    (
+        0.01_f32..10.0,
+        0.0_f32..20.0,
+        0.0_f32..20.0,
+        0.0_f32..5.0,
+        prop_oneof![Just(0.001_f32), 0.001_f32..1.0],
+        membership,
+    )
+        .prop_map(|(alpha1, alpha2, gamma, eta, epsilon, (centre, width))| Gains {
+            backstepping: backstepping::Gains { alpha1, alpha2 },
+            gamma,
+            eta,
+            epsilon,
+            membership: Membership { centre, width },
+        })
+}
+
+fn estimate() -> impl Strategy<Value = Estimate> {
+    (prop::array::uniform9(-5.0_f32..5.0), 0.0_f32..5.0)
+        .prop_map(|(theta, delta)| Estimate { theta: Matrix3::from_row_slice(&theta), delta })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 5_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// With f, g and dg/dt known, (15) becomes -alpha_1 e_1^2 - alpha_2 e_2^2: everything else in (14) cancels.
+    #[test]
+    fn backstepping_leaves_only_the_damping_in_the_lyapunov_rate(
+        tracking in tracking(), alpha1 in 0.01_f32..10.0, alpha2 in 0.0_f32..20.0,
+        f in -20.0_f32..20.0, g in 0.05_f32..70.0, g_dot in -5.0_f32..5.0,
+    ) {
+        let errors = Errors::new(alpha1, &tracking);
+        let u = ideal(alpha1, &errors, tracking.x1d_ddot, &Dynamics { f, g, g_dot }) + proportional(alpha2, &errors);
+
+        let [e1, e2, a1, a2] = [errors.e1, errors.e2, alpha1, alpha2].map(f64::from);
+        let [f, g, g_dot, x1d_ddot, u] = [f, g, g_dot, tracking.x1d_ddot, u].map(f64::from);
+        let e1_dot = e2 - a1 * e1; // (13)
+        let e2_dot = a1 * (e2 - a1 * e1) + x1d_ddot - f - g * u; // (13)
+        let v_dot = e1 * e1_dot + e2 * e2_dot / g - g_dot / (2.0 * g * g) * e2 * e2; // (14)
+        let damping = -a1 * e1 * e1 - a2 * e2 * e2;
+
+        // u is rounded at most 12 times on the way from its largest terms; V_dot holds e_2 u.
+        let terms = (e1.abs() + a1 * e2.abs() + a1 * a1 * e1.abs() + x1d_ddot.abs() + f.abs() + (g_dot / g * e2).abs()) / g
+            + a2 * e2.abs();
+        let allowed = 12.0 * U * terms * e2.abs() + 1e-12;
+        prop_assert!((v_dot - damping).abs() <= allowed, "V_dot {v_dot}, {damping} wanted, allowed {allowed:e}");
+    }
+
+    /// (12), (13): e_2 is what e_1's own dynamics leave over.
+    #[test]
+    fn errors_obey_13(tracking in tracking(), alpha1 in 0.01_f32..10.0) {
+        let errors = Errors::new(alpha1, &tracking);
+        prop_assert_eq!(errors.e1.to_bits(), tracking.e1.to_bits());
+        let [e1, e1_dot, e2, a1] = [errors.e1, errors.e1_dot, errors.e2, alpha1].map(f64::from);
+        let [x1d_dot, x2] = [tracking.x1d_dot, tracking.x2].map(f64::from);
+        prop_assert!((e1_dot - (x1d_dot - x2)).abs() <= U * e1_dot.abs());
+        // The product and the sum are rounded once each.
+        prop_assert!((e1_dot - (e2 - a1 * e1)).abs() <= U * (a1 * e1.abs() + e2.abs()) * 1.01);
+    }
+
+    /// (20): u = u_a + u_r + u_pd, each as defined.
+    #[test]
+    fn the_law_is_the_sum_of_its_three_terms(
+        gains in gains(), tracking in tracking(), inputs in prop::array::uniform2(-3.0_f32..3.0), estimate in estimate(),
+    ) {
+        let errors = Errors::new(gains.backstepping.alpha1, &tracking);
+        let (terms, _) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate);
+        prop_assert_eq!(terms.sum(), terms.fuzzy + terms.robust + terms.proportional);
+        prop_assert_eq!(terms.proportional, gains.backstepping.alpha2 * errors.e2); // (21)
+
+        // (22): nine products, eight sums.
+        let w = Basis::new(gains.membership).unwrap().weights(inputs);
+        let products = w.zip_map(&estimate.theta, |w, theta| f64::from(w) * f64::from(theta));
+        prop_assert!((f64::from(terms.fuzzy) - products.sum()).abs() <= 10.0 * U * products.abs().sum());
+        // A weighted mean lies between the smallest and the largest.
+        let slack = 16.0 * U as f32 * estimate.theta.abs().max();
+        prop_assert!(terms.fuzzy >= estimate.theta.min() - slack && terms.fuzzy <= estimate.theta.max() + slack);
+
+        // (32): the quotient carries 2 roundings, and s tanh'(s) <= 0.448; tanh itself is within 1.4e-7.
+        let s = (f64::from(errors.e2) / f64::from(gains.epsilon)).tanh();
+        let delta = f64::from(estimate.delta);
+        prop_assert!((f64::from(terms.robust) - delta * s).abs() <= delta * (1.4e-7 + 2.0 * U));
+    }
+
+    /// (33), (34): Theta_hat moves with the sign of e_2, in proportion to the weights; delta_hat can only grow.
+    #[test]
+    fn adaptation_goes_the_way_of_the_error(
+        gains in gains(), tracking in tracking(), inputs in prop::array::uniform2(-3.0_f32..3.0), estimate in estimate(),
+    ) {
+        let errors = Errors::new(gains.backstepping.alpha1, &tracking);
+        let (_, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate);
+        let w = Basis::new(gains.membership).unwrap().weights(inputs);
+        let e2 = f64::from(errors.e2);
+        for (rate, w) in rate.theta.iter().zip(w.iter()) {
+            let wanted = f64::from(gains.gamma) * e2 * f64::from(*w);
+            prop_assert!((f64::from(*rate) - wanted).abs() <= 3.0 * U * wanted.abs() + 1e-44, "{rate:e} for {wanted:e}");
+        }
+        // The weights sum to one, so the rates sum to gamma e_2.
+        let total: f64 = rate.theta.iter().copied().map(f64::from).sum();
+        prop_assert!((total - f64::from(gains.gamma) * e2).abs() <= 20.0 * U * f64::from(gains.gamma) * e2.abs());
+
+        prop_assert!(rate.delta >= 0.0);
+        let wanted = f64::from(gains.eta) * e2 * (e2 / f64::from(gains.epsilon)).tanh();
+        prop_assert!((f64::from(rate.delta) - wanted).abs() <= f64::from(gains.eta) * e2.abs() * (1.4e-7 + 5.0 * U));
+    }
+
+    /// The six subsystems: which inputs each takes (Section IV), Euler's step, and the freeze.
+    #[test]
+    fn a_step_uses_the_estimate_as_it_stood_and_then_moves_it(tracking in tracking(), before in estimate(), dt_s in 1e-4_f32..0.02) {
+        let gains = Profile::Paper.gains();
+        let law = Adaptive::new(gains).unwrap();
+        let state = State::default();
+        for axis in Axis::ALL {
+            let gains = *gains.get(axis);
+            let errors = Errors::new(gains.backstepping.alpha1, &tracking);
+            let inputs = match axis {
+                Axis::Roll | Axis::Pitch | Axis::Yaw => [tracking.x1, tracking.x2],
+                Axis::Z | Axis::X | Axis::Y => [errors.e1, errors.e1_dot],
+            };
+            let (terms, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &before);
+
+            let mut frozen = before;
+            let context = Context { state: &state, rotor_residual_rad_s: 0.0, dt_s, adapt: false };
+            let (u, seen) = law.input(axis, &tracking, &context, &mut frozen);
+            prop_assert_eq!((u, seen, frozen), (terms.sum(), errors, before));
+
+            let mut moved = before;
+            let (u, _) = law.input(axis, &tracking, &Context { adapt: true, ..context }, &mut moved);
+            prop_assert_eq!(u, terms.sum());
+            prop_assert_eq!(moved.theta, before.theta + rate.theta * dt_s);
+            prop_assert_eq!(moved.delta, before.delta + rate.delta * dt_s);
+            prop_assert_eq!(Adaptive::learnt(&moved), moved);
+        }
+    }
+}
+
+/// Every gain is refused outside its range, by its name, and accepted at both ends.
+#[test]
+fn a_gain_out_of_range_is_refused_by_name() {
+    use afbc::{adaptive, fuzzy};
+    type Set = fn(&mut Gains, f32);
+    let cases: [(airframe::Range, Set); 6] = [
+        (backstepping::ALPHA1, |g, v| g.backstepping.alpha1 = v),
+        (backstepping::ALPHA2, |g, v| g.backstepping.alpha2 = v),
+        (adaptive::GAMMA, |g, v| g.gamma = v),
+        (adaptive::ETA, |g, v| g.eta = v),
+        (adaptive::EPSILON, |g, v| g.epsilon = v),
+        (fuzzy::WIDTH, |g, v| g.membership = Membership { centre: 2.0 * v, width: v }),
+    ];
+    for axis in Axis::ALL {
+        for (range, set) in cases {
+            let with = |value: f32| {
+                let mut gains: PerAxis<Gains> = Profile::Paper.gains();
+                set(gains.get_mut(axis), value);
+                Adaptive::new(gains).map(|_| ()).map_err(|error| error.range.name)
+            };
+            let (min, max) = (range.min as f32, range.max as f32);
+            if range != fuzzy::WIDTH {
+                assert_eq!(with(min), Ok(()), "{} = {min} on {}", range.name, axis.name());
+                assert_eq!(with(max), Ok(()), "{} = {max} on {}", range.name, axis.name());
+                for bad in [min.next_down(), max.next_up(), f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                    assert_eq!(with(bad), Err(range.name), "{} = {bad} on {}", range.name, axis.name());
+                }
+            } else {
+                assert!(with(min / 4.0).is_err() && with(f32::NAN).is_err());
+            }
+        }
+    }
+}

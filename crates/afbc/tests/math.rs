@@ -1,0 +1,140 @@
+//! The largest error of every function of `afbc::math` over its documented range, against `f64`. The bounds are the
+//! figures of its documentation.
+#![allow(missing_docs)]
+
+use afbc::math;
+use core::f32::consts::PI;
+use proptest::prelude::*;
+
+/// Every finite `f32` of a sweep through the bit patterns of both signs: as dense near zero as far out.
+fn bit_sweep(stride: usize) -> impl Iterator<Item = f32> {
+    (0..f32::INFINITY.to_bits()).step_by(stride).flat_map(|bits| [f32::from_bits(bits), -f32::from_bits(bits)])
+}
+
+/// Even steps from `from` to `to`, both included.
+fn even_sweep(from: f32, to: f32, count: u32) -> impl Iterator<Item = f32> {
+    (0..=count)
+        .map(move |i| (f64::from(from) + (f64::from(to) - f64::from(from)) * f64::from(i) / f64::from(count)) as f32)
+}
+
+/// The largest error and where it is.
+fn worst(points: impl Iterator<Item = f32>, error: impl Fn(f32) -> f64) -> (f64, f32) {
+    points.fold((0.0, 0.0), |(largest, at), x| {
+        let e = error(x);
+        // Written so that a NaN is the worst of all.
+        if e <= largest { (largest, at) } else { (e, x) }
+    })
+}
+
+fn absolute(ours: fn(f32) -> f32, exact: fn(f64) -> f64) -> impl Fn(f32) -> f64 {
+    move |x| (f64::from(ours(x)) - exact(f64::from(x))).abs()
+}
+
+/// Asserts that the largest error is at most `bound` and that the bound is no more than twice the truth, so that the
+/// documentation cannot go stale in either direction.
+fn assert_figure(name: &str, (error, at): (f64, f32), bound: f64) {
+    println!("{name}: {error:.4e} at {at:e}, documented {bound:e}");
+    assert!(error <= bound, "{name}: error {error:e} at {at:e} is above the documented {bound:e}");
+    assert!(error >= 0.5 * bound, "{name}: documented {bound:e}, yet the largest error is {error:e}");
+}
+
+#[test]
+fn exp_is_within_1_2e_7_relative_from_minus_87_to_0() {
+    let relative = |x: f32| (f64::from(math::exp(x)) / f64::from(x).exp() - 1.0).abs();
+    let points = even_sweep(-87.0, 0.0, 8_000_000).chain(bit_sweep(997).filter(|x| (-87.0..=0.0).contains(x)));
+    assert_figure("exp", worst(points, relative), 1.2e-7);
+}
+
+#[test]
+fn exp_is_0_below_minus_104_1_at_0_and_never_above_1_for_what_is_not_positive() {
+    assert_eq!(math::exp(0.0), 1.0);
+    assert_eq!(math::exp(-0.0), 1.0);
+    assert_eq!(math::exp(f32::NEG_INFINITY), 0.0);
+    for x in bit_sweep(997).filter(|x| *x <= 0.0) {
+        let y = math::exp(x);
+        assert!((0.0..=1.0).contains(&y), "exp({x:e}) = {y:e}");
+        assert!(x > -104.0 || y == 0.0, "exp({x:e}) = {y:e}");
+    }
+}
+
+#[test]
+fn exp_never_falls_as_its_argument_grows() {
+    let mut last = 0.0;
+    for x in even_sweep(-105.0, 0.0, 4_000_000) {
+        let y = math::exp(x);
+        assert!(y >= last, "exp falls before {x:e}: {last:e} to {y:e}");
+        last = y;
+    }
+}
+
+#[test]
+fn tanh_is_within_1_4e_7() {
+    let points = bit_sweep(499).chain(even_sweep(-10.0, 10.0, 4_000_000));
+    assert_figure("tanh", worst(points, absolute(math::tanh, f64::tanh)), 1.4e-7);
+}
+
+#[test]
+fn atan_is_within_1_2e_7() {
+    let points = bit_sweep(499).chain(even_sweep(-20.0, 20.0, 4_000_000));
+    assert_figure("atan", worst(points, absolute(math::atan, f64::atan)), 1.2e-7);
+}
+
+#[test]
+fn sqrt_is_correctly_rounded() {
+    // The square root of an f32 in f64, rounded to f32, is the correctly rounded one: 53 >= 2 * 24 + 2 bits.
+    for x in bit_sweep(211).filter(|x| *x >= 0.0) {
+        let exact = f64::from(x).sqrt() as f32;
+        assert_eq!(math::sqrt(x).to_bits(), exact.to_bits(), "sqrt({x:e})");
+    }
+}
+
+#[test]
+fn sine_and_cosine_are_within_1_2e_3_up_to_1000_rad() {
+    let points = || even_sweep(-1000.0, 1000.0, 6_000_000).chain(bit_sweep(997).filter(|x| x.abs() <= 1000.0));
+    assert_figure("sin", worst(points(), absolute(math::sin, f64::sin)), 1.2e-3);
+    assert_figure("cos", worst(points(), absolute(math::cos, f64::cos)), 1.2e-3);
+}
+
+proptest! {
+    // Points between those of the sweeps.
+    #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_random_point_is_worse_than_documented(x in prop::num::f32::NORMAL | prop::num::f32::SUBNORMAL, angle in -1000.0_f32..1000.0, low in -87.0_f32..0.0) {
+        let exp = f64::from(low).exp();
+        prop_assert!((f64::from(math::exp(low)) - exp).abs() <= 1.2e-7 * exp);
+        prop_assert!(absolute(math::tanh, f64::tanh)(x) <= 1.4e-7);
+        prop_assert!(absolute(math::atan, f64::atan)(x) <= 1.2e-7);
+        prop_assert!(absolute(math::sin, f64::sin)(angle) <= 1.2e-3);
+        prop_assert!(absolute(math::cos, f64::cos)(angle) <= 1.2e-3);
+    }
+
+    #[test]
+    fn wrapping_moves_an_angle_by_whole_turns_into_plus_minus_pi(x in -2000.0_f32..2000.0) {
+        let wrapped = math::wrap_angle(x);
+        prop_assert!(wrapped.abs() <= PI + 1.4e-4, "{x} wraps to {wrapped}");
+        // The f32 turn is off by 1.75e-7, at most 318 of them fit into the range; the turns' product is rounded at 2000
+        // (6.1e-5), and so is the difference.
+        let turns = (f64::from(x) - f64::from(wrapped)) / core::f64::consts::TAU;
+        prop_assert!((turns - turns.round()).abs() * core::f64::consts::TAU <= 1.3e-4, "{x} wraps to {wrapped}");
+    }
+
+    #[test]
+    fn an_angle_within_plus_minus_pi_comes_back_unchanged(x in -PI..=PI) {
+        prop_assert_eq!(math::wrap_angle(x).to_bits(), x.to_bits());
+    }
+}
+
+#[test]
+fn wrapping_exceeds_pi_by_no_more_than_the_rounding_of_its_argument() {
+    // At an odd multiple of pi the count of turns is a tie; the nearer end may then lie just outside, by as much as
+    // the count, the turn and their product are rounded: 1.2e-4 + 5.6e-5 + 6.1e-5 rad at 2000 rad at the very most.
+    let ties = (-318..318).map(|turns| (f64::from(turns) + 0.5) * core::f64::consts::TAU);
+    let near = ties.flat_map(|tie| {
+        let below = (0..8).scan(tie as f32, |x, _| Some(std::mem::replace(x, x.next_down())));
+        let above = (0..8).scan(tie as f32, |x, _| Some(std::mem::replace(x, x.next_up())));
+        below.chain(above)
+    });
+    let beyond = |x: f32| (f64::from(math::wrap_angle(x).abs()) - core::f64::consts::PI).max(0.0);
+    assert_figure("wrap_angle beyond pi", worst(near, beyond), 1.4e-4);
+}

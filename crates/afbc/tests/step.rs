@@ -1,0 +1,327 @@
+//! Properties of one controller step, for every law: whatever it is given, it answers with something a motor can do.
+#![allow(clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
+
+use afbc::adaptive::{EPSILON, ETA, Estimate, GAMMA, Gains};
+use afbc::allocation::FORCE_MAX;
+use afbc::backstepping::{ALPHA1, ALPHA2};
+use afbc::cascade::DT;
+use afbc::command_filter::BANDWIDTH;
+use afbc::fuzzy::Membership;
+use afbc::{Adaptive, Backstepping, Command, Controller, Health, Law, Memory, Profile, Settings};
+use airframe::{Axis, Parameters, PerAxis, Range, Setpoint, State};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+/// A value that a sensor or a link may deliver: mostly of flight's size, often anything at all.
+fn value() -> impl Strategy<Value = f32> {
+    let edges = [
+        f32::NAN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::MAX,
+        f32::MIN,
+        f32::MIN_POSITIVE,
+        1e5,
+        -1e5,
+        1e3,
+        -1e3,
+        0.0,
+        -0.0,
+    ];
+    prop_oneof![
+        30 => -3.0_f32..3.0,
+        4 => -1e3_f32..=1e3,
+        1 => prop::sample::select(edges.to_vec()),
+        1 => prop::num::f32::ANY,
+    ]
+}
+
+/// A value that is always plausible.
+fn plausible() -> impl Strategy<Value = f32> {
+    prop_oneof![4 => -3.0_f32..3.0, 1 => -1e3_f32..=1e3]
+}
+
+fn vector(value: BoxedStrategy<f32>) -> impl Strategy<Value = Vector3<f32>> {
+    (value.clone(), value.clone(), value).prop_map(|(x, y, z)| Vector3::new(x, y, z))
+}
+
+fn state<S: Strategy<Value = f32> + 'static>(value: fn() -> S) -> impl Strategy<Value = State> {
+    (vector(value().boxed()), vector(value().boxed()), vector(value().boxed()), vector(value().boxed())).prop_map(
+        |(position_m, velocity_m_s, attitude_rad, rates_rad_s)| State {
+            position_m,
+            velocity_m_s,
+            attitude_rad,
+            rates_rad_s,
+        },
+    )
+}
+
+fn setpoint<S: Strategy<Value = f32> + 'static>(value: fn() -> S) -> impl Strategy<Value = Setpoint> {
+    (vector(value().boxed()), vector(value().boxed()), vector(value().boxed()), vector(value().boxed())).prop_map(
+        |(position_m, velocity_m_s, acceleration_m_s2, yaw)| Setpoint {
+            position_m,
+            velocity_m_s,
+            acceleration_m_s2,
+            yaw_rad: yaw.x,
+            yaw_rate_rad_s: yaw.y,
+            yaw_acceleration_rad_s2: yaw.z,
+        },
+    )
+}
+
+/// A value anywhere in `range`, its bounds drawn often.
+fn within(range: Range) -> impl Strategy<Value = f32> {
+    let (min, max) = (range.min as f32, range.max as f32);
+    prop_oneof![4 => min..=max, 1 => Just(min), 1 => Just(max)]
+}
+
+fn settings() -> impl Strategy<Value = Settings> {
+    let any = (within(DT), within(BANDWIDTH), within(FORCE_MAX)).prop_map(
+        |(dt_s, command_filter_rad_s, rotor_force_max_n)| Settings { dt_s, command_filter_rad_s, rotor_force_max_n },
+    );
+    prop_oneof![Just(Profile::Paper.settings()), any]
+}
+
+/// One set of gains for all six subsystems, or the paper's.
+fn gains() -> impl Strategy<Value = PerAxis<Gains>> {
+    let any =
+        (within(ALPHA1), within(ALPHA2), within(GAMMA), within(ETA), within(EPSILON), 1e-3_f32..100.0, 0.1_f32..=6.0)
+            .prop_map(|(alpha1, alpha2, gamma, eta, epsilon, width, spread)| Gains {
+                backstepping: afbc::backstepping::Gains { alpha1, alpha2 },
+                gamma,
+                eta,
+                epsilon,
+                membership: Membership { centre: (width * spread).max(1e-3), width },
+            })
+            .prop_filter("accepted", |gains| gains.validate().is_ok())
+            .prop_map(|gains| PerAxis::from_fn(|_| gains));
+    prop_oneof![Just(Profile::Paper.gains()), any]
+}
+
+fn sequence<S: Strategy<Value = f32> + 'static>(value: fn() -> S) -> impl Strategy<Value = Vec<(State, Setpoint)>> {
+    prop::collection::vec((state(value), setpoint(value)), 50)
+}
+
+fn adaptive(gains: PerAxis<Gains>, settings: Settings) -> Controller<Adaptive> {
+    Controller::new(Parameters::PAPER.to_f32(), settings, Adaptive::new(gains).unwrap()).unwrap()
+}
+
+fn backstepping(gains: PerAxis<Gains>, settings: Settings) -> Controller<Backstepping> {
+    let vehicle = Parameters::PAPER.to_f32();
+    let gains = PerAxis::from_fn(|axis| gains.get(axis).backstepping);
+    Controller::new(vehicle, settings, Backstepping::new(&vehicle, gains).unwrap()).unwrap()
+}
+
+fn estimates<L: Law>(memory: &Memory<L::Estimate>) -> PerAxis<Estimate> {
+    PerAxis::from_fn(|axis| L::learnt(memory.estimates.get(axis)))
+}
+
+/// What every step owes: speeds and forces within the rotors' limits, everything finite.
+fn check_command(command: &Command, settings: &Settings) -> Result<(), TestCaseError> {
+    let limit = settings.rotor_force_max_n;
+    let fastest = (f64::from(limit) / Parameters::PAPER.thrust_factor_n_s2).sqrt() * (1.0 + 2e-7);
+    prop_assert!(command.forces.0.iter().all(|f| (0.0..=limit).contains(f)), "{command:?}");
+    prop_assert!(command.speeds.0.iter().all(|w| (0.0..=fastest).contains(&f64::from(*w))), "{command:?}");
+    let u = &command.inputs;
+    let numbers = [u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n]
+        .into_iter()
+        .chain(command.virtual_m_s2)
+        .chain(command.desired_rad)
+        .chain(command.filtered.iter().flat_map(|f| [f.angle, f.rate]))
+        .chain(Axis::ALL.iter().flat_map(|axis| {
+            let errors = command.errors.get(*axis);
+            [errors.e1, errors.e1_dot, errors.e2]
+        }));
+    for number in numbers {
+        prop_assert!(number.is_finite(), "{command:?}");
+    }
+    Ok(())
+}
+
+fn check_estimates(estimates: &PerAxis<Estimate>) -> Result<(), TestCaseError> {
+    for axis in Axis::ALL {
+        let estimate = estimates.get(axis);
+        prop_assert!(
+            estimate.delta.is_finite() && estimate.theta.iter().all(|t| t.is_finite()),
+            "{axis:?} {estimate:?}"
+        );
+    }
+    Ok(())
+}
+
+/// Flies a sequence of anything and checks what every step owes, and what it owes to what was wrong.
+fn fly_anything<L: Law>(
+    controller: &Controller<L>,
+    settings: &Settings,
+    inputs: &[(State, Setpoint)],
+) -> Result<(), TestCaseError> {
+    let mut memory = Memory::default();
+    let mut seen_state = false;
+    for (state, setpoint) in inputs {
+        let before = estimates::<L>(&memory);
+        let command = controller.step(&mut memory, state, setpoint);
+        let after = estimates::<L>(&memory);
+        check_command(&command, settings)?;
+        check_estimates(&after)?;
+        prop_assert_eq!(command.health.state_rejected, !state.is_plausible());
+        prop_assert_eq!(command.health.setpoint_rejected, !setpoint.is_plausible());
+        if !state.is_plausible() {
+            prop_assert_eq!(after, before, "an implausible state taught the law something");
+        }
+        seen_state |= state.is_plausible();
+        if !seen_state {
+            prop_assert!(command.speeds.0.iter().all(|w| *w == 0.0), "rotors turn before there is a state");
+        }
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whatever_afbc_is_given_the_motors_get_something_they_can_do(gains in gains(), settings in settings(), inputs in sequence(value)) {
+        fly_anything(&adaptive(gains, settings), &settings, &inputs)?;
+    }
+
+    #[test]
+    fn whatever_backstepping_is_given_the_motors_get_something_they_can_do(gains in gains(), settings in settings(), inputs in sequence(value)) {
+        fly_anything(&backstepping(gains, settings), &settings, &inputs)?;
+    }
+
+    #[test]
+    fn the_same_inputs_give_the_same_bits(gains in gains(), settings in settings(), inputs in sequence(value)) {
+        let controller = adaptive(gains, settings);
+        let fly = || {
+            let mut memory = Memory::default();
+            inputs.iter().map(|(state, setpoint)| {
+                let command = controller.step(&mut memory, state, setpoint);
+                let estimates = estimates::<Adaptive>(&memory);
+                let learnt = Axis::ALL.map(|axis| estimates.get(axis).theta.map(f32::to_bits));
+                (command.speeds.0.map(f32::to_bits), learnt)
+            }).collect::<Vec<_>>()
+        };
+        prop_assert_eq!(fly(), fly());
+    }
+
+    /// While a state is implausible the step is the one that the last plausible state would have given, except that
+    /// nothing is learnt.
+    #[test]
+    fn the_last_plausible_state_stands_in(
+        good in state(plausible), bad in state(value), setpoint in setpoint(plausible), next in setpoint(plausible),
+    ) {
+        prop_assume!(!bad.is_plausible());
+        let controller = adaptive(Profile::Paper.gains(), Profile::Paper.settings());
+        let mut memory = Memory::default();
+        controller.step(&mut memory, &good, &setpoint);
+        let mut other = memory;
+
+        let stood_in = controller.step(&mut memory, &bad, &next);
+        let wanted = controller.step(&mut other, &good, &next);
+        prop_assert_eq!(stood_in.speeds, wanted.speeds);
+        prop_assert_eq!(stood_in.errors, wanted.errors);
+        let saturated = wanted.health.saturated;
+        prop_assert_eq!(stood_in.health, Health { state_rejected: true, setpoint_rejected: false, saturated });
+        prop_assert_ne!(memory.estimates, other.estimates, "the plausible twin should have learnt");
+    }
+
+    /// While a setpoint is implausible the last plausible one stands in, and learning goes on; before the first one, the
+    /// vehicle holds its place.
+    #[test]
+    fn the_last_plausible_setpoint_stands_in(
+        state in state(plausible), good in setpoint(plausible), bad in setpoint(value), after in state(plausible),
+    ) {
+        prop_assume!(!bad.is_plausible());
+        let controller = adaptive(Profile::Paper.gains(), Profile::Paper.settings());
+        for first in [Some(good), None] {
+            let (mut memory, mut other) = (Memory::default(), Memory::default());
+            let substitute = first.unwrap_or(Setpoint::hold(&state));
+            let started = controller.step(&mut memory, &state, &first.unwrap_or(bad));
+            let wanted = controller.step(&mut other, &state, &substitute);
+            prop_assert_eq!(started.speeds, wanted.speeds);
+            prop_assert_eq!(started.health.setpoint_rejected, first.is_none());
+
+            let stood_in = controller.step(&mut memory, &after, &bad);
+            let wanted = controller.step(&mut other, &after, &substitute);
+            prop_assert_eq!(stood_in.speeds, wanted.speeds);
+            prop_assert!(stood_in.health.setpoint_rejected && !stood_in.health.state_rejected);
+            prop_assert_eq!(memory.estimates, other.estimates);
+        }
+    }
+}
+
+/// One field at a time, so that none is forgotten: NaN, infinite and just too large are refused, the largest accepted
+/// value is not.
+#[test]
+fn every_single_field_is_watched() {
+    type SetState = fn(&mut State, f32);
+    type SetSetpoint = fn(&mut Setpoint, f32);
+    let states: [(SetState, f32); 12] = [
+        (|s, v| s.position_m.x = v, 1e5),
+        (|s, v| s.position_m.y = v, 1e5),
+        (|s, v| s.position_m.z = v, 1e5),
+        (|s, v| s.velocity_m_s.x = v, 1e3),
+        (|s, v| s.velocity_m_s.y = v, 1e3),
+        (|s, v| s.velocity_m_s.z = v, 1e3),
+        (|s, v| s.attitude_rad.x = v, 1e3),
+        (|s, v| s.attitude_rad.y = v, 1e3),
+        (|s, v| s.attitude_rad.z = v, 1e3),
+        (|s, v| s.rates_rad_s.x = v, 1e3),
+        (|s, v| s.rates_rad_s.y = v, 1e3),
+        (|s, v| s.rates_rad_s.z = v, 1e3),
+    ];
+    let setpoints: [(SetSetpoint, f32); 12] = [
+        (|s, v| s.position_m.x = v, 1e5),
+        (|s, v| s.position_m.y = v, 1e5),
+        (|s, v| s.position_m.z = v, 1e5),
+        (|s, v| s.velocity_m_s.x = v, 1e3),
+        (|s, v| s.velocity_m_s.y = v, 1e3),
+        (|s, v| s.velocity_m_s.z = v, 1e3),
+        (|s, v| s.acceleration_m_s2.x = v, 1e3),
+        (|s, v| s.acceleration_m_s2.y = v, 1e3),
+        (|s, v| s.acceleration_m_s2.z = v, 1e3),
+        (|s, v| s.yaw_rad = v, 1e3),
+        (|s, v| s.yaw_rate_rad_s = v, 1e3),
+        (|s, v| s.yaw_acceleration_rad_s2 = v, 1e3),
+    ];
+    let controller = adaptive(Profile::Paper.gains(), Profile::Paper.settings());
+    let health = |state, setpoint| controller.step(&mut Memory::default(), &state, &setpoint).health;
+    let bad = |max: f32| [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, max.next_up(), -max.next_up()];
+    for (index, (set, max)) in states.into_iter().enumerate() {
+        let with = |value| {
+            let mut state = State::default();
+            set(&mut state, value);
+            health(state, Setpoint::default()).state_rejected
+        };
+        assert!(!with(max) && !with(-max), "field {index}");
+        for value in bad(max) {
+            assert!(with(value), "field {index} = {value}");
+        }
+    }
+    for (index, (set, max)) in setpoints.into_iter().enumerate() {
+        let with = |value| {
+            let mut setpoint = Setpoint::default();
+            set(&mut setpoint, value);
+            health(State::default(), setpoint).setpoint_rejected
+        };
+        assert!(!with(max) && !with(-max), "field {index}");
+        for value in bad(max) {
+            assert!(with(value), "field {index} = {value}");
+        }
+    }
+}
+
+#[test]
+fn settings_out_of_range_are_refused_by_name() {
+    let paper = Profile::Paper.settings();
+    let build = |settings| {
+        let law = Adaptive::new(Profile::Paper.gains()).unwrap();
+        Controller::new(Parameters::PAPER.to_f32(), settings, law).map(|_| ()).map_err(|error| error.range.name)
+    };
+    assert_eq!(build(paper), Ok(()));
+    for bad in [0.0, -1.0, 1e9, f32::NAN, f32::INFINITY] {
+        assert_eq!(build(Settings { dt_s: bad, ..paper }), Err("dt_s"));
+        assert_eq!(build(Settings { command_filter_rad_s: bad, ..paper }), Err("command_filter_rad_s"));
+        assert_eq!(build(Settings { rotor_force_max_n: bad, ..paper }), Err("rotor_force_max_n"));
+    }
+}

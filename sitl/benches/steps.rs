@@ -1,0 +1,114 @@
+//! Time of one step of each part, and closed-loop steps per second on one core.
+//!
+//! `cargo bench -p sitl`. Each single step cycles through what it meets in the paper's flight, so that no branch or
+//! exponential is always the same. The closed loop is a whole flight of 60 s at 1 kHz: reference, AFBC, rigid body by
+//! Runge-Kutta, gusts and parameter changes, nothing logged; items are steps.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a scenario that cannot be flown must stop the bench
+
+use afbc::{Controller, Law, Memory};
+use airframe::{OutOfRange, RotorSpeeds, Setpoint, State};
+use divan::counter::ItemsCount;
+use divan::{Bencher, black_box};
+use plant::{Model, Plant};
+use sitl::flight::{Flight, adaptive_law, backstepping_law, fly};
+use sitl::paper::{Case, scenario};
+use sitl::scenario::{ControllerKind, Scenario};
+
+fn main() {
+    divan::main();
+}
+
+/// Steps of one whole flight.
+const STEPS: usize = 60_000;
+
+fn paper(model: Model) -> Scenario {
+    scenario(model, Case::DEFAULT).unwrap()
+}
+
+/// What a controller is given, and what it commands, at every 60th step of the paper's flight.
+fn recorded(model: Model, kind: ControllerKind) -> Vec<(State, Setpoint, RotorSpeeds)> {
+    let (mut steps, mut index) = (Vec::new(), 0_usize);
+    fly(&paper(model), kind, |sample| {
+        if index.is_multiple_of(60) {
+            steps.push((sample.motion.measure(), sample.reference.setpoint(), sample.command.speeds));
+        }
+        index += 1;
+    })
+    .unwrap();
+    steps
+}
+
+fn control_step<L: Law>(bencher: Bencher, kind: ControllerKind, law: fn(&Scenario) -> Result<L, OutOfRange>) {
+    let scenario = paper(Model::RigidBody);
+    let controller = Controller::new(scenario.vehicle.to_f32(), scenario.settings, law(&scenario).unwrap()).unwrap();
+    let steps = recorded(Model::RigidBody, kind);
+    let mut memory = Memory::default();
+    let mut at = 0;
+    bencher.counter(ItemsCount::new(1_usize)).bench_local(|| {
+        let (state, setpoint, _) = &steps[at];
+        at = if at + 1 == steps.len() { 0 } else { at + 1 };
+        controller.step(&mut memory, black_box(state), black_box(setpoint))
+    });
+}
+
+#[divan::bench]
+fn control_step_afbc(bencher: Bencher) {
+    control_step(bencher, ControllerKind::Afbc, adaptive_law);
+}
+
+#[divan::bench]
+fn control_step_backstepping(bencher: Bencher) {
+    control_step(bencher, ControllerKind::Backstepping, backstepping_law);
+}
+
+fn plant_step(bencher: Bencher, model: Model) {
+    let scenario = paper(model);
+    let steps = recorded(model, ControllerKind::Afbc);
+    let mut plant = Plant::new(model, scenario.initial, scenario.environment);
+    let mut at = 0;
+    bencher.counter(ItemsCount::new(1_usize)).bench_local(|| {
+        let (_, _, speeds) = &steps[at];
+        at = if at + 1 == steps.len() { 0 } else { at + 1 };
+        plant.step(black_box(speeds), 0.001);
+    });
+    black_box(plant.motion());
+}
+
+#[divan::bench]
+fn plant_step_rigid_body(bencher: Bencher) {
+    plant_step(bencher, Model::RigidBody);
+}
+
+#[divan::bench]
+fn plant_step_simplified(bencher: Bencher) {
+    plant_step(bencher, Model::Simplified);
+}
+
+fn closed_loop<L: Law>(bencher: Bencher, model: Model, law: fn(&Scenario) -> Result<L, OutOfRange>) {
+    let scenario = paper(model);
+    bencher
+        .counter(ItemsCount::new(STEPS))
+        .with_inputs(|| Flight::new(&scenario, law(&scenario).unwrap()).unwrap())
+        .bench_local_refs(|flight| {
+            for _ in 0..STEPS {
+                let sample = flight.control();
+                flight.advance(&sample.command);
+            }
+            flight.control().motion
+        });
+}
+
+#[divan::bench]
+fn closed_loop_afbc_rigid_body(bencher: Bencher) {
+    closed_loop(bencher, Model::RigidBody, adaptive_law);
+}
+
+#[divan::bench]
+fn closed_loop_backstepping_rigid_body(bencher: Bencher) {
+    closed_loop(bencher, Model::RigidBody, backstepping_law);
+}
+
+#[divan::bench]
+fn closed_loop_afbc_simplified(bencher: Bencher) {
+    closed_loop(bencher, Model::Simplified, adaptive_law);
+}

@@ -1,0 +1,41 @@
+//! `--log-hz`: how much of a flight is kept.
+
+use sitl::scenario::Scenario;
+use std::str::FromStr;
+
+/// Most rows of one log: an hour at 100 Hz, and some.
+const ROWS: f64 = 500_000.0;
+
+/// Log rows a second.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LogRate(u16);
+
+impl FromStr for LogRate {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text.parse() {
+            Ok(hz @ 1..=1000) if 1000 % hz == 0 => Ok(LogRate(hz)),
+            _ => Err("it must divide 1000: 1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 100, 125, 200, 250, 500 or 1000"),
+        }
+    }
+}
+
+impl LogRate {
+    /// Control steps from row to row, to the nearest whole number.
+    ///
+    /// # Errors
+    /// If the log of one run would be too long.
+    pub(crate) fn steps(self, scenario: &Scenario) -> Result<u64, String> {
+        let LogRate(hz) = self;
+        let steps = (1.0 / (f64::from(hz) * f64::from(scenario.settings.dt_s))).round().max(1.0);
+        let rows = scenario.duration_s / (f64::from(scenario.settings.dt_s) * steps);
+        if rows > ROWS {
+            let duration_s = scenario.duration_s;
+            return Err(format!(
+                "--log-hz {hz}: {duration_s} s would be {rows:.1e} rows a run, more than {ROWS:.1e}; lower it or --duration"
+            ));
+        }
+        Ok(steps as u64)
+    }
+}

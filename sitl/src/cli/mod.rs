@@ -1,0 +1,64 @@
+//! The command line: one module for each command.
+
+mod fly;
+mod flying;
+mod log_rate;
+mod paper;
+mod results;
+mod scenarios;
+mod target;
+
+use clap::{Parser, Subcommand};
+use std::error::Error;
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+/// What stops a command: its text is one line for people.
+type Failure = Box<dyn Error>;
+
+/// Flies an adaptive fuzzy backstepping (AFBC) quadrotor controller and classical backstepping in software.
+///
+/// Without a command, `sitl` is `sitl paper`: it flies the experiment of Yacef, Bouhali and Hamerlain, prints how both
+/// laws did and writes logs, figures and a report.
+#[derive(Debug, Parser)]
+#[command(version, args_conflicts_with_subcommands = true, max_term_width = 110)]
+#[command(after_help = "Exit codes: 0 all well; 1 a vehicle was lost; 2 wrong input, or nothing could be written.")]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+
+    #[command(flatten, next_help_heading = "Options of `sitl paper`")]
+    paper: paper::Paper,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Paper(paper::Paper),
+    Fly(fly::Fly),
+    Check(scenarios::Check),
+    Scenarios(scenarios::Scenarios),
+    Results(results::Results),
+}
+
+impl Cli {
+    /// Does what was asked for.
+    pub(crate) fn run(self) -> Result<ExitCode, Failure> {
+        match self.command.unwrap_or(Command::Paper(self.paper)) {
+            Command::Paper(paper) => paper.run(),
+            Command::Fly(fly) => fly.run(),
+            Command::Check(check) => check.run(),
+            Command::Scenarios(scenarios) => scenarios.run(),
+            Command::Results(results) => results.run(),
+        }
+    }
+}
+
+/// Prints to stdout. A reader who has seen enough, as in `sitl | head`, is no failure.
+fn print(text: &str) -> Result<(), Failure> {
+    match io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(format!("stdout: cannot be written ({error}); send it elsewhere").into())
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,35 @@
+//! `sitl results`: the table of `docs/results.md`.
+
+use super::{Failure, print};
+use clap::Args;
+use sitl::results;
+use std::fs;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Fly the paper's experiment in every reading and print the results as a Markdown table
+#[derive(Args, Debug)]
+pub(crate) struct Results {
+    /// Put the table into this page instead, between its two markers
+    #[arg(long, value_name = "PAGE")]
+    write: Option<PathBuf>,
+}
+
+impl Results {
+    /// Flies, then prints or writes.
+    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        let Some(path) = self.write else {
+            print(&results::markdown()?)?;
+            return Ok(ExitCode::SUCCESS);
+        };
+        let name = path.display();
+        let page = fs::read_to_string(&path).map_err(|error| format!("{name}: cannot be read ({error})"))?;
+        let Some((before, _, after)) = results::parts(&page) else {
+            let [begin, end] = results::MARKERS;
+            return Err(format!("{name}: no place for the table; add the lines {begin} and {end}").into());
+        };
+        let page = format!("{before}{}{after}", results::markdown()?);
+        fs::write(&path, page).map_err(|error| format!("{name}: cannot be written ({error})"))?;
+        Ok(ExitCode::SUCCESS)
+    }
+}

@@ -1,0 +1,174 @@
+//! One CSV for each run: every logged step, units in the header.
+
+use super::Flown;
+use crate::flight::Sample;
+use afbc::cascade::Context;
+use afbc::model::Model;
+use airframe::{Axis, Parameters, PerAxis};
+use csv::ByteRecord;
+use nalgebra::Vector4;
+use std::io::{self, Write};
+
+/// A value, written in as few digits as give it back exactly.
+enum Number {
+    /// What the controller computes.
+    Single(f32),
+    /// What the plant and the reference are.
+    Double(f64),
+    /// 0 or 1.
+    Flag(bool),
+}
+
+use Number::{Double, Flag, Single};
+
+/// What a column may show.
+struct Row<'a> {
+    sample: &'a Sample,
+    /// Lowest and highest U1..U4 since the row before.
+    extremes: &'a [Vector4<f64>; 2],
+    /// See [`lyapunov`].
+    lyapunov: PerAxis<f32>,
+}
+
+/// A header and the value under it.
+struct Column {
+    name: String,
+    value: Box<dyn Fn(&Row) -> Number>,
+}
+
+/// The terms of the Lyapunov functions (14), (27) that can be computed in flight: e_1^2 / 2 + e_2^2 / (2 g_i). What is
+/// left out is the distance of the estimates from values that nobody knows. g_i is the nominal vehicle's.
+fn lyapunov(model: &Model, sample: &Sample) -> PerAxis<f32> {
+    let state = sample.motion.measure();
+    let rotor_residual_rad_s = sample.command.speeds.residual_rad_s();
+    let context = Context { state: &state, rotor_residual_rad_s, dt_s: 0.0, adapt: false };
+    PerAxis::from_fn(|axis| {
+        let errors = sample.command.errors.get(axis);
+        0.5 * errors.e1 * errors.e1 + 0.5 * errors.e2 * errors.e2 / model.dynamics(axis, &context).g
+    })
+}
+
+/// Every column, left to right.
+fn columns() -> Vec<Column> {
+    let mut columns = Vec::new();
+    let mut add = |name: String, value: Box<dyn Fn(&Row) -> Number>| columns.push(Column { name, value });
+    macro_rules! add {
+        ($kind:ident $($name:literal: $value:expr;)*) => {
+            $(add($name.into(), Box::new(|row| { let value: fn(&Sample) -> _ = $value; $kind(value(row.sample)) }));)*
+        };
+    }
+    add! { Double
+        "time_s": |s| s.time_s;
+        "x_m": |s| s.motion.position_m.x;
+        "y_m": |s| s.motion.position_m.y;
+        "z_m": |s| s.motion.position_m.z;
+        "vx_m_s": |s| s.motion.velocity_m_s.x;
+        "vy_m_s": |s| s.motion.velocity_m_s.y;
+        "vz_m_s": |s| s.motion.velocity_m_s.z;
+        "phi_rad": |s| s.motion.attitude_rad.x;
+        "theta_rad": |s| s.motion.attitude_rad.y;
+        "psi_rad": |s| s.motion.attitude_rad.z;
+        "p_rad_s": |s| s.motion.rates_rad_s.x;
+        "q_rad_s": |s| s.motion.rates_rad_s.y;
+        "r_rad_s": |s| s.motion.rates_rad_s.z;
+        "x_d_m": |s| s.reference.position_m.x;
+        "y_d_m": |s| s.reference.position_m.y;
+        "z_d_m": |s| s.reference.position_m.z;
+        "vx_d_m_s": |s| s.reference.velocity_m_s.x;
+        "vy_d_m_s": |s| s.reference.velocity_m_s.y;
+        "vz_d_m_s": |s| s.reference.velocity_m_s.z;
+        "ax_d_m_s2": |s| s.reference.acceleration_m_s2.x;
+        "ay_d_m_s2": |s| s.reference.acceleration_m_s2.y;
+        "az_d_m_s2": |s| s.reference.acceleration_m_s2.z;
+        "psi_d_rad": |s| s.reference.yaw_rad;
+        "psi_d_rate_rad_s": |s| s.reference.yaw_rate_rad_s;
+        "psi_d_acceleration_rad_s2": |s| s.reference.yaw_acceleration_rad_s2;
+    }
+    // phi_d and theta_d: as (40) gives them, then as roll and pitch track them, behind the command filter.
+    add! { Single
+        "phi_d_raw_rad": |s| s.command.desired_rad[0];
+        "theta_d_raw_rad": |s| s.command.desired_rad[1];
+        "phi_d_rad": |s| s.command.filtered[0].angle;
+        "theta_d_rad": |s| s.command.filtered[1].angle;
+        "phi_d_rate_rad_s": |s| s.command.filtered[0].rate;
+        "theta_d_rate_rad_s": |s| s.command.filtered[1].rate;
+    }
+    // U1..U4 as the rotors give them, then as the law wants them; further down, between which values they went since
+    // the row before.
+    add! { Single
+        "u1_n": |s| given(s).roll_n;
+        "u2_n": |s| given(s).pitch_n;
+        "u3_n": |s| given(s).yaw_n;
+        "u4_n": |s| given(s).thrust_n;
+        "u1_wanted_n": |s| s.command.inputs.roll_n;
+        "u2_wanted_n": |s| s.command.inputs.pitch_n;
+        "u3_wanted_n": |s| s.command.inputs.yaw_n;
+        "u4_wanted_n": |s| s.command.inputs.thrust_n;
+        "u5_m_s2": |s| s.command.virtual_m_s2[0];
+        "u6_m_s2": |s| s.command.virtual_m_s2[1];
+        "f1_n": |s| s.command.forces.0.x;
+        "f2_n": |s| s.command.forces.0.y;
+        "f3_n": |s| s.command.forces.0.z;
+        "f4_n": |s| s.command.forces.0.w;
+        "omega1_rad_s": |s| s.command.speeds.0.x;
+        "omega2_rad_s": |s| s.command.speeds.0.y;
+        "omega3_rad_s": |s| s.command.speeds.0.z;
+        "omega4_rad_s": |s| s.command.speeds.0.w;
+    }
+    for (i, u) in ["u1", "u2", "u3", "u4"].into_iter().enumerate() {
+        for (j, extreme) in ["min", "max"].into_iter().enumerate() {
+            let value = move |row: &Row| row.extremes.get(j).and_then(|u| u.get(i)).copied();
+            // What the rotors give is computed in f32.
+            add(format!("{u}_{extreme}_n"), Box::new(move |row| Single(value(row).unwrap_or(f64::NAN) as f32)));
+        }
+    }
+    add! { Flag "saturated": |s| s.command.health.saturated; }
+    for axis in Axis::ALL {
+        let name = axis.name();
+        // Of e1, e2 and the subsystem's input.
+        let [e1, e2, u] = match axis {
+            Axis::Roll | Axis::Pitch | Axis::Yaw => ["rad", "rad_s", "n"],
+            Axis::Z => ["m", "m_s", "n"],
+            Axis::X | Axis::Y => ["m", "m_s", "m_s2"],
+        };
+        add(format!("e1_{name}_{e1}"), Box::new(move |row| Single(row.sample.command.errors.get(axis).e1)));
+        add(format!("e2_{name}_{e2}"), Box::new(move |row| Single(row.sample.command.errors.get(axis).e2)));
+        add(format!("delta_hat_{name}_{u}"), Box::new(move |row| Single(row.sample.estimates.get(axis).delta)));
+        add(format!("theta_norm_{name}_{u}"), Box::new(move |row| Single(row.sample.estimates.get(axis).theta.norm())));
+        add(format!("lyapunov_{name}"), Box::new(move |row| Single(*row.lyapunov.get(axis))));
+    }
+    let sum = |row: &Row| Axis::ALL.iter().map(|&axis| row.lyapunov.get(axis)).sum();
+    add("lyapunov_sum".into(), Box::new(move |row| Single(sum(row))));
+    columns
+}
+
+/// U1..U4 as the rotors give them.
+fn given(sample: &Sample) -> airframe::Inputs {
+    afbc::allocation::Mixer::inputs(&sample.command.forces)
+}
+
+/// Writes the header and one line for each logged step.
+pub(super) fn write(out: &mut dyn Write, Flown { scenario, run }: &Flown) -> io::Result<()> {
+    let vehicle: Parameters = scenario.vehicle.to_f32();
+    let model = Model::new(&vehicle);
+    let columns = columns();
+    let mut writer = csv::Writer::from_writer(out);
+    writer.write_record(columns.iter().map(|column| &column.name))?;
+    let mut digits = ryu::Buffer::new();
+    let mut record = ByteRecord::new();
+    for (sample, extremes) in run.log.iter().zip(&run.input_extremes) {
+        let row = Row { sample, extremes, lyapunov: lyapunov(&model, sample) };
+        record.clear();
+        for column in &columns {
+            let field = match (column.value)(&row) {
+                Single(value) => digits.format(value),
+                Double(value) => digits.format(value),
+                Flag(true) => "1",
+                Flag(false) => "0",
+            };
+            record.push_field(field.as_bytes());
+        }
+        writer.write_byte_record(&record)?;
+    }
+    writer.flush()
+}

@@ -1,0 +1,190 @@
+//! Counterparts of the paper's Figs. 4 to 8 as SVG, all laws of one scenario overlaid.
+//!
+//! Gusts are marked where they strike and the time when parameters are off is shaded. Colours are Okabe and Ito's, which
+//! the colour-blind can tell apart.
+
+mod canvas;
+mod marks;
+mod reduce;
+mod time_chart;
+mod trajectory;
+
+use super::{Flown, words};
+use crate::flight::Sample;
+use crate::metrics::{inputs, tracking_error};
+use canvas::Ink;
+use nalgebra::Vector4;
+use plotters::style::RGBColor;
+use std::io;
+use time_chart::{Chart, Line, Panel};
+
+/// One picture.
+pub(super) struct Figure {
+    /// File name without `.svg`.
+    pub(super) name: &'static str,
+    /// What there is to see, in one sentence.
+    pub(super) caption: String,
+    /// The picture.
+    pub(super) svg: String,
+}
+
+/// Blue, vermilion, green, purple, orange: one for each law, in the order flown.
+const LAWS: [RGBColor; 5] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+];
+/// What should be flown.
+const REFERENCE: Ink = Ink { color: RGBColor(176, 176, 176), width_px: 4.0 };
+/// Width of a law's line.
+const LINE_PX: f64 = 1.3;
+
+/// One law's flight, with the colour of its lines.
+struct Law<'a> {
+    flight: &'a Flown,
+    color: RGBColor,
+}
+
+impl Law<'_> {
+    fn ink(&self) -> Ink {
+        Ink { color: self.color, width_px: LINE_PX }
+    }
+
+    /// Wide and pale: what this law wants, behind what it gets.
+    fn pale(&self) -> Ink {
+        Ink { color: canvas::pale(self.color), width_px: REFERENCE.width_px }
+    }
+
+    /// The name, for the legend.
+    fn title(&self) -> String {
+        let title = self.flight.run.controller.title();
+        match &self.flight.run.lost {
+            Some(lost) => format!("{title} (lost at {:.1} s)", lost.time_s),
+            None => title.into(),
+        }
+    }
+
+    fn lost_s(&self) -> Option<f64> {
+        self.flight.run.lost.map(|lost| lost.time_s)
+    }
+
+    /// A value over time; `end_s` is the end of the time axis.
+    fn line(&self, ink: Ink, end_s: f64, value: impl Fn(&Sample) -> f64) -> Line {
+        self.drawn(ink, end_s, self.flight.run.log.iter().map(|sample| (sample.time_s, value(sample))))
+    }
+
+    /// One of U1..U4 over time, with what it did between the rows of the log.
+    fn input(&self, end_s: f64, input: Input) -> Line {
+        let rows = self.flight.run.log.iter().zip(&self.flight.run.input_extremes);
+        let values = rows.flat_map(|(sample, [low, high])| {
+            [input(low), input(high), input(&inputs(sample))].map(|u| (sample.time_s, u))
+        });
+        self.drawn(self.ink(), end_s, values)
+    }
+
+    fn drawn(&self, ink: Ink, end_s: f64, values: impl Iterator<Item = (f64, f64)>) -> Line {
+        Line {
+            ink,
+            points: reduce::envelope(values, end_s, time_chart::COLUMNS),
+            lost_s: self.lost_s(),
+            is_reference: false,
+        }
+    }
+}
+
+/// Something to draw over time.
+type Value = fn(&Sample) -> f64;
+/// One of U1..U4.
+type Input = fn(&Vector4<f64>) -> f64;
+
+/// Fig. 5: label, what is flown, what is wanted.
+const OUTPUTS: [(&str, Value, Value); 4] = [
+    ("x [m]", |s| s.motion.position_m.x, |s| s.reference.position_m.x),
+    ("y [m]", |s| s.motion.position_m.y, |s| s.reference.position_m.y),
+    ("z [m]", |s| s.motion.position_m.z, |s| s.reference.position_m.z),
+    ("ψ [rad]", |s| s.motion.attitude_rad.z, |s| s.reference.yaw_rad),
+];
+/// Fig. 6: likewise, but each law wants its own.
+const ATTITUDE: [(&str, Value, Value); 2] = [
+    ("φ [rad]", |s| s.motion.attitude_rad.x, |s| s.command.filtered[0].angle.into()),
+    ("θ [rad]", |s| s.motion.attitude_rad.y, |s| s.command.filtered[1].angle.into()),
+];
+/// Fig. 7. The space that does not break is also one that does not vanish behind a subscript.
+const ERRORS: [(&str, Value); 4] = [
+    ("x⟨d⟩\u{a0}− x [m]", |s| tracking_error(s).x),
+    ("y⟨d⟩\u{a0}− y [m]", |s| tracking_error(s).y),
+    ("z⟨d⟩\u{a0}− z [m]", |s| tracking_error(s).z),
+    ("ψ⟨d⟩\u{a0}− ψ [rad]", |s| tracking_error(s).w),
+];
+/// Fig. 8.
+const INPUTS: [(&str, Input); 4] = [("U₁ [N]", |u| u.x), ("U₂ [N]", |u| u.y), ("U₃ [N]", |u| u.z), ("U₄ [N]", |u| u.w)];
+
+/// Draws every figure of one scenario's flights; of no flight, none.
+pub(super) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {
+    // The longest flight has met the most of the reference.
+    let Some(longest) = flights.iter().max_by_key(|flight| flight.run.log.len()) else { return Ok(Vec::new()) };
+    let scenario = &longest.scenario;
+    let last_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
+    let end_s = if last_s > 0.0 { last_s } else { scenario.duration_s };
+    let laws: Vec<Law> =
+        flights.iter().zip(LAWS.iter().cycle()).map(|(flight, &color)| Law { flight, color }).collect();
+    // The roughest behind, so that it hides nothing.
+    let mut rough_first: Vec<&Law> = laws.iter().collect();
+    let roughness = |law: &Law| law.flight.run.metrics.mean_abs_delta_u.sum();
+    rough_first.sort_by(|a, b| roughness(b).total_cmp(&roughness(a)));
+    let each = |value: Value| rough_first.iter().map(move |law| law.line(law.ink(), end_s, value));
+
+    let reference = Law { flight: longest, color: REFERENCE.color };
+    let outputs = OUTPUTS.map(|(label, value, wanted)| {
+        let wanted = Line { lost_s: None, is_reference: true, ..reference.line(REFERENCE, end_s, wanted) };
+        Panel { label, zero: false, lines: core::iter::once(wanted).chain(each(value)).collect() }
+    });
+    let attitude = ATTITUDE.map(|(label, value, wanted)| {
+        let wanted = |law: &&Law| Line { is_reference: true, ..law.line(law.pale(), end_s, wanted) };
+        Panel { label, zero: true, lines: rough_first.iter().map(wanted).chain(each(value)).collect() }
+    });
+    let errors = ERRORS.map(|(label, value)| Panel { label, zero: true, lines: each(value).collect() });
+    let controls = INPUTS.map(|(label, input)| Panel {
+        label,
+        zero: true,
+        lines: rough_first.iter().map(|law| law.input(end_s, input)).collect(),
+    });
+
+    let law_legend = || laws.iter().map(|law| (law.title(), law.ink()));
+    let with_reference = || core::iter::once(("reference".to_owned(), REFERENCE)).chain(law_legend()).collect();
+    let with_desired = laws.iter().flat_map(|law| {
+        let desired = format!("{} φ⟨d⟩, θ⟨d⟩", law.flight.run.controller.title());
+        [(law.title(), law.ink()), (desired, law.pale())]
+    });
+
+    let conditions = format!("{}: {}", scenario.name, words::conditions(scenario));
+    let chart =
+        |title, legend, panels| Chart { title, conditions: &conditions, scenario, end_s, legend, panels }.draw();
+    let lost = if laws.iter().any(|law| law.lost_s().is_some()) { " A cross: where a vehicle was lost." } else { "" };
+    let figure = |name, caption, svg| Figure { name, caption: format!("{caption}{lost}"), svg };
+    Ok(vec![
+        figure(
+            "fig4-trajectory",
+            "The flights in space. Dots: where the reference was when a gust struck.",
+            trajectory::draw(&laws, longest, &conditions, with_reference())?,
+        ),
+        figure(
+            "fig5-outputs",
+            "Position and yaw against their reference.",
+            chart("Outputs", with_reference(), outputs.into())?,
+        ),
+        figure(
+            "fig6-attitude",
+            "Roll and pitch against the angles that the position loop asks for.",
+            chart("Roll and pitch", with_desired.collect(), attitude.into())?,
+        ),
+        figure("fig7-errors", "Reference minus vehicle.", chart("Errors", law_legend().collect(), errors.into())?),
+        figure(
+            "fig8-inputs",
+            "Inputs as the rotors give them. A filled band is chatter: the input jumps between its edges.",
+            chart("Inputs", law_legend().collect(), controls.into())?,
+        ),
+    ])
+}

@@ -1,0 +1,89 @@
+//! Fewer points, same picture.
+
+/// At most four points a column of the time axis 0 to `end_s`: the first, the extremes and the last in it, in time
+/// order. What chatters within a column keeps its height. Values that are not finite are left out.
+pub(super) fn envelope(values: impl Iterator<Item = (f64, f64)>, end_s: f64, columns: f64) -> Vec<(f64, f64)> {
+    let mut points = Vec::new();
+    let mut column: Option<(f64, [(f64, f64); 4])> = None;
+    let mut flush = |column: Option<(f64, [(f64, f64); 4])>| {
+        if let Some((_, mut four)) = column {
+            four.sort_by(|a, b| a.0.total_cmp(&b.0));
+            points.extend(four);
+        }
+    };
+    for point in values.filter(|(t, v)| t.is_finite() && v.is_finite()) {
+        let index = (point.0 / end_s * columns).floor();
+        match &mut column {
+            Some((current, [_, low, high, last])) if *current == index => {
+                if point.1 < low.1 {
+                    *low = point;
+                }
+                if point.1 > high.1 {
+                    *high = point;
+                }
+                *last = point;
+            }
+            _ => flush(column.replace((index, [point; 4]))),
+        }
+    }
+    flush(column);
+    points.dedup();
+    points
+}
+
+/// The points that a line through `points` cannot do without: it strays by at most `tolerance` once both coordinates are
+/// multiplied by `scale` (Ramer, Douglas, Peucker).
+pub(super) fn simplify(points: &[(f64, f64)], scale: (f64, f64), tolerance: f64) -> Vec<(f64, f64)> {
+    let place = |p: &(f64, f64)| (p.0 * scale.0, p.1 * scale.1);
+    let mut kept = Vec::new();
+    let mut open = vec![points];
+    kept.extend(points.first());
+    while let Some(part) = open.pop() {
+        let [first, between @ .., last] = part else { continue };
+        let (a, b) = (place(first), place(last));
+        let farthest = between
+            .iter()
+            .enumerate()
+            .map(|(i, p)| (i + 1, distance(place(p), a, b)))
+            .max_by(|x, y| x.1.total_cmp(&y.1))
+            .filter(|(_, far)| *far > tolerance);
+        match farthest.and_then(|(i, _)| Some((part.get(..=i)?, part.get(i..)?))) {
+            Some((before, after)) => open.extend([after, before]),
+            None => kept.push(*last),
+        }
+    }
+    kept
+}
+
+/// From `p` to the straight piece from `a` to `b`.
+fn distance(p: (f64, f64), a: (f64, f64), b: (f64, f64)) -> f64 {
+    let (dx, dy) = (b.0 - a.0, b.1 - a.1);
+    let length2 = dx * dx + dy * dy;
+    let along = if length2 > 0.0 { (((p.0 - a.0) * dx + (p.1 - a.1) * dy) / length2).clamp(0.0, 1.0) } else { 0.0 };
+    libm::hypot(p.0 - a.0 - along * dx, p.1 - a.1 - along * dy)
+}
+
+/// The pieces of a line that lie within `low..=high`, cut where it crosses.
+pub(super) fn clip(points: &[(f64, f64)], low: f64, high: f64) -> Vec<Vec<(f64, f64)>> {
+    let inside = |p: &(f64, f64)| p.1 >= low && p.1 <= high;
+    let mut pieces: Vec<Vec<(f64, f64)>> = Vec::new();
+    let mut piece: Vec<(f64, f64)> = points.first().filter(|p| inside(p)).copied().into_iter().collect();
+    for (a, b) in points.iter().zip(points.iter().skip(1)) {
+        let cut = |level: f64| (a.0 + (b.0 - a.0) * ((level - a.1) / (b.1 - a.1)), level);
+        if a.1.max(b.1) < low || a.1.min(b.1) > high {
+            continue;
+        }
+        if !inside(a) {
+            piece.push(cut(if a.1 < low { low } else { high }));
+        }
+        if inside(b) {
+            piece.push(*b);
+        } else {
+            piece.push(cut(if b.1 < low { low } else { high }));
+            pieces.push(core::mem::take(&mut piece));
+        }
+    }
+    pieces.push(piece);
+    pieces.retain(|piece| piece.len() > 1);
+    pieces
+}

@@ -1,0 +1,236 @@
+//! One page with everything: tables, claims, figures, parameters. Needs no network and no other file.
+
+use super::figures::Figure;
+use super::files::Group;
+use super::{table, words};
+use crate::claims::Claim;
+use crate::scenario::Scenario;
+use crate::trajectory::Trajectory;
+use airframe::Axis;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// Looks: dark on white, one column, breaks between figures on paper.
+const STYLE: &str = "
+:root { color-scheme: light; }
+body { font: 15px/1.5 system-ui, -apple-system, 'Segoe UI', Helvetica, Arial, sans-serif; color: #1a1a1a; background: #fff;
+  max-width: 900px; margin: 2.5rem auto; padding: 0 1rem; }
+h1 { font-size: 1.7rem; margin: 0 0 .25rem; }
+h2 { font-size: 1.3rem; margin: 2.5rem 0 .25rem; }
+h3 { font-size: 1.05rem; margin: 1.8rem 0 .4rem; }
+p { margin: .3rem 0; }
+.quiet { color: #555; }
+table { border-collapse: collapse; margin: .6rem 0; font-variant-numeric: tabular-nums; }
+th, td { padding: .16rem .8rem; text-align: right; }
+th { font-weight: 600; }
+th:first-child, td:first-child, .name { text-align: left; }
+thead th, thead td { border-bottom: 1px solid #888; }
+tbody { border-bottom: 1px solid #ccc; }
+.lost { color: #a12; text-align: left; }
+dl { margin: .4rem 0; }
+dl > div { display: grid; grid-template-columns: 8.5rem 1fr; margin: .7rem 0; }
+dt { font-weight: 600; }
+dd { margin: 0; }
+.holds { color: #146c2e; }
+.fails { color: #a12; }
+figure { margin: 1.6rem 0; }
+figure svg { width: 100%; height: auto; border: 1px solid #e4e4e4; }
+figcaption { color: #555; font-size: .9rem; }
+.scroll { overflow-x: auto; }
+@page { margin: 15mm; }
+@media print {
+  body { font-size: 10.5pt; margin: 0; padding: 0; max-width: none; }
+  figure, tbody, dl > div, tr { break-inside: avoid; }
+  h2, h3 { break-after: avoid; }
+  figure svg { border: 0; max-height: 110mm; }
+}
+";
+
+/// What an SVG needs as a file of its own, but not within a page.
+const NAMESPACE: &str = " xmlns=\"http://www.w3.org/2000/svg\"";
+
+/// The page; `figures` holds one set for each group.
+pub(super) fn page(groups: &[Group], figures: &[Vec<Figure>], claims: &[Claim]) -> String {
+    let title = match groups {
+        [only] => only.scenario.description.as_str(),
+        _ => "Flights",
+    };
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                h1 { (capitalised(title)) }
+                p.quiet {
+                    "Flown in software: the control crate against a model of the vehicle, in lockstep."
+                }
+                @if groups.is_empty() { p { "Nothing was flown." } }
+                @if !claims.is_empty() { (verdicts(claims)) }
+                @for (group, figures) in groups.iter().zip(figures) { (section(group, figures)) }
+            }
+        }
+    }
+    .into_string()
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn verdicts(claims: &[Claim]) -> Markup {
+    html! {
+        h2 { "The paper's claims" }
+        dl {
+            @for claim in claims {
+                div {
+                    dt { @if claim.holds { span.holds { "✓ holds" } } @else { span.fails { "✗ does not hold" } } }
+                    dd { strong { (claim.statement) } br; span.quiet { (claim.evidence) } }
+                }
+            }
+        }
+    }
+}
+
+fn section(group: &Group, figures: &[Figure]) -> Markup {
+    html! {
+        h2 { (group.scenario.name) }
+        p { (words::conditions(group.scenario)) "." }
+        div.scroll { (results(group)) }
+        p.quiet { (table::legend()) }
+        @for figure in figures {
+            figure {
+                (PreEscaped(figure.svg.replacen(NAMESPACE, "", 1)))
+                figcaption { (figure.caption) }
+            }
+        }
+        h3 { "Parameters" }
+        div.scroll { (parameters(group.scenario)) }
+    }
+}
+
+/// The terminal's table.
+fn results(group: &Group) -> Markup {
+    html! {
+        table {
+            @for (i, block) in table::BLOCKS.iter().enumerate() {
+                @let rows: Vec<_> = block.rows(group).collect();
+                @let head = i == 0 || table::BLOCKS.get(i - 1).is_none_or(|above| above.columns != block.columns);
+                @if head && !rows.is_empty() {
+                    tbody.head { tr { td {} td {} @for column in block.columns { th scope="col" { (column) } } } }
+                }
+                tbody {
+                    @for (row, flight) in rows.iter().enumerate() {
+                        tr {
+                            th scope="row" { @if row == 0 { (block.title) } }
+                            td.name { (flight.run.controller.title()) }
+                            @match &flight.run.lost {
+                                Some(lost) => td.lost colspan="4" { (words::lost(lost)) },
+                                None => @for cell in block.cells(flight) { td { (cell) } },
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What determines the flight.
+fn parameters(scenario: &Scenario) -> Markup {
+    let vehicle = &scenario.vehicle;
+    let inertia = &vehicle.inertia_kg_m2;
+    let fixed = [
+        ("mass m", format!("{} kg", vehicle.mass_kg)),
+        ("arm l", format!("{} m", vehicle.arm_m)),
+        ("inertia Ix, Iy, Iz", format!("{}, {}, {} kg m²", inertia.x, inertia.y, inertia.z)),
+        ("rotor inertia Ir", format!("{:e} kg m²", vehicle.rotor_inertia_kg_m2)),
+        ("thrust factor b", format!("{:e} N s²", vehicle.thrust_factor_n_s2)),
+        ("drag factor d", format!("{:e} N m s²", vehicle.drag_factor_n_m_s2)),
+        ("gravity g", format!("{} m/s²", vehicle.gravity_m_s2)),
+        ("time step", format!("{} s", scenario.settings.dt_s)),
+        ("command filter", format!("{} rad/s", scenario.settings.command_filter_rad_s)),
+        ("largest rotor force", format!("{} N", scenario.settings.rotor_force_max_n)),
+        ("start", start(scenario)),
+        ("reference", trajectory(&scenario.trajectory)),
+    ];
+    let until = |end_s: f64| if end_s < scenario.duration_s { format!("to {end_s} s") } else { "on".into() };
+    html! {
+        table {
+            tbody { @for (name, value) in fixed { tr { td { (name) } td.name { (value) } } } }
+            tbody {
+                @for gust in scenario.environment.gusts() {
+                    @let (letter, index) = words::gust(gust);
+                    tr {
+                        td { "gust " (letter) sub { (index) } }
+                        td.name { (gust.size) " " (words::gust_unit(gust)) " from " (gust.start_s) " s " (until(gust.end_s)) }
+                    }
+                }
+                @for change in scenario.environment.changes() {
+                    tr {
+                        td { (words::change(change)) }
+                        td.name { "from " (change.start_s) " s " (until(change.end_s)) }
+                    }
+                }
+            }
+        }
+        table {
+            thead {
+                tr {
+                    td { "subsystem" }
+                    @for gain in ["α₁", "α₂", "γ", "η", "ε", "centre", "width"] { th scope="col" { (gain) } }
+                }
+            }
+            tbody {
+                @for axis in Axis::ALL {
+                    @let gains = scenario.gains.get(axis);
+                    tr {
+                        td { (axis.name()) }
+                        td { (gains.backstepping.alpha1) }
+                        td { (gains.backstepping.alpha2) }
+                        td { (gains.gamma) }
+                        td { (gains.eta) }
+                        td { (gains.epsilon) }
+                        td { (gains.membership.centre) }
+                        td { (gains.membership.width) }
+                    }
+                }
+            }
+        }
+        p.quiet { "γ, η, ε and the memberships (centre, width) are AFBC's alone." }
+    }
+}
+
+fn start(scenario: &Scenario) -> String {
+    let (p, eta) = (&scenario.initial.position_m, &scenario.initial.attitude_rad);
+    format!("({}, {}, {}) m, roll {}, pitch {}, yaw {} rad", p.x, p.y, p.z, eta.x, eta.y, eta.z)
+}
+
+fn trajectory(trajectory: &Trajectory) -> String {
+    let place = |p: &nalgebra::Vector3<f64>| format!("({}, {}, {}) m", p.x, p.y, p.z);
+    match trajectory {
+        Trajectory::Paper => "Section IV: a tilted ellipse from 2 m to 8 m height, once round in 60 s".into(),
+        Trajectory::Hover { position_m, .. } => format!("hover at {}", place(position_m)),
+        Trajectory::Step { from_m, to_m, at_s, .. } => {
+            format!("step from {} to {} at {at_s} s", place(from_m), place(to_m))
+        }
+        Trajectory::Circle { centre_m, radius_m, period_s, .. } => {
+            format!("circle of {radius_m} m around {}, once round in {period_s} s", place(centre_m))
+        }
+        Trajectory::Lissajous { centre_m, sines: [x, y, z], .. } => format!(
+            "Lissajous around {}, {}, {}, {} m at periods of {}, {}, {} s",
+            place(centre_m),
+            x.amplitude_m,
+            y.amplitude_m,
+            z.amplitude_m,
+            x.period_s,
+            y.period_s,
+            z.period_s
+        ),
+        Trajectory::Waypoints(waypoints) => format!("{} waypoints", waypoints.len()),
+    }
+}

@@ -1,0 +1,73 @@
+//! `summary.json`: the figures of merit of each run, for programs.
+
+use super::{Flown, settled};
+use crate::metrics::SETTLED_S;
+use crate::paper::{Reading, Sign};
+use nalgebra::Vector4;
+use serde::Serialize;
+use std::io::{self, Write};
+
+/// One run. Whatever does not apply, or could not be measured, is null.
+#[derive(Serialize)]
+struct Summary<'a> {
+    scenario: &'a str,
+    reading: Option<&'a str>,
+    inertia_sign: Option<&'a str>,
+    thrust_sign: Option<&'a str>,
+    plant: &'a str,
+    controller: &'a str,
+    profile: &'a str,
+    duration_s: f64,
+    lost_at_s: Option<f64>,
+    lost_reason: Option<&'a str>,
+    /// From when on `rmse`, `max_abs` and `mean_abs_delta_u_n` count.
+    measured_from_s: f64,
+    rmse: Option<Outputs>,
+    max_abs: Option<Outputs>,
+    final_error: Outputs,
+    /// U1..U4, per control step.
+    mean_abs_delta_u_n: Option<[f64; 4]>,
+}
+
+#[derive(Serialize)]
+struct Outputs {
+    x_m: f64,
+    y_m: f64,
+    z_m: f64,
+    psi_rad: f64,
+}
+
+impl From<Vector4<f64>> for Outputs {
+    fn from(v: Vector4<f64>) -> Self {
+        Outputs { x_m: v.x, y_m: v.y, z_m: v.z, psi_rad: v.w }
+    }
+}
+
+fn summary(Flown { scenario, run }: &Flown) -> Summary<'_> {
+    let uncertainty = scenario.case.and_then(|case| case.uncertainty);
+    let measured = |figures: Vector4<f64>| settled(run).then_some(figures);
+    Summary {
+        scenario: &scenario.name,
+        reading: scenario.case.and_then(|case| case.reading).map(Reading::name),
+        inertia_sign: uncertainty.map(|u| u.inertia).map(Sign::symbol),
+        thrust_sign: uncertainty.map(|u| u.thrust).map(Sign::symbol),
+        plant: scenario.model.name(),
+        controller: run.controller.name(),
+        profile: scenario.profile.name(),
+        duration_s: scenario.duration_s,
+        lost_at_s: run.lost.map(|lost| lost.time_s),
+        lost_reason: run.lost.map(|lost| lost.reason),
+        measured_from_s: SETTLED_S,
+        rmse: measured(run.metrics.rmse).map(Outputs::from),
+        max_abs: measured(run.metrics.max_abs).map(Outputs::from),
+        final_error: run.metrics.final_error.into(),
+        mean_abs_delta_u_n: measured(run.metrics.mean_abs_delta_u).map(Into::into),
+    }
+}
+
+/// Writes an array with one object for each run.
+pub(super) fn write(out: &mut dyn Write, flown: &[Flown]) -> io::Result<()> {
+    let summaries: Vec<_> = flown.iter().map(summary).collect();
+    serde_json::to_writer_pretty(&mut *out, &summaries)?;
+    writeln!(out)
+}

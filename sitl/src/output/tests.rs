@@ -1,0 +1,228 @@
+#![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "a test that panics has failed")]
+
+use super::*;
+use crate::claims::Claim;
+use crate::paper::{Case, Reading, scenario};
+use crate::scenario::ControllerKind;
+use nalgebra::Vector3;
+use plant::{Environment, Gust, GustKind, Model, ParameterChange, Quantity};
+use std::collections::{BTreeMap, HashSet};
+use std::fs;
+
+/// A folder of its own for each test, gone afterwards.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new(name: &str) -> Self {
+        Scratch(std::env::temp_dir().join(format!("sitl-output-{name}-{}", std::process::id())))
+    }
+
+    /// Every file by name.
+    fn files(&self) -> BTreeMap<String, Vec<u8>> {
+        let entries = fs::read_dir(&self.0).unwrap().map(|entry| entry.unwrap().path());
+        entries.map(|path| (path.file_name().unwrap().to_str().unwrap().into(), fs::read(path).unwrap())).collect()
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn fly(scenario: &Scenario, controller: ControllerKind) -> Flown {
+    Flown { run: Run::fly(scenario, controller, 9).unwrap(), scenario: scenario.clone() }
+}
+
+fn both(scenario: &Scenario) -> Vec<Flown> {
+    ControllerKind::ALL.map(|controller| fly(scenario, controller)).into()
+}
+
+fn paper(reading: Reading, duration_s: f64) -> Scenario {
+    let case = Case { reading: Some(reading), ..Case::DEFAULT };
+    Scenario { duration_s, ..scenario(Model::RigidBody, case).unwrap() }
+}
+
+fn claims() -> Vec<Claim> {
+    vec![
+        Claim { statement: "It flies".into(), holds: true, evidence: "it does".into() },
+        Claim { statement: "It <swims>".into(), holds: false, evidence: "word ".repeat(60) },
+    ]
+}
+
+/// Panics unless every SVG is well-formed and small.
+fn check_svgs(files: &BTreeMap<String, Vec<u8>>) -> usize {
+    let svgs = files.iter().filter(|(name, _)| name.ends_with(".svg"));
+    svgs.inspect(|(name, bytes)| {
+        let text = str::from_utf8(bytes).unwrap();
+        let svg = roxmltree::Document::parse(text).map_err(|e| format!("{name}: {e}")).unwrap();
+        assert_eq!(svg.root_element().tag_name().name(), "svg");
+        assert!(bytes.len() < 400_000, "{name}: {} bytes", bytes.len());
+        assert!(!text.contains("NaN") && !text.contains("inf\""), "{name}");
+    })
+    .count()
+}
+
+#[test]
+fn writes_everything_twice_the_same() {
+    let flown = both(&paper(Reading::Persistent, 9.0));
+    let (first, second) = (Scratch::new("first"), Scratch::new("second"));
+    let paths = write(&first.0, &flown, &claims()).unwrap();
+    write(&second.0, &flown, &claims()).unwrap();
+    // And over what is there already.
+    write(&second.0, &flown, &claims()).unwrap();
+    let files = first.files();
+    assert_eq!(files, second.files());
+    assert_eq!(check_svgs(&files), 5);
+    let expected = [
+        "fig4-trajectory.svg",
+        "fig5-outputs.svg",
+        "fig6-attitude.svg",
+        "fig7-errors.svg",
+        "fig8-inputs.svg",
+        "paper-afbc.csv",
+        "paper-backstepping.csv",
+        "report.html",
+        "summary.json",
+    ];
+    assert_eq!(files.keys().collect::<Vec<_>>(), expected);
+    assert_eq!(paths.len(), expected.len());
+
+    let report = str::from_utf8(&files["report.html"]).unwrap();
+    assert!(!report.contains("http") && !report.contains("<script") && !report.contains("<link"));
+    assert_eq!(report.matches("<svg").count(), 5);
+    assert!(report.contains("It &lt;swims&gt;"));
+}
+
+#[test]
+fn csv_holds_every_logged_step() {
+    let flown = fly(&paper(Reading::Persistent, 1.0), ControllerKind::Afbc);
+    let mut bytes = Vec::new();
+    csv::write(&mut bytes, &flown).unwrap();
+    let mut reader = ::csv::Reader::from_reader(bytes.as_slice());
+    let header = reader.headers().unwrap().clone();
+    assert_eq!(header.iter().collect::<HashSet<_>>().len(), header.len(), "each name once");
+    let column = |name: &str| header.iter().position(|n| n == name).unwrap();
+    let rows: Vec<_> = reader.records().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), flown.run.log.len());
+    let value = |row: usize, name: &str| rows[row][column(name)].parse::<f64>().unwrap();
+    for (row, sample) in flown.run.log.iter().enumerate() {
+        assert_eq!(value(row, "time_s"), sample.time_s);
+        assert_eq!(value(row, "z_m"), sample.motion.position_m.z);
+        assert_eq!(value(row, "f3_n") as f32, sample.command.forces.0.z);
+    }
+    // z - z_d = -1.5 m at rest, alpha_1 = 3, g_4 = 1/m: V = 1.5^2/2 + (3 * 1.5)^2/2 * 0.486.
+    assert!((value(0, "e2_z_m_s") - 4.5).abs() < 1e-6);
+    assert!((value(0, "lyapunov_z") - (1.125 + 10.125 * 0.486)).abs() < 1e-5);
+    let sum: f64 = airframe::Axis::ALL.iter().map(|axis| value(0, &format!("lyapunov_{}", axis.name()))).sum();
+    assert!((value(0, "lyapunov_sum") - sum).abs() < 1e-5);
+}
+
+#[test]
+fn summary_has_the_agreed_keys() {
+    let mut flown = both(&paper(Reading::Forces, 20.0));
+    flown.push(fly(&paper(Reading::Persistent, 6.0), ControllerKind::Backstepping));
+    flown.push(fly(&Scenario { case: None, ..paper(Reading::Persistent, 0.1) }, ControllerKind::Backstepping));
+    let mut bytes = Vec::new();
+    summary::write(&mut bytes, &flown).unwrap();
+    let summary: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
+    let lost = &summary[1];
+    assert_eq!(lost["controller"], "backstepping");
+    assert_eq!(lost["reading"], "forces");
+    assert_eq!(lost["inertia_sign"], "+");
+    assert_eq!(lost["thrust_sign"], "-");
+    assert_eq!(lost["plant"], "rigid-body");
+    assert_eq!(lost["profile"], "paper");
+    assert_eq!(lost["lost_at_s"], flown[1].run.lost.unwrap().time_s);
+    let flown_well = &summary[2];
+    assert!(flown_well["lost_at_s"].is_null() && flown_well["lost_reason"].is_null());
+    for figures in ["rmse", "max_abs", "final_error"] {
+        for output in ["x_m", "y_m", "z_m", "psi_rad"] {
+            assert!(flown_well[figures][output].is_number(), "{figures}.{output}");
+        }
+    }
+    assert_eq!(flown_well["mean_abs_delta_u_n"].as_array().unwrap().len(), 4);
+    let short = &summary[3];
+    assert!(short["reading"].is_null() && short["rmse"].is_null() && short["final_error"]["z_m"].is_number());
+}
+
+#[test]
+fn table_fits_and_says_who_was_lost() {
+    let mut flown = both(&paper(Reading::Forces, 20.0));
+    let text = table(&flown, &claims());
+    assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+    assert!(text.contains("s: tilted beyond 90 degrees"), "{text}");
+    assert!(text.contains("  holds ") && text.contains("  does not hold "), "{text}");
+    flown.truncate(0);
+    assert!(table(&flown, &[]).starts_with("Nothing was flown."));
+}
+
+#[test]
+fn odd_flights_have_figures_too() {
+    let calm = Scenario { name: "".into(), ..paper(Reading::Persistent, 0.1) };
+    // Everything at once, under a name made to break files and markup.
+    let gust = |axis, size| Gust { axis, kind: GustKind::Force, size, start_s: 1.0, end_s: 1.5 };
+    let gusts = airframe::Axis::ALL.map(|axis| gust(axis, 0.001)).to_vec();
+    let change = ParameterChange { quantity: Quantity::Mass, factor: 1.013, start_s: 0.5, end_s: f64::INFINITY };
+    let stormy = Scenario {
+        name: "../a <b> & \"c\" ⟨d⟩".into(),
+        environment: Environment::new(calm.vehicle, vec![change], gusts).unwrap(),
+        ..paper(Reading::Persistent, 2.0)
+    };
+    let mut flown = vec![fly(&calm, ControllerKind::Afbc), fly(&stormy, ControllerKind::Backstepping)];
+    flown.extend(both(&paper(Reading::Forces, 20.0)));
+    // A vehicle that went nowhere fast.
+    let mut broken = fly(&Scenario { name: "broken".into(), ..calm.clone() }, ControllerKind::Afbc);
+    for sample in broken.run.log.iter_mut().skip(2) {
+        sample.motion.position_m = Vector3::repeat(f64::NAN);
+        sample.motion.velocity_m_s.x = f64::INFINITY;
+    }
+    broken.run.metrics.final_error.x = f64::NAN;
+    flown.push(broken.clone());
+    let mut empty = Flown { scenario: Scenario { name: "empty".into(), ..calm }, ..broken };
+    empty.run.log.clear();
+    flown.push(empty);
+
+    let scratch = Scratch::new("odd");
+    write(&scratch.0, &flown, &[]).unwrap();
+    assert_eq!(check_svgs(&scratch.files()), 5 * 5);
+    assert!(table(&flown, &[]).contains("mass +1.3 %"));
+}
+
+#[test]
+fn file_names_stay_apart() {
+    let rigid = paper(Reading::Persistent, 0.1);
+    let simple = Scenario { model: Model::Simplified, ..rigid.clone() };
+    let pulses = Scenario { name: "PAPER".into(), ..paper(Reading::Pulses, 0.1) };
+    let longer = Scenario { duration_s: 0.2, ..rigid.clone() };
+    let mut flown = Vec::new();
+    for scenario in [&rigid, &simple, &pulses, &longer] {
+        flown.extend(both(scenario));
+    }
+    flown.push(flown[0].clone());
+    let groups = files::groups(&flown);
+    let names: Vec<_> = groups.iter().flat_map(|group| &group.csv_names).map(|name| name.to_lowercase()).collect();
+    assert_eq!(names.iter().collect::<HashSet<_>>().len(), flown.len(), "{names:?}");
+    assert_eq!(groups[1].figure_prefix, "paper-simplified-");
+}
+
+#[test]
+fn nothing_flown_is_no_error() {
+    let scratch = Scratch::new("nothing");
+    write(&scratch.0.join("deep/er"), &[], &[]).unwrap();
+    assert_eq!(fs::read(scratch.0.join("deep/er/summary.json")).unwrap(), b"[]\n");
+}
+
+#[test]
+fn an_error_names_the_path_and_the_cure() {
+    let scratch = Scratch::new("error");
+    fs::create_dir_all(scratch.0.join("taken/summary.json/full")).unwrap();
+    let error = write(&scratch.0.join("taken"), &[], &[]).unwrap_err().to_string();
+    assert!(error.contains("summary.json") && error.contains("--out"), "{error}");
+    let left: Vec<_> = fs::read_dir(scratch.0.join("taken")).unwrap().collect();
+    assert_eq!(left.len(), 1, "no temporary file stays");
+
+    fs::write(scratch.0.join("file"), "").unwrap();
+    let error = write(&scratch.0.join("file"), &[], &[]).unwrap_err().to_string();
+    assert!(error.contains("file: ") && error.contains("--out"), "{error}");
+}

@@ -1,0 +1,93 @@
+//! Names and numbers for people, the same wherever they appear.
+
+use crate::paper::{Reading, Sign};
+use crate::scenario::Scenario;
+use airframe::Axis;
+use plant::{Gust, GustKind, ParameterChange, Quantity};
+
+/// A file name without its ending: letters, digits, `-` and `_` of `name`, anything else as `-`.
+pub(super) fn stem(name: &str) -> String {
+    let keep = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' };
+    let stem: String = name.chars().take(80).map(keep).collect();
+    if stem.is_empty() { "flight".into() } else { stem }
+}
+
+/// What may tell scenarios of one name apart, as parts of a file name: reading, signs, plant, profile.
+pub(super) fn case_words(scenario: &Scenario) -> [String; 4] {
+    let reading = scenario.case.and_then(|case| case.reading).map_or("still-air", Reading::name);
+    let sign = |sign| match sign {
+        Sign::Plus => "plus",
+        Sign::Minus => "minus",
+    };
+    let signs = scenario.case.and_then(|case| case.uncertainty).map_or("certain".into(), |uncertainty| {
+        format!("inertia-{}-thrust-{}", sign(uncertainty.inertia), sign(uncertainty.thrust))
+    });
+    [reading.into(), signs, scenario.model.name().into(), scenario.profile.name().into()]
+}
+
+/// One line that says what was flown: "rigid-body plant, persistent gusts, inertia +75 %, thrust factor -40 %, 60 s".
+pub(super) fn conditions(scenario: &Scenario) -> String {
+    let mut words = vec![format!("{} plant", scenario.model.name())];
+    match (scenario.case.and_then(|case| case.reading), scenario.environment.gusts().len()) {
+        (_, 0) => {}
+        (Some(Reading::Persistent), _) => words.push("persistent gusts".into()),
+        (Some(Reading::Pulses), _) => words.push("gusts of 1 s".into()),
+        (Some(Reading::Forces), _) => words.push("gusts as forces and moments".into()),
+        (None, 1) => words.push("1 gust".into()),
+        (None, count) => words.push(format!("{count} gusts")),
+    }
+    words.extend(scenario.environment.changes().iter().map(change));
+    words.push(format!("{} profile", scenario.profile.name()));
+    words.push(format!("{} s", scenario.duration_s));
+    words.join(", ")
+}
+
+/// "inertia +75 %"
+pub(super) fn change(change: &ParameterChange) -> String {
+    let quantity = match change.quantity {
+        Quantity::Mass => "mass",
+        Quantity::Inertia => "inertia",
+        Quantity::ThrustFactor => "thrust factor",
+        Quantity::DragFactor => "drag factor",
+    };
+    // Tenths of a percent.
+    let percent = ((change.factor - 1.0) * 1000.0).round() / 10.0;
+    format!("{quantity} {percent:+} %")
+}
+
+/// Letter and index of a gust: ("A", "x") for an acceleration, ("F", "x") for a force, ("T", "φ") for a moment.
+pub(super) fn gust(gust: &Gust) -> (&'static str, &'static str) {
+    let letter = match (gust.kind, gust.axis) {
+        (GustKind::Acceleration, _) => "A",
+        (GustKind::Force, Axis::X | Axis::Y | Axis::Z) => "F",
+        (GustKind::Force, _) => "T",
+    };
+    (letter, symbol(gust.axis))
+}
+
+/// Unit of a gust's size.
+pub(super) fn gust_unit(gust: &Gust) -> &'static str {
+    match (gust.kind, gust.axis) {
+        (GustKind::Acceleration, Axis::X | Axis::Y | Axis::Z) => "m/s²",
+        (GustKind::Acceleration, _) => "rad/s²",
+        (GustKind::Force, Axis::X | Axis::Y | Axis::Z) => "N",
+        (GustKind::Force, _) => "N m",
+    }
+}
+
+/// The paper's letter for the coordinate of `axis`.
+pub(super) const fn symbol(axis: Axis) -> &'static str {
+    match axis {
+        Axis::Roll => "φ",
+        Axis::Pitch => "θ",
+        Axis::Yaw => "ψ",
+        Axis::Z => "z",
+        Axis::X => "x",
+        Axis::Y => "y",
+    }
+}
+
+/// "lost at t = 15.625 s: tilted beyond 90 degrees"
+pub(super) fn lost(lost: &crate::flight::Lost) -> String {
+    format!("lost at t = {:.3} s: {}", lost.time_s, lost.reason)
+}

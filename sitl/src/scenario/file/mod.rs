@@ -1,0 +1,129 @@
+//! Scenario files. The format is described, key by key, in `docs/scenarios.md`.
+
+mod control;
+mod environment;
+mod motion;
+mod trajectory;
+mod vehicle;
+
+#[cfg(test)]
+mod tests;
+
+use super::error::{FileError, Source};
+use super::reader::Table;
+use super::words::out_of_range;
+use super::{ControllerKind, DURATION, Scenario};
+use afbc::Profile;
+use airframe::Parameters;
+use plant::Model;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+use toml::de::DeTable;
+
+/// Length of a flight that does not say how long it is \[s\].
+const DURATION_S: f64 = 60.0;
+/// Longest scenario name.
+const NAME_LENGTH: usize = 64;
+/// Largest file that is read at all \[bytes\].
+const FILE_SIZE: u64 = 1 << 20;
+
+/// Reads and checks the scenario file at `path`.
+///
+/// # Errors
+/// One line on the first thing that is wrong.
+pub fn load(path: &Path) -> Result<Scenario, FileError> {
+    let file = path.display().to_string();
+    let text = text(path).map_err(|error| {
+        let problem = match error.kind() {
+            io::ErrorKind::NotFound => "no such file; `sitl scenarios` lists the built-in ones".into(),
+            io::ErrorKind::IsADirectory => "it is a folder; name a scenario file in it".into(),
+            io::ErrorKind::InvalidData => "it is not UTF-8 text; save it as UTF-8".into(),
+            io::ErrorKind::FileTooLarge => {
+                "it is larger than 1 MiB, too large for a scenario; name another file".into()
+            }
+            _ => format!("it cannot be read ({error}); check its permissions"),
+        };
+        FileError::whole(&file, problem)
+    })?;
+    let stem = path.file_stem().map_or("".into(), |stem| stem.to_string_lossy());
+    parse(&file, &text, &stem)
+}
+
+fn text(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    let read = File::open(path)?.take(FILE_SIZE + 1).read_to_string(&mut text)?;
+    if read as u64 > FILE_SIZE { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(text) }
+}
+
+/// Reads and checks a scenario from its `text`. Errors call it `file`; `name` is its name if it gives none itself.
+///
+/// # Errors
+/// One line on the first thing that is wrong.
+pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> {
+    let source = Source { file, text };
+    let document = DeTable::parse(text).map_err(|error| syntax(source, &error))?;
+    let mut root = Table::root(source, document.get_ref());
+
+    let name = root.text("name")?.unwrap_or(name).to_owned();
+    if !is_file_name(&name) {
+        let cure = "it must be 1 to 64 letters, digits, '-' or '_', since file names come from it";
+        return Err(root.fault_at("name", format!("\"{name}\" cannot be a name; {cure}")));
+    }
+    let description = root.text("description")?.unwrap_or_default().to_owned();
+    if description.chars().any(char::is_control) {
+        return Err(root.fault_at("description", "it has line breaks or control characters; make it one plain line"));
+    }
+    let duration_s = root.number(&DURATION)?.unwrap_or(DURATION_S);
+    let models = [Model::Simplified, Model::RigidBody];
+    let model = root.choice("plant", &models, Model::name)?.unwrap_or(Model::RigidBody);
+    let controllers = root.choices("controllers", &ControllerKind::ALL, ControllerKind::name)?;
+    let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(Profile::Paper);
+
+    let vehicle = vehicle::read(root.table("vehicle")?, Parameters::PAPER)?;
+    let truth = vehicle::read(root.table("truth")?, vehicle)?;
+    let gains = control::gains(root.table("gains")?, profile.gains())?;
+    let settings = control::settings(root.table("settings")?, profile.settings())?;
+    let Some(table) = root.table("trajectory")? else {
+        return Err(root.missing("trajectory", "add [trajectory] with kind = \"hover\" and position_m = [0, 0, 1]"));
+    };
+    let trajectory = trajectory::read(table)?;
+    let initial = motion::initial(root.table("initial")?, &trajectory.at(0.0))?;
+    let environment = environment::read(&mut root, truth)?;
+
+    let scenario = Scenario {
+        name,
+        description,
+        case: None,
+        duration_s,
+        model,
+        vehicle,
+        environment,
+        initial,
+        trajectory,
+        controllers: controllers.unwrap_or(ControllerKind::ALL.to_vec()),
+        profile,
+        gains,
+        settings,
+    };
+    // Whatever the tables have let through, no flight begins with.
+    scenario.check().map_err(|error| root.fault(error.range.name, format!("{}; change it", out_of_range(&error))))?;
+    root.finish()?;
+    Ok(scenario)
+}
+
+/// What keeps a text from being TOML.
+fn syntax(source: Source<'_>, error: &toml::de::Error) -> FileError {
+    let span = error.span().unwrap_or_default();
+    let near = source.text.get(span.clone()).and_then(|text| text.lines().next()).unwrap_or_default();
+    let near: String = near.chars().take(40).collect();
+    let near = if near.is_empty() { near } else { format!(" near `{near}`") };
+    let problem = format!("{}{near}; `sitl scenarios hover` prints a file to compare with", error.message());
+    FileError::at(source, span.start, "syntax", problem)
+}
+
+/// Safe as a part of a file name on every system.
+fn is_file_name(name: &str) -> bool {
+    let safe = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_';
+    (1..=NAME_LENGTH).contains(&name.len()) && name.bytes().all(safe)
+}

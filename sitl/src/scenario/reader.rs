@@ -1,0 +1,236 @@
+//! Typed reading of TOML: every value is checked as it is read, and a key that nobody read is refused.
+
+use super::error::{FileError, Source};
+use super::words::{self, did_you_mean, nearest, one_of};
+use airframe::Range;
+use nalgebra::Vector3;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// One table of a document, and which of its keys have been read.
+pub(super) struct Table<'a> {
+    source: Source<'a>,
+    /// Its dotted name; empty for the document itself.
+    path: String,
+    /// Where it starts: what is missing is missing from here.
+    start: usize,
+    entries: &'a DeTable<'a>,
+    read: Vec<&'static str>,
+}
+
+impl<'a> Table<'a> {
+    /// The document as a table.
+    pub(super) fn root(source: Source<'a>, entries: &'a DeTable<'a>) -> Self {
+        Table { source, path: String::new(), start: 0, entries, read: Vec::new() }
+    }
+
+    /// The number under `range.name`, if it is there.
+    pub(super) fn number(&mut self, range: &Range) -> Result<Option<f64>, FileError> {
+        let Some(value) = self.value(range.name) else { return Ok(None) };
+        self.number_in(value, range.name, range).map(Some)
+    }
+
+    /// The number under `range.name`, which must be there.
+    pub(super) fn need_number(&mut self, range: &Range) -> Result<f64, FileError> {
+        let number = self.number(range)?;
+        number.ok_or_else(|| self.missing(range.name, &format!("add it{}", words::unit(range.name))))
+    }
+
+    /// The three numbers under `key`, each in its range, if they are there.
+    pub(super) fn vector(&mut self, key: &'static str, ranges: [&Range; 3]) -> Result<Option<Vector3<f64>>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let ([rx, ry, rz], array) = (ranges, value.get_ref().as_array());
+        let number = |value, range| self.number_in(value, key, range);
+        match array.map(|array| array.iter().collect::<Vec<_>>()).as_deref() {
+            Some(&[x, y, z]) => Ok(Some(Vector3::new(number(x, rx)?, number(y, ry)?, number(z, rz)?))),
+            Some(other) => {
+                Err(self.refuse(value, key, format!("{} values; it must hold three: [x, y, z]", other.len())))
+            }
+            None => Err(self.wrong_type(value, key, "three numbers", "[x, y, z]")),
+        }
+    }
+
+    /// The three numbers under `key`, which must be there, each in `range`.
+    pub(super) fn need_vector(&mut self, key: &'static str, range: &Range) -> Result<Vector3<f64>, FileError> {
+        let vector = self.vector(key, [range; 3])?;
+        vector.ok_or_else(|| self.missing(key, &format!("add three numbers{}", words::unit(key))))
+    }
+
+    /// The string under `key`, if it is there.
+    pub(super) fn text(&mut self, key: &'static str) -> Result<Option<&'a str>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        self.text_in(value, key).map(Some)
+    }
+
+    /// The option whose name stands under `key`, if it is there.
+    pub(super) fn choice<T: Copy>(
+        &mut self,
+        key: &'static str,
+        options: &[T],
+        name: fn(T) -> &'static str,
+    ) -> Result<Option<T>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        self.choice_in(value, key, options, name).map(Some)
+    }
+
+    /// The option whose name stands under `key`, which must be there.
+    pub(super) fn need_choice<T: Copy>(
+        &mut self,
+        key: &'static str,
+        options: &[T],
+        name: fn(T) -> &'static str,
+    ) -> Result<T, FileError> {
+        let choice = self.choice(key, options, name)?;
+        choice.ok_or_else(|| self.missing(key, &format!("it must be {}", one_of(options, name))))
+    }
+
+    /// The options whose names are listed under `key`, at least one and none twice, if the list is there.
+    pub(super) fn choices<T: Copy + PartialEq>(
+        &mut self,
+        key: &'static str,
+        options: &[T],
+        name: fn(T) -> &'static str,
+    ) -> Result<Option<Vec<T>>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let Some(array) = value.get_ref().as_array() else {
+            return Err(self.wrong_type(value, key, "a list", "[\"...\"]"));
+        };
+        let mut chosen = Vec::new();
+        for item in array.iter() {
+            let choice = self.choice_in(item, key, options, name)?;
+            if chosen.contains(&choice) {
+                return Err(self.refuse(item, key, format!("\"{}\" is listed twice; once is enough", name(choice))));
+            }
+            chosen.push(choice);
+        }
+        if chosen.is_empty() {
+            return Err(self.refuse(value, key, format!("the list is empty; it must hold {}", one_of(options, name))));
+        }
+        Ok(Some(chosen))
+    }
+
+    /// The table under `key`, if it is there.
+    pub(super) fn table(&mut self, key: &'static str) -> Result<Option<Table<'a>>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        self.table_in(value, key, &format!("one table: [{}]", self.dotted(key))).map(Some)
+    }
+
+    /// The tables of the array under `key`; none if it is not there.
+    pub(super) fn tables(&mut self, key: &'static str) -> Result<Vec<Table<'a>>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(Vec::new()) };
+        let wanted = format!("[[{}]], once for each", self.dotted(key));
+        let Some(array) = value.get_ref().as_array() else {
+            return Err(self.wrong_type(value, key, "a list of tables", &wanted));
+        };
+        array.iter().map(|item| self.table_in(item, key, &wanted)).collect()
+    }
+
+    /// Refuses the first key, from the top, that nobody read.
+    pub(super) fn finish(self) -> Result<(), FileError> {
+        let Some((key, start)) = self.unread().min_by_key(|(_, start)| *start) else { return Ok(()) };
+        let cure = match nearest(key, self.read.iter().copied()) {
+            Some(known) => did_you_mean(known),
+            None => format!("known here: {}", self.read.join(", ")),
+        };
+        Err(self.unknown(key, start, &cure))
+    }
+
+    /// The whole table is refused on account of `key`.
+    pub(super) fn fault(&self, key: &str, problem: impl Into<String>) -> FileError {
+        FileError::at(self.source, self.start, self.dotted(key), problem)
+    }
+
+    /// The value under `key` is refused.
+    pub(super) fn fault_at(&self, key: &str, problem: impl Into<String>) -> FileError {
+        let start = self.entries.get(key).map_or(self.start, |value| value.span().start);
+        FileError::at(self.source, start, self.dotted(key), problem)
+    }
+
+    /// `key` is needed and not there, unless an unread key looks like a slip of the pen.
+    pub(super) fn missing(&self, key: &'static str, cure: &str) -> FileError {
+        let slip = nearest(key, self.unread().map(|(unread, _)| unread));
+        match self.unread().find(|(unread, _)| Some(*unread) == slip) {
+            Some((slip, start)) => self.unknown(slip, start, &did_you_mean(key)),
+            None => self.fault(key, format!("missing; {cure}")),
+        }
+    }
+
+    /// The keys that nobody has read, and where they stand.
+    fn unread(&self) -> impl Iterator<Item = (&str, usize)> {
+        let keys = self.entries.iter().map(|(key, _)| (key.get_ref().as_ref(), key.span().start));
+        keys.filter(|(key, _)| !self.read.contains(key))
+    }
+
+    fn unknown(&self, key: &str, start: usize, cure: &str) -> FileError {
+        FileError::at(self.source, start, self.dotted(key), format!("unknown key; {cure}"))
+    }
+
+    fn value(&mut self, key: &'static str) -> Option<&'a Spanned<DeValue<'a>>> {
+        self.read.push(key);
+        self.entries.get(key)
+    }
+
+    fn number_in(&self, value: &Spanned<DeValue<'a>>, key: &str, range: &Range) -> Result<f64, FileError> {
+        let Range { min, max, .. } = *range;
+        let number = match value.get_ref() {
+            DeValue::Float(float) => float.as_str().parse::<f64>().ok(),
+            DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().parse().ok(),
+            DeValue::Integer(integer) => u64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|i| i as f64),
+            _ => None,
+        };
+        let unit = words::unit(key);
+        let bounds = format!("it must lie within {} to {}{unit}", words::number(min), words::number(max));
+        match number {
+            None => Err(self.wrong_type(value, key, &format!("a number{unit}"), "digits without quotes")),
+            Some(number) if !number.is_finite() => {
+                Err(self.refuse(value, key, format!("{number} is not a finite number: {bounds}")))
+            }
+            Some(number) if range.check(number).is_err() => {
+                Err(self.refuse(value, key, format!("{} is out of range: {bounds}", words::number(number))))
+            }
+            Some(number) => Ok(number),
+        }
+    }
+
+    fn text_in(&self, value: &'a Spanned<DeValue<'a>>, key: &str) -> Result<&'a str, FileError> {
+        value.get_ref().as_str().ok_or_else(|| self.wrong_type(value, key, "a string", "quotes around it"))
+    }
+
+    fn choice_in<T: Copy>(
+        &self,
+        value: &'a Spanned<DeValue<'a>>,
+        key: &str,
+        options: &[T],
+        name: fn(T) -> &'static str,
+    ) -> Result<T, FileError> {
+        let text = self.text_in(value, key)?;
+        options.iter().copied().find(|&option| name(option) == text).ok_or_else(|| {
+            self.refuse(value, key, format!("\"{text}\" is unknown; it must be {}", one_of(options, name)))
+        })
+    }
+
+    fn table_in(&self, value: &'a Spanned<DeValue<'a>>, key: &str, cure: &str) -> Result<Table<'a>, FileError> {
+        let entries = value.get_ref().as_table().ok_or_else(|| self.wrong_type(value, key, "a table", cure))?;
+        Ok(Table { source: self.source, path: self.dotted(key), start: value.span().start, entries, read: Vec::new() })
+    }
+
+    fn wrong_type(&self, value: &Spanned<DeValue<'_>>, key: &str, wanted: &str, cure: &str) -> FileError {
+        let found = match value.get_ref() {
+            DeValue::String(_) => "a string",
+            DeValue::Integer(_) | DeValue::Float(_) => "a number",
+            DeValue::Boolean(_) => "true or false",
+            DeValue::Datetime(_) => "a date or time",
+            DeValue::Array(_) => "a list",
+            DeValue::Table(_) => "a table",
+        };
+        self.refuse(value, key, format!("it is {found} and must be {wanted}; write {cure}"))
+    }
+
+    fn refuse(&self, value: &Spanned<DeValue<'_>>, key: &str, problem: String) -> FileError {
+        FileError::at(self.source, value.span().start, self.dotted(key), problem)
+    }
+
+    fn dotted(&self, key: &str) -> String {
+        if self.path.is_empty() { key.into() } else { format!("{}.{key}", self.path) }
+    }
+}

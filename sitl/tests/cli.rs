@@ -1,0 +1,396 @@
+//! The command line, from outside: what it refuses, what it writes, how it ends.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+/// An empty folder of its own for each test.
+fn folder(test: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cli").join(test);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).unwrap();
+    }
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn command(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sitl"));
+    command.current_dir(folder).args(arguments);
+    command
+}
+
+fn sitl(folder: &Path, arguments: &[&str]) -> Output {
+    command(folder, arguments).output().unwrap()
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+/// Every file under `folder`, by path.
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(files(&path));
+        } else {
+            found.insert(path.clone(), fs::read(&path).unwrap());
+        }
+    }
+    found
+}
+
+/// Three lines; what follows begins at line 4.
+const HOVER: &str = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
+
+/// Files after [`HOVER`], and what is said of them.
+const BAD_TABLES: [(&str, &str); 38] = [
+    ("[vehicle]\nmass_g = 486", ":5: vehicle.mass_g: unknown key; did you mean mass_kg (kilograms)?"),
+    (
+        "[vehicle]\n\n\nmass_kg = 4860",
+        ":7: vehicle.mass_kg: 4860 is out of range: it must lie within 0.01 to 500 (kilograms)",
+    ),
+    (
+        "[vehicle]\nmass_kg = \"0.5\"",
+        ":5: vehicle.mass_kg: it is a string and must be a number (kilograms); write digits without quotes",
+    ),
+    (
+        "[vehicle]\nmass_kg = nan",
+        ":5: vehicle.mass_kg: NaN is not a finite number: it must lie within 0.01 to 500 (kilograms)",
+    ),
+    (
+        "[vehicle]\narm_m = -inf",
+        ":5: vehicle.arm_m: -inf is not a finite number: it must lie within 0.01 to 10 (metres)",
+    ),
+    ("[vehicle]\ninertia_kg_m2 = [1, 2]", ":5: vehicle.inertia_kg_m2: 2 values; it must hold three: [x, y, z]"),
+    (
+        "[vehicle]\ninertia_kg_m2 = 1",
+        ":5: vehicle.inertia_kg_m2: it is a number and must be three numbers; write [x, y, z]",
+    ),
+    (
+        "[vehicle]\ninertia_kg_m2 = [\n  1,\n  -1,\n  1]",
+        ":7: vehicle.inertia_kg_m2: -1 is out of range: it must lie within 1e-6 to 1000 (kilogram square metres)",
+    ),
+    ("[truth]\nmass = 0.5", ":5: truth.mass: unknown key; did you mean mass_kg (kilograms)?"),
+    ("[gains.rol]\neta = 1", ":4: gains.rol: unknown key; did you mean roll?"),
+    ("[gains]\nroll = 1", ":5: gains.roll: it is a number and must be a table; write one table: [gains.roll]"),
+    ("[gains.z]\neta = -1", ":5: gains.z.eta: -1 is out of range: it must lie within 0 to 1000"),
+    (
+        "[gains.x]\neta = 1\nwidth = 0.1",
+        ":4: gains.x.centre: centre / width = 100, out of range: it must lie within 0.1 to 6; change one of the two",
+    ),
+    ("[settings]\ndt_s = 1", ":5: settings.dt_s: 1 is out of range: it must lie within 0.0001 to 0.02 (seconds)"),
+    (
+        "[settings]\nrate_hz = 500",
+        ":5: settings.rate_hz: unknown key; known here: dt_s, command_filter_rad_s, rotor_force_max_n",
+    ),
+    (
+        "[initial]\nattitude_rad = [1.6, 0, 0]",
+        ":5: initial.attitude_rad: 1.6 is out of range: it must lie within -1.5 to 1.5 (radians)",
+    ),
+    (
+        "[initial]\nattitude_deg = [5, 0, 0]",
+        ":5: initial.attitude_deg: unknown key; did you mean attitude_rad (radians)?",
+    ),
+    (
+        "[[gust]]\naxis = \"x\"\nmoment_n_m = 1\nstart_s = 1",
+        ":4: gust.acceleration_m_s2: missing; axis \"x\" takes acceleration_m_s2 or force_n",
+    ),
+    (
+        "[[gust]]\naxis = \"yaw\"\nmoment_n_m = 1\nangular_acceleration_rad_s2 = 1\nstart_s = 1",
+        ":6: gust.moment_n_m: a second size; axis \"yaw\" takes angular_acceleration_rad_s2 or moment_n_m, not both",
+    ),
+    (
+        "[[gust]]\naxis = \"phi\"",
+        ":5: gust.axis: \"phi\" is unknown; it must be \"roll\", \"pitch\", \"yaw\", \"z\", \"x\" or \"y\"",
+    ),
+    ("[[gust]]\naxis = \"x\"\nforce_n = 1", ":4: gust.start_s: missing; add it (seconds)"),
+    (
+        "[[gust]]\naxis = \"x\"\nforce_n = 1\nstart_s = 1\nduration_s = -1",
+        ":8: gust.duration_s: -1 is out of range: it must lie within 0.001 to 36000 (seconds)",
+    ),
+    ("[gust]\naxis = \"x\"", ":4: gust: it is a table and must be a list of tables; write [[gust]], once for each"),
+    (
+        "[[change]]\nparameter = \"weight\"",
+        ":5: change.parameter: \"weight\" is unknown; \
+         it must be \"mass\", \"inertia\", \"thrust-factor\" or \"drag-factor\"",
+    ),
+    ("[[change]]\nparameter = \"mass\"\nstart_s = 1", ":4: change.factor: missing; add it"),
+    (
+        "[[change]]\nparameter = \"mass\"\nstart_s = 1\nfactor = 0.01",
+        ":7: change.factor: it makes mass_kg = 0.00486, out of range: it must lie within 0.01 to 500; change the factor",
+    ),
+    (
+        "[[change]]\nparameter = \"mass\"\nstart_s = 1\nfactor = 100\n\
+         [[change]]\nparameter = \"mass\"\nstart_s = 2\nfactor = 100",
+        ":11: change.factor: it makes mass_kg = 4860, out of range: it must lie within 0.01 to 500; change the factor",
+    ),
+    ("[trajectory]\nkind = \"paper\"", ":4: syntax: duplicate key near `trajectory`; COMPARE"),
+    ("[wind]\nx = 1", ":4: wind: unknown key; known here: ALL"),
+    ("\"a\\nb\" = 1", ":4: trajectory.a\\nb: unknown key; known here: kind, position_m, yaw_rad"),
+    ("yaw_deg = 90", ":4: trajectory.yaw_deg: unknown key; did you mean yaw_rad (radians)?"),
+    (
+        "yaw_rad = true",
+        ":4: trajectory.yaw_rad: it is true or false and must be a number (radians); write digits without quotes",
+    ),
+    ("yaw_rad = 1e999", ":4: trajectory.yaw_rad: inf is not a finite number: it must lie within -100 to 100 (radians)"),
+    ("yaw_rad = 0xffff", ":4: trajectory.yaw_rad: 65535 is out of range: it must lie within -100 to 100 (radians)"),
+    ("yaw_rad = 1\nyaw_rad = 2", ":5: syntax: duplicate key near `yaw_rad`; COMPARE"),
+    ("yaw_rad = ", ":4: syntax: string values must be quoted, expected literal string; COMPARE"),
+    ("[vehicle", ":4: syntax: unclosed table, expected `]`; COMPARE"),
+    ("vehicle = 1", ":4: trajectory.vehicle: unknown key; known here: kind, position_m, yaw_rad"),
+];
+
+/// Whole files, and what is said of them.
+const BAD_FILES: [(&str, &str); 21] = [
+    ("", ":1: trajectory: missing; add [trajectory] with kind = \"hover\" and position_m = [0, 0, 1]"),
+    ("[trajectry]\nkind = \"paper\"", ":1: trajectry: unknown key; did you mean trajectory?"),
+    (
+        "[[trajectory]]\n[[trajectory]]",
+        ":1: trajectory: it is a list and must be a table; write one table: [trajectory]",
+    ),
+    (
+        "[trajectory]\nkind = \"spiral\"",
+        ":2: trajectory.kind: \"spiral\" is unknown; \
+         it must be \"paper\", \"hover\", \"step\", \"circle\", \"lissajous\" or \"waypoints\"",
+    ),
+    ("[trajectory]\nkind = \"paper\"\nradius_m = 1", ":3: trajectory.radius_m: unknown key; known here: kind"),
+    (
+        "[trajectory]\nkind = \"circle\"\ncentre_m = [0, 0, 1]\nradius = 1",
+        ":4: trajectory.radius: unknown key; did you mean radius_m (metres)?",
+    ),
+    (
+        "[trajectory]\nkind = \"circle\"\ncentre_m = [0, 0, 1]\nperiod_s = 9",
+        ":1: trajectory.radius_m: missing; add it (metres)",
+    ),
+    (
+        "[trajectory]\nkind = \"circle\"\ncentre_m = [0, 0, 1]\nradius_m = 100\nperiod_s = 0.5",
+        ":5: trajectory.period_s: it asks for 1.257e3 m/s and 1.579e4 m/s2, \
+         more than a controller accepts (1000 of either); allow more time",
+    ),
+    (
+        "[trajectory]\nkind = \"waypoints\"",
+        ":1: trajectory.waypoint: missing; add [[trajectory.waypoint]] with time_s and position_m",
+    ),
+    (
+        "[trajectory]\nkind = \"waypoints\"\n\
+         [[trajectory.waypoint]]\ntime_s = 3\nposition_m = [0, 0, 1]\n\
+         [[trajectory.waypoint]]\ntime_s = 2\nposition_m = [0, 0, 2]",
+        ":7: trajectory.waypoint.time_s: 2 is not after the 3 of the waypoint before; make times rise",
+    ),
+    ("duration_s = -3", ":1: duration_s: -3 is out of range: it must lie within 0.1 to 36000 (seconds)"),
+    ("duration = 3", ":1: trajectory: missing; add [trajectory] with kind = \"hover\" and position_m = [0, 0, 1]"),
+    ("duration = 3\n[trajectory]\nkind = \"paper\"", ":1: duration: unknown key; did you mean duration_s (seconds)?"),
+    (
+        "duration_s = 1979-05-27",
+        ":1: duration_s: it is a date or time and must be a number (seconds); write digits without quotes",
+    ),
+    ("name = \"../up\"", ":1: name: \"../up\" cannot be a name; NAME"),
+    ("name = \"\"", ":1: name: \"\" cannot be a name; NAME"),
+    ("description = \"a\\nb\"", ":1: description: it has line breaks or control characters; make it one plain line"),
+    ("plant = \"real\"", ":1: plant: \"real\" is unknown; it must be \"simplified\" or \"rigid-body\""),
+    ("controllers = []", ":1: controllers: the list is empty; it must hold \"afbc\" or \"backstepping\""),
+    ("controllers = [\"afbc\", \"afbc\"]", ":1: controllers: \"afbc\" is listed twice; once is enough"),
+    ("profile = \"best\"", ":1: profile: \"best\" is unknown; it must be \"paper\""),
+];
+
+/// What several messages have in common, written out.
+fn expand(message: &str) -> String {
+    message
+        .replace("COMPARE", "`sitl scenarios hover` prints a file to compare with")
+        .replace("NAME", "it must be 1 to 64 letters, digits, '-' or '_', since file names come from it")
+        .replace(
+            "ALL",
+            "name, description, duration_s, plant, controllers, profile, vehicle, truth, gains, settings, trajectory, \
+             initial, gust, change",
+        )
+}
+
+#[test]
+fn bad_files_get_one_line_and_nothing_is_written() {
+    let folder = folder("bad");
+    let tables = BAD_TABLES.map(|(text, message)| (format!("{HOVER}{text}\n"), message));
+    let files_ = BAD_FILES.map(|(text, message)| (format!("{text}\n"), message));
+    for (text, message) in tables.into_iter().chain(files_) {
+        fs::write(folder.join("my.toml"), &text).unwrap();
+        for verb in ["check", "fly"] {
+            let output = sitl(&folder, &[verb, "my.toml"]);
+            assert_eq!(stderr(&output), format!("my.toml{}\n", expand(message)), "{text}");
+            assert_eq!(code(&output), 2, "{text}");
+            assert_eq!(stdout(&output), "");
+        }
+        assert_eq!(files(&folder).len(), 1, "{text}");
+    }
+}
+
+#[test]
+fn files_that_cannot_be_read_get_one_line() {
+    let folder = folder("unreadable");
+    fs::create_dir(folder.join("dir.toml")).unwrap();
+    fs::write(folder.join("latin.toml"), b"name = \"caf\xe9\"").unwrap();
+    fs::write(folder.join("large.toml"), vec![b'#'; (1 << 20) + 1]).unwrap();
+    fs::write(folder.join("my flight.toml"), HOVER).unwrap();
+    let lists = "`sitl scenarios` lists the built-in ones";
+    for (name, message) in [
+        ("none.toml", format!("none.toml: no such file; {lists}")),
+        ("dir.toml", "dir.toml: it is a folder; name a scenario file in it".into()),
+        ("latin.toml", "latin.toml: it is not UTF-8 text; save it as UTF-8".into()),
+        ("large.toml", "large.toml: it is larger than 1 MiB, too large for a scenario; name another file".into()),
+        ("my flight.toml", expand("my flight.toml:1: name: \"my flight\" cannot be a name; NAME")),
+        ("hovr", "hovr: no such scenario; did you mean hover?".into()),
+        ("xyz", format!("xyz: no such scenario; {lists}; a file needs its path, as in ./my.toml")),
+    ] {
+        let output = sitl(&folder, &["fly", name]);
+        assert_eq!((stderr(&output), code(&output)), (format!("{message}\n"), 2));
+        assert!(!folder.join("out").exists());
+    }
+}
+
+#[test]
+fn bad_options_are_refused_before_anything_is_written() {
+    let folder = folder("options");
+    for arguments in [
+        &["--reading", "storm"] as &[&str],
+        &["--inertia", "0"],
+        &["--no-uncertainty", "--thrust", "+"],
+        &["paper", "--log-hz", "300"],
+        &["paper", "--duration", "0"],
+        &["paper", "--duration", "nan"],
+        &["fly"],
+        &["fly", "hover", "--controller", "pid"],
+        &["fly", "hover", "--duration", "36000", "--log-hz", "1000"],
+        &["scenarios", "hovr"],
+    ] {
+        let output = sitl(&folder, arguments);
+        assert_eq!(code(&output), 2, "{arguments:?}");
+        assert!(!stderr(&output).is_empty() && output.stdout.is_empty(), "{arguments:?}");
+        assert!(files(&folder).is_empty(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn an_out_folder_that_cannot_be_gets_one_line() {
+    let folder = folder("blocked");
+    fs::write(folder.join("taken"), "").unwrap();
+    let output = sitl(&folder, &["fly", "hover", "--duration", "1", "--out", "taken"]);
+    assert_eq!(code(&output), 2);
+    assert!(stderr(&output).contains("taken") && stderr(&output).lines().count() == 1, "{}", stderr(&output));
+    assert_eq!(files(&folder).len(), 1);
+}
+
+#[test]
+fn without_a_command_it_flies_the_paper() {
+    let folder = folder("paper");
+    let output = sitl(&folder, &["--duration", "6", "--log-hz", "10"]);
+    assert_eq!((code(&output), stderr(&output)), (0, String::new()));
+    for name in ["paper-afbc.csv", "paper-backstepping.csv", "summary.json", "report.html"] {
+        assert!(folder.join("out/paper").join(name).is_file(), "{name}");
+    }
+    let named = sitl(&folder, &["paper", "--duration", "6", "--log-hz", "10"]);
+    assert_eq!(stdout(&output), stdout(&named));
+}
+
+#[test]
+fn options_choose_among_the_papers_readings() {
+    let folder = folder("readings");
+    let logs = |arguments: &[&str]| {
+        let out = folder.join("out");
+        let _ = fs::remove_dir_all(&out);
+        let common = ["paper", "--duration", "1", "--log-hz", "1", "--out", "out"];
+        let output = sitl(&folder, &[&common, arguments].concat());
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        files(&out).keys().filter(|path| path.extension().is_some_and(|extension| extension == "csv")).count()
+    };
+    assert_eq!(logs(&[]), 2);
+    assert_eq!(logs(&["--no-uncertainty", "--reading", "none"]), 2);
+    assert_eq!(logs(&["--inertia", "-", "--thrust", "+"]), 2);
+    assert_eq!(logs(&["--inertia", "both", "--thrust", "both"]), 8);
+    assert_eq!(logs(&["--reading", "all", "--inertia", "both", "--thrust", "both", "--plant", "both"]), 48);
+}
+
+#[test]
+fn a_lost_vehicle_ends_its_run_and_keeps_its_log() {
+    let folder = folder("lost");
+    let gust = "duration_s = 10\n[[gust]]\naxis = \"roll\"\nmoment_n_m = 1.2\nstart_s = 2\n";
+    fs::write(folder.join("storm.toml"), format!("{gust}{HOVER}")).unwrap();
+    let output = sitl(&folder, &["fly", "storm.toml"]);
+    assert_eq!((code(&output), stderr(&output)), (1, String::new()));
+    assert!(stdout(&output).contains("lost at t = "), "{}", stdout(&output));
+    let log = fs::read_to_string(folder.join("out/storm/storm-afbc.csv")).unwrap();
+    assert!((200..900).contains(&log.lines().count()));
+
+    // The paper's reading that is known to lose the vehicle is no failure.
+    let output = sitl(&folder, &["--reading", "forces", "--log-hz", "10"]);
+    assert_eq!((code(&output), stderr(&output)), (0, String::new()));
+    assert!(stdout(&output).contains("lost at t = "));
+}
+
+#[test]
+fn every_built_in_scenario_is_listed_checked_and_a_template() {
+    let folder = folder("built_in");
+    let list = stdout(&sitl(&folder, &["scenarios"]));
+    let names: Vec<_> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert_eq!(names, ["paper", "hover", "step", "circle", "lissajous", "waypoints", "delivery"]);
+    for name in names {
+        let file = sitl(&folder, &["scenarios", name]);
+        fs::write(folder.join("copy.toml"), &file.stdout).unwrap();
+        let (built_in, copy) = (sitl(&folder, &["check", name]), sitl(&folder, &["check", "./copy.toml"]));
+        assert_eq!((code(&built_in), code(&copy)), (0, 0), "{}", stderr(&copy));
+        assert!(stdout(&built_in).starts_with(&format!("{name}: ok, ")));
+        assert_eq!(stdout(&built_in), stdout(&copy));
+        assert_eq!(code(&sitl(&folder, &["fly", name, "--log-hz", "1", "--controller", "afbc"])), 0);
+        assert!(folder.join("out").join(name).join(format!("{name}-afbc.csv")).is_file());
+        assert!(!folder.join("out").join(name).join(format!("{name}-backstepping.csv")).exists());
+    }
+}
+
+#[test]
+fn two_runs_write_the_same_bytes() {
+    let folder = folder("determinism");
+    for out in ["a", "b"] {
+        assert_eq!(code(&sitl(&folder, &["fly", "delivery", "--out", out])), 0);
+    }
+    let (a, b) = (files(&folder.join("a")), files(&folder.join("b")));
+    assert!(a.len() > 2);
+    assert!(a.values().eq(b.values()));
+
+    // The paper's flight is the same whether it comes from the file or from the code.
+    assert_eq!(code(&sitl(&folder, &["fly", "paper", "--out", "file"])), 0);
+    assert_eq!(code(&sitl(&folder, &["paper", "--out", "code"])), 0);
+    let log = |out: &str| fs::read(folder.join(out).join("paper-afbc.csv")).unwrap();
+    assert!(log("file") == log("code"));
+}
+
+#[test]
+fn a_closed_pipe_is_no_failure() {
+    let folder = folder("pipe");
+    for arguments in [&["scenarios", "paper"] as &[&str], &["fly", "hover", "--duration", "1"]] {
+        let mut child = command(&folder, arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!((code(&output), stderr(&output)), (0, String::new()));
+    }
+}
+
+#[test]
+fn help_and_version_go_to_stdout() {
+    let folder = folder("help");
+    for arguments in [&["--help"] as &[&str], &["-h"], &["--version"], &["fly", "--help"], &["help", "paper"]] {
+        let output = sitl(&folder, arguments);
+        assert_eq!(code(&output), 0);
+        assert!(stdout(&output).lines().count() > 0 && output.stderr.is_empty());
+    }
+}

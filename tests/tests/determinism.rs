@@ -1,0 +1,75 @@
+//! The same flight twice gives the same bits in every number of every sample.
+#![allow(clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
+
+use airframe::Axis;
+use plant::Model;
+use sitl::flight::{Sample, fly};
+use sitl::paper::{Case, scenario};
+use sitl::scenario::{ControllerKind, Scenario};
+
+/// Every number of a sample.
+fn numbers(sample: &Sample) -> impl Iterator<Item = u64> {
+    let (m, r, c) = (&sample.motion, &sample.reference, &sample.command);
+    let wide = [sample.time_s, r.yaw_rad, r.yaw_rate_rad_s, r.yaw_acceleration_rad_s2].into_iter().chain(
+        [
+            m.position_m,
+            m.velocity_m_s,
+            m.attitude_rad,
+            m.rates_rad_s,
+            r.position_m,
+            r.velocity_m_s,
+            r.acceleration_m_s2,
+        ]
+        .into_iter()
+        .flat_map(<[f64; 3]>::from),
+    );
+    let u = &c.inputs;
+    let learnt = Axis::ALL.into_iter().flat_map(|axis| {
+        let (e, estimate) = (c.errors.get(axis), sample.estimates.get(axis));
+        let theta: [[f32; 3]; 3] = estimate.theta.into();
+        [e.e1, e.e1_dot, e.e2, estimate.delta].into_iter().chain(theta.into_iter().flatten())
+    });
+    let narrow = [u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n]
+        .into_iter()
+        .chain(c.virtual_m_s2)
+        .chain(c.desired_rad)
+        .chain(c.filtered.into_iter().flat_map(|f| [f.angle, f.rate]))
+        .chain(<[f32; 4]>::from(c.speeds.0))
+        .chain(<[f32; 4]>::from(c.forces.0))
+        .chain(learnt);
+    let wide: Vec<u64> = wide.map(f64::to_bits).collect();
+    let narrow: Vec<u64> = narrow.map(|x| u64::from(x.to_bits())).collect();
+    wide.into_iter().chain(narrow)
+}
+
+/// One number for all bits of a flight (FNV-1a), and how many samples it is made of.
+fn digest(scenario: &Scenario, kind: ControllerKind) -> (u64, usize) {
+    let (mut hash, mut samples) = (0xcbf2_9ce4_8422_2325_u64, 0);
+    fly(scenario, kind, |sample| {
+        samples += 1;
+        for number in numbers(sample) {
+            hash = (hash ^ number).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    })
+    .unwrap();
+    (hash, samples)
+}
+
+#[test]
+fn two_flights_are_the_same_to_the_bit() {
+    for model in [Model::Simplified, Model::RigidBody] {
+        for kind in ControllerKind::ALL {
+            let mut scenario = scenario(model, Case::DEFAULT).unwrap();
+            scenario.duration_s = 25.0; // past both kinds of gusts and into the uncertainty
+            let first = digest(&scenario, kind);
+            assert_eq!(first.1, 25_001);
+            assert_eq!(digest(&scenario, kind), first, "{} {}", model.name(), kind.name());
+            // Side by side with another flight, in another thread.
+            let elsewhere = std::thread::scope(|scope| scope.spawn(|| digest(&scenario, kind)).join().unwrap());
+            assert_eq!(elsewhere, first);
+            // The digest sees a difference of one bit in 1e-15 m.
+            scenario.initial.position_m.z = scenario.initial.position_m.z.next_up();
+            assert_ne!(digest(&scenario, kind).0, first.0, "the digest is blind");
+        }
+    }
+}

@@ -1,0 +1,312 @@
+//! What the paper leaves open or gets wrong, held to what it was found to do: gaps 1, 3, 4 and 5 of `docs/paper.md`.
+#![allow(clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
+
+use afbc::adaptive::{self, Estimate};
+use afbc::backstepping::{Errors, Tracking};
+use afbc::cascade::Context;
+use afbc::fuzzy::{Basis, Membership};
+use afbc::{Adaptive, Controller, Law, Memory, Profile};
+use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
+use nalgebra::Vector3;
+use plant::{Environment, Model, Motion, Plant};
+use sitl::flight::{Flight, LOST_DISTANCE_M, Sample, adaptive_law, backstepping_law};
+use sitl::paper::{Case, Reading, scenario};
+use sitl::run::Run;
+use sitl::scenario::{ControllerKind, Scenario};
+
+const CALM: Case = Case { reading: None, uncertainty: None };
+const GUSTS: Case = Case { reading: Some(Reading::Persistent), uncertainty: None };
+
+fn paper(case: Case) -> Scenario {
+    scenario(Model::Simplified, case).unwrap()
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+// Gap 1: (12) needs d phi_d/dt and d theta_d/dt.
+
+/// A law that is told that phi_d and theta_d stand still, as an implementation without the filter's rates would be.
+#[derive(Clone, Copy)]
+struct Rateless<L>(L);
+
+impl<L: Law> Law for Rateless<L> {
+    type Estimate = L::Estimate;
+
+    fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut L::Estimate) -> (f32, Errors) {
+        match axis {
+            Axis::Roll | Axis::Pitch => {
+                let standing = Tracking { x1d_dot: 0.0, x1d_ddot: 0.0, ..*tracking };
+                self.0.input(axis, &standing, context, estimate)
+            }
+            _ => self.0.input(axis, tracking, context, estimate),
+        }
+    }
+
+    fn learnt(estimate: &L::Estimate) -> Estimate {
+        L::learnt(estimate)
+    }
+}
+
+/// Flies the scenario and tells whether the law held it: upright to the end and nearer than 1 m after 5 s.
+fn flies<L: Law>(scenario: &Scenario, law: L) -> bool {
+    let mut flight = Flight::new(scenario, law).unwrap();
+    loop {
+        let sample = flight.control();
+        let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
+        let tilt = sample.motion.attitude_rad.xy().amax();
+        // Written so that NaN is a loss.
+        let held =
+            tilt < core::f64::consts::FRAC_PI_2 && distance_m < if sample.time_s < 5.0 { LOST_DISTANCE_M } else { 1.0 };
+        if !held || sample.time_s >= scenario.duration_s {
+            return held;
+        }
+        flight.advance(&sample.command);
+    }
+}
+
+#[test]
+fn gap_1_without_the_rates_of_the_desired_angles_neither_law_flies() {
+    // Over the whole band in which both fly with them. (Beyond it the loss takes longer: at 1000 rad/s, nearly no filter
+    // at all, backstepping in calm air still swings within 0.3 m after 60 s, AFBC is 30 m off.)
+    for bandwidth in [10.0, 20.0, 40.0, 80.0] {
+        let mut scenario = paper(CALM);
+        scenario.settings.command_filter_rad_s = bandwidth;
+        let (adaptive, backstepping) = (adaptive_law(&scenario).unwrap(), backstepping_law(&scenario).unwrap());
+        assert!(!flies(&scenario, Rateless(adaptive)), "AFBC flies without rates at {bandwidth} rad/s");
+        assert!(!flies(&scenario, Rateless(backstepping)), "backstepping flies without rates at {bandwidth} rad/s");
+    }
+}
+
+#[test]
+fn gap_1_with_the_filters_rates_both_fly_from_10_to_80_rad_s() {
+    for bandwidth in [10.0, 20.0, 40.0, 80.0] {
+        let mut scenario = paper(CALM);
+        scenario.settings.command_filter_rad_s = bandwidth;
+        assert!(flies(&scenario, adaptive_law(&scenario).unwrap()), "AFBC at {bandwidth} rad/s");
+        assert!(flies(&scenario, backstepping_law(&scenario).unwrap()), "backstepping at {bandwidth} rad/s");
+    }
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+// Gap 3: (18) as printed is 0/0 in f32.
+
+const ATTITUDE: Membership = Membership { centre: 0.26, width: 0.1 };
+
+/// (18) as printed, in `f32`: nine products of two Gaussians over their sum.
+fn printed(membership: Membership, inputs: [f32; 2]) -> [f32; 9] {
+    let Membership { centre, width } = membership;
+    let gaussian = |x: f32, j: usize| {
+        let z = (x - centre * (j as f32 - 1.0)) / width;
+        (-0.5 * z * z).exp()
+    };
+    let firing: [f32; 9] = core::array::from_fn(|rule| gaussian(inputs[0], rule / 3) * gaussian(inputs[1], rule % 3));
+    let sum: f32 = firing.iter().sum();
+    firing.map(|w| w / sum)
+}
+
+#[test]
+fn gap_3_the_printed_basis_is_0_over_0_from_1_705_rad_s_and_ours_is_not() {
+    let basis = Basis::new(ATTITUDE).unwrap();
+    for step in 0..=2000_u16 {
+        let rate = f32::from(step) / 200.0; // 0 to 10 rad/s
+        let printed = printed(ATTITUDE, [0.0, rate]);
+        let ours = basis.weights([0.0, rate]).transpose();
+        let sum: f32 = ours.iter().sum();
+        assert!((sum - 1.0).abs() < 1e-6 && ours.iter().all(|w| (0.0..=1.0).contains(w)), "{ours} at {rate} rad/s");
+        if rate < 1.55 {
+            // The same basis, while no Gaussian that counts is below the normal numbers of f32: off by the rounding of
+            // exponents up to 87, six times.
+            for (a, b) in ours.iter().zip(printed) {
+                assert!((a - b).abs() < 4e-5, "{a} against {b} at {rate} rad/s");
+            }
+        }
+        assert_eq!(printed.iter().any(|w| w.is_nan()), rate >= 1.705, "{printed:?} at {rate} rad/s");
+    }
+}
+
+#[test]
+fn gap_3_the_basis_is_exact_where_the_printed_one_is_lost() {
+    // In f64 (18) holds to 4.125 rad/s; up to there it is an oracle for what f32 cannot say as printed.
+    let basis = Basis::new(ATTITUDE).unwrap();
+    for step in 0..=400_u16 {
+        let rate = f32::from(step) / 100.0;
+        let gaussian = |x: f64, j: usize| {
+            let z = (x - f64::from(ATTITUDE.centre) * (j as f64 - 1.0)) / f64::from(ATTITUDE.width);
+            (-0.5 * z * z).exp()
+        };
+        let firing: [f64; 9] =
+            core::array::from_fn(|rule| gaussian(0.1, rule / 3) * gaussian(f64::from(rate), rule % 3));
+        let sum: f64 = firing.iter().sum();
+        assert!(sum > 0.0);
+        for (ours, firing) in basis.weights([0.1, rate]).transpose().iter().zip(firing) {
+            // Exponents of up to 26 * 4.1, 7 roundings: see the property tests of the basis.
+            assert!((f64::from(*ours) - firing / sum).abs() <= 1e-4 * firing / sum + 1e-36, "at {rate} rad/s");
+        }
+    }
+}
+
+/// What it costs: a roll rate of 2 rad/s, half a turn in 1.5 s, makes every estimate of the printed basis NaN for good.
+#[test]
+fn gap_3_a_fast_roll_leaves_the_estimates_finite() {
+    let controller = Controller::new(
+        Parameters::PAPER.to_f32(),
+        Profile::Paper.settings(),
+        Adaptive::new(Profile::Paper.gains()).unwrap(),
+    )
+    .unwrap();
+    let mut memory = Memory::default();
+    for rate in [2.0, 10.0, 100.0, 1000.0] {
+        let state = State { rates_rad_s: Vector3::new(rate, rate, rate), ..State::default() };
+        let command = controller.step(&mut memory, &state, &Setpoint::default());
+        assert!(command.speeds.0.iter().all(|w| w.is_finite()));
+        for axis in Axis::ALL {
+            assert!(
+                memory.estimates.get(axis).theta.iter().all(|theta| theta.is_finite()),
+                "{} at {rate} rad/s",
+                axis.name()
+            );
+        }
+    }
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+// Gap 4: tanh(e_2 / 0.001) at 1 kHz is a relay.
+
+/// Mean |change of U1| per step over the last second of a hover with a roll of 0.01 rad to begin with, under a robust
+/// term that is held at `delta` \[mN\].
+fn trembling_mn(delta: f32, epsilon: f32) -> f64 {
+    let mut gains = Profile::Paper.gains();
+    for axis in Axis::ALL {
+        // Nothing is learnt: the threshold is that of delta, not of how it grew.
+        *gains.get_mut(axis) = adaptive::Gains { gamma: 0.0, eta: 0.0, epsilon, ..*gains.get(axis) };
+    }
+    let law = Adaptive::new(gains).unwrap();
+    let vehicle = Parameters::PAPER;
+    let controller = Controller::new(vehicle.to_f32(), Profile::Paper.settings(), law).unwrap();
+    let mut memory: Memory<Estimate> = Memory::default();
+    memory.estimates.roll.delta = delta;
+    // Held up by what the z subsystem would have learnt: the weight.
+    memory.estimates.z.theta.fill((vehicle.mass_kg * vehicle.gravity_m_s2) as f32);
+    let start = Motion { attitude_rad: Vector3::new(0.01, 0.0, 0.0), ..Motion::default() };
+    let mut plant = Plant::new(Model::Simplified, start, Environment::calm(vehicle).unwrap());
+    let (mut last, mut sum) = (0.0, 0.0);
+    for step in 0..5000 {
+        let command = controller.step(&mut memory, &plant.motion().measure(), &Setpoint::default());
+        if step >= 4000 {
+            sum += f64::from(command.inputs.roll_n - last).abs();
+        }
+        last = command.inputs.roll_n;
+        plant.step(&command.speeds, 0.001);
+    }
+    sum
+}
+
+#[test]
+fn gap_4_the_robust_term_becomes_a_relay_at_2_epsilon_over_g_dt() {
+    // One Euler step of e_2 under u = (delta / epsilon + alpha_2) e_2 is stable while g dt (delta / epsilon + alpha_2) < 2
+    // with g = l / Ix = 65.8: delta < 0.0284, or 0.030 without alpha_2. Found to 1 %.
+    let (g, dt, alpha2) = (65.79_f32, 0.001, 2.0);
+    for epsilon in [0.001, 0.002, 0.005] {
+        let onset = epsilon * (2.0 / (g * dt) - alpha2);
+        let (mut quiet, mut trembling) = (0.5 * onset, 2.0 * onset);
+        assert!(trembling_mn(quiet, epsilon) < 0.01, "epsilon {epsilon}: trembles at {quiet}");
+        assert!(trembling_mn(trembling, epsilon) > 1.0, "epsilon {epsilon}: quiet at {trembling}");
+        while trembling - quiet > 0.01 * onset {
+            let middle = 0.5 * (quiet + trembling);
+            if trembling_mn(middle, epsilon) < 0.01 { quiet = middle } else { trembling = middle }
+        }
+        assert!((0.98 * onset..1.01 * onset).contains(&quiet), "epsilon {epsilon}: onset {quiet}, {onset} predicted");
+    }
+}
+
+fn with_epsilon(case: Case, epsilon: f32) -> Scenario {
+    let mut scenario = paper(case);
+    scenario.gains = PerAxis::from_fn(|axis| adaptive::Gains { epsilon, ..*scenario.gains.get(axis) });
+    scenario
+}
+
+/// Mean |change of U1| per step \[mN\], apart for steps where delta_hat on roll is below and above 0.030.
+fn trembling_by_delta(scenario: &Scenario) -> [f64; 2] {
+    let (mut sums, mut counts) = ([0.0; 2], [0_u32; 2]);
+    let mut last: Option<Sample> = None;
+    sitl::flight::fly(scenario, ControllerKind::Afbc, |sample| {
+        if let Some(last) = last.replace(*sample).filter(|last| last.time_s >= 5.0) {
+            let above = usize::from(sample.estimates.roll.delta > 0.030);
+            sums[above] += 1000.0 * f64::from(sample.command.inputs.roll_n - last.command.inputs.roll_n).abs();
+            counts[above] += 1;
+        }
+    })
+    .unwrap();
+    assert!(counts.iter().all(|count| *count > 1000), "delta_hat does not cross 0.030: {counts:?}");
+    [sums[0] / f64::from(counts[0]), sums[1] / f64::from(counts[1])]
+}
+
+#[test]
+fn gap_4_in_flight_roll_trembles_once_delta_hat_has_passed_0_030() {
+    let [below, above] = trembling_by_delta(&paper(GUSTS));
+    assert!(below < 1.0 && above > 50.0, "{below} mN below, {above} mN above");
+}
+
+#[test]
+fn gap_4_a_hundred_times_the_epsilon_flies_as_well_without_trembling() {
+    for case in [GUSTS, Case::DEFAULT] {
+        let printed = Run::fly(&with_epsilon(case, 0.001), ControllerKind::Afbc, u64::MAX).unwrap();
+        let wide = Run::fly(&with_epsilon(case, 0.1), ControllerKind::Afbc, u64::MAX).unwrap();
+        assert_eq!((printed.lost, wide.lost), (None, None));
+        let mn = |run: &Run| run.metrics.mean_abs_delta_u * 1000.0;
+        // U1, U2 tremble by 50 mN and more a step as printed, and no longer.
+        assert!(mn(&printed).x > 50.0 && mn(&printed).y > 50.0, "{}", mn(&printed));
+        assert!(mn(&wide).x < 0.5 && mn(&wide).y < 0.5, "{}", mn(&wide));
+        // As well: no error grows by more than a fifth and 5 mm, all stay below half of what backstepping leaves.
+        let baseline = Run::fly(&paper(case), ControllerKind::Backstepping, u64::MAX).unwrap();
+        let errors = |run: &Run| -> [f64; 4] { run.metrics.rmse.into() };
+        for ((wide, printed), baseline) in errors(&wide).into_iter().zip(errors(&printed)).zip(errors(&baseline)) {
+            assert!(wide <= 1.2 * printed + 0.005, "RMSE {wide}, {printed} as printed");
+            assert!(wide <= 0.5 * baseline, "RMSE {wide}, {baseline} under backstepping");
+        }
+    }
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+// Gap 5: what "1.2 N" and "1.2 N m" mean.
+
+fn both(reading: Reading, model: Model) -> [Run; 2] {
+    let scenario = scenario(model, Case { reading: Some(reading), uncertainty: None }).unwrap();
+    ControllerKind::ALL.map(|kind| Run::fly(&scenario, kind, u64::MAX).unwrap())
+}
+
+#[test]
+fn gap_5_as_persistent_accelerations_backstepping_keeps_an_error_and_afbc_does_not() {
+    for model in [Model::Simplified, Model::RigidBody] {
+        let [afbc, baseline] = both(Reading::Persistent, model);
+        assert_eq!((afbc.lost, baseline.lost), (None, None));
+        // A / (1 + alpha_1 alpha_2) on x, y and psi: 1.2 / 3, and psi through g_3 = d / (b Iz) = 1.43.
+        let kept = baseline.metrics.final_error.abs();
+        assert!((0.3..0.5).contains(&kept.x) && (0.3..0.5).contains(&kept.y) && kept.w > 0.25, "{kept}");
+        let left = afbc.metrics.final_error.abs();
+        assert!(left.x < 0.01 && left.y < 0.01 && left.z < 0.01 && left.w < 0.2 * kept.w, "{left}");
+    }
+}
+
+#[test]
+fn gap_5_after_pulses_of_1_s_both_recover() {
+    for model in [Model::Simplified, Model::RigidBody] {
+        for run in both(Reading::Pulses, model) {
+            assert_eq!(run.lost, None);
+            let left = run.metrics.final_error.abs();
+            assert!(left.amax() < 0.01, "{} {} ends with {left}", model.name(), run.controller.name());
+        }
+    }
+}
+
+#[test]
+fn gap_5_as_forces_and_moments_both_lose_the_vehicle_to_the_moment_on_roll() {
+    for model in [Model::Simplified, Model::RigidBody] {
+        for run in both(Reading::Forces, model) {
+            // 1.2 N on 0.486 kg from 7.5 s on is survived. 1.2 N m on 0.0038 kg m2 from 15 s on is 316 rad/s2: it takes
+            // 4.8 N of difference between opposed rotors, more than the vehicle weighs, to hold it, and either the roll
+            // is lost (rigid body) or the thrust that goes with it carries the vehicle away.
+            let lost = run.lost.unwrap();
+            assert!((15.0..18.0).contains(&lost.time_s), "{} {}: {lost:?}", model.name(), run.controller.name());
+        }
+    }
+}

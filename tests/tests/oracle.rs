@@ -1,0 +1,170 @@
+//! The paper's flight against the table of an independent simulation in `f64`: simplified model (6), the law as printed,
+//! errors over 5 s to 60 s.
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)] // a table that cannot be flown must stop the test
+
+use flight_tests::{Row, golden};
+use plant::Model;
+use sitl::metrics::Metrics;
+use sitl::paper::{Case, Reading, Sign, Uncertainty, scenario};
+use sitl::run::Run;
+use sitl::scenario::ControllerKind;
+use std::sync::LazyLock;
+
+/// Rows of the table: 8 scenarios, two laws.
+const TABLE_ROWS: usize = 16;
+
+/// Figures below this are not compared: 10 % of them is within the table's own rounding \[m, rad\].
+const SMALLEST: f64 = 0.01;
+
+/// The agreement asked for.
+const SHARE: f64 = 0.1;
+
+const RMSE: [&str; 4] = ["rmse_x_m", "rmse_y_m", "rmse_z_m", "rmse_psi_rad"];
+const MAX_ABS: [&str; 4] = ["max_abs_x_m", "max_abs_y_m", "max_abs_z_m", "max_abs_psi_rad"];
+const DELTA_U: [&str; 4] = ["mean_abs_du1_mn", "mean_abs_du2_mn", "mean_abs_du3_mn", "mean_abs_du4_mn"];
+
+fn case(row: &Row<'_>) -> Case {
+    let sign = |column| match row.text(column) {
+        "+" => Some(Sign::Plus),
+        "-" => Some(Sign::Minus),
+        "none" => None,
+        other => panic!("{}: {column} = {other}", row.place()),
+    };
+    let reading = match row.text("reading") {
+        "none" => None,
+        name => Some(Reading::ALL.into_iter().find(|reading| reading.name() == name).unwrap()),
+    };
+    let uncertainty =
+        sign("inertia_sign").zip(sign("thrust_sign")).map(|(inertia, thrust)| Uncertainty { inertia, thrust });
+    Case { reading, uncertainty }
+}
+
+fn kind(row: &Row<'_>) -> ControllerKind {
+    ControllerKind::ALL.into_iter().find(|kind| kind.name() == row.text("controller")).unwrap()
+}
+
+/// Every row, flown once for all tests of this file.
+static FLOWN: LazyLock<Vec<(Case, ControllerKind, Metrics)>> = LazyLock::new(|| {
+    let table = golden("oracle_table");
+    let cases: Vec<_> = table.rows().map(|row| (case(&row), kind(&row))).collect();
+    std::thread::scope(|scope| {
+        let flights: Vec<_> = cases
+            .chunks(cases.len().div_ceil(2))
+            .map(|half| {
+                scope.spawn(move || {
+                    half.iter()
+                        .map(|&(case, kind)| {
+                            let run = Run::fly(&scenario(Model::Simplified, case).unwrap(), kind, u64::MAX).unwrap();
+                            assert_eq!(run.lost, None, "{} under {}", case.name(), kind.name());
+                            (case, kind, run.metrics)
+                        })
+                        .collect::<Vec<_>>()
+                })
+            })
+            .collect();
+        flights.into_iter().flat_map(|flight| flight.join().unwrap()).collect()
+    })
+});
+
+/// Compares one group of columns wherever `counts` says so; returns how many figures were compared.
+fn compare(
+    columns: [&str; 4],
+    figures: fn(&Metrics) -> [f64; 4],
+    counts: impl Fn(&Row<'_>, &str, f64) -> bool,
+) -> usize {
+    let table = golden("oracle_table");
+    assert_eq!(table.rows().len(), TABLE_ROWS);
+    let mut compared = 0;
+    let mut off = Vec::new();
+    for (row, (case, kind, metrics)) in table.rows().zip(FLOWN.iter()) {
+        for (column, got) in columns.into_iter().zip(figures(metrics)) {
+            let expected = row.get(column);
+            if !counts(&row, column, expected) {
+                continue;
+            }
+            compared += 1;
+            if (got - expected).abs() > SHARE * expected {
+                off.push(format!(
+                    "{}: {column} = {got:.4}, expected {expected} ({} under {})",
+                    row.place(),
+                    case.name(),
+                    kind.name()
+                ));
+            }
+        }
+    }
+    assert!(off.is_empty(), "{} of {compared} figures are off:\n{}", off.len(), off.join("\n"));
+    compared
+}
+
+#[test]
+fn the_table_holds_every_reading_and_all_four_signs() {
+    let table = golden("oracle_table");
+    for kind in ControllerKind::ALL {
+        for uncertainty in Uncertainty::ALL {
+            let wanted = Case { reading: Some(Reading::Persistent), uncertainty: Some(uncertainty) };
+            assert!(
+                table.rows().any(|row| case(&row) == wanted && row.text("controller") == kind.name()),
+                "{wanted:?}"
+            );
+        }
+        for (reading, uncertainty) in [
+            (None, None),
+            (None, Some(Uncertainty::DEFAULT)),
+            (Some(Reading::Persistent), None),
+            (Some(Reading::Pulses), None),
+        ] {
+            let wanted = Case { reading, uncertainty };
+            assert!(
+                table.rows().any(|row| case(&row) == wanted && row.text("controller") == kind.name()),
+                "{wanted:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn root_mean_square_errors_agree_within_10_percent() {
+    let compared = compare(RMSE, |metrics| metrics.rmse.into(), |_, _, expected| expected >= SMALLEST);
+    assert_eq!(compared, 45);
+}
+
+#[test]
+fn largest_errors_agree_within_10_percent() {
+    let compared = compare(MAX_ABS, |metrics| metrics.max_abs.into(), |_, _, expected| expected >= SMALLEST);
+    assert_eq!(compared, 51);
+}
+
+/// U4 under uncertainty is a relay that switches at every step: its mean change is well defined. The trembling of U1 and
+/// U2 is not, except where nothing but uncertainty excites it: it grows out of rounding once delta_hat passes a
+/// threshold, so when it starts depends on the width of the numbers. Rounding the measured state to `f32`, with the law
+/// itself in `f64`, moves the calm figure of U1 from 9 to 13 mN; there is no figure to agree on.
+#[test]
+fn changes_of_inputs_agree_within_10_percent_where_they_are_defined() {
+    let figures = |metrics: &Metrics| (metrics.mean_abs_delta_u * 1000.0).into();
+    let compared = compare(DELTA_U, figures, |row, column, expected| {
+        let uncertain_only = row.text("reading") == "none" && row.text("inertia_sign") != "none";
+        expected >= 100.0 && column == "mean_abs_du4_mn" || expected >= 1.0 && uncertain_only
+    });
+    assert_eq!(compared, 7);
+}
+
+/// The baseline's inputs are smooth to the table's last digit, 0.1 mN, and U3's are under either law.
+#[test]
+fn smooth_inputs_are_as_smooth_as_in_the_table() {
+    let figures = |metrics: &Metrics| (metrics.mean_abs_delta_u * 1000.0).into();
+    for (row, (case, kind, metrics)) in golden("oracle_table").rows().zip(FLOWN.iter()) {
+        let figures: [f64; 4] = figures(metrics);
+        for (column, got) in DELTA_U.into_iter().zip(figures) {
+            if *kind == ControllerKind::Backstepping || column == "mean_abs_du3_mn" {
+                let expected = row.get(column);
+                assert!(
+                    (got - expected).abs() <= 0.1,
+                    "{}: {column} = {got:.3}, expected {expected} ({})",
+                    row.place(),
+                    case.name()
+                );
+            }
+        }
+    }
+}
