@@ -218,9 +218,11 @@ impl<M: Message> Decoder<M> {
 
     /// Drops the first `count` bytes of those held.
     fn remove(&mut self, count: usize) {
-        let count = count.min(self.length);
-        self.buffer.copy_within(count..self.length, 0);
-        self.length -= count;
+        if let Some(held) = self.buffer.get_mut(..self.length) {
+            let count = count.min(held.len());
+            held.copy_within(count.., 0);
+            self.length -= count;
+        }
     }
 
     /// Counts the gap before a frame. What comes out of order or twice is no gap.

@@ -3,7 +3,7 @@
 use crate::decoder::Counters;
 use crate::frames::flip;
 use crate::framing::{Address, PAYLOAD_MAX};
-use crate::message::{Fault, Format, Message, parse, put};
+use crate::message::{Fault, Format, Message, extension, parse, put, put_extended};
 use airframe::{Axis, PerAxis, RotorSpeeds};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
@@ -116,13 +116,13 @@ impl Downlink {
 impl Message for Downlink {
     fn format(id: u32) -> Option<Format> {
         match id {
-            HEARTBEAT_DATA::ID => Some(Format::of::<HEARTBEAT_DATA>()),
-            HIL_ACTUATOR_CONTROLS_DATA::ID => Some(Format::of::<HIL_ACTUATOR_CONTROLS_DATA>()),
-            ATTITUDE_DATA::ID => Some(Format::of::<ATTITUDE_DATA>()),
-            LOCAL_POSITION_NED_DATA::ID => Some(Format::of::<LOCAL_POSITION_NED_DATA>()),
-            COMMAND_ACK_DATA::ID => Some(Format::of::<COMMAND_ACK_DATA>()),
-            STATUSTEXT_DATA::ID => Some(Format::of::<STATUSTEXT_DATA>()),
-            DEBUG_FLOAT_ARRAY_DATA::ID => Some(Format::of::<DEBUG_FLOAT_ARRAY_DATA>()),
+            HEARTBEAT_DATA::ID => Some(Format::of::<HEARTBEAT_DATA>(0)),
+            HIL_ACTUATOR_CONTROLS_DATA::ID => Some(Format::of::<HIL_ACTUATOR_CONTROLS_DATA>(0)),
+            ATTITUDE_DATA::ID => Some(Format::of::<ATTITUDE_DATA>(0)),
+            LOCAL_POSITION_NED_DATA::ID => Some(Format::of::<LOCAL_POSITION_NED_DATA>(0)),
+            COMMAND_ACK_DATA::ID => Some(Format::of::<COMMAND_ACK_DATA>(ANSWER_EXTENSION)),
+            STATUSTEXT_DATA::ID => Some(Format::of::<STATUSTEXT_DATA>(TEXT_EXTENSION)),
+            DEBUG_FLOAT_ARRAY_DATA::ID => Some(Format::of::<DEBUG_FLOAT_ARRAY_DATA>(4 * HEALTH_ELEMENTS)),
             _ => None,
         }
     }
@@ -133,9 +133,11 @@ impl Message for Downlink {
             HIL_ACTUATOR_CONTROLS_DATA::ID => read_rotors(&parse(payload)?),
             ATTITUDE_DATA::ID => parse(payload).map(read_attitude),
             LOCAL_POSITION_NED_DATA::ID => parse(payload).map(read_position),
-            COMMAND_ACK_DATA::ID => read_answer(&parse(payload)?),
+            COMMAND_ACK_DATA::ID => read_answer(&parse(payload)?, extension::<COMMAND_ACK_DATA, _>(payload)),
             STATUSTEXT_DATA::ID => parse(payload).map(|data: STATUSTEXT_DATA| Downlink::Text(data.text)),
-            DEBUG_FLOAT_ARRAY_DATA::ID => read_health(&parse(payload)?),
+            DEBUG_FLOAT_ARRAY_DATA::ID => {
+                read_health(&parse(payload)?, extension::<DEBUG_FLOAT_ARRAY_DATA, _>(payload))
+            }
             _ => Err(Fault::Unknown),
         }
     }
@@ -155,12 +157,18 @@ impl Message for Downlink {
                 let [vx, vy, vz] = flip(*velocity_m_s).into();
                 put(&LOCAL_POSITION_NED_DATA { time_boot_ms: *time_ms, x, y, z, vx, vy, vz }, payload)
             }
-            Downlink::Answer { command, answer, to } => put(&write_answer(*command, *answer, *to), payload),
+            Downlink::Answer { command, answer, to } => {
+                let (data, extension) = write_answer(*command, *answer, *to);
+                put_extended(&data, extension, payload)
+            }
             Downlink::Text(text) => {
                 let severity = MavSeverity::MAV_SEVERITY_WARNING;
-                put(&STATUSTEXT_DATA { severity, text: *text, ..STATUSTEXT_DATA::DEFAULT }, payload)
+                put(&STATUSTEXT_DATA { severity, text: *text }, payload)
             }
-            Downlink::Health(health) => put(&write_health(health), payload),
+            Downlink::Health(health) => {
+                let data = DEBUG_FLOAT_ARRAY_DATA { time_usec: health.time_us, array_id: 0, name: HEALTH.into() };
+                put_extended(&data, health.elements().flat_map(f32::to_le_bytes), payload)
+            }
         }
     }
 }
@@ -235,34 +243,41 @@ fn read_position(data: LOCAL_POSITION_NED_DATA) -> Downlink {
     }
 }
 
-fn read_answer(data: &COMMAND_ACK_DATA) -> Result<Downlink, Fault> {
+/// Extension fields of COMMAND_ACK: progress, `result_param2` as `i32`, target system and component.
+const ANSWER_EXTENSION: usize = 7;
+/// Extension fields of STATUSTEXT, which number the parts of longer texts.
+const TEXT_EXTENSION: usize = 3;
+/// Elements of DEBUG_FLOAT_ARRAY, its only extension field.
+const HEALTH_ELEMENTS: usize = 58;
+const HEALTH: &str = "health";
+
+fn read_answer(data: &COMMAND_ACK_DATA, extension: [u8; ANSWER_EXTENSION]) -> Result<Downlink, Fault> {
+    let [_, reason @ .., system, component] = extension;
     let answer = match data.result {
         MavResult::MAV_RESULT_ACCEPTED => Answer::Accepted,
-        MavResult::MAV_RESULT_TEMPORARILY_REJECTED => Answer::Refused(data.result_param2),
+        MavResult::MAV_RESULT_TEMPORARILY_REJECTED => Answer::Refused(i32::from_le_bytes(reason)),
         MavResult::MAV_RESULT_UNSUPPORTED => Answer::Unsupported,
         _ => return Err(Fault::Unsupported),
     };
-    let to = Address { system: data.target_system, component: data.target_component };
-    Ok(Downlink::Answer { command: data.command, answer, to })
+    Ok(Downlink::Answer { command: data.command, answer, to: Address { system, component } })
 }
 
-fn write_answer(command: MavCmd, answer: Answer, to: Address) -> COMMAND_ACK_DATA {
-    let (result, result_param2) = match answer {
+fn write_answer(command: MavCmd, answer: Answer, to: Address) -> (COMMAND_ACK_DATA, [u8; ANSWER_EXTENSION]) {
+    let (result, reason) = match answer {
         Answer::Accepted => (MavResult::MAV_RESULT_ACCEPTED, 0),
         Answer::Refused(reason) => (MavResult::MAV_RESULT_TEMPORARILY_REJECTED, reason),
         Answer::Unsupported => (MavResult::MAV_RESULT_UNSUPPORTED, 0),
     };
-    let Address { system: target_system, component: target_component } = to;
-    COMMAND_ACK_DATA { command, result, progress: 0, result_param2, target_system, target_component }
+    let [a, b, c, d] = i32::to_le_bytes(reason);
+    (COMMAND_ACK_DATA { command, result }, [0, a, b, c, d, to.system, to.component])
 }
 
-const HEALTH: &str = "health";
-
-fn read_health(data: &DEBUG_FLOAT_ARRAY_DATA) -> Result<Downlink, Fault> {
+fn read_health(data: &DEBUG_FLOAT_ARRAY_DATA, extension: [u8; 4 * HEALTH_ELEMENTS]) -> Result<Downlink, Fault> {
     if data.name.to_str() != Ok(HEALTH) {
         return Err(Fault::Unsupported);
     }
-    let mut elements = data.data.iter().copied();
+    let (elements, _) = extension.as_chunks();
+    let mut elements = elements.iter().map(|bytes| f32::from_le_bytes(*bytes));
     let mut next = || elements.next().unwrap_or_default();
     Ok(Downlink::Health(Health {
         time_us: data.time_usec,
@@ -278,18 +293,15 @@ fn read_health(data: &DEBUG_FLOAT_ARRAY_DATA) -> Result<Downlink, Fault> {
     }))
 }
 
-fn write_health(health: &Health) -> DEBUG_FLOAT_ARRAY_DATA {
-    let Health { time_us, tick_us, tick_max_us, rate_hz, late_ticks, saturated_ticks, state_age_us, .. } = *health;
-    let ticks = [tick_us, tick_max_us, rate_hz, late_ticks as f32, saturated_ticks as f32, state_age_us];
-    let estimates = [&health.theta_norm, &health.delta];
-    let elements = ticks
-        .into_iter()
-        .chain(estimates.into_iter().flat_map(|estimate| Axis::ALL.map(|axis| *estimate.get(axis))))
-        .chain(health.link.to_array().into_iter().map(|count| count as f32));
-    let mut data =
-        DEBUG_FLOAT_ARRAY_DATA { time_usec: time_us, name: HEALTH.into(), ..DEBUG_FLOAT_ARRAY_DATA::DEFAULT };
-    for (place, element) in data.data.iter_mut().zip(elements) {
-        *place = element;
+impl Health {
+    /// The array's elements.
+    fn elements(&self) -> impl Iterator<Item = f32> {
+        let Health { tick_us, tick_max_us, rate_hz, late_ticks, saturated_ticks, state_age_us, .. } = *self;
+        let ticks = [tick_us, tick_max_us, rate_hz, late_ticks as f32, saturated_ticks as f32, state_age_us];
+        let estimates = [self.theta_norm, self.delta].map(|estimate| Axis::ALL.map(|axis| *estimate.get(axis)));
+        ticks
+            .into_iter()
+            .chain(estimates.into_iter().flatten())
+            .chain(self.link.to_array().into_iter().map(|count| count as f32))
     }
-    data
 }

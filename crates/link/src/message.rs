@@ -1,4 +1,7 @@
 //! What a direction of the link carries.
+//!
+//! MAVLink 2 appends extension fields to some messages, which the `mavlink` crate leaves out here: its feature that has
+//! them does not build without std. The few that matter are read and written as bytes behind the rest.
 
 use crate::framing::{Address, PAYLOAD_MAX};
 use mavlink::{MavlinkVersion, MessageData};
@@ -13,8 +16,9 @@ pub struct Format {
 }
 
 impl Format {
-    pub(crate) const fn of<D: MessageData>() -> Self {
-        Format { extra_crc: D::EXTRA_CRC, length_max: D::ENCODED_LEN }
+    /// The format of `D`, with `extension` bytes of extension fields.
+    pub(crate) const fn of<D: MessageData>(extension: usize) -> Self {
+        Format { extra_crc: D::EXTRA_CRC, length_max: D::ENCODED_LEN + extension }
     }
 }
 
@@ -62,7 +66,32 @@ pub(crate) fn parse<D: MessageData>(payload: &[u8]) -> Result<D, Fault> {
     D::deser(MavlinkVersion::V2, payload).map_err(|_| Fault::Malformed)
 }
 
+/// The first `N` bytes of a payload's extension fields of the message `D`, completed with zeros.
+pub(crate) fn extension<D: MessageData, const N: usize>(payload: &[u8]) -> [u8; N] {
+    let mut extension = [0; N];
+    for (byte, sent) in extension.iter_mut().zip(payload.iter().skip(D::ENCODED_LEN)) {
+        *byte = *sent;
+    }
+    extension
+}
+
 /// Writes the message `data`.
 pub(crate) fn put<D: MessageData>(data: &D, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
     (D::ID, data.ser(MavlinkVersion::V2, payload) as u8)
+}
+
+/// Writes the message `data` and its extension fields, without the zeros at their end.
+pub(crate) fn put_extended<D: MessageData>(
+    data: &D,
+    extension: impl IntoIterator<Item = u8>,
+    payload: &mut [u8; PAYLOAD_MAX],
+) -> (u32, u8) {
+    let (id, mut length) = put(data, payload);
+    for (place, (byte, sent)) in payload.iter_mut().skip(D::ENCODED_LEN).zip(extension).enumerate() {
+        *byte = sent;
+        if sent != 0 {
+            length = (D::ENCODED_LEN + place + 1) as u8;
+        }
+    }
+    (id, length)
 }

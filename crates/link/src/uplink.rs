@@ -2,7 +2,7 @@
 
 use crate::frames::{Odometry, flip};
 use crate::framing::{Address, PAYLOAD_MAX};
-use crate::message::{Fault, Format, Message, parse, put};
+use crate::message::{Fault, Format, Message, extension, parse, put};
 use airframe::{Setpoint, State};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
@@ -59,10 +59,10 @@ impl Command {
 impl Message for Uplink {
     fn format(id: u32) -> Option<Format> {
         match id {
-            HEARTBEAT_DATA::ID => Some(Format::of::<HEARTBEAT_DATA>()),
-            ODOMETRY_DATA::ID => Some(Format::of::<ODOMETRY_DATA>()),
-            SET_POSITION_TARGET_LOCAL_NED_DATA::ID => Some(Format::of::<SET_POSITION_TARGET_LOCAL_NED_DATA>()),
-            COMMAND_LONG_DATA::ID => Some(Format::of::<COMMAND_LONG_DATA>()),
+            HEARTBEAT_DATA::ID => Some(Format::of::<HEARTBEAT_DATA>(0)),
+            ODOMETRY_DATA::ID => Some(Format::of::<ODOMETRY_DATA>(ODOMETRY_EXTENSION)),
+            SET_POSITION_TARGET_LOCAL_NED_DATA::ID => Some(Format::of::<SET_POSITION_TARGET_LOCAL_NED_DATA>(0)),
+            COMMAND_LONG_DATA::ID => Some(Format::of::<COMMAND_LONG_DATA>(0)),
             _ => None,
         }
     }
@@ -70,7 +70,7 @@ impl Message for Uplink {
     fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, Fault> {
         match id {
             HEARTBEAT_DATA::ID => Ok(Uplink::Heartbeat),
-            ODOMETRY_DATA::ID => read_odometry(&parse(payload)?),
+            ODOMETRY_DATA::ID => read_odometry(&parse(payload)?, extension::<ODOMETRY_DATA, _>(payload)),
             SET_POSITION_TARGET_LOCAL_NED_DATA::ID => read_setpoint(&parse(payload)?, receiver),
             COMMAND_LONG_DATA::ID => read_command(&parse(payload)?, receiver),
             _ => Err(Fault::Unknown),
@@ -102,10 +102,14 @@ fn meant_for(receiver: Address, system: u8, component: u8) -> Result<(), Fault> 
     if receiver.is_meant_by(Address { system, component }) { Ok(()) } else { Err(Fault::Elsewhere) }
 }
 
-fn read_odometry(data: &ODOMETRY_DATA) -> Result<Uplink, Fault> {
+/// Extension fields of ODOMETRY: reset counter, type of the estimator, quality as `i8`.
+const ODOMETRY_EXTENSION: usize = 3;
+
+fn read_odometry(data: &ODOMETRY_DATA, extension: [u8; ODOMETRY_EXTENSION]) -> Result<Uplink, Fault> {
     let earth = matches!(data.frame_id, MavFrame::MAV_FRAME_LOCAL_NED | MavFrame::MAV_FRAME_LOCAL_FRD);
     let body = data.child_frame_id == MavFrame::MAV_FRAME_BODY_FRD;
-    if !earth || !body || data.quality == -1 {
+    let [_, _, quality] = extension;
+    if !earth || !body || quality as i8 == -1 {
         return Err(Fault::Unsupported);
     }
     let odometry = Odometry {

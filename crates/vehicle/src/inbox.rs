@@ -66,27 +66,35 @@ pub struct SourceClock {
 struct Last {
     sent_us: u64,
     arrived_us: u64,
-    /// Smallest arrival minus sending, modulo 2^64.
+    fastest: Fastest,
+}
+
+/// The fastest message so far.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Fastest {
+    /// Arrival minus sending, modulo 2^64.
     offset_us: u64,
+    arrived_us: u64,
 }
 
 impl SourceClock {
     /// The time \[us\] on the vehicle's clock of a message sent at `sent_us` of the sender's clock, which arrived at
     /// `arrived_us` of the vehicle's; never after its arrival. `None` if a later one arrived before it: drop it.
     pub fn stamp(&mut self, sent_us: u64, arrived_us: u64) -> Option<u64> {
-        let offset_us = arrived_us.wrapping_sub(sent_us);
+        let this = Fastest { offset_us: arrived_us.wrapping_sub(sent_us), arrived_us };
         let restarted = |last: &Last| sent_us < last.sent_us && arrived_us.saturating_sub(last.arrived_us) > RESTART_US;
-        let offset_us = match self.last.filter(|last| !restarted(last)) {
-            None => offset_us,
+        let (fastest, offset_us) = match self.last.filter(|last| !restarted(last)) {
+            None => (this, this.offset_us),
             Some(last) if sent_us <= last.sent_us => return None,
-            Some(last) => {
-                let drift_us = arrived_us.saturating_sub(last.arrived_us) / DRIFT_DIVISOR;
-                let relaxed = last.offset_us.wrapping_add(drift_us);
+            Some(Last { fastest, .. }) => {
+                let drift_us = arrived_us.saturating_sub(fastest.arrived_us) / DRIFT_DIVISOR;
+                let relaxed_us = fastest.offset_us.wrapping_add(drift_us);
                 // The smaller of two numbers modulo 2^64 that lie close together.
-                if (offset_us.wrapping_sub(relaxed) as i64) < 0 { offset_us } else { relaxed }
+                let faster = (this.offset_us.wrapping_sub(relaxed_us) as i64) <= 0;
+                if faster { (this, this.offset_us) } else { (fastest, relaxed_us) }
             }
         };
-        self.last = Some(Last { sent_us, arrived_us, offset_us });
+        self.last = Some(Last { sent_us, arrived_us, fastest });
         Some(sent_us.wrapping_add(offset_us))
     }
 }
