@@ -65,7 +65,8 @@ impl Emulator {
         let to_firmware = open("to_firmware")?;
         let hold = open("from_firmware")?;
         let mut from_firmware = File::open(folder.join("from_firmware"))?;
-        let qemu = Qemu::start(elf, folder, &["-serial", "none"])?;
+        let arguments = [qemu::COUNT_INSTRUCTIONS.as_slice(), &["-serial", "none"]].concat();
+        let qemu = Qemu::start(elf, folder, &arguments)?;
 
         let (sender, replies) = mpsc::channel();
         let reader = std::thread::spawn(move || {

@@ -8,7 +8,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// QEMU's boards with an STM32F405, the better one first: QEMU 8 and newer, QEMU 7.
 const MACHINES: [&str; 2] = ["olimex-stm32-h405", "netduinoplus2"];
 
-/// One instruction is 2^3 ns of the emulated chip's time: the `shift=3` of `-icount`.
+/// Lets time pass by instructions, and stand still while the processor waits for the host.
+pub(crate) const COUNT_INSTRUCTIONS: [&str; 2] = ["-icount", "shift=3,sleep=off"];
+/// One instruction is 2^3 ns of the emulated chip's time: the shift above.
 const NS_PER_INSTRUCTION: u64 = 1 << 3;
 
 /// Cycles of the 168 MHz core clock, as SysTick counts them, in instructions.
@@ -42,8 +44,7 @@ impl Qemu {
         }
         let elf = elf.canonicalize()?;
         let child = Command::new(program())
-            .args(["-M", machine()?, "-icount", "shift=3,sleep=off"])
-            .args(["-nographic", "-monitor", "none"])
+            .args(["-M", machine()?, "-nographic", "-monitor", "none"])
             .args(["-semihosting-config", "enable=on,target=native"])
             .args(arguments)
             .arg("-kernel")
