@@ -13,7 +13,7 @@ use onboard::{Flight, Report};
 use vehicle::Inbox;
 
 /// Newest inputs, written by [`crate::comms`].
-static INBOX: Mutex<CriticalSectionRawMutex, Cell<Inbox>> = 
+static INBOX: Mutex<CriticalSectionRawMutex, Cell<Inbox>> =
     Mutex::new(Cell::new(Inbox { state: None, setpoint: None, request: None }));
 
 /// What the last ticks did, for [`crate::comms`]. A tick never waits: if nobody reads for eight ticks, the next are

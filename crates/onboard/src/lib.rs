@@ -20,5 +20,5 @@
 mod comms;
 mod flight;
 
-pub use comms::{Comms, ADDRESS, post};
+pub use comms::{ADDRESS, Comms, post};
 pub use flight::{Flight, Report};

@@ -2,8 +2,8 @@
 //!
 //! Two FIFOs carry it; their format is stated in `firmware/src/board/pil.rs`.
 
-use crate::qemu::{self, Qemu};
 use crate::Error;
+use crate::qemu::{self, Qemu};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::Path;

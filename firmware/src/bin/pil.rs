@@ -12,7 +12,8 @@ fn main() -> ! {
 }
 
 #[panic_handler]
-fn panic(_: &PanicInfo) -> ! {
+fn panic(info: &PanicInfo) -> ! {
+    semihosting::eprintln!("firmware: {info}");
     exit(101)
 }
 

@@ -84,11 +84,7 @@ pub fn start(control: SendSpawner) -> Board {
     let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
     watchdog.unleash();
 
-    Board {
-        outputs: Outputs { watchdog },
-        receiver: Receiver(receiver),
-        transmitter: Transmitter(transmitter),
-    }
+    Board { outputs: Outputs { watchdog }, receiver: Receiver(receiver), transmitter: Transmitter(transmitter) }
 }
 
 /// 8 MHz crystal to 168 MHz, the chip's rated speed; buses at 168, 42 and 84 MHz.

@@ -97,7 +97,12 @@ impl Transmitter {
         while length > 0 {
             let part = buffer.get_mut(..length.min(256)).unwrap_or_default();
             self.to_firmware.read_exact(part).expect("the host sends what it announced");
-            assert_eq!(LINK.try_write(part), Ok(part.len()), "the link takes 4096 bytes a tick");
+            let mut left = &part[..];
+            while !left.is_empty() {
+                // A ring takes what fits before its end, then the rest.
+                let taken = LINK.try_write(left).expect("the link takes 4096 bytes a tick");
+                left = left.get(taken..).unwrap_or_default();
+            }
             length -= part.len();
         }
     }
