@@ -13,18 +13,22 @@
 //! U = U_trim - (I/l) (w^2 (x - x_held) + 2 w dx/dt)
 //! ```
 //!
-//! U_trim is the mean of what the law asked for lately: it holds what the law has learnt of off-centre mass, wind and
-//! weight. Yaw gets its trim only; it has too little authority to be worth the thrust. What the trim does not know makes
-//! the true attitude leave the reckoned one as t^2, so this serves for fractions of a second, and the descent that
-//! follows for two seconds.
+//! U_trim is what the vehicle needs to stay as it is: off-centre mass, wind, weight. For roll and pitch it is observed in
+//! flight, from how the measured rate departs from the reckoned one; thrust and yaw are the mean of what the rotors were
+//! told lately. Yaw gets no more than that: it has too little authority to be worth the thrust.
+//!
+//! What the trim does not know makes the true attitude leave the reckoned one as t^2, so this serves for fractions of a
+//! second, and the descent that follows for two seconds.
 
 use airframe::{Inputs, Parameters, State};
 use nalgebra::Vector2;
 
 /// w: bandwidth of the hold \[rad/s\].
 pub const HOLD_RAD_S: f32 = 10.0;
-/// Time over which the trim averages \[s\].
+/// Time constant of the trim \[s\].
 pub const TRIM_S: f32 = 1.0;
+/// Most that one measured rate may depart from the reckoned one for the trim: a jump is no trim \[rad/s\].
+pub const INNOVATION_MAX_RAD_S: f32 = 0.1;
 /// Share of the trimmed thrust while descending blind: 1 m/s2 downwards.
 pub const DESCENT_THRUST: f32 = 0.9;
 
@@ -65,13 +69,11 @@ impl Blind {
         }
     }
 
-    /// A vehicle about to take off: measured, trimmed for the nominal weight.
+    /// A vehicle about to take off, trimmed for the nominal weight.
     pub fn start(&self, state: &State) -> Reckoning {
+        let angle_rad = state.attitude_rad.xy();
         let trim = Inputs { thrust_n: self.weight_n, ..Inputs::default() };
-        let mut reckoning =
-            Reckoning { held_rad: Vector2::zeros(), angle_rad: Vector2::zeros(), rate_rad_s: Vector2::zeros(), trim };
-        reckoning.measure(state);
-        reckoning
+        Reckoning { held_rad: angle_rad, angle_rad, rate_rad_s: state.rates_rad_s.xy(), trim }
     }
 
     /// One step of dead reckoning under what the rotors were told.
@@ -81,18 +83,27 @@ impl Blind {
         reckoning.angle_rad += reckoning.rate_rad_s * self.dt_s;
     }
 
-    /// Lets the trim follow what the rotors were told in flight under the law. Each sample counts up to twice the weight
-    /// in thrust and a tenth of it in the others: a transient is no trim.
+    /// Starts over from a measurement, and learns from how far it is from what was reckoned.
+    pub fn measure(&self, reckoning: &mut Reckoning, state: &State) {
+        let rate_rad_s = state.rates_rad_s.xy();
+        let innovation =
+            (rate_rad_s - reckoning.rate_rad_s).map(|rate| rate.clamp(-INNOVATION_MAX_RAD_S, INNOVATION_MAX_RAD_S));
+        let learnt = self.inverse_authority.component_mul(&innovation) / TRIM_S;
+        reckoning.trim.roll_n -= learnt.x;
+        reckoning.trim.pitch_n -= learnt.y;
+        reckoning.rate_rad_s = rate_rad_s;
+        reckoning.angle_rad = state.attitude_rad.xy();
+        reckoning.held_rad = reckoning.angle_rad;
+    }
+
+    /// Lets thrust and yaw of the trim follow what the law tells the rotors. A sample counts up to twice the weight in
+    /// thrust and a tenth of it in yaw: a transient is no trim.
     pub fn trim(&self, reckoning: &mut Reckoning, applied: &Inputs) {
         let share = self.dt_s / TRIM_S;
-        let moment_max = 0.1 * self.weight_n;
-        let follow =
-            |trim: &mut f32, sample: f32, min: f32, max: f32| *trim += share * (sample.max(min).min(max) - *trim);
-        let trim = &mut reckoning.trim;
-        follow(&mut trim.roll_n, applied.roll_n, -moment_max, moment_max);
-        follow(&mut trim.pitch_n, applied.pitch_n, -moment_max, moment_max);
-        follow(&mut trim.yaw_n, applied.yaw_n, -moment_max, moment_max);
-        follow(&mut trim.thrust_n, applied.thrust_n, 0.0, 2.0 * self.weight_n);
+        let yaw_max = 0.1 * self.weight_n;
+        let Inputs { yaw_n, thrust_n, .. } = &mut reckoning.trim;
+        *yaw_n += share * (applied.yaw_n.max(-yaw_max).min(yaw_max) - *yaw_n);
+        *thrust_n += share * (applied.thrust_n.max(0.0).min(2.0 * self.weight_n) - *thrust_n);
     }
 
     /// Inputs that keep the last attitude and the trimmed thrust.
@@ -115,14 +126,5 @@ impl Blind {
             yaw_n: trim.yaw_n,
             thrust_n: trim.thrust_n * thrust,
         }
-    }
-}
-
-impl Reckoning {
-    /// Starts over from a measurement.
-    pub fn measure(&mut self, state: &State) {
-        self.held_rad = state.attitude_rad.xy();
-        self.angle_rad = self.held_rad;
-        self.rate_rad_s = state.rates_rad_s.xy();
     }
 }

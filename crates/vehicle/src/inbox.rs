@@ -48,15 +48,17 @@ impl Inbox {
 
 /// How fast two clocks may drift apart: 100 us in a second, 100 ppm.
 const DRIFT_DIVISOR: u64 = 10_000;
-/// A sender whose time jumps back after a silence of this long was restarted \[us\].
-pub const RESTART_US: u64 = 250_000;
+/// A sender whose time jumps back after a silence of this long was restarted \[us\]. By then no flight depends on it
+/// ([`crate::supervisor::GIVE_UP_US`]): what comes with old times sooner is old.
+pub const RESTART_US: u64 = 3_000_000;
 
 /// When a message was sent, on the vehicle's clock.
 ///
 /// The sender stamps with its own clock, whose zero is unknown. The fastest message so far tells the difference of the
 /// two clocks (plus that message's delay, which nobody can know); every message slower than that one was late by the
 /// rest. So a state that was held up on its way is as old as it is, not as old as its arrival.
-/// A difference is forgotten at 100 ppm, so that clocks may drift.
+/// A difference is forgotten at 100 ppm, so that clocks may drift. Times must rise from message to message: a sender that
+/// does not stamp is not heard.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SourceClock {
     last: Option<Last>,

@@ -162,10 +162,11 @@ impl<L: Law> Vehicle<L> {
 }
 
 impl<E> Memory<E> {
-    /// Keeps the inbox's state, and returns it, if it is plausible and newer than the one at hand.
+    /// Keeps the inbox's state, and returns it, if it is plausible, newer than the one at hand, and not stale already: a
+    /// stream of states that are always late is no stream of states.
     fn take_state(&mut self, inbox: &Inbox, now_us: u64) -> Option<State> {
         let newer = |state: &Stamped<State>| {
-            state.at_us <= now_us
+            state.age_us(now_us) <= RIDE_US
                 && state.value.is_plausible()
                 && self.state.is_none_or(|held| state.at_us > held.at_us)
         };
@@ -182,11 +183,11 @@ impl<E: Default> Flight<E> {
 }
 
 impl<E> Flight<E> {
-    /// Dead reckoning over the last period, or from `measured` anew.
+    /// Dead reckoning over the last period, corrected by what was measured.
     fn reckon(&mut self, blind: &Blind, measured: Option<&State>) {
-        match measured {
-            Some(state) => self.reckoning.measure(state),
-            None => blind.advance(&mut self.reckoning, &self.applied),
+        blind.advance(&mut self.reckoning, &self.applied);
+        if let Some(state) = measured {
+            blind.measure(&mut self.reckoning, state);
         }
     }
 
