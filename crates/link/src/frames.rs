@@ -1,0 +1,109 @@
+//! Frame changes between the wire and [`airframe`].
+//!
+//! The wire's earth frame is north-east-down (NED) or any other local frame with z down, its body frame
+//! forward-right-down (FRD). Ours are north-west-up and forward-left-up. Each is the other turned by half a turn about
+//! x: y and z of a vector, and of a quaternion's vector part, change their signs, and change back.
+//!
+//! An attitude q turns body coordinates into earth coordinates on both sides, so that of the wire's pitch and yaw angles
+//! the signs change, too: positive pitch on the wire lifts the nose and tilts the thrust backwards, ours forwards.
+
+use airframe::State;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+/// A vector of one side on the other, and back.
+pub fn flip(vector: Vector3<f32>) -> Vector3<f32> {
+    Vector3::new(vector.x, -vector.y, -vector.z)
+}
+
+/// What ODOMETRY holds: position in the wire's earth frame, the rest of the motion in its body frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Odometry {
+    /// x, y, z, NED \[m\].
+    pub position_m: Vector3<f32>,
+    /// w, x, y, z; body to earth. Of any norm but zero.
+    pub attitude: [f32; 4],
+    /// In the body frame, as the message's child frame has it \[m/s\].
+    pub velocity_m_s: Vector3<f32>,
+    /// Of the body, in the body frame \[rad/s\].
+    pub rates_rad_s: Vector3<f32>,
+}
+
+/// Accepted departure of a quaternion's squared norm from 1.
+const NORM_SQUARED_ERROR_MAX: f32 = 0.1;
+
+impl Odometry {
+    /// The state in our frames, yaw within \[-pi, pi\]. `None` if the quaternion is no rotation (its squared norm is not
+    /// within 0.9 to 1.1) or the state is not plausible ([`State::is_plausible`]).
+    pub fn to_state(&self) -> Option<State> {
+        let [w, x, y, z] = self.attitude;
+        let attitude = Quaternion::new(w, x, -y, -z);
+        let rotation = (attitude.norm_squared() - 1.0).abs() <= NORM_SQUARED_ERROR_MAX;
+        let r_earth_body = UnitQuaternion::new_normalize(attitude);
+        let state = State {
+            position_m: flip(self.position_m),
+            velocity_m_s: r_earth_body * flip(self.velocity_m_s),
+            attitude_rad: euler(&attitude),
+            rates_rad_s: flip(self.rates_rad_s),
+        };
+        // A NaN makes `rotation` false.
+        (rotation && state.is_plausible()).then_some(state)
+    }
+
+    /// The wire's view of `state`.
+    pub fn from_state(state: &State) -> Self {
+        let attitude = quaternion(&state.attitude_rad);
+        Odometry {
+            position_m: flip(state.position_m),
+            attitude: [attitude.w, attitude.i, -attitude.j, -attitude.k],
+            velocity_m_s: flip(attitude.inverse() * state.velocity_m_s),
+            rates_rad_s: flip(state.rates_rad_s),
+        }
+    }
+}
+
+/// Roll, pitch and yaw \[rad\] of the z-y-x sequence from a quaternion that turns body coordinates into earth
+/// coordinates, of any norm but zero. Roll and yaw are within \[-pi, pi\], pitch within \[-pi/2, pi/2\].
+///
+/// In half angles, with c, s = cos, sin of half the pitch,
+///
+/// ```text
+/// w - y = (c - s) cos((roll + yaw)/2)      w + y = (c + s) cos((roll - yaw)/2)
+/// x + z = (c - s) sin((roll + yaw)/2)      x - z = (c + s) sin((roll - yaw)/2)
+/// ```
+///
+/// so no pitch costs accuracy: at 90 degrees one of the two angles loses its meaning, and nothing depends on it.
+/// Bernardes and Viollet, *Quaternion to Euler angles conversion*, PLoS ONE 17(11), 2022.
+pub fn euler(attitude: &Quaternion<f32>) -> Vector3<f32> {
+    use core::f32::consts::FRAC_PI_2;
+    let (w, x, y, z) = (attitude.w, attitude.i, attitude.j, attitude.k);
+    let half_sum = libm::atan2f(x + z, w - y);
+    let half_difference = libm::atan2f(x - z, w + y);
+    let length = |a: f32, b: f32| libm::sqrtf(a * a + b * b);
+    let pitch = 2.0 * libm::atan2f(length(w + y, x - z), length(w - y, x + z)) - FRAC_PI_2;
+    Vector3::new(wrap(half_sum + half_difference), pitch, wrap(half_sum - half_difference))
+}
+
+/// The unit quaternion that turns body coordinates into earth coordinates, from roll, pitch and yaw \[rad\] of the z-y-x
+/// sequence.
+pub fn quaternion(attitude_rad: &Vector3<f32>) -> UnitQuaternion<f32> {
+    let half = attitude_rad.map(|angle| libm::sincosf(0.5 * angle));
+    let ((sx, cx), (sy, cy), (sz, cz)) = (half.x, half.y, half.z);
+    UnitQuaternion::new_normalize(Quaternion::new(
+        cx * cy * cz + sx * sy * sz,
+        sx * cy * cz - cx * sy * sz,
+        cx * sy * cz + sx * cy * sz,
+        cx * cy * sz - sx * sy * cz,
+    ))
+}
+
+/// An angle within two turns of zero, brought within half a turn of it.
+fn wrap(angle: f32) -> f32 {
+    use core::f32::consts::{PI, TAU};
+    if angle > PI {
+        angle - TAU
+    } else if angle < -PI {
+        angle + TAU
+    } else {
+        angle
+    }
+}

@@ -1,0 +1,103 @@
+//! The layout of a MAVLink 2 frame, and writing one.
+//!
+//! ```text
+//! 0xFD  length  incompatible  compatible  sequence  system  component  id (3)  payload (length)  checksum (2)
+//! ```
+//!
+//! <https://mavlink.io/en/guide/serialization.html>. Frames with incompatibility flags (signed ones) are not understood.
+
+use crate::message::Message;
+
+/// First byte of a frame.
+pub(crate) const START: u8 = 0xFD;
+/// Bytes before the payload.
+pub(crate) const HEADER: usize = 10;
+/// Bytes after the payload.
+pub(crate) const CHECKSUM: usize = 2;
+/// Longest payload.
+pub(crate) const PAYLOAD_MAX: usize = 255;
+/// Longest frame \[bytes\].
+pub const FRAME_MAX: usize = HEADER + PAYLOAD_MAX + CHECKSUM;
+
+/// Who sends, or is meant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Address {
+    /// MAVLink system id; 0 means all.
+    pub system: u8,
+    /// MAVLink component id; 0 means all.
+    pub component: u8,
+}
+
+impl Address {
+    /// True if what is sent to `target` is meant for this address.
+    pub fn is_meant_by(self, target: Address) -> bool {
+        (target.system == 0 || target.system == self.system)
+            && (target.component == 0 || target.component == self.component)
+    }
+}
+
+/// A frame's header.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Header {
+    pub(crate) length: u8,
+    pub(crate) incompatible: u8,
+    pub(crate) sequence: u8,
+    pub(crate) from: Address,
+    pub(crate) id: u32,
+}
+
+impl Header {
+    pub(crate) fn read(bytes: &[u8; HEADER]) -> Self {
+        let [_, length, incompatible, _, sequence, system, component, id0, id1, id2] = *bytes;
+        let id = u32::from_le_bytes([id0, id1, id2, 0]);
+        Header { length, incompatible, sequence, from: Address { system, component }, id }
+    }
+
+    fn write(&self) -> [u8; HEADER] {
+        let [id0, id1, id2, _] = self.id.to_le_bytes();
+        let Address { system, component } = self.from;
+        [START, self.length, self.incompatible, 0, self.sequence, system, component, id0, id1, id2]
+    }
+}
+
+/// CRC-16/MCRF4XX over all of a frame but its first byte and its checksum, and then the message's seed.
+pub(crate) fn checksum(bytes: &[u8], extra_crc: u8) -> u16 {
+    let accumulate = |crc: u16, byte: &u8| {
+        let low = byte ^ crc as u8;
+        let mixed = u16::from(low ^ (low << 4));
+        (crc >> 8) ^ (mixed << 8) ^ (mixed << 3) ^ (mixed >> 4)
+    };
+    accumulate(bytes.iter().fold(0xFFFF, accumulate), &extra_crc)
+}
+
+/// Writes frames, numbering them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sender {
+    from: Address,
+    sequence: u8,
+}
+
+impl Sender {
+    /// Sends from `from`, beginning with sequence number 0.
+    pub const fn new(from: Address) -> Self {
+        Sender { from, sequence: 0 }
+    }
+
+    /// Writes `message` as a frame to the beginning of `buffer` and returns it.
+    pub fn send<'a>(&mut self, message: &impl Message, buffer: &'a mut [u8; FRAME_MAX]) -> &'a [u8] {
+        let (head, rest) = buffer.split_at_mut(HEADER);
+        let Some((payload, _)) = rest.split_first_chunk_mut::<PAYLOAD_MAX>() else { return &[] };
+        let (id, length) = message.write(payload);
+        let header = Header { length, incompatible: 0, sequence: self.sequence, from: self.from, id };
+        self.sequence = self.sequence.wrapping_add(1);
+        head.copy_from_slice(&header.write());
+
+        let end = HEADER + usize::from(length);
+        let extra_crc = crate::message::extra_crc(message, id);
+        let crc = checksum(buffer.get(1..end).unwrap_or_default(), extra_crc);
+        if let Some(tail) = buffer.get_mut(end..end + CHECKSUM) {
+            tail.copy_from_slice(&crc.to_le_bytes());
+        }
+        buffer.get(..end + CHECKSUM).unwrap_or_default()
+    }
+}

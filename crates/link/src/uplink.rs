@@ -1,0 +1,199 @@
+//! What comes to the vehicle.
+
+use crate::frames::{Odometry, flip};
+use crate::framing::{Address, PAYLOAD_MAX};
+use crate::message::{Fault, Format, Message, extension, parse, put};
+use airframe::{Setpoint, State};
+use mavlink::MessageData;
+use mavlink::dialects::common::{
+    COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavFrame, MavModeFlag, MavState, MavType, ODOMETRY_DATA,
+    PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
+};
+use nalgebra::Vector3;
+
+/// A message to the vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Uplink {
+    /// HEARTBEAT (0): somebody is there.
+    Heartbeat,
+    /// ODOMETRY (331): the full state, from motion capture, a companion computer or the simulator.
+    ///
+    /// Read in frame MAV_FRAME_LOCAL_NED or MAV_FRAME_LOCAL_FRD with child frame MAV_FRAME_BODY_FRD, otherwise
+    /// [`Fault::Unsupported`]; so is a quality of -1, "odometry has failed". Covariances are not looked at.
+    State {
+        /// When it was measured, on the sender's clock \[us\].
+        sent_us: u64,
+        /// In our frames; plausible.
+        state: State,
+    },
+    /// SET_POSITION_TARGET_LOCAL_NED (84) in MAV_FRAME_LOCAL_NED. The vehicle flies to positions and headings: if
+    /// `type_mask` says to ignore one of x, y, z or yaw, or that forces are meant, the message is
+    /// [`Fault::Unsupported`]. Ignored velocities, accelerations and yaw rate are zero. The message has no yaw
+    /// acceleration: zero.
+    Setpoint(Setpoint),
+    /// COMMAND_LONG (76).
+    Command(Command),
+}
+
+/// What COMMAND_LONG asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Command {
+    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 1. Forcing it (param2 = 21196) makes no difference.
+    Arm,
+    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 0.
+    Disarm,
+    /// Anything else, to be answered with "unsupported".
+    Other(MavCmd),
+}
+
+impl Command {
+    /// The MAVLink command, as its answer names it.
+    pub fn id(self) -> MavCmd {
+        match self {
+            Command::Arm | Command::Disarm => MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+            Command::Other(id) => id,
+        }
+    }
+}
+
+impl Message for Uplink {
+    fn format(id: u32) -> Option<Format> {
+        match id {
+            HEARTBEAT_DATA::ID => Some(Format::of::<HEARTBEAT_DATA>(0)),
+            ODOMETRY_DATA::ID => Some(Format::of::<ODOMETRY_DATA>(ODOMETRY_EXTENSION)),
+            SET_POSITION_TARGET_LOCAL_NED_DATA::ID => Some(Format::of::<SET_POSITION_TARGET_LOCAL_NED_DATA>(0)),
+            COMMAND_LONG_DATA::ID => Some(Format::of::<COMMAND_LONG_DATA>(0)),
+            _ => None,
+        }
+    }
+
+    fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, Fault> {
+        match id {
+            HEARTBEAT_DATA::ID => Ok(Uplink::Heartbeat),
+            ODOMETRY_DATA::ID => read_odometry(&parse(payload)?, extension::<ODOMETRY_DATA, _>(payload)),
+            SET_POSITION_TARGET_LOCAL_NED_DATA::ID => read_setpoint(&parse(payload)?, receiver),
+            COMMAND_LONG_DATA::ID => read_command(&parse(payload)?, receiver),
+            _ => Err(Fault::Unknown),
+        }
+    }
+
+    fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        match self {
+            Uplink::Heartbeat => put(
+                &HEARTBEAT_DATA {
+                    custom_mode: 0,
+                    mavtype: MavType::MAV_TYPE_ONBOARD_CONTROLLER,
+                    autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
+                    base_mode: MavModeFlag::empty(),
+                    system_status: MavState::MAV_STATE_ACTIVE,
+                    mavlink_version: 3,
+                },
+                payload,
+            ),
+            Uplink::State { sent_us, state } => put(&write_odometry(*sent_us, state), payload),
+            Uplink::Setpoint(setpoint) => put(&write_setpoint(setpoint), payload),
+            Uplink::Command(command) => put(&write_command(*command), payload),
+        }
+    }
+}
+
+/// The message's target, if it is not for `receiver`, drops it.
+fn meant_for(receiver: Address, system: u8, component: u8) -> Result<(), Fault> {
+    if receiver.is_meant_by(Address { system, component }) { Ok(()) } else { Err(Fault::Elsewhere) }
+}
+
+/// Extension fields of ODOMETRY: reset counter, type of the estimator, quality as `i8`.
+const ODOMETRY_EXTENSION: usize = 3;
+
+fn read_odometry(data: &ODOMETRY_DATA, extension: [u8; ODOMETRY_EXTENSION]) -> Result<Uplink, Fault> {
+    let earth = matches!(data.frame_id, MavFrame::MAV_FRAME_LOCAL_NED | MavFrame::MAV_FRAME_LOCAL_FRD);
+    let body = data.child_frame_id == MavFrame::MAV_FRAME_BODY_FRD;
+    let [_, _, quality] = extension;
+    if !earth || !body || quality as i8 == -1 {
+        return Err(Fault::Unsupported);
+    }
+    let odometry = Odometry {
+        position_m: Vector3::new(data.x, data.y, data.z),
+        attitude: data.q,
+        velocity_m_s: Vector3::new(data.vx, data.vy, data.vz),
+        rates_rad_s: Vector3::new(data.rollspeed, data.pitchspeed, data.yawspeed),
+    };
+    let state = odometry.to_state().ok_or(Fault::Implausible)?;
+    Ok(Uplink::State { sent_us: data.time_usec, state })
+}
+
+fn write_odometry(sent_us: u64, state: &State) -> ODOMETRY_DATA {
+    let odometry = Odometry::from_state(state);
+    let mut data = ODOMETRY_DATA {
+        time_usec: sent_us,
+        frame_id: MavFrame::MAV_FRAME_LOCAL_NED,
+        child_frame_id: MavFrame::MAV_FRAME_BODY_FRD,
+        q: odometry.attitude,
+        ..ODOMETRY_DATA::DEFAULT
+    };
+    [data.x, data.y, data.z] = odometry.position_m.into();
+    [data.vx, data.vy, data.vz] = odometry.velocity_m_s.into();
+    [data.rollspeed, data.pitchspeed, data.yawspeed] = odometry.rates_rad_s.into();
+    data
+}
+
+fn read_setpoint(data: &SET_POSITION_TARGET_LOCAL_NED_DATA, receiver: Address) -> Result<Uplink, Fault> {
+    use PositionTargetTypemask as Mask;
+    meant_for(receiver, data.target_system, data.target_component)?;
+    let needed = Mask::POSITION_TARGET_TYPEMASK_X_IGNORE
+        | Mask::POSITION_TARGET_TYPEMASK_Y_IGNORE
+        | Mask::POSITION_TARGET_TYPEMASK_Z_IGNORE
+        | Mask::POSITION_TARGET_TYPEMASK_YAW_IGNORE
+        | Mask::POSITION_TARGET_TYPEMASK_FORCE_SET;
+    if data.coordinate_frame != MavFrame::MAV_FRAME_LOCAL_NED || data.type_mask.intersects(needed) {
+        return Err(Fault::Unsupported);
+    }
+    let unless = |ignored: Mask, value: f32| if data.type_mask.contains(ignored) { 0.0 } else { value };
+    let setpoint = Setpoint {
+        position_m: flip(Vector3::new(data.x, data.y, data.z)),
+        velocity_m_s: flip(Vector3::new(
+            unless(Mask::POSITION_TARGET_TYPEMASK_VX_IGNORE, data.vx),
+            unless(Mask::POSITION_TARGET_TYPEMASK_VY_IGNORE, data.vy),
+            unless(Mask::POSITION_TARGET_TYPEMASK_VZ_IGNORE, data.vz),
+        )),
+        acceleration_m_s2: flip(Vector3::new(
+            unless(Mask::POSITION_TARGET_TYPEMASK_AX_IGNORE, data.afx),
+            unless(Mask::POSITION_TARGET_TYPEMASK_AY_IGNORE, data.afy),
+            unless(Mask::POSITION_TARGET_TYPEMASK_AZ_IGNORE, data.afz),
+        )),
+        yaw_rad: -data.yaw,
+        yaw_rate_rad_s: -unless(Mask::POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE, data.yaw_rate),
+        yaw_acceleration_rad_s2: 0.0,
+    };
+    if setpoint.is_plausible() { Ok(Uplink::Setpoint(setpoint)) } else { Err(Fault::Implausible) }
+}
+
+fn write_setpoint(setpoint: &Setpoint) -> SET_POSITION_TARGET_LOCAL_NED_DATA {
+    let mut data = SET_POSITION_TARGET_LOCAL_NED_DATA {
+        yaw: -setpoint.yaw_rad,
+        yaw_rate: -setpoint.yaw_rate_rad_s,
+        type_mask: PositionTargetTypemask::empty(),
+        coordinate_frame: MavFrame::MAV_FRAME_LOCAL_NED,
+        ..SET_POSITION_TARGET_LOCAL_NED_DATA::DEFAULT
+    };
+    [data.x, data.y, data.z] = flip(setpoint.position_m).into();
+    [data.vx, data.vy, data.vz] = flip(setpoint.velocity_m_s).into();
+    [data.afx, data.afy, data.afz] = flip(setpoint.acceleration_m_s2).into();
+    data
+}
+
+fn read_command(data: &COMMAND_LONG_DATA, receiver: Address) -> Result<Uplink, Fault> {
+    meant_for(receiver, data.target_system, data.target_component)?;
+    let command = match data.command {
+        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if data.param1 == 1.0 => Command::Arm,
+        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if data.param1 == 0.0 => Command::Disarm,
+        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => return Err(Fault::Malformed),
+        other => Command::Other(other),
+    };
+    Ok(Uplink::Command(command))
+}
+
+fn write_command(command: Command) -> COMMAND_LONG_DATA {
+    let param1 = if command == Command::Arm { 1.0 } else { 0.0 };
+    COMMAND_LONG_DATA { command: command.id(), param1, ..COMMAND_LONG_DATA::DEFAULT }
+}

@@ -1,0 +1,151 @@
+//! The wire's frames against ours: known attitudes, and `f64` rotation matrices as the oracle.
+#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
+
+use airframe::State;
+use core::f32::consts::{FRAC_PI_2, PI};
+use link::frames::{Odometry, euler, flip, quaternion};
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+
+/// Rz(psi) Ry(theta) Rx(phi), from the definition in `airframe`, in `f64`.
+fn r_earth_body(attitude: &Vector3<f32>) -> Matrix3<f64> {
+    let [phi, theta, psi] = attitude.map(f64::from).into();
+    let about = |axis, angle| *Rotation3::from_axis_angle(&axis, angle).matrix();
+    about(Vector3::z_axis(), psi) * about(Vector3::y_axis(), theta) * about(Vector3::x_axis(), phi)
+}
+
+fn rotation_of(q: &Quaternion<f32>) -> Matrix3<f64> {
+    *UnitQuaternion::from_quaternion(q.cast()).to_rotation_matrix().matrix()
+}
+
+/// A state at rest at the origin.
+fn with_attitude(attitude: [f32; 4]) -> Odometry {
+    let zero = Vector3::zeros();
+    Odometry { position_m: zero, attitude, velocity_m_s: zero, rates_rad_s: zero }
+}
+
+#[test]
+fn known_attitudes() {
+    let half = core::f32::consts::FRAC_1_SQRT_2;
+    // (the wire's quaternion, what it means there, our roll, pitch and yaw)
+    let cases = [
+        ([1.0, 0.0, 0.0, 0.0], "level, nose north", [0.0, 0.0, 0.0]),
+        ([half, 0.0, 0.0, half], "nose east: to our right", [0.0, 0.0, -FRAC_PI_2]),
+        ([half, half, 0.0, 0.0], "right side down", [FRAC_PI_2, 0.0, 0.0]),
+        ([half, 0.0, half, 0.0], "nose up: our pitch is negative", [0.0, -FRAC_PI_2, 0.0]),
+        ([-1.0, 0.0, 0.0, 0.0], "level, the other sign", [0.0, 0.0, 0.0]),
+        ([0.0, 0.0, 0.0, 1.0], "nose south", [0.0, 0.0, PI]),
+    ];
+    for (attitude, meaning, expected) in cases {
+        let state = with_attitude(attitude).to_state().expect(meaning);
+        let [roll, pitch, yaw] = state.attitude_rad.into();
+        assert!((r_earth_body(&state.attitude_rad) - r_earth_body(&expected.into())).amax() < 1e-6, "{meaning}");
+        assert!(roll.abs() <= PI && pitch.abs() <= FRAC_PI_2 && yaw.abs() <= PI, "{meaning}");
+    }
+}
+
+#[test]
+fn positive_pitch_of_ours_tilts_the_thrust_forwards() {
+    let state = State { attitude_rad: Vector3::new(0.0, 0.1, 0.0), ..State::default() };
+    let thrust_earth = r_earth_body(&state.attitude_rad) * Vector3::z();
+    assert!(thrust_earth.x > 0.0);
+    // On the wire the nose is down: the body's x axis points to positive z (down).
+    let [w, x, y, z] = Odometry::from_state(&state).attitude;
+    assert!((rotation_of(&Quaternion::new(w, x, y, z)) * Vector3::x()).z > 0.0);
+}
+
+#[test]
+fn velocity_is_in_the_child_frame() {
+    // Nose east, flying forwards at 1 m/s and sinking at 2 m/s: in our frame to -y and -z.
+    let half = core::f32::consts::FRAC_1_SQRT_2;
+    let mut odometry = with_attitude([half, 0.0, 0.0, half]);
+    odometry.velocity_m_s = Vector3::new(1.0, 0.0, 2.0);
+    odometry.position_m = Vector3::new(1.0, 2.0, 3.0);
+    odometry.rates_rad_s = Vector3::new(0.1, 0.2, 0.3);
+    let state = odometry.to_state().expect("plausible");
+    assert!((state.velocity_m_s - Vector3::new(0.0, -1.0, -2.0)).amax() < 1e-6);
+    assert_eq!(state.position_m, Vector3::new(1.0, -2.0, -3.0));
+    assert_eq!(state.rates_rad_s, Vector3::new(0.1, -0.2, -0.3));
+}
+
+#[test]
+fn hover_is_exact() {
+    let state = State { position_m: Vector3::new(1.5, -2.0, 3.25), ..State::default() };
+    assert_eq!(Odometry::from_state(&state).to_state(), Some(state));
+}
+
+#[test]
+fn what_is_no_rotation_is_refused() {
+    for attitude in [[0.0; 4], [1.2, 0.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0], [f32::NAN, 0.0, 0.0, 0.0], [f32::MAX; 4]] {
+        assert_eq!(with_attitude(attitude).to_state(), None, "{attitude:?}");
+    }
+    let mut infinite = with_attitude([1.0, 0.0, 0.0, 0.0]);
+    infinite.velocity_m_s.x = f32::INFINITY;
+    assert_eq!(infinite.to_state(), None);
+    let mut far = with_attitude([1.0, 0.0, 0.0, 0.0]);
+    far.position_m.y = 2e5;
+    assert_eq!(far.to_state(), None);
+}
+
+/// Any quaternion of norm about 1, and, as often, one within 1e-3 rad of a pitch of 90 degrees.
+fn attitudes() -> impl Strategy<Value = Quaternion<f32>> {
+    let any = prop::array::uniform4(-1.0f32..1.0)
+        .prop_filter("not too short", |q| q.iter().map(|c| c * c).sum::<f32>() > 0.01)
+        .prop_map(|[w, x, y, z]| Quaternion::new(w, x, y, z).normalize());
+    let near_gimbal = (prop::bool::ANY, -1e-3f32..1e-3, -3.1f32..3.1, -3.1f32..3.1).prop_map(|(up, off, roll, yaw)| {
+        let pitch = if up { FRAC_PI_2 } else { -FRAC_PI_2 } + off;
+        let about = |axis, angle: f32| UnitQuaternion::from_axis_angle(&axis, f64::from(angle));
+        let q = about(Vector3::z_axis(), yaw) * about(Vector3::y_axis(), pitch) * about(Vector3::x_axis(), roll);
+        q.into_inner().cast()
+    });
+    prop_oneof![any, near_gimbal]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    /// The Euler angles turn as the quaternion does, at every attitude, and lie within their ranges.
+    #[test]
+    fn euler_angles_are_the_same_rotation(q in attitudes(), scale in 0.96f32..1.04) {
+        let angles = euler(&(q * scale));
+        let difference = (r_earth_body(&angles) - rotation_of(&q)).amax();
+        prop_assert!(difference < 2e-6, "{difference} at {angles}");
+        prop_assert!(angles.x.abs() <= PI && angles.y.abs() <= FRAC_PI_2 && angles.z.abs() <= PI);
+    }
+
+    /// The quaternion turns as the Euler angles do.
+    #[test]
+    fn quaternions_are_the_same_rotation(roll in -3.1f32..3.1, pitch in -1.57f32..1.57, yaw in -30.0f32..30.0) {
+        let attitude = Vector3::new(roll, pitch, yaw);
+        let difference = (rotation_of(&quaternion(&attitude)) - r_earth_body(&attitude)).amax();
+        prop_assert!(difference < 2e-6, "{difference}");
+    }
+
+    /// A state crosses the wire with no more than rounding.
+    #[test]
+    fn states_cross(
+        position in prop::array::uniform3(-1e3f32..1e3),
+        velocity in prop::array::uniform3(-20.0f32..20.0),
+        attitude in (-3.1f32..3.1, -1.5f32..1.5, -3.1f32..3.1),
+        rates in prop::array::uniform3(-20.0f32..20.0),
+    ) {
+        let state = State {
+            position_m: position.into(),
+            velocity_m_s: velocity.into(),
+            attitude_rad: Vector3::new(attitude.0, attitude.1, attitude.2),
+            rates_rad_s: rates.into(),
+        };
+        let crossed = Odometry::from_state(&state).to_state().expect("plausible");
+        prop_assert_eq!(crossed.position_m, state.position_m);
+        prop_assert_eq!(crossed.rates_rad_s, state.rates_rad_s);
+        prop_assert!((crossed.velocity_m_s - state.velocity_m_s).amax() < 2e-5);
+        prop_assert!((r_earth_body(&crossed.attitude_rad) - r_earth_body(&state.attitude_rad)).amax() < 2e-6);
+    }
+
+    #[test]
+    fn flipping_twice_changes_nothing(v in prop::array::uniform3(-1e5f32..1e5)) {
+        let v = Vector3::from(v);
+        prop_assert_eq!(flip(flip(v)), v);
+        prop_assert_eq!(flip(v).cross(&flip(Vector3::x())), flip(v.cross(&Vector3::x())), "a rotation, no mirror");
+    }
+}

@@ -1,0 +1,179 @@
+//! The half that talks.
+
+use crate::flight::{Norm, Report};
+use airframe::{PerAxis, State};
+use link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, MavCmd, Sender, Text, Uplink};
+use vehicle::{Inbox, Mode, Request, SourceClock, Stamped};
+
+/// The vehicle on the link: system 1, component 1 (autopilot).
+pub const ADDRESS: Address = Address { system: 1, component: 1 };
+
+/// A message that goes out every `period` ticks, and in which of them.
+struct Schedule {
+    period: u64,
+    phase: u64,
+}
+
+impl Schedule {
+    fn is_due(&self, tick: u64) -> bool {
+        tick % self.period == self.phase
+    }
+}
+
+/// Once a second.
+const HEARTBEAT: Schedule = Schedule { period: 1000, phase: 3 };
+/// 50 Hz.
+const ATTITUDE: Schedule = Schedule { period: 20, phase: 1 };
+/// 50 Hz.
+const POSITION: Schedule = Schedule { period: 20, phase: 11 };
+/// 10 Hz.
+const HEALTH: Schedule = Schedule { period: 100, phase: 7 };
+/// 100 Hz, and after every tick that had a new state.
+const ROTORS: Schedule = Schedule { period: 10, phase: 0 };
+
+/// Reads what comes in, and says what there is to say.
+pub struct Comms {
+    decoder: Decoder<Uplink>,
+    sender: Sender,
+    clock: SourceClock,
+    /// When the last tick began \[us\]: everything that arrives before the next one is stamped so.
+    now_us: u64,
+    tick: u64,
+    tick_us_max: f32,
+    state: Option<State>,
+    /// The state is newer than the last rotor command.
+    state_is_news: bool,
+    /// Who asked for arming or disarming.
+    asked_by: Address,
+    /// A command that this vehicle does not know, and who sent it.
+    unknown: Option<(MavCmd, Address)>,
+}
+
+impl Default for Comms {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Comms {
+    /// Nothing heard yet.
+    pub fn new() -> Self {
+        Comms {
+            decoder: Decoder::new(ADDRESS),
+            sender: Sender::new(ADDRESS),
+            clock: SourceClock::default(),
+            now_us: 0,
+            tick: 0,
+            tick_us_max: 0.0,
+            state: None,
+            state_is_news: false,
+            asked_by: Address { system: 0, component: 0 },
+            unknown: None,
+        }
+    }
+
+    /// Takes the next bytes of the stream; returns what they tell the control tick, to be [posted](post).
+    pub fn receive(&mut self, bytes: &[u8]) -> Inbox {
+        let mut news = Inbox::default();
+        let Comms { decoder, clock, now_us, state, state_is_news, asked_by, unknown, .. } = self;
+        decoder.feed(bytes, |from, message| match message {
+            Uplink::Heartbeat => (),
+            Uplink::State { sent_us, state: value } => {
+                if let Some(at_us) = clock.stamp(sent_us, *now_us) {
+                    news.state = Some(Stamped { value, at_us });
+                    *state = Some(value);
+                    *state_is_news = true;
+                }
+            }
+            Uplink::Setpoint(value) => news.setpoint = Some(Stamped { value, at_us: *now_us }),
+            Uplink::Command(Command::Arm) => {
+                news.ask(Request::Arm);
+                *asked_by = from;
+            }
+            Uplink::Command(Command::Disarm) => {
+                news.ask(Request::Disarm);
+                *asked_by = from;
+            }
+            Uplink::Command(Command::Other(command)) => *unknown = Some((command, from)),
+        });
+        news
+    }
+
+    /// Frames dropped since power-up, for any reason.
+    pub fn bad_frames(&self) -> u32 {
+        let c = self.decoder.counters();
+        [c.bad_checksum, c.unknown, c.oversized, c.malformed, c.implausible, c.unsupported]
+            .into_iter()
+            .fold(0, u32::saturating_add)
+    }
+
+    /// Says what there is to say after a tick, frame by frame through `send`. `tick_cycles` is how long the tick took,
+    /// in cycles of 168 MHz.
+    pub fn report(&mut self, report: &Report, tick_cycles: u32, mut send: impl FnMut(&[u8])) {
+        let mut buffer = [0; FRAME_MAX];
+        let mut say = |message: Downlink| send(self.sender.send(&message, &mut buffer));
+
+        self.now_us = report.time_us;
+        self.tick += 1;
+        let tick_us = tick_cycles as f32 / 168.0;
+        self.tick_us_max = self.tick_us_max.max(tick_us);
+
+        let armed = report.mode.armed();
+        if self.state_is_news || ROTORS.is_due(self.tick) {
+            self.state_is_news = false;
+            say(Downlink::Rotors { time_us: report.time_us, armed, speeds: report.motors });
+        }
+        if let Some(answer) = report.answer {
+            let command = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
+            let (answer, reason) = match answer {
+                Ok(_) => (Answer::Accepted, None),
+                Err(refusal) => (Answer::Refused(refusal as i32), Some(refusal.reason())),
+            };
+            say(Downlink::Answer { command, answer, to: self.asked_by });
+            if let Some(reason) = reason {
+                say(Downlink::Text(Text::from(reason)));
+            }
+        }
+        if let Some((command, to)) = self.unknown.take() {
+            say(Downlink::Answer { command, answer: Answer::Unsupported, to });
+        }
+        if HEARTBEAT.is_due(self.tick) {
+            let failsafe = matches!(report.mode, Mode::Riding | Mode::Descending);
+            say(Downlink::Heartbeat { armed, failsafe, mode: report.mode as u32 });
+        }
+        let time_ms = (report.time_us / 1000) as u32;
+        if let Some(State { position_m, velocity_m_s, attitude_rad, rates_rad_s }) = self.state {
+            if ATTITUDE.is_due(self.tick) {
+                say(Downlink::Attitude { time_ms, attitude_rad, rates_rad_s });
+            }
+            if POSITION.is_due(self.tick) {
+                say(Downlink::Position { time_ms, position_m, velocity_m_s });
+            }
+        }
+        if HEALTH.is_due(self.tick) {
+            let Report { health, estimates, .. } = report;
+            let norm = |norm: &Norm| libm::sqrtf(norm.theta_squared);
+            say(Downlink::Health(link::Health {
+                time_us: report.time_us,
+                tick_us,
+                tick_max_us: self.tick_us_max,
+                rate_hz: health.rate.rate_hz.unwrap_or(0) as f32,
+                late_ticks: health.rate.late_ticks,
+                saturated_ticks: report.saturated_ticks,
+                state_age_us: health.state_age_us as f32,
+                theta_norm: PerAxis::from_fn(|axis| norm(estimates.get(axis))),
+                delta: PerAxis::from_fn(|axis| estimates.get(axis).delta),
+                link: *self.decoder.counters(),
+            }));
+        }
+    }
+}
+
+/// Adds `news` to what the next tick will work from.
+pub fn post(inbox: &mut Inbox, news: &Inbox) {
+    inbox.state = news.state.or(inbox.state);
+    inbox.setpoint = news.setpoint.or(inbox.setpoint);
+    if let Some(request) = news.request {
+        inbox.ask(request);
+    }
+}

@@ -1,0 +1,139 @@
+//! Lockstep with the `pil` image.
+//!
+//! Two FIFOs carry it; their format is stated in `firmware/src/board/pil.rs`.
+
+use crate::Error;
+use crate::qemu::{self, Qemu};
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read, Write};
+use std::path::Path;
+use std::process::Command;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// How long a tick may take on the host before the firmware counts as stuck.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// How often to look whether QEMU is still there.
+const LOOK: Duration = Duration::from_millis(500);
+/// Longest reply that is believed \[bytes\].
+const REPLY_MAX: usize = 4096;
+
+/// What the firmware did in one control tick.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Reply {
+    /// When the tick began, since power-up \[us\].
+    pub time_us: u64,
+    /// How long it took in cycles of 168 MHz, as the firmware itself sees it.
+    pub cycles: u32,
+    /// What that is in instructions, which is what the emulator really counts.
+    pub instructions: u32,
+    /// Most stack ever used, interrupts included, as of the last full second \[bytes\].
+    pub stack_bytes: u32,
+    /// What the motors get: 0, or 48 to 2047.
+    pub throttles: [u16; 4],
+    /// What went out over the link.
+    pub bytes: Vec<u8>,
+}
+
+/// The `pil` image, flying in lockstep with the host.
+#[derive(Debug)]
+pub struct Emulator {
+    qemu: Qemu,
+    to_firmware: File,
+    replies: Receiver<io::Result<Reply>>,
+    /// Writing end of the firmware's FIFO: as long as it is open, the reader waits for more.
+    hold: Option<File>,
+    reader: Option<JoinHandle<()>>,
+}
+
+impl Emulator {
+    /// Starts the image; it waits for the first [exchange](Self::exchange) before its first control tick.
+    ///
+    /// # Errors
+    /// If QEMU or the image is missing, or QEMU does not start.
+    pub fn start(elf: &Path) -> Result<Self, Error> {
+        let folder = Qemu::folder()?;
+        let open = |name: &str| -> Result<File, Error> {
+            let path = folder.join(name);
+            if !Command::new("mkfifo").arg(&path).status()?.success() {
+                return Err(Error::Protocol(format!("mkfifo {} failed", path.display())));
+            }
+            // Open for both, a FIFO does not wait for its other end.
+            Ok(OpenOptions::new().read(true).write(true).open(path)?)
+        };
+        let to_firmware = open("to_firmware")?;
+        let hold = open("from_firmware")?;
+        let mut from_firmware = File::open(folder.join("from_firmware"))?;
+        let arguments = [qemu::COUNT_INSTRUCTIONS.as_slice(), &["-serial", "none"]].concat();
+        let qemu = Qemu::start(elf, folder, &arguments)?;
+
+        let (sender, replies) = mpsc::channel();
+        let reader = std::thread::spawn(move || {
+            loop {
+                let reply = read_reply(&mut from_firmware);
+                let last = reply.is_err();
+                if sender.send(reply).is_err() || last {
+                    return;
+                }
+            }
+        });
+        Ok(Emulator { qemu, to_firmware, replies, hold: Some(hold), reader: Some(reader) })
+    }
+
+    /// One control tick: gives the firmware the bytes that reached it before, takes what it sent after.
+    ///
+    /// # Errors
+    /// If the firmware panicked, faulted or hangs.
+    pub fn exchange(&mut self, to_firmware: &[u8]) -> Result<Reply, Error> {
+        let mut frame = (to_firmware.len() as u32).to_le_bytes().to_vec();
+        frame.extend_from_slice(to_firmware);
+        self.to_firmware.write_all(&frame)?;
+
+        let mut waited = Duration::ZERO;
+        loop {
+            match self.replies.recv_timeout(LOOK) {
+                Ok(reply) => return Ok(reply?),
+                Err(RecvTimeoutError::Disconnected) => return Err(Error::Protocol("reply cut short".into())),
+                Err(RecvTimeoutError::Timeout) => self.qemu.check()?,
+            }
+            waited += LOOK;
+            if waited >= PATIENCE {
+                return Err(Error::Silent(waited));
+            }
+        }
+    }
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        // With both writing ends closed the reader sees the end of the FIFO.
+        self.qemu.kill();
+        self.hold = None;
+        if let Some(reader) = self.reader.take() {
+            let _ = reader.join();
+        }
+    }
+}
+
+fn read_reply(from: &mut impl Read) -> io::Result<Reply> {
+    /// The next field.
+    fn field<const N: usize>(from: &mut impl Read) -> io::Result<[u8; N]> {
+        let mut bytes = [0; N];
+        from.read_exact(&mut bytes).map(|()| bytes)
+    }
+    let time_us = u64::from_le_bytes(field(from)?);
+    let cycles = u32::from_le_bytes(field(from)?);
+    let stack_bytes = u32::from_le_bytes(field(from)?);
+    let length = u32::from_le_bytes(field(from)?) as usize;
+    let mut throttles = [0; 4];
+    for throttle in &mut throttles {
+        *throttle = u16::from_le_bytes(field(from)?);
+    }
+    if length > REPLY_MAX {
+        return Err(io::Error::new(io::ErrorKind::InvalidData, format!("a reply of {length} bytes")));
+    }
+    let mut bytes = vec![0; length];
+    from.read_exact(&mut bytes)?;
+    Ok(Reply { time_us, cycles, instructions: qemu::instructions(cycles), stack_bytes, throttles, bytes })
+}

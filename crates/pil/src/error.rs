@@ -1,0 +1,63 @@
+//! What can go wrong between host and emulator.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Why an image could not be built, started or flown.
+#[derive(Debug)]
+pub enum Error {
+    /// There is no QEMU for Arm.
+    NoQemu,
+    /// This QEMU has no STM32F405.
+    NoMachine,
+    /// The Rust toolchain cannot compile for the processor.
+    NoTarget,
+    /// The image has not been built.
+    NoImage(PathBuf),
+    /// Building the image failed; cargo said why.
+    Build,
+    /// The emulator ended by itself.
+    Exited(String),
+    /// The firmware gave no answer for this long.
+    Silent(Duration),
+    /// Something answered, but not what was asked.
+    Protocol(String),
+    /// Files, sockets or processes of the host.
+    Io(std::io::Error),
+}
+
+impl Error {
+    /// True if something has to be installed or built before this can work: a test may be skipped for it.
+    pub fn is_missing(&self) -> bool {
+        matches!(self, Error::NoQemu | Error::NoMachine | Error::NoTarget | Error::NoImage(_))
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::NoQemu => write!(f, "qemu-system-arm is missing: install it, on Debian by scripts/qemu.sh"),
+            Error::NoMachine => write!(f, "this qemu-system-arm emulates no STM32F405: take version 7 or newer"),
+            Error::NoTarget => write!(
+                f,
+                "the compiler's target is missing: rustup target add thumbv7em-none-eabihf, or where rustup cannot, \
+                 FW_TOOLCHAIN=$(scripts/thumb-toolchain.sh)"
+            ),
+            Error::NoImage(path) => write!(f, "{} is missing: build it by cargo fw, cargo fw-pil", path.display()),
+            Error::Build => write!(f, "the firmware does not build"),
+            Error::Exited(status) => write!(f, "the emulator ended: {status}"),
+            Error::Silent(time) => write!(f, "the firmware did not answer for {} s", time.as_secs()),
+            Error::Protocol(what) => write!(f, "unexpected answer: {what}"),
+            Error::Io(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+impl From<std::io::Error> for Error {
+    fn from(error: std::io::Error) -> Self {
+        Error::Io(error)
+    }
+}

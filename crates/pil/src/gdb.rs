@@ -1,0 +1,178 @@
+//! The little of GDB's remote protocol that it takes to watch a processor: registers, memory, watchpoints, run, step.
+
+use crate::Error;
+use std::io::{BufRead, BufReader, ErrorKind, Write};
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Number of the program counter.
+pub const PC: u32 = 15;
+
+/// What to watch at an address; the values are the protocol's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Watch {
+    /// Stores only.
+    Write = 2,
+    /// Loads and stores.
+    Access = 4,
+}
+
+/// A connection to the debug stub of an emulated processor.
+#[derive(Debug)]
+pub struct Gdb {
+    stream: BufReader<UnixStream>,
+}
+
+impl Gdb {
+    /// Connects to the stub's socket, which need not be there yet, and leaves the processor halted.
+    ///
+    /// # Errors
+    /// If there is none after 5 s.
+    pub fn connect(socket: &Path) -> Result<Self, Error> {
+        let mut gdb = Gdb { stream: BufReader::new(connect(socket)?) };
+        // QEMU offers registers by name and number only to those who asked for their list.
+        gdb.ask("qXfer:features:read:target.xml:0,ffb")?;
+        gdb.ask("?")?;
+        Ok(gdb)
+    }
+
+    /// A core register.
+    ///
+    /// # Errors
+    /// If the stub refuses.
+    pub fn register(&mut self, number: u32) -> Result<u32, Error> {
+        let answer = self.ask(&format!("p{number:x}"))?;
+        let bytes = from_hex(&answer)?;
+        Ok(u32::from_le_bytes(bytes.try_into().map_err(|_| Error::Protocol(answer))?))
+    }
+
+    /// Writes a core register.
+    ///
+    /// # Errors
+    /// If the stub refuses.
+    pub fn set_register(&mut self, number: u32, value: u32) -> Result<(), Error> {
+        self.order(&format!("P{number:x}={:08x}", value.swap_bytes()))
+    }
+
+    /// `N` bytes of memory.
+    ///
+    /// # Errors
+    /// If the stub refuses.
+    pub fn memory<const N: usize>(&mut self, address: u32) -> Result<[u8; N], Error> {
+        let answer = self.ask(&format!("m{address:x},{N:x}"))?;
+        from_hex(&answer)?.try_into().map_err(|_| Error::Protocol(answer))
+    }
+
+    /// Stops the processor before it next touches the word at `address`.
+    ///
+    /// # Errors
+    /// If the stub refuses.
+    pub fn watch(&mut self, watch: Watch, address: u32) -> Result<(), Error> {
+        self.order(&format!("Z{},{address:x},4", watch as u32))
+    }
+
+    /// Undoes [`Gdb::watch`].
+    ///
+    /// # Errors
+    /// If the stub refuses.
+    pub fn unwatch(&mut self, watch: Watch, address: u32) -> Result<(), Error> {
+        self.order(&format!("z{},{address:x},4", watch as u32))
+    }
+
+    /// One instruction.
+    ///
+    /// # Errors
+    /// If the stub refuses.
+    pub fn step(&mut self) -> Result<(), Error> {
+        self.ask("s").map(drop)
+    }
+
+    /// Runs until a watchpoint stops the processor, and gives the address touched; `None` if it still runs after
+    /// `patience`.
+    ///
+    /// # Errors
+    /// If it stops for another reason.
+    pub fn run(&mut self, patience: Duration) -> Result<Option<u32>, Error> {
+        self.send("c")?;
+        self.stream.get_ref().set_read_timeout(Some(patience))?;
+        let stop = self.receive();
+        self.stream.get_ref().set_read_timeout(None)?;
+        let stop = match stop {
+            Err(Error::Io(e)) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => return Ok(None),
+            stop => stop?,
+        };
+        // T05thread:p01.01;awatch:40023800;
+        let address = stop.split(';').find_map(|field| field.split_once("watch:")).map(|(_, address)| address);
+        let address = address.and_then(|address| u32::from_str_radix(address, 16).ok());
+        address.map(Some).ok_or(Error::Protocol(stop))
+    }
+
+    /// Halts a processor that runs.
+    ///
+    /// # Errors
+    /// If it does not.
+    pub fn halt(&mut self) -> Result<(), Error> {
+        self.stream.get_mut().write_all(&[0x03])?;
+        self.receive().map(drop)
+    }
+
+    /// Lets a halted processor run, and does not wait for it to stop.
+    ///
+    /// # Errors
+    /// If the connection fails.
+    pub fn resume(&mut self) -> Result<(), Error> {
+        self.send("c")
+    }
+
+    fn order(&mut self, order: &str) -> Result<(), Error> {
+        match self.ask(order)?.as_str() {
+            "OK" => Ok(()),
+            answer => Err(Error::Protocol(format!("{answer:?} to {order}"))),
+        }
+    }
+
+    fn ask(&mut self, question: &str) -> Result<String, Error> {
+        self.send(question)?;
+        self.receive()
+    }
+
+    fn send(&mut self, packet: &str) -> Result<(), Error> {
+        let sum = packet.bytes().fold(0, u8::wrapping_add);
+        Ok(write!(self.stream.get_mut(), "${packet}#{sum:02x}")?)
+    }
+
+    /// The next packet, past acknowledgements.
+    fn receive(&mut self) -> Result<String, Error> {
+        let mut packet = Vec::new();
+        self.stream.read_until(b'#', &mut packet)?;
+        let mut sum = [0; 2];
+        std::io::Read::read_exact(&mut self.stream, &mut sum)?;
+        self.stream.get_mut().write_all(b"+")?;
+        let packet = String::from_utf8_lossy(&packet).into_owned();
+        match packet.split_once('$') {
+            Some((_, body)) => Ok(body.trim_end_matches('#').to_owned()),
+            None => Err(Error::Protocol(packet)),
+        }
+    }
+}
+
+/// Connects to a socket that QEMU is about to open.
+pub(crate) fn connect(socket: &Path) -> Result<UnixStream, Error> {
+    let start = Instant::now();
+    loop {
+        match UnixStream::connect(socket) {
+            Ok(stream) => return Ok(stream),
+            Err(error) if start.elapsed() > Duration::from_secs(5) => return Err(error.into()),
+            Err(_) => std::thread::sleep(Duration::from_millis(10)),
+        }
+    }
+}
+
+fn from_hex(hex: &str) -> Result<Vec<u8>, Error> {
+    let digits = hex.as_bytes().chunks(2).map(|pair| {
+        let pair = std::str::from_utf8(pair).ok()?;
+        u8::from_str_radix(pair, 16).ok()
+    });
+    digits.collect::<Option<_>>().ok_or_else(|| Error::Protocol(hex.to_owned()))
+}

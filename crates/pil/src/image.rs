@@ -1,0 +1,67 @@
+//! The firmware's images: where they are, and how to build them.
+
+use crate::Error;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// One of the firmware's two images.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Image {
+    /// What runs on the board.
+    Flight,
+    /// The same code, trading bytes with the host once a control tick: for [`crate::Emulator`].
+    Pil,
+}
+
+impl Image {
+    const fn name(self) -> &'static str {
+        match self {
+            Image::Flight => "flight",
+            Image::Pil => "pil",
+        }
+    }
+
+    /// The image as built last.
+    ///
+    /// # Errors
+    /// [`Error::NoImage`] if there is none.
+    pub fn find(self) -> Result<PathBuf, Error> {
+        let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
+        let path = target.join(TARGET).join("release").join(self.name());
+        if path.is_file() { Ok(path) } else { Err(Error::NoImage(path)) }
+    }
+
+    /// Builds the image by its cargo alias and gives its path. `FW_TOOLCHAIN`, if set, names the toolchain to take.
+    ///
+    /// # Errors
+    /// [`Error::NoTarget`], [`Error::Build`].
+    pub fn build(self) -> Result<PathBuf, Error> {
+        let libraries = toolchain("rustc").args(["--print", "target-libdir", "--target", TARGET]).output()?;
+        let libraries = PathBuf::from(String::from_utf8_lossy(&libraries.stdout).trim());
+        if !libraries.is_dir() {
+            return Err(Error::NoTarget);
+        }
+        let alias = match self {
+            Image::Flight => "fw",
+            Image::Pil => "fw-pil",
+        };
+        let status = toolchain("cargo").arg(alias).current_dir(workspace()).stdout(Stdio::null()).status()?;
+        if status.success() { self.find() } else { Err(Error::Build) }
+    }
+}
+
+/// A tool of the firmware's toolchain.
+fn toolchain(tool: &str) -> Command {
+    let mut command = Command::new(tool);
+    if let Some(toolchain) = std::env::var_os("FW_TOOLCHAIN") {
+        command.env("RUSTUP_TOOLCHAIN", toolchain);
+    }
+    command
+}
+
+/// The workspace's root.
+fn workspace() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+}

@@ -1,0 +1,36 @@
+//! Processor in the loop: runs the firmware's images on an emulated Cortex-M4F, from the host.
+//!
+//! QEMU executes the target's own machine code, FPU included, but it is not the chip:
+//!
+//! * It counts instructions (`-icount`), not cycles. Every count here is of instructions.
+//! * It has no DMA, no timer outputs, no clock tree and no sensors, and peripherals answer at once.
+//!
+//! Two images, two ways:
+//!
+//! * [`Emulator`] flies the `pil` image in lockstep: one [exchange](Emulator::exchange) of bytes is one control tick.
+//!   Time stands still while the host thinks, so every run gives the same bytes.
+//! * [`Board`] boots the very `flight` image and talks to its USART1. A [debugger](gdb) lends the emulated chip the
+//!   clock tree's status bits, which it lacks.
+//!
+//! ```no_run
+//! use pil::{Emulator, Image};
+//!
+//! let mut emulator = Emulator::start(&Image::Pil.build()?)?;
+//! let reply = emulator.exchange(b"MAVLink in")?;
+//! println!("{} instructions, {} bytes out", reply.instructions, reply.bytes.len());
+//! # Ok::<(), pil::Error>(())
+//! ```
+#![forbid(unsafe_code)]
+
+mod board;
+mod clock_tree;
+mod emulator;
+mod error;
+pub mod gdb;
+mod image;
+mod qemu;
+
+pub use board::Board;
+pub use emulator::{Emulator, Reply};
+pub use error::Error;
+pub use image::Image;

@@ -1,0 +1,95 @@
+//! Finding and starting QEMU.
+
+use crate::Error;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// QEMU's boards with an STM32F405, the better one first: QEMU 8 and newer, QEMU 7.
+const MACHINES: [&str; 2] = ["olimex-stm32-h405", "netduinoplus2"];
+
+/// Lets time pass by instructions, and stand still while the processor waits for the host.
+pub(crate) const COUNT_INSTRUCTIONS: [&str; 2] = ["-icount", "shift=3,sleep=off"];
+/// One instruction is 2^3 ns of the emulated chip's time: the shift above.
+const NS_PER_INSTRUCTION: u64 = 1 << 3;
+
+/// Cycles of the 168 MHz core clock, as SysTick counts them, in instructions.
+pub(crate) fn instructions(cycles: u32) -> u32 {
+    // To the nearest: an instruction is 1.344 cycles.
+    let cycles_per_thousand = 168 * NS_PER_INSTRUCTION;
+    ((u64::from(cycles) * 1000 + cycles_per_thousand / 2) / cycles_per_thousand) as u32
+}
+
+/// QEMU with an image, halted or running. Ends with this value, and takes its folder along.
+#[derive(Debug)]
+pub(crate) struct Qemu {
+    child: Child,
+    folder: PathBuf,
+}
+
+impl Qemu {
+    /// A new empty folder, for what host and emulator share.
+    pub(crate) fn folder() -> Result<PathBuf, Error> {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let name = format!("pil-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        let folder = std::env::temp_dir().join(name);
+        std::fs::create_dir_all(&folder)?;
+        Ok(folder)
+    }
+
+    /// Starts `elf` in `folder` with these further arguments.
+    pub(crate) fn start(elf: &Path, folder: PathBuf, arguments: &[&str]) -> Result<Self, Error> {
+        if !elf.is_file() {
+            return Err(Error::NoImage(elf.to_owned()));
+        }
+        let elf = elf.canonicalize()?;
+        let child = Command::new(program())
+            .args(["-M", machine()?, "-nographic", "-monitor", "none"])
+            .args(["-semihosting-config", "enable=on,target=native"])
+            .args(arguments)
+            .arg("-kernel")
+            .arg(elf)
+            .current_dir(&folder)
+            .stdin(Stdio::null())
+            .spawn()?;
+        Ok(Qemu { child, folder })
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// Ends QEMU.
+    pub(crate) fn kill(&mut self) {
+        // It may have ended by itself already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+
+    /// [`Error::Exited`] if QEMU has ended.
+    pub(crate) fn check(&mut self) -> Result<(), Error> {
+        match self.child.try_wait()? {
+            Some(status) => Err(Error::Exited(status.to_string())),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Drop for Qemu {
+    fn drop(&mut self) {
+        self.kill();
+        let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
+/// `QEMU_SYSTEM_ARM`, or else `qemu-system-arm` of the search path.
+fn program() -> std::ffi::OsString {
+    std::env::var_os("QEMU_SYSTEM_ARM").unwrap_or_else(|| "qemu-system-arm".into())
+}
+
+/// The best machine that this QEMU offers.
+fn machine() -> Result<&'static str, Error> {
+    let help = Command::new(program()).args(["-machine", "help"]).output().map_err(|_| Error::NoQemu)?;
+    let help = String::from_utf8_lossy(&help.stdout);
+    MACHINES.into_iter().find(|machine| help.contains(machine)).ok_or(Error::NoMachine)
+}

@@ -1,0 +1,130 @@
+//! Flight without a measurement. The whole state comes over the wire, so while it stays away nothing on board says how
+//! the vehicle moves: all that is left is what it was doing and what the rotors have been told since. Ours.
+//!
+//! Roll and pitch are dead-reckoned from the last measurement,
+//!
+//! ```text
+//! d^2 x/dt^2 = (l/I) (U - U_trim)
+//! ```
+//!
+//! and held by a critically damped law on the reckoned angle, which stops the rotation that was measured last:
+//!
+//! ```text
+//! U = U_trim - (I/l) (w^2 (x - x_held) + 2 w dx/dt)
+//! ```
+//!
+//! U_trim is what the vehicle needs to stay as it is: off-centre mass, wind, weight. For roll and pitch it is observed in
+//! flight, from how the measured rate departs from the reckoned one; thrust and yaw are the mean of what the rotors were
+//! told lately. Yaw gets no more than that: it has too little authority to be worth the thrust.
+//!
+//! What the trim does not know makes the true attitude leave the reckoned one as t^2, so this serves for fractions of a
+//! second, and the descent that follows for two seconds.
+
+use airframe::{Inputs, Parameters, State};
+use nalgebra::Vector2;
+
+/// w: bandwidth of the hold \[rad/s\].
+pub const HOLD_RAD_S: f32 = 10.0;
+/// Time constant of the trim \[s\].
+pub const TRIM_S: f32 = 1.0;
+/// Most that one measured rate may depart from the reckoned one for the trim: a jump is no trim \[rad/s\].
+pub const INNOVATION_MAX_RAD_S: f32 = 0.1;
+/// Share of the trimmed thrust while descending blind: 1 m/s2 downwards.
+pub const DESCENT_THRUST: f32 = 0.9;
+
+/// What is fixed: how the nominal vehicle turns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blind {
+    /// l/Ix, l/Iy \[rad/s2 per N\].
+    authority: Vector2<f32>,
+    /// Ix/l, Iy/l
+    inverse_authority: Vector2<f32>,
+    /// m g \[N\].
+    weight_n: f32,
+    dt_s: f32,
+}
+
+/// What moves: the dead-reckoned attitude, and the trim.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reckoning {
+    /// Roll and pitch when last measured \[rad\].
+    pub held_rad: Vector2<f32>,
+    /// Roll and pitch as reckoned \[rad\].
+    pub angle_rad: Vector2<f32>,
+    /// Their rates as reckoned \[rad/s\].
+    pub rate_rad_s: Vector2<f32>,
+    /// U_trim
+    pub trim: Inputs,
+}
+
+impl Blind {
+    /// For a nominal vehicle whose parameters are valid, stepped every `dt_s` seconds.
+    pub fn new(vehicle: &Parameters, dt_s: f32) -> Self {
+        let inertia = vehicle.inertia_kg_m2.xy();
+        Blind {
+            authority: inertia.map(|i| vehicle.arm_m / i),
+            inverse_authority: inertia / vehicle.arm_m,
+            weight_n: vehicle.mass_kg * vehicle.gravity_m_s2,
+            dt_s,
+        }
+    }
+
+    /// A vehicle about to take off, trimmed for the nominal weight.
+    pub fn start(&self, state: &State) -> Reckoning {
+        let angle_rad = state.attitude_rad.xy();
+        let trim = Inputs { thrust_n: self.weight_n, ..Inputs::default() };
+        Reckoning { held_rad: angle_rad, angle_rad, rate_rad_s: state.rates_rad_s.xy(), trim }
+    }
+
+    /// One step of dead reckoning under what the rotors were told.
+    pub fn advance(&self, reckoning: &mut Reckoning, applied: &Inputs) {
+        let excess = Vector2::new(applied.roll_n - reckoning.trim.roll_n, applied.pitch_n - reckoning.trim.pitch_n);
+        reckoning.rate_rad_s += self.authority.component_mul(&excess) * self.dt_s;
+        reckoning.angle_rad += reckoning.rate_rad_s * self.dt_s;
+    }
+
+    /// Starts over from a measurement, and learns from how far it is from what was reckoned.
+    pub fn measure(&self, reckoning: &mut Reckoning, state: &State) {
+        let rate_rad_s = state.rates_rad_s.xy();
+        let innovation =
+            (rate_rad_s - reckoning.rate_rad_s).map(|rate| rate.clamp(-INNOVATION_MAX_RAD_S, INNOVATION_MAX_RAD_S));
+        let learnt = self.inverse_authority.component_mul(&innovation) / TRIM_S;
+        reckoning.trim.roll_n -= learnt.x;
+        reckoning.trim.pitch_n -= learnt.y;
+        reckoning.rate_rad_s = rate_rad_s;
+        reckoning.angle_rad = state.attitude_rad.xy();
+        reckoning.held_rad = reckoning.angle_rad;
+    }
+
+    /// Lets thrust and yaw of the trim follow what the law tells the rotors. A sample counts up to twice the weight in
+    /// thrust and a tenth of it in yaw: a transient is no trim.
+    pub fn trim(&self, reckoning: &mut Reckoning, applied: &Inputs) {
+        let share = self.dt_s / TRIM_S;
+        let yaw_max = 0.1 * self.weight_n;
+        let Inputs { yaw_n, thrust_n, .. } = &mut reckoning.trim;
+        *yaw_n += share * (applied.yaw_n.max(-yaw_max).min(yaw_max) - *yaw_n);
+        *thrust_n += share * (applied.thrust_n.max(0.0).min(2.0 * self.weight_n) - *thrust_n);
+    }
+
+    /// Inputs that keep the last attitude and the trimmed thrust.
+    pub fn ride(&self, reckoning: &Reckoning) -> Inputs {
+        self.hold(reckoning, &reckoning.held_rad, 1.0)
+    }
+
+    /// Inputs that level the vehicle and let it sink.
+    pub fn descend(&self, reckoning: &Reckoning) -> Inputs {
+        self.hold(reckoning, &Vector2::zeros(), DESCENT_THRUST)
+    }
+
+    fn hold(&self, reckoning: &Reckoning, held_rad: &Vector2<f32>, thrust: f32) -> Inputs {
+        let Reckoning { angle_rad, rate_rad_s, trim, .. } = reckoning;
+        let wanted_rad_s2 = (held_rad - angle_rad) * (HOLD_RAD_S * HOLD_RAD_S) - rate_rad_s * (2.0 * HOLD_RAD_S);
+        let moment = self.inverse_authority.component_mul(&wanted_rad_s2);
+        Inputs {
+            roll_n: trim.roll_n + moment.x,
+            pitch_n: trim.pitch_n + moment.y,
+            yaw_n: trim.yaw_n,
+            thrust_n: trim.thrust_n * thrust,
+        }
+    }
+}

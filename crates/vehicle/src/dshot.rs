@@ -1,0 +1,77 @@
+//! DSHOT600: sixteen bits to a motor controller, each a pulse whose length is its value.
+//!
+//! A bit lasts 1.67 us (600 kbit/s); its pulse is high for 1250 ns if it is one and for 625 ns if it is zero, that is
+//! for 3/4 and 3/8 of the bit. A timer that counts a bit per period and takes each pulse's length from memory plays the
+//! [`Waveform`].
+
+use airframe::{OutOfRange, Range};
+
+/// Bits in a second.
+pub const BIT_RATE_HZ: u32 = 600_000;
+/// Accepted clock of the timer \[Hz\]: pulses come out within 4 % of a bit, and a period fits the timer.
+pub const TIMER_CLOCK: Range = Range::new("timer_hz", 8e6, 500e6);
+
+/// One frame: 11 bits of throttle, one that asks for telemetry (never does), 4 of checksum; sent from the highest bit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frame(u16);
+
+impl Frame {
+    /// The frame for a throttle of 0 (stop) or 48 to 2047. What is not a throttle stops the motor: 1 to 47 are commands
+    /// to the motor controller, which are of no use in flight.
+    pub const fn new(throttle: u16) -> Self {
+        let throttle = match throttle {
+            crate::motor::THROTTLE_MIN..=crate::motor::THROTTLE_MAX => throttle,
+            _ => 0,
+        };
+        let data = throttle << 1;
+        let checksum = (data ^ (data >> 4) ^ (data >> 8)) & 0xF;
+        Frame(data << 4 | checksum)
+    }
+
+    /// The sixteen bits.
+    pub const fn bits(self) -> u16 {
+        self.0
+    }
+}
+
+/// Compare values of a frame: one pulse a bit, then a zero that leaves the line low.
+pub type Waveform = [u16; 17];
+
+/// Lengths in timer counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Timing {
+    period: u16,
+    one: u16,
+    zero: u16,
+}
+
+impl Timing {
+    /// The lengths for a timer that counts at `timer_hz`.
+    ///
+    /// # Errors
+    /// If the clock is outside [`TIMER_CLOCK`].
+    pub fn new(timer_hz: u32) -> Result<Self, OutOfRange> {
+        TIMER_CLOCK.check(timer_hz)?;
+        let counts = |numerator: u32, denominator: u32| {
+            let rate_hz = BIT_RATE_HZ * denominator;
+            ((timer_hz * numerator + rate_hz / 2) / rate_hz) as u16
+        };
+        Ok(Timing { period: counts(1, 1), one: counts(3, 4), zero: counts(3, 8) })
+    }
+
+    /// Counts in a bit: the timer reloads at this, less one.
+    pub const fn period(&self) -> u16 {
+        self.period
+    }
+
+    /// What the timer plays for `frame`.
+    pub fn waveform(&self, frame: Frame) -> Waveform {
+        let mut bits = frame.bits();
+        let mut waveform = [0; 17];
+        for pulse in waveform.iter_mut().take(16) {
+            *pulse = if bits & 0x8000 != 0 { self.one } else { self.zero };
+            bits <<= 1;
+        }
+        waveform
+    }
+}

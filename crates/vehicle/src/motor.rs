@@ -1,0 +1,76 @@
+//! From rotor speed to throttle.
+
+use airframe::{OutOfRange, Range, RotorSpeeds};
+
+/// Smallest throttle that turns a motor; 1 to 47 are commands, 0 stops it.
+pub const THROTTLE_MIN: u16 = 48;
+/// Full throttle.
+pub const THROTTLE_MAX: u16 = 2047;
+
+/// Accepted [`Curve::speed_max_rad_s`].
+pub const SPEED_MAX: Range = Range::new("speed_max_rad_s", 1.0, 32_768.0);
+/// Accepted [`Curve::linearity`].
+pub const LINEARITY: Range = Range::new("linearity", 0.0, 1.0);
+/// Accepted [`Curve::idle`].
+pub const IDLE: Range = Range::new("idle", 0.0, 0.3);
+
+/// The thrust curve of a motor with its controller and propeller: at throttle u in 0..1, the share of the largest
+/// thrust is
+///
+/// ```text
+/// F / F_max = (omega / omega_max)^2 = k u^2 + (1 - k) u
+/// ```
+///
+/// as in PX4's `THR_MDL_FAC`, k: 1 means that the speed follows the throttle, 0 that the thrust does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Curve {
+    /// omega_max: speed at full throttle \[rad/s\].
+    pub speed_max_rad_s: f32,
+    /// k
+    pub linearity: f32,
+    /// Throttle, in 0..1, below which an armed motor never goes, so that it keeps turning.
+    pub idle: f32,
+}
+
+/// A motor whose curve is valid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motor {
+    curve: Curve,
+    inverse_speed_max: f32,
+}
+
+impl Motor {
+    /// A motor with this curve.
+    ///
+    /// # Errors
+    /// The first value out of range.
+    pub fn new(curve: Curve) -> Result<Self, OutOfRange> {
+        SPEED_MAX.check(curve.speed_max_rad_s)?;
+        LINEARITY.check(curve.linearity)?;
+        IDLE.check(curve.idle)?;
+        Ok(Motor { curve, inverse_speed_max: 1.0 / curve.speed_max_rad_s })
+    }
+
+    /// Throttle of all four motors: 0 if disarmed, 48 to 2047 if armed.
+    pub fn throttles(&self, armed: bool, speeds: &RotorSpeeds) -> [u16; 4] {
+        let speeds: [f32; 4] = speeds.0.into();
+        speeds.map(|speed| if armed { self.throttle(speed) } else { 0 })
+    }
+
+    /// Throttle \[48 to 2047\] of an armed motor for `speed_rad_s`; never falls as the speed rises. Idle for what is not
+    /// a positive number, full throttle above the largest speed.
+    pub fn throttle(&self, speed_rad_s: f32) -> u16 {
+        let ratio = (speed_rad_s * self.inverse_speed_max).clamp(0.0, 1.0);
+        let u = self.inverse_curve(ratio * ratio).max(self.curve.idle).min(1.0);
+        let span = f32::from(THROTTLE_MAX - THROTTLE_MIN);
+        THROTTLE_MIN + (u * span + 0.5) as u16
+    }
+
+    /// u in 0..1 with k u^2 + (1 - k) u = `share`: the quadratic's root in the form that holds for k = 0 too. 0 for NaN.
+    fn inverse_curve(&self, share: f32) -> f32 {
+        let k = self.curve.linearity;
+        let linear = 1.0 - k;
+        let denominator = linear + libm::sqrtf(linear * linear + 4.0 * k * share);
+        if denominator > 0.0 { 2.0 * share / denominator } else { 0.0 }
+    }
+}

@@ -1,0 +1,282 @@
+//! What the vehicle does when the link drops, delays, corrupts or reorders: real frames through the real decoder into the
+//! real tick, one fault a case. The vehicle stands still at its setpoint; closed loops are flown elsewhere.
+#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
+
+use afbc::{Adaptive, Profile};
+use airframe::{Parameters, RotorSpeeds, Setpoint, State};
+use link::{Address, Command, Counters, Decoder, FRAME_MAX, Sender, Uplink};
+use vehicle::{ArmingLimits, Inbox, Memory, Mode, Refusal, Request, SourceClock, Stamped, Vehicle};
+
+const STATION: Address = Address { system: 255, component: 190 };
+const VEHICLE: Address = Address { system: 1, component: 1 };
+
+/// When the vehicle is armed, when the fault begins, and when the case ends \[ms since power-up\].
+const ARM_MS: u64 = 1_050;
+const FAULT_MS: u64 = 1_200;
+const END_MS: u64 = FAULT_MS + 3_000;
+
+/// A frame under way.
+#[derive(Clone)]
+struct Frame {
+    /// When it arrives, from the beginning of the fault on \[ms\].
+    at_ms: i64,
+    kind: Kind,
+    bytes: Vec<u8>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Kind {
+    State,
+    Setpoint,
+    Command,
+}
+
+/// An undisturbed flight: a state a millisecond, a setpoint every 100, one command.
+fn flight() -> Vec<Frame> {
+    let mut sender = Sender::new(STATION);
+    let mut frames = Vec::new();
+    for ms in 0..END_MS {
+        let mut push = |kind, message| {
+            let bytes = sender.send(&message, &mut [0; FRAME_MAX]).to_vec();
+            frames.push(Frame { at_ms: ms as i64 - FAULT_MS as i64, kind, bytes });
+        };
+        if ms % 100 == 0 {
+            push(Kind::Setpoint, Uplink::Setpoint(Setpoint::default()));
+        }
+        // On a clock that is 7 s ahead.
+        push(Kind::State, Uplink::State { sent_us: 7_000_000 + ms * 1000, state: State::default() });
+        if ms == ARM_MS {
+            push(Kind::Command, Uplink::Command(Command::Arm));
+        }
+    }
+    frames
+}
+
+/// One frame of a message, sent by the same station, numbered apart.
+fn frame(at_ms: i64, message: Uplink) -> Frame {
+    let bytes = Sender::new(Address { component: 1, ..STATION }).send(&message, &mut [0; FRAME_MAX]).to_vec();
+    Frame { at_ms, kind: Kind::Command, bytes }
+}
+
+/// What a case shows, from the beginning of the fault on.
+#[derive(Debug, Default)]
+struct Seen {
+    /// When each mode begins \[ms\].
+    modes: Vec<(i64, Mode)>,
+    counters: Counters,
+    answers: Vec<Result<Request, Refusal>>,
+    setpoint_stale: bool,
+}
+
+/// Plays the frames, each at its time, those of one millisecond in their order here.
+fn play(mut frames: Vec<Frame>) -> Seen {
+    frames.sort_by_key(|frame| frame.at_ms);
+    let law = Adaptive::new(Profile::Paper.gains()).expect("valid");
+    let vehicle = Vehicle::new(Parameters::PAPER.to_f32(), Profile::Paper.settings(), ArmingLimits::default(), law)
+        .expect("valid");
+    let (mut memory, mut inbox, mut clock) = (Memory::default(), Inbox::default(), SourceClock::default());
+    let mut decoder = Decoder::<Uplink>::new(VEHICLE);
+    let mut seen = Seen::default();
+    let mut frames = frames.iter().peekable();
+    let mut before = Counters::default();
+
+    for ms in 0..END_MS {
+        let (now_us, since_ms) = (ms * 1000, ms as i64 - FAULT_MS as i64);
+        while let Some(frame) = frames.next_if(|frame| frame.at_ms <= since_ms) {
+            decoder.feed(&frame.bytes, |_, message| match message {
+                Uplink::State { sent_us, state } => {
+                    if let Some(at_us) = clock.stamp(sent_us, now_us) {
+                        inbox.state = Some(Stamped { value: state, at_us });
+                    }
+                }
+                Uplink::Setpoint(value) => inbox.setpoint = Some(Stamped { value, at_us: now_us }),
+                Uplink::Command(Command::Arm) => inbox.ask(Request::Arm),
+                Uplink::Command(Command::Disarm) => inbox.ask(Request::Disarm),
+                Uplink::Command(Command::Other(_)) | Uplink::Heartbeat => {}
+            });
+        }
+        let outcome = vehicle.tick(&mut memory, now_us, &inbox.take());
+
+        // The gate, in every tick of every case.
+        let still = outcome.motors == RotorSpeeds::default();
+        assert!(outcome.mode.armed() || still, "motors turn while disarmed");
+        assert!(outcome.motors.0.iter().all(|speed| speed.is_finite() && *speed >= 0.0));
+
+        if since_ms < 0 {
+            before = *decoder.counters();
+            continue;
+        }
+        seen.answers.extend(outcome.answer);
+        seen.setpoint_stale |= outcome.health.setpoint_stale;
+        if seen.modes.last().is_none_or(|(_, mode)| *mode != outcome.mode) {
+            seen.modes.push((since_ms, outcome.mode));
+        }
+    }
+    assert_eq!(before, Counters { received: before.received, ..Counters::default() }, "no fault before the fault");
+    seen.counters = *decoder.counters();
+    seen
+}
+
+// --- Faults. Each changes the frames of an undisturbed flight. ---
+
+/// States sent in these milliseconds, and in these only, go through `change`; `None` drops them.
+fn states(frames: &mut Vec<Frame>, when: std::ops::Range<i64>, change: impl Fn(&mut Frame) -> Option<()>) {
+    frames.retain_mut(|frame| frame.kind != Kind::State || !when.contains(&frame.at_ms) || change(frame).is_some());
+}
+
+fn drop_states(frames: &mut Vec<Frame>, when: std::ops::Range<i64>) {
+    states(frames, when, |_| None);
+}
+
+fn delay_states(frames: &mut Vec<Frame>, when: std::ops::Range<i64>, by: impl Fn(i64) -> i64) {
+    states(frames, when, |frame| {
+        frame.at_ms += by(frame.at_ms);
+        Some(())
+    });
+}
+
+/// Changes the payload and makes the checksum right again.
+fn rewrite(frame: &mut Frame, change: impl Fn(&mut [u8])) {
+    let end = frame.bytes.len() - 2;
+    change(&mut frame.bytes[10..end]);
+    let crc = mavlink_crc(&frame.bytes[1..end], 91);
+    frame.bytes[end..].copy_from_slice(&crc.to_le_bytes());
+}
+
+/// CRC-16/MCRF4XX, bit by bit.
+fn mavlink_crc(bytes: &[u8], extra: u8) -> u16 {
+    bytes.iter().chain([&extra]).fold(0xFFFF, |crc, byte| {
+        (0..8).fold(crc ^ u16::from(*byte), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0x8408 } else { crc >> 1 })
+    })
+}
+
+const FOREVER: std::ops::Range<i64> = 0..i64::MAX;
+
+use Mode::{Descending as D, Disarmed as X, Flying as F, Riding as R};
+
+/// A fault, the modes that follow with the millisecond in which each begins, and what else must be seen.
+type Case = (&'static str, fn(&mut Vec<Frame>), &'static [(i64, Mode)], fn(&Seen) -> bool);
+
+#[rustfmt::skip]
+const CASES: &[Case] = &[
+    ("no fault", |_| {}, &[(0, F)], |s| s.counters.lost == 0 && s.answers.is_empty()),
+
+    // Dropping.
+    ("20 ms without a state are nothing", |f| drop_states(f, 0..20), &[(0, F)], |s| s.counters.lost == 20),
+    ("21 ms are ridden out", |f| drop_states(f, 0..21), &[(0, F), (20, R), (21, F)], |s| s.counters.lost == 21),
+    ("100 ms are ridden out", |f| drop_states(f, 0..100), &[(0, F), (20, R), (100, F)], |_| true),
+    ("250 ms are ridden out", |f| drop_states(f, 0..250), &[(0, F), (20, R), (250, F)], |_| true),
+    ("251 ms end in a descent, on the ground a second later", |f| drop_states(f, 0..251),
+        &[(0, F), (20, R), (250, D), (1252, X)], |_| true),
+    ("a state that never returns ends the flight", |f| drop_states(f, FOREVER),
+        &[(0, F), (20, R), (250, D), (2250, X)], |_| true),
+    ("a state that returns late still lands the vehicle", |f| drop_states(f, 0..1500),
+        &[(0, F), (20, R), (250, D), (2501, X)], |_| true),
+    ("every second state missing is nothing",
+        |f| states(f, FOREVER, |frame| (frame.at_ms % 2 == 0).then_some(())), &[(0, F)], |s| s.counters.lost > 1000),
+    ("one state in 20 ms is enough",
+        |f| states(f, FOREVER, |frame| (frame.at_ms % 20 == 0).then_some(())), &[(0, F)], |_| true),
+    ("outages of 40 ms are each ridden out",
+        |f| { drop_states(f, 0..40); drop_states(f, 60..100); },
+        &[(0, F), (20, R), (40, F), (80, R), (100, F)], |_| true),
+    ("no setpoint: the position is held", |f| f.retain(|frame| frame.kind != Kind::Setpoint || frame.at_ms < 0),
+        &[(0, F)], |s| s.setpoint_stale),
+    ("the whole link is dead", |f| f.retain(|frame| frame.at_ms < 0),
+        &[(0, F), (20, R), (250, D), (2250, X)], |s| s.setpoint_stale),
+
+    // Delaying.
+    ("15 ms late are nothing", |f| delay_states(f, FOREVER, |_| 15), &[(0, F)], |_| true),
+    ("30 ms late are as good as none", |f| delay_states(f, FOREVER, |_| 30),
+        &[(0, F), (20, R), (250, D), (2250, X)], |_| true),
+    ("a queue that builds up and empties", |f| delay_states(f, 0..100, |at| at.min(100 - at)),
+        &[(0, F), (41, R), (100, F)], |_| true),
+    ("a burst after a pause of 100 ms", |f| delay_states(f, 0..100, |at| 100 - at),
+        &[(0, F), (20, R), (100, F)], |s| s.counters.lost == 0),
+    ("jitter of 15 ms, some overtaken", |f| delay_states(f, FOREVER, |at| at * 7 % 16), &[(0, F)], |_| true),
+    ("one state 500 ms late is not taken for new", |f| {
+        delay_states(f, 100..101, |_| 500);
+        drop_states(f, 590..700);
+    }, &[(0, F), (610, R), (700, F)], |_| true),
+    ("setpoints 400 ms late are still setpoints",
+        |f| for frame in f.iter_mut().filter(|f| f.kind == Kind::Setpoint && f.at_ms >= 0) { frame.at_ms += 400; },
+        &[(0, F)], |s| !s.setpoint_stale),
+
+    // Corrupting.
+    ("one state with a flipped bit", |f| states(f, 5..6, |frame| { frame.bytes[50] ^= 4; Some(()) }),
+        &[(0, F)], |s| s.counters.bad_checksum == 1 && s.counters.lost == 1),
+    ("100 ms of flipped bits", |f| states(f, 0..100, |frame| { frame.bytes[100] ^= 0x80; Some(()) }),
+        &[(0, F), (20, R), (100, F)], |s| s.counters.bad_checksum == 100),
+    ("flipped bits for ever", |f| states(f, FOREVER, |frame| { frame.bytes[30] ^= 1; Some(()) }),
+        &[(0, F), (20, R), (250, D), (2250, X)], |_| true),
+    ("a length that swallows the next state", |f| states(f, 5..6, |frame| { frame.bytes[1] = 233; Some(()) }),
+        &[(0, F)], |s| s.counters.bad_checksum == 1 && s.counters.lost == 1),
+    ("truncated states for 30 ms", |f| states(f, 0..30, |frame| { frame.bytes.truncate(99); Some(()) }),
+        &[(0, F), (20, R), (30, F)], |s| s.counters.lost == 30),
+    ("noise between states", |f| states(f, FOREVER, |frame| {
+        frame.bytes.splice(0..0, [0xFD, 0, 0x55, 0xFD, 0xFD]);
+        Some(())
+    }), &[(0, F)], |s| s.counters.skipped_bytes > 10_000 && s.counters.lost == 0),
+    ("NaN positions for 50 ms",
+        |f| states(f, 0..50, |frame| { rewrite(frame, |p| p[8..12].copy_from_slice(&f32::NAN.to_le_bytes())); Some(()) }),
+        &[(0, F), (20, R), (50, F)], |s| s.counters.implausible == 50),
+    ("no rotation for 300 ms", |f| states(f, 0..300, |frame| { rewrite(frame, |p| p[20..36].fill(0)); Some(()) }),
+        &[(0, F), (20, R), (250, D), (1301, X)], |s| s.counters.implausible == 300),
+    ("states of another frame for 50 ms",
+        |f| states(f, 0..50, |frame| { rewrite(frame, |p| p[228] = 4); Some(()) }),
+        &[(0, F), (20, R), (50, F)], |s| s.counters.unsupported == 50),
+    ("a disarm command with a flipped bit does nothing", |f| {
+        let mut disarm = frame(10, Uplink::Command(Command::Disarm));
+        disarm.bytes[12] ^= 1;
+        f.push(disarm);
+    }, &[(0, F)], |s| s.answers.is_empty() && s.counters.bad_checksum == 1),
+
+    // Reordering and repeating.
+    ("states swapped in pairs", |f| delay_states(f, 0..1000, |at| if at % 2 == 0 { 2 } else { 0 }), &[(0, F)], |_| true),
+    ("states in blocks of 10, back to front", |f| delay_states(f, FOREVER, |at| 9 - at % 10 + 9 - at % 10), &[(0, F)], |_| true),
+    ("every state twice", |f| { let again = f.clone(); f.extend(again.into_iter().filter(|f| f.at_ms >= 0)); },
+        &[(0, F)], |s| s.counters.lost == 0),
+    ("old states played back instead of new ones", |f| {
+        let old = f.iter().find(|frame| frame.kind == Kind::State).expect("some").bytes.clone();
+        for frame in f.iter_mut().filter(|f| f.kind == Kind::State && f.at_ms >= 0) {
+            frame.bytes.clone_from(&old);
+        }
+    }, &[(0, F), (20, R), (250, D), (2250, X)], |_| true),
+    ("arming again in flight is refused and changes nothing", |f| f.push(frame(10, Uplink::Command(Command::Arm))),
+        &[(0, F)], |s| s.answers == [Err(Refusal::AlreadyArmed)]),
+    ("disarmed and armed within a millisecond: disarmed", |f| {
+        f.push(frame(10, Uplink::Command(Command::Disarm)));
+        f.push(frame(10, Uplink::Command(Command::Arm)));
+    }, &[(0, F), (10, X)], |s| s.answers == [Ok(Request::Disarm)]),
+
+    // Commands while a fault lasts.
+    ("disarmed in flight", |f| f.push(frame(10, Uplink::Command(Command::Disarm))), &[(0, F), (10, X)], |_| true),
+    ("disarmed while riding", |f| { drop_states(f, FOREVER); f.push(frame(100, Uplink::Command(Command::Disarm))); },
+        &[(0, F), (20, R), (100, X)], |_| true),
+    ("disarmed while descending", |f| { drop_states(f, FOREVER); f.push(frame(400, Uplink::Command(Command::Disarm))); },
+        &[(0, F), (20, R), (250, D), (400, X)], |_| true),
+    ("armed again while descending: refused", |f| {
+        drop_states(f, 0..300);
+        f.push(frame(400, Uplink::Command(Command::Arm)));
+    }, &[(0, F), (20, R), (250, D), (1301, X)], |s| s.answers == [Err(Refusal::AlreadyArmed)]),
+    ("armed on the ground without a state: refused", |f| {
+        drop_states(f, FOREVER);
+        f.push(frame(10, Uplink::Command(Command::Disarm)));
+        f.push(frame(500, Uplink::Command(Command::Arm)));
+    }, &[(0, F), (10, X)], |s| s.answers == [Ok(Request::Disarm), Err(Refusal::StateStale)]),
+];
+
+#[test]
+fn every_case_ends_as_it_should() {
+    let undisturbed = flight();
+    let mut failures = Vec::new();
+    for (name, fault, modes, seen_as_expected) in CASES {
+        let mut frames = undisturbed.clone();
+        fault(&mut frames);
+        let seen = play(frames);
+        if seen.modes != *modes || !seen_as_expected(&seen) {
+            failures.push(format!("{name}: expected {modes:?}, saw {seen:?}"));
+        }
+    }
+    assert!(failures.is_empty(), "{} of {} cases:\n{}", failures.len(), CASES.len(), failures.join("\n"));
+    assert!(CASES.len() >= 20);
+}

@@ -1,0 +1,293 @@
+//! The control tick against the law's own step, and blind flight against a plant.
+#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
+
+use afbc::{Adaptive, Controller, Profile, Settings};
+use airframe::{Parameters, RotorSpeeds, Setpoint, State};
+use nalgebra::{Vector3, Vector4};
+use proptest::prelude::*;
+use vehicle::descent::{SINK_M_S, STILL_US};
+use vehicle::{ArmingLimits, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle};
+
+type Adapted = afbc::adaptive::Estimate;
+
+fn law() -> Adaptive {
+    Adaptive::new(Profile::Paper.gains()).expect("valid")
+}
+
+fn vehicle() -> Vehicle<Adaptive> {
+    let settings = Profile::Paper.settings();
+    Vehicle::new(Parameters::PAPER.to_f32(), settings, ArmingLimits::default(), law()).expect("valid")
+}
+
+/// A vehicle, its memory and the time.
+struct Bench {
+    vehicle: Vehicle<Adaptive>,
+    memory: Memory<Adapted>,
+    now_us: u64,
+    inbox: Inbox,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Bench { vehicle: vehicle(), memory: Memory::default(), now_us: 0, inbox: Inbox::default() }
+    }
+
+    /// One that has been flying at `state` towards `setpoint` for a tick.
+    fn flying(state: State, setpoint: Setpoint) -> Self {
+        let mut bench = Bench::new();
+        for _ in 0..1001 {
+            bench.tick(Some(state), Some(setpoint));
+        }
+        bench.inbox.ask(Request::Arm);
+        assert_eq!(bench.tick(Some(state), Some(setpoint)).answer, Some(Ok(Request::Arm)));
+        bench
+    }
+
+    /// A millisecond with what was measured and commanded in it.
+    fn tick(&mut self, state: Option<State>, setpoint: Option<Setpoint>) -> Outcome {
+        self.now_us += 1000;
+        self.inbox.state = state.map(|value| Stamped { value, at_us: self.now_us }).or(self.inbox.state);
+        self.inbox.setpoint = setpoint.map(|value| Stamped { value, at_us: self.now_us }).or(self.inbox.setpoint);
+        let inbox = self.inbox.take();
+        self.vehicle.tick(&mut self.memory, self.now_us, &inbox)
+    }
+}
+
+fn near() -> Setpoint {
+    Setpoint { position_m: Vector3::new(0.3, -0.2, 0.5), ..Setpoint::default() }
+}
+
+#[test]
+fn disarmed_motors_are_off_and_arming_waits_for_the_rate() {
+    let mut bench = Bench::new();
+    for _ in 0..1000 {
+        bench.inbox.ask(Request::Arm);
+        let outcome = bench.tick(Some(State::default()), Some(near()));
+        assert_eq!(outcome.answer, Some(Err(Refusal::Unhealthy)));
+        assert_eq!((outcome.mode, outcome.motors), (Mode::Disarmed, RotorSpeeds::default()));
+    }
+    bench.inbox.ask(Request::Arm);
+    let outcome = bench.tick(Some(State::default()), Some(near()));
+    assert_eq!((outcome.mode, outcome.answer), (Mode::Flying, Some(Ok(Request::Arm))));
+    assert!(outcome.motors.0.min() > 0.0);
+}
+
+/// In flight, a tick is the law's step, bit for bit.
+#[test]
+fn flying_is_the_laws_step() {
+    let mut bench = Bench::flying(State::default(), near());
+    let parameters = Parameters::PAPER.to_f32();
+    let controller = Controller::new(parameters, Profile::Paper.settings(), law()).expect("valid");
+    let mut memory = afbc::Memory::default();
+    controller.step(&mut memory, &State::default(), &near());
+    for tick in 0..500 {
+        let t = tick as f32 * 1e-3;
+        let mut state = State { position_m: Vector3::new(t, -t, 0.1 * t), ..State::default() };
+        state.attitude_rad = Vector3::new(0.1 * (9.0 * t).sin(), 0.2 * t, -t);
+        state.rates_rad_s = Vector3::new(t, -t, 0.3);
+        let command = controller.step(&mut memory, &state, &near());
+        let outcome = bench.tick(Some(state), Some(near()));
+        assert_eq!(outcome.command, command);
+        assert_eq!(outcome.motors.0.map(f32::to_bits), command.speeds.0.map(f32::to_bits));
+        assert_eq!(bench.memory.control(), Some(&memory));
+    }
+}
+
+#[test]
+fn the_estimates_of_one_flight_are_not_those_of_the_next() {
+    let mut bench = Bench::flying(State::default(), near());
+    for _ in 0..200 {
+        bench.tick(Some(State::default()), Some(near()));
+    }
+    let learnt = bench.memory.control().expect("flown").estimates;
+    assert!(learnt.z.theta.norm() > 0.0);
+    bench.inbox.ask(Request::Disarm);
+    let outcome = bench.tick(Some(State::default()), Some(near()));
+    assert_eq!((outcome.mode, outcome.motors), (Mode::Disarmed, RotorSpeeds::default()));
+    assert_eq!(bench.memory.control().expect("flown").estimates, learnt, "still there to be reported");
+    bench.inbox.ask(Request::Arm);
+    bench.tick(Some(State::default()), Some(near()));
+    assert!(bench.memory.control().expect("flown").estimates.z.theta.norm() < learnt.z.theta.norm() / 50.0);
+}
+
+/// The tick in which each mode begins, and frozen estimates as long as the vehicle is blind.
+#[test]
+fn a_lost_state_is_ridden_out_then_descended_on_then_given_up() {
+    let mut bench = Bench::flying(State::default(), near());
+    let mut frozen = None;
+    for age_ms in 1..=2300 {
+        let outcome = bench.tick(None, Some(near()));
+        let expected = match age_ms {
+            0..=20 => Mode::Flying,
+            21..=250 => Mode::Riding,
+            251..=2250 => Mode::Descending,
+            _ => Mode::Disarmed,
+        };
+        assert_eq!(outcome.mode, expected, "{age_ms} ms");
+        assert_eq!(outcome.health.state_age_us, age_ms * 1000);
+        assert_eq!(outcome.motors == RotorSpeeds::default(), expected == Mode::Disarmed);
+        let estimates = bench.memory.control().expect("flown").estimates;
+        if expected != Mode::Flying {
+            assert_eq!(*frozen.get_or_insert(estimates), estimates);
+        }
+    }
+}
+
+/// Weight of the paper's vehicle \[N\].
+const WEIGHT_N: f32 = 0.486 * 9.81;
+
+#[test]
+fn blind_thrust_is_the_weight_and_then_less() {
+    let mut bench = Bench::flying(State::default(), Setpoint::hold(&State::default()));
+    let thrusts: Vec<f32> = (1..=400).map(|_| bench.tick(None, Some(near())).command.inputs.thrust_n).collect();
+    let (riding, descending) = (thrusts.get(100).expect("400 ticks"), thrusts.get(399).expect("400 ticks"));
+    assert!((riding / WEIGHT_N - 1.0).abs() < 0.05, "{riding}");
+    assert!((descending / riding - 0.9).abs() < 1e-5, "{descending}");
+}
+
+/// Roll of a plant with the nominal inertia, whose rotors do what they are told, under a steady moment from outside.
+struct Roll {
+    angle: f32,
+    rate: f32,
+    outside_n: f32,
+}
+
+impl Roll {
+    fn state(&self) -> State {
+        State {
+            attitude_rad: Vector3::new(self.angle, 0.0, 0.0),
+            rates_rad_s: Vector3::new(self.rate, 0.0, 0.0),
+            ..State::default()
+        }
+    }
+
+    fn advance(&mut self, outcome: &Outcome) {
+        let [f1, _, f3, _] = outcome.command.forces.0.into();
+        self.rate += 0.25 / 0.0038 * (f3 - f1 + self.outside_n) * 1e-3;
+        self.angle += self.rate * 1e-3;
+    }
+}
+
+/// The state is lost while the vehicle rolls at 1 rad/s. Left alone it would be at 0.35 rad after the ride and at 2.3 rad
+/// when the motors stop, and with the moment from outside, unknown, upside down long before.
+#[test]
+fn riding_stops_the_rotation_and_descending_levels() {
+    for outside_n in [0.0, 0.02, -0.02] {
+        let mut roll = Roll { angle: 0.0, rate: 0.0, outside_n };
+        let mut bench = Bench::flying(roll.state(), Setpoint::hold(&State::default()));
+        for _ in 0..5000 {
+            let outcome = bench.tick(Some(roll.state()), Some(Setpoint::hold(&State::default())));
+            roll.advance(&outcome);
+        }
+        (roll.angle, roll.rate) = (0.1, 1.0);
+        let mut held = None;
+        for age_ms in 0..=2250 {
+            let measured = (age_ms == 0).then(|| roll.state());
+            let outcome = bench.tick(measured, Some(near()));
+            roll.advance(&outcome);
+            match age_ms {
+                250 => {
+                    assert!(roll.rate.abs() < 0.3, "{} rad/s after the ride", roll.rate);
+                    assert!((roll.angle - 0.1).abs() < 0.1, "{} rad after the ride", roll.angle);
+                    held = Some(outcome.mode);
+                }
+                1000 => assert!(roll.angle.abs() < 0.1, "{} rad while descending", roll.angle),
+                2250 => assert!(roll.angle.abs() < 0.3, "{} rad when giving up", roll.angle),
+                _ => {}
+            }
+        }
+        assert_eq!(held, Some(Mode::Riding));
+    }
+}
+
+#[test]
+fn without_a_setpoint_the_vehicle_stays_where_it_is() {
+    let mut bench = Bench::flying(State::default(), near());
+    for age_ms in 1..=500 {
+        assert!(!bench.tick(Some(State::default()), None).health.setpoint_stale, "{age_ms} ms");
+    }
+    let here = State { position_m: Vector3::new(5.0, 6.0, 7.0), ..State::default() };
+    let outcome = bench.tick(Some(here), None);
+    assert!(outcome.health.setpoint_stale);
+    assert_eq!((outcome.mode, outcome.command.errors.x.e1), (Mode::Flying, 0.0));
+    // The place is that of the moment, not the vehicle's.
+    let moved = State { position_m: Vector3::new(5.5, 6.0, 7.0), ..State::default() };
+    assert_eq!(bench.tick(Some(moved), None).command.errors.x.e1, -0.5);
+    // A setpoint that comes back is followed.
+    assert_eq!(bench.tick(Some(moved), Some(near())).command.errors.x.e1, 0.3 - 5.5);
+}
+
+#[test]
+fn a_state_that_comes_back_leads_the_descent_to_the_ground() {
+    let mut bench = Bench::flying(State::default(), near());
+    for _ in 0..300 {
+        bench.tick(None, Some(near()));
+    }
+    let mut state = State { position_m: Vector3::new(1.0, 2.0, 3.0), ..State::default() };
+    state.velocity_m_s.z = -SINK_M_S;
+    for tick in 1..=2000 {
+        let outcome = bench.tick(Some(state), Some(near()));
+        assert_eq!(outcome.mode, Mode::Descending);
+        let sunk = outcome.command.errors.z.e1 + state.position_m.z - 3.0;
+        assert!((sunk + SINK_M_S * tick as f32 * 1e-3).abs() < 1e-3);
+        assert!(outcome.command.errors.x.e1.abs() < 1e-6);
+        state.position_m.z -= SINK_M_S * 1e-3;
+    }
+    state.velocity_m_s.z = 0.0;
+    for _ in 0..STILL_US / 1000 {
+        assert_eq!(bench.tick(Some(state), Some(near())).mode, Mode::Descending);
+    }
+    let outcome = bench.tick(Some(state), Some(near()));
+    assert_eq!((outcome.mode, outcome.motors), (Mode::Disarmed, RotorSpeeds::default()));
+}
+
+#[test]
+fn states_that_are_stale_when_they_come_are_no_states() {
+    let mut bench = Bench::flying(State::default(), near());
+    let mut modes = Vec::new();
+    for _ in 0..400 {
+        let at_us = bench.now_us + 1000 - 30_000;
+        bench.inbox.state = Some(Stamped { value: State::default(), at_us });
+        modes.push(bench.tick(None, Some(near())).mode);
+    }
+    modes.dedup();
+    assert_eq!(modes, [Mode::Flying, Mode::Riding, Mode::Descending]);
+}
+
+#[test]
+fn only_a_law_at_the_ticks_rate_flies() {
+    let settings = Settings { dt_s: 0.002, ..Profile::Paper.settings() };
+    let refused = Vehicle::new(Parameters::PAPER.to_f32(), settings, ArmingLimits::default(), law());
+    assert_eq!(refused.expect_err("2 ms").range.name, "dt_s");
+}
+
+proptest! {
+    /// Whatever arrives whenever: motors get speeds, none when disarmed, and nothing panics.
+    #[test]
+    fn any_inputs(script in prop::collection::vec(
+        (any::<u32>(), prop::option::of((any::<[f32; 12]>(), any::<u64>())), any::<u8>()), 1..100)
+    ) {
+        let mut bench = Bench::flying(State::default(), near());
+        for (later, state, request) in script {
+            bench.now_us += u64::from(later % 100_000);
+            if let Some(([x, y, z, u, v, w, a, b, c, p, q, r], at_us)) = state {
+                let value = State {
+                    position_m: Vector3::new(x, y, z),
+                    velocity_m_s: Vector3::new(u, v, w),
+                    attitude_rad: Vector3::new(a, b, c),
+                    rates_rad_s: Vector3::new(p, q, r),
+                };
+                let at_us = if at_us % 2 == 0 { bench.now_us } else { at_us };
+                bench.inbox.state = Some(Stamped { value, at_us });
+            }
+            bench.inbox.request = match request {
+                0..16 => Some(Request::Arm),
+                16..20 => Some(Request::Disarm),
+                _ => None,
+            };
+            let outcome = bench.tick(None, Some(near()));
+            prop_assert!(outcome.motors.0.iter().all(|speed| speed.is_finite() && *speed >= 0.0));
+            prop_assert!(outcome.mode.armed() || outcome.motors.0 == Vector4::zeros());
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! The image that flies.
+#![no_std]
+#![no_main]
+
+#[cfg(feature = "pil")]
+compile_error!("the flight image has no feature pil: build it by cargo fw");
+
+use core::panic::PanicInfo;
+use defmt_rtt as _;
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    firmware::run(cortex_m::Peripherals::take().expect("taken once"))
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo) -> ! {
+    firmware::board::stop_motors();
+    defmt::error!("{}", defmt::Display2Format(info));
+    wait_for_watchdog()
+}
+
+#[expect(unsafe_code, reason = "nothing may be pushed before the stack pointer is set")]
+mod hard_fault {
+    /// Entered on any fault, perhaps with a stack that has left the RAM: takes a fresh one first.
+    #[unsafe(naked)]
+    #[unsafe(no_mangle)]
+    extern "C" fn HardFault() -> ! {
+        core::arch::naked_asm!("ldr r0, =_stack_start", "mov sp, r0", "b {fault}", fault = sym super::fault)
+    }
+}
+
+extern "C" fn fault() -> ! {
+    firmware::board::stop_motors();
+    defmt::error!("hard fault");
+    wait_for_watchdog()
+}
+
+/// The watchdog resets the chip, which starts disarmed.
+fn wait_for_watchdog() -> ! {
+    cortex_m::interrupt::disable();
+    loop {
+        cortex_m::asm::nop();
+    }
+}

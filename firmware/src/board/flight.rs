@@ -1,0 +1,193 @@
+//! The real board: clocks, link, motors, watchdog. Pins and wiring are in `docs/firmware.md`.
+
+use crate::control::Tick;
+use crate::executors::priority;
+use embassy_executor::SendSpawner;
+use embassy_stm32::gpio::OutputType;
+use embassy_stm32::interrupt::{self, InterruptExt};
+use embassy_stm32::peripherals::{DMA2_CH1, IWDG, TIM8, USART1};
+use embassy_stm32::rcc::{
+    AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllQDiv, PllSource, Sysclk,
+};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::timer::Channel;
+use embassy_stm32::timer::low_level::CountingMode;
+use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
+use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, BufferedUartTx};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{Config, Peri, bind_interrupts, dma, pac};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use embassy_time::{Duration, with_timeout};
+use embedded_io_async::{Read, Write};
+use static_cell::StaticCell;
+use vehicle::dshot::{BIT_RATE_HZ, Frame, Timing};
+
+/// Bits per second of the link.
+const BAUD: u32 = 921_600;
+/// The watchdog resets the chip if it is not fed for this long \[us\]. A processor that stands still stops the motors
+/// sooner: motor controllers do so after some 20 ms without a frame.
+const WATCHDOG_US: u32 = 20_000;
+/// Timers of the second peripheral bus run at the core's clock \[Hz\].
+const MOTOR_TIMER_HZ: u32 = crate::time::CORE_HZ;
+
+bind_interrupts!(struct Irqs {
+    USART1 => usart::BufferedInterruptHandler<USART1>;
+    DMA2_STREAM1 => dma::InterruptHandler<DMA2_CH1>;
+});
+
+/// What the board offers, set up and still.
+pub struct Board {
+    /// Motors and watchdog.
+    pub outputs: Outputs,
+    /// The link, in.
+    pub receiver: Receiver,
+    /// The link, out.
+    pub transmitter: Transmitter,
+}
+
+/// Brings up clocks and peripherals. The motors' task runs with the control tick, right after it.
+pub fn start(control: SendSpawner) -> Board {
+    let p = embassy_stm32::init(clocks());
+
+    static RX: StaticCell<[u8; 1024]> = StaticCell::new();
+    static TX: StaticCell<[u8; 1024]> = StaticCell::new();
+    let mut config = usart::Config::default();
+    config.baudrate = BAUD;
+    // Every byte wakes the reader: a message must not wait for half a buffer of others.
+    config.eager_reads = Some(1);
+    let uart = BufferedUart::new(p.USART1, p.PA10, p.PA9, TX.init([0; 1024]), RX.init([0; 1024]), Irqs, config);
+    let (transmitter, receiver) = uart.expect("the baud rate divides the clock").split();
+    interrupt::USART1.set_priority(priority::UART);
+
+    let pin = OutputType::PushPull;
+    let pwm = SimplePwm::new(
+        p.TIM8,
+        Some(PwmPin::new(p.PC6, pin)),
+        Some(PwmPin::new(p.PC7, pin)),
+        Some(PwmPin::new(p.PC8, pin)),
+        Some(PwmPin::new(p.PC9, pin)),
+        Hertz(BIT_RATE_HZ),
+        CountingMode::EdgeAlignedUp,
+    );
+    let motors = Motors {
+        pwm,
+        dma: p.DMA2_CH1,
+        timing: Timing::new(MOTOR_TIMER_HZ).expect("the timer's clock is within its range"),
+        rows: Rows([[0; 4]; 17]),
+    };
+    interrupt::DMA2_STREAM1.set_priority(priority::MOTOR_DMA);
+    control.spawn(self::motors(motors).expect("spawned once"));
+
+    // A debugger that halts the core halts the watchdog.
+    pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
+    let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
+    watchdog.unleash();
+
+    Board { outputs: Outputs { watchdog }, receiver: Receiver(receiver), transmitter: Transmitter(transmitter) }
+}
+
+/// 8 MHz crystal to 168 MHz, the chip's rated speed; buses at 168, 42 and 84 MHz.
+fn clocks() -> Config {
+    let mut config = Config::default();
+    config.rcc.hse = Some(Hse { freq: Hertz(8_000_000), mode: HseMode::Oscillator });
+    config.rcc.pll_src = PllSource::HSE;
+    config.rcc.pll = Some(Pll {
+        prediv: PllPreDiv::DIV4,
+        mul: PllMul::MUL168,
+        divp: Some(PllPDiv::DIV2),
+        divq: Some(PllQDiv::DIV7),
+        divr: None,
+    });
+    config.rcc.sys = Sysclk::PLL1_P;
+    config.rcc.ahb_pre = AHBPrescaler::DIV1;
+    config.rcc.apb1_pre = APBPrescaler::DIV4;
+    config.rcc.apb2_pre = APBPrescaler::DIV2;
+    config
+}
+
+/// The motors' waveform: a row a bit, a column a motor. A burst of the DMA, four columns, must not cross 1 KiB.
+#[repr(align(8))]
+struct Rows([[u16; 4]; 17]);
+
+/// DSHOT600 on TIM8, channels 1 to 4, played by DMA.
+struct Motors {
+    pwm: SimplePwm<'static, TIM8>,
+    dma: Peri<'static, DMA2_CH1>,
+    timing: Timing,
+    rows: Rows,
+}
+
+impl Motors {
+    /// Sends one frame to each motor; takes 28 us.
+    async fn send(&mut self, throttles: [u16; 4]) {
+        let waveforms = throttles.map(|throttle| self.timing.waveform(Frame::new(throttle)));
+        for (bit, row) in self.rows.0.iter_mut().enumerate() {
+            *row = waveforms.map(|waveform| waveform.get(bit).copied().unwrap_or(0));
+        }
+        let rows = self.rows.0.as_flattened();
+        let dma = self.dma.reborrow();
+        let transfer = self.pwm.waveform_up_multi_channel(dma, Irqs, Channel::Ch1, Channel::Ch4, rows);
+        if with_timeout(Duration::from_millis(2), transfer).await.is_err() {
+            // The next frame sets the stream up anew.
+            defmt::warn!("the motors' DMA stands still");
+        }
+    }
+}
+
+/// Newest throttles, for the motors' task.
+static THROTTLES: Signal<CriticalSectionRawMutex, [u16; 4]> = Signal::new();
+
+#[embassy_executor::task]
+async fn motors(mut motors: Motors) {
+    loop {
+        motors.send(THROTTLES.wait().await).await;
+    }
+}
+
+/// Leaves the motors without a signal, whatever state the program is in. They stop by themselves then.
+pub fn stop_motors() {
+    use pac::gpio::vals::Moder;
+    // Their pins become plain outputs, which hold 0 since start-up.
+    pac::GPIOC.moder().modify(|mode| (6..=9).for_each(|pin| mode.set_moder(pin, Moder::OUTPUT)));
+}
+
+/// Motors and watchdog.
+pub struct Outputs {
+    watchdog: IndependentWatchdog<'static, IWDG>,
+}
+
+impl Outputs {
+    /// Gives the motors their throttle: 0, or 48 to 2047.
+    pub fn drive(&mut self, throttles: [u16; 4]) {
+        THROTTLES.signal(throttles);
+    }
+
+    /// Keeps the chip from being reset.
+    pub fn feed_watchdog(&mut self) {
+        self.watchdog.pet();
+    }
+}
+
+/// The link, in.
+pub struct Receiver(BufferedUartRx<'static>);
+
+impl Receiver {
+    /// The next bytes: waits for at least one.
+    pub async fn receive<'a>(&mut self, buffer: &'a mut [u8]) -> &'a [u8] {
+        // An overrun loses bytes, which the decoder notices.
+        let length = self.0.read(buffer).await.unwrap_or(0);
+        buffer.get(..length).unwrap_or_default()
+    }
+}
+
+/// The link, out.
+pub struct Transmitter(BufferedUartTx<'static>);
+
+impl Transmitter {
+    /// Sends what there was to say after `_tick`.
+    pub async fn transmit(&mut self, _tick: &Tick, bytes: &[u8]) {
+        // A UART cannot fail to send.
+        let _ = self.0.write_all(bytes).await;
+    }
+}

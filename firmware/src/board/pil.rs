@@ -1,0 +1,109 @@
+//! The board of the processor in the loop: the host, by semihosting. The processor stands still, time included, while
+//! the host works.
+//!
+//! Two FIFOs, little-endian. `to_firmware`: a u32 length and that many bytes, all that reaches the link before the next
+//! control tick. `from_firmware`, for each of them: the tick's time \[us\] as u64; its core cycles, the deepest stack
+//! \[bytes\] and a length as u32; four throttles as u16; and as many bytes as the length says.
+
+use crate::control::Tick;
+use crate::housekeeping;
+use core::cell::Cell;
+use embassy_executor::SendSpawner;
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::pipe::Pipe;
+use semihosting::fs::File;
+use semihosting::io::{Read, Write};
+use semihosting::process::exit;
+
+/// What reached the link, and the most that may reach it in one tick \[bytes\].
+static LINK: Pipe<CriticalSectionRawMutex, 4096> = Pipe::new();
+
+/// Throttles of the last tick.
+static THROTTLES: Mutex<CriticalSectionRawMutex, Cell<[u16; 4]>> = Mutex::new(Cell::new([0; 4]));
+
+/// What the host offers.
+pub struct Board {
+    /// Motors and watchdog.
+    pub outputs: Outputs,
+    /// The link, in.
+    pub receiver: Receiver,
+    /// The link, out.
+    pub transmitter: Transmitter,
+}
+
+/// Opens the FIFOs and waits for the first tick's bytes.
+pub fn start(_control: SendSpawner) -> Board {
+    let mut transmitter = Transmitter {
+        to_firmware: File::open(c"to_firmware").expect("the host made the FIFO"),
+        from_firmware: File::create(c"from_firmware").expect("the host made the FIFO"),
+    };
+    transmitter.take_bytes();
+    Board { outputs: Outputs, receiver: Receiver, transmitter }
+}
+
+/// Motors and watchdog.
+pub struct Outputs;
+
+impl Outputs {
+    /// Notes the throttles for the reply.
+    pub fn drive(&mut self, throttles: [u16; 4]) {
+        THROTTLES.lock(|cell| cell.set(throttles));
+    }
+
+    /// There is none.
+    pub fn feed_watchdog(&mut self) {}
+}
+
+/// The link, in.
+pub struct Receiver;
+
+impl Receiver {
+    /// The next bytes: waits for at least one.
+    pub async fn receive<'a>(&mut self, buffer: &'a mut [u8]) -> &'a [u8] {
+        let length = LINK.read(buffer).await;
+        buffer.get(..length).unwrap_or_default()
+    }
+}
+
+/// The link, out, and the hand-over to the host.
+pub struct Transmitter {
+    to_firmware: File,
+    from_firmware: File,
+}
+
+impl Transmitter {
+    /// Replies with what there was to say after `tick`, and waits for the next tick's bytes.
+    pub async fn transmit(&mut self, tick: &Tick, bytes: &[u8]) {
+        let mut head = [0; 28];
+        let words = [tick.cycles, housekeeping::stack_bytes(), bytes.len() as u32];
+        let fields = tick.report.time_us.to_le_bytes().into_iter();
+        let fields = fields.chain(words.into_iter().flat_map(u32::to_le_bytes));
+        let fields = fields.chain(THROTTLES.lock(Cell::get).into_iter().flat_map(u16::to_le_bytes));
+        head.iter_mut().zip(fields).for_each(|(to, from)| *to = from);
+        self.from_firmware.write_all(&head).expect("the host reads");
+        self.from_firmware.write_all(bytes).expect("the host reads");
+        self.take_bytes();
+    }
+
+    /// Hands the host's next bytes to the link. If the host has gone, so does the firmware.
+    fn take_bytes(&mut self) {
+        let mut length = [0; 4];
+        if self.to_firmware.read_exact(&mut length).is_err() {
+            exit(0);
+        }
+        let mut length = u32::from_le_bytes(length) as usize;
+        let mut buffer = [0; 256];
+        while length > 0 {
+            let part = buffer.get_mut(..length.min(256)).unwrap_or_default();
+            self.to_firmware.read_exact(part).expect("the host sends what it announced");
+            let mut left = &part[..];
+            while !left.is_empty() {
+                // A ring takes what fits before its end, then the rest.
+                let taken = LINK.try_write(left).expect("the link takes 4096 bytes a tick");
+                left = left.get(taken..).unwrap_or_default();
+            }
+            length -= part.len();
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! The link: bytes in, messages out, below the control tick.
+
+use crate::board::{Receiver, Transmitter};
+use crate::control::{self, TICKS};
+use core::sync::atomic::{AtomicU32, Ordering};
+use embassy_executor::SendSpawner;
+use embassy_futures::select::{Either, select};
+use heapless::Vec;
+use onboard::Comms;
+
+/// Most bytes read at once.
+const READ_MAX: usize = 128;
+/// Room for all that one tick may have to say \[bytes\].
+const WRITE_MAX: usize = 768;
+
+static BAD_FRAMES: AtomicU32 = AtomicU32::new(0);
+
+/// Frames dropped since power-up.
+pub fn bad_frames() -> u32 {
+    BAD_FRAMES.load(Ordering::Relaxed)
+}
+
+/// Starts listening.
+pub fn spawn(spawner: SendSpawner, receiver: Receiver, transmitter: Transmitter) {
+    spawner.spawn(task(Comms::new(), receiver, transmitter).expect("spawned once"));
+}
+
+#[embassy_executor::task]
+async fn task(mut comms: Comms, mut receiver: Receiver, mut transmitter: Transmitter) {
+    let mut incoming = [0; READ_MAX];
+    let mut outgoing = Vec::<u8, WRITE_MAX>::new();
+    loop {
+        match select(receiver.receive(&mut incoming), TICKS.receive()).await {
+            Either::First(bytes) => {
+                let news = comms.receive(bytes);
+                control::with_inbox(|inbox| onboard::post(inbox, &news));
+                BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
+            }
+            Either::Second(tick) => {
+                outgoing.clear();
+                // A frame that finds no room is left out: the link is not for keeping.
+                comms.report(&tick.report, tick.cycles, |frame| drop(outgoing.extend_from_slice(frame)));
+                transmitter.transmit(&tick, &outgoing).await;
+            }
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! The control tick, 1000 times a second.
+
+use crate::board::Outputs;
+use crate::time::Stopwatch;
+use core::cell::Cell;
+use core::sync::atomic::{AtomicU32, Ordering};
+use embassy_executor::SendSpawner;
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::channel::Channel;
+use embassy_time::{Duration, Instant, Ticker};
+use onboard::{Flight, Report};
+use vehicle::Inbox;
+
+/// Newest inputs, written by [`crate::comms`].
+static INBOX: Mutex<CriticalSectionRawMutex, Cell<Inbox>> =
+    Mutex::new(Cell::new(Inbox { state: None, setpoint: None, request: None }));
+
+/// What the last ticks did, for [`crate::comms`]. A tick never waits: if nobody reads for eight ticks, the next are
+/// left out.
+pub static TICKS: Channel<CriticalSectionRawMutex, Tick, 8> = Channel::new();
+
+/// Cycles of the last control tick and of the longest, for [`crate::housekeeping`].
+static CYCLES: AtomicU32 = AtomicU32::new(0);
+static CYCLES_MAX: AtomicU32 = AtomicU32::new(0);
+
+/// How long the last control tick took, and the longest so far, interrupts included \[core cycles\].
+pub fn cycles() -> [u32; 2] {
+    [&CYCLES, &CYCLES_MAX].map(|cycles| cycles.load(Ordering::Relaxed))
+}
+
+/// One control tick.
+#[derive(Clone, Copy)]
+pub struct Tick {
+    /// What it decided.
+    pub report: Report,
+    /// How long it took, interrupts included \[core cycles\].
+    pub cycles: u32,
+}
+
+/// Changes what the next tick will work from.
+pub fn with_inbox(change: impl FnOnce(&mut Inbox)) {
+    INBOX.lock(|cell| {
+        let mut inbox = cell.get();
+        change(&mut inbox);
+        cell.set(inbox);
+    });
+}
+
+/// Starts the tick, disarmed.
+pub fn spawn(spawner: SendSpawner, outputs: Outputs) {
+    let flight = Flight::new().expect("the vehicle's parameters are within their ranges");
+    spawner.spawn(task(flight, outputs).expect("spawned once"));
+}
+
+#[embassy_executor::task]
+async fn task(mut flight: Flight, mut outputs: Outputs) {
+    let mut ticker = Ticker::every(Duration::from_millis(1));
+    loop {
+        ticker.next().await;
+        let stopwatch = Stopwatch::start();
+        let report = tick(&mut flight, &mut outputs);
+        let cycles = stopwatch.cycles();
+        CYCLES.store(cycles, Ordering::Relaxed);
+        CYCLES_MAX.fetch_max(cycles, Ordering::Relaxed);
+        // Full if comms is behind: then this tick goes unreported.
+        let _ = TICKS.try_send(Tick { report, cycles });
+    }
+}
+
+/// The top loop: take the newest inputs; supervise, control and gate the motors ([`vehicle::tick`]); drive them; check
+/// the rate. Out of line, so that its stack and its instructions can be counted (`docs/budgets.md`).
+#[inline(never)]
+fn tick(flight: &mut Flight, outputs: &mut Outputs) -> Report {
+    let now_us = Instant::now().as_micros();
+    let inbox = INBOX.lock(|cell| {
+        let mut inbox = cell.get();
+        let taken = inbox.take();
+        cell.set(inbox);
+        taken
+    });
+
+    let report = flight.tick(now_us, &inbox);
+
+    outputs.drive(report.throttles);
+    if report.health.rate.may_feed_watchdog() {
+        outputs.feed_watchdog();
+    }
+    report
+}

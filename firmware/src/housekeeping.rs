@@ -1,0 +1,52 @@
+//! What nobody waits for: logging, and a watch on the stack.
+
+use crate::{comms, control};
+use core::sync::atomic::{AtomicU32, Ordering};
+use cortex_m_rt::STACK_PAINT_VALUE;
+use embassy_executor::SendSpawner;
+use embassy_time::{Duration, Ticker};
+
+static STACK_BYTES: AtomicU32 = AtomicU32::new(0);
+
+/// Most stack ever used, all interrupts included, as of the last look a second ago at most \[bytes\].
+pub fn stack_bytes() -> u32 {
+    STACK_BYTES.load(Ordering::Relaxed)
+}
+
+/// Starts the task.
+pub fn spawn(spawner: SendSpawner) {
+    spawner.spawn(task().expect("spawned once"));
+}
+
+#[embassy_executor::task]
+async fn task() {
+    let mut ticker = Ticker::every(Duration::from_secs(1));
+    loop {
+        ticker.next().await;
+        STACK_BYTES.store(deepest_stack(), Ordering::Relaxed);
+        let [last, longest] = control::cycles();
+        defmt::info!(
+            "tick {=u32} cycles, longest {=u32}; stack {=u32} bytes; {=u32} bad frames",
+            last,
+            longest,
+            stack_bytes(),
+            comms::bad_frames(),
+        );
+    }
+}
+
+/// Bytes of the stack that no longer hold the paint that start-up left there.
+#[expect(unsafe_code, reason = "the stack's bounds are linker symbols, and its unused part belongs to no object")]
+fn deepest_stack() -> u32 {
+    unsafe extern "C" {
+        static _stack_end: u32;
+        static _stack_start: u32;
+    }
+    let (mut word, top) = (&raw const _stack_end, &raw const _stack_start);
+    // SAFETY: every word from _stack_end up to _stack_start is RAM (memory.x); volatile, as interrupts push onto it.
+    while word < top && unsafe { word.read_volatile() } == STACK_PAINT_VALUE {
+        // SAFETY: still within the stack's region, or one past its end.
+        word = unsafe { word.add(1) };
+    }
+    (top as usize - word as usize) as u32
+}

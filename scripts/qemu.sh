@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# Makes sure of a qemu-system-arm that runs both images: 8.2 or newer. Debian 12 has 7.2, whose USART sends nothing by
+# interrupt; its backports have a newer one, from the mirror that apt uses anyway.
+set -euo pipefail
+
+# The version as a number: 802 for 8.2.
+version() {
+    qemu-system-arm --version 2>/dev/null | sed -nE '1s/.*version ([0-9]+)\.([0-9]+).*/\1 \2/p' |
+        { read -r major minor && echo $((major * 100 + minor)); } || echo 0
+}
+
+if [ "$(version)" -lt 802 ]; then
+    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
+    install="apt-get install -y -qq --no-install-recommends"
+    $sudo apt-get update -qq
+    $sudo $install qemu-system-arm >/dev/null
+    if [ "$(version)" -lt 802 ]; then
+        # The mirror that apt takes this release from, once more with the suite of backports; apt's settings stay as
+        # they are.
+        release=$(. /etc/os-release && echo "$VERSION_CODENAME")
+        mirror=$(apt-get indextargets --format '$(REPO_URI)' \
+            'Created-By: Packages' "Release: $release" 'Component: main' | head -1)
+        sources=$(mktemp -d)
+        trap 'rm -rf "$sources"' EXIT
+        chmod 755 "$sources"
+        cp /etc/apt/sources.list.d/*.{list,sources} "$sources" 2>/dev/null || true
+        echo "deb $mirror $release-backports main" >"$sources/backports.list"
+        $sudo apt-get -o Dir::Etc::SourceParts="$sources" update -qq
+        $sudo $install -o Dir::Etc::SourceParts="$sources" -t "$release-backports" qemu-system-arm >/dev/null
+    fi
+fi
+qemu-system-arm --version | head -1
