@@ -1,10 +1,11 @@
 //! The paper's three claims, from flights, in all four signs of the uncertainty and on both models of the vehicle.
-#![allow(clippy::unwrap_used, missing_docs)] // a scenario that cannot be flown must stop the test
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a scenario that cannot be flown must stop the test
 
 use nalgebra::{Vector3, Vector4};
 use plant::{Environment, Gust, GustKind, Model, Motion};
 use sitl::claims::VANISHED;
 use sitl::claims::claims;
+use sitl::flight::Sample;
 use sitl::metrics::{self, Metrics};
 use sitl::output::Flown;
 use sitl::paper::{Case, Reading, Uncertainty, scenario};
@@ -31,6 +32,14 @@ fn below(a: Vector4<f64>, b: Vector4<f64>) -> bool {
     a.iter().zip(b.iter()).all(|(a, b)| a < b)
 }
 
+/// Mean and largest size of the error over the last 5 s.
+fn late(run: &Run) -> (Vector4<f64>, Vector4<f64>) {
+    let late = run.log.iter().filter(|sample| sample.time_s >= 55.0);
+    let errors: Vec<_> = late.map(|sample| metrics::tracking_error(sample).abs()).collect();
+    let largest = errors.iter().fold(Vector4::zeros(), |largest: Vector4<f64>, error| largest.sup(error));
+    (errors.iter().sum::<Vector4<f64>>() / errors.len() as f64, largest)
+}
+
 /// The figures themselves, without the help of [`claims`].
 #[test]
 fn the_flights_bear_the_claims_out() {
@@ -41,17 +50,15 @@ fn the_flights_bear_the_claims_out() {
         assert_eq!((afbc.lost, baseline.lost), (None, None), "{place}");
         let (a, b): (&Metrics, &Metrics) = (&afbc.metrics, &baseline.metrics);
 
-        // "Null error is achieved in all outputs for the AFBC controller ... which is not the case for backstepping": at
-        // the end AFBC's errors are millimetres (psi still on its way from the gust of 45 s), backstepping's decimetres.
-        let (left, kept) = (a.final_error.abs(), b.final_error.abs());
-        assert!(below(left, Vector4::new(0.005, 0.005, 0.005, 0.06)), "{place}: AFBC ends with {left}");
-        assert!(below(Vector4::new(0.3, 0.3, 0.02, 0.25), kept), "{place}: backstepping ends with {kept}");
-        // And over the last 5 s, so that no zero crossing passes for zero.
-        let late = |run: &Run| {
-            let errors = run.log.iter().filter(|sample| sample.time_s >= 55.0).map(metrics::tracking_error);
-            errors.fold(Vector4::zeros(), |largest: Vector4<f64>, error| largest.sup(&error.abs()))
-        };
-        assert!(below(late(&afbc), late(&baseline) * 0.5), "{place}: {} against {}", late(&afbc), late(&baseline));
+        // "Null error is achieved in all outputs for the AFBC controller ... which is not the case for backstepping".
+        // Over the last 5 s, so that no zero crossing passes for zero and no tremble for an error, AFBC's errors are
+        // millimetres (psi still on its way from the gust of 45 s), backstepping's decimetres. A start 1e-6 m away moves
+        // AFBC's figures by up to 1.3 mm and 6 mrad, which trembling amplifies, and backstepping's not at all.
+        let (mean, largest) = late(&afbc);
+        let kept = b.final_error.abs();
+        assert!(below(mean, Vector4::new(0.01, 0.01, 0.002, 0.07)), "{place}: AFBC is left with {mean}");
+        assert!(below(Vector4::new(0.3, 0.3, 0.03, 0.3), kept), "{place}: backstepping ends with {kept}");
+        assert!(below(largest, late(&baseline).1 * 0.5), "{place}: {largest} against {}", late(&baseline).1);
 
         // "Better tracking performances".
         assert!(below(a.rmse, b.rmse), "{place}: RMSE {} against {}", a.rmse, b.rmse);
@@ -87,26 +94,39 @@ fn the_claims_as_reported_hold() {
 #[test]
 fn a_claim_falls_with_its_figures() {
     let honest = fly_both(&scenario(Model::Simplified, Case::DEFAULT).unwrap());
-    let holds = |change: &dyn Fn(&mut Metrics, &Metrics)| {
+    let holds = |change: &dyn Fn(&mut Run, &Run)| {
         let mut flown = honest.clone();
-        let baseline = honest[1].run.metrics;
-        change(&mut flown[0].run.metrics, &baseline);
+        change(&mut flown[0].run, &honest[1].run);
         claims(&flown).iter().map(|claim| claim.holds).collect::<Vec<_>>()
+    };
+    // An error along one axis all through the last 5 s, as a share of what backstepping keeps there.
+    let left = |run: &mut Run, baseline: &Run, axis: usize, share: f64| {
+        let late = |sample: &&Sample| sample.time_s >= 55.0;
+        let kept: Vec<f64> = baseline.log.iter().filter(late).map(|s| metrics::tracking_error(s)[axis].abs()).collect();
+        let error = share * kept.iter().sum::<f64>() / kept.len() as f64;
+        for sample in run.log.iter_mut().filter(|sample| late(&&**sample)) {
+            match axis {
+                3 => sample.motion.attitude_rad.z = sample.reference.yaw_rad + error,
+                _ => sample.motion.position_m[axis] = sample.reference.position_m[axis] + error,
+            }
+        }
     };
     assert_eq!(holds(&|_, _| ()), [true, true, true]);
     for axis in 0..4 {
-        assert_eq!(
-            holds(&|a, b| a.final_error[axis] = -b.final_error[axis].abs() * (VANISHED + 0.01)),
-            [false, true, true]
-        );
-        assert_eq!(holds(&|a, b| a.rmse[axis] = b.rmse[axis] * 1.01), [true, false, true]);
-        assert_eq!(holds(&|a, b| a.mean_abs_delta_u[axis] = b.mean_abs_delta_u[axis] * 0.99), [true, true, false]);
-        assert_eq!(holds(&|a, _| a.rmse[axis] = f64::NAN), [true, false, true]);
+        assert_eq!(holds(&|a, b| left(a, b, axis, VANISHED + 0.01)), [false, true, true]);
+        assert_eq!(holds(&|a, b| left(a, b, axis, -VANISHED - 0.01)), [false, true, true]);
+        assert_eq!(holds(&|a, b| left(a, b, axis, VANISHED - 0.01)), [true, true, true]);
+        assert_eq!(holds(&|a, b| a.metrics.rmse[axis] = b.metrics.rmse[axis] * 1.01), [true, false, true]);
+        assert_eq!(holds(&|a, _| a.metrics.rmse[axis] = f64::NAN), [true, false, true]);
+        let smoother = |a: &mut Run, b: &Run| {
+            a.metrics.mean_abs_delta_u[axis] = b.metrics.mean_abs_delta_u[axis] * 0.99;
+        };
+        assert_eq!(holds(&smoother), [true, true, false]);
     }
     // Without both laws of one scenario there is nothing to say.
     assert_eq!(claims(&honest[..1]).len(), 0);
     let mut other = honest.clone();
-    other[1].scenario.duration_s = 59.0;
+    other[1].scenario.name = "another".into();
     assert_eq!(claims(&other).len(), 0);
     assert_eq!(claims(&[]).len(), 0);
 }

@@ -6,8 +6,8 @@ use flight_tests::{ROWS, Row, golden};
 use nalgebra::Vector3;
 use plant::{Load, Motion, rigid_body, simplified};
 
-/// Relative to the expected number itself, with no allowance for cancellation: no row of the data cancels so far that
-/// rounding (1e-16 of the largest term, itself below 1e6 times the smallest result) would show.
+/// Relative to the expected number itself, with no allowance for cancellation: no result in the data is small enough
+/// beside its own terms to need one (all of them in fact hold to 1e-12).
 fn assert_close(row: &Row<'_>, column: &str, got: f64) {
     let expected = row.get(column);
     assert!(

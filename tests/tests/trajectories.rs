@@ -1,5 +1,5 @@
 //! Reference trajectories: analytic derivatives against differences, continuity, and what each is described to do.
-#![allow(missing_docs)]
+#![allow(clippy::indexing_slicing, missing_docs)] // what is missing must stop the test
 
 use nalgebra::Vector3;
 use proptest::prelude::*;

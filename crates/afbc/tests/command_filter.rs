@@ -3,6 +3,7 @@
 
 use afbc::cascade::DT;
 use afbc::command_filter::{BANDWIDTH, CommandFilter, Filtered};
+use core::f32::consts::FRAC_PI_2;
 use proptest::prelude::*;
 
 /// Rounding error of one `f32` operation, relative.
@@ -110,12 +111,12 @@ proptest! {
     /// response w^2 t exp(-w t) is positive with area 1, and that of its rate has the absolute area 2 w / e.
     #[test]
     fn bounded_commands_keep_it_bounded(
-        (w, dt) in bandwidth_and_step(), commands in prop::collection::vec(-1.5708_f32..1.5708, 1..300), relay in any::<bool>(),
+        (w, dt) in bandwidth_and_step(), commands in prop::collection::vec(-FRAC_PI_2..FRAC_PI_2, 1..300), relay in any::<bool>(),
     ) {
         let filter = CommandFilter::new(w, dt).unwrap();
         let mut state = Filtered::default();
         for command in commands {
-            let command = if relay { 1.5708_f32.copysign(command) } else { command };
+            let command = if relay { FRAC_PI_2.copysign(command) } else { command };
             state = filter.advance(&state, command);
             prop_assert!(state.angle.abs() <= 1.5709, "{state:?}");
             prop_assert!(f64::from(state.rate).abs() <= 2.0 * f64::from(w) / core::f64::consts::E * 1.5709, "{state:?}");

@@ -1,6 +1,6 @@
 //! What acts on the vehicle from outside, and how its parameters change, in time.
 
-use airframe::{Axis, OutOfRange, Parameters, PerAxis};
+use airframe::{Axis, OutOfRange, Parameters, PerAxis, Range};
 use alloc::vec::Vec;
 use nalgebra::Vector3;
 
@@ -63,6 +63,11 @@ pub struct Environment {
     gusts: Vec<Gust>,
 }
 
+/// Accepted size of a gust, in its own unit.
+pub const GUST_SIZE: Range = Range::new("gust", -1e4, 1e4);
+/// Accepted start of a gust or a change \[s\].
+pub const START: Range = Range::new("start_s", 0.0, 1e6);
+
 /// Slack in the comparison of times, far below any step \[s\]: onset and step count may round differently.
 const TIME_SLACK_S: f64 = 1e-9;
 
@@ -94,10 +99,15 @@ impl Environment {
     /// An environment with gusts, which add up, and parameter changes, which multiply.
     ///
     /// # Errors
-    /// The first parameter out of range, as it stands or at any time under the changes.
+    /// The first parameter out of range, as it stands or at any time under the changes, or the first gust out of
+    /// [`GUST_SIZE`] or [`START`].
     pub fn new(nominal: Parameters<f64>, changes: Vec<ParameterChange>, gusts: Vec<Gust>) -> Result<Self, OutOfRange> {
         let environment = Environment { nominal, changes, gusts };
         nominal.validate()?;
+        for gust in &environment.gusts {
+            GUST_SIZE.check(gust.size)?;
+            START.check(gust.start_s)?;
+        }
         for change in &environment.changes {
             environment.segment(change.start_s).parameters.validate()?;
             environment.segment(change.end_s).parameters.validate()?;

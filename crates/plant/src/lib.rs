@@ -30,6 +30,6 @@ pub mod rigid_body;
 pub mod simplified;
 mod vehicle;
 
-pub use environment::{Environment, Gust, GustKind, ParameterChange, Quantity};
+pub use environment::{Environment, GUST_SIZE, Gust, GustKind, ParameterChange, Quantity, START};
 pub use motion::Motion;
 pub use vehicle::{Load, Model, Plant};

@@ -1,5 +1,5 @@
 //! What physics conserves, the models must conserve; what is known in closed form, they must reproduce.
-#![allow(clippy::unwrap_used, missing_docs)] // a plant that cannot be built must stop the test
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a plant that cannot be built must stop the test
 
 use airframe::{Parameters, RotorSpeeds};
 use nalgebra::{Matrix3, SVector, Vector3, Vector4};
