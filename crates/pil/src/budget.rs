@@ -10,6 +10,9 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+/// Where the flash lies.
+const FLASH: std::ops::Range<u64> = 0x0800_0000..0x0810_0000;
+
 /// A linked image.
 #[derive(Debug)]
 pub struct Linked {
@@ -56,13 +59,14 @@ impl Linked {
 
         let (mut flash_bytes, mut ram_bytes) = (0, 0);
         for section in file.sections() {
+            let is_flash = FLASH.contains(&section.address());
             match section.kind() {
-                SectionKind::Text | SectionKind::ReadOnlyData => flash_bytes += section.size(),
                 SectionKind::Data => {
                     flash_bytes += section.size();
                     ram_bytes += section.size();
                 }
                 SectionKind::UninitializedData => ram_bytes += section.size(),
+                _ if is_flash => flash_bytes += section.size(),
                 _ => (),
             }
         }
