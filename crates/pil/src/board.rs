@@ -3,21 +3,24 @@
 use crate::gdb::{self, Gdb};
 use crate::qemu::Qemu;
 use crate::{Error, clock_tree};
-use std::io::{self, ErrorKind, Read, Write};
+use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::Duration;
 
-/// How long one [`Read::read`] of the link waits.
-const READ_TIMEOUT: Duration = Duration::from_millis(100);
+/// How long [`Board::receive`] waits.
+const PATIENCE: Duration = Duration::from_millis(100);
+/// A board that takes no bytes for this long is stuck.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// The `flight` image, booted and running freely. Reading and writing is its USART1: a read that finds nothing within
-/// 0.1 s gives 0 bytes.
+/// The `flight` image, booted, running freely and in real time.
 #[derive(Debug)]
 pub struct Board {
     qemu: Qemu,
     gdb: Gdb,
     usart1: UnixStream,
+    received: Receiver<Vec<u8>>,
     clock_accesses: usize,
 }
 
@@ -39,9 +42,10 @@ impl Board {
         let qemu = Qemu::start(elf, Qemu::folder()?, &arguments)?;
         let mut gdb = Gdb::connect(&qemu.path("gdb"))?;
         let usart1 = gdb::connect(&qemu.path("usart1"))?;
-        usart1.set_read_timeout(Some(READ_TIMEOUT))?;
+        usart1.set_write_timeout(Some(WRITE_TIMEOUT))?;
+        let received = listen(usart1.try_clone()?);
         let clock_accesses = clock_tree::boot(&mut gdb)?;
-        Ok(Board { qemu, gdb, usart1, clock_accesses })
+        Ok(Board { qemu, gdb, usart1, received, clock_accesses })
     }
 
     /// How often the image touched the clock tree while it booted.
@@ -60,23 +64,43 @@ impl Board {
         self.gdb.resume()?;
         Ok(u32::from_le_bytes(word))
     }
-}
 
-impl Read for Board {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        match self.usart1.read(bytes) {
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => Ok(0),
-            result => result,
+    /// Sends to USART1.
+    ///
+    /// # Errors
+    /// If the board has ended, or takes nothing.
+    pub fn send(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        self.qemu.check()?;
+        Ok(self.usart1.write_all(bytes)?)
+    }
+
+    /// What USART1 sent since the last time; waits 0.1 s for something, and gives nothing if nothing comes.
+    ///
+    /// # Errors
+    /// If the board has ended.
+    pub fn receive(&mut self) -> Result<Vec<u8>, Error> {
+        match self.received.recv_timeout(PATIENCE) {
+            Ok(mut bytes) => {
+                bytes.extend(self.received.try_iter().flatten());
+                Ok(bytes)
+            }
+            Err(RecvTimeoutError::Timeout) => Ok(Vec::new()),
+            Err(RecvTimeoutError::Disconnected) => Err(Error::Protocol("USART1 was closed".into())),
         }
     }
 }
 
-impl Write for Board {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.usart1.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.usart1.flush()
-    }
+/// Reads for as long as there is something. QEMU stands still, its debugger too, while nobody takes what it sends; and
+/// it sends bytes one by one, of which a socket holds no more than some three hundred.
+fn listen(mut usart1: UnixStream) -> Receiver<Vec<u8>> {
+    let (sender, received) = mpsc::channel();
+    std::thread::spawn(move || {
+        let mut buffer = [0; 4096];
+        while let Ok(length @ 1..) = usart1.read(&mut buffer) {
+            if sender.send(buffer.iter().take(length).copied().collect()).is_err() {
+                return;
+            }
+        }
+    });
+    received
 }

@@ -9,6 +9,9 @@ use std::time::{Duration, Instant};
 /// Number of the program counter.
 pub const PC: u32 = 15;
 
+/// A stub answers at once, or never.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
+
 /// What to watch at an address; the values are the protocol's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Watch {
@@ -30,7 +33,9 @@ impl Gdb {
     /// # Errors
     /// If there is none after 5 s.
     pub fn connect(socket: &Path) -> Result<Self, Error> {
-        let mut gdb = Gdb { stream: BufReader::new(connect(socket)?) };
+        let stream = connect(socket)?;
+        stream.set_read_timeout(Some(ANSWER_TIMEOUT))?;
+        let mut gdb = Gdb { stream: BufReader::new(stream) };
         // QEMU offers registers by name and number only to those who asked for their list.
         gdb.ask("qXfer:features:read:target.xml:0,ffb")?;
         gdb.ask("?")?;
@@ -97,7 +102,7 @@ impl Gdb {
         self.send("c")?;
         self.stream.get_ref().set_read_timeout(Some(patience))?;
         let stop = self.receive();
-        self.stream.get_ref().set_read_timeout(None)?;
+        self.stream.get_ref().set_read_timeout(Some(ANSWER_TIMEOUT))?;
         let stop = match stop {
             Err(Error::Io(e)) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => return Ok(None),
             stop => stop?,

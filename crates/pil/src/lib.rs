@@ -23,9 +23,11 @@
 #![forbid(unsafe_code)]
 
 mod board;
+pub mod budget;
 mod clock_tree;
 mod emulator;
 mod error;
+pub mod exercise;
 pub mod gdb;
 mod image;
 mod qemu;

@@ -1,0 +1,113 @@
+//! Measures what the firmware costs and writes the table of `docs/budgets.md`; with `--check`, writes nothing. Either
+//! way it fails if a budget is passed. Both images must have been built.
+
+use pil::budget::Linked;
+use pil::exercise::{Station, TICKS};
+use pil::{Emulator, Error, Image};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Where the table goes.
+const DOCUMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/budgets.md");
+const BEGIN: &str = "<!-- budgets: written by cargo run --release -p pil --bin budgets -->\n";
+const END: &str = "<!-- end -->\n";
+
+/// The function that is the control tick.
+const TICK: &str = "firmware::control::tick";
+
+/// One line of the table.
+struct Budget {
+    what: &'static str,
+    unit: &'static str,
+    measured: u64,
+    /// None if the number only informs.
+    most: Option<u64>,
+}
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("budgets: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// True if every budget is kept.
+fn run() -> Result<bool, Error> {
+    let flight = Linked::read(&Image::Flight.find()?)?;
+    let tick = flight.reach(TICK)?;
+    for (name, bytes) in &tick.deepest {
+        println!("{bytes:6} bytes of stack: {name}");
+    }
+    for name in &tick.panics {
+        println!("the tick can panic by {name}");
+    }
+    println!("calls through a pointer, taken for the executor's waker: {}", tick.indirect.join(", "));
+
+    let [min, mean, max, stack] = fly()?;
+    let line = |what, unit, measured, most| Budget { what, unit, measured, most };
+    let budgets = [
+        line("control tick, worst", "instructions", max, Some(3_300)),
+        line("control tick, mean", "instructions", mean, None),
+        line("control tick, least", "instructions", min, None),
+        line("stack of the control tick, worst case", "bytes", tick.stack_bytes.into(), Some(2_048)),
+        line("stack of everything, deepest seen", "bytes", stack, Some(16_384)),
+        line("panics that the control tick can reach", "", tick.panics.len() as u64, Some(0)),
+        line("flash", "bytes", flight.flash_bytes, Some(96 * 1024)),
+        line("static RAM, stack aside", "bytes", flight.ram_bytes, Some(32 * 1024)),
+    ];
+    let table = table(&budgets);
+    print!("{table}");
+    if !std::env::args().any(|argument| argument == "--check") {
+        write(&table)?;
+    }
+    Ok(budgets.iter().all(|budget| budget.most.is_none_or(|most| budget.measured <= most)))
+}
+
+/// Least, mean and worst instructions of the ticks with the motors on, and the deepest stack \[bytes\].
+fn fly() -> Result<[u64; 4], Error> {
+    let mut emulator = Emulator::start(&Image::Pil.find()?)?;
+    let mut station = Station::default();
+    let (mut min, mut sum, mut count, mut max, mut stack) = (u64::MAX, 0, 0, 0, 0);
+    for tick in 0..TICKS {
+        let reply = emulator.exchange(&station.bytes_of_tick(tick))?;
+        stack = reply.stack_bytes.into();
+        if reply.throttles != [0; 4] {
+            let instructions = reply.instructions.into();
+            min = min.min(instructions);
+            max = max.max(instructions);
+            sum += instructions;
+            count += 1;
+        }
+    }
+    if count == 0 {
+        return Err(Error::Protocol("the motors never turned".into()));
+    }
+    Ok([min, sum / count, max, stack])
+}
+
+fn table(budgets: &[Budget]) -> String {
+    let mut table = String::from("| | measured | at most | |\n|---|---:|---:|---|\n");
+    for Budget { what, unit, measured, most } in budgets {
+        let limit = most.map_or_else(String::new, |most| most.to_string());
+        let verdict = match most {
+            Some(most) if measured > most => "**passed**",
+            _ => "",
+        };
+        table += &format!("| {what} | {measured} {unit} | {limit} | {verdict} |\n");
+    }
+    table
+}
+
+/// Puts the table into the document, between its marks.
+fn write(table: &str) -> Result<(), Error> {
+    let path = Path::new(DOCUMENT);
+    let text = std::fs::read_to_string(path)?;
+    let unmarked = || Error::Protocol(format!("{} has lost its marks", path.display()));
+    let (before, rest) = text.split_once(BEGIN).ok_or_else(unmarked)?;
+    let (_, after) = rest.split_once(END).ok_or_else(unmarked)?;
+    Ok(std::fs::write(path, [before, BEGIN, table, END, after].concat())?)
+}

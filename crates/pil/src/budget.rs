@@ -1,0 +1,285 @@
+//! What an image costs, read from the linked file: memory, and for one function its worst-case stack and whether it can
+//! panic.
+//!
+//! The call graph comes from the machine code itself (Armv7-M manual, A5 to A7): every direct branch that leaves a
+//! function is taken for a call, and every instruction that lowers the stack pointer counts for the whole function. Both
+//! err on the side of more.
+
+use crate::Error;
+use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Where the flash lies.
+const FLASH: std::ops::Range<u64> = 0x0800_0000..0x0810_0000;
+
+/// A linked image.
+#[derive(Debug)]
+pub struct Linked {
+    functions: BTreeMap<u32, Function>,
+    /// Bytes of flash: code, constants and initial values.
+    pub flash_bytes: u64,
+    /// Bytes of RAM that are taken before the program starts, the stack aside.
+    pub ram_bytes: u64,
+}
+
+#[derive(Debug, Default)]
+struct Function {
+    name: String,
+    stack_bytes: u32,
+    calls: BTreeSet<u32>,
+    /// Calls through a pointer.
+    is_indirect: bool,
+}
+
+/// What running one function can lead to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Reach {
+    /// Worst-case stack \[bytes\].
+    pub stack_bytes: u32,
+    /// The chain of calls behind it, outermost first, each with its own share.
+    pub deepest: Vec<(String, u32)>,
+    /// Functions that panic.
+    pub panics: Vec<String>,
+    /// Functions that call through a pointer. In the control tick that can only be the executor's waker.
+    pub indirect: Vec<String>,
+}
+
+/// What a waker of the executors leads to.
+const WAKER: &str = "embassy_executor::raw::waker::wake";
+
+impl Linked {
+    /// Reads an image.
+    ///
+    /// # Errors
+    /// If it is missing or no image.
+    pub fn read(elf: &Path) -> Result<Self, Error> {
+        let bytes = std::fs::read(elf).map_err(|_| Error::NoImage(elf.to_owned()))?;
+        let file = object::File::parse(bytes.as_slice()).map_err(|error| Error::Protocol(error.to_string()))?;
+
+        let (mut flash_bytes, mut ram_bytes) = (0, 0);
+        for section in file.sections() {
+            let is_flash = FLASH.contains(&section.address());
+            match section.kind() {
+                SectionKind::Data => {
+                    flash_bytes += section.size();
+                    ram_bytes += section.size();
+                }
+                SectionKind::UninitializedData => ram_bytes += section.size(),
+                _ if is_flash => flash_bytes += section.size(),
+                _ => (),
+            }
+        }
+
+        // $t and $d mark where code and data begin within a section.
+        let marks: BTreeMap<u32, bool> = file
+            .symbols()
+            .filter_map(|symbol| {
+                let name = symbol.name().ok()?;
+                let is_code = name.starts_with("$t");
+                (is_code || name.starts_with("$d")).then_some((symbol.address() as u32, is_code))
+            })
+            .collect();
+        let is_code = |address: u32| marks.range(..=address).next_back().is_some_and(|(_, is_code)| *is_code);
+
+        let mut functions = BTreeMap::new();
+        for symbol in file.symbols().filter(|symbol| symbol.kind() == SymbolKind::Text && symbol.size() > 0) {
+            // Bit 0 of a function's address says Thumb.
+            let start = symbol.address() as u32 & !1;
+            let code = symbol
+                .section_index()
+                .and_then(|index| file.section_by_index(index).ok())
+                .and_then(|section| section.data_range(u64::from(start), symbol.size()).ok().flatten());
+            let Some(code) = code else { continue };
+            let name = format!("{:#}", rustc_demangle::demangle(symbol.name().unwrap_or_default()));
+            functions.entry(start).or_insert_with(|| Function::decode(name, start, code, is_code));
+        }
+        Ok(Linked { functions, flash_bytes, ram_bytes })
+    }
+
+    /// What running the function named `name` can lead to.
+    ///
+    /// # Errors
+    /// If there is none of that name, or it can call itself.
+    pub fn reach(&self, name: &str) -> Result<Reach, Error> {
+        let root = self.find(name).ok_or_else(|| Error::Protocol(format!("the image has no function {name}")))?;
+        let mut walk = Walk { linked: self, waker: self.find(WAKER), depths: BTreeMap::new(), open: BTreeSet::new() };
+        let (stack_bytes, deepest) = walk.depth(root)?;
+        let reached = || walk.depths.keys().filter_map(|address| self.functions.get(address));
+        let names = |keep: fn(&Function) -> bool| reached().filter(|f| keep(f)).map(|f| f.name.clone()).collect();
+        Ok(Reach {
+            stack_bytes,
+            deepest,
+            panics: names(|function| function.name.contains("panic") || function.name.ends_with("_fail")),
+            indirect: names(|function| function.is_indirect),
+        })
+    }
+
+    fn find(&self, name: &str) -> Option<u32> {
+        self.functions.iter().find(|(_, function)| function.name == name).map(|(address, _)| *address)
+    }
+}
+
+/// The deepest chain of calls below a function.
+type Depth = (u32, Vec<(String, u32)>);
+
+struct Walk<'a> {
+    linked: &'a Linked,
+    waker: Option<u32>,
+    depths: BTreeMap<u32, Depth>,
+    /// Functions that the walk is within.
+    open: BTreeSet<u32>,
+}
+
+impl Walk<'_> {
+    fn depth(&mut self, address: u32) -> Result<Depth, Error> {
+        if let Some(depth) = self.depths.get(&address) {
+            return Ok(depth.clone());
+        }
+        let Some(function) = self.linked.functions.get(&address) else {
+            return Err(Error::Protocol(format!("a call to {address:#010x}, where no function is")));
+        };
+        if !self.open.insert(address) {
+            return Err(Error::Protocol(format!("{} can call itself", function.name)));
+        }
+        let waker = self.waker.filter(|_| function.is_indirect);
+        let (mut below, mut chain) = Depth::default();
+        for &callee in function.calls.iter().chain(&waker) {
+            let (bytes, names) = self.depth(callee)?;
+            if bytes > below {
+                (below, chain) = (bytes, names);
+            }
+        }
+        self.open.remove(&address);
+        chain.insert(0, (function.name.clone(), function.stack_bytes));
+        let depth = (function.stack_bytes + below, chain);
+        self.depths.insert(address, depth.clone());
+        Ok(depth)
+    }
+}
+
+impl Function {
+    fn decode(name: String, start: u32, code: &[u8], is_code: impl Fn(u32) -> bool) -> Self {
+        let mut function = Function { name, ..Function::default() };
+        let end = start + code.len() as u32;
+        let halfwords: Vec<u16> = code
+            .chunks_exact(2)
+            .map(|pair| pair.iter().rev().fold(0, |value, byte| value << 8 | u16::from(*byte)))
+            .collect();
+        let mut index = 0;
+        while let Some(&first) = halfwords.get(index) {
+            let address = start + 2 * index as u32;
+            if !is_code(address) {
+                index += 1;
+                continue;
+            }
+            let effect = if first >> 11 >= 0b11101 {
+                index += 2;
+                Effect::of_wide(first, halfwords.get(index - 1).copied().unwrap_or(0))
+            } else {
+                index += 1;
+                Effect::of_narrow(first)
+            };
+            match effect {
+                Effect::Push(bytes) => function.stack_bytes += bytes,
+                Effect::Branch(offset) => {
+                    let target = address.wrapping_add(4).wrapping_add_signed(offset);
+                    if !(start..end).contains(&target) {
+                        function.calls.insert(target);
+                    }
+                }
+                Effect::Indirect => function.is_indirect = true,
+                Effect::Other => (),
+            }
+        }
+        function
+    }
+}
+
+/// What an instruction does to stack and control flow.
+enum Effect {
+    /// Lowers the stack pointer by so many bytes.
+    Push(u32),
+    /// Goes to its own address + 4 + this, perhaps for good.
+    Branch(i32),
+    /// Goes to an address from a register.
+    Indirect,
+    Other,
+}
+
+impl Effect {
+    fn of_narrow(code: u16) -> Self {
+        let bits = u32::from(code);
+        match code {
+            // PUSH
+            _ if code & 0xFE00 == 0xB400 => Effect::Push(4 * (bits & 0x1FF).count_ones()),
+            // SUB SP, #imm7 * 4
+            _ if code & 0xFF80 == 0xB080 => Effect::Push(4 * (bits & 0x7F)),
+            // BLX register; BX other than LR
+            _ if code & 0xFF87 == 0x4780 || code & 0xFF87 == 0x4700 && code != 0x4770 => Effect::Indirect,
+            // B with condition; conditions 14 and 15 are UDF and SVC
+            _ if code & 0xF000 == 0xD000 && code & 0x0E00 != 0x0E00 => Effect::Branch(signed(bits << 1, 9)),
+            // B
+            _ if code & 0xF800 == 0xE000 => Effect::Branch(signed(bits << 1, 12)),
+            _ => Effect::Other,
+        }
+    }
+
+    fn of_wide(first: u16, second: u16) -> Self {
+        let (a, b) = (u32::from(first), u32::from(second));
+        let is_branch = a & 0xF800 == 0xF000 && b & 0x8000 != 0;
+        let (s, j1, j2) = (a >> 10 & 1, b >> 13 & 1, b >> 11 & 1);
+        match b & 0x5000 {
+            // BL, B
+            0x5000 | 0x1000 if is_branch => {
+                let (i1, i2) = (1 ^ j1 ^ s, 1 ^ j2 ^ s);
+                let offset = s << 24 | i1 << 23 | i2 << 22 | (a & 0x3FF) << 12 | (b & 0x7FF) << 1;
+                return Effect::Branch(signed(offset, 25));
+            }
+            // B with condition; 14 and 15 are system instructions
+            0x0000 if is_branch && a >> 7 & 7 != 7 => {
+                let offset = s << 20 | j2 << 19 | j1 << 18 | (a & 0x3F) << 12 | (b & 0x7FF) << 1;
+                return Effect::Branch(signed(offset, 21));
+            }
+            _ => (),
+        }
+        match (a, b) {
+            // PUSH.W
+            (0xE92D, _) => Effect::Push(4 * b.count_ones()),
+            // STR register, [SP, #-imm8]!
+            (0xF84D, _) if b & 0x0F00 == 0x0D00 => Effect::Push(b & 0xFF),
+            // STRD registers, [SP, #-imm8 * 4]!
+            (0xE96D, _) => Effect::Push(4 * (b & 0xFF)),
+            // VPUSH
+            _ if a & 0xFFBF == 0xED2D && b & 0x0E00 == 0x0A00 => Effect::Push(4 * (b & 0xFF)),
+            // SUB.W SP, SP, #imm; SUBW SP, SP, #imm12
+            _ if a & 0xFBEF == 0xF1AD && b & 0x8F00 == 0x0D00 => Effect::Push(expand(immediate(a, b))),
+            _ if a & 0xFBFF == 0xF2AD && b & 0x8F00 == 0x0D00 => Effect::Push(immediate(a, b)),
+            // LDR PC, [register other than SP]
+            _ if a & 0xFF70 == 0xF850 && b >> 12 == 15 && a & 15 != 13 => Effect::Indirect,
+            _ => Effect::Other,
+        }
+    }
+}
+
+/// The lowest `width` bits as a signed number.
+fn signed(bits: u32, width: u32) -> i32 {
+    (bits << (32 - width)) as i32 >> (32 - width)
+}
+
+/// i:imm3:imm8 of a wide instruction.
+fn immediate(first: u32, second: u32) -> u32 {
+    (first >> 10 & 1) << 11 | (second >> 12 & 7) << 8 | second & 0xFF
+}
+
+/// ThumbExpandImm.
+fn expand(imm12: u32) -> u32 {
+    let byte = imm12 & 0xFF;
+    match imm12 >> 8 {
+        0 => byte,
+        1 => byte | byte << 16,
+        2 => byte << 8 | byte << 24,
+        3 => byte * 0x0101_0101,
+        _ => (0x80 | imm12 & 0x7F).rotate_right(imm12 >> 7),
+    }
+}

@@ -1,0 +1,79 @@
+//! A flight in which everything happens, as the bytes that reach the vehicle: what tests compare and budgets measure.
+
+use airframe::{Setpoint, State};
+use link::{Address, Command, FRAME_MAX, Sender, Uplink};
+use nalgebra::Vector3;
+
+/// Ticks of the whole flight.
+pub const TICKS: u64 = 6_000;
+
+/// The other end of the link: tracker and commander in one.
+#[derive(Clone, Debug)]
+pub struct Station {
+    sender: Sender,
+    bytes: Vec<u8>,
+}
+
+impl Default for Station {
+    fn default() -> Self {
+        Station { sender: Sender::new(Address { system: 255, component: 190 }), bytes: Vec::new() }
+    }
+}
+
+impl Station {
+    /// Adds a message to the next [`Station::take`].
+    pub fn say(&mut self, message: Uplink) {
+        self.bytes.extend_from_slice(self.sender.send(&message, &mut [0; FRAME_MAX]));
+    }
+
+    /// All that was said since the last time.
+    pub fn take(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.bytes)
+    }
+
+    /// What reaches the link before `tick`: a flight, and everything that can go wrong with its link. To be asked for
+    /// one tick after the other, from 0.
+    pub fn bytes_of_tick(&mut self, tick: u64) -> Vec<u8> {
+        let (state, setpoint) = motion(tick as f32 * 1e-3);
+        // Two gaps: one to ride out, one that ends in a descent.
+        let tracked = !(2_500..2_600).contains(&tick) && !(4_000..5_000).contains(&tick);
+        if tracked {
+            self.say(Uplink::State { sent_us: tick * 1000, state });
+        }
+        if tick % 10 == 0 {
+            self.say(Uplink::Setpoint(setpoint));
+        }
+        match tick {
+            // The first is refused: the rate is not known yet.
+            100 | 1_500 => self.say(Uplink::Command(Command::Arm)),
+            5_900 => self.say(Uplink::Command(Command::Disarm)),
+            _ => (),
+        }
+        let mut bytes = self.take();
+        match tick % 97 {
+            13 => bytes.truncate(bytes.len() / 2),
+            31 => bytes.extend_from_slice(b"\xFD\xFDnoise\x00\xFF"),
+            53 => bytes.iter_mut().skip(20).take(1).for_each(|byte| *byte ^= 0x10),
+            _ => (),
+        }
+        bytes
+    }
+}
+
+/// Some motion near hover in which every subsystem has something to do; `t` in seconds.
+pub fn motion(t: f32) -> (State, Setpoint) {
+    let wave = |rate: f32| (rate * t).sin();
+    let state = State {
+        position_m: Vector3::new(0.5 * wave(0.7), 0.4 * wave(1.1), 0.3 * wave(0.9)),
+        velocity_m_s: Vector3::new(0.6 * wave(1.7), 0.5 * wave(1.3), 0.4 * wave(2.3)),
+        attitude_rad: Vector3::new(0.2 * wave(3.1), 0.2 * wave(2.7), 0.5 * wave(0.6)),
+        rates_rad_s: Vector3::new(0.8 * wave(5.1), 0.7 * wave(4.7), 0.4 * wave(3.9)),
+    };
+    let setpoint = Setpoint {
+        position_m: Vector3::new(0.3 * wave(0.4), 0.3 * wave(0.5), 0.5),
+        velocity_m_s: Vector3::new(0.2 * wave(0.8), 0.2 * wave(0.6), 0.0),
+        yaw_rad: 0.5 * wave(0.3),
+        ..Setpoint::default()
+    };
+    (state, setpoint)
+}

@@ -1,0 +1,53 @@
+//! The very image that flies, on an emulated board: it boots, ticks, listens and answers.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs, unreachable_pub, reason = "test")]
+
+mod common;
+
+use common::start_or_skip;
+use link::{Address, Answer, Command, Decoder, Downlink, Uplink};
+use pil::exercise::{Station, motion};
+use pil::{Board, Image};
+use std::time::{Duration, Instant};
+
+/// Far longer than it takes, even on a machine that is busy with other things.
+const PATIENCE: Duration = Duration::from_secs(120);
+/// SysTick's reload value register.
+const SYST_RVR: u32 = 0xE000_E014;
+
+#[test]
+fn it_boots_ticks_and_flies() {
+    // That it comes back means that the image got past its clocks.
+    let Some(mut board) = start_or_skip(Image::Flight, |elf| Board::boot(&elf)) else { return };
+    assert!(board.clock_accesses() > 10, "the clock tree was set up");
+    assert_eq!(board.word(SYST_RVR).unwrap(), 168_000 - 1, "1 kHz at 168 MHz");
+
+    let mut station = Station::default();
+    let mut decoder = Decoder::<Downlink>::new(Address { system: 255, component: 190 });
+    let (mut heartbeats, mut rate_hz, mut accepted, mut spinning) = (0, 0.0, false, false);
+    let start = Instant::now();
+    let (mut spoke, mut commanded) = (start, start);
+    while !(heartbeats > 0 && rate_hz > 0.0 && accepted && spinning) {
+        assert!(start.elapsed() < PATIENCE, "{heartbeats} heartbeats, {rate_hz} Hz, armed {accepted}, {spinning}");
+
+        // Still, level, at its setpoint. The time is the host's: the board finds out how the two clocks differ.
+        if spoke.elapsed() > Duration::from_millis(5) {
+            let (state, setpoint) = motion(0.0);
+            station.say(Uplink::State { sent_us: start.elapsed().as_micros() as u64, state });
+            station.say(Uplink::Setpoint(setpoint));
+            spoke = Instant::now();
+        }
+        if !accepted && commanded.elapsed() > Duration::from_millis(200) {
+            station.say(Uplink::Command(Command::Arm));
+            commanded = Instant::now();
+        }
+        board.send(&station.take()).unwrap();
+        decoder.feed(&board.receive().unwrap(), |_, message| match message {
+            Downlink::Heartbeat { .. } => heartbeats += 1,
+            Downlink::Health(health) => rate_hz = health.rate_hz,
+            Downlink::Answer { answer, .. } => accepted |= answer == Answer::Accepted,
+            Downlink::Rotors { armed, speeds, .. } => spinning |= armed && speeds.0.min() > 0.0,
+            _ => (),
+        });
+    }
+    assert!((997.0..=1003.0).contains(&rate_hz), "the control tick runs at {rate_hz} Hz");
+}
