@@ -55,12 +55,43 @@ pub struct ParameterChange {
     pub end_s: f64,
 }
 
+/// A point mass carried from `start_s` to `end_s` on the body's z axis, so that thrust still passes through the common
+/// centre of mass. It is taken up and let go at the vehicle's velocity; position and velocity are those of the common
+/// centre of mass, and do not jump.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Payload {
+    /// \[kg\]
+    pub mass_kg: f64,
+    /// Below the centre of mass of vehicle and payloads listed before; negative for above \[m\].
+    pub below_m: f64,
+    /// Start \[s\].
+    pub start_s: f64,
+    /// End \[s\]; infinite for a payload that stays.
+    pub end_s: f64,
+}
+
+/// Accepted range of a payload's mass \[kg\].
+pub const PAYLOAD_MASS: Range = Range::new("payload_mass_kg", 0.0, 500.0);
+/// Accepted range of a payload's place \[m\].
+pub const PAYLOAD_BELOW: Range = Range::new("below_m", -10.0, 10.0);
+
+impl Payload {
+    /// Adds the payload's mass, and by the parallel axis theorem m m_p/(m + m_p) h^2 to Ix and Iy.
+    fn load(&self, vehicle: &mut Parameters<f64>) {
+        let total_kg = vehicle.mass_kg + self.mass_kg;
+        let across = vehicle.mass_kg * self.mass_kg / total_kg * self.below_m * self.below_m;
+        vehicle.mass_kg = total_kg;
+        vehicle.inertia_kg_m2 += Vector3::new(across, across, 0.0);
+    }
+}
+
 /// The vehicle's true parameters and everything that changes or pushes it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
     nominal: Parameters<f64>,
     changes: Vec<ParameterChange>,
     gusts: Vec<Gust>,
+    payloads: Vec<Payload>,
 }
 
 /// Accepted size of a gust, in its own unit.
@@ -102,17 +133,34 @@ impl Environment {
     /// The first parameter out of range, as it stands or at any time under the changes, or the first gust out of
     /// [`GUST_SIZE`] or [`START`].
     pub fn new(nominal: Parameters<f64>, changes: Vec<ParameterChange>, gusts: Vec<Gust>) -> Result<Self, OutOfRange> {
-        let environment = Environment { nominal, changes, gusts };
+        let environment = Environment { nominal, changes, gusts, payloads: Vec::new() };
         nominal.validate()?;
         for gust in &environment.gusts {
             GUST_SIZE.check(gust.size)?;
             START.check(gust.start_s)?;
         }
-        for change in &environment.changes {
-            environment.segment(change.start_s).parameters.validate()?;
-            environment.segment(change.end_s).parameters.validate()?;
-        }
+        environment.validate_changes()?;
         Ok(environment)
+    }
+
+    /// The same environment with payloads, which come after the parameter changes: a changed vehicle takes them up.
+    ///
+    /// # Errors
+    /// The first payload out of range, or parameter out of range at any time under them.
+    pub fn with_payloads(self, payloads: Vec<Payload>) -> Result<Self, OutOfRange> {
+        for payload in &payloads {
+            PAYLOAD_MASS.check(payload.mass_kg)?;
+            PAYLOAD_BELOW.check(payload.below_m)?;
+        }
+        let environment = Environment { payloads, ..self };
+        environment.validate_changes()?;
+        Ok(environment)
+    }
+
+    fn validate_changes(&self) -> Result<(), OutOfRange> {
+        let changes = self.changes.iter().flat_map(|c| [c.start_s, c.end_s]);
+        let payloads = self.payloads.iter().flat_map(|p| [p.start_s, p.end_s]);
+        changes.chain(payloads).try_for_each(|edge| self.segment(edge).parameters.validate())
     }
 
     /// The true parameters before any change.
@@ -130,6 +178,11 @@ impl Environment {
         &self.changes
     }
 
+    /// Every payload.
+    pub fn payloads(&self) -> &[Payload] {
+        &self.payloads
+    }
+
     /// What holds at time `t` \[s\], and until when.
     pub(crate) fn segment(&self, t: f64) -> Segment {
         let mut parameters = self.nominal;
@@ -140,6 +193,9 @@ impl Environment {
                 Quantity::ThrustFactor => parameters.thrust_factor_n_s2 *= change.factor,
                 Quantity::DragFactor => parameters.drag_factor_n_m_s2 *= change.factor,
             }
+        }
+        for payload in self.payloads.iter().filter(|p| active(p.start_s, p.end_s, t)) {
+            payload.load(&mut parameters);
         }
         let (m, i) = (parameters.mass_kg, parameters.inertia_kg_m2);
         let scale = PerAxis { roll: i.x, pitch: i.y, yaw: i.z, z: m, x: m, y: m };
@@ -152,7 +208,9 @@ impl Environment {
         }
         let changes = self.changes.iter().flat_map(|c| [c.start_s, c.end_s]);
         let gusts = self.gusts.iter().flat_map(|g| [g.start_s, g.end_s]);
-        let until_s = changes.chain(gusts).filter(|&edge| edge > t + TIME_SLACK_S).fold(f64::INFINITY, f64::min);
+        let payloads = self.payloads.iter().flat_map(|p| [p.start_s, p.end_s]);
+        let until_s =
+            changes.chain(gusts).chain(payloads).filter(|&edge| edge > t + TIME_SLACK_S).fold(f64::INFINITY, f64::min);
         Segment {
             parameters,
             a_force: Vector3::new(a.x, a.y, a.z),

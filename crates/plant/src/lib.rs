@@ -4,6 +4,10 @@
 //! gusts and parameters that change in time from an [`Environment`], and both are integrated by the classical
 //! fourth-order Runge-Kutta method with the rotor speeds held over the step.
 //!
+//! That is the paper's plant. [`Realism`] adds what it leaves out, part by part: rotors with lag, limits, delay, faults and
+//! a battery, drag, wind with gusts and turbulence, ground. [`Sensors`] stand between a plant and its controller. All of
+//! it is reproducible from a seed.
+//!
 //! Frames, units and the meaning of "(n)" are stated in [`airframe`]. Trigonometry comes from the `libm` crate, so a
 //! flight gives the same bits on every host.
 //!
@@ -23,13 +27,38 @@
 
 extern crate alloc;
 
+pub mod battery;
+mod body_axes;
+pub mod contact;
+mod delay;
+pub mod drag;
 mod environment;
+pub mod ground_effect;
 pub mod integrate;
 mod motion;
+pub mod noise;
+mod realism;
 pub mod rigid_body;
+pub mod rotors;
+pub mod sensors;
 pub mod simplified;
+mod surroundings;
+pub mod turbulence;
 mod vehicle;
+pub mod wind;
 
-pub use environment::{Environment, GUST_SIZE, Gust, GustKind, ParameterChange, Quantity, START};
+pub use battery::{Battery, Charge, Sag};
+pub use contact::Contact;
+pub use delay::DELAY;
+pub use drag::Drag;
+pub use environment::{
+    Environment, GUST_SIZE, Gust, GustKind, PAYLOAD_BELOW, PAYLOAD_MASS, ParameterChange, Payload, Quantity, START,
+};
+pub use ground_effect::GroundEffect;
 pub use motion::Motion;
+pub use realism::{Realism, STEP, Telemetry};
+pub use rotors::{RotorFault, Rotors, Start};
+pub use sensors::{Dropouts, Measurement, Sensing, Sensors, Spread};
+pub use turbulence::Turbulence;
 pub use vehicle::{Load, Model, Plant};
+pub use wind::{CosineGust, Wind};

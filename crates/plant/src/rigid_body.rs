@@ -1,6 +1,8 @@
 //! The full rigid body, (1)-(5) as corrected, its attitude a unit quaternion: no singularity.
 
+use crate::body_axes::BodyAxes;
 use crate::motion::Motion;
+use crate::surroundings::Surroundings;
 use crate::vehicle::Load;
 use libm::{asin, atan2, cos, sin, sqrt};
 use nalgebra::{SVector, Vector3};
@@ -56,10 +58,15 @@ pub fn euler_rates(attitude_rad: &Vector3<f64>, rates_rad_s: &Vector3<f64>) -> V
 #[inline]
 pub fn derivative(v: &Vector, load: &Load) -> Vector {
     let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
-    let (p, q, r) = (v[10], v[11], v[12]);
     let body_z = Vector3::new(2.0 * (w * y + x * z), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
-    let acceleration = load.acceleration(&body_z);
-    let angular_acceleration = load.angular_acceleration(&Vector3::new(p, q, r));
+    pack(v, &load.acceleration(&body_z), &load.angular_acceleration(&Vector3::new(v[10], v[11], v[12])))
+}
+
+/// d/dt of the state vector from its accelerations.
+#[inline]
+fn pack(v: &Vector, acceleration: &Vector3<f64>, angular_acceleration: &Vector3<f64>) -> Vector {
+    let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
+    let (p, q, r) = (v[10], v[11], v[12]);
     Vector::from([
         v[3],
         v[4],
@@ -76,6 +83,26 @@ pub fn derivative(v: &Vector, load: &Load) -> Vector {
         angular_acceleration.y,
         angular_acceleration.z,
     ])
+}
+
+/// The body's axes, of a unit quaternion.
+#[inline]
+pub(crate) fn body_axes(v: &Vector) -> BodyAxes {
+    let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
+    BodyAxes {
+        forward: Vector3::new(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)),
+        left: Vector3::new(2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)),
+        up: Vector3::new(2.0 * (w * y + x * z), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)),
+    }
+}
+
+/// [`derivative`] with what acts by position and velocity.
+#[inline]
+pub(crate) fn derivative_in(v: &Vector, load: &Load, surroundings: &Surroundings) -> Vector {
+    let (velocity, rates) = (Vector3::new(v[3], v[4], v[5]), Vector3::new(v[10], v[11], v[12]));
+    let axes = body_axes(v);
+    let (a, angular) = surroundings.accelerations(v[2], &velocity, &axes, &rates);
+    pack(v, &(a + load.acceleration(&axes.up)), &(angular + load.angular_acceleration(&rates)))
 }
 
 /// Scales the quaternion back to unit length, which integration loses slowly.

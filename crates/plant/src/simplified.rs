@@ -1,6 +1,8 @@
 //! The paper's simplified model (6): d eta/dt is taken for Omega.
 
+use crate::body_axes::BodyAxes;
 use crate::motion::Motion;
+use crate::surroundings::Surroundings;
 use crate::vehicle::Load;
 use libm::{cos, sin};
 use nalgebra::{SVector, Vector3};
@@ -44,4 +46,39 @@ pub fn derivative(x: &Vector, load: &Load) -> Vector {
     x_dot.fixed_rows_mut::<3>(6).copy_from(&eta_dot);
     x_dot.fixed_rows_mut::<3>(9).copy_from(&load.angular_acceleration(&eta_dot));
     x_dot
+}
+
+/// The body's axes: the columns of Rz(psi) Ry(theta) Rx(phi).
+#[inline]
+pub(crate) fn body_axes(x: &Vector) -> BodyAxes {
+    let (s_phi, c_phi) = (sin(x[6]), cos(x[6]));
+    let (s_theta, c_theta) = (sin(x[7]), cos(x[7]));
+    let (s_psi, c_psi) = (sin(x[8]), cos(x[8]));
+    BodyAxes {
+        forward: Vector3::new(c_psi * c_theta, s_psi * c_theta, -s_theta),
+        left: Vector3::new(
+            c_psi * s_theta * s_phi - s_psi * c_phi,
+            s_psi * s_theta * s_phi + c_psi * c_phi,
+            c_theta * s_phi,
+        ),
+        up: Vector3::new(
+            c_phi * s_theta * c_psi + s_phi * s_psi,
+            c_phi * s_theta * s_psi - s_phi * c_psi,
+            c_phi * c_theta,
+        ),
+    }
+}
+
+/// [`derivative`] with what acts by position and velocity; here too, d eta/dt is taken for Omega.
+#[inline]
+pub(crate) fn derivative_in(x: &Vector, load: &Load, surroundings: &Surroundings) -> Vector {
+    let (velocity, rates) = (Vector3::new(x[3], x[4], x[5]), Vector3::new(x[9], x[10], x[11]));
+    let axes = body_axes(x);
+    let (a, angular) = surroundings.accelerations(x[2], &velocity, &axes, &rates);
+    // As in `derivative`, with the thrust's direction at hand.
+    let a = a + load.acceleration(&axes.up);
+    let angular = angular + load.angular_acceleration(&rates);
+    Vector::from([
+        velocity.x, velocity.y, velocity.z, a.x, a.y, a.z, rates.x, rates.y, rates.z, angular.x, angular.y, angular.z,
+    ])
 }

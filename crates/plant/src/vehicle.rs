@@ -1,10 +1,14 @@
 //! One vehicle in one environment, stepped in time.
 
+use crate::body_axes::BodyAxes;
 use crate::environment::{Environment, Segment};
 use crate::integrate::rk4;
 use crate::motion::Motion;
+use crate::realism::{Effects, Realism, Telemetry};
+use crate::surroundings::Surroundings;
 use crate::{rigid_body, simplified};
-use airframe::{Parameters, RotorSpeeds};
+use airframe::{OutOfRange, Parameters, RotorSpeeds};
+use alloc::boxed::Box;
 use nalgebra::Vector3;
 
 /// Which equations move the vehicle.
@@ -54,10 +58,25 @@ impl Load {
         a_force: Vector3<f64>,
         a_moment: Vector3<f64>,
     ) -> Self {
+        let squares = speeds_rad_s.map(|w| w * w);
+        Self::of_rotors(parameters, speeds_rad_s, squares, 1.0, a_force, a_moment)
+    }
+
+    /// The same for rotors whose drag moments are those of the `squares` of their speeds \[rad2/s2\], as far as they are
+    /// whole, and whose thrusts are those times `thrust_ratio`.
+    #[inline]
+    pub(crate) fn of_rotors(
+        parameters: &Parameters<f64>,
+        speeds_rad_s: [f64; 4],
+        squares: [f64; 4],
+        thrust_ratio: f64,
+        a_force: Vector3<f64>,
+        a_moment: Vector3<f64>,
+    ) -> Self {
         let Parameters { mass_kg, arm_m, inertia_kg_m2: i, rotor_inertia_kg_m2, .. } = *parameters;
         let [w1, w2, w3, w4] = speeds_rad_s;
-        let [s1, s2, s3, s4] = speeds_rad_s.map(|w| w * w);
-        let (b, d) = (parameters.thrust_factor_n_s2, parameters.drag_factor_n_m_s2);
+        let [s1, s2, s3, s4] = squares;
+        let (b, d) = (thrust_ratio * parameters.thrust_factor_n_s2, parameters.drag_factor_n_m_s2);
         let momentum = rotor_inertia_kg_m2 * (w1 - w2 + w3 - w4);
         Load {
             thrust_m_s2: b * (s1 + s2 + s3 + s4) / mass_kg,
@@ -97,45 +116,123 @@ enum Body {
     RigidBody(rigid_body::Vector),
 }
 
+impl Body {
+    fn new(model: Model, initial: &Motion) -> Self {
+        match model {
+            Model::Simplified => Body::Simplified(simplified::vector(initial)),
+            Model::RigidBody => Body::RigidBody(rigid_body::vector(initial)),
+        }
+    }
+
+    /// Moves by `dt_s` under a load that is held.
+    #[inline]
+    fn advance(&mut self, load: &Load, dt_s: f64) {
+        match self {
+            Body::Simplified(x) => *x = rk4(|x| simplified::derivative(x, load), x, dt_s),
+            Body::RigidBody(x) => {
+                *x = rk4(|x| rigid_body::derivative(x, load), x, dt_s);
+                rigid_body::normalise(x);
+            }
+        }
+    }
+
+    /// Moves by `dt_s` under a load that is held, and surroundings that act by position and velocity.
+    #[inline]
+    fn advance_in(&mut self, load: &Load, surroundings: &Surroundings, dt_s: f64) {
+        match self {
+            Body::Simplified(x) => *x = rk4(|x| simplified::derivative_in(x, load, surroundings), x, dt_s),
+            Body::RigidBody(x) => {
+                *x = rk4(|x| rigid_body::derivative_in(x, load, surroundings), x, dt_s);
+                rigid_body::normalise(x);
+            }
+        }
+    }
+
+    /// Position and velocity, which both models begin with.
+    #[inline]
+    fn place(&self) -> (Vector3<f64>, Vector3<f64>) {
+        match self {
+            Body::Simplified(x) => (x.fixed_rows::<3>(0).into(), x.fixed_rows::<3>(3).into()),
+            Body::RigidBody(x) => (x.fixed_rows::<3>(0).into(), x.fixed_rows::<3>(3).into()),
+        }
+    }
+
+    fn axes(&self) -> BodyAxes {
+        match self {
+            Body::Simplified(x) => simplified::body_axes(x),
+            Body::RigidBody(x) => rigid_body::body_axes(x),
+        }
+    }
+}
+
 /// One vehicle in one environment.
 #[derive(Clone, Debug)]
 pub struct Plant {
     body: Body,
     environment: Environment,
     segment: Segment,
+    /// Boxed: the ideal plant stays small.
+    effects: Option<Box<Effects>>,
     steps: u64,
     time_s: f64,
 }
 
 impl Plant {
-    /// A vehicle at rest in time: `initial` holds at t = 0.
+    /// A vehicle at rest in time: `initial` holds at t = 0. Its rotors are ideal, and nothing but the environment acts.
     pub fn new(model: Model, initial: Motion, environment: Environment) -> Self {
-        let body = match model {
-            Model::Simplified => Body::Simplified(simplified::vector(&initial)),
-            Model::RigidBody => Body::RigidBody(rigid_body::vector(&initial)),
-        };
+        let body = Body::new(model, &initial);
         let segment = environment.segment(0.0);
-        Plant { body, environment, segment, steps: 0, time_s: 0.0 }
+        Plant { body, environment, segment, effects: None, steps: 0, time_s: 0.0 }
     }
 
-    /// Moves the vehicle by `dt_s`, rotor speeds held; every call must give the same `dt_s`.
+    /// The same vehicle with real rotors, air and ground, made for steps of `step_s`.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub fn with(
+        model: Model,
+        initial: Motion,
+        environment: Environment,
+        realism: &Realism,
+        step_s: f64,
+    ) -> Result<Self, OutOfRange> {
+        let effects = Effects::new(realism, environment.nominal(), step_s)?;
+        Ok(Plant { effects: Some(Box::new(effects)), ..Plant::new(model, initial, environment) })
+    }
+
+    /// Moves the vehicle by `dt_s`, the commanded rotor speeds held; every call must give the same `dt_s`, and the one
+    /// that the plant was made for.
     #[inline]
     pub fn step(&mut self, speeds: &RotorSpeeds, dt_s: f64) {
         if self.time_s >= self.segment.until_s {
             self.segment = self.environment.segment(self.time_s);
         }
-        let Segment { parameters, a_force, a_moment, .. } = &self.segment;
-        let load = Load::new(parameters, speeds.0.map(f64::from).into(), *a_force, *a_moment);
-        match &mut self.body {
-            Body::Simplified(x) => *x = rk4(|x| simplified::derivative(x, &load), x, dt_s),
-            Body::RigidBody(x) => {
-                *x = rk4(|x| rigid_body::derivative(x, &load), x, dt_s);
-                rigid_body::normalise(x);
-            }
+        if self.effects.is_some() {
+            self.advance_in_effect(speeds, dt_s);
+        } else {
+            let Segment { parameters, a_force, a_moment, .. } = &self.segment;
+            let load = Load::new(parameters, speeds.0.map(f64::from).into(), *a_force, *a_moment);
+            self.body.advance(&load, dt_s);
         }
         // Counted, not summed, so that time does not drift.
         self.steps += 1;
         self.time_s = self.steps as f64 * dt_s;
+    }
+
+    /// The step with everything that [`Realism`] adds.
+    // Apart, so that the ideal plant's step stays short.
+    #[inline(never)]
+    fn advance_in_effect(&mut self, speeds: &RotorSpeeds, dt_s: f64) {
+        let Some(effects) = &mut self.effects else { return };
+        let (position, velocity) = self.body.place();
+        let body = &self.body;
+        let (load, surroundings) =
+            effects.begin_step(speeds, &self.segment, self.time_s, &position, &velocity, || body.axes());
+        if surroundings.are_empty() {
+            self.body.advance(&load, dt_s);
+        } else {
+            self.body.advance_in(&load, &surroundings, dt_s);
+        }
     }
 
     /// True motion now.
@@ -145,6 +242,11 @@ impl Plant {
             Body::Simplified(x) => simplified::motion(x),
             Body::RigidBody(x) => rigid_body::motion(x),
         }
+    }
+
+    /// What rotors, air and ground did in the last step; before the first one, at rest. `None` for an ideal plant.
+    pub fn telemetry(&self) -> Option<Telemetry> {
+        self.effects.as_ref().map(|effects| effects.telemetry())
     }
 
     /// Time since the start \[s\].

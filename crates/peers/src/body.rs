@@ -1,0 +1,109 @@
+//! From thrust and angular acceleration to a command: the nominal vehicle and its rotors.
+
+use crate::attitude::roll_pitch;
+use afbc::allocation::Mixer;
+use afbc::backstepping::Errors;
+use afbc::command_filter::Filtered;
+use afbc::{Command, Health, Settings};
+use airframe::{Inputs, OutOfRange, Parameters, PerAxis, RotorSpeeds};
+use nalgebra::{Matrix3, Vector3};
+
+/// Largest |U3| as a share of U4: yaw is dear, since its moment is drag, and must leave something for roll and pitch.
+const YAW_SHARE: f32 = 0.5;
+/// What the rotors give counts as what was asked within this share of the thrust: rounding.
+const ROUNDING: f32 = 1e-4;
+
+/// The nominal vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Body {
+    pub(crate) mixer: Mixer,
+    pub(crate) mass_kg: f32,
+    pub(crate) inertia_kg_m2: Vector3<f32>,
+    /// l/Ix, l/Iy, (d/b)/Iz: angular acceleration of U1..U3 \[rad/s2 per N\].
+    effectiveness: Vector3<f32>,
+}
+
+/// What a controller asks of the vehicle, and why.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Demand {
+    /// U4 \[N\].
+    pub(crate) thrust_n: f32,
+    /// d Omega/dt from U1..U3 \[rad/s2\].
+    pub(crate) angular_acceleration_rad_s2: Vector3<f32>,
+    /// Wanted acceleration, earth frame \[m/s2\].
+    pub(crate) acceleration_m_s2: Vector3<f32>,
+    /// The attitude tracked.
+    pub(crate) desired: Matrix3<f32>,
+    /// Its angular velocity, in its own frame \[rad/s\].
+    pub(crate) desired_rates_rad_s: Vector3<f32>,
+    /// Setpoint minus state: position, velocity, attitude, rates.
+    pub(crate) errors: [Vector3<f32>; 4],
+}
+
+impl Body {
+    /// The vehicle with these parameters.
+    pub(crate) fn new(vehicle: &Parameters, settings: &Settings) -> Result<Self, OutOfRange> {
+        settings.validate()?;
+        let mixer = Mixer::new(vehicle, settings.rotor_force_max_n)?;
+        let (l, i) = (vehicle.arm_m, vehicle.inertia_kg_m2);
+        let c = vehicle.drag_factor_n_m_s2 / vehicle.thrust_factor_n_s2;
+        let effectiveness = Vector3::new(l / i.x, l / i.y, c / i.z);
+        Ok(Body { mixer, mass_kg: vehicle.mass_kg, inertia_kg_m2: i, effectiveness })
+    }
+
+    /// d Omega/dt that the rotors give under `inputs` \[rad/s2\].
+    #[inline]
+    pub(crate) fn angular_acceleration(&self, inputs: &Inputs) -> Vector3<f32> {
+        Vector3::new(inputs.roll_n, inputs.pitch_n, inputs.yaw_n).component_mul(&self.effectiveness)
+    }
+
+    /// -(I^-1)(Omega x I Omega): the part of d Omega/dt that the body's own turning causes \[rad/s2\].
+    #[inline]
+    pub(crate) fn coupling(&self, rates: &Vector3<f32>) -> Vector3<f32> {
+        -rates.cross(&self.inertia_kg_m2.component_mul(rates)).component_div(&self.inertia_kg_m2)
+    }
+
+    /// The rotor speeds at which the rotors carry the weight \[rad/s\].
+    pub(crate) fn hover(&self, gravity_m_s2: f32) -> RotorSpeeds {
+        let inputs = Inputs { thrust_n: self.mass_kg * gravity_m_s2, ..Inputs::default() };
+        self.mixer.speeds(&self.mixer.allocate(&inputs).forces)
+    }
+
+    /// The command for `demand`, and what of U1..U3 the rotors cannot give \[N\].
+    #[inline]
+    pub(crate) fn command(&self, demand: &Demand, health: Health) -> (Command, Vector3<f32>) {
+        let wanted = demand.angular_acceleration_rad_s2.component_div(&self.effectiveness);
+        let thrust_n = demand.thrust_n;
+        let yaw_max = YAW_SHARE * thrust_n.max(0.0);
+        let inputs =
+            Inputs { roll_n: wanted.x, pitch_n: wanted.y, yaw_n: wanted.z.max(-yaw_max).min(yaw_max), thrust_n };
+        let allocation = self.mixer.allocate(&inputs);
+        let given = Mixer::inputs(&allocation.forces);
+        let unallocated = (wanted - Vector3::new(given.roll_n, given.pitch_n, given.yaw_n))
+            .map(|missing| if missing.abs() > ROUNDING * thrust_n.abs() { missing } else { 0.0 });
+
+        let desired_rad = roll_pitch(&demand.desired);
+        let [roll, pitch] = desired_rad;
+        let [p, q] = [demand.desired_rates_rad_s.x, demand.desired_rates_rad_s.y];
+        let [position, velocity, attitude, rates] = demand.errors;
+        let errors = |e1, e1_dot| Errors { e1, e1_dot, e2: 0.0 };
+        let command = Command {
+            speeds: self.mixer.speeds(&allocation.forces),
+            forces: allocation.forces,
+            inputs,
+            virtual_m_s2: [demand.acceleration_m_s2.x, demand.acceleration_m_s2.y],
+            desired_rad,
+            filtered: [Filtered { angle: roll, rate: p }, Filtered { angle: pitch, rate: q }],
+            errors: PerAxis {
+                roll: errors(attitude.x, rates.x),
+                pitch: errors(attitude.y, rates.y),
+                yaw: errors(attitude.z, rates.z),
+                z: errors(position.z, velocity.z),
+                x: errors(position.x, velocity.x),
+                y: errors(position.y, velocity.y),
+            },
+            health: Health { saturated: allocation.saturated, ..health },
+        };
+        (command, unallocated)
+    }
+}

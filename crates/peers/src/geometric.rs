@@ -1,0 +1,326 @@
+//! Geometric tracking on SE(3).
+//!
+//! Lee, Leok, McClamroch, *Geometric tracking control of a quadrotor UAV on SE(3)*, CDC 2010, in frames with z up; the
+//! integral terms, 0 in the original, are those of Goodarzi, Lee, Leok, *Geometric nonlinear PID control of a quadrotor
+//! UAV on SE(3)*, ECC 2013. With e_x = x - x_d, e_v = v - v_d:
+//!
+//! ```text
+//! s   = -k_x e_x - k_v e_v - sat(k_i int e_x) + g e_z + a_d, within Limits      specific force: F/m of the paper
+//! f   = m s . R e_3                                                             thrust
+//! R_d: third column along s, heading psi_d
+//! e_R = (R_d' R - R' R_d)^v / 2,  e_Omega = Omega - R' R_d Omega_d
+//! I^-1 M = -k_R e_R - k_Omega e_Omega - sat(k_I int(e_Omega + c e_R))
+//!          + I^-1 (Omega x I Omega) - (Omega x R' R_d Omega_d - R' R_d dOmega_d/dt)
+//! ```
+//!
+//! # Decisions
+//!
+//! * **Gains** are the paper's over mass and inertia: k_x, k_R in 1/s2, k_v, k_Omega in 1/s. Yaw has its own k_R and
+//!   k_Omega, where the proof has one number for all three axes: yaw has a sixtieth of the others' authority.
+//! * **R_d, Omega_d and dOmega_d/dt** need two derivatives of s, and those of the setpoint end at acceleration. s passes a
+//!   critically damped second-order filter w^2/(s + w)^2 first, which gives the filtered s with ds/dt and d2s/dt2 exactly
+//!   (command-filtered, as AFBC's own desired attitude is); R_d follows the filtered s. Then with b1, b2, b3 the columns of R_d,
+//!   n = |s|, and x_C, y_C the horizontals along and left of the heading:
+//!
+//!   ```text
+//!   Omega_d1 = -b2 . ds/dt / n,  Omega_d2 = b1 . ds/dt / n
+//!   Omega_d3 = (dpsi_d/dt b1 . x_C + Omega_d2 b3 . y_C) / (b2 . y_C)
+//!   ```
+//!
+//!   and dOmega_d/dt is the same with one derivative more on s and psi_d; products of rates are left out (at 1 rad/s they
+//!   are 1 rad/s2 where k_R e_R is tens).
+//! * **Heading**: b1 is square to y_C, so that the yaw of R_d is psi_d exactly; the paper projects a freely chosen
+//!   direction, which this is one choice of.
+//! * **Limits**: the paper assumes that s never vanishes and that the rotors give anything; here [`Limits`] see to it.
+//! * **Integrals**: of e_x alone for position, since the integral of e_v, which the source adds, is e_x and part of k_x
+//!   already. c = k_R / k_Omega in the attitude's. Both are held within +-[`Gains::position_integral_max_m_s2`] and
+//!   +-20 rad/s2, and not driven further towards what limits or rotors cannot give.
+
+use crate::attitude::{facing, geometric_error, heading, length, r_earth_body, unit};
+use crate::body::{Body, Demand};
+use crate::differentiator::{Differentiator, Smooth};
+use crate::limits::{Limits, TILT_MAX};
+use crate::pid::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
+use afbc::{Command, FlightController, Health, Screen, Settings};
+use airframe::{OutOfRange, Parameters, Range, Setpoint, State};
+use nalgebra::{Matrix3, Vector3};
+
+/// Range of each tunable of [`Gains`].
+#[expect(missing_docs, reason = "named after the field that each bounds")]
+pub mod ranges {
+    use airframe::Range;
+    pub const POSITION_P: Range = Range::new("position_p_1_s2", 0.5, 100.0);
+    pub const POSITION_D: Range = Range::new("position_d_1_s", 0.5, 20.0);
+    pub const POSITION_I: Range = Range::new("position_i_1_s3", 0.0, 200.0);
+    pub const HEIGHT_P: Range = Range::new("height_p_1_s2", 0.5, 200.0);
+    pub const HEIGHT_D: Range = Range::new("height_d_1_s", 0.5, 60.0);
+    pub const HEIGHT_I: Range = Range::new("height_i_1_s3", 0.0, 300.0);
+    pub const TILT_P: Range = Range::new("tilt_p_1_s2", 10.0, 1000.0);
+    pub const TILT_D: Range = Range::new("tilt_d_1_s", 2.0, 100.0);
+    pub const TILT_I: Range = Range::new("tilt_i_1_s2", 0.0, 500.0);
+    pub const YAW_P: Range = Range::new("yaw_p_1_s2", 0.5, 200.0);
+    pub const YAW_D: Range = Range::new("yaw_d_1_s", 0.5, 40.0);
+    pub const YAW_I: Range = Range::new("yaw_i_1_s2", 0.0, 100.0);
+    pub const FILTER: Range = Range::new("filter_rad_s", 10.0, 300.0);
+}
+
+/// Accepted largest integral of the position loop \[m/s2\].
+pub const POSITION_INTEGRAL_MAX: Range = Range::new("position_integral_max_m_s2", 0.0, 50.0);
+
+/// Gains and limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// k_x along x and y \[1/s2\].
+    pub position_p_1_s2: f32,
+    /// k_v along x and y \[1/s\].
+    pub position_d_1_s: f32,
+    /// k_i along x and y \[1/s3\].
+    pub position_i_1_s3: f32,
+    /// k_x along z \[1/s2\].
+    pub height_p_1_s2: f32,
+    /// k_v along z \[1/s\].
+    pub height_d_1_s: f32,
+    /// k_i along z \[1/s3\].
+    pub height_i_1_s3: f32,
+    /// k_R of roll and pitch \[1/s2\].
+    pub tilt_p_1_s2: f32,
+    /// k_Omega of roll and pitch \[1/s\].
+    pub tilt_d_1_s: f32,
+    /// k_I of roll and pitch \[1/s2\].
+    pub tilt_i_1_s2: f32,
+    /// k_R of yaw \[1/s2\].
+    pub yaw_p_1_s2: f32,
+    /// k_Omega of yaw \[1/s\].
+    pub yaw_d_1_s: f32,
+    /// k_I of yaw \[1/s2\].
+    pub yaw_i_1_s2: f32,
+    /// w of the filter on s \[rad/s\].
+    pub filter_rad_s: f32,
+    /// Largest sat(k_i int e_x), per coordinate \[m/s2\]. Not a tunable.
+    pub position_integral_max_m_s2: f32,
+    /// Largest tilt \[rad\]. Not a tunable.
+    pub tilt_max_rad: f32,
+}
+
+impl Gains {
+    /// The law of 2010, without integrals. Ours, by hand, for the paper's vehicle with rotors of 20 ms.
+    pub const LEE_2010: Self = Gains {
+        position_p_1_s2: 16.0,
+        position_d_1_s: 8.0,
+        position_i_1_s3: 0.0,
+        height_p_1_s2: 25.0,
+        height_d_1_s: 12.0,
+        height_i_1_s3: 0.0,
+        tilt_p_1_s2: 250.0,
+        tilt_d_1_s: 26.0,
+        tilt_i_1_s2: 0.0,
+        yaw_p_1_s2: 24.0,
+        yaw_d_1_s: 8.0,
+        yaw_i_1_s2: 0.0,
+        filter_rad_s: 60.0,
+        position_integral_max_m_s2: 10.0,
+        tilt_max_rad: 0.7,
+    };
+
+    /// With the integrals of 2013. Ours, by hand, for the paper's vehicle with rotors of 20 ms.
+    pub const GOODARZI_2013: Self =
+        Gains { position_i_1_s3: 25.0, height_i_1_s3: 60.0, tilt_i_1_s2: 20.0, yaw_i_1_s2: 10.0, ..Self::LEE_2010 };
+
+    /// Every gain that is a matter of taste, with the range to search it in. For the law of 2010, leave the four integrals
+    /// (names with `_i_`) at 0.
+    pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 13] {
+        use ranges::*;
+        [
+            (&POSITION_P, &mut self.position_p_1_s2),
+            (&POSITION_D, &mut self.position_d_1_s),
+            (&POSITION_I, &mut self.position_i_1_s3),
+            (&HEIGHT_P, &mut self.height_p_1_s2),
+            (&HEIGHT_D, &mut self.height_d_1_s),
+            (&HEIGHT_I, &mut self.height_i_1_s3),
+            (&TILT_P, &mut self.tilt_p_1_s2),
+            (&TILT_D, &mut self.tilt_d_1_s),
+            (&TILT_I, &mut self.tilt_i_1_s2),
+            (&YAW_P, &mut self.yaw_p_1_s2),
+            (&YAW_D, &mut self.yaw_d_1_s),
+            (&YAW_I, &mut self.yaw_i_1_s2),
+            (&FILTER, &mut self.filter_rad_s),
+        ]
+    }
+
+    /// Checks every gain and limit.
+    ///
+    /// # Errors
+    /// The first one out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        let mut gains = *self;
+        for (range, gain) in gains.tunables() {
+            range.check(*gain)?;
+        }
+        POSITION_INTEGRAL_MAX.check(self.position_integral_max_m_s2)?;
+        TILT_MAX.check(self.tilt_max_rad)
+    }
+}
+
+/// The controller: fixed from here on. What changes in flight is in [`Memory`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Geometric {
+    body: Body,
+    limits: Limits,
+    filter: Differentiator,
+    dt_s: f32,
+    k_x: Vector3<f32>,
+    k_v: Vector3<f32>,
+    k_i: Vector3<f32>,
+    position_integral_max: f32,
+    k_r: Vector3<f32>,
+    k_omega: Vector3<f32>,
+    /// k_I
+    k_integral: Vector3<f32>,
+    /// c = k_R / k_Omega \[1/s\]
+    c: Vector3<f32>,
+}
+
+/// What the controller remembers between steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Memory {
+    /// sat(k_i int (x_d - x)), earth frame \[m/s2\].
+    pub position_integral: Vector3<f32>,
+    /// sat(-k_I int(e_Omega + c e_R)), body frame \[rad/s2\].
+    pub attitude_integral: Vector3<f32>,
+    /// What of U1..U3 the rotors could not give in the last step \[N\].
+    unallocated: Vector3<f32>,
+    specific_force: Smooth,
+    screen: Screen,
+}
+
+/// R_d, Omega_d, dOmega_d/dt; the last two in the desired frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Desired {
+    /// R_d: desired frame to earth.
+    pub r_earth_desired: Matrix3<f32>,
+    /// Omega_d \[rad/s\].
+    pub rates_rad_s: Vector3<f32>,
+    /// dOmega_d/dt, without products of rates \[rad/s2\].
+    pub rates_dot_rad_s2: Vector3<f32>,
+}
+
+/// The attitude along a specific force with its two derivatives, \[m/s2\], \[m/s3\], \[m/s4\], and the setpoint's heading. The
+/// specific force must point up.
+#[inline]
+pub fn desired(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> Desired {
+    let [s, s_dot, s_ddot] = specific_force;
+    let r = facing(&s, setpoint.yaw_rad);
+    let (b1, b2, b3) = (r.column(0), r.column(1), r.column(2));
+    let [along, left] = heading(setpoint.yaw_rad);
+    let per_length = 1.0 / length(&s);
+    // b2 . left is the cosine of the roll, above 0 as long as s points up.
+    let turn = |s_dot: &Vector3<f32>, yaw_dot: f32| {
+        let (p, q) = (-b2.dot(s_dot) * per_length, b1.dot(s_dot) * per_length);
+        Vector3::new(p, q, (yaw_dot * b1.dot(&along) + q * b3.dot(&left)) / b2.dot(&left))
+    };
+    Desired {
+        r_earth_desired: r,
+        rates_rad_s: turn(&s_dot, setpoint.yaw_rate_rad_s),
+        rates_dot_rad_s2: turn(&s_ddot, setpoint.yaw_acceleration_rad_s2),
+    }
+}
+
+impl Geometric {
+    /// A controller for a vehicle with these nominal parameters.
+    ///
+    /// # Errors
+    /// The first parameter, setting or gain out of range.
+    pub fn new(vehicle: Parameters, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
+        let body = Body::new(&vehicle, &settings)?;
+        gains.validate()?;
+        let twice = |tilt, yaw| Vector3::new(tilt, tilt, yaw);
+        let (k_r, k_omega) = (twice(gains.tilt_p_1_s2, gains.yaw_p_1_s2), twice(gains.tilt_d_1_s, gains.yaw_d_1_s));
+        Ok(Geometric {
+            body,
+            limits: Limits::new(&vehicle, &settings, gains.tilt_max_rad)?,
+            filter: Differentiator::new(gains.filter_rad_s, settings.dt_s)?,
+            dt_s: settings.dt_s,
+            k_x: twice(gains.position_p_1_s2, gains.height_p_1_s2),
+            k_v: twice(gains.position_d_1_s, gains.height_d_1_s),
+            k_i: twice(gains.position_i_1_s3, gains.height_i_1_s3),
+            position_integral_max: gains.position_integral_max_m_s2,
+            k_r,
+            k_omega,
+            k_integral: twice(gains.tilt_i_1_s2, gains.yaw_i_1_s2),
+            c: k_r.component_div(&k_omega),
+        })
+    }
+}
+
+impl FlightController for Geometric {
+    type Memory = Memory;
+
+    #[inline]
+    fn step(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint) -> Command {
+        let mut health = Health::default();
+        let Some((state, setpoint)) = memory.screen.pass(state, setpoint, &mut health) else {
+            return Command { health, ..Command::default() };
+        };
+
+        // Position.
+        let gravity = self.limits.gravity();
+        let position_error = setpoint.position_m - state.position_m;
+        let velocity_error = setpoint.velocity_m_s - state.velocity_m_s;
+        let acceleration = self.k_x.component_mul(&position_error)
+            + self.k_v.component_mul(&velocity_error)
+            + memory.position_integral
+            + setpoint.acceleration_m_s2;
+        let wanted = acceleration + gravity;
+        let specific_force = self.limits.apply(&wanted);
+
+        // Desired attitude.
+        self.filter.advance(&mut memory.specific_force, &specific_force);
+        let filtered = &memory.specific_force;
+        let second = self.filter.second_derivative(filtered, &specific_force);
+        let Desired { r_earth_desired, rates_rad_s, rates_dot_rad_s2 } =
+            desired([filtered.value(), filtered.derivative(), second], &setpoint);
+
+        // Attitude.
+        let r = r_earth_body(&state.attitude_rad);
+        let omega = state.rates_rad_s;
+        let to_body = r.transpose() * r_earth_desired;
+        let omega_d = to_body * rates_rad_s;
+        let attitude_error = geometric_error(&r, &r_earth_desired);
+        let rate_error = omega_d - omega;
+        let angular_acceleration = self.k_r.component_mul(&attitude_error)
+            + self.k_omega.component_mul(&rate_error)
+            + memory.attitude_integral
+            - self.body.coupling(&omega)
+            - (omega.cross(&omega_d) - to_body * rates_dot_rad_s2);
+
+        let demand = Demand {
+            thrust_n: self.body.mass_kg * specific_force.dot(&unit(&r.column(2).into())).max(0.0),
+            angular_acceleration_rad_s2: angular_acceleration,
+            acceleration_m_s2: acceleration,
+            desired: r_earth_desired,
+            desired_rates_rad_s: rates_rad_s,
+            errors: [position_error, velocity_error, attitude_error, rate_error],
+        };
+        let (command, unallocated) = self.body.command(&demand, health);
+
+        if !health.state_rejected {
+            let allowed = position_error.zip_map(&(wanted - specific_force), away_from);
+            memory.position_integral = integrate(
+                &memory.position_integral,
+                &self.k_i.component_mul(&allowed),
+                self.dt_s,
+                self.position_integral_max,
+            );
+            let driving = rate_error + self.c.component_mul(&attitude_error);
+            let allowed = driving.zip_map(&memory.unallocated, away_from);
+            memory.attitude_integral = integrate(
+                &memory.attitude_integral,
+                &self.k_integral.component_mul(&allowed),
+                self.dt_s,
+                RATE_INTEGRAL_MAX_RAD_S2,
+            );
+        }
+        memory.unallocated = unallocated;
+        command
+    }
+}

@@ -1,0 +1,54 @@
+//! Established quadrotor controllers, for AFBC to be weighed against, in AFBC's own style: no_std, no alloc, fixed size,
+//! and behind the same [`FlightController`](afbc::FlightController).
+//!
+//! | controller | what it is | source |
+//! |---|---|---|
+//! | [`pid`] | cascaded PID with a tilt-prioritised attitude loop, as autopilots fly | PX4; Brescianini and D'Andrea 2018 |
+//! | [`geometric`] | tracking on SE(3), optionally with integral terms | Lee, Leok, McClamroch 2010; Goodarzi, Lee, Leok 2013 |
+//! | [`indi`] | incremental dynamic inversion of attitude and of position | Smeur, Chu, de Croon 2016 and 2018 |
+//!
+//! Each has its equations and its sources at the top of its file; where the source leaves something open, the same
+//! place says what was decided. Frames and units are stated in [`airframe`].
+//!
+//! # What they share
+//!
+//! * The interface: an [`airframe::State`] and an [`airframe::Setpoint`] in, an [`afbc::Command`] out, by way of U1..U4
+//!   and AFBC's own [`Mixer`](afbc::allocation::Mixer), so that no controller has a better allocation than another.
+//! * Of [`afbc::Settings`], the time step and the rotors' limit. What else is there belongs to AFBC.
+//! * Implausible input through [`afbc::Screen`]; filters and integrators rest while the state is not a new one.
+//! * The vehicle's nominal parameters scale everything, so gains are in 1/s and 1/s2 and serve vehicles of any size whose
+//!   rotors are as quick.
+//! * [`limits::Limits`]: thrust within what the rotors give, tilt below a maximum, yaw no dearer than it is worth.
+//! * Mathematics from [`afbc::math`] alone, so host and target give the same bits. Its sine is off by up to 1.2e-3, which
+//!   turns a tilt of 0.1 rad into 0.0987: a lasting 0.013 m/s2 at most where nothing integrates, and nothing elsewhere.
+//!
+//! # Tuning
+//!
+//! Gains are plain structs. `tunables` lists each gain that is a matter of taste with the range to search; what describes
+//! the vehicle instead (largest tilt, rotor lag) is a field of the same struct but not in the list. The sets given
+//! here, each named `Gains::PAPER_VEHICLE` or after its source, were tuned by hand for the vehicle of the paper's
+//! Section IV with rotors of 20 ms.
+//!
+//! ```
+//! use afbc::{FlightController, Profile};
+//! use airframe::{Parameters, Setpoint, State};
+//! use peers::pid::{Gains, Memory, Pid};
+//!
+//! let controller = Pid::new(Parameters::PAPER.to_f32(), Profile::Paper.settings(), Gains::PAPER_VEHICLE)?;
+//! let command = controller.step(&mut Memory::default(), &State::default(), &Setpoint::default());
+//! assert_eq!(command.inputs.thrust_n, 0.486 * 9.81); // nothing to correct: the weight
+//! # Ok::<(), airframe::OutOfRange>(())
+//! ```
+#![no_std]
+
+pub mod attitude;
+mod body;
+pub mod differentiator;
+pub mod geometric;
+pub mod indi;
+pub mod limits;
+pub mod pid;
+
+pub use geometric::Geometric;
+pub use indi::Indi;
+pub use pid::Pid;

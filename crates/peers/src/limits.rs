@@ -1,0 +1,74 @@
+//! What the position loops may ask for.
+
+use afbc::{Settings, math};
+use airframe::{OutOfRange, Parameters, Range};
+use nalgebra::Vector3;
+
+/// Accepted largest tilt \[rad\].
+pub const TILT_MAX: Range = Range::new("tilt_max_rad", 0.05, 1.2);
+
+/// Least vertical part of the specific force, as a share of gravity: thrust always points up and tells an attitude.
+const VERTICAL_MIN: f32 = 0.1;
+/// Largest vertical part as a share of the rotors' most: what is left still turns the vehicle and moves it sideways.
+const VERTICAL_MAX: f32 = 0.9;
+
+/// Bounds of the specific force, which is thrust over mass as a vector of the earth frame \[m/s2\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    gravity_m_s2: f32,
+    vertical_min_m_s2: f32,
+    vertical_max_m_s2: f32,
+    max_m_s2: f32,
+    tan_tilt: f32,
+}
+
+impl Limits {
+    /// The bounds of a vehicle whose parameters and settings are valid.
+    ///
+    /// # Errors
+    /// If the tilt is outside [`TILT_MAX`].
+    pub fn new(vehicle: &Parameters, settings: &Settings, tilt_max_rad: f32) -> Result<Self, OutOfRange> {
+        TILT_MAX.check(tilt_max_rad)?;
+        let vertical_min_m_s2 = VERTICAL_MIN * vehicle.gravity_m_s2;
+        // A vehicle whose rotors cannot even lift it asks for all that they have.
+        let max_m_s2 = (4.0 * settings.rotor_force_max_n / vehicle.mass_kg).max(2.0 * vertical_min_m_s2);
+        Ok(Limits {
+            gravity_m_s2: vehicle.gravity_m_s2,
+            vertical_min_m_s2,
+            vertical_max_m_s2: VERTICAL_MAX * max_m_s2,
+            max_m_s2,
+            tan_tilt: math::sin(tilt_max_rad) / math::cos(tilt_max_rad),
+        })
+    }
+
+    /// Gravity, as the specific force that balances it \[m/s2\].
+    #[inline]
+    pub fn gravity(&self) -> Vector3<f32> {
+        Vector3::new(0.0, 0.0, self.gravity_m_s2)
+    }
+
+    /// The nearest thing to `specific_force` that the vehicle should give, height before sideways: vertical part within
+    /// 10 % of gravity and 90 % of what the rotors have, then tilt within its limit and length within what the rotors have.
+    /// Always points up.
+    #[inline]
+    pub fn apply(&self, specific_force: &Vector3<f32>) -> Vector3<f32> {
+        let vertical = specific_force.z.max(self.vertical_min_m_s2).min(self.vertical_max_m_s2);
+        let left_over = math::sqrt(self.max_m_s2 * self.max_m_s2 - vertical * vertical);
+        let bounded = horizontally(specific_force, left_over.min(self.tan_tilt * vertical));
+        Vector3::new(bounded.x, bounded.y, vertical)
+    }
+}
+
+/// `v` with its horizontal part shortened to at most `max`.
+#[inline]
+pub(crate) fn horizontally(v: &Vector3<f32>, max: f32) -> Vector3<f32> {
+    let length = math::sqrt(v.x * v.x + v.y * v.y);
+    if length > max { Vector3::new(v.x * (max / length), v.y * (max / length), v.z) } else { *v }
+}
+
+/// `v` with its horizontal part shortened to at most `max` and its vertical part clipped to `max`.
+#[inline]
+pub(crate) fn cylinder(v: &Vector3<f32>, max: f32) -> Vector3<f32> {
+    let v = horizontally(v, max);
+    Vector3::new(v.x, v.y, v.z.max(-max).min(max))
+}

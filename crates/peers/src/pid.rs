@@ -1,0 +1,322 @@
+//! Cascaded PID, in the manner of the PX4 autopilot: four loops, each commanding the next.
+//!
+//! With the setpoint's position p_d, velocity v_d, acceleration a_d and yaw psi_d, all errors setpoint minus state:
+//!
+//! ```text
+//! position     v_sp = v_d + sat(k_p (p_d - p))
+//! velocity     a_sp = a_d + k_v (v_sp - v) + i_v - d_v dv/dt
+//!              di_v/dt = k_i ((v_sp - v) - (2 / k_v) (a_sp - a_given)), |i_v| <= g
+//! thrust       s = a_given + g e_z, within Limits; U4 = m |s|; R_d points along s, its yaw is psi_d
+//! attitude     Omega_sp = k_a e(R, R_d) + R' e_z dpsi_d/dt, e tilt-prioritised
+//! rates        dOmega/dt = k_w (Omega_sp - Omega) + i_w - d_w dOmega/dt|measured + f Omega_sp
+//!              di_w/dt = k_iw (Omega_sp - Omega), not towards what the rotors could not give, |i_w| <= 20 rad/s2
+//! inputs       U1 = Ix/l dp/dt, U2 = Iy/l dq/dt, U3 = Iz/(d/b) dr/dt
+//! ```
+//!
+//! Sources: PX4-Autopilot, `mc_pos_control` (PositionControl), `mc_att_control` (AttitudeControl) and `lib/rate_control`,
+//! read for their structure; the attitude error is Brescianini and D'Andrea's (see [`crate::attitude`]); the velocity
+//! loop's tracking anti-windup is Rundqwist's, *Anti-reset windup for PID controllers*, IFAC 1990.
+//!
+//! Differences from PX4: gains of the rate loop are in 1/s, since the moment is scaled by the inertia; the tilt follows
+//! the whole specific force, not gravity plus its horizontal part; tracking anti-windup serves height too; derivatives
+//! are those of [`crate::differentiator`]; the rate integrator is not weakened at large errors.
+
+use crate::attitude::{facing, length, r_earth_body, tilt_prioritised_error};
+use crate::body::{Body, Demand};
+use crate::differentiator::{Differentiator, Smooth};
+use crate::limits::{Limits, TILT_MAX, cylinder};
+use afbc::{Command, FlightController, Health, Screen, Settings};
+use airframe::{OutOfRange, Parameters, Range, Setpoint, State};
+use nalgebra::Vector3;
+
+/// Range of each tunable of [`Gains`].
+#[expect(missing_docs, reason = "named after the field that each bounds")]
+pub mod ranges {
+    use airframe::Range;
+    pub const POSITION_P: Range = Range::new("position_p_1_s", 0.2, 10.0);
+    pub const VELOCITY_P: Range = Range::new("velocity_p_1_s", 0.5, 20.0);
+    pub const VELOCITY_I: Range = Range::new("velocity_i_1_s2", 0.0, 200.0);
+    pub const VELOCITY_D: Range = Range::new("velocity_d", 0.0, 2.0);
+    pub const HEIGHT_P: Range = Range::new("height_p_1_s", 0.2, 10.0);
+    pub const CLIMB_P: Range = Range::new("climb_p_1_s", 0.5, 20.0);
+    pub const CLIMB_I: Range = Range::new("climb_i_1_s2", 0.0, 200.0);
+    pub const CLIMB_D: Range = Range::new("climb_d", 0.0, 2.0);
+    pub const TILT_P: Range = Range::new("tilt_p_1_s", 1.0, 30.0);
+    pub const YAW_P: Range = Range::new("yaw_p_1_s", 0.2, 15.0);
+    pub const TILT_RATE_P: Range = Range::new("tilt_rate_p_1_s", 2.0, 100.0);
+    pub const TILT_RATE_I: Range = Range::new("tilt_rate_i_1_s2", 0.0, 500.0);
+    pub const TILT_RATE_D: Range = Range::new("tilt_rate_d", 0.0, 3.0);
+    pub const YAW_RATE_P: Range = Range::new("yaw_rate_p_1_s", 0.5, 40.0);
+    pub const YAW_RATE_I: Range = Range::new("yaw_rate_i_1_s2", 0.0, 100.0);
+    pub const RATE_FEED_FORWARD: Range = Range::new("rate_feed_forward_1_s", 0.0, 20.0);
+    pub const FILTER: Range = Range::new("filter_rad_s", 20.0, 500.0);
+}
+
+/// Accepted yaw weight.
+pub const YAW_WEIGHT: Range = Range::new("yaw_weight", 0.05, 1.0);
+/// Accepted largest correction of the velocity \[m/s\].
+pub const SPEED_MAX: Range = Range::new("speed_max_m_s", 0.1, 100.0);
+
+/// Largest integral of the rate loop \[rad/s2\].
+pub(crate) const RATE_INTEGRAL_MAX_RAD_S2: f32 = 20.0;
+
+/// Gains and limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// k_p along x and y \[1/s\].
+    pub position_p_1_s: f32,
+    /// k_v along x and y \[1/s\].
+    pub velocity_p_1_s: f32,
+    /// k_i along x and y \[1/s2\].
+    pub velocity_i_1_s2: f32,
+    /// d_v along x and y.
+    pub velocity_d: f32,
+    /// k_p along z \[1/s\].
+    pub height_p_1_s: f32,
+    /// k_v along z \[1/s\].
+    pub climb_p_1_s: f32,
+    /// k_i along z \[1/s2\].
+    pub climb_i_1_s2: f32,
+    /// d_v along z.
+    pub climb_d: f32,
+    /// k_a of roll and pitch \[1/s\].
+    pub tilt_p_1_s: f32,
+    /// k_a of yaw for small errors; the weight is made up for \[1/s\].
+    pub yaw_p_1_s: f32,
+    /// k_w of roll and pitch \[1/s\].
+    pub tilt_rate_p_1_s: f32,
+    /// k_iw of roll and pitch \[1/s2\].
+    pub tilt_rate_i_1_s2: f32,
+    /// d_w of roll and pitch.
+    pub tilt_rate_d: f32,
+    /// k_w of yaw \[1/s\].
+    pub yaw_rate_p_1_s: f32,
+    /// k_iw of yaw \[1/s2\].
+    pub yaw_rate_i_1_s2: f32,
+    /// f \[1/s\].
+    pub rate_feed_forward_1_s: f32,
+    /// Bandwidth of both derivatives \[rad/s\].
+    pub filter_rad_s: f32,
+    /// How much of a large yaw error is corrected together with the tilt, 0 to 1. Not a tunable.
+    pub yaw_weight: f32,
+    /// Largest velocity that a position error may add, sideways and upwards \[m/s\]. Not a tunable.
+    pub speed_max_m_s: f32,
+    /// Largest tilt \[rad\]. Not a tunable.
+    pub tilt_max_rad: f32,
+}
+
+impl Gains {
+    /// Ours, by hand, for the paper's vehicle with rotors of 20 ms.
+    pub const PAPER_VEHICLE: Self = Gains {
+        position_p_1_s: 2.2,
+        velocity_p_1_s: 6.0,
+        velocity_i_1_s2: 12.0,
+        velocity_d: 0.05,
+        height_p_1_s: 2.0,
+        climb_p_1_s: 7.0,
+        climb_i_1_s2: 30.0,
+        climb_d: 0.0,
+        tilt_p_1_s: 11.0,
+        yaw_p_1_s: 2.0,
+        tilt_rate_p_1_s: 30.0,
+        tilt_rate_i_1_s2: 40.0,
+        tilt_rate_d: 0.05,
+        yaw_rate_p_1_s: 8.0,
+        yaw_rate_i_1_s2: 15.0,
+        rate_feed_forward_1_s: 0.0,
+        filter_rad_s: 100.0,
+        yaw_weight: 0.4,
+        speed_max_m_s: 3.0,
+        tilt_max_rad: 0.7,
+    };
+
+    /// Every gain that is a matter of taste, with the range to search it in.
+    pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 17] {
+        use ranges::*;
+        [
+            (&POSITION_P, &mut self.position_p_1_s),
+            (&VELOCITY_P, &mut self.velocity_p_1_s),
+            (&VELOCITY_I, &mut self.velocity_i_1_s2),
+            (&VELOCITY_D, &mut self.velocity_d),
+            (&HEIGHT_P, &mut self.height_p_1_s),
+            (&CLIMB_P, &mut self.climb_p_1_s),
+            (&CLIMB_I, &mut self.climb_i_1_s2),
+            (&CLIMB_D, &mut self.climb_d),
+            (&TILT_P, &mut self.tilt_p_1_s),
+            (&YAW_P, &mut self.yaw_p_1_s),
+            (&TILT_RATE_P, &mut self.tilt_rate_p_1_s),
+            (&TILT_RATE_I, &mut self.tilt_rate_i_1_s2),
+            (&TILT_RATE_D, &mut self.tilt_rate_d),
+            (&YAW_RATE_P, &mut self.yaw_rate_p_1_s),
+            (&YAW_RATE_I, &mut self.yaw_rate_i_1_s2),
+            (&RATE_FEED_FORWARD, &mut self.rate_feed_forward_1_s),
+            (&FILTER, &mut self.filter_rad_s),
+        ]
+    }
+
+    /// Checks every gain and limit.
+    ///
+    /// # Errors
+    /// The first one out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        let mut gains = *self;
+        for (range, gain) in gains.tunables() {
+            range.check(*gain)?;
+        }
+        YAW_WEIGHT.check(self.yaw_weight)?;
+        SPEED_MAX.check(self.speed_max_m_s)?;
+        TILT_MAX.check(self.tilt_max_rad)
+    }
+}
+
+/// The controller: fixed from here on. What changes in flight is in [`Memory`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pid {
+    body: Body,
+    limits: Limits,
+    differentiator: Differentiator,
+    dt_s: f32,
+    position_p: Vector3<f32>,
+    velocity_p: Vector3<f32>,
+    velocity_i: Vector3<f32>,
+    velocity_d: Vector3<f32>,
+    /// 2 / k_v
+    anti_windup: Vector3<f32>,
+    attitude_p: Vector3<f32>,
+    rate_p: Vector3<f32>,
+    rate_i: Vector3<f32>,
+    rate_d: Vector3<f32>,
+    rate_feed_forward: f32,
+    yaw_weight: f32,
+    speed_max: f32,
+}
+
+/// What the controller remembers between steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Memory {
+    /// i_v, earth frame \[m/s2\].
+    pub velocity_integral: Vector3<f32>,
+    /// i_w, body frame \[rad/s2\].
+    pub rate_integral: Vector3<f32>,
+    /// What of U1..U3 the rotors could not give in the last step \[N\].
+    unallocated: Vector3<f32>,
+    velocity: Smooth,
+    rates: Smooth,
+    screen: Screen,
+}
+
+impl Pid {
+    /// A controller for a vehicle with these nominal parameters.
+    ///
+    /// # Errors
+    /// The first parameter, setting or gain out of range.
+    pub fn new(vehicle: Parameters, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
+        let body = Body::new(&vehicle, &settings)?;
+        gains.validate()?;
+        let twice = |tilt, yaw| Vector3::new(tilt, tilt, yaw);
+        let velocity_p = twice(gains.velocity_p_1_s, gains.climb_p_1_s);
+        Ok(Pid {
+            body,
+            limits: Limits::new(&vehicle, &settings, gains.tilt_max_rad)?,
+            differentiator: Differentiator::new(gains.filter_rad_s, settings.dt_s)?,
+            dt_s: settings.dt_s,
+            position_p: twice(gains.position_p_1_s, gains.height_p_1_s),
+            velocity_p,
+            velocity_i: twice(gains.velocity_i_1_s2, gains.climb_i_1_s2),
+            velocity_d: twice(gains.velocity_d, gains.climb_d),
+            anti_windup: velocity_p.map(|k| 2.0 / k),
+            attitude_p: twice(gains.tilt_p_1_s, gains.yaw_p_1_s / gains.yaw_weight),
+            rate_p: twice(gains.tilt_rate_p_1_s, gains.yaw_rate_p_1_s),
+            rate_i: twice(gains.tilt_rate_i_1_s2, gains.yaw_rate_i_1_s2),
+            rate_d: twice(gains.tilt_rate_d, 0.0),
+            rate_feed_forward: gains.rate_feed_forward_1_s,
+            yaw_weight: gains.yaw_weight,
+            speed_max: gains.speed_max_m_s,
+        })
+    }
+}
+
+/// `integral` one step further and within +-`max` in each coordinate.
+#[inline]
+pub(crate) fn integrate(integral: &Vector3<f32>, rate: &Vector3<f32>, dt_s: f32, max: f32) -> Vector3<f32> {
+    (integral + rate * dt_s).map(|i| i.max(-max).min(max))
+}
+
+/// `error`, unless it drives an integral further towards what is missing already.
+#[inline]
+pub(crate) fn away_from(error: f32, missing: f32) -> f32 {
+    if missing > 0.0 {
+        error.min(0.0)
+    } else if missing < 0.0 {
+        error.max(0.0)
+    } else {
+        error
+    }
+}
+
+impl FlightController for Pid {
+    type Memory = Memory;
+
+    #[inline]
+    fn step(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint) -> Command {
+        let mut health = Health::default();
+        let Some((state, setpoint)) = memory.screen.pass(state, setpoint, &mut health) else {
+            return Command { health, ..Command::default() };
+        };
+        let fresh = !health.state_rejected;
+        if fresh {
+            self.differentiator.advance(&mut memory.velocity, &state.velocity_m_s);
+            self.differentiator.advance(&mut memory.rates, &state.rates_rad_s);
+        }
+
+        // Position and velocity.
+        let position_error = setpoint.position_m - state.position_m;
+        let velocity_wanted =
+            setpoint.velocity_m_s + cylinder(&self.position_p.component_mul(&position_error), self.speed_max);
+        let velocity_error = velocity_wanted - state.velocity_m_s;
+        let acceleration =
+            setpoint.acceleration_m_s2 + self.velocity_p.component_mul(&velocity_error) + memory.velocity_integral
+                - self.velocity_d.component_mul(&memory.velocity.derivative());
+
+        // Thrust and attitude.
+        let gravity = self.limits.gravity();
+        let specific_force = self.limits.apply(&(acceleration + gravity));
+        let missing = acceleration - (specific_force - gravity);
+        let r = r_earth_body(&state.attitude_rad);
+        let desired = facing(&specific_force, setpoint.yaw_rad);
+        let attitude_error = tilt_prioritised_error(&r, &desired, self.yaw_weight);
+
+        // Rates.
+        let yaw_feed_forward = r.row(2).transpose() * setpoint.yaw_rate_rad_s;
+        let rates_wanted = self.attitude_p.component_mul(&attitude_error) + yaw_feed_forward;
+        let rate_error = rates_wanted - state.rates_rad_s;
+        let angular_acceleration = self.rate_p.component_mul(&rate_error) + memory.rate_integral
+            - self.rate_d.component_mul(&memory.rates.derivative())
+            + rates_wanted * self.rate_feed_forward;
+
+        let demand = Demand {
+            thrust_n: self.body.mass_kg * length(&specific_force),
+            angular_acceleration_rad_s2: angular_acceleration,
+            acceleration_m_s2: acceleration,
+            desired,
+            desired_rates_rad_s: rates_wanted,
+            errors: [position_error, velocity_error, attitude_error, rate_error],
+        };
+        let (command, unallocated) = self.body.command(&demand, health);
+
+        if fresh {
+            let unwound = velocity_error - self.anti_windup.component_mul(&missing);
+            memory.velocity_integral =
+                integrate(&memory.velocity_integral, &self.velocity_i.component_mul(&unwound), self.dt_s, gravity.z);
+            let allowed = rate_error.zip_map(&memory.unallocated, away_from);
+            memory.rate_integral = integrate(
+                &memory.rate_integral,
+                &self.rate_i.component_mul(&allowed),
+                self.dt_s,
+                RATE_INTEGRAL_MAX_RAD_S2,
+            );
+        }
+        memory.unallocated = unallocated;
+        command
+    }
+}

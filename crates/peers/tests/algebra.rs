@@ -1,0 +1,399 @@
+//! What one step must answer, against formulas in `f64` and against symmetry.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
+
+mod harness;
+
+use afbc::{Command, FlightController};
+use airframe::{Range, Setpoint, State};
+use harness::{Random, SETTINGS, vehicle};
+use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
+use peers::attitude::{facing, geometric_error, quaternion, r_earth_body, roll_pitch, tilt_prioritised_error};
+use peers::{Geometric, Indi, Pid, geometric, indi, pid};
+
+fn pid() -> Pid {
+    Pid::new(vehicle(), SETTINGS, pid::Gains::PAPER_VEHICLE).unwrap()
+}
+
+fn lee() -> Geometric {
+    Geometric::new(vehicle(), SETTINGS, geometric::Gains::LEE_2010).unwrap()
+}
+
+fn goodarzi() -> Geometric {
+    Geometric::new(vehicle(), SETTINGS, geometric::Gains::GOODARZI_2013).unwrap()
+}
+
+fn indi() -> Indi {
+    Indi::new(vehicle(), SETTINGS, indi::Gains::PAPER_VEHICLE).unwrap()
+}
+
+/// The command after `steps` steps of one and the same input.
+fn after<C: FlightController>(controller: &C, steps: usize, state: &State, setpoint: &Setpoint) -> Command {
+    let mut memory = C::Memory::default();
+    let mut command = Command::default();
+    for _ in 0..steps {
+        command = controller.step(&mut memory, state, setpoint);
+    }
+    command
+}
+
+/// Runs `check` on the first and on a later command of every peer.
+fn of_each(state: &State, setpoint: &Setpoint, check: impl Fn(&str, Command)) {
+    for steps in [1, 5] {
+        check("pid", after(&pid(), steps, state, setpoint));
+        check("lee", after(&lee(), steps, state, setpoint));
+        check("goodarzi", after(&goodarzi(), steps, state, setpoint));
+        check("indi", after(&indi(), steps, state, setpoint));
+    }
+}
+
+const WEIGHT_N: f32 = 0.486 * 9.81;
+
+#[test]
+fn without_error_the_rotors_carry_the_weight_and_nothing_else() {
+    for yaw_rad in [0.0, 0.7, -2.0, 3.0] {
+        let mut state = State { position_m: Vector3::new(1.0, -2.0, 3.0), ..State::default() };
+        state.attitude_rad.z = yaw_rad;
+        let setpoint = Setpoint::hold(&state);
+        of_each(&state, &setpoint, |name, command| {
+            let u = command.inputs;
+            assert!((u.thrust_n - WEIGHT_N).abs() < 2e-6, "{name}: {u:?}");
+            assert!(u.roll_n.abs() < 1e-5 && u.pitch_n.abs() < 1e-5 && u.yaw_n.abs() < 1e-4, "{name}: {u:?}");
+            assert_eq!(command.health, afbc::Health::default(), "{name}");
+        });
+    }
+    // Heading along x, there is no rounding either.
+    of_each(&State::default(), &Setpoint::default(), |name, command| {
+        if name != "indi" {
+            assert_eq!(command.inputs.thrust_n, WEIGHT_N, "{name}");
+        }
+        assert_eq!((command.inputs.roll_n, command.inputs.pitch_n, command.inputs.yaw_n), (0.0, 0.0, 0.0), "{name}");
+    });
+}
+
+#[test]
+fn every_error_is_answered_in_the_right_direction() {
+    let hold = Setpoint::hold(&State::default());
+    let moved = |change: fn(&mut State)| {
+        let mut state = State::default();
+        change(&mut state);
+        state
+    };
+    // Below: more thrust. Rising: less.
+    of_each(&moved(|s| s.position_m.z = -0.1), &hold, |name, c| assert!(c.inputs.thrust_n > WEIGHT_N, "{name}"));
+    of_each(&moved(|s| s.velocity_m_s.z = 0.1), &hold, |name, c| assert!(c.inputs.thrust_n < WEIGHT_N, "{name}"));
+    // Behind the setpoint along x: pitch up to tilt the thrust there; along y: roll the other way.
+    of_each(&moved(|s| s.position_m.x = -0.1), &hold, |name, c| {
+        assert!(c.desired_rad[1] > 0.0 && c.desired_rad[0] == 0.0 && c.inputs.pitch_n >= 0.0, "{name}: {c:?}");
+    });
+    of_each(&moved(|s| s.position_m.y = -0.1), &hold, |name, c| {
+        assert!(c.desired_rad[0] < 0.0 && c.desired_rad[1] == 0.0 && c.inputs.roll_n <= 0.0, "{name}: {c:?}");
+    });
+    of_each(&moved(|s| s.velocity_m_s.x = 0.1), &hold, |name, c| assert!(c.desired_rad[1] < 0.0, "{name}: {c:?}"));
+    // A positive angle or rate is turned back; but a tilt without an acceleration is, to INDI, leaning into a wind.
+    let tilted = |name: &str, u: f32| assert!(if name == "indi" { u.abs() < 1e-3 } else { u < -1e-2 }, "{name}: {u}");
+    of_each(&moved(|s| s.attitude_rad.x = 0.1), &hold, |name, c| tilted(name, c.inputs.roll_n));
+    of_each(&moved(|s| s.attitude_rad.y = 0.1), &hold, |name, c| tilted(name, c.inputs.pitch_n));
+    of_each(&moved(|s| s.attitude_rad.z = 0.1), &hold, |name, c| assert!(c.inputs.yaw_n < -1e-3, "{name}"));
+    of_each(&moved(|s| s.rates_rad_s.x = 0.1), &hold, |name, c| assert!(c.inputs.roll_n < -1e-3, "{name}"));
+    of_each(&moved(|s| s.rates_rad_s.y = 0.1), &hold, |name, c| assert!(c.inputs.pitch_n < -1e-3, "{name}"));
+    of_each(&moved(|s| s.rates_rad_s.z = 0.1), &hold, |name, c| assert!(c.inputs.yaw_n < -1e-3, "{name}"));
+    // Yaw goes the short way round.
+    let beyond = Setpoint { yaw_rad: -3.1, ..hold };
+    of_each(&moved(|s| s.attitude_rad.z = 3.1), &beyond, |name, c| assert!(c.inputs.yaw_n > 0.0, "{name}"));
+    // Feed-forward: an acceleration wanted is an acceleration tilted for.
+    let sideways = Setpoint { acceleration_m_s2: Vector3::new(1.0, 0.0, 0.0), ..hold };
+    of_each(&State::default(), &sideways, |name, c| {
+        assert!(c.desired_rad[1] > 0.0 && c.desired_rad[0] == 0.0, "{name}: {c:?}");
+    });
+}
+
+/// Euler angles of a rotation; nalgebra's are of the same z-y-x sequence.
+fn euler(r: &Rotation3<f64>) -> Vector3<f32> {
+    let (roll, pitch, yaw) = r.euler_angles();
+    Vector3::new(roll as f32, pitch as f32, yaw as f32)
+}
+
+fn vector(random: &mut Random, size: f64) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| size * (2.0 * random.uniform() - 1.0))
+}
+
+#[test]
+fn turning_the_scene_about_the_vertical_changes_nothing_for_the_body() {
+    let mut random = Random(1);
+    for _ in 0..300 {
+        // Small enough that no limit acts differently by rounding.
+        let (position, velocity) = (vector(&mut random, 0.5), vector(&mut random, 0.5));
+        let attitude = Rotation3::from_scaled_axis(vector(&mut random, 0.4));
+        let rates: Vector3<f32> = vector(&mut random, 0.5).cast();
+        let (setpoint_velocity, acceleration) = (vector(&mut random, 0.5), vector(&mut random, 0.5));
+        let (yaw, turn) = (0.3 * (2.0 * random.uniform() - 1.0), 6.0 * random.uniform() - 3.0);
+        let scene = |turn: f64| {
+            let about_z = Rotation3::from_axis_angle(&Vector3::z_axis(), turn);
+            let state = State {
+                position_m: (about_z * position).cast(),
+                velocity_m_s: (about_z * velocity).cast(),
+                attitude_rad: euler(&(about_z * attitude)),
+                rates_rad_s: rates,
+            };
+            let setpoint = Setpoint {
+                velocity_m_s: (about_z * setpoint_velocity).cast(),
+                acceleration_m_s2: (about_z * acceleration).cast(),
+                yaw_rad: (yaw + turn) as f32,
+                yaw_rate_rad_s: 0.2,
+                ..Setpoint::default()
+            };
+            (state, setpoint)
+        };
+        let ((state, setpoint), (turned_state, turned_setpoint)) = (scene(0.0), scene(turn));
+        let same = |a: Command, b: Command, name: &str| {
+            let difference = Vector3::new(
+                (a.inputs.roll_n - b.inputs.roll_n) * 65.8,
+                (a.inputs.pitch_n - b.inputs.pitch_n) * 65.8,
+                (a.inputs.yaw_n - b.inputs.yaw_n) * 1.43,
+            );
+            // The error of a sine, 1.2e-3, four times over, times the stiffest loop's 330 1/s2.
+            assert!(difference.amax() < 1.6, "{name}: {difference:?} after a turn of {turn}");
+            assert!((a.inputs.thrust_n - b.inputs.thrust_n).abs() < 0.03, "{name}: {a:?} {b:?}");
+        };
+        for steps in [1, 5] {
+            same(after(&pid(), steps, &state, &setpoint), after(&pid(), steps, &turned_state, &turned_setpoint), "pid");
+            same(after(&lee(), steps, &state, &setpoint), after(&lee(), steps, &turned_state, &turned_setpoint), "lee");
+            same(
+                after(&indi(), steps, &state, &setpoint),
+                after(&indi(), steps, &turned_state, &turned_setpoint),
+                "indi",
+            );
+        }
+    }
+}
+
+/// R = Rz Ry Rx in `f64`, from the angles that an `f32` state can hold.
+fn exact(eta: &Vector3<f32>) -> Matrix3<f64> {
+    *Rotation3::from_euler_angles(f64::from(eta.x), f64::from(eta.y), f64::from(eta.z)).matrix()
+}
+
+#[test]
+fn attitude_errors_agree_with_their_formulas() {
+    let mut random = Random(2);
+    for _ in 0..2000 {
+        let eta = euler(&Rotation3::from_scaled_axis(vector(&mut random, 1.5)));
+        let thrust = Vector3::new(0.0, 0.0, 9.81) + vector(&mut random, 5.0);
+        let yaw = vector(&mut random, 3.0).x;
+        let r = r_earth_body(&eta);
+        assert!((r.cast() - exact(&eta)).amax() < 3e-3);
+
+        // R_d by its definition: z along the thrust, x square to the left of the heading.
+        let desired = facing(&thrust.cast(), yaw as f32);
+        let z = thrust.normalize();
+        let x = Vector3::new(-yaw.sin(), yaw.cos(), 0.0).cross(&z).normalize();
+        let r_d = Matrix3::from_columns(&[x, z.cross(&x), z]);
+        assert!((desired.cast() - r_d).amax() < 3e-3);
+        let [roll, pitch] = roll_pitch(&desired);
+        let angles = Rotation3::from_matrix_unchecked(r_d).euler_angles();
+        assert!((f64::from(roll) - angles.0).abs() < 3e-3 && (f64::from(pitch) - angles.1).abs() < 3e-3);
+        assert!((angles.2 - yaw).abs() < 1e-9, "the yaw of R_d is psi_d");
+
+        // Lee: e_R = (R_d' R - R' R_d)^v / 2; positive e_R is a body turned too far.
+        let e = r_d.transpose() * exact(&eta) - exact(&eta).transpose() * r_d;
+        let e_r = Vector3::new(e[(2, 1)], e[(0, 2)], e[(1, 0)]) / 2.0;
+        let ours = -geometric_error(&r, &desired).cast::<f64>();
+        assert!((ours - e_r).amax() < 6e-3, "{ours:?} {e_r:?}");
+    }
+}
+
+#[test]
+fn the_tilt_comes_first_and_yaw_by_its_weight() {
+    let mut random = Random(3);
+    for _ in 0..2000 {
+        let r = Rotation3::from_scaled_axis(vector(&mut random, 1.5));
+        let r_d = Rotation3::from_scaled_axis(vector(&mut random, 1.5));
+        let (a, b) = (r.matrix().cast(), r_d.matrix().cast());
+        // By geometry: the shortest turn of the thrust, then the turn about the thrust that is left.
+        let (z, z_d) = (r * Vector3::z(), r_d * Vector3::z());
+        let tilt = Rotation3::rotation_between(&z, &z_d).unwrap();
+        let left: Rotation3<f64> = (tilt * r).inverse() * r_d;
+        let half_yaw = left.scaled_axis().z / 2.0;
+        for weight in [0.05, 0.4, 1.0] {
+            let turned = tilt * r * Rotation3::from_axis_angle(&Vector3::z_axis(), 2.0 * weight * half_yaw);
+            let q = nalgebra::UnitQuaternion::from_rotation_matrix(&(r.inverse() * turned));
+            let q = if q.w < 0.0 { -q.into_inner() } else { q.into_inner() };
+            let ours = tilt_prioritised_error(&a, &b, weight as f32).cast::<f64>();
+            // Which way round is shorter is rounding at half a turn of yaw.
+            if half_yaw.abs() < 1.5 {
+                assert!((ours - q.imag() * 2.0).amax() < 6e-3, "{ours:?} {q:?}");
+            }
+        }
+    }
+    // Opposite thrusts, every way round, have an answer.
+    for axis in [Vector3::x_axis(), Vector3::y_axis(), Unit::new_normalize(Vector3::new(1.0, 2.0, 0.0))] {
+        let upside_down = Rotation3::from_axis_angle(&axis, core::f32::consts::PI);
+        let e = tilt_prioritised_error(&Matrix3::identity(), upside_down.matrix(), 0.4);
+        assert!((e.norm() - 2.0).abs() < 1e-3, "{e:?}");
+    }
+}
+
+#[test]
+fn quaternions_are_their_matrices() {
+    let mut random = Random(4);
+    for _ in 0..5000 {
+        let r = Rotation3::from_scaled_axis(vector(&mut random, core::f64::consts::PI));
+        let q = quaternion(&r.matrix().cast()).cast::<f64>();
+        let back = nalgebra::UnitQuaternion::from_quaternion(q).to_rotation_matrix();
+        assert!((back.matrix() - r.matrix()).amax() < 2e-6 && q.w >= 0.0);
+    }
+}
+
+#[test]
+fn desired_rates_are_the_derivative_of_the_desired_attitude() {
+    // A specific force and a heading that move; R_d by differences in f64, Omega_d = (R_d' dR_d/dt)^v.
+    let force = |t: f64| Vector3::new(2.0 * (1.3 * t).sin(), 1.5 * (0.9 * t).cos(), 9.81 + (0.7 * t).sin());
+    let yaw = |t: f64| 0.8 * (0.5 * t).sin();
+    let attitude = |t: f64| {
+        let z = force(t).normalize();
+        let x = Vector3::new(-yaw(t).sin(), yaw(t).cos(), 0.0).cross(&z).normalize();
+        Matrix3::from_columns(&[x, z.cross(&x), z])
+    };
+    let rates = |t: f64| {
+        let h = 1e-5;
+        let w = attitude(t).transpose() * (attitude(t + h) - attitude(t - h)) / (2.0 * h);
+        Vector3::new(w[(2, 1)], w[(0, 2)], w[(1, 0)])
+    };
+    let derivative = |f: &dyn Fn(f64) -> Vector3<f64>, t: f64| (f(t + 1e-4) - f(t - 1e-4)) / 2e-4;
+    for step in 0..100 {
+        let t = 0.13 * f64::from(step);
+        let force_dot = |t: f64| derivative(&force, t);
+        let setpoint = Setpoint {
+            yaw_rad: yaw(t) as f32,
+            yaw_rate_rad_s: (0.4 * (0.5 * t).cos()) as f32,
+            yaw_acceleration_rad_s2: (-0.2 * (0.5 * t).sin()) as f32,
+            ..Setpoint::default()
+        };
+        let s = [force(t).cast(), force_dot(t).cast(), derivative(&force_dot, t).cast()];
+        let desired = geometric::desired(s, &setpoint);
+        let (omega, omega_dot) = (rates(t), derivative(&rates, t));
+        assert!((desired.rates_rad_s.cast::<f64>() - omega).amax() < 2e-3, "{desired:?} {omega:?}");
+        // What is left out is of second order in the rates.
+        let (left_out, speed) = ((desired.rates_dot_rad_s2.cast::<f64>() - omega_dot).amax(), omega.norm());
+        assert!(left_out < 5e-3 + 3.0 * speed * (speed + force_dot(t).norm() / 9.81), "{left_out} at {speed}");
+    }
+}
+
+#[test]
+fn an_integrator_does_not_wind_up_against_a_limit() {
+    // Far away sideways and above for 20 s: tilt and thrust are at their limits all the time.
+    let state = State { position_m: Vector3::new(-50.0, 0.0, 0.0), ..State::default() };
+    let far = Setpoint { position_m: Vector3::new(0.0, 0.0, 500.0), ..Setpoint::default() };
+    let mut memory = pid::Memory::default();
+    for _ in 0..20_000 {
+        pid().step(&mut memory, &state, &far);
+    }
+    // 20 s of 4 1/s2 times 3 m/s would be 240 m/s2, clipped to 9.81 m/s2.
+    assert!(memory.velocity_integral.x < 4.0, "{:?}", memory.velocity_integral);
+    let mut memory = geometric::Memory::default();
+    for _ in 0..20_000 {
+        goodarzi().step(&mut memory, &state, &far);
+    }
+    assert!(memory.position_integral.x == 0.0 && memory.position_integral.z == 0.0, "{:?}", memory.position_integral);
+
+    // A yaw error that the rotors cannot answer: the rate integral stays where it was.
+    let turned = Setpoint { yaw_rad: 2.5, ..Setpoint::default() };
+    let mut memory = pid::Memory::default();
+    for _ in 0..5000 {
+        pid().step(&mut memory, &State::default(), &turned);
+    }
+    assert!(memory.rate_integral.z < 0.1, "{:?}", memory.rate_integral);
+    let mut memory = geometric::Memory::default();
+    for _ in 0..5000 {
+        goodarzi().step(&mut memory, &State::default(), &turned);
+    }
+    assert!(memory.attitude_integral.z < 0.1, "{:?}", memory.attitude_integral);
+}
+
+#[test]
+fn no_integral_moves_on_a_stale_state() {
+    let state = State { position_m: Vector3::new(-0.1, 0.2, 0.3), ..State::default() };
+    let lost = State { position_m: Vector3::new(f32::NAN, 0.0, 0.0), ..State::default() };
+    let (mut a, mut b) = (pid::Memory::default(), geometric::Memory::default());
+    for _ in 0..100 {
+        pid().step(&mut a, &state, &Setpoint::default());
+        goodarzi().step(&mut b, &state, &Setpoint::default());
+    }
+    let (before_a, before_b) = (a, b);
+    for _ in 0..100 {
+        assert!(pid().step(&mut a, &lost, &Setpoint::default()).health.state_rejected);
+        assert!(goodarzi().step(&mut b, &lost, &Setpoint::default()).health.state_rejected);
+    }
+    assert_eq!((a.velocity_integral, a.rate_integral), (before_a.velocity_integral, before_a.rate_integral));
+    assert_eq!((b.position_integral, b.attitude_integral), (before_b.position_integral, before_b.attitude_integral));
+}
+
+/// Rotation about one axis alone: d rate/dt = (d/b)/Iz U3 + disturbance, the rotors' speeds behind their lag.
+#[test]
+fn increments_cancel_a_constant_moment() {
+    let controller = indi();
+    let mixer = afbc::allocation::Mixer::new(&vehicle(), SETTINGS.rotor_force_max_n).unwrap();
+    let mut memory = indi::Memory::default();
+    let mut rotors = nalgebra::Vector4::repeat(libm::sqrt(f64::from(WEIGHT_N) / 4.0 / 2.984e-5));
+    let effectiveness = 3.232e-7 / 2.984e-5 / 0.0076;
+    let (lag, dt_s) = (1.0 - libm::exp(-0.05), 1e-3);
+    let [mut angle, mut rate, mut largest, mut late] = [0.0f64; 4];
+    for step in 0..4000 {
+        let disturbance = if step >= 500 { 2.0 } else { 0.0 };
+        let state = State {
+            attitude_rad: Vector3::new(0.0, 0.0, angle as f32),
+            rates_rad_s: Vector3::new(0.0, 0.0, rate as f32),
+            ..State::default()
+        };
+        let command = controller.step(&mut memory, &state, &Setpoint::default());
+        rotors += (command.speeds.0.cast::<f64>() - rotors) * lag;
+        let u = afbc::allocation::Mixer::inputs(&mixer.forces(&airframe::RotorSpeeds(rotors.cast())));
+        rate += (effectiveness * f64::from(u.yaw_n) + disturbance) * dt_s;
+        angle += rate * dt_s;
+        largest = angle.abs().max(largest);
+        if step >= 3000 {
+            late = angle.abs().max(late);
+        }
+    }
+    // Without increments the angle would stay at 2 rad/s2 / (k_w k_a) = 83 mrad.
+    assert!(late < 1e-4, "left: {late}");
+    assert!(largest < 0.01, "largest: {largest}");
+}
+
+#[test]
+fn gains_out_of_range_are_refused_by_name() {
+    fn tried<const N: usize>(
+        list: [(&'static Range, &mut f32); N],
+        index: usize,
+        value: fn(&Range) -> f32,
+    ) -> &'static str {
+        let (range, gain) = list.into_iter().nth(index).unwrap();
+        *gain = value(range);
+        range.name
+    }
+    for bad in [|range: &Range| (range.max * 2.0) as f32, |_: &Range| f32::NAN, |_: &Range| -1.0] {
+        for index in 0..17 {
+            let mut gains = pid::Gains::PAPER_VEHICLE;
+            let name = tried(gains.tunables(), index, bad);
+            assert_eq!(Pid::new(vehicle(), SETTINGS, gains).unwrap_err().range.name, name);
+        }
+        for index in 0..13 {
+            let mut gains = geometric::Gains::GOODARZI_2013;
+            let name = tried(gains.tunables(), index, bad);
+            assert_eq!(Geometric::new(vehicle(), SETTINGS, gains).unwrap_err().range.name, name);
+        }
+        for index in 0..10 {
+            let mut gains = indi::Gains::PAPER_VEHICLE;
+            let name = tried(gains.tunables(), index, bad);
+            assert_eq!(Indi::new(vehicle(), SETTINGS, gains).unwrap_err().range.name, name);
+        }
+    }
+    let gains = pid::Gains { tilt_max_rad: 1.5, ..pid::Gains::PAPER_VEHICLE };
+    assert_eq!(gains.validate().unwrap_err().range.name, "tilt_max_rad");
+    let gains = indi::Gains { rotor_time_constant_s: -0.1, ..indi::Gains::PAPER_VEHICLE };
+    assert_eq!(gains.validate().unwrap_err().range.name, "rotor_time_constant_s");
+    let settings = afbc::Settings { dt_s: 1.0, ..SETTINGS };
+    assert_eq!(Indi::new(vehicle(), settings, indi::Gains::PAPER_VEHICLE).unwrap_err().range.name, "dt_s");
+    let mut vehicle = vehicle();
+    vehicle.mass_kg = 0.0;
+    assert_eq!(Pid::new(vehicle, SETTINGS, pid::Gains::PAPER_VEHICLE).unwrap_err().range.name, "mass_kg");
+}

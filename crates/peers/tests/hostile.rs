@@ -1,0 +1,106 @@
+//! Nothing that comes in gets anything but finite rotor speeds within their limits out.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
+
+mod harness;
+
+use afbc::{FlightController, Settings};
+use airframe::{Range, Setpoint, State};
+use harness::{SETTINGS, vehicle};
+use nalgebra::Vector3;
+use peers::{Geometric, Indi, Pid, geometric, indi, pid};
+use proptest::prelude::*;
+
+/// Any bits, and often enough something that passes the screen: small, or at its very edge.
+fn number() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        1 => any::<u32>().prop_map(f32::from_bits),
+        4 => -4.0f32..4.0,
+        2 => -1e3f32..1e3,
+        1 => prop::sample::select(vec![0.0, -0.0, 1e3, -1e3, 1e5, -1e5, f32::MIN_POSITIVE, 1e-45, f32::NAN, f32::INFINITY]),
+    ]
+}
+
+fn vector() -> impl Strategy<Value = Vector3<f32>> {
+    [number(), number(), number()].prop_map(Vector3::from)
+}
+
+fn motion() -> impl Strategy<Value = (State, Setpoint)> {
+    let state =
+        (vector(), vector(), vector(), vector()).prop_map(|(position_m, velocity_m_s, attitude_rad, rates_rad_s)| {
+            State { position_m, velocity_m_s, attitude_rad, rates_rad_s }
+        });
+    let setpoint =
+        (vector(), vector(), vector(), vector()).prop_map(|(position_m, velocity_m_s, acceleration_m_s2, yaw)| {
+            Setpoint {
+                position_m,
+                velocity_m_s,
+                acceleration_m_s2,
+                yaw_rad: yaw.x,
+                yaw_rate_rad_s: yaw.y,
+                yaw_acceleration_rad_s2: yaw.z,
+            }
+        });
+    (state, setpoint)
+}
+
+/// Each gain anywhere in its range, by the shares given.
+fn anywhere<const N: usize>(tunables: [(&'static Range, &mut f32); N], shares: &[f64]) {
+    for ((range, gain), share) in tunables.into_iter().zip(shares) {
+        *gain = (range.min + share * (range.max - range.min)) as f32;
+    }
+}
+
+fn harmless<C: FlightController>(controller: &C, settings: &Settings, inputs: &[(State, Setpoint)]) {
+    let mut memory = C::Memory::default();
+    let fastest = libm::sqrtf(settings.rotor_force_max_n / vehicle().thrust_factor_n_s2) * 1.000_001;
+    for (state, setpoint) in inputs {
+        let command = controller.step(&mut memory, state, setpoint);
+        for (speed, force) in command.speeds.0.iter().zip(command.forces.0.iter()) {
+            assert!(*speed >= 0.0 && *speed <= fastest, "{command:?}");
+            assert!(*force >= 0.0 && *force <= settings.rotor_force_max_n, "{command:?}");
+        }
+        let u = command.inputs;
+        assert!([u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n].iter().all(|u| u.is_finite()), "{command:?}");
+        assert!(command.desired_rad.iter().all(|angle| angle.is_finite()), "{command:?}");
+        assert_eq!(command.health.state_rejected, !state.is_plausible());
+        assert_eq!(command.health.setpoint_rejected, !setpoint.is_plausible());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn whatever_comes_in_the_rotors_get_something_they_can_do(
+        inputs in prop::collection::vec(motion(), 1..30),
+        shares in prop::collection::vec(0.0..=1.0, 17),
+        force_max in prop_oneof![Just(3.0f32), Just(1e4), Just(1e-3)],
+    ) {
+        let settings = Settings { rotor_force_max_n: force_max, ..SETTINGS };
+        let mut gains = pid::Gains::PAPER_VEHICLE;
+        harmless(&Pid::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
+        anywhere(gains.tunables(), &shares);
+        harmless(&Pid::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
+
+        let mut gains = geometric::Gains::GOODARZI_2013;
+        harmless(&Geometric::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
+        anywhere(gains.tunables(), &shares);
+        harmless(&Geometric::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
+
+        let mut gains = indi::Gains::PAPER_VEHICLE;
+        harmless(&Indi::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
+        anywhere(gains.tunables(), &shares);
+        harmless(&Indi::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
+    }
+}
+
+#[test]
+fn the_same_input_gives_the_same_bits() {
+    let state = State { position_m: Vector3::new(0.1, 0.2, 0.3), ..State::default() };
+    let controller = Indi::new(vehicle(), SETTINGS, indi::Gains::PAPER_VEHICLE).unwrap();
+    let run = || {
+        let mut memory = indi::Memory::default();
+        (0..100).map(|_| controller.step(&mut memory, &state, &Setpoint::default())).collect::<Vec<_>>()
+    };
+    assert_eq!(run(), run());
+}

@@ -1,0 +1,143 @@
+//! Time of one step of the plant, ideal and with everything that makes it real, and of one measurement.
+//!
+//! `cargo bench -p plant`. A few lines of feedback hold the vehicle in its place, so that it always meets the same air. The
+//! feedback's time, with that of [`Plant::motion`], is in every figure, and alone in `feedback_alone`.
+#![allow(clippy::unwrap_used, missing_docs)] // a plant that cannot be built must stop the bench
+
+use airframe::{Parameters, RotorSpeeds};
+use divan::counter::ItemsCount;
+use divan::{Bencher, black_box};
+use nalgebra::{Vector3, Vector4};
+use plant::{
+    Battery, Contact, CosineGust, Drag, Dropouts, Environment, GroundEffect, Model, Motion, Plant, Realism, Rotors,
+    Sensing, Sensors, Spread, Turbulence, Wind,
+};
+
+fn main() {
+    divan::main();
+}
+
+const STEP_S: f64 = 0.001;
+const MODELS: [Model; 2] = [Model::Simplified, Model::RigidBody];
+
+fn start() -> Motion {
+    Motion { position_m: Vector3::new(0.0, 0.0, 2.0), ..Motion::default() }
+}
+
+fn lag() -> Rotors {
+    Rotors { time_constant_s: 0.02, max_rad_s: 317.0, delay_s: 0.001, ..Rotors::default() }
+}
+
+fn weather() -> Wind {
+    Wind {
+        steady_m_s: Vector3::new(3.0, 1.0, 0.0),
+        gusts: vec![CosineGust { velocity_m_s: Vector3::new(0.0, 2.0, 0.0), start_s: 1.0, rise_s: 0.5, hold_s: 1.0 }],
+        turbulence: Some(Turbulence::LIGHT),
+    }
+}
+
+/// Lag, limits, delay, drag, wind with turbulence.
+fn usual() -> Realism {
+    Realism { rotors: lag(), drag: Some(Drag::PAPER), wind: weather(), seed: 1, ..Realism::default() }
+}
+
+fn everything() -> Realism {
+    Realism {
+        rotors: Rotors { battery: Some(Battery::THREE_CELLS), ..lag() },
+        contact: Some(Contact::PAPER),
+        ground_effect: Some(GroundEffect::PAPER),
+        ..usual()
+    }
+}
+
+fn environment() -> Environment {
+    Environment::calm(Parameters::PAPER).unwrap()
+}
+
+/// Speeds around hover that keep the vehicle near its place.
+fn feedback(motion: &Motion) -> RotorSpeeds {
+    let eta = &motion.attitude_rad;
+    let (p, q) = (motion.rates_rad_s.x, motion.rates_rad_s.y);
+    let (position, velocity) = (&motion.position_m, &motion.velocity_m_s);
+    let roll = 8.0 * p + 40.0 * (eta.x - 0.1 * velocity.y - 0.05 * position.y);
+    let pitch = 8.0 * q + 40.0 * (eta.y + 0.1 * velocity.x + 0.05 * position.x);
+    let up = 200.0 - 20.0 * (position.z - 2.0) - 20.0 * velocity.z;
+    RotorSpeeds(Vector4::new(up + roll, up + pitch, up - roll, up - pitch).map(|w| w.clamp(0.0, 317.0) as f32))
+}
+
+fn fly(bencher: Bencher, mut plant: Plant) {
+    bencher.counter(ItemsCount::new(1_usize)).bench_local(|| {
+        let speeds = feedback(&plant.motion());
+        plant.step(black_box(&speeds), STEP_S);
+    });
+    assert!(plant.motion().position_m.norm() < 1e3, "left the air it was measured in");
+}
+
+#[divan::bench(sample_count = 200, sample_size = 2000)]
+fn feedback_alone(bencher: Bencher) {
+    let plant = Plant::new(Model::RigidBody, start(), environment());
+    bencher.bench_local(|| feedback(&black_box(&plant).motion()));
+}
+
+#[divan::bench(args = MODELS, sample_count = 200, sample_size = 2000)]
+fn ideal(bencher: Bencher, model: Model) {
+    fly(bencher, Plant::new(model, start(), environment()));
+}
+
+#[divan::bench(args = MODELS, sample_count = 200, sample_size = 2000)]
+fn rotor_lag(bencher: Bencher, model: Model) {
+    let realism = Realism { rotors: lag(), ..Realism::default() };
+    fly(bencher, Plant::with(model, start(), environment(), &realism, STEP_S).unwrap());
+}
+
+#[divan::bench(args = MODELS, sample_count = 200, sample_size = 2000)]
+fn lag_drag_turbulence(bencher: Bencher, model: Model) {
+    fly(bencher, Plant::with(model, start(), environment(), &usual(), STEP_S).unwrap());
+}
+
+#[divan::bench(args = MODELS, sample_count = 200, sample_size = 2000)]
+fn all(bencher: Bencher, model: Model) {
+    fly(bencher, Plant::with(model, start(), environment(), &everything(), STEP_S).unwrap());
+}
+
+#[divan::bench(args = MODELS, sample_count = 200, sample_size = 2000)]
+fn drag_in_still_air(bencher: Bencher, model: Model) {
+    let realism = Realism { drag: Some(Drag::PAPER), ..Realism::default() };
+    fly(bencher, Plant::with(model, start(), environment(), &realism, STEP_S).unwrap());
+}
+
+/// As a campaign flies: everything usual, and the sensors.
+#[divan::bench(sample_count = 200, sample_size = 2000)]
+fn lag_drag_turbulence_sensors(bencher: Bencher) {
+    let mut plant = Plant::with(Model::RigidBody, start(), environment(), &usual(), STEP_S).unwrap();
+    let mut sensors = sensors();
+    bencher.counter(ItemsCount::new(1_usize)).bench_local(|| {
+        let motion = plant.motion();
+        let speeds = feedback(&motion);
+        plant.step(black_box(&speeds), STEP_S);
+        sensors.measure(&motion)
+    });
+}
+
+fn sensors() -> Sensors {
+    let sensing = Sensing {
+        noise: Spread::all(0.001),
+        bias: Spread::all(0.001),
+        delay_s: 0.002,
+        dropouts: Some(Dropouts { rate_hz: 1.0, mean_s: 0.01 }),
+    };
+    Sensors::new(&sensing, 1, STEP_S).unwrap()
+}
+
+#[divan::bench(sample_count = 200, sample_size = 2000)]
+fn measurement(bencher: Bencher) {
+    let mut sensors = sensors();
+    let motion = start();
+    bencher.counter(ItemsCount::new(1_usize)).bench_local(|| sensors.measure(black_box(&motion)));
+}
+
+#[divan::bench(sample_count = 200, sample_size = 2000)]
+fn normal_number(bencher: Bencher) {
+    let mut noise = plant::noise::Noise::new(1, plant::noise::Stream::Wind);
+    bencher.counter(ItemsCount::new(1_usize)).bench_local(|| noise.normal());
+}

@@ -1,0 +1,138 @@
+//! A battery that sags under load and runs down.
+
+use airframe::{OutOfRange, Range};
+use libm::sqrt;
+
+/// The Rint model, an open-circuit voltage behind a resistance (He, Xiong, Fan 2011, *Evaluation of lithium-ion battery
+/// equivalent circuit models for state of charge estimation by an experimental approach*, Energies 4), its open-circuit
+/// voltage falling linearly with the charge drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Battery {
+    /// Open-circuit voltage when full; the voltage at which the rotors reach their full speed \[V\].
+    pub full_v: f64,
+    /// Open-circuit voltage when empty \[V\].
+    pub empty_v: f64,
+    /// Internal resistance \[ohm\].
+    pub resistance_ohm: f64,
+    /// Charge when full \[A h\].
+    pub capacity_a_h: f64,
+    /// Share of the capacity that is left at the start.
+    pub initial_charge: f64,
+    /// Mechanical power of the rotors over electrical power: speed controller and motor together.
+    pub efficiency: f64,
+    /// What avionics and payload draw \[W\].
+    pub avionics_w: f64,
+    /// What a lower voltage does.
+    pub effect: Sag,
+}
+
+/// What a lower voltage does to the rotors, each in proportion to voltage over full voltage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sag {
+    /// Lowers the largest speed: the speed controllers hold the commanded speed as long as they can.
+    Ceiling,
+    /// Lowers every speed: the speed controllers apply a share of the voltage and do not know the speed.
+    Speed,
+}
+
+/// Accepted range of each setting.
+#[expect(missing_docs, reason = "named after the field that each bounds")]
+pub mod limits {
+    use airframe::Range;
+    pub const FULL: Range = Range::new("full_v", 1.0, 1000.0);
+    pub const RESISTANCE: Range = Range::new("resistance_ohm", 0.0, 10.0);
+    pub const CAPACITY: Range = Range::new("capacity_a_h", 0.001, 1000.0);
+    pub const INITIAL_CHARGE: Range = Range::new("initial_charge", 0.0, 1.0);
+    pub const EFFICIENCY: Range = Range::new("efficiency", 0.05, 1.0);
+    pub const AVIONICS: Range = Range::new("avionics_w", 0.0, 10_000.0);
+}
+
+impl Battery {
+    /// Three lithium-polymer cells of 1.5 A h, enough for about a quarter of an hour of the paper's vehicle.
+    pub const THREE_CELLS: Self = Battery {
+        full_v: 12.6,
+        empty_v: 9.9,
+        resistance_ohm: 0.06,
+        capacity_a_h: 1.5,
+        initial_charge: 1.0,
+        efficiency: 0.5,
+        avionics_w: 3.0,
+        effect: Sag::Ceiling,
+    };
+
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// The first one out of range, by name; an empty battery may have no more voltage than a full one.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        limits::FULL.check(self.full_v)?;
+        Range::new("empty_v", 0.1, self.full_v).check(self.empty_v)?;
+        limits::RESISTANCE.check(self.resistance_ohm)?;
+        limits::CAPACITY.check(self.capacity_a_h)?;
+        limits::INITIAL_CHARGE.check(self.initial_charge)?;
+        limits::EFFICIENCY.check(self.efficiency)?;
+        limits::AVIONICS.check(self.avionics_w)
+    }
+}
+
+/// What a battery is doing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Charge {
+    /// At the terminals, under load \[V\].
+    pub voltage_v: f64,
+    /// \[A\]
+    pub current_a: f64,
+    /// Share of the capacity that is left.
+    pub charge: f64,
+}
+
+/// A battery in use.
+#[derive(Clone, Debug)]
+pub(crate) struct Discharge {
+    battery: Battery,
+    /// Share of the capacity that one ampere draws in one step \[1/A\].
+    per_ampere: f64,
+    pub(crate) now: Charge,
+}
+
+impl Discharge {
+    pub(crate) fn new(battery: Battery, step_s: f64) -> Self {
+        let now = Charge { voltage_v: 0.0, current_a: 0.0, charge: battery.initial_charge };
+        let mut discharge = Discharge { battery, per_ampere: step_s / (3600.0 * battery.capacity_a_h), now };
+        discharge.now.voltage_v = discharge.open_circuit_v();
+        discharge
+    }
+
+    /// Voltage without load \[V\]. An empty battery has none: nothing flies on charge that is not there.
+    fn open_circuit_v(&self) -> f64 {
+        let Battery { full_v, empty_v, .. } = self.battery;
+        if self.now.charge > 0.0 { empty_v + (full_v - empty_v) * self.now.charge } else { 0.0 }
+    }
+
+    /// What the rotors' speeds are scaled by: voltage over full voltage.
+    #[inline]
+    pub(crate) fn voltage_share(&self) -> f64 {
+        self.now.voltage_v / self.battery.full_v
+    }
+
+    pub(crate) fn effect(&self) -> Sag {
+        self.battery.effect
+    }
+
+    /// Supplies rotors that take `rotor_w` of mechanical power for one step.
+    ///
+    /// Power P at the terminals takes the smaller current with (V_oc - R I) I = P. Beyond V_oc^2 / 4R there is none, and
+    /// the battery gives all that it can.
+    #[inline]
+    pub(crate) fn supply(&mut self, rotor_w: f64) {
+        let Battery { resistance_ohm: r, efficiency, avionics_w, .. } = self.battery;
+        let power_w = rotor_w / efficiency + avionics_w;
+        let v = self.open_circuit_v();
+        let current_a = if v > 0.0 { 2.0 * power_w / (v + sqrt((v * v - 4.0 * r * power_w).max(0.0))) } else { 0.0 };
+        // At the limit the formula above overshoots; V_oc / 2R is what flows into a matched load.
+        let current_a = if r > 0.0 { current_a.min(v / (2.0 * r)) } else { current_a };
+        self.now.voltage_v = v - r * current_a;
+        self.now.current_a = current_a;
+        self.now.charge = (self.now.charge - current_a * self.per_ampere).max(0.0);
+    }
+}

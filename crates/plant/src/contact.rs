@@ -1,0 +1,161 @@
+//! Ground to stand on, and to fall on.
+
+use crate::body_axes::BodyAxes;
+use airframe::{OutOfRange, Parameters, Range};
+use libm::sqrt;
+use nalgebra::Vector3;
+
+/// The ground, the plane z = 0, under four feet below the arms and under the four rotors, for landings upside down.
+///
+/// Each of these points is a spring and a damper that push and never pull, N = max(0, -k z - c dz/dt): the linear model in
+/// D. W. Marhefka, D. E. Orin 1999, *A compliant contact model with nonlinear damping for simulation of robotic systems*,
+/// IEEE Trans. SMC-A 29(6). Friction works against slip, viscous with the damper's c up to Coulomb's mu N, which keeps the
+/// integration stable but lets a steady push creep: 10 mm/s under 0.3 N on the paper's vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// How far the vehicle at rest sinks into its feet's springs; sets k \[m\].
+    pub sink_m: f64,
+    /// Of the vehicle bouncing on its feet; sets c. 1 does not bounce.
+    pub damping_ratio: f64,
+    /// mu.
+    pub friction: f64,
+    /// From the body's z axis to each foot \[m\].
+    pub foot_radius_m: f64,
+    /// Feet below the centre of mass \[m\].
+    pub foot_depth_m: f64,
+    /// Rotors above the centre of mass \[m\].
+    pub rotor_height_m: f64,
+}
+
+/// Accepted range of each setting. The smallest sink, and the largest damping, further depend on the vehicle and the step,
+/// so that the integration stays stable.
+#[expect(missing_docs, reason = "named after the field that each bounds")]
+pub mod limits {
+    use airframe::Range;
+    pub const SINK: Range = Range::new("sink_m", 1e-5, 0.5);
+    pub const DAMPING_RATIO: Range = Range::new("damping_ratio", 0.05, 5.0);
+    pub const FRICTION: Range = Range::new("friction", 0.0, 3.0);
+    pub const FOOT_RADIUS: Range = Range::new("foot_radius_m", 0.0, 10.0);
+    pub const FOOT_DEPTH: Range = Range::new("foot_depth_m", 0.001, 10.0);
+    pub const ROTOR_HEIGHT: Range = Range::new("rotor_height_m", 0.0, 10.0);
+}
+
+/// Largest (natural frequency times step)^2 of the stiffest motion, and largest damping rate times step. The Runge-Kutta
+/// method is stable to 8 and 2.78; the rest is for payloads dropped and inertia changed in flight.
+const STIFFNESS_PER_STEP_MAX: f64 = 0.5;
+const DAMPING_PER_STEP_MAX: f64 = 1.4;
+
+impl Contact {
+    /// A guess for the paper's vehicle.
+    pub const PAPER: Self = Contact {
+        sink_m: 0.005,
+        damping_ratio: 0.7,
+        friction: 0.6,
+        foot_radius_m: 0.12,
+        foot_depth_m: 0.08,
+        rotor_height_m: 0.02,
+    };
+
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// The first one out of range, by name.
+    pub fn validate(&self, vehicle: &Parameters<f64>, step_s: f64) -> Result<(), OutOfRange> {
+        limits::SINK.check(self.sink_m)?;
+        limits::DAMPING_RATIO.check(self.damping_ratio)?;
+        limits::FRICTION.check(self.friction)?;
+        limits::FOOT_RADIUS.check(self.foot_radius_m)?;
+        limits::FOOT_DEPTH.check(self.foot_depth_m)?;
+        limits::ROTOR_HEIGHT.check(self.rotor_height_m)?;
+        // How fast a unit of force moves its own point at worst, all four feet at the longest lever.
+        let lever_m = self.ground(vehicle).reach_m;
+        let compliance = 1.0 / vehicle.mass_kg + lever_m * lever_m / vehicle.inertia_kg_m2.min();
+        let weight_n = vehicle.mass_kg * vehicle.gravity_m_s2;
+        let softest = weight_n * compliance * step_s * step_s / STIFFNESS_PER_STEP_MAX;
+        Range { min: softest, ..limits::SINK }.check(self.sink_m)?;
+        let per_ratio =
+            4.0 * Contact { damping_ratio: 1.0, ..*self }.ground(vehicle).damping_n_s_m * compliance * step_s;
+        Range { max: DAMPING_PER_STEP_MAX / per_ratio, ..limits::DAMPING_RATIO }.check(self.damping_ratio)
+    }
+
+    /// The ground as this vehicle meets it.
+    pub(crate) fn ground(&self, vehicle: &Parameters<f64>) -> Ground {
+        let stiffness_n_m = vehicle.mass_kg * vehicle.gravity_m_s2 / (4.0 * self.sink_m);
+        let (feet, arm) = (self.foot_radius_m, vehicle.arm_m);
+        let around = |radius: f64, z: f64| {
+            [(radius, 0.0), (0.0, radius), (-radius, 0.0), (0.0, -radius)].map(|(x, y)| Vector3::new(x, y, z))
+        };
+        let points = [around(feet, -self.foot_depth_m), around(arm, self.rotor_height_m)];
+        let reach = |[point, ..]: &[Vector3<f64>; 4]| sqrt(point.norm_squared());
+        Ground {
+            stiffness_n_m,
+            damping_n_s_m: 0.5 * self.damping_ratio * sqrt(4.0 * stiffness_n_m * vehicle.mass_kg),
+            friction: self.friction,
+            reach_m: points.iter().map(reach).fold(0.0, f64::max),
+            points,
+        }
+    }
+}
+
+/// Near is what a fall of this time, longer than any step, may reach \[s\].
+const NEAR_S: f64 = 0.04;
+/// And no less than this \[m\].
+const NEAR_M: f64 = 0.02;
+
+/// The ground under one vehicle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ground {
+    /// k and c of each point.
+    stiffness_n_m: f64,
+    damping_n_s_m: f64,
+    friction: f64,
+    /// Distance of the farthest point from the centre of mass: higher up, nothing touches.
+    reach_m: f64,
+    /// Feet and rotors, body frame \[m\].
+    points: [[Vector3<f64>; 4]; 2],
+}
+
+impl Ground {
+    /// True if a vehicle at this height may touch the ground within a step.
+    #[inline]
+    pub(crate) fn is_near(&self, height_m: f64, climb_m_s: f64) -> bool {
+        height_m + NEAR_S * climb_m_s.min(0.0) < self.reach_m + NEAR_M
+    }
+
+    /// True if any point is below the ground.
+    pub(crate) fn touches(&self, height_m: f64, axes: &BodyAxes) -> bool {
+        self.points.iter().flatten().any(|point| height_m + axes.height(point) < 0.0)
+    }
+
+    /// Force, earth frame \[N\], and moment, body frame \[N m\], on a vehicle at `height_m` that moves.
+    // Apart: it is needed near the ground only.
+    #[inline(never)]
+    pub(crate) fn wrench(
+        &self,
+        height_m: f64,
+        velocity_m_s: &Vector3<f64>,
+        axes: &BodyAxes,
+        rates_rad_s: &Vector3<f64>,
+    ) -> (Vector3<f64>, Vector3<f64>) {
+        let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
+        for point in self.points.iter().flatten() {
+            let depth_m = -(height_m + axes.height(point));
+            if depth_m > 0.0 {
+                let at_point = self.push(depth_m, &(velocity_m_s + axes.to_earth(&rates_rad_s.cross(point))));
+                force += at_point;
+                moment += point.cross(&axes.to_body(&at_point));
+            }
+        }
+        (force, moment)
+    }
+
+    /// Force on one point that is `depth_m` below the ground, earth frame \[N\].
+    fn push(&self, depth_m: f64, velocity_m_s: &Vector3<f64>) -> Vector3<f64> {
+        let normal_n = (self.stiffness_n_m * depth_m - self.damping_n_s_m * velocity_m_s.z).max(0.0);
+        let slip_m_s = sqrt(velocity_m_s.x * velocity_m_s.x + velocity_m_s.y * velocity_m_s.y);
+        // The larger divisor of the two: viscous up to the limit, never a division by zero.
+        let drag = self.damping_n_s_m * self.friction * normal_n
+            / (self.damping_n_s_m * slip_m_s).max(self.friction * normal_n).max(f64::MIN_POSITIVE);
+        Vector3::new(-drag * velocity_m_s.x, -drag * velocity_m_s.y, normal_n)
+    }
+}

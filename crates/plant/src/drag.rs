@@ -1,0 +1,107 @@
+//! What the air does to a vehicle that moves through it: the paper's A_i = 1/2 rho C_i W^2 made concrete.
+
+use airframe::{OutOfRange, Parameters, Range};
+use libm::sqrt;
+use nalgebra::Vector3;
+
+/// Drag of blades and body by the airspeed W = velocity - wind, in body axes.
+///
+/// * **Blades**: each rotor is held back in its plane by `blade_n_s2_m` times its speed times the airspeed in that plane.
+///   Linear, and at hovering speeds the larger part. P. Martin, E. Salaun 2010, *The true role of accelerometer feedback in
+///   quadrotor control*, ICRA; M. Faessler, A. Franchi, D. Scaramuzza 2018, *Differential flatness of quadrotor
+///   dynamics subject to rotor drag*, RA-L 3(2), whose mass-normalised 0.2 to 0.6 1/s is this factor times the sum of
+///   the rotor speeds over the mass.
+/// * **Body**: -1/2 rho C_i S_i |W| W_i along each body axis, which is the paper's A_i where the air flows along that axis.
+///
+/// Wind acts through drag alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drag {
+    /// rho \[kg/m3\].
+    pub air_density_kg_m3: f64,
+    /// Force per rotor speed and airspeed \[N s2/m\].
+    pub blade_n_s2_m: f64,
+    /// Rotor plane above the centre of mass, where the blades' force acts \[m\].
+    pub rotor_height_m: f64,
+    /// C_i S_i along each body axis \[m2\].
+    pub area_m2: Vector3<f64>,
+    /// Where the body's force acts, from the centre of mass, body frame \[m\].
+    pub centre_m: Vector3<f64>,
+}
+
+/// Accepted range of each setting. Largest blade factor and area further depend on the vehicle and the step, so that the
+/// integration stays stable up to [`AIRSPEED_M_S`](limits::AIRSPEED_M_S).
+#[expect(missing_docs, reason = "named after the field that each bounds")]
+pub mod limits {
+    use airframe::Range;
+    pub const AIR_DENSITY: Range = Range::new("air_density_kg_m3", 0.0, 5.0);
+    pub const BLADE: Range = Range::new("blade_n_s2_m", 0.0, 1.0);
+    pub const ROTOR_HEIGHT: Range = Range::new("rotor_height_m", -1.0, 1.0);
+    pub const AREA: Range = Range::new("area_m2", 0.0, 100.0);
+    pub const CENTRE: Range = Range::new("centre_m", -1.0, 1.0);
+    /// Airspeed up to which drag is integrated stably \[m/s\].
+    pub const AIRSPEED_M_S: f64 = 100.0;
+}
+
+/// Largest product of a drag's rate and the step; the Runge-Kutta method is stable to 2.78.
+const RATE_PER_STEP_MAX: f64 = 0.5;
+
+impl Drag {
+    /// A guess for the paper's vehicle: blades at 0.4 1/s in hover, a body of about 0.1 m by 0.1 m.
+    pub const PAPER: Self = Drag {
+        air_density_kg_m3: 1.225,
+        blade_n_s2_m: 2.4e-4,
+        rotor_height_m: 0.02,
+        area_m2: Vector3::new(0.01, 0.01, 0.02),
+        centre_m: Vector3::new(0.0, 0.0, 0.01),
+    };
+
+    /// Checks every setting, for a vehicle whose rotors turn at most at `max_rad_s`.
+    ///
+    /// # Errors
+    /// The first one out of range, by name.
+    pub fn validate(&self, vehicle: &Parameters<f64>, max_rad_s: f64, step_s: f64) -> Result<(), OutOfRange> {
+        limits::AIR_DENSITY.check(self.air_density_kg_m3)?;
+        limits::BLADE.check(self.blade_n_s2_m)?;
+        limits::ROTOR_HEIGHT.check(self.rotor_height_m)?;
+        self.area_m2.iter().try_for_each(|&area| limits::AREA.check(area))?;
+        self.centre_m.iter().try_for_each(|&place| limits::CENTRE.check(place))?;
+        // d force/d airspeed that one step can bear.
+        let bearable = RATE_PER_STEP_MAX * vehicle.mass_kg / step_s;
+        Range { max: bearable / (4.0 * max_rad_s), ..limits::BLADE }.check(self.blade_n_s2_m)?;
+        let per_area = self.air_density_kg_m3 * limits::AIRSPEED_M_S;
+        Range { max: bearable / per_area, ..limits::AREA }.check(self.area_m2.max())
+    }
+
+    /// Drag over one step, the rotor speeds adding up to `speeds_rad_s`.
+    #[inline]
+    pub(crate) fn held(&self, speeds_rad_s: f64) -> HeldDrag {
+        HeldDrag {
+            blade_n_s_m: self.blade_n_s2_m * speeds_rad_s,
+            rotor_height_m: self.rotor_height_m,
+            body_n_s2_m2: self.area_m2 * (0.5 * self.air_density_kg_m3),
+            centre_m: self.centre_m,
+        }
+    }
+}
+
+/// Drag with the rotor speeds held, to be asked for any airspeed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HeldDrag {
+    /// k times the sum of rotor speeds \[N s/m\].
+    blade_n_s_m: f64,
+    rotor_height_m: f64,
+    /// 1/2 rho C_i S_i \[N s2/m2\].
+    body_n_s2_m2: Vector3<f64>,
+    centre_m: Vector3<f64>,
+}
+
+impl HeldDrag {
+    /// Force \[N\] and moment \[N m\] at airspeed `w` \[m/s\], all in body axes.
+    #[inline]
+    pub(crate) fn wrench(&self, w: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+        let blade = Vector3::new(-self.blade_n_s_m * w.x, -self.blade_n_s_m * w.y, 0.0);
+        let body = self.body_n_s2_m2.component_mul(w) * -sqrt(w.norm_squared());
+        let blade_moment = Vector3::new(-self.rotor_height_m * blade.y, self.rotor_height_m * blade.x, 0.0);
+        (blade + body, blade_moment + self.centre_m.cross(&body))
+    }
+}

@@ -1,0 +1,182 @@
+//! Seeded random numbers: the same seed gives the same bits on every machine.
+//!
+//! Bits come from xoshiro256++ (Blackman, Vigna 2021, *Scrambled linear pseudorandom number generators*), normal numbers
+//! from the ziggurat (Marsaglia, Tsang 2000, *The ziggurat method for generating random variables*, J. Stat. Softw. 5(8))
+//! with 256 layers. The ziggurat is written out here because a library's takes its logarithm from whatever mathematics
+//! another crate of the build has switched on; this one always takes it from `libm`.
+
+use core::fmt;
+use libm::{exp, log};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+
+/// Who draws. Streams of one seed never meet: each begins 2^128 draws after the one before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stream {
+    /// Turbulence.
+    Wind,
+    /// Measurement noise and bias.
+    Sensors,
+    /// When measurements stay away.
+    Dropouts,
+    /// What a campaign spreads: parameters, winds, faults.
+    Scenario,
+}
+
+/// A stream of random numbers.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Noise {
+    bits: Xoshiro256PlusPlus,
+}
+
+// The generator's words say nothing to a reader.
+impl fmt::Debug for Noise {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Noise")
+    }
+}
+
+impl Noise {
+    /// The numbers of `stream` under `seed`.
+    pub fn new(seed: u64, stream: Stream) -> Self {
+        let mut bits = Xoshiro256PlusPlus::seed_from_u64(seed);
+        for _ in 0..stream as usize {
+            bits.jump();
+        }
+        Noise { bits }
+    }
+
+    /// Uniform in \[0, 1), a multiple of 2^-53.
+    #[inline]
+    pub fn uniform(&mut self) -> f64 {
+        const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
+        (self.bits.next_u64() >> 11) as f64 * STEP
+    }
+
+    /// Normal with mean 0 and variance 1.
+    #[inline]
+    pub fn normal(&mut self) -> f64 {
+        const STEP: f64 = 1.0 / (1_u64 << 52) as f64;
+        loop {
+            let bits = self.bits.next_u64();
+            // The lowest eight bits choose the layer, the highest 53 the place within it: no bit serves both.
+            let Some(layer) = LAYERS.get((bits & 0xff) as usize) else { continue };
+            let x = (bits.cast_signed() >> 11) as f64 * STEP * layer.width;
+            if x.abs() < layer.width_above {
+                return x;
+            }
+            if let Some(x) = self.beyond(layer, x) {
+                return x;
+            }
+        }
+    }
+
+    /// The 1.2 % outside every layer's core: the tail below the lowest layer, or under the curve within the others.
+    #[cold]
+    fn beyond(&mut self, layer: &Layer, x: f64) -> Option<f64> {
+        if layer.height == LAYERS_BASE_HEIGHT {
+            return Some(self.tail().copysign(x));
+        }
+        let y = layer.height + (layer.height_above - layer.height) * self.uniform();
+        (y < exp(-0.5 * x * x)).then_some(x)
+    }
+
+    /// A normal number beyond R (Marsaglia 1964).
+    fn tail(&mut self) -> f64 {
+        loop {
+            // In (0, 1]: both logarithms are finite.
+            let (x, y) = (-log(1.0 - self.uniform()) / R, -log(1.0 - self.uniform()));
+            if 2.0 * y > x * x {
+                return R + x;
+            }
+        }
+    }
+}
+
+/// Where the tail begins.
+const R: f64 = 3.654_152_885_361_009;
+/// Area of each layer under exp(-x^2/2), the lowest with the tail.
+const AREA: f64 = 4.928_673_233_974_655e-3;
+
+/// One horizontal slice under exp(-x^2/2).
+#[derive(Clone, Copy)]
+struct Layer {
+    /// Its half width: the curve's abscissa at its lower edge. The lowest layer's is widened to hold the tail's area.
+    width: f64,
+    /// The half width of the next layer up: within it, every height of this layer is under the curve.
+    width_above: f64,
+    /// The curve's height at `width`.
+    height: f64,
+    /// The curve's height at `width_above`.
+    height_above: f64,
+}
+
+/// Marks the lowest layer, which has no lower edge on the curve.
+const LAYERS_BASE_HEIGHT: f64 = 0.0;
+
+static LAYERS: [Layer; 256] = layers();
+
+#[expect(clippy::indexing_slicing, reason = "evaluated when compiled")]
+const fn layers() -> [Layer; 256] {
+    let (mut x, mut y) = (R, gauss(R));
+    let base = Layer { width: AREA / y, width_above: R, height: LAYERS_BASE_HEIGHT, height_above: y };
+    let mut layers = [base; 256];
+    let mut i = 1;
+    while i < 256 {
+        // Each layer has the same area: x (y_above - y). The topmost ends at the peak.
+        let (x_above, y_above) = if i == 255 { (0.0, 1.0) } else { (gauss_inverse(y + AREA / x, x), y + AREA / x) };
+        layers[i] = Layer { width: x, width_above: x_above, height: y, height_above: y_above };
+        (x, y) = (x_above, y_above);
+        i += 1;
+    }
+    layers
+}
+
+/// exp(-x^2/2) by its series at a 64th of the exponent, squared six times.
+const fn gauss(x: f64) -> f64 {
+    let small = -0.5 * x * x / 64.0;
+    let (mut sum, mut term, mut n) = (1.0, 1.0, 1.0);
+    while n < 16.0 {
+        term *= small / n;
+        sum += term;
+        n += 1.0;
+    }
+    let mut squarings = 0;
+    while squarings < 6 {
+        sum *= sum;
+        squarings += 1;
+    }
+    sum
+}
+
+/// x > 0 with exp(-x^2/2) = y by Newton's method from `x`, somewhat above it.
+const fn gauss_inverse(y: f64, mut x: f64) -> f64 {
+    let mut round = 0;
+    while round < 20 {
+        x += (gauss(x) - y) / (x * gauss(x));
+        round += 1;
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn layers_lie_on_the_curve_and_share_one_area() {
+        let close = |a: f64, b: f64, what| assert!((a - b).abs() < 1e-13, "{what}: {a} != {b}");
+        for pair in LAYERS.windows(2) {
+            let [below, above] = pair else { unreachable!() };
+            assert!(above.width < below.width && above.height > below.height);
+            close(below.width_above, above.width, "width");
+            close(below.height_above, above.height, "height");
+            close(exp(-0.5 * above.width * above.width), above.height, "curve");
+            close(above.width * (above.height_above - above.height), AREA, "area");
+        }
+        assert_eq!(LAYERS.last().map(|top| top.height_above), Some(1.0));
+        // The lowest layer: R exp(-R^2/2), and the tail sqrt(pi/2) erfc(R / sqrt 2).
+        let tail = libm::sqrt(core::f64::consts::FRAC_PI_2) * libm::erfc(R * core::f64::consts::FRAC_1_SQRT_2);
+        close(R * exp(-0.5 * R * R) + tail, AREA, "base");
+    }
+}

@@ -1,0 +1,164 @@
+//! Everything that a real flight adds to the paper's vehicle, each part optional.
+
+use crate::battery::Charge;
+use crate::body_axes::BodyAxes;
+use crate::contact::{Contact, Ground};
+use crate::drag::Drag;
+use crate::environment::Segment;
+use crate::ground_effect::GroundEffect;
+use crate::rotors::{Rotors, Spin};
+use crate::surroundings::Surroundings;
+use crate::vehicle::Load;
+use crate::wind::{Weather, Wind};
+use airframe::{OutOfRange, Parameters, Range, RotorSpeeds};
+use nalgebra::{Vector3, Vector4};
+
+/// Accepted range of a step \[s\].
+pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
+
+/// What [`Plant::with`](crate::Plant::with) adds to a vehicle. The default adds nothing: the paper's plant to the bit, as
+/// long as no rotor is commanded beyond 10,000 rad/s.
+///
+/// Measurement is apart, in [`Sensors`](crate::Sensors): it comes between this plant and its controller.
+///
+/// Over a step, the commanded speeds, wind, ground effect and battery voltage are held at what they are when it begins,
+/// rotor speeds at what they are in its middle. Drag and ground contact are evaluated at every stage of the Runge-Kutta
+/// method. All of it acts on either model; in the simplified one, d eta/dt stands for Omega here as well.
+///
+/// ```
+/// use airframe::{Parameters, RotorSpeeds};
+/// use nalgebra::{Vector3, Vector4};
+/// use plant::{Drag, Environment, Model, Motion, Plant, Realism, Rotors, Turbulence, Wind};
+///
+/// let realism = Realism {
+///     rotors: Rotors { time_constant_s: 0.02, max_rad_s: 317.0, delay_s: 0.001, ..Rotors::default() },
+///     drag: Some(Drag::PAPER),
+///     wind: Wind {
+///         steady_m_s: Vector3::new(5.0, 0.0, 0.0),
+///         turbulence: Some(Turbulence::LIGHT),
+///         ..Wind::default()
+///     },
+///     seed: 7,
+///     ..Realism::default()
+/// };
+/// let environment = Environment::calm(Parameters::PAPER)?;
+/// let mut plant = Plant::with(Model::RigidBody, Motion::default(), environment, &realism, 0.001)?;
+/// for _ in 0..100 {
+///     plant.step(&RotorSpeeds(Vector4::repeat(199.9)), 0.001);
+/// }
+/// assert!(plant.motion().velocity_m_s.x > 0.1); // blown away
+/// # Ok::<(), airframe::OutOfRange>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Realism {
+    /// Lag, limits, delay, faults, battery.
+    pub rotors: Rotors,
+    /// Blade and body drag. Without it, the air does nothing.
+    pub drag: Option<Drag>,
+    /// Steady wind, gusts, turbulence.
+    pub wind: Wind,
+    /// Ground to stand on.
+    pub contact: Option<Contact>,
+    /// More thrust near the ground.
+    pub ground_effect: Option<GroundEffect>,
+    /// Of everything random in the plant. The same seed gives the same flight.
+    pub seed: u64,
+}
+
+/// What rotors, air and ground did in one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Telemetry {
+    /// At the step's end \[rad/s\].
+    pub rotor_speeds_rad_s: Vector4<f64>,
+    /// Velocity of the air, earth frame \[m/s\].
+    pub wind_m_s: Vector3<f64>,
+    /// Thrust over what it is far from the ground.
+    pub thrust_ratio: f64,
+    /// True if a foot or a rotor touched the ground when the step began.
+    pub on_ground: bool,
+    /// The battery, if there is one.
+    pub battery: Option<Charge>,
+}
+
+/// [`Realism`] in use.
+#[derive(Clone, Debug)]
+pub(crate) struct Effects {
+    spin: Spin,
+    drag: Option<Drag>,
+    weather: Weather,
+    ground: Option<Ground>,
+    ground_effect: Option<GroundEffect>,
+    wind_m_s: Vector3<f64>,
+    thrust_ratio: f64,
+    on_ground: bool,
+}
+
+impl Effects {
+    pub(crate) fn new(realism: &Realism, vehicle: &Parameters<f64>, step_s: f64) -> Result<Self, OutOfRange> {
+        let Realism { rotors, drag, wind, contact, ground_effect, seed } = realism;
+        STEP.check(step_s)?;
+        let spin = Spin::new(rotors.clone(), vehicle, step_s)?;
+        let weather = Weather::new(wind.clone(), *seed, step_s)?;
+        if let Some(drag) = drag {
+            drag.validate(vehicle, rotors.max_rad_s, step_s)?;
+        }
+        if let Some(contact) = contact {
+            contact.validate(vehicle, step_s)?;
+        }
+        if let Some(ground_effect) = ground_effect {
+            ground_effect.validate()?;
+        }
+        Ok(Effects {
+            spin,
+            drag: *drag,
+            weather,
+            ground: contact.map(|contact| contact.ground(vehicle)),
+            ground_effect: *ground_effect,
+            wind_m_s: Vector3::zeros(),
+            thrust_ratio: 1.0,
+            on_ground: false,
+        })
+    }
+
+    /// What acts over the step that begins at `time_s` with the vehicle at this place and velocity.
+    #[inline]
+    pub(crate) fn begin_step(
+        &mut self,
+        speeds: &RotorSpeeds,
+        segment: &Segment,
+        time_s: f64,
+        position_m: &Vector3<f64>,
+        velocity_m_s: &Vector3<f64>,
+        axes: impl FnOnce() -> BodyAxes,
+    ) -> (Load, Surroundings<'_>) {
+        let Segment { parameters, a_force, a_moment, .. } = segment;
+        let drive = self.spin.advance(speeds.0, time_s, parameters.drag_factor_n_m_s2);
+        self.wind_m_s = self.weather.advance(time_s, position_m.z, velocity_m_s);
+        if let Some(effect) = &self.ground_effect {
+            self.thrust_ratio = effect.thrust_ratio(position_m.z);
+        }
+        // The ground is left out of a step that cannot reach it.
+        let ground = self.ground.as_ref().filter(|ground| ground.is_near(position_m.z, velocity_m_s.z));
+        self.on_ground = ground.is_some_and(|ground| ground.touches(position_m.z, &axes()));
+        let load = Load::of_rotors(
+            parameters,
+            drive.speeds_rad_s.into(),
+            drive.squares.into(),
+            self.thrust_ratio,
+            *a_force,
+            *a_moment,
+        );
+        let drag = self.drag.as_ref().map(|drag| drag.held(drive.speeds_rad_s.sum()));
+        (load, Surroundings::new(parameters, drag, self.wind_m_s, ground))
+    }
+
+    pub(crate) fn telemetry(&self) -> Telemetry {
+        Telemetry {
+            rotor_speeds_rad_s: self.spin.speeds_rad_s,
+            wind_m_s: self.wind_m_s,
+            thrust_ratio: self.thrust_ratio,
+            on_ground: self.on_ground,
+            battery: self.spin.charge(),
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! Rotors that take time, have limits, wear, and hang on a battery.
+
+use crate::battery::{Battery, Charge, Discharge, Sag};
+use crate::delay::{DelayLine, whole_steps};
+use airframe::{OutOfRange, Parameters, Range};
+use alloc::vec::Vec;
+use libm::{exp, sqrt};
+use nalgebra::Vector4;
+
+/// Between the commanded rotor speeds and thrust. The default is ideal: speeds are what is commanded, at once.
+///
+/// The order is that of the hardware: a command is delayed, scaled by the battery's voltage, limited, followed with a lag.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rotors {
+    /// Time constant of d omega/dt = (commanded - omega)/tau; 0 for none \[s\].
+    pub time_constant_s: f64,
+    /// Smallest speed: idling \[rad/s\].
+    pub min_rad_s: f64,
+    /// Largest speed \[rad/s\].
+    pub max_rad_s: f64,
+    /// From command to the speed controllers, rounded to whole steps \[s\].
+    pub delay_s: f64,
+    /// What turns before the first command arrives.
+    pub start: Start,
+    /// Rotors that lose thrust.
+    pub faults: Vec<RotorFault>,
+    /// What the rotors hang on; without one, the voltage is always full.
+    pub battery: Option<Battery>,
+}
+
+/// What the rotors do, and were commanded to do, before the first command arrives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// They carry the vehicle's weight: a flight that begins in the air begins without a bump.
+    Hover,
+    /// They idle at their smallest speed: a flight that begins on the ground.
+    Idle,
+}
+
+/// A rotor whose thrust, and with it its drag moment, is `efficiency` times what its speed gives: a worn or broken blade.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RotorFault {
+    /// Which one, 1 to 4, numbered as in [`airframe`].
+    pub rotor: u8,
+    /// 1 is whole, 0 is dead. Faults of one rotor multiply.
+    pub efficiency: f64,
+    /// Onset \[s\].
+    pub start_s: f64,
+}
+
+/// Accepted range of each setting.
+#[expect(missing_docs, reason = "named after the field that each bounds")]
+pub mod limits {
+    use airframe::Range;
+    pub const TIME_CONSTANT: Range = Range::new("time_constant_s", 0.0, 1.0);
+    pub const MAX: Range = Range::new("max_rad_s", 1.0, 10_000.0);
+    pub const ROTOR: Range = Range::new("rotor", 1.0, 4.0);
+    pub const EFFICIENCY: Range = Range::new("efficiency", 0.0, 1.0);
+    pub const START: Range = Range::new("start_s", 0.0, f64::INFINITY);
+}
+
+impl Default for Rotors {
+    fn default() -> Self {
+        Rotors {
+            time_constant_s: 0.0,
+            min_rad_s: 0.0,
+            max_rad_s: limits::MAX.max,
+            delay_s: 0.0,
+            start: Start::Hover,
+            faults: Vec::new(),
+            battery: None,
+        }
+    }
+}
+
+impl Rotors {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// The first one out of range, by name; the smallest speed may not exceed the largest.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        limits::TIME_CONSTANT.check(self.time_constant_s)?;
+        limits::MAX.check(self.max_rad_s)?;
+        Range::new("min_rad_s", 0.0, self.max_rad_s).check(self.min_rad_s)?;
+        crate::delay::DELAY.check(self.delay_s)?;
+        for fault in &self.faults {
+            limits::ROTOR.check(fault.rotor)?;
+            limits::EFFICIENCY.check(fault.efficiency)?;
+            limits::START.check(fault.start_s)?;
+        }
+        self.battery.map_or(Ok(()), |battery| battery.validate())
+    }
+
+    /// Share of its thrust that each rotor gives at time `t` \[s\], and when that next changes.
+    fn efficiency(&self, t: f64) -> (Vector4<f64>, f64) {
+        let (mut efficiency, mut until_s) = (Vector4::repeat(1.0), f64::INFINITY);
+        for fault in &self.faults {
+            if fault.start_s > t + TIME_SLACK_S {
+                until_s = until_s.min(fault.start_s - TIME_SLACK_S);
+            } else if let Some(rotor) = efficiency.get_mut(usize::from(fault.rotor) - 1) {
+                *rotor *= fault.efficiency;
+            }
+        }
+        (efficiency, until_s)
+    }
+}
+
+/// Slack in the comparison of times, far below any step \[s\].
+const TIME_SLACK_S: f64 = 1e-9;
+
+/// What the rotors do over one step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Drive {
+    /// Speeds in the middle of the step \[rad/s\].
+    pub(crate) speeds_rad_s: Vector4<f64>,
+    /// Their squares times each rotor's efficiency \[rad2/s2\].
+    pub(crate) squares: Vector4<f64>,
+}
+
+/// Rotors in motion.
+#[derive(Clone, Debug)]
+pub(crate) struct Spin {
+    rotors: Rotors,
+    commands: DelayLine<Vector4<f32>>,
+    /// exp(-dt / 2 tau): the share of a speed's distance to its target that is left after half a step.
+    half_step: f64,
+    /// Speeds now \[rad/s\].
+    pub(crate) speeds_rad_s: Vector4<f64>,
+    efficiency: Vector4<f64>,
+    efficiency_until_s: f64,
+    battery: Option<Discharge>,
+}
+
+impl Spin {
+    /// Rotors that do what [`Start`] says on a vehicle with these parameters.
+    ///
+    /// # Errors
+    /// As [`Rotors::validate`].
+    pub(crate) fn new(rotors: Rotors, vehicle: &Parameters<f64>, step_s: f64) -> Result<Self, OutOfRange> {
+        rotors.validate()?;
+        let start_rad_s = match rotors.start {
+            Start::Hover => sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / (4.0 * vehicle.thrust_factor_n_s2))
+                .max(rotors.min_rad_s)
+                .min(rotors.max_rad_s),
+            Start::Idle => rotors.min_rad_s,
+        };
+        let (efficiency, efficiency_until_s) = rotors.efficiency(0.0);
+        Ok(Spin {
+            commands: DelayLine::new(whole_steps(rotors.delay_s, step_s)?, Vector4::repeat(start_rad_s as f32)),
+            // At tau = 0 this is exp(-infinity) = 0: no lag.
+            half_step: exp(-0.5 * step_s / rotors.time_constant_s),
+            speeds_rad_s: Vector4::repeat(start_rad_s),
+            efficiency,
+            efficiency_until_s,
+            battery: rotors.battery.map(|battery| Discharge::new(battery, step_s)),
+            rotors,
+        })
+    }
+
+    /// Turns the rotors for one step from `t` \[s\], their command held.
+    ///
+    /// The lag is discretised exactly. The load over the step is that of the speeds in its middle, which is right to
+    /// second order in the step. A command that is not a number counts as the smallest speed.
+    #[inline]
+    pub(crate) fn advance(&mut self, command_rad_s: Vector4<f32>, t: f64, drag_factor_n_m_s2: f64) -> Drive {
+        if t >= self.efficiency_until_s {
+            (self.efficiency, self.efficiency_until_s) = self.rotors.efficiency(t);
+        }
+        let (mut scale, mut ceiling) = (1.0, self.rotors.max_rad_s);
+        if let Some(battery) = &self.battery {
+            let share = battery.voltage_share();
+            ceiling *= share;
+            if battery.effect() == Sag::Speed {
+                scale = share;
+            }
+        }
+        // max first, so that it replaces NaN.
+        let floor = self.rotors.min_rad_s;
+        let command = self.commands.pass(command_rad_s);
+        let target = command.map(|w| (f64::from(w) * scale).max(floor).min(ceiling));
+        let middle = target + (self.speeds_rad_s - target) * self.half_step;
+        self.speeds_rad_s = target + (middle - target) * self.half_step;
+
+        let squares = middle.component_mul(&middle).component_mul(&self.efficiency);
+        if let Some(battery) = &mut self.battery {
+            // Drag moment times speed; what accelerates the rotors comes back when they slow down.
+            battery.supply(drag_factor_n_m_s2 * squares.dot(&middle));
+        }
+        Drive { speeds_rad_s: middle, squares }
+    }
+
+    pub(crate) fn charge(&self) -> Option<Charge> {
+        self.battery.as_ref().map(|battery| battery.now)
+    }
+}

@@ -1,0 +1,221 @@
+//! What reaches the controller of the true motion.
+
+use crate::delay::{DelayLine, whole_steps};
+use crate::motion::Motion;
+use crate::noise::{Noise, Stream};
+use airframe::{OutOfRange, State};
+use libm::exp;
+use nalgebra::Vector3;
+
+/// One number for each group of the state, the same for its three coordinates.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spread {
+    /// \[m\]
+    pub position_m: f64,
+    /// \[m/s\]
+    pub velocity_m_s: f64,
+    /// \[rad\]
+    pub attitude_rad: f64,
+    /// \[rad/s\]
+    pub rates_rad_s: f64,
+}
+
+impl Spread {
+    /// The same number for every group, each in its own unit.
+    pub const fn all(size: f64) -> Self {
+        Spread { position_m: size, velocity_m_s: size, attitude_rad: size, rates_rad_s: size }
+    }
+
+    fn validate(&self) -> Result<(), OutOfRange> {
+        limits::POSITION.check(self.position_m)?;
+        limits::VELOCITY.check(self.velocity_m_s)?;
+        limits::ATTITUDE.check(self.attitude_rad)?;
+        limits::RATES.check(self.rates_rad_s)
+    }
+
+    /// Normal numbers of these standard deviations.
+    #[inline]
+    fn draw(&self, noise: &mut Noise) -> Motion {
+        let mut three = |size: f64| Vector3::new(noise.normal(), noise.normal(), noise.normal()) * size;
+        Motion {
+            position_m: three(self.position_m),
+            velocity_m_s: three(self.velocity_m_s),
+            attitude_rad: three(self.attitude_rad),
+            rates_rad_s: three(self.rates_rad_s),
+        }
+    }
+}
+
+/// Intervals without a measurement, as a two-state Markov chain (E. N. Gilbert 1960, *Capacity of a burst-noise channel*).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dropouts {
+    /// How often one begins while there is none \[1/s\].
+    pub rate_hz: f64,
+    /// Mean length \[s\].
+    pub mean_s: f64,
+}
+
+/// How the state is measured. The default is perfect.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sensing {
+    /// Standard deviation of what is new at every step: white noise.
+    pub noise: Spread,
+    /// Standard deviation of what is drawn once and stays for the flight.
+    pub bias: Spread,
+    /// From motion to measurement, rounded to whole steps \[s\].
+    pub delay_s: f64,
+    /// Measurements that stay away.
+    pub dropouts: Option<Dropouts>,
+}
+
+/// Accepted range of each setting.
+#[expect(missing_docs, reason = "named after the field that each bounds")]
+pub mod limits {
+    use airframe::Range;
+    pub const POSITION: Range = Range::new("position_m", 0.0, 100.0);
+    pub const VELOCITY: Range = Range::new("velocity_m_s", 0.0, 100.0);
+    pub const ATTITUDE: Range = Range::new("attitude_rad", 0.0, 1.0);
+    pub const RATES: Range = Range::new("rates_rad_s", 0.0, 10.0);
+    pub const DROPOUT_RATE: Range = Range::new("rate_hz", 0.0, 1000.0);
+    pub const DROPOUT_MEAN: Range = Range::new("mean_s", 0.0, 60.0);
+}
+
+impl Sensing {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// The first one out of range, by name.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        self.noise.validate()?;
+        self.bias.validate()?;
+        crate::delay::DELAY.check(self.delay_s)?;
+        self.dropouts.map_or(Ok(()), |Dropouts { rate_hz, mean_s }| {
+            limits::DROPOUT_RATE.check(rate_hz)?;
+            limits::DROPOUT_MEAN.check(mean_s)
+        })
+    }
+}
+
+/// What the controller has at one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measurement {
+    /// The newest state that has arrived.
+    pub state: State,
+    /// How long ago it was true \[s\]; before the first one has arrived it stands for the past too.
+    pub age_s: f64,
+    /// False in a dropout: `state` is what arrived before it.
+    pub fresh: bool,
+}
+
+/// Sensors in use: noise and bias, then delay, then dropouts. Never fails; the first measurement always arrives.
+#[derive(Clone, Debug)]
+pub struct Sensors {
+    noise: Option<Spread>,
+    random: Noise,
+    bias: Motion,
+    delay: DelayLine<State>,
+    delay_s: f64,
+    outage: Option<Outage>,
+    step_s: f64,
+    /// What arrived last, if anything has.
+    last: Option<State>,
+    /// Steps since then.
+    missed: u32,
+}
+
+/// Dropouts in time.
+#[derive(Clone, Debug)]
+struct Outage {
+    random: Noise,
+    /// Probability per step that one begins, and that one ends.
+    begins: f64,
+    ends: f64,
+    now: bool,
+}
+
+impl Outage {
+    fn new(dropouts: &Dropouts, seed: u64, step_s: f64) -> Self {
+        Outage {
+            random: Noise::new(seed, Stream::Dropouts),
+            begins: 1.0 - exp(-dropouts.rate_hz * step_s),
+            // A mean length of zero ends with certainty.
+            ends: 1.0 - exp(-step_s / dropouts.mean_s),
+            now: false,
+        }
+    }
+
+    #[inline]
+    fn advance(&mut self) -> bool {
+        let chance = self.random.uniform();
+        self.now = if self.now { chance >= self.ends } else { chance < self.begins };
+        self.now
+    }
+}
+
+impl Sensors {
+    /// Sensors that are read every `step_s`. The seed may be the plant's: the streams are apart.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub fn new(sensing: &Sensing, seed: u64, step_s: f64) -> Result<Self, OutOfRange> {
+        sensing.validate()?;
+        crate::realism::STEP.check(step_s)?;
+        let mut random = Noise::new(seed, Stream::Sensors);
+        let steps = whole_steps(sensing.delay_s, step_s)?;
+        Ok(Sensors {
+            noise: (sensing.noise != Spread::default()).then_some(sensing.noise),
+            bias: sensing.bias.draw(&mut random),
+            random,
+            delay: DelayLine::new(steps, State::default()),
+            delay_s: steps as f64 * step_s,
+            outage: sensing.dropouts.as_ref().map(|dropouts| Outage::new(dropouts, seed, step_s)),
+            step_s,
+            last: None,
+            missed: 0,
+        })
+    }
+
+    /// What was drawn for this flight.
+    pub fn bias(&self) -> &Motion {
+        &self.bias
+    }
+
+    /// Measures `motion`; once per step.
+    #[inline]
+    pub fn measure(&mut self, motion: &Motion) -> Measurement {
+        let mut measured = sum(motion, &self.bias);
+        if let Some(spread) = &self.noise {
+            measured = sum(&measured, &spread.draw(&mut self.random));
+        }
+        let state = measured.measure();
+        let Some(last) = self.last else {
+            self.delay.refill(state);
+            self.last = Some(state);
+            return self.measurement(state);
+        };
+        let arriving = self.delay.pass(state);
+        if self.outage.as_mut().is_some_and(Outage::advance) {
+            self.missed += 1;
+            return self.measurement(last);
+        }
+        self.missed = 0;
+        self.last = Some(arriving);
+        self.measurement(arriving)
+    }
+
+    #[inline]
+    fn measurement(&self, state: State) -> Measurement {
+        let age_s = self.delay_s + f64::from(self.missed) * self.step_s;
+        Measurement { state, age_s, fresh: self.missed == 0 }
+    }
+}
+
+#[inline]
+fn sum(a: &Motion, b: &Motion) -> Motion {
+    Motion {
+        position_m: a.position_m + b.position_m,
+        velocity_m_s: a.velocity_m_s + b.velocity_m_s,
+        attitude_rad: a.attitude_rad + b.attitude_rad,
+        rates_rad_s: a.rates_rad_s + b.rates_rad_s,
+    }
+}

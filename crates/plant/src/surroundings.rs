@@ -1,0 +1,62 @@
+//! What acts on the vehicle by where it is and how it moves: air and ground, inside a step.
+
+use crate::body_axes::BodyAxes;
+use crate::contact::Ground;
+use crate::drag::HeldDrag;
+use airframe::Parameters;
+use nalgebra::Vector3;
+
+/// Air and ground over one step: the wind is held, drag and contact follow position, velocity and attitude within it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Surroundings<'a> {
+    drag: Option<HeldDrag>,
+    /// Velocity of the air, earth frame \[m/s\].
+    wind_m_s: Vector3<f64>,
+    ground: Option<&'a Ground>,
+    /// 1/m and diag(I)^-1: divisions are dear.
+    per_mass: f64,
+    per_inertia: Vector3<f64>,
+}
+
+impl<'a> Surroundings<'a> {
+    pub(crate) fn new(
+        vehicle: &Parameters<f64>,
+        drag: Option<HeldDrag>,
+        wind_m_s: Vector3<f64>,
+        ground: Option<&'a Ground>,
+    ) -> Self {
+        let per_inertia = vehicle.inertia_kg_m2.map(|i| 1.0 / i);
+        Surroundings { drag, wind_m_s, ground, per_mass: 1.0 / vehicle.mass_kg, per_inertia }
+    }
+
+    /// True if nothing acts.
+    #[inline]
+    pub(crate) fn are_empty(&self) -> bool {
+        self.drag.is_none() && self.ground.is_none()
+    }
+
+    /// What they add to d^2 xi/dt^2 \[m/s2\], earth frame, and to d Omega/dt \[rad/s2\], body frame.
+    // Always: passing its vectors through memory costs more than its arithmetic.
+    #[inline(always)]
+    pub(crate) fn accelerations(
+        &self,
+        height_m: f64,
+        velocity_m_s: &Vector3<f64>,
+        axes: &BodyAxes,
+        rates_rad_s: &Vector3<f64>,
+    ) -> (Vector3<f64>, Vector3<f64>) {
+        let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
+        if let Some(drag) = &self.drag {
+            let airspeed = axes.to_body(&(velocity_m_s - self.wind_m_s));
+            let (drag_force, drag_moment) = drag.wrench(&airspeed);
+            force += axes.to_earth(&drag_force);
+            moment += drag_moment;
+        }
+        if let Some(ground) = self.ground {
+            let (ground_force, ground_moment) = ground.wrench(height_m, velocity_m_s, axes, rates_rad_s);
+            force += ground_force;
+            moment += ground_moment;
+        }
+        (force * self.per_mass, moment.component_mul(&self.per_inertia))
+    }
+}

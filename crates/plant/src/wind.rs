@@ -1,0 +1,121 @@
+//! Air in motion: steady wind, single gusts, turbulence.
+
+use crate::noise::{Noise, Stream};
+use crate::turbulence::{Eddies, Turbulence};
+use airframe::OutOfRange;
+use alloc::vec::Vec;
+use core::f64::consts::PI;
+use libm::{cos, sqrt};
+use nalgebra::Vector3;
+
+/// Velocity of the air over the earth, the sum of its parts. Acts on the vehicle through [`Drag`](crate::Drag).
+///
+/// Held over a step at its value at the step's start.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Wind {
+    /// Always there, earth frame \[m/s\].
+    pub steady_m_s: Vector3<f64>,
+    /// One after the other, or one upon the other.
+    pub gusts: Vec<CosineGust>,
+    /// Random; its longitudinal axis points where the steady wind blows, or along x.
+    pub turbulence: Option<Turbulence>,
+}
+
+/// A gust that rises as V_m/2 (1 - cos(pi t/T)), stays, and falls as it rose.
+///
+/// MIL-F-8785C's discrete gust rises over a distance d_m, which a vehicle at airspeed V crosses in T = d_m/V, and
+/// stays: `hold_s` infinite. With `hold_s` zero it is the full 1-cosine of CS-25.341.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CosineGust {
+    /// V_m, earth frame \[m/s\].
+    pub velocity_m_s: Vector3<f64>,
+    /// Onset \[s\].
+    pub start_s: f64,
+    /// T \[s\].
+    pub rise_s: f64,
+    /// From the end of the rise to the beginning of the fall \[s\].
+    pub hold_s: f64,
+}
+
+/// Accepted range of each setting.
+#[expect(missing_docs, reason = "named after the field that each bounds")]
+pub mod limits {
+    use airframe::Range;
+    pub const STEADY: Range = Range::new("steady_m_s", -50.0, 50.0);
+    pub const GUST: Range = Range::new("velocity_m_s", -50.0, 50.0);
+    pub const START: Range = Range::new("start_s", 0.0, f64::INFINITY);
+    pub const RISE: Range = Range::new("rise_s", 0.001, 1000.0);
+    pub const HOLD: Range = Range::new("hold_s", 0.0, f64::INFINITY);
+}
+
+impl CosineGust {
+    /// Velocity at time `t` \[s\], earth frame \[m/s\].
+    pub fn at(&self, t: f64) -> Vector3<f64> {
+        let since = t - self.start_s;
+        // The fall is the rise run backwards.
+        let before_end = since.min(2.0 * self.rise_s + self.hold_s - since);
+        if before_end <= 0.0 {
+            Vector3::zeros()
+        } else if before_end >= self.rise_s {
+            self.velocity_m_s
+        } else {
+            self.velocity_m_s * (0.5 * (1.0 - cos(PI * before_end / self.rise_s)))
+        }
+    }
+}
+
+impl Wind {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// The first one out of range, by name.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        self.steady_m_s.iter().try_for_each(|&speed| limits::STEADY.check(speed))?;
+        for gust in &self.gusts {
+            gust.velocity_m_s.iter().try_for_each(|&speed| limits::GUST.check(speed))?;
+            limits::START.check(gust.start_s)?;
+            limits::RISE.check(gust.rise_s)?;
+            limits::HOLD.check(gust.hold_s)?;
+        }
+        self.turbulence.map_or(Ok(()), |turbulence| turbulence.validate())
+    }
+}
+
+/// Wind in time.
+#[derive(Clone, Debug)]
+pub(crate) struct Weather {
+    wind: Wind,
+    /// Cosine and sine of the steady wind's direction.
+    heading: (f64, f64),
+    eddies: Option<Eddies>,
+}
+
+impl Weather {
+    /// # Errors
+    /// As [`Wind::validate`].
+    pub(crate) fn new(wind: Wind, seed: u64, step_s: f64) -> Result<Self, OutOfRange> {
+        wind.validate()?;
+        let (x, y) = (wind.steady_m_s.x, wind.steady_m_s.y);
+        let speed = sqrt(x * x + y * y);
+        let heading = if speed > 0.0 { (x / speed, y / speed) } else { (1.0, 0.0) };
+        let eddies = wind.turbulence.map(|turbulence| Eddies::new(turbulence, Noise::new(seed, Stream::Wind), step_s));
+        Ok(Weather { wind, heading, eddies })
+    }
+
+    /// Velocity of the air at time `t` \[s\] where the vehicle is, earth frame \[m/s\]. Every call is one step.
+    #[inline]
+    pub(crate) fn advance(&mut self, t: f64, height_m: f64, velocity_m_s: &Vector3<f64>) -> Vector3<f64> {
+        let mut air = self.wind.steady_m_s;
+        for gust in &self.wind.gusts {
+            air += gust.at(t);
+        }
+        if let Some(eddies) = &mut self.eddies {
+            // The field drifts with the steady wind.
+            let steady = &self.wind.steady_m_s;
+            let local = eddies.advance(height_m, || sqrt((velocity_m_s - steady).norm_squared()));
+            let (c, s) = self.heading;
+            air += Vector3::new(c * local.x - s * local.y, s * local.x + c * local.y, local.z);
+        }
+        air
+    }
+}
