@@ -6,6 +6,7 @@ mod common;
 use common::start_or_skip;
 use link::{Address, Answer, Command, Decoder, Downlink, Uplink};
 use pil::exercise::{Station, motion};
+use pil::gdb::{SP, XPSR};
 use pil::{Board, Image};
 use std::time::{Duration, Instant};
 
@@ -19,7 +20,9 @@ fn it_boots_ticks_and_flies() {
     // That it comes back means that the image got past its clocks.
     let Some(mut board) = start_or_skip(Image::Flight, |elf| Board::boot(&elf)) else { return };
     assert!(board.clock_accesses() > 10, "the clock tree was set up");
-    assert_eq!(board.word(SYST_RVR).unwrap(), 168_000 - 1, "1 kHz at 168 MHz");
+    let gdb = board.halt().unwrap();
+    assert_eq!(u32::from_le_bytes(gdb.memory(SYST_RVR).unwrap()), 168_000 - 1, "1 kHz at 168 MHz");
+    gdb.resume().unwrap();
 
     let mut station = Station::default();
     let mut decoder = Decoder::<Downlink>::new(Address { system: 255, component: 190 });
@@ -48,4 +51,28 @@ fn it_boots_ticks_and_flies() {
         });
     }
     assert!((997.0..=1003.0).contains(&rate_hz), "the control tick runs at {rate_hz} Hz");
+}
+
+/// Bottom of the RAM, and of the stack; and the stack's top (`memory.x`).
+const STACK: std::ops::Range<u32> = 0x2000_0000..0x2000_4000;
+const HARD_FAULT: u32 = 3;
+
+#[test]
+fn a_stack_that_overflows_ends_in_the_fault_handler() {
+    let Some(mut board) = start_or_skip(Image::Flight, |elf| Board::boot(&elf)) else { return };
+    assert!(!board.receive().unwrap().is_empty(), "it runs");
+
+    let gdb = board.halt().unwrap();
+    gdb.set_register(SP, STACK.start + 16).unwrap();
+    gdb.resume().unwrap();
+    std::thread::sleep(Duration::from_millis(300));
+    let gdb = board.halt().unwrap();
+    assert_eq!(gdb.register(XPSR).unwrap() & 0x1FF, HARD_FAULT);
+    let sp = gdb.register(SP).unwrap();
+    assert!(STACK.contains(&(sp - 4)) && sp > STACK.end - 1024, "a fresh stack: {sp:#x}");
+    gdb.resume().unwrap();
+
+    // What was sent before it failed, and then nothing.
+    board.receive().unwrap();
+    assert_eq!(board.receive().unwrap(), [], "it is silent until the watchdog resets it");
 }
