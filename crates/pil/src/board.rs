@@ -1,7 +1,7 @@
 //! The `flight` image on an emulated board.
 
 use crate::gdb::{self, Gdb};
-use crate::qemu::Qemu;
+use crate::qemu::{self, Qemu};
 use crate::{Error, clock_tree};
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
@@ -39,7 +39,7 @@ impl Board {
             "-gdb",
             "chardev:gdb",
         ];
-        let qemu = Qemu::start(elf, Qemu::folder()?, &arguments)?;
+        let qemu = Qemu::start(elf, Qemu::folder()?, &[qemu::OLIMEX], &arguments)?;
         let mut gdb = Gdb::connect(&qemu.path("gdb"))?;
         let usart1 = gdb::connect(&qemu.path("usart1"))?;
         usart1.set_write_timeout(Some(WRITE_TIMEOUT))?;
@@ -53,16 +53,14 @@ impl Board {
         self.clock_accesses
     }
 
-    /// The word at `address`, read while the processor is halted for a moment.
+    /// The debugger, with the processor halted; [`Gdb::resume`] lets it run on.
     ///
     /// # Errors
-    /// If the board has ended, or nothing is there.
-    pub fn word(&mut self, address: u32) -> Result<u32, Error> {
+    /// If the board has ended.
+    pub fn halt(&mut self) -> Result<&mut Gdb, Error> {
         self.qemu.check()?;
         self.gdb.halt()?;
-        let word = self.gdb.memory(address)?;
-        self.gdb.resume()?;
-        Ok(u32::from_le_bytes(word))
+        Ok(&mut self.gdb)
     }
 
     /// Sends to USART1.

@@ -58,7 +58,7 @@ pub(crate) fn boot(gdb: &mut Gdb) -> Result<usize, Error> {
         gdb.step()?;
         gdb.watch(watch(register), register)?;
         if access.is_load {
-            gdb.set_register(access.register, answer(register, written[&register]))?;
+            gdb.set_register(access.register, answer(register, written.get(&register).copied().unwrap_or(0)))?;
         } else {
             written.insert(register, stored);
         }

@@ -66,7 +66,7 @@ impl Emulator {
         let hold = open("from_firmware")?;
         let mut from_firmware = File::open(folder.join("from_firmware"))?;
         let arguments = [qemu::COUNT_INSTRUCTIONS.as_slice(), &["-serial", "none"]].concat();
-        let qemu = Qemu::start(elf, folder, &arguments)?;
+        let qemu = Qemu::start(elf, folder, &[qemu::OLIMEX, qemu::NETDUINO], &arguments)?;
 
         let (sender, replies) = mpsc::channel();
         let reader = std::thread::spawn(move || {

@@ -9,7 +9,7 @@ use std::time::Duration;
 pub enum Error {
     /// There is no QEMU for Arm.
     NoQemu,
-    /// This QEMU has no STM32F405.
+    /// This QEMU has no STM32F405, or one that will not do.
     NoMachine,
     /// The Rust toolchain cannot compile for the processor.
     NoTarget,
@@ -38,7 +38,9 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Error::NoQemu => write!(f, "qemu-system-arm is missing: install it, on Debian by scripts/qemu.sh"),
-            Error::NoMachine => write!(f, "this qemu-system-arm emulates no STM32F405: take version 7 or newer"),
+            Error::NoMachine => {
+                write!(f, "this qemu-system-arm is too old: take 8.2 or newer, on Debian by scripts/qemu.sh")
+            }
             Error::NoTarget => write!(
                 f,
                 "the compiler's target is missing: rustup target add thumbv7em-none-eabihf, or where rustup cannot, \

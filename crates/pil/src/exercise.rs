@@ -40,7 +40,7 @@ impl Station {
         if tracked {
             self.say(Uplink::State { sent_us: tick * 1000, state });
         }
-        if tick % 10 == 0 {
+        if tick.is_multiple_of(10) {
             self.say(Uplink::Setpoint(setpoint));
         }
         match tick {

@@ -6,6 +6,10 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+/// Number of the stack pointer.
+pub const SP: u32 = 13;
+/// Number of the program status register; its lowest 9 bits are the exception that runs.
+pub const XPSR: u32 = 25;
 /// Number of the program counter.
 pub const PC: u32 = 15;
 

@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// QEMU's boards with an STM32F405, the better one first: QEMU 8 and newer, QEMU 7.
-const MACHINES: [&str; 2] = ["olimex-stm32-h405", "netduinoplus2"];
+/// QEMU's board with an STM32F405, from version 8.
+pub(crate) const OLIMEX: &str = "olimex-stm32-h405";
+/// The one of older versions, whose USART sends nothing by interrupt.
+pub(crate) const NETDUINO: &str = "netduinoplus2";
 
 /// Lets time pass by instructions, and stand still while the processor waits for the host.
 pub(crate) const COUNT_INSTRUCTIONS: [&str; 2] = ["-icount", "shift=3,sleep=off"];
@@ -37,14 +39,14 @@ impl Qemu {
         Ok(folder)
     }
 
-    /// Starts `elf` in `folder` with these further arguments.
-    pub(crate) fn start(elf: &Path, folder: PathBuf, arguments: &[&str]) -> Result<Self, Error> {
+    /// Starts `elf` in `folder` on the first of `machines` that this QEMU has, with these further arguments.
+    pub(crate) fn start(elf: &Path, folder: PathBuf, machines: &[&str], arguments: &[&str]) -> Result<Self, Error> {
         if !elf.is_file() {
             return Err(Error::NoImage(elf.to_owned()));
         }
         let elf = elf.canonicalize()?;
         let child = Command::new(program())
-            .args(["-M", machine()?, "-nographic", "-monitor", "none"])
+            .args(["-M", machine(machines)?, "-nographic", "-monitor", "none"])
             .args(["-semihosting-config", "enable=on,target=native"])
             .args(arguments)
             .arg("-kernel")
@@ -87,9 +89,9 @@ fn program() -> std::ffi::OsString {
     std::env::var_os("QEMU_SYSTEM_ARM").unwrap_or_else(|| "qemu-system-arm".into())
 }
 
-/// The best machine that this QEMU offers.
-fn machine() -> Result<&'static str, Error> {
+/// The first of `machines` that this QEMU has.
+fn machine<'a>(machines: &[&'a str]) -> Result<&'a str, Error> {
     let help = Command::new(program()).args(["-machine", "help"]).output().map_err(|_| Error::NoQemu)?;
     let help = String::from_utf8_lossy(&help.stdout);
-    MACHINES.into_iter().find(|machine| help.contains(machine)).ok_or(Error::NoMachine)
+    machines.iter().copied().find(|machine| help.contains(machine)).ok_or(Error::NoMachine)
 }

@@ -94,7 +94,7 @@ fn table(budgets: &[Budget]) -> String {
     for Budget { what, unit, measured, most } in budgets {
         let limit = most.map_or_else(String::new, |most| most.to_string());
         let verdict = match most {
-            Some(most) if measured > most => "**passed**",
+            Some(most) if measured > most => "**over**",
             _ => "",
         };
         table += &format!("| {what} | {measured} {unit} | {limit} | {verdict} |\n");
