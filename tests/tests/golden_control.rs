@@ -113,9 +113,9 @@ fn afbc_subsystem_agrees_in_every_row() {
         let size: f64 = row.all(["u_a", "u_r", "u_pd"]).iter().map(|term| term.abs()).sum();
         assert_within(&row, "u", terms.sum(), fuzzy_error + robust_error + proportional_error + 2.0 * U * size);
         // (33): eta, two products.
-        assert_within(&row, "delta_hat_dot", rate.delta, eta * (e2_error + e2.abs() * (tanh_error + 3.0 * U)));
+        assert_within(&row, "delta_hat_dot", rate.delta(), eta * (e2_error + e2.abs() * (tanh_error + 3.0 * U)));
         // (34): gamma, two products.
-        for (rule, (got, expected)) in rate.theta.transpose().iter().zip(theta_dot).enumerate() {
+        for (rule, (got, expected)) in rate.theta().transpose().iter().zip(theta_dot).enumerate() {
             let weight = expected / (gamma * e2);
             let allowed = gamma * (e2_error * weight + e2.abs() * (weight * (w_bound + 3.0 * U) + WEIGHT_FLOOR));
             assert_within(&row, &format!("theta_dot{}", rule + 1), *got, allowed);

@@ -5,7 +5,7 @@ use crate::cascade::{Context, Law};
 use crate::fuzzy::{Basis, Membership};
 use crate::math;
 use airframe::{Axis, OutOfRange, PerAxis, Range};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Accepted gamma.
 pub const GAMMA: Range = Range::new("gamma", 0.0, 1000.0);
@@ -52,6 +52,37 @@ pub struct Estimate {
     pub delta: f32,
 }
 
+/// d/dt of an [`Estimate`]; that of Theta_hat, gamma e_2 w(x), in its factors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rate {
+    first: Vector3<f32>,
+    second: Vector3<f32>,
+    /// gamma e_2
+    theta: f32,
+    delta: f32,
+}
+
+impl Rate {
+    /// (34): gamma e_2 w(x).
+    pub fn theta(&self) -> Matrix3<f32> {
+        self.first * self.second.transpose() * self.theta
+    }
+
+    /// (33): eta e_2 tanh(e_2/epsilon).
+    pub fn delta(&self) -> f32 {
+        self.delta
+    }
+}
+
+impl Estimate {
+    /// One step of explicit Euler.
+    #[inline]
+    fn advance(&mut self, rate: &Rate, dt_s: f32) {
+        self.theta += rate.first * (rate.theta * dt_s) * rate.second.transpose();
+        self.delta += rate.delta * dt_s;
+    }
+}
+
 /// The three terms of (20).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Terms {
@@ -89,19 +120,18 @@ impl Subsystem {
         Ok(Subsystem { gains, basis: Basis::new(gains.membership)?, inverse_epsilon: 1.0 / gains.epsilon })
     }
 
-    /// (20) and d/dt of the estimate by (33), (34), both from the estimate as it stands.
+    /// (20), and d/dt of the estimate by (33), (34), both from the estimate as it stands.
     #[inline]
-    pub fn law(&self, errors: &Errors, inputs: [f32; 2], estimate: &Estimate) -> (Terms, Estimate) {
+    pub fn law(&self, errors: &Errors, inputs: [f32; 2], estimate: &Estimate) -> (Terms, Rate) {
         let e2 = errors.e2;
-        let w = self.basis.weights(inputs);
+        let [first, second] = self.basis.factors(inputs);
         let s = math::tanh(e2 * self.inverse_epsilon);
         let terms = Terms {
-            fuzzy: w.dot(&estimate.theta),
+            fuzzy: first.dot(&(estimate.theta * second)),
             robust: estimate.delta * s,
             proportional: proportional(self.gains.backstepping.alpha2, errors),
         };
-        let rate = Estimate { theta: w * (self.gains.gamma * e2), delta: self.gains.eta * e2 * s };
-        (terms, rate)
+        (terms, Rate { first, second, theta: self.gains.gamma * e2, delta: self.gains.eta * e2 * s })
     }
 }
 
@@ -145,8 +175,7 @@ impl Law for Adaptive {
         };
         let (terms, rate) = subsystem.law(&errors, inputs, estimate);
         if context.adapt {
-            estimate.theta += rate.theta * context.dt_s;
-            estimate.delta += rate.delta * context.dt_s;
+            estimate.advance(&rate, context.dt_s);
         }
         (terms.sum(), errors)
     }

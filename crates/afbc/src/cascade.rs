@@ -146,19 +146,30 @@ impl<L: Law> Controller<L> {
 
     /// One step: from what is measured and wanted to rotor speeds. Cannot fail; see [`Health`] for what it does with
     /// input that is not plausible.
-    // Always: there is one caller, and copying the command out of a call costs a tenth of a closed-loop step.
+    // Always: copying the command out of a call costs a tenth of a closed-loop step.
     #[inline(always)]
     pub fn step(&self, memory: &mut Memory<L::Estimate>, state: &State, setpoint: &Setpoint) -> Command {
         let mut health = Health::default();
-        let Some((state, setpoint)) = memory.screen.pass(state, setpoint, &mut health) else {
-            return Command { health, ..Command::default() };
-        };
-        let context = Context {
-            state: &state,
-            rotor_residual_rad_s: memory.rotor_residual_rad_s,
-            dt_s: self.dt_s,
-            adapt: !health.state_rejected,
-        };
+        match memory.screen.pass(state, setpoint, &mut health) {
+            Some((state, setpoint)) => {
+                let command = self.step_screened(memory, &state, &setpoint, !health.state_rejected);
+                Command { health: Health { saturated: command.health.saturated, ..health }, ..command }
+            }
+            None => Command { health, ..Command::default() },
+        }
+    }
+
+    /// The step behind the screen, for a caller with one of its own: state and setpoint must be plausible
+    /// ([`State::is_plausible`], [`Setpoint::is_plausible`]). Estimates stay as they are unless `adapt`.
+    #[inline(always)]
+    pub fn step_screened(
+        &self,
+        memory: &mut Memory<L::Estimate>,
+        state: &State,
+        setpoint: &Setpoint,
+        adapt: bool,
+    ) -> Command {
+        let context = Context { state, rotor_residual_rad_s: memory.rotor_residual_rad_s, dt_s: self.dt_s, adapt };
         let mut errors = PerAxis::default();
         let estimates = &mut memory.estimates;
         let mut input = |axis: Axis, tracking: Tracking| {
@@ -202,7 +213,7 @@ impl<L: Law> Controller<L> {
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3, thrust_n: u4 };
         let allocation = self.mixer.allocate(&inputs);
         let speeds = self.mixer.speeds(&allocation.forces);
-        health.saturated = allocation.saturated;
+        let health = Health { saturated: allocation.saturated, ..Health::default() };
 
         memory.filtered = Some([self.filter.advance(&roll_d, phi_d), self.filter.advance(&pitch_d, theta_d)]);
         memory.rotor_residual_rad_s = speeds.residual_rad_s();

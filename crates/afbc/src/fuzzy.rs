@@ -68,8 +68,14 @@ impl Basis {
     /// Every weight is within \[0, 1\] and they sum to one, for every finite input.
     #[inline]
     pub fn weights(&self, inputs: [f32; 2]) -> Matrix3<f32> {
-        let [first, second] = inputs.map(|x| self.triple(x));
+        let [first, second] = self.factors(inputs);
         first * second.transpose()
+    }
+
+    /// The normalised memberships of each input: w(x) is their outer product, and seldom needed as such.
+    #[inline]
+    pub fn factors(&self, inputs: [f32; 2]) -> [Vector3<f32>; 2] {
+        inputs.map(|x| self.triple(x))
     }
 
     /// The normalised memberships of one input.

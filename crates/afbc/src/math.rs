@@ -27,10 +27,10 @@ pub fn atan(x: f32) -> f32 {
     libm::atanf(x)
 }
 
-/// Square root; libm, correctly rounded.
+/// Square root; the processor's own or libm's, both correctly rounded.
 #[inline]
 pub fn sqrt(x: f32) -> f32 {
-    libm::sqrtf(x)
+    fpu::sqrt(x)
 }
 
 /// sin x; micromath. Error at most 1.2e-3 absolute for |x| <= 1000 rad.

@@ -70,7 +70,7 @@ impl Motor {
     fn inverse_curve(&self, share: f32) -> f32 {
         let k = self.curve.linearity;
         let linear = 1.0 - k;
-        let denominator = linear + libm::sqrtf(linear * linear + 4.0 * k * share);
+        let denominator = linear + afbc::math::sqrt(linear * linear + 4.0 * k * share);
         if denominator > 0.0 { 2.0 * share / denominator } else { 0.0 }
     }
 }

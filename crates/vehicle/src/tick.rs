@@ -128,18 +128,21 @@ impl<L: Law> Vehicle<L> {
                 match fresh {
                     Some(state) => {
                         let target = flight.target(mode, &state, setpoint, now_us, self.dt_s);
-                        let command = self.controller.step(&mut flight.control, &state, &target);
-                        self.blind.trim(&mut flight.reckoning, &Mixer::inputs(&command.forces));
+                        // Screened above: both are plausible.
+                        let command = self.controller.step_screened(&mut flight.control, &state, &target, true);
+                        flight.applied = Mixer::inputs(&command.forces);
+                        self.blind.trim(&mut flight.reckoning, &flight.applied);
                         command
                     }
-                    None => self.blind_command(flight, mode),
+                    None => {
+                        let command = self.blind_command(flight, mode);
+                        flight.applied = Mixer::inputs(&command.forces);
+                        command
+                    }
                 }
             }
             _ => Command::default(),
         };
-        if let Some(flight) = &mut memory.flight {
-            flight.applied = Mixer::inputs(&command.forces);
-        }
 
         // Gate the motors.
         let motors = if mode.armed() { command.speeds } else { RotorSpeeds::default() };
