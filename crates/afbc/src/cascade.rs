@@ -151,25 +151,33 @@ impl<L: Law> Controller<L> {
     pub fn step(&self, memory: &mut Memory<L::Estimate>, state: &State, setpoint: &Setpoint) -> Command {
         let mut health = Health::default();
         match memory.screen.pass(state, setpoint, &mut health) {
-            Some((state, setpoint)) => {
-                let command = self.step_screened(memory, &state, &setpoint, !health.state_rejected);
-                Command { health: Health { saturated: command.health.saturated, ..health }, ..command }
-            }
+            Some((state, setpoint)) => self.decide(memory, &state, &setpoint, health),
             None => Command { health, ..Command::default() },
         }
     }
 
     /// The step behind the screen, for a caller with one of its own: state and setpoint must be plausible
-    /// ([`State::is_plausible`], [`Setpoint::is_plausible`]). Estimates stay as they are unless `adapt`.
+    /// ([`State::is_plausible`], [`Setpoint::is_plausible`]).
     #[inline(always)]
-    pub fn step_screened(
+    pub fn step_screened(&self, memory: &mut Memory<L::Estimate>, state: &State, setpoint: &Setpoint) -> Command {
+        self.decide(memory, state, setpoint, Health::default())
+    }
+
+    /// Estimates stay as they are if the state is not the present one.
+    #[inline(always)]
+    fn decide(
         &self,
         memory: &mut Memory<L::Estimate>,
         state: &State,
         setpoint: &Setpoint,
-        adapt: bool,
+        mut health: Health,
     ) -> Command {
-        let context = Context { state, rotor_residual_rad_s: memory.rotor_residual_rad_s, dt_s: self.dt_s, adapt };
+        let context = Context {
+            state,
+            rotor_residual_rad_s: memory.rotor_residual_rad_s,
+            dt_s: self.dt_s,
+            adapt: !health.state_rejected,
+        };
         let mut errors = PerAxis::default();
         let estimates = &mut memory.estimates;
         let mut input = |axis: Axis, tracking: Tracking| {
@@ -213,7 +221,7 @@ impl<L: Law> Controller<L> {
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3, thrust_n: u4 };
         let allocation = self.mixer.allocate(&inputs);
         let speeds = self.mixer.speeds(&allocation.forces);
-        let health = Health { saturated: allocation.saturated, ..Health::default() };
+        health.saturated = allocation.saturated;
 
         memory.filtered = Some([self.filter.advance(&roll_d, phi_d), self.filter.advance(&pitch_d, theta_d)]);
         memory.rotor_residual_rad_s = speeds.residual_rad_s();

@@ -129,7 +129,7 @@ impl<L: Law> Vehicle<L> {
                     Some(state) => {
                         let target = flight.target(mode, &state, setpoint, now_us, self.dt_s);
                         // Screened above: both are plausible.
-                        let command = self.controller.step_screened(&mut flight.control, &state, &target, true);
+                        let command = self.controller.step_screened(&mut flight.control, &state, &target);
                         flight.applied = Mixer::inputs(&command.forces);
                         self.blind.trim(&mut flight.reckoning, &flight.applied);
                         command
