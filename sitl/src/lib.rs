@@ -2,6 +2,7 @@
 
 pub mod claims;
 pub mod flight;
+pub mod in_the_loop;
 pub mod metrics;
 pub mod output;
 pub mod paper;

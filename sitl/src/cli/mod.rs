@@ -2,8 +2,10 @@
 
 mod fly;
 mod flying;
+mod hitl;
 mod log_rate;
 mod paper;
+mod pil;
 mod results;
 mod scenarios;
 mod target;
@@ -38,6 +40,8 @@ enum Command {
     Check(scenarios::Check),
     Scenarios(scenarios::Scenarios),
     Results(results::Results),
+    Pil(pil::Pil),
+    Hitl(hitl::Hitl),
 }
 
 impl Cli {
@@ -49,6 +53,8 @@ impl Cli {
             Command::Check(check) => check.run(),
             Command::Scenarios(scenarios) => scenarios.run(),
             Command::Results(results) => results.run(),
+            Command::Pil(pil) => pil.run(),
+            Command::Hitl(hitl) => hitl.run(),
         }
     }
 }

@@ -1,0 +1,110 @@
+//! `sitl hitl`: a board in the loop.
+
+use super::pil::{Flying, Recorder, outcome};
+use super::target::Target;
+use super::{Failure, print};
+use clap::Args;
+use sitl::flight::Sample;
+use sitl::in_the_loop::{self, End, Pace, Serial, Station};
+use std::ops::ControlFlow;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Fly a real board over a serial port, in real time
+///
+/// The board flies a vehicle that is simulated here. ITS MOTOR OUTPUTS ARE LIVE: take the propellers off, or leave the
+/// motors unpowered. Ctrl-C disarms. See docs/hitl.md.
+#[derive(Args, Debug)]
+pub(crate) struct Hitl {
+    /// Name of a built-in scenario, or path of a scenario file
+    #[arg(default_value = "paper")]
+    scenario: Target,
+
+    /// Serial port that the board is connected to
+    #[arg(long, value_name = "DEVICE", required_unless_present = "list")]
+    port: Option<String>,
+
+    /// Speed of the port; the firmware's is 921600
+    #[arg(long, value_name = "N", default_value_t = 921_600)]
+    baud: u32,
+
+    /// List the serial ports instead
+    #[arg(long)]
+    list: bool,
+
+    #[command(flatten)]
+    flying: Flying,
+}
+
+impl Hitl {
+    /// Flies, prints.
+    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        let Some(port) = self.port.filter(|_| !self.list) else {
+            let ports = in_the_loop::ports()?;
+            print(&if ports.is_empty() { "no serial port\n".into() } else { ports.join("\n") + "\n" })?;
+            return Ok(ExitCode::SUCCESS);
+        };
+        let scenario = self.flying.scenario(&self.scenario)?;
+        let pace = Pace::at(self.baud)?;
+        let mut recorder = Recorder::new(&scenario, &self.flying)?;
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopper = Arc::clone(&stop);
+        ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
+        let mut serial = Serial::open(&port, self.baud)?;
+        print(&format!(
+            "{}: {} s in real time; {} baud carry a state every {} ms ({:.0} Hz), a setpoint every {} ms\n",
+            scenario.name,
+            scenario.duration_s,
+            self.baud,
+            pace.state_ms,
+            pace.state_hz(),
+            pace.setpoint_ms,
+        ))?;
+
+        let mut station = Station::new();
+        let observe = |sample: &Sample| match recorder.observe(sample) {
+            ControlFlow::Continue(()) if !stop.load(Ordering::Relaxed) => ControlFlow::Continue(()),
+            _ => ControlFlow::Break(()),
+        };
+        let end = in_the_loop::fly(&scenario, &mut station, &mut serial, pace, observe)?;
+        let late_ms = serial.late_max().as_secs_f64() * 1e3;
+        let metrics = recorder.finish()?;
+
+        print(&format!(
+            "\n{}this side            {late_ms:.1} ms behind real time at most\n\n{}",
+            figures(&station),
+            outcome(&scenario, &metrics, &end)?,
+        ))?;
+        let End { lost, interrupted, disarmed } = end;
+        Ok(ExitCode::from(u8::from(lost.is_some() || interrupted || !disarmed)))
+    }
+}
+
+/// What the link and the board did.
+fn figures(station: &Station) -> String {
+    let (here, heard, round_trip) = (station.counters(), station.heard(), station.round_trip_ms());
+    let health = heard.health.unwrap_or_default();
+    let there = health.link;
+    let [min, mean, max] = [round_trip.min(), round_trip.mean(), round_trip.max()];
+    format!(
+        "messages to here     {} received, {} lost, {} corrupt\n\
+         messages to vehicle  {} received, {} lost, {} corrupt\n\
+         round trip           min {min:.1}, mean {mean:.1}, max {max:.1} ms of {} questions, {} unanswered\n\
+         state age on board   {:.1} ms at most, of 10 looks a second\n\
+         control tick         {:.1} us at most, {:.0} Hz, {} late, {} saturated\n",
+        here.received,
+        here.lost,
+        here.bad_checksum,
+        there.received,
+        there.lost,
+        there.bad_checksum,
+        round_trip.count(),
+        station.unanswered(),
+        heard.state_age_max_us * 1e-3,
+        health.tick_max_us,
+        health.rate_hz,
+        health.late_ticks,
+        health.saturated_ticks,
+    )
+}

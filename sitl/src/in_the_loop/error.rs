@@ -1,0 +1,79 @@
+//! What stops a flight in the loop.
+
+use airframe::OutOfRange;
+use std::fmt;
+use std::io;
+
+/// Why a flight did not begin or come to its end. The text is one line for people.
+#[derive(Debug)]
+pub enum Error {
+    /// The scenario wants what the firmware does not hold.
+    Mismatch(&'static str),
+    /// The baud rate is too low for states that are fresh enough.
+    Baud {
+        /// What was asked for \[baud\].
+        given: u32,
+        /// The least that will do \[baud\].
+        least: u32,
+    },
+    /// Nothing that can be read comes from the vehicle.
+    Silent,
+    /// The vehicle answers, but does not arm; its last word on it.
+    NotArmed(String),
+    /// A parameter out of range.
+    OutOfRange(OutOfRange),
+    /// The emulator, or what it needs.
+    Pil(pil::Error),
+    /// The serial port could not be opened or set up.
+    Port(serialport::Error),
+    /// The serial port failed in flight.
+    Link(io::Error),
+    /// The log could not be written.
+    Log(csv::Error),
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::Mismatch(what) => write!(
+                f,
+                "the firmware holds the paper's vehicle, gains and settings under AFBC, but the scenario has {what}; \
+                 fly it by `sitl fly`, or change it"
+            ),
+            Error::Baud { given, least } => {
+                write!(f, "{given} baud is too slow for a state every 10 ms; take at least {least}")
+            }
+            Error::Silent => {
+                write!(f, "the vehicle says nothing; check its power, the port, the baud rate and the wires")
+            }
+            Error::NotArmed(reason) => write!(f, "the vehicle did not arm: {reason}"),
+            Error::OutOfRange(error) => error.fmt(f),
+            Error::Pil(error) => error.fmt(f),
+            Error::Port(error) => {
+                write!(f, "the serial port cannot be opened ({error}); `sitl hitl --list` shows those there are")
+            }
+            Error::Link(error) => write!(f, "the serial port failed ({error}); check the cable"),
+            Error::Log(error) => write!(f, "the log cannot be written ({error})"),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+impl From<OutOfRange> for Error {
+    fn from(error: OutOfRange) -> Self {
+        Error::OutOfRange(error)
+    }
+}
+
+impl From<pil::Error> for Error {
+    fn from(error: pil::Error) -> Self {
+        Error::Pil(error)
+    }
+}
+
+impl From<csv::Error> for Error {
+    fn from(error: csv::Error) -> Self {
+        Error::Log(error)
+    }
+}

@@ -1,0 +1,182 @@
+//! The closed loop over the link.
+
+use super::{Autopilot, Error, Heard, Pace, Station};
+use crate::flight::{LOST_DISTANCE_M, Lost, Sample};
+use crate::scenario::{ControllerKind, Scenario};
+use crate::trajectory::Reference;
+use afbc::Profile;
+use airframe::{Parameters, PerAxis, RotorForces};
+use core::f64::consts::FRAC_PI_2;
+use core::ops::ControlFlow;
+use link::{Answer, Command};
+use plant::{Motion, Plant};
+
+/// Time between control ticks, and one step of the plant \[s\].
+const STEP_S: f64 = 0.001;
+/// How often arming and disarming are asked for until they are answered \[ms\].
+const ASK_EVERY_MS: u64 = 200;
+/// How long arming may take \[ms\]. The vehicle measures its rate over a second first, and ignores for three a sender
+/// whose clock was set back, which is what starting this program again looks like.
+const ARM_WITHIN_MS: u64 = 6_000;
+/// How long disarming may take \[ms\].
+const DISARM_WITHIN_MS: u64 = 1_000;
+/// A vehicle that has sent no rotor command for this long is gone \[ms\].
+const SILENT_MS: u64 = 500;
+
+/// How a flight came to its end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct End {
+    /// When and why the vehicle was lost, if it was.
+    pub lost: Option<Lost>,
+    /// True if the observer broke off.
+    pub interrupted: bool,
+    /// True if the vehicle said that its motors are off.
+    pub disarmed: bool,
+}
+
+/// Whether the firmware can fly `scenario`.
+///
+/// # Errors
+/// [`Error::Mismatch`] names what the firmware holds otherwise.
+pub fn check(scenario: &Scenario) -> Result<(), Error> {
+    let profile = Profile::Paper;
+    let agreed = [
+        (scenario.vehicle == Parameters::PAPER, "another vehicle"),
+        (scenario.gains == profile.gains(), "other gains"),
+        (scenario.settings == profile.settings(), "other settings"),
+        (scenario.controllers.contains(&ControllerKind::Afbc), "another law"),
+    ];
+    match agreed.into_iter().find(|(agreed, _)| !agreed) {
+        Some((_, what)) => Err(Error::Mismatch(what)),
+        None => Ok(()),
+    }
+}
+
+/// Flies `scenario`, showing every step from t = 0 to the end.
+///
+/// The vehicle is held where it starts until it is armed: that is t = 0. A step's [`Sample::command`] holds the rotor
+/// speeds and forces only, and nothing is known of the estimates. A vehicle that disarms in flight is lost. It is disarmed at
+/// the end, whatever the end is; after an error, the autopilot has to see to that itself.
+///
+/// # Errors
+/// If the firmware cannot fly the scenario, the vehicle does not arm, or the autopilot fails.
+pub fn fly(
+    scenario: &Scenario,
+    station: &mut Station,
+    autopilot: &mut impl Autopilot,
+    pace: Pace,
+    mut observe: impl FnMut(&Sample) -> ControlFlow<()>,
+) -> Result<End, Error> {
+    check(scenario)?;
+    let mut line = Line { station, autopilot, pace, now_ms: 0, silent_ms: 0 };
+    let mut plant = Plant::new(scenario.model, scenario.initial, scenario.environment.clone());
+    line.arm((&scenario.initial, &scenario.trajectory.at(0.0)))?;
+
+    let thrust_factor_n_s2 = scenario.vehicle.to_f32().thrust_factor_n_s2;
+    let steps = (scenario.duration_s / STEP_S).round() as u64;
+    let mut end = End { lost: None, interrupted: false, disarmed: false };
+    for step in 0..=steps {
+        let (time_s, motion) = (plant.time_s(), plant.motion());
+        let reference = scenario.trajectory.at(time_s);
+        // The tick that armed the vehicle was the first.
+        if step > 0 {
+            line.turn(&motion, &reference)?;
+        }
+        let heard = line.station.heard();
+        let mut command = afbc::Command { speeds: heard.speeds, ..afbc::Command::default() };
+        command.forces = RotorForces(heard.speeds.0.map(|speed| thrust_factor_n_s2 * speed * speed));
+        let sample = Sample { time_s, motion, reference, command, estimates: PerAxis::default() };
+        end.interrupted = observe(&sample).is_break();
+        end.lost = lost(&sample, heard.armed).map(|reason| Lost { time_s, reason });
+        if end.interrupted || end.lost.is_some() {
+            break;
+        }
+        if step < steps {
+            plant.step(&heard.speeds, STEP_S);
+        }
+    }
+    let (time_s, motion) = (plant.time_s(), plant.motion());
+    end.disarmed = line.disarm((&motion, &scenario.trajectory.at(time_s)))?;
+    Ok(end)
+}
+
+/// Why the vehicle counts as lost, if it does: as in [`crate::flight`], or because its motors stopped.
+fn lost(sample: &Sample, armed: bool) -> Option<&'static str> {
+    let eta = &sample.motion.attitude_rad;
+    let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
+    let (upright, near) = (eta.x.abs() < FRAC_PI_2 && eta.y.abs() < FRAC_PI_2, distance_m < LOST_DISTANCE_M);
+    // A NaN is neither upright nor near.
+    match (upright, near, armed) {
+        (true, true, true) => None,
+        (false, ..) => Some("tilted beyond 90 degrees"),
+        (_, false, _) => Some("more than 50 m from the reference"),
+        (.., false) => Some("it disarmed in flight"),
+    }
+}
+
+/// A station that talks with an autopilot, a millisecond at a time.
+struct Line<'a, A> {
+    station: &'a mut Station,
+    autopilot: &'a mut A,
+    pace: Pace,
+    now_ms: u64,
+    /// Since the last rotor command.
+    silent_ms: u64,
+}
+
+impl<A: Autopilot> Line<'_, A> {
+    /// One millisecond: says what is due, hears what comes.
+    fn turn(&mut self, motion: &Motion, reference: &Reference) -> Result<(), Error> {
+        let Line { station, autopilot, pace, now_ms, silent_ms } = self;
+        if now_ms.is_multiple_of(pace.state_ms) {
+            station.track(*now_ms * 1000, motion.measure());
+        }
+        if now_ms.is_multiple_of(pace.setpoint_ms) {
+            station.lead(reference.setpoint());
+        }
+        if pace.ping_ms.is_some_and(|ping_ms| now_ms.is_multiple_of(ping_ms)) {
+            station.ping();
+        }
+        *now_ms += 1;
+
+        let (uplink, heard_before) = (station.take(), station.heard().rotor_commands);
+        autopilot.exchange(&uplink, &mut |bytes| station.hear(bytes))?;
+        *silent_ms = if station.heard().rotor_commands == heard_before { *silent_ms + 1 } else { 0 };
+        if *silent_ms > SILENT_MS { Err(Error::Silent) } else { Ok(()) }
+    }
+
+    /// Asks for `command` again and again, until it is `done` or `within_ms` is over. True if it is done.
+    fn ask(
+        &mut self,
+        command: Command,
+        (motion, reference): (&Motion, &Reference),
+        within_ms: u64,
+        done: fn(&Heard) -> bool,
+    ) -> Result<bool, Error> {
+        for waited_ms in 0..within_ms {
+            if waited_ms.is_multiple_of(ASK_EVERY_MS) {
+                self.station.command(command);
+            }
+            self.turn(motion, reference)?;
+            if done(self.station.heard()) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Arms a vehicle that is held at `place`, or that was left armed by whoever was here before.
+    fn arm(&mut self, place: (&Motion, &Reference)) -> Result<(), Error> {
+        if self.disarm(place)? && self.ask(Command::Arm, place, ARM_WITHIN_MS, |heard| heard.armed)? {
+            return Ok(());
+        }
+        let reason = self.station.heard().refusal().unwrap_or("it does not answer");
+        Err(Error::NotArmed(reason.into()))
+    }
+
+    /// True if the vehicle says that it has disarmed.
+    fn disarm(&mut self, place: (&Motion, &Reference)) -> Result<bool, Error> {
+        let done = |heard: &Heard| heard.answer == Some(Answer::Accepted) && !heard.armed;
+        self.ask(Command::Disarm, place, DISARM_WITHIN_MS, done)
+    }
+}

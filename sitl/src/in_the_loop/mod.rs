@@ -1,0 +1,40 @@
+//! Flights in which the autopilot is the firmware, or stands in for it: the plant here, the law there, and between them
+//! nothing but the bytes of [`link`].
+//!
+//! # Reading order
+//!
+//! 1. [`Autopilot`]: what takes bytes and gives bytes, once a millisecond.
+//! 2. [`Host`]: the firmware's code in this process. [`Twins`]: the emulated processor and the host side by side, compared
+//!    bit for bit. [`Serial`]: a board at the end of a serial port.
+//! 3. [`Station`]: tracker, commander and listener in one, the other end of the link.
+//! 4. [`fly()`]: arms, lets the vehicle go, flies a scenario, disarms. [`Pace`] is how often it speaks.
+//!
+//! The firmware holds the paper's vehicle, gains and settings; a scenario that wants others is refused ([`check`]).
+//! Everything around the vehicle is the scenario's: equations, gusts, true parameters, start, trajectory.
+
+mod autopilot;
+mod error;
+mod flight;
+mod host;
+mod log;
+mod pace;
+mod report;
+mod serial;
+mod spread;
+mod station;
+mod twins;
+
+#[cfg(test)]
+mod tests;
+
+pub use autopilot::Autopilot;
+pub use error::Error;
+pub use flight::{End, check, fly};
+pub use host::{Host, Tick};
+pub use log::Log;
+pub use pace::Pace;
+pub use report::tracking;
+pub use serial::{Serial, ports};
+pub use spread::Spread;
+pub use station::{Heard, Station};
+pub use twins::{Comparison, Twins};

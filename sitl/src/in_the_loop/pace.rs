@@ -1,0 +1,94 @@
+//! How often the station speaks.
+
+use super::Error;
+
+/// Frames of a state, of a setpoint and of a question on the wire \[bytes\].
+const STATE_BYTES: u64 = 242;
+const SETPOINT_BYTES: u64 = 65;
+const PING_BYTES: u64 = 45;
+/// Start bit, eight data bits, stop bit.
+const BITS_PER_BYTE: u64 = 10;
+/// Share of the line that may be used: what is left over lets a backlog go \[%\].
+const LINE_USE_PERCENT: u64 = 90;
+/// Longest time between states \[ms\]: half of what the vehicle flies on.
+const STATE_PERIOD_MAX_MS: u64 = 10;
+/// Time between setpoints, and between questions, on a serial line \[ms\].
+const SETPOINT_PERIOD_MS: u64 = 10;
+const PING_PERIOD_MS: u64 = 100;
+
+/// Time from one message to the next \[ms\].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pace {
+    /// Of states.
+    pub state_ms: u64,
+    /// Of setpoints.
+    pub setpoint_ms: u64,
+    /// Of questions that time the link, if any.
+    pub ping_ms: Option<u64>,
+}
+
+impl Pace {
+    /// Both at every control tick: what a flight without a link gets.
+    pub const LOCKSTEP: Pace = Pace { state_ms: 1, setpoint_ms: 1, ping_ms: None };
+
+    /// As many states as a serial line of `baud` carries, a whole number of milliseconds apart.
+    ///
+    /// # Errors
+    /// [`Error::Baud`] if they would be more than 10 ms apart.
+    pub fn at(baud: u32) -> Result<Self, Error> {
+        let bytes_per_s = u64::from(baud) * LINE_USE_PERCENT / 100 / BITS_PER_BYTE;
+        let state_ms = bytes_per_s
+            .checked_sub(other_bytes_per_s())
+            .filter(|&left| left > 0)
+            .map(|left| (STATE_BYTES * 1000).div_ceil(left));
+        match state_ms {
+            Some(state_ms @ ..=STATE_PERIOD_MAX_MS) => {
+                Ok(Pace { state_ms, setpoint_ms: SETPOINT_PERIOD_MS, ping_ms: Some(PING_PERIOD_MS) })
+            }
+            _ => Err(Error::Baud { given: baud, least: least_baud() }),
+        }
+    }
+
+    /// States in a second.
+    pub fn state_hz(&self) -> f64 {
+        1000.0 / self.state_ms as f64
+    }
+}
+
+/// What setpoints and questions take of a serial line.
+const fn other_bytes_per_s() -> u64 {
+    SETPOINT_BYTES * 1000 / SETPOINT_PERIOD_MS + PING_BYTES * 1000 / PING_PERIOD_MS
+}
+
+fn least_baud() -> u32 {
+    let bytes_per_s = other_bytes_per_s() + STATE_BYTES * 1000 / STATE_PERIOD_MAX_MS;
+    (bytes_per_s * BITS_PER_BYTE * 100).div_ceil(LINE_USE_PERCENT) as u32
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test")]
+mod tests {
+    use super::*;
+    use airframe::{Setpoint, State};
+    use link::{Address, Command, FRAME_MAX, MavCmd, Sender, Uplink};
+
+    #[test]
+    fn frames_are_as_long_as_said() {
+        let length = |message: Uplink| Sender::new(Address::default()).send(&message, &mut [0; FRAME_MAX]).len() as u64;
+        assert_eq!(length(Uplink::State { sent_us: 0, state: State::default() }), STATE_BYTES);
+        assert!(length(Uplink::Setpoint(Setpoint::default())) <= SETPOINT_BYTES);
+        assert!(length(Uplink::Command(Command::Other(MavCmd::MAV_CMD_REQUEST_MESSAGE))) <= PING_BYTES);
+    }
+
+    #[test]
+    fn states_come_as_often_as_the_line_allows() {
+        let state_ms = |baud| Pace::at(baud).map(|pace| pace.state_ms).ok();
+        assert_eq!(state_ms(4_000_000), Some(1));
+        assert_eq!(state_ms(921_600), Some(4));
+        assert_eq!(state_ms(460_800), Some(8));
+        assert_eq!(state_ms(least_baud()), Some(10));
+        assert_eq!(state_ms(least_baud() - 100), None);
+        assert_eq!(state_ms(9_600), None);
+        assert_eq!(state_ms(0), None);
+    }
+}

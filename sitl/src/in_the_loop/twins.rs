@@ -1,0 +1,88 @@
+//! The processor beside the host.
+
+use super::{Autopilot, Error, Host, Spread, Tick};
+use airframe::OutOfRange;
+use pil::{Emulator, Reply};
+
+/// The emulated processor flies; the host gets the same bytes at the same times, and every output of every tick is
+/// compared. As long as none differs, this is also what the host alone would have flown: the loop has no other input.
+pub struct Twins {
+    emulator: Emulator,
+    host: Host,
+    comparison: Comparison,
+}
+
+/// What the comparison shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Comparison {
+    /// Control ticks compared.
+    pub ticks: u64,
+    /// Of these, armed ones.
+    pub armed_ticks: u64,
+    /// Bits compared: throttles and the link's bytes.
+    pub bits: u64,
+    /// Ticks with a bit that differs.
+    pub differing_ticks: u64,
+    /// Bits that differ; those of a byte that only one side has sent are eight.
+    pub differing_bits: u64,
+    /// The first tick with a bit that differs, counted from 0.
+    pub first_difference: Option<u64>,
+    /// Instructions of each armed control tick.
+    pub instructions: Spread,
+    /// Ticks that came late, by the processor's own clock.
+    pub late_ticks: u32,
+    /// Most stack ever used, interrupts included \[bytes\].
+    pub stack_bytes: u32,
+}
+
+impl Twins {
+    /// Both, disarmed.
+    ///
+    /// # Errors
+    /// The first parameter out of range; none in fact.
+    pub fn new(emulator: Emulator) -> Result<Self, OutOfRange> {
+        Ok(Twins { emulator, host: Host::new()?, comparison: Comparison::default() })
+    }
+
+    /// What was compared so far.
+    pub fn comparison(&self) -> &Comparison {
+        &self.comparison
+    }
+}
+
+impl Autopilot for Twins {
+    fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error> {
+        let reply = self.emulator.exchange(uplink)?;
+        // Times are the processor's: they are measured, not computed.
+        let tick = self.host.tick(uplink, reply.time_us, reply.cycles);
+        self.comparison.add(&reply, &tick);
+        hear(&reply.bytes);
+        Ok(())
+    }
+}
+
+impl Comparison {
+    fn add(&mut self, reply: &Reply, tick: &Tick) {
+        let differing_bits = differing_bits(reply, tick);
+        if differing_bits > 0 {
+            self.differing_ticks += 1;
+            self.differing_bits += differing_bits;
+            self.first_difference.get_or_insert(self.ticks);
+        }
+        self.ticks += 1;
+        self.bits += 8 * (reply.bytes.len() as u64 + 2 * reply.throttles.len() as u64);
+        if tick.report.mode.armed() {
+            self.armed_ticks += 1;
+            self.instructions.add(f64::from(reply.instructions));
+        }
+        self.late_ticks = tick.report.health.rate.late_ticks;
+        self.stack_bytes = self.stack_bytes.max(reply.stack_bytes);
+    }
+}
+
+fn differing_bits(reply: &Reply, tick: &Tick) -> u64 {
+    let throttles = reply.throttles.iter().zip(tick.report.throttles).map(|(a, b)| (a ^ b).count_ones());
+    let bytes = reply.bytes.iter().zip(&tick.bytes).map(|(a, b)| (a ^ b).count_ones());
+    let unmatched = 8 * reply.bytes.len().abs_diff(tick.bytes.len()) as u64;
+    u64::from(throttles.chain(bytes).sum::<u32>()) + unmatched
+}

@@ -1,0 +1,43 @@
+//! The paper's flight, gusts and uncertainty on, flown by the firmware's own machine code on an emulated Cortex-M4F: in
+//! 60,000 ticks of control, no bit differs from what the same code gives on the host.
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
+
+use core::ops::ControlFlow;
+use pil::{Emulator, Image};
+use plant::Model;
+use sitl::in_the_loop::{End, Pace, Station, Twins, fly};
+use sitl::paper::{Case, scenario};
+use std::io::Write as _;
+
+/// The emulator, or none if this test has to be skipped, which it says on the terminal. Under CI nothing may be skipped.
+fn emulator_or_skip() -> Option<Emulator> {
+    match Image::Pil.find().and_then(|image| Emulator::start(&image)) {
+        Ok(emulator) => Some(emulator),
+        Err(error) if error.is_missing() && std::env::var_os("CI").is_none() => {
+            // Not println!: the test harness would hide it.
+            let _ = writeln!(std::io::stderr(), "SKIPPED, nothing was tested: {error}");
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+#[test]
+fn the_papers_flight_is_the_hosts_bit_for_bit() {
+    let Some(emulator) = emulator_or_skip() else { return };
+    let mut twins = Twins::new(emulator).expect("in range");
+    let paper = scenario(Model::Simplified, Case::DEFAULT).expect("in range");
+    let end = fly(&paper, &mut Station::new(), &mut twins, Pace::LOCKSTEP, |_| ControlFlow::Continue(()));
+    assert_eq!(end.expect("flown"), End { lost: None, interrupted: false, disarmed: true });
+
+    let comparison = twins.comparison();
+    println!("{comparison:#?}");
+    assert!(comparison.armed_ticks > 60_000, "{comparison:?}");
+    assert!(comparison.bits > 60_000 * 8 * 93, "every tick sends rotor commands: {comparison:?}");
+    assert_eq!(
+        comparison.first_difference, None,
+        "unless the image is older than the source (cargo fw-pil): {comparison:?}"
+    );
+    assert_eq!((comparison.differing_ticks, comparison.differing_bits), (0, 0));
+    assert_eq!(comparison.late_ticks, 0);
+}
