@@ -15,10 +15,19 @@ pub fn exp(x: f32) -> f32 {
     libm::expf(x)
 }
 
-/// tanh x; libm. Error at most 8.2e-8 absolute for all x.
+/// tanh x = (1 - t)/(1 + t) with t = e^(-2|x|) from libm: half of what libm's own tanh costs where it costs most. Error at
+/// most 1.2e-7 absolute for all x; a NaN counts as infinite.
 #[inline]
 pub fn tanh(x: f32) -> f32 {
-    libm::tanhf(x)
+    let size = x.abs();
+    // From here on tanh rounds to 1.
+    let tanh = if size < 9.02 {
+        let t = exp(-2.0 * size);
+        (1.0 - t) / (1.0 + t)
+    } else {
+        1.0
+    };
+    tanh.copysign(x)
 }
 
 /// atan x; libm. Error at most 9.1e-8 absolute for all x.
