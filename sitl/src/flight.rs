@@ -133,7 +133,7 @@ pub fn backstepping_law(scenario: &Scenario) -> Result<Backstepping, OutOfRange>
 }
 
 /// Why the vehicle counts as lost, if it does. Assumption A3 rules out a tilt of 90 degrees.
-fn lost(sample: &Sample) -> Option<&'static str> {
+pub(crate) fn lost(sample: &Sample) -> Option<&'static str> {
     let eta = &sample.motion.attitude_rad;
     let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
     let (upright, near) = (eta.x.abs() < FRAC_PI_2 && eta.y.abs() < FRAC_PI_2, distance_m < LOST_DISTANCE_M);

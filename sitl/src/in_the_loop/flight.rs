@@ -1,12 +1,11 @@
 //! The closed loop over the link.
 
 use super::{Autopilot, Error, Heard, Pace, Station};
-use crate::flight::{LOST_DISTANCE_M, Lost, Sample};
+use crate::flight::{Lost, Sample, lost};
 use crate::scenario::{ControllerKind, Scenario};
 use crate::trajectory::Reference;
 use afbc::Profile;
 use airframe::{Parameters, PerAxis, RotorForces};
-use core::f64::consts::FRAC_PI_2;
 use core::ops::ControlFlow;
 use link::{Answer, Command};
 use plant::{Motion, Plant};
@@ -87,7 +86,8 @@ pub fn fly(
         command.forces = RotorForces(heard.speeds.0.map(|speed| thrust_factor_n_s2 * speed * speed));
         let sample = Sample { time_s, motion, reference, command, estimates: PerAxis::default() };
         end.interrupted = observe(&sample).is_break();
-        end.lost = lost(&sample, heard.armed).map(|reason| Lost { time_s, reason });
+        end.lost =
+            lost(&sample).or((!heard.armed).then_some("it disarmed in flight")).map(|reason| Lost { time_s, reason });
         if end.interrupted || end.lost.is_some() {
             break;
         }
@@ -98,20 +98,6 @@ pub fn fly(
     let (time_s, motion) = (plant.time_s(), plant.motion());
     end.disarmed = line.disarm((&motion, &scenario.trajectory.at(time_s)))?;
     Ok(end)
-}
-
-/// Why the vehicle counts as lost, if it does: as in [`crate::flight`], or because its motors stopped.
-fn lost(sample: &Sample, armed: bool) -> Option<&'static str> {
-    let eta = &sample.motion.attitude_rad;
-    let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
-    let (upright, near) = (eta.x.abs() < FRAC_PI_2 && eta.y.abs() < FRAC_PI_2, distance_m < LOST_DISTANCE_M);
-    // A NaN is neither upright nor near.
-    match (upright, near, armed) {
-        (true, true, true) => None,
-        (false, ..) => Some("tilted beyond 90 degrees"),
-        (_, false, _) => Some("more than 50 m from the reference"),
-        (.., false) => Some("it disarmed in flight"),
-    }
 }
 
 /// A station that talks with an autopilot, a millisecond at a time.
