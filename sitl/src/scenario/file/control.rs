@@ -38,6 +38,7 @@ fn axis_gains(mut table: Table<'_>, default: &Gains) -> Result<Gains, FileError>
             centre: number(&CENTRE, default.membership.centre)?,
             width: number(&WIDTH, default.membership.width)?,
         },
+        safeguards: default.safeguards,
     };
     // Each gain is in its range; what is left to refuse is how two of them go together.
     gains
@@ -54,6 +55,7 @@ pub(super) fn settings(table: Option<Table<'_>>, default: Settings) -> Result<Se
         dt_s: number(&mut table, &DT, default.dt_s)?,
         command_filter_rad_s: number(&mut table, &BANDWIDTH, default.command_filter_rad_s)?,
         rotor_force_max_n: number(&mut table, &FORCE_MAX, default.rotor_force_max_n)?,
+        ..default
     };
     table.finish()?;
     Ok(settings)
