@@ -5,7 +5,7 @@
 //! Runge-Kutta, gusts and parameter changes, nothing logged; items are steps.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a scenario that cannot be flown must stop the bench
 
-use afbc::{Controller, Law, Memory};
+use afbc::{Controller, FlightController, Law, Memory};
 use airframe::{OutOfRange, RotorSpeeds, Setpoint, State};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};

@@ -2,7 +2,7 @@
 
 use crate::scenario::{ControllerKind, Scenario};
 use crate::trajectory::{Reference, Trajectory};
-use afbc::{Adaptive, Backstepping, Command, Controller, Law, Memory, adaptive};
+use afbc::{Adaptive, Backstepping, Cascade, Command, Controller, FlightController, Law, Memory, adaptive};
 use airframe::{OutOfRange, PerAxis};
 use core::f64::consts::FRAC_PI_2;
 use plant::{Motion, Plant};
@@ -37,7 +37,7 @@ pub struct Lost {
 /// One controller flying one vehicle.
 pub struct Flight<L: Law> {
     controller: Controller<L>,
-    memory: Memory<L::Estimate>,
+    memory: Memory<Cascade<L::Estimate>>,
     plant: Plant,
     trajectory: Trajectory,
     dt_s: f64,
@@ -66,7 +66,7 @@ impl<L: Law> Flight<L> {
         let motion = self.plant.motion();
         let reference = self.trajectory.at(time_s);
         let command = self.controller.step(&mut self.memory, &motion.measure(), &reference.setpoint());
-        let estimates = &self.memory.estimates;
+        let estimates = &self.memory.control.estimates;
         let estimates = PerAxis::from_fn(|axis| L::learnt(estimates.get(axis)));
         Sample { time_s, motion, reference, command, estimates }
     }

@@ -5,7 +5,7 @@ use afbc::adaptive::{self, Estimate};
 use afbc::backstepping::{Errors, Tracking};
 use afbc::cascade::Context;
 use afbc::fuzzy::{Basis, Membership};
-use afbc::{Adaptive, Controller, Law, Memory, Profile};
+use afbc::{Adaptive, Cascade, Controller, FlightController, Law, Memory, Profile};
 use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
 use nalgebra::Vector3;
 use plant::{Environment, Model, Motion, Plant};
@@ -39,6 +39,10 @@ impl<L: Law> Law for Rateless<L> {
             }
             _ => self.0.input(axis, tracking, context, estimate),
         }
+    }
+
+    fn alpha1(&self, axis: Axis) -> f32 {
+        self.0.alpha1(axis)
     }
 
     fn learnt(estimate: &L::Estimate) -> Estimate {
@@ -160,7 +164,7 @@ fn gap_3_a_fast_roll_leaves_the_estimates_finite() {
         assert!(command.speeds.0.iter().all(|w| w.is_finite()));
         for axis in Axis::ALL {
             assert!(
-                memory.estimates.get(axis).theta.iter().all(|theta| theta.is_finite()),
+                memory.control.estimates.get(axis).theta.iter().all(|theta| theta.is_finite()),
                 "{} at {rate} rad/s",
                 axis.name()
             );
@@ -182,10 +186,10 @@ fn trembling_mn(delta: f32, epsilon: f32) -> f64 {
     let law = Adaptive::new(gains).unwrap();
     let vehicle = Parameters::PAPER;
     let controller = Controller::new(vehicle.to_f32(), Profile::Paper.settings(), law).unwrap();
-    let mut memory: Memory<Estimate> = Memory::default();
-    memory.estimates.roll.delta = delta;
+    let mut memory: Memory<Cascade<Estimate>> = Memory::default();
+    memory.control.estimates.roll.delta = delta;
     // Held up by what the z subsystem would have learnt: the weight.
-    memory.estimates.z.theta.fill((vehicle.mass_kg * vehicle.gravity_m_s2) as f32);
+    memory.control.estimates.z.theta.fill((vehicle.mass_kg * vehicle.gravity_m_s2) as f32);
     let start = Motion { attitude_rad: Vector3::new(0.01, 0.0, 0.0), ..Motion::default() };
     let mut plant = Plant::new(Model::Simplified, start, Environment::calm(vehicle).unwrap());
     let (mut last, mut sum) = (0.0, 0.0);
