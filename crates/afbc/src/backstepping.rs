@@ -27,6 +27,14 @@ pub struct Tracking {
     pub rate_max: f32,
 }
 
+impl Tracking {
+    /// True if the errors ask for more speed than [`Tracking::rate_max`].
+    #[inline]
+    fn limited(&self, alpha1: f32) -> bool {
+        (self.x1d_dot + alpha1 * self.e1).abs() > self.rate_max
+    }
+}
+
 /// Backstepping errors of one subsystem.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Errors {
@@ -45,7 +53,7 @@ impl Errors {
         let Tracking { e1, x1d_dot, x2, rate_max, .. } = *tracking;
         let e1_dot = x1d_dot - x2;
         let phi = x1d_dot + alpha1 * e1;
-        let e2 = if phi.abs() > rate_max { rate_max.copysign(phi) - x2 } else { e1_dot + alpha1 * e1 };
+        let e2 = if tracking.limited(alpha1) { rate_max.copysign(phi) - x2 } else { e1_dot + alpha1 * e1 };
         Errors { e1, e1_dot, e2 }
     }
 }
@@ -54,14 +62,34 @@ impl Errors {
 #[inline]
 pub fn ideal(alpha1: f32, errors: &Errors, x1d_ddot: f32, dynamics: &Dynamics) -> f32 {
     let Errors { e1, e2, .. } = *errors;
+    compensated(e1 + alpha1 * (e2 - alpha1 * e1) + x1d_ddot, e2, dynamics)
+}
+
+/// The input for an acceleration, with what (16) takes off for f and dg/dt.
+#[inline]
+fn compensated(acceleration: f32, e2: f32, dynamics: &Dynamics) -> f32 {
     let Dynamics { f, g, g_dot } = *dynamics;
-    (e1 + alpha1 * (e2 - alpha1 * e1) + x1d_ddot - f - 0.5 * g_dot / g * e2) / g
+    (acceleration - f - 0.5 * g_dot / g * e2) / g
 }
 
 /// u_pd (21).
 #[inline]
 pub fn proportional(alpha2: f32, errors: &Errors) -> f32 {
     alpha2 * errors.e2
+}
+
+/// u*_eq + alpha_2 e_2 with the errors behind it. At the speed limit phi stands still and e_1 is left to it: (16) for
+/// e_2 alone. Kept as it is, e_1 (1 - alpha_1^2) would drive a vehicle with alpha_1 > 1 away from a distant setpoint.
+#[inline]
+pub(crate) fn classical(gains: &Gains, tracking: &Tracking, dynamics: &Dynamics) -> (f32, Errors) {
+    let Gains { alpha1, alpha2 } = *gains;
+    let errors = Errors::new(alpha1, tracking);
+    let ideal = if tracking.limited(alpha1) {
+        compensated(0.0, errors.e2, dynamics)
+    } else {
+        ideal(alpha1, &errors, tracking.x1d_ddot, dynamics)
+    };
+    (ideal + proportional(alpha2, &errors), errors)
 }
 
 /// The two gains of one backstepping subsystem.
@@ -111,11 +139,7 @@ impl Law for Backstepping {
 
     #[inline]
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, (): &mut ()) -> (f32, Errors) {
-        let gains = self.gains.get(axis);
-        let errors = Errors::new(gains.alpha1, tracking);
-        let dynamics = self.model.dynamics(axis, context);
-        let u = ideal(gains.alpha1, &errors, tracking.x1d_ddot, &dynamics) + proportional(gains.alpha2, &errors);
-        (u, errors)
+        classical(self.gains.get(axis), tracking, &self.model.dynamics(axis, context))
     }
 
     fn learnt((): &()) -> Estimate {

@@ -211,6 +211,12 @@ impl<L: Law> Controller<L> {
         [u5 * scale, u6 * scale]
     }
 
+    /// True if the ground carries the vehicle, as far as that is heeded.
+    #[inline]
+    pub(crate) fn stands(&self, memory: &Memory<L::Estimate>) -> bool {
+        self.settings.heed_ground && memory.ground.standing()
+    }
+
     /// One step: from what is measured and wanted to rotor speeds. Cannot fail; see [`Health`] for what it does with
     /// input that is not plausible.
     // Always: copying the command out of a call costs a tenth of a closed-loop step.
@@ -246,7 +252,7 @@ impl<L: Law> Controller<L> {
             state,
             rotor_residual_rad_s: memory.rotor_residual_rad_s,
             dt_s: self.settings.dt_s,
-            adapt: !health.state_rejected && !(self.settings.heed_ground && memory.ground.standing()),
+            adapt: !health.state_rejected && !self.stands(memory),
             unallocated: memory.unallocated,
         };
         let hover_n = self.law.hover_thrust_n(&memory.estimates.z, self.weight_n);
@@ -308,7 +314,7 @@ impl<L: Law> Controller<L> {
         health.saturated = saturated;
 
         memory.filtered = Some([self.filter.advance(&roll_d, phi_d), self.filter.advance(&pitch_d, theta_d)]);
-        memory.ground.advance(forces.0.sum(), self.weight_n, &state.velocity_m_s, self.settings.dt_s);
+        memory.ground.advance(u4, self.weight_n, &state.velocity_m_s, self.settings.dt_s);
         memory.rotor_residual_rad_s = speeds.residual_rad_s();
         memory.unallocated = PerAxis {
             roll: unallocated.roll_n,

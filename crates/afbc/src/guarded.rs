@@ -74,11 +74,15 @@ impl Guarded {
         match &mut memory.fallback {
             None => {
                 let command = self.adaptive.decide(&mut memory.adaptive, state, setpoint, health);
+                // On the ground a law may ask for less than nothing, for as long as it likes.
+                if self.adaptive.stands(&memory.adaptive) {
+                    return command;
+                }
                 if let Some(trip) = self.monitor.watch(&mut memory.figures, &memory.adaptive.estimates, &command) {
                     let inputs = command.per_axis();
                     let resume = |axis| Integral { value: 0.0, resume: Some(*inputs.get(axis)) };
                     let cascade = memory.adaptive.handed_over(PerAxis::from_fn(resume));
-                    memory.fallback = Some(Fallback { trip, cascade, learnt: PerAxis::default() });
+                    memory.fallback = Some(Fallback { trip, cascade, learnt: self.learnt_from(&command) });
                 }
                 command
             }
@@ -89,10 +93,14 @@ impl Guarded {
     fn stand_in(&self, fallback: &mut Fallback, state: &State, setpoint: &Setpoint, health: Health) -> Command {
         let mut command = self.fallback.decide(&mut fallback.cascade, state, setpoint, health);
         command.health.trip = Some(fallback.trip);
-        let inputs = command.per_axis();
-        fallback.learnt =
-            PerAxis::from_fn(|axis| inputs.get(axis) - self.alpha2.get(axis) * command.errors.get(axis).e2);
+        fallback.learnt = self.learnt_from(&command);
         command
+    }
+
+    /// What AFBC must have learnt to want the same as `command`.
+    fn learnt_from(&self, command: &Command) -> PerAxis<f32> {
+        let inputs = command.per_axis();
+        PerAxis::from_fn(|axis| inputs.get(axis) - self.alpha2.get(axis) * command.errors.get(axis).e2)
     }
 }
 
