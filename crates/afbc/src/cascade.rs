@@ -70,7 +70,8 @@ pub struct Settings {
     pub limits: Limits,
     /// Whether the desired attitude comes from the thrust really commanded; otherwise from (39), the thrust of hovering.
     pub tilt_by_thrust: bool,
-    /// Whether estimates stay as they are while the vehicle stands on the [`ground`](crate::ground).
+    /// Whether estimates stay as they are, and rotors give thrust alone, while the vehicle stands on the
+    /// [`ground`](crate::ground).
     pub heed_ground: bool,
     /// Whether to take over a vehicle in flight as it is: estimates that carry its weight, a command filter that starts
     /// at its attitude. The paper starts from estimates of zero and at its first command.
@@ -248,11 +249,12 @@ impl<L: Law> Controller<L> {
         if memory.filtered.is_none() && self.settings.bumpless {
             memory.estimates = PerAxis::from_fn(|axis| self.law.start(axis, self.weight_n));
         }
+        let stands = self.stands(memory);
         let context = Context {
             state,
             rotor_residual_rad_s: memory.rotor_residual_rad_s,
             dt_s: self.settings.dt_s,
-            adapt: !health.state_rejected && !self.stands(memory),
+            adapt: !health.state_rejected && !stands,
             unallocated: memory.unallocated,
         };
         let hover_n = self.law.hover_thrust_n(&memory.estimates.z, self.weight_n);
@@ -309,7 +311,9 @@ impl<L: Law> Controller<L> {
         );
 
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3, thrust_n: u4 };
-        let Allocation { forces, unallocated, saturated } = self.mixer.allocate(&inputs);
+        // Moments would keep the thrust up, and tip a vehicle over that stands.
+        let asked = if stands { Inputs { thrust_n: u4, ..Inputs::default() } } else { inputs };
+        let Allocation { forces, unallocated, saturated } = self.mixer.allocate(&asked);
         let speeds = self.mixer.speeds(&forces);
         health.saturated = saturated;
 

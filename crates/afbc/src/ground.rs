@@ -8,6 +8,9 @@ use nalgebra::Vector3;
 pub const LIFT_SHARE: f32 = 0.4;
 /// Speed along each axis below which the vehicle is still \[m/s\].
 pub const STILL_M_S: f32 = 0.1;
+/// Speed along an axis at which a vehicle that stood does no longer \[m/s\]: more than rocking on its feet, and reached in
+/// 0.1 s of falling.
+pub const MOVING_M_S: f32 = 0.5;
 /// How long both must last \[s\].
 pub const STILL_S: f32 = 0.2;
 
@@ -21,7 +24,8 @@ impl Ground {
     /// Takes one step into account: U4 that was wanted \[N\].
     #[inline]
     pub fn advance(&mut self, thrust_n: f32, weight_n: f32, velocity_m_s: &Vector3<f32>, dt_s: f32) {
-        let still = velocity_m_s.iter().all(|v| v.abs() < STILL_M_S);
+        let speed_max = if self.standing() { MOVING_M_S } else { STILL_M_S };
+        let still = velocity_m_s.iter().all(|v| v.abs() < speed_max);
         self.still_s = if thrust_n < LIFT_SHARE * weight_n && still { self.still_s + dt_s } else { 0.0 };
     }
 

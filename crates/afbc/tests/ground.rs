@@ -4,7 +4,7 @@
 use afbc::ground::{Ground, LIFT_SHARE, STILL_M_S, STILL_S};
 use afbc::{Adaptive, Controller, Memory, Profile, Settings};
 use airframe::{Parameters, Setpoint, State};
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
 
 const DT_S: f32 = 0.001;
@@ -41,7 +41,9 @@ fn a_light_vehicle_that_hovers_does_not_stand_and_one_that_lifts_off_no_longer()
     }
     assert!(ground.standing());
     let mut moving = ground;
-    moving.advance(0.0, WEIGHT_N, &Vector3::new(0.0, 0.0, 0.11), DT_S);
+    moving.advance(0.0, WEIGHT_N, &Vector3::new(0.0, -0.49, 0.0), DT_S);
+    assert!(moving.standing(), "it rocks");
+    moving.advance(0.0, WEIGHT_N, &Vector3::new(0.0, 0.0, -0.51), DT_S);
     ground.advance(0.5 * WEIGHT_N, WEIGHT_N, &Vector3::zeros(), DT_S);
     assert!(!ground.standing() && !moving.standing());
 }
@@ -69,4 +71,25 @@ fn estimates_freeze_on_the_ground_and_thaw_on_lift() {
     assert!(lifted.z != stood.z && lifted.x != stood.x);
     let [stood, still_standing, ..] = fly(false);
     assert_ne!(stood, still_standing, "nothing to freeze");
+}
+
+/// However far aside its setpoint is and however tilted it stands: no moment tips the vehicle over, until it is to lift.
+#[test]
+fn a_standing_vehicle_is_not_tipped_over() {
+    let law = Adaptive::new(Profile::Flight.gains()).unwrap();
+    let controller = Controller::new(Parameters::PAPER.to_f32(), Profile::Flight.settings(), law).unwrap();
+    let state = State { attitude_rad: Vector3::new(0.1, -0.05, 0.3), ..State::default() };
+    let mut memory = Memory::default();
+    let mut forces = |z, steps| {
+        let setpoint = Setpoint { position_m: Vector3::new(2.0, -1.0, z), ..Setpoint::default() };
+        let mut forces = Vector4::zeros();
+        for _ in 0..steps {
+            forces = controller.step(&mut memory, &state, &setpoint).forces.0;
+        }
+        forces
+    };
+    let spread = |forces: Vector4<f32>| forces.max() - forces.min();
+    assert!(spread(forces(-0.4, 100)) > 0.1);
+    assert_eq!(forces(-0.4, 200), Vector4::zeros());
+    assert!(spread(forces(0.4, 2)) > 0.1);
 }
