@@ -2,6 +2,7 @@
 //! very inputs at hand, and AFBC takes over again on command only.
 
 use crate::adaptive::{self, Adaptive, Estimate};
+use crate::backstepping::Errors;
 use crate::cascade::{Cascade, Command, Controller, Settings};
 use crate::flight_controller::FlightController;
 use crate::integral::{Integral, IntegralBackstepping};
@@ -87,19 +88,23 @@ impl Guarded {
     fn stand_in(&self, memory: &mut StandIn, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
         let mut command = self.fallback.cascade(&mut memory.cascade, state, setpoint, fresh);
         command.health.trip = Some(memory.trip);
-        let inputs = command.per_axis();
-        memory.learnt = PerAxis::from_fn(|axis| inputs.get(axis) - self.alpha2.get(axis) * command.errors.get(axis).e2);
+        memory.learnt = self.learnt_from(&command.per_axis(), &command.errors);
         command
     }
-}
 
-/// The law that stands in goes on from `inputs`, in the next step.
-#[cold]
-#[inline(never)]
-fn fall_back(trip: Trip, cascade: &Cascade<Estimate>, inputs: PerAxis<f32>) -> Pilot {
-    let resume = |axis| Integral { value: 0.0, resume: Some(*inputs.get(axis)) };
-    let cascade = cascade.handed_over(PerAxis::from_fn(resume));
-    Pilot::StandIn(StandIn { trip, cascade, learnt: PerAxis::default() })
+    /// The law that stands in goes on from `inputs`, in the next step.
+    #[cold]
+    #[inline(never)]
+    fn fall_back(&self, trip: Trip, cascade: &Cascade<Estimate>, inputs: PerAxis<f32>) -> Pilot {
+        let resume = |axis| Integral { value: 0.0, resume: Some(*inputs.get(axis)) };
+        let learnt = self.learnt_from(&inputs, &cascade.errors);
+        Pilot::StandIn(StandIn { trip, cascade: cascade.handed_over(PerAxis::from_fn(resume)), learnt })
+    }
+
+    /// What AFBC must have learnt to want `inputs` for these errors.
+    fn learnt_from(&self, inputs: &PerAxis<f32>, errors: &PerAxis<Errors>) -> PerAxis<f32> {
+        PerAxis::from_fn(|axis| inputs.get(axis) - self.alpha2.get(axis) * errors.get(axis).e2)
+    }
 }
 
 impl FlightController for Guarded {
@@ -112,9 +117,13 @@ impl FlightController for Guarded {
             Pilot::Afbc(cascade) => {
                 let command = self.adaptive.cascade(cascade, state, setpoint, fresh);
                 let inputs = command.per_axis();
+                // On the ground a law may ask for less than nothing, for as long as it likes.
+                if self.adaptive.stands(cascade) {
+                    return command;
+                }
                 let saturated = command.health.saturated;
                 if let Some(trip) = self.monitor.watch(figures, cascade, &inputs, saturated) {
-                    *pilot = fall_back(trip, cascade, inputs);
+                    *pilot = self.fall_back(trip, cascade, inputs);
                 }
                 command
             }

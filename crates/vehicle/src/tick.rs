@@ -131,7 +131,7 @@ impl<C: FlightController> Vehicle<C> {
         if let (Some(Ok(Request::Arm)), Some(state)) = (answer, &fresh) {
             memory.flight = Some(Flight::new(self.blind.start(state)));
         }
-        if let (Some(Ok(Request::Engage)), Some(flight)) = (answer, &mut memory.flight) {
+        if let (Some(Ok(Request::Engage)), true, Some(flight)) = (answer, mode.armed(), &mut memory.flight) {
             self.controller.engage(&mut flight.control);
         }
 
