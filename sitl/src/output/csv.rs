@@ -42,7 +42,8 @@ struct Column {
 fn lyapunov(model: &Model, sample: &Sample) -> PerAxis<f32> {
     let state = sample.motion.measure();
     let rotor_residual_rad_s = sample.command.speeds.residual_rad_s();
-    let context = Context { state: &state, rotor_residual_rad_s, dt_s: 0.0, adapt: false };
+    let context =
+        Context { state: &state, rotor_residual_rad_s, dt_s: 0.0, adapt: false, unallocated: PerAxis::default() };
     PerAxis::from_fn(|axis| {
         let errors = sample.command.errors.get(axis);
         0.5 * errors.e1 * errors.e1 + 0.5 * errors.e2 * errors.e2 / model.dynamics(axis, &context).g

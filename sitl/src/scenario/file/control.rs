@@ -151,6 +151,7 @@ fn axis_gains(mut table: Table<'_>, default: &Gains) -> Result<Gains, FileError>
             centre: number(&CENTRE, default.membership.centre)?,
             width: number(&WIDTH, default.membership.width)?,
         },
+        safeguards: default.safeguards,
     };
     // Each gain is in its range; what is left to refuse is how two of them go together.
     gains
