@@ -7,6 +7,7 @@ mod csv;
 mod error;
 mod figures;
 mod files;
+mod reality;
 mod report;
 mod summary;
 mod table;
