@@ -1,5 +1,6 @@
 //! Scenario files. The format is described, key by key, in `docs/scenarios.md`.
 
+mod contenders;
 mod control;
 mod environment;
 mod motion;
@@ -84,7 +85,7 @@ pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> 
 
     let vehicle = vehicle::read(root.table("vehicle")?, Parameters::PAPER)?;
     let truth = vehicle::read(root.table("truth")?, vehicle)?;
-    let contenders = control::contenders(&mut root)?;
+    let contenders = contenders::read(&mut root)?;
     let Some(table) = root.table("trajectory")? else {
         return Err(root.missing("trajectory", "add [trajectory] with kind = \"hover\" and position_m = [0, 0, 1]"));
     };
@@ -94,7 +95,6 @@ pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> 
     let step_s = contenders.first().map_or(afbc::cascade::DT.max, Contender::step_s);
     let realism = realism::read(&mut root, &truth, step_s)?;
     let sensing = sensors::read(root.table("sensors")?)?;
-    let seed = seed(&mut root)?;
 
     let scenario = Scenario {
         name,
