@@ -12,6 +12,9 @@ use common::{U, check_command, gains, plausible, setpoint, settings, state, valu
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
+/// What a flight remembers.
+type Flight = Memory<guarded::Memory>;
+
 const WEIGHT_N: f32 = 0.486 * 9.81;
 
 fn guarded(bounds: Bounds) -> Guarded {
@@ -64,20 +67,20 @@ proptest! {
     ) {
         let bounds = if trips { Bounds { lyapunov: PerAxis::from_fn(|_| 1.0), ..lax() } } else { Bounds::new(&gains, WEIGHT_N) };
         let controller = Guarded::new(Parameters::PAPER.to_f32(), settings, gains, bounds).unwrap();
-        let mut memory = guarded::Memory::default();
+        let mut memory = Flight::default();
         for (state, setpoint, engage) in inputs {
             if engage {
-                controller.engage(&mut memory);
-                prop_assert_eq!(memory.trip(), None);
+                controller.engage(&mut memory.control);
+                prop_assert_eq!(memory.control.trip(), None);
             }
-            let tripped = memory.trip();
+            let tripped = memory.control.trip();
             let command = controller.step(&mut memory, &state, &setpoint);
             check_command(&command, &settings)?;
             prop_assert_eq!(command.health.trip, tripped);
             prop_assert_eq!(command.health.state_rejected, !state.is_plausible());
             prop_assert_eq!(command.health.setpoint_rejected, !setpoint.is_plausible());
-            prop_assert!(tripped.is_none() || memory.trip() == tripped, "re-engaged by itself");
-            let learnt = Guarded::learnt(&memory);
+            prop_assert!(tripped.is_none() || memory.control.trip() == tripped, "re-engaged by itself");
+            let learnt = Guarded::learnt(&memory.control);
             prop_assert!(Axis::ALL.iter().all(|axis| learnt.get(*axis).theta.iter().all(|theta| theta.is_finite())));
         }
     }
@@ -87,14 +90,14 @@ proptest! {
     fn untripped_it_is_the_law(inputs in prop::collection::vec((state(plausible), setpoint(plausible)), 50)) {
         let controller = guarded(lax());
         let law = Controller::new(Parameters::PAPER.to_f32(), Profile::Flight.settings(), Adaptive::new(Profile::Flight.gains()).unwrap()).unwrap();
-        let (mut memory, mut other) = (guarded::Memory::default(), Memory::default());
+        let (mut memory, mut other) = (Flight::default(), Memory::default());
         for (state, setpoint) in inputs {
-            controller.engage(&mut memory);
-            let command = controller.step_screened(&mut memory, &state, &setpoint);
-            prop_assert_eq!(command, law.step_screened(&mut other, &state, &setpoint));
-            prop_assert_eq!(Guarded::learnt(&memory), other.estimates);
+            controller.engage(&mut memory.control);
+            let command = controller.step(&mut memory, &state, &setpoint);
+            prop_assert_eq!(command, law.step(&mut other, &state, &setpoint));
+            prop_assert_eq!(Guarded::learnt(&memory.control), other.control.estimates);
         }
-        prop_assert_eq!(memory.trip(), None);
+        prop_assert_eq!(memory.control.trip(), None);
     }
 
     /// At one and the same state the three steps around a trip, and those around engaging again, want the same inputs:
@@ -103,26 +106,26 @@ proptest! {
     fn hand_over_is_bumpless_there_and_back(state in near(), setpoint in near(), lasting in 0_usize..300) {
         let setpoint = Setpoint { position_m: setpoint.position_m, velocity_m_s: setpoint.velocity_m_s, ..Setpoint::default() };
         let controller = guarded(hair_trigger());
-        let mut memory = guarded::Memory::default();
+        let mut memory = Flight::default();
         let last_of_afbc = controller.step(&mut memory, &state, &setpoint);
-        prop_assert_eq!((last_of_afbc.health.trip, memory.trip()), (None, Some(Trip::Lyapunov(Axis::Roll))));
+        prop_assert_eq!((last_of_afbc.health.trip, memory.control.trip()), (None, Some(Trip::Lyapunov(Axis::Roll))));
 
         // Engaged at once, before the fallback has flown.
         let mut at_once = memory;
-        controller.engage(&mut at_once);
+        controller.engage(&mut at_once.control);
         let first_of_afbc = controller.step(&mut at_once, &state, &setpoint);
         prop_assert_eq!(first_of_afbc.health.trip, None);
         position_is_the_same(&last_of_afbc, &first_of_afbc)?;
 
         let mut last_of_fallback = controller.step(&mut memory, &state, &setpoint);
-        prop_assert_eq!(last_of_fallback.health.trip, memory.trip());
+        prop_assert_eq!(last_of_fallback.health.trip, memory.control.trip());
         position_is_the_same(&last_of_afbc, &last_of_fallback)?;
         for _ in 0..lasting {
             last_of_fallback = controller.step(&mut memory, &state, &setpoint);
         }
-        controller.engage(&mut memory);
+        controller.engage(&mut memory.control);
         let first_of_afbc = controller.step(&mut memory, &state, &setpoint);
-        prop_assert_eq!((first_of_afbc.health.trip, memory.trip().is_some()), (None, true));
+        prop_assert_eq!((first_of_afbc.health.trip, memory.control.trip().is_some()), (None, true));
         position_is_the_same(&last_of_fallback, &first_of_afbc)?;
     }
 
@@ -131,19 +134,19 @@ proptest! {
     fn hand_over_at_rest_is_bumpless_in_all_axes(height in -0.2_f32..0.2, yaw in -0.2_f32..0.2) {
         let state = State { position_m: Vector3::new(0.0, 0.0, height), attitude_rad: Vector3::new(0.0, 0.0, yaw), ..State::default() };
         let controller = guarded(Bounds { lyapunov: PerAxis { z: 0.0, ..bounds().lyapunov }, ..bounds() });
-        let mut memory = guarded::Memory::default();
+        let mut memory = Flight::default();
         let mut commands = Vec::new();
-        while memory.trip().is_none() && commands.len() < 12 {
+        while memory.control.trip().is_none() && commands.len() < 12 {
             commands.push(controller.step(&mut memory, &state, &Setpoint::default()));
         }
-        prop_assume!(memory.trip() == Some(Trip::Lyapunov(Axis::Z)));
+        prop_assume!(memory.control.trip() == Some(Trip::Lyapunov(Axis::Z)));
         let before = *commands.last().unwrap();
         let mut after = controller.step(&mut memory, &state, &Setpoint::default());
         same(&before, &after)?;
         for _ in 0..100 {
             after = controller.step(&mut memory, &state, &Setpoint::default());
         }
-        controller.engage(&mut memory);
+        controller.engage(&mut memory.control);
         same(&after, &controller.step(&mut memory, &state, &Setpoint::default()))?;
     }
 }
@@ -163,11 +166,11 @@ fn position_is_the_same(before: &Command, after: &Command) -> Result<(), TestCas
 fn the_fallback_takes_over_no_more_than_its_bound() {
     let gains = Profile::Flight.gains();
     let controller = guarded(hair_trigger());
-    let mut memory = guarded::Memory::default();
+    let mut memory = Flight::default();
     let state = State { attitude_rad: Vector3::new(0.3, 0.0, 0.0), ..State::default() };
     // The filter starts at the attitude and is led back to level: errors, and AFBC's first steps.
     let mut steps = 0;
-    while memory.trip().is_none() {
+    while memory.control.trip().is_none() {
         controller.step(&mut memory, &state, &Setpoint::default());
         steps += 1;
         assert!(steps < 100);
@@ -183,36 +186,36 @@ fn the_fallback_takes_over_no_more_than_its_bound() {
 #[test]
 fn the_ground_does_not_trip() {
     let controller = guarded(bounds());
-    let mut memory = guarded::Memory::default();
+    let mut memory = Flight::default();
     let below = Setpoint { position_m: Vector3::new(0.0, 0.0, -1.0), ..Setpoint::default() };
     for _ in 0..20_000 {
         let command = controller.step(&mut memory, &State::default(), &below);
         assert!(command.health.saturated);
     }
-    assert_eq!(memory.trip(), None);
+    assert_eq!(memory.control.trip(), None);
     // The same in the air, sinking: it is one.
     let sinking = State { velocity_m_s: Vector3::new(0.0, 0.0, -0.5), ..State::default() };
     for _ in 0..5_000 {
         controller.step(&mut memory, &sinking, &below);
     }
-    assert_eq!(memory.trip(), Some(Trip::Saturation));
+    assert_eq!(memory.control.trip(), Some(Trip::Saturation));
 }
 
 #[test]
 fn a_tripped_controller_learns_nothing_and_says_why() {
     let controller = guarded(hair_trigger());
-    let mut memory = guarded::Memory::default();
+    let mut memory = Flight::default();
     let state = State { attitude_rad: Vector3::new(0.1, 0.0, 0.0), ..State::default() };
     let setpoint = Setpoint { position_m: Vector3::new(0.3, 0.0, 0.2), ..Setpoint::default() };
-    while memory.trip().is_none() {
+    while memory.control.trip().is_none() {
         controller.step(&mut memory, &state, &setpoint);
     }
-    let learnt: PerAxis<Estimate> = Guarded::learnt(&memory);
+    let learnt: PerAxis<Estimate> = Guarded::learnt(&memory.control);
     for _ in 0..1000 {
         let health = controller.step(&mut memory, &state, &setpoint).health;
-        assert_eq!(health, Health { trip: memory.trip(), saturated: health.saturated, ..Health::default() });
+        assert_eq!(health, Health { trip: memory.control.trip(), saturated: health.saturated, ..Health::default() });
     }
-    assert_eq!(Guarded::learnt(&memory), learnt);
+    assert_eq!(Guarded::learnt(&memory.control), learnt);
 }
 
 #[test]

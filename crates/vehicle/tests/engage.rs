@@ -11,7 +11,7 @@ struct Counter;
 impl FlightController for Counter {
     type Memory = u32;
 
-    fn step(&self, _: &mut u32, _: &State, _: &Setpoint) -> Command {
+    fn decide(&self, _: &mut u32, _: &State, _: &Setpoint, _: bool) -> Command {
         Command::default()
     }
 

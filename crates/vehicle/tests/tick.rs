@@ -177,8 +177,8 @@ impl Roll {
         }
     }
 
-    fn advance(&mut self, outcome: &Outcome) {
-        let [f1, _, f3, _] = bench.command.forces.0.into();
+    fn advance(&mut self, command: &Command) {
+        let [f1, _, f3, _] = command.forces.0.into();
         self.rate += 0.25 / 0.0038 * (f3 - f1 + self.outside_n) * 1e-3;
         self.angle += self.rate * 1e-3;
     }
@@ -192,15 +192,15 @@ fn riding_stops_the_rotation_and_descending_levels() {
         let mut roll = Roll { angle: 0.0, rate: 0.0, outside_n };
         let mut bench = Bench::flying(roll.state(), Setpoint::hold(&State::default()));
         for _ in 0..5000 {
-            let outcome = bench.tick(Some(roll.state()), Some(Setpoint::hold(&State::default())));
-            roll.advance(&outcome);
+            bench.tick(Some(roll.state()), Some(Setpoint::hold(&State::default())));
+            roll.advance(&bench.command);
         }
         (roll.angle, roll.rate) = (0.1, 1.0);
         let mut held = None;
         for age_ms in 0..=2250 {
             let measured = (age_ms == 0).then(|| roll.state());
             let outcome = bench.tick(measured, Some(near()));
-            roll.advance(&outcome);
+            roll.advance(&bench.command);
             match age_ms {
                 250 => {
                     assert!(roll.rate.abs() < 0.3, "{} rad/s after the ride", roll.rate);
