@@ -16,6 +16,7 @@ mod words;
 mod tests;
 
 pub use error::Error;
+pub(crate) use files::Folder;
 pub use table::table;
 
 use crate::claims::Claim;
