@@ -202,7 +202,11 @@ const BAD_FILES: [(&str, &str); 21] = [
     ("name = \"\"", ":1: name: \"\" cannot be a name; NAME"),
     ("description = \"a\\nb\"", ":1: description: it has line breaks or control characters; make it one plain line"),
     ("plant = \"real\"", ":1: plant: \"real\" is unknown; it must be \"simplified\" or \"rigid-body\""),
-    ("controllers = []", ":1: controllers: the list is empty; it must hold \"afbc\" or \"backstepping\""),
+    (
+        "controllers = []",
+        ":1: controllers: the list is empty; \
+         it must hold \"afbc\", \"backstepping\", \"pid\", \"geometric\" or \"indi\"",
+    ),
     ("controllers = [\"afbc\", \"afbc\"]", ":1: controllers: \"afbc\" is listed twice; once is enough"),
     ("profile = \"best\"", ":1: profile: \"best\" is unknown; it must be \"paper\""),
 ];
@@ -214,8 +218,8 @@ fn expand(message: &str) -> String {
         .replace("NAME", "it must be 1 to 64 letters, digits, '-' or '_', since file names come from it")
         .replace(
             "ALL",
-            "name, description, duration_s, plant, controllers, profile, vehicle, truth, gains, settings, trajectory, \
-             initial, gust, change",
+            "name, description, duration_s, plant, vehicle, truth, controllers, profile, gains, settings, contender, \
+             trajectory, initial, gust, change",
         )
 }
 
@@ -270,7 +274,7 @@ fn bad_options_are_refused_before_anything_is_written() {
         &["paper", "--duration", "0"],
         &["paper", "--duration", "nan"],
         &["fly"],
-        &["fly", "hover", "--controller", "pid"],
+        &["fly", "hover", "--controller", "lqr"],
         &["fly", "hover", "--duration", "36000", "--log-hz", "1000"],
         &["scenarios", "hovr"],
     ] {

@@ -2,6 +2,7 @@
 //! by row, so it is as tight where numbers are small.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // what cannot be built or is missing must stop the test
 
+use afbc::Safeguards;
 use afbc::adaptive::{Estimate, Gains, Subsystem};
 use afbc::allocation::Mixer;
 use afbc::backstepping::{self, Errors, Tracking, ideal, proportional};
@@ -69,16 +70,23 @@ fn afbc_subsystem_agrees_in_every_row() {
             eta: eta as f32,
             epsilon: epsilon as f32,
             membership: Membership { centre: centre as f32, width: width as f32 },
+            safeguards: Safeguards::NONE,
         };
         let x1d_dot_32 = x1d_dot as f32;
-        let tracking =
-            Tracking { x1: x1 as f32, x2: x2 as f32, e1: x1d as f32 - x1 as f32, x1d_dot: x1d_dot_32, x1d_ddot: 0.0 };
+        let tracking = Tracking {
+            x1: x1 as f32,
+            x2: x2 as f32,
+            e1: x1d as f32 - x1 as f32,
+            x1d_dot: x1d_dot_32,
+            x1d_ddot: 0.0,
+            rate_max: f32::MAX,
+        };
         let errors = Errors::new(gains.backstepping.alpha1, &tracking);
         let inputs_are_state = row.get("inputs_are_state") == 1.0;
         kinds[usize::from(inputs_are_state)] += 1;
         let inputs = if inputs_are_state { [tracking.x1, tracking.x2] } else { [errors.e1, errors.e1_dot] };
         let estimate = Estimate { theta: Matrix3::from_row_slice(&theta.map(|t| t as f32)), delta: delta as f32 };
-        let (terms, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate);
+        let (terms, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
 
         // Errors: each input is rounded once, each difference and product once more.
         let [e1, e2] = row.all(["e1", "e2"]);
@@ -137,6 +145,7 @@ fn backstepping_agrees_in_every_row() {
             e1: x1d as f32 - x1 as f32,
             x1d_dot: x1d_dot as f32,
             x1d_ddot: x1d_ddot as f32,
+            rate_max: f32::MAX,
         };
         let errors = Errors::new(alpha1 as f32, &tracking);
         let dynamics = Dynamics { f: f as f32, g: g as f32, g_dot: 0.0 };

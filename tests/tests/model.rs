@@ -4,7 +4,7 @@
 
 use afbc::cascade::Context;
 use afbc::model;
-use airframe::{Axis, Parameters, State};
+use airframe::{Axis, Parameters, PerAxis, State};
 use nalgebra::Vector3;
 use plant::{Load, Motion, simplified};
 use proptest::prelude::*;
@@ -51,7 +51,7 @@ proptest! {
         let [f1, f2, f3, f4] = speeds.map(|w| p.thrust_factor_n_s2 * w * w);
         let state: State = motion.measure();
         let residual = w1 - w2 + w3 - w4;
-        let context = Context { state: &state, rotor_residual_rad_s: residual as f32, dt_s: 0.001, adapt: true };
+        let context = Context { state: &state, rotor_residual_rad_s: residual as f32, dt_s: 0.001, adapt: true, unallocated: PerAxis::default() };
         let model = model::Model::new(&p.to_f32());
 
         let (q, r) = (rates_rad_s.abs(), residual.abs());
@@ -93,7 +93,7 @@ proptest! {
         let p = Parameters::PAPER;
         let model = model::Model::new(&p.to_f32());
         let state: State = Motion { attitude_rad, rates_rad_s, ..Motion::default() }.measure();
-        let context = Context { state: &state, rotor_residual_rad_s: 0.0, dt_s: 0.001, adapt: true };
+        let context = Context { state: &state, rotor_residual_rad_s: 0.0, dt_s: 0.001, adapt: true, unallocated: PerAxis::default() };
         let dynamics = model.dynamics(Axis::Z, &context);
         let g = |t: f64| {
             let eta = attitude_rad + rates_rad_s * t;
@@ -116,7 +116,13 @@ fn g_4_stays_positive_at_any_tilt() {
     for step in -2000..=2000_i16 {
         let tilt = f32::from(step) / 100.0;
         let state = State { attitude_rad: Vector3::new(tilt, 0.3 * tilt, 0.0), ..State::default() };
-        let context = Context { state: &state, rotor_residual_rad_s: 0.0, dt_s: 0.001, adapt: true };
+        let context = Context {
+            state: &state,
+            rotor_residual_rad_s: 0.0,
+            dt_s: 0.001,
+            adapt: true,
+            unallocated: PerAxis::default(),
+        };
         let g = model.dynamics(Axis::Z, &context).g;
         assert!(g >= 0.999 * model::TILT_COSINE_MIN / 0.486, "{g} at {tilt} rad");
     }

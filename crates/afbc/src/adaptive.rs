@@ -4,6 +4,7 @@ use crate::backstepping::{self, Errors, Tracking, proportional};
 use crate::cascade::{Context, Law};
 use crate::fuzzy::{Basis, Membership};
 use crate::math;
+use crate::safeguards::Safeguards;
 use airframe::{Axis, OutOfRange, PerAxis, Range};
 use nalgebra::{Matrix3, Vector3};
 
@@ -13,6 +14,9 @@ pub const GAMMA: Range = Range::new("gamma", 0.0, 1000.0);
 pub const ETA: Range = Range::new("eta", 0.0, 1000.0);
 /// Accepted epsilon \[m/s or rad/s\].
 pub const EPSILON: Range = Range::new("epsilon", 1e-6, 100.0);
+
+/// Least thrust for hovering that is believed, as a share of the weight.
+const HOVER_SHARE_MIN: f32 = 0.3;
 
 /// Gains of one AFBC subsystem.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +31,8 @@ pub struct Gains {
     pub epsilon: f32,
     /// Gaussians over both inputs of the fuzzy system (22).
     pub membership: Membership,
+    /// What keeps the estimates bounded.
+    pub safeguards: Safeguards,
 }
 
 impl Gains {
@@ -39,7 +45,8 @@ impl Gains {
         GAMMA.check(self.gamma)?;
         ETA.check(self.eta)?;
         EPSILON.check(self.epsilon)?;
-        self.membership.validate()
+        self.membership.validate()?;
+        self.safeguards.validate()
     }
 }
 
@@ -52,7 +59,7 @@ pub struct Estimate {
     pub delta: f32,
 }
 
-/// d/dt of an [`Estimate`]; that of Theta_hat, gamma e_2 w(x), in its factors.
+/// How fast an [`Estimate`] learns and forgets; learning Theta_hat, gamma e_2 w(x), in its factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rate {
     first: Vector3<f32>,
@@ -60,6 +67,7 @@ pub struct Rate {
     /// gamma e_2
     theta: f32,
     delta: f32,
+    leakage: f32,
 }
 
 impl Rate {
@@ -72,14 +80,30 @@ impl Rate {
     pub fn delta(&self) -> f32 {
         self.delta
     }
+
+    /// The share of both estimates that is forgotten, by [`Safeguards`] \[1/s\].
+    pub fn leakage(&self) -> f32 {
+        self.leakage
+    }
 }
 
 impl Estimate {
-    /// One step of explicit Euler.
+    /// The estimate whose u_a is `input` whatever the errors are, for the weights of the rules sum to one.
+    pub fn of(input: f32) -> Self {
+        Estimate { theta: Matrix3::repeat(input), delta: 0.0 }
+    }
+
+    /// One step of explicit Euler, projected into the bounds.
     #[inline]
-    fn advance(&mut self, rate: &Rate, dt_s: f32) {
-        self.theta += rate.first * (rate.theta * dt_s) * rate.second.transpose();
-        self.delta += rate.delta * dt_s;
+    fn advance(&mut self, rate: &Rate, safeguards: &Safeguards, dt_s: f32) {
+        let Safeguards { theta_max, delta_max, .. } = *safeguards;
+        let keep = 1.0 - rate.leakage * dt_s;
+        self.theta = self.theta * keep + rate.first * (rate.theta * dt_s) * rate.second.transpose();
+        let square = self.theta.norm_squared();
+        if square > theta_max * theta_max {
+            self.theta *= theta_max / math::sqrt(square);
+        }
+        self.delta = (self.delta * keep + rate.delta * dt_s).min(delta_max);
     }
 }
 
@@ -120,9 +144,11 @@ impl Subsystem {
         Ok(Subsystem { gains, basis: Basis::new(gains.membership)?, inverse_epsilon: 1.0 / gains.epsilon })
     }
 
-    /// (20), and d/dt of the estimate by (33), (34), both from the estimate as it stands.
+    /// (20), and d/dt of the estimate by (33), (34) with their [`Safeguards`], both from the estimate as it stands.
+    /// `unallocated` is what was wanted of the input in the last step and could not be given.
     #[inline]
-    pub fn law(&self, errors: &Errors, inputs: [f32; 2], estimate: &Estimate) -> (Terms, Rate) {
+    pub fn law(&self, errors: &Errors, inputs: [f32; 2], estimate: &Estimate, unallocated: f32) -> (Terms, Rate) {
+        let Gains { gamma, eta, safeguards, .. } = &self.gains;
         let e2 = errors.e2;
         let [first, second] = self.basis.factors(inputs);
         let s = math::tanh(e2 * self.inverse_epsilon);
@@ -131,7 +157,8 @@ impl Subsystem {
             robust: estimate.delta * s,
             proportional: proportional(self.gains.backstepping.alpha2, errors),
         };
-        (terms, Rate { first, second, theta: self.gains.gamma * e2, delta: self.gains.eta * e2 * s })
+        let (lesson, leakage) = (safeguards.lesson(e2, unallocated), safeguards.leakage(e2));
+        (terms, Rate { first, second, theta: gamma * lesson, delta: eta * lesson * s, leakage })
     }
 }
 
@@ -173,11 +200,20 @@ impl Law for Adaptive {
             Axis::Roll | Axis::Pitch | Axis::Yaw => [tracking.x1, tracking.x2],
             Axis::Z | Axis::X | Axis::Y => [errors.e1, errors.e1_dot],
         };
-        let (terms, rate) = subsystem.law(&errors, inputs, estimate);
+        let (terms, rate) = subsystem.law(&errors, inputs, estimate, *context.unallocated.get(axis));
         if context.adapt {
-            estimate.advance(&rate, context.dt_s);
+            estimate.advance(&rate, &subsystem.gains.safeguards, context.dt_s);
         }
         (terms.sum(), errors)
+    }
+
+    fn start(&self, axis: Axis, weight_n: f32) -> Estimate {
+        if axis == Axis::Z { Estimate::of(weight_n) } else { Estimate::default() }
+    }
+
+    fn hover_thrust_n(&self, z: &Estimate, weight_n: f32) -> f32 {
+        // The rule for no error and no speed.
+        z.theta.m22.max(HOVER_SHARE_MIN * weight_n)
     }
 
     fn learnt(estimate: &Estimate) -> Estimate {

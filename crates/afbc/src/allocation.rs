@@ -1,15 +1,50 @@
-//! Allocation of U1..U4 to rotor forces and rotor speeds, and back.
+//! Allocation of U1..U4 to rotor forces and rotor speeds, and back, for rotors anywhere in the body's x-y plane.
+//!
+//! U = B F with one column of B a rotor: \[y/l, -x/l, spin, 1\]. Forces are F = P U with the pseudo-inverse
+//! P = B^T (B B^T)^-1: exact, and of all exact ones the smallest. When that breaks a rotor's limits, roll and pitch are
+//! served first, then thrust, yaw last:
+//!
+//! 1. roll and pitch are scaled down together until their forces fit between the limits at all;
+//! 2. thrust moves by as little as makes room for them;
+//! 3. yaw gets the share that still fits.
 
 use crate::math;
 use airframe::{Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds};
-use nalgebra::Vector4;
+use nalgebra::{Matrix4, SMatrix, SVector, Vector4};
 
 /// Accepted largest force of one rotor \[N\].
 pub const FORCE_MAX: Range = Range::new("rotor_force_max_n", 1e-3, 1e4);
+/// Accepted position of a rotor along x and along y, in arm's lengths.
+pub const POSITION: Range = Range::new("rotor_position", -10.0, 10.0);
+/// Accepted determinant of B B^T: below it the rotors cannot give all four inputs.
+pub const AUTHORITY: Range = Range::new("rotor_authority", 1e-3, 1e9);
 
-/// The mixer of the plus frame described in [`airframe`].
+/// Where a rotor is, and which way it turns the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mixer {
+pub struct Rotor {
+    /// Along body x, in arm's lengths.
+    pub x: f32,
+    /// Along body y, in arm's lengths.
+    pub y: f32,
+    /// True if its drag pushes the body to positive yaw.
+    pub pushes_left: bool,
+}
+
+/// The frame described in [`airframe`]: rotor 1 at -y, 2 at +x, 3 at +y, 4 at -x.
+pub const PLUS: [Rotor; 4] = [
+    Rotor { x: 0.0, y: -1.0, pushes_left: true },
+    Rotor { x: 1.0, y: 0.0, pushes_left: false },
+    Rotor { x: 0.0, y: 1.0, pushes_left: true },
+    Rotor { x: -1.0, y: 0.0, pushes_left: false },
+];
+
+/// The mixer of a frame of `N` rotors, four to eight of them in practice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mixer<const N: usize = 4> {
+    /// B
+    effectiveness: SMatrix<f32, 4, N>,
+    /// P
+    inverse: SMatrix<f32, N, 4>,
     /// b
     thrust_factor: f32,
     /// 1/b
@@ -18,57 +53,114 @@ pub struct Mixer {
 }
 
 /// Forces within the rotors' limits.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Allocation {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Allocation<const N: usize = 4> {
     /// What the rotors can give of what was asked.
-    pub forces: RotorForces,
+    pub forces: RotorForces<N>,
+    /// What was asked and is not given.
+    pub unallocated: Inputs,
     /// True if a rotor was asked for less than nothing or more than its limit.
     pub saturated: bool,
 }
 
 impl Mixer {
-    /// The mixer for a vehicle whose rotors give 0 to `force_max_n`.
+    /// The mixer of the [`PLUS`] frame, for a vehicle whose rotors give 0 to `force_max_n`.
     ///
     /// # Errors
     /// If a parameter or the limit is out of range.
     pub fn new(vehicle: &Parameters, force_max_n: f32) -> Result<Self, OutOfRange> {
-        vehicle.validate()?;
-        FORCE_MAX.check(force_max_n)?;
-        let b = vehicle.thrust_factor_n_s2;
-        Ok(Mixer { thrust_factor: b, inverse_thrust_factor: 1.0 / b, force_max: force_max_n })
+        Self::of(PLUS, vehicle, force_max_n)
     }
 
-    /// Rotor forces that give `inputs`, each clipped to the rotor's limits. A NaN becomes 0.
+    /// U1..U4 of the [`PLUS`] frame's rotor forces, (6).
     #[inline]
-    pub fn allocate(&self, inputs: &Inputs) -> Allocation {
-        let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = *inputs;
-        let wanted = Vector4::new(
-            0.25 * (thrust_n + yaw_n) - 0.5 * roll_n,
-            0.25 * (thrust_n - yaw_n) - 0.5 * pitch_n,
-            0.25 * (thrust_n + yaw_n) + 0.5 * roll_n,
-            0.25 * (thrust_n - yaw_n) + 0.5 * pitch_n,
-        );
-        // max before min: f32::max drops a NaN.
-        let forces = wanted.map(|force| force.max(0.0).min(self.force_max));
-        Allocation { forces: RotorForces(forces), saturated: forces != wanted }
+    pub fn inputs(forces: &RotorForces) -> Inputs {
+        let [f1, f2, f3, f4] = forces.0.into();
+        Inputs { roll_n: f3 - f1, pitch_n: f4 - f2, yaw_n: f1 - f2 + f3 - f4, thrust_n: f1 + f2 + f3 + f4 }
+    }
+}
+
+impl<const N: usize> Mixer<N> {
+    /// The mixer of any frame.
+    ///
+    /// # Errors
+    /// If a parameter, a position or the limit is out of range, or the rotors cannot give all four inputs.
+    pub fn of(rotors: [Rotor; N], vehicle: &Parameters, force_max_n: f32) -> Result<Self, OutOfRange> {
+        vehicle.validate()?;
+        FORCE_MAX.check(force_max_n)?;
+        for rotor in &rotors {
+            POSITION.check(rotor.x)?;
+            POSITION.check(rotor.y)?;
+        }
+        let spin = |rotor: &Rotor| if rotor.pushes_left { 1.0 } else { -1.0 };
+        let columns = rotors.map(|rotor| Vector4::new(rotor.y, -rotor.x, spin(&rotor), 1.0));
+        let effectiveness = SMatrix::<f32, 4, N>::from_columns(&columns);
+        let gram: Matrix4<f32> = effectiveness * effectiveness.transpose();
+        AUTHORITY.check(gram.determinant())?;
+        let inverse = effectiveness.transpose() * gram.try_inverse().unwrap_or_default();
+        let b = vehicle.thrust_factor_n_s2;
+        Ok(Mixer { effectiveness, inverse, thrust_factor: b, inverse_thrust_factor: 1.0 / b, force_max: force_max_n })
+    }
+
+    /// Rotor forces that give `inputs`, as far as the rotors' limits allow. A NaN is taken for 0.
+    #[inline]
+    pub fn allocate(&self, inputs: &Inputs) -> Allocation<N> {
+        let wanted = Vector4::new(inputs.roll_n, inputs.pitch_n, inputs.yaw_n, inputs.thrust_n)
+            .map(|u| if u.is_nan() { 0.0 } else { u });
+        let forces = self.inverse * wanted;
+        if forces.iter().all(|&force| 0.0 <= force && force <= self.force_max) {
+            return Allocation { forces: RotorForces(forces), unallocated: Inputs::default(), saturated: false };
+        }
+        let forces = self.within_limits(&wanted);
+        let missing = wanted - self.effectiveness * forces;
+        let unallocated = Inputs { roll_n: missing.x, pitch_n: missing.y, yaw_n: missing.z, thrust_n: missing.w };
+        Allocation { forces: RotorForces(forces), unallocated, saturated: true }
+    }
+
+    /// The forces nearest to what is wanted, by priority.
+    fn within_limits(&self, wanted: &Vector4<f32>) -> SVector<f32, N> {
+        let column = |i: usize, u: f32| self.inverse.column(i) * u;
+        let tilt = column(0, wanted.x) + column(1, wanted.y);
+        let spread = tilt.max() - tilt.min();
+        let tilt = if spread > self.force_max { tilt * (self.force_max / spread) } else { tilt };
+
+        // Of a thrust of 1 N, each rotor's share; for a frame that no thrust can hold level, an even one.
+        let share = column(3, 1.0);
+        let share = if share.min() > 0.0 { share } else { SVector::repeat(1.0 / N as f32) };
+        let (mut lowest, mut highest) = (0.0_f32, f32::MAX);
+        for (force, share) in tilt.iter().zip(share.iter()) {
+            lowest = lowest.max(-force / share);
+            highest = highest.min((self.force_max - force) / share);
+        }
+        let upright = tilt + share * wanted.w.min(highest).max(lowest);
+
+        let yaw = column(2, wanted.z);
+        let mut fits = 1.0_f32;
+        for (force, yaw) in upright.iter().zip(yaw.iter()) {
+            let room = if *yaw > 0.0 { self.force_max - force } else { *force };
+            if yaw.abs() > room {
+                fits = fits.min(room.max(0.0) / yaw.abs());
+            }
+        }
+        (upright + yaw * fits).map(|force| force.max(0.0).min(self.force_max))
     }
 
     /// omega_i = sqrt(F_i / b), for forces that are not negative.
     #[inline]
-    pub fn speeds(&self, forces: &RotorForces) -> RotorSpeeds {
+    pub fn speeds(&self, forces: &RotorForces<N>) -> RotorSpeeds<N> {
         RotorSpeeds(forces.0.map(|force| math::sqrt(force * self.inverse_thrust_factor)))
     }
 
     /// F_i = b omega_i^2.
     #[inline]
-    pub fn forces(&self, speeds: &RotorSpeeds) -> RotorForces {
+    pub fn forces(&self, speeds: &RotorSpeeds<N>) -> RotorForces<N> {
         RotorForces(speeds.0.map(|speed| self.thrust_factor * speed * speed))
     }
 
-    /// U1..U4 of rotor forces, (6).
+    /// U = B F.
     #[inline]
-    pub fn inputs(forces: &RotorForces) -> Inputs {
-        let [f1, f2, f3, f4] = forces.0.into();
-        Inputs { roll_n: f3 - f1, pitch_n: f4 - f2, yaw_n: f1 - f2 + f3 - f4, thrust_n: f1 + f2 + f3 + f4 }
+    pub fn inputs_of(&self, forces: &RotorForces<N>) -> Inputs {
+        let u = self.effectiveness * forces.0;
+        Inputs { roll_n: u.x, pitch_n: u.y, yaw_n: u.z, thrust_n: u.w }
     }
 }

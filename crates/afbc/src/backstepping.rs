@@ -23,6 +23,8 @@ pub struct Tracking {
     pub x1d_dot: f32,
     /// d^2 x_1d/dt^2
     pub x1d_ddot: f32,
+    /// Largest speed phi that the errors may ask for.
+    pub rate_max: f32,
 }
 
 /// Backstepping errors of one subsystem.
@@ -37,12 +39,14 @@ pub struct Errors {
 }
 
 impl Errors {
-    /// (9), (12): e_2 = d x_1d/dt + alpha_1 e_1 - x_2.
+    /// (9), (12): e_2 = phi - x_2 with phi = d x_1d/dt + alpha_1 e_1, kept within the speed limit.
     #[inline]
     pub fn new(alpha1: f32, tracking: &Tracking) -> Self {
-        let e1 = tracking.e1;
-        let e1_dot = tracking.x1d_dot - tracking.x2;
-        Errors { e1, e1_dot, e2: e1_dot + alpha1 * e1 }
+        let Tracking { e1, x1d_dot, x2, rate_max, .. } = *tracking;
+        let e1_dot = x1d_dot - x2;
+        let phi = x1d_dot + alpha1 * e1;
+        let e2 = if phi.abs() > rate_max { rate_max.copysign(phi) - x2 } else { e1_dot + alpha1 * e1 };
+        Errors { e1, e1_dot, e2 }
     }
 }
 

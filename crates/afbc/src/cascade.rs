@@ -2,15 +2,21 @@
 //! speeds. Section III-D, Fig. 2.
 
 use crate::adaptive::Estimate;
-use crate::allocation::{FORCE_MAX, Mixer};
+use crate::allocation::{Allocation, FORCE_MAX, Mixer};
 use crate::backstepping::{Errors, Tracking};
 use crate::command_filter::{CommandFilter, Filtered};
+use crate::ground::Ground;
+use crate::limits::Limits;
 use crate::math;
+use crate::monitor::Trip;
 use crate::screen::Screen;
 use airframe::{Axis, Inputs, OutOfRange, Parameters, PerAxis, Range, RotorForces, RotorSpeeds, Setpoint, State};
 
 /// Accepted time between steps \[s\].
 pub const DT: Range = Range::new("dt_s", 1e-4, 0.02);
+
+/// Least vertical part of thrust over weight that a tilt is worked out with: what sinks faster does not tilt more. Ours.
+pub const VERTICAL_MIN: f32 = 0.3;
 
 /// How one subsystem turns its errors into its input. AFBC and the baseline differ in nothing else.
 pub trait Law {
@@ -21,6 +27,16 @@ pub trait Law {
     /// May update the estimate, if the context lets it.
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Self::Estimate)
     -> (f32, Errors);
+
+    /// The estimate to start from in flight, for a vehicle of this weight.
+    fn start(&self, _axis: Axis, _weight_n: f32) -> Self::Estimate {
+        Self::Estimate::default()
+    }
+
+    /// U4 that it takes to hover \[N\], by the estimate of the z subsystem; for a law that does not know, the weight.
+    fn hover_thrust_n(&self, _z: &Self::Estimate, weight_n: f32) -> f32 {
+        weight_n
+    }
 
     /// What `estimate` holds in AFBC's terms, for logs and monitors; zero for a law that learns nothing.
     fn learnt(estimate: &Self::Estimate) -> Estimate;
@@ -37,6 +53,8 @@ pub struct Context<'a> {
     pub dt_s: f32,
     /// False if estimates must stay as they are.
     pub adapt: bool,
+    /// What each subsystem wanted of its input in the last step and could not have.
+    pub unallocated: PerAxis<f32>,
 }
 
 /// Settings of the cascade around the law.
@@ -48,6 +66,15 @@ pub struct Settings {
     pub command_filter_rad_s: f32,
     /// Largest force of one rotor \[N\].
     pub rotor_force_max_n: f32,
+    /// What position control may ask for.
+    pub limits: Limits,
+    /// Whether the desired attitude comes from the thrust really commanded; otherwise from (39), the thrust of hovering.
+    pub tilt_by_thrust: bool,
+    /// Whether estimates stay as they are while the vehicle stands on the [`ground`](crate::ground).
+    pub heed_ground: bool,
+    /// Whether to take over a vehicle in flight as it is: estimates that carry its weight, a command filter that starts
+    /// at its attitude. The paper starts from estimates of zero and at its first command.
+    pub bumpless: bool,
 }
 
 impl Settings {
@@ -58,7 +85,8 @@ impl Settings {
     pub fn validate(&self) -> Result<(), OutOfRange> {
         DT.check(self.dt_s)?;
         crate::command_filter::BANDWIDTH.check(self.command_filter_rad_s)?;
-        FORCE_MAX.check(self.rotor_force_max_n)
+        FORCE_MAX.check(self.rotor_force_max_n)?;
+        self.limits.validate()
     }
 }
 
@@ -68,8 +96,11 @@ pub struct Controller<L> {
     law: L,
     mixer: Mixer,
     filter: CommandFilter,
-    dt_s: f32,
+    settings: Settings,
+    weight_n: f32,
+    gravity_m_s2: f32,
     inverse_gravity: f32,
+    tilt_max_tan: f32,
 }
 
 /// What a controller remembers between steps.
@@ -77,10 +108,21 @@ pub struct Controller<L> {
 pub struct Memory<E> {
     /// Estimates of each subsystem.
     pub estimates: PerAxis<E>,
-    /// Filtered phi_d and theta_d; none before the first step, whose command they start from, at rest.
+    /// Filtered phi_d and theta_d; none before the first step.
     filtered: Option<[Filtered; 2]>,
+    /// See [`Context::unallocated`].
+    unallocated: PerAxis<f32>,
+    ground: Ground,
     screen: Screen,
     rotor_residual_rad_s: f32,
+}
+
+impl<E> Memory<E> {
+    /// The same flight with other estimates, of another law.
+    pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>) -> Memory<F> {
+        let Memory { filtered, unallocated, ground, screen, rotor_residual_rad_s, .. } = *self;
+        Memory { estimates, filtered, unallocated, ground, screen, rotor_residual_rad_s }
+    }
 }
 
 /// What went wrong in a step; all false in normal flight.
@@ -94,6 +136,8 @@ pub struct Health {
     pub setpoint_rejected: bool,
     /// A rotor was asked for a force outside its limits.
     pub saturated: bool,
+    /// Why AFBC does not fly any more, if its [`monitor`](crate::monitor) has tripped.
+    pub trip: Option<Trip>,
 }
 
 /// What one step decides, and why.
@@ -117,14 +161,24 @@ pub struct Command {
     pub health: Health,
 }
 
-/// Desired roll and pitch (40) \[rad\] for the wanted horizontal accelerations u5, u6 \[m/s2\] at yaw psi \[rad\].
+impl Command {
+    /// What each subsystem wants: U1..U4 \[N\], u5, u6 \[m/s2\].
+    pub fn per_axis(&self) -> PerAxis<f32> {
+        let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = self.inputs;
+        let [x, y] = self.virtual_m_s2;
+        PerAxis { roll: roll_n, pitch: pitch_n, yaw: yaw_n, z: thrust_n, x, y }
+    }
+}
+
+/// Desired roll and pitch (40) \[rad\] for the wanted horizontal accelerations u5, u6 \[m/s2\] at yaw
+/// psi \[rad\]. `inverse_vertical` is mass over the vertical part of thrust: 1/g in hover, as in (39).
 #[inline]
-pub fn desired_attitude(u5: f32, u6: f32, yaw_rad: f32, inverse_gravity: f32) -> [f32; 2] {
+pub fn desired_attitude(u5: f32, u6: f32, yaw_rad: f32, inverse_vertical: f32) -> [f32; 2] {
     let (sin_psi, cos_psi) = (math::sin(yaw_rad), math::cos(yaw_rad));
-    let tan_theta = (u5 * cos_psi + u6 * sin_psi) * inverse_gravity;
+    let tan_theta = (u5 * cos_psi + u6 * sin_psi) * inverse_vertical;
     // cos(atan t) = 1 / sqrt(1 + t^2)
     let cos_theta = 1.0 / math::sqrt(1.0 + tan_theta * tan_theta);
-    let tan_phi = (u5 * sin_psi - u6 * cos_psi) * inverse_gravity * cos_theta;
+    let tan_phi = (u5 * sin_psi - u6 * cos_psi) * inverse_vertical * cos_theta;
     [math::atan(tan_phi), math::atan(tan_theta)]
 }
 
@@ -138,10 +192,23 @@ impl<L: Law> Controller<L> {
         Ok(Controller {
             law,
             mixer: Mixer::new(&vehicle, settings.rotor_force_max_n)?,
-            filter: CommandFilter::new(settings.command_filter_rad_s, settings.dt_s)?,
-            dt_s: settings.dt_s,
+            filter: CommandFilter::new(settings.command_filter_rad_s, settings.dt_s)?
+                .limited(settings.limits.tilt_rate_max_rad_s)?,
+            settings,
+            weight_n: vehicle.mass_kg * vehicle.gravity_m_s2,
+            gravity_m_s2: vehicle.gravity_m_s2,
             inverse_gravity: 1.0 / vehicle.gravity_m_s2,
+            tilt_max_tan: math::tan(settings.limits.tilt_max_rad),
         })
+    }
+
+    /// The part of (u5, u6) that tilt and acceleration limits leave, its direction kept.
+    #[inline]
+    fn limited(&self, u5: f32, u6: f32, vertical: f32) -> [f32; 2] {
+        let max = (vertical * self.tilt_max_tan).min(self.settings.limits.acceleration_max_m_s2);
+        let square = u5 * u5 + u6 * u6;
+        let scale = if square > max * max { max / math::sqrt(square) } else { 1.0 };
+        [u5 * scale, u6 * scale]
     }
 
     /// One step: from what is measured and wanted to rotor speeds. Cannot fail; see [`Health`] for what it does with
@@ -165,19 +232,24 @@ impl<L: Law> Controller<L> {
 
     /// Estimates stay as they are if the state is not the present one.
     #[inline(always)]
-    fn decide(
+    pub(crate) fn decide(
         &self,
         memory: &mut Memory<L::Estimate>,
         state: &State,
         setpoint: &Setpoint,
         mut health: Health,
     ) -> Command {
+        if memory.filtered.is_none() && self.settings.bumpless {
+            memory.estimates = PerAxis::from_fn(|axis| self.law.start(axis, self.weight_n));
+        }
         let context = Context {
             state,
             rotor_residual_rad_s: memory.rotor_residual_rad_s,
-            dt_s: self.dt_s,
-            adapt: !health.state_rejected,
+            dt_s: self.settings.dt_s,
+            adapt: !health.state_rejected && !(self.settings.heed_ground && memory.ground.standing()),
+            unallocated: memory.unallocated,
         };
+        let hover_n = self.law.hover_thrust_n(&memory.estimates.z, self.weight_n);
         let mut errors = PerAxis::default();
         let estimates = &mut memory.estimates;
         let mut input = |axis: Axis, tracking: Tracking| {
@@ -187,26 +259,37 @@ impl<L: Law> Controller<L> {
         };
 
         // Position: subsystems 4, 5, 6.
+        let Limits { climb_max_m_s, speed_max_m_s, .. } = self.settings.limits;
         let (p, v, a) = (setpoint.position_m, setpoint.velocity_m_s, setpoint.acceleration_m_s2);
         let (xi, xi_dot) = (state.position_m, state.velocity_m_s);
-        let track = |x1, x2, x1d, x1d_dot, x1d_ddot| Tracking { x1, x2, e1: x1d - x1, x1d_dot, x1d_ddot };
-        let u4 = input(Axis::Z, track(xi.z, xi_dot.z, p.z, v.z, a.z));
-        let u5 = input(Axis::X, track(xi.x, xi_dot.x, p.x, v.x, a.x));
-        let u6 = input(Axis::Y, track(xi.y, xi_dot.y, p.y, v.y, a.y));
+        let track =
+            |x1, x2, x1d, x1d_dot, x1d_ddot, rate_max| Tracking { x1, x2, e1: x1d - x1, x1d_dot, x1d_ddot, rate_max };
+        let u4 = input(Axis::Z, track(xi.z, xi_dot.z, p.z, v.z, a.z, climb_max_m_s));
+        let u5 = input(Axis::X, track(xi.x, xi_dot.x, p.x, v.x, a.x, speed_max_m_s));
+        let u6 = input(Axis::Y, track(xi.y, xi_dot.y, p.y, v.y, a.y, speed_max_m_s));
 
         // Desired attitude with the derivatives that (12) and (16) ask for.
         let (eta, eta_dot) = (state.attitude_rad, state.rates_rad_s);
-        let desired_rad = desired_attitude(u5, u6, eta.z, self.inverse_gravity);
+        let (vertical, inverse_vertical) = if self.settings.tilt_by_thrust {
+            let upward_n = u4 * math::cos(eta.x) * math::cos(eta.y);
+            let share = (upward_n / hover_n).max(VERTICAL_MIN);
+            (self.gravity_m_s2 * share, self.inverse_gravity / share)
+        } else {
+            (self.gravity_m_s2, self.inverse_gravity)
+        };
+        let [a5, a6] = self.limited(u5, u6, vertical);
+        let desired_rad = desired_attitude(a5, a6, eta.z, inverse_vertical);
         let [phi_d, theta_d] = desired_rad;
         let at_rest = |angle| Filtered { angle, rate: 0.0 };
-        let filtered = memory.filtered.unwrap_or(desired_rad.map(at_rest));
+        let start = if self.settings.bumpless { [eta.x, eta.y] } else { desired_rad };
+        let filtered = memory.filtered.unwrap_or(start.map(at_rest));
         let [roll_d, pitch_d] = filtered;
 
         // Attitude: subsystems 1, 2, 3.
         let roll_d_ddot = self.filter.acceleration(&roll_d, phi_d);
         let pitch_d_ddot = self.filter.acceleration(&pitch_d, theta_d);
-        let u1 = input(Axis::Roll, track(eta.x, eta_dot.x, roll_d.angle, roll_d.rate, roll_d_ddot));
-        let u2 = input(Axis::Pitch, track(eta.y, eta_dot.y, pitch_d.angle, pitch_d.rate, pitch_d_ddot));
+        let u1 = input(Axis::Roll, track(eta.x, eta_dot.x, roll_d.angle, roll_d.rate, roll_d_ddot, f32::MAX));
+        let u2 = input(Axis::Pitch, track(eta.y, eta_dot.y, pitch_d.angle, pitch_d.rate, pitch_d_ddot, f32::MAX));
         let u3 = input(
             Axis::Yaw,
             Tracking {
@@ -215,25 +298,26 @@ impl<L: Law> Controller<L> {
                 e1: math::wrap_angle(setpoint.yaw_rad - eta.z),
                 x1d_dot: setpoint.yaw_rate_rad_s,
                 x1d_ddot: setpoint.yaw_acceleration_rad_s2,
+                rate_max: f32::MAX,
             },
         );
 
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3, thrust_n: u4 };
-        let allocation = self.mixer.allocate(&inputs);
-        let speeds = self.mixer.speeds(&allocation.forces);
-        health.saturated = allocation.saturated;
+        let Allocation { forces, unallocated, saturated } = self.mixer.allocate(&inputs);
+        let speeds = self.mixer.speeds(&forces);
+        health.saturated = saturated;
 
         memory.filtered = Some([self.filter.advance(&roll_d, phi_d), self.filter.advance(&pitch_d, theta_d)]);
+        memory.ground.advance(forces.0.sum(), self.weight_n, &state.velocity_m_s, self.settings.dt_s);
         memory.rotor_residual_rad_s = speeds.residual_rad_s();
-        Command {
-            speeds,
-            forces: allocation.forces,
-            inputs,
-            virtual_m_s2: [u5, u6],
-            desired_rad,
-            filtered,
-            errors,
-            health,
-        }
+        memory.unallocated = PerAxis {
+            roll: unallocated.roll_n,
+            pitch: unallocated.pitch_n,
+            yaw: unallocated.yaw_n,
+            z: unallocated.thrust_n,
+            x: u5 - a5,
+            y: u6 - a6,
+        };
+        Command { speeds, forces, inputs, virtual_m_s2: [u5, u6], desired_rad, filtered, errors, health }
     }
 }

@@ -8,6 +8,7 @@
 //!
 //! and is advanced by its exact solution for a command held over the step, so it is stable at any bandwidth.
 
+use crate::limits::TILT_RATE;
 use crate::math;
 use airframe::{OutOfRange, Range};
 
@@ -21,6 +22,7 @@ pub struct CommandFilter {
     dt: f32,
     /// exp(-w dt)
     decay: f32,
+    rate_max: f32,
 }
 
 /// The filter's state.
@@ -39,7 +41,17 @@ impl CommandFilter {
     /// If the bandwidth is outside [`BANDWIDTH`].
     pub fn new(bandwidth_rad_s: f32, dt_s: f32) -> Result<Self, OutOfRange> {
         BANDWIDTH.check(bandwidth_rad_s)?;
-        Ok(CommandFilter { bandwidth: bandwidth_rad_s, dt: dt_s, decay: math::exp(-bandwidth_rad_s * dt_s) })
+        let decay = math::exp(-bandwidth_rad_s * dt_s);
+        Ok(CommandFilter { bandwidth: bandwidth_rad_s, dt: dt_s, decay, rate_max: f32::INFINITY })
+    }
+
+    /// The same filter with a rate of at most `rate_max_rad_s`.
+    ///
+    /// # Errors
+    /// If the rate is outside [`TILT_RATE`].
+    pub fn limited(self, rate_max_rad_s: f32) -> Result<Self, OutOfRange> {
+        TILT_RATE.check(rate_max_rad_s)?;
+        Ok(CommandFilter { rate_max: rate_max_rad_s, ..self })
     }
 
     /// d^2 x/dt^2 under `command` \[rad/s2\].
@@ -53,9 +65,13 @@ impl CommandFilter {
     pub fn advance(&self, state: &Filtered, command: f32) -> Filtered {
         let offset = state.angle - command;
         let slope = state.rate + self.bandwidth * offset;
-        Filtered {
-            angle: command + (offset + slope * self.dt) * self.decay,
-            rate: (state.rate - self.bandwidth * slope * self.dt) * self.decay,
+        let angle = command + (offset + slope * self.dt) * self.decay;
+        let rate = (state.rate - self.bandwidth * slope * self.dt) * self.decay;
+        if rate.abs() <= self.rate_max {
+            Filtered { angle, rate }
+        } else {
+            let rate = self.rate_max.copysign(rate);
+            Filtered { angle: state.angle + rate * self.dt, rate }
         }
     }
 }

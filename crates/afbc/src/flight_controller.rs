@@ -32,6 +32,16 @@ pub trait FlightController {
     /// [`Command::health`] what of it was not plausible.
     fn step(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint) -> Command;
 
+    /// The step behind a [`Screen`](crate::Screen) of the caller's own: state and setpoint must be plausible
+    /// ([`State::is_plausible`], [`Setpoint::is_plausible`]).
+    fn step_screened(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint) -> Command {
+        self.step(memory, state, setpoint)
+    }
+
+    /// Gives the flight back to a controller that has fallen back on another law, without a jump of its inputs. Does
+    /// nothing to one that has not.
+    fn engage(&self, _memory: &mut Self::Memory) {}
+
     /// What `memory` holds in AFBC's terms, for logs and monitors; zero for a controller that learns nothing.
     fn learnt(_memory: &Self::Memory) -> PerAxis<Estimate> {
         PerAxis::default()
@@ -44,6 +54,11 @@ impl<L: Law> FlightController for Controller<L> {
     #[inline(always)]
     fn step(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint) -> Command {
         Controller::step(self, memory, state, setpoint)
+    }
+
+    #[inline(always)]
+    fn step_screened(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint) -> Command {
+        Controller::step_screened(self, memory, state, setpoint)
     }
 
     fn learnt(memory: &Self::Memory) -> PerAxis<Estimate> {

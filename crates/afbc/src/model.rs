@@ -52,6 +52,17 @@ impl Model {
         }
     }
 
+    /// g_i of `axis`, level.
+    pub fn hover_gain(&self, axis: Axis) -> f32 {
+        match axis {
+            Axis::Roll => self.b1,
+            Axis::Pitch => self.b2,
+            Axis::Yaw => self.b3,
+            Axis::Z => 1.0 / self.mass,
+            Axis::X | Axis::Y => 1.0,
+        }
+    }
+
     /// f_i, g_i and dg_i/dt of `axis`; d eta/dt is taken for Omega as in (6).
     #[inline]
     pub fn dynamics(&self, axis: Axis, context: &Context) -> Dynamics {

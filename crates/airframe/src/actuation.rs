@@ -1,6 +1,6 @@
 //! What moves the vehicle: inputs, rotor forces, rotor speeds.
 
-use nalgebra::Vector4;
+use nalgebra::SVector;
 
 /// The inputs U1..U4 of (6), all in newtons: sums and differences of rotor forces, not moments.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -16,12 +16,26 @@ pub struct Inputs {
 }
 
 /// Thrust F1..F4 of each rotor, along body z \[N\].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RotorForces(pub Vector4<f32>);
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RotorForces<const N: usize = 4>(pub SVector<f32, N>);
+
+impl<const N: usize> Default for RotorForces<N> {
+    /// Rotors that stand still.
+    fn default() -> Self {
+        RotorForces(SVector::zeros())
+    }
+}
 
 /// Speed omega_1..omega_4 of each rotor, never negative \[rad/s\].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RotorSpeeds(pub Vector4<f32>);
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RotorSpeeds<const N: usize = 4>(pub SVector<f32, N>);
+
+impl<const N: usize> Default for RotorSpeeds<N> {
+    /// Rotors that stand still.
+    fn default() -> Self {
+        RotorSpeeds(SVector::zeros())
+    }
+}
 
 impl RotorSpeeds {
     /// The residual omega = omega_1 - omega_2 + omega_3 - omega_4 of (6) \[rad/s\].

@@ -32,6 +32,18 @@ impl Axis {
             Axis::Y => "y",
         }
     }
+
+    /// The next one in the paper's order, round and round.
+    pub const fn next(self) -> Self {
+        match self {
+            Axis::Roll => Axis::Pitch,
+            Axis::Pitch => Axis::Yaw,
+            Axis::Yaw => Axis::Z,
+            Axis::Z => Axis::X,
+            Axis::X => Axis::Y,
+            Axis::Y => Axis::Roll,
+        }
+    }
 }
 
 /// One `T` for each subsystem, in the paper's order.

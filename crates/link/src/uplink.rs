@@ -42,6 +42,8 @@ pub enum Command {
     Arm,
     /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 0.
     Disarm,
+    /// MAV_CMD_USER_1 (31010): give the flight back to AFBC after its monitor has tripped.
+    Engage,
     /// Anything else, to be answered with "unsupported".
     Other(MavCmd),
 }
@@ -51,6 +53,7 @@ impl Command {
     pub fn id(self) -> MavCmd {
         match self {
             Command::Arm | Command::Disarm => MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+            Command::Engage => MavCmd::MAV_CMD_USER_1,
             Command::Other(id) => id,
         }
     }
@@ -188,6 +191,7 @@ fn read_command(data: &COMMAND_LONG_DATA, receiver: Address) -> Result<Uplink, F
         MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if data.param1 == 1.0 => Command::Arm,
         MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if data.param1 == 0.0 => Command::Disarm,
         MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => return Err(Fault::Malformed),
+        MavCmd::MAV_CMD_USER_1 => Command::Engage,
         other => Command::Other(other),
     };
     Ok(Uplink::Command(command))

@@ -1,6 +1,7 @@
 //! The half that talks.
 
-use crate::flight::{Norm, Report};
+use crate::flight::Report;
+use afbc::monitor::{Norm, Trip};
 use airframe::{PerAxis, State};
 use link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, MavCmd, Sender, Text, Uplink};
 use vehicle::{Inbox, Mode, Request, SourceClock, Stamped};
@@ -43,10 +44,12 @@ pub struct Comms {
     state: Option<State>,
     /// The state is newer than the last rotor command.
     state_is_news: bool,
-    /// Who asked for arming or disarming.
-    asked_by: Address,
+    /// The last command to the vehicle, and who sent it.
+    asked: (MavCmd, Address),
     /// A command that this vehicle does not know, and who sent it.
     unknown: Option<(MavCmd, Address)>,
+    norms: PerAxis<Norm>,
+    trip: Option<Trip>,
 }
 
 impl Default for Comms {
@@ -67,15 +70,17 @@ impl Comms {
             tick_us_max: 0.0,
             state: None,
             state_is_news: false,
-            asked_by: Address { system: 0, component: 0 },
+            asked: (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, Address { system: 0, component: 0 }),
             unknown: None,
+            norms: PerAxis::default(),
+            trip: None,
         }
     }
 
     /// Takes the next bytes of the stream; returns what they tell the control tick, to be [posted](post).
     pub fn receive(&mut self, bytes: &[u8]) -> Inbox {
         let mut news = Inbox::default();
-        let Comms { decoder, clock, now_us, state, state_is_news, asked_by, unknown, .. } = self;
+        let Comms { decoder, clock, now_us, state, state_is_news, asked, unknown, .. } = self;
         decoder.feed(bytes, |from, message| match message {
             Uplink::Heartbeat => (),
             Uplink::State { sent_us, state: value } => {
@@ -86,15 +91,16 @@ impl Comms {
                 }
             }
             Uplink::Setpoint(value) => news.setpoint = Some(Stamped { value, at_us: *now_us }),
-            Uplink::Command(Command::Arm) => {
-                news.ask(Request::Arm);
-                *asked_by = from;
+            Uplink::Command(command) => {
+                let request = match command {
+                    Command::Arm => Request::Arm,
+                    Command::Disarm => Request::Disarm,
+                    Command::Engage => Request::Engage,
+                    Command::Other(id) => return *unknown = Some((id, from)),
+                };
+                news.ask(request);
+                *asked = (command.id(), from);
             }
-            Uplink::Command(Command::Disarm) => {
-                news.ask(Request::Disarm);
-                *asked_by = from;
-            }
-            Uplink::Command(Command::Other(command)) => *unknown = Some((command, from)),
         });
         news
     }
@@ -124,15 +130,23 @@ impl Comms {
             say(Downlink::Rotors { time_us: report.time_us, armed, speeds: report.motors });
         }
         if let Some(answer) = report.answer {
-            let command = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
+            let (command, to) = self.asked;
             let (answer, reason) = match answer {
                 Ok(_) => (Answer::Accepted, None),
                 Err(refusal) => (Answer::Refused(refusal as i32), Some(refusal.reason())),
             };
-            say(Downlink::Answer { command, answer, to: self.asked_by });
+            say(Downlink::Answer { command, answer, to });
             if let Some(reason) = reason {
                 say(Downlink::Text(Text::from(reason)));
             }
+        }
+        let trip = report.health.control.trip;
+        if let (Some(trip), None) = (trip, self.trip) {
+            say(Downlink::Text(Text::from(trip.reason())));
+        }
+        self.trip = trip;
+        if let Some((axis, norm)) = report.learnt {
+            *self.norms.get_mut(axis) = norm;
         }
         if let Some((command, to)) = self.unknown.take() {
             say(Downlink::Answer { command, answer: Answer::Unsupported, to });
@@ -151,7 +165,7 @@ impl Comms {
             }
         }
         if HEALTH.is_due(self.tick) {
-            let Report { health, estimates, .. } = report;
+            let Report { health, .. } = report;
             let norm = |norm: &Norm| libm::sqrtf(norm.theta_squared);
             say(Downlink::Health(link::Health {
                 time_us: report.time_us,
@@ -161,8 +175,8 @@ impl Comms {
                 late_ticks: health.rate.late_ticks,
                 saturated_ticks: report.saturated_ticks,
                 state_age_us: health.state_age_us as f32,
-                theta_norm: PerAxis::from_fn(|axis| norm(estimates.get(axis))),
-                delta: PerAxis::from_fn(|axis| estimates.get(axis).delta),
+                theta_norm: PerAxis::from_fn(|axis| norm(self.norms.get(axis))),
+                delta: PerAxis::from_fn(|axis| self.norms.get(axis).delta),
                 link: *self.decoder.counters(),
             }));
         }

@@ -1,8 +1,8 @@
 //! The half that decides.
 
-use afbc::adaptive::Estimate;
-use afbc::{Adaptive, Profile};
-use airframe::{Axis, OutOfRange, Parameters, PerAxis, RotorSpeeds};
+use afbc::monitor::{Bounds, Norm};
+use afbc::{Guarded, Profile, guarded};
+use airframe::{Axis, OutOfRange, Parameters, RotorSpeeds};
 use vehicle::motor::Curve;
 use vehicle::{ArmingLimits, Health, Inbox, Memory, Mode, Motor, Refusal, Request, Vehicle};
 
@@ -10,25 +10,13 @@ use vehicle::{ArmingLimits, Health, Inbox, Memory, Mode, Motor, Refusal, Request
 /// to be measured for the vehicle at hand.
 const MOTOR: Curve = Curve { speed_max_rad_s: 1000.0, linearity: 1.0, idle: 0.05 };
 
-/// The vehicle of the paper, under its law.
+/// The vehicle of the paper, under its law in the profile `flight`.
 #[derive(Clone, Debug)]
 pub struct Flight {
-    vehicle: Vehicle<Adaptive>,
-    memory: Memory<Estimate>,
+    vehicle: Vehicle<Guarded>,
+    memory: Memory<guarded::Memory>,
     motor: Motor,
-    estimates: PerAxis<Norm>,
-    /// Whose norm is worked out in the next tick.
-    axis: Axis,
     saturated_ticks: u32,
-}
-
-/// How much one subsystem has learnt.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Norm {
-    /// |Theta_hat|^2
-    pub theta_squared: f32,
-    /// delta_hat
-    pub delta: f32,
 }
 
 /// What a control tick decided.
@@ -46,8 +34,8 @@ pub struct Report {
     pub health: Health,
     /// Ticks since power-up in which a rotor was asked for a force outside its limits.
     pub saturated_ticks: u32,
-    /// Each subsystem's as of one of the last six ticks.
-    pub estimates: PerAxis<Norm>,
+    /// How much the subsystem whose turn it was has learnt; none before the first flight.
+    pub learnt: Option<(Axis, Norm)>,
     /// The answer to a request.
     pub answer: Option<Result<Request, Refusal>>,
 }
@@ -58,15 +46,14 @@ impl Flight {
     /// # Errors
     /// The first parameter out of range.
     pub fn new() -> Result<Self, OutOfRange> {
-        let profile = Profile::Paper;
-        let law = Adaptive::new(profile.gains())?;
+        let (gains, settings) = (Profile::Flight.gains(), Profile::Flight.settings());
         let airframe = Parameters::PAPER.to_f32();
+        let bounds = Bounds::new(&gains, airframe.mass_kg * airframe.gravity_m_s2);
+        let controller = Guarded::new(airframe, settings, gains, bounds)?;
         Ok(Flight {
-            vehicle: Vehicle::new(airframe, profile.settings(), ArmingLimits::default(), law)?,
+            vehicle: Vehicle::new(airframe, settings, ArmingLimits::default(), controller)?,
             memory: Memory::default(),
             motor: Motor::new(MOTOR)?,
-            estimates: PerAxis::default(),
-            axis: Axis::Roll,
             saturated_ticks: 0,
         })
     }
@@ -77,7 +64,6 @@ impl Flight {
         if outcome.health.control.saturated {
             self.saturated_ticks = self.saturated_ticks.saturating_add(1);
         }
-        self.look_at_one_estimate();
         Report {
             time_us: now_us,
             mode: outcome.mode,
@@ -85,23 +71,8 @@ impl Flight {
             throttles: self.motor.throttles(outcome.mode.armed(), &outcome.motors),
             health: outcome.health,
             saturated_ticks: self.saturated_ticks,
-            estimates: self.estimates,
+            learnt: self.memory.control().map(|control| control.figures().latest()),
             answer: outcome.answer,
         }
-    }
-
-    /// One subsystem in each tick: nobody needs them sooner, and so no tick pays for all six.
-    fn look_at_one_estimate(&mut self) {
-        let Some(control) = self.memory.control() else { return };
-        let Estimate { theta, delta } = control.estimates.get(self.axis);
-        *self.estimates.get_mut(self.axis) = Norm { theta_squared: theta.norm_squared(), delta: *delta };
-        self.axis = match self.axis {
-            Axis::Roll => Axis::Pitch,
-            Axis::Pitch => Axis::Yaw,
-            Axis::Yaw => Axis::Z,
-            Axis::Z => Axis::X,
-            Axis::X => Axis::Y,
-            Axis::Y => Axis::Roll,
-        };
     }
 }

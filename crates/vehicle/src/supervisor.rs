@@ -56,6 +56,8 @@ pub enum Request {
     Arm,
     /// Stop the motors, now, wherever the vehicle is.
     Disarm,
+    /// Give the flight back to the controller that has fallen back on another law.
+    Engage,
 }
 
 /// Why arming is refused: the first reason that applies, in this order. The numbers go over the wire.
@@ -190,7 +192,7 @@ impl Mode {
     /// Arming refused.
     pub fn answer(self, request: Request, ready: Result<(), Refusal>) -> Result<Request, Refusal> {
         match request {
-            Request::Disarm => Ok(request),
+            Request::Disarm | Request::Engage => Ok(request),
             Request::Arm if self.armed() => Err(Refusal::AlreadyArmed),
             Request::Arm => ready.map(|()| request),
         }

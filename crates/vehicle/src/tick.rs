@@ -6,16 +6,16 @@ use crate::inbox::{Inbox, Stamped};
 use crate::rate;
 use crate::supervisor::{ArmingLimits, Mode, Observed, RIDE_US, Refusal, Request, SETPOINT_STALE_US};
 use afbc::allocation::Mixer;
-use afbc::{Command, Controller, Law, Settings};
+use afbc::{Command, FlightController, Settings};
 use airframe::{Inputs, OutOfRange, Parameters, Range, RotorSpeeds, Setpoint, State};
 
 /// Accepted time between steps of a law that flies: the tick's \[s\].
 pub const DT: Range = Range::new("dt_s", 0.001, 0.001);
 
-/// A vehicle with its law: fixed from here on. What changes in flight is in [`Memory`].
+/// A vehicle with its controller: fixed from here on. What changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Vehicle<L> {
-    controller: Controller<L>,
+pub struct Vehicle<C> {
+    controller: C,
     mixer: Mixer,
     blind: Blind,
     limits: ArmingLimits,
@@ -24,18 +24,18 @@ pub struct Vehicle<L> {
 
 /// What a vehicle remembers between ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Memory<E> {
+pub struct Memory<M> {
     mode: Mode,
     rate: rate::Counter,
     /// The newest plausible state.
     state: Option<Stamped<State>>,
-    flight: Option<Flight<E>>,
+    flight: Option<Flight<M>>,
 }
 
 /// What a vehicle remembers of one flight, from arming on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Flight<E> {
-    control: afbc::Memory<E>,
+struct Flight<M> {
+    control: M,
     reckoning: Reckoning,
     /// What the rotors were last told.
     applied: Inputs,
@@ -44,14 +44,14 @@ struct Flight<E> {
     descent: Option<Descent>,
 }
 
-impl<E> Memory<E> {
+impl<M> Memory<M> {
     /// What the vehicle is doing.
     pub fn mode(&self) -> Mode {
         self.mode
     }
 
-    /// What the law remembers of this flight, or of the last one; none before the first.
-    pub fn control(&self) -> Option<&afbc::Memory<E>> {
+    /// What the controller remembers of this flight, or of the last one; none before the first.
+    pub fn control(&self) -> Option<&M> {
         self.flight.as_ref().map(|flight| &flight.control)
     }
 }
@@ -84,16 +84,21 @@ pub struct Outcome {
     pub answer: Option<Result<Request, Refusal>>,
 }
 
-impl<L: Law> Vehicle<L> {
-    /// A vehicle with these nominal parameters under `law`.
+impl<C: FlightController> Vehicle<C> {
+    /// A vehicle with these nominal parameters under `controller`, which was built with the same settings.
     ///
     /// # Errors
     /// The first parameter, setting or limit out of range; the time step must be the tick's, 1 ms.
-    pub fn new(airframe: Parameters, settings: Settings, limits: ArmingLimits, law: L) -> Result<Self, OutOfRange> {
+    pub fn new(
+        airframe: Parameters,
+        settings: Settings,
+        limits: ArmingLimits,
+        controller: C,
+    ) -> Result<Self, OutOfRange> {
         limits.validate()?;
         DT.check(settings.dt_s)?;
         Ok(Vehicle {
-            controller: Controller::new(airframe, settings, law)?,
+            controller,
             mixer: Mixer::new(&airframe, settings.rotor_force_max_n)?,
             blind: Blind::new(&airframe, settings.dt_s),
             limits,
@@ -102,7 +107,7 @@ impl<L: Law> Vehicle<L> {
     }
 
     /// One tick, to be called every millisecond; `now_us` is the time since power-up and never goes back. Cannot fail.
-    pub fn tick(&self, memory: &mut Memory<L::Estimate>, now_us: u64, inbox: &Inbox) -> Outcome {
+    pub fn tick(&self, memory: &mut Memory<C::Memory>, now_us: u64, inbox: &Inbox) -> Outcome {
         // Take the newest inputs.
         let rate = memory.rate.tick(now_us);
         let measured = memory.take_state(inbox, now_us);
@@ -119,6 +124,9 @@ impl<L: Law> Vehicle<L> {
         let mode = memory.mode;
         if let (Some(Ok(Request::Arm)), Some(state)) = (answer, &fresh) {
             memory.flight = Some(Flight::new(self.blind.start(state)));
+        }
+        if let (Some(Ok(Request::Engage)), Some(flight)) = (answer, &mut memory.flight) {
+            self.controller.engage(&mut flight.control);
         }
 
         // Control.
@@ -151,7 +159,7 @@ impl<L: Law> Vehicle<L> {
     }
 
     /// Rotor commands without a state.
-    fn blind_command<E>(&self, flight: &mut Flight<E>, mode: Mode) -> Command {
+    fn blind_command<M>(&self, flight: &mut Flight<M>, mode: Mode) -> Command {
         flight.descent = None;
         let inputs = match mode {
             Mode::Descending => self.blind.descend(&flight.reckoning),
@@ -164,7 +172,7 @@ impl<L: Law> Vehicle<L> {
     }
 }
 
-impl<E> Memory<E> {
+impl<M> Memory<M> {
     /// Keeps the inbox's state, and returns it, if it is plausible, newer than the one at hand, and not stale already: a
     /// stream of states that are always late is no stream of states.
     fn take_state(&mut self, inbox: &Inbox, now_us: u64) -> Option<State> {
@@ -179,13 +187,13 @@ impl<E> Memory<E> {
     }
 }
 
-impl<E: Default> Flight<E> {
+impl<M: Default> Flight<M> {
     fn new(reckoning: Reckoning) -> Self {
-        Flight { control: afbc::Memory::default(), reckoning, applied: Inputs::default(), hold: None, descent: None }
+        Flight { control: M::default(), reckoning, applied: Inputs::default(), hold: None, descent: None }
     }
 }
 
-impl<E> Flight<E> {
+impl<M> Flight<M> {
     /// Dead reckoning over the last period, corrected by what was measured.
     fn reckon(&mut self, blind: &Blind, measured: Option<&State>) {
         blind.advance(&mut self.reckoning, &self.applied);

@@ -2,7 +2,7 @@
 //! real tick, one fault a case. The vehicle stands still at its setpoint; closed loops are flown elsewhere.
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
-use afbc::{Adaptive, Profile};
+use afbc::{Adaptive, Controller, Profile};
 use airframe::{Parameters, RotorSpeeds, Setpoint, State};
 use link::{Address, Command, Counters, Decoder, FRAME_MAX, Sender, Uplink};
 use vehicle::{ArmingLimits, Inbox, Memory, Mode, Refusal, Request, SourceClock, Stamped, Vehicle};
@@ -71,9 +71,10 @@ struct Seen {
 /// Plays the frames, each at its time, those of one millisecond in their order here.
 fn play(mut frames: Vec<Frame>) -> Seen {
     frames.sort_by_key(|frame| frame.at_ms);
+    let (airframe, settings) = (Parameters::PAPER.to_f32(), Profile::Paper.settings());
     let law = Adaptive::new(Profile::Paper.gains()).expect("valid");
-    let vehicle = Vehicle::new(Parameters::PAPER.to_f32(), Profile::Paper.settings(), ArmingLimits::default(), law)
-        .expect("valid");
+    let controller = Controller::new(airframe, settings, law).expect("valid");
+    let vehicle = Vehicle::new(airframe, settings, ArmingLimits::default(), controller).expect("valid");
     let (mut memory, mut inbox, mut clock) = (Memory::default(), Inbox::default(), SourceClock::default());
     let mut decoder = Decoder::<Uplink>::new(VEHICLE);
     let mut seen = Seen::default();
@@ -91,6 +92,7 @@ fn play(mut frames: Vec<Frame>) -> Seen {
                 }
                 Uplink::Setpoint(value) => inbox.setpoint = Some(Stamped { value, at_us: now_us }),
                 Uplink::Command(Command::Arm) => inbox.ask(Request::Arm),
+                Uplink::Command(Command::Engage) => inbox.ask(Request::Engage),
                 Uplink::Command(Command::Disarm) => inbox.ask(Request::Disarm),
                 Uplink::Command(Command::Other(_)) | Uplink::Heartbeat => {}
             });

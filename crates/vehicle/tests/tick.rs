@@ -8,20 +8,21 @@ use proptest::prelude::*;
 use vehicle::descent::{SINK_M_S, STILL_US};
 use vehicle::{ArmingLimits, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle};
 
-type Adapted = afbc::adaptive::Estimate;
+type Adapted = afbc::Memory<afbc::adaptive::Estimate>;
 
-fn law() -> Adaptive {
-    Adaptive::new(Profile::Paper.gains()).expect("valid")
+fn controller(settings: Settings) -> Controller<Adaptive> {
+    let law = Adaptive::new(Profile::Paper.gains()).expect("valid");
+    Controller::new(Parameters::PAPER.to_f32(), settings, law).expect("valid")
 }
 
-fn vehicle() -> Vehicle<Adaptive> {
+fn vehicle() -> Vehicle<Controller<Adaptive>> {
     let settings = Profile::Paper.settings();
-    Vehicle::new(Parameters::PAPER.to_f32(), settings, ArmingLimits::default(), law()).expect("valid")
+    Vehicle::new(Parameters::PAPER.to_f32(), settings, ArmingLimits::default(), controller(settings)).expect("valid")
 }
 
 /// A vehicle, its memory and the time.
 struct Bench {
-    vehicle: Vehicle<Adaptive>,
+    vehicle: Vehicle<Controller<Adaptive>>,
     memory: Memory<Adapted>,
     now_us: u64,
     inbox: Inbox,
@@ -76,8 +77,7 @@ fn disarmed_motors_are_off_and_arming_waits_for_the_rate() {
 #[test]
 fn flying_is_the_laws_step() {
     let mut bench = Bench::flying(State::default(), near());
-    let parameters = Parameters::PAPER.to_f32();
-    let controller = Controller::new(parameters, Profile::Paper.settings(), law()).expect("valid");
+    let controller = controller(Profile::Paper.settings());
     let mut memory = afbc::Memory::default();
     controller.step(&mut memory, &State::default(), &near());
     for tick in 0..500 {
@@ -258,7 +258,7 @@ fn states_that_are_stale_when_they_come_are_no_states() {
 #[test]
 fn only_a_law_at_the_ticks_rate_flies() {
     let settings = Settings { dt_s: 0.002, ..Profile::Paper.settings() };
-    let refused = Vehicle::new(Parameters::PAPER.to_f32(), settings, ArmingLimits::default(), law());
+    let refused = Vehicle::new(Parameters::PAPER.to_f32(), settings, ArmingLimits::default(), controller(settings));
     assert_eq!(refused.expect_err("2 ms").range.name, "dt_s");
 }
 

@@ -1,6 +1,7 @@
 //! One CSV for each run: every logged step, units in the header.
 
 use super::Flown;
+use crate::contender::ControllerKind;
 use crate::flight::Sample;
 use afbc::cascade::Context;
 use afbc::model::Model;
@@ -41,15 +42,16 @@ struct Column {
 fn lyapunov(model: &Model, sample: &Sample) -> PerAxis<f32> {
     let state = sample.motion.measure();
     let rotor_residual_rad_s = sample.command.speeds.residual_rad_s();
-    let context = Context { state: &state, rotor_residual_rad_s, dt_s: 0.0, adapt: false };
+    let context =
+        Context { state: &state, rotor_residual_rad_s, dt_s: 0.0, adapt: false, unallocated: PerAxis::default() };
     PerAxis::from_fn(|axis| {
         let errors = sample.command.errors.get(axis);
         0.5 * errors.e1 * errors.e1 + 0.5 * errors.e2 * errors.e2 / model.dynamics(axis, &context).g
     })
 }
 
-/// Every column, left to right.
-fn columns() -> Vec<Column> {
+/// Every column of a law's log, left to right.
+fn columns(kind: ControllerKind) -> Vec<Column> {
     let mut columns = Vec::new();
     let mut add = |name: String, value: Box<dyn Fn(&Row) -> Number>| columns.push(Column { name, value });
     macro_rules! add {
@@ -123,6 +125,12 @@ fn columns() -> Vec<Column> {
         }
     }
     add! { Flag "saturated": |s| s.command.health.saturated; }
+    // What the others have in the place of e_2 and the estimates is nothing.
+    let (backstepping, adaptive) = match kind {
+        ControllerKind::Afbc => (true, true),
+        ControllerKind::Backstepping => (true, false),
+        _ => (false, false),
+    };
     for axis in Axis::ALL {
         let name = axis.name();
         // Of e1, e2 and the subsystem's input.
@@ -132,13 +140,22 @@ fn columns() -> Vec<Column> {
             Axis::X | Axis::Y => ["m", "m_s", "m_s2"],
         };
         add(format!("e1_{name}_{e1}"), Box::new(move |row| Single(row.sample.command.errors.get(axis).e1)));
-        add(format!("e2_{name}_{e2}"), Box::new(move |row| Single(row.sample.command.errors.get(axis).e2)));
-        add(format!("delta_hat_{name}_{u}"), Box::new(move |row| Single(row.sample.estimates.get(axis).delta)));
-        add(format!("theta_norm_{name}_{u}"), Box::new(move |row| Single(row.sample.estimates.get(axis).theta.norm())));
-        add(format!("lyapunov_{name}"), Box::new(move |row| Single(*row.lyapunov.get(axis))));
+        if backstepping {
+            add(format!("e2_{name}_{e2}"), Box::new(move |row| Single(row.sample.command.errors.get(axis).e2)));
+        }
+        if adaptive {
+            let estimate = move |row: &Row| *row.sample.estimates.get(axis);
+            add(format!("delta_hat_{name}_{u}"), Box::new(move |row| Single(estimate(row).delta)));
+            add(format!("theta_norm_{name}_{u}"), Box::new(move |row| Single(estimate(row).theta.norm())));
+        }
+        if backstepping {
+            add(format!("lyapunov_{name}"), Box::new(move |row| Single(*row.lyapunov.get(axis))));
+        }
     }
-    let sum = |row: &Row| Axis::ALL.iter().map(|&axis| row.lyapunov.get(axis)).sum();
-    add("lyapunov_sum".into(), Box::new(move |row| Single(sum(row))));
+    if backstepping {
+        let sum = |row: &Row| Axis::ALL.iter().map(|&axis| row.lyapunov.get(axis)).sum();
+        add("lyapunov_sum".into(), Box::new(move |row| Single(sum(row))));
+    }
     columns
 }
 
@@ -151,7 +168,7 @@ fn given(sample: &Sample) -> airframe::Inputs {
 pub(super) fn write(out: &mut dyn Write, Flown { scenario, run }: &Flown) -> io::Result<()> {
     let vehicle: Parameters = scenario.vehicle.to_f32();
     let model = Model::new(&vehicle);
-    let columns = columns();
+    let columns = columns(run.contender.kind());
     let mut writer = csv::Writer::from_writer(out);
     writer.write_record(columns.iter().map(|column| &column.name))?;
     let mut digits = ryu::Buffer::new();

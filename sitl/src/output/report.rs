@@ -4,9 +4,12 @@ use super::figures::Figure;
 use super::files::Group;
 use super::{table, words};
 use crate::claims::Claim;
+use crate::contender::{Contender, Law};
 use crate::scenario::Scenario;
 use crate::trajectory::Trajectory;
+use afbc::Settings;
 use airframe::Axis;
+use core::convert::Infallible;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// Looks: dark on white, one column, breaks between figures on paper.
@@ -127,7 +130,7 @@ fn results(group: &Group) -> Markup {
                     @for (row, flight) in rows.iter().enumerate() {
                         tr {
                             th scope="row" { @if row == 0 { (block.title) } }
-                            td.name { (flight.run.controller.title()) }
+                            td.name { (flight.run.contender.title()) }
                             @match &flight.run.lost {
                                 Some(lost) => td.lost colspan="4" { (words::lost(lost)) },
                                 None => @for cell in block.cells(flight) { td { (cell) } },
@@ -152,9 +155,6 @@ fn parameters(scenario: &Scenario) -> Markup {
         ("thrust factor b", format!("{:e} N s²", vehicle.thrust_factor_n_s2)),
         ("drag factor d", format!("{:e} N m s²", vehicle.drag_factor_n_m_s2)),
         ("gravity g", format!("{} m/s²", vehicle.gravity_m_s2)),
-        ("time step", format!("{} s", scenario.settings.dt_s)),
-        ("command filter", format!("{} rad/s", scenario.settings.command_filter_rad_s)),
-        ("largest rotor force", format!("{} N", scenario.settings.rotor_force_max_n)),
         ("start", start(scenario)),
         ("reference", trajectory(&scenario.trajectory)),
     ];
@@ -178,31 +178,57 @@ fn parameters(scenario: &Scenario) -> Markup {
                 }
             }
         }
-        table {
-            thead {
-                tr {
-                    td { "subsystem" }
-                    @for gain in ["α₁", "α₂", "γ", "η", "ε", "centre", "width"] { th scope="col" { (gain) } }
-                }
-            }
-            tbody {
-                @for axis in Axis::ALL {
-                    @let gains = scenario.gains.get(axis);
-                    tr {
-                        td { (axis.name()) }
-                        td { (gains.backstepping.alpha1) }
-                        td { (gains.backstepping.alpha2) }
-                        td { (gains.gamma) }
-                        td { (gains.eta) }
-                        td { (gains.epsilon) }
-                        td { (gains.membership.centre) }
-                        td { (gains.membership.width) }
-                    }
-                }
-            }
-        }
-        p.quiet { "γ, η, ε and the memberships (centre, width) are AFBC's alone." }
+        @for contender in &scenario.contenders { (gains(contender)) }
     }
+}
+
+/// Who flew: settings and gains.
+fn gains(contender: &Contender) -> Markup {
+    let Settings { dt_s, command_filter_rad_s, rotor_force_max_n, .. } = contender.settings;
+    let mut settings = format!("steps of {dt_s} s, at most {rotor_force_max_n} N a rotor");
+    if let Law::Afbc(_) | Law::Backstepping(_) = contender.law {
+        settings += &format!(", command filter {command_filter_rad_s} rad/s");
+    }
+    html! {
+        h3 { (capitalised(contender.title())) }
+        p.quiet { (contender.kind().title()) ", " (settings) "." }
+        @match &contender.law {
+            Law::Afbc(gains) => (per_axis(&["α₁", "α₂", "γ", "η", "ε", "centre", "width"], |axis| {
+                let g = gains.get(axis);
+                vec![
+                    g.backstepping.alpha1,
+                    g.backstepping.alpha2,
+                    g.gamma,
+                    g.eta,
+                    g.epsilon,
+                    g.membership.centre,
+                    g.membership.width,
+                ]
+            })),
+            Law::Backstepping(gains) => (per_axis(&["α₁", "α₂"], |axis| {
+                vec![gains.get(axis).alpha1, gains.get(axis).alpha2]
+            })),
+            law => (by_name(*law)),
+        }
+    }
+}
+
+fn per_axis(names: &[&str], gains: impl Fn(Axis) -> Vec<f32>) -> Markup {
+    html! {
+        table {
+            thead { tr { td { "subsystem" } @for name in names { th scope="col" { (name) } } } }
+            tbody { @for axis in Axis::ALL { tr { td { (axis.name()) } @for gain in gains(axis) { td { (gain) } } } } }
+        }
+    }
+}
+
+fn by_name(mut law: Law) -> Markup {
+    let mut gains = Vec::new();
+    let Ok(()) = law.each_gain(|range, gain| {
+        gains.push((range.name, *gain));
+        Ok::<(), Infallible>(())
+    });
+    html! { table { tbody { @for (name, gain) in gains { tr { td { code { (name) } } td { (gain) } } } } } }
 }
 
 fn start(scenario: &Scenario) -> String {

@@ -3,6 +3,7 @@
 use super::{Flown, settled};
 use crate::metrics::SETTLED_S;
 use crate::paper::{Reading, Sign};
+use afbc::Profile;
 use nalgebra::Vector4;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -15,8 +16,10 @@ struct Summary<'a> {
     inertia_sign: Option<&'a str>,
     thrust_sign: Option<&'a str>,
     plant: &'a str,
+    contender: &'a str,
     controller: &'a str,
-    profile: &'a str,
+    /// Whose gains and settings those are, if a profile's.
+    profile: Option<&'a str>,
     duration_s: f64,
     lost_at_s: Option<f64>,
     lost_reason: Option<&'a str>,
@@ -52,8 +55,9 @@ fn summary(Flown { scenario, run }: &Flown) -> Summary<'_> {
         inertia_sign: uncertainty.map(|u| u.inertia).map(Sign::symbol),
         thrust_sign: uncertainty.map(|u| u.thrust).map(Sign::symbol),
         plant: scenario.model.name(),
-        controller: run.controller.name(),
-        profile: scenario.profile.name(),
+        contender: &run.contender.name,
+        controller: run.contender.kind().name(),
+        profile: run.contender.profile().map(Profile::name),
         duration_s: scenario.duration_s,
         lost_at_s: run.lost.map(|lost| lost.time_s),
         lost_reason: run.lost.map(|lost| lost.reason),

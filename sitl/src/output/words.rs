@@ -1,15 +1,16 @@
 //! Names and numbers for people, the same wherever they appear.
 
 use crate::paper::{Reading, Sign};
-use crate::scenario::Scenario;
+use crate::scenario::{Contender, Scenario};
+use afbc::Profile;
 use airframe::Axis;
 use plant::{Gust, GustKind, ParameterChange, Quantity};
 
 /// A file name without its ending: letters, digits, `-` and `_` of `name`, anything else as `-`.
-pub(super) fn stem(name: &str) -> String {
+pub(super) fn slug(name: &str) -> String {
     let keep = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' };
-    let stem: String = name.chars().take(80).map(keep).collect();
-    if stem.is_empty() { "flight".into() } else { stem }
+    let slug: String = name.chars().take(80).map(keep).collect();
+    if slug.is_empty() { "flight".into() } else { slug }
 }
 
 /// What may tell scenarios of one name apart, as parts of a file name: reading, signs, plant, profile.
@@ -22,7 +23,14 @@ pub(super) fn case_words(scenario: &Scenario) -> [String; 4] {
     let signs = scenario.case.and_then(|case| case.uncertainty).map_or("certain".into(), |uncertainty| {
         format!("inertia-{}-thrust-{}", sign(uncertainty.inertia), sign(uncertainty.thrust))
     });
-    [reading.into(), signs, scenario.model.name().into(), scenario.profile.name().into()]
+    [reading.into(), signs, scenario.model.name().into(), profile(scenario).map_or("tuned", Profile::name).into()]
+}
+
+/// The profile that all contenders share, if there is one.
+fn profile(scenario: &Scenario) -> Option<Profile> {
+    let mut profiles = scenario.contenders.iter().map(Contender::profile);
+    let first = profiles.next()?;
+    profiles.all(|profile| profile == first).then_some(first)?
 }
 
 /// One line that says what was flown: "rigid-body plant, persistent gusts, inertia +75 %, thrust factor -40 %, 60 s".
@@ -37,7 +45,7 @@ pub(super) fn conditions(scenario: &Scenario) -> String {
         (None, count) => words.push(format!("{count} gusts")),
     }
     words.extend(scenario.environment.changes().iter().map(change));
-    words.push(format!("{} profile", scenario.profile.name()));
+    words.extend(profile(scenario).map(|profile| format!("{} profile", profile.name())));
     words.push(format!("{} s", scenario.duration_s));
     words.join(", ")
 }

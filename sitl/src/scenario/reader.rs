@@ -62,6 +62,11 @@ impl<'a> Table<'a> {
         self.text_in(value, key).map(Some)
     }
 
+    /// The string under `key`, which must be there.
+    pub(super) fn need_text(&mut self, key: &'static str, cure: &str) -> Result<&'a str, FileError> {
+        self.text(key)?.ok_or_else(|| self.missing(key, cure))
+    }
+
     /// The option whose name stands under `key`, if it is there.
     pub(super) fn choice<T: Copy>(
         &mut self,
@@ -133,6 +138,11 @@ impl<'a> Table<'a> {
             None => format!("known here: {}", self.read.join(", ")),
         };
         Err(self.unknown(key, start, &cure))
+    }
+
+    /// Refuses `key`, which has its place elsewhere.
+    pub(super) fn forbid(&self, key: &str, problem: &str) -> Result<(), FileError> {
+        if self.entries.contains_key(key) { Err(self.fault_at(key, problem)) } else { Ok(()) }
     }
 
     /// The whole table is refused on account of `key`.

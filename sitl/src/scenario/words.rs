@@ -6,7 +6,7 @@ use airframe::OutOfRange;
 const LIKENESS: f64 = 0.8;
 
 /// What the endings of keys mean, longest ending first.
-const UNITS: [(&str, &str); 16] = [
+const UNITS: [(&str, &str); 19] = [
     ("_n_m_s2", "newton metre seconds squared"),
     ("_kg_m2", "kilogram square metres"),
     ("_rad_s2", "radians per second squared"),
@@ -14,6 +14,9 @@ const UNITS: [(&str, &str); 16] = [
     ("_m_s2", "metres per second squared"),
     ("_rad_s", "radians per second"),
     ("_m_s", "metres per second"),
+    ("_1_s3", "1/s3"),
+    ("_1_s2", "1/s2"),
+    ("_1_s", "1/s"),
     ("_n_m", "newton metres"),
     ("_rad", "radians"),
     ("_kg", "kilograms"),

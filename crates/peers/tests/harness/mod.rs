@@ -2,14 +2,14 @@
 
 #![allow(dead_code, reason = "each test file uses a part")]
 
-use afbc::{Command, FlightController, Settings};
+use afbc::{Command, FlightController, Profile, Settings};
 use airframe::{Axis, Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Plant, Quantity};
 use std::collections::VecDeque;
 
 /// 1 kHz and 3 N a rotor.
-pub(crate) const SETTINGS: Settings = Settings { dt_s: 0.001, command_filter_rad_s: 40.0, rotor_force_max_n: 3.0 };
+pub(crate) const SETTINGS: Settings = Settings { rotor_force_max_n: 3.0, ..Profile::Paper.settings() };
 
 pub(crate) fn vehicle() -> Parameters {
     Parameters::PAPER.to_f32()

@@ -12,10 +12,9 @@ mod tests;
 use super::error::{FileError, Source};
 use super::reader::Table;
 use super::words::out_of_range;
-use super::{ControllerKind, DURATION, Scenario};
-use afbc::Profile;
+use super::{DURATION, Scenario};
 use airframe::Parameters;
-use plant::Model;
+use plant::{Model, Realism, Sensing};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -77,13 +76,10 @@ pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> 
     let duration_s = root.number(&DURATION)?.unwrap_or(DURATION_S);
     let models = [Model::Simplified, Model::RigidBody];
     let model = root.choice("plant", &models, Model::name)?.unwrap_or(Model::RigidBody);
-    let controllers = root.choices("controllers", &ControllerKind::ALL, ControllerKind::name)?;
-    let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(Profile::Paper);
 
     let vehicle = vehicle::read(root.table("vehicle")?, Parameters::PAPER)?;
     let truth = vehicle::read(root.table("truth")?, vehicle)?;
-    let gains = control::gains(root.table("gains")?, profile.gains())?;
-    let settings = control::settings(root.table("settings")?, profile.settings())?;
+    let contenders = control::contenders(&mut root)?;
     let Some(table) = root.table("trajectory")? else {
         return Err(root.missing("trajectory", "add [trajectory] with kind = \"hover\" and position_m = [0, 0, 1]"));
     };
@@ -99,12 +95,12 @@ pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> 
         model,
         vehicle,
         environment,
+        realism: Realism::default(),
+        sensing: Sensing::default(),
+        seed: 0,
         initial,
         trajectory,
-        controllers: controllers.unwrap_or(ControllerKind::ALL.to_vec()),
-        profile,
-        gains,
-        settings,
+        contenders,
     };
     // Whatever the tables have let through, no flight begins with.
     scenario.check().map_err(|error| root.fault(error.range.name, format!("{}; change it", out_of_range(&error))))?;

@@ -1,0 +1,32 @@
+//! Standing on the ground, told from what the rotors are asked for and how the vehicle moves. Ours, in the manner of
+//! autopilots' land detectors: in the air a vehicle whose rotors do not carry it is soon too fast to be standing.
+
+use nalgebra::Vector3;
+
+/// Share of the weight below which the rotors do not carry the vehicle.
+pub const LIFT_SHARE: f32 = 0.4;
+/// Speed along each axis below which the vehicle is still \[m/s\].
+pub const STILL_M_S: f32 = 0.1;
+/// How long both must last \[s\].
+pub const STILL_S: f32 = 0.2;
+
+/// How long the vehicle may have been standing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ground {
+    still_s: f32,
+}
+
+impl Ground {
+    /// Takes one step into account.
+    #[inline]
+    pub fn advance(&mut self, thrust_n: f32, weight_n: f32, velocity_m_s: &Vector3<f32>, dt_s: f32) {
+        let still = velocity_m_s.iter().all(|v| v.abs() < STILL_M_S);
+        self.still_s = if thrust_n < LIFT_SHARE * weight_n && still { self.still_s + dt_s } else { 0.0 };
+    }
+
+    /// True if the ground carries the vehicle.
+    #[inline]
+    pub fn standing(&self) -> bool {
+        self.still_s > STILL_S
+    }
+}

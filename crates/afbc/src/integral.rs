@@ -1,0 +1,92 @@
+//! Backstepping with integral action: the fixed-gain law that stands in for AFBC when the [monitor](crate::monitor)
+//! has tripped.
+//!
+//! ```text
+//! u = u*_eq + alpha_2 e_2 + i        di/dt = kappa e_2,  |i| <= i_max
+//! ```
+//!
+//! With V = 1/2 (e_1^2 + e_2^2/g + (i* - i)^2/kappa), V' = -alpha_1 e_1^2 - alpha_2 e_2^2 for any constant disturbance
+//! g i*: the integral is (34) with a single rule. Krstic, Kanellakopoulos, Kokotovic, *Nonlinear and Adaptive Control
+//! Design*, 1995, section 4.2.
+
+use crate::adaptive::{self, Estimate, GAMMA};
+use crate::backstepping::{self, Errors, Tracking, ideal, proportional};
+use crate::cascade::{Context, Law};
+use crate::model::Model;
+use crate::safeguards::THETA_MAX;
+use airframe::{Axis, OutOfRange, Parameters, PerAxis};
+
+/// Gains of one subsystem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// alpha_1, alpha_2.
+    pub backstepping: backstepping::Gains,
+    /// kappa, within [`GAMMA`].
+    pub integral: f32,
+    /// i_max, in the subsystem's input, within [`THETA_MAX`].
+    pub integral_max: f32,
+}
+
+impl From<&adaptive::Gains> for Gains {
+    /// As fast as AFBC with a single rule, and as far.
+    fn from(gains: &adaptive::Gains) -> Self {
+        Gains { backstepping: gains.backstepping, integral: gains.gamma, integral_max: gains.safeguards.theta_max }
+    }
+}
+
+/// What one subsystem remembers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Integral {
+    /// i
+    pub value: f32,
+    /// The input to go on from: the next step chooses i for it.
+    pub resume: Option<f32>,
+}
+
+/// Backstepping with integral action.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IntegralBackstepping {
+    gains: PerAxis<Gains>,
+    model: Model,
+}
+
+impl IntegralBackstepping {
+    /// The law for a vehicle with these nominal parameters.
+    ///
+    /// # Errors
+    /// The first parameter or gain out of range.
+    pub fn new(vehicle: &Parameters, gains: PerAxis<Gains>) -> Result<Self, OutOfRange> {
+        vehicle.validate()?;
+        for axis in Axis::ALL {
+            let Gains { backstepping, integral, integral_max } = gains.get(axis);
+            backstepping.validate()?;
+            GAMMA.check(*integral)?;
+            THETA_MAX.check(*integral_max)?;
+        }
+        Ok(IntegralBackstepping { gains, model: Model::new(vehicle) })
+    }
+}
+
+impl Law for IntegralBackstepping {
+    type Estimate = Integral;
+
+    #[inline]
+    fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, integral: &mut Integral) -> (f32, Errors) {
+        let Gains { backstepping, integral: kappa, integral_max } = self.gains.get(axis);
+        let errors = Errors::new(backstepping.alpha1, tracking);
+        let dynamics = self.model.dynamics(axis, context);
+        let fixed = ideal(backstepping.alpha1, &errors, tracking.x1d_ddot, &dynamics)
+            + proportional(backstepping.alpha2, &errors);
+        if let Some(input) = integral.resume.take() {
+            integral.value = input - fixed;
+        }
+        let i = integral.value.max(-integral_max).min(*integral_max);
+        let winds_up = errors.e2 * context.unallocated.get(axis) > 0.0;
+        integral.value = if context.adapt && !winds_up { i + kappa * errors.e2 * context.dt_s } else { i };
+        (fixed + i, errors)
+    }
+
+    fn learnt(_: &Integral) -> Estimate {
+        Estimate::default()
+    }
+}

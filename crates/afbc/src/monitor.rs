@@ -1,0 +1,276 @@
+//! Watches AFBC fly, and says when it is no longer to be trusted. Ours.
+//!
+//! | figure | of | trips beyond |
+//! |---|---|---|
+//! | \|Theta_hat\|, delta_hat | each subsystem | [`Bounds::theta`], [`Bounds::delta`] |
+//! | V_e = e_1^2/2 + e_2^2/2g, the part of (29) that can be computed, averaged over 1 s | each subsystem | [`Bounds::lyapunov`] |
+//! | share of steps with a saturated rotor, over 1 s | all | [`Bounds::saturation_share`] |
+//! | reversals of U1..U4 by more than [`Bounds::swing_n`], per second | each input | [`Bounds::swings_hz`] |
+//!
+//! The last is the limit-cycle detector: it counts turning points of the input that are further apart than a threshold,
+//! so it sees chatter from one step to the next and a slow oscillation alike, and neither noise nor manoeuvres.
+//!
+//! Norms and V_e are looked at for one subsystem a step, so each is at most six steps old.
+
+use crate::adaptive::{self, Estimate};
+use crate::cascade::Command;
+use crate::math;
+use crate::model::Model;
+use airframe::{Axis, OutOfRange, Parameters, PerAxis, Range};
+
+/// Accepted bounds on |Theta_hat|, delta_hat and V_e.
+pub const BOUND: Range = Range::new("monitor_bound", 0.0, 1e9);
+/// Accepted share of saturated steps.
+pub const SATURATION_SHARE: Range = Range::new("saturation_share", 0.01, 1.0);
+/// Accepted least size of a reversal \[N\].
+pub const SWING: Range = Range::new("swing_n", 1e-3, 1e4);
+/// Accepted rate of reversals \[1/s\].
+pub const SWINGS: Range = Range::new("swings_hz", 0.1, 1e4);
+
+/// Time over which figures are averaged \[s\].
+pub const WINDOW_S: f32 = 1.0;
+
+/// What the monitor lets pass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// |Theta_hat|, in the subsystem's input.
+    pub theta: PerAxis<f32>,
+    /// delta_hat, in the subsystem's input.
+    pub delta: PerAxis<f32>,
+    /// Mean V_e, with g that of hovering.
+    pub lyapunov: PerAxis<f32>,
+    /// Share of steps in which a rotor was at a limit, 0 to 1.
+    pub saturation_share: f32,
+    /// Least size of a reversal of an input that counts \[N\].
+    pub swing_n: f32,
+    /// Reversals of one input per second.
+    pub swings_hz: f32,
+}
+
+impl Bounds {
+    /// Bounds for a law with these gains on a vehicle like the paper's: estimates that lean on their projection, errors
+    /// far beyond any manoeuvre, a limit cycle of a tenth of the weight.
+    pub fn new(gains: &PerAxis<adaptive::Gains>, weight_n: f32) -> Self {
+        Bounds {
+            theta: PerAxis::from_fn(|axis| 0.95 * gains.get(axis).safeguards.theta_max),
+            // Projection holds delta_hat at its bound as a matter of course; beyond it there is none.
+            delta: PerAxis::from_fn(|axis| 1.001 * gains.get(axis).safeguards.delta_max),
+            lyapunov: PerAxis { roll: 0.5, pitch: 0.5, yaw: 10.0, z: 200.0, x: 1000.0, y: 1000.0 },
+            saturation_share: 0.9,
+            swing_n: 0.1 * weight_n,
+            swings_hz: 16.0,
+        }
+    }
+
+    /// Checks every bound.
+    ///
+    /// # Errors
+    /// The first one out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        for axis in Axis::ALL {
+            BOUND.check(*self.theta.get(axis))?;
+            BOUND.check(*self.delta.get(axis))?;
+            BOUND.check(*self.lyapunov.get(axis))?;
+        }
+        SATURATION_SHARE.check(self.saturation_share)?;
+        SWING.check(self.swing_n)?;
+        SWINGS.check(self.swings_hz)
+    }
+}
+
+/// Why the law is no longer trusted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trip {
+    /// |Theta_hat| passed its bound.
+    Theta(Axis),
+    /// delta_hat passed its bound.
+    Delta(Axis),
+    /// Errors stayed large.
+    Lyapunov(Axis),
+    /// Rotors stayed at their limits.
+    Saturation,
+    /// An input swings to and fro; z stands for the thrust.
+    LimitCycle(Axis),
+}
+
+impl Trip {
+    /// The reason in words, at most 50 characters.
+    pub const fn reason(self) -> &'static str {
+        match self {
+            Trip::Theta(Axis::Roll) => "AFBC off: Theta_hat of roll out of bounds",
+            Trip::Theta(Axis::Pitch) => "AFBC off: Theta_hat of pitch out of bounds",
+            Trip::Theta(Axis::Yaw) => "AFBC off: Theta_hat of yaw out of bounds",
+            Trip::Theta(Axis::Z) => "AFBC off: Theta_hat of z out of bounds",
+            Trip::Theta(Axis::X) => "AFBC off: Theta_hat of x out of bounds",
+            Trip::Theta(Axis::Y) => "AFBC off: Theta_hat of y out of bounds",
+            Trip::Delta(Axis::Roll) => "AFBC off: delta_hat of roll out of bounds",
+            Trip::Delta(Axis::Pitch) => "AFBC off: delta_hat of pitch out of bounds",
+            Trip::Delta(Axis::Yaw) => "AFBC off: delta_hat of yaw out of bounds",
+            Trip::Delta(Axis::Z) => "AFBC off: delta_hat of z out of bounds",
+            Trip::Delta(Axis::X) => "AFBC off: delta_hat of x out of bounds",
+            Trip::Delta(Axis::Y) => "AFBC off: delta_hat of y out of bounds",
+            Trip::Lyapunov(Axis::Roll) => "AFBC off: errors of roll stay large",
+            Trip::Lyapunov(Axis::Pitch) => "AFBC off: errors of pitch stay large",
+            Trip::Lyapunov(Axis::Yaw) => "AFBC off: errors of yaw stay large",
+            Trip::Lyapunov(Axis::Z) => "AFBC off: errors of z stay large",
+            Trip::Lyapunov(Axis::X) => "AFBC off: errors of x stay large",
+            Trip::Lyapunov(Axis::Y) => "AFBC off: errors of y stay large",
+            Trip::Saturation => "AFBC off: rotors stay saturated",
+            Trip::LimitCycle(Axis::Roll) => "AFBC off: limit cycle of U1 (roll)",
+            Trip::LimitCycle(Axis::Pitch) => "AFBC off: limit cycle of U2 (pitch)",
+            Trip::LimitCycle(Axis::Yaw) => "AFBC off: limit cycle of U3 (yaw)",
+            Trip::LimitCycle(_) => "AFBC off: limit cycle of U4 (thrust)",
+        }
+    }
+}
+
+/// How much one subsystem has learnt.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Norm {
+    /// |Theta_hat|^2
+    pub theta_squared: f32,
+    /// delta_hat
+    pub delta: f32,
+}
+
+/// Turning points of one input.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Swing {
+    /// The furthest point in the present direction \[N\].
+    extreme: f32,
+    /// The present direction: 1 or -1.
+    direction: f32,
+    /// Reversals per second, averaged over [`WINDOW_S`].
+    pub rate_hz: f32,
+}
+
+impl Default for Swing {
+    fn default() -> Self {
+        Swing { extreme: 0.0, direction: 1.0, rate_hz: 0.0 }
+    }
+}
+
+impl Swing {
+    #[inline]
+    fn advance(&mut self, input: f32, least: f32, forget: f32) {
+        self.rate_hz -= forget * self.rate_hz;
+        let onward = (input - self.extreme) * self.direction;
+        if onward > 0.0 {
+            self.extreme = input;
+        } else if onward < -least {
+            self.extreme = input;
+            self.direction = -self.direction;
+            self.rate_hz += 1.0 / WINDOW_S;
+        }
+    }
+}
+
+/// The figures as they stand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Figures {
+    /// Of the estimates.
+    pub norms: PerAxis<Norm>,
+    /// Mean V_e.
+    pub lyapunov: PerAxis<f32>,
+    /// Share of steps with a saturated rotor.
+    pub saturation_share: f32,
+    /// Of U1, U2, U3, U4.
+    pub swings: [Swing; 4],
+    /// Whose turn it was.
+    axis: Axis,
+}
+
+impl Default for Figures {
+    fn default() -> Self {
+        Figures {
+            norms: PerAxis::default(),
+            lyapunov: PerAxis::default(),
+            saturation_share: 0.0,
+            swings: [Swing::default(); 4],
+            axis: Axis::Y,
+        }
+    }
+}
+
+impl Figures {
+    /// The subsystem that was looked at last, and what it has learnt.
+    #[inline]
+    pub fn latest(&self) -> (Axis, Norm) {
+        (self.axis, *self.norms.get(self.axis))
+    }
+}
+
+/// A monitor: fixed from here on. What changes in flight is in [`Figures`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Monitor {
+    bounds: Bounds,
+    theta_squared: PerAxis<f32>,
+    /// 1/2g
+    half_inverse_gain: PerAxis<f32>,
+    /// Share of an average that one step replaces.
+    forget: f32,
+}
+
+impl Monitor {
+    /// A monitor that is called every `dt_s` seconds (valid in [`crate::cascade::DT`]).
+    ///
+    /// # Errors
+    /// The first bound or parameter out of range.
+    pub fn new(vehicle: &Parameters, bounds: Bounds, dt_s: f32) -> Result<Self, OutOfRange> {
+        vehicle.validate()?;
+        bounds.validate()?;
+        let model = Model::new(vehicle);
+        Ok(Monitor {
+            bounds,
+            theta_squared: PerAxis::from_fn(|axis| bounds.theta.get(axis) * bounds.theta.get(axis)),
+            half_inverse_gain: PerAxis::from_fn(|axis| 0.5 / model.hover_gain(axis)),
+            forget: 1.0 - math::exp(-dt_s / WINDOW_S),
+        })
+    }
+
+    /// Takes one step into account; tells what is wrong, if anything is.
+    #[inline]
+    pub fn watch(&self, figures: &mut Figures, estimates: &PerAxis<Estimate>, command: &Command) -> Option<Trip> {
+        let axis = figures.axis.next();
+        figures.axis = axis;
+
+        let estimate = estimates.get(axis);
+        let norm = Norm { theta_squared: estimate.theta.norm_squared(), delta: estimate.delta };
+        *figures.norms.get_mut(axis) = norm;
+
+        let errors = command.errors.get(axis);
+        let v = 0.5 * errors.e1 * errors.e1 + self.half_inverse_gain.get(axis) * errors.e2 * errors.e2;
+        let lyapunov = figures.lyapunov.get_mut(axis);
+        // Its turn comes every sixth step.
+        *lyapunov += 6.0 * self.forget * (v - *lyapunov);
+
+        let saturated = if command.health.saturated { 1.0 } else { 0.0 };
+        figures.saturation_share += self.forget * (saturated - figures.saturation_share);
+
+        let inputs = &command.inputs;
+        let [roll, pitch, yaw, thrust] = &mut figures.swings;
+        let Bounds { swing_n, swings_hz, .. } = self.bounds;
+        let cycles = |swing: &mut Swing, input| {
+            swing.advance(input, swing_n, self.forget);
+            swing.rate_hz > swings_hz
+        };
+        let cycles = [
+            (cycles(roll, inputs.roll_n), Axis::Roll),
+            (cycles(pitch, inputs.pitch_n), Axis::Pitch),
+            (cycles(yaw, inputs.yaw_n), Axis::Yaw),
+            (cycles(thrust, inputs.thrust_n), Axis::Z),
+        ];
+
+        if norm.theta_squared > *self.theta_squared.get(axis) {
+            Some(Trip::Theta(axis))
+        } else if norm.delta > *self.bounds.delta.get(axis) {
+            Some(Trip::Delta(axis))
+        } else if *lyapunov > *self.bounds.lyapunov.get(axis) {
+            Some(Trip::Lyapunov(axis))
+        } else if figures.saturation_share > self.bounds.saturation_share {
+            Some(Trip::Saturation)
+        } else {
+            cycles.iter().find(|(cycles, _)| *cycles).map(|(_, axis)| Trip::LimitCycle(*axis))
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! What keeps the estimates bounded and the robust term quiet. Ours: the printed law (33), (34) has none of it.
+//!
+//! With e = e_2 behind the dead zone and s = tanh(e_2/epsilon), (33) and (34) become
+//!
+//! ```text
+//! d Theta_hat/dt = gamma e w(x) - (sigma + kappa |e_2|) Theta_hat,   |Theta_hat| <= Theta_max
+//! d delta_hat/dt = eta e s      - (sigma + kappa |e_2|) delta_hat,   0 <= delta_hat <= delta_max
+//! ```
+//!
+//! * sigma > 0: sigma-modification, Ioannou and Kokotovic 1983. In V' (31) it adds
+//!   sigma/gamma Theta_tilde^T Theta_hat <= sigma/2gamma (|Theta*|^2 - |Theta_tilde|^2), the decay that (37) lacks.
+//! * kappa > 0: e-modification, Narendra and Annaswamy 1987. The same, but only while there is an error to learn from.
+//! * Theta_max, delta_max: projection, Pomet and Praly 1992. Never increases V as long as the optimum lies within.
+//! * Dead zone: no learning from errors that noise explains, Peterson and Narendra 1982.
+//! * Saturation: an estimate does not grow towards a limit that the rotors have reached already.
+//!
+//! `docs/flight.md` derives the bound that then really follows.
+
+use airframe::{OutOfRange, Range};
+
+/// Accepted sigma \[1/s\].
+pub const SIGMA: Range = Range::new("sigma", 0.0, 10.0);
+/// Accepted kappa, 1/s per unit of e_2.
+pub const KAPPA: Range = Range::new("kappa", 0.0, 100.0);
+/// Accepted bound on |Theta_hat|, in the subsystem's input.
+pub const THETA_MAX: Range = Range::new("theta_max", 0.0, 1e6);
+/// Accepted bound on delta_hat, in the subsystem's input.
+pub const DELTA_MAX: Range = Range::new("delta_max", 0.0, 1e6);
+/// Accepted dead zone \[m/s or rad/s\].
+pub const DEAD_ZONE: Range = Range::new("dead_zone", 0.0, 10.0);
+
+/// Safeguards of one subsystem's adaptation; each off at the value that [`Safeguards::NONE`] gives it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Safeguards {
+    /// sigma: leakage \[1/s\].
+    pub sigma: f32,
+    /// kappa: leakage that grows with the error \[1/s per m/s or rad/s\].
+    pub kappa: f32,
+    /// Bound on |Theta_hat|, in the subsystem's input.
+    pub theta_max: f32,
+    /// Bound on delta_hat, in the subsystem's input.
+    pub delta_max: f32,
+    /// |e_2| up to which nothing is learnt \[m/s or rad/s\].
+    pub dead_zone: f32,
+    /// Whether an estimate stops growing towards a limit that has been reached.
+    pub heed_saturation: bool,
+}
+
+impl Safeguards {
+    /// The law as printed.
+    pub const NONE: Self =
+        Safeguards { sigma: 0.0, kappa: 0.0, theta_max: 1e6, delta_max: 1e6, dead_zone: 0.0, heed_saturation: false };
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first one out of range.
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        SIGMA.check(self.sigma)?;
+        KAPPA.check(self.kappa)?;
+        THETA_MAX.check(self.theta_max)?;
+        DELTA_MAX.check(self.delta_max)?;
+        DEAD_ZONE.check(self.dead_zone)
+    }
+
+    /// e: what there is to learn from e_2, when `unallocated` of the input that was wanted could not be given.
+    #[inline]
+    pub(crate) fn lesson(&self, e2: f32, unallocated: f32) -> f32 {
+        if self.heed_saturation && e2 * unallocated > 0.0 {
+            0.0
+        } else if e2 > self.dead_zone {
+            e2 - self.dead_zone
+        } else if e2 < -self.dead_zone {
+            e2 + self.dead_zone
+        } else {
+            0.0
+        }
+    }
+
+    /// sigma + kappa |e_2| \[1/s\].
+    #[inline]
+    pub(crate) fn leakage(&self, e2: f32) -> f32 {
+        self.sigma + self.kappa * e2.abs()
+    }
+}
