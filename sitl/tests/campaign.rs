@@ -122,7 +122,9 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
     {
         let place = Folder::open(&path, Manifest::new(&campaign, Shard::WHOLE)).unwrap();
         assert!(!unfinished.exists());
-        let first = |flights| drop(resumed.compare_exchange(u64::MAX, flights, Ordering::Relaxed, Ordering::Relaxed));
+        let first = |flights| {
+            let _ = resumed.compare_exchange(u64::MAX, flights, Ordering::Relaxed, Ordering::Relaxed);
+        };
         campaign::fly(&campaign, &place, &AtomicBool::new(false), &first).unwrap().unwrap();
     }
     assert_eq!(resumed.into_inner(), 32, "the whole chunk is not flown again");
@@ -195,7 +197,7 @@ fn a_flight_flown_again_gives_the_figures_of_its_row() {
     let campaign = small();
     let manifest = Manifest::new(&campaign, Shard::WHOLE);
     let mut lost = 0;
-    for flight in [0, 1, 42, 149] {
+    for flight in 0..30 {
         let scenario = campaign.flight(flight).unwrap();
         for (row, contender) in campaign.rows(flight).unwrap().iter().zip(&scenario.contenders) {
             let Run { metrics, lost: end, .. } = Run::fly(&scenario, contender, 10).unwrap();
@@ -211,7 +213,7 @@ fn a_flight_flown_again_gives_the_figures_of_its_row() {
             lost += u32::from(end.is_some());
         }
     }
-    assert!((1..8).contains(&lost), "{lost} lost: a test of both kinds");
+    assert!((1..60).contains(&lost), "{lost} lost: a test of both kinds");
 }
 
 /// Every row of `SMALL`'s first flights.
@@ -283,7 +285,7 @@ fn sitl(folder: &Path, arguments: &[&str]) -> Output {
 
 /// What goes wrong: the line and key, and what is said.
 const BAD: [(&str, &str, &str); 14] = [
-    ("flights = 150", "flights = 0", ":3: flights: 0 is out of range: it must lie within 1 to 10000000"),
+    ("flights = 150", "flights = 0", ":3: flights: 0 is out of range: it must lie within 1 to 1e7"),
     ("flights = 150", "flights = 1.5", ":3: flights: 1.5 is not a whole number"),
     ("flights = 150", "flight = 150", ":3: flight: unknown key; did you mean flights?"),
     ("seed = 7", "seed = -1", ":4: seed: -1 is out of range"),

@@ -1,10 +1,10 @@
 //! Campaign files. The format is described, key by key, in `docs/campaigns.md`.
 
 use super::{Campaign, Course, QUANTITIES, Quantity, Spread};
-use crate::scenario::file::{self, DURATION};
+use crate::scenario::file;
 use crate::scenario::reader::Table;
 use crate::scenario::words::out_of_range;
-use crate::scenario::{FileError, Scenario, built_in, similar_built_in};
+use crate::scenario::{DURATION, FileError, Scenario, built_in, similar_built_in};
 use airframe::Range;
 use std::path::{Path, PathBuf};
 
@@ -29,9 +29,9 @@ pub fn load(path: &Path) -> Result<Campaign, FileError> {
 /// # Errors
 /// One line on the first thing that is wrong.
 pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campaign, FileError> {
-    file::document(file, text, "campaign", |mut root| {
-        let (name, description) = file::title(&mut root, name)?;
-        let flights = root.need_whole(&FLIGHTS)?;
+    file::document(file, text, "campaigns robustness", |mut root| {
+        let [name, description] = file::title(&mut root, name)?;
+        let flights = root.whole(&FLIGHTS)?.ok_or_else(|| root.missing(FLIGHTS.name, "say how many to fly"))?;
         let seed = root.whole(&SEED)?.unwrap_or(1);
         let duration_s = root.number(&DURATION)?;
         let mut scenario = scenario(&mut root, folder)?;

@@ -23,7 +23,7 @@ pub use error::Error;
 pub use file::{load, parse};
 pub use fly::{fly, merge};
 pub use folder::Folder;
-pub use manifest::{Manifest, Shard};
+pub use manifest::{Drawn, Manifest, Shard};
 pub use quantity::{QUANTITIES, Quantity};
 pub use row::{Column, FIGURES, Figure, Row};
 pub use summary::{BINS, Bad, Count, Summary, Tally};

@@ -1,11 +1,11 @@
 //! What is kept of one flight of one contender.
 
-use super::{Campaign, Manifest};
+use super::Campaign;
 use crate::contender::Contender;
-use crate::flight::{Lost, Sample, fly};
-use crate::metrics::{Accumulator, Metrics, SETTLED_S};
+use crate::flight::{Lost, fly};
+use crate::metrics::{Accumulator, Metrics, is_settled, tracking_error};
+use crate::scenario::Scenario;
 use airframe::OutOfRange;
-use plant::Motion;
 
 /// One flight of one contender: a row of the results.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +65,7 @@ const fn figure(name: &'static str, meaning: &'static str, value: fn(&Outcome) -
     Figure { name, meaning, value }
 }
 
-/// Every figure of merit, in the order of the columns. Errors count from [`SETTLED_S`] on.
+/// Every figure of merit, in the order of the columns. Errors count from [`SETTLED_S`](crate::metrics::SETTLED_S) on.
 pub static FIGURES: [Figure; 16] = [
     figure("lost_at_s", "when the vehicle was lost", |o| o.lost.map(|lost| lost.time_s)),
     figure("rmse_x_m", "root mean square error along x", |o| o.measured(o.metrics.rmse.x)),

@@ -3,6 +3,7 @@
 //! [`write()`] fills a folder; [`table()`] is for the terminal. The same flights give the same bytes: nothing here knows the
 //! time of day or the machine.
 
+pub mod campaign;
 mod csv;
 mod error;
 mod figures;

@@ -3,14 +3,13 @@
 use super::{HEADS, LEGEND, bad, cells};
 use crate::campaign::Summary;
 use crate::output::figures::Figure;
-use crate::output::report::{capitalised, picture, sheet};
+use crate::output::report::{picture, sheet};
 use maud::{Markup, html};
 
 pub(super) fn page(summary: &Summary, figures: &[Figure]) -> String {
     let manifest = &summary.manifest;
     let title = if manifest.description.is_empty() { &manifest.name } else { &manifest.description };
-    sheet(title, html! {
-        h1 { (capitalised(title)) }
+    sheet(title, &html! {
         p.quiet {
             (manifest.flights) " flights under each of " (manifest.contenders.len())
             " contenders, all with the same draws (seed " (manifest.seed) "). Every row is in results.parquet."

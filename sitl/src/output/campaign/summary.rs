@@ -66,21 +66,22 @@ impl From<&Vec<f64>> for Percentiles {
     }
 }
 
+fn contender<'a>(manifest: &'a Manifest, tally: &'a Tally) -> Contender<'a> {
+    let names = manifest.trajectories.iter().map(String::as_str);
+    Contender {
+        name: &tally.contender,
+        all: (&tally.count).into(),
+        by_trajectory: names.zip(tally.by_trajectory.iter().map(Success::from)).collect(),
+        rmse_position_m: (&tally.rmse_position_m).into(),
+        max_position_m: (&tally.max_position_m).into(),
+        mean_abs_du4_n: (&tally.mean_abs_du4_n).into(),
+        saturated_ratio: (&tally.saturated_ratio).into(),
+        worst_flights: tally.worst.iter().map(|bad| bad.flight).collect(),
+    }
+}
+
 pub(super) fn write(out: &mut dyn Write, summary: &Summary) -> io::Result<()> {
-    let names = summary.manifest.trajectories.iter().map(String::as_str);
-    let contender = |tally| {
-        let Tally { contender, count, by_trajectory, worst, .. } = tally;
-        Contender {
-            name: contender,
-            all: count.into(),
-            by_trajectory: names.clone().zip(by_trajectory.iter().map(Success::from)).collect(),
-            rmse_position_m: (&tally.rmse_position_m).into(),
-            max_position_m: (&tally.max_position_m).into(),
-            mean_abs_du4_n: (&tally.mean_abs_du4_n).into(),
-            saturated_ratio: (&tally.saturated_ratio).into(),
-            worst_flights: worst.iter().map(|bad| bad.flight).collect(),
-        }
-    };
+    let contender = |tally| contender(&summary.manifest, tally);
     let page = Page { campaign: &summary.manifest, contenders: summary.tallies.iter().map(contender).collect() };
     serde_json::to_writer_pretty(&mut *out, &page)?;
     writeln!(out)

@@ -2,7 +2,7 @@
 
 use super::canvas::{self, Area, FRAME, Failure, GREY, GRID, Ink, WIDTH_PX, text, units};
 use super::time_chart::{decimals, number};
-use super::{Figure, LAWS};
+use super::{Figure, color};
 use crate::campaign::statistics::percentile;
 use crate::campaign::{BINS, Count, Drawn, Summary, Tally};
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
@@ -58,7 +58,7 @@ fn is_spread(drawn: &Drawn) -> bool {
 }
 
 fn inks() -> impl Iterator<Item = Ink> {
-    LAWS.iter().cycle().map(|&color| Ink { color, width_px: LINE_PX })
+    (0..).map(|index| Ink { color: color(index), width_px: LINE_PX })
 }
 
 fn legend(summary: &Summary) -> Vec<(String, Ink)> {
@@ -85,14 +85,15 @@ fn distribution(
     let range = if low < high { 0.9 * low..1.1 * high } else { 1e-3..1.0 };
 
     let legend = legend(summary);
-    canvas::svg(WIDE_PX + 84.0, title, |area| {
-        let top_px = canvas::head(area, title, conditions, &legend)?;
+    let top_px = canvas::head_px(&legend);
+    canvas::svg(top_px + WIDE_PX, title, |area| {
+        canvas::head(area, title, conditions, &legend)?;
         let area = area.clone().shrink((0, units(top_px)), (units(WIDTH_PX - MARGIN_PX), units(WIDE_PX)));
         let mut chart = ChartBuilder::on(&area)
             .set_label_area_size(LabelAreaPosition::Left, units(LEFT_PX))
             .set_label_area_size(LabelAreaPosition::Bottom, units(BOTTOM_PX))
             .margin_top(units(6.0))
-            .build_cartesian_2d(range.clone().log_scale(), 0.0..100.0)?;
+            .build_cartesian_2d(range.clone().log_scale(), 0.0..100.0_f64)?;
         mesh(&mut chart, label, "flights [%]", 12, &|x| logarithmic(*x))?;
         for (tally, ink) in summary.tallies.iter().zip(inks()) {
             let values = values(tally);
@@ -114,7 +115,7 @@ fn success(summary: &Summary, conditions: &str) -> io::Result<String> {
     let title = "Success";
     let panels: Vec<_> = summary.manifest.drawn.iter().enumerate().filter(|(_, drawn)| is_spread(drawn)).collect();
     let rows = panels.len().div_ceil(2);
-    let head_px = 54.0 + 18.0 * (legend.len().saturating_sub(1) / 4) as f64;
+    let head_px = canvas::head_px(&legend);
     canvas::svg(head_px + rows as f64 * PANEL_PX + 8.0, title, |area| {
         canvas::head(area, title, conditions, &legend)?;
         let width_px = (WIDTH_PX - MARGIN_PX) / 2.0;
@@ -133,7 +134,7 @@ fn success_panel(area: &Area, summary: &Summary, index: usize, drawn: &Drawn) ->
         .set_label_area_size(LabelAreaPosition::Left, units(LEFT_PX))
         .set_label_area_size(LabelAreaPosition::Bottom, units(BOTTOM_PX))
         .margin_top(units(6.0))
-        .build_cartesian_2d(low..high, 0.0..100.0)?;
+        .build_cartesian_2d(low..high, 0.0..100.0_f64)?;
     let digits = decimals((high - low) / 5.0);
     mesh(&mut chart, &drawn.name, "not lost [%]", 6, &|x| number(*x, digits))?;
     for (tally, ink) in summary.tallies.iter().zip(inks()) {
