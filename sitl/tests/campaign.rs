@@ -1,6 +1,6 @@
 //! Campaigns: that their results are the same however they came about, and that nothing that was flown is lost.
 
-#![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
 
 use sitl::campaign::{self, Campaign, Folder, Manifest, Row, Shard, built_in};
 use sitl::run::Run;
@@ -289,7 +289,11 @@ const BAD: [(&str, &str, &str); 14] = [
     ("flights = 150", "flights = 1.5", ":3: flights: 1.5 is not a whole number"),
     ("flights = 150", "flight = 150", ":3: flight: unknown key; did you mean flights?"),
     ("seed = 7", "seed = -1", ":4: seed: -1 is out of range"),
-    ("scenario = \"hover\"", "scenario = \"hovr\"", ":6: scenario: \"hovr\" is no built-in scenario; did you mean \"hover\"?"),
+    (
+        "scenario = \"hover\"",
+        "scenario = \"hovr\"",
+        ":6: scenario: \"hovr\" is no built-in scenario; did you mean \"hover\"?",
+    ),
     ("scenario = \"hover\"", "", ": scenario: missing; "),
     ("scenario = \"hover\"", "scenario = \"none.toml\"", "none.toml: no such file"),
     ("\"circle\"]", "\"hover\"]", ":7: trajectories: \"hover\" is listed twice"),
@@ -359,7 +363,9 @@ fn a_killed_program_loses_nothing_that_was_finished() {
     let again = sitl(&folder, &["campaign", "small.toml"]);
     assert_eq!(again.status.code(), Some(0));
     assert_eq!(again.stdout, String::from_utf8(whole.stdout).unwrap().replace("whole/", "out/small/").into_bytes());
-    for file in ["results.parquet", "summary.json", "report.html", "position-error.svg", "smoothness.svg", "success.svg"] {
+    for file in
+        ["results.parquet", "summary.json", "report.html", "position-error.svg", "smoothness.svg", "success.svg"]
+    {
         assert_eq!(fs::read(out.join(file)).unwrap(), fs::read(folder.join("whole").join(file)).unwrap(), "{file}");
     }
     assert!(!out.join("chunks").exists());
@@ -387,4 +393,41 @@ fn built_in_campaigns_are_listed_and_templates() {
         campaign.rows(0).unwrap();
     }
     assert_eq!(built_in("robustness").unwrap().campaign().unwrap().flights, 10_000);
+}
+
+const PAGE: &str = include_str!("../../docs/campaigns.md");
+
+#[test]
+fn every_quantity_and_column_is_documented() {
+    for quantity in &campaign::QUANTITIES {
+        let range = quantity.range;
+        let row = PAGE.lines().find(|line| line.starts_with("| `") && line.contains(&format!("`{}`", range.name)));
+        let cells: Vec<_> = row.unwrap_or_else(|| panic!("{}", range.name)).split(" | ").collect();
+        let number = |text: &str| text.parse::<f64>().unwrap();
+        let (min, max) = cells[1].split_once(" to ").unwrap();
+        assert!((number(min) - range.min).abs() < 1e-4 && (number(max) - range.max).abs() < 1e-4, "{}", range.name);
+        if let Some(needed) = quantity.needs {
+            assert!(cells[2].contains(&format!("`{needed}`")), "{}", range.name);
+        }
+    }
+    for figure in &campaign::FIGURES {
+        assert!(
+            PAGE.contains(&format!("`{}`", figure.name)) || figure.name.starts_with("mean_abs_du"),
+            "{}",
+            figure.name
+        );
+    }
+}
+
+#[test]
+fn the_documented_file_is_a_campaign() {
+    let example = PAGE.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    let campaign = campaign::parse("example", example, "example", Path::new("")).unwrap();
+    assert_eq!(campaign.flights, 10_000);
+    // Whatever is listed as a key is in it.
+    for line in PAGE.lines().take_while(|line| !line.starts_with("## What is drawn")) {
+        if let Some(key) = line.strip_prefix("| `").and_then(|line| line.split('`').next()) {
+            assert!(example.contains(&format!("{key} = ")), "{key}");
+        }
+    }
 }

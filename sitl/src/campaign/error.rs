@@ -55,7 +55,11 @@ impl fmt::Display for Error {
                 path.display()
             ),
             Error::Busy(path) => {
-                write!(f, "{}: another campaign is being flown into it; wait, or choose another with --out", path.display())
+                write!(
+                    f,
+                    "{}: another campaign is being flown into it; wait, or choose another with --out",
+                    path.display()
+                )
             }
             Error::Unfinished(path) => write!(
                 f,
@@ -73,7 +77,11 @@ impl fmt::Display for Error {
             }
             Error::Missing(shards) => {
                 let names: Vec<_> = shards.iter().take(8).map(Shard::to_string).collect();
-                let more = if shards.len() > names.len() { format!(" and {} more", shards.len() - names.len()) } else { String::new() };
+                let more = if shards.len() > names.len() {
+                    format!(" and {} more", shards.len() - names.len())
+                } else {
+                    String::new()
+                };
                 write!(f, "shard {}{more} missing; fly it, or name its folder too", names.join(", "))
             }
             Error::Output(error) => error.fmt(f),

@@ -6,9 +6,9 @@
 use super::parquet::{Reader, Writer};
 use super::{Error, Manifest, Row};
 use crate::output::Folder as Place;
+use std::fmt;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
-use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// Flights of one chunk: seconds of work for one core.

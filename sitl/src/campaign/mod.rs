@@ -16,7 +16,6 @@ mod row;
 pub mod statistics;
 mod summary;
 
-
 pub use built_in::{BUILT_IN, BuiltIn, built_in};
 pub use draw::Draw;
 pub use error::Error;

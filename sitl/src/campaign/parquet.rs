@@ -20,13 +20,14 @@ const GROUP_ROWS: usize = 1 << 16;
 /// Name under which a file carries its manifest.
 const MANIFEST: &str = "campaign";
 /// Columns before those of numbers, with what is in them.
-const LABELS: [(&str, &str); 6] = [
+const LABELS: [(&str, &str); 7] = [
     ("flight", "index of the flight, from 0 on; `sitl campaign FILE --flight` flies it again"),
     ("seed", "seed of the flight's noise and weather"),
     ("contender", "the controller"),
     ("trajectory", "name of the scenario that the reference is from"),
     ("lost", "whether the vehicle was lost"),
     ("lost_reason", "why"),
+    ("trip_reason", "why the contender's own monitor took another law, if it did"),
 ];
 
 fn schema(manifest: &Manifest) -> Result<Arc<Type>> {
@@ -36,12 +37,11 @@ fn schema(manifest: &Manifest) -> Result<Arc<Type>> {
             "lost" => (Physical::BOOLEAN, None),
             _ => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
         };
-        let repetition = if *name == "lost_reason" { Repetition::OPTIONAL } else { Repetition::REQUIRED };
+        let repetition = if name.ends_with("_reason") { Repetition::OPTIONAL } else { Repetition::REQUIRED };
         Type::primitive_type_builder(name, physical).with_logical_type(logical).with_repetition(repetition).build()
     };
-    let number = |name: &str| {
-        Type::primitive_type_builder(name, Physical::DOUBLE).with_repetition(Repetition::OPTIONAL).build()
-    };
+    let number =
+        |name: &str| Type::primitive_type_builder(name, Physical::DOUBLE).with_repetition(Repetition::OPTIONAL).build();
     let labels = LABELS.iter().map(label);
     let columns = manifest.columns();
     let fields = labels.chain(columns.iter().map(|column| number(&column.name)));
@@ -99,6 +99,7 @@ impl<W: Write + Send> Writer<W> {
         put::<ByteArrayType>(&mut group, rows.iter().map(|row| Some(text(&row.trajectory))))?;
         put::<BoolType>(&mut group, rows.iter().map(|row| Some(row.lost_reason.is_some())))?;
         put::<ByteArrayType>(&mut group, rows.iter().map(|row| row.lost_reason.as_ref().map(text)))?;
+        put::<ByteArrayType>(&mut group, rows.iter().map(|row| row.trip_reason.as_ref().map(text)))?;
         for column in 0..first.numbers.len() {
             put::<DoubleType>(&mut group, rows.iter().map(|row| row.numbers.get(column).copied().flatten()))?;
         }
@@ -159,7 +160,8 @@ impl Reader {
         let mut seeds = take::<Int64Type>(group, 1)?.into_iter();
         let mut contenders = take::<ByteArrayType>(group, 2)?.into_iter();
         let mut trajectories = take::<ByteArrayType>(group, 3)?.into_iter();
-        let mut reasons = take::<ByteArrayType>(group, 5)?.into_iter();
+        let mut losses = take::<ByteArrayType>(group, 5)?.into_iter();
+        let mut trips = take::<ByteArrayType>(group, 6)?.into_iter();
         let numbers = (0..columns).map(|column| Ok(take::<DoubleType>(group, LABELS.len() + column)?.into_iter()));
         let mut numbers = numbers.collect::<Result<Vec<_>>>()?;
         let row = |flight: Option<i64>| {
@@ -168,7 +170,8 @@ impl Reader {
                 seed: seeds.next().flatten().ok_or_else(shape)?.cast_unsigned(),
                 contender: text(contenders.next().flatten().ok_or_else(shape)?)?,
                 trajectory: text(trajectories.next().flatten().ok_or_else(shape)?)?,
-                lost_reason: reasons.next().flatten().map(text).transpose()?,
+                lost_reason: losses.next().flatten().map(text).transpose()?,
+                trip_reason: trips.next().flatten().map(text).transpose()?,
                 numbers: numbers.iter_mut().map(|column| column.next().flatten()).collect(),
             })
         };

@@ -48,7 +48,13 @@ pub(super) fn apply<'a>(
     Ok(scenario)
 }
 
-const fn quantity(name: &'static str, min: f64, max: f64, meaning: &'static str, apply: fn(&mut Flight, f64)) -> Quantity {
+const fn quantity(
+    name: &'static str,
+    min: f64,
+    max: f64,
+    meaning: &'static str,
+    apply: fn(&mut Flight, f64),
+) -> Quantity {
     Quantity { range: Range::new(name, min, max), meaning, whole: false, needs: None, apply }
 }
 
@@ -74,12 +80,15 @@ pub static QUANTITIES: [Quantity; 23] = [
     quantity("rotor_efficiency", 0.0, 1.0, "share of its thrust that a failing rotor keeps", |f, efficiency| {
         f.scenario.realism.rotors.faults.push(RotorFault { rotor: 1, efficiency, start_s: 0.0 });
     }),
-    needing("rotor_efficiency", Quantity {
-        whole: true,
-        ..quantity("fault_rotor", 1.0, 4.0, "which rotor fails; without it, the first", |f, x| {
-            f.scenario.realism.rotors.faults.last_mut().into_iter().for_each(|fault| fault.rotor = x as u8);
-        })
-    }),
+    needing(
+        "rotor_efficiency",
+        Quantity {
+            whole: true,
+            ..quantity("fault_rotor", 1.0, 4.0, "which rotor fails; without it, the first", |f, x| {
+                f.scenario.realism.rotors.faults.last_mut().into_iter().for_each(|fault| fault.rotor = x as u8);
+            })
+        },
+    ),
     needing(
         "rotor_efficiency",
         quantity("fault_start_s", 0.0, 36_000.0, "when it fails; without it, at once", |f, x| {
@@ -91,9 +100,15 @@ pub static QUANTITIES: [Quantity; 23] = [
     }),
     needing(
         "payload_kg",
-        quantity("payload_below_m", -10.0, 10.0, "where it hangs below the centre of mass; without it, there", |f, x| {
-            f.payload.iter_mut().for_each(|payload| payload.below_m = x);
-        }),
+        quantity(
+            "payload_below_m",
+            -10.0,
+            10.0,
+            "where it hangs below the centre of mass; without it, there",
+            |f, x| {
+                f.payload.iter_mut().for_each(|payload| payload.below_m = x);
+            },
+        ),
     ),
     needing(
         "payload_kg",
@@ -129,13 +144,25 @@ pub static QUANTITIES: [Quantity; 23] = [
     }),
     needing(
         "dropout_rate_hz",
-        quantity("dropout_mean_s", 0.0, 60.0, "how long, on average; without it, as in the scenario, or 0.02", |f, x| {
-            f.scenario.sensing.dropouts.iter_mut().for_each(|dropouts| dropouts.mean_s = x);
-        }),
+        quantity(
+            "dropout_mean_s",
+            0.0,
+            60.0,
+            "how long, on average; without it, as in the scenario, or 0.02",
+            |f, x| {
+                f.scenario.sensing.dropouts.iter_mut().for_each(|dropouts| dropouts.mean_s = x);
+            },
+        ),
     ),
-    quantity("start_x_m", -100.0, 100.0, "start off the scenario's, along x", |f, x| f.scenario.initial.position_m.x += x),
-    quantity("start_y_m", -100.0, 100.0, "start off the scenario's, along y", |f, x| f.scenario.initial.position_m.y += x),
-    quantity("start_z_m", -100.0, 100.0, "start off the scenario's, along z", |f, x| f.scenario.initial.position_m.z += x),
+    quantity("start_x_m", -100.0, 100.0, "start off the scenario's, along x", |f, x| {
+        f.scenario.initial.position_m.x += x
+    }),
+    quantity("start_y_m", -100.0, 100.0, "start off the scenario's, along y", |f, x| {
+        f.scenario.initial.position_m.y += x
+    }),
+    quantity("start_z_m", -100.0, 100.0, "start off the scenario's, along z", |f, x| {
+        f.scenario.initial.position_m.z += x
+    }),
 ];
 
 fn scale(spread: &mut Spread, ratio: f64) {

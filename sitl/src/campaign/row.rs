@@ -5,6 +5,7 @@ use crate::contender::Contender;
 use crate::flight::{Lost, fly};
 use crate::metrics::{Accumulator, Metrics, is_settled, tracking_error};
 use crate::scenario::Scenario;
+use afbc::monitor::Trip;
 use airframe::OutOfRange;
 
 /// One flight of one contender: a row of the results.
@@ -20,6 +21,8 @@ pub struct Row {
     pub trajectory: String,
     /// Why the vehicle was lost, if it was.
     pub lost_reason: Option<String>,
+    /// Why the contender's own monitor took another law, if it did.
+    pub trip_reason: Option<String>,
     /// What was drawn, then what [`FIGURES`] lists; nothing where there was nothing to measure.
     pub numbers: Vec<Option<f64>>,
 }
@@ -46,6 +49,8 @@ pub struct Figure {
 #[derive(Clone, Debug, Default)]
 struct Outcome {
     lost: Option<Lost>,
+    /// When and why the contender's monitor tripped, if it did.
+    trip: Option<(f64, Trip)>,
     metrics: Metrics,
     /// Whether errors have counted at all.
     settled: bool,
@@ -66,8 +71,9 @@ const fn figure(name: &'static str, meaning: &'static str, value: fn(&Outcome) -
 }
 
 /// Every figure of merit, in the order of the columns. Errors count from [`SETTLED_S`](crate::metrics::SETTLED_S) on.
-pub static FIGURES: [Figure; 16] = [
+pub static FIGURES: [Figure; 17] = [
     figure("lost_at_s", "when the vehicle was lost", |o| o.lost.map(|lost| lost.time_s)),
+    figure("tripped_at_s", "when the monitor took another law", |o| o.trip.map(|(time_s, _)| time_s)),
     figure("rmse_x_m", "root mean square error along x", |o| o.measured(o.metrics.rmse.x)),
     figure("rmse_y_m", "root mean square error along y", |o| o.measured(o.metrics.rmse.y)),
     figure("rmse_z_m", "root mean square error along z", |o| o.measured(o.metrics.rmse.z)),
@@ -107,6 +113,7 @@ impl Campaign {
                 contender: contender.name.clone(),
                 trajectory: trajectory.into(),
                 lost_reason: outcome.lost.map(|lost| lost.reason.into()),
+                trip_reason: outcome.trip.map(|(_, trip)| trip.reason().into()),
                 numbers: draw.values.iter().copied().map(Some).chain(figures).collect(),
             })
         };
@@ -122,7 +129,9 @@ impl Outcome {
         outcome.lost = fly(scenario, contender, |sample| {
             metrics.add(sample);
             outcome.steps += 1;
-            outcome.saturated += u64::from(sample.command.health.saturated);
+            let health = &sample.command.health;
+            outcome.saturated += u64::from(health.saturated);
+            outcome.trip = outcome.trip.or(health.trip.map(|trip| (sample.time_s, trip)));
             if is_settled(sample.time_s) {
                 outcome.settled = true;
                 outcome.max_position_m = outcome.max_position_m.max(tracking_error(sample).xyz().norm());

@@ -59,6 +59,8 @@ pub struct Tally {
     pub contender: String,
     /// All of its flights.
     pub count: Count,
+    /// Flights in which its own monitor took another law.
+    pub tripped: u64,
     /// Apart for each trajectory, in the campaign's order.
     pub by_trajectory: Vec<Count>,
     /// For each drawn quantity, apart for [`BINS`] equal parts of its interval.
@@ -90,6 +92,7 @@ impl Summary {
         let tally = |contender: &String| Tally {
             contender: contender.clone(),
             count: Count::default(),
+            tripped: 0,
             by_trajectory: vec![Count::default(); manifest.trajectories.len()],
             by_draw: vec![[Count::default(); BINS]; manifest.drawn.len()],
             rmse_position_m: Vec::new(),
@@ -108,6 +111,7 @@ impl Summary {
         let number = |name| manifest.number(row, name);
         let kept = row.lost_reason.is_none();
         tally.count.add(kept);
+        tally.tripped += u64::from(row.trip_reason.is_some());
         let along = manifest.trajectories.iter().position(|name| *name == row.trajectory);
         if let Some(count) = along.and_then(|along| tally.by_trajectory.get_mut(along)) {
             count.add(kept);

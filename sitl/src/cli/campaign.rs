@@ -57,9 +57,12 @@ impl Campaign {
         }
         let shard = self.shard.unwrap_or(Shard::WHOLE);
         if shard.of > plan.flights {
-            return Err(format!("--shard {shard}: there are only {} flights; cut them into fewer parts", plan.flights).into());
+            return Err(
+                format!("--shard {shard}: there are only {} flights; cut them into fewer parts", plan.flights).into()
+            );
         }
-        let name = if shard.of > 1 { format!("{}-{}-of-{}", plan.name, shard.index, shard.of) } else { plan.name.clone() };
+        let name =
+            if shard.of > 1 { format!("{}-{}-of-{}", plan.name, shard.index, shard.of) } else { plan.name.clone() };
         let out = self.out.unwrap_or_else(|| Path::new("out").join(name));
         let folder = Folder::open(&out, Manifest::new(&plan, shard))?;
 
@@ -82,7 +85,9 @@ impl Campaign {
     /// One flight, with all that can be shown of it.
     fn fly_again(self, plan: &Plan, flight: u64) -> Result<ExitCode, Failure> {
         if flight >= plan.flights {
-            return Err(format!("--flight {flight}: the campaign has flights 0 to {}; choose one", plan.flights - 1).into());
+            return Err(
+                format!("--flight {flight}: the campaign has flights 0 to {}; choose one", plan.flights - 1).into()
+            );
         }
         let mut scenario = plan.flight(flight)?;
         scenario.name = format!("{}-{flight}", plan.name);

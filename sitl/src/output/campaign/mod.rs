@@ -7,8 +7,8 @@ mod table;
 pub use table::table;
 
 use super::{Error, Folder, figures};
-use crate::campaign::{Bad, Summary, Tally};
 use crate::campaign::statistics::{Share, percentile};
+use crate::campaign::{Bad, Summary, Tally};
 use std::path::{Path, PathBuf};
 
 /// Writes everything about a campaign but its rows into the folder `dir`, and returns the paths written:
@@ -42,7 +42,7 @@ const HEADS: [(&str, &[&str]); 5] = [
     ("RMS distance [m]", &["median", "90 %", "99 %"]),
     ("largest [m]", &["median", "99 %"]),
     ("|ΔU₄| [mN]", &["median"]),
-    ("at limit", &["median"]),
+    ("fell back", &["of all"]),
 ];
 
 /// One line of the table: as many cells as [`HEADS`] has columns.
@@ -54,21 +54,23 @@ fn cells(tally: &Tally) -> Vec<String> {
         Some(_) => "lost".into(),
     };
     let percent = |share: f64| 100.0 * share;
-    let mut cells = vec![
-        format!("{:.2} %", percent(value)),
-        format!("{:.2} to {:.2}", percent(low), percent(high)),
-    ];
+    let mut cells = vec![format!("{:.2} %", percent(value)), format!("{:.2} to {:.2}", percent(low), percent(high))];
     cells.extend(PERCENTS.map(|percent| at(&tally.rmse_position_m, percent, 1.0, 3)));
     cells.extend([50.0, 99.0].map(|percent| at(&tally.max_position_m, percent, 1.0, 3)));
     cells.push(at(&tally.mean_abs_du4_n, 50.0, 1000.0, 1));
-    cells.push(at(&tally.saturated_ratio, 50.0, 100.0, 2) + " %");
+    cells.push(format!("{:.2} %", percent(tally.tripped as f64 / tally.count.flights as f64)));
     cells
+}
+
+/// How many flights each contender has made: of a shard, fewer than of the campaign.
+fn flights(summary: &Summary) -> u64 {
+    summary.tallies.first().map_or(0, |tally| tally.count.flights)
 }
 
 /// What the columns mean, in few sentences.
 const LEGEND: &str = "Distances from the reference count from 5 s to the end. A lost flight is worse than any other: where a \
-    percentile is one, it says so. |ΔU₄|: mean jump of the thrust command from one control step to the next; at limit: \
-    share of steps with a rotor at its limit; both of flights that were not lost. Percentiles are nearest ranks, intervals \
+    percentile is one, it says so. |ΔU₄|: mean jump of the thrust command from one control step to the next, of flights that \
+    were not lost. Fell back: the contender's own monitor took another law. Percentiles are nearest ranks, intervals \
     Wilson's.";
 
 /// How a bad flight went, and how to see it again.

@@ -1,6 +1,6 @@
 //! A campaign on one page.
 
-use super::{HEADS, LEGEND, bad, cells};
+use super::{HEADS, LEGEND, bad, cells, flights};
 use crate::campaign::Summary;
 use crate::output::figures::Figure;
 use crate::output::report::{picture, sheet};
@@ -9,22 +9,25 @@ use maud::{Markup, html};
 pub(super) fn page(summary: &Summary, figures: &[Figure]) -> String {
     let manifest = &summary.manifest;
     let title = if manifest.description.is_empty() { &manifest.name } else { &manifest.description };
-    sheet(title, &html! {
-        p.quiet {
-            (manifest.flights) " flights under each of " (manifest.contenders.len())
-            " contenders, all with the same draws (seed " (manifest.seed) "). Every row is in results.parquet."
-        }
-        h2 { (manifest.name) }
-        div.scroll { (results(summary)) }
-        p.quiet { (LEGEND) }
-        @for figure in figures { (picture(figure)) }
-        h3 { "Not lost, by trajectory" }
-        div.scroll { (by_trajectory(summary)) }
-        h3 { "Worst flights" }
-        div.scroll { (worst(summary)) }
-        h3 { "Drawn" }
-        div.scroll { (drawn(summary)) }
-    })
+    sheet(
+        title,
+        &html! {
+            p.quiet {
+                (flights(summary)) " flights under each of " (manifest.contenders.len())
+                " contenders, all with the same draws (seed " (manifest.seed) "). Every row is in results.parquet."
+            }
+            h2 { (manifest.name) }
+            div.scroll { (results(summary)) }
+            p.quiet { (LEGEND) }
+            @for figure in figures { (picture(figure)) }
+            h3 { "Not lost, by trajectory" }
+            div.scroll { (by_trajectory(summary)) }
+            h3 { "Worst flights" }
+            div.scroll { (worst(summary)) }
+            h3 { "Drawn" }
+            div.scroll { (drawn(summary)) }
+        },
+    )
 }
 
 fn results(summary: &Summary) -> Markup {

@@ -18,6 +18,7 @@ struct Contender<'a> {
     name: &'a str,
     #[serde(flatten)]
     all: Success,
+    tripped: u64,
     by_trajectory: BTreeMap<&'a str, Success>,
     /// Null where the percentile is a lost flight.
     rmse_position_m: Percentiles,
@@ -71,6 +72,7 @@ fn contender<'a>(manifest: &'a Manifest, tally: &'a Tally) -> Contender<'a> {
     Contender {
         name: &tally.contender,
         all: (&tally.count).into(),
+        tripped: tally.tripped,
         by_trajectory: names.zip(tally.by_trajectory.iter().map(Success::from)).collect(),
         rmse_position_m: (&tally.rmse_position_m).into(),
         max_position_m: (&tally.max_position_m).into(),

@@ -17,22 +17,25 @@ const LINE_PX: f64 = 1.6;
 const LEFT_PX: f64 = 62.0;
 const BOTTOM_PX: f64 = 42.0;
 const MARGIN_PX: f64 = 16.0;
+/// What of the left is free.
+const FREE_PX: f64 = 6.0;
 /// Height of a distribution, and of one of the panels side by side.
 const WIDE_PX: f64 = 330.0;
 const PANEL_PX: f64 = 200.0;
 
 /// Draws every figure of a campaign.
 pub(in crate::output) fn draw(summary: &Summary) -> io::Result<Vec<Figure>> {
-    let conditions = format!("{}: {} flights each", summary.manifest.name, summary.manifest.flights);
-    let distribution = |title, label, values: fn(&Tally) -> &[f64]| {
-        distribution(summary, title, &conditions, label, values)
-    };
+    let flights = summary.tallies.first().map_or(0, |tally| tally.count.flights);
+    let conditions = format!("{}: {flights} flights each", summary.manifest.name);
+    let distribution =
+        |title, label, values: fn(&Tally) -> &[f64]| distribution(summary, title, &conditions, label, values);
     let mut figures = vec![
         Figure {
             name: "position-error",
-            caption: "How many flights stayed below which distance from the reference. A curve ends where the flights do \
+            caption:
+                "How many flights stayed below which distance from the reference. A curve ends where the flights do \
                       that were not lost."
-                .into(),
+                    .into(),
             svg: distribution("Position error", "root mean square distance from the reference [m]", |tally| {
                 &tally.rmse_position_m
             })?,
@@ -90,7 +93,8 @@ fn distribution(
         canvas::head(area, title, conditions, &legend)?;
         let area = area.clone().shrink((0, units(top_px)), (units(WIDTH_PX - MARGIN_PX), units(WIDE_PX)));
         let mut chart = ChartBuilder::on(&area)
-            .set_label_area_size(LabelAreaPosition::Left, units(LEFT_PX))
+            .margin_left(units(FREE_PX))
+            .set_label_area_size(LabelAreaPosition::Left, units(LEFT_PX - FREE_PX))
             .set_label_area_size(LabelAreaPosition::Bottom, units(BOTTOM_PX))
             .margin_top(units(6.0))
             .build_cartesian_2d(range.clone().log_scale(), 0.0..100.0_f64)?;
@@ -131,17 +135,19 @@ fn success(summary: &Summary, conditions: &str) -> io::Result<String> {
 fn success_panel(area: &Area, summary: &Summary, index: usize, drawn: &Drawn) -> Result<(), Failure> {
     let [low, high] = drawn.ends;
     let mut chart = ChartBuilder::on(area)
-        .set_label_area_size(LabelAreaPosition::Left, units(LEFT_PX))
+        .margin_left(units(FREE_PX))
+        .set_label_area_size(LabelAreaPosition::Left, units(LEFT_PX - FREE_PX))
         .set_label_area_size(LabelAreaPosition::Bottom, units(BOTTOM_PX))
-        .margin_top(units(6.0))
+        .margin_top(units(10.0))
         .build_cartesian_2d(low..high, 0.0..100.0_f64)?;
     let digits = decimals((high - low) / 5.0);
-    mesh(&mut chart, &drawn.name, "not lost [%]", 6, &|x| number(*x, digits))?;
+    mesh(&mut chart, &drawn.name, "not lost [%]", 6, &|x| short(*x, digits))?;
     for (tally, ink) in summary.tallies.iter().zip(inks()) {
         let Some(bins) = tally.by_draw.get(index) else { continue };
         let centre = |bin: usize| low + (bin as f64 + 0.5) / BINS as f64 * (high - low);
         let flown = bins.iter().enumerate().filter(|(_, count)| count.flights > 0);
-        let points: Vec<_> = flown.map(|(bin, count): (_, &Count)| (centre(bin), 100.0 * count.share().value)).collect();
+        let points: Vec<_> =
+            flown.map(|(bin, count): (_, &Count)| (centre(bin), 100.0 * count.share().value)).collect();
         chart.draw_series(points.iter().map(|&at| Circle::new(at, units(2.0), ink.color.filled())))?;
         chart.draw_series([PathElement::new(points, ink.style())])?;
     }
@@ -176,5 +182,11 @@ fn mesh<X: Ranged<ValueType = f64> + ValueFormatter<f64>>(
 /// A number on a logarithmic axis, free of what the logarithm left behind the second digit.
 fn logarithmic(x: f64) -> String {
     let power = libm::floor(libm::log10(x));
-    number(x, (1.0 - power).clamp(0.0, 9.0) as usize).trim_end_matches('0').trim_end_matches('.').into()
+    short(x, (1.0 - power).clamp(0.0, 9.0) as usize)
+}
+
+/// A number without zeros that say nothing.
+fn short(x: f64, decimals: usize) -> String {
+    let text = number(x, decimals);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
