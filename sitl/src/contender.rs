@@ -1,6 +1,7 @@
 //! Who flies: a control law with its gains and settings, under a name.
 
-use afbc::{Adaptive, Backstepping, Controller, FlightController, Profile, Settings, adaptive, backstepping};
+use afbc::monitor::Bounds;
+use afbc::{Adaptive, Backstepping, Controller, FlightController, Guarded, Profile, Settings, adaptive, backstepping};
 use airframe::{OutOfRange, Parameters, PerAxis, Range};
 use peers::{Geometric, Indi, Pid, geometric, indi, pid};
 
@@ -60,6 +61,8 @@ impl ControllerKind {
 pub enum Law {
     /// See [`ControllerKind::Afbc`].
     Afbc(PerAxis<adaptive::Gains>),
+    /// AFBC under its [monitor](afbc::guarded), with a law to fall back on.
+    Guarded(PerAxis<adaptive::Gains>),
     /// See [`ControllerKind::Backstepping`].
     Backstepping(PerAxis<backstepping::Gains>),
     /// See [`ControllerKind::Pid`].
@@ -85,7 +88,7 @@ impl Law {
     /// Which law it is.
     pub const fn kind(&self) -> ControllerKind {
         match self {
-            Law::Afbc(_) => ControllerKind::Afbc,
+            Law::Afbc(_) | Law::Guarded(_) => ControllerKind::Afbc,
             Law::Backstepping(_) => ControllerKind::Backstepping,
             Law::Pid(_) => ControllerKind::Pid,
             Law::Geometric(_) => ControllerKind::Geometric,
@@ -93,15 +96,19 @@ impl Law {
         }
     }
 
-    /// Shows each gain of a law that has one set for the whole vehicle, by name and range; none of AFBC and backstepping,
-    /// which have a set for each axis.
+    /// True if it stands outside AFBC's cascade, with one set of gains for the whole vehicle.
+    pub const fn is_peer(&self) -> bool {
+        matches!(self, Law::Pid(_) | Law::Geometric(_) | Law::Indi(_))
+    }
+
+    /// Shows each gain of a peer by name and range; none of AFBC and backstepping, which have a set for each axis.
     ///
     /// # Errors
     /// The first that `visit` returns.
     pub fn each_gain<E>(&mut self, mut visit: impl FnMut(&'static Range, &mut f32) -> Result<(), E>) -> Result<(), E> {
         let mut visit = |(range, gain): (&'static Range, &mut f32)| visit(range, gain);
         match self {
-            Law::Afbc(_) | Law::Backstepping(_) => Ok(()),
+            Law::Afbc(_) | Law::Guarded(_) | Law::Backstepping(_) => Ok(()),
             Law::Pid(gains) => {
                 gains.tunables().into_iter().try_for_each(&mut visit)?;
                 gains.others().into_iter().try_for_each(visit)
@@ -152,8 +159,9 @@ impl Contender {
 
     /// The profile whose gains and settings these are, if there is one.
     pub fn profile(&self) -> Option<Profile> {
-        let same =
-            |profile: &Profile| self.law == Law::of(self.kind(), *profile) && self.settings == profile.settings();
+        // Under its monitor or not, the gains are the same.
+        let law = if let Law::Guarded(gains) = self.law { Law::Afbc(gains) } else { self.law };
+        let same = |profile: &Profile| law == Law::of(law.kind(), *profile) && self.settings == profile.settings();
         Profile::ALL.into_iter().find(same)
     }
 
@@ -169,6 +177,7 @@ impl Contender {
     pub fn check(&self, vehicle: Parameters) -> Result<(), OutOfRange> {
         match &self.law {
             Law::Afbc(gains) => gains.controller(vehicle, self.settings).map(drop),
+            Law::Guarded(gains) => Monitored(gains).controller(vehicle, self.settings).map(drop),
             Law::Backstepping(gains) => gains.controller(vehicle, self.settings).map(drop),
             Law::Pid(gains) => gains.controller(vehicle, self.settings).map(drop),
             Law::Geometric(gains) => gains.controller(vehicle, self.settings).map(drop),
@@ -198,6 +207,18 @@ impl Build for PerAxis<adaptive::Gains> {
 
     fn controller(&self, vehicle: Parameters, settings: Settings) -> Result<Self::Controller, OutOfRange> {
         Controller::new(vehicle, settings, Adaptive::new(*self)?)
+    }
+}
+
+/// Gains of AFBC that is to fly under its monitor, with the bounds that go with them.
+pub struct Monitored<'a>(pub &'a PerAxis<adaptive::Gains>);
+
+impl Build for Monitored<'_> {
+    type Controller = Guarded;
+
+    fn controller(&self, vehicle: Parameters, settings: Settings) -> Result<Guarded, OutOfRange> {
+        let bounds = Bounds::new(self.0, vehicle.mass_kg * vehicle.gravity_m_s2);
+        Guarded::new(vehicle, settings, *self.0, bounds)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Lockstep flights: measure, control, observe, move the vehicle, once per step.
 
-use crate::contender::{Build, Contender, Law, step_s};
+use crate::contender::{Build, Contender, Law, Monitored, step_s};
 use crate::scenario::Scenario;
 use crate::trajectory::{Reference, Trajectory};
 use afbc::{Command, FlightController, Settings, adaptive};
@@ -127,6 +127,7 @@ pub fn fly(
     let settings = &contender.settings;
     match &contender.law {
         Law::Afbc(gains) => run(scenario, settings, gains, observe),
+        Law::Guarded(gains) => run(scenario, settings, &Monitored(gains), observe),
         Law::Backstepping(gains) => run(scenario, settings, gains, observe),
         Law::Pid(gains) => run(scenario, settings, gains, observe),
         Law::Geometric(gains) => run(scenario, settings, gains, observe),

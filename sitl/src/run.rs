@@ -3,6 +3,7 @@
 use crate::flight::{Lost, Sample, fly};
 use crate::metrics::{Accumulator, Metrics, inputs};
 use crate::scenario::{Contender, Scenario};
+use afbc::monitor::Trip;
 use airframe::OutOfRange;
 use nalgebra::Vector4;
 
@@ -13,6 +14,8 @@ pub struct Run {
     pub contender: Contender,
     /// When and why the vehicle was lost, if it was.
     pub lost: Option<Lost>,
+    /// When and why AFBC's monitor put another law in its place, if it did.
+    pub tripped: Option<Tripped>,
     /// Figures of merit over every step.
     pub metrics: Metrics,
     /// Every `log_every`-th step, and the last one.
@@ -20,6 +23,15 @@ pub struct Run {
     /// For each row of the log, the lowest and the highest U1..U4 \[N\] of all steps since the row before: chatter is
     /// faster than the log.
     pub input_extremes: Vec<[Vector4<f64>; 2]>,
+}
+
+/// What a monitor did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tripped {
+    /// \[s\]
+    pub time_s: f64,
+    /// Why.
+    pub trip: Trip,
 }
 
 impl Run {
@@ -32,9 +44,12 @@ impl Run {
         let mut metrics = Accumulator::default();
         let (mut log, mut input_extremes) = (Vec::new(), Vec::new());
         let mut unlogged: Option<(Sample, [Vector4<f64>; 2])> = None;
-        let mut step = 0;
+        let (mut step, mut tripped) = (0, None);
         let lost = fly(scenario, contender, |sample| {
             metrics.add(sample);
+            if let Some(trip) = sample.command.health.trip {
+                tripped.get_or_insert(Tripped { time_s: sample.time_s, trip });
+            }
             let u = inputs(sample);
             let extremes = match unlogged.take() {
                 Some((_, [low, high])) => [u.inf(&low), u.sup(&high)],
@@ -52,6 +67,6 @@ impl Run {
             log.push(last);
             input_extremes.push(extremes);
         }
-        Ok(Run { contender: contender.clone(), lost, metrics: metrics.finish(), log, input_extremes })
+        Ok(Run { contender: contender.clone(), lost, tripped, metrics: metrics.finish(), log, input_extremes })
     }
 }

@@ -8,6 +8,7 @@ mod csv;
 mod error;
 mod figures;
 mod files;
+mod reality;
 mod report;
 mod summary;
 mod table;

@@ -2,12 +2,12 @@
 
 use super::figures::Figure;
 use super::files::Group;
-use super::{table, words};
+use super::{reality, table, words};
 use crate::claims::Claim;
 use crate::contender::{Contender, Law};
 use crate::scenario::Scenario;
 use crate::trajectory::Trajectory;
-use afbc::Settings;
+use afbc::{Limits, Settings};
 use airframe::Axis;
 use core::convert::Infallible;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -122,6 +122,11 @@ fn section(group: &Group, figures: &[Figure]) -> Markup {
         h2 { (group.scenario.name) }
         p { (words::conditions(group.scenario)) "." }
         div.scroll { (results(group)) }
+        @for flight in &group.flights {
+            @if let Some(tripped) = &flight.run.tripped {
+                p { (flight.run.contender.title()) ": " (words::tripped(tripped)) "." }
+            }
+        }
         p.quiet { (table::legend()) }
         @for figure in figures { (picture(figure)) }
         h3 { "Parameters" }
@@ -189,6 +194,13 @@ fn parameters(scenario: &Scenario) -> Markup {
                         td.name { "from " (change.start_s) " s " (until(change.end_s)) }
                     }
                 }
+                @for payload in scenario.environment.payloads() {
+                    tr {
+                        td { "payload " (words::payload(payload)) }
+                        td.name { (payload.below_m) " m below, from " (payload.start_s) " s " (until(payload.end_s)) }
+                    }
+                }
+                @for (name, value) in reality::rows(scenario) { tr { td { (name) } td.name { (value) } } }
             }
         }
         @for contender in &scenario.contenders { (gains(contender)) }
@@ -197,16 +209,34 @@ fn parameters(scenario: &Scenario) -> Markup {
 
 /// Who flew: settings and gains.
 fn gains(contender: &Contender) -> Markup {
-    let Settings { dt_s, command_filter_rad_s, rotor_force_max_n, .. } = contender.settings;
+    let Settings { dt_s, command_filter_rad_s, rotor_force_max_n, limits, tilt_by_thrust, heed_ground, bumpless } =
+        contender.settings;
     let mut settings = format!("steps of {dt_s} s, at most {rotor_force_max_n} N a rotor");
-    if let Law::Afbc(_) | Law::Backstepping(_) = contender.law {
+    if !contender.law.is_peer() {
         settings += &format!(", command filter {command_filter_rad_s} rad/s");
+        let also = [
+            (tilt_by_thrust, "tilt by thrust"),
+            (heed_ground, "heeds the ground"),
+            (bumpless, "bumpless"),
+            (matches!(contender.law, Law::Guarded(_)), "monitored"),
+        ];
+        settings.extend(also.into_iter().filter(|(on, _)| *on).map(|(_, word)| format!(", {word}")));
+        if limits != Limits::NONE {
+            settings += &format!(
+                ", limits: tilt {} rad at {} rad/s, {} m/s², {} m/s, climb {} m/s",
+                limits.tilt_max_rad,
+                limits.tilt_rate_max_rad_s,
+                limits.acceleration_max_m_s2,
+                limits.speed_max_m_s,
+                limits.climb_max_m_s
+            );
+        }
     }
     html! {
         h3 { (capitalised(contender.title())) }
         p.quiet { (contender.kind().title()) ", " (settings) "." }
         @match &contender.law {
-            Law::Afbc(gains) => (per_axis(&["α₁", "α₂", "γ", "η", "ε", "centre", "width"], |axis| {
+            Law::Afbc(gains) | Law::Guarded(gains) => (per_axis(&AFBC_GAINS, |axis| {
                 let g = gains.get(axis);
                 vec![
                     g.backstepping.alpha1,
@@ -216,6 +246,11 @@ fn gains(contender: &Contender) -> Markup {
                     g.epsilon,
                     g.membership.centre,
                     g.membership.width,
+                    g.safeguards.sigma,
+                    g.safeguards.kappa,
+                    g.safeguards.theta_max,
+                    g.safeguards.delta_max,
+                    g.safeguards.dead_zone,
                 ]
             })),
             Law::Backstepping(gains) => (per_axis(&["α₁", "α₂"], |axis| {
@@ -225,6 +260,9 @@ fn gains(contender: &Contender) -> Markup {
         }
     }
 }
+
+/// What the columns of AFBC's gains are called.
+const AFBC_GAINS: [&str; 12] = ["α₁", "α₂", "γ", "η", "ε", "centre", "width", "σ", "κ", "Θ max", "δ max", "dead zone"];
 
 fn per_axis(names: &[&str], gains: impl Fn(Axis) -> Vec<f32>) -> Markup {
     html! {

@@ -23,6 +23,10 @@ struct Summary<'a> {
     duration_s: f64,
     lost_at_s: Option<f64>,
     lost_reason: Option<&'a str>,
+    /// When and why AFBC's monitor put another law in its place.
+    tripped_at_s: Option<f64>,
+    tripped_reason: Option<&'a str>,
+    seed: u64,
     /// From when on `rmse`, `max_abs` and `mean_abs_delta_u_n` count.
     measured_from_s: f64,
     rmse: Option<Outputs>,
@@ -61,6 +65,9 @@ fn summary(Flown { scenario, run }: &Flown) -> Summary<'_> {
         duration_s: scenario.duration_s,
         lost_at_s: run.lost.map(|lost| lost.time_s),
         lost_reason: run.lost.map(|lost| lost.reason),
+        tripped_at_s: run.tripped.map(|tripped| tripped.time_s),
+        tripped_reason: run.tripped.map(|tripped| tripped.trip.reason()),
+        seed: scenario.seed,
         measured_from_s: SETTLED_S,
         rmse: measured(run.metrics.rmse).map(Outputs::from),
         max_abs: measured(run.metrics.max_abs).map(Outputs::from),

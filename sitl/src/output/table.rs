@@ -145,6 +145,11 @@ fn flights(group: &Group, lines: &mut Vec<String>) {
         }
     }
     lines.push(rule);
+    for flight in &group.flights {
+        if let Some(tripped) = &flight.run.tripped {
+            wrap(lines, "", &format!("{}: {}.", flight.run.contender.title(), words::tripped(tripped)));
+        }
+    }
 }
 
 fn row(title: &str, name: &str, name_width: usize, cells: &[impl AsRef<str>; 4]) -> String {

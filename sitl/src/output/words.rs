@@ -1,10 +1,11 @@
 //! Names and numbers for people, the same wherever they appear.
 
 use crate::paper::{Reading, Sign};
+use crate::run::Tripped;
 use crate::scenario::{Contender, Scenario};
 use afbc::Profile;
 use airframe::Axis;
-use plant::{Gust, GustKind, ParameterChange, Quantity};
+use plant::{Gust, GustKind, ParameterChange, Payload, Quantity, Realism, RotorFault, Rotors, Sensing, Wind};
 
 /// A file name without its ending: letters, digits, `-` and `_` of `name`, anything else as `-`.
 pub(super) fn slug(name: &str) -> String {
@@ -45,9 +46,38 @@ pub(super) fn conditions(scenario: &Scenario) -> String {
         (None, count) => words.push(format!("{count} gusts")),
     }
     words.extend(scenario.environment.changes().iter().map(change));
+    words.extend(real(scenario).into_iter().map(Into::into));
     words.extend(profile(scenario).map(|profile| format!("{} profile", profile.name())));
     words.push(format!("{} s", scenario.duration_s));
     words.join(", ")
+}
+
+/// What is real about the flight, word by word: "rotors", "battery", "drag", "wind", "ground", "payload", "sensors".
+fn real(scenario: &Scenario) -> Vec<&'static str> {
+    let Realism { rotors, drag, wind, contact, ground_effect, .. } = &scenario.realism;
+    let (faults, battery) = (!rotors.faults.is_empty(), rotors.battery.is_some());
+    let ideal = Rotors { faults: rotors.faults.clone(), battery: rotors.battery, ..Rotors::default() };
+    let words = [
+        (*rotors != ideal, "real rotors"),
+        (faults, "rotor fault"),
+        (battery, "battery"),
+        (drag.is_some(), "drag"),
+        (*wind != Wind::default(), "wind"),
+        (contact.is_some() || ground_effect.is_some(), "ground"),
+        (!scenario.environment.payloads().is_empty(), "payload"),
+        (scenario.sensing != Sensing::default(), "real sensors"),
+    ];
+    words.into_iter().filter_map(|(there, word)| there.then_some(word)).collect()
+}
+
+/// "+0.2 kg"
+pub(super) fn payload(payload: &Payload) -> String {
+    format!("{:+} kg", payload.mass_kg)
+}
+
+/// "rotor 1 at 80 %"
+pub(super) fn fault(fault: &RotorFault) -> String {
+    format!("rotor {} at {} %", fault.rotor, (fault.efficiency * 1000.0).round() / 10.0)
 }
 
 /// "inertia +75 %"
@@ -98,4 +128,11 @@ pub(super) const fn symbol(axis: Axis) -> &'static str {
 /// "lost at t = 15.625 s: tilted beyond 90 degrees"
 pub(super) fn lost(lost: &crate::flight::Lost) -> String {
     format!("lost at t = {:.3} s: {}", lost.time_s, lost.reason)
+}
+
+/// "the monitor put backstepping in AFBC's place at t = 15.625 s: rotors stay saturated"
+pub(super) fn tripped(tripped: &Tripped) -> String {
+    let reason = tripped.trip.reason();
+    let reason = reason.strip_prefix("AFBC off: ").unwrap_or(reason);
+    format!("the monitor put backstepping in AFBC's place at t = {:.3} s: {reason}", tripped.time_s)
 }

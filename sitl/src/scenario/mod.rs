@@ -71,16 +71,22 @@ impl Scenario {
         })
     }
 
+    /// True if rotors, air and ground are those of the paper's equations.
+    pub fn is_ideal(&self) -> bool {
+        self.realism == Realism { seed: self.realism.seed, ..Realism::default() }
+    }
+
     /// The vehicle at t = 0, made for steps of `step_s`; the ideal one if nothing real was asked for.
     ///
     /// # Errors
     /// The first setting out of range.
     pub fn plant(&self, step_s: f64) -> Result<Plant, OutOfRange> {
-        let realism = Realism { seed: self.seed, ..self.realism.clone() };
-        if realism == (Realism { seed: self.seed, ..Realism::default() }) {
-            return Ok(Plant::new(self.model, self.initial, self.environment.clone()));
+        let environment = self.environment.clone();
+        if self.is_ideal() {
+            return Ok(Plant::new(self.model, self.initial, environment));
         }
-        Plant::with(self.model, self.initial, self.environment.clone(), &realism, step_s)
+        let realism = Realism { seed: self.seed, ..self.realism.clone() };
+        Plant::with(self.model, self.initial, environment, &realism, step_s)
     }
 
     /// The sensors, read every `step_s`; none if they are perfect.

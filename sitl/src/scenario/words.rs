@@ -6,7 +6,9 @@ use airframe::OutOfRange;
 const LIKENESS: f64 = 0.8;
 
 /// What the endings of keys mean, longest ending first.
-const UNITS: [(&str, &str); 19] = [
+const UNITS: [(&str, &str); 30] = [
+    ("_kg_m3", "kilograms per cubic metre"),
+    ("_n_s2_m", "newton seconds squared per metre"),
     ("_n_m_s2", "newton metre seconds squared"),
     ("_kg_m2", "kilogram square metres"),
     ("_rad_s2", "radians per second squared"),
@@ -20,9 +22,18 @@ const UNITS: [(&str, &str); 19] = [
     ("_n_m", "newton metres"),
     ("_rad", "radians"),
     ("_kg", "kilograms"),
+    ("_m2", "square metres"),
+    ("_a_h", "ampere hours"),
+    ("_ohm", "ohms"),
+    ("_hz", "per second"),
     ("_m", "metres"),
     ("_n", "newtons"),
     ("_s", "seconds"),
+    ("_v", "volts"),
+    ("_w", "watts"),
+    ("sigma", "1/s"),
+    ("kappa", "1/s per m/s or rad/s"),
+    ("dead_zone", "m/s or rad/s"),
     ("alpha1", "1/s"),
     ("alpha2", "input per m/s or rad/s"),
     ("epsilon", "m/s or rad/s"),

@@ -1,4 +1,4 @@
-//! `controllers`, `[gains.AXIS]`, `[settings]` and `[[contender]]`: who flies.
+//! `controllers`, `profile`, `[gains.AXIS]`, `[settings]`, `[limits]`, `monitor` and `[[contender]]`: who flies.
 
 use super::{FileError, Table};
 use crate::contender::{Contender, ControllerKind, Law, backstepping_part};
@@ -9,11 +9,11 @@ use afbc::backstepping::{self, ALPHA1, ALPHA2};
 use afbc::cascade::DT;
 use afbc::command_filter::BANDWIDTH;
 use afbc::fuzzy::{CENTRE, Membership, WIDTH};
-use afbc::{Profile, Settings};
+use afbc::limits::{ACCELERATION, CLIMB, SPEED, TILT, TILT_RATE};
+use afbc::safeguards::{DEAD_ZONE, DELTA_MAX, KAPPA, SIGMA, THETA_MAX};
+use afbc::{Limits, Profile, Safeguards, Settings};
 use airframe::{Axis, PerAxis, Range};
 
-/// Most contenders in one file.
-const CONTENDERS: usize = 100;
 /// Longest name of a contender: what a table has room for.
 const NAME_LENGTH: usize = 32;
 
@@ -23,11 +23,14 @@ struct Defaults {
     profile: Profile,
     gains: PerAxis<Gains>,
     settings: Settings,
+    /// Whether AFBC flies under its monitor.
+    monitor: bool,
 }
 
 impl Defaults {
     fn law(&self, kind: ControllerKind) -> Law {
         match kind {
+            ControllerKind::Afbc if self.monitor => Law::Guarded(self.gains),
             ControllerKind::Afbc => Law::Afbc(self.gains),
             ControllerKind::Backstepping => Law::Backstepping(backstepping_part(&self.gains)),
             _ => Law::of(kind, self.profile),
@@ -40,19 +43,11 @@ pub(super) fn contenders(root: &mut Table<'_>) -> Result<Vec<Contender>, FileErr
     let controllers = root.choices("controllers", &ControllerKind::ALL, ControllerKind::name)?;
     let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(Profile::Paper);
     let gains = per_axis(root.table("gains")?, profile.gains(), axis_gains)?;
-    let settings = match root.table("settings")? {
-        Some(mut table) => {
-            let dt_s = number(&mut table, &DT, profile.settings().dt_s)?;
-            settings(table, Settings { dt_s, ..profile.settings() })?
-        }
-        None => profile.settings(),
-    };
-    let defaults = Defaults { profile, gains, settings };
+    let settings = settings(root, profile.settings(), true)?;
+    let monitor = root.boolean("monitor")?.unwrap_or(false);
+    let defaults = Defaults { profile, gains, settings, monitor };
 
-    let tables = root.tables("contender")?;
-    if tables.len() > CONTENDERS {
-        return Err(root.fault_at("contender", format!("{} contenders; keep {CONTENDERS} at most", tables.len())));
-    }
+    let tables = root.few_tables("contender")?;
     let kinds = controllers.unwrap_or(if tables.is_empty() { ControllerKind::PAPER.to_vec() } else { Vec::new() });
     let short = |kind: ControllerKind| Contender { name: kind.name().into(), law: defaults.law(kind), settings };
     let mut contenders: Vec<_> = kinds.into_iter().map(short).collect();
@@ -72,22 +67,20 @@ fn contender(mut table: Table<'_>, file: Defaults, others: &[Contender]) -> Resu
         return Err(table.fault_at("name", format!("\"{name}\" is the name of another contender; choose another")));
     }
     let kind = table.need_choice("controller", &ControllerKind::ALL, ControllerKind::name)?;
-    let defaults = match table.choice("profile", &Profile::ALL, Profile::name)? {
+    let mut defaults = match table.choice("profile", &Profile::ALL, Profile::name)? {
         Some(profile) => Defaults {
             profile,
             gains: profile.gains(),
             settings: Settings { dt_s: file.settings.dt_s, ..profile.settings() },
+            monitor: file.monitor,
         },
         None => file,
     };
+    if kind == ControllerKind::Afbc {
+        defaults.monitor = table.boolean("monitor")?.unwrap_or(defaults.monitor);
+    }
     let law = law(table.table("gains")?, defaults.law(kind))?;
-    let settings = match table.table("settings")? {
-        Some(table) => {
-            table.forbid(DT.name, "one step serves all contenders; set it in the file's own [settings]")?;
-            settings(table, defaults.settings)?
-        }
-        None => defaults.settings,
-    };
+    let settings = settings(&mut table, defaults.settings, false)?;
     table.finish()?;
     Ok(Contender { name, law, settings })
 }
@@ -96,6 +89,7 @@ fn contender(mut table: Table<'_>, file: Defaults, others: &[Contender]) -> Resu
 fn law(table: Option<Table<'_>>, mut default: Law) -> Result<Law, FileError> {
     match default {
         Law::Afbc(gains) => per_axis(table, gains, axis_gains).map(Law::Afbc),
+        Law::Guarded(gains) => per_axis(table, gains, axis_gains).map(Law::Guarded),
         Law::Backstepping(gains) => per_axis(table, gains, axis_backstepping).map(Law::Backstepping),
         _ => {
             let Some(mut table) = table else { return Ok(default) };
@@ -140,18 +134,16 @@ fn axis_backstepping(mut table: Table<'_>, default: &backstepping::Gains) -> Res
 }
 
 fn axis_gains(mut table: Table<'_>, default: &Gains) -> Result<Gains, FileError> {
-    let backstepping = alphas(&mut table, &default.backstepping)?;
-    let mut number = |range: &Range, default: f32| number(&mut table, range, default);
     let gains = Gains {
-        backstepping,
-        gamma: number(&GAMMA, default.gamma)?,
-        eta: number(&ETA, default.eta)?,
-        epsilon: number(&EPSILON, default.epsilon)?,
+        backstepping: alphas(&mut table, &default.backstepping)?,
+        gamma: number(&mut table, &GAMMA, default.gamma)?,
+        eta: number(&mut table, &ETA, default.eta)?,
+        epsilon: number(&mut table, &EPSILON, default.epsilon)?,
         membership: Membership {
-            centre: number(&CENTRE, default.membership.centre)?,
-            width: number(&WIDTH, default.membership.width)?,
+            centre: number(&mut table, &CENTRE, default.membership.centre)?,
+            width: number(&mut table, &WIDTH, default.membership.width)?,
         },
-        safeguards: default.safeguards,
+        safeguards: safeguards(&mut table, &default.safeguards)?,
     };
     // Each gain is in its range; what is left to refuse is how two of them go together.
     gains
@@ -161,15 +153,51 @@ fn axis_gains(mut table: Table<'_>, default: &Gains) -> Result<Gains, FileError>
     Ok(gains)
 }
 
-/// The settings in `table`, all but the time step; those that it leaves out are as in `default`.
-fn settings(mut table: Table<'_>, default: Settings) -> Result<Settings, FileError> {
-    let settings = Settings {
-        command_filter_rad_s: number(&mut table, &BANDWIDTH, default.command_filter_rad_s)?,
-        rotor_force_max_n: number(&mut table, &FORCE_MAX, default.rotor_force_max_n)?,
-        ..default
+fn safeguards(table: &mut Table<'_>, default: &Safeguards) -> Result<Safeguards, FileError> {
+    Ok(Safeguards {
+        sigma: number(table, &SIGMA, default.sigma)?,
+        kappa: number(table, &KAPPA, default.kappa)?,
+        theta_max: number(table, &THETA_MAX, default.theta_max)?,
+        delta_max: number(table, &DELTA_MAX, default.delta_max)?,
+        dead_zone: number(table, &DEAD_ZONE, default.dead_zone)?,
+        heed_saturation: table.boolean("heed_saturation")?.unwrap_or(default.heed_saturation),
+    })
+}
+
+/// `[settings]` and `[limits]` in `parent`; what they leave out is as in `default`. Only the file's own have a time step.
+fn settings(parent: &mut Table<'_>, default: Settings, with_step: bool) -> Result<Settings, FileError> {
+    let mut settings = default;
+    if let Some(mut table) = parent.table("settings")? {
+        if !with_step {
+            table.forbid(DT.name, "one step serves all contenders; set it in the file's own [settings]")?;
+        }
+        settings = Settings {
+            dt_s: if with_step { number(&mut table, &DT, default.dt_s)? } else { default.dt_s },
+            command_filter_rad_s: number(&mut table, &BANDWIDTH, default.command_filter_rad_s)?,
+            rotor_force_max_n: number(&mut table, &FORCE_MAX, default.rotor_force_max_n)?,
+            tilt_by_thrust: table.boolean("tilt_by_thrust")?.unwrap_or(default.tilt_by_thrust),
+            heed_ground: table.boolean("heed_ground")?.unwrap_or(default.heed_ground),
+            bumpless: table.boolean("bumpless")?.unwrap_or(default.bumpless),
+            limits: default.limits,
+        };
+        table.finish()?;
+    }
+    if let Some(table) = parent.table("limits")? {
+        settings.limits = limits(table, &default.limits)?;
+    }
+    Ok(settings)
+}
+
+fn limits(mut table: Table<'_>, default: &Limits) -> Result<Limits, FileError> {
+    let limits = Limits {
+        tilt_max_rad: number(&mut table, &TILT, default.tilt_max_rad)?,
+        tilt_rate_max_rad_s: number(&mut table, &TILT_RATE, default.tilt_rate_max_rad_s)?,
+        acceleration_max_m_s2: number(&mut table, &ACCELERATION, default.acceleration_max_m_s2)?,
+        speed_max_m_s: number(&mut table, &SPEED, default.speed_max_m_s)?,
+        climb_max_m_s: number(&mut table, &CLIMB, default.climb_max_m_s)?,
     };
     table.finish()?;
-    Ok(settings)
+    Ok(limits)
 }
 
 fn number(table: &mut Table<'_>, range: &Range, default: f32) -> Result<f32, FileError> {

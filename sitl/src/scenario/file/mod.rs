@@ -3,6 +3,8 @@
 mod control;
 mod environment;
 mod motion;
+mod realism;
+mod sensors;
 mod trajectory;
 mod vehicle;
 
@@ -12,9 +14,9 @@ mod tests;
 use super::error::{FileError, Source};
 use super::reader::Table;
 use super::words::out_of_range;
-use super::{DURATION, Scenario};
-use airframe::Parameters;
-use plant::{Model, Realism, Sensing};
+use super::{Contender, DURATION, Scenario};
+use airframe::{Parameters, Range};
+use plant::Model;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -22,6 +24,8 @@ use toml::de::DeTable;
 
 /// Length of a flight that does not say how long it is \[s\].
 const DURATION_S: f64 = 60.0;
+/// Accepted seeds.
+const SEED: Range = Range::new("seed", 0.0, 1e9);
 /// Longest scenario name.
 const NAME_LENGTH: usize = 64;
 /// Largest file that is read at all \[bytes\].
@@ -97,6 +101,7 @@ pub(crate) fn read(mut root: Table<'_>, name: &str) -> Result<Scenario, FileErro
     let [name, description] = title(&mut root, name)?;
     let duration_s = root.number(&DURATION)?.unwrap_or(DURATION_S);
     let models = [Model::Simplified, Model::RigidBody];
+    let seed = seed(&mut root)?;
     let model = root.choice("plant", &models, Model::name)?.unwrap_or(Model::RigidBody);
 
     let vehicle = vehicle::read(root.table("vehicle")?, Parameters::PAPER)?;
@@ -108,6 +113,10 @@ pub(crate) fn read(mut root: Table<'_>, name: &str) -> Result<Scenario, FileErro
     let trajectory = trajectory::read(table)?;
     let initial = motion::initial(root.table("initial")?, &trajectory.at(0.0))?;
     let environment = environment::read(&mut root, truth)?;
+    let step_s = contenders.first().map_or(afbc::cascade::DT.max, Contender::step_s);
+    let realism = realism::read(&mut root, &truth, step_s)?;
+    let sensing = sensors::read(root.table("sensors")?)?;
+    let seed = seed(&mut root)?;
 
     let scenario = Scenario {
         name,
@@ -117,9 +126,9 @@ pub(crate) fn read(mut root: Table<'_>, name: &str) -> Result<Scenario, FileErro
         model,
         vehicle,
         environment,
-        realism: Realism::default(),
-        sensing: Sensing::default(),
-        seed: 0,
+        realism,
+        sensing,
+        seed,
         initial,
         trajectory,
         contenders,
@@ -128,6 +137,15 @@ pub(crate) fn read(mut root: Table<'_>, name: &str) -> Result<Scenario, FileErro
     scenario.check().map_err(|error| root.fault(error.range.name, format!("{}; change it", out_of_range(&error))))?;
     root.finish()?;
     Ok(scenario)
+}
+
+/// The seed of everything random.
+fn seed(root: &mut Table<'_>) -> Result<u64, FileError> {
+    let seed = root.number(&SEED)?.unwrap_or(0.0);
+    if seed.fract() != 0.0 {
+        return Err(root.fault_at(SEED.name, format!("{seed} is not a whole number; leave out its decimals")));
+    }
+    Ok(seed as u64)
 }
 
 /// What keeps a text from being TOML.

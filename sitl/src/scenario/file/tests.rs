@@ -60,7 +60,7 @@ fn with_line(text: &str, key: &str, line: &str) -> String {
 #[test]
 fn documented_examples_are_valid_and_complete() {
     let sections = sections();
-    assert_eq!(sections.len(), 16);
+    assert_eq!(sections.len(), 29);
     for Section { example: text, rows } in sections {
         example(&text).unwrap_or_else(|error| panic!("{error} in\n{text}"));
         for line in text.lines().filter(|line| line.contains(" = ")) {
@@ -81,8 +81,8 @@ fn documented_ranges_are_those_of_the_code() {
             if key == "name" || !range.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
                 continue;
             }
-            // Of "-1.5 to 1.5; yaw -100 to 100" the first is tried.
-            let range = range.split(';').next().unwrap().trim_end_matches(" each");
+            // Of "-1.5 to 1.5; yaw -100 to 100", "0 to 1e9, whole" the first is tried.
+            let range = range.split([';', ',']).next().unwrap().trim_end_matches(" each");
             let vector = text.contains(&format!("{key} = ["));
             let value = if vector { "[1e300, 1e300, 1e300]" } else { "1e300" };
             let error = example(&with_line(&text, key, &format!("{key} = {value}"))).unwrap_err().to_string();
