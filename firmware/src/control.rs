@@ -49,7 +49,7 @@ pub fn with_inbox(change: impl FnOnce(&mut Inbox)) {
 
 /// Starts the tick, disarmed.
 pub fn spawn(spawner: SendSpawner, outputs: Outputs) {
-    let flight = Flight::new().expect("the vehicle's parameters are within their ranges");
+    let Ok(flight) = Flight::new() else { panic!("a parameter of the vehicle is out of range") };
     spawner.spawn(task(flight, outputs).expect("spawned once"));
 }
 

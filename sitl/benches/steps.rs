@@ -5,7 +5,7 @@
 //! Runge-Kutta, gusts and parameter changes, nothing logged; items are steps.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a scenario that cannot be flown must stop the bench
 
-use afbc::{FlightController, Profile};
+use afbc::{FlightController, Memory, Profile};
 use airframe::{PerAxis, RotorSpeeds, Setpoint, State};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
@@ -57,7 +57,7 @@ fn control_step(bencher: Bencher, kind: ControllerKind, gains: impl Build) {
 
 fn memory_and_step<C: FlightController>(bencher: Bencher, kind: ControllerKind, controller: &C) {
     let steps = recorded(Model::RigidBody, kind);
-    let mut memory = C::Memory::default();
+    let mut memory = Memory::default();
     let mut at = 0;
     bencher.counter(ItemsCount::new(1_usize)).bench_local(|| {
         let (state, setpoint, _) = &steps[at];

@@ -165,6 +165,14 @@ impl Contender {
         Profile::ALL.into_iter().find(same)
     }
 
+    /// AFBC's gains, if it flies that.
+    pub const fn gains(&self) -> Option<&PerAxis<adaptive::Gains>> {
+        match &self.law {
+            Law::Afbc(gains) | Law::Guarded(gains) => Some(gains),
+            _ => None,
+        }
+    }
+
     /// Time from step to step \[s\]: the settings', without the noise that `f32` adds to a decimal.
     pub fn step_s(&self) -> f64 {
         step_s(&self.settings)

@@ -3,7 +3,7 @@
 use crate::contender::{Build, Contender, Law, Monitored, step_s};
 use crate::scenario::Scenario;
 use crate::trajectory::{Reference, Trajectory};
-use afbc::{Command, FlightController, Settings, adaptive};
+use afbc::{Command, FlightController, Memory, Settings, adaptive};
 use airframe::{OutOfRange, PerAxis, State};
 use core::f64::consts::FRAC_PI_2;
 use nalgebra::Vector3;
@@ -43,7 +43,7 @@ pub struct Lost {
 /// One controller flying one vehicle.
 pub struct Flight<C: FlightController> {
     controller: C,
-    memory: C::Memory,
+    memory: Memory<C::Memory>,
     plant: Plant,
     sensors: Option<Sensors>,
     trajectory: Trajectory,
@@ -59,7 +59,7 @@ impl<C: FlightController> Flight<C> {
         let dt_s = step_s(settings);
         Ok(Flight {
             controller,
-            memory: C::Memory::default(),
+            memory: Memory::default(),
             plant: scenario.plant(dt_s)?,
             sensors: scenario.sensors(dt_s)?,
             trajectory: scenario.trajectory.clone(),
@@ -77,7 +77,7 @@ impl<C: FlightController> Flight<C> {
         let state = measurement.as_ref().map_or_else(|| motion.measure(), arrived);
         let reference = self.trajectory.at(time_s);
         let command = self.controller.step(&mut self.memory, &state, &reference.setpoint());
-        let (estimates, telemetry) = (C::learnt(&self.memory), self.plant.telemetry());
+        let (estimates, telemetry) = (C::learnt(&self.memory.control), self.plant.telemetry());
         Sample { time_s, motion, measurement, telemetry, reference, command, estimates }
     }
 

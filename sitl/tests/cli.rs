@@ -96,7 +96,8 @@ const BAD_TABLES: [(&str, &str); 67] = [
     (
         "[settings]\nrate_hz = 500",
         ":5: settings.rate_hz: unknown key; \
-         known here: dt_s, command_filter_rad_s, rotor_force_max_n, tilt_by_thrust, heed_ground, bumpless",
+         known here: dt_s, command_filter_rad_s, rotor_force_max_n, tilt_by_thrust, heed_ground, bumpless, \
+         heed_saturation",
     ),
     (
         "[initial]\nattitude_rad = [1.6, 0, 0]",
@@ -306,9 +307,9 @@ fn expand(message: &str) -> String {
         .replace("NAME", "it must be 1 to 64 letters, digits, '-' or '_', since file names come from it")
         .replace(
             "ALL",
-            "name, description, duration_s, plant, vehicle, truth, controllers, profile, gains, settings, limits, monitor, \
+            "name, description, duration_s, plant, seed, vehicle, truth, controllers, profile, gains, settings, limits, monitor, \
              contender, trajectory, initial, gust, change, payload, rotors, rotor_fault, battery, drag, wind, ground, \
-             sensors, seed",
+             sensors",
         )
 }
 

@@ -5,7 +5,7 @@ use afbc::adaptive::{self, Estimate};
 use afbc::backstepping::{Errors, Tracking};
 use afbc::cascade::Context;
 use afbc::fuzzy::{Basis, Membership};
-use afbc::{Adaptive, Backstepping, Controller, Law, Memory, Profile, Settings};
+use afbc::{Adaptive, Backstepping, Cascade, Controller, FlightController, Law, Memory, Profile, Settings};
 use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
 use nalgebra::Vector3;
 use plant::{Environment, Model, Motion, Plant};
@@ -40,6 +40,10 @@ impl<L: Law> Law for Rateless<L> {
             }
             _ => self.0.input(axis, tracking, context, estimate),
         }
+    }
+
+    fn alpha1(&self, axis: Axis) -> f32 {
+        self.0.alpha1(axis)
     }
 
     fn learnt(estimate: &L::Estimate) -> Estimate {
@@ -173,7 +177,7 @@ fn gap_3_a_fast_roll_leaves_the_estimates_finite() {
         assert!(command.speeds.0.iter().all(|w| w.is_finite()));
         for axis in Axis::ALL {
             assert!(
-                memory.estimates.get(axis).theta.iter().all(|theta| theta.is_finite()),
+                memory.control.estimates.get(axis).theta.iter().all(|theta| theta.is_finite()),
                 "{} at {rate} rad/s",
                 axis.name()
             );
@@ -195,10 +199,10 @@ fn trembling_mn(delta: f32, epsilon: f32) -> f64 {
     let law = Adaptive::new(gains).unwrap();
     let vehicle = Parameters::PAPER;
     let controller = Controller::new(vehicle.to_f32(), Profile::Paper.settings(), law).unwrap();
-    let mut memory: Memory<Estimate> = Memory::default();
-    memory.estimates.roll.delta = delta;
+    let mut memory: Memory<Cascade<Estimate>> = Memory::default();
+    memory.control.estimates.roll.delta = delta;
     // Held up by what the z subsystem would have learnt: the weight.
-    memory.estimates.z.theta.fill((vehicle.mass_kg * vehicle.gravity_m_s2) as f32);
+    memory.control.estimates.z.theta.fill((vehicle.mass_kg * vehicle.gravity_m_s2) as f32);
     let start = Motion { attitude_rad: Vector3::new(0.01, 0.0, 0.0), ..Motion::default() };
     let mut plant = Plant::new(Model::Simplified, start, Environment::calm(vehicle).unwrap());
     let (mut last, mut sum) = (0.0, 0.0);
@@ -321,9 +325,10 @@ fn gap_5_as_forces_and_moments_both_lose_the_vehicle_to_the_moment_on_roll() {
         for run in both(Reading::Forces, model) {
             // 1.2 N on 0.486 kg from 7.5 s on is survived. 1.2 N m on 0.0038 kg m2 from 15 s on is 316 rad/s2: it takes
             // 4.8 N of difference between opposed rotors, more than the vehicle weighs, to hold it, and either the roll
-            // is lost (rigid body) or the thrust that goes with it carries the vehicle away.
+            // is lost (rigid body) or the thrust that goes with it, since roll comes before thrust where rotors are
+            // at zero, carries the vehicle away within 4 s.
             let lost = run.lost.unwrap();
-            assert!((15.0..18.0).contains(&lost.time_s), "{} {}: {lost:?}", model.name(), run.contender.name);
+            assert!((15.0..19.0).contains(&lost.time_s), "{} {}: {lost:?}", model.name(), run.contender.name);
         }
     }
 }

@@ -103,7 +103,7 @@ impl Estimate {
         if square > theta_max * theta_max {
             self.theta *= theta_max / math::sqrt(square);
         }
-        self.delta = (self.delta * keep + rate.delta * dt_s).min(delta_max);
+        self.delta = math::min(self.delta * keep + rate.delta * dt_s, delta_max);
     }
 }
 
@@ -207,13 +207,17 @@ impl Law for Adaptive {
         (terms.sum(), errors)
     }
 
+    fn alpha1(&self, axis: Axis) -> f32 {
+        self.subsystems.get(axis).gains.backstepping.alpha1
+    }
+
     fn start(&self, axis: Axis, weight_n: f32) -> Estimate {
         if axis == Axis::Z { Estimate::of(weight_n) } else { Estimate::default() }
     }
 
     fn hover_thrust_n(&self, z: &Estimate, weight_n: f32) -> f32 {
         // The rule for no error and no speed.
-        z.theta.m22.max(HOVER_SHARE_MIN * weight_n)
+        math::max(z.theta.m22, HOVER_SHARE_MIN * weight_n)
     }
 
     fn learnt(estimate: &Estimate) -> Estimate {

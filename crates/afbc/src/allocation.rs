@@ -45,6 +45,9 @@ pub struct Mixer<const N: usize = 4> {
     effectiveness: SMatrix<f32, 4, N>,
     /// P
     inverse: SMatrix<f32, N, 4>,
+    /// Of a thrust of 1 N, each rotor's part when roll and pitch need room; and 1 over it.
+    share: SVector<f32, N>,
+    inverse_share: SVector<f32, N>,
     /// b
     thrust_factor: f32,
     /// 1/b
@@ -98,19 +101,32 @@ impl<const N: usize> Mixer<N> {
         let gram: Matrix4<f32> = effectiveness * effectiveness.transpose();
         AUTHORITY.check(gram.determinant())?;
         let inverse = effectiveness.transpose() * gram.try_inverse().unwrap_or_default();
+        // For a frame that no thrust can hold level, an even one.
+        let share: SVector<f32, N> = inverse.column(3).into();
+        let share = if share.min() > 0.0 { share } else { SVector::repeat(1.0 / N as f32) };
+        let inverse_share = share.map(|share| 1.0 / share);
         let b = vehicle.thrust_factor_n_s2;
-        Ok(Mixer { effectiveness, inverse, thrust_factor: b, inverse_thrust_factor: 1.0 / b, force_max: force_max_n })
+        Ok(Mixer {
+            effectiveness,
+            inverse,
+            share,
+            inverse_share,
+            thrust_factor: b,
+            inverse_thrust_factor: 1.0 / b,
+            force_max: force_max_n,
+        })
     }
 
     /// Rotor forces that give `inputs`, as far as the rotors' limits allow. A NaN is taken for 0.
     #[inline]
     pub fn allocate(&self, inputs: &Inputs) -> Allocation<N> {
-        let wanted = Vector4::new(inputs.roll_n, inputs.pitch_n, inputs.yaw_n, inputs.thrust_n)
-            .map(|u| if u.is_nan() { 0.0 } else { u });
+        let wanted = Vector4::new(inputs.roll_n, inputs.pitch_n, inputs.yaw_n, inputs.thrust_n);
         let forces = self.inverse * wanted;
+        // A NaN is not within limits.
         if forces.iter().all(|&force| 0.0 <= force && force <= self.force_max) {
             return Allocation { forces: RotorForces(forces), unallocated: Inputs::default(), saturated: false };
         }
+        let wanted = wanted.map(|u| if u.is_nan() { 0.0 } else { u });
         let forces = self.within_limits(&wanted);
         let missing = wanted - self.effectiveness * forces;
         let unallocated = Inputs { roll_n: missing.x, pitch_n: missing.y, yaw_n: missing.z, thrust_n: missing.w };
@@ -121,28 +137,27 @@ impl<const N: usize> Mixer<N> {
     fn within_limits(&self, wanted: &Vector4<f32>) -> SVector<f32, N> {
         let column = |i: usize, u: f32| self.inverse.column(i) * u;
         let tilt = column(0, wanted.x) + column(1, wanted.y);
-        let spread = tilt.max() - tilt.min();
+        let least = tilt.iter().fold(f32::MAX, |least, &force| math::min(force, least));
+        let most = tilt.iter().fold(f32::MIN, |most, &force| math::max(force, most));
+        let spread = most - least;
         let tilt = if spread > self.force_max { tilt * (self.force_max / spread) } else { tilt };
 
-        // Of a thrust of 1 N, each rotor's share; for a frame that no thrust can hold level, an even one.
-        let share = column(3, 1.0);
-        let share = if share.min() > 0.0 { share } else { SVector::repeat(1.0 / N as f32) };
         let (mut lowest, mut highest) = (0.0_f32, f32::MAX);
-        for (force, share) in tilt.iter().zip(share.iter()) {
-            lowest = lowest.max(-force / share);
-            highest = highest.min((self.force_max - force) / share);
+        for (force, inverse_share) in tilt.iter().zip(self.inverse_share.iter()) {
+            lowest = math::max(lowest, -force * inverse_share);
+            highest = math::min(highest, (self.force_max - force) * inverse_share);
         }
-        let upright = tilt + share * wanted.w.min(highest).max(lowest);
+        let upright = tilt + self.share * math::max(math::min(wanted.w, highest), lowest);
 
         let yaw = column(2, wanted.z);
         let mut fits = 1.0_f32;
         for (force, yaw) in upright.iter().zip(yaw.iter()) {
             let room = if *yaw > 0.0 { self.force_max - force } else { *force };
             if yaw.abs() > room {
-                fits = fits.min(room.max(0.0) / yaw.abs());
+                fits = math::min(fits, math::max(room, 0.0) / yaw.abs());
             }
         }
-        (upright + yaw * fits).map(|force| force.max(0.0).min(self.force_max))
+        (upright + yaw * fits).map(|force| math::min(math::max(force, 0.0), self.force_max))
     }
 
     /// omega_i = sqrt(F_i / b), for forces that are not negative.

@@ -23,8 +23,6 @@ pub struct Tracking {
     pub x1d_dot: f32,
     /// d^2 x_1d/dt^2
     pub x1d_ddot: f32,
-    /// Largest speed phi that the errors may ask for.
-    pub rate_max: f32,
 }
 
 /// Backstepping errors of one subsystem.
@@ -39,14 +37,12 @@ pub struct Errors {
 }
 
 impl Errors {
-    /// (9), (12): e_2 = phi - x_2 with phi = d x_1d/dt + alpha_1 e_1, kept within the speed limit.
+    /// (9), (12): e_2 = d x_1d/dt + alpha_1 e_1 - x_2.
     #[inline]
     pub fn new(alpha1: f32, tracking: &Tracking) -> Self {
-        let Tracking { e1, x1d_dot, x2, rate_max, .. } = *tracking;
-        let e1_dot = x1d_dot - x2;
-        let phi = x1d_dot + alpha1 * e1;
-        let e2 = if phi.abs() > rate_max { rate_max.copysign(phi) - x2 } else { e1_dot + alpha1 * e1 };
-        Errors { e1, e1_dot, e2 }
+        let e1 = tracking.e1;
+        let e1_dot = tracking.x1d_dot - tracking.x2;
+        Errors { e1, e1_dot, e2: e1_dot + alpha1 * e1 }
     }
 }
 
@@ -116,6 +112,10 @@ impl Law for Backstepping {
         let dynamics = self.model.dynamics(axis, context);
         let u = ideal(gains.alpha1, &errors, tracking.x1d_ddot, &dynamics) + proportional(gains.alpha2, &errors);
         (u, errors)
+    }
+
+    fn alpha1(&self, axis: Axis) -> f32 {
+        self.gains.get(axis).alpha1
     }
 
     fn learnt((): &()) -> Estimate {

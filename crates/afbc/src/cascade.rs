@@ -9,8 +9,8 @@ use crate::ground::Ground;
 use crate::limits::Limits;
 use crate::math;
 use crate::monitor::Trip;
-use crate::screen::Screen;
 use airframe::{Axis, Inputs, OutOfRange, Parameters, PerAxis, Range, RotorForces, RotorSpeeds, Setpoint, State};
+use nalgebra::Vector3;
 
 /// Accepted time between steps \[s\].
 pub const DT: Range = Range::new("dt_s", 1e-4, 0.02);
@@ -27,6 +27,9 @@ pub trait Law {
     /// May update the estimate, if the context lets it.
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Self::Estimate)
     -> (f32, Errors);
+
+    /// alpha_1 of the subsystem \[1/s\].
+    fn alpha1(&self, axis: Axis) -> f32;
 
     /// The estimate to start from in flight, for a vehicle of this weight.
     fn start(&self, _axis: Axis, _weight_n: f32) -> Self::Estimate {
@@ -53,7 +56,7 @@ pub struct Context<'a> {
     pub dt_s: f32,
     /// False if estimates must stay as they are.
     pub adapt: bool,
-    /// What each subsystem wanted of its input in the last step and could not have.
+    /// What each subsystem wanted of its input in the last step and could not have; zero if it is not to care.
     pub unallocated: PerAxis<f32>,
 }
 
@@ -70,6 +73,8 @@ pub struct Settings {
     pub limits: Limits,
     /// Whether the desired attitude comes from the thrust really commanded; otherwise from (39), the thrust of hovering.
     pub tilt_by_thrust: bool,
+    /// Whether an estimate stops growing towards a limit of rotors, tilt or acceleration that has been reached.
+    pub heed_saturation: bool,
     /// Whether estimates stay as they are while the vehicle stands on the [`ground`](crate::ground).
     pub heed_ground: bool,
     /// Whether to take over a vehicle in flight as it is: estimates that carry its weight, a command filter that starts
@@ -90,7 +95,7 @@ impl Settings {
     }
 }
 
-/// A controller: fixed from here on. What changes in flight is in [`Memory`].
+/// A controller: fixed from here on. What changes in flight is in [`Cascade`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controller<L> {
     law: L,
@@ -101,27 +106,30 @@ pub struct Controller<L> {
     gravity_m_s2: f32,
     inverse_gravity: f32,
     tilt_max_tan: f32,
+    /// Largest e_1 of x, y and z \[m\]: alpha_1 times it is the largest speed.
+    error_max_m: Vector3<f32>,
 }
 
-/// What a controller remembers between steps.
+/// What the cascade remembers between steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Memory<E> {
+pub struct Cascade<E> {
     /// Estimates of each subsystem.
     pub estimates: PerAxis<E>,
+    /// Errors of each subsystem in the last step.
+    pub errors: PerAxis<Errors>,
     /// Filtered phi_d and theta_d; none before the first step.
     filtered: Option<[Filtered; 2]>,
     /// See [`Context::unallocated`].
     unallocated: PerAxis<f32>,
     ground: Ground,
-    screen: Screen,
     rotor_residual_rad_s: f32,
 }
 
-impl<E> Memory<E> {
+impl<E> Cascade<E> {
     /// The same flight with other estimates, of another law.
-    pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>) -> Memory<F> {
-        let Memory { filtered, unallocated, ground, screen, rotor_residual_rad_s, .. } = *self;
-        Memory { estimates, filtered, unallocated, ground, screen, rotor_residual_rad_s }
+    pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>) -> Cascade<F> {
+        let Cascade { errors, filtered, unallocated, ground, rotor_residual_rad_s, .. } = *self;
+        Cascade { estimates, errors, filtered, unallocated, ground, rotor_residual_rad_s }
     }
 }
 
@@ -189,7 +197,14 @@ impl<L: Law> Controller<L> {
     /// The first parameter or setting out of range.
     pub fn new(vehicle: Parameters, settings: Settings, law: L) -> Result<Self, OutOfRange> {
         settings.validate()?;
+        let Limits { speed_max_m_s, climb_max_m_s, .. } = settings.limits;
+        let error_max = |axis, speed| speed / law.alpha1(axis);
         Ok(Controller {
+            error_max_m: Vector3::new(
+                error_max(Axis::X, speed_max_m_s),
+                error_max(Axis::Y, speed_max_m_s),
+                error_max(Axis::Z, climb_max_m_s),
+            ),
             law,
             mixer: Mixer::new(&vehicle, settings.rotor_force_max_n)?,
             filter: CommandFilter::new(settings.command_filter_rad_s, settings.dt_s)?
@@ -205,39 +220,20 @@ impl<L: Law> Controller<L> {
     /// The part of (u5, u6) that tilt and acceleration limits leave, its direction kept.
     #[inline]
     fn limited(&self, u5: f32, u6: f32, vertical: f32) -> [f32; 2] {
-        let max = (vertical * self.tilt_max_tan).min(self.settings.limits.acceleration_max_m_s2);
+        let max = math::min(vertical * self.tilt_max_tan, self.settings.limits.acceleration_max_m_s2);
         let square = u5 * u5 + u6 * u6;
         let scale = if square > max * max { max / math::sqrt(square) } else { 1.0 };
         [u5 * scale, u6 * scale]
     }
 
-    /// One step: from what is measured and wanted to rotor speeds. Cannot fail; see [`Health`] for what it does with
-    /// input that is not plausible.
-    // Always: copying the command out of a call costs a tenth of a closed-loop step.
+    /// (7)-(40) in their order; `fresh` as in [`FlightController::decide`](crate::FlightController::decide).
     #[inline(always)]
-    pub fn step(&self, memory: &mut Memory<L::Estimate>, state: &State, setpoint: &Setpoint) -> Command {
-        let mut health = Health::default();
-        match memory.screen.pass(state, setpoint, &mut health) {
-            Some((state, setpoint)) => self.decide(memory, &state, &setpoint, health),
-            None => Command { health, ..Command::default() },
-        }
-    }
-
-    /// The step behind the screen, for a caller with one of its own: state and setpoint must be plausible
-    /// ([`State::is_plausible`], [`Setpoint::is_plausible`]).
-    #[inline(always)]
-    pub fn step_screened(&self, memory: &mut Memory<L::Estimate>, state: &State, setpoint: &Setpoint) -> Command {
-        self.decide(memory, state, setpoint, Health::default())
-    }
-
-    /// Estimates stay as they are if the state is not the present one.
-    #[inline(always)]
-    pub(crate) fn decide(
+    pub(crate) fn cascade(
         &self,
-        memory: &mut Memory<L::Estimate>,
+        memory: &mut Cascade<L::Estimate>,
         state: &State,
         setpoint: &Setpoint,
-        mut health: Health,
+        fresh: bool,
     ) -> Command {
         if memory.filtered.is_none() && self.settings.bumpless {
             memory.estimates = PerAxis::from_fn(|axis| self.law.start(axis, self.weight_n));
@@ -246,12 +242,11 @@ impl<L: Law> Controller<L> {
             state,
             rotor_residual_rad_s: memory.rotor_residual_rad_s,
             dt_s: self.settings.dt_s,
-            adapt: !health.state_rejected && !(self.settings.heed_ground && memory.ground.standing()),
+            adapt: fresh && !(self.settings.heed_ground && memory.ground.standing()),
             unallocated: memory.unallocated,
         };
         let hover_n = self.law.hover_thrust_n(&memory.estimates.z, self.weight_n);
-        let mut errors = PerAxis::default();
-        let estimates = &mut memory.estimates;
+        let Cascade { estimates, errors, .. } = memory;
         let mut input = |axis: Axis, tracking: Tracking| {
             let (u, e) = self.law.input(axis, &tracking, &context, estimates.get_mut(axis));
             *errors.get_mut(axis) = e;
@@ -259,20 +254,19 @@ impl<L: Law> Controller<L> {
         };
 
         // Position: subsystems 4, 5, 6.
-        let Limits { climb_max_m_s, speed_max_m_s, .. } = self.settings.limits;
         let (p, v, a) = (setpoint.position_m, setpoint.velocity_m_s, setpoint.acceleration_m_s2);
         let (xi, xi_dot) = (state.position_m, state.velocity_m_s);
-        let track =
-            |x1, x2, x1d, x1d_dot, x1d_ddot, rate_max| Tracking { x1, x2, e1: x1d - x1, x1d_dot, x1d_ddot, rate_max };
-        let u4 = input(Axis::Z, track(xi.z, xi_dot.z, p.z, v.z, a.z, climb_max_m_s));
-        let u5 = input(Axis::X, track(xi.x, xi_dot.x, p.x, v.x, a.x, speed_max_m_s));
-        let u6 = input(Axis::Y, track(xi.y, xi_dot.y, p.y, v.y, a.y, speed_max_m_s));
+        let track = |x1, x2, e1, x1d_dot, x1d_ddot| Tracking { x1, x2, e1, x1d_dot, x1d_ddot };
+        let e1 = (p - xi).zip_map(&self.error_max_m, |e1, max| math::max(math::min(e1, max), -max));
+        let u4 = input(Axis::Z, track(xi.z, xi_dot.z, e1.z, v.z, a.z));
+        let u5 = input(Axis::X, track(xi.x, xi_dot.x, e1.x, v.x, a.x));
+        let u6 = input(Axis::Y, track(xi.y, xi_dot.y, e1.y, v.y, a.y));
 
         // Desired attitude with the derivatives that (12) and (16) ask for.
         let (eta, eta_dot) = (state.attitude_rad, state.rates_rad_s);
         let (vertical, inverse_vertical) = if self.settings.tilt_by_thrust {
-            let upward_n = u4 * math::cos(eta.x) * math::cos(eta.y);
-            let share = (upward_n / hover_n).max(VERTICAL_MIN);
+            let upward_n = u4 * math::tilt_cosine(eta.x, eta.y);
+            let share = math::max(upward_n / hover_n, VERTICAL_MIN);
             (self.gravity_m_s2 * share, self.inverse_gravity / share)
         } else {
             (self.gravity_m_s2, self.inverse_gravity)
@@ -288,8 +282,8 @@ impl<L: Law> Controller<L> {
         // Attitude: subsystems 1, 2, 3.
         let roll_d_ddot = self.filter.acceleration(&roll_d, phi_d);
         let pitch_d_ddot = self.filter.acceleration(&pitch_d, theta_d);
-        let u1 = input(Axis::Roll, track(eta.x, eta_dot.x, roll_d.angle, roll_d.rate, roll_d_ddot, f32::MAX));
-        let u2 = input(Axis::Pitch, track(eta.y, eta_dot.y, pitch_d.angle, pitch_d.rate, pitch_d_ddot, f32::MAX));
+        let u1 = input(Axis::Roll, track(eta.x, eta_dot.x, roll_d.angle - eta.x, roll_d.rate, roll_d_ddot));
+        let u2 = input(Axis::Pitch, track(eta.y, eta_dot.y, pitch_d.angle - eta.y, pitch_d.rate, pitch_d_ddot));
         let u3 = input(
             Axis::Yaw,
             Tracking {
@@ -298,26 +292,27 @@ impl<L: Law> Controller<L> {
                 e1: math::wrap_angle(setpoint.yaw_rad - eta.z),
                 x1d_dot: setpoint.yaw_rate_rad_s,
                 x1d_ddot: setpoint.yaw_acceleration_rad_s2,
-                rate_max: f32::MAX,
             },
         );
 
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3, thrust_n: u4 };
         let Allocation { forces, unallocated, saturated } = self.mixer.allocate(&inputs);
         let speeds = self.mixer.speeds(&forces);
-        health.saturated = saturated;
+        let health = Health { saturated, ..Health::default() };
 
         memory.filtered = Some([self.filter.advance(&roll_d, phi_d), self.filter.advance(&pitch_d, theta_d)]);
         memory.ground.advance(forces.0.sum(), self.weight_n, &state.velocity_m_s, self.settings.dt_s);
         memory.rotor_residual_rad_s = speeds.residual_rad_s();
-        memory.unallocated = PerAxis {
-            roll: unallocated.roll_n,
-            pitch: unallocated.pitch_n,
-            yaw: unallocated.yaw_n,
-            z: unallocated.thrust_n,
-            x: u5 - a5,
-            y: u6 - a6,
-        };
-        Command { speeds, forces, inputs, virtual_m_s2: [u5, u6], desired_rad, filtered, errors, health }
+        if self.settings.heed_saturation {
+            memory.unallocated = PerAxis {
+                roll: unallocated.roll_n,
+                pitch: unallocated.pitch_n,
+                yaw: unallocated.yaw_n,
+                z: unallocated.thrust_n,
+                x: u5 - a5,
+                y: u6 - a6,
+            };
+        }
+        Command { speeds, forces, inputs, virtual_m_s2: [u5, u6], desired_rad, filtered, errors: memory.errors, health }
     }
 }

@@ -2,20 +2,31 @@
 //! them all.
 
 use crate::adaptive::Estimate;
-use crate::cascade::{Command, Controller, Law, Memory};
+use crate::cascade::{Cascade, Command, Controller, Health, Law};
+use crate::screen::Screen;
 use airframe::{PerAxis, Setpoint, State};
+
+/// What a controller remembers between steps: the last plausible input, and its own.
+///
+/// The default is that of a controller that has not flown yet.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Memory<M> {
+    screen: Screen,
+    /// Of the controller behind the screen.
+    pub control: M,
+}
 
 /// A controller from measured and wanted motion to rotor speeds.
 ///
-/// A controller is checked when it is built and fixed from then on; what changes in flight is in its `Memory`, whose
-/// default is that of a controller that has not flown yet. One step is called every `dt_s` seconds of its settings.
+/// A controller is checked when it is built and fixed from then on; what changes in flight is in its [`Memory`]. One step
+/// is called every `dt_s` seconds of its settings.
 ///
 /// ```
-/// use afbc::{Backstepping, Controller, FlightController, Profile};
+/// use afbc::{Backstepping, Controller, FlightController, Memory, Profile};
 /// use airframe::{OutOfRange, Parameters, PerAxis, Setpoint, State};
 ///
 /// fn first_thrust_n<C: FlightController>(controller: &C) -> f32 {
-///     controller.step(&mut C::Memory::default(), &State::default(), &Setpoint::default()).inputs.thrust_n
+///     controller.step(&mut Memory::default(), &State::default(), &Setpoint::default()).inputs.thrust_n
 /// }
 ///
 /// let vehicle = Parameters::PAPER.to_f32();
@@ -25,17 +36,27 @@ use airframe::{PerAxis, Setpoint, State};
 /// # Ok::<(), OutOfRange>(())
 /// ```
 pub trait FlightController {
-    /// What the controller remembers between steps.
+    /// What the controller itself remembers between steps.
     type Memory: Copy + Default + core::fmt::Debug;
 
-    /// One step. Cannot fail or panic; gives finite rotor speeds within their limits whatever it is given, and tells in
-    /// [`Command::health`] what of it was not plausible.
-    fn step(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint) -> Command;
+    /// The decision of one step, from a plausible state and setpoint ([`State::is_plausible`],
+    /// [`Setpoint::is_plausible`]). If the state is not `fresh` but an old one, nothing is learnt, integrated or filtered
+    /// from it. Cannot fail or panic; gives finite rotor speeds within their limits.
+    fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Command;
 
-    /// The step behind a [`Screen`](crate::Screen) of the caller's own: state and setpoint must be plausible
-    /// ([`State::is_plausible`], [`Setpoint::is_plausible`]).
-    fn step_screened(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint) -> Command {
-        self.step(memory, state, setpoint)
+    /// One step from any input, finite or not: [`FlightController::decide`] behind a [`Screen`]. [`Command::health`] tells
+    /// what was not plausible.
+    // Always: copying the command out of a call costs a tenth of a closed-loop step.
+    #[inline(always)]
+    fn step(&self, memory: &mut Memory<Self::Memory>, state: &State, setpoint: &Setpoint) -> Command {
+        let mut screened = Health::default();
+        let Some((state, setpoint)) = memory.screen.pass(state, setpoint, &mut screened) else {
+            return Command { health: screened, ..Command::default() };
+        };
+        let mut command = self.decide(&mut memory.control, &state, &setpoint, !screened.state_rejected);
+        command.health.state_rejected = screened.state_rejected;
+        command.health.setpoint_rejected = screened.setpoint_rejected;
+        command
     }
 
     /// Gives the flight back to a controller that has fallen back on another law, without a jump of its inputs. Does
@@ -49,16 +70,11 @@ pub trait FlightController {
 }
 
 impl<L: Law> FlightController for Controller<L> {
-    type Memory = Memory<L::Estimate>;
+    type Memory = Cascade<L::Estimate>;
 
     #[inline(always)]
-    fn step(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint) -> Command {
-        Controller::step(self, memory, state, setpoint)
-    }
-
-    #[inline(always)]
-    fn step_screened(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint) -> Command {
-        Controller::step_screened(self, memory, state, setpoint)
+    fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
+        self.cascade(memory, state, setpoint, fresh)
     }
 
     fn learnt(memory: &Self::Memory) -> PerAxis<Estimate> {

@@ -47,7 +47,7 @@ impl Membership {
 /// The basis of one subsystem, its constants worked out from a [`Membership`] that both inputs share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Basis {
-    /// k = c/s^2
+    /// k / ln 2, k = c/s^2
     k: f32,
     /// q = exp(-c^2 / 2s^2)
     q: f32,
@@ -61,7 +61,7 @@ impl Basis {
     pub fn new(membership: Membership) -> Result<Self, OutOfRange> {
         membership.validate()?;
         let spread = membership.centre / membership.width;
-        Ok(Basis { k: spread / membership.width, q: math::exp(-0.5 * spread * spread) })
+        Ok(Basis { k: spread / membership.width * core::f32::consts::LOG2_E, q: math::exp(-0.5 * spread * spread) })
     }
 
     /// w(x) of (18), one weight a rule: row = the first input's Gaussian, column = the second's, from -c to c.
@@ -75,13 +75,14 @@ impl Basis {
     /// The normalised memberships of each input: w(x) is their outer product, and seldom needed as such.
     #[inline]
     pub fn factors(&self, inputs: [f32; 2]) -> [Vector3<f32>; 2] {
-        inputs.map(|x| self.triple(x))
+        let [first, second] = inputs;
+        [self.triple(first), self.triple(second)]
     }
 
     /// The normalised memberships of one input.
     #[inline]
     fn triple(&self, x: f32) -> Vector3<f32> {
-        let t = math::exp(-self.k * x.abs());
+        let t = math::exp2(-self.k * x.abs());
         let (near, middle, far) = (self.q, t, self.q * t * t);
         // Each triple by its own sum: so no weight exceeds 1, rounding included.
         let scale = 1.0 / (near + middle + far);

@@ -1,13 +1,11 @@
 //! AFBC under its [monitor](crate::monitor): when that trips, [integral backstepping](crate::integral) flies on from the
 //! very inputs at hand, and AFBC takes over again on command only.
 
-use crate::Health;
 use crate::adaptive::{self, Adaptive, Estimate};
-use crate::cascade::{Command, Controller, Memory as Cascade, Settings};
+use crate::cascade::{Cascade, Command, Controller, Settings};
 use crate::flight_controller::FlightController;
 use crate::integral::{Integral, IntegralBackstepping};
 use crate::monitor::{Bounds, Figures, Monitor, Trip};
-use crate::screen::Screen;
 use airframe::{OutOfRange, Parameters, PerAxis, Setpoint, State};
 
 /// AFBC with a monitor and a law to fall back on.
@@ -19,22 +17,33 @@ pub struct Guarded {
     alpha2: PerAxis<f32>,
 }
 
-/// What changes in flight.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Memory {
-    adaptive: Cascade<Estimate>,
-    fallback: Option<Fallback>,
-    figures: Figures,
-    screen: Screen,
+/// Who flies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Pilot {
+    Afbc(Cascade<Estimate>),
+    StandIn(StandIn),
 }
 
 /// A flight under the law that stands in.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Fallback {
+struct StandIn {
     trip: Trip,
     cascade: Cascade<Integral>,
-    /// What AFBC must have learnt to go on from the last inputs.
+    /// What AFBC would have to know to go on from the last inputs.
     learnt: PerAxis<f32>,
+}
+
+/// What changes in flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Memory {
+    pilot: Pilot,
+    figures: Figures,
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Memory { pilot: Pilot::Afbc(Cascade::default()), figures: Figures::default() }
+    }
 }
 
 impl Memory {
@@ -45,7 +54,10 @@ impl Memory {
 
     /// Why AFBC does not fly, if it does not.
     pub fn trip(&self) -> Option<Trip> {
-        self.fallback.map(|fallback| fallback.trip)
+        match &self.pilot {
+            Pilot::Afbc(_) => None,
+            Pilot::StandIn(stand_in) => Some(stand_in.trip),
+        }
     }
 }
 
@@ -69,58 +81,65 @@ impl Guarded {
         })
     }
 
-    #[inline(always)]
-    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, health: Health) -> Command {
-        match &mut memory.fallback {
-            None => {
-                let command = self.adaptive.decide(&mut memory.adaptive, state, setpoint, health);
-                if let Some(trip) = self.monitor.watch(&mut memory.figures, &memory.adaptive.estimates, &command) {
-                    let inputs = command.per_axis();
-                    let resume = |axis| Integral { value: 0.0, resume: Some(*inputs.get(axis)) };
-                    let cascade = memory.adaptive.handed_over(PerAxis::from_fn(resume));
-                    memory.fallback = Some(Fallback { trip, cascade, learnt: PerAxis::default() });
-                }
-                command
-            }
-            Some(fallback) => self.stand_in(fallback, state, setpoint, health),
-        }
-    }
-
-    fn stand_in(&self, fallback: &mut Fallback, state: &State, setpoint: &Setpoint, health: Health) -> Command {
-        let mut command = self.fallback.decide(&mut fallback.cascade, state, setpoint, health);
-        command.health.trip = Some(fallback.trip);
+    /// One step of the law that stands in.
+    #[cold]
+    #[inline(never)]
+    fn stand_in(&self, memory: &mut StandIn, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
+        let mut command = self.fallback.cascade(&mut memory.cascade, state, setpoint, fresh);
+        command.health.trip = Some(memory.trip);
         let inputs = command.per_axis();
-        fallback.learnt =
-            PerAxis::from_fn(|axis| inputs.get(axis) - self.alpha2.get(axis) * command.errors.get(axis).e2);
+        memory.learnt = PerAxis::from_fn(|axis| inputs.get(axis) - self.alpha2.get(axis) * command.errors.get(axis).e2);
         command
     }
+}
+
+/// The law that stands in goes on from `inputs`, in the next step.
+#[cold]
+#[inline(never)]
+fn fall_back(trip: Trip, cascade: &Cascade<Estimate>, inputs: PerAxis<f32>) -> Pilot {
+    let resume = |axis| Integral { value: 0.0, resume: Some(*inputs.get(axis)) };
+    let cascade = cascade.handed_over(PerAxis::from_fn(resume));
+    Pilot::StandIn(StandIn { trip, cascade, learnt: PerAxis::default() })
 }
 
 impl FlightController for Guarded {
     type Memory = Memory;
 
     #[inline(always)]
-    fn step(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint) -> Command {
-        let mut health = Health::default();
-        match memory.screen.pass(state, setpoint, &mut health) {
-            Some((state, setpoint)) => self.decide(memory, &state, &setpoint, health),
-            None => Command { health, ..Command::default() },
+    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
+        let Memory { pilot, figures } = memory;
+        match pilot {
+            Pilot::Afbc(cascade) => {
+                let command = self.adaptive.cascade(cascade, state, setpoint, fresh);
+                let inputs = command.per_axis();
+                let saturated = command.health.saturated;
+                if let Some(trip) = self.monitor.watch(figures, cascade, &inputs, saturated) {
+                    *pilot = fall_back(trip, cascade, inputs);
+                }
+                command
+            }
+            // Field by field: a whole command straight from the call would have to be put together in memory on the other
+            // path too.
+            Pilot::StandIn(stand_in) => {
+                let Command { speeds, forces, inputs, virtual_m_s2, desired_rad, filtered, errors, health } =
+                    self.stand_in(stand_in, state, setpoint, fresh);
+                Command { speeds, forces, inputs, virtual_m_s2, desired_rad, filtered, errors, health }
+            }
         }
-    }
-
-    #[inline(always)]
-    fn step_screened(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint) -> Command {
-        self.decide(memory, state, setpoint, Health::default())
     }
 
     fn engage(&self, memory: &mut Memory) {
-        if let Some(Fallback { cascade, learnt, .. }) = memory.fallback.take() {
-            memory.adaptive = cascade.handed_over(PerAxis::from_fn(|axis| Estimate::of(*learnt.get(axis))));
-            memory.figures = Figures::default();
+        if let Pilot::StandIn(StandIn { cascade, learnt, .. }) = &memory.pilot {
+            let estimates = PerAxis::from_fn(|axis| Estimate::of(*learnt.get(axis)));
+            *memory = Memory { pilot: Pilot::Afbc(cascade.handed_over(estimates)), figures: Figures::default() };
         }
     }
 
+    /// Zero while the other law flies.
     fn learnt(memory: &Memory) -> PerAxis<Estimate> {
-        memory.adaptive.estimates
+        match &memory.pilot {
+            Pilot::Afbc(cascade) => cascade.estimates,
+            Pilot::StandIn(_) => PerAxis::default(),
+        }
     }
 }

@@ -12,6 +12,7 @@
 use crate::adaptive::{self, Estimate, GAMMA};
 use crate::backstepping::{self, Errors, Tracking, ideal, proportional};
 use crate::cascade::{Context, Law};
+use crate::math;
 use crate::model::Model;
 use crate::safeguards::THETA_MAX;
 use airframe::{Axis, OutOfRange, Parameters, PerAxis};
@@ -80,10 +81,14 @@ impl Law for IntegralBackstepping {
         if let Some(input) = integral.resume.take() {
             integral.value = input - fixed;
         }
-        let i = integral.value.max(-integral_max).min(*integral_max);
+        let i = math::min(math::max(integral.value, -integral_max), *integral_max);
         let winds_up = errors.e2 * context.unallocated.get(axis) > 0.0;
         integral.value = if context.adapt && !winds_up { i + kappa * errors.e2 * context.dt_s } else { i };
         (fixed + i, errors)
+    }
+
+    fn alpha1(&self, axis: Axis) -> f32 {
+        self.gains.get(axis).backstepping.alpha1
     }
 
     fn learnt(_: &Integral) -> Estimate {

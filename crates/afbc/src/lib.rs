@@ -18,7 +18,7 @@
 //! on host and target: all mathematics comes from [`math`].
 //!
 //! ```
-//! use afbc::{Adaptive, Controller, Memory, Profile};
+//! use afbc::{Adaptive, Controller, FlightController, Memory, Profile};
 //! use airframe::{Parameters, Setpoint, State};
 //!
 //! let vehicle = Parameters::PAPER.to_f32();
@@ -52,8 +52,8 @@ mod screen;
 
 pub use adaptive::Adaptive;
 pub use backstepping::Backstepping;
-pub use cascade::{Command, Controller, Health, Law, Memory, Settings};
-pub use flight_controller::FlightController;
+pub use cascade::{Cascade, Command, Controller, Health, Law, Settings};
+pub use flight_controller::{FlightController, Memory};
 pub use guarded::Guarded;
 pub use limits::Limits;
 pub use profile::Profile;

@@ -8,9 +8,9 @@ pub const TILT: Range = Range::new("tilt_max_rad", 0.05, 1.57);
 pub const TILT_RATE: Range = Range::new("tilt_rate_max_rad_s", 0.1, 1e6);
 /// Accepted largest horizontal acceleration \[m/s2\].
 pub const ACCELERATION: Range = Range::new("acceleration_max_m_s2", 0.1, 1e6);
-/// Accepted largest horizontal speed, along x and along y \[m/s\].
+/// Accepted largest speed for an error along x and along y \[m/s\].
 pub const SPEED: Range = Range::new("speed_max_m_s", 0.1, 1e6);
-/// Accepted largest rate of climb or descent \[m/s\].
+/// Accepted largest speed for an error along z \[m/s\].
 pub const CLIMB: Range = Range::new("climb_max_m_s", 0.1, 1e6);
 
 /// What position control may ask for.
@@ -22,7 +22,7 @@ pub struct Limits {
     pub tilt_rate_max_rad_s: f32,
     /// Size of (u5, u6) \[m/s2\].
     pub acceleration_max_m_s2: f32,
-    /// Speed along x and along y that the errors may ask for \[m/s\]; the reference itself may be faster by no more.
+    /// Speed along x and along y that a position error may ask for, on top of the reference's \[m/s\]: alpha_1 e_1.
     pub speed_max_m_s: f32,
     /// The same along z \[m/s\].
     pub climb_max_m_s: f32,

@@ -79,7 +79,7 @@ impl Model {
                 let tilt_cosine_dot = -math::sin(phi) * cos_theta * rates.x - cos_phi * math::sin(theta) * rates.y;
                 Dynamics {
                     f: -self.gravity,
-                    g: (cos_phi * cos_theta).max(TILT_COSINE_MIN) / self.mass,
+                    g: math::max(cos_phi * cos_theta, TILT_COSINE_MIN) / self.mass,
                     g_dot: tilt_cosine_dot / self.mass,
                 }
             }

@@ -13,7 +13,7 @@
 //! Norms and V_e are looked at for one subsystem a step, so each is at most six steps old.
 
 use crate::adaptive::{self, Estimate};
-use crate::cascade::Command;
+use crate::cascade::Cascade;
 use crate::math;
 use crate::model::Model;
 use airframe::{Axis, OutOfRange, Parameters, PerAxis, Range};
@@ -228,26 +228,31 @@ impl Monitor {
         })
     }
 
-    /// Takes one step into account; tells what is wrong, if anything is.
+    /// Takes one step into account; tells what is wrong, if anything is. `inputs` are U1..U4 \[N\], u5, u6 \[m/s2\].
     #[inline]
-    pub fn watch(&self, figures: &mut Figures, estimates: &PerAxis<Estimate>, command: &Command) -> Option<Trip> {
+    pub fn watch(
+        &self,
+        figures: &mut Figures,
+        cascade: &Cascade<Estimate>,
+        inputs: &PerAxis<f32>,
+        saturated: bool,
+    ) -> Option<Trip> {
         let axis = figures.axis.next();
         figures.axis = axis;
 
-        let estimate = estimates.get(axis);
+        let estimate = cascade.estimates.get(axis);
         let norm = Norm { theta_squared: estimate.theta.norm_squared(), delta: estimate.delta };
         *figures.norms.get_mut(axis) = norm;
 
-        let errors = command.errors.get(axis);
+        let errors = cascade.errors.get(axis);
         let v = 0.5 * errors.e1 * errors.e1 + self.half_inverse_gain.get(axis) * errors.e2 * errors.e2;
         let lyapunov = figures.lyapunov.get_mut(axis);
         // Its turn comes every sixth step.
         *lyapunov += 6.0 * self.forget * (v - *lyapunov);
 
-        let saturated = if command.health.saturated { 1.0 } else { 0.0 };
+        let saturated = if saturated { 1.0 } else { 0.0 };
         figures.saturation_share += self.forget * (saturated - figures.saturation_share);
 
-        let inputs = &command.inputs;
         let [roll, pitch, yaw, thrust] = &mut figures.swings;
         let Bounds { swing_n, swings_hz, .. } = self.bounds;
         let cycles = |swing: &mut Swing, input| {
@@ -255,10 +260,10 @@ impl Monitor {
             swing.rate_hz > swings_hz
         };
         let cycles = [
-            (cycles(roll, inputs.roll_n), Axis::Roll),
-            (cycles(pitch, inputs.pitch_n), Axis::Pitch),
-            (cycles(yaw, inputs.yaw_n), Axis::Yaw),
-            (cycles(thrust, inputs.thrust_n), Axis::Z),
+            (cycles(roll, inputs.roll), Axis::Roll),
+            (cycles(pitch, inputs.pitch), Axis::Pitch),
+            (cycles(yaw, inputs.yaw), Axis::Yaw),
+            (cycles(thrust, inputs.z), Axis::Z),
         ];
 
         if norm.theta_squared > *self.theta_squared.get(axis) {

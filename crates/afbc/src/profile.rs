@@ -60,6 +60,7 @@ impl Profile {
             rotor_force_max_n: 1e4,
             limits: Limits::NONE,
             tilt_by_thrust: false,
+            heed_saturation: false,
             heed_ground: false,
             bumpless: false,
         };
@@ -75,6 +76,7 @@ impl Profile {
                     climb_max_m_s: 3.0,
                 },
                 tilt_by_thrust: true,
+                heed_saturation: true,
                 heed_ground: true,
                 bumpless: true,
                 ..paper
@@ -92,7 +94,6 @@ fn flight(axis: Axis, paper: adaptive::Gains) -> adaptive::Gains {
         Axis::Z => (12.0, 0.9, 0.1, 30.0, 1.0),
         Axis::X | Axis::Y => (12.0, 0.3, 0.1, 15.0, 0.5),
     };
-    let safeguards =
-        Safeguards { sigma: 0.01, kappa: 0.0, theta_max, delta_max, dead_zone: 0.0, heed_saturation: true };
+    let safeguards = Safeguards { sigma: 0.01, kappa: 0.0, theta_max, delta_max, dead_zone: 0.0 };
     adaptive::Gains { gamma, eta, epsilon, safeguards, ..paper }
 }

@@ -12,7 +12,8 @@
 //! * kappa > 0: e-modification, Narendra and Annaswamy 1987. The same, but only while there is an error to learn from.
 //! * Theta_max, delta_max: projection, Pomet and Praly 1992. Never increases V as long as the optimum lies within.
 //! * Dead zone: no learning from errors that noise explains, Peterson and Narendra 1982.
-//! * Saturation: an estimate does not grow towards a limit that the rotors have reached already.
+//! * Saturation ([`Settings::heed_saturation`](crate::Settings)): an estimate does not grow towards a limit that has been
+//!   reached already.
 //!
 //! `docs/flight.md` derives the bound that then really follows.
 
@@ -42,14 +43,11 @@ pub struct Safeguards {
     pub delta_max: f32,
     /// |e_2| up to which nothing is learnt \[m/s or rad/s\].
     pub dead_zone: f32,
-    /// Whether an estimate stops growing towards a limit that has been reached.
-    pub heed_saturation: bool,
 }
 
 impl Safeguards {
     /// The law as printed.
-    pub const NONE: Self =
-        Safeguards { sigma: 0.0, kappa: 0.0, theta_max: 1e6, delta_max: 1e6, dead_zone: 0.0, heed_saturation: false };
+    pub const NONE: Self = Safeguards { sigma: 0.0, kappa: 0.0, theta_max: 1e6, delta_max: 1e6, dead_zone: 0.0 };
 
     /// Checks every value.
     ///
@@ -66,15 +64,8 @@ impl Safeguards {
     /// e: what there is to learn from e_2, when `unallocated` of the input that was wanted could not be given.
     #[inline]
     pub(crate) fn lesson(&self, e2: f32, unallocated: f32) -> f32 {
-        if self.heed_saturation && e2 * unallocated > 0.0 {
-            0.0
-        } else if e2 > self.dead_zone {
-            e2 - self.dead_zone
-        } else if e2 < -self.dead_zone {
-            e2 + self.dead_zone
-        } else {
-            0.0
-        }
+        let beyond = e2.abs() - self.dead_zone;
+        if beyond <= 0.0 || e2 * unallocated > 0.0 { 0.0 } else { beyond.copysign(e2) }
     }
 
     /// sigma + kappa |e_2| \[1/s\].

@@ -68,6 +68,35 @@ fn exp_never_falls_as_its_argument_grows() {
 }
 
 #[test]
+fn exp2_is_as_exact_as_documented_and_0_below() {
+    let relative = |x: f32| (f64::from(math::exp2(x)) / f64::from(x).exp2() - 1.0).abs();
+    let points = even_sweep(-126.0, 0.0, 8_000_000).chain(bit_sweep(997).filter(|x| (-126.0..=0.0).contains(x)));
+    assert_figure("exp2", worst(points, relative), 9e-8);
+    for x in bit_sweep(997).filter(|x| *x <= 0.0) {
+        let y = math::exp2(x);
+        assert!((0.0..=1.0).contains(&y) && (x >= -126.0 || y == 0.0), "exp2({x:e}) = {y:e}");
+    }
+    assert_eq!(math::exp2(f32::NEG_INFINITY), 0.0);
+}
+
+#[test]
+fn tanh_never_passes_1_nor_changes_its_sign() {
+    for x in bit_sweep(499).chain(even_sweep(-10.0, 10.0, 4_000_000)).chain([f32::INFINITY, f32::NEG_INFINITY]) {
+        let y = math::tanh(x);
+        assert!(y.abs() <= 1.0 && y * x >= 0.0, "tanh({x:e}) = {y:e}");
+    }
+}
+
+#[test]
+fn tan_and_tilt_cosine_are_as_exact_as_documented() {
+    let relative = |x: f32| (f64::from(math::tan(x)) / f64::from(x).tan() - 1.0).abs();
+    assert_figure("tan", worst(even_sweep(1e-3, 1.0, 1_000_000), relative), 3e-7);
+    assert_figure("tan near a quarter turn", worst(even_sweep(1.0, 1.57, 1_000_000), relative), 1e-4);
+    let alone = |x: f32| (f64::from(math::tilt_cosine(x, 0.0)) - f64::from(x).cos()).abs();
+    assert_figure("tilt_cosine", worst(even_sweep(-1.5707, 1.5707, 1_000_000), alone), 1e-3);
+}
+
+#[test]
 fn tanh_is_as_exact_as_documented() {
     let points = bit_sweep(499).chain(even_sweep(-10.0, 10.0, 4_000_000));
     assert_figure("tanh", worst(points, absolute(math::tanh, f64::tanh)), 1.2e-7);

@@ -1,17 +1,12 @@
 //! From thrust and angular acceleration to a command: the nominal vehicle and its rotors.
 
 use crate::attitude::roll_pitch;
-use afbc::allocation::Mixer;
+use afbc::allocation::{Allocation, Mixer};
 use afbc::backstepping::Errors;
 use afbc::command_filter::Filtered;
 use afbc::{Command, Health, Settings};
 use airframe::{Inputs, OutOfRange, Parameters, PerAxis, RotorSpeeds};
 use nalgebra::{Matrix3, Vector3};
-
-/// Largest |U3| as a share of U4: yaw is dear, since its moment is drag, and must leave something for roll and pitch.
-const YAW_SHARE: f32 = 0.5;
-/// What the rotors give counts as what was asked within this share of the thrust: rounding.
-const ROUNDING: f32 = 1e-4;
 
 /// The nominal vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,16 +66,10 @@ impl Body {
 
     /// The command for `demand`, and what of U1..U3 the rotors cannot give \[N\].
     #[inline]
-    pub(crate) fn command(&self, demand: &Demand, health: Health) -> (Command, Vector3<f32>) {
+    pub(crate) fn command(&self, demand: &Demand) -> (Command, Vector3<f32>) {
         let wanted = demand.angular_acceleration_rad_s2.component_div(&self.effectiveness);
-        let thrust_n = demand.thrust_n;
-        let yaw_max = YAW_SHARE * thrust_n.max(0.0);
-        let inputs =
-            Inputs { roll_n: wanted.x, pitch_n: wanted.y, yaw_n: wanted.z.max(-yaw_max).min(yaw_max), thrust_n };
-        let allocation = self.mixer.allocate(&inputs);
-        let given = Mixer::inputs(&allocation.forces);
-        let unallocated = (wanted - Vector3::new(given.roll_n, given.pitch_n, given.yaw_n))
-            .map(|missing| if missing.abs() > ROUNDING * thrust_n.abs() { missing } else { 0.0 });
+        let inputs = Inputs { roll_n: wanted.x, pitch_n: wanted.y, yaw_n: wanted.z, thrust_n: demand.thrust_n };
+        let Allocation { forces, unallocated, saturated } = self.mixer.allocate(&inputs);
 
         let desired_rad = roll_pitch(&demand.desired);
         let [roll, pitch] = desired_rad;
@@ -88,8 +77,8 @@ impl Body {
         let [position, velocity, attitude, rates] = demand.errors;
         let errors = |e1, e1_dot| Errors { e1, e1_dot, e2: 0.0 };
         let command = Command {
-            speeds: self.mixer.speeds(&allocation.forces),
-            forces: allocation.forces,
+            speeds: self.mixer.speeds(&forces),
+            forces,
             inputs,
             virtual_m_s2: [demand.acceleration_m_s2.x, demand.acceleration_m_s2.y],
             desired_rad,
@@ -102,8 +91,8 @@ impl Body {
                 x: errors(position.x, velocity.x),
                 y: errors(position.y, velocity.y),
             },
-            health: Health { saturated: allocation.saturated, ..health },
+            health: Health { saturated, ..Health::default() },
         };
-        (command, unallocated)
+        (command, Vector3::new(unallocated.roll_n, unallocated.pitch_n, unallocated.yaw_n))
     }
 }

@@ -41,7 +41,7 @@ use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
 use crate::limits::{Limits, TILT_MAX};
 use crate::pid::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
-use afbc::{Command, FlightController, Health, Screen, Settings};
+use afbc::{Command, FlightController, Settings};
 use airframe::{OutOfRange, Parameters, Range, Setpoint, State};
 use nalgebra::{Matrix3, Vector3};
 
@@ -192,7 +192,6 @@ pub struct Memory {
     /// What of U1..U3 the rotors could not give in the last step \[N\].
     unallocated: Vector3<f32>,
     specific_force: Smooth,
-    screen: Screen,
 }
 
 /// R_d, Omega_d, dOmega_d/dt; the last two in the desired frame.
@@ -258,12 +257,7 @@ impl FlightController for Geometric {
     type Memory = Memory;
 
     #[inline]
-    fn step(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint) -> Command {
-        let mut health = Health::default();
-        let Some((state, setpoint)) = memory.screen.pass(state, setpoint, &mut health) else {
-            return Command { health, ..Command::default() };
-        };
-
+    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
         // Position.
         let gravity = self.limits.gravity();
         let position_error = setpoint.position_m - state.position_m;
@@ -280,7 +274,7 @@ impl FlightController for Geometric {
         let filtered = &memory.specific_force;
         let second = self.filter.second_derivative(filtered, &specific_force);
         let Desired { r_earth_desired, rates_rad_s, rates_dot_rad_s2 } =
-            desired([filtered.value(), filtered.derivative(), second], &setpoint);
+            desired([filtered.value(), filtered.derivative(), second], setpoint);
 
         // Attitude.
         let r = r_earth_body(&state.attitude_rad);
@@ -303,9 +297,9 @@ impl FlightController for Geometric {
             desired_rates_rad_s: rates_rad_s,
             errors: [position_error, velocity_error, attitude_error, rate_error],
         };
-        let (command, unallocated) = self.body.command(&demand, health);
+        let (command, unallocated) = self.body.command(&demand);
 
-        if !health.state_rejected {
+        if fresh {
             let allowed = position_error.zip_map(&(wanted - specific_force), away_from);
             memory.position_integral = integrate(
                 &memory.position_integral,

@@ -38,7 +38,7 @@ use crate::differentiator::{Differentiator, Smooth};
 use crate::limits::{Limits, TILT_MAX, cylinder};
 use crate::pid::{SPEED_MAX, YAW_WEIGHT};
 use afbc::allocation::Mixer;
-use afbc::{Command, FlightController, Health, Screen, Settings, math};
+use afbc::{Command, FlightController, Settings, math};
 use airframe::{OutOfRange, Parameters, Range, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 
@@ -179,7 +179,6 @@ pub struct Memory {
     rates: Smooth,
     /// G u \[rad/s2\]
     rotor_acceleration: Smooth,
-    screen: Screen,
 }
 
 impl Indi {
@@ -213,11 +212,7 @@ impl FlightController for Indi {
     type Memory = Memory;
 
     #[inline]
-    fn step(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint) -> Command {
-        let mut health = Health::default();
-        let Some((state, setpoint)) = memory.screen.pass(state, setpoint, &mut health) else {
-            return Command { health, ..Command::default() };
-        };
+    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
         let r = r_earth_body(&state.attitude_rad);
         let (body_z, earth_z) = (unit(&r.column(2).into()), r.row(2).transpose());
 
@@ -225,7 +220,7 @@ impl FlightController for Indi {
         let rotors = memory.rotors.unwrap_or(self.hover);
         let now = Mixer::inputs(&self.body.mixer.forces(&rotors));
         // Without a new measurement all four rest, so that they stay in step.
-        if !health.state_rejected {
+        if fresh {
             let specific_force = body_z * (now.thrust_n / self.body.mass_kg);
             self.position_filter.advance(&mut memory.specific_force, &specific_force);
             self.position_filter.advance(&mut memory.velocity, &state.velocity_m_s);
@@ -258,7 +253,7 @@ impl FlightController for Indi {
             desired_rates_rad_s: rates_wanted,
             errors: [position_error, velocity_error, attitude_error, rate_error],
         };
-        let (command, _) = self.body.command(&demand, health);
+        let (command, _) = self.body.command(&demand);
         memory.rotors = Some(RotorSpeeds(rotors.0 + (command.speeds.0 - rotors.0) * self.rotor_gain));
         command
     }

@@ -25,7 +25,7 @@ use crate::attitude::{facing, length, r_earth_body, tilt_prioritised_error};
 use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
 use crate::limits::{Limits, TILT_MAX, cylinder};
-use afbc::{Command, FlightController, Health, Screen, Settings};
+use afbc::{Command, FlightController, Settings};
 use airframe::{OutOfRange, Parameters, Range, Setpoint, State};
 use nalgebra::Vector3;
 
@@ -207,7 +207,6 @@ pub struct Memory {
     unallocated: Vector3<f32>,
     velocity: Smooth,
     rates: Smooth,
-    screen: Screen,
 }
 
 impl Pid {
@@ -263,12 +262,7 @@ impl FlightController for Pid {
     type Memory = Memory;
 
     #[inline]
-    fn step(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint) -> Command {
-        let mut health = Health::default();
-        let Some((state, setpoint)) = memory.screen.pass(state, setpoint, &mut health) else {
-            return Command { health, ..Command::default() };
-        };
-        let fresh = !health.state_rejected;
+    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
         if fresh {
             self.differentiator.advance(&mut memory.velocity, &state.velocity_m_s);
             self.differentiator.advance(&mut memory.rates, &state.rates_rad_s);
@@ -307,7 +301,7 @@ impl FlightController for Pid {
             desired_rates_rad_s: rates_wanted,
             errors: [position_error, velocity_error, attitude_error, rate_error],
         };
-        let (command, unallocated) = self.body.command(&demand, health);
+        let (command, unallocated) = self.body.command(&demand);
 
         if fresh {
             let unwound = velocity_error - self.anti_windup.component_mul(&missing);

@@ -3,7 +3,7 @@
 
 mod harness;
 
-use afbc::{Command, FlightController};
+use afbc::{Command, FlightController, Memory};
 use airframe::{Range, Setpoint, State};
 use harness::{Random, SETTINGS, vehicle};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
@@ -28,7 +28,7 @@ fn indi() -> Indi {
 
 /// The command after `steps` steps of one and the same input.
 fn after<C: FlightController>(controller: &C, steps: usize, state: &State, setpoint: &Setpoint) -> Command {
-    let mut memory = C::Memory::default();
+    let mut memory = Memory::<C::Memory>::default();
     let mut command = Command::default();
     for _ in 0..steps {
         command = controller.step(&mut memory, state, setpoint);
@@ -283,37 +283,41 @@ fn an_integrator_does_not_wind_up_against_a_limit() {
     // Far away sideways and above for 20 s: tilt and thrust are at their limits all the time.
     let state = State { position_m: Vector3::new(-50.0, 0.0, 0.0), ..State::default() };
     let far = Setpoint { position_m: Vector3::new(0.0, 0.0, 500.0), ..Setpoint::default() };
-    let mut memory = pid::Memory::default();
+    let mut memory = Memory::<pid::Memory>::default();
     for _ in 0..20_000 {
         pid().step(&mut memory, &state, &far);
     }
     // 20 s of 4 1/s2 times 3 m/s would be 240 m/s2, clipped to 9.81 m/s2.
-    assert!(memory.velocity_integral.x < 4.0, "{:?}", memory.velocity_integral);
-    let mut memory = geometric::Memory::default();
+    assert!(memory.control.velocity_integral.x < 4.0, "{:?}", memory.control.velocity_integral);
+    let mut memory = Memory::<geometric::Memory>::default();
     for _ in 0..20_000 {
         goodarzi().step(&mut memory, &state, &far);
     }
-    assert!(memory.position_integral.x == 0.0 && memory.position_integral.z == 0.0, "{:?}", memory.position_integral);
+    assert!(
+        memory.control.position_integral.x == 0.0 && memory.control.position_integral.z == 0.0,
+        "{:?}",
+        memory.control.position_integral
+    );
 
     // A yaw error that the rotors cannot answer: the rate integral stays where it was.
     let turned = Setpoint { yaw_rad: 2.5, ..Setpoint::default() };
-    let mut memory = pid::Memory::default();
+    let mut memory = Memory::<pid::Memory>::default();
     for _ in 0..5000 {
         pid().step(&mut memory, &State::default(), &turned);
     }
-    assert!(memory.rate_integral.z < 0.1, "{:?}", memory.rate_integral);
-    let mut memory = geometric::Memory::default();
+    assert!(memory.control.rate_integral.z < 0.1, "{:?}", memory.control.rate_integral);
+    let mut memory = Memory::<geometric::Memory>::default();
     for _ in 0..5000 {
         goodarzi().step(&mut memory, &State::default(), &turned);
     }
-    assert!(memory.attitude_integral.z < 0.1, "{:?}", memory.attitude_integral);
+    assert!(memory.control.attitude_integral.z < 0.1, "{:?}", memory.control.attitude_integral);
 }
 
 #[test]
 fn no_integral_moves_on_a_stale_state() {
     let state = State { position_m: Vector3::new(-0.1, 0.2, 0.3), ..State::default() };
     let lost = State { position_m: Vector3::new(f32::NAN, 0.0, 0.0), ..State::default() };
-    let (mut a, mut b) = (pid::Memory::default(), geometric::Memory::default());
+    let (mut a, mut b) = (Memory::<pid::Memory>::default(), Memory::<geometric::Memory>::default());
     for _ in 0..100 {
         pid().step(&mut a, &state, &Setpoint::default());
         goodarzi().step(&mut b, &state, &Setpoint::default());
@@ -323,8 +327,14 @@ fn no_integral_moves_on_a_stale_state() {
         assert!(pid().step(&mut a, &lost, &Setpoint::default()).health.state_rejected);
         assert!(goodarzi().step(&mut b, &lost, &Setpoint::default()).health.state_rejected);
     }
-    assert_eq!((a.velocity_integral, a.rate_integral), (before_a.velocity_integral, before_a.rate_integral));
-    assert_eq!((b.position_integral, b.attitude_integral), (before_b.position_integral, before_b.attitude_integral));
+    assert_eq!(
+        (a.control.velocity_integral, a.control.rate_integral),
+        (before_a.control.velocity_integral, before_a.control.rate_integral)
+    );
+    assert_eq!(
+        (b.control.position_integral, b.control.attitude_integral),
+        (before_b.control.position_integral, before_b.control.attitude_integral)
+    );
 }
 
 /// Rotation about one axis alone: d rate/dt = (d/b)/Iz U3 + disturbance, the rotors' speeds behind their lag.
@@ -332,7 +342,7 @@ fn no_integral_moves_on_a_stale_state() {
 fn increments_cancel_a_constant_moment() {
     let controller = indi();
     let mixer = afbc::allocation::Mixer::new(&vehicle(), SETTINGS.rotor_force_max_n).unwrap();
-    let mut memory = indi::Memory::default();
+    let mut memory = Memory::<indi::Memory>::default();
     let mut rotors = nalgebra::Vector4::repeat(libm::sqrt(f64::from(WEIGHT_N) / 4.0 / 2.984e-5));
     let effectiveness = 3.232e-7 / 2.984e-5 / 0.0076;
     let (lag, dt_s) = (1.0 - libm::exp(-0.05), 1e-3);

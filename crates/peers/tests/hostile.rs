@@ -3,7 +3,7 @@
 
 mod harness;
 
-use afbc::{FlightController, Settings};
+use afbc::{FlightController, Memory, Settings};
 use airframe::{Range, Setpoint, State};
 use harness::{SETTINGS, vehicle};
 use nalgebra::Vector3;
@@ -51,7 +51,7 @@ fn anywhere<const N: usize>(tunables: [(&'static Range, &mut f32); N], shares: &
 }
 
 fn harmless<C: FlightController>(controller: &C, settings: &Settings, inputs: &[(State, Setpoint)]) {
-    let mut memory = C::Memory::default();
+    let mut memory = Memory::<C::Memory>::default();
     let fastest = libm::sqrtf(settings.rotor_force_max_n / vehicle().thrust_factor_n_s2) * 1.000_001;
     for (state, setpoint) in inputs {
         let command = controller.step(&mut memory, state, setpoint);
@@ -99,7 +99,7 @@ fn the_same_input_gives_the_same_bits() {
     let state = State { position_m: Vector3::new(0.1, 0.2, 0.3), ..State::default() };
     let controller = Indi::new(vehicle(), SETTINGS, indi::Gains::PAPER_VEHICLE).unwrap();
     let run = || {
-        let mut memory = indi::Memory::default();
+        let mut memory = Memory::<indi::Memory>::default();
         (0..100).map(|_| controller.step(&mut memory, &state, &Setpoint::default())).collect::<Vec<_>>()
     };
     assert_eq!(run(), run());

@@ -20,6 +20,7 @@
 //! What the trim does not know makes the true attitude leave the reckoned one as t^2, so this serves for fractions of a
 //! second, and the descent that follows for two seconds.
 
+use afbc::math::{max, min};
 use airframe::{Inputs, Parameters, State};
 use nalgebra::Vector2;
 
@@ -87,7 +88,7 @@ impl Blind {
     pub fn measure(&self, reckoning: &mut Reckoning, state: &State) {
         let rate_rad_s = state.rates_rad_s.xy();
         let innovation =
-            (rate_rad_s - reckoning.rate_rad_s).map(|rate| rate.clamp(-INNOVATION_MAX_RAD_S, INNOVATION_MAX_RAD_S));
+            (rate_rad_s - reckoning.rate_rad_s).map(|rate| min(max(rate, -INNOVATION_MAX_RAD_S), INNOVATION_MAX_RAD_S));
         let learnt = self.inverse_authority.component_mul(&innovation) / TRIM_S;
         reckoning.trim.roll_n -= learnt.x;
         reckoning.trim.pitch_n -= learnt.y;
@@ -102,8 +103,8 @@ impl Blind {
         let share = self.dt_s / TRIM_S;
         let yaw_max = 0.1 * self.weight_n;
         let Inputs { yaw_n, thrust_n, .. } = &mut reckoning.trim;
-        *yaw_n += share * (applied.yaw_n.max(-yaw_max).min(yaw_max) - *yaw_n);
-        *thrust_n += share * (applied.thrust_n.max(0.0).min(2.0 * self.weight_n) - *thrust_n);
+        *yaw_n += share * (min(max(applied.yaw_n, -yaw_max), yaw_max) - *yaw_n);
+        *thrust_n += share * (min(max(applied.thrust_n, 0.0), 2.0 * self.weight_n) - *thrust_n);
     }
 
     /// Inputs that keep the last attitude and the trimmed thrust.

@@ -1,5 +1,6 @@
 //! From rotor speed to throttle.
 
+use afbc::math::{max, min, sqrt};
 use airframe::{OutOfRange, Range, RotorSpeeds};
 
 /// Smallest throttle that turns a motor; 1 to 47 are commands, 0 stops it.
@@ -60,8 +61,10 @@ impl Motor {
     /// Throttle \[48 to 2047\] of an armed motor for `speed_rad_s`; never falls as the speed rises. Idle for what is not
     /// a positive number, full throttle above the largest speed.
     pub fn throttle(&self, speed_rad_s: f32) -> u16 {
-        let ratio = (speed_rad_s * self.inverse_speed_max).clamp(0.0, 1.0);
-        let u = self.inverse_curve(ratio * ratio).max(self.curve.idle).min(1.0);
+        let ratio = max(speed_rad_s * self.inverse_speed_max, 0.0);
+        // The speed follows the throttle: nothing to invert.
+        let u = if self.curve.linearity == 1.0 { ratio } else { self.inverse_curve(ratio * ratio) };
+        let u = min(max(u, self.curve.idle), 1.0);
         let span = f32::from(THROTTLE_MAX - THROTTLE_MIN);
         THROTTLE_MIN + (u * span + 0.5) as u16
     }
@@ -70,7 +73,7 @@ impl Motor {
     fn inverse_curve(&self, share: f32) -> f32 {
         let k = self.curve.linearity;
         let linear = 1.0 - k;
-        let denominator = linear + afbc::math::sqrt(linear * linear + 4.0 * k * share);
+        let denominator = linear + sqrt(linear * linear + 4.0 * k * share);
         if denominator > 0.0 { 2.0 * share / denominator } else { 0.0 }
     }
 }

@@ -74,8 +74,6 @@ pub struct Health {
 pub struct Outcome {
     /// What the motors get: zero if disarmed.
     pub motors: RotorSpeeds,
-    /// What is behind it. While blind, rotor speeds, forces and inputs only; disarmed, all zero.
-    pub command: Command,
     /// What the vehicle is doing.
     pub mode: Mode,
     /// How well.
@@ -107,7 +105,15 @@ impl<C: FlightController> Vehicle<C> {
     }
 
     /// One tick, to be called every millisecond; `now_us` is the time since power-up and never goes back. Cannot fail.
+    #[inline]
     pub fn tick(&self, memory: &mut Memory<C::Memory>, now_us: u64, inbox: &Inbox) -> Outcome {
+        self.traced_tick(memory, now_us, inbox).0
+    }
+
+    /// The same tick, with the command behind it: while blind, rotor speeds, forces and inputs only; disarmed, all zero.
+    // Always: a command that nobody looks at is then never put together.
+    #[inline(always)]
+    pub fn traced_tick(&self, memory: &mut Memory<C::Memory>, now_us: u64, inbox: &Inbox) -> (Outcome, Command) {
         // Take the newest inputs.
         let rate = memory.rate.tick(now_us);
         let measured = memory.take_state(inbox, now_us);
@@ -137,7 +143,7 @@ impl<C: FlightController> Vehicle<C> {
                     Some(state) => {
                         let target = flight.target(mode, &state, setpoint, now_us, self.dt_s);
                         // Screened above: both are plausible.
-                        let command = self.controller.step_screened(&mut flight.control, &state, &target);
+                        let command = self.controller.decide(&mut flight.control, &state, &target, true);
                         flight.applied = Mixer::inputs(&command.forces);
                         self.blind.trim(&mut flight.reckoning, &flight.applied);
                         command
@@ -155,10 +161,11 @@ impl<C: FlightController> Vehicle<C> {
         // Gate the motors.
         let motors = if mode.armed() { command.speeds } else { RotorSpeeds::default() };
         let health = Health { control: command.health, rate, state_age_us, setpoint_stale: setpoint.is_none() };
-        Outcome { motors, command, mode, health, answer }
+        (Outcome { motors, mode, health, answer }, command)
     }
 
     /// Rotor commands without a state.
+    #[inline(always)]
     fn blind_command<M>(&self, flight: &mut Flight<M>, mode: Mode) -> Command {
         flight.descent = None;
         let inputs = match mode {

@@ -2,7 +2,6 @@
 
 use super::target::Target;
 use super::{Failure, print};
-use afbc::Profile;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use pil::{Emulator, Image};
@@ -10,7 +9,7 @@ use sitl::flight::Sample;
 use sitl::in_the_loop::{self, Comparison, End, Error, Log, Pace, Station, Twins};
 use sitl::metrics::{Accumulator, Metrics};
 use sitl::run::Run;
-use sitl::scenario::{Contender, ControllerKind, DURATION, Scenario};
+use sitl::scenario::{DURATION, Scenario};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -96,8 +95,7 @@ pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &End) -> Resu
     let End { lost, interrupted, disarmed } = end;
     let mut text = match (lost, interrupted) {
         (None, false) => {
-            let afbc = Contender::of(ControllerKind::Afbc, Profile::Paper);
-            let without_link = Run::fly(scenario, &afbc, u64::MAX)?.metrics;
+            let without_link = Run::fly(scenario, &in_the_loop::firmware(), u64::MAX)?.metrics;
             in_the_loop::tracking(scenario.duration_s, metrics, &without_link)
         }
         (Some(lost), _) => format!("The vehicle was lost at t = {:.3} s: {}.\n", lost.time_s, lost.reason),

@@ -2,7 +2,7 @@
 
 use super::{Autopilot, Error, Heard, Pace, Station};
 use crate::flight::{Lost, Sample, lost};
-use crate::scenario::{Contender, ControllerKind, Scenario};
+use crate::scenario::{Contender, ControllerKind, Law, Scenario};
 use crate::trajectory::Reference;
 use afbc::Profile;
 use airframe::{Parameters, PerAxis, RotorForces};
@@ -33,18 +33,27 @@ pub struct End {
     pub disarmed: bool,
 }
 
-/// Whether the firmware can fly `scenario`.
+/// Who flies in the loop: AFBC in the profile `flight`, under its monitor.
+pub fn firmware() -> Contender {
+    let Contender { settings, .. } = Contender::of(ControllerKind::Afbc, Profile::Flight);
+    Contender { name: "firmware".into(), law: Law::Guarded(Profile::Flight.gains()), settings }
+}
+
+/// Whether the firmware can fly `scenario`. The [`firmware`] has its own profile; a scenario that leaves gains and settings
+/// as they are in any profile does not mind.
 ///
 /// # Errors
 /// [`Error::Mismatch`] names what the firmware holds otherwise.
 pub fn check(scenario: &Scenario) -> Result<(), Error> {
-    let firmware = Contender::of(ControllerKind::Afbc, Profile::Paper);
     let afbc = scenario.contender(ControllerKind::Afbc);
+    let profile = |same: fn(&Contender, Profile) -> bool| {
+        afbc.is_none_or(|afbc| Profile::ALL.into_iter().any(|profile| same(afbc, profile)))
+    };
     let agreed = [
         (scenario.vehicle == Parameters::PAPER, "another vehicle"),
         (afbc.is_some(), "another law"),
-        (afbc.is_none_or(|afbc| afbc.law == firmware.law), "other gains"),
-        (afbc.is_none_or(|afbc| afbc.settings == firmware.settings), "other settings"),
+        (profile(|afbc, profile| afbc.gains() == Some(&profile.gains())), "other gains"),
+        (profile(|afbc, profile| afbc.settings == profile.settings()), "other settings"),
     ];
     match agreed.into_iter().find(|(agreed, _)| !agreed) {
         Some((_, what)) => Err(Error::Mismatch(what)),

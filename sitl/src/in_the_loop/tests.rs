@@ -4,7 +4,7 @@
 use super::*;
 use crate::metrics::{Accumulator, Metrics};
 use crate::run::Run;
-use crate::scenario::{ControllerKind, Law, Scenario, built_in};
+use crate::scenario::{Law, Scenario, built_in};
 use core::ops::ControlFlow;
 
 fn scenario(name: &str, duration_s: f64) -> Scenario {
@@ -25,7 +25,7 @@ fn the_link_in_between_changes_nothing_that_matters() {
     let scenario = scenario("paper", 60.0);
     let (end, looped) = fly_host(&scenario);
     assert_eq!(end, End { lost: None, interrupted: false, disarmed: true });
-    let plain = Run::fly(&scenario, scenario.contender(ControllerKind::Afbc).unwrap(), u64::MAX).unwrap().metrics;
+    let plain = Run::fly(&scenario, &firmware(), u64::MAX).unwrap().metrics;
     // The wire rounds the attitude to a quaternion of f32, and has no yaw acceleration.
     assert!((looped.rmse - plain.rmse).amax() < 1e-3, "{} {}", looped.rmse, plain.rmse);
     assert!((looped.max_abs - plain.max_abs).amax() < 5e-3, "{} {}", looped.max_abs, plain.max_abs);

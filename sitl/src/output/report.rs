@@ -209,8 +209,16 @@ fn parameters(scenario: &Scenario) -> Markup {
 
 /// Who flew: settings and gains.
 fn gains(contender: &Contender) -> Markup {
-    let Settings { dt_s, command_filter_rad_s, rotor_force_max_n, limits, tilt_by_thrust, heed_ground, bumpless } =
-        contender.settings;
+    let Settings {
+        dt_s,
+        command_filter_rad_s,
+        rotor_force_max_n,
+        limits,
+        tilt_by_thrust,
+        heed_ground,
+        bumpless,
+        heed_saturation,
+    } = contender.settings;
     let mut settings = format!("steps of {dt_s} s, at most {rotor_force_max_n} N a rotor");
     if !contender.law.is_peer() {
         settings += &format!(", command filter {command_filter_rad_s} rad/s");
@@ -218,6 +226,7 @@ fn gains(contender: &Contender) -> Markup {
             (tilt_by_thrust, "tilt by thrust"),
             (heed_ground, "heeds the ground"),
             (bumpless, "bumpless"),
+            (heed_saturation, "heeds saturation"),
             (matches!(contender.law, Law::Guarded(_)), "monitored"),
         ];
         settings.extend(also.into_iter().filter(|(on, _)| *on).map(|(_, word)| format!(", {word}")));

@@ -2,7 +2,7 @@
 
 #![allow(dead_code, reason = "each test file uses a part")]
 
-use afbc::{Command, FlightController, Profile, Settings};
+use afbc::{Command, FlightController, Memory, Profile, Settings};
 use airframe::{Axis, Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Plant, Quantity};
@@ -84,7 +84,7 @@ pub(crate) fn fly<C: FlightController>(
 ) -> Figures {
     let dt_s = 0.001;
     let mut plant = Plant::new(Model::RigidBody, initial, environment);
-    let mut memory = C::Memory::default();
+    let mut memory = Memory::<C::Memory>::default();
     let hover = libm::sqrt(0.486 * 9.81 / 4.0 / 2.984e-5);
     let mut rotors = Vector4::repeat(hover);
     let mut queue: VecDeque<Command> = VecDeque::new();

@@ -1,7 +1,6 @@
-//! `controllers`, `profile`, `[gains.AXIS]`, `[settings]`, `[limits]`, `monitor` and `[[contender]]`: who flies.
+//! `[gains.AXIS]`, `[settings]` and `[limits]`, of a file or of a contender.
 
 use super::{FileError, Table};
-use crate::contender::{Contender, ControllerKind, Law, backstepping_part};
 use crate::scenario::words::out_of_range;
 use afbc::adaptive::{EPSILON, ETA, GAMMA, Gains};
 use afbc::allocation::FORCE_MAX;
@@ -11,100 +10,11 @@ use afbc::command_filter::BANDWIDTH;
 use afbc::fuzzy::{CENTRE, Membership, WIDTH};
 use afbc::limits::{ACCELERATION, CLIMB, SPEED, TILT, TILT_RATE};
 use afbc::safeguards::{DEAD_ZONE, DELTA_MAX, KAPPA, SIGMA, THETA_MAX};
-use afbc::{Limits, Profile, Safeguards, Settings};
+use afbc::{Limits, Safeguards, Settings};
 use airframe::{Axis, PerAxis, Range};
 
-/// Longest name of a contender: what a table has room for.
-const NAME_LENGTH: usize = 32;
-
-/// What a contender starts from.
-#[derive(Clone, Copy)]
-struct Defaults {
-    profile: Profile,
-    gains: PerAxis<Gains>,
-    settings: Settings,
-    /// Whether AFBC flies under its monitor.
-    monitor: bool,
-}
-
-impl Defaults {
-    fn law(&self, kind: ControllerKind) -> Law {
-        match kind {
-            ControllerKind::Afbc if self.monitor => Law::Guarded(self.gains),
-            ControllerKind::Afbc => Law::Afbc(self.gains),
-            ControllerKind::Backstepping => Law::Backstepping(backstepping_part(&self.gains)),
-            _ => Law::of(kind, self.profile),
-        }
-    }
-}
-
-/// Everyone who flies, those of `controllers` first.
-pub(super) fn contenders(root: &mut Table<'_>) -> Result<Vec<Contender>, FileError> {
-    let controllers = root.choices("controllers", &ControllerKind::ALL, ControllerKind::name)?;
-    let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(Profile::Paper);
-    let gains = per_axis(root.table("gains")?, profile.gains(), axis_gains)?;
-    let settings = settings(root, profile.settings(), true)?;
-    let monitor = root.boolean("monitor")?.unwrap_or(false);
-    let defaults = Defaults { profile, gains, settings, monitor };
-
-    let tables = root.few_tables("contender")?;
-    let kinds = controllers.unwrap_or(if tables.is_empty() { ControllerKind::PAPER.to_vec() } else { Vec::new() });
-    let short = |kind: ControllerKind| Contender { name: kind.name().into(), law: defaults.law(kind), settings };
-    let mut contenders: Vec<_> = kinds.into_iter().map(short).collect();
-    for table in tables {
-        contenders.push(contender(table, defaults, &contenders)?);
-    }
-    Ok(contenders)
-}
-
-fn contender(mut table: Table<'_>, file: Defaults, others: &[Contender]) -> Result<Contender, FileError> {
-    let name = table.need_text("name", "give it one, such as \"gentle\"")?.to_owned();
-    if !(1..=NAME_LENGTH).contains(&name.chars().count()) || name.chars().any(char::is_control) {
-        let problem = format!("it cannot be a name; make it one plain line of 1 to {NAME_LENGTH} characters");
-        return Err(table.fault_at("name", problem));
-    }
-    if others.iter().any(|other| other.name == name) {
-        return Err(table.fault_at("name", format!("\"{name}\" is the name of another contender; choose another")));
-    }
-    let kind = table.need_choice("controller", &ControllerKind::ALL, ControllerKind::name)?;
-    let mut defaults = match table.choice("profile", &Profile::ALL, Profile::name)? {
-        Some(profile) => Defaults {
-            profile,
-            gains: profile.gains(),
-            settings: Settings { dt_s: file.settings.dt_s, ..profile.settings() },
-            monitor: file.monitor,
-        },
-        None => file,
-    };
-    if kind == ControllerKind::Afbc {
-        defaults.monitor = table.boolean("monitor")?.unwrap_or(defaults.monitor);
-    }
-    let law = law(table.table("gains")?, defaults.law(kind))?;
-    let settings = settings(&mut table, defaults.settings, false)?;
-    table.finish()?;
-    Ok(Contender { name, law, settings })
-}
-
-/// The law with the gains in `table`; those that it leaves out are as in `default`.
-fn law(table: Option<Table<'_>>, mut default: Law) -> Result<Law, FileError> {
-    match default {
-        Law::Afbc(gains) => per_axis(table, gains, axis_gains).map(Law::Afbc),
-        Law::Guarded(gains) => per_axis(table, gains, axis_gains).map(Law::Guarded),
-        Law::Backstepping(gains) => per_axis(table, gains, axis_backstepping).map(Law::Backstepping),
-        _ => {
-            let Some(mut table) = table else { return Ok(default) };
-            default.each_gain(|range, gain| {
-                *gain = number(&mut table, range, *gain)?;
-                Ok(())
-            })?;
-            table.finish()?;
-            Ok(default)
-        }
-    }
-}
-
 /// One table for each axis; what is left out is as in `default`.
-fn per_axis<G: Copy>(
+pub(super) fn per_axis<G: Copy>(
     table: Option<Table<'_>>,
     default: PerAxis<G>,
     read: fn(Table<'_>, &G) -> Result<G, FileError>,
@@ -127,13 +37,16 @@ fn alphas(table: &mut Table<'_>, default: &backstepping::Gains) -> Result<backst
     })
 }
 
-fn axis_backstepping(mut table: Table<'_>, default: &backstepping::Gains) -> Result<backstepping::Gains, FileError> {
+pub(super) fn axis_backstepping(
+    mut table: Table<'_>,
+    default: &backstepping::Gains,
+) -> Result<backstepping::Gains, FileError> {
     let gains = alphas(&mut table, default)?;
     table.finish()?;
     Ok(gains)
 }
 
-fn axis_gains(mut table: Table<'_>, default: &Gains) -> Result<Gains, FileError> {
+pub(super) fn axis_gains(mut table: Table<'_>, default: &Gains) -> Result<Gains, FileError> {
     let gains = Gains {
         backstepping: alphas(&mut table, &default.backstepping)?,
         gamma: number(&mut table, &GAMMA, default.gamma)?,
@@ -160,12 +73,11 @@ fn safeguards(table: &mut Table<'_>, default: &Safeguards) -> Result<Safeguards,
         theta_max: number(table, &THETA_MAX, default.theta_max)?,
         delta_max: number(table, &DELTA_MAX, default.delta_max)?,
         dead_zone: number(table, &DEAD_ZONE, default.dead_zone)?,
-        heed_saturation: table.boolean("heed_saturation")?.unwrap_or(default.heed_saturation),
     })
 }
 
 /// `[settings]` and `[limits]` in `parent`; what they leave out is as in `default`. Only the file's own have a time step.
-fn settings(parent: &mut Table<'_>, default: Settings, with_step: bool) -> Result<Settings, FileError> {
+pub(super) fn settings(parent: &mut Table<'_>, default: Settings, with_step: bool) -> Result<Settings, FileError> {
     let mut settings = default;
     if let Some(mut table) = parent.table("settings")? {
         if !with_step {
@@ -178,6 +90,7 @@ fn settings(parent: &mut Table<'_>, default: Settings, with_step: bool) -> Resul
             tilt_by_thrust: table.boolean("tilt_by_thrust")?.unwrap_or(default.tilt_by_thrust),
             heed_ground: table.boolean("heed_ground")?.unwrap_or(default.heed_ground),
             bumpless: table.boolean("bumpless")?.unwrap_or(default.bumpless),
+            heed_saturation: table.boolean("heed_saturation")?.unwrap_or(default.heed_saturation),
             limits: default.limits,
         };
         table.finish()?;
@@ -200,6 +113,6 @@ fn limits(mut table: Table<'_>, default: &Limits) -> Result<Limits, FileError> {
     Ok(limits)
 }
 
-fn number(table: &mut Table<'_>, range: &Range, default: f32) -> Result<f32, FileError> {
+pub(super) fn number(table: &mut Table<'_>, range: &Range, default: f32) -> Result<f32, FileError> {
     Ok(table.number(range)?.map_or(default, |number| number as f32))
 }

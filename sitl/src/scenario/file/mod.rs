@@ -1,5 +1,6 @@
 //! Scenario files. The format is described, key by key, in `docs/scenarios.md`.
 
+mod contenders;
 mod control;
 mod environment;
 mod motion;
@@ -107,7 +108,7 @@ pub(crate) fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajecto
 
     let vehicle = vehicle::read(root.table("vehicle")?, Parameters::PAPER)?;
     let truth = vehicle::read(root.table("truth")?, vehicle)?;
-    let contenders = control::contenders(&mut root)?;
+    let contenders = contenders::read(&mut root)?;
     let trajectory = match (root.table("trajectory")?, trajectory) {
         (Some(table), _) => trajectory::read(table)?,
         (None, Some(trajectory)) => trajectory.clone(),
