@@ -107,15 +107,8 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
     let files: Vec<_> = kept.iter().collect();
     fs::write(files[0].0, &files[0].1[..files[0].1.len() / 2]).unwrap();
     let other = folder.join("other");
-    let strangers = parse(&SMALL.replace("seed = 7", "seed = 8").replace("flights = 150", "flights = 33"));
-    {
-        let stop = AtomicBool::new(false);
-        let place = Folder::open(&other, Manifest::new(&strangers, Shard::WHOLE)).unwrap();
-        let progress = |flights| stop.store(flights > 0, Ordering::Relaxed);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-        pool.install(|| campaign::fly(&strangers, &place, &stop, &progress)).unwrap();
-    }
-    fs::write(files[1].0, b"PAR1 something else PAR1").unwrap();
+    fly(&parse(&SMALL.replace("seed = 7", "seed = 8").replace("= 150", "= 32")), &other, Shard::WHOLE, 1);
+    fs::copy(other.join("results.parquet"), files[1].0).unwrap();
     let unfinished = path.join("chunks").join(".000004.parquet.1.tmp");
     fs::write(&unfinished, b"PAR1").unwrap();
 
@@ -190,6 +183,9 @@ fn a_folder_belongs_to_one_campaign_and_one_program() {
         assert!(error.contains("not this one") && error.contains("--out"), "{to}: {error}");
     }
     assert!(refused(&campaign, Shard { index: 1, of: 2 }).contains("not this one"));
+    // Words for people, and where the file is, do not matter.
+    let renamed = campaign::parse("/elsewhere/small.toml", SMALL, "small", Path::new("")).unwrap();
+    Folder::open(&folder, Manifest::new(&renamed, Shard::WHOLE)).unwrap();
     Folder::open(&folder, Manifest::new(&campaign, Shard::WHOLE)).unwrap();
 }
 
