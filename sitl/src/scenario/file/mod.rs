@@ -103,8 +103,8 @@ pub(crate) fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajecto
     let [name, description] = title(&mut root, name)?;
     let duration_s = root.number(&DURATION)?.unwrap_or(DURATION_S);
     let models = [Model::Simplified, Model::RigidBody];
-    let model = root.choice("plant", &models, Model::name)?.unwrap_or(Model::RigidBody);
     let seed = seed(&mut root)?;
+    let model = root.choice("plant", &models, Model::name)?.unwrap_or(Model::RigidBody);
 
     let vehicle = vehicle::read(root.table("vehicle")?, Parameters::PAPER)?;
     let truth = vehicle::read(root.table("truth")?, vehicle)?;
