@@ -211,8 +211,8 @@ impl Law for Adaptive {
         self.subsystems.get(axis).gains.backstepping.alpha1
     }
 
-    fn start(&self, axis: Axis, weight_n: f32) -> Estimate {
-        if axis == Axis::Z { Estimate::of(weight_n) } else { Estimate::default() }
+    fn start(&self, estimates: &mut PerAxis<Estimate>, weight_n: f32) {
+        estimates.z = Estimate::of(weight_n);
     }
 
     fn hover_thrust_n(&self, z: &Estimate, weight_n: f32) -> f32 {

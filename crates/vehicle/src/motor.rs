@@ -61,16 +61,17 @@ impl Motor {
     /// Throttle \[48 to 2047\] of an armed motor for `speed_rad_s`; never falls as the speed rises. Idle for what is not
     /// a positive number, full throttle above the largest speed.
     pub fn throttle(&self, speed_rad_s: f32) -> u16 {
-        let ratio = max(speed_rad_s * self.inverse_speed_max, 0.0);
+        let ratio = speed_rad_s * self.inverse_speed_max;
         // The speed follows the throttle: nothing to invert.
-        let u = if self.curve.linearity == 1.0 { ratio } else { self.inverse_curve(ratio * ratio) };
+        let u = if self.curve.linearity == 1.0 { ratio } else { self.inverse_curve(max(ratio, 0.0)) };
         let u = min(max(u, self.curve.idle), 1.0);
         let span = f32::from(THROTTLE_MAX - THROTTLE_MIN);
         THROTTLE_MIN + (u * span + 0.5) as u16
     }
 
-    /// u in 0..1 with k u^2 + (1 - k) u = `share`: the quadratic's root in the form that holds for k = 0 too. 0 for NaN.
-    fn inverse_curve(&self, share: f32) -> f32 {
+    /// u in 0..1 with k u^2 + (1 - k) u = `ratio`^2: the quadratic's root in the form that holds for k = 0 too. 0 for NaN.
+    fn inverse_curve(&self, ratio: f32) -> f32 {
+        let share = ratio * ratio;
         let k = self.curve.linearity;
         let linear = 1.0 - k;
         let denominator = linear + sqrt(linear * linear + 4.0 * k * share);

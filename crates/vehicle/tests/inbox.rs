@@ -14,8 +14,8 @@ fn disarming_wins_whichever_came_first() {
         let mut inbox = Inbox::default();
         inbox.ask(first);
         inbox.ask(second);
-        assert_eq!(inbox.take().request, Some(expected));
-        assert_eq!(inbox.take().request, None, "a request is done with");
+        assert_eq!(inbox.take().request(), Some(expected));
+        assert_eq!(inbox.take().request(), None, "a request is done with");
     }
 }
 
