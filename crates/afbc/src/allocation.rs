@@ -126,7 +126,8 @@ impl<const N: usize> Mixer<N> {
         if forces.iter().all(|&force| 0.0 <= force && force <= self.force_max) {
             return Allocation { forces: RotorForces(forces), unallocated: Inputs::default(), saturated: false };
         }
-        let wanted = wanted.map(|u| if u.is_nan() { 0.0 } else { u });
+        // A NaN in any makes the sum one.
+        let wanted = if wanted.sum().is_nan() { wanted.map(|u| if u.is_nan() { 0.0 } else { u }) } else { wanted };
         let forces = self.within_limits(&wanted);
         let missing = wanted - self.effectiveness * forces;
         let unallocated = Inputs { roll_n: missing.x, pitch_n: missing.y, yaw_n: missing.z, thrust_n: missing.w };

@@ -20,8 +20,8 @@ impl Ground {
     /// Takes one step into account.
     #[inline]
     pub fn advance(&mut self, thrust_n: f32, weight_n: f32, velocity_m_s: &Vector3<f32>, dt_s: f32) {
-        let still = velocity_m_s.iter().all(|v| v.abs() < STILL_M_S);
-        self.still_s = if thrust_n < LIFT_SHARE * weight_n && still { self.still_s + dt_s } else { 0.0 };
+        let still = || velocity_m_s.iter().all(|v| v.abs() < STILL_M_S);
+        self.still_s = if thrust_n < LIFT_SHARE * weight_n && still() { self.still_s + dt_s } else { 0.0 };
     }
 
     /// True if the ground carries the vehicle.

@@ -129,7 +129,10 @@ impl<C: FlightController> Vehicle<C> {
         let setpoint = inbox.setpoint().filter(|s| s.age_us(now_us) <= SETPOINT_STALE_US).map(|s| &s.value);
 
         // Supervise.
-        let ready = self.limits.ready(fresh, setpoint, rate.healthy());
+        let ready = match mode.armed() {
+            true => Err(Refusal::AlreadyArmed),
+            false => self.limits.ready(fresh, setpoint, rate.healthy()),
+        };
         let request = inbox.request();
         let answer = request.map(|request| mode.answer(request, ready));
         let landed = flight.as_ref().is_some_and(|flight| flight.guide.landed(now_us));
