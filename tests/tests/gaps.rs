@@ -308,9 +308,10 @@ fn gap_5_as_forces_and_moments_both_lose_the_vehicle_to_the_moment_on_roll() {
         for run in both(Reading::Forces, model) {
             // 1.2 N on 0.486 kg from 7.5 s on is survived. 1.2 N m on 0.0038 kg m2 from 15 s on is 316 rad/s2: it takes
             // 4.8 N of difference between opposed rotors, more than the vehicle weighs, to hold it, and either the roll
-            // is lost (rigid body) or the thrust that goes with it carries the vehicle away.
+            // is lost (rigid body) or the thrust that goes with it, since roll comes before thrust where rotors are
+            // at zero, carries the vehicle away within 4 s.
             let lost = run.lost.unwrap();
-            assert!((15.0..18.0).contains(&lost.time_s), "{} {}: {lost:?}", model.name(), run.controller.name());
+            assert!((15.0..19.0).contains(&lost.time_s), "{} {}: {lost:?}", model.name(), run.controller.name());
         }
     }
 }

@@ -97,7 +97,8 @@ impl Estimate {
     #[inline]
     fn advance(&mut self, rate: &Rate, safeguards: &Safeguards, dt_s: f32) {
         let Safeguards { theta_max, delta_max, .. } = *safeguards;
-        let keep = 1.0 - rate.leakage * dt_s;
+        // What leaks faster than a step is long is gone after it; it does not turn round.
+        let keep = math::max(1.0 - rate.leakage * dt_s, 0.0);
         self.theta = self.theta * keep + rate.first * (rate.theta * dt_s) * rate.second.transpose();
         let square = self.theta.norm_squared();
         if square > theta_max * theta_max {

@@ -2,6 +2,7 @@
 //! very inputs at hand, and AFBC takes over again on command only.
 
 use crate::adaptive::{self, Adaptive, Estimate};
+use crate::backstepping::Errors;
 use crate::cascade::{Cascade, Command, Controller, Settings};
 use crate::flight_controller::FlightController;
 use crate::integral::{Integral, IntegralBackstepping};
@@ -94,6 +95,11 @@ impl Guarded {
         command.health.trip = Some(tripped.trip);
         command
     }
+
+    /// What AFBC must have learnt to want `inputs` for these errors.
+    fn learnt_from(&self, inputs: &PerAxis<f32>, errors: &PerAxis<Errors>) -> PerAxis<Estimate> {
+        PerAxis::from_fn(|axis| Estimate::of(inputs.get(axis) - self.alpha2.get(axis) * errors.get(axis).e2))
+    }
 }
 
 impl FlightController for Guarded {
@@ -106,20 +112,27 @@ impl FlightController for Guarded {
             return *self.stand_in(stand_in, (afbc, tripped), (state, setpoint), fresh);
         }
         let command = self.adaptive.cascade(afbc, state, setpoint, fresh);
-        let inputs = command.per_axis();
-        if let Some(trip) = self.monitor.watch(figures, afbc, &inputs, command.health.saturated) {
-            *tripped = Some(Tripped { trip, inputs });
+        // On the ground a law may ask for less than nothing, for as long as it likes.
+        if !self.adaptive.stands(afbc) {
+            let inputs = command.per_axis();
+            if let Some(trip) = self.monitor.watch(figures, afbc, &inputs, command.health.saturated) {
+                *tripped = Some(Tripped { trip, inputs });
+            }
         }
         command
     }
 
     fn engage(&self, memory: &mut Memory) {
-        if let Some(StandIn { cascade, command }) = &memory.stand_in {
-            // What AFBC would have to know to give the last inputs.
-            let (inputs, errors) = (command.per_axis(), &command.errors);
-            let learnt = |axis| Estimate::of(inputs.get(axis) - self.alpha2.get(axis) * errors.get(axis).e2);
-            *memory = Memory { afbc: cascade.handed_over(PerAxis::from_fn(learnt)), ..Memory::default() };
-        }
+        let afbc = match memory {
+            Memory { stand_in: Some(StandIn { cascade, command }), .. } => {
+                cascade.handed_over(self.learnt_from(&command.per_axis(), &command.errors))
+            }
+            Memory { tripped: Some(Tripped { inputs, .. }), afbc, .. } => {
+                afbc.handed_over(self.learnt_from(inputs, &afbc.errors))
+            }
+            _ => return,
+        };
+        *memory = Memory { afbc, ..Memory::default() };
     }
 
     /// Zero while the other law flies.

@@ -167,7 +167,7 @@ impl<C: FlightController> Vehicle<C> {
             _ => Command::default(),
         };
         // For the next step: so is taking over and a step.
-        if let (Some(Ok(Request::Engage)), Some(flight)) = (answer, flight) {
+        if let (Some(Ok(Request::Engage)), true, Some(flight)) = (answer, mode.armed(), flight) {
             self.controller.engage(&mut flight.control);
         }
 
