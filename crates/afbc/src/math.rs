@@ -16,11 +16,13 @@ use micromath::F32Ext;
 pub fn exp2(x: f32) -> f32 {
     const P: [f32; 6] =
         [core::f32::consts::LN_2, 2.40226475e-01, 5.55036186e-02, 9.61852947e-03, 1.33903875e-03, 1.53208306e-04];
-    // To the nearest, since what is cut off is the part below zero.
-    let n = (x - 0.5) as i32;
-    let f = x - n as f32;
+    // So large a number has no places behind the point: adding it rounds, and leaves the integer, with the exponent's
+    // bias, in its lowest bits.
+    const LARGE: f32 = 12_582_912.0 + 127.0;
+    let n = x + LARGE;
+    let f = x - (n - LARGE);
     let p = P[0] + f * (P[1] + f * (P[2] + f * (P[3] + f * (P[4] + f * P[5]))));
-    let y = (1.0 + f * p) * f32::from_bits((n.wrapping_add(127) as u32) << 23);
+    let y = (1.0 + f * p) * f32::from_bits(n.to_bits() << 23);
     // Last, and a choice rather than a branch: so the constants of several exponentials in a row are loaded once.
     if x >= -126.0 { y } else { 0.0 }
 }
