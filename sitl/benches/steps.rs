@@ -5,12 +5,13 @@
 //! Runge-Kutta, gusts and parameter changes, nothing logged; items are steps.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a scenario that cannot be flown must stop the bench
 
-use afbc::{Controller, FlightController, Law, Memory};
-use airframe::{OutOfRange, RotorSpeeds, Setpoint, State};
+use afbc::{FlightController, Memory, Profile};
+use airframe::{PerAxis, RotorSpeeds, Setpoint, State};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use plant::{Model, Plant};
-use sitl::flight::{Flight, adaptive_law, backstepping_law, fly};
+use sitl::contender::{Build, Contender};
+use sitl::flight::{Flight, fly};
 use sitl::paper::{Case, scenario};
 use sitl::scenario::{ControllerKind, Scenario};
 
@@ -28,7 +29,7 @@ fn paper(model: Model) -> Scenario {
 /// What a controller is given, and what it commands, at every 60th step of the paper's flight.
 fn recorded(model: Model, kind: ControllerKind) -> Vec<(State, Setpoint, RotorSpeeds)> {
     let (mut steps, mut index) = (Vec::new(), 0_usize);
-    fly(&paper(model), kind, |sample| {
+    fly(&paper(model), &Contender::of(kind, Profile::Paper), |sample| {
         if index.is_multiple_of(60) {
             steps.push((sample.motion.measure(), sample.reference.setpoint(), sample.command.speeds));
         }
@@ -38,9 +39,22 @@ fn recorded(model: Model, kind: ControllerKind) -> Vec<(State, Setpoint, RotorSp
     steps
 }
 
-fn control_step<L: Law>(bencher: Bencher, kind: ControllerKind, law: fn(&Scenario) -> Result<L, OutOfRange>) {
-    let scenario = paper(Model::RigidBody);
-    let controller = Controller::new(scenario.vehicle.to_f32(), scenario.settings, law(&scenario).unwrap()).unwrap();
+/// The settings of every controller here.
+const PROFILE: Profile = Profile::Paper;
+
+fn backstepping() -> impl Build {
+    PerAxis::from_fn(|axis| PROFILE.gains().get(axis).backstepping)
+}
+
+fn controller<B: Build>(gains: &B, scenario: &Scenario) -> B::Controller {
+    gains.controller(scenario.vehicle.to_f32(), PROFILE.settings()).unwrap()
+}
+
+fn control_step(bencher: Bencher, kind: ControllerKind, gains: impl Build) {
+    memory_and_step(bencher, kind, &controller(&gains, &paper(Model::RigidBody)));
+}
+
+fn memory_and_step<C: FlightController>(bencher: Bencher, kind: ControllerKind, controller: &C) {
     let steps = recorded(Model::RigidBody, kind);
     let mut memory = Memory::default();
     let mut at = 0;
@@ -53,12 +67,12 @@ fn control_step<L: Law>(bencher: Bencher, kind: ControllerKind, law: fn(&Scenari
 
 #[divan::bench]
 fn control_step_afbc(bencher: Bencher) {
-    control_step(bencher, ControllerKind::Afbc, adaptive_law);
+    control_step(bencher, ControllerKind::Afbc, PROFILE.gains());
 }
 
 #[divan::bench]
 fn control_step_backstepping(bencher: Bencher) {
-    control_step(bencher, ControllerKind::Backstepping, backstepping_law);
+    control_step(bencher, ControllerKind::Backstepping, backstepping());
 }
 
 fn plant_step(bencher: Bencher, model: Model) {
@@ -84,11 +98,11 @@ fn plant_step_simplified(bencher: Bencher) {
     plant_step(bencher, Model::Simplified);
 }
 
-fn closed_loop<L: Law>(bencher: Bencher, model: Model, law: fn(&Scenario) -> Result<L, OutOfRange>) {
+fn closed_loop(bencher: Bencher, model: Model, gains: impl Build) {
     let scenario = paper(model);
     bencher
         .counter(ItemsCount::new(STEPS))
-        .with_inputs(|| Flight::new(&scenario, law(&scenario).unwrap()).unwrap())
+        .with_inputs(|| Flight::new(&scenario, &PROFILE.settings(), controller(&gains, &scenario)).unwrap())
         .bench_local_refs(|flight| {
             for _ in 0..STEPS {
                 let sample = flight.control();
@@ -100,15 +114,15 @@ fn closed_loop<L: Law>(bencher: Bencher, model: Model, law: fn(&Scenario) -> Res
 
 #[divan::bench]
 fn closed_loop_afbc_rigid_body(bencher: Bencher) {
-    closed_loop(bencher, Model::RigidBody, adaptive_law);
+    closed_loop(bencher, Model::RigidBody, PROFILE.gains());
 }
 
 #[divan::bench]
 fn closed_loop_backstepping_rigid_body(bencher: Bencher) {
-    closed_loop(bencher, Model::RigidBody, backstepping_law);
+    closed_loop(bencher, Model::RigidBody, backstepping());
 }
 
 #[divan::bench]
 fn closed_loop_afbc_simplified(bencher: Bencher) {
-    closed_loop(bencher, Model::Simplified, adaptive_law);
+    closed_loop(bencher, Model::Simplified, PROFILE.gains());
 }

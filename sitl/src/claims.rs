@@ -30,7 +30,7 @@ pub const TAIL_S: f64 = 5.0;
 pub fn claims(flown: &[Flown]) -> Vec<Claim> {
     let find = |kind, of: &Flown| {
         let whole = of.scenario.duration_s >= paper::DURATION_S;
-        flown.iter().find(|f| whole && f.run.controller == kind && f.scenario == of.scenario).map(|f| &f.run)
+        flown.iter().find(|f| whole && f.run.contender.kind() == kind && f.scenario == of.scenario).map(|f| &f.run)
     };
     let pair =
         flown.iter().find_map(|of| Some((find(ControllerKind::Afbc, of)?, find(ControllerKind::Backstepping, of)?)));

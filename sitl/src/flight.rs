@@ -1,11 +1,13 @@
 //! Lockstep flights: measure, control, observe, move the vehicle, once per step.
 
-use crate::scenario::{ControllerKind, Scenario};
+use crate::contender::{Build, Contender, Law, Monitored, step_s};
+use crate::scenario::Scenario;
 use crate::trajectory::{Reference, Trajectory};
-use afbc::{Adaptive, Backstepping, Cascade, Command, Controller, FlightController, Law, Memory, adaptive};
-use airframe::{OutOfRange, PerAxis};
+use afbc::{Command, FlightController, Memory, Settings, adaptive};
+use airframe::{OutOfRange, PerAxis, State};
 use core::f64::consts::FRAC_PI_2;
-use plant::{Motion, Plant};
+use nalgebra::Vector3;
+use plant::{Measurement, Motion, Plant, Sensors, Telemetry};
 
 /// Distance from the reference beyond which a vehicle counts as lost \[m\].
 pub const LOST_DISTANCE_M: f64 = 50.0;
@@ -17,11 +19,15 @@ pub struct Sample {
     pub time_s: f64,
     /// True motion.
     pub motion: Motion,
+    /// What the sensors made of it; none if they are perfect.
+    pub measurement: Option<Measurement>,
+    /// What rotors, air and ground did in the step before; none of an ideal plant.
+    pub telemetry: Option<Telemetry>,
     /// Where the vehicle should be.
     pub reference: Reference,
     /// What the controller decided.
     pub command: Command,
-    /// What the law has learnt; zero for the baseline.
+    /// What the law has learnt; zero for one that learns nothing.
     pub estimates: PerAxis<adaptive::Estimate>,
 }
 
@@ -35,26 +41,29 @@ pub struct Lost {
 }
 
 /// One controller flying one vehicle.
-pub struct Flight<L: Law> {
-    controller: Controller<L>,
-    memory: Memory<Cascade<L::Estimate>>,
+pub struct Flight<C: FlightController> {
+    controller: C,
+    memory: Memory<C::Memory>,
     plant: Plant,
+    sensors: Option<Sensors>,
     trajectory: Trajectory,
     dt_s: f64,
 }
 
-impl<L: Law> Flight<L> {
-    /// A flight of `scenario` under `law`.
+impl<C: FlightController> Flight<C> {
+    /// A flight of `scenario` under `controller`, which was made with `settings`.
     ///
     /// # Errors
-    /// The first parameter or setting out of range.
-    pub fn new(scenario: &Scenario, law: L) -> Result<Self, OutOfRange> {
+    /// The first setting of plant or sensors out of range.
+    pub fn new(scenario: &Scenario, settings: &Settings, controller: C) -> Result<Self, OutOfRange> {
+        let dt_s = step_s(settings);
         Ok(Flight {
-            controller: Controller::new(scenario.vehicle.to_f32(), scenario.settings, law)?,
+            controller,
             memory: Memory::default(),
-            plant: Plant::new(scenario.model, scenario.initial, scenario.environment.clone()),
+            plant: scenario.plant(dt_s)?,
+            sensors: scenario.sensors(dt_s)?,
             trajectory: scenario.trajectory.clone(),
-            dt_s: step_s(scenario),
+            dt_s,
         })
     }
 
@@ -64,11 +73,12 @@ impl<L: Law> Flight<L> {
     pub fn control(&mut self) -> Sample {
         let time_s = self.plant.time_s();
         let motion = self.plant.motion();
+        let measurement = self.sensors.as_mut().map(|sensors| sensors.measure(&motion));
+        let state = measurement.as_ref().map_or_else(|| motion.measure(), arrived);
         let reference = self.trajectory.at(time_s);
-        let command = self.controller.step(&mut self.memory, &motion.measure(), &reference.setpoint());
-        let estimates = &self.memory.control.estimates;
-        let estimates = PerAxis::from_fn(|axis| L::learnt(estimates.get(axis)));
-        Sample { time_s, motion, reference, command, estimates }
+        let command = self.controller.step(&mut self.memory, &state, &reference.setpoint());
+        let (estimates, telemetry) = (C::learnt(&self.memory.control), self.plant.telemetry());
+        Sample { time_s, motion, measurement, telemetry, reference, command, estimates }
     }
 
     /// Moves the vehicle by one step under `command`.
@@ -94,45 +104,49 @@ impl<L: Law> Flight<L> {
     }
 }
 
-/// The plant's step \[s\]: the controller's, without the noise that `f32` adds to a decimal.
-fn step_s(scenario: &Scenario) -> f64 {
-    (f64::from(scenario.settings.dt_s) * 1e7).round() / 1e7
+/// What a controller is given: in a dropout a state that it cannot believe, so that it works from the last one and
+/// learns nothing from it.
+fn arrived(measurement: &Measurement) -> State {
+    if measurement.fresh {
+        measurement.state
+    } else {
+        State { position_m: Vector3::repeat(f32::NAN), ..measurement.state }
+    }
 }
 
-/// Flies `scenario` under one law, showing every step from t = 0 to the end; tells when the vehicle was lost, if it was.
+/// Flies `scenario` under one contender, showing every step from t = 0 to the end; tells when the vehicle was lost, if it
+/// was.
 ///
 /// # Errors
 /// The first parameter, gain or setting out of range; nothing has been flown then.
 pub fn fly(
     scenario: &Scenario,
-    kind: ControllerKind,
+    contender: &Contender,
     observe: impl FnMut(&Sample),
 ) -> Result<Option<Lost>, OutOfRange> {
-    let duration_s = scenario.duration_s;
-    Ok(match kind {
-        ControllerKind::Afbc => Flight::new(scenario, adaptive_law(scenario)?)?.run(duration_s, observe),
-        ControllerKind::Backstepping => Flight::new(scenario, backstepping_law(scenario)?)?.run(duration_s, observe),
-    })
+    let settings = &contender.settings;
+    match &contender.law {
+        Law::Afbc(gains) => run(scenario, settings, gains, observe),
+        Law::Guarded(gains) => run(scenario, settings, &Monitored(gains), observe),
+        Law::Backstepping(gains) => run(scenario, settings, gains, observe),
+        Law::Pid(gains) => run(scenario, settings, gains, observe),
+        Law::Geometric(gains) => run(scenario, settings, gains, observe),
+        Law::Indi(gains) => run(scenario, settings, gains, observe),
+    }
 }
 
-/// AFBC with the scenario's gains.
-///
-/// # Errors
-/// The first gain out of range.
-pub fn adaptive_law(scenario: &Scenario) -> Result<Adaptive, OutOfRange> {
-    Adaptive::new(scenario.gains)
+fn run(
+    scenario: &Scenario,
+    settings: &Settings,
+    gains: &impl Build,
+    observe: impl FnMut(&Sample),
+) -> Result<Option<Lost>, OutOfRange> {
+    let controller = gains.controller(scenario.vehicle.to_f32(), *settings)?;
+    Ok(Flight::new(scenario, settings, controller)?.run(scenario.duration_s, observe))
 }
 
-/// The baseline with the scenario's gains and nominal vehicle.
-///
-/// # Errors
-/// The first gain or parameter out of range.
-pub fn backstepping_law(scenario: &Scenario) -> Result<Backstepping, OutOfRange> {
-    let gains = PerAxis::from_fn(|axis| scenario.gains.get(axis).backstepping);
-    Backstepping::new(&scenario.vehicle.to_f32(), gains)
-}
-
-/// Why the vehicle counts as lost, if it does. Assumption A3 rules out a tilt of 90 degrees.
+/// Why the vehicle counts as lost, if it does. Assumption A3 rules out a tilt of 90 degrees; a vehicle that has come down
+/// on its feet is not lost.
 pub(crate) fn lost(sample: &Sample) -> Option<&'static str> {
     let eta = &sample.motion.attitude_rad;
     let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();

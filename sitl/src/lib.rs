@@ -1,6 +1,7 @@
 //! Software in the loop: scenarios, lockstep flights, logs, figures. See the `sitl` binary for the command line.
 
 pub mod claims;
+pub mod contender;
 pub mod flight;
 pub mod in_the_loop;
 pub mod metrics;

@@ -1,11 +1,11 @@
 //! The paper's experiment, Section IV, in each of its readings.
 
-use crate::scenario::{ControllerKind, Scenario};
+use crate::scenario::{Contender, ControllerKind, Scenario};
 use crate::trajectory::Trajectory;
 use afbc::Profile;
 use airframe::{Axis, OutOfRange, Parameters};
 use nalgebra::Vector3;
-use plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Quantity};
+use plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Quantity, Realism, Sensing};
 
 /// How the paper's "1.2 N" and "1.2 N m" are read (gap 5 in `docs/paper.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,7 +138,6 @@ pub fn scenario(model: Model, case: Case) -> Result<Scenario, OutOfRange> {
         let change = |quantity, factor| ParameterChange { quantity, factor, start_s, end_s };
         vec![change(Quantity::Inertia, inertia.factor(0.75)), change(Quantity::ThrustFactor, thrust.factor(0.4))]
     });
-    let profile = Profile::Paper;
     Ok(Scenario {
         name: case.name().into(),
         description: "the paper's flight, Section IV".into(),
@@ -147,15 +146,15 @@ pub fn scenario(model: Model, case: Case) -> Result<Scenario, OutOfRange> {
         model,
         vehicle: Parameters::PAPER,
         environment: Environment::new(Parameters::PAPER, changes, gusts)?,
+        realism: Realism::default(),
+        sensing: Sensing::default(),
+        seed: 0,
         initial: Motion {
             position_m: Vector3::new(0.0, 0.0, 0.5),
             attitude_rad: Vector3::new(0.0, 0.0, 0.35),
             ..Motion::default()
         },
         trajectory: Trajectory::Paper,
-        controllers: ControllerKind::ALL.to_vec(),
-        profile,
-        gains: profile.gains(),
-        settings: profile.settings(),
+        contenders: ControllerKind::PAPER.map(|kind| Contender::of(kind, Profile::Paper)).to_vec(),
     })
 }

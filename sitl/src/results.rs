@@ -3,7 +3,6 @@
 use crate::metrics::Metrics;
 use crate::paper::{Case, Reading, Uncertainty, scenario};
 use crate::run::Run;
-use crate::scenario::ControllerKind;
 use airframe::OutOfRange;
 use core::fmt::Write;
 use plant::Model;
@@ -53,14 +52,14 @@ pub fn markdown() -> Result<String, OutOfRange> {
     for (name, case) in cases() {
         for model in [Model::Simplified, Model::RigidBody] {
             let scenario = scenario(model, case)?;
-            for kind in ControllerKind::ALL {
-                let run = Run::fly(&scenario, kind, u64::MAX)?;
+            for contender in &scenario.contenders {
+                let run = Run::fly(&scenario, contender, u64::MAX)?;
                 let figures = match run.lost {
                     Some(lost) => format!("lost at {:.3} s: {}{}", lost.time_s, lost.reason, " |".repeat(16)),
                     None => row(&run.metrics),
                 };
                 // Writing to a String cannot fail.
-                let _ = writeln!(table, "| {name} | {} | {} | {figures}", model.name(), kind.title());
+                let _ = writeln!(table, "| {name} | {} | {} | {figures}", model.name(), contender.title());
             }
         }
     }

@@ -2,17 +2,20 @@
 
 use crate::flight::{Lost, Sample, fly};
 use crate::metrics::{Accumulator, Metrics, inputs};
-use crate::scenario::{ControllerKind, Scenario};
+use crate::scenario::{Contender, Scenario};
+use afbc::monitor::Trip;
 use airframe::OutOfRange;
 use nalgebra::Vector4;
 
-/// A flown scenario under one law.
+/// A flown scenario under one contender.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// The law that flew.
-    pub controller: ControllerKind,
+    /// Who flew.
+    pub contender: Contender,
     /// When and why the vehicle was lost, if it was.
     pub lost: Option<Lost>,
+    /// When and why AFBC's monitor put another law in its place, if it did.
+    pub tripped: Option<Tripped>,
     /// Figures of merit over every step.
     pub metrics: Metrics,
     /// Every `log_every`-th step, and the last one.
@@ -22,19 +25,31 @@ pub struct Run {
     pub input_extremes: Vec<[Vector4<f64>; 2]>,
 }
 
+/// What a monitor did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tripped {
+    /// \[s\]
+    pub time_s: f64,
+    /// Why.
+    pub trip: Trip,
+}
+
 impl Run {
-    /// Flies `scenario` under `controller`, keeping every `log_every`-th step (at least 1).
+    /// Flies `scenario` under `contender`, keeping every `log_every`-th step (at least 1).
     ///
     /// # Errors
     /// The first parameter, gain or setting out of range; nothing has been flown then.
-    pub fn fly(scenario: &Scenario, controller: ControllerKind, log_every: u64) -> Result<Self, OutOfRange> {
+    pub fn fly(scenario: &Scenario, contender: &Contender, log_every: u64) -> Result<Self, OutOfRange> {
         let log_every = log_every.max(1);
         let mut metrics = Accumulator::default();
         let (mut log, mut input_extremes) = (Vec::new(), Vec::new());
         let mut unlogged: Option<(Sample, [Vector4<f64>; 2])> = None;
-        let mut step = 0;
-        let lost = fly(scenario, controller, |sample| {
+        let (mut step, mut tripped) = (0, None);
+        let lost = fly(scenario, contender, |sample| {
             metrics.add(sample);
+            if let Some(trip) = sample.command.health.trip {
+                tripped.get_or_insert(Tripped { time_s: sample.time_s, trip });
+            }
             let u = inputs(sample);
             let extremes = match unlogged.take() {
                 Some((_, [low, high])) => [u.inf(&low), u.sup(&high)],
@@ -52,6 +67,6 @@ impl Run {
             log.push(last);
             input_extremes.push(extremes);
         }
-        Ok(Run { controller, lost, metrics: metrics.finish(), log, input_extremes })
+        Ok(Run { contender: contender.clone(), lost, tripped, metrics: metrics.finish(), log, input_extremes })
     }
 }

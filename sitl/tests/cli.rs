@@ -57,7 +57,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 const HOVER: &str = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
 
 /// Files after [`HOVER`], and what is said of them.
-const BAD_TABLES: [(&str, &str); 38] = [
+const BAD_TABLES: [(&str, &str); 67] = [
     ("[vehicle]\nmass_g = 486", ":5: vehicle.mass_g: unknown key; did you mean mass_kg (kilograms)?"),
     (
         "[vehicle]\n\n\nmass_kg = 4860",
@@ -95,7 +95,9 @@ const BAD_TABLES: [(&str, &str); 38] = [
     ("[settings]\ndt_s = 1", ":5: settings.dt_s: 1 is out of range: it must lie within 0.0001 to 0.02 (seconds)"),
     (
         "[settings]\nrate_hz = 500",
-        ":5: settings.rate_hz: unknown key; known here: dt_s, command_filter_rad_s, rotor_force_max_n",
+        ":5: settings.rate_hz: unknown key; \
+         known here: dt_s, command_filter_rad_s, rotor_force_max_n, tilt_by_thrust, heed_ground, bumpless, \
+         heed_saturation",
     ),
     (
         "[initial]\nattitude_rad = [1.6, 0, 0]",
@@ -139,7 +141,92 @@ const BAD_TABLES: [(&str, &str); 38] = [
         ":11: change.factor: it makes mass_kg = 4860, out of range: it must lie within 0.01 to 500; change the factor",
     ),
     ("[trajectory]\nkind = \"paper\"", ":4: syntax: duplicate key near `trajectory`; COMPARE"),
-    ("[wind]\nx = 1", ":4: wind: unknown key; known here: ALL"),
+    ("[weather]\nx = 1", ":4: weather: unknown key; known here: ALL"),
+    ("[wind]\nx = 1", ":5: wind.x: unknown key; known here: steady_m_s, turbulence, gust"),
+    ("[wind]\nsteady_m_s = [1, 0, 0]", ":4: wind: wind acts through drag, and there is none; add [drag]"),
+    (
+        "[drag]\n[wind]\nturbulence = \"strong\"",
+        ":6: wind.turbulence: \"strong\" is unknown; it must be \"light\", \"moderate\" or \"severe\"",
+    ),
+    ("[drag]\n[wind.turbulence]", ":5: wind.turbulence.wind_20ft_m_s: missing; add it (metres per second)"),
+    ("[drag]\n[[wind.gust]]\nvelocity_m_s = [1, 0, 0]\nstart_s = 1", ":5: wind.gust.rise_s: missing; add it (seconds)"),
+    (
+        "[drag]\nblade_n_s2_m = 0.5",
+        ":5: drag.blade_n_s2_m: blade_n_s2_m = 0.5, out of range: it must lie within 0 to 0.006075; change it",
+    ),
+    ("[drag]\narea_m2 = 1", ":5: drag.area_m2: it is a number and must be three numbers; write [x, y, z]"),
+    (
+        "[rotors]\nmax_rad_s = 300\nforce_max_n = 3",
+        ":6: rotors.force_max_n: a second limit; write it or max_rad_s, not both",
+    ),
+    (
+        "[rotors]\nforce_max_n = 9999",
+        ":5: rotors.force_max_n: it makes max_rad_s = 18305.385, out of range: it must lie within 1 to 10000; \
+         change the force",
+    ),
+    (
+        "[rotors]\nmin_rad_s = 400\nmax_rad_s = 300",
+        ":5: rotors.min_rad_s: min_rad_s = 400, out of range: it must lie within 0 to 300; change it",
+    ),
+    (
+        "[rotors]\ntime_constant = 0.02",
+        ":5: rotors.time_constant: unknown key; did you mean time_constant_s (seconds)?",
+    ),
+    ("[[rotor_fault]]\nrotor = 5", ":5: rotor_fault.rotor: 5 is out of range: it must lie within 1 to 4"),
+    (
+        "[[rotor_fault]]\nrotor = 1.5\nefficiency = 1\nstart_s = 0",
+        ":5: rotor_fault.rotor: 1.5 is no rotor; it must be 1, 2, 3 or 4",
+    ),
+    (
+        "[battery]\nfull_v = 9",
+        ":4: battery.empty_v: empty_v = 9.9, out of range: it must lie within 0.1 to 9; change it",
+    ),
+    (
+        "[ground]\nground_effect = 1",
+        ":5: ground.ground_effect: it is a number and must be true or false; write true or false without quotes",
+    ),
+    (
+        "[[payload]]\nmass_kg = 499.9\nstart_s = 1",
+        ":5: payload.mass_kg: it makes mass_kg = 500.386, out of range: it must lie within 0.01 to 500; change the payload",
+    ),
+    ("[sensors]\nnoise = 2", ":5: sensors.noise: 2 is out of range: it must lie within 0 to 1"),
+    ("[sensors.noise]\nposition = 1", ":5: sensors.noise.position: unknown key; did you mean position_m (metres)?"),
+    ("[sensors]\ndropouts = { rate_hz = 1 }", ":5: sensors.dropouts.mean_s: missing; add it (seconds)"),
+    (
+        "[limits]\ntilt_max_rad = 2",
+        ":5: limits.tilt_max_rad: 2 is out of range: it must lie within 0.05 to 1.57 (radians)",
+    ),
+    ("[gains.z]\nsigma = 11", ":5: gains.z.sigma: 11 is out of range: it must lie within 0 to 10 (1/s)"),
+    ("[[contender]]\ncontroller = \"afbc\"", ":4: contender.name: missing; give it one, such as \"gentle\""),
+    (
+        "[[contender]]\nname = \"a\\nb\"",
+        ":5: contender.name: it cannot be a name; make it one plain line of 1 to 32 characters",
+    ),
+    (
+        "[[contender]]\nname = \"a\"\ncontroller = \"pid\"\n[[contender]]\nname = \"a\"",
+        ":8: contender.name: \"a\" is the name of another contender; choose another",
+    ),
+    (
+        "[[contender]]\nname = \"a\"\ncontroller = \"lqr\"",
+        ":6: contender.controller: \"lqr\" is unknown; \
+         it must be \"afbc\", \"backstepping\", \"pid\", \"geometric\" or \"indi\"",
+    ),
+    (
+        "[[contender]]\nname = \"a\"\ncontroller = \"afbc\"\nsettings = { dt_s = 0.002 }",
+        ":7: contender.settings.dt_s: one step serves all contenders; set it in the file's own [settings]",
+    ),
+    (
+        "[[contender]]\nname = \"a\"\ncontroller = \"backstepping\"\n[contender.gains.x]\ngamma = 1",
+        ":8: contender.gains.x.gamma: unknown key; known here: alpha1, alpha2",
+    ),
+    (
+        "[[contender]]\nname = \"a\"\ncontroller = \"pid\"\n[contender.gains]\nposition_p = 1",
+        ":8: contender.gains.position_p: unknown key; did you mean position_p_1_s (1/s)?",
+    ),
+    (
+        "[[contender]]\nname = \"a\"\ncontroller = \"indi\"\nmonitor = true",
+        ":7: contender.monitor: unknown key; known here: name, controller, profile, gains, settings, limits",
+    ),
     ("\"a\\nb\" = 1", ":4: trajectory.a\\nb: unknown key; known here: kind, position_m, yaw_rad"),
     ("yaw_deg = 90", ":4: trajectory.yaw_deg: unknown key; did you mean yaw_rad (radians)?"),
     (
@@ -155,7 +242,7 @@ const BAD_TABLES: [(&str, &str); 38] = [
 ];
 
 /// Whole files, and what is said of them.
-const BAD_FILES: [(&str, &str); 21] = [
+const BAD_FILES: [(&str, &str); 23] = [
     ("", ":1: trajectory: missing; add [trajectory] with kind = \"hover\" and position_m = [0, 0, 1]"),
     ("[trajectry]\nkind = \"paper\"", ":1: trajectry: unknown key; did you mean trajectory?"),
     (
@@ -202,9 +289,15 @@ const BAD_FILES: [(&str, &str); 21] = [
     ("name = \"\"", ":1: name: \"\" cannot be a name; NAME"),
     ("description = \"a\\nb\"", ":1: description: it has line breaks or control characters; make it one plain line"),
     ("plant = \"real\"", ":1: plant: \"real\" is unknown; it must be \"simplified\" or \"rigid-body\""),
-    ("controllers = []", ":1: controllers: the list is empty; it must hold \"afbc\" or \"backstepping\""),
+    (
+        "controllers = []",
+        ":1: controllers: the list is empty; \
+         it must hold \"afbc\", \"backstepping\", \"pid\", \"geometric\" or \"indi\"",
+    ),
+    ("seed = 1.5", ":1: seed: 1.5 is not a whole number; leave out its decimals"),
+    ("monitor = 1", ":1: monitor: it is a number and must be true or false; write true or false without quotes"),
     ("controllers = [\"afbc\", \"afbc\"]", ":1: controllers: \"afbc\" is listed twice; once is enough"),
-    ("profile = \"best\"", ":1: profile: \"best\" is unknown; it must be \"paper\""),
+    ("profile = \"best\"", ":1: profile: \"best\" is unknown; it must be \"paper\" or \"flight\""),
 ];
 
 /// What several messages have in common, written out.
@@ -214,8 +307,9 @@ fn expand(message: &str) -> String {
         .replace("NAME", "it must be 1 to 64 letters, digits, '-' or '_', since file names come from it")
         .replace(
             "ALL",
-            "name, description, duration_s, plant, controllers, profile, vehicle, truth, gains, settings, trajectory, \
-             initial, gust, change",
+            "name, description, duration_s, seed, plant, vehicle, truth, controllers, profile, gains, settings, limits, monitor, \
+             contender, trajectory, initial, gust, change, payload, rotors, rotor_fault, battery, drag, wind, ground, \
+             sensors",
         )
 }
 
@@ -270,7 +364,7 @@ fn bad_options_are_refused_before_anything_is_written() {
         &["paper", "--duration", "0"],
         &["paper", "--duration", "nan"],
         &["fly"],
-        &["fly", "hover", "--controller", "pid"],
+        &["fly", "hover", "--controller", "lqr"],
         &["fly", "hover", "--duration", "36000", "--log-hz", "1000"],
         &["scenarios", "hovr"],
     ] {
@@ -343,7 +437,7 @@ fn every_built_in_scenario_is_listed_checked_and_a_template() {
     let folder = folder("built_in");
     let list = stdout(&sitl(&folder, &["scenarios"]));
     let names: Vec<_> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
-    assert_eq!(names, ["paper", "hover", "step", "circle", "lissajous", "waypoints", "delivery"]);
+    assert_eq!(names, ["paper", "hover", "step", "circle", "lissajous", "waypoints", "delivery", "hardware", "storm"]);
     for name in names {
         let file = sitl(&folder, &["scenarios", name]);
         fs::write(folder.join("copy.toml"), &file.stdout).unwrap();

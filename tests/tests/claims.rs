@@ -14,9 +14,8 @@ use sitl::scenario::{ControllerKind, Scenario};
 use sitl::trajectory::Trajectory;
 
 fn fly_both(scenario: &Scenario) -> Vec<Flown> {
-    ControllerKind::ALL
-        .map(|kind| Flown { scenario: scenario.clone(), run: Run::fly(scenario, kind, 10).unwrap() })
-        .to_vec()
+    let fly = |contender| Flown { scenario: scenario.clone(), run: Run::fly(scenario, contender, 10).unwrap() };
+    scenario.contenders.iter().map(fly).collect()
 }
 
 /// Every default reading: four signs, two models.
@@ -153,7 +152,7 @@ fn backstepping_keeps_an_offset_of_the_gust_over_one_plus_both_gains() {
             Gust { axis: airframe::Axis::X, kind: GustKind::Acceleration, size, start_s: 1.0, end_s: f64::INFINITY };
         scenario.environment = Environment::new(scenario.vehicle, vec![], vec![gust]).unwrap();
 
-        let run = Run::fly(&scenario, ControllerKind::Backstepping, u64::MAX).unwrap();
+        let run = Run::fly(&scenario, scenario.contender(ControllerKind::Backstepping).unwrap(), u64::MAX).unwrap();
         let offset = size / (1.0 + 1.0 * 2.0);
         // The vehicle holds its height, so thrust is weight over the cosine of the tilt, as (40) assumes, and g tan(theta)
         // is u5: what is left is rounding, of f32 positions of 1 m (6e-8) times alpha_1 alpha_2, and micromath's cosine
@@ -163,7 +162,7 @@ fn backstepping_keeps_an_offset_of_the_gust_over_one_plus_both_gains() {
         assert!(error.y.abs() < 1e-6 && error.w.abs() < 1e-6, "{error}");
 
         // AFBC keeps none: what it has learnt replaces the error. In 39 s it is down to a twentieth.
-        let run = Run::fly(&scenario, ControllerKind::Afbc, u64::MAX).unwrap();
+        let run = Run::fly(&scenario, scenario.contender(ControllerKind::Afbc).unwrap(), u64::MAX).unwrap();
         assert!(run.metrics.final_error.x.abs() < 0.05 * offset.abs(), "{} m of {offset} m", run.metrics.final_error.x);
     }
 }

@@ -1,11 +1,12 @@
 //! The same flight twice gives the same bits in every number of every sample.
 #![allow(clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
 
+use afbc::Profile;
 use airframe::Axis;
 use plant::Model;
 use sitl::flight::{Sample, fly};
 use sitl::paper::{Case, scenario};
-use sitl::scenario::{ControllerKind, Scenario};
+use sitl::scenario::{Contender, ControllerKind, Scenario};
 
 /// Every number of a sample.
 fn numbers(sample: &Sample) -> impl Iterator<Item = u64> {
@@ -43,9 +44,9 @@ fn numbers(sample: &Sample) -> impl Iterator<Item = u64> {
 }
 
 /// One number for all bits of a flight (FNV-1a), and how many samples it is made of.
-fn digest(scenario: &Scenario, kind: ControllerKind) -> (u64, usize) {
+fn digest(scenario: &Scenario, contender: &Contender) -> (u64, usize) {
     let (mut hash, mut samples) = (0xcbf2_9ce4_8422_2325_u64, 0);
-    fly(scenario, kind, |sample| {
+    fly(scenario, contender, |sample| {
         samples += 1;
         for number in numbers(sample) {
             hash = (hash ^ number).wrapping_mul(0x0000_0100_0000_01b3);
@@ -59,17 +60,18 @@ fn digest(scenario: &Scenario, kind: ControllerKind) -> (u64, usize) {
 fn two_flights_are_the_same_to_the_bit() {
     for model in [Model::Simplified, Model::RigidBody] {
         for kind in ControllerKind::ALL {
+            let contender = &Contender::of(kind, Profile::Paper);
             let mut scenario = scenario(model, Case::DEFAULT).unwrap();
             scenario.duration_s = 25.0; // past both kinds of gusts and into the uncertainty
-            let first = digest(&scenario, kind);
+            let first = digest(&scenario, contender);
             assert_eq!(first.1, 25_001);
-            assert_eq!(digest(&scenario, kind), first, "{} {}", model.name(), kind.name());
+            assert_eq!(digest(&scenario, contender), first, "{} {}", model.name(), kind.name());
             // Side by side with another flight, in another thread.
-            let elsewhere = std::thread::scope(|scope| scope.spawn(|| digest(&scenario, kind)).join().unwrap());
+            let elsewhere = std::thread::scope(|scope| scope.spawn(|| digest(&scenario, contender)).join().unwrap());
             assert_eq!(elsewhere, first);
             // The digest sees a difference of one bit in 1e-15 m.
             scenario.initial.position_m.z = scenario.initial.position_m.z.next_up();
-            assert_ne!(digest(&scenario, kind).0, first.0, "the digest is blind");
+            assert_ne!(digest(&scenario, contender).0, first.0, "the digest is blind");
         }
     }
 }

@@ -5,14 +5,15 @@ use afbc::adaptive::{self, Estimate};
 use afbc::backstepping::{Errors, Tracking};
 use afbc::cascade::Context;
 use afbc::fuzzy::{Basis, Membership};
-use afbc::{Adaptive, Cascade, Controller, FlightController, Law, Memory, Profile};
+use afbc::{Adaptive, Backstepping, Cascade, Controller, FlightController, Law, Memory, Profile, Settings};
 use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
 use nalgebra::Vector3;
 use plant::{Environment, Model, Motion, Plant};
-use sitl::flight::{Flight, LOST_DISTANCE_M, Sample, adaptive_law, backstepping_law};
+use sitl::contender::{Contender, ControllerKind, Law as Gains};
+use sitl::flight::{Flight, LOST_DISTANCE_M, Sample};
 use sitl::paper::{Case, Reading, scenario};
 use sitl::run::Run;
-use sitl::scenario::{ControllerKind, Scenario};
+use sitl::scenario::Scenario;
 
 const CALM: Case = Case { reading: None, uncertainty: None };
 const GUSTS: Case = Case { reading: Some(Reading::Persistent), uncertainty: None };
@@ -51,8 +52,9 @@ impl<L: Law> Law for Rateless<L> {
 }
 
 /// Flies the scenario and tells whether the law held it: upright to the end and nearer than 1 m after 5 s.
-fn flies<L: Law>(scenario: &Scenario, law: L) -> bool {
-    let mut flight = Flight::new(scenario, law).unwrap();
+fn flies<L: Law>(scenario: &Scenario, settings: Settings, law: L) -> bool {
+    let controller = Controller::new(scenario.vehicle.to_f32(), settings, law).unwrap();
+    let mut flight = Flight::new(scenario, &settings, controller).unwrap();
     loop {
         let sample = flight.control();
         let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
@@ -67,26 +69,37 @@ fn flies<L: Law>(scenario: &Scenario, law: L) -> bool {
     }
 }
 
+/// The paper's settings, but for the command filter.
+fn filtered(command_filter_rad_s: f32) -> Settings {
+    Settings { command_filter_rad_s, ..Profile::Paper.settings() }
+}
+
+/// Both laws with the paper's gains.
+fn laws() -> (Adaptive, Backstepping) {
+    let gains = Profile::Paper.gains();
+    let alphas = PerAxis::from_fn(|axis| gains.get(axis).backstepping);
+    (Adaptive::new(gains).unwrap(), Backstepping::new(&Parameters::PAPER.to_f32(), alphas).unwrap())
+}
+
 #[test]
 fn gap_1_without_the_rates_of_the_desired_angles_neither_law_flies() {
     // Over the whole band in which both fly with them. (Beyond it the loss takes longer: at 1000 rad/s, nearly no filter
     // at all, backstepping in calm air still swings within 0.3 m after 60 s, AFBC is 30 m off.)
     for bandwidth in [10.0, 20.0, 40.0, 80.0] {
-        let mut scenario = paper(CALM);
-        scenario.settings.command_filter_rad_s = bandwidth;
-        let (adaptive, backstepping) = (adaptive_law(&scenario).unwrap(), backstepping_law(&scenario).unwrap());
-        assert!(!flies(&scenario, Rateless(adaptive)), "AFBC flies without rates at {bandwidth} rad/s");
-        assert!(!flies(&scenario, Rateless(backstepping)), "backstepping flies without rates at {bandwidth} rad/s");
+        let (scenario, settings) = (paper(CALM), filtered(bandwidth));
+        let (adaptive, backstepping) = laws();
+        assert!(!flies(&scenario, settings, Rateless(adaptive)), "AFBC flies without rates at {bandwidth} rad/s");
+        assert!(!flies(&scenario, settings, Rateless(backstepping)), "backstepping flies so at {bandwidth} rad/s");
     }
 }
 
 #[test]
 fn gap_1_with_the_filters_rates_both_fly_from_10_to_80_rad_s() {
     for bandwidth in [10.0, 20.0, 40.0, 80.0] {
-        let mut scenario = paper(CALM);
-        scenario.settings.command_filter_rad_s = bandwidth;
-        assert!(flies(&scenario, adaptive_law(&scenario).unwrap()), "AFBC at {bandwidth} rad/s");
-        assert!(flies(&scenario, backstepping_law(&scenario).unwrap()), "backstepping at {bandwidth} rad/s");
+        let (scenario, settings) = (paper(CALM), filtered(bandwidth));
+        let (adaptive, backstepping) = laws();
+        assert!(flies(&scenario, settings, adaptive), "AFBC at {bandwidth} rad/s");
+        assert!(flies(&scenario, settings, backstepping), "backstepping at {bandwidth} rad/s");
     }
 }
 
@@ -222,17 +235,20 @@ fn gap_4_the_robust_term_becomes_a_relay_at_2_epsilon_over_g_dt() {
     }
 }
 
-fn with_epsilon(case: Case, epsilon: f32) -> Scenario {
-    let mut scenario = paper(case);
-    scenario.gains = PerAxis::from_fn(|axis| adaptive::Gains { epsilon, ..*scenario.gains.get(axis) });
-    scenario
+fn with_epsilon(epsilon: f32) -> Contender {
+    let gains = PerAxis::from_fn(|axis| adaptive::Gains { epsilon, ..*Profile::Paper.gains().get(axis) });
+    Contender { law: Gains::Afbc(gains), ..afbc() }
+}
+
+fn afbc() -> Contender {
+    Contender::of(ControllerKind::Afbc, Profile::Paper)
 }
 
 /// Mean |change of U1| per step \[mN\], apart for steps where delta_hat on roll is below and above 0.030.
 fn trembling_by_delta(scenario: &Scenario) -> [f64; 2] {
     let (mut sums, mut counts) = ([0.0; 2], [0_u32; 2]);
     let mut last: Option<Sample> = None;
-    sitl::flight::fly(scenario, ControllerKind::Afbc, |sample| {
+    sitl::flight::fly(scenario, &afbc(), |sample| {
         if let Some(last) = last.replace(*sample).filter(|last| last.time_s >= 5.0) {
             let above = usize::from(sample.estimates.roll.delta > 0.030);
             sums[above] += 1000.0 * f64::from(sample.command.inputs.roll_n - last.command.inputs.roll_n).abs();
@@ -253,15 +269,16 @@ fn gap_4_in_flight_roll_trembles_once_delta_hat_has_passed_0_030() {
 #[test]
 fn gap_4_a_hundred_times_the_epsilon_flies_as_well_without_trembling() {
     for case in [GUSTS, Case::DEFAULT] {
-        let printed = Run::fly(&with_epsilon(case, 0.001), ControllerKind::Afbc, u64::MAX).unwrap();
-        let wide = Run::fly(&with_epsilon(case, 0.1), ControllerKind::Afbc, u64::MAX).unwrap();
+        let printed = Run::fly(&paper(case), &with_epsilon(0.001), u64::MAX).unwrap();
+        let wide = Run::fly(&paper(case), &with_epsilon(0.1), u64::MAX).unwrap();
         assert_eq!((printed.lost, wide.lost), (None, None));
         let mn = |run: &Run| run.metrics.mean_abs_delta_u * 1000.0;
         // U1, U2 tremble by 50 mN and more a step as printed, and no longer.
         assert!(mn(&printed).x > 50.0 && mn(&printed).y > 50.0, "{}", mn(&printed));
         assert!(mn(&wide).x < 0.5 && mn(&wide).y < 0.5, "{}", mn(&wide));
         // As well: no error grows by more than a fifth and 5 mm, all stay below half of what backstepping leaves.
-        let baseline = Run::fly(&paper(case), ControllerKind::Backstepping, u64::MAX).unwrap();
+        let baseline =
+            Run::fly(&paper(case), &Contender::of(ControllerKind::Backstepping, Profile::Paper), u64::MAX).unwrap();
         let errors = |run: &Run| -> [f64; 4] { run.metrics.rmse.into() };
         for ((wide, printed), baseline) in errors(&wide).into_iter().zip(errors(&printed)).zip(errors(&baseline)) {
             assert!(wide <= 1.2 * printed + 0.005, "RMSE {wide}, {printed} as printed");
@@ -275,7 +292,7 @@ fn gap_4_a_hundred_times_the_epsilon_flies_as_well_without_trembling() {
 
 fn both(reading: Reading, model: Model) -> [Run; 2] {
     let scenario = scenario(model, Case { reading: Some(reading), uncertainty: None }).unwrap();
-    ControllerKind::ALL.map(|kind| Run::fly(&scenario, kind, u64::MAX).unwrap())
+    ControllerKind::PAPER.map(|kind| Run::fly(&scenario, scenario.contender(kind).unwrap(), u64::MAX).unwrap())
 }
 
 #[test]
@@ -297,7 +314,7 @@ fn gap_5_after_pulses_of_1_s_both_recover() {
         for run in both(Reading::Pulses, model) {
             assert_eq!(run.lost, None);
             let left = run.metrics.final_error.abs();
-            assert!(left.amax() < 0.01, "{} {} ends with {left}", model.name(), run.controller.name());
+            assert!(left.amax() < 0.01, "{} {} ends with {left}", model.name(), run.contender.name);
         }
     }
 }
@@ -311,7 +328,7 @@ fn gap_5_as_forces_and_moments_both_lose_the_vehicle_to_the_moment_on_roll() {
             // is lost (rigid body) or the thrust that goes with it, since roll comes before thrust where rotors are
             // at zero, carries the vehicle away within 4 s.
             let lost = run.lost.unwrap();
-            assert!((15.0..19.0).contains(&lost.time_s), "{} {}: {lost:?}", model.name(), run.controller.name());
+            assert!((15.0..19.0).contains(&lost.time_s), "{} {}: {lost:?}", model.name(), run.contender.name);
         }
     }
 }

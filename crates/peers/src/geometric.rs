@@ -147,17 +147,19 @@ impl Gains {
         ]
     }
 
+    /// What the vehicle and its task ask for instead, with the accepted range of each.
+    pub fn others(&mut self) -> [(&'static Range, &mut f32); 2] {
+        [(&POSITION_INTEGRAL_MAX, &mut self.position_integral_max_m_s2), (&TILT_MAX, &mut self.tilt_max_rad)]
+    }
+
     /// Checks every gain and limit.
     ///
     /// # Errors
     /// The first one out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
         let mut gains = *self;
-        for (range, gain) in gains.tunables() {
-            range.check(*gain)?;
-        }
-        POSITION_INTEGRAL_MAX.check(self.position_integral_max_m_s2)?;
-        TILT_MAX.check(self.tilt_max_rad)
+        gains.tunables().into_iter().try_for_each(|(range, gain)| range.check(*gain))?;
+        gains.others().into_iter().try_for_each(|(range, gain)| range.check(*gain))
     }
 }
 

@@ -130,19 +130,24 @@ impl Gains {
         ]
     }
 
+    /// What the vehicle and its task ask for instead, with the accepted range of each.
+    pub fn others(&mut self) -> [(&'static Range, &mut f32); 4] {
+        [
+            (&ROTOR_TIME_CONSTANT, &mut self.rotor_time_constant_s),
+            (&YAW_WEIGHT, &mut self.yaw_weight),
+            (&SPEED_MAX, &mut self.speed_max_m_s),
+            (&TILT_MAX, &mut self.tilt_max_rad),
+        ]
+    }
+
     /// Checks every gain and limit.
     ///
     /// # Errors
     /// The first one out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
         let mut gains = *self;
-        for (range, gain) in gains.tunables() {
-            range.check(*gain)?;
-        }
-        ROTOR_TIME_CONSTANT.check(self.rotor_time_constant_s)?;
-        YAW_WEIGHT.check(self.yaw_weight)?;
-        SPEED_MAX.check(self.speed_max_m_s)?;
-        TILT_MAX.check(self.tilt_max_rad)
+        gains.tunables().into_iter().try_for_each(|(range, gain)| range.check(*gain))?;
+        gains.others().into_iter().try_for_each(|(range, gain)| range.check(*gain))
     }
 }
 

@@ -154,18 +154,23 @@ impl Gains {
         ]
     }
 
+    /// What the vehicle and its task ask for instead, with the accepted range of each.
+    pub fn others(&mut self) -> [(&'static Range, &mut f32); 3] {
+        [
+            (&YAW_WEIGHT, &mut self.yaw_weight),
+            (&SPEED_MAX, &mut self.speed_max_m_s),
+            (&TILT_MAX, &mut self.tilt_max_rad),
+        ]
+    }
+
     /// Checks every gain and limit.
     ///
     /// # Errors
     /// The first one out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
         let mut gains = *self;
-        for (range, gain) in gains.tunables() {
-            range.check(*gain)?;
-        }
-        YAW_WEIGHT.check(self.yaw_weight)?;
-        SPEED_MAX.check(self.speed_max_m_s)?;
-        TILT_MAX.check(self.tilt_max_rad)
+        gains.tunables().into_iter().try_for_each(|(range, gain)| range.check(*gain))?;
+        gains.others().into_iter().try_for_each(|(range, gain)| range.check(*gain))
     }
 }
 

@@ -3,8 +3,9 @@
 use super::Failure;
 use super::flying::{Flying, report};
 use super::target::Target;
-use clap::{Args, ValueEnum};
-use sitl::scenario::ControllerKind;
+use afbc::Profile;
+use clap::Args;
+use sitl::scenario::{Contender, ControllerKind, Scenario};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -14,9 +15,10 @@ pub(crate) struct Fly {
     /// Name of a built-in scenario, or path of a scenario file
     scenario: Target,
 
-    /// Law to fly with, instead of the scenario's; may be given more than once
-    #[arg(long = "controller", value_name = "LAW", value_enum)]
-    controllers: Vec<Controller>,
+    /// Fly this law or contender alone; may be given more than once. A law that the scenario lacks flies with its default
+    /// gains
+    #[arg(long = "controller", value_name = "NAME")]
+    controllers: Vec<String>,
 
     #[command(flatten)]
     flying: Flying,
@@ -26,35 +28,41 @@ pub(crate) struct Fly {
     out: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
-enum Controller {
-    /// Adaptive fuzzy backstepping
-    Afbc,
-    /// Classical backstepping
-    Backstepping,
-}
-
-impl Controller {
-    fn kind(self) -> ControllerKind {
-        match self {
-            Controller::Afbc => ControllerKind::Afbc,
-            Controller::Backstepping => ControllerKind::Backstepping,
-        }
-    }
-}
-
 impl Fly {
     /// Flies, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let mut scenario = self.scenario.scenario()?;
         if !self.controllers.is_empty() {
-            // In the order of the laws, whatever the order they were asked for in; none twice.
-            scenario.controllers = ControllerKind::ALL.to_vec();
-            scenario.controllers.retain(|kind| self.controllers.iter().any(|controller| controller.kind() == *kind));
+            choose(&mut scenario, &self.controllers)?;
         }
         let out = self.out.unwrap_or_else(|| Path::new("out").join(&scenario.name));
         let flown = self.flying.fly(vec![scenario], &out)?;
         report(&out, &flown, &[])?;
         Ok(ExitCode::from(u8::from(flown.iter().any(|flown| flown.run.lost.is_some()))))
     }
+}
+
+/// Keeps the contenders that are called one of `names` or fly a law called so, in their order, and adds laws that nobody
+/// flies.
+fn choose(scenario: &mut Scenario, names: &[String]) -> Result<(), Failure> {
+    let called = |contender: &Contender, name: &str| contender.name == name || contender.kind().name() == name;
+    for name in names {
+        if scenario.contenders.iter().any(|contender| called(contender, name)) {
+            continue;
+        }
+        let Some(kind) = ControllerKind::ALL.into_iter().find(|kind| kind.name() == name) else {
+            let laws = ControllerKind::ALL.map(ControllerKind::name).join(", ");
+            let own: Vec<_> = scenario.contenders.iter().map(|contender| contender.name.as_str()).collect();
+            let problem =
+                format!("no such controller; the laws are {laws}, the scenario's contenders {}", own.join(", "));
+            return Err(format!("--controller {}: {problem}", name.escape_debug()).into());
+        };
+        let mut contender = Contender::of(kind, Profile::Paper);
+        if let Some(other) = scenario.contenders.first() {
+            contender.settings = other.settings;
+        }
+        scenario.contenders.push(contender);
+    }
+    scenario.contenders.retain(|contender| names.iter().any(|name| called(contender, name)));
+    Ok(scenario.check()?)
 }

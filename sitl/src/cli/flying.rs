@@ -33,7 +33,7 @@ fn duration(text: &str) -> Result<f64, String> {
 }
 
 impl Flying {
-    /// Flies every scenario under each of its laws, once it is sure that `out` can take what comes of it.
+    /// Flies every scenario under each of its contenders, once it is sure that `out` can take what comes of it.
     pub(crate) fn fly(self, mut scenarios: Vec<Scenario>, out: &Path) -> Result<Vec<Flown>, Failure> {
         output::prepare(out)?;
         for scenario in &mut scenarios {
@@ -42,10 +42,10 @@ impl Flying {
         let progress = progress(&scenarios);
         let mut flown = Vec::new();
         for scenario in scenarios {
-            let log_every = self.log_hz.steps(&scenario)?;
-            for &controller in &scenario.controllers {
-                progress.set_message(format!("{}, {}", scenario.name, controller.title()));
-                let run = Run::fly(&scenario, controller, log_every)?;
+            for contender in &scenario.contenders {
+                let log_every = self.log_hz.steps(&scenario, contender)?;
+                progress.set_message(format!("{}, {}", scenario.name, contender.title()));
+                let run = Run::fly(&scenario, contender, log_every)?;
                 flown.push(Flown { scenario: scenario.clone(), run });
                 progress.inc(1);
             }
@@ -57,11 +57,11 @@ impl Flying {
 
 /// Progress on stderr, one tick a run; nothing if it will not take long or stderr is no terminal.
 fn progress(scenarios: &[Scenario]) -> ProgressBar {
-    let steps = |s: &Scenario| s.duration_s / f64::from(s.settings.dt_s) * s.controllers.len() as f64;
+    let steps = |s: &Scenario| s.contenders.iter().map(|contender| s.duration_s / contender.step_s()).sum::<f64>();
     if scenarios.iter().map(steps).sum::<f64>() < QUIET_STEPS {
         return ProgressBar::hidden();
     }
-    let runs: usize = scenarios.iter().map(|scenario| scenario.controllers.len()).sum();
+    let runs: usize = scenarios.iter().map(|scenario| scenario.contenders.len()).sum();
     let bar = ProgressBar::with_draw_target(Some(runs as u64), ProgressDrawTarget::stderr());
     let style = ProgressStyle::with_template("{spinner} run {pos} of {len} done, {elapsed}: {msg}");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));

@@ -1,6 +1,6 @@
 //! `--log-hz`: how much of a flight is kept.
 
-use sitl::scenario::Scenario;
+use sitl::scenario::{Contender, Scenario};
 use std::str::FromStr;
 
 /// Most rows of one log: an hour at 100 Hz, and some.
@@ -26,10 +26,10 @@ impl LogRate {
     ///
     /// # Errors
     /// If the log of one run would be too long.
-    pub(crate) fn steps(self, scenario: &Scenario) -> Result<u64, String> {
+    pub(crate) fn steps(self, scenario: &Scenario, contender: &Contender) -> Result<u64, String> {
         let LogRate(hz) = self;
-        let steps = (1.0 / (f64::from(hz) * f64::from(scenario.settings.dt_s))).round().max(1.0);
-        let rows = scenario.duration_s / (f64::from(scenario.settings.dt_s) * steps);
+        let steps = (1.0 / (f64::from(hz) * contender.step_s())).round().max(1.0);
+        let rows = scenario.duration_s / (contender.step_s() * steps);
         if rows > ROWS {
             let duration_s = scenario.duration_s;
             return Err(format!(

@@ -9,7 +9,7 @@ use sitl::flight::Sample;
 use sitl::in_the_loop::{self, Comparison, End, Error, Log, Pace, Station, Twins};
 use sitl::metrics::{Accumulator, Metrics};
 use sitl::run::Run;
-use sitl::scenario::{ControllerKind, DURATION, Scenario};
+use sitl::scenario::{DURATION, Scenario};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -95,7 +95,7 @@ pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &End) -> Resu
     let End { lost, interrupted, disarmed } = end;
     let mut text = match (lost, interrupted) {
         (None, false) => {
-            let without_link = Run::fly(scenario, ControllerKind::Afbc, u64::MAX)?.metrics;
+            let without_link = Run::fly(scenario, &in_the_loop::firmware(), u64::MAX)?.metrics;
             in_the_loop::tracking(scenario.duration_s, metrics, &without_link)
         }
         (Some(lost), _) => format!("The vehicle was lost at t = {:.3} s: {}.\n", lost.time_s, lost.reason),
@@ -134,7 +134,7 @@ impl Recorder {
     pub(crate) fn new(scenario: &Scenario, flying: &Flying) -> Result<Self, Failure> {
         let create = |path: &PathBuf| Log::create(path).map_err(|error| format!("{}: {error}", path.display()));
         let log = flying.out.as_ref().map(create).transpose()?;
-        let steps = (scenario.duration_s / f64::from(scenario.settings.dt_s)).round() as u64;
+        let steps = (scenario.duration_s * 1000.0).round() as u64;
         let progress = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr());
         let style = ProgressStyle::with_template("{bar:40} {percent:>3} %, {eta} left");
         progress.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));

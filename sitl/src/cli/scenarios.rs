@@ -3,7 +3,7 @@
 use super::target::{Target, unknown};
 use super::{Failure, print};
 use clap::Args;
-use sitl::scenario::{BUILT_IN, Scenario, built_in};
+use sitl::scenario::{BUILT_IN, Contender, Scenario, built_in};
 use std::process::ExitCode;
 
 /// List the built-in scenarios, or print one of them to start from
@@ -45,9 +45,9 @@ pub(crate) struct Check {
 impl Check {
     /// Prints what would be flown.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
-        let Scenario { name, duration_s, model, controllers, .. } = self.scenario.scenario()?;
-        let laws: Vec<_> = controllers.iter().map(|controller| controller.title()).collect();
-        print(&format!("{name}: ok, {duration_s} s, {} plant, {}\n", model.name(), laws.join(" and ")))?;
+        let Scenario { name, duration_s, model, contenders, .. } = self.scenario.scenario()?;
+        let laws: Vec<_> = contenders.iter().map(Contender::title).collect();
+        print(&format!("{name}: ok, {duration_s} s, {} plant, {}\n", model.name(), laws.join(", ")))?;
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -37,7 +37,7 @@ impl fmt::Display for Error {
         match self {
             Error::Mismatch(what) => write!(
                 f,
-                "the firmware holds the paper's vehicle, gains and settings under AFBC, but the scenario has {what}; \
+                "the firmware holds the paper's vehicle and AFBC in the profile flight, but the scenario has {what}; \
                  fly it by `sitl fly`, or change it"
             ),
             Error::Baud { given, least } => {

@@ -2,13 +2,13 @@
 
 use super::{Autopilot, Error, Heard, Pace, Station};
 use crate::flight::{Lost, Sample, lost};
-use crate::scenario::{ControllerKind, Scenario};
+use crate::scenario::{Contender, ControllerKind, Law, Scenario};
 use crate::trajectory::Reference;
 use afbc::Profile;
 use airframe::{Parameters, PerAxis, RotorForces};
 use core::ops::ControlFlow;
 use link::{Answer, Command};
-use plant::{Motion, Plant};
+use plant::{Measurement, Motion, Sensors};
 
 /// Time between control ticks, and one step of the plant \[s\].
 const STEP_S: f64 = 0.001;
@@ -33,17 +33,27 @@ pub struct End {
     pub disarmed: bool,
 }
 
-/// Whether the firmware can fly `scenario`.
+/// Who flies in the loop: AFBC in the profile `flight`, under its monitor.
+pub fn firmware() -> Contender {
+    let Contender { settings, .. } = Contender::of(ControllerKind::Afbc, Profile::Flight);
+    Contender { name: "firmware".into(), law: Law::Guarded(Profile::Flight.gains()), settings }
+}
+
+/// Whether the firmware can fly `scenario`. The [`firmware`] has its own profile; a scenario that leaves gains and settings
+/// as they are in any profile does not mind.
 ///
 /// # Errors
 /// [`Error::Mismatch`] names what the firmware holds otherwise.
 pub fn check(scenario: &Scenario) -> Result<(), Error> {
-    let profile = Profile::Paper;
+    let afbc = scenario.contender(ControllerKind::Afbc);
+    let profile = |same: fn(&Contender, Profile) -> bool| {
+        afbc.is_none_or(|afbc| Profile::ALL.into_iter().any(|profile| same(afbc, profile)))
+    };
     let agreed = [
         (scenario.vehicle == Parameters::PAPER, "another vehicle"),
-        (scenario.gains == profile.gains(), "other gains"),
-        (scenario.settings == profile.settings(), "other settings"),
-        (scenario.controllers.contains(&ControllerKind::Afbc), "another law"),
+        (afbc.is_some(), "another law"),
+        (profile(|afbc, profile| afbc.gains() == Some(&profile.gains())), "other gains"),
+        (profile(|afbc, profile| afbc.settings == profile.settings()), "other settings"),
     ];
     match agreed.into_iter().find(|(agreed, _)| !agreed) {
         Some((_, what)) => Err(Error::Mismatch(what)),
@@ -67,15 +77,23 @@ pub fn fly(
     mut observe: impl FnMut(&Sample) -> ControlFlow<()>,
 ) -> Result<End, Error> {
     check(scenario)?;
-    let mut line = Line { station, autopilot, pace, now_ms: 0, silent_ms: 0 };
-    let mut plant = Plant::new(scenario.model, scenario.initial, scenario.environment.clone());
+    let mut plant = scenario.plant(STEP_S)?;
+    let mut line = Line {
+        station,
+        autopilot,
+        sensors: scenario.sensors(STEP_S)?,
+        measurement: None,
+        pace,
+        now_ms: 0,
+        silent_ms: 0,
+    };
     line.arm((&scenario.initial, &scenario.trajectory.at(0.0)))?;
 
     let thrust_factor_n_s2 = scenario.vehicle.to_f32().thrust_factor_n_s2;
     let steps = (scenario.duration_s / STEP_S).round() as u64;
     let mut end = End { lost: None, interrupted: false, disarmed: false };
     for step in 0..=steps {
-        let (time_s, motion) = (plant.time_s(), plant.motion());
+        let (time_s, motion, telemetry) = (plant.time_s(), plant.motion(), plant.telemetry());
         let reference = scenario.trajectory.at(time_s);
         // The tick that armed the vehicle was the first.
         if step > 0 {
@@ -84,7 +102,15 @@ pub fn fly(
         let heard = line.station.heard();
         let mut command = afbc::Command { speeds: heard.speeds, ..afbc::Command::default() };
         command.forces = RotorForces(heard.speeds.0.map(|speed| thrust_factor_n_s2 * speed * speed));
-        let sample = Sample { time_s, motion, reference, command, estimates: PerAxis::default() };
+        let sample = Sample {
+            time_s,
+            motion,
+            measurement: line.measurement,
+            telemetry,
+            reference,
+            command,
+            estimates: PerAxis::default(),
+        };
         end.interrupted = observe(&sample).is_break();
         end.lost =
             lost(&sample).or((!heard.armed).then_some("it disarmed in flight")).map(|reason| Lost { time_s, reason });
@@ -104,6 +130,9 @@ pub fn fly(
 struct Line<'a, A> {
     station: &'a mut Station,
     autopilot: &'a mut A,
+    sensors: Option<Sensors>,
+    /// What they said last.
+    measurement: Option<Measurement>,
     pace: Pace,
     now_ms: u64,
     /// Since the last rotor command.
@@ -113,9 +142,11 @@ struct Line<'a, A> {
 impl<A: Autopilot> Line<'_, A> {
     /// One millisecond: says what is due, hears what comes.
     fn turn(&mut self, motion: &Motion, reference: &Reference) -> Result<(), Error> {
-        let Line { station, autopilot, pace, now_ms, silent_ms } = self;
-        if now_ms.is_multiple_of(pace.state_ms) {
-            station.track(*now_ms * 1000, motion.measure());
+        let Line { station, autopilot, sensors, measurement, pace, now_ms, silent_ms } = self;
+        *measurement = sensors.as_mut().map(|sensors| sensors.measure(motion));
+        let state = measurement.map_or(Some(motion.measure()), |m| m.fresh.then_some(m.state));
+        if let Some(state) = state.filter(|_| now_ms.is_multiple_of(pace.state_ms)) {
+            station.track(*now_ms * 1000, state);
         }
         if now_ms.is_multiple_of(pace.setpoint_ms) {
             station.lead(reference.setpoint());

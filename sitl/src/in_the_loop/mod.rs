@@ -9,7 +9,8 @@
 //! 3. [`Station`]: tracker, commander and listener in one, the other end of the link.
 //! 4. [`fly()`]: arms, lets the vehicle go, flies a scenario, disarms. [`Pace`] is how often it speaks.
 //!
-//! The firmware holds the paper's vehicle, gains and settings; a scenario that wants others is refused ([`check`]).
+//! The firmware holds the paper's vehicle and flies its own law ([`firmware`]); a scenario that wants others is refused
+//! ([`check`]).
 //! Everything around the vehicle is the scenario's: equations, gusts, true parameters, start, trajectory.
 
 mod autopilot;
@@ -29,7 +30,7 @@ mod tests;
 
 pub use autopilot::Autopilot;
 pub use error::Error;
-pub use flight::{End, check, fly};
+pub use flight::{End, check, firmware, fly};
 pub use host::{Host, Tick};
 pub use log::Log;
 pub use pace::Pace;

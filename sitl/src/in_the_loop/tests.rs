@@ -1,10 +1,10 @@
 //! The loop around the host's autopilot, in lockstep and over a pseudo-terminal.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, reason = "tests")]
 
 use super::*;
 use crate::metrics::{Accumulator, Metrics};
 use crate::run::Run;
-use crate::scenario::{ControllerKind, Scenario, built_in};
+use crate::scenario::{Law, Scenario, built_in};
 use core::ops::ControlFlow;
 
 fn scenario(name: &str, duration_s: f64) -> Scenario {
@@ -25,7 +25,7 @@ fn the_link_in_between_changes_nothing_that_matters() {
     let scenario = scenario("paper", 60.0);
     let (end, looped) = fly_host(&scenario);
     assert_eq!(end, End { lost: None, interrupted: false, disarmed: true });
-    let plain = Run::fly(&scenario, ControllerKind::Afbc, u64::MAX).unwrap().metrics;
+    let plain = Run::fly(&scenario, &firmware(), u64::MAX).unwrap().metrics;
     // The wire rounds the attitude to a quaternion of f32, and has no yaw acceleration.
     assert!((looped.rmse - plain.rmse).amax() < 1e-3, "{} {}", looped.rmse, plain.rmse);
     assert!((looped.max_abs - plain.max_abs).amax() < 5e-3, "{} {}", looped.max_abs, plain.max_abs);
@@ -42,11 +42,13 @@ fn what_the_firmware_does_not_hold_is_refused() {
     let mut heavier = scenario("hover", 1.0);
     heavier.vehicle.mass_kg *= 2.0;
     let mut livelier = scenario("hover", 1.0);
-    livelier.gains.z.gamma *= 2.0;
+    if let Law::Afbc(gains) = &mut livelier.contenders[0].law {
+        gains.z.gamma *= 2.0;
+    }
     let mut slower = scenario("hover", 1.0);
-    slower.settings.command_filter_rad_s = 20.0;
+    slower.contenders[0].settings.command_filter_rad_s = 20.0;
     let mut baseline = scenario("hover", 1.0);
-    baseline.controllers = vec![ControllerKind::Backstepping];
+    baseline.contenders.remove(0);
     for (scenario, what) in
         [(heavier, "another vehicle"), (livelier, "other gains"), (slower, "other settings"), (baseline, "another law")]
     {

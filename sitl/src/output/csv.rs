@@ -1,12 +1,15 @@
 //! One CSV for each run: every logged step, units in the header.
 
 use super::Flown;
+use crate::contender::Law;
 use crate::flight::Sample;
+use crate::scenario::Scenario;
 use afbc::cascade::Context;
 use afbc::model::Model;
-use airframe::{Axis, Parameters, PerAxis};
+use airframe::{Axis, Parameters, PerAxis, State};
 use csv::ByteRecord;
 use nalgebra::Vector4;
+use plant::{Sensing, Telemetry};
 use std::io::{self, Write};
 
 /// A value, written in as few digits as give it back exactly.
@@ -49,8 +52,8 @@ fn lyapunov(model: &Model, sample: &Sample) -> PerAxis<f32> {
     })
 }
 
-/// Every column, left to right.
-fn columns() -> Vec<Column> {
+/// Every column of a flight's log, left to right.
+fn columns(scenario: &Scenario, law: &Law) -> Vec<Column> {
     let mut columns = Vec::new();
     let mut add = |name: String, value: Box<dyn Fn(&Row) -> Number>| columns.push(Column { name, value });
     macro_rules! add {
@@ -124,6 +127,8 @@ fn columns() -> Vec<Column> {
         }
     }
     add! { Flag "saturated": |s| s.command.health.saturated; }
+    // What the others have in the place of e_2 and the estimates is nothing.
+    let (backstepping, adaptive) = (!law.is_peer(), matches!(law, Law::Afbc(_) | Law::Guarded(_)));
     for axis in Axis::ALL {
         let name = axis.name();
         // Of e1, e2 and the subsystem's input.
@@ -133,13 +138,72 @@ fn columns() -> Vec<Column> {
             Axis::X | Axis::Y => ["m", "m_s", "m_s2"],
         };
         add(format!("e1_{name}_{e1}"), Box::new(move |row| Single(row.sample.command.errors.get(axis).e1)));
-        add(format!("e2_{name}_{e2}"), Box::new(move |row| Single(row.sample.command.errors.get(axis).e2)));
-        add(format!("delta_hat_{name}_{u}"), Box::new(move |row| Single(row.sample.estimates.get(axis).delta)));
-        add(format!("theta_norm_{name}_{u}"), Box::new(move |row| Single(row.sample.estimates.get(axis).theta.norm())));
-        add(format!("lyapunov_{name}"), Box::new(move |row| Single(*row.lyapunov.get(axis))));
+        if backstepping {
+            add(format!("e2_{name}_{e2}"), Box::new(move |row| Single(row.sample.command.errors.get(axis).e2)));
+        }
+        if adaptive {
+            let estimate = move |row: &Row| *row.sample.estimates.get(axis);
+            add(format!("delta_hat_{name}_{u}"), Box::new(move |row| Single(estimate(row).delta)));
+            add(format!("theta_norm_{name}_{u}"), Box::new(move |row| Single(estimate(row).theta.norm())));
+        }
+        if backstepping {
+            add(format!("lyapunov_{name}"), Box::new(move |row| Single(*row.lyapunov.get(axis))));
+        }
     }
-    let sum = |row: &Row| Axis::ALL.iter().map(|&axis| row.lyapunov.get(axis)).sum();
-    add("lyapunov_sum".into(), Box::new(move |row| Single(sum(row))));
+    if backstepping {
+        let sum = |row: &Row| Axis::ALL.iter().map(|&axis| row.lyapunov.get(axis)).sum();
+        add("lyapunov_sum".into(), Box::new(move |row| Single(sum(row))));
+    }
+    if let Law::Guarded(_) = law {
+        add("tripped".into(), Box::new(|row| Flag(row.sample.command.health.trip.is_some())));
+    }
+    columns.extend(real(scenario));
+    columns
+}
+
+/// What rotors and air did, and what was measured, of a plant and of sensors that are not ideal.
+fn real(scenario: &Scenario) -> Vec<Column> {
+    let mut columns = Vec::new();
+    if !scenario.is_ideal() {
+        let mut add = |name: &str, value: fn(&Telemetry) -> f64| {
+            let value = move |row: &Row| Double(row.sample.telemetry.as_ref().map_or(f64::NAN, value));
+            columns.push(Column { name: name.into(), value: Box::new(value) });
+        };
+        add("rotor1_rad_s", |t| t.rotor_speeds_rad_s.x);
+        add("rotor2_rad_s", |t| t.rotor_speeds_rad_s.y);
+        add("rotor3_rad_s", |t| t.rotor_speeds_rad_s.z);
+        add("rotor4_rad_s", |t| t.rotor_speeds_rad_s.w);
+        add("wind_x_m_s", |t| t.wind_m_s.x);
+        add("wind_y_m_s", |t| t.wind_m_s.y);
+        add("wind_z_m_s", |t| t.wind_m_s.z);
+        add("thrust_ratio", |t| t.thrust_ratio);
+        add("on_ground", |t| f64::from(u8::from(t.on_ground)));
+        if scenario.realism.rotors.battery.is_some() {
+            add("battery_v", |t| t.battery.map_or(f64::NAN, |battery| battery.voltage_v));
+            add("battery_a", |t| t.battery.map_or(f64::NAN, |battery| battery.current_a));
+            add("battery_charge", |t| t.battery.map_or(f64::NAN, |battery| battery.charge));
+        }
+    }
+    if scenario.sensing != Sensing::default() {
+        let mut add = |name: &str, value: fn(&State) -> f32| {
+            let value = move |row: &Row| Single(row.sample.measurement.as_ref().map_or(f32::NAN, |m| value(&m.state)));
+            columns.push(Column { name: name.into(), value: Box::new(value) });
+        };
+        add("x_measured_m", |s| s.position_m.x);
+        add("y_measured_m", |s| s.position_m.y);
+        add("z_measured_m", |s| s.position_m.z);
+        add("vx_measured_m_s", |s| s.velocity_m_s.x);
+        add("vy_measured_m_s", |s| s.velocity_m_s.y);
+        add("vz_measured_m_s", |s| s.velocity_m_s.z);
+        add("phi_measured_rad", |s| s.attitude_rad.x);
+        add("theta_measured_rad", |s| s.attitude_rad.y);
+        add("psi_measured_rad", |s| s.attitude_rad.z);
+        add("p_measured_rad_s", |s| s.rates_rad_s.x);
+        add("q_measured_rad_s", |s| s.rates_rad_s.y);
+        add("r_measured_rad_s", |s| s.rates_rad_s.z);
+        let fresh = |row: &Row| Flag(row.sample.measurement.is_some_and(|measurement| measurement.fresh));
+        columns.push(Column { name: "measurement_fresh".into(), value: Box::new(fresh) });
+    }
     columns
 }
 
@@ -152,7 +216,7 @@ fn given(sample: &Sample) -> airframe::Inputs {
 pub(super) fn write(out: &mut dyn Write, Flown { scenario, run }: &Flown) -> io::Result<()> {
     let vehicle: Parameters = scenario.vehicle.to_f32();
     let model = Model::new(&vehicle);
-    let columns = columns();
+    let columns = columns(scenario, &run.contender.law);
     let mut writer = csv::Writer::from_writer(out);
     writer.write_record(columns.iter().map(|column| &column.name))?;
     let mut digits = ryu::Buffer::new();

@@ -1,6 +1,6 @@
 //! Names of files, and how they come into being.
 
-use super::words::{case_words, stem};
+use super::words::{case_words, slug};
 use super::{Error, Flown};
 use crate::scenario::Scenario;
 use std::collections::HashSet;
@@ -42,7 +42,7 @@ pub(super) fn groups(flown: &[Flown]) -> Vec<Group<'_>> {
             group.figure_prefix = format!("{stem}-");
         }
         for flight in &group.flights {
-            let name = unique(&mut taken, format!("{stem}-{}", flight.run.controller.name()));
+            let name = unique(&mut taken, format!("{stem}-{}", slug(&flight.run.contender.name)));
             group.csv_names.push(format!("{name}.csv"));
         }
     }
@@ -52,8 +52,8 @@ pub(super) fn groups(flown: &[Flown]) -> Vec<Group<'_>> {
 /// The scenario's name with whatever tells it from others of that name.
 fn distinct_stem(scenario: &Scenario, all: &[&Scenario]) -> String {
     let own = case_words(scenario);
-    let mut name = stem(&scenario.name);
-    let others: Vec<_> = all.iter().filter(|other| stem(&other.name) == name).map(|other| case_words(other)).collect();
+    let mut name = slug(&scenario.name);
+    let others: Vec<_> = all.iter().filter(|other| slug(&other.name) == name).map(|other| case_words(other)).collect();
     for (i, word) in own.iter().enumerate() {
         if others.iter().any(|other| other.get(i) != Some(word)) {
             name = format!("{name}-{word}");

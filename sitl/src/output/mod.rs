@@ -7,6 +7,7 @@ mod csv;
 mod error;
 mod figures;
 mod files;
+mod reality;
 mod report;
 mod summary;
 mod table;
@@ -24,7 +25,7 @@ use crate::run::Run;
 use crate::scenario::Scenario;
 use std::path::{Path, PathBuf};
 
-/// One flown law of one scenario.
+/// One contender's flight of one scenario.
 #[derive(Clone, Debug)]
 pub struct Flown {
     /// What was flown.
@@ -43,9 +44,9 @@ pub fn prepare(dir: &Path) -> Result<(), Error> {
 
 /// Writes everything about `flown` into the folder `dir`, which is created if need be, and returns the paths written:
 ///
-/// * `<stem>-<controller>.csv`: each run's log;
+/// * `<stem>-<contender>.csv`: each run's log;
 /// * `fig4-trajectory.svg`, `fig5-outputs.svg`, `fig6-attitude.svg`, `fig7-errors.svg`, `fig8-inputs.svg`: the counterparts
-///   of the paper's figures, all laws overlaid; of several scenarios, each has its own set `<stem>-fig4-trajectory.svg`
+///   of the paper's figures, all contenders overlaid; of several scenarios, each has its own set `<stem>-fig4-trajectory.svg`
 ///   etc.;
 /// * `summary.json`: the figures of merit of each run;
 /// * `report.html`: all of it on one page that needs no other file.

@@ -2,11 +2,14 @@
 
 use super::figures::Figure;
 use super::files::Group;
-use super::{table, words};
+use super::{reality, table, words};
 use crate::claims::Claim;
+use crate::contender::{Contender, Law};
 use crate::scenario::Scenario;
 use crate::trajectory::Trajectory;
+use afbc::{Limits, Settings};
 use airframe::Axis;
+use core::convert::Infallible;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// Looks: dark on white, one column, breaks between figures on paper.
@@ -101,6 +104,11 @@ fn section(group: &Group, figures: &[Figure]) -> Markup {
         h2 { (group.scenario.name) }
         p { (words::conditions(group.scenario)) "." }
         div.scroll { (results(group)) }
+        @for flight in &group.flights {
+            @if let Some(tripped) = &flight.run.tripped {
+                p { (flight.run.contender.title()) ": " (words::tripped(tripped)) "." }
+            }
+        }
         p.quiet { (table::legend()) }
         @for figure in figures {
             figure {
@@ -127,7 +135,7 @@ fn results(group: &Group) -> Markup {
                     @for (row, flight) in rows.iter().enumerate() {
                         tr {
                             th scope="row" { @if row == 0 { (block.title) } }
-                            td.name { (flight.run.controller.title()) }
+                            td.name { (flight.run.contender.title()) }
                             @match &flight.run.lost {
                                 Some(lost) => td.lost colspan="4" { (words::lost(lost)) },
                                 None => @for cell in block.cells(flight) { td { (cell) } },
@@ -152,9 +160,6 @@ fn parameters(scenario: &Scenario) -> Markup {
         ("thrust factor b", format!("{:e} N s²", vehicle.thrust_factor_n_s2)),
         ("drag factor d", format!("{:e} N m s²", vehicle.drag_factor_n_m_s2)),
         ("gravity g", format!("{} m/s²", vehicle.gravity_m_s2)),
-        ("time step", format!("{} s", scenario.settings.dt_s)),
-        ("command filter", format!("{} rad/s", scenario.settings.command_filter_rad_s)),
-        ("largest rotor force", format!("{} N", scenario.settings.rotor_force_max_n)),
         ("start", start(scenario)),
         ("reference", trajectory(&scenario.trajectory)),
     ];
@@ -176,33 +181,101 @@ fn parameters(scenario: &Scenario) -> Markup {
                         td.name { "from " (change.start_s) " s " (until(change.end_s)) }
                     }
                 }
-            }
-        }
-        table {
-            thead {
-                tr {
-                    td { "subsystem" }
-                    @for gain in ["α₁", "α₂", "γ", "η", "ε", "centre", "width"] { th scope="col" { (gain) } }
-                }
-            }
-            tbody {
-                @for axis in Axis::ALL {
-                    @let gains = scenario.gains.get(axis);
+                @for payload in scenario.environment.payloads() {
                     tr {
-                        td { (axis.name()) }
-                        td { (gains.backstepping.alpha1) }
-                        td { (gains.backstepping.alpha2) }
-                        td { (gains.gamma) }
-                        td { (gains.eta) }
-                        td { (gains.epsilon) }
-                        td { (gains.membership.centre) }
-                        td { (gains.membership.width) }
+                        td { "payload " (words::payload(payload)) }
+                        td.name { (payload.below_m) " m below, from " (payload.start_s) " s " (until(payload.end_s)) }
                     }
                 }
+                @for (name, value) in reality::rows(scenario) { tr { td { (name) } td.name { (value) } } }
             }
         }
-        p.quiet { "γ, η, ε and the memberships (centre, width) are AFBC's alone." }
+        @for contender in &scenario.contenders { (gains(contender)) }
     }
+}
+
+/// Who flew: settings and gains.
+fn gains(contender: &Contender) -> Markup {
+    let Settings {
+        dt_s,
+        command_filter_rad_s,
+        rotor_force_max_n,
+        limits,
+        tilt_by_thrust,
+        heed_ground,
+        bumpless,
+        heed_saturation,
+    } = contender.settings;
+    let mut settings = format!("steps of {dt_s} s, at most {rotor_force_max_n} N a rotor");
+    if !contender.law.is_peer() {
+        settings += &format!(", command filter {command_filter_rad_s} rad/s");
+        let also = [
+            (tilt_by_thrust, "tilt by thrust"),
+            (heed_ground, "heeds the ground"),
+            (bumpless, "bumpless"),
+            (heed_saturation, "heeds saturation"),
+            (matches!(contender.law, Law::Guarded(_)), "monitored"),
+        ];
+        settings.extend(also.into_iter().filter(|(on, _)| *on).map(|(_, word)| format!(", {word}")));
+        if limits != Limits::NONE {
+            settings += &format!(
+                ", limits: tilt {} rad at {} rad/s, {} m/s², {} m/s, climb {} m/s",
+                limits.tilt_max_rad,
+                limits.tilt_rate_max_rad_s,
+                limits.acceleration_max_m_s2,
+                limits.speed_max_m_s,
+                limits.climb_max_m_s
+            );
+        }
+    }
+    html! {
+        h3 { (capitalised(contender.title())) }
+        p.quiet { (contender.kind().title()) ", " (settings) "." }
+        @match &contender.law {
+            Law::Afbc(gains) | Law::Guarded(gains) => (per_axis(&AFBC_GAINS, |axis| {
+                let g = gains.get(axis);
+                vec![
+                    g.backstepping.alpha1,
+                    g.backstepping.alpha2,
+                    g.gamma,
+                    g.eta,
+                    g.epsilon,
+                    g.membership.centre,
+                    g.membership.width,
+                    g.safeguards.sigma,
+                    g.safeguards.kappa,
+                    g.safeguards.theta_max,
+                    g.safeguards.delta_max,
+                    g.safeguards.dead_zone,
+                ]
+            })),
+            Law::Backstepping(gains) => (per_axis(&["α₁", "α₂"], |axis| {
+                vec![gains.get(axis).alpha1, gains.get(axis).alpha2]
+            })),
+            law => (by_name(*law)),
+        }
+    }
+}
+
+/// What the columns of AFBC's gains are called.
+const AFBC_GAINS: [&str; 12] = ["α₁", "α₂", "γ", "η", "ε", "centre", "width", "σ", "κ", "Θ max", "δ max", "dead zone"];
+
+fn per_axis(names: &[&str], gains: impl Fn(Axis) -> Vec<f32>) -> Markup {
+    html! {
+        table {
+            thead { tr { td { "subsystem" } @for name in names { th scope="col" { (name) } } } }
+            tbody { @for axis in Axis::ALL { tr { td { (axis.name()) } @for gain in gains(axis) { td { (gain) } } } } }
+        }
+    }
+}
+
+fn by_name(mut law: Law) -> Markup {
+    let mut gains = Vec::new();
+    let Ok(()) = law.each_gain(|range, gain| {
+        gains.push((range.name, *gain));
+        Ok::<(), Infallible>(())
+    });
+    html! { table { tbody { @for (name, gain) in gains { tr { td { code { (name) } } td { (gain) } } } } } }
 }
 
 fn start(scenario: &Scenario) -> String {

@@ -3,6 +3,7 @@
 use super::{Flown, settled};
 use crate::metrics::SETTLED_S;
 use crate::paper::{Reading, Sign};
+use afbc::Profile;
 use nalgebra::Vector4;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -15,11 +16,17 @@ struct Summary<'a> {
     inertia_sign: Option<&'a str>,
     thrust_sign: Option<&'a str>,
     plant: &'a str,
+    contender: &'a str,
     controller: &'a str,
-    profile: &'a str,
+    /// Whose gains and settings those are, if a profile's.
+    profile: Option<&'a str>,
     duration_s: f64,
     lost_at_s: Option<f64>,
     lost_reason: Option<&'a str>,
+    /// When and why AFBC's monitor put another law in its place.
+    tripped_at_s: Option<f64>,
+    tripped_reason: Option<&'a str>,
+    seed: u64,
     /// From when on `rmse`, `max_abs` and `mean_abs_delta_u_n` count.
     measured_from_s: f64,
     rmse: Option<Outputs>,
@@ -52,11 +59,15 @@ fn summary(Flown { scenario, run }: &Flown) -> Summary<'_> {
         inertia_sign: uncertainty.map(|u| u.inertia).map(Sign::symbol),
         thrust_sign: uncertainty.map(|u| u.thrust).map(Sign::symbol),
         plant: scenario.model.name(),
-        controller: run.controller.name(),
-        profile: scenario.profile.name(),
+        contender: &run.contender.name,
+        controller: run.contender.kind().name(),
+        profile: run.contender.profile().map(Profile::name),
         duration_s: scenario.duration_s,
         lost_at_s: run.lost.map(|lost| lost.time_s),
         lost_reason: run.lost.map(|lost| lost.reason),
+        tripped_at_s: run.tripped.map(|tripped| tripped.time_s),
+        tripped_reason: run.tripped.map(|tripped| tripped.trip.reason()),
+        seed: scenario.seed,
         measured_from_s: SETTLED_S,
         rmse: measured(run.metrics.rmse).map(Outputs::from),
         max_abs: measured(run.metrics.max_abs).map(Outputs::from),

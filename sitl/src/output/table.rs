@@ -118,8 +118,8 @@ pub fn table(flown: &[Flown], claims: &[Claim]) -> String {
 /// The block of one scenario.
 fn flights(group: &Group, lines: &mut Vec<String>) {
     wrap(lines, "", &format!("{}: {}", group.scenario.name, words::conditions(group.scenario)));
-    // Counted from what is printed, so that any law's name fits.
-    let name_width = group.flights.iter().map(|flight| flight.run.controller.title().len()).max().unwrap_or(0);
+    // Counted from what is printed, so that any name fits.
+    let name_width = group.flights.iter().map(|flight| flight.run.contender.title().chars().count()).max().unwrap_or(0);
     let rule = "─".repeat(20 + name_width + 4 * 12);
     let mut head = [""; 4];
     for block in &BLOCKS {
@@ -136,7 +136,7 @@ fn flights(group: &Group, lines: &mut Vec<String>) {
         }
         let mut title = block.title;
         for flight in rows {
-            let name = flight.run.controller.title();
+            let name = flight.run.contender.title();
             lines.push(match &flight.run.lost {
                 Some(lost) => format!("{title:<20}{name:<name_width$}   {}", words::lost(lost)),
                 None => row(title, name, name_width, &block.cells(flight)),
@@ -145,6 +145,11 @@ fn flights(group: &Group, lines: &mut Vec<String>) {
         }
     }
     lines.push(rule);
+    for flight in &group.flights {
+        if let Some(tripped) = &flight.run.tripped {
+            wrap(lines, "", &format!("{}: {}.", flight.run.contender.title(), words::tripped(tripped)));
+        }
+    }
 }
 
 fn row(title: &str, name: &str, name_width: usize, cells: &[impl AsRef<str>; 4]) -> String {

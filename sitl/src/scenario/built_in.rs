@@ -13,7 +13,7 @@ pub struct BuiltIn {
 }
 
 /// Every built-in scenario.
-pub const BUILT_IN: [BuiltIn; 7] = [
+pub const BUILT_IN: [BuiltIn; 9] = [
     BuiltIn { name: "paper", text: include_str!("../../scenarios/paper.toml") },
     BuiltIn { name: "hover", text: include_str!("../../scenarios/hover.toml") },
     BuiltIn { name: "step", text: include_str!("../../scenarios/step.toml") },
@@ -21,6 +21,8 @@ pub const BUILT_IN: [BuiltIn; 7] = [
     BuiltIn { name: "lissajous", text: include_str!("../../scenarios/lissajous.toml") },
     BuiltIn { name: "waypoints", text: include_str!("../../scenarios/waypoints.toml") },
     BuiltIn { name: "delivery", text: include_str!("../../scenarios/delivery.toml") },
+    BuiltIn { name: "hardware", text: include_str!("../../scenarios/hardware.toml") },
+    BuiltIn { name: "storm", text: include_str!("../../scenarios/storm.toml") },
 ];
 
 /// The built-in scenario called `name`.

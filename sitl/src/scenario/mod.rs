@@ -12,45 +12,15 @@ pub use built_in::{BUILT_IN, BuiltIn, built_in, similar_built_in};
 pub use error::FileError;
 pub use file::{load, parse};
 
-use crate::flight::{Flight, adaptive_law, backstepping_law};
+pub use crate::contender::{Contender, ControllerKind, Law};
+
 use crate::paper::Case;
 use crate::trajectory::Trajectory;
-use afbc::{Profile, Settings, adaptive};
-use airframe::{OutOfRange, Parameters, PerAxis, Range};
-use plant::{Environment, Model, Motion};
+use airframe::{OutOfRange, Parameters, Range};
+use plant::{Environment, Model, Motion, Plant, Realism, Sensing, Sensors};
 
 /// Accepted length of a flight \[s\].
 pub const DURATION: Range = Range::new("duration_s", 0.1, 36_000.0);
-
-/// A control law to fly with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ControllerKind {
-    /// Adaptive fuzzy backstepping (20)-(22).
-    Afbc,
-    /// Classical backstepping (16), (21).
-    Backstepping,
-}
-
-impl ControllerKind {
-    /// Every law.
-    pub const ALL: [ControllerKind; 2] = [ControllerKind::Afbc, ControllerKind::Backstepping];
-
-    /// Lower-case name, as in scenario files and logs.
-    pub const fn name(self) -> &'static str {
-        match self {
-            ControllerKind::Afbc => "afbc",
-            ControllerKind::Backstepping => "backstepping",
-        }
-    }
-
-    /// Name for people.
-    pub const fn title(self) -> &'static str {
-        match self {
-            ControllerKind::Afbc => "AFBC",
-            ControllerKind::Backstepping => "backstepping",
-        }
-    }
-}
 
 /// Everything that determines a flight.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,33 +35,68 @@ pub struct Scenario {
     pub duration_s: f64,
     /// Equations that move the vehicle.
     pub model: Model,
-    /// The vehicle as the controller believes it to be.
+    /// The vehicle as the controllers believe it to be.
     pub vehicle: Parameters<f64>,
     /// The vehicle as it is, and what pushes it.
     pub environment: Environment,
+    /// What rotors, air and ground add to the equations. Its own seed is not used.
+    pub realism: Realism,
+    /// How the motion is measured.
+    pub sensing: Sensing,
+    /// Of everything random. The same seed gives the same flight.
+    pub seed: u64,
     /// Motion at t = 0.
     pub initial: Motion,
     /// The reference.
     pub trajectory: Trajectory,
-    /// Laws to compare, each in a flight of its own.
-    pub controllers: Vec<ControllerKind>,
-    /// Where gains and settings started from.
-    pub profile: Profile,
-    /// Gains; the baseline takes their backstepping part.
-    pub gains: PerAxis<adaptive::Gains>,
-    /// Settings of the cascade.
-    pub settings: Settings,
+    /// Controllers to compare, each in a flight of its own.
+    pub contenders: Vec<Contender>,
 }
 
 impl Scenario {
-    /// Builds every controller once, just as a flight would.
+    /// The first contender that flies a law of this kind.
+    pub fn contender(&self, kind: ControllerKind) -> Option<&Contender> {
+        self.contenders.iter().find(|contender| contender.kind() == kind)
+    }
+
+    /// Builds every flight once, just as it would begin.
     ///
     /// # Errors
     /// The first parameter, gain or setting out of range.
     pub fn check(&self) -> Result<(), OutOfRange> {
-        self.controllers.iter().try_for_each(|kind| match kind {
-            ControllerKind::Afbc => Flight::new(self, adaptive_law(self)?).map(drop),
-            ControllerKind::Backstepping => Flight::new(self, backstepping_law(self)?).map(drop),
+        self.contenders.iter().try_for_each(|contender| {
+            contender.check(self.vehicle.to_f32())?;
+            self.plant(contender.step_s())?;
+            self.sensors(contender.step_s()).map(drop)
         })
+    }
+
+    /// True if rotors, air and ground are those of the paper's equations.
+    pub fn is_ideal(&self) -> bool {
+        self.realism == Realism { seed: self.realism.seed, ..Realism::default() }
+    }
+
+    /// The vehicle at t = 0, made for steps of `step_s`; the ideal one if nothing real was asked for.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub fn plant(&self, step_s: f64) -> Result<Plant, OutOfRange> {
+        let environment = self.environment.clone();
+        if self.is_ideal() {
+            return Ok(Plant::new(self.model, self.initial, environment));
+        }
+        let realism = Realism { seed: self.seed, ..self.realism.clone() };
+        Plant::with(self.model, self.initial, environment, &realism, step_s)
+    }
+
+    /// The sensors, read every `step_s`; none if they are perfect.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub fn sensors(&self, step_s: f64) -> Result<Option<Sensors>, OutOfRange> {
+        if self.sensing == Sensing::default() {
+            return Ok(None);
+        }
+        Sensors::new(&self.sensing, self.seed, step_s).map(Some)
     }
 }

@@ -7,6 +7,9 @@ use nalgebra::Vector3;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+/// Most tables of one array that each step of a flight has to look at.
+const MOST: usize = 100;
+
 /// One table of a document, and which of its keys have been read.
 pub(super) struct Table<'a> {
     source: Source<'a>,
@@ -60,6 +63,11 @@ impl<'a> Table<'a> {
     pub(super) fn text(&mut self, key: &'static str) -> Result<Option<&'a str>, FileError> {
         let Some(value) = self.value(key) else { return Ok(None) };
         self.text_in(value, key).map(Some)
+    }
+
+    /// The string under `key`, which must be there.
+    pub(super) fn need_text(&mut self, key: &'static str, cure: &str) -> Result<&'a str, FileError> {
+        self.text(key)?.ok_or_else(|| self.missing(key, cure))
     }
 
     /// The option whose name stands under `key`, if it is there.
@@ -125,6 +133,27 @@ impl<'a> Table<'a> {
         array.iter().map(|item| self.table_in(item, key, &wanted)).collect()
     }
 
+    /// The tables of the array under `key`, [`MOST`] at most.
+    pub(super) fn few_tables(&mut self, key: &'static str) -> Result<Vec<Table<'a>>, FileError> {
+        let tables = self.tables(key)?;
+        if tables.len() > MOST {
+            return Err(self.fault_at(key, format!("{} of them; keep {MOST} at most", tables.len())));
+        }
+        Ok(tables)
+    }
+
+    /// True or false, as it stands under `key`, if it is there.
+    pub(super) fn boolean(&mut self, key: &'static str) -> Result<Option<bool>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let boolean = value.get_ref().as_bool();
+        boolean.map(Some).ok_or_else(|| self.wrong_type(value, key, "true or false", "true or false without quotes"))
+    }
+
+    /// True if a table stands under `key`.
+    pub(super) fn holds_table(&self, key: &str) -> bool {
+        self.entries.get(key).is_some_and(|value| value.get_ref().is_table())
+    }
+
     /// Refuses the first key, from the top, that nobody read.
     pub(super) fn finish(self) -> Result<(), FileError> {
         let Some((key, start)) = self.unread().min_by_key(|(_, start)| *start) else { return Ok(()) };
@@ -133,6 +162,11 @@ impl<'a> Table<'a> {
             None => format!("known here: {}", self.read.join(", ")),
         };
         Err(self.unknown(key, start, &cure))
+    }
+
+    /// Refuses `key`, which has its place elsewhere.
+    pub(super) fn forbid(&self, key: &str, problem: &str) -> Result<(), FileError> {
+        if self.entries.contains_key(key) { Err(self.fault_at(key, problem)) } else { Ok(()) }
     }
 
     /// The whole table is refused on account of `key`.

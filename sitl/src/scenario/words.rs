@@ -6,7 +6,9 @@ use airframe::OutOfRange;
 const LIKENESS: f64 = 0.8;
 
 /// What the endings of keys mean, longest ending first.
-const UNITS: [(&str, &str); 16] = [
+const UNITS: [(&str, &str); 30] = [
+    ("_kg_m3", "kilograms per cubic metre"),
+    ("_n_s2_m", "newton seconds squared per metre"),
     ("_n_m_s2", "newton metre seconds squared"),
     ("_kg_m2", "kilogram square metres"),
     ("_rad_s2", "radians per second squared"),
@@ -14,12 +16,24 @@ const UNITS: [(&str, &str); 16] = [
     ("_m_s2", "metres per second squared"),
     ("_rad_s", "radians per second"),
     ("_m_s", "metres per second"),
+    ("_1_s3", "1/s3"),
+    ("_1_s2", "1/s2"),
+    ("_1_s", "1/s"),
     ("_n_m", "newton metres"),
     ("_rad", "radians"),
     ("_kg", "kilograms"),
+    ("_m2", "square metres"),
+    ("_a_h", "ampere hours"),
+    ("_ohm", "ohms"),
+    ("_hz", "per second"),
     ("_m", "metres"),
     ("_n", "newtons"),
     ("_s", "seconds"),
+    ("_v", "volts"),
+    ("_w", "watts"),
+    ("sigma", "1/s"),
+    ("kappa", "1/s per m/s or rad/s"),
+    ("dead_zone", "m/s or rad/s"),
     ("alpha1", "1/s"),
     ("alpha2", "input per m/s or rad/s"),
     ("epsilon", "m/s or rad/s"),

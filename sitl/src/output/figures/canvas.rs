@@ -58,25 +58,39 @@ pub(super) fn text_width_px(text: &str, size_px: f64) -> f64 {
     0.5 * size_px * text.chars().filter(|c| !matches!(c, '⟨' | '⟩')).count() as f64
 }
 
-/// Draws title, conditions and legend, and gives back the height that they take.
-pub(super) fn head(area: &Area, title: &str, conditions: &str, legend: &[(String, Ink)]) -> Result<f64, Failure> {
+/// Draws title, conditions and legend.
+pub(super) fn head(area: &Area, title: &str, conditions: &str, legend: &[(String, Ink)]) -> Result<(), Failure> {
     let put = |words: &str, x: f64, y: f64, style: TextStyle<'static>| {
         area.draw(&Text::new(words.to_owned(), (units(x), units(y)), style))
     };
     put(title, 14.0, 18.0, styled(15.0, BLACK, HPos::Left, FontStyle::Bold))?;
     put(&conditions.replace(" -", " −"), WIDTH_PX - 14.0, 18.0, text(11.0, GREY, HPos::Right))?;
+    for ((name, ink), (x, y)) in legend.iter().zip(places(legend)) {
+        let sample = [(units(x), units(y)), (units(x + 24.0), units(y))];
+        area.draw(&PathElement::new(sample, ink.style()))?;
+        put(name, x + 30.0, y, text(12.0, BLACK, HPos::Left))?;
+    }
+    Ok(())
+}
+
+/// Height that title and legend take.
+pub(super) fn head_px(legend: &[(String, Ink)]) -> f64 {
+    places(legend).last().map_or(42.0, |(_, y)| *y) + 12.0
+}
+
+/// Where each entry of the legend goes, line by line.
+fn places(legend: &[(String, Ink)]) -> Vec<(f64, f64)> {
     let (mut x, mut y) = (14.0, 42.0);
-    for (name, ink) in legend {
+    let place = |(name, _): &(String, Ink)| {
         let width = 30.0 + text_width_px(name, 12.0) + 26.0;
         if x > 14.0 && x + width > WIDTH_PX {
             (x, y) = (14.0, y + 18.0);
         }
-        let sample = [(units(x), units(y)), (units(x + 24.0), units(y))];
-        area.draw(&PathElement::new(sample, ink.style()))?;
-        put(name, x + 30.0, y, text(12.0, BLACK, HPos::Left))?;
+        let here = (x, y);
         x += width;
-    }
-    Ok(y + 12.0)
+        here
+    };
+    legend.iter().map(place).collect()
 }
 
 /// Lets `draw` fill a white picture.

@@ -22,7 +22,7 @@ const LANES: usize = 4;
 
 /// Everything that is marked on one time axis.
 pub(super) struct Marks {
-    /// Parameters are off.
+    /// The vehicle is another than believed: parameters, payloads, rotor faults.
     pub(super) changes: Vec<Mark>,
     /// Gusts.
     pub(super) gusts: Vec<Mark>,
@@ -37,8 +37,11 @@ pub(super) fn marks(scenario: &Scenario, end_s: f64, width_px: f64) -> Marks {
         let (letter, index) = words::gust(gust);
         (format!("{letter}⟨{index}⟩"), gust.start_s, gust.end_s)
     });
-    let changes = scenario.environment.changes().iter();
-    let changes = changes.map(|change| (words::change(change).replace('-', "−"), change.start_s, change.end_s));
+    let (environment, rotors) = (&scenario.environment, &scenario.realism.rotors);
+    let changes = environment.changes().iter().map(|c| (words::change(c).replace('-', "−"), c.start_s, c.end_s));
+    let payloads = environment.payloads().iter().map(|p| (words::payload(p), p.start_s, p.end_s));
+    let faults = rotors.faults.iter().map(|fault| (words::fault(fault), fault.start_s, f64::INFINITY));
+    let changes = changes.chain(payloads).chain(faults);
     let (mut gusts, mut changes) = (merged(gusts, end_s), merged(changes, end_s));
     // The end of the last label of each row.
     let mut lanes = Vec::new();

@@ -1,4 +1,4 @@
-//! Counterparts of the paper's Figs. 4 to 8 as SVG, all laws of one scenario overlaid.
+//! Counterparts of the paper's Figs. 4 to 8 as SVG, all contenders of one scenario overlaid.
 //!
 //! Gusts are marked where they strike and the time when parameters are off is shaded. Colours are Okabe and Ito's, which
 //! the colour-blind can tell apart.
@@ -28,14 +28,24 @@ pub(super) struct Figure {
     pub(super) svg: String,
 }
 
-/// Blue, vermilion, green, purple, orange: one for each law, in the order flown.
-const LAWS: [RGBColor; 5] = [
+/// Blue, vermilion, green, purple, orange, sky blue: one for each contender, in the order flown.
+const CONTENDERS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
     RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
 ];
+
+/// The colour of contender number `index`; with each round through the palette, darker.
+fn color(index: usize) -> RGBColor {
+    let round = (index / CONTENDERS.len()).min(3);
+    let RGBColor(r, g, b) = *CONTENDERS.get(index % CONTENDERS.len()).unwrap_or(&canvas::BLACK);
+    let [r, g, b] = [r, g, b].map(|part| (f64::from(part) * libm::pow(0.6, round as f64)) as u8);
+    RGBColor(r, g, b)
+}
+
 /// What should be flown.
 const REFERENCE: Ink = Ink { color: RGBColor(176, 176, 176), width_px: 4.0 };
 /// Width of a law's line.
@@ -59,7 +69,7 @@ impl Law<'_> {
 
     /// The name, for the legend.
     fn title(&self) -> String {
-        let title = self.flight.run.controller.title();
+        let title = self.flight.run.contender.title();
         match &self.flight.run.lost {
             Some(lost) => format!("{title} (lost at {:.1} s)", lost.time_s),
             None => title.into(),
@@ -129,7 +139,7 @@ pub(super) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {
     let last_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
     let end_s = if last_s > 0.0 { last_s } else { scenario.duration_s };
     let laws: Vec<Law> =
-        flights.iter().zip(LAWS.iter().cycle()).map(|(flight, &color)| Law { flight, color }).collect();
+        flights.iter().enumerate().map(|(index, flight)| Law { flight, color: color(index) }).collect();
     // The roughest behind, so that it hides nothing.
     let mut rough_first: Vec<&Law> = laws.iter().collect();
     let roughness = |law: &Law| law.flight.run.metrics.mean_abs_delta_u.sum();
@@ -155,7 +165,7 @@ pub(super) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {
     let law_legend = || laws.iter().map(|law| (law.title(), law.ink()));
     let with_reference = || core::iter::once(("reference".to_owned(), REFERENCE)).chain(law_legend()).collect();
     let with_desired = laws.iter().flat_map(|law| {
-        let desired = format!("{} φ⟨d⟩, θ⟨d⟩", law.flight.run.controller.title());
+        let desired = format!("{} φ⟨d⟩, θ⟨d⟩", law.flight.run.contender.title());
         [(law.title(), law.ink()), (desired, law.pale())]
     });
 

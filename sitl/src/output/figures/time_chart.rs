@@ -72,12 +72,12 @@ impl Chart<'_> {
     /// The figure as SVG.
     pub(super) fn draw(&self) -> io::Result<String> {
         let marks = marks(self.scenario, self.end_s, PLOT_PX);
-        // Legends of more than a line are rare; they push the panels down.
-        let head_px = 54.0 + 18.0 * (self.legend.len().saturating_sub(1) / 4) as f64;
+        let head_px = canvas::head_px(&self.legend);
         let lanes_px = marks.lanes as f64 * LANE_PX;
         let height_px = head_px + lanes_px + self.panels.len() as f64 * PANEL_PX + BOTTOM_PX;
         canvas::svg(height_px, self.title, |area| {
-            let top_px = canvas::head(area, self.title, self.conditions, &self.legend)?.max(head_px) + lanes_px;
+            canvas::head(area, self.title, self.conditions, &self.legend)?;
+            let top_px = head_px + lanes_px;
             for (i, panel) in self.panels.iter().enumerate() {
                 let y_px = top_px + i as f64 * PANEL_PX;
                 let last = i + 1 == self.panels.len();

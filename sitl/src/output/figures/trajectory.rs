@@ -13,7 +13,7 @@ use std::collections::HashSet;
 use std::io;
 
 const HEIGHT_PX: f64 = 660.0;
-/// Room for the box, below the legend: left, top, width, height.
+/// Room for the box, below a legend of one line: left, top, width, height.
 const ROOM_PX: [f64; 4] = [110.0, 70.0, WIDTH_PX - 220.0, HEIGHT_PX - 70.0 - 62.0];
 /// Height of the box in the lengths of its longer floor edge.
 const BOX_HEIGHT: f64 = 0.62;
@@ -32,13 +32,15 @@ struct View {
 }
 
 impl View {
-    /// A view of the box between two corners. The floor is true to scale as long as that leaves it wide enough.
-    fn new(low_m: Vector3<f64>, high_m: Vector3<f64>) -> Self {
+    /// A view of the box between two corners, its room moved down by `below_px`. The floor is true to scale as long as that
+    /// leaves it wide enough.
+    fn new(low_m: Vector3<f64>, high_m: Vector3<f64>, below_px: f64) -> Self {
         let span = high_m - low_m;
         let longer = span.x.max(span.y);
         let edges = Vector3::new((span.x / longer).max(0.5), (span.y / longer).max(0.5), BOX_HEIGHT);
         let [left, top, width, height] = ROOM_PX;
-        let view = View { low_m, high_m, edges, px: 1.0, middle_px: (left + 0.5 * width, top + 0.5 * height) };
+        let view =
+            View { low_m, high_m, edges, px: 1.0, middle_px: (left + 0.5 * width, top + below_px + 0.5 * height) };
         // The far corners of the outline, seen from the middle.
         let (right, _) = view.direction(Vector3::new(0.5, 0.5, 0.0));
         let (_, down) = view.direction(Vector3::new(0.5, -0.5, -0.5));
@@ -84,15 +86,17 @@ pub(super) fn draw(
         range(&flown.chain(wanted).collect::<Vec<_>>(), 0.5)
     };
     let ranges = [Vector3::x(), Vector3::y(), Vector3::z()].map(range_along);
-    let view = View::new(
-        Vector3::from(ranges.each_ref().map(|range| range.start)),
-        Vector3::from(ranges.each_ref().map(|range| range.end)),
-    );
     let marks = marks(scenario, end_s, PLOT_PX);
     let changed = Ink { color: CHANGED, width_px: 13.0 };
     legend.extend(marks.changes.iter().map(|change| (change.label.clone(), changed)));
+    let below_px = canvas::head_px(&legend) - canvas::head_px(&[]);
+    let view = View::new(
+        Vector3::from(ranges.each_ref().map(|range| range.start)),
+        Vector3::from(ranges.each_ref().map(|range| range.end)),
+        below_px,
+    );
 
-    canvas::svg(HEIGHT_PX, "Trajectory", |area| {
+    canvas::svg(HEIGHT_PX + below_px, "Trajectory", |area| {
         canvas::head(area, "Trajectory", conditions, &legend)?;
         furniture(area, &view)?;
         let wanted = || longest.run.log.iter().map(|s| (s.time_s, s.reference.position_m));

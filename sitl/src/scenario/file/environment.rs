@@ -1,18 +1,18 @@
-//! `[[gust]]` and `[[change]]`: what happens to the vehicle in flight.
+//! `[[gust]]`, `[[change]]` and `[[payload]]`: what happens to the vehicle in flight.
 
 use super::{FileError, Table};
 use crate::scenario::words::out_of_range;
 use airframe::{Axis, Parameters, Range};
-use plant::{Environment, Gust, GustKind, ParameterChange, Quantity};
+use plant::{Environment, Gust, GustKind, PAYLOAD_BELOW, ParameterChange, Payload, Quantity};
 
-/// Accepted start of a gust or change \[s\].
-const START: Range = Range::new("start_s", 0.0, 36_000.0);
-/// Accepted length of a gust or change \[s\]; one without a length stays to the end.
-const LENGTH: Range = Range::new("duration_s", 0.001, 36_000.0);
+/// Accepted start of whatever happens in flight \[s\].
+pub(super) const START: Range = Range::new("start_s", 0.0, 36_000.0);
+/// Accepted length of it \[s\]; what has none stays to the end.
+pub(super) const LENGTH: Range = Range::new("duration_s", 0.001, 36_000.0);
 /// Accepted factor of a change; the parameter must stay in range too.
 const FACTOR: Range = Range::new("factor", 0.001, 1000.0);
-/// Most changes in one file.
-const CHANGES: usize = 100;
+/// Accepted mass of a payload \[kg\].
+const PAYLOAD_MASS: Range = Range::new("mass_kg", 0.0, plant::PAYLOAD_MASS.max);
 
 /// How large a gust along x, y or z may be.
 const LINEAR: [(Range, GustKind); 2] = [
@@ -28,10 +28,7 @@ const ANGULAR: [(Range, GustKind); 2] = [
 /// The environment of a vehicle with these true parameters.
 pub(super) fn read(root: &mut Table<'_>, truth: Parameters<f64>) -> Result<Environment, FileError> {
     let gusts = root.tables("gust")?.into_iter().map(gust).collect::<Result<_, _>>()?;
-    let tables = root.tables("change")?;
-    if tables.len() > CHANGES {
-        return Err(root.fault_at("change", format!("{} changes; keep {CHANGES} at most", tables.len())));
-    }
+    let tables = root.few_tables("change")?;
     let mut environment = Environment::new(truth, Vec::new(), gusts)
         .map_err(|error| root.fault_at("truth", format!("{}; change it", out_of_range(&error))))?;
     for mut table in tables {
@@ -43,7 +40,22 @@ pub(super) fn read(root: &mut Table<'_>, truth: Parameters<f64>) -> Result<Envir
         })?;
         table.finish()?;
     }
+    let mut payloads = Vec::new();
+    for mut table in root.few_tables("payload")? {
+        payloads.push(payload(&mut table)?);
+        environment = environment.with_payloads(payloads.clone()).map_err(|error| {
+            table.fault_at(PAYLOAD_MASS.name, format!("it makes {}; change the payload", out_of_range(&error)))
+        })?;
+        table.finish()?;
+    }
     Ok(environment)
+}
+
+fn payload(table: &mut Table<'_>) -> Result<Payload, FileError> {
+    let mass_kg = table.need_number(&PAYLOAD_MASS)?;
+    let below_m = table.number(&PAYLOAD_BELOW)?.unwrap_or(0.0);
+    let [start_s, end_s] = interval(table)?;
+    Ok(Payload { mass_kg, below_m, start_s, end_s })
 }
 
 fn gust(mut table: Table<'_>) -> Result<Gust, FileError> {

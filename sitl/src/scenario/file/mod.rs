@@ -1,8 +1,11 @@
 //! Scenario files. The format is described, key by key, in `docs/scenarios.md`.
 
+mod contenders;
 mod control;
 mod environment;
 mod motion;
+mod realism;
+mod sensors;
 mod trajectory;
 mod vehicle;
 
@@ -12,9 +15,8 @@ mod tests;
 use super::error::{FileError, Source};
 use super::reader::Table;
 use super::words::out_of_range;
-use super::{ControllerKind, DURATION, Scenario};
-use afbc::Profile;
-use airframe::Parameters;
+use super::{Contender, DURATION, Scenario};
+use airframe::{Parameters, Range};
 use plant::Model;
 use std::fs::File;
 use std::io::{self, Read};
@@ -23,6 +25,8 @@ use toml::de::DeTable;
 
 /// Length of a flight that does not say how long it is \[s\].
 const DURATION_S: f64 = 60.0;
+/// Accepted seeds.
+const SEED: Range = Range::new("seed", 0.0, 1e9);
 /// Longest scenario name.
 const NAME_LENGTH: usize = 64;
 /// Largest file that is read at all \[bytes\].
@@ -76,20 +80,21 @@ pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> 
     }
     let duration_s = root.number(&DURATION)?.unwrap_or(DURATION_S);
     let models = [Model::Simplified, Model::RigidBody];
+    let seed = seed(&mut root)?;
     let model = root.choice("plant", &models, Model::name)?.unwrap_or(Model::RigidBody);
-    let controllers = root.choices("controllers", &ControllerKind::ALL, ControllerKind::name)?;
-    let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(Profile::Paper);
 
     let vehicle = vehicle::read(root.table("vehicle")?, Parameters::PAPER)?;
     let truth = vehicle::read(root.table("truth")?, vehicle)?;
-    let gains = control::gains(root.table("gains")?, profile.gains())?;
-    let settings = control::settings(root.table("settings")?, profile.settings())?;
+    let contenders = contenders::read(&mut root)?;
     let Some(table) = root.table("trajectory")? else {
         return Err(root.missing("trajectory", "add [trajectory] with kind = \"hover\" and position_m = [0, 0, 1]"));
     };
     let trajectory = trajectory::read(table)?;
     let initial = motion::initial(root.table("initial")?, &trajectory.at(0.0))?;
     let environment = environment::read(&mut root, truth)?;
+    let step_s = contenders.first().map_or(afbc::cascade::DT.max, Contender::step_s);
+    let realism = realism::read(&mut root, &truth, step_s)?;
+    let sensing = sensors::read(root.table("sensors")?)?;
 
     let scenario = Scenario {
         name,
@@ -99,17 +104,26 @@ pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> 
         model,
         vehicle,
         environment,
+        realism,
+        sensing,
+        seed,
         initial,
         trajectory,
-        controllers: controllers.unwrap_or(ControllerKind::ALL.to_vec()),
-        profile,
-        gains,
-        settings,
+        contenders,
     };
     // Whatever the tables have let through, no flight begins with.
     scenario.check().map_err(|error| root.fault(error.range.name, format!("{}; change it", out_of_range(&error))))?;
     root.finish()?;
     Ok(scenario)
+}
+
+/// The seed of everything random.
+fn seed(root: &mut Table<'_>) -> Result<u64, FileError> {
+    let seed = root.number(&SEED)?.unwrap_or(0.0);
+    if seed.fract() != 0.0 {
+        return Err(root.fault_at(SEED.name, format!("{seed} is not a whole number; leave out its decimals")));
+    }
+    Ok(seed as u64)
 }
 
 /// What keeps a text from being TOML.
