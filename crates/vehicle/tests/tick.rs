@@ -49,6 +49,7 @@ impl Bench {
         }
         bench.inbox.ask(Request::Arm);
         assert_eq!(bench.tick(Some(state), Some(setpoint)).answer, Some(Ok(Request::Arm)));
+        bench.tick(Some(state), Some(setpoint));
         bench
     }
 
@@ -85,7 +86,8 @@ fn disarmed_motors_are_off_and_arming_waits_for_the_rate() {
     bench.inbox.ask(Request::Arm);
     let outcome = bench.tick(Some(State::default()), Some(near()));
     assert_eq!((outcome.mode, outcome.answer), (Mode::Flying, Some(Ok(Request::Arm))));
-    assert!(outcome.motors.0.min() > 0.0);
+    assert_eq!(outcome.motors, RotorSpeeds::default(), "idle in the tick of arming");
+    assert!(bench.tick(Some(State::default()), Some(near())).motors.0.min() > 0.0);
 }
 
 /// In flight, a tick is the law's step, bit for bit.
@@ -122,6 +124,7 @@ fn the_estimates_of_one_flight_are_not_those_of_the_next() {
     assert_eq!((outcome.mode, outcome.motors), (Mode::Disarmed, RotorSpeeds::default()));
     assert_eq!(bench.memory.control().expect("flown").estimates, learnt, "still there to be reported");
     bench.inbox.ask(Request::Arm);
+    bench.tick(Some(State::default()), Some(near()));
     bench.tick(Some(State::default()), Some(near()));
     assert!(bench.memory.control().expect("flown").estimates.z.theta.norm() < learnt.z.theta.norm() / 50.0);
 }
