@@ -140,7 +140,12 @@ impl<const N: usize> Mixer<N> {
         if forces.iter().all(|&force| 0.0 <= force && force <= self.force_max) {
             return Allocation { forces: RotorForces(forces), unallocated: Inputs::default(), saturated: false };
         }
-        let wanted = wanted.map(|u| if u.is_nan() { 0.0 } else { u.clamp(-ASKED_MAX, ASKED_MAX) });
+        // The usual case by one comparison, which a NaN fails, too.
+        let wanted = if wanted.norm_squared() <= ASKED_MAX * ASKED_MAX {
+            wanted
+        } else {
+            wanted.map(|u| if u.is_nan() { 0.0 } else { u.clamp(-ASKED_MAX, ASKED_MAX) })
+        };
         let forces = self.within_limits(&wanted);
         let least = ROUNDING * self.force_max;
         let missing = (wanted - self.effectiveness * forces).map(|u| if u.abs() > least { u } else { 0.0 });

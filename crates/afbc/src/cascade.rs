@@ -31,10 +31,8 @@ pub trait Law {
     /// alpha_1 of the subsystem \[1/s\].
     fn alpha1(&self, axis: Axis) -> f32;
 
-    /// The estimate to start from in flight, for a vehicle of this weight.
-    fn start(&self, _axis: Axis, _weight_n: f32) -> Self::Estimate {
-        Self::Estimate::default()
-    }
+    /// Turns estimates that know nothing yet into those to start from in flight, for a vehicle of this weight.
+    fn start(&self, _estimates: &mut PerAxis<Self::Estimate>, _weight_n: f32) {}
 
     /// U4 that it takes to hover \[N\], by the estimate of the z subsystem; for a law that does not know, the weight.
     fn hover_thrust_n(&self, _z: &Self::Estimate, weight_n: f32) -> f32 {
@@ -243,7 +241,7 @@ impl<L: Law> Controller<L> {
         fresh: bool,
     ) -> Command {
         if memory.filtered.is_none() && self.settings.bumpless {
-            memory.estimates = PerAxis::from_fn(|axis| self.law.start(axis, self.weight_n));
+            self.law.start(&mut memory.estimates, self.weight_n);
         }
         let stands = self.stands(memory);
         let context = Context {

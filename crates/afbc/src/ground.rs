@@ -25,8 +25,8 @@ impl Ground {
     #[inline]
     pub fn advance(&mut self, thrust_n: f32, weight_n: f32, velocity_m_s: &Vector3<f32>, dt_s: f32) {
         let speed_max = if self.standing() { MOVING_M_S } else { STILL_M_S };
-        let still = velocity_m_s.iter().all(|v| v.abs() < speed_max);
-        self.still_s = if thrust_n < LIFT_SHARE * weight_n && still { self.still_s + dt_s } else { 0.0 };
+        let still = || velocity_m_s.iter().all(|v| v.abs() < speed_max);
+        self.still_s = if thrust_n < LIFT_SHARE * weight_n && still() { self.still_s + dt_s } else { 0.0 };
     }
 
     /// True if the ground carries the vehicle.

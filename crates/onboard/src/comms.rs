@@ -77,7 +77,7 @@ impl Comms {
         }
     }
 
-    /// Takes the next bytes of the stream; returns what they tell the control tick, to be [posted](post).
+    /// Takes the next bytes of the stream; returns what they tell the control tick, to be [posted](Inbox::post).
     pub fn receive(&mut self, bytes: &[u8]) -> Inbox {
         let mut news = Inbox::default();
         let Comms { decoder, clock, now_us, state, state_is_news, asked_by, unknown, .. } = self;
@@ -85,12 +85,12 @@ impl Comms {
             Uplink::Heartbeat => (),
             Uplink::State { sent_us, state: value } => {
                 if let Some(at_us) = clock.stamp(sent_us, *now_us) {
-                    news.state = Some(Stamped { value, at_us });
+                    news.measure(Stamped { value, at_us });
                     *state = Some(value);
                     *state_is_news = true;
                 }
             }
-            Uplink::Setpoint(value) => news.setpoint = Some(Stamped { value, at_us: *now_us }),
+            Uplink::Setpoint(value) => news.aim(Stamped { value, at_us: *now_us }),
             Uplink::Command(command) => {
                 let request = match command {
                     Command::Arm => Request::Arm,
@@ -187,14 +187,5 @@ impl Comms {
                 link: *self.decoder.counters(),
             }));
         }
-    }
-}
-
-/// Adds `news` to what the next tick will work from.
-pub fn post(inbox: &mut Inbox, news: &Inbox) {
-    inbox.state = news.state.or(inbox.state);
-    inbox.setpoint = news.setpoint.or(inbox.setpoint);
-    if let Some(request) = news.request {
-        inbox.ask(request);
     }
 }

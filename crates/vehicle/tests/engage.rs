@@ -36,9 +36,15 @@ impl Bench {
     fn tick(&mut self, tracked: bool, request: Option<Request>) -> Outcome {
         self.now_us += 1000;
         let at_us = self.now_us;
-        let state = tracked.then(|| Stamped { value: State::default(), at_us });
-        let setpoint = Some(Stamped { value: Setpoint::default(), at_us });
-        self.vehicle.tick(&mut self.memory, at_us, &Inbox { state, setpoint, request })
+        let mut inbox = Inbox::EMPTY;
+        if tracked {
+            inbox.measure(Stamped { value: State::default(), at_us });
+        }
+        inbox.aim(Stamped { value: Setpoint::default(), at_us });
+        if let Some(request) = request {
+            inbox.ask(request);
+        }
+        self.vehicle.tick(&mut self.memory, at_us, &inbox)
     }
 
     fn wait(&mut self, ticks: u32, tracked: bool) {
