@@ -2,12 +2,12 @@
 //! very inputs at hand, and AFBC takes over again on command only.
 
 use crate::adaptive::{self, Adaptive, Estimate};
-use crate::backstepping::Errors;
 use crate::cascade::{Cascade, Command, Controller, Settings};
 use crate::flight_controller::FlightController;
 use crate::integral::{Integral, IntegralBackstepping};
 use crate::monitor::{Bounds, Figures, Monitor, Trip};
-use airframe::{OutOfRange, Parameters, PerAxis, Setpoint, State};
+use airframe::{Axis, OutOfRange, Parameters, PerAxis, Setpoint, State};
+use nalgebra::Vector3;
 
 /// AFBC with a monitor and a law to fall back on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,7 +15,6 @@ pub struct Guarded {
     adaptive: Controller<Adaptive>,
     fallback: Controller<IntegralBackstepping>,
     monitor: Monitor,
-    alpha2: PerAxis<f32>,
 }
 
 /// Who flies.
@@ -30,8 +29,10 @@ enum Pilot {
 struct StandIn {
     trip: Trip,
     cascade: Cascade<Integral>,
-    /// What AFBC would have to know to go on from the last inputs.
-    learnt: PerAxis<f32>,
+    /// The last step: the inputs that AFBC would go on from, and the attitude with its rates.
+    inputs: PerAxis<f32>,
+    attitude_rad: Vector3<f32>,
+    rates_rad_s: Vector3<f32>,
 }
 
 /// What changes in flight.
@@ -78,7 +79,6 @@ impl Guarded {
             adaptive: Controller::new(vehicle, settings, Adaptive::new(gains)?)?,
             fallback: Controller::new(vehicle, settings, IntegralBackstepping::new(&vehicle, fixed)?)?,
             monitor: Monitor::new(&vehicle, bounds, settings.dt_s)?,
-            alpha2: PerAxis::from_fn(|axis| gains.get(axis).backstepping.alpha2),
         })
     }
 
@@ -88,22 +88,35 @@ impl Guarded {
     fn stand_in(&self, memory: &mut StandIn, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
         let mut command = self.fallback.cascade(&mut memory.cascade, state, setpoint, fresh);
         command.health.trip = Some(memory.trip);
-        memory.learnt = self.learnt_from(&command.per_axis(), &command.errors);
+        memory.inputs = command.per_axis();
+        (memory.attitude_rad, memory.rates_rad_s) = (state.attitude_rad, state.rates_rad_s);
         command
     }
 
     /// The law that stands in goes on from `inputs`, in the next step.
     #[cold]
     #[inline(never)]
-    fn fall_back(&self, trip: Trip, cascade: &Cascade<Estimate>, inputs: PerAxis<f32>) -> Pilot {
-        let resume = |axis| Integral { value: 0.0, resume: Some(*inputs.get(axis)) };
-        let learnt = self.learnt_from(&inputs, &cascade.errors);
-        Pilot::StandIn(StandIn { trip, cascade: cascade.handed_over(PerAxis::from_fn(resume)), learnt })
+    fn fall_back(&self, trip: Trip, cascade: &Cascade<Estimate>, inputs: PerAxis<f32>, state: &State) -> Pilot {
+        let hover_thrust_n = Some(self.adaptive.hover_thrust_n(cascade));
+        let resume = |axis| Integral { value: 0.0, resume: Some(*inputs.get(axis)), hover_thrust_n };
+        let State { attitude_rad, rates_rad_s, .. } = *state;
+        let cascade = cascade.handed_over(PerAxis::from_fn(resume));
+        Pilot::StandIn(StandIn { trip, cascade, inputs, attitude_rad, rates_rad_s })
     }
 
-    /// What AFBC must have learnt to want `inputs` for these errors.
-    fn learnt_from(&self, inputs: &PerAxis<f32>, errors: &PerAxis<Errors>) -> PerAxis<f32> {
-        PerAxis::from_fn(|axis| inputs.get(axis) - self.alpha2.get(axis) * errors.get(axis).e2)
+    /// AFBC goes on from the last inputs.
+    fn resumed(&self, stand_in: &StandIn) -> Cascade<Estimate> {
+        let StandIn { cascade, inputs, attitude_rad: eta, rates_rad_s: eta_dot, .. } = stand_in;
+        let estimate = |axis| {
+            let x = match axis {
+                Axis::Roll => [eta.x, eta_dot.x],
+                Axis::Pitch => [eta.y, eta_dot.y],
+                _ => [eta.z, eta_dot.z],
+            };
+            let norm_max = self.monitor.theta_start(axis);
+            self.adaptive.law().resumed(axis, *inputs.get(axis), x, cascade.errors.get(axis), norm_max)
+        };
+        cascade.handed_over(PerAxis::from_fn(estimate))
     }
 }
 
@@ -123,7 +136,7 @@ impl FlightController for Guarded {
                 }
                 let saturated = command.health.saturated;
                 if let Some(trip) = self.monitor.watch(figures, cascade, &inputs, saturated) {
-                    *pilot = self.fall_back(trip, cascade, inputs);
+                    *pilot = self.fall_back(trip, cascade, inputs, state);
                 }
                 command
             }
@@ -138,9 +151,8 @@ impl FlightController for Guarded {
     }
 
     fn engage(&self, memory: &mut Memory) {
-        if let Pilot::StandIn(StandIn { cascade, learnt, .. }) = &memory.pilot {
-            let estimates = PerAxis::from_fn(|axis| Estimate::of(*learnt.get(axis)));
-            *memory = Memory { pilot: Pilot::Afbc(cascade.handed_over(estimates)), figures: Figures::default() };
+        if let Pilot::StandIn(stand_in) = &memory.pilot {
+            *memory = Memory { pilot: Pilot::Afbc(self.resumed(stand_in)), figures: Figures::default() };
         }
     }
 

@@ -13,7 +13,7 @@ use micromath::F32Ext;
 /// nearest to it in the relative sense. A third of what libm's costs. Error at most 9e-8 relative for x >= -126; 0 below.
 #[inline]
 pub fn exp2(x: f32) -> f32 {
-    const P: [f32; 5] = [2.40226475e-01, 5.55036186e-02, 9.61852947e-03, 1.33903875e-03, 1.53208306e-04];
+    const P: [f32; 5] = [0.24022647, 0.055503619, 0.009618529, 0.0013390387, 1.5320831e-04];
     if x < -126.0 {
         return 0.0;
     }
@@ -89,9 +89,13 @@ pub fn cos(x: f32) -> f32 {
     F32Ext::cos(x)
 }
 
-/// cos phi cos theta by their series: the cosine of a tilt. Error at most 1e-3 absolute for angles within +-pi/2.
+/// cos phi cos theta, the cosine of a tilt: by their series within a quarter turn, error at most 1e-3 absolute; beyond, by
+/// [`cos`].
 #[inline]
 pub fn tilt_cosine(phi: f32, theta: f32) -> f32 {
+    if max(phi.abs(), theta.abs()) > core::f32::consts::FRAC_PI_2 {
+        return cos(phi) * cos(theta);
+    }
     let [cos_phi, cos_theta] = [phi * phi, theta * theta].map(|s| 1.0 - s * (0.5 - s * (1.0 / 24.0 - s / 720.0)));
     cos_phi * cos_theta
 }
