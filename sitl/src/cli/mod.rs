@@ -1,5 +1,6 @@
 //! The command line: one module for each command.
 
+mod campaign;
 mod fly;
 mod flying;
 mod hitl;
@@ -37,8 +38,11 @@ pub(crate) struct Cli {
 enum Command {
     Paper(paper::Paper),
     Fly(fly::Fly),
+    Campaign(campaign::Campaign),
+    Merge(campaign::Merge),
     Check(scenarios::Check),
     Scenarios(scenarios::Scenarios),
+    Campaigns(campaign::Campaigns),
     Results(results::Results),
     Pil(pil::Pil),
     Hitl(hitl::Hitl),
@@ -50,8 +54,11 @@ impl Cli {
         match self.command.unwrap_or(Command::Paper(self.paper)) {
             Command::Paper(paper) => paper.run(),
             Command::Fly(fly) => fly.run(),
+            Command::Campaign(campaign) => campaign.run(),
+            Command::Merge(merge) => merge.run(),
             Command::Check(check) => check.run(),
             Command::Scenarios(scenarios) => scenarios.run(),
+            Command::Campaigns(campaigns) => campaigns.run(),
             Command::Results(results) => results.run(),
             Command::Pil(pil) => pil.run(),
             Command::Hitl(hitl) => hitl.run(),

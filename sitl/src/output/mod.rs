@@ -3,6 +3,7 @@
 //! [`write()`] fills a folder; [`table()`] is for the terminal. The same flights give the same bytes: nothing here knows the
 //! time of day or the machine.
 
+pub mod campaign;
 mod csv;
 mod error;
 mod figures;
@@ -17,6 +18,7 @@ mod words;
 mod tests;
 
 pub use error::Error;
+pub(crate) use files::Folder;
 pub use table::table;
 
 use crate::claims::Claim;

@@ -3,6 +3,7 @@
 //! Gusts are marked where they strike and the time when parameters are off is shaded. Colours are Okabe and Ito's, which
 //! the colour-blind can tell apart.
 
+pub(super) mod campaign;
 mod canvas;
 mod marks;
 mod reduce;
