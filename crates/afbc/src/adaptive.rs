@@ -4,7 +4,7 @@ use crate::backstepping::{self, Errors, Tracking, proportional};
 use crate::cascade::{Context, Law};
 use crate::fuzzy::{Basis, Membership};
 use crate::math;
-use crate::safeguards::Safeguards;
+use crate::safeguards::{DELTA_MAX, Safeguards};
 use airframe::{Axis, OutOfRange, PerAxis, Range};
 use nalgebra::{Matrix3, Vector3};
 
@@ -36,6 +36,19 @@ pub struct Gains {
 }
 
 impl Gains {
+    /// Every gain that is a matter of taste, with the range to search it in.
+    pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 6] {
+        let [alpha1, alpha2] = self.backstepping.tunables();
+        [
+            alpha1,
+            alpha2,
+            (&GAMMA, &mut self.gamma),
+            (&ETA, &mut self.eta),
+            (&EPSILON, &mut self.epsilon),
+            (&DELTA_MAX, &mut self.safeguards.delta_max),
+        ]
+    }
+
     /// Checks every gain.
     ///
     /// # Errors
