@@ -2,9 +2,9 @@
 
 use crate::backstepping::{self, Errors, Tracking, proportional};
 use crate::cascade::{Context, Law};
-use crate::fuzzy::{Basis, Membership};
+use crate::fuzzy::{Basis, CENTRE, Membership, WIDTH};
 use crate::math;
-use crate::safeguards::{DELTA_MAX, Safeguards};
+use crate::safeguards::{DEAD_ZONE, DELTA_MAX, KAPPA, SIGMA, Safeguards, THETA_MAX};
 use airframe::{Axis, OutOfRange, PerAxis, Range};
 use nalgebra::{Matrix3, Vector3};
 
@@ -46,6 +46,19 @@ impl Gains {
             (&ETA, &mut self.eta),
             (&EPSILON, &mut self.epsilon),
             (&DELTA_MAX, &mut self.safeguards.delta_max),
+        ]
+    }
+
+    /// What is rather chosen once for the vehicle and its task, with the accepted range of each.
+    pub fn others(&mut self) -> [(&'static Range, &mut f32); 6] {
+        let Gains { membership, safeguards, .. } = self;
+        [
+            (&CENTRE, &mut membership.centre),
+            (&WIDTH, &mut membership.width),
+            (&SIGMA, &mut safeguards.sigma),
+            (&KAPPA, &mut safeguards.kappa),
+            (&THETA_MAX, &mut safeguards.theta_max),
+            (&DEAD_ZONE, &mut safeguards.dead_zone),
         ]
     }
 

@@ -41,6 +41,7 @@ use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
 use crate::limits::{Limits, TILT_MAX};
 use crate::pid::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
+use crate::within;
 use afbc::{Command, FlightController, Settings};
 use airframe::{OutOfRange, Parameters, Range, Setpoint, State};
 use nalgebra::{Matrix3, Vector3};
@@ -158,8 +159,8 @@ impl Gains {
     /// The first one out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
         let mut gains = *self;
-        gains.tunables().into_iter().try_for_each(|(range, gain)| range.check(*gain))?;
-        gains.others().into_iter().try_for_each(|(range, gain)| range.check(*gain))
+        within(gains.tunables())?;
+        within(gains.others())
     }
 }
 

@@ -37,6 +37,7 @@ use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
 use crate::limits::{Limits, TILT_MAX, cylinder};
 use crate::pid::{SPEED_MAX, YAW_WEIGHT};
+use crate::within;
 use afbc::allocation::Mixer;
 use afbc::{Command, FlightController, Settings, math};
 use airframe::{OutOfRange, Parameters, Range, RotorSpeeds, Setpoint, State};
@@ -146,8 +147,8 @@ impl Gains {
     /// The first one out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
         let mut gains = *self;
-        gains.tunables().into_iter().try_for_each(|(range, gain)| range.check(*gain))?;
-        gains.others().into_iter().try_for_each(|(range, gain)| range.check(*gain))
+        within(gains.tunables())?;
+        within(gains.others())
     }
 }
 

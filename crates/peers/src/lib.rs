@@ -52,3 +52,10 @@ pub mod pid;
 pub use geometric::Geometric;
 pub use indi::Indi;
 pub use pid::Pid;
+
+use airframe::{OutOfRange, Range};
+
+/// Checks each gain against its range.
+fn within<const N: usize>(gains: [(&'static Range, &mut f32); N]) -> Result<(), OutOfRange> {
+    gains.into_iter().try_for_each(|(range, gain)| range.check(*gain))
+}

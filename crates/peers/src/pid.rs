@@ -25,6 +25,7 @@ use crate::attitude::{facing, length, r_earth_body, tilt_prioritised_error};
 use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
 use crate::limits::{Limits, TILT_MAX, cylinder};
+use crate::within;
 use afbc::{Command, FlightController, Settings};
 use airframe::{OutOfRange, Parameters, Range, Setpoint, State};
 use nalgebra::Vector3;
@@ -169,8 +170,8 @@ impl Gains {
     /// The first one out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
         let mut gains = *self;
-        gains.tunables().into_iter().try_for_each(|(range, gain)| range.check(*gain))?;
-        gains.others().into_iter().try_for_each(|(range, gain)| range.check(*gain))
+        within(gains.tunables())?;
+        within(gains.others())
     }
 }
 

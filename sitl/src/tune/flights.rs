@@ -25,7 +25,7 @@ pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
     turbulent.realism.wind.turbulence = Some(Turbulence::MODERATE);
     Ok(vec![
         hardware()?,
-        Flight { trajectory: step(Vector3::new(1.5, -1.0, 0.8)), ..Flight::new("step", 12.0) }.scenario()?,
+        Flight { trajectory: step(Vector3::new(0.6, -0.4, 0.3)), ..Flight::new("step", 12.0) }.scenario()?,
         turbulent,
         eight("weak", Some((Quantity::ThrustFactor, 0.6))).scenario()?,
         eight("heavy", Some((Quantity::Mass, 1.3))).scenario()?,
@@ -47,7 +47,7 @@ pub fn held_out() -> Result<Vec<Scenario>, Box<dyn Error>> {
     windy.realism.wind.turbulence = Some(Turbulence::LIGHT);
     Ok(vec![
         Scenario { seed: 1001, ..hardware()? },
-        Flight { trajectory: step(Vector3::new(-1.0, 2.0, -0.8)), ..Flight::new("step-back", 12.0) }.scenario()?,
+        Flight { trajectory: step(Vector3::new(-0.4, 0.8, -0.3)), ..Flight::new("step-back", 12.0) }.scenario()?,
         windy,
         fast("light", Some((Quantity::Mass, 0.8))).scenario()?,
         fast("inert", Some((Quantity::Inertia, 1.75))).scenario()?,

@@ -2,11 +2,8 @@
 
 use crate::contender::{Contender, Law};
 use crate::scenario::ControllerKind;
-use afbc::adaptive::Gains;
 use afbc::command_filter::BANDWIDTH;
-use afbc::fuzzy::{CENTRE, WIDTH};
 use afbc::limits::{ACCELERATION, CLIMB, SPEED, TILT, TILT_RATE};
-use afbc::safeguards::{DEAD_ZONE, KAPPA, SIGMA, THETA_MAX};
 use afbc::{Profile, allocation::FORCE_MAX};
 use airframe::{Axis, PerAxis, Range};
 use core::convert::Infallible;
@@ -162,7 +159,7 @@ fn keys(contender: &Contender) -> Vec<Key> {
                 for (range, gain) in gains.tunables() {
                     put(&table, range.name, gain.to_string());
                 }
-                for (range, gain) in others(gains) {
+                for (range, gain) in gains.others() {
                     put(&table, range.name, gain.to_string());
                 }
             }
@@ -199,17 +196,4 @@ fn keys(contender: &Contender) -> Vec<Key> {
         put("limits", range.name, limit.to_string());
     }
     keys
-}
-
-/// What of AFBC's gains is not searched.
-fn others(gains: &Gains) -> [(&'static Range, f32); 6] {
-    let (membership, safeguards) = (&gains.membership, &gains.safeguards);
-    [
-        (&CENTRE, membership.centre),
-        (&WIDTH, membership.width),
-        (&SIGMA, safeguards.sigma),
-        (&KAPPA, safeguards.kappa),
-        (&THETA_MAX, safeguards.theta_max),
-        (&DEAD_ZONE, safeguards.dead_zone),
-    ]
 }
