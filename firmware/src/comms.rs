@@ -33,7 +33,7 @@ async fn task(mut comms: Comms, mut receiver: Receiver, mut transmitter: Transmi
         match select(receiver.receive(&mut incoming), TICKS.receive()).await {
             Either::First(bytes) => {
                 let news = comms.receive(bytes);
-                control::with_inbox(|inbox| onboard::post(inbox, &news));
+                control::with_inbox(|inbox| inbox.post(&news));
                 BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
             }
             Either::Second(tick) => {

@@ -307,7 +307,7 @@ fn expand(message: &str) -> String {
         .replace("NAME", "it must be 1 to 64 letters, digits, '-' or '_', since file names come from it")
         .replace(
             "ALL",
-            "name, description, duration_s, plant, seed, vehicle, truth, controllers, profile, gains, settings, limits, monitor, \
+            "name, description, duration_s, seed, plant, vehicle, truth, controllers, profile, gains, settings, limits, monitor, \
              contender, trajectory, initial, gust, change, payload, rotors, rotor_fault, battery, drag, wind, ground, \
              sensors",
         )

@@ -123,7 +123,8 @@ impl Estimate {
     #[inline]
     fn advance(&mut self, rate: &Rate, safeguards: &Safeguards, dt_s: f32) {
         let Safeguards { theta_max, delta_max, .. } = *safeguards;
-        let keep = 1.0 - rate.leakage * dt_s;
+        // What leaks faster than a step is long is gone after it; it does not turn round.
+        let keep = math::max(1.0 - rate.leakage * dt_s, 0.0);
         self.theta = self.theta * keep + rate.first * (rate.theta * dt_s) * rate.second.transpose();
         let square = self.theta.norm_squared();
         if square > theta_max * theta_max {
@@ -186,6 +187,24 @@ impl Subsystem {
         let (lesson, leakage) = (safeguards.lesson(e2, unallocated), safeguards.leakage(e2));
         (terms, Rate { first, second, theta: gamma * lesson, delta: eta * lesson * s, leakage })
     }
+
+    /// u, and what there is to learn from it.
+    // One copy for all six, out of line: so it has the processor's registers to itself.
+    #[inline(never)]
+    fn step(
+        &self,
+        errors: &Errors,
+        [x1, x2]: [f32; 2],
+        unallocated: f32,
+        context: &Context,
+        estimate: &mut Estimate,
+    ) -> f32 {
+        let (terms, rate) = self.law(errors, [x1, x2], estimate, unallocated);
+        if context.adapt {
+            estimate.advance(&rate, &self.gains.safeguards, context.dt_s);
+        }
+        terms.sum()
+    }
 }
 
 /// AFBC for the six subsystems.
@@ -217,7 +236,7 @@ impl Adaptive {
 impl Law for Adaptive {
     type Estimate = Estimate;
 
-    #[inline]
+    #[inline(always)]
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Estimate) -> (f32, Errors) {
         let subsystem = self.subsystems.get(axis);
         let errors = Errors::new(subsystem.gains.backstepping.alpha1, tracking);
@@ -226,19 +245,15 @@ impl Law for Adaptive {
             Axis::Roll | Axis::Pitch | Axis::Yaw => [tracking.x1, tracking.x2],
             Axis::Z | Axis::X | Axis::Y => [errors.e1, errors.e1_dot],
         };
-        let (terms, rate) = subsystem.law(&errors, inputs, estimate, *context.unallocated.get(axis));
-        if context.adapt {
-            estimate.advance(&rate, &subsystem.gains.safeguards, context.dt_s);
-        }
-        (terms.sum(), errors)
+        (subsystem.step(&errors, inputs, *context.unallocated.get(axis), context, estimate), errors)
     }
 
     fn alpha1(&self, axis: Axis) -> f32 {
         self.subsystems.get(axis).gains.backstepping.alpha1
     }
 
-    fn start(&self, axis: Axis, weight_n: f32) -> Estimate {
-        if axis == Axis::Z { Estimate::of(weight_n) } else { Estimate::default() }
+    fn start(&self, estimates: &mut PerAxis<Estimate>, weight_n: f32) {
+        estimates.z = Estimate::of(weight_n);
     }
 
     fn hover_thrust_n(&self, z: &Estimate, weight_n: f32) -> f32 {

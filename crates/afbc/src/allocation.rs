@@ -4,9 +4,13 @@
 //! P = B^T (B B^T)^-1: exact, and of all exact ones the smallest. When that breaks a rotor's limits, roll and pitch are
 //! served first, then thrust, yaw last:
 //!
-//! 1. roll and pitch are scaled down together until their forces fit between the limits at all;
+//! 1. roll and pitch are scaled down together until some thrust makes their forces P \[U1, U2, 0, 0\] fit the limits;
 //! 2. thrust moves by as little as makes room for them;
 //! 3. yaw gets the share that still fits.
+//!
+//! For four rotors on a cross, no other forces give more roll and pitch. More rotors leave a choice that is not searched:
+//! other forces may give more. Yaw that happens to make room is counted on only where all four inputs fit, and in a frame
+//! without symmetry a little pitch may make room for roll, so that more of one asked is not always more given.
 
 use crate::math;
 use airframe::{Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds};
@@ -16,8 +20,16 @@ use nalgebra::{Matrix4, SMatrix, SVector, Vector4};
 pub const FORCE_MAX: Range = Range::new("rotor_force_max_n", 1e-3, 1e4);
 /// Accepted position of a rotor along x and along y, in arm's lengths.
 pub const POSITION: Range = Range::new("rotor_position", -10.0, 10.0);
-/// Accepted determinant of B B^T: below it the rotors cannot give all four inputs.
-pub const AUTHORITY: Range = Range::new("rotor_authority", 1e-3, 1e9);
+/// Accepted determinant of B B^T over the product of its diagonal, 1 for a symmetric frame: near 0 the rotors cannot give
+/// all four inputs apart from each other.
+pub const AUTHORITY: Range = Range::new("rotor_authority", 1e-3, 1.001);
+/// Accepted share of one rotor in a thrust without moments: a frame that hovers on less does not hover.
+pub const THRUST_SHARE: Range = Range::new("rotor_thrust_share", 1e-3, 1.0);
+
+/// Larger inputs than this are taken for it \[N\]: beyond what any rotors give, and within what can be reckoned with.
+const ASKED_MAX: f32 = 1e9;
+/// What is missing of an input by rounding alone, as a share of the largest force.
+const ROUNDING: f32 = 1e-6;
 
 /// Where a rotor is, and which way it turns the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +57,7 @@ pub struct Mixer<const N: usize = 4> {
     effectiveness: SMatrix<f32, 4, N>,
     /// P
     inverse: SMatrix<f32, N, 4>,
-    /// Of a thrust of 1 N, each rotor's part when roll and pitch need room; and 1 over it.
+    /// Of a thrust of 1 N, each rotor's part; and 1 over it.
     share: SVector<f32, N>,
     inverse_share: SVector<f32, N>,
     /// b
@@ -60,7 +72,7 @@ pub struct Mixer<const N: usize = 4> {
 pub struct Allocation<const N: usize = 4> {
     /// What the rotors can give of what was asked.
     pub forces: RotorForces<N>,
-    /// What was asked and is not given.
+    /// What was asked and is not given: U - B F, or 0 where rounding explains it.
     pub unallocated: Inputs,
     /// True if a rotor was asked for less than nothing or more than its limit.
     pub saturated: bool,
@@ -87,7 +99,7 @@ impl<const N: usize> Mixer<N> {
     /// The mixer of any frame.
     ///
     /// # Errors
-    /// If a parameter, a position or the limit is out of range, or the rotors cannot give all four inputs.
+    /// If a parameter, a position or the limit is out of range, or the rotors cannot give all four inputs and hover.
     pub fn of(rotors: [Rotor; N], vehicle: &Parameters, force_max_n: f32) -> Result<Self, OutOfRange> {
         vehicle.validate()?;
         FORCE_MAX.check(force_max_n)?;
@@ -99,11 +111,12 @@ impl<const N: usize> Mixer<N> {
         let columns = rotors.map(|rotor| Vector4::new(rotor.y, -rotor.x, spin(&rotor), 1.0));
         let effectiveness = SMatrix::<f32, 4, N>::from_columns(&columns);
         let gram: Matrix4<f32> = effectiveness * effectiveness.transpose();
-        AUTHORITY.check(gram.determinant())?;
+        AUTHORITY.check(gram.determinant() / gram.diagonal().product())?;
         let inverse = effectiveness.transpose() * gram.try_inverse().unwrap_or_default();
-        // For a frame that no thrust can hold level, an even one.
         let share: SVector<f32, N> = inverse.column(3).into();
-        let share = if share.min() > 0.0 { share } else { SVector::repeat(1.0 / N as f32) };
+        for share in &share {
+            THRUST_SHARE.check(*share)?;
+        }
         let inverse_share = share.map(|share| 1.0 / share);
         let b = vehicle.thrust_factor_n_s2;
         Ok(Mixer {
@@ -117,18 +130,25 @@ impl<const N: usize> Mixer<N> {
         })
     }
 
-    /// Rotor forces that give `inputs`, as far as the rotors' limits allow. A NaN is taken for 0.
+    /// Rotor forces that give `inputs`, as far as the rotors' limits allow. A NaN is taken for 0, and reported as
+    /// saturation.
     #[inline]
     pub fn allocate(&self, inputs: &Inputs) -> Allocation<N> {
         let wanted = Vector4::new(inputs.roll_n, inputs.pitch_n, inputs.yaw_n, inputs.thrust_n);
         let forces = self.inverse * wanted;
-        // A NaN is not within limits.
+        // One NaN makes every force a NaN, which is within no limits.
         if forces.iter().all(|&force| 0.0 <= force && force <= self.force_max) {
             return Allocation { forces: RotorForces(forces), unallocated: Inputs::default(), saturated: false };
         }
-        let wanted = wanted.map(|u| if u.is_nan() { 0.0 } else { u });
+        // The usual case by one comparison, which a NaN fails, too.
+        let wanted = if wanted.norm_squared() <= ASKED_MAX * ASKED_MAX {
+            wanted
+        } else {
+            wanted.map(|u| if u.is_nan() { 0.0 } else { u.clamp(-ASKED_MAX, ASKED_MAX) })
+        };
         let forces = self.within_limits(&wanted);
-        let missing = wanted - self.effectiveness * forces;
+        let least = ROUNDING * self.force_max;
+        let missing = (wanted - self.effectiveness * forces).map(|u| if u.abs() > least { u } else { 0.0 });
         let unallocated = Inputs { roll_n: missing.x, pitch_n: missing.y, yaw_n: missing.z, thrust_n: missing.w };
         Allocation { forces: RotorForces(forces), unallocated, saturated: true }
     }
@@ -137,17 +157,22 @@ impl<const N: usize> Mixer<N> {
     fn within_limits(&self, wanted: &Vector4<f32>) -> SVector<f32, N> {
         let column = |i: usize, u: f32| self.inverse.column(i) * u;
         let tilt = column(0, wanted.x) + column(1, wanted.y);
-        let least = tilt.iter().fold(f32::MAX, |least, &force| math::min(force, least));
-        let most = tilt.iter().fold(f32::MIN, |most, &force| math::max(force, most));
-        let spread = most - least;
-        let tilt = if spread > self.force_max { tilt * (self.force_max / spread) } else { tilt };
-
-        let (mut lowest, mut highest) = (0.0_f32, f32::MAX);
+        // The least thrust at which no rotor has to pull down, and the largest force then.
+        let (mut least, mut largest) = (f32::MIN, f32::MIN);
         for (force, inverse_share) in tilt.iter().zip(self.inverse_share.iter()) {
-            lowest = math::max(lowest, -force * inverse_share);
-            highest = math::min(highest, (self.force_max - force) * inverse_share);
+            least = math::max(least, -force * inverse_share);
         }
-        let upright = tilt + self.share * math::max(math::min(wanted.w, highest), lowest);
+        for (force, share) in tilt.iter().zip(self.share.iter()) {
+            largest = math::max(largest, force + share * least);
+        }
+        let scale = if largest > self.force_max { self.force_max / largest } else { 1.0 };
+        let (tilt, least) = (tilt * scale, least * scale);
+
+        let mut most = f32::MAX;
+        for (force, inverse_share) in tilt.iter().zip(self.inverse_share.iter()) {
+            most = math::min(most, (self.force_max - force) * inverse_share);
+        }
+        let upright = tilt + self.share * math::max(math::min(wanted.w, most), least);
 
         let yaw = column(2, wanted.z);
         let mut fits = 1.0_f32;
@@ -157,7 +182,8 @@ impl<const N: usize> Mixer<N> {
                 fits = math::min(fits, math::max(room, 0.0) / yaw.abs());
             }
         }
-        (upright + yaw * fits).map(|force| math::min(math::max(force, 0.0), self.force_max))
+        // Not `max`: that of 0 and -0 is either.
+        (upright + yaw * fits).map(|force| if force > 0.0 { math::min(force, self.force_max) } else { 0.0 })
     }
 
     /// omega_i = sqrt(F_i / b), for forces that are not negative.

@@ -23,6 +23,8 @@ pub struct Tracking {
     pub x1d_dot: f32,
     /// d^2 x_1d/dt^2
     pub x1d_ddot: f32,
+    /// True if e_1 is less than the distance, since that would ask for more speed than is allowed.
+    pub limited: bool,
 }
 
 /// Backstepping errors of one subsystem.
@@ -50,14 +52,34 @@ impl Errors {
 #[inline]
 pub fn ideal(alpha1: f32, errors: &Errors, x1d_ddot: f32, dynamics: &Dynamics) -> f32 {
     let Errors { e1, e2, .. } = *errors;
+    compensated(e1 + alpha1 * (e2 - alpha1 * e1) + x1d_ddot, e2, dynamics)
+}
+
+/// The input for an acceleration, with what (16) takes off for f and dg/dt.
+#[inline]
+fn compensated(acceleration: f32, e2: f32, dynamics: &Dynamics) -> f32 {
     let Dynamics { f, g, g_dot } = *dynamics;
-    (e1 + alpha1 * (e2 - alpha1 * e1) + x1d_ddot - f - 0.5 * g_dot / g * e2) / g
+    (acceleration - f - 0.5 * g_dot / g * e2) / g
 }
 
 /// u_pd (21).
 #[inline]
 pub fn proportional(alpha2: f32, errors: &Errors) -> f32 {
     alpha2 * errors.e2
+}
+
+/// u*_eq + alpha_2 e_2 with the errors behind it. At the speed limit e_1 stands still, and (16) is for e_2 alone, whose
+/// rate is d^2 x_1d/dt^2 - f - g u: otherwise -alpha_1^2 e_1 would hold a vehicle back that comes up to its speed.
+#[inline]
+pub(crate) fn classical(gains: &Gains, tracking: &Tracking, dynamics: &Dynamics) -> (f32, Errors) {
+    let Gains { alpha1, alpha2 } = *gains;
+    let errors = Errors::new(alpha1, tracking);
+    let ideal = if tracking.limited {
+        compensated(tracking.x1d_ddot, errors.e2, dynamics)
+    } else {
+        ideal(alpha1, &errors, tracking.x1d_ddot, dynamics)
+    };
+    (ideal + proportional(alpha2, &errors), errors)
 }
 
 /// The two gains of one backstepping subsystem.
@@ -112,11 +134,7 @@ impl Law for Backstepping {
 
     #[inline]
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, (): &mut ()) -> (f32, Errors) {
-        let gains = self.gains.get(axis);
-        let errors = Errors::new(gains.alpha1, tracking);
-        let dynamics = self.model.dynamics(axis, context);
-        let u = ideal(gains.alpha1, &errors, tracking.x1d_ddot, &dynamics) + proportional(gains.alpha2, &errors);
-        (u, errors)
+        classical(self.gains.get(axis), tracking, &self.model.dynamics(axis, context))
     }
 
     fn alpha1(&self, axis: Axis) -> f32 {

@@ -31,10 +31,8 @@ pub trait Law {
     /// alpha_1 of the subsystem \[1/s\].
     fn alpha1(&self, axis: Axis) -> f32;
 
-    /// The estimate to start from in flight, for a vehicle of this weight.
-    fn start(&self, _axis: Axis, _weight_n: f32) -> Self::Estimate {
-        Self::Estimate::default()
-    }
+    /// Turns estimates that know nothing yet into those to start from in flight, for a vehicle of this weight.
+    fn start(&self, _estimates: &mut PerAxis<Self::Estimate>, _weight_n: f32) {}
 
     /// U4 that it takes to hover \[N\], by the estimate of the z subsystem; for a law that does not know, the weight.
     fn hover_thrust_n(&self, _z: &Self::Estimate, weight_n: f32) -> f32 {
@@ -75,7 +73,8 @@ pub struct Settings {
     pub tilt_by_thrust: bool,
     /// Whether an estimate stops growing towards a limit of rotors, tilt or acceleration that has been reached.
     pub heed_saturation: bool,
-    /// Whether estimates stay as they are while the vehicle stands on the [`ground`](crate::ground).
+    /// Whether estimates stay as they are, and rotors give thrust alone, while the vehicle stands on the
+    /// [`ground`](crate::ground).
     pub heed_ground: bool,
     /// Whether to take over a vehicle in flight as it is: estimates that carry its weight, a command filter that starts
     /// at its attitude. The paper starts from estimates of zero and at its first command.
@@ -226,6 +225,12 @@ impl<L: Law> Controller<L> {
         [u5 * scale, u6 * scale]
     }
 
+    /// True if the ground carries the vehicle, as far as that is heeded.
+    #[inline]
+    pub(crate) fn stands(&self, memory: &Cascade<L::Estimate>) -> bool {
+        self.settings.heed_ground && memory.ground.standing()
+    }
+
     /// (7)-(40) in their order; `fresh` as in [`FlightController::decide`](crate::FlightController::decide).
     #[inline(always)]
     pub(crate) fn cascade(
@@ -236,13 +241,14 @@ impl<L: Law> Controller<L> {
         fresh: bool,
     ) -> Command {
         if memory.filtered.is_none() && self.settings.bumpless {
-            memory.estimates = PerAxis::from_fn(|axis| self.law.start(axis, self.weight_n));
+            self.law.start(&mut memory.estimates, self.weight_n);
         }
+        let stands = self.stands(memory);
         let context = Context {
             state,
             rotor_residual_rad_s: memory.rotor_residual_rad_s,
             dt_s: self.settings.dt_s,
-            adapt: fresh && !(self.settings.heed_ground && memory.ground.standing()),
+            adapt: fresh && !stands,
             unallocated: memory.unallocated,
         };
         let hover_n = self.law.hover_thrust_n(&memory.estimates.z, self.weight_n);
@@ -256,11 +262,17 @@ impl<L: Law> Controller<L> {
         // Position: subsystems 4, 5, 6.
         let (p, v, a) = (setpoint.position_m, setpoint.velocity_m_s, setpoint.acceleration_m_s2);
         let (xi, xi_dot) = (state.position_m, state.velocity_m_s);
-        let track = |x1, x2, e1, x1d_dot, x1d_ddot| Tracking { x1, x2, e1, x1d_dot, x1d_ddot };
-        let e1 = (p - xi).zip_map(&self.error_max_m, |e1, max| math::max(math::min(e1, max), -max));
-        let u4 = input(Axis::Z, track(xi.z, xi_dot.z, e1.z, v.z, a.z));
-        let u5 = input(Axis::X, track(xi.x, xi_dot.x, e1.x, v.x, a.x));
-        let u6 = input(Axis::Y, track(xi.y, xi_dot.y, e1.y, v.y, a.y));
+        let track = |x1, x2, e1, x1d_dot, x1d_ddot| Tracking { x1, x2, e1, x1d_dot, x1d_ddot, limited: false };
+        let approach = |x1: f32, x2, x1d: f32, x1d_dot, x1d_ddot, max: f32| {
+            let distance = x1d - x1;
+            let limited = distance.abs() > max;
+            let e1 = if limited { max.copysign(distance) } else { distance };
+            Tracking { x1, x2, e1, x1d_dot, x1d_ddot, limited }
+        };
+        let max = &self.error_max_m;
+        let u4 = input(Axis::Z, approach(xi.z, xi_dot.z, p.z, v.z, a.z, max.z));
+        let u5 = input(Axis::X, approach(xi.x, xi_dot.x, p.x, v.x, a.x, max.x));
+        let u6 = input(Axis::Y, approach(xi.y, xi_dot.y, p.y, v.y, a.y, max.y));
 
         // Desired attitude with the derivatives that (12) and (16) ask for.
         let (eta, eta_dot) = (state.attitude_rad, state.rates_rad_s);
@@ -292,16 +304,19 @@ impl<L: Law> Controller<L> {
                 e1: math::wrap_angle(setpoint.yaw_rad - eta.z),
                 x1d_dot: setpoint.yaw_rate_rad_s,
                 x1d_ddot: setpoint.yaw_acceleration_rad_s2,
+                limited: false,
             },
         );
 
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3, thrust_n: u4 };
-        let Allocation { forces, unallocated, saturated } = self.mixer.allocate(&inputs);
+        // Moments would keep the thrust up, and tip a vehicle over that stands.
+        let asked = if stands { Inputs { thrust_n: u4, ..Inputs::default() } } else { inputs };
+        let Allocation { forces, unallocated, saturated } = self.mixer.allocate(&asked);
         let speeds = self.mixer.speeds(&forces);
         let health = Health { saturated, ..Health::default() };
 
         memory.filtered = Some([self.filter.advance(&roll_d, phi_d), self.filter.advance(&pitch_d, theta_d)]);
-        memory.ground.advance(forces.0.sum(), self.weight_n, &state.velocity_m_s, self.settings.dt_s);
+        memory.ground.advance(u4, self.weight_n, &state.velocity_m_s, self.settings.dt_s);
         memory.rotor_residual_rad_s = speeds.residual_rad_s();
         if self.settings.heed_saturation {
             memory.unallocated = PerAxis {

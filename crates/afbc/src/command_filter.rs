@@ -54,10 +54,12 @@ impl CommandFilter {
         Ok(CommandFilter { rate_max: rate_max_rad_s, ..self })
     }
 
-    /// d^2 x/dt^2 under `command` \[rad/s2\].
+    /// d^2 x/dt^2 under `command` \[rad/s2\]: none beyond the rate limit.
     #[inline]
     pub fn acceleration(&self, state: &Filtered, command: f32) -> f32 {
-        self.bandwidth * (self.bandwidth * (command - state.angle) - 2.0 * state.rate)
+        let acceleration = self.bandwidth * (self.bandwidth * (command - state.angle) - 2.0 * state.rate);
+        let limited = state.rate.abs() >= self.rate_max && acceleration * state.rate > 0.0;
+        if limited { 0.0 } else { acceleration }
     }
 
     /// The state one step later, `command` held meanwhile.
@@ -67,10 +69,13 @@ impl CommandFilter {
         let slope = state.rate + self.bandwidth * offset;
         let angle = command + (offset + slope * self.dt) * self.decay;
         let rate = (state.rate - self.bandwidth * slope * self.dt) * self.decay;
-        if rate.abs() <= self.rate_max {
+        // A fast filter is at its command, and at rest, within a step.
+        let travel = angle - state.angle;
+        let fastest = if rate.abs() > self.rate_max { rate } else { travel };
+        if rate.abs() <= self.rate_max && travel.abs() <= self.rate_max * self.dt {
             Filtered { angle, rate }
         } else {
-            let rate = self.rate_max.copysign(rate);
+            let rate = self.rate_max.copysign(fastest);
             Filtered { angle: state.angle + rate * self.dt, rate }
         }
     }

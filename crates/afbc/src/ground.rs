@@ -1,12 +1,16 @@
-//! Standing on the ground, told from what the rotors are asked for and how the vehicle moves. Ours, in the manner of
-//! autopilots' land detectors: in the air a vehicle whose rotors do not carry it is soon too fast to be standing.
+//! Standing on the ground, told from the thrust that is wanted and how the vehicle moves. Ours, in the manner of autopilots'
+//! land detectors: in the air a vehicle that wants too little to be carried is soon too fast to be standing. (What the
+//! rotors give does not tell: roll and pitch come before thrust, and may keep it up.)
 
 use nalgebra::Vector3;
 
-/// Share of the weight below which the rotors do not carry the vehicle.
+/// Share of the weight below which the thrust is not meant to carry the vehicle.
 pub const LIFT_SHARE: f32 = 0.4;
 /// Speed along each axis below which the vehicle is still \[m/s\].
 pub const STILL_M_S: f32 = 0.1;
+/// Speed along an axis at which a vehicle that stood does no longer \[m/s\]: more than rocking on its feet, and reached in
+/// 0.1 s of falling.
+pub const MOVING_M_S: f32 = 0.5;
 /// How long both must last \[s\].
 pub const STILL_S: f32 = 0.2;
 
@@ -17,11 +21,12 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// Takes one step into account.
+    /// Takes one step into account: U4 that was wanted \[N\].
     #[inline]
     pub fn advance(&mut self, thrust_n: f32, weight_n: f32, velocity_m_s: &Vector3<f32>, dt_s: f32) {
-        let still = velocity_m_s.iter().all(|v| v.abs() < STILL_M_S);
-        self.still_s = if thrust_n < LIFT_SHARE * weight_n && still { self.still_s + dt_s } else { 0.0 };
+        let speed_max = if self.standing() { MOVING_M_S } else { STILL_M_S };
+        let still = || velocity_m_s.iter().all(|v| v.abs() < speed_max);
+        self.still_s = if thrust_n < LIFT_SHARE * weight_n && still() { self.still_s + dt_s } else { 0.0 };
     }
 
     /// True if the ground carries the vehicle.

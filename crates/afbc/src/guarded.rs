@@ -2,6 +2,7 @@
 //! very inputs at hand, and AFBC takes over again on command only.
 
 use crate::adaptive::{self, Adaptive, Estimate};
+use crate::backstepping::Errors;
 use crate::cascade::{Cascade, Command, Controller, Settings};
 use crate::flight_controller::FlightController;
 use crate::integral::{Integral, IntegralBackstepping};
@@ -17,33 +18,31 @@ pub struct Guarded {
     alpha2: PerAxis<f32>,
 }
 
-/// Who flies.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Pilot {
-    Afbc(Cascade<Estimate>),
-    StandIn(StandIn),
-}
-
 /// A flight under the law that stands in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct StandIn {
-    trip: Trip,
     cascade: Cascade<Integral>,
-    /// What AFBC would have to know to go on from the last inputs.
-    learnt: PerAxis<f32>,
+    /// Its last command. Kept here: coming back from a call, it would have a command put together in memory on AFBC's
+    /// path, too.
+    command: Command,
+}
+
+/// How AFBC's flight ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Tripped {
+    trip: Trip,
+    /// AFBC's last inputs.
+    inputs: PerAxis<f32>,
 }
 
 /// What changes in flight.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory {
-    pilot: Pilot,
+    afbc: Cascade<Estimate>,
     figures: Figures,
-}
-
-impl Default for Memory {
-    fn default() -> Self {
-        Memory { pilot: Pilot::Afbc(Cascade::default()), figures: Figures::default() }
-    }
+    tripped: Option<Tripped>,
+    /// From the first step after AFBC's last on.
+    stand_in: Option<StandIn>,
 }
 
 impl Memory {
@@ -54,10 +53,7 @@ impl Memory {
 
     /// Why AFBC does not fly, if it does not.
     pub fn trip(&self) -> Option<Trip> {
-        match &self.pilot {
-            Pilot::Afbc(_) => None,
-            Pilot::StandIn(stand_in) => Some(stand_in.trip),
-        }
+        self.tripped.map(|tripped| tripped.trip)
     }
 }
 
@@ -81,25 +77,29 @@ impl Guarded {
         })
     }
 
-    /// One step of the law that stands in.
+    /// One step of the law that stands in, in AFBC's place. The first one takes over: the step that trips has no time to.
     #[cold]
     #[inline(never)]
-    fn stand_in(&self, memory: &mut StandIn, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
-        let mut command = self.fallback.cascade(&mut memory.cascade, state, setpoint, fresh);
-        command.health.trip = Some(memory.trip);
-        let inputs = command.per_axis();
-        memory.learnt = PerAxis::from_fn(|axis| inputs.get(axis) - self.alpha2.get(axis) * command.errors.get(axis).e2);
+    fn stand_in<'a>(
+        &self,
+        memory: &'a mut Option<StandIn>,
+        (afbc, tripped): (&Cascade<Estimate>, &Tripped),
+        (state, setpoint): (&State, &Setpoint),
+        fresh: bool,
+    ) -> &'a Command {
+        let StandIn { cascade, command } = memory.get_or_insert_with(|| {
+            let resume = |axis| Integral { value: 0.0, resume: Some(*tripped.inputs.get(axis)) };
+            StandIn { cascade: afbc.handed_over(PerAxis::from_fn(resume)), command: Command::default() }
+        });
+        *command = self.fallback.cascade(cascade, state, setpoint, fresh);
+        command.health.trip = Some(tripped.trip);
         command
     }
-}
 
-/// The law that stands in goes on from `inputs`, in the next step.
-#[cold]
-#[inline(never)]
-fn fall_back(trip: Trip, cascade: &Cascade<Estimate>, inputs: PerAxis<f32>) -> Pilot {
-    let resume = |axis| Integral { value: 0.0, resume: Some(*inputs.get(axis)) };
-    let cascade = cascade.handed_over(PerAxis::from_fn(resume));
-    Pilot::StandIn(StandIn { trip, cascade, learnt: PerAxis::default() })
+    /// What AFBC must have learnt to want `inputs` for these errors.
+    fn learnt_from(&self, inputs: &PerAxis<f32>, errors: &PerAxis<Errors>) -> PerAxis<Estimate> {
+        PerAxis::from_fn(|axis| Estimate::of(inputs.get(axis) - self.alpha2.get(axis) * errors.get(axis).e2))
+    }
 }
 
 impl FlightController for Guarded {
@@ -107,39 +107,36 @@ impl FlightController for Guarded {
 
     #[inline(always)]
     fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
-        let Memory { pilot, figures } = memory;
-        match pilot {
-            Pilot::Afbc(cascade) => {
-                let command = self.adaptive.cascade(cascade, state, setpoint, fresh);
-                let inputs = command.per_axis();
-                let saturated = command.health.saturated;
-                if let Some(trip) = self.monitor.watch(figures, cascade, &inputs, saturated) {
-                    *pilot = fall_back(trip, cascade, inputs);
-                }
-                command
-            }
-            // Field by field: a whole command straight from the call would have to be put together in memory on the other
-            // path too.
-            Pilot::StandIn(stand_in) => {
-                let Command { speeds, forces, inputs, virtual_m_s2, desired_rad, filtered, errors, health } =
-                    self.stand_in(stand_in, state, setpoint, fresh);
-                Command { speeds, forces, inputs, virtual_m_s2, desired_rad, filtered, errors, health }
+        let Memory { afbc, figures, tripped, stand_in } = memory;
+        if let Some(tripped) = tripped {
+            return *self.stand_in(stand_in, (afbc, tripped), (state, setpoint), fresh);
+        }
+        let command = self.adaptive.cascade(afbc, state, setpoint, fresh);
+        // On the ground a law may ask for less than nothing, for as long as it likes.
+        if !self.adaptive.stands(afbc) {
+            let inputs = command.per_axis();
+            if let Some(trip) = self.monitor.watch(figures, afbc, &inputs, command.health.saturated) {
+                *tripped = Some(Tripped { trip, inputs });
             }
         }
+        command
     }
 
     fn engage(&self, memory: &mut Memory) {
-        if let Pilot::StandIn(StandIn { cascade, learnt, .. }) = &memory.pilot {
-            let estimates = PerAxis::from_fn(|axis| Estimate::of(*learnt.get(axis)));
-            *memory = Memory { pilot: Pilot::Afbc(cascade.handed_over(estimates)), figures: Figures::default() };
-        }
+        let afbc = match memory {
+            Memory { stand_in: Some(StandIn { cascade, command }), .. } => {
+                cascade.handed_over(self.learnt_from(&command.per_axis(), &command.errors))
+            }
+            Memory { tripped: Some(Tripped { inputs, .. }), afbc, .. } => {
+                afbc.handed_over(self.learnt_from(inputs, &afbc.errors))
+            }
+            _ => return,
+        };
+        *memory = Memory { afbc, ..Memory::default() };
     }
 
     /// Zero while the other law flies.
     fn learnt(memory: &Memory) -> PerAxis<Estimate> {
-        match &memory.pilot {
-            Pilot::Afbc(cascade) => cascade.estimates,
-            Pilot::StandIn(_) => PerAxis::default(),
-        }
+        if memory.tripped.is_some() { PerAxis::default() } else { memory.afbc.estimates }
     }
 }

@@ -10,7 +10,7 @@
 //! Design*, 1995, section 4.2.
 
 use crate::adaptive::{self, Estimate, GAMMA};
-use crate::backstepping::{self, Errors, Tracking, ideal, proportional};
+use crate::backstepping::{self, Errors, Tracking, classical};
 use crate::cascade::{Context, Law};
 use crate::math;
 use crate::model::Model;
@@ -74,10 +74,7 @@ impl Law for IntegralBackstepping {
     #[inline]
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, integral: &mut Integral) -> (f32, Errors) {
         let Gains { backstepping, integral: kappa, integral_max } = self.gains.get(axis);
-        let errors = Errors::new(backstepping.alpha1, tracking);
-        let dynamics = self.model.dynamics(axis, context);
-        let fixed = ideal(backstepping.alpha1, &errors, tracking.x1d_ddot, &dynamics)
-            + proportional(backstepping.alpha2, &errors);
+        let (fixed, errors) = classical(backstepping, tracking, &self.model.dynamics(axis, context));
         if let Some(input) = integral.resume.take() {
             integral.value = input - fixed;
         }

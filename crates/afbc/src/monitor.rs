@@ -8,7 +8,7 @@
 //! | reversals of U1..U4 by more than [`Bounds::swing_n`], per second | each input | [`Bounds::swings_hz`] |
 //!
 //! The last is the limit-cycle detector: it counts turning points of the input that are further apart than a threshold,
-//! so it sees chatter from one step to the next and a slow oscillation alike, and neither noise nor manoeuvres.
+//! so it sees chatter from one step to the next and a slow oscillation alike, and neither manoeuvres nor noise below it.
 //!
 //! Norms and V_e are looked at for one subsystem a step, so each is at most six steps old.
 
@@ -49,7 +49,7 @@ pub struct Bounds {
 
 impl Bounds {
     /// Bounds for a law with these gains on a vehicle like the paper's: estimates that lean on their projection, errors
-    /// far beyond any manoeuvre, a limit cycle of a tenth of the weight.
+    /// far beyond any manoeuvre, a limit cycle of a fifth of the weight: noise of 10 mm/s alone makes a tenth, in U4.
     pub fn new(gains: &PerAxis<adaptive::Gains>, weight_n: f32) -> Self {
         Bounds {
             theta: PerAxis::from_fn(|axis| 0.95 * gains.get(axis).safeguards.theta_max),
@@ -57,7 +57,7 @@ impl Bounds {
             delta: PerAxis::from_fn(|axis| 1.001 * gains.get(axis).safeguards.delta_max),
             lyapunov: PerAxis { roll: 0.5, pitch: 0.5, yaw: 10.0, z: 200.0, x: 1000.0, y: 1000.0 },
             saturation_share: 0.9,
-            swing_n: 0.1 * weight_n,
+            swing_n: 0.2 * weight_n,
             swings_hz: 16.0,
         }
     }

@@ -64,8 +64,15 @@ impl Safeguards {
     /// e: what there is to learn from e_2, when `unallocated` of the input that was wanted could not be given.
     #[inline]
     pub(crate) fn lesson(&self, e2: f32, unallocated: f32) -> f32 {
-        let beyond = e2.abs() - self.dead_zone;
-        if beyond <= 0.0 || e2 * unallocated > 0.0 { 0.0 } else { beyond.copysign(e2) }
+        if e2 * unallocated > 0.0 {
+            0.0
+        } else if e2 > self.dead_zone {
+            e2 - self.dead_zone
+        } else if e2 < -self.dead_zone {
+            e2 + self.dead_zone
+        } else {
+            0.0
+        }
     }
 
     /// sigma + kappa |e_2| \[1/s\].

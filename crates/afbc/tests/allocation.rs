@@ -1,13 +1,18 @@
-//! Properties of the mixer: there and back, and its limits under anything.
+//! Properties of the mixer: there and back, its limits under anything, and who is served first.
 #![allow(clippy::unwrap_used, missing_docs)] // a mixer that cannot be built must stop the test
 
-use afbc::allocation::{FORCE_MAX, Mixer};
+use afbc::allocation::{AUTHORITY, Allocation, FORCE_MAX, Mixer, PLUS, POSITION, Rotor, THRUST_SHARE};
 use airframe::{Inputs, Parameters, RotorForces};
-use nalgebra::Vector4;
+use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
+use nalgebra::{SVector, Vector4};
 use proptest::prelude::*;
 
 /// Rounding error of one `f32` operation, relative.
 const U: f32 = 1.0 / (1 << 24) as f32;
+
+fn mixer_of<const N: usize>(rotors: [Rotor; N], force_max_n: f32) -> Mixer<N> {
+    Mixer::of(rotors, &Parameters::PAPER.to_f32(), force_max_n).unwrap()
+}
 
 fn mixer(force_max_n: f32) -> Mixer {
     Mixer::new(&Parameters::PAPER.to_f32(), force_max_n).unwrap()
@@ -20,6 +25,68 @@ fn inputs(values: [f32; 4]) -> Inputs {
 
 fn list(inputs: &Inputs) -> [f32; 4] {
     [inputs.roll_n, inputs.pitch_n, inputs.yaw_n, inputs.thrust_n]
+}
+
+/// `N` rotors on a circle, every other one turning the other way, the first at `first_rad` from +x.
+fn circle<const N: usize>(first_rad: f32) -> [Rotor; N] {
+    core::array::from_fn(|i| {
+        let angle = first_rad + TAU * i as f32 / N as f32;
+        Rotor { x: angle.cos(), y: angle.sin(), pushes_left: i % 2 == 0 }
+    })
+}
+
+fn cross() -> [Rotor; 4] {
+    circle(FRAC_PI_4)
+}
+
+/// Front rotors further apart and nearer than the rear ones.
+const UNEVEN: [Rotor; 4] = [
+    Rotor { x: 0.6, y: 0.9, pushes_left: true },
+    Rotor { x: 0.6, y: -0.9, pushes_left: false },
+    Rotor { x: -0.9, y: -0.6, pushes_left: true },
+    Rotor { x: -0.9, y: 0.6, pushes_left: false },
+];
+
+/// What every allocation owes, on every frame: forces within limits, nothing missing that was not asked for, and
+/// unallocated = U - B F.
+fn check<const N: usize>(
+    mixer: &Mixer<N>,
+    limit: f32,
+    asked: &Inputs,
+    got: &Allocation<N>,
+) -> Result<(), TestCaseError> {
+    prop_assert!(got.forces.0.iter().all(|force| (0.0..=limit).contains(force)), "{got:?}");
+    let given = list(&mixer.inputs_of(&got.forces));
+    for ((asked, given), missing) in list(asked).into_iter().zip(given).zip(list(&got.unallocated)) {
+        let asked = if asked.is_nan() { 0.0 } else { asked.clamp(-1e9, 1e9) };
+        // Forces are rounded at the scale of the limit, and the difference at its own.
+        let allowed = 4e-6 * limit + 4.0 * U * asked.abs();
+        prop_assert!((asked - given - missing).abs() <= allowed, "{asked} - {given} is not {missing}");
+    }
+    Ok(())
+}
+
+fn anything() -> impl Strategy<Value = Inputs> {
+    prop::array::uniform4(prop_oneof![prop::num::f32::ANY, -100.0_f32..100.0]).prop_map(inputs)
+}
+
+/// Whatever the frame: what its rotors can give they give, and whatever else is asked, they stay within limits.
+fn any_frame<const N: usize>(rotors: [Rotor; N], shares: &[f32; 8], asked: &Inputs) -> Result<(), TestCaseError> {
+    let limit = 3.0;
+    let mixer = mixer_of(rotors, limit);
+    check(&mixer, limit, asked, &mixer.allocate(asked))?;
+
+    // The forces of least size for some inputs, if within limits.
+    let forces = SVector::<f32, N>::from_iterator(shares.iter().map(|share| limit * share));
+    let wanted = mixer.inputs_of(&RotorForces(forces));
+    let got = mixer.allocate(&wanted);
+    check(&mixer, limit, &wanted, &got)?;
+    if N == 4 || !got.saturated {
+        for (got, wanted) in list(&mixer.inputs_of(&got.forces)).into_iter().zip(list(&wanted)) {
+            prop_assert!((got - wanted).abs() <= 3e-6 * limit * N as f32, "{got} for {wanted}");
+        }
+    }
+    Ok(())
 }
 
 proptest! {
@@ -43,6 +110,33 @@ proptest! {
     }
 
     #[test]
+    fn frames_of_four_six_and_eight(shares in prop::array::uniform8(0.0_f32..=1.0), asked in anything()) {
+        any_frame(PLUS, &shares, &asked)?;
+        any_frame(cross(), &shares, &asked)?;
+        any_frame(UNEVEN, &shares, &asked)?;
+        any_frame(circle::<6>(0.5), &shares, &asked)?;
+        any_frame(circle::<8>(0.0), &shares, &asked)?;
+    }
+
+    /// B F of the plus frame is (6), and its general mixer inverts it as the closed form does.
+    #[test]
+    fn the_plus_frame_is_that_of_6(forces in prop::array::uniform4(0.0_f32..30.0), asked in prop::array::uniform4(-10.0_f32..10.0)) {
+        let forces = RotorForces(Vector4::from(forces));
+        let general = mixer(1e4).inputs_of(&forces);
+        for (general, own) in list(&general).into_iter().zip(list(&Mixer::inputs(&forces))) {
+            prop_assert!((general - own).abs() <= 4.0 * U * forces.0.sum());
+        }
+        let [u1, u2, u3, _] = asked;
+        let u4 = 100.0;
+        let wanted = [(u4 + u3) / 4.0 - u1 / 2.0, (u4 - u3) / 4.0 - u2 / 2.0, (u4 + u3) / 4.0 + u1 / 2.0, (u4 - u3) / 4.0 + u2 / 2.0];
+        let got = mixer(1e4).allocate(&inputs([u1, u2, u3, u4]));
+        prop_assert!(!got.saturated);
+        for (got, wanted) in got.forces.0.iter().zip(wanted) {
+            prop_assert!((got - wanted).abs() <= 8.0 * U * 50.0, "{got} for {wanted}");
+        }
+    }
+
+    #[test]
     fn speeds_and_forces_are_inverse(force in prop::array::uniform4(0.0_f32..1e4)) {
         let mixer = mixer(1e4);
         let forces = RotorForces(Vector4::from(force));
@@ -59,52 +153,91 @@ proptest! {
     }
 
     #[test]
-    fn whatever_is_asked_every_force_stays_within_its_limits(
-        asked in prop::array::uniform4(prop_oneof![prop::num::f32::ANY, -100.0_f32..100.0]), limit in 1e-3_f32..1e4,
-    ) {
+    fn whatever_is_asked_every_force_stays_within_its_limits(asked in anything(), limit in 1e-3_f32..1e4) {
         let mixer = mixer(limit);
-        let allocation = mixer.allocate(&inputs(asked));
-        prop_assert!(allocation.forces.0.iter().all(|force| (0.0..=limit).contains(force)), "{allocation:?}");
+        let allocation = mixer.allocate(&asked);
+        check(&mixer, limit, &asked, &allocation)?;
         let fastest = (f64::from(limit) / Parameters::PAPER.thrust_factor_n_s2).sqrt() * (1.0 + 3.0 * f64::from(U));
         let speeds = mixer.speeds(&allocation.forces);
         prop_assert!(speeds.0.iter().all(|speed| (0.0..=fastest).contains(&f64::from(*speed))), "{speeds:?}");
-        if asked.iter().any(|value| value.is_nan()) {
+        if list(&asked).iter().any(|value| value.is_nan()) {
             prop_assert!(allocation.saturated, "a NaN went unnoticed");
         }
     }
 
+    /// Four rotors: roll and pitch in full if any forces within limits give them (found by trying all thrusts and yaws);
+    /// then thrust as near as can be; yaw never turned round, and given in full if there is room.
     #[test]
-    fn a_clipped_rotor_is_reported_and_only_then(asked in prop::array::uniform4(-10.0_f64..10.0), limit in 0.1_f64..5.0) {
-        let [u1, u2, u3, u4] = asked;
-        let wanted = [
-            (u4 + u3) / 4.0 - u1 / 2.0,
-            (u4 - u3) / 4.0 - u2 / 2.0,
-            (u4 + u3) / 4.0 + u1 / 2.0,
-            (u4 - u3) / 4.0 + u2 / 2.0,
-        ];
-        // Nothing can be said of a force within rounding of a limit.
-        let margin = 1e-5;
-        prop_assume!(wanted.iter().all(|force| force.abs() > margin && (force - limit).abs() > margin));
-        let allocation = mixer(limit as f32).allocate(&inputs(asked.map(|value| value as f32)));
-        prop_assert_eq!(allocation.saturated, wanted.iter().any(|force| !(0.0..=limit).contains(force)));
-        for (force, wanted) in allocation.forces.0.iter().zip(wanted) {
-            prop_assert!((f64::from(*force) - wanted.clamp(0.0, limit)).abs() <= margin, "{force} for {wanted}");
+    fn roll_and_pitch_come_first_then_thrust_then_yaw(
+        frame in prop::sample::select(vec![PLUS, cross()]), asked in prop::array::uniform4(-8.0_f32..8.0), limit in 0.5_f32..5.0,
+    ) {
+        let mixer = mixer_of(frame, limit);
+        let got = mixer.allocate(&inputs(asked));
+        let [roll, pitch, yaw, thrust] = list(&mixer.inputs_of(&got.forces));
+        let near = |a: f32, b: f32| (a - b).abs() <= 1e-5 * (limit + b.abs());
+
+        // Opposite rotors share a sum, and differ by what roll and pitch ask of them.
+        let [a, b, c, d] = frame;
+        let difference = |p: &Rotor, q: &Rotor| {
+            let (x, y) = (p.x - q.x, p.y - q.y);
+            (y * asked[0] - x * asked[1]) / (x * x + y * y) * 2.0
+        };
+        let widest = difference(&a, &c).abs().max(difference(&b, &d).abs());
+        let fits = limit / widest;
+        let share = fits.min(1.0);
+        prop_assert!(near(roll, share * asked[0]) && near(pitch, share * asked[1]), "{roll}, {pitch} are not {share} of {asked:?}");
+
+        // Everything fits: given in full, which the other tests see to.
+        if !got.saturated {
+            return Ok(());
         }
+        let (least, most) = (2.0 * widest * share, 4.0 * limit - 2.0 * widest * share);
+        prop_assert!(near(thrust, asked[3].max(least).min(most)), "{thrust} of {} to {most} for {asked:?}", least);
+        prop_assert!(yaw * asked[2] >= -1e-5 * limit && yaw.abs() <= asked[2].abs() + 1e-5 * limit, "{yaw} for {asked:?}");
+        // As much yaw as leaves the widest pair that it brings nearer to a limit within it.
+        let pair = |p: &Rotor, q: &Rotor| difference(p, q).abs() * share / 2.0;
+        let (up, down) = if (asked[2] > 0.0) == a.pushes_left { (pair(&a, &c), pair(&b, &d)) } else { (pair(&b, &d), pair(&a, &c)) };
+        let room = (limit - thrust / 4.0 - up).min(thrust / 4.0 - down).max(0.0);
+        prop_assert!(near(yaw.abs(), asked[2].abs().min(4.0 * room)), "{yaw} with {room} for {asked:?}");
+    }
+
+    /// Asked for more roll, a symmetric frame never gives less.
+    #[test]
+    fn more_roll_asked_is_never_less_given(
+        frame in prop::sample::select(vec![PLUS, cross()]), asked in prop::array::uniform4(-8.0_f32..8.0), more in 0.0_f32..8.0,
+    ) {
+        let mixer = mixer_of(frame, 3.0);
+        let roll = |roll_n| mixer.inputs_of(&mixer.allocate(&Inputs { roll_n, ..inputs(asked) }).forces).roll_n;
+        let [first, second] = [asked[0].abs(), asked[0].abs() + more].map(roll);
+        prop_assert!(second >= first - 1e-5, "{first}, then {second}");
+        let all = roll(f32::INFINITY);
+        prop_assert!(all >= second - 1e-4, "{second}, then {all} for infinite roll");
+    }
+
+    /// What is missing of one input alone is missing of that one alone: learning goes on in the others.
+    #[test]
+    fn rounding_is_not_reported_as_missing(roll in -0.5_f32..0.5, pitch in -0.5_f32..0.5, yaw in 6.0_f32..50.0) {
+        let missing = mixer(3.0).allocate(&inputs([roll, pitch, yaw, 4.8])).unallocated;
+        prop_assert_eq!((missing.roll_n, missing.pitch_n, missing.thrust_n), (0.0, 0.0, 0.0));
+        prop_assert!(missing.yaw_n > 1.0);
     }
 }
 
 #[test]
-fn nan_becomes_no_force() {
+fn nan_becomes_no_force_and_infinity_the_largest() {
     let mixer = mixer(10.0);
     let all = mixer.allocate(&inputs([0.0, 0.0, 0.0, f32::NAN]));
     assert_eq!(all.forces.0, Vector4::zeros());
     assert!(all.saturated);
-    // Only the rotors that the NaN reaches.
+    // What is asked of the others is given.
     let roll = mixer.allocate(&inputs([f32::NAN, 0.0, 0.0, 8.0]));
-    assert_eq!(roll.forces.0, Vector4::new(0.0, 2.0, 0.0, 2.0));
-    // Opposed infinities are a NaN too.
+    assert_eq!(roll.forces.0, Vector4::repeat(2.0));
+    assert!(roll.saturated);
+    let roll = mixer.allocate(&inputs([f32::INFINITY, 0.0, 0.0, 8.0]));
+    assert_eq!(roll.forces.0, Vector4::new(0.0, 5.0, 10.0, 5.0));
+    // Thrust before yaw.
     let opposed = mixer.allocate(&inputs([0.0, 0.0, f32::NEG_INFINITY, f32::INFINITY]));
-    assert_eq!(opposed.forces.0, Vector4::new(0.0, 10.0, 0.0, 10.0));
+    assert_eq!(opposed.forces.0, Vector4::repeat(10.0));
 }
 
 #[test]
@@ -115,4 +248,37 @@ fn a_limit_out_of_range_is_refused_by_name() {
     }
     let weightless = Parameters { mass_kg: 0.0, ..vehicle };
     assert_eq!(Mixer::new(&weightless, 10.0).unwrap_err().range.name, "mass_kg");
+}
+
+#[test]
+fn a_frame_that_cannot_fly_is_refused_by_name() {
+    fn refused<const N: usize>(rotors: [Rotor; N]) -> airframe::Range {
+        Mixer::of(rotors, &Parameters::PAPER.to_f32(), 3.0).unwrap_err().range
+    }
+    for bad in [11.0, -11.0, f32::NAN, f32::INFINITY] {
+        let [first, rest @ ..] = PLUS;
+        let [second, third, fourth] = rest;
+        assert_eq!(refused([Rotor { x: bad, ..first }, second, third, fourth]), POSITION);
+        assert_eq!(refused([first, second, third, Rotor { y: bad, ..fourth }]), POSITION);
+    }
+    // All turn the same way; too few; on one point.
+    assert_eq!(refused(PLUS.map(|rotor| Rotor { pushes_left: true, ..rotor })), AUTHORITY);
+    assert_eq!(refused(circle::<3>(0.1)), AUTHORITY);
+    assert_eq!(refused(PLUS.map(|rotor| Rotor { x: 0.0, y: 0.0, ..rotor })), AUTHORITY);
+    // On one line through the centre, at any angle and size.
+    for angle in [0.0_f32, 0.3, 0.8, 1.1, FRAC_PI_2, 2.9] {
+        for size in [1e-3_f32, 1.0, 7.3] {
+            let at = |r: f32, pushes_left| Rotor { x: r * angle.cos(), y: r * angle.sin(), pushes_left };
+            assert_eq!(
+                refused([at(size, true), at(-size, false), at(0.37 * size, false), at(-0.61 * size, true)]),
+                AUTHORITY
+            );
+        }
+    }
+    // The centre of mass is outside the rotors: hovering would take one that pulls down.
+    assert_eq!(refused(cross().map(|rotor| Rotor { x: rotor.x + 1.2, ..rotor })), THRUST_SHARE);
+    // A small frame is a frame.
+    assert!(
+        Mixer::of(PLUS.map(|r| Rotor { x: 0.01 * r.x, y: 0.01 * r.y, ..r }), &Parameters::PAPER.to_f32(), 3.0).is_ok()
+    );
 }

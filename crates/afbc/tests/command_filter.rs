@@ -122,6 +122,46 @@ proptest! {
             prop_assert!(f64::from(state.rate).abs() <= 2.0 * f64::from(w) / core::f64::consts::E * 1.5709, "{state:?}");
         }
     }
+
+    /// A rate limit binds rate and travel alike, leaves a slow filter alone to the bit, and never keeps it from its command.
+    #[test]
+    fn a_rate_limit_limits((w, dt) in bandwidth_and_step(), state in filtered(), command in -1.6_f32..1.6, limit in 0.1_f32..30.0) {
+        let free = CommandFilter::new(w, dt).unwrap();
+        let filter = free.limited(limit).unwrap();
+        let next = filter.advance(&state, command);
+        prop_assert!(next.rate.abs() <= limit, "{next:?}");
+        let travel = f64::from(next.angle) - f64::from(state.angle);
+        prop_assert!(travel.abs() <= f64::from(limit) * f64::from(dt) * (1.0 + 2.0 * U) + 2.0 * U * f64::from(next.angle.abs()));
+        let unlimited = free.advance(&state, command);
+        if unlimited.rate.abs() <= limit && (unlimited.angle - state.angle).abs() <= limit * dt {
+            prop_assert_eq!(next, unlimited);
+        }
+        // At the limit and pressed against it, the rate is constant.
+        let pressed = Filtered { angle: command - limit - 1.0, rate: limit };
+        let presses = free.acceleration(&pressed, command) > 0.0;
+        prop_assert_eq!(filter.acceleration(&pressed, command), if presses { 0.0 } else { free.acceleration(&pressed, command) });
+        let slower = Filtered { rate: 0.5 * limit, ..pressed };
+        prop_assert_eq!(filter.acceleration(&slower, command), free.acceleration(&slower, command));
+
+        let (mut settled, start) = (Filtered { rate: 0.0, ..state }, f64::from(state.angle - command).abs());
+        let steps = ((25.0 / f64::from(w) + start / f64::from(limit)) / f64::from(dt)) as u32 + 2;
+        if steps < 20_000 {
+            for _ in 0..steps {
+                settled = filter.advance(&settled, command);
+            }
+            prop_assert!((settled.angle - command).abs() < 1e-3, "{settled:?} for {command}");
+        }
+    }
+}
+
+#[test]
+fn a_rate_limit_out_of_range_is_refused_by_name() {
+    for rate in [0.0, 0.09, 1.1e6, -1.0, f32::NAN, f32::INFINITY] {
+        assert_eq!(
+            CommandFilter::new(40.0, 0.001).unwrap().limited(rate).unwrap_err().range.name,
+            "tilt_rate_max_rad_s"
+        );
+    }
 }
 
 #[test]

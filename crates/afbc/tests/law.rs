@@ -6,8 +6,8 @@ use afbc::backstepping::{self, Errors, Tracking, ideal, proportional};
 use afbc::cascade::Context;
 use afbc::fuzzy::{Basis, Membership};
 use afbc::model::Dynamics;
-use afbc::{Adaptive, Law, Profile};
-use airframe::{Axis, PerAxis, State};
+use afbc::{Adaptive, Backstepping, Law, Profile, Safeguards};
+use airframe::{Axis, Parameters, PerAxis, State};
 use nalgebra::Matrix3;
 use proptest::prelude::*;
 
@@ -16,7 +16,7 @@ const U: f64 = 1.0 / (1 << 24) as f64;
 
 fn tracking() -> impl Strategy<Value = Tracking> {
     (-10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0)
-        .prop_map(|(x1, x2, e1, x1d_dot, x1d_ddot)| Tracking { x1, x2, e1, x1d_dot, x1d_ddot })
+        .prop_map(|(x1, x2, e1, x1d_dot, x1d_ddot)| Tracking { x1, x2, e1, x1d_dot, x1d_ddot, limited: false })
 }
 
 fn gains() -> impl Strategy<Value = Gains> {
@@ -35,6 +35,7 @@ fn gains() -> impl Strategy<Value = Gains> {
             eta,
             epsilon,
             membership: Membership { centre, width },
+            safeguards: Safeguards::NONE,
         })
 }
 
@@ -79,6 +80,25 @@ proptest! {
         prop_assert!(g != 1.0 || left_over == 0.0);
     }
 
+    /// At the speed limit e_1 stands still: (13) is d e_2/dt = d^2 x_1d/dt^2 - f - g u, and what (16) and (21) give it is
+    /// -g alpha_2 e_2. For x: f = 0, g = 1.
+    #[test]
+    fn at_the_speed_limit_e2_decays(tracking in tracking(), alpha1 in 0.01_f32..10.0, alpha2 in 0.0_f32..20.0) {
+        let tracking = Tracking { limited: true, ..tracking };
+        let law = Backstepping::new(&Parameters::PAPER.to_f32(), PerAxis::from_fn(|_| backstepping::Gains { alpha1, alpha2 }));
+        let context = Context {
+            state: &State::default(),
+            rotor_residual_rad_s: 0.0,
+            dt_s: 0.001,
+            adapt: true,
+            unallocated: PerAxis::default(),
+        };
+        let (u, errors) = law.unwrap().input(Axis::X, &tracking, &context, &mut ());
+        let [u, x1d_ddot, e2, a2] = [u, tracking.x1d_ddot, errors.e2, alpha2].map(f64::from);
+        let e2_dot = x1d_ddot - u;
+        prop_assert!((e2_dot + a2 * e2).abs() <= 4.0 * U * (x1d_ddot.abs() + a2 * e2.abs()), "{e2_dot} for {}", -a2 * e2);
+    }
+
     /// (12), (13): e_2 is what e_1's own dynamics leave over.
     #[test]
     fn errors_obey_13(tracking in tracking(), alpha1 in 0.01_f32..10.0) {
@@ -97,7 +117,7 @@ proptest! {
         gains in gains(), tracking in tracking(), inputs in prop::array::uniform2(-3.0_f32..3.0), estimate in estimate(),
     ) {
         let errors = Errors::new(gains.backstepping.alpha1, &tracking);
-        let (terms, _) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate);
+        let (terms, _) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
         prop_assert_eq!(terms.sum(), terms.fuzzy + terms.robust + terms.proportional);
         prop_assert_eq!(terms.proportional, gains.backstepping.alpha2 * errors.e2); // (21)
 
@@ -121,7 +141,7 @@ proptest! {
         gains in gains(), tracking in tracking(), inputs in prop::array::uniform2(-3.0_f32..3.0), estimate in estimate(),
     ) {
         let errors = Errors::new(gains.backstepping.alpha1, &tracking);
-        let (_, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate);
+        let (_, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
         let w = Basis::new(gains.membership).unwrap().weights(inputs);
         let e2 = f64::from(errors.e2);
         for (rate, w) in rate.theta().iter().zip(w.iter()) {
@@ -150,10 +170,10 @@ proptest! {
                 Axis::Roll | Axis::Pitch | Axis::Yaw => [tracking.x1, tracking.x2],
                 Axis::Z | Axis::X | Axis::Y => [errors.e1, errors.e1_dot],
             };
-            let (terms, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &before);
+            let (terms, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &before, 0.0);
 
             let mut frozen = before;
-            let context = Context { state: &state, rotor_residual_rad_s: 0.0, dt_s, adapt: false };
+            let context = Context { state: &state, rotor_residual_rad_s: 0.0, dt_s, adapt: false, unallocated: PerAxis::default() };
             let (u, seen) = law.input(axis, &tracking, &context, &mut frozen);
             prop_assert_eq!((u, seen, frozen), (terms.sum(), errors, before));
 
@@ -175,14 +195,19 @@ proptest! {
 /// Every gain is refused outside its range, by its name, and accepted at both ends.
 #[test]
 fn a_gain_out_of_range_is_refused_by_name() {
-    use afbc::{adaptive, fuzzy};
+    use afbc::{adaptive, fuzzy, safeguards};
     type Set = fn(&mut Gains, f32);
-    let cases: [(airframe::Range, Set); 6] = [
+    let cases: [(airframe::Range, Set); 11] = [
         (backstepping::ALPHA1, |g, v| g.backstepping.alpha1 = v),
         (backstepping::ALPHA2, |g, v| g.backstepping.alpha2 = v),
         (adaptive::GAMMA, |g, v| g.gamma = v),
         (adaptive::ETA, |g, v| g.eta = v),
         (adaptive::EPSILON, |g, v| g.epsilon = v),
+        (safeguards::SIGMA, |g, v| g.safeguards.sigma = v),
+        (safeguards::KAPPA, |g, v| g.safeguards.kappa = v),
+        (safeguards::THETA_MAX, |g, v| g.safeguards.theta_max = v),
+        (safeguards::DELTA_MAX, |g, v| g.safeguards.delta_max = v),
+        (safeguards::DEAD_ZONE, |g, v| g.safeguards.dead_zone = v),
         (fuzzy::WIDTH, |g, v| g.membership = Membership { centre: 2.0 * v, width: v }),
     ];
     for axis in Axis::ALL {

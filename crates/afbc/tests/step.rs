@@ -1,102 +1,13 @@
 //! Properties of one controller step, for every law: whatever it is given, it answers with something a motor can do.
 #![allow(clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
 
-use afbc::adaptive::{EPSILON, ETA, Estimate, GAMMA, Gains};
-use afbc::allocation::FORCE_MAX;
-use afbc::backstepping::{ALPHA1, ALPHA2};
-use afbc::cascade::DT;
-use afbc::command_filter::BANDWIDTH;
-use afbc::fuzzy::Membership;
-use afbc::{Adaptive, Backstepping, Command, Controller, Health, Law, Memory, Profile, Settings};
-use airframe::{Axis, Parameters, PerAxis, Range, Setpoint, State};
-use nalgebra::Vector3;
+mod common;
+
+use afbc::adaptive::{Estimate, Gains};
+use afbc::{Adaptive, Backstepping, Cascade, Controller, FlightController, Health, Law, Memory, Profile, Settings};
+use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
+use common::{check_command, gains, plausible, setpoint, settings, state, value};
 use proptest::prelude::*;
-
-/// A value that a sensor or a link may deliver: mostly of flight's size, often anything at all.
-fn value() -> impl Strategy<Value = f32> {
-    let edges = [
-        f32::NAN,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-        f32::MAX,
-        f32::MIN,
-        f32::MIN_POSITIVE,
-        1e5,
-        -1e5,
-        1e3,
-        -1e3,
-        0.0,
-        -0.0,
-    ];
-    prop_oneof![
-        30 => -3.0_f32..3.0,
-        4 => -1e3_f32..=1e3,
-        1 => prop::sample::select(edges.to_vec()),
-        1 => prop::num::f32::ANY,
-    ]
-}
-
-/// A value that is always plausible.
-fn plausible() -> impl Strategy<Value = f32> {
-    prop_oneof![4 => -3.0_f32..3.0, 1 => -1e3_f32..=1e3]
-}
-
-fn vector(value: BoxedStrategy<f32>) -> impl Strategy<Value = Vector3<f32>> {
-    (value.clone(), value.clone(), value).prop_map(|(x, y, z)| Vector3::new(x, y, z))
-}
-
-fn state<S: Strategy<Value = f32> + 'static>(value: fn() -> S) -> impl Strategy<Value = State> {
-    (vector(value().boxed()), vector(value().boxed()), vector(value().boxed()), vector(value().boxed())).prop_map(
-        |(position_m, velocity_m_s, attitude_rad, rates_rad_s)| State {
-            position_m,
-            velocity_m_s,
-            attitude_rad,
-            rates_rad_s,
-        },
-    )
-}
-
-fn setpoint<S: Strategy<Value = f32> + 'static>(value: fn() -> S) -> impl Strategy<Value = Setpoint> {
-    (vector(value().boxed()), vector(value().boxed()), vector(value().boxed()), vector(value().boxed())).prop_map(
-        |(position_m, velocity_m_s, acceleration_m_s2, yaw)| Setpoint {
-            position_m,
-            velocity_m_s,
-            acceleration_m_s2,
-            yaw_rad: yaw.x,
-            yaw_rate_rad_s: yaw.y,
-            yaw_acceleration_rad_s2: yaw.z,
-        },
-    )
-}
-
-/// A value anywhere in `range`, its bounds drawn often.
-fn within(range: Range) -> impl Strategy<Value = f32> {
-    let (min, max) = (range.min as f32, range.max as f32);
-    prop_oneof![4 => min..=max, 1 => Just(min), 1 => Just(max)]
-}
-
-fn settings() -> impl Strategy<Value = Settings> {
-    let any = (within(DT), within(BANDWIDTH), within(FORCE_MAX)).prop_map(
-        |(dt_s, command_filter_rad_s, rotor_force_max_n)| Settings { dt_s, command_filter_rad_s, rotor_force_max_n },
-    );
-    prop_oneof![Just(Profile::Paper.settings()), any]
-}
-
-/// One set of gains for all six subsystems, or the paper's.
-fn gains() -> impl Strategy<Value = PerAxis<Gains>> {
-    let any =
-        (within(ALPHA1), within(ALPHA2), within(GAMMA), within(ETA), within(EPSILON), 1e-3_f32..100.0, 0.1_f32..=6.0)
-            .prop_map(|(alpha1, alpha2, gamma, eta, epsilon, width, spread)| Gains {
-                backstepping: afbc::backstepping::Gains { alpha1, alpha2 },
-                gamma,
-                eta,
-                epsilon,
-                membership: Membership { centre: (width * spread).max(1e-3), width },
-            })
-            .prop_filter("accepted", |gains| gains.validate().is_ok())
-            .prop_map(|gains| PerAxis::from_fn(|_| gains));
-    prop_oneof![Just(Profile::Paper.gains()), any]
-}
 
 fn sequence<S: Strategy<Value = f32> + 'static>(value: fn() -> S) -> impl Strategy<Value = Vec<(State, Setpoint)>> {
     prop::collection::vec((state(value), setpoint(value)), 50)
@@ -112,30 +23,8 @@ fn backstepping(gains: PerAxis<Gains>, settings: Settings) -> Controller<Backste
     Controller::new(vehicle, settings, Backstepping::new(&vehicle, gains).unwrap()).unwrap()
 }
 
-fn estimates<L: Law>(memory: &Memory<L::Estimate>) -> PerAxis<Estimate> {
-    PerAxis::from_fn(|axis| L::learnt(memory.estimates.get(axis)))
-}
-
-/// What every step owes: speeds and forces within the rotors' limits, everything finite.
-fn check_command(command: &Command, settings: &Settings) -> Result<(), TestCaseError> {
-    let limit = settings.rotor_force_max_n;
-    let fastest = (f64::from(limit) / Parameters::PAPER.thrust_factor_n_s2).sqrt() * (1.0 + 2e-7);
-    prop_assert!(command.forces.0.iter().all(|f| (0.0..=limit).contains(f)), "{command:?}");
-    prop_assert!(command.speeds.0.iter().all(|w| (0.0..=fastest).contains(&f64::from(*w))), "{command:?}");
-    let u = &command.inputs;
-    let numbers = [u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n]
-        .into_iter()
-        .chain(command.virtual_m_s2)
-        .chain(command.desired_rad)
-        .chain(command.filtered.iter().flat_map(|f| [f.angle, f.rate]))
-        .chain(Axis::ALL.iter().flat_map(|axis| {
-            let errors = command.errors.get(*axis);
-            [errors.e1, errors.e1_dot, errors.e2]
-        }));
-    for number in numbers {
-        prop_assert!(number.is_finite(), "{command:?}");
-    }
-    Ok(())
+fn estimates<L: Law>(memory: &Memory<Cascade<L::Estimate>>) -> PerAxis<Estimate> {
+    PerAxis::from_fn(|axis| L::learnt(memory.control.estimates.get(axis)))
 }
 
 fn check_estimates(estimates: &PerAxis<Estimate>) -> Result<(), TestCaseError> {
@@ -221,8 +110,8 @@ proptest! {
         prop_assert_eq!(stood_in.speeds, wanted.speeds);
         prop_assert_eq!(stood_in.errors, wanted.errors);
         let saturated = wanted.health.saturated;
-        prop_assert_eq!(stood_in.health, Health { state_rejected: true, setpoint_rejected: false, saturated });
-        prop_assert_ne!(memory.estimates, other.estimates, "the plausible twin should have learnt");
+        prop_assert_eq!(stood_in.health, Health { state_rejected: true, saturated, ..Health::default() });
+        prop_assert_ne!(memory.control.estimates, other.control.estimates, "the plausible twin should have learnt");
     }
 
     /// While a setpoint is implausible the last plausible one stands in, and learning goes on; before the first one, the
@@ -245,7 +134,7 @@ proptest! {
             let wanted = controller.step(&mut other, &after, &substitute);
             prop_assert_eq!(stood_in.speeds, wanted.speeds);
             prop_assert!(stood_in.health.setpoint_rejected && !stood_in.health.state_rejected);
-            prop_assert_eq!(memory.estimates, other.estimates);
+            prop_assert_eq!(memory.control.estimates, other.control.estimates);
         }
     }
 }

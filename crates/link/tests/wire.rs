@@ -86,6 +86,13 @@ fn bytes_are_the_mavlink_crates() {
     let command =
         COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, param1: 1.0, ..COMMAND_LONG_DATA::DEFAULT };
     assert_eq!(bytes(&Uplink::Command(Command::Arm)), theirs(&command));
+
+    // 31010, whatever its parameters say.
+    let command = COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_USER_1, ..COMMAND_LONG_DATA::DEFAULT };
+    let engage = Uplink::Command(Command::Engage);
+    assert_eq!(bytes(&engage), theirs(&command));
+    assert_eq!(bytes(&engage)[38..40], 31010_u16.to_le_bytes());
+    assert_eq!(read(&theirs(&COMMAND_LONG_DATA { param1: 7.0, ..command })), Ok(engage));
 }
 
 #[test]
@@ -337,6 +344,7 @@ proptest! {
             Uplink::Setpoint(setpoint),
             Uplink::Command(Command::Arm),
             Uplink::Command(Command::Disarm),
+            Uplink::Command(Command::Engage),
             Uplink::Command(Command::Other(MavCmd::MAV_CMD_DO_SET_MODE)),
         ] {
             prop_assert_eq!(read(&bytes(&message)), Ok(message));

@@ -44,8 +44,8 @@ pub struct Comms {
     state: Option<State>,
     /// The state is newer than the last rotor command.
     state_is_news: bool,
-    /// The last command to the vehicle, and who sent it.
-    asked: (MavCmd, Address),
+    /// Who sent the last command to the vehicle.
+    asked_by: Address,
     /// A command that this vehicle does not know, and who sent it.
     unknown: Option<(MavCmd, Address)>,
     norms: PerAxis<Norm>,
@@ -70,27 +70,27 @@ impl Comms {
             tick_us_max: 0.0,
             state: None,
             state_is_news: false,
-            asked: (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, Address { system: 0, component: 0 }),
+            asked_by: Address { system: 0, component: 0 },
             unknown: None,
             norms: PerAxis::default(),
             trip: None,
         }
     }
 
-    /// Takes the next bytes of the stream; returns what they tell the control tick, to be [posted](post).
+    /// Takes the next bytes of the stream; returns what they tell the control tick, to be [posted](Inbox::post).
     pub fn receive(&mut self, bytes: &[u8]) -> Inbox {
         let mut news = Inbox::default();
-        let Comms { decoder, clock, now_us, state, state_is_news, asked, unknown, .. } = self;
+        let Comms { decoder, clock, now_us, state, state_is_news, asked_by, unknown, .. } = self;
         decoder.feed(bytes, |from, message| match message {
             Uplink::Heartbeat => (),
             Uplink::State { sent_us, state: value } => {
                 if let Some(at_us) = clock.stamp(sent_us, *now_us) {
-                    news.state = Some(Stamped { value, at_us });
+                    news.measure(Stamped { value, at_us });
                     *state = Some(value);
                     *state_is_news = true;
                 }
             }
-            Uplink::Setpoint(value) => news.setpoint = Some(Stamped { value, at_us: *now_us }),
+            Uplink::Setpoint(value) => news.aim(Stamped { value, at_us: *now_us }),
             Uplink::Command(command) => {
                 let request = match command {
                     Command::Arm => Request::Arm,
@@ -99,7 +99,7 @@ impl Comms {
                     Command::Other(id) => return *unknown = Some((id, from)),
                 };
                 news.ask(request);
-                *asked = (command.id(), from);
+                *asked_by = from;
             }
         });
         news
@@ -130,12 +130,16 @@ impl Comms {
             say(Downlink::Rotors { time_us: report.time_us, armed, speeds: report.motors });
         }
         if let Some(answer) = report.answer {
-            let (command, to) = self.asked;
+            let command = match answer {
+                Ok(Request::Engage) => Command::Engage,
+                Ok(Request::Disarm) => Command::Disarm,
+                Ok(Request::Arm) | Err(_) => Command::Arm,
+            };
             let (answer, reason) = match answer {
                 Ok(_) => (Answer::Accepted, None),
                 Err(refusal) => (Answer::Refused(refusal as i32), Some(refusal.reason())),
             };
-            say(Downlink::Answer { command, answer, to });
+            say(Downlink::Answer { command: command.id(), answer, to: self.asked_by });
             if let Some(reason) = reason {
                 say(Downlink::Text(Text::from(reason)));
             }
@@ -144,7 +148,10 @@ impl Comms {
         if let (Some(trip), None) = (trip, self.trip) {
             say(Downlink::Text(Text::from(trip.reason())));
         }
-        self.trip = trip;
+        // While the vehicle flies blind no law says anything.
+        if report.mode != Mode::Riding {
+            self.trip = trip;
+        }
         if let Some((axis, norm)) = report.learnt {
             *self.norms.get_mut(axis) = norm;
         }
@@ -180,14 +187,5 @@ impl Comms {
                 link: *self.decoder.counters(),
             }));
         }
-    }
-}
-
-/// Adds `news` to what the next tick will work from.
-pub fn post(inbox: &mut Inbox, news: &Inbox) {
-    inbox.state = news.state.or(inbox.state);
-    inbox.setpoint = news.setpoint.or(inbox.setpoint);
-    if let Some(request) = news.request {
-        inbox.ask(request);
     }
 }

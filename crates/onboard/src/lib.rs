@@ -9,7 +9,7 @@
 //! use vehicle::Inbox;
 //!
 //! let (mut flight, mut comms, mut inbox) = (Flight::new()?, Comms::new(), Inbox::default());
-//! onboard::post(&mut inbox, &comms.receive(b"MAVLink, or noise"));
+//! inbox.post(&comms.receive(b"MAVLink, or noise"));
 //! let report = flight.tick(1_000, &inbox.take());
 //! assert_eq!(report.throttles, [0; 4]); // disarmed
 //! comms.report(&report, 0, |_bytes| ());
@@ -20,5 +20,5 @@
 mod comms;
 mod flight;
 
-pub use comms::{ADDRESS, Comms, post};
+pub use comms::{ADDRESS, Comms};
 pub use flight::{Flight, Report};

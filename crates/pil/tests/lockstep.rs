@@ -25,7 +25,7 @@ fn every_bit_is_the_hosts() {
     let mut modes = Vec::new();
     for (tick, reply) in replies.iter().enumerate() {
         let news = comms.receive(&station.bytes_of_tick(tick as u64));
-        onboard::post(&mut inbox, &news);
+        inbox.post(&news);
         let report = flight.tick(reply.time_us, &inbox.take());
         let mut bytes = Vec::new();
         comms.report(&report, reply.cycles, |frame| bytes.extend_from_slice(frame));

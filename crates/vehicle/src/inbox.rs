@@ -19,18 +19,58 @@ impl<T> Stamped<T> {
     }
 }
 
-/// Newest inputs. The link writes it, the control tick takes it.
+/// Newest inputs. The link writes it, the control tick takes it. What is not plausible does not get in: the tick trusts
+/// what it finds here.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inbox {
-    /// Newest measured state, stamped by a [`SourceClock`].
-    pub state: Option<Stamped<State>>,
-    /// Newest setpoint, stamped on arrival.
-    pub setpoint: Option<Stamped<Setpoint>>,
-    /// What was asked for since the last tick. Written by [`Inbox::ask`].
-    pub request: Option<Request>,
+    state: Option<Stamped<State>>,
+    setpoint: Option<Stamped<Setpoint>>,
+    request: Option<Request>,
 }
 
 impl Inbox {
+    /// Nothing yet.
+    pub const EMPTY: Self = Inbox { state: None, setpoint: None, request: None };
+
+    /// Takes in a measured state, stamped by a [`SourceClock`]; does nothing with one that is not
+    /// [plausible](State::is_plausible).
+    pub fn measure(&mut self, state: Stamped<State>) {
+        if state.value.is_plausible() {
+            self.state = Some(state);
+        }
+    }
+
+    /// Takes in a setpoint, stamped on arrival; does nothing with one that is not [plausible](Setpoint::is_plausible).
+    pub fn aim(&mut self, setpoint: Stamped<Setpoint>) {
+        if setpoint.value.is_plausible() {
+            self.setpoint = Some(setpoint);
+        }
+    }
+
+    /// Newest plausible state.
+    pub fn state(&self) -> Option<&Stamped<State>> {
+        self.state.as_ref()
+    }
+
+    /// Newest plausible setpoint.
+    pub fn setpoint(&self) -> Option<&Stamped<Setpoint>> {
+        self.setpoint.as_ref()
+    }
+
+    /// What was asked for since the last tick.
+    pub fn request(&self) -> Option<Request> {
+        self.request
+    }
+
+    /// Adds `news` to what the next tick will work from.
+    pub fn post(&mut self, news: &Inbox) {
+        self.state = news.state.or(self.state);
+        self.setpoint = news.setpoint.or(self.setpoint);
+        if let Some(request) = news.request {
+            self.ask(request);
+        }
+    }
+
     /// Leaves `request` for the next tick. Of two that meet in one tick, disarming wins.
     pub fn ask(&mut self, request: Request) {
         if self.request != Some(Request::Disarm) {
@@ -40,9 +80,7 @@ impl Inbox {
 
     /// What the next tick works from: a copy of everything, and the request is done with.
     pub fn take(&mut self) -> Inbox {
-        let taken = *self;
-        self.request = None;
-        taken
+        Inbox { request: self.request.take(), ..*self }
     }
 }
 

@@ -1,6 +1,6 @@
 //! From rotor speed to throttle.
 
-use afbc::math::{max, min, sqrt};
+use afbc::math::{max, sqrt};
 use airframe::{OutOfRange, Range, RotorSpeeds};
 
 /// Smallest throttle that turns a motor; 1 to 47 are commands, 0 stops it.
@@ -37,7 +37,17 @@ pub struct Curve {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motor {
     curve: Curve,
+    /// Of the curve, in steps.
+    idle: u16,
     inverse_speed_max: f32,
+}
+
+/// Steps of throttle between the least and the most.
+const SPAN: u16 = THROTTLE_MAX - THROTTLE_MIN;
+
+/// Throttle in 0..1 in steps above [`THROTTLE_MIN`], to the nearest. 0 for less, and for NaN.
+fn steps(u: f32) -> u16 {
+    (u * f32::from(SPAN) + 0.5) as u16
 }
 
 impl Motor {
@@ -49,7 +59,7 @@ impl Motor {
         SPEED_MAX.check(curve.speed_max_rad_s)?;
         LINEARITY.check(curve.linearity)?;
         IDLE.check(curve.idle)?;
-        Ok(Motor { curve, inverse_speed_max: 1.0 / curve.speed_max_rad_s })
+        Ok(Motor { curve, idle: steps(curve.idle), inverse_speed_max: 1.0 / curve.speed_max_rad_s })
     }
 
     /// Throttle of all four motors: 0 if disarmed, 48 to 2047 if armed.
@@ -61,16 +71,15 @@ impl Motor {
     /// Throttle \[48 to 2047\] of an armed motor for `speed_rad_s`; never falls as the speed rises. Idle for what is not
     /// a positive number, full throttle above the largest speed.
     pub fn throttle(&self, speed_rad_s: f32) -> u16 {
-        let ratio = max(speed_rad_s * self.inverse_speed_max, 0.0);
+        let ratio = speed_rad_s * self.inverse_speed_max;
         // The speed follows the throttle: nothing to invert.
-        let u = if self.curve.linearity == 1.0 { ratio } else { self.inverse_curve(ratio * ratio) };
-        let u = min(max(u, self.curve.idle), 1.0);
-        let span = f32::from(THROTTLE_MAX - THROTTLE_MIN);
-        THROTTLE_MIN + (u * span + 0.5) as u16
+        let u = if self.curve.linearity == 1.0 { ratio } else { self.inverse_curve(max(ratio, 0.0)) };
+        steps(u).clamp(self.idle, SPAN) + THROTTLE_MIN
     }
 
-    /// u in 0..1 with k u^2 + (1 - k) u = `share`: the quadratic's root in the form that holds for k = 0 too. 0 for NaN.
-    fn inverse_curve(&self, share: f32) -> f32 {
+    /// u in 0..1 with k u^2 + (1 - k) u = `ratio`^2: the quadratic's root in the form that holds for k = 0 too. 0 for NaN.
+    fn inverse_curve(&self, ratio: f32) -> f32 {
+        let share = ratio * ratio;
         let k = self.curve.linearity;
         let linear = 1.0 - k;
         let denominator = linear + sqrt(linear * linear + 4.0 * k * share);

@@ -52,11 +52,11 @@ pub enum Mode {
 /// What the commander asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Request {
-    /// Start the motors.
+    /// Start the motors: they idle for a tick, from the next one on the law flies.
     Arm,
     /// Stop the motors, now, wherever the vehicle is.
     Disarm,
-    /// Give the flight back to the controller that has fallen back on another law.
+    /// Give the flight back, from the next tick on, to the controller that has fallen back on another law.
     Engage,
 }
 

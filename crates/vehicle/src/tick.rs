@@ -39,6 +39,12 @@ struct Flight<M> {
     reckoning: Reckoning,
     /// What the rotors were last told.
     applied: Inputs,
+    guide: Guide,
+}
+
+/// Where to go when no setpoint says so.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Guide {
     /// Where to stay while there is no setpoint.
     hold: Option<Setpoint>,
     descent: Option<Descent>,
@@ -115,35 +121,38 @@ impl<C: FlightController> Vehicle<C> {
     #[inline(always)]
     pub fn traced_tick(&self, memory: &mut Memory<C::Memory>, now_us: u64, inbox: &Inbox) -> (Outcome, Command) {
         // Take the newest inputs.
-        let rate = memory.rate.tick(now_us);
         let measured = memory.take_state(inbox, now_us);
-        let state_age_us = memory.state.map_or(u64::MAX, |state| state.age_us(now_us));
-        let fresh = memory.state.filter(|_| state_age_us <= RIDE_US).map(|state| state.value);
-        let setpoint =
-            inbox.setpoint.filter(|s| s.age_us(now_us) <= SETPOINT_STALE_US && s.value.is_plausible()).map(|s| s.value);
+        let Memory { mode, rate, state, flight } = memory;
+        let rate = rate.tick(now_us);
+        let state_age_us = state.map_or(u64::MAX, |state| state.age_us(now_us));
+        let fresh = state.as_ref().filter(|_| state_age_us <= RIDE_US).map(|state| &state.value);
+        let setpoint = inbox.setpoint().filter(|s| s.age_us(now_us) <= SETPOINT_STALE_US).map(|s| &s.value);
 
         // Supervise.
-        let ready = self.limits.ready(fresh.as_ref(), setpoint.as_ref(), rate.healthy());
-        let answer = inbox.request.map(|request| memory.mode.answer(request, ready));
-        let landed = memory.flight.as_ref().is_some_and(|flight| flight.landed(now_us));
-        memory.mode = memory.mode.next(&Observed { request: inbox.request, ready, state_age_us, landed });
-        let mode = memory.mode;
-        if let (Some(Ok(Request::Arm)), Some(state)) = (answer, &fresh) {
-            memory.flight = Some(Flight::new(self.blind.start(state)));
-        }
-        if let (Some(Ok(Request::Engage)), Some(flight)) = (answer, &mut memory.flight) {
-            self.controller.engage(&mut flight.control);
+        let ready = match mode.armed() {
+            true => Err(Refusal::AlreadyArmed),
+            false => self.limits.ready(fresh, setpoint, rate.healthy()),
+        };
+        let request = inbox.request();
+        let answer = request.map(|request| mode.answer(request, ready));
+        let landed = flight.as_ref().is_some_and(|flight| flight.guide.landed(now_us));
+        *mode = mode.next(&Observed { request, ready, state_age_us, landed });
+        let mode = *mode;
+        // Arming takes a tick of its own, in which the motors idle: setting up a flight and a step are too much for one.
+        let arms = answer == Some(Ok(Request::Arm));
+        if let (true, Some(state)) = (arms, fresh) {
+            Flight::begin(flight, self.blind.start(state));
         }
 
         // Control.
-        let command = match &mut memory.flight {
-            Some(flight) if mode.armed() => {
-                flight.reckon(&self.blind, measured.as_ref());
+        let command = match flight {
+            Some(flight) if mode.armed() && !arms => {
+                flight.reckon(&self.blind, fresh.filter(|_| measured));
                 match fresh {
                     Some(state) => {
-                        let target = flight.target(mode, &state, setpoint, now_us, self.dt_s);
-                        // Screened above: both are plausible.
-                        let command = self.controller.decide(&mut flight.control, &state, &target, true);
+                        let target = flight.guide.target(mode, state, setpoint, now_us, self.dt_s);
+                        // The inbox let plausible ones pass only.
+                        let command = self.controller.decide(&mut flight.control, state, target, true);
                         flight.applied = Mixer::inputs(&command.forces);
                         self.blind.trim(&mut flight.reckoning, &flight.applied);
                         command
@@ -157,6 +166,10 @@ impl<C: FlightController> Vehicle<C> {
             }
             _ => Command::default(),
         };
+        // For the next step: so is taking over and a step.
+        if let (Some(Ok(Request::Engage)), true, Some(flight)) = (answer, mode.armed(), flight) {
+            self.controller.engage(&mut flight.control);
+        }
 
         // Gate the motors.
         let motors = if mode.armed() { command.speeds } else { RotorSpeeds::default() };
@@ -167,7 +180,7 @@ impl<C: FlightController> Vehicle<C> {
     /// Rotor commands without a state.
     #[inline(always)]
     fn blind_command<M>(&self, flight: &mut Flight<M>, mode: Mode) -> Command {
-        flight.descent = None;
+        flight.guide.descent = None;
         let inputs = match mode {
             Mode::Descending => self.blind.descend(&flight.reckoning),
             _ => self.blind.ride(&flight.reckoning),
@@ -180,23 +193,28 @@ impl<C: FlightController> Vehicle<C> {
 }
 
 impl<M> Memory<M> {
-    /// Keeps the inbox's state, and returns it, if it is plausible, newer than the one at hand, and not stale already: a
-    /// stream of states that are always late is no stream of states.
-    fn take_state(&mut self, inbox: &Inbox, now_us: u64) -> Option<State> {
-        let newer = |state: &Stamped<State>| {
-            state.age_us(now_us) <= RIDE_US
-                && state.value.is_plausible()
-                && self.state.is_none_or(|held| state.at_us > held.at_us)
+    /// Keeps the inbox's state if it is newer than the one at hand and not stale already: a stream of states that are
+    /// always late is no stream of states. Tells whether it did.
+    fn take_state(&mut self, inbox: &Inbox, now_us: u64) -> bool {
+        let newer = |state: &&Stamped<State>| {
+            state.age_us(now_us) <= RIDE_US && self.state.is_none_or(|held| state.at_us > held.at_us)
         };
-        let taken = inbox.state.filter(newer);
-        self.state = taken.or(self.state);
-        taken.map(|state| state.value)
+        let taken = inbox.state().filter(newer);
+        if let Some(state) = taken {
+            self.state = Some(*state);
+        }
+        taken.is_some()
     }
 }
 
 impl<M: Default> Flight<M> {
-    fn new(reckoning: Reckoning) -> Self {
-        Flight { control: M::default(), reckoning, applied: Inputs::default(), hold: None, descent: None }
+    /// Begins a flight where the last one was remembered.
+    // Out of line, so that the new memory is not put together on the tick's stack and copied.
+    #[cold]
+    #[inline(never)]
+    fn begin(flight: &mut Option<Self>, reckoning: Reckoning) {
+        *flight =
+            Some(Flight { control: M::default(), reckoning, applied: Inputs::default(), guide: Guide::default() });
     }
 }
 
@@ -208,20 +226,29 @@ impl<M> Flight<M> {
             blind.measure(&mut self.reckoning, state);
         }
     }
+}
 
+impl Guide {
     /// Where to go from a fresh `state`: down, to the setpoint, or nowhere if there is none.
-    fn target(&mut self, mode: Mode, state: &State, setpoint: Option<Setpoint>, now_us: u64, dt_s: f32) -> Setpoint {
+    fn target<'a>(
+        &'a mut self,
+        mode: Mode,
+        state: &State,
+        setpoint: Option<&'a Setpoint>,
+        now_us: u64,
+        dt_s: f32,
+    ) -> &'a Setpoint {
         if mode == Mode::Descending {
-            let descent = self.descent.get_or_insert(Descent::new(state, now_us));
+            let descent = self.descent.get_or_insert_with(|| Descent::new(state, now_us));
             descent.advance(state, now_us, dt_s);
-            return *descent.setpoint();
+            return descent.setpoint();
         }
         match setpoint {
             Some(setpoint) => {
                 self.hold = None;
                 setpoint
             }
-            None => *self.hold.get_or_insert(Setpoint::hold(state)),
+            None => self.hold.get_or_insert_with(|| Setpoint::hold(state)),
         }
     }
 

@@ -87,10 +87,10 @@ fn play(mut frames: Vec<Frame>) -> Seen {
             decoder.feed(&frame.bytes, |_, message| match message {
                 Uplink::State { sent_us, state } => {
                     if let Some(at_us) = clock.stamp(sent_us, now_us) {
-                        inbox.state = Some(Stamped { value: state, at_us });
+                        inbox.measure(Stamped { value: state, at_us });
                     }
                 }
-                Uplink::Setpoint(value) => inbox.setpoint = Some(Stamped { value, at_us: now_us }),
+                Uplink::Setpoint(value) => inbox.aim(Stamped { value, at_us: now_us }),
                 Uplink::Command(Command::Arm) => inbox.ask(Request::Arm),
                 Uplink::Command(Command::Engage) => inbox.ask(Request::Engage),
                 Uplink::Command(Command::Disarm) => inbox.ask(Request::Disarm),

@@ -1,5 +1,7 @@
 //! Requests that meet, and how old a message is.
 
+use airframe::{Setpoint, State};
+use nalgebra::Vector3;
 use proptest::prelude::*;
 use vehicle::inbox::RESTART_US;
 use vehicle::{Inbox, Request, SourceClock, Stamped};
@@ -14,9 +16,26 @@ fn disarming_wins_whichever_came_first() {
         let mut inbox = Inbox::default();
         inbox.ask(first);
         inbox.ask(second);
-        assert_eq!(inbox.take().request, Some(expected));
-        assert_eq!(inbox.take().request, None, "a request is done with");
+        assert_eq!(inbox.take().request(), Some(expected));
+        assert_eq!(inbox.take().request(), None, "a request is done with");
     }
+}
+
+#[test]
+fn what_is_not_plausible_does_not_get_in() {
+    let good = (Stamped { value: State::default(), at_us: 1 }, Stamped { value: Setpoint::default(), at_us: 1 });
+    let mut inbox = Inbox::EMPTY;
+    inbox.measure(good.0);
+    inbox.aim(good.1);
+    for bad in [f32::NAN, f32::INFINITY, 2e5] {
+        let position_m = Vector3::new(0.0, bad, 0.0);
+        let mut news = Inbox::EMPTY;
+        news.measure(Stamped { value: State { position_m, ..State::default() }, at_us: 2 });
+        news.aim(Stamped { value: Setpoint { position_m, ..Setpoint::default() }, at_us: 2 });
+        assert_eq!(news, Inbox::EMPTY, "{bad}");
+        inbox.post(&news);
+    }
+    assert_eq!((inbox.state(), inbox.setpoint()), (Some(&good.0), Some(&good.1)), "the last good ones stay");
 }
 
 #[test]

@@ -49,14 +49,20 @@ impl Bench {
         }
         bench.inbox.ask(Request::Arm);
         assert_eq!(bench.tick(Some(state), Some(setpoint)).answer, Some(Ok(Request::Arm)));
+        bench.tick(Some(state), Some(setpoint));
         bench
     }
 
     /// A millisecond with what was measured and commanded in it.
     fn tick(&mut self, state: Option<State>, setpoint: Option<Setpoint>) -> Outcome {
         self.now_us += 1000;
-        self.inbox.state = state.map(|value| Stamped { value, at_us: self.now_us }).or(self.inbox.state);
-        self.inbox.setpoint = setpoint.map(|value| Stamped { value, at_us: self.now_us }).or(self.inbox.setpoint);
+        let at_us = self.now_us;
+        if let Some(value) = state {
+            self.inbox.measure(Stamped { value, at_us });
+        }
+        if let Some(value) = setpoint {
+            self.inbox.aim(Stamped { value, at_us });
+        }
         let inbox = self.inbox.take();
         let (outcome, command) = self.vehicle.traced_tick(&mut self.memory, self.now_us, &inbox);
         self.command = command;
@@ -80,7 +86,8 @@ fn disarmed_motors_are_off_and_arming_waits_for_the_rate() {
     bench.inbox.ask(Request::Arm);
     let outcome = bench.tick(Some(State::default()), Some(near()));
     assert_eq!((outcome.mode, outcome.answer), (Mode::Flying, Some(Ok(Request::Arm))));
-    assert!(outcome.motors.0.min() > 0.0);
+    assert_eq!(outcome.motors, RotorSpeeds::default(), "idle in the tick of arming");
+    assert!(bench.tick(Some(State::default()), Some(near())).motors.0.min() > 0.0);
 }
 
 /// In flight, a tick is the law's step, bit for bit.
@@ -117,6 +124,7 @@ fn the_estimates_of_one_flight_are_not_those_of_the_next() {
     assert_eq!((outcome.mode, outcome.motors), (Mode::Disarmed, RotorSpeeds::default()));
     assert_eq!(bench.memory.control().expect("flown").estimates, learnt, "still there to be reported");
     bench.inbox.ask(Request::Arm);
+    bench.tick(Some(State::default()), Some(near()));
     bench.tick(Some(State::default()), Some(near()));
     assert!(bench.memory.control().expect("flown").estimates.z.theta.norm() < learnt.z.theta.norm() / 50.0);
 }
@@ -177,8 +185,8 @@ impl Roll {
         }
     }
 
-    fn advance(&mut self, outcome: &Outcome) {
-        let [f1, _, f3, _] = bench.command.forces.0.into();
+    fn advance(&mut self, command: &Command) {
+        let [f1, _, f3, _] = command.forces.0.into();
         self.rate += 0.25 / 0.0038 * (f3 - f1 + self.outside_n) * 1e-3;
         self.angle += self.rate * 1e-3;
     }
@@ -192,15 +200,15 @@ fn riding_stops_the_rotation_and_descending_levels() {
         let mut roll = Roll { angle: 0.0, rate: 0.0, outside_n };
         let mut bench = Bench::flying(roll.state(), Setpoint::hold(&State::default()));
         for _ in 0..5000 {
-            let outcome = bench.tick(Some(roll.state()), Some(Setpoint::hold(&State::default())));
-            roll.advance(&outcome);
+            bench.tick(Some(roll.state()), Some(Setpoint::hold(&State::default())));
+            roll.advance(&bench.command);
         }
         (roll.angle, roll.rate) = (0.1, 1.0);
         let mut held = None;
         for age_ms in 0..=2250 {
             let measured = (age_ms == 0).then(|| roll.state());
             let outcome = bench.tick(measured, Some(near()));
-            roll.advance(&outcome);
+            roll.advance(&bench.command);
             match age_ms {
                 250 => {
                     assert!(roll.rate.abs() < 0.3, "{} rad/s after the ride", roll.rate);
@@ -265,7 +273,7 @@ fn states_that_are_stale_when_they_come_are_no_states() {
     let mut modes = Vec::new();
     for _ in 0..400 {
         let at_us = bench.now_us + 1000 - 30_000;
-        bench.inbox.state = Some(Stamped { value: State::default(), at_us });
+        bench.inbox.measure(Stamped { value: State::default(), at_us });
         modes.push(bench.tick(None, Some(near())).mode);
     }
     modes.dedup();
@@ -296,13 +304,13 @@ proptest! {
                     rates_rad_s: Vector3::new(p, q, r),
                 };
                 let at_us = if at_us % 2 == 0 { bench.now_us } else { at_us };
-                bench.inbox.state = Some(Stamped { value, at_us });
+                bench.inbox.measure(Stamped { value, at_us });
             }
-            bench.inbox.request = match request {
-                0..16 => Some(Request::Arm),
-                16..20 => Some(Request::Disarm),
-                _ => None,
-            };
+            match request {
+                0..16 => bench.inbox.ask(Request::Arm),
+                16..20 => bench.inbox.ask(Request::Disarm),
+                _ => {}
+            }
             let outcome = bench.tick(None, Some(near()));
             prop_assert!(outcome.motors.0.iter().all(|speed| speed.is_finite() && *speed >= 0.0));
             prop_assert!(outcome.mode.armed() || outcome.motors.0 == Vector4::zeros());

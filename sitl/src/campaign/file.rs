@@ -34,9 +34,10 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campai
         let flights = root.whole(&FLIGHTS)?.ok_or_else(|| root.missing(FLIGHTS.name, "say how many to fly"))?;
         let seed = root.whole(&SEED)?.unwrap_or(1);
         let duration_s = root.number(&DURATION)?;
-        let mut scenario = scenario(&mut root, folder)?;
+        let courses = courses(&mut root, folder)?;
+        let mut scenario = scenario(&mut root, folder, courses.first())?;
         scenario.duration_s = duration_s.unwrap_or(scenario.duration_s);
-        let courses = courses(&mut root, folder, &scenario)?;
+        let courses = if courses.is_empty() { vec![course(scenario.clone())] } else { courses };
         let spreads = match root.table("spread")? {
             Some(table) => spreads(table, &scenario)?,
             None => Vec::new(),
@@ -55,10 +56,10 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campai
     })
 }
 
-/// What is not drawn: a scenario by name, or one written out here.
-fn scenario(root: &mut Table<'_>, folder: &Path) -> Result<Scenario, FileError> {
+/// What is not drawn: a scenario by name, or one written out here, which needs no trajectory if there is a course.
+fn scenario(root: &mut Table<'_>, folder: &Path, course: Option<&Course>) -> Result<Scenario, FileError> {
     if let Some(table) = root.table_if("scenario")? {
-        return file::read(table, "inline");
+        return file::read(table, "own", course.map(|course| &course.trajectory));
     }
     let Some(name) = root.text("scenario")? else {
         return Err(root.missing("scenario", "name a scenario, as in scenario = \"hardware\""));
@@ -66,10 +67,13 @@ fn scenario(root: &mut Table<'_>, folder: &Path) -> Result<Scenario, FileError> 
     named(root, "scenario", name, folder)
 }
 
-/// The references: of the named scenarios, or the scenario's own.
-fn courses(root: &mut Table<'_>, folder: &Path, scenario: &Scenario) -> Result<Vec<Course>, FileError> {
-    let course = |Scenario { name, trajectory, initial, .. }| Course { name, trajectory, initial };
-    let Some(names) = root.texts("trajectories")? else { return Ok(vec![course(scenario.clone())]) };
+fn course(Scenario { name, trajectory, initial, .. }: Scenario) -> Course {
+    Course { name, trajectory, initial }
+}
+
+/// The references of the scenarios that are listed, if there is a list.
+fn courses(root: &mut Table<'_>, folder: &Path) -> Result<Vec<Course>, FileError> {
+    let Some(names) = root.texts("trajectories")? else { return Ok(Vec::new()) };
     let mut courses: Vec<Course> = Vec::new();
     for name in names {
         let next = course(named(root, "trajectories", name, folder)?);

@@ -41,12 +41,14 @@ impl Folder {
             // Some network file systems know no locks: there, two must not be started at once.
             Err(TryLockError::Error(_)) | Ok(()) => {}
         }
-        let own = serde_json::to_string_pretty(&manifest).map_err(|error| place.error(MANIFEST, error.into()))? + "\n";
         match fs::read_to_string(path.join(MANIFEST)) {
-            Ok(found) if serde_json::from_str::<Manifest>(&found).is_ok_and(|found| found == manifest) => {}
+            Ok(found) if serde_json::from_str(&found).is_ok_and(|found| manifest.is_same(&found)) => {}
             Ok(_) => return Err(Error::Changed(path.into())),
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                place.place(MANIFEST, |out| out.write_all(own.as_bytes()))?;
+                place.place(MANIFEST, |out| {
+                    serde_json::to_writer_pretty(&mut *out, &manifest)?;
+                    writeln!(out)
+                })?;
             }
             Err(error) => return Err(damaged(&path.join(MANIFEST), error)),
         }
@@ -106,7 +108,7 @@ impl Folder {
     /// Whether this chunk is there, whole and of this campaign.
     pub(super) fn has_chunk(&self, chunk: usize) -> bool {
         let Ok(rows) = Reader::open(&self.chunk_path(chunk)) else { return false };
-        if rows.manifest() != &self.manifest {
+        if !self.manifest.is_same(rows.manifest()) {
             return false;
         }
         let contenders = &self.manifest.contenders;
@@ -126,7 +128,7 @@ impl Folder {
 
     /// Whether all rows are in one file already.
     pub fn is_complete(&self) -> bool {
-        Reader::open(&self.path.join(RESULTS)).is_ok_and(|rows| rows.manifest() == &self.manifest)
+        Reader::open(&self.path.join(RESULTS)).is_ok_and(|rows| self.manifest.is_same(rows.manifest()))
     }
 
     /// Makes one file of all chunks, if it is not there yet, and shows each of its rows.

@@ -115,9 +115,14 @@ impl Manifest {
         row.numbers.get(drawn.or_else(figure)?).copied().flatten()
     }
 
-    /// Whether `other` is another part of the same campaign, cut in as many.
+    /// Whether `other` is of the same part of the same campaign, whatever the path of its file.
+    pub fn is_same(&self, other: &Manifest) -> bool {
+        self.fingerprint == other.fingerprint && self.shard == other.shard
+    }
+
+    /// Whether `other` is of a part of the same campaign, cut in as many.
     pub fn is_sibling(&self, other: &Manifest) -> bool {
-        Manifest { shard: self.shard, ..other.clone() } == *self && self.shard.of == other.shard.of
+        self.fingerprint == other.fingerprint && self.shard.of == other.shard.of
     }
 }
 

@@ -27,7 +27,9 @@ type Failure = Box<dyn Error>;
 /// laws did and writes logs, figures and a report.
 #[derive(Debug, Parser)]
 #[command(version, args_conflicts_with_subcommands = true, max_term_width = 110)]
-#[command(after_help = "Exit codes: 0 all well; 1 a vehicle was lost; 2 wrong input, or nothing could be written.")]
+#[command(
+    after_help = "Exit codes: 0 all well; 1 a vehicle was lost; 2 wrong input, or nothing could be written; 130 interrupted."
+)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     command: Option<Command>,

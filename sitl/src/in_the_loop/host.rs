@@ -37,7 +37,7 @@ impl Host {
     /// One control tick at `time_us` since power-up: `uplink` reached the link before it. It says that it took `cycles`
     /// cycles of 168 MHz.
     pub fn tick(&mut self, uplink: &[u8], time_us: u64, cycles: u32) -> Tick {
-        onboard::post(&mut self.inbox, &self.comms.receive(uplink));
+        self.inbox.post(&self.comms.receive(uplink));
         let report = self.flight.tick(time_us, &self.inbox.take());
         let mut bytes = Vec::new();
         self.comms.report(&report, cycles, |frame| bytes.extend_from_slice(frame));

@@ -3,7 +3,8 @@
 use super::*;
 use crate::claims::Claim;
 use crate::paper::{Case, Reading, scenario};
-use crate::scenario::ControllerKind;
+use crate::scenario::{Contender, ControllerKind, built_in};
+use afbc::Profile;
 use nalgebra::Vector3;
 use plant::{Environment, Gust, GustKind, Model, ParameterChange, Quantity};
 use std::collections::{BTreeMap, HashSet};
@@ -225,4 +226,32 @@ fn an_error_names_the_path_and_the_cure() {
     fs::write(scratch.0.join("file"), "").unwrap();
     let error = write(&scratch.0.join("file"), &[], &[]).unwrap_err().to_string();
     assert!(error.contains("file: ") && error.contains("--out"), "{error}");
+}
+
+#[test]
+fn real_flights_of_many_contenders_leave_everything() {
+    let mut scenario = Scenario { duration_s: 6.0, ..built_in("storm").unwrap().scenario().unwrap() };
+    let named = |name: &str| Contender { name: name.into(), ..Contender::of(ControllerKind::Pid, Profile::Flight) };
+    scenario.contenders.truncate(1);
+    scenario.contenders.extend(["pid", "a/b", "a b", "<&\"'> δ = 0 of thirty-two."].map(named));
+    let fly = |contender| Flown { run: Run::fly(&scenario, contender, 9).unwrap(), scenario: scenario.clone() };
+    let flown: Vec<_> = scenario.contenders.iter().map(fly).collect();
+    let scratch = Scratch::new("many");
+    write(&scratch.0, &flown, &[]).unwrap();
+    let files = scratch.files();
+    assert_eq!(files.keys().filter(|name| name.ends_with(".csv")).count(), 5);
+    assert_eq!(check_svgs(&files), 5);
+    for name in ["storm-afbc.csv", "storm-a-b.csv", "storm-a-b-2.csv"] {
+        assert!(files.contains_key(name), "{name} of {:?}", files.keys());
+    }
+    let header = |name: &str| files[name].split(|byte| *byte == b'\n').next().unwrap().to_vec();
+    let has = |name: &str, column: &str| header(name).split(|byte| *byte == b',').any(|c| c == column.as_bytes());
+    for column in ["rotor1_rad_s", "wind_x_m_s", "battery_v", "x_measured_m", "measurement_fresh"] {
+        assert!(has("storm-afbc.csv", column) && has("storm-pid.csv", column), "{column}");
+    }
+    assert!(has("storm-afbc.csv", "delta_hat_z_n") && !has("storm-pid.csv", "delta_hat_z_n"));
+    let text = table(&flown, &[]);
+    assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+    let report = str::from_utf8(&files["report.html"]).unwrap();
+    assert!(report.contains("position_p_1_s") && report.contains("rotor 2 at 90 %") && report.contains("Dryden"));
 }

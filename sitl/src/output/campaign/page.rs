@@ -34,16 +34,21 @@ fn results(summary: &Summary) -> Markup {
     html! {
         table {
             thead {
-                tr { td {} @for (group, columns) in HEADS { th colspan=(columns.len()) { (group) } } }
+                tr { td {} @for (group, columns) in HEADS { th colspan=(columns.len()) { (unbroken(group)) } } }
                 tr { td {} @for (_, columns) in HEADS { @for column in columns { th scope="col" { (column) } } } }
             }
             tbody {
                 @for tally in &summary.tallies {
-                    tr { th scope="row" { (tally.contender) } @for cell in cells(tally) { td { (cell) } } }
+                    tr { th scope="row" { (unbroken(&tally.contender)) } @for cell in cells(tally) { td { (unbroken(&cell)) } } }
                 }
             }
         }
     }
+}
+
+/// Text that stays on one line.
+fn unbroken(text: &str) -> String {
+    text.replace(' ', "\u{a0}").replace('-', "\u{2011}")
 }
 
 fn by_trajectory(summary: &Summary) -> Markup {

@@ -16,6 +16,7 @@ use super::error::{FileError, Source};
 use super::reader::Table;
 use super::words::out_of_range;
 use super::{Contender, DURATION, Scenario};
+use crate::trajectory::Trajectory;
 use airframe::{Parameters, Range};
 use plant::Model;
 use std::fs::File;
@@ -68,7 +69,7 @@ pub(crate) fn text(path: &Path, kind: &str) -> Result<String, FileError> {
 /// # Errors
 /// One line on the first thing that is wrong.
 pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> {
-    document(file, text, "scenarios hover", |root| read(root, name))
+    document(file, text, "scenarios hover", |root| read(root, name, None))
 }
 
 /// Lets `read` make something of the `text` of a TOML file; `sitl SAMPLE` prints one that is right.
@@ -97,8 +98,8 @@ pub(crate) fn title(root: &mut Table<'_>, name: &str) -> Result<[String; 2], Fil
     Ok([name, description])
 }
 
-/// The scenario in `root`; `name` is its name if it gives none itself.
-pub(crate) fn read(mut root: Table<'_>, name: &str) -> Result<Scenario, FileError> {
+/// The scenario in `root`; `name` and `trajectory` are its own if it gives none itself.
+pub(crate) fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) -> Result<Scenario, FileError> {
     let [name, description] = title(&mut root, name)?;
     let duration_s = root.number(&DURATION)?.unwrap_or(DURATION_S);
     let models = [Model::Simplified, Model::RigidBody];
@@ -108,10 +109,14 @@ pub(crate) fn read(mut root: Table<'_>, name: &str) -> Result<Scenario, FileErro
     let vehicle = vehicle::read(root.table("vehicle")?, Parameters::PAPER)?;
     let truth = vehicle::read(root.table("truth")?, vehicle)?;
     let contenders = contenders::read(&mut root)?;
-    let Some(table) = root.table("trajectory")? else {
-        return Err(root.missing("trajectory", "add [trajectory] with kind = \"hover\" and position_m = [0, 0, 1]"));
+    let trajectory = match (root.table("trajectory")?, trajectory) {
+        (Some(table), _) => trajectory::read(table)?,
+        (None, Some(trajectory)) => trajectory.clone(),
+        (None, None) => {
+            let cure = "add [trajectory] with kind = \"hover\" and position_m = [0, 0, 1]";
+            return Err(root.missing("trajectory", cure));
+        }
     };
-    let trajectory = trajectory::read(table)?;
     let initial = motion::initial(root.table("initial")?, &trajectory.at(0.0))?;
     let environment = environment::read(&mut root, truth)?;
     let step_s = contenders.first().map_or(afbc::cascade::DT.max, Contender::step_s);

@@ -1,10 +1,13 @@
 //! Built-in scenarios against the code, and `docs/scenarios.md` against both.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 use super::parse;
 use crate::paper::{self, Case};
-use crate::scenario::{BUILT_IN, FileError, Scenario, built_in};
+use crate::scenario::{BUILT_IN, Contender, FileError, Law, Scenario, built_in};
+use afbc::adaptive::Gains;
+use afbc::{Profile, Settings};
+use peers::pid;
 use plant::Model;
 
 #[test]
@@ -114,4 +117,60 @@ fn documented_defaults_are_those_of_the_code() {
         }
     }
     assert!(checked > 35, "{checked}");
+}
+
+/// Whatever is done to a line of a file, either it is still a scenario that can be flown, or one line says what is wrong.
+#[test]
+fn damaged_files_get_one_line() {
+    let values =
+        ["", "nan", "-1e300", "1e300", "\"\\n\"", "[]", "{}", "true", "[0, 0]", "1979-05-27", "{ a.b = [[1]] }"];
+    let (mut refused, mut accepted) = (0, 0);
+    for built_in in BUILT_IN {
+        let lines: Vec<_> = built_in.text.lines().collect();
+        for (at, line) in lines.iter().enumerate() {
+            let key = line.split_once(" = ").map(|(key, _)| key);
+            let mut damaged: Vec<_> = key.map_or(Vec::new(), |key| values.map(|v| format!("{key} = {v}")).to_vec());
+            damaged.extend([
+                String::new(),
+                format!("{line}\n{line}"),
+                line.chars().rev().collect(),
+                format!("x{line}"),
+            ]);
+            for damaged in damaged {
+                let text = [&lines[..at], &[damaged.as_str()], &lines[at + 1..]].concat().join("\n");
+                match parse("damaged", &text, "damaged") {
+                    Ok(scenario) => {
+                        scenario.check().unwrap();
+                        accepted += 1;
+                    }
+                    Err(error) => {
+                        let error = error.to_string();
+                        assert!(error.starts_with("damaged:") && !error.contains('\n'), "{error}");
+                        refused += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(refused > 3000 && accepted > 300, "{refused} refused, {accepted} accepted");
+}
+
+#[test]
+fn contenders_start_from_the_file_or_from_a_profile() {
+    let text = "controllers = [\"afbc\"]\n[gains.z]\ngamma = 5.0\n[settings]\ndt_s = 0.002\nrotor_force_max_n = 4.0\n\
+                [[contender]]\nname = \"file\"\ncontroller = \"afbc\"\ngains.z.eta = 0.1\n\
+                [[contender]]\nname = \"flight\"\ncontroller = \"afbc\"\nprofile = \"flight\"\nmonitor = true\n\
+                [[contender]]\nname = \"pid\"\ncontroller = \"pid\"\ngains.tilt_p_1_s = 9.0\n";
+    let contenders = example(text).unwrap().contenders;
+    let [short, file, flight, pid] = contenders.as_slice() else { panic!("{contenders:?}") };
+    let z = |contender: &Contender| contender.gains().unwrap().z;
+    let paper = Profile::Paper.gains().z;
+    assert_eq!((short.name.as_str(), z(short)), ("afbc", Gains { gamma: 5.0, ..paper }));
+    assert_eq!(z(file), Gains { gamma: 5.0, eta: 0.1, ..paper });
+    assert_eq!(flight.law, Law::Guarded(Profile::Flight.gains()));
+    assert_eq!(flight.settings, Settings { dt_s: 0.002, ..Profile::Flight.settings() });
+    let tuned = pid::Gains { tilt_p_1_s: 9.0, ..pid::Gains::PAPER_VEHICLE };
+    assert_eq!((pid.law, pid.settings), (Law::Pid(tuned), short.settings));
+    // Without controllers, a contender is alone.
+    assert_eq!(example("[[contender]]\nname = \"a\"\ncontroller = \"indi\"\n").unwrap().contenders.len(), 1);
 }

@@ -1,0 +1,182 @@
+//! What the tests of the law share: anything that a sensor, a link or a file of settings may say, and what a step owes.
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    reason = "each test uses its own share; what cannot be built must stop the test"
+)]
+
+use afbc::adaptive::{EPSILON, ETA, GAMMA, Gains};
+use afbc::allocation::FORCE_MAX;
+use afbc::backstepping::{ALPHA1, ALPHA2};
+use afbc::cascade::DT;
+use afbc::command_filter::BANDWIDTH;
+use afbc::fuzzy::Membership;
+use afbc::limits::{ACCELERATION, CLIMB, SPEED, TILT, TILT_RATE};
+use afbc::safeguards::{DEAD_ZONE, DELTA_MAX, KAPPA, SIGMA, THETA_MAX};
+use afbc::{Command, Limits, Profile, Safeguards, Settings};
+use airframe::{Axis, Parameters, PerAxis, Range, Setpoint, State};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+/// Rounding error of one `f32` operation, relative.
+pub(crate) const U: f64 = 1.0 / (1 << 24) as f64;
+
+/// A value that a sensor or a link may deliver: mostly of flight's size, often anything at all.
+pub(crate) fn value() -> impl Strategy<Value = f32> {
+    let edges = [
+        f32::NAN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::MAX,
+        f32::MIN,
+        f32::MIN_POSITIVE,
+        1e5,
+        -1e5,
+        1e3,
+        -1e3,
+        0.0,
+        -0.0,
+    ];
+    prop_oneof![
+        30 => -3.0_f32..3.0,
+        4 => -1e3_f32..=1e3,
+        1 => prop::sample::select(edges.to_vec()),
+        1 => prop::num::f32::ANY,
+    ]
+}
+
+/// A value that is always plausible.
+pub(crate) fn plausible() -> impl Strategy<Value = f32> {
+    prop_oneof![4 => -3.0_f32..3.0, 1 => -1e3_f32..=1e3]
+}
+
+pub(crate) fn vector(value: BoxedStrategy<f32>) -> impl Strategy<Value = Vector3<f32>> {
+    (value.clone(), value.clone(), value).prop_map(|(x, y, z)| Vector3::new(x, y, z))
+}
+
+pub(crate) fn state<S: Strategy<Value = f32> + 'static>(value: fn() -> S) -> impl Strategy<Value = State> {
+    (vector(value().boxed()), vector(value().boxed()), vector(value().boxed()), vector(value().boxed())).prop_map(
+        |(position_m, velocity_m_s, attitude_rad, rates_rad_s)| State {
+            position_m,
+            velocity_m_s,
+            attitude_rad,
+            rates_rad_s,
+        },
+    )
+}
+
+pub(crate) fn setpoint<S: Strategy<Value = f32> + 'static>(value: fn() -> S) -> impl Strategy<Value = Setpoint> {
+    (vector(value().boxed()), vector(value().boxed()), vector(value().boxed()), vector(value().boxed())).prop_map(
+        |(position_m, velocity_m_s, acceleration_m_s2, yaw)| Setpoint {
+            position_m,
+            velocity_m_s,
+            acceleration_m_s2,
+            yaw_rad: yaw.x,
+            yaw_rate_rad_s: yaw.y,
+            yaw_acceleration_rad_s2: yaw.z,
+        },
+    )
+}
+
+/// A value anywhere in `range`, its bounds drawn often.
+pub(crate) fn within(range: Range) -> impl Strategy<Value = f32> {
+    let (min, max) = (range.min as f32, range.max as f32);
+    prop_oneof![4 => min..=max, 1 => Just(min), 1 => Just(max)]
+}
+
+/// A value anywhere in `range`, evenly over its orders of magnitude from a millionth of its end on, its bounds drawn often.
+pub(crate) fn spread(range: Range) -> impl Strategy<Value = f32> {
+    let (min, max) = (range.min.max(1e-6 * range.max), range.max);
+    prop_oneof![
+        4 => (min.ln()..=max.ln()).prop_map(move |x| x.exp().clamp(min, max) as f32),
+        1 => Just(range.min as f32),
+        1 => Just(range.max as f32),
+    ]
+}
+
+pub(crate) fn limits() -> impl Strategy<Value = Limits> {
+    let any = (spread(TILT), spread(TILT_RATE), spread(ACCELERATION), spread(SPEED), spread(CLIMB)).prop_map(
+        |(tilt_max_rad, tilt_rate_max_rad_s, acceleration_max_m_s2, speed_max_m_s, climb_max_m_s)| Limits {
+            tilt_max_rad,
+            tilt_rate_max_rad_s,
+            acceleration_max_m_s2,
+            speed_max_m_s,
+            climb_max_m_s,
+        },
+    );
+    prop_oneof![1 => Just(Limits::NONE), 1 => Just(Profile::Flight.settings().limits), 4 => any]
+}
+
+pub(crate) fn safeguards() -> impl Strategy<Value = Safeguards> {
+    let leakage = (spread(SIGMA), spread(KAPPA));
+    let bounds = (spread(THETA_MAX), spread(DELTA_MAX));
+    let any = (leakage, bounds, spread(DEAD_ZONE)).prop_map(|((sigma, kappa), (theta_max, delta_max), dead_zone)| {
+        Safeguards { sigma, kappa, theta_max, delta_max, dead_zone }
+    });
+    prop_oneof![1 => Just(Safeguards::NONE), 4 => any]
+}
+
+pub(crate) fn settings() -> impl Strategy<Value = Settings> {
+    let numbers = (within(DT), within(BANDWIDTH), within(FORCE_MAX), limits());
+    let any = (numbers, any::<[bool; 4]>()).prop_map(|(numbers, switches)| {
+        let (dt_s, command_filter_rad_s, rotor_force_max_n, limits) = numbers;
+        let [tilt_by_thrust, heed_saturation, heed_ground, bumpless] = switches;
+        Settings {
+            dt_s,
+            command_filter_rad_s,
+            rotor_force_max_n,
+            limits,
+            tilt_by_thrust,
+            heed_saturation,
+            heed_ground,
+            bumpless,
+        }
+    });
+    prop_oneof![Just(Profile::Paper.settings()), Just(Profile::Flight.settings()), any]
+}
+
+/// One set of gains for one subsystem.
+pub(crate) fn gains_of_one() -> impl Strategy<Value = Gains> {
+    let membership = (1e-3_f32..100.0, 0.1_f32..=6.0);
+    (within(ALPHA1), within(ALPHA2), within(GAMMA), within(ETA), within(EPSILON), membership, safeguards())
+        .prop_map(|(alpha1, alpha2, gamma, eta, epsilon, (width, spread), safeguards)| Gains {
+            backstepping: afbc::backstepping::Gains { alpha1, alpha2 },
+            gamma,
+            eta,
+            epsilon,
+            membership: Membership { centre: (width * spread).max(1e-3), width },
+            safeguards,
+        })
+        .prop_filter("accepted", |gains| gains.validate().is_ok())
+}
+
+/// One set of gains for all six subsystems, or a profile's.
+pub(crate) fn gains() -> impl Strategy<Value = PerAxis<Gains>> {
+    prop_oneof![
+        Just(Profile::Paper.gains()),
+        Just(Profile::Flight.gains()),
+        gains_of_one().prop_map(|gains| PerAxis::from_fn(|_| gains)),
+    ]
+}
+
+/// What every step owes: speeds and forces within the rotors' limits, everything finite.
+pub(crate) fn check_command(command: &Command, settings: &Settings) -> Result<(), TestCaseError> {
+    let limit = settings.rotor_force_max_n;
+    let fastest = (f64::from(limit) / Parameters::PAPER.thrust_factor_n_s2).sqrt() * (1.0 + 2e-7);
+    prop_assert!(command.forces.0.iter().all(|f| (0.0..=limit).contains(f)), "{command:?}");
+    prop_assert!(command.speeds.0.iter().all(|w| (0.0..=fastest).contains(&f64::from(*w))), "{command:?}");
+    let u = &command.inputs;
+    let numbers = [u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n]
+        .into_iter()
+        .chain(command.virtual_m_s2)
+        .chain(command.desired_rad)
+        .chain(command.filtered.iter().flat_map(|f| [f.angle, f.rate]))
+        .chain(Axis::ALL.iter().flat_map(|axis| {
+            let errors = command.errors.get(*axis);
+            [errors.e1, errors.e1_dot, errors.e2]
+        }));
+    for number in numbers {
+        prop_assert!(number.is_finite(), "{command:?}");
+    }
+    Ok(())
+}

@@ -1,0 +1,95 @@
+//! Standing on the ground: told from the thrust that is wanted and from motion, and nothing is learnt meanwhile.
+#![allow(clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
+
+use afbc::ground::{Ground, LIFT_SHARE, STILL_M_S, STILL_S};
+use afbc::{Adaptive, Controller, FlightController, Memory, Profile, Settings};
+use airframe::{Parameters, Setpoint, State};
+use nalgebra::{Vector3, Vector4};
+use proptest::prelude::*;
+
+const DT_S: f32 = 0.001;
+const WEIGHT_N: f32 = 4.77;
+
+/// Whether a vehicle that has been so for `steps` stands.
+fn stands(thrust_n: f32, velocity_m_s: Vector3<f32>, steps: usize) -> bool {
+    let mut ground = Ground::default();
+    for _ in 0..steps {
+        ground.advance(thrust_n, WEIGHT_N, &velocity_m_s, DT_S);
+    }
+    ground.standing()
+}
+
+proptest! {
+    #[test]
+    fn only_a_still_vehicle_with_little_thrust_stands(
+        share in 0.0_f32..2.0, x in -0.2_f32..0.2, y in -0.2_f32..0.2, z in -0.2_f32..0.2, steps in 0_usize..1000,
+    ) {
+        prop_assume!((steps as f32 * DT_S - STILL_S).abs() > 2.0 * DT_S);
+        let still = [x, y, z].iter().all(|v| v.abs() < STILL_M_S);
+        let expected = share * WEIGHT_N < LIFT_SHARE * WEIGHT_N && still && steps as f32 * DT_S > STILL_S;
+        prop_assert_eq!(stands(share * WEIGHT_N, Vector3::new(x, y, z), steps), expected);
+    }
+}
+
+#[test]
+fn a_light_vehicle_that_hovers_does_not_stand_and_one_that_lifts_off_no_longer() {
+    // 60 % of the weight that the controller was told.
+    assert!(!stands(0.6 * WEIGHT_N, Vector3::zeros(), 10_000));
+    let mut ground = Ground::default();
+    for _ in 0..1000 {
+        ground.advance(0.0, WEIGHT_N, &Vector3::zeros(), DT_S);
+    }
+    assert!(ground.standing());
+    let mut moving = ground;
+    moving.advance(0.0, WEIGHT_N, &Vector3::new(0.0, -0.49, 0.0), DT_S);
+    assert!(moving.standing(), "it rocks");
+    moving.advance(0.0, WEIGHT_N, &Vector3::new(0.0, 0.0, -0.51), DT_S);
+    ground.advance(0.5 * WEIGHT_N, WEIGHT_N, &Vector3::zeros(), DT_S);
+    assert!(!ground.standing() && !moving.standing());
+}
+
+/// A vehicle on the ground whose setpoint is below it, until it is raised.
+#[test]
+fn estimates_freeze_on_the_ground_and_thaw_on_lift() {
+    let setpoint = |z| Setpoint { position_m: Vector3::new(0.3, 0.0, z), ..Setpoint::default() };
+    let fly = |heed_ground| {
+        let settings = Settings { heed_ground, ..Profile::Flight.settings() };
+        let law = Adaptive::new(Profile::Flight.gains()).unwrap();
+        let controller = Controller::new(Parameters::PAPER.to_f32(), settings, law).unwrap();
+        let mut memory = Memory::default();
+        [(-1.0, 300), (-1.0, 3000), (1.0, 1), (1.0, 100)].map(|(z, steps)| {
+            for _ in 0..steps {
+                controller.step(&mut memory, &State::default(), &setpoint(z));
+            }
+            memory.control.estimates
+        })
+    };
+    let [stood, still_standing, asked, lifted] = fly(true);
+    assert_eq!(stood, still_standing);
+    // The step that asks for lift is still one from the ground; the next is not.
+    assert_eq!(asked, stood);
+    assert!(lifted.z != stood.z && lifted.x != stood.x);
+    let [stood, still_standing, ..] = fly(false);
+    assert_ne!(stood, still_standing, "nothing to freeze");
+}
+
+/// However far aside its setpoint is and however tilted it stands: no moment tips the vehicle over, until it is to lift.
+#[test]
+fn a_standing_vehicle_is_not_tipped_over() {
+    let law = Adaptive::new(Profile::Flight.gains()).unwrap();
+    let controller = Controller::new(Parameters::PAPER.to_f32(), Profile::Flight.settings(), law).unwrap();
+    let state = State { attitude_rad: Vector3::new(0.1, -0.05, 0.3), ..State::default() };
+    let mut memory = Memory::default();
+    let mut forces = |z, steps| {
+        let setpoint = Setpoint { position_m: Vector3::new(2.0, -1.0, z), ..Setpoint::default() };
+        let mut forces = Vector4::zeros();
+        for _ in 0..steps {
+            forces = controller.step(&mut memory, &state, &setpoint).forces.0;
+        }
+        forces
+    };
+    let spread = |forces: Vector4<f32>| forces.max() - forces.min();
+    assert!(spread(forces(-0.4, 100)) > 0.1);
+    assert_eq!(forces(-0.4, 200), Vector4::zeros());
+    assert!(spread(forces(0.4, 2)) > 0.1);
+}

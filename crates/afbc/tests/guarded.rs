@@ -1,0 +1,230 @@
+//! AFBC under its monitor: what every step owes, the hand-over to the fallback and back, and that only a command leads
+//! back. Flown against a plant in `tests/tests/guarded.rs`.
+#![allow(clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
+
+mod common;
+
+use afbc::adaptive::Estimate;
+use afbc::monitor::{Bounds, Trip};
+use afbc::{Adaptive, Command, Controller, FlightController, Guarded, Health, Memory, Profile, guarded};
+use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
+use common::{U, check_command, gains, plausible, setpoint, settings, state, value};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+/// What a flight remembers.
+type Flight = Memory<guarded::Memory>;
+
+const WEIGHT_N: f32 = 0.486 * 9.81;
+
+fn guarded(bounds: Bounds) -> Guarded {
+    Guarded::new(Parameters::PAPER.to_f32(), Profile::Flight.settings(), Profile::Flight.gains(), bounds).unwrap()
+}
+
+fn bounds() -> Bounds {
+    Bounds::new(&Profile::Flight.gains(), WEIGHT_N)
+}
+
+/// Bounds that the first step breaks: V_e above nothing at all.
+fn hair_trigger() -> Bounds {
+    Bounds { lyapunov: PerAxis { roll: 0.0, ..bounds().lyapunov }, ..bounds() }
+}
+
+/// Bounds that nothing breaks.
+fn lax() -> Bounds {
+    let most = PerAxis::from_fn(|_| 1e9);
+    Bounds { theta: most, delta: most, lyapunov: most, saturation_share: 1.0, swing_n: 1e4, swings_hz: 1e4 }
+}
+
+/// A state whose errors are not zero, and whose fallback stays within its integral's bounds.
+fn near() -> impl Strategy<Value = State> {
+    prop::array::uniform12(-0.05_f32..0.05).prop_map(|[x, y, z, u, v, w, a, b, c, p, q, r]| State {
+        position_m: Vector3::new(x, y, z),
+        velocity_m_s: Vector3::new(u, v, w),
+        attitude_rad: Vector3::new(a, b, c),
+        rates_rad_s: Vector3::new(p, q, r),
+    })
+}
+
+/// Bumpless up to rounding: a few operations on numbers of this size.
+fn same(before: &Command, after: &Command) -> Result<(), TestCaseError> {
+    let (before, after) = (before.per_axis(), after.per_axis());
+    for axis in Axis::ALL {
+        let (before, after) = (f64::from(*before.get(axis)), f64::from(*after.get(axis)));
+        prop_assert!((before - after).abs() <= 16.0 * U * (before.abs() + 20.0), "{axis:?}: {before}, then {after}");
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Whatever arrives, tripped or not, engaged or not: finite commands within limits, and the screen's flags.
+    #[test]
+    fn whatever_it_is_given_the_motors_get_something_they_can_do(
+        gains in gains(), settings in settings(), trips: bool,
+        inputs in prop::collection::vec((state(value), setpoint(value), prop::bool::weighted(0.1)), 50),
+    ) {
+        let bounds = if trips { Bounds { lyapunov: PerAxis::from_fn(|_| 1.0), ..lax() } } else { Bounds::new(&gains, WEIGHT_N) };
+        let controller = Guarded::new(Parameters::PAPER.to_f32(), settings, gains, bounds).unwrap();
+        let mut memory = Flight::default();
+        for (state, setpoint, engage) in inputs {
+            if engage {
+                controller.engage(&mut memory.control);
+                prop_assert_eq!(memory.control.trip(), None);
+            }
+            let tripped = memory.control.trip();
+            let command = controller.step(&mut memory, &state, &setpoint);
+            check_command(&command, &settings)?;
+            prop_assert_eq!(command.health.trip, tripped);
+            prop_assert_eq!(command.health.state_rejected, !state.is_plausible());
+            prop_assert_eq!(command.health.setpoint_rejected, !setpoint.is_plausible());
+            prop_assert!(tripped.is_none() || memory.control.trip() == tripped, "re-engaged by itself");
+            let learnt = Guarded::learnt(&memory.control);
+            prop_assert!(Axis::ALL.iter().all(|axis| learnt.get(*axis).theta.iter().all(|theta| theta.is_finite())));
+        }
+    }
+
+    /// Until it trips, it is AFBC to the bit; and engaging changes nothing.
+    #[test]
+    fn untripped_it_is_the_law(inputs in prop::collection::vec((state(plausible), setpoint(plausible)), 50)) {
+        let controller = guarded(lax());
+        let law = Controller::new(Parameters::PAPER.to_f32(), Profile::Flight.settings(), Adaptive::new(Profile::Flight.gains()).unwrap()).unwrap();
+        let (mut memory, mut other) = (Flight::default(), Memory::default());
+        for (state, setpoint) in inputs {
+            controller.engage(&mut memory.control);
+            let command = controller.step(&mut memory, &state, &setpoint);
+            prop_assert_eq!(command, law.step(&mut other, &state, &setpoint));
+            prop_assert_eq!(Guarded::learnt(&memory.control), other.control.estimates);
+        }
+        prop_assert_eq!(memory.control.trip(), None);
+    }
+
+    /// At one and the same state the three steps around a trip, and those around engaging again, want the same inputs:
+    /// AFBC's last, the fallback's first; the fallback's last, AFBC's first.
+    #[test]
+    fn hand_over_is_bumpless_there_and_back(state in near(), setpoint in near(), lasting in 0_usize..300) {
+        let setpoint = Setpoint { position_m: setpoint.position_m, velocity_m_s: setpoint.velocity_m_s, ..Setpoint::default() };
+        let controller = guarded(hair_trigger());
+        let mut memory = Flight::default();
+        let last_of_afbc = controller.step(&mut memory, &state, &setpoint);
+        prop_assert_eq!((last_of_afbc.health.trip, memory.control.trip()), (None, Some(Trip::Lyapunov(Axis::Roll))));
+
+        // Engaged at once, before the fallback has flown.
+        let mut at_once = memory;
+        controller.engage(&mut at_once.control);
+        let first_of_afbc = controller.step(&mut at_once, &state, &setpoint);
+        prop_assert_eq!(first_of_afbc.health.trip, None);
+        position_is_the_same(&last_of_afbc, &first_of_afbc)?;
+
+        let mut last_of_fallback = controller.step(&mut memory, &state, &setpoint);
+        prop_assert_eq!(last_of_fallback.health.trip, memory.control.trip());
+        position_is_the_same(&last_of_afbc, &last_of_fallback)?;
+        for _ in 0..lasting {
+            last_of_fallback = controller.step(&mut memory, &state, &setpoint);
+        }
+        controller.engage(&mut memory.control);
+        let first_of_afbc = controller.step(&mut memory, &state, &setpoint);
+        prop_assert_eq!((first_of_afbc.health.trip, memory.control.trip().is_some()), (None, true));
+        position_is_the_same(&last_of_fallback, &first_of_afbc)?;
+    }
+
+    /// The same for attitude, whose reference moves on from step to step: held where it is by a filter at rest.
+    #[test]
+    fn hand_over_at_rest_is_bumpless_in_all_axes(height in -0.2_f32..0.2, yaw in -0.2_f32..0.2) {
+        let state = State { position_m: Vector3::new(0.0, 0.0, height), attitude_rad: Vector3::new(0.0, 0.0, yaw), ..State::default() };
+        let controller = guarded(Bounds { lyapunov: PerAxis { z: 0.0, ..bounds().lyapunov }, ..bounds() });
+        let mut memory = Flight::default();
+        let mut commands = Vec::new();
+        while memory.control.trip().is_none() && commands.len() < 12 {
+            commands.push(controller.step(&mut memory, &state, &Setpoint::default()));
+        }
+        prop_assume!(memory.control.trip() == Some(Trip::Lyapunov(Axis::Z)));
+        let before = *commands.last().unwrap();
+        let mut after = controller.step(&mut memory, &state, &Setpoint::default());
+        same(&before, &after)?;
+        for _ in 0..100 {
+            after = controller.step(&mut memory, &state, &Setpoint::default());
+        }
+        controller.engage(&mut memory.control);
+        same(&after, &controller.step(&mut memory, &state, &Setpoint::default()))?;
+    }
+}
+
+/// z, x, y and yaw: at one and the same state and setpoint, nothing that they track moves on its own.
+fn position_is_the_same(before: &Command, after: &Command) -> Result<(), TestCaseError> {
+    let only = |command: &Command| {
+        let mut command = *command;
+        (command.inputs.roll_n, command.inputs.pitch_n) = (0.0, 0.0);
+        command
+    };
+    same(&only(before), &only(after))
+}
+
+/// A fallback whose integral may not go as far as the last input stops at its bound: bounded before bumpless.
+#[test]
+fn the_fallback_takes_over_no_more_than_its_bound() {
+    let gains = Profile::Flight.gains();
+    let controller = guarded(hair_trigger());
+    let mut memory = Flight::default();
+    let state = State { attitude_rad: Vector3::new(0.3, 0.0, 0.0), ..State::default() };
+    // The filter starts at the attitude and is led back to level: errors, and AFBC's first steps.
+    let mut steps = 0;
+    while memory.control.trip().is_none() {
+        controller.step(&mut memory, &state, &Setpoint::default());
+        steps += 1;
+        assert!(steps < 100);
+    }
+    for _ in 0..50_000 {
+        let command = controller.step(&mut memory, &state, &Setpoint::default());
+        let bound = gains.roll.safeguards.theta_max + 10.0;
+        assert!(command.inputs.roll_n.abs() < bound, "{}", command.inputs.roll_n);
+    }
+}
+
+/// Standing on the ground with a setpoint below it is no fault, however long it takes and whatever saturates.
+#[test]
+fn the_ground_does_not_trip() {
+    let controller = guarded(bounds());
+    let mut memory = Flight::default();
+    let below = Setpoint { position_m: Vector3::new(0.0, 0.0, -1.0), ..Setpoint::default() };
+    for _ in 0..20_000 {
+        let command = controller.step(&mut memory, &State::default(), &below);
+        assert!(command.health.saturated);
+    }
+    assert_eq!(memory.control.trip(), None);
+    // The same in the air, sinking: it is one.
+    let sinking = State { velocity_m_s: Vector3::new(0.0, 0.0, -0.5), ..State::default() };
+    for _ in 0..5_000 {
+        controller.step(&mut memory, &sinking, &below);
+    }
+    assert_eq!(memory.control.trip(), Some(Trip::Saturation));
+}
+
+#[test]
+fn a_tripped_controller_learns_nothing_and_says_why() {
+    let controller = guarded(hair_trigger());
+    let mut memory = Flight::default();
+    let state = State { attitude_rad: Vector3::new(0.1, 0.0, 0.0), ..State::default() };
+    let setpoint = Setpoint { position_m: Vector3::new(0.3, 0.0, 0.2), ..Setpoint::default() };
+    while memory.control.trip().is_none() {
+        controller.step(&mut memory, &state, &setpoint);
+    }
+    let learnt: PerAxis<Estimate> = Guarded::learnt(&memory.control);
+    for _ in 0..1000 {
+        let health = controller.step(&mut memory, &state, &setpoint).health;
+        assert_eq!(health, Health { trip: memory.control.trip(), saturated: health.saturated, ..Health::default() });
+    }
+    assert_eq!(Guarded::learnt(&memory.control), learnt);
+}
+
+#[test]
+fn bounds_and_gains_out_of_range_are_refused_by_name() {
+    let (vehicle, settings, gains) = (Parameters::PAPER.to_f32(), Profile::Flight.settings(), Profile::Flight.gains());
+    let name = |settings, gains, bounds| Guarded::new(vehicle, settings, gains, bounds).unwrap_err().range.name;
+    assert_eq!(name(settings, gains, Bounds { swing_n: 0.0, ..bounds() }), "swing_n");
+    let mut bad = gains;
+    bad.z.gamma = f32::NAN;
+    assert_eq!(name(settings, bad, bounds()), "gamma");
+    assert_eq!(name(afbc::Settings { dt_s: 0.0, ..settings }, gains, bounds()), "dt_s");
+}

@@ -1,0 +1,205 @@
+//! What the cascade may ask of the vehicle, for every limit that is accepted and every plausible state and setpoint.
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
+
+mod common;
+
+use afbc::backstepping::Errors;
+use afbc::integral::IntegralBackstepping;
+use afbc::{Adaptive, Backstepping, Command, Controller, FlightController, Limits, Memory, Profile, Settings};
+use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
+use common::{U, gains, limits, plausible, setpoint, settings, state};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+const GRAVITY_M_S2: f64 = 9.81;
+const WEIGHT_N: f32 = 0.486 * 9.81;
+
+/// Error of a rotation by the yaw angle: sine and cosine are off by up to 1.2e-3.
+const ROTATION: f64 = 3e-3;
+
+fn adaptive(gains: PerAxis<afbc::adaptive::Gains>, settings: Settings) -> Controller<Adaptive> {
+    Controller::new(Parameters::PAPER.to_f32(), settings, Adaptive::new(gains).unwrap()).unwrap()
+}
+
+fn flight(limits: Limits) -> Controller<Adaptive> {
+    adaptive(Profile::Flight.gains(), Settings { limits, ..Profile::Flight.settings() })
+}
+
+/// Tangent of the angle between vertical and thrust in the desired attitude.
+fn tilt_tangent(command: &Command) -> f64 {
+    let [phi, theta] = command.desired_rad.map(f64::from);
+    let cosine = phi.cos() * theta.cos();
+    // By 1 - cos^2 = sin^2 phi + cos^2 phi sin^2 theta, which keeps its digits near zero.
+    (phi.sin().powi(2) + (phi.cos() * theta.sin()).powi(2)).sqrt() / cosine
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn tilt_and_tilt_rate_stay_within_their_limits(
+        gains in gains(), settings in settings(), inputs in prop::collection::vec((state(plausible), setpoint(plausible)), 20),
+    ) {
+        let controller = adaptive(gains, settings);
+        let mut memory = Memory::default();
+        let Limits { tilt_max_rad, tilt_rate_max_rad_s, .. } = settings.limits;
+        let tangent_max = f64::from(tilt_max_rad).tan() * (1.0 + ROTATION);
+        let rate_max = f64::from(tilt_rate_max_rad_s);
+        let mut before = None;
+        for (state, setpoint) in inputs {
+            let command = controller.step(&mut memory, &state, &setpoint);
+            let tangent = tilt_tangent(&command);
+            // 90 degrees is 1.5708, and the tangent there ill-conditioned.
+            prop_assert!(tangent <= tangent_max * (1.0 + 4.0 * U * tangent_max), "{tangent} beyond {tangent_max}");
+            for (now, then) in command.filtered.iter().zip(before.unwrap_or(command.filtered)) {
+                prop_assert!(f64::from(now.rate).abs() <= rate_max, "{now:?}");
+                let travel = (f64::from(now.angle) - f64::from(then.angle)).abs();
+                let rounding = 4.0 * U * (f64::from(then.angle).abs() + 1.0);
+                prop_assert!(travel <= rate_max * f64::from(settings.dt_s) * (1.0 + 4.0 * U) + rounding, "{travel} rad in a step");
+            }
+            before = Some(command.filtered);
+        }
+    }
+
+    /// (40) makes of (u5, u6), cut to its limits, the accelerations meant: with the vertical part of the thrust that is
+    /// commanded, along the same direction, at any yaw.
+    #[test]
+    fn limits_cut_the_size_and_keep_the_direction(
+        state in state(plausible), setpoint in setpoint(plausible), limits in limits(), yaw_rad in -9.0_f32..9.0, by_thrust: bool,
+    ) {
+        let attitude_rad = Vector3::new(state.attitude_rad.x, state.attitude_rad.y, yaw_rad);
+        let state = State { attitude_rad, ..state };
+        let settings = Settings { limits, tilt_by_thrust: by_thrust, ..Profile::Flight.settings() };
+        let command = adaptive(Profile::Flight.gains(), settings).step(&mut Memory::default(), &state, &setpoint);
+
+        let [u5, u6] = command.virtual_m_s2.map(f64::from);
+        let [roll, pitch] = [attitude_rad.x, attitude_rad.y].map(|angle| f64::from(afbc::math::cos(angle)));
+        let upward = f64::from(command.inputs.thrust_n) * roll * pitch / f64::from(WEIGHT_N);
+        let vertical = if by_thrust { GRAVITY_M_S2 * upward.max(0.3) } else { GRAVITY_M_S2 };
+        let max = (vertical * f64::from(limits.tilt_max_rad).tan()).min(f64::from(limits.acceleration_max_m_s2));
+        let size = u5.hypot(u6);
+        let scale = if size > max { max / size } else { 1.0 };
+
+        let [phi, theta] = command.desired_rad.map(f64::from);
+        let (forward, left) = (vertical * theta.tan(), -vertical * phi.tan() / theta.cos());
+        let (sin, cos) = f64::from(yaw_rad).sin_cos();
+        let got = [forward * cos - left * sin, forward * sin + left * cos];
+        // Rotation; and the rounding of angles near 90 degrees, which their tangent magnifies.
+        let steep = (scale * size / vertical).powi(2) + 1.0;
+        let allowed = scale * size * ROTATION + 8.0 * U * vertical * steep;
+        prop_assert!((got[0] - scale * u5).hypot(got[1] - scale * u6) <= allowed, "{got:?} of {u5}, {u6} scaled by {scale}");
+    }
+
+    /// (12) with alpha_1 e_1 of x, y and z kept within the speed limit, on top of the reference's own speed; e_1 is the
+    /// distance as long as that is within.
+    #[test]
+    fn errors_ask_for_no_more_than_the_speed_limit(
+        gains in gains(), limits in limits(), state in state(plausible), setpoint in setpoint(plausible),
+    ) {
+        let settings = Settings { limits, ..Profile::Flight.settings() };
+        let command = adaptive(gains, settings).step(&mut Memory::default(), &state, &setpoint);
+        let Limits { speed_max_m_s, climb_max_m_s, .. } = limits;
+        for (i, axis, max) in [(0, Axis::X, speed_max_m_s), (1, Axis::Y, speed_max_m_s), (2, Axis::Z, climb_max_m_s)] {
+            let (Errors { e1, e1_dot, e2 }, alpha1, max) =
+                (*command.errors.get(axis), f64::from(gains.get(axis).backstepping.alpha1), f64::from(max));
+            let (distance, x1d_dot, x2) =
+                (setpoint.position_m[i] - state.position_m[i], setpoint.velocity_m_s[i], state.velocity_m_s[i]);
+            let speed = alpha1 * f64::from(distance);
+            let asked = speed.clamp(-max, max);
+            let wanted = f64::from(x1d_dot) + asked - f64::from(x2);
+            let size = f64::from(x1d_dot).abs() + asked.abs() + f64::from(x2).abs();
+            prop_assert!((f64::from(e2) - wanted).abs() <= 6.0 * U * size, "{axis:?}: {e2} for {wanted}");
+            prop_assert!((alpha1 * f64::from(e1) - asked).abs() <= 2.0 * U * asked.abs(), "{axis:?}: {e1} m of {distance} m");
+            prop_assert!(e1 == distance || speed.abs() > max * (1.0 - 2.0 * U), "{axis:?}: {e1} m of {distance} m");
+            prop_assert_eq!(e1_dot, x1d_dot - x2);
+        }
+    }
+
+    /// A whole turn more or less of the setpoint's yaw changes nothing, and the way round is the short one.
+    #[test]
+    fn yaw_goes_the_short_way_round(yaw in -3.0_f32..3.0, wanted in -3.0_f32..3.0, turns in -20_i32..20) {
+        let error = |yaw_rad: f32, wanted_rad: f32| {
+            let state = State { attitude_rad: Vector3::new(0.0, 0.0, yaw_rad), ..State::default() };
+            let setpoint = Setpoint { yaw_rad: wanted_rad, ..Setpoint::default() };
+            flight(Limits::NONE).step(&mut Memory::default(), &state, &setpoint).errors.yaw.e1
+        };
+        let turn = core::f32::consts::TAU * turns as f32;
+        let short = error(yaw, wanted);
+        prop_assert!(short.abs() <= core::f32::consts::PI);
+        prop_assume!(short.abs() < 3.1);
+        for other in [error(yaw, wanted + turn), error(yaw + turn, wanted)] {
+            prop_assert!((other - short).abs() < 5e-5, "{other} for {short}");
+        }
+    }
+}
+
+/// However far away the setpoint is, every law starts towards it, and the fixed ones rest at the speed limit: beyond it
+/// e_1 (1 - alpha_1^2) of (16) must not drive them the other way.
+#[test]
+fn a_distant_setpoint_is_approached_at_the_speed_limit() {
+    fn thrust<C: FlightController>(controller: &C, up_m: f32, climb_m_s: f32) -> f32 {
+        let setpoint = Setpoint { position_m: Vector3::new(0.0, 0.0, up_m), ..Setpoint::default() };
+        let state = State { velocity_m_s: Vector3::new(0.0, 0.0, climb_m_s), ..State::default() };
+        controller.step(&mut Memory::default(), &state, &setpoint).inputs.thrust_n
+    }
+    fn check<C: FlightController>(controller: &C) {
+        for up_m in [0.3, 1.5, 5.0, 10.0, 100.0, 1e4] {
+            let (up, down) = (thrust(controller, up_m, 0.0), thrust(controller, -up_m, 0.0));
+            assert!(up > 1.2 * WEIGHT_N && down < 0.8 * WEIGHT_N, "{up} N for {up_m} m up, {down} N for as much down");
+        }
+        let climb_m_s = Profile::Flight.settings().limits.climb_max_m_s;
+        for far_m in [5.0, 100.0] {
+            for sign in [1.0, -1.0] {
+                let at_limit = thrust(controller, sign * far_m, sign * climb_m_s);
+                assert!((at_limit - WEIGHT_N).abs() < 1e-3, "{at_limit} N at the speed limit, {far_m} m away");
+            }
+        }
+    }
+    let (vehicle, settings, gains) = (Parameters::PAPER.to_f32(), Profile::Flight.settings(), Profile::Flight.gains());
+    check(&flight(settings.limits));
+    let fixed = PerAxis::from_fn(|axis| gains.get(axis).backstepping);
+    check(&Controller::new(vehicle, settings, Backstepping::new(&vehicle, fixed).unwrap()).unwrap());
+    let integral = PerAxis::from_fn(|axis| gains.get(axis).into());
+    check(&Controller::new(vehicle, settings, IntegralBackstepping::new(&vehicle, integral).unwrap()).unwrap());
+}
+
+/// Attitudes all the way round, upside down included: no division by the tilt's cosine goes wrong.
+#[test]
+fn no_attitude_is_singular() {
+    let controller = flight(Profile::Flight.settings().limits);
+    let setpoint = Setpoint { position_m: Vector3::new(3.0, -2.0, 1.0), ..Setpoint::default() };
+    let tangent_max = f64::from(Profile::Flight.settings().limits.tilt_max_rad).tan() * (1.0 + ROTATION);
+    for roll in -36..=36 {
+        for pitch in -36..=36 {
+            let angle = |step: i32| step as f32 * core::f32::consts::PI / 36.0;
+            let state = State { attitude_rad: Vector3::new(angle(roll), angle(pitch), 0.0), ..State::default() };
+            let command = controller.step(&mut Memory::default(), &state, &setpoint);
+            common::check_command(&command, &Profile::Flight.settings()).unwrap();
+            assert!(tilt_tangent(&command) <= tangent_max, "{command:?}");
+        }
+    }
+}
+
+#[test]
+fn limits_out_of_range_are_refused_by_name() {
+    type Set = fn(&mut Limits, f32);
+    let cases: [(airframe::Range, Set); 5] = [
+        (afbc::limits::TILT, |l, v| l.tilt_max_rad = v),
+        (afbc::limits::TILT_RATE, |l, v| l.tilt_rate_max_rad_s = v),
+        (afbc::limits::ACCELERATION, |l, v| l.acceleration_max_m_s2 = v),
+        (afbc::limits::SPEED, |l, v| l.speed_max_m_s = v),
+        (afbc::limits::CLIMB, |l, v| l.climb_max_m_s = v),
+    ];
+    for (range, set) in cases {
+        let with = |value| {
+            let mut settings = Profile::Flight.settings();
+            set(&mut settings.limits, value);
+            settings.validate().map_err(|error| error.range.name)
+        };
+        let (min, max) = (range.min as f32, range.max as f32);
+        assert_eq!((with(min), with(max)), (Ok(()), Ok(())));
+        for bad in [min.next_down(), max.next_up(), 0.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(with(bad), Err(range.name), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! Every figure of the monitor against its definition, and every trip: provoked, and not by a healthy flight.
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
+
+use afbc::adaptive::Estimate;
+use afbc::backstepping::Errors;
+use afbc::model::Model;
+use afbc::monitor::{BOUND, Bounds, Figures, Monitor, SATURATION_SHARE, SWING, SWINGS, Trip};
+use afbc::{Cascade, Command, Health, Profile};
+use airframe::{Axis, Inputs, Parameters, PerAxis};
+use nalgebra::Matrix3;
+use proptest::prelude::*;
+use std::collections::BTreeSet;
+
+const DT_S: f32 = 0.001;
+const WEIGHT_N: f32 = 0.486 * 9.81;
+
+fn bounds() -> Bounds {
+    Bounds::new(&Profile::Flight.gains(), WEIGHT_N)
+}
+
+fn monitor(bounds: Bounds) -> Monitor {
+    Monitor::new(&Parameters::PAPER.to_f32(), bounds, DT_S).unwrap()
+}
+
+/// A step of a vehicle that hovers.
+fn hover() -> Command {
+    Command { inputs: Inputs { thrust_n: WEIGHT_N, ..Inputs::default() }, ..Command::default() }
+}
+
+/// One step's look at what has been learnt and commanded.
+fn look(monitor: &Monitor, figures: &mut Figures, estimates: PerAxis<Estimate>, command: &Command) -> Option<Trip> {
+    let mut cascade = Cascade::default();
+    (cascade.estimates, cascade.errors) = (estimates, command.errors);
+    monitor.watch(figures, &cascade, &command.per_axis(), command.health.saturated)
+}
+
+/// The first trip of `steps` steps, and after how many.
+fn watch(
+    monitor: &Monitor,
+    steps: usize,
+    mut step: impl FnMut(usize) -> (PerAxis<Estimate>, Command),
+) -> (Figures, Option<(usize, Trip)>) {
+    let mut figures = Figures::default();
+    for i in 0..steps {
+        let (estimates, command) = step(i);
+        if let Some(trip) = look(monitor, &mut figures, estimates, &command) {
+            return (figures, Some((i + 1, trip)));
+        }
+    }
+    (figures, None)
+}
+
+fn estimates(axis: Axis, estimate: Estimate) -> PerAxis<Estimate> {
+    let mut estimates = PerAxis::default();
+    *estimates.get_mut(axis) = estimate;
+    estimates
+}
+
+fn input(axis: Axis, value: f32) -> Command {
+    let mut command = hover();
+    let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = &mut command.inputs;
+    match axis {
+        Axis::Roll => *roll_n = value,
+        Axis::Pitch => *pitch_n = value,
+        Axis::Yaw => *yaw_n = value,
+        _ => *thrust_n += value,
+    }
+    command
+}
+
+/// Estimates beyond their bound trip within the six steps of a round, by name, while projection still has room for Theta;
+/// those just below never do.
+#[test]
+fn an_estimate_out_of_bounds_trips_within_six_steps() {
+    let bounds = bounds();
+    let monitor = monitor(bounds);
+    for axis in Axis::ALL {
+        let (theta, delta) = (*bounds.theta.get(axis), *bounds.delta.get(axis));
+        assert!(theta < Profile::Flight.gains().get(axis).safeguards.theta_max);
+        let with = |theta: f32, delta: f32| {
+            // |Theta_hat| of nine equal entries is three times each.
+            let estimate = Estimate { theta: Matrix3::repeat(-theta / 3.0), delta };
+            watch(&monitor, 60, |_| (estimates(axis, estimate), hover())).1
+        };
+        assert_eq!(with(0.999 * theta, 0.999 * delta), None, "{axis:?}");
+        let (steps, trip) = with(1.001 * theta, 0.0).unwrap();
+        assert!(steps <= 6 && trip == Trip::Theta(axis), "{trip:?} after {steps}");
+        let (steps, trip) = with(0.0, 1.001 * delta).unwrap();
+        assert!(steps <= 6 && trip == Trip::Delta(axis), "{trip:?} after {steps}");
+    }
+}
+
+/// Mean V_e follows its definition, 1 - exp(-t/1 s) of a lasting error, and trips by name once beyond its bound.
+#[test]
+fn large_errors_trip_when_they_last() {
+    let bounds = bounds();
+    let monitor = monitor(bounds);
+    let model = Model::new(&Parameters::PAPER.to_f32());
+    for axis in Axis::ALL {
+        let bound = *bounds.lyapunov.get(axis);
+        let with = |v: f32, steps| {
+            let (e1, e2) = ((1.2 * v).sqrt(), (0.8 * v * model.hover_gain(axis)).sqrt());
+            let mut command = hover();
+            *command.errors.get_mut(axis) = Errors { e1, e1_dot: 0.0, e2 };
+            watch(&monitor, steps, |_| (PerAxis::default(), command))
+        };
+        assert_eq!(with(0.99 * bound, 20_000).1, None, "{axis:?}");
+        let (steps, trip) = with(2.0 * bound, 20_000).1.unwrap();
+        assert_eq!(trip, Trip::Lyapunov(axis));
+        // 1 - exp(-t) = 1/2 at 0.693 s; a round is six steps.
+        assert!((680..=710).contains(&steps), "{axis:?} after {steps}");
+        let figure = *with(0.9 * bound, 1500).0.lyapunov.get(axis);
+        assert!((figure / (0.9 * bound * (1.0 - (-1.5_f32).exp())) - 1.0).abs() < 0.01, "{axis:?}: {figure}");
+    }
+}
+
+#[test]
+fn lasting_saturation_trips_and_moments_of_it_do_not() {
+    let monitor = monitor(bounds());
+    let with = |saturated: fn(usize) -> bool| {
+        let command = |i| Command { health: Health { saturated: saturated(i), ..Health::default() }, ..hover() };
+        watch(&monitor, 20_000, |i| (PerAxis::default(), command(i)))
+    };
+    // 1 - exp(-t) = 0.9 at 2.303 s.
+    let (steps, trip) = with(|_| true).1.unwrap();
+    assert!((2295..=2310).contains(&steps) && trip == Trip::Saturation, "{trip:?} after {steps}");
+    // Five of six steps; two whole seconds of every five.
+    let (figures, trip) = with(|i| !i.is_multiple_of(6));
+    assert_eq!(trip, None);
+    assert!((figures.saturation_share - 5.0 / 6.0).abs() < 0.01, "{}", figures.saturation_share);
+    assert_eq!(with(|i| i % 5000 < 2000).1, None);
+}
+
+/// Swings per second are two per period of whatever is larger than the threshold from crest to trough; more than the bound
+/// trip, by name.
+#[test]
+fn limit_cycles_are_counted_slow_and_fast() {
+    let bounds = bounds();
+    let monitor = monitor(bounds);
+    let sine = |axis, hz: f32, amplitude: f32| {
+        let at = move |i: usize| amplitude * (core::f32::consts::TAU * hz * i as f32 * DT_S).sin();
+        watch(&monitor, 10_000, |i| (PerAxis::default(), input(axis, at(i))))
+    };
+    for (index, axis) in [Axis::Roll, Axis::Pitch, Axis::Yaw, Axis::Z].into_iter().enumerate() {
+        let large = bounds.swing_n;
+        assert_eq!(sine(axis, 7.0, large).1, None, "{axis:?}: 14 swings a second");
+        let rate_hz = sine(axis, 7.0, large).0.swings[index].rate_hz;
+        assert!((rate_hz - 14.0).abs() < 1.2, "{axis:?}: {rate_hz}");
+        assert_eq!(sine(axis, 0.5, 50.0 * large).1, None, "{axis:?}: a manoeuvre");
+        assert_eq!(sine(axis, 100.0, 0.49 * large).1, None, "{axis:?}: small");
+        for (hz, amplitude) in [(9.0, large), (9.0, 100.0 * large), (100.0, 0.6 * large)] {
+            assert_eq!(sine(axis, hz, amplitude).1.unwrap().1, Trip::LimitCycle(axis), "{hz} Hz");
+        }
+        // From one step to the next.
+        let chatter = |i: usize| if i.is_multiple_of(2) { 0.0 } else { 1.01 * bounds.swing_n };
+        let (steps, trip) = watch(&monitor, 100, |i| (PerAxis::default(), input(axis, chatter(i)))).1.unwrap();
+        assert!(steps < 20 && trip == Trip::LimitCycle(axis), "{trip:?} after {steps}");
+    }
+}
+
+proptest! {
+    /// Noise of less than half the threshold on every input, and estimates and errors within bounds: nothing trips.
+    #[test]
+    fn a_healthy_flight_does_not_trip(seed: u32, share in 0.0_f32..0.99, saturated: bool) {
+        let bounds = bounds();
+        let mut random = seed;
+        let mut noise = || {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (random >> 8) as f32 / (1 << 23) as f32 - 1.0
+        };
+        let (_, trip) = watch(&monitor(bounds), 3000, |i| {
+            let estimates = PerAxis::from_fn(|axis| Estimate {
+                theta: Matrix3::repeat(share * bounds.theta.get(axis) / 3.0 * noise()),
+                delta: share * bounds.delta.get(axis),
+            });
+            let mut command = hover();
+            command.inputs.roll_n += 0.49 * bounds.swing_n * noise();
+            command.inputs.pitch_n += 0.49 * bounds.swing_n * noise();
+            command.inputs.yaw_n += 0.49 * bounds.swing_n * noise();
+            command.inputs.thrust_n += 0.49 * bounds.swing_n * noise();
+            command.errors = PerAxis::from_fn(|axis| Errors {
+                e1: (2.0 * share * bounds.lyapunov.get(axis)).sqrt() * noise(),
+                ..Errors::default()
+            });
+            command.health.saturated = saturated && i.is_multiple_of(2);
+            (estimates, command)
+        });
+        prop_assert_eq!(trip, None);
+    }
+
+    /// One look a step, round and round, and the figure is that of the estimate.
+    #[test]
+    fn norms_are_those_of_the_estimates(theta in prop::array::uniform9(-0.1_f32..0.1), delta in 0.0_f32..0.05) {
+        let estimate = Estimate { theta: Matrix3::from_row_slice(&theta), delta };
+        let monitor = monitor(bounds());
+        let mut figures = Figures::default();
+        for axis in Axis::ALL.into_iter().chain(Axis::ALL) {
+            look(&monitor, &mut figures, PerAxis::from_fn(|_| estimate), &hover());
+            let (looked_at, norm) = figures.latest();
+            prop_assert_eq!(looked_at, axis);
+            prop_assert_eq!(norm.delta, delta);
+            prop_assert!((norm.theta_squared - estimate.theta.norm_squared()).abs() <= 1e-6 * norm.theta_squared);
+        }
+    }
+}
+
+#[test]
+fn every_reason_is_its_own_and_fits_a_status_text() {
+    let mut trips = vec![Trip::Saturation];
+    trips.extend(Axis::ALL.into_iter().flat_map(|axis| [Trip::Theta(axis), Trip::Delta(axis), Trip::Lyapunov(axis)]));
+    trips.extend([Axis::Roll, Axis::Pitch, Axis::Yaw, Axis::Z].map(Trip::LimitCycle));
+    let reasons: BTreeSet<_> = trips.iter().map(|trip| trip.reason()).collect();
+    assert_eq!(reasons.len(), trips.len());
+    assert!(reasons.iter().all(|reason| reason.len() <= 50 && reason.is_ascii()));
+}
+
+#[test]
+fn bounds_out_of_range_are_refused_by_name() {
+    type Set = fn(&mut Bounds, f32);
+    let cases: [(airframe::Range, Set); 6] = [
+        (BOUND, |b, v| b.theta.yaw = v),
+        (BOUND, |b, v| b.delta.x = v),
+        (BOUND, |b, v| b.lyapunov.roll = v),
+        (SATURATION_SHARE, |b, v| b.saturation_share = v),
+        (SWING, |b, v| b.swing_n = v),
+        (SWINGS, |b, v| b.swings_hz = v),
+    ];
+    for (range, set) in cases {
+        let with = |value| {
+            let mut bounds = bounds();
+            set(&mut bounds, value);
+            Monitor::new(&Parameters::PAPER.to_f32(), bounds, DT_S).map(|_| ()).map_err(|error| error.range.name)
+        };
+        assert_eq!((with(range.min as f32), with(range.max as f32)), (Ok(()), Ok(())));
+        for bad in [-1.0, 1e10, f32::NAN, f32::INFINITY] {
+            assert_eq!(with(bad), Err(range.name), "{bad}");
+        }
+    }
+}

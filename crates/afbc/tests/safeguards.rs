@@ -1,0 +1,259 @@
+//! The safeguards against the equations that `safeguards.rs` documents, in `f64`, and what follows from them.
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
+
+mod common;
+
+use afbc::adaptive::{Estimate, Gains};
+use afbc::backstepping::Tracking;
+use afbc::cascade::Context;
+use afbc::fuzzy::Basis;
+use afbc::{Adaptive, Controller, FlightController, Law, Memory, Profile, Safeguards, Settings};
+use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
+use common::{U, gains_of_one};
+use nalgebra::{Matrix3, Vector3};
+use proptest::prelude::*;
+
+/// A subsystem whose e_2 is `e2` exactly: e_1 = 0, x_2 = -e_2.
+fn tracking(e2: f32) -> Tracking {
+    Tracking { x2: -e2, ..Tracking::default() }
+}
+
+/// One step of the x subsystem; returns its u.
+fn step(gains: Gains, e2: f32, unallocated: f32, dt_s: f32, estimate: &mut Estimate) -> f32 {
+    let law = Adaptive::new(PerAxis::from_fn(|_| gains)).unwrap();
+    let context = Context {
+        state: &State::default(),
+        rotor_residual_rad_s: 0.0,
+        dt_s,
+        adapt: true,
+        unallocated: PerAxis { x: unallocated, ..PerAxis::default() },
+    };
+    law.input(Axis::X, &tracking(e2), &context, estimate).0
+}
+
+/// The same in `f64`, as documented.
+fn reference(gains: &Gains, e2: f32, unallocated: f32, dt_s: f32, before: &Estimate) -> (Matrix3<f64>, f64) {
+    let Safeguards { sigma, kappa, theta_max, delta_max, dead_zone } = gains.safeguards;
+    let [sigma, kappa, theta_max, delta_max, dead_zone] =
+        [sigma, kappa, theta_max, delta_max, dead_zone].map(f64::from);
+    let [gamma, eta, epsilon, dt] = [gains.gamma, gains.eta, gains.epsilon, dt_s].map(f64::from);
+    // e_1 = 0, so its rate is e_2.
+    let w = Basis::new(gains.membership).unwrap().weights([0.0, e2]).map(f64::from);
+    let towards_limit = f64::from(e2) * f64::from(unallocated) > 0.0;
+    let e2 = f64::from(e2);
+    let e = if towards_limit { 0.0 } else { e2.signum() * (e2.abs() - dead_zone).max(0.0) };
+    let keep = (1.0 - (sigma + kappa * e2.abs()) * dt).max(0.0);
+    let mut theta = before.theta.map(f64::from) * keep + w * (gamma * e * dt);
+    if theta.norm() > theta_max {
+        theta *= theta_max / theta.norm();
+    }
+    let delta = f64::from(before.delta) * keep + eta * e * (e2 / epsilon).tanh() * dt;
+    (theta, delta.min(delta_max))
+}
+
+fn error() -> impl Strategy<Value = f32> {
+    prop_oneof![3 => -1.0_f32..1.0, 1 => -1e4_f32..1e4, 1 => Just(0.0)]
+}
+
+fn unallocated() -> impl Strategy<Value = f32> {
+    prop_oneof![Just(0.0_f32), -1.0_f32..1.0, Just(f32::INFINITY), Just(f32::NEG_INFINITY)]
+}
+
+/// An estimate that the safeguards allow.
+fn estimate(safeguards: Safeguards) -> impl Strategy<Value = Estimate> {
+    (prop::array::uniform9(-1.0_f32..1.0), 0.0_f32..=1.0).prop_map(move |(theta, delta)| Estimate {
+        theta: Matrix3::from_row_slice(&theta) * (safeguards.theta_max / 3.0),
+        delta: delta * safeguards.delta_max,
+    })
+}
+
+fn gains_and_estimate() -> impl Strategy<Value = (Gains, Estimate)> {
+    gains_of_one().prop_flat_map(|gains| (Just(gains), estimate(gains.safeguards)))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 5_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_step_is_the_documented_one(
+        (gains, before) in gains_and_estimate(), e2 in error(), unallocated in unallocated(), dt_s in 1e-4_f32..=0.02,
+    ) {
+        let mut after = before;
+        step(gains, e2, unallocated, dt_s, &mut after);
+        let (theta, delta) = reference(&gains, e2, unallocated, dt_s, &before);
+        // What is added, each rounded some ten times; 1 - leakage dt is rounded as a whole.
+        let [gamma, eta, dt, e2] = [gains.gamma, gains.eta, dt_s, e2].map(f64::from);
+        let learnt = e2.abs() * dt;
+        let theta_size = f64::from(before.theta.abs().max()) + gamma * learnt;
+        for (got, wanted) in after.theta.iter().zip(theta.iter()) {
+            prop_assert!((f64::from(*got) - wanted).abs() <= 20.0 * U * theta_size + 1e-38, "{got:e} for {wanted:e}");
+        }
+        let allowed = 20.0 * U * (f64::from(before.delta) + eta * learnt) + 1e-38;
+        prop_assert!((f64::from(after.delta) - delta).abs() <= allowed, "{:e} for {delta:e}", after.delta);
+    }
+
+    #[test]
+    fn estimates_never_leave_their_bounds(
+        gains in gains_of_one(), inputs in prop::collection::vec((error(), unallocated()), 1..100), dt_s in 1e-4_f32..=0.02,
+    ) {
+        let mut estimate = Estimate::default();
+        let (theta_max, delta_max) = (f64::from(gains.safeguards.theta_max), gains.safeguards.delta_max);
+        for (e2, unallocated) in inputs {
+            let u = step(gains, e2, unallocated, dt_s, &mut estimate);
+            let norm = estimate.theta.map(f64::from).norm();
+            // Nine squares summed, a root, a quotient and a product; squares below 1e-38 are nothing.
+            prop_assert!(norm <= theta_max * (1.0 + 12.0 * U) + 1e-18, "{norm} beyond {theta_max}");
+            prop_assert!((0.0..=delta_max).contains(&estimate.delta), "{} beyond {delta_max}", estimate.delta);
+            prop_assert!(u.is_finite());
+        }
+    }
+
+    /// With `NONE`, Euler's step of (33), (34) to the bit: what leaks and bounds nothing changes nothing.
+    #[test]
+    fn none_is_the_printed_law(
+        gains in gains_of_one(), e2 in error(), dt_s in 1e-4_f32..=0.02,
+        theta in prop::array::uniform9(-5.0_f32..5.0), delta in 0.0_f32..5.0,
+    ) {
+        let gains = Gains { safeguards: Safeguards::NONE, ..gains };
+        let before = Estimate { theta: Matrix3::from_row_slice(&theta), delta };
+        let [first, second] = Basis::new(gains.membership).unwrap().factors([0.0, e2]);
+        let s = afbc::math::tanh(e2 * (1.0 / gains.epsilon));
+        let printed = Estimate {
+            theta: before.theta + first * (gains.gamma * e2 * dt_s) * second.transpose(),
+            delta: before.delta + gains.eta * e2 * s * dt_s,
+        };
+        prop_assume!(printed.theta.norm() < 1e6 && printed.delta < 1e6);
+        let mut after = before;
+        step(gains, e2, 0.0, dt_s, &mut after);
+        prop_assert_eq!(after.theta.map(f32::to_bits), printed.theta.map(f32::to_bits));
+        prop_assert_eq!(after.delta.to_bits(), printed.delta.to_bits());
+    }
+
+    /// Inside the dead zone nothing is learnt: without leakage not one bit changes.
+    #[test]
+    fn a_dead_zone_is_dead((gains, before) in gains_and_estimate(), share in -1.0_f32..=1.0, dead_zone in 1e-3_f32..10.0) {
+        let bounds = Safeguards { theta_max: 1e6, delta_max: 1e6, ..gains.safeguards };
+        let safeguards = Safeguards { sigma: 0.0, kappa: 0.0, dead_zone, ..bounds };
+        let mut after = before;
+        step(Gains { safeguards, ..gains }, share * dead_zone, 0.0, 0.001, &mut after);
+        prop_assert_eq!(after, before);
+        // Beyond it, it is.
+        let mut after = Estimate::default();
+        let able = Gains { gamma: 1.0, eta: 1.0, safeguards: Safeguards { delta_max: 1.0, ..safeguards }, ..gains };
+        step(able, 1.1 * dead_zone, 0.0, 0.02, &mut after);
+        prop_assert!(after.theta.min() >= 0.0 && after.theta.max() > 0.0 && after.delta > 0.0);
+    }
+
+    /// Towards a limit that was reached nothing is learnt, away from it everything.
+    #[test]
+    fn saturation_is_heeded_on_its_own_side((gains, before) in gains_and_estimate(), e2 in 1e-3_f32..10.0, missing in 1e-6_f32..100.0) {
+        let safeguards = Safeguards { sigma: 0.0, kappa: 0.0, ..gains.safeguards };
+        let gains = Gains { safeguards, ..gains };
+        let fly = |e2, missing| {
+            let mut estimate = before;
+            step(gains, e2, missing, 0.001, &mut estimate);
+            estimate
+        };
+        let still = fly(0.0, 0.0);
+        prop_assert_eq!(fly(e2, missing), still);
+        prop_assert_eq!(fly(-e2, -missing), still);
+        prop_assert_eq!(fly(e2, -missing), fly(e2, 0.0));
+    }
+
+    /// A cascade that does not heed saturation learns the same, to the bit, with whatever rotors; one that does, does not.
+    #[test]
+    fn saturation_is_heeded_if_so_set(up_m in 1.0_f32..3.0, roll_rad in 0.2_f32..1.0) {
+        let setpoint = Setpoint { position_m: Vector3::new(0.0, 0.0, up_m), ..Setpoint::default() };
+        let state = State { attitude_rad: Vector3::new(roll_rad, 0.0, 0.0), ..State::default() };
+        let fly = |heed_saturation, rotor_force_max_n| {
+            let settings = Settings { heed_saturation, rotor_force_max_n, ..Profile::Flight.settings() };
+            let settings = Settings { tilt_by_thrust: false, ..settings };
+            let law = Adaptive::new(Profile::Flight.gains()).unwrap();
+            let controller = Controller::new(Parameters::PAPER.to_f32(), settings, law).unwrap();
+            let mut memory = Memory::default();
+            for _ in 0..20 {
+                controller.step(&mut memory, &state, &setpoint);
+            }
+            memory.control.estimates
+        };
+        let [careless, heeding] = [false, true].map(|heed| fly(heed, 0.5));
+        prop_assert_eq!(careless, fly(false, 1e4));
+        prop_assert_eq!(heeding.x, careless.x, "its limits are not the rotors'");
+        prop_assert!(heeding.z.theta.m22 < careless.z.theta.m22 && heeding.roll != careless.roll);
+    }
+}
+
+/// With no error, an estimate decays by exp(-sigma t); under a lasting error, delta_hat settles where learning and
+/// forgetting are equal.
+#[test]
+fn leakage_forgets_at_its_rate() {
+    let dt_s = 0.001;
+    for sigma in [0.01_f32, 0.5, 10.0] {
+        let safeguards = Safeguards { sigma, ..Safeguards::NONE };
+        let gains = Gains { safeguards, ..Profile::Paper.gains().x };
+        let mut estimate = Estimate { theta: Matrix3::repeat(2.0), delta: 3.0 };
+        for _ in 0..1000 {
+            step(gains, 0.0, 0.0, dt_s, &mut estimate);
+        }
+        // (1 - sigma dt)^n is below exp(-sigma n dt) by a share of sigma^2 dt n dt / 2, at most 5 %; rounding adds 1000 U.
+        let (exact, sigma) = ((-f64::from(sigma)).exp(), f64::from(sigma));
+        let share = sigma * sigma * f64::from(dt_s) / 2.0 + 1e-4;
+        for (got, start) in estimate.theta.iter().map(|theta| (theta, 2.0)).chain([(&estimate.delta, 3.0)]) {
+            let left = f64::from(*got) / start / exact;
+            assert!((1.0 - 1.1 * share..=1.0 + 1e-4).contains(&left), "sigma {sigma}: {left} of exp(-sigma t)");
+        }
+    }
+    let (sigma, kappa, e2) = (0.2, 3.0, 0.4);
+    let safeguards = Safeguards { sigma, kappa, ..Safeguards::NONE };
+    let gains = Gains { eta: 2.0, epsilon: 0.1, safeguards, ..Profile::Paper.gains().x };
+    let mut estimate = Estimate::default();
+    for _ in 0..20_000 {
+        step(gains, e2, 0.0, dt_s, &mut estimate);
+    }
+    let settled = 2.0 * e2 * (e2 / 0.1).tanh() / (sigma + kappa * e2);
+    assert!((estimate.delta / settled - 1.0).abs() < 1e-3, "{} for {settled}", estimate.delta);
+    // Without an error the e-modification forgets nothing.
+    let safeguards = Safeguards { kappa: 100.0, ..Safeguards::NONE };
+    let before = estimate;
+    step(Gains { safeguards, ..gains }, 0.0, 0.0, dt_s, &mut estimate);
+    assert_eq!(estimate, before);
+}
+
+/// A double integrator that is measured with noise: the printed delta_hat grows for as long as it flies, the flight
+/// profile's settles.
+#[test]
+fn noise_drives_the_printed_delta_hat_and_not_the_hardened() {
+    const SECOND: u32 = 1000;
+    let fly = |profile: Profile| {
+        let gains = profile.gains();
+        let law = Adaptive::new(gains).unwrap();
+        let (mut estimate, mut x, mut v, mut random) = (Estimate::default(), 0.0_f32, 0.0_f32, 1_u32);
+        let mut noise = || {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (random >> 8) as f32 / (1 << 23) as f32 - 1.0
+        };
+        [500 * SECOND, 500 * SECOND].map(|steps| {
+            for _ in 0..steps {
+                let (x1, x2) = (x + 0.02 * noise(), v + 0.04 * noise());
+                let tracking = Tracking { x1, x2, e1: -x1, ..Tracking::default() };
+                let context = Context {
+                    state: &State::default(),
+                    rotor_residual_rad_s: 0.0,
+                    dt_s: 0.001,
+                    adapt: true,
+                    unallocated: PerAxis::default(),
+                };
+                let (u, _) = law.input(Axis::X, &tracking, &context, &mut estimate);
+                v += (u + 0.3) * 0.001;
+                x += v * 0.001;
+                assert!(estimate.theta.norm() <= gains.x.safeguards.theta_max * 1.000_001);
+            }
+            assert!(x.abs() < 0.2, "{profile:?} lost it: {x}");
+            estimate.delta
+        })
+    };
+    let [half, whole] = fly(Profile::Paper);
+    assert!(half > 2.0 && whole > 1.9 * half, "printed: {half}, then {whole}");
+    let [half, whole] = fly(Profile::Flight);
+    assert!(whole < 0.5 && whole < 1.2 * half, "hardened: {half}, then {whole}");
+}

@@ -1,0 +1,97 @@
+//! Ten hours of hovering in noise: the estimates of the profile `flight` stay, those of the law as printed drift.
+#![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
+
+use afbc::adaptive::Estimate;
+use afbc::{Adaptive, Cascade, Controller, FlightController, Memory, Profile};
+use airframe::{Axis, Parameters, PerAxis, Setpoint};
+use nalgebra::Vector3;
+use plant::sensors::Spread;
+use plant::{Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors};
+
+const STEP_S: f64 = 0.001;
+const HOUR: u64 = 3_600_000;
+
+/// A hover at 2 m with rotors of 20 ms and 3 N and noise of 0.001 on every state.
+struct Hover {
+    controller: Controller<Adaptive>,
+    memory: Memory<Cascade<Estimate>>,
+    plant: Plant,
+    sensors: Sensors,
+    setpoint: Setpoint,
+}
+
+impl Hover {
+    fn new(profile: Profile) -> Self {
+        let vehicle = Parameters::PAPER;
+        let controller =
+            Controller::new(vehicle.to_f32(), profile.settings(), Adaptive::new(profile.gains()).unwrap()).unwrap();
+        let max_rad_s = (3.0 / vehicle.thrust_factor_n_s2).sqrt();
+        let rotors = Rotors { time_constant_s: 0.02, max_rad_s, delay_s: 0.001, ..Rotors::default() };
+        let realism = Realism { rotors, seed: 11, ..Realism::default() };
+        let start = Motion { position_m: Vector3::new(0.0, 0.0, 2.0), ..Motion::default() };
+        let environment = Environment::calm(vehicle).unwrap();
+        let plant = Plant::with(Model::RigidBody, start, environment, &realism, STEP_S).unwrap();
+        let sensors = Sensors::new(&Sensing { noise: Spread::all(0.001), ..Sensing::default() }, 11, STEP_S).unwrap();
+        let setpoint = Setpoint { position_m: Vector3::new(0.0, 0.0, 2.0), ..Setpoint::default() };
+        Hover { controller, memory: Memory::default(), plant, sensors, setpoint }
+    }
+
+    /// Flies `steps`; returns how far the vehicle was from its place at most \[m\].
+    fn fly(&mut self, steps: u64) -> f64 {
+        let mut furthest = 0.0_f64;
+        for _ in 0..steps {
+            let motion = self.plant.motion();
+            let state = self.sensors.measure(&motion).state;
+            let command = self.controller.step(&mut self.memory, &state, &self.setpoint);
+            self.plant.step(&command.speeds, STEP_S);
+            furthest = furthest.max((motion.position_m - Vector3::new(0.0, 0.0, 2.0)).norm());
+        }
+        furthest
+    }
+
+    /// |Theta_hat| and delta_hat of each subsystem.
+    fn norms(&self) -> PerAxis<[f32; 2]> {
+        let estimates = &self.memory.control.estimates;
+        PerAxis::from_fn(|axis| [estimates.get(axis).theta.norm(), estimates.get(axis).delta])
+    }
+}
+
+#[test]
+fn estimates_of_the_profile_flight_stay_bounded_over_ten_hours() {
+    let mut hover = Hover::new(Profile::Flight);
+    let gains = Profile::Flight.gains();
+    hover.fly(HOUR);
+    let first = hover.norms();
+    for hour in 2..=10 {
+        let furthest = hover.fly(HOUR);
+        assert!(furthest < 0.05, "hour {hour}: {furthest} m away");
+        let norms = hover.norms();
+        for axis in Axis::ALL {
+            let [theta, delta] = *norms.get(axis);
+            let safeguards = gains.get(axis).safeguards;
+            assert!(theta <= 0.9 * safeguards.theta_max, "hour {hour}, {axis:?}: |Theta_hat| = {theta}");
+            assert!((0.0..=safeguards.delta_max).contains(&delta), "hour {hour}, {axis:?}: delta_hat = {delta}");
+            // Nothing creeps: an hour is 36 time constants of the leakage.
+            let [theta_then, delta_then] = *first.get(axis);
+            assert!((theta - theta_then).abs() <= 0.2 * theta_then.max(0.1), "{axis:?}: {theta_then} to {theta}");
+            assert!((delta - delta_then).abs() <= 0.2 * delta_then.max(0.01), "{axis:?}: {delta_then} to {delta}");
+        }
+    }
+    println!("after an hour {first:?}\nafter ten    {:?}", hover.norms());
+}
+
+#[test]
+fn estimates_of_the_law_as_printed_drift_until_the_vehicle_is_lost() {
+    let mut hover = Hover::new(Profile::Paper);
+    let mut deltas = [0.0; 5];
+    for delta in &mut deltas {
+        let furthest = hover.fly(20_000);
+        assert!(furthest < 0.5, "{furthest} m away");
+        *delta = hover.norms().z[1];
+    }
+    println!("delta_hat of z every 20 s: {deltas:?}");
+    assert!(deltas.is_sorted_by(|before, after| after - before > 0.05), "{deltas:?}");
+    let furthest = hover.fly(140_000);
+    println!("up to 240 s: {furthest} m away");
+    assert!(furthest > 50.0);
+}
