@@ -2,6 +2,7 @@
 
 pub mod campaign;
 pub mod claims;
+pub mod compare;
 pub mod contender;
 pub mod flight;
 pub mod in_the_loop;
@@ -12,3 +13,4 @@ pub mod results;
 pub mod run;
 pub mod scenario;
 pub mod trajectory;
+pub mod tune;

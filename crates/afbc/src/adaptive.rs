@@ -2,9 +2,9 @@
 
 use crate::backstepping::{self, Errors, Tracking, proportional};
 use crate::cascade::{Context, Law};
-use crate::fuzzy::{Basis, Membership};
+use crate::fuzzy::{Basis, CENTRE, Membership, WIDTH};
 use crate::math;
-use crate::safeguards::Safeguards;
+use crate::safeguards::{DEAD_ZONE, DELTA_MAX, KAPPA, SIGMA, Safeguards, THETA_MAX};
 use airframe::{Axis, OutOfRange, PerAxis, Range};
 use nalgebra::{Matrix3, Vector3};
 
@@ -36,6 +36,32 @@ pub struct Gains {
 }
 
 impl Gains {
+    /// Every gain that is a matter of taste, with the range to search it in.
+    pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 6] {
+        let [alpha1, alpha2] = self.backstepping.tunables();
+        [
+            alpha1,
+            alpha2,
+            (&GAMMA, &mut self.gamma),
+            (&ETA, &mut self.eta),
+            (&EPSILON, &mut self.epsilon),
+            (&DELTA_MAX, &mut self.safeguards.delta_max),
+        ]
+    }
+
+    /// What is rather chosen once for the vehicle and its task, with the accepted range of each.
+    pub fn others(&mut self) -> [(&'static Range, &mut f32); 6] {
+        let Gains { membership, safeguards, .. } = self;
+        [
+            (&CENTRE, &mut membership.centre),
+            (&WIDTH, &mut membership.width),
+            (&SIGMA, &mut safeguards.sigma),
+            (&KAPPA, &mut safeguards.kappa),
+            (&THETA_MAX, &mut safeguards.theta_max),
+            (&DEAD_ZONE, &mut safeguards.dead_zone),
+        ]
+    }
+
     /// Checks every gain.
     ///
     /// # Errors

@@ -92,6 +92,11 @@ pub struct Gains {
 }
 
 impl Gains {
+    /// Both gains, with the range to search each in.
+    pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 2] {
+        [(&ALPHA1, &mut self.alpha1), (&ALPHA2, &mut self.alpha2)]
+    }
+
     /// Checks both gains.
     ///
     /// # Errors

@@ -1,6 +1,7 @@
 //! The command line: one module for each command.
 
 mod campaign;
+mod compare;
 mod fly;
 mod flying;
 mod hitl;
@@ -10,6 +11,7 @@ mod pil;
 mod results;
 mod scenarios;
 mod target;
+mod tune;
 
 use clap::{Parser, Subcommand};
 use std::error::Error;
@@ -42,6 +44,8 @@ enum Command {
     Fly(fly::Fly),
     Campaign(campaign::Campaign),
     Merge(campaign::Merge),
+    Compare(compare::Compare),
+    Tune(tune::Tune),
     Check(scenarios::Check),
     Scenarios(scenarios::Scenarios),
     Campaigns(campaign::Campaigns),
@@ -58,6 +62,8 @@ impl Cli {
             Command::Fly(fly) => fly.run(),
             Command::Campaign(campaign) => campaign.run(),
             Command::Merge(merge) => merge.run(),
+            Command::Compare(compare) => compare.run(),
+            Command::Tune(tune) => tune.run(),
             Command::Check(check) => check.run(),
             Command::Scenarios(scenarios) => scenarios.run(),
             Command::Campaigns(campaigns) => campaigns.run(),

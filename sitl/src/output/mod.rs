@@ -4,6 +4,7 @@
 //! time of day or the machine.
 
 pub mod campaign;
+pub mod compare;
 mod csv;
 mod error;
 mod figures;

@@ -162,7 +162,7 @@ fn results(group: &Group) -> Markup {
 }
 
 /// What determines the flight.
-fn parameters(scenario: &Scenario) -> Markup {
+pub(super) fn parameters(scenario: &Scenario) -> Markup {
     let vehicle = &scenario.vehicle;
     let inertia = &vehicle.inertia_kg_m2;
     let fixed = [
