@@ -15,8 +15,8 @@ pub const ETA: Range = Range::new("eta", 0.0, 1000.0);
 /// Accepted epsilon \[m/s or rad/s\].
 pub const EPSILON: Range = Range::new("epsilon", 1e-6, 100.0);
 
-/// Least and largest thrust for hovering that is believed, as a share of the weight.
-const HOVER_SHARE: [f32; 2] = [0.3, 2.0];
+/// Least thrust for hovering that is believed, as a share of the weight.
+const HOVER_SHARE_MIN: f32 = 0.3;
 
 /// Gains of one AFBC subsystem.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -281,9 +281,8 @@ impl Law for Adaptive {
     }
 
     fn hover_thrust_n(&self, z: &Estimate, weight_n: f32) -> f32 {
-        let [least, largest] = HOVER_SHARE.map(|share| share * weight_n);
         // The rule for no error and no speed.
-        math::min(math::max(z.theta.m22, least), largest)
+        math::max(z.theta.m22, HOVER_SHARE_MIN * weight_n)
     }
 
     fn learnt(estimate: &Estimate) -> Estimate {

@@ -233,9 +233,9 @@ impl<L: Law> Controller<L> {
         &self.law
     }
 
-    /// U4 that it takes to hover \[N\], by what has been learnt.
+    /// U4 that it takes to hover \[N\], by what has been learnt: no more than the rotors give.
     pub(crate) fn hover_thrust_n(&self, memory: &Cascade<L::Estimate>) -> f32 {
-        self.law.hover_thrust_n(&memory.estimates.z, self.weight_n)
+        math::min(self.law.hover_thrust_n(&memory.estimates.z, self.weight_n), self.thrust_max_n)
     }
 
     /// True if the ground carries the vehicle, as far as that is heeded.
