@@ -9,7 +9,8 @@ use afbc::{FlightController, Memory, Profile};
 use airframe::{PerAxis, RotorSpeeds, Setpoint, State};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use plant::{Model, Plant};
+use nalgebra::Vector3;
+use plant::{Drag, Model, Plant, Realism, Rotors, Sensing, Spread, Turbulence, Wind};
 use sitl::contender::{Build, Contender};
 use sitl::flight::{Flight, fly};
 use sitl::paper::{Case, scenario};
@@ -99,10 +100,15 @@ fn plant_step_simplified(bencher: Bencher) {
 }
 
 fn closed_loop(bencher: Bencher, model: Model, gains: impl Build) {
-    let scenario = paper(model);
+    closed_loop_of(bencher, &paper(model), PROFILE, gains);
+}
+
+fn closed_loop_of(bencher: Bencher, scenario: &Scenario, profile: Profile, gains: impl Build) {
+    let settings = profile.settings();
+    let controller = || gains.controller(scenario.vehicle.to_f32(), settings).unwrap();
     bencher
         .counter(ItemsCount::new(STEPS))
-        .with_inputs(|| Flight::new(&scenario, &PROFILE.settings(), controller(&gains, &scenario)).unwrap())
+        .with_inputs(|| Flight::new(scenario, &settings, controller()).unwrap())
         .bench_local_refs(|flight| {
             for _ in 0..STEPS {
                 let sample = flight.control();
@@ -125,4 +131,34 @@ fn closed_loop_backstepping_rigid_body(bencher: Bencher) {
 #[divan::bench]
 fn closed_loop_afbc_simplified(bencher: Bencher) {
     closed_loop(bencher, Model::Simplified, PROFILE.gains());
+}
+
+/// The paper's flight with everything that a campaign adds: lag, limits and delay of the rotors, drag, wind, turbulence,
+/// noise, bias and delay of the measurements.
+fn real() -> Scenario {
+    let rotors = Rotors { time_constant_s: 0.02, max_rad_s: 317.0, delay_s: 0.001, ..Rotors::default() };
+    let wind =
+        Wind { steady_m_s: Vector3::new(3.0, 1.0, 0.0), turbulence: Some(Turbulence::MODERATE), ..Wind::default() };
+    let (noise, bias) = (Spread::all(0.001), Spread::all(0.001));
+    Scenario {
+        realism: Realism { rotors, wind, drag: Some(Drag::PAPER), ..Realism::default() },
+        sensing: Sensing { noise, bias, delay_s: 0.002, dropouts: None },
+        ..paper(Model::RigidBody)
+    }
+}
+
+#[divan::bench]
+fn closed_loop_afbc_real(bencher: Bencher) {
+    closed_loop_of(bencher, &real(), Profile::Flight, Profile::Flight.gains());
+}
+
+/// One flight of the built-in campaign under every contender, as it is flown: items are flights of one contender.
+#[divan::bench]
+fn campaign_flight(bencher: Bencher) {
+    let campaign = sitl::campaign::built_in("robustness").unwrap().campaign().unwrap();
+    let mut flight = 0;
+    bencher.counter(ItemsCount::new(campaign.scenario.contenders.len())).bench_local(|| {
+        flight += 1;
+        campaign.rows(flight).unwrap()
+    });
 }

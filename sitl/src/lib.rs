@@ -1,6 +1,8 @@
 //! Software in the loop: scenarios, lockstep flights, logs, figures. See the `sitl` binary for the command line.
 
+pub mod campaign;
 pub mod claims;
+pub mod compare;
 pub mod contender;
 pub mod flight;
 pub mod in_the_loop;
@@ -11,3 +13,4 @@ pub mod results;
 pub mod run;
 pub mod scenario;
 pub mod trajectory;
+pub mod tune;

@@ -45,13 +45,18 @@ pub fn inputs(sample: &Sample) -> Vector4<f64> {
     Vector4::new(u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n).cast()
 }
 
+/// Whether errors count at this time.
+pub fn is_settled(time_s: f64) -> bool {
+    // Half a microsecond of slack: times are decimal, steps binary.
+    time_s >= SETTLED_S - 5e-7
+}
+
 impl Accumulator {
     /// Takes one step into account.
     pub fn add(&mut self, sample: &Sample) {
         let error = tracking_error(sample);
         self.last_error = error;
-        // Half a microsecond of slack: times are decimal, steps binary.
-        if sample.time_s < SETTLED_S - 5e-7 {
+        if !is_settled(sample.time_s) {
             return;
         }
         self.errors += 1;

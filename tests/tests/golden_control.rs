@@ -73,8 +73,9 @@ fn afbc_subsystem_agrees_in_every_row() {
             safeguards: Safeguards::NONE,
         };
         let x1d_dot_32 = x1d_dot as f32;
-        let tracking =
-            Tracking { x1: x1 as f32, x2: x2 as f32, e1: x1d as f32 - x1 as f32, x1d_dot: x1d_dot_32, x1d_ddot: 0.0 };
+        let [x1_32, x2_32] = [x1 as f32, x2 as f32];
+        let e1_32 = x1d as f32 - x1_32;
+        let tracking = Tracking { x1: x1_32, x2: x2_32, e1: e1_32, x1d_dot: x1d_dot_32, ..Tracking::default() };
         let errors = Errors::new(gains.backstepping.alpha1, &tracking);
         let inputs_are_state = row.get("inputs_are_state") == 1.0;
         kinds[usize::from(inputs_are_state)] += 1;
@@ -139,6 +140,7 @@ fn backstepping_agrees_in_every_row() {
             e1: x1d as f32 - x1 as f32,
             x1d_dot: x1d_dot as f32,
             x1d_ddot: x1d_ddot as f32,
+            limited: false,
         };
         let errors = Errors::new(alpha1 as f32, &tracking);
         let dynamics = Dynamics { f: f as f32, g: g as f32, g_dot: 0.0 };

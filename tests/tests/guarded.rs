@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
 
 use afbc::monitor::{Bounds, Trip};
-use afbc::{Command, FlightController, Guarded, Profile, Settings, guarded};
+use afbc::{Command, FlightController, Guarded, Memory, Profile, Settings, guarded};
 use airframe::{Axis, Parameters, PerAxis, Setpoint};
 use nalgebra::Vector3;
 use plant::{Drag, Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors, Spread, Turbulence, Wind};
@@ -33,7 +33,7 @@ fn above(height_m: f32) -> Setpoint {
 /// One vehicle, its sensors, its controller and what that remembers.
 struct Bench {
     controller: Guarded,
-    memory: guarded::Memory,
+    memory: Memory<guarded::Memory>,
     plant: Plant,
     sensors: Sensors,
 }
@@ -46,7 +46,7 @@ impl Bench {
         let realism = Realism { rotors, ..realism };
         let plant = Plant::with(Model::RigidBody, Motion::default(), environment, &realism, STEP_S).unwrap();
         let sensors = Sensors::new(&Sensing { noise, ..Sensing::default() }, 1, STEP_S).unwrap();
-        Bench { controller, memory: guarded::Memory::default(), plant, sensors }
+        Bench { controller, memory: Memory::default(), plant, sensors }
     }
 
     fn step(&mut self, setpoint: &Setpoint) -> Command {
@@ -60,11 +60,11 @@ impl Bench {
     fn fly(&mut self, steps: usize, setpoint: &Setpoint) -> Option<Trip> {
         for _ in 0..steps {
             self.step(setpoint);
-            if self.memory.trip().is_some() {
+            if self.memory.control.trip().is_some() {
                 break;
             }
         }
-        self.memory.trip()
+        self.memory.control.trip()
     }
 
     fn distance_m(&self, setpoint: &Setpoint) -> f64 {
@@ -84,7 +84,7 @@ fn the_printed_laws_chatter_is_a_limit_cycle() {
     let fly = |bounds| {
         let mut bench = Bench {
             controller: guarded(Profile::Paper, Profile::Paper.settings(), bounds),
-            memory: guarded::Memory::default(),
+            memory: Memory::default(),
             plant: Plant::new(Model::Simplified, paper.initial, paper.environment.clone()),
             sensors: Sensors::new(&Sensing::default(), 0, STEP_S).unwrap(),
         };
@@ -131,12 +131,12 @@ fn a_flight_goes_on_across_a_trip_and_back() {
     };
     let mut last = bench.step(&setpoint);
     for _ in 0..20 * SECOND {
-        if bench.memory.trip().is_some() {
+        if bench.memory.control.trip().is_some() {
             break;
         }
         last = bench.step(&setpoint);
     }
-    assert_eq!((last.health.trip, bench.memory.trip()), (None, Some(Trip::Theta(Axis::X))));
+    assert_eq!((last.health.trip, bench.memory.control.trip()), (None, Some(Trip::Theta(Axis::X))));
     let mut command = bench.step(&setpoint);
     bumpless(&last, &command, "fallback");
     for _ in 0..20 * SECOND {
@@ -148,13 +148,13 @@ fn a_flight_goes_on_across_a_trip_and_back() {
 
     // Engaged under bounds that let the wind pass.
     bench.controller = flight(|_| ());
-    bench.controller.engage(&mut bench.memory);
+    bench.controller.engage(&mut bench.memory.control);
     last = command;
     command = bench.step(&setpoint);
     bumpless(&last, &command, "engaged");
     for _ in 0..20 * SECOND {
         command = bench.step(&setpoint);
-        assert_eq!((command.health.trip, bench.memory.trip()), (None, None));
+        assert_eq!((command.health.trip, bench.memory.control.trip()), (None, None));
         assert!(bench.distance_m(&setpoint) < 0.05, "{} m off", bench.distance_m(&setpoint));
     }
 }

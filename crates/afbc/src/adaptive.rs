@@ -2,9 +2,9 @@
 
 use crate::backstepping::{self, Errors, Tracking, proportional};
 use crate::cascade::{Context, Law};
-use crate::fuzzy::{Basis, Membership};
+use crate::fuzzy::{Basis, CENTRE, Membership, WIDTH};
 use crate::math;
-use crate::safeguards::Safeguards;
+use crate::safeguards::{DEAD_ZONE, DELTA_MAX, KAPPA, SIGMA, Safeguards, THETA_MAX};
 use airframe::{Axis, OutOfRange, PerAxis, Range};
 use nalgebra::{Matrix3, Vector3};
 
@@ -15,8 +15,8 @@ pub const ETA: Range = Range::new("eta", 0.0, 1000.0);
 /// Accepted epsilon \[m/s or rad/s\].
 pub const EPSILON: Range = Range::new("epsilon", 1e-6, 100.0);
 
-/// Least thrust for hovering that is believed, as a share of the weight.
-const HOVER_SHARE_MIN: f32 = 0.3;
+/// Least and largest thrust for hovering that is believed, as a share of the weight.
+const HOVER_SHARE: [f32; 2] = [0.3, 2.0];
 
 /// Gains of one AFBC subsystem.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +36,32 @@ pub struct Gains {
 }
 
 impl Gains {
+    /// Every gain that is a matter of taste, with the range to search it in.
+    pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 6] {
+        let [alpha1, alpha2] = self.backstepping.tunables();
+        [
+            alpha1,
+            alpha2,
+            (&GAMMA, &mut self.gamma),
+            (&ETA, &mut self.eta),
+            (&EPSILON, &mut self.epsilon),
+            (&DELTA_MAX, &mut self.safeguards.delta_max),
+        ]
+    }
+
+    /// What is rather chosen once for the vehicle and its task, with the accepted range of each.
+    pub fn others(&mut self) -> [(&'static Range, &mut f32); 6] {
+        let Gains { membership, safeguards, .. } = self;
+        [
+            (&CENTRE, &mut membership.centre),
+            (&WIDTH, &mut membership.width),
+            (&SIGMA, &mut safeguards.sigma),
+            (&KAPPA, &mut safeguards.kappa),
+            (&THETA_MAX, &mut safeguards.theta_max),
+            (&DEAD_ZONE, &mut safeguards.dead_zone),
+        ]
+    }
+
     /// Checks every gain.
     ///
     /// # Errors
@@ -91,6 +117,18 @@ impl Estimate {
     /// The estimate whose u_a is `input` whatever the errors are, for the weights of the rules sum to one.
     pub fn of(input: f32) -> Self {
         Estimate { theta: Matrix3::repeat(input), delta: 0.0 }
+    }
+
+    /// The estimate whose u_a is `input` where the rules have these weights: as even over the rules as |Theta_hat| of
+    /// `norm_max` allows, and no smaller than the input takes.
+    fn spread(input: f32, weights: &Matrix3<f32>, norm_max: f32) -> Self {
+        // Of all such Theta_hat the smallest; what an even one has besides is at right angles to the weights.
+        let least = weights * (input / weights.norm_squared());
+        let rest = Matrix3::repeat(input) - least;
+        let room = math::max(norm_max * norm_max - least.norm_squared(), 0.0);
+        let square = rest.norm_squared();
+        let share = if square > room { math::sqrt(room / square) } else { 1.0 };
+        Estimate { theta: least + rest * share, delta: 0.0 }
     }
 
     /// One step of explicit Euler, projected into the bounds.
@@ -181,6 +219,14 @@ impl Subsystem {
     }
 }
 
+/// Inputs of the fuzzy system (22), section IV: the angle and its rate for attitude, the error and its rate for position.
+fn fuzzy_inputs(axis: Axis, x: [f32; 2], errors: &Errors) -> [f32; 2] {
+    match axis {
+        Axis::Roll | Axis::Pitch | Axis::Yaw => x,
+        Axis::Z | Axis::X | Axis::Y => [errors.e1, errors.e1_dot],
+    }
+}
+
 /// AFBC for the six subsystems.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adaptive {
@@ -205,6 +251,14 @@ impl Adaptive {
             },
         })
     }
+
+    /// What the subsystem must have learnt to want `input` for these errors, with [`Estimate::spread`] over its rules;
+    /// `x` is x_1, x_2 of an attitude.
+    pub(crate) fn resumed(&self, axis: Axis, input: f32, x: [f32; 2], errors: &Errors, norm_max: f32) -> Estimate {
+        let Subsystem { gains, basis, .. } = self.subsystems.get(axis);
+        let fuzzy = input - proportional(gains.backstepping.alpha2, errors);
+        Estimate::spread(fuzzy, &basis.weights(fuzzy_inputs(axis, x, errors)), norm_max)
+    }
 }
 
 impl Law for Adaptive {
@@ -214,11 +268,7 @@ impl Law for Adaptive {
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Estimate) -> (f32, Errors) {
         let subsystem = self.subsystems.get(axis);
         let errors = Errors::new(subsystem.gains.backstepping.alpha1, tracking);
-        // Section IV: the angle and its rate for attitude, the error and its rate for position.
-        let inputs = match axis {
-            Axis::Roll | Axis::Pitch | Axis::Yaw => [tracking.x1, tracking.x2],
-            Axis::Z | Axis::X | Axis::Y => [errors.e1, errors.e1_dot],
-        };
+        let inputs = fuzzy_inputs(axis, [tracking.x1, tracking.x2], &errors);
         (subsystem.step(&errors, inputs, *context.unallocated.get(axis), context, estimate), errors)
     }
 
@@ -231,8 +281,9 @@ impl Law for Adaptive {
     }
 
     fn hover_thrust_n(&self, z: &Estimate, weight_n: f32) -> f32 {
+        let [least, largest] = HOVER_SHARE.map(|share| share * weight_n);
         // The rule for no error and no speed.
-        math::max(z.theta.m22, HOVER_SHARE_MIN * weight_n)
+        math::min(math::max(z.theta.m22, least), largest)
     }
 
     fn learnt(estimate: &Estimate) -> Estimate {

@@ -68,14 +68,14 @@ pub fn proportional(alpha2: f32, errors: &Errors) -> f32 {
     alpha2 * errors.e2
 }
 
-/// u*_eq + alpha_2 e_2 with the errors behind it. At the speed limit e_1 stands still, and (16) is for e_2 alone:
-/// otherwise -alpha_1^2 e_1 would hold a vehicle back that comes up to its speed.
+/// u*_eq + alpha_2 e_2 with the errors behind it. At the speed limit e_1 stands still, and (16) is for e_2 alone, whose
+/// rate is d^2 x_1d/dt^2 - f - g u: otherwise -alpha_1^2 e_1 would hold a vehicle back that comes up to its speed.
 #[inline]
 pub(crate) fn classical(gains: &Gains, tracking: &Tracking, dynamics: &Dynamics) -> (f32, Errors) {
     let Gains { alpha1, alpha2 } = *gains;
     let errors = Errors::new(alpha1, tracking);
     let ideal = if tracking.limited {
-        compensated(0.0, errors.e2, dynamics)
+        compensated(tracking.x1d_ddot, errors.e2, dynamics)
     } else {
         ideal(alpha1, &errors, tracking.x1d_ddot, dynamics)
     };
@@ -92,6 +92,11 @@ pub struct Gains {
 }
 
 impl Gains {
+    /// Both gains, with the range to search each in.
+    pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 2] {
+        [(&ALPHA1, &mut self.alpha1), (&ALPHA2, &mut self.alpha2)]
+    }
+
     /// Checks both gains.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
 
 use afbc::ground::{Ground, LIFT_SHARE, STILL_M_S, STILL_S};
-use afbc::{Adaptive, Controller, Memory, Profile, Settings};
+use afbc::{Adaptive, Controller, FlightController, Memory, Profile, Settings};
 use airframe::{Parameters, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
@@ -61,7 +61,7 @@ fn estimates_freeze_on_the_ground_and_thaw_on_lift() {
             for _ in 0..steps {
                 controller.step(&mut memory, &State::default(), &setpoint(z));
             }
-            memory.estimates
+            memory.control.estimates
         })
     };
     let [stood, still_standing, asked, lifted] = fly(true);

@@ -6,8 +6,8 @@ use afbc::backstepping::{self, Errors, Tracking, ideal, proportional};
 use afbc::cascade::Context;
 use afbc::fuzzy::{Basis, Membership};
 use afbc::model::Dynamics;
-use afbc::{Adaptive, Law, Profile, Safeguards};
-use airframe::{Axis, PerAxis, State};
+use afbc::{Adaptive, Backstepping, Law, Profile, Safeguards};
+use airframe::{Axis, Parameters, PerAxis, State};
 use nalgebra::Matrix3;
 use proptest::prelude::*;
 
@@ -16,7 +16,7 @@ const U: f64 = 1.0 / (1 << 24) as f64;
 
 fn tracking() -> impl Strategy<Value = Tracking> {
     (-10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0)
-        .prop_map(|(x1, x2, e1, x1d_dot, x1d_ddot)| Tracking { x1, x2, e1, x1d_dot, x1d_ddot, rate_max: f32::MAX })
+        .prop_map(|(x1, x2, e1, x1d_dot, x1d_ddot)| Tracking { x1, x2, e1, x1d_dot, x1d_ddot, limited: false })
 }
 
 fn gains() -> impl Strategy<Value = Gains> {
@@ -78,6 +78,25 @@ proptest! {
         prop_assert!((squares - wanted).abs() <= allowed, "{squares}, {wanted} wanted, allowed {allowed:e}");
         prop_assert!(g_dot != 0.0 || squares <= allowed);
         prop_assert!(g != 1.0 || left_over == 0.0);
+    }
+
+    /// At the speed limit e_1 stands still: (13) is d e_2/dt = d^2 x_1d/dt^2 - f - g u, and what (16) and (21) give it is
+    /// -g alpha_2 e_2. For x: f = 0, g = 1.
+    #[test]
+    fn at_the_speed_limit_e2_decays(tracking in tracking(), alpha1 in 0.01_f32..10.0, alpha2 in 0.0_f32..20.0) {
+        let tracking = Tracking { limited: true, ..tracking };
+        let law = Backstepping::new(&Parameters::PAPER.to_f32(), PerAxis::from_fn(|_| backstepping::Gains { alpha1, alpha2 }));
+        let context = Context {
+            state: &State::default(),
+            rotor_residual_rad_s: 0.0,
+            dt_s: 0.001,
+            adapt: true,
+            unallocated: PerAxis::default(),
+        };
+        let (u, errors) = law.unwrap().input(Axis::X, &tracking, &context, &mut ());
+        let [u, x1d_ddot, e2, a2] = [u, tracking.x1d_ddot, errors.e2, alpha2].map(f64::from);
+        let e2_dot = x1d_ddot - u;
+        prop_assert!((e2_dot + a2 * e2).abs() <= 4.0 * U * (x1d_ddot.abs() + a2 * e2.abs()), "{e2_dot} for {}", -a2 * e2);
     }
 
     /// (12), (13): e_2 is what e_1's own dynamics leave over.

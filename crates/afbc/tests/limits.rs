@@ -3,10 +3,10 @@
 
 mod common;
 
-use afbc::backstepping::{Errors, Tracking};
+use afbc::backstepping::Errors;
 use afbc::integral::IntegralBackstepping;
 use afbc::{Adaptive, Backstepping, Command, Controller, FlightController, Limits, Memory, Profile, Settings};
-use airframe::{Parameters, PerAxis, Setpoint, State};
+use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
 use common::{U, gains, limits, plausible, setpoint, settings, state};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -73,8 +73,9 @@ proptest! {
         let command = adaptive(Profile::Flight.gains(), settings).step(&mut Memory::default(), &state, &setpoint);
 
         let [u5, u6] = command.virtual_m_s2.map(f64::from);
-        let [roll, pitch] = [attitude_rad.x, attitude_rad.y].map(|angle| f64::from(afbc::math::cos(angle)));
-        let upward = f64::from(command.inputs.thrust_n) * roll * pitch / f64::from(WEIGHT_N);
+        let cosine = f64::from(afbc::math::tilt_cosine(attitude_rad.x, attitude_rad.y));
+        let thrust = command.inputs.thrust_n.min(4.0 * settings.rotor_force_max_n);
+        let upward = f64::from(thrust) * cosine / f64::from(WEIGHT_N);
         let vertical = if by_thrust { GRAVITY_M_S2 * upward.max(0.3) } else { GRAVITY_M_S2 };
         let max = (vertical * f64::from(limits.tilt_max_rad).tan()).min(f64::from(limits.acceleration_max_m_s2));
         let size = u5.hypot(u6);
@@ -90,18 +91,29 @@ proptest! {
         prop_assert!((got[0] - scale * u5).hypot(got[1] - scale * u6) <= allowed, "{got:?} of {u5}, {u6} scaled by {scale}");
     }
 
-    /// (12) with phi kept within the speed limit, and e_1 as it is.
+    /// (12) with alpha_1 e_1 of x, y and z kept within the speed limit, on top of the reference's own speed; e_1 is the
+    /// distance as long as that is within.
     #[test]
     fn errors_ask_for_no_more_than_the_speed_limit(
-        alpha1 in 0.01_f32..10.0, e1 in -100.0_f32..100.0, x1d_dot in -10.0_f32..10.0, x2 in -10.0_f32..10.0, rate_max in 0.1_f32..20.0,
+        gains in gains(), limits in limits(), state in state(plausible), setpoint in setpoint(plausible),
     ) {
-        let tracking = Tracking { x2, e1, x1d_dot, rate_max, ..Tracking::default() };
-        let errors = Errors::new(alpha1, &tracking);
-        let phi = f64::from(x1d_dot) + f64::from(alpha1) * f64::from(e1);
-        let wanted = phi.clamp(-f64::from(rate_max), f64::from(rate_max)) - f64::from(x2);
-        let size = f64::from(x1d_dot).abs() + f64::from(alpha1 * e1).abs() + f64::from(x2).abs();
-        prop_assert!((f64::from(errors.e2) - wanted).abs() <= 4.0 * U * size, "{} for {wanted}", errors.e2);
-        prop_assert_eq!((errors.e1, errors.e1_dot), (e1, x1d_dot - x2));
+        let settings = Settings { limits, ..Profile::Flight.settings() };
+        let command = adaptive(gains, settings).step(&mut Memory::default(), &state, &setpoint);
+        let Limits { speed_max_m_s, climb_max_m_s, .. } = limits;
+        for (i, axis, max) in [(0, Axis::X, speed_max_m_s), (1, Axis::Y, speed_max_m_s), (2, Axis::Z, climb_max_m_s)] {
+            let (Errors { e1, e1_dot, e2 }, alpha1, max) =
+                (*command.errors.get(axis), f64::from(gains.get(axis).backstepping.alpha1), f64::from(max));
+            let (distance, x1d_dot, x2) =
+                (setpoint.position_m[i] - state.position_m[i], setpoint.velocity_m_s[i], state.velocity_m_s[i]);
+            let speed = alpha1 * f64::from(distance);
+            let asked = speed.clamp(-max, max);
+            let wanted = f64::from(x1d_dot) + asked - f64::from(x2);
+            let size = f64::from(x1d_dot).abs() + asked.abs() + f64::from(x2).abs();
+            prop_assert!((f64::from(e2) - wanted).abs() <= 6.0 * U * size, "{axis:?}: {e2} for {wanted}");
+            prop_assert!((alpha1 * f64::from(e1) - asked).abs() <= 2.0 * U * asked.abs(), "{axis:?}: {e1} m of {distance} m");
+            prop_assert!(e1 == distance || speed.abs() > max * (1.0 - 2.0 * U), "{axis:?}: {e1} m of {distance} m");
+            prop_assert_eq!(e1_dot, x1d_dot - x2);
+        }
     }
 
     /// A whole turn more or less of the setpoint's yaw changes nothing, and the way round is the short one.
@@ -129,7 +141,7 @@ fn a_distant_setpoint_is_approached_at_the_speed_limit() {
     fn thrust<C: FlightController>(controller: &C, up_m: f32, climb_m_s: f32) -> f32 {
         let setpoint = Setpoint { position_m: Vector3::new(0.0, 0.0, up_m), ..Setpoint::default() };
         let state = State { velocity_m_s: Vector3::new(0.0, 0.0, climb_m_s), ..State::default() };
-        controller.step(&mut C::Memory::default(), &state, &setpoint).inputs.thrust_n
+        controller.step(&mut Memory::default(), &state, &setpoint).inputs.thrust_n
     }
     fn check<C: FlightController>(controller: &C) {
         for up_m in [0.3, 1.5, 5.0, 10.0, 100.0, 1e4] {

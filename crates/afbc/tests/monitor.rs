@@ -5,7 +5,7 @@ use afbc::adaptive::Estimate;
 use afbc::backstepping::Errors;
 use afbc::model::Model;
 use afbc::monitor::{BOUND, Bounds, Figures, Monitor, SATURATION_SHARE, SWING, SWINGS, Trip};
-use afbc::{Command, Health, Profile};
+use afbc::{Cascade, Command, Health, Profile};
 use airframe::{Axis, Inputs, Parameters, PerAxis};
 use nalgebra::Matrix3;
 use proptest::prelude::*;
@@ -27,6 +27,13 @@ fn hover() -> Command {
     Command { inputs: Inputs { thrust_n: WEIGHT_N, ..Inputs::default() }, ..Command::default() }
 }
 
+/// One step's look at what has been learnt and commanded.
+fn look(monitor: &Monitor, figures: &mut Figures, estimates: PerAxis<Estimate>, command: &Command) -> Option<Trip> {
+    let mut cascade = Cascade::default();
+    (cascade.estimates, cascade.errors) = (estimates, command.errors);
+    monitor.watch(figures, &cascade, &command.per_axis(), command.health.saturated)
+}
+
 /// The first trip of `steps` steps, and after how many.
 fn watch(
     monitor: &Monitor,
@@ -36,7 +43,7 @@ fn watch(
     let mut figures = Figures::default();
     for i in 0..steps {
         let (estimates, command) = step(i);
-        if let Some(trip) = monitor.watch(&mut figures, &estimates, &command) {
+        if let Some(trip) = look(monitor, &mut figures, estimates, &command) {
             return (figures, Some((i + 1, trip)));
         }
     }
@@ -188,7 +195,7 @@ proptest! {
         let monitor = monitor(bounds());
         let mut figures = Figures::default();
         for axis in Axis::ALL.into_iter().chain(Axis::ALL) {
-            monitor.watch(&mut figures, &PerAxis::from_fn(|_| estimate), &hover());
+            look(&monitor, &mut figures, PerAxis::from_fn(|_| estimate), &hover());
             let (looked_at, norm) = figures.latest();
             prop_assert_eq!(looked_at, axis);
             prop_assert_eq!(norm.delta, delta);

@@ -4,7 +4,7 @@
 mod common;
 
 use afbc::adaptive::{Estimate, Gains};
-use afbc::{Adaptive, Backstepping, Controller, Health, Law, Memory, Profile, Settings};
+use afbc::{Adaptive, Backstepping, Cascade, Controller, FlightController, Health, Law, Memory, Profile, Settings};
 use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
 use common::{check_command, gains, plausible, setpoint, settings, state, value};
 use proptest::prelude::*;
@@ -23,8 +23,8 @@ fn backstepping(gains: PerAxis<Gains>, settings: Settings) -> Controller<Backste
     Controller::new(vehicle, settings, Backstepping::new(&vehicle, gains).unwrap()).unwrap()
 }
 
-fn estimates<L: Law>(memory: &Memory<L::Estimate>) -> PerAxis<Estimate> {
-    PerAxis::from_fn(|axis| L::learnt(memory.estimates.get(axis)))
+fn estimates<L: Law>(memory: &Memory<Cascade<L::Estimate>>) -> PerAxis<Estimate> {
+    PerAxis::from_fn(|axis| L::learnt(memory.control.estimates.get(axis)))
 }
 
 fn check_estimates(estimates: &PerAxis<Estimate>) -> Result<(), TestCaseError> {
@@ -111,7 +111,7 @@ proptest! {
         prop_assert_eq!(stood_in.errors, wanted.errors);
         let saturated = wanted.health.saturated;
         prop_assert_eq!(stood_in.health, Health { state_rejected: true, saturated, ..Health::default() });
-        prop_assert_ne!(memory.estimates, other.estimates, "the plausible twin should have learnt");
+        prop_assert_ne!(memory.control.estimates, other.control.estimates, "the plausible twin should have learnt");
     }
 
     /// While a setpoint is implausible the last plausible one stands in, and learning goes on; before the first one, the
@@ -134,7 +134,7 @@ proptest! {
             let wanted = controller.step(&mut other, &after, &substitute);
             prop_assert_eq!(stood_in.speeds, wanted.speeds);
             prop_assert!(stood_in.health.setpoint_rejected && !stood_in.health.state_rejected);
-            prop_assert_eq!(memory.estimates, other.estimates);
+            prop_assert_eq!(memory.control.estimates, other.control.estimates);
         }
     }
 }

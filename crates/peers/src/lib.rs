@@ -26,13 +26,13 @@
 //!
 //! Gains are plain structs. `tunables` lists each gain that is a matter of taste with the range to search; what describes
 //! the vehicle instead (largest tilt, rotor lag) is in `others`. The sets given
-//! here, each named `Gains::PAPER_VEHICLE` or after its source, were tuned by hand for the vehicle of the paper's
-//! Section IV with rotors of 20 ms.
+//! here, each named `Gains::PAPER_VEHICLE` or after its source, were found by `sitl tune` (`docs/tuning.md`; those of 2010 by
+//! hand) for the vehicle of the paper's Section IV with rotors of 20 ms.
 //!
 //! ```
-//! use afbc::{FlightController, Profile};
+//! use afbc::{FlightController, Memory, Profile};
 //! use airframe::{Parameters, Setpoint, State};
-//! use peers::pid::{Gains, Memory, Pid};
+//! use peers::pid::{Gains, Pid};
 //!
 //! let controller = Pid::new(Parameters::PAPER.to_f32(), Profile::Paper.settings(), Gains::PAPER_VEHICLE)?;
 //! let command = controller.step(&mut Memory::default(), &State::default(), &Setpoint::default());
@@ -52,3 +52,10 @@ pub mod pid;
 pub use geometric::Geometric;
 pub use indi::Indi;
 pub use pid::Pid;
+
+use airframe::{OutOfRange, Range};
+
+/// Checks each gain against its range.
+fn within<const N: usize>(gains: [(&'static Range, &mut f32); N]) -> Result<(), OutOfRange> {
+    gains.into_iter().try_for_each(|(range, gain)| range.check(*gain))
+}

@@ -25,6 +25,7 @@ use crate::attitude::{facing, length, r_earth_body, tilt_prioritised_error};
 use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
 use crate::limits::{Limits, TILT_MAX, cylinder};
+use crate::within;
 use afbc::{Command, FlightController, Settings};
 use airframe::{OutOfRange, Parameters, Range, Setpoint, State};
 use nalgebra::Vector3;
@@ -106,25 +107,25 @@ pub struct Gains {
 }
 
 impl Gains {
-    /// Ours, by hand, for the paper's vehicle with rotors of 20 ms.
+    /// Ours, found by `sitl tune`, for the paper's vehicle with rotors of 20 ms.
     pub const PAPER_VEHICLE: Self = Gains {
-        position_p_1_s: 2.2,
-        velocity_p_1_s: 6.0,
-        velocity_i_1_s2: 12.0,
-        velocity_d: 0.05,
-        height_p_1_s: 2.0,
-        climb_p_1_s: 7.0,
-        climb_i_1_s2: 30.0,
+        position_p_1_s: 1.579,
+        velocity_p_1_s: 5.146,
+        velocity_i_1_s2: 25.54,
+        velocity_d: 0.04463,
+        height_p_1_s: 1.24,
+        climb_p_1_s: 5.953,
+        climb_i_1_s2: 90.24,
         climb_d: 0.0,
-        tilt_p_1_s: 11.0,
-        yaw_p_1_s: 2.0,
-        tilt_rate_p_1_s: 30.0,
-        tilt_rate_i_1_s2: 40.0,
-        tilt_rate_d: 0.05,
-        yaw_rate_p_1_s: 8.0,
-        yaw_rate_i_1_s2: 15.0,
+        tilt_p_1_s: 13.36,
+        yaw_p_1_s: 0.6672,
+        tilt_rate_p_1_s: 21.76,
+        tilt_rate_i_1_s2: 49.82,
+        tilt_rate_d: 0.06449,
+        yaw_rate_p_1_s: 1.704,
+        yaw_rate_i_1_s2: 25.31,
         rate_feed_forward_1_s: 0.0,
-        filter_rad_s: 100.0,
+        filter_rad_s: 138.2,
         yaw_weight: 0.4,
         speed_max_m_s: 3.0,
         tilt_max_rad: 0.7,
@@ -169,8 +170,8 @@ impl Gains {
     /// The first one out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
         let mut gains = *self;
-        gains.tunables().into_iter().try_for_each(|(range, gain)| range.check(*gain))?;
-        gains.others().into_iter().try_for_each(|(range, gain)| range.check(*gain))
+        within(gains.tunables())?;
+        within(gains.others())
     }
 }
 

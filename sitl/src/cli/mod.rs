@@ -1,5 +1,7 @@
 //! The command line: one module for each command.
 
+mod campaign;
+mod compare;
 mod fly;
 mod flying;
 mod hitl;
@@ -9,6 +11,7 @@ mod pil;
 mod results;
 mod scenarios;
 mod target;
+mod tune;
 
 use clap::{Parser, Subcommand};
 use std::error::Error;
@@ -24,7 +27,9 @@ type Failure = Box<dyn Error>;
 /// laws did and writes logs, figures and a report.
 #[derive(Debug, Parser)]
 #[command(version, args_conflicts_with_subcommands = true, max_term_width = 110)]
-#[command(after_help = "Exit codes: 0 all well; 1 a vehicle was lost; 2 wrong input, or nothing could be written.")]
+#[command(
+    after_help = "Exit codes: 0 all well; 1 a vehicle was lost; 2 wrong input, or nothing could be written; 130 interrupted."
+)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
@@ -37,8 +42,13 @@ pub(crate) struct Cli {
 enum Command {
     Paper(paper::Paper),
     Fly(fly::Fly),
+    Campaign(campaign::Campaign),
+    Merge(campaign::Merge),
+    Compare(compare::Compare),
+    Tune(tune::Tune),
     Check(scenarios::Check),
     Scenarios(scenarios::Scenarios),
+    Campaigns(campaign::Campaigns),
     Results(results::Results),
     Pil(pil::Pil),
     Hitl(hitl::Hitl),
@@ -50,8 +60,13 @@ impl Cli {
         match self.command.unwrap_or(Command::Paper(self.paper)) {
             Command::Paper(paper) => paper.run(),
             Command::Fly(fly) => fly.run(),
+            Command::Campaign(campaign) => campaign.run(),
+            Command::Merge(merge) => merge.run(),
+            Command::Compare(compare) => compare.run(),
+            Command::Tune(tune) => tune.run(),
             Command::Check(check) => check.run(),
             Command::Scenarios(scenarios) => scenarios.run(),
+            Command::Campaigns(campaigns) => campaigns.run(),
             Command::Results(results) => results.run(),
             Command::Pil(pil) => pil.run(),
             Command::Hitl(hitl) => hitl.run(),

@@ -9,9 +9,9 @@ use std::path::PathBuf;
 #[derive(Clone, Debug)]
 pub(crate) struct Target(PathBuf);
 
-impl From<OsString> for Target {
-    fn from(path: OsString) -> Self {
-        Target(path.into())
+impl<P: Into<OsString>> From<P> for Target {
+    fn from(path: P) -> Self {
+        Target(path.into().into())
     }
 }
 

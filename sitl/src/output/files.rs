@@ -74,32 +74,32 @@ fn unique(taken: &mut HashSet<String>, name: String) -> String {
 }
 
 /// A folder that files are put into whole.
-pub(super) struct Folder<'a>(&'a Path);
+pub(crate) struct Folder<'a>(&'a Path);
 
 impl<'a> Folder<'a> {
     /// The folder at `dir`, created with its parents if need be.
-    pub(super) fn create(dir: &'a Path) -> Result<Self, Error> {
+    pub(crate) fn create(dir: &'a Path) -> Result<Self, Error> {
         fs::create_dir_all(dir).map_err(|source| Error { path: dir.into(), source })?;
         Ok(Folder(dir))
     }
 
-    pub(super) fn error(&self, name: &str, source: io::Error) -> Error {
+    pub(crate) fn error(&self, name: &str, source: io::Error) -> Error {
         Error { path: self.0.join(name), source }
     }
 
     /// Lets `fill` write a file under a temporary name, then gives it its own; an interrupted or failed run leaves the
-    /// file that was there before.
-    pub(super) fn place(
+    /// file that was there before. What has its own name is on the disk, whatever happens to the power.
+    pub(crate) fn place(
         &self,
         name: &str,
-        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+        fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
     ) -> Result<PathBuf, Error> {
         let path = self.0.join(name);
         let temporary = self.0.join(format!(".{name}.{}.tmp", std::process::id()));
         let written = File::create(&temporary).and_then(|file| {
             let mut out = BufWriter::new(file);
             fill(&mut out)?;
-            out.flush()
+            out.into_inner()?.sync_all()
         });
         written.and_then(|()| fs::rename(&temporary, &path)).map_err(|source| {
             // Nothing more can be done if this fails too.

@@ -3,6 +3,8 @@
 //! [`write()`] fills a folder; [`table()`] is for the terminal. The same flights give the same bytes: nothing here knows the
 //! time of day or the machine.
 
+pub mod campaign;
+pub mod compare;
 mod csv;
 mod error;
 mod figures;
@@ -17,6 +19,7 @@ mod words;
 mod tests;
 
 pub use error::Error;
+pub(crate) use files::Folder;
 pub use table::table;
 
 use crate::claims::Claim;

@@ -57,6 +57,19 @@ pub(super) fn page(groups: &[Group], figures: &[Vec<Figure>], claims: &[Claim]) 
         [only] => only.scenario.description.as_str(),
         _ => "Flights",
     };
+    let body = html! {
+        p.quiet {
+            "Flown in software: the control crate against a model of the vehicle, in lockstep."
+        }
+        @if groups.is_empty() { p { "Nothing was flown." } }
+        @if !claims.is_empty() { (verdicts(claims)) }
+        @for (group, figures) in groups.iter().zip(figures) { (section(group, figures)) }
+    };
+    sheet(title, &body)
+}
+
+/// A whole page.
+pub(super) fn sheet(title: &str, body: &Markup) -> String {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -68,16 +81,21 @@ pub(super) fn page(groups: &[Group], figures: &[Vec<Figure>], claims: &[Claim]) 
             }
             body {
                 h1 { (capitalised(title)) }
-                p.quiet {
-                    "Flown in software: the control crate against a model of the vehicle, in lockstep."
-                }
-                @if groups.is_empty() { p { "Nothing was flown." } }
-                @if !claims.is_empty() { (verdicts(claims)) }
-                @for (group, figures) in groups.iter().zip(figures) { (section(group, figures)) }
+                (body)
             }
         }
     }
     .into_string()
+}
+
+/// A figure with its caption.
+pub(super) fn picture(figure: &Figure) -> Markup {
+    html! {
+        figure {
+            (PreEscaped(figure.svg.replacen(NAMESPACE, "", 1)))
+            figcaption { (figure.caption) }
+        }
+    }
 }
 
 fn capitalised(text: &str) -> String {
@@ -110,12 +128,7 @@ fn section(group: &Group, figures: &[Figure]) -> Markup {
             }
         }
         p.quiet { (table::legend()) }
-        @for figure in figures {
-            figure {
-                (PreEscaped(figure.svg.replacen(NAMESPACE, "", 1)))
-                figcaption { (figure.caption) }
-            }
-        }
+        @for figure in figures { (picture(figure)) }
         h3 { "Parameters" }
         div.scroll { (parameters(group.scenario)) }
     }
@@ -149,7 +162,7 @@ fn results(group: &Group) -> Markup {
 }
 
 /// What determines the flight.
-fn parameters(scenario: &Scenario) -> Markup {
+pub(super) fn parameters(scenario: &Scenario) -> Markup {
     let vehicle = &scenario.vehicle;
     let inertia = &vehicle.inertia_kg_m2;
     let fixed = [

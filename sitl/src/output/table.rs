@@ -158,7 +158,7 @@ fn row(title: &str, name: &str, name_width: usize, cells: &[impl AsRef<str>; 4])
 }
 
 /// Appends `text` behind `first`, broken between words; further lines start below the text.
-fn wrap(lines: &mut Vec<String>, first: &str, text: &str) {
+pub(super) fn wrap(lines: &mut Vec<String>, first: &str, text: &str) {
     let mut line = first.to_owned();
     let mut length = first.chars().count();
     let indent = length;

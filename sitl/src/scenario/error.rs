@@ -13,12 +13,12 @@ pub struct FileError {
 
 impl FileError {
     /// The file as a whole is of no use.
-    pub(super) fn whole(file: &str, problem: impl Into<String>) -> Self {
+    pub(crate) fn whole(file: &str, problem: impl Into<String>) -> Self {
         FileError { file: file.into(), line: None, key: String::new(), problem: problem.into() }
     }
 
     /// Something at byte `at` of `text`; `key` is empty if it is not about a key.
-    pub(super) fn at(source: Source<'_>, at: usize, key: impl Into<String>, problem: impl Into<String>) -> Self {
+    pub(crate) fn at(source: Source<'_>, at: usize, key: impl Into<String>, problem: impl Into<String>) -> Self {
         let line = 1 + source.text.bytes().take(at).filter(|&byte| byte == b'\n').count();
         FileError { file: source.file.into(), line: Some(line), key: key.into(), problem: problem.into() }
     }
@@ -26,9 +26,9 @@ impl FileError {
 
 /// A file's name, as the user gave it, and its text.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Source<'a> {
-    pub(super) file: &'a str,
-    pub(super) text: &'a str,
+pub(crate) struct Source<'a> {
+    pub(crate) file: &'a str,
+    pub(crate) text: &'a str,
 }
 
 impl fmt::Display for FileError {

@@ -4,9 +4,9 @@
 
 mod built_in;
 mod error;
-mod file;
-mod reader;
-mod words;
+pub(crate) mod file;
+pub(crate) mod reader;
+pub(crate) mod words;
 
 pub use built_in::{BUILT_IN, BuiltIn, built_in, similar_built_in};
 pub use error::FileError;

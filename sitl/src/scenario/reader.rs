@@ -11,7 +11,7 @@ use toml::de::{DeTable, DeValue};
 const MOST: usize = 100;
 
 /// One table of a document, and which of its keys have been read.
-pub(super) struct Table<'a> {
+pub(crate) struct Table<'a> {
     source: Source<'a>,
     /// Its dotted name; empty for the document itself.
     path: String,
@@ -23,24 +23,56 @@ pub(super) struct Table<'a> {
 
 impl<'a> Table<'a> {
     /// The document as a table.
-    pub(super) fn root(source: Source<'a>, entries: &'a DeTable<'a>) -> Self {
+    pub(crate) fn root(source: Source<'a>, entries: &'a DeTable<'a>) -> Self {
         Table { source, path: String::new(), start: 0, entries, read: Vec::new() }
     }
 
     /// The number under `range.name`, if it is there.
-    pub(super) fn number(&mut self, range: &Range) -> Result<Option<f64>, FileError> {
+    pub(crate) fn number(&mut self, range: &Range) -> Result<Option<f64>, FileError> {
         let Some(value) = self.value(range.name) else { return Ok(None) };
         self.number_in(value, range.name, range).map(Some)
     }
 
     /// The number under `range.name`, which must be there.
-    pub(super) fn need_number(&mut self, range: &Range) -> Result<f64, FileError> {
+    pub(crate) fn need_number(&mut self, range: &Range) -> Result<f64, FileError> {
         let number = self.number(range)?;
         number.ok_or_else(|| self.missing(range.name, &format!("add it{}", words::unit(range.name))))
     }
 
+    /// The whole number under `range.name`, if it is there.
+    pub(crate) fn whole(&mut self, range: &Range) -> Result<Option<u64>, FileError> {
+        match self.number(range)? {
+            Some(number) if number.fract() != 0.0 => {
+                Err(self.fault_at(range.name, format!("{number} is not a whole number; make it one")))
+            }
+            number => Ok(number.map(|number| number as u64)),
+        }
+    }
+
+    /// The interval `[low, high]` under `range.name`, or a single number that is both, if it is there.
+    pub(crate) fn interval(&mut self, range: &Range) -> Result<Option<[f64; 2]>, FileError> {
+        let Some(value) = self.value(range.name) else { return Ok(None) };
+        let number = |value| self.number_in(value, range.name, range);
+        let Some(array) = value.get_ref().as_array() else {
+            return number(value).map(|number| Some([number; 2]));
+        };
+        match array.iter().collect::<Vec<_>>().as_slice() {
+            [low, high] => match [number(low)?, number(high)?] {
+                [low, high] if low > high => {
+                    Err(self.refuse(value, range.name, format!("{low} is above {high}; write the smaller end first")))
+                }
+                ends => Ok(Some(ends)),
+            },
+            other => Err(self.refuse(
+                value,
+                range.name,
+                format!("{} values; it must be one number, or two: [low, high]", other.len()),
+            )),
+        }
+    }
+
     /// The three numbers under `key`, each in its range, if they are there.
-    pub(super) fn vector(&mut self, key: &'static str, ranges: [&Range; 3]) -> Result<Option<Vector3<f64>>, FileError> {
+    pub(crate) fn vector(&mut self, key: &'static str, ranges: [&Range; 3]) -> Result<Option<Vector3<f64>>, FileError> {
         let Some(value) = self.value(key) else { return Ok(None) };
         let ([rx, ry, rz], array) = (ranges, value.get_ref().as_array());
         let number = |value, range| self.number_in(value, key, range);
@@ -54,24 +86,33 @@ impl<'a> Table<'a> {
     }
 
     /// The three numbers under `key`, which must be there, each in `range`.
-    pub(super) fn need_vector(&mut self, key: &'static str, range: &Range) -> Result<Vector3<f64>, FileError> {
+    pub(crate) fn need_vector(&mut self, key: &'static str, range: &Range) -> Result<Vector3<f64>, FileError> {
         let vector = self.vector(key, [range; 3])?;
         vector.ok_or_else(|| self.missing(key, &format!("add three numbers{}", words::unit(key))))
     }
 
     /// The string under `key`, if it is there.
-    pub(super) fn text(&mut self, key: &'static str) -> Result<Option<&'a str>, FileError> {
+    pub(crate) fn text(&mut self, key: &'static str) -> Result<Option<&'a str>, FileError> {
         let Some(value) = self.value(key) else { return Ok(None) };
         self.text_in(value, key).map(Some)
     }
 
     /// The string under `key`, which must be there.
-    pub(super) fn need_text(&mut self, key: &'static str, cure: &str) -> Result<&'a str, FileError> {
+    pub(crate) fn need_text(&mut self, key: &'static str, cure: &str) -> Result<&'a str, FileError> {
         self.text(key)?.ok_or_else(|| self.missing(key, cure))
     }
 
+    /// The strings listed under `key`, if the list is there.
+    pub(crate) fn texts(&mut self, key: &'static str) -> Result<Option<Vec<&'a str>>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let Some(array) = value.get_ref().as_array() else {
+            return Err(self.wrong_type(value, key, "a list", "[\"...\"]"));
+        };
+        array.iter().map(|item| self.text_in(item, key)).collect::<Result<_, _>>().map(Some)
+    }
+
     /// The option whose name stands under `key`, if it is there.
-    pub(super) fn choice<T: Copy>(
+    pub(crate) fn choice<T: Copy>(
         &mut self,
         key: &'static str,
         options: &[T],
@@ -82,7 +123,7 @@ impl<'a> Table<'a> {
     }
 
     /// The option whose name stands under `key`, which must be there.
-    pub(super) fn need_choice<T: Copy>(
+    pub(crate) fn need_choice<T: Copy>(
         &mut self,
         key: &'static str,
         options: &[T],
@@ -93,7 +134,7 @@ impl<'a> Table<'a> {
     }
 
     /// The options whose names are listed under `key`, at least one and none twice, if the list is there.
-    pub(super) fn choices<T: Copy + PartialEq>(
+    pub(crate) fn choices<T: Copy + PartialEq>(
         &mut self,
         key: &'static str,
         options: &[T],
@@ -118,13 +159,19 @@ impl<'a> Table<'a> {
     }
 
     /// The table under `key`, if it is there.
-    pub(super) fn table(&mut self, key: &'static str) -> Result<Option<Table<'a>>, FileError> {
+    pub(crate) fn table(&mut self, key: &'static str) -> Result<Option<Table<'a>>, FileError> {
         let Some(value) = self.value(key) else { return Ok(None) };
         self.table_in(value, key, &format!("one table: [{}]", self.dotted(key))).map(Some)
     }
 
+    /// The table under `key`, if there is one rather than something else.
+    pub(crate) fn table_if(&mut self, key: &'static str) -> Result<Option<Table<'a>>, FileError> {
+        let is_table = self.entries.get(key).is_some_and(|value| value.get_ref().is_table());
+        if is_table { self.table(key) } else { Ok(None) }
+    }
+
     /// The tables of the array under `key`; none if it is not there.
-    pub(super) fn tables(&mut self, key: &'static str) -> Result<Vec<Table<'a>>, FileError> {
+    pub(crate) fn tables(&mut self, key: &'static str) -> Result<Vec<Table<'a>>, FileError> {
         let Some(value) = self.value(key) else { return Ok(Vec::new()) };
         let wanted = format!("[[{}]], once for each", self.dotted(key));
         let Some(array) = value.get_ref().as_array() else {
@@ -155,7 +202,7 @@ impl<'a> Table<'a> {
     }
 
     /// Refuses the first key, from the top, that nobody read.
-    pub(super) fn finish(self) -> Result<(), FileError> {
+    pub(crate) fn finish(self) -> Result<(), FileError> {
         let Some((key, start)) = self.unread().min_by_key(|(_, start)| *start) else { return Ok(()) };
         let cure = match nearest(key, self.read.iter().copied()) {
             Some(known) => did_you_mean(known),
@@ -165,23 +212,23 @@ impl<'a> Table<'a> {
     }
 
     /// Refuses `key`, which has its place elsewhere.
-    pub(super) fn forbid(&self, key: &str, problem: &str) -> Result<(), FileError> {
+    pub(crate) fn forbid(&self, key: &str, problem: &str) -> Result<(), FileError> {
         if self.entries.contains_key(key) { Err(self.fault_at(key, problem)) } else { Ok(()) }
     }
 
     /// The whole table is refused on account of `key`.
-    pub(super) fn fault(&self, key: &str, problem: impl Into<String>) -> FileError {
+    pub(crate) fn fault(&self, key: &str, problem: impl Into<String>) -> FileError {
         FileError::at(self.source, self.start, self.dotted(key), problem)
     }
 
     /// The value under `key` is refused.
-    pub(super) fn fault_at(&self, key: &str, problem: impl Into<String>) -> FileError {
+    pub(crate) fn fault_at(&self, key: &str, problem: impl Into<String>) -> FileError {
         let start = self.entries.get(key).map_or(self.start, |value| value.span().start);
         FileError::at(self.source, start, self.dotted(key), problem)
     }
 
     /// `key` is needed and not there, unless an unread key looks like a slip of the pen.
-    pub(super) fn missing(&self, key: &'static str, cure: &str) -> FileError {
+    pub(crate) fn missing(&self, key: &'static str, cure: &str) -> FileError {
         let slip = nearest(key, self.unread().map(|(unread, _)| unread));
         match self.unread().find(|(unread, _)| Some(*unread) == slip) {
             Some((slip, start)) => self.unknown(slip, start, &did_you_mean(key)),

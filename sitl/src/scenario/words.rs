@@ -40,18 +40,18 @@ const UNITS: [(&str, &str); 30] = [
 ];
 
 /// ` (kilograms)` for `mass_kg`; nothing for a key without a unit.
-pub(super) fn unit(key: &str) -> String {
+pub(crate) fn unit(key: &str) -> String {
     let found = UNITS.iter().find(|(ending, _)| key.ends_with(ending));
     found.map_or(String::new(), |(_, words)| format!(" ({words})"))
 }
 
 /// A number for people: decimal where that is short.
-pub(super) fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     if value == 0.0 || (1e-4..1e7).contains(&value.abs()) { format!("{value}") } else { format!("{value:e}") }
 }
 
 /// What is out of range, as a controller or plant found it.
-pub(super) fn out_of_range(error: &OutOfRange) -> String {
+pub(crate) fn out_of_range(error: &OutOfRange) -> String {
     let OutOfRange { value, range } = error;
     // To f32 precision, for a decimal in a file may have come through one.
     let (value, min, max) = (*value as f32, number(range.min), number(range.max));
@@ -59,19 +59,19 @@ pub(super) fn out_of_range(error: &OutOfRange) -> String {
 }
 
 /// The word most like `word`, if any is like it at all.
-pub(super) fn nearest<'w>(word: &str, words: impl Iterator<Item = &'w str>) -> Option<&'w str> {
+pub(crate) fn nearest<'w>(word: &str, words: impl Iterator<Item = &'w str>) -> Option<&'w str> {
     let rated = words.map(|other| (strsim::jaro_winkler(word, other), other));
     let (likeness, best) = rated.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
     (likeness >= LIKENESS).then_some(best)
 }
 
 /// The cure for a slip of the pen.
-pub(super) fn did_you_mean(key: &str) -> String {
+pub(crate) fn did_you_mean(key: &str) -> String {
     format!("did you mean {key}{}?", unit(key))
 }
 
 /// `"step", "circle" or "hover"`.
-pub(super) fn one_of<T: Copy>(options: &[T], name: fn(T) -> &'static str) -> String {
+pub(crate) fn one_of<T: Copy>(options: &[T], name: fn(T) -> &'static str) -> String {
     let quoted: Vec<_> = options.iter().map(|&option| format!("\"{}\"", name(option))).collect();
     match quoted.split_last() {
         Some((last, others)) if !others.is_empty() => format!("{} or {last}", others.join(", ")),

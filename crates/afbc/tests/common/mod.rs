@@ -110,32 +110,28 @@ pub(crate) fn limits() -> impl Strategy<Value = Limits> {
 pub(crate) fn safeguards() -> impl Strategy<Value = Safeguards> {
     let leakage = (spread(SIGMA), spread(KAPPA));
     let bounds = (spread(THETA_MAX), spread(DELTA_MAX));
-    let any = (leakage, bounds, spread(DEAD_ZONE), any::<bool>()).prop_map(
-        |((sigma, kappa), (theta_max, delta_max), dead_zone, heed_saturation)| Safeguards {
-            sigma,
-            kappa,
-            theta_max,
-            delta_max,
-            dead_zone,
-            heed_saturation,
-        },
-    );
+    let any = (leakage, bounds, spread(DEAD_ZONE)).prop_map(|((sigma, kappa), (theta_max, delta_max), dead_zone)| {
+        Safeguards { sigma, kappa, theta_max, delta_max, dead_zone }
+    });
     prop_oneof![1 => Just(Safeguards::NONE), 4 => any]
 }
 
 pub(crate) fn settings() -> impl Strategy<Value = Settings> {
     let numbers = (within(DT), within(BANDWIDTH), within(FORCE_MAX), limits());
-    let any = (numbers, any::<[bool; 3]>()).prop_map(
-        |((dt_s, command_filter_rad_s, rotor_force_max_n, limits), [tilt_by_thrust, heed_ground, bumpless])| Settings {
+    let any = (numbers, any::<[bool; 4]>()).prop_map(|(numbers, switches)| {
+        let (dt_s, command_filter_rad_s, rotor_force_max_n, limits) = numbers;
+        let [tilt_by_thrust, heed_saturation, heed_ground, bumpless] = switches;
+        Settings {
             dt_s,
             command_filter_rad_s,
             rotor_force_max_n,
             limits,
             tilt_by_thrust,
+            heed_saturation,
             heed_ground,
             bumpless,
-        },
-    );
+        }
+    });
     prop_oneof![Just(Profile::Paper.settings()), Just(Profile::Flight.settings()), any]
 }
 

@@ -3,7 +3,9 @@
 //! Gusts are marked where they strike and the time when parameters are off is shaded. Colours are Okabe and Ito's, which
 //! the colour-blind can tell apart.
 
+pub(super) mod campaign;
 mod canvas;
+pub(super) mod compare;
 mod marks;
 mod reduce;
 mod time_chart;
@@ -130,6 +132,12 @@ const ERRORS: [(&str, Value); 4] = [
 ];
 /// Fig. 8.
 const INPUTS: [(&str, Input); 4] = [("U₁ [N]", |u| u.x), ("U₂ [N]", |u| u.y), ("U₃ [N]", |u| u.z), ("U₄ [N]", |u| u.w)];
+
+/// Fig. 7 alone.
+pub(super) fn errors(flights: &[&Flown]) -> io::Result<Option<Figure>> {
+    let fig7 = draw(flights)?.into_iter().find(|figure| figure.name == "fig7-errors");
+    Ok(fig7.map(|figure| Figure { name: "errors", ..figure }))
+}
 
 /// Draws every figure of one scenario's flights; of no flight, none.
 pub(super) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {

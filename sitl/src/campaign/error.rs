@@ -1,0 +1,98 @@
+//! What can keep a campaign from its results, in one line.
+
+use super::Shard;
+use crate::output;
+use airframe::OutOfRange;
+use std::fmt;
+use std::path::PathBuf;
+
+/// One line for people.
+#[derive(Debug)]
+pub enum Error {
+    /// A flight whose draw cannot be flown.
+    Draw {
+        /// Which.
+        flight: u64,
+        /// Why.
+        error: OutOfRange,
+    },
+    /// A file that cannot be read as results.
+    Damaged {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        problem: String,
+    },
+    /// The folder holds results of something else.
+    Changed(PathBuf),
+    /// Another program is at work in the folder.
+    Busy(PathBuf),
+    /// A shard without results yet.
+    Unfinished(PathBuf),
+    /// Results of different campaigns.
+    Strangers([PathBuf; 2]),
+    /// Two folders with the same shard.
+    Twice(Shard, [PathBuf; 2]),
+    /// Shards without a folder.
+    Missing(Vec<Shard>),
+    /// Something could not be written.
+    Output(output::Error),
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::Draw { flight, error } => {
+                write!(f, "flight {flight} cannot be flown: {error}; narrow the spread that leads there")
+            }
+            Error::Damaged { path, problem } => {
+                write!(f, "{}: damaged ({problem}); delete it and fly that part again", path.display())
+            }
+            Error::Changed(path) => write!(
+                f,
+                "{}: holds results of a campaign, shard or program that is not this one; choose another folder with \
+                 --out, or delete it",
+                path.display()
+            ),
+            Error::Busy(path) => {
+                write!(
+                    f,
+                    "{}: another campaign is being flown into it; wait, or choose another with --out",
+                    path.display()
+                )
+            }
+            Error::Unfinished(path) => write!(
+                f,
+                "{}: no finished results in it; fly that shard to its end with `sitl campaign --shard` first",
+                path.display()
+            ),
+            Error::Strangers([a, b]) => write!(
+                f,
+                "{} and {}: parts of different campaigns; merge those of one and the same file and program",
+                a.display(),
+                b.display()
+            ),
+            Error::Twice(shard, [a, b]) => {
+                write!(f, "{} and {}: both hold shard {shard}; name one of them", a.display(), b.display())
+            }
+            Error::Missing(shards) => {
+                let names: Vec<_> = shards.iter().take(8).map(Shard::to_string).collect();
+                let more = if shards.len() > names.len() {
+                    format!(" and {} more", shards.len() - names.len())
+                } else {
+                    String::new()
+                };
+                write!(f, "shard {}{more} missing; fly it, or name its folder too", names.join(", "))
+            }
+            Error::Output(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+impl From<output::Error> for Error {
+    fn from(error: output::Error) -> Self {
+        Error::Output(error)
+    }
+}

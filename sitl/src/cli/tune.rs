@@ -1,0 +1,109 @@
+//! `sitl tune`: gains for one contender.
+
+use super::target::Target;
+use super::{Failure, print};
+use afbc::Profile;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use sitl::scenario::{Contender, ControllerKind, Scenario};
+use sitl::tune::{self, Found};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Search for gains: the same flights, cost, search and effort for every law
+///
+/// Prints a [[contender]] to put into a scenario file, with what it costs before and after as comments. Ctrl-C ends the
+/// search early and keeps the best so far. See docs/tuning.md.
+#[derive(Args, Debug)]
+pub(crate) struct Tune {
+    /// A law, to start from its gains for flight, or a contender of the first --scenario
+    #[arg(value_name = "CONTROLLER")]
+    contender: String,
+
+    /// Fly this built-in scenario or scenario file instead of the training flights; may be given more than once
+    #[arg(long = "scenario", value_name = "SCENARIO")]
+    scenarios: Vec<Target>,
+
+    /// How many sets of gains to try
+    #[arg(long, value_name = "N", default_value = "1000", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    budget: u32,
+
+    /// Seed of the search; the same seed finds the same gains
+    #[arg(long, default_value = "1")]
+    seed: u64,
+
+    /// Put what is found into this file instead
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+impl Tune {
+    /// Searches, then prints or writes.
+    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        let scenarios = self.scenarios.iter().map(Target::scenario).collect::<Result<Vec<_>, _>>()?;
+        let start = start(&self.contender, scenarios.first())?;
+        let training = if scenarios.is_empty() { tune::training()? } else { scenarios };
+        if let Some(out) = &self.out {
+            writable(out)?;
+        }
+
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopper = Arc::clone(&stop);
+        ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
+        let bar = progress(u64::from(self.budget));
+        let found = tune::search(&start, &training, self.budget as usize, self.seed, |tried, cost| {
+            bar.set_position(tried as u64);
+            bar.set_message(format!("{cost:.4}"));
+            !stop.load(Ordering::Relaxed)
+        })?;
+        bar.finish_and_clear();
+
+        let text = tune::report(&start, &found, &training, self.seed)?;
+        let Some(out) = self.out else {
+            print(&text)?;
+            return Ok(ExitCode::SUCCESS);
+        };
+        std::fs::write(&out, text).map_err(|error| format!("{}: cannot be written ({error})", out.display()))?;
+        let Found { before, after, evaluations, .. } = found;
+        print(&format!("cost {before:.4} before, {after:.4} after {evaluations} tries; gains in {}\n", out.display()))?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Who is called `name`: a contender of `scenario`, or a law with its gains for flight.
+fn start(name: &str, scenario: Option<&Scenario>) -> Result<Contender, Failure> {
+    let own = scenario.map_or(&[][..], |scenario| &scenario.contenders);
+    let law = || ControllerKind::ALL.into_iter().find(|kind| kind.name() == name);
+    let contender = own.iter().find(|contender| contender.name == name).cloned();
+    contender.or_else(|| law().map(|kind| Contender::of(kind, Profile::Flight))).ok_or_else(|| {
+        let laws = ControllerKind::ALL.map(ControllerKind::name).join(", ");
+        let own: Vec<_> = own.iter().map(|contender| contender.name.as_str()).collect();
+        let own =
+            if own.is_empty() { String::new() } else { format!("; the scenario's contenders {}", own.join(", ")) };
+        format!("{}: no such controller; the laws are {laws}{own}", name.escape_debug()).into()
+    })
+}
+
+/// Fails if `path` cannot be a file: worth knowing before a long search.
+fn writable(path: &std::path::Path) -> Result<(), Failure> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if path.is_dir() {
+        return Err(format!("{}: it is a folder; name a file in it", path.display()).into());
+    }
+    match folder {
+        Some(folder) if !folder.is_dir() => Err(format!("{}: no such folder; make it first", folder.display()).into()),
+        _ => Ok(()),
+    }
+}
+
+/// Tries so far, the least cost, and how long there is to wait, on stderr.
+fn progress(budget: u64) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(budget), ProgressDrawTarget::stderr());
+    let style = "{bar:30} {human_pos} of {human_len} tried, least cost {msg}, {eta} left";
+    bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.enable_steady_tick(Duration::from_millis(250));
+    bar
+}

@@ -1,0 +1,105 @@
+//! What a comparison leaves behind: table, CSV, JSON, figures, report.
+
+mod files;
+mod page;
+mod table;
+
+pub use table::table;
+
+use super::figures::{self, Figure};
+use super::files::groups;
+use super::{Error, Flown, Folder};
+use crate::compare::{Comparison, Entry, FIGURES};
+use crate::metrics::SETTLED_S;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Writes everything about `comparisons` into the folder `dir`, and returns the paths written:
+///
+/// * `comparison.csv`: a row for each flight;
+/// * `comparison.json`: the same, with mean and spread over the seeds;
+/// * `errors.svg`, `rmse.svg`: errors over time, and their root mean squares; of several scenarios, each has its own
+///   `<scenario>-errors.svg` etc.;
+/// * `report.html`: all of it on one page that needs no other file.
+///
+/// # Errors
+/// The first folder or file that could not be written.
+pub fn write(dir: &Path, comparisons: &[Comparison]) -> Result<Vec<PathBuf>, Error> {
+    let folder = Folder::create(dir)?;
+    let mut paths = vec![
+        folder.place("comparison.csv", |out| files::csv(out, comparisons))?,
+        folder.place("comparison.json", |out| files::json(out, comparisons))?,
+    ];
+    let flown: Vec<Flown> =
+        comparisons.iter().flat_map(|comparison| &comparison.entries).map(|entry| entry.first.clone()).collect();
+    let prefixes = groups(&flown).into_iter().map(|group| group.figure_prefix);
+    let mut sets = Vec::new();
+    for (comparison, prefix) in comparisons.iter().zip(prefixes) {
+        let figures = draw(comparison).map_err(|source| folder.error("figures", source))?;
+        for figure in &figures {
+            let name = format!("{prefix}{}.svg", figure.name);
+            paths.push(folder.place(&name, |out| out.write_all(figure.svg.as_bytes()))?);
+        }
+        sets.push(figures);
+    }
+    let page = page::page(comparisons, &sets);
+    paths.push(folder.place("report.html", |out| out.write_all(page.as_bytes()))?);
+    Ok(paths)
+}
+
+fn draw(comparison: &Comparison) -> io::Result<Vec<Figure>> {
+    let flights: Vec<&Flown> = comparison.entries.iter().map(|entry| &entry.first).collect();
+    Ok(vec![figures::compare::draw(comparison)?, figures::errors(&flights)?].into_iter().flatten().collect())
+}
+
+/// Whether every flight is one of several with seeds of their own.
+fn is_repeated(comparison: &Comparison) -> bool {
+    comparison.entries.iter().any(|entry| entry.flights.len() > 1)
+}
+
+/// The figures of one contender, and whether each is the best of its column; none if it lost a vehicle.
+fn cells(comparison: &Comparison, entry: &Entry) -> Option<Vec<(String, bool)>> {
+    let cell = |figure: &crate::compare::Figure| {
+        let spread = entry.spread(figure.value)?;
+        let [mean, deviation] =
+            [spread.mean, spread.deviation].map(|value| number(figure.scale * value, figure.digits));
+        let text = if is_repeated(comparison) { format!("{mean} ±{deviation}") } else { mean };
+        Some((text, comparison.is_best(entry, figure)))
+    };
+    let mut cells = FIGURES.iter().map(cell).collect::<Option<Vec<_>>>()?;
+    cells.push((comparison.ratio(entry).map_or("-".into(), |ratio| format!("{ratio:.2}")), false));
+    Some(cells)
+}
+
+fn number(value: f64, digits: usize) -> String {
+    if value < 1e4 { format!("{value:.digits$}") } else { format!("{value:.2e}") }
+}
+
+/// Heads of the columns.
+fn heads() -> Vec<&'static str> {
+    FIGURES.iter().map(|figure| figure.title).chain(["ratio"]).collect()
+}
+
+/// What became of the vehicles of a contender that lost some.
+fn lost(entry: &Entry) -> String {
+    let of = entry.flights.len();
+    let first = entry.flights.iter().find_map(|flight| flight.lost.map(|lost| (flight.seed, lost)));
+    match first {
+        Some((seed, lost)) if of > 1 => {
+            let how = super::words::lost(&lost);
+            format!("{} of {of} vehicles lost, the first with seed {seed}: {how}", entry.lost())
+        }
+        Some((_, lost)) => super::words::lost(&lost),
+        None => String::new(),
+    }
+}
+
+/// What the columns mean.
+fn legend(comparisons: &[Comparison]) -> String {
+    let spread = if comparisons.iter().any(is_repeated) { " ±: standard deviation over the seeds." } else { "" };
+    format!(
+        "Root mean square errors, and the largest of x, y and z, from {SETTLED_S} s to the end. |ΔU₄|: mean jump of the \
+         thrust from one control step to the next; small is smooth. Ratio: root mean square distance from the reference, \
+         over backstepping's. *: best of its column.{spread}"
+    )
+}

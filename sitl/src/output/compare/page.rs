@@ -1,0 +1,49 @@
+//! A comparison on one page.
+
+use super::{cells, heads, legend, lost};
+use crate::compare::Comparison;
+use crate::output::figures::Figure;
+use crate::output::report::{parameters, picture, sheet};
+use crate::output::words;
+use maud::{Markup, html};
+
+pub(super) fn page(comparisons: &[Comparison], figures: &[Vec<Figure>]) -> String {
+    sheet(
+        "Controllers compared",
+        &html! {
+            p.quiet { "Every controller flies the same vehicle through the same noise and weather." }
+            @for (comparison, figures) in comparisons.iter().zip(figures) {
+                h2 { (comparison.scenario.name) }
+                @if !comparison.scenario.description.is_empty() { p { (comparison.scenario.description) "." } }
+                p.quiet { (words::conditions(&comparison.scenario)) "." }
+                div.scroll { (results(comparison)) }
+                p.quiet { (legend(comparisons)) }
+                @for figure in figures { (picture(figure)) }
+                h3 { "Parameters" }
+                div.scroll { (parameters(&comparison.scenario)) }
+            }
+        },
+    )
+}
+
+fn results(comparison: &Comparison) -> Markup {
+    let heads = heads();
+    html! {
+        table {
+            thead { tr { td {} @for head in &heads { th scope="col" { (head) } } } }
+            tbody {
+                @for entry in &comparison.entries {
+                    tr {
+                        th scope="row" { (entry.contender().title()) }
+                        @match cells(comparison, entry) {
+                            Some(cells) => {
+                                @for (cell, best) in cells { td { @if best { strong { (cell) } "*" } @else { (cell) } } }
+                            }
+                            None => td.lost colspan=(heads.len()) { (lost(entry)) },
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

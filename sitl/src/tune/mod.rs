@@ -1,0 +1,118 @@
+//! Finding gains, in one way for every law: the same flights, the same cost, the same search, the same effort.
+//!
+//! `docs/tuning.md` says what that is and what came of it.
+
+mod cma_es;
+mod flights;
+mod gains;
+mod report;
+
+pub use flights::{held_out, training};
+pub use gains::{Change, fragment};
+pub use report::report;
+
+use crate::run::Run;
+use crate::scenario::{Contender, Scenario};
+use airframe::OutOfRange;
+use cma_es::Search;
+use rayon::prelude::*;
+
+/// First step of the search, in every gain's logarithm: by a third, up or down.
+const STEP: f64 = 0.3;
+
+/// Root mean square distance from the reference that costs as much as 1 of the others \[m\].
+pub const POSITION_M: f64 = 0.1;
+/// Likewise, yaw \[rad\].
+pub const YAW_RAD: f64 = 0.1;
+/// Likewise, sum over U1..U4 of the mean |change| from step to step \[N\].
+pub const JUMP_N: f64 = 0.1;
+/// Cost of a flight that is lost at its end; the earlier the loss, the more, up to twice that.
+pub const LOST: f64 = 100.0;
+
+/// What one flight costs.
+pub fn cost(scenario: &Scenario, run: &Run) -> f64 {
+    if let Some(lost) = run.lost {
+        return LOST * (2.0 - lost.time_s / scenario.duration_s);
+    }
+    let (rmse, jumps) = (&run.metrics.rmse, &run.metrics.mean_abs_delta_u);
+    rmse.xyz().norm() / POSITION_M + rmse.w / YAW_RAD + jumps.sum() / JUMP_N
+}
+
+/// What each of `scenarios` costs under `contender`.
+///
+/// # Errors
+/// The first parameter, gain or setting out of range.
+pub fn costs(scenarios: &[Scenario], contender: &Contender) -> Result<Vec<f64>, OutOfRange> {
+    let fly = |scenario| Run::fly(scenario, contender, u64::MAX).map(|run| cost(scenario, &run));
+    scenarios.par_iter().map(fly).collect()
+}
+
+/// The mean over flights: what a contender is judged by.
+pub fn mean(costs: &[f64]) -> f64 {
+    costs.iter().sum::<f64>() / costs.len() as f64
+}
+
+/// What a search has found.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// The best contender; the one that it started from, if none was better.
+    pub contender: Contender,
+    /// Cost of the start.
+    pub before: f64,
+    /// Cost of the best.
+    pub after: f64,
+    /// How many contenders were tried.
+    pub evaluations: usize,
+    /// Every gain that was searched.
+    pub changes: Vec<Change>,
+}
+
+/// Searches for the gains of `start` that cost least over `scenarios`, trying at most `budget` contenders, `start`
+/// included. `progress` hears how many have been tried and the least cost so far; if it returns false, the search ends
+/// there. What is found is the same however many threads there are.
+///
+/// # Errors
+/// If `start` cannot fly.
+pub fn search(
+    start: &Contender,
+    scenarios: &[Scenario],
+    budget: usize,
+    seed: u64,
+    mut progress: impl FnMut(usize, f64) -> bool,
+) -> Result<Found, OutOfRange> {
+    let before = mean(&costs(scenarios, start)?);
+    let (mut best, mut after, mut evaluations) = (start.clone(), before, 1);
+    let mut search = Search::new(&gains::point(start), STEP, seed);
+    while evaluations + search.population() < budget && progress(evaluations, after) {
+        let generation = rated(start, scenarios, search.ask());
+        evaluations += generation.len();
+        if let Some((cost, contender, _)) = generation.first().filter(|(cost, ..)| *cost < after) {
+            (best, after) = (contender.clone(), *cost);
+        }
+        let points: Vec<_> = generation.into_iter().map(|(_, _, point)| point).collect();
+        search.tell(&points);
+    }
+    // The middle of the search is often better than any point around it.
+    if evaluations < budget {
+        let last = rated(start, scenarios, vec![search.mean()]);
+        evaluations += last.len();
+        if let Some((cost, contender, _)) = last.into_iter().find(|(cost, ..)| *cost < after) {
+            (best, after) = (contender, cost);
+        }
+    }
+    let changes = gains::changes(start, &best);
+    Ok(Found { contender: best, before, after, evaluations, changes })
+}
+
+/// Contenders with the gains of `points`, and what they cost, the best first.
+fn rated(start: &Contender, scenarios: &[Scenario], points: Vec<Vec<f64>>) -> Vec<(f64, Contender, Vec<f64>)> {
+    let rate = |mut point: Vec<f64>| {
+        let contender = gains::contender(start, &mut point);
+        // Gains that do not go together cost as much as a flight that ends where it begins.
+        let cost = costs(scenarios, &contender).map_or(2.0 * LOST, |costs| mean(&costs));
+        (cost, contender, point)
+    };
+    let mut rated: Vec<_> = points.into_par_iter().map(rate).collect();
+    rated.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
+    rated
+}

@@ -1,0 +1,448 @@
+//! Campaigns: that their results are the same however they came about, and that nothing that was flown is lost.
+
+#![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
+
+use sitl::campaign::{self, Campaign, Folder, Manifest, Row, Shard, built_in};
+use sitl::run::Run;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
+
+/// A folder for each test, empty at first.
+fn folder(test: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("campaign").join(test);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).unwrap();
+    }
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// Short flights of two contenders on two courses, some of which are lost.
+const SMALL: &str = r#"
+name = "small"
+flights = 150
+seed = 7
+duration_s = 6.0
+scenario = "hover"
+trajectories = ["hover", "circle"]
+
+[spread]
+mass_ratio = [0.7, 1.3]
+thrust_factor_ratio = [0.2, 1.2]
+rotor_time_constant_s = 0.02
+rotor_efficiency = [0.0, 1.0]
+fault_rotor = [1, 4]
+fault_start_s = [1.0, 5.0]
+"#;
+
+fn parse(text: &str) -> Campaign {
+    campaign::parse("small.toml", text, "small", Path::new("")).unwrap()
+}
+
+fn small() -> Campaign {
+    parse(SMALL)
+}
+
+/// Flies all that `folder` lacks on `threads` cores.
+fn fly(campaign: &Campaign, path: &Path, shard: Shard, threads: usize) {
+    let folder = Folder::open(path, Manifest::new(campaign, shard)).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let flown = pool.install(|| campaign::fly(campaign, &folder, &AtomicBool::new(false), &|_| ())).unwrap();
+    assert!(flown.is_some());
+}
+
+fn results(path: &Path) -> Vec<u8> {
+    fs::read(path.join("results.parquet")).unwrap()
+}
+
+/// What every other way must come to.
+fn reference(campaign: &Campaign, folder: &Path) -> Vec<u8> {
+    let path = folder.join("reference");
+    fly(campaign, &path, Shard::WHOLE, 1);
+    results(&path)
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    let (folder, campaign) = (folder("threads"), small());
+    let reference = reference(&campaign, &folder);
+    fly(&campaign, &folder.join("many"), Shard::WHOLE, 5);
+    assert_eq!(reference, results(&folder.join("many")));
+    // And they are the campaign's own.
+    let other = parse(&SMALL.replace("seed = 7", "seed = 8"));
+    fly(&other, &folder.join("other"), Shard::WHOLE, 5);
+    assert_ne!(reference, results(&folder.join("other")));
+}
+
+#[test]
+fn an_interrupted_campaign_goes_on_from_what_is_whole() {
+    let (folder, campaign) = (folder("resume"), small());
+    let reference = reference(&campaign, &folder);
+    let path = folder.join("interrupted");
+
+    // Stopped after 100 of 150 flights, by one thread: six chunks of 16 are there, the seventh was begun.
+    {
+        let (stop, done) = (AtomicBool::new(false), AtomicU64::new(0));
+        let place = Folder::open(&path, Manifest::new(&campaign, Shard::WHOLE)).unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let progress = |flights| {
+            if done.fetch_add(flights, Ordering::Relaxed) + flights >= 100 {
+                stop.store(true, Ordering::Relaxed);
+            }
+        };
+        assert!(pool.install(|| campaign::fly(&campaign, &place, &stop, &progress)).unwrap().is_none());
+    }
+    let chunks = || {
+        let entries = fs::read_dir(path.join("chunks")).unwrap().map(|entry| entry.unwrap().path());
+        entries.map(|path| (path.clone(), fs::read(path).unwrap())).collect::<BTreeMap<_, _>>()
+    };
+    let kept = chunks();
+    assert_eq!(kept.len(), 6);
+
+    // One is torn, one is of another campaign, four are whole; and a file was being written.
+    let files: Vec<_> = kept.iter().collect();
+    fs::write(files[0].0, &files[0].1[..files[0].1.len() / 2]).unwrap();
+    let other = folder.join("other");
+    fly(&parse(&SMALL.replace("seed = 7", "seed = 8").replace("= 150", "= 32")), &other, Shard::WHOLE, 1);
+    fs::copy(other.join("results.parquet"), files[1].0).unwrap();
+    let unfinished = path.join("chunks").join(".000004.parquet.1.tmp");
+    fs::write(&unfinished, b"PAR1").unwrap();
+
+    let resumed = AtomicU64::new(u64::MAX);
+    {
+        let place = Folder::open(&path, Manifest::new(&campaign, Shard::WHOLE)).unwrap();
+        assert!(!unfinished.exists());
+        let first = |flights| {
+            let _ = resumed.compare_exchange(u64::MAX, flights, Ordering::Relaxed, Ordering::Relaxed);
+        };
+        campaign::fly(&campaign, &place, &AtomicBool::new(false), &first).unwrap().unwrap();
+    }
+    assert_eq!(resumed.into_inner(), 64, "the four whole chunks are not flown again");
+    assert_eq!(reference, results(&path));
+    // Once more: nothing is left to fly.
+    fly(&campaign, &path, Shard::WHOLE, 1);
+    assert_eq!(reference, results(&path));
+}
+
+#[test]
+fn shards_come_together_to_what_one_machine_gives() {
+    let (folder, campaign) = (folder("shards"), small());
+    let reference = reference(&campaign, &folder);
+    let part = |index, of| {
+        let path = folder.join(format!("{index}-of-{of}"));
+        fly(&campaign, &path, Shard { index, of }, 2);
+        path
+    };
+    let parts: Vec<_> = (1..=4).map(|index| part(index, 4)).collect();
+    // In whatever order they are named.
+    let order: Vec<_> = [2, 0, 3, 1].into_iter().map(|i: usize| parts[i].clone()).collect();
+    let (_, summary) = campaign::merge(&order, &folder.join("merged")).unwrap();
+    assert_eq!(reference, results(&folder.join("merged")));
+    assert_eq!(summary.tallies[0].count.flights, 150);
+
+    let refused = |shards: &[PathBuf]| {
+        let out = folder.join("refused");
+        let error = campaign::merge(shards, &out).map(|_| ()).unwrap_err().to_string();
+        assert!(!out.exists(), "{error}");
+        assert!(!error.contains('\n'), "{error}");
+        error
+    };
+    assert!(refused(&parts[..3]).starts_with("shard 4/4 missing; "));
+    assert!(refused(&[parts[3].clone()]).starts_with("shard 1/4, 2/4, 3/4 missing; "));
+    let copy = folder.join("copy");
+    fs::create_dir_all(&copy).unwrap();
+    fs::copy(parts[1].join("results.parquet"), copy.join("results.parquet")).unwrap();
+    assert!(refused(&[&parts[..], &[copy]].concat()).contains("both hold shard 2/4"));
+    assert!(refused(&[&parts[..3], &[part(2, 3)]].concat()).contains("parts of different campaigns"));
+    let other = parse(&SMALL.replace("0.7, 1.3", "0.7, 1.4"));
+    let path = folder.join("other");
+    fly(&other, &path, Shard { index: 4, of: 4 }, 2);
+    assert!(refused(&[&parts[..3], &[path]].concat()).contains("parts of different campaigns"));
+    fs::create_dir_all(folder.join("empty")).unwrap();
+    assert!(refused(&[&parts[..3], &[folder.join("empty")]].concat()).contains("no finished results"));
+    fs::write(parts[0].join("results.parquet"), b"PAR1").unwrap();
+    assert!(refused(&parts).contains("damaged"));
+}
+
+#[test]
+fn a_folder_belongs_to_one_campaign_and_one_program() {
+    let (folder, campaign) = (folder("changed"), small());
+    let refused = |campaign: &Campaign, shard| {
+        Folder::open(&folder, Manifest::new(campaign, shard)).map(|_| ()).unwrap_err().to_string()
+    };
+    {
+        let _held = Folder::open(&folder, Manifest::new(&campaign, Shard::WHOLE)).unwrap();
+        assert!(refused(&campaign, Shard::WHOLE).contains("is being flown into it"));
+    }
+    for (from, to) in [("seed = 7", "seed = 8"), ("\"circle\"", "\"step\""), ("0.02", "0.03"), ("= 150", "= 151")] {
+        let error = refused(&parse(&SMALL.replace(from, to)), Shard::WHOLE);
+        assert!(error.contains("not this one") && error.contains("--out"), "{to}: {error}");
+    }
+    assert!(refused(&campaign, Shard { index: 1, of: 2 }).contains("not this one"));
+    // Words for people, and where the file is, do not matter.
+    let renamed = campaign::parse("/elsewhere/small.toml", SMALL, "small", Path::new("")).unwrap();
+    Folder::open(&folder, Manifest::new(&renamed, Shard::WHOLE)).unwrap();
+    Folder::open(&folder, Manifest::new(&campaign, Shard::WHOLE)).unwrap();
+}
+
+#[test]
+fn a_flight_flown_again_gives_the_figures_of_its_row() {
+    let campaign = small();
+    let manifest = Manifest::new(&campaign, Shard::WHOLE);
+    let mut lost = 0;
+    for flight in 0..30 {
+        let scenario = campaign.flight(flight).unwrap();
+        for (row, contender) in campaign.rows(flight).unwrap().iter().zip(&scenario.contenders) {
+            let Run { metrics, lost: end, .. } = Run::fly(&scenario, contender, 10).unwrap();
+            let number = |name| manifest.number(row, name);
+            assert_eq!(row.contender, contender.name);
+            assert_eq!(row.lost_reason.as_deref(), end.map(|lost| lost.reason));
+            assert_eq!(number("lost_at_s"), end.map(|lost| lost.time_s));
+            let settled = end.is_none_or(|lost| lost.time_s >= 5.0);
+            let expected = |value: f64| settled.then_some(value);
+            assert_eq!(number("rmse_x_m"), expected(metrics.rmse.x));
+            assert_eq!(number("max_psi_rad"), expected(metrics.max_abs.w));
+            assert_eq!(number("mean_abs_du4_n"), expected(metrics.mean_abs_delta_u.w));
+            lost += u32::from(end.is_some());
+        }
+    }
+    assert!((1..60).contains(&lost), "{lost} lost: a test of both kinds");
+}
+
+/// Every row of `SMALL`'s first flights.
+fn rows(campaign: &Campaign, flights: u64) -> Vec<Row> {
+    (0..flights).flat_map(|flight| campaign.rows(flight).unwrap()).collect()
+}
+
+#[test]
+fn a_draw_depends_on_seed_and_flight_alone() {
+    let campaign = small();
+    let again = parse(&SMALL.replace("flights = 150", "flights = 9"));
+    assert_eq!(rows(&campaign, 3), rows(&again, 3));
+    // A quantity more leaves the others as they were, wherever it stands.
+    let more = parse(&SMALL.replace("[spread]", "[spread]\ninertia_ratio = [0.5, 2.0]\nsensor_delay_s = [0.0, 0.004]"));
+    for flight in 0..100 {
+        let (few, many) = (campaign.draw(flight), more.draw(flight));
+        assert_eq!(few.seed, many.seed);
+        assert_eq!(few.values[0], many.values[0]);
+        assert_eq!(few.values[1..6], many.values[2..7]);
+        assert!(few.seed < 1 << 53);
+    }
+}
+
+#[test]
+fn draws_fill_their_intervals_evenly() {
+    let campaign = small();
+    const FLIGHTS: u64 = 5_000;
+    let (mut sums, mut rotors) = ([0.0; 6], [0_u32; 4]);
+    for flight in 0..FLIGHTS {
+        let draw = campaign.draw(flight);
+        for ((sum, value), spread) in sums.iter_mut().zip(&draw.values).zip(&campaign.spreads) {
+            let [low, high] = spread.ends;
+            assert!((low..=high).contains(value), "{value}");
+            *sum += if high > low { (value - low) / (high - low) } else { 0.5 };
+        }
+        rotors[draw.values[4] as usize - 1] += 1;
+    }
+    for sum in sums {
+        // The mean of n uniform numbers has a standard deviation of 1 / sqrt(12 n) = 0.004.
+        assert!((sum / FLIGHTS as f64 - 0.5).abs() < 0.02, "{sums:?}");
+    }
+    // 1250 of each, standard deviation 31.
+    assert!(rotors.iter().all(|&count| count.abs_diff(1250) < 150), "{rotors:?}");
+}
+
+#[test]
+fn what_is_drawn_reaches_the_vehicle() {
+    let campaign = small();
+    let flight = campaign.flight(5).unwrap();
+    let values = campaign.draw(5).values;
+    let (truth, nominal) = (*flight.environment.nominal(), campaign.scenario.vehicle);
+    assert_eq!(truth.mass_kg, nominal.mass_kg * values[0]);
+    assert_eq!(truth.thrust_factor_n_s2, nominal.thrust_factor_n_s2 * values[1]);
+    assert_eq!(truth.inertia_kg_m2, nominal.inertia_kg_m2);
+    assert_eq!(flight.vehicle, nominal, "the law is not told");
+    let rotors = &flight.realism.rotors;
+    assert_eq!(rotors.time_constant_s, 0.02);
+    assert_eq!(rotors.faults.len(), 1);
+    assert_eq!((rotors.faults[0].efficiency, f64::from(rotors.faults[0].rotor)), (values[3], values[4]));
+    assert_eq!(rotors.faults[0].start_s, values[5]);
+    // In turn.
+    assert_eq!(campaign.course(5).unwrap().name, "circle");
+    assert_ne!(campaign.flight(4).unwrap().trajectory, flight.trajectory);
+}
+
+fn sitl(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sitl")).current_dir(folder).args(arguments).output().unwrap()
+}
+
+/// What goes wrong: the line and key, and what is said.
+const BAD: [(&str, &str, &str); 14] = [
+    ("flights = 150", "flights = 0", ":3: flights: 0 is out of range: it must lie within 1 to 1e7"),
+    ("flights = 150", "flights = 1.5", ":3: flights: 1.5 is not a whole number"),
+    ("flights = 150", "flight = 150", ":3: flight: unknown key; did you mean flights?"),
+    ("seed = 7", "seed = -1", ":4: seed: -1 is out of range"),
+    (
+        "scenario = \"hover\"",
+        "scenario = \"hovr\"",
+        ":6: scenario: \"hovr\" is no built-in scenario; did you mean \"hover\"?",
+    ),
+    ("scenario = \"hover\"", "", ": scenario: missing; "),
+    ("scenario = \"hover\"", "scenario = \"none.toml\"", "none.toml: no such file"),
+    ("\"circle\"]", "\"hover\"]", ":7: trajectories: \"hover\" is listed twice"),
+    ("[\"hover\", \"circle\"]", "[]", ":7: trajectories: the list is empty"),
+    ("mass_ratio", "mas_ratio", ":10: spread.mas_ratio: unknown key; did you mean mass_ratio?"),
+    ("[0.7, 1.3]", "[1.3, 0.7]", ":10: spread.mass_ratio: 1.3 is above 0.7; write the smaller end first"),
+    ("[0.7, 1.3]", "[0.7, 130]", ":10: spread.mass_ratio: 130 is out of range: it must lie within 0.01 to 100"),
+    ("rotor_efficiency = [0.0, 1.0]\n", "", "spread.fault_rotor: it does nothing without rotor_efficiency"),
+    ("[1, 4]", "[1.5, 4]", "spread.fault_rotor: only whole numbers are drawn"),
+];
+
+#[test]
+fn a_bad_file_gets_one_line() {
+    let folder = folder("bad");
+    for (from, to, said) in BAD {
+        let text = SMALL.replacen(from, to, 1);
+        assert_ne!(text, SMALL);
+        fs::write(folder.join("bad.toml"), text).unwrap();
+        let output = sitl(&folder, &["campaign", "bad.toml"]);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(error.contains(said), "{said}, not {error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+        assert!(!folder.join("out").exists(), "{to}");
+    }
+    for (arguments, said) in [
+        (&["campaign", "robust"][..], "robust: no such campaign; "),
+        (&["campaign", "small.toml", "--flight", "150"], "the campaign has flights 0 to 149"),
+        (&["campaign", "small.toml", "--flight", "1", "--contender", "me"], "it has: afbc, backstepping"),
+        (&["campaign", "small.toml", "--shard", "3/2"], "it must be I/N"),
+        (&["campaign", "small.toml", "--shard", "1/151"], "there are only 150 flights"),
+        (&["merge", "nowhere", "-o", "merged"], "nowhere: no finished results"),
+    ] {
+        fs::write(folder.join("small.toml"), SMALL).unwrap();
+        let output = sitl(&folder, arguments);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(error.contains(said), "{said}, not {error}");
+        assert!(!folder.join("out").exists());
+    }
+}
+
+/// The whole way of a user: a run that is killed outright, the same command again, one flight flown again.
+#[test]
+fn a_killed_program_loses_nothing_that_was_finished() {
+    let folder = folder("killed");
+    fs::write(folder.join("small.toml"), SMALL.replace("150", "320")).unwrap();
+    let whole = sitl(&folder, &["campaign", "small.toml", "--out", "whole", "--threads", "3"]);
+    assert_eq!(whole.status.code(), Some(0));
+
+    let mut child = Command::new(env!("CARGO_BIN_EXE_sitl"))
+        .current_dir(&folder)
+        .args(["campaign", "small.toml", "--threads", "2"])
+        .spawn()
+        .unwrap();
+    let out = folder.join("out/small");
+    let chunks = || fs::read_dir(out.join("chunks")).map_or(0, |entries| entries.flatten().count());
+    while chunks() < 2 && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(!out.join("results.parquet").exists(), "killed on the way");
+    let kept = chunks();
+    assert!(kept >= 2);
+
+    let again = sitl(&folder, &["campaign", "small.toml"]);
+    assert_eq!(again.status.code(), Some(0));
+    assert_eq!(again.stdout, String::from_utf8(whole.stdout).unwrap().replace("whole/", "out/small/").into_bytes());
+    for file in
+        ["results.parquet", "summary.json", "report.html", "position-error.svg", "smoothness.svg", "success.svg"]
+    {
+        assert_eq!(fs::read(out.join(file)).unwrap(), fs::read(folder.join("whole").join(file)).unwrap(), "{file}");
+    }
+    assert!(!out.join("chunks").exists());
+
+    let table = String::from_utf8(again.stdout).unwrap();
+    let command = table.lines().find_map(|line| line.trim().strip_prefix("sitl ")).unwrap();
+    let arguments: Vec<_> = command.split(' ').collect();
+    let replay = sitl(&folder, &arguments);
+    assert_eq!(replay.status.code(), Some(1), "the worst flight was lost: {command}");
+    let flown: Vec<_> = fs::read_dir(folder.join("out")).unwrap().flatten().map(|entry| entry.path()).collect();
+    assert!(flown.iter().any(|path| path.join("fig4-trajectory.svg").exists()), "{flown:?}");
+}
+
+#[test]
+fn built_in_campaigns_are_listed_and_templates() {
+    let folder = folder("built-in");
+    let list = String::from_utf8(sitl(&folder, &["campaigns"]).stdout).unwrap();
+    for built_in in campaign::BUILT_IN {
+        assert!(list.contains(built_in.name), "{list}");
+        let printed = sitl(&folder, &["campaigns", built_in.name]);
+        assert_eq!(printed.stdout, built_in.text.as_bytes());
+        let campaign = built_in.campaign().unwrap();
+        assert_eq!(campaign.name, built_in.name);
+        assert!(!campaign.description.is_empty());
+        campaign.rows(0).unwrap();
+    }
+    assert_eq!(built_in("robustness").unwrap().campaign().unwrap().flights, 10_000);
+}
+
+const PAGE: &str = include_str!("../../docs/campaigns.md");
+
+#[test]
+fn every_quantity_and_column_is_documented() {
+    for quantity in &campaign::QUANTITIES {
+        let range = quantity.range;
+        let row = PAGE.lines().find(|line| line.starts_with("| `") && line.contains(&format!("`{}`", range.name)));
+        let cells: Vec<_> = row.unwrap_or_else(|| panic!("{}", range.name)).split(" | ").collect();
+        let number = |text: &str| text.parse::<f64>().unwrap();
+        let (min, max) = cells[1].split_once(" to ").unwrap();
+        assert!((number(min) - range.min).abs() < 1e-4 && (number(max) - range.max).abs() < 1e-4, "{}", range.name);
+        if let Some(needed) = quantity.needs {
+            assert!(cells[2].contains(&format!("`{needed}`")), "{}", range.name);
+        }
+    }
+    for figure in &campaign::FIGURES {
+        assert!(
+            PAGE.contains(&format!("`{}`", figure.name)) || figure.name.starts_with("mean_abs_du"),
+            "{}",
+            figure.name
+        );
+    }
+}
+
+#[test]
+fn a_scenario_may_be_written_out() {
+    let inline = "[scenario]\n[[scenario.contender]]\nname = \"me\"\ncontroller = \"pid\"\n";
+    let text = SMALL.replace("scenario = \"hover\"\n", "") + inline;
+    let campaign = parse(&text);
+    assert_eq!(campaign.scenario.contenders.len(), 1);
+    assert_eq!(campaign.rows(0).unwrap()[0].contender, "me");
+    // Its own trajectory, if there are no others.
+    let line = "trajectories = [\"hover\", \"circle\"]\n";
+    let error = campaign::parse("f", &text.replace(line, ""), "f", Path::new("")).unwrap_err().to_string();
+    assert!(error.contains("scenario.trajectory: missing; "), "{error}");
+    let own = "[scenario.trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 9]\n";
+    assert_eq!(parse(&(text.replace(line, "") + own)).courses[0].initial.position_m.z, 9.0);
+    // What is wrong in it is found where it stands.
+    let error = campaign::parse("f", &text.replace("\"pid\"", "\"pdi\""), "f", Path::new("")).unwrap_err().to_string();
+    assert!(error.contains("contender.controller: \"pdi\" is unknown"), "{error}");
+}
+
+#[test]
+fn the_documented_file_is_a_campaign() {
+    let example = PAGE.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    let campaign = campaign::parse("example", example, "example", Path::new("")).unwrap();
+    assert_eq!(campaign.flights, 10_000);
+    // Whatever is listed as a key is in it.
+    for line in PAGE.lines().take_while(|line| !line.starts_with("## What is drawn")) {
+        if let Some(key) = line.strip_prefix("| `").and_then(|line| line.split('`').next()) {
+            assert!(example.contains(&format!("{key} = ")), "{key}");
+        }
+    }
+}

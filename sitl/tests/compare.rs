@@ -1,0 +1,202 @@
+//! `sitl compare` and `sitl tune`, from outside.
+
+#![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
+
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// An empty folder of its own for each test.
+fn folder(test: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("compare").join(test);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).unwrap();
+    }
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn sitl_on(threads: &str, folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sitl"));
+    command.current_dir(folder).args(arguments).env("RAYON_NUM_THREADS", threads).output().unwrap()
+}
+
+fn sitl(folder: &Path, arguments: &[&str]) -> Output {
+    sitl_on("2", folder, arguments)
+}
+
+/// What is printed if all goes well.
+fn succeeds(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+/// The one line that says why nothing was done.
+fn refused(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(2));
+    assert!(output.stdout.is_empty());
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+/// A noisy circle of 8 s, and a PID that is far too soft.
+const SOFT: &str = r#"
+name = "round"
+duration_s = 8.0
+profile = "flight"
+controllers = ["backstepping"]
+
+[rotors]
+time_constant_s = 0.02
+force_max_n = 3.0
+
+[sensors]
+noise = 0.001
+
+[trajectory]
+kind = "circle"
+centre_m = [0.0, 0.0, 2.0]
+radius_m = 1.0
+period_s = 6.0
+
+[[contender]]
+name = "soft"
+controller = "pid"
+gains = { position_p_1_s = 0.6, velocity_p_1_s = 1.5, climb_p_1_s = 1.5 }
+"#;
+
+fn soft(test: &str) -> PathBuf {
+    let folder = folder(test);
+    fs::write(folder.join("soft.toml"), SOFT).unwrap();
+    folder
+}
+
+#[test]
+fn compares_by_the_figures_of_fly() {
+    let folder = soft("figures");
+    let table = succeeds(&sitl(&folder, &["compare", "soft.toml", "--controllers", "soft,backstepping,indi"]));
+    assert!(table.contains("soft ") && table.contains("INDI "), "{table}");
+    let compared = json(&folder.join("out/compare/comparison.json"));
+    succeeds(&sitl(&folder, &["fly", "soft.toml"]));
+    let flown = json(&folder.join("out/round/summary.json"));
+    for run in flown.as_array().unwrap() {
+        let contenders = compared[0]["contenders"].as_array().unwrap();
+        let same = contenders.iter().find(|contender| contender["name"] == run["contender"]).unwrap();
+        assert_eq!(same["mean"]["rmse_x_m"], run["rmse"]["x_m"]);
+        assert_eq!(same["mean"]["rmse_psi_rad"], run["rmse"]["psi_rad"]);
+        assert_eq!(same["mean"]["mean_abs_delta_u4_n"], run["mean_abs_delta_u_n"][3]);
+    }
+    assert_eq!(compared[0]["contenders"][1]["ratio"], 1.0);
+    for figure in ["errors.svg", "rmse.svg"] {
+        let svg = fs::read_to_string(folder.join("out/compare").join(figure)).unwrap();
+        roxmltree::Document::parse(&svg).unwrap();
+    }
+}
+
+#[test]
+fn compares_over_seeds_alike_on_any_number_of_threads() {
+    let folder = soft("seeds");
+    let fly = |threads, out| {
+        let arguments = ["compare", "soft.toml", "circle", "--controllers", "pid,soft", "--seeds", "3", "--out", out];
+        succeeds(&sitl_on(threads, &folder, &arguments))
+    };
+    let table = fly("1", "one");
+    fly("3", "three");
+    for file in ["comparison.csv", "comparison.json", "report.html", "round-errors.svg", "circle-rmse.svg"] {
+        let [one, three] = ["one", "three"].map(|out| fs::read(folder.join(out).join(file)).unwrap());
+        assert!(one == three, "{file}");
+    }
+    assert!(table.contains(" ±"), "{table}");
+    let rows = fs::read_to_string(folder.join("one/comparison.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 1 + 2 * 2 * 3);
+    let pid = &json(&folder.join("one/comparison.json"))[0]["contenders"][0];
+    assert_eq!(pid["seeds"], serde_json::json!([0, 1, 2]));
+    // Another seed is another flight.
+    assert!(pid["standard_deviation"]["rmse_x_m"].as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn a_lost_vehicle_is_part_of_the_comparison() {
+    let folder = folder("lost");
+    let moment = "[[gust]]\naxis = \"roll\"\nmoment_n_m = 1.2\nstart_s = 1.0\n";
+    fs::write(folder.join("lost.toml"), format!("duration_s = 6.0\n{moment}[trajectory]\nkind = \"paper\"\n")).unwrap();
+    let table = succeeds(&sitl(&folder, &["compare", "lost.toml", "--controllers", "pid,indi"]));
+    assert!(table.contains("PID   lost at t = 1.") && table.contains("INDI  lost at t = 1."), "{table}");
+    let compared = json(&folder.join("out/compare/comparison.json"));
+    assert_eq!(compared[0]["contenders"][0]["mean"]["rmse_x_m"], Value::Null);
+    assert_eq!(compared[0]["contenders"][0]["lost"], 1);
+}
+
+#[test]
+fn compare_refuses_what_it_cannot_fly() {
+    let folder = soft("refused");
+    let line = refused(&sitl(&folder, &["compare", "soft.toml", "--controllers", "sof"]));
+    assert!(line.starts_with("--controllers sof: no such controller; there are afbc, afbc-as-printed,"), "{line}");
+    assert_eq!(line.lines().count(), 1);
+    let line = refused(&sitl(&folder, &["compare", "hardwear"]));
+    assert_eq!(line, "hardwear: no such scenario; did you mean hardware?\n");
+    let line = refused(&sitl(&folder, &["compare", "hover", "--controllers", "pid,pid"]));
+    assert_eq!(line, "--controllers pid: named twice; once is enough\n");
+    refused(&sitl(&folder, &["compare", "hover", "--seeds", "0"]));
+    assert!(!folder.join("out").exists());
+}
+
+/// The two costs in the first line of what `sitl tune` prints.
+fn costs(fragment: &str) -> [f64; 2] {
+    let line = fragment.lines().next().unwrap();
+    let after = |word: &str| line.split(word).nth(1).unwrap().split([',', ' ']).next().unwrap().parse().unwrap();
+    [after("before "), after(": cost ")]
+}
+
+#[test]
+fn tune_improves_a_bad_start_alike_on_any_number_of_threads() {
+    let folder = soft("tune");
+    let tune = |threads, seed| {
+        let arguments = ["tune", "soft", "--scenario", "soft.toml", "--budget", "60", "--seed", seed];
+        succeeds(&sitl_on(threads, &folder, &arguments))
+    };
+    let fragment = tune("1", "1");
+    assert_eq!(fragment, tune("3", "1"));
+    assert_ne!(fragment, tune("2", "2"));
+    let [before, after] = costs(&fragment);
+    assert!(after < 0.7 * before, "{before} to {after}");
+
+    // It goes into a scenario file as it is, and flies at the cost that it claims.
+    fs::write(folder.join("tuned.toml"), format!("{SOFT}\n{fragment}")).unwrap();
+    let again =
+        succeeds(&sitl(&folder, &["tune", "soft-tuned", "--scenario", "tuned.toml", "--budget", "1", "--seed", "3"]));
+    assert_eq!(costs(&again), [after, after]);
+}
+
+#[test]
+fn what_tune_prints_of_every_law_flies() {
+    let folder = soft("every-law");
+    let mut file = SOFT.to_owned();
+    for law in ["afbc", "backstepping", "pid", "geometric", "indi"] {
+        let out = format!("{law}.toml");
+        let arguments =
+            ["tune", law, "--scenario", "circle", "--scenario", "soft.toml", "--budget", "20", "--out", &out];
+        let said = succeeds(&sitl(&folder, &arguments));
+        assert!(said.ends_with(&format!("gains in {out}\n")), "{said}");
+        file += &fs::read_to_string(folder.join(out)).unwrap();
+    }
+    fs::write(folder.join("all.toml"), file).unwrap();
+    let checked = succeeds(&sitl(&folder, &["check", "all.toml"]));
+    assert!(checked.contains("afbc-tuned, backstepping-tuned, pid-tuned, geometric-tuned, indi-tuned"), "{checked}");
+}
+
+#[test]
+fn tune_refuses_what_it_cannot_do() {
+    let folder = soft("tune-refused");
+    let line = refused(&sitl(&folder, &["tune", "lqr"]));
+    assert_eq!(line, "lqr: no such controller; the laws are afbc, backstepping, pid, geometric, indi\n");
+    let line = refused(&sitl(&folder, &["tune", "hard", "--scenario", "soft.toml"]));
+    assert!(line.ends_with("; the scenario's contenders backstepping, soft\n"), "{line}");
+    let line = refused(&sitl(&folder, &["tune", "pid", "--out", "nowhere/pid.toml"]));
+    assert_eq!(line, "nowhere: no such folder; make it first\n");
+    refused(&sitl(&folder, &["tune", "pid", "--budget", "0"]));
+}
