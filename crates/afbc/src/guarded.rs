@@ -138,14 +138,15 @@ impl FlightController for Guarded {
         command
     }
 
-    fn engage(&self, memory: &mut Memory) {
+    fn engage(&self, memory: &mut Memory) -> bool {
         let afbc = match memory {
             Memory { stand_in: Some(stand_in), .. } => self.resumed(stand_in),
             // Nobody has stood in yet: AFBC goes on from where it is.
             Memory { tripped: Some(_), afbc, .. } => *afbc,
-            _ => return,
+            _ => return false,
         };
         *memory = Memory { afbc, ..Memory::default() };
+        true
     }
 
     /// Zero while the other law flies.

@@ -90,10 +90,10 @@ fn a_trip_is_told_once_and_ended_by_command() {
     bench.hear(Uplink::Command(Command::Engage));
     let (report, said) = bench.tick(&State::default());
     assert_eq!(report.answer, Some(Ok(Request::Engage)));
+    assert_eq!(report.health.control.trip, None);
     assert_eq!(said, [accepted(MavCmd::MAV_CMD_USER_1)]);
-    // From the next tick on.
     let (report, said) = bench.tick(&State::default());
-    assert_eq!((report.health.control.trip, said), (None, vec![]));
+    assert_eq!((report.health.control.trip, said), (None, vec![]), "AFBC flies");
 }
 
 /// Told again only if it trips again: not when states come back after a gap.
