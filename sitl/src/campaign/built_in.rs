@@ -14,8 +14,9 @@ pub struct BuiltIn {
 }
 
 /// Every built-in campaign.
-pub const BUILT_IN: [BuiltIn; 2] = [
+pub const BUILT_IN: [BuiltIn; 3] = [
     BuiltIn { name: "robustness", text: include_str!("../../campaigns/robustness.toml") },
+    BuiltIn { name: "ablation", text: include_str!("../../campaigns/ablation.toml") },
     BuiltIn { name: "faults", text: include_str!("../../campaigns/faults.toml") },
 ];
 
