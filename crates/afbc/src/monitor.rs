@@ -49,7 +49,7 @@ pub struct Bounds {
 
 impl Bounds {
     /// Bounds for a law with these gains on a vehicle like the paper's: estimates that lean on their projection, errors
-    /// far beyond any manoeuvre, a limit cycle of a fifth of the weight: noise of 10 mm/s alone makes a tenth, in U4.
+    /// far beyond any manoeuvre, a limit cycle of half the weight: noise of 20 mrad/s alone makes two fifths, in U3.
     pub fn new(gains: &PerAxis<adaptive::Gains>, weight_n: f32) -> Self {
         Bounds {
             theta: PerAxis::from_fn(|axis| 0.95 * gains.get(axis).safeguards.theta_max),
@@ -57,7 +57,7 @@ impl Bounds {
             delta: PerAxis::from_fn(|axis| 1.001 * gains.get(axis).safeguards.delta_max),
             lyapunov: PerAxis { roll: 0.5, pitch: 0.5, yaw: 10.0, z: 200.0, x: 1000.0, y: 1000.0 },
             saturation_share: 0.9,
-            swing_n: 0.2 * weight_n,
+            swing_n: 0.5 * weight_n,
             swings_hz: 16.0,
         }
     }
