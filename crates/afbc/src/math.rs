@@ -14,8 +14,7 @@ use micromath::F32Ext;
 /// and for NaN.
 #[inline]
 pub fn exp2(x: f32) -> f32 {
-    const P: [f32; 6] =
-        [core::f32::consts::LN_2, 2.40226475e-01, 5.55036186e-02, 9.61852947e-03, 1.33903875e-03, 1.53208306e-04];
+    const P: [f32; 6] = [core::f32::consts::LN_2, 0.24022648, 0.055503618, 0.009618529, 0.0013390387, 0.00015320831];
     // So large a number has no places behind the point: adding it rounds, and leaves the integer, with the exponent's
     // bias, in its lowest bits.
     const LARGE: f32 = 12_582_912.0 + 127.0;
