@@ -2,6 +2,7 @@
 //! very inputs at hand, and AFBC takes over again on command only.
 
 use crate::adaptive::{self, Adaptive, Estimate};
+use crate::backstepping::Errors;
 use crate::cascade::{Cascade, Command, Controller, Settings};
 use crate::flight_controller::FlightController;
 use crate::integral::{Integral, IntegralBackstepping};
@@ -24,17 +25,30 @@ struct StandIn {
     /// Its last command. Kept here: coming back from a call, it would have a command put together in memory on AFBC's
     /// path, too.
     command: Command,
-    /// The attitude behind that, and its rates: what AFBC would go on from.
+}
+
+/// What the other law goes on from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Last {
+    inputs: PerAxis<f32>,
+    /// The attitude behind them, and its rates.
     attitude_rad: Vector3<f32>,
     rates_rad_s: Vector3<f32>,
+}
+
+impl Last {
+    #[inline]
+    fn new(inputs: PerAxis<f32>, state: &State) -> Self {
+        Last { inputs, attitude_rad: state.attitude_rad, rates_rad_s: state.rates_rad_s }
+    }
 }
 
 /// How AFBC's flight ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Tripped {
     trip: Trip,
-    /// AFBC's last inputs.
-    inputs: PerAxis<f32>,
+    /// Of the latest step, whoever flew it.
+    last: Last,
 }
 
 /// What changes in flight.
@@ -84,37 +98,33 @@ impl Guarded {
     fn stand_in<'a>(
         &self,
         memory: &'a mut Option<StandIn>,
-        (afbc, tripped): (&Cascade<Estimate>, &Tripped),
+        (afbc, tripped): (&Cascade<Estimate>, &mut Tripped),
         (state, setpoint): (&State, &Setpoint),
         fresh: bool,
     ) -> &'a Command {
-        let State { attitude_rad, rates_rad_s, .. } = *state;
-        let stand_in = memory.get_or_insert_with(|| {
+        let StandIn { cascade, command } = memory.get_or_insert_with(|| {
             let hover_thrust_n = Some(self.adaptive.hover_thrust_n(afbc));
-            let resume = |axis| Integral { value: 0.0, resume: Some(*tripped.inputs.get(axis)), hover_thrust_n };
-            let cascade = afbc.handed_over(PerAxis::from_fn(resume));
-            StandIn { cascade, command: Command::default(), attitude_rad, rates_rad_s }
+            let resume = |axis| Integral { value: 0.0, resume: Some(*tripped.last.inputs.get(axis)), hover_thrust_n };
+            StandIn { cascade: afbc.handed_over(PerAxis::from_fn(resume)), command: Command::default() }
         });
-        let mut command = self.fallback.cascade(&mut stand_in.cascade, state, setpoint, fresh);
+        *command = self.fallback.cascade(cascade, state, setpoint, fresh);
         command.health.trip = Some(tripped.trip);
-        *stand_in = StandIn { command, attitude_rad, rates_rad_s, ..*stand_in };
-        &stand_in.command
+        tripped.last = Last::new(command.per_axis(), state);
+        command
     }
 
-    /// AFBC goes on from the inputs of the law that stood in.
-    fn resumed(&self, stand_in: &StandIn) -> Cascade<Estimate> {
-        let StandIn { cascade, command, attitude_rad: eta, rates_rad_s: eta_dot } = stand_in;
-        let inputs = command.per_axis();
-        let estimate = |axis| {
+    /// What AFBC must have learnt to go on from the last inputs.
+    fn resumed(&self, last: &Last, errors: &PerAxis<Errors>) -> PerAxis<Estimate> {
+        let Last { inputs, attitude_rad: eta, rates_rad_s: eta_dot } = last;
+        PerAxis::from_fn(|axis| {
             let x = match axis {
                 Axis::Roll => [eta.x, eta_dot.x],
                 Axis::Pitch => [eta.y, eta_dot.y],
                 _ => [eta.z, eta_dot.z],
             };
             let norm_max = self.monitor.theta_start(axis);
-            self.adaptive.law().resumed(axis, *inputs.get(axis), x, cascade.errors.get(axis), norm_max)
-        };
-        cascade.handed_over(PerAxis::from_fn(estimate))
+            self.adaptive.law().resumed(axis, *inputs.get(axis), x, errors.get(axis), norm_max)
+        })
     }
 }
 
@@ -132,18 +142,17 @@ impl FlightController for Guarded {
         if !self.adaptive.stands(afbc) {
             let inputs = command.per_axis();
             if let Some(trip) = self.monitor.watch(figures, afbc, &inputs, command.health.saturated) {
-                *tripped = Some(Tripped { trip, inputs });
+                *tripped = Some(Tripped { trip, last: Last::new(inputs, state) });
             }
         }
         command
     }
 
     fn engage(&self, memory: &mut Memory) -> bool {
-        let afbc = match memory {
-            Memory { stand_in: Some(stand_in), .. } => self.resumed(stand_in),
-            // Nobody has stood in yet: AFBC goes on from where it is.
-            Memory { tripped: Some(_), afbc, .. } => *afbc,
-            _ => return false,
+        let Memory { afbc, tripped: Some(Tripped { last, .. }), stand_in, .. } = memory else { return false };
+        let afbc = match stand_in {
+            Some(StandIn { cascade, .. }) => cascade.handed_over(self.resumed(last, &cascade.errors)),
+            None => afbc.handed_over(self.resumed(last, &afbc.errors)),
         };
         *memory = Memory { afbc, ..Memory::default() };
         true
