@@ -84,7 +84,7 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
     let reference = reference(&campaign, &folder);
     let path = folder.join("interrupted");
 
-    // Stopped after 100 of 150 flights, by one thread: three chunks are there, the fourth was begun.
+    // Stopped after 100 of 150 flights, by one thread: six chunks of 16 are there, the seventh was begun.
     {
         let (stop, done) = (AtomicBool::new(false), AtomicU64::new(0));
         let place = Folder::open(&path, Manifest::new(&campaign, Shard::WHOLE)).unwrap();
@@ -101,9 +101,9 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
         entries.map(|path| (path.clone(), fs::read(path).unwrap())).collect::<BTreeMap<_, _>>()
     };
     let kept = chunks();
-    assert_eq!(kept.len(), 3);
+    assert_eq!(kept.len(), 6);
 
-    // One is torn, one is of another campaign, one is whole; and a file was being written.
+    // One is torn, one is of another campaign, four are whole; and a file was being written.
     let files: Vec<_> = kept.iter().collect();
     fs::write(files[0].0, &files[0].1[..files[0].1.len() / 2]).unwrap();
     let other = folder.join("other");
@@ -121,7 +121,7 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
         };
         campaign::fly(&campaign, &place, &AtomicBool::new(false), &first).unwrap().unwrap();
     }
-    assert_eq!(resumed.into_inner(), 32, "the whole chunk is not flown again");
+    assert_eq!(resumed.into_inner(), 64, "the four whole chunks are not flown again");
     assert_eq!(reference, results(&path));
     // Once more: nothing is left to fly.
     fly(&campaign, &path, Shard::WHOLE, 1);

@@ -119,6 +119,18 @@ impl Estimate {
         Estimate { theta: Matrix3::repeat(input), delta: 0.0 }
     }
 
+    /// The estimate whose u_a is `input` where the rules have these weights: as even over the rules as |Theta_hat| of
+    /// `norm_max` allows, and no smaller than the input takes.
+    fn spread(input: f32, weights: &Matrix3<f32>, norm_max: f32) -> Self {
+        // Of all such Theta_hat the smallest; what an even one has besides is at right angles to the weights.
+        let least = weights * (input / weights.norm_squared());
+        let rest = Matrix3::repeat(input) - least;
+        let room = math::max(norm_max * norm_max - least.norm_squared(), 0.0);
+        let square = rest.norm_squared();
+        let share = if square > room { math::sqrt(room / square) } else { 1.0 };
+        Estimate { theta: least + rest * share, delta: 0.0 }
+    }
+
     /// One step of explicit Euler, projected into the bounds.
     #[inline]
     fn advance(&mut self, rate: &Rate, safeguards: &Safeguards, dt_s: f32) {
@@ -207,6 +219,14 @@ impl Subsystem {
     }
 }
 
+/// Inputs of the fuzzy system (22), section IV: the angle and its rate for attitude, the error and its rate for position.
+fn fuzzy_inputs(axis: Axis, x: [f32; 2], errors: &Errors) -> [f32; 2] {
+    match axis {
+        Axis::Roll | Axis::Pitch | Axis::Yaw => x,
+        Axis::Z | Axis::X | Axis::Y => [errors.e1, errors.e1_dot],
+    }
+}
+
 /// AFBC for the six subsystems.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adaptive {
@@ -231,6 +251,14 @@ impl Adaptive {
             },
         })
     }
+
+    /// What the subsystem must have learnt to want `input` for these errors, with [`Estimate::spread`] over its rules;
+    /// `x` is x_1, x_2 of an attitude.
+    pub(crate) fn resumed(&self, axis: Axis, input: f32, x: [f32; 2], errors: &Errors, norm_max: f32) -> Estimate {
+        let Subsystem { gains, basis, .. } = self.subsystems.get(axis);
+        let fuzzy = input - proportional(gains.backstepping.alpha2, errors);
+        Estimate::spread(fuzzy, &basis.weights(fuzzy_inputs(axis, x, errors)), norm_max)
+    }
 }
 
 impl Law for Adaptive {
@@ -240,11 +268,7 @@ impl Law for Adaptive {
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Estimate) -> (f32, Errors) {
         let subsystem = self.subsystems.get(axis);
         let errors = Errors::new(subsystem.gains.backstepping.alpha1, tracking);
-        // Section IV: the angle and its rate for attitude, the error and its rate for position.
-        let inputs = match axis {
-            Axis::Roll | Axis::Pitch | Axis::Yaw => [tracking.x1, tracking.x2],
-            Axis::Z | Axis::X | Axis::Y => [errors.e1, errors.e1_dot],
-        };
+        let inputs = fuzzy_inputs(axis, [tracking.x1, tracking.x2], &errors);
         (subsystem.step(&errors, inputs, *context.unallocated.get(axis), context, estimate), errors)
     }
 

@@ -105,6 +105,8 @@ pub struct Controller<L> {
     gravity_m_s2: f32,
     inverse_gravity: f32,
     tilt_max_tan: f32,
+    /// What all rotors give together \[N\].
+    thrust_max_n: f32,
     /// Largest e_1 of x, y and z \[m\]: alpha_1 times it is the largest speed.
     error_max_m: Vector3<f32>,
 }
@@ -213,6 +215,7 @@ impl<L: Law> Controller<L> {
             gravity_m_s2: vehicle.gravity_m_s2,
             inverse_gravity: 1.0 / vehicle.gravity_m_s2,
             tilt_max_tan: math::tan(settings.limits.tilt_max_rad),
+            thrust_max_n: 4.0 * settings.rotor_force_max_n,
         })
     }
 
@@ -223,6 +226,16 @@ impl<L: Law> Controller<L> {
         let square = u5 * u5 + u6 * u6;
         let scale = if square > max * max { max / math::sqrt(square) } else { 1.0 };
         [u5 * scale, u6 * scale]
+    }
+
+    /// The law in the cascade.
+    pub(crate) fn law(&self) -> &L {
+        &self.law
+    }
+
+    /// U4 that it takes to hover \[N\], by what has been learnt: no more than the rotors give.
+    pub(crate) fn hover_thrust_n(&self, memory: &Cascade<L::Estimate>) -> f32 {
+        math::min(self.law.hover_thrust_n(&memory.estimates.z, self.weight_n), self.thrust_max_n)
     }
 
     /// True if the ground carries the vehicle, as far as that is heeded.
@@ -251,7 +264,7 @@ impl<L: Law> Controller<L> {
             adapt: fresh && !stands,
             unallocated: memory.unallocated,
         };
-        let hover_n = self.law.hover_thrust_n(&memory.estimates.z, self.weight_n);
+        let hover_n = self.hover_thrust_n(memory);
         let Cascade { estimates, errors, .. } = memory;
         let mut input = |axis: Axis, tracking: Tracking| {
             let (u, e) = self.law.input(axis, &tracking, &context, estimates.get_mut(axis));
@@ -277,7 +290,7 @@ impl<L: Law> Controller<L> {
         // Desired attitude with the derivatives that (12) and (16) ask for.
         let (eta, eta_dot) = (state.attitude_rad, state.rates_rad_s);
         let (vertical, inverse_vertical) = if self.settings.tilt_by_thrust {
-            let upward_n = u4 * math::tilt_cosine(eta.x, eta.y);
+            let upward_n = math::min(u4, self.thrust_max_n) * math::tilt_cosine(eta.x, eta.y);
             let share = math::max(upward_n / hover_n, VERTICAL_MIN);
             (self.gravity_m_s2 * share, self.inverse_gravity / share)
         } else {

@@ -59,9 +59,11 @@ pub trait FlightController {
         command
     }
 
-    /// Gives the flight back to a controller that has fallen back on another law, without a jump of its inputs. Does
-    /// nothing to one that has not.
-    fn engage(&self, _memory: &mut Self::Memory) {}
+    /// Gives the flight back to a controller that has fallen back on another law, without a jump of its inputs; true if it
+    /// had. Does nothing to one that has not.
+    fn engage(&self, _memory: &mut Self::Memory) -> bool {
+        false
+    }
 
     /// What `memory` holds in AFBC's terms, for logs and monitors; zero for a controller that learns nothing.
     fn learnt(_memory: &Self::Memory) -> PerAxis<Estimate> {

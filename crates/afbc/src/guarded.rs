@@ -2,12 +2,12 @@
 //! very inputs at hand, and AFBC takes over again on command only.
 
 use crate::adaptive::{self, Adaptive, Estimate};
-use crate::backstepping::Errors;
 use crate::cascade::{Cascade, Command, Controller, Settings};
 use crate::flight_controller::FlightController;
 use crate::integral::{Integral, IntegralBackstepping};
 use crate::monitor::{Bounds, Figures, Monitor, Trip};
-use airframe::{OutOfRange, Parameters, PerAxis, Setpoint, State};
+use airframe::{Axis, OutOfRange, Parameters, PerAxis, Setpoint, State};
+use nalgebra::Vector3;
 
 /// AFBC with a monitor and a law to fall back on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,7 +15,6 @@ pub struct Guarded {
     adaptive: Controller<Adaptive>,
     fallback: Controller<IntegralBackstepping>,
     monitor: Monitor,
-    alpha2: PerAxis<f32>,
 }
 
 /// A flight under the law that stands in.
@@ -25,6 +24,9 @@ struct StandIn {
     /// Its last command. Kept here: coming back from a call, it would have a command put together in memory on AFBC's
     /// path, too.
     command: Command,
+    /// The attitude behind that, and its rates: what AFBC would go on from.
+    attitude_rad: Vector3<f32>,
+    rates_rad_s: Vector3<f32>,
 }
 
 /// How AFBC's flight ended.
@@ -73,7 +75,6 @@ impl Guarded {
             adaptive: Controller::new(vehicle, settings, Adaptive::new(gains)?)?,
             fallback: Controller::new(vehicle, settings, IntegralBackstepping::new(&vehicle, fixed)?)?,
             monitor: Monitor::new(&vehicle, bounds, settings.dt_s)?,
-            alpha2: PerAxis::from_fn(|axis| gains.get(axis).backstepping.alpha2),
         })
     }
 
@@ -87,18 +88,33 @@ impl Guarded {
         (state, setpoint): (&State, &Setpoint),
         fresh: bool,
     ) -> &'a Command {
-        let StandIn { cascade, command } = memory.get_or_insert_with(|| {
-            let resume = |axis| Integral { value: 0.0, resume: Some(*tripped.inputs.get(axis)) };
-            StandIn { cascade: afbc.handed_over(PerAxis::from_fn(resume)), command: Command::default() }
+        let State { attitude_rad, rates_rad_s, .. } = *state;
+        let stand_in = memory.get_or_insert_with(|| {
+            let hover_thrust_n = Some(self.adaptive.hover_thrust_n(afbc));
+            let resume = |axis| Integral { value: 0.0, resume: Some(*tripped.inputs.get(axis)), hover_thrust_n };
+            let cascade = afbc.handed_over(PerAxis::from_fn(resume));
+            StandIn { cascade, command: Command::default(), attitude_rad, rates_rad_s }
         });
-        *command = self.fallback.cascade(cascade, state, setpoint, fresh);
+        let mut command = self.fallback.cascade(&mut stand_in.cascade, state, setpoint, fresh);
         command.health.trip = Some(tripped.trip);
-        command
+        *stand_in = StandIn { command, attitude_rad, rates_rad_s, ..*stand_in };
+        &stand_in.command
     }
 
-    /// What AFBC must have learnt to want `inputs` for these errors.
-    fn learnt_from(&self, inputs: &PerAxis<f32>, errors: &PerAxis<Errors>) -> PerAxis<Estimate> {
-        PerAxis::from_fn(|axis| Estimate::of(inputs.get(axis) - self.alpha2.get(axis) * errors.get(axis).e2))
+    /// AFBC goes on from the inputs of the law that stood in.
+    fn resumed(&self, stand_in: &StandIn) -> Cascade<Estimate> {
+        let StandIn { cascade, command, attitude_rad: eta, rates_rad_s: eta_dot } = stand_in;
+        let inputs = command.per_axis();
+        let estimate = |axis| {
+            let x = match axis {
+                Axis::Roll => [eta.x, eta_dot.x],
+                Axis::Pitch => [eta.y, eta_dot.y],
+                _ => [eta.z, eta_dot.z],
+            };
+            let norm_max = self.monitor.theta_start(axis);
+            self.adaptive.law().resumed(axis, *inputs.get(axis), x, cascade.errors.get(axis), norm_max)
+        };
+        cascade.handed_over(PerAxis::from_fn(estimate))
     }
 }
 
@@ -122,17 +138,15 @@ impl FlightController for Guarded {
         command
     }
 
-    fn engage(&self, memory: &mut Memory) {
+    fn engage(&self, memory: &mut Memory) -> bool {
         let afbc = match memory {
-            Memory { stand_in: Some(StandIn { cascade, command }), .. } => {
-                cascade.handed_over(self.learnt_from(&command.per_axis(), &command.errors))
-            }
-            Memory { tripped: Some(Tripped { inputs, .. }), afbc, .. } => {
-                afbc.handed_over(self.learnt_from(inputs, &afbc.errors))
-            }
-            _ => return,
+            Memory { stand_in: Some(stand_in), .. } => self.resumed(stand_in),
+            // Nobody has stood in yet: AFBC goes on from where it is.
+            Memory { tripped: Some(_), afbc, .. } => *afbc,
+            _ => return false,
         };
         *memory = Memory { afbc, ..Memory::default() };
+        true
     }
 
     /// Zero while the other law flies.

@@ -42,6 +42,8 @@ pub struct Integral {
     pub value: f32,
     /// The input to go on from: the next step chooses i for it.
     pub resume: Option<f32>,
+    /// Of z: U4 that it takes to hover, as far as that has been learnt before \[N\].
+    pub hover_thrust_n: Option<f32>,
 }
 
 /// Backstepping with integral action.
@@ -86,6 +88,11 @@ impl Law for IntegralBackstepping {
 
     fn alpha1(&self, axis: Axis) -> f32 {
         self.gains.get(axis).backstepping.alpha1
+    }
+
+    fn hover_thrust_n(&self, z: &Integral, weight_n: f32) -> f32 {
+        // Not weight and integral: that holds what a manoeuvre takes, too.
+        z.hover_thrust_n.unwrap_or(weight_n)
     }
 
     fn learnt(_: &Integral) -> Estimate {

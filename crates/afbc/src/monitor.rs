@@ -228,6 +228,11 @@ impl Monitor {
         })
     }
 
+    /// |Theta_hat| to start from, of what is allowed the rest left to be learnt.
+    pub(crate) fn theta_start(&self, axis: Axis) -> f32 {
+        0.75 * self.bounds.theta.get(axis)
+    }
+
     /// Takes one step into account; tells what is wrong, if anything is. `inputs` are U1..U4 \[N\], u5, u6 \[m/s2\].
     #[inline]
     pub fn watch(

@@ -5,6 +5,7 @@
 mod common;
 
 use afbc::adaptive::Estimate;
+use afbc::ground::LIFT_SHARE;
 use afbc::monitor::{Bounds, Trip};
 use afbc::{Adaptive, Command, Controller, FlightController, Guarded, Health, Memory, Profile, guarded};
 use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
@@ -104,6 +105,8 @@ proptest! {
     /// AFBC's last, the fallback's first; the fallback's last, AFBC's first.
     #[test]
     fn hand_over_is_bumpless_there_and_back(state in near(), setpoint in near(), lasting in 0_usize..300) {
+        // Otherwise there is no error of roll to trip on.
+        prop_assume!(state.rates_rad_s.x.abs() > 1e-3);
         let setpoint = Setpoint { position_m: setpoint.position_m, velocity_m_s: setpoint.velocity_m_s, ..Setpoint::default() };
         let controller = guarded(hair_trigger());
         let mut memory = Flight::default();
@@ -123,6 +126,8 @@ proptest! {
         for _ in 0..lasting {
             last_of_fallback = controller.step(&mut memory, &state, &setpoint);
         }
+        // Otherwise it may stand by then, where nothing trips.
+        prop_assume!(last_of_fallback.inputs.thrust_n >= LIFT_SHARE * WEIGHT_N);
         controller.engage(&mut memory.control);
         let first_of_afbc = controller.step(&mut memory, &state, &setpoint);
         prop_assert_eq!((first_of_afbc.health.trip, memory.control.trip().is_some()), (None, true));
@@ -227,4 +232,66 @@ fn bounds_and_gains_out_of_range_are_refused_by_name() {
     bad.z.gamma = f32::NAN;
     assert_eq!(name(settings, bad, bounds()), "gamma");
     assert_eq!(name(afbc::Settings { dt_s: 0.0, ..settings }, gains, bounds()), "dt_s");
+}
+
+/// What AFBC goes on from is spread over its rules no wider than its monitor lets pass: it is engaged for good.
+#[test]
+fn engaging_does_not_trip_by_itself() {
+    let bounds = bounds();
+    for yaw_n in [0.5_f32, 1.5, -1.5, 2.4] {
+        let (controller, (_, mut memory)) = (guarded(bounds), tripped(0, 0.0));
+        controller.step(&mut memory, &State::default(), &Setpoint::default());
+        // Held by force: the integral goes on, 1 mN a step.
+        let turning = Setpoint { yaw_rate_rad_s: 0.05_f32.copysign(yaw_n), ..Setpoint::default() };
+        for _ in 0..(yaw_n.abs() * 1e3) as usize {
+            controller.step(&mut memory, &State::default(), &turning);
+        }
+        let before = controller.step(&mut memory, &State::default(), &Setpoint::default());
+        assert!((before.inputs.yaw_n / yaw_n - 1.0).abs() < 0.05 && memory.control.trip().is_some(), "{before:?}");
+        controller.engage(&mut memory.control);
+        for _ in 0..100 {
+            let command = controller.step(&mut memory, &State::default(), &Setpoint::default());
+            assert_eq!((command.health.trip, memory.control.trip()), (None, None), "{yaw_n} N");
+            assert!((command.inputs.yaw_n - before.inputs.yaw_n).abs() < 5e-3, "{yaw_n} N: {command:?}");
+            let learnt = Guarded::learnt(&memory.control).yaw.theta;
+            assert!(learnt.norm() < bounds.theta.yaw && (yaw_n.abs() > 0.7 || learnt.max() - learnt.min() < 1e-2));
+        }
+    }
+}
+
+/// The law that stands in knows what AFBC had learnt of the weight: the tilt for an acceleration is the same.
+#[test]
+fn the_tilt_does_not_step_at_a_trip() {
+    // Of thrust, by (40) at yaw 0 [m/s2].
+    let vertical = |command: &Command| command.virtual_m_s2[0] / command.desired_rad[1].tan();
+    let (controller, (before, mut memory)) = (guarded(bounds()), tripped(1500, 0.1));
+    for _ in 0..20 {
+        let aside = Setpoint { position_m: Vector3::new(0.1, 0.0, 0.0), ..Setpoint::default() };
+        let after = controller.step(&mut memory, &State::default(), &aside);
+        assert!(after.health.trip.is_some() && after.inputs.thrust_n > 1.3 * WEIGHT_N, "{after:?}");
+        assert!(
+            (vertical(&after) / vertical(&before) - 1.0).abs() < 0.02,
+            "{} then {}",
+            vertical(&before),
+            vertical(&after)
+        );
+    }
+}
+
+/// A flight of a vehicle that sinks a little for so long, then is led aside, until errors of z trip it; and the step that
+/// did.
+fn tripped(steps: usize, aside_m: f32) -> (Command, Flight) {
+    let controller = guarded(bounds());
+    let mut memory = Flight::default();
+    let sinks = Setpoint { velocity_m_s: Vector3::new(0.0, 0.0, 0.05), ..Setpoint::default() };
+    for _ in 0..steps {
+        controller.step(&mut memory, &State::default(), &sinks);
+    }
+    let touchy = guarded(Bounds { lyapunov: PerAxis { z: 0.0, ..bounds().lyapunov }, ..bounds() });
+    let aside = Setpoint { position_m: Vector3::new(aside_m, 0.0, 0.0), ..sinks };
+    let mut last = Command::default();
+    while memory.control.trip().is_none() {
+        last = touchy.step(&mut memory, &State::default(), &aside);
+    }
+    (last, memory)
 }

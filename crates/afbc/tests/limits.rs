@@ -73,8 +73,9 @@ proptest! {
         let command = adaptive(Profile::Flight.gains(), settings).step(&mut Memory::default(), &state, &setpoint);
 
         let [u5, u6] = command.virtual_m_s2.map(f64::from);
-        let [roll, pitch] = [attitude_rad.x, attitude_rad.y].map(|angle| f64::from(afbc::math::cos(angle)));
-        let upward = f64::from(command.inputs.thrust_n) * roll * pitch / f64::from(WEIGHT_N);
+        let cosine = f64::from(afbc::math::tilt_cosine(attitude_rad.x, attitude_rad.y));
+        let thrust = command.inputs.thrust_n.min(4.0 * settings.rotor_force_max_n);
+        let upward = f64::from(thrust) * cosine / f64::from(WEIGHT_N);
         let vertical = if by_thrust { GRAVITY_M_S2 * upward.max(0.3) } else { GRAVITY_M_S2 };
         let max = (vertical * f64::from(limits.tilt_max_rad).tan()).min(f64::from(limits.acceleration_max_m_s2));
         let size = u5.hypot(u6);

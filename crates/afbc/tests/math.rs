@@ -3,7 +3,7 @@
 #![allow(missing_docs)]
 
 use afbc::math;
-use core::f32::consts::PI;
+use core::f32::consts::{FRAC_PI_2, PI};
 use proptest::prelude::*;
 
 /// Every finite `f32` of a sweep through the bit patterns of both signs: as dense near zero as far out.
@@ -93,7 +93,12 @@ fn tan_and_tilt_cosine_are_as_exact_as_documented() {
     assert_figure("tan", worst(even_sweep(1e-3, 1.0, 1_000_000), relative), 3e-7);
     assert_figure("tan near a quarter turn", worst(even_sweep(1.0, 1.57, 1_000_000), relative), 1e-4);
     let alone = |x: f32| (f64::from(math::tilt_cosine(x, 0.0)) - f64::from(x).cos()).abs();
-    assert_figure("tilt_cosine", worst(even_sweep(-1.5707, 1.5707, 1_000_000), alone), 1e-3);
+    assert_figure("tilt_cosine", worst(even_sweep(-FRAC_PI_2, FRAC_PI_2, 1_000_000), alone), 1e-3);
+    assert_figure("tilt_cosine, any angle", worst(even_sweep(-1000.0, 1000.0, 1_000_000), alone), 1.2e-3);
+    let both =
+        |x: f32| (f64::from(math::tilt_cosine(x, 1.3 * x)) - f64::from(x).cos() * f64::from(1.3 * x).cos()).abs();
+    // Two cosines, each within 1.2e-3.
+    assert!(worst(even_sweep(-700.0, 700.0, 1_000_000), both).0 <= 2.4e-3);
 }
 
 #[test]

@@ -4,7 +4,7 @@
 use afbc::monitor::Trip;
 use airframe::{Axis, Setpoint, State};
 use link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, MavCmd, Sender, Text, Uplink};
-use onboard::{Comms, Flight, Report, post};
+use onboard::{Comms, Flight, Report};
 use vehicle::{Inbox, Mode, Request};
 
 const STATION: Address = Address { system: 255, component: 190 };
@@ -33,7 +33,7 @@ impl Bench {
 
     fn hear(&mut self, message: Uplink) {
         let news = self.comms.receive(self.sender.send(&message, &mut [0; FRAME_MAX]));
-        post(&mut self.inbox, &news);
+        self.inbox.post(&news);
     }
 
     /// What is said after a tick that is reported so.
@@ -92,6 +92,8 @@ fn a_trip_is_told_once_and_ended_by_command() {
     assert_eq!(report.answer, Some(Ok(Request::Engage)));
     assert_eq!(report.health.control.trip, None);
     assert_eq!(said, [accepted(MavCmd::MAV_CMD_USER_1)]);
+    let (report, said) = bench.tick(&State::default());
+    assert_eq!((report.health.control.trip, said), (None, vec![]), "AFBC flies");
 }
 
 /// Told again only if it trips again: not when states come back after a gap.

@@ -30,9 +30,9 @@
 //! Section IV with rotors of 20 ms.
 //!
 //! ```
-//! use afbc::{FlightController, Profile};
+//! use afbc::{FlightController, Memory, Profile};
 //! use airframe::{Parameters, Setpoint, State};
-//! use peers::pid::{Gains, Memory, Pid};
+//! use peers::pid::{Gains, Pid};
 //!
 //! let controller = Pid::new(Parameters::PAPER.to_f32(), Profile::Paper.settings(), Gains::PAPER_VEHICLE)?;
 //! let command = controller.step(&mut Memory::default(), &State::default(), &Setpoint::default());

@@ -46,6 +46,8 @@ impl Station {
         match tick {
             // The first is refused: the rate is not known yet.
             100 | 1_500 => self.say(Uplink::Command(Command::Arm)),
+            // The motion does not follow the rotors, so AFBC's monitor trips, time and again.
+            3_000 | 5_200 => self.say(Uplink::Command(Command::Engage)),
             5_900 => self.say(Uplink::Command(Command::Disarm)),
             _ => (),
         }

@@ -74,7 +74,7 @@ impl Motor {
         let ratio = speed_rad_s * self.inverse_speed_max;
         // The speed follows the throttle: nothing to invert.
         let u = if self.curve.linearity == 1.0 { ratio } else { self.inverse_curve(max(ratio, 0.0)) };
-        steps(u).clamp(self.idle, SPAN) + THROTTLE_MIN
+        steps(u).max(self.idle).min(SPAN) + THROTTLE_MIN
     }
 
     /// u in 0..1 with k u^2 + (1 - k) u = `ratio`^2: the quadratic's root in the form that holds for k = 0 too. 0 for NaN.

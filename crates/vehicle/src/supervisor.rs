@@ -56,7 +56,8 @@ pub enum Request {
     Arm,
     /// Stop the motors, now, wherever the vehicle is.
     Disarm,
-    /// Give the flight back, from the next tick on, to the controller that has fallen back on another law.
+    /// Give the flight back to the controller, if it has fallen back on another law: the rotors stay as they are for a
+    /// tick, from the next one on it flies.
     Engage,
 }
 

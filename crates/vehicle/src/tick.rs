@@ -148,7 +148,10 @@ impl<C: FlightController> Vehicle<C> {
         let command = match flight {
             Some(flight) if mode.armed() && !arms => {
                 flight.reckon(&self.blind, fresh.filter(|_| measured));
+                let engaged = answer == Some(Ok(Request::Engage)) && self.controller.engage(&mut flight.control);
                 match fresh {
+                    // Taking over and a step would be too much, too: the rotors stay as they are.
+                    _ if engaged => self.allocated(flight.applied),
                     Some(state) => {
                         let target = flight.guide.target(mode, state, setpoint, now_us, self.dt_s);
                         // The inbox let plausible ones pass only.
@@ -166,10 +169,6 @@ impl<C: FlightController> Vehicle<C> {
             }
             _ => Command::default(),
         };
-        // For the next step: so is taking over and a step.
-        if let (Some(Ok(Request::Engage)), true, Some(flight)) = (answer, mode.armed(), flight) {
-            self.controller.engage(&mut flight.control);
-        }
 
         // Gate the motors.
         let motors = if mode.armed() { command.speeds } else { RotorSpeeds::default() };
@@ -185,6 +184,12 @@ impl<C: FlightController> Vehicle<C> {
             Mode::Descending => self.blind.descend(&flight.reckoning),
             _ => self.blind.ride(&flight.reckoning),
         };
+        self.allocated(inputs)
+    }
+
+    /// The command for these inputs, without a law.
+    #[inline(always)]
+    fn allocated(&self, inputs: Inputs) -> Command {
         let allocation = self.mixer.allocate(&inputs);
         let health = afbc::Health { saturated: allocation.saturated, ..afbc::Health::default() };
         let speeds = self.mixer.speeds(&allocation.forces);

@@ -15,8 +15,9 @@ impl FlightController for Counter {
         Command::default()
     }
 
-    fn engage(&self, memory: &mut u32) {
+    fn engage(&self, memory: &mut u32) -> bool {
         *memory += 1;
+        true
     }
 }
 

@@ -12,7 +12,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Flights of one chunk: seconds of work for one core.
-const CHUNK: usize = 32;
+const CHUNK: usize = 16;
 /// All rows.
 const RESULTS: &str = "results.parquet";
 /// The manifest, there from the beginning.
