@@ -96,18 +96,18 @@ pub struct Gains {
 }
 
 impl Gains {
-    /// Ours, found by `sitl tune`, for the paper's vehicle with rotors of 20 ms.
+    /// Ours, by hand, for the paper's vehicle with rotors of 20 ms.
     pub const PAPER_VEHICLE: Self = Gains {
-        position_p_1_s: 2.924,
-        velocity_p_1_s: 4.506,
-        height_p_1_s: 2.694,
-        climb_p_1_s: 3.394,
-        tilt_p_1_s: 11.5,
-        tilt_rate_p_1_s: 12.8,
-        yaw_p_1_s: 1.974,
-        yaw_rate_p_1_s: 1.359,
-        position_filter_rad_s: 60.03,
-        attitude_filter_rad_s: 56.22,
+        position_p_1_s: 2.0,
+        velocity_p_1_s: 4.5,
+        height_p_1_s: 3.0,
+        climb_p_1_s: 8.0,
+        tilt_p_1_s: 10.0,
+        tilt_rate_p_1_s: 25.0,
+        yaw_p_1_s: 3.0,
+        yaw_rate_p_1_s: 8.0,
+        position_filter_rad_s: 40.0,
+        attitude_filter_rad_s: 80.0,
         rotor_time_constant_s: 0.02,
         yaw_weight: 0.4,
         speed_max_m_s: 3.0,
