@@ -79,9 +79,9 @@ impl Law {
         match kind {
             ControllerKind::Afbc => Law::Afbc(profile.gains()),
             ControllerKind::Backstepping => Law::Backstepping(backstepping_part(&profile.gains())),
-            ControllerKind::Pid => Law::Pid(pid::Gains::PAPER_VEHICLE),
-            ControllerKind::Geometric => Law::Geometric(geometric::Gains::GOODARZI_2013),
-            ControllerKind::Indi => Law::Indi(indi::Gains::PAPER_VEHICLE),
+            ControllerKind::Pid => Law::Pid(pid::Gains::TUNED),
+            ControllerKind::Geometric => Law::Geometric(geometric::Gains::TUNED),
+            ControllerKind::Indi => Law::Indi(indi::Gains::TUNED),
         }
     }
 

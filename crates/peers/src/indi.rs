@@ -96,6 +96,21 @@ pub struct Gains {
 }
 
 impl Gains {
+    /// As `sitl tune` found it for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
+    pub const TUNED: Self = Gains {
+        position_p_1_s: 2.924,
+        velocity_p_1_s: 4.506,
+        height_p_1_s: 2.694,
+        climb_p_1_s: 3.394,
+        tilt_p_1_s: 11.5,
+        tilt_rate_p_1_s: 12.8,
+        yaw_p_1_s: 1.974,
+        yaw_rate_p_1_s: 1.359,
+        position_filter_rad_s: 60.03,
+        attitude_filter_rad_s: 56.22,
+        ..Self::PAPER_VEHICLE
+    };
+
     /// Ours, by hand, for the paper's vehicle with rotors of 20 ms.
     pub const PAPER_VEHICLE: Self = Gains {
         position_p_1_s: 2.0,

@@ -26,8 +26,8 @@
 //!
 //! Gains are plain structs. `tunables` lists each gain that is a matter of taste with the range to search; what describes
 //! the vehicle instead (largest tilt, rotor lag) is in `others`. The sets given
-//! here, each named `Gains::PAPER_VEHICLE` or after its source, were tuned by hand for the vehicle of the paper's
-//! Section IV with rotors of 20 ms.
+//! here are for the vehicle of the paper's Section IV with rotors of 20 ms: those named `Gains::PAPER_VEHICLE` or after
+//! their source were tuned by hand, `Gains::TUNED` by `sitl tune` (`docs/tuning.md`).
 //!
 //! ```
 //! use afbc::{FlightController, Memory, Profile};

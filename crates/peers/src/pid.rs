@@ -107,6 +107,26 @@ pub struct Gains {
 }
 
 impl Gains {
+    /// As `sitl tune` found it for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
+    pub const TUNED: Self = Gains {
+        position_p_1_s: 1.579,
+        velocity_p_1_s: 5.146,
+        velocity_i_1_s2: 25.54,
+        velocity_d: 0.04463,
+        height_p_1_s: 1.24,
+        climb_p_1_s: 5.953,
+        climb_i_1_s2: 90.24,
+        tilt_p_1_s: 13.36,
+        yaw_p_1_s: 0.6672,
+        tilt_rate_p_1_s: 21.76,
+        tilt_rate_i_1_s2: 49.82,
+        tilt_rate_d: 0.06449,
+        yaw_rate_p_1_s: 1.704,
+        yaw_rate_i_1_s2: 25.31,
+        filter_rad_s: 138.2,
+        ..Self::PAPER_VEHICLE
+    };
+
     /// Ours, by hand, for the paper's vehicle with rotors of 20 ms.
     pub const PAPER_VEHICLE: Self = Gains {
         position_p_1_s: 2.2,

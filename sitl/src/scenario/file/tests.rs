@@ -169,7 +169,7 @@ fn contenders_start_from_the_file_or_from_a_profile() {
     assert_eq!(z(file), Gains { gamma: 5.0, eta: 0.1, ..paper });
     assert_eq!(flight.law, Law::Guarded(Profile::Flight.gains()));
     assert_eq!(flight.settings, Settings { dt_s: 0.002, ..Profile::Flight.settings() });
-    let tuned = pid::Gains { tilt_p_1_s: 9.0, ..pid::Gains::PAPER_VEHICLE };
+    let tuned = pid::Gains { tilt_p_1_s: 9.0, ..pid::Gains::TUNED };
     assert_eq!((pid.law, pid.settings), (Law::Pid(tuned), short.settings));
     // Without controllers, a contender is alone.
     assert_eq!(example("[[contender]]\nname = \"a\"\ncontroller = \"indi\"\n").unwrap().contenders.len(), 1);
