@@ -10,6 +10,8 @@
 //! 3. [`adaptive`]: the law (20)-(22) with its adaptation (32)-(34).
 //! 4. [`cascade`]: six subsystems, the desired attitude (39)-(40) and the command filter make one [`Controller`].
 //! 5. [`allocation`]: U1..U4 to rotor forces and speeds, and back.
+//! 6. [`safeguards`], [`limits`], [`ground`]: what makes the printed law fit to fly, in [`Profile::Flight`].
+//! 7. [`monitor`], [`integral`], [`guarded`]: who watches AFBC, and who flies when it is not to be trusted.
 //!
 //! # What to expect
 //!
