@@ -94,7 +94,7 @@ const ANSWER_S: f32 = 0.021;
 fn flight(axis: Axis, paper: adaptive::Gains) -> adaptive::Gains {
     let (alpha1, alpha2, gamma, eta, theta_max, delta_max) = match axis {
         Axis::Roll | Axis::Pitch => (1.6, 0.78, 6.9, 0.15, 3.0, 0.05),
-        Axis::Yaw => (0.72, 1.0, 38.0, 0.26, 3.0, 0.65),
+        Axis::Yaw => (0.72, 1.0, 38.0, 0.26, 6.0, 0.65),
         Axis::Z => (0.81, 2.5, 78.0, 1.4, 30.0, 0.6),
         Axis::X | Axis::Y => (2.6, 7.6, 65.0, 0.17, 15.0, 0.5),
     };
