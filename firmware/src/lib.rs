@@ -7,7 +7,7 @@
 //!
 //! # Priorities
 //!
-//! Nothing runs in thread mode: every task lives in an interrupt executor, and the core sleeps when none has work.
+//! Nothing runs in thread mode: every task lives in an interrupt executor, and the core idles when none has work.
 //! From the most urgent (see [`executors::priority`]):
 //!
 //! | | runs | for about |
@@ -32,7 +32,7 @@ pub mod time;
 #[cfg_attr(not(feature = "pil"), path = "board/flight.rs")]
 pub mod board;
 
-/// Starts everything; the core then sleeps between interrupts.
+/// Starts everything; the core then idles between interrupts.
 pub fn run(mut core: cortex_m::Peripherals) -> ! {
     let executors = executors::start(&mut core);
     let board = board::start(executors.control);
@@ -41,6 +41,6 @@ pub fn run(mut core: cortex_m::Peripherals) -> ! {
     control::spawn(executors.control, board.outputs);
     housekeeping::spawn(executors.housekeeping);
     loop {
-        cortex_m::asm::wfi();
+        board::idle();
     }
 }

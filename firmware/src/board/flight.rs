@@ -152,6 +152,11 @@ pub fn stop_motors() {
     pac::GPIOC.moder().modify(|mode| (6..=9).for_each(|pin| mode.set_moder(pin, Moder::OUTPUT)));
 }
 
+/// Sleeps until the next interrupt.
+pub fn idle() {
+    cortex_m::asm::wfi();
+}
+
 /// Motors and watchdog.
 pub struct Outputs {
     watchdog: IndependentWatchdog<'static, IWDG>,
