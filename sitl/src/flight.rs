@@ -1,7 +1,8 @@
 //! Lockstep flights: measure, control, observe, move the vehicle, once per step.
 
+use crate::aboard::Aboard;
 use crate::contender::{Build, Contender, Law, Monitored, step_s};
-use crate::scenario::Scenario;
+use crate::scenario::{Outage, Scenario};
 use crate::trajectory::{Reference, Trajectory};
 use afbc::{Command, FlightController, Memory, Settings, adaptive};
 use airframe::{OutOfRange, PerAxis, State};
@@ -46,6 +47,7 @@ pub struct Flight<C: FlightController> {
     memory: Memory<C::Memory>,
     plant: Plant,
     sensors: Option<Sensors>,
+    outages: Vec<Outage>,
     trajectory: Trajectory,
     dt_s: f64,
 }
@@ -62,6 +64,7 @@ impl<C: FlightController> Flight<C> {
             memory: Memory::default(),
             plant: scenario.plant(dt_s)?,
             sensors: scenario.sensors(dt_s)?,
+            outages: scenario.outages.clone(),
             trajectory: scenario.trajectory.clone(),
             dt_s,
         })
@@ -78,7 +81,8 @@ impl<C: FlightController> Flight<C> {
             Some(sensors) => measure(sensors, &motion),
         };
         let reference = self.trajectory.at(time_s);
-        let command = self.controller.step(&mut self.memory, &state, &reference.setpoint());
+        let state = if self.outages.is_empty() { &state } else { arrived(&self.outages, time_s, &state) };
+        let command = self.controller.step(&mut self.memory, state, &reference.setpoint());
         let (estimates, telemetry) = (C::learnt(&self.memory.control), self.plant.telemetry());
         Sample { time_s, motion, measurement, telemetry, reference, command, estimates }
     }
@@ -106,17 +110,26 @@ impl<C: FlightController> Flight<C> {
     }
 }
 
-/// What a controller is given: in a dropout a state that it cannot believe, so that it works from the last one and
+/// In place of a state that does not arrive: one that a controller cannot believe, so that it works from the last one and
 /// learns nothing from it.
+const UNKNOWN: State = {
+    let unknown = Vector3::new(f32::NAN, f32::NAN, f32::NAN);
+    State { position_m: unknown, velocity_m_s: unknown, attitude_rad: unknown, rates_rad_s: unknown }
+};
+
+/// What arrives of `state` at `time_s`.
+#[cold]
+fn arrived<'a>(outages: &[Outage], time_s: f64, state: &'a State) -> &'a State {
+    let out = outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&time_s));
+    if out { &UNKNOWN } else { state }
+}
+
+/// What a controller is given of the motion.
 // Apart, so that the step of an ideal flight stays short.
 #[inline(never)]
 fn measure(sensors: &mut Sensors, motion: &Motion) -> (State, Option<Measurement>) {
     let measurement = sensors.measure(motion);
-    let mut state = measurement.state;
-    if !measurement.fresh {
-        state.position_m = Vector3::repeat(f32::NAN);
-    }
-    (state, Some(measurement))
+    (if measurement.fresh { measurement.state } else { UNKNOWN }, Some(measurement))
 }
 
 /// Flies `scenario` under one contender, showing every step from t = 0 to the end; tells when the vehicle was lost, if it
@@ -146,7 +159,12 @@ fn run(
     gains: &impl Build,
     observe: impl FnMut(&Sample),
 ) -> Result<Option<Lost>, OutOfRange> {
-    let controller = gains.controller(scenario.vehicle.to_f32(), *settings)?;
+    let vehicle = scenario.vehicle.to_f32();
+    let controller = gains.controller(vehicle, *settings)?;
+    if scenario.flight_core {
+        let aboard = Aboard::new(vehicle, *settings, controller)?;
+        return Ok(Flight::new(scenario, settings, aboard)?.run(scenario.duration_s, observe));
+    }
     Ok(Flight::new(scenario, settings, controller)?.run(scenario.duration_s, observe))
 }
 

@@ -1,5 +1,6 @@
 //! Software in the loop: scenarios, lockstep flights, logs, figures. See the `sitl` binary for the command line.
 
+pub mod aboard;
 pub mod campaign;
 pub mod claims;
 pub mod compare;

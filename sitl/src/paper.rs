@@ -148,6 +148,8 @@ pub fn scenario(model: Model, case: Case) -> Result<Scenario, OutOfRange> {
         environment: Environment::new(Parameters::PAPER, changes, gusts)?,
         realism: Realism::default(),
         sensing: Sensing::default(),
+        outages: Vec::new(),
+        flight_core: false,
         seed: 0,
         initial: Motion {
             position_m: Vector3::new(0.0, 0.0, 0.5),

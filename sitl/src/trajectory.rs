@@ -95,8 +95,10 @@ pub enum Trajectory {
         to_m: Vector3<f64>,
         /// When \[s\].
         at_s: f64,
-        /// \[rad\]
+        /// Before `at_s` \[rad\].
         yaw_rad: f64,
+        /// By how much it turns then \[rad\].
+        turn_rad: f64,
     },
     /// Level circle, counter-clockwise from above, starting at +x of the centre.
     Circle {
@@ -130,9 +132,8 @@ impl Trajectory {
         match self {
             Trajectory::Paper => paper(t),
             Trajectory::Hover { position_m, yaw_rad } => Reference::rest(*position_m, *yaw_rad),
-            Trajectory::Step { from_m, to_m, at_s, yaw_rad } => {
-                Reference::rest(if t < *at_s { *from_m } else { *to_m }, *yaw_rad)
-            }
+            Trajectory::Step { from_m, yaw_rad, at_s, .. } if t < *at_s => Reference::rest(*from_m, *yaw_rad),
+            Trajectory::Step { to_m, yaw_rad, turn_rad, .. } => Reference::rest(*to_m, yaw_rad + turn_rad),
             Trajectory::Circle { centre_m, radius_m, period_s, yaw_rad } => {
                 let rate = TAU / period_s;
                 let radius = Vector3::new(cos(rate * t), sin(rate * t), 0.0) * *radius_m;

@@ -57,7 +57,8 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 const HOVER: &str = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
 
 /// Files after [`HOVER`], and what is said of them.
-const BAD_TABLES: [(&str, &str); 67] = [
+const BAD_TABLES: [(&str, &str); 68] = [
+    ("[[outage]]\nstart_s = -1", ":5: outage.start_s: -1 is out of range: it must lie within 0 to 36000 (seconds)"),
     ("[vehicle]\nmass_g = 486", ":5: vehicle.mass_g: unknown key; did you mean mass_kg (kilograms)?"),
     (
         "[vehicle]\n\n\nmass_kg = 4860",
@@ -242,7 +243,17 @@ const BAD_TABLES: [(&str, &str); 67] = [
 ];
 
 /// Whole files, and what is said of them.
-const BAD_FILES: [(&str, &str); 23] = [
+const BAD_FILES: [(&str, &str); 25] = [
+    (
+        "flight_core = true\n[trajectory]\nkind = \"paper\"\n[settings]\ndt_s = 0.002",
+        ":1: flight_core: it cannot fly with dt_s = 0.002, out of range: it must lie within 0.001 to 0.001; \
+         change that, or leave flight_core out",
+    ),
+    (
+        "flight_core = true\n[trajectory]\nkind = \"paper\"\n[initial]\nattitude_rad = [1, 0, 0]",
+        ":1: flight_core: it cannot fly with attitude_rad = 1, out of range: it must lie within -0.8 to 0.8; \
+         change that, or leave flight_core out",
+    ),
     ("", ":1: trajectory: missing; add [trajectory] with kind = \"hover\" and position_m = [0, 0, 1]"),
     ("[trajectry]\nkind = \"paper\"", ":1: trajectry: unknown key; did you mean trajectory?"),
     (
@@ -309,7 +320,7 @@ fn expand(message: &str) -> String {
             "ALL",
             "name, description, duration_s, seed, plant, vehicle, truth, controllers, profile, gains, settings, limits, monitor, \
              contender, trajectory, initial, gust, change, payload, rotors, rotor_fault, battery, drag, wind, ground, \
-             sensors",
+             sensors, outage, flight_core",
         )
 }
 

@@ -152,12 +152,12 @@ proptest! {
     }
 
     #[test]
-    fn a_step_is_a_step(from_m in vector(10.0), to_m in vector(10.0), at_s in 0.1_f64..50.0, yaw_rad in -3.0_f64..3.0) {
-        let step = Trajectory::Step { from_m, to_m, at_s, yaw_rad };
+    fn a_step_is_a_step(from_m in vector(10.0), to_m in vector(10.0), at_s in 0.1_f64..50.0, yaw_rad in -3.0_f64..3.0, turn_rad in -3.0_f64..3.0) {
+        let step = Trajectory::Step { from_m, to_m, at_s, yaw_rad, turn_rad };
         prop_assert_eq!(step.at(0.0), Reference::rest(from_m, yaw_rad));
         prop_assert_eq!(step.at(at_s.next_down()), Reference::rest(from_m, yaw_rad));
-        prop_assert_eq!(step.at(at_s), Reference::rest(to_m, yaw_rad));
-        prop_assert_eq!(step.at(at_s + 100.0), Reference::rest(to_m, yaw_rad));
+        prop_assert_eq!(step.at(at_s), Reference::rest(to_m, yaw_rad + turn_rad));
+        prop_assert_eq!(step.at(at_s + 100.0), Reference::rest(to_m, yaw_rad + turn_rad));
     }
 
     /// Section IV as printed, with its sines and their phases.

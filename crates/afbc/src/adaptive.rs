@@ -37,22 +37,16 @@ pub struct Gains {
 
 impl Gains {
     /// Every gain that is a matter of taste, with the range to search it in.
-    pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 6] {
+    pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 5] {
         let [alpha1, alpha2] = self.backstepping.tunables();
-        [
-            alpha1,
-            alpha2,
-            (&GAMMA, &mut self.gamma),
-            (&ETA, &mut self.eta),
-            (&EPSILON, &mut self.epsilon),
-            (&DELTA_MAX, &mut self.safeguards.delta_max),
-        ]
+        [alpha1, alpha2, (&GAMMA, &mut self.gamma), (&ETA, &mut self.eta), (&DELTA_MAX, &mut self.safeguards.delta_max)]
     }
 
-    /// What is rather chosen once for the vehicle and its task, with the accepted range of each.
-    pub fn others(&mut self) -> [(&'static Range, &mut f32); 6] {
-        let Gains { membership, safeguards, .. } = self;
+    /// What goes by rule, or is rather chosen once for the vehicle and its task, with the accepted range of each.
+    pub fn others(&mut self) -> [(&'static Range, &mut f32); 7] {
+        let Gains { epsilon, membership, safeguards, .. } = self;
         [
+            (&EPSILON, epsilon),
             (&CENTRE, &mut membership.centre),
             (&WIDTH, &mut membership.width),
             (&SIGMA, &mut safeguards.sigma),

@@ -53,6 +53,14 @@ impl Profile {
         })
     }
 
+    /// epsilon of the profile `flight`, by rule, for a subsystem whose delta_hat goes up to `delta_max`.
+    ///
+    /// Near zero the robust term is a gain of delta_hat/epsilon: this keeps it, times g of the paper's vehicle, below half
+    /// of what an answer after 21 ms can take without a limit cycle (`docs/flight.md`).
+    pub fn flight_epsilon(axis: Axis, delta_max: f32) -> f32 {
+        2.0 * Model::new(&Parameters::PAPER.to_f32()).hover_gain(axis) * ANSWER_S * delta_max
+    }
+
     /// Settings of the cascade.
     pub const fn settings(self) -> Settings {
         let paper = Settings {
@@ -76,6 +84,7 @@ impl Profile {
                     speed_max_m_s: 5.0,
                     climb_max_m_s: 3.0,
                 },
+                command_filter_rad_s: 66.7,
                 tilt_by_thrust: true,
                 heed_saturation: true,
                 heed_ground: true,
@@ -89,19 +98,15 @@ impl Profile {
 /// How long the vehicle takes to answer: a step and the rotors' lag \[s\].
 const ANSWER_S: f32 = 0.021;
 
-/// The paper's law with gains of its own, bounded; epsilon is by rule. `docs/flight.md` says what each does, and why they are
-/// not those that `sitl tune afbc` finds.
+/// The paper's law with gains of its own, bounded: what `sitl tune afbc` finds. `docs/flight.md` says what each does.
 fn flight(axis: Axis, paper: adaptive::Gains) -> adaptive::Gains {
     let (alpha1, alpha2, gamma, eta, theta_max, delta_max) = match axis {
-        Axis::Roll | Axis::Pitch => (10.0, 0.7, 4.0, 0.3, 3.0, 0.05),
-        Axis::Yaw => (3.0, 12.0, 20.0, 0.3, 6.0, 0.5),
-        Axis::Z => (4.0, 8.0, 30.0, 0.9, 30.0, 1.0),
-        Axis::X | Axis::Y => (3.0, 6.0, 40.0, 0.3, 15.0, 0.5),
+        Axis::Roll | Axis::Pitch => (5.257, 0.57, 2.787, 0.2387, 3.0, 0.1274),
+        Axis::Yaw => (1.988, 7.693, 39.83, 0.08335, 6.0, 0.2576),
+        Axis::Z => (2.845, 5.273, 127.8, 0.5931, 30.0, 1.684),
+        Axis::X | Axis::Y => (2.227, 9.236, 38.87, 0.128, 15.0, 0.6565),
     };
-    // Near zero the robust term is a gain of delta_hat/epsilon: this keeps it, times g, below half of what an answer
-    // after ANSWER_S can take without a limit cycle.
-    let g = Model::new(&Parameters::PAPER.to_f32()).hover_gain(axis);
-    let epsilon = 2.0 * g * ANSWER_S * delta_max;
+    let epsilon = Profile::flight_epsilon(axis, delta_max);
     let safeguards = Safeguards { sigma: 0.01, kappa: 0.0, theta_max, delta_max, dead_zone: 0.0 };
     let backstepping = backstepping::Gains { alpha1, alpha2 };
     adaptive::Gains { backstepping, gamma, eta, epsilon, safeguards, ..paper }

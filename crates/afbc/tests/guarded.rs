@@ -244,8 +244,9 @@ fn engaging_does_not_trip_by_itself() {
     for yaw_n in [0.5_f32, 1.5, -1.5, 2.4] {
         let (controller, (_, mut memory)) = (guarded(bounds), tripped(0, 0.0));
         controller.step(&mut memory, &State::default(), &Setpoint::default());
-        // Held by force: the integral goes on, 1 mN a step.
-        let turning = Setpoint { yaw_rate_rad_s: 0.05_f32.copysign(yaw_n), ..Setpoint::default() };
+        // Held by force: the integral of gamma e_2 goes on, 1 mN a step.
+        let e2 = 1.0 / Profile::Flight.gains().yaw.gamma;
+        let turning = Setpoint { yaw_rate_rad_s: e2.copysign(yaw_n), ..Setpoint::default() };
         for _ in 0..(yaw_n.abs() * 1e3) as usize {
             controller.step(&mut memory, &State::default(), &turning);
         }

@@ -125,19 +125,19 @@ impl Gains {
 
     /// With the integrals of 2013, as `sitl tune` found it for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
     pub const TUNED: Self = Gains {
-        position_p_1_s2: 18.0,
-        position_d_1_s: 12.87,
-        position_i_1_s3: 70.4,
-        height_p_1_s2: 21.8,
-        height_d_1_s: 18.76,
-        height_i_1_s3: 160.5,
-        tilt_p_1_s2: 139.6,
-        tilt_d_1_s: 47.15,
-        tilt_i_1_s2: 26.56,
-        yaw_p_1_s2: 3.436,
-        yaw_d_1_s: 4.756,
-        yaw_i_1_s2: 56.71,
-        filter_rad_s: 10.11,
+        position_p_1_s2: 20.64,
+        position_d_1_s: 10.56,
+        position_i_1_s3: 14.41,
+        height_p_1_s2: 43.87,
+        height_d_1_s: 19.27,
+        height_i_1_s3: 65.01,
+        tilt_p_1_s2: 175.4,
+        tilt_d_1_s: 37.89,
+        tilt_i_1_s2: 96.35,
+        yaw_p_1_s2: 19.11,
+        yaw_d_1_s: 6.932,
+        yaw_i_1_s2: 80.71,
+        filter_rad_s: 15.86,
         ..Self::LEE_2010
     };
 

@@ -98,16 +98,16 @@ pub struct Gains {
 impl Gains {
     /// As `sitl tune` found it for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
     pub const TUNED: Self = Gains {
-        position_p_1_s: 2.924,
-        velocity_p_1_s: 4.506,
-        height_p_1_s: 2.694,
-        climb_p_1_s: 3.394,
-        tilt_p_1_s: 11.5,
-        tilt_rate_p_1_s: 12.8,
-        yaw_p_1_s: 1.974,
-        yaw_rate_p_1_s: 1.359,
-        position_filter_rad_s: 60.03,
-        attitude_filter_rad_s: 56.22,
+        position_p_1_s: 3.227,
+        velocity_p_1_s: 5.183,
+        height_p_1_s: 2.841,
+        climb_p_1_s: 7.548,
+        tilt_p_1_s: 15.04,
+        tilt_rate_p_1_s: 14.82,
+        yaw_p_1_s: 3.147,
+        yaw_rate_p_1_s: 4.979,
+        position_filter_rad_s: 71.32,
+        attitude_filter_rad_s: 113.5,
         ..Self::PAPER_VEHICLE
     };
 

@@ -109,21 +109,21 @@ pub struct Gains {
 impl Gains {
     /// As `sitl tune` found it for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
     pub const TUNED: Self = Gains {
-        position_p_1_s: 1.579,
-        velocity_p_1_s: 5.146,
-        velocity_i_1_s2: 25.54,
-        velocity_d: 0.04463,
-        height_p_1_s: 1.24,
-        climb_p_1_s: 5.953,
-        climb_i_1_s2: 90.24,
-        tilt_p_1_s: 13.36,
-        yaw_p_1_s: 0.6672,
-        tilt_rate_p_1_s: 21.76,
-        tilt_rate_i_1_s2: 49.82,
-        tilt_rate_d: 0.06449,
-        yaw_rate_p_1_s: 1.704,
-        yaw_rate_i_1_s2: 25.31,
-        filter_rad_s: 138.2,
+        position_p_1_s: 1.742,
+        velocity_p_1_s: 4.347,
+        velocity_i_1_s2: 33.16,
+        velocity_d: 0.07327,
+        height_p_1_s: 2.518,
+        climb_p_1_s: 10.75,
+        climb_i_1_s2: 97.01,
+        tilt_p_1_s: 20.4,
+        yaw_p_1_s: 2.053,
+        tilt_rate_p_1_s: 19.43,
+        tilt_rate_i_1_s2: 12.49,
+        tilt_rate_d: 0.1676,
+        yaw_rate_p_1_s: 5.905,
+        yaw_rate_i_1_s2: 38.2,
+        filter_rad_s: 140.7,
         ..Self::PAPER_VEHICLE
     };
 

@@ -2,7 +2,6 @@
 
 use super::target::Target;
 use super::{Failure, print};
-use afbc::Profile;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sitl::scenario::{Contender, ControllerKind, Scenario};
@@ -19,7 +18,7 @@ use std::time::Duration;
 /// search early and keeps the best so far. See docs/tuning.md.
 #[derive(Args, Debug)]
 pub(crate) struct Tune {
-    /// A law, to start from its gains for flight, or a contender of the first --scenario
+    /// A law, to start from gains by hand, or a contender of the first --scenario, to start from its own
     #[arg(value_name = "CONTROLLER")]
     contender: String,
 
@@ -73,12 +72,12 @@ impl Tune {
     }
 }
 
-/// Who is called `name`: a contender of `scenario`, or a law with its gains for flight.
+/// Who is called `name`: a contender of `scenario`, or a law with gains by hand.
 fn start(name: &str, scenario: Option<&Scenario>) -> Result<Contender, Failure> {
     let own = scenario.map_or(&[][..], |scenario| &scenario.contenders);
     let law = || ControllerKind::ALL.into_iter().find(|kind| kind.name() == name);
     let contender = own.iter().find(|contender| contender.name == name).cloned();
-    contender.or_else(|| law().map(|kind| Contender::of(kind, Profile::Flight))).ok_or_else(|| {
+    contender.or_else(|| law().map(tune::by_hand)).ok_or_else(|| {
         let laws = ControllerKind::ALL.map(ControllerKind::name).join(", ");
         let own: Vec<_> = own.iter().map(|contender| contender.name.as_str()).collect();
         let own =

@@ -63,6 +63,11 @@ fn sensors(scenario: &Scenario) -> Vec<(&'static str, String)> {
     add(noise != Spread::default(), "sensor noise", spread(noise));
     add(bias != Spread::default(), "sensor bias", spread(bias));
     add(delay_s != 0.0, "sensor delay", format!("{delay_s} s"));
+    for outage in &scenario.outages {
+        let end = if outage.end_s.is_finite() { format!("to {:.4} s", outage.end_s) } else { "to the end".into() };
+        add(true, "no state", format!("from {} s {end}", outage.start_s));
+    }
+    add(scenario.flight_core, "flight core", "rides and descends while no state arrives".into());
     if let Some(dropouts) = dropouts {
         add(true, "dropouts", format!("{} a second, {} s on average", dropouts.rate_hz, dropouts.mean_s));
     }

@@ -52,7 +52,7 @@ pub(super) fn conditions(scenario: &Scenario) -> String {
     words.join(", ")
 }
 
-/// What is real about the flight, word by word: "rotors", "battery", "drag", "wind", "ground", "payload", "sensors".
+/// What is real about the flight, word by word: "rotors", "battery", "drag", "wind", "ground", "payload", "sensors", "outages".
 fn real(scenario: &Scenario) -> Vec<&'static str> {
     let Realism { rotors, drag, wind, contact, ground_effect, .. } = &scenario.realism;
     let (faults, battery) = (!rotors.faults.is_empty(), rotors.battery.is_some());
@@ -66,6 +66,7 @@ fn real(scenario: &Scenario) -> Vec<&'static str> {
         (contact.is_some() || ground_effect.is_some(), "ground"),
         (!scenario.environment.payloads().is_empty(), "payload"),
         (scenario.sensing != Sensing::default(), "real sensors"),
+        (!scenario.outages.is_empty(), "outages"),
     ];
     words.into_iter().filter_map(|(there, word)| there.then_some(word)).collect()
 }

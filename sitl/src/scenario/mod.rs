@@ -14,6 +14,7 @@ pub use file::{load, parse};
 
 pub use crate::contender::{Contender, ControllerKind, Law};
 
+use crate::aboard::ARMING_TILT;
 use crate::paper::Case;
 use crate::trajectory::Trajectory;
 use airframe::{OutOfRange, Parameters, Range};
@@ -21,6 +22,15 @@ use plant::{Environment, Model, Motion, Plant, Realism, Sensing, Sensors};
 
 /// Accepted length of a flight \[s\].
 pub const DURATION: Range = Range::new("duration_s", 0.1, 36_000.0);
+
+/// An interval in which no state arrives: a link that is down.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outage {
+    /// From \[s\].
+    pub start_s: f64,
+    /// To, where states arrive again \[s\].
+    pub end_s: f64,
+}
 
 /// Everything that determines a flight.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +53,10 @@ pub struct Scenario {
     pub realism: Realism,
     /// How the motion is measured.
     pub sensing: Sensing,
+    /// When no state arrives at all.
+    pub outages: Vec<Outage>,
+    /// Whether the controllers fly inside the [flight core](crate::aboard), as on board.
+    pub flight_core: bool,
     /// Of everything random. The same seed gives the same flight.
     pub seed: u64,
     /// Motion at t = 0.
@@ -64,11 +78,25 @@ impl Scenario {
     /// # Errors
     /// The first parameter, gain or setting out of range.
     pub fn check(&self) -> Result<(), OutOfRange> {
+        self.check_flight_core()?;
         self.contenders.iter().try_for_each(|contender| {
             contender.check(self.vehicle.to_f32())?;
             self.plant(contender.step_s())?;
             self.sensors(contender.step_s()).map(drop)
         })
+    }
+
+    /// Whether the flight core could take every contender up, if it is to.
+    ///
+    /// # Errors
+    /// The first time step or tilt out of its range.
+    pub fn check_flight_core(&self) -> Result<(), OutOfRange> {
+        if !self.flight_core {
+            return Ok(());
+        }
+        ARMING_TILT.check(self.initial.attitude_rad.x)?;
+        ARMING_TILT.check(self.initial.attitude_rad.y)?;
+        self.contenders.iter().try_for_each(|contender| vehicle::tick::DT.check(contender.settings.dt_s))
     }
 
     /// True if rotors, air and ground are those of the paper's equations.

@@ -25,7 +25,14 @@ fn each_tunable(contender: &mut Contender, visit: Visit) {
     };
     match &mut contender.law {
         Law::Afbc(gains) | Law::Guarded(gains) => {
-            each_group(gains, &mut |place, gains| gains.tunables().into_iter().for_each(|knob| visit(place, knob)));
+            each_group(gains, &mut |place, gains| {
+                let before = gains.safeguards.delta_max;
+                gains.tunables().into_iter().for_each(|knob| visit(place, knob));
+                // By rule, epsilon goes with the bound on delta_hat: their ratio is all that a limit cycle depends on.
+                if before > 0.0 {
+                    gains.epsilon *= gains.safeguards.delta_max / before;
+                }
+            });
         }
         Law::Backstepping(gains) => {
             each_group(gains, &mut |place, gains| gains.tunables().into_iter().for_each(|knob| visit(place, knob)));

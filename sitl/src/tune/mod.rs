@@ -6,11 +6,14 @@ mod cma_es;
 mod flights;
 mod gains;
 mod report;
+mod start;
 
 pub use flights::{held_out, training};
 pub use gains::{Change, fragment};
 pub use report::report;
+pub use start::by_hand;
 
+use crate::metrics::Metrics;
 use crate::run::Run;
 use crate::scenario::{Contender, Scenario};
 use airframe::OutOfRange;
@@ -22,20 +25,24 @@ const STEP: f64 = 0.3;
 
 /// Root mean square distance from the reference that costs as much as 1 of the others \[m\].
 pub const POSITION_M: f64 = 0.1;
-/// Likewise, yaw \[rad\].
+/// Likewise, largest error along x, y and z, together \[m\].
+pub const WORST_M: f64 = 0.3;
+/// Likewise, root mean square error of yaw \[rad\].
 pub const YAW_RAD: f64 = 0.1;
 /// Likewise, sum over U1..U4 of the mean |change| from step to step \[N\].
-pub const JUMP_N: f64 = 0.1;
-/// Cost of a flight that is lost at its end; the earlier the loss, the more, up to twice that.
+pub const JUMP_N: f64 = 0.2;
+/// Cost of a flight that is lost at its end, or in which the monitor ends the law's; the earlier, the more, up to twice that.
 pub const LOST: f64 = 100.0;
 
 /// What one flight costs.
 pub fn cost(scenario: &Scenario, run: &Run) -> f64 {
-    if let Some(lost) = run.lost {
-        return LOST * (2.0 - lost.time_s / scenario.duration_s);
+    let tripped_s = run.tripped.map(|tripped| tripped.time_s);
+    if let Some(end_s) = run.lost.map(|lost| lost.time_s).or(tripped_s) {
+        return LOST * (2.0 - end_s / scenario.duration_s);
     }
-    let (rmse, jumps) = (&run.metrics.rmse, &run.metrics.mean_abs_delta_u);
-    rmse.xyz().norm() / POSITION_M + rmse.w / YAW_RAD + jumps.sum() / JUMP_N
+    let Metrics { rmse, max_abs, mean_abs_delta_u: jumps, .. } = &run.metrics;
+    let errors = rmse.xyz().norm() / POSITION_M + rmse.w / YAW_RAD;
+    errors + max_abs.xyz().norm() / WORST_M + jumps.sum() / JUMP_N
 }
 
 /// What each of `scenarios` costs under `contender`.

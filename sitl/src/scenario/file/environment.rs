@@ -1,6 +1,7 @@
-//! `[[gust]]`, `[[change]]` and `[[payload]]`: what happens to the vehicle in flight.
+//! `[[gust]]`, `[[change]]`, `[[payload]]` and `[[outage]]`: what happens to the vehicle in flight.
 
 use super::{FileError, Table};
+use crate::scenario::Outage;
 use crate::scenario::words::out_of_range;
 use airframe::{Axis, Parameters, Range};
 use plant::{Environment, Gust, GustKind, PAYLOAD_BELOW, ParameterChange, Payload, Quantity};
@@ -49,6 +50,16 @@ pub(super) fn read(root: &mut Table<'_>, truth: Parameters<f64>) -> Result<Envir
         table.finish()?;
     }
     Ok(environment)
+}
+
+/// When no state arrives.
+pub(super) fn outages(root: &mut Table<'_>) -> Result<Vec<Outage>, FileError> {
+    let outage = |mut table: Table<'_>| {
+        let [start_s, end_s] = interval(&mut table)?;
+        table.finish()?;
+        Ok(Outage { start_s, end_s })
+    };
+    root.few_tables("outage")?.into_iter().map(outage).collect()
 }
 
 fn payload(table: &mut Table<'_>) -> Result<Payload, FileError> {

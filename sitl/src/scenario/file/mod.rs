@@ -122,6 +122,8 @@ pub(crate) fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajecto
     let step_s = contenders.first().map_or(afbc::cascade::DT.max, Contender::step_s);
     let realism = realism::read(&mut root, &truth, step_s)?;
     let sensing = sensors::read(root.table("sensors")?)?;
+    let outages = environment::outages(&mut root)?;
+    let flight_core = root.boolean("flight_core")?.unwrap_or(false);
 
     let scenario = Scenario {
         name,
@@ -133,11 +135,17 @@ pub(crate) fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajecto
         environment,
         realism,
         sensing,
+        outages,
+        flight_core,
         seed,
         initial,
         trajectory,
         contenders,
     };
+    scenario.check_flight_core().map_err(|error| {
+        let cure = "change that, or leave flight_core out";
+        root.fault_at("flight_core", format!("it cannot fly with {}; {cure}", out_of_range(&error)))
+    })?;
     // Whatever the tables have let through, no flight begins with.
     scenario.check().map_err(|error| root.fault(error.range.name, format!("{}; change it", out_of_range(&error))))?;
     root.finish()?;

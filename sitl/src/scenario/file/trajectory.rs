@@ -17,6 +17,8 @@ const PERIOD: Range = Range::new("period_s", 0.1, 36_000.0);
 const AMPLITUDE: Range = Range::new("amplitude_m", -10_000.0, 10_000.0);
 /// Accepted phase of a sine \[rad\].
 const PHASE: Range = Range::new("phase_rad", -100.0, 100.0);
+/// Accepted turn of a step \[rad\].
+const TURN: Range = Range::new("turn_rad", -100.0, 100.0);
 /// Accepted time of a step \[s\].
 const STEP_TIME: Range = Range::new("at_s", 0.0, 36_000.0);
 /// Accepted time of a waypoint \[s\].
@@ -58,6 +60,7 @@ pub(super) fn read(mut table: Table<'_>) -> Result<Trajectory, FileError> {
             to_m: table.need_vector("to_m", &POSITION)?,
             at_s: table.need_number(&STEP_TIME)?,
             yaw_rad: yaw(&mut table)?,
+            turn_rad: table.number(&TURN)?.unwrap_or(0.0),
         },
         Kind::Circle => circle(&mut table)?,
         Kind::Lissajous => lissajous(&mut table)?,

@@ -1,0 +1,76 @@
+//! Any controller inside the flight core: what a board does around its law, without the board and its link.
+
+use afbc::{Command, FlightController, Settings, adaptive};
+use airframe::{OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
+use vehicle::supervisor::{SETPOINT_DISTANCE_MAX, TILT_MAX};
+use vehicle::{ArmingLimits, Inbox, Request, Stamped, Vehicle};
+
+/// Accepted roll and pitch of a vehicle that is to be armed \[rad\].
+pub const ARMING_TILT: Range = Range::new("attitude_rad", -TILT_MAX.max, TILT_MAX.max);
+/// Ticks before the first step: the flight core arms once it has measured its rate for a second.
+const TICKS_HELD: u32 = 1_001;
+/// Time between ticks \[us\].
+const PERIOD_US: u64 = 1_000;
+
+/// A controller that the flight core flies: without a state it rides blind, then descends.
+#[derive(Clone, Copy, Debug)]
+pub struct Aboard<C>(Vehicle<C>);
+
+/// What the flight core remembers, and its clock.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Memory<M> {
+    vehicle: vehicle::Memory<M>,
+    inbox: Inbox,
+    /// Time since power-up \[us\].
+    now_us: u64,
+}
+
+impl<C: FlightController> Aboard<C> {
+    /// `controller`, which was made for this vehicle and these settings, in a flight core that arms wherever it may.
+    ///
+    /// # Errors
+    /// If the time step is not the flight core's, 1 ms.
+    pub fn new(vehicle: Parameters, settings: Settings, controller: C) -> Result<Self, OutOfRange> {
+        let limits = ArmingLimits {
+            tilt_max_rad: TILT_MAX.max as f32,
+            setpoint_distance_max_m: SETPOINT_DISTANCE_MAX.max as f32,
+        };
+        Vehicle::new(vehicle, settings, limits, controller).map(Aboard)
+    }
+
+    fn tick(&self, memory: &mut Memory<C::Memory>) -> Command {
+        memory.now_us += PERIOD_US;
+        let inbox = memory.inbox.take();
+        self.0.traced_tick(&mut memory.vehicle, memory.now_us, &inbox).1
+    }
+}
+
+impl<C: FlightController> FlightController for Aboard<C> {
+    type Memory = Memory<C::Memory>;
+
+    /// One tick. Before the first, the vehicle is held where it is until it has armed.
+    fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
+        let post = |memory: &mut Self::Memory| {
+            let at_us = memory.now_us + PERIOD_US;
+            if fresh {
+                memory.inbox.measure(Stamped { value: *state, at_us });
+            }
+            memory.inbox.aim(Stamped { value: *setpoint, at_us });
+        };
+        if memory.now_us == 0 {
+            for _ in 0..TICKS_HELD {
+                post(memory);
+                self.tick(memory);
+            }
+            post(memory);
+            memory.inbox.ask(Request::Arm);
+            self.tick(memory);
+        }
+        post(memory);
+        self.tick(memory)
+    }
+
+    fn learnt(memory: &Self::Memory) -> PerAxis<adaptive::Estimate> {
+        memory.vehicle.control().map(C::learnt).unwrap_or_default()
+    }
+}

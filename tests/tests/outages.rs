@@ -1,0 +1,65 @@
+//! Scenarios with `flight_core`: a controller inside the flight core rides out what it would not survive alone.
+#![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be flown must stop the test")]
+
+use sitl::flight::{Lost, Sample, fly};
+use sitl::scenario::{Outage, Scenario, built_in};
+
+/// The paper's flight on hardware, on a link that is down for `length_s` from 7.45 s on: a gust begins meanwhile.
+fn scenario(length_s: f64, flight_core: bool) -> Scenario {
+    let mut scenario = built_in("hardware").unwrap().scenario().unwrap();
+    scenario.duration_s = 20.0;
+    scenario.outages = vec![Outage { start_s: 7.45, end_s: 7.45 + length_s }];
+    scenario.flight_core = flight_core;
+    scenario
+}
+
+/// What became of each contender: its name, the loss, the largest distance from the reference \[m\], the last sample.
+fn outcomes(scenario: &Scenario) -> Vec<(String, Option<Lost>, f64, Sample)> {
+    let outcome = |contender: &sitl::contender::Contender| {
+        let (mut worst_m, mut last) = (0.0_f64, None);
+        let lost = fly(scenario, contender, |sample| {
+            if sample.time_s > 5.0 {
+                worst_m = worst_m.max((sample.motion.position_m - sample.reference.position_m).norm());
+            }
+            last = Some(*sample);
+        });
+        (contender.name.clone(), lost.unwrap(), worst_m, last.unwrap())
+    };
+    scenario.contenders.iter().map(outcome).collect()
+}
+
+#[test]
+fn every_law_rides_out_what_the_flight_core_rides_out() {
+    let outcomes = outcomes(&scenario(0.24, true));
+    assert_eq!(outcomes.len(), 5);
+    for (name, lost, worst_m, _) in outcomes {
+        assert_eq!(lost, None, "{name}");
+        assert!(worst_m < 0.5, "{name}: {worst_m} m");
+    }
+}
+
+#[test]
+fn alone_a_law_does_not_survive_a_second() {
+    for (name, lost, ..) in outcomes(&scenario(1.0, false)) {
+        assert!(lost.is_some(), "{name}");
+    }
+}
+
+/// Nothing but the arming tick differs from a flight of the law alone.
+#[test]
+fn without_an_outage_the_flight_core_changes_nothing() {
+    let ends = [true, false].map(|flight_core| outcomes(&scenario(0.0, flight_core)));
+    for ((name, _, aboard_m, aboard), (.., alone_m, alone)) in ends[0].iter().zip(&ends[1]) {
+        assert!((aboard_m - alone_m).abs() < 1e-3, "{name}: {aboard_m} m and {alone_m} m");
+        let apart_m = (aboard.motion.position_m - alone.motion.position_m).norm();
+        assert!(apart_m < 5e-3, "{name}: {apart_m} m");
+    }
+}
+
+/// A state that does not come back leads down, and motors that have stopped.
+#[test]
+fn an_outage_to_the_end_ends_with_the_motors_off() {
+    for (name, _, _, last) in outcomes(&scenario(f64::INFINITY, true)) {
+        assert!(last.time_s > 9.0 && last.command.speeds == airframe::RotorSpeeds::default(), "{name}: {last:?}");
+    }
+}
