@@ -142,8 +142,6 @@ fn real() -> Scenario {
     let (noise, bias) = (Spread::all(0.001), Spread::all(0.001));
     Scenario {
         realism: Realism { rotors, wind, drag: Some(Drag::PAPER), ..Realism::default() },
-        outages: Vec::new(),
-        flight_core: false,
         sensing: Sensing { noise, bias, delay_s: 0.002, dropouts: None },
         ..paper(Model::RigidBody)
     }

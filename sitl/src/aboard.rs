@@ -2,15 +2,14 @@
 
 use afbc::{Command, FlightController, Settings, adaptive};
 use airframe::{OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
+use vehicle::rate::{PERIOD_US, WINDOW_US};
 use vehicle::supervisor::{SETPOINT_DISTANCE_MAX, TILT_MAX};
 use vehicle::{ArmingLimits, Inbox, Request, Stamped, Vehicle};
 
 /// Accepted roll and pitch of a vehicle that is to be armed \[rad\].
 pub const ARMING_TILT: Range = Range::new("attitude_rad", -TILT_MAX.max, TILT_MAX.max);
-/// Ticks before the first step: the flight core arms once it has measured its rate for a second.
-const TICKS_HELD: u32 = 1_001;
-/// Time between ticks \[us\].
-const PERIOD_US: u64 = 1_000;
+/// Ticks before the first step: the flight core arms once it has measured its rate.
+const TICKS_HELD: u64 = WINDOW_US / PERIOD_US + 1;
 
 /// A controller that the flight core flies: without a state it rides blind, then descends.
 #[derive(Clone, Copy, Debug)]

@@ -49,7 +49,7 @@ pub struct Bounds {
 
 impl Bounds {
     /// Bounds for a law with these gains on a vehicle like the paper's: estimates that lean on their projection, errors
-    /// far beyond any manoeuvre, a limit cycle of half the weight: noise of 20 mrad/s alone makes two fifths, in U3.
+    /// far beyond any manoeuvre, a limit cycle of half the weight: of a fifth, U3 makes too many from noise of 20 mrad/s alone.
     pub fn new(gains: &PerAxis<adaptive::Gains>, weight_n: f32) -> Self {
         Bounds {
             theta: PerAxis::from_fn(|axis| 0.95 * gains.get(axis).safeguards.theta_max),

@@ -4,9 +4,7 @@ use super::{Autopilot, Error};
 use airframe::OutOfRange;
 use onboard::{Comms, Flight, Report};
 use vehicle::Inbox;
-
-/// Time between control ticks \[us\].
-const PERIOD_US: u64 = 1000;
+use vehicle::rate::PERIOD_US;
 
 /// What the firmware is without its hardware, ticked in lockstep.
 pub struct Host {
