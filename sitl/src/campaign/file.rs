@@ -42,7 +42,7 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campai
             Some(table) => spreads(table, &scenario)?,
             None => Vec::new(),
         };
-        let campaign = Campaign { name, description, file: file.into(), flights, seed, scenario, courses, spreads };
+        let campaign = Campaign { name, description, flights, seed, scenario, courses, spreads };
         // If both ends of every spread can be flown on every course, it takes bad luck for a flight in between not to be.
         for end in 0..2 {
             for flight in 0..campaign.courses.len() as u64 {

@@ -1,6 +1,6 @@
 //! What results are the results of: written beside and into them.
 
-use super::{Campaign, Column, FIGURES, Row, Spread};
+use super::{Campaign, Column, FIGURES, Row, Spread, built_in};
 use core::hash::Hasher;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -62,8 +62,6 @@ pub struct Manifest {
     pub name: String,
     /// The campaign's.
     pub description: String,
-    /// What `sitl campaign` was given.
-    pub file: String,
     /// Of everything that determines the flights, this program's version included.
     pub fingerprint: String,
     /// The campaign's.
@@ -90,7 +88,6 @@ impl Manifest {
         Manifest {
             name: campaign.name.clone(),
             description: campaign.description.clone(),
-            file: campaign.file.clone(),
             fingerprint: fingerprint(campaign),
             seed: campaign.seed,
             flights: campaign.flights,
@@ -113,6 +110,14 @@ impl Manifest {
         let drawn = self.drawn.iter().position(|drawn| drawn.name == name);
         let figure = || Some(self.drawn.len() + FIGURES.iter().position(|figure| figure.name == name)?);
         row.numbers.get(drawn.or_else(figure)?).copied().flatten()
+    }
+
+    /// What `sitl campaign` knows the campaign by: the name of a built-in one, or of a file called after the campaign.
+    /// Where somebody's file lies is no part of the results, so that they are the same wherever it does.
+    pub fn target(&self) -> String {
+        let same = |plan: Campaign| fingerprint(&plan) == self.fingerprint;
+        let known = built_in(&self.name).and_then(|known| known.campaign().ok()).is_some_and(same);
+        if known { self.name.clone() } else { format!("{}.toml", self.name) }
     }
 
     /// Whether `other` is of the same part of the same campaign, whatever the path of its file.

@@ -58,8 +58,6 @@ pub struct Campaign {
     pub name: String,
     /// One line for people.
     pub description: String,
-    /// What `sitl campaign` was given.
-    pub file: String,
     /// How many flights each contender makes.
     pub flights: u64,
     /// Where every draw comes from.

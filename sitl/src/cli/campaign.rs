@@ -74,7 +74,7 @@ impl Campaign {
         let summary = pool.install(|| campaign::fly(&plan, &folder, &stop, &|done| bar.inc(done)));
         bar.finish_and_clear();
         match summary? {
-            Some(summary) => conclude(&out, &summary),
+            Some(summary) => conclude(&out, &summary, &self.campaign.to_string_lossy()),
             None => {
                 eprintln!("stopped; what was flown is in {}, and the same command goes on from there", out.display());
                 Ok(ExitCode::from(130))
@@ -133,9 +133,9 @@ fn progress(flights: u64) -> ProgressBar {
 }
 
 /// Writes and prints what is to be said of all flights.
-fn conclude(out: &Path, summary: &Summary) -> Result<ExitCode, Failure> {
+fn conclude(out: &Path, summary: &Summary, target: &str) -> Result<ExitCode, Failure> {
     output::campaign::write(out, summary)?;
-    let (table, shard) = (output::campaign::table(summary), summary.manifest.shard);
+    let (table, shard) = (output::campaign::table(summary, target), summary.manifest.shard);
     let part = if shard.of > 1 { format!("part {shard} only; ") } else { String::new() };
     let (rows, page) = (out.join("results.parquet"), out.join("report.html"));
     print(&format!("{table}\n{part}every flight is in {}; open {}\n", rows.display(), page.display()))?;
@@ -158,7 +158,7 @@ impl Merge {
     /// Joins, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let (_folder, summary) = campaign::merge(&self.shards, &self.out)?;
-        conclude(&self.out, &summary)
+        conclude(&self.out, &summary, &summary.manifest.target())
     }
 }
 

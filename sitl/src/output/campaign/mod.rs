@@ -73,18 +73,14 @@ const LEGEND: &str = "Distances from the reference count from 5 s to the end. A 
     were not lost. Fell back: the contender's own monitor took another law. Percentiles are nearest ranks, intervals \
     Wilson's.";
 
-/// How a bad flight went, and how to see it again.
-fn bad(summary: &Summary, tally: &Tally, bad: &Bad) -> [String; 2] {
+/// How a bad flight went, and how to see it again; `target` is what `sitl campaign` knows the campaign by.
+fn bad(target: &str, tally: &Tally, bad: &Bad) -> [String; 2] {
     let how = match &bad.lost {
         Some((time_s, reason)) => format!("lost at t = {time_s:.3} s: {reason}"),
         None => format!("{:.3} m from the reference, root mean square", bad.rmse_position_m.unwrap_or(f64::NAN)),
     };
     let quoted = |text: &str| if text.contains(' ') { format!("\"{text}\"") } else { text.to_owned() };
-    let command = format!(
-        "sitl campaign {} --flight {} --contender {}",
-        quoted(&summary.manifest.file),
-        bad.flight,
-        quoted(&tally.contender)
-    );
+    let command =
+        format!("sitl campaign {} --flight {} --contender {}", quoted(target), bad.flight, quoted(&tally.contender));
     [format!("flight {}, {}: {how}", bad.flight, bad.trajectory), command]
 }

@@ -68,12 +68,13 @@ fn by_trajectory(summary: &Summary) -> Markup {
 }
 
 fn worst(summary: &Summary) -> Markup {
+    let target = summary.manifest.target();
     html! {
         table {
             @for tally in &summary.tallies {
                 tbody {
                     @for (i, flight) in tally.worst.iter().enumerate() {
-                        @let [how, command] = bad(summary, tally, flight);
+                        @let [how, command] = bad(&target, tally, flight);
                         tr {
                             th scope="row" { @if i == 0 { (tally.contender) } }
                             td.name { (how) br; code { (command) } }

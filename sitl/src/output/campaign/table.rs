@@ -7,8 +7,9 @@ use crate::output::table::wrap;
 /// Space between columns.
 const GAP: usize = 2;
 
-/// How every contender did, and each one's worst flight with the command that flies it again.
-pub fn table(summary: &Summary) -> String {
+/// How every contender did, and each one's worst flight with the command that flies it again; `target` is what
+/// `sitl campaign` knows the campaign by.
+pub fn table(summary: &Summary, target: &str) -> String {
     let manifest = &summary.manifest;
     let mut lines = vec![format!("{}: {} flights each", manifest.name, flights(summary))];
     let body: Vec<_> = summary.tallies.iter().map(cells).collect();
@@ -49,7 +50,7 @@ pub fn table(summary: &Summary) -> String {
     lines.extend([String::new(), "Worst flights".into()]);
     for tally in &summary.tallies {
         if let Some(worst) = tally.worst.first() {
-            let [how, command] = bad(summary, tally, worst);
+            let [how, command] = bad(target, tally, worst);
             lines.extend([format!("  {}: {how}", tally.contender), format!("    {command}")]);
         }
     }
