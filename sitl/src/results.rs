@@ -1,8 +1,10 @@
 //! The results table of `docs/results.md`: the paper's flight in every reading, on both models, under both laws.
 
 use crate::metrics::Metrics;
+use crate::output::Flown;
 use crate::paper::{Case, Reading, Uncertainty, scenario};
 use crate::run::Run;
+use crate::scenario::Scenario;
 use airframe::OutOfRange;
 use core::fmt::Write;
 use plant::Model;
@@ -38,32 +40,49 @@ pub fn parts(page: &str) -> Option<(&str, &str, &str)> {
     Some((page.get(..from)?, page.get(from..to)?, page.get(to..)?))
 }
 
-/// Flies every row and writes the table in Markdown.
+/// What is flown for the table, top to bottom, each with its name for people.
 ///
 /// # Errors
 /// None in fact: the paper's parameters are in range.
-pub fn markdown() -> Result<String, OutOfRange> {
+pub fn scenarios() -> Result<Vec<(String, Scenario)>, OutOfRange> {
+    let models = [Model::Simplified, Model::RigidBody];
+    let rows = cases().into_iter().flat_map(|(name, case)| models.map(|model| (name.clone(), model, case)));
+    rows.map(|(name, model, case)| Ok((name, scenario(model, case)?))).collect()
+}
+
+/// Flies each of `scenarios` under each of its contenders. `progress` hears of each flight that is done.
+///
+/// # Errors
+/// The first parameter, gain or setting out of range.
+pub fn fly(scenarios: Vec<(String, Scenario)>, progress: &dyn Fn()) -> Result<Vec<(String, Flown)>, OutOfRange> {
+    let mut flown = Vec::new();
+    for (name, scenario) in scenarios {
+        for contender in &scenario.contenders {
+            let run = Run::fly(&scenario, contender, u64::MAX)?;
+            flown.push((name.clone(), Flown { scenario: scenario.clone(), run }));
+            progress();
+        }
+    }
+    Ok(flown)
+}
+
+/// The table in Markdown.
+pub fn markdown(flown: &[(String, Flown)]) -> String {
     let mut table = String::from(
         "| scenario | plant | law | RMSE x | y | z | psi | max x | y | z | psi | final x | y | z | psi \
          | mean \\|dU1\\| | dU2 | dU3 | dU4 |\n|---|---|---|",
     );
     table.push_str(&"--:|".repeat(16));
     table.push('\n');
-    for (name, case) in cases() {
-        for model in [Model::Simplified, Model::RigidBody] {
-            let scenario = scenario(model, case)?;
-            for contender in &scenario.contenders {
-                let run = Run::fly(&scenario, contender, u64::MAX)?;
-                let figures = match run.lost {
-                    Some(lost) => format!("lost at {:.3} s: {}{}", lost.time_s, lost.reason, " |".repeat(16)),
-                    None => row(&run.metrics),
-                };
-                // Writing to a String cannot fail.
-                let _ = writeln!(table, "| {name} | {} | {} | {figures}", model.name(), contender.title());
-            }
-        }
+    for (name, Flown { scenario, run }) in flown {
+        let figures = match run.lost {
+            Some(lost) => format!("lost at {:.3} s: {}{}", lost.time_s, lost.reason, " |".repeat(16)),
+            None => row(&run.metrics),
+        };
+        // Writing to a String cannot fail.
+        let _ = writeln!(table, "| {name} | {} | {} | {figures}", scenario.model.name(), run.contender.title());
     }
-    Ok(table)
+    table
 }
 
 fn row(metrics: &Metrics) -> String {

@@ -499,3 +499,25 @@ fn help_and_version_go_to_stdout() {
         assert!(stdout(&output).lines().count() > 0 && output.stderr.is_empty());
     }
 }
+
+/// Rows of a flight's log.
+fn rows(log: &Path) -> usize {
+    fs::read_to_string(log).unwrap().lines().count() - 1
+}
+
+#[test]
+fn a_long_flight_keeps_a_log_of_ordinary_size_unless_told_to_keep_more() {
+    let folder = folder("long");
+    let log = folder.join("out/hover/hover-backstepping.csv");
+    let fly = |arguments: &[&str]| {
+        let output = sitl(&folder, &[&["fly", "hover", "--controller", "backstepping"], arguments].concat());
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        (rows(&log), stderr(&output))
+    };
+    assert_eq!(fly(&["--duration", "600"]), (60_001, String::new()));
+    let (rows, said) = fly(&["--duration", "1500"]);
+    assert_eq!(rows, 1500 * 40 + 1);
+    assert!(said.starts_with("logs of 1500 s keep 40 rows a second; --log-hz 100 keeps more\n"), "{said}");
+    assert_eq!(fly(&["--duration", "601", "--log-hz", "100"]), (60_101, String::new()));
+    assert_eq!(fly(&["--duration", "601", "--log-hz", "200"]), (120_201, String::new()));
+}

@@ -69,3 +69,50 @@ fn results_do_not_depend_on_where_the_file_is() {
     let page = fs::read_to_string(folder.join("merged/report.html")).unwrap();
     assert!(page.contains("sitl campaign short.toml --flight "));
 }
+
+/// The lines that a machine's log gets: one at the start, one for each tenth, each with what there is to know.
+fn lines(output: &Output) -> Vec<String> {
+    String::from_utf8(output.stderr.clone()).unwrap().lines().map(str::to_owned).collect()
+}
+
+/// `RATE a TIME, N UNIT left`, all numbers whole and none of the waits nothing.
+fn is_rate_and_wait(text: &str) -> bool {
+    let parts: Vec<_> = text.split(", ").collect();
+    let [rate, wait] = parts.as_slice() else { return false };
+    let whole = |number: &str| number.parse::<u64>().is_ok_and(|number| number > 0);
+    let rates = [" a second", " a minute", " an hour"];
+    let waits = [" s left", " min left", " h left"];
+    rates.iter().any(|time| rate.strip_suffix(time).is_some_and(whole))
+        && waits.iter().any(|unit| wait.strip_suffix(unit).is_some_and(whole))
+}
+
+#[test]
+fn a_log_without_a_terminal_shows_life() {
+    let folder = folder("log");
+    fs::write(folder.join("short.toml"), SHORT).unwrap();
+    let flown = sitl(&folder, &["campaign", "short.toml"]);
+    let said = lines(&flown);
+    succeeds(&flown);
+    assert_eq!(said.first().unwrap(), "short: 0 of 40 flights");
+    assert_eq!(said.last().unwrap(), "short: 40 of 40 flights");
+    let mut before = 0;
+    for line in said.iter().take(said.len() - 1).filter(|line| *line != "short: 0 of 40 flights") {
+        let (done, rest) = line.strip_prefix("short: ").unwrap().split_once(" of 40 flights, ").unwrap();
+        assert!(is_rate_and_wait(rest), "{line}");
+        let done: u64 = done.parse().unwrap();
+        assert!(done >= before && done <= before + 4, "{said:?}");
+        before = done;
+    }
+    assert!(before >= 36, "{said:?}");
+
+    // What is there already is not flown again; nor is there anything to say of it.
+    let again = sitl(&folder, &["campaign", "short.toml"]);
+    assert!(lines(&again).iter().all(|line| line == "short: 40 of 40 flights"));
+    assert_eq!(flown.stdout, again.stdout);
+    // The parts of it likewise, and whatever else takes its time.
+    let part = sitl(&folder, &["campaign", "short.toml", "--shard", "2/2"]);
+    assert_eq!(lines(&part).first().unwrap(), "short: 0 of 20 flights");
+    let compared = sitl(&folder, &["compare", "hover", "--seeds", "2", "--controllers", "pid"]);
+    assert_eq!(lines(&compared).first().unwrap(), "compare: 0 of 2 flights");
+    assert_eq!(lines(&compared).last().unwrap(), "compare: 2 of 2 flights");
+}

@@ -200,3 +200,18 @@ fn tune_refuses_what_it_cannot_do() {
     assert_eq!(line, "nowhere: no such folder; make it first\n");
     refused(&sitl(&folder, &["tune", "pid", "--budget", "0"]));
 }
+
+/// The number of tries in the first line of what `sitl tune` prints.
+fn tries(fragment: &str) -> &str {
+    fragment.lines().next().unwrap().split("after ").nth(1).unwrap().split(' ').next().unwrap()
+}
+
+#[test]
+fn tune_tries_as_many_gains_as_it_was_told_to() {
+    let folder = soft("budget");
+    // A generation of this PID's gains is some ten: below one, between two, and whole ones with what is left.
+    for budget in ["1", "2", "9", "12", "13", "14", "40"] {
+        let fragment = succeeds(&sitl(&folder, &["tune", "soft", "--scenario", "soft.toml", "--budget", budget]));
+        assert_eq!(tries(&fragment), budget);
+    }
+}

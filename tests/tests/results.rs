@@ -16,7 +16,8 @@ fn agree(page: &str, code: &str) -> bool {
 #[test]
 fn the_results_page_is_what_the_code_does() {
     let (_, page, _) = results::parts(PAGE).expect("both markers");
-    let code = results::markdown().expect("the paper's parameters are in range");
+    let scenarios = results::scenarios().expect("the paper's parameters are in range");
+    let code = results::markdown(&results::fly(scenarios, &|| ()).expect("parameters in range"));
     assert_eq!(page.lines().count(), 2 + 9 * 2 * 2, "nine scenarios, two models, two laws");
     assert_eq!(page.lines().count(), code.lines().count());
     for (page, code) in page.lines().zip(code.lines()) {

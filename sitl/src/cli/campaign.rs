@@ -2,17 +2,16 @@
 
 use super::flying::{Flying, report};
 use super::log_rate::LogRate;
-use super::{Failure, print};
+use super::progress::Progress;
+use super::{Failure, INTERRUPTED, print, say};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sitl::campaign::{self, BUILT_IN, Campaign as Plan, Folder, Manifest, Shard, Summary, built_in};
 use sitl::output;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::sync::{Arc, OnceLock};
 
 /// Fly a campaign: one scenario, many times, with drawn vehicles, weather and faults
 ///
@@ -39,9 +38,9 @@ pub(crate) struct Campaign {
     #[arg(long = "contender", value_name = "NAME", requires = "flight")]
     contenders: Vec<String>,
 
-    /// Log rows a second of that one flight, a divisor of 1000
-    #[arg(long, value_name = "HZ", default_value = "100", requires = "flight")]
-    log_hz: LogRate,
+    /// Log rows a second of that one flight, a divisor of 1000 [default: 100; fewer of more than 10 minutes]
+    #[arg(long, value_name = "HZ", requires = "flight")]
+    log_hz: Option<LogRate>,
 
     /// Folder for results and report [default: out/ and the campaign's name, with the shard or flight if there is one]
     #[arg(long, value_name = "DIR")]
@@ -70,14 +69,30 @@ impl Campaign {
         let stopper = Arc::clone(&stop);
         ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads.map_or(0, NonZeroUsize::get)).build()?;
-        let bar = progress(shard.flights(plan.flights).len() as u64);
-        let summary = pool.install(|| campaign::fly(&plan, &folder, &stop, &|done| bar.inc(done)));
-        bar.finish_and_clear();
+        let flights = shard.flights(plan.flights).len() as u64;
+        // The first to be heard of are those of earlier runs.
+        let progress: OnceLock<Progress> = OnceLock::new();
+        let done = |done| {
+            let mut first = false;
+            let begin = || {
+                first = true;
+                Progress::new(&plan.name, "flights", flights, done)
+            };
+            let progress = progress.get_or_init(begin);
+            if !first {
+                progress.add(done);
+            }
+        };
+        let summary = pool.install(|| campaign::fly(&plan, &folder, &stop, &done));
+        drop(progress);
         match summary? {
             Some(summary) => conclude(&out, &summary, &self.campaign.to_string_lossy()),
             None => {
-                eprintln!("stopped; what was flown is in {}, and the same command goes on from there", out.display());
-                Ok(ExitCode::from(130))
+                say(&format!(
+                    "stopped; what was flown is in {}, and the same command goes on from there",
+                    out.display()
+                ));
+                Ok(ExitCode::from(INTERRUPTED))
             }
         }
     }
@@ -121,15 +136,6 @@ fn plan(path: &Path) -> Result<Plan, Failure> {
 fn unknown(name: &str) -> Failure {
     let cure = "`sitl campaigns` lists the built-in ones; a file needs its path, as in ./my.toml";
     format!("{}: no such campaign; {cure}", name.escape_debug()).into()
-}
-
-/// Flights done, how fast, and how long there is to wait, on stderr.
-fn progress(flights: u64) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(flights), ProgressDrawTarget::stderr());
-    let style = "{bar:30} {human_pos} of {human_len} flights, {per_sec}, {eta} left";
-    bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.enable_steady_tick(Duration::from_millis(250));
-    bar
 }
 
 /// Writes and prints what is to be said of all flights.

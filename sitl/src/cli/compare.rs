@@ -1,18 +1,15 @@
 //! `sitl compare`: every contender in every scenario.
 
+use super::log_rate::LogRate;
+use super::progress::Progress;
 use super::target::Target;
-use super::{Failure, print};
+use super::{Failure, interrupt, print};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sitl::compare::{self, standard};
 use sitl::output;
 use sitl::scenario::{Contender, Scenario};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Duration;
-
-/// Log rows a second.
-const LOG_HZ: f64 = 100.0;
 
 /// Fly every controller through every scenario, and compare
 ///
@@ -48,13 +45,15 @@ impl Compare {
             scenario.contenders.clone_from(&contenders);
             scenario.check()?;
         }
+        let log_every = log_every(&scenarios)?;
+        interrupt::ends_it()?;
         output::prepare(&self.out)?;
-        let bar = progress(&scenarios, self.seeds);
-        let step_s = contenders.iter().map(Contender::step_s).fold(f64::INFINITY, f64::min);
-        let log_every = (1.0 / (LOG_HZ * step_s)).round().max(1.0) as u64;
-        let comparisons = compare::fly(scenarios, self.seeds, log_every, &|| bar.inc(1))?;
-        bar.finish_and_clear();
+        let flights: u64 = scenarios.iter().map(|scenario| scenario.contenders.len() as u64 * self.seeds).sum();
+        let progress = Progress::new("compare", "flights", flights, 0);
+        let comparisons = compare::fly(scenarios, self.seeds, log_every, &|| progress.add(1))?;
+        drop(progress);
 
+        interrupt::is_too_late();
         let written = output::compare::write(&self.out, &comparisons)?;
         let (table, page) = (output::compare::table(&comparisons), self.out.join("report.html"));
         print(&format!(
@@ -88,12 +87,13 @@ fn choose(own: &[Contender], names: &[String]) -> Result<Vec<Contender>, Failure
     Ok(chosen)
 }
 
-/// Flights done and how long there is to wait, on stderr.
-fn progress(scenarios: &[Scenario], seeds: u64) -> ProgressBar {
-    let flights = scenarios.iter().map(|scenario| scenario.contenders.len() as u64).sum::<u64>() * seeds;
-    let bar = ProgressBar::with_draw_target(Some(flights), ProgressDrawTarget::stderr());
-    let style = "{bar:30} {human_pos} of {human_len} flights, {eta} left";
-    bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.enable_steady_tick(Duration::from_millis(250));
-    bar
+/// Steps from row to row of the logs that figures are drawn from: one number, whoever flies.
+fn log_every(scenarios: &[Scenario]) -> Result<u64, String> {
+    let every = |scenario: &Scenario| {
+        let usual = LogRate::usual(scenario.duration_s);
+        let steps = scenario.contenders.iter().map(|contender| usual.steps(scenario, contender));
+        steps.collect::<Result<Vec<_>, _>>()
+    };
+    let every = scenarios.iter().map(every).collect::<Result<Vec<_>, _>>()?;
+    Ok(every.into_iter().flatten().max().unwrap_or(1))
 }

@@ -1,15 +1,14 @@
 //! What `paper` and `fly` have in common: the options, the flights, the output.
 
 use super::log_rate::LogRate;
-use super::{Failure, print};
+use super::progress::Progress;
+use super::{Failure, interrupt, print, say};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sitl::claims::Claim;
 use sitl::output::{self, Flown};
 use sitl::run::Run;
 use sitl::scenario::{DURATION, Scenario};
 use std::path::Path;
-use std::time::Duration;
 
 /// Flights of more steps than this, about a second's worth, show their progress.
 const QUIET_STEPS: f64 = 1e6;
@@ -21,9 +20,10 @@ pub(crate) struct Flying {
     #[arg(long, value_name = "SECONDS", value_parser = duration)]
     pub(crate) duration: Option<f64>,
 
-    /// Log rows a second, a divisor of 1000; kept to the nearest whole number of control steps
-    #[arg(long, value_name = "HZ", default_value = "100")]
-    pub(crate) log_hz: LogRate,
+    /// Log rows a second, a divisor of 1000; kept to the nearest whole number of control steps [default: 100; fewer of a
+    /// flight of more than 10 minutes]
+    #[arg(long, value_name = "HZ")]
+    pub(crate) log_hz: Option<LogRate>,
 }
 
 fn duration(text: &str) -> Result<f64, String> {
@@ -35,42 +35,44 @@ fn duration(text: &str) -> Result<f64, String> {
 impl Flying {
     /// Flies every scenario under each of its contenders, once it is sure that `out` can take what comes of it.
     pub(crate) fn fly(self, mut scenarios: Vec<Scenario>, out: &Path) -> Result<Vec<Flown>, Failure> {
+        interrupt::ends_it()?;
         output::prepare(out)?;
         for scenario in &mut scenarios {
             scenario.duration_s = self.duration.unwrap_or(scenario.duration_s);
+        }
+        if self.log_hz.is_none() {
+            let longest_s = scenarios.iter().map(|scenario| scenario.duration_s).fold(0.0, f64::max);
+            LogRate::thinned(longest_s).iter().for_each(|line| say(line));
         }
         let progress = progress(&scenarios);
         let mut flown = Vec::new();
         for scenario in scenarios {
             for contender in &scenario.contenders {
-                let log_every = self.log_hz.steps(&scenario, contender)?;
-                progress.set_message(format!("{}, {}", scenario.name, contender.title()));
+                let log_hz = self.log_hz.unwrap_or_else(|| LogRate::usual(scenario.duration_s));
+                let log_every = log_hz.steps(&scenario, contender)?;
                 let run = Run::fly(&scenario, contender, log_every)?;
                 flown.push(Flown { scenario: scenario.clone(), run });
-                progress.inc(1);
+                progress.add(1);
             }
         }
-        progress.finish_and_clear();
         Ok(flown)
     }
 }
 
-/// Progress on stderr, one tick a run; nothing if it will not take long or stderr is no terminal.
-fn progress(scenarios: &[Scenario]) -> ProgressBar {
+/// Progress on stderr, run by run; nothing if it will not take long.
+fn progress(scenarios: &[Scenario]) -> Progress {
     let steps = |s: &Scenario| s.contenders.iter().map(|contender| s.duration_s / contender.step_s()).sum::<f64>();
     if scenarios.iter().map(steps).sum::<f64>() < QUIET_STEPS {
-        return ProgressBar::hidden();
+        return Progress::hidden();
     }
     let runs: usize = scenarios.iter().map(|scenario| scenario.contenders.len()).sum();
-    let bar = ProgressBar::with_draw_target(Some(runs as u64), ProgressDrawTarget::stderr());
-    let style = ProgressStyle::with_template("{spinner} run {pos} of {len} done, {elapsed}: {msg}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.enable_steady_tick(Duration::from_millis(100));
-    bar
+    let name = scenarios.first().map_or("", |scenario| scenario.name.as_str());
+    Progress::new(name, "flights", runs as u64, 0)
 }
 
 /// Writes everything into `out`, then prints the table and where to look.
 pub(crate) fn report(out: &Path, flown: &[Flown], claims: &[Claim]) -> Result<(), Failure> {
+    interrupt::is_too_late();
     let written = output::write(out, flown, claims)?;
     let table = output::table(flown, claims);
     let (count, page) = (written.len(), out.join("report.html"));

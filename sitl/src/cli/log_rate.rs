@@ -5,6 +5,10 @@ use std::str::FromStr;
 
 /// Most rows of one log: an hour at 100 Hz, and some.
 const ROWS: f64 = 500_000.0;
+/// Most rows of a log if nobody asks for more: ten minutes at 100 Hz, some 26 MB.
+const PLENTY: f64 = 60_000.0;
+/// What is kept of a flight that is no longer than that, and what of longer ones \[Hz\].
+const USUAL: [u16; 11] = [100, 50, 40, 25, 20, 10, 8, 5, 4, 2, 1];
 
 /// Log rows a second.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +26,19 @@ impl FromStr for LogRate {
 }
 
 impl LogRate {
+    /// 100 Hz, or what of the lower rates gives no more than plenty of rows in `duration_s`.
+    pub(crate) fn usual(duration_s: f64) -> Self {
+        let fits = |hz: &u16| f64::from(*hz) * duration_s <= PLENTY;
+        LogRate(USUAL.into_iter().find(fits).unwrap_or(1))
+    }
+
+    /// One line if the usual rate leaves out what it keeps of shorter flights.
+    pub(crate) fn thinned(duration_s: f64) -> Option<String> {
+        let [full, ..] = USUAL;
+        let LogRate(hz) = Self::usual(duration_s);
+        (hz < full).then(|| format!("logs of {duration_s} s keep {hz} rows a second; --log-hz {full} keeps more"))
+    }
+
     /// Control steps from row to row, to the nearest whole number.
     ///
     /// # Errors

@@ -5,9 +5,11 @@ mod compare;
 mod fly;
 mod flying;
 mod hitl;
+mod interrupt;
 mod log_rate;
 mod paper;
 mod pil;
+mod progress;
 mod results;
 mod scenarios;
 mod target;
@@ -72,6 +74,14 @@ impl Cli {
             Command::Hitl(hitl) => hitl.run(),
         }
     }
+}
+
+/// Exit code of a command that was asked to stop.
+const INTERRUPTED: u8 = 130;
+
+/// Says one line on stderr, to whoever is still listening.
+fn say(line: &str) {
+    let _ = writeln!(io::stderr().lock(), "{line}");
 }
 
 /// Prints to stdout. A reader who has seen enough, as in `sitl | head`, is no failure.

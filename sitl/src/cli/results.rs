@@ -1,6 +1,7 @@
 //! `sitl results`: the table of `docs/results.md`.
 
-use super::{Failure, print};
+use super::progress::Progress;
+use super::{Failure, interrupt, print};
 use clap::Args;
 use sitl::results;
 use std::fs;
@@ -19,7 +20,7 @@ impl Results {
     /// Flies, then prints or writes.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let Some(path) = self.write else {
-            print(&results::markdown()?)?;
+            print(&table()?)?;
             return Ok(ExitCode::SUCCESS);
         };
         let name = path.display();
@@ -28,8 +29,20 @@ impl Results {
             let [begin, end] = results::MARKERS;
             return Err(format!("{name}: no place for the table; add the lines {begin} and {end}").into());
         };
-        let page = format!("{before}{}{after}", results::markdown()?);
+        let page = format!("{before}{}{after}", table()?);
         fs::write(&path, page).map_err(|error| format!("{name}: cannot be written ({error})"))?;
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// Flies everything that is in the table.
+fn table() -> Result<String, Failure> {
+    interrupt::ends_it()?;
+    let scenarios = results::scenarios()?;
+    let flights = scenarios.iter().map(|(_, scenario)| scenario.contenders.len() as u64).sum();
+    let progress = Progress::new("results", "flights", flights, 0);
+    let flown = results::fly(scenarios, &|| progress.add(1))?;
+    drop(progress);
+    interrupt::is_too_late();
+    Ok(results::markdown(&flown))
 }

@@ -1,16 +1,15 @@
 //! `sitl tune`: gains for one contender.
 
+use super::progress::Progress;
 use super::target::Target;
 use super::{Failure, print};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sitl::scenario::{Contender, ControllerKind, Scenario};
 use sitl::tune::{self, Found};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 /// Search for gains: the same flights, cost, search and effort for every law
 ///
@@ -52,13 +51,15 @@ impl Tune {
         let stop = Arc::new(AtomicBool::new(false));
         let stopper = Arc::clone(&stop);
         ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
-        let bar = progress(u64::from(self.budget));
+        let progress = Progress::new(&format!("tune {}", self.contender), "tried", u64::from(self.budget), 0);
+        let mut before = 0;
         let found = tune::search(&start, &training, self.budget as usize, self.seed, |tried, cost| {
-            bar.set_position(tried as u64);
-            bar.set_message(format!("{cost:.4}"));
+            progress.note(format!(", least cost {cost:.4}"));
+            progress.add((tried - before) as u64);
+            before = tried;
             !stop.load(Ordering::Relaxed)
         })?;
-        bar.finish_and_clear();
+        drop(progress);
 
         let text = tune::report(&start, &found, &training, self.seed)?;
         let Some(out) = self.out else {
@@ -96,13 +97,4 @@ fn writable(path: &std::path::Path) -> Result<(), Failure> {
         Some(folder) if !folder.is_dir() => Err(format!("{}: no such folder; make it first", folder.display()).into()),
         _ => Ok(()),
     }
-}
-
-/// Tries so far, the least cost, and how long there is to wait, on stderr.
-fn progress(budget: u64) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(budget), ProgressDrawTarget::stderr());
-    let style = "{bar:30} {human_pos} of {human_len} tried, least cost {msg}, {eta} left";
-    bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.enable_steady_tick(Duration::from_millis(250));
-    bar
 }

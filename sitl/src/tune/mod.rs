@@ -74,8 +74,8 @@ pub struct Found {
     pub changes: Vec<Change>,
 }
 
-/// Searches for the gains of `start` that cost least over `scenarios`, trying at most `budget` contenders, `start`
-/// included. `progress` hears how many have been tried and the least cost so far; if it returns false, the search ends
+/// Searches for the gains of `start` that cost least over `scenarios`, trying `budget` contenders, `start` included.
+/// `progress` hears how many have been tried and the least cost so far; if it returns false, the search ends
 /// there. What is found is the same however many threads there are.
 ///
 /// # Errors
@@ -90,23 +90,32 @@ pub fn search(
     let before = mean(&costs(scenarios, start)?);
     let (mut best, mut after, mut evaluations) = (start.clone(), before, 1);
     let mut search = Search::new(&gains::point(start), STEP, seed);
-    while evaluations + search.population() < budget && progress(evaluations, after) {
-        let generation = rated(start, scenarios, search.ask());
+    // The middle of the search is often better than any point around it: the last try is kept for it, once it has moved.
+    let mut kept = 0;
+    while evaluations + kept < budget && progress(evaluations, after) {
+        // Of the last generation as many points as there are tries left.
+        let mut points = search.ask();
+        points.truncate(budget - kept - evaluations);
+        let is_whole = points.len() == search.population();
+        let generation = rated(start, scenarios, points);
         evaluations += generation.len();
         if let Some((cost, contender, _)) = generation.first().filter(|(cost, ..)| *cost < after) {
             (best, after) = (contender.clone(), *cost);
         }
         let points: Vec<_> = generation.into_iter().map(|(_, _, point)| point).collect();
-        search.tell(&points);
+        if is_whole {
+            search.tell(&points);
+            kept = 1;
+        }
     }
-    // The middle of the search is often better than any point around it.
-    if evaluations < budget {
+    if evaluations + kept <= budget && kept > 0 {
         let last = rated(start, scenarios, vec![search.mean()]);
         evaluations += last.len();
         if let Some((cost, contender, _)) = last.into_iter().find(|(cost, ..)| *cost < after) {
             (best, after) = (contender, cost);
         }
     }
+    progress(evaluations, after);
     let changes = gains::changes(start, &best);
     Ok(Found { contender: best, before, after, evaluations, changes })
 }
