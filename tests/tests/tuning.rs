@@ -1,5 +1,10 @@
 //! The gains that fly are those that the search found: over its flights they cost what docs/tuning.md says.
-#![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be flown must stop the test")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    missing_docs,
+    reason = "what cannot be flown must stop the test"
+)]
 
 use afbc::Profile;
 use sitl::contender::{Contender, ControllerKind, Law};
@@ -17,18 +22,32 @@ fn the_gains_that_fly_cost_what_is_documented() {
     let page = include_str!("../../docs/tuning.md");
     let flights = [training().unwrap(), held_out().unwrap()];
     // Backstepping of the profile flies with AFBC's gains.
-    for kind in ControllerKind::ALL.into_iter().filter(|kind| *kind != ControllerKind::Backstepping) {
-        let cost = |contender: &Contender| {
-            flights.each_ref().map(|flights| {
-                let costs = costs(flights, contender).unwrap();
-                (costs.iter().copied().fold(0.0, f64::max), mean(&costs))
-            })
-        };
-        let ([(_, training_before), (_, held_out_before)], [(worst, training), (held_out_worst, held_out)]) =
-            (cost(&by_hand(kind)), cost(&found(kind)));
-        assert!(worst < LOST && held_out_worst < LOST, "{}: lost or tripped", kind.title());
-        let row = format!("| {training_before:.3} | {training:.3} | {held_out_before:.3} | {held_out:.3} |");
-        let documented = page.lines().find(|line| line.starts_with(&format!("| {} | ", kind.title()))).unwrap();
-        assert!(documented.ends_with(&row), "{documented}: {row}");
+    let kinds: Vec<_> = ControllerKind::ALL.into_iter().filter(|kind| *kind != ControllerKind::Backstepping).collect();
+    let mut missing = Vec::new();
+    let mut expect = |begin: String, end: String| {
+        if !page.lines().any(|line| line.starts_with(&begin) && line.ends_with(&end)) {
+            missing.push(format!("{begin}...{end}"));
+        }
+    };
+
+    let of_each = |contender: &Contender| flights.each_ref().map(|flights| costs(flights, contender).unwrap());
+    let each_after: Vec<_> = kinds.iter().map(|&kind| of_each(&found(kind))).collect();
+    for (kind, after) in kinds.iter().zip(&each_after) {
+        let before = of_each(&by_hand(*kind));
+        assert!(after.iter().flatten().all(|cost| *cost < LOST), "{}: lost or tripped", kind.title());
+        let ([training_before, held_out_before], [training, held_out]) =
+            (before.each_ref().map(|costs| mean(costs)), after.each_ref().map(|costs| mean(costs)));
+        expect(
+            format!("| {} | ", kind.title()),
+            format!(" | {training_before:.3} | {training:.3} | {held_out_before:.3} | {held_out:.3} |"),
+        );
     }
+
+    let head: String = kinds.iter().map(|kind| format!(" {} |", kind.title())).collect();
+    expect("| cost after |".into(), head);
+    for (index, flight) in flights[0].iter().enumerate() {
+        let costs: String = each_after.iter().map(|[training, _]| format!(" {:.2} |", training[index])).collect();
+        expect(format!("| `{}` |", flight.name), costs);
+    }
+    assert!(missing.is_empty(), "docs/tuning.md lacks these rows:\n{}", missing.join("\n"));
 }

@@ -2,16 +2,19 @@
 
 use airframe::{OutOfRange, Parameters, Range};
 use libm::sqrt;
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector4};
 
 /// Drag of blades and body by the airspeed W = velocity - wind, in body axes.
 ///
-/// * **Blades**: each rotor is held back in its plane by `blade_n_s2_m` times its speed times the airspeed in that plane.
-///   Linear, and at hovering speeds the larger part. P. Martin, E. Salaun 2010, *The true role of accelerometer feedback in
+/// * **Blades**: rotor i is held back in its plane by k omega_i (W + Omega x r_i), with k = `blade_n_s2_m`, its own speed
+///   omega_i and the airspeed of its own hub at r_i, where that force acts: k sum(omega_i) W and, as the hubs circle the
+///   centre of mass, damping of yaw at 4 k omega l^2/Iz; rotors of unequal speed in wind give a yaw moment. Linear,
+///   and at hovering speeds the larger part. P. Martin, E. Salaun 2010, *The true role of accelerometer feedback in
 ///   quadrotor control*, ICRA; M. Faessler, A. Franchi, D. Scaramuzza 2018, *Differential flatness of quadrotor
 ///   dynamics subject to rotor drag*, RA-L 3(2), whose mass-normalised 0.2 to 0.6 1/s is this factor times the sum of
 ///   the rotor speeds over the mass.
 /// * **Body**: -1/2 rho C_i S_i |W| W_i along each body axis, which is the paper's A_i where the air flows along that axis.
+///   How the body turns does not matter to it.
 ///
 /// Wind acts through drag alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,18 +68,27 @@ impl Drag {
         limits::ROTOR_HEIGHT.check(self.rotor_height_m)?;
         self.area_m2.iter().try_for_each(|&area| limits::AREA.check(area))?;
         self.centre_m.iter().try_for_each(|&place| limits::CENTRE.check(place))?;
-        // d force/d airspeed that one step can bear.
-        let bearable = RATE_PER_STEP_MAX * vehicle.mass_kg / step_s;
-        Range { max: bearable / (4.0 * max_rad_s), ..limits::BLADE }.check(self.blade_n_s2_m)?;
+        // What a force in the rotor plane does to the velocity of its hub, at most: it pushes, tilts and turns the vehicle.
+        let Parameters { mass_kg, arm_m, inertia_kg_m2: i, .. } = vehicle;
+        let (height_m, rate_max) = (self.rotor_height_m, RATE_PER_STEP_MAX / step_s);
+        let hub_per_kg = 1.0 / mass_kg + height_m * height_m / i.x.min(i.y) + arm_m * arm_m / i.z;
+        Range { max: rate_max / (4.0 * max_rad_s * hub_per_kg), ..limits::BLADE }.check(self.blade_n_s2_m)?;
         let per_area = self.air_density_kg_m3 * limits::AIRSPEED_M_S;
-        Range { max: bearable / per_area, ..limits::AREA }.check(self.area_m2.max())
+        Range { max: rate_max * mass_kg / per_area, ..limits::AREA }.check(self.area_m2.max())
     }
 
-    /// Drag over one step, the rotor speeds adding up to `speeds_rad_s`.
+    /// Drag over one step of a vehicle with arms of `arm_m`, its rotors turning at `speeds_rad_s`.
     #[inline]
-    pub(crate) fn held(&self, speeds_rad_s: f64) -> HeldDrag {
+    pub(crate) fn held(&self, speeds_rad_s: &Vector4<f64>, arm_m: f64) -> HeldDrag {
+        let [w1, w2, w3, w4] = (*speeds_rad_s).into();
+        let blade_n_s_m = self.blade_n_s2_m * (w1 + w2 + w3 + w4);
+        let lever = self.blade_n_s2_m * arm_m;
         HeldDrag {
-            blade_n_s_m: self.blade_n_s2_m * speeds_rad_s,
+            blade_n_s_m,
+            // Rotor 2 at +x, 4 at -x, 3 at +y, 1 at -y.
+            lever_x_n_s: lever * (w2 - w4),
+            lever_y_n_s: lever * (w3 - w1),
+            yaw_n_m_s: blade_n_s_m * arm_m * arm_m,
             rotor_height_m: self.rotor_height_m,
             body_n_s2_m2: self.area_m2 * (0.5 * self.air_density_kg_m3),
             centre_m: self.centre_m,
@@ -84,11 +96,18 @@ impl Drag {
     }
 }
 
-/// Drag with the rotor speeds held, to be asked for any airspeed.
+/// Drag with the rotor speeds held, to be asked for any motion. The blades' forces are summed over the rotors beforehand,
+/// which leaves the sums of k omega_i (1, x_i, y_i, x_i^2 + y_i^2).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HeldDrag {
-    /// k times the sum of rotor speeds \[N s/m\].
+    /// Sum of k omega_i \[N s/m\].
     blade_n_s_m: f64,
+    /// Sum of k omega_i x_i \[N s\].
+    lever_x_n_s: f64,
+    /// Sum of k omega_i y_i \[N s\].
+    lever_y_n_s: f64,
+    /// Sum of k omega_i l^2 \[N m s\].
+    yaw_n_m_s: f64,
     rotor_height_m: f64,
     /// 1/2 rho C_i S_i \[N s2/m2\].
     body_n_s2_m2: Vector3<f64>,
@@ -96,12 +115,19 @@ pub(crate) struct HeldDrag {
 }
 
 impl HeldDrag {
-    /// Force \[N\] and moment \[N m\] at airspeed `w` \[m/s\], all in body axes.
+    /// Force \[N\] and moment \[N m\] at airspeed `w` \[m/s\] of the centre of mass and `rates` \[rad/s\], in body axes.
     #[inline]
-    pub(crate) fn wrench(&self, w: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-        let blade = Vector3::new(-self.blade_n_s_m * w.x, -self.blade_n_s_m * w.y, 0.0);
+    pub(crate) fn wrench(&self, w: &Vector3<f64>, rates: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+        let h = self.rotor_height_m;
+        // W + Omega x r in the middle of the rotors; from there, hub i moves on by r (-y_i, x_i).
+        let (x, y, r) = (w.x + rates.y * h, w.y - rates.x * h, rates.z);
+        let blade = Vector3::new(
+            self.lever_y_n_s * r - self.blade_n_s_m * x,
+            -(self.lever_x_n_s * r) - self.blade_n_s_m * y,
+            0.0,
+        );
+        let yaw = self.lever_y_n_s * x - self.lever_x_n_s * y - self.yaw_n_m_s * r;
         let body = self.body_n_s2_m2.component_mul(w) * -sqrt(w.norm_squared());
-        let blade_moment = Vector3::new(-self.rotor_height_m * blade.y, self.rotor_height_m * blade.x, 0.0);
-        (blade + body, blade_moment + self.centre_m.cross(&body))
+        (blade + body, Vector3::new(-h * blade.y, h * blade.x, yaw) + self.centre_m.cross(&body))
     }
 }

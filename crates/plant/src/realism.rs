@@ -148,7 +148,7 @@ impl Effects {
             *a_force,
             *a_moment,
         );
-        let drag = self.drag.as_ref().map(|drag| drag.held(drive.speeds_rad_s.sum()));
+        let drag = self.drag.as_ref().map(|drag| drag.held(&drive.speeds_rad_s, parameters.arm_m));
         (load, Surroundings::new(parameters, drag, self.wind_m_s, ground))
     }
 

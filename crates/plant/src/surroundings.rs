@@ -6,7 +6,7 @@ use crate::drag::HeldDrag;
 use airframe::Parameters;
 use nalgebra::Vector3;
 
-/// Air and ground over one step: the wind is held, drag and contact follow position, velocity and attitude within it.
+/// Air and ground over one step: the wind is held, drag and contact follow the motion within it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surroundings<'a> {
     drag: Option<HeldDrag>,
@@ -48,7 +48,7 @@ impl<'a> Surroundings<'a> {
         let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
         if let Some(drag) = &self.drag {
             let airspeed = axes.to_body(&(velocity_m_s - self.wind_m_s));
-            let (drag_force, drag_moment) = drag.wrench(&airspeed);
+            let (drag_force, drag_moment) = drag.wrench(&airspeed, rates_rad_s);
             force += axes.to_earth(&drag_force);
             moment += drag_moment;
         }

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use airframe::{Parameters, RotorSpeeds};
-use nalgebra::{Vector3, Vector4};
+use nalgebra::{Matrix3, Rotation3, Vector3, Vector4};
 use plant::{Drag, Environment, Model, Motion, Plant, Realism, Wind};
 use proptest::prelude::*;
 
@@ -85,6 +85,47 @@ fn drag_above_the_centre_of_mass_turns_the_vehicle_away_from_its_motion() {
     assert!((rates.x - 0.5 * -rates.y).abs() < 1e-3 * rates.y.abs());
 }
 
+/// The hubs circle the centre of mass at r l each, in the blades' way: dr/dt = -4 k omega l^2/Iz r, and nothing but yaw
+/// turns, since hubs at equal speed balance.
+#[test]
+fn blades_brake_yaw_exponentially() {
+    let drag = Drag { blade_n_s2_m: 2.4e-4, rotor_height_m: 0.02, ..none() };
+    let initial = Motion { rates_rad_s: Vector3::new(0.0, 0.0, 3.0), ..Motion::default() };
+    let omega = f64::from(hover().0.x);
+    let rate = 4.0 * drag.blade_n_s2_m * omega * P.arm_m * P.arm_m / P.inertia_kg_m2.z;
+    assert!((1.5..1.7).contains(&rate), "{rate} 1/s for the paper's vehicle");
+    for model in MODELS {
+        let mut plant = plant(model, initial, drag, Vector3::zeros());
+        for k in 1..=2000 {
+            plant.step(&hover(), STEP_S);
+            let gone = (-rate * f64::from(k) * STEP_S).exp();
+            let Motion { velocity_m_s, rates_rad_s, .. } = plant.motion();
+            assert!((rates_rad_s - initial.rates_rad_s * gone).amax() < 1e-9, "{rates_rad_s} after {k} steps");
+            assert!(velocity_m_s.xy().amax() < 1e-9);
+        }
+    }
+}
+
+/// Rotors 2 (front) and 4 (rear) at unequal speed in a wind from the right: the faster one is pushed harder.
+#[test]
+fn unequal_rotors_in_wind_turn_the_vehicle_about_its_vertical_axis() {
+    let drag = Drag { blade_n_s2_m: 2.4e-4, ..none() };
+    let wind = Vector3::new(0.0, 5.0, 0.0);
+    // The squares of 1, 3 and 2, 4 add up to the same, so that the rotors' own drag moments cancel.
+    let (front, rear) = (220.0_f32, 170.0_f32);
+    let side = ((front * front + rear * rear) / 2.0).sqrt();
+    let speeds = RotorSpeeds(Vector4::new(side, front, side, rear));
+    let yaw_rad_s2 = |wind| {
+        let mut plant = plant(Model::RigidBody, Motion::default(), drag, wind);
+        plant.step(&speeds, STEP_S);
+        plant.motion().rates_rad_s.z / STEP_S
+    };
+    let expected = drag.blade_n_s2_m * f64::from(front - rear) * P.arm_m * wind.y / P.inertia_kg_m2.z;
+    let found = yaw_rad_s2(wind) - yaw_rad_s2(Vector3::zeros());
+    // A thousandth of the yaw damping of 1.6 1/s, and the pitch that grows within the step.
+    assert!((found / expected - 1.0).abs() < 2e-3, "{found}, not {expected} rad/s2");
+}
+
 #[test]
 fn drag_that_the_step_cannot_follow_is_refused() {
     let refused = |drag: Drag| {
@@ -93,6 +134,8 @@ fn drag_that_the_step_cannot_follow_is_refused() {
         Plant::with(Model::RigidBody, Motion::default(), environment, &realism, 0.02).unwrap_err().range.name
     };
     assert_eq!(refused(Drag { blade_n_s2_m: 0.01, ..none() }), "blade_n_s2_m");
+    // Slow enough for the mass, but not for the inertia that the hubs turn.
+    assert_eq!(refused(Drag { blade_n_s2_m: 2.4e-4, ..none() }), "blade_n_s2_m");
     assert_eq!(refused(Drag { area_m2: Vector3::new(0.0, 0.0, 1.0), ..none() }), "area_m2");
     assert_eq!(refused(Drag { centre_m: Vector3::new(0.0, 0.0, 5.0), ..none() }), "centre_m");
     assert_eq!(refused(Drag { air_density_kg_m3: f64::NAN, ..none() }), "air_density_kg_m3");
@@ -100,6 +143,25 @@ fn drag_that_the_step_cannot_follow_is_refused() {
 
 fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
     (-size..size, -size..size, -size..size).prop_map(|(x, y, z)| Vector3::new(x, y, z))
+}
+
+/// Body to earth: Rz(psi) Ry(theta) Rx(phi).
+fn r_earth_body(eta: &Vector3<f64>) -> Matrix3<f64> {
+    *Rotation3::from_euler_angles(eta.x, eta.y, eta.z).matrix()
+}
+
+/// Force and moment of the blades, body axes: the sum over the rotors of k omega_i times the velocity of each hub through
+/// the air, in the rotor plane, where the hub is.
+fn blades(drag: &Drag, motion: &Motion, wind: &Vector3<f64>, speeds: &RotorSpeeds) -> (Vector3<f64>, Vector3<f64>) {
+    let (l, h) = (P.arm_m, drag.rotor_height_m);
+    let hubs = [(0.0, -l), (l, 0.0), (0.0, l), (-l, 0.0)].map(|(x, y)| Vector3::new(x, y, h));
+    let airspeed = r_earth_body(&motion.attitude_rad).transpose() * (motion.velocity_m_s - wind);
+    let each = hubs.iter().zip(&speeds.0).map(|(hub, &omega)| {
+        let through_air = airspeed + motion.rates_rad_s.cross(hub);
+        let force = -drag.blade_n_s2_m * f64::from(omega) * Vector3::new(through_air.x, through_air.y, 0.0);
+        (force, hub.cross(&force))
+    });
+    each.fold((Vector3::zeros(), Vector3::zeros()), |sum, one| (sum.0 + one.0, sum.1 + one.1))
 }
 
 proptest! {
@@ -125,6 +187,37 @@ proptest! {
         prop_assert!((b.velocity_m_s - a.velocity_m_s - wind).amax() < 1e-6);
         prop_assert!((b.position_m - a.position_m - wind).amax() < 1e-6);
         prop_assert!((b.rates_rad_s - a.rates_rad_s).amax() < 1e-6);
+    }
+
+    /// What blade drag adds to the motion is the sum over the rotors, each at its own speed and with its own hub's airspeed.
+    #[test]
+    fn each_rotor_is_held_back_at_its_own_hub(
+        velocity in vector(10.0), wind in vector(10.0), attitude in vector(1.0), rates in vector(5.0),
+        speeds in prop::array::uniform4(0.0_f32..400.0), height in -0.1..0.1, first in 0..2_usize
+    ) {
+        const SHORT_S: f64 = 1e-5;
+        let model = *MODELS.get(first).unwrap();
+        let initial = Motion {
+            velocity_m_s: velocity, attitude_rad: attitude, rates_rad_s: rates, ..Motion::default()
+        };
+        let speeds = RotorSpeeds(Vector4::from(speeds));
+        let drag = Drag { blade_n_s2_m: 2.4e-4, rotor_height_m: height, ..none() };
+        let after = |drag: Drag| {
+            let wind = Wind { steady_m_s: wind, ..Wind::default() };
+            let realism = Realism { drag: Some(drag), wind, ..Realism::default() };
+            let mut plant = Plant::with(model, initial, Environment::calm(P).unwrap(), &realism, SHORT_S).unwrap();
+            plant.step(&speeds, SHORT_S);
+            plant.motion()
+        };
+        let (with, without) = (after(drag), after(none()));
+        let force = (with.velocity_m_s - without.velocity_m_s) * (P.mass_kg / SHORT_S);
+        let moment = (with.rates_rad_s - without.rates_rad_s).component_mul(&P.inertia_kg_m2) / SHORT_S;
+        let (body_force, expected_moment) = blades(&drag, &initial, &wind, &speeds);
+        let expected_force = r_earth_body(&attitude) * body_force;
+        // Over the step, rates of at most 9 rad/s and angular accelerations of 3000 rad/s2 change what acts by 1e-4 of
+        // what it can be: 0.4 N s/m at 36 m/s of a hub, at arms of 0.25 m.
+        prop_assert!((force - expected_force).amax() < 2e-3, "{force} N, not {expected_force}");
+        prop_assert!((moment - expected_moment).amax() < 5e-4, "{moment} N m, not {expected_moment}");
     }
 
     /// Drag takes energy from the motion through the air, and gives none.
