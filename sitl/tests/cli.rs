@@ -153,7 +153,7 @@ const BAD_TABLES: [(&str, &str); 68] = [
     ("[drag]\n[[wind.gust]]\nvelocity_m_s = [1, 0, 0]\nstart_s = 1", ":5: wind.gust.rise_s: missing; add it (seconds)"),
     (
         "[drag]\nblade_n_s2_m = 0.5",
-        ":5: drag.blade_n_s2_m: blade_n_s2_m = 0.5, out of range: it must lie within 0 to 0.006075; change it",
+        ":5: drag.blade_n_s2_m: blade_n_s2_m = 0.5, out of range: it must lie within 0 to 0.0012034782790026014; change it",
     ),
     ("[drag]\narea_m2 = 1", ":5: drag.area_m2: it is a number and must be three numbers; write [x, y, z]"),
     (
