@@ -3,8 +3,8 @@
 use afbc::{Command, FlightController, Settings, adaptive};
 use airframe::{OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
 use vehicle::rate::{PERIOD_US, WINDOW_US};
-use vehicle::supervisor::{SETPOINT_DISTANCE_MAX, TILT_MAX};
-use vehicle::{ArmingLimits, Inbox, Request, Stamped, Vehicle};
+use vehicle::supervisor::TILT_MAX;
+use vehicle::{ArmingLimits, Asked, Inbox, Request, Stamped, Vehicle};
 
 /// Accepted roll and pitch of a vehicle that is to be armed \[rad\].
 pub const ARMING_TILT: Range = Range::new("attitude_rad", -TILT_MAX.max, TILT_MAX.max);
@@ -30,11 +30,7 @@ impl<C: FlightController> Aboard<C> {
     /// # Errors
     /// If the time step is not the flight core's, 1 ms.
     pub fn new(vehicle: Parameters, settings: Settings, controller: C) -> Result<Self, OutOfRange> {
-        let limits = ArmingLimits {
-            tilt_max_rad: TILT_MAX.max as f32,
-            setpoint_distance_max_m: SETPOINT_DISTANCE_MAX.max as f32,
-        };
-        Vehicle::new(vehicle, settings, limits, controller).map(Aboard)
+        Vehicle::new(vehicle, settings, ArmingLimits::NONE, controller).map(Aboard)
     }
 
     fn tick(&self, memory: &mut Memory<C::Memory>) -> Command {
@@ -62,7 +58,7 @@ impl<C: FlightController> FlightController for Aboard<C> {
                 self.tick(memory);
             }
             post(memory);
-            memory.inbox.ask(Request::Arm);
+            memory.inbox.ask(Asked { request: Request::Arm, ticket: 0 });
             self.tick(memory);
         }
         post(memory);

@@ -156,7 +156,7 @@ const fn asked(requests: &'static [(i64, Command)], case: Case) -> Case {
     Case { requests, ..case }
 }
 
-use Command::{Arm, Disarm};
+use Command::{Arm, Disarm, Kill};
 use Flight::{Below, Hover, Paper};
 use Of::{Answers, Commands, Downlink, Rotors, Setpoints, States, Uplink};
 use Then::{Flies, GivesUp, Lands, Recovers, Refuses, Stays, Stops};
@@ -211,7 +211,7 @@ const CASES: &[Case] = &[
     case("a flipped bit in each setpoint of the paper's flight for 5 s", Paper, &[(Setpoints, 10_000..15_000, Flip)], 40_000, Flies(2.0)),
     case("truncated states for 100 ms", Hover(2.0), &[(States, 3000..3100, Truncate)], 13_000, Recovers(0.1, 0.02)),
     case("noise before everything, the paper's flight", Paper, &[(Uplink, 0..FOREVER, Noise)], 42_000, Flies(0.5)),
-    asked(&[(5_000, Disarm)], case("a flipped bit in a request to disarm", Hover(2.0), &[(Commands, 5_000..5_010, Flip)], 10_000, Flies(0.1))),
+    asked(&[(5_000, Kill)], case("a flipped bit in a request to stop", Hover(2.0), &[(Commands, 5_000..5_010, Flip)], 10_000, Flies(0.1))),
 
     // Repeating and reordering.
     case("every frame twice, the paper's flight", Paper, &[(Uplink, 0..FOREVER, Twice)], 42_000, Flies(0.5)),
@@ -227,9 +227,10 @@ const CASES: &[Case] = &[
     case("no answers", Hover(2.0), &[(Answers, -HELD_MS..FOREVER, Drop)], 10_000, Flies(0.1)),
 
     // Requests.
-    asked(&[(5_000, Disarm)], case("disarmed in flight", Hover(1.5), &[], 10_000, Stops(5_000))),
-    asked(&[(3_100, Disarm)], case("disarmed while riding", Hover(1.5), &[(States, 3000..FOREVER, Drop)], 10_000, Stops(3_100))),
-    asked(&[(3_600, Disarm)], case("disarmed while descending", Hover(1.5), &[(States, 3000..FOREVER, Drop)], 10_000, Stops(3_600))),
+    asked(&[(5_000, Disarm)], case("asked to disarm in flight", Hover(1.5), &[], 10_000, Flies(0.1))),
+    asked(&[(5_000, Kill)], case("stopped in flight", Hover(1.5), &[], 10_000, Stops(5_000))),
+    asked(&[(3_100, Kill)], case("stopped while riding", Hover(1.5), &[(States, 3000..FOREVER, Drop)], 10_000, Stops(3_100))),
+    asked(&[(3_600, Kill)], case("stopped while descending", Hover(1.5), &[(States, 3000..FOREVER, Drop)], 10_000, Stops(3_600))),
     asked(&[(3_600, Arm)], case("asked to arm while descending", Hover(2.0), &[(States, 3000..3500, Drop)], 15_000, Lands(0.6))),
     asked(&[(5_000, Arm)], case("asked to arm in flight", Hover(2.0), &[], 10_000, Flies(0.1))),
 
@@ -380,7 +381,7 @@ fn fly(case: &Case) -> Seen {
             seen.modes.push((now_ms, report.mode, height_m));
             (seen.touched_down_before, seen.last_tilt_rad) = (seen.touchdown_m_s.is_some(), tilt_rad);
         }
-        seen.answers.extend(report.answer);
+        seen.answers.extend(report.answer.map(|answer| answer.result.map(|()| answer.request)));
         seen.refused = station.heard().refusal().or(seen.refused);
         let mut never = |what: &str, happened: bool| {
             if happened && seen.violations.len() < 3 {

@@ -66,6 +66,12 @@ pub fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
+/// The size of a vector's largest coordinate; NaN coordinates do not count.
+#[inline]
+pub fn abs_max(v: &nalgebra::Vector3<f32>) -> f32 {
+    max(max(v.x.abs(), v.y.abs()), max(v.z.abs(), 0.0))
+}
+
 /// Square root; the processor's own or libm's, both correctly rounded.
 #[inline]
 pub fn sqrt(x: f32) -> f32 {

@@ -42,6 +42,8 @@ pub enum Command {
     Arm,
     /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 0.
     Disarm,
+    /// The same, forced (param2 = 21196): in flight, too.
+    Kill,
     /// MAV_CMD_USER_1 (31010): give the flight back to AFBC after its monitor has tripped.
     Engage,
     /// Anything else, to be answered with "unsupported".
@@ -52,7 +54,7 @@ impl Command {
     /// The MAVLink command, as its answer names it.
     pub fn id(self) -> MavCmd {
         match self {
-            Command::Arm | Command::Disarm => MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+            Command::Arm | Command::Disarm | Command::Kill => MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
             Command::Engage => MavCmd::MAV_CMD_USER_1,
             Command::Other(id) => id,
         }
@@ -185,10 +187,14 @@ fn write_setpoint(setpoint: &Setpoint) -> SET_POSITION_TARGET_LOCAL_NED_DATA {
     data
 }
 
+/// param2 of MAV_CMD_COMPONENT_ARM_DISARM that forces it.
+const FORCED: f32 = 21196.0;
+
 fn read_command(data: &COMMAND_LONG_DATA, receiver: Address) -> Result<Uplink, Fault> {
     meant_for(receiver, data.target_system, data.target_component)?;
     let command = match data.command {
         MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if data.param1 == 1.0 => Command::Arm,
+        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if data.param1 == 0.0 && data.param2 == FORCED => Command::Kill,
         MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if data.param1 == 0.0 => Command::Disarm,
         MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => return Err(Fault::Malformed),
         MavCmd::MAV_CMD_USER_1 => Command::Engage,
@@ -199,5 +205,6 @@ fn read_command(data: &COMMAND_LONG_DATA, receiver: Address) -> Result<Uplink, F
 
 fn write_command(command: Command) -> COMMAND_LONG_DATA {
     let param1 = if command == Command::Arm { 1.0 } else { 0.0 };
-    COMMAND_LONG_DATA { command: command.id(), param1, ..COMMAND_LONG_DATA::DEFAULT }
+    let param2 = if command == Command::Kill { FORCED } else { 0.0 };
+    COMMAND_LONG_DATA { command: command.id(), param1, param2, ..COMMAND_LONG_DATA::DEFAULT }
 }

@@ -4,7 +4,7 @@ use crate::flight::Report;
 use afbc::monitor::{Norm, Trip};
 use airframe::{PerAxis, State};
 use link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, MavCmd, Sender, Text, Uplink};
-use vehicle::{Inbox, Mode, Request, SourceClock, Stamped};
+use vehicle::{Asked, Inbox, Mode, Request, Stamped, Tracker};
 
 /// The vehicle on the link: system 1, component 1 (autopilot).
 pub const ADDRESS: Address = Address { system: 1, component: 1 };
@@ -36,7 +36,7 @@ const ROTORS: Schedule = Schedule { period: 10, phase: 0 };
 pub struct Comms {
     decoder: Decoder<Uplink>,
     sender: Sender,
-    clock: SourceClock,
+    tracker: Tracker,
     /// When the last tick began \[us\]: everything that arrives before the next one is stamped so.
     now_us: u64,
     tick: u64,
@@ -64,7 +64,7 @@ impl Comms {
         Comms {
             decoder: Decoder::new(ADDRESS),
             sender: Sender::new(ADDRESS),
-            clock: SourceClock::default(),
+            tracker: Tracker::default(),
             now_us: 0,
             tick: 0,
             tick_us_max: 0.0,
@@ -80,12 +80,13 @@ impl Comms {
     /// Takes the next bytes of the stream; returns what they tell the control tick, to be [posted](Inbox::post).
     pub fn receive(&mut self, bytes: &[u8]) -> Inbox {
         let mut news = Inbox::default();
-        let Comms { decoder, clock, now_us, state, state_is_news, asked_by, unknown, .. } = self;
+        let Comms { decoder, tracker, now_us, state, state_is_news, asked_by, unknown, .. } = self;
         decoder.feed(bytes, |from, message| match message {
             Uplink::Heartbeat => (),
             Uplink::State { sent_us, state: value } => {
-                if let Some(at_us) = clock.stamp(sent_us, *now_us) {
-                    news.measure(Stamped { value, at_us });
+                let sender = u16::from_be_bytes([from.system, from.component]);
+                if let Some(measured) = tracker.stamp(sender, sent_us, *now_us, value) {
+                    news.measure(measured);
                     *state = Some(value);
                     *state_is_news = true;
                 }
@@ -95,10 +96,11 @@ impl Comms {
                 let request = match command {
                     Command::Arm => Request::Arm,
                     Command::Disarm => Request::Disarm,
+                    Command::Kill => Request::Kill,
                     Command::Engage => Request::Engage,
                     Command::Other(id) => return *unknown = Some((id, from)),
                 };
-                news.ask(request);
+                news.ask(Asked { request, ticket: 0 });
                 *asked_by = from;
             }
         });
@@ -130,13 +132,14 @@ impl Comms {
             say(Downlink::Rotors { time_us: report.time_us, armed, speeds: report.motors });
         }
         if let Some(answer) = report.answer {
-            let command = match answer {
-                Ok(Request::Engage) => Command::Engage,
-                Ok(Request::Disarm) => Command::Disarm,
-                Ok(Request::Arm) | Err(_) => Command::Arm,
+            let command = match answer.request {
+                Request::Engage => Command::Engage,
+                Request::Disarm => Command::Disarm,
+                Request::Kill => Command::Kill,
+                Request::Arm => Command::Arm,
             };
-            let (answer, reason) = match answer {
-                Ok(_) => (Answer::Accepted, None),
+            let (answer, reason) = match answer.result {
+                Ok(()) => (Answer::Accepted, None),
                 Err(refusal) => (Answer::Refused(refusal as i32), Some(refusal.reason())),
             };
             say(Downlink::Answer { command: command.id(), answer, to: self.asked_by });

@@ -4,7 +4,7 @@ use afbc::monitor::{Bounds, Norm};
 use afbc::{Guarded, Profile, guarded};
 use airframe::{Axis, OutOfRange, Parameters, RotorSpeeds};
 use vehicle::motor::Curve;
-use vehicle::{ArmingLimits, Health, Inbox, Memory, Mode, Motor, Refusal, Request, Vehicle};
+use vehicle::{Answer, ArmingLimits, End, Health, Inbox, Memory, Mode, Motor, Vehicle};
 
 /// Motor, controller and propeller: 1000 rad/s at full throttle, of which the paper's vehicle needs 200 to hover. Ours;
 /// to be measured for the vehicle at hand.
@@ -37,7 +37,9 @@ pub struct Report {
     /// How much the subsystem whose turn it was has learnt; none before the first flight.
     pub learnt: Option<(Axis, Norm)>,
     /// The answer to a request.
-    pub answer: Option<Result<Request, Refusal>>,
+    pub answer: Option<Answer>,
+    /// Why the flight ended, if it did in this tick.
+    pub ended: Option<End>,
 }
 
 impl Flight {
@@ -73,6 +75,7 @@ impl Flight {
             saturated_ticks: self.saturated_ticks,
             learnt: self.memory.control().map(|control| control.figures().latest()),
             answer: outcome.answer,
+            ended: outcome.ended,
         }
     }
 }

@@ -48,7 +48,7 @@ impl Station {
             100 | 1_500 => self.say(Uplink::Command(Command::Arm)),
             // The motion does not follow the rotors, so AFBC's monitor trips, time and again.
             3_000 | 5_200 => self.say(Uplink::Command(Command::Engage)),
-            5_900 => self.say(Uplink::Command(Command::Disarm)),
+            5_900 => self.say(Uplink::Command(Command::Kill)),
             _ => (),
         }
         let mut bytes = self.take();

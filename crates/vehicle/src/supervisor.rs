@@ -1,15 +1,20 @@
-//! Arming and failsafe.
+//! Arming and failsafe: the five things that may be asked for, the four modes, and what leads from one to another.
 
+use afbc::math::abs_max;
 use airframe::{OutOfRange, Range, Setpoint, State};
 
 /// Older than this, a state is stale and the law may not fly on it \[us\].
 pub const RIDE_US: u64 = 20_000;
+/// Riding ends once states have been fresh for this long \[us\]: a tracker that stutters does not make the mode flicker.
+pub const STEADY_US: u64 = 100_000;
 /// Older than this, riding on ends and the vehicle comes down \[us\].
 pub const DESCEND_US: u64 = 250_000;
 /// Older than this, the attitude is anyone's guess and the motors stop \[us\]: two seconds of blind descent.
 pub const GIVE_UP_US: u64 = 2_250_000;
 /// Older than this, a setpoint no longer counts: the vehicle holds its position \[us\].
 pub const SETPOINT_STALE_US: u64 = 500_000;
+/// Arming asks that the vehicle has been at rest for this long \[us\].
+pub const REST_US: u64 = 1_000_000;
 
 /// What the vehicle is doing.
 ///
@@ -18,18 +23,18 @@ pub const SETPOINT_STALE_US: u64 = 500_000;
 ///  +----------+              +----------+ --------------> +----------+
 ///  | Disarmed | -----------> |  Flying  |                 |  Riding  |
 ///  +----------+              +----------+ <-------------- +----------+
-///    ^      ^                     |          age <= 20 ms      |
+///    ^      ^                     |     fresh for 100 ms       |
 ///    |      |                     | age > 250 ms               | age > 250 ms
 ///    |      |                     v                            |
 ///    |      |               +------------+                     |
 ///    |      +---------------| Descending | <-------------------+
-///    |    on the ground, or +------------+
-///    |    age > 2.25 s
+///    |    on the ground     +------------+
 ///    |
-///    +--- Disarm, from anywhere; age > 2.25 s, from anywhere
+///    +--- Kill, age > 2.25 s or tumbled, from anywhere; Disarm, from anywhere on the ground
 /// ```
 ///
-/// `age` is that of the newest plausible state. Disarmed at power-up.
+/// `age` is that of the newest plausible state. Disarmed at power-up. In Riding and Descending the law flies whenever the
+/// state is fresh; without one the vehicle is flown blind ([`crate::blind`]).
 ///
 /// Descending does not lead back to Flying. The attitude has been unknown for a quarter of a second: whatever comes
 /// back may be a tracker that recovers for a moment, and a vehicle that goes up and down with it is worse than one that
@@ -43,7 +48,7 @@ pub enum Mode {
     Disarmed = 0,
     /// The law flies on fresh states.
     Flying = 1,
-    /// The state is stale: the last attitude is held ([`crate::blind`]).
+    /// The state is stale, or was a moment ago.
     Riding = 2,
     /// Coming down, to disarm.
     Descending = 3,
@@ -54,14 +59,16 @@ pub enum Mode {
 pub enum Request {
     /// Start the motors: they idle for a tick, from the next one on the law flies.
     Arm,
-    /// Stop the motors, now, wherever the vehicle is.
+    /// Stop the motors of a vehicle that is on the ground.
     Disarm,
+    /// Stop the motors now, wherever the vehicle is, before any other request.
+    Kill,
     /// Give the flight back to the controller, if it has fallen back on another law: the rotors stay as they are for a
     /// tick, from the next one on it flies.
     Engage,
 }
 
-/// Why arming is refused: the first reason that applies, in this order. The numbers go over the wire.
+/// Why a request is refused; for arming, the first reason that applies, in this order. The numbers go over the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Refusal {
     /// It is armed.
@@ -74,19 +81,32 @@ pub enum Refusal {
     SetpointMissing = 4,
     /// The setpoint is farther from the vehicle than [`ArmingLimits::setpoint_distance_max_m`].
     SetpointTooFar = 5,
-    /// The control tick's rate is not known to be within 997 to 1003 Hz.
+    /// The control tick's rate is not known to be right.
     Unhealthy = 6,
+    /// Within the last second it moved faster than [`ArmingLimits::speed_max_m_s`] or turned faster than
+    /// [`ArmingLimits::rate_max_rad_s`], or no state told.
+    NotAtRest = 7,
+    /// It is in flight, and only [`Request::Kill`] stops the motors there.
+    InFlight = 8,
+    /// It is not armed.
+    NotArmed = 9,
+    /// A request to stop the motors came after it.
+    Overtaken = 10,
 }
 
 impl Refusal {
     /// Every reason.
-    pub const ALL: [Refusal; 6] = [
+    pub const ALL: [Refusal; 10] = [
         Refusal::AlreadyArmed,
         Refusal::StateStale,
         Refusal::TiltTooLarge,
         Refusal::SetpointMissing,
         Refusal::SetpointTooFar,
         Refusal::Unhealthy,
+        Refusal::NotAtRest,
+        Refusal::InFlight,
+        Refusal::NotArmed,
+        Refusal::Overtaken,
     ];
 
     /// The reason in words, at most 50 characters.
@@ -98,71 +118,135 @@ impl Refusal {
             Refusal::SetpointMissing => "arming refused: no fresh setpoint",
             Refusal::SetpointTooFar => "arming refused: setpoint too far away",
             Refusal::Unhealthy => "arming refused: tick rate not 997 to 1003 Hz",
+            Refusal::NotAtRest => "arming refused: not at rest for a second",
+            Refusal::InFlight => "disarming refused: in flight; force it to stop",
+            Refusal::NotArmed => "refused: not armed",
+            Refusal::Overtaken => "refused: motors were stopped meanwhile",
         }
     }
 }
 
-/// How far from its setpoint and how tilted a vehicle may be when it is armed.
+/// Why a flight ended. The numbers go over the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum End {
+    /// [`Request::Disarm`] on the ground.
+    Disarmed = 1,
+    /// [`Request::Kill`].
+    Killed = 2,
+    /// The descent reached the ground.
+    Landed = 3,
+    /// No state for too long.
+    StateLost = 4,
+    /// Upside down or spinning, beyond recovery ([`crate::tumble`]).
+    Tumbled = 5,
+}
+
+/// How far from its setpoint, how tilted and how restless a vehicle may be when it is armed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmingLimits {
     /// Largest roll and largest pitch, each \[rad\].
     pub tilt_max_rad: f32,
     /// Largest distance between setpoint and position \[m\].
     pub setpoint_distance_max_m: f32,
+    /// Largest speed of a vehicle at rest \[m/s\].
+    pub speed_max_m_s: f32,
+    /// Largest angular rate of a vehicle at rest, about any axis \[rad/s\].
+    pub rate_max_rad_s: f32,
 }
 
 /// Accepted [`ArmingLimits::tilt_max_rad`].
 pub const TILT_MAX: Range = Range::new("tilt_max_rad", 0.01, 0.8);
 /// Accepted [`ArmingLimits::setpoint_distance_max_m`].
 pub const SETPOINT_DISTANCE_MAX: Range = Range::new("setpoint_distance_max_m", 0.01, 100.0);
+/// Accepted [`ArmingLimits::speed_max_m_s`].
+pub const SPEED_MAX: Range = Range::new("speed_max_m_s", 0.01, 2000.0);
+/// Accepted [`ArmingLimits::rate_max_rad_s`].
+pub const RATE_MAX: Range = Range::new("rate_max_rad_s", 0.01, 2000.0);
 
 impl Default for ArmingLimits {
-    /// 15 degrees and 2 m. Ours.
+    /// 15 degrees, 2 m, 0.5 m/s and 0.5 rad/s. Ours.
     fn default() -> Self {
-        ArmingLimits { tilt_max_rad: 0.26, setpoint_distance_max_m: 2.0 }
+        ArmingLimits { tilt_max_rad: 0.26, setpoint_distance_max_m: 2.0, speed_max_m_s: 0.5, rate_max_rad_s: 0.5 }
     }
 }
 
 impl ArmingLimits {
-    /// Checks both limits.
+    /// No limit but that of what is plausible, for a simulated vehicle that is held until it flies.
+    pub const NONE: Self = ArmingLimits {
+        tilt_max_rad: TILT_MAX.max as f32,
+        setpoint_distance_max_m: SETPOINT_DISTANCE_MAX.max as f32,
+        speed_max_m_s: SPEED_MAX.max as f32,
+        rate_max_rad_s: RATE_MAX.max as f32,
+    };
+
+    /// Checks every limit.
     ///
     /// # Errors
     /// The first one out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
         TILT_MAX.check(self.tilt_max_rad)?;
-        SETPOINT_DISTANCE_MAX.check(self.setpoint_distance_max_m)
+        SETPOINT_DISTANCE_MAX.check(self.setpoint_distance_max_m)?;
+        SPEED_MAX.check(self.speed_max_m_s)?;
+        RATE_MAX.check(self.rate_max_rad_s)
     }
 
-    /// Whether a vehicle that is disarmed may be armed: `state` and `setpoint` are there if they are plausible and
-    /// fresh.
+    /// True if a vehicle in this state neither moves nor turns.
+    pub fn at_rest(&self, state: &State) -> bool {
+        state.velocity_m_s.norm_squared() <= self.speed_max_m_s * self.speed_max_m_s
+            && abs_max(&state.rates_rad_s) <= self.rate_max_rad_s
+    }
+
+    /// Whether a vehicle that is disarmed may be armed.
     ///
     /// # Errors
     /// The first reason against it.
-    pub fn ready(&self, state: Option<&State>, setpoint: Option<&Setpoint>, healthy: bool) -> Result<(), Refusal> {
-        let state = state.ok_or(Refusal::StateStale)?;
+    pub fn ready(&self, vehicle: &Standing) -> Result<(), Refusal> {
+        let state = vehicle.state.ok_or(Refusal::StateStale)?;
         if state.attitude_rad.x.abs() > self.tilt_max_rad || state.attitude_rad.y.abs() > self.tilt_max_rad {
             return Err(Refusal::TiltTooLarge);
         }
-        let setpoint = setpoint.ok_or(Refusal::SetpointMissing)?;
+        let setpoint = vehicle.setpoint.ok_or(Refusal::SetpointMissing)?;
         let distance_max = self.setpoint_distance_max_m;
         if (setpoint.position_m - state.position_m).norm_squared() > distance_max * distance_max {
             return Err(Refusal::SetpointTooFar);
         }
-        if healthy { Ok(()) } else { Err(Refusal::Unhealthy) }
+        if !vehicle.healthy {
+            return Err(Refusal::Unhealthy);
+        }
+        if vehicle.rest_us >= REST_US { Ok(()) } else { Err(Refusal::NotAtRest) }
     }
+}
+
+/// A vehicle that may be armed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Standing<'a> {
+    /// Its state, if that is plausible and fresh.
+    pub state: Option<&'a State>,
+    /// Its setpoint, if that is plausible and fresh.
+    pub setpoint: Option<&'a Setpoint>,
+    /// True if the control tick runs at its rate.
+    pub healthy: bool,
+    /// For how long it has been [at rest](ArmingLimits::at_rest) \[us\].
+    pub rest_us: u64,
 }
 
 /// What the supervisor decides from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Observed {
-    /// What was asked for since the last tick.
+    /// The request whose turn it is.
     pub request: Option<Request>,
+    /// True if one that waits is [`Request::Kill`].
+    pub kill: bool,
     /// Whether a disarmed vehicle may be armed, [`ArmingLimits::ready`].
     pub ready: Result<(), Refusal>,
     /// Age of the newest plausible state \[us\]; `u64::MAX` if there is none.
     pub state_age_us: u64,
-    /// True if the vehicle that descends has touched down.
-    pub landed: bool,
+    /// For how long no state has been stale \[us\].
+    pub steady_us: u64,
+    /// False if the vehicle is on the ground ([`crate::ground`]).
+    pub airborne: bool,
+    /// True if it is upside down or spinning, beyond recovery ([`crate::tumble`]).
+    pub tumbled: bool,
 }
 
 impl Mode {
@@ -171,18 +255,32 @@ impl Mode {
         !matches!(self, Mode::Disarmed)
     }
 
+    /// Why the flight ends, if it does, by the diagram above.
+    pub fn end(self, observed: &Observed) -> Option<End> {
+        match self {
+            Mode::Disarmed => None,
+            _ if observed.kill => Some(End::Killed),
+            _ if observed.request == Some(Request::Disarm) && !observed.airborne => Some(End::Disarmed),
+            _ if observed.tumbled => Some(End::Tumbled),
+            _ if observed.state_age_us > GIVE_UP_US => Some(End::StateLost),
+            Mode::Descending if !observed.airborne => Some(End::Landed),
+            _ => None,
+        }
+    }
+
     /// The mode that follows from what is observed, by the diagram above.
     pub fn next(self, observed: &Observed) -> Mode {
         let age_us = observed.state_age_us;
-        match (self, observed.request) {
-            (_, Some(Request::Disarm)) => Mode::Disarmed,
-            (Mode::Disarmed, Some(Request::Arm)) if observed.ready.is_ok() => Mode::Flying,
-            (Mode::Disarmed, _) => Mode::Disarmed,
-            _ if age_us > GIVE_UP_US => Mode::Disarmed,
-            (Mode::Descending, _) if observed.landed => Mode::Disarmed,
-            (Mode::Descending, _) => Mode::Descending,
+        match self {
+            Mode::Disarmed if self.answer(Request::Arm, observed).is_ok() && observed.request == Some(Request::Arm) => {
+                Mode::Flying
+            }
+            Mode::Disarmed => Mode::Disarmed,
+            _ if self.end(observed).is_some() => Mode::Disarmed,
+            Mode::Descending => Mode::Descending,
             _ if age_us > DESCEND_US => Mode::Descending,
             _ if age_us > RIDE_US => Mode::Riding,
+            Mode::Riding if observed.steady_us < STEADY_US => Mode::Riding,
             _ => Mode::Flying,
         }
     }
@@ -190,12 +288,17 @@ impl Mode {
     /// The answer to `request` in this mode: done, or refused and why.
     ///
     /// # Errors
-    /// Arming refused.
-    pub fn answer(self, request: Request, ready: Result<(), Refusal>) -> Result<Request, Refusal> {
+    /// Why it is refused.
+    pub fn answer(self, request: Request, observed: &Observed) -> Result<(), Refusal> {
         match request {
-            Request::Disarm | Request::Engage => Ok(request),
+            Request::Kill => Ok(()),
+            _ if observed.kill => Err(Refusal::Overtaken),
             Request::Arm if self.armed() => Err(Refusal::AlreadyArmed),
-            Request::Arm => ready.map(|()| request),
+            Request::Arm => observed.ready,
+            Request::Disarm if self.armed() && observed.airborne => Err(Refusal::InFlight),
+            Request::Disarm => Ok(()),
+            Request::Engage if !self.armed() => Err(Refusal::NotArmed),
+            Request::Engage => Ok(()),
         }
     }
 }

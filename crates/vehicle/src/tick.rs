@@ -2,9 +2,12 @@
 
 use crate::blind::{Blind, Reckoning};
 use crate::descent::Descent;
+use crate::ground::Ground;
 use crate::inbox::{Inbox, Stamped};
 use crate::rate;
-use crate::supervisor::{ArmingLimits, Mode, Observed, RIDE_US, Refusal, Request, SETPOINT_STALE_US};
+use crate::supervisor::{ArmingLimits, End, Mode, Observed, RIDE_US, Refusal, Request, SETPOINT_STALE_US, Standing};
+use crate::tumble::Tumble;
+use crate::witness::Witness;
 use afbc::allocation::Mixer;
 use afbc::{Command, FlightController, Settings};
 use airframe::{Inputs, OutOfRange, Parameters, Range, RotorSpeeds, Setpoint, State};
@@ -19,6 +22,7 @@ pub struct Vehicle<C> {
     mixer: Mixer,
     blind: Blind,
     limits: ArmingLimits,
+    weight_n: f32,
     dt_s: f32,
 }
 
@@ -29,6 +33,12 @@ pub struct Memory<M> {
     rate: rate::Counter,
     /// The newest plausible state.
     state: Option<Stamped<State>>,
+    /// When the state was last stale \[us\].
+    stale_us: u64,
+    /// When the vehicle was last not at rest, or there was no fresh state to tell \[us\].
+    restless_us: u64,
+    /// States that were refused because they repeated the last one in flight, or came from a tracker that is not believed.
+    frozen_states: u32,
     flight: Option<Flight<M>>,
 }
 
@@ -40,6 +50,11 @@ struct Flight<M> {
     /// What the rotors were last told.
     applied: Inputs,
     guide: Guide,
+    ground: Ground,
+    tumble: Tumble,
+    witness: Witness,
+    /// True if the tracker contradicted itself or the rotors: no more states in this flight.
+    distrusts: bool,
 }
 
 /// Where to go when no setpoint says so.
@@ -73,6 +88,19 @@ pub struct Health {
     pub state_age_us: u64,
     /// True if there is no plausible setpoint younger than 500 ms: an armed vehicle holds its position.
     pub setpoint_stale: bool,
+    /// States since power-up that were no measurements of a vehicle in flight ([`crate::witness`]), up to `u32::MAX`.
+    pub frozen_states: u32,
+}
+
+/// The answer to a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// That of the request.
+    pub ticket: u8,
+    /// What was asked for.
+    pub request: Request,
+    /// Done, or refused and why.
+    pub result: Result<(), Refusal>,
 }
 
 /// What a tick decides.
@@ -85,7 +113,9 @@ pub struct Outcome {
     /// How well.
     pub health: Health,
     /// The answer to this tick's request.
-    pub answer: Option<Result<Request, Refusal>>,
+    pub answer: Option<Answer>,
+    /// Why the flight ended, if it did in this tick.
+    pub ended: Option<End>,
 }
 
 impl<C: FlightController> Vehicle<C> {
@@ -106,6 +136,7 @@ impl<C: FlightController> Vehicle<C> {
             mixer: Mixer::new(&airframe, settings.rotor_force_max_n)?,
             blind: Blind::new(&airframe, settings.dt_s),
             limits,
+            weight_n: airframe.mass_kg * airframe.gravity_m_s2,
             dt_s: settings.dt_s,
         })
     }
@@ -122,38 +153,53 @@ impl<C: FlightController> Vehicle<C> {
     pub fn traced_tick(&self, memory: &mut Memory<C::Memory>, now_us: u64, inbox: &Inbox) -> (Outcome, Command) {
         // Take the newest inputs.
         let measured = memory.take_state(inbox, now_us);
-        let Memory { mode, rate, state, flight } = memory;
+        let state_age_us = memory.state.map_or(u64::MAX, |state| state.age_us(now_us));
+        let fresh =
+            memory.state.filter(|_| state_age_us <= RIDE_US).map(|state| extrapolated(&state.value, state_age_us));
+        let fresh = fresh.as_ref();
+        memory.watch(fresh, &self.limits, self.dt_s, now_us);
+        let Memory { mode, rate, stale_us, restless_us, frozen_states, flight, .. } = memory;
         let rate = rate.tick(now_us);
-        let state_age_us = state.map_or(u64::MAX, |state| state.age_us(now_us));
-        let fresh = state.as_ref().filter(|_| state_age_us <= RIDE_US).map(|state| &state.value);
         let setpoint = inbox.setpoint().filter(|s| s.age_us(now_us) <= SETPOINT_STALE_US).map(|s| &s.value);
 
         // Supervise.
-        let ready = match mode.armed() {
-            true => Err(Refusal::AlreadyArmed),
-            false => self.limits.ready(fresh, setpoint, rate.healthy()),
+        let rest_us = now_us.saturating_sub(*restless_us);
+        let standing = Standing { state: fresh, setpoint, healthy: rate.healthy(), rest_us };
+        let asked = inbox.request();
+        let observed = Observed {
+            request: asked.map(|asked| asked.request),
+            kill: inbox.kills(),
+            ready: if mode.armed() { Err(Refusal::AlreadyArmed) } else { self.limits.ready(&standing) },
+            state_age_us,
+            steady_us: now_us.saturating_sub(*stale_us),
+            airborne: flight.as_ref().is_some_and(|flight| flight.ground.airborne()),
+            tumbled: flight.as_ref().is_some_and(|flight| flight.tumble.is_lost(now_us)),
         };
-        let request = inbox.request();
-        let answer = request.map(|request| mode.answer(request, ready));
-        let landed = flight.as_ref().is_some_and(|flight| flight.guide.landed(now_us));
-        *mode = mode.next(&Observed { request, ready, state_age_us, landed });
+        let answer = asked.map(|asked| {
+            let result = mode.answer(asked.request, &observed);
+            Answer { ticket: asked.ticket, request: asked.request, result }
+        });
+        let done = |request| answer.is_some_and(|answer| answer.request == request && answer.result.is_ok());
+        let ended = mode.end(&observed);
+        *mode = mode.next(&observed);
         let mode = *mode;
         // Arming takes a tick of its own, in which the motors idle: setting up a flight and a step are too much for one.
-        let arms = answer == Some(Ok(Request::Arm));
+        let arms = done(Request::Arm);
         if let (true, Some(state)) = (arms, fresh) {
-            Flight::begin(flight, self.blind.start(state));
+            Flight::begin(flight, self, state, now_us);
         }
 
         // Control.
         let command = match flight {
             Some(flight) if mode.armed() && !arms => {
                 flight.reckon(&self.blind, fresh.filter(|_| measured));
-                let engaged = answer == Some(Ok(Request::Engage)) && self.controller.engage(&mut flight.control);
+                let engaged = done(Request::Engage) && self.controller.engage(&mut flight.control);
                 match fresh {
                     // Taking over and a step would be too much, too: the rotors stay as they are.
                     _ if engaged => self.allocated(flight.applied),
                     Some(state) => {
-                        let target = flight.guide.target(mode, state, setpoint, now_us, self.dt_s);
+                        let state = &flight.reckoning.between(state);
+                        let target = flight.guide.target(mode, state, setpoint, self.dt_s);
                         // The inbox let plausible ones pass only.
                         let command = self.controller.decide(&mut flight.control, state, target, true);
                         flight.applied = Mixer::inputs(&command.forces);
@@ -172,8 +218,10 @@ impl<C: FlightController> Vehicle<C> {
 
         // Gate the motors.
         let motors = if mode.armed() { command.speeds } else { RotorSpeeds::default() };
-        let health = Health { control: command.health, rate, state_age_us, setpoint_stale: setpoint.is_none() };
-        (Outcome { motors, mode, health, answer }, command)
+        let setpoint_stale = setpoint.is_none();
+        let health =
+            Health { control: command.health, rate, state_age_us, setpoint_stale, frozen_states: *frozen_states };
+        (Outcome { motors, mode, health, answer, ended }, command)
     }
 
     /// Rotor commands without a state.
@@ -197,18 +245,56 @@ impl<C: FlightController> Vehicle<C> {
     }
 }
 
+/// The state `age_us` after it was measured, by the velocities and rates of that moment; as in the paper's model, those of
+/// the body stand in for those of the angles.
+fn extrapolated(state: &State, age_us: u64) -> State {
+    let age_s = age_us as f32 * 1e-6;
+    State {
+        position_m: state.position_m + state.velocity_m_s * age_s,
+        attitude_rad: state.attitude_rad + state.rates_rad_s * age_s,
+        ..*state
+    }
+}
+
 impl<M> Memory<M> {
-    /// Keeps the inbox's state if it is newer than the one at hand and not stale already: a stream of states that are
-    /// always late is no stream of states. Tells whether it did.
+    /// Keeps the inbox's state if it is newer than the one at hand, not stale already (a stream of states that are always
+    /// late is no stream of states), and a measurement of the vehicle in flight. Tells whether it did.
     fn take_state(&mut self, inbox: &Inbox, now_us: u64) -> bool {
         let newer = |state: &&Stamped<State>| {
             state.age_us(now_us) <= RIDE_US && self.state.is_none_or(|held| state.at_us > held.at_us)
         };
-        let taken = inbox.state().filter(newer);
-        if let Some(state) = taken {
-            self.state = Some(*state);
+        let Some(state) = inbox.state().filter(newer) else { return false };
+        let armed = self.mode.armed();
+        if let Some(flight) = self.flight.as_mut().filter(|flight| armed && flight.ground.airborne()) {
+            let repeated = self.state.is_some_and(|held| held.value == state.value);
+            flight.distrusts |= flight.witness.contradicts(&state.value, state.at_us);
+            if repeated || flight.distrusts {
+                self.frozen_states = self.frozen_states.saturating_add(1);
+                return false;
+            }
         }
-        taken.is_some()
+        self.state = Some(*state);
+        true
+    }
+
+    /// Keeps account of what a fresh state, or none, says of the vehicle.
+    fn watch(&mut self, fresh: Option<&State>, limits: &ArmingLimits, dt_s: f32, now_us: u64) {
+        if fresh.is_none() {
+            self.stale_us = now_us;
+        }
+        if !fresh.is_some_and(|state| limits.at_rest(state)) {
+            self.restless_us = now_us;
+        }
+        let armed = self.mode.armed();
+        let Some(flight) = self.flight.as_mut().filter(|_| armed) else { return };
+        match fresh {
+            Some(state) => {
+                flight.tumble.advance(state, now_us);
+                flight.ground.advance(state, flight.applied.thrust_n, now_us, dt_s);
+                flight.distrusts |= flight.ground.contradicts(now_us);
+            }
+            None => flight.ground.advance_blind(now_us),
+        }
     }
 }
 
@@ -217,9 +303,17 @@ impl<M: Default> Flight<M> {
     // Out of line, so that the new memory is not put together on the tick's stack and copied.
     #[cold]
     #[inline(never)]
-    fn begin(flight: &mut Option<Self>, reckoning: Reckoning) {
-        *flight =
-            Some(Flight { control: M::default(), reckoning, applied: Inputs::default(), guide: Guide::default() });
+    fn begin<C>(flight: &mut Option<Self>, vehicle: &Vehicle<C>, state: &State, now_us: u64) {
+        *flight = Some(Flight {
+            control: M::default(),
+            reckoning: vehicle.blind.start(state),
+            applied: Inputs::default(),
+            guide: Guide::default(),
+            ground: Ground::new(state, vehicle.weight_n, now_us),
+            tumble: Tumble::default(),
+            witness: Witness::new(state, now_us),
+            distrusts: false,
+        });
     }
 }
 
@@ -235,17 +329,10 @@ impl<M> Flight<M> {
 
 impl Guide {
     /// Where to go from a fresh `state`: down, to the setpoint, or nowhere if there is none.
-    fn target<'a>(
-        &'a mut self,
-        mode: Mode,
-        state: &State,
-        setpoint: Option<&'a Setpoint>,
-        now_us: u64,
-        dt_s: f32,
-    ) -> &'a Setpoint {
+    fn target<'a>(&'a mut self, mode: Mode, state: &State, setpoint: Option<&'a Setpoint>, dt_s: f32) -> &'a Setpoint {
         if mode == Mode::Descending {
-            let descent = self.descent.get_or_insert_with(|| Descent::new(state, now_us));
-            descent.advance(state, now_us, dt_s);
+            let descent = self.descent.get_or_insert_with(|| Descent::new(state));
+            descent.advance(dt_s);
             return descent.setpoint();
         }
         match setpoint {
@@ -255,9 +342,5 @@ impl Guide {
             }
             None => self.hold.get_or_insert_with(|| Setpoint::hold(state)),
         }
-    }
-
-    fn landed(&self, now_us: u64) -> bool {
-        self.descent.is_some_and(|descent| descent.landed(now_us))
     }
 }

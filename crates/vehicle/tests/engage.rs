@@ -2,17 +2,17 @@
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc::{Command, FlightController, Profile};
-use airframe::{Parameters, Setpoint, State};
-use vehicle::{ArmingLimits, Inbox, Memory, Mode, Outcome, Request, Stamped, Vehicle};
+use airframe::{Parameters, RotorForces, Setpoint, State};
+use vehicle::{ArmingLimits, Asked, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle};
 
-/// Counts how often it is engaged.
+/// Counts how often it is engaged, and carries the vehicle.
 struct Counter;
 
 impl FlightController for Counter {
     type Memory = u32;
 
     fn decide(&self, _: &mut u32, _: &State, _: &Setpoint, _: bool) -> Command {
-        Command::default()
+        Command { forces: RotorForces([1.2; 4].into()), ..Command::default() }
     }
 
     fn engage(&self, memory: &mut u32) -> bool {
@@ -39,11 +39,13 @@ impl Bench {
         let at_us = self.now_us;
         let mut inbox = Inbox::EMPTY;
         if tracked {
-            inbox.measure(Stamped { value: State::default(), at_us });
+            let mut value = State::default();
+            value.position_m.z = if at_us % 2000 == 0 { 1e-6 } else { -1e-6 };
+            inbox.measure(Stamped { value, at_us });
         }
         inbox.aim(Stamped { value: Setpoint::default(), at_us });
         if let Some(request) = request {
-            inbox.ask(request);
+            assert!(inbox.ask(Asked { request, ticket: 7 }));
         }
         self.vehicle.tick(&mut self.memory, at_us, &inbox)
     }
@@ -58,7 +60,9 @@ impl Bench {
     fn engages(&mut self, tracked: bool, mode: Mode) -> bool {
         let before = self.memory.control().copied();
         let outcome = self.tick(tracked, Some(Request::Engage));
-        assert_eq!((outcome.mode, outcome.answer), (mode, Some(Ok(Request::Engage))));
+        let answer = outcome.answer.expect("answered");
+        let result = if mode.armed() { Ok(()) } else { Err(Refusal::NotArmed) };
+        assert_eq!((outcome.mode, answer.request, answer.ticket, answer.result), (mode, Request::Engage, 7, result));
         self.memory.control().copied() != before
     }
 }
@@ -71,7 +75,7 @@ fn engaging_reaches_the_controller_in_flight_only() {
     assert_eq!(bench.tick(true, Some(Request::Arm)).mode, Mode::Flying);
     assert_eq!(bench.memory.control(), Some(&0));
     assert!(bench.engages(true, Mode::Flying));
-    bench.wait(10, true);
+    bench.wait(600, true);
     assert_eq!(bench.memory.control(), Some(&1), "once");
 
     bench.wait(100, false);
@@ -79,6 +83,6 @@ fn engaging_reaches_the_controller_in_flight_only() {
     bench.wait(200, false);
     assert!(bench.engages(false, Mode::Descending));
 
-    assert_eq!(bench.tick(true, Some(Request::Disarm)).mode, Mode::Disarmed);
+    assert_eq!(bench.tick(true, Some(Request::Kill)).mode, Mode::Disarmed);
     assert!(!bench.engages(true, Mode::Disarmed), "the flight is over");
 }

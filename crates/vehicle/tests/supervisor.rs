@@ -1,14 +1,43 @@
-//! Every transition of the mode, and every reason against arming.
+//! Every transition of the mode, every answer, and every reason against arming.
 
 use airframe::{Setpoint, State};
 use nalgebra::Vector3;
-use vehicle::supervisor::{DESCEND_US, GIVE_UP_US, Observed, RIDE_US};
-use vehicle::{ArmingLimits, Mode, Refusal, Request};
+use vehicle::supervisor::{DESCEND_US, GIVE_UP_US, Observed, REST_US, RIDE_US, STEADY_US, Standing};
+use vehicle::{ArmingLimits, End, Mode, Refusal, Request};
 
 const MODES: [Mode; 4] = [Mode::Disarmed, Mode::Flying, Mode::Riding, Mode::Descending];
+const REQUESTS: [Option<Request>; 5] =
+    [None, Some(Request::Arm), Some(Request::Disarm), Some(Request::Kill), Some(Request::Engage)];
 
 /// Ages on both sides of each limit.
 const AGES_US: [u64; 8] = [0, RIDE_US, RIDE_US + 1, DESCEND_US, DESCEND_US + 1, GIVE_UP_US, GIVE_UP_US + 1, u64::MAX];
+
+/// In the air, with nothing asked for, and fresh states for long.
+const CALM: Observed = Observed {
+    request: None,
+    kill: false,
+    ready: Ok(()),
+    state_age_us: 0,
+    steady_us: u64::MAX,
+    airborne: true,
+    tumbled: false,
+};
+
+/// Everything that can be observed.
+fn all() -> impl Iterator<Item = (Mode, Observed)> {
+    let flags = |n: usize| (n & 1 == 1, n & 2 == 2, n & 4 == 4);
+    let cases = MODES.into_iter().flat_map(|mode| REQUESTS.into_iter().map(move |request| (mode, request)));
+    let cases = cases.flat_map(|case| AGES_US.into_iter().map(move |age| (case, age)));
+    let cases = cases.flat_map(|case| [0, STEADY_US - 1, STEADY_US].into_iter().map(move |steady| (case, steady)));
+    let cases = cases.flat_map(|case| [Ok(()), Err(Refusal::TiltTooLarge)].into_iter().map(move |ready| (case, ready)));
+    cases.flat_map(move |((((mode, request), state_age_us), steady_us), ready)| {
+        (0..8).map(move |n| {
+            let (waits, airborne, tumbled) = flags(n);
+            let kill = waits || request == Some(Request::Kill);
+            (mode, Observed { request, kill, ready, state_age_us, steady_us, airborne, tumbled })
+        })
+    })
+}
 
 #[test]
 fn disarmed_at_power_up() {
@@ -28,8 +57,8 @@ fn in_flight_the_age_decides() {
     ];
     for (mode, row) in table {
         for (state_age_us, expected) in AGES_US.into_iter().zip(row) {
-            for (request, ready) in [(None, Ok(())), (None, Err(Refusal::TiltTooLarge))] {
-                let observed = Observed { request, ready, state_age_us, landed: false };
+            for ready in [Ok(()), Err(Refusal::TiltTooLarge)] {
+                let observed = Observed { ready, state_age_us, ..CALM };
                 assert_eq!(mode.next(&observed), expected, "{mode:?}, {observed:?}");
             }
         }
@@ -37,69 +66,103 @@ fn in_flight_the_age_decides() {
 }
 
 #[test]
-fn disarming_stops_the_motors_whatever_else_is_true() {
-    for mode in MODES {
-        for state_age_us in AGES_US {
-            for landed in [false, true] {
-                for ready in [Ok(()), Err(Refusal::Unhealthy)] {
-                    let request = Some(Request::Disarm);
-                    assert_eq!(mode.next(&Observed { request, ready, state_age_us, landed }), Mode::Disarmed);
-                    assert_eq!(mode.answer(Request::Disarm, ready), Ok(Request::Disarm));
-                }
-            }
+fn riding_ends_once_states_have_been_fresh_for_a_while() {
+    for (steady_us, expected) in [(0, Mode::Riding), (STEADY_US - 1, Mode::Riding), (STEADY_US, Mode::Flying)] {
+        assert_eq!(Mode::Riding.next(&Observed { steady_us, ..CALM }), expected);
+        assert_eq!(Mode::Flying.next(&Observed { steady_us, ..CALM }), Mode::Flying);
+    }
+}
+
+/// The diagram, read off once more: what ends a flight, in the order of weight.
+#[test]
+fn a_flight_ends_for_the_weightiest_reason() {
+    for (mode, seen) in all() {
+        let reasons = [
+            (seen.kill, End::Killed),
+            (seen.request == Some(Request::Disarm) && !seen.airborne, End::Disarmed),
+            (seen.tumbled, End::Tumbled),
+            (seen.state_age_us > GIVE_UP_US, End::StateLost),
+            (mode == Mode::Descending && !seen.airborne, End::Landed),
+        ];
+        let end = reasons.into_iter().find(|(holds, _)| *holds && mode.armed()).map(|(_, end)| end);
+        assert_eq!(mode.end(&seen), end, "{mode:?}, {seen:?}");
+        assert!(end.is_none() || mode.next(&seen) == Mode::Disarmed);
+        assert!(end.is_some() || !mode.armed() || mode.next(&seen).armed(), "no end without a reason: {seen:?}");
+    }
+}
+
+/// Only a request to arm, which is granted, starts the motors; and a request changes nothing that is refused.
+#[test]
+fn what_is_refused_changes_nothing() {
+    for (mode, seen) in all() {
+        let without = mode.next(&Observed { request: None, ..seen });
+        let granted = seen.request.is_some_and(|request| mode.answer(request, &seen).is_ok());
+        if !granted {
+            assert_eq!(mode.next(&seen), without, "{mode:?}, {seen:?}");
+        }
+        if mode == Mode::Disarmed {
+            let arms = seen.request == Some(Request::Arm) && granted;
+            assert_eq!(mode.next(&seen), if arms { Mode::Flying } else { Mode::Disarmed }, "{seen:?}");
         }
     }
 }
 
 #[test]
-fn arming_needs_readiness_and_changes_nothing_in_flight() {
-    for mode in MODES {
-        for ready in [Ok(()), Err(Refusal::SetpointTooFar)] {
-            let observed = Observed { request: Some(Request::Arm), ready, state_age_us: 0, landed: false };
-            let expected = match (mode, ready) {
-                (Mode::Disarmed, Ok(())) => Mode::Flying,
-                _ => mode.next(&Observed { request: None, ..observed }),
-            };
-            assert_eq!(mode.next(&observed), expected, "{mode:?}, {ready:?}");
-            let answer = if mode.armed() { Err(Refusal::AlreadyArmed) } else { ready.map(|()| Request::Arm) };
-            assert_eq!(mode.answer(Request::Arm, ready), answer, "{mode:?}, {ready:?}");
-        }
-    }
-}
-
-#[test]
-fn landing_ends_a_descent_and_nothing_else() {
-    for mode in MODES {
-        let observed = Observed { request: None, ready: Ok(()), state_age_us: 0, landed: true };
-        let expected = match mode {
-            Mode::Descending => Mode::Disarmed,
-            _ => mode.next(&Observed { landed: false, ..observed }),
+fn every_request_is_answered() {
+    for (mode, seen) in all() {
+        let Some(request) = seen.request else { continue };
+        let expected = match (request, mode.armed()) {
+            (Request::Kill, _) => Ok(()),
+            _ if seen.kill => Err(Refusal::Overtaken),
+            (Request::Arm, true) => Err(Refusal::AlreadyArmed),
+            (Request::Arm, false) => seen.ready,
+            (Request::Disarm, true) if seen.airborne => Err(Refusal::InFlight),
+            (Request::Disarm, _) => Ok(()),
+            (Request::Engage, true) => Ok(()),
+            (Request::Engage, false) => Err(Refusal::NotArmed),
         };
-        assert_eq!(mode.next(&observed), expected, "{mode:?}");
+        assert_eq!(mode.answer(request, &seen), expected, "{mode:?}, {seen:?}");
     }
 }
 
 #[test]
 fn readiness_names_the_first_reason_against_it() {
-    let limits = ArmingLimits { tilt_max_rad: 0.2, setpoint_distance_max_m: 2.0 };
+    let limits = ArmingLimits { tilt_max_rad: 0.2, setpoint_distance_max_m: 2.0, ..ArmingLimits::default() };
     let at = |x, y, z| Some(Setpoint { position_m: Vector3::new(x, y, z), ..Setpoint::default() });
     let tilted = |roll, pitch, yaw| Some(State { attitude_rad: Vector3::new(roll, pitch, yaw), ..State::default() });
     let level = tilted(0.0, 0.0, 3.0);
     let cases = [
-        (level, at(0.0, 0.0, 0.0), true, Ok(())),
-        (tilted(0.2, -0.2, 3.0), at(0.0, 0.0, 2.0), true, Ok(())),
-        (None, at(0.0, 0.0, 0.0), true, Err(Refusal::StateStale)),
-        (None, None, false, Err(Refusal::StateStale)),
-        (tilted(0.21, 0.0, 0.0), None, false, Err(Refusal::TiltTooLarge)),
-        (tilted(0.0, -0.21, 0.0), at(0.0, 0.0, 0.0), true, Err(Refusal::TiltTooLarge)),
-        (level, None, false, Err(Refusal::SetpointMissing)),
-        (level, at(0.0, 0.0, -2.01), false, Err(Refusal::SetpointTooFar)),
-        (level, at(1.5, 1.5, 0.0), true, Err(Refusal::SetpointTooFar)),
-        (level, at(1.0, 1.0, 1.0), false, Err(Refusal::Unhealthy)),
+        (level, at(0.0, 0.0, 0.0), true, REST_US, Ok(())),
+        (tilted(0.2, -0.2, 3.0), at(0.0, 0.0, 2.0), true, u64::MAX, Ok(())),
+        (None, at(0.0, 0.0, 0.0), true, REST_US, Err(Refusal::StateStale)),
+        (None, None, false, 0, Err(Refusal::StateStale)),
+        (tilted(0.21, 0.0, 0.0), None, false, 0, Err(Refusal::TiltTooLarge)),
+        (tilted(0.0, -0.21, 0.0), at(0.0, 0.0, 0.0), true, REST_US, Err(Refusal::TiltTooLarge)),
+        (level, None, false, 0, Err(Refusal::SetpointMissing)),
+        (level, at(0.0, 0.0, -2.01), false, 0, Err(Refusal::SetpointTooFar)),
+        (level, at(1.5, 1.5, 0.0), true, REST_US, Err(Refusal::SetpointTooFar)),
+        (level, at(1.0, 1.0, 1.0), false, 0, Err(Refusal::Unhealthy)),
+        (level, at(1.0, 1.0, 1.0), true, REST_US - 1, Err(Refusal::NotAtRest)),
     ];
-    for (state, setpoint, healthy, expected) in cases {
-        assert_eq!(limits.ready(state.as_ref(), setpoint.as_ref(), healthy), expected, "{state:?}, {setpoint:?}");
+    for (state, setpoint, healthy, rest_us, expected) in cases {
+        let standing = Standing { state: state.as_ref(), setpoint: setpoint.as_ref(), healthy, rest_us };
+        assert_eq!(limits.ready(&standing), expected, "{standing:?}");
     }
+}
+
+#[test]
+fn at_rest_is_neither_moving_nor_turning() {
+    let limits = ArmingLimits { speed_max_m_s: 0.5, rate_max_rad_s: 0.25, ..ArmingLimits::default() };
+    let state = |v: [f32; 3], w: [f32; 3]| State { velocity_m_s: v.into(), rates_rad_s: w.into(), ..State::default() };
+    for axis in 0..3 {
+        let along = |size: f32| core::array::from_fn(|i| if i == axis { size } else { 0.0 });
+        for sign in [1.0, -1.0] {
+            assert!(limits.at_rest(&state(along(0.5 * sign), along(0.25 * sign))));
+            assert!(!limits.at_rest(&state(along(0.51 * sign), [0.0; 3])));
+            assert!(!limits.at_rest(&state([0.0; 3], along(0.26 * sign))));
+        }
+    }
+    assert!(!limits.at_rest(&state([0.3, 0.3, 0.3], [0.0; 3])), "the speed counts, not its parts");
 }
 
 #[test]
@@ -112,14 +175,17 @@ fn every_refusal_has_a_number_of_its_own_and_fits_a_status_text() {
 
 #[test]
 fn limits_are_validated_by_name() {
-    assert_eq!(ArmingLimits::default().validate(), Ok(()));
-    for (tilt_max_rad, setpoint_distance_max_m, name) in [
-        (0.9, 2.0, "tilt_max_rad"),
-        (f32::NAN, 2.0, "tilt_max_rad"),
-        (0.2, 0.0, "setpoint_distance_max_m"),
-        (0.2, f32::INFINITY, "setpoint_distance_max_m"),
+    let limits = ArmingLimits::default();
+    assert_eq!(limits.validate(), Ok(()));
+    assert_eq!(ArmingLimits::NONE.validate(), Ok(()));
+    for (limits, name) in [
+        (ArmingLimits { tilt_max_rad: 0.9, ..limits }, "tilt_max_rad"),
+        (ArmingLimits { tilt_max_rad: f32::NAN, ..limits }, "tilt_max_rad"),
+        (ArmingLimits { setpoint_distance_max_m: 0.0, ..limits }, "setpoint_distance_max_m"),
+        (ArmingLimits { setpoint_distance_max_m: f32::INFINITY, ..limits }, "setpoint_distance_max_m"),
+        (ArmingLimits { speed_max_m_s: 0.0, ..limits }, "speed_max_m_s"),
+        (ArmingLimits { rate_max_rad_s: -1.0, ..limits }, "rate_max_rad_s"),
     ] {
-        let refused = ArmingLimits { tilt_max_rad, setpoint_distance_max_m }.validate();
-        assert_eq!(refused.map_err(|error| error.range.name), Err(name));
+        assert_eq!(limits.validate().map_err(|error| error.range.name), Err(name));
     }
 }

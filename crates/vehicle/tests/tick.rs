@@ -5,18 +5,19 @@ use afbc::{Adaptive, Command, Controller, FlightController, Profile, Settings};
 use airframe::{Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
-use vehicle::descent::{SINK_M_S, STILL_US};
-use vehicle::{ArmingLimits, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle};
+use vehicle::descent::SINK_M_S;
+use vehicle::ground::{CARRIED_US, STILL_US};
+use vehicle::{Answer, ArmingLimits, Asked, End, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle};
 
 type Adapted = afbc::Cascade<afbc::adaptive::Estimate>;
 
 fn controller(settings: Settings) -> Controller<Adaptive> {
-    let law = Adaptive::new(Profile::Paper.gains()).expect("valid");
+    let law = Adaptive::new(Profile::Flight.gains()).expect("valid");
     Controller::new(Parameters::PAPER.to_f32(), settings, law).expect("valid")
 }
 
 fn vehicle() -> Vehicle<Controller<Adaptive>> {
-    let settings = Profile::Paper.settings();
+    let settings = Profile::Flight.settings();
     Vehicle::new(Parameters::PAPER.to_f32(), settings, ArmingLimits::default(), controller(settings)).expect("valid")
 }
 
@@ -28,6 +29,8 @@ struct Bench {
     inbox: Inbox,
     /// What was behind the last tick.
     command: Command,
+    /// Of the measured height, to and fro: no tracker says the same twice \[m\].
+    noise_m: f32,
 }
 
 impl Bench {
@@ -38,7 +41,12 @@ impl Bench {
             now_us: 0,
             inbox: Inbox::default(),
             command: Command::default(),
+            noise_m: 0.0,
         }
+    }
+
+    fn ask(&mut self, request: Request) {
+        assert!(self.inbox.ask(Asked { request, ticket: 3 }));
     }
 
     /// One that has been flying at `state` towards `setpoint` for a tick.
@@ -47,9 +55,18 @@ impl Bench {
         for _ in 0..1001 {
             bench.tick(Some(state), Some(setpoint));
         }
-        bench.inbox.ask(Request::Arm);
-        assert_eq!(bench.tick(Some(state), Some(setpoint)).answer, Some(Ok(Request::Arm)));
+        bench.ask(Request::Arm);
+        assert_eq!(bench.tick(Some(state), Some(setpoint)).answer, answer(Request::Arm, Ok(())));
         bench.tick(Some(state), Some(setpoint));
+        bench
+    }
+
+    /// One that has been carried by its rotors for long enough to be in the air, under a tracker with noise.
+    fn airborne(state: State, setpoint: Setpoint) -> Self {
+        let mut bench = Bench { noise_m: 1e-6, ..Bench::flying(state, setpoint) };
+        for _ in 0..CARRIED_US / 1000 {
+            bench.tick(Some(state), Some(setpoint));
+        }
         bench
     }
 
@@ -57,7 +74,9 @@ impl Bench {
     fn tick(&mut self, state: Option<State>, setpoint: Option<Setpoint>) -> Outcome {
         self.now_us += 1000;
         let at_us = self.now_us;
-        if let Some(value) = state {
+        if let Some(mut value) = state {
+            self.noise_m = -self.noise_m;
+            value.position_m.z += self.noise_m;
             self.inbox.measure(Stamped { value, at_us });
         }
         if let Some(value) = setpoint {
@@ -70,6 +89,10 @@ impl Bench {
     }
 }
 
+fn answer(request: Request, result: Result<(), Refusal>) -> Option<Answer> {
+    Some(Answer { ticket: 3, request, result })
+}
+
 fn near() -> Setpoint {
     Setpoint { position_m: Vector3::new(0.3, -0.2, 0.5), ..Setpoint::default() }
 }
@@ -78,14 +101,14 @@ fn near() -> Setpoint {
 fn disarmed_motors_are_off_and_arming_waits_for_the_rate() {
     let mut bench = Bench::new();
     for _ in 0..1000 {
-        bench.inbox.ask(Request::Arm);
+        bench.ask(Request::Arm);
         let outcome = bench.tick(Some(State::default()), Some(near()));
-        assert_eq!(outcome.answer, Some(Err(Refusal::Unhealthy)));
+        assert_eq!(outcome.answer, answer(Request::Arm, Err(Refusal::Unhealthy)));
         assert_eq!((outcome.mode, outcome.motors), (Mode::Disarmed, RotorSpeeds::default()));
     }
-    bench.inbox.ask(Request::Arm);
+    bench.ask(Request::Arm);
     let outcome = bench.tick(Some(State::default()), Some(near()));
-    assert_eq!((outcome.mode, outcome.answer), (Mode::Flying, Some(Ok(Request::Arm))));
+    assert_eq!((outcome.mode, outcome.answer), (Mode::Flying, answer(Request::Arm, Ok(()))));
     assert_eq!(outcome.motors, RotorSpeeds::default(), "idle in the tick of arming");
     assert!(bench.tick(Some(State::default()), Some(near())).motors.0.min() > 0.0);
 }
@@ -94,7 +117,7 @@ fn disarmed_motors_are_off_and_arming_waits_for_the_rate() {
 #[test]
 fn flying_is_the_laws_step() {
     let mut bench = Bench::flying(State::default(), near());
-    let controller = controller(Profile::Paper.settings());
+    let controller = controller(Profile::Flight.settings());
     let mut memory = afbc::Memory::default();
     controller.step(&mut memory, &State::default(), &near());
     for tick in 0..500 {
@@ -118,21 +141,23 @@ fn the_estimates_of_one_flight_are_not_those_of_the_next() {
         bench.tick(Some(State::default()), Some(near()));
     }
     let learnt = bench.memory.control().expect("flown").estimates;
-    assert!(learnt.z.theta.norm() > 0.0);
-    bench.inbox.ask(Request::Disarm);
+    let fresh = Bench::flying(State::default(), near()).memory.control().expect("flown").estimates;
+    assert_ne!(learnt, fresh, "it has learnt");
+    bench.ask(Request::Kill);
     let outcome = bench.tick(Some(State::default()), Some(near()));
     assert_eq!((outcome.mode, outcome.motors), (Mode::Disarmed, RotorSpeeds::default()));
+    assert_eq!(outcome.ended, Some(End::Killed));
     assert_eq!(bench.memory.control().expect("flown").estimates, learnt, "still there to be reported");
-    bench.inbox.ask(Request::Arm);
+    bench.ask(Request::Arm);
     bench.tick(Some(State::default()), Some(near()));
     bench.tick(Some(State::default()), Some(near()));
-    assert!(bench.memory.control().expect("flown").estimates.z.theta.norm() < learnt.z.theta.norm() / 50.0);
+    assert_eq!(bench.memory.control().expect("flown").estimates, fresh);
 }
 
 /// The tick in which each mode begins, and frozen estimates as long as the vehicle is blind.
 #[test]
 fn a_lost_state_is_ridden_out_then_descended_on_then_given_up() {
-    let mut bench = Bench::flying(State::default(), near());
+    let mut bench = Bench::airborne(State::default(), near());
     let mut frozen = None;
     for age_ms in 1..=2300 {
         let outcome = bench.tick(None, Some(near()));
@@ -157,7 +182,7 @@ const WEIGHT_N: f32 = 0.486 * 9.81;
 
 #[test]
 fn blind_thrust_is_the_weight_and_then_less() {
-    let mut bench = Bench::flying(State::default(), Setpoint::hold(&State::default()));
+    let mut bench = Bench::airborne(State::default(), Setpoint::hold(&State::default()));
     let thrusts: Vec<f32> = (1..=400)
         .map(|_| {
             bench.tick(None, Some(near()));
@@ -198,7 +223,7 @@ impl Roll {
 fn riding_stops_the_rotation_and_descending_levels() {
     for outside_n in [0.0, 0.02, -0.02] {
         let mut roll = Roll { angle: 0.0, rate: 0.0, outside_n };
-        let mut bench = Bench::flying(roll.state(), Setpoint::hold(&State::default()));
+        let mut bench = Bench::airborne(roll.state(), Setpoint::hold(&State::default()));
         for _ in 0..5000 {
             bench.tick(Some(roll.state()), Some(Setpoint::hold(&State::default())));
             roll.advance(&bench.command);
@@ -207,7 +232,7 @@ fn riding_stops_the_rotation_and_descending_levels() {
         let mut held = None;
         for age_ms in 0..=2250 {
             let measured = (age_ms == 0).then(|| roll.state());
-            let outcome = bench.tick(measured, Some(near()));
+            let outcome = bench.tick(measured, Some(Setpoint::hold(&State::default())));
             roll.advance(&bench.command);
             match age_ms {
                 250 => {
@@ -226,26 +251,27 @@ fn riding_stops_the_rotation_and_descending_levels() {
 
 #[test]
 fn without_a_setpoint_the_vehicle_stays_where_it_is() {
-    let mut bench = Bench::flying(State::default(), near());
+    let mut bench = Bench::airborne(State::default(), near());
     for age_ms in 1..=500 {
         assert!(!bench.tick(Some(State::default()), None).health.setpoint_stale, "{age_ms} ms");
     }
-    let here = State { position_m: Vector3::new(5.0, 6.0, 7.0), ..State::default() };
+    bench.noise_m = 0.0;
+    let here = State { position_m: Vector3::new(1.0, 2.0, 3.0), ..State::default() };
     let outcome = bench.tick(Some(here), None);
     assert!(outcome.health.setpoint_stale);
     assert_eq!((outcome.mode, bench.command.errors.x.e1), (Mode::Flying, 0.0));
     // The place is that of the moment, not the vehicle's.
-    let moved = State { position_m: Vector3::new(5.5, 6.0, 7.0), ..State::default() };
+    let moved = State { position_m: Vector3::new(1.5, 2.0, 3.0), ..State::default() };
     bench.tick(Some(moved), None);
     assert_eq!(bench.command.errors.x.e1, -0.5);
     // A setpoint that comes back is followed.
     bench.tick(Some(moved), Some(near()));
-    assert_eq!(bench.command.errors.x.e1, 0.3 - 5.5);
+    assert_eq!(bench.command.errors.x.e1, 0.3 - 1.5);
 }
 
 #[test]
 fn a_state_that_comes_back_leads_the_descent_to_the_ground() {
-    let mut bench = Bench::flying(State::default(), near());
+    let mut bench = Bench::airborne(State::default(), near());
     for _ in 0..300 {
         bench.tick(None, Some(near()));
     }
@@ -260,16 +286,21 @@ fn a_state_that_comes_back_leads_the_descent_to_the_ground() {
         state.position_m.z -= SINK_M_S * 1e-3;
     }
     state.velocity_m_s.z = 0.0;
-    for _ in 0..STILL_US / 1000 {
-        assert_eq!(bench.tick(Some(state), Some(near())).mode, Mode::Descending);
-    }
-    let outcome = bench.tick(Some(state), Some(near()));
-    assert_eq!((outcome.mode, outcome.motors), (Mode::Disarmed, RotorSpeeds::default()));
+    // The ground stops it. Its rotors must stop carrying it, too, and both for a second.
+    let mut uncarried_ms = 0;
+    let ended = (0..3000).find_map(|_| {
+        uncarried_ms += u64::from(bench.command.inputs.thrust_n < 0.6 * WEIGHT_N);
+        let outcome = bench.tick(Some(state), Some(near()));
+        assert!(outcome.mode == Mode::Descending || outcome.motors == RotorSpeeds::default());
+        outcome.ended
+    });
+    assert_eq!(ended, Some(End::Landed));
+    assert!((STILL_US / 1000..STILL_US / 1000 + 500).contains(&uncarried_ms), "{uncarried_ms} ms");
 }
 
 #[test]
 fn states_that_are_stale_when_they_come_are_no_states() {
-    let mut bench = Bench::flying(State::default(), near());
+    let mut bench = Bench::airborne(State::default(), near());
     let mut modes = Vec::new();
     for _ in 0..400 {
         let at_us = bench.now_us + 1000 - 30_000;
@@ -282,7 +313,7 @@ fn states_that_are_stale_when_they_come_are_no_states() {
 
 #[test]
 fn only_a_law_at_the_ticks_rate_flies() {
-    let settings = Settings { dt_s: 0.002, ..Profile::Paper.settings() };
+    let settings = Settings { dt_s: 0.002, ..Profile::Flight.settings() };
     let refused = Vehicle::new(Parameters::PAPER.to_f32(), settings, ArmingLimits::default(), controller(settings));
     assert_eq!(refused.expect_err("2 ms").range.name, "dt_s");
 }
@@ -307,8 +338,9 @@ proptest! {
                 bench.inbox.measure(Stamped { value, at_us });
             }
             match request {
-                0..16 => bench.inbox.ask(Request::Arm),
-                16..20 => bench.inbox.ask(Request::Disarm),
+                0..16 => bench.ask(Request::Arm),
+                16..20 => bench.ask(Request::Disarm),
+                20..22 => bench.ask(Request::Kill),
                 _ => {}
             }
             let outcome = bench.tick(None, Some(near()));

@@ -194,6 +194,6 @@ impl<A: Autopilot> Line<'_, A> {
     /// True if the vehicle says that it has disarmed.
     fn disarm(&mut self, place: (&Motion, &Reference)) -> Result<bool, Error> {
         let done = |heard: &Heard| heard.answer == Some(Answer::Accepted) && !heard.armed;
-        self.ask(Command::Disarm, place, DISARM_WITHIN_MS, done)
+        self.ask(Command::Kill, place, DISARM_WITHIN_MS, done)
     }
 }

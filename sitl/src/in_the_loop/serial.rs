@@ -75,7 +75,7 @@ impl Autopilot for Serial {
 impl Drop for Serial {
     fn drop(&mut self) {
         let mut station = Station::new();
-        (0..FAREWELLS).for_each(|_| station.command(Command::Disarm));
+        (0..FAREWELLS).for_each(|_| station.command(Command::Kill));
         // There is nobody left to tell if this fails; the vehicle comes down by itself once no more states come.
         let _ = self.port.write_all(&station.take());
         let _ = self.port.flush();

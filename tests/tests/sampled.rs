@@ -1,0 +1,95 @@
+//! Flights on a tracker as they are: 100 states a second, each 10 ms late, through the flight core.
+#![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
+
+use afbc::{FlightController, Profile};
+use airframe::State;
+use sitl::contender::{Build, Contender, ControllerKind, Law, Monitored};
+use sitl::scenario::{Scenario, built_in};
+use std::collections::VecDeque;
+use vehicle::{ArmingLimits, Asked, Inbox, Memory, Mode, Request, Stamped, Vehicle};
+
+/// When, in ms of power-up, the vehicle is armed and let go.
+const ARMED_MS: u64 = 1_100;
+
+/// A tracker's states: one every so many ms, each so many ms late.
+struct Tracker {
+    period_ms: u64,
+    late_ms: u64,
+    under_way: VecDeque<Stamped<State>>,
+}
+
+impl Tracker {
+    fn new(period_ms: u64, late_ms: u64) -> Self {
+        Tracker { period_ms, late_ms, under_way: VecDeque::new() }
+    }
+
+    /// What arrives at `now_ms`, if the vehicle is in this state now.
+    fn turn(&mut self, now_ms: u64, state: State) -> Option<Stamped<State>> {
+        if now_ms.is_multiple_of(self.period_ms) {
+            self.under_way.push_back(Stamped { value: state, at_us: now_ms * 1000 });
+        }
+        let arrives = |state: &Stamped<State>| state.at_us + self.late_ms * 1000 <= now_ms * 1000;
+        self.under_way.pop_front_if(|state| arrives(state))
+    }
+}
+
+/// Root mean square of the distance from the reference from 5 s on \[m\], and whether it flew to the end.
+fn fly<C: FlightController>(
+    scenario: &Scenario,
+    contender: &Contender,
+    controller: C,
+    mut tracker: Tracker,
+) -> (f64, bool) {
+    let vehicle = Vehicle::new(scenario.vehicle.to_f32(), contender.settings, ArmingLimits::NONE, controller).unwrap();
+    let (mut memory, mut inbox) = (Memory::default(), Inbox::default());
+    let mut plant = scenario.plant(0.001).unwrap();
+    let (mut squares, mut count) = (0.0, 0);
+    let mut outcome = None;
+    for now_ms in 1..ARMED_MS + (scenario.duration_s * 1e3) as u64 {
+        let reference = scenario.trajectory.at(plant.time_s());
+        if let Some(state) = tracker.turn(now_ms, plant.motion().measure()) {
+            inbox.measure(state);
+        }
+        inbox.aim(Stamped { value: reference.setpoint(), at_us: now_ms * 1000 });
+        if now_ms == ARMED_MS {
+            inbox.ask(Asked { request: Request::Arm, ticket: 0 });
+        }
+        let tick = vehicle.tick(&mut memory, now_ms * 1000, &inbox.take());
+        if now_ms >= ARMED_MS {
+            plant.step(&tick.motors, 0.001);
+        }
+        if plant.time_s() > 5.0 {
+            squares += (plant.motion().position_m - reference.position_m).norm_squared();
+            count += 1;
+        }
+        outcome = Some(tick);
+    }
+    ((squares / f64::from(count)).sqrt(), outcome.unwrap().mode == Mode::Flying)
+}
+
+fn flown(scenario: &Scenario, kind: ControllerKind, tracker: Tracker) -> (f64, bool) {
+    let contender = Contender::of(kind, Profile::Flight);
+    let (vehicle, settings) = (scenario.vehicle.to_f32(), contender.settings);
+    match &contender.law {
+        Law::Afbc(gains) => fly(scenario, &contender, Monitored(gains).controller(vehicle, settings).unwrap(), tracker),
+        Law::Guarded(gains) => {
+            fly(scenario, &contender, Monitored(gains).controller(vehicle, settings).unwrap(), tracker)
+        }
+        Law::Backstepping(gains) => fly(scenario, &contender, gains.controller(vehicle, settings).unwrap(), tracker),
+        Law::Pid(gains) => fly(scenario, &contender, gains.controller(vehicle, settings).unwrap(), tracker),
+        Law::Geometric(gains) => fly(scenario, &contender, gains.controller(vehicle, settings).unwrap(), tracker),
+        Law::Indi(gains) => fly(scenario, &contender, gains.controller(vehicle, settings).unwrap(), tracker),
+    }
+}
+
+#[test]
+fn a_tracker_of_100_hz_that_is_10_ms_late_is_flown_on() {
+    let mut scenario = built_in("hardware").unwrap().scenario().unwrap();
+    scenario.duration_s = 20.0;
+    for kind in ControllerKind::ALL {
+        for (period, late) in [(1, 0), (10, 0), (10, 5), (10, 10), (5, 10), (1, 10)] {
+            let (rms_m, flies) = flown(&scenario, kind, Tracker::new(period, late));
+            println!("{} {period} ms, {late} ms late: {rms_m:.4} m, {flies}", kind.name());
+        }
+    }
+}
