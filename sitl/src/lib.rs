@@ -13,5 +13,6 @@ pub mod paper;
 pub mod results;
 pub mod run;
 pub mod scenario;
+pub mod subject;
 pub mod trajectory;
 pub mod tune;

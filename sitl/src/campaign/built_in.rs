@@ -2,6 +2,7 @@
 
 use super::{Campaign, parse};
 use crate::scenario::FileError;
+use crate::scenario::words::nearest;
 use std::path::Path;
 
 /// A campaign file that comes with the program.
@@ -23,6 +24,11 @@ pub const BUILT_IN: [BuiltIn; 3] = [
 /// The built-in campaign called `name`.
 pub fn built_in(name: &str) -> Option<BuiltIn> {
     BUILT_IN.into_iter().find(|built_in| built_in.name == name)
+}
+
+/// The built-in campaign that somebody who wrote `name` may have meant.
+pub fn similar_built_in(name: &str) -> Option<BuiltIn> {
+    nearest(name, BUILT_IN.iter().map(|built_in| built_in.name)).and_then(built_in)
 }
 
 impl BuiltIn {

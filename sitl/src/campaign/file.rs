@@ -13,16 +13,6 @@ const FLIGHTS: Range = Range::new("flights", 1.0, 1e7);
 /// Accepted seeds: whole numbers that no tool rounds.
 const SEED: Range = Range::new("seed", 0.0, 9_007_199_254_740_991.0);
 
-/// Reads and checks the campaign file at `path`.
-///
-/// # Errors
-/// One line on the first thing that is wrong.
-pub fn load(path: &Path) -> Result<Campaign, FileError> {
-    let text = file::text(path, "campaign")?;
-    let stem = path.file_stem().map_or("".into(), |stem| stem.to_string_lossy());
-    parse(&path.display().to_string(), &text, &stem, path.parent().unwrap_or(Path::new("")))
-}
-
 /// Reads and checks a campaign from its `text`. Errors call it `file`; `name` is its name if it gives none itself;
 /// scenario files that it names are looked for from `folder`.
 ///

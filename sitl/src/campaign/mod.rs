@@ -16,10 +16,10 @@ mod row;
 pub mod statistics;
 mod summary;
 
-pub use built_in::{BUILT_IN, BuiltIn, built_in};
+pub use built_in::{BUILT_IN, BuiltIn, built_in, similar_built_in};
 pub use draw::Draw;
 pub use error::Error;
-pub use file::{load, parse};
+pub use file::parse;
 pub use fly::{fly, merge};
 pub use folder::Folder;
 pub use manifest::{Drawn, Manifest, Shard};

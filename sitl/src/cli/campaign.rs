@@ -1,12 +1,15 @@
 //! `sitl campaign`, `sitl merge` and `sitl campaigns`: many flights.
 
 use super::flying::{Flying, report};
+use super::json::Json;
 use super::log_rate::LogRate;
 use super::progress::Progress;
-use super::{Failure, INTERRUPTED, print, say};
+use super::target::Target;
+use super::{Failure, INTERRUPTED, json, print, say};
 use clap::Args;
-use sitl::campaign::{self, BUILT_IN, Campaign as Plan, Folder, Manifest, Shard, Summary, built_in};
+use sitl::campaign::{self, BUILT_IN, BuiltIn, Campaign as Plan, Folder, Manifest, Shard, Summary, built_in};
 use sitl::output;
+use sitl::subject::Kind;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -20,7 +23,7 @@ use std::sync::{Arc, OnceLock};
 #[derive(Args, Debug)]
 pub(crate) struct Campaign {
     /// Name of a built-in campaign, or path of a campaign file
-    campaign: PathBuf,
+    campaign: Target,
 
     /// Cores to fly on [default: all]; the results are the same
     #[arg(long, value_name = "N")]
@@ -45,12 +48,15 @@ pub(crate) struct Campaign {
     /// Folder for results and report [default: out/ and the campaign's name, with the shard or flight if there is one]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+
+    #[command(flatten)]
+    json: Json,
 }
 
 impl Campaign {
     /// Flies, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
-        let plan = plan(&self.campaign)?;
+        let plan = self.campaign.campaign()?;
         if let Some(flight) = self.flight {
             return self.fly_again(&plan, flight);
         }
@@ -86,7 +92,7 @@ impl Campaign {
         let summary = pool.install(|| campaign::fly(&plan, &folder, &stop, &done));
         drop(progress);
         match summary? {
-            Some(summary) => conclude(&out, &summary, &self.campaign.to_string_lossy()),
+            Some(summary) => conclude(&out, &summary, &self.campaign.to_string(), self.json),
             None => {
                 say(&format!(
                     "stopped; what was flown is in {}, and the same command goes on from there",
@@ -115,32 +121,18 @@ impl Campaign {
         }
         let out = self.out.unwrap_or_else(|| Path::new("out").join(&scenario.name));
         let flown = Flying { duration: None, log_hz: self.log_hz }.fly(vec![scenario], &out)?;
-        report(&out, &flown, &[])?;
+        report(&out, &flown, &[], self.json)?;
         Ok(ExitCode::from(u8::from(flown.iter().any(|flown| flown.run.lost.is_some()))))
     }
 }
 
-/// The campaign of this name or path. A plain name is a built-in campaign first, then a file.
-fn plan(path: &Path) -> Result<Plan, Failure> {
-    let Some(name) = path.to_str().filter(|text| !text.contains(['/', '\\', '.'])) else {
-        return Ok(campaign::load(path)?);
-    };
-    match built_in(name) {
-        Some(built_in) => Ok(built_in.campaign()?),
-        None if path.exists() => Ok(campaign::load(path)?),
-        None => Err(unknown(name)),
-    }
-}
-
-/// There is neither a built-in campaign nor a file of that name.
-fn unknown(name: &str) -> Failure {
-    let cure = "`sitl campaigns` lists the built-in ones; a file needs its path, as in ./my.toml";
-    format!("{}: no such campaign; {cure}", name.escape_debug()).into()
-}
-
 /// Writes and prints what is to be said of all flights.
-fn conclude(out: &Path, summary: &Summary, target: &str) -> Result<ExitCode, Failure> {
+fn conclude(out: &Path, summary: &Summary, target: &str, json: Json) -> Result<ExitCode, Failure> {
     output::campaign::write(out, summary)?;
+    if json.json {
+        json::print_written(|out| output::campaign::json(out, summary))?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let (table, shard) = (output::campaign::table(summary, target), summary.manifest.shard);
     let part = if shard.of > 1 { format!("part {shard} only; ") } else { String::new() };
     let (rows, page) = (out.join("results.parquet"), out.join("report.html"));
@@ -158,13 +150,16 @@ pub(crate) struct Merge {
     /// Folder for results and report
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
+
+    #[command(flatten)]
+    json: Json,
 }
 
 impl Merge {
     /// Joins, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let (_folder, summary) = campaign::merge(&self.shards, &self.out)?;
-        conclude(&self.out, &summary, &summary.manifest.target())
+        conclude(&self.out, &summary, &summary.manifest.target(), self.json)
     }
 }
 
@@ -174,25 +169,31 @@ impl Merge {
 #[derive(Args, Debug)]
 pub(crate) struct Campaigns {
     /// Built-in campaign to print
+    #[arg(conflicts_with = "json")]
     name: Option<String>,
+
+    #[command(flatten)]
+    json: Json,
 }
 
 impl Campaigns {
     /// Prints the list or the file.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         match self.name {
-            Some(name) => print(built_in(&name).ok_or_else(|| unknown(&name))?.text)?,
-            None => print(&list()?)?,
+            Some(name) => print(built_in(&name).ok_or_else(|| Kind::Campaign.unknown(&name))?.text)?,
+            None => {
+                let all = BUILT_IN.iter().map(BuiltIn::campaign).collect::<Result<Vec<_>, _>>()?;
+                match self.json.json {
+                    true => json::print_value(&all.iter().map(json::campaign).collect::<Vec<_>>())?,
+                    false => print(&all.iter().map(line).collect::<String>())?,
+                }
+            }
         }
         Ok(ExitCode::SUCCESS)
     }
 }
 
-fn list() -> Result<String, Failure> {
-    let mut list = String::new();
-    for built_in in BUILT_IN {
-        let Plan { flights, description, .. } = built_in.campaign()?;
-        list += &format!("{:<12}{flights:>6} flights  {description}\n", built_in.name);
-    }
-    Ok(list)
+fn line(plan: &Plan) -> String {
+    let Plan { name, flights, description, .. } = plan;
+    format!("{name:<12}{flights:>6} flights  {description}\n")
 }

@@ -1,9 +1,10 @@
 //! `sitl compare`: every contender in every scenario.
 
+use super::json::Json;
 use super::log_rate::LogRate;
 use super::progress::Progress;
 use super::target::Target;
-use super::{Failure, interrupt, print};
+use super::{Failure, interrupt, json, print};
 use clap::Args;
 use sitl::compare::{self, standard};
 use sitl::output;
@@ -32,6 +33,9 @@ pub(crate) struct Compare {
     /// Folder for table, figures and report
     #[arg(long, value_name = "DIR", default_value = "out/compare")]
     out: PathBuf,
+
+    #[command(flatten)]
+    json: Json,
 }
 
 impl Compare {
@@ -55,6 +59,10 @@ impl Compare {
 
         interrupt::is_too_late();
         let written = output::compare::write(&self.out, &comparisons)?;
+        if self.json.json {
+            json::print_written(|out| output::compare::json(out, &comparisons))?;
+            return Ok(ExitCode::SUCCESS);
+        }
         let (table, page) = (output::compare::table(&comparisons), self.out.join("report.html"));
         print(&format!(
             "{}\n\n{} files in {}; open {}\n",

@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::flying::{Flying, report};
+use super::json::Json;
 use super::target::Target;
 use afbc::Profile;
 use clap::Args;
@@ -26,6 +27,9 @@ pub(crate) struct Fly {
     /// Folder for logs, figures and report [default: out/ and the scenario's name]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+
+    #[command(flatten)]
+    json: Json,
 }
 
 impl Fly {
@@ -37,7 +41,7 @@ impl Fly {
         }
         let out = self.out.unwrap_or_else(|| Path::new("out").join(&scenario.name));
         let flown = self.flying.fly(vec![scenario], &out)?;
-        report(&out, &flown, &[])?;
+        report(&out, &flown, &[], self.json)?;
         Ok(ExitCode::from(u8::from(flown.iter().any(|flown| flown.run.lost.is_some()))))
     }
 }

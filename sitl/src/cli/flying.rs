@@ -1,8 +1,9 @@
 //! What `paper` and `fly` have in common: the options, the flights, the output.
 
+use super::json::Json;
 use super::log_rate::LogRate;
 use super::progress::Progress;
-use super::{Failure, interrupt, print, say};
+use super::{Failure, interrupt, json, print, say};
 use clap::Args;
 use sitl::claims::Claim;
 use sitl::output::{self, Flown};
@@ -71,9 +72,12 @@ fn progress(scenarios: &[Scenario]) -> Progress {
 }
 
 /// Writes everything into `out`, then prints the table and where to look.
-pub(crate) fn report(out: &Path, flown: &[Flown], claims: &[Claim]) -> Result<(), Failure> {
+pub(crate) fn report(out: &Path, flown: &[Flown], claims: &[Claim], json: Json) -> Result<(), Failure> {
     interrupt::is_too_late();
     let written = output::write(out, flown, claims)?;
+    if json.json {
+        return json::print_written(|out| output::json(out, flown));
+    }
     let table = output::table(flown, claims);
     let (count, page) = (written.len(), out.join("report.html"));
     print(&format!("{}\n\n{count} files in {}; open {}\n", table.trim_end(), out.display(), page.display()))

@@ -6,6 +6,7 @@ mod fly;
 mod flying;
 mod hitl;
 mod interrupt;
+mod json;
 mod log_rate;
 mod paper;
 mod pil;

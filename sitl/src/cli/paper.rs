@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::flying::{Flying, report};
+use super::json::Json;
 use clap::{Args, ValueEnum};
 use plant::Model;
 use sitl::claims::claims;
@@ -43,6 +44,9 @@ pub(crate) struct Paper {
     /// Folder for logs, figures and report
     #[arg(long, value_name = "DIR", default_value = "out/paper")]
     out: PathBuf,
+
+    #[command(flatten)]
+    json: Json,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -111,7 +115,7 @@ impl Paper {
     /// Flies, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let flown = self.flying.fly(self.scenarios()?, &self.out)?;
-        report(&self.out, &flown, &claims(&flown))?;
+        report(&self.out, &flown, &claims(&flown), self.json)?;
         Ok(ExitCode::from(u8::from(flown.iter().any(unexpectedly_lost))))
     }
 

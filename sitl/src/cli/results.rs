@@ -1,8 +1,10 @@
 //! `sitl results`: the table of `docs/results.md`.
 
+use super::json::Json;
 use super::progress::Progress;
-use super::{Failure, interrupt, print};
+use super::{Failure, interrupt, json, print};
 use clap::Args;
+use sitl::output::{self, Flown};
 use sitl::results;
 use std::fs;
 use std::path::PathBuf;
@@ -12,15 +14,25 @@ use std::process::ExitCode;
 #[derive(Args, Debug)]
 pub(crate) struct Results {
     /// Put the table into this page instead, between its two markers
-    #[arg(long, value_name = "PAGE")]
+    #[arg(long, value_name = "PAGE", conflicts_with = "json")]
     write: Option<PathBuf>,
+
+    #[command(flatten)]
+    json: Json,
 }
 
 impl Results {
     /// Flies, then prints or writes.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let Some(path) = self.write else {
-            print(&table()?)?;
+            let flown = fly()?;
+            match self.json.json {
+                true => {
+                    let flown: Vec<_> = flown.into_iter().map(|(_, flown)| flown).collect();
+                    json::print_written(|out| output::json(out, &flown))?;
+                }
+                false => print(&results::markdown(&flown))?,
+            }
             return Ok(ExitCode::SUCCESS);
         };
         let name = path.display();
@@ -29,14 +41,14 @@ impl Results {
             let [begin, end] = results::MARKERS;
             return Err(format!("{name}: no place for the table; add the lines {begin} and {end}").into());
         };
-        let page = format!("{before}{}{after}", table()?);
+        let page = format!("{before}{}{after}", results::markdown(&fly()?));
         fs::write(&path, page).map_err(|error| format!("{name}: cannot be written ({error})"))?;
         Ok(ExitCode::SUCCESS)
     }
 }
 
 /// Flies everything that is in the table.
-fn table() -> Result<String, Failure> {
+fn fly() -> Result<Vec<(String, Flown)>, Failure> {
     interrupt::ends_it()?;
     let scenarios = results::scenarios()?;
     let flights = scenarios.iter().map(|(_, scenario)| scenario.contenders.len() as u64).sum();
@@ -44,5 +56,5 @@ fn table() -> Result<String, Failure> {
     let flown = results::fly(scenarios, &|| progress.add(1))?;
     drop(progress);
     interrupt::is_too_late();
-    Ok(results::markdown(&flown))
+    Ok(flown)
 }

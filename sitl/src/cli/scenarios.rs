@@ -1,9 +1,12 @@
 //! `sitl scenarios` and `sitl check`: what can be flown.
 
-use super::target::{Target, unknown};
-use super::{Failure, print};
+use super::json::Json;
+use super::target::Target;
+use super::{Failure, json, print};
 use clap::Args;
-use sitl::scenario::{BUILT_IN, Contender, Scenario, built_in};
+use sitl::campaign::Campaign;
+use sitl::scenario::{BUILT_IN, BuiltIn, Contender, Scenario, built_in};
+use sitl::subject::{Kind, Subject};
 use std::process::ExitCode;
 
 /// List the built-in scenarios, or print one of them to start from
@@ -12,42 +15,68 @@ use std::process::ExitCode;
 #[derive(Args, Debug)]
 pub(crate) struct Scenarios {
     /// Built-in scenario to print
+    #[arg(conflicts_with = "json")]
     name: Option<String>,
+
+    #[command(flatten)]
+    json: Json,
 }
 
 impl Scenarios {
     /// Prints the list or the file.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         match self.name {
-            Some(name) => print(built_in(&name).ok_or_else(|| unknown(&name))?.text)?,
-            None => print(&list()?)?,
+            Some(name) => print(built_in(&name).ok_or_else(|| Kind::Scenario.unknown(&name))?.text)?,
+            None => {
+                let all = BUILT_IN.iter().map(BuiltIn::scenario).collect::<Result<Vec<_>, _>>()?;
+                match self.json.json {
+                    true => json::print_value(&all.iter().map(json::scenario).collect::<Vec<_>>())?,
+                    false => print(&all.iter().map(line).collect::<String>())?,
+                }
+            }
         }
         Ok(ExitCode::SUCCESS)
     }
 }
 
-fn list() -> Result<String, Failure> {
-    let mut list = String::new();
-    for built_in in BUILT_IN {
-        let Scenario { duration_s, description, .. } = built_in.scenario()?;
-        list += &format!("{:<12}{duration_s:>4} s  {description}\n", built_in.name);
-    }
-    Ok(list)
+fn line(scenario: &Scenario) -> String {
+    let Scenario { name, duration_s, description, .. } = scenario;
+    format!("{name:<12}{duration_s:>4} s  {description}\n")
 }
 
-/// Check a scenario without flying it; exits with 2 and one line on the first error
+/// Check a scenario or a campaign without flying it; exits with 2 and one line on the first error
 #[derive(Args, Debug)]
 pub(crate) struct Check {
-    /// Name of a built-in scenario, or path of a scenario file
+    /// Name of a built-in scenario or campaign, or path of a file
     scenario: Target,
+
+    #[command(flatten)]
+    json: Json,
 }
 
 impl Check {
     /// Prints what would be flown.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
-        let Scenario { name, duration_s, model, contenders, .. } = self.scenario.scenario()?;
-        let laws: Vec<_> = contenders.iter().map(Contender::title).collect();
-        print(&format!("{name}: ok, {duration_s} s, {} plant, {}\n", model.name(), laws.join(", ")))?;
+        match (self.scenario.either()?, self.json.json) {
+            (Subject::Scenario(scenario), true) => json::print_value(&json::scenario(&scenario))?,
+            (Subject::Campaign(campaign), true) => json::print_value(&json::campaign(&campaign))?,
+            (Subject::Scenario(scenario), false) => {
+                let Scenario { name, duration_s, model, contenders, .. } = scenario;
+                print(&format!("{name}: ok, {duration_s} s, {} plant, {}\n", model.name(), titles(&contenders)))?;
+            }
+            (Subject::Campaign(campaign), false) => {
+                let Campaign { name, flights, scenario: Scenario { duration_s, model, contenders, .. }, .. } = campaign;
+                let (plant, titles, file) = (model.name(), titles(&contenders), self.scenario);
+                print(&format!(
+                    "{name}: ok, {flights} flights of {duration_s} s, {plant} plant, {titles}; this is a campaign: \
+                     sitl campaign {file}\n"
+                ))?;
+            }
+        }
         Ok(ExitCode::SUCCESS)
     }
+}
+
+fn titles(contenders: &[Contender]) -> String {
+    contenders.iter().map(Contender::title).collect::<Vec<_>>().join(", ")
 }

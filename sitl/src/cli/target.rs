@@ -1,11 +1,14 @@
-//! A scenario as it is named on the command line.
+//! A scenario or a campaign as it is named on the command line.
 
 use super::Failure;
-use sitl::scenario::{Scenario, built_in, load, similar_built_in};
+use sitl::campaign::Campaign;
+use sitl::scenario::Scenario;
+use sitl::subject::{self, Subject};
 use std::ffi::OsString;
+use std::fmt;
 use std::path::PathBuf;
 
-/// The name of a built-in scenario, or the path of a file.
+/// The name of a built-in one, or the path of a file.
 #[derive(Clone, Debug)]
 pub(crate) struct Target(PathBuf);
 
@@ -15,26 +18,25 @@ impl<P: Into<OsString>> From<P> for Target {
     }
 }
 
-impl Target {
-    /// The scenario, checked. A plain name is a built-in scenario first, then a file.
-    pub(crate) fn scenario(&self) -> Result<Scenario, Failure> {
-        let Target(path) = self;
-        let Some(name) = path.to_str().filter(|text| !text.contains(['/', '\\', '.'])) else {
-            return Ok(load(path)?);
-        };
-        match built_in(name) {
-            Some(built_in) => Ok(built_in.scenario()?),
-            None if path.exists() => Ok(load(path)?),
-            None => Err(unknown(name)),
-        }
+impl fmt::Display for Target {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.display().fmt(f)
     }
 }
 
-/// There is neither a built-in scenario nor a file of that name.
-pub(crate) fn unknown(name: &str) -> Failure {
-    let cure = match similar_built_in(name) {
-        Some(known) => format!("did you mean {}?", known.name),
-        None => "`sitl scenarios` lists the built-in ones; a file needs its path, as in ./my.toml".into(),
-    };
-    format!("{}: no such scenario; {cure}", name.escape_debug()).into()
+impl Target {
+    /// The scenario, checked.
+    pub(crate) fn scenario(&self) -> Result<Scenario, Failure> {
+        Ok(subject::scenario(&self.0)?)
+    }
+
+    /// The campaign, checked.
+    pub(crate) fn campaign(&self) -> Result<Campaign, Failure> {
+        Ok(subject::campaign(&self.0)?)
+    }
+
+    /// Whichever of the two it is, checked.
+    pub(crate) fn either(&self) -> Result<Subject, Failure> {
+        Ok(subject::either(&self.0)?)
+    }
 }

@@ -1,8 +1,9 @@
 //! `sitl tune`: gains for one contender.
 
+use super::json::Json;
 use super::progress::Progress;
 use super::target::Target;
-use super::{Failure, print};
+use super::{Failure, json, print};
 use clap::Args;
 use sitl::scenario::{Contender, ControllerKind, Scenario};
 use sitl::tune::{self, Found};
@@ -36,6 +37,9 @@ pub(crate) struct Tune {
     /// Put what is found into this file instead
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+
+    #[command(flatten)]
+    json: Json,
 }
 
 impl Tune {
@@ -61,14 +65,20 @@ impl Tune {
         })?;
         drop(progress);
 
-        let text = tune::report(&start, &found, &training, self.seed)?;
-        let Some(out) = self.out else {
-            print(&text)?;
-            return Ok(ExitCode::SUCCESS);
-        };
-        std::fs::write(&out, text).map_err(|error| format!("{}: cannot be written ({error})", out.display()))?;
-        let Found { before, after, evaluations, .. } = found;
-        print(&format!("cost {before:.4} before, {after:.4} after {evaluations} tries; gains in {}\n", out.display()))?;
+        let report = || tune::report(&start, &found, &training, self.seed);
+        if let Some(out) = &self.out {
+            std::fs::write(out, report()?)
+                .map_err(|error| format!("{}: cannot be written ({error})", out.display()))?;
+        }
+        let Found { before, after, evaluations, .. } = &found;
+        match &self.out {
+            _ if self.json.json => json::print_value(&json::tuned(&found, &start.name, self.seed))?,
+            Some(out) => print(&format!(
+                "cost {before:.4} before, {after:.4} after {evaluations} tries; gains in {}\n",
+                out.display()
+            ))?,
+            None => print(&report()?)?,
+        }
         Ok(ExitCode::SUCCESS)
     }
 }

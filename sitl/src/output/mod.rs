@@ -20,6 +20,7 @@ mod tests;
 
 pub use error::Error;
 pub(crate) use files::Folder;
+pub use summary::write as json;
 pub use table::table;
 
 use crate::claims::Claim;

@@ -77,7 +77,10 @@ fn summary(Flown { scenario, run }: &Flown) -> Summary<'_> {
 }
 
 /// Writes an array with one object for each run.
-pub(super) fn write(out: &mut dyn Write, flown: &[Flown]) -> io::Result<()> {
+///
+/// # Errors
+/// If `out` does not take it.
+pub fn write(out: &mut dyn Write, flown: &[Flown]) -> io::Result<()> {
     let summaries: Vec<_> = flown.iter().map(summary).collect();
     serde_json::to_writer_pretty(&mut *out, &summaries)?;
     writeln!(out)

@@ -4,6 +4,7 @@ mod page;
 mod summary;
 mod table;
 
+pub use summary::write as json;
 pub use table::table;
 
 use super::{Error, Folder, figures};

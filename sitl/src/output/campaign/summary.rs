@@ -82,7 +82,11 @@ fn contender<'a>(manifest: &'a Manifest, tally: &'a Tally) -> Contender<'a> {
     }
 }
 
-pub(super) fn write(out: &mut dyn Write, summary: &Summary) -> io::Result<()> {
+/// Writes one object.
+///
+/// # Errors
+/// If `out` does not take it.
+pub fn write(out: &mut dyn Write, summary: &Summary) -> io::Result<()> {
     let contender = |tally| contender(&summary.manifest, tally);
     let page = Page { campaign: &summary.manifest, contenders: summary.tallies.iter().map(contender).collect() };
     serde_json::to_writer_pretty(&mut *out, &page)?;

@@ -43,8 +43,11 @@ struct Contender<'a> {
     ratio: Option<f64>,
 }
 
-/// Mean and spread over the seeds.
-pub(super) fn json(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
+/// Writes an array with one object for each scenario: mean and spread over the seeds.
+///
+/// # Errors
+/// If `out` does not take it.
+pub fn json(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
     let compared = comparisons.iter().map(|comparison| Compared {
         scenario: &comparison.scenario.name,
         contenders: comparison.entries.iter().map(|entry| contender(comparison, entry)).collect(),

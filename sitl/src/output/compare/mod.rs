@@ -4,6 +4,7 @@ mod files;
 mod page;
 mod table;
 
+pub use files::json;
 pub use table::table;
 
 use super::figures::{self, Figure};

@@ -1,0 +1,146 @@
+//! `--json`: the same for machines, on stdout. docs/json.md lists every key.
+
+use super::{Failure, print};
+use afbc::Profile;
+use clap::Args;
+use serde::Serialize;
+use sitl::campaign::Campaign;
+use sitl::scenario::{Contender, Scenario};
+use sitl::tune::{Change, Found, fragment};
+use std::io;
+
+/// Of every command that has something to say to machines.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct Json {
+    /// Print JSON instead, as docs/json.md describes it
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Prints what `write` writes.
+pub(crate) fn print_written(write: impl FnOnce(&mut Vec<u8>) -> io::Result<()>) -> Result<(), Failure> {
+    let mut text = Vec::new();
+    write(&mut text)?;
+    print(&String::from_utf8(text)?)
+}
+
+/// Prints one value.
+pub(crate) fn print_value(value: &impl Serialize) -> Result<(), Failure> {
+    print(&(serde_json::to_string_pretty(value)? + "\n"))
+}
+
+/// Who flies.
+#[derive(Serialize)]
+struct Who<'a> {
+    name: &'a str,
+    controller: &'static str,
+    profile: Option<&'static str>,
+}
+
+fn who<'a>(contenders: &'a [Contender]) -> Vec<Who<'a>> {
+    let who = |contender: &'a Contender| {
+        let (controller, profile) = (contender.kind().name(), contender.profile().map(Profile::name));
+        Who { name: &contender.name, controller, profile }
+    };
+    contenders.iter().map(who).collect()
+}
+
+/// What can be flown once.
+#[derive(Serialize)]
+struct ScenarioWords<'a> {
+    kind: &'static str,
+    name: &'a str,
+    description: &'a str,
+    duration_s: f64,
+    plant: &'static str,
+    seed: u64,
+    contenders: Vec<Who<'a>>,
+}
+
+/// A scenario in a few words.
+pub(crate) fn scenario(scenario: &Scenario) -> impl Serialize + '_ {
+    let Scenario { name, description, duration_s, model, seed, contenders, .. } = scenario;
+    ScenarioWords {
+        kind: "scenario",
+        name,
+        description,
+        duration_s: *duration_s,
+        plant: model.name(),
+        seed: *seed,
+        contenders: who(contenders),
+    }
+}
+
+/// What can be flown many times.
+#[derive(Serialize)]
+struct CampaignWords<'a> {
+    kind: &'static str,
+    name: &'a str,
+    description: &'a str,
+    flights: u64,
+    seed: u64,
+    duration_s: f64,
+    plant: &'static str,
+    contenders: Vec<Who<'a>>,
+    trajectories: Vec<&'a str>,
+    drawn: Vec<Drawn>,
+}
+
+#[derive(Serialize)]
+struct Drawn {
+    name: &'static str,
+    ends: [f64; 2],
+}
+
+/// A campaign in a few words.
+pub(crate) fn campaign(campaign: &Campaign) -> impl Serialize + '_ {
+    let Campaign { name, description, flights, seed, scenario, courses, spreads, .. } = campaign;
+    let drawn =
+        spreads.iter().filter_map(|spread| Some(Drawn { name: spread.quantity()?.range.name, ends: spread.ends }));
+    CampaignWords {
+        kind: "campaign",
+        name,
+        description,
+        flights: *flights,
+        seed: *seed,
+        duration_s: scenario.duration_s,
+        plant: scenario.model.name(),
+        contenders: who(&scenario.contenders),
+        trajectories: courses.iter().map(|course| course.name.as_str()).collect(),
+        drawn: drawn.collect(),
+    }
+}
+
+/// What a search has found.
+#[derive(Serialize)]
+struct Tuned {
+    controller: &'static str,
+    seed: u64,
+    tries: usize,
+    cost_before: f64,
+    cost_after: f64,
+    gains: Vec<Gain>,
+    contender_toml: String,
+}
+
+#[derive(Serialize)]
+struct Gain {
+    name: String,
+    before: f32,
+    after: f32,
+}
+
+/// What a search with this seed has found, for the contender called `name`.
+pub(crate) fn tuned(found: &Found, name: &str, seed: u64) -> impl Serialize {
+    let Found { contender, before, after, evaluations, changes } = found;
+    let gain = |Change { name, from, to }: &Change| Gain { name: name.clone(), before: *from, after: *to };
+    Tuned {
+        controller: contender.kind().name(),
+        seed,
+        tries: *evaluations,
+        cost_before: *before,
+        cost_after: *after,
+        gains: changes.iter().map(gain).collect(),
+        contender_toml: fragment(&Contender { name: format!("{name}-tuned"), ..contender.clone() }),
+    }
+}

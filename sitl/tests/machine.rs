@@ -1,0 +1,203 @@
+//! What a program reads of `sitl`: JSON on stdout with the keys that docs/json.md lists, nothing else there; and what kind of
+//! file a file is.
+
+#![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
+
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// An empty folder of its own for each test.
+fn folder(test: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("machine").join(test);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).unwrap();
+    }
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn sitl(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sitl")).current_dir(folder).args(arguments).output().unwrap()
+}
+
+/// What is printed if all goes well.
+fn succeeds(folder: &Path, arguments: &[&str]) -> String {
+    let output = sitl(folder, arguments);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {said}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The one line that says why nothing was done.
+fn refused(folder: &Path, arguments: &[&str]) -> String {
+    let output = sitl(folder, arguments);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+    assert!(output.stdout.is_empty(), "{arguments:?}");
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(said.lines().count(), 1, "{said}");
+    said
+}
+
+const PAGE: &str = include_str!("../../docs/json.md");
+
+/// The keys in the tables of one section of the page.
+fn documented(section: &str) -> BTreeSet<String> {
+    let after = PAGE.split(&format!("\n## {section}\n")).nth(1).unwrap_or_else(|| panic!("no section {section}"));
+    let rows = after.split("\n## ").next().unwrap().lines().filter(|line| line.starts_with("| `"));
+    let cells = rows.map(|row| row.trim_start_matches("| ").split(" | ").next().unwrap());
+    cells.flat_map(|cell| cell.split(", ")).map(|key| key.trim_matches('`').to_owned()).collect()
+}
+
+/// Adds the path of every value that is neither an object nor an array.
+fn keys(path: &str, value: &Value, found: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(object) => {
+            for (key, value) in object {
+                // Its keys are names.
+                let key = if path.ends_with("by_trajectory") { "*" } else { key };
+                let dot = if path.is_empty() { "" } else { "." };
+                keys(&format!("{path}{dot}{key}"), value, found);
+            }
+        }
+        Value::Array(array) => array.iter().for_each(|value| keys(&format!("{path}[]"), value, found)),
+        _ => drop(found.insert(path.to_owned())),
+    }
+}
+
+/// Every command of a section of the page prints what the section says; returns what the first printed.
+fn prints(folder: &Path, section: &str, commands: &[&[&str]]) -> Value {
+    let mut first = None;
+    for command in commands {
+        let text = succeeds(folder, &[*command, &["--json"]].concat());
+        let value: Value = serde_json::from_str(&text).unwrap();
+        let mut found = BTreeSet::new();
+        keys("", &value, &mut found);
+        let found: BTreeSet<_> = found.into_iter().map(|key| key.trim_start_matches("[].").to_owned()).collect();
+        assert_eq!(found, documented(section), "{command:?}");
+        first.get_or_insert(value);
+    }
+    first.unwrap()
+}
+
+const SMALL: &str = r#"
+name = "small"
+flights = 20
+duration_s = 6.0
+scenario = "hover"
+
+[spread]
+thrust_factor_ratio = [0.6, 1.2]
+"#;
+
+fn small(test: &str) -> PathBuf {
+    let folder = folder(test);
+    fs::write(folder.join("small.toml"), SMALL).unwrap();
+    let scenario = "description = \"d\"\nduration_s = 6\n[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
+    fs::write(folder.join("flight.toml"), scenario).unwrap();
+    folder
+}
+
+#[test]
+fn lists_and_checks() {
+    let folder = small("lists");
+    let scenarios = prints(&folder, "Scenarios", &[&["scenarios"], &["check", "storm"], &["check", "flight.toml"]]);
+    let names: Vec<_> = scenarios.as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap()).collect();
+    assert!(names.contains(&"hardware"), "{names:?}");
+    let campaigns = prints(&folder, "Campaigns", &[&["campaigns"], &["check", "robustness"], &["check", "small.toml"]]);
+    assert_eq!(campaigns[0]["name"], "robustness");
+    assert_eq!(campaigns[0]["flights"], 10_000);
+    let small: Value = serde_json::from_str(&succeeds(&folder, &["check", "small.toml", "--json"])).unwrap();
+    assert_eq!(small["drawn"], serde_json::json!([{ "name": "thrust_factor_ratio", "ends": [0.6, 1.2] }]));
+    assert_eq!(small["kind"], "campaign");
+}
+
+#[test]
+fn flights() {
+    let folder = small("flights");
+    // Long enough for there to be figures.
+    let flown = prints(
+        &folder,
+        "Flights",
+        &[
+            &["fly", "flight.toml"],
+            &["paper", "--duration", "7"],
+            &["campaign", "small.toml", "--flight", "1", "--out", "again"],
+            &["results"],
+        ],
+    );
+    let file: Value = serde_json::from_slice(&fs::read(folder.join("out/flight/summary.json")).unwrap()).unwrap();
+    assert_eq!(flown, file);
+    // The same without a command.
+    let paper = succeeds(&folder, &["--duration", "7", "--json"]);
+    assert_eq!(serde_json::from_str::<Value>(&paper).unwrap()[0]["scenario"], "paper");
+}
+
+#[test]
+fn comparisons_and_gains() {
+    let folder = small("comparisons");
+    let compared = prints(&folder, "Comparisons", &[&["compare", "flight.toml", "--seeds", "2"]]);
+    let file = fs::read(folder.join("out/compare/comparison.json")).unwrap();
+    assert_eq!(compared, serde_json::from_slice::<Value>(&file).unwrap());
+    let tune = ["tune", "pid", "--scenario", "flight.toml", "--budget", "5"];
+    let found = prints(&folder, "Gains found", &[&tune, &[&tune[..], &["--out", "pid.toml"]].concat()]);
+    assert_eq!(found["tries"], 5);
+    let toml = found["contender_toml"].as_str().unwrap();
+    assert!(fs::read_to_string(folder.join("pid.toml")).unwrap().ends_with(toml));
+}
+
+#[test]
+fn campaigns() {
+    let folder = small("campaigns");
+    for part in ["1/2", "2/2"] {
+        succeeds(&folder, &["campaign", "small.toml", "--shard", part]);
+    }
+    let merge = ["merge", "out/small-1-of-2", "out/small-2-of-2", "--out", "merged"];
+    let flown = prints(&folder, "Campaigns flown", &[&["campaign", "small.toml"], &merge]);
+    assert_eq!(flown["contenders"][0]["flights"], 20);
+    let file: Value = serde_json::from_slice(&fs::read(folder.join("merged/summary.json")).unwrap()).unwrap();
+    assert_eq!(flown, file);
+}
+
+#[test]
+fn errors_are_one_line_on_stderr_all_the_same() {
+    let folder = small("errors");
+    fs::write(folder.join("bad.toml"), SMALL.replace("flights = 20", "flights = 0")).unwrap();
+    assert!(refused(&folder, &["check", "bad.toml", "--json"]).starts_with("bad.toml:3: flights: 0 is out of range"));
+    assert!(
+        refused(&folder, &["campaign", "bad.toml", "--json"]).starts_with("bad.toml:3: flights: 0 is out of range")
+    );
+    refused(&folder, &["fly", "nothing", "--json"]);
+    refused(&folder, &["compare", "nothing", "--json"]);
+    refused(&folder, &["tune", "nothing", "--json"]);
+    refused(&folder, &["merge", "nothing", "--out", "merged", "--json"]);
+}
+
+#[test]
+fn a_campaign_is_told_from_a_scenario() {
+    let folder = small("kinds");
+    // A file without an ending, and one whose values are wrong, are of a kind all the same.
+    fs::write(folder.join("plain"), SMALL).unwrap();
+    fs::write(folder.join("bad.toml"), SMALL.replace("[0.6, 1.2]", "[6.0, 120]")).unwrap();
+    fs::write(folder.join("bad-flight.toml"), "plant = 1\n[trajectory]\nkind = \"paper\"\n").unwrap();
+    for file in ["small.toml", "./small.toml", "plain", "robustness"] {
+        let said = succeeds(&folder, &["check", file]);
+        assert!(said.contains(": ok, ") && said.contains(" flights of "), "{said}");
+        assert!(said.ends_with(&format!("; this is a campaign: sitl campaign {file}\n")), "{said}");
+    }
+    for file in ["small.toml", "plain", "robustness", "bad.toml"] {
+        for command in [&["fly"][..], &["compare"], &["pil"], &["tune", "pid", "--scenario"]] {
+            let said = refused(&folder, &[command, &[file]].concat());
+            assert_eq!(said, format!("{file}: this is a campaign: sitl campaign {file}\n"));
+        }
+    }
+    for file in ["hardware", "flight.toml", "bad-flight.toml"] {
+        let said = refused(&folder, &["campaign", file]);
+        assert!(said.starts_with(&format!("{file}: this is a scenario: sitl fly {file}; ")), "{said}");
+    }
+    assert_eq!(refused(&folder, &["campaign", "robustnes"]), "robustnes: no such campaign; did you mean robustness?\n");
+    assert!(refused(&folder, &["check", "bad.toml"]).starts_with("bad.toml:8: spread.thrust_factor_ratio: 120 is out"));
+    assert!(!folder.join("out").exists());
+}
