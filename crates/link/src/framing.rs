@@ -1,10 +1,11 @@
 //! The layout of a MAVLink 2 frame, and writing one.
 //!
 //! ```text
-//! 0xFD  length  incompatible  compatible  sequence  system  component  id (3)  payload (length)  checksum (2)
+//! 0xFD  length  incompatible  compatible  sequence  system  component  id (3)  payload (length)  checksum (2)  [signature (13)]
 //! ```
 //!
-//! <https://mavlink.io/en/guide/serialization.html>. Frames with incompatibility flags (signed ones) are not understood.
+//! <https://mavlink.io/en/guide/serialization.html>. Frames with incompatibility flags are not understood; the one that
+//! says that a signature follows is, as far as a frame's length goes.
 
 use crate::message::Message;
 
@@ -14,10 +15,16 @@ pub(crate) const START: u8 = 0xFD;
 pub(crate) const HEADER: usize = 10;
 /// Bytes after the payload.
 pub(crate) const CHECKSUM: usize = 2;
+/// Bytes behind the checksum of a frame with the flag [`SIGNED`].
+const SIGNATURE: usize = 13;
+/// Incompatibility flag: a signature follows the checksum.
+const SIGNED: u8 = 1;
 /// Longest payload.
 pub(crate) const PAYLOAD_MAX: usize = 255;
-/// Longest frame \[bytes\].
+/// Longest frame without a signature \[bytes\].
 pub const FRAME_MAX: usize = HEADER + PAYLOAD_MAX + CHECKSUM;
+/// Longest frame with a signature \[bytes\].
+pub(crate) const SIGNED_MAX: usize = FRAME_MAX + SIGNATURE;
 
 /// Who sends, or is meant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -51,6 +58,12 @@ impl Header {
         let [_, length, incompatible, _, sequence, system, component, id0, id1, id2] = *bytes;
         let id = u32::from_le_bytes([id0, id1, id2, 0]);
         Header { length, incompatible, sequence, from: Address { system, component }, id }
+    }
+
+    /// Bytes from the first to the last of the frame.
+    pub(crate) fn frame_length(&self) -> usize {
+        let signature = if self.incompatible & SIGNED != 0 { SIGNATURE } else { 0 };
+        HEADER + usize::from(self.length) + CHECKSUM + signature
     }
 
     fn write(&self) -> [u8; HEADER] {

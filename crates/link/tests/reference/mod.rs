@@ -1,0 +1,105 @@
+//! Which frames a stream holds, by MAVLink's specification (<https://mavlink.io/en/guide/serialization.html>) and the
+//! rules that `link::Decoder` states: written from these alone, over the whole stream at once, to judge the decoder by.
+#![allow(clippy::indexing_slicing, unreachable_pub, reason = "shared by tests")]
+
+/// A frame whose checksum is right.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// Incompatibility flags.
+    pub flags: u8,
+    pub sequence: u8,
+    pub system: u8,
+    pub component: u8,
+    pub id: u32,
+    pub payload: Vec<u8>,
+}
+
+/// CRC-16/MCRF4XX, bit by bit.
+pub fn crc(bytes: impl IntoIterator<Item = u8>) -> u16 {
+    bytes.into_iter().fold(0xFFFF, |crc, byte| {
+        (0..8).fold(crc ^ u16::from(byte), |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0x8408 } else { crc >> 1 })
+    })
+}
+
+impl Frame {
+    /// Its bytes; the signature, if there is one, signs nothing.
+    pub fn bytes(&self, seed: u8) -> Vec<u8> {
+        let Frame { flags, sequence, system, component, id, payload } = self;
+        let mut bytes = vec![0xFD, payload.len() as u8, *flags, 0, *sequence, *system, *component];
+        bytes.extend_from_slice(&id.to_le_bytes()[..3]);
+        bytes.extend_from_slice(payload);
+        let sum = crc(bytes[1..].iter().copied().chain([seed]));
+        bytes.extend_from_slice(&sum.to_le_bytes());
+        bytes.extend_from_slice(&[0xA5; 13][..if flags & 1 == 1 { 13 } else { 0 }]);
+        bytes
+    }
+
+    /// Where the frame that begins at `at` ends, if its header is all there.
+    fn end(stream: &[u8], at: usize) -> Option<usize> {
+        let header = stream.get(at..at + 10)?;
+        Some(at + 10 + usize::from(header[1]) + 2 + if header[2] & 1 == 1 { 13 } else { 0 })
+    }
+
+    /// The frame from `at`, if it is all there and its checksum is right.
+    fn read(stream: &[u8], at: usize, seed: &impl Fn(u32) -> Option<u8>) -> Option<Self> {
+        let frame = stream.get(at..Self::end(stream, at)?)?;
+        let id = u32::from_le_bytes([frame[7], frame[8], frame[9], 0]);
+        let payload = &frame[10..10 + usize::from(frame[1])];
+        let sum = crc(frame[1..10 + payload.len()].iter().copied().chain([seed(id)?]));
+        let right = frame[10 + payload.len()..][..2] == sum.to_le_bytes();
+        let payload = payload.to_vec();
+        right.then(|| Frame { flags: frame[2], sequence: frame[4], system: frame[5], component: frame[6], id, payload })
+    }
+}
+
+/// All frames of `stream` with the right checksum that do not lie within another frame. `seed` is a message's
+/// `CRC_EXTRA`, if it is known.
+pub fn frames(stream: &[u8], seed: impl Fn(u32) -> Option<u8>) -> Vec<Frame> {
+    // Here; where the last frame that could not be checked ends; how much of the stream it took to get here.
+    let (mut at, mut sealed, mut known) = (0, 0, 0);
+    let mut frames = Vec::new();
+    while at < stream.len() {
+        known = known.max(at + 1);
+        if stream[at] != 0xFD {
+            at += 1;
+            continue;
+        }
+        let Some(end) = Frame::end(stream, at) else {
+            // The header is cut off by the end of the stream; what is behind it is shorter than a frame.
+            break;
+        };
+        known = known.max(at + 10);
+        if end <= sealed {
+            at += 1;
+            continue;
+        }
+        // Of two that may be there, this one and the one behind what is sealed, the one that is intact first.
+        if at < sealed
+            && let Some(other) = Frame::end(stream, sealed)
+            && (known..end).contains(&other)
+            && let Some(frame) = Frame::read(stream, sealed, &seed)
+        {
+            frames.push(frame);
+            (at, known) = (other, other);
+            continue;
+        }
+        if end > stream.len() {
+            break;
+        }
+        known = known.max(end);
+        if let Some(frame) = Frame::read(stream, at, &seed) {
+            frames.push(frame);
+            at = end;
+        } else if at < sealed {
+            at += 1;
+        } else {
+            let Some(&next) = stream.get(end) else { break };
+            known = known.max(end + 1);
+            if next == 0xFD {
+                sealed = end;
+            }
+            at += 1;
+        }
+    }
+    frames
+}
