@@ -1,9 +1,11 @@
-//! The same flight twice gives the same bits in every number of every sample.
+//! The same flight twice gives the same bits in every number of every sample; the same test twice draws the same cases.
 #![allow(clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
 
 use afbc::Profile;
 use airframe::Axis;
 use plant::Model;
+use proptest::prelude::{ProptestConfig, Rng as _};
+use proptest::test_runner::{RngSeed, TestRunner};
 use sitl::flight::{Sample, fly};
 use sitl::paper::{Case, scenario};
 use sitl::scenario::{Contender, ControllerKind, Scenario};
@@ -74,4 +76,13 @@ fn two_flights_are_the_same_to_the_bit() {
             assert_ne!(digest(&scenario, contender).0, first.0, "the digest is blind");
         }
     }
+}
+
+/// `.cargo/config.toml` seeds every property test of the workspace, unless `scripts/soak` does.
+#[test]
+fn property_tests_draw_the_same_cases_every_time() {
+    let config = ProptestConfig::with_cases(1);
+    assert!(matches!(config.rng_seed, RngSeed::Fixed(_)), "run it by cargo, from within the workspace");
+    let draw = || TestRunner::new(config.clone()).rng().next_u64();
+    assert_eq!(draw(), draw());
 }
