@@ -133,7 +133,9 @@ impl Comparison {
     pub fn ratio(&self, entry: &Entry) -> Option<f64> {
         let distance = |entry: &Entry| entry.spread(|metrics| metrics.rmse.xyz().norm()).map(|spread| spread.mean);
         let classical = |entry: &&Entry| entry.contender().kind() == ControllerKind::Backstepping;
-        Some(distance(entry)? / distance(self.entries.iter().find(classical)?)?)
+        let ratio = distance(entry)? / distance(self.entries.iter().find(classical)?)?;
+        // Of flights that were over before errors count, there is none.
+        Some(ratio).filter(|ratio| ratio.is_finite())
     }
 
     /// Whether `entry` has the smallest mean of a figure, of those that kept the vehicle.

@@ -49,13 +49,13 @@ fn small() -> Campaign {
 
 /// Flies all that `folder` lacks on `threads` cores.
 fn fly(campaign: &Campaign, path: &Path, shard: Shard, threads: usize) {
-    let folder = Folder::open(path, Manifest::new(campaign, shard)).unwrap();
+    let folder = Folder::open(path, Manifest::new(campaign, shard), false).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let flown = pool.install(|| campaign::fly(campaign, &folder, &AtomicBool::new(false), &|_| ())).unwrap();
     assert!(flown.is_some());
 }
 
-fn results(path: &Path) -> Vec<u8> {
+fn results_of(path: &Path) -> Vec<u8> {
     fs::read(path.join("results.parquet")).unwrap()
 }
 
@@ -63,7 +63,7 @@ fn results(path: &Path) -> Vec<u8> {
 fn reference(campaign: &Campaign, folder: &Path) -> Vec<u8> {
     let path = folder.join("reference");
     fly(campaign, &path, Shard::WHOLE, 1);
-    results(&path)
+    results_of(&path)
 }
 
 #[test]
@@ -71,11 +71,11 @@ fn results_do_not_depend_on_the_number_of_threads() {
     let (folder, campaign) = (folder("threads"), small());
     let reference = reference(&campaign, &folder);
     fly(&campaign, &folder.join("many"), Shard::WHOLE, 5);
-    assert_eq!(reference, results(&folder.join("many")));
+    assert_eq!(reference, results_of(&folder.join("many")));
     // And they are the campaign's own.
     let other = parse(&SMALL.replace("seed = 7", "seed = 8"));
     fly(&other, &folder.join("other"), Shard::WHOLE, 5);
-    assert_ne!(reference, results(&folder.join("other")));
+    assert_ne!(reference, results_of(&folder.join("other")));
 }
 
 #[test]
@@ -87,7 +87,7 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
     // Stopped after 100 of 150 flights, by one thread: six chunks of 16 are there, the seventh was begun.
     {
         let (stop, done) = (AtomicBool::new(false), AtomicU64::new(0));
-        let place = Folder::open(&path, Manifest::new(&campaign, Shard::WHOLE)).unwrap();
+        let place = Folder::open(&path, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let progress = |flights| {
             if done.fetch_add(flights, Ordering::Relaxed) + flights >= 100 {
@@ -109,12 +109,12 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
     let other = folder.join("other");
     fly(&parse(&SMALL.replace("seed = 7", "seed = 8").replace("= 150", "= 32")), &other, Shard::WHOLE, 1);
     fs::copy(other.join("results.parquet"), files[1].0).unwrap();
-    let unfinished = path.join("chunks").join(".000004.parquet.1.tmp");
+    let unfinished = path.join("chunks").join(".sitl.000004.parquet.1.tmp");
     fs::write(&unfinished, b"PAR1").unwrap();
 
     let resumed = AtomicU64::new(u64::MAX);
     {
-        let place = Folder::open(&path, Manifest::new(&campaign, Shard::WHOLE)).unwrap();
+        let place = Folder::open(&path, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
         assert!(!unfinished.exists());
         let first = |flights| {
             let _ = resumed.compare_exchange(u64::MAX, flights, Ordering::Relaxed, Ordering::Relaxed);
@@ -122,10 +122,10 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
         campaign::fly(&campaign, &place, &AtomicBool::new(false), &first).unwrap().unwrap();
     }
     assert_eq!(resumed.into_inner(), 64, "the four whole chunks are not flown again");
-    assert_eq!(reference, results(&path));
+    assert_eq!(reference, results_of(&path));
     // Once more: nothing is left to fly.
     fly(&campaign, &path, Shard::WHOLE, 1);
-    assert_eq!(reference, results(&path));
+    assert_eq!(reference, results_of(&path));
 }
 
 #[test]
@@ -140,13 +140,13 @@ fn shards_come_together_to_what_one_machine_gives() {
     let parts: Vec<_> = (1..=4).map(|index| part(index, 4)).collect();
     // In whatever order they are named.
     let order: Vec<_> = [2, 0, 3, 1].into_iter().map(|i: usize| parts[i].clone()).collect();
-    let (_, summary) = campaign::merge(&order, &folder.join("merged")).unwrap();
-    assert_eq!(reference, results(&folder.join("merged")));
+    let (_, summary) = campaign::merge(&order, &folder.join("merged"), false).unwrap();
+    assert_eq!(reference, results_of(&folder.join("merged")));
     assert_eq!(summary.tallies[0].count.flights, 150);
 
     let refused = |shards: &[PathBuf]| {
         let out = folder.join("refused");
-        let error = campaign::merge(shards, &out).map(|_| ()).unwrap_err().to_string();
+        let error = campaign::merge(shards, &out, false).map(|_| ()).unwrap_err().to_string();
         assert!(!out.exists(), "{error}");
         assert!(!error.contains('\n'), "{error}");
         error
@@ -172,10 +172,10 @@ fn shards_come_together_to_what_one_machine_gives() {
 fn a_folder_belongs_to_one_campaign_and_one_program() {
     let (folder, campaign) = (folder("changed"), small());
     let refused = |campaign: &Campaign, shard| {
-        Folder::open(&folder, Manifest::new(campaign, shard)).map(|_| ()).unwrap_err().to_string()
+        Folder::open(&folder, Manifest::new(campaign, shard), false).map(|_| ()).unwrap_err().to_string()
     };
     {
-        let _held = Folder::open(&folder, Manifest::new(&campaign, Shard::WHOLE)).unwrap();
+        let _held = Folder::open(&folder, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
         assert!(refused(&campaign, Shard::WHOLE).contains("is being flown into it"));
     }
     for (from, to) in [("seed = 7", "seed = 8"), ("\"circle\"", "\"step\""), ("0.02", "0.03"), ("= 150", "= 151")] {
@@ -185,8 +185,8 @@ fn a_folder_belongs_to_one_campaign_and_one_program() {
     assert!(refused(&campaign, Shard { index: 1, of: 2 }).contains("not this one"));
     // Words for people, and where the file is, do not matter.
     let renamed = campaign::parse("/elsewhere/small.toml", SMALL, "small", Path::new("")).unwrap();
-    Folder::open(&folder, Manifest::new(&renamed, Shard::WHOLE)).unwrap();
-    Folder::open(&folder, Manifest::new(&campaign, Shard::WHOLE)).unwrap();
+    Folder::open(&folder, Manifest::new(&renamed, Shard::WHOLE), false).unwrap();
+    Folder::open(&folder, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
 }
 
 #[test]
@@ -281,11 +281,20 @@ fn sitl(folder: &Path, arguments: &[&str]) -> Output {
 }
 
 /// What goes wrong: the line and key, and what is said.
-const BAD: [(&str, &str, &str); 14] = [
+const BAD: [(&str, &str, &str); 22] = [
     ("flights = 150", "flights = 0", ":3: flights: 0 is out of range: it must lie within 1 to 1e7"),
     ("flights = 150", "flights = 1.5", ":3: flights: 1.5 is not a whole number"),
     ("flights = 150", "flight = 150", ":3: flight: unknown key; did you mean flights?"),
     ("seed = 7", "seed = -1", ":4: seed: -1 is out of range"),
+    // Not rounded to the nearest that a float can hold, which is the largest seed or one more.
+    ("seed = 7", "seed = 9007199254740992", ":4: seed: 9007199254740992 is out of range: it must lie within 0 to 9.0"),
+    ("seed = 7", "seed = 9007199254740993", ":4: seed: 9007199254740993 is out of range"),
+    ("seed = 7", "seed = 0x20000000000000", ":4: seed: 0x20000000000000 is out of range"),
+    ("seed = 7", "seed = 99999999999999999999", ":4: seed: 99999999999999999999 is out of range"),
+    ("seed = 7", "seed = 9007199254740992.0", ":4: seed: 9.007199254740992e15 is out of range"),
+    ("seed = 7", "seed = 9007199254740991.4", ":4: seed: 9007199254740991.4 is not a whole number"),
+    ("seed = 7", "seed = 1e-3", ":4: seed: 1e-3 is not a whole number"),
+    ("flights = 150", "flights = 10000001", ":3: flights: 10000001 is out of range: it must lie within 1 to 1e7"),
     (
         "scenario = \"hover\"",
         "scenario = \"hovr\"",
@@ -322,6 +331,10 @@ fn a_bad_file_gets_one_line() {
         (&["campaign", "small.toml", "--flight", "1", "--contender", "me"], "it has: afbc, backstepping"),
         (&["campaign", "small.toml", "--shard", "3/2"], "it must be I/N"),
         (&["campaign", "small.toml", "--shard", "1/151"], "there are only 150 flights"),
+        (&["campaign", "small.toml", "--threads", "0"], "--threads <N>': it must be a whole number from 1 on"),
+        (&["campaign", "small.toml", "--threads", "two"], "--threads <N>': it must be a whole number from 1 on"),
+        (&["campaign", "small.toml", "--threads", "1.5"], "--threads <N>': it must be a whole number from 1 on"),
+        (&["campaign", "small.toml", "--threads=-1"], "--threads <N>': it must be a whole number from 1 on"),
         (&["merge", "nowhere", "-o", "merged"], "nowhere: no finished results"),
     ] {
         fs::write(folder.join("small.toml"), SMALL).unwrap();
@@ -330,6 +343,217 @@ fn a_bad_file_gets_one_line() {
         assert_eq!(output.status.code(), Some(2), "{error}");
         assert!(error.contains(said), "{said}, not {error}");
         assert!(!folder.join("out").exists());
+    }
+}
+
+/// A campaign's files, and what is made of them with any bit of them flipped, any end cut off.
+#[test]
+fn no_damaged_file_is_believed() {
+    let folder = folder("damaged");
+    let campaign = parse(&SMALL.replace("flights = 150", "flights = 4").replace("= 6.0", "= 5.2"));
+    let whole = folder.join("whole");
+    fly(&campaign, &whole, Shard::WHOLE, 1);
+    let parts: Vec<_> = (1..=2).map(|index| folder.join(format!("part-{index}"))).collect();
+    for (index, part) in (1..).zip(&parts) {
+        fly(&campaign, part, Shard { index, of: 2 }, 1);
+    }
+    // A chunk as an interrupted campaign leaves it.
+    let begun = folder.join("begun");
+    fly(&campaign, &begun, Shard::WHOLE, 1);
+    fs::create_dir_all(begun.join("chunks")).unwrap();
+    fs::rename(begun.join("results.parquet"), begun.join("chunks/000000.parquet")).unwrap();
+
+    let never = AtomicBool::new(false);
+    let open = |path: &Path| Folder::open(path, Manifest::new(&campaign, Shard::WHOLE), false);
+    let (results, chunks) = (open(&whole).unwrap(), open(&begun).unwrap());
+    let again = || campaign::fly(&campaign, &results, &never, &|_| panic!("it is finished")).map(|_| ());
+    let merged = || campaign::merge(&parts, &folder.join("merged"), false).map(|_| ());
+    // How many flights a campaign goes on from.
+    let kept = || {
+        let (stop, kept) = (AtomicBool::new(false), AtomicU64::new(0));
+        let first = |flights| {
+            kept.fetch_add(flights, Ordering::Relaxed);
+            stop.store(true, Ordering::Relaxed);
+        };
+        assert!(campaign::fly(&campaign, &chunks, &stop, &first).unwrap().is_none());
+        kept.into_inner()
+    };
+    assert!(again().is_ok());
+    assert_eq!(kept(), 4);
+    let refused = |file: &Path, error: Result<(), campaign::Error>| {
+        let error = error.unwrap_err().to_string();
+        assert!(error.starts_with(&format!("{}: damaged (", file.display())), "{error}");
+        assert!(error.contains("delete it") && !error.contains('\n'), "{error}");
+    };
+    each_damage(&whole.join("results.parquet"), 3, |file| refused(file, again()));
+    each_damage(&parts[1].join("results.parquet"), 7, |file| refused(file, merged()));
+    each_damage(&begun.join("chunks/000000.parquet"), 7, |_| assert_eq!(kept(), 0));
+    assert!(!folder.join("merged").exists());
+    drop(results);
+    each_damage(&whole.join("campaign.json"), 1, |file| refused(file, open(&whole).map(|_| ())));
+    // As it was, all is well.
+    drop(chunks);
+    fly(&campaign, &begun, Shard::WHOLE, 1);
+    assert_eq!(results_of(&begun), results_of(&whole));
+    campaign::merge(&parts, &folder.join("merged"), false).unwrap();
+    assert_eq!(results_of(&folder.join("merged")), results_of(&whole));
+}
+
+/// Shows `see` the file with a bit of every `stride`-th byte changed, with every bit of its first and last bytes, and with
+/// ends cut off; then it is as it was.
+fn each_damage(path: &Path, stride: usize, mut see: impl FnMut(&Path)) {
+    let whole = fs::read(path).unwrap();
+    let mut damage = |bytes: &[u8]| {
+        fs::write(path, bytes).unwrap();
+        see(path);
+    };
+    let mut bytes = whole.clone();
+    for at in 0..whole.len() {
+        let is_end = at < 8 || at + 150 > whole.len();
+        let flips = if is_end { (0..8).map(|bit| 1 << bit).collect() } else { vec![1 << (at / stride % 8)] };
+        for flip in flips.iter().filter(|_| is_end || at % stride == 0) {
+            bytes[at] ^= flip;
+            damage(&bytes);
+            bytes[at] = whole[at];
+        }
+        if at % 101 == 0 {
+            damage(&whole[..at]);
+        }
+    }
+    damage(&[&whole[..], b"x"].concat());
+    damage(&[&whole[..], &whole[..]].concat());
+    fs::write(path, whole).unwrap();
+}
+
+#[test]
+fn a_damaged_folder_is_mended_by_what_its_error_says() {
+    let (folder, campaign) = (folder("mended"), small());
+    let path = folder.join("campaign");
+    fly(&campaign, &path, Shard::WHOLE, 2);
+    let reference = results_of(&path);
+    for (file, cure_by_force) in [("campaign.json", false), ("results.parquet", false), ("results.parquet", true)] {
+        let mut bytes = fs::read(path.join(file)).unwrap();
+        bytes[100] ^= 4;
+        fs::write(path.join(file), bytes).unwrap();
+        let manifest = || Manifest::new(&campaign, Shard::WHOLE);
+        let fly_on = |force| {
+            let place = Folder::open(&path, manifest(), force)?;
+            campaign::fly(&campaign, &place, &AtomicBool::new(false), &|_| ())
+        };
+        let error = fly_on(false).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(file) && error.contains("damaged (its checksum is wrong); delete it"), "{error}");
+        if !cure_by_force {
+            fs::remove_file(path.join(file)).unwrap();
+        }
+        fly_on(cure_by_force).unwrap().unwrap();
+        assert_eq!(results_of(&path), reference);
+    }
+}
+
+/// Whatever is done for a campaign before its first flight, and for a chunk, costs the same for ten million flights as for
+/// ten: one that is stopped after its first chunk comes back at all.
+#[test]
+fn ten_million_flights_start_with_the_first() {
+    let folder = folder("ten-million");
+    let campaign = parse(&SMALL.replace("flights = 150", "flights = 10000000").replace("= 6.0", "= 0.2"));
+    for shard in [Shard::WHOLE, Shard { index: 3, of: 16 }, Shard { index: 100_000, of: 100_000 }] {
+        let path = folder.join(format!("of-{}", shard.of));
+        let place = Folder::open(&path, Manifest::new(&campaign, shard), false).unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let chunks = || fs::read_dir(path.join("chunks")).map_or(0, |entries| entries.count());
+        let flown = |most: u64, stop: bool| {
+            let (stop, flown) = (AtomicBool::new(stop), AtomicU64::new(0));
+            let progress = |flights| {
+                stop.fetch_or(flown.fetch_add(flights, Ordering::Relaxed) + flights >= most, Ordering::Relaxed);
+            };
+            assert!(pool.install(|| campaign::fly(&campaign, &place, &stop, &progress)).unwrap().is_none());
+            flown.into_inner()
+        };
+        // Stopped before the first, nothing is flown.
+        assert_eq!((flown(u64::MAX, true), chunks()), (0, 0));
+        assert_eq!((flown(16, false), chunks()), (16, 1));
+        assert_eq!((flown(40, false), chunks()), (40, 2));
+    }
+}
+
+#[test]
+fn a_shard_is_every_so_manieth_flight() {
+    for (flights, of) in [(1, 1), (150, 1), (150, 4), (16, 16), (17, 16), (31, 16), (100, 7)] {
+        let mut seen = 0;
+        for index in 1..=of {
+            let shard = Shard { index, of };
+            let found: Vec<_> = (0..shard.count(flights)).map(|nth| shard.flight(nth)).collect();
+            assert_eq!(found, (0..flights).filter(|flight| flight % of == index - 1).collect::<Vec<_>>(), "{shard}");
+            seen += found.len() as u64;
+        }
+        assert_eq!(seen, flights);
+    }
+}
+
+/// Before the first flight is over, and in the middle of it: none of these would end before the test's patience does.
+#[test]
+fn a_signal_stops_it_whatever_it_is_at() {
+    let folder = folder("signals");
+    let text =
+        SMALL.replace("flights = 150", "flights = 10000000").replace("= 6.0", "= 36000").replace("0.2, 1.2", "1, 1");
+    let text = text.replace("rotor_efficiency = [0.0, 1.0]", "").replace("fault_rotor = [1, 4]", "");
+    fs::write(folder.join("long.toml"), text.replace("fault_start_s = [1.0, 5.0]", "")).unwrap();
+    for signal in ["-INT", "-TERM"] {
+        let out = folder.join(format!("out{signal}"));
+        let mut child = Command::new(env!("CARGO_BIN_EXE_sitl"));
+        child.current_dir(&folder).args(["campaign", "long.toml", "--out"]).arg(&out);
+        let child = child.stderr(std::process::Stdio::piped()).spawn().unwrap();
+        // From here on it listens.
+        while !out.join("campaign.json").exists() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        let output = child.wait_with_output().unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(130), "{error}");
+        assert!(error.contains("the same command goes on from there"), "{error}");
+        assert!(!out.join("results.parquet").exists());
+    }
+}
+
+#[test]
+fn no_more_threads_than_help() {
+    let folder = folder("many-threads");
+    fs::write(folder.join("few.toml"), SMALL.replace("150", "4").replace("= 6.0", "= 0.2")).unwrap();
+    let cores = std::thread::available_parallelism().unwrap().get();
+    let output = sitl(&folder, &["campaign", "few.toml", "--threads", "8000", "--out", "many"]);
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{error}");
+    assert!(error.contains(&format!("--threads 8000: flying on {}, for there are", cores.min(4))), "{error}");
+    let output = sitl(&folder, &["campaign", "few.toml", "--threads", "1", "--out", "one"]);
+    assert!(!String::from_utf8(output.stderr).unwrap().contains("--threads"));
+    assert_eq!(results_of(&folder.join("many")), results_of(&folder.join("one")));
+}
+
+/// Errors count from 5 s on: before, there are none, and nothing takes their place.
+#[test]
+fn short_campaigns_hold_no_nan() {
+    let folder = folder("short");
+    for (flights, duration) in [("3", "0.1"), ("3", "4.999"), ("3", "5.0"), ("1", "5.001"), ("1", "6.0")] {
+        let text = SMALL.replace("150", flights).replace("6.0", duration).replace("0.2, 1.2", "0.6, 1.2");
+        fs::write(folder.join("short.toml"), &text).unwrap();
+        let out = format!("{flights}-of-{duration}");
+        let output = sitl(&folder, &["campaign", "short.toml", "--out", &out]);
+        let table = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        assert!(!table.contains("NaN"), "{table}");
+        for entry in fs::read_dir(folder.join(&out)).unwrap() {
+            let path = entry.unwrap().path();
+            let is_text =
+                ["html", "json", "svg"].iter().any(|extension| path.extension().is_some_and(|e| e == *extension));
+            assert!(!is_text || !fs::read_to_string(&path).unwrap().contains("NaN"), "{}", path.display());
+        }
+        let campaign = parse(&text);
+        for row in (0..campaign.flights).flat_map(|flight| campaign.rows(flight).unwrap()) {
+            assert!(row.numbers.iter().flatten().all(|number| number.is_finite()), "{row:?}");
+            let jumps = Manifest::new(&campaign, Shard::WHOLE).number(&row, "mean_abs_du4_n");
+            assert!(jumps != Some(0.0), "the mean of no jump is none");
+        }
     }
 }
 

@@ -243,7 +243,7 @@ const BAD_TABLES: [(&str, &str); 68] = [
 ];
 
 /// Whole files, and what is said of them.
-const BAD_FILES: [(&str, &str); 25] = [
+const BAD_FILES: [(&str, &str); 28] = [
     (
         "flight_core = true\n[trajectory]\nkind = \"paper\"\n[settings]\ndt_s = 0.002",
         ":1: flight_core: it cannot fly with dt_s = 0.002, out of range: it must lie within 0.001 to 0.001; \
@@ -306,6 +306,9 @@ const BAD_FILES: [(&str, &str); 25] = [
          it must hold \"afbc\", \"backstepping\", \"pid\", \"geometric\" or \"indi\"",
     ),
     ("seed = 1.5", ":1: seed: 1.5 is not a whole number; leave out its decimals"),
+    ("seed = 1000000001", ":1: seed: 1000000001 is out of range: it must lie within 0 to 1e9"),
+    ("seed = 1000000000.5", ":1: seed: 1000000000.5 is not a whole number; leave out its decimals"),
+    ("seed = -1", ":1: seed: -1 is out of range: it must lie within 0 to 1e9"),
     ("monitor = 1", ":1: monitor: it is a number and must be true or false; write true or false without quotes"),
     ("controllers = [\"afbc\", \"afbc\"]", ":1: controllers: \"afbc\" is listed twice; once is enough"),
     ("profile = \"best\"", ":1: profile: \"best\" is unknown; it must be \"paper\" or \"flight\""),

@@ -33,10 +33,14 @@ pub enum Error {
     Strangers([PathBuf; 2]),
     /// Two folders with the same shard.
     Twice(Shard, [PathBuf; 2]),
+    /// A shard that is to be merged into itself.
+    IntoPart(PathBuf),
     /// Shards without a folder.
     Missing(Vec<Shard>),
     /// Something could not be written.
     Output(output::Error),
+    /// Somebody has had enough.
+    Stopped,
 }
 
 impl fmt::Display for Error {
@@ -46,12 +50,16 @@ impl fmt::Display for Error {
                 write!(f, "flight {flight} cannot be flown: {error}; narrow the spread that leads there")
             }
             Error::Damaged { path, problem } => {
-                write!(f, "{}: damaged ({problem}); delete it and fly that part again", path.display())
+                write!(
+                    f,
+                    "{}: damaged ({problem}); delete it and fly that campaign into its folder again",
+                    path.display()
+                )
             }
             Error::Changed(path) => write!(
                 f,
                 "{}: holds results of a campaign, shard or program that is not this one; choose another folder with \
-                 --out, or delete it",
+                 --out, or replace them with --force",
                 path.display()
             ),
             Error::Busy(path) => {
@@ -84,7 +92,11 @@ impl fmt::Display for Error {
                 };
                 write!(f, "shard {}{more} missing; fly it, or name its folder too", names.join(", "))
             }
+            Error::IntoPart(path) => {
+                write!(f, "{}: one of the parts; choose another folder for the whole with --out", path.display())
+            }
             Error::Output(error) => error.fmt(f),
+            Error::Stopped => f.write_str("stopped"),
         }
     }
 }

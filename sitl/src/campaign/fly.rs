@@ -2,8 +2,9 @@
 
 use super::folder::{Rows, finished};
 use super::{Campaign, Error, Folder, Manifest, Row, Shard, Summary};
-use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Flies whatever `folder` lacks of `campaign`, on the current rayon pool. `progress` hears of every number of flights
@@ -12,48 +13,85 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// None if `stop` became true before the end: whole chunks are kept then.
 ///
 /// # Errors
-/// A flight that cannot be flown, results that cannot be written.
+/// A flight that cannot be flown, results that cannot be written, or are damaged.
 pub fn fly(
     campaign: &Campaign,
     folder: &Folder,
     stop: &AtomicBool,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Option<Summary>, Error> {
-    if !folder.is_complete() {
-        let chunk = |chunk| (chunk, folder.chunk(chunk));
-        let (kept, missing): (Vec<_>, Vec<_>) =
-            (0..folder.chunks()).into_par_iter().map(chunk).partition(|(chunk, _)| folder.has_chunk(*chunk));
-        progress(kept.iter().map(|(_, flights)| flights.len() as u64).sum());
-        missing.par_iter().with_max_len(1).try_for_each(|(chunk, flights)| {
-            let fly = |&flight: &u64| {
-                if stop.load(Ordering::Relaxed) {
-                    return Ok(None);
-                }
-                let rows = campaign.rows(flight).map_err(|error| Error::Draw { flight, error })?;
-                progress(1);
-                Ok(Some(rows))
-            };
-            let rows = flights.par_iter().map(fly).collect::<Result<Vec<_>, Error>>()?;
-            match rows.into_iter().collect::<Option<Vec<_>>>() {
-                Some(rows) => folder.put_chunk(*chunk, rows.into_iter().flatten()),
-                None => Ok(()),
-            }
-        })?;
-        if stop.load(Ordering::Relaxed) {
-            return Ok(None);
-        }
-    }
     let mut summary = Summary::new(folder.manifest());
-    folder.collect(&mut |row| summary.add(row))?;
-    Ok(Some(summary.finish()))
+    let is_stopped = || stop.load(Ordering::Relaxed);
+    let heard = |row: Result<Row, Error>| if is_stopped() { Err(Error::Stopped) } else { row };
+    let flown = match folder.results()? {
+        Some(mut rows) => rows.try_for_each(|row| heard(row).map(|row| summary.add(&row))),
+        None => fly_missing(campaign, folder, stop, progress).and_then(|()| {
+            folder.write(folder.rows().map(heard).inspect(|row| row.iter().for_each(|row| summary.add(row))))
+        }),
+    };
+    match flown {
+        Err(Error::Stopped) => Ok(None),
+        flown => flown.map(|()| Some(summary.finish())),
+    }
+}
+
+/// Flies the chunks that are not there, in order, flight by flight.
+fn fly_missing(
+    campaign: &Campaign,
+    folder: &Folder,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(u64) + Sync),
+) -> Result<(), Error> {
+    let kept = folder.kept(stop);
+    progress(kept.iter().map(|chunk| folder.chunk(*chunk).count() as u64).sum());
+    let missing = (0..folder.chunks()).filter(|chunk| !kept.contains(chunk));
+    let jobs =
+        missing.flat_map(|chunk| folder.chunk(chunk).enumerate().map(move |(place, flight)| (chunk, place, flight)));
+    // A thread takes the next flight; whoever brings the last of a chunk writes it. Only begun chunks are in memory.
+    let (jobs, begun) = (Mutex::new(jobs.fuse()), Mutex::new(BTreeMap::<u64, BTreeMap<usize, Vec<Row>>>::new()));
+    let failed = AtomicBool::new(false);
+    let next = || match jobs.lock() {
+        Ok(mut jobs) => jobs.next(),
+        Err(_) => None,
+    };
+    let gather = |chunk: u64, place: usize, rows: Vec<Row>| {
+        let Ok(mut begun) = begun.lock() else { return None };
+        let flown = begun.entry(chunk).or_default();
+        flown.insert(place, rows);
+        if flown.len() == folder.chunk(chunk).count() { begun.remove(&chunk) } else { None }
+    };
+    let work = || {
+        while !failed.load(Ordering::Relaxed) {
+            if stop.load(Ordering::Relaxed) {
+                return Err(Error::Stopped);
+            }
+            let Some((chunk, place, flight)) = next() else { break };
+            let rows = campaign.rows(flight).map_err(|error| Error::Draw { flight, error })?;
+            progress(1);
+            if let Some(flown) = gather(chunk, place, rows) {
+                folder.put_chunk(chunk, flown.into_values().flatten())?;
+            }
+        }
+        Ok(())
+    };
+    let work = |_: rayon::BroadcastContext<'_>| work().inspect_err(|_| failed.store(true, Ordering::Relaxed));
+    let ends = rayon::broadcast(work);
+    // What went wrong matters more than that somebody has had enough.
+    let (stopped, others): (Vec<_>, Vec<_>) = ends.into_iter().partition(|end| matches!(end, Err(Error::Stopped)));
+    others.into_iter().chain(stopped).collect()
 }
 
 /// Makes one whole of all `shards` of one campaign, in the folder `out`: the same bytes that one machine would have
-/// written.
+/// written. By `force`, whatever is in the way there is replaced.
 ///
 /// # Errors
 /// Shards of different campaigns, a shard that is missing, unfinished or there twice, and what cannot be read or written.
-pub fn merge(shards: &[PathBuf], out: &Path) -> Result<(Folder, Summary), Error> {
+pub fn merge(shards: &[PathBuf], out: &Path, force: bool) -> Result<(Folder, Summary), Error> {
+    let is_out =
+        |shard: &&PathBuf| shard.canonicalize().is_ok_and(|shard| out.canonicalize().is_ok_and(|out| out == shard));
+    if let Some(part) = shards.iter().find(is_out) {
+        return Err(Error::IntoPart(part.clone()));
+    }
     let mut parts = shards.iter().map(|path| Ok((path, finished(path)?))).collect::<Result<Vec<_>, Error>>()?;
     parts.sort_by_key(|(_, rows)| rows.manifest().shard.index);
     let Some((first, manifest)) = parts.first().map(|(path, rows)| (*path, rows.manifest().clone())) else {
@@ -78,7 +116,7 @@ pub fn merge(shards: &[PathBuf], out: &Path) -> Result<(Folder, Summary), Error>
 
     let whole = Manifest { shard: Shard::WHOLE, ..manifest };
     let contenders = whole.contenders.len();
-    let folder = Folder::open(out, whole)?;
+    let folder = Folder::open(out, whole, force)?;
     let mut summary = Summary::new(folder.manifest());
     // Flight i is in shard i modulo their number.
     let flights = (0..folder.manifest().flights).flat_map(|flight| core::iter::repeat_n(flight, contenders));
@@ -91,6 +129,6 @@ pub fn merge(shards: &[PathBuf], out: &Path) -> Result<(Folder, Summary), Error>
             Some(row) => row,
         }
     });
-    folder.write(rows, &mut |row| summary.add(row))?;
+    folder.write(rows.inspect(|row| row.iter().for_each(|row| summary.add(row))))?;
     Ok((folder, summary.finish()))
 }

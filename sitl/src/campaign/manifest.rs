@@ -20,9 +20,14 @@ impl Shard {
     /// All of it.
     pub const WHOLE: Shard = Shard { index: 1, of: 1 };
 
-    /// The flights of this part, out of `flights`: every `of`-th.
-    pub fn flights(&self, flights: u64) -> impl ExactSizeIterator<Item = usize> + use<> {
-        (self.index as usize - 1..flights as usize).step_by(self.of as usize)
+    /// How many of `flights` are of this part: every `of`-th.
+    pub fn count(&self, flights: u64) -> u64 {
+        (flights + self.of - self.index) / self.of
+    }
+
+    /// The `index`-th flight of this part, from 0 on.
+    pub fn flight(&self, index: u64) -> u64 {
+        self.index - 1 + index * self.of
     }
 }
 

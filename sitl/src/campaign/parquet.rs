@@ -1,22 +1,22 @@
 //! Rows as Parquet files, and back.
 
 use super::{Manifest, Row};
+use crate::output::seal;
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use parquet::column::reader::get_typed_column_reader;
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
 use parquet::errors::{ParquetError, Result};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
-use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
+use parquet::file::reader::{ChunkReader, FileReader, RowGroupReader, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
-use std::fs::File;
 use std::io::Write;
-use std::path::Path;
 use std::sync::Arc;
 
-/// Rows that are written and read at once: a compromise between memory and the size of the file.
-const GROUP_ROWS: usize = 1 << 16;
+/// Rows that are written and read at once: a compromise between memory and the size of the file. Fewer in each of many
+/// parts, for they will be read all at once.
+const GROUP_ROWS: [usize; 2] = [1 << 10, 1 << 16];
 /// Name under which a file carries its manifest.
 const MANIFEST: &str = "campaign";
 /// Columns before those of numbers, with what is in them.
@@ -52,6 +52,7 @@ fn schema(manifest: &Manifest) -> Result<Arc<Type>> {
 /// Writes rows in the order they come in.
 pub(super) struct Writer<W: Write + Send> {
     file: SerializedFileWriter<W>,
+    group_rows: usize,
     rows: Vec<Row>,
 }
 
@@ -67,6 +68,8 @@ impl<W: Write + Send> Writer<W> {
         let metadata = vec![
             KeyValue::new(MANIFEST.into(), serde_json::to_string(manifest).map_err(external)?),
             KeyValue::new("columns".into(), serde_json::to_string(&meanings).map_err(external)?),
+            // The last: it has to be near the end of the file.
+            KeyValue::new("checksum".into(), seal::OPEN.to_owned()),
         ];
         let properties = WriterProperties::builder()
             .set_compression(Compression::SNAPPY)
@@ -74,12 +77,14 @@ impl<W: Write + Send> Writer<W> {
             .set_created_by(concat!("sitl ", env!("CARGO_PKG_VERSION")).into())
             .build();
         let file = SerializedFileWriter::new(out, schema(manifest)?, Arc::new(properties))?;
-        Ok(Writer { file, rows: Vec::new() })
+        let [least, most] = GROUP_ROWS;
+        let group_rows = (most / manifest.shard.of as usize).max(least);
+        Ok(Writer { file, group_rows, rows: Vec::new() })
     }
 
     pub(super) fn push(&mut self, row: Row) -> Result<()> {
         self.rows.push(row);
-        if self.rows.len() == GROUP_ROWS { self.flush() } else { Ok(()) }
+        if self.rows.len() == self.group_rows { self.flush() } else { Ok(()) }
     }
 
     /// Ends the file.
@@ -123,18 +128,19 @@ fn put<T: DataType>(
     column.close()
 }
 
-/// Reads rows in order.
-pub(super) struct Reader {
-    file: SerializedFileReader<File>,
+/// Reads rows in order. Of bytes that are not what was written, the library may make anything, a panic included: they are
+/// to be verified before.
+pub(super) struct Reader<R: ChunkReader + 'static> {
+    file: SerializedFileReader<R>,
     manifest: Manifest,
     next_group: usize,
     rows: std::vec::IntoIter<Row>,
 }
 
-impl Reader {
-    /// The results at `path`.
-    pub(super) fn open(path: &Path) -> Result<Self> {
-        let file = SerializedFileReader::new(File::open(path)?)?;
+impl<R: ChunkReader + 'static> Reader<R> {
+    /// The rows in `source`.
+    pub(super) fn new(source: R) -> Result<Self> {
+        let file = SerializedFileReader::new(source)?;
         let metadata = file.metadata().file_metadata().key_value_metadata();
         let manifest = metadata.and_then(|all| all.iter().find(|pair| pair.key == MANIFEST)?.value.as_deref());
         let manifest: Manifest = manifest
@@ -179,7 +185,7 @@ impl Reader {
     }
 }
 
-impl Iterator for Reader {
+impl<R: ChunkReader + 'static> Iterator for Reader<R> {
     type Item = Result<Row>;
 
     fn next(&mut self) -> Option<Self::Item> {

@@ -52,8 +52,8 @@ struct Outcome {
     /// When and why the contender's monitor tripped, if it did.
     trip: Option<(f64, Trip)>,
     metrics: Metrics,
-    /// Whether errors have counted at all.
-    settled: bool,
+    /// Steps in which errors have counted.
+    settled: u64,
     max_position_m: f64,
     /// Steps, and those of them in which a rotor was at its limit.
     steps: u64,
@@ -62,7 +62,12 @@ struct Outcome {
 
 impl Outcome {
     fn measured(&self, value: f64) -> Option<f64> {
-        self.settled.then_some(value)
+        (self.settled > 0).then_some(value)
+    }
+
+    /// From one step to the next.
+    fn changed(&self, value: f64) -> Option<f64> {
+        (self.settled > 1).then_some(value)
     }
 }
 
@@ -86,10 +91,10 @@ pub static FIGURES: [Figure; 17] = [
     figure("max_z_m", "largest error along z", |o| o.measured(o.metrics.max_abs.z)),
     figure("max_psi_rad", "largest error of yaw", |o| o.measured(o.metrics.max_abs.w)),
     figure("max_position_m", "largest distance from the reference", |o| o.measured(o.max_position_m)),
-    figure("mean_abs_du1_n", "mean |change of U1| per step", |o| o.measured(o.metrics.mean_abs_delta_u.x)),
-    figure("mean_abs_du2_n", "mean |change of U2| per step", |o| o.measured(o.metrics.mean_abs_delta_u.y)),
-    figure("mean_abs_du3_n", "mean |change of U3| per step", |o| o.measured(o.metrics.mean_abs_delta_u.z)),
-    figure("mean_abs_du4_n", "mean |change of U4| per step", |o| o.measured(o.metrics.mean_abs_delta_u.w)),
+    figure("mean_abs_du1_n", "mean |change of U1| per step", |o| o.changed(o.metrics.mean_abs_delta_u.x)),
+    figure("mean_abs_du2_n", "mean |change of U2| per step", |o| o.changed(o.metrics.mean_abs_delta_u.y)),
+    figure("mean_abs_du3_n", "mean |change of U3| per step", |o| o.changed(o.metrics.mean_abs_delta_u.z)),
+    figure("mean_abs_du4_n", "mean |change of U4| per step", |o| o.changed(o.metrics.mean_abs_delta_u.w)),
     figure("saturated_ratio", "share of all steps with a rotor at its limit", |o| {
         Some(o.saturated as f64 / o.steps as f64)
     }),
@@ -133,7 +138,7 @@ impl Outcome {
             outcome.saturated += u64::from(health.saturated);
             outcome.trip = outcome.trip.or(health.trip.map(|trip| (sample.time_s, trip)));
             if is_settled(sample.time_s) {
-                outcome.settled = true;
+                outcome.settled += 1;
                 outcome.max_position_m = outcome.max_position_m.max(tracking_error(sample).xyz().norm());
             }
         })?;

@@ -3,18 +3,19 @@
 use super::flying::{Flying, report};
 use super::json::Json;
 use super::log_rate::LogRate;
+use super::place::Place;
 use super::progress::Progress;
 use super::target::Target;
-use super::{Failure, INTERRUPTED, json, print, say};
+use super::{Failure, interrupt, json, print, say};
 use clap::Args;
 use sitl::campaign::{self, BUILT_IN, BuiltIn, Campaign as Plan, Folder, Manifest, Shard, Summary, built_in};
 use sitl::output;
 use sitl::subject::Kind;
-use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
+use std::thread;
 
 /// Fly a campaign: one scenario, many times, with drawn vehicles, weather and faults
 ///
@@ -26,8 +27,8 @@ pub(crate) struct Campaign {
     campaign: Target,
 
     /// Cores to fly on [default: all]; the results are the same
-    #[arg(long, value_name = "N")]
-    threads: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = threads)]
+    threads: Option<u64>,
 
     /// Fly part I of N only, as one of N machines; `sitl merge` joins the parts
     #[arg(long, value_name = "I/N")]
@@ -45,9 +46,8 @@ pub(crate) struct Campaign {
     #[arg(long, value_name = "HZ", requires = "flight")]
     log_hz: Option<LogRate>,
 
-    /// Folder for results and report [default: out/ and the campaign's name, with the shard or flight if there is one]
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    place: Place,
 
     #[command(flatten)]
     json: Json,
@@ -68,14 +68,14 @@ impl Campaign {
         }
         let name =
             if shard.of > 1 { format!("{}-{}-of-{}", plan.name, shard.index, shard.of) } else { plan.name.clone() };
-        let out = self.out.unwrap_or_else(|| Path::new("out").join(name));
-        let folder = Folder::open(&out, Manifest::new(&plan, shard))?;
-
-        let stop = Arc::new(AtomicBool::new(false));
-        let stopper = Arc::clone(&stop);
-        ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads.map_or(0, NonZeroUsize::get)).build()?;
-        let flights = shard.flights(plan.flights).len() as u64;
+        let (out, flights) = (self.place.path(&name), shard.count(plan.flights));
+        let threads = useful(self.threads, flights);
+        interrupt::ends_with(format!(
+            "stopped; what was flown is in {}, and the same command goes on from there",
+            out.display()
+        ))?;
+        let folder = Folder::open(&out, Manifest::new(&plan, shard), self.place.force)?;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         // The first to be heard of are those of earlier runs.
         let progress: OnceLock<Progress> = OnceLock::new();
         let done = |done| {
@@ -89,18 +89,11 @@ impl Campaign {
                 progress.add(done);
             }
         };
-        let summary = pool.install(|| campaign::fly(&plan, &folder, &stop, &done));
+        let never = AtomicBool::new(false);
+        let summary = pool.install(|| campaign::fly(&plan, &folder, &never, &done));
         drop(progress);
-        match summary? {
-            Some(summary) => conclude(&out, &summary, &self.campaign.to_string(), self.json),
-            None => {
-                say(&format!(
-                    "stopped; what was flown is in {}, and the same command goes on from there",
-                    out.display()
-                ));
-                Ok(ExitCode::from(INTERRUPTED))
-            }
-        }
+        let summary = summary?.ok_or("stopped")?;
+        conclude(&folder, &summary, &self.campaign.to_string(), self.json)
     }
 
     /// One flight, with all that can be shown of it.
@@ -119,16 +112,33 @@ impl Campaign {
         if !self.contenders.is_empty() {
             scenario.contenders.retain(|contender| self.contenders.contains(&contender.name));
         }
-        let out = self.out.unwrap_or_else(|| Path::new("out").join(&scenario.name));
-        let flown = Flying { duration: None, log_hz: self.log_hz }.fly(vec![scenario], &out)?;
-        report(&out, &flown, &[], self.json)?;
+        let name = scenario.name.clone();
+        let open = || self.place.open("campaign --flight", &name);
+        let (folder, flown) = Flying { duration: None, log_hz: self.log_hz }.fly(vec![scenario], open)?;
+        report(&folder, &flown, &[], self.json)?;
         Ok(ExitCode::from(u8::from(flown.iter().any(|flown| flown.run.lost.is_some()))))
     }
 }
 
+fn threads(text: &str) -> Result<u64, &'static str> {
+    text.parse().ok().filter(|threads| *threads > 0).ok_or("it must be a whole number from 1 on, such as 4")
+}
+
+/// As many of the `wanted` threads, or of all cores, as make `flights` go faster.
+fn useful(wanted: Option<u64>, flights: u64) -> usize {
+    let cores = thread::available_parallelism().map_or(1, |cores| cores.get() as u64);
+    let most = cores.min(flights);
+    if let Some(wanted) = wanted.filter(|wanted| *wanted > most) {
+        let why = if flights < cores { format!("{flights} flights") } else { format!("{cores} cores") };
+        say(&format!("--threads {wanted}: flying on {most}, for there are {why}; more would be no faster"));
+    }
+    wanted.unwrap_or(most).min(most) as usize
+}
+
 /// Writes and prints what is to be said of all flights.
-fn conclude(out: &Path, summary: &Summary, target: &str, json: Json) -> Result<ExitCode, Failure> {
-    output::campaign::write(out, summary)?;
+fn conclude(folder: &Folder, summary: &Summary, target: &str, json: Json) -> Result<ExitCode, Failure> {
+    let out = folder.path();
+    output::campaign::write(folder.place(), summary)?;
     if json.json {
         json::print_written(|out| output::campaign::json(out, summary))?;
         return Ok(ExitCode::SUCCESS);
@@ -151,6 +161,10 @@ pub(crate) struct Merge {
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
 
+    /// Write into that folder even if it holds something else; replaces what is in the way
+    #[arg(long)]
+    force: bool,
+
     #[command(flatten)]
     json: Json,
 }
@@ -158,8 +172,9 @@ pub(crate) struct Merge {
 impl Merge {
     /// Joins, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
-        let (_folder, summary) = campaign::merge(&self.shards, &self.out)?;
-        conclude(&self.out, &summary, &summary.manifest.target(), self.json)
+        interrupt::ends_with("stopped; the same command begins again".into())?;
+        let (folder, summary) = campaign::merge(&self.shards, &self.out, self.force)?;
+        conclude(&folder, &summary, &summary.manifest.target(), self.json)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::json::Json;
 use super::log_rate::LogRate;
+use super::place::Place;
 use super::progress::Progress;
 use super::target::Target;
 use super::{Failure, interrupt, json, print};
@@ -9,7 +10,6 @@ use clap::Args;
 use sitl::compare::{self, standard};
 use sitl::output;
 use sitl::scenario::{Contender, Scenario};
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Fly every controller through every scenario, and compare
@@ -30,9 +30,8 @@ pub(crate) struct Compare {
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: u64,
 
-    /// Folder for table, figures and report
-    #[arg(long, value_name = "DIR", default_value = "out/compare")]
-    out: PathBuf,
+    #[command(flatten)]
+    place: Place,
 
     #[command(flatten)]
     json: Json,
@@ -51,24 +50,24 @@ impl Compare {
         }
         let log_every = log_every(&scenarios)?;
         interrupt::ends_it()?;
-        output::prepare(&self.out)?;
+        let folder = self.place.open("compare", "compare")?;
         let flights: u64 = scenarios.iter().map(|scenario| scenario.contenders.len() as u64 * self.seeds).sum();
         let progress = Progress::new("compare", "flights", flights, 0);
         let comparisons = compare::fly(scenarios, self.seeds, log_every, &|| progress.add(1))?;
         drop(progress);
 
         interrupt::is_too_late();
-        let written = output::compare::write(&self.out, &comparisons)?;
+        let written = output::compare::write(&folder, &comparisons)?;
         if self.json.json {
             json::print_written(|out| output::compare::json(out, &comparisons))?;
             return Ok(ExitCode::SUCCESS);
         }
-        let (table, page) = (output::compare::table(&comparisons), self.out.join("report.html"));
+        let (table, page) = (output::compare::table(&comparisons), folder.path().join("report.html"));
         print(&format!(
             "{}\n\n{} files in {}; open {}\n",
             table.trim_end(),
             written.len(),
-            self.out.display(),
+            folder.path().display(),
             page.display()
         ))?;
         Ok(ExitCode::SUCCESS)

@@ -3,11 +3,11 @@
 use super::Failure;
 use super::flying::{Flying, report};
 use super::json::Json;
+use super::place::Place;
 use super::target::Target;
 use afbc::Profile;
 use clap::Args;
 use sitl::scenario::{Contender, ControllerKind, Scenario};
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Fly a built-in scenario or a scenario file; exits with 1 if a vehicle is lost
@@ -24,9 +24,8 @@ pub(crate) struct Fly {
     #[command(flatten)]
     flying: Flying,
 
-    /// Folder for logs, figures and report [default: out/ and the scenario's name]
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    place: Place,
 
     #[command(flatten)]
     json: Json,
@@ -39,9 +38,9 @@ impl Fly {
         if !self.controllers.is_empty() {
             choose(&mut scenario, &self.controllers)?;
         }
-        let out = self.out.unwrap_or_else(|| Path::new("out").join(&scenario.name));
-        let flown = self.flying.fly(vec![scenario], &out)?;
-        report(&out, &flown, &[], self.json)?;
+        let name = scenario.name.clone();
+        let (folder, flown) = self.flying.fly(vec![scenario], || self.place.open("fly", &name))?;
+        report(&folder, &flown, &[], self.json)?;
         Ok(ExitCode::from(u8::from(flown.iter().any(|flown| flown.run.lost.is_some()))))
     }
 }

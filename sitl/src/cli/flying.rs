@@ -6,10 +6,9 @@ use super::progress::Progress;
 use super::{Failure, interrupt, json, print, say};
 use clap::Args;
 use sitl::claims::Claim;
-use sitl::output::{self, Flown};
+use sitl::output::{self, Flown, Folder};
 use sitl::run::Run;
 use sitl::scenario::{DURATION, Scenario};
-use std::path::Path;
 
 /// Flights of more steps than this, about a second's worth, show their progress.
 const QUIET_STEPS: f64 = 1e6;
@@ -34,29 +33,36 @@ fn duration(text: &str) -> Result<f64, String> {
 }
 
 impl Flying {
-    /// Flies every scenario under each of its contenders, once it is sure that `out` can take what comes of it.
-    pub(crate) fn fly(self, mut scenarios: Vec<Scenario>, out: &Path) -> Result<Vec<Flown>, Failure> {
+    /// Flies every scenario under each of its contenders, once it is sure that `open` gives a folder for what comes of it.
+    pub(crate) fn fly(
+        self,
+        mut scenarios: Vec<Scenario>,
+        open: impl FnOnce() -> Result<Folder, Failure>,
+    ) -> Result<(Folder, Vec<Flown>), Failure> {
         interrupt::ends_it()?;
-        output::prepare(out)?;
+        let mut log_every = Vec::new();
         for scenario in &mut scenarios {
             scenario.duration_s = self.duration.unwrap_or(scenario.duration_s);
+            let log_hz = self.log_hz.unwrap_or_else(|| LogRate::usual(scenario.duration_s));
+            for contender in &scenario.contenders {
+                log_every.push(log_hz.steps(scenario, contender)?);
+            }
         }
+        let folder = open()?;
         if self.log_hz.is_none() {
             let longest_s = scenarios.iter().map(|scenario| scenario.duration_s).fold(0.0, f64::max);
             LogRate::thinned(longest_s).iter().for_each(|line| say(line));
         }
         let progress = progress(&scenarios);
-        let mut flown = Vec::new();
+        let (mut flown, mut log_every) = (Vec::new(), log_every.into_iter());
         for scenario in scenarios {
-            for contender in &scenario.contenders {
-                let log_hz = self.log_hz.unwrap_or_else(|| LogRate::usual(scenario.duration_s));
-                let log_every = log_hz.steps(&scenario, contender)?;
+            for (contender, log_every) in scenario.contenders.iter().zip(&mut log_every) {
                 let run = Run::fly(&scenario, contender, log_every)?;
                 flown.push(Flown { scenario: scenario.clone(), run });
                 progress.add(1);
             }
         }
-        Ok(flown)
+        Ok((folder, flown))
     }
 }
 
@@ -71,14 +77,14 @@ fn progress(scenarios: &[Scenario]) -> Progress {
     Progress::new(name, "flights", runs as u64, 0)
 }
 
-/// Writes everything into `out`, then prints the table and where to look.
-pub(crate) fn report(out: &Path, flown: &[Flown], claims: &[Claim], json: Json) -> Result<(), Failure> {
+/// Writes everything into `folder`, then prints the table and where to look.
+pub(crate) fn report(folder: &Folder, flown: &[Flown], claims: &[Claim], json: Json) -> Result<(), Failure> {
     interrupt::is_too_late();
-    let written = output::write(out, flown, claims)?;
+    let written = output::write(folder, flown, claims)?;
     if json.json {
         return json::print_written(|out| output::json(out, flown));
     }
-    let table = output::table(flown, claims);
+    let (table, out) = (output::table(flown, claims), folder.path());
     let (count, page) = (written.len(), out.join("report.html"));
     print(&format!("{}\n\n{count} files in {}; open {}\n", table.trim_end(), out.display(), page.display()))
 }

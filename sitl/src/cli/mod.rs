@@ -10,6 +10,7 @@ mod json;
 mod log_rate;
 mod paper;
 mod pil;
+mod place;
 mod progress;
 mod results;
 mod scenarios;

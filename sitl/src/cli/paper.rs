@@ -3,13 +3,13 @@
 use super::Failure;
 use super::flying::{Flying, report};
 use super::json::Json;
+use super::place::Place;
 use clap::{Args, ValueEnum};
 use plant::Model;
 use sitl::claims::claims;
 use sitl::output::Flown;
 use sitl::paper::{Case, Reading, Sign, Uncertainty, scenario};
 use sitl::scenario::Scenario;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Fly the paper's experiment under both laws and weigh its three claims
@@ -41,9 +41,8 @@ pub(crate) struct Paper {
     #[command(flatten)]
     flying: Flying,
 
-    /// Folder for logs, figures and report
-    #[arg(long, value_name = "DIR", default_value = "out/paper")]
-    out: PathBuf,
+    #[command(flatten)]
+    place: Place,
 
     #[command(flatten)]
     json: Json,
@@ -114,8 +113,8 @@ impl Plants {
 impl Paper {
     /// Flies, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
-        let flown = self.flying.fly(self.scenarios()?, &self.out)?;
-        report(&self.out, &flown, &claims(&flown), self.json)?;
+        let (folder, flown) = self.flying.fly(self.scenarios()?, || self.place.open("paper", "paper"))?;
+        report(&folder, &flown, &claims(&flown), self.json)?;
         Ok(ExitCode::from(u8::from(flown.iter().any(unexpectedly_lost))))
     }
 

@@ -3,30 +3,67 @@
 use std::path::PathBuf;
 use std::{fmt, io};
 
-/// A folder or file that could not be written.
+/// Why something could not be put where it was wanted.
 #[derive(Debug)]
-pub struct Error {
-    /// Which one.
-    pub path: PathBuf,
-    /// Why.
-    pub source: io::Error,
+pub enum Error {
+    /// A folder or file that could not be written.
+    Write {
+        /// Which one.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// Somebody else's folder or file.
+    Foreign {
+        /// Which one.
+        path: PathBuf,
+        /// Whose.
+        whose: String,
+    },
+    /// What says whose a folder is cannot be trusted.
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        problem: String,
+    },
 }
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let cure = match self.source.kind() {
-            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "free some space, or choose another disk",
-            io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory | io::ErrorKind::IsADirectory => {
-                "something else has that name: move it, or choose another folder"
+        match self {
+            Error::Write { path, source } => {
+                let cure = match source.kind() {
+                    io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+                        "free some space, or choose another disk"
+                    }
+                    io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory | io::ErrorKind::IsADirectory => {
+                        "something else has that name: move it, or choose another folder"
+                    }
+                    _ => "choose a folder that you may write to",
+                };
+                write!(f, "cannot write {}: {source}; {cure} with --out", path.display())
             }
-            _ => "choose a folder that you may write to",
-        };
-        write!(f, "cannot write {}: {}; {cure} with --out", self.path.display(), self.source)
+            Error::Foreign { path, whose } => write!(
+                f,
+                "{}: {whose}; choose another folder with --out, or replace what is in the way with --force",
+                path.display()
+            ),
+            Error::Damaged { path, problem } => write!(
+                f,
+                "{}: damaged ({problem}), so nobody knows whose the folder is; choose another folder with --out, or \
+                 replace what is in the way with --force",
+                path.display()
+            ),
+        }
     }
 }
 
 impl core::error::Error for Error {
     fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        Some(&self.source)
+        match self {
+            Error::Write { source, .. } => Some(source),
+            _ => None,
+        }
     }
 }

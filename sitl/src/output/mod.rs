@@ -11,6 +11,7 @@ mod figures;
 mod files;
 mod reality;
 mod report;
+pub(crate) mod seal;
 mod summary;
 mod table;
 mod words;
@@ -19,7 +20,8 @@ mod words;
 mod tests;
 
 pub use error::Error;
-pub(crate) use files::Folder;
+pub use files::Folder;
+pub(crate) use files::{place, sweep};
 pub use summary::write as json;
 pub use table::table;
 
@@ -27,7 +29,8 @@ use crate::claims::Claim;
 use crate::metrics::SETTLED_S;
 use crate::run::Run;
 use crate::scenario::Scenario;
-use std::path::{Path, PathBuf};
+use std::io;
+use std::path::PathBuf;
 
 /// One contender's flight of one scenario.
 #[derive(Clone, Debug)]
@@ -38,15 +41,8 @@ pub struct Flown {
     pub run: Run,
 }
 
-/// Creates the folder `dir` if need be: worth doing before a long flight.
-///
-/// # Errors
-/// If there can be no such folder.
-pub fn prepare(dir: &Path) -> Result<(), Error> {
-    files::Folder::create(dir).map(|_| ())
-}
-
-/// Writes everything about `flown` into the folder `dir`, which is created if need be, and returns the paths written:
+/// Writes everything about `flown` into `folder`, in place of all that its command has left there before, and returns the
+/// paths written:
 ///
 /// * `<stem>-<contender>.csv`: each run's log;
 /// * `fig4-trajectory.svg`, `fig5-outputs.svg`, `fig6-attitude.svg`, `fig7-errors.svg`, `fig8-inputs.svg`: the counterparts
@@ -59,22 +55,29 @@ pub fn prepare(dir: &Path) -> Result<(), Error> {
 /// profile, or else a number. A file appears whole or not at all: each is written under a temporary name first.
 ///
 /// # Errors
-/// The first folder or file that could not be written.
-pub fn write(dir: &Path, flown: &[Flown], claims: &[Claim]) -> Result<Vec<PathBuf>, Error> {
-    let folder = files::Folder::create(dir)?;
+/// The first file that could not be written, or is somebody else's.
+pub fn write(folder: &Folder, flown: &[Flown], claims: &[Claim]) -> Result<Vec<PathBuf>, Error> {
     let groups = files::groups(flown);
+    let draw = |group: &files::Group<'_>| figures::draw(&group.flights);
+    let sets = groups.iter().map(draw).collect::<io::Result<Vec<_>>>();
+    let sets = sets.map_err(|source| folder.error("figures", source))?;
+    let svg_name =
+        |group: &files::Group<'_>, figure: &figures::Figure| format!("{}{}.svg", group.figure_prefix, figure.name);
+    let mut names = vec!["summary.json".to_owned(), "report.html".to_owned()];
+    for (group, figures) in groups.iter().zip(&sets) {
+        names.extend(group.csv_names.iter().cloned());
+        names.extend(figures.iter().map(|figure| svg_name(group, figure)));
+    }
+    folder.only(&names)?;
+
     let mut paths = Vec::new();
-    let mut sets = Vec::new();
-    for group in &groups {
+    for (group, figures) in groups.iter().zip(&sets) {
         for (flight, name) in group.flights.iter().zip(&group.csv_names) {
             paths.push(folder.place(name, |out| csv::write(out, flight))?);
         }
-        let figures = figures::draw(&group.flights).map_err(|source| folder.error("figures", source))?;
-        for figure in &figures {
-            let name = format!("{}{}.svg", group.figure_prefix, figure.name);
-            paths.push(folder.place(&name, |out| out.write_all(figure.svg.as_bytes()))?);
+        for figure in figures {
+            paths.push(folder.place(&svg_name(group, figure), |out| out.write_all(figure.svg.as_bytes()))?);
         }
-        sets.push(figures);
     }
     paths.push(folder.place("summary.json", |out| summary::write(out, flown))?);
     let page = report::page(&groups, &sets, claims);

@@ -18,10 +18,17 @@ impl Scratch {
         Scratch(std::env::temp_dir().join(format!("sitl-output-{name}-{}", std::process::id())))
     }
 
-    /// Every file by name.
+    /// As a command's own.
+    fn open(&self) -> Folder {
+        Folder::open(&self.0, "test", "it", false).unwrap()
+    }
+
+    /// Every file by name, but for what says whose they are.
     fn files(&self) -> BTreeMap<String, Vec<u8>> {
-        let entries = fs::read_dir(&self.0).unwrap().map(|entry| entry.unwrap().path());
-        entries.map(|path| (path.file_name().unwrap().to_str().unwrap().into(), fs::read(path).unwrap())).collect()
+        let entries = fs::read_dir(&self.0).unwrap().map(|entry| entry.unwrap());
+        let named = entries.map(|entry| (entry.file_name().into_string().unwrap(), entry.path()));
+        let results = named.filter(|(name, _)| name != ".sitl.json");
+        results.map(|(name, path)| (name, fs::read(path).unwrap())).collect()
     }
 }
 
@@ -68,10 +75,10 @@ fn check_svgs(files: &BTreeMap<String, Vec<u8>>) -> usize {
 fn writes_everything_twice_the_same() {
     let flown = both(&paper(Reading::Persistent, 9.0));
     let (first, second) = (Scratch::new("first"), Scratch::new("second"));
-    let paths = write(&first.0, &flown, &claims()).unwrap();
-    write(&second.0, &flown, &claims()).unwrap();
+    let paths = write(&first.open(), &flown, &claims()).unwrap();
+    write(&second.open(), &flown, &claims()).unwrap();
     // And over what is there already.
-    write(&second.0, &flown, &claims()).unwrap();
+    write(&second.open(), &flown, &claims()).unwrap();
     let files = first.files();
     assert_eq!(files, second.files());
     assert_eq!(check_svgs(&files), 5);
@@ -185,7 +192,7 @@ fn odd_flights_have_figures_too() {
     flown.push(empty);
 
     let scratch = Scratch::new("odd");
-    write(&scratch.0, &flown, &[]).unwrap();
+    write(&scratch.open(), &flown, &[]).unwrap();
     assert_eq!(check_svgs(&scratch.files()), 5 * 5);
     assert!(table(&flown, &[]).contains("mass +1.3 %"));
 }
@@ -210,22 +217,86 @@ fn file_names_stay_apart() {
 #[test]
 fn nothing_flown_is_no_error() {
     let scratch = Scratch::new("nothing");
-    write(&scratch.0.join("deep/er"), &[], &[]).unwrap();
+    write(&Folder::open(&scratch.0.join("deep/er"), "test", "it", false).unwrap(), &[], &[]).unwrap();
     assert_eq!(fs::read(scratch.0.join("deep/er/summary.json")).unwrap(), b"[]\n");
 }
 
 #[test]
 fn an_error_names_the_path_and_the_cure() {
     let scratch = Scratch::new("error");
-    fs::create_dir_all(scratch.0.join("taken/summary.json/full")).unwrap();
-    let error = write(&scratch.0.join("taken"), &[], &[]).unwrap_err().to_string();
+    let taken = scratch.0.join("taken");
+    fs::create_dir_all(taken.join("summary.json/full")).unwrap();
+    let error = Folder::open(&taken, "test", "it", false).unwrap_err().to_string();
+    assert!(error.contains("taken: not empty") && error.contains("--out") && error.contains("--force"), "{error}");
+    assert_eq!(fs::read_dir(&taken).unwrap().count(), 1, "nothing is touched");
+    let error = write(&Folder::open(&taken, "test", "it", true).unwrap(), &[], &[]).unwrap_err().to_string();
     assert!(error.contains("summary.json") && error.contains("--out"), "{error}");
-    let left: Vec<_> = fs::read_dir(scratch.0.join("taken")).unwrap().collect();
-    assert_eq!(left.len(), 1, "no temporary file stays");
+    assert_eq!(fs::read_dir(&taken).unwrap().count(), 2, "no temporary file stays");
 
     fs::write(scratch.0.join("file"), "").unwrap();
-    let error = write(&scratch.0.join("file"), &[], &[]).unwrap_err().to_string();
+    let error = Folder::open(&scratch.0.join("file"), "test", "it", false).unwrap_err().to_string();
     assert!(error.contains("file: ") && error.contains("--out"), "{error}");
+}
+
+/// Whatever library writes: the system's own word is what is heard.
+#[test]
+fn a_full_disk_says_free_some_space() {
+    let scratch = Scratch::new("full");
+    let folder = scratch.open();
+    let flown = fly(&paper(Reading::Persistent, 0.1), ControllerKind::Afbc);
+    let full = || fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    // Fills through a file on a disk that is full, under what the library wraps its errors in.
+    let fill = |name: &str, wrap: &dyn Fn(&mut dyn io::Write) -> io::Result<()>| {
+        let mut disk = files::Disk { file: full(), failure: None };
+        let failed = wrap(&mut disk).unwrap_err();
+        folder.error(name, disk.cause(failed)).to_string()
+    };
+    for said in [
+        fill("log.csv", &|out| csv::write(out, &flown)),
+        fill("summary.json", &|out| summary::write(out, std::slice::from_ref(&flown))),
+        fill("odd", &|out| out.write_all(b"x").map_err(|error| io::Error::other(format!("wrapped: {error}")))),
+    ] {
+        assert!(said.contains("free some space") && said.contains("No space left"), "{said}");
+    }
+}
+
+/// What a command has written before goes, what others have put there stays.
+#[test]
+fn nothing_stale_stays_and_nothing_foreign_goes() {
+    let scratch = Scratch::new("stale");
+    let [afbc, other] = ControllerKind::PAPER.map(|kind| fly(&paper(Reading::Persistent, 6.0), kind));
+    write(&scratch.open(), &[afbc.clone(), other], &[]).unwrap();
+    let both = scratch.files();
+    fs::write(scratch.0.join("notes.csv"), "mine").unwrap();
+    write(&scratch.open(), std::slice::from_ref(&afbc), &[]).unwrap();
+    let one = scratch.files();
+    assert!(both.contains_key("paper-backstepping.csv") && !one.contains_key("paper-backstepping.csv"));
+    assert_eq!(one["notes.csv"], b"mine");
+    assert_eq!(one.len(), both.len());
+
+    // Somebody's file where one of ours would come, be it no more than a link.
+    fs::remove_file(scratch.0.join("paper-afbc.csv")).unwrap();
+    write(&scratch.open(), &[], &[]).unwrap();
+    std::os::unix::fs::symlink("nowhere", scratch.0.join("paper-afbc.csv")).unwrap();
+    let error = write(&scratch.open(), std::slice::from_ref(&afbc), &[]).unwrap_err().to_string();
+    assert!(error.contains("paper-afbc.csv: in the way"), "{error}");
+    assert!(fs::symlink_metadata(scratch.0.join("paper-afbc.csv")).unwrap().is_symlink());
+    write(&Folder::open(&scratch.0, "test", "it", true).unwrap(), &[afbc], &[]).unwrap();
+    assert!(fs::symlink_metadata(scratch.0.join("paper-afbc.csv")).unwrap().is_file());
+    assert!(!scratch.0.join("nowhere").exists());
+
+    // Of another command; and what says so, with any bit of it flipped.
+    let refused = || Folder::open(&scratch.0, "other", "that", false).unwrap_err().to_string();
+    assert!(refused().contains("holds what `sitl test` made of it;"), "{}", refused());
+    let marker = scratch.0.join(".sitl.json");
+    let bytes = fs::read(&marker).unwrap();
+    for (at, bit) in (0..bytes.len()).flat_map(|at| (0..8).map(move |bit| (at, bit))) {
+        let mut flipped = bytes.clone();
+        flipped[at] ^= 1 << bit;
+        fs::write(&marker, flipped).unwrap();
+        let error = Folder::open(&scratch.0, "test", "it", false).unwrap_err().to_string();
+        assert!(error.contains(".sitl.json: damaged"), "{error}");
+    }
 }
 
 #[test]
@@ -237,7 +308,7 @@ fn real_flights_of_many_contenders_leave_everything() {
     let fly = |contender| Flown { run: Run::fly(&scenario, contender, 9).unwrap(), scenario: scenario.clone() };
     let flown: Vec<_> = scenario.contenders.iter().map(fly).collect();
     let scratch = Scratch::new("many");
-    write(&scratch.0, &flown, &[]).unwrap();
+    write(&scratch.open(), &flown, &[]).unwrap();
     let files = scratch.files();
     assert_eq!(files.keys().filter(|name| name.ends_with(".csv")).count(), 5);
     assert_eq!(check_svgs(&files), 5);

@@ -39,13 +39,29 @@ impl<'a> Table<'a> {
         number.ok_or_else(|| self.missing(range.name, &format!("add it{}", words::unit(range.name))))
     }
 
-    /// The whole number under `range.name`, if it is there.
+    /// The whole number under `range.name`, to the last digit, if it is there.
     pub(crate) fn whole(&mut self, range: &Range) -> Result<Option<u64>, FileError> {
-        match self.number(range)? {
-            Some(number) if number.fract() != 0.0 => {
-                Err(self.fault_at(range.name, format!("{number} is not a whole number; make it one")))
+        let Some(value) = self.value(range.name) else { return Ok(None) };
+        let (min, max) = (range.min as i128, range.max as i128);
+        let bounds = format!("it must lie within {} to {}", words::number(range.min), words::number(range.max));
+        let outside = |number: &str| self.refuse(value, range.name, format!("{number} is out of range: {bounds}"));
+        match value.get_ref() {
+            // Through no float, which would round it.
+            DeValue::Integer(integer) => {
+                let number = i128::from_str_radix(integer.as_str(), integer.radix()).ok();
+                let number = number.filter(|number| (min..=max).contains(number)).and_then(|n| u64::try_from(n).ok());
+                number
+                    .map(Some)
+                    .ok_or_else(|| outside(&value.get_ref().as_integer().map_or("it".into(), |i| i.to_string())))
             }
-            number => Ok(number.map(|number| number as u64)),
+            DeValue::Float(float) if !is_whole(float.as_str()) => {
+                let problem = format!("{} is not a whole number; leave out its decimals", float.as_str());
+                Err(self.refuse(value, range.name, problem))
+            }
+            _ => match self.number_in(value, range.name, range)? {
+                number if (range.min..=range.max).contains(&number) => Ok(Some(number as u64)),
+                number => Err(outside(&words::number(number))),
+            },
         }
     }
 
@@ -314,4 +330,12 @@ impl<'a> Table<'a> {
     fn dotted(&self, key: &str) -> String {
         if self.path.is_empty() { key.into() } else { format!("{}.{key}", self.path) }
     }
+}
+
+/// Whether a float is a whole number as it is written, before any rounding; one that is not finite is another matter.
+fn is_whole(float: &str) -> bool {
+    let number = float.parse().unwrap_or(f64::NAN);
+    let is_round = float.contains(['e', 'E'])
+        || float.split_once('.').is_none_or(|(_, after)| after.trim_end_matches('0').is_empty());
+    !number.is_finite() || (number.fract() == 0.0 && is_round)
 }

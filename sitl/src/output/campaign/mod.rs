@@ -10,9 +10,10 @@ pub use table::table;
 use super::{Error, Folder, figures};
 use crate::campaign::statistics::{Share, percentile};
 use crate::campaign::{Bad, Summary, Tally};
-use std::path::{Path, PathBuf};
+use crate::metrics::SETTLED_S;
+use std::path::PathBuf;
 
-/// Writes everything about a campaign but its rows into the folder `dir`, and returns the paths written:
+/// Writes everything about a campaign but its rows into `folder`, and returns the paths written:
 ///
 /// * `position-error.svg`, `smoothness.svg`: distributions over all flights;
 /// * `success.svg`: what losses hang on;
@@ -20,10 +21,11 @@ use std::path::{Path, PathBuf};
 /// * `report.html`: all of it on one page that needs no other file.
 ///
 /// # Errors
-/// The first folder or file that could not be written.
-pub fn write(dir: &Path, summary: &Summary) -> Result<Vec<PathBuf>, Error> {
-    let folder = Folder::create(dir)?;
+/// The first file that could not be written, or is somebody else's.
+pub fn write(folder: &Folder, summary: &Summary) -> Result<Vec<PathBuf>, Error> {
     let figures = figures::campaign::draw(summary).map_err(|source| folder.error("figures", source))?;
+    let svgs = figures.iter().map(|figure| format!("{}.svg", figure.name));
+    folder.add(&svgs.chain(["summary.json".into(), "report.html".into()]).collect::<Vec<_>>())?;
     let mut paths = Vec::new();
     for figure in &figures {
         paths.push(folder.place(&format!("{}.svg", figure.name), |out| out.write_all(figure.svg.as_bytes()))?);
@@ -54,13 +56,17 @@ fn cells(tally: &Tally) -> Vec<String> {
         Some(value) if value.is_finite() => format!("{:.digits$}", scale * value),
         Some(_) => "lost".into(),
     };
-    let percent = |share: f64| 100.0 * share;
-    let mut cells = vec![format!("{:.2} %", percent(value)), format!("{:.2} to {:.2}", percent(low), percent(high))];
+    let mut cells = vec![percent(value), format!("{:.2} to {:.2}", 100.0 * low, 100.0 * high)];
     cells.extend(PERCENTS.map(|percent| at(&tally.rmse_position_m, percent, 1.0, 3)));
     cells.extend([50.0, 99.0].map(|percent| at(&tally.max_position_m, percent, 1.0, 3)));
     cells.push(at(&tally.mean_abs_du4_n, 50.0, 1000.0, 1));
-    cells.push(format!("{:.2} %", percent(tally.tripped as f64 / tally.count.flights as f64)));
+    cells.push(percent(tally.tripped as f64 / tally.count.flights as f64));
     cells
+}
+
+/// A share for people; of nothing, none.
+fn percent(share: f64) -> String {
+    if share.is_nan() { "-".into() } else { format!("{:.2} %", 100.0 * share) }
 }
 
 /// How many flights each contender has made: of a shard, fewer than of the campaign.
@@ -78,7 +84,10 @@ const LEGEND: &str = "Distances from the reference count from 5 s to the end. A 
 fn bad(target: &str, tally: &Tally, bad: &Bad) -> [String; 2] {
     let how = match &bad.lost {
         Some((time_s, reason)) => format!("lost at t = {time_s:.3} s: {reason}"),
-        None => format!("{:.3} m from the reference, root mean square", bad.rmse_position_m.unwrap_or(f64::NAN)),
+        None => match bad.rmse_position_m {
+            Some(rmse_m) => format!("{rmse_m:.3} m from the reference, root mean square"),
+            None => format!("over before errors count, which is from {SETTLED_S} s on"),
+        },
     };
     let quoted = |text: &str| if text.contains(' ') { format!("\"{text}\"") } else { text.to_owned() };
     let command =

@@ -1,6 +1,6 @@
 //! A campaign on one page.
 
-use super::{HEADS, LEGEND, bad, cells, flights};
+use super::{HEADS, LEGEND, bad, cells, flights, percent};
 use crate::campaign::Summary;
 use crate::output::figures::Figure;
 use crate::output::report::{picture, sheet};
@@ -59,7 +59,7 @@ fn by_trajectory(summary: &Summary) -> Markup {
                 @for tally in &summary.tallies {
                     tr {
                         th scope="row" { (tally.contender) }
-                        @for count in &tally.by_trajectory { td { (format!("{:.2} %", 100.0 * count.share().value)) } }
+                        @for count in &tally.by_trajectory { td { (percent(count.share().value)) } }
                     }
                 }
             }

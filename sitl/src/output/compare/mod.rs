@@ -13,9 +13,10 @@ use super::{Error, Flown, Folder};
 use crate::compare::{Comparison, Entry, FIGURES};
 use crate::metrics::SETTLED_S;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-/// Writes everything about `comparisons` into the folder `dir`, and returns the paths written:
+/// Writes everything about `comparisons` into `folder`, in place of all that its command has left there before, and returns
+/// the paths written:
 ///
 /// * `comparison.csv`: a row for each flight;
 /// * `comparison.json`: the same, with mean and spread over the seeds;
@@ -24,24 +25,26 @@ use std::path::{Path, PathBuf};
 /// * `report.html`: all of it on one page that needs no other file.
 ///
 /// # Errors
-/// The first folder or file that could not be written.
-pub fn write(dir: &Path, comparisons: &[Comparison]) -> Result<Vec<PathBuf>, Error> {
-    let folder = Folder::create(dir)?;
+/// The first file that could not be written, or is somebody else's.
+pub fn write(folder: &Folder, comparisons: &[Comparison]) -> Result<Vec<PathBuf>, Error> {
+    let flown: Vec<Flown> =
+        comparisons.iter().flat_map(|comparison| &comparison.entries).map(|entry| entry.first.clone()).collect();
+    let prefixes: Vec<_> = groups(&flown).into_iter().map(|group| group.figure_prefix).collect();
+    let sets = comparisons.iter().map(draw).collect::<io::Result<Vec<_>>>();
+    let sets = sets.map_err(|source| folder.error("figures", source))?;
+    let svgs = prefixes.iter().zip(&sets).flat_map(|(prefix, figures)| {
+        figures.iter().map(move |figure| (format!("{prefix}{}.svg", figure.name), &figure.svg))
+    });
+    let svgs: Vec<_> = svgs.collect();
+    let names = ["comparison.csv", "comparison.json", "report.html"].into_iter();
+    folder.only(&names.chain(svgs.iter().map(|(name, _)| name.as_str())).collect::<Vec<_>>())?;
+
     let mut paths = vec![
         folder.place("comparison.csv", |out| files::csv(out, comparisons))?,
         folder.place("comparison.json", |out| files::json(out, comparisons))?,
     ];
-    let flown: Vec<Flown> =
-        comparisons.iter().flat_map(|comparison| &comparison.entries).map(|entry| entry.first.clone()).collect();
-    let prefixes = groups(&flown).into_iter().map(|group| group.figure_prefix);
-    let mut sets = Vec::new();
-    for (comparison, prefix) in comparisons.iter().zip(prefixes) {
-        let figures = draw(comparison).map_err(|source| folder.error("figures", source))?;
-        for figure in &figures {
-            let name = format!("{prefix}{}.svg", figure.name);
-            paths.push(folder.place(&name, |out| out.write_all(figure.svg.as_bytes()))?);
-        }
-        sets.push(figures);
+    for (name, svg) in &svgs {
+        paths.push(folder.place(name, |out| out.write_all(svg.as_bytes()))?);
     }
     let page = page::page(comparisons, &sets);
     paths.push(folder.place("report.html", |out| out.write_all(page.as_bytes()))?);

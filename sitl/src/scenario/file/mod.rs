@@ -103,7 +103,7 @@ pub(crate) fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajecto
     let [name, description] = title(&mut root, name)?;
     let duration_s = root.number(&DURATION)?.unwrap_or(DURATION_S);
     let models = [Model::Simplified, Model::RigidBody];
-    let seed = seed(&mut root)?;
+    let seed = root.whole(&SEED)?.unwrap_or(0);
     let model = root.choice("plant", &models, Model::name)?.unwrap_or(Model::RigidBody);
 
     let vehicle = vehicle::read(root.table("vehicle")?, Parameters::PAPER)?;
@@ -150,15 +150,6 @@ pub(crate) fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajecto
     scenario.check().map_err(|error| root.fault(error.range.name, format!("{}; change it", out_of_range(&error))))?;
     root.finish()?;
     Ok(scenario)
-}
-
-/// The seed of everything random.
-fn seed(root: &mut Table<'_>) -> Result<u64, FileError> {
-    let seed = root.number(&SEED)?.unwrap_or(0.0);
-    if seed.fract() != 0.0 {
-        return Err(root.fault_at(SEED.name, format!("{seed} is not a whole number; leave out its decimals")));
-    }
-    Ok(seed as u64)
 }
 
 /// What keeps a text from being TOML.
