@@ -1,14 +1,14 @@
 //! The control tick, 1000 times a second.
 
-use crate::board::Outputs;
-use crate::time::Stopwatch;
+use crate::board::{self, Outputs};
+use crate::time::{self, Stopwatch};
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_executor::SendSpawner;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
-use embassy_time::{Duration, Instant, Ticker};
+use embassy_time::{Instant, Timer};
 use onboard::{Flight, Report};
 use vehicle::Inbox;
 
@@ -50,9 +50,10 @@ pub fn spawn(spawner: SendSpawner, outputs: Outputs) {
 
 #[embassy_executor::task]
 async fn task(mut flight: Flight, mut outputs: Outputs) {
-    let mut ticker = Ticker::every(Duration::from_millis(1));
     loop {
-        ticker.next().await;
+        // Not by a ticker, whose periods begin whenever it was made: one that begins just after a control period, which
+        // is when alarms go off, ticks twice in every other one.
+        Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
         let report = tick(&mut flight, &mut outputs);
         let cycles = stopwatch.cycles();
@@ -71,10 +72,13 @@ fn tick(flight: &mut Flight, outputs: &mut Outputs) -> Report {
     // Borrowed by nobody else while it is locked; and the tick holds no panic.
     let inbox = INBOX.lock(|inbox| inbox.try_borrow_mut().map_or(Inbox::EMPTY, |mut inbox| inbox.take()));
 
+    if board::clock_has_failed() {
+        flight.distrust_clock();
+    }
     let report = flight.tick(now_us, &inbox);
 
     outputs.drive(report.throttles);
-    if report.health.rate.may_feed_watchdog() {
+    if report.health.rate.alive {
         outputs.feed_watchdog();
     }
     report

@@ -22,10 +22,14 @@
 //! USART1 comes before the control tick because it holds one byte, and the next comes within 11 us.
 #![no_std]
 
+#[cfg(not(feature = "pil"))]
+pub mod clocks;
 pub mod comms;
 pub mod control;
 pub mod executors;
 pub mod housekeeping;
+#[cfg(not(feature = "pil"))]
+pub mod reset;
 pub mod time;
 
 #[cfg_attr(feature = "pil", path = "board/pil.rs")]

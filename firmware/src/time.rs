@@ -8,6 +8,7 @@ use core::task::Waker;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{SCB, SYST};
 use critical_section::Mutex;
+use embassy_time::Instant;
 use embassy_time_driver::Driver;
 use embassy_time_queue_utils::Queue;
 
@@ -38,6 +39,15 @@ pub fn start(mut syst: SYST) {
     syst.clear_current();
     syst.enable_interrupt();
     syst.enable_counter();
+}
+
+/// When the next control period begins.
+pub fn next_period() -> Instant {
+    let period_us = critical_section::with(|cs| {
+        let period_us = DRIVER.period_us.borrow(cs).get();
+        if SCB::is_pendst_pending() { period_us + US_PER_TICK } else { period_us }
+    });
+    Instant::from_micros(period_us + US_PER_TICK)
 }
 
 /// A stopwatch in core cycles, for what takes less than one period.

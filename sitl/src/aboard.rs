@@ -9,7 +9,7 @@ use vehicle::{ArmingLimits, Asked, Inbox, Request, Stamped, Vehicle};
 /// Accepted roll and pitch of a vehicle that is to be armed \[rad\].
 pub const ARMING_TILT: Range = Range::new("attitude_rad", -TILT_MAX.max, TILT_MAX.max);
 /// Ticks before the first step: the flight core arms once it has measured its rate.
-const TICKS_HELD: u64 = WINDOW_US / PERIOD_US + 1;
+const TICKS_HELD: u64 = WINDOW_US as u64 / PERIOD_US + 1;
 
 /// A controller that the flight core flies: without a state it rides blind, then descends.
 #[derive(Clone, Copy, Debug)]

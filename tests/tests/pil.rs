@@ -3,6 +3,7 @@
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
 use core::ops::ControlFlow;
+use pil::budget::TICK_INSTRUCTIONS_MAX;
 use pil::{Emulator, Image};
 use plant::Model;
 use sitl::in_the_loop::{End, Pace, Station, Twins, fly};
@@ -41,5 +42,5 @@ fn the_papers_flight_is_the_hosts_bit_for_bit() {
     assert_eq!((comparison.differing_ticks, comparison.differing_bits), (0, 0));
     assert_eq!(comparison.late_ticks, 0);
     // The budget of docs/budgets.md, in the flight that chatters most. Counted, not timed: every run gives the same.
-    assert!(comparison.instructions.max() <= 3_300.0, "{comparison:?}");
+    assert!(comparison.instructions.max() <= f64::from(TICK_INSTRUCTIONS_MAX), "{comparison:?}");
 }

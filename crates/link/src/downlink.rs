@@ -94,7 +94,7 @@ pub struct Health {
     pub tick_max_us: f32,
     /// Ticks in the last second \[Hz\].
     pub rate_hz: f32,
-    /// Ticks that came late.
+    /// Ticks that came late, or early, since power-up.
     pub late_ticks: u32,
     /// Ticks in which a rotor was asked for a force outside its limits.
     pub saturated_ticks: u32,

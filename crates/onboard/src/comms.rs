@@ -4,10 +4,16 @@ use crate::flight::Report;
 use afbc::monitor::{Norm, Trip};
 use airframe::{PerAxis, State};
 use link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, MavCmd, Sender, Text, Uplink};
+use vehicle::rate;
 use vehicle::{Asked, Inbox, Mode, Request, Stamped, Tracker};
 
 /// The vehicle on the link: system 1, component 1 (autopilot).
 pub const ADDRESS: Address = Address { system: 1, component: 1 };
+
+/// What the pilot is told when the clock has failed.
+pub const CLOCK_FAILED: &str = "clock failed, flying on the spare one: land";
+/// What the pilot is told when the control tick does not keep its rate or its time any more.
+pub const TICK_OFF: &str = "control tick off its 1000 Hz: land";
 
 /// A message that goes out every `period` ticks, and in which of them.
 struct Schedule {
@@ -50,6 +56,7 @@ pub struct Comms {
     unknown: Option<(MavCmd, Address)>,
     norms: PerAxis<Norm>,
     trip: Option<Trip>,
+    rate: rate::Report,
 }
 
 impl Default for Comms {
@@ -74,6 +81,7 @@ impl Comms {
             unknown: None,
             norms: PerAxis::default(),
             trip: None,
+            rate: rate::Report::default(),
         }
     }
 
@@ -155,6 +163,13 @@ impl Comms {
         if report.mode != Mode::Riding {
             self.trip = trip;
         }
+        let (rate, before) = (report.health.rate, self.rate);
+        self.rate = rate;
+        if rate.clock_failed && !before.clock_failed {
+            say(Downlink::Text(Text::from(CLOCK_FAILED)));
+        } else if before.healthy() && !rate.healthy() {
+            say(Downlink::Text(Text::from(TICK_OFF)));
+        }
         if let Some((axis, norm)) = report.learnt {
             *self.norms.get_mut(axis) = norm;
         }
@@ -182,7 +197,7 @@ impl Comms {
                 tick_us,
                 tick_max_us: self.tick_us_max,
                 rate_hz: health.rate.rate_hz.unwrap_or(0) as f32,
-                late_ticks: health.rate.late_ticks,
+                late_ticks: health.rate.off_ticks(),
                 saturated_ticks: report.saturated_ticks,
                 state_age_us: health.state_age_us as f32,
                 theta_norm: PerAxis::from_fn(|axis| norm(self.norms.get(axis))),

@@ -60,6 +60,11 @@ impl Flight {
         })
     }
 
+    /// The clock has failed and another has taken over: the vehicle is not armed again.
+    pub fn distrust_clock(&mut self) {
+        self.memory.distrust_clock();
+    }
+
     /// One control tick, to be called every millisecond; `now_us` is the time since power-up. Cannot fail.
     pub fn tick(&mut self, now_us: u64, inbox: &Inbox) -> Report {
         let outcome = self.vehicle.tick(&mut self.memory, now_us, inbox);

@@ -20,5 +20,5 @@
 mod comms;
 mod flight;
 
-pub use comms::{ADDRESS, Comms};
+pub use comms::{ADDRESS, CLOCK_FAILED, Comms, TICK_OFF};
 pub use flight::{Flight, Report};

@@ -1,8 +1,10 @@
 //! The `flight` image on an emulated board.
 
+use crate::Error;
+use crate::clock_tree::{self, ClockTree};
 use crate::gdb::{self, Gdb};
 use crate::qemu::{self, Qemu};
-use crate::{Error, clock_tree};
+use object::{Object, ObjectSection};
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
@@ -14,11 +16,22 @@ const PATIENCE: Duration = Duration::from_millis(100);
 /// A board that takes no bytes for this long is stuck.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// The `flight` image, booted, running freely and in real time.
+/// Status of USART1. The driver clears "transmission complete" by a load and a store of the whole register, and a byte that
+/// arrives in between is lost with its flag: on silicon within 3 cycles of 168 MHz, in QEMU whenever the store waits for the
+/// thread that brings the byte. QEMU does without the store.
+const USART1_SR: u32 = 0x4001_1000;
+/// Interrupt control and state register: bit 31 raises a non-maskable interrupt.
+const ICSR: u32 = 0xE000_ED04;
+
+/// The `flight` image, booted and running, as fast as the host allows.
+///
+/// Its time passes by instructions, so that it is not late because the host was busy; and its idle loop counts on instead
+/// of sleeping, so that time does not run away from the host that talks to it.
 #[derive(Debug)]
 pub struct Board {
     qemu: Qemu,
     gdb: Gdb,
+    clock_tree: ClockTree,
     usart1: UnixStream,
     received: Receiver<Vec<u8>>,
     clock_accesses: usize,
@@ -30,7 +43,19 @@ impl Board {
     /// # Errors
     /// If QEMU or the image is missing, or the boot does not come to an end.
     pub fn boot(elf: &Path) -> Result<Self, Error> {
-        let arguments = [
+        Board::boot_with(elf, true)
+    }
+
+    /// The same, on a board whose crystal does not start.
+    ///
+    /// # Errors
+    /// As for [`Board::boot`].
+    pub fn boot_without_crystal(elf: &Path) -> Result<Self, Error> {
+        Board::boot_with(elf, false)
+    }
+
+    fn boot_with(elf: &Path, crystal: bool) -> Result<Self, Error> {
+        let serial = [
             "-S",
             "-serial",
             "unix:usart1,server=on,wait=off",
@@ -39,18 +64,43 @@ impl Board {
             "-gdb",
             "chardev:gdb",
         ];
+        let arguments = [qemu::count_instructions(qemu::SHIFT).as_slice(), &serial.map(String::from)].concat();
         let qemu = Qemu::start(elf, Qemu::folder()?, &[qemu::OLIMEX], &arguments)?;
         let mut gdb = Gdb::connect(&qemu.path("gdb"))?;
         let usart1 = gdb::connect(&qemu.path("usart1"))?;
         usart1.set_write_timeout(Some(WRITE_TIMEOUT))?;
         let received = listen(usart1.try_clone()?);
-        let clock_accesses = clock_tree::boot(&mut gdb)?;
-        Ok(Board { qemu, gdb, usart1, received, clock_accesses })
+        // NOP
+        gdb.set_memory(idle(elf)?, &[0x00, 0xBF])?;
+        let mut clock_tree = ClockTree::new(&mut gdb, crystal)?;
+        let clock_accesses = clock_tree.boot(&mut gdb)?;
+        clock_tree::skip_first_store(&mut gdb, USART1_SR)?;
+        gdb.resume()?;
+        Ok(Board { qemu, gdb, clock_tree, usart1, received, clock_accesses })
     }
 
     /// How often the image touched the clock tree while it booted.
     pub fn clock_accesses(&self) -> usize {
         self.clock_accesses
+    }
+
+    /// What the image last wrote to a register of the [clock tree](crate::clock_tree).
+    pub fn clock_register(&self, register: u32) -> u32 {
+        self.clock_tree.register(register)
+    }
+
+    /// The crystal stops: returns when the image has switched to another clock.
+    ///
+    /// # Errors
+    /// If the image does not have it watched, or does not switch.
+    pub fn lose_crystal(&mut self) -> Result<(), Error> {
+        self.gdb.halt()?;
+        if !self.clock_tree.lose_crystal() {
+            return Err(Error::Protocol("nothing watches the crystal".into()));
+        }
+        self.gdb.store(ICSR, 1 << 31)?;
+        self.clock_tree.switch(&mut self.gdb)?;
+        self.gdb.resume()
     }
 
     /// The debugger, with the processor halted; [`Gdb::resume`] lets it run on.
@@ -86,6 +136,19 @@ impl Board {
             Err(RecvTimeoutError::Disconnected) => Err(Error::Protocol("USART1 was closed".into())),
         }
     }
+}
+
+/// Where the idle loop sleeps.
+fn idle(elf: &Path) -> Result<u32, Error> {
+    // WFI; B to it
+    const LOOP: [u8; 4] = [0x30, 0xBF, 0xFD, 0xE7];
+    let bytes = std::fs::read(elf)?;
+    let file = object::File::parse(bytes.as_slice()).map_err(|error| Error::Protocol(error.to_string()))?;
+    let text = file.section_by_name(".text").ok_or_else(|| Error::Protocol("the image has no code".into()))?;
+    let code = text.data().map_err(|error| Error::Protocol(error.to_string()))?;
+    let offset = code.windows(4).position(|window| window == LOOP);
+    let offset = offset.ok_or_else(|| Error::Protocol("the image has no idle loop that sleeps".into()))?;
+    Ok(text.address() as u32 + offset as u32)
 }
 
 /// Reads for as long as there is something. QEMU stands still, its debugger too, while nobody takes what it sends; and

@@ -10,6 +10,9 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+/// Most instructions that a control tick may take: at two and a half cycles each, 63 us of the 1000.
+pub const TICK_INSTRUCTIONS_MAX: u32 = 4_200;
+
 /// Where the flash lies.
 const FLASH: std::ops::Range<u64> = 0x0800_0000..0x0810_0000;
 
@@ -17,6 +20,9 @@ const FLASH: std::ops::Range<u64> = 0x0800_0000..0x0810_0000;
 #[derive(Debug)]
 pub struct Linked {
     functions: BTreeMap<u32, Function>,
+    symbols: BTreeMap<String, u32>,
+    /// What the image can log, as it stands in the source.
+    pub log: Vec<String>,
     /// Bytes of flash: code, constants and initial values.
     pub flash_bytes: u64,
     /// Bytes of RAM that are taken before the program starts, the stack aside.
@@ -94,7 +100,12 @@ impl Linked {
             let name = format!("{:#}", rustc_demangle::demangle(symbol.name().unwrap_or_default()));
             functions.entry(start).or_insert_with(|| Function::decode(name, start, code, is_code));
         }
-        Ok(Linked { functions, flash_bytes, ram_bytes })
+        let symbols =
+            file.symbols().filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address() as u32)));
+        let log = file.section_by_name(".defmt").map(|section| section.index());
+        let log = file.symbols().filter(|symbol| symbol.section_index().is_some_and(|index| Some(index) == log));
+        let log = log.filter_map(|symbol| Some(symbol.name().ok()?.to_owned())).collect();
+        Ok(Linked { functions, symbols: symbols.collect(), log, flash_bytes, ram_bytes })
     }
 
     /// What running the function named `name` can lead to.
@@ -113,6 +124,11 @@ impl Linked {
             panics: names(|function| function.name.contains("panic") || function.name.ends_with("_fail")),
             indirect: names(|function| function.is_indirect),
         })
+    }
+
+    /// The address of a symbol, by the name that the linker knows.
+    pub fn symbol(&self, name: &str) -> Option<u32> {
+        self.symbols.get(name).copied()
     }
 
     fn find(&self, name: &str) -> Option<u32> {

@@ -9,82 +9,173 @@ use crate::gdb::{Gdb, PC, Watch};
 use std::collections::HashMap;
 use std::time::Duration;
 
-const RCC_CR: u32 = 0x4002_3800;
-const RCC_CFGR: u32 = 0x4002_3808;
+/// Clock control of the chip (reference manual RM0090, 7.3).
+pub const RCC_CR: u32 = 0x4002_3800;
+/// The main locking loop's source and factors.
+pub const RCC_PLLCFGR: u32 = 0x4002_3804;
+/// Which clock the core runs from.
+pub const RCC_CFGR: u32 = 0x4002_3808;
+/// The flash's wait states, caches and prefetch (3.9.1).
+pub const FLASH_ACR: u32 = 0x4002_3C00;
+const RCC_CIR: u32 = 0x4002_380C;
 const RCC_APB2RSTR: u32 = 0x4002_3824;
 const RCC_BDCR: u32 = 0x4002_3870;
 const RCC_CSR: u32 = 0x4002_3874;
 const PWR_CR: u32 = 0x4000_7000;
-const FLASH_ACR: u32 = 0x4002_3C00;
+const FLASH_OPTCR: u32 = 0x4002_3C14;
+const DBGMCU_IDCODE: u32 = 0xE004_2000;
+const SYST_CSR: u32 = 0xE000_E010;
 
-/// Every register watched, with its value at reset.
-const WATCHED: [(u32, u32); 7] = [
+/// Every register watched, with its value at reset; option bytes as they leave the factory, on a chip of revision 2.
+const WATCHED: [(u32, u32); 12] = [
     (RCC_CR, 0x0000_0083),
+    (RCC_PLLCFGR, 0x2400_3010),
     (RCC_CFGR, 0),
+    (RCC_CIR, 0),
     (RCC_APB2RSTR, 0),
     (RCC_BDCR, 0),
     (RCC_CSR, 0x0E00_0000),
     (PWR_CR, 0x0000_4000),
     (FLASH_ACR, 0),
+    (FLASH_OPTCR, 0x0FFF_AAED),
+    (DBGMCU_IDCODE, 0x1007_6413),
+    (SYST_CSR, 0),
 ];
 
-/// A boot whose clock tree stays untouched for so long is over.
-const SETTLED: Duration = Duration::from_millis(300);
-/// A boot that touches it more often is lost in a loop.
+// Bits of RCC_CR, RCC_CFGR and RCC_CIR.
+const HSEON: u32 = 1 << 16;
+const CSSON: u32 = 1 << 19;
+const PLLON: u32 = 1 << 24;
+const SW: u32 = 0b11;
+const CSSF: u32 = 1 << 7;
+const CSSC: u32 = 1 << 23;
+
+/// How long the image may take to its next access.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// An image that touches the clock tree more often is lost in a loop.
 const ACCESSES_MAX: usize = 2000;
 
-/// Runs a halted processor from reset until its clocks are set up, and gives the number of accesses that took. It is
-/// left running.
-pub(crate) fn boot(gdb: &mut Gdb) -> Result<usize, Error> {
-    let mut written = HashMap::from(WATCHED);
-    for (register, _) in WATCHED {
-        gdb.watch(watch(register), register)?;
-    }
-    for accesses in 0..ACCESSES_MAX {
-        let Some(address) = gdb.run(SETTLED)? else {
-            return Ok(accesses);
-        };
-        let register = address & !3;
-        let pc = gdb.register(PC)?;
-        let access = Access::decode(gdb.memory(pc)?)?;
-        if register == RCC_APB2RSTR {
-            // QEMU 10.0 ends in an assertion when this is stored to: go past the store.
-            gdb.set_register(PC, pc + access.length)?;
-            continue;
+/// The registers, as the image sees them.
+#[derive(Debug)]
+pub(crate) struct ClockTree {
+    written: HashMap<u32, u32>,
+    /// Whether there is a crystal that starts.
+    crystal: bool,
+}
+
+impl ClockTree {
+    /// As a reset leaves it. Every access stops the processor from now on.
+    pub(crate) fn new(gdb: &mut Gdb, crystal: bool) -> Result<Self, Error> {
+        for (register, _) in WATCHED {
+            gdb.watch(watch(register), register)?;
         }
-        // Arm's watchpoints stop before the access.
-        gdb.unwatch(watch(register), register)?;
-        let stored = gdb.register(access.register)?;
-        gdb.step()?;
-        gdb.watch(watch(register), register)?;
-        if access.is_load {
-            gdb.set_register(access.register, answer(register, written.get(&register).copied().unwrap_or(0)))?;
-        } else {
-            written.insert(register, stored);
+        Ok(ClockTree { written: HashMap::from(WATCHED), crystal })
+    }
+
+    /// What was last written to `register`, or its value at reset.
+    pub(crate) fn register(&self, register: u32) -> u32 {
+        self.written.get(&register).copied().unwrap_or(0)
+    }
+
+    /// Runs a halted processor from reset until its clocks are set up and SysTick runs, and gives the number of accesses
+    /// that took. It is left halted.
+    pub(crate) fn boot(&mut self, gdb: &mut Gdb) -> Result<usize, Error> {
+        self.serve(gdb, SYST_CSR, 1)
+    }
+
+    /// The crystal stops, and with it what the clock security system watches: the hardware's part (RM0090, 7.2.7). True
+    /// if that raises a non-maskable interrupt.
+    pub(crate) fn lose_crystal(&mut self) -> bool {
+        self.crystal = false;
+        let watched = self.register(RCC_CR) & CSSON != 0;
+        if watched {
+            self.change(RCC_CR, |value| value & !(HSEON | PLLON));
+            self.change(RCC_CFGR, |value| value & !SW);
+            self.change(RCC_CIR, |value| value | CSSF);
+        }
+        watched
+    }
+
+    fn change(&mut self, register: u32, change: impl FnOnce(u32) -> u32) {
+        self.written.insert(register, change(self.register(register)));
+    }
+
+    /// The image's part: runs a halted processor until the core runs from another clock. It is left halted.
+    pub(crate) fn switch(&mut self, gdb: &mut Gdb) -> Result<usize, Error> {
+        self.serve(gdb, RCC_CFGR, SW)
+    }
+
+    /// Runs a halted processor until it sets one of `bits` in the register `last`, and gives the number of accesses that
+    /// took. It is left halted.
+    fn serve(&mut self, gdb: &mut Gdb, last: u32, bits: u32) -> Result<usize, Error> {
+        for accesses in 1..ACCESSES_MAX {
+            let Some(address) = gdb.run(PATIENCE)? else {
+                return Err(Error::Protocol("the image waits for something that never comes".into()));
+            };
+            let register = address & !3;
+            let pc = gdb.register(PC)?;
+            let access = Access::decode(gdb.memory(pc)?)?;
+            if register == RCC_APB2RSTR {
+                // QEMU 10.0 ends in an assertion when this is stored to: go past the store.
+                gdb.set_register(PC, pc + access.length)?;
+                continue;
+            }
+            // Arm's watchpoints stop before the access.
+            gdb.unwatch(watch(register), register)?;
+            let stored = gdb.register(access.register)?;
+            gdb.step()?;
+            gdb.watch(watch(register), register)?;
+            if access.is_load {
+                gdb.set_register(access.register, self.answer(register))?;
+                continue;
+            }
+            self.written.insert(register, stored);
+            if register == RCC_CIR && stored & CSSC != 0 {
+                self.change(RCC_CIR, |value| value & !(CSSC | CSSF));
+            }
+            if register == last && stored & bits != 0 {
+                return Ok(accesses);
+            }
+        }
+        Err(Error::Protocol(format!("{ACCESSES_MAX} accesses to the clock tree, and no end")))
+    }
+
+    /// What silicon answers to a load: every clock is ready as soon as it is on.
+    fn answer(&self, register: u32) -> u32 {
+        /// `ready` follows `on`.
+        fn follow(value: u32, on: u32, ready: u32) -> u32 {
+            value & !(1 << ready) | (value >> on & 1) << ready
+        }
+        let written = self.register(register);
+        match register {
+            // HSI, HSE, PLL, PLLI2S.
+            RCC_CR => {
+                let ready = [0, 16, 24, 26].into_iter().fold(written, |value, on| follow(value, on, on + 1));
+                if self.crystal { ready } else { ready & !(HSEON << 1) }
+            }
+            // SWS reports SW.
+            RCC_CFGR => follow(follow(written, 0, 2), 1, 3),
+            // LSE, LSI.
+            RCC_BDCR | RCC_CSR => follow(written, 0, 1),
+            _ => written,
         }
     }
-    Err(Error::Protocol(format!("{ACCESSES_MAX} accesses to the clock tree, and no end")))
+}
+
+/// Runs a halted processor to its first store to `register`, and has it go past that instruction now and ever after.
+pub(crate) fn skip_first_store(gdb: &mut Gdb, register: u32) -> Result<(), Error> {
+    gdb.watch(Watch::Write, register)?;
+    gdb.run(PATIENCE)?.ok_or_else(|| Error::Protocol(format!("nothing stores to {register:#x}")))?;
+    gdb.unwatch(Watch::Write, register)?;
+    let pc = gdb.register(PC)?;
+    let access = Access::decode(gdb.memory(pc)?)?;
+    // NOP
+    gdb.set_memory(pc, &[0x00, 0xBF].repeat(access.length as usize / 2))
 }
 
 fn watch(register: u32) -> Watch {
-    if register == RCC_APB2RSTR { Watch::Write } else { Watch::Access }
-}
-
-/// What silicon answers to a load after `written` was stored: every clock is ready as soon as it is on.
-fn answer(register: u32, written: u32) -> u32 {
-    /// `ready` follows `on`.
-    fn follow(value: u32, on: u32, ready: u32) -> u32 {
-        value & !(1 << ready) | (value >> on & 1) << ready
-    }
-    match register {
-        // HSI, HSE, PLL, PLLI2S.
-        RCC_CR => [0, 16, 24, 26].into_iter().fold(written, |value, on| follow(value, on, on + 1)),
-        // SWS reports SW.
-        RCC_CFGR => follow(follow(written, 0, 2), 1, 3),
-        // LSE, LSI.
-        RCC_BDCR | RCC_CSR => follow(written, 0, 1),
-        _ => written,
-    }
+    // SysTick's counter lies beside it, and is read all the time.
+    if [RCC_APB2RSTR, SYST_CSR].contains(&register) { Watch::Write } else { Watch::Access }
 }
 
 /// A load or store of one register.

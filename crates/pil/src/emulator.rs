@@ -53,6 +53,15 @@ impl Emulator {
     /// # Errors
     /// If QEMU or the image is missing, or QEMU does not start.
     pub fn start(elf: &Path) -> Result<Self, Error> {
+        Emulator::start_slower(elf, 0)
+    }
+
+    /// The same with a processor whose every instruction takes 2^`slower` times as long: 8 ns, 16 ns, 32 ns.
+    ///
+    /// # Errors
+    /// As for [`Emulator::start`].
+    pub fn start_slower(elf: &Path, slower: u32) -> Result<Self, Error> {
+        let shift = qemu::SHIFT + slower;
         let folder = Qemu::folder()?;
         let open = |name: &str| -> Result<File, Error> {
             let path = folder.join(name);
@@ -65,13 +74,13 @@ impl Emulator {
         let to_firmware = open("to_firmware")?;
         let hold = open("from_firmware")?;
         let mut from_firmware = File::open(folder.join("from_firmware"))?;
-        let arguments = [qemu::COUNT_INSTRUCTIONS.as_slice(), &["-serial", "none"]].concat();
+        let arguments = [qemu::count_instructions(shift).as_slice(), &["-serial".into(), "none".into()]].concat();
         let qemu = Qemu::start(elf, folder, &[qemu::OLIMEX, qemu::NETDUINO], &arguments)?;
 
         let (sender, replies) = mpsc::channel();
         let reader = std::thread::spawn(move || {
             loop {
-                let reply = read_reply(&mut from_firmware);
+                let reply = read_reply(&mut from_firmware, shift);
                 let last = reply.is_err();
                 if sender.send(reply).is_err() || last {
                     return;
@@ -116,7 +125,7 @@ impl Drop for Emulator {
     }
 }
 
-fn read_reply(from: &mut impl Read) -> io::Result<Reply> {
+fn read_reply(from: &mut impl Read, shift: u32) -> io::Result<Reply> {
     /// The next field.
     fn field<const N: usize>(from: &mut impl Read) -> io::Result<[u8; N]> {
         let mut bytes = [0; N];
@@ -135,5 +144,5 @@ fn read_reply(from: &mut impl Read) -> io::Result<Reply> {
     }
     let mut bytes = vec![0; length];
     from.read_exact(&mut bytes)?;
-    Ok(Reply { time_us, cycles, instructions: qemu::instructions(cycles), stack_bytes, throttles, bytes })
+    Ok(Reply { time_us, cycles, instructions: qemu::instructions(cycles, shift), stack_bytes, throttles, bytes })
 }

@@ -4,6 +4,8 @@ use airframe::{Setpoint, State};
 use link::{Address, Command, FRAME_MAX, Sender, Uplink};
 use nalgebra::Vector3;
 
+/// Tick before which the vehicle is armed.
+const ARMED: u64 = 1_500;
 /// Ticks of the whole flight.
 pub const TICKS: u64 = 6_000;
 
@@ -34,7 +36,8 @@ impl Station {
     /// What reaches the link before `tick`: a flight, and everything that can go wrong with its link. To be asked for
     /// one tick after the other, from 0.
     pub fn bytes_of_tick(&mut self, tick: u64) -> Vec<u8> {
-        let (state, setpoint) = motion(tick as f32 * 1e-3);
+        // At rest until it is armed.
+        let (state, setpoint) = motion(tick.saturating_sub(ARMED) as f32 * 1e-3);
         // Two gaps: one to ride out, one that ends in a descent.
         let tracked = !(2_500..2_600).contains(&tick) && !(4_000..5_000).contains(&tick);
         if tracked {
@@ -45,7 +48,7 @@ impl Station {
         }
         match tick {
             // The first is refused: the rate is not known yet.
-            100 | 1_500 => self.say(Uplink::Command(Command::Arm)),
+            100 | ARMED => self.say(Uplink::Command(Command::Arm)),
             // The motion does not follow the rotors, so AFBC's monitor trips, time and again.
             3_000 | 5_200 => self.say(Uplink::Command(Command::Engage)),
             5_900 => self.say(Uplink::Command(Command::Kill)),

@@ -73,6 +73,36 @@ impl Gdb {
         from_hex(&answer)?.try_into().map_err(|_| Error::Protocol(answer))
     }
 
+    /// Writes to RAM or, unlike a processor, to flash.
+    ///
+    /// # Errors
+    /// If the stub refuses.
+    pub fn set_memory(&mut self, address: u32, bytes: &[u8]) -> Result<(), Error> {
+        let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        self.order(&format!("M{address:x},{:x}:{hex}", bytes.len()))
+    }
+
+    /// Has a halted processor store a word, since the stub itself does not reach device registers. Uses the first bytes
+    /// of the core-coupled memory.
+    ///
+    /// # Errors
+    /// If the stub refuses.
+    pub fn store(&mut self, address: u32, value: u32) -> Result<(), Error> {
+        const SCRATCH: u32 = 0x1000_0000;
+        // STR r1, [r0]
+        self.set_memory(SCRATCH, &[0x01, 0x60])?;
+        let registers = [(0, address), (1, value), (PC, SCRATCH)];
+        let before = [self.register(0)?, self.register(1)?, self.register(PC)?];
+        for (number, value) in registers {
+            self.set_register(number, value)?;
+        }
+        self.step()?;
+        for ((number, _), value) in registers.into_iter().zip(before) {
+            self.set_register(number, value)?;
+        }
+        Ok(())
+    }
+
     /// Stops the processor before it next touches the word at `address`.
     ///
     /// # Errors

@@ -24,7 +24,7 @@
 
 mod board;
 pub mod budget;
-mod clock_tree;
+pub mod clock_tree;
 mod emulator;
 mod error;
 pub mod exercise;

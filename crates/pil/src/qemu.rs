@@ -1,6 +1,7 @@
 //! Finding and starting QEMU.
 
 use crate::Error;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -10,15 +11,18 @@ pub(crate) const OLIMEX: &str = "olimex-stm32-h405";
 /// The one of older versions, whose USART sends nothing by interrupt.
 pub(crate) const NETDUINO: &str = "netduinoplus2";
 
-/// Lets time pass by instructions, and stand still while the processor waits for the host.
-pub(crate) const COUNT_INSTRUCTIONS: [&str; 2] = ["-icount", "shift=3,sleep=off"];
-/// One instruction is 2^3 ns of the emulated chip's time: the shift above.
-const NS_PER_INSTRUCTION: u64 = 1 << 3;
+/// How long an instruction takes, as a power of two \[ns\]: 8 ns, unless a slower processor is wanted.
+pub(crate) const SHIFT: u32 = 3;
 
-/// Cycles of the 168 MHz core clock, as SysTick counts them, in instructions.
-pub(crate) fn instructions(cycles: u32) -> u32 {
-    // To the nearest: an instruction is 1.344 cycles.
-    let cycles_per_thousand = 168 * NS_PER_INSTRUCTION;
+/// Lets time pass by instructions, 2^`shift` ns each, and stand still while the processor waits for the host.
+pub(crate) fn count_instructions(shift: u32) -> [String; 2] {
+    ["-icount".into(), format!("shift={shift},sleep=off")]
+}
+
+/// Cycles of the 168 MHz core clock, as SysTick counts them, in instructions of 2^`shift` ns.
+pub(crate) fn instructions(cycles: u32, shift: u32) -> u32 {
+    // To the nearest: an instruction of 8 ns is 1.344 cycles.
+    let cycles_per_thousand = 168 << shift;
     ((u64::from(cycles) * 1000 + cycles_per_thousand / 2) / cycles_per_thousand) as u32
 }
 
@@ -40,7 +44,12 @@ impl Qemu {
     }
 
     /// Starts `elf` in `folder` on the first of `machines` that this QEMU has, with these further arguments.
-    pub(crate) fn start(elf: &Path, folder: PathBuf, machines: &[&str], arguments: &[&str]) -> Result<Self, Error> {
+    pub(crate) fn start(
+        elf: &Path,
+        folder: PathBuf,
+        machines: &[&str],
+        arguments: &[impl AsRef<OsStr>],
+    ) -> Result<Self, Error> {
         if !elf.is_file() {
             return Err(Error::NoImage(elf.to_owned()));
         }

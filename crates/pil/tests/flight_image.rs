@@ -1,56 +1,174 @@
-//! The very image that flies, on an emulated board: it boots, ticks, listens and answers.
+//! The very image that flies, on an emulated board: it boots, ticks, listens and answers, and goes on without its crystal.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs, unreachable_pub, reason = "test")]
 
 mod common;
 
 use common::start_or_skip;
-use link::{Address, Answer, Command, Decoder, Downlink, Uplink};
+use link::{Address, Answer, Command, Decoder, Downlink, Health, Uplink};
+use onboard::CLOCK_FAILED;
+use pil::budget::Linked;
+use pil::clock_tree::{FLASH_ACR, RCC_CFGR, RCC_PLLCFGR};
 use pil::exercise::{Station, motion};
 use pil::gdb::{SP, XPSR};
 use pil::{Board, Image};
+use std::collections::HashSet;
 use std::time::{Duration, Instant};
+use vehicle::Refusal;
 
 /// Far longer than it takes, even on a machine that is busy with other things.
 const PATIENCE: Duration = Duration::from_secs(120);
+/// How often it is told where it is \[us\]: QEMU's USART takes some 8 kB/s.
+const EVERY_US: u64 = 30_000;
+/// What counts as 1 kHz; QEMU's USART may hold up a tick, by bytes faster than any line's.
+const RATE_HZ: std::ops::RangeInclusive<f32> = 997.0..=1003.0;
 /// SysTick's reload value register.
 const SYST_RVR: u32 = 0xE000_E014;
 
+/// Somebody who tells the board again and again where it is, and hears what it says.
+struct Talk {
+    board: Board,
+    station: Station,
+    decoder: Decoder<Downlink>,
+    heard: Heard,
+    /// When it was last told \[us since its power-up\].
+    spoke_us: u64,
+}
+
+/// What the board said.
+#[derive(Debug, Default)]
+struct Heard {
+    heartbeats: u32,
+    /// Of the newest rotor command \[us since power-up\].
+    time_us: u64,
+    health: Health,
+    answers: HashSet<Answer>,
+    texts: HashSet<String>,
+}
+
+impl Talk {
+    fn new(board: Board) -> Self {
+        let decoder = Decoder::new(Address { system: 255, component: 190 });
+        Talk { board, station: Station::default(), decoder, heard: Heard::default(), spoke_us: 0 }
+    }
+
+    /// Talks, with `command` each time, until `enough`.
+    fn until(&mut self, command: Option<Command>, enough: impl Fn(&Heard) -> bool) {
+        let start = Instant::now();
+        while !enough(&self.heard) {
+            assert!(start.elapsed() < PATIENCE, "{:?}", self.heard);
+            let (spoke_us, heard) = (self.spoke_us, &mut self.heard);
+            self.decoder.feed(&self.board.receive().unwrap(), |_, message| match message {
+                Downlink::Heartbeat { .. } => heard.heartbeats += 1,
+                Downlink::Health(health) => heard.health = health,
+                Downlink::Answer { answer, .. } => drop(heard.answers.insert(answer)),
+                Downlink::Text(text) => drop(heard.texts.insert(text.to_str().unwrap().to_owned())),
+                Downlink::Rotors { time_us, .. } => heard.time_us = time_us,
+                _ => (),
+            });
+            // By the board's own clock, right after it told its time. Still, level, at its setpoint; the state goes last
+            // before the command, to be fresh when that arrives.
+            if heard.time_us >= spoke_us + EVERY_US {
+                let (state, setpoint) = motion(0.0);
+                self.station.say(Uplink::Setpoint(setpoint));
+                self.station.say(Uplink::State { sent_us: heard.time_us, state });
+                command.iter().for_each(|command| self.station.say(Uplink::Command(*command)));
+                self.spoke_us = heard.time_us;
+                self.board.send(&self.station.take()).unwrap();
+            }
+        }
+    }
+
+    /// Asks to be armed until the answer says that all is well: it is refused for this only, that the vehicle has to be
+    /// told for a whole second without a gap that it is at rest, which QEMU's USART is too slow for.
+    fn ask(&mut self) {
+        self.until(Some(Command::Arm), |heard| heard.texts.contains(Refusal::NotAtRest.reason()));
+    }
+}
+
+/// Five wait states, prefetch, both caches.
+const FLASH_ON: u32 = 5 | 1 << 8 | 1 << 9 | 1 << 10;
+/// The locking loop's source is the crystal; its divider.
+const PLL_FROM_CRYSTAL: u32 = 1 << 22;
+const PLL_DIVIDER: u32 = 0x3F;
+/// The core runs from the locking loop.
+const CORE_FROM_PLL: u32 = 0b10;
+
 #[test]
-fn it_boots_ticks_and_flies() {
+fn it_boots_ticks_and_listens() {
     // That it comes back means that the image got past its clocks.
     let Some(mut board) = start_or_skip(Image::Flight, |elf| Board::boot(&elf)) else { return };
     assert!(board.clock_accesses() > 10, "the clock tree was set up");
+    assert_eq!(board.clock_register(FLASH_ACR), FLASH_ON);
+    assert_eq!(board.clock_register(RCC_PLLCFGR) & (PLL_FROM_CRYSTAL | PLL_DIVIDER), PLL_FROM_CRYSTAL | 4);
     let gdb = board.halt().unwrap();
     assert_eq!(u32::from_le_bytes(gdb.memory(SYST_RVR).unwrap()), 168_000 - 1, "1 kHz at 168 MHz");
     gdb.resume().unwrap();
 
-    let mut station = Station::default();
-    let mut decoder = Decoder::<Downlink>::new(Address { system: 255, component: 190 });
-    let (mut heartbeats, mut rate_hz, mut accepted, mut spinning) = (0, 0.0, false, false);
-    let start = Instant::now();
-    let mut spoke = start;
-    while !(heartbeats > 0 && rate_hz > 0.0 && accepted && spinning) {
-        assert!(start.elapsed() < PATIENCE, "{heartbeats} heartbeats, {rate_hz} Hz, armed {accepted}, {spinning}");
+    let mut talk = Talk::new(board);
+    talk.until(None, |heard| heard.heartbeats > 0 && heard.health.rate_hz > 0.0);
+    assert!(RATE_HZ.contains(&talk.heard.health.rate_hz), "{:?}", talk.heard);
+    talk.ask();
+}
 
-        // Still, level, at its setpoint; the state goes last before the command, to be fresh when that arrives. QEMU's
-        // USART takes some 8 kB/s: more would pile up.
-        if spoke.elapsed() > Duration::from_millis(150) {
-            let (state, setpoint) = motion(0.0);
-            station.say(Uplink::Setpoint(setpoint));
-            station.say(Uplink::State { sent_us: start.elapsed().as_micros() as u64, state });
-            station.say(Uplink::Command(Command::Arm));
-            board.send(&station.take()).unwrap();
-            spoke = Instant::now();
-        }
-        decoder.feed(&board.receive().unwrap(), |_, message| match message {
-            Downlink::Heartbeat { .. } => heartbeats += 1,
-            Downlink::Health(health) => rate_hz = health.rate_hz,
-            Downlink::Answer { answer, .. } => accepted |= answer == Answer::Accepted,
-            Downlink::Rotors { armed, speeds, .. } => spinning |= armed && speeds.0.min() > 0.0,
-            _ => (),
-        });
+#[test]
+fn without_a_crystal_it_runs_on_and_does_not_arm() {
+    let Some(board) = start_or_skip(Image::Flight, |elf| Board::boot_without_crystal(&elf)) else { return };
+    assert_eq!(board.clock_register(RCC_PLLCFGR) & (PLL_FROM_CRYSTAL | PLL_DIVIDER), 8, "16 MHz / 8, as 8 MHz / 4");
+    assert_eq!(board.clock_register(RCC_CFGR) & 0b11, CORE_FROM_PLL);
+    assert_eq!(board.clock_register(FLASH_ACR), FLASH_ON);
+    let mut talk = Talk::new(board);
+    talk.until(None, |heard| heard.health.rate_hz > 0.0);
+    talk.until(Some(Command::Arm), |heard| heard.texts.contains(Refusal::Unhealthy.reason()));
+    assert!(talk.heard.texts.contains(CLOCK_FAILED), "{:?}", talk.heard);
+    assert!(!talk.heard.answers.contains(&Answer::Accepted), "{:?}", talk.heard);
+}
+
+#[test]
+fn a_crystal_that_fails_does_not_stop_it() {
+    let Some(board) = start_or_skip(Image::Flight, |elf| Board::boot(&elf)) else { return };
+    let mut talk = Talk::new(board);
+    talk.until(None, |heard| heard.health.rate_hz > 0.0);
+    talk.ask();
+    assert!(!talk.heard.texts.contains(CLOCK_FAILED), "{:?}", talk.heard);
+
+    talk.board.lose_crystal().unwrap();
+    assert_eq!(talk.board.clock_register(RCC_PLLCFGR) & (PLL_FROM_CRYSTAL | PLL_DIVIDER), 8);
+    assert_eq!(talk.board.clock_register(RCC_CFGR) & 0b11, CORE_FROM_PLL);
+    assert_eq!(talk.board.clock_register(FLASH_ACR), FLASH_ON, "the wait states of 168 MHz");
+
+    let failed_us = talk.heard.time_us;
+    talk.heard.texts.remove(Refusal::NotAtRest.reason());
+    talk.until(None, |heard| heard.texts.contains(CLOCK_FAILED));
+    talk.until(Some(Command::Arm), |heard| heard.texts.contains(Refusal::Unhealthy.reason()));
+    talk.until(None, |heard| heard.time_us > failed_us + 1_000_000 && heard.health.time_us > failed_us + 1_000_000);
+    assert!(RATE_HZ.contains(&talk.heard.health.rate_hz), "by its own clock: {:?}", talk.heard);
+}
+
+#[test]
+fn it_has_a_log() {
+    let Some((mut board, linked)) = start_or_skip(Image::Flight, |elf| Ok((Board::boot(&elf)?, Linked::read(&elf)?)))
+    else {
+        return;
+    };
+    for line in ["tick {=u32} cycles, longest {=u32}", "started by {=str}"] {
+        assert!(linked.log.iter().any(|logged| logged.contains(line)), "{line:?} in {:?}", linked.log);
     }
-    assert!((997.0..=1003.0).contains(&rate_hz), "the control tick runs at {rate_hz} Hz");
+    // It says something, and once a second more.
+    let header = linked.symbol("_SEGGER_RTT").unwrap();
+    let written = header + 16 + 4 + 4 + 3 * 4;
+    let mut said = || {
+        let gdb = board.halt().unwrap();
+        let said = u32::from_le_bytes(gdb.memory(written).unwrap());
+        gdb.resume().unwrap();
+        said
+    };
+    let first = said();
+    assert!(first > 0, "started by ...");
+    let start = Instant::now();
+    while said() == first {
+        assert!(start.elapsed() < PATIENCE, "no line a second");
+        std::thread::sleep(Duration::from_millis(50));
+    }
 }
 
 /// Bottom of the RAM, and of the stack; and the stack's top (`memory.x`).
@@ -60,19 +178,30 @@ const HARD_FAULT: u32 = 3;
 #[test]
 fn a_stack_that_overflows_ends_in_the_fault_handler() {
     let Some(mut board) = start_or_skip(Image::Flight, |elf| Board::boot(&elf)) else { return };
-    assert!(!board.receive().unwrap().is_empty(), "it runs");
+    let start = Instant::now();
+    while board.receive().unwrap().is_empty() {
+        assert!(start.elapsed() < PATIENCE, "it does not run");
+    }
 
     let gdb = board.halt().unwrap();
     gdb.set_register(SP, STACK.start + 16).unwrap();
     gdb.resume().unwrap();
-    std::thread::sleep(Duration::from_millis(300));
-    let gdb = board.halt().unwrap();
-    assert_eq!(gdb.register(XPSR).unwrap() & 0x1FF, HARD_FAULT);
+    let gdb = loop {
+        assert!(start.elapsed() < PATIENCE, "no fault");
+        std::thread::sleep(Duration::from_millis(50));
+        let gdb = board.halt().unwrap();
+        if gdb.register(XPSR).unwrap() & 0x1FF == HARD_FAULT {
+            break gdb;
+        }
+        gdb.resume().unwrap();
+    };
     let sp = gdb.register(SP).unwrap();
     assert!(STACK.contains(&(sp - 4)) && sp > STACK.end - 1024, "a fresh stack: {sp:#x}");
     gdb.resume().unwrap();
 
     // What was sent before it failed, and then nothing.
-    board.receive().unwrap();
+    while !board.receive().unwrap().is_empty() {
+        assert!(start.elapsed() < PATIENCE, "it talks on");
+    }
     assert_eq!(board.receive().unwrap(), [], "it is silent until the watchdog resets it");
 }

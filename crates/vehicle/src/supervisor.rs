@@ -81,7 +81,7 @@ pub enum Refusal {
     SetpointMissing = 4,
     /// The setpoint is farther from the vehicle than [`ArmingLimits::setpoint_distance_max_m`].
     SetpointTooFar = 5,
-    /// The control tick's rate is not known to be right.
+    /// The control tick is not known to keep its rate and its time ([`crate::rate`]), or its clock has failed.
     Unhealthy = 6,
     /// Within the last second it moved faster than [`ArmingLimits::speed_max_m_s`] or turned faster than
     /// [`ArmingLimits::rate_max_rad_s`], or no state told.
@@ -117,7 +117,7 @@ impl Refusal {
             Refusal::TiltTooLarge => "arming refused: tilt too large",
             Refusal::SetpointMissing => "arming refused: no fresh setpoint",
             Refusal::SetpointTooFar => "arming refused: setpoint too far away",
-            Refusal::Unhealthy => "arming refused: tick rate not 997 to 1003 Hz",
+            Refusal::Unhealthy => "arming refused: tick off its 1000 Hz, or clock bad",
             Refusal::NotAtRest => "arming refused: not at rest for a second",
             Refusal::InFlight => "disarming refused: in flight; force it to stop",
             Refusal::NotArmed => "refused: not armed",

@@ -71,6 +71,11 @@ impl<M> Memory<M> {
         self.mode
     }
 
+    /// The clock has failed and another has taken over: the vehicle is not armed again.
+    pub fn distrust_clock(&mut self) {
+        self.rate.distrust();
+    }
+
     /// What the controller remembers of this flight, or of the last one; none before the first.
     pub fn control(&self) -> Option<&M> {
         self.flight.as_ref().map(|flight| &flight.control)

@@ -1,7 +1,8 @@
-//! The rate's limits, and late ticks.
+//! The rate's limits, and ticks at the wrong time.
+#![allow(clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use proptest::prelude::*;
-use vehicle::rate::{Counter, Report};
+use vehicle::rate::{Counter, EARLY_US, LATE_US, Report, TICKS_MAX, TICKS_MIN, WINDOW_US};
 
 /// The report after ticks every `period_us` for `seconds`.
 fn after(period_us: f64, seconds: f64) -> Report {
@@ -10,19 +11,29 @@ fn after(period_us: f64, seconds: f64) -> Report {
     (0..=ticks).map(|tick| counter.tick((tick as f64 * period_us) as u64)).last().unwrap_or_default()
 }
 
+/// What a counter reports of ticks this far apart, the first at 0.
+fn reports(gaps_us: impl IntoIterator<Item = u64>) -> Vec<Report> {
+    let (mut counter, mut now_us) = (Counter::default(), 0);
+    let first = counter.tick(now_us);
+    let rest = gaps_us.into_iter().map(|gap_us| {
+        now_us += gap_us;
+        counter.tick(now_us)
+    });
+    std::iter::once(first).chain(rest).collect()
+}
+
 #[test]
 fn unknown_until_a_second_has_passed() {
     let report = after(1000.0, 0.999);
-    assert_eq!(report, Report { rate_hz: None, late_ticks: 0 });
+    assert_eq!(report, Report { steady: true, alive: true, ..Report::default() });
     assert!(!report.healthy(), "no arming yet");
-    assert!(report.may_feed_watchdog(), "no reset yet");
 }
 
 #[test]
 fn lockstep_time_is_1000_hz() {
     let report = after(1000.0, 5.0);
-    assert_eq!(report, Report { rate_hz: Some(1000), late_ticks: 0 });
-    assert!(report.healthy() && report.may_feed_watchdog());
+    assert_eq!(report, Report { rate_hz: Some(1000), steady: true, alive: true, ..Report::default() });
+    assert!(report.healthy());
 }
 
 #[test]
@@ -31,7 +42,7 @@ fn accepts_997_to_1003() {
         let report = after(1e6 / f64::from(rate_hz), 3.5);
         assert_eq!(report.rate_hz, Some(rate_hz));
         assert_eq!(report.healthy(), healthy, "{rate_hz}");
-        assert_eq!(report.may_feed_watchdog(), healthy, "{rate_hz}");
+        assert!(report.alive, "{rate_hz} Hz are better than no motors");
     }
 }
 
@@ -51,20 +62,101 @@ fn recovers_with_the_next_good_second() {
 }
 
 #[test]
-fn late_ticks_are_counted_one_by_one() {
+fn ticks_at_the_wrong_time_are_counted_one_by_one() {
     let mut counter = Counter::default();
-    let late: Vec<u32> =
-        [0, 1000, 2100, 3100, 4201, 5000, 9000, 9001].into_iter().map(|now| counter.tick(now).late_ticks).collect();
-    assert_eq!(late, [0, 0, 0, 0, 1, 1, 2, 2]);
+    let counts = [0, 1000, 2100, 3100, 4201, 5100, 6000, 6899, 9000, 9001].map(|now| {
+        let Report { late_ticks, early_ticks, .. } = counter.tick(now);
+        [late_ticks, early_ticks]
+    });
+    let wanted = [[0, 0], [0, 0], [0, 0], [0, 0], [1, 0], [1, 1], [1, 1], [1, 2], [2, 2], [2, 3]];
+    assert_eq!(counts, wanted);
+}
+
+#[test]
+fn ticks_in_pairs_are_not_healthy_though_1000_hz() {
+    let reports = reports([11, 1989].into_iter().cycle().take(5000));
+    assert!(reports.iter().all(|report| !report.healthy()));
+    assert_eq!(reports.last().and_then(|report| report.rate_hz), Some(1000));
+}
+
+#[test]
+fn a_clock_that_has_failed_is_never_healthy_again() {
+    let mut counter = Counter::default();
+    let second = |counter: &mut Counter, from_s: u64| {
+        (0..=1000).fold(Report::default(), |_, ms| counter.tick(from_s * 1_000_000 + ms * 1000 + 1000))
+    };
+    second(&mut counter, 0);
+    assert!(second(&mut counter, 1).healthy());
+    counter.distrust();
+    for from_s in 2..5 {
+        let report = second(&mut counter, from_s);
+        assert!(report.clock_failed && !report.healthy());
+        assert!(report.alive, "it flies on");
+    }
 }
 
 proptest! {
-    /// No times whatever panic it; a clock that stands still or goes back never makes it healthy.
+    /// Healthy is exactly: a full second was counted and had 997 to 1003 ticks, and every gap that ended within the last
+    /// second was right.
     #[test]
-    fn any_times(times in prop::collection::vec(any::<u64>(), 0..200)) {
+    fn healthy_is_rate_and_gaps(
+        stretches in prop::collection::vec(
+            (prop_oneof![4 => Just(1000), 4 => 890u64..1110, 1 => 0u64..4000], 1..1500usize), 1..8)
+    ) {
+        let gaps: Vec<u64> = stretches.iter().flat_map(|&(gap, times)| std::iter::repeat_n(gap, times)).collect();
+        let reports = reports(gaps.iter().copied());
+        let mut times = vec![0];
+        for gap in &gaps {
+            times.push(times.last().unwrap_or(&0) + gap);
+        }
+        // The rate: whole seconds, each from the first tick that is a second after the start of the last one.
+        let (mut start, mut rate) = (0, None);
+        let mut last_off = None;
+        for (index, (&now, report)) in times.iter().zip(&reports).enumerate() {
+            if now - times[start] >= u64::from(WINDOW_US) {
+                rate = Some((index - start) as u32);
+                start = index;
+            }
+            if index > 0 && !(EARLY_US..=LATE_US).contains(&(gaps[index - 1] as u32)) {
+                last_off = Some(now);
+            }
+            let steady = last_off.is_none_or(|off| now - off >= u64::from(WINDOW_US));
+            let in_range = rate.is_some_and(|rate| (TICKS_MIN..=TICKS_MAX).contains(&rate));
+            prop_assert_eq!(report.rate_hz, rate);
+            prop_assert_eq!(report.steady, steady, "at {} us", now);
+            prop_assert_eq!(report.healthy(), steady && in_range);
+            prop_assert_eq!(report.alive, index == 0 || gaps[index - 1] > 0);
+        }
+    }
+
+    /// One tick that is missing, or one too many, anywhere in the last second forbids arming, and none in the second
+    /// before that does.
+    #[test]
+    fn one_gap_is_enough(at in 0usize..2000, wrong in prop_oneof![0..u64::from(EARLY_US), u64::from(LATE_US) + 1..2600]) {
+        let gaps = (0..4000).map(|index| if index == at + 500 { wrong } else { 1000 });
+        let reports = reports(gaps);
+        let (before, after) = (&reports[at + 500], &reports[at + 501..at + 1501]);
+        prop_assert_eq!(before.off_ticks(), 0);
+        prop_assert!(after.iter().all(|report| !report.healthy() && report.off_ticks() == 1));
+        prop_assert!(reports.last().is_some_and(Report::healthy));
+    }
+
+    /// A tick is alive for as long as time moves on, however odd its rate: what flies is not reset.
+    #[test]
+    fn alive_while_time_moves(gaps in prop::collection::vec(1u64..3_000_000, 1..300)) {
+        prop_assert!(reports(gaps).iter().all(|report| report.alive));
+    }
+
+    /// No times whatever panic it; a clock that stands still or goes back is dead, and nothing of this is healthy.
+    #[test]
+    fn any_times(times in prop::collection::vec(any::<u64>(), 1..200)) {
         let mut counter = Counter::default();
+        let mut last = None;
         for now_us in times {
-            prop_assert!(!counter.tick(now_us).healthy());
+            let report = counter.tick(now_us);
+            prop_assert!(!report.healthy());
+            prop_assert_eq!(report.alive, last.is_none_or(|last| now_us > last));
+            last = Some(now_us);
         }
     }
 }

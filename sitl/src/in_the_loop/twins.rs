@@ -29,7 +29,7 @@ pub struct Comparison {
     pub first_difference: Option<u64>,
     /// Instructions of each armed control tick.
     pub instructions: Spread,
-    /// Ticks that came late, by the processor's own clock.
+    /// Ticks that came late or early, by the processor's own clock.
     pub late_ticks: u32,
     /// Most stack ever used, interrupts included \[bytes\].
     pub stack_bytes: u32,
@@ -75,7 +75,7 @@ impl Comparison {
             self.armed_ticks += 1;
             self.instructions.add(f64::from(reply.instructions));
         }
-        self.late_ticks = tick.report.health.rate.late_ticks;
+        self.late_ticks = tick.report.health.rate.off_ticks();
         self.stack_bytes = self.stack_bytes.max(reply.stack_bytes);
     }
 }

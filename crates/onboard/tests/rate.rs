@@ -1,0 +1,110 @@
+//! A control tick that does not keep its time, and a clock that fails: the pilot is told once, and arming is refused.
+#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
+
+use airframe::{Setpoint, State};
+use link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
+use onboard::{CLOCK_FAILED, Comms, Flight, TICK_OFF};
+use vehicle::{Inbox, Mode, Refusal};
+
+const STATION: Address = Address { system: 255, component: 190 };
+
+/// The firmware under a tick of any period, tracked at rest and told where to be.
+struct Bench {
+    flight: Flight,
+    comms: Comms,
+    inbox: Inbox,
+    sender: Sender,
+    decoder: Decoder<Downlink>,
+    now_us: u64,
+    mode: Mode,
+    /// What was said.
+    texts: Vec<String>,
+    answers: Vec<Answer>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Bench {
+            flight: Flight::new().expect("valid"),
+            comms: Comms::new(),
+            inbox: Inbox::default(),
+            sender: Sender::new(STATION),
+            decoder: Decoder::new(STATION),
+            now_us: 0,
+            mode: Mode::Disarmed,
+            texts: Vec::new(),
+            answers: Vec::new(),
+        }
+    }
+
+    fn hear(&mut self, message: Uplink) {
+        let news = self.comms.receive(self.sender.send(&message, &mut [0; FRAME_MAX]));
+        self.inbox.post(&news);
+    }
+
+    /// So many ticks, so far apart.
+    fn run(&mut self, ticks: u32, period_us: u64) {
+        for _ in 0..ticks {
+            self.now_us += period_us;
+            // Never the same twice, as measurements are.
+            let mut state = State::default();
+            state.position_m.z = 1e-6 * (self.now_us % 11) as f32;
+            self.hear(Uplink::State { sent_us: self.now_us, state });
+            self.hear(Uplink::Setpoint(Setpoint::default()));
+            let report = self.flight.tick(self.now_us, &self.inbox.take());
+            self.mode = report.mode;
+            let Bench { comms, decoder, texts, answers, .. } = self;
+            let mut hear = |_: Address, message: Downlink| match message {
+                Downlink::Text(text) => texts.push(text.to_str().expect("text").to_owned()),
+                Downlink::Answer { answer, .. } => answers.push(answer),
+                _ => (),
+            };
+            comms.report(&report, 0, |bytes| decoder.feed(bytes, &mut hear));
+        }
+    }
+
+    /// The answer to a request to arm.
+    fn arm(&mut self) -> Answer {
+        self.answers.clear();
+        self.hear(Uplink::Command(Command::Arm));
+        self.run(1, 1000);
+        *self.answers.first().expect("answered")
+    }
+}
+
+#[test]
+fn a_tick_off_its_time_is_told_and_does_not_end_the_flight() {
+    let mut bench = Bench::new();
+    bench.run(1100, 1000);
+    assert_eq!(bench.arm(), Answer::Accepted);
+    bench.run(500, 1000);
+    assert_eq!(bench.texts, [""; 0]);
+
+    // One that is missing; then a second in which every tick is 5 % late.
+    bench.run(1, 2000);
+    assert_eq!(bench.texts, [TICK_OFF]);
+    bench.run(2000, 1050);
+    assert_eq!((bench.mode, bench.texts.len()), (Mode::Flying, 1), "told once, and flies on");
+
+    bench.hear(Uplink::Command(Command::Kill));
+    bench.run(1, 1000);
+    assert_eq!(bench.arm(), Answer::Refused(Refusal::Unhealthy as i32));
+    bench.texts.clear();
+    bench.run(3000, 1000);
+    assert_eq!(bench.arm(), Answer::Accepted, "it keeps its time again");
+}
+
+#[test]
+fn a_clock_that_fails_is_told_and_forbids_arming() {
+    let mut bench = Bench::new();
+    bench.run(1100, 1000);
+    assert_eq!(bench.arm(), Answer::Accepted);
+    bench.run(50, 1000);
+    bench.flight.distrust_clock();
+    bench.run(3000, 1000);
+    assert_eq!(bench.texts, [CLOCK_FAILED]);
+    assert_eq!(bench.mode, Mode::Flying);
+    bench.hear(Uplink::Command(Command::Kill));
+    bench.run(3000, 1000);
+    assert_eq!(bench.arm(), Answer::Refused(Refusal::Unhealthy as i32), "not until it is switched off and on");
+}

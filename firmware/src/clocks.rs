@@ -1,0 +1,112 @@
+//! Clocks of the real board: 168 MHz, the chip's rated speed, from the crystal, or, should that fail, from the chip's own
+//! oscillator; and a flash that keeps up with them.
+//!
+//! The oscillator of the chip is good to 1 % at room temperature: the vehicle flies on it, and everything is up to 1 %
+//! too fast or too slow, but nobody takes off on it ([`have_failed`]).
+
+use core::sync::atomic::{AtomicBool, Ordering};
+use embassy_stm32::pac::rcc::vals::{Pllm, Pllsrc, Sw};
+use embassy_stm32::pac::{DBGMCU, FLASH, RCC};
+use embassy_stm32::rcc::{
+    AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllQDiv, PllSource, Sysclk,
+};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::{Config, Peripherals};
+
+/// The crystal \[Hz\].
+const CRYSTAL: Hertz = Hertz(8_000_000);
+/// How long a crystal may take to start \[ms\]; usually 2.
+const CRYSTAL_START_MS: u32 = 100;
+/// Core cycles in a millisecond, before the clocks are set up.
+const START_UP_CYCLES_PER_MS: u32 = 16_000;
+/// Looks at the locking loop until it counts as broken: at 16 MHz some 3 ms, of which it needs 0.3.
+const LOCK_LOOKS: u32 = 5_000;
+
+static FAILED: AtomicBool = AtomicBool::new(false);
+
+/// True if the crystal has failed, at the start or in flight: nobody should take off.
+pub fn have_failed() -> bool {
+    FAILED.load(Ordering::Relaxed)
+}
+
+/// Sets up clocks and flash. To be called once, in the state that a reset leaves.
+pub fn start() -> Peripherals {
+    let crystal = crystal_starts();
+    FAILED.store(!crystal, Ordering::Relaxed);
+    let peripherals = embassy_stm32::init(config(crystal));
+    speed_up_flash();
+    // The clock security system: hardware that falls back on the chip's oscillator and raises an NMI.
+    RCC.cr().modify(|cr| cr.set_csson(crystal));
+    peripherals
+}
+
+/// Turns the crystal on, since embassy's init would wait for it for ever.
+fn crystal_starts() -> bool {
+    RCC.cr().modify(|cr| cr.set_hseon(true));
+    (0..CRYSTAL_START_MS).any(|_| {
+        let ready = RCC.cr().read().hserdy();
+        if !ready {
+            cortex_m::asm::delay(START_UP_CYCLES_PER_MS);
+        }
+        ready
+    })
+}
+
+/// 168 MHz; buses at 168, 42 and 84 MHz.
+fn config(crystal: bool) -> Config {
+    // Both give the loop 2 MHz.
+    let (source, prediv) = if crystal { (PllSource::HSE, PllPreDiv::DIV4) } else { (PllSource::HSI, PllPreDiv::DIV8) };
+    let mut config = Config::default();
+    config.rcc.hse = crystal.then_some(Hse { freq: CRYSTAL, mode: HseMode::Oscillator });
+    config.rcc.pll_src = source;
+    config.rcc.pll =
+        Some(Pll { prediv, mul: PllMul::MUL168, divp: Some(PllPDiv::DIV2), divq: Some(PllQDiv::DIV7), divr: None });
+    config.rcc.sys = Sysclk::PLL1_P;
+    config.rcc.ahb_pre = AHBPrescaler::DIV1;
+    config.rcc.apb1_pre = APBPrescaler::DIV4;
+    config.rcc.apb2_pre = APBPrescaler::DIV2;
+    config
+}
+
+/// First revision of the chip (Z) whose flash may prefetch; on revision A, prefetching corrupts what is fetched.
+const REVISION_Z: u16 = 0x1001;
+
+/// Turns on the flash's caches and its prefetch, which embassy leaves off: five wait states a fetch are then seldom seen.
+fn speed_up_flash() {
+    let acr = FLASH.acr();
+    // Off now, as they must be to be emptied: a boot loader may have used them.
+    acr.modify(|acr| {
+        acr.set_icrst(true);
+        acr.set_dcrst(true);
+    });
+    acr.modify(|acr| {
+        acr.set_icrst(false);
+        acr.set_dcrst(false);
+        acr.set_icen(true);
+        acr.set_dcen(true);
+        acr.set_prften(DBGMCU.idcode().read().rev_id() >= REVISION_Z);
+    });
+}
+
+/// The crystal has failed: the core runs at 16 MHz by now. Back to 168, in less than a control period.
+#[allow(unsafe_code, reason = "the runtime asks for it: this interrupts critical sections")]
+#[cortex_m_rt::exception]
+unsafe fn NonMaskableInt() {
+    if !RCC.cir().read().cssf() {
+        return;
+    }
+    FAILED.store(true, Ordering::Relaxed);
+    RCC.cir().modify(|cir| cir.set_cssc(true));
+    RCC.cr().modify(|cr| {
+        cr.set_hseon(false);
+        cr.set_pllon(false);
+    });
+    RCC.pllcfgr().modify(|pll| {
+        pll.set_pllsrc(Pllsrc::HSI);
+        pll.set_pllm(Pllm::DIV8);
+    });
+    RCC.cr().modify(|cr| cr.set_pllon(true));
+    if (0..LOCK_LOOKS).any(|_| RCC.cr().read().pllrdy()) {
+        RCC.cfgr().modify(|cfgr| cfgr.set_sw(Sw::PLL1_P));
+    }
+}
