@@ -82,14 +82,18 @@ fn flown(scenario: &Scenario, kind: ControllerKind, tracker: Tracker) -> (f64, b
     }
 }
 
+/// As close as on a state a millisecond, or nearly: extrapolation makes up for the rest. Without it PID and AFBC are lost.
 #[test]
 fn a_tracker_of_100_hz_that_is_10_ms_late_is_flown_on() {
     let mut scenario = built_in("hardware").unwrap().scenario().unwrap();
     scenario.duration_s = 20.0;
     for kind in ControllerKind::ALL {
-        for (period, late) in [(1, 0), (10, 0), (10, 5), (10, 10), (5, 10), (1, 10)] {
-            let (rms_m, flies) = flown(&scenario, kind, Tracker::new(period, late));
-            println!("{} {period} ms, {late} ms late: {rms_m:.4} m, {flies}", kind.name());
+        let (best_m, flies) = flown(&scenario, kind, Tracker::new(1, 0));
+        assert!(flies, "{}", kind.name());
+        for (period_ms, late_ms) in [(10, 0), (10, 5), (10, 10), (5, 10), (1, 10)] {
+            let (rms_m, flies) = flown(&scenario, kind, Tracker::new(period_ms, late_ms));
+            println!("{}: every {period_ms} ms, {late_ms} ms late: {rms_m:.4} m ({best_m:.4} m)", kind.name());
+            assert!(flies && rms_m < best_m + 0.003, "{}: {rms_m} m instead of {best_m} m", kind.name());
         }
     }
 }

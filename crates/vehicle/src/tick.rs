@@ -186,6 +186,9 @@ impl<C: FlightController> Vehicle<C> {
         });
         let done = |request| answer.is_some_and(|answer| answer.request == request && answer.result.is_ok());
         let ended = mode.end(&observed);
+        if ended.is_some() && observed.airborne {
+            *restless_us = now_us;
+        }
         *mode = mode.next(&observed);
         let mode = *mode;
         // Arming takes a tick of its own, in which the motors idle: setting up a flight and a step are too much for one.

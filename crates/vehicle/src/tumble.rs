@@ -29,6 +29,8 @@ struct Over {
     lowest: f32,
     /// Since when it has been upright again.
     upright_since_us: Option<u64>,
+    /// True if it went over again before that was long enough: coming up is no way back then.
+    again: bool,
 }
 
 impl Tumble {
@@ -37,8 +39,9 @@ impl Tumble {
         let cosine = math::tilt_cosine(state.attitude_rad.x, state.attitude_rad.y);
         let spins = state.rates_rad_s.xy().norm_squared() > SPIN_RAD_S * SPIN_RAD_S;
         let upright = cosine >= TILT_COSINE_MIN && !spins;
+        let new = Over { since_us: now_us, lowest: cosine, upright_since_us: None, again: false };
         let Some(over) = &mut self.over else {
-            self.over = (!upright).then_some(Over { since_us: now_us, lowest: cosine, upright_since_us: None });
+            self.over = (!upright).then_some(new);
             return;
         };
         if upright {
@@ -48,9 +51,9 @@ impl Tumble {
             }
             return;
         }
-        over.upright_since_us = None;
-        if cosine > over.lowest + RIGHTING && !spins {
-            *over = Over { since_us: now_us, lowest: cosine, upright_since_us: None };
+        over.again |= over.upright_since_us.take().is_some();
+        if cosine > over.lowest + RIGHTING && !spins && !over.again {
+            *over = new;
         }
         over.lowest = math::min(over.lowest, cosine);
     }

@@ -3,7 +3,7 @@
 //! | what it sends | is told from |
 //! |---|---|
 //! | the same state again, to the last bit | a measurement never repeats itself in the air |
-//! | a pose that stands, with a twist that says it moves | displacement against the integral of velocity and rates over half a second |
+//! | a pose that stands, with a twist that says it moves | displacement against the integral of velocity and rates over a quarter of a second |
 //! | a vehicle that hangs still without thrust | [`crate::ground`] |
 //!
 //! A repeated state is no measurement: its age goes on. After either of the others the tracker is not believed for the rest
@@ -14,11 +14,11 @@ use airframe::State;
 use nalgebra::Vector3;
 
 /// Time over which displacements are compared \[us\].
-pub const WINDOW_US: u64 = 500_000;
+pub const WINDOW_US: u64 = 250_000;
 /// Least displacement that the twist has to tell of, along any axis \[m\].
-pub const TRAVEL_M: f32 = 0.3;
+pub const TRAVEL_M: f32 = 0.15;
 /// Least turn that the twist has to tell of, about body x or y \[rad\].
-pub const TURN_RAD: f32 = 0.3;
+pub const TURN_RAD: f32 = 0.15;
 /// Share of it up to which a pose stands.
 pub const STANDS_SHARE: f32 = 0.2;
 

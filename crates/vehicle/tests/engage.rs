@@ -40,7 +40,7 @@ impl Bench {
         let mut inbox = Inbox::EMPTY;
         if tracked {
             let mut value = State::default();
-            value.position_m.z = if at_us % 2000 == 0 { 1e-6 } else { -1e-6 };
+            value.position_m.z = if at_us.is_multiple_of(2000) { 1e-6 } else { -1e-6 };
             inbox.measure(Stamped { value, at_us });
         }
         inbox.aim(Stamped { value: Setpoint::default(), at_us });

@@ -1,0 +1,329 @@
+//! Clocks as trackers have them, each for a minute of hover: what becomes of the flight, and of the ages of its states.
+#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
+
+use afbc::{Adaptive, Controller, Profile};
+use airframe::{Parameters, Setpoint, State};
+use proptest::prelude::*;
+use vehicle::clock::SILENCE_US;
+use vehicle::tracker::{Refused, SILENT_US};
+use vehicle::{ArmingLimits, Asked, Inbox, Memory, Mode, Request, SourceClock, Stamped, Tracker, Vehicle};
+
+/// When the vehicle is armed, when something happens to the clock, and when the case ends \[us since power-up\].
+const ARM_US: u64 = 2_000_000;
+const EVENT_US: u64 = 10_000_000;
+const END_US: u64 = 70_000_000;
+/// The tracker measures 100 times a second; a state needs a millisecond to arrive.
+const PERIOD_US: u64 = 10_000;
+const DELAY_US: u64 = 1_000;
+
+/// A state under way.
+struct Sent {
+    sender: u16,
+    measured_us: u64,
+    stamp_us: u64,
+    arrives_us: u64,
+}
+
+/// What a case shows.
+#[derive(Debug, Default)]
+struct Seen {
+    /// In flight, in their order.
+    modes: Vec<Mode>,
+    /// Largest error of a state's age, of those that were flown on \[us\].
+    age_error_us: u64,
+    refused: Refused,
+}
+
+/// The state of a hovering vehicle through a tracker's noise.
+fn hovering(measured_us: u64) -> State {
+    let mut state = State::default();
+    state.position_m.z = (measured_us / 1000 * 7919 % 1000) as f32 * 1e-8;
+    state
+}
+
+fn play(mut sent: Vec<Sent>) -> Seen {
+    sent.sort_by_key(|sent| sent.arrives_us);
+    let (airframe, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
+    let law = Adaptive::new(Profile::Flight.gains()).expect("valid");
+    let controller = Controller::new(airframe, settings, law).expect("valid");
+    let vehicle = Vehicle::new(airframe, settings, ArmingLimits::default(), controller).expect("valid");
+    let (mut memory, mut inbox, mut tracker) = (Memory::default(), Inbox::default(), Tracker::default());
+    let mut sent = sent.iter().peekable();
+    let mut seen = Seen::default();
+    for now_us in (1000..END_US).step_by(1000) {
+        while let Some(sent) = sent.next_if(|sent| sent.arrives_us <= now_us) {
+            let state = hovering(sent.measured_us);
+            if let Some(state) = tracker.stamp(sent.sender, sent.stamp_us, now_us, state) {
+                // The delay of the fastest state cannot be known.
+                let error_us = state.at_us.abs_diff(sent.measured_us + DELAY_US);
+                seen.age_error_us = seen.age_error_us.max(error_us);
+                inbox.measure(state);
+            }
+        }
+        inbox.aim(Stamped { value: Setpoint::default(), at_us: now_us });
+        if now_us == ARM_US {
+            assert!(inbox.ask(Asked { request: Request::Arm, ticket: 0 }));
+        }
+        let mode = vehicle.tick(&mut memory, now_us, &inbox.take()).mode;
+        if now_us >= ARM_US && seen.modes.last() != Some(&mode) {
+            seen.modes.push(mode);
+        }
+    }
+    seen.refused = *tracker.refused();
+    seen
+}
+
+/// The states of one sender, stamped by `clock` from the true time.
+fn stamped(clock: impl Fn(u64) -> u64) -> Vec<Sent> {
+    let at =
+        |measured_us| Sent { sender: 1, measured_us, stamp_us: clock(measured_us), arrives_us: measured_us + DELAY_US };
+    (0..END_US).step_by(PERIOD_US as usize).map(at).collect()
+}
+
+/// True time plus this much from the event on.
+fn steps(by_us: i64) -> Vec<Sent> {
+    stamped(
+        move |t| if t < EVENT_US { (t + HOUR_US).wrapping_add(0) } else { (t + HOUR_US).wrapping_add_signed(by_us) },
+    )
+}
+
+/// One stamp that is this much ahead.
+fn once_ahead(by_us: u64) -> Vec<Sent> {
+    stamped(move |t| if t == EVENT_US { t + by_us } else { t })
+}
+
+fn drifts(ppm: i64) -> Vec<Sent> {
+    stamped(move |t| t.wrapping_add_signed(HOUR_US as i64 + t as i64 * ppm / 1_000_000))
+}
+
+/// Of this resolution.
+fn coarse(resolution_us: u64) -> Vec<Sent> {
+    stamped(move |t| (t + 12_345) / resolution_us * resolution_us)
+}
+
+/// Arrivals later by up to `by_us`, as if by chance.
+fn jitters(by_us: u64) -> Vec<Sent> {
+    let mut sent = stamped(|t| t);
+    for (n, sent) in sent.iter_mut().enumerate() {
+        sent.arrives_us += n as u64 * 7919 % 1009 * by_us / 1009;
+    }
+    sent
+}
+
+/// Two senders with clocks of their own, the first of which falls silent.
+fn two(until_us: u64) -> Vec<Sent> {
+    let mut sent = stamped(|t| t);
+    sent.retain(|sent| sent.measured_us < until_us);
+    let mut other = stamped(|t| t / 3 + 77 * HOUR_US);
+    for sent in &mut other {
+        // Not slower, but of another zero; between the first one's.
+        sent.stamp_us = sent.measured_us + 77 * HOUR_US;
+        sent.sender = 2;
+        sent.measured_us += 4_000;
+        sent.arrives_us += 4_000;
+        sent.stamp_us += 4_000;
+    }
+    sent.extend(other);
+    sent
+}
+
+const HOUR_US: u64 = 3_600_000_000;
+/// A Saturday in 2026, as microseconds since 1970.
+const WALL_US: u64 = 1_795_000_000_000_000;
+
+use Mode::{Flying as F, Riding as R};
+
+/// A clock, the modes that follow, the largest error of an age \[us\].
+type Case = (&'static str, fn() -> Vec<Sent>, &'static [Mode], u64);
+
+#[rustfmt::skip]
+const CASES: &[Case] = &[
+    ("a good clock", || stamped(|t| t), &[F], 0),
+    ("one stamp 11 ms ahead", || once_ahead(11_000), &[F], 0),
+    ("one stamp 19 ms ahead", || once_ahead(19_000), &[F], 0),
+    ("one stamp 30 ms ahead", || once_ahead(30_000), &[F], 0),
+    ("one stamp an hour ahead", || once_ahead(HOUR_US), &[F], 0),
+    ("one stamp 5 ms back", || stamped(|t| if t == EVENT_US { t - 5_000 } else { t }), &[F], 5_000),
+    ("one stamp an hour back", || stamped(|t| if t == EVENT_US { 1 } else { t }), &[F], 0),
+    ("every tenth stamp 15 ms ahead", || stamped(|t| if t % 100_000 == 50_000 { t + 15_000 } else { t }), &[F], 0),
+    ("a step of 5 ms ahead", || steps(5_000), &[F], 0),
+    ("a step of 25 ms ahead", || steps(25_000), &[F], 0),
+    ("a step of an hour ahead", || steps(HOUR_US as i64), &[F], 0),
+    ("a step of 5 ms back", || steps(-5_000), &[F], 5_000),
+    ("a step of 9 ms back", || steps(-9_000), &[F], 9_000),
+    ("a step of 25 ms back", || steps(-25_000), &[F, R, F], 0),
+    ("a step of half an hour back", || steps(-(HOUR_US as i64) / 2), &[F, R, F], 0),
+    ("32 bits of microseconds that wrap", || stamped(|t| (t + (1 << 32) - EVENT_US) % (1 << 32)), &[F, R, F], 0),
+    ("200 ppm fast", || drifts(200), &[F], 200),
+    ("200 ppm slow", || drifts(-200), &[F], 200),
+    ("1000 ppm fast", || drifts(1000), &[F], 1_100),
+    ("1000 ppm slow", || drifts(-1000), &[F], 1_100),
+    ("slewed by 500 ppm for 20 s", || stamped(|t| t + t.clamp(EVENT_US, 3 * EVENT_US) / 2000), &[F], 600),
+    ("slewed back by 500 ppm for 20 s", || stamped(|t| HOUR_US + t - t.clamp(EVENT_US, 3 * EVENT_US) / 2000), &[F], 600),
+    ("a resolution of 1 ms", || coarse(1_000), &[F], 1_000),
+    ("a resolution of 15.625 ms", || coarse(15_625), &[F], 15_625),
+    ("a resolution of 1 s", || coarse(1_000_000), &[F], 10_000),
+    ("no stamps at all", || stamped(|_| 0), &[F], 0),
+    ("a clock that stops", || stamped(|t| t.min(EVENT_US)), &[F], 0),
+    ("a wall clock", || stamped(|t| t + WALL_US), &[F], 0),
+    ("a wall clock that is set by NTP in flight", || stamped(|t| if t < EVENT_US { t } else { t + WALL_US }), &[F], 0),
+    ("nanoseconds sent as microseconds", || stamped(|t| t * 1000), &[F], 0),
+    ("jitter of 8 ms", || jitters(8_000), &[F], 1_000),
+    ("two senders", || two(END_US), &[F], 0),
+    ("two senders, one of which falls silent", || two(EVENT_US), &[F, R, F], 0),
+];
+
+#[test]
+fn ordinary_clocks_end_no_flight() {
+    let mut failures = String::new();
+    for (name, sent, modes, age_error_us) in CASES {
+        let seen = play(sent());
+        println!("{name:<45} {:?} {} us, {:?}", seen.modes, seen.age_error_us, seen.refused);
+        // Ticks take what has come a millisecond at a time.
+        if seen.modes != *modes || seen.age_error_us > age_error_us + 1_000 {
+            failures += &format!("{name}: expected {modes:?} within {age_error_us} us, saw {seen:?}\n");
+        }
+    }
+    assert!(failures.is_empty(), "\n{failures}");
+}
+
+/// Milliseconds sent as microseconds look like a delay that grows by 10 ms from state to state: the vehicle does not arm.
+#[test]
+fn a_clock_that_crawls_is_not_flown_on() {
+    assert_eq!(play(stamped(|t| t / 1000)).modes, [Mode::Disarmed]);
+}
+
+#[test]
+fn refused_states_are_counted_by_reason() {
+    assert_eq!(play(stamped(|t| t)).refused, Refused::default());
+    let refused = play(two(END_US)).refused;
+    assert!(u64::from(refused.elsewhere) > END_US / PERIOD_US - 5, "{refused:?}");
+    let mut twice = stamped(|t| t);
+    twice.extend(stamped(|t| t));
+    let refused = play(twice).refused;
+    assert!(u64::from(refused.overtaken) > END_US / PERIOD_US - 5, "{refused:?}");
+    let mut held_up = stamped(|t| t);
+    held_up.iter_mut().filter(|sent| sent.measured_us % 1_000_000 == 0).for_each(|sent| sent.arrives_us += 100_000);
+    let refused = play(held_up).refused;
+    assert!((60..=70).contains(&refused.overtaken), "{refused:?}");
+}
+
+#[test]
+fn another_sender_takes_over_after_a_silence_only() {
+    let mut tracker = Tracker::default();
+    let mut says = |sender, now_us| tracker.stamp(sender, now_us, now_us, hovering(now_us)).is_some();
+    assert!(says(1, 0));
+    assert!(!says(2, SILENT_US));
+    assert!(says(2, SILENT_US + 1));
+    assert!(!says(1, 2 * SILENT_US), "then the other one is in use");
+    assert!((3..9).all(|sender| !says(sender, 2 * SILENT_US)), "however many there are");
+    assert!(says(2, 2 * SILENT_US + 1));
+}
+
+/// One that says the same again and again is silent, too.
+#[test]
+fn a_frozen_sender_gives_way() {
+    let mut tracker = Tracker::default();
+    for now_us in (0..100_000).step_by(10_000) {
+        assert!(tracker.stamp(1, now_us, now_us, State::default()).is_some());
+    }
+    assert!(tracker.stamp(2, 5, 100_000, hovering(1)).is_some());
+}
+
+#[test]
+fn delay_beyond_the_fastest_message_is_age() {
+    // The sender's clock is 1 s ahead; messages take 2 ms, one of them 50 ms.
+    let mut clock = SourceClock::default();
+    for (sent, arrived, stamp) in [
+        (1_000_000, 2_000, Some(2_000)),
+        (1_010_000, 12_000, Some(12_000)),
+        (1_020_000, 70_000, Some(22_000)),
+        (1_030_000, 71_000, Some(32_000)),
+        (1_080_000, 82_000, Some(82_000)),
+        (1_079_000, 83_000, None), // overtaken
+        (1_080_000, 84_000, None), // twice
+        (1_081_000, 85_000, Some(83_000)),
+    ] {
+        assert_eq!(clock.stamp(sent, arrived, sent != 1_080_000 || arrived < 84_000), stamp, "sent at {sent}");
+    }
+}
+
+#[test]
+fn a_faster_message_corrects_the_difference() {
+    let mut clock = SourceClock::default();
+    assert_eq!(clock.stamp(0, 40_000, true), Some(40_000), "the first one cannot be known to be late");
+    assert_eq!(clock.stamp(10_000, 11_000, true), Some(11_000));
+    assert_eq!(clock.stamp(20_000, 21_000, true), Some(21_000), "two of the first ones are believed");
+    assert_eq!(clock.stamp(30_000, 50_000, true), Some(31_000));
+}
+
+#[test]
+fn after_a_long_silence_a_clock_is_new() {
+    let mut clock = SourceClock::default();
+    assert_eq!(clock.stamp(9_000_000, 1_000, true), Some(1_000));
+    assert_eq!(clock.stamp(5, 1_000 + SILENCE_US, true), None, "might be an old one");
+    assert_eq!(clock.stamp(6, 1_001 + SILENCE_US, true), Some(1_001 + SILENCE_US));
+    assert_eq!(clock.stamp(7, 1_002 + SILENCE_US, true), Some(1_002 + SILENCE_US));
+}
+
+proptest! {
+    /// No times panic it, and none gives a message that was sent after it arrived.
+    #[test]
+    fn any_times(times in prop::collection::vec((any::<u64>(), any::<u64>(), any::<bool>()), 0..50)) {
+        let mut clock = SourceClock::default();
+        for (sent, arrived, differs) in times {
+            prop_assert!(clock.stamp(sent, arrived, differs).is_none_or(|at| at <= arrived));
+        }
+    }
+
+    /// On a good clock behind any delays, a state is never taken for older than it is, beyond what the fastest one of the
+    /// last second tells of the clocks.
+    #[test]
+    fn an_age_is_no_more_than_the_delay(
+        steps in prop::collection::vec((1u64..50_000, 0u64..300_000), 1..100),
+        ahead in 0u64..1 << 60,
+    ) {
+        let mut clock = SourceClock::default();
+        let (mut sent, mut arrived) = (ahead, 0);
+        for (period, delay) in steps {
+            sent += period;
+            arrived = arrived.max(sent - ahead + delay);
+            if let Some(at) = clock.stamp(sent, arrived, true) {
+                prop_assert!(at <= arrived && arrived - at <= arrived - (sent - ahead));
+            }
+        }
+    }
+
+    /// Whatever one stamp says, the flight goes on: a single outlier, in any direction.
+    #[test]
+    fn one_wrong_stamp_is_nothing(wrong in any::<u64>(), at in 200u64..400) {
+        let (mut clock, mut worst_us) = (SourceClock::default(), 0);
+        for n in 0..1000u64 {
+            let (sent, arrived) = (HOUR_US + n * PERIOD_US, n * PERIOD_US + 500);
+            let said = if n == at { wrong } else { sent };
+            match clock.stamp(said, arrived, true) {
+                Some(at_us) => worst_us = worst_us.max(arrived - at_us),
+                None => prop_assert!(n == at, "state {n} was refused"),
+            }
+        }
+        // One that is a little behind is taken for late.
+        prop_assert!(worst_us <= PERIOD_US + 2_000, "{worst_us} us");
+    }
+
+    /// Whatever step a clock makes, states are flown on again within 50 ms, and never taken for older than a step back
+    /// that is smaller than a period makes them.
+    #[test]
+    fn any_step_is_got_over(step in any::<i64>(), period_us in 1_000u64..20_000) {
+        let mut clock = SourceClock::default();
+        let mut last_us = 0;
+        for n in 0..40_000_000 / period_us {
+            let (sent, arrived) = ((1 << 62) + n * period_us, n * period_us + 500);
+            let said = if n * period_us < EVENT_US { sent } else { sent.wrapping_add_signed(step / 2) };
+            if let Some(at_us) = clock.stamp(said, arrived, true) {
+                prop_assert!(arrived - at_us <= period_us);
+                prop_assert!(arrived - last_us <= 50_000 + period_us, "{} us without a state", arrived - last_us);
+                last_us = arrived;
+            }
+        }
+    }
+}

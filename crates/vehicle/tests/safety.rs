@@ -1,0 +1,300 @@
+//! What the flight core makes of a vehicle that has tipped over, stands, falls, or is not what its tracker says: each by
+//! itself, with states made up. Closed loops are in `tests/tests/frozen.rs`.
+#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
+
+use afbc::{Command, FlightController, Profile};
+use airframe::{Parameters, RotorForces, RotorSpeeds, Setpoint, State};
+use core::f32::consts::{PI, TAU};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+use vehicle::supervisor::REST_US;
+use vehicle::{Answer, ArmingLimits, Asked, End, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle};
+
+const WEIGHT_N: f32 = 0.486 * 9.81;
+
+/// Gives a thrust of as many newtons as the setpoint is high.
+struct Lift;
+
+impl FlightController for Lift {
+    type Memory = ();
+
+    fn decide(&self, (): &mut (), _: &State, setpoint: &Setpoint, _: bool) -> Command {
+        let force = setpoint.position_m.z / 4.0;
+        Command { forces: RotorForces([force; 4].into()), speeds: RotorSpeeds([300.0; 4].into()), ..Command::default() }
+    }
+}
+
+struct Bench {
+    vehicle: Vehicle<Lift>,
+    memory: Memory<()>,
+    inbox: Inbox,
+    now_us: u64,
+    thrust_n: f32,
+    /// Where its velocity has taken it.
+    travelled_m: Vector3<f32>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let limits = ArmingLimits { setpoint_distance_max_m: 100.0, ..ArmingLimits::default() };
+        let vehicle = Vehicle::new(Parameters::PAPER.to_f32(), Profile::Flight.settings(), limits, Lift);
+        let vehicle = vehicle.expect("valid");
+        Bench {
+            vehicle,
+            memory: Memory::default(),
+            inbox: Inbox::EMPTY,
+            now_us: 0,
+            thrust_n: WEIGHT_N,
+            travelled_m: Vector3::zeros(),
+        }
+    }
+
+    /// A tick in which this state is measured, through a tracker's noise.
+    fn tick(&mut self, state: State) -> Outcome {
+        let mut value = state;
+        self.travelled_m += state.velocity_m_s * 1e-3;
+        value.position_m += self.travelled_m;
+        value.position_m.x += (self.now_us / 1000 * 7919 % 1000) as f32 * 1e-7;
+        self.exactly(value)
+    }
+
+    /// A tick in which this very state is measured.
+    fn exactly(&mut self, value: State) -> Outcome {
+        self.now_us += 1000;
+        let at_us = self.now_us;
+        self.inbox.measure(Stamped { value, at_us });
+        let position_m = Vector3::new(0.0, 0.0, self.thrust_n);
+        self.inbox.aim(Stamped { value: Setpoint { position_m, ..Setpoint::default() }, at_us });
+        self.vehicle.tick(&mut self.memory, at_us, &self.inbox.take())
+    }
+
+    fn ask(&mut self, request: Request) {
+        assert!(self.inbox.ask(Asked { request, ticket: 9 }));
+    }
+
+    /// So many ms in this state; the end of the flight, if it ended, and after how many.
+    fn wait(&mut self, ms: u64, state: State) -> Option<(u64, End)> {
+        (1..=ms).find_map(|ms| self.tick(state).ended.map(|end| (ms, end)))
+    }
+
+    fn answer(&mut self, request: Request, state: State) -> Result<(), Refusal> {
+        self.ask(request);
+        let Answer { ticket, request: answered, result } = self.tick(state).answer.expect("answered");
+        assert_eq!((ticket, answered), (9, request));
+        result
+    }
+
+    /// One in the air.
+    fn flying() -> Self {
+        let mut bench = Bench::new();
+        assert_eq!(bench.wait(1500, State::default()), None);
+        assert_eq!(bench.answer(Request::Arm, State::default()), Ok(()));
+        assert_eq!(bench.wait(1000, State::default()), None);
+        bench
+    }
+}
+
+fn rolled(roll_rad: f32) -> State {
+    State { attitude_rad: Vector3::new(roll_rad, 0.0, 0.0), ..State::default() }
+}
+
+fn climbing(m_s: f32) -> State {
+    State { velocity_m_s: Vector3::new(0.0, 0.0, m_s), ..State::default() }
+}
+
+/// On its side or its back for a second, however it lies.
+#[test]
+fn a_vehicle_that_lies_is_disarmed() {
+    for roll_rad in [1.45, 2.0, 3.1, -1.6, -3.1] {
+        let mut bench = Bench::flying();
+        assert_eq!(bench.wait(20_000, rolled(roll_rad)), Some((1002, End::Tumbled)), "{roll_rad} rad");
+        assert_eq!(bench.tick(rolled(roll_rad)).motors, RotorSpeeds::default());
+        assert_eq!(bench.answer(Request::Arm, rolled(roll_rad)), Err(Refusal::TiltTooLarge));
+    }
+}
+
+#[test]
+fn a_vehicle_that_leans_or_rights_itself_is_not() {
+    let mut bench = Bench::flying();
+    assert_eq!(bench.wait(20_000, rolled(1.2)), None);
+    // On its back for a moment, and on its way back for longer than a second.
+    assert_eq!(bench.wait(300, rolled(3.1)), None);
+    for step in 0..1600 {
+        assert_eq!(bench.wait(1, rolled(3.1 - step as f32 * 1e-3)), None, "{step} ms");
+    }
+    assert_eq!(bench.wait(5_000, rolled(0.1)), None);
+    assert_eq!(bench.wait(900, rolled(3.1)), None, "the second begins anew");
+}
+
+#[test]
+fn a_vehicle_that_spins_is_disarmed() {
+    for rate_rad_s in [5.0, 8.0, 12.0, 40.0] {
+        let mut bench = Bench::flying();
+        let ended = (1..10_000).find_map(|ms| {
+            let mut state = rolled((ms as f32 * 1e-3 * rate_rad_s + PI) % TAU - PI);
+            state.rates_rad_s.x = rate_rad_s;
+            bench.tick(state).ended.map(|end| (ms, end))
+        });
+        let (ms, end) = ended.expect("over and over");
+        assert!(end == End::Tumbled && ms < 2_500, "{rate_rad_s} rad/s: {ms} ms");
+    }
+    // About its own z it may.
+    let mut bench = Bench::flying();
+    let spinning = State { rates_rad_s: Vector3::new(0.0, 0.0, 12.0), ..State::default() };
+    assert_eq!(bench.wait(5_000, spinning), None);
+}
+
+#[test]
+fn nothing_that_moves_or_turns_is_armed() {
+    for (velocity, rate) in [(50.0, 0.0), (0.0, 100.0), (0.6, 0.0), (0.0, 0.6)] {
+        let mut bench = Bench::new();
+        let moving = State {
+            velocity_m_s: Vector3::new(0.0, velocity, 0.0),
+            rates_rad_s: Vector3::new(0.0, 0.0, rate),
+            ..State::default()
+        };
+        bench.wait(1_500, moving);
+        assert_eq!(bench.answer(Request::Arm, moving), Err(Refusal::NotAtRest), "{velocity} m/s, {rate} rad/s");
+        bench.wait(REST_US / 1000 - 2, State::default());
+        assert_eq!(bench.answer(Request::Arm, State::default()), Err(Refusal::NotAtRest));
+        bench.wait(2, State::default());
+        assert_eq!(bench.answer(Request::Arm, State::default()), Ok(()));
+    }
+}
+
+/// An Arm that was held up on its way comes after the motors were stopped in the air.
+#[test]
+fn a_late_arm_does_not_start_a_falling_vehicle() {
+    let mut bench = Bench::flying();
+    bench.ask(Request::Kill);
+    assert_eq!(bench.tick(State::default()).ended, Some(End::Killed));
+    for ms in 0..500 {
+        let falling = climbing(-9.81e-3 * ms as f32);
+        assert_eq!(bench.answer(Request::Arm, falling), Err(Refusal::NotAtRest), "{ms} ms");
+        assert_eq!(bench.tick(falling).mode, Mode::Disarmed);
+    }
+    // Nor the moment that it lies.
+    assert_eq!(bench.answer(Request::Arm, State::default()), Err(Refusal::NotAtRest));
+    assert_eq!(bench.wait(REST_US / 1000, State::default()), None);
+    assert_eq!(bench.answer(Request::Arm, State::default()), Ok(()));
+}
+
+#[test]
+fn disarming_is_for_the_ground() {
+    // Armed, and not carried by its rotors yet.
+    let mut bench = Bench::new();
+    bench.thrust_n = 0.3 * WEIGHT_N;
+    bench.wait(1500, State::default());
+    assert_eq!(bench.answer(Request::Arm, State::default()), Ok(()));
+    bench.wait(5000, State::default());
+    assert_eq!(bench.answer(Request::Disarm, State::default()), Ok(()));
+
+    // In the air, however still.
+    let mut bench = Bench::flying();
+    assert_eq!(bench.answer(Request::Disarm, State::default()), Err(Refusal::InFlight));
+    assert_eq!(bench.tick(State::default()).mode, Mode::Flying);
+    // Down again: it sinks, it stops, and its rotors rest.
+    assert_eq!(bench.wait(1000, climbing(0.6)), None);
+    assert_eq!(bench.wait(1000, climbing(-0.6)), None);
+    assert_eq!(bench.answer(Request::Disarm, climbing(-0.6)), Err(Refusal::InFlight));
+    bench.thrust_n = 0.3 * WEIGHT_N;
+    assert_eq!(bench.wait(990, State::default()), None);
+    assert_eq!(bench.answer(Request::Disarm, State::default()), Err(Refusal::InFlight), "not for a second yet");
+    bench.wait(20, State::default());
+    assert_eq!(bench.answer(Request::Disarm, State::default()), Ok(()));
+}
+
+/// A state that repeats itself to the last bit is no measurement, in the air only.
+#[test]
+fn a_repeated_state_is_as_old_as_its_first() {
+    let mut bench = Bench::new();
+    for _ in 0..1500 {
+        assert_eq!(bench.exactly(State::default()).health.state_age_us, 0, "at rest nothing need change");
+    }
+    assert_eq!(bench.answer(Request::Arm, State::default()), Ok(()));
+    bench.wait(1000, State::default());
+    bench.exactly(State::default());
+    for age_ms in 1..=2_251 {
+        let outcome = bench.exactly(State::default());
+        let mode = match age_ms {
+            0..=20 => Mode::Flying,
+            21..=250 => Mode::Riding,
+            251..=2250 => Mode::Descending,
+            _ => Mode::Disarmed,
+        };
+        assert_eq!((outcome.mode, outcome.health.state_age_us), (mode, age_ms * 1000));
+        assert_eq!(u64::from(outcome.health.frozen_states), age_ms);
+    }
+}
+
+/// A pose that stands within noise while its twist says that it moves, along and about every axis.
+#[test]
+fn a_pose_that_stands_while_its_twist_moves_is_not_believed() {
+    for axis in 0..5 {
+        let mut bench = Bench::flying();
+        let mut frozen = State::default();
+        match axis {
+            0..3 => frozen.velocity_m_s[axis] = -1.0,
+            _ => frozen.rates_rad_s[axis - 3] = 1.0,
+        }
+        // It counts as in the air from its speed on; two windows at most.
+        let stands = |bench: &mut Bench| {
+            bench.travelled_m = Vector3::zeros();
+            bench.tick(frozen)
+        };
+        let seen = (1..5_000).find(|_| stands(&mut bench).mode != Mode::Flying).expect("seen");
+        assert!(seen <= 521, "axis {axis}: {seen} ms");
+        let ended = (1..5_000).find_map(|_| stands(&mut bench).ended).expect("and is not believed again");
+        assert_eq!(ended, End::StateLost);
+    }
+}
+
+/// After an outage: a pose that hangs still at height while the thrust falls away is no landing.
+#[test]
+fn a_vehicle_that_hangs_without_thrust_has_not_landed() {
+    let mut bench = Bench::flying();
+    bench.wait(1000, climbing(0.6));
+    bench.wait(3000, State::default());
+    bench.thrust_n = 0.1;
+    let (ms, end) = bench.wait(10_000, State::default()).expect("ended");
+    assert_eq!(end, End::StateLost);
+    assert!((2_500..3_500).contains(&ms), "{ms} ms");
+}
+
+proptest! {
+    /// Whatever is measured and asked for, in whatever order: no motor turns while disarmed, arming comes from rest, and a
+    /// plain Disarm never ends a flight in the air.
+    #[test]
+    fn any_flight(script in prop::collection::vec((0u8..8, -4.0f32..4.0, -4.0f32..4.0, 0.0f32..10.0, 1u64..600), 1..40)) {
+        let mut bench = Bench::new();
+        let mut at_rest_us = 0;
+        for (what, turn, climb, thrust_n, ms) in script {
+            bench.thrust_n = thrust_n;
+            let request = match what {
+                0 | 1 => Some(Request::Arm),
+                2 => Some(Request::Disarm),
+                3 => Some(Request::Kill),
+                _ => None,
+            };
+            if let Some(request) = request {
+                bench.ask(request);
+            }
+            let mut state = State::default();
+            if what % 2 == 1 {
+                state.attitude_rad.x = turn;
+                state.velocity_m_s.z = climb;
+            }
+            for _ in 0..ms {
+                let before = bench.memory.mode();
+                let outcome = bench.tick(state);
+                let at_rest = climb.abs() <= 0.5 || what % 2 == 0;
+                at_rest_us = if at_rest { at_rest_us + 1000 } else { 0 };
+                prop_assert!(outcome.mode.armed() || outcome.motors == RotorSpeeds::default());
+                if before == Mode::Disarmed && outcome.mode.armed() {
+                    prop_assert!(at_rest_us >= REST_US);
+                }
+                prop_assert_eq!(outcome.ended.is_some(), before.armed() && !outcome.mode.armed());
+            }
+        }
+    }
+}
