@@ -138,6 +138,11 @@ impl Comparison {
         Some(ratio).filter(|ratio| ratio.is_finite())
     }
 
+    /// Whether every flight is one of several with seeds of their own.
+    pub fn is_repeated(&self) -> bool {
+        self.entries.iter().any(|entry| entry.flights.len() > 1)
+    }
+
     /// Whether `entry` has the smallest mean of a figure, of those that kept the vehicle.
     pub fn is_best(&self, entry: &Entry, figure: &Figure) -> bool {
         let mean = |entry: &Entry| entry.spread(figure.value).map(|spread| spread.mean);

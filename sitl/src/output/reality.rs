@@ -39,9 +39,9 @@ fn air(scenario: &Scenario) -> Vec<(&'static str, String)> {
         rows.push(("steady wind", format!("({}, {}, {}) m/s", v.x, v.y, v.z)));
     }
     rows.extend(realism.wind.gusts.iter().map(|gust| {
-        let v = gust.velocity_m_s;
-        let times = format!("from {} s, rise {} s, hold {} s", gust.start_s, gust.rise_s, gust.hold_s);
-        ("gust of wind", format!("({}, {}, {}) m/s {times}", v.x, v.y, v.z))
+        let hold = if gust.hold_s.is_finite() { format!("hold {} s", gust.hold_s) } else { "stays".into() };
+        let wind = super::words::wind_gust(gust);
+        ("gust", format!("{wind} from {} s, rise {} s, {hold}", gust.start_s, gust.rise_s))
     }));
     if let Some(turbulence) = realism.wind.turbulence {
         rows.push(("turbulence", format!("Dryden, {:.4} m/s at 20 ft", turbulence.wind_20ft_m_s)));

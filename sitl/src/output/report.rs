@@ -12,39 +12,56 @@ use airframe::Axis;
 use core::convert::Infallible;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-/// Looks: dark on white, one column, breaks between figures on paper.
+/// Looks: one column; dark on white, or light on dark for those who prefer that, never on paper. Whatever is wider than
+/// the screen scrolls by itself.
 const STYLE: &str = "
-:root { color-scheme: light; }
-body { font: 15px/1.5 system-ui, -apple-system, 'Segoe UI', Helvetica, Arial, sans-serif; color: #1a1a1a; background: #fff;
-  max-width: 900px; margin: 2.5rem auto; padding: 0 1rem; }
+:root { color-scheme: light dark; --paper: #fff; --ink: #1a1a1a; --quiet: #555; --rule: #888; --faint: #ccc;
+  --good: #146c2e; --bad: #a12; }
+@media screen and (prefers-color-scheme: dark) {
+  :root { --paper: #16181d; --ink: #e8e8e8; --quiet: #a8acb3; --rule: #737983; --faint: #3a3f48;
+    --good: #6fcf8a; --bad: #ff8f85; }
+}
+body { font: 15px/1.5 system-ui, -apple-system, 'Segoe UI', Helvetica, Arial, sans-serif; color: var(--ink);
+  background: var(--paper); max-width: 900px; margin: 2.5rem auto; padding: 0 1rem; -webkit-text-size-adjust: 100%; }
 h1 { font-size: 1.7rem; margin: 0 0 .25rem; }
 h2 { font-size: 1.3rem; margin: 2.5rem 0 .25rem; }
 h3 { font-size: 1.05rem; margin: 1.8rem 0 .4rem; }
 p { margin: .3rem 0; }
-.quiet { color: #555; }
+h1, h2, h3, p, dd, figcaption { overflow-wrap: anywhere; }
+.quiet { color: var(--quiet); }
 table { border-collapse: collapse; margin: .6rem 0; font-variant-numeric: tabular-nums; }
-th, td { padding: .16rem .8rem; text-align: right; }
+th, td { padding: .16rem .65rem; text-align: right; white-space: nowrap; }
 th { font-weight: 600; }
-th:first-child, td:first-child, .name { text-align: left; }
-thead th, thead td { border-bottom: 1px solid #888; }
-tbody { border-bottom: 1px solid #ccc; }
-.lost { color: #a12; text-align: left; }
+th:first-child, td:first-child, .name, .prose { text-align: left; }
+.prose { white-space: normal; min-width: 14rem; }
+.prose code { overflow-wrap: anywhere; }
+th[scope=row] { position: sticky; left: 0; background: var(--paper); }
+thead th, thead td { border-bottom: 1px solid var(--rule); }
+tbody { border-bottom: 1px solid var(--faint); }
+.lost { color: var(--bad); text-align: left; }
 dl { margin: .4rem 0; }
 dl > div { display: grid; grid-template-columns: 8.5rem 1fr; margin: .7rem 0; }
 dt { font-weight: 600; }
 dd { margin: 0; }
-.holds { color: #146c2e; }
-.fails { color: #a12; }
+.holds { color: var(--good); }
+.fails { color: var(--bad); }
 figure { margin: 1.6rem 0; }
-figure svg { width: 100%; height: auto; border: 1px solid #e4e4e4; }
-figcaption { color: #555; font-size: .9rem; }
-.scroll { overflow-x: auto; }
+figure svg { display: block; width: 100%; min-width: 40rem; height: auto; }
+figure .scroll { border: 1px solid var(--faint); }
+figcaption { color: var(--quiet); font-size: .9rem; }
+.scroll { overflow-x: auto; max-width: 100%; }
+@media (max-width: 34rem) {
+  body { margin: 1.2rem auto; }
+  dl > div { display: block; }
+  th, td { padding: .16rem .5rem; }
+}
 @page { margin: 15mm; }
 @media print {
   body { font-size: 10.5pt; margin: 0; padding: 0; max-width: none; }
   figure, tbody, dl > div, tr { break-inside: avoid; }
   h2, h3 { break-after: avoid; }
-  figure svg { border: 0; max-height: 110mm; }
+  figure svg { min-width: 0; max-height: 110mm; }
+  figure .scroll { border: 0; }
 }
 ";
 
@@ -76,6 +93,7 @@ pub(super) fn sheet(title: &str, body: &Markup) -> String {
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
                 title { (title) }
                 style { (PreEscaped(STYLE)) }
             }
@@ -92,7 +110,7 @@ pub(super) fn sheet(title: &str, body: &Markup) -> String {
 pub(super) fn picture(figure: &Figure) -> Markup {
     html! {
         figure {
-            (PreEscaped(figure.svg.replacen(NAMESPACE, "", 1)))
+            div.scroll { (PreEscaped(figure.svg.replacen(NAMESPACE, "", 1))) }
             figcaption { (figure.caption) }
         }
     }
@@ -130,7 +148,7 @@ fn section(group: &Group, figures: &[Figure]) -> Markup {
         p.quiet { (table::legend()) }
         @for figure in figures { (picture(figure)) }
         h3 { "Parameters" }
-        div.scroll { (parameters(group.scenario)) }
+        (parameters(group.scenario))
     }
 }
 
@@ -178,31 +196,31 @@ pub(super) fn parameters(scenario: &Scenario) -> Markup {
     ];
     let until = |end_s: f64| if end_s < scenario.duration_s { format!("to {end_s} s") } else { "on".into() };
     html! {
-        table {
-            tbody { @for (name, value) in fixed { tr { td { (name) } td.name { (value) } } } }
+        div.scroll { table {
+            tbody { @for (name, value) in fixed { tr { td { (name) } td.prose { (value) } } } }
             tbody {
                 @for gust in scenario.environment.gusts() {
                     @let (letter, index) = words::gust(gust);
                     tr {
                         td { "gust " (letter) sub { (index) } }
-                        td.name { (gust.size) " " (words::gust_unit(gust)) " from " (gust.start_s) " s " (until(gust.end_s)) }
+                        td.prose { (gust.size) " " (words::gust_unit(gust)) " from " (gust.start_s) " s " (until(gust.end_s)) }
                     }
                 }
                 @for change in scenario.environment.changes() {
                     tr {
                         td { (words::change(change)) }
-                        td.name { "from " (change.start_s) " s " (until(change.end_s)) }
+                        td.prose { "from " (change.start_s) " s " (until(change.end_s)) }
                     }
                 }
                 @for payload in scenario.environment.payloads() {
                     tr {
                         td { "payload " (words::payload(payload)) }
-                        td.name { (payload.below_m) " m below, from " (payload.start_s) " s " (until(payload.end_s)) }
+                        td.prose { (payload.below_m) " m below, from " (payload.start_s) " s " (until(payload.end_s)) }
                     }
                 }
-                @for (name, value) in reality::rows(scenario) { tr { td { (name) } td.name { (value) } } }
+                @for (name, value) in reality::rows(scenario) { tr { td { (name) } td.prose { (value) } } }
             }
-        }
+        } }
         @for contender in &scenario.contenders { (gains(contender)) }
     }
 }
@@ -275,10 +293,10 @@ const AFBC_GAINS: [&str; 12] = ["α₁", "α₂", "γ", "η", "ε", "centre", "w
 
 fn per_axis(names: &[&str], gains: impl Fn(Axis) -> Vec<f32>) -> Markup {
     html! {
-        table {
+        div.scroll { table {
             thead { tr { td { "subsystem" } @for name in names { th scope="col" { (name) } } } }
             tbody { @for axis in Axis::ALL { tr { td { (axis.name()) } @for gain in gains(axis) { td { (gain) } } } } }
-        }
+        } }
     }
 }
 
@@ -288,7 +306,7 @@ fn by_name(mut law: Law) -> Markup {
         gains.push((range.name, *gain));
         Ok::<(), Infallible>(())
     });
-    html! { table { tbody { @for (name, gain) in gains { tr { td { code { (name) } } td { (gain) } } } } } }
+    html! { div.scroll { table { tbody { @for (name, gain) in gains { tr { td { code { (name) } } td { (gain) } } } } } } }
 }
 
 fn start(scenario: &Scenario) -> String {

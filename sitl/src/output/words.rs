@@ -5,7 +5,9 @@ use crate::run::Tripped;
 use crate::scenario::{Contender, Scenario};
 use afbc::Profile;
 use airframe::Axis;
-use plant::{Gust, GustKind, ParameterChange, Payload, Quantity, Realism, RotorFault, Rotors, Sensing, Wind};
+use plant::{
+    CosineGust, Gust, GustKind, ParameterChange, Payload, Quantity, Realism, RotorFault, Rotors, Sensing, Wind,
+};
 
 /// A file name without its ending: letters, digits, `-` and `_` of `name`, anything else as `-`.
 pub(super) fn slug(name: &str) -> String {
@@ -102,6 +104,43 @@ pub(super) fn gust(gust: &Gust) -> (&'static str, &'static str) {
         (GustKind::Force, _) => "T",
     };
     (letter, symbol(gust.axis))
+}
+
+/// "wind (3, 0, −1) m/s"
+pub(super) fn wind_gust(gust: &CosineGust) -> String {
+    let v = gust.velocity_m_s;
+    format!("wind ({}, {}, {}) m/s", v.x, v.y, v.z).replace('-', "−")
+}
+
+/// A quantity that a campaign draws, with its unit: "steady wind [m/s]". An unknown one is its name in words.
+pub(super) fn drawn(name: &str) -> String {
+    let words = match name {
+        "mass_ratio" => "true mass, over the believed",
+        "inertia_ratio" => "true inertia, over the believed",
+        "thrust_factor_ratio" => "true thrust factor, over the believed",
+        "drag_factor_ratio" => "true rotor drag factor, over the believed",
+        "rotor_time_constant_s" => "time constant of the rotors [s]",
+        "rotor_delay_s" => "delay from command to rotors [s]",
+        "rotor_efficiency" => "thrust that a failing rotor keeps, as a share",
+        "fault_rotor" => "number of the rotor that fails",
+        "fault_start_s" => "when a rotor fails [s]",
+        "payload_kg" => "mass of the payload [kg]",
+        "payload_below_m" => "payload below the centre of mass [m]",
+        "payload_start_s" => "when the payload is taken up [s]",
+        "wind_m_s" => "steady wind [m/s]",
+        "wind_direction_rad" => "where the wind blows to, from +x to +y [rad]",
+        "wind_20ft_m_s" => "turbulence: wind at 20 ft [m/s]",
+        "noise_ratio" => "measurement noise, over the scenario's",
+        "bias_ratio" => "measurement bias, over the scenario's",
+        "sensor_delay_s" => "delay from motion to measurement [s]",
+        "dropout_rate_hz" => "measurements stay away, per second [Hz]",
+        "dropout_mean_s" => "mean time without measurements [s]",
+        "start_x_m" => "start away from the scenario's, along x [m]",
+        "start_y_m" => "start away from the scenario's, along y [m]",
+        "start_z_m" => "start away from the scenario's, along z [m]",
+        other => return other.replace('_', " "),
+    };
+    words.into()
 }
 
 /// Unit of a gust's size.

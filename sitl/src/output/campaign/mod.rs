@@ -75,10 +75,16 @@ fn flights(summary: &Summary) -> u64 {
 }
 
 /// What the columns mean, in few sentences.
-const LEGEND: &str = "Distances from the reference count from 5 s to the end. A lost flight is worse than any other: where a \
-    percentile is one, it says so. |ΔU₄|: mean jump of the thrust command from one control step to the next, of flights that \
-    were not lost. Fell back: the contender's own monitor took another law. Percentiles are nearest ranks, intervals \
-    Wilson's.";
+fn legend(summary: &Summary) -> String {
+    let lost = summary.tallies.iter().any(|tally| tally.count.kept < tally.count.flights);
+    let worse = " A lost flight is worse than any other: where a percentile is one, it says so.";
+    let (worse, of) = if lost { (worse, ", of flights that were not lost") } else { ("", "") };
+    format!(
+        "Distances from the reference count from {SETTLED_S} s to the end.{worse} |ΔU₄|: mean jump of the thrust command from \
+         one control step to the next{of}. Fell back: the contender's own monitor took another law. Percentiles are nearest \
+         ranks, intervals Wilson's."
+    )
+}
 
 /// How a bad flight went, and how to see it again; `target` is what `sitl campaign` knows the campaign by.
 fn bad(target: &str, tally: &Tally, bad: &Bad) -> [String; 2] {

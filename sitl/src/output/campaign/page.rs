@@ -1,9 +1,11 @@
 //! A campaign on one page.
 
-use super::{HEADS, LEGEND, bad, cells, flights, percent};
-use crate::campaign::Summary;
+use super::{HEADS, bad, cells, flights, legend, percent};
+use crate::campaign::statistics::Share;
+use crate::campaign::{Count, Summary};
 use crate::output::figures::Figure;
 use crate::output::report::{picture, sheet};
+use crate::output::words;
 use maud::{Markup, html};
 
 pub(super) fn page(summary: &Summary, figures: &[Figure]) -> String {
@@ -18,14 +20,17 @@ pub(super) fn page(summary: &Summary, figures: &[Figure]) -> String {
             }
             h2 { (manifest.name) }
             div.scroll { (results(summary)) }
-            p.quiet { (LEGEND) }
+            p.quiet { (legend(summary)) }
             @for figure in figures { (picture(figure)) }
             h3 { "Not lost, by trajectory" }
             div.scroll { (by_trajectory(summary)) }
+            p.quiet { "Below each share: its 95 % interval." }
             h3 { "Worst flights" }
             div.scroll { (worst(summary)) }
-            h3 { "Drawn" }
-            div.scroll { (drawn(summary)) }
+            @if !manifest.drawn.is_empty() {
+                h3 { "Drawn" }
+                div.scroll { (drawn(summary)) }
+            }
         },
     )
 }
@@ -34,21 +39,25 @@ fn results(summary: &Summary) -> Markup {
     html! {
         table {
             thead {
-                tr { td {} @for (group, columns) in HEADS { th colspan=(columns.len()) { (unbroken(group)) } } }
+                tr { td {} @for (group, columns) in HEADS { th colspan=(columns.len()) { (group) } } }
                 tr { td {} @for (_, columns) in HEADS { @for column in columns { th scope="col" { (column) } } } }
             }
             tbody {
                 @for tally in &summary.tallies {
-                    tr { th scope="row" { (unbroken(&tally.contender)) } @for cell in cells(tally) { td { (unbroken(&cell)) } } }
+                    tr { th scope="row" { (&tally.contender) } @for cell in cells(tally) { td { (&cell) } } }
                 }
             }
         }
     }
 }
 
-/// Text that stays on one line.
-fn unbroken(text: &str) -> String {
-    text.replace(' ', "\u{a0}").replace('-', "\u{2011}")
+/// The share that was not lost, with its 95 % interval.
+fn not_lost(count: &Count) -> Markup {
+    let Share { value, low, high } = count.share();
+    html! {
+        (percent(value))
+        @if count.flights > 0 { br; span.quiet { (format!("{:.1} to {:.1}", 100.0 * low, 100.0 * high)) } }
+    }
 }
 
 fn by_trajectory(summary: &Summary) -> Markup {
@@ -59,7 +68,7 @@ fn by_trajectory(summary: &Summary) -> Markup {
                 @for tally in &summary.tallies {
                     tr {
                         th scope="row" { (tally.contender) }
-                        @for count in &tally.by_trajectory { td { (percent(count.share().value)) } }
+                        @for count in &tally.by_trajectory { td { (not_lost(count)) } }
                     }
                 }
             }
@@ -77,7 +86,7 @@ fn worst(summary: &Summary) -> Markup {
                         @let [how, command] = bad(&target, tally, flight);
                         tr {
                             th scope="row" { @if i == 0 { (tally.contender) } }
-                            td.name { (how) br; code { (command) } }
+                            td.prose { (how) br; code { (command) } }
                         }
                     }
                 }
@@ -89,13 +98,14 @@ fn worst(summary: &Summary) -> Markup {
 fn drawn(summary: &Summary) -> Markup {
     html! {
         table {
+            thead { tr { th scope="col" { "quantity" } th.name scope="col" { "from, to" } th.name scope="col" { "in the file" } } }
             tbody {
                 @for drawn in &summary.manifest.drawn {
                     @let [low, high] = drawn.ends;
                     tr {
-                        th scope="row" { (drawn.name) }
+                        th scope="row" { (words::drawn(&drawn.name)) }
                         td.name { @if low < high { (low) " to " (high) } @else { (low) } }
-                        td.name { (drawn.meaning) }
+                        td.name { code { (drawn.name) } }
                     }
                 }
             }

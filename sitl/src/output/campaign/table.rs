@@ -1,6 +1,6 @@
 //! A campaign's table for the terminal.
 
-use super::{HEADS, LEGEND, bad, cells, flights};
+use super::{HEADS, bad, cells, flights, legend};
 use crate::campaign::Summary;
 use crate::output::table::wrap;
 
@@ -46,7 +46,7 @@ pub fn table(summary: &Summary, target: &str) -> String {
         lines.push(row(&tally.contender, &mut cells.iter().map(String::as_str)));
     }
     lines.push(rule);
-    wrap(&mut lines, "", LEGEND);
+    wrap(&mut lines, "", &legend(summary));
     lines.extend([String::new(), "Worst flights".into()]);
     for tally in &summary.tallies {
         if let Some(worst) = tally.worst.first() {

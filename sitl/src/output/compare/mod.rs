@@ -56,22 +56,19 @@ fn draw(comparison: &Comparison) -> io::Result<Vec<Figure>> {
     Ok(vec![figures::compare::draw(comparison)?, figures::errors(&flights)?].into_iter().flatten().collect())
 }
 
-/// Whether every flight is one of several with seeds of their own.
-fn is_repeated(comparison: &Comparison) -> bool {
-    comparison.entries.iter().any(|entry| entry.flights.len() > 1)
-}
-
 /// The figures of one contender, and whether each is the best of its column; none if it lost a vehicle.
 fn cells(comparison: &Comparison, entry: &Entry) -> Option<Vec<(String, bool)>> {
     let cell = |figure: &crate::compare::Figure| {
         let spread = entry.spread(figure.value)?;
         let [mean, deviation] =
             [spread.mean, spread.deviation].map(|value| number(figure.scale * value, figure.digits));
-        let text = if is_repeated(comparison) { format!("{mean} ±{deviation}") } else { mean };
+        let text = if comparison.is_repeated() { format!("{mean} ±{deviation}") } else { mean };
         Some((text, comparison.is_best(entry, figure)))
     };
     let mut cells = FIGURES.iter().map(cell).collect::<Option<Vec<_>>>()?;
-    cells.push((comparison.ratio(entry).map_or("-".into(), |ratio| format!("{ratio:.2}")), false));
+    if has_ratio(comparison) {
+        cells.push((comparison.ratio(entry).map_or("-".into(), |ratio| format!("{ratio:.2}")), false));
+    }
     Some(cells)
 }
 
@@ -79,9 +76,14 @@ fn number(value: f64, digits: usize) -> String {
     if value < 1e4 { format!("{value:.digits$}") } else { format!("{value:.2e}") }
 }
 
+/// Whether there is backstepping to set others against.
+fn has_ratio(comparison: &Comparison) -> bool {
+    comparison.entries.iter().any(|entry| comparison.ratio(entry).is_some())
+}
+
 /// Heads of the columns.
-fn heads() -> Vec<&'static str> {
-    FIGURES.iter().map(|figure| figure.title).chain(["ratio"]).collect()
+fn heads(comparison: &Comparison) -> Vec<&'static str> {
+    FIGURES.iter().map(|figure| figure.title).chain(has_ratio(comparison).then_some("ratio")).collect()
 }
 
 /// What became of the vehicles of a contender that lost some.
@@ -100,10 +102,20 @@ fn lost(entry: &Entry) -> String {
 
 /// What the columns mean.
 fn legend(comparisons: &[Comparison]) -> String {
-    let spread = if comparisons.iter().any(is_repeated) { " ±: standard deviation over the seeds." } else { "" };
-    format!(
+    let kept = |comparison: &Comparison| comparison.entries.iter().any(|entry| entry.lost() == 0);
+    if !comparisons.iter().any(kept) {
+        return "Who loses a vehicle has no figures.".into();
+    }
+    let mut words = format!(
         "Root mean square errors, and the largest of x, y and z, from {SETTLED_S} s to the end. |ΔU₄|: mean jump of the \
-         thrust from one control step to the next; small is smooth. Ratio: root mean square distance from the reference, \
-         over backstepping's. *: best of its column.{spread}"
-    )
+         thrust from one control step to the next; small is smooth."
+    );
+    if comparisons.iter().any(has_ratio) {
+        words += " Ratio: root mean square distance from the reference, over backstepping's.";
+    }
+    words += " *: best of its column.";
+    if comparisons.iter().any(Comparison::is_repeated) {
+        words += " ±: standard deviation over the seeds.";
+    }
+    words
 }

@@ -20,14 +20,14 @@ pub(super) fn page(comparisons: &[Comparison], figures: &[Vec<Figure>]) -> Strin
                 p.quiet { (legend(comparisons)) }
                 @for figure in figures { (picture(figure)) }
                 h3 { "Parameters" }
-                div.scroll { (parameters(&comparison.scenario)) }
+                (parameters(&comparison.scenario))
             }
         },
     )
 }
 
 fn results(comparison: &Comparison) -> Markup {
-    let heads = heads();
+    let heads = heads(comparison);
     html! {
         table {
             thead { tr { td {} @for head in &heads { th scope="col" { (head) } } } }

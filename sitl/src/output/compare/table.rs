@@ -33,7 +33,7 @@ fn block(comparison: &Comparison, lines: &mut Vec<String>) {
             (entry.contender().title(), cells.ok_or_else(|| lost(entry)))
         })
         .collect();
-    let heads: Vec<String> = heads().into_iter().map(|head| format!("{head} ")).collect();
+    let heads: Vec<String> = heads(comparison).into_iter().map(|head| format!("{head} ")).collect();
     let widest = |(column, head): (usize, &String)| {
         let cells = rows.iter().filter_map(|(_, cells)| cells.as_ref().ok()?.get(column)).map(|cell| width(cell));
         cells.max().unwrap_or(0).max(width(head)) + GAP

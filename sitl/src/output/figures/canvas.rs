@@ -1,5 +1,6 @@
 //! What all figures are drawn on and with.
 
+use super::palette::{self, BLACK, GREY, WHITE};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -10,31 +11,58 @@ const SCALE: f64 = 4.0;
 /// Width of every figure.
 pub(super) const WIDTH_PX: f64 = 900.0;
 
-pub(super) const BLACK: RGBColor = RGBColor(26, 26, 26);
-pub(super) const GREY: RGBColor = RGBColor(100, 100, 100);
-pub(super) const GRID: RGBColor = RGBColor(226, 226, 226);
-pub(super) const FRAME: RGBColor = RGBColor(150, 150, 150);
+/// Least width of the lines in a legend.
+const LEGEND_PX: f64 = 2.5;
 
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub(super) type Failure = DrawingAreaErrorKind<io::Error>;
 
-/// Colour and width of a line.
+/// How a line is drawn.
 #[derive(Clone, Copy)]
 pub(super) struct Ink {
     pub(super) color: RGBColor,
     pub(super) width_px: f64,
+    /// 0 is a whole line, every other number its own pattern of dashes.
+    pub(super) dash: usize,
+    /// 1 hides what is behind.
+    pub(super) opacity: f64,
 }
 
+/// Dashes are numbered in this part of the opacity until the picture is done: the library does not know them.
+const DASH: f64 = 0.001;
+/// More are never told apart.
+const DASHES: usize = 50;
+
 impl Ink {
+    /// A whole line.
+    pub(super) const fn new(color: RGBColor, width_px: f64) -> Self {
+        Ink { color, width_px, dash: 0, opacity: 1.0 }
+    }
+
     pub(super) fn style(self) -> ShapeStyle {
-        self.color.stroke_width(units(self.width_px).unsigned_abs())
+        let opacity = if self.dash > 0 { 1.0 - DASH * self.dash.min(DASHES) as f64 } else { self.opacity };
+        self.color.mix(opacity).stroke_width(units(self.width_px).unsigned_abs())
     }
 }
 
-/// `color`, two thirds of the way to white.
-pub(super) fn pale(color: RGBColor) -> RGBColor {
-    let mix = |part: u8| 255 - (255 - part) / 3;
-    RGBColor(mix(color.0), mix(color.1), mix(color.2))
+/// Contenders' lines, one for each of `names`: of two that share a colour, the second is dashed.
+pub(super) fn inks(names: &[&str], width_px: f64) -> Vec<Ink> {
+    let ink = |(name, dash): (&&str, usize)| Ink { dash, ..Ink::new(palette::color(name), width_px) };
+    names.iter().zip(palette::repeats(names)).map(ink).collect()
+}
+
+/// The attribute that stands for a dash until then.
+fn dash_opacity(dash: usize) -> String {
+    format!(" opacity=\"{}\"", 1.0 - DASH * dash as f64)
+}
+
+/// Lengths on and off in pixels, longer with each round.
+fn dash_pattern(dash: usize) -> String {
+    const PATTERNS: [&[f64]; 5] = [&[7.0, 3.0], &[2.0, 3.0], &[10.0, 3.0, 2.0, 3.0], &[14.0, 5.0], &[4.0, 7.0]];
+    let (pattern, round) = ((dash - 1) % PATTERNS.len(), 1 + (dash - 1) / PATTERNS.len());
+    let lengths = PATTERNS.get(pattern).copied().unwrap_or_default();
+    let lengths: Vec<_> = lengths.iter().map(|px| units(px * round as f64).to_string()).collect();
+    format!(" stroke-dasharray=\"{}\"", lengths.join(" "))
 }
 
 /// Pixels to drawing units.
@@ -67,7 +95,8 @@ pub(super) fn head(area: &Area, title: &str, conditions: &str, legend: &[(String
     put(&conditions.replace(" -", " −"), WIDTH_PX - 14.0, 18.0, text(11.0, GREY, HPos::Right))?;
     for ((name, ink), (x, y)) in legend.iter().zip(places(legend)) {
         let sample = [(units(x), units(y)), (units(x + 24.0), units(y))];
-        area.draw(&PathElement::new(sample, ink.style()))?;
+        let clear = Ink { width_px: ink.width_px.max(LEGEND_PX), ..*ink };
+        area.draw(&PathElement::new(sample, clear.style()))?;
         put(name, x + 30.0, y, text(12.0, BLACK, HPos::Left))?;
     }
     Ok(())
@@ -79,7 +108,7 @@ pub(super) fn head_px(legend: &[(String, Ink)]) -> f64 {
 }
 
 /// Where each entry of the legend goes, line by line.
-fn places(legend: &[(String, Ink)]) -> Vec<(f64, f64)> {
+pub(super) fn places(legend: &[(String, Ink)]) -> Vec<(f64, f64)> {
     let (mut x, mut y) = (14.0, 42.0);
     let place = |(name, _): &(String, Ink)| {
         let width = 30.0 + text_width_px(name, 12.0) + 26.0;
@@ -106,12 +135,14 @@ pub(super) fn svg(height_px: f64, title: &str, draw: impl FnOnce(&Area) -> Resul
     let body: String = body.lines().map(|line| subscripts(line) + "\n").collect();
     let body = body.replace(" opacity=\"1\"", "").replace("font-family=\"sans-serif\" ", "");
     // Type stands out from what lies under it.
-    let body = body.replace("<text ", "<text paint-order=\"stroke\" stroke=\"#FFF\" stroke-width=\"10\" ");
+    let body = body.replace("<text ", "<text paint-order=\"stroke\" stroke=\"#FFFFFF\" stroke-width=\"10\" ");
+    let body = (1..=DASHES).fold(body, |body, dash| body.replace(&dash_opacity(dash), &dash_pattern(dash)));
+    let style = palette::dark_style(&body);
     let (width, height) = size;
     Ok(format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH_PX}\" height=\"{height_px}\" \
          viewBox=\"0 0 {width} {height}\" role=\"img\" stroke-linejoin=\"round\" \
-         font-family=\"Helvetica, Arial, sans-serif\"><title>{title}</title>{body}"
+         font-family=\"Helvetica, Arial, sans-serif\"><title>{title}</title>{style}{body}"
     ))
 }
 

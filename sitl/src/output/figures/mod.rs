@@ -1,12 +1,13 @@
 //! Counterparts of the paper's Figs. 4 to 8 as SVG, all contenders of one scenario overlaid.
 //!
-//! Gusts are marked where they strike and the time when parameters are off is shaded. Colours are Okabe and Ito's, which
-//! the colour-blind can tell apart.
+//! Gusts are marked where they strike, and shaded is for how long something is the matter. A contender has the same colour
+//! in every figure, whoever else is in it.
 
 pub(super) mod campaign;
 mod canvas;
 pub(super) mod compare;
 mod marks;
+mod palette;
 mod reduce;
 mod time_chart;
 mod trajectory;
@@ -30,43 +31,47 @@ pub(super) struct Figure {
     pub(super) svg: String,
 }
 
-/// Blue, vermilion, green, purple, orange, sky blue: one for each contender, in the order flown.
-const CONTENDERS: [RGBColor; 6] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-];
+/// Said of figures with a cross.
+const CROSS: &str = " A cross: where a vehicle was lost.";
 
-/// The colour of contender number `index`; with each round through the palette, darker.
-fn color(index: usize) -> RGBColor {
-    let round = (index / CONTENDERS.len()).min(3);
-    let RGBColor(r, g, b) = *CONTENDERS.get(index % CONTENDERS.len()).unwrap_or(&canvas::BLACK);
-    let [r, g, b] = [r, g, b].map(|part| (f64::from(part) * libm::pow(0.6, round as f64)) as u8);
-    RGBColor(r, g, b)
+/// Corners of the mark of contender number `index` around its middle, in drawing units: with colours, marks tell
+/// contenders apart for those who see no colours.
+fn marker(index: usize, px: f64) -> Vec<(i32, i32)> {
+    // Corners around the middle, the direction of the first in turns, and how far out every second one is.
+    const SHAPES: [(usize, f64, f64); 6] =
+        [(16, 0.0, 0.85), (4, 0.125, 1.0), (3, -0.25, 1.0), (4, 0.0, 1.0), (8, 0.0, 0.35), (3, 0.25, 1.0)];
+    let (corners, turn, second) = *SHAPES.get(index % SHAPES.len()).unwrap_or(&SHAPES[0]);
+    let corner = |i: usize| {
+        let (sin, cos) = libm::sincos(core::f64::consts::TAU * (i as f64 / corners as f64 + turn));
+        let out = 1.15 * px * if i % 2 == 1 { second } else { 1.0 };
+        (canvas::units(out * cos), canvas::units(out * sin))
+    };
+    (0..corners).map(corner).collect()
 }
 
 /// What should be flown.
-const REFERENCE: Ink = Ink { color: RGBColor(176, 176, 176), width_px: 4.0 };
+const REFERENCE: Ink = Ink::new(palette::WANTED, 4.0);
 /// Width of a law's line.
 const LINE_PX: f64 = 1.3;
 
-/// One law's flight, with the colour of its lines.
+/// One law's flight, with what its lines are drawn in.
 struct Law<'a> {
     flight: &'a Flown,
-    color: RGBColor,
+    ink: Ink,
 }
 
 impl Law<'_> {
     fn ink(&self) -> Ink {
-        Ink { color: self.color, width_px: LINE_PX }
+        self.ink
+    }
+
+    fn color(&self) -> RGBColor {
+        self.ink.color
     }
 
     /// Wide and pale: what this law wants, behind what it gets.
     fn pale(&self) -> Ink {
-        Ink { color: canvas::pale(self.color), width_px: REFERENCE.width_px }
+        Ink { opacity: 1.0 / 3.0, ..Ink::new(self.color(), REFERENCE.width_px) }
     }
 
     /// The name, for the legend.
@@ -146,15 +151,16 @@ pub(super) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {
     let scenario = &longest.scenario;
     let last_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
     let end_s = if last_s > 0.0 { last_s } else { scenario.duration_s };
-    let laws: Vec<Law> =
-        flights.iter().enumerate().map(|(index, flight)| Law { flight, color: color(index) }).collect();
+    let names: Vec<&str> = flights.iter().map(|flight| flight.run.contender.name.as_str()).collect();
+    let inks = canvas::inks(&names, LINE_PX);
+    let laws: Vec<Law> = flights.iter().zip(inks).map(|(flight, ink)| Law { flight, ink }).collect();
     // The roughest behind, so that it hides nothing.
     let mut rough_first: Vec<&Law> = laws.iter().collect();
     let roughness = |law: &Law| law.flight.run.metrics.mean_abs_delta_u.sum();
     rough_first.sort_by(|a, b| roughness(b).total_cmp(&roughness(a)));
     let each = |value: Value| rough_first.iter().map(move |law| law.line(law.ink(), end_s, value));
 
-    let reference = Law { flight: longest, color: REFERENCE.color };
+    let reference = Law { flight: longest, ink: REFERENCE };
     let outputs = OUTPUTS.map(|(label, value, wanted)| {
         let wanted = Line { lost_s: None, is_reference: true, ..reference.line(REFERENCE, end_s, wanted) };
         Panel { label, zero: false, lines: core::iter::once(wanted).chain(each(value)).collect() }
@@ -178,31 +184,36 @@ pub(super) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {
     });
 
     let conditions = format!("{}: {}", scenario.name, words::conditions(scenario));
-    let chart =
-        |title, legend, panels| Chart { title, conditions: &conditions, scenario, end_s, legend, panels }.draw();
-    let lost = if laws.iter().any(|law| law.lost_s().is_some()) { " A cross: where a vehicle was lost." } else { "" };
-    let figure = |name, caption, svg| Figure { name, caption: format!("{caption}{lost}"), svg };
+    let chatter = controls.iter().any(|panel| panel.has_chatter(end_s));
+    let chart = |name, caption: &str, title, legend, panels| {
+        let (svg, seen) = Chart { title, conditions: &conditions, scenario, end_s, legend, panels }.draw()?;
+        Ok::<_, io::Error>(Figure { name, caption: format!("{caption}{seen}"), svg })
+    };
+    let jumps = if chatter { " A filled band is chatter: the input jumps between its edges." } else { "" };
+    let (trajectory, seen) = trajectory::draw(&laws, longest, &conditions, with_reference())?;
     Ok(vec![
-        figure(
-            "fig4-trajectory",
-            "The flights in space. Dots: where the reference was when a gust struck.",
-            trajectory::draw(&laws, longest, &conditions, with_reference())?,
-        ),
-        figure(
+        Figure { name: "fig4-trajectory", caption: format!("The flights in space.{seen}"), svg: trajectory },
+        chart(
             "fig5-outputs",
             "Position and yaw against their reference.",
-            chart("Outputs", with_reference(), outputs.into())?,
-        ),
-        figure(
+            "Outputs",
+            with_reference(),
+            outputs.into(),
+        )?,
+        chart(
             "fig6-attitude",
             "Roll and pitch against the angles that the position loop asks for.",
-            chart("Roll and pitch", with_desired.collect(), attitude.into())?,
-        ),
-        figure("fig7-errors", "Reference minus vehicle.", chart("Errors", law_legend().collect(), errors.into())?),
-        figure(
+            "Roll and pitch",
+            with_desired.collect(),
+            attitude.into(),
+        )?,
+        chart("fig7-errors", "Reference minus vehicle.", "Errors", law_legend().collect(), errors.into())?,
+        chart(
             "fig8-inputs",
-            "Inputs as the rotors give them. A filled band is chatter: the input jumps between its edges.",
-            chart("Inputs", law_legend().collect(), controls.into())?,
-        ),
+            &format!("Inputs as the rotors give them.{jumps}"),
+            "Inputs",
+            law_legend().collect(),
+            controls.into(),
+        )?,
     ])
 }

@@ -1,7 +1,8 @@
 //! Panels one above the other that share one time axis.
 
-use super::canvas::{self, Area, FRAME, Failure, GREY, GRID, Ink, WIDTH_PX, text, units};
-use super::marks::{LABEL_PX, Marks, marks};
+use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
+use super::marks::{LABEL_PX, Mark, Marks, marks};
+use super::palette::{BLACK, EDGE, FRAME, GREY, GRID};
 use super::reduce::{clip, simplify};
 use crate::scenario::Scenario;
 use core::ops::Range;
@@ -32,10 +33,13 @@ const Y_TICKS: usize = 6;
 /// Columns of a panel, one a pixel.
 pub(super) const COLUMNS: f64 = PLOT_PX;
 
-/// Parameters are off; a gust of limited length.
-pub(super) const CHANGED: RGBColor = RGBColor(247, 238, 212);
-const GUSTY: RGBColor = RGBColor(225, 232, 238);
-const ONSET: Ink = Ink { color: RGBColor(130, 130, 130), width_px: 0.75 };
+/// Below and above what a panel shows, in the panel's unit.
+const LEAST_ROOM: f64 = 5e-3;
+/// A gust strikes; a band begins or ends.
+const ONSET: Ink = Ink::new(EDGE, 0.75);
+const BAND_END: Ink = Ink { opacity: 0.5, ..ONSET };
+/// How much a band hides of another below it.
+const BAND_OPACITY: f64 = 0.6;
 
 /// A value over time.
 pub(super) struct Line {
@@ -57,6 +61,26 @@ pub(super) struct Panel {
     pub(super) lines: Vec<Line>,
 }
 
+impl Panel {
+    /// Whether a line fills a band rather than being one: in at least a twentieth of the columns it goes up and down
+    /// by several of its own widths.
+    pub(super) fn has_chatter(&self, end_s: f64) -> bool {
+        let range = range(&self.lines, LEAST_ROOM);
+        let tall = 4.0 / (PANEL_PX - GAP_PX) * (range.end - range.start);
+        self.lines.iter().any(|line| {
+            let column = |t: f64| (t / end_s * COLUMNS).floor();
+            let columns = line.points.chunk_by(|a, b| column(a.0) == column(b.0));
+            let height = |points: &[(f64, f64)]| {
+                let values = || points.iter().map(|(_, v)| v.clamp(range.start, range.end));
+                values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+            };
+            let (tall, all) =
+                columns.fold((0, 0), |(n, all), points| (n + usize::from(height(points) > tall), all + 1));
+            20 * tall > all
+        })
+    }
+}
+
 /// A whole figure.
 pub(super) struct Chart<'a> {
     pub(super) title: &'a str,
@@ -69,9 +93,25 @@ pub(super) struct Chart<'a> {
 }
 
 impl Chart<'_> {
-    /// The figure as SVG.
-    pub(super) fn draw(&self) -> io::Result<String> {
+    /// The figure as SVG, and what there is to see besides lines, in words.
+    pub(super) fn draw(&self) -> io::Result<(String, String)> {
         let marks = marks(self.scenario, self.end_s, PLOT_PX);
+        let mut all = marks.gusts.iter().chain(&marks.changes);
+        let mut words = String::new();
+        if !marks.gusts.is_empty() {
+            words += " A thin line: a gust strikes.";
+        }
+        if all.any(|mark| mark.is_band) {
+            words += " Shaded: while what is named above lasts.";
+        }
+        let mut lines = self.panels.iter().flat_map(|panel| &panel.lines);
+        if lines.any(|line| line.lost_s.is_some() && !line.is_reference && !line.points.is_empty()) {
+            words += super::CROSS;
+        }
+        Ok((self.svg(&marks)?, words))
+    }
+
+    fn svg(&self, marks: &Marks) -> io::Result<String> {
         let head_px = canvas::head_px(&self.legend);
         let lanes_px = marks.lanes as f64 * LANE_PX;
         let height_px = head_px + lanes_px + self.panels.len() as f64 * PANEL_PX + BOTTOM_PX;
@@ -81,9 +121,9 @@ impl Chart<'_> {
             for (i, panel) in self.panels.iter().enumerate() {
                 let y_px = top_px + i as f64 * PANEL_PX;
                 let last = i + 1 == self.panels.len();
-                self.panel(area, panel, y_px, &marks, last)?;
+                self.panel(area, panel, y_px, marks, last)?;
             }
-            labels(area, &marks, top_px)
+            labels(area, marks, self.end_s, top_px)
         })
     }
 
@@ -93,7 +133,7 @@ impl Chart<'_> {
         let bottom_px = if last { BOTTOM_PX } else { 0.0 };
         let area =
             area.clone().shrink((0, units(y_px)), (units(WIDTH_PX - RIGHT_PX), units(plot_height_px + bottom_px)));
-        let range = range(&panel.lines, 5e-3);
+        let range = range(&panel.lines, LEAST_ROOM);
         let (low, high) = (range.start, range.end);
         let (decimals, time_decimals) = (tick_decimals(low..high, Y_TICKS), tick_decimals(0.0..self.end_s, T_TICKS));
         let mut chart = ChartBuilder::on(&area)
@@ -102,21 +142,24 @@ impl Chart<'_> {
             .set_label_area_size(LabelAreaPosition::Bottom, units(bottom_px))
             .build_cartesian_2d(0.0..self.end_s, range)?;
 
-        let band = |start_s, end_s, color: RGBColor| Rectangle::new([(start_s, low), (end_s, high)], color.filled());
-        chart.draw_series(marks.changes.iter().map(|mark| band(mark.start_s, mark.end_s, CHANGED)))?;
-        let short = marks.gusts.iter().filter(|gust| gust.end_s < self.end_s);
-        chart.draw_series(short.map(|gust| band(gust.start_s, gust.end_s, GUSTY)))?;
+        let line = |from, to, ink: Ink| PathElement::new([from, to], ink.style());
+        let bands = || marks.changes.iter().chain(&marks.gusts).filter(|mark| mark.is_band);
+        let shade = |mark: &Mark| mark.tint.mix(BAND_OPACITY).filled();
+        chart.draw_series(bands().map(|m| Rectangle::new([(m.start_s, low), (m.end_s, high)], shade(m))))?;
+        let ends = bands().flat_map(|mark| [mark.start_s, mark.end_s]).filter(|t| *t > 0.0 && *t < self.end_s);
+        chart.draw_series(ends.map(|t| line((t, low), (t, high), BAND_END)))?;
 
-        let axis = Ink { color: FRAME, width_px: 0.75 }.style();
+        let axis = Ink::new(FRAME, 0.75).style();
         chart
             .configure_mesh()
             .x_labels(T_TICKS)
             .y_labels(Y_TICKS)
             .max_light_lines(0)
-            .bold_line_style(Ink { color: GRID, width_px: 0.75 }.style())
+            .bold_line_style(Ink::new(GRID, 0.75).style())
+            .light_line_style(Ink::new(GRID, 0.25).style())
             .axis_style(axis)
             .label_style(text(11.0, GREY, HPos::Center))
-            .axis_desc_style(text(12.0, canvas::BLACK, HPos::Center))
+            .axis_desc_style(text(12.0, BLACK, HPos::Center))
             .x_label_formatter(&|t| number(*t, time_decimals))
             .y_label_formatter(&|v| number(*v, decimals))
             .set_all_tick_mark_size(units(3.0))
@@ -124,10 +167,9 @@ impl Chart<'_> {
             .y_desc(panel.label)
             .draw()?;
 
-        let line = |from, to, ink: Ink| PathElement::new([from, to], ink.style());
         chart.draw_series([Rectangle::new([(0.0, low), (self.end_s, high)], axis)])?;
         if panel.zero && low < 0.0 && 0.0 < high {
-            chart.draw_series([line((0.0, 0.0), (self.end_s, 0.0), Ink { color: FRAME, width_px: 0.75 })])?;
+            chart.draw_series([line((0.0, 0.0), (self.end_s, 0.0), Ink::new(FRAME, 0.75))])?;
         }
         chart.draw_series(marks.gusts.iter().map(|gust| line((gust.start_s, low), (gust.start_s, high), ONSET)))?;
 
@@ -136,7 +178,7 @@ impl Chart<'_> {
             let pieces = clip(points, low, high);
             chart.draw_series(pieces.iter().map(|piece| PathElement::new(simplify(piece, scale, 0.2), ink.style())))?;
             if let (Some(_), false, Some((t, v))) = (lost_s, is_reference, points.last()) {
-                let style = Ink { width_px: 2.0, ..*ink }.style();
+                let style = Ink::new(ink.color, 2.0).style();
                 chart.draw_series([Cross::new((*t, v.clamp(low, high)), units(4.0), style)])?;
             }
         }
@@ -144,14 +186,17 @@ impl Chart<'_> {
     }
 }
 
-/// Labels of the marks, above the panels.
-fn labels(area: &Area, marks: &Marks, top_px: f64) -> Result<(), Failure> {
+/// Labels of the marks on their bands, above the panels.
+fn labels(area: &Area, marks: &Marks, end_s: f64, top_px: f64) -> Result<(), Failure> {
     for mark in marks.gusts.iter().chain(&marks.changes) {
-        if let Some(lane) = mark.lane {
-            let y_px = top_px - 9.0 - lane as f64 * LANE_PX;
-            let place = (units(LEFT_PX + mark.label_px), units(y_px));
-            area.draw(&Text::new(mark.label.clone(), place, text(LABEL_PX, GREY, HPos::Center)))?;
+        let bottom_px = top_px - 3.0 - mark.lane as f64 * LANE_PX;
+        if mark.is_band {
+            let x = |t: f64| units(LEFT_PX + t / end_s * PLOT_PX);
+            let corners = [(x(mark.start_s), units(bottom_px - LANE_PX + 2.0)), (x(mark.end_s), units(bottom_px))];
+            area.draw(&Rectangle::new(corners, mark.tint.filled()))?;
         }
+        let place = (units(LEFT_PX + mark.label_px), units(bottom_px - 0.5 * LANE_PX + 1.0));
+        area.draw(&Text::new(mark.label.clone(), place, text(LABEL_PX, GREY, HPos::Center)))?;
     }
     Ok(())
 }

@@ -1,9 +1,10 @@
 //! The flights in space: a box seen from above its front right corner.
 
-use super::canvas::{self, Area, FRAME, Failure, GREY, GRID, Ink, WIDTH_PX, text, units};
-use super::marks::{LABEL_PX, marks};
+use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
+use super::marks::{LABEL_PX, Mark, marks};
+use super::palette::{BLACK, FRAME, GREY, GRID};
 use super::reduce::simplify;
-use super::time_chart::{CHANGED, Line, PLOT_PX, decimals, number, range};
+use super::time_chart::{Line, PLOT_PX, decimals, number, range};
 use super::{Law, REFERENCE};
 use crate::output::Flown;
 use nalgebra::Vector3;
@@ -15,6 +16,8 @@ use std::io;
 const HEIGHT_PX: f64 = 660.0;
 /// Room for the box, below a legend of one line: left, top, width, height.
 const ROOM_PX: [f64; 4] = [110.0, 70.0, WIDTH_PX - 220.0, HEIGHT_PX - 70.0 - 62.0];
+/// Width of a band along the reference.
+const BAND_PX: f64 = 13.0;
 /// Height of the box in the lengths of its longer floor edge.
 const BOX_HEIGHT: f64 = 0.62;
 /// Direction to the eye: azimuth -55 degrees, elevation 24 degrees.
@@ -67,13 +70,13 @@ impl View {
     }
 }
 
-/// Draws the flights of `laws` and the reference of the longest.
+/// Draws the flights of `laws` and the reference of the longest; tells what there is to see besides them, in words.
 pub(super) fn draw(
     laws: &[Law],
     longest: &Flown,
     conditions: &str,
     mut legend: Vec<(String, Ink)>,
-) -> io::Result<String> {
+) -> io::Result<(String, String)> {
     let scenario = &longest.scenario;
     let end_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
     let range_along = |axis: Vector3<f64>| {
@@ -87,8 +90,16 @@ pub(super) fn draw(
     };
     let ranges = [Vector3::x(), Vector3::y(), Vector3::z()].map(range_along);
     let marks = marks(scenario, end_s, PLOT_PX);
-    let changed = Ink { color: CHANGED, width_px: 13.0 };
-    legend.extend(marks.changes.iter().map(|change| (change.label.clone(), changed)));
+    // Wider below narrower, where several bands lie over one another.
+    let band = |change: &Mark| Ink::new(change.tint, BAND_PX + 6.0 * change.depth as f64);
+    let mut changes: Vec<&Mark> = marks.changes.iter().collect();
+    for (i, change) in changes.iter().enumerate() {
+        if changes.iter().take(i).all(|other| (&other.label, other.tint) != (&change.label, change.tint)) {
+            legend.push((change.label.clone(), Ink::new(change.tint, BAND_PX)));
+        }
+    }
+    changes.sort_by_key(|change| core::cmp::Reverse(change.depth));
+    let (mut dots, mut bands, mut crosses) = (false, false, false);
     let below_px = canvas::head_px(&legend) - canvas::head_px(&[]);
     let view = View::new(
         Vector3::from(ranges.each_ref().map(|range| range.start)),
@@ -96,47 +107,80 @@ pub(super) fn draw(
         below_px,
     );
 
-    canvas::svg(HEIGHT_PX + below_px, "Trajectory", |area| {
+    let svg = canvas::svg(HEIGHT_PX + below_px, "Trajectory", |area| {
         canvas::head(area, "Trajectory", conditions, &legend)?;
         furniture(area, &view)?;
         let wanted = || longest.run.log.iter().map(|s| (s.time_s, s.reference.position_m));
         let shadow = wanted().map(|(_, p)| Vector3::new(p.x, p.y, view.low_m.z));
-        path(area, &view, shadow, Ink { color: FRAME, width_px: 0.75 })?;
-        for change in &marks.changes {
+        path(area, &view, shadow, Ink::new(FRAME, 0.75))?;
+        for change in &changes {
             let during = wanted().filter(|(t, _)| change.start_s <= *t && *t <= change.end_s);
-            path(area, &view, during.map(|(_, p)| p), changed)?;
+            bands |= path(area, &view, during.map(|(_, p)| p), band(change))?.is_some();
         }
         path(area, &view, wanted().map(|(_, p)| p), REFERENCE)?;
         for law in laws {
             let flown = law.flight.run.log.iter().map(|s| s.motion.position_m);
             let end = path(area, &view, flown, law.ink())?;
             if let (Some(end), Some(_)) = (end, law.flight.run.lost) {
-                area.draw(&Cross::new(pixel(end), units(5.0), Ink { width_px: 2.0, ..law.ink() }.style()))?;
+                crosses = true;
+                area.draw(&Cross::new(pixel(end), units(5.0), Ink::new(law.color(), 2.0).style()))?;
             }
         }
-        for gust in &marks.gusts {
-            dot(area, &view, scenario.trajectory.at(gust.start_s).position_m, &gust.label)?;
-        }
-        dot(area, &view, scenario.initial.position_m, "start")
-    })
+        let start = scenario.initial.position_m;
+        let gusts =
+            marks.gusts.iter().map(|gust| (scenario.trajectory.at(gust.start_s).position_m, gust.label.as_str()));
+        let seen = dot_all(area, &view, core::iter::once((start, "start")).chain(gusts))?;
+        dots = seen > usize::from(view.contains(&start));
+        Ok(())
+    })?;
+    let mut words = String::new();
+    if dots {
+        words += " Dots: where the reference was when a gust struck.";
+    }
+    if bands {
+        words += " Shaded: where it was while what the legend names lasted.";
+    }
+    if crosses {
+        words += super::CROSS;
+    }
+    Ok((svg, words))
 }
 
 fn pixel((x, y): (f64, f64)) -> (i32, i32) {
     (units(x), units(y))
 }
 
-/// A dot with a label on the side that faces away from the middle.
-fn dot(area: &Area, view: &View, p: Vector3<f64>, label: &str) -> Result<(), Failure> {
-    if !view.contains(&p) {
-        return Ok(());
+/// Dots with their labels at those of the `places` that are in the box; of several at one place, the labels stand in a
+/// row. Tells how many places were.
+fn dot_all<'a>(
+    area: &Area,
+    view: &View,
+    places: impl Iterator<Item = (Vector3<f64>, &'a str)>,
+) -> Result<usize, Failure> {
+    let mut dots: Vec<((f64, f64), String)> = Vec::new();
+    let mut count = 0;
+    for (place, label) in places.filter(|(place, _)| view.contains(place)) {
+        count += 1;
+        let (x, y) = view.at(place);
+        match dots.iter_mut().find(|((a, b), _)| libm::hypot(a - x, b - y) < LABEL_PX) {
+            Some((_, labels)) => *labels += &format!(", {label}"),
+            None => dots.push(((x, y), label.to_owned())),
+        }
     }
-    let (x, y) = view.at(p);
+    for (place, label) in &dots {
+        dot(area, view, *place, label)?;
+    }
+    Ok(count)
+}
+
+/// A dot with a label on the side that faces away from the middle.
+fn dot(area: &Area, view: &View, (x, y): (f64, f64), label: &str) -> Result<(), Failure> {
     let (dx, dy) = (x - view.middle_px.0, y - view.middle_px.1);
     let away = 15.0 / libm::hypot(dx, dy).max(1.0);
-    area.draw(&Circle::new(pixel((x, y)), units(3.0), canvas::BLACK.filled()))?;
+    area.draw(&Circle::new(pixel((x, y)), units(3.0), BLACK.filled()))?;
     let side = if dx < 0.0 { HPos::Right } else { HPos::Left };
     let place = pixel((x + dx * away * 0.7, y + dy * away));
-    area.draw(&Text::new(label.to_owned(), place, text(LABEL_PX, canvas::BLACK, side)))
+    area.draw(&Text::new(label.to_owned(), place, text(LABEL_PX, BLACK, side)))
 }
 
 /// Draws a way through the box up to where it first leaves it, and tells where that is. What would be drawn twice, lap
@@ -178,7 +222,7 @@ fn path(
 fn furniture(area: &Area, view: &View) -> Result<(), Failure> {
     let (low, high) = (view.low_m, view.high_m);
     let line = |a: Vector3<f64>, b: Vector3<f64>, color: RGBColor| {
-        area.draw(&PathElement::new([pixel(view.at(a)), pixel(view.at(b))], Ink { color, width_px: 0.75 }.style()))
+        area.draw(&PathElement::new([pixel(view.at(a)), pixel(view.at(b))], Ink::new(color, 0.75).style()))
     };
     // For each axis: the edge with the numbers and the parallel one behind it, each as the place where the axis is at
     // zero and the way in which grid lines run from there over floor or wall; and where the numbers go.
@@ -214,7 +258,7 @@ fn furniture(area: &Area, view: &View) -> Result<(), Failure> {
         for (edge, _) in [front, back] {
             line(edge + axis * first, edge + axis * last, FRAME)?;
         }
-        label(0.5 * (first + last), 50.0, name.to_owned(), text(12.0, canvas::BLACK, HPos::Center))?;
+        label(0.5 * (first + last), 50.0, name.to_owned(), text(12.0, BLACK, HPos::Center))?;
     }
     // The three edges of the back walls that no numbers belong to.
     line(Vector3::new(low.x, low.y, high.z), Vector3::new(low.x, high.y, high.z), FRAME)?;
