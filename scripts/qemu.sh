@@ -10,8 +10,16 @@ version() {
 }
 
 if [ "$(version)" -lt 802 ]; then
+    # One at a time: two at once leave packages half installed. Whoever waited finds it done. (apt locks each of its own
+    # steps, and waits for others' when told to; not the steps together.)
+    exec 9>"${TMPDIR:-/tmp}/qemu.sh.$(id -u).lock"
+    flock 9
+fi
+if [ "$(version)" -lt 802 ]; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
-    install="apt-get install -y -qq --no-install-recommends"
+    install="apt-get install -y -qq --no-install-recommends -o DPkg::Lock::Timeout=300"
+    # What an earlier run that was cut short left half installed.
+    $sudo dpkg --configure -a >/dev/null || true
     $sudo apt-get update -qq
     $sudo $install qemu-system-arm >/dev/null
     if [ "$(version)" -lt 802 ]; then

@@ -1,7 +1,7 @@
 //! The link: bytes in, messages out, below the control tick.
 
 use crate::board::{Receiver, Transmitter};
-use crate::control::{self, TICKS};
+use crate::control::{self, Tick};
 use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_executor::SendSpawner;
 use embassy_futures::select::{Either, select};
@@ -30,18 +30,24 @@ async fn task(mut comms: Comms, mut receiver: Receiver, mut transmitter: Transmi
     let mut incoming = [0; READ_MAX];
     let mut outgoing = Vec::<u8, WRITE_MAX>::new();
     loop {
-        match select(receiver.receive(&mut incoming), TICKS.receive()).await {
-            Either::First(bytes) => {
-                let news = comms.receive(bytes);
+        match select(receiver.receive(&mut incoming), control::next_tick()).await {
+            Either::First(length) => {
+                let news = comms.receive(incoming.get(..length).unwrap_or_default());
                 control::with_inbox(|inbox| inbox.post(&news));
                 BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
             }
             Either::Second(tick) => {
-                outgoing.clear();
-                // A frame that finds no room is left out: the link is not for keeping.
-                comms.report(&tick.report, tick.cycles, |frame| drop(outgoing.extend_from_slice(frame)));
-                transmitter.transmit(&tick, &outgoing).await;
+                report(&mut comms, &tick, &mut outgoing);
+                transmitter.transmit(&tick, &outgoing);
             }
         }
     }
+}
+
+/// All that there is to say after a tick. Out of line, as the control tick is, to be told from the other tasks.
+#[inline(never)]
+fn report(comms: &mut Comms, tick: &Tick, outgoing: &mut Vec<u8, WRITE_MAX>) {
+    outgoing.clear();
+    // A frame that finds no room is left out: the link is not for keeping.
+    comms.report(&tick.report, tick.cycles, |frame| drop(outgoing.extend_from_slice(frame)));
 }

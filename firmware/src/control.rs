@@ -3,21 +3,38 @@
 use crate::board::{self, Outputs};
 use crate::time::{self, Stopwatch};
 use core::cell::RefCell;
+use core::future::poll_fn;
+use core::pin::pin;
 use core::sync::atomic::{AtomicU32, Ordering};
+use core::task::Poll;
 use embassy_executor::SendSpawner;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::channel::Channel;
+use embassy_sync::signal::Signal;
 use embassy_time::{Instant, Timer};
+use heapless::Deque;
 use onboard::{Flight, Report};
 use vehicle::Inbox;
 
 /// Newest inputs, written by [`crate::comms`].
 static INBOX: Mutex<CriticalSectionRawMutex, RefCell<Inbox>> = Mutex::new(RefCell::new(Inbox::EMPTY));
 
-/// What the last ticks did, for [`crate::comms`]. A tick never waits: if nobody reads for eight ticks, the next are
-/// left out.
-pub static TICKS: Channel<CriticalSectionRawMutex, Tick, 8> = Channel::new();
+/// What the last ticks did, and that there are some. Not a channel, which panics if it is used while it is used.
+static TICKS: Mutex<CriticalSectionRawMutex, RefCell<Deque<Tick, 8>>> = Mutex::new(RefCell::new(Deque::new()));
+static TICKED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+
+/// What the oldest tick did that nobody has asked for yet. A tick never waits: if nobody asks for eight ticks, the next
+/// are left out.
+pub fn next_tick() -> impl Future<Output = Tick> {
+    poll_fn(|context| {
+        // Before the look, so that none comes in between.
+        let _ = pin!(TICKED.wait()).poll(context);
+        match TICKS.lock(|ticks| ticks.try_borrow_mut().ok()?.pop_front()) {
+            Some(tick) => Poll::Ready(tick),
+            None => Poll::Pending,
+        }
+    })
+}
 
 /// Cycles of the last control tick and of the longest, for [`crate::housekeeping`].
 static CYCLES: AtomicU32 = AtomicU32::new(0);
@@ -39,7 +56,8 @@ pub struct Tick {
 
 /// Changes what the next tick will work from.
 pub fn with_inbox(change: impl FnOnce(&mut Inbox)) {
-    INBOX.lock(|inbox| change(&mut inbox.borrow_mut()));
+    // Borrowed by nobody else while it is locked; and no panic.
+    INBOX.lock(|inbox| inbox.try_borrow_mut().ok().map(|mut inbox| change(&mut inbox)));
 }
 
 /// Starts the tick, disarmed.
@@ -60,7 +78,10 @@ async fn task(mut flight: Flight, mut outputs: Outputs) {
         CYCLES.store(cycles, Ordering::Relaxed);
         CYCLES_MAX.fetch_max(cycles, Ordering::Relaxed);
         // Full if comms is behind: then this tick goes unreported.
-        let _ = TICKS.try_send(Tick { report, cycles });
+        let push = |ticks: &RefCell<Deque<_, _>>| ticks.try_borrow_mut().ok()?.push_back(Tick { report, cycles }).ok();
+        if TICKS.lock(push).is_some() {
+            TICKED.signal(());
+        }
     }
 }
 
@@ -78,7 +99,9 @@ fn tick(flight: &mut Flight, outputs: &mut Outputs) -> Report {
     let report = flight.tick(now_us, &inbox);
 
     outputs.drive(report.throttles);
-    if report.health.rate.alive {
+    // A task that has failed is started anew by a reset, once that ends no flight.
+    let may_reset = board::task_has_failed() && !report.mode.armed();
+    if report.health.rate.alive && !may_reset {
         outputs.feed_watchdog();
     }
     report

@@ -2,7 +2,8 @@
 //!
 //! The executors borrow the lines of CAN2, which this firmware leaves off.
 
-use cortex_m::peripheral::scb::SystemHandler;
+use cortex_m::peripheral::SCB;
+use cortex_m::peripheral::scb::{SystemHandler, VectActive};
 use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
@@ -27,6 +28,15 @@ pub mod priority {
 static CONTROL: InterruptExecutor = InterruptExecutor::new();
 static COMMS: InterruptExecutor = InterruptExecutor::new();
 static HOUSEKEEPING: InterruptExecutor = InterruptExecutor::new();
+
+/// True in a task that is not needed to fly, and in what it calls: the link's, housekeeping.
+pub fn in_dispensable_task() -> bool {
+    let dispensable = [interrupt::CAN2_RX0, interrupt::CAN2_RX1];
+    match SCB::vect_active() {
+        VectActive::Interrupt { irqn } => dispensable.into_iter().any(|line| line as u16 == irqn.into()),
+        _ => false,
+    }
+}
 
 /// Where to spawn tasks.
 #[expect(missing_docs, reason = "named after the module whose tasks each takes")]

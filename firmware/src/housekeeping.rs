@@ -4,7 +4,10 @@ use crate::{comms, control};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_rt::STACK_PAINT_VALUE;
 use embassy_executor::SendSpawner;
-use embassy_time::{Duration, Ticker};
+use embassy_time::{Instant, Timer};
+
+/// How often \[us\].
+const EVERY_US: u64 = 1_000_000;
 
 static STACK_BYTES: AtomicU32 = AtomicU32::new(0);
 
@@ -20,9 +23,9 @@ pub fn spawn(spawner: SendSpawner) {
 
 #[embassy_executor::task]
 async fn task() {
-    let mut ticker = Ticker::every(Duration::from_secs(1));
     loop {
-        ticker.next().await;
+        // Without the checks for an overflow that would panic in 585,000 years.
+        Timer::at(Instant::from_micros(Instant::now().as_micros().wrapping_add(EVERY_US))).await;
         STACK_BYTES.store(deepest_stack(), Ordering::Relaxed);
         let [last, longest] = control::cycles();
         defmt::info!(
@@ -37,6 +40,7 @@ async fn task() {
 
 /// Bytes of the stack that no longer hold the paint that start-up left there.
 #[expect(unsafe_code, reason = "the stack's bounds are linker symbols, and its unused part belongs to no object")]
+#[inline(never)]
 fn deepest_stack() -> u32 {
     unsafe extern "C" {
         static _stack_end: u32;

@@ -7,10 +7,9 @@ use core::cell::{Cell, RefCell};
 use core::task::Waker;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{SCB, SYST};
-use critical_section::Mutex;
+use critical_section::{CriticalSection, Mutex};
 use embassy_time::Instant;
 use embassy_time_driver::Driver;
-use embassy_time_queue_utils::Queue;
 
 /// Clock of the core and of SysTick \[Hz\].
 pub const CORE_HZ: u32 = 168_000_000;
@@ -24,12 +23,30 @@ const US_PER_TICK: u64 = 1000;
 struct SysTickDriver {
     /// Start of the current period \[us\].
     period_us: Mutex<Cell<u64>>,
-    alarms: Mutex<RefCell<Queue>>,
+    alarms: Mutex<RefCell<[Option<Alarm>; ALARMS]>>,
+}
+
+/// Tasks that may wait for a time at once; four do. Any more are woken at once, and ask again.
+const ALARMS: usize = 8;
+
+/// A task that waits for a time.
+struct Alarm {
+    at_us: u64,
+    waker: Waker,
+}
+
+impl SysTickDriver {
+    /// Nobody else has borrowed them while interrupts are off; and nothing here may panic, since nothing flies without it.
+    fn with_alarms(&self, cs: CriticalSection, change: impl FnOnce(&mut [Option<Alarm>; ALARMS])) {
+        if let Ok(mut alarms) = self.alarms.borrow(cs).try_borrow_mut() {
+            change(&mut alarms);
+        }
+    }
 }
 
 embassy_time_driver::time_driver_impl!(static DRIVER: SysTickDriver = SysTickDriver {
     period_us: Mutex::new(Cell::new(0)),
-    alarms: Mutex::new(RefCell::new(Queue::new())),
+    alarms: Mutex::new(RefCell::new([const { None }; ALARMS])),
 });
 
 /// Starts the time base, whose interrupt must have its priority by then. The core must run at [`CORE_HZ`].
@@ -84,11 +101,19 @@ impl Driver for SysTickDriver {
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {
         critical_section::with(|cs| {
-            let mut alarms = self.alarms.borrow(cs).borrow_mut();
-            if alarms.schedule_wake(at, waker) {
-                // Wakes at once what is already due; the rest waits for the next period.
-                alarms.next_expiration(self.period_us.borrow(cs).get());
+            if at <= self.period_us.borrow(cs).get() {
+                return waker.wake_by_ref();
             }
+            self.with_alarms(cs, |alarms| {
+                if let Some(known) = alarms.iter_mut().flatten().find(|alarm| alarm.waker.will_wake(waker)) {
+                    known.at_us = known.at_us.min(at);
+                    return;
+                }
+                match alarms.iter_mut().find(|alarm| alarm.is_none()) {
+                    Some(free) => *free = Some(Alarm { at_us: at, waker: waker.clone() }),
+                    None => waker.wake_by_ref(),
+                }
+            });
         });
     }
 }
@@ -96,8 +121,14 @@ impl Driver for SysTickDriver {
 #[cortex_m_rt::exception]
 fn SysTick() {
     critical_section::with(|cs| {
-        let period_us = DRIVER.period_us.borrow(cs);
-        period_us.set(period_us.get() + US_PER_TICK);
-        DRIVER.alarms.borrow(cs).borrow_mut().next_expiration(period_us.get());
+        let period_us = DRIVER.period_us.borrow(cs).get() + US_PER_TICK;
+        DRIVER.period_us.borrow(cs).set(period_us);
+        DRIVER.with_alarms(cs, |alarms| {
+            for slot in alarms {
+                if let Some(due) = slot.take_if(|alarm| alarm.at_us <= period_us) {
+                    due.waker.wake();
+                }
+            }
+        });
     });
 }

@@ -7,7 +7,7 @@
 
 use crate::Error;
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
 
 /// Most instructions that a control tick may take: at two and a half cycles each, 63 us of the 1000.
@@ -45,14 +45,38 @@ pub struct Reach {
     pub stack_bytes: u32,
     /// The chain of calls behind it, outermost first, each with its own share.
     pub deepest: Vec<(String, u32)>,
-    /// Functions that panic.
-    pub panics: Vec<String>,
-    /// Functions that call through a pointer. In the control tick that can only be the executor's waker.
+    /// The shortest chain of calls to each function that panics, outermost first. What a panic does is not looked at: it
+    /// ends whatever ran.
+    pub panics: Vec<Vec<String>>,
+    /// Functions that call through a pointer.
     pub indirect: Vec<String>,
 }
 
-/// What a waker of the executors leads to.
-const WAKER: &str = "embassy_executor::raw::waker::wake";
+/// What the executors' wakers lead to, which is what all calls through a pointer are, but those of [`EXECUTORS`].
+const WAKER: [&str; 3] =
+    ["embassy_executor::raw::waker::wake", "embassy_executor::raw::waker::clone", "embassy_executor::raw::waker::drop"];
+
+/// Each executor's interrupt, and the tasks that it polls through a pointer, each by a function that it alone calls.
+const EXECUTORS: [(&str, &[&str]); 3] = [
+    ("CAN2_TX", &["firmware::control::tick", "firmware::board::encode"]),
+    ("CAN2_RX0", &["firmware::comms::report"]),
+    ("CAN2_RX1", &["firmware::housekeeping::deepest_stack"]),
+];
+/// The name of every task's function.
+const POLL: &str = "embassy_executor::raw::TaskStorage<F>::poll";
+
+/// Interrupts of the flight image by priority, from the most urgent; those of one level do not nest.
+pub const LEVELS: [(&str, &str); 7] = [
+    ("-2", "NonMaskableInt"),
+    ("1", "SysTick"),
+    ("2", "USART1"),
+    ("4", "CAN2_TX"),
+    ("6", "DMA2_STREAM1"),
+    ("8", "CAN2_RX0"),
+    ("12", "CAN2_RX1"),
+];
+/// What the processor pushes when it takes an interrupt: 26 words with the FPU's, and 1 to align them.
+pub const FRAME_BYTES: u32 = 108;
 
 impl Linked {
     /// Reads an image.
@@ -114,16 +138,66 @@ impl Linked {
     /// If there is none of that name, or it can call itself.
     pub fn reach(&self, name: &str) -> Result<Reach, Error> {
         let root = self.find(name).ok_or_else(|| Error::Protocol(format!("the image has no function {name}")))?;
-        let mut walk = Walk { linked: self, waker: self.find(WAKER), depths: BTreeMap::new(), open: BTreeSet::new() };
+        let mut walk = Walk { linked: self, depths: BTreeMap::new(), open: BTreeSet::new() };
         let (stack_bytes, deepest) = walk.depth(root)?;
-        let reached = || walk.depths.keys().filter_map(|address| self.functions.get(address));
-        let names = |keep: fn(&Function) -> bool| reached().filter(|f| keep(f)).map(|f| f.name.clone()).collect();
-        Ok(Reach {
-            stack_bytes,
-            deepest,
-            panics: names(|function| function.name.contains("panic") || function.name.ends_with("_fail")),
-            indirect: names(|function| function.is_indirect),
-        })
+        let reached = walk.depths.keys().filter_map(|address| self.functions.get(address));
+        let indirect = reached.filter(|function| function.is_indirect).map(|function| function.name.clone()).collect();
+        Ok(Reach { stack_bytes, deepest, panics: self.panics(root)?, indirect })
+    }
+
+    /// The shortest chain from `root` to each function that panics.
+    fn panics(&self, root: u32) -> Result<Vec<Vec<String>>, Error> {
+        let mut chains = Vec::new();
+        let mut seen = BTreeSet::from([root]);
+        let mut next = VecDeque::from([vec![root]]);
+        while let Some(chain) = next.pop_front() {
+            let last = chain.last().copied().unwrap_or(root);
+            if self.function(last)?.panics() {
+                let names = chain.iter().map(|address| Ok(self.function(*address)?.name.clone()));
+                chains.push(names.collect::<Result<_, Error>>()?);
+                continue;
+            }
+            for callee in self.callees(last)? {
+                if seen.insert(callee) {
+                    next.push_back([chain.as_slice(), &[callee]].concat());
+                }
+            }
+        }
+        Ok(chains)
+    }
+
+    fn function(&self, address: u32) -> Result<&Function, Error> {
+        let none = || Error::Protocol(format!("a call to {address:#010x}, where no function is"));
+        self.functions.get(&address).ok_or_else(none)
+    }
+
+    /// All that a function may call.
+    fn callees(&self, address: u32) -> Result<BTreeSet<u32>, Error> {
+        let function = self.function(address)?;
+        let mut callees = function.calls.clone();
+        if function.is_indirect {
+            callees.extend(WAKER.iter().filter_map(|name| self.find(name)));
+            for (_, marks) in EXECUTORS.iter().filter(|(interrupt, _)| *interrupt == function.name) {
+                for mark in *marks {
+                    callees.insert(self.task(mark)?);
+                }
+            }
+        }
+        Ok(callees)
+    }
+
+    /// The task that calls the function `mark`.
+    fn task(&self, mark: &str) -> Result<u32, Error> {
+        let missing = |what: &str| Error::Protocol(format!("the image has no {what} {mark}"));
+        let mark_address = self.find(mark).ok_or_else(|| missing("function"))?;
+        let mut tasks = self.functions.iter().filter(|(_, function)| function.name == POLL);
+        let task = tasks.find(|(_, function)| function.calls.contains(&mark_address));
+        task.map(|(address, _)| *address).ok_or_else(|| missing("task that calls"))
+    }
+
+    /// Where the function of this name begins.
+    pub fn function_named(&self, name: &str) -> Option<u32> {
+        self.find(name)
     }
 
     /// The address of a symbol, by the name that the linker knows.
@@ -141,7 +215,6 @@ type Depth = (u32, Vec<(String, u32)>);
 
 struct Walk<'a> {
     linked: &'a Linked,
-    waker: Option<u32>,
     depths: BTreeMap<u32, Depth>,
     /// Functions that the walk is within.
     open: BTreeSet<u32>,
@@ -152,15 +225,13 @@ impl Walk<'_> {
         if let Some(depth) = self.depths.get(&address) {
             return Ok(depth.clone());
         }
-        let Some(function) = self.linked.functions.get(&address) else {
-            return Err(Error::Protocol(format!("a call to {address:#010x}, where no function is")));
-        };
+        let function = self.linked.function(address)?;
         if !self.open.insert(address) {
             return Err(Error::Protocol(format!("{} can call itself", function.name)));
         }
-        let waker = self.waker.filter(|_| function.is_indirect);
         let (mut below, mut chain) = Depth::default();
-        for &callee in function.calls.iter().chain(&waker) {
+        let callees = if function.panics() { BTreeSet::new() } else { self.linked.callees(address)? };
+        for callee in callees {
             let (bytes, names) = self.depth(callee)?;
             if bytes > below {
                 (below, chain) = (bytes, names);
@@ -175,6 +246,11 @@ impl Walk<'_> {
 }
 
 impl Function {
+    /// True if it is where a panic begins.
+    fn panics(&self) -> bool {
+        self.name.contains("panic") || self.name.ends_with("_fail") || self.name.ends_with("_failed")
+    }
+
     fn decode(name: String, start: u32, code: &[u8], is_code: impl Fn(u32) -> bool) -> Self {
         let mut function = Function { name, ..Function::default() };
         let end = start + code.len() as u32;

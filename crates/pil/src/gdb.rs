@@ -147,6 +147,20 @@ impl Gdb {
         address.map(Some).ok_or(Error::Protocol(stop))
     }
 
+    /// Runs a halted processor until it comes to the instruction at `address`.
+    ///
+    /// # Errors
+    /// If it does not within `patience`.
+    pub fn run_to(&mut self, address: u32, patience: Duration) -> Result<(), Error> {
+        self.order(&format!("Z1,{address:x},2"))?;
+        self.send("c")?;
+        self.stream.get_ref().set_read_timeout(Some(patience))?;
+        let stop = self.receive();
+        self.stream.get_ref().set_read_timeout(Some(ANSWER_TIMEOUT))?;
+        stop?;
+        self.order(&format!("z1,{address:x},2"))
+    }
+
     /// Halts a processor that runs.
     ///
     /// # Errors

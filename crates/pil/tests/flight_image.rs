@@ -9,7 +9,7 @@ use onboard::CLOCK_FAILED;
 use pil::budget::Linked;
 use pil::clock_tree::{FLASH_ACR, RCC_CFGR, RCC_PLLCFGR};
 use pil::exercise::{Station, motion};
-use pil::gdb::{SP, XPSR};
+use pil::gdb::{PC, SP, XPSR};
 use pil::{Board, Image};
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
@@ -145,6 +145,28 @@ fn a_crystal_that_fails_does_not_stop_it() {
 }
 
 #[test]
+fn a_panic_of_the_link_does_not_stop_the_tick() {
+    let Some((mut board, linked)) = start_or_skip(Image::Flight, |elf| Ok((Board::boot(&elf)?, Linked::read(&elf)?)))
+    else {
+        return;
+    };
+    let address = |name: &str| linked.function_named(name).unwrap();
+    let gdb = board.halt().unwrap();
+    gdb.run_to(address("firmware::comms::report"), PATIENCE).unwrap();
+    gdb.set_register(PC, linked.symbol("_defmt_panic").unwrap() & !1).unwrap();
+    for _ in 0..100 {
+        gdb.run_to(address("firmware::control::tick"), PATIENCE).unwrap();
+        gdb.step().unwrap();
+    }
+    gdb.resume().unwrap();
+    // What was sent before, and then nothing: the link's task is gone.
+    let start = Instant::now();
+    while !board.receive().unwrap().is_empty() {
+        assert!(start.elapsed() < PATIENCE, "it talks on");
+    }
+}
+
+#[test]
 fn it_has_a_log() {
     let Some((mut board, linked)) = start_or_skip(Image::Flight, |elf| Ok((Board::boot(&elf)?, Linked::read(&elf)?)))
     else {
@@ -172,7 +194,7 @@ fn it_has_a_log() {
 }
 
 /// Bottom of the RAM, and of the stack; and the stack's top (`memory.x`).
-const STACK: std::ops::Range<u32> = 0x2000_0000..0x2000_4000;
+const STACK: std::ops::Range<u32> = 0x2000_0000..0x2000_6000;
 const HARD_FAULT: u32 = 3;
 
 #[test]

@@ -15,6 +15,11 @@ fn main() -> ! {
 
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {
+    if firmware::executors::in_dispensable_task() {
+        let (file, line) = info.location().map_or(("", 0), |place| (place.file(), place.line()));
+        defmt::error!("a task has failed, flying on without it: {=str}:{=u32}", file, line);
+        firmware::board::park()
+    }
     firmware::board::stop_motors();
     defmt::error!("{}", defmt::Display2Format(info));
     wait_for_watchdog()

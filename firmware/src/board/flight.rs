@@ -3,6 +3,10 @@
 use crate::control::Tick;
 use crate::executors::priority;
 use crate::{clocks, reset};
+use core::future::poll_fn;
+use core::pin::pin;
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::task::{Poll, ready};
 use embassy_executor::SendSpawner;
 use embassy_futures::poll_once;
 use embassy_stm32::gpio::OutputType;
@@ -17,8 +21,8 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peri, bind_interrupts, dma, pac};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use embassy_time::{Duration, with_timeout};
-use embedded_io_async::{Read, Write};
+use embassy_time::{Instant, with_deadline};
+use embedded_io_async::{BufRead, Write};
 use static_cell::StaticCell;
 use vehicle::dshot::{BIT_RATE_HZ, Frame, Timing};
 
@@ -32,6 +36,8 @@ const READ_MIN: usize = 32;
 /// anything from 17 to 47. A processor that stands still stops the motors
 /// sooner: motor controllers do so after some 20 ms without a frame.
 const WATCHDOG_US: u32 = 20_000;
+/// A frame to the motors that takes longer is given up \[us\].
+const TRANSFER_MAX_US: u64 = 2_000;
 /// Timers of the second peripheral bus run at the core's clock \[Hz\].
 const MOTOR_TIMER_HZ: u32 = crate::time::CORE_HZ;
 
@@ -106,17 +112,25 @@ struct Motors {
 impl Motors {
     /// Sends one frame to each motor; takes 28 us.
     async fn send(&mut self, throttles: [u16; 4]) {
-        let waveforms = throttles.map(|throttle| self.timing.waveform(Frame::new(throttle)));
-        for (bit, row) in self.rows.0.iter_mut().enumerate() {
-            *row = waveforms.map(|waveform| waveform.get(bit).copied().unwrap_or(0));
-        }
+        encode(&self.timing, throttles, &mut self.rows);
         let rows = self.rows.0.as_flattened();
         let dma = self.dma.reborrow();
         let transfer = self.pwm.waveform_up_multi_channel(dma, Irqs, Channel::Ch1, Channel::Ch4, rows);
-        if with_timeout(Duration::from_millis(2), transfer).await.is_err() {
+        // Without the check for an overflow that would panic in 585,000 years.
+        let deadline = Instant::from_micros(Instant::now().as_micros().wrapping_add(TRANSFER_MAX_US));
+        if with_deadline(deadline, transfer).await.is_err() {
             // The next frame sets the stream up anew.
             defmt::warn!("the motors' DMA stands still");
         }
+    }
+}
+
+/// Out of line, as the control tick is, to be counted.
+#[inline(never)]
+fn encode(timing: &Timing, throttles: [u16; 4], rows: &mut Rows) {
+    let waveforms = throttles.map(|throttle| timing.waveform(Frame::new(throttle)));
+    for (bit, row) in rows.0.iter_mut().enumerate() {
+        *row = waveforms.map(|waveform| waveform.get(bit).copied().unwrap_or(0));
     }
 }
 
@@ -135,6 +149,28 @@ pub fn stop_motors() {
     use pac::gpio::vals::Moder;
     // Their pins become plain outputs, which hold 0 since start-up.
     pac::GPIOC.moder().modify(|mode| (6..=9).for_each(|pin| mode.set_moder(pin, Moder::OUTPUT)));
+}
+
+/// A task that is not needed to fly has panicked.
+static TASK_FAILED: AtomicBool = AtomicBool::new(false);
+
+/// True if a task that is not needed to fly has panicked.
+pub fn task_has_failed() -> bool {
+    TASK_FAILED.load(Ordering::Relaxed)
+}
+
+/// Where a task that is not needed to fly ends when it panics: whatever is more urgent goes on.
+pub fn park() -> ! {
+    TASK_FAILED.store(true, Ordering::Relaxed);
+    loop {
+        // It may have panicked with interrupts off.
+        #[expect(unsafe_code, reason = "the critical section that this may end is one that nobody returns to")]
+        // SAFETY: what it protected is tried before it is used: the inbox, the ticks, the alarms.
+        unsafe {
+            cortex_m::interrupt::enable()
+        };
+        cortex_m::asm::wfi();
+    }
 }
 
 /// True if the crystal has failed and the chip's own oscillator has taken over.
@@ -168,11 +204,18 @@ impl Outputs {
 pub struct Receiver(BufferedUartRx<'static>);
 
 impl Receiver {
-    /// The next bytes: waits for at least one.
-    pub async fn receive<'a>(&mut self, buffer: &'a mut [u8]) -> &'a [u8] {
-        // An overrun loses bytes, which the decoder notices.
-        let length = self.0.read(buffer).await.unwrap_or(0);
-        buffer.get(..length).unwrap_or_default()
+    /// Reads the next bytes, and tells how many: waits for at least one.
+    pub fn receive(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize> {
+        // A new reading each time, which the compiler knows not to be one that has ended: that would panic. An overrun
+        // loses bytes, which the decoder notices.
+        poll_fn(move |context| {
+            let length = ready!(pin!(self.0.fill_buf()).poll(context)).map_or(0, |bytes| {
+                buffer.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+                bytes.len().min(buffer.len())
+            });
+            self.0.consume(length);
+            Poll::Ready(length)
+        })
     }
 }
 
@@ -181,7 +224,7 @@ pub struct Transmitter(BufferedUartTx<'static>);
 
 impl Transmitter {
     /// Sends what there was to say after `_tick`; leaves it out if the line is that far behind.
-    pub async fn transmit(&mut self, _tick: &Tick, bytes: &[u8]) {
+    pub fn transmit(&mut self, _tick: &Tick, bytes: &[u8]) {
         // Takes all of them or, if the ring has no room, none; the driver forgets those who wait for room.
         if !bytes.is_empty() {
             let _ = poll_once(self.0.write(bytes));

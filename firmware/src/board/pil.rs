@@ -42,6 +42,11 @@ pub fn start(_control: SendSpawner) -> Board {
     Board { outputs: Outputs, receiver: Receiver, transmitter }
 }
 
+/// A panic ends the emulator.
+pub fn task_has_failed() -> bool {
+    false
+}
+
 /// The emulator's clock does not fail.
 pub fn clock_has_failed() -> bool {
     false
@@ -70,10 +75,9 @@ impl Outputs {
 pub struct Receiver;
 
 impl Receiver {
-    /// The next bytes: waits for at least one.
-    pub async fn receive<'a>(&mut self, buffer: &'a mut [u8]) -> &'a [u8] {
-        let length = LINK.read(buffer).await;
-        buffer.get(..length).unwrap_or_default()
+    /// Reads the next bytes, and tells how many: waits for at least one.
+    pub fn receive(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize> {
+        LINK.read(buffer)
     }
 }
 
@@ -85,7 +89,7 @@ pub struct Transmitter {
 
 impl Transmitter {
     /// Replies with what there was to say after `tick`, and waits for the next tick's bytes.
-    pub async fn transmit(&mut self, tick: &Tick, bytes: &[u8]) {
+    pub fn transmit(&mut self, tick: &Tick, bytes: &[u8]) {
         let mut head = [0; 28];
         let words = [tick.cycles, housekeeping::stack_bytes(), bytes.len() as u32];
         let fields = tick.report.time_us.to_le_bytes().into_iter();
