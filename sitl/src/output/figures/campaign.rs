@@ -34,7 +34,7 @@ const SAME_PX: f64 = 1.0;
 const INTERVAL_OPACITY: f64 = 0.15;
 /// The same of all intervals together, about.
 const INTERVALS_OPACITY: f64 = 0.6;
-/// Top of the axis of shares [%]: marks at 100 stay whole.
+/// Top of the axis of shares \[%\]: marks at 100 stay whole.
 const TOP: f64 = 104.0;
 
 /// Draws every figure of a campaign; none of no flight.
@@ -105,7 +105,7 @@ struct Distribution {
     values: fn(&Tally) -> &[f64],
 }
 
-/// One contender's part of a distribution: value and how many flights [%] stayed below, with the interval's ends.
+/// One contender's part of a distribution: value and how many flights \[%\] stayed below, with the interval's ends.
 type Curve = Vec<(f64, [f64; 3])>;
 
 impl Distribution {
