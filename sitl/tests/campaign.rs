@@ -476,6 +476,34 @@ fn ten_million_flights_start_with_the_first() {
     }
 }
 
+/// Of many parts, all are needed at once, and the system gives a program few files at once.
+#[test]
+fn more_parts_than_open_files_come_together() {
+    let (folder, campaign) = (folder("many-parts"), parse(&SMALL.replace("= 150", "= 60").replace("= 6.0", "= 0.2")));
+    fly(&campaign, &folder.join("whole"), Shard::WHOLE, 2);
+    (1..=60).for_each(|index| fly(&campaign, &folder.join(format!("part-{index}")), Shard { index, of: 60 }, 1));
+    let merge = format!("ulimit -n 40; {} merge part-* --out merged", env!("CARGO_BIN_EXE_sitl"));
+    let output = Command::new("sh").current_dir(&folder).args(["-c", &merge]).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(results_of(&folder.join("whole")), results_of(&folder.join("merged")));
+}
+
+/// What the system does not give is not damaged: to delete it would be bad advice.
+#[test]
+fn what_cannot_be_read_is_not_called_damaged() {
+    let (folder, campaign) = (folder("unreadable"), parse(&SMALL.replace("= 150", "= 2").replace("= 6.0", "= 0.2")));
+    for file in ["campaign.json", "results.parquet"] {
+        let path = folder.join(file.replace('.', "-"));
+        fly(&campaign, &path, Shard::WHOLE, 1);
+        fs::remove_file(path.join(file)).unwrap();
+        fs::create_dir(path.join(file)).unwrap();
+        let place = Folder::open(&path, Manifest::new(&campaign, Shard::WHOLE), false);
+        let flown = place.and_then(|place| campaign::fly(&campaign, &place, &AtomicBool::new(false), &|_| ()));
+        let error = flown.map(|_| ()).unwrap_err().to_string();
+        assert!(error.starts_with(&format!("{}: cannot be read (", path.join(file).display())), "{error}");
+    }
+}
+
 #[test]
 fn a_shard_is_every_so_manieth_flight() {
     for (flights, of) in [(1, 1), (150, 1), (150, 4), (16, 16), (17, 16), (31, 16), (100, 7)] {

@@ -4,6 +4,7 @@ use super::Shard;
 use crate::output;
 use airframe::OutOfRange;
 use std::fmt;
+use std::io;
 use std::path::PathBuf;
 
 /// One line for people.
@@ -16,7 +17,14 @@ pub enum Error {
         /// Why.
         error: OutOfRange,
     },
-    /// A file that cannot be read as results.
+    /// A file that cannot be read at all.
+    Unreadable {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A file that is not what was written.
     Damaged {
         /// Which.
         path: PathBuf,
@@ -48,6 +56,9 @@ impl fmt::Display for Error {
         match self {
             Error::Draw { flight, error } => {
                 write!(f, "flight {flight} cannot be flown: {error}; narrow the spread that leads there")
+            }
+            Error::Unreadable { path, source } => {
+                write!(f, "{}: cannot be read ({source}); see that it can, and start again", path.display())
             }
             Error::Damaged { path, problem } => {
                 write!(

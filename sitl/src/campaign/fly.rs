@@ -20,19 +20,29 @@ pub fn fly(
     stop: &AtomicBool,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Option<Summary>, Error> {
-    let mut summary = Summary::new(folder.manifest());
-    let is_stopped = || stop.load(Ordering::Relaxed);
-    let heard = |row: Result<Row, Error>| if is_stopped() { Err(Error::Stopped) } else { row };
-    let flown = match folder.results()? {
-        Some(mut rows) => rows.try_for_each(|row| heard(row).map(|row| summary.add(&row))),
-        None => fly_missing(campaign, folder, stop, progress).and_then(|()| {
-            folder.write(folder.rows().map(heard).inspect(|row| row.iter().for_each(|row| summary.add(row))))
-        }),
-    };
-    match flown {
+    match flown(campaign, folder, stop, progress) {
         Err(Error::Stopped) => Ok(None),
-        flown => flown.map(|()| Some(summary.finish())),
+        summary => summary.map(Some),
     }
+}
+
+/// What all flights together say, those that are missing flown before.
+fn flown(
+    campaign: &Campaign,
+    folder: &Folder,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(u64) + Sync),
+) -> Result<Summary, Error> {
+    let heard = |row| if stop.load(Ordering::Relaxed) { Err(Error::Stopped) } else { row };
+    if let Some(rows) = folder.results()? {
+        let mut summary = Summary::new(folder.manifest());
+        rows.map(heard).try_for_each(|row| row.map(|row| summary.add(&row)))?;
+        return Ok(summary.finish());
+    }
+    fly_missing(campaign, folder, stop, progress)?;
+    let mut summary = Summary::new(folder.manifest());
+    folder.write(folder.rows().map(heard).inspect(|row| row.iter().for_each(|row| summary.add(row))))?;
+    Ok(summary.finish())
 }
 
 /// Flies the chunks that are not there, in order, flight by flight.

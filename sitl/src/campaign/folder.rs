@@ -4,7 +4,7 @@
 //! name. At the end all become `results.parquet`. Whoever starts again in the same folder goes on with what is missing.
 //! Every file carries its checksum, and none is believed without.
 
-use super::parquet::{Reader, Writer};
+use super::parquet::{OnDisk, Reader, Writer};
 use super::{Error, Manifest, Row};
 use crate::output::seal::{self, Sealing};
 use crate::output::{self, Folder as Place};
@@ -144,8 +144,8 @@ impl Folder {
     /// The rows of one chunk, which are what they should be.
     fn read_chunk(&self, chunk: u64) -> Result<Vec<Row>, Error> {
         let path = self.chunk_path(chunk);
-        let bytes = fs::read(&path).map_err(|error| damaged(&path, error))?;
-        seal::verify(&mut io::Cursor::new(&bytes)).map_err(|error| damaged(&path, error))?;
+        let bytes = fs::read(&path).map_err(|error| unread(&path, error))?;
+        seal::verify(&mut io::Cursor::new(&bytes)).map_err(|error| unread(&path, error))?;
         let reader = Reader::new(Bytes::from(bytes)).map_err(|error| damaged(&path, error))?;
         if !self.manifest.is_same(reader.manifest()) {
             return Err(damaged(&path, "it is of another campaign"));
@@ -216,9 +216,9 @@ impl Folder {
 fn found(path: &Path) -> Result<Option<Manifest>, Error> {
     let bytes = match fs::read(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-        bytes => bytes.map_err(|error| damaged(path, error))?,
+        bytes => bytes.map_err(|error| unread(path, error))?,
     };
-    seal::verify(&mut io::Cursor::new(&bytes)).map_err(|error| damaged(path, error))?;
+    seal::verify(&mut io::Cursor::new(&bytes)).map_err(|error| unread(path, error))?;
     let page: Page<Manifest> = serde_json::from_slice(&bytes).map_err(|error| damaged(path, error))?;
     Ok(Some(page.manifest))
 }
@@ -236,7 +236,7 @@ fn write(out: &mut (dyn Write + Send), manifest: &Manifest, mut rows: impl Itera
 /// The rows of one file; an error names it.
 pub(super) struct Rows {
     path: PathBuf,
-    rows: Reader<File>,
+    rows: Reader<OnDisk>,
 }
 
 impl Rows {
@@ -244,10 +244,11 @@ impl Rows {
     fn open(path: &Path) -> Result<Option<Self>, Error> {
         let mut file = match File::open(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            file => file.map_err(|error| damaged(path, error))?,
+            file => file.map_err(|error| unread(path, error))?,
         };
-        seal::verify(&mut file).map_err(|error| damaged(path, error))?;
-        let rows = Reader::new(file).map_err(|error| damaged(path, error))?;
+        seal::verify(&mut file).map_err(|error| unread(path, error))?;
+        let length = file.metadata().map_err(|error| unread(path, error))?.len();
+        let rows = Reader::new(OnDisk { path: path.into(), length }).map_err(|error| damaged(path, error))?;
         Ok(Some(Rows { path: path.into(), rows }))
     }
 
@@ -266,6 +267,14 @@ impl Iterator for Rows {
 
     fn next(&mut self) -> Option<Self::Item> {
         Some(self.rows.next()?.map_err(|error| damaged(&self.path, error)))
+    }
+}
+
+/// Why a file is not believed: the system does not give it, or it is not what was written.
+fn unread(path: &Path, source: io::Error) -> Error {
+    match source.kind() {
+        io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => damaged(path, source),
+        _ => Error::Unreadable { path: path.into(), source },
     }
 }
 

@@ -2,16 +2,19 @@
 
 use super::{Manifest, Row};
 use crate::output::seal;
+use bytes::Bytes;
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use parquet::column::reader::get_typed_column_reader;
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
 use parquet::errors::{ParquetError, Result};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
-use parquet::file::reader::{ChunkReader, FileReader, RowGroupReader, SerializedFileReader};
+use parquet::file::reader::{ChunkReader, FileReader, Length, RowGroupReader, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
-use std::io::Write;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom, Write};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Rows that are written and read at once: a compromise between memory and the size of the file. Fewer in each of many
@@ -126,6 +129,34 @@ fn put<T: DataType>(
     }
     column.typed::<T>().write_batch(&dense, Some(&present), None)?;
     column.close()
+}
+
+/// A file that is open only while it is being read: of many parts, all at once would be more than the system allows.
+pub(super) struct OnDisk {
+    pub(super) path: PathBuf,
+    pub(super) length: u64,
+}
+
+impl Length for OnDisk {
+    fn len(&self) -> u64 {
+        self.length
+    }
+}
+
+impl ChunkReader for OnDisk {
+    type T = BufReader<File>;
+
+    fn get_read(&self, start: u64) -> Result<Self::T> {
+        let mut file = File::open(&self.path)?;
+        file.seek(SeekFrom::Start(start))?;
+        Ok(BufReader::new(file))
+    }
+
+    fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes> {
+        let mut bytes = Vec::with_capacity(length);
+        let read = self.get_read(start)?.take(length as u64).read_to_end(&mut bytes)?;
+        if read == length { Ok(bytes.into()) } else { Err(shape()) }
+    }
 }
 
 /// Reads rows in order. Of bytes that are not what was written, the library may make anything, a panic included: they are

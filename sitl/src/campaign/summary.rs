@@ -89,16 +89,18 @@ pub struct Summary {
 impl Summary {
     /// Of no flight yet.
     pub fn new(manifest: &Manifest) -> Self {
+        // As much as there will be and no more: it is all that grows with the flights.
+        let values = || Vec::with_capacity(manifest.shard.count(manifest.flights) as usize);
         let tally = |contender: &String| Tally {
             contender: contender.clone(),
             count: Count::default(),
             tripped: 0,
             by_trajectory: vec![Count::default(); manifest.trajectories.len()],
             by_draw: vec![[Count::default(); BINS]; manifest.drawn.len()],
-            rmse_position_m: Vec::new(),
-            max_position_m: Vec::new(),
-            mean_abs_du4_n: Vec::new(),
-            saturated_ratio: Vec::new(),
+            rmse_position_m: values(),
+            max_position_m: values(),
+            mean_abs_du4_n: values(),
+            saturated_ratio: values(),
             worst: Vec::new(),
         };
         Summary { tallies: manifest.contenders.iter().map(tally).collect(), manifest: manifest.clone() }

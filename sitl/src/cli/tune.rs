@@ -5,6 +5,7 @@ use super::progress::Progress;
 use super::target::Target;
 use super::{Failure, json, print};
 use clap::Args;
+use sitl::output::Error;
 use sitl::scenario::{Contender, ControllerKind, Scenario};
 use sitl::tune::{self, Found};
 use std::path::PathBuf;
@@ -67,8 +68,7 @@ impl Tune {
 
         let report = || tune::report(&start, &found, &training, self.seed);
         if let Some(out) = &self.out {
-            std::fs::write(out, report()?)
-                .map_err(|error| format!("{}: cannot be written ({error})", out.display()))?;
+            std::fs::write(out, report()?).map_err(|source| Error::Write { path: out.clone(), source })?;
         }
         let Found { before, after, evaluations, .. } = &found;
         match &self.out {
