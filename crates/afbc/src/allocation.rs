@@ -177,9 +177,10 @@ impl<const N: usize> Mixer<N> {
         let yaw = column(2, wanted.z);
         let mut fits = 1.0_f32;
         for (force, yaw) in upright.iter().zip(yaw.iter()) {
-            let room = if *yaw > 0.0 { self.force_max - force } else { *force };
+            // By rounding, less than none may be left: of no yaw, that takes no share.
+            let room = math::max(if *yaw > 0.0 { self.force_max - force } else { *force }, 0.0);
             if yaw.abs() > room {
-                fits = math::min(fits, math::max(room, 0.0) / yaw.abs());
+                fits = math::min(fits, room / yaw.abs());
             }
         }
         // Not `max`: that of 0 and -0 is either.

@@ -1,9 +1,9 @@
 //! Drag against closed forms.
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use airframe::{Parameters, RotorSpeeds};
+use airframe::{Axis, Parameters, RotorSpeeds};
 use nalgebra::{Matrix3, Rotation3, Vector3, Vector4};
-use plant::{Drag, Environment, Model, Motion, Plant, Realism, Wind};
+use plant::{Drag, Environment, Gust, GustKind, Model, Motion, Plant, Realism, Wind};
 use proptest::prelude::*;
 
 const STEP_S: f64 = 0.001;
@@ -218,6 +218,31 @@ proptest! {
         // what it can be: 0.4 N s/m at 36 m/s of a hub, at arms of 0.25 m.
         prop_assert!((force - expected_force).amax() < 2e-3, "{force} N, not {expected_force}");
         prop_assert!((moment - expected_moment).amax() < 5e-4, "{moment} N m, not {expected_moment}");
+    }
+
+    /// Drag of nothing changes nothing: with surroundings or without, the models' equations are the same ones, to the bit.
+    #[test]
+    fn drag_of_nothing_is_no_drag(
+        velocity in vector(10.0), wind in vector(10.0), attitude in vector(3.0), rates in vector(5.0),
+        speeds in prop::array::uniform4(0.0_f32..400.0), size in -2.0..2.0, axis in 0..6_usize, first in 0..2_usize
+    ) {
+        let model = *MODELS.get(first).unwrap();
+        let initial = Motion {
+            velocity_m_s: velocity, attitude_rad: attitude, rates_rad_s: rates, ..Motion::default()
+        };
+        let axis = *Axis::ALL.get(axis).unwrap();
+        let push = Gust { axis, kind: GustKind::Acceleration, size, start_s: 0.0, end_s: f64::INFINITY };
+        let environment = || Environment::new(P, Vec::new(), vec![push]).unwrap();
+        let realism = Realism {
+            drag: Some(none()), wind: Wind { steady_m_s: wind, ..Wind::default() }, ..Realism::default()
+        };
+        let mut with = Plant::with(model, initial, environment(), &realism, STEP_S).unwrap();
+        let mut without = Plant::new(model, initial, environment());
+        for _ in 0..100 {
+            with.step(&RotorSpeeds(Vector4::from(speeds)), STEP_S);
+            without.step(&RotorSpeeds(Vector4::from(speeds)), STEP_S);
+            prop_assert_eq!(with.motion(), without.motion());
+        }
     }
 
     /// Drag takes energy from the motion through the air, and gives none.
