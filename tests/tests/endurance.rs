@@ -7,6 +7,10 @@ use airframe::{Axis, Parameters, PerAxis, Setpoint};
 use nalgebra::Vector3;
 use plant::sensors::Spread;
 use plant::{Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors};
+use sitl::contender::ControllerKind;
+use sitl::flight::Sample;
+use sitl::run::Run;
+use sitl::scenario::{Scenario, built_in};
 
 const STEP_S: f64 = 0.001;
 const HOUR: u64 = 3_600_000;
@@ -94,4 +98,31 @@ fn estimates_of_the_law_as_printed_drift_until_the_vehicle_is_lost() {
     let furthest = hover.fly(140_000);
     println!("up to 240 s: {furthest} m away");
     assert!(furthest > 50.0);
+}
+
+/// Without noise it lasts as long as docs/results.md says, and the end comes as told there: level, of thrust that the
+/// allocation needs for the limit cycle of pitch.
+#[test]
+fn the_printed_hover_is_lost_upwards_and_level() {
+    let scenario = Scenario { duration_s: 300.0, ..built_in("hover").unwrap().scenario().unwrap() };
+    let fly = |kind| Run::fly(&scenario, scenario.contender(kind).unwrap(), 7).unwrap();
+    let run = fly(ControllerKind::Afbc);
+    let (lost, last) = (run.lost.unwrap(), run.log.last().unwrap());
+    let told = format!(
+        "after {:.1} s (`sitl fly hover --duration 300`), level, and {:.0} m up",
+        lost.time_s, last.motion.position_m.z
+    );
+    let page = include_str!("../../docs/results.md").split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(page.contains(&told), "docs/results.md does not say: {told}");
+
+    let tilt = |sample: &Sample| sample.motion.attitude_rad.xy().amax();
+    assert!(run.log.iter().filter(|sample| sample.time_s > 5.0).all(|sample| tilt(sample) < 0.06));
+    // The last second: less thrust is wanted than is given, since pitch comes first.
+    let end: Vec<_> = run.log.iter().filter(|sample| sample.time_s > lost.time_s - 1.0).collect();
+    let mean = |of: fn(&Sample) -> f32| end.iter().map(|sample| of(sample)).sum::<f32>() / end.len() as f32;
+    let weight_n = (Parameters::PAPER.mass_kg * Parameters::PAPER.gravity_m_s2) as f32;
+    let given = mean(|sample| sample.command.forces.0.sum());
+    assert!(mean(|sample| sample.command.inputs.thrust_n) < -1000.0 && given > 1.1 * weight_n, "{given} N");
+    assert!(end.iter().any(|sample| sample.command.inputs.pitch_n.abs() > 0.5 * weight_n));
+    assert_eq!(fly(ControllerKind::Backstepping).lost, None);
 }

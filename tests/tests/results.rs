@@ -1,7 +1,9 @@
 //! docs/results.md says what the code does.
-#![allow(clippy::unwrap_used, clippy::expect_used, missing_docs)] // a page that cannot be read must stop the test
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, missing_docs)] // a page that cannot be read must stop the test
 
-use sitl::results;
+use sitl::run::Run;
+use sitl::scenario::built_in;
+use sitl::{compare, results};
 
 const PAGE: &str = include_str!("../../docs/results.md");
 
@@ -25,5 +27,44 @@ fn the_results_page_is_what_the_code_does() {
         let (page, code) = (cells(page), cells(code));
         let same = page.len() == code.len() && page.iter().zip(&code).all(|(page, code)| agree(page, code));
         assert!(same, "run `cargo run --release -- results --write docs/results.md`\npage {page:?}\ncode {code:?}");
+    }
+}
+
+/// The table of `sitl compare`: the standard contenders in `hardware`, an asterisk on whatever is best as printed.
+#[test]
+fn the_table_on_real_rotors_is_what_flies() {
+    let scenario = built_in("hardware").unwrap().scenario().unwrap();
+    let figures = |contender| {
+        let metrics = Run::fly(&scenario, contender, u64::MAX).unwrap().metrics;
+        let largest = metrics.max_abs.xyz().max();
+        let [x, y, z, psi] = metrics.rmse.into();
+        [x, y, z, psi, largest]
+            .map(|error| format!("{error:.4}"))
+            .into_iter()
+            .chain([format!("{:.1}", metrics.mean_abs_delta_u.w * 1e3)])
+    };
+    let rows: Vec<Vec<String>> = compare::standard().iter().map(|contender| figures(contender).collect()).collect();
+    let number = |text: &str| text.trim_end_matches('*').parse::<f64>().unwrap();
+    let code: Vec<String> = rows
+        .iter()
+        .map(|row| {
+            let star = |(column, cell): (usize, &String)| {
+                let best = rows.iter().all(|other| number(&other[column]) >= number(cell));
+                format!("{cell}{}", if best { "*" } else { "" })
+            };
+            row.iter().enumerate().map(star).collect::<Vec<_>>().join(" | ")
+        })
+        .collect();
+
+    let section = PAGE.split("## On real rotors").nth(1).unwrap();
+    let page = section.lines().filter(|line| line.starts_with("| ")).skip(1);
+    let page: Vec<_> =
+        page.map(|line| line.trim_matches('|').split_once('|').unwrap().1.trim()).take(rows.len()).collect();
+    assert_eq!(page.len(), rows.len(), "a row for each: {page:?}");
+    for (page, code_row) in page.iter().zip(&code) {
+        let same = page.split(" | ").zip(code_row.split(" | ")).all(|(page, code)| {
+            agree(page.trim_end_matches('*'), code.trim_end_matches('*')) && page.ends_with('*') == code.ends_with('*')
+        });
+        assert!(same && page.matches('|').count() == code_row.matches('|').count(), "{page}\n{code:#?}");
     }
 }

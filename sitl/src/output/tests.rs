@@ -197,6 +197,23 @@ fn odd_flights_have_figures_too() {
     assert!(table(&flown, &[]).contains("mass +1.3 %"));
 }
 
+/// The law as printed climbs away from its hover and is lost 52 m up, with backstepping 50 m below it on the same panel: the
+/// figure says so, and marks no other place. In the panels of x, y and psi it is lost where the cross is.
+#[test]
+fn a_loss_beyond_a_panel_is_told_and_not_marked_elsewhere() {
+    let hover = Scenario { duration_s: 200.0, ..built_in("hover").unwrap().scenario().unwrap() };
+    let flown = both(&hover);
+    assert!(flown[0].run.lost.is_some() && flown[1].run.lost.is_none());
+    let height_m = flown[0].run.log.last().unwrap().motion.position_m.z;
+    assert!(height_m > 51.0, "{height_m}");
+    let figures = figures::draw(&flown.iter().collect::<Vec<_>>()).unwrap();
+    let svg = |name: &str| &figures.iter().find(|figure| figure.name == name).unwrap().svg;
+    // Two strokes make a cross.
+    let strokes = |name: &str| svg(name).matches(r#"stroke-width="8""#).count();
+    assert!(svg("fig5-outputs").contains(&format!("↑ {height_m:.1}")), "{height_m}");
+    assert_eq!((strokes("fig4-trajectory"), strokes("fig5-outputs")), (0, 3 * 2));
+}
+
 #[test]
 fn file_names_stay_apart() {
     let rigid = paper(Reading::Persistent, 0.1);

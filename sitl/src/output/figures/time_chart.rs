@@ -104,9 +104,18 @@ impl Chart<'_> {
         if all.any(|mark| mark.is_band) {
             words += " Shaded: while what is named above lasts.";
         }
-        let mut lines = self.panels.iter().flat_map(|panel| &panel.lines);
-        if lines.any(|line| line.lost_s.is_some() && !line.is_reference && !line.points.is_empty()) {
+        let losses = |panel: &Panel| {
+            let range = range(&panel.lines, LEAST_ROOM);
+            let lost = panel.lines.iter().filter(|line| line.lost_s.is_some() && !line.is_reference);
+            let ends: Vec<_> = lost.filter_map(|line| line.points.last()).map(|(_, v)| range.contains(v)).collect();
+            ends
+        };
+        let within: Vec<bool> = self.panels.iter().flat_map(losses).collect();
+        if within.contains(&true) {
             words += super::CROSS;
+        }
+        if within.contains(&false) {
+            words += " An arrow: where one was lost beyond the panel.";
         }
         Ok((self.svg(&marks)?, words))
     }
@@ -177,9 +186,19 @@ impl Chart<'_> {
         for Line { ink, points, lost_s, is_reference } in &panel.lines {
             let pieces = clip(points, low, high);
             chart.draw_series(pieces.iter().map(|piece| PathElement::new(simplify(piece, scale, 0.2), ink.style())))?;
-            if let (Some(_), false, Some((t, v))) = (lost_s, is_reference, points.last()) {
+            if let (Some(_), false, Some(&(t, v))) = (lost_s, is_reference, points.last()) {
                 let style = Ink::new(ink.color, 2.0).style();
-                chart.draw_series([Cross::new((*t, v.clamp(low, high)), units(4.0), style)])?;
+                // Beyond the panel, where it was in words: a cross at the edge would be one at another place.
+                let beyond = |arrow, edge| {
+                    let words = format!("{arrow} {} ", number(v, decimals));
+                    Text::new(words, (t, edge), text(LABEL_PX, ink.color, HPos::Right))
+                };
+                let edge = LABEL_PX * (high - low) / plot_height_px;
+                match v {
+                    v if v > high => drop(chart.draw_series([beyond('↑', high - edge)])?),
+                    v if v < low => drop(chart.draw_series([beyond('↓', low + edge)])?),
+                    _ => drop(chart.draw_series([Cross::new((t, v), units(4.0), style)])?),
+                }
             }
         }
         Ok(())

@@ -120,10 +120,11 @@ pub(super) fn draw(
         path(area, &view, wanted().map(|(_, p)| p), REFERENCE)?;
         for law in laws {
             let flown = law.flight.run.log.iter().map(|s| s.motion.position_m);
-            let end = path(area, &view, flown, law.ink())?;
+            path(area, &view, flown, law.ink())?;
+            let end = law.flight.run.log.last().map(|s| s.motion.position_m).filter(|end| view.contains(end));
             if let (Some(end), Some(_)) = (end, law.flight.run.lost) {
                 crosses = true;
-                area.draw(&Cross::new(pixel(end), units(5.0), Ink::new(law.color(), 2.0).style()))?;
+                area.draw(&Cross::new(pixel(view.at(end)), units(5.0), Ink::new(law.color(), 2.0).style()))?;
             }
         }
         let start = scenario.initial.position_m;
