@@ -7,7 +7,7 @@ use airframe::{Axis, OutOfRange, Parameters};
 use nalgebra::Vector3;
 use plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Quantity, Realism, Sensing};
 
-/// How the paper's "1.2 N" and "1.2 N m" are read (gap 5 in `docs/paper.md`).
+/// How the paper's "1.2 N" and "1.2 N m" are read (decision 3 in `docs/paper.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
     /// Accelerations of 1.2 m/s2 and 1.2 rad/s2 that stay on from their onset: the paper's claims hold.
@@ -32,7 +32,7 @@ impl Reading {
     }
 }
 
-/// The direction of an uncertainty whose size alone is printed (gap 6).
+/// The direction of an uncertainty whose size alone is printed (decision 4 there).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sign {
     /// More than nominal.

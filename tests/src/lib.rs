@@ -1,4 +1,4 @@
-//! What the tests of the whole share: reading the golden tables, and a flight as bits.
+//! What the tests of the whole share: reading the golden tables.
 //!
 //! `golden/*.csv` come from an independent simulation of the paper in `f64`. Header names carry the unit where it is not
 //! plain SI. Rules are ordered with the first input outermost.

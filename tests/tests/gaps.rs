@@ -1,4 +1,4 @@
-//! What the paper leaves open or gets wrong, held to what it was found to do: gaps 1, 3, 4 and 5 of `docs/paper.md`.
+//! What the paper leaves open or gets wrong, held to what it was found to do: under the headings that `docs/paper.md` has for it.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
 
 use afbc::adaptive::{self, Estimate};
@@ -23,7 +23,7 @@ fn paper(case: Case) -> Scenario {
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
-// Gap 1: (12) needs d phi_d/dt and d theta_d/dt.
+// Decision 1: (12) needs d phi_d/dt and d theta_d/dt.
 
 /// A law that is told that phi_d and theta_d stand still, as an implementation without the filter's rates would be.
 #[derive(Clone, Copy)]
@@ -82,7 +82,7 @@ fn laws() -> (Adaptive, Backstepping) {
 }
 
 #[test]
-fn gap_1_without_the_rates_of_the_desired_angles_neither_law_flies() {
+fn without_the_rates_of_the_desired_angles_neither_law_flies() {
     // Over the whole band in which both fly with them. (Beyond it the loss takes longer: at 1000 rad/s, nearly no filter
     // at all, backstepping in calm air still swings within 0.3 m after 60 s, AFBC is 30 m off.)
     for bandwidth in [10.0, 20.0, 40.0, 80.0] {
@@ -94,7 +94,7 @@ fn gap_1_without_the_rates_of_the_desired_angles_neither_law_flies() {
 }
 
 #[test]
-fn gap_1_with_the_filters_rates_both_fly_from_10_to_80_rad_s() {
+fn with_the_filters_rates_both_fly_from_10_to_80_rad_s() {
     for bandwidth in [10.0, 20.0, 40.0, 80.0] {
         let (scenario, settings) = (paper(CALM), filtered(bandwidth));
         let (adaptive, backstepping) = laws();
@@ -104,7 +104,7 @@ fn gap_1_with_the_filters_rates_both_fly_from_10_to_80_rad_s() {
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
-// Gap 3: (18) as printed is 0/0 in f32.
+// "Where `f32` needs care": (18) as printed is 0/0 in f32.
 
 const ATTITUDE: Membership = Membership { centre: 0.26, width: 0.1 };
 
@@ -121,7 +121,7 @@ fn printed(membership: Membership, inputs: [f32; 2]) -> [f32; 9] {
 }
 
 #[test]
-fn gap_3_the_printed_basis_is_0_over_0_from_1_705_rad_s_and_ours_is_not() {
+fn the_printed_basis_is_0_over_0_from_1_705_rad_s_and_ours_is_not() {
     let basis = Basis::new(ATTITUDE).unwrap();
     for step in 0..=2000_u16 {
         let rate = f32::from(step) / 200.0; // 0 to 10 rad/s
@@ -141,7 +141,7 @@ fn gap_3_the_printed_basis_is_0_over_0_from_1_705_rad_s_and_ours_is_not() {
 }
 
 #[test]
-fn gap_3_the_basis_is_exact_where_the_printed_one_is_lost() {
+fn the_basis_is_exact_where_the_printed_one_is_lost() {
     // In f64 (18) holds to 4.125 rad/s; up to there it is an oracle for what f32 cannot say as printed.
     let basis = Basis::new(ATTITUDE).unwrap();
     for step in 0..=400_u16 {
@@ -163,7 +163,7 @@ fn gap_3_the_basis_is_exact_where_the_printed_one_is_lost() {
 
 /// What it costs: a roll rate of 2 rad/s, half a turn in 1.5 s, makes every estimate of the printed basis NaN for good.
 #[test]
-fn gap_3_a_fast_roll_leaves_the_estimates_finite() {
+fn a_fast_roll_leaves_the_estimates_finite() {
     let controller = Controller::new(
         Parameters::PAPER.to_f32(),
         Profile::Paper.settings(),
@@ -186,7 +186,7 @@ fn gap_3_a_fast_roll_leaves_the_estimates_finite() {
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
-// Gap 4: tanh(e_2 / 0.001) at 1 kHz is a relay.
+// "What the printed gains cost": tanh(e_2 / 0.001) at 1 kHz is a relay.
 
 /// Mean |change of U1| per step over the last second of a hover with a roll of 0.01 rad to begin with, under a robust
 /// term that is held at `delta` \[mN\].
@@ -218,7 +218,7 @@ fn trembling_mn(delta: f32, epsilon: f32) -> f64 {
 }
 
 #[test]
-fn gap_4_the_robust_term_becomes_a_relay_at_2_epsilon_over_g_dt() {
+fn the_robust_term_becomes_a_relay_at_2_epsilon_over_g_dt() {
     // One Euler step of e_2 under u = (delta / epsilon + alpha_2) e_2 is stable while g dt (delta / epsilon + alpha_2) < 2
     // with g = l / Ix = 65.8: delta < 0.0284, or 0.030 without alpha_2. Found to 1 %.
     let (g, dt, alpha2) = (65.79_f32, 0.001, 2.0);
@@ -261,13 +261,13 @@ fn trembling_by_delta(scenario: &Scenario) -> [f64; 2] {
 }
 
 #[test]
-fn gap_4_in_flight_roll_trembles_once_delta_hat_has_passed_0_030() {
+fn in_flight_roll_trembles_once_delta_hat_has_passed_0_030() {
     let [below, above] = trembling_by_delta(&paper(GUSTS));
     assert!(below < 1.0 && above > 50.0, "{below} mN below, {above} mN above");
 }
 
 #[test]
-fn gap_4_a_hundred_times_the_epsilon_flies_as_well_without_trembling() {
+fn a_hundred_times_the_epsilon_flies_as_well_without_trembling() {
     for case in [GUSTS, Case::DEFAULT] {
         let printed = Run::fly(&paper(case), &with_epsilon(0.001), u64::MAX).unwrap();
         let wide = Run::fly(&paper(case), &with_epsilon(0.1), u64::MAX).unwrap();
@@ -288,7 +288,7 @@ fn gap_4_a_hundred_times_the_epsilon_flies_as_well_without_trembling() {
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
-// Gap 5: what "1.2 N" and "1.2 N m" mean.
+// Decision 3: what "1.2 N" and "1.2 N m" mean.
 
 fn both(reading: Reading, model: Model) -> [Run; 2] {
     let scenario = scenario(model, Case { reading: Some(reading), uncertainty: None }).unwrap();
@@ -296,7 +296,7 @@ fn both(reading: Reading, model: Model) -> [Run; 2] {
 }
 
 #[test]
-fn gap_5_as_persistent_accelerations_backstepping_keeps_an_error_and_afbc_does_not() {
+fn as_persistent_accelerations_backstepping_keeps_an_error_and_afbc_does_not() {
     for model in [Model::Simplified, Model::RigidBody] {
         let [afbc, baseline] = both(Reading::Persistent, model);
         assert_eq!((afbc.lost, baseline.lost), (None, None));
@@ -309,7 +309,7 @@ fn gap_5_as_persistent_accelerations_backstepping_keeps_an_error_and_afbc_does_n
 }
 
 #[test]
-fn gap_5_after_pulses_of_1_s_both_recover() {
+fn after_pulses_of_1_s_both_recover() {
     for model in [Model::Simplified, Model::RigidBody] {
         for run in both(Reading::Pulses, model) {
             assert_eq!(run.lost, None);
@@ -320,7 +320,7 @@ fn gap_5_after_pulses_of_1_s_both_recover() {
 }
 
 #[test]
-fn gap_5_as_forces_and_moments_both_lose_the_vehicle_to_the_moment_on_roll() {
+fn as_forces_and_moments_both_lose_the_vehicle_to_the_moment_on_roll() {
     for model in [Model::Simplified, Model::RigidBody] {
         for run in both(Reading::Forces, model) {
             // 1.2 N on 0.486 kg from 7.5 s on is survived. 1.2 N m on 0.0038 kg m2 from 15 s on is 316 rad/s2: it takes

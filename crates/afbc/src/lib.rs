@@ -16,8 +16,9 @@
 //! # What to expect
 //!
 //! Parameters are checked once, by name, when a [`Controller`] is built. After that a step cannot fail, allocate or
-//! panic, takes the same path of a few hundred floating-point operations whatever it is given, and gives the same bits
-//! on host and target: all mathematics comes from [`math`].
+//! panic, has no loop whose length depends on what it is given, and gives the same bits on host and target: all
+//! mathematics comes from [`math`]. Which branches it takes, and so how long it takes, does depend on its inputs: limits,
+//! projection, saturated rotors and the monitor cost what they do only where they act.
 //!
 //! ```
 //! use afbc::{Adaptive, Controller, FlightController, Memory, Profile};

@@ -4,7 +4,7 @@ use airframe::{Axis, OutOfRange, Parameters, PerAxis, Range};
 use alloc::vec::Vec;
 use nalgebra::Vector3;
 
-/// How a gust's size is to be read. All three appear as the paper's A_F = -\[A_x, A_y, A_z\] and
+/// How a gust's size is to be read. Either way it is part of the paper's A_F = -\[A_x, A_y, A_z\] and
 /// A_T = -\[A_phi, A_theta, A_psi\]: a positive gust decelerates the positive direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GustKind {
