@@ -295,6 +295,19 @@ proptest! {
     }
 }
 
+/// Rounding left less than no room for no yaw at all here, 0/0, and every rotor stood still.
+#[test]
+fn no_yaw_takes_no_share_of_no_room() {
+    let frame = [
+        Rotor { x: 0.7713504, y: 0.68169683, pushes_left: true },
+        Rotor { x: -1.0259535, y: 0.70710677, pushes_left: false },
+        Rotor { x: -0.6084402, y: -1.0598502, pushes_left: true },
+        Rotor { x: 0.9079, y: -0.6907507, pushes_left: false },
+    ];
+    let got = mixer_of(frame, 0.5).allocate(&inputs([-2.7995617, -5.2674437, 0.0, 0.0]));
+    assert!(got.saturated && (got.forces.0.max() - 0.5).abs() < 1e-6, "{}", got.forces.0);
+}
+
 #[test]
 fn nan_becomes_no_force_and_infinity_the_largest() {
     let mixer = mixer(10.0);
