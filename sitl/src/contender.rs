@@ -1,5 +1,6 @@
 //! Who flies: a control law with its gains and settings, under a name.
 
+use afbc::allocation::Mixer;
 use afbc::monitor::Bounds;
 use afbc::{Adaptive, Backstepping, Controller, FlightController, Guarded, Profile, Settings, adaptive, backstepping};
 use airframe::{OutOfRange, Parameters, PerAxis, Range};
@@ -147,6 +148,20 @@ impl Contender {
         Contender { name: kind.name().into(), law: Law::of(kind, profile), settings: profile.settings() }
     }
 
+    /// The same for another vehicle than the paper's: gains of a profile are those of the profile for this vehicle
+    /// ([`Profile::gains_for`]); others stay. The peers' are scaled by their own laws.
+    pub fn for_vehicle(self, vehicle: &Parameters<f64>) -> Self {
+        let Some(profile) = self.gains_of() else { return self };
+        let gains = profile.gains_for(&vehicle.to_f32());
+        let law = match self.law {
+            Law::Afbc(_) => Law::Afbc(gains),
+            Law::Guarded(_) => Law::Guarded(gains),
+            Law::Backstepping(_) => Law::Backstepping(backstepping_part(&gains)),
+            peer => peer,
+        };
+        Contender { law, ..self }
+    }
+
     /// Which law it flies.
     pub const fn kind(&self) -> ControllerKind {
         self.law.kind()
@@ -159,10 +174,18 @@ impl Contender {
 
     /// The profile whose gains and settings these are, if there is one.
     pub fn profile(&self) -> Option<Profile> {
+        self.gains_of().filter(|profile| self.settings == profile.settings())
+    }
+
+    /// The profile whose gains these are, for the paper's vehicle.
+    fn gains_of(&self) -> Option<Profile> {
         // Under its monitor or not, the gains are the same.
         let law = if let Law::Guarded(gains) = self.law { Law::Afbc(gains) } else { self.law };
-        let same = |profile: &Profile| law == Law::of(law.kind(), *profile) && self.settings == profile.settings();
-        Profile::ALL.into_iter().find(same)
+        // The peers' are the same in every profile.
+        let same = |profile: &Profile| law == Law::of(law.kind(), *profile);
+        Profile::ALL
+            .into_iter()
+            .find(|profile| same(profile) && (!law.is_peer() || self.settings == profile.settings()))
     }
 
     /// AFBC's gains, if it flies that.
@@ -181,8 +204,11 @@ impl Contender {
     /// Builds the controller, as a flight would.
     ///
     /// # Errors
-    /// The first parameter, gain or setting out of range.
+    /// The first parameter, gain or setting out of range; the rotors must lift the vehicle
+    /// [with a margin](afbc::allocation::HOVER_MARGIN).
     pub fn check(&self, vehicle: Parameters) -> Result<(), OutOfRange> {
+        let mixer = Mixer::new(&vehicle, self.settings.rotor_force_max_n)?;
+        mixer.check_hover(vehicle.mass_kg * vehicle.gravity_m_s2)?;
         match &self.law {
             Law::Afbc(gains) => gains.controller(vehicle, self.settings).map(drop),
             Law::Guarded(gains) => Monitored(gains).controller(vehicle, self.settings).map(drop),
@@ -225,7 +251,7 @@ impl Build for Monitored<'_> {
     type Controller = Guarded;
 
     fn controller(&self, vehicle: Parameters, settings: Settings) -> Result<Guarded, OutOfRange> {
-        let bounds = Bounds::new(self.0, vehicle.mass_kg * vehicle.gravity_m_s2);
+        let bounds = Bounds::new(self.0, &vehicle);
         Guarded::new(vehicle, settings, *self.0, bounds)
     }
 }

@@ -11,17 +11,13 @@ use sitl::paper::{self, Case};
 const STEP_S: f64 = 0.001;
 const SECOND: usize = 1000;
 
-fn weight_n() -> f32 {
-    (Parameters::PAPER.mass_kg * Parameters::PAPER.gravity_m_s2) as f32
-}
-
 fn guarded(profile: Profile, settings: Settings, bounds: Bounds) -> Guarded {
     Guarded::new(Parameters::PAPER.to_f32(), settings, profile.gains(), bounds).unwrap()
 }
 
 /// The profile `flight` under its own bounds, some of them changed.
 fn flight(change: fn(&mut Bounds)) -> Guarded {
-    let mut bounds = Bounds::new(&Profile::Flight.gains(), weight_n());
+    let mut bounds = Bounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32());
     change(&mut bounds);
     guarded(Profile::Flight, Profile::Flight.settings(), bounds)
 }
@@ -80,7 +76,7 @@ const NOISE: Spread = Spread { position_m: 0.002, velocity_m_s: 0.01, attitude_r
 #[test]
 fn the_printed_laws_chatter_is_a_limit_cycle() {
     let paper = paper::scenario(Model::Simplified, Case::DEFAULT).unwrap();
-    let bounds = Bounds::new(&Profile::Paper.gains(), weight_n());
+    let bounds = Bounds::new(&Profile::Paper.gains(), &Parameters::PAPER.to_f32());
     let fly = |bounds| {
         let mut bench = Bench {
             controller: guarded(Profile::Paper, Profile::Paper.settings(), bounds),

@@ -29,7 +29,7 @@ impl Tracker {
             self.under_way.push_back(Stamped { value: state, at_us: now_ms * 1000 });
         }
         let arrives = |state: &Stamped<State>| state.at_us + self.late_ms * 1000 <= now_ms * 1000;
-        self.under_way.pop_front_if(|state| arrives(state))
+        if self.under_way.front().is_some_and(arrives) { self.under_way.pop_front() } else { None }
     }
 }
 

@@ -36,6 +36,23 @@ pub struct Gains {
 }
 
 impl Gains {
+    /// The gains of a subsystem whose input has to be so many times as large.
+    pub fn scaled(&self, scale: f32) -> Self {
+        let Gains { backstepping: backstepping::Gains { alpha1, alpha2 }, gamma, eta, safeguards, .. } = *self;
+        let bound = |bound: f32| math::min(bound * scale, THETA_MAX.max as f32);
+        Gains {
+            backstepping: backstepping::Gains { alpha1, alpha2: alpha2 * scale },
+            gamma: gamma * scale,
+            eta: eta * scale,
+            safeguards: Safeguards {
+                theta_max: bound(safeguards.theta_max),
+                delta_max: bound(safeguards.delta_max),
+                ..safeguards
+            },
+            ..*self
+        }
+    }
+
     /// Every gain that is a matter of taste, with the range to search it in.
     pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 5] {
         let [alpha1, alpha2] = self.backstepping.tunables();

@@ -26,6 +26,10 @@ pub const AUTHORITY: Range = Range::new("rotor_authority", 1e-3, 1.001);
 /// Accepted share of one rotor in a thrust without moments: a frame that hovers on less does not hover.
 pub const THRUST_SHARE: Range = Range::new("rotor_thrust_share", 1e-3, 1.0);
 
+/// Least largest force of a rotor over its part of the weight. Less leaves too little for roll and pitch, for a battery
+/// that sags, for a climb. Ours.
+pub const HOVER_MARGIN: f32 = 1.3;
+
 /// Larger inputs than this are taken for it \[N\]: beyond what any rotors give, and within what can be reckoned with.
 const ASKED_MAX: f32 = 1e9;
 /// What is missing of an input by rounding alone, as a share of the largest force.
@@ -128,6 +132,16 @@ impl<const N: usize> Mixer<N> {
             inverse_thrust_factor: 1.0 / b,
             force_max: force_max_n,
         })
+    }
+
+    /// Whether the rotors lift a vehicle of this weight with a margin of [`HOVER_MARGIN`].
+    ///
+    /// # Errors
+    /// The largest force of one rotor, and what it would have to be at least.
+    pub fn check_hover(&self, weight_n: f32) -> Result<(), OutOfRange> {
+        // Rounded up to what people read.
+        let needed_n = libm::ceil(f64::from(HOVER_MARGIN * weight_n * self.share.max()) * 1e4) / 1e4;
+        Range { min: needed_n, ..FORCE_MAX }.check(self.force_max)
     }
 
     /// Rotor forces that give `inputs`, as far as the rotors' limits allow. A NaN is taken for 0, and reported as

@@ -2,13 +2,19 @@
 //! very inputs at hand, and AFBC takes over again on command only.
 
 use crate::adaptive::{self, Adaptive, Estimate};
+use crate::allocation::Mixer;
 use crate::backstepping::Errors;
 use crate::cascade::{Cascade, Command, Controller, Settings};
 use crate::flight_controller::FlightController;
 use crate::integral::{Integral, IntegralBackstepping};
 use crate::monitor::{Bounds, Figures, Monitor, Trip};
-use airframe::{Axis, OutOfRange, Parameters, PerAxis, Setpoint, State};
+use crate::safeguards::THETA_MAX;
+use airframe::{Axis, OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
 use nalgebra::Vector3;
+
+/// Least Theta_max of z, in weights: nine rules that hold the weight make |Theta_hat| = 3 weights, and rotors that give 60 %
+/// of their thrust make that 5.
+pub const HOVER_THETA: f32 = 5.0;
 
 /// AFBC with a monitor and a law to fall back on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,13 +83,19 @@ impl Guarded {
     /// AFBC with these gains, under a monitor with these bounds.
     ///
     /// # Errors
-    /// The first parameter, setting, gain or bound out of range.
+    /// The first parameter, setting, gain or bound out of range; among them `rotor_force_max_n`, if the rotors do not lift
+    /// the vehicle [with a margin](crate::allocation::HOVER_MARGIN), and `theta_max` of z, if |Theta_hat| has no room for
+    /// [`HOVER_THETA`] weights.
     pub fn new(
         vehicle: Parameters,
         settings: Settings,
         gains: PerAxis<adaptive::Gains>,
         bounds: Bounds,
     ) -> Result<Self, OutOfRange> {
+        let weight_n = vehicle.mass_kg * vehicle.gravity_m_s2;
+        Mixer::new(&vehicle, settings.rotor_force_max_n)?.check_hover(weight_n)?;
+        let hover = Range { min: libm::ceil(f64::from(HOVER_THETA * weight_n) * 1e4) / 1e4, ..THETA_MAX };
+        hover.check(gains.z.safeguards.theta_max)?;
         let fixed = PerAxis::from_fn(|axis| gains.get(axis).into());
         Ok(Guarded {
             adaptive: Controller::new(vehicle, settings, Adaptive::new(gains)?)?,

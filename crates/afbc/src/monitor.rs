@@ -48,16 +48,23 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Bounds for a law with these gains on a vehicle like the paper's: estimates that lean on their projection, errors
-    /// far beyond any manoeuvre, a limit cycle of half the weight: of a fifth, U3 makes too many from noise of 20 mrad/s alone.
-    pub fn new(gains: &PerAxis<adaptive::Gains>, weight_n: f32) -> Self {
+    /// Bounds for a law with these gains on this vehicle, whose parameters must be valid: estimates that lean on their
+    /// projection, errors far beyond any manoeuvre, a limit cycle of half the weight: of a fifth, U3 makes too many from
+    /// noise of 20 mrad/s alone.
+    ///
+    /// V_e weighs e_2 by 1/g, so for a vehicle on which an input does less than on the paper's, its bound is as much larger;
+    /// for one on which it does more it stays, for e_1's sake.
+    pub fn new(gains: &PerAxis<adaptive::Gains>, vehicle: &Parameters) -> Self {
+        let (paper, own) = (Model::new(&Parameters::PAPER.to_f32()), Model::new(vehicle));
+        let sluggish = |axis| math::max(paper.hover_gain(axis) / own.hover_gain(axis), 1.0);
+        let lyapunov = PerAxis { roll: 0.5, pitch: 0.5, yaw: 10.0, z: 200.0, x: 1000.0, y: 1000.0 };
         Bounds {
             theta: PerAxis::from_fn(|axis| 0.95 * gains.get(axis).safeguards.theta_max),
             // Projection holds delta_hat at its bound as a matter of course; beyond it there is none.
             delta: PerAxis::from_fn(|axis| 1.001 * gains.get(axis).safeguards.delta_max),
-            lyapunov: PerAxis { roll: 0.5, pitch: 0.5, yaw: 10.0, z: 200.0, x: 1000.0, y: 1000.0 },
+            lyapunov: PerAxis::from_fn(|axis| lyapunov.get(axis) * sluggish(axis)),
             saturation_share: 0.9,
-            swing_n: 0.5 * weight_n,
+            swing_n: 0.5 * vehicle.mass_kg * vehicle.gravity_m_s2,
             swings_hz: 16.0,
         }
     }

@@ -27,7 +27,20 @@ impl Profile {
         }
     }
 
-    /// Gains of AFBC; their `backstepping` part is the baseline's.
+    /// Gains of AFBC for a vehicle with these nominal parameters, which must be valid: [`Profile::gains`], scaled in the
+    /// unit of the input so that what the input does to the vehicle is the same.
+    ///
+    /// With g_i of (6) when hovering, alpha_2, gamma, eta, Theta_max and delta_max are multiplied by g_i of the paper's
+    /// vehicle over g_i of this one: its mass for z, its inertia over its arm for roll and pitch, its inertia over d/b for
+    /// yaw. alpha_1, epsilon, the leakage and the membership functions are in rad and m, and stay. So vehicles of any size
+    /// fly alike whose rotors are as quick. Ours.
+    pub fn gains_for(self, vehicle: &Parameters) -> PerAxis<adaptive::Gains> {
+        let (paper, own) = (Model::new(&Parameters::PAPER.to_f32()), Model::new(vehicle));
+        let gains = self.gains();
+        PerAxis::from_fn(|axis| gains.get(axis).scaled(paper.hover_gain(axis) / own.hover_gain(axis)))
+    }
+
+    /// Gains of AFBC for the paper's vehicle; their `backstepping` part is the baseline's.
     pub fn gains(self) -> PerAxis<adaptive::Gains> {
         PerAxis::from_fn(|axis| {
             let (alpha1, alpha2) = match axis {

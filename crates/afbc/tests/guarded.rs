@@ -4,10 +4,12 @@
 
 mod common;
 
-use afbc::adaptive::Estimate;
+use afbc::adaptive::{Estimate, Gains};
+use afbc::allocation::HOVER_MARGIN;
 use afbc::ground::LIFT_SHARE;
+use afbc::guarded::HOVER_THETA;
 use afbc::monitor::{Bounds, Trip};
-use afbc::{Adaptive, Command, Controller, FlightController, Guarded, Health, Memory, Profile, guarded};
+use afbc::{Adaptive, Command, Controller, FlightController, Guarded, Health, Memory, Profile, Settings, guarded};
 use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
 use common::{U, check_command, gains, plausible, setpoint, settings, state, value};
 use nalgebra::Vector3;
@@ -23,7 +25,7 @@ fn guarded(bounds: Bounds) -> Guarded {
 }
 
 fn bounds() -> Bounds {
-    Bounds::new(&Profile::Flight.gains(), WEIGHT_N)
+    Bounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32())
 }
 
 /// Bounds that the first step breaks: V_e above nothing at all.
@@ -66,7 +68,11 @@ proptest! {
         gains in gains(), settings in settings(), trips: bool,
         inputs in prop::collection::vec((state(value), setpoint(value), prop::bool::weighted(0.1)), 50),
     ) {
-        let bounds = if trips { Bounds { lyapunov: PerAxis::from_fn(|_| 1.0), ..lax() } } else { Bounds::new(&gains, WEIGHT_N) };
+        // A vehicle that can hover.
+        let (mut gains, mut settings) = (gains, settings);
+        gains.z.safeguards.theta_max = gains.z.safeguards.theta_max.max(1.001 * HOVER_THETA * WEIGHT_N);
+        settings.rotor_force_max_n = settings.rotor_force_max_n.max(1.001 * HOVER_MARGIN * WEIGHT_N / 4.0);
+        let bounds = if trips { Bounds { lyapunov: PerAxis::from_fn(|_| 1.0), ..lax() } } else { Bounds::new(&gains, &Parameters::PAPER.to_f32()) };
         let controller = Guarded::new(Parameters::PAPER.to_f32(), settings, gains, bounds).unwrap();
         let mut memory = Flight::default();
         for (state, setpoint, engage) in inputs {
@@ -235,6 +241,59 @@ fn bounds_and_gains_out_of_range_are_refused_by_name() {
     bad.z.gamma = f32::NAN;
     assert_eq!(name(settings, bad, bounds()), "gamma");
     assert_eq!(name(afbc::Settings { dt_s: 0.0, ..settings }, gains, bounds()), "dt_s");
+}
+
+/// The needed figure is in the error.
+#[test]
+fn a_vehicle_that_cannot_hover_is_refused_by_name() {
+    let settings = Profile::Flight.settings();
+    let of_mass = |mass_kg: f32| Parameters { mass_kg, ..Parameters::PAPER.to_f32() };
+    let refusal = |vehicle: Parameters, gains: PerAxis<Gains>| {
+        let guarded = Guarded::new(vehicle, settings, gains, Bounds::new(&gains, &vehicle));
+        guarded.err().map(|error| (error.range.name, error.range.min as f32))
+    };
+    for mass_kg in [0.05, 0.3, 0.486, 0.61, 0.8, 0.94, 0.95, 0.97, 1.22, 2.0, 50.0] {
+        let vehicle = of_mass(mass_kg);
+        let needed_n = HOVER_MARGIN * mass_kg * 9.81 / 4.0;
+        match refusal(vehicle, Profile::Flight.gains_for(&vehicle)) {
+            None => assert!(needed_n <= 3.0, "{mass_kg} kg"),
+            Some((name, least)) => {
+                assert!(needed_n > 3.0, "{mass_kg} kg");
+                assert!(name == "rotor_force_max_n" && (-1e-6..2e-4).contains(&(least - needed_n)), "{name} {least}");
+            }
+        }
+    }
+    // With the gains of the paper's vehicle a heavier one would trip in a perfect hover, had it rotors that lift it.
+    let strong = |mass_kg: f32| {
+        let gains = Profile::Flight.gains();
+        let settings = Settings { rotor_force_max_n: 100.0, ..settings };
+        Guarded::new(of_mass(mass_kg), settings, gains, Bounds::new(&gains, &of_mass(mass_kg)))
+    };
+    assert!(strong(0.6).is_ok());
+    let error = strong(0.97).unwrap_err();
+    assert_eq!((error.range.name, error.range.min), ("theta_max", 47.5786));
+}
+
+/// For the paper's vehicle they are the profile's own, to the bit; for one whose every input does half as much, those in the
+/// input's unit are twice as large.
+#[test]
+fn gains_are_scaled_by_what_an_input_does() {
+    for profile in Profile::ALL {
+        let paper = Parameters::PAPER.to_f32();
+        assert_eq!(profile.gains_for(&paper), profile.gains());
+        let sluggish = Parameters { mass_kg: 2.0 * paper.mass_kg, inertia_kg_m2: 2.0 * paper.inertia_kg_m2, ..paper };
+        for axis in Axis::ALL {
+            let (own, other) = (*profile.gains().get(axis), *profile.gains_for(&sluggish).get(axis));
+            let times = if matches!(axis, Axis::X | Axis::Y) { 1.0 } else { 2.0 };
+            assert_eq!(other.backstepping.alpha2, times * own.backstepping.alpha2);
+            assert_eq!((other.gamma, other.eta), (times * own.gamma, times * own.eta));
+            let bound = |bound: f32| (times * bound).min(1e6);
+            assert_eq!(other.safeguards.theta_max, bound(own.safeguards.theta_max));
+            assert_eq!(other.safeguards.delta_max, bound(own.safeguards.delta_max));
+            assert_eq!((other.backstepping.alpha1, other.epsilon), (own.backstepping.alpha1, own.epsilon));
+            assert_eq!((other.membership, other.safeguards.sigma), (own.membership, own.safeguards.sigma));
+        }
+    }
 }
 
 /// What AFBC goes on from is spread over its rules no wider than its monitor lets pass: it is engaged for good.

@@ -15,7 +15,7 @@ const DT_S: f32 = 0.001;
 const WEIGHT_N: f32 = 0.486 * 9.81;
 
 fn bounds() -> Bounds {
-    Bounds::new(&Profile::Flight.gains(), WEIGHT_N)
+    Bounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32())
 }
 
 fn monitor(bounds: Bounds) -> Monitor {

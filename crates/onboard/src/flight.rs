@@ -48,9 +48,9 @@ impl Flight {
     /// # Errors
     /// The first parameter out of range.
     pub fn new() -> Result<Self, OutOfRange> {
-        let (gains, settings) = (Profile::Flight.gains(), Profile::Flight.settings());
-        let airframe = Parameters::PAPER.to_f32();
-        let bounds = Bounds::new(&gains, airframe.mass_kg * airframe.gravity_m_s2);
+        let (airframe, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
+        let gains = Profile::Flight.gains_for(&airframe);
+        let bounds = Bounds::new(&gains, &airframe);
         let controller = Guarded::new(airframe, settings, gains, bounds)?;
         Ok(Flight {
             vehicle: Vehicle::new(airframe, settings, ArmingLimits::default(), controller)?,

@@ -127,7 +127,8 @@ impl<C: FlightController> Vehicle<C> {
     /// A vehicle with these nominal parameters under `controller`, which was built with the same settings.
     ///
     /// # Errors
-    /// The first parameter, setting or limit out of range; the time step must be the tick's, 1 ms.
+    /// The first parameter, setting or limit out of range; the time step must be the tick's, 1 ms, and the rotors must lift
+    /// the vehicle [with a margin](afbc::allocation::HOVER_MARGIN).
     pub fn new(
         airframe: Parameters,
         settings: Settings,
@@ -136,12 +137,15 @@ impl<C: FlightController> Vehicle<C> {
     ) -> Result<Self, OutOfRange> {
         limits.validate()?;
         DT.check(settings.dt_s)?;
+        let weight_n = airframe.mass_kg * airframe.gravity_m_s2;
+        let mixer = Mixer::new(&airframe, settings.rotor_force_max_n)?;
+        mixer.check_hover(weight_n)?;
         Ok(Vehicle {
             controller,
-            mixer: Mixer::new(&airframe, settings.rotor_force_max_n)?,
+            mixer,
             blind: Blind::new(&airframe, settings.dt_s),
             limits,
-            weight_n: airframe.mass_kg * airframe.gravity_m_s2,
+            weight_n,
             dt_s: settings.dt_s,
         })
     }

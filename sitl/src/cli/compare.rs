@@ -45,7 +45,8 @@ impl Compare {
         let own = if self.scenarios.is_empty() { standard() } else { compare::contenders(&scenarios) };
         let contenders = if self.controllers.is_empty() { own } else { choose(&own, &self.controllers)? };
         for scenario in &mut scenarios {
-            scenario.contenders.clone_from(&contenders);
+            let own = |contender: &Contender| contender.clone().for_vehicle(&scenario.vehicle);
+            scenario.contenders = contenders.iter().map(own).collect();
             scenario.check()?;
         }
         let log_every = log_every(&scenarios)?;

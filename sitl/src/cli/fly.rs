@@ -60,7 +60,7 @@ fn choose(scenario: &mut Scenario, names: &[String]) -> Result<(), Failure> {
                 format!("no such controller; the laws are {laws}, the scenario's contenders {}", own.join(", "));
             return Err(format!("--controller {}: {problem}", name.escape_debug()).into());
         };
-        let mut contender = Contender::of(kind, Profile::Paper);
+        let mut contender = Contender::of(kind, Profile::Paper).for_vehicle(&scenario.vehicle);
         if let Some(other) = scenario.contenders.first() {
             contender.settings = other.settings;
         }

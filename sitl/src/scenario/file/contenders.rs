@@ -5,7 +5,7 @@ use super::{FileError, Table};
 use crate::contender::{Contender, ControllerKind, Law, backstepping_part};
 use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
-use airframe::PerAxis;
+use airframe::{Parameters, PerAxis};
 
 /// Longest name of a contender: what a table has room for.
 const NAME_LENGTH: usize = 32;
@@ -32,10 +32,10 @@ impl Defaults {
 }
 
 /// Everyone who flies, those of `controllers` first.
-pub(super) fn read(root: &mut Table<'_>) -> Result<Vec<Contender>, FileError> {
+pub(super) fn read(root: &mut Table<'_>, vehicle: &Parameters) -> Result<Vec<Contender>, FileError> {
     let controllers = root.choices("controllers", &ControllerKind::ALL, ControllerKind::name)?;
     let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(Profile::Paper);
-    let gains = per_axis(root.table("gains")?, profile.gains(), axis_gains)?;
+    let gains = per_axis(root.table("gains")?, profile.gains_for(vehicle), axis_gains)?;
     let settings = settings(root, profile.settings(), true)?;
     let monitor = root.boolean("monitor")?.unwrap_or(false);
     let defaults = Defaults { profile, gains, settings, monitor };
@@ -45,12 +45,17 @@ pub(super) fn read(root: &mut Table<'_>) -> Result<Vec<Contender>, FileError> {
     let short = |kind: ControllerKind| Contender { name: kind.name().into(), law: defaults.law(kind), settings };
     let mut contenders: Vec<_> = kinds.into_iter().map(short).collect();
     for table in tables {
-        contenders.push(contender(table, defaults, &contenders)?);
+        contenders.push(contender(table, vehicle, defaults, &contenders)?);
     }
     Ok(contenders)
 }
 
-fn contender(mut table: Table<'_>, file: Defaults, others: &[Contender]) -> Result<Contender, FileError> {
+fn contender(
+    mut table: Table<'_>,
+    vehicle: &Parameters,
+    file: Defaults,
+    others: &[Contender],
+) -> Result<Contender, FileError> {
     let name = table.need_text("name", "give it one, such as \"gentle\"")?.to_owned();
     if !(1..=NAME_LENGTH).contains(&name.chars().count()) || name.chars().any(char::is_control) {
         let problem = format!("it cannot be a name; make it one plain line of 1 to {NAME_LENGTH} characters");
@@ -63,7 +68,7 @@ fn contender(mut table: Table<'_>, file: Defaults, others: &[Contender]) -> Resu
     let mut defaults = match table.choice("profile", &Profile::ALL, Profile::name)? {
         Some(profile) => Defaults {
             profile,
-            gains: profile.gains(),
+            gains: profile.gains_for(vehicle),
             settings: Settings { dt_s: file.settings.dt_s, ..profile.settings() },
             monitor: file.monitor,
         },

@@ -108,7 +108,7 @@ pub(crate) fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajecto
 
     let vehicle = vehicle::read(root.table("vehicle")?, Parameters::PAPER)?;
     let truth = vehicle::read(root.table("truth")?, vehicle)?;
-    let contenders = contenders::read(&mut root)?;
+    let contenders = contenders::read(&mut root, &vehicle.to_f32())?;
     let trajectory = match (root.table("trajectory")?, trajectory) {
         (Some(table), _) => trajectory::read(table)?,
         (None, Some(trajectory)) => trajectory.clone(),

@@ -1,0 +1,105 @@
+//! Vehicles of other sizes: whatever is not refused by name hovers under every law of the profile `flight`.
+#![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
+
+use afbc::{Guarded, Profile, Settings};
+use airframe::{Axis, Parameters};
+use nalgebra::Vector3;
+use plant::Environment;
+use proptest::prelude::*;
+use sitl::contender::{Contender, ControllerKind, Law};
+use sitl::flight::fly;
+use sitl::scenario::{Scenario, built_in};
+
+/// The hover scenario for this vehicle, with rotors of 20 ms and of this largest force, starting a little off.
+fn scenario(vehicle: Parameters<f64>, force_max_n: f64) -> Scenario {
+    let hardware = built_in("hardware").unwrap().scenario().unwrap();
+    let mut scenario = built_in("hover").unwrap().scenario().unwrap();
+    scenario.vehicle = vehicle;
+    scenario.environment = Environment::calm(vehicle).unwrap();
+    scenario.duration_s = 6.0;
+    scenario.realism.rotors = hardware.realism.rotors;
+    scenario.realism.rotors.max_rad_s = (force_max_n / vehicle.thrust_factor_n_s2).sqrt();
+    scenario.initial.position_m += Vector3::new(0.1, -0.1, 0.05);
+    scenario
+}
+
+/// Flies it, with rotors of `margin` times the force that hovering takes; the distance at the end \[m\], or why it was refused.
+fn hovers(kind: ControllerKind, vehicle: Parameters<f64>, margin: f64) -> Result<f64, String> {
+    let force_max_n = margin * vehicle.mass_kg * vehicle.gravity_m_s2 / 4.0;
+    let scenario = scenario(vehicle, force_max_n);
+    let settings = Settings { rotor_force_max_n: force_max_n as f32, ..Profile::Flight.settings() };
+    let mut contender = Contender::of(kind, Profile::Flight).for_vehicle(&vehicle);
+    contender.settings = settings;
+    if let Law::Afbc(gains) = contender.law {
+        contender.law = Law::Guarded(gains);
+    }
+    contender.check(vehicle.to_f32()).map_err(|error| error.to_string())?;
+    let (mut distance_m, mut trip) = (f64::NAN, None);
+    let lost = fly(&scenario, &contender, |sample| {
+        distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
+        trip = trip.or(sample.command.health.trip);
+    });
+    assert_eq!((lost.unwrap(), trip), (None, None), "{} {vehicle:?}", kind.name());
+    Ok(distance_m)
+}
+
+/// A vehicle of this mass and size, its inertia that of masses at the rotors and in the middle.
+fn vehicle(mass_kg: f64, arm_m: f64, spread: f64) -> Parameters<f64> {
+    let inertia = spread * mass_kg * arm_m * arm_m;
+    Parameters {
+        mass_kg,
+        arm_m,
+        inertia_kg_m2: Vector3::new(inertia, inertia, 1.8 * inertia),
+        rotor_inertia_kg_m2: 0.0,
+        thrust_factor_n_s2: mass_kg * 6e-5,
+        drag_factor_n_m_s2: mass_kg * 6e-5 * 0.02,
+        gravity_m_s2: 9.81,
+    }
+}
+
+#[test]
+fn five_laws_hover_vehicles_from_50_g_to_3_kg() {
+    for (mass_kg, arm_m, spread) in
+        [(0.05, 0.05, 0.2), (0.25, 0.1, 0.1), (0.7, 0.15, 0.15), (1.5, 0.25, 0.15), (3.0, 0.35, 0.1)]
+    {
+        for kind in ControllerKind::ALL {
+            let distance_m = hovers(kind, vehicle(mass_kg, arm_m, spread), 2.0).unwrap();
+            println!("{mass_kg} kg, {}: {distance_m:.4} m", kind.name());
+            assert!(distance_m < 0.02, "{mass_kg} kg, {}: {distance_m} m", kind.name());
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Refused by name, or flown: nothing in between.
+    #[test]
+    fn what_is_not_refused_hovers(
+        mass_kg in 0.05..3.5_f64, arm_m in 0.05..0.4_f64, spread in 0.05..0.4_f64, margin in 0.8..3.0_f64,
+    ) {
+        match hovers(ControllerKind::Afbc, vehicle(mass_kg, arm_m, spread), margin) {
+            Ok(distance_m) => prop_assert!(margin >= 1.299 && distance_m < 0.03, "{distance_m} m"),
+            Err(error) => prop_assert!(margin < 1.301 && error.contains("rotor_force_max_n"), "{error}"),
+        }
+    }
+}
+
+/// `Guarded` of the profile `flight` in a perfect hover, whatever the vehicle weighs: it does not trip.
+#[test]
+fn a_perfect_hover_does_not_trip() {
+    use afbc::FlightController;
+    for mass_kg in [0.2, 0.486, 0.8, 0.97, 1.3, 2.0, 3.5] {
+        let vehicle = Parameters { mass_kg, ..Parameters::PAPER.to_f32() };
+        let settings = Settings { rotor_force_max_n: mass_kg * 6.0, ..Profile::Flight.settings() };
+        let gains = Profile::Flight.gains_for(&vehicle);
+        let guarded = Guarded::new(vehicle, settings, gains, afbc::monitor::Bounds::new(&gains, &vehicle)).unwrap();
+        let mut memory = afbc::Memory::default();
+        for _ in 0..5_000 {
+            let command = guarded.step(&mut memory, &airframe::State::default(), &airframe::Setpoint::default());
+            assert_eq!(command.health.trip, None, "{mass_kg} kg");
+        }
+        let learnt = Guarded::learnt(&memory.control);
+        assert!(Axis::ALL.iter().all(|axis| learnt.get(*axis).theta.norm().is_finite()));
+    }
+}
