@@ -6,12 +6,10 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_executor::SendSpawner;
 use embassy_futures::select::{Either, select};
 use heapless::Vec;
-use onboard::Comms;
+use onboard::{Comms, REPORT_MAX};
 
 /// Most bytes read at once.
 const READ_MAX: usize = 128;
-/// Room for all that one tick may have to say \[bytes\].
-const WRITE_MAX: usize = 768;
 
 static BAD_FRAMES: AtomicU32 = AtomicU32::new(0);
 
@@ -28,7 +26,7 @@ pub fn spawn(spawner: SendSpawner, receiver: Receiver, transmitter: Transmitter)
 #[embassy_executor::task]
 async fn task(mut comms: Comms, mut receiver: Receiver, mut transmitter: Transmitter) {
     let mut incoming = [0; READ_MAX];
-    let mut outgoing = Vec::<u8, WRITE_MAX>::new();
+    let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     loop {
         match select(receiver.receive(&mut incoming), control::next_tick()).await {
             Either::First(length) => {
@@ -46,8 +44,8 @@ async fn task(mut comms: Comms, mut receiver: Receiver, mut transmitter: Transmi
 
 /// All that there is to say after a tick. Out of line, as the control tick is, to be told from the other tasks.
 #[inline(never)]
-fn report(comms: &mut Comms, tick: &Tick, outgoing: &mut Vec<u8, WRITE_MAX>) {
+fn report(comms: &mut Comms, tick: &Tick, outgoing: &mut Vec<u8, REPORT_MAX>) {
     outgoing.clear();
-    // A frame that finds no room is left out: the link is not for keeping.
+    // There is room for every frame.
     comms.report(&tick.report, tick.cycles, |frame| drop(outgoing.extend_from_slice(frame)));
 }

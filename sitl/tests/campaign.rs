@@ -593,19 +593,25 @@ fn a_killed_program_loses_nothing_that_was_finished() {
     let whole = sitl(&folder, &["campaign", "small.toml", "--out", "whole", "--threads", "3"]);
     assert_eq!(whole.status.code(), Some(0));
 
-    let mut child = Command::new(env!("CARGO_BIN_EXE_sitl"))
-        .current_dir(&folder)
-        .args(["campaign", "small.toml", "--threads", "2"])
-        .spawn()
-        .unwrap();
     let out = folder.join("out/small");
     let chunks = || fs::read_dir(out.join("chunks")).map_or(0, |entries| entries.flatten().count());
-    while chunks() < 2 && child.try_wait().unwrap().is_none() {
-        std::thread::sleep(Duration::from_millis(1));
+    loop {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_sitl"))
+            .current_dir(&folder)
+            .args(["campaign", "small.toml", "--threads", "2"])
+            .spawn()
+            .unwrap();
+        while chunks() < 2 && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        if !out.join("results.parquet").exists() {
+            break;
+        }
+        // On a busy machine it may be at its end before it is looked at again.
+        fs::remove_dir_all(&out).unwrap();
     }
-    child.kill().unwrap();
-    child.wait().unwrap();
-    assert!(!out.join("results.parquet").exists(), "killed on the way");
     let kept = chunks();
     assert!(kept >= 2);
 

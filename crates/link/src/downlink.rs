@@ -3,13 +3,13 @@
 use crate::decoder::Counters;
 use crate::frames::flip;
 use crate::framing::{Address, PAYLOAD_MAX};
-use crate::message::{Fault, Format, Message, extension, parse, put, put_extended};
+use crate::message::{Fault, Format, Message, extension, field, parse, put, put_extended, put_fields};
 use airframe::{Axis, PerAxis, RotorSpeeds};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     ATTITUDE_DATA, COMMAND_ACK_DATA, DEBUG_FLOAT_ARRAY_DATA, HEARTBEAT_DATA, HIL_ACTUATOR_CONTROLS_DATA,
-    HilActuatorControlsFlags, LOCAL_POSITION_NED_DATA, MavAutopilot, MavCmd, MavModeFlag, MavResult, MavSeverity,
-    MavState, MavType, STATUSTEXT_DATA,
+    HilActuatorControlsFlags, LOCAL_POSITION_NED_DATA, MavAutopilot, MavModeFlag, MavResult, MavSeverity, MavState,
+    MavType, STATUSTEXT_DATA,
 };
 use mavlink::types::CharArray;
 use nalgebra::{Vector3, Vector4};
@@ -24,7 +24,7 @@ pub enum Downlink {
     Heartbeat {
         /// True if the motors may turn.
         armed: bool,
-        /// True if a failsafe flies: MAV_STATE_CRITICAL.
+        /// True if a failsafe flies, or did a moment ago: MAV_STATE_CRITICAL.
         failsafe: bool,
         /// The vehicle's mode, its `custom_mode`.
         mode: u32,
@@ -59,15 +59,20 @@ pub enum Downlink {
     },
     /// COMMAND_ACK (77).
     Answer {
-        /// What is answered.
-        command: MavCmd,
+        /// What is answered, by its number.
+        command: u16,
         /// The answer.
         answer: Answer,
         /// Who asked.
         to: Address,
     },
-    /// STATUSTEXT (253), a warning.
-    Text(Text),
+    /// STATUSTEXT (253).
+    Text {
+        /// How bad it is.
+        severity: MavSeverity,
+        /// What it is.
+        text: Text,
+    },
     /// DEBUG_FLOAT_ARRAY (350) named "health".
     Health(Health),
 }
@@ -79,8 +84,12 @@ pub enum Answer {
     Accepted,
     /// Not now; the number of the reason, `result_param2`.
     Refused(i32),
+    /// Never, with these parameters.
+    Denied,
     /// This vehicle does not know the command.
     Unsupported,
+    /// Nobody knows what became of it.
+    Failed,
 }
 
 /// How the vehicle does, in the order of the array's elements. Counts cross as `f32`, exactly up to 2^24.
@@ -106,6 +115,8 @@ pub struct Health {
     pub delta: PerAxis<f32>,
     /// What was received and dropped.
     pub link: Counters,
+    /// Commands since power-up that got no answer: more came at once than could be answered.
+    pub unanswered: u32,
 }
 
 impl Downlink {
@@ -133,8 +144,11 @@ impl Message for Downlink {
             HIL_ACTUATOR_CONTROLS_DATA::ID => read_rotors(&parse(payload)?),
             ATTITUDE_DATA::ID => parse(payload).map(read_attitude),
             LOCAL_POSITION_NED_DATA::ID => parse(payload).map(read_position),
-            COMMAND_ACK_DATA::ID => read_answer(&parse(payload)?, extension::<COMMAND_ACK_DATA, _>(payload)),
-            STATUSTEXT_DATA::ID => parse(payload).map(|data: STATUSTEXT_DATA| Downlink::Text(data.text)),
+            COMMAND_ACK_DATA::ID => read_answer(payload),
+            STATUSTEXT_DATA::ID => {
+                let STATUSTEXT_DATA { severity, text } = parse(payload)?;
+                Ok(Downlink::Text { severity, text })
+            }
             DEBUG_FLOAT_ARRAY_DATA::ID => {
                 read_health(&parse(payload)?, extension::<DEBUG_FLOAT_ARRAY_DATA, _>(payload))
             }
@@ -158,13 +172,9 @@ impl Message for Downlink {
                 put(&LOCAL_POSITION_NED_DATA { time_boot_ms: *time_ms, x, y, z, vx, vy, vz }, payload)
             }
             Downlink::Answer { command, answer, to } => {
-                let (data, extension) = write_answer(*command, *answer, *to);
-                put_extended(&data, extension, payload)
+                put_fields(COMMAND_ACK_DATA::ID, write_answer(*command, *answer, *to), payload)
             }
-            Downlink::Text(text) => {
-                let severity = MavSeverity::MAV_SEVERITY_WARNING;
-                put(&STATUSTEXT_DATA { severity, text: *text }, payload)
-            }
+            Downlink::Text { severity, text } => put(&STATUSTEXT_DATA { severity: *severity, text: *text }, payload),
             Downlink::Health(health) => {
                 let data = DEBUG_FLOAT_ARRAY_DATA { time_usec: health.time_us, array_id: 0, name: HEALTH.into() };
                 put_extended(&data, health.elements().flat_map(f32::to_le_bytes), payload)
@@ -245,32 +255,46 @@ fn read_position(data: LOCAL_POSITION_NED_DATA) -> Downlink {
 
 /// Extension fields of COMMAND_ACK: progress, `result_param2` as `i32`, target system and component.
 const ANSWER_EXTENSION: usize = 7;
+const ANSWER_FIELDS: usize = COMMAND_ACK_DATA::ENCODED_LEN + ANSWER_EXTENSION;
 /// Extension fields of STATUSTEXT, which number the parts of longer texts.
 const TEXT_EXTENSION: usize = 3;
 /// Elements of DEBUG_FLOAT_ARRAY, its only extension field.
 const HEALTH_ELEMENTS: usize = 58;
 const HEALTH: &str = "health";
 
-fn read_answer(data: &COMMAND_ACK_DATA, extension: [u8; ANSWER_EXTENSION]) -> Result<Downlink, Fault> {
-    let [_, reason @ .., system, component] = extension;
-    let answer = match data.result {
-        MavResult::MAV_RESULT_ACCEPTED => Answer::Accepted,
-        MavResult::MAV_RESULT_TEMPORARILY_REJECTED => Answer::Refused(i32::from_le_bytes(reason)),
-        MavResult::MAV_RESULT_UNSUPPORTED => Answer::Unsupported,
+/// Command, result, progress, `result_param2`, target. By hand, since the `mavlink` crate refuses commands that its
+/// dialect does not know.
+fn read_answer(payload: &[u8]) -> Result<Downlink, Fault> {
+    let [low, high, result, _, reason @ .., system, component]: [u8; ANSWER_FIELDS] = field(payload, 0);
+    let answer = match result {
+        ACCEPTED => Answer::Accepted,
+        REFUSED => Answer::Refused(i32::from_le_bytes(reason)),
+        DENIED => Answer::Denied,
+        UNSUPPORTED => Answer::Unsupported,
+        FAILED => Answer::Failed,
         _ => return Err(Fault::Unsupported),
     };
-    Ok(Downlink::Answer { command: data.command, answer, to: Address { system, component } })
+    let command = u16::from_le_bytes([low, high]);
+    Ok(Downlink::Answer { command, answer, to: Address { system, component } })
 }
 
-fn write_answer(command: MavCmd, answer: Answer, to: Address) -> (COMMAND_ACK_DATA, [u8; ANSWER_EXTENSION]) {
+fn write_answer(command: u16, answer: Answer, to: Address) -> [u8; ANSWER_FIELDS] {
     let (result, reason) = match answer {
-        Answer::Accepted => (MavResult::MAV_RESULT_ACCEPTED, 0),
-        Answer::Refused(reason) => (MavResult::MAV_RESULT_TEMPORARILY_REJECTED, reason),
-        Answer::Unsupported => (MavResult::MAV_RESULT_UNSUPPORTED, 0),
+        Answer::Accepted => (ACCEPTED, 0),
+        Answer::Refused(reason) => (REFUSED, reason),
+        Answer::Denied => (DENIED, 0),
+        Answer::Unsupported => (UNSUPPORTED, 0),
+        Answer::Failed => (FAILED, 0),
     };
-    let [a, b, c, d] = i32::to_le_bytes(reason);
-    (COMMAND_ACK_DATA { command, result }, [0, a, b, c, d, to.system, to.component])
+    let ([low, high], [a, b, c, d]) = (command.to_le_bytes(), reason.to_le_bytes());
+    [low, high, result, 0, a, b, c, d, to.system, to.component]
 }
+
+const ACCEPTED: u8 = MavResult::MAV_RESULT_ACCEPTED as u8;
+const REFUSED: u8 = MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
+const DENIED: u8 = MavResult::MAV_RESULT_DENIED as u8;
+const UNSUPPORTED: u8 = MavResult::MAV_RESULT_UNSUPPORTED as u8;
+const FAILED: u8 = MavResult::MAV_RESULT_FAILED as u8;
 
 fn read_health(data: &DEBUG_FLOAT_ARRAY_DATA, extension: [u8; 4 * HEALTH_ELEMENTS]) -> Result<Downlink, Fault> {
     if data.name.to_str() != Ok(HEALTH) {
@@ -290,6 +314,7 @@ fn read_health(data: &DEBUG_FLOAT_ARRAY_DATA, extension: [u8; 4 * HEALTH_ELEMENT
         theta_norm: PerAxis::from_fn(|_| next()),
         delta: PerAxis::from_fn(|_| next()),
         link: Counters::from_array(core::array::from_fn(|_| next() as u32)),
+        unanswered: next() as u32,
     }))
 }
 
@@ -302,6 +327,6 @@ impl Health {
         ticks
             .into_iter()
             .chain(estimates.into_iter().flatten())
-            .chain(self.link.to_array().into_iter().map(|count| count as f32))
+            .chain(self.link.to_array().into_iter().chain([self.unanswered]).map(|count| count as f32))
     }
 }

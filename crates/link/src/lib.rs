@@ -38,6 +38,6 @@ mod uplink;
 pub use decoder::{Counters, Decoder};
 pub use downlink::{Answer, Downlink, Health, Text};
 pub use framing::{Address, FRAME_MAX, Sender};
-pub use mavlink::dialects::common::MavCmd;
+pub use mavlink::dialects::common::{MavCmd, MavSeverity};
 pub use message::{Fault, Format, Message};
 pub use uplink::{Command, Uplink};

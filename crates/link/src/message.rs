@@ -68,16 +68,34 @@ pub(crate) fn parse<D: MessageData>(payload: &[u8]) -> Result<D, Fault> {
 
 /// The first `N` bytes of a payload's extension fields of the message `D`, completed with zeros.
 pub(crate) fn extension<D: MessageData, const N: usize>(payload: &[u8]) -> [u8; N] {
-    let mut extension = [0; N];
-    for (byte, sent) in extension.iter_mut().zip(payload.iter().skip(D::ENCODED_LEN)) {
+    field(payload, D::ENCODED_LEN)
+}
+
+/// The `N` bytes of a payload that begin at `offset`, completed with zeros.
+pub(crate) fn field<const N: usize>(payload: &[u8], offset: usize) -> [u8; N] {
+    let mut field = [0; N];
+    for (byte, sent) in field.iter_mut().zip(payload.iter().skip(offset)) {
         *byte = *sent;
     }
-    extension
+    field
 }
 
 /// Writes the message `data`.
 pub(crate) fn put<D: MessageData>(data: &D, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
     (D::ID, data.ser(MavlinkVersion::V2, payload) as u8)
+}
+
+/// Writes the fields of the message numbered `id`, as they follow each other, without the zeros at their end.
+pub(crate) fn put_fields(id: u32, fields: impl IntoIterator<Item = u8>, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+    // Never shorter than a byte.
+    let mut length = 1;
+    for (place, (byte, sent)) in payload.iter_mut().zip(fields).enumerate() {
+        *byte = sent;
+        if sent != 0 {
+            length = (place + 1) as u8;
+        }
+    }
+    (id, length)
 }
 
 /// Writes the message `data` and its extension fields, without the zeros at their end.

@@ -2,12 +2,12 @@
 
 use crate::frames::{Odometry, flip};
 use crate::framing::{Address, PAYLOAD_MAX};
-use crate::message::{Fault, Format, Message, extension, parse, put};
+use crate::message::{Fault, Format, Message, extension, field, parse, put, put_fields};
 use airframe::{Setpoint, State};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
-    COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavFrame, MavModeFlag, MavState, MavType, ODOMETRY_DATA,
-    PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
+    COMMAND_INT_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavFrame, MavModeFlag, MavState,
+    MavType, ODOMETRY_DATA, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
 };
 use nalgebra::Vector3;
 
@@ -31,12 +31,12 @@ pub enum Uplink {
     /// [`Fault::Unsupported`]. Ignored velocities, accelerations and yaw rate are zero. The message has no yaw
     /// acceleration: zero.
     Setpoint(Setpoint),
-    /// COMMAND_LONG (76).
+    /// COMMAND_LONG (76) or COMMAND_INT (75). Written as COMMAND_LONG.
     Command(Command),
 }
 
-/// What COMMAND_LONG asks for.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What COMMAND_LONG or COMMAND_INT asks for. Each has an answer, [`Downlink::Answer`](crate::Downlink::Answer).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
     /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 1. Forcing it (param2 = 21196) makes no difference.
     Arm,
@@ -46,20 +46,25 @@ pub enum Command {
     Kill,
     /// MAV_CMD_USER_1 (31010): give the flight back to AFBC after its monitor has tripped.
     Engage,
-    /// Anything else, to be answered with "unsupported".
-    Other(MavCmd),
+    /// One of these, by its number, with a parameter that it cannot have: to be answered with "denied".
+    Denied(u16),
+    /// Anything else, by its number in whatever dialect: to be answered with "unsupported".
+    Other(u16),
 }
 
 impl Command {
-    /// The MAVLink command, as its answer names it.
-    pub fn id(self) -> MavCmd {
+    /// The MAVLink command's number, as its answer names it.
+    pub fn id(self) -> u16 {
         match self {
-            Command::Arm | Command::Disarm | Command::Kill => MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
-            Command::Engage => MavCmd::MAV_CMD_USER_1,
-            Command::Other(id) => id,
+            Command::Arm | Command::Disarm | Command::Kill => ARM_DISARM,
+            Command::Engage => ENGAGE,
+            Command::Denied(id) | Command::Other(id) => id,
         }
     }
 }
+
+const ARM_DISARM: u16 = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16;
+const ENGAGE: u16 = MavCmd::MAV_CMD_USER_1 as u16;
 
 impl Message for Uplink {
     fn format(id: u32) -> Option<Format> {
@@ -68,6 +73,7 @@ impl Message for Uplink {
             ODOMETRY_DATA::ID => Some(Format::of::<ODOMETRY_DATA>(ODOMETRY_EXTENSION)),
             SET_POSITION_TARGET_LOCAL_NED_DATA::ID => Some(Format::of::<SET_POSITION_TARGET_LOCAL_NED_DATA>(0)),
             COMMAND_LONG_DATA::ID => Some(Format::of::<COMMAND_LONG_DATA>(0)),
+            COMMAND_INT_DATA::ID => Some(Format::of::<COMMAND_INT_DATA>(0)),
             _ => None,
         }
     }
@@ -77,7 +83,7 @@ impl Message for Uplink {
             HEARTBEAT_DATA::ID => Ok(Uplink::Heartbeat),
             ODOMETRY_DATA::ID => read_odometry(&parse(payload)?, extension::<ODOMETRY_DATA, _>(payload)),
             SET_POSITION_TARGET_LOCAL_NED_DATA::ID => read_setpoint(&parse(payload)?, receiver),
-            COMMAND_LONG_DATA::ID => read_command(&parse(payload)?, receiver),
+            COMMAND_LONG_DATA::ID | COMMAND_INT_DATA::ID => read_command(payload, receiver),
             _ => Err(Fault::Unknown),
         }
     }
@@ -97,7 +103,7 @@ impl Message for Uplink {
             ),
             Uplink::State { sent_us, state } => put(&write_odometry(*sent_us, state), payload),
             Uplink::Setpoint(setpoint) => put(&write_setpoint(setpoint), payload),
-            Uplink::Command(command) => put(&write_command(*command), payload),
+            Uplink::Command(command) => put_fields(COMMAND_LONG_DATA::ID, write_command(*command), payload),
         }
     }
 }
@@ -190,21 +196,35 @@ fn write_setpoint(setpoint: &Setpoint) -> SET_POSITION_TARGET_LOCAL_NED_DATA {
 /// param2 of MAV_CMD_COMPONENT_ARM_DISARM that forces it.
 const FORCED: f32 = 21196.0;
 
-fn read_command(data: &COMMAND_LONG_DATA, receiver: Address) -> Result<Uplink, Fault> {
-    meant_for(receiver, data.target_system, data.target_component)?;
-    let command = match data.command {
-        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if data.param1 == 1.0 => Command::Arm,
-        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if data.param1 == 0.0 && data.param2 == FORCED => Command::Kill,
-        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if data.param1 == 0.0 => Command::Disarm,
-        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => return Err(Fault::Malformed),
-        MavCmd::MAV_CMD_USER_1 => Command::Engage,
+/// Where COMMAND_LONG and COMMAND_INT have the fields that matter, both alike: two parameters, number, target. By hand,
+/// since the `mavlink` crate refuses what its dialect does not know.
+const COMMAND_FIELDS: [usize; 4] = [0, 4, 28, 30];
+
+fn read_command(payload: &[u8], receiver: Address) -> Result<Uplink, Fault> {
+    let [param1_at, param2_at, id_at, target_at] = COMMAND_FIELDS;
+    let [system, component] = field(payload, target_at);
+    meant_for(receiver, system, component)?;
+    let param1 = f32::from_le_bytes(field(payload, param1_at));
+    let forced = f32::from_le_bytes(field(payload, param2_at)) == FORCED;
+    let command = match u16::from_le_bytes(field(payload, id_at)) {
+        ARM_DISARM if param1 == 1.0 => Command::Arm,
+        ARM_DISARM if param1 == 0.0 && forced => Command::Kill,
+        ARM_DISARM if param1 == 0.0 => Command::Disarm,
+        ARM_DISARM => Command::Denied(ARM_DISARM),
+        ENGAGE => Command::Engage,
         other => Command::Other(other),
     };
     Ok(Uplink::Command(command))
 }
 
-fn write_command(command: Command) -> COMMAND_LONG_DATA {
-    let param1 = if command == Command::Arm { 1.0 } else { 0.0 };
-    let param2 = if command == Command::Kill { FORCED } else { 0.0 };
-    COMMAND_LONG_DATA { command: command.id(), param1, param2, ..COMMAND_LONG_DATA::DEFAULT }
+/// The fields of COMMAND_LONG: seven parameters, number, target (all) and confirmation.
+fn write_command(command: Command) -> impl Iterator<Item = u8> {
+    let [param1, param2] = match command {
+        Command::Arm => [1.0, 0.0],
+        Command::Kill => [0.0, FORCED],
+        Command::Denied(_) => [f32::NAN, 0.0],
+        Command::Disarm | Command::Engage | Command::Other(_) => [0.0; 2],
+    };
+    let parameters = [param1, param2, 0.0, 0.0, 0.0, 0.0, 0.0].into_iter().flat_map(f32::to_le_bytes);
+    parameters.chain(command.id().to_le_bytes())
 }

@@ -71,6 +71,7 @@ fn expected(stream: &[u8]) -> Vec<Uplink> {
     let carried = |id: u32, length: usize| match id {
         0 => length <= 9,
         76 => length <= 33,
+        75 => length <= 35,
         84 => length <= 53,
         331 => length <= 233,
         _ => false,
@@ -103,12 +104,21 @@ fn nesting_payloads() -> impl Strategy<Value = Vec<u8>> {
 /// behind the header.
 fn top_level() -> impl Strategy<Value = (Vec<u8>, Option<Uplink>)> {
     let carried = messages().prop_map(|message| (frames(&[message]).concat(), Some(message))).boxed();
-    let id =
-        prop_oneof![Just(385), Just(110), Just(120), Just(395), Just(0), Just(76), Just(42_000), 13_000_u32..1 << 24];
+    let id = prop_oneof![
+        Just(385),
+        Just(110),
+        Just(120),
+        Just(395),
+        Just(0),
+        Just(76),
+        Just(75),
+        Just(42_000),
+        13_000_u32..1 << 24
+    ];
     let flags = prop_oneof![2 => Just(0), 2 => Just(1), 1 => any::<u8>()];
     let other = (id, flags, nesting_payloads(), any::<u8>())
         .prop_filter("neither carried nor short enough to be", |(id, flags, payload, _)| {
-            *flags != 0 || !matches!(id, 0 | 76) || payload.len() > 33
+            *flags != 0 || !matches!(id, 0 | 75 | 76) || payload.len() > 35
         })
         .prop_map(|(id, flags, payload, sequence)| {
             let frame = Frame { flags, sequence, system: 255, component: 190, id, payload };
@@ -309,7 +319,7 @@ fn each_cause_has_its_count() {
     let not_carried = raw(30, 0, &[1; 28], 39);
     let foreign = raw(42_000, 0, &[1; 28], 39);
     let signed = [raw(0, 1, &[1; 9], 50), vec![7; 13]].concat();
-    let malformed = raw(76, 0, &[0; 33], 152);
+    let malformed = raw(331, 0, &[[0; 228].as_slice(), &[99, 12]].concat(), 91);
     let implausible = raw(331, 0, &[[0; 228].as_slice(), &[1, 12]].concat(), 91);
     let unsupported = raw(331, 0, &[0; 230], 91);
     let elsewhere = raw(84, 0, &[[0; 50].as_slice(), &[9, 1, 1]].concat(), 143);

@@ -1,12 +1,20 @@
 //! Bytes on the wire against the `mavlink` crate's own serialiser, and against the specification where that crate has no
 //! say: extension fields, masks, frames, targets.
-#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    reason = "a test that cannot go on should say why"
+)]
 
 use airframe::{Axis, PerAxis, RotorSpeeds, Setpoint, State};
-use link::{Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, Health, MavCmd, Message, Sender, Uplink};
+use link::{
+    Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, Health, MavCmd, MavSeverity, Message, Sender,
+    Uplink,
+};
 use mavlink::dialects::common::{
-    ATTITUDE_DATA, COMMAND_LONG_DATA, HIL_ACTUATOR_CONTROLS_DATA, MavFrame, ODOMETRY_DATA, PositionTargetTypemask,
-    SET_POSITION_TARGET_LOCAL_NED_DATA,
+    ATTITUDE_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, HIL_ACTUATOR_CONTROLS_DATA, MavFrame, ODOMETRY_DATA,
+    PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MessageData};
 use nalgebra::{Vector3, Vector4};
@@ -106,7 +114,7 @@ fn sequence_numbers_count_and_wrap() {
 #[test]
 fn answers_carry_their_extension_fields() {
     let answer = Downlink::Answer {
-        command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+        command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16,
         answer: Answer::Refused(0x0102_0304),
         to: Address { system: 255, component: 190 },
     };
@@ -117,7 +125,7 @@ fn answers_carry_their_extension_fields() {
 }
 
 #[test]
-fn health_is_an_array_of_28_floats() {
+fn health_is_an_array_of_29_floats() {
     let mut number = 0.0;
     let mut next = || {
         number += 1.0;
@@ -145,6 +153,7 @@ fn health_is_an_array_of_28_floats() {
             skipped_bytes: next() as u32,
             lost: next() as u32,
         },
+        unanswered: next() as u32,
     };
     let frame = bytes(&Downlink::Health(health));
     assert_eq!(frame[10..18], 7u64.to_le_bytes());
@@ -155,7 +164,7 @@ fn health_is_an_array_of_28_floats() {
         assert_eq!(f32::from_le_bytes(padded), index as f32 + 1.0);
     }
     assert_eq!(read(&frame), Ok(Downlink::Health(health)));
-    assert_eq!(Axis::ALL.len() * 2 + 6 + 10, 28);
+    assert_eq!(Axis::ALL.len() * 2 + 6 + 10 + 1, 29);
 }
 
 #[test]
@@ -276,7 +285,13 @@ fn only_what_is_meant_for_the_vehicle_is_read() {
             target_component: component,
             ..COMMAND_LONG_DATA::DEFAULT
         };
-        for frame in [theirs(&setpoint), theirs(&command)] {
+        let int = COMMAND_INT_DATA {
+            command: MavCmd::MAV_CMD_DO_SET_MODE,
+            target_system: system,
+            target_component: component,
+            ..COMMAND_INT_DATA::DEFAULT
+        };
+        for frame in [theirs(&setpoint), theirs(&command), theirs(&int)] {
             match read::<Uplink>(&frame) {
                 Ok(_) => assert!(mine),
                 Err(counters) => assert_eq!((mine, counters.elsewhere), (false, 1)),
@@ -287,20 +302,50 @@ fn only_what_is_meant_for_the_vehicle_is_read() {
 
 #[test]
 fn commands() {
-    let command = |command, param1| theirs(&COMMAND_LONG_DATA { command, param1, ..COMMAND_LONG_DATA::DEFAULT });
+    let long = |command, param1, param2| {
+        theirs(&COMMAND_LONG_DATA { command, param1, param2, target_system: 1, ..COMMAND_LONG_DATA::DEFAULT })
+    };
+    let int = |command, param1, param2| {
+        let (frame, x) = (MavFrame::MAV_FRAME_GLOBAL, -1);
+        theirs(&COMMAND_INT_DATA { command, param1, param2, x, frame, target_system: 1, ..COMMAND_INT_DATA::DEFAULT })
+    };
     let arm = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
-    assert_eq!(read(&command(arm, 1.0)), Ok(Uplink::Command(Command::Arm)));
-    assert_eq!(read(&command(arm, 0.0)), Ok(Uplink::Command(Command::Disarm)));
-    for param1 in [0.5, -1.0, f32::NAN] {
-        assert_eq!(read::<Uplink>(&command(arm, param1)).expect_err("neither").malformed, 1);
+    for command in [&long as &dyn Fn(_, _, _) -> Vec<u8>, &int] {
+        let read = |id, param1, param2| match read(&command(id, param1, param2)) {
+            Ok(Uplink::Command(command)) => command,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(read(arm, 1.0, 0.0), Command::Arm);
+        assert_eq!(read(arm, 1.0, 21196.0), Command::Arm);
+        assert_eq!(read(arm, 0.0, 0.0), Command::Disarm);
+        assert_eq!(read(arm, 0.0, 21195.0), Command::Disarm);
+        assert_eq!(read(arm, -0.0, 21196.0), Command::Kill);
+        for param1 in [0.5, -1.0, 2.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(read(arm, param1, 21196.0), Command::Denied(400));
+        }
+        assert_eq!(read(MavCmd::MAV_CMD_USER_1, 0.5, f32::NAN), Command::Engage);
+        assert_eq!(read(MavCmd::MAV_CMD_NAV_LAND, 1.0, 0.0), Command::Other(21));
     }
-    let other = MavCmd::MAV_CMD_NAV_LAND;
-    assert_eq!(read(&command(other, 1.0)), Ok(Uplink::Command(Command::Other(other))));
-    // A command that no dialect knows.
-    let mut payload = [0; 33];
-    payload[28..30].copy_from_slice(&60_000u16.to_le_bytes());
-    let unknown = raw(COMMAND_LONG_DATA::ID, &payload, COMMAND_LONG_DATA::EXTRA_CRC);
-    assert_eq!(read::<Uplink>(&unknown).expect_err("unknown").malformed, 1);
+}
+
+/// Whatever its number, in a dialect or not: who asked can be answered.
+#[test]
+fn every_command_is_read() {
+    for id in 0..=u16::MAX {
+        for (message, extra_crc, length) in [(76, 152, 33), (75, 158, 35)] {
+            let mut payload = vec![0; length];
+            payload[28..30].copy_from_slice(&id.to_le_bytes());
+            let expected = match id {
+                400 => Command::Disarm,
+                31_010 => Command::Engage,
+                _ => Command::Other(id),
+            };
+            assert_eq!(read(&raw(message, &payload, extra_crc)), Ok(Uplink::Command(expected)));
+            // Short of the zeros at its end.
+            assert_eq!(read(&raw(message, &payload[..30], extra_crc)), Ok(Uplink::Command(expected)));
+            assert_eq!(expected.id(), id);
+        }
+    }
 }
 
 #[test]
@@ -311,6 +356,17 @@ fn rotor_speeds_outside_the_scale_are_refused() {
         assert_eq!(read::<Downlink>(&theirs(&data)).expect_err("no speed").implausible, 1);
     }
 }
+
+const SEVERITIES: [MavSeverity; 8] = [
+    MavSeverity::MAV_SEVERITY_EMERGENCY,
+    MavSeverity::MAV_SEVERITY_ALERT,
+    MavSeverity::MAV_SEVERITY_CRITICAL,
+    MavSeverity::MAV_SEVERITY_ERROR,
+    MavSeverity::MAV_SEVERITY_WARNING,
+    MavSeverity::MAV_SEVERITY_NOTICE,
+    MavSeverity::MAV_SEVERITY_INFO,
+    MavSeverity::MAV_SEVERITY_DEBUG,
+];
 
 proptest! {
     /// Rotor speeds cross without losing a bit.
@@ -329,6 +385,8 @@ proptest! {
         armed: bool,
         failsafe: bool,
         text in "[ -~]{0,50}",
+        command in any::<u16>().prop_filter("not ours", |id| ![400, 31_010].contains(id)),
+        severity in 0..8usize,
     ) {
         let (a, b) = (v.into(), w.into());
         let setpoint = Setpoint {
@@ -345,11 +403,12 @@ proptest! {
             Uplink::Command(Command::Arm),
             Uplink::Command(Command::Disarm),
             Uplink::Command(Command::Engage),
-            Uplink::Command(Command::Other(MavCmd::MAV_CMD_DO_SET_MODE)),
+            Uplink::Command(Command::Kill),
+            Uplink::Command(Command::Denied(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16)),
+            Uplink::Command(Command::Other(command)),
         ] {
             prop_assert_eq!(read(&bytes(&message)), Ok(message));
         }
-        let command = MavCmd::MAV_CMD_DO_SET_MODE;
         for message in [
             Downlink::Heartbeat { armed, failsafe, mode: n },
             Downlink::Attitude { time_ms: n, attitude_rad: a, rates_rad_s: b },
@@ -357,7 +416,9 @@ proptest! {
             Downlink::Answer { command, answer: Answer::Unsupported, to: VEHICLE },
             Downlink::Answer { command, answer: Answer::Accepted, to: VEHICLE },
             Downlink::Answer { command, answer: Answer::Refused(n as i32), to: VEHICLE },
-            Downlink::Text(text.as_str().into()),
+            Downlink::Answer { command, answer: Answer::Denied, to: VEHICLE },
+            Downlink::Answer { command, answer: Answer::Failed, to: VEHICLE },
+            Downlink::Text { severity: SEVERITIES[severity], text: text.as_str().into() },
         ] {
             prop_assert_eq!(read(&bytes(&message)), Ok(message));
         }

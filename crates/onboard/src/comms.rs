@@ -1,14 +1,18 @@
 //! The half that talks.
 
+use crate::answers::{ANSWERS_PER_TICK, Answers};
+use crate::failsafes::Failsafes;
 use crate::flight::Report;
 use afbc::monitor::{Norm, Trip};
 use airframe::{PerAxis, State};
-use link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, MavCmd, Sender, Text, Uplink};
+use link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, Sender, Text, Uplink};
 use vehicle::rate;
-use vehicle::{Asked, Inbox, Mode, Request, Stamped, Tracker};
+use vehicle::{Inbox, Mode, Stamped, Tracker};
 
 /// The vehicle on the link: system 1, component 1 (autopilot).
 pub const ADDRESS: Address = Address { system: 1, component: 1 };
+/// Room for all that one tick may have to say \[bytes\].
+pub const REPORT_MAX: usize = 768;
 
 /// What the pilot is told when the clock has failed.
 pub const CLOCK_FAILED: &str = "clock failed, flying on the spare one: land";
@@ -50,10 +54,8 @@ pub struct Comms {
     state: Option<State>,
     /// The state is newer than the last rotor command.
     state_is_news: bool,
-    /// Who sent the last command to the vehicle.
-    asked_by: Address,
-    /// A command that this vehicle does not know, and who sent it.
-    unknown: Option<(MavCmd, Address)>,
+    answers: Answers,
+    failsafes: Failsafes,
     norms: PerAxis<Norm>,
     trip: Option<Trip>,
     rate: rate::Report,
@@ -77,8 +79,8 @@ impl Comms {
             tick_us_max: 0.0,
             state: None,
             state_is_news: false,
-            asked_by: Address { system: 0, component: 0 },
-            unknown: None,
+            answers: Answers::default(),
+            failsafes: Failsafes::default(),
             norms: PerAxis::default(),
             trip: None,
             rate: rate::Report::default(),
@@ -88,7 +90,7 @@ impl Comms {
     /// Takes the next bytes of the stream; returns what they tell the control tick, to be [posted](Inbox::post).
     pub fn receive(&mut self, bytes: &[u8]) -> Inbox {
         let mut news = Inbox::default();
-        let Comms { decoder, tracker, now_us, state, state_is_news, asked_by, unknown, .. } = self;
+        let Comms { decoder, tracker, now_us, state, state_is_news, answers, .. } = self;
         decoder.feed(bytes, |from, message| match message {
             Uplink::Heartbeat => (),
             Uplink::State { sent_us, state: value } => {
@@ -100,17 +102,7 @@ impl Comms {
                 }
             }
             Uplink::Setpoint(value) => news.aim(Stamped { value, at_us: *now_us }),
-            Uplink::Command(command) => {
-                let request = match command {
-                    Command::Arm => Request::Arm,
-                    Command::Disarm => Request::Disarm,
-                    Command::Kill => Request::Kill,
-                    Command::Engage => Request::Engage,
-                    Command::Other(id) => return *unknown = Some((id, from)),
-                };
-                news.ask(Asked { request, ticket: 0 });
-                *asked_by = from;
-            }
+            Uplink::Command(command) => answers.hear(command, from, *now_us, &mut news),
         });
         news
     }
@@ -139,45 +131,39 @@ impl Comms {
             self.state_is_news = false;
             say(Downlink::Rotors { time_us: report.time_us, armed, speeds: report.motors });
         }
-        if let Some(answer) = report.answer {
-            let command = match answer.request {
-                Request::Engage => Command::Engage,
-                Request::Disarm => Command::Disarm,
-                Request::Kill => Command::Kill,
-                Request::Arm => Command::Arm,
-            };
-            let (answer, reason) = match answer.result {
-                Ok(()) => (Answer::Accepted, None),
-                Err(refusal) => (Answer::Refused(refusal as i32), Some(refusal.reason())),
-            };
-            say(Downlink::Answer { command: command.id(), answer, to: self.asked_by });
-            if let Some(reason) = reason {
-                say(Downlink::Text(Text::from(reason)));
-            }
+        if let Some(answer) = report.answer.and_then(|answer| self.answers.settle(answer)) {
+            say(answer);
+        }
+        for answer in core::iter::from_fn(|| self.answers.next(report.time_us)).take(ANSWERS_PER_TICK) {
+            say(answer);
+        }
+        let mut text = |severity, text: &str| say(Downlink::Text { severity, text: Text::from(text) });
+        if let Some(Err(refusal)) = report.answer.map(|answer| answer.result) {
+            text(MavSeverity::MAV_SEVERITY_WARNING, refusal.reason());
+        }
+        for (severity, notice) in self.failsafes.watch(report, self.tick) {
+            text(severity, notice);
         }
         let trip = report.health.control.trip;
         if let (Some(trip), None) = (trip, self.trip) {
-            say(Downlink::Text(Text::from(trip.reason())));
+            text(MavSeverity::MAV_SEVERITY_WARNING, trip.reason());
+        }
+        let (rate, before) = (report.health.rate, self.rate);
+        self.rate = rate;
+        if rate.clock_failed && !before.clock_failed {
+            text(MavSeverity::MAV_SEVERITY_CRITICAL, CLOCK_FAILED);
+        } else if before.healthy() && !rate.healthy() {
+            text(MavSeverity::MAV_SEVERITY_CRITICAL, TICK_OFF);
         }
         // While the vehicle flies blind no law says anything.
         if report.mode != Mode::Riding {
             self.trip = trip;
         }
-        let (rate, before) = (report.health.rate, self.rate);
-        self.rate = rate;
-        if rate.clock_failed && !before.clock_failed {
-            say(Downlink::Text(Text::from(CLOCK_FAILED)));
-        } else if before.healthy() && !rate.healthy() {
-            say(Downlink::Text(Text::from(TICK_OFF)));
-        }
         if let Some((axis, norm)) = report.learnt {
             *self.norms.get_mut(axis) = norm;
         }
-        if let Some((command, to)) = self.unknown.take() {
-            say(Downlink::Answer { command, answer: Answer::Unsupported, to });
-        }
         if HEARTBEAT.is_due(self.tick) {
-            let failsafe = matches!(report.mode, Mode::Riding | Mode::Descending);
+            let failsafe = self.failsafes.within(HEARTBEAT.period, self.tick);
             say(Downlink::Heartbeat { armed, failsafe, mode: report.mode as u32 });
         }
         let time_ms = (report.time_us / 1000) as u32;
@@ -203,6 +189,7 @@ impl Comms {
                 theta_norm: PerAxis::from_fn(|axis| norm(self.norms.get(axis))),
                 delta: PerAxis::from_fn(|axis| self.norms.get(axis).delta),
                 link: *self.decoder.counters(),
+                unanswered: self.answers.unanswered(),
             }));
         }
     }

@@ -17,8 +17,11 @@
 //! ```
 #![no_std]
 
+mod answers;
 mod comms;
+mod failsafes;
 mod flight;
 
-pub use comms::{ADDRESS, CLOCK_FAILED, Comms, TICK_OFF};
+pub use answers::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, FORGOTTEN_US};
+pub use comms::{ADDRESS, CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
 pub use flight::{Flight, Report};

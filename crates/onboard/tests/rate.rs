@@ -55,7 +55,7 @@ impl Bench {
             self.mode = report.mode;
             let Bench { comms, decoder, texts, answers, .. } = self;
             let mut hear = |_: Address, message: Downlink| match message {
-                Downlink::Text(text) => texts.push(text.to_str().expect("text").to_owned()),
+                Downlink::Text { text, .. } => texts.push(text.to_str().expect("text").to_owned()),
                 Downlink::Answer { answer, .. } => answers.push(answer),
                 _ => (),
             };

@@ -61,7 +61,7 @@ impl Talk {
                 Downlink::Heartbeat { .. } => heard.heartbeats += 1,
                 Downlink::Health(health) => heard.health = health,
                 Downlink::Answer { answer, .. } => drop(heard.answers.insert(answer)),
-                Downlink::Text(text) => drop(heard.texts.insert(text.to_str().unwrap().to_owned())),
+                Downlink::Text { text, .. } => drop(heard.texts.insert(text.to_str().unwrap().to_owned())),
                 Downlink::Rotors { time_us, .. } => heard.time_us = time_us,
                 _ => (),
             });

@@ -77,7 +77,7 @@ mod tests {
         let length = |message: Uplink| Sender::new(Address::default()).send(&message, &mut [0; FRAME_MAX]).len() as u64;
         assert_eq!(length(Uplink::State { sent_us: 0, state: State::default() }), STATE_BYTES);
         assert!(length(Uplink::Setpoint(Setpoint::default())) <= SETPOINT_BYTES);
-        assert!(length(Uplink::Command(Command::Other(MavCmd::MAV_CMD_REQUEST_MESSAGE))) <= PING_BYTES);
+        assert!(length(Uplink::Command(Command::Other(MavCmd::MAV_CMD_REQUEST_MESSAGE as u16))) <= PING_BYTES);
     }
 
     #[test]

@@ -3,13 +3,14 @@
 use super::Spread;
 use airframe::{RotorSpeeds, Setpoint, State};
 use link::{Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, Health, MavCmd, Sender, Text, Uplink};
+use onboard::BUSY;
 use std::time::Instant;
 use vehicle::Refusal;
 
 /// A ground station, by the usual numbers.
 const ADDRESS: Address = Address { system: 255, component: 190 };
 /// A command that the vehicle does not know, and says so: that shows how long an answer takes.
-const PING: MavCmd = MavCmd::MAV_CMD_REQUEST_MESSAGE;
+const PING: u16 = MavCmd::MAV_CMD_REQUEST_MESSAGE as u16;
 
 /// Tracker, commander and listener in one.
 pub struct Station {
@@ -114,7 +115,7 @@ impl Station {
                 }
                 heard.health = Some(health);
             }
-            Downlink::Text(text) => heard.text = Some(text),
+            Downlink::Text { text, .. } => heard.text = Some(text),
             Downlink::Heartbeat { .. } | Downlink::Attitude { .. } | Downlink::Position { .. } => {}
         });
     }
@@ -144,7 +145,8 @@ impl Heard {
     /// Why the vehicle would not arm, in words.
     pub fn refusal(&self) -> Option<&'static str> {
         let Some(Answer::Refused(number)) = self.answer else { return None };
-        let known = Refusal::ALL.into_iter().find(|refusal| *refusal as i32 == number);
-        Some(known.map_or("arming refused: reason unknown", Refusal::reason))
+        let known = Refusal::ALL.into_iter().find(|refusal| *refusal as i32 == number).map(Refusal::reason);
+        let busy = (number == BUSY).then_some("refused: too many requests wait");
+        Some(known.or(busy).unwrap_or("arming refused: reason unknown"))
     }
 }

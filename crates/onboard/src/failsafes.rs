@@ -1,0 +1,51 @@
+//! What is told of failsafes: each once, in words, and all in the heartbeat, however short they are.
+
+use crate::flight::Report;
+use link::MavSeverity;
+use vehicle::{End, Mode};
+
+/// How bad it is, and what it is.
+pub(crate) type Notice = (MavSeverity, &'static str);
+
+const RIDING: Notice = (MavSeverity::MAV_SEVERITY_WARNING, "no fresh state for 20 ms: riding it out");
+const DESCENDING: Notice = (MavSeverity::MAV_SEVERITY_CRITICAL, "no state for 0.25 s: coming down");
+const STATE_LOST: Notice = (MavSeverity::MAV_SEVERITY_EMERGENCY, "no state for 2.25 s: motors stopped");
+const TUMBLED: Notice = (MavSeverity::MAV_SEVERITY_EMERGENCY, "tumbled: motors stopped");
+const SETPOINT_LOST: Notice = (MavSeverity::MAV_SEVERITY_WARNING, "no setpoint for 0.5 s: holding the position");
+
+/// What the last tick was like.
+#[derive(Default)]
+pub(crate) struct Failsafes {
+    mode: Mode,
+    setpoint_lost: bool,
+    /// The last tick with a failsafe.
+    last: Option<u64>,
+}
+
+impl Failsafes {
+    /// What there is to say of the tick numbered `tick`: what it began.
+    pub(crate) fn watch(&mut self, report: &Report, tick: u64) -> impl Iterator<Item = Notice> + use<> {
+        let Report { mode, ended, health, .. } = report;
+        let entered = (*mode != self.mode).then_some(*mode);
+        let given_up = matches!(ended, Some(End::StateLost | End::Tumbled));
+        // A vehicle that comes down needs no setpoint.
+        let setpoint_lost = matches!(mode, Mode::Flying | Mode::Riding) && health.setpoint_stale;
+        let notices = [
+            (entered == Some(Mode::Riding)).then_some(RIDING),
+            (entered == Some(Mode::Descending)).then_some(DESCENDING),
+            (*ended == Some(End::StateLost)).then_some(STATE_LOST),
+            (*ended == Some(End::Tumbled)).then_some(TUMBLED),
+            (setpoint_lost && !self.setpoint_lost).then_some(SETPOINT_LOST),
+        ];
+        if matches!(mode, Mode::Riding | Mode::Descending) || given_up || setpoint_lost {
+            self.last = Some(tick);
+        }
+        (self.mode, self.setpoint_lost) = (*mode, setpoint_lost);
+        notices.into_iter().flatten()
+    }
+
+    /// True if there was a failsafe within the last `ticks` ticks.
+    pub(crate) fn within(&self, ticks: u64, tick: u64) -> bool {
+        self.last.is_some_and(|last| tick.saturating_sub(last) < ticks)
+    }
+}

@@ -1,0 +1,276 @@
+//! Every command has its own answer, and whoever sent it gets it.
+#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
+
+mod common;
+
+use afbc::monitor::Trip;
+use airframe::{Axis, State};
+use common::{Bench, STATION};
+use link::{Address, Answer, Command, Downlink, FRAME_MAX, MavSeverity, Sender, Text, Uplink};
+use onboard::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, FORGOTTEN_US, Report};
+use proptest::prelude::*;
+use vehicle::inbox::REQUESTS_MAX;
+use vehicle::{End, Mode, Refusal, Request};
+
+const STATIONS: [Address; 3] = [STATION, Address { system: 254, component: 1 }, Address { system: 1, component: 191 }];
+
+/// Who is told what.
+type Told = (u16, Answer, Address);
+
+fn answers(said: &[Downlink]) -> Vec<Told> {
+    let answer = |message: &Downlink| match *message {
+        Downlink::Answer { command, answer, to } => Some((command, answer, to)),
+        _ => None,
+    };
+    said.iter().filter_map(answer).collect()
+}
+
+/// All answers of the next `ticks` ticks, in which nothing is heard.
+fn listen(bench: &mut Bench, ticks: usize) -> Vec<Told> {
+    (0..ticks).flat_map(|_| answers(&bench.step().1)).collect()
+}
+
+fn texts(said: &[Downlink]) -> Vec<Text> {
+    let text = |message: &Downlink| match message {
+        Downlink::Text { text, .. } => Some(*text),
+        _ => None,
+    };
+    said.iter().filter_map(text).collect()
+}
+
+/// What a vehicle answers that has just been switched on.
+fn expected(command: Command) -> Answer {
+    match command {
+        Command::Arm => Answer::Refused(Refusal::StateStale as i32),
+        Command::Engage => Answer::Refused(Refusal::NotArmed as i32),
+        Command::Disarm | Command::Kill => Answer::Accepted,
+        Command::Denied(_) => Answer::Denied,
+        Command::Other(_) => Answer::Unsupported,
+    }
+}
+
+fn is_request(command: Command) -> bool {
+    !matches!(command, Command::Denied(_) | Command::Other(_))
+}
+
+fn commands() -> impl Strategy<Value = Command> {
+    prop_oneof![
+        Just(Command::Arm),
+        Just(Command::Disarm),
+        Just(Command::Engage),
+        Just(Command::Denied(400)),
+        any::<u16>().prop_filter("not ours", |id| ![400, 31_010].contains(id)).prop_map(Command::Other),
+    ]
+}
+
+fn sorted(mut told: Vec<Told>) -> Vec<Told> {
+    told.sort_by_key(|told| format!("{told:?}"));
+    told
+}
+
+proptest! {
+    /// Any commands of several stations, any number of them in one tick.
+    #[test]
+    fn everyone_is_answered(asked in prop::collection::vec(
+        prop::collection::vec((commands(), prop::sample::select(STATIONS.as_slice())), 0..12), 1..20)
+    ) {
+        let mut bench = Bench::new();
+        let (mut told, mut due) = (Vec::new(), Vec::new());
+        for tick in asked {
+            // Those with the flight core are answered one a tick, the others three a tick.
+            prop_assert!(answers(&bench.step().1).is_empty());
+            let (mut requests, mut all) = (0, 0);
+            for (command, from) in tick {
+                requests += usize::from(is_request(command));
+                if requests < REQUESTS_MAX || !is_request(command) {
+                    bench.hear_from(from, Uplink::Command(command));
+                    due.push((command.id(), expected(command), from));
+                    all += 1;
+                }
+            }
+            told.extend(listen(&mut bench, REQUESTS_MAX + all / ANSWERS_PER_TICK));
+        }
+        prop_assert_eq!(sorted(told), sorted(due));
+    }
+
+    /// More than there is room for: those that the flight core cannot take are refused, those that cannot be answered are
+    /// counted; but each is one or the other.
+    #[test]
+    fn nobody_is_forgotten(asked in prop::collection::vec((commands(), prop::sample::select(STATIONS.as_slice())), 0..200)) {
+        let mut bench = Bench::new();
+        for (command, from) in &asked {
+            bench.hear_from(*from, Uplink::Command(*command));
+        }
+        let (mut told, mut unanswered) = (0, 0.0);
+        for _ in 0..200 {
+            let (_, said) = bench.step();
+            prop_assert!(answers(&said).len() <= 1 + ANSWERS_PER_TICK);
+            told += answers(&said).len();
+            for message in said {
+                if let Downlink::Health(health) = message {
+                    unanswered = f64::from(health.unanswered);
+                }
+            }
+        }
+        prop_assert_eq!(told + unanswered as usize, asked.len());
+        let requests = asked.iter().filter(|(command, _)| is_request(*command)).count();
+        let others = asked.len() - requests.min(REQUESTS_MAX - 1);
+        prop_assert_eq!(unanswered as usize, others.saturating_sub(ANSWERS_MAX));
+    }
+}
+
+#[test]
+fn two_commands_of_one_tick_are_answered_to_their_senders() {
+    let mut bench = Bench::new();
+    let [first, second, third] = STATIONS;
+    bench.hear_from(first, Uplink::Command(Command::Disarm));
+    bench.hear_from(second, Uplink::Command(Command::Arm));
+    bench.hear_from(third, Uplink::Command(Command::Other(60_000)));
+    bench.hear_from(first, Uplink::Command(Command::Denied(400)));
+    assert_eq!(
+        sorted(listen(&mut bench, 2)),
+        sorted(vec![
+            (400, Answer::Accepted, first),
+            (400, Answer::Refused(Refusal::StateStale as i32), second),
+            (60_000, Answer::Unsupported, third),
+            (400, Answer::Denied, first),
+        ])
+    );
+    assert_eq!(listen(&mut bench, 1000), []);
+}
+
+/// Every number, from either message, and none that is for somebody else.
+#[test]
+fn every_number_is_answered_unless_meant_for_others() {
+    let mut bench = Bench::new();
+    for id in (0..=u16::MAX).step_by(7).filter(|id| ![400, 31_010].contains(id)) {
+        let sent = Sender::new(STATION).send(&Uplink::Command(Command::Other(id)), &mut [0; FRAME_MAX]).to_vec();
+        let to = |system, component| {
+            let mut payload = sent[10..sent.len() - 2].to_vec();
+            payload.resize(33, 0);
+            payload[30..32].copy_from_slice(&[system, component]);
+            let mut frame = [&[0xFD, 33, 0, 0, 0, 255, 190, 76, 0, 0], payload.as_slice()].concat();
+            frame.extend_from_slice(&crc(&frame[1..], 152).to_le_bytes());
+            frame
+        };
+        for (system, component, mine) in [(0, 0, true), (1, 1, true), (1, 0, true), (2, 1, false), (1, 2, false)] {
+            bench.hear_bytes(&to(system, component));
+            let expected = if mine { vec![(id, Answer::Unsupported, STATION)] } else { vec![] };
+            assert_eq!(listen(&mut bench, 1), expected);
+        }
+    }
+}
+
+/// CRC-16/MCRF4XX.
+fn crc(bytes: &[u8], extra: u8) -> u16 {
+    bytes.iter().chain([&extra]).fold(0xFFFF, |crc, byte| {
+        (0..8).fold(crc ^ u16::from(*byte), |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0x8408 } else { crc >> 1 })
+    })
+}
+
+/// In flight a plain request to disarm is refused, with the reason, and a forced one stops the motors.
+#[test]
+fn only_the_forced_one_disarms_in_flight() {
+    let mut bench = Bench::flying();
+    bench.hear(Uplink::Command(Command::Disarm));
+    let (report, said) = bench.tick(&State::default());
+    assert!(report.mode.armed());
+    assert_eq!(answers(&said), [(400, Answer::Refused(Refusal::InFlight as i32), STATION)]);
+    assert_eq!(texts(&said), [Text::from(Refusal::InFlight.reason())]);
+    bench.hear(Uplink::Command(Command::Kill));
+    let (report, said) = bench.tick(&State::default());
+    assert_eq!((report.mode, report.ended), (Mode::Disarmed, Some(End::Killed)));
+    assert_eq!(answers(&said), [(400, Answer::Accepted, STATION)]);
+}
+
+/// Whatever the flight core answers: its number, and its reason in words.
+#[test]
+fn every_refusal_is_told_with_its_reason() {
+    for request in [Request::Arm, Request::Disarm, Request::Engage] {
+        for refusal in Refusal::ALL {
+            let mut bench = Bench::new();
+            let (idle, _) = bench.step();
+            let (command, id) = match request {
+                Request::Engage => (Command::Engage, 31_010),
+                Request::Disarm => (Command::Disarm, 400),
+                _ => (Command::Arm, 400),
+            };
+            bench.hear(Uplink::Command(command));
+            let asked = bench.inbox.take().request().expect("asked");
+            assert_eq!(asked.request, request);
+            let answer = vehicle::Answer { ticket: asked.ticket, request, result: Err(refusal) };
+            let said = bench.said(&Report { answer: Some(answer), ..idle });
+            assert_eq!(answers(&said), [(id, Answer::Refused(refusal as i32), STATION)]);
+            assert_eq!(texts(&said), [Text::from(refusal.reason())]);
+        }
+    }
+    assert!(Refusal::ALL.iter().all(|refusal| *refusal as i32 != BUSY));
+}
+
+/// However many requests wait, there is a place for the one that stops the motors.
+#[test]
+fn a_kill_finds_its_place() {
+    let mut bench = Bench::new();
+    for _ in 0..20 {
+        bench.hear(Uplink::Command(Command::Arm));
+    }
+    let [_, second, third] = STATIONS;
+    bench.hear_from(second, Uplink::Command(Command::Kill));
+    bench.hear_from(third, Uplink::Command(Command::Kill));
+    assert!(bench.inbox.kills());
+    let told = listen(&mut bench, 30);
+    assert_eq!(told.len(), 22);
+    let of = |answer| told.iter().filter(|told| **told == (400, answer, STATION)).count();
+    assert_eq!(of(Answer::Refused(BUSY)), 20 - (REQUESTS_MAX - 1));
+    assert_eq!(of(Answer::Refused(Refusal::Overtaken as i32)) + of(Answer::Refused(Refusal::StateStale as i32)), 7);
+    assert!(told.contains(&(400, Answer::Accepted, second)) && told.contains(&(400, Answer::Accepted, third)));
+}
+
+/// The board leaves out reports if its link is behind: what was asked then is answered with "failed", and the place is free.
+#[test]
+fn requests_whose_tick_went_unreported_fail() {
+    let mut bench = Bench::new();
+    for _ in 0..3 {
+        for _ in 0..REQUESTS_MAX - 1 {
+            bench.hear(Uplink::Command(Command::Disarm));
+        }
+        for _ in 0..REQUESTS_MAX {
+            bench.now_us += 1000;
+            bench.flight.tick(bench.now_us, &bench.inbox.take());
+        }
+        let told = listen(&mut bench, FORGOTTEN_US as usize / 1000 + 10);
+        assert_eq!(told, [(400, Answer::Failed, STATION); REQUESTS_MAX - 1]);
+    }
+    bench.hear(Uplink::Command(Command::Disarm));
+    assert_eq!(listen(&mut bench, 2), [(400, Answer::Accepted, STATION)]);
+}
+
+/// The most that a tick can have to say still fits, and all of it is said: [`Bench::said`] looks.
+#[test]
+fn everything_at_once_fits() {
+    let mut bench = Bench::new();
+    let (idle, _) = bench.tick(&State::default());
+    let answer = vehicle::Answer { ticket: 1, request: Request::Arm, result: Err(Refusal::Unhealthy) };
+    for round in 0..2000 {
+        bench.now_us += 1000;
+        bench.measure(&State::default());
+        for _ in 0..5 {
+            bench.hear(Uplink::Command(Command::Other(u16::MAX)));
+        }
+        bench.hear(Uplink::Command(Command::Arm));
+        let odd = round % 2 == 1;
+        let mode = if odd { Mode::Riding } else { Mode::Disarmed };
+        let ended = odd.then_some(End::StateLost);
+        let mut report = Report { mode, ended, answer: Some(answer), time_us: bench.now_us, ..idle };
+        report.health.setpoint_stale = odd;
+        report.health.control.trip = odd.then_some(Trip::Theta(Axis::Pitch));
+        report.health.rate.clock_failed = odd;
+        report.motors.0.fill(1.234);
+        let said = bench.said(&report);
+        let severe = |message: &&Downlink| {
+            matches!(message, Downlink::Text { severity: MavSeverity::MAV_SEVERITY_EMERGENCY, .. })
+        };
+        assert_eq!(said.iter().filter(severe).count(), usize::from(odd));
+        assert_eq!(texts(&said).len(), if odd { 6 } else { 1 });
+    }
+}

@@ -1,0 +1,92 @@
+//! The firmware without its hardware, and stations that talk to it.
+#![allow(dead_code, unreachable_pub, clippy::expect_used, reason = "shared by tests")]
+
+use airframe::{Setpoint, State};
+use link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
+use onboard::{Comms, Flight, REPORT_MAX, Report};
+use vehicle::Inbox;
+
+pub const STATION: Address = Address { system: 255, component: 190 };
+
+pub struct Bench {
+    pub flight: Flight,
+    pub comms: Comms,
+    pub inbox: Inbox,
+    decoder: Decoder<Downlink>,
+    pub now_us: u64,
+}
+
+impl Bench {
+    pub fn new() -> Self {
+        Bench {
+            flight: Flight::new().expect("valid"),
+            comms: Comms::new(),
+            inbox: Inbox::default(),
+            decoder: Decoder::new(STATION),
+            now_us: 0,
+        }
+    }
+
+    /// Armed, and carried by its rotors for long enough to be in flight.
+    pub fn flying() -> Self {
+        let mut bench = Bench::new();
+        for tick in 0..2000 {
+            if tick == 1100 {
+                bench.hear(Uplink::Command(Command::Arm));
+            }
+            assert_eq!(bench.tick(&State::default()).0.mode.armed(), tick >= 1100);
+        }
+        bench
+    }
+
+    /// `from` says `message`.
+    pub fn hear_from(&mut self, from: Address, message: Uplink) {
+        self.hear_bytes(Sender::new(from).send(&message, &mut [0; FRAME_MAX]));
+    }
+
+    pub fn hear_bytes(&mut self, bytes: &[u8]) {
+        let news = self.comms.receive(bytes);
+        self.inbox.post(&news);
+    }
+
+    pub fn hear(&mut self, message: Uplink) {
+        self.hear_from(STATION, message);
+    }
+
+    /// This state is measured.
+    pub fn measure(&mut self, state: &State) {
+        // No tracker says the same twice.
+        let mut state = *state;
+        state.position_m.z += (self.now_us % 1_000_000) as f32 * 1e-12;
+        self.hear(Uplink::State { sent_us: self.now_us, state });
+    }
+
+    /// A tick with nothing but what was heard; returns its report, and all that is said.
+    pub fn step(&mut self) -> (Report, Vec<Downlink>) {
+        self.now_us += 1000;
+        let report = self.flight.tick(self.now_us, &self.inbox.take());
+        (report, self.said(&report))
+    }
+
+    /// A tick with this state measured in it; returns its report, and what was said of answers and texts.
+    pub fn tick(&mut self, state: &State) -> (Report, Vec<Downlink>) {
+        self.measure(state);
+        self.hear(Uplink::Setpoint(Setpoint::default()));
+        let (report, mut said) = self.step();
+        said.retain(|message| matches!(message, Downlink::Answer { .. } | Downlink::Text { .. }));
+        (report, said)
+    }
+
+    /// What is said after a tick that is reported so. It fits where the firmware puts it, and arrives.
+    pub fn said(&mut self, report: &Report) -> Vec<Downlink> {
+        let (mut messages, mut length, mut frames) = (Vec::new(), 0, 0);
+        let Bench { comms, decoder, .. } = self;
+        comms.report(report, 0, |bytes| {
+            (length, frames) = (length + bytes.len(), frames + 1);
+            decoder.feed(bytes, |_, message| messages.push(message));
+        });
+        assert!(length <= REPORT_MAX, "{length} bytes");
+        assert_eq!(messages.len(), frames);
+        messages
+    }
+}

@@ -1,0 +1,146 @@
+//! Failsafes are told: once, in words, and in the heartbeat for a period at least.
+#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
+
+mod common;
+
+use airframe::{Setpoint, State};
+use common::Bench;
+use link::{Downlink, MavSeverity, Uplink};
+use onboard::Report;
+use proptest::prelude::*;
+use vehicle::{End, Mode};
+
+const WARNING: MavSeverity = MavSeverity::MAV_SEVERITY_WARNING;
+const CRITICAL: MavSeverity = MavSeverity::MAV_SEVERITY_CRITICAL;
+const EMERGENCY: MavSeverity = MavSeverity::MAV_SEVERITY_EMERGENCY;
+
+fn notices(said: &[Downlink]) -> Vec<(MavSeverity, String)> {
+    let notice = |message: &Downlink| match message {
+        Downlink::Text { severity, text } => Some((*severity, text.to_str().expect("words").to_owned())),
+        _ => None,
+    };
+    said.iter().filter_map(notice).collect()
+}
+
+/// What the heartbeat says of failsafes, if there is one.
+fn critical(said: &[Downlink]) -> Option<bool> {
+    let heartbeat = |message: &Downlink| match message {
+        Downlink::Heartbeat { failsafe, .. } => Some(*failsafe),
+        _ => None,
+    };
+    said.iter().find_map(heartbeat)
+}
+
+/// What is told in this many ticks with states and with setpoints, or without; and what the heartbeats say.
+fn fly(bench: &mut Bench, ticks: u32, states: bool, setpoints: bool) -> (Vec<(MavSeverity, String)>, Vec<bool>) {
+    let (mut told, mut heartbeats) = (Vec::new(), Vec::new());
+    for _ in 0..ticks {
+        if states {
+            bench.measure(&State::default());
+        }
+        if setpoints {
+            bench.hear(Uplink::Setpoint(Setpoint::default()));
+        }
+        let (_, said) = bench.step();
+        told.extend(notices(&said));
+        heartbeats.extend(critical(&said));
+    }
+    (told, heartbeats)
+}
+
+#[test]
+fn losing_the_state_is_told_step_by_step() {
+    let mut bench = Bench::flying();
+    let (told, heartbeats) = fly(&mut bench, 5000, false, true);
+    let severities: Vec<_> = told.iter().map(|(severity, _)| *severity).collect();
+    assert_eq!(severities, [WARNING, CRITICAL, EMERGENCY], "{told:?}");
+    for ((_, text), word) in told.iter().zip(["riding", "coming down", "motors stopped"]) {
+        assert!(text.contains(word) && text.contains("state"), "{text}");
+    }
+    // Lost after 2.25 s, and a second more.
+    assert_eq!(heartbeats.iter().filter(|critical| **critical).count(), 3, "{heartbeats:?}");
+    assert_eq!(heartbeats.last(), Some(&false));
+}
+
+/// A gap of 30 ms at any time between two heartbeats.
+#[test]
+fn a_short_gap_shows_in_the_next_heartbeat() {
+    for before in [1, 100, 500, 850, 899, 960, 990] {
+        let mut bench = Bench::flying();
+        assert_eq!(fly(&mut bench, before, true, true).0, []);
+        let (told, mut heartbeats) = fly(&mut bench, 30, false, true);
+        assert!(matches!(told.as_slice(), [(WARNING, text)] if text.contains("riding")), "{told:?}");
+        let (told, after) = fly(&mut bench, 3000, true, true);
+        assert_eq!(told, []);
+        heartbeats.extend(after);
+        let critical = heartbeats.iter().filter(|critical| **critical).count();
+        assert!((1..=2).contains(&critical), "{before} ms after: {heartbeats:?}");
+        assert_eq!(heartbeats.last(), Some(&false));
+    }
+}
+
+#[test]
+fn losing_the_setpoint_is_told_each_time() {
+    let mut bench = Bench::flying();
+    for _ in 0..3 {
+        let (told, _) = fly(&mut bench, 2000, true, false);
+        assert!(matches!(told.as_slice(), [(WARNING, text)] if text.contains("setpoint")), "{told:?}");
+        let (told, heartbeats) = fly(&mut bench, 3000, true, true);
+        assert_eq!(told, []);
+        assert_eq!(heartbeats, [true, false, false]);
+    }
+}
+
+#[test]
+fn a_disarmed_vehicle_needs_neither() {
+    let mut bench = Bench::new();
+    assert_eq!(fly(&mut bench, 5000, false, false), (vec![], vec![false; 5]));
+}
+
+fn modes() -> impl Strategy<Value = (Mode, usize)> {
+    let mode = prop_oneof![Just(Mode::Disarmed), Just(Mode::Flying), Just(Mode::Riding), Just(Mode::Descending)];
+    (mode, prop_oneof![1..5usize, 1..1500usize])
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Whatever the modes, and for however long: each time one is entered it is told once; a heartbeat is critical if
+    /// there was a failsafe since the last one, and not if there was none for a second.
+    #[test]
+    fn each_time_once(modes in prop::collection::vec(modes(), 1..12), tumbles: bool) {
+        let mut bench = Bench::new();
+        let (idle, _) = bench.step();
+        let (mut last, mut since, mut since_heartbeat) = (Mode::Disarmed, usize::MAX, false);
+        for (mode, ticks) in modes {
+            for tick in 0..ticks {
+                bench.now_us += 1000;
+                let given_up = last.armed() && !mode.armed();
+                let end = if tumbles { End::Tumbled } else { End::StateLost };
+                let mut report = Report { mode, ended: given_up.then_some(end), time_us: bench.now_us, ..idle };
+                report.health.setpoint_stale = false;
+                let said = bench.said(&report);
+
+                let entered = tick == 0 && mode != last;
+                let severities: Vec<_> = notices(&said).into_iter().map(|(severity, _)| severity).collect();
+                let expected = match mode {
+                    Mode::Riding if entered => vec![WARNING],
+                    Mode::Descending if entered => vec![CRITICAL],
+                    Mode::Disarmed if given_up => vec![EMERGENCY],
+                    _ => vec![],
+                };
+                prop_assert_eq!(severities, expected);
+
+                let failsafe = matches!(mode, Mode::Riding | Mode::Descending) || given_up;
+                since = if failsafe { 0 } else { since.saturating_add(1) };
+                since_heartbeat |= failsafe;
+                if let Some(critical) = critical(&said) {
+                    prop_assert!(critical || !since_heartbeat);
+                    prop_assert!(!critical || since < 1000);
+                    since_heartbeat = false;
+                }
+                last = mode;
+            }
+        }
+    }
+}
