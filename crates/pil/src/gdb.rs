@@ -10,6 +10,8 @@ use std::time::{Duration, Instant};
 pub const SP: u32 = 13;
 /// Number of the program status register; its lowest 9 bits are the exception that runs.
 pub const XPSR: u32 = 25;
+/// Number of the link register.
+const LR: u32 = 14;
 /// Number of the program counter.
 pub const PC: u32 = 15;
 
@@ -147,7 +149,7 @@ impl Gdb {
         address.map(Some).ok_or(Error::Protocol(stop))
     }
 
-    /// Runs a halted processor until it comes to the instruction at `address`.
+    /// Runs a halted processor until it comes to the instruction at `address`, from any other.
     ///
     /// # Errors
     /// If it does not within `patience`.
@@ -159,6 +161,37 @@ impl Gdb {
         self.stream.get_ref().set_read_timeout(Some(ANSWER_TIMEOUT))?;
         stop?;
         self.order(&format!("z1,{address:x},2"))
+    }
+
+    /// Instructions that a halted processor takes until the exception that it is in has ended; it takes no other meanwhile.
+    ///
+    /// # Errors
+    /// If the stub refuses, or there is no end.
+    pub fn count_exception(&mut self) -> Result<u32, Error> {
+        let exception = |gdb: &mut Self| Ok::<_, Error>(gdb.register(XPSR)? & 0x1FF);
+        let this = exception(self)?;
+        self.count_while(|gdb| Ok(exception(gdb)? == this))
+    }
+
+    /// Instructions that a halted processor takes until the function that it has just entered returns.
+    ///
+    /// # Errors
+    /// If the stub refuses, or there is no end.
+    pub fn count_function(&mut self) -> Result<u32, Error> {
+        let back = self.register(LR)? & !1;
+        self.count_while(|gdb| Ok(gdb.register(PC)? != back))
+    }
+
+    fn count_while(&mut self, mut within: impl FnMut(&mut Self) -> Result<bool, Error>) -> Result<u32, Error> {
+        /// Far more than anything takes that is counted so.
+        const STEPS_MAX: u32 = 100_000;
+        for steps in 1..STEPS_MAX {
+            self.step()?;
+            if !within(self)? {
+                return Ok(steps);
+            }
+        }
+        Err(Error::Protocol(format!("no end after {STEPS_MAX} instructions")))
     }
 
     /// Halts a processor that runs.

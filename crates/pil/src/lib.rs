@@ -22,6 +22,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod beside;
 mod board;
 pub mod budget;
 pub mod clock_tree;
@@ -31,6 +32,7 @@ pub mod exercise;
 pub mod gdb;
 mod image;
 mod qemu;
+pub mod worst;
 
 pub use board::Board;
 pub use emulator::{Emulator, Reply};

@@ -64,12 +64,29 @@ impl Timing {
         self.period
     }
 
+    /// What the timer plays for four motors at once: a row for each bit, a column for each motor, each column a
+    /// [waveform](Self::waveform).
+    pub fn rows(&self, throttles: [u16; 4], rows: &mut [[u16; 4]; 17]) {
+        let mut frames = throttles.map(|throttle| Frame::new(throttle).bits());
+        let [bits @ .., last] = rows;
+        for row in bits {
+            *row = frames.map(|bits| self.pulse(bits & 0x8000 != 0));
+            frames = frames.map(|bits| bits << 1);
+        }
+        *last = [0; 4];
+    }
+
+    /// Length of a pulse.
+    const fn pulse(&self, one: bool) -> u16 {
+        if one { self.one } else { self.zero }
+    }
+
     /// What the timer plays for `frame`.
     pub fn waveform(&self, frame: Frame) -> Waveform {
         let mut bits = frame.bits();
         let mut waveform = [0; 17];
         for pulse in waveform.iter_mut().take(16) {
-            *pulse = if bits & 0x8000 != 0 { self.one } else { self.zero };
+            *pulse = self.pulse(bits & 0x8000 != 0);
             bits <<= 1;
         }
         waveform

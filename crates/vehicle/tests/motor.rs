@@ -136,4 +136,17 @@ proptest! {
         prop_assert_eq!(bits >> 5, throttle);
         prop_assert_eq!((bits ^ bits >> 4 ^ bits >> 8 ^ bits >> 12) & 0xF, 0);
     }
+
+    /// The four columns of a burst are the motors' waveforms, whatever the rows held before.
+    #[test]
+    fn rows_are_waveforms_side_by_side(throttles in any::<[u16; 4]>(), before in any::<u16>()) {
+        let timing = Timing::new(168_000_000).expect("valid");
+        let mut rows = [[before; 4]; 17];
+        timing.rows(throttles, &mut rows);
+        let waveforms = throttles.map(|throttle| timing.waveform(Frame::new(throttle)));
+        for (column, waveform) in waveforms.iter().enumerate() {
+            let played = rows.map(|row| row.get(column).copied().unwrap_or_default());
+            prop_assert_eq!(&played, waveform);
+        }
+    }
 }

@@ -24,7 +24,7 @@ use embassy_sync::signal::Signal;
 use embassy_time::{Instant, with_deadline};
 use embedded_io_async::{BufRead, Write};
 use static_cell::StaticCell;
-use vehicle::dshot::{BIT_RATE_HZ, Frame, Timing};
+use vehicle::dshot::{BIT_RATE_HZ, Timing};
 
 /// Bits per second of the link.
 const BAUD: u32 = 921_600;
@@ -128,10 +128,7 @@ impl Motors {
 /// Out of line, as the control tick is, to be counted.
 #[inline(never)]
 fn encode(timing: &Timing, throttles: [u16; 4], rows: &mut Rows) {
-    let waveforms = throttles.map(|throttle| timing.waveform(Frame::new(throttle)));
-    for (bit, row) in rows.0.iter_mut().enumerate() {
-        *row = waveforms.map(|waveform| waveform.get(bit).copied().unwrap_or(0));
-    }
+    timing.rows(throttles, &mut rows.0);
 }
 
 /// Newest throttles, for the motors' task.

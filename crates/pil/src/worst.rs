@@ -1,0 +1,143 @@
+//! A search for the control tick that takes the most instructions: random plausible states first, then a climb from the
+//! worst of them.
+//!
+//! A tick's cost depends on what the law remembers, too, so this is one long flight: every candidate is flown for a few
+//! ticks, from wherever the ones before it have left the estimates. It finds a bad tick, and does not prove that there is no
+//! worse one.
+
+use crate::exercise::Station;
+use crate::{Emulator, Error};
+use airframe::{Setpoint, State};
+use link::{Command, Uplink};
+use nalgebra::Vector3;
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+
+/// Ticks for which a candidate is flown, and then its mirror image: a tracker whose pose stands while its twist says that
+/// it moves is not believed for long.
+const HOLD: u64 = 8;
+/// Ticks at rest before a vehicle is armed.
+const REST: u64 = 1_050;
+/// How many numbers make a candidate.
+const NUMBERS: usize = 19;
+/// Largest of each: position \[m\], velocity \[m/s\], attitude \[rad\], rates \[rad/s\]; of the setpoint position \[m\],
+/// velocity \[m/s\], yaw \[rad\].
+const SCALES: [f32; NUMBERS] =
+    [2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 0.6, 0.6, 3.0, 5.0, 5.0, 5.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 3.0];
+
+/// The worst tick that was found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Worst {
+    /// What it took.
+    pub instructions: u32,
+    /// Candidates flown until then.
+    pub candidate: u64,
+    /// All of them.
+    pub candidates: u64,
+    /// Ticks flown with the motors on.
+    pub ticks: u64,
+}
+
+/// Flies `candidates`; the same ones for the same `seed`.
+///
+/// # Errors
+/// If the emulator fails, or the vehicle does not arm.
+pub fn search(emulator: Emulator, seed: u64, candidates: u64) -> Result<Worst, Error> {
+    let mut flight = Flight { emulator, station: Station::default(), tick: 0, random: SplitMix64::seed_from_u64(seed) };
+    let mut worst = Worst { candidates, ..Worst::default() };
+    let (mut summit, mut height) = ([0.0; NUMBERS], 0);
+    for candidate in 0..candidates {
+        // The first half is random; the other climbs.
+        let numbers = if candidate < candidates / 2 { flight.anywhere() } else { flight.near(&summit) };
+        let mut instructions = 0;
+        for tick in 0..2 * HOLD {
+            // The monitor trips all the time.
+            if tick == 0 {
+                flight.station.say(Uplink::Command(Command::Engage));
+            }
+            let (state, setpoint) = flight.inputs(&numbers, tick >= HOLD);
+            match flight.fly(state, setpoint)? {
+                Some(this) => {
+                    worst.ticks += 1;
+                    instructions = instructions.max(this);
+                }
+                None => flight.arm()?,
+            }
+        }
+        if instructions >= height {
+            (summit, height) = (numbers, instructions);
+        }
+        if instructions > worst.instructions {
+            (worst.instructions, worst.candidate) = (instructions, candidate);
+        }
+    }
+    Ok(worst)
+}
+
+struct Flight {
+    emulator: Emulator,
+    station: Station,
+    tick: u64,
+    random: SplitMix64,
+}
+
+impl Flight {
+    /// A number in -1..1.
+    fn number(&mut self) -> f32 {
+        (self.random.next_u64() >> 40) as f32 / (1 << 23) as f32 - 1.0
+    }
+
+    fn anywhere(&mut self) -> [f32; NUMBERS] {
+        // Some far out, some near hover.
+        let reach = (self.number() + 1.0) / 2.0;
+        [0.0; NUMBERS].map(|_| reach * self.number())
+    }
+
+    /// Another one near `numbers`.
+    fn near(&mut self, numbers: &[f32; NUMBERS]) -> [f32; NUMBERS] {
+        numbers.map(|number| match self.random.next_u64() % 8 {
+            0 => self.number(),
+            1..=3 => (number + 0.1 * self.number()).clamp(-1.0, 1.0),
+            _ => number,
+        })
+    }
+
+    fn inputs(&mut self, numbers: &[f32; NUMBERS], mirrored: bool) -> (State, Setpoint) {
+        let sign = if mirrored { -1.0 } else { 1.0 };
+        // Never the same twice, as measurements are.
+        let noise = 1e-5 * self.number();
+        let mut scaled = numbers.iter().zip(SCALES).map(|(number, scale)| number * scale);
+        let mut next = || scaled.next().unwrap_or(0.0);
+        let mut vector = || Vector3::new(next(), next(), next());
+        let state = State {
+            position_m: vector().add_scalar(noise),
+            velocity_m_s: sign * vector(),
+            attitude_rad: vector(),
+            rates_rad_s: sign * vector(),
+        };
+        let (position_m, velocity_m_s) = (vector(), vector());
+        (state, Setpoint { position_m, velocity_m_s, yaw_rad: next(), ..Setpoint::default() })
+    }
+
+    /// One tick; what it took, if the motors were on.
+    fn fly(&mut self, state: State, setpoint: Setpoint) -> Result<Option<u32>, Error> {
+        self.tick += 1;
+        self.station.say(Uplink::State { sent_us: self.tick * 1000, state });
+        self.station.say(Uplink::Setpoint(setpoint));
+        let reply = self.emulator.exchange(&self.station.take())?;
+        Ok((reply.throttles != [0; 4]).then_some(reply.instructions))
+    }
+
+    /// Puts it on the ground and arms it.
+    fn arm(&mut self) -> Result<(), Error> {
+        for tick in 0..3 * REST {
+            if tick >= REST && tick.is_multiple_of(10) {
+                self.station.say(Uplink::Command(Command::Arm));
+            }
+            if self.fly(State::default(), Setpoint::default())?.is_some() {
+                return Ok(());
+            }
+        }
+        Err(Error::Protocol("the vehicle does not arm".into()))
+    }
+}
