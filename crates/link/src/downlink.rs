@@ -117,6 +117,21 @@ pub struct Health {
     pub link: Counters,
     /// Commands since power-up that got no answer: more came at once than could be answered.
     pub unanswered: u32,
+    /// States that were not flown on.
+    pub states_refused: StatesRefused,
+}
+
+/// States since power-up that were not flown on, by reason.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StatesRefused {
+    /// A later one had overtaken it, or it came twice.
+    pub overtaken: u32,
+    /// It was too old when it came.
+    pub late: u32,
+    /// Another sender is in use.
+    pub elsewhere: u32,
+    /// It repeated the last one in flight, or came from a tracker that is not believed any more.
+    pub frozen: u32,
 }
 
 impl Downlink {
@@ -315,6 +330,12 @@ fn read_health(data: &DEBUG_FLOAT_ARRAY_DATA, extension: [u8; 4 * HEALTH_ELEMENT
         delta: PerAxis::from_fn(|_| next()),
         link: Counters::from_array(core::array::from_fn(|_| next() as u32)),
         unanswered: next() as u32,
+        states_refused: StatesRefused {
+            overtaken: next() as u32,
+            late: next() as u32,
+            elsewhere: next() as u32,
+            frozen: next() as u32,
+        },
     }))
 }
 
@@ -324,9 +345,8 @@ impl Health {
         let Health { tick_us, tick_max_us, rate_hz, late_ticks, saturated_ticks, state_age_us, .. } = *self;
         let ticks = [tick_us, tick_max_us, rate_hz, late_ticks as f32, saturated_ticks as f32, state_age_us];
         let estimates = [self.theta_norm, self.delta].map(|estimate| Axis::ALL.map(|axis| *estimate.get(axis)));
-        ticks
-            .into_iter()
-            .chain(estimates.into_iter().flatten())
-            .chain(self.link.to_array().into_iter().chain([self.unanswered]).map(|count| count as f32))
+        let StatesRefused { overtaken, late, elsewhere, frozen } = self.states_refused;
+        let counts = self.link.to_array().into_iter().chain([self.unanswered, overtaken, late, elsewhere, frozen]);
+        ticks.into_iter().chain(estimates.into_iter().flatten()).chain(counts.map(|count| count as f32))
     }
 }

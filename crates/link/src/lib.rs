@@ -36,7 +36,7 @@ mod message;
 mod uplink;
 
 pub use decoder::{Counters, Decoder};
-pub use downlink::{Answer, Downlink, Health, Text};
+pub use downlink::{Answer, Downlink, Health, StatesRefused, Text};
 pub use framing::{Address, FRAME_MAX, Sender};
 pub use mavlink::dialects::common::{MavCmd, MavSeverity};
 pub use message::{Fault, Format, Message};

@@ -10,7 +10,7 @@
 use airframe::{Axis, PerAxis, RotorSpeeds, Setpoint, State};
 use link::{
     Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, Health, MavCmd, MavSeverity, Message, Sender,
-    Uplink,
+    StatesRefused, Uplink,
 };
 use mavlink::dialects::common::{
     ATTITUDE_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, HIL_ACTUATOR_CONTROLS_DATA, MavFrame, ODOMETRY_DATA,
@@ -154,6 +154,12 @@ fn health_is_an_array_of_29_floats() {
             lost: next() as u32,
         },
         unanswered: next() as u32,
+        states_refused: StatesRefused {
+            overtaken: next() as u32,
+            late: next() as u32,
+            elsewhere: next() as u32,
+            frozen: next() as u32,
+        },
     };
     let frame = bytes(&Downlink::Health(health));
     assert_eq!(frame[10..18], 7u64.to_le_bytes());

@@ -5,8 +5,9 @@ use crate::failsafes::Failsafes;
 use crate::flight::Report;
 use afbc::monitor::{Norm, Trip};
 use airframe::{PerAxis, State};
-use link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, Sender, Text, Uplink};
+use link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, Sender, StatesRefused, Text, Uplink};
 use vehicle::rate;
+use vehicle::tracker::Refused;
 use vehicle::{Inbox, Mode, Stamped, Tracker};
 
 /// The vehicle on the link: system 1, component 1 (autopilot).
@@ -178,6 +179,7 @@ impl Comms {
         if HEALTH.is_due(self.tick) {
             let Report { health, .. } = report;
             let norm = |norm: &Norm| libm::sqrtf(norm.theta_squared);
+            let Refused { overtaken, late, elsewhere } = *self.tracker.refused();
             say(Downlink::Health(link::Health {
                 time_us: report.time_us,
                 tick_us,
@@ -190,6 +192,7 @@ impl Comms {
                 delta: PerAxis::from_fn(|axis| self.norms.get(axis).delta),
                 link: *self.decoder.counters(),
                 unanswered: self.answers.unanswered(),
+                states_refused: StatesRefused { overtaken, late, elsewhere, frozen: health.frozen_states },
             }));
         }
     }

@@ -29,7 +29,7 @@ impl Image {
     /// [`Error::NoImage`] if there is none.
     pub fn find(self) -> Result<PathBuf, Error> {
         let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
-        let path = target.join(TARGET).join("release").join(self.name());
+        let path = target.join(TARGET).join("firmware").join(self.name());
         if path.is_file() { Ok(path) } else { Err(Error::NoImage(path)) }
     }
 

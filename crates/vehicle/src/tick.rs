@@ -210,7 +210,8 @@ impl<C: FlightController> Vehicle<C> {
                     // Taking over and a step would be too much, too: the rotors stay as they are.
                     _ if engaged => self.allocated(flight.applied),
                     Some(state) => {
-                        let state = &flight.reckoning.between(state);
+                        let between = (!measured).then(|| flight.reckoning.between(state));
+                        let state = between.as_ref().unwrap_or(state);
                         let target = flight.guide.target(mode, state, setpoint, self.dt_s);
                         // The inbox let plausible ones pass only.
                         let command = self.controller.decide(&mut flight.control, state, target, true);

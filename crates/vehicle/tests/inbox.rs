@@ -12,7 +12,7 @@ fn asked(request: Request, ticket: usize) -> Asked {
 /// One a tick, in their order, whether asked at once or posted as news.
 #[test]
 fn requests_wait_for_their_turn() {
-    let all = [Request::Arm, Request::Disarm, Request::Engage, Request::Arm, Request::Kill];
+    let all = [Request::Arm, Request::Disarm, Request::Engage, Request::Kill];
     let (mut inbox, mut news) = (Inbox::default(), Inbox::default());
     for (ticket, request) in all.into_iter().enumerate() {
         let to = if ticket < 2 { &mut inbox } else { &mut news };
