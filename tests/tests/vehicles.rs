@@ -71,16 +71,22 @@ fn five_laws_hover_vehicles_from_50_g_to_3_kg() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Refused by name, or flown: nothing in between.
     #[test]
     fn what_is_not_refused_hovers(
         mass_kg in 0.05..3.5_f64, arm_m in 0.05..0.4_f64, spread in 0.05..0.4_f64, margin in 0.8..3.0_f64,
     ) {
-        match hovers(ControllerKind::Afbc, vehicle(mass_kg, arm_m, spread), margin) {
-            Ok(distance_m) => prop_assert!(margin >= 1.299 && distance_m < 0.03, "{distance_m} m"),
-            Err(error) => prop_assert!(margin < 1.301 && error.contains("rotor_force_max_n"), "{error}"),
+        let vehicle = vehicle(mass_kg, arm_m, spread);
+        let hover_n = mass_kg * 9.81 / 4.0;
+        let authority = 2.0 * hover_n * (margin - 1.0).min(1.0) * arm_m / vehicle.inertia_kg_m2.x;
+        match hovers(ControllerKind::Afbc, vehicle, margin) {
+            Ok(distance_m) => prop_assert!(margin > 1.299 && authority > 79.9 && distance_m < 0.03, "{distance_m} m"),
+            Err(error) if error.contains("rotor_force_max_n") => prop_assert!(margin < 1.301, "{error}"),
+            Err(error) if error.contains("hover_authority_rad_s2") => prop_assert!(authority < 80.1, "{error}"),
+            // Of the heaviest, yaw would have to learn faster than any gain may be.
+            Err(error) => prop_assert!(error.contains("gamma") && vehicle.inertia_kg_m2.z > 0.1, "{error}"),
         }
     }
 }
@@ -89,7 +95,7 @@ proptest! {
 #[test]
 fn a_perfect_hover_does_not_trip() {
     use afbc::FlightController;
-    for mass_kg in [0.2, 0.486, 0.8, 0.97, 1.3, 2.0, 3.5] {
+    for mass_kg in [0.3, 0.486, 0.8, 0.97, 1.3, 2.0, 3.5] {
         let vehicle = Parameters { mass_kg, ..Parameters::PAPER.to_f32() };
         let settings = Settings { rotor_force_max_n: mass_kg * 6.0, ..Profile::Flight.settings() };
         let gains = Profile::Flight.gains_for(&vehicle);

@@ -7,6 +7,8 @@ use crate::backstepping::Errors;
 use crate::cascade::{Cascade, Command, Controller, Settings};
 use crate::flight_controller::FlightController;
 use crate::integral::{Integral, IntegralBackstepping};
+use crate::math;
+use crate::model::Model;
 use crate::monitor::{Bounds, Figures, Monitor, Trip};
 use crate::safeguards::THETA_MAX;
 use airframe::{Axis, OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
@@ -15,6 +17,10 @@ use nalgebra::Vector3;
 /// Least Theta_max of z, in weights: nine rules that hold the weight make |Theta_hat| = 3 weights, and rotors that give 60 %
 /// of their thrust make that 5.
 pub const HOVER_THETA: f32 = 5.0;
+
+/// Accepted angular acceleration about body x and about y that the rotors give around hover: the gains of the profile
+/// `flight` want half of what the paper's vehicle has, and hold no vehicle below 60 rad/s2 (`tests/tests/vehicles.rs`).
+pub const HOVER_AUTHORITY: Range = Range::new("hover_authority_rad_s2", 80.0, 1e9);
 
 /// AFBC with a monitor and a law to fall back on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,8 +90,8 @@ impl Guarded {
     ///
     /// # Errors
     /// The first parameter, setting, gain or bound out of range; among them `rotor_force_max_n`, if the rotors do not lift
-    /// the vehicle [with a margin](crate::allocation::HOVER_MARGIN), and `theta_max` of z, if |Theta_hat| has no room for
-    /// [`HOVER_THETA`] weights.
+    /// the vehicle [with a margin](crate::allocation::HOVER_MARGIN), `theta_max` of z, if |Theta_hat| has no room for
+    /// [`HOVER_THETA`] weights, and [`HOVER_AUTHORITY`], if they turn it too slowly.
     pub fn new(
         vehicle: Parameters,
         settings: Settings,
@@ -96,6 +102,11 @@ impl Guarded {
         Mixer::new(&vehicle, settings.rotor_force_max_n)?.check_hover(weight_n)?;
         let hover = Range { min: libm::ceil(f64::from(HOVER_THETA * weight_n) * 1e4) / 1e4, ..THETA_MAX };
         hover.check(gains.z.safeguards.theta_max)?;
+        // Two rotors at work, one up, one down, by what both have room for.
+        let (hover_n, model) = (0.25 * weight_n, Model::new(&vehicle));
+        let swing_n = 2.0 * math::min(hover_n, settings.rotor_force_max_n - hover_n);
+        HOVER_AUTHORITY.check(swing_n * model.hover_gain(Axis::Roll))?;
+        HOVER_AUTHORITY.check(swing_n * model.hover_gain(Axis::Pitch))?;
         let fixed = PerAxis::from_fn(|axis| gains.get(axis).into());
         Ok(Guarded {
             adaptive: Controller::new(vehicle, settings, Adaptive::new(gains)?)?,

@@ -62,7 +62,7 @@ impl Beside {
     }
 
     /// The link's share of a control period on a line that never pauses, in both directions at once: interrupts for every
-    /// byte, wakes for every [`BYTES_PER_WAKE`] and one for the tick.
+    /// byte, wakes for every 32 bytes and one for the tick.
     pub fn link_per_period(&self) -> u32 {
         let wakes = BYTES_PER_PERIOD / BYTES_PER_WAKE + 1.0;
         (2.0 * BYTES_PER_PERIOD * f64::from(self.byte) + wakes * f64::from(self.wake)) as u32
