@@ -101,6 +101,26 @@ fn attitudes() -> impl Strategy<Value = Quaternion<f32>> {
     prop_oneof![any, near_gimbal]
 }
 
+/// Most that a velocity is changed by being turned into the body frame and back \[m/s\]. A turn v + 2w(q x v) + 2q x (q x v)
+/// rounds some ten times, each time by half of EPSILON of no more than the speed, and twice as much comes from |q|, which is
+/// 1 to two roundings and counts squared: 8 EPSILON of the speed a turn.
+fn rotated_twice(state: &State) -> f32 {
+    16.0 * f32::EPSILON * state.velocity_m_s.norm()
+}
+
+/// Found by the property below when its bound was a number.
+#[test]
+fn a_fast_state_crosses() {
+    let state = State {
+        velocity_m_s: Vector3::new(-18.270386, -17.043652, 18.831186),
+        attitude_rad: Vector3::new(-0.48733982, -0.8878281, -2.867579),
+        ..State::default()
+    };
+    let crossed = Odometry::from_state(&state).to_state().expect("plausible");
+    let error = (crossed.velocity_m_s - state.velocity_m_s).amax();
+    assert!(error > 2e-5 && error <= rotated_twice(&state), "{error}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
@@ -138,7 +158,7 @@ proptest! {
         let crossed = Odometry::from_state(&state).to_state().expect("plausible");
         prop_assert_eq!(crossed.position_m, state.position_m);
         prop_assert_eq!(crossed.rates_rad_s, state.rates_rad_s);
-        prop_assert!((crossed.velocity_m_s - state.velocity_m_s).amax() < 2e-5);
+        prop_assert!((crossed.velocity_m_s - state.velocity_m_s).amax() <= rotated_twice(&state));
         prop_assert!((r_earth_body(&crossed.attitude_rad) - r_earth_body(&state.attitude_rad)).amax() < 2e-6);
     }
 
