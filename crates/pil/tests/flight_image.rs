@@ -166,6 +166,34 @@ fn a_panic_of_the_link_does_not_stop_the_tick() {
     }
 }
 
+/// USART1's interrupt.
+const USART1: u32 = 16 + 37;
+
+/// On a line that never pauses, to wake the link's task for every byte would take most of the processor's time.
+#[test]
+fn few_bytes_do_not_wake_the_link() {
+    let Some((mut board, linked)) = start_or_skip(Image::Flight, |elf| Ok((Board::boot(&elf)?, Linked::read(&elf)?)))
+    else {
+        return;
+    };
+    let wake = linked.function_named("embassy_executor::raw::waker::wake").unwrap();
+    // Tasks are woken by ticks all the time; how many of the next 200 times by so many bytes?
+    let mut woken_by = |bytes: usize| {
+        board.send(&vec![0; bytes]).unwrap();
+        let gdb = board.halt().unwrap();
+        let by_usart = (0..200).filter(|_| {
+            gdb.step().unwrap(); // off the breakpoint
+            gdb.run_to(wake, PATIENCE).unwrap();
+            gdb.register(XPSR).unwrap() & 0x1FF == USART1
+        });
+        let by_usart = by_usart.count();
+        gdb.resume().unwrap();
+        by_usart
+    };
+    assert_eq!(woken_by(31), 0, "READ_MIN is 32");
+    assert!(woken_by(128) > 0);
+}
+
 #[test]
 fn it_has_a_log() {
     let Some((mut board, linked)) = start_or_skip(Image::Flight, |elf| Ok((Board::boot(&elf)?, Linked::read(&elf)?)))
