@@ -125,8 +125,9 @@ impl Linked {
             let name = format!("{:#}", rustc_demangle::demangle(symbol.name().unwrap_or_default()));
             functions.entry(start).or_insert_with(|| Function::decode(name, start, code, is_code));
         }
-        let symbols =
-            file.symbols().filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address() as u32)));
+        let symbols = file.symbols().filter_map(|symbol| {
+            Some((format!("{:#}", rustc_demangle::demangle(symbol.name().ok()?)), symbol.address() as u32))
+        });
         let log = file.section_by_name(".defmt").map(|section| section.index());
         let log = file.symbols().filter(|symbol| symbol.section_index().is_some_and(|index| Some(index) == log));
         let log = log.filter_map(|symbol| Some(symbol.name().ok()?.to_owned())).collect();
@@ -201,7 +202,7 @@ impl Linked {
         self.find(name)
     }
 
-    /// The address of a symbol, by the name that the linker knows.
+    /// The address of a symbol, by its name in the source: `firmware::board::start::RX`.
     pub fn symbol(&self, name: &str) -> Option<u32> {
         self.symbols.get(name).copied()
     }
