@@ -52,6 +52,15 @@ impl Frame {
     }
 }
 
+/// True if there is a frame in `stream`, with the right checksum, that nobody sent: one that reaches across one of the
+/// `joints` between what was sent. Of 65,536 sums of 16 bits one is right by chance.
+pub fn any_by_chance(stream: &[u8], joints: &[usize], seed: impl Fn(u32) -> Option<u8>) -> bool {
+    (0..stream.len()).filter(|&at| stream[at] == 0xFD).any(|at| {
+        let end = Frame::end(stream, at).unwrap_or(at);
+        joints.iter().any(|&joint| at < joint && joint < end) && Frame::read(stream, at, &seed).is_some()
+    })
+}
+
 /// All frames of `stream` with the right checksum that do not lie within another frame. `seed` is a message's
 /// `CRC_EXTRA`, if it is known.
 pub fn frames(stream: &[u8], seed: impl Fn(u32) -> Option<u8>) -> Vec<Frame> {
