@@ -2,11 +2,11 @@
 
 use crate::board::{Receiver, Transmitter};
 use crate::control::{self, Tick};
+use afbc_onboard::{Comms, REPORT_MAX};
 use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_executor::SendSpawner;
 use embassy_futures::select::{Either, select};
 use heapless::Vec;
-use onboard::{Comms, REPORT_MAX};
 
 /// Most bytes read at once.
 const READ_MAX: usize = 128;

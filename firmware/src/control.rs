@@ -2,6 +2,8 @@
 
 use crate::board::{self, Outputs};
 use crate::time::{self, Stopwatch};
+use afbc_flight_core::Inbox;
+use afbc_onboard::{Flight, Report};
 use core::cell::RefCell;
 use core::future::poll_fn;
 use core::pin::pin;
@@ -13,8 +15,6 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Instant, Timer};
 use heapless::Deque;
-use onboard::{Flight, Report};
-use vehicle::Inbox;
 
 /// Newest inputs, written by [`crate::comms`].
 static INBOX: Mutex<CriticalSectionRawMutex, RefCell<Inbox>> = Mutex::new(RefCell::new(Inbox::EMPTY));
@@ -85,7 +85,7 @@ async fn task(mut flight: Flight, mut outputs: Outputs) {
     }
 }
 
-/// The top loop: take the newest inputs; supervise, control and gate the motors ([`vehicle::tick`]); drive them; check
+/// The top loop: take the newest inputs; supervise, control and gate the motors ([`afbc_flight_core::tick`]); drive them; check
 /// the rate. Out of line, so that its stack and its instructions can be counted (`docs/budgets.md`).
 #[inline(never)]
 fn tick(flight: &mut Flight, outputs: &mut Outputs) -> Report {

@@ -1,4 +1,4 @@
-//! AFBC on an STM32F405RG at 168 MHz: a thin shell around [`vehicle`] and [`link`], which decide everything.
+//! AFBC on an STM32F405RG at 168 MHz: a thin shell around [`afbc_flight_core`] and [`afbc_link`], which decide everything.
 //!
 //! # Two images, one code
 //!

@@ -8,7 +8,7 @@
 mod reference;
 
 use libfuzzer_sys::fuzz_target;
-use link::{Address, Counters, Decoder, Downlink, FRAME_MAX, Message, Sender, Uplink};
+use afbc_link::{Address, Counters, Decoder, Downlink, FRAME_MAX, Message, Sender, Uplink};
 use mavlink::Message as _;
 use mavlink::dialects::common::MavMessage;
 

@@ -6,11 +6,11 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a scenario that cannot be flown must stop the bench
 
 use afbc::{FlightController, Memory, Profile};
-use airframe::{PerAxis, RotorSpeeds, Setpoint, State};
+use afbc_plant::{Drag, Model, Plant, Realism, Rotors, Sensing, Spread, Turbulence, Wind};
+use afbc_types::{PerAxis, RotorSpeeds, Setpoint, State};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use nalgebra::Vector3;
-use plant::{Drag, Model, Plant, Realism, Rotors, Sensing, Spread, Turbulence, Wind};
 use sitl::contender::{Build, Contender};
 use sitl::flight::{Flight, fly};
 use sitl::paper::{Case, scenario};

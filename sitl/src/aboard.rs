@@ -1,10 +1,10 @@
 //! Any controller inside the flight core: what a board does around its law, without the board and its link.
 
 use afbc::{Command, FlightController, Settings, adaptive};
-use airframe::{OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
-use vehicle::rate::{PERIOD_US, WINDOW_US};
-use vehicle::supervisor::TILT_MAX;
-use vehicle::{ArmingLimits, Asked, Inbox, Request, Stamped, Vehicle};
+use afbc_flight_core::rate::{PERIOD_US, WINDOW_US};
+use afbc_flight_core::supervisor::TILT_MAX;
+use afbc_flight_core::{ArmingLimits, Asked, Inbox, Request, Stamped, Vehicle};
+use afbc_types::{OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
 
 /// Accepted roll and pitch of a vehicle that is to be armed \[rad\].
 pub const ARMING_TILT: Range = Range::new("attitude_rad", -TILT_MAX.max, TILT_MAX.max);
@@ -18,7 +18,7 @@ pub struct Aboard<C>(Vehicle<C>);
 /// What the flight core remembers, and its clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Memory<M> {
-    vehicle: vehicle::Memory<M>,
+    vehicle: afbc_flight_core::Memory<M>,
     inbox: Inbox,
     /// Time since power-up \[us\].
     now_us: u64,

@@ -7,7 +7,7 @@ use crate::output::Flown;
 use crate::run::Run;
 use crate::scenario::{Contender, Scenario};
 use afbc::Profile;
-use airframe::OutOfRange;
+use afbc_types::OutOfRange;
 use rayon::prelude::*;
 
 /// Those who fly if nobody else is named: every law as it is meant to fly, and AFBC as printed.

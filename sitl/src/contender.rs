@@ -3,8 +3,8 @@
 use afbc::allocation::Mixer;
 use afbc::monitor::Bounds;
 use afbc::{Adaptive, Backstepping, Controller, FlightController, Guarded, Profile, Settings, adaptive, backstepping};
-use airframe::{OutOfRange, Parameters, PerAxis, Range};
-use peers::{Geometric, Indi, Pid, geometric, indi, pid};
+use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
+use afbc_types::{OutOfRange, Parameters, PerAxis, Range};
 
 /// A kind of control law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,10 +5,10 @@ use crate::contender::{Build, Contender, Law, Monitored, step_s};
 use crate::scenario::{Outage, Scenario};
 use crate::trajectory::{Reference, Trajectory};
 use afbc::{Command, FlightController, Memory, Settings, adaptive};
-use airframe::{OutOfRange, PerAxis, State};
+use afbc_plant::{Measurement, Motion, Plant, Sensors, Telemetry};
+use afbc_types::{OutOfRange, PerAxis, State};
 use core::f64::consts::FRAC_PI_2;
 use nalgebra::Vector3;
-use plant::{Measurement, Motion, Plant, Sensors, Telemetry};
 
 /// Distance from the reference beyond which a vehicle counts as lost \[m\].
 pub const LOST_DISTANCE_M: f64 = 50.0;

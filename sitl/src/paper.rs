@@ -3,9 +3,9 @@
 use crate::scenario::{Contender, ControllerKind, Scenario};
 use crate::trajectory::Trajectory;
 use afbc::Profile;
-use airframe::{Axis, OutOfRange, Parameters};
+use afbc_plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Quantity, Realism, Sensing};
+use afbc_types::{Axis, OutOfRange, Parameters};
 use nalgebra::Vector3;
-use plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Quantity, Realism, Sensing};
 
 /// How the paper's "1.2 N" and "1.2 N m" are read (decision 3 in `docs/paper.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,9 +5,9 @@ use crate::output::Flown;
 use crate::paper::{Case, Reading, Uncertainty, scenario};
 use crate::run::Run;
 use crate::scenario::Scenario;
-use airframe::OutOfRange;
+use afbc_plant::Model;
+use afbc_types::OutOfRange;
 use core::fmt::Write;
-use plant::Model;
 
 /// The rows, top to bottom: each reading of the experiment, with its name for people.
 pub fn cases() -> Vec<(String, Case)> {

@@ -4,7 +4,7 @@ use crate::flight::{Lost, Sample, fly};
 use crate::metrics::{Accumulator, Metrics, inputs};
 use crate::scenario::{Contender, Scenario};
 use afbc::monitor::Trip;
-use airframe::OutOfRange;
+use afbc_types::OutOfRange;
 use nalgebra::Vector4;
 
 /// A flown scenario under one contender.

@@ -2,7 +2,7 @@
 //!
 //! Trigonometry is `libm`'s, so a flight gives the same bits on every host.
 
-use airframe::Setpoint;
+use afbc_types::Setpoint;
 use core::f64::consts::{PI, TAU};
 use libm::{cos, sin, sincos};
 use nalgebra::Vector3;

@@ -2,8 +2,8 @@
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
 
+use afbc_plant::{CosineGust, Environment, Gust, GustKind, ParameterChange, Payload, Quantity, RotorFault};
 use nalgebra::Vector3;
-use plant::{CosineGust, Environment, Gust, GustKind, ParameterChange, Payload, Quantity, RotorFault};
 use roxmltree::{Document, Node};
 use sitl::campaign::{self, Drawn, FIGURES, Manifest, QUANTITIES, Row, Shard, Summary};
 use sitl::compare;
@@ -338,7 +338,7 @@ fn eventful() -> Scenario {
             change(Quantity::Inertia, 0.9, 2.0, 9.0),
             change(Quantity::ThrustFactor, 0.98, 3.0, 4.0),
         ],
-        vec![gust(airframe::Axis::X, 2.5, 3.5), gust(airframe::Axis::Y, 3.0, f64::INFINITY)],
+        vec![gust(afbc_types::Axis::X, 2.5, 3.5), gust(afbc_types::Axis::Y, 3.0, f64::INFINITY)],
     );
     let payload = Payload { mass_kg: 0.02, below_m: 0.0, start_s: 3.5, end_s: f64::INFINITY };
     let mut scenario = Scenario {

@@ -1,8 +1,8 @@
 //! The paper's three claims, from flights, in all four signs of the uncertainty and on both models of the vehicle.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a scenario that cannot be flown must stop the test
 
+use afbc_plant::{Environment, Gust, GustKind, Model, Motion};
 use nalgebra::{Vector3, Vector4};
-use plant::{Environment, Gust, GustKind, Model, Motion};
 use sitl::claims::VANISHED;
 use sitl::claims::claims;
 use sitl::flight::Sample;
@@ -149,7 +149,7 @@ fn backstepping_keeps_an_offset_of_the_gust_over_one_plus_both_gains() {
         scenario.initial = Motion { position_m, ..Motion::default() };
         scenario.duration_s = 40.0;
         let gust =
-            Gust { axis: airframe::Axis::X, kind: GustKind::Acceleration, size, start_s: 1.0, end_s: f64::INFINITY };
+            Gust { axis: afbc_types::Axis::X, kind: GustKind::Acceleration, size, start_s: 1.0, end_s: f64::INFINITY };
         scenario.environment = Environment::new(scenario.vehicle, vec![], vec![gust]).unwrap();
 
         let run = Run::fly(&scenario, scenario.contender(ControllerKind::Backstepping).unwrap(), u64::MAX).unwrap();

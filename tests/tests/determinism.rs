@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
 
 use afbc::Profile;
-use airframe::Axis;
-use plant::Model;
+use afbc_plant::Model;
+use afbc_types::Axis;
 use proptest::prelude::{ProptestConfig, Rng as _};
 use proptest::test_runner::{RngSeed, TestRunner};
 use sitl::flight::{Sample, fly};

@@ -3,10 +3,10 @@
 
 use afbc::adaptive::Estimate;
 use afbc::{Adaptive, Cascade, Controller, FlightController, Memory, Profile};
-use airframe::{Axis, Parameters, PerAxis, Setpoint};
+use afbc_plant::sensors::Spread;
+use afbc_plant::{Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors};
+use afbc_types::{Axis, Parameters, PerAxis, Setpoint};
 use nalgebra::Vector3;
-use plant::sensors::Spread;
-use plant::{Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors};
 use sitl::contender::ControllerKind;
 use sitl::flight::Sample;
 use sitl::run::Run;

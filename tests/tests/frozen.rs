@@ -1,12 +1,12 @@
 //! Trackers that freeze in flight: the firmware's code on the host, the rigid body above a ground, real frames between them.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
-use airframe::{Parameters, State};
-use link::Command;
+use afbc_flight_core::{End, Mode};
+use afbc_link::Command;
+use afbc_plant::{Contact, Environment, Model, Motion, Plant, Realism};
+use afbc_types::{Parameters, State};
 use nalgebra::Vector3;
-use plant::{Contact, Environment, Model, Motion, Plant, Realism};
 use sitl::in_the_loop::{Host, Station};
-use vehicle::{End, Mode};
 
 /// When the vehicle is armed, and when the tracker freezes \[ms\].
 const ARM_MS: u64 = 2_100;
@@ -63,7 +63,7 @@ fn fly(height_m: f64, speed_m_s: f64, frozen: Frozen) -> Seen {
         if let Some(state) = sent {
             station.track(now_ms * 1000, state);
         }
-        let mut setpoint = airframe::Setpoint::default();
+        let mut setpoint = afbc_types::Setpoint::default();
         setpoint.position_m.z = (t.min(height_m) + 0.02) as f32;
         setpoint.position_m.x = ((t - 2.0).max(0.0) * speed_m_s) as f32;
         setpoint.velocity_m_s.x = if t > 2.0 { speed_m_s as f32 } else { 0.0 };

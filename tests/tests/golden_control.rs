@@ -9,7 +9,7 @@ use afbc::backstepping::{self, Errors, Tracking, ideal, proportional};
 use afbc::cascade::desired_attitude;
 use afbc::fuzzy::{Basis, Membership};
 use afbc::model::Dynamics;
-use airframe::{Inputs, Parameters, RotorSpeeds};
+use afbc_types::{Inputs, Parameters, RotorSpeeds};
 use flight_tests::{ROWS, Row, golden};
 use nalgebra::{Matrix3, Vector4};
 
@@ -262,8 +262,8 @@ fn mixer_agrees_from_inputs_to_speeds_in_every_row() {
 /// This ties the sign and frame of every golden file together.
 #[test]
 fn desired_attitude_gives_the_wanted_acceleration_in_the_plant() {
+    use afbc_plant::{Load, Motion, simplified};
     use nalgebra::Vector3;
-    use plant::{Load, Motion, simplified};
     let p = Parameters::PAPER;
     for row in golden("desired_attitude").rows() {
         let [u5, u6, psi, phi, theta] = row.all(["u5_m_s2", "u6_m_s2", "psi_rad", "phi_d_rad", "theta_d_rad"]);

@@ -1,10 +1,10 @@
 //! Every row of the plant's golden data, in `f64`, within 1e-9 relative.
 #![allow(missing_docs)]
 
-use airframe::Parameters;
+use afbc_plant::{Load, Motion, rigid_body, simplified};
+use afbc_types::Parameters;
 use flight_tests::{ROWS, Row, golden};
 use nalgebra::Vector3;
-use plant::{Load, Motion, rigid_body, simplified};
 
 /// Relative to the expected number itself, with no allowance for cancellation: no result in the data is small enough
 /// beside its own terms to need one (all of them in fact hold to 1e-12).

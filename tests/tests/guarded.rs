@@ -3,9 +3,11 @@
 
 use afbc::monitor::{Bounds, Trip};
 use afbc::{Command, FlightController, Guarded, Memory, Profile, Settings, guarded};
-use airframe::{Axis, Parameters, PerAxis, Setpoint};
+use afbc_plant::{
+    Drag, Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors, Spread, Turbulence, Wind,
+};
+use afbc_types::{Axis, Parameters, PerAxis, Setpoint};
 use nalgebra::Vector3;
-use plant::{Drag, Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors, Spread, Turbulence, Wind};
 use sitl::paper::{self, Case};
 
 const STEP_S: f64 = 0.001;

@@ -5,17 +5,17 @@
 //! Times are in ms since the request to arm. Until then the vehicle is held where it starts. There is a ground to land on.
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
-use airframe::{Parameters, RotorSpeeds};
+use afbc_flight_core::{Mode, Refusal, Request};
+use afbc_link::Command;
+use afbc_plant::{Contact, Environment, Model, Motion, Plant, Realism};
+use afbc_types::{Parameters, RotorSpeeds};
 use core::ops::Range;
-use link::Command;
 use nalgebra::Vector3;
-use plant::{Contact, Environment, Model, Motion, Plant, Realism};
 use sitl::in_the_loop::{Host, Station};
 use sitl::paper::{self, Case as Reading};
 use sitl::scenario::Scenario;
 use sitl::trajectory::Trajectory;
 use std::fmt::Write as _;
-use vehicle::{Mode, Refusal, Request};
 
 /// A fault that is there from the start shows after this long: the start from afar is not tracking \[ms\].
 const SETTLED_MS: i64 = 5_000;

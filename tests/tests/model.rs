@@ -4,9 +4,9 @@
 
 use afbc::cascade::Context;
 use afbc::model;
-use airframe::{Axis, Parameters, PerAxis, State};
+use afbc_plant::{Load, Motion, simplified};
+use afbc_types::{Axis, Parameters, PerAxis, State};
 use nalgebra::Vector3;
-use plant::{Load, Motion, simplified};
 use proptest::prelude::*;
 
 /// Rounding error of one `f32` operation, relative.

@@ -2,8 +2,8 @@
 //! errors over 5 s to 60 s.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)] // a table that cannot be flown must stop the test
 
+use afbc_plant::Model;
 use flight_tests::{Row, golden};
-use plant::Model;
 use sitl::metrics::Metrics;
 use sitl::paper::{Case, Reading, Sign, Uncertainty, scenario};
 use sitl::run::Run;

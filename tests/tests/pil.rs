@@ -2,10 +2,10 @@
 //! 60,000 ticks of control, no bit differs from what the same code gives on the host.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
+use afbc_plant::Model;
 use core::ops::ControlFlow;
 use pil::budget::TICK_INSTRUCTIONS_MAX;
 use pil::{Emulator, Image};
-use plant::Model;
 use sitl::in_the_loop::{End, Pace, Station, Twins, fly};
 use sitl::paper::{Case, scenario};
 use std::io::Write as _;

@@ -2,11 +2,11 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
 use afbc::{FlightController, Profile};
-use airframe::State;
+use afbc_flight_core::{ArmingLimits, Asked, Inbox, Memory, Mode, Request, Stamped, Vehicle};
+use afbc_types::State;
 use sitl::contender::{Build, Contender, ControllerKind, Law, Monitored};
 use sitl::scenario::{Scenario, built_in};
 use std::collections::VecDeque;
-use vehicle::{ArmingLimits, Asked, Inbox, Memory, Mode, Request, Stamped, Vehicle};
 
 /// When, in ms of power-up, the vehicle is armed and let go.
 const ARMED_MS: u64 = 1_100;

@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
 use afbc::{Guarded, Profile, Settings};
-use airframe::{Axis, Parameters};
+use afbc_plant::Environment;
+use afbc_types::{Axis, Parameters};
 use nalgebra::Vector3;
-use plant::Environment;
 use proptest::prelude::*;
 use sitl::contender::{Contender, ControllerKind, Law};
 use sitl::flight::fly;
@@ -115,7 +115,7 @@ fn a_perfect_hover_does_not_trip() {
         let guarded = Guarded::new(vehicle, settings, gains, afbc::monitor::Bounds::new(&gains, &vehicle)).unwrap();
         let mut memory = afbc::Memory::default();
         for _ in 0..5_000 {
-            let command = guarded.step(&mut memory, &airframe::State::default(), &airframe::Setpoint::default());
+            let command = guarded.step(&mut memory, &afbc_types::State::default(), &afbc_types::Setpoint::default());
             assert_eq!(command.health.trip, None, "{mass_kg} kg");
         }
         let learnt = Guarded::learnt(&memory.control);

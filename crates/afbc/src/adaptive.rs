@@ -5,7 +5,7 @@ use crate::cascade::{Context, Law};
 use crate::fuzzy::{Basis, CENTRE, Membership, WIDTH};
 use crate::math;
 use crate::safeguards::{DEAD_ZONE, DELTA_MAX, KAPPA, SIGMA, Safeguards, THETA_MAX};
-use airframe::{Axis, OutOfRange, PerAxis, Range};
+use afbc_types::{Axis, OutOfRange, PerAxis, Range};
 use nalgebra::{Matrix3, Vector3};
 
 /// Accepted gamma.

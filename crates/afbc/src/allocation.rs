@@ -13,7 +13,7 @@
 //! without symmetry a little pitch may make room for roll, so that more of one asked is not always more given.
 
 use crate::math;
-use airframe::{Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds};
+use afbc_types::{Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds};
 use nalgebra::{Matrix4, SMatrix, SVector, Vector4};
 
 /// Accepted largest force of one rotor \[N\].
@@ -46,7 +46,7 @@ pub struct Rotor {
     pub pushes_left: bool,
 }
 
-/// The frame described in [`airframe`]: rotor 1 at -y, 2 at +x, 3 at +y, 4 at -x.
+/// The frame described in [`afbc_types`]: rotor 1 at -y, 2 at +x, 3 at +y, 4 at -x.
 pub const PLUS: [Rotor; 4] = [
     Rotor { x: 0.0, y: -1.0, pushes_left: true },
     Rotor { x: 1.0, y: 0.0, pushes_left: false },

@@ -3,7 +3,7 @@
 use crate::adaptive::Estimate;
 use crate::cascade::{Context, Law};
 use crate::model::{Dynamics, Model};
-use airframe::{Axis, OutOfRange, Parameters, PerAxis, Range};
+use afbc_types::{Axis, OutOfRange, Parameters, PerAxis, Range};
 
 /// Accepted alpha_1 \[1/s\].
 pub const ALPHA1: Range = Range::new("alpha1", 1e-2, 100.0);

@@ -9,7 +9,7 @@ use crate::ground::Ground;
 use crate::limits::Limits;
 use crate::math;
 use crate::monitor::Trip;
-use airframe::{Axis, Inputs, OutOfRange, Parameters, PerAxis, Range, RotorForces, RotorSpeeds, Setpoint, State};
+use afbc_types::{Axis, Inputs, OutOfRange, Parameters, PerAxis, Range, RotorForces, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 
 /// Accepted time between steps \[s\].

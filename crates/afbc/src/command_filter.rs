@@ -10,7 +10,7 @@
 
 use crate::limits::TILT_RATE;
 use crate::math;
-use airframe::{OutOfRange, Range};
+use afbc_types::{OutOfRange, Range};
 
 /// Accepted bandwidth w \[rad/s\].
 pub const BANDWIDTH: Range = Range::new("command_filter_rad_s", 1.0, 1000.0);

@@ -4,7 +4,7 @@
 use crate::adaptive::Estimate;
 use crate::cascade::{Cascade, Command, Controller, Health, Law};
 use crate::screen::Screen;
-use airframe::{PerAxis, Setpoint, State};
+use afbc_types::{PerAxis, Setpoint, State};
 
 /// What a controller remembers between steps: the last plausible input, and its own.
 ///
@@ -23,7 +23,7 @@ pub struct Memory<M> {
 ///
 /// ```
 /// use afbc::{Backstepping, Controller, FlightController, Memory, Profile};
-/// use airframe::{OutOfRange, Parameters, PerAxis, Setpoint, State};
+/// use afbc_types::{OutOfRange, Parameters, PerAxis, Setpoint, State};
 ///
 /// fn first_thrust_n<C: FlightController>(controller: &C) -> f32 {
 ///     controller.step(&mut Memory::default(), &State::default(), &Setpoint::default()).inputs.thrust_n

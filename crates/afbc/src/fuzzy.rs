@@ -13,7 +13,7 @@
 //! zero by zero or loses all its weights, where (18) as printed does from 1.7 rad/s on in `f32`.
 
 use crate::math;
-use airframe::{OutOfRange, Range};
+use afbc_types::{OutOfRange, Range};
 use nalgebra::{Matrix3, Vector3};
 
 /// Accepted distance of the outer Gaussians, in the input's unit.

@@ -11,7 +11,7 @@ use crate::math;
 use crate::model::Model;
 use crate::monitor::{Bounds, Figures, Monitor, Trip};
 use crate::safeguards::THETA_MAX;
-use airframe::{Axis, OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
+use afbc_types::{Axis, OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
 use nalgebra::Vector3;
 
 /// Least Theta_max of z, in weights: nine rules that hold the weight make |Theta_hat| = 3 weights, and rotors that give 60 %

@@ -15,7 +15,7 @@ use crate::cascade::{Context, Law};
 use crate::math;
 use crate::model::Model;
 use crate::safeguards::THETA_MAX;
-use airframe::{Axis, OutOfRange, Parameters, PerAxis};
+use afbc_types::{Axis, OutOfRange, Parameters, PerAxis};
 
 /// Gains of one subsystem.
 #[derive(Clone, Copy, Debug, PartialEq)]

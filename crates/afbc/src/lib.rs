@@ -1,7 +1,7 @@
 //! Adaptive fuzzy backstepping control (AFBC) of a quadrotor, after Yacef, Bouhali and Hamerlain, and the classical
 //! backstepping law that it is compared with.
 //!
-//! Frames, units and the meaning of "(n)" are stated in [`airframe`]; corrections to the paper in `docs/paper.md`.
+//! Frames, units and the meaning of "(n)" are stated in [`afbc_types`]; corrections to the paper in `docs/paper.md`.
 //!
 //! # Reading order
 //!
@@ -22,7 +22,7 @@
 //!
 //! ```
 //! use afbc::{Adaptive, Controller, FlightController, Memory, Profile};
-//! use airframe::{Parameters, Setpoint, State};
+//! use afbc_types::{Parameters, Setpoint, State};
 //!
 //! let vehicle = Parameters::PAPER.to_f32();
 //! let controller = Controller::new(vehicle, Profile::Paper.settings(), Adaptive::new(Profile::Paper.gains())?)?;
@@ -31,7 +31,7 @@
 //! above.position_m.z = 1.0;
 //! let command = controller.step(&mut memory, &State::default(), &above);
 //! assert!((command.inputs.thrust_n - 18.0).abs() < 1e-5); // alpha_24 alpha_14 e_14 = 6 * 3 * 1 m
-//! # Ok::<(), airframe::OutOfRange>(())
+//! # Ok::<(), afbc_types::OutOfRange>(())
 //! ```
 #![no_std]
 

@@ -1,6 +1,6 @@
 //! Limits of the cascade: what position control may ask of the vehicle. Ours; the paper has none.
 
-use airframe::{OutOfRange, Range};
+use afbc_types::{OutOfRange, Range};
 
 /// Accepted largest tilt \[rad\].
 pub const TILT: Range = Range::new("tilt_max_rad", 0.05, 1.57);

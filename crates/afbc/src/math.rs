@@ -75,7 +75,7 @@ pub fn abs_max(v: &nalgebra::Vector3<f32>) -> f32 {
 /// Square root; the processor's own or libm's, both correctly rounded.
 #[inline]
 pub fn sqrt(x: f32) -> f32 {
-    fpu::sqrt(x)
+    afbc_fpu::sqrt(x)
 }
 
 /// sin x; micromath. Error at most 1.2e-3 absolute for |x| <= 1000 rad.

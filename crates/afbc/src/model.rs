@@ -2,7 +2,7 @@
 
 use crate::cascade::Context;
 use crate::math;
-use airframe::{Axis, Parameters};
+use afbc_types::{Axis, Parameters};
 
 /// d x_2/dt = f + g u of one subsystem, and dg/dt.
 #[derive(Clone, Copy, Debug, PartialEq)]

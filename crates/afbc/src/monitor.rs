@@ -16,7 +16,7 @@ use crate::adaptive::{self, Estimate};
 use crate::cascade::Cascade;
 use crate::math;
 use crate::model::Model;
-use airframe::{Axis, OutOfRange, Parameters, PerAxis, Range};
+use afbc_types::{Axis, OutOfRange, Parameters, PerAxis, Range};
 
 /// Accepted bounds on |Theta_hat|, delta_hat and V_e.
 pub const BOUND: Range = Range::new("monitor_bound", 0.0, 1e9);

@@ -3,7 +3,7 @@
 use crate::fuzzy::Membership;
 use crate::model::Model;
 use crate::{Limits, Safeguards, Settings, adaptive, backstepping};
-use airframe::{Axis, Parameters, PerAxis};
+use afbc_types::{Axis, Parameters, PerAxis};
 
 /// A named set of gains and settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -17,7 +17,7 @@
 //!
 //! `docs/flight.md` derives the bound that then really follows.
 
-use airframe::{OutOfRange, Range};
+use afbc_types::{OutOfRange, Range};
 
 /// Accepted sigma \[1/s\].
 pub const SIGMA: Range = Range::new("sigma", 0.0, 10.0);

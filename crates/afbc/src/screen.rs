@@ -1,7 +1,7 @@
 //! What a controller may believe: implausible input never reaches a law.
 
 use crate::Health;
-use airframe::{Setpoint, State};
+use afbc_types::{Setpoint, State};
 
 /// The last plausible state and setpoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -6,7 +6,7 @@
 #![allow(clippy::unwrap_used, missing_docs)] // a mixer that cannot be built must stop the test
 
 use afbc::allocation::{AUTHORITY, Allocation, FORCE_MAX, Mixer, PLUS, POSITION, Rotor, THRUST_SHARE};
-use airframe::{Inputs, Parameters, RotorForces};
+use afbc_types::{Inputs, Parameters, RotorForces};
 use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 use nalgebra::{Matrix4, SVector, Vector4};
 use proptest::prelude::*;
@@ -337,7 +337,7 @@ fn a_limit_out_of_range_is_refused_by_name() {
 
 #[test]
 fn a_frame_that_cannot_fly_is_refused_by_name() {
-    fn refused<const N: usize>(rotors: [Rotor; N]) -> airframe::Range {
+    fn refused<const N: usize>(rotors: [Rotor; N]) -> afbc_types::Range {
         Mixer::of(rotors, &Parameters::PAPER.to_f32(), 3.0).unwrap_err().range
     }
     for bad in [11.0, -11.0, f32::NAN, f32::INFINITY] {

@@ -11,7 +11,7 @@ const U: f64 = 1.0 / (1 << 24) as f64;
 
 /// Any accepted bandwidth and step, their bounds drawn often; evenly spread over orders of magnitude.
 fn bandwidth_and_step() -> impl Strategy<Value = (f32, f32)> {
-    let over = |range: airframe::Range| {
+    let over = |range: afbc_types::Range| {
         prop_oneof![
             4 => (range.min.ln()..=range.max.ln()).prop_map(move |x| x.exp().clamp(range.min, range.max) as f32),
             1 => Just(range.min as f32),

@@ -3,7 +3,7 @@
 
 use afbc::ground::{Ground, LIFT_SHARE, STILL_M_S, STILL_S};
 use afbc::{Adaptive, Controller, FlightController, Memory, Profile, Settings};
-use airframe::{Parameters, Setpoint, State};
+use afbc_types::{Parameters, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
 

@@ -10,7 +10,7 @@ use afbc::ground::LIFT_SHARE;
 use afbc::guarded::HOVER_THETA;
 use afbc::monitor::{Bounds, Trip};
 use afbc::{Adaptive, Command, Controller, FlightController, Guarded, Health, Memory, Profile, Settings, guarded};
-use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
+use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
 use common::{U, check_command, gains, plausible, setpoint, settings, state, value};
 use nalgebra::Vector3;
 use proptest::prelude::*;

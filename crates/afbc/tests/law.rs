@@ -7,7 +7,7 @@ use afbc::cascade::Context;
 use afbc::fuzzy::{Basis, Membership};
 use afbc::model::Dynamics;
 use afbc::{Adaptive, Backstepping, Law, Profile, Safeguards};
-use airframe::{Axis, Parameters, PerAxis, State};
+use afbc_types::{Axis, Parameters, PerAxis, State};
 use nalgebra::Matrix3;
 use proptest::prelude::*;
 
@@ -197,7 +197,7 @@ proptest! {
 fn a_gain_out_of_range_is_refused_by_name() {
     use afbc::{adaptive, fuzzy, safeguards};
     type Set = fn(&mut Gains, f32);
-    let cases: [(airframe::Range, Set); 11] = [
+    let cases: [(afbc_types::Range, Set); 11] = [
         (backstepping::ALPHA1, |g, v| g.backstepping.alpha1 = v),
         (backstepping::ALPHA2, |g, v| g.backstepping.alpha2 = v),
         (adaptive::GAMMA, |g, v| g.gamma = v),

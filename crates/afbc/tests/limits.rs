@@ -6,7 +6,7 @@ mod common;
 use afbc::backstepping::Errors;
 use afbc::integral::IntegralBackstepping;
 use afbc::{Adaptive, Backstepping, Command, Controller, FlightController, Limits, Memory, Profile, Settings};
-use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
+use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
 use common::{U, gains, limits, plausible, setpoint, settings, state};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -184,7 +184,7 @@ fn no_attitude_is_singular() {
 #[test]
 fn limits_out_of_range_are_refused_by_name() {
     type Set = fn(&mut Limits, f32);
-    let cases: [(airframe::Range, Set); 5] = [
+    let cases: [(afbc_types::Range, Set); 5] = [
         (afbc::limits::TILT, |l, v| l.tilt_max_rad = v),
         (afbc::limits::TILT_RATE, |l, v| l.tilt_rate_max_rad_s = v),
         (afbc::limits::ACCELERATION, |l, v| l.acceleration_max_m_s2 = v),

@@ -6,7 +6,7 @@ use afbc::backstepping::Errors;
 use afbc::model::Model;
 use afbc::monitor::{BOUND, Bounds, Figures, Monitor, SATURATION_SHARE, SWING, SWINGS, Trip};
 use afbc::{Cascade, Command, Health, Profile};
-use airframe::{Axis, Inputs, Parameters, PerAxis};
+use afbc_types::{Axis, Inputs, Parameters, PerAxis};
 use nalgebra::Matrix3;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
@@ -217,7 +217,7 @@ fn every_reason_is_its_own_and_fits_a_status_text() {
 #[test]
 fn bounds_out_of_range_are_refused_by_name() {
     type Set = fn(&mut Bounds, f32);
-    let cases: [(airframe::Range, Set); 6] = [
+    let cases: [(afbc_types::Range, Set); 6] = [
         (BOUND, |b, v| b.theta.yaw = v),
         (BOUND, |b, v| b.delta.x = v),
         (BOUND, |b, v| b.lyapunov.roll = v),

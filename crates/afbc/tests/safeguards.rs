@@ -8,7 +8,7 @@ use afbc::backstepping::Tracking;
 use afbc::cascade::Context;
 use afbc::fuzzy::Basis;
 use afbc::{Adaptive, Controller, FlightController, Law, Memory, Profile, Safeguards, Settings};
-use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
+use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
 use common::{U, gains_of_one};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;

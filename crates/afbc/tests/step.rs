@@ -5,7 +5,7 @@ mod common;
 
 use afbc::adaptive::{Estimate, Gains};
 use afbc::{Adaptive, Backstepping, Cascade, Controller, FlightController, Health, Law, Memory, Profile, Settings};
-use airframe::{Axis, Parameters, PerAxis, Setpoint, State};
+use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
 use common::{check_command, gains, plausible, setpoint, settings, state, value};
 use proptest::prelude::*;
 

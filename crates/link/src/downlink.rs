@@ -4,7 +4,7 @@ use crate::decoder::Counters;
 use crate::frames::flip;
 use crate::framing::{Address, PAYLOAD_MAX};
 use crate::message::{Fault, Format, Message, extension, field, parse, put, put_extended, put_fields};
-use airframe::{Axis, PerAxis, RotorSpeeds};
+use afbc_types::{Axis, PerAxis, RotorSpeeds};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     ATTITUDE_DATA, COMMAND_ACK_DATA, DEBUG_FLOAT_ARRAY_DATA, HEARTBEAT_DATA, HIL_ACTUATOR_CONTROLS_DATA,

@@ -1,4 +1,4 @@
-//! Frame changes between the wire and [`airframe`].
+//! Frame changes between the wire and [`afbc_types`].
 //!
 //! The wire's earth frame is north-east-down (NED) or any other local frame with z down, its body frame
 //! forward-right-down (FRD). Ours are north-west-up and forward-left-up. Each is the other turned by half a turn about
@@ -7,7 +7,7 @@
 //! An attitude q turns body coordinates into earth coordinates on both sides, so that of the wire's pitch and yaw angles
 //! the signs change, too: positive pitch on the wire lifts the nose and tilts the thrust backwards, ours forwards.
 
-use airframe::State;
+use afbc_types::State;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// A vector of one side on the other, and back.

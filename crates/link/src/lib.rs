@@ -15,7 +15,7 @@
 //! Nothing here panics or waits, whatever the bytes; memory is one frame.
 //!
 //! ```
-//! use link::{Address, Decoder, FRAME_MAX, Sender, Uplink};
+//! use afbc_link::{Address, Decoder, FRAME_MAX, Sender, Uplink};
 //!
 //! let (station, vehicle) = (Address { system: 255, component: 190 }, Address { system: 1, component: 1 });
 //! let mut buffer = [0; FRAME_MAX];

@@ -3,7 +3,7 @@
 use crate::frames::{Odometry, flip};
 use crate::framing::{Address, PAYLOAD_MAX};
 use crate::message::{Fault, Format, Message, extension, field, parse, put, put_fields};
-use airframe::{Setpoint, State};
+use afbc_types::{Setpoint, State};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     COMMAND_INT_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavFrame, MavModeFlag, MavState,

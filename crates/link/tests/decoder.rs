@@ -8,8 +8,8 @@
 
 mod reference;
 
-use airframe::{Setpoint, State};
-use link::{Address, Command, Counters, Decoder, FRAME_MAX, Message as _, Sender, Uplink};
+use afbc_link::{Address, Command, Counters, Decoder, FRAME_MAX, Message as _, Sender, Uplink};
+use afbc_types::{Setpoint, State};
 use mavlink::Message as _;
 use mavlink::dialects::common::MavMessage;
 use nalgebra::Vector3;

@@ -1,13 +1,13 @@
 //! The wire's frames against ours: known attitudes, and `f64` rotation matrices as the oracle.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use airframe::State;
+use afbc_link::frames::{Odometry, euler, flip, quaternion};
+use afbc_types::State;
 use core::f32::consts::{FRAC_PI_2, PI};
-use link::frames::{Odometry, euler, flip, quaternion};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-/// Rz(psi) Ry(theta) Rx(phi), from the definition in `airframe`, in `f64`.
+/// Rz(psi) Ry(theta) Rx(phi), from the definition in `afbc-types`, in `f64`.
 fn r_earth_body(attitude: &Vector3<f32>) -> Matrix3<f64> {
     let [phi, theta, psi] = attitude.map(f64::from).into();
     let about = |axis, angle| *Rotation3::from_axis_angle(&axis, angle).matrix();

@@ -7,11 +7,11 @@
     reason = "a test that cannot go on should say why"
 )]
 
-use airframe::{Axis, PerAxis, RotorSpeeds, Setpoint, State};
-use link::{
+use afbc_link::{
     Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, Health, MavCmd, MavSeverity, Message, Sender,
     StatesRefused, Uplink,
 };
+use afbc_types::{Axis, PerAxis, RotorSpeeds, Setpoint, State};
 use mavlink::dialects::common::{
     ATTITUDE_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, HIL_ACTUATOR_CONTROLS_DATA, MavFrame, ODOMETRY_DATA,
     PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,

@@ -1,9 +1,9 @@
 //! An answer for everyone who asks.
 
+use afbc_flight_core::inbox::REQUESTS_MAX;
+use afbc_flight_core::{Asked, Inbox, Request};
+use afbc_link::{Address, Answer, Command, Downlink};
 use heapless::Deque;
-use link::{Address, Answer, Command, Downlink};
-use vehicle::inbox::REQUESTS_MAX;
-use vehicle::{Asked, Inbox, Request};
 
 /// Most answers that wait to be sent, beside those of the flight core. Whoever asks for more at once gets none, which is
 /// counted.
@@ -66,7 +66,7 @@ impl Answers {
     }
 
     /// What the flight core answered in a tick, and to whom.
-    pub(crate) fn settle(&mut self, answer: vehicle::Answer) -> Option<Downlink> {
+    pub(crate) fn settle(&mut self, answer: afbc_flight_core::Answer) -> Option<Downlink> {
         let Open { command, from: to, .. } = self.asked.get_mut(usize::from(answer.ticket))?.take()?;
         let answer = answer.result.map_or_else(|refusal| Answer::Refused(refusal as i32), |()| Answer::Accepted);
         Some(Downlink::Answer { command, answer, to })

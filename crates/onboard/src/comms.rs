@@ -4,11 +4,11 @@ use crate::answers::{ANSWERS_PER_TICK, Answers};
 use crate::failsafes::Failsafes;
 use crate::flight::Report;
 use afbc::monitor::{Norm, Trip};
-use airframe::{PerAxis, State};
-use link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, Sender, StatesRefused, Text, Uplink};
-use vehicle::rate;
-use vehicle::tracker::Refused;
-use vehicle::{Inbox, Mode, Stamped, Tracker};
+use afbc_flight_core::rate;
+use afbc_flight_core::tracker::Refused;
+use afbc_flight_core::{Inbox, Mode, Stamped, Tracker};
+use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, Sender, StatesRefused, Text, Uplink};
+use afbc_types::{PerAxis, State};
 
 /// The vehicle on the link: system 1, component 1 (autopilot).
 pub const ADDRESS: Address = Address { system: 1, component: 1 };
@@ -180,7 +180,7 @@ impl Comms {
             let Report { health, .. } = report;
             let norm = |norm: &Norm| libm::sqrtf(norm.theta_squared);
             let Refused { overtaken, late, elsewhere } = *self.tracker.refused();
-            say(Downlink::Health(link::Health {
+            say(Downlink::Health(afbc_link::Health {
                 time_us: report.time_us,
                 tick_us,
                 tick_max_us: self.tick_us_max,

@@ -1,8 +1,8 @@
 //! What is told of failsafes: each once, in words, and all in the heartbeat, however short they are.
 
 use crate::flight::Report;
-use link::MavSeverity;
-use vehicle::{End, Mode};
+use afbc_flight_core::{End, Mode};
+use afbc_link::MavSeverity;
 
 /// How bad it is, and what it is.
 pub(crate) type Notice = (MavSeverity, &'static str);

@@ -2,9 +2,9 @@
 
 use afbc::monitor::{Bounds, Norm};
 use afbc::{Guarded, Profile, guarded};
-use airframe::{Axis, OutOfRange, Parameters, RotorSpeeds};
-use vehicle::motor::Curve;
-use vehicle::{Answer, ArmingLimits, End, Health, Inbox, Memory, Mode, Motor, Vehicle};
+use afbc_flight_core::motor::Curve;
+use afbc_flight_core::{Answer, ArmingLimits, End, Health, Inbox, Memory, Mode, Motor, Vehicle};
+use afbc_types::{Axis, OutOfRange, Parameters, RotorSpeeds};
 
 /// Motor, controller and propeller: 1000 rad/s at full throttle, of which the paper's vehicle needs 200 to hover. Ours;
 /// to be measured for the vehicle at hand.

@@ -1,19 +1,19 @@
-//! The firmware without its hardware: which vehicle it flies, and what goes between [`link`] and the flight core.
+//! The firmware without its hardware: which vehicle it flies, and what goes between [`afbc_link`] and the flight core.
 //!
 //! Two halves, because on the board the control tick interrupts everything else: [`Flight`] decides, every millisecond;
 //! [`Comms`] reads and writes messages, whenever there is time. The host that runs both in turn on the same bytes and
 //! times gets the same bytes back as from the processor, bit for bit.
 //!
 //! ```
-//! use onboard::{Comms, Flight};
-//! use vehicle::Inbox;
+//! use afbc_onboard::{Comms, Flight};
+//! use afbc_flight_core::Inbox;
 //!
 //! let (mut flight, mut comms, mut inbox) = (Flight::new()?, Comms::new(), Inbox::default());
 //! inbox.post(&comms.receive(b"MAVLink, or noise"));
 //! let report = flight.tick(1_000, &inbox.take());
 //! assert_eq!(report.throttles, [0; 4]); // disarmed
 //! comms.report(&report, 0, |_bytes| ());
-//! # Ok::<(), airframe::OutOfRange>(())
+//! # Ok::<(), afbc_types::OutOfRange>(())
 //! ```
 #![no_std]
 

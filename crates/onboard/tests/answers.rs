@@ -4,13 +4,13 @@
 mod common;
 
 use afbc::monitor::Trip;
-use airframe::{Axis, State};
+use afbc_flight_core::inbox::REQUESTS_MAX;
+use afbc_flight_core::{End, Mode, Refusal, Request};
+use afbc_link::{Address, Answer, Command, Downlink, FRAME_MAX, MavSeverity, Sender, Text, Uplink};
+use afbc_onboard::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, FORGOTTEN_US, Report};
+use afbc_types::{Axis, State};
 use common::{Bench, STATION};
-use link::{Address, Answer, Command, Downlink, FRAME_MAX, MavSeverity, Sender, Text, Uplink};
-use onboard::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, FORGOTTEN_US, Report};
 use proptest::prelude::*;
-use vehicle::inbox::REQUESTS_MAX;
-use vehicle::{End, Mode, Refusal, Request};
 
 const STATIONS: [Address; 3] = [STATION, Address { system: 254, component: 1 }, Address { system: 1, component: 191 }];
 
@@ -198,7 +198,7 @@ fn every_refusal_is_told_with_its_reason() {
             bench.hear(Uplink::Command(command));
             let asked = bench.inbox.take().request().expect("asked");
             assert_eq!(asked.request, request);
-            let answer = vehicle::Answer { ticket: asked.ticket, request, result: Err(refusal) };
+            let answer = afbc_flight_core::Answer { ticket: asked.ticket, request, result: Err(refusal) };
             let said = bench.said(&Report { answer: Some(answer), ..idle });
             assert_eq!(answers(&said), [(id, Answer::Refused(refusal as i32), STATION)]);
             assert_eq!(texts(&said), [Text::from(refusal.reason())]);
@@ -253,7 +253,7 @@ fn requests_whose_tick_went_unreported_fail() {
 fn everything_at_once_fits() {
     let mut bench = Bench::new();
     let (idle, _) = bench.tick(&State::default());
-    let answer = vehicle::Answer { ticket: 1, request: Request::Arm, result: Err(Refusal::Unhealthy) };
+    let answer = afbc_flight_core::Answer { ticket: 1, request: Request::Arm, result: Err(Refusal::Unhealthy) };
     for round in 0..2000 {
         bench.now_us += 1000;
         bench.measure(&State::default());

@@ -3,12 +3,12 @@
 
 mod common;
 
-use airframe::{Setpoint, State};
+use afbc_flight_core::{End, Mode};
+use afbc_link::{Downlink, MavSeverity, Uplink};
+use afbc_onboard::Report;
+use afbc_types::{Setpoint, State};
 use common::Bench;
-use link::{Downlink, MavSeverity, Uplink};
-use onboard::Report;
 use proptest::prelude::*;
-use vehicle::{End, Mode};
 
 const WARNING: MavSeverity = MavSeverity::MAV_SEVERITY_WARNING;
 const CRITICAL: MavSeverity = MavSeverity::MAV_SEVERITY_CRITICAL;

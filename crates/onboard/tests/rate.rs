@@ -1,10 +1,10 @@
 //! A control tick that does not keep its time, and a clock that fails: the pilot is told once, and arming is refused.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use airframe::{Setpoint, State};
-use link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
-use onboard::{CLOCK_FAILED, Comms, Flight, TICK_OFF};
-use vehicle::{Inbox, Mode, Refusal};
+use afbc_flight_core::{Inbox, Mode, Refusal};
+use afbc_link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
+use afbc_onboard::{CLOCK_FAILED, Comms, Flight, TICK_OFF};
+use afbc_types::{Setpoint, State};
 
 const STATION: Address = Address { system: 255, component: 190 };
 

@@ -4,11 +4,11 @@
 mod common;
 
 use afbc::monitor::Trip;
-use airframe::{Axis, State};
+use afbc_flight_core::{Mode, Request};
+use afbc_link::{Answer, Command, Downlink, MavCmd, MavSeverity, Text, Uplink};
+use afbc_onboard::Report;
+use afbc_types::{Axis, State};
 use common::{Bench, STATION};
-use link::{Answer, Command, Downlink, MavCmd, MavSeverity, Text, Uplink};
-use onboard::Report;
-use vehicle::{Mode, Request};
 
 fn text(trip: Trip) -> Downlink {
     Downlink::Text { severity: MavSeverity::MAV_SEVERITY_WARNING, text: Text::from(trip.reason()) }

@@ -5,7 +5,7 @@ use afbc::allocation::{Allocation, Mixer};
 use afbc::backstepping::Errors;
 use afbc::command_filter::Filtered;
 use afbc::{Command, Health, Settings};
-use airframe::{Inputs, OutOfRange, Parameters, PerAxis, RotorSpeeds};
+use afbc_types::{Inputs, OutOfRange, Parameters, PerAxis, RotorSpeeds};
 use nalgebra::{Matrix3, Vector3};
 
 /// The nominal vehicle.

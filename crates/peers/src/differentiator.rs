@@ -6,7 +6,7 @@
 //! sigma sqrt(dt w^3 / 4) on the derivative.
 
 use afbc::command_filter::{CommandFilter, Filtered};
-use airframe::OutOfRange;
+use afbc_types::OutOfRange;
 use nalgebra::Vector3;
 
 /// The filter for the three coordinates of a vector.

@@ -43,13 +43,13 @@ use crate::limits::{Limits, TILT_MAX};
 use crate::pid::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
 use crate::within;
 use afbc::{Command, FlightController, Settings};
-use airframe::{OutOfRange, Parameters, Range, Setpoint, State};
+use afbc_types::{OutOfRange, Parameters, Range, Setpoint, State};
 use nalgebra::{Matrix3, Vector3};
 
 /// Range of each tunable of [`Gains`].
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod ranges {
-    use airframe::Range;
+    use afbc_types::Range;
     pub const POSITION_P: Range = Range::new("position_p_1_s2", 0.5, 100.0);
     pub const POSITION_D: Range = Range::new("position_d_1_s", 0.5, 20.0);
     pub const POSITION_I: Range = Range::new("position_i_1_s3", 0.0, 200.0);

@@ -40,13 +40,13 @@ use crate::pid::{SPEED_MAX, YAW_WEIGHT};
 use crate::within;
 use afbc::allocation::Mixer;
 use afbc::{Command, FlightController, Settings, math};
-use airframe::{OutOfRange, Parameters, Range, RotorSpeeds, Setpoint, State};
+use afbc_types::{OutOfRange, Parameters, Range, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 
 /// Range of each tunable of [`Gains`].
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod ranges {
-    use airframe::Range;
+    use afbc_types::Range;
     pub const POSITION_P: Range = Range::new("position_p_1_s", 0.2, 10.0);
     pub const VELOCITY_P: Range = Range::new("velocity_p_1_s", 0.5, 20.0);
     pub const HEIGHT_P: Range = Range::new("height_p_1_s", 0.2, 20.0);

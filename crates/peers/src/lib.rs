@@ -8,11 +8,11 @@
 //! | [`indi`] | incremental dynamic inversion of attitude and of position | Smeur, Chu, de Croon 2016 and 2018 |
 //!
 //! Each has its equations and its sources at the top of its file; where the source leaves something open, the same
-//! place says what was decided. Frames and units are stated in [`airframe`].
+//! place says what was decided. Frames and units are stated in [`afbc_types`].
 //!
 //! # What they share
 //!
-//! * The interface: an [`airframe::State`] and an [`airframe::Setpoint`] in, an [`afbc::Command`] out, by way of U1..U4
+//! * The interface: an [`afbc_types::State`] and an [`afbc_types::Setpoint`] in, an [`afbc::Command`] out, by way of U1..U4
 //!   and AFBC's own [`Mixer`](afbc::allocation::Mixer), so that no controller has a better allocation than another.
 //! * Of [`afbc::Settings`], the time step and the rotors' limit. What else is there belongs to AFBC.
 //! * Implausible input through [`afbc::Screen`]; filters and integrators rest while the state is not a new one.
@@ -31,13 +31,13 @@
 //!
 //! ```
 //! use afbc::{FlightController, Memory, Profile};
-//! use airframe::{Parameters, Setpoint, State};
-//! use peers::pid::{Gains, Pid};
+//! use afbc_types::{Parameters, Setpoint, State};
+//! use afbc_peers::pid::{Gains, Pid};
 //!
 //! let controller = Pid::new(Parameters::PAPER.to_f32(), Profile::Paper.settings(), Gains::PAPER_VEHICLE)?;
 //! let command = controller.step(&mut Memory::default(), &State::default(), &Setpoint::default());
 //! assert_eq!(command.inputs.thrust_n, 0.486 * 9.81); // nothing to correct: the weight
-//! # Ok::<(), airframe::OutOfRange>(())
+//! # Ok::<(), afbc_types::OutOfRange>(())
 //! ```
 #![no_std]
 
@@ -53,7 +53,7 @@ pub use geometric::Geometric;
 pub use indi::Indi;
 pub use pid::Pid;
 
-use airframe::{OutOfRange, Range};
+use afbc_types::{OutOfRange, Range};
 
 /// Checks each gain against its range.
 fn within<const N: usize>(gains: [(&'static Range, &mut f32); N]) -> Result<(), OutOfRange> {

@@ -1,7 +1,7 @@
 //! What the position loops may ask for.
 
 use afbc::{Settings, math};
-use airframe::{OutOfRange, Parameters, Range};
+use afbc_types::{OutOfRange, Parameters, Range};
 use nalgebra::Vector3;
 
 /// Accepted largest tilt \[rad\].

@@ -27,13 +27,13 @@ use crate::differentiator::{Differentiator, Smooth};
 use crate::limits::{Limits, TILT_MAX, cylinder};
 use crate::within;
 use afbc::{Command, FlightController, Settings};
-use airframe::{OutOfRange, Parameters, Range, Setpoint, State};
+use afbc_types::{OutOfRange, Parameters, Range, Setpoint, State};
 use nalgebra::Vector3;
 
 /// Range of each tunable of [`Gains`].
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod ranges {
-    use airframe::Range;
+    use afbc_types::Range;
     pub const POSITION_P: Range = Range::new("position_p_1_s", 0.2, 10.0);
     pub const VELOCITY_P: Range = Range::new("velocity_p_1_s", 0.5, 20.0);
     pub const VELOCITY_I: Range = Range::new("velocity_i_1_s2", 0.0, 200.0);

@@ -4,11 +4,11 @@
 mod harness;
 
 use afbc::{Command, FlightController, Memory};
-use airframe::{Range, Setpoint, State};
+use afbc_peers::attitude::{facing, geometric_error, quaternion, r_earth_body, roll_pitch, tilt_prioritised_error};
+use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
+use afbc_types::{Range, Setpoint, State};
 use harness::{Random, SETTINGS, vehicle};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
-use peers::attitude::{facing, geometric_error, quaternion, r_earth_body, roll_pitch, tilt_prioritised_error};
-use peers::{Geometric, Indi, Pid, geometric, indi, pid};
 
 fn pid() -> Pid {
     Pid::new(vehicle(), SETTINGS, pid::Gains::PAPER_VEHICLE).unwrap()
@@ -356,7 +356,7 @@ fn increments_cancel_a_constant_moment() {
         };
         let command = controller.step(&mut memory, &state, &Setpoint::default());
         rotors += (command.speeds.0.cast::<f64>() - rotors) * lag;
-        let u = afbc::allocation::Mixer::inputs(&mixer.forces(&airframe::RotorSpeeds(rotors.cast())));
+        let u = afbc::allocation::Mixer::inputs(&mixer.forces(&afbc_types::RotorSpeeds(rotors.cast())));
         rate += (effectiveness * f64::from(u.yaw_n) + disturbance) * dt_s;
         angle += rate * dt_s;
         largest = angle.abs().max(largest);

@@ -6,9 +6,9 @@
 mod harness;
 
 use afbc::FlightController;
+use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
 use harness::{Figures, Rig, SETTINGS, at, calm, circle, disturbed, fly, hover, paper, paper_start, vehicle};
 use nalgebra::{Vector3, Vector4};
-use peers::{Geometric, Indi, Pid, geometric, indi, pid};
 
 fn pid() -> Pid {
     Pid::new(vehicle(), SETTINGS, pid::Gains::PAPER_VEHICLE).unwrap()
@@ -75,7 +75,7 @@ fn all_follow_a_step() {
 #[test]
 fn all_fly_a_circle() {
     let start = at([2.0, 0.0, 2.0], core::f64::consts::FRAC_PI_2);
-    fn figures<C: FlightController>(controller: &C, start: plant::Motion) -> Figures {
+    fn figures<C: FlightController>(controller: &C, start: afbc_plant::Motion) -> Figures {
         fly(controller, Rig::LAG, calm(), start, circle(2.0, 6.0), [6.0, 20.0])
     }
     within("pid", &figures(&pid(), start), [0.003, 0.003, 0.001, 0.002]);
@@ -88,7 +88,7 @@ fn all_fly_a_circle() {
 #[test]
 fn all_fly_the_papers_flight() {
     for (inertia, thrust) in [(1.75, 0.6), (1.75, 1.4), (0.25, 0.6), (0.25, 1.4)] {
-        fn figures<C: FlightController>(controller: &C, environment: plant::Environment) -> Figures {
+        fn figures<C: FlightController>(controller: &C, environment: afbc_plant::Environment) -> Figures {
             let figures = fly(controller, Rig::ALL, environment, paper_start(), paper, [5.0, 60.0]);
             assert!(figures.delta_u4_n < 0.02, "{figures:?}");
             figures

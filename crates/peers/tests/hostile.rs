@@ -4,10 +4,10 @@
 mod harness;
 
 use afbc::{FlightController, Memory, Settings};
-use airframe::{Range, Setpoint, State};
+use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
+use afbc_types::{Range, Setpoint, State};
 use harness::{SETTINGS, vehicle};
 use nalgebra::Vector3;
-use peers::{Geometric, Indi, Pid, geometric, indi, pid};
 use proptest::prelude::*;
 
 /// Any bits, and often enough something that passes the screen: small, or at its very edge.

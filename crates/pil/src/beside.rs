@@ -3,7 +3,7 @@
 use crate::budget::Linked;
 use crate::exercise::{Station, motion};
 use crate::{Board, Error};
-use link::Uplink;
+use afbc_link::Uplink;
 use std::path::Path;
 use std::time::Duration;
 

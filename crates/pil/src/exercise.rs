@@ -1,7 +1,7 @@
 //! A flight in which everything happens, as the bytes that reach the vehicle: what tests compare and budgets measure.
 
-use airframe::{Setpoint, State};
-use link::{Address, Command, FRAME_MAX, Sender, Uplink};
+use afbc_link::{Address, Command, FRAME_MAX, Sender, Uplink};
+use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 
 /// Tick before which the vehicle is armed.

@@ -7,8 +7,8 @@
 
 use crate::exercise::Station;
 use crate::{Emulator, Error};
-use airframe::{Setpoint, State};
-use link::{Command, Uplink};
+use afbc_link::{Command, Uplink};
+use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};

@@ -3,9 +3,10 @@
 
 mod common;
 
+use afbc_flight_core::Refusal;
+use afbc_link::{Address, Answer, Command, Decoder, Downlink, Health, Uplink};
+use afbc_onboard::CLOCK_FAILED;
 use common::start_or_skip;
-use link::{Address, Answer, Command, Decoder, Downlink, Health, Uplink};
-use onboard::CLOCK_FAILED;
 use pil::budget::Linked;
 use pil::clock_tree::{FLASH_ACR, RCC_CFGR, RCC_PLLCFGR};
 use pil::exercise::{Station, motion};
@@ -13,7 +14,6 @@ use pil::gdb::{PC, SP, XPSR};
 use pil::{Board, Image};
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
-use vehicle::Refusal;
 
 /// Far longer than it takes, even on a machine that is busy with other things.
 const PATIENCE: Duration = Duration::from_secs(120);

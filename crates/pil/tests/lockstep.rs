@@ -3,11 +3,11 @@
 
 mod common;
 
+use afbc_flight_core::{Inbox, Mode};
+use afbc_onboard::{Comms, Flight};
 use common::start_or_skip;
-use onboard::{Comms, Flight};
 use pil::exercise::{Station, TICKS};
 use pil::{Emulator, Image, Reply};
-use vehicle::{Inbox, Mode};
 
 /// All replies of one flight.
 fn fly(mut emulator: Emulator) -> Vec<Reply> {

@@ -4,14 +4,14 @@
 //! feedback's time, with that of [`Plant::motion`], is in every figure, and alone in `feedback_alone`.
 #![allow(clippy::unwrap_used, missing_docs)] // a plant that cannot be built must stop the bench
 
-use airframe::{Parameters, RotorSpeeds};
-use divan::counter::ItemsCount;
-use divan::{Bencher, black_box};
-use nalgebra::{Vector3, Vector4};
-use plant::{
+use afbc_plant::{
     Battery, Contact, CosineGust, Drag, Dropouts, Environment, GroundEffect, Model, Motion, Plant, Realism, Rotors,
     Sensing, Sensors, Spread, Turbulence, Wind,
 };
+use afbc_types::{Parameters, RotorSpeeds};
+use divan::counter::ItemsCount;
+use divan::{Bencher, black_box};
+use nalgebra::{Vector3, Vector4};
 
 fn main() {
     divan::main();
@@ -138,6 +138,6 @@ fn measurement(bencher: Bencher) {
 
 #[divan::bench(sample_count = 200, sample_size = 2000)]
 fn normal_number(bencher: Bencher) {
-    let mut noise = plant::noise::Noise::new(1, plant::noise::Stream::Wind);
+    let mut noise = afbc_plant::noise::Noise::new(1, afbc_plant::noise::Stream::Wind);
     bencher.counter(ItemsCount::new(1_usize)).bench_local(|| noise.normal());
 }

@@ -1,6 +1,6 @@
 //! A battery that sags under load and runs down.
 
-use airframe::{OutOfRange, Range};
+use afbc_types::{OutOfRange, Range};
 use libm::sqrt;
 
 /// The Rint model, an open-circuit voltage behind a resistance (He, Xiong, Fan 2011, *Evaluation of lithium-ion battery
@@ -38,7 +38,7 @@ pub enum Sag {
 /// Accepted range of each setting.
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod limits {
-    use airframe::Range;
+    use afbc_types::Range;
     pub const FULL: Range = Range::new("full_v", 1.0, 1000.0);
     pub const RESISTANCE: Range = Range::new("resistance_ohm", 0.0, 10.0);
     pub const CAPACITY: Range = Range::new("capacity_a_h", 0.001, 1000.0);

@@ -1,7 +1,7 @@
 //! Ground to stand on, and to fall on.
 
 use crate::body_axes::BodyAxes;
-use airframe::{OutOfRange, Parameters, Range};
+use afbc_types::{OutOfRange, Parameters, Range};
 use libm::sqrt;
 use nalgebra::Vector3;
 
@@ -31,7 +31,7 @@ pub struct Contact {
 /// so that the integration stays stable.
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod limits {
-    use airframe::Range;
+    use afbc_types::Range;
     pub const SINK: Range = Range::new("sink_m", 1e-5, 0.5);
     pub const DAMPING_RATIO: Range = Range::new("damping_ratio", 0.05, 5.0);
     pub const FRICTION: Range = Range::new("friction", 0.0, 3.0);

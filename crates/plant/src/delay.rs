@@ -1,6 +1,6 @@
 //! A delay of whole steps.
 
-use airframe::{OutOfRange, Range};
+use afbc_types::{OutOfRange, Range};
 use alloc::{vec, vec::Vec};
 
 /// Longest delay of a command or a measurement \[s\].

@@ -1,6 +1,6 @@
 //! What the air does to a vehicle that moves through it: the paper's A_i = 1/2 rho C_i W^2 made concrete.
 
-use airframe::{OutOfRange, Parameters, Range};
+use afbc_types::{OutOfRange, Parameters, Range};
 use libm::sqrt;
 use nalgebra::{Vector3, Vector4};
 
@@ -35,7 +35,7 @@ pub struct Drag {
 /// integration stays stable up to [`AIRSPEED_M_S`](limits::AIRSPEED_M_S).
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod limits {
-    use airframe::Range;
+    use afbc_types::Range;
     pub const AIR_DENSITY: Range = Range::new("air_density_kg_m3", 0.0, 5.0);
     pub const BLADE: Range = Range::new("blade_n_s2_m", 0.0, 1.0);
     pub const ROTOR_HEIGHT: Range = Range::new("rotor_height_m", -1.0, 1.0);

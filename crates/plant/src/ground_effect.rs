@@ -1,6 +1,6 @@
 //! More thrust near the ground.
 
-use airframe::OutOfRange;
+use afbc_types::OutOfRange;
 
 /// Thrust near the ground over thrust far from it, at the same rotor speed: 1 / (1 - (R/4z)^2).
 ///
@@ -18,7 +18,7 @@ pub struct GroundEffect {
 /// Accepted range of each setting.
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod limits {
-    use airframe::Range;
+    use afbc_types::Range;
     pub const ROTOR_RADIUS: Range = Range::new("rotor_radius_m", 0.001, 10.0);
     pub const ROTOR_HEIGHT: Range = Range::new("rotor_height_m", -10.0, 10.0);
 }

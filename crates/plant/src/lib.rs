@@ -8,12 +8,12 @@
 //! a battery, drag, wind with gusts and turbulence, ground. [`Sensors`] stand between a plant and its controller. All of
 //! it is reproducible from a seed.
 //!
-//! Frames, units and the meaning of "(n)" are stated in [`airframe`]. Trigonometry comes from the `libm` crate, so a
+//! Frames, units and the meaning of "(n)" are stated in [`afbc_types`]. Trigonometry comes from the `libm` crate, so a
 //! flight gives the same bits on every host.
 //!
 //! ```
-//! use airframe::{Parameters, RotorSpeeds};
-//! use plant::{Environment, Model, Motion, Plant};
+//! use afbc_types::{Parameters, RotorSpeeds};
+//! use afbc_plant::{Environment, Model, Motion, Plant};
 //!
 //! let environment = Environment::calm(Parameters::PAPER)?;
 //! let mut plant = Plant::new(Model::RigidBody, Motion::default(), environment);
@@ -21,7 +21,7 @@
 //!     plant.step(&RotorSpeeds::default(), 0.001);
 //! }
 //! assert!((plant.motion().velocity_m_s.z + 9.81).abs() < 1e-9); // one second of free fall
-//! # Ok::<(), airframe::OutOfRange>(())
+//! # Ok::<(), afbc_types::OutOfRange>(())
 //! ```
 #![no_std]
 

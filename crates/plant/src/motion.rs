@@ -1,9 +1,9 @@
 //! True motion of the vehicle.
 
-use airframe::State;
+use afbc_types::State;
 use nalgebra::Vector3;
 
-/// True motion, in `f64`; the same quantities and frames as [`airframe::State`].
+/// True motion, in `f64`; the same quantities and frames as [`afbc_types::State`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion {
     /// xi, earth frame \[m\].

@@ -10,7 +10,7 @@ use crate::rotors::{Rotors, Spin};
 use crate::surroundings::Surroundings;
 use crate::vehicle::Load;
 use crate::wind::{Weather, Wind};
-use airframe::{OutOfRange, Parameters, Range, RotorSpeeds};
+use afbc_types::{OutOfRange, Parameters, Range, RotorSpeeds};
 use nalgebra::{Vector3, Vector4};
 
 /// Accepted range of a step \[s\].
@@ -26,9 +26,9 @@ pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
 /// method. All of it acts on either model; in the simplified one, d eta/dt stands for Omega here as well.
 ///
 /// ```
-/// use airframe::{Parameters, RotorSpeeds};
+/// use afbc_types::{Parameters, RotorSpeeds};
 /// use nalgebra::{Vector3, Vector4};
-/// use plant::{Drag, Environment, Model, Motion, Plant, Realism, Rotors, Turbulence, Wind};
+/// use afbc_plant::{Drag, Environment, Model, Motion, Plant, Realism, Rotors, Turbulence, Wind};
 ///
 /// let realism = Realism {
 ///     rotors: Rotors { time_constant_s: 0.02, max_rad_s: 317.0, delay_s: 0.001, ..Rotors::default() },
@@ -47,7 +47,7 @@ pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
 ///     plant.step(&RotorSpeeds(Vector4::repeat(199.9)), 0.001);
 /// }
 /// assert!(plant.motion().velocity_m_s.x > 0.1); // blown away
-/// # Ok::<(), airframe::OutOfRange>(())
+/// # Ok::<(), afbc_types::OutOfRange>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Realism {

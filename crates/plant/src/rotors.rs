@@ -2,7 +2,7 @@
 
 use crate::battery::{Battery, Charge, Discharge, Sag};
 use crate::delay::{DelayLine, whole_steps};
-use airframe::{OutOfRange, Parameters, Range};
+use afbc_types::{OutOfRange, Parameters, Range};
 use alloc::vec::Vec;
 use libm::{exp, sqrt};
 use nalgebra::Vector4;
@@ -40,7 +40,7 @@ pub enum Start {
 /// A rotor whose thrust, and with it its drag moment, is `efficiency` times what its speed gives: a worn or broken blade.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotorFault {
-    /// Which one, 1 to 4, numbered as in [`airframe`].
+    /// Which one, 1 to 4, numbered as in [`afbc_types`].
     pub rotor: u8,
     /// 1 is whole, 0 is dead. Faults of one rotor multiply.
     pub efficiency: f64,
@@ -51,7 +51,7 @@ pub struct RotorFault {
 /// Accepted range of each setting.
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod limits {
-    use airframe::Range;
+    use afbc_types::Range;
     pub const TIME_CONSTANT: Range = Range::new("time_constant_s", 0.0, 1.0);
     pub const MAX: Range = Range::new("max_rad_s", 1.0, 10_000.0);
     pub const ROTOR: Range = Range::new("rotor", 1.0, 4.0);

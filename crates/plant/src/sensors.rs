@@ -3,7 +3,7 @@
 use crate::delay::{DelayLine, whole_steps};
 use crate::motion::Motion;
 use crate::noise::{Noise, Stream};
-use airframe::{OutOfRange, State};
+use afbc_types::{OutOfRange, State};
 use libm::exp;
 use nalgebra::Vector3;
 
@@ -71,7 +71,7 @@ pub struct Sensing {
 /// Accepted range of each setting.
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod limits {
-    use airframe::Range;
+    use afbc_types::Range;
     pub const POSITION: Range = Range::new("position_m", 0.0, 100.0);
     pub const VELOCITY: Range = Range::new("velocity_m_s", 0.0, 100.0);
     pub const ATTITUDE: Range = Range::new("attitude_rad", 0.0, 1.0);

@@ -3,7 +3,7 @@
 use crate::body_axes::BodyAxes;
 use crate::contact::Ground;
 use crate::drag::HeldDrag;
-use airframe::Parameters;
+use afbc_types::Parameters;
 use nalgebra::Vector3;
 
 /// Air and ground over one step: the wind is held, drag and contact follow the motion within it.

@@ -1,7 +1,7 @@
 //! Dryden turbulence near the ground.
 
 use crate::noise::Noise;
-use airframe::OutOfRange;
+use afbc_types::OutOfRange;
 use libm::{exp, pow, sqrt};
 use nalgebra::Vector3;
 
@@ -22,7 +22,7 @@ pub struct Turbulence {
 /// Accepted range of each setting.
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod limits {
-    use airframe::Range;
+    use afbc_types::Range;
     pub const WIND_20FT: Range = Range::new("wind_20ft_m_s", 0.0, 50.0);
     pub const AIRSPEED_FLOOR: Range = Range::new("airspeed_floor_m_s", 0.1, 50.0);
 }

@@ -7,7 +7,7 @@ use crate::motion::Motion;
 use crate::realism::{Effects, Realism, Telemetry};
 use crate::surroundings::Surroundings;
 use crate::{rigid_body, simplified};
-use airframe::{OutOfRange, Parameters, RotorSpeeds};
+use afbc_types::{OutOfRange, Parameters, RotorSpeeds};
 use alloc::boxed::Box;
 use nalgebra::Vector3;
 

@@ -2,7 +2,7 @@
 
 use crate::noise::{Noise, Stream};
 use crate::turbulence::{Eddies, Turbulence};
-use airframe::OutOfRange;
+use afbc_types::OutOfRange;
 use alloc::vec::Vec;
 use core::f64::consts::PI;
 use libm::{cos, sqrt};
@@ -40,7 +40,7 @@ pub struct CosineGust {
 /// Accepted range of each setting.
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod limits {
-    use airframe::Range;
+    use afbc_types::Range;
     pub const STEADY: Range = Range::new("steady_m_s", -50.0, 50.0);
     pub const GUST: Range = Range::new("velocity_m_s", -50.0, 50.0);
     pub const START: Range = Range::new("start_s", 0.0, f64::INFINITY);

@@ -1,9 +1,9 @@
 //! Rotors against closed forms, the battery against its own energy.
 #![allow(clippy::unwrap_used, clippy::float_cmp, missing_docs)]
 
-use airframe::{Parameters, RotorSpeeds};
+use afbc_plant::{Battery, Charge, Environment, Model, Motion, Plant, Realism, RotorFault, Rotors, Sag, Start};
+use afbc_types::{Parameters, RotorSpeeds};
 use nalgebra::{Vector3, Vector4};
-use plant::{Battery, Charge, Environment, Model, Motion, Plant, Realism, RotorFault, Rotors, Sag, Start};
 
 const STEP_S: f64 = 0.001;
 const P: Parameters<f64> = Parameters::PAPER;

@@ -1,10 +1,10 @@
 //! What physics conserves, the models must conserve; what is known in closed form, they must reproduce.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a plant that cannot be built must stop the test
 
-use airframe::{Parameters, RotorSpeeds};
+use afbc_plant::integrate::rk4;
+use afbc_plant::{Environment, Load, Model, Motion, Plant, rigid_body, simplified};
+use afbc_types::{Parameters, RotorSpeeds};
 use nalgebra::{Matrix3, SVector, Vector3, Vector4};
-use plant::integrate::rk4;
-use plant::{Environment, Load, Model, Motion, Plant, rigid_body, simplified};
 use proptest::prelude::*;
 
 const G: f64 = 9.81;
@@ -31,7 +31,7 @@ fn motion() -> impl Strategy<Value = Motion> {
     )
 }
 
-/// Body to earth: Rz(psi) Ry(theta) Rx(phi), written out from the convention of `airframe`.
+/// Body to earth: Rz(psi) Ry(theta) Rx(phi), written out from the convention of `afbc-types`.
 fn r_earth_body(eta: &Vector3<f64>) -> Matrix3<f64> {
     let (sx, cx) = eta.x.sin_cos();
     let (sy, cy) = eta.y.sin_cos();

@@ -1,9 +1,9 @@
 //! The ground holds what stands and stops what falls; near it, thrust grows.
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use airframe::{Parameters, RotorSpeeds};
+use afbc_plant::{Contact, Environment, GroundEffect, Model, Motion, Payload, Plant, Realism};
+use afbc_types::{Parameters, RotorSpeeds};
 use nalgebra::{Rotation3, Vector3, Vector4};
-use plant::{Contact, Environment, GroundEffect, Model, Motion, Payload, Plant, Realism};
 use proptest::prelude::*;
 
 const STEP_S: f64 = 0.001;

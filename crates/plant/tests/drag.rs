@@ -1,9 +1,9 @@
 //! Drag against closed forms.
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use airframe::{Axis, Parameters, RotorSpeeds};
+use afbc_plant::{Drag, Environment, Gust, GustKind, Model, Motion, Plant, Realism, Wind};
+use afbc_types::{Axis, Parameters, RotorSpeeds};
 use nalgebra::{Matrix3, Rotation3, Vector3, Vector4};
-use plant::{Drag, Environment, Gust, GustKind, Model, Motion, Plant, Realism, Wind};
 use proptest::prelude::*;
 
 const STEP_S: f64 = 0.001;

@@ -1,9 +1,9 @@
 //! Gusts and parameter changes: how much, from exactly when, until exactly when.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // an environment that cannot be built must stop the test
 
-use airframe::{Axis, Parameters, RotorSpeeds};
+use afbc_plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Plant, Quantity};
+use afbc_types::{Axis, Parameters, RotorSpeeds};
 use nalgebra::{Vector3, Vector4};
-use plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Plant, Quantity};
 use proptest::prelude::*;
 
 const P: Parameters<f64> = Parameters::PAPER;

@@ -1,12 +1,12 @@
 //! The paper's plant is not touched by what can be added to it.
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use airframe::{Axis, Parameters, RotorSpeeds};
-use nalgebra::{Vector3, Vector4};
-use plant::integrate::rk4;
-use plant::{
+use afbc_plant::integrate::rk4;
+use afbc_plant::{
     Environment, Gust, GustKind, Load, Model, Motion, ParameterChange, Plant, Quantity, Realism, rigid_body, simplified,
 };
+use afbc_types::{Axis, Parameters, RotorSpeeds};
+use nalgebra::{Vector3, Vector4};
 
 const STEP_S: f64 = 0.001;
 const STEPS: u16 = 2000;

@@ -1,7 +1,7 @@
 //! Random numbers against what their distribution says, at five standard errors and fixed seeds.
 #![allow(clippy::indexing_slicing, missing_docs)]
 
-use plant::noise::{Noise, Stream};
+use afbc_plant::noise::{Noise, Stream};
 
 const N: usize = 2_000_000;
 

@@ -1,12 +1,12 @@
 //! Everything together: reproducible by seed, and finite whatever it is given.
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use airframe::{Parameters, RotorSpeeds};
-use nalgebra::{Vector3, Vector4};
-use plant::{
+use afbc_plant::{
     Battery, Contact, CosineGust, Drag, Dropouts, Environment, GroundEffect, Model, Motion, Plant, Realism, RotorFault,
     Rotors, Sag, Sensing, Sensors, Spread, Start, Turbulence, Wind,
 };
+use afbc_types::{Parameters, RotorSpeeds};
+use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
 
 const STEP_S: f64 = 0.001;

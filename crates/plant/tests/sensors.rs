@@ -1,8 +1,8 @@
 //! Sensors against their own settings.
 #![allow(clippy::unwrap_used, clippy::float_cmp, clippy::indexing_slicing, missing_docs)]
 
+use afbc_plant::{Dropouts, Measurement, Motion, Sensing, Sensors, Spread};
 use nalgebra::Vector3;
-use plant::{Dropouts, Measurement, Motion, Sensing, Sensors, Spread};
 
 const STEP_S: f64 = 0.001;
 

@@ -5,9 +5,9 @@
 //! That integral is L/V for the longitudinal velocity and 5/8 L/V for the others. Bounds are five standard errors.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
 
-use airframe::{Axis, Parameters, RotorSpeeds};
+use afbc_plant::{CosineGust, Environment, Gust, GustKind, Model, Motion, Plant, Realism, Turbulence, Wind};
+use afbc_types::{Axis, Parameters, RotorSpeeds};
 use nalgebra::Vector3;
-use plant::{CosineGust, Environment, Gust, GustKind, Model, Motion, Plant, Realism, Turbulence, Wind};
 
 const FOOT_M: f64 = 0.3048;
 const P: Parameters<f64> = Parameters::PAPER;

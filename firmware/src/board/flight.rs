@@ -3,6 +3,7 @@
 use crate::control::Tick;
 use crate::executors::priority;
 use crate::{clocks, reset};
+use afbc_flight_core::dshot::{BIT_RATE_HZ, Timing};
 use core::future::poll_fn;
 use core::pin::pin;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -24,7 +25,6 @@ use embassy_sync::signal::Signal;
 use embassy_time::{Instant, with_deadline};
 use embedded_io_async::{BufRead, Write};
 use static_cell::StaticCell;
-use vehicle::dshot::{BIT_RATE_HZ, Timing};
 
 /// Bits per second of the link.
 const BAUD: u32 = 921_600;

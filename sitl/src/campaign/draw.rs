@@ -3,8 +3,8 @@
 use super::quantity::{self, QUANTITIES, Quantity};
 use super::{Campaign, Course, Spread};
 use crate::scenario::Scenario;
-use airframe::OutOfRange;
-use plant::noise::{Noise, Stream};
+use afbc_plant::noise::{Noise, Stream};
+use afbc_types::OutOfRange;
 
 /// What one flight has drawn.
 #[derive(Clone, Debug, PartialEq)]

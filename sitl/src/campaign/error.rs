@@ -2,7 +2,7 @@
 
 use super::Shard;
 use crate::output;
-use airframe::OutOfRange;
+use afbc_types::OutOfRange;
 use std::fmt;
 use std::io;
 use std::path::PathBuf;

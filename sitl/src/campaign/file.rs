@@ -5,7 +5,7 @@ use crate::scenario::file;
 use crate::scenario::reader::Table;
 use crate::scenario::words::out_of_range;
 use crate::scenario::{DURATION, FileError, Scenario, built_in, similar_built_in};
-use airframe::Range;
+use afbc_types::Range;
 use std::path::{Path, PathBuf};
 
 /// Accepted number of flights.
@@ -118,7 +118,7 @@ fn spreads(mut table: Table<'_>, scenario: &Scenario) -> Result<Vec<Spread>, Fil
 
 /// Why drawing this quantity would change nothing, if so.
 fn idle(name: &str, scenario: &Scenario) -> Option<&'static str> {
-    let still = plant::Spread::default();
+    let still = afbc_plant::Spread::default();
     match name {
         "wind_m_s" | "wind_20ft_m_s" if scenario.realism.drag.is_none() => {
             Some("wind does nothing to a vehicle without drag; add [drag] to the scenario")

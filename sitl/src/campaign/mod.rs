@@ -29,7 +29,7 @@ pub use summary::{BINS, Bad, Count, Summary, Tally};
 
 use crate::scenario::Scenario;
 use crate::trajectory::Trajectory;
-use plant::Motion;
+use afbc_plant::Motion;
 
 /// A quantity and the interval that it is drawn from, evenly; a single value if both ends are the same.
 #[derive(Clone, Copy, Debug)]

@@ -1,10 +1,10 @@
 //! What can be drawn, quantity by quantity.
 
 use crate::scenario::Scenario;
-use airframe::{OutOfRange, Parameters, Range};
+use afbc_plant::{Dropouts, Environment, Payload, RotorFault, Spread, Turbulence};
+use afbc_types::{OutOfRange, Parameters, Range};
 use core::f64::consts::TAU;
 use nalgebra::Vector3;
-use plant::{Dropouts, Environment, Payload, RotorFault, Spread, Turbulence};
 
 /// One quantity that a campaign may draw.
 pub struct Quantity {

@@ -6,7 +6,7 @@ use crate::flight::{Lost, fly};
 use crate::metrics::{Accumulator, Metrics, is_settled, tracking_error};
 use crate::scenario::Scenario;
 use afbc::monitor::Trip;
-use airframe::OutOfRange;
+use afbc_types::OutOfRange;
 
 /// One flight of one contender: a row of the results.
 #[derive(Clone, Debug, PartialEq)]

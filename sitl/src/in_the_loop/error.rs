@@ -1,6 +1,6 @@
 //! What stops a flight in the loop.
 
-use airframe::OutOfRange;
+use afbc_types::OutOfRange;
 use std::fmt;
 use std::io;
 

@@ -5,10 +5,10 @@ use crate::flight::{Lost, Sample, lost};
 use crate::scenario::{Contender, ControllerKind, Law, Scenario};
 use crate::trajectory::Reference;
 use afbc::Profile;
-use airframe::{Parameters, PerAxis, RotorForces};
+use afbc_link::{Answer, Command};
+use afbc_plant::{Measurement, Motion, Sensors};
+use afbc_types::{Parameters, PerAxis, RotorForces};
 use core::ops::ControlFlow;
-use link::{Answer, Command};
-use plant::{Measurement, Motion, Sensors};
 
 /// Time between control ticks, and one step of the plant \[s\].
 const STEP_S: f64 = 0.001;

@@ -1,10 +1,10 @@
 //! The firmware's code in this process.
 
 use super::{Autopilot, Error};
-use airframe::OutOfRange;
-use onboard::{Comms, Flight, Report};
-use vehicle::Inbox;
-use vehicle::rate::PERIOD_US;
+use afbc_flight_core::Inbox;
+use afbc_flight_core::rate::PERIOD_US;
+use afbc_onboard::{Comms, Flight, Report};
+use afbc_types::OutOfRange;
 
 /// What the firmware is without its hardware, ticked in lockstep.
 pub struct Host {

@@ -1,5 +1,5 @@
 //! Flights in which the autopilot is the firmware, or stands in for it: the plant here, the law there, and between them
-//! nothing but the bytes of [`link`].
+//! nothing but the bytes of [`afbc_link`].
 //!
 //! # Reading order
 //!

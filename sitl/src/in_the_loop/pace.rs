@@ -69,8 +69,8 @@ fn least_baud() -> u32 {
 #[allow(clippy::unwrap_used, reason = "a test")]
 mod tests {
     use super::*;
-    use airframe::{Setpoint, State};
-    use link::{Address, Command, FRAME_MAX, MavCmd, Sender, Uplink};
+    use afbc_link::{Address, Command, FRAME_MAX, MavCmd, Sender, Uplink};
+    use afbc_types::{Setpoint, State};
 
     #[test]
     fn frames_are_as_long_as_said() {

@@ -1,7 +1,7 @@
 //! A board at the end of a serial port.
 
 use super::{Autopilot, Error, Station};
-use link::Command;
+use afbc_link::Command;
 use serialport::SerialPort;
 use std::io;
 use std::thread;

@@ -1,11 +1,13 @@
 //! The other end of the link.
 
 use super::Spread;
-use airframe::{RotorSpeeds, Setpoint, State};
-use link::{Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, Health, MavCmd, Sender, Text, Uplink};
-use onboard::BUSY;
+use afbc_flight_core::Refusal;
+use afbc_link::{
+    Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, Health, MavCmd, Sender, Text, Uplink,
+};
+use afbc_onboard::BUSY;
+use afbc_types::{RotorSpeeds, Setpoint, State};
 use std::time::Instant;
-use vehicle::Refusal;
 
 /// A ground station, by the usual numbers.
 const ADDRESS: Address = Address { system: 255, component: 190 };

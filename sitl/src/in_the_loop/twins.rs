@@ -1,7 +1,7 @@
 //! The processor beside the host.
 
 use super::{Autopilot, Error, Host, Spread, Tick};
-use airframe::OutOfRange;
+use afbc_types::OutOfRange;
 use pil::{Emulator, Reply};
 
 /// The emulated processor flies; the host gets the same bytes at the same times, and every output of every tick is

@@ -6,10 +6,10 @@ use crate::flight::Sample;
 use crate::scenario::Scenario;
 use afbc::cascade::Context;
 use afbc::model::Model;
-use airframe::{Axis, Parameters, PerAxis, State};
+use afbc_plant::{Sensing, Telemetry};
+use afbc_types::{Axis, Parameters, PerAxis, State};
 use csv::ByteRecord;
 use nalgebra::Vector4;
-use plant::{Sensing, Telemetry};
 use std::io::{self, Write};
 
 /// A value, written in as few digits as give it back exactly.
@@ -208,7 +208,7 @@ fn real(scenario: &Scenario) -> Vec<Column> {
 }
 
 /// U1..U4 as the rotors give them.
-fn given(sample: &Sample) -> airframe::Inputs {
+fn given(sample: &Sample) -> afbc_types::Inputs {
     afbc::allocation::Mixer::inputs(&sample.command.forces)
 }
 

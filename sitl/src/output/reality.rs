@@ -1,7 +1,7 @@
 //! What a scenario adds to the paper's vehicle, in the report's words.
 
 use crate::scenario::Scenario;
-use plant::{Rotors, Sensing, Spread};
+use afbc_plant::{Rotors, Sensing, Spread};
 
 /// Name and value of each part that is there.
 pub(super) fn rows(scenario: &Scenario) -> Vec<(&'static str, String)> {

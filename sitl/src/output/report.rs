@@ -8,7 +8,7 @@ use crate::contender::{Contender, Law};
 use crate::scenario::Scenario;
 use crate::trajectory::Trajectory;
 use afbc::{Limits, Settings};
-use airframe::Axis;
+use afbc_types::Axis;
 use core::convert::Infallible;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 

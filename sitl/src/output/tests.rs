@@ -5,8 +5,8 @@ use crate::claims::Claim;
 use crate::paper::{Case, Reading, scenario};
 use crate::scenario::{Contender, ControllerKind, built_in};
 use afbc::Profile;
+use afbc_plant::{Environment, Gust, GustKind, Model, ParameterChange, Quantity};
 use nalgebra::Vector3;
-use plant::{Environment, Gust, GustKind, Model, ParameterChange, Quantity};
 use std::collections::{BTreeMap, HashSet};
 use std::fs;
 
@@ -122,7 +122,7 @@ fn csv_holds_every_logged_step() {
     // z - z_d = -1.5 m at rest, alpha_1 = 3, g_4 = 1/m: V = 1.5^2/2 + (3 * 1.5)^2/2 * 0.486.
     assert!((value(0, "e2_z_m_s") - 4.5).abs() < 1e-6);
     assert!((value(0, "lyapunov_z") - (1.125 + 10.125 * 0.486)).abs() < 1e-5);
-    let sum: f64 = airframe::Axis::ALL.iter().map(|axis| value(0, &format!("lyapunov_{}", axis.name()))).sum();
+    let sum: f64 = afbc_types::Axis::ALL.iter().map(|axis| value(0, &format!("lyapunov_{}", axis.name()))).sum();
     assert!((value(0, "lyapunov_sum") - sum).abs() < 1e-5);
 }
 
@@ -170,7 +170,7 @@ fn odd_flights_have_figures_too() {
     let calm = Scenario { name: "".into(), ..paper(Reading::Persistent, 0.1) };
     // Everything at once, under a name made to break files and markup.
     let gust = |axis, size| Gust { axis, kind: GustKind::Force, size, start_s: 1.0, end_s: 1.5 };
-    let gusts = airframe::Axis::ALL.map(|axis| gust(axis, 0.001)).to_vec();
+    let gusts = afbc_types::Axis::ALL.map(|axis| gust(axis, 0.001)).to_vec();
     let change = ParameterChange { quantity: Quantity::Mass, factor: 1.013, start_s: 0.5, end_s: f64::INFINITY };
     let stormy = Scenario {
         name: "../a <b> & \"c\" ⟨d⟩".into(),

@@ -4,10 +4,10 @@ use crate::paper::{Reading, Sign};
 use crate::run::Tripped;
 use crate::scenario::{Contender, Scenario};
 use afbc::Profile;
-use airframe::Axis;
-use plant::{
+use afbc_plant::{
     CosineGust, Gust, GustKind, ParameterChange, Payload, Quantity, Realism, RotorFault, Rotors, Sensing, Wind,
 };
+use afbc_types::Axis;
 
 /// A file name without its ending: letters, digits, `-` and `_` of `name`, anything else as `-`.
 pub(super) fn slug(name: &str) -> String {

@@ -17,8 +17,8 @@ pub use crate::contender::{Contender, ControllerKind, Law};
 use crate::aboard::ARMING_TILT;
 use crate::paper::Case;
 use crate::trajectory::Trajectory;
-use airframe::{OutOfRange, Parameters, Range};
-use plant::{Environment, Model, Motion, Plant, Realism, Sensing, Sensors};
+use afbc_plant::{Environment, Model, Motion, Plant, Realism, Sensing, Sensors};
+use afbc_types::{OutOfRange, Parameters, Range};
 
 /// Accepted length of a flight \[s\].
 pub const DURATION: Range = Range::new("duration_s", 0.1, 36_000.0);
@@ -96,7 +96,7 @@ impl Scenario {
         }
         ARMING_TILT.check(self.initial.attitude_rad.x)?;
         ARMING_TILT.check(self.initial.attitude_rad.y)?;
-        self.contenders.iter().try_for_each(|contender| vehicle::tick::DT.check(contender.settings.dt_s))
+        self.contenders.iter().try_for_each(|contender| afbc_flight_core::tick::DT.check(contender.settings.dt_s))
     }
 
     /// True if rotors, air and ground are those of the paper's equations.

@@ -2,7 +2,7 @@
 
 use super::error::{FileError, Source};
 use super::words::{self, did_you_mean, nearest, one_of};
-use airframe::Range;
+use afbc_types::Range;
 use nalgebra::Vector3;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};

@@ -1,6 +1,6 @@
 //! Words for people: units, numbers, suggestions.
 
-use airframe::OutOfRange;
+use afbc_types::OutOfRange;
 
 /// How alike two words must be for "did you mean".
 const LIKENESS: f64 = 0.8;

@@ -7,8 +7,8 @@
 //! Written out here because a library's takes its logarithms and exponentials from the platform, and a search that differs
 //! in the last bit soon differs in all of them; here the same seed gives the same search on every machine.
 
+use afbc_plant::noise::{Noise, Stream};
 use libm::{exp, log, sqrt};
-use plant::noise::{Noise, Stream};
 
 /// A search for the smallest value of a function of a few numbers.
 #[derive(Clone, Debug)]

@@ -5,9 +5,11 @@
 
 use crate::scenario::{FileError, Outage, Scenario, parse};
 use crate::trajectory::{Sine, Trajectory, Waypoint};
-use airframe::Axis;
+use afbc_plant::{
+    Contact, Drag, Environment, GroundEffect, Gust, GustKind, Motion, ParameterChange, Quantity, Turbulence,
+};
+use afbc_types::Axis;
 use nalgebra::Vector3;
-use plant::{Contact, Drag, Environment, GroundEffect, Gust, GustKind, Motion, ParameterChange, Quantity, Turbulence};
 use std::error::Error;
 
 /// When things go wrong \[s\]: errors count by then.

@@ -5,7 +5,7 @@ use crate::scenario::ControllerKind;
 use afbc::command_filter::BANDWIDTH;
 use afbc::limits::{ACCELERATION, CLIMB, SPEED, TILT, TILT_RATE};
 use afbc::{Profile, allocation::FORCE_MAX};
-use airframe::{Axis, PerAxis, Range};
+use afbc_types::{Axis, PerAxis, Range};
 use core::convert::Infallible;
 use core::fmt::Write;
 

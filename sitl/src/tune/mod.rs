@@ -16,7 +16,7 @@ pub use start::by_hand;
 use crate::metrics::Metrics;
 use crate::run::Run;
 use crate::scenario::{Contender, Scenario};
-use airframe::OutOfRange;
+use afbc_types::OutOfRange;
 use cma_es::Search;
 use rayon::prelude::*;
 

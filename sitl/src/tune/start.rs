@@ -2,8 +2,8 @@
 
 use crate::contender::{Contender, ControllerKind, Law, backstepping_part};
 use afbc::{Profile, adaptive};
-use airframe::{Axis, PerAxis};
-use peers::{geometric, indi, pid};
+use afbc_peers::{geometric, indi, pid};
+use afbc_types::{Axis, PerAxis};
 
 /// Of the command filter, for AFBC and backstepping \[rad/s\].
 const FILTER_RAD_S: f32 = 40.0;

@@ -14,7 +14,7 @@ use afbc::fuzzy::Membership;
 use afbc::limits::{ACCELERATION, CLIMB, SPEED, TILT, TILT_RATE};
 use afbc::safeguards::{DEAD_ZONE, DELTA_MAX, KAPPA, SIGMA, THETA_MAX};
 use afbc::{Command, Limits, Profile, Safeguards, Settings};
-use airframe::{Axis, Parameters, PerAxis, Range, Setpoint, State};
+use afbc_types::{Axis, Parameters, PerAxis, Range, Setpoint, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 

@@ -1,5 +1,5 @@
 //! Which frames a stream holds, by MAVLink's specification (<https://mavlink.io/en/guide/serialization.html>) and the
-//! rules that `link::Decoder` states: written from these alone, over the whole stream at once, to judge the decoder by.
+//! rules that `afbc_link::Decoder` states: written from these alone, over the whole stream at once, to judge the decoder by.
 #![allow(clippy::indexing_slicing, unreachable_pub, reason = "shared by tests")]
 
 /// A frame whose checksum is right.

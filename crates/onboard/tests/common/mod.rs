@@ -1,10 +1,10 @@
 //! The firmware without its hardware, and stations that talk to it.
 #![allow(dead_code, unreachable_pub, clippy::expect_used, reason = "shared by tests")]
 
-use airframe::{Setpoint, State};
-use link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
-use onboard::{Comms, Flight, REPORT_MAX, Report};
-use vehicle::Inbox;
+use afbc_flight_core::Inbox;
+use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
+use afbc_onboard::{Comms, Flight, REPORT_MAX, Report};
+use afbc_types::{Setpoint, State};
 
 pub const STATION: Address = Address { system: 255, component: 190 };
 

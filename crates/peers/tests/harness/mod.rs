@@ -3,9 +3,9 @@
 #![allow(dead_code, reason = "each test file uses a part")]
 
 use afbc::{Command, FlightController, Memory, Profile, Settings};
-use airframe::{Axis, Parameters, RotorSpeeds, Setpoint, State};
+use afbc_plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Plant, Quantity};
+use afbc_types::{Axis, Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
-use plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Plant, Quantity};
 use std::collections::VecDeque;
 
 /// 1 kHz and 3 N a rotor.

@@ -5,7 +5,7 @@ use super::{FileError, Table};
 use crate::contender::{Contender, ControllerKind, Law, backstepping_part};
 use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
-use airframe::{Parameters, PerAxis};
+use afbc_types::{Parameters, PerAxis};
 
 /// Longest name of a contender: what a table has room for.
 const NAME_LENGTH: usize = 32;

@@ -11,7 +11,7 @@ use afbc::fuzzy::{CENTRE, Membership, WIDTH};
 use afbc::limits::{ACCELERATION, CLIMB, SPEED, TILT, TILT_RATE};
 use afbc::safeguards::{DEAD_ZONE, DELTA_MAX, KAPPA, SIGMA, THETA_MAX};
 use afbc::{Limits, Safeguards, Settings};
-use airframe::{Axis, PerAxis, Range};
+use afbc_types::{Axis, PerAxis, Range};
 
 /// One table for each axis; what is left out is as in `default`.
 pub(super) fn per_axis<G: Copy>(

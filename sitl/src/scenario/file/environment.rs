@@ -3,8 +3,8 @@
 use super::{FileError, Table};
 use crate::scenario::Outage;
 use crate::scenario::words::out_of_range;
-use airframe::{Axis, Parameters, Range};
-use plant::{Environment, Gust, GustKind, PAYLOAD_BELOW, ParameterChange, Payload, Quantity};
+use afbc_plant::{Environment, Gust, GustKind, PAYLOAD_BELOW, ParameterChange, Payload, Quantity};
+use afbc_types::{Axis, Parameters, Range};
 
 /// Accepted start of whatever happens in flight \[s\].
 pub(super) const START: Range = Range::new("start_s", 0.0, 36_000.0);
@@ -13,7 +13,7 @@ pub(super) const LENGTH: Range = Range::new("duration_s", 0.001, 36_000.0);
 /// Accepted factor of a change; the parameter must stay in range too.
 const FACTOR: Range = Range::new("factor", 0.001, 1000.0);
 /// Accepted mass of a payload \[kg\].
-const PAYLOAD_MASS: Range = Range::new("mass_kg", 0.0, plant::PAYLOAD_MASS.max);
+const PAYLOAD_MASS: Range = Range::new("mass_kg", 0.0, afbc_plant::PAYLOAD_MASS.max);
 
 /// How large a gust along x, y or z may be.
 const LINEAR: [(Range, GustKind); 2] = [

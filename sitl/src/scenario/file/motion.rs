@@ -2,9 +2,9 @@
 
 use super::{FileError, Table};
 use crate::trajectory::Reference;
-use airframe::Range;
+use afbc_plant::Motion;
+use afbc_types::Range;
 use nalgebra::Vector3;
-use plant::Motion;
 
 /// Accepted coordinates \[m\].
 pub(super) const POSITION: Range = Range::new("position_m", -1e4, 1e4);

@@ -3,12 +3,12 @@
 use super::environment::{LENGTH, START};
 use super::{FileError, Table};
 use crate::scenario::words::out_of_range;
-use airframe::{OutOfRange, Parameters, Range};
-use plant::rotors::limits::{EFFICIENCY, MAX, ROTOR, TIME_CONSTANT};
-use plant::{
+use afbc_plant::rotors::limits::{EFFICIENCY, MAX, ROTOR, TIME_CONSTANT};
+use afbc_plant::{
     Battery, Contact, CosineGust, DELAY, Drag, GroundEffect, Realism, RotorFault, Rotors, Sag, Start, Turbulence, Wind,
     battery, contact, drag, ground_effect, turbulence, wind,
 };
+use afbc_types::{OutOfRange, Parameters, Range};
 
 /// Accepted smallest speed of a rotor \[rad/s\]; no more than the largest.
 const MIN: Range = Range::new("min_rad_s", 0.0, MAX.max);

@@ -1,9 +1,9 @@
 //! `[sensors]`: what reaches the controllers of the true motion.
 
 use super::{FileError, Table};
-use airframe::Range;
-use plant::sensors::limits::{ATTITUDE, DROPOUT_MEAN, DROPOUT_RATE, POSITION, RATES, VELOCITY};
-use plant::{DELAY, Dropouts, Sensing, Spread};
+use afbc_plant::sensors::limits::{ATTITUDE, DROPOUT_MEAN, DROPOUT_RATE, POSITION, RATES, VELOCITY};
+use afbc_plant::{DELAY, Dropouts, Sensing, Spread};
+use afbc_types::Range;
 
 /// Accepted size of one number for all of the state: what every part of it accepts.
 const NOISE: Range = Range::new("noise", 0.0, ATTITUDE.max);

@@ -7,8 +7,8 @@ use crate::paper::{self, Case};
 use crate::scenario::{BUILT_IN, Contender, FileError, Law, Scenario, built_in};
 use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
-use peers::pid;
-use plant::Model;
+use afbc_peers::pid;
+use afbc_plant::Model;
 
 #[test]
 fn built_in_paper_is_the_paper() {

@@ -3,7 +3,7 @@
 use super::motion::POSITION;
 use super::{FileError, Table};
 use crate::trajectory::{Sine, Trajectory, Waypoint};
-use airframe::{Range, Setpoint};
+use afbc_types::{Range, Setpoint};
 use core::f64::consts::TAU;
 use nalgebra::Vector3;
 

@@ -1,7 +1,7 @@
 //! `[vehicle]`, what the controller believes, and `[truth]`, what flies.
 
 use super::{FileError, Table};
-use airframe::{Parameters, limits};
+use afbc_types::{Parameters, limits};
 
 /// The parameters in `table`; those that it leaves out are as in `default`.
 pub(super) fn read(table: Option<Table<'_>>, default: Parameters<f64>) -> Result<Parameters<f64>, FileError> {

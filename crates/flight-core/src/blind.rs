@@ -21,7 +21,7 @@
 //! second, and the descent that follows for two seconds.
 
 use afbc::math::{max, min};
-use airframe::{Inputs, Parameters, State};
+use afbc_types::{Inputs, Parameters, State};
 use nalgebra::{Vector2, Vector3};
 
 /// w: bandwidth of the hold \[rad/s\].

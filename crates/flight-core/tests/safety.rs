@@ -3,12 +3,14 @@
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc::{Command, FlightController, Profile};
-use airframe::{Parameters, RotorForces, RotorSpeeds, Setpoint, State};
+use afbc_flight_core::supervisor::REST_US;
+use afbc_flight_core::{
+    Answer, ArmingLimits, Asked, End, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle,
+};
+use afbc_types::{Parameters, RotorForces, RotorSpeeds, Setpoint, State};
 use core::f32::consts::{PI, TAU};
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use vehicle::supervisor::REST_US;
-use vehicle::{Answer, ArmingLimits, Asked, End, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle};
 
 const WEIGHT_N: f32 = 0.486 * 9.81;
 

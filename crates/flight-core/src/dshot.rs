@@ -4,7 +4,7 @@
 //! for 3/4 and 3/8 of the bit. A timer that counts a bit per period and takes each pulse's length from memory plays the
 //! [`Waveform`].
 
-use airframe::{OutOfRange, Range};
+use afbc_types::{OutOfRange, Range};
 
 /// Bits in a second.
 pub const BIT_RATE_HZ: u32 = 600_000;

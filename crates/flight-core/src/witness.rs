@@ -10,7 +10,7 @@
 //! of the flight. A pose that stands within noise while the vehicle hovers cannot be told from a vehicle that does.
 
 use afbc::math::abs_max;
-use airframe::State;
+use afbc_types::State;
 use nalgebra::Vector3;
 
 /// Time over which displacements are compared \[us\].

@@ -1,7 +1,7 @@
 //! What a tick works from: the newest of everything, when it was measured, and what is asked for.
 
 use crate::supervisor::Request;
-use airframe::{Setpoint, State};
+use afbc_types::{Setpoint, State};
 
 /// A value and the time it belongs to, on the vehicle's clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

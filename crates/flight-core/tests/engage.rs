@@ -2,8 +2,8 @@
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc::{Command, FlightController, Profile};
-use airframe::{Parameters, RotorForces, Setpoint, State};
-use vehicle::{ArmingLimits, Asked, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle};
+use afbc_flight_core::{ArmingLimits, Asked, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle};
+use afbc_types::{Parameters, RotorForces, Setpoint, State};
 
 /// Counts how often it is engaged, and carries the vehicle.
 struct Counter;

@@ -1,8 +1,8 @@
 //! The rate's limits, and ticks at the wrong time.
 #![allow(clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
+use afbc_flight_core::rate::{Counter, EARLY_US, LATE_US, Report, TICKS_MAX, TICKS_MIN, WINDOW_US};
 use proptest::prelude::*;
-use vehicle::rate::{Counter, EARLY_US, LATE_US, Report, TICKS_MAX, TICKS_MIN, WINDOW_US};
 
 /// The report after ticks every `period_us` for `seconds`.
 fn after(period_us: f64, seconds: f64) -> Report {

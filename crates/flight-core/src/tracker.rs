@@ -6,7 +6,7 @@
 use crate::clock::SourceClock;
 use crate::inbox::Stamped;
 use crate::supervisor::RIDE_US;
-use airframe::State;
+use afbc_types::State;
 
 /// Senders whose clocks are known at once; another one takes the place of the one that was silent for longest.
 pub const SENDERS_MAX: usize = 4;

@@ -2,7 +2,7 @@
 //! the tumble checks of autopilots (PX4's failure detector, the Crazyflie's supervisor).
 
 use afbc::math;
-use airframe::State;
+use afbc_types::State;
 
 /// Cosine of the tilt below which a vehicle lies on its side or its back: 80 degrees.
 pub const TILT_COSINE_MIN: f32 = 0.17;

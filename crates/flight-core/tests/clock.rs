@@ -2,11 +2,11 @@
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc::{Adaptive, Controller, Profile};
-use airframe::{Parameters, Setpoint, State};
+use afbc_flight_core::clock::SILENCE_US;
+use afbc_flight_core::tracker::{Refused, SILENT_US};
+use afbc_flight_core::{ArmingLimits, Asked, Inbox, Memory, Mode, Request, SourceClock, Stamped, Tracker, Vehicle};
+use afbc_types::{Parameters, Setpoint, State};
 use proptest::prelude::*;
-use vehicle::clock::SILENCE_US;
-use vehicle::tracker::{Refused, SILENT_US};
-use vehicle::{ArmingLimits, Asked, Inbox, Memory, Mode, Request, SourceClock, Stamped, Tracker, Vehicle};
 
 /// When the vehicle is armed, when something happens to the clock, and when the case ends \[us since power-up\].
 const ARM_US: u64 = 2_000_000;

@@ -3,9 +3,9 @@
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc::{Adaptive, Controller, Profile};
-use airframe::{Parameters, RotorSpeeds, Setpoint, State};
-use link::{Address, Command, Counters, Decoder, FRAME_MAX, Sender, Uplink};
-use vehicle::{Answer, ArmingLimits, Asked, Inbox, Memory, Mode, Refusal, Request, Stamped, Tracker, Vehicle};
+use afbc_flight_core::{Answer, ArmingLimits, Asked, Inbox, Memory, Mode, Refusal, Request, Stamped, Tracker, Vehicle};
+use afbc_link::{Address, Command, Counters, Decoder, FRAME_MAX, Sender, Uplink};
+use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
 
 const STATION: Address = Address { system: 255, component: 190 };
 const VEHICLE: Address = Address { system: 1, component: 1 };

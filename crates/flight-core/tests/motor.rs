@@ -1,11 +1,11 @@
 //! From rotor speed to throttle to frame to waveform.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use airframe::RotorSpeeds;
+use afbc_flight_core::dshot::{Frame, Timing};
+use afbc_flight_core::motor::{Curve, Motor};
+use afbc_types::RotorSpeeds;
 use nalgebra::Vector4;
 use proptest::prelude::*;
-use vehicle::dshot::{Frame, Timing};
-use vehicle::motor::{Curve, Motor};
 
 fn motor(linearity: f32, idle: f32) -> Motor {
     Motor::new(Curve { speed_max_rad_s: 1000.0, linearity, idle }).expect("valid")

@@ -1,7 +1,7 @@
 //! Arming and failsafe: the five things that may be asked for, the four modes, and what leads from one to another.
 
 use afbc::math::abs_max;
-use airframe::{OutOfRange, Range, Setpoint, State};
+use afbc_types::{OutOfRange, Range, Setpoint, State};
 
 /// Older than this, a state is stale and the law may not fly on it \[us\].
 pub const RIDE_US: u64 = 20_000;

@@ -7,7 +7,7 @@
 //! landed: its tracker has frozen.
 
 use afbc::math::abs_max;
-use airframe::State;
+use afbc_types::State;
 use nalgebra::Vector3;
 
 /// How far from where it stood a vehicle is in the air \[m\].

@@ -1,6 +1,6 @@
 //! The flight core around the law: who may fly, on what, and when the motors stop.
 //!
-//! Frames and units are stated in [`airframe`]. Everything that decides anything in flight is here and runs on the
+//! Frames and units are stated in [`afbc_types`]. Everything that decides anything in flight is here and runs on the
 //! host; firmware and simulator are shells that fill an [`Inbox`], call [`Vehicle::tick`] every millisecond and carry
 //! its [`Outcome`] away.
 //!

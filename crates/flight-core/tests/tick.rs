@@ -2,12 +2,14 @@
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc::{Adaptive, Command, Controller, FlightController, Profile, Settings};
-use airframe::{Parameters, RotorSpeeds, Setpoint, State};
+use afbc_flight_core::descent::SINK_M_S;
+use afbc_flight_core::ground::{CARRIED_US, STILL_US};
+use afbc_flight_core::{
+    Answer, ArmingLimits, Asked, End, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle,
+};
+use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
-use vehicle::descent::SINK_M_S;
-use vehicle::ground::{CARRIED_US, STILL_US};
-use vehicle::{Answer, ArmingLimits, Asked, End, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle};
 
 type Adapted = afbc::Cascade<afbc::adaptive::Estimate>;
 

@@ -1,9 +1,9 @@
 //! Requests that meet, what gets in, and how old it is.
 
-use airframe::{Setpoint, State};
+use afbc_flight_core::inbox::REQUESTS_MAX;
+use afbc_flight_core::{Asked, Inbox, Request, Stamped};
+use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
-use vehicle::inbox::REQUESTS_MAX;
-use vehicle::{Asked, Inbox, Request, Stamped};
 
 fn asked(request: Request, ticket: usize) -> Asked {
     Asked { request, ticket: ticket as u8 }

@@ -1,7 +1,7 @@
 //! From rotor speed to throttle.
 
 use afbc::math::{max, sqrt};
-use airframe::{OutOfRange, Range, RotorSpeeds};
+use afbc_types::{OutOfRange, Range, RotorSpeeds};
 
 /// Smallest throttle that turns a motor; 1 to 47 are commands, 0 stops it.
 pub const THROTTLE_MIN: u16 = 48;

@@ -1,9 +1,9 @@
 //! Every transition of the mode, every answer, and every reason against arming.
 
-use airframe::{Setpoint, State};
+use afbc_flight_core::supervisor::{DESCEND_US, GIVE_UP_US, Observed, REST_US, RIDE_US, STEADY_US, Standing};
+use afbc_flight_core::{ArmingLimits, End, Mode, Refusal, Request};
+use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
-use vehicle::supervisor::{DESCEND_US, GIVE_UP_US, Observed, REST_US, RIDE_US, STEADY_US, Standing};
-use vehicle::{ArmingLimits, End, Mode, Refusal, Request};
 
 const MODES: [Mode; 4] = [Mode::Disarmed, Mode::Flying, Mode::Riding, Mode::Descending];
 const REQUESTS: [Option<Request>; 5] =

@@ -1,7 +1,7 @@
 //! Coming down with a state that came back: straight down from where it came back, until the vehicle has landed
 //! ([`crate::ground`]). Ours.
 
-use airframe::{Setpoint, State};
+use afbc_types::{Setpoint, State};
 
 /// Speed of the descent \[m/s\].
 pub const SINK_M_S: f32 = 0.5;
