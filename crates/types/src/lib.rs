@@ -1,5 +1,5 @@
 //! The words that every other crate speaks: what a state, a setpoint, a rotor speed and a vehicle are.
-//! Types and their accepted ranges only; nothing here decides anything.
+//! Types and their accepted ranges only, and the way to declare parameters ([`parameters!`]); nothing here decides anything.
 //!
 //! # Conventions
 //!
@@ -22,12 +22,14 @@
 
 mod actuation;
 mod axes;
+mod declared;
 mod motion;
 mod parameters;
 mod range;
 
 pub use actuation::{Inputs, RotorForces, RotorSpeeds};
 pub use axes::{Axis, PerAxis};
+pub use declared::{Declaration, Declared, Field, Name, Number, Value, Visit};
 pub use motion::{Setpoint, State};
 pub use parameters::{Parameters, limits};
 pub use range::{OutOfRange, Range};

@@ -1,6 +1,7 @@
 //! Accepted intervals of physical quantities, by name.
 
 use core::fmt;
+use core::ops::RangeInclusive;
 
 /// The closed interval that a named quantity must lie in. The name ends in the unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,6 +18,11 @@ impl Range {
     /// A range; `min <= max`.
     pub const fn new(name: &'static str, min: f64, max: f64) -> Self {
         Range { name, min, max }
+    }
+
+    /// The range of all values in `interval`, as it is written in a declaration.
+    pub const fn over(name: &'static str, interval: RangeInclusive<f64>) -> Self {
+        Range { name, min: *interval.start(), max: *interval.end() }
     }
 
     /// `Ok` if `value` is finite and within the range, to `f32` precision: what a file may say, a controller may hold.
