@@ -7,14 +7,16 @@
 
 use afbc::{FlightController, Memory, Profile};
 use afbc_plant::{Drag, Model, Plant, Realism, Rotors, Sensing, Spread, Turbulence, Wind};
+use afbc_sim::case::Case;
+use afbc_sim::contender::ControllerKind;
+use afbc_sim::contender::{Build, Contender};
+use afbc_sim::flight::{Flight, fly};
+use afbc_sim::paper::scenario;
+use afbc_sim::scenario::Scenario;
 use afbc_types::{PerAxis, RotorSpeeds, Setpoint, State};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use nalgebra::Vector3;
-use sitl::contender::{Build, Contender};
-use sitl::flight::{Flight, fly};
-use sitl::paper::{Case, scenario};
-use sitl::scenario::{ControllerKind, Scenario};
 
 fn main() {
     divan::main();
@@ -155,7 +157,7 @@ fn closed_loop_afbc_real(bencher: Bencher) {
 /// One flight of the built-in campaign under every contender, as it is flown: items are flights of one contender.
 #[divan::bench]
 fn campaign_flight(bencher: Bencher) {
-    let campaign = sitl::campaign::built_in("robustness").unwrap().campaign().unwrap();
+    let campaign = afbc_campaign::built_in("robustness").unwrap().campaign().unwrap();
     let mut flight = 0;
     bencher.counter(ItemsCount::new(campaign.scenario.contenders.len())).bench_local(|| {
         flight += 1;

@@ -2,16 +2,18 @@
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a scenario that cannot be flown must stop the test
 
 use afbc_plant::{Environment, Gust, GustKind, Model, Motion};
+use afbc_report::claims::VANISHED;
+use afbc_report::claims::claims;
+use afbc_sim::case::{Case, Reading, Uncertainty};
+use afbc_sim::contender::ControllerKind;
+use afbc_sim::flight::Sample;
+use afbc_sim::flown::Flown;
+use afbc_sim::metrics::{self, Metrics};
+use afbc_sim::paper::scenario;
+use afbc_sim::run::Run;
+use afbc_sim::scenario::Scenario;
+use afbc_sim::trajectory::Trajectory;
 use nalgebra::{Vector3, Vector4};
-use sitl::claims::VANISHED;
-use sitl::claims::claims;
-use sitl::flight::Sample;
-use sitl::metrics::{self, Metrics};
-use sitl::output::Flown;
-use sitl::paper::{Case, Reading, Uncertainty, scenario};
-use sitl::run::Run;
-use sitl::scenario::{ControllerKind, Scenario};
-use sitl::trajectory::Trajectory;
 
 fn fly_both(scenario: &Scenario) -> Vec<Flown> {
     let fly = |contender| Flown { scenario: scenario.clone(), run: Run::fly(scenario, contender, 10).unwrap() };

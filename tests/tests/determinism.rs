@@ -3,12 +3,14 @@
 
 use afbc::Profile;
 use afbc_plant::Model;
+use afbc_sim::case::Case;
+use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_sim::flight::{Sample, fly};
+use afbc_sim::paper::scenario;
+use afbc_sim::scenario::Scenario;
 use afbc_types::Axis;
 use proptest::prelude::{ProptestConfig, Rng as _};
 use proptest::test_runner::{RngSeed, TestRunner};
-use sitl::flight::{Sample, fly};
-use sitl::paper::{Case, scenario};
-use sitl::scenario::{Contender, ControllerKind, Scenario};
 
 /// Every number of a sample.
 fn numbers(sample: &Sample) -> impl Iterator<Item = u64> {

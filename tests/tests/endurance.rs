@@ -5,12 +5,12 @@ use afbc::adaptive::Estimate;
 use afbc::{Adaptive, Cascade, Controller, FlightController, Memory, Profile};
 use afbc_plant::sensors::Spread;
 use afbc_plant::{Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors};
+use afbc_sim::contender::ControllerKind;
+use afbc_sim::flight::Sample;
+use afbc_sim::run::Run;
+use afbc_sim::scenario::{Scenario, built_in};
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint};
 use nalgebra::Vector3;
-use sitl::contender::ControllerKind;
-use sitl::flight::Sample;
-use sitl::run::Run;
-use sitl::scenario::{Scenario, built_in};
 
 const STEP_S: f64 = 0.001;
 const HOUR: u64 = 3_600_000;

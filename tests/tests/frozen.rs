@@ -4,9 +4,9 @@
 use afbc_flight_core::{End, Mode};
 use afbc_link::Command;
 use afbc_plant::{Contact, Environment, Model, Motion, Plant, Realism};
+use afbc_sim::in_the_loop::{Host, Station};
 use afbc_types::{Parameters, State};
 use nalgebra::Vector3;
-use sitl::in_the_loop::{Host, Station};
 
 /// When the vehicle is armed, and when the tracker freezes \[ms\].
 const ARM_MS: u64 = 2_100;

@@ -7,13 +7,14 @@ use afbc::cascade::Context;
 use afbc::fuzzy::{Basis, Membership};
 use afbc::{Adaptive, Backstepping, Cascade, Controller, FlightController, Law, Memory, Profile, Settings};
 use afbc_plant::{Environment, Model, Motion, Plant};
+use afbc_sim::case::{Case, Reading};
+use afbc_sim::contender::{Contender, ControllerKind, Law as Gains};
+use afbc_sim::flight::{Flight, LOST_DISTANCE_M, Sample};
+use afbc_sim::paper::scenario;
+use afbc_sim::run::Run;
+use afbc_sim::scenario::Scenario;
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
 use nalgebra::Vector3;
-use sitl::contender::{Contender, ControllerKind, Law as Gains};
-use sitl::flight::{Flight, LOST_DISTANCE_M, Sample};
-use sitl::paper::{Case, Reading, scenario};
-use sitl::run::Run;
-use sitl::scenario::Scenario;
 
 const CALM: Case = Case { reading: None, uncertainty: None };
 const GUSTS: Case = Case { reading: Some(Reading::Persistent), uncertainty: None };
@@ -248,7 +249,7 @@ fn afbc() -> Contender {
 fn trembling_by_delta(scenario: &Scenario) -> [f64; 2] {
     let (mut sums, mut counts) = ([0.0; 2], [0_u32; 2]);
     let mut last: Option<Sample> = None;
-    sitl::flight::fly(scenario, &afbc(), |sample| {
+    afbc_sim::flight::fly(scenario, &afbc(), |sample| {
         if let Some(last) = last.replace(*sample).filter(|last| last.time_s >= 5.0) {
             let above = usize::from(sample.estimates.roll.delta > 0.030);
             sums[above] += 1000.0 * f64::from(sample.command.inputs.roll_n - last.command.inputs.roll_n).abs();

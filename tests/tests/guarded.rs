@@ -6,9 +6,10 @@ use afbc::{Command, FlightController, Guarded, Memory, Profile, Settings, guarde
 use afbc_plant::{
     Drag, Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors, Spread, Turbulence, Wind,
 };
+use afbc_sim::case::Case;
+use afbc_sim::paper;
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint};
 use nalgebra::Vector3;
-use sitl::paper::{self, Case};
 
 const STEP_S: f64 = 0.001;
 const SECOND: usize = 1000;

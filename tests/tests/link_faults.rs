@@ -8,13 +8,14 @@
 use afbc_flight_core::{Mode, Refusal, Request};
 use afbc_link::Command;
 use afbc_plant::{Contact, Environment, Model, Motion, Plant, Realism};
+use afbc_sim::case::Case as Reading;
+use afbc_sim::in_the_loop::{Host, Station};
+use afbc_sim::paper;
+use afbc_sim::scenario::Scenario;
+use afbc_sim::trajectory::Trajectory;
 use afbc_types::{Parameters, RotorSpeeds};
 use core::ops::Range;
 use nalgebra::Vector3;
-use sitl::in_the_loop::{Host, Station};
-use sitl::paper::{self, Case as Reading};
-use sitl::scenario::Scenario;
-use sitl::trajectory::Trajectory;
 use std::fmt::Write as _;
 
 /// A fault that is there from the start shows after this long: the start from afar is not tracking \[ms\].

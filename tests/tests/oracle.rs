@@ -3,11 +3,12 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)] // a table that cannot be flown must stop the test
 
 use afbc_plant::Model;
+use afbc_sim::case::{Case, Reading, Sign, Uncertainty};
+use afbc_sim::contender::ControllerKind;
+use afbc_sim::metrics::Metrics;
+use afbc_sim::paper::scenario;
+use afbc_sim::run::Run;
 use flight_tests::{Row, golden};
-use sitl::metrics::Metrics;
-use sitl::paper::{Case, Reading, Sign, Uncertainty, scenario};
-use sitl::run::Run;
-use sitl::scenario::ControllerKind;
 use std::sync::LazyLock;
 
 /// Rows of the table: 8 scenarios, two laws.

@@ -1,8 +1,8 @@
 //! Scenarios with `flight_core`: a controller inside the flight core rides out what it would not survive alone.
 #![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be flown must stop the test")]
 
-use sitl::flight::{Lost, Sample, fly};
-use sitl::scenario::{Outage, Scenario, built_in};
+use afbc_sim::flight::{Lost, Sample, fly};
+use afbc_sim::scenario::{Outage, Scenario, built_in};
 
 /// The paper's flight on hardware, on a link that is down for `length_s` from 7.45 s on: a gust begins meanwhile.
 fn scenario(length_s: f64, flight_core: bool) -> Scenario {
@@ -15,7 +15,7 @@ fn scenario(length_s: f64, flight_core: bool) -> Scenario {
 
 /// What became of each contender: its name, the loss, the largest distance from the reference \[m\], the last sample.
 fn outcomes(scenario: &Scenario) -> Vec<(String, Option<Lost>, f64, Sample)> {
-    let outcome = |contender: &sitl::contender::Contender| {
+    let outcome = |contender: &afbc_sim::contender::Contender| {
         let (mut worst_m, mut last) = (0.0_f64, None);
         let lost = fly(scenario, contender, |sample| {
             if sample.time_s > 5.0 {

@@ -3,11 +3,12 @@
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
 use afbc_plant::Model;
+use afbc_sim::case::Case;
+use afbc_sim::in_the_loop::{End, Pace, Station, Twins, fly};
+use afbc_sim::paper::scenario;
 use core::ops::ControlFlow;
 use pil::budget::TICK_INSTRUCTIONS_MAX;
 use pil::{Emulator, Image};
-use sitl::in_the_loop::{End, Pace, Station, Twins, fly};
-use sitl::paper::{Case, scenario};
 use std::io::Write as _;
 
 /// The emulator, or none if this test has to be skipped, which it says on the terminal. Under CI nothing may be skipped.

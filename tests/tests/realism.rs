@@ -1,9 +1,10 @@
 //! Flights with real rotors, air, ground and sensors, from scenario files.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // what cannot be flown must stop the test
 
-use sitl::flight::{Sample, fly};
-use sitl::run::Run;
-use sitl::scenario::{ControllerKind, Scenario, built_in, parse};
+use afbc_sim::contender::ControllerKind;
+use afbc_sim::flight::{Sample, fly};
+use afbc_sim::run::Run;
+use afbc_sim::scenario::{Scenario, built_in, parse};
 
 fn scenario(name: &str, duration_s: f64) -> Scenario {
     Scenario { duration_s, ..built_in(name).unwrap().scenario().unwrap() }

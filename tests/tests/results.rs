@@ -1,9 +1,10 @@
 //! docs/results.md says what the code does.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, missing_docs)] // a page that cannot be read must stop the test
 
-use sitl::run::Run;
-use sitl::scenario::built_in;
-use sitl::{compare, results};
+use afbc_campaign::compare;
+use afbc_report::results;
+use afbc_sim::run::Run;
+use afbc_sim::scenario::built_in;
 
 const PAGE: &str = include_str!("../../docs/results.md");
 

@@ -3,9 +3,9 @@
 
 use afbc::{FlightController, Profile};
 use afbc_flight_core::{ArmingLimits, Asked, Inbox, Memory, Mode, Request, Stamped, Vehicle};
+use afbc_sim::contender::{Build, Contender, ControllerKind, Law, Monitored};
+use afbc_sim::scenario::{Scenario, built_in};
 use afbc_types::State;
-use sitl::contender::{Build, Contender, ControllerKind, Law, Monitored};
-use sitl::scenario::{Scenario, built_in};
 use std::collections::VecDeque;
 
 /// When, in ms of power-up, the vehicle is armed and let go.

@@ -1,9 +1,9 @@
 //! Reference trajectories: analytic derivatives against differences, continuity, and what each is described to do.
 #![allow(clippy::indexing_slicing, missing_docs)] // what is missing must stop the test
 
+use afbc_sim::trajectory::{Reference, Sine, Trajectory, Waypoint};
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use sitl::trajectory::{Reference, Sine, Trajectory, Waypoint};
 
 fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
     (-size..size, -size..size, -size..size).prop_map(|(x, y, z)| Vector3::new(x, y, z))

@@ -7,8 +7,8 @@
 )]
 
 use afbc::Profile;
-use sitl::contender::{Contender, ControllerKind, Law};
-use sitl::tune::{LOST, by_hand, costs, held_out, mean, training};
+use afbc_sim::contender::{Contender, ControllerKind, Law};
+use afbc_tune::{LOST, by_hand, costs, held_out, mean, training};
 
 /// The law with the gains that `sitl tune` found; AFBC under its monitor, as in the search.
 fn found(kind: ControllerKind) -> Contender {

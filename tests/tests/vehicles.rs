@@ -3,12 +3,12 @@
 
 use afbc::{Guarded, Profile, Settings};
 use afbc_plant::Environment;
+use afbc_sim::contender::{Contender, ControllerKind, Law};
+use afbc_sim::flight::fly;
+use afbc_sim::scenario::{Scenario, built_in};
 use afbc_types::{Axis, Parameters};
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use sitl::contender::{Contender, ControllerKind, Law};
-use sitl::flight::fly;
-use sitl::scenario::{Scenario, built_in};
 
 /// The hover scenario for this vehicle, with rotors of 20 ms and of this largest force, starting a little off.
 fn scenario(vehicle: Parameters<f64>, force_max_n: f64) -> Scenario {

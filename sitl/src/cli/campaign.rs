@@ -5,12 +5,14 @@ use super::json::Json;
 use super::log_rate::LogRate;
 use super::place::Place;
 use super::progress::Progress;
+use super::subject::Kind;
 use super::target::Target;
 use super::{Failure, interrupt, json, print, say};
+use afbc_campaign::{
+    self as campaign, BUILT_IN, BuiltIn, Campaign as Plan, Folder, Manifest, Shard, Summary, built_in,
+};
+use afbc_report::campaign as report;
 use clap::Args;
-use sitl::campaign::{self, BUILT_IN, BuiltIn, Campaign as Plan, Folder, Manifest, Shard, Summary, built_in};
-use sitl::output;
-use sitl::subject::Kind;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::OnceLock;
@@ -138,12 +140,12 @@ fn useful(wanted: Option<u64>, flights: u64) -> usize {
 /// Writes and prints what is to be said of all flights.
 fn conclude(folder: &Folder, summary: &Summary, target: &str, json: Json) -> Result<ExitCode, Failure> {
     let out = folder.path();
-    output::campaign::write(folder.place(), summary)?;
+    report::write(folder.place(), summary)?;
     if json.json {
-        json::print_written(|out| output::campaign::json(out, summary))?;
+        json::print_written(|out| report::json(out, summary))?;
         return Ok(ExitCode::SUCCESS);
     }
-    let (table, shard) = (output::campaign::table(summary, target), summary.manifest.shard);
+    let (table, shard) = (report::table(summary, target), summary.manifest.shard);
     let part = if shard.of > 1 { format!("part {shard} only; ") } else { String::new() };
     let (rows, page) = (out.join("results.parquet"), out.join("report.html"));
     print(&format!("{table}\n{part}every flight is in {}; open {}\n", rows.display(), page.display()))?;

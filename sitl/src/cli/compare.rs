@@ -6,10 +6,11 @@ use super::place::Place;
 use super::progress::Progress;
 use super::target::Target;
 use super::{Failure, interrupt, json, print};
+use afbc_campaign::compare::{self, standard};
+use afbc_report::compare as report;
+use afbc_sim::contender::Contender;
+use afbc_sim::scenario::Scenario;
 use clap::Args;
-use sitl::compare::{self, standard};
-use sitl::output;
-use sitl::scenario::{Contender, Scenario};
 use std::process::ExitCode;
 
 /// Fly every controller through every scenario, and compare
@@ -58,12 +59,12 @@ impl Compare {
         drop(progress);
 
         interrupt::is_too_late();
-        let written = output::compare::write(&folder, &comparisons)?;
+        let written = report::write(&folder, &comparisons)?;
         if self.json.json {
-            json::print_written(|out| output::compare::json(out, &comparisons))?;
+            json::print_written(|out| report::json(out, &comparisons))?;
             return Ok(ExitCode::SUCCESS);
         }
-        let (table, page) = (output::compare::table(&comparisons), folder.path().join("report.html"));
+        let (table, page) = (report::table(&comparisons), folder.path().join("report.html"));
         print(&format!(
             "{}\n\n{} files in {}; open {}\n",
             table.trim_end(),

@@ -6,8 +6,9 @@ use super::json::Json;
 use super::place::Place;
 use super::target::Target;
 use afbc::Profile;
+use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_sim::scenario::Scenario;
 use clap::Args;
-use sitl::scenario::{Contender, ControllerKind, Scenario};
 use std::process::ExitCode;
 
 /// Fly a built-in scenario or a scenario file; exits with 1 if a vehicle is lost

@@ -4,11 +4,13 @@ use super::json::Json;
 use super::log_rate::LogRate;
 use super::progress::Progress;
 use super::{Failure, interrupt, json, print, say};
+use afbc_files::Folder;
+use afbc_report::claims::Claim;
+use afbc_report::flights;
+use afbc_sim::flown::Flown;
+use afbc_sim::run::Run;
+use afbc_sim::scenario::{DURATION, Scenario};
 use clap::Args;
-use sitl::claims::Claim;
-use sitl::output::{self, Flown, Folder};
-use sitl::run::Run;
-use sitl::scenario::{DURATION, Scenario};
 
 /// Flights of more steps than this, about a second's worth, show their progress.
 const QUIET_STEPS: f64 = 1e6;
@@ -80,11 +82,11 @@ fn progress(scenarios: &[Scenario]) -> Progress {
 /// Writes everything into `folder`, then prints the table and where to look.
 pub(crate) fn report(folder: &Folder, flown: &[Flown], claims: &[Claim], json: Json) -> Result<(), Failure> {
     interrupt::is_too_late();
-    let written = output::write(folder, flown, claims)?;
+    let written = flights::write(folder, flown, claims)?;
     if json.json {
-        return json::print_written(|out| output::json(out, flown));
+        return json::print_written(|out| flights::json(out, flown));
     }
-    let (table, out) = (output::table(flown, claims), folder.path());
+    let (table, out) = (flights::table(flown, claims), folder.path());
     let (count, page) = (written.len(), out.join("report.html"));
     print(&format!("{}\n\n{count} files in {}; open {}\n", table.trim_end(), out.display(), page.display()))
 }

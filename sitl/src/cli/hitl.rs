@@ -3,9 +3,9 @@
 use super::pil::{Flying, Recorder, outcome};
 use super::target::Target;
 use super::{Failure, print};
+use afbc_sim::flight::Sample;
+use afbc_sim::in_the_loop::{self, End, Pace, Serial, Station};
 use clap::Args;
-use sitl::flight::Sample;
-use sitl::in_the_loop::{self, End, Pace, Serial, Station};
 use std::ops::ControlFlow;
 use std::process::ExitCode;
 use std::sync::Arc;

@@ -2,11 +2,12 @@
 
 use super::{Failure, print};
 use afbc::Profile;
+use afbc_campaign::Campaign;
+use afbc_sim::contender::Contender;
+use afbc_sim::scenario::Scenario;
+use afbc_tune::{Change, Found, fragment};
 use clap::Args;
 use serde::Serialize;
-use sitl::campaign::Campaign;
-use sitl::scenario::{Contender, Scenario};
-use sitl::tune::{Change, Found, fragment};
 use std::io;
 
 /// Of every command that has something to say to machines.

@@ -1,6 +1,7 @@
 //! `--log-hz`: how much of a flight is kept.
 
-use sitl::scenario::{Contender, Scenario};
+use afbc_sim::contender::Contender;
+use afbc_sim::scenario::Scenario;
 use std::str::FromStr;
 
 /// Most rows of one log: an hour at 100 Hz, and some.

@@ -14,6 +14,7 @@ mod place;
 mod progress;
 mod results;
 mod scenarios;
+mod subject;
 mod target;
 mod tune;
 

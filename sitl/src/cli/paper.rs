@@ -5,11 +5,12 @@ use super::flying::{Flying, report};
 use super::json::Json;
 use super::place::Place;
 use afbc_plant::Model;
+use afbc_report::claims::claims;
+use afbc_sim::case::{Case, Reading, Sign, Uncertainty};
+use afbc_sim::flown::Flown;
+use afbc_sim::paper::scenario;
+use afbc_sim::scenario::Scenario;
 use clap::{Args, ValueEnum};
-use sitl::claims::claims;
-use sitl::output::Flown;
-use sitl::paper::{Case, Reading, Sign, Uncertainty, scenario};
-use sitl::scenario::Scenario;
 use std::process::ExitCode;
 
 /// Fly the paper's experiment under both laws and weigh its three claims

@@ -2,14 +2,14 @@
 
 use super::target::Target;
 use super::{Failure, print};
+use afbc_sim::flight::Sample;
+use afbc_sim::in_the_loop::{self, Comparison, End, Error, Log, Pace, Station, Twins};
+use afbc_sim::metrics::{Accumulator, Metrics};
+use afbc_sim::run::Run;
+use afbc_sim::scenario::{DURATION, Scenario};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use pil::{Emulator, Image};
-use sitl::flight::Sample;
-use sitl::in_the_loop::{self, Comparison, End, Error, Log, Pace, Station, Twins};
-use sitl::metrics::{Accumulator, Metrics};
-use sitl::run::Run;
-use sitl::scenario::{DURATION, Scenario};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::process::ExitCode;

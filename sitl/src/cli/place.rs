@@ -1,8 +1,8 @@
 //! Where results go: `--out` and `--force`.
 
 use super::Failure;
+use afbc_files::Folder;
 use clap::Args;
-use sitl::output::Folder;
 use std::path::{Path, PathBuf};
 
 /// Options of every command that fills a folder.

@@ -3,9 +3,10 @@
 use super::json::Json;
 use super::progress::Progress;
 use super::{Failure, interrupt, json, print};
+use afbc_report::flights;
+use afbc_report::results;
+use afbc_sim::flown::Flown;
 use clap::Args;
-use sitl::output::{self, Flown};
-use sitl::results;
 use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -29,7 +30,7 @@ impl Results {
             match self.json.json {
                 true => {
                     let flown: Vec<_> = flown.into_iter().map(|(_, flown)| flown).collect();
-                    json::print_written(|out| output::json(out, &flown))?;
+                    json::print_written(|out| flights::json(out, &flown))?;
                 }
                 false => print(&results::markdown(&flown))?,
             }

@@ -1,12 +1,13 @@
 //! `sitl scenarios` and `sitl check`: what can be flown.
 
 use super::json::Json;
+use super::subject::{Kind, Subject};
 use super::target::Target;
 use super::{Failure, json, print};
+use afbc_campaign::Campaign;
+use afbc_sim::contender::Contender;
+use afbc_sim::scenario::{BUILT_IN, BuiltIn, Scenario, built_in};
 use clap::Args;
-use sitl::campaign::Campaign;
-use sitl::scenario::{BUILT_IN, BuiltIn, Contender, Scenario, built_in};
-use sitl::subject::{Kind, Subject};
 use std::process::ExitCode;
 
 /// List the built-in scenarios, or print one of them to start from

@@ -1,9 +1,9 @@
 //! A scenario or a campaign as it is named on the command line.
 
 use super::Failure;
-use sitl::campaign::Campaign;
-use sitl::scenario::Scenario;
-use sitl::subject::{self, Subject};
+use super::subject::{self, Subject};
+use afbc_campaign::Campaign;
+use afbc_sim::scenario::Scenario;
 use std::ffi::OsString;
 use std::fmt;
 use std::path::PathBuf;

@@ -1,0 +1,188 @@
+//! Every contender in every scenario: who flies best.
+
+use afbc::Profile;
+use afbc_sim::contender::Contender;
+use afbc_sim::contender::ControllerKind;
+use afbc_sim::flight::Lost;
+use afbc_sim::flown::Flown;
+use afbc_sim::metrics::Metrics;
+use afbc_sim::run::Run;
+use afbc_sim::scenario::Scenario;
+use afbc_types::OutOfRange;
+use rayon::prelude::*;
+
+/// Those who fly if nobody else is named: every law as it is meant to fly, and AFBC as printed.
+pub fn standard() -> Vec<Contender> {
+    let flying = |kind| Contender::of(kind, Profile::Flight);
+    let printed = Contender { name: "afbc-as-printed".into(), ..Contender::of(ControllerKind::Afbc, Profile::Paper) };
+    let [afbc, others @ ..] = ControllerKind::ALL;
+    [flying(afbc), printed].into_iter().chain(others.map(flying)).collect()
+}
+
+/// All contenders of `scenarios`; of two that differ and share a name, the second is named after its scenario too.
+pub fn contenders(scenarios: &[Scenario]) -> Vec<Contender> {
+    let mut all: Vec<Contender> = Vec::new();
+    for scenario in scenarios {
+        for contender in &scenario.contenders {
+            let mut contender = contender.clone();
+            if all.contains(&contender) {
+                continue;
+            }
+            if all.iter().any(|other| other.name == contender.name) {
+                contender.name = format!("{} ({})", contender.name, scenario.name);
+            }
+            all.push(contender);
+        }
+    }
+    all
+}
+
+/// One scenario under every contender.
+#[derive(Clone, Debug)]
+pub struct Comparison {
+    /// What was flown, and by whom.
+    pub scenario: Scenario,
+    /// One for each of the scenario's contenders.
+    pub entries: Vec<Entry>,
+}
+
+/// One contender's flights of one scenario.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// The flight with the scenario's own seed, with its log.
+    pub first: Flown,
+    /// Every flight, that one first.
+    pub flights: Vec<Outcome>,
+}
+
+/// What came of one flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome {
+    /// Seed of the flight's noise and weather.
+    pub seed: u64,
+    /// When and why the vehicle was lost, if it was.
+    pub lost: Option<Lost>,
+    /// How well it was flown until then.
+    pub metrics: Metrics,
+}
+
+/// Mean and standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// The mean.
+    pub mean: f64,
+    /// The standard deviation of the sample; 0 of a single value.
+    pub deviation: f64,
+}
+
+/// A figure of merit: the smaller, the better.
+pub struct Figure {
+    /// As a column of a file.
+    pub name: &'static str,
+    /// For people.
+    pub title: &'static str,
+    /// Decimals that people see.
+    pub digits: usize,
+    /// What people see of 1.
+    pub scale: f64,
+    /// From all figures of a flight.
+    pub value: fn(&Metrics) -> f64,
+}
+
+/// What contenders are compared by.
+pub const FIGURES: [Figure; 6] = [
+    Figure { name: "rmse_x_m", title: "x [m]", digits: 4, scale: 1.0, value: |m| m.rmse.x },
+    Figure { name: "rmse_y_m", title: "y [m]", digits: 4, scale: 1.0, value: |m| m.rmse.y },
+    Figure { name: "rmse_z_m", title: "z [m]", digits: 4, scale: 1.0, value: |m| m.rmse.z },
+    Figure { name: "rmse_psi_rad", title: "ψ [rad]", digits: 4, scale: 1.0, value: |m| m.rmse.w },
+    Figure { name: "max_position_m", title: "max [m]", digits: 4, scale: 1.0, value: |m| m.max_abs.xyz().max() },
+    Figure {
+        name: "mean_abs_delta_u4_n",
+        title: "|ΔU₄| [mN]",
+        digits: 1,
+        scale: 1000.0,
+        value: |m| m.mean_abs_delta_u.w,
+    },
+];
+
+impl Entry {
+    /// Who flew.
+    pub fn contender(&self) -> &Contender {
+        &self.first.run.contender
+    }
+
+    /// How many vehicles were lost.
+    pub fn lost(&self) -> usize {
+        self.flights.iter().filter(|flight| flight.lost.is_some()).count()
+    }
+
+    /// Mean and spread of a figure over the flights, none of them lost: what a lost one would have come to, nobody knows.
+    pub fn spread(&self, value: impl Fn(&Metrics) -> f64) -> Option<Spread> {
+        if self.lost() > 0 {
+            return None;
+        }
+        let values: Vec<f64> = self.flights.iter().map(|flight| value(&flight.metrics)).collect();
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+        Some(Spread { mean, deviation: libm::sqrt(squares / (count - 1.0).max(1.0)) })
+    }
+}
+
+impl Comparison {
+    /// Root mean square distance of each contender over that of backstepping, if both keep the vehicle.
+    pub fn ratio(&self, entry: &Entry) -> Option<f64> {
+        let distance = |entry: &Entry| entry.spread(|metrics| metrics.rmse.xyz().norm()).map(|spread| spread.mean);
+        let classical = |entry: &&Entry| entry.contender().kind() == ControllerKind::Backstepping;
+        let ratio = distance(entry)? / distance(self.entries.iter().find(classical)?)?;
+        // Of flights that were over before errors count, there is none.
+        Some(ratio).filter(|ratio| ratio.is_finite())
+    }
+
+    /// Whether every flight is one of several with seeds of their own.
+    pub fn is_repeated(&self) -> bool {
+        self.entries.iter().any(|entry| entry.flights.len() > 1)
+    }
+
+    /// Whether `entry` has the smallest mean of a figure, of those that kept the vehicle.
+    pub fn is_best(&self, entry: &Entry, figure: &Figure) -> bool {
+        let mean = |entry: &Entry| entry.spread(figure.value).map(|spread| spread.mean);
+        let Some(own) = mean(entry) else { return false };
+        self.entries.iter().filter_map(mean).all(|other| own <= other)
+    }
+}
+
+/// Flies every scenario under each of its contenders, with `seeds` seeds from the scenario's own on, on the current rayon
+/// pool; keeps every `log_every`-th step of the first. `progress` hears of each flight that is done. What comes of it is
+/// the same however many threads there are.
+///
+/// # Errors
+/// The first parameter, gain or setting out of range.
+pub fn fly(
+    scenarios: Vec<Scenario>,
+    seeds: u64,
+    log_every: u64,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Vec<Comparison>, OutOfRange> {
+    let outcome = |scenario: &Scenario, contender: &Contender, number: u64| {
+        let scenario = Scenario { seed: scenario.seed + number, ..scenario.clone() };
+        let run = Run::fly(&scenario, contender, if number == 0 { log_every } else { u64::MAX })?;
+        progress();
+        Ok((Outcome { seed: scenario.seed, lost: run.lost, metrics: run.metrics }, run))
+    };
+    let entry = |scenario: &Scenario, contender: &Contender| {
+        let flown: Vec<(Outcome, Run)> = (0..seeds.max(1))
+            .into_par_iter()
+            .map(|number| outcome(scenario, contender, number))
+            .collect::<Result<_, _>>()?;
+        let flights = flown.iter().map(|(outcome, _)| *outcome).collect();
+        let first = flown.into_iter().next().map(|(_, run)| Flown { scenario: scenario.clone(), run });
+        Ok(first.map(|first| Entry { first, flights }))
+    };
+    let compare = |scenario: Scenario| {
+        let entries: Vec<Option<Entry>> =
+            scenario.contenders.par_iter().map(|contender| entry(&scenario, contender)).collect::<Result<_, _>>()?;
+        Ok(Comparison { scenario, entries: entries.into_iter().flatten().collect() })
+    };
+    scenarios.into_par_iter().map(compare).collect()
+}

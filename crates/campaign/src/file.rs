@@ -1,0 +1,135 @@
+//! Campaign files. The format is described, key by key, in `docs/campaigns.md`.
+
+use crate::plan::{Campaign, Course, Spread};
+use crate::quantity::{QUANTITIES, Quantity};
+use afbc_sim::reader::Table;
+use afbc_sim::reader::words::out_of_range;
+use afbc_sim::reader::{self, FileError};
+use afbc_sim::scenario::{self, DURATION, Scenario, built_in, similar_built_in};
+use afbc_types::Range;
+use std::path::{Path, PathBuf};
+
+/// Accepted number of flights.
+const FLIGHTS: Range = Range::new("flights", 1.0, 1e7);
+/// Accepted seeds: whole numbers that no tool rounds.
+const SEED: Range = Range::new("seed", 0.0, 9_007_199_254_740_991.0);
+
+/// Reads and checks a campaign from its `text`. Errors call it `file`; `name` is its name if it gives none itself;
+/// scenario files that it names are looked for from `folder`.
+///
+/// # Errors
+/// One line on the first thing that is wrong.
+pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campaign, FileError> {
+    reader::document(file, text, "campaigns robustness", |mut root| {
+        let [name, description] = reader::title(&mut root, name)?;
+        let flights = root.whole(&FLIGHTS)?.ok_or_else(|| root.missing(FLIGHTS.name, "say how many to fly"))?;
+        let seed = root.whole(&SEED)?.unwrap_or(1);
+        let duration_s = root.number(&DURATION)?;
+        let courses = courses(&mut root, folder)?;
+        let mut scenario = scenario(&mut root, folder, courses.first())?;
+        scenario.duration_s = duration_s.unwrap_or(scenario.duration_s);
+        let courses = if courses.is_empty() { vec![course(scenario.clone())] } else { courses };
+        let spreads = match root.table("spread")? {
+            Some(table) => spreads(table, &scenario)?,
+            None => Vec::new(),
+        };
+        let campaign = Campaign { name, description, flights, seed, scenario, courses, spreads };
+        // If both ends of every spread can be flown on every course, it takes bad luck for a flight in between not to be.
+        for end in 0..2 {
+            for flight in 0..campaign.courses.len() as u64 {
+                campaign.at_end(flight, end).and_then(|scenario| scenario.check()).map_err(|error| {
+                    root.fault("spread", format!("it leads to {}; narrow it", out_of_range(&error)))
+                })?;
+            }
+        }
+        root.finish()?;
+        Ok(campaign)
+    })
+}
+
+/// What is not drawn: a scenario by name, or one written out here, which needs no trajectory if there is a course.
+fn scenario(root: &mut Table<'_>, folder: &Path, course: Option<&Course>) -> Result<Scenario, FileError> {
+    if let Some(table) = root.table_if("scenario")? {
+        return scenario::read(table, "own", course.map(|course| &course.trajectory));
+    }
+    let Some(name) = root.text("scenario")? else {
+        return Err(root.missing("scenario", "name a scenario, as in scenario = \"hardware\""));
+    };
+    named(root, "scenario", name, folder)
+}
+
+fn course(Scenario { name, trajectory, initial, .. }: Scenario) -> Course {
+    Course { name, trajectory, initial }
+}
+
+/// The references of the scenarios that are listed, if there is a list.
+fn courses(root: &mut Table<'_>, folder: &Path) -> Result<Vec<Course>, FileError> {
+    let Some(names) = root.texts("trajectories")? else { return Ok(Vec::new()) };
+    let mut courses: Vec<Course> = Vec::new();
+    for name in names {
+        let next = course(named(root, "trajectories", name, folder)?);
+        if courses.iter().any(|course| course.name == next.name) {
+            return Err(root.fault_at("trajectories", format!("\"{}\" is listed twice; once is enough", next.name)));
+        }
+        courses.push(next);
+    }
+    if courses.is_empty() {
+        return Err(root.fault_at("trajectories", "the list is empty; name a scenario in it, or leave it out"));
+    }
+    Ok(courses)
+}
+
+/// A scenario by its name: a plain one is built in, anything else is a file.
+fn named(root: &Table<'_>, key: &str, name: &str, folder: &Path) -> Result<Scenario, FileError> {
+    if !name.contains(['/', '\\', '.']) {
+        let built_in = built_in(name).ok_or_else(|| {
+            let cure = match similar_built_in(name) {
+                Some(known) => format!("did you mean \"{}\"?", known.name),
+                None => "`sitl scenarios` lists the built-in ones; a file ends in .toml".into(),
+            };
+            root.fault_at(key, format!("\"{name}\" is no built-in scenario; {cure}"))
+        })?;
+        return built_in.scenario();
+    }
+    let path: PathBuf = folder.join(name);
+    scenario::load(&path)
+}
+
+fn spreads(mut table: Table<'_>, scenario: &Scenario) -> Result<Vec<Spread>, FileError> {
+    let mut spreads = Vec::new();
+    let mut wanted: Vec<&str> = Vec::new();
+    for (index, quantity) in QUANTITIES.iter().enumerate() {
+        let Quantity { range, whole, needs, .. } = quantity;
+        let Some(ends) = table.interval(range)? else { continue };
+        if *whole && ends.iter().any(|end| end.fract() != 0.0) {
+            return Err(table.fault_at(range.name, "only whole numbers are drawn; write whole ends"));
+        }
+        if let Some(needed) = needs.filter(|needed| !wanted.contains(needed)) {
+            return Err(table.fault_at(range.name, format!("it does nothing without {needed}; add that")));
+        }
+        if let Some(problem) = idle(range.name, scenario) {
+            return Err(table.fault_at(range.name, problem));
+        }
+        wanted.push(range.name);
+        spreads.push(Spread { quantity: index, ends });
+    }
+    table.finish()?;
+    Ok(spreads)
+}
+
+/// Why drawing this quantity would change nothing, if so.
+fn idle(name: &str, scenario: &Scenario) -> Option<&'static str> {
+    let still = afbc_plant::Spread::default();
+    match name {
+        "wind_m_s" | "wind_20ft_m_s" if scenario.realism.drag.is_none() => {
+            Some("wind does nothing to a vehicle without drag; add [drag] to the scenario")
+        }
+        "noise_ratio" if scenario.sensing.noise == still => {
+            Some("the scenario has no noise to multiply; add [sensors] with noise to it")
+        }
+        "bias_ratio" if scenario.sensing.bias == still => {
+            Some("the scenario has no bias to multiply; add [sensors] with bias to it")
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,148 @@
+//! Flying a campaign on many cores, and putting together what was flown apart.
+
+use crate::error::Error;
+use crate::folder::{Folder, Rows, finished};
+use crate::manifest::{Manifest, Shard};
+use crate::plan::Campaign;
+use crate::row::Row;
+use crate::summary::Summary;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Flies whatever `folder` lacks of `campaign`, on the current rayon pool. `progress` hears of every number of flights
+/// that is done, those of earlier runs first. What comes of it is the same however many threads there are.
+///
+/// None if `stop` became true before the end: whole chunks are kept then.
+///
+/// # Errors
+/// A flight that cannot be flown, results that cannot be written, or are damaged.
+pub fn fly(
+    campaign: &Campaign,
+    folder: &Folder,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(u64) + Sync),
+) -> Result<Option<Summary>, Error> {
+    match flown(campaign, folder, stop, progress) {
+        Err(Error::Stopped) => Ok(None),
+        summary => summary.map(Some),
+    }
+}
+
+/// What all flights together say, those that are missing flown before.
+fn flown(
+    campaign: &Campaign,
+    folder: &Folder,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(u64) + Sync),
+) -> Result<Summary, Error> {
+    let heard = |row| if stop.load(Ordering::Relaxed) { Err(Error::Stopped) } else { row };
+    if let Some(rows) = folder.results()? {
+        let mut summary = Summary::new(folder.manifest());
+        rows.map(heard).try_for_each(|row| row.map(|row| summary.add(&row)))?;
+        return Ok(summary.finish());
+    }
+    fly_missing(campaign, folder, stop, progress)?;
+    let mut summary = Summary::new(folder.manifest());
+    folder.write(folder.rows().map(heard).inspect(|row| row.iter().for_each(|row| summary.add(row))))?;
+    Ok(summary.finish())
+}
+
+/// Flies the chunks that are not there, in order, flight by flight.
+fn fly_missing(
+    campaign: &Campaign,
+    folder: &Folder,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(u64) + Sync),
+) -> Result<(), Error> {
+    let kept = folder.kept(stop);
+    progress(kept.iter().map(|chunk| folder.chunk(*chunk).count() as u64).sum());
+    let missing = (0..folder.chunks()).filter(|chunk| !kept.contains(chunk));
+    let jobs =
+        missing.flat_map(|chunk| folder.chunk(chunk).enumerate().map(move |(place, flight)| (chunk, place, flight)));
+    // A thread takes the next flight; whoever brings the last of a chunk writes it. Only begun chunks are in memory.
+    let (jobs, begun) = (Mutex::new(jobs.fuse()), Mutex::new(BTreeMap::<u64, BTreeMap<usize, Vec<Row>>>::new()));
+    let failed = AtomicBool::new(false);
+    let next = || match jobs.lock() {
+        Ok(mut jobs) => jobs.next(),
+        Err(_) => None,
+    };
+    let gather = |chunk: u64, place: usize, rows: Vec<Row>| {
+        let Ok(mut begun) = begun.lock() else { return None };
+        let flown = begun.entry(chunk).or_default();
+        flown.insert(place, rows);
+        if flown.len() == folder.chunk(chunk).count() { begun.remove(&chunk) } else { None }
+    };
+    let work = || {
+        while !failed.load(Ordering::Relaxed) {
+            if stop.load(Ordering::Relaxed) {
+                return Err(Error::Stopped);
+            }
+            let Some((chunk, place, flight)) = next() else { break };
+            let rows = campaign.rows(flight).map_err(|error| Error::Draw { flight, error })?;
+            progress(1);
+            if let Some(flown) = gather(chunk, place, rows) {
+                folder.put_chunk(chunk, flown.into_values().flatten())?;
+            }
+        }
+        Ok(())
+    };
+    let work = |_: rayon::BroadcastContext<'_>| work().inspect_err(|_| failed.store(true, Ordering::Relaxed));
+    let ends = rayon::broadcast(work);
+    // What went wrong matters more than that somebody has had enough.
+    let (stopped, others): (Vec<_>, Vec<_>) = ends.into_iter().partition(|end| matches!(end, Err(Error::Stopped)));
+    others.into_iter().chain(stopped).collect()
+}
+
+/// Makes one whole of all `shards` of one campaign, in the folder `out`: the same bytes that one machine would have
+/// written. By `force`, whatever is in the way there is replaced.
+///
+/// # Errors
+/// Shards of different campaigns, a shard that is missing, unfinished or there twice, and what cannot be read or written.
+pub fn merge(shards: &[PathBuf], out: &Path, force: bool) -> Result<(Folder, Summary), Error> {
+    let is_out =
+        |shard: &&PathBuf| shard.canonicalize().is_ok_and(|shard| out.canonicalize().is_ok_and(|out| out == shard));
+    if let Some(part) = shards.iter().find(is_out) {
+        return Err(Error::IntoPart(part.clone()));
+    }
+    let mut parts = shards.iter().map(|path| Ok((path, finished(path)?))).collect::<Result<Vec<_>, Error>>()?;
+    parts.sort_by_key(|(_, rows)| rows.manifest().shard.index);
+    let Some((first, manifest)) = parts.first().map(|(path, rows)| (*path, rows.manifest().clone())) else {
+        return Err(Error::Missing(vec![Shard::WHOLE]));
+    };
+    for (path, rows) in &parts {
+        if !manifest.is_sibling(rows.manifest()) {
+            return Err(Error::Strangers([first.clone(), (*path).clone()]));
+        }
+    }
+    for ((a, rows), (b, next)) in parts.iter().zip(parts.iter().skip(1)) {
+        if rows.manifest().shard == next.manifest().shard {
+            return Err(Error::Twice(rows.manifest().shard, [(*a).clone(), (*b).clone()]));
+        }
+    }
+    let of = manifest.shard.of;
+    let has = |shard: &Shard| parts.iter().any(|(_, rows)| rows.manifest().shard == *shard);
+    let missing: Vec<_> = (1..=of).map(|index| Shard { index, of }).filter(|shard| !has(shard)).collect();
+    if !missing.is_empty() {
+        return Err(Error::Missing(missing));
+    }
+
+    let whole = Manifest { shard: Shard::WHOLE, ..manifest };
+    let contenders = whole.contenders.len();
+    let folder = Folder::open(out, whole, force)?;
+    let mut summary = Summary::new(folder.manifest());
+    // Flight i is in shard i modulo their number.
+    let flights = (0..folder.manifest().flights).flat_map(|flight| core::iter::repeat_n(flight, contenders));
+    let mut rows: Vec<Rows> = parts.into_iter().map(|(_, rows)| rows).collect();
+    let rows = flights.map(|flight| {
+        let shard = rows.get_mut((flight % of) as usize).ok_or(Error::Missing(Vec::new()))?;
+        match shard.next() {
+            Some(Ok(Row { flight: found, .. })) if found != flight => Err(shard.incomplete()),
+            None => Err(shard.incomplete()),
+            Some(row) => row,
+        }
+    });
+    folder.write(rows.inspect(|row| row.iter().for_each(|row| summary.add(row))))?;
+    Ok((folder, summary.finish()))
+}

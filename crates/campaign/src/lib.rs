@@ -1,0 +1,33 @@
+//! Monte Carlo campaigns: one scenario, flown many times with drawn vehicles, weather and faults.
+//!
+//! Flight `i` is drawn from the campaign's seed and `i` alone, so it can be flown again by itself, on any machine; every
+//! contender flies the same draws. The format of campaign files is in `docs/campaigns.md`. [`compare`] flies scenarios as they
+//! are, under every contender.
+#![forbid(unsafe_code)]
+
+mod built_in;
+pub mod compare;
+mod draw;
+mod error;
+mod file;
+mod fly;
+mod folder;
+mod manifest;
+mod parquet;
+mod plan;
+mod quantity;
+mod row;
+pub mod statistics;
+mod summary;
+
+pub use built_in::{BUILT_IN, BuiltIn, built_in, similar_built_in};
+pub use draw::Draw;
+pub use error::Error;
+pub use file::parse;
+pub use fly::{fly, merge};
+pub use folder::Folder;
+pub use manifest::{Drawn, Manifest, Shard};
+pub use plan::{Campaign, Course, Spread};
+pub use quantity::{QUANTITIES, Quantity};
+pub use row::{Column, FIGURES, Figure, Row};
+pub use summary::{BINS, Bad, Count, Summary, Tally};

@@ -1,0 +1,173 @@
+//! What can be drawn, quantity by quantity.
+
+use afbc_plant::{Dropouts, Environment, Payload, RotorFault, Spread, Turbulence};
+use afbc_sim::scenario::Scenario;
+use afbc_types::{OutOfRange, Parameters, Range};
+use core::f64::consts::TAU;
+use nalgebra::Vector3;
+
+/// One quantity that a campaign may draw.
+pub struct Quantity {
+    /// Its name, which ends in its unit, and what is accepted. `ratio`s multiply what the scenario has.
+    pub range: Range,
+    /// For people.
+    pub meaning: &'static str,
+    /// Whether only whole numbers are drawn.
+    pub whole: bool,
+    /// Another quantity without which this one does nothing.
+    pub needs: Option<&'static str>,
+    /// Gives the flight its value.
+    apply: fn(&mut Flight, f64),
+}
+
+/// What is being put together from draws.
+struct Flight {
+    scenario: Scenario,
+    truth: Parameters<f64>,
+    payload: Option<Payload>,
+}
+
+/// Puts `values` of `quantities`, in the order of [`QUANTITIES`], into `scenario`.
+///
+/// # Errors
+/// The first parameter that they bring out of range.
+pub(super) fn apply<'a>(
+    scenario: Scenario,
+    values: impl Iterator<Item = (&'a Quantity, f64)>,
+) -> Result<Scenario, OutOfRange> {
+    let truth = *scenario.environment.nominal();
+    let mut flight = Flight { scenario, truth, payload: None };
+    for (quantity, value) in values {
+        (quantity.apply)(&mut flight, value);
+    }
+    let Flight { mut scenario, truth, payload } = flight;
+    let old = &scenario.environment;
+    let payloads = old.payloads().iter().copied().chain(payload).collect();
+    scenario.environment =
+        Environment::new(truth, old.changes().to_vec(), old.gusts().to_vec())?.with_payloads(payloads)?;
+    Ok(scenario)
+}
+
+const fn quantity(
+    name: &'static str,
+    min: f64,
+    max: f64,
+    meaning: &'static str,
+    apply: fn(&mut Flight, f64),
+) -> Quantity {
+    Quantity { range: Range::new(name, min, max), meaning, whole: false, needs: None, apply }
+}
+
+const fn needing(needs: &'static str, quantity: Quantity) -> Quantity {
+    Quantity { needs: Some(needs), ..quantity }
+}
+
+/// Every quantity. A flight draws one number for each, wanted or not, from the top: a quantity more in a campaign leaves
+/// the others as they were. New ones go to the end.
+pub static QUANTITIES: [Quantity; 23] = [
+    quantity("mass_ratio", 0.01, 100.0, "true mass over the scenario's", |f, x| f.truth.mass_kg *= x),
+    quantity("inertia_ratio", 0.01, 100.0, "true Ix, Iy, Iz over the scenario's", |f, x| f.truth.inertia_kg_m2 *= x),
+    quantity("thrust_factor_ratio", 0.01, 100.0, "true thrust factor over the scenario's", |f, x| {
+        f.truth.thrust_factor_n_s2 *= x;
+    }),
+    quantity("drag_factor_ratio", 0.01, 100.0, "true rotor drag factor over the scenario's", |f, x| {
+        f.truth.drag_factor_n_m_s2 *= x;
+    }),
+    quantity("rotor_time_constant_s", 0.0, 1.0, "lag of the rotors", |f, x| {
+        f.scenario.realism.rotors.time_constant_s = x;
+    }),
+    quantity("rotor_delay_s", 0.0, 0.5, "from command to rotors", |f, x| f.scenario.realism.rotors.delay_s = x),
+    quantity("rotor_efficiency", 0.0, 1.0, "share of its thrust that a failing rotor keeps", |f, efficiency| {
+        f.scenario.realism.rotors.faults.push(RotorFault { rotor: 1, efficiency, start_s: 0.0 });
+    }),
+    needing(
+        "rotor_efficiency",
+        Quantity {
+            whole: true,
+            ..quantity("fault_rotor", 1.0, 4.0, "which rotor fails; without it, the first", |f, x| {
+                f.scenario.realism.rotors.faults.last_mut().into_iter().for_each(|fault| fault.rotor = x as u8);
+            })
+        },
+    ),
+    needing(
+        "rotor_efficiency",
+        quantity("fault_start_s", 0.0, 36_000.0, "when it fails; without it, at once", |f, x| {
+            f.scenario.realism.rotors.faults.last_mut().into_iter().for_each(|fault| fault.start_s = x);
+        }),
+    ),
+    quantity("payload_kg", 0.0, 500.0, "mass of a payload that the law is not told of", |f, mass_kg| {
+        f.payload = Some(Payload { mass_kg, below_m: 0.0, start_s: 0.0, end_s: f64::INFINITY });
+    }),
+    needing(
+        "payload_kg",
+        quantity(
+            "payload_below_m",
+            -10.0,
+            10.0,
+            "where it hangs below the centre of mass; without it, there",
+            |f, x| {
+                f.payload.iter_mut().for_each(|payload| payload.below_m = x);
+            },
+        ),
+    ),
+    needing(
+        "payload_kg",
+        quantity("payload_start_s", 0.0, 36_000.0, "when it is taken up; without it, at once", |f, x| {
+            f.payload.iter_mut().for_each(|payload| payload.start_s = x);
+        }),
+    ),
+    quantity("wind_m_s", 0.0, 50.0, "steady wind", |f, x| {
+        f.scenario.realism.wind.steady_m_s = Vector3::new(x, 0.0, 0.0);
+    }),
+    needing(
+        "wind_m_s",
+        quantity("wind_direction_rad", -TAU, TAU, "where it blows to, from +x to +y; without it, +x", |f, x| {
+            let wind = &mut f.scenario.realism.wind.steady_m_s;
+            let (sin, cos) = libm::sincos(x);
+            *wind = Vector3::new(cos, sin, 0.0) * wind.x;
+        }),
+    ),
+    quantity("wind_20ft_m_s", 0.0, 50.0, "wind at 20 ft that sets the turbulence's strength", |f, x| {
+        let turbulence = &mut f.scenario.realism.wind.turbulence;
+        *turbulence = Some(Turbulence { wind_20ft_m_s: x, ..turbulence.unwrap_or(Turbulence::MODERATE) });
+    }),
+    quantity("noise_ratio", 0.0, 100.0, "measurement noise over the scenario's", |f, x| {
+        scale(&mut f.scenario.sensing.noise, x);
+    }),
+    quantity("bias_ratio", 0.0, 100.0, "spread of the measurements' bias over the scenario's", |f, x| {
+        scale(&mut f.scenario.sensing.bias, x);
+    }),
+    quantity("sensor_delay_s", 0.0, 0.5, "from motion to measurement", |f, x| f.scenario.sensing.delay_s = x),
+    quantity("dropout_rate_hz", 0.0, 1000.0, "how often measurements stay away", |f, rate_hz| {
+        let dropouts = &mut f.scenario.sensing.dropouts;
+        *dropouts = Some(Dropouts { rate_hz, ..dropouts.unwrap_or(Dropouts { rate_hz, mean_s: 0.02 }) });
+    }),
+    needing(
+        "dropout_rate_hz",
+        quantity(
+            "dropout_mean_s",
+            0.0,
+            60.0,
+            "how long, on average; without it, as in the scenario, or 0.02",
+            |f, x| {
+                f.scenario.sensing.dropouts.iter_mut().for_each(|dropouts| dropouts.mean_s = x);
+            },
+        ),
+    ),
+    quantity("start_x_m", -100.0, 100.0, "start off the scenario's, along x", |f, x| {
+        f.scenario.initial.position_m.x += x
+    }),
+    quantity("start_y_m", -100.0, 100.0, "start off the scenario's, along y", |f, x| {
+        f.scenario.initial.position_m.y += x
+    }),
+    quantity("start_z_m", -100.0, 100.0, "start off the scenario's, along z", |f, x| {
+        f.scenario.initial.position_m.z += x
+    }),
+];
+
+fn scale(spread: &mut Spread, ratio: f64) {
+    let Spread { position_m, velocity_m_s, attitude_rad, rates_rad_s } = spread;
+    for size in [position_m, velocity_m_s, attitude_rad, rates_rad_s] {
+        *size *= ratio;
+    }
+}

@@ -1,0 +1,148 @@
+//! What is kept of one flight of one contender.
+
+use crate::plan::Campaign;
+use afbc::monitor::Trip;
+use afbc_sim::contender::Contender;
+use afbc_sim::flight::{Lost, fly};
+use afbc_sim::metrics::{Accumulator, Metrics, is_settled, tracking_error};
+use afbc_sim::scenario::Scenario;
+use afbc_types::OutOfRange;
+
+/// One flight of one contender: a row of the results.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Index of the flight.
+    pub flight: u64,
+    /// Seed of its noise and weather.
+    pub seed: u64,
+    /// Who flew.
+    pub contender: String,
+    /// Along what.
+    pub trajectory: String,
+    /// Why the vehicle was lost, if it was.
+    pub lost_reason: Option<String>,
+    /// Why the contender's own monitor took another law, if it did.
+    pub trip_reason: Option<String>,
+    /// What was drawn, then what [`FIGURES`] lists; nothing where there was nothing to measure.
+    pub numbers: Vec<Option<f64>>,
+}
+
+/// A column of numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// Ends in the unit.
+    pub name: String,
+    /// For people.
+    pub meaning: String,
+}
+
+/// A figure of merit.
+pub struct Figure {
+    /// Ends in the unit.
+    pub name: &'static str,
+    /// For people.
+    pub meaning: &'static str,
+    value: fn(&Outcome) -> Option<f64>,
+}
+
+/// How a flight went.
+#[derive(Clone, Debug, Default)]
+struct Outcome {
+    lost: Option<Lost>,
+    /// When and why the contender's monitor tripped, if it did.
+    trip: Option<(f64, Trip)>,
+    metrics: Metrics,
+    /// Steps in which errors have counted.
+    settled: u64,
+    max_position_m: f64,
+    /// Steps, and those of them in which a rotor was at its limit.
+    steps: u64,
+    saturated: u64,
+}
+
+impl Outcome {
+    fn measured(&self, value: f64) -> Option<f64> {
+        (self.settled > 0).then_some(value)
+    }
+
+    /// From one step to the next.
+    fn changed(&self, value: f64) -> Option<f64> {
+        (self.settled > 1).then_some(value)
+    }
+}
+
+const fn figure(name: &'static str, meaning: &'static str, value: fn(&Outcome) -> Option<f64>) -> Figure {
+    Figure { name, meaning, value }
+}
+
+/// Every figure of merit, in the order of the columns. Errors count from [`SETTLED_S`](afbc_sim::metrics::SETTLED_S) on.
+pub static FIGURES: [Figure; 17] = [
+    figure("lost_at_s", "when the vehicle was lost", |o| o.lost.map(|lost| lost.time_s)),
+    figure("tripped_at_s", "when the monitor took another law", |o| o.trip.map(|(time_s, _)| time_s)),
+    figure("rmse_x_m", "root mean square error along x", |o| o.measured(o.metrics.rmse.x)),
+    figure("rmse_y_m", "root mean square error along y", |o| o.measured(o.metrics.rmse.y)),
+    figure("rmse_z_m", "root mean square error along z", |o| o.measured(o.metrics.rmse.z)),
+    figure("rmse_psi_rad", "root mean square error of yaw", |o| o.measured(o.metrics.rmse.w)),
+    figure("rmse_position_m", "root mean square distance from the reference", |o| {
+        o.measured(o.metrics.rmse.xyz().norm())
+    }),
+    figure("max_x_m", "largest error along x", |o| o.measured(o.metrics.max_abs.x)),
+    figure("max_y_m", "largest error along y", |o| o.measured(o.metrics.max_abs.y)),
+    figure("max_z_m", "largest error along z", |o| o.measured(o.metrics.max_abs.z)),
+    figure("max_psi_rad", "largest error of yaw", |o| o.measured(o.metrics.max_abs.w)),
+    figure("max_position_m", "largest distance from the reference", |o| o.measured(o.max_position_m)),
+    figure("mean_abs_du1_n", "mean |change of U1| per step", |o| o.changed(o.metrics.mean_abs_delta_u.x)),
+    figure("mean_abs_du2_n", "mean |change of U2| per step", |o| o.changed(o.metrics.mean_abs_delta_u.y)),
+    figure("mean_abs_du3_n", "mean |change of U3| per step", |o| o.changed(o.metrics.mean_abs_delta_u.z)),
+    figure("mean_abs_du4_n", "mean |change of U4| per step", |o| o.changed(o.metrics.mean_abs_delta_u.w)),
+    figure("saturated_ratio", "share of all steps with a rotor at its limit", |o| {
+        Some(o.saturated as f64 / o.steps as f64)
+    }),
+];
+
+impl Campaign {
+    /// Flies flight `flight` under every contender.
+    ///
+    /// # Errors
+    /// The first parameter, gain or setting out of range.
+    pub fn rows(&self, flight: u64) -> Result<Vec<Row>, OutOfRange> {
+        let draw = self.draw(flight);
+        let scenario = self.with(flight, &draw)?;
+        let trajectory = self.course(flight).map(|course| course.name.as_str()).unwrap_or_default();
+        let row = |contender: &Contender| {
+            let outcome = Outcome::of(&scenario, contender)?;
+            let figures = FIGURES.iter().map(|figure| (figure.value)(&outcome));
+            Ok(Row {
+                flight,
+                seed: draw.seed,
+                contender: contender.name.clone(),
+                trajectory: trajectory.into(),
+                lost_reason: outcome.lost.map(|lost| lost.reason.into()),
+                trip_reason: outcome.trip.map(|(_, trip)| trip.reason().into()),
+                numbers: draw.values.iter().copied().map(Some).chain(figures).collect(),
+            })
+        };
+        scenario.contenders.iter().map(row).collect()
+    }
+}
+
+impl Outcome {
+    /// Flies, and keeps nothing but sums.
+    fn of(scenario: &Scenario, contender: &Contender) -> Result<Self, OutOfRange> {
+        let mut outcome = Outcome::default();
+        let mut metrics = Accumulator::default();
+        outcome.lost = fly(scenario, contender, |sample| {
+            metrics.add(sample);
+            outcome.steps += 1;
+            let health = &sample.command.health;
+            outcome.saturated += u64::from(health.saturated);
+            outcome.trip = outcome.trip.or(health.trip.map(|trip| (sample.time_s, trip)));
+            if is_settled(sample.time_s) {
+                outcome.settled += 1;
+                outcome.max_position_m = outcome.max_position_m.max(tracking_error(sample).xyz().norm());
+            }
+        })?;
+        outcome.metrics = metrics.finish();
+        Ok(outcome)
+    }
+}

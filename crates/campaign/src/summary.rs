@@ -1,0 +1,164 @@
+//! What all flights together say, gathered row by row.
+
+use crate::manifest::Manifest;
+use crate::row::Row;
+use crate::statistics::Share;
+
+/// Intervals that a drawn quantity's spread is cut into.
+pub const BINS: usize = 10;
+/// How many of each contender's worst flights are named.
+const WORST: usize = 3;
+
+/// Flights, and those of them that ended well.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Count {
+    /// All.
+    pub flights: u64,
+    /// Not lost.
+    pub kept: u64,
+}
+
+impl Count {
+    fn add(&mut self, kept: bool) {
+        self.flights += 1;
+        self.kept += u64::from(kept);
+    }
+
+    /// The share that ended well.
+    pub fn share(&self) -> Share {
+        Share::of(self.kept, self.flights)
+    }
+}
+
+/// A flight that went badly.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bad {
+    /// Which.
+    pub flight: u64,
+    /// Along what.
+    pub trajectory: String,
+    /// When and why the vehicle was lost, if it was.
+    pub lost: Option<(f64, String)>,
+    /// Root mean square distance from the reference \[m\].
+    pub rmse_position_m: Option<f64>,
+}
+
+impl Bad {
+    /// Rises with how bad it was: lost is worse than astray, and soon is worse than late.
+    fn badness(&self) -> (bool, f64) {
+        match &self.lost {
+            Some((time_s, _)) => (true, -time_s),
+            None => (false, self.rmse_position_m.unwrap_or_default()),
+        }
+    }
+}
+
+/// How one contender did.
+#[derive(Clone, Debug)]
+pub struct Tally {
+    /// Its name.
+    pub contender: String,
+    /// All of its flights.
+    pub count: Count,
+    /// Flights in which its own monitor took another law.
+    pub tripped: u64,
+    /// Apart for each trajectory, in the campaign's order.
+    pub by_trajectory: Vec<Count>,
+    /// For each drawn quantity, apart for [`BINS`] equal parts of its interval.
+    pub by_draw: Vec<[Count; BINS]>,
+    /// Root mean square distances from the reference \[m\], sorted; infinite for a flight that was lost.
+    pub rmse_position_m: Vec<f64>,
+    /// Largest distances from the reference \[m\], likewise.
+    pub max_position_m: Vec<f64>,
+    /// Mean |change of U4| per step \[N\], sorted, of flights that were not lost.
+    pub mean_abs_du4_n: Vec<f64>,
+    /// Shares of steps with a rotor at its limit, sorted, of flights that were not lost.
+    pub saturated_ratio: Vec<f64>,
+    /// The worst flights, the very worst first.
+    pub worst: Vec<Bad>,
+}
+
+/// How a campaign went.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    /// What was flown.
+    pub manifest: Manifest,
+    /// In the campaign's order.
+    pub tallies: Vec<Tally>,
+}
+
+impl Summary {
+    /// Of no flight yet.
+    pub fn new(manifest: &Manifest) -> Self {
+        // As much as there will be and no more: it is all that grows with the flights.
+        let values = || Vec::with_capacity(manifest.shard.count(manifest.flights) as usize);
+        let tally = |contender: &String| Tally {
+            contender: contender.clone(),
+            count: Count::default(),
+            tripped: 0,
+            by_trajectory: vec![Count::default(); manifest.trajectories.len()],
+            by_draw: vec![[Count::default(); BINS]; manifest.drawn.len()],
+            rmse_position_m: values(),
+            max_position_m: values(),
+            mean_abs_du4_n: values(),
+            saturated_ratio: values(),
+            worst: Vec::new(),
+        };
+        Summary { tallies: manifest.contenders.iter().map(tally).collect(), manifest: manifest.clone() }
+    }
+
+    /// Takes one row into account.
+    pub fn add(&mut self, row: &Row) {
+        let Summary { manifest, tallies } = self;
+        let Some(tally) = tallies.iter_mut().find(|tally| tally.contender == row.contender) else { return };
+        let number = |name| manifest.number(row, name);
+        let kept = row.lost_reason.is_none();
+        tally.count.add(kept);
+        tally.tripped += u64::from(row.trip_reason.is_some());
+        let along = manifest.trajectories.iter().position(|name| *name == row.trajectory);
+        if let Some(count) = along.and_then(|along| tally.by_trajectory.get_mut(along)) {
+            count.add(kept);
+        }
+        for ((bins, drawn), value) in tally.by_draw.iter_mut().zip(&manifest.drawn).zip(&row.numbers) {
+            if let Some(count) = value.and_then(|value| bins.get_mut(bin(drawn.ends, value))) {
+                count.add(kept);
+            }
+        }
+        let or_lost = |name| if kept { number(name) } else { Some(f64::INFINITY) };
+        tally.rmse_position_m.extend(or_lost("rmse_position_m"));
+        tally.max_position_m.extend(or_lost("max_position_m"));
+        if kept {
+            tally.mean_abs_du4_n.extend(number("mean_abs_du4_n"));
+            tally.saturated_ratio.extend(number("saturated_ratio"));
+        }
+        let bad = Bad {
+            flight: row.flight,
+            trajectory: row.trajectory.clone(),
+            lost: row.lost_reason.clone().map(|reason| (number("lost_at_s").unwrap_or_default(), reason)),
+            rmse_position_m: number("rmse_position_m"),
+        };
+        tally.worst.push(bad);
+        // Stable: of two that are as bad, the earlier stays first.
+        tally.worst.sort_by(|a, b| {
+            let ((a_lost, a), (b_lost, b)) = (a.badness(), b.badness());
+            b_lost.cmp(&a_lost).then(b.total_cmp(&a))
+        });
+        tally.worst.truncate(WORST);
+    }
+
+    /// Puts what is to be sorted in order, once all rows are in.
+    pub fn finish(mut self) -> Self {
+        for tally in &mut self.tallies {
+            let Tally { rmse_position_m, max_position_m, mean_abs_du4_n, saturated_ratio, .. } = tally;
+            for values in [rmse_position_m, max_position_m, mean_abs_du4_n, saturated_ratio] {
+                values.sort_by(f64::total_cmp);
+            }
+        }
+        self
+    }
+}
+
+/// Which of [`BINS`] equal parts of an interval `value` lies in; the upper end belongs to the last.
+fn bin([low, high]: [f64; 2], value: f64) -> usize {
+    ((value - low) / (high - low) * BINS as f64).clamp(0.0, BINS as f64 - 1.0) as usize
+}

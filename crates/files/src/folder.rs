@@ -1,0 +1,159 @@
+//! A folder that one command has for itself.
+
+use crate::error::Error;
+use crate::place::{HIDDEN, place};
+use crate::seal;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// What every folder that this program writes holds: whose it is, and which files in it are.
+const MARKER: &str = ".sitl.json";
+#[derive(Serialize, Deserialize)]
+struct Marker {
+    /// What follows `sitl` on the command line.
+    command: String,
+    /// Of what was flown.
+    name: String,
+    /// What the command has written, or is about to.
+    files: BTreeSet<String>,
+    checksum: String,
+}
+
+/// A folder that one command has for itself, and puts files into whole.
+///
+/// Nothing in it that the command has not written is ever replaced or removed, unless by force.
+#[derive(Clone, Debug)]
+pub struct Folder {
+    path: PathBuf,
+    command: String,
+    name: String,
+    force: bool,
+}
+
+impl Folder {
+    /// The folder at `path` for what `sitl <command>` makes of `name`, created with its parents if need be. By `force`,
+    /// files in the way may be replaced.
+    ///
+    /// # Errors
+    /// If it cannot be written, or is neither empty nor the command's own; nothing has been touched then.
+    pub fn open(path: &Path, command: &str, name: &str, force: bool) -> Result<Self, Error> {
+        let folder = Folder::find(path, command, name, force)?;
+        fs::create_dir_all(path).map_err(|source| Error::Write { path: path.into(), source })?;
+        folder.add::<&str>(&[])?;
+        Ok(folder)
+    }
+
+    /// As [`open`](Self::open), before anything is made.
+    ///
+    /// # Errors
+    /// If it is neither empty nor the command's own.
+    pub fn find(path: &Path, command: &str, name: &str, force: bool) -> Result<Self, Error> {
+        let folder = Folder { path: path.into(), command: command.into(), name: name.into(), force };
+        folder.files().map(|_| folder)
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// That a file in it, called `name`, could not be written.
+    pub fn error(&self, name: &str, source: io::Error) -> Error {
+        Error::Write { path: self.path.join(name), source }
+    }
+
+    fn foreign(&self, whose: String) -> Error {
+        Error::Foreign { path: self.path.clone(), whose }
+    }
+
+    /// The files that the command has written here before.
+    fn files(&self) -> Result<BTreeSet<String>, Error> {
+        let files = match self.marker() {
+            Ok(Some(Marker { command, files, .. })) if command == self.command => Ok(files),
+            Ok(Some(Marker { command, name, .. })) => {
+                Err(self.foreign(format!("holds what `sitl {command}` made of {name}")))
+            }
+            Ok(None) if self.is_empty()? => Ok(BTreeSet::new()),
+            Ok(None) => Err(self.foreign(format!("not empty, and not from `sitl {}`", self.command))),
+            Err(error) => Err(Error::Damaged { path: self.path.join(MARKER), problem: error.to_string() }),
+        };
+        if self.force { Ok(files.unwrap_or_default()) } else { files }
+    }
+
+    fn marker(&self) -> io::Result<Option<Marker>> {
+        let bytes = match fs::read(self.path.join(MARKER)) {
+            Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+                return Ok(None);
+            }
+            bytes => bytes?,
+        };
+        seal::verify(&mut io::Cursor::new(&bytes))?;
+        let marker: Marker = serde_json::from_slice(&bytes)?;
+        // They will be removed one day: nothing outside the folder may be among them.
+        let is_plain = |name: &String| Path::new(name).file_name().is_some_and(|plain| plain == name.as_str());
+        if marker.files.iter().all(is_plain) { Ok(Some(marker)) } else { Err(io::Error::other("a path in it")) }
+    }
+
+    /// Whether there is nothing, not even the folder; what a killed program may have left does not count.
+    fn is_empty(&self) -> Result<bool, Error> {
+        let entries = match fs::read_dir(&self.path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(true),
+            entries => entries.map_err(|source| Error::Write { path: self.path.clone(), source })?,
+        };
+        Ok(entries.flatten().all(|entry| entry.file_name().to_string_lossy().starts_with(HIDDEN)))
+    }
+
+    /// Makes `names` the command's own, before they are written.
+    ///
+    /// # Errors
+    /// If one is there already and not the command's.
+    pub fn add<N: AsRef<str>>(&self, names: &[N]) -> Result<(), Error> {
+        let mut files = self.files()?;
+        for name in names.iter().map(N::as_ref) {
+            let path = self.path.join(name);
+            if files.insert(name.into()) && !self.force && fs::symlink_metadata(&path).is_ok() {
+                return Err(Error::Foreign {
+                    path,
+                    whose: format!("in the way, and not from `sitl {}`", self.command),
+                });
+            }
+        }
+        self.mark(files)
+    }
+
+    /// As [`add`](Self::add), and removes whatever else the command has written here before: none of it belongs beside
+    /// what comes now.
+    pub fn only<N: AsRef<str>>(&self, names: &[N]) -> Result<(), Error> {
+        let before = self.files()?;
+        self.add(names)?;
+        let now: BTreeSet<String> = names.iter().map(|name| name.as_ref().into()).collect();
+        for stale in before.difference(&now) {
+            match fs::remove_file(self.path.join(stale)) {
+                Err(source) if source.kind() != io::ErrorKind::NotFound => return Err(self.error(stale, source)),
+                _ => {}
+            }
+        }
+        self.mark(now)
+    }
+
+    fn mark(&self, files: BTreeSet<String>) -> Result<(), Error> {
+        let Folder { command, name, .. } = self.clone();
+        let marker = Marker { command, name, files, checksum: seal::OPEN.into() };
+        self.place(MARKER, |out| seal::json(out, &marker)).map(drop)
+    }
+
+    /// Lets `fill` write a file under a temporary name, then gives it its own; an interrupted or failed run leaves the
+    /// file that was there before. What has its own name is on the disk, whatever happens to the power.
+    pub fn place(
+        &self,
+        name: &str,
+        fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
+    ) -> Result<PathBuf, Error> {
+        let path = self.path.join(name);
+        place(&path, fill).map_err(|source| Error::Write { path: path.clone(), source })?;
+        Ok(path)
+    }
+}

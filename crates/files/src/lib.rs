@@ -1,0 +1,11 @@
+//! Folders of results: files that appear whole or not at all, carry a checksum, and never replace what is not theirs.
+#![forbid(unsafe_code)]
+
+mod error;
+mod folder;
+mod place;
+pub mod seal;
+
+pub use error::Error;
+pub use folder::Folder;
+pub use place::{Disk, place, sweep};

@@ -1,0 +1,64 @@
+//! How files come into being: whole or not at all.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+/// Begins the names of what is none of the results.
+pub(crate) const HIDDEN: &str = ".sitl.";
+
+/// Writes the file at `path` as [`Folder::place`] does.
+pub fn place(path: &Path, fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>) -> io::Result<()> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let temporary = path.with_file_name(format!("{HIDDEN}{name}.{}.tmp", std::process::id()));
+    // Another program of this number may have been killed; where there is none, there is nothing to remove.
+    let _ = fs::remove_file(&temporary);
+    let written = File::create_new(&temporary).and_then(|file| {
+        let mut out = BufWriter::new(Disk { file, failure: None });
+        let filled = fill(&mut out).and_then(|()| out.flush());
+        let (disk, _) = out.into_parts();
+        filled.map_err(|error| disk.cause(error))?;
+        disk.file.sync_all()
+    });
+    written.and_then(|()| fs::rename(&temporary, path)).inspect_err(|_| {
+        // Nothing more can be done if this fails too.
+        let _ = fs::remove_file(&temporary);
+    })
+}
+
+/// Removes from the folder `dir` what a killed program has left half written.
+pub fn sweep(dir: &Path) {
+    for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with(HIDDEN) && name.ends_with(".tmp") {
+            // What cannot be removed does no harm either.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// A file that remembers why it could not be written.
+pub struct Disk {
+    /// The file.
+    pub file: File,
+    /// The system's number.
+    pub failure: Option<i32>,
+}
+
+impl Disk {
+    /// What the system said, if it said something: libraries wrap it so that its kind is lost.
+    pub fn cause(&self, error: io::Error) -> io::Error {
+        self.failure.map_or(error, io::Error::from_raw_os_error)
+    }
+}
+
+impl Write for Disk {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes).inspect_err(|error| self.failure = error.raw_os_error())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}

@@ -1,0 +1,137 @@
+//! A checksum that a file carries in itself, and so wherever it goes.
+//!
+//! Near its end the file holds `xxh64:` and 16 digits: its own XXH64, computed with 16 zeros in their place.
+
+use core::hash::Hasher;
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use twox_hash::XxHash64;
+
+/// What a file holds before it is sealed.
+pub const OPEN: &str = "xxh64:0000000000000000";
+const TAG: &[u8] = b"xxh64:";
+const ZEROS: &[u8; 16] = b"0000000000000000";
+/// The tag lies within this many bytes of the end.
+const TAIL: usize = 4096;
+
+/// Where the digits begin, after the last tag.
+fn digits(tail: &[u8]) -> Option<usize> {
+    let tag = tail.windows(OPEN.len()).rposition(|window| window.starts_with(TAG))?;
+    Some(tag + TAG.len())
+}
+
+/// Seals what is written into it, which holds [`OPEN`] near its end.
+pub struct Sealing<W> {
+    out: W,
+    hash: XxHash64,
+    /// The last bytes so far: the digits may be among them.
+    held: Vec<u8>,
+}
+
+impl<W: Write> Sealing<W> {
+    /// Seals what goes to `out`.
+    pub fn new(out: W) -> Self {
+        Sealing { out, hash: XxHash64::with_seed(0), held: Vec::new() }
+    }
+
+    /// Puts the checksum in its place.
+    pub fn finish(mut self) -> io::Result<()> {
+        self.hash.write(&self.held);
+        let sum = format!("{:016x}", self.hash.finish());
+        let place = digits(&self.held).and_then(|at| self.held.get_mut(at..at + sum.len()));
+        place.ok_or_else(|| io::Error::other("no place for a checksum"))?.copy_from_slice(sum.as_bytes());
+        self.out.write_all(&self.held)
+    }
+}
+
+impl<W: Write> Write for Sealing<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.held.extend_from_slice(bytes);
+        if self.held.len() > 16 * TAIL {
+            let rest = self.held.split_off(self.held.len() - TAIL);
+            self.hash.write(&self.held);
+            self.out.write_all(&self.held)?;
+            self.held = rest;
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+/// Writes `value`, which holds [`OPEN`] in its last field, and seals it.
+pub fn json(out: &mut dyn Write, value: &impl serde::Serialize) -> io::Result<()> {
+    let mut out = Sealing::new(out);
+    serde_json::to_writer_pretty(&mut out, value)?;
+    writeln!(out)?;
+    out.finish()
+}
+
+/// Whether a file is what was sealed, to the last bit.
+///
+/// # Errors
+/// One that says that it is not, or that it cannot be read.
+pub fn verify(file: &mut (impl Read + Seek)) -> io::Result<()> {
+    let broken = |problem: &str| io::Error::new(io::ErrorKind::InvalidData, problem);
+    let start = file.seek(SeekFrom::End(0))?.saturating_sub(TAIL as u64);
+    let mut tail = Vec::new();
+    file.seek(SeekFrom::Start(start))?;
+    file.read_to_end(&mut tail)?;
+    let at = digits(&tail).ok_or_else(|| broken("no checksum in it"))?;
+    let mut hash = XxHash64::with_seed(0);
+    file.seek(SeekFrom::Start(0))?;
+    let (mut left, mut buffer) = (start, vec![0; 1 << 16]);
+    while left > 0 {
+        let want = buffer.len().min(usize::try_from(left).unwrap_or(usize::MAX));
+        let piece = buffer.get_mut(..want).ok_or_else(|| broken("too long"))?;
+        file.read_exact(piece)?;
+        hash.write(piece);
+        left -= want as u64;
+    }
+    let (before, rest) = tail.split_at_checked(at).ok_or_else(|| broken("no checksum in it"))?;
+    let (sum, after) = rest.split_at_checked(ZEROS.len()).ok_or_else(|| broken("no checksum in it"))?;
+    for piece in [before, ZEROS, after] {
+        hash.write(piece);
+    }
+    file.seek(SeekFrom::Start(0))?;
+    if format!("{:016x}", hash.finish()).as_bytes() == sum { Ok(()) } else { Err(broken("its checksum is wrong")) }
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
+    use super::*;
+    use std::io::Cursor;
+
+    fn sealed(before: usize, after: usize, piece: usize) -> Vec<u8> {
+        let mut bytes: Vec<u8> = (0..before).map(|i| (i * 7 % 251) as u8).collect();
+        bytes.extend_from_slice(OPEN.as_bytes());
+        bytes.extend(std::iter::repeat_n(b'.', after));
+        let mut out = Vec::new();
+        let mut sealing = Sealing::new(&mut out);
+        bytes.chunks(piece).for_each(|piece| sealing.write_all(piece).unwrap());
+        sealing.finish().unwrap();
+        out
+    }
+
+    /// Of every length around what is held back, however it is cut: the same checksum, and no flipped bit passes.
+    #[test]
+    fn no_flipped_bit_passes() {
+        for (before, after) in [(0, 0), (1, 9), (TAIL - 30, 8), (16 * TAIL, 100), (40 * TAIL + 1, TAIL - 50)] {
+            let bytes = sealed(before, after, 1000);
+            assert_eq!(bytes, sealed(before, after, 77_777));
+            verify(&mut Cursor::new(&bytes)).unwrap();
+            // Every bit of the end, and some of the rest.
+            let positions = (0..bytes.len()).filter(|at| at + 300 > bytes.len() || at % 1009 == 0);
+            for (at, bit) in positions.flat_map(|at| (0..8).map(move |bit| (at, bit))) {
+                let mut flipped = bytes.clone();
+                flipped[at] ^= 1 << bit;
+                assert!(verify(&mut Cursor::new(flipped)).is_err(), "bit {bit} of byte {at} of {}", bytes.len());
+            }
+            for length in (0..bytes.len()).filter(|length| length + 300 > bytes.len() || length % 1009 == 0) {
+                assert!(verify(&mut Cursor::new(&bytes[..length])).is_err(), "cut to {length}");
+            }
+        }
+    }
+}

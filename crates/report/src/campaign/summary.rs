@@ -1,0 +1,94 @@
+//! `summary.json` of a campaign, for programs.
+
+use super::PERCENTS;
+use afbc_campaign::statistics::percentile;
+use afbc_campaign::{Count, Manifest, Summary, Tally};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+
+#[derive(Serialize)]
+struct Page<'a> {
+    campaign: &'a Manifest,
+    contenders: Vec<Contender<'a>>,
+}
+
+#[derive(Serialize)]
+struct Contender<'a> {
+    name: &'a str,
+    #[serde(flatten)]
+    all: Success,
+    tripped: u64,
+    by_trajectory: BTreeMap<&'a str, Success>,
+    /// Null where the percentile is a lost flight.
+    rmse_position_m: Percentiles,
+    max_position_m: Percentiles,
+    /// Of flights that were not lost.
+    mean_abs_du4_n: Percentiles,
+    saturated_ratio: Percentiles,
+    /// The worst first.
+    worst_flights: Vec<u64>,
+}
+
+/// Flights that were not lost.
+#[derive(Serialize)]
+struct Success {
+    flights: u64,
+    kept: u64,
+    success_ratio: f64,
+    /// Wilson's.
+    success_interval_95: [f64; 2],
+}
+
+impl From<&Count> for Success {
+    fn from(count: &Count) -> Self {
+        let share = count.share();
+        Success {
+            flights: count.flights,
+            kept: count.kept,
+            success_ratio: share.value,
+            success_interval_95: [share.low, share.high],
+        }
+    }
+}
+
+/// Nearest ranks.
+#[derive(Serialize)]
+struct Percentiles {
+    p50: Option<f64>,
+    p90: Option<f64>,
+    p99: Option<f64>,
+}
+
+impl From<&Vec<f64>> for Percentiles {
+    fn from(sorted: &Vec<f64>) -> Self {
+        let [p50, p90, p99] = PERCENTS.map(|percent| percentile(sorted, percent).filter(|value| value.is_finite()));
+        Percentiles { p50, p90, p99 }
+    }
+}
+
+fn contender<'a>(manifest: &'a Manifest, tally: &'a Tally) -> Contender<'a> {
+    let names = manifest.trajectories.iter().map(String::as_str);
+    Contender {
+        name: &tally.contender,
+        all: (&tally.count).into(),
+        tripped: tally.tripped,
+        by_trajectory: names.zip(tally.by_trajectory.iter().map(Success::from)).collect(),
+        rmse_position_m: (&tally.rmse_position_m).into(),
+        max_position_m: (&tally.max_position_m).into(),
+        mean_abs_du4_n: (&tally.mean_abs_du4_n).into(),
+        saturated_ratio: (&tally.saturated_ratio).into(),
+        worst_flights: tally.worst.iter().map(|bad| bad.flight).collect(),
+    }
+}
+
+/// Writes one object.
+///
+/// # Errors
+/// If `out` does not take it.
+pub fn write(out: &mut dyn Write, summary: &Summary) -> io::Result<()> {
+    let contender = |tally| contender(&summary.manifest, tally);
+    let page = Page { campaign: &summary.manifest, contenders: summary.tallies.iter().map(contender).collect() };
+    serde_json::to_writer_pretty(&mut *out, &page)?;
+    writeln!(out)
+}

@@ -1,0 +1,72 @@
+//! A comparison for programs: `comparison.csv` and `comparison.json`.
+
+use afbc_campaign::compare::{Comparison, Entry, FIGURES, Outcome, Spread};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+
+/// A row for each flight. Figures of a lost flight end with it.
+pub(super) fn csv(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(out);
+    let head = ["scenario", "contender", "controller", "seed"].into_iter().chain(FIGURES.iter().map(|f| f.name));
+    csv.write_record(head.chain(["lost_at_s"]))?;
+    for comparison in comparisons {
+        for entry in &comparison.entries {
+            for Outcome { seed, lost, metrics } in &entry.flights {
+                let contender = entry.contender();
+                let who = [comparison.scenario.name.clone(), contender.name.clone(), contender.kind().name().into()];
+                let figures = FIGURES.iter().map(|figure| (figure.value)(metrics).to_string());
+                let lost = lost.map_or(String::new(), |lost| lost.time_s.to_string());
+                csv.write_record(who.into_iter().chain([seed.to_string()]).chain(figures).chain([lost]))?;
+            }
+        }
+    }
+    csv.flush()
+}
+
+#[derive(Serialize)]
+struct Compared<'a> {
+    scenario: &'a str,
+    contenders: Vec<Contender<'a>>,
+}
+
+#[derive(Serialize)]
+struct Contender<'a> {
+    name: &'a str,
+    controller: &'a str,
+    seeds: Vec<u64>,
+    lost: usize,
+    /// Null if a vehicle was lost.
+    mean: BTreeMap<&'a str, Option<f64>>,
+    standard_deviation: BTreeMap<&'a str, Option<f64>>,
+    /// Root mean square distance over backstepping's.
+    ratio: Option<f64>,
+}
+
+/// Writes an array with one object for each scenario: mean and spread over the seeds.
+///
+/// # Errors
+/// If `out` does not take it.
+pub fn json(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
+    let compared = comparisons.iter().map(|comparison| Compared {
+        scenario: &comparison.scenario.name,
+        contenders: comparison.entries.iter().map(|entry| contender(comparison, entry)).collect(),
+    });
+    serde_json::to_writer_pretty(&mut *out, &compared.collect::<Vec<_>>())?;
+    writeln!(out)
+}
+
+fn contender<'a>(comparison: &Comparison, entry: &'a Entry) -> Contender<'a> {
+    let figures = |part: fn(Spread) -> f64| {
+        FIGURES.iter().map(|figure| (figure.name, entry.spread(figure.value).map(part))).collect()
+    };
+    Contender {
+        name: &entry.contender().name,
+        controller: entry.contender().kind().name(),
+        seeds: entry.flights.iter().map(|flight| flight.seed).collect(),
+        lost: entry.lost(),
+        mean: figures(|spread| spread.mean),
+        standard_deviation: figures(|spread| spread.deviation),
+        ratio: comparison.ratio(entry),
+    }
+}

@@ -1,0 +1,239 @@
+//! One CSV for each run: every logged step, units in the header.
+
+use afbc::cascade::Context;
+use afbc::model::Model;
+use afbc_plant::{Sensing, Telemetry};
+use afbc_sim::contender::Law;
+use afbc_sim::flight::Sample;
+use afbc_sim::flown::Flown;
+use afbc_sim::scenario::Scenario;
+use afbc_types::{Axis, Parameters, PerAxis, State};
+use csv::ByteRecord;
+use nalgebra::Vector4;
+use std::io::{self, Write};
+
+/// A value, written in as few digits as give it back exactly.
+enum Number {
+    /// What the controller computes.
+    Single(f32),
+    /// What the plant and the reference are.
+    Double(f64),
+    /// 0 or 1.
+    Flag(bool),
+}
+
+use Number::{Double, Flag, Single};
+
+/// What a column may show.
+struct Row<'a> {
+    sample: &'a Sample,
+    /// Lowest and highest U1..U4 since the row before.
+    extremes: &'a [Vector4<f64>; 2],
+    /// See [`lyapunov`].
+    lyapunov: PerAxis<f32>,
+}
+
+/// A header and the value under it.
+struct Column {
+    name: String,
+    value: Box<dyn Fn(&Row) -> Number>,
+}
+
+/// The terms of the Lyapunov functions (14), (27) that can be computed in flight: e_1^2 / 2 + e_2^2 / (2 g_i). What is
+/// left out is the distance of the estimates from values that nobody knows. g_i is the nominal vehicle's.
+fn lyapunov(model: &Model, sample: &Sample) -> PerAxis<f32> {
+    let state = sample.motion.measure();
+    let rotor_residual_rad_s = sample.command.speeds.residual_rad_s();
+    let context =
+        Context { state: &state, rotor_residual_rad_s, dt_s: 0.0, adapt: false, unallocated: PerAxis::default() };
+    PerAxis::from_fn(|axis| {
+        let errors = sample.command.errors.get(axis);
+        0.5 * errors.e1 * errors.e1 + 0.5 * errors.e2 * errors.e2 / model.dynamics(axis, &context).g
+    })
+}
+
+/// Every column of a flight's log, left to right.
+fn columns(scenario: &Scenario, law: &Law) -> Vec<Column> {
+    let mut columns = Vec::new();
+    let mut add = |name: String, value: Box<dyn Fn(&Row) -> Number>| columns.push(Column { name, value });
+    macro_rules! add {
+        ($kind:ident $($name:literal: $value:expr;)*) => {
+            $(add($name.into(), Box::new(|row| { let value: fn(&Sample) -> _ = $value; $kind(value(row.sample)) }));)*
+        };
+    }
+    add! { Double
+        "time_s": |s| s.time_s;
+        "x_m": |s| s.motion.position_m.x;
+        "y_m": |s| s.motion.position_m.y;
+        "z_m": |s| s.motion.position_m.z;
+        "vx_m_s": |s| s.motion.velocity_m_s.x;
+        "vy_m_s": |s| s.motion.velocity_m_s.y;
+        "vz_m_s": |s| s.motion.velocity_m_s.z;
+        "phi_rad": |s| s.motion.attitude_rad.x;
+        "theta_rad": |s| s.motion.attitude_rad.y;
+        "psi_rad": |s| s.motion.attitude_rad.z;
+        "p_rad_s": |s| s.motion.rates_rad_s.x;
+        "q_rad_s": |s| s.motion.rates_rad_s.y;
+        "r_rad_s": |s| s.motion.rates_rad_s.z;
+        "x_d_m": |s| s.reference.position_m.x;
+        "y_d_m": |s| s.reference.position_m.y;
+        "z_d_m": |s| s.reference.position_m.z;
+        "vx_d_m_s": |s| s.reference.velocity_m_s.x;
+        "vy_d_m_s": |s| s.reference.velocity_m_s.y;
+        "vz_d_m_s": |s| s.reference.velocity_m_s.z;
+        "ax_d_m_s2": |s| s.reference.acceleration_m_s2.x;
+        "ay_d_m_s2": |s| s.reference.acceleration_m_s2.y;
+        "az_d_m_s2": |s| s.reference.acceleration_m_s2.z;
+        "psi_d_rad": |s| s.reference.yaw_rad;
+        "psi_d_rate_rad_s": |s| s.reference.yaw_rate_rad_s;
+        "psi_d_acceleration_rad_s2": |s| s.reference.yaw_acceleration_rad_s2;
+    }
+    // phi_d and theta_d: as (40) gives them, then as roll and pitch track them, behind the command filter.
+    add! { Single
+        "phi_d_raw_rad": |s| s.command.desired_rad[0];
+        "theta_d_raw_rad": |s| s.command.desired_rad[1];
+        "phi_d_rad": |s| s.command.filtered[0].angle;
+        "theta_d_rad": |s| s.command.filtered[1].angle;
+        "phi_d_rate_rad_s": |s| s.command.filtered[0].rate;
+        "theta_d_rate_rad_s": |s| s.command.filtered[1].rate;
+    }
+    // U1..U4 as the rotors give them, then as the law wants them; further down, between which values they went since
+    // the row before.
+    add! { Single
+        "u1_n": |s| given(s).roll_n;
+        "u2_n": |s| given(s).pitch_n;
+        "u3_n": |s| given(s).yaw_n;
+        "u4_n": |s| given(s).thrust_n;
+        "u1_wanted_n": |s| s.command.inputs.roll_n;
+        "u2_wanted_n": |s| s.command.inputs.pitch_n;
+        "u3_wanted_n": |s| s.command.inputs.yaw_n;
+        "u4_wanted_n": |s| s.command.inputs.thrust_n;
+        "u5_m_s2": |s| s.command.virtual_m_s2[0];
+        "u6_m_s2": |s| s.command.virtual_m_s2[1];
+        "f1_n": |s| s.command.forces.0.x;
+        "f2_n": |s| s.command.forces.0.y;
+        "f3_n": |s| s.command.forces.0.z;
+        "f4_n": |s| s.command.forces.0.w;
+        "omega1_rad_s": |s| s.command.speeds.0.x;
+        "omega2_rad_s": |s| s.command.speeds.0.y;
+        "omega3_rad_s": |s| s.command.speeds.0.z;
+        "omega4_rad_s": |s| s.command.speeds.0.w;
+    }
+    for (i, u) in ["u1", "u2", "u3", "u4"].into_iter().enumerate() {
+        for (j, extreme) in ["min", "max"].into_iter().enumerate() {
+            let value = move |row: &Row| row.extremes.get(j).and_then(|u| u.get(i)).copied();
+            // What the rotors give is computed in f32.
+            add(format!("{u}_{extreme}_n"), Box::new(move |row| Single(value(row).unwrap_or(f64::NAN) as f32)));
+        }
+    }
+    add! { Flag "saturated": |s| s.command.health.saturated; }
+    // What the others have in the place of e_2 and the estimates is nothing.
+    let (backstepping, adaptive) = (!law.is_peer(), matches!(law, Law::Afbc(_) | Law::Guarded(_)));
+    for axis in Axis::ALL {
+        let name = axis.name();
+        // Of e1, e2 and the subsystem's input.
+        let [e1, e2, u] = match axis {
+            Axis::Roll | Axis::Pitch | Axis::Yaw => ["rad", "rad_s", "n"],
+            Axis::Z => ["m", "m_s", "n"],
+            Axis::X | Axis::Y => ["m", "m_s", "m_s2"],
+        };
+        add(format!("e1_{name}_{e1}"), Box::new(move |row| Single(row.sample.command.errors.get(axis).e1)));
+        if backstepping {
+            add(format!("e2_{name}_{e2}"), Box::new(move |row| Single(row.sample.command.errors.get(axis).e2)));
+        }
+        if adaptive {
+            let estimate = move |row: &Row| *row.sample.estimates.get(axis);
+            add(format!("delta_hat_{name}_{u}"), Box::new(move |row| Single(estimate(row).delta)));
+            add(format!("theta_norm_{name}_{u}"), Box::new(move |row| Single(estimate(row).theta.norm())));
+        }
+        if backstepping {
+            add(format!("lyapunov_{name}"), Box::new(move |row| Single(*row.lyapunov.get(axis))));
+        }
+    }
+    if backstepping {
+        let sum = |row: &Row| Axis::ALL.iter().map(|&axis| row.lyapunov.get(axis)).sum();
+        add("lyapunov_sum".into(), Box::new(move |row| Single(sum(row))));
+    }
+    if let Law::Guarded(_) = law {
+        add("tripped".into(), Box::new(|row| Flag(row.sample.command.health.trip.is_some())));
+    }
+    columns.extend(real(scenario));
+    columns
+}
+
+/// What rotors and air did, and what was measured, of a plant and of sensors that are not ideal.
+fn real(scenario: &Scenario) -> Vec<Column> {
+    let mut columns = Vec::new();
+    if !scenario.is_ideal() {
+        let mut add = |name: &str, value: fn(&Telemetry) -> f64| {
+            let value = move |row: &Row| Double(row.sample.telemetry.as_ref().map_or(f64::NAN, value));
+            columns.push(Column { name: name.into(), value: Box::new(value) });
+        };
+        add("rotor1_rad_s", |t| t.rotor_speeds_rad_s.x);
+        add("rotor2_rad_s", |t| t.rotor_speeds_rad_s.y);
+        add("rotor3_rad_s", |t| t.rotor_speeds_rad_s.z);
+        add("rotor4_rad_s", |t| t.rotor_speeds_rad_s.w);
+        add("wind_x_m_s", |t| t.wind_m_s.x);
+        add("wind_y_m_s", |t| t.wind_m_s.y);
+        add("wind_z_m_s", |t| t.wind_m_s.z);
+        add("thrust_ratio", |t| t.thrust_ratio);
+        add("on_ground", |t| f64::from(u8::from(t.on_ground)));
+        if scenario.realism.rotors.battery.is_some() {
+            add("battery_v", |t| t.battery.map_or(f64::NAN, |battery| battery.voltage_v));
+            add("battery_a", |t| t.battery.map_or(f64::NAN, |battery| battery.current_a));
+            add("battery_charge", |t| t.battery.map_or(f64::NAN, |battery| battery.charge));
+        }
+    }
+    if scenario.sensing != Sensing::default() {
+        let mut add = |name: &str, value: fn(&State) -> f32| {
+            let value = move |row: &Row| Single(row.sample.measurement.as_ref().map_or(f32::NAN, |m| value(&m.state)));
+            columns.push(Column { name: name.into(), value: Box::new(value) });
+        };
+        add("x_measured_m", |s| s.position_m.x);
+        add("y_measured_m", |s| s.position_m.y);
+        add("z_measured_m", |s| s.position_m.z);
+        add("vx_measured_m_s", |s| s.velocity_m_s.x);
+        add("vy_measured_m_s", |s| s.velocity_m_s.y);
+        add("vz_measured_m_s", |s| s.velocity_m_s.z);
+        add("phi_measured_rad", |s| s.attitude_rad.x);
+        add("theta_measured_rad", |s| s.attitude_rad.y);
+        add("psi_measured_rad", |s| s.attitude_rad.z);
+        add("p_measured_rad_s", |s| s.rates_rad_s.x);
+        add("q_measured_rad_s", |s| s.rates_rad_s.y);
+        add("r_measured_rad_s", |s| s.rates_rad_s.z);
+        let fresh = |row: &Row| Flag(row.sample.measurement.is_some_and(|measurement| measurement.fresh));
+        columns.push(Column { name: "measurement_fresh".into(), value: Box::new(fresh) });
+    }
+    columns
+}
+
+/// U1..U4 as the rotors give them.
+fn given(sample: &Sample) -> afbc_types::Inputs {
+    afbc::allocation::Mixer::inputs(&sample.command.forces)
+}
+
+/// Writes the header and one line for each logged step.
+pub(super) fn write(out: &mut dyn Write, Flown { scenario, run }: &Flown) -> io::Result<()> {
+    let vehicle: Parameters = scenario.vehicle.to_f32();
+    let model = Model::new(&vehicle);
+    let columns = columns(scenario, &run.contender.law);
+    let mut writer = csv::Writer::from_writer(out);
+    writer.write_record(columns.iter().map(|column| &column.name))?;
+    let mut digits = ryu::Buffer::new();
+    let mut record = ByteRecord::new();
+    for (sample, extremes) in run.log.iter().zip(&run.input_extremes) {
+        let row = Row { sample, extremes, lyapunov: lyapunov(&model, sample) };
+        record.clear();
+        for column in &columns {
+            let field = match (column.value)(&row) {
+                Single(value) => digits.format(value),
+                Double(value) => digits.format(value),
+                Flag(true) => "1",
+                Flag(false) => "0",
+            };
+            record.push_field(field.as_bytes());
+        }
+        writer.write_byte_record(&record)?;
+    }
+    writer.flush()
+}

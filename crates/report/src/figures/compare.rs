@@ -1,0 +1,90 @@
+//! Root mean square errors as bars.
+
+use super::Figure;
+use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, text_width_px, units};
+use super::palette::{BLACK, FRAME, GREY, color};
+use crate::words;
+use afbc_campaign::compare::{Comparison, Entry, FIGURES, Spread};
+use afbc_sim::metrics::SETTLED_S;
+use plotters::prelude::*;
+use plotters::style::text_anchor::HPos;
+use std::io;
+
+/// The first of [`FIGURES`]: the errors.
+const PANELS: usize = 4;
+const BAR_PX: f64 = 18.0;
+/// Above the bars of one panel.
+const TITLE_PX: f64 = 26.0;
+const MARGIN_PX: f64 = 14.0;
+/// Right of the longest bar: its number, and what it is known by.
+const NUMBER_PX: f64 = 60.0;
+const SPREAD_PX: f64 = 46.0;
+
+/// Bars of every contender's errors, two panels side by side; none of no contender.
+pub(crate) fn draw(comparison: &Comparison) -> io::Result<Option<Figure>> {
+    if comparison.entries.is_empty() {
+        return Ok(None);
+    }
+    let scenario = &comparison.scenario;
+    let conditions = format!("{}: {}", scenario.name, words::conditions(scenario));
+    let title = "Root mean square errors";
+    let (top_px, panel_px) = (34.0, TITLE_PX + comparison.entries.len() as f64 * BAR_PX + 12.0);
+    let svg = canvas::svg(top_px + 2.0 * panel_px, title, |area| {
+        canvas::head(area, title, &conditions, &[])?;
+        for index in 0..PANELS {
+            let corner = ((index % 2) as f64 * WIDTH_PX / 2.0 + MARGIN_PX, top_px + (index / 2) as f64 * panel_px);
+            panel(area, comparison, index, corner)?;
+        }
+        Ok(())
+    })?;
+    let mut caption = format!("Root mean square errors from {SETTLED_S} s to the end; short is good.");
+    let lost = |entry: &Entry| entry.lost() > 0;
+    if comparison.is_repeated() && !comparison.entries.iter().all(lost) {
+        caption += " Mean over all seeds; a thin bar: one standard deviation to both sides.";
+    }
+    if comparison.entries.iter().any(lost) {
+        caption += " Who lost a vehicle has no bar.";
+    }
+    Ok(Some(Figure { name: "rmse", caption, svg }))
+}
+
+/// One error of every contender, from the corner at the left top.
+fn panel(area: &Area, comparison: &Comparison, index: usize, (left_px, top_px): (f64, f64)) -> Result<(), Failure> {
+    let Some(figure) = FIGURES.get(index) else { return Ok(()) };
+    let repeated = comparison.is_repeated();
+    let spread = |entry: &Entry| entry.spread(figure.value);
+    let ends = comparison.entries.iter().filter_map(spread).map(|spread| spread.mean + spread.deviation);
+    let largest = ends.fold(1e-9, f64::max);
+    let names = comparison.entries.iter().map(|entry| text_width_px(entry.contender().title(), 12.0));
+    let zero_px = left_px + names.fold(0.0, f64::max) + 8.0;
+    let number_px = NUMBER_PX + if repeated { SPREAD_PX } else { 0.0 };
+    let room_px = (left_px + WIDTH_PX / 2.0 - 2.0 * MARGIN_PX - number_px - zero_px).max(1.0);
+    let write = |words: String, x: f64, y: f64, style| area.draw(&Text::new(words, (units(x), units(y)), style));
+
+    write(figure.title.into(), zero_px, top_px + 14.0, text(12.0, BLACK, HPos::Left))?;
+    for (row, entry) in comparison.entries.iter().enumerate() {
+        let y_px = top_px + TITLE_PX + row as f64 * BAR_PX;
+        let middle_px = y_px + 0.5 * BAR_PX;
+        write(entry.contender().title().into(), zero_px - 8.0, middle_px, text(12.0, BLACK, HPos::Right))?;
+        let Some(Spread { mean, deviation }) = spread(entry) else {
+            write("lost".into(), zero_px + 6.0, middle_px, text(11.0, GREY, HPos::Left))?;
+            continue;
+        };
+        let x_px = |value: f64| zero_px + room_px * value.max(0.0) / largest;
+        let corners = [(units(zero_px), units(y_px + 2.0)), (units(x_px(mean)), units(y_px + BAR_PX - 2.0))];
+        area.draw(&Rectangle::new(corners, color(&entry.contender().name).filled()))?;
+        let (mut end_px, mut label) = (x_px(mean), format!("{mean:.digits$}", digits = figure.digits));
+        if repeated {
+            end_px = x_px(mean + deviation);
+            label += &format!(" ±{deviation:.digits$}", digits = figure.digits);
+            let ends = [x_px(mean - deviation), end_px].map(|x| (units(x), units(middle_px)));
+            area.draw(&PathElement::new(ends, Ink::new(BLACK, 1.25).style()))?;
+        }
+        write(label, end_px + 6.0, middle_px, text(11.0, GREY, HPos::Left))?;
+    }
+    let axis = [
+        (units(zero_px), units(top_px + TITLE_PX)),
+        (units(zero_px), units(top_px + TITLE_PX + comparison.entries.len() as f64 * BAR_PX)),
+    ];
+    area.draw(&PathElement::new(axis, Ink::new(FRAME, 0.75).style()))
+}

@@ -1,0 +1,215 @@
+//! Colours: one a controller, the same in every report, and each in a second shade for the dark.
+
+use core::hash::Hasher;
+use plotters::style::RGBColor;
+use twox_hash::XxHash64;
+
+/// A colour on white paper, and the same on a dark screen.
+type Shades = [RGBColor; 2];
+
+const fn shades(light: u32, dark: u32) -> Shades {
+    [rgb(light), rgb(dark)]
+}
+
+const fn rgb(hex: u32) -> RGBColor {
+    let [_, r, g, b] = hex.to_be_bytes();
+    RGBColor(r, g, b)
+}
+
+pub(super) const WHITE: RGBColor = rgb(0xFFFFFF);
+pub(super) const BLACK: RGBColor = rgb(0x1A1A1A);
+pub(super) const GREY: RGBColor = rgb(0x646464);
+pub(super) const GRID: RGBColor = rgb(0xE2E2E2);
+pub(super) const FRAME: RGBColor = rgb(0x969696);
+/// What should be flown.
+pub(super) const WANTED: RGBColor = rgb(0xB0B0B0);
+/// Where something begins or ends.
+pub(super) const EDGE: RGBColor = rgb(0x828282);
+/// What happens to the vehicle: those that overlap are of different tints.
+pub(super) const TINTS: [RGBColor; 5] = [rgb(0xF7EED4), rgb(0xD5E5F2), rgb(0xF6DCDC), rgb(0xDAEFD8), rgb(0xE6DDF4)];
+
+/// Everything that is not a contender's.
+const ROLES: [Shades; 12] = [
+    [WHITE, rgb(0x16181D)],
+    [BLACK, rgb(0xE8E8E8)],
+    [GREY, rgb(0xA8ACB3)],
+    [GRID, rgb(0x2C3038)],
+    [FRAME, rgb(0x737983)],
+    [WANTED, rgb(0x6A707A)],
+    [EDGE, rgb(0x9A9FA8)],
+    [TINTS[0], rgb(0x4A3F1C)],
+    [TINTS[1], rgb(0x1E3A54)],
+    [TINTS[2], rgb(0x54282C)],
+    [TINTS[3], rgb(0x24452A)],
+    [TINTS[4], rgb(0x3D2E5A)],
+];
+
+/// The contenders that this program brings along. Of any two, the colours stay apart for the colour-blind too, on white
+/// (contrast 3 : 1 and more) as in the dark (4 : 1 and more).
+const KNOWN: [(&str, Shades); 7] = [
+    ("afbc", shades(0x0072B2, 0x7FA8ED)),
+    ("backstepping", shades(0xD55E00, 0xC7613D)),
+    ("pid", shades(0x189E8C, 0x39F3FC)),
+    ("geometric", shades(0xC171F6, 0x906B98)),
+    ("indi", shades(0x681053, 0xED7FA4)),
+    ("afbc-as-printed", shades(0x26349E, 0x2773EE)),
+    ("afbc-monitored", shades(0x923002, 0xF5C299)),
+];
+
+/// All others: their names choose.
+const OTHERS: [Shades; 10] = [
+    shades(0x696C8C, 0xA1A5C7),
+    shades(0x885B34, 0xDCB282),
+    shades(0x5A406E, 0xDAB0FA),
+    shades(0x4A1A33, 0xFFD4E0),
+    shades(0x9D9459, 0xCCE576),
+    shades(0x162072, 0x6690BB),
+    shades(0xDE6CBC, 0xAB6F81),
+    shades(0x364ACC, 0x6C6ECB),
+    shades(0x6E69F3, 0x5392FC),
+    shades(0x760A03, 0xCA8E79),
+];
+
+/// With this seed no two contenders of a built-in campaign choose the same.
+const SEED: u64 = 203;
+
+/// The colour of the contender of this name, whoever else flies.
+pub(super) fn color(name: &str) -> RGBColor {
+    if let Some((_, [light, _])) = KNOWN.iter().find(|(known, _)| *known == name) {
+        return *light;
+    }
+    let mut hasher = XxHash64::with_seed(SEED);
+    hasher.write(name.as_bytes());
+    let choice = hasher.finish() % OTHERS.len() as u64;
+    OTHERS.get(choice as usize).map_or(BLACK, |[light, _]| *light)
+}
+
+/// For each of `names` how many before it have the same colour: what is to tell them apart.
+pub(super) fn repeats(names: &[&str]) -> Vec<usize> {
+    let before = |(index, name): (usize, &&str)| names.iter().take(index).filter(|n| color(n) == color(name)).count();
+    names.iter().enumerate().map(before).collect()
+}
+
+/// As an attribute has it.
+fn hex(RGBColor(r, g, b): RGBColor) -> String {
+    format!("#{r:02X}{g:02X}{b:02X}")
+}
+
+/// Style that turns the colours of `svg` over for those who prefer a dark screen. Paper stays white.
+pub(super) fn dark_style(svg: &str) -> String {
+    let all = ROLES.iter().chain(KNOWN.iter().map(|(_, shades)| shades)).chain(&OTHERS);
+    let mut rules = String::new();
+    for [light, dark] in all.map(|shades| shades.map(hex)) {
+        for part in ["fill", "stroke"] {
+            if svg.contains(&format!("{part}=\"{light}\"")) {
+                rules += &format!("svg [{part}=\"{light}\"]{{{part}:{dark}}}");
+            }
+        }
+    }
+    format!("<style>@media screen and (prefers-color-scheme:dark){{{rules}}}</style>")
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::indexing_slicing, clippy::unwrap_used, reason = "tests")]
+    use super::*;
+    use afbc_campaign::{BUILT_IN, Campaign};
+    use std::collections::HashSet;
+
+    fn linear(RGBColor(r, g, b): RGBColor) -> [f64; 3] {
+        [r, g, b].map(|part| {
+            let part = f64::from(part) / 255.0;
+            if part <= 0.04045 { part / 12.92 } else { libm::pow((part + 0.055) / 1.055, 2.4) }
+        })
+    }
+
+    fn times(m: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
+        m.map(|row| row.iter().zip(v).map(|(a, b)| a * b).sum())
+    }
+
+    /// WCAG 2.
+    fn contrast(a: RGBColor, b: RGBColor) -> f64 {
+        let luminance = |color| times(&[[0.2126, 0.7152, 0.0722], [0.0; 3], [0.0; 3]], linear(color))[0] + 0.05;
+        let (a, b) = (luminance(a), luminance(b));
+        a.max(b) / a.min(b)
+    }
+
+    /// Machado, Oliveira and Fernandes 2009: nobody's, protanopes', deuteranopes', tritanopes' sight.
+    const SIGHTS: [[[f64; 3]; 3]; 4] = [
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+        [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+    ];
+
+    /// Distance in Oklab, in hundredths, to whoever tells the two apart least.
+    fn distance(a: RGBColor, b: RGBColor) -> f64 {
+        let lab = |color, sight| {
+            let seen = times(sight, linear(color)).map(|part| part.clamp(0.0, 1.0));
+            let cones = times(
+                &[
+                    [0.4122214708, 0.5363325363, 0.0514459929],
+                    [0.2119034982, 0.6806995451, 0.1073969566],
+                    [0.0883024619, 0.2817188376, 0.6299787005],
+                ],
+                seen,
+            );
+            times(
+                &[
+                    [0.2104542553, 0.7936177850, -0.0040720468],
+                    [1.9779984951, -2.4285922050, 0.4505937099],
+                    [0.0259040371, 0.7827717662, -0.8086757660],
+                ],
+                cones.map(libm::cbrt),
+            )
+        };
+        let apart = |sight| {
+            let (a, b) = (lab(a, sight), lab(b, sight));
+            100.0 * libm::sqrt(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum())
+        };
+        SIGHTS.iter().map(apart).fold(f64::INFINITY, f64::min)
+    }
+
+    #[test]
+    fn known_contenders_are_told_apart_by_everyone_on_white_and_in_the_dark() {
+        for shade in [0, 1] {
+            let paper = ROLES[0][shade];
+            for (i, (name, a)) in KNOWN.iter().enumerate() {
+                let least = [3.0, 4.0][shade];
+                assert!(contrast(a[shade], paper) >= least, "{name}: {}", contrast(a[shade], paper));
+                for (other, b) in &KNOWN[..i] {
+                    // Okabe and Ito's six reach 6.
+                    assert!(distance(a[shade], b[shade]) >= 8.0, "{name}, {other}: {}", distance(a[shade], b[shade]));
+                }
+            }
+            for (i, a) in OTHERS.iter().enumerate() {
+                assert!(contrast(a[shade], paper) >= 3.0, "{i}");
+                let others = OTHERS[..i].iter().chain(KNOWN.iter().map(|(_, shades)| shades));
+                assert!(others.map(|b| distance(a[shade], b[shade])).all(|apart| apart >= 2.0), "{i}");
+            }
+            assert!(contrast(ROLES[1][shade], paper) >= 7.0 && contrast(ROLES[2][shade], paper) >= 4.5);
+            for tint in &ROLES[7..] {
+                assert!(contrast(ROLES[2][shade], tint[shade]) >= 3.0, "labels on {tint:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn contenders_of_one_built_in_campaign_differ() {
+        for built_in in &BUILT_IN {
+            let campaign: Campaign = built_in.campaign().unwrap();
+            let names: Vec<_> = campaign.scenario.contenders.iter().map(|contender| contender.name.as_str()).collect();
+            let colors: HashSet<_> = names.iter().map(|name| hex(color(name))).collect();
+            assert_eq!(colors.len(), names.len(), "{}: {names:?}", built_in.name);
+        }
+    }
+
+    #[test]
+    fn a_color_hangs_on_the_name_alone_and_what_shares_one_is_numbered() {
+        let names: Vec<String> = (0..40).map(|i| format!("contender {i}")).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let numbered: HashSet<_> = names.iter().zip(repeats(&names)).map(|(name, n)| (hex(color(name)), n)).collect();
+        assert_eq!(numbered.len(), names.len());
+        assert_eq!(repeats(&["afbc", "pid", "afbc"]), [0, 0, 1]);
+    }
+}

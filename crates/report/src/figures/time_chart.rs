@@ -1,0 +1,276 @@
+//! Panels one above the other that share one time axis.
+
+use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
+use super::marks::{LABEL_PX, Mark, Marks, marks};
+use super::palette::{BLACK, EDGE, FRAME, GREY, GRID};
+use super::reduce::{clip, simplify};
+use afbc_sim::scenario::Scenario;
+use core::ops::Range;
+use plotters::coord::ranged1d::{BoldPoints, Ranged};
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+use plotters::style::text_anchor::HPos;
+use std::io;
+
+/// Left of the panels: label and numbers.
+const LEFT_PX: f64 = 74.0;
+/// What of that is left free.
+const MARGIN_PX: f64 = 6.0;
+const RIGHT_PX: f64 = 16.0;
+/// Height of one panel, space between panels included.
+const PANEL_PX: f64 = 148.0;
+const GAP_PX: f64 = 12.0;
+/// Below the panels: numbers and label of the time axis.
+const BOTTOM_PX: f64 = 42.0;
+const LANE_PX: f64 = 16.0;
+/// Width of a panel.
+pub(super) const PLOT_PX: f64 = WIDTH_PX - LEFT_PX - RIGHT_PX;
+
+/// Most numbers along each axis.
+const T_TICKS: usize = 13;
+const Y_TICKS: usize = 6;
+
+/// Columns of a panel, one a pixel.
+pub(super) const COLUMNS: f64 = PLOT_PX;
+
+/// Below and above what a panel shows, in the panel's unit.
+const LEAST_ROOM: f64 = 5e-3;
+/// A gust strikes; a band begins or ends.
+const ONSET: Ink = Ink::new(EDGE, 0.75);
+const BAND_END: Ink = Ink { opacity: 0.5, ..ONSET };
+/// How much a band hides of another below it.
+const BAND_OPACITY: f64 = 0.6;
+
+/// A value over time.
+pub(super) struct Line {
+    pub(super) ink: Ink,
+    /// Rising in time.
+    pub(super) points: Vec<(f64, f64)>,
+    /// When the vehicle was lost, if it was.
+    pub(super) lost_s: Option<f64>,
+    /// What should be flown, rather than what was: no axis is drawn for it alone.
+    pub(super) is_reference: bool,
+}
+
+/// One quantity.
+pub(super) struct Panel {
+    pub(super) label: &'static str,
+    /// Whether zero has a line of its own.
+    pub(super) zero: bool,
+    /// Back to front.
+    pub(super) lines: Vec<Line>,
+}
+
+impl Panel {
+    /// Whether a line fills a band rather than being one: in at least a twentieth of the columns it goes up and down
+    /// by several of its own widths.
+    pub(super) fn has_chatter(&self, end_s: f64) -> bool {
+        let range = range(&self.lines, LEAST_ROOM);
+        let tall = 4.0 / (PANEL_PX - GAP_PX) * (range.end - range.start);
+        self.lines.iter().any(|line| {
+            let column = |t: f64| (t / end_s * COLUMNS).floor();
+            let columns = line.points.chunk_by(|a, b| column(a.0) == column(b.0));
+            let height = |points: &[(f64, f64)]| {
+                let values = || points.iter().map(|(_, v)| v.clamp(range.start, range.end));
+                values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+            };
+            let (tall, all) =
+                columns.fold((0, 0), |(n, all), points| (n + usize::from(height(points) > tall), all + 1));
+            20 * tall > all
+        })
+    }
+}
+
+/// A whole figure.
+pub(super) struct Chart<'a> {
+    pub(super) title: &'a str,
+    pub(super) conditions: &'a str,
+    /// Where the marks come from.
+    pub(super) scenario: &'a Scenario,
+    pub(super) end_s: f64,
+    pub(super) legend: Vec<(String, Ink)>,
+    pub(super) panels: Vec<Panel>,
+}
+
+impl Chart<'_> {
+    /// The figure as SVG, and what there is to see besides lines, in words.
+    pub(super) fn draw(&self) -> io::Result<(String, String)> {
+        let marks = marks(self.scenario, self.end_s, PLOT_PX);
+        let mut all = marks.gusts.iter().chain(&marks.changes);
+        let mut words = String::new();
+        if !marks.gusts.is_empty() {
+            words += " A thin line: a gust strikes.";
+        }
+        if all.any(|mark| mark.is_band) {
+            words += " Shaded: while what is named above lasts.";
+        }
+        let losses = |panel: &Panel| {
+            let range = range(&panel.lines, LEAST_ROOM);
+            let lost = panel.lines.iter().filter(|line| line.lost_s.is_some() && !line.is_reference);
+            let ends: Vec<_> = lost.filter_map(|line| line.points.last()).map(|(_, v)| range.contains(v)).collect();
+            ends
+        };
+        let within: Vec<bool> = self.panels.iter().flat_map(losses).collect();
+        if within.contains(&true) {
+            words += super::CROSS;
+        }
+        if within.contains(&false) {
+            words += " An arrow: where one was lost beyond the panel.";
+        }
+        Ok((self.svg(&marks)?, words))
+    }
+
+    fn svg(&self, marks: &Marks) -> io::Result<String> {
+        let head_px = canvas::head_px(&self.legend);
+        let lanes_px = marks.lanes as f64 * LANE_PX;
+        let height_px = head_px + lanes_px + self.panels.len() as f64 * PANEL_PX + BOTTOM_PX;
+        canvas::svg(height_px, self.title, |area| {
+            canvas::head(area, self.title, self.conditions, &self.legend)?;
+            let top_px = head_px + lanes_px;
+            for (i, panel) in self.panels.iter().enumerate() {
+                let y_px = top_px + i as f64 * PANEL_PX;
+                let last = i + 1 == self.panels.len();
+                self.panel(area, panel, y_px, marks, last)?;
+            }
+            labels(area, marks, self.end_s, top_px)
+        })
+    }
+
+    /// One panel with its top at `y_px`; the last one carries the time axis.
+    fn panel(&self, area: &Area, panel: &Panel, y_px: f64, marks: &Marks, last: bool) -> Result<(), Failure> {
+        let plot_height_px = PANEL_PX - GAP_PX;
+        let bottom_px = if last { BOTTOM_PX } else { 0.0 };
+        let area =
+            area.clone().shrink((0, units(y_px)), (units(WIDTH_PX - RIGHT_PX), units(plot_height_px + bottom_px)));
+        let range = range(&panel.lines, LEAST_ROOM);
+        let (low, high) = (range.start, range.end);
+        let (decimals, time_decimals) = (tick_decimals(low..high, Y_TICKS), tick_decimals(0.0..self.end_s, T_TICKS));
+        let mut chart = ChartBuilder::on(&area)
+            .margin_left(units(MARGIN_PX))
+            .set_label_area_size(LabelAreaPosition::Left, units(LEFT_PX - MARGIN_PX))
+            .set_label_area_size(LabelAreaPosition::Bottom, units(bottom_px))
+            .build_cartesian_2d(0.0..self.end_s, range)?;
+
+        let line = |from, to, ink: Ink| PathElement::new([from, to], ink.style());
+        let bands = || marks.changes.iter().chain(&marks.gusts).filter(|mark| mark.is_band);
+        let shade = |mark: &Mark| mark.tint.mix(BAND_OPACITY).filled();
+        chart.draw_series(bands().map(|m| Rectangle::new([(m.start_s, low), (m.end_s, high)], shade(m))))?;
+        let ends = bands().flat_map(|mark| [mark.start_s, mark.end_s]).filter(|t| *t > 0.0 && *t < self.end_s);
+        chart.draw_series(ends.map(|t| line((t, low), (t, high), BAND_END)))?;
+
+        let axis = Ink::new(FRAME, 0.75).style();
+        chart
+            .configure_mesh()
+            .x_labels(T_TICKS)
+            .y_labels(Y_TICKS)
+            .max_light_lines(0)
+            .bold_line_style(Ink::new(GRID, 0.75).style())
+            .light_line_style(Ink::new(GRID, 0.25).style())
+            .axis_style(axis)
+            .label_style(text(11.0, GREY, HPos::Center))
+            .axis_desc_style(text(12.0, BLACK, HPos::Center))
+            .x_label_formatter(&|t| number(*t, time_decimals))
+            .y_label_formatter(&|v| number(*v, decimals))
+            .set_all_tick_mark_size(units(3.0))
+            .x_desc(if last { "t [s]" } else { "" })
+            .y_desc(panel.label)
+            .draw()?;
+
+        chart.draw_series([Rectangle::new([(0.0, low), (self.end_s, high)], axis)])?;
+        if panel.zero && low < 0.0 && 0.0 < high {
+            chart.draw_series([line((0.0, 0.0), (self.end_s, 0.0), Ink::new(FRAME, 0.75))])?;
+        }
+        chart.draw_series(marks.gusts.iter().map(|gust| line((gust.start_s, low), (gust.start_s, high), ONSET)))?;
+
+        let scale = (PLOT_PX / self.end_s, plot_height_px / (high - low));
+        for Line { ink, points, lost_s, is_reference } in &panel.lines {
+            let pieces = clip(points, low, high);
+            chart.draw_series(pieces.iter().map(|piece| PathElement::new(simplify(piece, scale, 0.2), ink.style())))?;
+            if let (Some(_), false, Some(&(t, v))) = (lost_s, is_reference, points.last()) {
+                let style = Ink::new(ink.color, 2.0).style();
+                // Beyond the panel, where it was in words: a cross at the edge would be one at another place.
+                let beyond = |arrow, edge| {
+                    let words = format!("{arrow} {} ", number(v, decimals));
+                    Text::new(words, (t, edge), text(LABEL_PX, ink.color, HPos::Right))
+                };
+                let edge = LABEL_PX * (high - low) / plot_height_px;
+                match v {
+                    v if v > high => drop(chart.draw_series([beyond('↑', high - edge)])?),
+                    v if v < low => drop(chart.draw_series([beyond('↓', low + edge)])?),
+                    _ => drop(chart.draw_series([Cross::new((t, v), units(4.0), style)])?),
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Labels of the marks on their bands, above the panels.
+fn labels(area: &Area, marks: &Marks, end_s: f64, top_px: f64) -> Result<(), Failure> {
+    for mark in marks.gusts.iter().chain(&marks.changes) {
+        let bottom_px = top_px - 3.0 - mark.lane as f64 * LANE_PX;
+        if mark.is_band {
+            let x = |t: f64| units(LEFT_PX + t / end_s * PLOT_PX);
+            let corners = [(x(mark.start_s), units(bottom_px - LANE_PX + 2.0)), (x(mark.end_s), units(bottom_px))];
+            area.draw(&Rectangle::new(corners, mark.tint.filled()))?;
+        }
+        let place = (units(LEFT_PX + mark.label_px), units(bottom_px - 0.5 * LANE_PX + 1.0));
+        area.draw(&Text::new(mark.label.clone(), place, text(LABEL_PX, GREY, HPos::Center)))?;
+    }
+    Ok(())
+}
+
+/// What a panel shows: all of every flight. A flight that was lost may widen that to three times what the others need,
+/// and counts until shortly before its end; if no flight was better, nothing else limits it.
+pub(super) fn range(lines: &[Line], least_room: f64) -> Range<f64> {
+    let all = extent(lines.iter());
+    let survived = lines.iter().any(|line| line.lost_s.is_none() && !line.is_reference);
+    let others = extent(lines.iter().filter(|line| line.lost_s.is_none()));
+    let (low, high) = match (all, others) {
+        (Some(all), Some((low, high))) if survived => {
+            let span = high - low;
+            (all.0.max(low - span), all.1.min(high + span))
+        }
+        (all, _) => all.unwrap_or_default(),
+    };
+    // Room above and below; a constant gets some too.
+    let room = (0.06 * (high - low)).max(1e-3 * low.abs().max(high.abs())).max(least_room);
+    low - room..high + room
+}
+
+/// Smallest and largest value of some lines, if there are any.
+fn extent<'a>(lines: impl Iterator<Item = &'a Line>) -> Option<(f64, f64)> {
+    let mut extent = None;
+    for line in lines {
+        // A second before the end, or a tenth of a short flight.
+        let until_s = line.lost_s.map_or(f64::INFINITY, |lost_s| lost_s - (0.1 * lost_s).min(1.0));
+        for &(_, v) in line.points.iter().filter(|(t, _)| *t <= until_s) {
+            let (low, high) = extent.unwrap_or((v, v));
+            extent = Some((v.min(low), v.max(high)));
+        }
+    }
+    extent
+}
+
+/// Decimals that the numbers on an axis need.
+fn tick_decimals(range: Range<f64>, most: usize) -> usize {
+    match RangedCoordf64::from(range).key_points(BoldPoints(most)).as_slice() {
+        [first, second, ..] => decimals(second - first),
+        _ => 3,
+    }
+}
+
+/// Decimals that tell numbers `step` apart.
+pub(super) fn decimals(step: f64) -> usize {
+    (-libm::log10(step) - 1e-6).ceil().clamp(0.0, 9.0) as usize
+}
+
+/// A number on an axis, with a real minus sign.
+pub(super) fn number(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(digits) if digits.bytes().any(|b| matches!(b, b'1'..=b'9')) => format!("−{digits}"),
+        Some(digits) => digits.into(),
+        None => text,
+    }
+}

@@ -1,0 +1,277 @@
+//! The flights in space: a box seen from above its front right corner.
+
+use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
+use super::marks::{LABEL_PX, Mark, marks};
+use super::palette::{BLACK, FRAME, GREY, GRID};
+use super::reduce::simplify;
+use super::time_chart::{Line, PLOT_PX, decimals, number, range};
+use super::{Law, REFERENCE};
+use afbc_sim::flown::Flown;
+use nalgebra::Vector3;
+use plotters::prelude::*;
+use plotters::style::text_anchor::HPos;
+use std::collections::HashSet;
+use std::io;
+
+const HEIGHT_PX: f64 = 660.0;
+/// Room for the box, below a legend of one line: left, top, width, height.
+const ROOM_PX: [f64; 4] = [110.0, 70.0, WIDTH_PX - 220.0, HEIGHT_PX - 70.0 - 62.0];
+/// Width of a band along the reference.
+const BAND_PX: f64 = 13.0;
+/// Height of the box in the lengths of its longer floor edge.
+const BOX_HEIGHT: f64 = 0.62;
+/// Direction to the eye: azimuth -55 degrees, elevation 24 degrees.
+const AZIMUTH_RAD: f64 = -0.96;
+const ELEVATION_RAD: f64 = 0.42;
+
+/// The box and how it falls on the picture.
+struct View {
+    low_m: Vector3<f64>,
+    high_m: Vector3<f64>,
+    /// Edges as drawn, in one length.
+    edges: Vector3<f64>,
+    px: f64,
+    middle_px: (f64, f64),
+}
+
+impl View {
+    /// A view of the box between two corners, its room moved down by `below_px`. The floor is true to scale as long as that
+    /// leaves it wide enough.
+    fn new(low_m: Vector3<f64>, high_m: Vector3<f64>, below_px: f64) -> Self {
+        let span = high_m - low_m;
+        let longer = span.x.max(span.y);
+        let edges = Vector3::new((span.x / longer).max(0.5), (span.y / longer).max(0.5), BOX_HEIGHT);
+        let [left, top, width, height] = ROOM_PX;
+        let view =
+            View { low_m, high_m, edges, px: 1.0, middle_px: (left + 0.5 * width, top + below_px + 0.5 * height) };
+        // The far corners of the outline, seen from the middle.
+        let (right, _) = view.direction(Vector3::new(0.5, 0.5, 0.0));
+        let (_, down) = view.direction(Vector3::new(0.5, -0.5, -0.5));
+        View { px: (0.5 * width / right).min(0.5 * height / down), ..view }
+    }
+
+    /// Where a vector, counted in edges of the box, points on the picture: right and down.
+    fn direction(&self, v: Vector3<f64>) -> (f64, f64) {
+        let v = v.component_mul(&self.edges) * self.px;
+        let ((sin_a, cos_a), (sin_e, cos_e)) = (libm::sincos(AZIMUTH_RAD), libm::sincos(ELEVATION_RAD));
+        let toward = cos_a * v.x + sin_a * v.y;
+        (cos_a * v.y - sin_a * v.x, sin_e * toward - cos_e * v.z)
+    }
+
+    /// Pixel of a place.
+    fn at(&self, p: Vector3<f64>) -> (f64, f64) {
+        let middle = 0.5 * (self.low_m + self.high_m);
+        let (right, down) = self.direction((p - middle).component_div(&(self.high_m - self.low_m)));
+        (self.middle_px.0 + right, self.middle_px.1 + down)
+    }
+
+    fn contains(&self, p: &Vector3<f64>) -> bool {
+        self.low_m.iter().zip(p).zip(&self.high_m).all(|((low, p), high)| low <= p && p <= high)
+    }
+}
+
+/// Draws the flights of `laws` and the reference of the longest; tells what there is to see besides them, in words.
+pub(super) fn draw(
+    laws: &[Law],
+    longest: &Flown,
+    conditions: &str,
+    mut legend: Vec<(String, Ink)>,
+) -> io::Result<(String, String)> {
+    let scenario = &longest.scenario;
+    let end_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
+    let range_along = |axis: Vector3<f64>| {
+        let flown = laws.iter().map(|law| law.line(law.ink(), end_s, |s| s.motion.position_m.dot(&axis)));
+        let wanted = laws.iter().map(|law| Line {
+            is_reference: true,
+            lost_s: None,
+            ..law.line(REFERENCE, end_s, |s| s.reference.position_m.dot(&axis))
+        });
+        range(&flown.chain(wanted).collect::<Vec<_>>(), 0.5)
+    };
+    let ranges = [Vector3::x(), Vector3::y(), Vector3::z()].map(range_along);
+    let marks = marks(scenario, end_s, PLOT_PX);
+    // Wider below narrower, where several bands lie over one another.
+    let band = |change: &Mark| Ink::new(change.tint, BAND_PX + 6.0 * change.depth as f64);
+    let mut changes: Vec<&Mark> = marks.changes.iter().collect();
+    for (i, change) in changes.iter().enumerate() {
+        if changes.iter().take(i).all(|other| (&other.label, other.tint) != (&change.label, change.tint)) {
+            legend.push((change.label.clone(), Ink::new(change.tint, BAND_PX)));
+        }
+    }
+    changes.sort_by_key(|change| core::cmp::Reverse(change.depth));
+    let (mut dots, mut bands, mut crosses) = (false, false, false);
+    let below_px = canvas::head_px(&legend) - canvas::head_px(&[]);
+    let view = View::new(
+        Vector3::from(ranges.each_ref().map(|range| range.start)),
+        Vector3::from(ranges.each_ref().map(|range| range.end)),
+        below_px,
+    );
+
+    let svg = canvas::svg(HEIGHT_PX + below_px, "Trajectory", |area| {
+        canvas::head(area, "Trajectory", conditions, &legend)?;
+        furniture(area, &view)?;
+        let wanted = || longest.run.log.iter().map(|s| (s.time_s, s.reference.position_m));
+        let shadow = wanted().map(|(_, p)| Vector3::new(p.x, p.y, view.low_m.z));
+        path(area, &view, shadow, Ink::new(FRAME, 0.75))?;
+        for change in &changes {
+            let during = wanted().filter(|(t, _)| change.start_s <= *t && *t <= change.end_s);
+            bands |= path(area, &view, during.map(|(_, p)| p), band(change))?.is_some();
+        }
+        path(area, &view, wanted().map(|(_, p)| p), REFERENCE)?;
+        for law in laws {
+            let flown = law.flight.run.log.iter().map(|s| s.motion.position_m);
+            path(area, &view, flown, law.ink())?;
+            let end = law.flight.run.log.last().map(|s| s.motion.position_m).filter(|end| view.contains(end));
+            if let (Some(end), Some(_)) = (end, law.flight.run.lost) {
+                crosses = true;
+                area.draw(&Cross::new(pixel(view.at(end)), units(5.0), Ink::new(law.color(), 2.0).style()))?;
+            }
+        }
+        let start = scenario.initial.position_m;
+        let gusts =
+            marks.gusts.iter().map(|gust| (scenario.trajectory.at(gust.start_s).position_m, gust.label.as_str()));
+        let seen = dot_all(area, &view, core::iter::once((start, "start")).chain(gusts))?;
+        dots = seen > usize::from(view.contains(&start));
+        Ok(())
+    })?;
+    let mut words = String::new();
+    if dots {
+        words += " Dots: where the reference was when a gust struck.";
+    }
+    if bands {
+        words += " Shaded: where it was while what the legend names lasted.";
+    }
+    if crosses {
+        words += super::CROSS;
+    }
+    Ok((svg, words))
+}
+
+fn pixel((x, y): (f64, f64)) -> (i32, i32) {
+    (units(x), units(y))
+}
+
+/// Dots with their labels at those of the `places` that are in the box; of several at one place, the labels stand in a
+/// row. Tells how many places were.
+fn dot_all<'a>(
+    area: &Area,
+    view: &View,
+    places: impl Iterator<Item = (Vector3<f64>, &'a str)>,
+) -> Result<usize, Failure> {
+    let mut dots: Vec<((f64, f64), String)> = Vec::new();
+    let mut count = 0;
+    for (place, label) in places.filter(|(place, _)| view.contains(place)) {
+        count += 1;
+        let (x, y) = view.at(place);
+        match dots.iter_mut().find(|((a, b), _)| libm::hypot(a - x, b - y) < LABEL_PX) {
+            Some((_, labels)) => *labels += &format!(", {label}"),
+            None => dots.push(((x, y), label.to_owned())),
+        }
+    }
+    for (place, label) in &dots {
+        dot(area, view, *place, label)?;
+    }
+    Ok(count)
+}
+
+/// A dot with a label on the side that faces away from the middle.
+fn dot(area: &Area, view: &View, (x, y): (f64, f64), label: &str) -> Result<(), Failure> {
+    let (dx, dy) = (x - view.middle_px.0, y - view.middle_px.1);
+    let away = 15.0 / libm::hypot(dx, dy).max(1.0);
+    area.draw(&Circle::new(pixel((x, y)), units(3.0), BLACK.filled()))?;
+    let side = if dx < 0.0 { HPos::Right } else { HPos::Left };
+    let place = pixel((x + dx * away * 0.7, y + dy * away));
+    area.draw(&Text::new(label.to_owned(), place, text(LABEL_PX, BLACK, side)))
+}
+
+/// Draws a way through the box up to where it first leaves it, and tells where that is. What would be drawn twice, lap
+/// after lap, is drawn once.
+fn path(
+    area: &Area,
+    view: &View,
+    places: impl Iterator<Item = Vector3<f64>>,
+    ink: Ink,
+) -> Result<Option<(f64, f64)>, Failure> {
+    let mut inked = HashSet::new();
+    let mut pieces = Vec::new();
+    let mut piece = Vec::new();
+    let mut last: Option<(f64, f64)> = None;
+    for place in places.take_while(|p| view.contains(p)) {
+        let (x, y) = view.at(place);
+        let cell = (x as i32, y as i32);
+        if inked.insert(cell) {
+            if piece.is_empty() {
+                piece.extend(last);
+            }
+            piece.push((x, y));
+        } else if last.is_some_and(|(x, y)| (x as i32, y as i32) != cell) && !piece.is_empty() {
+            piece.push((x, y));
+            pieces.push(core::mem::take(&mut piece));
+        }
+        last = Some((x, y));
+    }
+    piece.extend(last);
+    pieces.push(piece);
+    for piece in pieces.iter().filter(|piece| piece.len() > 1) {
+        let points: Vec<_> = simplify(piece, (1.0, 1.0), 0.15).into_iter().map(pixel).collect();
+        area.draw(&PathElement::new(points, ink.style()))?;
+    }
+    Ok(last)
+}
+
+/// Floor and back walls with their grid, numbers and names of the axes.
+fn furniture(area: &Area, view: &View) -> Result<(), Failure> {
+    let (low, high) = (view.low_m, view.high_m);
+    let line = |a: Vector3<f64>, b: Vector3<f64>, color: RGBColor| {
+        area.draw(&PathElement::new([pixel(view.at(a)), pixel(view.at(b))], Ink::new(color, 0.75).style()))
+    };
+    // For each axis: the edge with the numbers and the parallel one behind it, each as the place where the axis is at
+    // zero and the way in which grid lines run from there over floor or wall; and where the numbers go.
+    let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
+    let near = |axis: Vector3<f64>| low - axis.component_mul(&low);
+    let right = Vector3::new(high.x, 0.0, low.z);
+    let axes = [
+        (x, "x [m]", (near(x), y), (near(x) + y * (high.y - low.y), z), -y),
+        (y, "y [m]", (right, -x), (near(y), z), x),
+        (z, "z [m]", (near(z), y), (near(z) + y * (high.y - low.y), x), -x - y),
+    ];
+    let span = high - low;
+    for (axis, name, front, back, outward) in axes {
+        let (first, last) = (low.dot(&axis), high.dot(&axis));
+        let out = view.direction(outward);
+        let out_length = libm::hypot(out.0, out.1);
+        let label = |value: f64, away_px: f64, text: String, style: TextStyle<'static>| {
+            let (right, down) = view.at(front.0 + axis * value);
+            let away = away_px / out_length;
+            area.draw(&Text::new(text, pixel((right + out.0 * away, down + out.1 * away + 4.0)), style))
+        };
+        let (ticks, step) = ticks(first, last);
+        for value in ticks {
+            for (edge, way) in [front, back] {
+                let from = edge + axis * value;
+                line(from, from + way.component_mul(&span), GRID)?;
+            }
+            // The left corner belongs to the height.
+            if axis != x || value - first > 0.04 * (last - first) {
+                label(value, 16.0, number(value, decimals(step)), text(LABEL_PX, GREY, HPos::Center))?;
+            }
+        }
+        for (edge, _) in [front, back] {
+            line(edge + axis * first, edge + axis * last, FRAME)?;
+        }
+        label(0.5 * (first + last), 50.0, name.to_owned(), text(12.0, BLACK, HPos::Center))?;
+    }
+    // The three edges of the back walls that no numbers belong to.
+    line(Vector3::new(low.x, low.y, high.z), Vector3::new(low.x, high.y, high.z), FRAME)?;
+    line(Vector3::new(low.x, high.y, high.z), Vector3::new(high.x, high.y, high.z), FRAME)?;
+    line(Vector3::new(high.x, high.y, low.z), Vector3::new(high.x, high.y, high.z), FRAME)
+}
+
+/// Round numbers within the interval, about six, and the step between them.
+fn ticks(low: f64, high: f64) -> (Vec<f64>, f64) {
+    let rough = (high - low) / 6.0;
+    let power = libm::pow(10.0, libm::log10(rough).floor());
+    let step = [1.0, 2.0, 5.0].map(|m| m * power).into_iter().find(|step| *step >= rough).unwrap_or(10.0 * power);
+    let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
+    ((first..=last).map(|i| i as f64 * step).collect(), step)
+}

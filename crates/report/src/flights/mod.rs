@@ -1,0 +1,58 @@
+//! Flights of one scenario or several: table, CSV, summary, figures, page.
+
+#[cfg(test)]
+mod tests;
+
+pub use crate::summary::write as json;
+pub use crate::table::table;
+
+use crate::claims::Claim;
+use crate::{csv, figures, groups, report, summary};
+use afbc_files::{Error, Folder};
+use afbc_sim::flown::Flown;
+use std::io;
+use std::path::PathBuf;
+
+/// Writes everything about `flown` into `folder`, in place of all that its command has left there before, and returns the
+/// paths written:
+///
+/// * `<stem>-<contender>.csv`: each run's log;
+/// * `fig4-trajectory.svg`, `fig5-outputs.svg`, `fig6-attitude.svg`, `fig7-errors.svg`, `fig8-inputs.svg`: the counterparts
+///   of the paper's figures, all contenders overlaid; of several scenarios, each has its own set `<stem>-fig4-trajectory.svg`
+///   etc.;
+/// * `summary.json`: the figures of merit of each run;
+/// * `report.html`: all of it on one page that needs no other file.
+///
+/// The stem is the scenario's name. Scenarios that share a name add what tells them apart: reading, signs, plant,
+/// profile, or else a number. A file appears whole or not at all: each is written under a temporary name first.
+///
+/// # Errors
+/// The first file that could not be written, or is somebody else's.
+pub fn write(folder: &Folder, flown: &[Flown], claims: &[Claim]) -> Result<Vec<PathBuf>, Error> {
+    let groups = groups::groups(flown);
+    let draw = |group: &groups::Group<'_>| figures::draw(&group.flights);
+    let sets = groups.iter().map(draw).collect::<io::Result<Vec<_>>>();
+    let sets = sets.map_err(|source| folder.error("figures", source))?;
+    let svg_name =
+        |group: &groups::Group<'_>, figure: &figures::Figure| format!("{}{}.svg", group.figure_prefix, figure.name);
+    let mut names = vec!["summary.json".to_owned(), "report.html".to_owned()];
+    for (group, figures) in groups.iter().zip(&sets) {
+        names.extend(group.csv_names.iter().cloned());
+        names.extend(figures.iter().map(|figure| svg_name(group, figure)));
+    }
+    folder.only(&names)?;
+
+    let mut paths = Vec::new();
+    for (group, figures) in groups.iter().zip(&sets) {
+        for (flight, name) in group.flights.iter().zip(&group.csv_names) {
+            paths.push(folder.place(name, |out| csv::write(out, flight))?);
+        }
+        for figure in figures {
+            paths.push(folder.place(&svg_name(group, figure), |out| out.write_all(figure.svg.as_bytes()))?);
+        }
+    }
+    paths.push(folder.place("summary.json", |out| summary::write(out, flown))?);
+    let page = report::page(&groups, &sets, claims);
+    paths.push(folder.place("report.html", |out| out.write_all(page.as_bytes()))?);
+    Ok(paths)
+}

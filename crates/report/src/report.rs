@@ -1,0 +1,340 @@
+//! One page with everything: tables, claims, figures, parameters. Needs no network and no other file.
+
+use super::figures::Figure;
+use super::groups::Group;
+use super::{reality, table, words};
+use crate::claims::Claim;
+use afbc::{Limits, Settings};
+use afbc_sim::contender::{Contender, Law};
+use afbc_sim::scenario::Scenario;
+use afbc_sim::trajectory::Trajectory;
+use afbc_types::Axis;
+use core::convert::Infallible;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// Looks: one column; dark on white, or light on dark for those who prefer that, never on paper. Whatever is wider than
+/// the screen scrolls by itself.
+const STYLE: &str = "
+:root { color-scheme: light dark; --paper: #fff; --ink: #1a1a1a; --quiet: #555; --rule: #888; --faint: #ccc;
+  --good: #146c2e; --bad: #a12; }
+@media screen and (prefers-color-scheme: dark) {
+  :root { --paper: #16181d; --ink: #e8e8e8; --quiet: #a8acb3; --rule: #737983; --faint: #3a3f48;
+    --good: #6fcf8a; --bad: #ff8f85; }
+}
+body { font: 15px/1.5 system-ui, -apple-system, 'Segoe UI', Helvetica, Arial, sans-serif; color: var(--ink);
+  background: var(--paper); max-width: 900px; margin: 2.5rem auto; padding: 0 1rem; -webkit-text-size-adjust: 100%; }
+h1 { font-size: 1.7rem; margin: 0 0 .25rem; }
+h2 { font-size: 1.3rem; margin: 2.5rem 0 .25rem; }
+h3 { font-size: 1.05rem; margin: 1.8rem 0 .4rem; }
+p { margin: .3rem 0; }
+h1, h2, h3, p, dd, figcaption { overflow-wrap: anywhere; }
+.quiet { color: var(--quiet); }
+table { border-collapse: collapse; margin: .6rem 0; font-variant-numeric: tabular-nums; }
+th, td { padding: .16rem .65rem; text-align: right; white-space: nowrap; }
+th { font-weight: 600; }
+th:first-child, td:first-child, .name, .prose { text-align: left; }
+.prose { white-space: normal; min-width: 14rem; }
+.prose code { overflow-wrap: anywhere; }
+th[scope=row] { position: sticky; left: 0; background: var(--paper); }
+thead th, thead td { border-bottom: 1px solid var(--rule); }
+tbody { border-bottom: 1px solid var(--faint); }
+.lost { color: var(--bad); text-align: left; }
+dl { margin: .4rem 0; }
+dl > div { display: grid; grid-template-columns: 8.5rem 1fr; margin: .7rem 0; }
+dt { font-weight: 600; }
+dd { margin: 0; }
+.holds { color: var(--good); }
+.fails { color: var(--bad); }
+figure { margin: 1.6rem 0; }
+figure svg { display: block; width: 100%; min-width: 40rem; height: auto; }
+figure .scroll { border: 1px solid var(--faint); }
+figcaption { color: var(--quiet); font-size: .9rem; }
+.scroll { overflow-x: auto; max-width: 100%; }
+@media (max-width: 34rem) {
+  body { margin: 1.2rem auto; }
+  dl > div { display: block; }
+  th, td { padding: .16rem .5rem; }
+}
+@page { margin: 15mm; }
+@media print {
+  body { font-size: 10.5pt; margin: 0; padding: 0; max-width: none; }
+  figure, tbody, dl > div, tr { break-inside: avoid; }
+  h2, h3 { break-after: avoid; }
+  figure svg { min-width: 0; max-height: 110mm; }
+  figure .scroll { border: 0; }
+}
+";
+
+/// What an SVG needs as a file of its own, but not within a page.
+const NAMESPACE: &str = " xmlns=\"http://www.w3.org/2000/svg\"";
+
+/// The page; `figures` holds one set for each group.
+pub(super) fn page(groups: &[Group], figures: &[Vec<Figure>], claims: &[Claim]) -> String {
+    let title = match groups {
+        [only] => only.scenario.description.as_str(),
+        _ => "Flights",
+    };
+    let body = html! {
+        p.quiet {
+            "Flown in software: the control crate against a model of the vehicle, in lockstep."
+        }
+        @if groups.is_empty() { p { "Nothing was flown." } }
+        @if !claims.is_empty() { (verdicts(claims)) }
+        @for (group, figures) in groups.iter().zip(figures) { (section(group, figures)) }
+    };
+    sheet(title, &body)
+}
+
+/// A whole page.
+pub(super) fn sheet(title: &str, body: &Markup) -> String {
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                h1 { (capitalised(title)) }
+                (body)
+            }
+        }
+    }
+    .into_string()
+}
+
+/// A figure with its caption.
+pub(super) fn picture(figure: &Figure) -> Markup {
+    html! {
+        figure {
+            div.scroll { (PreEscaped(figure.svg.replacen(NAMESPACE, "", 1))) }
+            figcaption { (figure.caption) }
+        }
+    }
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn verdicts(claims: &[Claim]) -> Markup {
+    html! {
+        h2 { "The paper's claims" }
+        dl {
+            @for claim in claims {
+                div {
+                    dt { @if claim.holds { span.holds { "✓ holds" } } @else { span.fails { "✗ does not hold" } } }
+                    dd { strong { (claim.statement) } br; span.quiet { (claim.evidence) } }
+                }
+            }
+        }
+    }
+}
+
+fn section(group: &Group, figures: &[Figure]) -> Markup {
+    html! {
+        h2 { (group.scenario.name) }
+        p { (words::conditions(group.scenario)) "." }
+        div.scroll { (results(group)) }
+        @for flight in &group.flights {
+            @if let Some(tripped) = &flight.run.tripped {
+                p { (flight.run.contender.title()) ": " (words::tripped(tripped)) "." }
+            }
+        }
+        p.quiet { (table::legend()) }
+        @for figure in figures { (picture(figure)) }
+        h3 { "Parameters" }
+        (parameters(group.scenario))
+    }
+}
+
+/// The terminal's table.
+fn results(group: &Group) -> Markup {
+    html! {
+        table {
+            @for (i, block) in table::BLOCKS.iter().enumerate() {
+                @let rows: Vec<_> = block.rows(group).collect();
+                @let head = i == 0 || table::BLOCKS.get(i - 1).is_none_or(|above| above.columns != block.columns);
+                @if head && !rows.is_empty() {
+                    tbody.head { tr { td {} td {} @for column in block.columns { th scope="col" { (column) } } } }
+                }
+                tbody {
+                    @for (row, flight) in rows.iter().enumerate() {
+                        tr {
+                            th scope="row" { @if row == 0 { (block.title) } }
+                            td.name { (flight.run.contender.title()) }
+                            @match &flight.run.lost {
+                                Some(lost) => td.lost colspan="4" { (words::lost(lost)) },
+                                None => @for cell in block.cells(flight) { td { (cell) } },
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What determines the flight.
+pub(super) fn parameters(scenario: &Scenario) -> Markup {
+    let vehicle = &scenario.vehicle;
+    let inertia = &vehicle.inertia_kg_m2;
+    let fixed = [
+        ("mass m", format!("{} kg", vehicle.mass_kg)),
+        ("arm l", format!("{} m", vehicle.arm_m)),
+        ("inertia Ix, Iy, Iz", format!("{}, {}, {} kg m²", inertia.x, inertia.y, inertia.z)),
+        ("rotor inertia Ir", format!("{:e} kg m²", vehicle.rotor_inertia_kg_m2)),
+        ("thrust factor b", format!("{:e} N s²", vehicle.thrust_factor_n_s2)),
+        ("drag factor d", format!("{:e} N m s²", vehicle.drag_factor_n_m_s2)),
+        ("gravity g", format!("{} m/s²", vehicle.gravity_m_s2)),
+        ("start", start(scenario)),
+        ("reference", trajectory(&scenario.trajectory)),
+    ];
+    let until = |end_s: f64| if end_s < scenario.duration_s { format!("to {end_s} s") } else { "on".into() };
+    html! {
+        div.scroll { table {
+            tbody { @for (name, value) in fixed { tr { td { (name) } td.prose { (value) } } } }
+            tbody {
+                @for gust in scenario.environment.gusts() {
+                    @let (letter, index) = words::gust(gust);
+                    tr {
+                        td { "gust " (letter) sub { (index) } }
+                        td.prose { (gust.size) " " (words::gust_unit(gust)) " from " (gust.start_s) " s " (until(gust.end_s)) }
+                    }
+                }
+                @for change in scenario.environment.changes() {
+                    tr {
+                        td { (words::change(change)) }
+                        td.prose { "from " (change.start_s) " s " (until(change.end_s)) }
+                    }
+                }
+                @for payload in scenario.environment.payloads() {
+                    tr {
+                        td { "payload " (words::payload(payload)) }
+                        td.prose { (payload.below_m) " m below, from " (payload.start_s) " s " (until(payload.end_s)) }
+                    }
+                }
+                @for (name, value) in reality::rows(scenario) { tr { td { (name) } td.prose { (value) } } }
+            }
+        } }
+        @for contender in &scenario.contenders { (gains(contender)) }
+    }
+}
+
+/// Who flew: settings and gains.
+fn gains(contender: &Contender) -> Markup {
+    let Settings {
+        dt_s,
+        command_filter_rad_s,
+        rotor_force_max_n,
+        limits,
+        tilt_by_thrust,
+        heed_ground,
+        bumpless,
+        heed_saturation,
+    } = contender.settings;
+    let mut settings = format!("steps of {dt_s} s, at most {rotor_force_max_n} N a rotor");
+    if !contender.law.is_peer() {
+        settings += &format!(", command filter {command_filter_rad_s} rad/s");
+        let also = [
+            (tilt_by_thrust, "tilt by thrust"),
+            (heed_ground, "heeds the ground"),
+            (bumpless, "bumpless"),
+            (heed_saturation, "heeds saturation"),
+            (matches!(contender.law, Law::Guarded(_)), "monitored"),
+        ];
+        settings.extend(also.into_iter().filter(|(on, _)| *on).map(|(_, word)| format!(", {word}")));
+        if limits != Limits::NONE {
+            settings += &format!(
+                ", limits: tilt {} rad at {} rad/s, {} m/s², {} m/s, climb {} m/s",
+                limits.tilt_max_rad,
+                limits.tilt_rate_max_rad_s,
+                limits.acceleration_max_m_s2,
+                limits.speed_max_m_s,
+                limits.climb_max_m_s
+            );
+        }
+    }
+    html! {
+        h3 { (capitalised(contender.title())) }
+        p.quiet { (contender.kind().title()) ", " (settings) "." }
+        @match &contender.law {
+            Law::Afbc(gains) | Law::Guarded(gains) => (per_axis(&AFBC_GAINS, |axis| {
+                let g = gains.get(axis);
+                vec![
+                    g.backstepping.alpha1,
+                    g.backstepping.alpha2,
+                    g.gamma,
+                    g.eta,
+                    g.epsilon,
+                    g.membership.centre,
+                    g.membership.width,
+                    g.safeguards.sigma,
+                    g.safeguards.kappa,
+                    g.safeguards.theta_max,
+                    g.safeguards.delta_max,
+                    g.safeguards.dead_zone,
+                ]
+            })),
+            Law::Backstepping(gains) => (per_axis(&["α₁", "α₂"], |axis| {
+                vec![gains.get(axis).alpha1, gains.get(axis).alpha2]
+            })),
+            law => (by_name(*law)),
+        }
+    }
+}
+
+/// What the columns of AFBC's gains are called.
+const AFBC_GAINS: [&str; 12] = ["α₁", "α₂", "γ", "η", "ε", "centre", "width", "σ", "κ", "Θ max", "δ max", "dead zone"];
+
+fn per_axis(names: &[&str], gains: impl Fn(Axis) -> Vec<f32>) -> Markup {
+    html! {
+        div.scroll { table {
+            thead { tr { td { "subsystem" } @for name in names { th scope="col" { (name) } } } }
+            tbody { @for axis in Axis::ALL { tr { td { (axis.name()) } @for gain in gains(axis) { td { (gain) } } } } }
+        } }
+    }
+}
+
+fn by_name(mut law: Law) -> Markup {
+    let mut gains = Vec::new();
+    let Ok(()) = law.each_gain(|range, gain| {
+        gains.push((range.name, *gain));
+        Ok::<(), Infallible>(())
+    });
+    html! { div.scroll { table { tbody { @for (name, gain) in gains { tr { td { code { (name) } } td { (gain) } } } } } } }
+}
+
+fn start(scenario: &Scenario) -> String {
+    let (p, eta) = (&scenario.initial.position_m, &scenario.initial.attitude_rad);
+    format!("({}, {}, {}) m, roll {}, pitch {}, yaw {} rad", p.x, p.y, p.z, eta.x, eta.y, eta.z)
+}
+
+fn trajectory(trajectory: &Trajectory) -> String {
+    let place = |p: &nalgebra::Vector3<f64>| format!("({}, {}, {}) m", p.x, p.y, p.z);
+    match trajectory {
+        Trajectory::Paper => "Section IV: a tilted ellipse from 2 m to 8 m height, once round in 60 s".into(),
+        Trajectory::Hover { position_m, .. } => format!("hover at {}", place(position_m)),
+        Trajectory::Step { from_m, to_m, at_s, .. } => {
+            format!("step from {} to {} at {at_s} s", place(from_m), place(to_m))
+        }
+        Trajectory::Circle { centre_m, radius_m, period_s, .. } => {
+            format!("circle of {radius_m} m around {}, once round in {period_s} s", place(centre_m))
+        }
+        Trajectory::Lissajous { centre_m, sines: [x, y, z], .. } => format!(
+            "Lissajous around {}, {}, {}, {} m at periods of {}, {}, {} s",
+            place(centre_m),
+            x.amplitude_m,
+            y.amplitude_m,
+            z.amplitude_m,
+            x.period_s,
+            y.period_s,
+            z.period_s
+        ),
+        Trajectory::Waypoints(waypoints) => format!("{} waypoints", waypoints.len()),
+    }
+}

@@ -1,0 +1,94 @@
+//! The results table of `docs/results.md`: the paper's flight in every reading, on both models, under both laws.
+
+use afbc_plant::Model;
+use afbc_sim::case::{Case, Reading, Uncertainty};
+use afbc_sim::flown::Flown;
+use afbc_sim::metrics::Metrics;
+use afbc_sim::paper::scenario;
+use afbc_sim::run::Run;
+use afbc_sim::scenario::Scenario;
+use afbc_types::OutOfRange;
+use core::fmt::Write;
+
+/// The rows, top to bottom: each reading of the experiment, with its name for people.
+pub fn cases() -> Vec<(String, Case)> {
+    let case = |reading, uncertainty| Case { reading, uncertainty };
+    let mut cases = vec![
+        ("calm".to_owned(), case(None, None)),
+        ("uncertain".to_owned(), case(None, Some(Uncertainty::DEFAULT))),
+        ("gusts, persistent".to_owned(), case(Some(Reading::Persistent), None)),
+        ("gusts, 1 s pulses".to_owned(), case(Some(Reading::Pulses), None)),
+        ("gusts, forces and moments".to_owned(), case(Some(Reading::Forces), None)),
+    ];
+    cases.extend(Uncertainty::ALL.map(|uncertainty| {
+        let Uncertainty { inertia, thrust } = uncertainty;
+        (
+            format!("paper, inertia {}75 %, thrust {}40 %", inertia.symbol(), thrust.symbol()),
+            case(Some(Reading::Persistent), Some(uncertainty)),
+        )
+    }));
+    cases
+}
+
+/// The lines between which a page holds the table.
+pub const MARKERS: [&str; 2] = ["<!-- results: begin -->", "<!-- results: end -->"];
+
+/// A page up to and with the first marker's line, its table, and the rest; `None` if it lacks a marker.
+pub fn parts(page: &str) -> Option<(&str, &str, &str)> {
+    let [begin, end] = MARKERS;
+    let from = page.find(begin)? + begin.len() + 1;
+    let to = page.find(end).filter(|&to| to >= from)?;
+    Some((page.get(..from)?, page.get(from..to)?, page.get(to..)?))
+}
+
+/// What is flown for the table, top to bottom, each with its name for people.
+///
+/// # Errors
+/// None in fact: the paper's parameters are in range.
+pub fn scenarios() -> Result<Vec<(String, Scenario)>, OutOfRange> {
+    let models = [Model::Simplified, Model::RigidBody];
+    let rows = cases().into_iter().flat_map(|(name, case)| models.map(|model| (name.clone(), model, case)));
+    rows.map(|(name, model, case)| Ok((name, scenario(model, case)?))).collect()
+}
+
+/// Flies each of `scenarios` under each of its contenders. `progress` hears of each flight that is done.
+///
+/// # Errors
+/// The first parameter, gain or setting out of range.
+pub fn fly(scenarios: Vec<(String, Scenario)>, progress: &dyn Fn()) -> Result<Vec<(String, Flown)>, OutOfRange> {
+    let mut flown = Vec::new();
+    for (name, scenario) in scenarios {
+        for contender in &scenario.contenders {
+            let run = Run::fly(&scenario, contender, u64::MAX)?;
+            flown.push((name.clone(), Flown { scenario: scenario.clone(), run }));
+            progress();
+        }
+    }
+    Ok(flown)
+}
+
+/// The table in Markdown.
+pub fn markdown(flown: &[(String, Flown)]) -> String {
+    let mut table = String::from(
+        "| scenario | plant | law | RMSE x | y | z | psi | max x | y | z | psi | final x | y | z | psi \
+         | mean \\|dU1\\| | dU2 | dU3 | dU4 |\n|---|---|---|",
+    );
+    table.push_str(&"--:|".repeat(16));
+    table.push('\n');
+    for (name, Flown { scenario, run }) in flown {
+        let figures = match run.lost {
+            Some(lost) => format!("lost at {:.3} s: {}{}", lost.time_s, lost.reason, " |".repeat(16)),
+            None => row(&run.metrics),
+        };
+        // Writing to a String cannot fail.
+        let _ = writeln!(table, "| {name} | {} | {} | {figures}", scenario.model.name(), run.contender.title());
+    }
+    table
+}
+
+fn row(metrics: &Metrics) -> String {
+    let errors = [metrics.rmse, metrics.max_abs, metrics.final_error];
+    let errors = errors.iter().flatten().map(|error| format!("{error:.4} | "));
+    let inputs = metrics.mean_abs_delta_u.iter().map(|newtons| format!("{:.1} | ", newtons * 1000.0));
+    errors.chain(inputs).collect::<String>().trim_end().to_owned()
+}

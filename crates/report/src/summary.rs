@@ -1,0 +1,87 @@
+//! `summary.json`: the figures of merit of each run, for programs.
+
+use afbc::Profile;
+use afbc_sim::case::{Reading, Sign};
+use afbc_sim::flown::Flown;
+use afbc_sim::metrics::SETTLED_S;
+use nalgebra::Vector4;
+use serde::Serialize;
+use std::io::{self, Write};
+
+/// One run. Whatever does not apply, or could not be measured, is null.
+#[derive(Serialize)]
+struct Summary<'a> {
+    scenario: &'a str,
+    reading: Option<&'a str>,
+    inertia_sign: Option<&'a str>,
+    thrust_sign: Option<&'a str>,
+    plant: &'a str,
+    contender: &'a str,
+    controller: &'a str,
+    /// Whose gains and settings those are, if a profile's.
+    profile: Option<&'a str>,
+    duration_s: f64,
+    lost_at_s: Option<f64>,
+    lost_reason: Option<&'a str>,
+    /// When and why AFBC's monitor put another law in its place.
+    tripped_at_s: Option<f64>,
+    tripped_reason: Option<&'a str>,
+    seed: u64,
+    /// From when on `rmse`, `max_abs` and `mean_abs_delta_u_n` count.
+    measured_from_s: f64,
+    rmse: Option<Outputs>,
+    max_abs: Option<Outputs>,
+    final_error: Outputs,
+    /// U1..U4, per control step.
+    mean_abs_delta_u_n: Option<[f64; 4]>,
+}
+
+#[derive(Serialize)]
+struct Outputs {
+    x_m: f64,
+    y_m: f64,
+    z_m: f64,
+    psi_rad: f64,
+}
+
+impl From<Vector4<f64>> for Outputs {
+    fn from(v: Vector4<f64>) -> Self {
+        Outputs { x_m: v.x, y_m: v.y, z_m: v.z, psi_rad: v.w }
+    }
+}
+
+fn summary(Flown { scenario, run }: &Flown) -> Summary<'_> {
+    let uncertainty = scenario.case.and_then(|case| case.uncertainty);
+    let measured = |figures: Vector4<f64>| run.is_settled().then_some(figures);
+    Summary {
+        scenario: &scenario.name,
+        reading: scenario.case.and_then(|case| case.reading).map(Reading::name),
+        inertia_sign: uncertainty.map(|u| u.inertia).map(Sign::symbol),
+        thrust_sign: uncertainty.map(|u| u.thrust).map(Sign::symbol),
+        plant: scenario.model.name(),
+        contender: &run.contender.name,
+        controller: run.contender.kind().name(),
+        profile: run.contender.profile().map(Profile::name),
+        duration_s: scenario.duration_s,
+        lost_at_s: run.lost.map(|lost| lost.time_s),
+        lost_reason: run.lost.map(|lost| lost.reason),
+        tripped_at_s: run.tripped.map(|tripped| tripped.time_s),
+        tripped_reason: run.tripped.map(|tripped| tripped.trip.reason()),
+        seed: scenario.seed,
+        measured_from_s: SETTLED_S,
+        rmse: measured(run.metrics.rmse).map(Outputs::from),
+        max_abs: measured(run.metrics.max_abs).map(Outputs::from),
+        final_error: run.metrics.final_error.into(),
+        mean_abs_delta_u_n: measured(run.metrics.mean_abs_delta_u).map(Into::into),
+    }
+}
+
+/// Writes an array with one object for each run.
+///
+/// # Errors
+/// If `out` does not take it.
+pub fn write(out: &mut dyn Write, flown: &[Flown]) -> io::Result<()> {
+    let summaries: Vec<_> = flown.iter().map(summary).collect();
+    serde_json::to_writer_pretty(&mut *out, &summaries)?;
+    writeln!(out)
+}

@@ -1,0 +1,181 @@
+//! The table for the terminal: plain text, at most [`WIDTH`] columns.
+
+use super::groups::{Group, groups};
+use crate::claims::Claim;
+use crate::words;
+use afbc_sim::flown::Flown;
+use afbc_sim::metrics::{Metrics, SETTLED_S};
+use nalgebra::Vector4;
+
+/// Widest line.
+const WIDTH: usize = 100;
+
+/// One block of figures: a title, the head of its four columns, and what to show.
+pub(super) struct Block {
+    pub(super) title: &'static str,
+    pub(super) columns: [&'static str; 4],
+    pub(super) digits: usize,
+    pub(super) values: fn(&Metrics) -> Vector4<f64>,
+    /// False if there is something to show even of a flight too short for the others.
+    pub(super) needs_settled: bool,
+    /// A flight that was lost has no figures worth comparing: the first block says so, the others leave it out.
+    pub(super) first: bool,
+}
+
+const OUTPUTS: [&str; 4] = ["x [m]", "y [m]", "z [m]", "psi [rad]"];
+
+/// Top to bottom.
+pub(super) const BLOCKS: [Block; 4] = [
+    Block { title: "RMSE", columns: OUTPUTS, digits: 4, values: |m| m.rmse, needs_settled: true, first: true },
+    Block {
+        title: "largest |error|",
+        columns: OUTPUTS,
+        digits: 4,
+        values: |m| m.max_abs,
+        needs_settled: true,
+        first: false,
+    },
+    Block {
+        title: "final error",
+        columns: OUTPUTS,
+        digits: 4,
+        values: |m| m.final_error,
+        needs_settled: false,
+        first: false,
+    },
+    Block {
+        title: "mean |dU| per step",
+        columns: ["U1 [mN]", "U2 [mN]", "U3 [mN]", "U4 [mN]"],
+        digits: 1,
+        values: |m| m.mean_abs_delta_u * 1000.0,
+        needs_settled: true,
+        first: false,
+    },
+];
+
+impl Block {
+    /// The flights that have a row here.
+    pub(super) fn rows<'a>(&self, group: &'a Group<'_>) -> impl Iterator<Item = &'a Flown> {
+        let all = self.first;
+        group.flights.iter().copied().filter(move |flight| all || flight.run.lost.is_none())
+    }
+
+    /// The four figures of a run, or dashes where there was nothing to measure.
+    pub(super) fn cells(&self, flight: &Flown) -> [String; 4] {
+        let values: [f64; 4] = (self.values)(&flight.run.metrics).into();
+        if self.needs_settled && !flight.run.is_settled() {
+            return values.map(|_| "-".into());
+        }
+        values.map(|value| number(value, self.digits))
+    }
+}
+
+/// `value` with `digits` decimals, fewer for a number too large for its column, and no "-0.000".
+fn number(value: f64, digits: usize) -> String {
+    let text = format!("{value:.digits$}");
+    if text.len() > 11 {
+        format!("{value:.3e}")
+    } else if text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.')) {
+        text.trim_start_matches('-').into()
+    } else {
+        text
+    }
+}
+
+/// What the figures mean, in one sentence.
+pub(super) fn legend() -> String {
+    format!(
+        "Error: reference minus vehicle, from {SETTLED_S} s to the end. Mean |dU| per step: how far each input jumps from one \
+         control step to the next; small is smooth."
+    )
+}
+
+/// The flights and the claims as text: for each scenario, law and axis the RMSE, largest and final error, and for each
+/// input its smoothness.
+pub fn table(flown: &[Flown], claims: &[Claim]) -> String {
+    let mut lines = Vec::new();
+    let groups = groups(flown);
+    for group in &groups {
+        flights(group, &mut lines);
+        lines.push(String::new());
+    }
+    if groups.is_empty() {
+        lines.push("Nothing was flown.".into());
+    } else {
+        wrap(&mut lines, "", &legend());
+    }
+    if !claims.is_empty() {
+        lines.extend([String::new(), "The paper's claims".into()]);
+    }
+    for claim in claims {
+        let verdict = if claim.holds { "  holds          " } else { "  does not hold  " };
+        wrap(&mut lines, verdict, &format!("{}:", claim.statement));
+        wrap(&mut lines, &" ".repeat(verdict.len()), &claim.evidence);
+    }
+    lines.push(String::new());
+    lines.join("\n")
+}
+
+/// The block of one scenario.
+fn flights(group: &Group, lines: &mut Vec<String>) {
+    wrap(lines, "", &format!("{}: {}", group.scenario.name, words::conditions(group.scenario)));
+    // Counted from what is printed, so that any name fits.
+    let name_width = group.flights.iter().map(|flight| flight.run.contender.title().chars().count()).max().unwrap_or(0);
+    let rule = "─".repeat(20 + name_width + 4 * 12);
+    let mut head = [""; 4];
+    for block in &BLOCKS {
+        let rows: Vec<_> = block.rows(group).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        if head == block.columns {
+            lines.push(rule.replace('─', "┈"));
+        } else {
+            head = block.columns;
+            lines.push(rule.clone());
+            lines.push(row("", "", name_width, &head));
+        }
+        let mut title = block.title;
+        for flight in rows {
+            let name = flight.run.contender.title();
+            lines.push(match &flight.run.lost {
+                Some(lost) => format!("{title:<20}{name:<name_width$}   {}", words::lost(lost)),
+                None => row(title, name, name_width, &block.cells(flight)),
+            });
+            title = "";
+        }
+    }
+    lines.push(rule);
+    for flight in &group.flights {
+        if let Some(tripped) = &flight.run.tripped {
+            wrap(lines, "", &format!("{}: {}.", flight.run.contender.title(), words::tripped(tripped)));
+        }
+    }
+}
+
+fn row(title: &str, name: &str, name_width: usize, cells: &[impl AsRef<str>; 4]) -> String {
+    let [a, b, c, d] = cells.each_ref().map(AsRef::as_ref);
+    format!("{title:<20}{name:<name_width$}{a:>12}{b:>12}{c:>12}{d:>12}")
+}
+
+/// Appends `text` behind `first`, broken between words; further lines start below the text.
+pub(super) fn wrap(lines: &mut Vec<String>, first: &str, text: &str) {
+    let mut line = first.to_owned();
+    let mut length = first.chars().count();
+    let indent = length;
+    for word in text.split_whitespace() {
+        let word_length = word.chars().count();
+        if length > indent {
+            if length + 1 + word_length > WIDTH {
+                lines.push(core::mem::replace(&mut line, " ".repeat(indent)));
+                length = indent;
+            } else {
+                line.push(' ');
+                length += 1;
+            }
+        }
+        line.push_str(word);
+        length += word_length;
+    }
+    lines.push(line);
+}

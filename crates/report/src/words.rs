@@ -1,0 +1,179 @@
+//! Names and numbers for people, the same wherever they appear.
+
+use afbc::Profile;
+use afbc_plant::{
+    CosineGust, Gust, GustKind, ParameterChange, Payload, Quantity, Realism, RotorFault, Rotors, Sensing, Wind,
+};
+use afbc_sim::case::{Reading, Sign};
+use afbc_sim::contender::Contender;
+use afbc_sim::run::Tripped;
+use afbc_sim::scenario::Scenario;
+use afbc_types::Axis;
+
+/// A file name without its ending: letters, digits, `-` and `_` of `name`, anything else as `-`.
+pub(super) fn slug(name: &str) -> String {
+    let keep = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' };
+    let slug: String = name.chars().take(80).map(keep).collect();
+    if slug.is_empty() { "flight".into() } else { slug }
+}
+
+/// What may tell scenarios of one name apart, as parts of a file name: reading, signs, plant, profile.
+pub(super) fn case_words(scenario: &Scenario) -> [String; 4] {
+    let reading = scenario.case.and_then(|case| case.reading).map_or("still-air", Reading::name);
+    let sign = |sign| match sign {
+        Sign::Plus => "plus",
+        Sign::Minus => "minus",
+    };
+    let signs = scenario.case.and_then(|case| case.uncertainty).map_or("certain".into(), |uncertainty| {
+        format!("inertia-{}-thrust-{}", sign(uncertainty.inertia), sign(uncertainty.thrust))
+    });
+    [reading.into(), signs, scenario.model.name().into(), profile(scenario).map_or("tuned", Profile::name).into()]
+}
+
+/// The profile that all contenders share, if there is one.
+fn profile(scenario: &Scenario) -> Option<Profile> {
+    let mut profiles = scenario.contenders.iter().map(Contender::profile);
+    let first = profiles.next()?;
+    profiles.all(|profile| profile == first).then_some(first)?
+}
+
+/// One line that says what was flown: "rigid-body plant, persistent gusts, inertia +75 %, thrust factor -40 %, 60 s".
+pub(super) fn conditions(scenario: &Scenario) -> String {
+    let mut words = vec![format!("{} plant", scenario.model.name())];
+    match (scenario.case.and_then(|case| case.reading), scenario.environment.gusts().len()) {
+        (_, 0) => {}
+        (Some(Reading::Persistent), _) => words.push("persistent gusts".into()),
+        (Some(Reading::Pulses), _) => words.push("gusts of 1 s".into()),
+        (Some(Reading::Forces), _) => words.push("gusts as forces and moments".into()),
+        (None, 1) => words.push("1 gust".into()),
+        (None, count) => words.push(format!("{count} gusts")),
+    }
+    words.extend(scenario.environment.changes().iter().map(change));
+    words.extend(real(scenario).into_iter().map(Into::into));
+    words.extend(profile(scenario).map(|profile| format!("{} profile", profile.name())));
+    words.push(format!("{} s", scenario.duration_s));
+    words.join(", ")
+}
+
+/// What is real about the flight, word by word: "rotors", "battery", "drag", "wind", "ground", "payload", "sensors", "outages".
+fn real(scenario: &Scenario) -> Vec<&'static str> {
+    let Realism { rotors, drag, wind, contact, ground_effect, .. } = &scenario.realism;
+    let (faults, battery) = (!rotors.faults.is_empty(), rotors.battery.is_some());
+    let ideal = Rotors { faults: rotors.faults.clone(), battery: rotors.battery, ..Rotors::default() };
+    let words = [
+        (*rotors != ideal, "real rotors"),
+        (faults, "rotor fault"),
+        (battery, "battery"),
+        (drag.is_some(), "drag"),
+        (*wind != Wind::default(), "wind"),
+        (contact.is_some() || ground_effect.is_some(), "ground"),
+        (!scenario.environment.payloads().is_empty(), "payload"),
+        (scenario.sensing != Sensing::default(), "real sensors"),
+        (!scenario.outages.is_empty(), "outages"),
+    ];
+    words.into_iter().filter_map(|(there, word)| there.then_some(word)).collect()
+}
+
+/// "+0.2 kg"
+pub(super) fn payload(payload: &Payload) -> String {
+    format!("{:+} kg", payload.mass_kg)
+}
+
+/// "rotor 1 at 80 %"
+pub(super) fn fault(fault: &RotorFault) -> String {
+    format!("rotor {} at {} %", fault.rotor, (fault.efficiency * 1000.0).round() / 10.0)
+}
+
+/// "inertia +75 %"
+pub(super) fn change(change: &ParameterChange) -> String {
+    let quantity = match change.quantity {
+        Quantity::Mass => "mass",
+        Quantity::Inertia => "inertia",
+        Quantity::ThrustFactor => "thrust factor",
+        Quantity::DragFactor => "drag factor",
+    };
+    // Tenths of a percent.
+    let percent = ((change.factor - 1.0) * 1000.0).round() / 10.0;
+    format!("{quantity} {percent:+} %")
+}
+
+/// Letter and index of a gust: ("A", "x") for an acceleration, ("F", "x") for a force, ("T", "φ") for a moment.
+pub(super) fn gust(gust: &Gust) -> (&'static str, &'static str) {
+    let letter = match (gust.kind, gust.axis) {
+        (GustKind::Acceleration, _) => "A",
+        (GustKind::Force, Axis::X | Axis::Y | Axis::Z) => "F",
+        (GustKind::Force, _) => "T",
+    };
+    (letter, symbol(gust.axis))
+}
+
+/// "wind (3, 0, −1) m/s"
+pub(super) fn wind_gust(gust: &CosineGust) -> String {
+    let v = gust.velocity_m_s;
+    format!("wind ({}, {}, {}) m/s", v.x, v.y, v.z).replace('-', "−")
+}
+
+/// A quantity that a campaign draws, with its unit: "steady wind [m/s]". An unknown one is its name in words.
+pub(super) fn drawn(name: &str) -> String {
+    let words = match name {
+        "mass_ratio" => "true mass, over the believed",
+        "inertia_ratio" => "true inertia, over the believed",
+        "thrust_factor_ratio" => "true thrust factor, over the believed",
+        "drag_factor_ratio" => "true rotor drag factor, over the believed",
+        "rotor_time_constant_s" => "time constant of the rotors [s]",
+        "rotor_delay_s" => "delay from command to rotors [s]",
+        "rotor_efficiency" => "thrust that a failing rotor keeps, as a share",
+        "fault_rotor" => "number of the rotor that fails",
+        "fault_start_s" => "when a rotor fails [s]",
+        "payload_kg" => "mass of the payload [kg]",
+        "payload_below_m" => "payload below the centre of mass [m]",
+        "payload_start_s" => "when the payload is taken up [s]",
+        "wind_m_s" => "steady wind [m/s]",
+        "wind_direction_rad" => "where the wind blows to, from +x to +y [rad]",
+        "wind_20ft_m_s" => "turbulence: wind at 20 ft [m/s]",
+        "noise_ratio" => "measurement noise, over the scenario's",
+        "bias_ratio" => "measurement bias, over the scenario's",
+        "sensor_delay_s" => "delay from motion to measurement [s]",
+        "dropout_rate_hz" => "measurements stay away, per second [Hz]",
+        "dropout_mean_s" => "mean time without measurements [s]",
+        "start_x_m" => "start away from the scenario's, along x [m]",
+        "start_y_m" => "start away from the scenario's, along y [m]",
+        "start_z_m" => "start away from the scenario's, along z [m]",
+        other => return other.replace('_', " "),
+    };
+    words.into()
+}
+
+/// Unit of a gust's size.
+pub(super) fn gust_unit(gust: &Gust) -> &'static str {
+    match (gust.kind, gust.axis) {
+        (GustKind::Acceleration, Axis::X | Axis::Y | Axis::Z) => "m/s²",
+        (GustKind::Acceleration, _) => "rad/s²",
+        (GustKind::Force, Axis::X | Axis::Y | Axis::Z) => "N",
+        (GustKind::Force, _) => "N m",
+    }
+}
+
+/// The paper's letter for the coordinate of `axis`.
+pub(super) const fn symbol(axis: Axis) -> &'static str {
+    match axis {
+        Axis::Roll => "φ",
+        Axis::Pitch => "θ",
+        Axis::Yaw => "ψ",
+        Axis::Z => "z",
+        Axis::X => "x",
+        Axis::Y => "y",
+    }
+}
+
+/// "lost at t = 15.625 s: tilted beyond 90 degrees"
+pub(super) fn lost(lost: &afbc_sim::flight::Lost) -> String {
+    format!("lost at t = {:.3} s: {}", lost.time_s, lost.reason)
+}
+
+/// "the monitor put backstepping in AFBC's place at t = 15.625 s: rotors stay saturated"
+pub(super) fn tripped(tripped: &Tripped) -> String {
+    let reason = tripped.trip.reason();
+    let reason = reason.strip_prefix("AFBC off: ").unwrap_or(reason);
+    format!("the monitor put backstepping in AFBC's place at t = {:.3} s: {reason}", tripped.time_s)
+}

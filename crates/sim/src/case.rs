@@ -1,0 +1,101 @@
+//! How the paper's account of its experiment is read.
+
+/// How the paper's "1.2 N" and "1.2 N m" are read (decision 3 in `docs/paper.md`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reading {
+    /// Accelerations of 1.2 m/s2 and 1.2 rad/s2 that stay on from their onset: the paper's claims hold.
+    Persistent,
+    /// The same accelerations for one second each.
+    Pulses,
+    /// Physical forces and moments that stay on: 1.2 N m is 316 rad/s2 here, and loses the vehicle.
+    Forces,
+}
+
+impl Reading {
+    /// Every reading.
+    pub const ALL: [Reading; 3] = [Reading::Persistent, Reading::Pulses, Reading::Forces];
+
+    /// Lower-case name, as on the command line and in logs.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Reading::Persistent => "persistent",
+            Reading::Pulses => "pulses",
+            Reading::Forces => "forces",
+        }
+    }
+}
+
+/// The direction of an uncertainty whose size alone is printed (decision 4 there).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sign {
+    /// More than nominal.
+    Plus,
+    /// Less than nominal.
+    Minus,
+}
+
+impl Sign {
+    /// 1 + or - `size`.
+    pub(crate) const fn factor(self, size: f64) -> f64 {
+        match self {
+            Sign::Plus => 1.0 + size,
+            Sign::Minus => 1.0 - size,
+        }
+    }
+
+    /// "+" or "-".
+    pub const fn symbol(self) -> &'static str {
+        match self {
+            Sign::Plus => "+",
+            Sign::Minus => "-",
+        }
+    }
+}
+
+/// Signs of the parameter uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Uncertainty {
+    /// Inertia +-75 %.
+    pub inertia: Sign,
+    /// Thrust factor +-40 %.
+    pub thrust: Sign,
+}
+
+impl Uncertainty {
+    /// Inertia up, thrust down: the hardest, and the default.
+    pub const DEFAULT: Self = Uncertainty { inertia: Sign::Plus, thrust: Sign::Minus };
+
+    /// All four combinations, the default first.
+    pub const ALL: [Self; 4] = [
+        Self::DEFAULT,
+        Uncertainty { inertia: Sign::Plus, thrust: Sign::Plus },
+        Uncertainty { inertia: Sign::Minus, thrust: Sign::Minus },
+        Uncertainty { inertia: Sign::Minus, thrust: Sign::Plus },
+    ];
+}
+
+/// One reading of the experiment; `None` leaves gusts or uncertainty out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Case {
+    /// How the gusts are read.
+    pub reading: Option<Reading>,
+    /// Which way the parameters are off.
+    pub uncertainty: Option<Uncertainty>,
+}
+
+impl Case {
+    /// The default reading of Section IV.
+    pub const DEFAULT: Self = Case { reading: Some(Reading::Persistent), uncertainty: Some(Uncertainty::DEFAULT) };
+
+    /// Short name: `calm`, `uncertain`, `gusts`, `pulses`, `forces`, or `paper` when both gusts and uncertainty are on.
+    pub const fn name(self) -> &'static str {
+        match (self.reading, self.uncertainty) {
+            (None, None) => "calm",
+            (None, Some(_)) => "uncertain",
+            (Some(Reading::Persistent), None) => "gusts",
+            (Some(Reading::Pulses), None) => "pulses",
+            (Some(Reading::Forces), None) => "forces",
+            (Some(_), Some(_)) => "paper",
+        }
+    }
+}

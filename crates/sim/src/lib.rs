@@ -1,0 +1,15 @@
+//! World and pilots in lockstep: what is flown ([`scenario`]), by whom ([`contender`]), and how it went ([`run`]).
+#![forbid(unsafe_code)]
+
+pub mod aboard;
+pub mod case;
+pub mod contender;
+pub mod flight;
+pub mod flown;
+pub mod in_the_loop;
+pub mod metrics;
+pub mod paper;
+pub mod reader;
+pub mod run;
+pub mod scenario;
+pub mod trajectory;

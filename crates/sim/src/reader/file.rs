@@ -1,0 +1,85 @@
+//! What every TOML file of ours has: a size, a syntax, a name and a description.
+
+use super::error::{FileError, Source};
+use super::table::Table;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+use toml::de::DeTable;
+
+/// Longest name.
+const NAME_LENGTH: usize = 64;
+/// Largest file that is read at all \[bytes\].
+const FILE_SIZE: u64 = 1 << 20;
+
+/// The text of a file of this `kind`, of which there are built-in ones too.
+///
+/// # Errors
+/// If it cannot be read, or is too large or no text.
+pub fn text(path: &Path, kind: &str) -> Result<String, FileError> {
+    let read = || {
+        let mut text = String::new();
+        let read = File::open(path)?.take(FILE_SIZE + 1).read_to_string(&mut text)?;
+        if read as u64 > FILE_SIZE { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(text) }
+    };
+    read().map_err(|error: io::Error| {
+        let problem = match error.kind() {
+            io::ErrorKind::NotFound => format!("no such file; `sitl {kind}s` lists the built-in ones"),
+            io::ErrorKind::IsADirectory => format!("it is a folder; name a {kind} file in it"),
+            io::ErrorKind::InvalidData => "it is not UTF-8 text; save it as UTF-8".into(),
+            io::ErrorKind::FileTooLarge => {
+                format!("it is larger than 1 MiB, too large for a {kind}; name another file")
+            }
+            _ => format!("it cannot be read ({error}); check its permissions"),
+        };
+        FileError::whole(&path.display().to_string(), problem)
+    })
+}
+
+/// Lets `read` make something of the `text` of a TOML file; `sitl SAMPLE` prints one that is right.
+///
+/// # Errors
+/// If it is not TOML, and whatever `read` finds.
+pub fn document<T>(
+    file: &str,
+    text: &str,
+    sample: &str,
+    read: impl FnOnce(Table<'_>) -> Result<T, FileError>,
+) -> Result<T, FileError> {
+    let source = Source { file, text };
+    let document = DeTable::parse(text).map_err(|error| syntax(source, &error, sample))?;
+    read(Table::root(source, document.get_ref()))
+}
+
+/// Name and description; `name` if there is none.
+///
+/// # Errors
+/// If the name cannot be a part of a file name, or the description is more than a line.
+pub fn title(root: &mut Table<'_>, name: &str) -> Result<[String; 2], FileError> {
+    let name = root.text("name")?.unwrap_or(name).to_owned();
+    if !is_file_name(&name) {
+        let cure = "it must be 1 to 64 letters, digits, '-' or '_', since file names come from it";
+        return Err(root.fault_at("name", format!("\"{name}\" cannot be a name; {cure}")));
+    }
+    let description = root.text("description")?.unwrap_or_default().to_owned();
+    if description.chars().any(char::is_control) {
+        return Err(root.fault_at("description", "it has line breaks or control characters; make it one plain line"));
+    }
+    Ok([name, description])
+}
+
+/// What keeps a text from being TOML.
+fn syntax(source: Source<'_>, error: &toml::de::Error, sample: &str) -> FileError {
+    let span = error.span().unwrap_or_default();
+    let near = source.text.get(span.clone()).and_then(|text| text.lines().next()).unwrap_or_default();
+    let near: String = near.chars().take(40).collect();
+    let near = if near.is_empty() { near } else { format!(" near `{near}`") };
+    let problem = format!("{}{near}; `sitl {sample}` prints a file to compare with", error.message());
+    FileError::at(source, span.start, "syntax", problem)
+}
+
+/// Safe as a part of a file name on every system.
+fn is_file_name(name: &str) -> bool {
+    let safe = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_';
+    (1..=NAME_LENGTH).contains(&name.len()) && name.bytes().all(safe)
+}

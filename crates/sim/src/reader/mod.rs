@@ -1,0 +1,10 @@
+//! TOML files, read so that whatever is wrong is told in one line.
+
+mod error;
+mod file;
+mod table;
+pub mod words;
+
+pub use error::{FileError, Source};
+pub use file::{document, text, title};
+pub use table::Table;

@@ -1,0 +1,341 @@
+//! Typed reading of TOML: every value is checked as it is read, and a key that nobody read is refused.
+
+use super::error::{FileError, Source};
+use super::words::{self, did_you_mean, nearest, one_of};
+use afbc_types::Range;
+use nalgebra::Vector3;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// Most tables of one array that each step of a flight has to look at.
+const MOST: usize = 100;
+
+/// One table of a document, and which of its keys have been read.
+pub struct Table<'a> {
+    source: Source<'a>,
+    /// Its dotted name; empty for the document itself.
+    path: String,
+    /// Where it starts: what is missing is missing from here.
+    start: usize,
+    entries: &'a DeTable<'a>,
+    read: Vec<&'static str>,
+}
+
+impl<'a> Table<'a> {
+    /// The document as a table.
+    pub fn root(source: Source<'a>, entries: &'a DeTable<'a>) -> Self {
+        Table { source, path: String::new(), start: 0, entries, read: Vec::new() }
+    }
+
+    /// The number under `range.name`, if it is there.
+    pub fn number(&mut self, range: &Range) -> Result<Option<f64>, FileError> {
+        let Some(value) = self.value(range.name) else { return Ok(None) };
+        self.number_in(value, range.name, range).map(Some)
+    }
+
+    /// The number under `range.name`, which must be there.
+    pub fn need_number(&mut self, range: &Range) -> Result<f64, FileError> {
+        let number = self.number(range)?;
+        number.ok_or_else(|| self.missing(range.name, &format!("add it{}", words::unit(range.name))))
+    }
+
+    /// The whole number under `range.name`, to the last digit, if it is there.
+    pub fn whole(&mut self, range: &Range) -> Result<Option<u64>, FileError> {
+        let Some(value) = self.value(range.name) else { return Ok(None) };
+        let (min, max) = (range.min as i128, range.max as i128);
+        let bounds = format!("it must lie within {} to {}", words::number(range.min), words::number(range.max));
+        let outside = |number: &str| self.refuse(value, range.name, format!("{number} is out of range: {bounds}"));
+        match value.get_ref() {
+            // Through no float, which would round it.
+            DeValue::Integer(integer) => {
+                let number = i128::from_str_radix(integer.as_str(), integer.radix()).ok();
+                let number = number.filter(|number| (min..=max).contains(number)).and_then(|n| u64::try_from(n).ok());
+                number
+                    .map(Some)
+                    .ok_or_else(|| outside(&value.get_ref().as_integer().map_or("it".into(), |i| i.to_string())))
+            }
+            DeValue::Float(float) if !is_whole(float.as_str()) => {
+                let problem = format!("{} is not a whole number; leave out its decimals", float.as_str());
+                Err(self.refuse(value, range.name, problem))
+            }
+            _ => match self.number_in(value, range.name, range)? {
+                number if (range.min..=range.max).contains(&number) => Ok(Some(number as u64)),
+                number => Err(outside(&words::number(number))),
+            },
+        }
+    }
+
+    /// The interval `[low, high]` under `range.name`, or a single number that is both, if it is there.
+    pub fn interval(&mut self, range: &Range) -> Result<Option<[f64; 2]>, FileError> {
+        let Some(value) = self.value(range.name) else { return Ok(None) };
+        let number = |value| self.number_in(value, range.name, range);
+        let Some(array) = value.get_ref().as_array() else {
+            return number(value).map(|number| Some([number; 2]));
+        };
+        match array.iter().collect::<Vec<_>>().as_slice() {
+            [low, high] => match [number(low)?, number(high)?] {
+                [low, high] if low > high => {
+                    Err(self.refuse(value, range.name, format!("{low} is above {high}; write the smaller end first")))
+                }
+                ends => Ok(Some(ends)),
+            },
+            other => Err(self.refuse(
+                value,
+                range.name,
+                format!("{} values; it must be one number, or two: [low, high]", other.len()),
+            )),
+        }
+    }
+
+    /// The three numbers under `key`, each in its range, if they are there.
+    pub fn vector(&mut self, key: &'static str, ranges: [&Range; 3]) -> Result<Option<Vector3<f64>>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let ([rx, ry, rz], array) = (ranges, value.get_ref().as_array());
+        let number = |value, range| self.number_in(value, key, range);
+        match array.map(|array| array.iter().collect::<Vec<_>>()).as_deref() {
+            Some(&[x, y, z]) => Ok(Some(Vector3::new(number(x, rx)?, number(y, ry)?, number(z, rz)?))),
+            Some(other) => {
+                Err(self.refuse(value, key, format!("{} values; it must hold three: [x, y, z]", other.len())))
+            }
+            None => Err(self.wrong_type(value, key, "three numbers", "[x, y, z]")),
+        }
+    }
+
+    /// The three numbers under `key`, which must be there, each in `range`.
+    pub fn need_vector(&mut self, key: &'static str, range: &Range) -> Result<Vector3<f64>, FileError> {
+        let vector = self.vector(key, [range; 3])?;
+        vector.ok_or_else(|| self.missing(key, &format!("add three numbers{}", words::unit(key))))
+    }
+
+    /// The string under `key`, if it is there.
+    pub fn text(&mut self, key: &'static str) -> Result<Option<&'a str>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        self.text_in(value, key).map(Some)
+    }
+
+    /// The string under `key`, which must be there.
+    pub fn need_text(&mut self, key: &'static str, cure: &str) -> Result<&'a str, FileError> {
+        self.text(key)?.ok_or_else(|| self.missing(key, cure))
+    }
+
+    /// The strings listed under `key`, if the list is there.
+    pub fn texts(&mut self, key: &'static str) -> Result<Option<Vec<&'a str>>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let Some(array) = value.get_ref().as_array() else {
+            return Err(self.wrong_type(value, key, "a list", "[\"...\"]"));
+        };
+        array.iter().map(|item| self.text_in(item, key)).collect::<Result<_, _>>().map(Some)
+    }
+
+    /// The option whose name stands under `key`, if it is there.
+    pub fn choice<T: Copy>(
+        &mut self,
+        key: &'static str,
+        options: &[T],
+        name: fn(T) -> &'static str,
+    ) -> Result<Option<T>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        self.choice_in(value, key, options, name).map(Some)
+    }
+
+    /// The option whose name stands under `key`, which must be there.
+    pub fn need_choice<T: Copy>(
+        &mut self,
+        key: &'static str,
+        options: &[T],
+        name: fn(T) -> &'static str,
+    ) -> Result<T, FileError> {
+        let choice = self.choice(key, options, name)?;
+        choice.ok_or_else(|| self.missing(key, &format!("it must be {}", one_of(options, name))))
+    }
+
+    /// The options whose names are listed under `key`, at least one and none twice, if the list is there.
+    pub fn choices<T: Copy + PartialEq>(
+        &mut self,
+        key: &'static str,
+        options: &[T],
+        name: fn(T) -> &'static str,
+    ) -> Result<Option<Vec<T>>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let Some(array) = value.get_ref().as_array() else {
+            return Err(self.wrong_type(value, key, "a list", "[\"...\"]"));
+        };
+        let mut chosen = Vec::new();
+        for item in array.iter() {
+            let choice = self.choice_in(item, key, options, name)?;
+            if chosen.contains(&choice) {
+                return Err(self.refuse(item, key, format!("\"{}\" is listed twice; once is enough", name(choice))));
+            }
+            chosen.push(choice);
+        }
+        if chosen.is_empty() {
+            return Err(self.refuse(value, key, format!("the list is empty; it must hold {}", one_of(options, name))));
+        }
+        Ok(Some(chosen))
+    }
+
+    /// The table under `key`, if it is there.
+    pub fn table(&mut self, key: &'static str) -> Result<Option<Table<'a>>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        self.table_in(value, key, &format!("one table: [{}]", self.dotted(key))).map(Some)
+    }
+
+    /// The table under `key`, if there is one rather than something else.
+    pub fn table_if(&mut self, key: &'static str) -> Result<Option<Table<'a>>, FileError> {
+        let is_table = self.entries.get(key).is_some_and(|value| value.get_ref().is_table());
+        if is_table { self.table(key) } else { Ok(None) }
+    }
+
+    /// The tables of the array under `key`; none if it is not there.
+    pub fn tables(&mut self, key: &'static str) -> Result<Vec<Table<'a>>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(Vec::new()) };
+        let wanted = format!("[[{}]], once for each", self.dotted(key));
+        let Some(array) = value.get_ref().as_array() else {
+            return Err(self.wrong_type(value, key, "a list of tables", &wanted));
+        };
+        array.iter().map(|item| self.table_in(item, key, &wanted)).collect()
+    }
+
+    /// The tables of the array under `key`, [`MOST`] at most.
+    pub fn few_tables(&mut self, key: &'static str) -> Result<Vec<Table<'a>>, FileError> {
+        let tables = self.tables(key)?;
+        if tables.len() > MOST {
+            return Err(self.fault_at(key, format!("{} of them; keep {MOST} at most", tables.len())));
+        }
+        Ok(tables)
+    }
+
+    /// True or false, as it stands under `key`, if it is there.
+    pub fn boolean(&mut self, key: &'static str) -> Result<Option<bool>, FileError> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let boolean = value.get_ref().as_bool();
+        boolean.map(Some).ok_or_else(|| self.wrong_type(value, key, "true or false", "true or false without quotes"))
+    }
+
+    /// True if a table stands under `key`.
+    pub fn holds_table(&self, key: &str) -> bool {
+        self.entries.get(key).is_some_and(|value| value.get_ref().is_table())
+    }
+
+    /// Refuses the first key, from the top, that nobody read.
+    pub fn finish(self) -> Result<(), FileError> {
+        let Some((key, start)) = self.unread().min_by_key(|(_, start)| *start) else { return Ok(()) };
+        let cure = match nearest(key, self.read.iter().copied()) {
+            Some(known) => did_you_mean(known),
+            None => format!("known here: {}", self.read.join(", ")),
+        };
+        Err(self.unknown(key, start, &cure))
+    }
+
+    /// Refuses `key`, which has its place elsewhere.
+    pub fn forbid(&self, key: &str, problem: &str) -> Result<(), FileError> {
+        if self.entries.contains_key(key) { Err(self.fault_at(key, problem)) } else { Ok(()) }
+    }
+
+    /// The whole table is refused on account of `key`.
+    pub fn fault(&self, key: &str, problem: impl Into<String>) -> FileError {
+        FileError::at(self.source, self.start, self.dotted(key), problem)
+    }
+
+    /// The value under `key` is refused.
+    pub fn fault_at(&self, key: &str, problem: impl Into<String>) -> FileError {
+        let start = self.entries.get(key).map_or(self.start, |value| value.span().start);
+        FileError::at(self.source, start, self.dotted(key), problem)
+    }
+
+    /// `key` is needed and not there, unless an unread key looks like a slip of the pen.
+    pub fn missing(&self, key: &'static str, cure: &str) -> FileError {
+        let slip = nearest(key, self.unread().map(|(unread, _)| unread));
+        match self.unread().find(|(unread, _)| Some(*unread) == slip) {
+            Some((slip, start)) => self.unknown(slip, start, &did_you_mean(key)),
+            None => self.fault(key, format!("missing; {cure}")),
+        }
+    }
+
+    /// The keys that nobody has read, and where they stand.
+    fn unread(&self) -> impl Iterator<Item = (&str, usize)> {
+        let keys = self.entries.iter().map(|(key, _)| (key.get_ref().as_ref(), key.span().start));
+        keys.filter(|(key, _)| !self.read.contains(key))
+    }
+
+    fn unknown(&self, key: &str, start: usize, cure: &str) -> FileError {
+        FileError::at(self.source, start, self.dotted(key), format!("unknown key; {cure}"))
+    }
+
+    fn value(&mut self, key: &'static str) -> Option<&'a Spanned<DeValue<'a>>> {
+        self.read.push(key);
+        self.entries.get(key)
+    }
+
+    fn number_in(&self, value: &Spanned<DeValue<'a>>, key: &str, range: &Range) -> Result<f64, FileError> {
+        let Range { min, max, .. } = *range;
+        let number = match value.get_ref() {
+            DeValue::Float(float) => float.as_str().parse::<f64>().ok(),
+            DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().parse().ok(),
+            DeValue::Integer(integer) => u64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|i| i as f64),
+            _ => None,
+        };
+        let unit = words::unit(key);
+        let bounds = format!("it must lie within {} to {}{unit}", words::number(min), words::number(max));
+        match number {
+            None => Err(self.wrong_type(value, key, &format!("a number{unit}"), "digits without quotes")),
+            Some(number) if !number.is_finite() => {
+                Err(self.refuse(value, key, format!("{number} is not a finite number: {bounds}")))
+            }
+            Some(number) if range.check(number).is_err() => {
+                Err(self.refuse(value, key, format!("{} is out of range: {bounds}", words::number(number))))
+            }
+            Some(number) => Ok(number),
+        }
+    }
+
+    fn text_in(&self, value: &'a Spanned<DeValue<'a>>, key: &str) -> Result<&'a str, FileError> {
+        value.get_ref().as_str().ok_or_else(|| self.wrong_type(value, key, "a string", "quotes around it"))
+    }
+
+    fn choice_in<T: Copy>(
+        &self,
+        value: &'a Spanned<DeValue<'a>>,
+        key: &str,
+        options: &[T],
+        name: fn(T) -> &'static str,
+    ) -> Result<T, FileError> {
+        let text = self.text_in(value, key)?;
+        options.iter().copied().find(|&option| name(option) == text).ok_or_else(|| {
+            self.refuse(value, key, format!("\"{text}\" is unknown; it must be {}", one_of(options, name)))
+        })
+    }
+
+    fn table_in(&self, value: &'a Spanned<DeValue<'a>>, key: &str, cure: &str) -> Result<Table<'a>, FileError> {
+        let entries = value.get_ref().as_table().ok_or_else(|| self.wrong_type(value, key, "a table", cure))?;
+        Ok(Table { source: self.source, path: self.dotted(key), start: value.span().start, entries, read: Vec::new() })
+    }
+
+    fn wrong_type(&self, value: &Spanned<DeValue<'_>>, key: &str, wanted: &str, cure: &str) -> FileError {
+        let found = match value.get_ref() {
+            DeValue::String(_) => "a string",
+            DeValue::Integer(_) | DeValue::Float(_) => "a number",
+            DeValue::Boolean(_) => "true or false",
+            DeValue::Datetime(_) => "a date or time",
+            DeValue::Array(_) => "a list",
+            DeValue::Table(_) => "a table",
+        };
+        self.refuse(value, key, format!("it is {found} and must be {wanted}; write {cure}"))
+    }
+
+    fn refuse(&self, value: &Spanned<DeValue<'_>>, key: &str, problem: String) -> FileError {
+        FileError::at(self.source, value.span().start, self.dotted(key), problem)
+    }
+
+    fn dotted(&self, key: &str) -> String {
+        if self.path.is_empty() { key.into() } else { format!("{}.{key}", self.path) }
+    }
+}
+
+/// Whether a float is a whole number as it is written, before any rounding; one that is not finite is another matter.
+fn is_whole(float: &str) -> bool {
+    let number = float.parse().unwrap_or(f64::NAN);
+    let is_round = float.contains(['e', 'E'])
+        || float.split_once('.').is_none_or(|(_, after)| after.trim_end_matches('0').is_empty());
+    !number.is_finite() || (number.fract() == 0.0 && is_round)
+}

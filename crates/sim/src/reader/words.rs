@@ -1,0 +1,80 @@
+//! Words for people: units, numbers, suggestions.
+
+use afbc_types::OutOfRange;
+
+/// How alike two words must be for "did you mean".
+const LIKENESS: f64 = 0.8;
+
+/// What the endings of keys mean, longest ending first.
+const UNITS: [(&str, &str); 30] = [
+    ("_kg_m3", "kilograms per cubic metre"),
+    ("_n_s2_m", "newton seconds squared per metre"),
+    ("_n_m_s2", "newton metre seconds squared"),
+    ("_kg_m2", "kilogram square metres"),
+    ("_rad_s2", "radians per second squared"),
+    ("_n_s2", "newton seconds squared"),
+    ("_m_s2", "metres per second squared"),
+    ("_rad_s", "radians per second"),
+    ("_m_s", "metres per second"),
+    ("_1_s3", "1/s3"),
+    ("_1_s2", "1/s2"),
+    ("_1_s", "1/s"),
+    ("_n_m", "newton metres"),
+    ("_rad", "radians"),
+    ("_kg", "kilograms"),
+    ("_m2", "square metres"),
+    ("_a_h", "ampere hours"),
+    ("_ohm", "ohms"),
+    ("_hz", "per second"),
+    ("_m", "metres"),
+    ("_n", "newtons"),
+    ("_s", "seconds"),
+    ("_v", "volts"),
+    ("_w", "watts"),
+    ("sigma", "1/s"),
+    ("kappa", "1/s per m/s or rad/s"),
+    ("dead_zone", "m/s or rad/s"),
+    ("alpha1", "1/s"),
+    ("alpha2", "input per m/s or rad/s"),
+    ("epsilon", "m/s or rad/s"),
+];
+
+/// ` (kilograms)` for `mass_kg`; nothing for a key without a unit.
+pub fn unit(key: &str) -> String {
+    let found = UNITS.iter().find(|(ending, _)| key.ends_with(ending));
+    found.map_or(String::new(), |(_, words)| format!(" ({words})"))
+}
+
+/// A number for people: decimal where that is short.
+pub fn number(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e7).contains(&value.abs()) { format!("{value}") } else { format!("{value:e}") }
+}
+
+/// What is out of range, as a controller or plant found it.
+pub fn out_of_range(error: &OutOfRange) -> String {
+    let OutOfRange { value, range } = error;
+    // To f32 precision, for a decimal in a file may have come through one.
+    let (value, min, max) = (*value as f32, number(range.min), number(range.max));
+    format!("{} = {value}, out of range: it must lie within {min} to {max}", range.name)
+}
+
+/// The word most like `word`, if any is like it at all.
+pub fn nearest<'w>(word: &str, words: impl Iterator<Item = &'w str>) -> Option<&'w str> {
+    let rated = words.map(|other| (strsim::jaro_winkler(word, other), other));
+    let (likeness, best) = rated.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
+    (likeness >= LIKENESS).then_some(best)
+}
+
+/// The cure for a slip of the pen.
+pub fn did_you_mean(key: &str) -> String {
+    format!("did you mean {key}{}?", unit(key))
+}
+
+/// `"step", "circle" or "hover"`.
+pub fn one_of<T: Copy>(options: &[T], name: fn(T) -> &'static str) -> String {
+    let quoted: Vec<_> = options.iter().map(|&option| format!("\"{}\"", name(option))).collect();
+    match quoted.split_last() {
+        Some((last, others)) if !others.is_empty() => format!("{} or {last}", others.join(", ")),
+        _ => quoted.concat(),
+    }
+}

@@ -1,0 +1,78 @@
+//! One flight with everything that is reported of it.
+
+use crate::contender::Contender;
+use crate::flight::{Lost, Sample, fly};
+use crate::metrics::{Accumulator, Metrics, SETTLED_S, inputs};
+use crate::scenario::Scenario;
+use afbc::monitor::Trip;
+use afbc_types::OutOfRange;
+use nalgebra::Vector4;
+
+/// A flown scenario under one contender.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Who flew.
+    pub contender: Contender,
+    /// When and why the vehicle was lost, if it was.
+    pub lost: Option<Lost>,
+    /// When and why AFBC's monitor put another law in its place, if it did.
+    pub tripped: Option<Tripped>,
+    /// Figures of merit over every step.
+    pub metrics: Metrics,
+    /// Every `log_every`-th step, and the last one.
+    pub log: Vec<Sample>,
+    /// For each row of the log, the lowest and the highest U1..U4 \[N\] of all steps since the row before: chatter is
+    /// faster than the log.
+    pub input_extremes: Vec<[Vector4<f64>; 2]>,
+}
+
+/// What a monitor did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tripped {
+    /// \[s\]
+    pub time_s: f64,
+    /// Why.
+    pub trip: Trip,
+}
+
+impl Run {
+    /// Whether the flight reached the time from which errors count.
+    pub fn is_settled(&self) -> bool {
+        self.log.last().is_some_and(|last| last.time_s >= SETTLED_S)
+    }
+
+    /// Flies `scenario` under `contender`, keeping every `log_every`-th step (at least 1).
+    ///
+    /// # Errors
+    /// The first parameter, gain or setting out of range; nothing has been flown then.
+    pub fn fly(scenario: &Scenario, contender: &Contender, log_every: u64) -> Result<Self, OutOfRange> {
+        let log_every = log_every.max(1);
+        let mut metrics = Accumulator::default();
+        let (mut log, mut input_extremes) = (Vec::new(), Vec::new());
+        let mut unlogged: Option<(Sample, [Vector4<f64>; 2])> = None;
+        let (mut step, mut tripped) = (0, None);
+        let lost = fly(scenario, contender, |sample| {
+            metrics.add(sample);
+            if let Some(trip) = sample.command.health.trip {
+                tripped.get_or_insert(Tripped { time_s: sample.time_s, trip });
+            }
+            let u = inputs(sample);
+            let extremes = match unlogged.take() {
+                Some((_, [low, high])) => [u.inf(&low), u.sup(&high)],
+                None => [u, u],
+            };
+            if step % log_every == 0 {
+                log.push(*sample);
+                input_extremes.push(extremes);
+            } else {
+                unlogged = Some((*sample, extremes));
+            }
+            step += 1;
+        })?;
+        if let Some((last, extremes)) = unlogged {
+            log.push(last);
+            input_extremes.push(extremes);
+        }
+        Ok(Run { contender: contender.clone(), lost, tripped, metrics: metrics.finish(), log, input_extremes })
+    }
+}

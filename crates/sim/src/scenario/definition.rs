@@ -1,0 +1,117 @@
+//! What is flown: one vehicle, one trajectory, one environment, the controllers to compare.
+
+use crate::aboard::ARMING_TILT;
+use crate::case::Case;
+use crate::contender::{Contender, ControllerKind};
+use crate::trajectory::Trajectory;
+use afbc_plant::{Environment, Model, Motion, Plant, Realism, Sensing, Sensors};
+use afbc_types::{OutOfRange, Parameters, Range};
+
+/// Accepted length of a flight \[s\].
+pub const DURATION: Range = Range::new("duration_s", 0.1, 36_000.0);
+
+/// An interval in which no state arrives: a link that is down.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outage {
+    /// From \[s\].
+    pub start_s: f64,
+    /// To, where states arrive again \[s\].
+    pub end_s: f64,
+}
+
+/// Everything that determines a flight.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scenario {
+    /// Short name: file names come from it.
+    pub name: String,
+    /// One line for people.
+    pub description: String,
+    /// Which reading of the paper's experiment this is, if it is one.
+    pub case: Option<Case>,
+    /// Length of the flight \[s\].
+    pub duration_s: f64,
+    /// Equations that move the vehicle.
+    pub model: Model,
+    /// The vehicle as the controllers believe it to be.
+    pub vehicle: Parameters<f64>,
+    /// The vehicle as it is, and what pushes it.
+    pub environment: Environment,
+    /// What rotors, air and ground add to the equations. Its own seed is not used.
+    pub realism: Realism,
+    /// How the motion is measured.
+    pub sensing: Sensing,
+    /// When no state arrives at all.
+    pub outages: Vec<Outage>,
+    /// Whether the controllers fly inside the [flight core](crate::aboard), as on board.
+    pub flight_core: bool,
+    /// Of everything random. The same seed gives the same flight.
+    pub seed: u64,
+    /// Motion at t = 0.
+    pub initial: Motion,
+    /// The reference.
+    pub trajectory: Trajectory,
+    /// Controllers to compare, each in a flight of its own.
+    pub contenders: Vec<Contender>,
+}
+
+impl Scenario {
+    /// The first contender that flies a law of this kind.
+    pub fn contender(&self, kind: ControllerKind) -> Option<&Contender> {
+        self.contenders.iter().find(|contender| contender.kind() == kind)
+    }
+
+    /// Builds every flight once, just as it would begin.
+    ///
+    /// # Errors
+    /// The first parameter, gain or setting out of range.
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        self.check_flight_core()?;
+        self.contenders.iter().try_for_each(|contender| {
+            contender.check(self.vehicle.to_f32())?;
+            self.plant(contender.step_s())?;
+            self.sensors(contender.step_s()).map(drop)
+        })
+    }
+
+    /// Whether the flight core could take every contender up, if it is to.
+    ///
+    /// # Errors
+    /// The first time step or tilt out of its range.
+    pub fn check_flight_core(&self) -> Result<(), OutOfRange> {
+        if !self.flight_core {
+            return Ok(());
+        }
+        ARMING_TILT.check(self.initial.attitude_rad.x)?;
+        ARMING_TILT.check(self.initial.attitude_rad.y)?;
+        self.contenders.iter().try_for_each(|contender| afbc_flight_core::tick::DT.check(contender.settings.dt_s))
+    }
+
+    /// True if rotors, air and ground are those of the paper's equations.
+    pub fn is_ideal(&self) -> bool {
+        self.realism == Realism { seed: self.realism.seed, ..Realism::default() }
+    }
+
+    /// The vehicle at t = 0, made for steps of `step_s`; the ideal one if nothing real was asked for.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub fn plant(&self, step_s: f64) -> Result<Plant, OutOfRange> {
+        let environment = self.environment.clone();
+        if self.is_ideal() {
+            return Ok(Plant::new(self.model, self.initial, environment));
+        }
+        let realism = Realism { seed: self.seed, ..self.realism.clone() };
+        Plant::with(self.model, self.initial, environment, &realism, step_s)
+    }
+
+    /// The sensors, read every `step_s`; none if they are perfect.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub fn sensors(&self, step_s: f64) -> Result<Option<Sensors>, OutOfRange> {
+        if self.sensing == Sensing::default() {
+            return Ok(None);
+        }
+        Sensors::new(&self.sensing, self.seed, step_s).map(Some)
+    }
+}

@@ -1,0 +1,102 @@
+//! `controllers`, `profile`, `monitor` and `[[contender]]`: who flies.
+
+use super::control::{axis_backstepping, axis_gains, number, per_axis, settings};
+use crate::contender::{Contender, ControllerKind, Law, backstepping_part};
+use crate::reader::{FileError, Table};
+use afbc::adaptive::Gains;
+use afbc::{Profile, Settings};
+use afbc_types::{Parameters, PerAxis};
+
+/// Longest name of a contender: what a table has room for.
+const NAME_LENGTH: usize = 32;
+
+/// What a contender starts from.
+#[derive(Clone, Copy)]
+struct Defaults {
+    profile: Profile,
+    gains: PerAxis<Gains>,
+    settings: Settings,
+    /// Whether AFBC flies under its monitor.
+    monitor: bool,
+}
+
+impl Defaults {
+    fn law(&self, kind: ControllerKind) -> Law {
+        match kind {
+            ControllerKind::Afbc if self.monitor => Law::Guarded(self.gains),
+            ControllerKind::Afbc => Law::Afbc(self.gains),
+            ControllerKind::Backstepping => Law::Backstepping(backstepping_part(&self.gains)),
+            _ => Law::of(kind, self.profile),
+        }
+    }
+}
+
+/// Everyone who flies, those of `controllers` first.
+pub(super) fn read(root: &mut Table<'_>, vehicle: &Parameters) -> Result<Vec<Contender>, FileError> {
+    let controllers = root.choices("controllers", &ControllerKind::ALL, ControllerKind::name)?;
+    let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(Profile::Paper);
+    let gains = per_axis(root.table("gains")?, profile.gains_for(vehicle), axis_gains)?;
+    let settings = settings(root, profile.settings(), true)?;
+    let monitor = root.boolean("monitor")?.unwrap_or(false);
+    let defaults = Defaults { profile, gains, settings, monitor };
+
+    let tables = root.few_tables("contender")?;
+    let kinds = controllers.unwrap_or(if tables.is_empty() { ControllerKind::PAPER.to_vec() } else { Vec::new() });
+    let short = |kind: ControllerKind| Contender { name: kind.name().into(), law: defaults.law(kind), settings };
+    let mut contenders: Vec<_> = kinds.into_iter().map(short).collect();
+    for table in tables {
+        contenders.push(contender(table, vehicle, defaults, &contenders)?);
+    }
+    Ok(contenders)
+}
+
+fn contender(
+    mut table: Table<'_>,
+    vehicle: &Parameters,
+    file: Defaults,
+    others: &[Contender],
+) -> Result<Contender, FileError> {
+    let name = table.need_text("name", "give it one, such as \"gentle\"")?.to_owned();
+    if !(1..=NAME_LENGTH).contains(&name.chars().count()) || name.chars().any(char::is_control) {
+        let problem = format!("it cannot be a name; make it one plain line of 1 to {NAME_LENGTH} characters");
+        return Err(table.fault_at("name", problem));
+    }
+    if others.iter().any(|other| other.name == name) {
+        return Err(table.fault_at("name", format!("\"{name}\" is the name of another contender; choose another")));
+    }
+    let kind = table.need_choice("controller", &ControllerKind::ALL, ControllerKind::name)?;
+    let mut defaults = match table.choice("profile", &Profile::ALL, Profile::name)? {
+        Some(profile) => Defaults {
+            profile,
+            gains: profile.gains_for(vehicle),
+            settings: Settings { dt_s: file.settings.dt_s, ..profile.settings() },
+            monitor: file.monitor,
+        },
+        None => file,
+    };
+    if kind == ControllerKind::Afbc {
+        defaults.monitor = table.boolean("monitor")?.unwrap_or(defaults.monitor);
+    }
+    let law = law(table.table("gains")?, defaults.law(kind))?;
+    let settings = settings(&mut table, defaults.settings, false)?;
+    table.finish()?;
+    Ok(Contender { name, law, settings })
+}
+
+/// The law with the gains in `table`; those that it leaves out are as in `default`.
+fn law(table: Option<Table<'_>>, mut default: Law) -> Result<Law, FileError> {
+    match default {
+        Law::Afbc(gains) => per_axis(table, gains, axis_gains).map(Law::Afbc),
+        Law::Guarded(gains) => per_axis(table, gains, axis_gains).map(Law::Guarded),
+        Law::Backstepping(gains) => per_axis(table, gains, axis_backstepping).map(Law::Backstepping),
+        _ => {
+            let Some(mut table) = table else { return Ok(default) };
+            default.each_gain(|range, gain| {
+                *gain = number(&mut table, range, *gain)?;
+                Ok(())
+            })?;
+            table.finish()?;
+            Ok(default)
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! `[[gust]]`, `[[change]]`, `[[payload]]` and `[[outage]]`: what happens to the vehicle in flight.
+
+use crate::reader::words::out_of_range;
+use crate::reader::{FileError, Table};
+use crate::scenario::definition::Outage;
+use afbc_plant::{Environment, Gust, GustKind, PAYLOAD_BELOW, ParameterChange, Payload, Quantity};
+use afbc_types::{Axis, Parameters, Range};
+
+/// Accepted start of whatever happens in flight \[s\].
+pub(super) const START: Range = Range::new("start_s", 0.0, 36_000.0);
+/// Accepted length of it \[s\]; what has none stays to the end.
+pub(super) const LENGTH: Range = Range::new("duration_s", 0.001, 36_000.0);
+/// Accepted factor of a change; the parameter must stay in range too.
+const FACTOR: Range = Range::new("factor", 0.001, 1000.0);
+/// Accepted mass of a payload \[kg\].
+const PAYLOAD_MASS: Range = Range::new("mass_kg", 0.0, afbc_plant::PAYLOAD_MASS.max);
+
+/// How large a gust along x, y or z may be.
+const LINEAR: [(Range, GustKind); 2] = [
+    (Range::new("acceleration_m_s2", -1000.0, 1000.0), GustKind::Acceleration),
+    (Range::new("force_n", -10_000.0, 10_000.0), GustKind::Force),
+];
+/// How large a gust about roll, pitch or yaw may be.
+const ANGULAR: [(Range, GustKind); 2] = [
+    (Range::new("angular_acceleration_rad_s2", -1000.0, 1000.0), GustKind::Acceleration),
+    (Range::new("moment_n_m", -10_000.0, 10_000.0), GustKind::Force),
+];
+
+/// The environment of a vehicle with these true parameters.
+pub(super) fn read(root: &mut Table<'_>, truth: Parameters<f64>) -> Result<Environment, FileError> {
+    let gusts = root.tables("gust")?.into_iter().map(gust).collect::<Result<_, _>>()?;
+    let tables = root.few_tables("change")?;
+    let mut environment = Environment::new(truth, Vec::new(), gusts)
+        .map_err(|error| root.fault_at("truth", format!("{}; change it", out_of_range(&error))))?;
+    for mut table in tables {
+        // Changes that overlap multiply, so each is checked together with those before it.
+        let mut changes = environment.changes().to_vec();
+        changes.push(change(&mut table)?);
+        environment = Environment::new(truth, changes, environment.gusts().to_vec()).map_err(|error| {
+            table.fault_at(FACTOR.name, format!("it makes {}; change the factor", out_of_range(&error)))
+        })?;
+        table.finish()?;
+    }
+    let mut payloads = Vec::new();
+    for mut table in root.few_tables("payload")? {
+        payloads.push(payload(&mut table)?);
+        environment = environment.with_payloads(payloads.clone()).map_err(|error| {
+            table.fault_at(PAYLOAD_MASS.name, format!("it makes {}; change the payload", out_of_range(&error)))
+        })?;
+        table.finish()?;
+    }
+    Ok(environment)
+}
+
+/// When no state arrives.
+pub(super) fn outages(root: &mut Table<'_>) -> Result<Vec<Outage>, FileError> {
+    let outage = |mut table: Table<'_>| {
+        let [start_s, end_s] = interval(&mut table)?;
+        table.finish()?;
+        Ok(Outage { start_s, end_s })
+    };
+    root.few_tables("outage")?.into_iter().map(outage).collect()
+}
+
+fn payload(table: &mut Table<'_>) -> Result<Payload, FileError> {
+    let mass_kg = table.need_number(&PAYLOAD_MASS)?;
+    let below_m = table.number(&PAYLOAD_BELOW)?.unwrap_or(0.0);
+    let [start_s, end_s] = interval(table)?;
+    Ok(Payload { mass_kg, below_m, start_s, end_s })
+}
+
+fn gust(mut table: Table<'_>) -> Result<Gust, FileError> {
+    let axis = table.need_choice("axis", &Axis::ALL, Axis::name)?;
+    let [(acceleration, by_acceleration), (force, by_force)] = match axis {
+        Axis::X | Axis::Y | Axis::Z => LINEAR,
+        Axis::Roll | Axis::Pitch | Axis::Yaw => ANGULAR,
+    };
+    let sizes = format!("axis \"{}\" takes {} or {}", axis.name(), acceleration.name, force.name);
+    let (kind, size) = match (table.number(&acceleration)?, table.number(&force)?) {
+        (Some(size), None) => (by_acceleration, size),
+        (None, Some(size)) => (by_force, size),
+        (Some(_), Some(_)) => return Err(table.fault_at(force.name, format!("a second size; {sizes}, not both"))),
+        (None, None) => return Err(table.missing(acceleration.name, &sizes)),
+    };
+    let [start_s, end_s] = interval(&mut table)?;
+    table.finish()?;
+    Ok(Gust { axis, kind, size, start_s, end_s })
+}
+
+fn change(table: &mut Table<'_>) -> Result<ParameterChange, FileError> {
+    let quantities = [Quantity::Mass, Quantity::Inertia, Quantity::ThrustFactor, Quantity::DragFactor];
+    let quantity = table.need_choice("parameter", &quantities, |quantity| match quantity {
+        Quantity::Mass => "mass",
+        Quantity::Inertia => "inertia",
+        Quantity::ThrustFactor => "thrust-factor",
+        Quantity::DragFactor => "drag-factor",
+    })?;
+    let factor = table.need_number(&FACTOR)?;
+    let [start_s, end_s] = interval(table)?;
+    Ok(ParameterChange { quantity, factor, start_s, end_s })
+}
+
+fn interval(table: &mut Table<'_>) -> Result<[f64; 2], FileError> {
+    let start_s = table.need_number(&START)?;
+    let length_s = table.number(&LENGTH)?.unwrap_or(f64::INFINITY);
+    Ok([start_s, start_s + length_s])
+}

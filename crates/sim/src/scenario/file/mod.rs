@@ -1,0 +1,101 @@
+//! Scenario files. The format is described, key by key, in `docs/scenarios.md`.
+
+mod contenders;
+mod control;
+mod environment;
+mod motion;
+mod realism;
+mod sensors;
+mod trajectory;
+mod vehicle;
+
+#[cfg(test)]
+mod tests;
+
+use super::definition::{DURATION, Scenario};
+use crate::contender::Contender;
+use crate::reader::words::out_of_range;
+use crate::reader::{self, FileError, Table};
+use crate::trajectory::Trajectory;
+use afbc_plant::Model;
+use afbc_types::{Parameters, Range};
+use std::path::Path;
+
+/// Length of a flight that does not say how long it is \[s\].
+const DURATION_S: f64 = 60.0;
+/// Accepted seeds.
+const SEED: Range = Range::new("seed", 0.0, 1e9);
+/// Reads and checks the scenario file at `path`.
+///
+/// # Errors
+/// One line on the first thing that is wrong.
+pub fn load(path: &Path) -> Result<Scenario, FileError> {
+    let text = reader::text(path, "scenario")?;
+    let stem = path.file_stem().map_or("".into(), |stem| stem.to_string_lossy());
+    parse(&path.display().to_string(), &text, &stem)
+}
+
+/// Reads and checks a scenario from its `text`. Errors call it `file`; `name` is its name if it gives none itself.
+///
+/// # Errors
+/// One line on the first thing that is wrong.
+pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> {
+    reader::document(file, text, "scenarios hover", |root| read(root, name, None))
+}
+
+/// The scenario in `root`; `name` and `trajectory` are its own if it gives none itself.
+///
+/// # Errors
+/// One line on the first thing that is wrong.
+pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) -> Result<Scenario, FileError> {
+    let [name, description] = reader::title(&mut root, name)?;
+    let duration_s = root.number(&DURATION)?.unwrap_or(DURATION_S);
+    let models = [Model::Simplified, Model::RigidBody];
+    let seed = root.whole(&SEED)?.unwrap_or(0);
+    let model = root.choice("plant", &models, Model::name)?.unwrap_or(Model::RigidBody);
+
+    let vehicle = vehicle::read(root.table("vehicle")?, Parameters::PAPER)?;
+    let truth = vehicle::read(root.table("truth")?, vehicle)?;
+    let contenders = contenders::read(&mut root, &vehicle.to_f32())?;
+    let trajectory = match (root.table("trajectory")?, trajectory) {
+        (Some(table), _) => trajectory::read(table)?,
+        (None, Some(trajectory)) => trajectory.clone(),
+        (None, None) => {
+            let cure = "add [trajectory] with kind = \"hover\" and position_m = [0, 0, 1]";
+            return Err(root.missing("trajectory", cure));
+        }
+    };
+    let initial = motion::initial(root.table("initial")?, &trajectory.at(0.0))?;
+    let environment = environment::read(&mut root, truth)?;
+    let step_s = contenders.first().map_or(afbc::cascade::DT.max, Contender::step_s);
+    let realism = realism::read(&mut root, &truth, step_s)?;
+    let sensing = sensors::read(root.table("sensors")?)?;
+    let outages = environment::outages(&mut root)?;
+    let flight_core = root.boolean("flight_core")?.unwrap_or(false);
+
+    let scenario = Scenario {
+        name,
+        description,
+        case: None,
+        duration_s,
+        model,
+        vehicle,
+        environment,
+        realism,
+        sensing,
+        outages,
+        flight_core,
+        seed,
+        initial,
+        trajectory,
+        contenders,
+    };
+    scenario.check_flight_core().map_err(|error| {
+        let cure = "change that, or leave flight_core out";
+        root.fault_at("flight_core", format!("it cannot fly with {}; {cure}", out_of_range(&error)))
+    })?;
+    // Whatever the tables have let through, no flight begins with.
+    scenario.check().map_err(|error| root.fault(error.range.name, format!("{}; change it", out_of_range(&error))))?;
+    root.finish()?;
+    Ok(scenario)
+}

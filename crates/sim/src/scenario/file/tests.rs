@@ -1,0 +1,179 @@
+//! Built-in scenarios against the code, and `docs/scenarios.md` against both.
+
+#![expect(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
+
+use super::parse;
+use crate::case::Case;
+use crate::contender::{Contender, Law};
+use crate::paper;
+use crate::reader::FileError;
+use crate::scenario::{BUILT_IN, Scenario, built_in};
+use afbc::adaptive::Gains;
+use afbc::{Profile, Settings};
+use afbc_peers::pid;
+use afbc_plant::Model;
+
+#[test]
+fn built_in_paper_is_the_paper() {
+    let from_file = built_in("paper").unwrap().scenario().unwrap();
+    let from_code = Scenario { case: None, ..paper::scenario(Model::Simplified, Case::DEFAULT).unwrap() };
+    assert_eq!(from_file, from_code);
+}
+
+#[test]
+fn built_in_scenarios_are_valid_and_named_after_their_files() {
+    for built_in in BUILT_IN {
+        let scenario = built_in.scenario().unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(scenario.name, built_in.name);
+        assert!(!scenario.description.is_empty(), "{}", built_in.name);
+    }
+}
+
+/// One section of the page: its example, and its table's rows of key, range and default.
+struct Section {
+    example: String,
+    rows: Vec<[String; 3]>,
+}
+
+fn sections() -> Vec<Section> {
+    let page = include_str!("../../../../../docs/scenarios.md");
+    let mut sections = Vec::new();
+    for part in page.split("```toml\n").skip(1) {
+        let (example, text) = part.split_once("```").unwrap();
+        let cells = |line: &str| {
+            let mut cells = line.split(" | ").map(|cell| cell.trim_matches(['|', ' ']).to_owned());
+            [cells.next(), cells.next(), cells.next()].map(Option::unwrap_or_default)
+        };
+        let rows = text.lines().filter(|line| line.starts_with("| `")).map(cells).collect();
+        sections.push(Section { example: example.into(), rows });
+    }
+    sections
+}
+
+/// The scenario of an example, with a trajectory if it has none.
+fn example(text: &str) -> Result<Scenario, FileError> {
+    let hover = "\n[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
+    parse("example", &format!("{text}{}", if text.contains("[trajectory]") { "" } else { hover }), "example")
+}
+
+/// `text` with the first line that sets `key` replaced.
+fn with_line(text: &str, key: &str, line: &str) -> String {
+    let start = format!("{key} = ");
+    let old = text.lines().find(|line| line.starts_with(&start)).unwrap_or_else(|| panic!("no {key} in {text}"));
+    text.replacen(old, line, 1)
+}
+
+#[test]
+fn documented_examples_are_valid_and_complete() {
+    let sections = sections();
+    assert_eq!(sections.len(), 30);
+    for Section { example: text, rows } in sections {
+        example(&text).unwrap_or_else(|error| panic!("{error} in\n{text}"));
+        for line in text.lines().filter(|line| line.contains(" = ")) {
+            let documented = rows.iter().any(|[key, ..]| line.starts_with(&format!("{} = ", key.trim_matches('`'))));
+            // What kind of table it is, and the head of a contender whose gains are the section's subject.
+            let head = ["kind", "name", "controller"].iter().any(|key| line.starts_with(&format!("{key} = ")));
+            assert!(documented || head, "{line}");
+        }
+    }
+}
+
+#[test]
+fn documented_ranges_are_those_of_the_code() {
+    let mut ranges = 0;
+    for Section { example: text, rows } in sections() {
+        for [key, range, _] in rows {
+            let key = key.trim_matches('`');
+            if key == "name" || !range.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
+                continue;
+            }
+            // Of "-1.5 to 1.5; yaw -100 to 100", "0 to 1e9, whole" the first is tried.
+            let range = range.split([';', ',']).next().unwrap().trim_end_matches(" each");
+            let vector = text.contains(&format!("{key} = ["));
+            let value = if vector { "[1e300, 1e300, 1e300]" } else { "1e300" };
+            let error = example(&with_line(&text, key, &format!("{key} = {value}"))).unwrap_err().to_string();
+            let expected = format!("{key}: 1e300 is out of range: it must lie within {range}");
+            let unit = error.split_once(&expected).unwrap_or_else(|| panic!("{expected}, not {error}")).1;
+            assert!(unit.is_empty() || unit.starts_with(" ("), "{expected}, not {error}");
+            ranges += 1;
+        }
+    }
+    assert!(ranges > 40, "{ranges}");
+}
+
+#[test]
+fn documented_defaults_are_those_of_the_code() {
+    let mut checked = 0;
+    for Section { example: text, rows } in sections() {
+        for [key, _, default] in rows {
+            let key = key.trim_matches('`');
+            let without = with_line(&text, key, "");
+            if default == "required" {
+                let error = example(&without).unwrap_err().to_string();
+                assert!(error.contains(&format!("{key}: missing; ")), "{error}");
+                checked += 1;
+            } else if let Some(value) = default.strip_prefix('`') {
+                let with = with_line(&text, key, &format!("{key} = {}", value.trim_end_matches('`')));
+                assert_eq!(example(&without).unwrap(), example(&with).unwrap(), "{key}");
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 35, "{checked}");
+}
+
+/// Whatever is done to a line of a file, either it is still a scenario that can be flown, or one line says what is wrong.
+#[test]
+fn damaged_files_get_one_line() {
+    let values =
+        ["", "nan", "-1e300", "1e300", "\"\\n\"", "[]", "{}", "true", "[0, 0]", "1979-05-27", "{ a.b = [[1]] }"];
+    let (mut refused, mut accepted) = (0, 0);
+    for built_in in BUILT_IN {
+        let lines: Vec<_> = built_in.text.lines().collect();
+        for (at, line) in lines.iter().enumerate() {
+            let key = line.split_once(" = ").map(|(key, _)| key);
+            let mut damaged: Vec<_> = key.map_or(Vec::new(), |key| values.map(|v| format!("{key} = {v}")).to_vec());
+            damaged.extend([
+                String::new(),
+                format!("{line}\n{line}"),
+                line.chars().rev().collect(),
+                format!("x{line}"),
+            ]);
+            for damaged in damaged {
+                let text = [&lines[..at], &[damaged.as_str()], &lines[at + 1..]].concat().join("\n");
+                match parse("damaged", &text, "damaged") {
+                    Ok(scenario) => {
+                        scenario.check().unwrap();
+                        accepted += 1;
+                    }
+                    Err(error) => {
+                        let error = error.to_string();
+                        assert!(error.starts_with("damaged:") && !error.contains('\n'), "{error}");
+                        refused += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(refused > 3000 && accepted > 300, "{refused} refused, {accepted} accepted");
+}
+
+#[test]
+fn contenders_start_from_the_file_or_from_a_profile() {
+    let text = "controllers = [\"afbc\"]\n[gains.z]\ngamma = 5.0\n[settings]\ndt_s = 0.002\nrotor_force_max_n = 4.0\n\
+                [[contender]]\nname = \"file\"\ncontroller = \"afbc\"\ngains.z.eta = 0.1\n\
+                [[contender]]\nname = \"flight\"\ncontroller = \"afbc\"\nprofile = \"flight\"\nmonitor = true\n\
+                [[contender]]\nname = \"pid\"\ncontroller = \"pid\"\ngains.tilt_p_1_s = 9.0\n";
+    let contenders = example(text).unwrap().contenders;
+    let [short, file, flight, pid] = contenders.as_slice() else { panic!("{contenders:?}") };
+    let z = |contender: &Contender| contender.gains().unwrap().z;
+    let paper = Profile::Paper.gains().z;
+    assert_eq!((short.name.as_str(), z(short)), ("afbc", Gains { gamma: 5.0, ..paper }));
+    assert_eq!(z(file), Gains { gamma: 5.0, eta: 0.1, ..paper });
+    assert_eq!(flight.law, Law::Guarded(Profile::Flight.gains()));
+    assert_eq!(flight.settings, Settings { dt_s: 0.002, ..Profile::Flight.settings() });
+    let tuned = pid::Gains { tilt_p_1_s: 9.0, ..pid::Gains::TUNED };
+    assert_eq!((pid.law, pid.settings), (Law::Pid(tuned), short.settings));
+    // Without controllers, a contender is alone.
+    assert_eq!(example("[[contender]]\nname = \"a\"\ncontroller = \"indi\"\n").unwrap().contenders.len(), 1);
+}

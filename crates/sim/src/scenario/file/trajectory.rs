@@ -1,0 +1,141 @@
+//! `[trajectory]`: the reference, one table whose `kind` decides what else is in it.
+
+use super::motion::POSITION;
+use crate::reader::{FileError, Table};
+use crate::trajectory::{Sine, Trajectory, Waypoint};
+use afbc_types::{Range, Setpoint};
+use core::f64::consts::TAU;
+use nalgebra::Vector3;
+
+/// Accepted heading \[rad\].
+const YAW: Range = Range::new("yaw_rad", -100.0, 100.0);
+/// Accepted radius of a circle \[m\].
+const RADIUS: Range = Range::new("radius_m", 0.0, 10_000.0);
+/// Accepted time once round \[s\].
+const PERIOD: Range = Range::new("period_s", 0.1, 36_000.0);
+/// Accepted amplitude of a sine \[m\].
+const AMPLITUDE: Range = Range::new("amplitude_m", -10_000.0, 10_000.0);
+/// Accepted phase of a sine \[rad\].
+const PHASE: Range = Range::new("phase_rad", -100.0, 100.0);
+/// Accepted turn of a step \[rad\].
+const TURN: Range = Range::new("turn_rad", -100.0, 100.0);
+/// Accepted time of a step \[s\].
+const STEP_TIME: Range = Range::new("at_s", 0.0, 36_000.0);
+/// Accepted time of a waypoint \[s\].
+const WAYPOINT_TIME: Range = Range::new("time_s", 0.0, 36_000.0);
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Paper,
+    Hover,
+    Step,
+    Circle,
+    Lissajous,
+    Waypoints,
+}
+
+impl Kind {
+    const ALL: [Kind; 6] = [Kind::Paper, Kind::Hover, Kind::Step, Kind::Circle, Kind::Lissajous, Kind::Waypoints];
+
+    const fn name(self) -> &'static str {
+        match self {
+            Kind::Paper => "paper",
+            Kind::Hover => "hover",
+            Kind::Step => "step",
+            Kind::Circle => "circle",
+            Kind::Lissajous => "lissajous",
+            Kind::Waypoints => "waypoints",
+        }
+    }
+}
+
+pub(super) fn read(mut table: Table<'_>) -> Result<Trajectory, FileError> {
+    let trajectory = match table.need_choice("kind", &Kind::ALL, Kind::name)? {
+        Kind::Paper => Trajectory::Paper,
+        Kind::Hover => {
+            Trajectory::Hover { position_m: table.need_vector("position_m", &POSITION)?, yaw_rad: yaw(&mut table)? }
+        }
+        Kind::Step => Trajectory::Step {
+            from_m: table.need_vector("from_m", &POSITION)?,
+            to_m: table.need_vector("to_m", &POSITION)?,
+            at_s: table.need_number(&STEP_TIME)?,
+            yaw_rad: yaw(&mut table)?,
+            turn_rad: table.number(&TURN)?.unwrap_or(0.0),
+        },
+        Kind::Circle => circle(&mut table)?,
+        Kind::Lissajous => lissajous(&mut table)?,
+        Kind::Waypoints => waypoints(&mut table)?,
+    };
+    table.finish()?;
+    Ok(trajectory)
+}
+
+fn yaw(table: &mut Table<'_>) -> Result<f64, FileError> {
+    Ok(table.number(&YAW)?.unwrap_or(0.0))
+}
+
+fn circle(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
+    let centre_m = table.need_vector("centre_m", &POSITION)?;
+    let (radius_m, period_s) = (table.need_number(&RADIUS)?, table.need_number(&PERIOD)?);
+    let rate = TAU / period_s;
+    slow_enough(table, PERIOD.name, radius_m * rate, radius_m * rate * rate)?;
+    Ok(Trajectory::Circle { centre_m, radius_m, period_s, yaw_rad: yaw(table)? })
+}
+
+fn lissajous(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
+    let centre_m = table.need_vector("centre_m", &POSITION)?;
+    let amplitude_m = table.need_vector("amplitude_m", &AMPLITUDE)?;
+    let period_s = table.need_vector("period_s", &PERIOD)?;
+    let phase_rad = table.vector("phase_rad", [&PHASE; 3])?.unwrap_or_default();
+    let rate = period_s.map(|period_s| TAU / period_s);
+    let speed_m_s = amplitude_m.component_mul(&rate);
+    slow_enough(table, PERIOD.name, speed_m_s.amax(), speed_m_s.component_mul(&rate).amax())?;
+    let sine = |amplitude_m, period_s, phase_rad| Sine { amplitude_m, period_s, phase_rad };
+    let sines = amplitude_m.zip_zip_map(&period_s, &phase_rad, sine).into();
+    Ok(Trajectory::Lissajous { centre_m, sines, yaw_rad: yaw(table)? })
+}
+
+fn waypoints(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
+    let mut waypoints: Vec<Waypoint> = Vec::new();
+    for mut table in table.tables("waypoint")? {
+        let waypoint = Waypoint {
+            time_s: table.need_number(&WAYPOINT_TIME)?,
+            position_m: table.need_vector("position_m", &POSITION)?,
+            yaw_rad: yaw(&mut table)?,
+        };
+        if let Some(before) = waypoints.last() {
+            let length_s = waypoint.time_s - before.time_s;
+            if length_s <= 0.0 {
+                let problem = format!(
+                    "{} is not after the {} of the waypoint before; make times rise",
+                    waypoint.time_s, before.time_s
+                );
+                return Err(table.fault_at(WAYPOINT_TIME.name, problem));
+            }
+            // Peaks of minimum-jerk motion: 15/8 and 10/sqrt(3) of the mean.
+            let leg_m = (waypoint.position_m - before.position_m).amax();
+            slow_enough(&table, WAYPOINT_TIME.name, 1.875 * leg_m / length_s, 5.774 * leg_m / (length_s * length_s))?;
+        }
+        table.finish()?;
+        waypoints.push(waypoint);
+    }
+    if waypoints.is_empty() {
+        return Err(table.missing("waypoint", "add [[trajectory.waypoint]] with time_s and position_m"));
+    }
+    Ok(Trajectory::Waypoints(waypoints))
+}
+
+/// Refuses a reference that would be too fast for a controller to accept.
+fn slow_enough(table: &Table<'_>, key: &str, speed_m_s: f64, acceleration_m_s2: f64) -> Result<(), FileError> {
+    let along_x = |size: f64| Vector3::new(size as f32, 0.0, 0.0);
+    let fastest = Setpoint {
+        velocity_m_s: along_x(speed_m_s),
+        acceleration_m_s2: along_x(acceleration_m_s2),
+        ..Setpoint::default()
+    };
+    if fastest.is_plausible() {
+        return Ok(());
+    }
+    let peak = format!("it asks for {speed_m_s:.3e} m/s and {acceleration_m_s2:.3e} m/s2");
+    Err(table.fault_at(key, format!("{peak}, more than a controller accepts (1000 of either); allow more time")))
+}

@@ -1,0 +1,188 @@
+//! What gains are judged by.
+//!
+//! Every flight is that of the built-in scenario `hardware`: rotors that lag by 20 ms, obey a millisecond late and give 3 N
+//! each, a noisy state. The first is that scenario itself; each of the others adds one thing that goes wrong.
+
+use afbc_plant::{
+    Contact, Drag, Environment, GroundEffect, Gust, GustKind, Motion, ParameterChange, Quantity, Turbulence,
+};
+use afbc_sim::reader::FileError;
+use afbc_sim::scenario::{Outage, Scenario, built_in};
+use afbc_sim::trajectory::{Sine, Trajectory, Waypoint};
+use afbc_types::Axis;
+use nalgebra::Vector3;
+use std::error::Error;
+
+/// When things go wrong \[s\]: errors count by then.
+const ONSET_S: f64 = 6.0;
+/// When the reference jumps \[s\]: half a second before errors count, so that what counts is how the vehicle settles.
+const STEP_S: f64 = 4.5;
+
+/// The flights that gains are searched with.
+///
+/// # Errors
+/// None in fact: a test flies them.
+pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
+    let to = Vector3::new(0.6, -0.4, 1.0);
+    let eight = |name, change| Flight { trajectory: eight(8.0), change, ..Flight::new(name, 15.0) };
+    let mut late = eight("late", None).scenario()?;
+    late.realism.rotors.delay_s = 0.004;
+    let mut turbulent = Flight::new("turbulence", 20.0).scenario()?;
+    turbulent.realism.drag = Some(Drag::PAPER);
+    turbulent.realism.wind.turbulence = Some(Turbulence::MODERATE);
+    Ok(vec![
+        hardware()?,
+        Flight { trajectory: step(to, 1.0), ..Flight::new("step", 12.0) }.scenario()?,
+        turbulent,
+        Flight { change: Some((Quantity::ThrustFactor, 0.6)), ..Flight::new("weak", 8.0) }.scenario()?,
+        eight("heavy", Some((Quantity::Mass, 1.3))).scenario()?,
+        late,
+        // As each gust begins, as parameters change, and on the way to somewhere else.
+        Scenario {
+            name: "outages".into(),
+            duration_s: 45.0,
+            ..blind(hardware()?, &[7.45, 14.95, 19.9, 22.45, 29.95, 37.45])
+        },
+        blind(Flight { trajectory: step(-to, -1.0), ..Flight::new("blind-step", 12.0) }.scenario()?, &[STEP_S + 0.5]),
+        landing("landing", 2.0)?,
+        upset("upset", 1.0)?,
+        course("course", 1.5)?,
+    ])
+}
+
+/// Flights that no gain has seen in its search, to tell whether it has learnt or memorised.
+///
+/// # Errors
+/// None in fact: a test flies them.
+pub fn held_out() -> Result<Vec<Scenario>, Box<dyn Error>> {
+    let fast = |name, change| Flight { trajectory: eight(6.0), change, ..Flight::new(name, 20.0) };
+    let mut delayed = fast("delayed", None).scenario()?;
+    delayed.sensing.delay_s = 0.003;
+    let mut windy = fast("wind", None).scenario()?;
+    windy.realism.drag = Some(Drag::PAPER);
+    windy.realism.wind.steady_m_s = Vector3::new(4.0, 2.0, 0.0);
+    windy.realism.wind.turbulence = Some(Turbulence::LIGHT);
+    Ok(vec![
+        Scenario { seed: 1001, ..hardware()? },
+        Flight { trajectory: step(Vector3::new(-0.4, 0.8, -0.3), 1.5), ..Flight::new("step-back", 12.0) }.scenario()?,
+        windy,
+        fast("light", Some((Quantity::Mass, 0.8))).scenario()?,
+        fast("inert", Some((Quantity::Inertia, 1.75))).scenario()?,
+        delayed,
+        blind(fast("outages", Some((Quantity::Mass, 1.15))).scenario()?, &[ONSET_S - 0.05, 8.3, 11.0, 13.7, 16.4]),
+        landing("landing-fast", 1.2)?,
+        upset("upset-back", -0.8)?,
+        course("course-back", -1.2)?,
+    ])
+}
+
+/// `scenario` on a link that goes down for 240 ms at each of these times; the flight core rides that out.
+fn blind(scenario: Scenario, starts_s: &[f64]) -> Scenario {
+    let outages = starts_s.iter().map(|&start_s| Outage { start_s, end_s: start_s + 0.24 }).collect();
+    Scenario { outages, flight_core: true, ..scenario }
+}
+
+/// Pushes of a tenth of a second or less, each as hard as `strength`: about 2 m/s, or 2 rad/s.
+fn upset(name: &'static str, strength: f64) -> Result<Scenario, Box<dyn Error>> {
+    let pushes = [
+        (Axis::Roll, 60.0, 0.03),
+        (Axis::X, 20.0, 0.1),
+        (Axis::Pitch, 60.0, 0.03),
+        (Axis::Z, 20.0, 0.1),
+        (Axis::Yaw, 20.0, 0.1),
+    ];
+    let push = |((axis, size, length_s), k): ((Axis, f64, f64), u32)| {
+        let start_s = ONSET_S + 3.0 * f64::from(k);
+        Gust { axis, kind: GustKind::Acceleration, size: size * strength, start_s, end_s: start_s + length_s }
+    };
+    let pushes = pushes.into_iter().zip(0..).map(push).collect();
+    let scenario = Flight::new(name, 20.0).scenario()?;
+    let environment = Environment::new(*scenario.environment.nominal(), Vec::new(), pushes)?;
+    Ok(Scenario { environment, ..scenario })
+}
+
+/// Corners in a wind, each turned at: from one to the next in a second.
+fn course(name: &'static str, leg_m: f64) -> Result<Scenario, Box<dyn Error>> {
+    let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)];
+    let corner = |(k, (x, y)): (u32, (f64, f64))| {
+        let (position_m, yaw_rad) = (Vector3::new(x * leg_m, y * leg_m, 3.0), f64::from(k));
+        let arrived_s = ONSET_S + 3.0 * f64::from(k);
+        [arrived_s, arrived_s + 2.0].map(|time_s| Waypoint { time_s, position_m, yaw_rad })
+    };
+    let waypoints = (0..).zip(corners).flat_map(corner).collect();
+    let mut scenario = Flight { trajectory: Trajectory::Waypoints(waypoints), ..Flight::new(name, 22.0) }.scenario()?;
+    scenario.realism.drag = Some(Drag::PAPER);
+    scenario.realism.wind.steady_m_s = Vector3::new(4.0, -2.0, 0.0);
+    scenario.realism.wind.turbulence = Some(Turbulence::LIGHT);
+    Ok(scenario)
+}
+
+/// Down to the ground within `length_s` in a breeze, 3 s on it, where the reference is a little lower still, and up again.
+fn landing(name: &'static str, length_s: f64) -> Result<Scenario, Box<dyn Error>> {
+    let at = |time_s, height_m| Waypoint { time_s, position_m: Vector3::new(0.0, 0.0, height_m), yaw_rad: 0.0 };
+    let down_s = ONSET_S + length_s;
+    let waypoints = vec![at(ONSET_S, 1.0), at(down_s, 0.05), at(down_s + 3.0, 0.05), at(down_s + 5.0, 1.0)];
+    let mut scenario = Flight { trajectory: Trajectory::Waypoints(waypoints), ..Flight::new(name, 16.0) }.scenario()?;
+    scenario.realism.contact = Some(Contact::PAPER);
+    scenario.realism.ground_effect = Some(GroundEffect::PAPER);
+    scenario.realism.drag = Some(Drag::PAPER);
+    scenario.realism.wind.turbulence = Some(Turbulence::LIGHT);
+    Ok(scenario)
+}
+
+fn hardware() -> Result<Scenario, FileError> {
+    built_in("hardware").ok_or_else(|| FileError::whole("hardware", "no such scenario"))?.scenario()
+}
+
+/// One calm flight of the hardware.
+struct Flight {
+    name: &'static str,
+    duration_s: f64,
+    trajectory: Trajectory,
+    /// What is different from the onset on, for half of what is left of the flight, and by which factor.
+    change: Option<(Quantity, f64)>,
+}
+
+impl Flight {
+    fn new(name: &'static str, duration_s: f64) -> Self {
+        let trajectory = Trajectory::Hover { position_m: Vector3::new(0.0, 0.0, 3.0), yaw_rad: 0.0 };
+        Flight { name, duration_s, trajectory, change: None }
+    }
+
+    fn scenario(self) -> Result<Scenario, Box<dyn Error>> {
+        let hardware = hardware()?;
+        let change = |(quantity, factor)| ParameterChange {
+            quantity,
+            factor,
+            start_s: ONSET_S,
+            end_s: 0.5 * (ONSET_S + self.duration_s),
+        };
+        let changes = self.change.into_iter().map(change).collect();
+        let environment = Environment::new(*hardware.environment.nominal(), changes, Vec::new())?;
+        let start = self.trajectory.at(0.0);
+        let mut initial =
+            Motion { position_m: start.position_m, velocity_m_s: start.velocity_m_s, ..Motion::default() };
+        initial.attitude_rad.z = start.yaw_rad;
+        Ok(Scenario {
+            name: self.name.into(),
+            description: String::new(),
+            duration_s: self.duration_s,
+            trajectory: self.trajectory,
+            environment,
+            initial,
+            ..hardware
+        })
+    }
+}
+
+fn step(by_m: Vector3<f64>, turn_rad: f64) -> Trajectory {
+    let from_m = Vector3::new(0.0, 0.0, 3.0);
+    Trajectory::Step { from_m, to_m: from_m + by_m, at_s: STEP_S, yaw_rad: 0.5, turn_rad }
+}
+
+/// A lying eight, once round in `period_s`.
+fn eight(period_s: f64) -> Trajectory {
+    let sine = |amplitude_m, period_s| Sine { amplitude_m, period_s, phase_rad: 0.0 };
+    let sines = [sine(1.5, period_s), sine(0.75, 0.5 * period_s), sine(0.3, period_s)];
+    Trajectory::Lissajous { centre_m: Vector3::new(0.0, 0.0, 3.0), sines, yaw_rad: 0.0 }
+}

@@ -1,0 +1,40 @@
+//! What was found, as a piece of a scenario file.
+
+use crate::cost::{costs, mean};
+use crate::flights::held_out;
+use crate::gains::fragment;
+use crate::search::Found;
+use afbc_sim::contender::Contender;
+use afbc_sim::scenario::Scenario;
+use core::fmt::Write;
+use std::error::Error;
+
+/// The contender found, as `[[contender]]` of a scenario file, and before it, as comments, what it costs in each flight
+/// and which gains are how much larger than those of `start`.
+///
+/// # Errors
+/// None in fact: both have flown before.
+pub fn report(start: &Contender, found: &Found, training: &[Scenario], seed: u64) -> Result<String, Box<dyn Error>> {
+    let Found { contender, before, after, evaluations, changes } = found;
+    let mut text = format!(
+        "# {} after {evaluations} tries with seed {seed}: cost {after:.4}, before {before:.4}\n#\n",
+        contender.kind().title()
+    );
+    text += "# flight              before     after\n";
+    for (title, flights) in [("training", training), ("held out", &held_out()?)] {
+        let (before, after) = (costs(flights, start)?, costs(flights, contender)?);
+        // Writing to a String cannot fail.
+        for (scenario, (before, after)) in flights.iter().zip(before.iter().zip(&after)) {
+            let _ = writeln!(text, "# {:<16}{before:>10.4}{after:>10.4}", scenario.name);
+        }
+        let (before, after) = (mean(&before), mean(&after));
+        let _ = writeln!(text, "# {title:<16}{before:>10.4}{after:>10.4}  mean\n#");
+    }
+    let width = changes.iter().map(|change| change.name.len()).max().unwrap_or(0);
+    for change in changes {
+        let _ = writeln!(text, "# {:<width$} {:>10} -> {}", change.name, change.from, change.to);
+    }
+    text.push('\n');
+    text += &fragment(&Contender { name: format!("{}-tuned", start.name), ..contender.clone() });
+    Ok(text)
+}
