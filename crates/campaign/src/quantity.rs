@@ -140,7 +140,7 @@ pub static QUANTITIES: [Quantity; 23] = [
     quantity("sensor_delay_s", 0.0, 0.5, "from motion to measurement", |f, x| f.scenario.sensing.delay_s = x),
     quantity("dropout_rate_hz", 0.0, 1000.0, "how often measurements stay away", |f, rate_hz| {
         let dropouts = &mut f.scenario.sensing.dropouts;
-        *dropouts = Some(Dropouts { rate_hz, ..dropouts.unwrap_or(Dropouts { rate_hz, mean_s: 0.02 }) });
+        *dropouts = Some(Dropouts { rate_hz, ..dropouts.unwrap_or_default() });
     }),
     needing(
         "dropout_rate_hz",

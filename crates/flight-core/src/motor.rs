@@ -1,36 +1,36 @@
 //! From rotor speed to throttle.
 
 use afbc::math::{max, sqrt};
-use afbc_types::{OutOfRange, Range, RotorSpeeds};
+use afbc_types::{Declared, OutOfRange, RotorSpeeds, parameters};
 
 /// Smallest throttle that turns a motor; 1 to 47 are commands, 0 stops it.
 pub const THROTTLE_MIN: u16 = 48;
 /// Full throttle.
 pub const THROTTLE_MAX: u16 = 2047;
 
-/// Accepted [`Curve::speed_max_rad_s`].
-pub const SPEED_MAX: Range = Range::new("speed_max_rad_s", 1.0, 32_768.0);
-/// Accepted [`Curve::linearity`].
-pub const LINEARITY: Range = Range::new("linearity", 0.0, 1.0);
-/// Accepted [`Curve::idle`].
-pub const IDLE: Range = Range::new("idle", 0.0, 0.3);
-
-/// The thrust curve of a motor with its controller and propeller: at throttle u in 0..1, the share of the largest
-/// thrust is
-///
-/// ```text
-/// F / F_max = (omega / omega_max)^2 = k u^2 + (1 - k) u
-/// ```
-///
-/// as in PX4's `THR_MDL_FAC`, k: 1 means that the speed follows the throttle, 0 that the thrust does.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Curve {
-    /// omega_max: speed at full throttle \[rad/s\].
-    pub speed_max_rad_s: f32,
-    /// k
-    pub linearity: f32,
-    /// Throttle, in 0..1, below which an armed motor never goes, so that it keeps turning.
-    pub idle: f32,
+parameters! {
+    /// The thrust curve of a motor with its controller and propeller: at throttle u in 0..1, the share of the largest
+    /// thrust is
+    ///
+    /// ```text
+    /// F / F_max = (omega / omega_max)^2 = k u^2 + (1 - k) u
+    /// ```
+    ///
+    /// as in PX4's `THR_MDL_FAC`, k: 1 means that the speed follows the throttle, 0 that the thrust does. By default full
+    /// throttle gives 1000 rad/s, of which the paper's vehicle needs 200 to hover; to be measured for the vehicle at hand.
+    /// Not in the paper.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Curve {
+        /// omega_max: speed at full throttle.
+        #[parameter(SPEED_MAX, "rad/s", 1.0..=32_768.0)]
+        pub speed_max_rad_s: f32 = 1000.0,
+        /// k: whether the speed (1) or the thrust (0) follows the throttle, or something in between.
+        #[parameter(LINEARITY, "1", 0.0..=1.0)]
+        pub linearity: f32 = 1.0,
+        /// Throttle below which an armed motor never goes, so that it keeps turning.
+        #[parameter(IDLE, "1", 0.0..=0.3)]
+        pub idle: f32 = 0.05,
+    }
 }
 
 /// A motor whose curve is valid.
@@ -56,9 +56,7 @@ impl Motor {
     /// # Errors
     /// The first value out of range.
     pub fn new(curve: Curve) -> Result<Self, OutOfRange> {
-        SPEED_MAX.check(curve.speed_max_rad_s)?;
-        LINEARITY.check(curve.linearity)?;
-        IDLE.check(curve.idle)?;
+        curve.validate()?;
         Ok(Motor { curve, idle: steps(curve.idle), inverse_speed_max: 1.0 / curve.speed_max_rad_s })
     }
 

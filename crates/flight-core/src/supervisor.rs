@@ -1,7 +1,7 @@
 //! Arming and failsafe: the five things that may be asked for, the four modes, and what leads from one to another.
 
 use afbc::math::abs_max;
-use afbc_types::{OutOfRange, Range, Setpoint, State};
+use afbc_types::{Setpoint, State, parameters};
 
 /// Older than this, a state is stale and the law may not fly on it \[us\].
 pub const RIDE_US: u64 = 20_000;
@@ -141,54 +141,33 @@ pub enum End {
     Tumbled = 5,
 }
 
-/// How far from its setpoint, how tilted and how restless a vehicle may be when it is armed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ArmingLimits {
-    /// Largest roll and largest pitch, each \[rad\].
-    pub tilt_max_rad: f32,
-    /// Largest distance between setpoint and position \[m\].
-    pub setpoint_distance_max_m: f32,
-    /// Largest speed of a vehicle at rest \[m/s\].
-    pub speed_max_m_s: f32,
-    /// Largest angular rate of a vehicle at rest, about any axis \[rad/s\].
-    pub rate_max_rad_s: f32,
-}
-
-/// Accepted [`ArmingLimits::tilt_max_rad`].
-pub const TILT_MAX: Range = Range::new("tilt_max_rad", 0.01, 0.8);
-/// Accepted [`ArmingLimits::setpoint_distance_max_m`].
-pub const SETPOINT_DISTANCE_MAX: Range = Range::new("setpoint_distance_max_m", 0.01, 100.0);
-/// Accepted [`ArmingLimits::speed_max_m_s`].
-pub const SPEED_MAX: Range = Range::new("speed_max_m_s", 0.01, 2000.0);
-/// Accepted [`ArmingLimits::rate_max_rad_s`].
-pub const RATE_MAX: Range = Range::new("rate_max_rad_s", 0.01, 2000.0);
-
-impl Default for ArmingLimits {
-    /// 15 degrees, 2 m, 0.5 m/s and 0.5 rad/s. Ours.
-    fn default() -> Self {
-        ArmingLimits { tilt_max_rad: 0.26, setpoint_distance_max_m: 2.0, speed_max_m_s: 0.5, rate_max_rad_s: 0.5 }
+parameters! {
+    /// How far from its setpoint, how tilted and how restless a vehicle may be when it is armed. Not in the paper.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct ArmingLimits {
+        /// Largest roll and largest pitch, each: 15 degrees.
+        #[parameter(TILT_MAX, "rad", 0.01..=0.8)]
+        pub tilt_max_rad: f32 = 0.26,
+        /// Largest distance between setpoint and position.
+        #[parameter(DIST_MAX, "m", 0.01..=100.0)]
+        pub setpoint_distance_max_m: f32 = 2.0,
+        /// Largest speed of a vehicle at rest.
+        #[parameter(SPEED_MAX, "m/s", 0.01..=2000.0)]
+        pub speed_max_m_s: f32 = 0.5,
+        /// Largest angular rate of a vehicle at rest, about any axis.
+        #[parameter(RATE_MAX, "rad/s", 0.01..=2000.0)]
+        pub rate_max_rad_s: f32 = 0.5,
     }
 }
 
 impl ArmingLimits {
     /// No limit but that of what is plausible, for a simulated vehicle that is held until it flies.
     pub const NONE: Self = ArmingLimits {
-        tilt_max_rad: TILT_MAX.max as f32,
-        setpoint_distance_max_m: SETPOINT_DISTANCE_MAX.max as f32,
-        speed_max_m_s: SPEED_MAX.max as f32,
-        rate_max_rad_s: RATE_MAX.max as f32,
+        tilt_max_rad: Self::TILT_MAX.range.max as f32,
+        setpoint_distance_max_m: Self::DIST_MAX.range.max as f32,
+        speed_max_m_s: Self::SPEED_MAX.range.max as f32,
+        rate_max_rad_s: Self::RATE_MAX.range.max as f32,
     };
-
-    /// Checks every limit.
-    ///
-    /// # Errors
-    /// The first one out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        TILT_MAX.check(self.tilt_max_rad)?;
-        SETPOINT_DISTANCE_MAX.check(self.setpoint_distance_max_m)?;
-        SPEED_MAX.check(self.speed_max_m_s)?;
-        RATE_MAX.check(self.rate_max_rad_s)
-    }
 
     /// True if a vehicle in this state neither moves nor turns.
     pub fn at_rest(&self, state: &State) -> bool {

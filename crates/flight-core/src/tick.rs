@@ -10,7 +10,7 @@ use crate::tumble::Tumble;
 use crate::witness::Witness;
 use afbc::allocation::Mixer;
 use afbc::{Command, FlightController, Settings};
-use afbc_types::{Inputs, OutOfRange, Parameters, Range, RotorSpeeds, Setpoint, State};
+use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Range, RotorSpeeds, Setpoint, State};
 
 /// Accepted time between steps of a law that flies: the tick's \[s\].
 pub const DT: Range = Range::new("dt_s", 0.001, 0.001);

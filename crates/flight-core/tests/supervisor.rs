@@ -2,7 +2,7 @@
 
 use afbc_flight_core::supervisor::{DESCEND_US, GIVE_UP_US, Observed, REST_US, RIDE_US, STEADY_US, Standing};
 use afbc_flight_core::{ArmingLimits, End, Mode, Refusal, Request};
-use afbc_types::{Setpoint, State};
+use afbc_types::{Declared, Setpoint, State};
 use nalgebra::Vector3;
 
 const MODES: [Mode; 4] = [Mode::Disarmed, Mode::Flying, Mode::Riding, Mode::Descending];

@@ -6,10 +6,6 @@ use afbc_flight_core::motor::Curve;
 use afbc_flight_core::{Answer, ArmingLimits, End, Health, Inbox, Memory, Mode, Motor, Vehicle};
 use afbc_types::{Axis, OutOfRange, Parameters, RotorSpeeds};
 
-/// Motor, controller and propeller: 1000 rad/s at full throttle, of which the paper's vehicle needs 200 to hover. Ours;
-/// to be measured for the vehicle at hand.
-const MOTOR: Curve = Curve { speed_max_rad_s: 1000.0, linearity: 1.0, idle: 0.05 };
-
 /// The vehicle of the paper, under its law in the profile `flight`.
 #[derive(Clone, Debug)]
 pub struct Flight {
@@ -55,7 +51,7 @@ impl Flight {
         Ok(Flight {
             vehicle: Vehicle::new(airframe, settings, ArmingLimits::default(), controller)?,
             memory: Memory::default(),
-            motor: Motor::new(MOTOR)?,
+            motor: Motor::new(Curve::DEFAULT)?,
             saturated_ticks: 0,
         })
     }

@@ -1,29 +1,41 @@
 //! A battery that sags under load and runs down.
 
-use afbc_types::{OutOfRange, Range};
+use afbc_types::{Range, parameters};
 use libm::sqrt;
 
-/// The Rint model, an open-circuit voltage behind a resistance (He, Xiong, Fan 2011, *Evaluation of lithium-ion battery
-/// equivalent circuit models for state of charge estimation by an experimental approach*, Energies 4), its open-circuit
-/// voltage falling linearly with the charge drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Battery {
-    /// Open-circuit voltage when full; the voltage at which the rotors reach their full speed \[V\].
-    pub full_v: f64,
-    /// Open-circuit voltage when empty \[V\].
-    pub empty_v: f64,
-    /// Internal resistance \[ohm\].
-    pub resistance_ohm: f64,
-    /// Charge when full \[A h\].
-    pub capacity_a_h: f64,
-    /// Share of the capacity that is left at the start.
-    pub initial_charge: f64,
-    /// Mechanical power of the rotors over electrical power: speed controller and motor together.
-    pub efficiency: f64,
-    /// What avionics and payload draw \[W\].
-    pub avionics_w: f64,
-    /// What a lower voltage does.
-    pub effect: Sag,
+parameters! {
+    /// The Rint model, an open-circuit voltage behind a resistance (He, Xiong, Fan 2011, *Evaluation of lithium-ion battery
+    /// equivalent circuit models for state of charge estimation by an experimental approach*, Energies 4), its open-circuit
+    /// voltage falling linearly with the charge drawn.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Battery {
+        /// Open-circuit voltage when full; the voltage at which the rotors reach their full speed.
+        #[parameter(FULL, "V", 1.0..=1000.0)]
+        pub full_v: f64 = 12.6,
+        /// Open-circuit voltage when empty, no more than when full.
+        #[parameter(EMPTY, "V", 0.1..=1000.0)]
+        pub empty_v: f64 = 9.9,
+        /// Internal resistance.
+        #[parameter(RESISTANCE, "ohm", 0.0..=10.0)]
+        pub resistance_ohm: f64 = 0.06,
+        /// Charge when full.
+        #[parameter(CAPACITY, "A h", 0.001..=1000.0)]
+        pub capacity_a_h: f64 = 1.5,
+        /// Share of the capacity that is left at the start.
+        #[parameter(CHARGE, "1", 0.0..=1.0)]
+        pub initial_charge: f64 = 1.0,
+        /// Mechanical power of the rotors over electrical power: speed controller and motor together.
+        #[parameter(EFFICIENCY, "1", 0.05..=1.0)]
+        pub efficiency: f64 = 0.5,
+        /// Power that avionics and payload draw.
+        #[parameter(AVIONICS, "W", 0.0..=10_000.0)]
+        pub avionics_w: f64 = 3.0,
+        /// What a lower voltage does.
+        pub effect: Sag = Sag::Ceiling,
+    }
+    together(battery) {
+        Range { max: battery.full_v, ..Battery::EMPTY.range }.check(battery.empty_v)
+    }
 }
 
 /// What a lower voltage does to the rotors, each in proportion to voltage over full voltage.
@@ -35,44 +47,9 @@ pub enum Sag {
     Speed,
 }
 
-/// Accepted range of each setting.
-#[expect(missing_docs, reason = "named after the field that each bounds")]
-pub mod limits {
-    use afbc_types::Range;
-    pub const FULL: Range = Range::new("full_v", 1.0, 1000.0);
-    pub const RESISTANCE: Range = Range::new("resistance_ohm", 0.0, 10.0);
-    pub const CAPACITY: Range = Range::new("capacity_a_h", 0.001, 1000.0);
-    pub const INITIAL_CHARGE: Range = Range::new("initial_charge", 0.0, 1.0);
-    pub const EFFICIENCY: Range = Range::new("efficiency", 0.05, 1.0);
-    pub const AVIONICS: Range = Range::new("avionics_w", 0.0, 10_000.0);
-}
-
 impl Battery {
     /// Three lithium-polymer cells of 1.5 A h, enough for about a quarter of an hour of the paper's vehicle.
-    pub const THREE_CELLS: Self = Battery {
-        full_v: 12.6,
-        empty_v: 9.9,
-        resistance_ohm: 0.06,
-        capacity_a_h: 1.5,
-        initial_charge: 1.0,
-        efficiency: 0.5,
-        avionics_w: 3.0,
-        effect: Sag::Ceiling,
-    };
-
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// The first one out of range, by name; an empty battery may have no more voltage than a full one.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        limits::FULL.check(self.full_v)?;
-        Range::new("empty_v", 0.1, self.full_v).check(self.empty_v)?;
-        limits::RESISTANCE.check(self.resistance_ohm)?;
-        limits::CAPACITY.check(self.capacity_a_h)?;
-        limits::INITIAL_CHARGE.check(self.initial_charge)?;
-        limits::EFFICIENCY.check(self.efficiency)?;
-        limits::AVIONICS.check(self.avionics_w)
-    }
+    pub const THREE_CELLS: Self = Self::DEFAULT;
 }
 
 /// What a battery is doing.

@@ -1,43 +1,41 @@
 //! Ground to stand on, and to fall on.
 
 use crate::body_axes::BodyAxes;
-use afbc_types::{OutOfRange, Parameters, Range};
+use afbc_types::{Declared, OutOfRange, Parameters, Range, parameters};
 use libm::sqrt;
 use nalgebra::Vector3;
 
-/// The ground, the plane z = 0, under four feet below the arms and under the four rotors, for landings upside down.
-///
-/// Each of these points is a spring and a damper that push and never pull, N = max(0, -k z - c dz/dt): the linear model in
-/// D. W. Marhefka, D. E. Orin 1999, *A compliant contact model with nonlinear damping for simulation of robotic systems*,
-/// IEEE Trans. SMC-A 29(6). Friction works against slip, viscous with the damper's c up to Coulomb's mu N, which keeps the
-/// integration stable but lets a steady push creep: 10 mm/s under 0.3 N on the paper's vehicle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contact {
-    /// How far the vehicle at rest sinks into its feet's springs; sets k \[m\].
-    pub sink_m: f64,
-    /// Of the vehicle bouncing on its feet; sets c. 1 does not bounce.
-    pub damping_ratio: f64,
-    /// mu.
-    pub friction: f64,
-    /// From the body's z axis to each foot \[m\].
-    pub foot_radius_m: f64,
-    /// Feet below the centre of mass \[m\].
-    pub foot_depth_m: f64,
-    /// Rotors above the centre of mass \[m\].
-    pub rotor_height_m: f64,
-}
-
-/// Accepted range of each setting. The smallest sink, and the largest damping, further depend on the vehicle and the step,
-/// so that the integration stays stable.
-#[expect(missing_docs, reason = "named after the field that each bounds")]
-pub mod limits {
-    use afbc_types::Range;
-    pub const SINK: Range = Range::new("sink_m", 1e-5, 0.5);
-    pub const DAMPING_RATIO: Range = Range::new("damping_ratio", 0.05, 5.0);
-    pub const FRICTION: Range = Range::new("friction", 0.0, 3.0);
-    pub const FOOT_RADIUS: Range = Range::new("foot_radius_m", 0.0, 10.0);
-    pub const FOOT_DEPTH: Range = Range::new("foot_depth_m", 0.001, 10.0);
-    pub const ROTOR_HEIGHT: Range = Range::new("rotor_height_m", 0.0, 10.0);
+parameters! {
+    /// The ground, the plane z = 0, under four feet below the arms and under the four rotors, for landings upside down.
+    ///
+    /// Each of these points is a spring and a damper that push and never pull, N = max(0, -k z - c dz/dt): the linear model
+    /// in D. W. Marhefka, D. E. Orin 1999, *A compliant contact model with nonlinear damping for simulation of robotic
+    /// systems*, IEEE Trans. SMC-A 29(6). Friction works against slip, viscous with the damper's c up to Coulomb's mu N,
+    /// which keeps the integration stable but lets a steady push creep: 10 mm/s under 0.3 N on the paper's vehicle.
+    ///
+    /// The smallest sink, and the largest damping, further depend on the vehicle and the step, so that the integration
+    /// stays stable ([`Contact::validate_for`]).
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Contact {
+        /// How far the vehicle at rest sinks into its feet's springs; sets k.
+        #[parameter(SINK, "m", 1e-5..=0.5)]
+        pub sink_m: f64 = 0.005,
+        /// Damping ratio of the vehicle bouncing on its feet; sets c. 1 does not bounce.
+        #[parameter(DAMPING, "1", 0.05..=5.0)]
+        pub damping_ratio: f64 = 0.7,
+        /// mu: coefficient of friction.
+        #[parameter(FRICTION, "1", 0.0..=3.0)]
+        pub friction: f64 = 0.6,
+        /// Distance of each foot from the body's z axis.
+        #[parameter(FOOT_RAD, "m", 0.0..=10.0)]
+        pub foot_radius_m: f64 = 0.12,
+        /// Depth of the feet below the centre of mass.
+        #[parameter(FOOT_DEPTH, "m", 0.001..=10.0)]
+        pub foot_depth_m: f64 = 0.08,
+        /// Height of the rotors above the centre of mass.
+        #[parameter(ROT_HEIGHT, "m", 0.0..=10.0)]
+        pub rotor_height_m: f64 = 0.02,
+    }
 }
 
 /// Largest (natural frequency times step)^2 of the stiffest motion, and largest damping rate times step. The Runge-Kutta
@@ -47,35 +45,23 @@ const DAMPING_PER_STEP_MAX: f64 = 1.4;
 
 impl Contact {
     /// A guess for the paper's vehicle.
-    pub const PAPER: Self = Contact {
-        sink_m: 0.005,
-        damping_ratio: 0.7,
-        friction: 0.6,
-        foot_radius_m: 0.12,
-        foot_depth_m: 0.08,
-        rotor_height_m: 0.02,
-    };
+    pub const PAPER: Self = Self::DEFAULT;
 
-    /// Checks every setting.
+    /// Checks every parameter, for this vehicle and step.
     ///
     /// # Errors
     /// The first one out of range, by name.
-    pub fn validate(&self, vehicle: &Parameters<f64>, step_s: f64) -> Result<(), OutOfRange> {
-        limits::SINK.check(self.sink_m)?;
-        limits::DAMPING_RATIO.check(self.damping_ratio)?;
-        limits::FRICTION.check(self.friction)?;
-        limits::FOOT_RADIUS.check(self.foot_radius_m)?;
-        limits::FOOT_DEPTH.check(self.foot_depth_m)?;
-        limits::ROTOR_HEIGHT.check(self.rotor_height_m)?;
+    pub fn validate_for(&self, vehicle: &Parameters<f64>, step_s: f64) -> Result<(), OutOfRange> {
+        self.validate()?;
         // How fast a unit of force moves its own point at worst, all four feet at the longest lever.
         let lever_m = self.ground(vehicle).reach_m;
         let compliance = 1.0 / vehicle.mass_kg + lever_m * lever_m / vehicle.inertia_kg_m2.min();
         let weight_n = vehicle.mass_kg * vehicle.gravity_m_s2;
         let softest = weight_n * compliance * step_s * step_s / STIFFNESS_PER_STEP_MAX;
-        Range { min: softest, ..limits::SINK }.check(self.sink_m)?;
+        Range { min: softest, ..Self::SINK.range }.check(self.sink_m)?;
         let per_ratio =
             4.0 * Contact { damping_ratio: 1.0, ..*self }.ground(vehicle).damping_n_s_m * compliance * step_s;
-        Range { max: DAMPING_PER_STEP_MAX / per_ratio, ..limits::DAMPING_RATIO }.check(self.damping_ratio)
+        Range { max: DAMPING_PER_STEP_MAX / per_ratio, ..Self::DAMPING.range }.check(self.damping_ratio)
     }
 
     /// The ground as this vehicle meets it.

@@ -1,80 +1,67 @@
 //! What the air does to a vehicle that moves through it: the paper's A_i = 1/2 rho C_i W^2 made concrete.
 
-use afbc_types::{OutOfRange, Parameters, Range};
+use afbc_types::{Declared, OutOfRange, Parameters, Range, parameters};
 use libm::sqrt;
 use nalgebra::{Vector3, Vector4};
 
-/// Drag of blades and body by the airspeed W = velocity - wind, in body axes.
-///
-/// * **Blades**: rotor i is held back in its plane by k omega_i (W + Omega x r_i), with k = `blade_n_s2_m`, its own speed
-///   omega_i and the airspeed of its own hub at r_i, where that force acts: k sum(omega_i) W and, as the hubs circle the
-///   centre of mass, damping of yaw at 4 k omega l^2/Iz; rotors of unequal speed in wind give a yaw moment. Linear,
-///   and at hovering speeds the larger part. P. Martin, E. Salaun 2010, *The true role of accelerometer feedback in
-///   quadrotor control*, ICRA; M. Faessler, A. Franchi, D. Scaramuzza 2018, *Differential flatness of quadrotor
-///   dynamics subject to rotor drag*, RA-L 3(2), whose mass-normalised 0.2 to 0.6 1/s is this factor times the sum of
-///   the rotor speeds over the mass.
-/// * **Body**: -1/2 rho C_i S_i |W| W_i along each body axis, which is the paper's A_i where the air flows along that axis.
-///   How the body turns does not matter to it.
-///
-/// Wind acts through drag alone.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drag {
-    /// rho \[kg/m3\].
-    pub air_density_kg_m3: f64,
-    /// Force per rotor speed and airspeed \[N s2/m\].
-    pub blade_n_s2_m: f64,
-    /// Rotor plane above the centre of mass, where the blades' force acts \[m\].
-    pub rotor_height_m: f64,
-    /// C_i S_i along each body axis \[m2\].
-    pub area_m2: Vector3<f64>,
-    /// Where the body's force acts, from the centre of mass, body frame \[m\].
-    pub centre_m: Vector3<f64>,
+parameters! {
+    /// Drag of blades and body by the airspeed W = velocity - wind, in body axes.
+    ///
+    /// * **Blades**: rotor i is held back in its plane by k omega_i (W + Omega x r_i), with k = `blade_n_s2_m`, its own
+    ///   speed omega_i and the airspeed of its own hub at r_i, where that force acts: k sum(omega_i) W and, as the hubs
+    ///   circle the centre of mass, damping of yaw at 4 k omega l^2/Iz; rotors of unequal speed in wind give a yaw moment.
+    ///   Linear, and at hovering speeds the larger part. P. Martin, E. Salaun 2010, *The true role of accelerometer
+    ///   feedback in quadrotor control*, ICRA; M. Faessler, A. Franchi, D. Scaramuzza 2018, *Differential flatness of
+    ///   quadrotor dynamics subject to rotor drag*, RA-L 3(2), whose mass-normalised 0.2 to 0.6 1/s is this factor times the
+    ///   sum of the rotor speeds over the mass.
+    /// * **Body**: -1/2 rho C_i S_i |W| W_i along each body axis, which is the paper's A_i where the air flows along that
+    ///   axis. How the body turns does not matter to it.
+    ///
+    /// Wind acts through drag alone. The largest blade factor and area further depend on the vehicle and the step, so that
+    /// the integration stays stable up to [`AIRSPEED_M_S`] ([`Drag::validate_for`]).
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Drag {
+        /// rho: density of the air.
+        #[parameter(DENSITY, "kg/m3", 0.0..=5.0)]
+        pub air_density_kg_m3: f64 = 1.225,
+        /// Force of one rotor's blades per rotor speed and airspeed.
+        #[parameter(BLADE, "N s2/m", 0.0..=1.0)]
+        pub blade_n_s2_m: f64 = 2.4e-4,
+        /// Rotor plane above the centre of mass, where the blades' force acts.
+        #[parameter(ROT_HEIGHT, "m", -1.0..=1.0)]
+        pub rotor_height_m: f64 = 0.02,
+        /// C_i S_i: drag area along each body axis.
+        #[parameter(AREA, "m2", 0.0..=100.0)]
+        pub area_m2: Vector3<f64> = Vector3::new(0.01, 0.01, 0.02),
+        /// Where the body's force acts, from the centre of mass, body frame.
+        #[parameter(CENTRE, "m", -1.0..=1.0)]
+        pub centre_m: Vector3<f64> = Vector3::new(0.0, 0.0, 0.01),
+    }
 }
 
-/// Accepted range of each setting. Largest blade factor and area further depend on the vehicle and the step, so that the
-/// integration stays stable up to [`AIRSPEED_M_S`](limits::AIRSPEED_M_S).
-#[expect(missing_docs, reason = "named after the field that each bounds")]
-pub mod limits {
-    use afbc_types::Range;
-    pub const AIR_DENSITY: Range = Range::new("air_density_kg_m3", 0.0, 5.0);
-    pub const BLADE: Range = Range::new("blade_n_s2_m", 0.0, 1.0);
-    pub const ROTOR_HEIGHT: Range = Range::new("rotor_height_m", -1.0, 1.0);
-    pub const AREA: Range = Range::new("area_m2", 0.0, 100.0);
-    pub const CENTRE: Range = Range::new("centre_m", -1.0, 1.0);
-    /// Airspeed up to which drag is integrated stably \[m/s\].
-    pub const AIRSPEED_M_S: f64 = 100.0;
-}
+/// Airspeed up to which drag is integrated stably \[m/s\].
+pub const AIRSPEED_M_S: f64 = 100.0;
 
 /// Largest product of a drag's rate and the step; the Runge-Kutta method is stable to 2.78.
 const RATE_PER_STEP_MAX: f64 = 0.5;
 
 impl Drag {
     /// A guess for the paper's vehicle: blades at 0.4 1/s in hover, a body of about 0.1 m by 0.1 m.
-    pub const PAPER: Self = Drag {
-        air_density_kg_m3: 1.225,
-        blade_n_s2_m: 2.4e-4,
-        rotor_height_m: 0.02,
-        area_m2: Vector3::new(0.01, 0.01, 0.02),
-        centre_m: Vector3::new(0.0, 0.0, 0.01),
-    };
+    pub const PAPER: Self = Self::DEFAULT;
 
-    /// Checks every setting, for a vehicle whose rotors turn at most at `max_rad_s`.
+    /// Checks every parameter, for a vehicle whose rotors turn at most at `max_rad_s` and this step.
     ///
     /// # Errors
     /// The first one out of range, by name.
-    pub fn validate(&self, vehicle: &Parameters<f64>, max_rad_s: f64, step_s: f64) -> Result<(), OutOfRange> {
-        limits::AIR_DENSITY.check(self.air_density_kg_m3)?;
-        limits::BLADE.check(self.blade_n_s2_m)?;
-        limits::ROTOR_HEIGHT.check(self.rotor_height_m)?;
-        self.area_m2.iter().try_for_each(|&area| limits::AREA.check(area))?;
-        self.centre_m.iter().try_for_each(|&place| limits::CENTRE.check(place))?;
+    pub fn validate_for(&self, vehicle: &Parameters<f64>, max_rad_s: f64, step_s: f64) -> Result<(), OutOfRange> {
+        self.validate()?;
         // What a force in the rotor plane does to the velocity of its hub, at most: it pushes, tilts and turns the vehicle.
         let Parameters { mass_kg, arm_m, inertia_kg_m2: i, .. } = vehicle;
         let (height_m, rate_max) = (self.rotor_height_m, RATE_PER_STEP_MAX / step_s);
         let hub_per_kg = 1.0 / mass_kg + height_m * height_m / i.x.min(i.y) + arm_m * arm_m / i.z;
-        Range { max: rate_max / (4.0 * max_rad_s * hub_per_kg), ..limits::BLADE }.check(self.blade_n_s2_m)?;
-        let per_area = self.air_density_kg_m3 * limits::AIRSPEED_M_S;
-        Range { max: rate_max * mass_kg / per_area, ..limits::AREA }.check(self.area_m2.max())
+        Range { max: rate_max / (4.0 * max_rad_s * hub_per_kg), ..Self::BLADE.range }.check(self.blade_n_s2_m)?;
+        let per_area = self.air_density_kg_m3 * AIRSPEED_M_S;
+        Range { max: rate_max * mass_kg / per_area, ..Self::AREA.range }.check(self.area_m2.max())
     }
 
     /// Drag over one step of a vehicle with arms of `arm_m`, its rotors turning at `speeds_rad_s`.

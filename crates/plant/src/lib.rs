@@ -49,7 +49,6 @@ pub mod wind;
 
 pub use battery::{Battery, Charge, Sag};
 pub use contact::Contact;
-pub use delay::DELAY;
 pub use drag::Drag;
 pub use environment::{
     Environment, GUST_SIZE, Gust, GustKind, PAYLOAD_BELOW, PAYLOAD_MASS, ParameterChange, Payload, Quantity, START,

@@ -10,7 +10,7 @@ use crate::rotors::{Rotors, Spin};
 use crate::surroundings::Surroundings;
 use crate::vehicle::Load;
 use crate::wind::{Weather, Wind};
-use afbc_types::{OutOfRange, Parameters, Range, RotorSpeeds};
+use afbc_types::{Declared, OutOfRange, Parameters, Range, RotorSpeeds};
 use nalgebra::{Vector3, Vector4};
 
 /// Accepted range of a step \[s\].
@@ -100,10 +100,10 @@ impl Effects {
         let spin = Spin::new(rotors.clone(), vehicle, step_s)?;
         let weather = Weather::new(wind.clone(), *seed, step_s)?;
         if let Some(drag) = drag {
-            drag.validate(vehicle, rotors.max_rad_s, step_s)?;
+            drag.validate_for(vehicle, rotors.max_rad_s, step_s)?;
         }
         if let Some(contact) = contact {
-            contact.validate(vehicle, step_s)?;
+            contact.validate_for(vehicle, step_s)?;
         }
         if let Some(ground_effect) = ground_effect {
             ground_effect.validate()?;

@@ -2,30 +2,42 @@
 
 use crate::battery::{Battery, Charge, Discharge, Sag};
 use crate::delay::{DelayLine, whole_steps};
-use afbc_types::{OutOfRange, Parameters, Range};
+use afbc_types::{Declared, OutOfRange, Parameters, Range, parameters};
 use alloc::vec::Vec;
 use libm::{exp, sqrt};
 use nalgebra::Vector4;
 
-/// Between the commanded rotor speeds and thrust. The default is ideal: speeds are what is commanded, at once.
-///
-/// The order is that of the hardware: a command is delayed, scaled by the battery's voltage, limited, followed with a lag.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Rotors {
-    /// Time constant of d omega/dt = (commanded - omega)/tau; 0 for none \[s\].
-    pub time_constant_s: f64,
-    /// Smallest speed: idling \[rad/s\].
-    pub min_rad_s: f64,
-    /// Largest speed \[rad/s\].
-    pub max_rad_s: f64,
-    /// From command to the speed controllers, rounded to whole steps \[s\].
-    pub delay_s: f64,
-    /// What turns before the first command arrives.
-    pub start: Start,
-    /// Rotors that lose thrust.
-    pub faults: Vec<RotorFault>,
-    /// What the rotors hang on; without one, the voltage is always full.
-    pub battery: Option<Battery>,
+parameters! {
+    /// Between the commanded rotor speeds and thrust. The default is ideal: speeds are what is commanded, at once.
+    ///
+    /// The order is that of the hardware: a command is delayed, scaled by the battery's voltage, limited, followed with a
+    /// lag.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Rotors {
+        /// Time constant of d omega/dt = (commanded - omega)/tau; 0 for none.
+        #[parameter(LAG, "s", 0.0..=1.0)]
+        pub time_constant_s: f64 = 0.0,
+        /// Time from command to the speed controllers, rounded to whole steps.
+        #[parameter(DELAY, "s", 0.0..=0.5)]
+        pub delay_s: f64 = 0.0,
+        /// Smallest speed, at which rotors idle, no more than the largest.
+        #[parameter(MIN, "rad/s", 0.0..=10_000.0)]
+        pub min_rad_s: f64 = 0.0,
+        /// Largest speed.
+        #[parameter(MAX, "rad/s", 1.0..=10_000.0)]
+        pub max_rad_s: f64 = 10_000.0,
+        /// What turns before the first command arrives.
+        pub start: Start = Start::Hover,
+        /// Rotors that lose thrust.
+        pub faults: Vec<RotorFault> = Vec::new(),
+        /// What the rotors hang on; without one, the voltage is always full.
+        pub battery: Option<Battery> = None,
+    }
+    together(rotors) {
+        Range { max: rotors.max_rad_s, ..Rotors::MIN.range }.check(rotors.min_rad_s)?;
+        rotors.faults.iter().try_for_each(RotorFault::validate)?;
+        rotors.battery.map_or(Ok(()), |battery| battery.validate())
+    }
 }
 
 /// What the rotors do, and were commanded to do, before the first command arrives.
@@ -48,49 +60,26 @@ pub struct RotorFault {
     pub start_s: f64,
 }
 
-/// Accepted range of each setting.
+/// Accepted range of what makes a fault.
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod limits {
     use afbc_types::Range;
-    pub const TIME_CONSTANT: Range = Range::new("time_constant_s", 0.0, 1.0);
-    pub const MAX: Range = Range::new("max_rad_s", 1.0, 10_000.0);
     pub const ROTOR: Range = Range::new("rotor", 1.0, 4.0);
     pub const EFFICIENCY: Range = Range::new("efficiency", 0.0, 1.0);
     pub const START: Range = Range::new("start_s", 0.0, f64::INFINITY);
 }
 
-impl Default for Rotors {
-    fn default() -> Self {
-        Rotors {
-            time_constant_s: 0.0,
-            min_rad_s: 0.0,
-            max_rad_s: limits::MAX.max,
-            delay_s: 0.0,
-            start: Start::Hover,
-            faults: Vec::new(),
-            battery: None,
-        }
+impl RotorFault {
+    /// # Errors
+    /// The first number out of range, by name.
+    fn validate(&self) -> Result<(), OutOfRange> {
+        limits::ROTOR.check(self.rotor)?;
+        limits::EFFICIENCY.check(self.efficiency)?;
+        limits::START.check(self.start_s)
     }
 }
 
 impl Rotors {
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// The first one out of range, by name; the smallest speed may not exceed the largest.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        limits::TIME_CONSTANT.check(self.time_constant_s)?;
-        limits::MAX.check(self.max_rad_s)?;
-        Range::new("min_rad_s", 0.0, self.max_rad_s).check(self.min_rad_s)?;
-        crate::delay::DELAY.check(self.delay_s)?;
-        for fault in &self.faults {
-            limits::ROTOR.check(fault.rotor)?;
-            limits::EFFICIENCY.check(fault.efficiency)?;
-            limits::START.check(fault.start_s)?;
-        }
-        self.battery.map_or(Ok(()), |battery| battery.validate())
-    }
-
     /// Share of its thrust that each rotor gives at time `t` \[s\], and when that next changes.
     fn efficiency(&self, t: f64) -> (Vector4<f64>, f64) {
         let (mut efficiency, mut until_s) = (Vector4::repeat(1.0), f64::INFINITY);
@@ -135,7 +124,7 @@ impl Spin {
     /// Rotors that do what [`Start`] says on a vehicle with these parameters.
     ///
     /// # Errors
-    /// As [`Rotors::validate`].
+    /// The first parameter out of range.
     pub(crate) fn new(rotors: Rotors, vehicle: &Parameters<f64>, step_s: f64) -> Result<Self, OutOfRange> {
         rotors.validate()?;
         let start_rad_s = match rotors.start {
@@ -146,7 +135,7 @@ impl Spin {
         };
         let (efficiency, efficiency_until_s) = rotors.efficiency(0.0);
         Ok(Spin {
-            commands: DelayLine::new(whole_steps(rotors.delay_s, step_s)?, Vector4::repeat(start_rad_s as f32)),
+            commands: DelayLine::new(whole_steps(rotors.delay_s, step_s), Vector4::repeat(start_rad_s as f32)),
             // At tau = 0 this is exp(-infinity) = 0: no lag.
             half_step: exp(-0.5 * step_s / rotors.time_constant_s),
             speeds_rad_s: Vector4::repeat(start_rad_s),

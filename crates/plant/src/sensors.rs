@@ -3,34 +3,33 @@
 use crate::delay::{DelayLine, whole_steps};
 use crate::motion::Motion;
 use crate::noise::{Noise, Stream};
-use afbc_types::{OutOfRange, State};
+use afbc_types::{Declared, OutOfRange, State, parameters};
 use libm::exp;
 use nalgebra::Vector3;
 
-/// One number for each group of the state, the same for its three coordinates.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spread {
-    /// \[m\]
-    pub position_m: f64,
-    /// \[m/s\]
-    pub velocity_m_s: f64,
-    /// \[rad\]
-    pub attitude_rad: f64,
-    /// \[rad/s\]
-    pub rates_rad_s: f64,
+parameters! {
+    /// One number for each group of the state, the same for its three coordinates.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Spread {
+        /// Standard deviation of the position, per coordinate.
+        #[parameter(POS, "m", 0.0..=100.0)]
+        pub position_m: f64 = 0.0,
+        /// Standard deviation of the velocity, per coordinate.
+        #[parameter(VEL, "m/s", 0.0..=100.0)]
+        pub velocity_m_s: f64 = 0.0,
+        /// Standard deviation of roll, pitch and yaw.
+        #[parameter(ATT, "rad", 0.0..=1.0)]
+        pub attitude_rad: f64 = 0.0,
+        /// Standard deviation of the angular rates, per axis.
+        #[parameter(RATE, "rad/s", 0.0..=10.0)]
+        pub rates_rad_s: f64 = 0.0,
+    }
 }
 
 impl Spread {
     /// The same number for every group, each in its own unit.
     pub const fn all(size: f64) -> Self {
         Spread { position_m: size, velocity_m_s: size, attitude_rad: size, rates_rad_s: size }
-    }
-
-    fn validate(&self) -> Result<(), OutOfRange> {
-        limits::POSITION.check(self.position_m)?;
-        limits::VELOCITY.check(self.velocity_m_s)?;
-        limits::ATTITUDE.check(self.attitude_rad)?;
-        limits::RATES.check(self.rates_rad_s)
     }
 
     /// Normal numbers of these standard deviations.
@@ -46,53 +45,38 @@ impl Spread {
     }
 }
 
-/// Intervals without a measurement, as a two-state Markov chain (E. N. Gilbert 1960, *Capacity of a burst-noise channel*).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Dropouts {
-    /// How often one begins while there is none \[1/s\].
-    pub rate_hz: f64,
-    /// Mean length \[s\].
-    pub mean_s: f64,
+parameters! {
+    /// Intervals without a measurement, as a two-state Markov chain (E. N. Gilbert 1960, *Capacity of a burst-noise
+    /// channel*).
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Dropouts {
+        /// How often one begins while there is none.
+        #[parameter(RATE, "Hz", 0.0..=1000.0)]
+        pub rate_hz: f64 = 0.0,
+        /// Mean length.
+        #[parameter(MEAN, "s", 0.0..=60.0)]
+        pub mean_s: f64 = 0.02,
+    }
 }
 
-/// How the state is measured. The default is perfect.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sensing {
-    /// Standard deviation of what is new at every step: white noise.
-    pub noise: Spread,
-    /// Standard deviation of what is drawn once and stays for the flight.
-    pub bias: Spread,
-    /// From motion to measurement, rounded to whole steps \[s\].
-    pub delay_s: f64,
-    /// Measurements that stay away.
-    pub dropouts: Option<Dropouts>,
-}
-
-/// Accepted range of each setting.
-#[expect(missing_docs, reason = "named after the field that each bounds")]
-pub mod limits {
-    use afbc_types::Range;
-    pub const POSITION: Range = Range::new("position_m", 0.0, 100.0);
-    pub const VELOCITY: Range = Range::new("velocity_m_s", 0.0, 100.0);
-    pub const ATTITUDE: Range = Range::new("attitude_rad", 0.0, 1.0);
-    pub const RATES: Range = Range::new("rates_rad_s", 0.0, 10.0);
-    pub const DROPOUT_RATE: Range = Range::new("rate_hz", 0.0, 1000.0);
-    pub const DROPOUT_MEAN: Range = Range::new("mean_s", 0.0, 60.0);
-}
-
-impl Sensing {
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// The first one out of range, by name.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        self.noise.validate()?;
-        self.bias.validate()?;
-        crate::delay::DELAY.check(self.delay_s)?;
-        self.dropouts.map_or(Ok(()), |Dropouts { rate_hz, mean_s }| {
-            limits::DROPOUT_RATE.check(rate_hz)?;
-            limits::DROPOUT_MEAN.check(mean_s)
-        })
+parameters! {
+    /// How the state is measured. The default is perfect.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Sensing {
+        /// Standard deviation of what is new at every step: white noise.
+        #[group("noise")]
+        pub noise: Spread = Spread::DEFAULT,
+        /// Standard deviation of what is drawn once and stays for the flight.
+        #[group("bias")]
+        pub bias: Spread = Spread::DEFAULT,
+        /// Time from motion to measurement, rounded to whole steps.
+        #[parameter(DELAY, "s", 0.0..=0.5)]
+        pub delay_s: f64 = 0.0,
+        /// Measurements that stay away.
+        pub dropouts: Option<Dropouts> = None,
+    }
+    together(sensing) {
+        sensing.dropouts.map_or(Ok(()), |dropouts| dropouts.validate())
     }
 }
 
@@ -161,7 +145,7 @@ impl Sensors {
         sensing.validate()?;
         crate::realism::STEP.check(step_s)?;
         let mut random = Noise::new(seed, Stream::Sensors);
-        let steps = whole_steps(sensing.delay_s, step_s)?;
+        let steps = whole_steps(sensing.delay_s, step_s);
         Ok(Sensors {
             noise: (sensing.noise != Spread::default()).then_some(sensing.noise),
             bias: sensing.bias.draw(&mut random),

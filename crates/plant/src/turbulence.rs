@@ -1,30 +1,27 @@
 //! Dryden turbulence near the ground.
 
 use crate::noise::Noise;
-use afbc_types::OutOfRange;
+use afbc_types::parameters;
 use libm::{exp, pow, sqrt};
 use nalgebra::Vector3;
 
-/// Dryden turbulence below 1,000 ft by MIL-F-8785C, 3.7.3: how strong and how large it is follows from the height and
-/// from the wind at 20 ft.
-///
-/// The spectra are those of a frozen field that the vehicle crosses at its airspeed V. A vehicle that hovers in still air
-/// would meet none of it, so V is at least `airspeed_floor_m_s`: the field drifts past it at that speed. In wind, the
-/// airspeed of a hovering vehicle is the wind's. The gusts' rotation (p, q, r) is left out: it turns wings, not rotors.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Turbulence {
-    /// W20, wind at 20 ft (6 m) \[m/s\].
-    pub wind_20ft_m_s: f64,
-    /// Smallest speed at which the field drifts past \[m/s\].
-    pub airspeed_floor_m_s: f64,
-}
-
-/// Accepted range of each setting.
-#[expect(missing_docs, reason = "named after the field that each bounds")]
-pub mod limits {
-    use afbc_types::Range;
-    pub const WIND_20FT: Range = Range::new("wind_20ft_m_s", 0.0, 50.0);
-    pub const AIRSPEED_FLOOR: Range = Range::new("airspeed_floor_m_s", 0.1, 50.0);
+parameters! {
+    /// Dryden turbulence below 1,000 ft by MIL-F-8785C, 3.7.3: how strong and how large it is follows from the height and
+    /// from the wind at 20 ft.
+    ///
+    /// The spectra are those of a frozen field that the vehicle crosses at its airspeed V. A vehicle that hovers in still
+    /// air would meet none of it, so V is at least `airspeed_floor_m_s`: the field drifts past it at that speed. In wind,
+    /// the airspeed of a hovering vehicle is the wind's. The gusts' rotation (p, q, r) is left out: it turns wings, not
+    /// rotors.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Turbulence {
+        /// W20, wind at 20 ft (6 m).
+        #[parameter(WIND_20FT, "m/s", 0.0..=50.0)]
+        pub wind_20ft_m_s: f64 = 15.0 * KNOT_M_S,
+        /// Smallest speed at which the field drifts past.
+        #[parameter(FLOOR, "m/s", 0.1..=50.0)]
+        pub airspeed_floor_m_s: f64 = 1.0,
+    }
 }
 
 const FOOT_M: f64 = 0.3048;
@@ -39,16 +36,7 @@ impl Turbulence {
     pub const SEVERE: Self = Self::of_knots(45.0);
 
     const fn of_knots(knots: f64) -> Self {
-        Turbulence { wind_20ft_m_s: knots * KNOT_M_S, airspeed_floor_m_s: 1.0 }
-    }
-
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// The first one out of range, by name.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        limits::WIND_20FT.check(self.wind_20ft_m_s)?;
-        limits::AIRSPEED_FLOOR.check(self.airspeed_floor_m_s)
+        Turbulence { wind_20ft_m_s: knots * KNOT_M_S, ..Self::DEFAULT }
     }
 
     /// What the turbulence is like at a height above ground, taken as 10 ft below and 1,000 ft above the model's range.

@@ -2,23 +2,30 @@
 
 use crate::noise::{Noise, Stream};
 use crate::turbulence::{Eddies, Turbulence};
-use afbc_types::OutOfRange;
+use afbc_types::{Declared, OutOfRange, parameters};
 use alloc::vec::Vec;
 use core::f64::consts::PI;
 use libm::{cos, sqrt};
 use nalgebra::Vector3;
 
-/// Velocity of the air over the earth, the sum of its parts. Acts on the vehicle through [`Drag`](crate::Drag).
-///
-/// Held over a step at its value at the step's start.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Wind {
-    /// Always there, earth frame \[m/s\].
-    pub steady_m_s: Vector3<f64>,
-    /// One after the other, or one upon the other.
-    pub gusts: Vec<CosineGust>,
-    /// Random; its longitudinal axis points where the steady wind blows, or along x.
-    pub turbulence: Option<Turbulence>,
+parameters! {
+    /// Velocity of the air over the earth, the sum of its parts. Acts on the vehicle through [`Drag`](crate::Drag).
+    ///
+    /// Held over a step at its value at the step's start.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Wind {
+        /// Steady wind, where it blows to, earth frame.
+        #[parameter(STEADY, "m/s", -50.0..=50.0)]
+        pub steady_m_s: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0),
+        /// One after the other, or one upon the other.
+        pub gusts: Vec<CosineGust> = Vec::new(),
+        /// Random; its longitudinal axis points where the steady wind blows, or along x.
+        pub turbulence: Option<Turbulence> = None,
+    }
+    together(wind) {
+        wind.gusts.iter().try_for_each(CosineGust::validate)?;
+        wind.turbulence.map_or(Ok(()), |turbulence| turbulence.validate())
+    }
 }
 
 /// A gust that rises as V_m/2 (1 - cos(pi t/T)), stays, and falls as it rose.
@@ -37,11 +44,10 @@ pub struct CosineGust {
     pub hold_s: f64,
 }
 
-/// Accepted range of each setting.
+/// Accepted range of what makes a gust.
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod limits {
     use afbc_types::Range;
-    pub const STEADY: Range = Range::new("steady_m_s", -50.0, 50.0);
     pub const GUST: Range = Range::new("velocity_m_s", -50.0, 50.0);
     pub const START: Range = Range::new("start_s", 0.0, f64::INFINITY);
     pub const RISE: Range = Range::new("rise_s", 0.001, 1000.0);
@@ -49,6 +55,15 @@ pub mod limits {
 }
 
 impl CosineGust {
+    /// # Errors
+    /// The first number out of range, by name.
+    fn validate(&self) -> Result<(), OutOfRange> {
+        self.velocity_m_s.iter().try_for_each(|&speed| limits::GUST.check(speed))?;
+        limits::START.check(self.start_s)?;
+        limits::RISE.check(self.rise_s)?;
+        limits::HOLD.check(self.hold_s)
+    }
+
     /// Velocity at time `t` \[s\], earth frame \[m/s\].
     pub fn at(&self, t: f64) -> Vector3<f64> {
         let since = t - self.start_s;
@@ -64,23 +79,6 @@ impl CosineGust {
     }
 }
 
-impl Wind {
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// The first one out of range, by name.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        self.steady_m_s.iter().try_for_each(|&speed| limits::STEADY.check(speed))?;
-        for gust in &self.gusts {
-            gust.velocity_m_s.iter().try_for_each(|&speed| limits::GUST.check(speed))?;
-            limits::START.check(gust.start_s)?;
-            limits::RISE.check(gust.rise_s)?;
-            limits::HOLD.check(gust.hold_s)?;
-        }
-        self.turbulence.map_or(Ok(()), |turbulence| turbulence.validate())
-    }
-}
-
 /// Wind in time.
 #[derive(Clone, Debug)]
 pub(crate) struct Weather {
@@ -92,7 +90,7 @@ pub(crate) struct Weather {
 
 impl Weather {
     /// # Errors
-    /// As [`Wind::validate`].
+    /// The first parameter out of range.
     pub(crate) fn new(wind: Wind, seed: u64, step_s: f64) -> Result<Self, OutOfRange> {
         wind.validate()?;
         let (x, y) = (wind.steady_m_s.x, wind.steady_m_s.y);

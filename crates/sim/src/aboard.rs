@@ -2,12 +2,12 @@
 
 use afbc::{Command, FlightController, Settings, adaptive};
 use afbc_flight_core::rate::{PERIOD_US, WINDOW_US};
-use afbc_flight_core::supervisor::TILT_MAX;
 use afbc_flight_core::{ArmingLimits, Asked, Inbox, Request, Stamped, Vehicle};
 use afbc_types::{OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
 
 /// Accepted roll and pitch of a vehicle that is to be armed \[rad\].
-pub const ARMING_TILT: Range = Range::new("attitude_rad", -TILT_MAX.max, TILT_MAX.max);
+pub const ARMING_TILT: Range = Range::new("attitude_rad", -TILT_MAX, TILT_MAX);
+const TILT_MAX: f64 = ArmingLimits::TILT_MAX.range.max;
 /// Ticks before the first step: the flight core arms once it has measured its rate.
 const TICKS_HELD: u64 = WINDOW_US as u64 / PERIOD_US + 1;
 

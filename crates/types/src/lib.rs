@@ -31,5 +31,5 @@ pub use actuation::{Inputs, RotorForces, RotorSpeeds};
 pub use axes::{Axis, PerAxis};
 pub use declared::{Declaration, Declared, Field, Name, Number, Value, Visit};
 pub use motion::{Setpoint, State};
-pub use parameters::{Parameters, limits};
+pub use parameters::Parameters;
 pub use range::{OutOfRange, Range};

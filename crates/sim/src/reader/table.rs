@@ -2,7 +2,7 @@
 
 use super::error::{FileError, Source};
 use super::words::{self, did_you_mean, nearest, one_of};
-use afbc_types::Range;
+use afbc_types::{Declaration, Declared, Range, Value};
 use nalgebra::Vector3;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -36,7 +36,50 @@ impl<'a> Table<'a> {
     /// The number under `range.name`, which must be there.
     pub fn need_number(&mut self, range: &Range) -> Result<f64, FileError> {
         let number = self.number(range)?;
-        number.ok_or_else(|| self.missing(range.name, &format!("add it{}", words::unit(range.name))))
+        self.require(range)?;
+        Ok(number.unwrap_or_default())
+    }
+
+    /// Every key of `parameters` that is there, but `elsewhere`: the others stay as they are. A group within them has a table
+    /// of its own.
+    pub fn declared_but(&mut self, elsewhere: &str, parameters: &mut impl Declared) -> Result<(), FileError> {
+        parameters.visit_mut(&mut |Declaration { group, range, .. }, value| {
+            if !group.is_empty() || range.name == elsewhere {
+                return Ok(());
+            }
+            match value {
+                Value::Single([number]) => self.number(range)?.into_iter().for_each(|read| *number = read as f32),
+                Value::Double([number]) => self.number(range)?.into_iter().for_each(|read| *number = read),
+                Value::Switch(switch) => self.boolean(range.name)?.into_iter().for_each(|read| *switch = read),
+                Value::Single(numbers) => {
+                    let read = self.vector(range.name, [range; 3])?;
+                    numbers.iter_mut().zip(read.iter().flatten()).for_each(|(number, read)| *number = *read as f32);
+                }
+                Value::Double(numbers) => {
+                    let read = self.vector(range.name, [range; 3])?;
+                    numbers.iter_mut().zip(read.iter().flatten()).for_each(|(number, read)| *number = *read);
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// Every key of `parameters` that is there; the others stay as they are.
+    pub fn declared(&mut self, parameters: &mut impl Declared) -> Result<(), FileError> {
+        self.declared_but("", parameters)
+    }
+
+    /// Refuses a table in which `range.name` is missing.
+    pub fn require(&self, range: &Range) -> Result<(), FileError> {
+        if self.has(range.name) {
+            return Ok(());
+        }
+        Err(self.missing(range.name, &format!("add it{}", words::unit(range.name))))
+    }
+
+    /// True if something stands under `key`.
+    pub fn has(&self, key: &str) -> bool {
+        self.entries.contains_key(key)
     }
 
     /// The whole number under `range.name`, to the last digit, if it is there.
@@ -229,7 +272,7 @@ impl<'a> Table<'a> {
 
     /// Refuses `key`, which has its place elsewhere.
     pub fn forbid(&self, key: &str, problem: &str) -> Result<(), FileError> {
-        if self.entries.contains_key(key) { Err(self.fault_at(key, problem)) } else { Ok(()) }
+        if self.has(key) { Err(self.fault_at(key, problem)) } else { Ok(()) }
     }
 
     /// The whole table is refused on account of `key`.
