@@ -1,6 +1,7 @@
 //! From a stream of bytes to messages.
 
-use crate::framing::{Address, HEADER, Header, SIGNED_MAX, START, checksum};
+use crate::address::Address;
+use crate::framing::{HEADER, Header, SIGNED_MAX, START, checksum};
 use crate::message::{Fault, Message};
 use core::marker::PhantomData;
 use mavlink::Message as _;

@@ -1,9 +1,9 @@
 //! What the vehicle says.
 
+use crate::address::Address;
 use crate::decoder::Counters;
 use crate::frames::flip;
-use crate::framing::{Address, PAYLOAD_MAX};
-use crate::message::{Fault, Format, Message, extension, field, parse, put, put_extended, put_fields};
+use crate::message::{Fault, Format, Message, PAYLOAD_MAX, extension, field, parse, put, put_extended, put_fields};
 use afbc_types::{Axis, PerAxis, RotorSpeeds};
 use mavlink::MessageData;
 use mavlink::dialects::common::{

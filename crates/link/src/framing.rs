@@ -7,7 +7,8 @@
 //! <https://mavlink.io/en/guide/serialization.html>. Frames with incompatibility flags are not understood; the one that
 //! says that a signature follows is, as far as a frame's length goes.
 
-use crate::message::Message;
+use crate::address::Address;
+use crate::message::{Message, PAYLOAD_MAX};
 
 /// First byte of a frame.
 pub(crate) const START: u8 = 0xFD;
@@ -19,29 +20,10 @@ pub(crate) const CHECKSUM: usize = 2;
 const SIGNATURE: usize = 13;
 /// Incompatibility flag: a signature follows the checksum.
 const SIGNED: u8 = 1;
-/// Longest payload.
-pub(crate) const PAYLOAD_MAX: usize = 255;
 /// Longest frame without a signature \[bytes\].
 pub const FRAME_MAX: usize = HEADER + PAYLOAD_MAX + CHECKSUM;
 /// Longest frame with a signature \[bytes\].
 pub(crate) const SIGNED_MAX: usize = FRAME_MAX + SIGNATURE;
-
-/// Who sends, or is meant.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Address {
-    /// MAVLink system id; 0 means all.
-    pub system: u8,
-    /// MAVLink component id; 0 means all.
-    pub component: u8,
-}
-
-impl Address {
-    /// True if what is sent to `target` is meant for this address.
-    pub fn is_meant_by(self, target: Address) -> bool {
-        (target.system == 0 || target.system == self.system)
-            && (target.component == 0 || target.component == self.component)
-    }
-}
 
 /// A frame's header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

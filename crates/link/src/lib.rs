@@ -28,6 +28,7 @@
 //! ```
 #![no_std]
 
+mod address;
 mod decoder;
 mod downlink;
 pub mod frames;
@@ -35,9 +36,10 @@ mod framing;
 mod message;
 mod uplink;
 
+pub use address::Address;
 pub use decoder::{Counters, Decoder};
 pub use downlink::{Answer, Downlink, Health, StatesRefused, Text};
-pub use framing::{Address, FRAME_MAX, Sender};
+pub use framing::{FRAME_MAX, Sender};
 pub use mavlink::dialects::common::{MavCmd, MavSeverity};
 pub use message::{Fault, Format, Message};
 pub use uplink::{Command, Uplink};

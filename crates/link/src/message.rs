@@ -3,8 +3,11 @@
 //! MAVLink 2 appends extension fields to some messages, which the `mavlink` crate leaves out here: its feature that has
 //! them does not build without std. The few that matter are read and written as bytes behind the rest.
 
-use crate::framing::{Address, PAYLOAD_MAX};
+use crate::address::Address;
 use mavlink::{MavlinkVersion, MessageData};
+
+/// Longest payload.
+pub(crate) const PAYLOAD_MAX: usize = 255;
 
 /// What is known of a message before its payload is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

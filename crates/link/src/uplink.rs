@@ -1,8 +1,8 @@
 //! What comes to the vehicle.
 
+use crate::address::Address;
 use crate::frames::{Odometry, flip};
-use crate::framing::{Address, PAYLOAD_MAX};
-use crate::message::{Fault, Format, Message, extension, field, parse, put, put_fields};
+use crate::message::{Fault, Format, Message, PAYLOAD_MAX, extension, field, parse, put, put_fields};
 use afbc_types::{Setpoint, State};
 use mavlink::MessageData;
 use mavlink::dialects::common::{

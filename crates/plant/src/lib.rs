@@ -35,6 +35,7 @@ pub mod drag;
 mod environment;
 pub mod ground_effect;
 pub mod integrate;
+mod load;
 mod motion;
 pub mod noise;
 mod realism;
@@ -54,10 +55,11 @@ pub use environment::{
     Environment, GUST_SIZE, Gust, GustKind, PAYLOAD_BELOW, PAYLOAD_MASS, ParameterChange, Payload, Quantity, START,
 };
 pub use ground_effect::GroundEffect;
+pub use load::Load;
 pub use motion::Motion;
 pub use realism::{Realism, STEP, Telemetry};
 pub use rotors::{RotorFault, Rotors, Start};
 pub use sensors::{Dropouts, Measurement, Sensing, Sensors, Spread};
 pub use turbulence::Turbulence;
-pub use vehicle::{Load, Model, Plant};
+pub use vehicle::{Model, Plant};
 pub use wind::{CosineGust, Wind};

@@ -1,9 +1,9 @@
 //! The full rigid body, (1)-(5) as corrected, its attitude a unit quaternion: no singularity.
 
 use crate::body_axes::BodyAxes;
+use crate::load::Load;
 use crate::motion::Motion;
 use crate::surroundings::Surroundings;
-use crate::vehicle::Load;
 use libm::{asin, atan2, cos, sin, sqrt};
 use nalgebra::{SVector, Vector3};
 

@@ -1,9 +1,9 @@
 //! The paper's simplified model (6): d eta/dt is taken for Omega.
 
 use crate::body_axes::BodyAxes;
+use crate::load::Load;
 use crate::motion::Motion;
 use crate::surroundings::Surroundings;
-use crate::vehicle::Load;
 use libm::{cos, sin};
 use nalgebra::{SVector, Vector3};
 

@@ -3,11 +3,12 @@
 use crate::body_axes::BodyAxes;
 use crate::environment::{Environment, Segment};
 use crate::integrate::rk4;
+use crate::load::Load;
 use crate::motion::Motion;
 use crate::realism::{Effects, Realism, Telemetry};
 use crate::surroundings::Surroundings;
 use crate::{rigid_body, simplified};
-use afbc_types::{OutOfRange, Parameters, RotorSpeeds};
+use afbc_types::{OutOfRange, RotorSpeeds};
 use alloc::boxed::Box;
 use nalgebra::Vector3;
 
@@ -27,85 +28,6 @@ impl Model {
             Model::Simplified => "simplified",
             Model::RigidBody => "rigid-body",
         }
-    }
-}
-
-/// Forces and moments held over one step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Load {
-    /// Thrust of all rotors over mass, along body z \[m/s2\].
-    thrust_m_s2: f64,
-    gravity_m_s2: f64,
-    /// Moment of the rotors over inertia, body frame \[rad/s2\].
-    rotor_rad_s2: Vector3<f64>,
-    /// \[A_x, A_y, A_z\] \[m/s2\].
-    a_force: Vector3<f64>,
-    /// \[A_phi, A_theta, A_psi\] \[rad/s2\].
-    a_moment: Vector3<f64>,
-    /// a_1, a_3, a_5 of (6).
-    coupling: Vector3<f64>,
-    /// I_r omega over Ix and Iy: a_2 omega, -a_4 omega \[1/s\].
-    gyroscopic: [f64; 2],
-}
-
-impl Load {
-    /// The load of rotors at `speeds_rad_s` on a vehicle with these parameters, with the paper's disturbances
-    /// `a_force` = \[A_x, A_y, A_z\] (earth) and `a_moment` = \[A_phi, A_theta, A_psi\] (body).
-    #[inline]
-    pub fn new(
-        parameters: &Parameters<f64>,
-        speeds_rad_s: [f64; 4],
-        a_force: Vector3<f64>,
-        a_moment: Vector3<f64>,
-    ) -> Self {
-        let squares = speeds_rad_s.map(|w| w * w);
-        Self::of_rotors(parameters, speeds_rad_s, squares, 1.0, a_force, a_moment)
-    }
-
-    /// The same for rotors whose drag moments are those of the `squares` of their speeds \[rad2/s2\], as far as they are
-    /// whole, and whose thrusts are those times `thrust_ratio`.
-    #[inline]
-    pub(crate) fn of_rotors(
-        parameters: &Parameters<f64>,
-        speeds_rad_s: [f64; 4],
-        squares: [f64; 4],
-        thrust_ratio: f64,
-        a_force: Vector3<f64>,
-        a_moment: Vector3<f64>,
-    ) -> Self {
-        let Parameters { mass_kg, arm_m, inertia_kg_m2: i, rotor_inertia_kg_m2, .. } = *parameters;
-        let [w1, w2, w3, w4] = speeds_rad_s;
-        let [s1, s2, s3, s4] = squares;
-        let (b, d) = (thrust_ratio * parameters.thrust_factor_n_s2, parameters.drag_factor_n_m_s2);
-        let momentum = rotor_inertia_kg_m2 * (w1 - w2 + w3 - w4);
-        Load {
-            thrust_m_s2: b * (s1 + s2 + s3 + s4) / mass_kg,
-            gravity_m_s2: parameters.gravity_m_s2,
-            rotor_rad_s2: Vector3::new(
-                arm_m * b * (s3 - s1) / i.x,
-                arm_m * b * (s4 - s2) / i.y,
-                d * (s1 - s2 + s3 - s4) / i.z,
-            ),
-            a_force,
-            a_moment,
-            coupling: Vector3::new((i.y - i.z) / i.x, (i.z - i.x) / i.y, (i.x - i.y) / i.z),
-            gyroscopic: [momentum / i.x, momentum / i.y],
-        }
-    }
-
-    /// d^2 xi/dt^2 in the earth frame, for the direction of body z in the earth frame \[m/s2\].
-    #[inline]
-    pub(crate) fn acceleration(&self, body_z: &Vector3<f64>) -> Vector3<f64> {
-        body_z * self.thrust_m_s2 - Vector3::new(0.0, 0.0, self.gravity_m_s2) - self.a_force
-    }
-
-    /// d Omega/dt in the body frame \[rad/s2\]: rotors, Omega x I Omega, rotor gyroscopics, disturbance.
-    #[inline]
-    pub(crate) fn angular_acceleration(&self, rates: &Vector3<f64>) -> Vector3<f64> {
-        let (p, q, r) = (rates.x, rates.y, rates.z);
-        let [gyro_x, gyro_y] = self.gyroscopic;
-        let cross = self.coupling.component_mul(&Vector3::new(q * r, p * r, p * q));
-        self.rotor_rad_s2 + cross + Vector3::new(q * gyro_x, -p * gyro_y, 0.0) - self.a_moment
     }
 }
 

@@ -18,7 +18,7 @@ fn rotors(scenario: &Scenario) -> Vec<(&'static str, String)> {
         rows.push(("rotors", format!("time constant {time_constant_s} s, delay {delay_s} s, {limits}")));
     }
     rows.extend(
-        rotors.faults.iter().map(|f| ("rotor fault", format!("{} from {} s", super::words::fault(f), f.start_s))),
+        rotors.faults.iter().map(|f| ("rotor fault", format!("{} from {} s", crate::words::fault(f), f.start_s))),
     );
     if let Some(battery) = rotors.battery {
         let voltage = format!("{} V to {} V, {} ohm", battery.full_v, battery.empty_v, battery.resistance_ohm);
@@ -40,7 +40,7 @@ fn air(scenario: &Scenario) -> Vec<(&'static str, String)> {
     }
     rows.extend(realism.wind.gusts.iter().map(|gust| {
         let hold = if gust.hold_s.is_finite() { format!("hold {} s", gust.hold_s) } else { "stays".into() };
-        let wind = super::words::wind_gust(gust);
+        let wind = crate::words::wind_gust(gust);
         ("gust", format!("{wind} from {} s, rise {} s, {hold}", gust.start_s, gust.rise_s))
     }));
     if let Some(turbulence) = realism.wind.turbulence {

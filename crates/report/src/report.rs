@@ -1,9 +1,9 @@
 //! One page with everything: tables, claims, figures, parameters. Needs no network and no other file.
 
-use super::figures::Figure;
-use super::groups::Group;
-use super::{reality, table, words};
 use crate::claims::Claim;
+use crate::figures::Figure;
+use crate::groups::Group;
+use crate::{reality, table, words};
 use afbc::{Limits, Settings};
 use afbc_sim::contender::{Contender, Law};
 use afbc_sim::scenario::Scenario;

@@ -1,7 +1,7 @@
 //! The table for the terminal: plain text, at most [`WIDTH`] columns.
 
-use super::groups::{Group, groups};
 use crate::claims::Claim;
+use crate::groups::{Group, groups};
 use crate::words;
 use afbc_sim::flown::Flown;
 use afbc_sim::metrics::{Metrics, SETTLED_S};

@@ -7,7 +7,8 @@ use super::place::Place;
 use super::progress::Progress;
 use super::subject::Kind;
 use super::target::Target;
-use super::{Failure, interrupt, json, print, say};
+use super::terminal::{Failure, print, say};
+use super::{interrupt, json};
 use afbc_campaign::{
     self as campaign, BUILT_IN, BuiltIn, Campaign as Plan, Folder, Manifest, Shard, Summary, built_in,
 };

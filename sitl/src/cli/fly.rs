@@ -1,10 +1,10 @@
 //! `sitl fly`: one scenario.
 
-use super::Failure;
 use super::flying::{Flying, report};
 use super::json::Json;
 use super::place::Place;
 use super::target::Target;
+use super::terminal::Failure;
 use afbc::Profile;
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::scenario::Scenario;

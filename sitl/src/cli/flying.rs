@@ -3,7 +3,8 @@
 use super::json::Json;
 use super::log_rate::LogRate;
 use super::progress::Progress;
-use super::{Failure, interrupt, json, print, say};
+use super::terminal::{Failure, print, say};
+use super::{interrupt, json};
 use afbc_files::Folder;
 use afbc_report::claims::Claim;
 use afbc_report::flights;

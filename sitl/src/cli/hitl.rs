@@ -1,8 +1,8 @@
 //! `sitl hitl`: a board in the loop.
 
-use super::pil::{Flying, Recorder, outcome};
+use super::in_the_loop::{Flying, Recorder, outcome};
 use super::target::Target;
-use super::{Failure, print};
+use super::terminal::{Failure, print};
 use afbc_sim::flight::Sample;
 use afbc_sim::in_the_loop::{self, End, Pace, Serial, Station};
 use clap::Args;

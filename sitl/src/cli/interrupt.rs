@@ -1,7 +1,7 @@
 //! Ctrl-C, and whatever else asks a program to end: of commands that have nothing to show for half of their work, or that
 //! keep it whole at any time.
 
-use super::{INTERRUPTED, say};
+use super::terminal::{INTERRUPTED, say};
 use std::io::{IsTerminal, stderr};
 use std::sync::{Mutex, PoisonError};
 

@@ -1,6 +1,6 @@
 //! `--json`: the same for machines, on stdout. docs/json.md lists every key.
 
-use super::{Failure, print};
+use super::terminal::{Failure, print};
 use afbc::Profile;
 use afbc_campaign::Campaign;
 use afbc_sim::contender::Contender;

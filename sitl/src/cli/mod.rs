@@ -5,6 +5,7 @@ mod compare;
 mod fly;
 mod flying;
 mod hitl;
+mod in_the_loop;
 mod interrupt;
 mod json;
 mod log_rate;
@@ -16,15 +17,12 @@ mod results;
 mod scenarios;
 mod subject;
 mod target;
+mod terminal;
 mod tune;
 
 use clap::{Parser, Subcommand};
-use std::error::Error;
-use std::io::{self, Write};
 use std::process::ExitCode;
-
-/// What stops a command: its text is one line for people.
-type Failure = Box<dyn Error>;
+use terminal::Failure;
 
 /// Flies an adaptive fuzzy backstepping (AFBC) quadrotor controller and classical backstepping in software.
 ///
@@ -76,23 +74,5 @@ impl Cli {
             Command::Pil(pil) => pil.run(),
             Command::Hitl(hitl) => hitl.run(),
         }
-    }
-}
-
-/// Exit code of a command that was asked to stop.
-const INTERRUPTED: u8 = 130;
-
-/// Says one line on stderr, to whoever is still listening.
-fn say(line: &str) {
-    let _ = writeln!(io::stderr().lock(), "{line}");
-}
-
-/// Prints to stdout. A reader who has seen enough, as in `sitl | head`, is no failure.
-fn print(text: &str) -> Result<(), Failure> {
-    match io::stdout().lock().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(format!("stdout: cannot be written ({error}); send it elsewhere").into())
-        }
-        _ => Ok(()),
     }
 }

@@ -1,9 +1,9 @@
 //! `sitl paper`: the paper's experiment.
 
-use super::Failure;
 use super::flying::{Flying, report};
 use super::json::Json;
 use super::place::Place;
+use super::terminal::Failure;
 use afbc_plant::Model;
 use afbc_report::claims::claims;
 use afbc_sim::case::{Case, Reading, Sign, Uncertainty};

@@ -1,6 +1,6 @@
 //! Where results go: `--out` and `--force`.
 
-use super::Failure;
+use super::terminal::Failure;
 use afbc_files::Folder;
 use clap::Args;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! How far a command has come, on stderr: a bar for people, lines for the log of a machine without a terminal.
 
-use super::say;
+use super::terminal::say;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, stderr};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};

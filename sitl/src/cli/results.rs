@@ -2,7 +2,8 @@
 
 use super::json::Json;
 use super::progress::Progress;
-use super::{Failure, interrupt, json, print};
+use super::terminal::{Failure, print};
+use super::{interrupt, json};
 use afbc_report::flights;
 use afbc_report::results;
 use afbc_sim::flown::Flown;

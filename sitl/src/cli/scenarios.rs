@@ -1,9 +1,10 @@
 //! `sitl scenarios` and `sitl check`: what can be flown.
 
+use super::json;
 use super::json::Json;
 use super::subject::{Kind, Subject};
 use super::target::Target;
-use super::{Failure, json, print};
+use super::terminal::{Failure, print};
 use afbc_campaign::Campaign;
 use afbc_sim::contender::Contender;
 use afbc_sim::scenario::{BUILT_IN, BuiltIn, Scenario, built_in};

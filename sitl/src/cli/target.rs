@@ -1,7 +1,7 @@
 //! A scenario or a campaign as it is named on the command line.
 
-use super::Failure;
 use super::subject::{self, Subject};
+use super::terminal::Failure;
 use afbc_campaign::Campaign;
 use afbc_sim::scenario::Scenario;
 use std::ffi::OsString;

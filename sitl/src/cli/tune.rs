@@ -1,9 +1,10 @@
 //! `sitl tune`: gains for one contender.
 
+use super::json;
 use super::json::Json;
 use super::progress::Progress;
 use super::target::Target;
-use super::{Failure, json, print};
+use super::terminal::{Failure, print};
 use afbc_files::Error;
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::scenario::Scenario;

@@ -1,6 +1,6 @@
 //! A campaign on one page.
 
-use super::{HEADS, bad, cells, flights, legend, percent};
+use super::cells::{HEADS, bad, cells, flights, legend, percent};
 use crate::figures::Figure;
 use crate::report::{picture, sheet};
 use crate::words;

@@ -1,6 +1,6 @@
 //! `summary.json` of a campaign, for programs.
 
-use super::PERCENTS;
+use super::cells::PERCENTS;
 use afbc_campaign::statistics::percentile;
 use afbc_campaign::{Count, Manifest, Summary, Tally};
 use serde::Serialize;

@@ -1,6 +1,6 @@
 //! A campaign's table for the terminal.
 
-use super::{HEADS, bad, cells, flights, legend};
+use super::cells::{HEADS, bad, cells, flights, legend};
 use crate::table::wrap;
 use afbc_campaign::Summary;
 

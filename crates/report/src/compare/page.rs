@@ -1,6 +1,6 @@
 //! A comparison on one page.
 
-use super::{cells, heads, legend, lost};
+use super::cells::{cells, heads, legend, lost};
 use crate::figures::Figure;
 use crate::report::{parameters, picture, sheet};
 use crate::words;

@@ -1,6 +1,6 @@
 //! The comparison's table for the terminal.
 
-use super::{cells, heads, legend, lost};
+use super::cells::{cells, heads, legend, lost};
 use crate::table::wrap;
 use crate::words;
 use afbc_campaign::compare::Comparison;

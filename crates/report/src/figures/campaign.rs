@@ -1,9 +1,9 @@
 //! Figures of a whole campaign: distributions over its flights, and what its losses hang on.
 
-use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
+use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, marker, text, units};
+use super::figure::Figure;
 use super::palette::{BLACK, FRAME, GREY, GRID};
 use super::time_chart::{decimals, number};
-use super::{Figure, marker};
 use crate::words;
 use afbc_campaign::statistics::{Share, percentile};
 use afbc_campaign::{BINS, Count, Drawn, Summary, Tally};

@@ -152,3 +152,18 @@ fn subscripts(line: &str) -> String {
     let raised = lower.replace('⟩', "</tspan><tspan dy=\"-0.225em\">");
     raised + &"</tspan>".repeat(line.matches('⟩').count())
 }
+
+/// Corners of the mark of contender number `index` around its middle, in drawing units: with colours, marks tell
+/// contenders apart for those who see no colours.
+pub(super) fn marker(index: usize, px: f64) -> Vec<(i32, i32)> {
+    // Corners around the middle, the direction of the first in turns, and how far out every second one is.
+    const SHAPES: [(usize, f64, f64); 6] =
+        [(16, 0.0, 0.85), (4, 0.125, 1.0), (3, -0.25, 1.0), (4, 0.0, 1.0), (8, 0.0, 0.35), (3, 0.25, 1.0)];
+    let (corners, turn, second) = *SHAPES.get(index % SHAPES.len()).unwrap_or(&SHAPES[0]);
+    let corner = |i: usize| {
+        let (sin, cos) = libm::sincos(core::f64::consts::TAU * (i as f64 / corners as f64 + turn));
+        let out = 1.15 * px * if i % 2 == 1 { second } else { 1.0 };
+        (units(out * cos), units(out * sin))
+    };
+    (0..corners).map(corner).collect()
+}

@@ -1,7 +1,7 @@
 //! Root mean square errors as bars.
 
-use super::Figure;
 use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, text_width_px, units};
+use super::figure::Figure;
 use super::palette::{BLACK, FRAME, GREY, color};
 use crate::words;
 use afbc_campaign::compare::{Comparison, Entry, FIGURES, Spread};

@@ -1,6 +1,7 @@
 //! Panels one above the other that share one time axis.
 
 use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
+use super::figure::CROSS;
 use super::marks::{LABEL_PX, Mark, Marks, marks};
 use super::palette::{BLACK, EDGE, FRAME, GREY, GRID};
 use super::reduce::{clip, simplify};
@@ -112,7 +113,7 @@ impl Chart<'_> {
         };
         let within: Vec<bool> = self.panels.iter().flat_map(losses).collect();
         if within.contains(&true) {
-            words += super::CROSS;
+            words += CROSS;
         }
         if within.contains(&false) {
             words += " An arrow: where one was lost beyond the panel.";

@@ -1,11 +1,13 @@
 //! The flights in space: a box seen from above its front right corner.
 
 use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
+use super::figure::CROSS;
+use super::law::{Law, REFERENCE};
 use super::marks::{LABEL_PX, Mark, marks};
 use super::palette::{BLACK, FRAME, GREY, GRID};
 use super::reduce::simplify;
 use super::time_chart::{Line, PLOT_PX, decimals, number, range};
-use super::{Law, REFERENCE};
+
 use afbc_sim::flown::Flown;
 use nalgebra::Vector3;
 use plotters::prelude::*;
@@ -142,7 +144,7 @@ pub(super) fn draw(
         words += " Shaded: where it was while what the legend names lasted.";
     }
     if crosses {
-        words += super::CROSS;
+        words += CROSS;
     }
     Ok((svg, words))
 }

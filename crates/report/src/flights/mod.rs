@@ -30,7 +30,7 @@ use std::path::PathBuf;
 /// The first file that could not be written, or is somebody else's.
 pub fn write(folder: &Folder, flown: &[Flown], claims: &[Claim]) -> Result<Vec<PathBuf>, Error> {
     let groups = groups::groups(flown);
-    let draw = |group: &groups::Group<'_>| figures::draw(&group.flights);
+    let draw = |group: &groups::Group<'_>| figures::flights::draw(&group.flights);
     let sets = groups.iter().map(draw).collect::<io::Result<Vec<_>>>();
     let sets = sets.map_err(|source| folder.error("figures", source))?;
     let svg_name =

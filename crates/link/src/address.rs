@@ -1,0 +1,18 @@
+//! Who sends, and to whom.
+
+/// Who sends, or is meant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Address {
+    /// MAVLink system id; 0 means all.
+    pub system: u8,
+    /// MAVLink component id; 0 means all.
+    pub component: u8,
+}
+
+impl Address {
+    /// True if what is sent to `target` is meant for this address.
+    pub fn is_meant_by(self, target: Address) -> bool {
+        (target.system == 0 || target.system == self.system)
+            && (target.component == 0 || target.component == self.component)
+    }
+}

@@ -1,0 +1,69 @@
+//! What a comparison's table says, on the page and in the terminal.
+
+use crate::words;
+use afbc_campaign::compare::{Comparison, Entry, FIGURES, Figure};
+use afbc_sim::metrics::SETTLED_S;
+
+/// The figures of one contender, and whether each is the best of its column; none if it lost a vehicle.
+pub(super) fn cells(comparison: &Comparison, entry: &Entry) -> Option<Vec<(String, bool)>> {
+    let cell = |figure: &Figure| {
+        let spread = entry.spread(figure.value)?;
+        let [mean, deviation] =
+            [spread.mean, spread.deviation].map(|value| number(figure.scale * value, figure.digits));
+        let text = if comparison.is_repeated() { format!("{mean} ±{deviation}") } else { mean };
+        Some((text, comparison.is_best(entry, figure)))
+    };
+    let mut cells = FIGURES.iter().map(cell).collect::<Option<Vec<_>>>()?;
+    if has_ratio(comparison) {
+        cells.push((comparison.ratio(entry).map_or("-".into(), |ratio| format!("{ratio:.2}")), false));
+    }
+    Some(cells)
+}
+
+pub(super) fn number(value: f64, digits: usize) -> String {
+    if value < 1e4 { format!("{value:.digits$}") } else { format!("{value:.2e}") }
+}
+
+/// Whether there is backstepping to set others against.
+pub(super) fn has_ratio(comparison: &Comparison) -> bool {
+    comparison.entries.iter().any(|entry| comparison.ratio(entry).is_some())
+}
+
+/// Heads of the columns.
+pub(super) fn heads(comparison: &Comparison) -> Vec<&'static str> {
+    FIGURES.iter().map(|figure| figure.title).chain(has_ratio(comparison).then_some("ratio")).collect()
+}
+
+/// What became of the vehicles of a contender that lost some.
+pub(super) fn lost(entry: &Entry) -> String {
+    let of = entry.flights.len();
+    let first = entry.flights.iter().find_map(|flight| flight.lost.map(|lost| (flight.seed, lost)));
+    match first {
+        Some((seed, lost)) if of > 1 => {
+            let how = words::lost(&lost);
+            format!("{} of {of} vehicles lost, the first with seed {seed}: {how}", entry.lost())
+        }
+        Some((_, lost)) => words::lost(&lost),
+        None => String::new(),
+    }
+}
+
+/// What the columns mean.
+pub(super) fn legend(comparisons: &[Comparison]) -> String {
+    let kept = |comparison: &Comparison| comparison.entries.iter().any(|entry| entry.lost() == 0);
+    if !comparisons.iter().any(kept) {
+        return "Who loses a vehicle has no figures.".into();
+    }
+    let mut words = format!(
+        "Root mean square errors, and the largest of x, y and z, from {SETTLED_S} s to the end. |ΔU₄|: mean jump of the \
+         thrust from one control step to the next; small is smooth."
+    );
+    if comparisons.iter().any(has_ratio) {
+        words += " Ratio: root mean square distance from the reference, over backstepping's.";
+    }
+    words += " *: best of its column.";
+    if comparisons.iter().any(Comparison::is_repeated) {
+        words += " ±: standard deviation over the seeds.";
+    }
+    words
+}

@@ -1,0 +1,119 @@
+//! Counterparts of the paper's Figs. 4 to 8, all contenders of one scenario overlaid.
+
+use super::figure::Figure;
+use super::law::{LINE_PX, Law, REFERENCE};
+use super::time_chart::{Chart, Line, Panel};
+use super::{canvas, trajectory};
+use crate::words;
+use afbc_sim::flight::Sample;
+use afbc_sim::flown::Flown;
+use afbc_sim::metrics::tracking_error;
+use nalgebra::Vector4;
+use std::io;
+
+/// Something to draw over time.
+type Value = fn(&Sample) -> f64;
+/// One of U1..U4.
+type Input = fn(&Vector4<f64>) -> f64;
+
+/// Fig. 5: label, what is flown, what is wanted.
+const OUTPUTS: [(&str, Value, Value); 4] = [
+    ("x [m]", |s| s.motion.position_m.x, |s| s.reference.position_m.x),
+    ("y [m]", |s| s.motion.position_m.y, |s| s.reference.position_m.y),
+    ("z [m]", |s| s.motion.position_m.z, |s| s.reference.position_m.z),
+    ("ψ [rad]", |s| s.motion.attitude_rad.z, |s| s.reference.yaw_rad),
+];
+/// Fig. 6: likewise, but each law wants its own.
+const ATTITUDE: [(&str, Value, Value); 2] = [
+    ("φ [rad]", |s| s.motion.attitude_rad.x, |s| s.command.filtered[0].angle.into()),
+    ("θ [rad]", |s| s.motion.attitude_rad.y, |s| s.command.filtered[1].angle.into()),
+];
+/// Fig. 7. The space that does not break is also one that does not vanish behind a subscript.
+const ERRORS: [(&str, Value); 4] = [
+    ("x⟨d⟩\u{a0}− x [m]", |s| tracking_error(s).x),
+    ("y⟨d⟩\u{a0}− y [m]", |s| tracking_error(s).y),
+    ("z⟨d⟩\u{a0}− z [m]", |s| tracking_error(s).z),
+    ("ψ⟨d⟩\u{a0}− ψ [rad]", |s| tracking_error(s).w),
+];
+/// Fig. 8.
+const INPUTS: [(&str, Input); 4] = [("U₁ [N]", |u| u.x), ("U₂ [N]", |u| u.y), ("U₃ [N]", |u| u.z), ("U₄ [N]", |u| u.w)];
+
+/// Fig. 7 alone.
+pub(crate) fn errors(flights: &[&Flown]) -> io::Result<Option<Figure>> {
+    let fig7 = draw(flights)?.into_iter().find(|figure| figure.name == "fig7-errors");
+    Ok(fig7.map(|figure| Figure { name: "errors", ..figure }))
+}
+
+/// Draws every figure of one scenario's flights; of no flight, none.
+pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {
+    // The longest flight has met the most of the reference.
+    let Some(longest) = flights.iter().max_by_key(|flight| flight.run.log.len()) else { return Ok(Vec::new()) };
+    let scenario = &longest.scenario;
+    let last_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
+    let end_s = if last_s > 0.0 { last_s } else { scenario.duration_s };
+    let names: Vec<&str> = flights.iter().map(|flight| flight.run.contender.name.as_str()).collect();
+    let inks = canvas::inks(&names, LINE_PX);
+    let laws: Vec<Law> = flights.iter().zip(inks).map(|(flight, ink)| Law { flight, ink }).collect();
+    // The roughest behind, so that it hides nothing.
+    let mut rough_first: Vec<&Law> = laws.iter().collect();
+    let roughness = |law: &Law| law.flight.run.metrics.mean_abs_delta_u.sum();
+    rough_first.sort_by(|a, b| roughness(b).total_cmp(&roughness(a)));
+    let each = |value: Value| rough_first.iter().map(move |law| law.line(law.ink(), end_s, value));
+
+    let reference = Law { flight: longest, ink: REFERENCE };
+    let outputs = OUTPUTS.map(|(label, value, wanted)| {
+        let wanted = Line { lost_s: None, is_reference: true, ..reference.line(REFERENCE, end_s, wanted) };
+        Panel { label, zero: false, lines: core::iter::once(wanted).chain(each(value)).collect() }
+    });
+    let attitude = ATTITUDE.map(|(label, value, wanted)| {
+        let wanted = |law: &&Law| Line { is_reference: true, ..law.line(law.pale(), end_s, wanted) };
+        Panel { label, zero: true, lines: rough_first.iter().map(wanted).chain(each(value)).collect() }
+    });
+    let errors = ERRORS.map(|(label, value)| Panel { label, zero: true, lines: each(value).collect() });
+    let controls = INPUTS.map(|(label, input)| Panel {
+        label,
+        zero: true,
+        lines: rough_first.iter().map(|law| law.input(end_s, input)).collect(),
+    });
+
+    let law_legend = || laws.iter().map(|law| (law.title(), law.ink()));
+    let with_reference = || core::iter::once(("reference".to_owned(), REFERENCE)).chain(law_legend()).collect();
+    let with_desired = laws.iter().flat_map(|law| {
+        let desired = format!("{} φ⟨d⟩, θ⟨d⟩", law.flight.run.contender.title());
+        [(law.title(), law.ink()), (desired, law.pale())]
+    });
+
+    let conditions = format!("{}: {}", scenario.name, words::conditions(scenario));
+    let chatter = controls.iter().any(|panel| panel.has_chatter(end_s));
+    let chart = |name, caption: &str, title, legend, panels| {
+        let (svg, seen) = Chart { title, conditions: &conditions, scenario, end_s, legend, panels }.draw()?;
+        Ok::<_, io::Error>(Figure { name, caption: format!("{caption}{seen}"), svg })
+    };
+    let jumps = if chatter { " A filled band is chatter: the input jumps between its edges." } else { "" };
+    let (trajectory, seen) = trajectory::draw(&laws, longest, &conditions, with_reference())?;
+    Ok(vec![
+        Figure { name: "fig4-trajectory", caption: format!("The flights in space.{seen}"), svg: trajectory },
+        chart(
+            "fig5-outputs",
+            "Position and yaw against their reference.",
+            "Outputs",
+            with_reference(),
+            outputs.into(),
+        )?,
+        chart(
+            "fig6-attitude",
+            "Roll and pitch against the angles that the position loop asks for.",
+            "Roll and pitch",
+            with_desired.collect(),
+            attitude.into(),
+        )?,
+        chart("fig7-errors", "Reference minus vehicle.", "Errors", law_legend().collect(), errors.into())?,
+        chart(
+            "fig8-inputs",
+            &format!("Inputs as the rotors give them.{jumps}"),
+            "Inputs",
+            law_legend().collect(),
+            controls.into(),
+        )?,
+    ])
+}
