@@ -5,7 +5,8 @@
 //! Runge-Kutta, gusts and parameter changes, nothing logged; items are steps.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a scenario that cannot be flown must stop the bench
 
-use afbc::{FlightController, Memory, Profile};
+use afbc::Profile;
+use afbc_control::{FlightController, Screened};
 use afbc_plant::{Drag, Model, Plant, Realism, Rotors, Sensing, Spread, Turbulence, Wind};
 use afbc_sim::case::Case;
 use afbc_sim::contender::ControllerKind;
@@ -34,7 +35,7 @@ fn recorded(model: Model, kind: ControllerKind) -> Vec<(State, Setpoint, RotorSp
     let (mut steps, mut index) = (Vec::new(), 0_usize);
     fly(&paper(model), &Contender::of(kind, Profile::Paper), |sample| {
         if index.is_multiple_of(60) {
-            steps.push((sample.motion.measure(), sample.reference.setpoint(), sample.command.speeds));
+            steps.push((sample.motion.measure(), sample.reference.setpoint(), sample.action.speeds));
         }
         index += 1;
     })
@@ -59,12 +60,12 @@ fn control_step(bencher: Bencher, kind: ControllerKind, gains: impl Build) {
 
 fn memory_and_step<C: FlightController>(bencher: Bencher, kind: ControllerKind, controller: &C) {
     let steps = recorded(Model::RigidBody, kind);
-    let mut memory = Memory::default();
+    let mut memory = Screened::default();
     let mut at = 0;
     bencher.counter(ItemsCount::new(1_usize)).bench_local(|| {
         let (state, setpoint, _) = &steps[at];
         at = if at + 1 == steps.len() { 0 } else { at + 1 };
-        controller.step(&mut memory, black_box(state), black_box(setpoint))
+        controller.step(&mut memory, Some(black_box(state)), black_box(setpoint))
     });
 }
 
@@ -110,11 +111,11 @@ fn closed_loop_of(bencher: Bencher, scenario: &Scenario, profile: Profile, gains
     let controller = || gains.controller(scenario.vehicle.to_f32(), settings).unwrap();
     bencher
         .counter(ItemsCount::new(STEPS))
-        .with_inputs(|| Flight::new(scenario, &settings, controller()).unwrap())
+        .with_inputs(|| Flight::new(scenario, controller()).unwrap())
         .bench_local_refs(|flight| {
             for _ in 0..STEPS {
                 let sample = flight.control();
-                flight.advance(&sample.command);
+                flight.advance(&sample.action);
             }
             flight.control().motion
         });

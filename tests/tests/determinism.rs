@@ -14,7 +14,7 @@ use proptest::test_runner::{RngSeed, TestRunner};
 
 /// Every number of a sample.
 fn numbers(sample: &Sample) -> impl Iterator<Item = u64> {
-    let (m, r, c) = (&sample.motion, &sample.reference, &sample.command);
+    let (m, r, a, t) = (&sample.motion, &sample.reference, &sample.action, &sample.trace);
     let wide = [sample.time_s, r.yaw_rad, r.yaw_rate_rad_s, r.yaw_acceleration_rad_s2].into_iter().chain(
         [
             m.position_m,
@@ -28,19 +28,19 @@ fn numbers(sample: &Sample) -> impl Iterator<Item = u64> {
         .into_iter()
         .flat_map(<[f64; 3]>::from),
     );
-    let u = &c.inputs;
+    let u = &t.inputs;
     let learnt = Axis::ALL.into_iter().flat_map(|axis| {
-        let (e, estimate) = (c.errors.get(axis), sample.estimates.get(axis));
+        let (e, estimate) = (t.errors.get(axis), sample.estimates.get(axis));
         let theta: [[f32; 3]; 3] = estimate.theta.into();
         [e.e1, e.e1_dot, e.e2, estimate.delta].into_iter().chain(theta.into_iter().flatten())
     });
     let narrow = [u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n]
         .into_iter()
-        .chain(c.virtual_m_s2)
-        .chain(c.desired_rad)
-        .chain(c.filtered.into_iter().flat_map(|f| [f.angle, f.rate]))
-        .chain(<[f32; 4]>::from(c.speeds.0))
-        .chain(<[f32; 4]>::from(c.forces.0))
+        .chain(t.virtual_m_s2)
+        .chain(t.desired_rad)
+        .chain(t.filtered.into_iter().flat_map(|f| [f.angle, f.rate]))
+        .chain(<[f32; 4]>::from(a.speeds.0))
+        .chain(<[f32; 4]>::from(a.forces.0))
         .chain(learnt);
     let wide: Vec<u64> = wide.map(f64::to_bits).collect();
     let narrow: Vec<u64> = narrow.map(|x| u64::from(x.to_bits())).collect();

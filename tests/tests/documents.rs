@@ -73,7 +73,7 @@ fn the_gains_of_the_profile_flight_are_those_on_its_page() {
     let plain = page.split_whitespace().collect::<Vec<_>>().join(" ");
     for sentence in [
         format!("a command filter of {} rad/s", settings.command_filter_rad_s),
-        format!("rotors that lag by 20 ms and give {} N each", settings.rotor_force_max_n),
+        format!("rotors that lag by 20 ms and give {} N each", settings.common.rotor_force_max_n),
         format!(
             "tilt {} rad, tilt rate {} rad/s, acceleration {} m/s2, and for errors a speed of {} m/s, {} m/s vertically",
             l.tilt_max_rad, l.tilt_rate_max_rad_s, l.acceleration_max_m_s2, l.speed_max_m_s, l.climb_max_m_s

@@ -1,8 +1,9 @@
 //! Ten hours of hovering in noise: the estimates of the profile `flight` stay, those of the law as printed drift.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
-use afbc::adaptive::Estimate;
-use afbc::{Adaptive, Cascade, Controller, FlightController, Memory, Profile};
+use afbc::{Adaptive, Cascade, Controller, Profile};
+use afbc_control::Estimate;
+use afbc_control::{FlightController, Screened};
 use afbc_plant::sensors::Spread;
 use afbc_plant::{Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors};
 use afbc_sim::contender::ControllerKind;
@@ -18,7 +19,7 @@ const HOUR: u64 = 3_600_000;
 /// A hover at 2 m with rotors of 20 ms and 3 N and noise of 0.001 on every state.
 struct Hover {
     controller: Controller<Adaptive>,
-    memory: Memory<Cascade<Estimate>>,
+    memory: Screened<Cascade<Estimate>>,
     plant: Plant,
     sensors: Sensors,
     setpoint: Setpoint,
@@ -37,7 +38,7 @@ impl Hover {
         let plant = Plant::with(Model::RigidBody, start, environment, &realism, STEP_S).unwrap();
         let sensors = Sensors::new(&Sensing { noise: Spread::all(0.001), ..Sensing::default() }, 11, STEP_S).unwrap();
         let setpoint = Setpoint { position_m: Vector3::new(0.0, 0.0, 2.0), ..Setpoint::default() };
-        Hover { controller, memory: Memory::default(), plant, sensors, setpoint }
+        Hover { controller, memory: Screened::default(), plant, sensors, setpoint }
     }
 
     /// Flies `steps`; returns how far the vehicle was from its place at most \[m\].
@@ -46,7 +47,7 @@ impl Hover {
         for _ in 0..steps {
             let motion = self.plant.motion();
             let state = self.sensors.measure(&motion).state;
-            let command = self.controller.step(&mut self.memory, &state, &self.setpoint);
+            let command = self.controller.step(&mut self.memory, Some(&state), &self.setpoint);
             self.plant.step(&command.speeds, STEP_S);
             furthest = furthest.max((motion.position_m - Vector3::new(0.0, 0.0, 2.0)).norm());
         }
@@ -121,8 +122,8 @@ fn the_printed_hover_is_lost_upwards_and_level() {
     let end: Vec<_> = run.log.iter().filter(|sample| sample.time_s > lost.time_s - 1.0).collect();
     let mean = |of: fn(&Sample) -> f32| end.iter().map(|sample| of(sample)).sum::<f32>() / end.len() as f32;
     let weight_n = (Parameters::PAPER.mass_kg * Parameters::PAPER.gravity_m_s2) as f32;
-    let given = mean(|sample| sample.command.forces.0.sum());
-    assert!(mean(|sample| sample.command.inputs.thrust_n) < -1000.0 && given > 1.1 * weight_n, "{given} N");
-    assert!(end.iter().any(|sample| sample.command.inputs.pitch_n.abs() > 0.5 * weight_n));
+    let given = mean(|sample| sample.action.forces.0.sum());
+    assert!(mean(|sample| sample.trace.inputs.thrust_n) < -1000.0 && given > 1.1 * weight_n, "{given} N");
+    assert!(end.iter().any(|sample| sample.trace.inputs.pitch_n.abs() > 0.5 * weight_n));
     assert_eq!(fly(ControllerKind::Backstepping).lost, None);
 }

@@ -1,11 +1,12 @@
 //! What the paper leaves open or gets wrong, held to what it was found to do: under the headings that `docs/paper.md` has for it.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
 
-use afbc::adaptive::{self, Estimate};
-use afbc::backstepping::{Errors, Tracking};
-use afbc::cascade::Context;
+use afbc::adaptive::{self};
 use afbc::fuzzy::{Basis, Membership};
-use afbc::{Adaptive, Backstepping, Cascade, Controller, FlightController, Law, Memory, Profile, Settings};
+use afbc::law::Context;
+use afbc::law::Tracking;
+use afbc::{Adaptive, Backstepping, Cascade, Controller, Law, Profile, Settings};
+use afbc_control::{Errors, Estimate, FlightController, Screened};
 use afbc_plant::{Environment, Model, Motion, Plant};
 use afbc_sim::case::{Case, Reading};
 use afbc_sim::contender::{Contender, ControllerKind, Law as Gains};
@@ -55,7 +56,7 @@ impl<L: Law> Law for Rateless<L> {
 /// Flies the scenario and tells whether the law held it: upright to the end and nearer than 1 m after 5 s.
 fn flies<L: Law>(scenario: &Scenario, settings: Settings, law: L) -> bool {
     let controller = Controller::new(scenario.vehicle.to_f32(), settings, law).unwrap();
-    let mut flight = Flight::new(scenario, &settings, controller).unwrap();
+    let mut flight = Flight::new(scenario, controller).unwrap();
     loop {
         let sample = flight.control();
         let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
@@ -66,7 +67,7 @@ fn flies<L: Law>(scenario: &Scenario, settings: Settings, law: L) -> bool {
         if !held || sample.time_s >= scenario.duration_s {
             return held;
         }
-        flight.advance(&sample.command);
+        flight.advance(&sample.action);
     }
 }
 
@@ -171,10 +172,10 @@ fn a_fast_roll_leaves_the_estimates_finite() {
         Adaptive::new(Profile::Paper.gains()).unwrap(),
     )
     .unwrap();
-    let mut memory = Memory::default();
+    let mut memory = Screened::default();
     for rate in [2.0, 10.0, 100.0, 1000.0] {
         let state = State { rates_rad_s: Vector3::new(rate, rate, rate), ..State::default() };
-        let command = controller.step(&mut memory, &state, &Setpoint::default());
+        let command = controller.step(&mut memory, Some(&state), &Setpoint::default());
         assert!(command.speeds.0.iter().all(|w| w.is_finite()));
         for axis in Axis::ALL {
             assert!(
@@ -200,7 +201,7 @@ fn trembling_mn(delta: f32, epsilon: f32) -> f64 {
     let law = Adaptive::new(gains).unwrap();
     let vehicle = Parameters::PAPER;
     let controller = Controller::new(vehicle.to_f32(), Profile::Paper.settings(), law).unwrap();
-    let mut memory: Memory<Cascade<Estimate>> = Memory::default();
+    let mut memory: Screened<Cascade<Estimate>> = Screened::default();
     memory.control.estimates.roll.delta = delta;
     // Held up by what the z subsystem would have learnt: the weight.
     memory.control.estimates.z.theta.fill((vehicle.mass_kg * vehicle.gravity_m_s2) as f32);
@@ -208,11 +209,12 @@ fn trembling_mn(delta: f32, epsilon: f32) -> f64 {
     let mut plant = Plant::new(Model::Simplified, start, Environment::calm(vehicle).unwrap());
     let (mut last, mut sum) = (0.0, 0.0);
     for step in 0..5000 {
-        let command = controller.step(&mut memory, &plant.motion().measure(), &Setpoint::default());
+        let command = controller.step(&mut memory, Some(&plant.motion().measure()), &Setpoint::default());
+        let roll_n = memory.control.inputs.roll;
         if step >= 4000 {
-            sum += f64::from(command.inputs.roll_n - last).abs();
+            sum += f64::from(roll_n - last).abs();
         }
-        last = command.inputs.roll_n;
+        last = roll_n;
         plant.step(&command.speeds, 0.001);
     }
     sum
@@ -252,7 +254,7 @@ fn trembling_by_delta(scenario: &Scenario) -> [f64; 2] {
     afbc_sim::flight::fly(scenario, &afbc(), |sample| {
         if let Some(last) = last.replace(*sample).filter(|last| last.time_s >= 5.0) {
             let above = usize::from(sample.estimates.roll.delta > 0.030);
-            sums[above] += 1000.0 * f64::from(sample.command.inputs.roll_n - last.command.inputs.roll_n).abs();
+            sums[above] += 1000.0 * f64::from(sample.trace.inputs.roll_n - last.trace.inputs.roll_n).abs();
             counts[above] += 1;
         }
     })

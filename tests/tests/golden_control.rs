@@ -3,12 +3,14 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // what cannot be built or is missing must stop the test
 
 use afbc::Safeguards;
-use afbc::adaptive::{Estimate, Gains, Subsystem};
-use afbc::allocation::Mixer;
-use afbc::backstepping::{self, Errors, Tracking, ideal, proportional};
+use afbc::adaptive::{Gains, Subsystem};
+use afbc::backstepping::{self, ideal, proportional};
 use afbc::cascade::desired_attitude;
 use afbc::fuzzy::{Basis, Membership};
+use afbc::law::Tracking;
 use afbc::model::Dynamics;
+use afbc_control::Estimate;
+use afbc_control::mixer::Mixer;
 use afbc_types::{Inputs, Parameters, RotorSpeeds};
 use flight_tests::{ROWS, Row, golden};
 use nalgebra::{Matrix3, Vector4};
@@ -76,7 +78,7 @@ fn afbc_subsystem_agrees_in_every_row() {
         let [x1_32, x2_32] = [x1 as f32, x2 as f32];
         let e1_32 = x1d as f32 - x1_32;
         let tracking = Tracking { x1: x1_32, x2: x2_32, e1: e1_32, x1d_dot: x1d_dot_32, ..Tracking::default() };
-        let errors = Errors::new(gains.backstepping.alpha1, &tracking);
+        let errors = tracking.errors(gains.backstepping.alpha1);
         let inputs_are_state = row.get("inputs_are_state") == 1.0;
         kinds[usize::from(inputs_are_state)] += 1;
         let inputs = if inputs_are_state { [tracking.x1, tracking.x2] } else { [errors.e1, errors.e1_dot] };
@@ -142,7 +144,7 @@ fn backstepping_agrees_in_every_row() {
             x1d_ddot: x1d_ddot as f32,
             limited: false,
         };
-        let errors = Errors::new(alpha1 as f32, &tracking);
+        let errors = tracking.errors(alpha1 as f32);
         let dynamics = Dynamics { f: f as f32, g: g as f32, g_dot: 0.0 };
         let u_eq = ideal(alpha1 as f32, &errors, tracking.x1d_ddot, &dynamics);
         let u = u_eq + proportional(alpha2 as f32, &errors);
@@ -201,7 +203,7 @@ fn desired_attitude_without_yaw_agrees_to_rounding() {
         let (forward, right) = (u5 * psi.cos() + u6 * psi.sin(), u5 * psi.sin() - u6 * psi.cos());
         let [phi_d, theta_d] = desired_attitude(forward as f32, -right as f32, 0.0, (1.0 / gravity) as f32);
         // micromath's sine of 0 is what it is; both tangents move by that share of the other component.
-        let sine_of_0 = f64::from(afbc::math::sin(0.0)).abs();
+        let sine_of_0 = f64::from(afbc_control::math::sin(0.0)).abs();
         let moved = (sine_of_0 + 8.0 * U) * (forward.abs() + right.abs()) / gravity;
         assert_within(&row, "theta_d_rad", theta_d, moved + 1.2e-7);
         assert_within(&row, "phi_d_rad", phi_d, moved * (1.0 + 0.385 * (right.abs() / gravity + moved)) + 1.2e-7);

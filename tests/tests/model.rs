@@ -2,7 +2,7 @@
 //! physics, which never see each other.
 #![allow(clippy::indexing_slicing, missing_docs)] // what is missing must stop the test
 
-use afbc::cascade::Context;
+use afbc::law::Context;
 use afbc::model;
 use afbc_plant::{Load, Motion, simplified};
 use afbc_types::{Axis, Parameters, PerAxis, State};

@@ -60,6 +60,6 @@ fn without_an_outage_the_flight_core_changes_nothing() {
 #[test]
 fn an_outage_to_the_end_ends_with_the_motors_off() {
     for (name, _, _, last) in outcomes(&scenario(f64::INFINITY, true)) {
-        assert!(last.time_s > 9.0 && last.command.speeds == afbc_types::RotorSpeeds::default(), "{name}: {last:?}");
+        assert!(last.time_s > 9.0 && last.action.speeds == afbc_types::RotorSpeeds::default(), "{name}: {last:?}");
     }
 }

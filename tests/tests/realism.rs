@@ -96,7 +96,7 @@ fn in_a_dropout_nothing_is_learnt() {
     let mut missed = 0;
     for (before, now) in samples.iter().zip(samples.iter().skip(1)) {
         let fresh = now.measurement.unwrap().fresh;
-        assert_eq!(now.command.health.state_rejected, !fresh);
+        assert_eq!(now.action.health.state_rejected, !fresh);
         if !fresh {
             missed += 1;
             assert_eq!(now.estimates, before.estimates, "at {} s", now.time_s);

@@ -1,7 +1,8 @@
 //! Flights on a tracker as they are: 100 states a second, each 10 ms late, through the flight core.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
-use afbc::{FlightController, Profile};
+use afbc::Profile;
+use afbc_control::FlightController;
 use afbc_flight_core::{ArmingLimits, Asked, Inbox, Memory, Mode, Request, Stamped, Vehicle};
 use afbc_sim::contender::{Build, Contender, ControllerKind, Law, Monitored};
 use afbc_sim::scenario::{Scenario, built_in};
@@ -34,13 +35,8 @@ impl Tracker {
 }
 
 /// Root mean square of the distance from the reference from 5 s on \[m\], and whether it flew to the end.
-fn fly<C: FlightController>(
-    scenario: &Scenario,
-    contender: &Contender,
-    controller: C,
-    mut tracker: Tracker,
-) -> (f64, bool) {
-    let vehicle = Vehicle::new(scenario.vehicle.to_f32(), contender.settings, ArmingLimits::NONE, controller).unwrap();
+fn fly<C: FlightController>(scenario: &Scenario, controller: C, mut tracker: Tracker) -> (f64, bool) {
+    let vehicle = Vehicle::new(scenario.vehicle.to_f32(), ArmingLimits::NONE, controller).unwrap();
     let (mut memory, mut inbox) = (Memory::default(), Inbox::default());
     let mut plant = scenario.plant(0.001).unwrap();
     let (mut squares, mut count) = (0.0, 0);
@@ -71,14 +67,12 @@ fn flown(scenario: &Scenario, kind: ControllerKind, tracker: Tracker) -> (f64, b
     let contender = Contender::of(kind, Profile::Flight);
     let (vehicle, settings) = (scenario.vehicle.to_f32(), contender.settings);
     match &contender.law {
-        Law::Afbc(gains) => fly(scenario, &contender, Monitored(gains).controller(vehicle, settings).unwrap(), tracker),
-        Law::Guarded(gains) => {
-            fly(scenario, &contender, Monitored(gains).controller(vehicle, settings).unwrap(), tracker)
-        }
-        Law::Backstepping(gains) => fly(scenario, &contender, gains.controller(vehicle, settings).unwrap(), tracker),
-        Law::Pid(gains) => fly(scenario, &contender, gains.controller(vehicle, settings).unwrap(), tracker),
-        Law::Geometric(gains) => fly(scenario, &contender, gains.controller(vehicle, settings).unwrap(), tracker),
-        Law::Indi(gains) => fly(scenario, &contender, gains.controller(vehicle, settings).unwrap(), tracker),
+        Law::Afbc(gains) => fly(scenario, Monitored(gains).controller(vehicle, settings).unwrap(), tracker),
+        Law::Guarded(gains) => fly(scenario, Monitored(gains).controller(vehicle, settings).unwrap(), tracker),
+        Law::Backstepping(gains) => fly(scenario, gains.controller(vehicle, settings).unwrap(), tracker),
+        Law::Pid(gains) => fly(scenario, gains.controller(vehicle, settings).unwrap(), tracker),
+        Law::Geometric(gains) => fly(scenario, gains.controller(vehicle, settings).unwrap(), tracker),
+        Law::Indi(gains) => fly(scenario, gains.controller(vehicle, settings).unwrap(), tracker),
     }
 }
 

@@ -2,8 +2,8 @@
 //! come from, and has the figures of `docs/vehicles.md`.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)] // a broken file must stop the test
 
-use afbc::allocation::HOVER_MARGIN;
 use afbc::guarded::HOVER_AUTHORITY;
+use afbc_control::mixer::HOVER_MARGIN;
 use afbc_types::Parameters;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! Vehicles of other sizes: whatever is not refused by name hovers under every law of the profile `flight`.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
-use afbc::{Guarded, Profile, Settings};
+use afbc::{Guarded, Profile};
 use afbc_plant::Environment;
 use afbc_sim::contender::{Contender, ControllerKind, Law};
 use afbc_sim::flight::fly;
@@ -27,7 +27,7 @@ fn scenario(vehicle: Parameters<f64>, force_max_n: f64) -> Scenario {
 fn hovers(kind: ControllerKind, vehicle: Parameters<f64>, margin: f64) -> Result<f64, String> {
     let force_max_n = margin * vehicle.mass_kg * vehicle.gravity_m_s2 / 4.0;
     let scenario = scenario(vehicle, force_max_n);
-    let settings = Settings { rotor_force_max_n: force_max_n as f32, ..Profile::Flight.settings() };
+    let settings = Profile::Flight.settings().with_rotor_force_max_n(force_max_n as f32);
     let mut contender = Contender::of(kind, Profile::Flight).for_vehicle(&vehicle);
     contender.settings = settings;
     if let Law::Afbc(gains) = contender.law {
@@ -37,7 +37,7 @@ fn hovers(kind: ControllerKind, vehicle: Parameters<f64>, margin: f64) -> Result
     let (mut distance_m, mut trip) = (f64::NAN, None);
     let lost = fly(&scenario, &contender, |sample| {
         distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
-        trip = trip.or(sample.command.health.trip);
+        trip = trip.or(sample.action.health.trip);
     });
     assert_eq!((lost.unwrap(), trip), (None, None), "{} {vehicle:?}", kind.name());
     Ok(distance_m)
@@ -107,15 +107,16 @@ fn vehicles_that_turn_too_slowly_are_refused() {
 /// `Guarded` of the profile `flight` in a perfect hover, whatever the vehicle weighs: it does not trip.
 #[test]
 fn a_perfect_hover_does_not_trip() {
-    use afbc::FlightController;
+    use afbc_control::FlightController;
     for mass_kg in [0.3, 0.486, 0.8, 0.97, 1.3, 2.0, 3.5] {
         let vehicle = Parameters { mass_kg, ..Parameters::PAPER.to_f32() };
-        let settings = Settings { rotor_force_max_n: mass_kg * 6.0, ..Profile::Flight.settings() };
+        let settings = Profile::Flight.settings().with_rotor_force_max_n(mass_kg * 6.0);
         let gains = Profile::Flight.gains_for(&vehicle);
         let guarded = Guarded::new(vehicle, settings, gains, afbc::monitor::Bounds::new(&gains, &vehicle)).unwrap();
-        let mut memory = afbc::Memory::default();
+        let mut memory = afbc_control::Screened::default();
         for _ in 0..5_000 {
-            let command = guarded.step(&mut memory, &afbc_types::State::default(), &afbc_types::Setpoint::default());
+            let command =
+                guarded.step(&mut memory, Some(&afbc_types::State::default()), &afbc_types::Setpoint::default());
             assert_eq!(command.health.trip, None, "{mass_kg} kg");
         }
         let learnt = Guarded::learnt(&memory.control);

@@ -1,10 +1,10 @@
 //! Adaptive fuzzy backstepping of one subsystem: the law (20)-(22) and its adaptation (32)-(34).
 
-use crate::backstepping::{self, Errors, Tracking, proportional};
-use crate::cascade::{Context, Law};
+use crate::backstepping::{self, proportional};
 use crate::fuzzy::{Basis, CENTRE, Membership, WIDTH};
-use crate::math;
+use crate::law::{Context, Law, Tracking};
 use crate::safeguards::{DEAD_ZONE, DELTA_MAX, KAPPA, SIGMA, Safeguards, THETA_MAX};
+use afbc_control::{Errors, Estimate, math};
 use afbc_types::{Axis, OutOfRange, PerAxis, Range};
 use nalgebra::{Matrix3, Vector3};
 
@@ -87,15 +87,6 @@ impl Gains {
     }
 }
 
-/// What one subsystem has learnt. Starts at zero.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Estimate {
-    /// Theta_hat, one consequent parameter a rule, laid out as [`Basis::weights`]; in the subsystem's input.
-    pub theta: Matrix3<f32>,
-    /// delta_hat: estimated bound of approximation error and disturbance; in the subsystem's input.
-    pub delta: f32,
-}
-
 /// How fast an [`Estimate`] learns and forgets; learning Theta_hat, gamma e_2 w(x), in its factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rate {
@@ -124,37 +115,35 @@ impl Rate {
     }
 }
 
-impl Estimate {
-    /// The estimate whose u_a is `input` whatever the errors are, for the weights of the rules sum to one.
-    pub fn of(input: f32) -> Self {
-        Estimate { theta: Matrix3::repeat(input), delta: 0.0 }
-    }
+/// The estimate whose u_a is `input` whatever the errors are, for the weights of the rules sum to one.
+pub fn even(input: f32) -> Estimate {
+    Estimate { theta: Matrix3::repeat(input), delta: 0.0 }
+}
 
-    /// The estimate whose u_a is `input` where the rules have these weights: as even over the rules as |Theta_hat| of
-    /// `norm_max` allows, and no smaller than the input takes.
-    fn spread(input: f32, weights: &Matrix3<f32>, norm_max: f32) -> Self {
-        // Of all such Theta_hat the smallest; what an even one has besides is at right angles to the weights.
-        let least = weights * (input / weights.norm_squared());
-        let rest = Matrix3::repeat(input) - least;
-        let room = math::max(norm_max * norm_max - least.norm_squared(), 0.0);
-        let square = rest.norm_squared();
-        let share = if square > room { math::sqrt(room / square) } else { 1.0 };
-        Estimate { theta: least + rest * share, delta: 0.0 }
-    }
+/// The estimate whose u_a is `input` where the rules have these weights: as even over the rules as |Theta_hat| of
+/// `norm_max` allows, and no smaller than the input takes.
+fn spread(input: f32, weights: &Matrix3<f32>, norm_max: f32) -> Estimate {
+    // Of all such Theta_hat the smallest; what an even one has besides is at right angles to the weights.
+    let least = weights * (input / weights.norm_squared());
+    let rest = Matrix3::repeat(input) - least;
+    let room = math::max(norm_max * norm_max - least.norm_squared(), 0.0);
+    let square = rest.norm_squared();
+    let share = if square > room { math::sqrt(room / square) } else { 1.0 };
+    Estimate { theta: least + rest * share, delta: 0.0 }
+}
 
-    /// One step of explicit Euler, projected into the bounds.
-    #[inline]
-    fn advance(&mut self, rate: &Rate, safeguards: &Safeguards, dt_s: f32) {
-        let Safeguards { theta_max, delta_max, .. } = *safeguards;
-        // What leaks faster than a step is long is gone after it; it does not turn round.
-        let keep = math::max(1.0 - rate.leakage * dt_s, 0.0);
-        self.theta = self.theta * keep + rate.first * (rate.theta * dt_s) * rate.second.transpose();
-        let square = self.theta.norm_squared();
-        if square > theta_max * theta_max {
-            self.theta *= theta_max / math::sqrt(square);
-        }
-        self.delta = math::min(self.delta * keep + rate.delta * dt_s, delta_max);
+/// One step of explicit Euler, projected into the bounds.
+#[inline]
+fn advance(estimate: &mut Estimate, rate: &Rate, safeguards: &Safeguards, dt_s: f32) {
+    let Safeguards { theta_max, delta_max, .. } = *safeguards;
+    // What leaks faster than a step is long is gone after it; it does not turn round.
+    let keep = math::max(1.0 - rate.leakage * dt_s, 0.0);
+    estimate.theta = estimate.theta * keep + rate.first * (rate.theta * dt_s) * rate.second.transpose();
+    let square = estimate.theta.norm_squared();
+    if square > theta_max * theta_max {
+        estimate.theta *= theta_max / math::sqrt(square);
     }
+    estimate.delta = math::min(estimate.delta * keep + rate.delta * dt_s, delta_max);
 }
 
 /// The three terms of (20).
@@ -224,7 +213,7 @@ impl Subsystem {
     ) -> f32 {
         let (terms, rate) = self.law(errors, [x1, x2], estimate, unallocated);
         if context.adapt {
-            estimate.advance(&rate, &self.gains.safeguards, context.dt_s);
+            advance(estimate, &rate, &self.gains.safeguards, context.dt_s);
         }
         terms.sum()
     }
@@ -263,12 +252,12 @@ impl Adaptive {
         })
     }
 
-    /// What the subsystem must have learnt to want `input` for these errors, with [`Estimate::spread`] over its rules;
+    /// What the subsystem must have learnt to want `input` for these errors, with an estimate spread over its rules;
     /// `x` is x_1, x_2 of an attitude.
     pub(crate) fn resumed(&self, axis: Axis, input: f32, x: [f32; 2], errors: &Errors, norm_max: f32) -> Estimate {
         let Subsystem { gains, basis, .. } = self.subsystems.get(axis);
         let fuzzy = input - proportional(gains.backstepping.alpha2, errors);
-        Estimate::spread(fuzzy, &basis.weights(fuzzy_inputs(axis, x, errors)), norm_max)
+        spread(fuzzy, &basis.weights(fuzzy_inputs(axis, x, errors)), norm_max)
     }
 }
 
@@ -278,7 +267,7 @@ impl Law for Adaptive {
     #[inline(always)]
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Estimate) -> (f32, Errors) {
         let subsystem = self.subsystems.get(axis);
-        let errors = Errors::new(subsystem.gains.backstepping.alpha1, tracking);
+        let errors = tracking.errors(subsystem.gains.backstepping.alpha1);
         let inputs = fuzzy_inputs(axis, [tracking.x1, tracking.x2], &errors);
         (subsystem.step(&errors, inputs, *context.unallocated.get(axis), context, estimate), errors)
     }
@@ -288,7 +277,7 @@ impl Law for Adaptive {
     }
 
     fn start(&self, estimates: &mut PerAxis<Estimate>, weight_n: f32) {
-        estimates.z = Estimate::of(weight_n);
+        estimates.z = even(weight_n);
     }
 
     fn hover_thrust_n(&self, z: &Estimate, weight_n: f32) -> f32 {

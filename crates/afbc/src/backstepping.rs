@@ -1,52 +1,14 @@
 //! Backstepping of one second-order subsystem (7), and the classical controller that the paper compares with.
 
-use crate::adaptive::Estimate;
-use crate::cascade::{Context, Law};
+use crate::law::{Context, Law, Tracking};
 use crate::model::{Dynamics, Model};
+use afbc_control::{Errors, Estimate};
 use afbc_types::{Axis, OutOfRange, Parameters, PerAxis, Range};
 
 /// Accepted alpha_1 \[1/s\].
 pub const ALPHA1: Range = Range::new("alpha1", 1e-2, 100.0);
 /// Accepted alpha_2, in the subsystem's input per m/s or rad/s.
 pub const ALPHA2: Range = Range::new("alpha2", 0.0, 1000.0);
-
-/// What a subsystem is and what it should be: x_1, x_2 and the reference with two derivatives. In m or rad, and seconds.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tracking {
-    /// x_1
-    pub x1: f32,
-    /// x_2 = d x_1/dt
-    pub x2: f32,
-    /// e_1 = x_1d - x_1 (9), for yaw the short way round.
-    pub e1: f32,
-    /// d x_1d/dt
-    pub x1d_dot: f32,
-    /// d^2 x_1d/dt^2
-    pub x1d_ddot: f32,
-    /// True if e_1 is less than the distance, since that would ask for more speed than is allowed.
-    pub limited: bool,
-}
-
-/// Backstepping errors of one subsystem.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Errors {
-    /// e_1 (9)
-    pub e1: f32,
-    /// d e_1/dt = d x_1d/dt - x_2
-    pub e1_dot: f32,
-    /// e_2 (12)
-    pub e2: f32,
-}
-
-impl Errors {
-    /// (9), (12): e_2 = d x_1d/dt + alpha_1 e_1 - x_2.
-    #[inline]
-    pub fn new(alpha1: f32, tracking: &Tracking) -> Self {
-        let e1 = tracking.e1;
-        let e1_dot = tracking.x1d_dot - tracking.x2;
-        Errors { e1, e1_dot, e2: e1_dot + alpha1 * e1 }
-    }
-}
 
 /// The ideal law u*_eq (16), for known f, g and dg/dt.
 #[inline]
@@ -73,7 +35,7 @@ pub fn proportional(alpha2: f32, errors: &Errors) -> f32 {
 #[inline]
 pub(crate) fn classical(gains: &Gains, tracking: &Tracking, dynamics: &Dynamics) -> (f32, Errors) {
     let Gains { alpha1, alpha2 } = *gains;
-    let errors = Errors::new(alpha1, tracking);
+    let errors = tracking.errors(alpha1);
     let ideal = if tracking.limited {
         compensated(tracking.x1d_ddot, errors.e2, dynamics)
     } else {

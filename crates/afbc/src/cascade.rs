@@ -1,95 +1,59 @@
 //! Six subsystems in one cascade: position gives thrust and desired attitude, attitude gives U1..U3, all give rotor
 //! speeds. Section III-D, Fig. 2.
 
-use crate::adaptive::Estimate;
-use crate::allocation::{Allocation, FORCE_MAX, Mixer};
-use crate::backstepping::{Errors, Tracking};
-use crate::command_filter::{CommandFilter, Filtered};
 use crate::ground::Ground;
+use crate::law::{Context, Law, Tracking};
 use crate::limits::Limits;
-use crate::math;
-use crate::monitor::Trip;
-use afbc_types::{Axis, Inputs, OutOfRange, Parameters, PerAxis, Range, RotorForces, RotorSpeeds, Setpoint, State};
+use afbc_control::command_filter::{BANDWIDTH, CommandFilter, Filtered};
+use afbc_control::mixer::{Allocation, Mixer};
+use afbc_control::{Action, Errors, Estimate, FlightController, Health, Trace, math};
+use afbc_types::{Axis, Inputs, OutOfRange, Parameters, PerAxis, Setpoint, State};
 use nalgebra::Vector3;
-
-/// Accepted time between steps \[s\].
-pub const DT: Range = Range::new("dt_s", 1e-4, 0.02);
 
 /// Least vertical part of thrust over weight that a tilt is worked out with: what sinks faster does not tilt more. Ours.
 pub const VERTICAL_MIN: f32 = 0.3;
 
-/// How one subsystem turns its errors into its input. AFBC and the baseline differ in nothing else.
-pub trait Law {
-    /// What the law remembers of one subsystem from step to step.
-    type Estimate: Copy + Default + core::fmt::Debug;
-
-    /// u_i in the subsystem's own unit (N for roll, pitch, yaw and z; m/s2 for x and y), with the errors behind it.
-    /// May update the estimate, if the context lets it.
-    fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Self::Estimate)
-    -> (f32, Errors);
-
-    /// alpha_1 of the subsystem \[1/s\].
-    fn alpha1(&self, axis: Axis) -> f32;
-
-    /// Turns estimates that know nothing yet into those to start from in flight, for a vehicle of this weight.
-    fn start(&self, _estimates: &mut PerAxis<Self::Estimate>, _weight_n: f32) {}
-
-    /// U4 that it takes to hover \[N\], by the estimate of the z subsystem; for a law that does not know, the weight.
-    fn hover_thrust_n(&self, _z: &Self::Estimate, weight_n: f32) -> f32 {
-        weight_n
-    }
-
-    /// What `estimate` holds in AFBC's terms, for logs and monitors; zero for a law that learns nothing.
-    fn learnt(estimate: &Self::Estimate) -> Estimate;
-}
-
-/// What all six subsystems share in one step.
-#[derive(Clone, Copy, Debug)]
-pub struct Context<'a> {
-    /// The state that the step works from.
-    pub state: &'a State,
-    /// omega of (6), as last commanded \[rad/s\].
-    pub rotor_residual_rad_s: f32,
-    /// Time step \[s\].
-    pub dt_s: f32,
-    /// False if estimates must stay as they are.
-    pub adapt: bool,
-    /// What each subsystem wanted of its input in the last step and could not have; zero if it is not to care.
-    pub unallocated: PerAxis<f32>,
-}
-
 /// Settings of the cascade around the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Time between steps \[s\].
-    pub dt_s: f32,
+    /// What every controller has to know.
+    pub common: afbc_control::Settings,
     /// Bandwidth of the filter on phi_d and theta_d \[rad/s\].
     pub command_filter_rad_s: f32,
-    /// Largest force of one rotor \[N\].
-    pub rotor_force_max_n: f32,
     /// What position control may ask for.
     pub limits: Limits,
     /// Whether the desired attitude comes from the thrust really commanded; otherwise from (39), the thrust of hovering.
     pub tilt_by_thrust: bool,
     /// Whether an estimate stops growing towards a limit of rotors, tilt or acceleration that has been reached.
-    pub heed_saturation: bool,
+    pub anti_windup: bool,
     /// Whether estimates stay as they are, and rotors give thrust alone, while the vehicle stands on the
     /// [`ground`](crate::ground).
-    pub heed_ground: bool,
+    pub freeze_on_ground: bool,
     /// Whether to take over a vehicle in flight as it is: estimates that carry its weight, a command filter that starts
     /// at its attitude. The paper starts from estimates of zero and at its first command.
     pub bumpless: bool,
 }
 
 impl Settings {
+    /// The same with another time between steps.
+    pub const fn with_dt_s(mut self, dt_s: f32) -> Self {
+        self.common.dt_s = dt_s;
+        self
+    }
+
+    /// The same with rotors of another largest force.
+    pub const fn with_rotor_force_max_n(mut self, force_n: f32) -> Self {
+        self.common.rotor_force_max_n = force_n;
+        self
+    }
+
     /// Checks every setting.
     ///
     /// # Errors
     /// The first one out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
-        DT.check(self.dt_s)?;
-        crate::command_filter::BANDWIDTH.check(self.command_filter_rad_s)?;
-        FORCE_MAX.check(self.rotor_force_max_n)?;
+        self.common.validate()?;
+        BANDWIDTH.check(self.command_filter_rad_s)?;
         self.limits.validate()
     }
 }
@@ -111,6 +75,15 @@ pub struct Controller<L> {
     error_max_m: Vector3<f32>,
 }
 
+/// Desired roll and pitch of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Desired {
+    /// phi_d, theta_d of (40) \[rad\].
+    rad: [f32; 2],
+    /// What the command filter made of the ones before: what roll and pitch tracked.
+    filtered: [Filtered; 2],
+}
+
 /// What the cascade remembers between steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cascade<E> {
@@ -118,8 +91,10 @@ pub struct Cascade<E> {
     pub estimates: PerAxis<E>,
     /// Errors of each subsystem in the last step.
     pub errors: PerAxis<Errors>,
-    /// Filtered phi_d and theta_d; none before the first step.
-    filtered: Option<[Filtered; 2]>,
+    /// What each subsystem wanted in the last step: U1..U4 \[N\], u5, u6 \[m/s2\].
+    pub inputs: PerAxis<f32>,
+    /// What roll and pitch were to be in the last step; none before the first.
+    desired: Option<Desired>,
     /// See [`Context::unallocated`].
     unallocated: PerAxis<f32>,
     ground: Ground,
@@ -129,53 +104,21 @@ pub struct Cascade<E> {
 impl<E> Cascade<E> {
     /// The same flight with other estimates, of another law.
     pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>) -> Cascade<F> {
-        let Cascade { errors, filtered, unallocated, ground, rotor_residual_rad_s, .. } = *self;
-        Cascade { estimates, errors, filtered, unallocated, ground, rotor_residual_rad_s }
+        let Cascade { errors, inputs, desired, unallocated, ground, rotor_residual_rad_s, .. } = *self;
+        Cascade { estimates, errors, inputs, desired, unallocated, ground, rotor_residual_rad_s }
     }
-}
 
-/// What went wrong in a step; all false in normal flight.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Health {
-    /// The measurement was implausible (see [`State::is_plausible`]); the last plausible one stood in for it and no
-    /// estimate changed. If there was none yet, the rotors stay still.
-    pub state_rejected: bool,
-    /// The setpoint was implausible; the last plausible one stood in for it, or if there was none yet, a hold of the
-    /// position of that moment.
-    pub setpoint_rejected: bool,
-    /// A rotor was asked for a force outside its limits.
-    pub saturated: bool,
-    /// Why AFBC does not fly any more, if its [`monitor`](crate::monitor) has tripped.
-    pub trip: Option<Trip>,
-}
-
-/// What one step decides, and why.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Command {
-    /// omega_i, always finite and never negative.
-    pub speeds: RotorSpeeds,
-    /// F_i, within the rotors' limits.
-    pub forces: RotorForces,
-    /// U1..U4 as the law wants them, before rotor limits.
-    pub inputs: Inputs,
-    /// u5, u6: wanted acceleration along x and y \[m/s2\].
-    pub virtual_m_s2: [f32; 2],
-    /// phi_d, theta_d of (40) \[rad\].
-    pub desired_rad: [f32; 2],
-    /// phi_d, theta_d behind the command filter: what roll and pitch track.
-    pub filtered: [Filtered; 2],
-    /// Errors of each subsystem.
-    pub errors: PerAxis<Errors>,
-    /// What went wrong.
-    pub health: Health,
-}
-
-impl Command {
-    /// What each subsystem wants: U1..U4 \[N\], u5, u6 \[m/s2\].
-    pub fn per_axis(&self) -> PerAxis<f32> {
-        let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = self.inputs;
-        let [x, y] = self.virtual_m_s2;
-        PerAxis { roll: roll_n, pitch: pitch_n, yaw: yaw_n, z: thrust_n, x, y }
+    /// Why the last step decided as it did.
+    pub(crate) fn trace(&self) -> Trace {
+        let PerAxis { roll, pitch, yaw, z, x, y } = self.inputs;
+        let Desired { rad, filtered } = self.desired.unwrap_or(Desired { rad: [0.0; 2], filtered: Default::default() });
+        Trace {
+            inputs: Inputs { roll_n: roll, pitch_n: pitch, yaw_n: yaw, thrust_n: z },
+            virtual_m_s2: [x, y],
+            desired_rad: rad,
+            filtered,
+            errors: self.errors,
+        }
     }
 }
 
@@ -207,15 +150,15 @@ impl<L: Law> Controller<L> {
                 error_max(Axis::Z, climb_max_m_s),
             ),
             law,
-            mixer: Mixer::new(&vehicle, settings.rotor_force_max_n)?,
-            filter: CommandFilter::new(settings.command_filter_rad_s, settings.dt_s)?
+            mixer: Mixer::new(&vehicle, settings.common.rotor_force_max_n)?,
+            filter: CommandFilter::new(settings.command_filter_rad_s, settings.common.dt_s)?
                 .limited(settings.limits.tilt_rate_max_rad_s)?,
             settings,
             weight_n: vehicle.mass_kg * vehicle.gravity_m_s2,
             gravity_m_s2: vehicle.gravity_m_s2,
             inverse_gravity: 1.0 / vehicle.gravity_m_s2,
             tilt_max_tan: math::tan(settings.limits.tilt_max_rad),
-            thrust_max_n: 4.0 * settings.rotor_force_max_n,
+            thrust_max_n: 4.0 * settings.common.rotor_force_max_n,
         })
     }
 
@@ -241,10 +184,10 @@ impl<L: Law> Controller<L> {
     /// True if the ground carries the vehicle, as far as that is heeded.
     #[inline]
     pub(crate) fn stands(&self, memory: &Cascade<L::Estimate>) -> bool {
-        self.settings.heed_ground && memory.ground.standing()
+        self.settings.freeze_on_ground && memory.ground.standing()
     }
 
-    /// (7)-(40) in their order; `fresh` as in [`FlightController::decide`](crate::FlightController::decide).
+    /// (7)-(40) in their order; `fresh` as in [`FlightController::decide`].
     #[inline(always)]
     pub(crate) fn cascade(
         &self,
@@ -252,15 +195,15 @@ impl<L: Law> Controller<L> {
         state: &State,
         setpoint: &Setpoint,
         fresh: bool,
-    ) -> Command {
-        if memory.filtered.is_none() && self.settings.bumpless {
+    ) -> Action {
+        if memory.desired.is_none() && self.settings.bumpless {
             self.law.start(&mut memory.estimates, self.weight_n);
         }
         let stands = self.stands(memory);
         let context = Context {
             state,
             rotor_residual_rad_s: memory.rotor_residual_rad_s,
-            dt_s: self.settings.dt_s,
+            dt_s: self.settings.common.dt_s,
             adapt: fresh && !stands,
             unallocated: memory.unallocated,
         };
@@ -301,7 +244,12 @@ impl<L: Law> Controller<L> {
         let [phi_d, theta_d] = desired_rad;
         let at_rest = |angle| Filtered { angle, rate: 0.0 };
         let start = if self.settings.bumpless { [eta.x, eta.y] } else { desired_rad };
-        let filtered = memory.filtered.unwrap_or(start.map(at_rest));
+        let filtered = match &memory.desired {
+            None => start.map(at_rest),
+            Some(Desired { rad: [phi_d, theta_d], filtered: [roll_d, pitch_d] }) => {
+                [self.filter.advance(roll_d, *phi_d), self.filter.advance(pitch_d, *theta_d)]
+            }
+        };
         let [roll_d, pitch_d] = filtered;
 
         // Attitude: subsystems 1, 2, 3.
@@ -328,10 +276,11 @@ impl<L: Law> Controller<L> {
         let speeds = self.mixer.speeds(&forces);
         let health = Health { saturated, ..Health::default() };
 
-        memory.filtered = Some([self.filter.advance(&roll_d, phi_d), self.filter.advance(&pitch_d, theta_d)]);
-        memory.ground.advance(u4, self.weight_n, &state.velocity_m_s, self.settings.dt_s);
+        memory.inputs = PerAxis { roll: u1, pitch: u2, yaw: u3, z: u4, x: u5, y: u6 };
+        memory.desired = Some(Desired { rad: desired_rad, filtered });
+        memory.ground.advance(u4, self.weight_n, &state.velocity_m_s, self.settings.common.dt_s);
         memory.rotor_residual_rad_s = speeds.residual_rad_s();
-        if self.settings.heed_saturation {
+        if self.settings.anti_windup {
             memory.unallocated = PerAxis {
                 roll: unallocated.roll_n,
                 pitch: unallocated.pitch_n,
@@ -341,6 +290,31 @@ impl<L: Law> Controller<L> {
                 y: u6 - a6,
             };
         }
-        Command { speeds, forces, inputs, virtual_m_s2: [u5, u6], desired_rad, filtered, errors: memory.errors, health }
+        Action { speeds, forces, health }
+    }
+}
+
+impl<L: Law> FlightController for Controller<L> {
+    type Memory = Cascade<L::Estimate>;
+
+    fn dt_s(&self) -> f32 {
+        self.settings.common.dt_s
+    }
+
+    fn mixer(&self) -> &Mixer {
+        &self.mixer
+    }
+
+    #[inline(always)]
+    fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
+        self.cascade(memory, state, setpoint, fresh)
+    }
+
+    fn trace(memory: &Self::Memory) -> Trace {
+        memory.trace()
+    }
+
+    fn learnt(memory: &Self::Memory) -> PerAxis<Estimate> {
+        PerAxis::from_fn(|axis| L::learnt(memory.estimates.get(axis)))
     }
 }

@@ -12,7 +12,7 @@
 //! exponential an input, of a number never positive, over a sum never below q. So no finite input overflows, divides
 //! zero by zero or loses all its weights, where (18) as printed does from 1.7 rad/s on in `f32`.
 
-use crate::math;
+use afbc_control::math;
 use afbc_types::{OutOfRange, Range};
 use nalgebra::{Matrix3, Vector3};
 

@@ -1,16 +1,13 @@
 //! AFBC under its [monitor](crate::monitor): when that trips, [integral backstepping](crate::integral) flies on from the
 //! very inputs at hand, and AFBC takes over again on command only.
 
-use crate::adaptive::{self, Adaptive, Estimate};
-use crate::allocation::Mixer;
-use crate::backstepping::Errors;
-use crate::cascade::{Cascade, Command, Controller, Settings};
-use crate::flight_controller::FlightController;
+use crate::adaptive::{self, Adaptive};
+use crate::cascade::{Cascade, Controller, Settings};
 use crate::integral::{Integral, IntegralBackstepping};
-use crate::math;
 use crate::model::Model;
-use crate::monitor::{Bounds, Figures, Monitor, Trip};
+use crate::monitor::{Bounds, Figures, Monitor};
 use crate::safeguards::THETA_MAX;
+use afbc_control::{Action, Errors, Estimate, FlightController, Mixer, Trace, Trip, math};
 use afbc_types::{Axis, OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
 use nalgebra::Vector3;
 
@@ -34,9 +31,9 @@ pub struct Guarded {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct StandIn {
     cascade: Cascade<Integral>,
-    /// Its last command. Kept here: coming back from a call, it would have a command put together in memory on AFBC's
-    /// path, too.
-    command: Command,
+    /// Its last action. Kept here: coming back from a call, it would have an action put together in memory on AFBC's path,
+    /// too.
+    action: Action,
 }
 
 /// What the other law goes on from.
@@ -90,7 +87,7 @@ impl Guarded {
     ///
     /// # Errors
     /// The first parameter, setting, gain or bound out of range; among them `rotor_force_max_n`, if the rotors do not lift
-    /// the vehicle [with a margin](crate::allocation::HOVER_MARGIN), `theta_max` of z, if |Theta_hat| has no room for
+    /// the vehicle [with a margin](afbc_control::mixer::HOVER_MARGIN), `theta_max` of z, if |Theta_hat| has no room for
     /// [`HOVER_THETA`] weights, and [`HOVER_AUTHORITY`], if they turn it too slowly.
     pub fn new(
         vehicle: Parameters,
@@ -99,19 +96,19 @@ impl Guarded {
         bounds: Bounds,
     ) -> Result<Self, OutOfRange> {
         let weight_n = vehicle.mass_kg * vehicle.gravity_m_s2;
-        Mixer::new(&vehicle, settings.rotor_force_max_n)?.check_hover(weight_n)?;
+        Mixer::new(&vehicle, settings.common.rotor_force_max_n)?.check_hover(weight_n)?;
         let hover = Range { min: libm::ceil(f64::from(HOVER_THETA * weight_n) * 1e4) / 1e4, ..THETA_MAX };
         hover.check(gains.z.safeguards.theta_max)?;
         // Two rotors at work, one up, one down, by what both have room for.
         let (hover_n, model) = (0.25 * weight_n, Model::new(&vehicle));
-        let swing_n = 2.0 * math::min(hover_n, settings.rotor_force_max_n - hover_n);
+        let swing_n = 2.0 * math::min(hover_n, settings.common.rotor_force_max_n - hover_n);
         HOVER_AUTHORITY.check(swing_n * model.hover_gain(Axis::Roll))?;
         HOVER_AUTHORITY.check(swing_n * model.hover_gain(Axis::Pitch))?;
         let fixed = PerAxis::from_fn(|axis| gains.get(axis).into());
         Ok(Guarded {
             adaptive: Controller::new(vehicle, settings, Adaptive::new(gains)?)?,
             fallback: Controller::new(vehicle, settings, IntegralBackstepping::new(&vehicle, fixed)?)?,
-            monitor: Monitor::new(&vehicle, bounds, settings.dt_s)?,
+            monitor: Monitor::new(&vehicle, bounds, settings.common.dt_s)?,
         })
     }
 
@@ -124,16 +121,16 @@ impl Guarded {
         (afbc, tripped): (&Cascade<Estimate>, &mut Tripped),
         (state, setpoint): (&State, &Setpoint),
         fresh: bool,
-    ) -> &'a Command {
-        let StandIn { cascade, command } = memory.get_or_insert_with(|| {
+    ) -> &'a Action {
+        let StandIn { cascade, action } = memory.get_or_insert_with(|| {
             let hover_thrust_n = Some(self.adaptive.hover_thrust_n(afbc));
             let resume = |axis| Integral { value: 0.0, resume: Some(*tripped.last.inputs.get(axis)), hover_thrust_n };
-            StandIn { cascade: afbc.handed_over(PerAxis::from_fn(resume)), command: Command::default() }
+            StandIn { cascade: afbc.handed_over(PerAxis::from_fn(resume)), action: Action::default() }
         });
-        *command = self.fallback.cascade(cascade, state, setpoint, fresh);
-        command.health.trip = Some(tripped.trip);
-        tripped.last = Last::new(command.per_axis(), state);
-        command
+        *action = self.fallback.cascade(cascade, state, setpoint, fresh);
+        action.health.trip = Some(tripped.trip);
+        tripped.last = Last::new(cascade.inputs, state);
+        action
     }
 
     /// What AFBC must have learnt to go on from the last inputs.
@@ -154,21 +151,35 @@ impl Guarded {
 impl FlightController for Guarded {
     type Memory = Memory;
 
+    fn dt_s(&self) -> f32 {
+        self.adaptive.dt_s()
+    }
+
+    fn mixer(&self) -> &Mixer {
+        self.adaptive.mixer()
+    }
+
     #[inline(always)]
-    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
+    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
         let Memory { afbc, figures, tripped, stand_in } = memory;
         if let Some(tripped) = tripped {
             return *self.stand_in(stand_in, (afbc, tripped), (state, setpoint), fresh);
         }
-        let command = self.adaptive.cascade(afbc, state, setpoint, fresh);
+        let action = self.adaptive.cascade(afbc, state, setpoint, fresh);
         // On the ground a law may ask for less than nothing, for as long as it likes.
         if !self.adaptive.stands(afbc) {
-            let inputs = command.per_axis();
-            if let Some(trip) = self.monitor.watch(figures, afbc, &inputs, command.health.saturated) {
-                *tripped = Some(Tripped { trip, last: Last::new(inputs, state) });
+            if let Some(trip) = self.monitor.watch(figures, afbc, action.health.saturated) {
+                *tripped = Some(Tripped { trip, last: Last::new(afbc.inputs, state) });
             }
         }
-        command
+        action
+    }
+
+    fn trace(memory: &Memory) -> Trace {
+        match &memory.stand_in {
+            Some(stand_in) => stand_in.cascade.trace(),
+            None => memory.afbc.trace(),
+        }
     }
 
     fn engage(&self, memory: &mut Memory) -> bool {

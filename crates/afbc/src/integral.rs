@@ -9,12 +9,12 @@
 //! g i*: the integral is (34) with a single rule. Krstic, Kanellakopoulos, Kokotovic, *Nonlinear and Adaptive Control
 //! Design*, 1995, section 4.2.
 
-use crate::adaptive::{self, Estimate, GAMMA};
-use crate::backstepping::{self, Errors, Tracking, classical};
-use crate::cascade::{Context, Law};
-use crate::math;
+use crate::adaptive::{self, GAMMA};
+use crate::backstepping::{self, classical};
+use crate::law::{Context, Law, Tracking};
 use crate::model::Model;
 use crate::safeguards::THETA_MAX;
+use afbc_control::{Errors, Estimate, math};
 use afbc_types::{Axis, OutOfRange, Parameters, PerAxis};
 
 /// Gains of one subsystem.

@@ -1,11 +1,10 @@
 //! Limits of the cascade: what position control may ask of the vehicle. Ours; the paper has none.
 
+pub use afbc_control::command_filter::RATE_MAX as TILT_RATE;
 use afbc_types::{OutOfRange, Range};
 
 /// Accepted largest tilt \[rad\].
 pub const TILT: Range = Range::new("tilt_max_rad", 0.05, 1.57);
-/// Accepted largest rate of the desired roll and pitch, each \[rad/s\].
-pub const TILT_RATE: Range = Range::new("tilt_rate_max_rad_s", 0.1, 1e6);
 /// Accepted largest horizontal acceleration \[m/s2\].
 pub const ACCELERATION: Range = Range::new("acceleration_max_m_s2", 0.1, 1e6);
 /// Accepted largest speed for an error along x and along y \[m/s\].

@@ -1,7 +1,7 @@
 //! The nominal model (7) that the baseline inverts: f_i, g_i without disturbances (A_F = A_T = 0).
 
-use crate::cascade::Context;
-use crate::math;
+use crate::law::Context;
+use afbc_control::math;
 use afbc_types::{Axis, Parameters};
 
 /// d x_2/dt = f + g u of one subsystem, and dg/dt.

@@ -12,10 +12,10 @@
 //!
 //! Norms and V_e are looked at for one subsystem a step, so each is at most six steps old.
 
-use crate::adaptive::{self, Estimate};
+use crate::adaptive;
 use crate::cascade::Cascade;
-use crate::math;
 use crate::model::Model;
+use afbc_control::{Estimate, Trip, math};
 use afbc_types::{Axis, OutOfRange, Parameters, PerAxis, Range};
 
 /// Accepted bounds on |Theta_hat|, delta_hat and V_e.
@@ -82,52 +82,6 @@ impl Bounds {
         SATURATION_SHARE.check(self.saturation_share)?;
         SWING.check(self.swing_n)?;
         SWINGS.check(self.swings_hz)
-    }
-}
-
-/// Why the law is no longer trusted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Trip {
-    /// |Theta_hat| passed its bound.
-    Theta(Axis),
-    /// delta_hat passed its bound.
-    Delta(Axis),
-    /// Errors stayed large.
-    Lyapunov(Axis),
-    /// Rotors stayed at their limits.
-    Saturation,
-    /// An input swings to and fro; z stands for the thrust.
-    LimitCycle(Axis),
-}
-
-impl Trip {
-    /// The reason in words, at most 50 characters.
-    pub const fn reason(self) -> &'static str {
-        match self {
-            Trip::Theta(Axis::Roll) => "AFBC off: Theta_hat of roll out of bounds",
-            Trip::Theta(Axis::Pitch) => "AFBC off: Theta_hat of pitch out of bounds",
-            Trip::Theta(Axis::Yaw) => "AFBC off: Theta_hat of yaw out of bounds",
-            Trip::Theta(Axis::Z) => "AFBC off: Theta_hat of z out of bounds",
-            Trip::Theta(Axis::X) => "AFBC off: Theta_hat of x out of bounds",
-            Trip::Theta(Axis::Y) => "AFBC off: Theta_hat of y out of bounds",
-            Trip::Delta(Axis::Roll) => "AFBC off: delta_hat of roll out of bounds",
-            Trip::Delta(Axis::Pitch) => "AFBC off: delta_hat of pitch out of bounds",
-            Trip::Delta(Axis::Yaw) => "AFBC off: delta_hat of yaw out of bounds",
-            Trip::Delta(Axis::Z) => "AFBC off: delta_hat of z out of bounds",
-            Trip::Delta(Axis::X) => "AFBC off: delta_hat of x out of bounds",
-            Trip::Delta(Axis::Y) => "AFBC off: delta_hat of y out of bounds",
-            Trip::Lyapunov(Axis::Roll) => "AFBC off: errors of roll stay large",
-            Trip::Lyapunov(Axis::Pitch) => "AFBC off: errors of pitch stay large",
-            Trip::Lyapunov(Axis::Yaw) => "AFBC off: errors of yaw stay large",
-            Trip::Lyapunov(Axis::Z) => "AFBC off: errors of z stay large",
-            Trip::Lyapunov(Axis::X) => "AFBC off: errors of x stay large",
-            Trip::Lyapunov(Axis::Y) => "AFBC off: errors of y stay large",
-            Trip::Saturation => "AFBC off: rotors stay saturated",
-            Trip::LimitCycle(Axis::Roll) => "AFBC off: limit cycle of U1 (roll)",
-            Trip::LimitCycle(Axis::Pitch) => "AFBC off: limit cycle of U2 (pitch)",
-            Trip::LimitCycle(Axis::Yaw) => "AFBC off: limit cycle of U3 (yaw)",
-            Trip::LimitCycle(_) => "AFBC off: limit cycle of U4 (thrust)",
-        }
     }
 }
 
@@ -219,7 +173,7 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// A monitor that is called every `dt_s` seconds (valid in [`crate::cascade::DT`]).
+    /// A monitor that is called every `dt_s` seconds (valid in [`afbc_control::settings::DT`]).
     ///
     /// # Errors
     /// The first bound or parameter out of range.
@@ -240,15 +194,9 @@ impl Monitor {
         0.75 * self.bounds.theta.get(axis)
     }
 
-    /// Takes one step into account; tells what is wrong, if anything is. `inputs` are U1..U4 \[N\], u5, u6 \[m/s2\].
+    /// Takes one step into account; tells what is wrong, if anything is.
     #[inline]
-    pub fn watch(
-        &self,
-        figures: &mut Figures,
-        cascade: &Cascade<Estimate>,
-        inputs: &PerAxis<f32>,
-        saturated: bool,
-    ) -> Option<Trip> {
+    pub fn watch(&self, figures: &mut Figures, cascade: &Cascade<Estimate>, saturated: bool) -> Option<Trip> {
         let axis = figures.axis.next();
         figures.axis = axis;
 
@@ -271,6 +219,7 @@ impl Monitor {
             swing.advance(input, swing_n, self.forget);
             swing.rate_hz > swings_hz
         };
+        let inputs = &cascade.inputs;
         let cycles = [
             (cycles(roll, inputs.roll), Axis::Roll),
             (cycles(pitch, inputs.pitch), Axis::Pitch),

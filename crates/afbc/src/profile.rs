@@ -77,19 +77,18 @@ impl Profile {
     /// Settings of the cascade.
     pub const fn settings(self) -> Settings {
         let paper = Settings {
-            dt_s: 0.001,
+            common: afbc_control::Settings { dt_s: 0.001, rotor_force_max_n: 1e4 },
             command_filter_rad_s: 40.0,
-            rotor_force_max_n: 1e4,
             limits: Limits::NONE,
             tilt_by_thrust: false,
-            heed_saturation: false,
-            heed_ground: false,
+            anti_windup: false,
+            freeze_on_ground: false,
             bumpless: false,
         };
         match self {
             Profile::Paper => paper,
             Profile::Flight => Settings {
-                rotor_force_max_n: 3.0,
+                common: afbc_control::Settings { dt_s: 0.001, rotor_force_max_n: 3.0 },
                 limits: Limits {
                     tilt_max_rad: 0.7,
                     tilt_rate_max_rad_s: 6.0,
@@ -99,8 +98,8 @@ impl Profile {
                 },
                 command_filter_rad_s: 66.7,
                 tilt_by_thrust: true,
-                heed_saturation: true,
-                heed_ground: true,
+                anti_windup: true,
+                freeze_on_ground: true,
                 bumpless: true,
                 ..paper
             },

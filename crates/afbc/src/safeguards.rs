@@ -12,7 +12,7 @@
 //! * kappa > 0: e-modification, Narendra and Annaswamy 1987. The same, but only while there is an error to learn from.
 //! * Theta_max, delta_max: projection, Pomet and Praly 1992. Never increases V as long as the optimum lies within.
 //! * Dead zone: no learning from errors that noise explains, Peterson and Narendra 1982.
-//! * Saturation ([`Settings::heed_saturation`](crate::Settings)): an estimate does not grow towards a limit that has been
+//! * Saturation ([`Settings::anti_windup`](crate::Settings)): an estimate does not grow towards a limit that has been
 //!   reached already.
 //!
 //! `docs/flight.md` derives the bound that then really follows.

@@ -2,7 +2,8 @@
 #![allow(clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
 
 use afbc::ground::{Ground, LIFT_SHARE, STILL_M_S, STILL_S};
-use afbc::{Adaptive, Controller, FlightController, Memory, Profile, Settings};
+use afbc::{Adaptive, Controller, Profile, Settings};
+use afbc_control::{FlightController, Screened};
 use afbc_types::{Parameters, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
@@ -52,14 +53,14 @@ fn a_light_vehicle_that_hovers_does_not_stand_and_one_that_lifts_off_no_longer()
 #[test]
 fn estimates_freeze_on_the_ground_and_thaw_on_lift() {
     let setpoint = |z| Setpoint { position_m: Vector3::new(0.3, 0.0, z), ..Setpoint::default() };
-    let fly = |heed_ground| {
-        let settings = Settings { heed_ground, ..Profile::Flight.settings() };
+    let fly = |freeze_on_ground| {
+        let settings = Settings { freeze_on_ground, ..Profile::Flight.settings() };
         let law = Adaptive::new(Profile::Flight.gains()).unwrap();
         let controller = Controller::new(Parameters::PAPER.to_f32(), settings, law).unwrap();
-        let mut memory = Memory::default();
+        let mut memory = Screened::default();
         [(-1.0, 300), (-1.0, 3000), (1.0, 1), (1.0, 100)].map(|(z, steps)| {
             for _ in 0..steps {
-                controller.step(&mut memory, &State::default(), &setpoint(z));
+                controller.step(&mut memory, Some(&State::default()), &setpoint(z));
             }
             memory.control.estimates
         })
@@ -79,12 +80,12 @@ fn a_standing_vehicle_is_not_tipped_over() {
     let law = Adaptive::new(Profile::Flight.gains()).unwrap();
     let controller = Controller::new(Parameters::PAPER.to_f32(), Profile::Flight.settings(), law).unwrap();
     let state = State { attitude_rad: Vector3::new(0.1, -0.05, 0.3), ..State::default() };
-    let mut memory = Memory::default();
+    let mut memory = Screened::default();
     let mut forces = |z, steps| {
         let setpoint = Setpoint { position_m: Vector3::new(2.0, -1.0, z), ..Setpoint::default() };
         let mut forces = Vector4::zeros();
         for _ in 0..steps {
-            forces = controller.step(&mut memory, &state, &setpoint).forces.0;
+            forces = controller.step(&mut memory, Some(&state), &setpoint).forces.0;
         }
         forces
     };

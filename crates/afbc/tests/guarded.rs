@@ -4,19 +4,20 @@
 
 mod common;
 
-use afbc::adaptive::{Estimate, Gains};
-use afbc::allocation::HOVER_MARGIN;
+use afbc::adaptive::Gains;
 use afbc::ground::LIFT_SHARE;
 use afbc::guarded::HOVER_THETA;
-use afbc::monitor::{Bounds, Trip};
-use afbc::{Adaptive, Command, Controller, FlightController, Guarded, Health, Memory, Profile, Settings, guarded};
+use afbc::monitor::Bounds;
+use afbc::{Adaptive, Controller, Guarded, Profile, guarded};
+use afbc_control::mixer::HOVER_MARGIN;
+use afbc_control::{Estimate, FlightController, Health, Screened, Trip};
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
-use common::{U, check_command, gains, plausible, setpoint, settings, state, value};
+use common::{Stepped, U, check_step, gains, plausible, setpoint, settings, state, step, value};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
 /// What a flight remembers.
-type Flight = Memory<guarded::Memory>;
+type Flight = Screened<guarded::Memory>;
 
 const WEIGHT_N: f32 = 0.486 * 9.81;
 
@@ -50,7 +51,7 @@ fn near() -> impl Strategy<Value = State> {
 }
 
 /// Bumpless up to rounding: a few operations on numbers of this size.
-fn same(before: &Command, after: &Command) -> Result<(), TestCaseError> {
+fn same(before: &Stepped, after: &Stepped) -> Result<(), TestCaseError> {
     let (before, after) = (before.per_axis(), after.per_axis());
     for axis in Axis::ALL {
         let (before, after) = (f64::from(*before.get(axis)), f64::from(*after.get(axis)));
@@ -71,7 +72,7 @@ proptest! {
         // A vehicle that can hover.
         let (mut gains, mut settings) = (gains, settings);
         gains.z.safeguards.theta_max = gains.z.safeguards.theta_max.max(1.001 * HOVER_THETA * WEIGHT_N);
-        settings.rotor_force_max_n = settings.rotor_force_max_n.max(2.0);
+        settings.common.rotor_force_max_n = settings.common.rotor_force_max_n.max(2.0);
         let bounds = if trips { Bounds { lyapunov: PerAxis::from_fn(|_| 1.0), ..lax() } } else { Bounds::new(&gains, &Parameters::PAPER.to_f32()) };
         let controller = Guarded::new(Parameters::PAPER.to_f32(), settings, gains, bounds).unwrap();
         let mut memory = Flight::default();
@@ -81,11 +82,11 @@ proptest! {
                 prop_assert_eq!(memory.control.trip(), None);
             }
             let tripped = memory.control.trip();
-            let command = controller.step(&mut memory, &state, &setpoint);
-            check_command(&command, &settings)?;
-            prop_assert_eq!(command.health.trip, tripped);
-            prop_assert_eq!(command.health.state_rejected, !state.is_plausible());
-            prop_assert_eq!(command.health.setpoint_rejected, !setpoint.is_plausible());
+            let command = step(&controller, &mut memory, &state, &setpoint);
+            check_step(&command, &settings)?;
+            prop_assert_eq!(command.action.health.trip, tripped);
+            prop_assert_eq!(command.action.health.state_rejected, !state.is_plausible());
+            prop_assert_eq!(command.action.health.setpoint_rejected, !setpoint.is_plausible());
             prop_assert!(tripped.is_none() || memory.control.trip() == tripped, "re-engaged by itself");
             let learnt = Guarded::learnt(&memory.control);
             prop_assert!(Axis::ALL.iter().all(|axis| learnt.get(*axis).theta.iter().all(|theta| theta.is_finite())));
@@ -97,11 +98,11 @@ proptest! {
     fn untripped_it_is_the_law(inputs in prop::collection::vec((state(plausible), setpoint(plausible)), 50)) {
         let controller = guarded(lax());
         let law = Controller::new(Parameters::PAPER.to_f32(), Profile::Flight.settings(), Adaptive::new(Profile::Flight.gains()).unwrap()).unwrap();
-        let (mut memory, mut other) = (Flight::default(), Memory::default());
+        let (mut memory, mut other) = (Flight::default(), Screened::default());
         for (state, setpoint) in inputs {
             controller.engage(&mut memory.control);
-            let command = controller.step(&mut memory, &state, &setpoint);
-            prop_assert_eq!(command, law.step(&mut other, &state, &setpoint));
+            let command = step(&controller, &mut memory, &state, &setpoint);
+            prop_assert_eq!(command, step(&law, &mut other, &state, &setpoint));
             prop_assert_eq!(Guarded::learnt(&memory.control), other.control.estimates);
         }
         prop_assert_eq!(memory.control.trip(), None);
@@ -116,27 +117,27 @@ proptest! {
         let setpoint = Setpoint { position_m: setpoint.position_m, velocity_m_s: setpoint.velocity_m_s, ..Setpoint::default() };
         let controller = guarded(hair_trigger());
         let mut memory = Flight::default();
-        let last_of_afbc = controller.step(&mut memory, &state, &setpoint);
-        prop_assert_eq!((last_of_afbc.health.trip, memory.control.trip()), (None, Some(Trip::Lyapunov(Axis::Roll))));
+        let last_of_afbc = step(&controller, &mut memory, &state, &setpoint);
+        prop_assert_eq!((last_of_afbc.action.health.trip, memory.control.trip()), (None, Some(Trip::Lyapunov(Axis::Roll))));
 
         // Engaged at once, before the fallback has flown.
         let mut at_once = memory;
         controller.engage(&mut at_once.control);
-        let first_of_afbc = controller.step(&mut at_once, &state, &setpoint);
-        prop_assert_eq!(first_of_afbc.health.trip, None);
+        let first_of_afbc = step(&controller, &mut at_once, &state, &setpoint);
+        prop_assert_eq!(first_of_afbc.action.health.trip, None);
         position_is_the_same(&last_of_afbc, &first_of_afbc)?;
 
-        let mut last_of_fallback = controller.step(&mut memory, &state, &setpoint);
-        prop_assert_eq!(last_of_fallback.health.trip, memory.control.trip());
+        let mut last_of_fallback = step(&controller, &mut memory, &state, &setpoint);
+        prop_assert_eq!(last_of_fallback.action.health.trip, memory.control.trip());
         position_is_the_same(&last_of_afbc, &last_of_fallback)?;
         for _ in 0..lasting {
-            last_of_fallback = controller.step(&mut memory, &state, &setpoint);
+            last_of_fallback = step(&controller, &mut memory, &state, &setpoint);
         }
         // Otherwise it may stand by then, where nothing trips.
-        prop_assume!(last_of_fallback.inputs.thrust_n >= LIFT_SHARE * WEIGHT_N);
+        prop_assume!(last_of_fallback.trace.inputs.thrust_n >= LIFT_SHARE * WEIGHT_N);
         controller.engage(&mut memory.control);
-        let first_of_afbc = controller.step(&mut memory, &state, &setpoint);
-        prop_assert_eq!((first_of_afbc.health.trip, memory.control.trip().is_some()), (None, true));
+        let first_of_afbc = step(&controller, &mut memory, &state, &setpoint);
+        prop_assert_eq!((first_of_afbc.action.health.trip, memory.control.trip().is_some()), (None, true));
         position_is_the_same(&last_of_fallback, &first_of_afbc)?;
     }
 
@@ -148,25 +149,25 @@ proptest! {
         let mut memory = Flight::default();
         let mut commands = Vec::new();
         while memory.control.trip().is_none() && commands.len() < 12 {
-            commands.push(controller.step(&mut memory, &state, &Setpoint::default()));
+            commands.push(step(&controller, &mut memory, &state, &Setpoint::default()));
         }
         prop_assume!(memory.control.trip() == Some(Trip::Lyapunov(Axis::Z)));
         let before = *commands.last().unwrap();
-        let mut after = controller.step(&mut memory, &state, &Setpoint::default());
+        let mut after = step(&controller, &mut memory, &state, &Setpoint::default());
         same(&before, &after)?;
         for _ in 0..100 {
-            after = controller.step(&mut memory, &state, &Setpoint::default());
+            after = step(&controller, &mut memory, &state, &Setpoint::default());
         }
         controller.engage(&mut memory.control);
-        same(&after, &controller.step(&mut memory, &state, &Setpoint::default()))?;
+        same(&after, &step(&controller, &mut memory, &state, &Setpoint::default()))?;
     }
 }
 
 /// z, x, y and yaw: at one and the same state and setpoint, nothing that they track moves on its own.
-fn position_is_the_same(before: &Command, after: &Command) -> Result<(), TestCaseError> {
-    let only = |command: &Command| {
+fn position_is_the_same(before: &Stepped, after: &Stepped) -> Result<(), TestCaseError> {
+    let only = |command: &Stepped| {
         let mut command = *command;
-        (command.inputs.roll_n, command.inputs.pitch_n) = (0.0, 0.0);
+        (command.trace.inputs.roll_n, command.trace.inputs.pitch_n) = (0.0, 0.0);
         command
     };
     same(&only(before), &only(after))
@@ -182,14 +183,14 @@ fn the_fallback_takes_over_no_more_than_its_bound() {
     // The filter starts at the attitude and is led back to level: errors, and AFBC's first steps.
     let mut steps = 0;
     while memory.control.trip().is_none() {
-        controller.step(&mut memory, &state, &Setpoint::default());
+        step(&controller, &mut memory, &state, &Setpoint::default());
         steps += 1;
         assert!(steps < 100);
     }
     for _ in 0..50_000 {
-        let command = controller.step(&mut memory, &state, &Setpoint::default());
+        let command = step(&controller, &mut memory, &state, &Setpoint::default());
         let bound = gains.roll.safeguards.theta_max + 10.0;
-        assert!(command.inputs.roll_n.abs() < bound, "{}", command.inputs.roll_n);
+        assert!(command.trace.inputs.roll_n.abs() < bound, "{}", command.trace.inputs.roll_n);
     }
 }
 
@@ -200,14 +201,14 @@ fn the_ground_does_not_trip() {
     let mut memory = Flight::default();
     let below = Setpoint { position_m: Vector3::new(0.0, 0.0, -1.0), ..Setpoint::default() };
     for _ in 0..20_000 {
-        let command = controller.step(&mut memory, &State::default(), &below);
-        assert!(command.health.saturated);
+        let command = step(&controller, &mut memory, &State::default(), &below);
+        assert!(command.action.health.saturated);
     }
     assert_eq!(memory.control.trip(), None);
     // The same in the air, sinking: it is one.
     let sinking = State { velocity_m_s: Vector3::new(0.0, 0.0, -0.5), ..State::default() };
     for _ in 0..5_000 {
-        controller.step(&mut memory, &sinking, &below);
+        step(&controller, &mut memory, &sinking, &below);
     }
     assert_eq!(memory.control.trip(), Some(Trip::Saturation));
 }
@@ -219,13 +220,13 @@ fn a_tripped_controller_learns_nothing_and_says_why() {
     let state = State { attitude_rad: Vector3::new(0.1, 0.0, 0.0), ..State::default() };
     let setpoint = Setpoint { position_m: Vector3::new(0.3, 0.0, 0.2), ..Setpoint::default() };
     while memory.control.trip().is_none() {
-        controller.step(&mut memory, &state, &setpoint);
+        step(&controller, &mut memory, &state, &setpoint);
     }
     // The monitor saw each subsystem's norm within the last six steps: one that went on learning would change them.
     let seen = *memory.control.figures();
     assert!(Axis::ALL.iter().any(|axis| seen.norms.get(*axis).theta_squared > 0.0), "{seen:?}");
     for _ in 0..1000 {
-        let health = controller.step(&mut memory, &state, &setpoint).health;
+        let health = step(&controller, &mut memory, &state, &setpoint).action.health;
         assert_eq!(health, Health { trip: memory.control.trip(), saturated: health.saturated, ..Health::default() });
     }
     assert_eq!(*memory.control.figures(), seen);
@@ -240,7 +241,7 @@ fn bounds_and_gains_out_of_range_are_refused_by_name() {
     let mut bad = gains;
     bad.z.gamma = f32::NAN;
     assert_eq!(name(settings, bad, bounds()), "gamma");
-    assert_eq!(name(afbc::Settings { dt_s: 0.0, ..settings }, gains, bounds()), "dt_s");
+    assert_eq!(name(settings.with_dt_s(0.0), gains, bounds()), "dt_s");
 }
 
 /// The needed figure is in the error.
@@ -269,7 +270,7 @@ fn a_vehicle_that_cannot_hover_is_refused_by_name() {
     // With the gains of the paper's vehicle a heavier one would trip in a perfect hover, had it rotors that lift it.
     let strong = |mass_kg: f32| {
         let gains = Profile::Flight.gains();
-        let settings = Settings { rotor_force_max_n: 100.0, ..settings };
+        let settings = settings.with_rotor_force_max_n(100.0);
         Guarded::new(of_mass(mass_kg), settings, gains, Bounds::new(&gains, &of_mass(mass_kg)))
     };
     assert!(strong(0.6).is_ok());
@@ -305,20 +306,23 @@ fn engaging_does_not_trip_by_itself() {
     let bounds = bounds();
     for yaw_n in [0.5_f32, 1.5, -1.5, 2.4] {
         let (controller, (_, mut memory)) = (guarded(bounds), tripped(0, 0.0));
-        controller.step(&mut memory, &State::default(), &Setpoint::default());
+        step(&controller, &mut memory, &State::default(), &Setpoint::default());
         // Held by force: the integral of gamma e_2 goes on, 1 mN a step.
         let e2 = 1.0 / Profile::Flight.gains().yaw.gamma;
         let turning = Setpoint { yaw_rate_rad_s: e2.copysign(yaw_n), ..Setpoint::default() };
         for _ in 0..(yaw_n.abs() * 1e3) as usize {
-            controller.step(&mut memory, &State::default(), &turning);
+            step(&controller, &mut memory, &State::default(), &turning);
         }
-        let before = controller.step(&mut memory, &State::default(), &Setpoint::default());
-        assert!((before.inputs.yaw_n / yaw_n - 1.0).abs() < 0.05 && memory.control.trip().is_some(), "{before:?}");
+        let before = step(&controller, &mut memory, &State::default(), &Setpoint::default());
+        assert!(
+            (before.trace.inputs.yaw_n / yaw_n - 1.0).abs() < 0.05 && memory.control.trip().is_some(),
+            "{before:?}"
+        );
         controller.engage(&mut memory.control);
         for _ in 0..100 {
-            let command = controller.step(&mut memory, &State::default(), &Setpoint::default());
-            assert_eq!((command.health.trip, memory.control.trip()), (None, None), "{yaw_n} N");
-            assert!((command.inputs.yaw_n - before.inputs.yaw_n).abs() < 5e-3, "{yaw_n} N: {command:?}");
+            let command = step(&controller, &mut memory, &State::default(), &Setpoint::default());
+            assert_eq!((command.action.health.trip, memory.control.trip()), (None, None), "{yaw_n} N");
+            assert!((command.trace.inputs.yaw_n - before.trace.inputs.yaw_n).abs() < 5e-3, "{yaw_n} N: {command:?}");
             let learnt = Guarded::learnt(&memory.control).yaw.theta;
             assert!(learnt.norm() < bounds.theta.yaw && (yaw_n.abs() > 0.7 || learnt.max() - learnt.min() < 1e-2));
         }
@@ -329,12 +333,12 @@ fn engaging_does_not_trip_by_itself() {
 #[test]
 fn the_tilt_does_not_step_at_a_trip() {
     // Of thrust, by (40) at yaw 0 [m/s2].
-    let vertical = |command: &Command| command.virtual_m_s2[0] / command.desired_rad[1].tan();
+    let vertical = |command: &Stepped| command.trace.virtual_m_s2[0] / command.trace.desired_rad[1].tan();
     let (controller, (before, mut memory)) = (guarded(bounds()), tripped(1500, 0.1));
     for _ in 0..20 {
         let aside = Setpoint { position_m: Vector3::new(0.1, 0.0, 0.0), ..Setpoint::default() };
-        let after = controller.step(&mut memory, &State::default(), &aside);
-        assert!(after.health.trip.is_some() && after.inputs.thrust_n > 1.3 * WEIGHT_N, "{after:?}");
+        let after = step(&controller, &mut memory, &State::default(), &aside);
+        assert!(after.action.health.trip.is_some() && after.trace.inputs.thrust_n > 1.3 * WEIGHT_N, "{after:?}");
         assert!(
             (vertical(&after) / vertical(&before) - 1.0).abs() < 0.02,
             "{} then {}",
@@ -346,18 +350,18 @@ fn the_tilt_does_not_step_at_a_trip() {
 
 /// A flight of a vehicle that sinks a little for so long, then is led aside, until errors of z trip it; and the step that
 /// did.
-fn tripped(steps: usize, aside_m: f32) -> (Command, Flight) {
+fn tripped(steps: usize, aside_m: f32) -> (Stepped, Flight) {
     let controller = guarded(bounds());
     let mut memory = Flight::default();
     let sinks = Setpoint { velocity_m_s: Vector3::new(0.0, 0.0, 0.05), ..Setpoint::default() };
     for _ in 0..steps {
-        controller.step(&mut memory, &State::default(), &sinks);
+        step(&controller, &mut memory, &State::default(), &sinks);
     }
     let touchy = guarded(Bounds { lyapunov: PerAxis { z: 0.0, ..bounds().lyapunov }, ..bounds() });
     let aside = Setpoint { position_m: Vector3::new(aside_m, 0.0, 0.0), ..sinks };
-    let mut last = Command::default();
+    let mut last = Stepped::default();
     while memory.control.trip().is_none() {
-        last = touchy.step(&mut memory, &State::default(), &aside);
+        last = step(&touchy, &mut memory, &State::default(), &aside);
     }
     (last, memory)
 }

@@ -1,12 +1,14 @@
 //! Properties of the laws: backstepping (9)-(16), (21), and AFBC (20)-(22), (32)-(34).
 #![allow(clippy::unwrap_used, missing_docs)] // a law that cannot be built must stop the test
 
-use afbc::adaptive::{Estimate, Gains, Subsystem};
-use afbc::backstepping::{self, Errors, Tracking, ideal, proportional};
-use afbc::cascade::Context;
+use afbc::adaptive::{Gains, Subsystem};
+use afbc::backstepping::{self, ideal, proportional};
 use afbc::fuzzy::{Basis, Membership};
+use afbc::law::Context;
+use afbc::law::Tracking;
 use afbc::model::Dynamics;
 use afbc::{Adaptive, Backstepping, Law, Profile, Safeguards};
+use afbc_control::Estimate;
 use afbc_types::{Axis, Parameters, PerAxis, State};
 use nalgebra::Matrix3;
 use proptest::prelude::*;
@@ -56,7 +58,7 @@ proptest! {
         tracking in tracking(), alpha1 in 0.01_f32..10.0, alpha2 in 0.0_f32..20.0,
         f in -20.0_f32..20.0, g in prop_oneof![Just(1.0_f32), 0.05_f32..70.0], g_dot in prop_oneof![Just(0.0_f32), -5.0_f32..5.0],
     ) {
-        let errors = Errors::new(alpha1, &tracking);
+        let errors = tracking.errors(alpha1);
         let u = ideal(alpha1, &errors, tracking.x1d_ddot, &Dynamics { f, g, g_dot }) + proportional(alpha2, &errors);
 
         let [e1, e2, a1, a2] = [errors.e1, errors.e2, alpha1, alpha2].map(f64::from);
@@ -102,7 +104,7 @@ proptest! {
     /// (12), (13): e_2 is what e_1's own dynamics leave over.
     #[test]
     fn errors_obey_13(tracking in tracking(), alpha1 in 0.01_f32..10.0) {
-        let errors = Errors::new(alpha1, &tracking);
+        let errors = tracking.errors(alpha1);
         prop_assert_eq!(errors.e1.to_bits(), tracking.e1.to_bits());
         let [e1, e1_dot, e2, a1] = [errors.e1, errors.e1_dot, errors.e2, alpha1].map(f64::from);
         let [x1d_dot, x2] = [tracking.x1d_dot, tracking.x2].map(f64::from);
@@ -116,7 +118,7 @@ proptest! {
     fn the_law_is_the_sum_of_its_three_terms(
         gains in gains(), tracking in tracking(), inputs in prop::array::uniform2(-3.0_f32..3.0), estimate in estimate(),
     ) {
-        let errors = Errors::new(gains.backstepping.alpha1, &tracking);
+        let errors = tracking.errors(gains.backstepping.alpha1);
         let (terms, _) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
         prop_assert_eq!(terms.sum(), terms.fuzzy + terms.robust + terms.proportional);
         prop_assert_eq!(terms.proportional, gains.backstepping.alpha2 * errors.e2); // (21)
@@ -140,7 +142,7 @@ proptest! {
     fn adaptation_goes_the_way_of_the_error(
         gains in gains(), tracking in tracking(), inputs in prop::array::uniform2(-3.0_f32..3.0), estimate in estimate(),
     ) {
-        let errors = Errors::new(gains.backstepping.alpha1, &tracking);
+        let errors = tracking.errors(gains.backstepping.alpha1);
         let (_, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
         let w = Basis::new(gains.membership).unwrap().weights(inputs);
         let e2 = f64::from(errors.e2);
@@ -165,7 +167,7 @@ proptest! {
         let state = State::default();
         for axis in Axis::ALL {
             let gains = *gains.get(axis);
-            let errors = Errors::new(gains.backstepping.alpha1, &tracking);
+            let errors = tracking.errors(gains.backstepping.alpha1);
             let inputs = match axis {
                 Axis::Roll | Axis::Pitch | Axis::Yaw => [tracking.x1, tracking.x2],
                 Axis::Z | Axis::X | Axis::Y => [errors.e1, errors.e1_dot],

@@ -3,11 +3,12 @@
 
 mod common;
 
-use afbc::backstepping::Errors;
 use afbc::integral::IntegralBackstepping;
-use afbc::{Adaptive, Backstepping, Command, Controller, FlightController, Limits, Memory, Profile, Settings};
+use afbc::{Adaptive, Backstepping, Controller, Limits, Profile, Settings};
+use afbc_control::Errors;
+use afbc_control::{FlightController, Screened};
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
-use common::{U, gains, limits, plausible, setpoint, settings, state};
+use common::{Stepped, U, gains, limits, plausible, setpoint, settings, state, step};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
@@ -26,8 +27,8 @@ fn flight(limits: Limits) -> Controller<Adaptive> {
 }
 
 /// Tangent of the angle between vertical and thrust in the desired attitude.
-fn tilt_tangent(command: &Command) -> f64 {
-    let [phi, theta] = command.desired_rad.map(f64::from);
+fn tilt_tangent(command: &Stepped) -> f64 {
+    let [phi, theta] = command.trace.desired_rad.map(f64::from);
     let cosine = phi.cos() * theta.cos();
     // By 1 - cos^2 = sin^2 phi + cos^2 phi sin^2 theta, which keeps its digits near zero.
     (phi.sin().powi(2) + (phi.cos() * theta.sin()).powi(2)).sqrt() / cosine
@@ -41,23 +42,23 @@ proptest! {
         gains in gains(), settings in settings(), inputs in prop::collection::vec((state(plausible), setpoint(plausible)), 20),
     ) {
         let controller = adaptive(gains, settings);
-        let mut memory = Memory::default();
+        let mut memory = Screened::default();
         let Limits { tilt_max_rad, tilt_rate_max_rad_s, .. } = settings.limits;
         let tangent_max = f64::from(tilt_max_rad).tan() * (1.0 + ROTATION);
         let rate_max = f64::from(tilt_rate_max_rad_s);
         let mut before = None;
         for (state, setpoint) in inputs {
-            let command = controller.step(&mut memory, &state, &setpoint);
+            let command = step(&controller, &mut memory, &state, &setpoint);
             let tangent = tilt_tangent(&command);
             // 90 degrees is 1.5708, and the tangent there ill-conditioned.
             prop_assert!(tangent <= tangent_max * (1.0 + 4.0 * U * tangent_max), "{tangent} beyond {tangent_max}");
-            for (now, then) in command.filtered.iter().zip(before.unwrap_or(command.filtered)) {
+            for (now, then) in command.trace.filtered.iter().zip(before.unwrap_or(command.trace.filtered)) {
                 prop_assert!(f64::from(now.rate).abs() <= rate_max, "{now:?}");
                 let travel = (f64::from(now.angle) - f64::from(then.angle)).abs();
                 let rounding = 4.0 * U * (f64::from(then.angle).abs() + 1.0);
-                prop_assert!(travel <= rate_max * f64::from(settings.dt_s) * (1.0 + 4.0 * U) + rounding, "{travel} rad in a step");
+                prop_assert!(travel <= rate_max * f64::from(settings.common.dt_s) * (1.0 + 4.0 * U) + rounding, "{travel} rad in a step");
             }
-            before = Some(command.filtered);
+            before = Some(command.trace.filtered);
         }
     }
 
@@ -70,18 +71,18 @@ proptest! {
         let attitude_rad = Vector3::new(state.attitude_rad.x, state.attitude_rad.y, yaw_rad);
         let state = State { attitude_rad, ..state };
         let settings = Settings { limits, tilt_by_thrust: by_thrust, ..Profile::Flight.settings() };
-        let command = adaptive(Profile::Flight.gains(), settings).step(&mut Memory::default(), &state, &setpoint);
+        let command = step(&adaptive(Profile::Flight.gains(), settings), &mut Screened::default(), &state, &setpoint);
 
-        let [u5, u6] = command.virtual_m_s2.map(f64::from);
-        let cosine = f64::from(afbc::math::tilt_cosine(attitude_rad.x, attitude_rad.y));
-        let thrust = command.inputs.thrust_n.min(4.0 * settings.rotor_force_max_n);
+        let [u5, u6] = command.trace.virtual_m_s2.map(f64::from);
+        let cosine = f64::from(afbc_control::math::tilt_cosine(attitude_rad.x, attitude_rad.y));
+        let thrust = command.trace.inputs.thrust_n.min(4.0 * settings.common.rotor_force_max_n);
         let upward = f64::from(thrust) * cosine / f64::from(WEIGHT_N);
         let vertical = if by_thrust { GRAVITY_M_S2 * upward.max(0.3) } else { GRAVITY_M_S2 };
         let max = (vertical * f64::from(limits.tilt_max_rad).tan()).min(f64::from(limits.acceleration_max_m_s2));
         let size = u5.hypot(u6);
         let scale = if size > max { max / size } else { 1.0 };
 
-        let [phi, theta] = command.desired_rad.map(f64::from);
+        let [phi, theta] = command.trace.desired_rad.map(f64::from);
         let (forward, left) = (vertical * theta.tan(), -vertical * phi.tan() / theta.cos());
         let (sin, cos) = f64::from(yaw_rad).sin_cos();
         let got = [forward * cos - left * sin, forward * sin + left * cos];
@@ -98,11 +99,11 @@ proptest! {
         gains in gains(), limits in limits(), state in state(plausible), setpoint in setpoint(plausible),
     ) {
         let settings = Settings { limits, ..Profile::Flight.settings() };
-        let command = adaptive(gains, settings).step(&mut Memory::default(), &state, &setpoint);
+        let command = step(&adaptive(gains, settings), &mut Screened::default(), &state, &setpoint);
         let Limits { speed_max_m_s, climb_max_m_s, .. } = limits;
         for (i, axis, max) in [(0, Axis::X, speed_max_m_s), (1, Axis::Y, speed_max_m_s), (2, Axis::Z, climb_max_m_s)] {
             let (Errors { e1, e1_dot, e2 }, alpha1, max) =
-                (*command.errors.get(axis), f64::from(gains.get(axis).backstepping.alpha1), f64::from(max));
+                (*command.trace.errors.get(axis), f64::from(gains.get(axis).backstepping.alpha1), f64::from(max));
             let (distance, x1d_dot, x2) =
                 (setpoint.position_m[i] - state.position_m[i], setpoint.velocity_m_s[i], state.velocity_m_s[i]);
             let speed = alpha1 * f64::from(distance);
@@ -122,7 +123,7 @@ proptest! {
         let error = |yaw_rad: f32, wanted_rad: f32| {
             let state = State { attitude_rad: Vector3::new(0.0, 0.0, yaw_rad), ..State::default() };
             let setpoint = Setpoint { yaw_rad: wanted_rad, ..Setpoint::default() };
-            flight(Limits::NONE).step(&mut Memory::default(), &state, &setpoint).errors.yaw.e1
+            step(&flight(Limits::NONE), &mut Screened::default(), &state, &setpoint).trace.errors.yaw.e1
         };
         let turn = core::f32::consts::TAU * turns as f32;
         let short = error(yaw, wanted);
@@ -141,7 +142,7 @@ fn a_distant_setpoint_is_approached_at_the_speed_limit() {
     fn thrust<C: FlightController>(controller: &C, up_m: f32, climb_m_s: f32) -> f32 {
         let setpoint = Setpoint { position_m: Vector3::new(0.0, 0.0, up_m), ..Setpoint::default() };
         let state = State { velocity_m_s: Vector3::new(0.0, 0.0, climb_m_s), ..State::default() };
-        controller.step(&mut Memory::default(), &state, &setpoint).inputs.thrust_n
+        step(controller, &mut Screened::default(), &state, &setpoint).trace.inputs.thrust_n
     }
     fn check<C: FlightController>(controller: &C) {
         for up_m in [0.3, 1.5, 5.0, 10.0, 100.0, 1e4] {
@@ -174,8 +175,8 @@ fn no_attitude_is_singular() {
         for pitch in -36..=36 {
             let angle = |step: i32| step as f32 * core::f32::consts::PI / 36.0;
             let state = State { attitude_rad: Vector3::new(angle(roll), angle(pitch), 0.0), ..State::default() };
-            let command = controller.step(&mut Memory::default(), &state, &setpoint);
-            common::check_command(&command, &Profile::Flight.settings()).unwrap();
+            let command = step(&controller, &mut Screened::default(), &state, &setpoint);
+            common::check_step(&command, &Profile::Flight.settings()).unwrap();
             assert!(tilt_tangent(&command) <= tangent_max, "{command:?}");
         }
     }

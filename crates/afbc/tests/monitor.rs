@@ -1,12 +1,11 @@
 //! Every figure of the monitor against its definition, and every trip: provoked, and not by a healthy flight.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
-use afbc::adaptive::Estimate;
-use afbc::backstepping::Errors;
 use afbc::model::Model;
-use afbc::monitor::{BOUND, Bounds, Figures, Monitor, SATURATION_SHARE, SWING, SWINGS, Trip};
-use afbc::{Cascade, Command, Health, Profile};
-use afbc_types::{Axis, Inputs, Parameters, PerAxis};
+use afbc::monitor::{BOUND, Bounds, Figures, Monitor, SATURATION_SHARE, SWING, SWINGS};
+use afbc::{Cascade, Profile};
+use afbc_control::{Errors, Estimate, Trip};
+use afbc_types::{Axis, Parameters, PerAxis};
 use nalgebra::Matrix3;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
@@ -22,28 +21,36 @@ fn monitor(bounds: Bounds) -> Monitor {
     Monitor::new(&Parameters::PAPER.to_f32(), bounds, DT_S).unwrap()
 }
 
+/// What the monitor sees of a step.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    inputs: PerAxis<f32>,
+    errors: PerAxis<Errors>,
+    saturated: bool,
+}
+
 /// A step of a vehicle that hovers.
-fn hover() -> Command {
-    Command { inputs: Inputs { thrust_n: WEIGHT_N, ..Inputs::default() }, ..Command::default() }
+fn hover() -> Seen {
+    Seen { inputs: PerAxis { z: WEIGHT_N, ..PerAxis::default() }, ..Seen::default() }
 }
 
 /// One step's look at what has been learnt and commanded.
-fn look(monitor: &Monitor, figures: &mut Figures, estimates: PerAxis<Estimate>, command: &Command) -> Option<Trip> {
+fn look(monitor: &Monitor, figures: &mut Figures, estimates: PerAxis<Estimate>, seen: &Seen) -> Option<Trip> {
     let mut cascade = Cascade::default();
-    (cascade.estimates, cascade.errors) = (estimates, command.errors);
-    monitor.watch(figures, &cascade, &command.per_axis(), command.health.saturated)
+    (cascade.estimates, cascade.errors, cascade.inputs) = (estimates, seen.errors, seen.inputs);
+    monitor.watch(figures, &cascade, seen.saturated)
 }
 
 /// The first trip of `steps` steps, and after how many.
 fn watch(
     monitor: &Monitor,
     steps: usize,
-    mut step: impl FnMut(usize) -> (PerAxis<Estimate>, Command),
+    mut step: impl FnMut(usize) -> (PerAxis<Estimate>, Seen),
 ) -> (Figures, Option<(usize, Trip)>) {
     let mut figures = Figures::default();
     for i in 0..steps {
-        let (estimates, command) = step(i);
-        if let Some(trip) = look(monitor, &mut figures, estimates, &command) {
+        let (estimates, seen) = step(i);
+        if let Some(trip) = look(monitor, &mut figures, estimates, &seen) {
             return (figures, Some((i + 1, trip)));
         }
     }
@@ -56,16 +63,10 @@ fn estimates(axis: Axis, estimate: Estimate) -> PerAxis<Estimate> {
     estimates
 }
 
-fn input(axis: Axis, value: f32) -> Command {
-    let mut command = hover();
-    let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = &mut command.inputs;
-    match axis {
-        Axis::Roll => *roll_n = value,
-        Axis::Pitch => *pitch_n = value,
-        Axis::Yaw => *yaw_n = value,
-        _ => *thrust_n += value,
-    }
-    command
+fn input(axis: Axis, value: f32) -> Seen {
+    let mut seen = hover();
+    *seen.inputs.get_mut(axis) += value;
+    seen
 }
 
 /// Estimates beyond their bound trip within the six steps of a round, by name, while projection still has room for Theta;
@@ -100,9 +101,9 @@ fn large_errors_trip_when_they_last() {
         let bound = *bounds.lyapunov.get(axis);
         let with = |v: f32, steps| {
             let (e1, e2) = ((1.2 * v).sqrt(), (0.8 * v * model.hover_gain(axis)).sqrt());
-            let mut command = hover();
-            *command.errors.get_mut(axis) = Errors { e1, e1_dot: 0.0, e2 };
-            watch(&monitor, steps, |_| (PerAxis::default(), command))
+            let mut seen = hover();
+            *seen.errors.get_mut(axis) = Errors { e1, e1_dot: 0.0, e2 };
+            watch(&monitor, steps, |_| (PerAxis::default(), seen))
         };
         assert_eq!(with(0.99 * bound, 20_000).1, None, "{axis:?}");
         let (steps, trip) = with(2.0 * bound, 20_000).1.unwrap();
@@ -118,8 +119,8 @@ fn large_errors_trip_when_they_last() {
 fn lasting_saturation_trips_and_moments_of_it_do_not() {
     let monitor = monitor(bounds());
     let with = |saturated: fn(usize) -> bool| {
-        let command = |i| Command { health: Health { saturated: saturated(i), ..Health::default() }, ..hover() };
-        watch(&monitor, 20_000, |i| (PerAxis::default(), command(i)))
+        let seen = |i| Seen { saturated: saturated(i), ..hover() };
+        watch(&monitor, 20_000, |i| (PerAxis::default(), seen(i)))
     };
     // 1 - exp(-t) = 0.9 at 2.303 s.
     let (steps, trip) = with(|_| true).1.unwrap();
@@ -173,17 +174,17 @@ proptest! {
                 theta: Matrix3::repeat(share * bounds.theta.get(axis) / 3.0 * noise()),
                 delta: share * bounds.delta.get(axis),
             });
-            let mut command = hover();
-            command.inputs.roll_n += 0.49 * bounds.swing_n * noise();
-            command.inputs.pitch_n += 0.49 * bounds.swing_n * noise();
-            command.inputs.yaw_n += 0.49 * bounds.swing_n * noise();
-            command.inputs.thrust_n += 0.49 * bounds.swing_n * noise();
-            command.errors = PerAxis::from_fn(|axis| Errors {
+            let mut seen = hover();
+            seen.inputs.roll += 0.49 * bounds.swing_n * noise();
+            seen.inputs.pitch += 0.49 * bounds.swing_n * noise();
+            seen.inputs.yaw += 0.49 * bounds.swing_n * noise();
+            seen.inputs.z += 0.49 * bounds.swing_n * noise();
+            seen.errors = PerAxis::from_fn(|axis| Errors {
                 e1: (2.0 * share * bounds.lyapunov.get(axis)).sqrt() * noise(),
                 ..Errors::default()
             });
-            command.health.saturated = saturated && i.is_multiple_of(2);
-            (estimates, command)
+            seen.saturated = saturated && i.is_multiple_of(2);
+            (estimates, seen)
         });
         prop_assert_eq!(trip, None);
     }

@@ -3,11 +3,12 @@
 
 mod common;
 
-use afbc::adaptive::{Estimate, Gains};
-use afbc::backstepping::Tracking;
-use afbc::cascade::Context;
+use afbc::adaptive::Gains;
 use afbc::fuzzy::Basis;
-use afbc::{Adaptive, Controller, FlightController, Law, Memory, Profile, Safeguards, Settings};
+use afbc::law::Context;
+use afbc::law::Tracking;
+use afbc::{Adaptive, Controller, Law, Profile, Safeguards, Settings};
+use afbc_control::{Estimate, FlightController, Screened};
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
 use common::{U, gains_of_one};
 use nalgebra::{Matrix3, Vector3};
@@ -117,7 +118,7 @@ proptest! {
         let gains = Gains { safeguards: Safeguards::NONE, ..gains };
         let before = Estimate { theta: Matrix3::from_row_slice(&theta), delta };
         let [first, second] = Basis::new(gains.membership).unwrap().factors([0.0, e2]);
-        let s = afbc::math::tanh(e2 * (1.0 / gains.epsilon));
+        let s = afbc_control::math::tanh(e2 * (1.0 / gains.epsilon));
         let printed = Estimate {
             theta: before.theta + first * (gains.gamma * e2 * dt_s) * second.transpose(),
             delta: before.delta + gains.eta * e2 * s * dt_s,
@@ -165,14 +166,14 @@ proptest! {
     fn saturation_is_heeded_if_so_set(up_m in 1.0_f32..3.0, roll_rad in 0.2_f32..1.0) {
         let setpoint = Setpoint { position_m: Vector3::new(0.0, 0.0, up_m), ..Setpoint::default() };
         let state = State { attitude_rad: Vector3::new(roll_rad, 0.0, 0.0), ..State::default() };
-        let fly = |heed_saturation, rotor_force_max_n| {
-            let settings = Settings { heed_saturation, rotor_force_max_n, ..Profile::Flight.settings() };
+        let fly = |anti_windup, rotor_force_max_n| {
+            let settings = Settings { anti_windup, ..Profile::Flight.settings().with_rotor_force_max_n(rotor_force_max_n) };
             let settings = Settings { tilt_by_thrust: false, ..settings };
             let law = Adaptive::new(Profile::Flight.gains()).unwrap();
             let controller = Controller::new(Parameters::PAPER.to_f32(), settings, law).unwrap();
-            let mut memory = Memory::default();
+            let mut memory = Screened::default();
             for _ in 0..20 {
-                controller.step(&mut memory, &state, &setpoint);
+                controller.step(&mut memory, Some(&state), &setpoint);
             }
             memory.control.estimates
         };

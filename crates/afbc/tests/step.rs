@@ -3,10 +3,11 @@
 
 mod common;
 
-use afbc::adaptive::{Estimate, Gains};
-use afbc::{Adaptive, Backstepping, Cascade, Controller, FlightController, Health, Law, Memory, Profile, Settings};
+use afbc::adaptive::Gains;
+use afbc::{Adaptive, Backstepping, Cascade, Controller, Law, Profile, Settings};
+use afbc_control::{Estimate, Health, Screened};
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
-use common::{check_command, gains, plausible, setpoint, settings, state, value};
+use common::{check_step, gains, plausible, setpoint, settings, state, step, value};
 use proptest::prelude::*;
 
 fn sequence<S: Strategy<Value = f32> + 'static>(value: fn() -> S) -> impl Strategy<Value = Vec<(State, Setpoint)>> {
@@ -23,7 +24,7 @@ fn backstepping(gains: PerAxis<Gains>, settings: Settings) -> Controller<Backste
     Controller::new(vehicle, settings, Backstepping::new(&vehicle, gains).unwrap()).unwrap()
 }
 
-fn estimates<L: Law>(memory: &Memory<Cascade<L::Estimate>>) -> PerAxis<Estimate> {
+fn estimates<L: Law>(memory: &Screened<Cascade<L::Estimate>>) -> PerAxis<Estimate> {
     PerAxis::from_fn(|axis| L::learnt(memory.control.estimates.get(axis)))
 }
 
@@ -44,22 +45,22 @@ fn fly_anything<L: Law>(
     settings: &Settings,
     inputs: &[(State, Setpoint)],
 ) -> Result<(), TestCaseError> {
-    let mut memory = Memory::default();
+    let mut memory = Screened::default();
     let mut seen_state = false;
     for (state, setpoint) in inputs {
         let before = estimates::<L>(&memory);
-        let command = controller.step(&mut memory, state, setpoint);
+        let command = step(controller, &mut memory, state, setpoint);
         let after = estimates::<L>(&memory);
-        check_command(&command, settings)?;
+        check_step(&command, settings)?;
         check_estimates(&after)?;
-        prop_assert_eq!(command.health.state_rejected, !state.is_plausible());
-        prop_assert_eq!(command.health.setpoint_rejected, !setpoint.is_plausible());
+        prop_assert_eq!(command.action.health.state_rejected, !state.is_plausible());
+        prop_assert_eq!(command.action.health.setpoint_rejected, !setpoint.is_plausible());
         if !state.is_plausible() {
             prop_assert_eq!(after, before, "an implausible state taught the law something");
         }
         seen_state |= state.is_plausible();
         if !seen_state {
-            prop_assert!(command.speeds.0.iter().all(|w| *w == 0.0), "rotors turn before there is a state");
+            prop_assert!(command.action.speeds.0.iter().all(|w| *w == 0.0), "rotors turn before there is a state");
         }
     }
     Ok(())
@@ -82,12 +83,12 @@ proptest! {
     fn the_same_inputs_give_the_same_bits(gains in gains(), settings in settings(), inputs in sequence(value)) {
         let controller = adaptive(gains, settings);
         let fly = || {
-            let mut memory = Memory::default();
+            let mut memory = Screened::default();
             inputs.iter().map(|(state, setpoint)| {
-                let command = controller.step(&mut memory, state, setpoint);
+                let command = step(&controller, &mut memory, state, setpoint);
                 let estimates = estimates::<Adaptive>(&memory);
                 let learnt = Axis::ALL.map(|axis| estimates.get(axis).theta.map(f32::to_bits));
-                (command.speeds.0.map(f32::to_bits), learnt)
+                (command.action.speeds.0.map(f32::to_bits), learnt)
             }).collect::<Vec<_>>()
         };
         prop_assert_eq!(fly(), fly());
@@ -101,16 +102,16 @@ proptest! {
     ) {
         prop_assume!(!bad.is_plausible());
         let controller = adaptive(Profile::Paper.gains(), Profile::Paper.settings());
-        let mut memory = Memory::default();
-        controller.step(&mut memory, &good, &setpoint);
+        let mut memory = Screened::default();
+        step(&controller, &mut memory, &good, &setpoint);
         let mut other = memory;
 
-        let stood_in = controller.step(&mut memory, &bad, &next);
-        let wanted = controller.step(&mut other, &good, &next);
-        prop_assert_eq!(stood_in.speeds, wanted.speeds);
-        prop_assert_eq!(stood_in.errors, wanted.errors);
-        let saturated = wanted.health.saturated;
-        prop_assert_eq!(stood_in.health, Health { state_rejected: true, saturated, ..Health::default() });
+        let stood_in = step(&controller, &mut memory, &bad, &next);
+        let wanted = step(&controller, &mut other, &good, &next);
+        prop_assert_eq!(stood_in.action.speeds, wanted.action.speeds);
+        prop_assert_eq!(stood_in.trace.errors, wanted.trace.errors);
+        let saturated = wanted.action.health.saturated;
+        prop_assert_eq!(stood_in.action.health, Health { state_rejected: true, saturated, ..Health::default() });
         prop_assert_ne!(memory.control.estimates, other.control.estimates, "the plausible twin should have learnt");
     }
 
@@ -123,17 +124,17 @@ proptest! {
         prop_assume!(!bad.is_plausible());
         let controller = adaptive(Profile::Paper.gains(), Profile::Paper.settings());
         for first in [Some(good), None] {
-            let (mut memory, mut other) = (Memory::default(), Memory::default());
+            let (mut memory, mut other) = (Screened::default(), Screened::default());
             let substitute = first.unwrap_or(Setpoint::hold(&state));
-            let started = controller.step(&mut memory, &state, &first.unwrap_or(bad));
-            let wanted = controller.step(&mut other, &state, &substitute);
-            prop_assert_eq!(started.speeds, wanted.speeds);
-            prop_assert_eq!(started.health.setpoint_rejected, first.is_none());
+            let started = step(&controller, &mut memory, &state, &first.unwrap_or(bad));
+            let wanted = step(&controller, &mut other, &state, &substitute);
+            prop_assert_eq!(started.action.speeds, wanted.action.speeds);
+            prop_assert_eq!(started.action.health.setpoint_rejected, first.is_none());
 
-            let stood_in = controller.step(&mut memory, &after, &bad);
-            let wanted = controller.step(&mut other, &after, &substitute);
-            prop_assert_eq!(stood_in.speeds, wanted.speeds);
-            prop_assert!(stood_in.health.setpoint_rejected && !stood_in.health.state_rejected);
+            let stood_in = step(&controller, &mut memory, &after, &bad);
+            let wanted = step(&controller, &mut other, &after, &substitute);
+            prop_assert_eq!(stood_in.action.speeds, wanted.action.speeds);
+            prop_assert!(stood_in.action.health.setpoint_rejected && !stood_in.action.health.state_rejected);
             prop_assert_eq!(memory.control.estimates, other.control.estimates);
         }
     }
@@ -174,7 +175,7 @@ fn every_single_field_is_watched() {
         (|s, v| s.yaw_acceleration_rad_s2 = v, 1e3),
     ];
     let controller = adaptive(Profile::Paper.gains(), Profile::Paper.settings());
-    let health = |state, setpoint| controller.step(&mut Memory::default(), &state, &setpoint).health;
+    let health = |state, setpoint| step(&controller, &mut Screened::default(), &state, &setpoint).action.health;
     let bad = |max: f32| [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, max.next_up(), -max.next_up()];
     for (index, (set, max)) in states.into_iter().enumerate() {
         let with = |value| {
@@ -209,8 +210,8 @@ fn settings_out_of_range_are_refused_by_name() {
     };
     assert_eq!(build(paper), Ok(()));
     for bad in [0.0, -1.0, 1e9, f32::NAN, f32::INFINITY] {
-        assert_eq!(build(Settings { dt_s: bad, ..paper }), Err("dt_s"));
+        assert_eq!(build(paper.with_dt_s(bad)), Err("dt_s"));
         assert_eq!(build(Settings { command_filter_rad_s: bad, ..paper }), Err("command_filter_rad_s"));
-        assert_eq!(build(Settings { rotor_force_max_n: bad, ..paper }), Err("rotor_force_max_n"));
+        assert_eq!(build(paper.with_rotor_force_max_n(bad)), Err("rotor_force_max_n"));
     }
 }

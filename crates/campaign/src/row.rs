@@ -1,7 +1,7 @@
 //! What is kept of one flight of one contender.
 
 use crate::plan::Campaign;
-use afbc::monitor::Trip;
+use afbc_control::Trip;
 use afbc_sim::contender::Contender;
 use afbc_sim::flight::{Lost, fly};
 use afbc_sim::metrics::{Accumulator, Metrics, is_settled, tracking_error};
@@ -134,7 +134,7 @@ impl Outcome {
         outcome.lost = fly(scenario, contender, |sample| {
             metrics.add(sample);
             outcome.steps += 1;
-            let health = &sample.command.health;
+            let health = &sample.action.health;
             outcome.saturated += u64::from(health.saturated);
             outcome.trip = outcome.trip.or(health.trip.map(|trip| (sample.time_s, trip)));
             if is_settled(sample.time_s) {

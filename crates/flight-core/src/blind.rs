@@ -20,7 +20,7 @@
 //! What the trim does not know makes the true attitude leave the reckoned one as t^2, so this serves for fractions of a
 //! second, and the descent that follows for two seconds.
 
-use afbc::math::{max, min};
+use afbc_control::math::{max, min};
 use afbc_types::{Inputs, Parameters, State};
 use nalgebra::{Vector2, Vector3};
 

@@ -6,7 +6,7 @@
 //! although its rotors do not carry it. One that is said to be still all along while its thrust falls away has not
 //! landed: its tracker has frozen.
 
-use afbc::math::abs_max;
+use afbc_control::math::abs_max;
 use afbc_types::State;
 use nalgebra::Vector3;
 

@@ -1,6 +1,6 @@
 //! From rotor speed to throttle.
 
-use afbc::math::{max, sqrt};
+use afbc_control::math::{max, sqrt};
 use afbc_types::{Declared, OutOfRange, RotorSpeeds, parameters};
 
 /// Smallest throttle that turns a motor; 1 to 47 are commands, 0 stops it.

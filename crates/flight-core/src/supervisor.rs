@@ -1,6 +1,6 @@
 //! Arming and failsafe: the five things that may be asked for, the four modes, and what leads from one to another.
 
-use afbc::math::abs_max;
+use afbc_control::math::abs_max;
 use afbc_types::{Setpoint, State, parameters};
 
 /// Older than this, a state is stale and the law may not fly on it \[us\].

@@ -8,9 +8,8 @@ use crate::rate;
 use crate::supervisor::{ArmingLimits, End, Mode, Observed, RIDE_US, Refusal, Request, SETPOINT_STALE_US, Standing};
 use crate::tumble::Tumble;
 use crate::witness::Witness;
-use afbc::allocation::Mixer;
-use afbc::{Command, FlightController, Settings};
-use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Range, RotorSpeeds, Setpoint, State};
+use afbc_control::{Action, FlightController, Mixer, Trace};
+use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds, Setpoint, State};
 
 /// Accepted time between steps of a law that flies: the tick's \[s\].
 pub const DT: Range = Range::new("dt_s", 0.001, 0.001);
@@ -19,11 +18,9 @@ pub const DT: Range = Range::new("dt_s", 0.001, 0.001);
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle<C> {
     controller: C,
-    mixer: Mixer,
     blind: Blind,
     limits: ArmingLimits,
     weight_n: f32,
-    dt_s: f32,
 }
 
 /// What a vehicle remembers between ticks.
@@ -49,6 +46,8 @@ struct Flight<M> {
     reckoning: Reckoning,
     /// What the rotors were last told.
     applied: Inputs,
+    /// What the rotors were to do in the last tick, if no law said so.
+    lawless: Option<Inputs>,
     guide: Guide,
     ground: Ground,
     tumble: Tumble,
@@ -80,13 +79,24 @@ impl<M> Memory<M> {
     pub fn control(&self) -> Option<&M> {
         self.flight.as_ref().map(|flight| &flight.control)
     }
+
+    /// Why the last tick decided as it did, under the controller `C`: while blind, inputs only; disarmed, all zero.
+    pub fn trace<C: FlightController<Memory = M>>(&self) -> Trace {
+        match &self.flight {
+            Some(Flight { lawless: Some(inputs), .. }) if self.mode.armed() => {
+                Trace { inputs: *inputs, ..Trace::default() }
+            }
+            Some(Flight { control, .. }) if self.mode.armed() => C::trace(control),
+            _ => Trace::default(),
+        }
+    }
 }
 
 /// What a tick says about itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Health {
     /// Of the law's step.
-    pub control: afbc::Health,
+    pub control: afbc_control::Health,
     /// Of the tick's rate.
     pub rate: rate::Report,
     /// Age of the newest plausible state \[us\]; `u64::MAX` if there is none.
@@ -113,6 +123,8 @@ pub struct Answer {
 pub struct Outcome {
     /// What the motors get: zero if disarmed.
     pub motors: RotorSpeeds,
+    /// The force of each of them \[N\].
+    pub forces: RotorForces,
     /// What the vehicle is doing.
     pub mode: Mode,
     /// How well.
@@ -124,49 +136,31 @@ pub struct Outcome {
 }
 
 impl<C: FlightController> Vehicle<C> {
-    /// A vehicle with these nominal parameters under `controller`, which was built with the same settings.
+    /// A vehicle with these nominal parameters under `controller`, which was built for them.
     ///
     /// # Errors
-    /// The first parameter, setting or limit out of range; the time step must be the tick's, 1 ms, and the rotors must lift
-    /// the vehicle [with a margin](afbc::allocation::HOVER_MARGIN).
-    pub fn new(
-        airframe: Parameters,
-        settings: Settings,
-        limits: ArmingLimits,
-        controller: C,
-    ) -> Result<Self, OutOfRange> {
+    /// The first parameter or limit out of range; the controller's time step must be the tick's, 1 ms, and its rotors must
+    /// lift the vehicle [with a margin](afbc_control::mixer::HOVER_MARGIN).
+    pub fn new(parameters: Parameters, limits: ArmingLimits, controller: C) -> Result<Self, OutOfRange> {
+        parameters.validate()?;
         limits.validate()?;
-        DT.check(settings.dt_s)?;
-        let weight_n = airframe.mass_kg * airframe.gravity_m_s2;
-        let mixer = Mixer::new(&airframe, settings.rotor_force_max_n)?;
-        mixer.check_hover(weight_n)?;
-        Ok(Vehicle {
-            controller,
-            mixer,
-            blind: Blind::new(&airframe, settings.dt_s),
-            limits,
-            weight_n,
-            dt_s: settings.dt_s,
-        })
+        DT.check(controller.dt_s())?;
+        let weight_n = parameters.mass_kg * parameters.gravity_m_s2;
+        controller.mixer().check_hover(weight_n)?;
+        Ok(Vehicle { blind: Blind::new(&parameters, controller.dt_s()), controller, limits, weight_n })
     }
 
     /// One tick, to be called every millisecond; `now_us` is the time since power-up and never goes back. Cannot fail.
     #[inline]
     pub fn tick(&self, memory: &mut Memory<C::Memory>, now_us: u64, inbox: &Inbox) -> Outcome {
-        self.traced_tick(memory, now_us, inbox).0
-    }
-
-    /// The same tick, with the command behind it: while blind, rotor speeds, forces and inputs only; disarmed, all zero.
-    // Always: a command that nobody looks at is then never put together.
-    #[inline(always)]
-    pub fn traced_tick(&self, memory: &mut Memory<C::Memory>, now_us: u64, inbox: &Inbox) -> (Outcome, Command) {
+        let dt_s = self.controller.dt_s();
         // Take the newest inputs.
         let measured = memory.take_state(inbox, now_us);
         let state_age_us = memory.state.map_or(u64::MAX, |state| state.age_us(now_us));
         let fresh =
             memory.state.filter(|_| state_age_us <= RIDE_US).map(|state| extrapolated(&state.value, state_age_us));
         let fresh = fresh.as_ref();
-        memory.watch(fresh, &self.limits, self.dt_s, now_us);
+        memory.watch(fresh, &self.limits, dt_s, now_us);
         let Memory { mode, rate, stale_us, restless_us, frozen_states, flight, .. } = memory;
         let rate = rate.tick(now_us);
         let setpoint = inbox.setpoint().filter(|s| s.age_us(now_us) <= SETPOINT_STALE_US).map(|s| &s.value);
@@ -202,59 +196,58 @@ impl<C: FlightController> Vehicle<C> {
         }
 
         // Control.
-        let command = match flight {
+        let action = match flight {
             Some(flight) if mode.armed() && !arms => {
                 flight.reckon(&self.blind, fresh.filter(|_| measured));
                 let engaged = done(Request::Engage) && self.controller.engage(&mut flight.control);
                 match fresh {
                     // Taking over and a step would be too much, too: the rotors stay as they are.
-                    _ if engaged => self.allocated(flight.applied),
+                    _ if engaged => self.lawless(flight, flight.applied),
                     Some(state) => {
                         let between = (!measured).then(|| flight.reckoning.between(state));
                         let state = between.as_ref().unwrap_or(state);
-                        let target = flight.guide.target(mode, state, setpoint, self.dt_s);
+                        let target = flight.guide.target(mode, state, setpoint, dt_s);
                         // The inbox let plausible ones pass only.
-                        let command = self.controller.decide(&mut flight.control, state, target, true);
-                        flight.applied = Mixer::inputs(&command.forces);
+                        let action = self.controller.decide(&mut flight.control, state, target, true);
+                        flight.lawless = None;
+                        flight.applied = Mixer::inputs(&action.forces);
                         self.blind.trim(&mut flight.reckoning, &flight.applied);
-                        command
+                        action
                     }
                     None => {
-                        let command = self.blind_command(flight, mode);
-                        flight.applied = Mixer::inputs(&command.forces);
-                        command
+                        let action = self.blind_action(flight, mode);
+                        flight.applied = Mixer::inputs(&action.forces);
+                        action
                     }
                 }
             }
-            _ => Command::default(),
+            _ => Action::default(),
         };
 
         // Gate the motors.
-        let motors = if mode.armed() { command.speeds } else { RotorSpeeds::default() };
+        let (motors, forces) = if mode.armed() { (action.speeds, action.forces) } else { Default::default() };
         let setpoint_stale = setpoint.is_none();
         let health =
-            Health { control: command.health, rate, state_age_us, setpoint_stale, frozen_states: *frozen_states };
-        (Outcome { motors, mode, health, answer, ended }, command)
+            Health { control: action.health, rate, state_age_us, setpoint_stale, frozen_states: *frozen_states };
+        Outcome { motors, forces, mode, health, answer, ended }
     }
 
-    /// Rotor commands without a state.
+    /// What the rotors do without a state.
     #[inline(always)]
-    fn blind_command<M>(&self, flight: &mut Flight<M>, mode: Mode) -> Command {
+    fn blind_action<M>(&self, flight: &mut Flight<M>, mode: Mode) -> Action {
         flight.guide.descent = None;
         let inputs = match mode {
             Mode::Descending => self.blind.descend(&flight.reckoning),
             _ => self.blind.ride(&flight.reckoning),
         };
-        self.allocated(inputs)
+        self.lawless(flight, inputs)
     }
 
-    /// The command for these inputs, without a law.
+    /// What the rotors do for these inputs, that no law wants.
     #[inline(always)]
-    fn allocated(&self, inputs: Inputs) -> Command {
-        let allocation = self.mixer.allocate(&inputs);
-        let health = afbc::Health { saturated: allocation.saturated, ..afbc::Health::default() };
-        let speeds = self.mixer.speeds(&allocation.forces);
-        Command { speeds, forces: allocation.forces, inputs, health, ..Command::default() }
+    fn lawless<M>(&self, flight: &mut Flight<M>, inputs: Inputs) -> Action {
+        flight.lawless = Some(inputs);
+        self.controller.mixer().action(&inputs)
     }
 }
 
@@ -321,6 +314,7 @@ impl<M: Default> Flight<M> {
             control: M::default(),
             reckoning: vehicle.blind.start(state),
             applied: Inputs::default(),
+            lawless: None,
             guide: Guide::default(),
             ground: Ground::new(state, vehicle.weight_n, now_us),
             tumble: Tumble::default(),

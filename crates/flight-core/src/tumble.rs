@@ -1,7 +1,7 @@
 //! A vehicle that is past recovery: on its side or its back, or spinning, for too long and not on its way back. Ours, after
 //! the tumble checks of autopilots (PX4's failure detector, the Crazyflie's supervisor).
 
-use afbc::math;
+use afbc_control::math;
 use afbc_types::State;
 
 /// Cosine of the tilt below which a vehicle lies on its side or its back: 80 degrees.

@@ -9,7 +9,7 @@
 //! A repeated state is no measurement: its age goes on. After either of the others the tracker is not believed for the rest
 //! of the flight. A pose that stands within noise while the vehicle hovers cannot be told from a vehicle that does.
 
-use afbc::math::abs_max;
+use afbc_control::math::abs_max;
 use afbc_types::State;
 use nalgebra::Vector3;
 

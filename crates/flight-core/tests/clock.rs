@@ -43,10 +43,10 @@ fn hovering(measured_us: u64) -> State {
 
 fn play(mut sent: Vec<Sent>) -> Seen {
     sent.sort_by_key(|sent| sent.arrives_us);
-    let (airframe, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
+    let (parameters, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
     let law = Adaptive::new(Profile::Flight.gains()).expect("valid");
-    let controller = Controller::new(airframe, settings, law).expect("valid");
-    let vehicle = Vehicle::new(airframe, settings, ArmingLimits::default(), controller).expect("valid");
+    let controller = Controller::new(parameters, settings, law).expect("valid");
+    let vehicle = Vehicle::new(parameters, ArmingLimits::default(), controller).expect("valid");
     let (mut memory, mut inbox, mut tracker) = (Memory::default(), Inbox::default(), Tracker::default());
     let mut sent = sent.iter().peekable();
     let mut seen = Seen::default();

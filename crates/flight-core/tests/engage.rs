@@ -1,18 +1,30 @@
 //! The request to engage: it reaches the controller once, in flight only, and is answered.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use afbc::{Command, FlightController, Profile};
+use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_flight_core::{ArmingLimits, Asked, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle};
 use afbc_types::{Parameters, RotorForces, Setpoint, State};
 
 /// Counts how often it is engaged, and carries the vehicle.
-struct Counter;
+struct Counter(Mixer);
 
 impl FlightController for Counter {
     type Memory = u32;
 
-    fn decide(&self, _: &mut u32, _: &State, _: &Setpoint, _: bool) -> Command {
-        Command { forces: RotorForces([1.2; 4].into()), ..Command::default() }
+    fn dt_s(&self) -> f32 {
+        0.001
+    }
+
+    fn mixer(&self) -> &Mixer {
+        &self.0
+    }
+
+    fn trace(_: &u32) -> Trace {
+        Trace::default()
+    }
+
+    fn decide(&self, _: &mut u32, _: &State, _: &Setpoint, _: bool) -> Action {
+        Action { forces: RotorForces([1.2; 4].into()), ..Action::default() }
     }
 
     fn engage(&self, memory: &mut u32) -> bool {
@@ -29,8 +41,9 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let (airframe, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
-        let vehicle = Vehicle::new(airframe, settings, ArmingLimits::default(), Counter).expect("valid");
+        let parameters = Parameters::PAPER.to_f32();
+        let counter = Counter(Mixer::new(&parameters, 3.0).expect("valid"));
+        let vehicle = Vehicle::new(parameters, ArmingLimits::default(), counter).expect("valid");
         Bench { vehicle, memory: Memory::default(), now_us: 0 }
     }
 

@@ -78,10 +78,10 @@ struct Seen {
 /// Plays the frames, each at its time, those of one millisecond in their order here.
 fn play(mut frames: Vec<Frame>) -> Seen {
     frames.sort_by_key(|frame| frame.at_ms);
-    let (airframe, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
+    let (parameters, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
     let law = Adaptive::new(Profile::Flight.gains()).expect("valid");
-    let controller = Controller::new(airframe, settings, law).expect("valid");
-    let vehicle = Vehicle::new(airframe, settings, ArmingLimits::default(), controller).expect("valid");
+    let controller = Controller::new(parameters, settings, law).expect("valid");
+    let vehicle = Vehicle::new(parameters, ArmingLimits::default(), controller).expect("valid");
     let (mut memory, mut inbox, mut tracker) = (Memory::default(), Inbox::default(), Tracker::default());
     let mut decoder = Decoder::<Uplink>::new(VEHICLE);
     let mut seen = Seen::default();

@@ -2,7 +2,7 @@
 //! itself, with states made up. Closed loops are in `tests/tests/frozen.rs`.
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
-use afbc::{Command, FlightController, Profile};
+use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_flight_core::supervisor::REST_US;
 use afbc_flight_core::{
     Answer, ArmingLimits, Asked, End, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle,
@@ -15,14 +15,26 @@ use proptest::prelude::*;
 const WEIGHT_N: f32 = 0.486 * 9.81;
 
 /// Gives a thrust of as many newtons as the setpoint is high.
-struct Lift;
+struct Lift(Mixer);
 
 impl FlightController for Lift {
     type Memory = ();
 
-    fn decide(&self, (): &mut (), _: &State, setpoint: &Setpoint, _: bool) -> Command {
+    fn dt_s(&self) -> f32 {
+        0.001
+    }
+
+    fn mixer(&self) -> &Mixer {
+        &self.0
+    }
+
+    fn trace(_: &()) -> Trace {
+        Trace::default()
+    }
+
+    fn decide(&self, (): &mut (), _: &State, setpoint: &Setpoint, _: bool) -> Action {
         let force = setpoint.position_m.z / 4.0;
-        Command { forces: RotorForces([force; 4].into()), speeds: RotorSpeeds([300.0; 4].into()), ..Command::default() }
+        Action { forces: RotorForces([force; 4].into()), speeds: RotorSpeeds([300.0; 4].into()), ..Action::default() }
     }
 }
 
@@ -39,8 +51,9 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         let limits = ArmingLimits { setpoint_distance_max_m: 100.0, ..ArmingLimits::default() };
-        let vehicle = Vehicle::new(Parameters::PAPER.to_f32(), Profile::Flight.settings(), limits, Lift);
-        let vehicle = vehicle.expect("valid");
+        let parameters = Parameters::PAPER.to_f32();
+        let lift = Lift(Mixer::new(&parameters, 3.0).expect("valid"));
+        let vehicle = Vehicle::new(parameters, limits, lift).expect("valid");
         Bench {
             vehicle,
             memory: Memory::default(),

@@ -1,7 +1,8 @@
 //! The control tick against the law's own step, and blind flight against a plant.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use afbc::{Adaptive, Command, Controller, FlightController, Profile, Settings};
+use afbc::{Adaptive, Controller, Profile, Settings};
+use afbc_control::{FlightController, Trace};
 use afbc_flight_core::descent::SINK_M_S;
 use afbc_flight_core::ground::{CARRIED_US, STILL_US};
 use afbc_flight_core::{
@@ -11,7 +12,7 @@ use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
 
-type Adapted = afbc::Cascade<afbc::adaptive::Estimate>;
+type Adapted = afbc::Cascade<afbc_control::Estimate>;
 
 fn controller(settings: Settings) -> Controller<Adaptive> {
     let law = Adaptive::new(Profile::Flight.gains()).expect("valid");
@@ -20,7 +21,7 @@ fn controller(settings: Settings) -> Controller<Adaptive> {
 
 fn vehicle() -> Vehicle<Controller<Adaptive>> {
     let settings = Profile::Flight.settings();
-    Vehicle::new(Parameters::PAPER.to_f32(), settings, ArmingLimits::default(), controller(settings)).expect("valid")
+    Vehicle::new(Parameters::PAPER.to_f32(), ArmingLimits::default(), controller(settings)).expect("valid")
 }
 
 /// A vehicle, its memory and the time.
@@ -29,22 +30,18 @@ struct Bench {
     memory: Memory<Adapted>,
     now_us: u64,
     inbox: Inbox,
-    /// What was behind the last tick.
-    command: Command,
     /// Of the measured height, to and fro: no tracker says the same twice \[m\].
     noise_m: f32,
 }
 
 impl Bench {
     fn new() -> Self {
-        Bench {
-            vehicle: vehicle(),
-            memory: Memory::default(),
-            now_us: 0,
-            inbox: Inbox::default(),
-            command: Command::default(),
-            noise_m: 0.0,
-        }
+        Bench { vehicle: vehicle(), memory: Memory::default(), now_us: 0, inbox: Inbox::default(), noise_m: 0.0 }
+    }
+
+    /// What was behind the last tick.
+    fn trace(&self) -> Trace {
+        self.memory.trace::<Controller<Adaptive>>()
     }
 
     fn ask(&mut self, request: Request) {
@@ -85,9 +82,7 @@ impl Bench {
             self.inbox.aim(Stamped { value, at_us });
         }
         let inbox = self.inbox.take();
-        let (outcome, command) = self.vehicle.traced_tick(&mut self.memory, self.now_us, &inbox);
-        self.command = command;
-        outcome
+        self.vehicle.tick(&mut self.memory, self.now_us, &inbox)
     }
 }
 
@@ -120,16 +115,17 @@ fn disarmed_motors_are_off_and_arming_waits_for_the_rate() {
 fn flying_is_the_laws_step() {
     let mut bench = Bench::flying(State::default(), near());
     let controller = controller(Profile::Flight.settings());
-    let mut memory = afbc::Memory::default();
-    controller.step(&mut memory, &State::default(), &near());
+    let mut memory = afbc_control::Screened::default();
+    controller.step(&mut memory, Some(&State::default()), &near());
     for tick in 0..500 {
         let t = tick as f32 * 1e-3;
         let mut state = State { position_m: Vector3::new(t, -t, 0.1 * t), ..State::default() };
         state.attitude_rad = Vector3::new(0.1 * (9.0 * t).sin(), 0.2 * t, -t);
         state.rates_rad_s = Vector3::new(t, -t, 0.3);
-        let command = controller.step(&mut memory, &state, &near());
+        let command = controller.step(&mut memory, Some(&state), &near());
         let outcome = bench.tick(Some(state), Some(near()));
-        assert_eq!(bench.command, command);
+        assert_eq!((outcome.forces, outcome.health.control), (command.forces, command.health));
+        assert_eq!(bench.trace(), Controller::<Adaptive>::trace(&memory.control));
         assert_eq!(outcome.motors.0.map(f32::to_bits), command.speeds.0.map(f32::to_bits));
         let estimates = bench.memory.control().map(|control| &control.estimates);
         assert_eq!(estimates, Some(&memory.control.estimates));
@@ -188,7 +184,7 @@ fn blind_thrust_is_the_weight_and_then_less() {
     let thrusts: Vec<f32> = (1..=400)
         .map(|_| {
             bench.tick(None, Some(near()));
-            bench.command.inputs.thrust_n
+            bench.trace().inputs.thrust_n
         })
         .collect();
     let (riding, descending) = (thrusts.get(100).expect("400 ticks"), thrusts.get(399).expect("400 ticks"));
@@ -212,8 +208,8 @@ impl Roll {
         }
     }
 
-    fn advance(&mut self, command: &Command) {
-        let [f1, _, f3, _] = command.forces.0.into();
+    fn advance(&mut self, outcome: &Outcome) {
+        let [f1, _, f3, _] = outcome.forces.0.into();
         self.rate += 0.25 / 0.0038 * (f3 - f1 + self.outside_n) * 1e-3;
         self.angle += self.rate * 1e-3;
     }
@@ -227,15 +223,15 @@ fn riding_stops_the_rotation_and_descending_levels() {
         let mut roll = Roll { angle: 0.0, rate: 0.0, outside_n };
         let mut bench = Bench::airborne(roll.state(), Setpoint::hold(&State::default()));
         for _ in 0..5000 {
-            bench.tick(Some(roll.state()), Some(Setpoint::hold(&State::default())));
-            roll.advance(&bench.command);
+            let outcome = bench.tick(Some(roll.state()), Some(Setpoint::hold(&State::default())));
+            roll.advance(&outcome);
         }
         (roll.angle, roll.rate) = (0.1, 1.0);
         let mut held = None;
         for age_ms in 0..=2250 {
             let measured = (age_ms == 0).then(|| roll.state());
             let outcome = bench.tick(measured, Some(Setpoint::hold(&State::default())));
-            roll.advance(&bench.command);
+            roll.advance(&outcome);
             match age_ms {
                 250 => {
                     assert!(roll.rate.abs() < 0.3, "{} rad/s after the ride", roll.rate);
@@ -261,14 +257,14 @@ fn without_a_setpoint_the_vehicle_stays_where_it_is() {
     let here = State { position_m: Vector3::new(1.0, 2.0, 3.0), ..State::default() };
     let outcome = bench.tick(Some(here), None);
     assert!(outcome.health.setpoint_stale);
-    assert_eq!((outcome.mode, bench.command.errors.x.e1), (Mode::Flying, 0.0));
+    assert_eq!((outcome.mode, bench.trace().errors.x.e1), (Mode::Flying, 0.0));
     // The place is that of the moment, not the vehicle's.
     let moved = State { position_m: Vector3::new(1.5, 2.0, 3.0), ..State::default() };
     bench.tick(Some(moved), None);
-    assert_eq!(bench.command.errors.x.e1, -0.5);
+    assert_eq!(bench.trace().errors.x.e1, -0.5);
     // A setpoint that comes back is followed.
     bench.tick(Some(moved), Some(near()));
-    assert_eq!(bench.command.errors.x.e1, 0.3 - 1.5);
+    assert_eq!(bench.trace().errors.x.e1, 0.3 - 1.5);
 }
 
 #[test]
@@ -282,16 +278,16 @@ fn a_state_that_comes_back_leads_the_descent_to_the_ground() {
     for tick in 1..=2000 {
         let outcome = bench.tick(Some(state), Some(near()));
         assert_eq!(outcome.mode, Mode::Descending);
-        let sunk = bench.command.errors.z.e1 + state.position_m.z - 3.0;
+        let sunk = bench.trace().errors.z.e1 + state.position_m.z - 3.0;
         assert!((sunk + SINK_M_S * tick as f32 * 1e-3).abs() < 1e-3);
-        assert!(bench.command.errors.x.e1.abs() < 1e-6);
+        assert!(bench.trace().errors.x.e1.abs() < 1e-6);
         state.position_m.z -= SINK_M_S * 1e-3;
     }
     state.velocity_m_s.z = 0.0;
     // The ground stops it. Its rotors must stop carrying it, too, and both for a second.
     let mut uncarried_ms = 0;
     let ended = (0..3000).find_map(|_| {
-        uncarried_ms += u64::from(bench.command.inputs.thrust_n < 0.6 * WEIGHT_N);
+        uncarried_ms += u64::from(bench.trace().inputs.thrust_n < 0.6 * WEIGHT_N);
         let outcome = bench.tick(Some(state), Some(near()));
         assert!(outcome.mode == Mode::Descending || outcome.motors == RotorSpeeds::default());
         outcome.ended
@@ -315,8 +311,8 @@ fn states_that_are_stale_when_they_come_are_no_states() {
 
 #[test]
 fn only_a_law_at_the_ticks_rate_flies() {
-    let settings = Settings { dt_s: 0.002, ..Profile::Flight.settings() };
-    let refused = Vehicle::new(Parameters::PAPER.to_f32(), settings, ArmingLimits::default(), controller(settings));
+    let settings = Profile::Flight.settings().with_dt_s(0.002);
+    let refused = Vehicle::new(Parameters::PAPER.to_f32(), ArmingLimits::default(), controller(settings));
     assert_eq!(refused.expect_err("2 ms").range.name, "dt_s");
 }
 

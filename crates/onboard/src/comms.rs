@@ -3,7 +3,8 @@
 use crate::answers::{ANSWERS_PER_TICK, Answers};
 use crate::failsafes::Failsafes;
 use crate::flight::Report;
-use afbc::monitor::{Norm, Trip};
+use afbc::monitor::Norm;
+use afbc_control::Trip;
 use afbc_flight_core::rate;
 use afbc_flight_core::tracker::Refused;
 use afbc_flight_core::{Inbox, Mode, Stamped, Tracker};

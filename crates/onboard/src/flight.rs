@@ -44,12 +44,12 @@ impl Flight {
     /// # Errors
     /// The first parameter out of range.
     pub fn new() -> Result<Self, OutOfRange> {
-        let (airframe, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
-        let gains = Profile::Flight.gains_for(&airframe);
-        let bounds = Bounds::new(&gains, &airframe);
-        let controller = Guarded::new(airframe, settings, gains, bounds)?;
+        let (parameters, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
+        let gains = Profile::Flight.gains_for(&parameters);
+        let bounds = Bounds::new(&gains, &parameters);
+        let controller = Guarded::new(parameters, settings, gains, bounds)?;
         Ok(Flight {
-            vehicle: Vehicle::new(airframe, settings, ArmingLimits::default(), controller)?,
+            vehicle: Vehicle::new(parameters, ArmingLimits::default(), controller)?,
             memory: Memory::default(),
             motor: Motor::new(Curve::DEFAULT)?,
             saturated_ticks: 0,

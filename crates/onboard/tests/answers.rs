@@ -3,7 +3,7 @@
 
 mod common;
 
-use afbc::monitor::Trip;
+use afbc_control::Trip;
 use afbc_flight_core::inbox::REQUESTS_MAX;
 use afbc_flight_core::{End, Mode, Refusal, Request};
 use afbc_link::{Address, Answer, Command, Downlink, FRAME_MAX, MavSeverity, Sender, Text, Uplink};

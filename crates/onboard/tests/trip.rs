@@ -3,7 +3,7 @@
 
 mod common;
 
-use afbc::monitor::Trip;
+use afbc_control::Trip;
 use afbc_flight_core::{Mode, Request};
 use afbc_link::{Answer, Command, Downlink, MavCmd, MavSeverity, Text, Uplink};
 use afbc_onboard::Report;

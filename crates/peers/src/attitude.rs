@@ -4,7 +4,7 @@
 //! small rotations in body coordinates \[rad\], positive where the body must turn positively to reach the desired
 //! attitude.
 
-use afbc::math;
+use afbc_control::math;
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
 /// Below this square of cos(tilt error / 2), two thrusts count as opposite.

@@ -1,10 +1,9 @@
-//! From thrust and angular acceleration to a command: the nominal vehicle and its rotors.
+//! From thrust and angular acceleration to an action: the nominal vehicle and its rotors.
 
 use crate::attitude::roll_pitch;
-use afbc::allocation::{Allocation, Mixer};
-use afbc::backstepping::Errors;
-use afbc::command_filter::Filtered;
-use afbc::{Command, Health, Settings};
+use afbc_control::command_filter::Filtered;
+use afbc_control::mixer::{Allocation, Mixer};
+use afbc_control::{Action, Errors, Health, Settings, Trace};
 use afbc_types::{Inputs, OutOfRange, Parameters, PerAxis, RotorSpeeds};
 use nalgebra::{Matrix3, Vector3};
 
@@ -64,9 +63,9 @@ impl Body {
         self.mixer.speeds(&self.mixer.allocate(&inputs).forces)
     }
 
-    /// The command for `demand`, and what of U1..U3 the rotors cannot give \[N\].
+    /// The action for `demand`, why, and what of U1..U3 the rotors cannot give \[N\].
     #[inline]
-    pub(crate) fn command(&self, demand: &Demand) -> (Command, Vector3<f32>) {
+    pub(crate) fn act(&self, demand: &Demand) -> (Action, Trace, Vector3<f32>) {
         let wanted = demand.angular_acceleration_rad_s2.component_div(&self.effectiveness);
         let inputs = Inputs { roll_n: wanted.x, pitch_n: wanted.y, yaw_n: wanted.z, thrust_n: demand.thrust_n };
         let Allocation { forces, unallocated, saturated } = self.mixer.allocate(&inputs);
@@ -76,9 +75,9 @@ impl Body {
         let [p, q] = [demand.desired_rates_rad_s.x, demand.desired_rates_rad_s.y];
         let [position, velocity, attitude, rates] = demand.errors;
         let errors = |e1, e1_dot| Errors { e1, e1_dot, e2: 0.0 };
-        let command = Command {
-            speeds: self.mixer.speeds(&forces),
-            forces,
+        let health = Health { saturated, ..Health::default() };
+        let action = Action { speeds: self.mixer.speeds(&forces), forces, health };
+        let trace = Trace {
             inputs,
             virtual_m_s2: [demand.acceleration_m_s2.x, demand.acceleration_m_s2.y],
             desired_rad,
@@ -91,8 +90,7 @@ impl Body {
                 x: errors(position.x, velocity.x),
                 y: errors(position.y, velocity.y),
             },
-            health: Health { saturated, ..Health::default() },
         };
-        (command, Vector3::new(unallocated.roll_n, unallocated.pitch_n, unallocated.yaw_n))
+        (action, trace, Vector3::new(unallocated.roll_n, unallocated.pitch_n, unallocated.yaw_n))
     }
 }

@@ -5,7 +5,7 @@
 //! 0.64 w, the delay at low frequencies 2 / w. White noise of standard deviation sigma per sample becomes one of
 //! sigma sqrt(dt w^3 / 4) on the derivative.
 
-use afbc::command_filter::{CommandFilter, Filtered};
+use afbc_control::command_filter::{CommandFilter, Filtered};
 use afbc_types::OutOfRange;
 use nalgebra::Vector3;
 
@@ -37,7 +37,7 @@ impl Differentiator {
     /// A filter of the given w \[rad/s\], advanced every `dt_s` seconds.
     ///
     /// # Errors
-    /// If w is outside [`afbc::command_filter::BANDWIDTH`].
+    /// If w is outside [`afbc_control::command_filter::BANDWIDTH`].
     pub fn new(bandwidth_rad_s: f32, dt_s: f32) -> Result<Self, OutOfRange> {
         CommandFilter::new(bandwidth_rad_s, dt_s).map(Differentiator)
     }

@@ -42,7 +42,7 @@ use crate::differentiator::{Differentiator, Smooth};
 use crate::limits::{Limits, TILT_MAX};
 use crate::pid::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
 use crate::within;
-use afbc::{Command, FlightController, Settings};
+use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
 use afbc_types::{OutOfRange, Parameters, Range, Setpoint, State};
 use nalgebra::{Matrix3, Vector3};
 
@@ -211,6 +211,8 @@ pub struct Memory {
     /// What of U1..U3 the rotors could not give in the last step \[N\].
     unallocated: Vector3<f32>,
     specific_force: Smooth,
+    /// Of the last step.
+    trace: Trace,
 }
 
 /// R_d, Omega_d, dOmega_d/dt; the last two in the desired frame.
@@ -275,8 +277,20 @@ impl Geometric {
 impl FlightController for Geometric {
     type Memory = Memory;
 
+    fn dt_s(&self) -> f32 {
+        self.dt_s
+    }
+
+    fn mixer(&self) -> &Mixer {
+        &self.body.mixer
+    }
+
+    fn trace(memory: &Memory) -> Trace {
+        memory.trace
+    }
+
     #[inline]
-    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
+    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
         // Position.
         let gravity = self.limits.gravity();
         let position_error = setpoint.position_m - state.position_m;
@@ -316,7 +330,8 @@ impl FlightController for Geometric {
             desired_rates_rad_s: rates_rad_s,
             errors: [position_error, velocity_error, attitude_error, rate_error],
         };
-        let (command, unallocated) = self.body.command(&demand);
+        let (action, trace, unallocated) = self.body.act(&demand);
+        memory.trace = trace;
 
         if fresh {
             let allowed = position_error.zip_map(&(wanted - specific_force), away_from);
@@ -336,6 +351,6 @@ impl FlightController for Geometric {
             );
         }
         memory.unallocated = unallocated;
-        command
+        action
     }
 }

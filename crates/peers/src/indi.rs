@@ -38,8 +38,7 @@ use crate::differentiator::{Differentiator, Smooth};
 use crate::limits::{Limits, TILT_MAX, cylinder};
 use crate::pid::{SPEED_MAX, YAW_WEIGHT};
 use crate::within;
-use afbc::allocation::Mixer;
-use afbc::{Command, FlightController, Settings, math};
+use afbc_control::{Action, FlightController, Mixer, Settings, Trace, math};
 use afbc_types::{OutOfRange, Parameters, Range, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 
@@ -171,6 +170,7 @@ impl Gains {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Indi {
     body: Body,
+    dt_s: f32,
     limits: Limits,
     position_filter: Differentiator,
     attitude_filter: Differentiator,
@@ -195,6 +195,8 @@ pub struct Memory {
     rates: Smooth,
     /// G u \[rad/s2\]
     rotor_acceleration: Smooth,
+    /// Of the last step.
+    trace: Trace,
 }
 
 impl Indi {
@@ -209,6 +211,7 @@ impl Indi {
         let tau = gains.rotor_time_constant_s;
         Ok(Indi {
             body,
+            dt_s: settings.dt_s,
             limits: Limits::new(&vehicle, &settings, gains.tilt_max_rad)?,
             position_filter: Differentiator::new(gains.position_filter_rad_s, settings.dt_s)?,
             attitude_filter: Differentiator::new(gains.attitude_filter_rad_s, settings.dt_s)?,
@@ -227,8 +230,20 @@ impl Indi {
 impl FlightController for Indi {
     type Memory = Memory;
 
+    fn dt_s(&self) -> f32 {
+        self.dt_s
+    }
+
+    fn mixer(&self) -> &Mixer {
+        &self.body.mixer
+    }
+
+    fn trace(memory: &Memory) -> Trace {
+        memory.trace
+    }
+
     #[inline]
-    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
+    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
         let r = r_earth_body(&state.attitude_rad);
         let (body_z, earth_z) = (unit(&r.column(2).into()), r.row(2).transpose());
 
@@ -269,8 +284,9 @@ impl FlightController for Indi {
             desired_rates_rad_s: rates_wanted,
             errors: [position_error, velocity_error, attitude_error, rate_error],
         };
-        let (command, _) = self.body.command(&demand);
-        memory.rotors = Some(RotorSpeeds(rotors.0 + (command.speeds.0 - rotors.0) * self.rotor_gain));
-        command
+        let (action, trace, _) = self.body.act(&demand);
+        memory.trace = trace;
+        memory.rotors = Some(RotorSpeeds(rotors.0 + (action.speeds.0 - rotors.0) * self.rotor_gain));
+        action
     }
 }

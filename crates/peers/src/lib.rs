@@ -1,5 +1,5 @@
 //! Established quadrotor controllers, for AFBC to be weighed against, in AFBC's own style: no_std, no alloc, fixed size,
-//! and behind the same [`FlightController`](afbc::FlightController).
+//! and behind the same [`FlightController`](afbc_control::FlightController).
 //!
 //! | controller | what it is | source |
 //! |---|---|---|
@@ -12,14 +12,14 @@
 //!
 //! # What they share
 //!
-//! * The interface: an [`afbc_types::State`] and an [`afbc_types::Setpoint`] in, an [`afbc::Command`] out, by way of U1..U4
-//!   and AFBC's own [`Mixer`](afbc::allocation::Mixer), so that no controller has a better allocation than another.
-//! * Of [`afbc::Settings`], the time step and the rotors' limit. What else is there belongs to AFBC.
-//! * Implausible input through [`afbc::Screen`]; filters and integrators rest while the state is not a new one.
+//! * The interface: an [`afbc_types::State`] and an [`afbc_types::Setpoint`] in, an [`afbc_control::Action`] out, by way of U1..U4
+//!   and AFBC's own [`Mixer`](afbc_control::Mixer), so that no controller has a better allocation than another.
+//! * [`afbc_control::Settings`]: the time step and the rotors' limit.
+//! * Implausible input through [`afbc_control::Screen`]; filters and integrators rest while the state is not a new one.
 //! * The vehicle's nominal parameters scale everything, so gains are in 1/s and 1/s2 and serve vehicles of any size whose
 //!   rotors are as quick.
 //! * [`limits::Limits`]: thrust within what the rotors give, tilt below a maximum, yaw no dearer than it is worth.
-//! * Mathematics from [`afbc::math`] alone, so host and target give the same bits. Its sine is off by up to 1.2e-3, which
+//! * Mathematics from [`afbc_control::math`] alone, so host and target give the same bits. Its sine is off by up to 1.2e-3, which
 //!   turns a tilt of 0.1 rad into 0.0987: a lasting 0.013 m/s2 at most where nothing integrates, and nothing elsewhere.
 //!
 //! # Tuning
@@ -30,13 +30,14 @@
 //! their source were tuned by hand, `Gains::TUNED` by `sitl tune` (`docs/tuning.md`).
 //!
 //! ```
-//! use afbc::{FlightController, Memory, Profile};
+//! use afbc_control::{FlightController, Screened, Settings};
 //! use afbc_types::{Parameters, Setpoint, State};
 //! use afbc_peers::pid::{Gains, Pid};
 //!
-//! let controller = Pid::new(Parameters::PAPER.to_f32(), Profile::Paper.settings(), Gains::PAPER_VEHICLE)?;
-//! let command = controller.step(&mut Memory::default(), &State::default(), &Setpoint::default());
-//! assert_eq!(command.inputs.thrust_n, 0.486 * 9.81); // nothing to correct: the weight
+//! let settings = Settings { dt_s: 0.001, rotor_force_max_n: 3.0 };
+//! let controller = Pid::new(Parameters::PAPER.to_f32(), settings, Gains::PAPER_VEHICLE)?;
+//! let action = controller.step(&mut Screened::default(), Some(&State::default()), &Setpoint::default());
+//! assert!((action.forces.0.sum() - 0.486 * 9.81).abs() < 1e-5); // nothing to correct: the weight
 //! # Ok::<(), afbc_types::OutOfRange>(())
 //! ```
 #![no_std]

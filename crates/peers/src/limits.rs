@@ -1,6 +1,6 @@
 //! What the position loops may ask for.
 
-use afbc::{Settings, math};
+use afbc_control::{Settings, math};
 use afbc_types::{OutOfRange, Parameters, Range};
 use nalgebra::Vector3;
 

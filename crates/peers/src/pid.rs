@@ -26,7 +26,7 @@ use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
 use crate::limits::{Limits, TILT_MAX, cylinder};
 use crate::within;
-use afbc::{Command, FlightController, Settings};
+use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
 use afbc_types::{OutOfRange, Parameters, Range, Setpoint, State};
 use nalgebra::Vector3;
 
@@ -228,6 +228,8 @@ pub struct Memory {
     unallocated: Vector3<f32>,
     velocity: Smooth,
     rates: Smooth,
+    /// Of the last step.
+    trace: Trace,
 }
 
 impl Pid {
@@ -282,8 +284,20 @@ pub(crate) fn away_from(error: f32, missing: f32) -> f32 {
 impl FlightController for Pid {
     type Memory = Memory;
 
+    fn dt_s(&self) -> f32 {
+        self.dt_s
+    }
+
+    fn mixer(&self) -> &Mixer {
+        &self.body.mixer
+    }
+
+    fn trace(memory: &Memory) -> Trace {
+        memory.trace
+    }
+
     #[inline]
-    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
+    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
         if fresh {
             self.differentiator.advance(&mut memory.velocity, &state.velocity_m_s);
             self.differentiator.advance(&mut memory.rates, &state.rates_rad_s);
@@ -322,7 +336,8 @@ impl FlightController for Pid {
             desired_rates_rad_s: rates_wanted,
             errors: [position_error, velocity_error, attitude_error, rate_error],
         };
-        let (command, unallocated) = self.body.command(&demand);
+        let (action, trace, unallocated) = self.body.act(&demand);
+        memory.trace = trace;
 
         if fresh {
             let unwound = velocity_error - self.anti_windup.component_mul(&missing);
@@ -337,6 +352,6 @@ impl FlightController for Pid {
             );
         }
         memory.unallocated = unallocated;
-        command
+        action
     }
 }

@@ -3,7 +3,7 @@
 
 mod harness;
 
-use afbc::{Command, FlightController, Memory};
+use afbc_control::{Action, FlightController, Screened, Trace};
 use afbc_peers::attitude::{facing, geometric_error, quaternion, r_earth_body, roll_pitch, tilt_prioritised_error};
 use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
 use afbc_types::{Range, Setpoint, State};
@@ -26,18 +26,18 @@ fn indi() -> Indi {
     Indi::new(vehicle(), SETTINGS, indi::Gains::PAPER_VEHICLE).unwrap()
 }
 
-/// The command after `steps` steps of one and the same input.
-fn after<C: FlightController>(controller: &C, steps: usize, state: &State, setpoint: &Setpoint) -> Command {
-    let mut memory = Memory::<C::Memory>::default();
-    let mut command = Command::default();
+/// The action after `steps` steps of one and the same input, and why.
+fn after<C: FlightController>(controller: &C, steps: usize, state: &State, setpoint: &Setpoint) -> (Action, Trace) {
+    let mut memory = Screened::<C::Memory>::default();
+    let mut action = Action::default();
     for _ in 0..steps {
-        command = controller.step(&mut memory, state, setpoint);
+        action = controller.step(&mut memory, Some(state), setpoint);
     }
-    command
+    (action, C::trace(&memory.control))
 }
 
-/// Runs `check` on the first and on a later command of every peer.
-fn of_each(state: &State, setpoint: &Setpoint, check: impl Fn(&str, Command)) {
+/// Runs `check` on the first and on a later step of every peer.
+fn of_each(state: &State, setpoint: &Setpoint, check: impl Fn(&str, (Action, Trace))) {
     for steps in [1, 5] {
         check("pid", after(&pid(), steps, state, setpoint));
         check("lee", after(&lee(), steps, state, setpoint));
@@ -54,19 +54,19 @@ fn without_error_the_rotors_carry_the_weight_and_nothing_else() {
         let mut state = State { position_m: Vector3::new(1.0, -2.0, 3.0), ..State::default() };
         state.attitude_rad.z = yaw_rad;
         let setpoint = Setpoint::hold(&state);
-        of_each(&state, &setpoint, |name, command| {
-            let u = command.inputs;
+        of_each(&state, &setpoint, |name, (action, trace)| {
+            let u = trace.inputs;
             assert!((u.thrust_n - WEIGHT_N).abs() < 2e-6, "{name}: {u:?}");
             assert!(u.roll_n.abs() < 1e-5 && u.pitch_n.abs() < 1e-5 && u.yaw_n.abs() < 1e-4, "{name}: {u:?}");
-            assert_eq!(command.health, afbc::Health::default(), "{name}");
+            assert_eq!(action.health, afbc_control::Health::default(), "{name}");
         });
     }
     // Heading along x, there is no rounding either.
-    of_each(&State::default(), &Setpoint::default(), |name, command| {
+    of_each(&State::default(), &Setpoint::default(), |name, (_, trace)| {
         if name != "indi" {
-            assert_eq!(command.inputs.thrust_n, WEIGHT_N, "{name}");
+            assert_eq!(trace.inputs.thrust_n, WEIGHT_N, "{name}");
         }
-        assert_eq!((command.inputs.roll_n, command.inputs.pitch_n, command.inputs.yaw_n), (0.0, 0.0, 0.0), "{name}");
+        assert_eq!((trace.inputs.roll_n, trace.inputs.pitch_n, trace.inputs.yaw_n), (0.0, 0.0, 0.0), "{name}");
     });
 }
 
@@ -79,30 +79,30 @@ fn every_error_is_answered_in_the_right_direction() {
         state
     };
     // Below: more thrust. Rising: less.
-    of_each(&moved(|s| s.position_m.z = -0.1), &hold, |name, c| assert!(c.inputs.thrust_n > WEIGHT_N, "{name}"));
-    of_each(&moved(|s| s.velocity_m_s.z = 0.1), &hold, |name, c| assert!(c.inputs.thrust_n < WEIGHT_N, "{name}"));
+    of_each(&moved(|s| s.position_m.z = -0.1), &hold, |name, (_, c)| assert!(c.inputs.thrust_n > WEIGHT_N, "{name}"));
+    of_each(&moved(|s| s.velocity_m_s.z = 0.1), &hold, |name, (_, c)| assert!(c.inputs.thrust_n < WEIGHT_N, "{name}"));
     // Behind the setpoint along x: pitch up to tilt the thrust there; along y: roll the other way.
-    of_each(&moved(|s| s.position_m.x = -0.1), &hold, |name, c| {
+    of_each(&moved(|s| s.position_m.x = -0.1), &hold, |name, (_, c)| {
         assert!(c.desired_rad[1] > 0.0 && c.desired_rad[0] == 0.0 && c.inputs.pitch_n >= 0.0, "{name}: {c:?}");
     });
-    of_each(&moved(|s| s.position_m.y = -0.1), &hold, |name, c| {
+    of_each(&moved(|s| s.position_m.y = -0.1), &hold, |name, (_, c)| {
         assert!(c.desired_rad[0] < 0.0 && c.desired_rad[1] == 0.0 && c.inputs.roll_n <= 0.0, "{name}: {c:?}");
     });
-    of_each(&moved(|s| s.velocity_m_s.x = 0.1), &hold, |name, c| assert!(c.desired_rad[1] < 0.0, "{name}: {c:?}"));
+    of_each(&moved(|s| s.velocity_m_s.x = 0.1), &hold, |name, (_, c)| assert!(c.desired_rad[1] < 0.0, "{name}: {c:?}"));
     // A positive angle or rate is turned back; but a tilt without an acceleration is, to INDI, leaning into a wind.
     let tilted = |name: &str, u: f32| assert!(if name == "indi" { u.abs() < 1e-3 } else { u < -1e-2 }, "{name}: {u}");
-    of_each(&moved(|s| s.attitude_rad.x = 0.1), &hold, |name, c| tilted(name, c.inputs.roll_n));
-    of_each(&moved(|s| s.attitude_rad.y = 0.1), &hold, |name, c| tilted(name, c.inputs.pitch_n));
-    of_each(&moved(|s| s.attitude_rad.z = 0.1), &hold, |name, c| assert!(c.inputs.yaw_n < -1e-3, "{name}"));
-    of_each(&moved(|s| s.rates_rad_s.x = 0.1), &hold, |name, c| assert!(c.inputs.roll_n < -1e-3, "{name}"));
-    of_each(&moved(|s| s.rates_rad_s.y = 0.1), &hold, |name, c| assert!(c.inputs.pitch_n < -1e-3, "{name}"));
-    of_each(&moved(|s| s.rates_rad_s.z = 0.1), &hold, |name, c| assert!(c.inputs.yaw_n < -1e-3, "{name}"));
+    of_each(&moved(|s| s.attitude_rad.x = 0.1), &hold, |name, (_, c)| tilted(name, c.inputs.roll_n));
+    of_each(&moved(|s| s.attitude_rad.y = 0.1), &hold, |name, (_, c)| tilted(name, c.inputs.pitch_n));
+    of_each(&moved(|s| s.attitude_rad.z = 0.1), &hold, |name, (_, c)| assert!(c.inputs.yaw_n < -1e-3, "{name}"));
+    of_each(&moved(|s| s.rates_rad_s.x = 0.1), &hold, |name, (_, c)| assert!(c.inputs.roll_n < -1e-3, "{name}"));
+    of_each(&moved(|s| s.rates_rad_s.y = 0.1), &hold, |name, (_, c)| assert!(c.inputs.pitch_n < -1e-3, "{name}"));
+    of_each(&moved(|s| s.rates_rad_s.z = 0.1), &hold, |name, (_, c)| assert!(c.inputs.yaw_n < -1e-3, "{name}"));
     // Yaw goes the short way round.
     let beyond = Setpoint { yaw_rad: -3.1, ..hold };
-    of_each(&moved(|s| s.attitude_rad.z = 3.1), &beyond, |name, c| assert!(c.inputs.yaw_n > 0.0, "{name}"));
+    of_each(&moved(|s| s.attitude_rad.z = 3.1), &beyond, |name, (_, c)| assert!(c.inputs.yaw_n > 0.0, "{name}"));
     // Feed-forward: an acceleration wanted is an acceleration tilted for.
     let sideways = Setpoint { acceleration_m_s2: Vector3::new(1.0, 0.0, 0.0), ..hold };
-    of_each(&State::default(), &sideways, |name, c| {
+    of_each(&State::default(), &sideways, |name, (_, c)| {
         assert!(c.desired_rad[1] > 0.0 && c.desired_rad[0] == 0.0, "{name}: {c:?}");
     });
 }
@@ -145,7 +145,7 @@ fn turning_the_scene_about_the_vertical_changes_nothing_for_the_body() {
             (state, setpoint)
         };
         let ((state, setpoint), (turned_state, turned_setpoint)) = (scene(0.0), scene(turn));
-        let same = |a: Command, b: Command, name: &str| {
+        let same = |(_, a): (Action, Trace), (_, b): (Action, Trace), name: &str| {
             let difference = Vector3::new(
                 (a.inputs.roll_n - b.inputs.roll_n) * 65.8,
                 (a.inputs.pitch_n - b.inputs.pitch_n) * 65.8,
@@ -283,15 +283,15 @@ fn an_integrator_does_not_wind_up_against_a_limit() {
     // Far away sideways and above for 20 s: tilt and thrust are at their limits all the time.
     let state = State { position_m: Vector3::new(-50.0, 0.0, 0.0), ..State::default() };
     let far = Setpoint { position_m: Vector3::new(0.0, 0.0, 500.0), ..Setpoint::default() };
-    let mut memory = Memory::<pid::Memory>::default();
+    let mut memory = Screened::<pid::Memory>::default();
     for _ in 0..20_000 {
-        pid().step(&mut memory, &state, &far);
+        pid().step(&mut memory, Some(&state), &far);
     }
     // 20 s of 4 1/s2 times 3 m/s would be 240 m/s2, clipped to 9.81 m/s2.
     assert!(memory.control.velocity_integral.x < 4.0, "{:?}", memory.control.velocity_integral);
-    let mut memory = Memory::<geometric::Memory>::default();
+    let mut memory = Screened::<geometric::Memory>::default();
     for _ in 0..20_000 {
-        goodarzi().step(&mut memory, &state, &far);
+        goodarzi().step(&mut memory, Some(&state), &far);
     }
     assert!(
         memory.control.position_integral.x == 0.0 && memory.control.position_integral.z == 0.0,
@@ -301,14 +301,14 @@ fn an_integrator_does_not_wind_up_against_a_limit() {
 
     // A yaw error that the rotors cannot answer: the rate integral stays where it was.
     let turned = Setpoint { yaw_rad: 2.5, ..Setpoint::default() };
-    let mut memory = Memory::<pid::Memory>::default();
+    let mut memory = Screened::<pid::Memory>::default();
     for _ in 0..5000 {
-        pid().step(&mut memory, &State::default(), &turned);
+        pid().step(&mut memory, Some(&State::default()), &turned);
     }
     assert!(memory.control.rate_integral.z < 0.1, "{:?}", memory.control.rate_integral);
-    let mut memory = Memory::<geometric::Memory>::default();
+    let mut memory = Screened::<geometric::Memory>::default();
     for _ in 0..5000 {
-        goodarzi().step(&mut memory, &State::default(), &turned);
+        goodarzi().step(&mut memory, Some(&State::default()), &turned);
     }
     assert!(memory.control.attitude_integral.z < 0.1, "{:?}", memory.control.attitude_integral);
 }
@@ -317,15 +317,15 @@ fn an_integrator_does_not_wind_up_against_a_limit() {
 fn no_integral_moves_on_a_stale_state() {
     let state = State { position_m: Vector3::new(-0.1, 0.2, 0.3), ..State::default() };
     let lost = State { position_m: Vector3::new(f32::NAN, 0.0, 0.0), ..State::default() };
-    let (mut a, mut b) = (Memory::<pid::Memory>::default(), Memory::<geometric::Memory>::default());
+    let (mut a, mut b) = (Screened::<pid::Memory>::default(), Screened::<geometric::Memory>::default());
     for _ in 0..100 {
-        pid().step(&mut a, &state, &Setpoint::default());
-        goodarzi().step(&mut b, &state, &Setpoint::default());
+        pid().step(&mut a, Some(&state), &Setpoint::default());
+        goodarzi().step(&mut b, Some(&state), &Setpoint::default());
     }
     let (before_a, before_b) = (a, b);
     for _ in 0..100 {
-        assert!(pid().step(&mut a, &lost, &Setpoint::default()).health.state_rejected);
-        assert!(goodarzi().step(&mut b, &lost, &Setpoint::default()).health.state_rejected);
+        assert!(pid().step(&mut a, Some(&lost), &Setpoint::default()).health.state_rejected);
+        assert!(goodarzi().step(&mut b, Some(&lost), &Setpoint::default()).health.state_rejected);
     }
     assert_eq!(
         (a.control.velocity_integral, a.control.rate_integral),
@@ -341,8 +341,8 @@ fn no_integral_moves_on_a_stale_state() {
 #[test]
 fn increments_cancel_a_constant_moment() {
     let controller = indi();
-    let mixer = afbc::allocation::Mixer::new(&vehicle(), SETTINGS.rotor_force_max_n).unwrap();
-    let mut memory = Memory::<indi::Memory>::default();
+    let mixer = afbc_control::mixer::Mixer::new(&vehicle(), SETTINGS.rotor_force_max_n).unwrap();
+    let mut memory = Screened::<indi::Memory>::default();
     let mut rotors = nalgebra::Vector4::repeat(libm::sqrt(f64::from(WEIGHT_N) / 4.0 / 2.984e-5));
     let effectiveness = 3.232e-7 / 2.984e-5 / 0.0076;
     let (lag, dt_s) = (1.0 - libm::exp(-0.05), 1e-3);
@@ -354,9 +354,9 @@ fn increments_cancel_a_constant_moment() {
             rates_rad_s: Vector3::new(0.0, 0.0, rate as f32),
             ..State::default()
         };
-        let command = controller.step(&mut memory, &state, &Setpoint::default());
+        let command = controller.step(&mut memory, Some(&state), &Setpoint::default());
         rotors += (command.speeds.0.cast::<f64>() - rotors) * lag;
-        let u = afbc::allocation::Mixer::inputs(&mixer.forces(&afbc_types::RotorSpeeds(rotors.cast())));
+        let u = afbc_control::mixer::Mixer::inputs(&mixer.forces(&afbc_types::RotorSpeeds(rotors.cast())));
         rate += (effectiveness * f64::from(u.yaw_n) + disturbance) * dt_s;
         angle += rate * dt_s;
         largest = angle.abs().max(largest);
@@ -401,7 +401,7 @@ fn gains_out_of_range_are_refused_by_name() {
     assert_eq!(gains.validate().unwrap_err().range.name, "tilt_max_rad");
     let gains = indi::Gains { rotor_time_constant_s: -0.1, ..indi::Gains::PAPER_VEHICLE };
     assert_eq!(gains.validate().unwrap_err().range.name, "rotor_time_constant_s");
-    let settings = afbc::Settings { dt_s: 1.0, ..SETTINGS };
+    let settings = afbc_control::Settings { dt_s: 1.0, ..SETTINGS };
     assert_eq!(Indi::new(vehicle(), settings, indi::Gains::PAPER_VEHICLE).unwrap_err().range.name, "dt_s");
     let mut vehicle = vehicle();
     vehicle.mass_kg = 0.0;

@@ -5,7 +5,7 @@
 
 mod harness;
 
-use afbc::FlightController;
+use afbc_control::FlightController;
 use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
 use harness::{Figures, Rig, SETTINGS, at, calm, circle, disturbed, fly, hover, paper, paper_start, vehicle};
 use nalgebra::{Vector3, Vector4};

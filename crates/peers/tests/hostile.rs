@@ -3,7 +3,7 @@
 
 mod harness;
 
-use afbc::{FlightController, Memory, Settings};
+use afbc_control::{FlightController, Screened, Settings};
 use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
 use afbc_types::{Range, Setpoint, State};
 use harness::{SETTINGS, vehicle};
@@ -51,17 +51,18 @@ fn anywhere<const N: usize>(tunables: [(&'static Range, &mut f32); N], shares: &
 }
 
 fn harmless<C: FlightController>(controller: &C, settings: &Settings, inputs: &[(State, Setpoint)]) {
-    let mut memory = Memory::<C::Memory>::default();
+    let mut memory = Screened::<C::Memory>::default();
     let fastest = libm::sqrtf(settings.rotor_force_max_n / vehicle().thrust_factor_n_s2) * 1.000_001;
     for (state, setpoint) in inputs {
-        let command = controller.step(&mut memory, state, setpoint);
+        let command = controller.step(&mut memory, Some(state), setpoint);
         for (speed, force) in command.speeds.0.iter().zip(command.forces.0.iter()) {
             assert!(*speed >= 0.0 && *speed <= fastest, "{command:?}");
             assert!(*force >= 0.0 && *force <= settings.rotor_force_max_n, "{command:?}");
         }
-        let u = command.inputs;
-        assert!([u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n].iter().all(|u| u.is_finite()), "{command:?}");
-        assert!(command.desired_rad.iter().all(|angle| angle.is_finite()), "{command:?}");
+        let trace = C::trace(&memory.control);
+        let u = trace.inputs;
+        assert!([u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n].iter().all(|u| u.is_finite()), "{trace:?}");
+        assert!(trace.desired_rad.iter().all(|angle| angle.is_finite()), "{trace:?}");
         assert_eq!(command.health.state_rejected, !state.is_plausible());
         assert_eq!(command.health.setpoint_rejected, !setpoint.is_plausible());
     }
@@ -99,8 +100,8 @@ fn the_same_input_gives_the_same_bits() {
     let state = State { position_m: Vector3::new(0.1, 0.2, 0.3), ..State::default() };
     let controller = Indi::new(vehicle(), SETTINGS, indi::Gains::PAPER_VEHICLE).unwrap();
     let run = || {
-        let mut memory = Memory::<indi::Memory>::default();
-        (0..100).map(|_| controller.step(&mut memory, &state, &Setpoint::default())).collect::<Vec<_>>()
+        let mut memory = Screened::<indi::Memory>::default();
+        (0..100).map(|_| controller.step(&mut memory, Some(&state), &Setpoint::default())).collect::<Vec<_>>()
     };
     assert_eq!(run(), run());
 }

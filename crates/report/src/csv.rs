@@ -1,6 +1,6 @@
 //! One CSV for each run: every logged step, units in the header.
 
-use afbc::cascade::Context;
+use afbc::law::Context;
 use afbc::model::Model;
 use afbc_plant::{Sensing, Telemetry};
 use afbc_sim::contender::Law;
@@ -43,11 +43,11 @@ struct Column {
 /// left out is the distance of the estimates from values that nobody knows. g_i is the nominal vehicle's.
 fn lyapunov(model: &Model, sample: &Sample) -> PerAxis<f32> {
     let state = sample.motion.measure();
-    let rotor_residual_rad_s = sample.command.speeds.residual_rad_s();
+    let rotor_residual_rad_s = sample.action.speeds.residual_rad_s();
     let context =
         Context { state: &state, rotor_residual_rad_s, dt_s: 0.0, adapt: false, unallocated: PerAxis::default() };
     PerAxis::from_fn(|axis| {
-        let errors = sample.command.errors.get(axis);
+        let errors = sample.trace.errors.get(axis);
         0.5 * errors.e1 * errors.e1 + 0.5 * errors.e2 * errors.e2 / model.dynamics(axis, &context).g
     })
 }
@@ -90,12 +90,12 @@ fn columns(scenario: &Scenario, law: &Law) -> Vec<Column> {
     }
     // phi_d and theta_d: as (40) gives them, then as roll and pitch track them, behind the command filter.
     add! { Single
-        "phi_d_raw_rad": |s| s.command.desired_rad[0];
-        "theta_d_raw_rad": |s| s.command.desired_rad[1];
-        "phi_d_rad": |s| s.command.filtered[0].angle;
-        "theta_d_rad": |s| s.command.filtered[1].angle;
-        "phi_d_rate_rad_s": |s| s.command.filtered[0].rate;
-        "theta_d_rate_rad_s": |s| s.command.filtered[1].rate;
+        "phi_d_raw_rad": |s| s.trace.desired_rad[0];
+        "theta_d_raw_rad": |s| s.trace.desired_rad[1];
+        "phi_d_rad": |s| s.trace.filtered[0].angle;
+        "theta_d_rad": |s| s.trace.filtered[1].angle;
+        "phi_d_rate_rad_s": |s| s.trace.filtered[0].rate;
+        "theta_d_rate_rad_s": |s| s.trace.filtered[1].rate;
     }
     // U1..U4 as the rotors give them, then as the law wants them; further down, between which values they went since
     // the row before.
@@ -104,20 +104,20 @@ fn columns(scenario: &Scenario, law: &Law) -> Vec<Column> {
         "u2_n": |s| given(s).pitch_n;
         "u3_n": |s| given(s).yaw_n;
         "u4_n": |s| given(s).thrust_n;
-        "u1_wanted_n": |s| s.command.inputs.roll_n;
-        "u2_wanted_n": |s| s.command.inputs.pitch_n;
-        "u3_wanted_n": |s| s.command.inputs.yaw_n;
-        "u4_wanted_n": |s| s.command.inputs.thrust_n;
-        "u5_m_s2": |s| s.command.virtual_m_s2[0];
-        "u6_m_s2": |s| s.command.virtual_m_s2[1];
-        "f1_n": |s| s.command.forces.0.x;
-        "f2_n": |s| s.command.forces.0.y;
-        "f3_n": |s| s.command.forces.0.z;
-        "f4_n": |s| s.command.forces.0.w;
-        "omega1_rad_s": |s| s.command.speeds.0.x;
-        "omega2_rad_s": |s| s.command.speeds.0.y;
-        "omega3_rad_s": |s| s.command.speeds.0.z;
-        "omega4_rad_s": |s| s.command.speeds.0.w;
+        "u1_wanted_n": |s| s.trace.inputs.roll_n;
+        "u2_wanted_n": |s| s.trace.inputs.pitch_n;
+        "u3_wanted_n": |s| s.trace.inputs.yaw_n;
+        "u4_wanted_n": |s| s.trace.inputs.thrust_n;
+        "u5_m_s2": |s| s.trace.virtual_m_s2[0];
+        "u6_m_s2": |s| s.trace.virtual_m_s2[1];
+        "f1_n": |s| s.action.forces.0.x;
+        "f2_n": |s| s.action.forces.0.y;
+        "f3_n": |s| s.action.forces.0.z;
+        "f4_n": |s| s.action.forces.0.w;
+        "omega1_rad_s": |s| s.action.speeds.0.x;
+        "omega2_rad_s": |s| s.action.speeds.0.y;
+        "omega3_rad_s": |s| s.action.speeds.0.z;
+        "omega4_rad_s": |s| s.action.speeds.0.w;
     }
     for (i, u) in ["u1", "u2", "u3", "u4"].into_iter().enumerate() {
         for (j, extreme) in ["min", "max"].into_iter().enumerate() {
@@ -126,7 +126,7 @@ fn columns(scenario: &Scenario, law: &Law) -> Vec<Column> {
             add(format!("{u}_{extreme}_n"), Box::new(move |row| Single(value(row).unwrap_or(f64::NAN) as f32)));
         }
     }
-    add! { Flag "saturated": |s| s.command.health.saturated; }
+    add! { Flag "saturated": |s| s.action.health.saturated; }
     // What the others have in the place of e_2 and the estimates is nothing.
     let (backstepping, adaptive) = (!law.is_peer(), matches!(law, Law::Afbc(_) | Law::Guarded(_)));
     for axis in Axis::ALL {
@@ -137,9 +137,9 @@ fn columns(scenario: &Scenario, law: &Law) -> Vec<Column> {
             Axis::Z => ["m", "m_s", "n"],
             Axis::X | Axis::Y => ["m", "m_s", "m_s2"],
         };
-        add(format!("e1_{name}_{e1}"), Box::new(move |row| Single(row.sample.command.errors.get(axis).e1)));
+        add(format!("e1_{name}_{e1}"), Box::new(move |row| Single(row.sample.trace.errors.get(axis).e1)));
         if backstepping {
-            add(format!("e2_{name}_{e2}"), Box::new(move |row| Single(row.sample.command.errors.get(axis).e2)));
+            add(format!("e2_{name}_{e2}"), Box::new(move |row| Single(row.sample.trace.errors.get(axis).e2)));
         }
         if adaptive {
             let estimate = move |row: &Row| *row.sample.estimates.get(axis);
@@ -155,7 +155,7 @@ fn columns(scenario: &Scenario, law: &Law) -> Vec<Column> {
         add("lyapunov_sum".into(), Box::new(move |row| Single(sum(row))));
     }
     if let Law::Guarded(_) = law {
-        add("tripped".into(), Box::new(|row| Flag(row.sample.command.health.trip.is_some())));
+        add("tripped".into(), Box::new(|row| Flag(row.sample.action.health.trip.is_some())));
     }
     columns.extend(real(scenario));
     columns
@@ -209,7 +209,7 @@ fn real(scenario: &Scenario) -> Vec<Column> {
 
 /// U1..U4 as the rotors give them.
 fn given(sample: &Sample) -> afbc_types::Inputs {
-    afbc::allocation::Mixer::inputs(&sample.command.forces)
+    afbc_control::mixer::Mixer::inputs(&sample.action.forces)
 }
 
 /// Writes the header and one line for each logged step.

@@ -228,23 +228,22 @@ pub(super) fn parameters(scenario: &Scenario) -> Markup {
 /// Who flew: settings and gains.
 fn gains(contender: &Contender) -> Markup {
     let Settings {
-        dt_s,
+        common: afbc_control::Settings { dt_s, rotor_force_max_n },
         command_filter_rad_s,
-        rotor_force_max_n,
         limits,
         tilt_by_thrust,
-        heed_ground,
+        freeze_on_ground,
         bumpless,
-        heed_saturation,
+        anti_windup,
     } = contender.settings;
     let mut settings = format!("steps of {dt_s} s, at most {rotor_force_max_n} N a rotor");
     if !contender.law.is_peer() {
         settings += &format!(", command filter {command_filter_rad_s} rad/s");
         let also = [
             (tilt_by_thrust, "tilt by thrust"),
-            (heed_ground, "heeds the ground"),
+            (freeze_on_ground, "frozen on the ground"),
             (bumpless, "bumpless"),
-            (heed_saturation, "heeds saturation"),
+            (anti_windup, "anti-windup"),
             (matches!(contender.law, Law::Guarded(_)), "monitored"),
         ];
         settings.extend(also.into_iter().filter(|(on, _)| *on).map(|(_, word)| format!(", {word}")));

@@ -1,6 +1,6 @@
 //! Any controller inside the flight core: what a board does around its law, without the board and its link.
 
-use afbc::{Command, FlightController, Settings, adaptive};
+use afbc_control::{Action, Estimate, FlightController, Mixer, Trace};
 use afbc_flight_core::rate::{PERIOD_US, WINDOW_US};
 use afbc_flight_core::{ArmingLimits, Asked, Inbox, Request, Stamped, Vehicle};
 use afbc_types::{OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
@@ -13,7 +13,11 @@ const TICKS_HELD: u64 = WINDOW_US as u64 / PERIOD_US + 1;
 
 /// A controller that the flight core flies: without a state it rides blind, then descends.
 #[derive(Clone, Copy, Debug)]
-pub struct Aboard<C>(Vehicle<C>);
+pub struct Aboard<C> {
+    vehicle: Vehicle<C>,
+    mixer: Mixer,
+    dt_s: f32,
+}
 
 /// What the flight core remembers, and its clock.
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,26 +29,36 @@ pub struct Memory<M> {
 }
 
 impl<C: FlightController> Aboard<C> {
-    /// `controller`, which was made for this vehicle and these settings, in a flight core that arms wherever it may.
+    /// `controller`, which was made for this vehicle, in a flight core that arms wherever it may.
     ///
     /// # Errors
     /// If the time step is not the flight core's, 1 ms.
-    pub fn new(vehicle: Parameters, settings: Settings, controller: C) -> Result<Self, OutOfRange> {
-        Vehicle::new(vehicle, settings, ArmingLimits::NONE, controller).map(Aboard)
+    pub fn new(vehicle: Parameters, controller: C) -> Result<Self, OutOfRange> {
+        let (mixer, dt_s) = (*controller.mixer(), controller.dt_s());
+        Ok(Aboard { vehicle: Vehicle::new(vehicle, ArmingLimits::NONE, controller)?, mixer, dt_s })
     }
 
-    fn tick(&self, memory: &mut Memory<C::Memory>) -> Command {
+    fn tick(&self, memory: &mut Memory<C::Memory>) -> Action {
         memory.now_us += PERIOD_US;
         let inbox = memory.inbox.take();
-        self.0.traced_tick(&mut memory.vehicle, memory.now_us, &inbox).1
+        let outcome = self.vehicle.tick(&mut memory.vehicle, memory.now_us, &inbox);
+        Action { speeds: outcome.motors, forces: outcome.forces, health: outcome.health.control }
     }
 }
 
 impl<C: FlightController> FlightController for Aboard<C> {
     type Memory = Memory<C::Memory>;
 
+    fn dt_s(&self) -> f32 {
+        self.dt_s
+    }
+
+    fn mixer(&self) -> &Mixer {
+        &self.mixer
+    }
+
     /// One tick. Before the first, the vehicle is held where it is until it has armed.
-    fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Command {
+    fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
         let post = |memory: &mut Self::Memory| {
             let at_us = memory.now_us + PERIOD_US;
             if fresh {
@@ -65,7 +79,11 @@ impl<C: FlightController> FlightController for Aboard<C> {
         self.tick(memory)
     }
 
-    fn learnt(memory: &Self::Memory) -> PerAxis<adaptive::Estimate> {
+    fn trace(memory: &Self::Memory) -> Trace {
+        memory.vehicle.trace::<C>()
+    }
+
+    fn learnt(memory: &Self::Memory) -> PerAxis<Estimate> {
         memory.vehicle.control().map(C::learnt).unwrap_or_default()
     }
 }

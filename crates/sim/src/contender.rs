@@ -1,8 +1,8 @@
 //! Who flies: a control law with its gains and settings, under a name.
 
-use afbc::allocation::Mixer;
 use afbc::monitor::Bounds;
-use afbc::{Adaptive, Backstepping, Controller, FlightController, Guarded, Profile, Settings, adaptive, backstepping};
+use afbc::{Adaptive, Backstepping, Controller, Guarded, Profile, Settings, adaptive, backstepping};
+use afbc_control::{FlightController, Mixer};
 use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
 use afbc_types::{OutOfRange, Parameters, PerAxis, Range};
 
@@ -198,16 +198,16 @@ impl Contender {
 
     /// Time from step to step \[s\]: the settings', without the noise that `f32` adds to a decimal.
     pub fn step_s(&self) -> f64 {
-        step_s(&self.settings)
+        decimal(self.settings.common.dt_s)
     }
 
     /// Builds the controller, as a flight would.
     ///
     /// # Errors
     /// The first parameter, gain or setting out of range; the rotors must lift the vehicle
-    /// [with a margin](afbc::allocation::HOVER_MARGIN).
+    /// [with a margin](afbc_control::mixer::HOVER_MARGIN).
     pub fn check(&self, vehicle: Parameters) -> Result<(), OutOfRange> {
-        let mixer = Mixer::new(&vehicle, self.settings.rotor_force_max_n)?;
+        let mixer = Mixer::new(&vehicle, self.settings.common.rotor_force_max_n)?;
         mixer.check_hover(vehicle.mass_kg * vehicle.gravity_m_s2)?;
         match &self.law {
             Law::Afbc(gains) => gains.controller(vehicle, self.settings).map(drop),
@@ -220,9 +220,9 @@ impl Contender {
     }
 }
 
-/// Time from step to step \[s\], without the noise that `f32` adds to a decimal.
-pub fn step_s(settings: &Settings) -> f64 {
-    (f64::from(settings.dt_s) * 1e7).round() / 1e7
+/// A time step without the noise that `f32` adds to a decimal \[s\].
+pub fn decimal(dt_s: f32) -> f64 {
+    (f64::from(dt_s) * 1e7).round() / 1e7
 }
 
 /// Gains that make a controller.
@@ -269,7 +269,7 @@ impl Build for pid::Gains {
     type Controller = Pid;
 
     fn controller(&self, vehicle: Parameters, settings: Settings) -> Result<Pid, OutOfRange> {
-        Pid::new(vehicle, settings, *self)
+        Pid::new(vehicle, settings.common, *self)
     }
 }
 
@@ -277,7 +277,7 @@ impl Build for geometric::Gains {
     type Controller = Geometric;
 
     fn controller(&self, vehicle: Parameters, settings: Settings) -> Result<Geometric, OutOfRange> {
-        Geometric::new(vehicle, settings, *self)
+        Geometric::new(vehicle, settings.common, *self)
     }
 }
 
@@ -285,6 +285,6 @@ impl Build for indi::Gains {
     type Controller = Indi;
 
     fn controller(&self, vehicle: Parameters, settings: Settings) -> Result<Indi, OutOfRange> {
-        Indi::new(vehicle, settings, *self)
+        Indi::new(vehicle, settings.common, *self)
     }
 }

@@ -1,14 +1,14 @@
 //! Lockstep flights: measure, control, observe, move the vehicle, once per step.
 
 use crate::aboard::Aboard;
-use crate::contender::{Build, Contender, Law, Monitored, step_s};
+use crate::contender::{Build, Contender, Law, Monitored, decimal};
 use crate::scenario::{Outage, Scenario};
 use crate::trajectory::{Reference, Trajectory};
-use afbc::{Command, FlightController, Memory, Settings, adaptive};
+use afbc::Settings;
+use afbc_control::{Action, Estimate, FlightController, Screened, Trace};
 use afbc_plant::{Measurement, Motion, Plant, Sensors, Telemetry};
 use afbc_types::{OutOfRange, PerAxis, State};
 use core::f64::consts::FRAC_PI_2;
-use nalgebra::Vector3;
 
 /// Distance from the reference beyond which a vehicle counts as lost \[m\].
 pub const LOST_DISTANCE_M: f64 = 50.0;
@@ -27,9 +27,11 @@ pub struct Sample {
     /// Where the vehicle should be.
     pub reference: Reference,
     /// What the controller decided.
-    pub command: Command,
+    pub action: Action,
+    /// Why.
+    pub trace: Trace,
     /// What the law has learnt; zero for one that learns nothing.
-    pub estimates: PerAxis<adaptive::Estimate>,
+    pub estimates: PerAxis<Estimate>,
 }
 
 /// Why and when a vehicle was given up.
@@ -44,7 +46,7 @@ pub struct Lost {
 /// One controller flying one vehicle.
 pub struct Flight<C: FlightController> {
     controller: C,
-    memory: Memory<C::Memory>,
+    memory: Screened<C::Memory>,
     plant: Plant,
     sensors: Option<Sensors>,
     outages: Vec<Outage>,
@@ -53,15 +55,15 @@ pub struct Flight<C: FlightController> {
 }
 
 impl<C: FlightController> Flight<C> {
-    /// A flight of `scenario` under `controller`, which was made with `settings`.
+    /// A flight of `scenario` under `controller`.
     ///
     /// # Errors
     /// The first setting of plant or sensors out of range.
-    pub fn new(scenario: &Scenario, settings: &Settings, controller: C) -> Result<Self, OutOfRange> {
-        let dt_s = step_s(settings);
+    pub fn new(scenario: &Scenario, controller: C) -> Result<Self, OutOfRange> {
+        let dt_s = decimal(controller.dt_s());
         Ok(Flight {
             controller,
-            memory: Memory::default(),
+            memory: Screened::default(),
             plant: scenario.plant(dt_s)?,
             sensors: scenario.sensors(dt_s)?,
             outages: scenario.outages.clone(),
@@ -77,20 +79,22 @@ impl<C: FlightController> Flight<C> {
         let time_s = self.plant.time_s();
         let motion = self.plant.motion();
         let (state, measurement) = match &mut self.sensors {
-            None => (motion.measure(), None),
+            None => (Some(motion.measure()), None),
             Some(sensors) => measure(sensors, &motion),
         };
         let reference = self.trajectory.at(time_s);
-        let state = if self.outages.is_empty() { &state } else { arrived(&self.outages, time_s, &state) };
-        let command = self.controller.step(&mut self.memory, state, &reference.setpoint());
-        let (estimates, telemetry) = (C::learnt(&self.memory.control), self.plant.telemetry());
-        Sample { time_s, motion, measurement, telemetry, reference, command, estimates }
+        let lost = !self.outages.is_empty() && is_lost(&self.outages, time_s);
+        let state = state.as_ref().filter(|_| !lost);
+        let action = self.controller.step(&mut self.memory, state, &reference.setpoint());
+        let Screened { control, .. } = &self.memory;
+        let (trace, estimates, telemetry) = (C::trace(control), C::learnt(control), self.plant.telemetry());
+        Sample { time_s, motion, measurement, telemetry, reference, action, trace, estimates }
     }
 
-    /// Moves the vehicle by one step under `command`.
+    /// Moves the vehicle by one step under `action`.
     #[inline]
-    pub fn advance(&mut self, command: &Command) {
-        self.plant.step(&command.speeds, self.dt_s);
+    pub fn advance(&mut self, action: &Action) {
+        self.plant.step(&action.speeds, self.dt_s);
     }
 
     /// Flies to the end or until the vehicle is lost, showing every step from t = 0 to the end.
@@ -103,33 +107,25 @@ impl<C: FlightController> Flight<C> {
                 return Some(Lost { time_s: sample.time_s, reason });
             }
             if step < steps {
-                self.advance(&sample.command);
+                self.advance(&sample.action);
             }
         }
         None
     }
 }
 
-/// In place of a state that does not arrive: one that a controller cannot believe, so that it works from the last one and
-/// learns nothing from it.
-const UNKNOWN: State = {
-    let unknown = Vector3::new(f32::NAN, f32::NAN, f32::NAN);
-    State { position_m: unknown, velocity_m_s: unknown, attitude_rad: unknown, rates_rad_s: unknown }
-};
-
-/// What arrives of `state` at `time_s`.
+/// True if nothing that is sent at `time_s` arrives.
 #[cold]
-fn arrived<'a>(outages: &[Outage], time_s: f64, state: &'a State) -> &'a State {
-    let out = outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&time_s));
-    if out { &UNKNOWN } else { state }
+fn is_lost(outages: &[Outage], time_s: f64) -> bool {
+    outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&time_s))
 }
 
-/// What a controller is given of the motion.
+/// What a controller is given of the motion, if there is anything new.
 // Apart, so that the step of an ideal flight stays short.
 #[inline(never)]
-fn measure(sensors: &mut Sensors, motion: &Motion) -> (State, Option<Measurement>) {
+fn measure(sensors: &mut Sensors, motion: &Motion) -> (Option<State>, Option<Measurement>) {
     let measurement = sensors.measure(motion);
-    (if measurement.fresh { measurement.state } else { UNKNOWN }, Some(measurement))
+    (Some(measurement.state).filter(|_| measurement.fresh), Some(measurement))
 }
 
 /// Flies `scenario` under one contender, showing every step from t = 0 to the end; tells when the vehicle was lost, if it
@@ -162,10 +158,10 @@ fn run(
     let vehicle = scenario.vehicle.to_f32();
     let controller = gains.controller(vehicle, *settings)?;
     if scenario.flight_core {
-        let aboard = Aboard::new(vehicle, *settings, controller)?;
-        return Ok(Flight::new(scenario, settings, aboard)?.run(scenario.duration_s, observe));
+        let aboard = Aboard::new(vehicle, controller)?;
+        return Ok(Flight::new(scenario, aboard)?.run(scenario.duration_s, observe));
     }
-    Ok(Flight::new(scenario, settings, controller)?.run(scenario.duration_s, observe))
+    Ok(Flight::new(scenario, controller)?.run(scenario.duration_s, observe))
 }
 
 /// Why the vehicle counts as lost, if it does. Assumption A3 rules out a tilt of 90 degrees; a vehicle that has come down

@@ -41,7 +41,7 @@ pub fn tracking_error(sample: &Sample) -> Vector4<f64> {
 
 /// U1..U4 as the rotors give them \[N\].
 pub fn inputs(sample: &Sample) -> Vector4<f64> {
-    let u = afbc::allocation::Mixer::inputs(&sample.command.forces);
+    let u = afbc_control::mixer::Mixer::inputs(&sample.action.forces);
     Vector4::new(u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n).cast()
 }
 

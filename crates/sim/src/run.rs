@@ -4,7 +4,7 @@ use crate::contender::Contender;
 use crate::flight::{Lost, Sample, fly};
 use crate::metrics::{Accumulator, Metrics, SETTLED_S, inputs};
 use crate::scenario::Scenario;
-use afbc::monitor::Trip;
+use afbc_control::Trip;
 use afbc_types::OutOfRange;
 use nalgebra::Vector4;
 
@@ -53,7 +53,7 @@ impl Run {
         let (mut step, mut tripped) = (0, None);
         let lost = fly(scenario, contender, |sample| {
             metrics.add(sample);
-            if let Some(trip) = sample.command.health.trip {
+            if let Some(trip) = sample.action.health.trip {
                 tripped.get_or_insert(Tripped { time_s: sample.time_s, trip });
             }
             let u = inputs(sample);

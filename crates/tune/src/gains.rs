@@ -1,8 +1,9 @@
 //! A contender's gains as coordinates of a search, and as text for a scenario file.
 
-use afbc::command_filter::BANDWIDTH;
+use afbc::Profile;
 use afbc::limits::{ACCELERATION, CLIMB, SPEED, TILT, TILT_RATE};
-use afbc::{Profile, allocation::FORCE_MAX};
+use afbc_control::command_filter::BANDWIDTH;
+use afbc_control::mixer::FORCE_MAX;
 use afbc_sim::contender::ControllerKind;
 use afbc_sim::contender::{Contender, Law};
 use afbc_types::{Axis, PerAxis, Range};
@@ -187,11 +188,11 @@ fn keys(contender: &Contender) -> Vec<Key> {
     }
     let settings = &contender.settings;
     put("settings", BANDWIDTH.name, settings.command_filter_rad_s.to_string());
-    put("settings", FORCE_MAX.name, settings.rotor_force_max_n.to_string());
+    put("settings", FORCE_MAX.name, settings.common.rotor_force_max_n.to_string());
     put("settings", "tilt_by_thrust", settings.tilt_by_thrust.to_string());
-    put("settings", "heed_ground", settings.heed_ground.to_string());
+    put("settings", "freeze_on_ground", settings.freeze_on_ground.to_string());
     put("settings", "bumpless", settings.bumpless.to_string());
-    put("settings", "heed_saturation", settings.heed_saturation.to_string());
+    put("settings", "anti_windup", settings.anti_windup.to_string());
     let limits = &settings.limits;
     for (range, limit) in [
         (&TILT, limits.tilt_max_rad),

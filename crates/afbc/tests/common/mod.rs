@@ -6,15 +6,16 @@
 )]
 
 use afbc::adaptive::{EPSILON, ETA, GAMMA, Gains};
-use afbc::allocation::FORCE_MAX;
 use afbc::backstepping::{ALPHA1, ALPHA2};
-use afbc::cascade::DT;
-use afbc::command_filter::BANDWIDTH;
 use afbc::fuzzy::Membership;
 use afbc::limits::{ACCELERATION, CLIMB, SPEED, TILT, TILT_RATE};
 use afbc::safeguards::{DEAD_ZONE, DELTA_MAX, KAPPA, SIGMA, THETA_MAX};
-use afbc::{Command, Limits, Profile, Safeguards, Settings};
-use afbc_types::{Axis, Parameters, PerAxis, Range, Setpoint, State};
+use afbc::{Limits, Profile, Safeguards, Settings};
+use afbc_control::command_filter::BANDWIDTH;
+use afbc_control::mixer::FORCE_MAX;
+use afbc_control::settings::DT;
+use afbc_control::{Action, FlightController, Screened, Trace};
+use afbc_types::{Axis, Inputs, Parameters, PerAxis, Range, Setpoint, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
@@ -120,15 +121,14 @@ pub(crate) fn settings() -> impl Strategy<Value = Settings> {
     let numbers = (within(DT), within(BANDWIDTH), within(FORCE_MAX), limits());
     let any = (numbers, any::<[bool; 4]>()).prop_map(|(numbers, switches)| {
         let (dt_s, command_filter_rad_s, rotor_force_max_n, limits) = numbers;
-        let [tilt_by_thrust, heed_saturation, heed_ground, bumpless] = switches;
+        let [tilt_by_thrust, anti_windup, freeze_on_ground, bumpless] = switches;
         Settings {
-            dt_s,
+            common: afbc_control::Settings { dt_s, rotor_force_max_n },
             command_filter_rad_s,
-            rotor_force_max_n,
             limits,
             tilt_by_thrust,
-            heed_saturation,
-            heed_ground,
+            anti_windup,
+            freeze_on_ground,
             bumpless,
         }
     });
@@ -159,24 +159,51 @@ pub(crate) fn gains() -> impl Strategy<Value = PerAxis<Gains>> {
     ]
 }
 
+/// What a step decided, and why.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Stepped {
+    pub(crate) action: Action,
+    pub(crate) trace: Trace,
+}
+
+impl Stepped {
+    /// What each subsystem wants: U1..U4 \[N\], u5, u6 \[m/s2\].
+    pub(crate) fn per_axis(&self) -> PerAxis<f32> {
+        let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = self.trace.inputs;
+        let [x, y] = self.trace.virtual_m_s2;
+        PerAxis { roll: roll_n, pitch: pitch_n, yaw: yaw_n, z: thrust_n, x, y }
+    }
+}
+
+/// One step from a measurement.
+pub(crate) fn step<C: FlightController>(
+    controller: &C,
+    memory: &mut Screened<C::Memory>,
+    state: &State,
+    setpoint: &Setpoint,
+) -> Stepped {
+    let action = controller.step(memory, Some(state), setpoint);
+    Stepped { action, trace: C::trace(&memory.control) }
+}
+
 /// What every step owes: speeds and forces within the rotors' limits, everything finite.
-pub(crate) fn check_command(command: &Command, settings: &Settings) -> Result<(), TestCaseError> {
-    let limit = settings.rotor_force_max_n;
+pub(crate) fn check_step(step: &Stepped, settings: &Settings) -> Result<(), TestCaseError> {
+    let (limit, Stepped { action, trace }) = (settings.common.rotor_force_max_n, step);
     let fastest = (f64::from(limit) / Parameters::PAPER.thrust_factor_n_s2).sqrt() * (1.0 + 2e-7);
-    prop_assert!(command.forces.0.iter().all(|f| (0.0..=limit).contains(f)), "{command:?}");
-    prop_assert!(command.speeds.0.iter().all(|w| (0.0..=fastest).contains(&f64::from(*w))), "{command:?}");
-    let u = &command.inputs;
+    prop_assert!(action.forces.0.iter().all(|f| (0.0..=limit).contains(f)), "{step:?}");
+    prop_assert!(action.speeds.0.iter().all(|w| (0.0..=fastest).contains(&f64::from(*w))), "{step:?}");
+    let u = &trace.inputs;
     let numbers = [u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n]
         .into_iter()
-        .chain(command.virtual_m_s2)
-        .chain(command.desired_rad)
-        .chain(command.filtered.iter().flat_map(|f| [f.angle, f.rate]))
+        .chain(trace.virtual_m_s2)
+        .chain(trace.desired_rad)
+        .chain(trace.filtered.iter().flat_map(|f| [f.angle, f.rate]))
         .chain(Axis::ALL.iter().flat_map(|axis| {
-            let errors = command.errors.get(*axis);
+            let errors = trace.errors.get(*axis);
             [errors.e1, errors.e1_dot, errors.e2]
         }));
     for number in numbers {
-        prop_assert!(number.is_finite(), "{command:?}");
+        prop_assert!(number.is_finite(), "{step:?}");
     }
     Ok(())
 }

@@ -2,14 +2,14 @@
 
 #![allow(dead_code, reason = "each test file uses a part")]
 
-use afbc::{Command, FlightController, Memory, Profile, Settings};
+use afbc_control::{Action, FlightController, Screened, Settings};
 use afbc_plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Plant, Quantity};
 use afbc_types::{Axis, Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use std::collections::VecDeque;
 
 /// 1 kHz and 3 N a rotor.
-pub(crate) const SETTINGS: Settings = Settings { rotor_force_max_n: 3.0, ..Profile::Paper.settings() };
+pub(crate) const SETTINGS: Settings = Settings { dt_s: 0.001, rotor_force_max_n: 3.0 };
 
 pub(crate) fn vehicle() -> Parameters {
     Parameters::PAPER.to_f32()
@@ -84,10 +84,10 @@ pub(crate) fn fly<C: FlightController>(
 ) -> Figures {
     let dt_s = 0.001;
     let mut plant = Plant::new(Model::RigidBody, initial, environment);
-    let mut memory = Memory::<C::Memory>::default();
+    let mut memory = Screened::<C::Memory>::default();
     let hover = libm::sqrt(0.486 * 9.81 / 4.0 / 2.984e-5);
     let mut rotors = Vector4::repeat(hover);
-    let mut queue: VecDeque<Command> = VecDeque::new();
+    let mut queue: VecDeque<Action> = VecDeque::new();
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
     let gain = if rig.lag_s > 0.0 { 1.0 - libm::exp(-dt_s / rig.lag_s) } else { 1.0 };
     let (mut sum, mut max_abs, mut last) = (Vector4::zeros(), Vector4::<f64>::zeros(), Vector4::zeros());
@@ -96,10 +96,11 @@ pub(crate) fn fly<C: FlightController>(
         let t = step as f64 * dt_s;
         let motion = plant.motion();
         let setpoint = reference(t);
-        let command = controller.step(&mut memory, &random.noisy(&motion.measure(), rig.noise), &setpoint);
+        let measured = random.noisy(&motion.measure(), rig.noise);
+        let command = controller.step(&mut memory, Some(&measured), &setpoint);
         assert!(command.speeds.0.iter().all(|speed| speed.is_finite() && *speed >= 0.0));
         let position = setpoint.position_m.cast::<f64>() - motion.position_m;
-        let yaw = afbc::math::wrap_angle(setpoint.yaw_rad - motion.attitude_rad.z as f32);
+        let yaw = afbc_control::math::wrap_angle(setpoint.yaw_rad - motion.attitude_rad.z as f32);
         last = Vector4::new(position.x, position.y, position.z, f64::from(yaw));
         if t > settled_s - 1e-9 {
             count += 1.0;
@@ -144,7 +145,7 @@ pub(crate) fn circle(radius_m: f64, period_s: f64) -> impl Fn(f64) -> Setpoint {
             position_m: (radius + Vector3::new(0.0, 0.0, 2.0)).cast(),
             velocity_m_s: (Vector3::new(-radius.y, radius.x, 0.0) * w).cast(),
             acceleration_m_s2: (-radius * w * w).cast(),
-            yaw_rad: afbc::math::wrap_angle((w * t + core::f64::consts::FRAC_PI_2) as f32),
+            yaw_rad: afbc_control::math::wrap_angle((w * t + core::f64::consts::FRAC_PI_2) as f32),
             yaw_rate_rad_s: w as f32,
             yaw_acceleration_rad_s2: 0.0,
         }

@@ -25,8 +25,8 @@ const OUTPUTS: [(&str, Value, Value); 4] = [
 ];
 /// Fig. 6: likewise, but each law wants its own.
 const ATTITUDE: [(&str, Value, Value); 2] = [
-    ("φ [rad]", |s| s.motion.attitude_rad.x, |s| s.command.filtered[0].angle.into()),
-    ("θ [rad]", |s| s.motion.attitude_rad.y, |s| s.command.filtered[1].angle.into()),
+    ("φ [rad]", |s| s.motion.attitude_rad.x, |s| s.trace.filtered[0].angle.into()),
+    ("θ [rad]", |s| s.motion.attitude_rad.y, |s| s.trace.filtered[1].angle.into()),
 ];
 /// Fig. 7. The space that does not break is also one that does not vanish behind a subscript.
 const ERRORS: [(&str, Value); 4] = [

@@ -6,6 +6,7 @@ use crate::flight::{Lost, Sample, lost};
 use crate::scenario::Scenario;
 use crate::trajectory::Reference;
 use afbc::Profile;
+use afbc_control::{Action, Trace};
 use afbc_link::{Answer, Command};
 use afbc_plant::{Measurement, Motion, Sensors};
 use afbc_types::{Parameters, PerAxis, RotorForces};
@@ -101,15 +102,15 @@ pub fn fly(
             line.turn(&motion, &reference)?;
         }
         let heard = line.station.heard();
-        let mut command = afbc::Command { speeds: heard.speeds, ..afbc::Command::default() };
-        command.forces = RotorForces(heard.speeds.0.map(|speed| thrust_factor_n_s2 * speed * speed));
+        let forces = RotorForces(heard.speeds.0.map(|speed| thrust_factor_n_s2 * speed * speed));
         let sample = Sample {
             time_s,
             motion,
             measurement: line.measurement,
             telemetry,
             reference,
-            command,
+            action: Action { speeds: heard.speeds, forces, ..Action::default() },
+            trace: Trace::default(),
             estimates: PerAxis::default(),
         };
         end.interrupted = observe(&sample).is_break();

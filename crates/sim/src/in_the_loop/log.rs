@@ -60,12 +60,12 @@ impl Log {
         if !due {
             return Ok(());
         }
-        let Sample { time_s, motion, reference, command, .. } = sample;
+        let Sample { time_s, motion, reference, action, .. } = sample;
         let vectors =
             [motion.position_m, motion.velocity_m_s, motion.attitude_rad, motion.rates_rad_s, reference.position_m];
         let numbers = vectors.iter().flatten().chain([&reference.yaw_rad]);
         let numbers = core::iter::once(time_s).chain(numbers).map(f64::to_string);
-        self.rows.write_record(numbers.chain(command.speeds.0.iter().map(f32::to_string)))?;
+        self.rows.write_record(numbers.chain(action.speeds.0.iter().map(f32::to_string)))?;
         Ok(())
     }
 

@@ -83,7 +83,9 @@ impl Scenario {
         }
         ARMING_TILT.check(self.initial.attitude_rad.x)?;
         ARMING_TILT.check(self.initial.attitude_rad.y)?;
-        self.contenders.iter().try_for_each(|contender| afbc_flight_core::tick::DT.check(contender.settings.dt_s))
+        self.contenders
+            .iter()
+            .try_for_each(|contender| afbc_flight_core::tick::DT.check(contender.settings.common.dt_s))
     }
 
     /// True if rotors, air and ground are those of the paper's equations.

@@ -69,7 +69,7 @@ fn contender(
         Some(profile) => Defaults {
             profile,
             gains: profile.gains_for(vehicle),
-            settings: Settings { dt_s: file.settings.dt_s, ..profile.settings() },
+            settings: profile.settings().with_dt_s(file.settings.common.dt_s),
             monitor: file.monitor,
         },
         None => file,

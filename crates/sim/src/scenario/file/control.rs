@@ -3,14 +3,14 @@
 use crate::reader::words::out_of_range;
 use crate::reader::{FileError, Table};
 use afbc::adaptive::{EPSILON, ETA, GAMMA, Gains};
-use afbc::allocation::FORCE_MAX;
 use afbc::backstepping::{self, ALPHA1, ALPHA2};
-use afbc::cascade::DT;
-use afbc::command_filter::BANDWIDTH;
 use afbc::fuzzy::{CENTRE, Membership, WIDTH};
 use afbc::limits::{ACCELERATION, CLIMB, SPEED, TILT, TILT_RATE};
 use afbc::safeguards::{DEAD_ZONE, DELTA_MAX, KAPPA, SIGMA, THETA_MAX};
 use afbc::{Limits, Safeguards, Settings};
+use afbc_control::command_filter::BANDWIDTH;
+use afbc_control::mixer::FORCE_MAX;
+use afbc_control::settings::DT;
 use afbc_types::{Axis, PerAxis, Range};
 
 /// One table for each axis; what is left out is as in `default`.
@@ -84,13 +84,15 @@ pub(super) fn settings(parent: &mut Table<'_>, default: Settings, with_step: boo
             table.forbid(DT.name, "one step serves all contenders; set it in the file's own [settings]")?;
         }
         settings = Settings {
-            dt_s: if with_step { number(&mut table, &DT, default.dt_s)? } else { default.dt_s },
+            common: afbc_control::Settings {
+                dt_s: if with_step { number(&mut table, &DT, default.common.dt_s)? } else { default.common.dt_s },
+                rotor_force_max_n: number(&mut table, &FORCE_MAX, default.common.rotor_force_max_n)?,
+            },
             command_filter_rad_s: number(&mut table, &BANDWIDTH, default.command_filter_rad_s)?,
-            rotor_force_max_n: number(&mut table, &FORCE_MAX, default.rotor_force_max_n)?,
             tilt_by_thrust: table.boolean("tilt_by_thrust")?.unwrap_or(default.tilt_by_thrust),
-            heed_ground: table.boolean("heed_ground")?.unwrap_or(default.heed_ground),
+            freeze_on_ground: table.boolean("freeze_on_ground")?.unwrap_or(default.freeze_on_ground),
             bumpless: table.boolean("bumpless")?.unwrap_or(default.bumpless),
-            heed_saturation: table.boolean("heed_saturation")?.unwrap_or(default.heed_saturation),
+            anti_windup: table.boolean("anti_windup")?.unwrap_or(default.anti_windup),
             limits: default.limits,
         };
         table.finish()?;

@@ -8,8 +8,8 @@ use crate::contender::{Contender, Law};
 use crate::paper;
 use crate::reader::FileError;
 use crate::scenario::{BUILT_IN, Scenario, built_in};
+use afbc::Profile;
 use afbc::adaptive::Gains;
-use afbc::{Profile, Settings};
 use afbc_peers::pid;
 use afbc_plant::Model;
 
@@ -171,7 +171,7 @@ fn contenders_start_from_the_file_or_from_a_profile() {
     assert_eq!((short.name.as_str(), z(short)), ("afbc", Gains { gamma: 5.0, ..paper }));
     assert_eq!(z(file), Gains { gamma: 5.0, eta: 0.1, ..paper });
     assert_eq!(flight.law, Law::Guarded(Profile::Flight.gains()));
-    assert_eq!(flight.settings, Settings { dt_s: 0.002, ..Profile::Flight.settings() });
+    assert_eq!(flight.settings, Profile::Flight.settings().with_dt_s(0.002));
     let tuned = pid::Gains { tilt_p_1_s: 9.0, ..pid::Gains::TUNED };
     assert_eq!((pid.law, pid.settings), (Law::Pid(tuned), short.settings));
     // Without controllers, a contender is alone.

@@ -1,8 +1,8 @@
-//! The largest error of every function of `afbc::math` over its documented range, against `f64`. The bounds are the
+//! The largest error of every function of `afbc_control::math` over its documented range, against `f64`. The bounds are the
 //! figures of its documentation.
 #![allow(missing_docs)]
 
-use afbc::math;
+use afbc_control::math;
 use core::f32::consts::{FRAC_PI_2, PI};
 use proptest::prelude::*;
 

@@ -8,12 +8,14 @@
 //!
 //! and is advanced by its exact solution for a command held over the step, so it is stable at any bandwidth.
 
-use crate::limits::TILT_RATE;
 use crate::math;
 use afbc_types::{OutOfRange, Range};
 
 /// Accepted bandwidth w \[rad/s\].
 pub const BANDWIDTH: Range = Range::new("command_filter_rad_s", 1.0, 1000.0);
+
+/// Accepted largest rate behind the filter \[rad/s\].
+pub const RATE_MAX: Range = Range::new("tilt_rate_max_rad_s", 0.1, 1e6);
 
 /// The filter's constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +37,7 @@ pub struct Filtered {
 }
 
 impl CommandFilter {
-    /// A filter of the given bandwidth \[rad/s\], advanced every `dt_s` seconds (valid in [`crate::cascade::DT`]).
+    /// A filter of the given bandwidth \[rad/s\], advanced every `dt_s` seconds (valid in [`crate::settings::DT`]).
     ///
     /// # Errors
     /// If the bandwidth is outside [`BANDWIDTH`].
@@ -48,9 +50,9 @@ impl CommandFilter {
     /// The same filter with a rate of at most `rate_max_rad_s`.
     ///
     /// # Errors
-    /// If the rate is outside [`TILT_RATE`].
+    /// If the rate is outside [`RATE_MAX`].
     pub fn limited(self, rate_max_rad_s: f32) -> Result<Self, OutOfRange> {
-        TILT_RATE.check(rate_max_rad_s)?;
+        RATE_MAX.check(rate_max_rad_s)?;
         Ok(CommandFilter { rate_max: rate_max_rad_s, ..self })
     }
 

@@ -1,4 +1,4 @@
-//! Where every transcendental function of the control crate comes from.
+//! Where every transcendental function of the control crates comes from.
 //!
 //! Nothing here reaches the platform's own library, so host and target give the same bits. Each function names its
 //! source and its largest error against `f64`, measured over the stated range by `tests/math.rs`.

@@ -12,7 +12,7 @@
 //! other forces may give more. Yaw that happens to make room is counted on only where all four inputs fit, and in a frame
 //! without symmetry a little pitch may make room for roll, so that more of one asked is not always more given.
 
-use crate::math;
+use crate::{Action, Health, math};
 use afbc_types::{Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds};
 use nalgebra::{Matrix4, SMatrix, SVector, Vector4};
 
@@ -89,6 +89,13 @@ impl Mixer {
     /// If a parameter or the limit is out of range.
     pub fn new(vehicle: &Parameters, force_max_n: f32) -> Result<Self, OutOfRange> {
         Self::of(PLUS, vehicle, force_max_n)
+    }
+
+    /// What the rotors do for `inputs`, as far as their limits allow.
+    #[inline]
+    pub fn action(&self, inputs: &Inputs) -> Action {
+        let Allocation { forces, saturated, .. } = self.allocate(inputs);
+        Action { speeds: self.speeds(&forces), forces, health: Health { saturated, ..Health::default() } }
     }
 
     /// U1..U4 of the [`PLUS`] frame's rotor forces, (6).

@@ -5,7 +5,7 @@
 //! `yaw >= 0` (no yaw takes no share of any room). `|missing| >= least` differs at equality alone, where either is right.
 #![allow(clippy::unwrap_used, missing_docs)] // a mixer that cannot be built must stop the test
 
-use afbc::allocation::{AUTHORITY, Allocation, FORCE_MAX, Mixer, PLUS, POSITION, Rotor, THRUST_SHARE};
+use afbc_control::mixer::{AUTHORITY, Allocation, FORCE_MAX, Mixer, PLUS, POSITION, Rotor, THRUST_SHARE};
 use afbc_types::{Inputs, Parameters, RotorForces};
 use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 use nalgebra::{Matrix4, SVector, Vector4};

@@ -1,0 +1,49 @@
+//! Why a controller no longer flies by its own law.
+
+use afbc_types::Axis;
+
+/// Why the law is no longer trusted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trip {
+    /// |Theta_hat| passed its bound.
+    Theta(Axis),
+    /// delta_hat passed its bound.
+    Delta(Axis),
+    /// Errors stayed large.
+    Lyapunov(Axis),
+    /// Rotors stayed at their limits.
+    Saturation,
+    /// An input swings to and fro; z stands for the thrust.
+    LimitCycle(Axis),
+}
+
+impl Trip {
+    /// The reason in words, at most 50 characters.
+    pub const fn reason(self) -> &'static str {
+        match self {
+            Trip::Theta(Axis::Roll) => "AFBC off: Theta_hat of roll out of bounds",
+            Trip::Theta(Axis::Pitch) => "AFBC off: Theta_hat of pitch out of bounds",
+            Trip::Theta(Axis::Yaw) => "AFBC off: Theta_hat of yaw out of bounds",
+            Trip::Theta(Axis::Z) => "AFBC off: Theta_hat of z out of bounds",
+            Trip::Theta(Axis::X) => "AFBC off: Theta_hat of x out of bounds",
+            Trip::Theta(Axis::Y) => "AFBC off: Theta_hat of y out of bounds",
+            Trip::Delta(Axis::Roll) => "AFBC off: delta_hat of roll out of bounds",
+            Trip::Delta(Axis::Pitch) => "AFBC off: delta_hat of pitch out of bounds",
+            Trip::Delta(Axis::Yaw) => "AFBC off: delta_hat of yaw out of bounds",
+            Trip::Delta(Axis::Z) => "AFBC off: delta_hat of z out of bounds",
+            Trip::Delta(Axis::X) => "AFBC off: delta_hat of x out of bounds",
+            Trip::Delta(Axis::Y) => "AFBC off: delta_hat of y out of bounds",
+            Trip::Lyapunov(Axis::Roll) => "AFBC off: errors of roll stay large",
+            Trip::Lyapunov(Axis::Pitch) => "AFBC off: errors of pitch stay large",
+            Trip::Lyapunov(Axis::Yaw) => "AFBC off: errors of yaw stay large",
+            Trip::Lyapunov(Axis::Z) => "AFBC off: errors of z stay large",
+            Trip::Lyapunov(Axis::X) => "AFBC off: errors of x stay large",
+            Trip::Lyapunov(Axis::Y) => "AFBC off: errors of y stay large",
+            Trip::Saturation => "AFBC off: rotors stay saturated",
+            Trip::LimitCycle(Axis::Roll) => "AFBC off: limit cycle of U1 (roll)",
+            Trip::LimitCycle(Axis::Pitch) => "AFBC off: limit cycle of U2 (pitch)",
+            Trip::LimitCycle(Axis::Yaw) => "AFBC off: limit cycle of U3 (yaw)",
+            Trip::LimitCycle(_) => "AFBC off: limit cycle of U4 (thrust)",
+        }
+    }
+}
