@@ -39,68 +39,64 @@
 use crate::attitude::{facing, geometric_error, heading, length, r_earth_body, unit};
 use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
-use crate::limits::{Limits, TILT_MAX};
+use crate::limits::Limits;
 use crate::pid::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
-use crate::within;
 use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
-use afbc_types::{OutOfRange, Parameters, Range, Setpoint, State};
+use afbc_types::{Declared, OutOfRange, Parameters, Setpoint, State, parameters};
 use nalgebra::{Matrix3, Vector3};
 
-/// Range of each tunable of [`Gains`].
-#[expect(missing_docs, reason = "named after the field that each bounds")]
-pub mod ranges {
-    use afbc_types::Range;
-    pub const POSITION_P: Range = Range::new("position_p_1_s2", 0.5, 100.0);
-    pub const POSITION_D: Range = Range::new("position_d_1_s", 0.5, 20.0);
-    pub const POSITION_I: Range = Range::new("position_i_1_s3", 0.0, 200.0);
-    pub const HEIGHT_P: Range = Range::new("height_p_1_s2", 0.5, 200.0);
-    pub const HEIGHT_D: Range = Range::new("height_d_1_s", 0.5, 60.0);
-    pub const HEIGHT_I: Range = Range::new("height_i_1_s3", 0.0, 300.0);
-    pub const TILT_P: Range = Range::new("tilt_p_1_s2", 10.0, 1000.0);
-    pub const TILT_D: Range = Range::new("tilt_d_1_s", 2.0, 100.0);
-    pub const TILT_I: Range = Range::new("tilt_i_1_s2", 0.0, 500.0);
-    pub const YAW_P: Range = Range::new("yaw_p_1_s2", 0.5, 200.0);
-    pub const YAW_D: Range = Range::new("yaw_d_1_s", 0.5, 40.0);
-    pub const YAW_I: Range = Range::new("yaw_i_1_s2", 0.0, 100.0);
-    pub const FILTER: Range = Range::new("filter_rad_s", 10.0, 300.0);
-}
-
-/// Accepted largest integral of the position loop \[m/s2\].
-pub const POSITION_INTEGRAL_MAX: Range = Range::new("position_integral_max_m_s2", 0.0, 50.0);
-
-/// Gains and limits.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gains {
-    /// k_x along x and y \[1/s2\].
-    pub position_p_1_s2: f32,
-    /// k_v along x and y \[1/s\].
-    pub position_d_1_s: f32,
-    /// k_i along x and y \[1/s3\].
-    pub position_i_1_s3: f32,
-    /// k_x along z \[1/s2\].
-    pub height_p_1_s2: f32,
-    /// k_v along z \[1/s\].
-    pub height_d_1_s: f32,
-    /// k_i along z \[1/s3\].
-    pub height_i_1_s3: f32,
-    /// k_R of roll and pitch \[1/s2\].
-    pub tilt_p_1_s2: f32,
-    /// k_Omega of roll and pitch \[1/s\].
-    pub tilt_d_1_s: f32,
-    /// k_I of roll and pitch \[1/s2\].
-    pub tilt_i_1_s2: f32,
-    /// k_R of yaw \[1/s2\].
-    pub yaw_p_1_s2: f32,
-    /// k_Omega of yaw \[1/s\].
-    pub yaw_d_1_s: f32,
-    /// k_I of yaw \[1/s2\].
-    pub yaw_i_1_s2: f32,
-    /// w of the filter on s \[rad/s\].
-    pub filter_rad_s: f32,
-    /// Largest sat(k_i int e_x), per coordinate \[m/s2\]. Not a tunable.
-    pub position_integral_max_m_s2: f32,
-    /// Largest tilt \[rad\]. Not a tunable.
-    pub tilt_max_rad: f32,
+parameters! {
+    /// Gains and limits. By default as `sitl tune` found them for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
+    ///
+    /// For the law of 2010, leave the four integrals (names with `_i_`) at 0.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Gains {
+        /// k_x along x and y.
+        #[parameter(POS_P, "1/s2", 0.5..=100.0, tuned)]
+        pub position_p_1_s2: f32 = 20.64,
+        /// k_v along x and y.
+        #[parameter(POS_D, "1/s", 0.5..=20.0, tuned)]
+        pub position_d_1_s: f32 = 10.56,
+        /// k_i along x and y.
+        #[parameter(POS_I, "1/s3", 0.0..=200.0, tuned)]
+        pub position_i_1_s3: f32 = 14.41,
+        /// k_x along z.
+        #[parameter(HEIGHT_P, "1/s2", 0.5..=200.0, tuned)]
+        pub height_p_1_s2: f32 = 43.87,
+        /// k_v along z.
+        #[parameter(HEIGHT_D, "1/s", 0.5..=60.0, tuned)]
+        pub height_d_1_s: f32 = 19.27,
+        /// k_i along z.
+        #[parameter(HEIGHT_I, "1/s3", 0.0..=300.0, tuned)]
+        pub height_i_1_s3: f32 = 65.01,
+        /// k_R of roll and pitch.
+        #[parameter(TILT_P, "1/s2", 10.0..=1000.0, tuned)]
+        pub tilt_p_1_s2: f32 = 175.4,
+        /// k_Omega of roll and pitch.
+        #[parameter(TILT_D, "1/s", 2.0..=100.0, tuned)]
+        pub tilt_d_1_s: f32 = 37.89,
+        /// k_I of roll and pitch.
+        #[parameter(TILT_I, "1/s2", 0.0..=500.0, tuned)]
+        pub tilt_i_1_s2: f32 = 96.35,
+        /// k_R of yaw.
+        #[parameter(YAW_P, "1/s2", 0.5..=200.0, tuned)]
+        pub yaw_p_1_s2: f32 = 19.11,
+        /// k_Omega of yaw.
+        #[parameter(YAW_D, "1/s", 0.5..=40.0, tuned)]
+        pub yaw_d_1_s: f32 = 6.932,
+        /// k_I of yaw.
+        #[parameter(YAW_I, "1/s2", 0.0..=100.0, tuned)]
+        pub yaw_i_1_s2: f32 = 80.71,
+        /// w of the filter on s.
+        #[parameter(FILTER, "rad/s", 10.0..=300.0, tuned)]
+        pub filter_rad_s: f32 = 15.86,
+        /// Largest sat(k_i int e_x), per coordinate.
+        #[parameter(POS_INT_MAX, "m/s2", 0.0..=50.0)]
+        pub position_integral_max_m_s2: f32 = 10.0,
+        /// Largest tilt.
+        #[parameter(TILT_MAX, "rad", 0.05..=1.2)]
+        pub tilt_max_rad: f32 = 0.7,
+    }
 }
 
 impl Gains {
@@ -124,62 +120,11 @@ impl Gains {
     };
 
     /// With the integrals of 2013, as `sitl tune` found it for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
-    pub const TUNED: Self = Gains {
-        position_p_1_s2: 20.64,
-        position_d_1_s: 10.56,
-        position_i_1_s3: 14.41,
-        height_p_1_s2: 43.87,
-        height_d_1_s: 19.27,
-        height_i_1_s3: 65.01,
-        tilt_p_1_s2: 175.4,
-        tilt_d_1_s: 37.89,
-        tilt_i_1_s2: 96.35,
-        yaw_p_1_s2: 19.11,
-        yaw_d_1_s: 6.932,
-        yaw_i_1_s2: 80.71,
-        filter_rad_s: 15.86,
-        ..Self::LEE_2010
-    };
+    pub const TUNED: Self = Self::DEFAULT;
 
     /// With the integrals of 2013. Ours, by hand, for the paper's vehicle with rotors of 20 ms.
     pub const GOODARZI_2013: Self =
         Gains { position_i_1_s3: 25.0, height_i_1_s3: 60.0, tilt_i_1_s2: 20.0, yaw_i_1_s2: 10.0, ..Self::LEE_2010 };
-
-    /// Every gain that is a matter of taste, with the range to search it in. For the law of 2010, leave the four integrals
-    /// (names with `_i_`) at 0.
-    pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 13] {
-        use ranges::*;
-        [
-            (&POSITION_P, &mut self.position_p_1_s2),
-            (&POSITION_D, &mut self.position_d_1_s),
-            (&POSITION_I, &mut self.position_i_1_s3),
-            (&HEIGHT_P, &mut self.height_p_1_s2),
-            (&HEIGHT_D, &mut self.height_d_1_s),
-            (&HEIGHT_I, &mut self.height_i_1_s3),
-            (&TILT_P, &mut self.tilt_p_1_s2),
-            (&TILT_D, &mut self.tilt_d_1_s),
-            (&TILT_I, &mut self.tilt_i_1_s2),
-            (&YAW_P, &mut self.yaw_p_1_s2),
-            (&YAW_D, &mut self.yaw_d_1_s),
-            (&YAW_I, &mut self.yaw_i_1_s2),
-            (&FILTER, &mut self.filter_rad_s),
-        ]
-    }
-
-    /// What the vehicle and its task ask for instead, with the accepted range of each.
-    pub fn others(&mut self) -> [(&'static Range, &mut f32); 2] {
-        [(&POSITION_INTEGRAL_MAX, &mut self.position_integral_max_m_s2), (&TILT_MAX, &mut self.tilt_max_rad)]
-    }
-
-    /// Checks every gain and limit.
-    ///
-    /// # Errors
-    /// The first one out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        let mut gains = *self;
-        within(gains.tunables())?;
-        within(gains.others())
-    }
 }
 
 /// The controller: fixed from here on. What changes in flight is in [`Memory`].
@@ -259,7 +204,7 @@ impl Geometric {
         let (k_r, k_omega) = (twice(gains.tilt_p_1_s2, gains.yaw_p_1_s2), twice(gains.tilt_d_1_s, gains.yaw_d_1_s));
         Ok(Geometric {
             body,
-            limits: Limits::new(&vehicle, &settings, gains.tilt_max_rad)?,
+            limits: Limits::new(&vehicle, &settings, gains.tilt_max_rad),
             filter: Differentiator::new(gains.filter_rad_s, settings.dt_s)?,
             dt_s: settings.dt_s,
             k_x: twice(gains.position_p_1_s2, gains.height_p_1_s2),

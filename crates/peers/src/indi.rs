@@ -35,80 +35,63 @@
 use crate::attitude::{facing, r_earth_body, tilt_prioritised_error, unit};
 use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
-use crate::limits::{Limits, TILT_MAX, cylinder};
-use crate::pid::{SPEED_MAX, YAW_WEIGHT};
-use crate::within;
+use crate::limits::{Limits, cylinder};
 use afbc_control::{Action, FlightController, Mixer, Settings, Trace, math};
-use afbc_types::{OutOfRange, Parameters, Range, RotorSpeeds, Setpoint, State};
+use afbc_types::{Declared, OutOfRange, Parameters, RotorSpeeds, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
-/// Range of each tunable of [`Gains`].
-#[expect(missing_docs, reason = "named after the field that each bounds")]
-pub mod ranges {
-    use afbc_types::Range;
-    pub const POSITION_P: Range = Range::new("position_p_1_s", 0.2, 10.0);
-    pub const VELOCITY_P: Range = Range::new("velocity_p_1_s", 0.5, 20.0);
-    pub const HEIGHT_P: Range = Range::new("height_p_1_s", 0.2, 20.0);
-    pub const CLIMB_P: Range = Range::new("climb_p_1_s", 0.5, 40.0);
-    pub const TILT_P: Range = Range::new("tilt_p_1_s", 1.0, 30.0);
-    pub const TILT_RATE_P: Range = Range::new("tilt_rate_p_1_s", 2.0, 100.0);
-    pub const YAW_P: Range = Range::new("yaw_p_1_s", 0.2, 15.0);
-    pub const YAW_RATE_P: Range = Range::new("yaw_rate_p_1_s", 0.5, 40.0);
-    pub const POSITION_FILTER: Range = Range::new("position_filter_rad_s", 5.0, 300.0);
-    pub const ATTITUDE_FILTER: Range = Range::new("attitude_filter_rad_s", 10.0, 500.0);
-}
-
-/// Accepted time constant of the rotors; 0 for rotors that follow at once \[s\].
-pub const ROTOR_TIME_CONSTANT: Range = Range::new("rotor_time_constant_s", 0.0, 0.5);
-
-/// Gains and limits.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gains {
-    /// k_p along x and y \[1/s\].
-    pub position_p_1_s: f32,
-    /// k_v along x and y \[1/s\].
-    pub velocity_p_1_s: f32,
-    /// k_p along z \[1/s\].
-    pub height_p_1_s: f32,
-    /// k_v along z \[1/s\].
-    pub climb_p_1_s: f32,
-    /// k_a of roll and pitch \[1/s\].
-    pub tilt_p_1_s: f32,
-    /// k_w of roll and pitch \[1/s\].
-    pub tilt_rate_p_1_s: f32,
-    /// k_a of yaw for small errors; the weight is made up for \[1/s\].
-    pub yaw_p_1_s: f32,
-    /// k_w of yaw \[1/s\].
-    pub yaw_rate_p_1_s: f32,
-    /// w of the filter on velocity and thrust \[rad/s\].
-    pub position_filter_rad_s: f32,
-    /// w of the filter on rates and U1..U3 \[rad/s\].
-    pub attitude_filter_rad_s: f32,
-    /// tau of the rotor model \[s\]. Not a tunable.
-    pub rotor_time_constant_s: f32,
-    /// How much of a large yaw error is corrected together with the tilt, 0 to 1. Not a tunable.
-    pub yaw_weight: f32,
-    /// Largest velocity that a position error may add, sideways and upwards \[m/s\]. Not a tunable.
-    pub speed_max_m_s: f32,
-    /// Largest tilt \[rad\]. Not a tunable.
-    pub tilt_max_rad: f32,
+parameters! {
+    /// Gains and limits. By default as `sitl tune` found them for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Gains {
+        /// k_p along x and y.
+        #[parameter(POS_P, "1/s", 0.2..=10.0, tuned)]
+        pub position_p_1_s: f32 = 3.227,
+        /// k_v along x and y.
+        #[parameter(VEL_P, "1/s", 0.5..=20.0, tuned)]
+        pub velocity_p_1_s: f32 = 5.183,
+        /// k_p along z.
+        #[parameter(HEIGHT_P, "1/s", 0.2..=20.0, tuned)]
+        pub height_p_1_s: f32 = 2.841,
+        /// k_v along z.
+        #[parameter(CLIMB_P, "1/s", 0.5..=40.0, tuned)]
+        pub climb_p_1_s: f32 = 7.548,
+        /// k_a of roll and pitch.
+        #[parameter(TILT_P, "1/s", 1.0..=30.0, tuned)]
+        pub tilt_p_1_s: f32 = 15.04,
+        /// k_w of roll and pitch.
+        #[parameter(TILTRATE_P, "1/s", 2.0..=100.0, tuned)]
+        pub tilt_rate_p_1_s: f32 = 14.82,
+        /// k_a of yaw for small errors; the weight is made up for.
+        #[parameter(YAW_P, "1/s", 0.2..=15.0, tuned)]
+        pub yaw_p_1_s: f32 = 3.147,
+        /// k_w of yaw.
+        #[parameter(YAWRATE_P, "1/s", 0.5..=40.0, tuned)]
+        pub yaw_rate_p_1_s: f32 = 4.979,
+        /// w of the filter on velocity and thrust.
+        #[parameter(POS_FILTER, "rad/s", 5.0..=300.0, tuned)]
+        pub position_filter_rad_s: f32 = 71.32,
+        /// w of the filter on rates and U1..U3.
+        #[parameter(ATT_FILTER, "rad/s", 10.0..=500.0, tuned)]
+        pub attitude_filter_rad_s: f32 = 113.5,
+        /// tau of the rotor model.
+        #[parameter(ROT_LAG, "s", 0.0..=0.5)]
+        pub rotor_time_constant_s: f32 = 0.02,
+        /// How much of a large yaw error is corrected together with the tilt, 0 to 1.
+        #[parameter(YAW_WEIGHT, "1", 0.05..=1.0)]
+        pub yaw_weight: f32 = 0.4,
+        /// Largest velocity that a position error may add, sideways and upwards.
+        #[parameter(SPEED_MAX, "m/s", 0.1..=100.0)]
+        pub speed_max_m_s: f32 = 3.0,
+        /// Largest tilt.
+        #[parameter(TILT_MAX, "rad", 0.05..=1.2)]
+        pub tilt_max_rad: f32 = 0.7,
+    }
 }
 
 impl Gains {
     /// As `sitl tune` found it for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
-    pub const TUNED: Self = Gains {
-        position_p_1_s: 3.227,
-        velocity_p_1_s: 5.183,
-        height_p_1_s: 2.841,
-        climb_p_1_s: 7.548,
-        tilt_p_1_s: 15.04,
-        tilt_rate_p_1_s: 14.82,
-        yaw_p_1_s: 3.147,
-        yaw_rate_p_1_s: 4.979,
-        position_filter_rad_s: 71.32,
-        attitude_filter_rad_s: 113.5,
-        ..Self::PAPER_VEHICLE
-    };
+    pub const TUNED: Self = Self::DEFAULT;
 
     /// Ours, by hand, for the paper's vehicle with rotors of 20 ms.
     pub const PAPER_VEHICLE: Self = Gains {
@@ -127,43 +110,6 @@ impl Gains {
         speed_max_m_s: 3.0,
         tilt_max_rad: 0.7,
     };
-
-    /// Every gain that is a matter of taste, with the range to search it in.
-    pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 10] {
-        use ranges::*;
-        [
-            (&POSITION_P, &mut self.position_p_1_s),
-            (&VELOCITY_P, &mut self.velocity_p_1_s),
-            (&HEIGHT_P, &mut self.height_p_1_s),
-            (&CLIMB_P, &mut self.climb_p_1_s),
-            (&TILT_P, &mut self.tilt_p_1_s),
-            (&TILT_RATE_P, &mut self.tilt_rate_p_1_s),
-            (&YAW_P, &mut self.yaw_p_1_s),
-            (&YAW_RATE_P, &mut self.yaw_rate_p_1_s),
-            (&POSITION_FILTER, &mut self.position_filter_rad_s),
-            (&ATTITUDE_FILTER, &mut self.attitude_filter_rad_s),
-        ]
-    }
-
-    /// What the vehicle and its task ask for instead, with the accepted range of each.
-    pub fn others(&mut self) -> [(&'static Range, &mut f32); 4] {
-        [
-            (&ROTOR_TIME_CONSTANT, &mut self.rotor_time_constant_s),
-            (&YAW_WEIGHT, &mut self.yaw_weight),
-            (&SPEED_MAX, &mut self.speed_max_m_s),
-            (&TILT_MAX, &mut self.tilt_max_rad),
-        ]
-    }
-
-    /// Checks every gain and limit.
-    ///
-    /// # Errors
-    /// The first one out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        let mut gains = *self;
-        within(gains.tunables())?;
-        within(gains.others())
-    }
 }
 
 /// The controller: fixed from here on. What changes in flight is in [`Memory`].
@@ -212,7 +158,7 @@ impl Indi {
         Ok(Indi {
             body,
             dt_s: settings.dt_s,
-            limits: Limits::new(&vehicle, &settings, gains.tilt_max_rad)?,
+            limits: Limits::new(&vehicle, &settings, gains.tilt_max_rad),
             position_filter: Differentiator::new(gains.position_filter_rad_s, settings.dt_s)?,
             attitude_filter: Differentiator::new(gains.attitude_filter_rad_s, settings.dt_s)?,
             hover: body.hover(vehicle.gravity_m_s2),

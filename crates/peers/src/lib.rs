@@ -24,9 +24,8 @@
 //!
 //! # Tuning
 //!
-//! Gains are plain structs. `tunables` lists each gain that is a matter of taste with the range to search; what describes
-//! the vehicle instead (largest tilt, rotor lag) is in `others`. The sets given
-//! here are for the vehicle of the paper's Section IV with rotors of 20 ms: those named `Gains::PAPER_VEHICLE` or after
+//! Gains are plain structs, declared with their ranges. The tuner searches those that are a matter of taste (`tuned`); the
+//! others describe the vehicle and its task (largest tilt, rotor lag). The sets given here are for the vehicle of the paper's Section IV with rotors of 20 ms: those named `Gains::PAPER_VEHICLE` or after
 //! their source were tuned by hand, `Gains::TUNED` by `sitl tune` (`docs/tuning.md`).
 //!
 //! ```
@@ -53,10 +52,3 @@ pub mod pid;
 pub use geometric::Geometric;
 pub use indi::Indi;
 pub use pid::Pid;
-
-use afbc_types::{OutOfRange, Range};
-
-/// Checks each gain against its range.
-fn within<const N: usize>(gains: [(&'static Range, &mut f32); N]) -> Result<(), OutOfRange> {
-    gains.into_iter().try_for_each(|(range, gain)| range.check(*gain))
-}

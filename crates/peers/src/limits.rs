@@ -1,11 +1,8 @@
 //! What the position loops may ask for.
 
 use afbc_control::{Settings, math};
-use afbc_types::{OutOfRange, Parameters, Range};
+use afbc_types::Parameters;
 use nalgebra::Vector3;
-
-/// Accepted largest tilt \[rad\].
-pub const TILT_MAX: Range = Range::new("tilt_max_rad", 0.05, 1.2);
 
 /// Least vertical part of the specific force, as a share of gravity: thrust always points up and tells an attitude.
 const VERTICAL_MIN: f32 = 0.1;
@@ -23,22 +20,18 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The bounds of a vehicle whose parameters and settings are valid.
-    ///
-    /// # Errors
-    /// If the tilt is outside [`TILT_MAX`].
-    pub fn new(vehicle: &Parameters, settings: &Settings, tilt_max_rad: f32) -> Result<Self, OutOfRange> {
-        TILT_MAX.check(tilt_max_rad)?;
+    /// The bounds of a vehicle whose parameters, settings and largest tilt are valid.
+    pub fn new(vehicle: &Parameters, settings: &Settings, tilt_max_rad: f32) -> Self {
         let vertical_min_m_s2 = VERTICAL_MIN * vehicle.gravity_m_s2;
         // A vehicle whose rotors cannot even lift it asks for all that they have.
         let max_m_s2 = (4.0 * settings.rotor_force_max_n / vehicle.mass_kg).max(2.0 * vertical_min_m_s2);
-        Ok(Limits {
+        Limits {
             gravity_m_s2: vehicle.gravity_m_s2,
             vertical_min_m_s2,
             vertical_max_m_s2: VERTICAL_MAX * max_m_s2,
             max_m_s2,
             tan_tilt: math::sin(tilt_max_rad) / math::cos(tilt_max_rad),
-        })
+        }
     }
 
     /// Gravity, as the specific force that balances it \[m/s2\].

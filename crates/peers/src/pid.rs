@@ -24,108 +24,84 @@
 use crate::attitude::{facing, length, r_earth_body, tilt_prioritised_error};
 use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
-use crate::limits::{Limits, TILT_MAX, cylinder};
-use crate::within;
+use crate::limits::{Limits, cylinder};
 use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
-use afbc_types::{OutOfRange, Parameters, Range, Setpoint, State};
+use afbc_types::{Declared, OutOfRange, Parameters, Setpoint, State, parameters};
 use nalgebra::Vector3;
-
-/// Range of each tunable of [`Gains`].
-#[expect(missing_docs, reason = "named after the field that each bounds")]
-pub mod ranges {
-    use afbc_types::Range;
-    pub const POSITION_P: Range = Range::new("position_p_1_s", 0.2, 10.0);
-    pub const VELOCITY_P: Range = Range::new("velocity_p_1_s", 0.5, 20.0);
-    pub const VELOCITY_I: Range = Range::new("velocity_i_1_s2", 0.0, 200.0);
-    pub const VELOCITY_D: Range = Range::new("velocity_d", 0.0, 2.0);
-    pub const HEIGHT_P: Range = Range::new("height_p_1_s", 0.2, 10.0);
-    pub const CLIMB_P: Range = Range::new("climb_p_1_s", 0.5, 20.0);
-    pub const CLIMB_I: Range = Range::new("climb_i_1_s2", 0.0, 200.0);
-    pub const CLIMB_D: Range = Range::new("climb_d", 0.0, 2.0);
-    pub const TILT_P: Range = Range::new("tilt_p_1_s", 1.0, 30.0);
-    pub const YAW_P: Range = Range::new("yaw_p_1_s", 0.2, 15.0);
-    pub const TILT_RATE_P: Range = Range::new("tilt_rate_p_1_s", 2.0, 100.0);
-    pub const TILT_RATE_I: Range = Range::new("tilt_rate_i_1_s2", 0.0, 500.0);
-    pub const TILT_RATE_D: Range = Range::new("tilt_rate_d", 0.0, 3.0);
-    pub const YAW_RATE_P: Range = Range::new("yaw_rate_p_1_s", 0.5, 40.0);
-    pub const YAW_RATE_I: Range = Range::new("yaw_rate_i_1_s2", 0.0, 100.0);
-    pub const RATE_FEED_FORWARD: Range = Range::new("rate_feed_forward_1_s", 0.0, 20.0);
-    pub const FILTER: Range = Range::new("filter_rad_s", 20.0, 500.0);
-}
-
-/// Accepted yaw weight.
-pub const YAW_WEIGHT: Range = Range::new("yaw_weight", 0.05, 1.0);
-/// Accepted largest correction of the velocity \[m/s\].
-pub const SPEED_MAX: Range = Range::new("speed_max_m_s", 0.1, 100.0);
 
 /// Largest integral of the rate loop \[rad/s2\].
 pub(crate) const RATE_INTEGRAL_MAX_RAD_S2: f32 = 20.0;
 
-/// Gains and limits.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gains {
-    /// k_p along x and y \[1/s\].
-    pub position_p_1_s: f32,
-    /// k_v along x and y \[1/s\].
-    pub velocity_p_1_s: f32,
-    /// k_i along x and y \[1/s2\].
-    pub velocity_i_1_s2: f32,
-    /// d_v along x and y.
-    pub velocity_d: f32,
-    /// k_p along z \[1/s\].
-    pub height_p_1_s: f32,
-    /// k_v along z \[1/s\].
-    pub climb_p_1_s: f32,
-    /// k_i along z \[1/s2\].
-    pub climb_i_1_s2: f32,
-    /// d_v along z.
-    pub climb_d: f32,
-    /// k_a of roll and pitch \[1/s\].
-    pub tilt_p_1_s: f32,
-    /// k_a of yaw for small errors; the weight is made up for \[1/s\].
-    pub yaw_p_1_s: f32,
-    /// k_w of roll and pitch \[1/s\].
-    pub tilt_rate_p_1_s: f32,
-    /// k_iw of roll and pitch \[1/s2\].
-    pub tilt_rate_i_1_s2: f32,
-    /// d_w of roll and pitch.
-    pub tilt_rate_d: f32,
-    /// k_w of yaw \[1/s\].
-    pub yaw_rate_p_1_s: f32,
-    /// k_iw of yaw \[1/s2\].
-    pub yaw_rate_i_1_s2: f32,
-    /// f \[1/s\].
-    pub rate_feed_forward_1_s: f32,
-    /// Bandwidth of both derivatives \[rad/s\].
-    pub filter_rad_s: f32,
-    /// How much of a large yaw error is corrected together with the tilt, 0 to 1. Not a tunable.
-    pub yaw_weight: f32,
-    /// Largest velocity that a position error may add, sideways and upwards \[m/s\]. Not a tunable.
-    pub speed_max_m_s: f32,
-    /// Largest tilt \[rad\]. Not a tunable.
-    pub tilt_max_rad: f32,
+parameters! {
+    /// Gains and limits. By default as `sitl tune` found them for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Gains {
+        /// k_p along x and y.
+        #[parameter(POS_P, "1/s", 0.2..=10.0, tuned)]
+        pub position_p_1_s: f32 = 1.742,
+        /// k_v along x and y.
+        #[parameter(VEL_P, "1/s", 0.5..=20.0, tuned)]
+        pub velocity_p_1_s: f32 = 4.347,
+        /// k_i along x and y.
+        #[parameter(VEL_I, "1/s2", 0.0..=200.0, tuned)]
+        pub velocity_i_1_s2: f32 = 33.16,
+        /// d_v along x and y.
+        #[parameter(VEL_D, "1", 0.0..=2.0, tuned)]
+        pub velocity_d: f32 = 0.07327,
+        /// k_p along z.
+        #[parameter(HEIGHT_P, "1/s", 0.2..=10.0, tuned)]
+        pub height_p_1_s: f32 = 2.518,
+        /// k_v along z.
+        #[parameter(CLIMB_P, "1/s", 0.5..=20.0, tuned)]
+        pub climb_p_1_s: f32 = 10.75,
+        /// k_i along z.
+        #[parameter(CLIMB_I, "1/s2", 0.0..=200.0, tuned)]
+        pub climb_i_1_s2: f32 = 97.01,
+        /// d_v along z.
+        #[parameter(CLIMB_D, "1", 0.0..=2.0, tuned)]
+        pub climb_d: f32 = 0.0,
+        /// k_a of roll and pitch.
+        #[parameter(TILT_P, "1/s", 1.0..=30.0, tuned)]
+        pub tilt_p_1_s: f32 = 20.4,
+        /// k_a of yaw for small errors; the weight is made up for.
+        #[parameter(YAW_P, "1/s", 0.2..=15.0, tuned)]
+        pub yaw_p_1_s: f32 = 2.053,
+        /// k_w of roll and pitch.
+        #[parameter(TILTRATE_P, "1/s", 2.0..=100.0, tuned)]
+        pub tilt_rate_p_1_s: f32 = 19.43,
+        /// k_iw of roll and pitch.
+        #[parameter(TILTRATE_I, "1/s2", 0.0..=500.0, tuned)]
+        pub tilt_rate_i_1_s2: f32 = 12.49,
+        /// d_w of roll and pitch.
+        #[parameter(TILTRATE_D, "1", 0.0..=3.0, tuned)]
+        pub tilt_rate_d: f32 = 0.1676,
+        /// k_w of yaw.
+        #[parameter(YAWRATE_P, "1/s", 0.5..=40.0, tuned)]
+        pub yaw_rate_p_1_s: f32 = 5.905,
+        /// k_iw of yaw.
+        #[parameter(YAWRATE_I, "1/s2", 0.0..=100.0, tuned)]
+        pub yaw_rate_i_1_s2: f32 = 38.2,
+        /// f.
+        #[parameter(RATE_FF, "1/s", 0.0..=20.0, tuned)]
+        pub rate_feed_forward_1_s: f32 = 0.0,
+        /// Bandwidth of both derivatives.
+        #[parameter(FILTER, "rad/s", 20.0..=500.0, tuned)]
+        pub filter_rad_s: f32 = 140.7,
+        /// How much of a large yaw error is corrected together with the tilt, 0 to 1.
+        #[parameter(YAW_WEIGHT, "1", 0.05..=1.0)]
+        pub yaw_weight: f32 = 0.4,
+        /// Largest velocity that a position error may add, sideways and upwards.
+        #[parameter(SPEED_MAX, "m/s", 0.1..=100.0)]
+        pub speed_max_m_s: f32 = 3.0,
+        /// Largest tilt.
+        #[parameter(TILT_MAX, "rad", 0.05..=1.2)]
+        pub tilt_max_rad: f32 = 0.7,
+    }
 }
 
 impl Gains {
     /// As `sitl tune` found it for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
-    pub const TUNED: Self = Gains {
-        position_p_1_s: 1.742,
-        velocity_p_1_s: 4.347,
-        velocity_i_1_s2: 33.16,
-        velocity_d: 0.07327,
-        height_p_1_s: 2.518,
-        climb_p_1_s: 10.75,
-        climb_i_1_s2: 97.01,
-        tilt_p_1_s: 20.4,
-        yaw_p_1_s: 2.053,
-        tilt_rate_p_1_s: 19.43,
-        tilt_rate_i_1_s2: 12.49,
-        tilt_rate_d: 0.1676,
-        yaw_rate_p_1_s: 5.905,
-        yaw_rate_i_1_s2: 38.2,
-        filter_rad_s: 140.7,
-        ..Self::PAPER_VEHICLE
-    };
+    pub const TUNED: Self = Self::DEFAULT;
 
     /// Ours, by hand, for the paper's vehicle with rotors of 20 ms.
     pub const PAPER_VEHICLE: Self = Gains {
@@ -150,49 +126,6 @@ impl Gains {
         speed_max_m_s: 3.0,
         tilt_max_rad: 0.7,
     };
-
-    /// Every gain that is a matter of taste, with the range to search it in.
-    pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 17] {
-        use ranges::*;
-        [
-            (&POSITION_P, &mut self.position_p_1_s),
-            (&VELOCITY_P, &mut self.velocity_p_1_s),
-            (&VELOCITY_I, &mut self.velocity_i_1_s2),
-            (&VELOCITY_D, &mut self.velocity_d),
-            (&HEIGHT_P, &mut self.height_p_1_s),
-            (&CLIMB_P, &mut self.climb_p_1_s),
-            (&CLIMB_I, &mut self.climb_i_1_s2),
-            (&CLIMB_D, &mut self.climb_d),
-            (&TILT_P, &mut self.tilt_p_1_s),
-            (&YAW_P, &mut self.yaw_p_1_s),
-            (&TILT_RATE_P, &mut self.tilt_rate_p_1_s),
-            (&TILT_RATE_I, &mut self.tilt_rate_i_1_s2),
-            (&TILT_RATE_D, &mut self.tilt_rate_d),
-            (&YAW_RATE_P, &mut self.yaw_rate_p_1_s),
-            (&YAW_RATE_I, &mut self.yaw_rate_i_1_s2),
-            (&RATE_FEED_FORWARD, &mut self.rate_feed_forward_1_s),
-            (&FILTER, &mut self.filter_rad_s),
-        ]
-    }
-
-    /// What the vehicle and its task ask for instead, with the accepted range of each.
-    pub fn others(&mut self) -> [(&'static Range, &mut f32); 3] {
-        [
-            (&YAW_WEIGHT, &mut self.yaw_weight),
-            (&SPEED_MAX, &mut self.speed_max_m_s),
-            (&TILT_MAX, &mut self.tilt_max_rad),
-        ]
-    }
-
-    /// Checks every gain and limit.
-    ///
-    /// # Errors
-    /// The first one out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        let mut gains = *self;
-        within(gains.tunables())?;
-        within(gains.others())
-    }
 }
 
 /// The controller: fixed from here on. What changes in flight is in [`Memory`].
@@ -244,7 +177,7 @@ impl Pid {
         let velocity_p = twice(gains.velocity_p_1_s, gains.climb_p_1_s);
         Ok(Pid {
             body,
-            limits: Limits::new(&vehicle, &settings, gains.tilt_max_rad)?,
+            limits: Limits::new(&vehicle, &settings, gains.tilt_max_rad),
             differentiator: Differentiator::new(gains.filter_rad_s, settings.dt_s)?,
             dt_s: settings.dt_s,
             position_p: twice(gains.position_p_1_s, gains.height_p_1_s),

@@ -6,7 +6,8 @@ mod harness;
 use afbc_control::{Action, FlightController, Screened, Trace};
 use afbc_peers::attitude::{facing, geometric_error, quaternion, r_earth_body, roll_pitch, tilt_prioritised_error};
 use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
-use afbc_types::{Range, Setpoint, State};
+use afbc_types::{Declared, OutOfRange, Range, Setpoint, State, Value};
+use core::convert::Infallible;
 use harness::{Random, SETTINGS, vehicle};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
@@ -371,32 +372,27 @@ fn increments_cancel_a_constant_moment() {
 
 #[test]
 fn gains_out_of_range_are_refused_by_name() {
-    fn tried<const N: usize>(
-        list: [(&'static Range, &mut f32); N],
-        index: usize,
-        value: fn(&Range) -> f32,
-    ) -> &'static str {
-        let (range, gain) = list.into_iter().nth(index).unwrap();
-        *gain = value(range);
-        range.name
-    }
-    for bad in [|range: &Range| (range.max * 2.0) as f32, |_: &Range| f32::NAN, |_: &Range| -1.0] {
-        for index in 0..17 {
-            let mut gains = pid::Gains::PAPER_VEHICLE;
-            let name = tried(gains.tunables(), index, bad);
-            assert_eq!(Pid::new(vehicle(), SETTINGS, gains).unwrap_err().range.name, name);
-        }
-        for index in 0..13 {
-            let mut gains = geometric::Gains::GOODARZI_2013;
-            let name = tried(gains.tunables(), index, bad);
-            assert_eq!(Geometric::new(vehicle(), SETTINGS, gains).unwrap_err().range.name, name);
-        }
-        for index in 0..10 {
-            let mut gains = indi::Gains::PAPER_VEHICLE;
-            let name = tried(gains.tunables(), index, bad);
-            assert_eq!(Indi::new(vehicle(), SETTINGS, gains).unwrap_err().range.name, name);
+    /// Builds a controller with each gain in turn put to a bad value: it is refused by that gain's name.
+    fn refused<G: Declared + Copy>(gains: G, count: usize, build: fn(G) -> Result<(), OutOfRange>) {
+        assert_eq!(build(gains), Ok(()));
+        for bad in [|range: &Range| (range.max * 2.0) as f32, |_: &Range| f32::NAN, |_: &Range| -1.0] {
+            for index in 0..count {
+                let (mut gains, mut at, mut name) = (gains, 0, "");
+                let Ok(()) = gains.visit_mut(&mut |declaration, value| {
+                    if let (true, Value::Single([gain])) = (at == index, value) {
+                        (*gain, name) = (bad(&declaration.range), declaration.range.name);
+                    }
+                    at += 1;
+                    Ok::<(), Infallible>(())
+                });
+                assert_eq!(at, count);
+                assert_eq!(build(gains).unwrap_err().range.name, name);
+            }
         }
     }
+    refused(pid::Gains::PAPER_VEHICLE, 20, |gains| Pid::new(vehicle(), SETTINGS, gains).map(drop));
+    refused(geometric::Gains::GOODARZI_2013, 15, |gains| Geometric::new(vehicle(), SETTINGS, gains).map(drop));
+    refused(indi::Gains::PAPER_VEHICLE, 14, |gains| Indi::new(vehicle(), SETTINGS, gains).map(drop));
     let gains = pid::Gains { tilt_max_rad: 1.5, ..pid::Gains::PAPER_VEHICLE };
     assert_eq!(gains.validate().unwrap_err().range.name, "tilt_max_rad");
     let gains = indi::Gains { rotor_time_constant_s: -0.1, ..indi::Gains::PAPER_VEHICLE };

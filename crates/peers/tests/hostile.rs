@@ -5,7 +5,8 @@ mod harness;
 
 use afbc_control::{FlightController, Screened, Settings};
 use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
-use afbc_types::{Range, Setpoint, State};
+use afbc_types::{Declared, Range, Setpoint, State, Value};
+use core::convert::Infallible;
 use harness::{SETTINGS, vehicle};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -44,10 +45,14 @@ fn motion() -> impl Strategy<Value = (State, Setpoint)> {
 }
 
 /// Each gain anywhere in its range, by the shares given.
-fn anywhere<const N: usize>(tunables: [(&'static Range, &mut f32); N], shares: &[f64]) {
-    for ((range, gain), share) in tunables.into_iter().zip(shares) {
-        *gain = (range.min + share * (range.max - range.min)) as f32;
-    }
+fn anywhere(gains: &mut impl Declared, shares: &[f64]) {
+    let mut shares = shares.iter();
+    let Ok(()) = gains.visit_mut(&mut |declaration, value| {
+        let (Value::Single([gain]), Some(share)) = (value, shares.next()) else { panic!("{declaration:?}") };
+        let Range { min, max, .. } = declaration.range;
+        *gain = (min + share * (max - min)) as f32;
+        Ok::<(), Infallible>(())
+    });
 }
 
 fn harmless<C: FlightController>(controller: &C, settings: &Settings, inputs: &[(State, Setpoint)]) {
@@ -74,23 +79,23 @@ proptest! {
     #[test]
     fn whatever_comes_in_the_rotors_get_something_they_can_do(
         inputs in prop::collection::vec(motion(), 1..30),
-        shares in prop::collection::vec(0.0..=1.0, 17),
+        shares in prop::collection::vec(0.0..=1.0, 20),
         force_max in prop_oneof![Just(3.0f32), Just(1e4), Just(1e-3)],
     ) {
         let settings = Settings { rotor_force_max_n: force_max, ..SETTINGS };
         let mut gains = pid::Gains::PAPER_VEHICLE;
         harmless(&Pid::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
-        anywhere(gains.tunables(), &shares);
+        anywhere(&mut gains, &shares);
         harmless(&Pid::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
 
         let mut gains = geometric::Gains::GOODARZI_2013;
         harmless(&Geometric::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
-        anywhere(gains.tunables(), &shares);
+        anywhere(&mut gains, &shares);
         harmless(&Geometric::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
 
         let mut gains = indi::Gains::PAPER_VEHICLE;
         harmless(&Indi::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
-        anywhere(gains.tunables(), &shares);
+        anywhere(&mut gains, &shares);
         harmless(&Indi::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
     }
 }

@@ -8,7 +8,7 @@ use afbc::{Limits, Settings};
 use afbc_sim::contender::{Contender, Law};
 use afbc_sim::scenario::Scenario;
 use afbc_sim::trajectory::Trajectory;
-use afbc_types::Axis;
+use afbc_types::{Axis, Value};
 use core::convert::Infallible;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -301,8 +301,10 @@ fn per_axis(names: &[&str], gains: impl Fn(Axis) -> Vec<f32>) -> Markup {
 
 fn by_name(mut law: Law) -> Markup {
     let mut gains = Vec::new();
-    let Ok(()) = law.each_gain(|range, gain| {
-        gains.push((range.name, *gain));
+    let Ok(()) = law.each_gain(&mut |declaration, value| {
+        if let Value::Single([gain]) = value {
+            gains.push((declaration.range.name, *gain));
+        }
         Ok::<(), Infallible>(())
     });
     html! { div.scroll { table { tbody { @for (name, gain) in gains { tr { td { code { (name) } } td { (gain) } } } } } } }

@@ -4,7 +4,7 @@ use afbc::monitor::Bounds;
 use afbc::{Adaptive, Backstepping, Controller, Guarded, Profile, Settings, adaptive, backstepping};
 use afbc_control::{FlightController, Mixer};
 use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
-use afbc_types::{OutOfRange, Parameters, PerAxis, Range};
+use afbc_types::{Declared, OutOfRange, Parameters, PerAxis, Visit};
 
 /// A kind of control law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,26 +102,16 @@ impl Law {
         matches!(self, Law::Pid(_) | Law::Geometric(_) | Law::Indi(_))
     }
 
-    /// Shows each gain of a peer by name and range; none of AFBC and backstepping, which have a set for each axis.
+    /// Shows each gain of a peer; none of AFBC and backstepping, which have a set for each axis.
     ///
     /// # Errors
     /// The first that `visit` returns.
-    pub fn each_gain<E>(&mut self, mut visit: impl FnMut(&'static Range, &mut f32) -> Result<(), E>) -> Result<(), E> {
-        let mut visit = |(range, gain): (&'static Range, &mut f32)| visit(range, gain);
+    pub fn each_gain<E>(&mut self, visit: Visit<'_, E>) -> Result<(), E> {
         match self {
             Law::Afbc(_) | Law::Guarded(_) | Law::Backstepping(_) => Ok(()),
-            Law::Pid(gains) => {
-                gains.tunables().into_iter().try_for_each(&mut visit)?;
-                gains.others().into_iter().try_for_each(visit)
-            }
-            Law::Geometric(gains) => {
-                gains.tunables().into_iter().try_for_each(&mut visit)?;
-                gains.others().into_iter().try_for_each(visit)
-            }
-            Law::Indi(gains) => {
-                gains.tunables().into_iter().try_for_each(&mut visit)?;
-                gains.others().into_iter().try_for_each(visit)
-            }
+            Law::Pid(gains) => gains.visit_mut(visit),
+            Law::Geometric(gains) => gains.visit_mut(visit),
+            Law::Indi(gains) => gains.visit_mut(visit),
         }
     }
 }

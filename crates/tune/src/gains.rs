@@ -6,7 +6,7 @@ use afbc_control::command_filter::BANDWIDTH;
 use afbc_control::mixer::FORCE_MAX;
 use afbc_sim::contender::ControllerKind;
 use afbc_sim::contender::{Contender, Law};
-use afbc_types::{Axis, PerAxis, Range};
+use afbc_types::{Axis, PerAxis, Range, Value};
 use core::convert::Infallible;
 use core::fmt::Write;
 
@@ -14,12 +14,12 @@ use core::fmt::Write;
 const GROUPS: [&[Axis]; 4] = [&[Axis::Z], &[Axis::X, Axis::Y], &[Axis::Roll, Axis::Pitch], &[Axis::Yaw]];
 
 /// Where a gain stands, and what it may be.
-type Visit<'a> = &'a mut dyn FnMut(&str, &'static Range, &mut f32);
+type Visit<'a> = &'a mut dyn FnMut(&str, &Range, &mut f32);
 
 /// Shows every gain of `contender` that is a matter of taste and not 0. At 0 it switches a part of its law off, which is
 /// another law; it stays there.
 fn each_tunable(contender: &mut Contender, visit: Visit) {
-    let mut visit = |place: &str, (range, gain): (&'static Range, &mut f32)| {
+    let mut visit = |place: &str, (range, gain): (&Range, &mut f32)| {
         if *gain > 0.0 {
             visit(place, range, gain);
         }
@@ -38,9 +38,15 @@ fn each_tunable(contender: &mut Contender, visit: Visit) {
         Law::Backstepping(gains) => {
             each_group(gains, &mut |place, gains| gains.tunables().into_iter().for_each(|knob| visit(place, knob)));
         }
-        Law::Pid(gains) => return gains.tunables().into_iter().for_each(|knob| visit("", knob)),
-        Law::Geometric(gains) => return gains.tunables().into_iter().for_each(|knob| visit("", knob)),
-        Law::Indi(gains) => return gains.tunables().into_iter().for_each(|knob| visit("", knob)),
+        peer => {
+            let Ok(()) = peer.each_gain(&mut |declaration, value| {
+                if let (true, Value::Single([gain])) = (declaration.tuned, value) {
+                    visit("", (&declaration.range, gain));
+                }
+                Ok::<(), Infallible>(())
+            });
+            return;
+        }
     }
     visit("cascade", (&BANDWIDTH, &mut contender.settings.command_filter_rad_s));
 }
@@ -180,8 +186,10 @@ fn keys(contender: &Contender) -> Vec<Key> {
             }
         }
         peer => {
-            let Ok(()) = peer.each_gain(|range, gain| {
-                put("gains", range.name, gain.to_string());
+            let Ok(()) = peer.each_gain(&mut |declaration, value| {
+                if let Value::Single([gain]) = value {
+                    put("gains", declaration.range.name, gain.to_string());
+                }
                 Ok::<(), Infallible>(())
             });
         }

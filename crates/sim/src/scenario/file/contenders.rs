@@ -1,11 +1,11 @@
 //! `controllers`, `profile`, `monitor` and `[[contender]]`: who flies.
 
-use super::control::{axis_backstepping, axis_gains, number, per_axis, settings};
+use super::control::{axis_backstepping, axis_gains, per_axis, settings};
 use crate::contender::{Contender, ControllerKind, Law, backstepping_part};
 use crate::reader::{FileError, Table};
 use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
-use afbc_types::{Parameters, PerAxis};
+use afbc_types::{Declared, Parameters, PerAxis};
 
 /// Longest name of a contender: what a table has room for.
 const NAME_LENGTH: usize = 32;
@@ -85,18 +85,19 @@ fn contender(
 
 /// The law with the gains in `table`; those that it leaves out are as in `default`.
 fn law(table: Option<Table<'_>>, mut default: Law) -> Result<Law, FileError> {
-    match default {
-        Law::Afbc(gains) => per_axis(table, gains, axis_gains).map(Law::Afbc),
-        Law::Guarded(gains) => per_axis(table, gains, axis_gains).map(Law::Guarded),
-        Law::Backstepping(gains) => per_axis(table, gains, axis_backstepping).map(Law::Backstepping),
-        _ => {
-            let Some(mut table) = table else { return Ok(default) };
-            default.each_gain(|range, gain| {
-                *gain = number(&mut table, range, *gain)?;
-                Ok(())
-            })?;
-            table.finish()?;
-            Ok(default)
-        }
+    match &mut default {
+        Law::Afbc(gains) | Law::Guarded(gains) => *gains = per_axis(table, *gains, axis_gains)?,
+        Law::Backstepping(gains) => *gains = per_axis(table, *gains, axis_backstepping)?,
+        Law::Pid(gains) => whole(table, gains)?,
+        Law::Geometric(gains) => whole(table, gains)?,
+        Law::Indi(gains) => whole(table, gains)?,
     }
+    Ok(default)
+}
+
+/// Gains for the whole vehicle.
+fn whole(table: Option<Table<'_>>, gains: &mut impl Declared) -> Result<(), FileError> {
+    let Some(mut table) = table else { return Ok(()) };
+    table.declared(gains)?;
+    table.finish()
 }

@@ -115,6 +115,6 @@ fn limits(mut table: Table<'_>, default: &Limits) -> Result<Limits, FileError> {
     Ok(limits)
 }
 
-pub(super) fn number(table: &mut Table<'_>, range: &Range, default: f32) -> Result<f32, FileError> {
+fn number(table: &mut Table<'_>, range: &Range, default: f32) -> Result<f32, FileError> {
     Ok(table.number(range)?.map_or(default, |number| number as f32))
 }
