@@ -5,6 +5,7 @@
 //! what a campaign has flown is kept; one line says which.
 
 mod cli;
+mod serial;
 
 use clap::Parser;
 use std::process::ExitCode;

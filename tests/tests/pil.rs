@@ -4,11 +4,11 @@
 
 use afbc_plant::Model;
 use afbc_sim::case::Case;
-use afbc_sim::in_the_loop::{End, Pace, Station, Twins, fly};
+use afbc_sim::in_the_loop::{End, Pace, Station, fly};
 use afbc_sim::paper::scenario;
 use core::ops::ControlFlow;
 use pil::budget::TICK_INSTRUCTIONS_MAX;
-use pil::{Emulator, Image};
+use pil::{Emulator, Image, Twins};
 use std::io::Write as _;
 
 /// The emulator, or none if this test has to be skipped, which it says on the terminal. Under CI nothing may be skipped.

@@ -1,6 +1,7 @@
 //! A flight in which everything happens, as the bytes that reach the vehicle: what tests compare and budgets measure.
 
-use afbc_link::{Address, Command, FRAME_MAX, Sender, Uplink};
+use afbc_link::{Command, Uplink};
+use afbc_sim::in_the_loop::Station;
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 
@@ -9,60 +10,35 @@ const ARMED: u64 = 1_500;
 /// Ticks of the whole flight.
 pub const TICKS: u64 = 6_000;
 
-/// The other end of the link: tracker and commander in one.
-#[derive(Clone, Debug)]
-pub struct Station {
-    sender: Sender,
-    bytes: Vec<u8>,
-}
-
-impl Default for Station {
-    fn default() -> Self {
-        Station { sender: Sender::new(Address { system: 255, component: 190 }), bytes: Vec::new() }
+/// What reaches the link before `tick`: a flight, and everything that can go wrong with its link. To be asked for
+/// one tick after the other, from 0.
+pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
+    // At rest until it is armed.
+    let (state, setpoint) = motion(tick.saturating_sub(ARMED) as f32 * 1e-3);
+    // Two gaps: one to ride out, one that ends in a descent.
+    let tracked = !(2_500..2_600).contains(&tick) && !(4_000..5_000).contains(&tick);
+    if tracked {
+        station.say(&Uplink::State { sent_us: tick * 1000, state });
     }
-}
-
-impl Station {
-    /// Adds a message to the next [`Station::take`].
-    pub fn say(&mut self, message: Uplink) {
-        self.bytes.extend_from_slice(self.sender.send(&message, &mut [0; FRAME_MAX]));
+    if tick.is_multiple_of(10) {
+        station.say(&Uplink::Setpoint(setpoint));
     }
-
-    /// All that was said since the last time.
-    pub fn take(&mut self) -> Vec<u8> {
-        std::mem::take(&mut self.bytes)
+    match tick {
+        // The first is refused: the rate is not known yet.
+        100 | ARMED => station.say(&Uplink::Command(Command::Arm)),
+        // The motion does not follow the rotors, so AFBC's monitor trips, time and again.
+        3_000 | 5_200 => station.say(&Uplink::Command(Command::Engage)),
+        5_900 => station.say(&Uplink::Command(Command::Kill)),
+        _ => (),
     }
-
-    /// What reaches the link before `tick`: a flight, and everything that can go wrong with its link. To be asked for
-    /// one tick after the other, from 0.
-    pub fn bytes_of_tick(&mut self, tick: u64) -> Vec<u8> {
-        // At rest until it is armed.
-        let (state, setpoint) = motion(tick.saturating_sub(ARMED) as f32 * 1e-3);
-        // Two gaps: one to ride out, one that ends in a descent.
-        let tracked = !(2_500..2_600).contains(&tick) && !(4_000..5_000).contains(&tick);
-        if tracked {
-            self.say(Uplink::State { sent_us: tick * 1000, state });
-        }
-        if tick.is_multiple_of(10) {
-            self.say(Uplink::Setpoint(setpoint));
-        }
-        match tick {
-            // The first is refused: the rate is not known yet.
-            100 | ARMED => self.say(Uplink::Command(Command::Arm)),
-            // The motion does not follow the rotors, so AFBC's monitor trips, time and again.
-            3_000 | 5_200 => self.say(Uplink::Command(Command::Engage)),
-            5_900 => self.say(Uplink::Command(Command::Kill)),
-            _ => (),
-        }
-        let mut bytes = self.take();
-        match tick % 97 {
-            13 => bytes.truncate(bytes.len() / 2),
-            31 => bytes.extend_from_slice(b"\xFD\xFDnoise\x00\xFF"),
-            53 => bytes.iter_mut().skip(20).take(1).for_each(|byte| *byte ^= 0x10),
-            _ => (),
-        }
-        bytes
+    let mut bytes = station.take();
+    match tick % 97 {
+        13 => bytes.truncate(bytes.len() / 2),
+        31 => bytes.extend_from_slice(b"\xFD\xFDnoise\x00\xFF"),
+        53 => bytes.iter_mut().skip(20).take(1).for_each(|byte| *byte ^= 0x10),
+        _ => (),
     }
+    bytes
 }
 
 /// Some motion near hover in which every subsystem has something to do; `t` in seconds.

@@ -8,7 +8,7 @@
 //! Two images, two ways:
 //!
 //! * [`Emulator`] flies the `pil` image in lockstep: one [exchange](Emulator::exchange) of bytes is one control tick.
-//!   Time stands still while the host thinks, so every run gives the same bytes.
+//!   Time stands still while the host thinks, so every run gives the same bytes. [`Twins`] compare them with the host's.
 //! * [`Board`] boots the very `flight` image and talks to its USART1. A [debugger](gdb) lends the emulated chip the
 //!   clock tree's status bits, which it lacks.
 //!
@@ -32,9 +32,11 @@ pub mod exercise;
 pub mod gdb;
 mod image;
 mod qemu;
+mod twins;
 pub mod worst;
 
 pub use board::Board;
 pub use emulator::{Emulator, Reply};
 pub use error::Error;
 pub use image::Image;
+pub use twins::{Comparison, Twins};

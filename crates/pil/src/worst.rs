@@ -5,9 +5,9 @@
 //! ticks, from wherever the ones before it have left the estimates. It finds a bad tick, and does not prove that there is no
 //! worse one.
 
-use crate::exercise::Station;
 use crate::{Emulator, Error};
 use afbc_link::{Command, Uplink};
+use afbc_sim::in_the_loop::Station;
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 use rand_xoshiro::SplitMix64;
@@ -53,7 +53,7 @@ pub fn search(emulator: Emulator, seed: u64, candidates: u64) -> Result<Worst, E
         for tick in 0..2 * HOLD {
             // The monitor trips all the time.
             if tick == 0 {
-                flight.station.say(Uplink::Command(Command::Engage));
+                flight.station.say(&Uplink::Command(Command::Engage));
             }
             let (state, setpoint) = flight.inputs(&numbers, tick >= HOLD);
             match flight.fly(state, setpoint)? {
@@ -122,8 +122,8 @@ impl Flight {
     /// One tick; what it took, if the motors were on.
     fn fly(&mut self, state: State, setpoint: Setpoint) -> Result<Option<u32>, Error> {
         self.tick += 1;
-        self.station.say(Uplink::State { sent_us: self.tick * 1000, state });
-        self.station.say(Uplink::Setpoint(setpoint));
+        self.station.say(&Uplink::State { sent_us: self.tick * 1000, state });
+        self.station.say(&Uplink::Setpoint(setpoint));
         let reply = self.emulator.exchange(&self.station.take())?;
         Ok((reply.throttles != [0; 4]).then_some(reply.instructions))
     }
@@ -132,7 +132,7 @@ impl Flight {
     fn arm(&mut self) -> Result<(), Error> {
         for tick in 0..3 * REST {
             if tick >= REST && tick.is_multiple_of(10) {
-                self.station.say(Uplink::Command(Command::Arm));
+                self.station.say(&Uplink::Command(Command::Arm));
             }
             if self.fly(State::default(), Setpoint::default())?.is_some() {
                 return Ok(());

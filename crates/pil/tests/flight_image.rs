@@ -6,10 +6,11 @@ mod common;
 use afbc_flight_core::Refusal;
 use afbc_link::{Address, Answer, Command, Decoder, Downlink, Health, Uplink};
 use afbc_onboard::CLOCK_FAILED;
+use afbc_sim::in_the_loop::Station;
 use common::start_or_skip;
 use pil::budget::Linked;
 use pil::clock_tree::{FLASH_ACR, RCC_CFGR, RCC_PLLCFGR};
-use pil::exercise::{Station, motion};
+use pil::exercise::motion;
 use pil::gdb::{PC, SP, XPSR};
 use pil::{Board, Image};
 use std::collections::HashSet;
@@ -69,9 +70,9 @@ impl Talk {
             // before the command, to be fresh when that arrives.
             if heard.time_us >= spoke_us + EVERY_US {
                 let (state, setpoint) = motion(0.0);
-                self.station.say(Uplink::Setpoint(setpoint));
-                self.station.say(Uplink::State { sent_us: heard.time_us, state });
-                command.iter().for_each(|command| self.station.say(Uplink::Command(*command)));
+                self.station.say(&Uplink::Setpoint(setpoint));
+                self.station.say(&Uplink::State { sent_us: heard.time_us, state });
+                command.iter().for_each(|command| self.station.say(&Uplink::Command(*command)));
                 self.spoke_us = heard.time_us;
                 self.board.send(&self.station.take()).unwrap();
             }

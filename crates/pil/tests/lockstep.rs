@@ -3,16 +3,16 @@
 
 mod common;
 
-use afbc_flight_core::{Inbox, Mode};
-use afbc_onboard::{Comms, Flight};
+use afbc_flight_core::Mode;
+use afbc_sim::in_the_loop::{Host, Station, Tick};
 use common::start_or_skip;
-use pil::exercise::{Station, TICKS};
+use pil::exercise::{TICKS, bytes_of_tick};
 use pil::{Emulator, Image, Reply};
 
 /// All replies of one flight.
 fn fly(mut emulator: Emulator) -> Vec<Reply> {
     let mut station = Station::default();
-    (0..TICKS).map(|tick| emulator.exchange(&station.bytes_of_tick(tick)).unwrap()).collect()
+    (0..TICKS).map(|tick| emulator.exchange(&bytes_of_tick(&mut station, tick)).unwrap()).collect()
 }
 
 #[test]
@@ -20,16 +20,10 @@ fn every_bit_is_the_hosts() {
     let Some(emulator) = start_or_skip(Image::Pil, |elf| Emulator::start(&elf)) else { return };
     let replies = fly(emulator);
 
-    let (mut flight, mut comms, mut inbox) = (Flight::new().unwrap(), Comms::new(), Inbox::default());
-    let mut station = Station::default();
+    let (mut host, mut station) = (Host::new().unwrap(), Station::default());
     let mut modes = Vec::new();
     for (tick, reply) in replies.iter().enumerate() {
-        let news = comms.receive(&station.bytes_of_tick(tick as u64));
-        inbox.post(&news);
-        let report = flight.tick(reply.time_us, &inbox.take());
-        let mut bytes = Vec::new();
-        comms.report(&report, reply.cycles, |frame| bytes.extend_from_slice(frame));
-
+        let Tick { report, bytes } = host.tick(&bytes_of_tick(&mut station, tick as u64), reply.time_us, reply.cycles);
         assert_eq!(report.throttles, reply.throttles, "throttles of tick {tick}");
         assert_eq!(bytes, reply.bytes, "bytes of tick {tick}");
         assert_eq!(report.health.rate.off_ticks(), 0, "tick {tick} came at the wrong time");
@@ -60,7 +54,7 @@ fn the_tick_keeps_its_time_on_any_processor() {
         let start = |elf: std::path::PathBuf| Emulator::start_slower(&elf, slower);
         let Some(mut emulator) = start_or_skip(Image::Pil, start) else { return };
         let mut station = Station::default();
-        let ticks = (0..2_500).map(|tick| emulator.exchange(&station.bytes_of_tick(tick)).unwrap());
+        let ticks = (0..2_500).map(|tick| emulator.exchange(&bytes_of_tick(&mut station, tick)).unwrap());
         let times: Vec<u64> = ticks.map(|reply| reply.time_us).collect();
         // From interrupt to tick, some 300 instructions.
         let latest_us = 10 << slower;

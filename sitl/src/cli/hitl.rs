@@ -3,8 +3,9 @@
 use super::in_the_loop::{Flying, Recorder, outcome};
 use super::target::Target;
 use super::terminal::{Failure, print};
+use crate::serial::{self, Serial};
 use afbc_sim::flight::Sample;
-use afbc_sim::in_the_loop::{self, End, Pace, Serial, Station};
+use afbc_sim::in_the_loop::{self, End, Pace, Station};
 use clap::Args;
 use std::ops::ControlFlow;
 use std::process::ExitCode;
@@ -41,7 +42,7 @@ impl Hitl {
     /// Flies, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let Some(port) = self.port.filter(|_| !self.list) else {
-            let ports = in_the_loop::ports()?;
+            let ports = serial::ports()?;
             print(&if ports.is_empty() { "no serial port\n".into() } else { ports.join("\n") + "\n" })?;
             return Ok(ExitCode::SUCCESS);
         };

@@ -1,9 +1,10 @@
 //! Measures what the firmware costs and writes the table of `docs/budgets.md`; with `--check`, writes nothing. Either
 //! way it fails if a budget is passed. Both images must have been built.
 
+use afbc_sim::in_the_loop::Station;
 use pil::beside::Beside;
 use pil::budget::{FRAME_BYTES, LEVELS, Linked, TICK_INSTRUCTIONS_MAX};
-use pil::exercise::{Station, TICKS};
+use pil::exercise::{TICKS, bytes_of_tick};
 use pil::worst::search;
 use pil::{Emulator, Error, Image};
 use std::path::Path;
@@ -125,7 +126,7 @@ fn fly() -> Result<[u64; 4], Error> {
     let mut station = Station::default();
     let (mut min, mut sum, mut count, mut max, mut stack) = (u64::MAX, 0, 0, 0, 0);
     for tick in 0..TICKS {
-        let reply = emulator.exchange(&station.bytes_of_tick(tick))?;
+        let reply = emulator.exchange(&bytes_of_tick(&mut station, tick))?;
         stack = reply.stack_bytes.into();
         if reply.throttles != [0; 4] {
             let instructions = reply.instructions.into();

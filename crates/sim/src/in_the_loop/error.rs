@@ -2,7 +2,6 @@
 
 use afbc_types::OutOfRange;
 use std::fmt;
-use std::io;
 
 /// Why a flight did not begin or come to its end. The text is one line for people.
 #[derive(Debug)]
@@ -22,12 +21,8 @@ pub enum Error {
     NotArmed(String),
     /// A parameter out of range.
     OutOfRange(OutOfRange),
-    /// The emulator, or what it needs.
-    Pil(pil::Error),
-    /// The serial port could not be opened or set up.
-    Port(serialport::Error),
-    /// The serial port failed in flight.
-    Link(io::Error),
+    /// The autopilot is gone, and why.
+    Autopilot(Box<dyn std::error::Error + Send + Sync>),
     /// The log could not be written.
     Log(csv::Error),
 }
@@ -48,11 +43,7 @@ impl fmt::Display for Error {
             }
             Error::NotArmed(reason) => write!(f, "the vehicle did not arm: {reason}"),
             Error::OutOfRange(error) => error.fmt(f),
-            Error::Pil(error) => error.fmt(f),
-            Error::Port(error) => {
-                write!(f, "the serial port cannot be opened ({error}); `sitl hitl --list` shows those there are")
-            }
-            Error::Link(error) => write!(f, "the serial port failed ({error}); check the cable"),
+            Error::Autopilot(error) => error.fmt(f),
             Error::Log(error) => write!(f, "the log cannot be written ({error})"),
         }
     }
@@ -63,12 +54,6 @@ impl std::error::Error for Error {}
 impl From<OutOfRange> for Error {
     fn from(error: OutOfRange) -> Self {
         Error::OutOfRange(error)
-    }
-}
-
-impl From<pil::Error> for Error {
-    fn from(error: pil::Error) -> Self {
-        Error::Pil(error)
     }
 }
 

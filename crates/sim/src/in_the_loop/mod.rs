@@ -4,8 +4,8 @@
 //! # Reading order
 //!
 //! 1. [`Autopilot`]: what takes bytes and gives bytes, once a millisecond.
-//! 2. [`Host`]: the firmware's code in this process. [`Twins`]: the emulated processor and the host side by side, compared
-//!    bit for bit. [`Serial`]: a board at the end of a serial port.
+//! 2. [`Host`]: the firmware's code in this process. Other programs bring an emulated processor, or a board at the end of a
+//!    serial port.
 //! 3. [`Station`]: tracker, commander and listener in one, the other end of the link.
 //! 4. [`fly()`]: arms, lets the vehicle go, flies a scenario, disarms. [`Pace`] is how often it speaks.
 //!
@@ -20,10 +20,8 @@ mod host;
 mod log;
 mod pace;
 mod report;
-mod serial;
 mod spread;
 mod station;
-mod twins;
 
 #[cfg(test)]
 mod tests;
@@ -35,7 +33,5 @@ pub use host::{Host, Tick};
 pub use log::Log;
 pub use pace::Pace;
 pub use report::tracking;
-pub use serial::{Serial, ports};
 pub use spread::Spread;
 pub use station::{Heard, Station};
-pub use twins::{Comparison, Twins};

@@ -1,8 +1,8 @@
 //! The processor beside the host.
 
-use super::{Autopilot, Error, Host, Spread, Tick};
+use crate::emulator::{Emulator, Reply};
+use afbc_sim::in_the_loop::{Autopilot, Error, Host, Spread, Tick};
 use afbc_types::OutOfRange;
-use pil::{Emulator, Reply};
 
 /// The emulated processor flies; the host gets the same bytes at the same times, and every output of every tick is
 /// compared. As long as none differs, this is also what the host alone would have flown: the loop has no other input.
@@ -52,7 +52,7 @@ impl Twins {
 
 impl Autopilot for Twins {
     fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error> {
-        let reply = self.emulator.exchange(uplink)?;
+        let reply = self.emulator.exchange(uplink).map_err(|error| Error::Autopilot(error.into()))?;
         // Times are the processor's: they are measured, not computed.
         let tick = self.host.tick(uplink, reply.time_us, reply.cycles);
         self.comparison.add(&reply, &tick);

@@ -1,0 +1,52 @@
+//! The flight in the emulator.
+
+use crate::cli::in_the_loop::{Flying, Recorder, outcome};
+use crate::cli::terminal::{Failure, print};
+use afbc_sim::flight::Sample;
+use afbc_sim::in_the_loop::{self, Pace, Station};
+use afbc_sim::scenario::Scenario;
+use pil::{Comparison, Emulator, Image, Twins};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Flies `scenario` by `image`, or by the one that belongs to this source, and prints how that went.
+pub(super) fn fly(scenario: &Scenario, flying: &Flying, image: Option<PathBuf>) -> Result<ExitCode, Failure> {
+    let mut recorder = Recorder::new(scenario, flying)?;
+    let image = image.map_or_else(|| Image::Pil.build(), Ok)?;
+    let mut twins = Twins::new(Emulator::start(&image)?)?;
+
+    let start = Instant::now();
+    let observe = |sample: &Sample| recorder.observe(sample);
+    let end = in_the_loop::fly(scenario, &mut Station::new(), &mut twins, Pace::LOCKSTEP, observe)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let comparison = twins.comparison();
+    let metrics = recorder.finish()?;
+
+    print(&format!(
+        "{}: {} s, {} plant, the firmware on an emulated Cortex-M4F in lockstep\n\n{}\n{}",
+        scenario.name,
+        scenario.duration_s,
+        scenario.model.name(),
+        figures(comparison, seconds),
+        outcome(scenario, &metrics, &end)?,
+    ))?;
+    let good = comparison.differing_bits == 0 && end.lost.is_none();
+    Ok(ExitCode::from(u8::from(!good)))
+}
+
+fn figures(comparison: &Comparison, seconds: f64) -> String {
+    let Comparison { ticks, armed_ticks, bits, differing_ticks, differing_bits, .. } = comparison;
+    let Comparison { first_difference, instructions, late_ticks, stack_bytes, .. } = comparison;
+    let first = first_difference.map_or(String::new(), |tick| format!(", the first is tick {tick}"));
+    let [min, mean, max] = [instructions.min(), instructions.mean(), instructions.max()];
+    let rate = *ticks as f64 / seconds;
+    format!(
+        "ticks                {ticks}, {armed_ticks} of them armed, {rate:.0} a second\n\
+         differing ticks      {differing_ticks}{first}\n\
+         differing bits       {differing_bits} of {bits}\n\
+         instructions a tick  min {min:.0}, mean {mean:.0}, max {max:.0}\n\
+         late ticks           {late_ticks}\n\
+         stack used           {stack_bytes} bytes\n"
+    )
+}

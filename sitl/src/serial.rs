@@ -1,0 +1,214 @@
+//! A board at the end of a serial port.
+
+use afbc_link::Command;
+use afbc_sim::in_the_loop::{Autopilot, Error, Station};
+use serialport::SerialPort;
+use std::io;
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// One exchange.
+const PERIOD: Duration = Duration::from_millis(1);
+/// Longest wait between two looks at what has arrived.
+const NAP: Duration = Duration::from_micros(200);
+/// How long the port may take to accept what is written.
+const WRITE_TIMEOUT: Duration = Duration::from_millis(200);
+/// How often a vehicle that is left is told to disarm: one frame may get lost.
+const FAREWELLS: usize = 3;
+
+/// A board, in real time. Dropping it disarms the vehicle, whatever has happened.
+pub(crate) struct Serial {
+    port: Box<dyn SerialPort>,
+    /// When the millisecond under way is over.
+    deadline: Option<Instant>,
+    late_max: Duration,
+}
+
+impl Serial {
+    /// Opens the port `device` at `baud`, 8N1.
+    ///
+    /// # Errors
+    /// One line for people.
+    pub(crate) fn open(device: &str, baud: u32) -> Result<Self, String> {
+        Ok(Serial::new(serialport::new(device, baud).timeout(WRITE_TIMEOUT).open().map_err(no_port)?))
+    }
+
+    /// Takes a port that is open.
+    pub(crate) fn new(port: Box<dyn SerialPort>) -> Self {
+        Serial { port, deadline: None, late_max: Duration::ZERO }
+    }
+
+    /// The longest that this side was behind real time: states are late by as much.
+    pub(crate) fn late_max(&self) -> Duration {
+        self.late_max
+    }
+
+    /// Gives `hear` what arrives until `deadline`.
+    fn listen(&mut self, deadline: Instant, hear: &mut dyn FnMut(&[u8])) -> io::Result<()> {
+        let mut buffer = [0; 4096];
+        loop {
+            if self.port.bytes_to_read()? > 0 {
+                let length = self.port.read(&mut buffer)?;
+                hear(buffer.get(..length).unwrap_or_default());
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(());
+            }
+            thread::sleep(left.min(NAP));
+        }
+    }
+}
+
+impl Autopilot for Serial {
+    fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error> {
+        let deadline = *self.deadline.get_or_insert_with(Instant::now);
+        self.listen(deadline, hear).map_err(failed)?;
+        self.late_max = self.late_max.max(deadline.elapsed());
+        // From deadline to deadline, so that a delay is caught up with.
+        self.deadline = Some(deadline + PERIOD);
+        self.port.write_all(uplink).map_err(failed)
+    }
+}
+
+impl Drop for Serial {
+    fn drop(&mut self) {
+        let mut station = Station::new();
+        (0..FAREWELLS).for_each(|_| station.command(Command::Kill));
+        // There is nobody left to tell if this fails; the vehicle comes down by itself once no more states come.
+        let _ = self.port.write_all(&station.take());
+        let _ = self.port.flush();
+    }
+}
+
+/// The names of all serial ports.
+///
+/// # Errors
+/// One line for people.
+pub(crate) fn ports() -> Result<Vec<String>, String> {
+    let ports = serialport::available_ports().map_err(no_port)?;
+    Ok(ports.into_iter().map(|port| port.port_name).collect())
+}
+
+fn no_port(error: serialport::Error) -> String {
+    format!("the serial port cannot be opened ({error}); `sitl hitl --list` shows those there are")
+}
+
+fn failed(error: io::Error) -> Error {
+    Error::Autopilot(format!("the serial port failed ({error}); check the cable").into())
+}
+
+/// A pseudo-terminal is a serial port without a wire. Its other end ticks once for each millisecond that [`Serial`] waits,
+/// so that a busy machine slows both down and disturbs neither.
+#[cfg(all(test, unix))]
+#[allow(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::*;
+    use afbc_sim::in_the_loop::{End, Host, Pace, fly};
+    use afbc_sim::scenario::{Scenario, built_in};
+    use core::ops::ControlFlow;
+    use serialport::TTYPort;
+    use std::io::{Read, Write};
+
+    fn scenario(name: &str, duration_s: f64) -> Scenario {
+        Scenario { duration_s, ..built_in(name).unwrap().scenario().unwrap() }
+    }
+
+    /// The host's autopilot behind a serial port.
+    struct Board {
+        host: Host,
+        port: TTYPort,
+        /// A pseudo-terminal ends with the last program that uses it, and what is in it is lost; a wire does not.
+        _wire: TTYPort,
+        armed: bool,
+    }
+
+    /// The port, and the board that ticks after each exchange over it.
+    struct Wired<'a> {
+        serial: Serial,
+        board: &'a mut Board,
+    }
+
+    impl Board {
+        /// The board, and the port that leads to it.
+        fn new() -> (Self, Serial) {
+            let (here, there) = TTYPort::pair().unwrap();
+            let wire = there.try_clone_native().unwrap();
+            let board = Board { host: Host::new().unwrap(), port: here, _wire: wire, armed: false };
+            (board, Serial::new(Box::new(there)))
+        }
+
+        fn tick(&mut self) {
+            let mut buffer = [0; 4096];
+            let length = if self.port.bytes_to_read().unwrap() > 0 { self.port.read(&mut buffer).unwrap() } else { 0 };
+            let tick = self.host.next_tick(buffer.get(..length).unwrap());
+            self.armed = tick.report.mode.armed();
+            self.port.write_all(&tick.bytes).unwrap();
+        }
+    }
+
+    impl Autopilot for Wired<'_> {
+        fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error> {
+            self.serial.exchange(uplink, hear)?;
+            self.board.tick();
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_flight_over_a_serial_port() {
+        let (mut board, serial) = Board::new();
+        let mut wired = Wired { serial, board: &mut board };
+        let (mut station, mut furthest_m) = (Station::new(), 0.0_f64);
+        let scenario = scenario("hover", 2.0);
+        let start = std::time::Instant::now();
+        let end = fly(&scenario, &mut station, &mut wired, Pace::at(921_600).unwrap(), |sample| {
+            furthest_m = furthest_m.max((sample.motion.position_m - sample.reference.position_m).norm());
+            ControlFlow::Continue(())
+        });
+        assert_eq!(end.unwrap(), End { lost: None, interrupted: false, disarmed: true });
+        assert!(start.elapsed() > Duration::from_secs(3), "in real time: a second to arm, two to fly");
+        let start_m = (scenario.initial.position_m - scenario.trajectory.at(0.0).position_m).norm();
+        assert!(furthest_m < start_m + 0.1, "{furthest_m} m away, {start_m} m at the start");
+
+        let (here, there) = (station.counters(), station.heard().health.unwrap().link);
+        for counters in [here, &there] {
+            assert_eq!((counters.bad_checksum, counters.skipped_bytes, counters.lost), (0, 0, 0));
+        }
+        assert!(there.received > 750, "a state every 4 ms: {}", there.received);
+        assert!(station.heard().rotor_commands > 750, "each of them is answered");
+        assert!(station.round_trip_ms().count() > 20 && station.unanswered() < 3, "{:?}", station.round_trip_ms());
+    }
+
+    #[test]
+    fn a_port_that_is_dropped_disarms() {
+        let (mut board, serial) = Board::new();
+        let mut wired = Wired { serial, board: &mut board };
+        let flight = std::panic::AssertUnwindSafe(|| {
+            let mut steps = 0;
+            fly(&scenario("hover", 2.0), &mut Station::new(), &mut wired, Pace::at(921_600).unwrap(), |_| {
+                steps += 1;
+                assert!(steps < 200, "on purpose: a bug in flight");
+                ControlFlow::Continue(())
+            })
+        });
+        assert!(std::panic::catch_unwind(flight).is_err());
+        let Wired { serial, board } = wired;
+        assert!(board.armed);
+        drop(serial);
+        // A tick for each piece of what is left on the wire, however long that takes to come: far fewer than the 2250 after
+        // which it would give up by itself.
+        let start = std::time::Instant::now();
+        let mut ticks = 0;
+        while board.armed && ticks < 200 {
+            assert!(start.elapsed() < Duration::from_secs(60), "nothing more comes");
+            if board.port.bytes_to_read().unwrap() > 0 {
+                board.tick();
+                ticks += 1;
+            } else {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+        assert!(!board.armed);
+    }
+}
