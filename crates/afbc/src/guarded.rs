@@ -7,7 +7,7 @@ use crate::integral::{Integral, IntegralBackstepping};
 use crate::model::Model;
 use crate::monitor::{Bounds, Figures, Monitor};
 use crate::safeguards::THETA_MAX;
-use afbc_control::{Action, Errors, Estimate, FlightController, Mixer, Trace, Trip, math};
+use afbc_control::{Action, Estimate, FlightController, Mixer, Trace, Trip, math};
 use afbc_types::{Axis, OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
 use nalgebra::Vector3;
 
@@ -36,19 +36,17 @@ struct StandIn {
     action: Action,
 }
 
-/// What the other law goes on from.
+/// The attitude behind the last inputs, and its rates: with those, what the other law goes on from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Last {
-    inputs: PerAxis<f32>,
-    /// The attitude behind them, and its rates.
     attitude_rad: Vector3<f32>,
     rates_rad_s: Vector3<f32>,
 }
 
 impl Last {
     #[inline]
-    fn new(inputs: PerAxis<f32>, state: &State) -> Self {
-        Last { inputs, attitude_rad: state.attitude_rad, rates_rad_s: state.rates_rad_s }
+    fn new(state: &State) -> Self {
+        Last { attitude_rad: state.attitude_rad, rates_rad_s: state.rates_rad_s }
     }
 }
 
@@ -124,19 +122,19 @@ impl Guarded {
     ) -> &'a Action {
         let StandIn { cascade, action } = memory.get_or_insert_with(|| {
             let hover_thrust_n = Some(self.adaptive.hover_thrust_n(afbc));
-            let resume = |axis| Integral { value: 0.0, resume: Some(*tripped.last.inputs.get(axis)), hover_thrust_n };
+            let resume = |axis| Integral { value: 0.0, resume: Some(*afbc.inputs.get(axis)), hover_thrust_n };
             StandIn { cascade: afbc.handed_over(PerAxis::from_fn(resume)), action: Action::default() }
         });
         *action = self.fallback.cascade(cascade, state, setpoint, fresh);
         action.health.trip = Some(tripped.trip);
-        tripped.last = Last::new(cascade.inputs, state);
+        tripped.last = Last::new(state);
         action
     }
 
-    /// What AFBC must have learnt to go on from the last inputs.
-    fn resumed(&self, last: &Last, errors: &PerAxis<Errors>) -> PerAxis<Estimate> {
-        let Last { inputs, attitude_rad: eta, rates_rad_s: eta_dot } = last;
-        PerAxis::from_fn(|axis| {
+    /// The flight that `cascade` is in with what AFBC must have learnt to go on from its last inputs.
+    fn resumed<E>(&self, last: &Last, cascade: &Cascade<E>) -> Cascade<Estimate> {
+        let (Last { attitude_rad: eta, rates_rad_s: eta_dot }, Cascade { inputs, errors, .. }) = (last, cascade);
+        cascade.handed_over(PerAxis::from_fn(|axis| {
             let x = match axis {
                 Axis::Roll => [eta.x, eta_dot.x],
                 Axis::Pitch => [eta.y, eta_dot.y],
@@ -144,7 +142,7 @@ impl Guarded {
             };
             let norm_max = self.monitor.theta_start(axis);
             self.adaptive.law().resumed(axis, *inputs.get(axis), x, errors.get(axis), norm_max)
-        })
+        }))
     }
 }
 
@@ -167,10 +165,10 @@ impl FlightController for Guarded {
         }
         let action = self.adaptive.cascade(afbc, state, setpoint, fresh);
         // On the ground a law may ask for less than nothing, for as long as it likes.
-        if !self.adaptive.stands(afbc) {
-            if let Some(trip) = self.monitor.watch(figures, afbc, action.health.saturated) {
-                *tripped = Some(Tripped { trip, last: Last::new(afbc.inputs, state) });
-            }
+        if !self.adaptive.stands(afbc)
+            && let Some(trip) = self.monitor.watch(figures, afbc, action.health.saturated)
+        {
+            *tripped = Some(Tripped { trip, last: Last::new(state) });
         }
         action
     }
@@ -185,8 +183,8 @@ impl FlightController for Guarded {
     fn engage(&self, memory: &mut Memory) -> bool {
         let Memory { afbc, tripped: Some(Tripped { last, .. }), stand_in, .. } = memory else { return false };
         let afbc = match stand_in {
-            Some(StandIn { cascade, .. }) => cascade.handed_over(self.resumed(last, &cascade.errors)),
-            None => afbc.handed_over(self.resumed(last, &afbc.errors)),
+            Some(StandIn { cascade, .. }) => self.resumed(last, cascade),
+            None => self.resumed(last, afbc),
         };
         *memory = Memory { afbc, ..Memory::default() };
         true

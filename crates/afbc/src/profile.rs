@@ -101,7 +101,6 @@ impl Profile {
                 anti_windup: true,
                 freeze_on_ground: true,
                 bumpless: true,
-                ..paper
             },
         }
     }
