@@ -88,3 +88,8 @@ impl Row<'_> {
         format!("{}.csv, row {}", self.table.name, self.index)
     }
 }
+
+/// The code in the README.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;
