@@ -11,7 +11,7 @@ use afbc_plant::{Drag, Model, Plant, Realism, Rotors, Sensing, Spread, Turbulenc
 use afbc_sim::case::Case;
 use afbc_sim::contender::ControllerKind;
 use afbc_sim::contender::{Build, Contender};
-use afbc_sim::flight::{Flight, fly};
+use afbc_sim::flight::{Alone, Pilot, World, fly};
 use afbc_sim::paper::scenario;
 use afbc_sim::scenario::Scenario;
 use afbc_types::{PerAxis, RotorSpeeds, Setpoint, State};
@@ -111,13 +111,13 @@ fn closed_loop_of(bencher: Bencher, scenario: &Scenario, profile: Profile, gains
     let controller = || gains.controller(scenario.vehicle.to_f32(), settings).unwrap();
     bencher
         .counter(ItemsCount::new(STEPS))
-        .with_inputs(|| Flight::new(scenario, controller()).unwrap())
-        .bench_local_refs(|flight| {
+        .with_inputs(|| (World::new(scenario, 0.001).unwrap(), Alone::new(controller())))
+        .bench_local_refs(|(world, pilot)| {
             for _ in 0..STEPS {
-                let sample = flight.control();
-                flight.advance(&sample.action);
+                let Ok(sample) = pilot.step(world);
+                world.advance(&sample.action.speeds);
             }
-            flight.control().motion
+            world.look().motion
         });
 }
 

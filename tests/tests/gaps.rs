@@ -10,11 +10,12 @@ use afbc_control::{Errors, Estimate, FlightController, Screened};
 use afbc_plant::{Environment, Model, Motion, Plant};
 use afbc_sim::case::{Case, Reading};
 use afbc_sim::contender::{Contender, ControllerKind, Law as Gains};
-use afbc_sim::flight::{Flight, LOST_DISTANCE_M, Sample};
+use afbc_sim::flight::{Alone, End, Sample, World, lockstep};
 use afbc_sim::paper::scenario;
 use afbc_sim::run::Run;
 use afbc_sim::scenario::Scenario;
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
+use core::ops::ControlFlow;
 use nalgebra::Vector3;
 
 const CALM: Case = Case { reading: None, uncertainty: None };
@@ -56,19 +57,13 @@ impl<L: Law> Law for Rateless<L> {
 /// Flies the scenario and tells whether the law held it: upright to the end and nearer than 1 m after 5 s.
 fn flies<L: Law>(scenario: &Scenario, settings: Settings, law: L) -> bool {
     let controller = Controller::new(scenario.vehicle.to_f32(), settings, law).unwrap();
-    let mut flight = Flight::new(scenario, controller).unwrap();
-    loop {
-        let sample = flight.control();
+    let mut world = World::new(scenario, f64::from(settings.common.dt_s)).unwrap();
+    let near = |sample: &Sample| {
         let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
-        let tilt = sample.motion.attitude_rad.xy().amax();
-        // Written so that NaN is a loss.
-        let held =
-            tilt < core::f64::consts::FRAC_PI_2 && distance_m < if sample.time_s < 5.0 { LOST_DISTANCE_M } else { 1.0 };
-        if !held || sample.time_s >= scenario.duration_s {
-            return held;
-        }
-        flight.advance(&sample.action);
-    }
+        if sample.time_s < 5.0 || distance_m < 1.0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    };
+    let Ok(end) = lockstep(&mut world, &mut Alone::new(controller), scenario.duration_s, near);
+    end == End::default()
 }
 
 /// The paper's settings, but for the command filter.

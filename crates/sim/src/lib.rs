@@ -1,7 +1,6 @@
 //! World and pilots in lockstep: what is flown ([`scenario`]), by whom ([`contender`]), and how it went ([`run`]).
 #![forbid(unsafe_code)]
 
-pub mod aboard;
 pub mod case;
 pub mod contender;
 pub mod flight;

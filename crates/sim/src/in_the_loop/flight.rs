@@ -2,13 +2,11 @@
 
 use super::{Autopilot, Error, Heard, Pace, Station};
 use crate::contender::{Contender, ControllerKind, Law};
-use crate::flight::{Lost, Sample, lost};
+use crate::flight::{Lost, Pilot, Sample, View, World, lockstep};
 use crate::scenario::Scenario;
-use crate::trajectory::Reference;
 use afbc::Profile;
 use afbc_control::{Action, Trace};
 use afbc_link::{Answer, Command};
-use afbc_plant::{Measurement, Motion, Sensors};
 use afbc_types::{Parameters, PerAxis, RotorForces};
 use core::ops::ControlFlow;
 
@@ -76,82 +74,62 @@ pub fn fly(
     station: &mut Station,
     autopilot: &mut impl Autopilot,
     pace: Pace,
-    mut observe: impl FnMut(&Sample) -> ControlFlow<()>,
+    observe: impl FnMut(&Sample) -> ControlFlow<()>,
 ) -> Result<End, Error> {
     check(scenario)?;
-    let mut plant = scenario.plant(STEP_S)?;
+    let mut world = World::new(scenario, STEP_S)?;
     let mut line = Line {
         station,
         autopilot,
-        sensors: scenario.sensors(STEP_S)?,
-        measurement: None,
         pace,
+        thrust_factor_n_s2: scenario.vehicle.to_f32().thrust_factor_n_s2,
         now_ms: 0,
         silent_ms: 0,
+        has_armed: false,
     };
-    line.arm((&scenario.initial, &scenario.trajectory.at(0.0)))?;
-
-    let thrust_factor_n_s2 = scenario.vehicle.to_f32().thrust_factor_n_s2;
-    let steps = (scenario.duration_s / STEP_S).round() as u64;
-    let mut end = End { lost: None, interrupted: false, disarmed: false };
-    for step in 0..=steps {
-        let (time_s, motion, telemetry) = (plant.time_s(), plant.motion(), plant.telemetry());
-        let reference = scenario.trajectory.at(time_s);
-        // The tick that armed the vehicle was the first.
-        if step > 0 {
-            line.turn(&motion, &reference)?;
-        }
-        let heard = line.station.heard();
-        let forces = RotorForces(heard.speeds.0.map(|speed| thrust_factor_n_s2 * speed * speed));
-        let sample = Sample {
-            time_s,
-            motion,
-            measurement: line.measurement,
-            telemetry,
-            reference,
-            action: Action { speeds: heard.speeds, forces, ..Action::default() },
-            trace: Trace::default(),
-            estimates: PerAxis::default(),
-        };
-        end.interrupted = observe(&sample).is_break();
-        end.lost =
-            lost(&sample).or((!heard.armed).then_some("it disarmed in flight")).map(|reason| Lost { time_s, reason });
-        if end.interrupted || end.lost.is_some() {
-            break;
-        }
-        if step < steps {
-            plant.step(&heard.speeds, STEP_S);
-        }
-    }
-    let (time_s, motion) = (plant.time_s(), plant.motion());
-    end.disarmed = line.disarm((&motion, &scenario.trajectory.at(time_s)))?;
-    Ok(end)
+    let flight = lockstep(&mut world, &mut line, scenario.duration_s, observe)?;
+    let disarmed = line.disarm(&mut world)?;
+    Ok(End { lost: flight.lost, interrupted: flight.interrupted, disarmed })
 }
 
 /// A station that talks with an autopilot, a millisecond at a time.
 struct Line<'a, A> {
     station: &'a mut Station,
     autopilot: &'a mut A,
-    sensors: Option<Sensors>,
-    /// What they said last.
-    measurement: Option<Measurement>,
     pace: Pace,
+    thrust_factor_n_s2: f32,
     now_ms: u64,
     /// Since the last rotor command.
     silent_ms: u64,
+    has_armed: bool,
+}
+
+impl<A: Autopilot> Pilot for Line<'_, A> {
+    type Error = Error;
+
+    /// The tick that arms the vehicle is the first.
+    fn step(&mut self, world: &mut World) -> Result<Sample, Error> {
+        let view = if self.has_armed { self.turn(world)? } else { self.arm(world)? };
+        let speeds = self.station.heard().speeds;
+        let forces = RotorForces(speeds.0.map(|speed| self.thrust_factor_n_s2 * speed * speed));
+        Ok(view.sample(Action { speeds, forces, ..Action::default() }, Trace::default(), PerAxis::default()))
+    }
+
+    fn gave_up(&self) -> Option<&'static str> {
+        (!self.station.heard().armed).then_some("it disarmed in flight")
+    }
 }
 
 impl<A: Autopilot> Line<'_, A> {
     /// One millisecond: says what is due, hears what comes.
-    fn turn(&mut self, motion: &Motion, reference: &Reference) -> Result<(), Error> {
-        let Line { station, autopilot, sensors, measurement, pace, now_ms, silent_ms } = self;
-        *measurement = sensors.as_mut().map(|sensors| sensors.measure(motion));
-        let state = measurement.map_or(Some(motion.measure()), |m| m.fresh.then_some(m.state));
-        if let Some(state) = state.filter(|_| now_ms.is_multiple_of(pace.state_ms)) {
+    fn turn(&mut self, world: &mut World) -> Result<View, Error> {
+        let Line { station, autopilot, pace, now_ms, silent_ms, .. } = self;
+        let view = world.look();
+        if let Some(state) = view.state.filter(|_| now_ms.is_multiple_of(pace.state_ms)) {
             station.track(*now_ms * 1000, state);
         }
         if now_ms.is_multiple_of(pace.setpoint_ms) {
-            station.lead(reference.setpoint());
+            station.lead(view.reference.setpoint());
         }
         if pace.ping_ms.is_some_and(|ping_ms| now_ms.is_multiple_of(ping_ms)) {
             station.ping();
@@ -161,41 +139,44 @@ impl<A: Autopilot> Line<'_, A> {
         let (uplink, heard_before) = (station.take(), station.heard().rotor_commands);
         autopilot.exchange(&uplink, &mut |bytes| station.hear(bytes))?;
         *silent_ms = if station.heard().rotor_commands == heard_before { *silent_ms + 1 } else { 0 };
-        if *silent_ms > SILENT_MS { Err(Error::Silent) } else { Ok(()) }
+        if *silent_ms > SILENT_MS { Err(Error::Silent) } else { Ok(view) }
     }
 
-    /// Asks for `command` again and again, until it is `done` or `within_ms` is over. True if it is done.
+    /// Asks for `command` again and again, until it is `done` or `within_ms` is over; what was to be seen when it was done.
     fn ask(
         &mut self,
         command: Command,
-        (motion, reference): (&Motion, &Reference),
+        world: &mut World,
         within_ms: u64,
         done: fn(&Heard) -> bool,
-    ) -> Result<bool, Error> {
+    ) -> Result<Option<View>, Error> {
         for waited_ms in 0..within_ms {
             if waited_ms.is_multiple_of(ASK_EVERY_MS) {
                 self.station.command(command);
             }
-            self.turn(motion, reference)?;
+            let view = self.turn(world)?;
             if done(self.station.heard()) {
-                return Ok(true);
+                return Ok(Some(view));
             }
         }
-        Ok(false)
+        Ok(None)
     }
 
-    /// Arms a vehicle that is held at `place`, or that was left armed by whoever was here before.
-    fn arm(&mut self, place: (&Motion, &Reference)) -> Result<(), Error> {
-        if self.disarm(place)? && self.ask(Command::Arm, place, ARM_WITHIN_MS, |heard| heard.armed)? {
-            return Ok(());
+    /// Arms a vehicle that is held where it is, or that was left armed by whoever was here before.
+    fn arm(&mut self, world: &mut World) -> Result<View, Error> {
+        if self.disarm(world)?
+            && let Some(view) = self.ask(Command::Arm, world, ARM_WITHIN_MS, |heard| heard.armed)?
+        {
+            self.has_armed = true;
+            return Ok(view);
         }
         let reason = self.station.heard().refusal().unwrap_or("it does not answer");
         Err(Error::NotArmed(reason.into()))
     }
 
     /// True if the vehicle says that it has disarmed.
-    fn disarm(&mut self, place: (&Motion, &Reference)) -> Result<bool, Error> {
+    fn disarm(&mut self, world: &mut World) -> Result<bool, Error> {
         let done = |heard: &Heard| heard.answer == Some(Answer::Accepted) && !heard.armed;
-        self.ask(Command::Kill, place, DISARM_WITHIN_MS, done)
+        Ok(self.ask(Command::Kill, world, DISARM_WITHIN_MS, done)?.is_some())
     }
 }

@@ -1,14 +1,18 @@
 //! What is flown: one vehicle, one trajectory, one environment, the controllers to compare.
 
-use crate::aboard::ARMING_TILT;
 use crate::case::Case;
 use crate::contender::{Contender, ControllerKind};
 use crate::trajectory::Trajectory;
+use afbc_flight_core::ArmingLimits;
 use afbc_plant::{Environment, Model, Motion, Plant, Realism, Sensing, Sensors};
 use afbc_types::{OutOfRange, Parameters, Range};
 
 /// Accepted length of a flight \[s\].
 pub const DURATION: Range = Range::new("duration_s", 0.1, 36_000.0);
+
+/// Accepted roll and pitch of a vehicle that the flight core is to arm \[rad\].
+const ARMING_TILT: Range = Range::new("attitude_rad", -TILT_MAX, TILT_MAX);
+const TILT_MAX: f64 = ArmingLimits::TILT_MAX.range.max;
 
 /// An interval in which no state arrives: a link that is down.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +46,7 @@ pub struct Scenario {
     pub sensing: Sensing,
     /// When no state arrives at all.
     pub outages: Vec<Outage>,
-    /// Whether the controllers fly inside the [flight core](crate::aboard), as on board.
+    /// Whether the controllers fly inside the [flight core](crate::flight::Aboard), as on board.
     pub flight_core: bool,
     /// Of everything random. The same seed gives the same flight.
     pub seed: u64,
