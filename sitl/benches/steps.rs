@@ -47,7 +47,7 @@ fn recorded(model: Model, kind: ControllerKind) -> Vec<(State, Setpoint, RotorSp
 const PROFILE: Profile = Profile::Paper;
 
 fn backstepping() -> impl Build {
-    PerAxis::from_fn(|axis| PROFILE.gains().get(axis).backstepping)
+    PerAxis::from_fn(|axis| PROFILE.gains()[axis].backstepping)
 }
 
 fn controller<B: Build>(gains: &B, scenario: &Scenario) -> B::Controller {

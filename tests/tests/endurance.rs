@@ -35,7 +35,7 @@ impl Hover {
         let realism = Realism { rotors, seed: 11, ..Realism::default() };
         let start = Motion { position_m: Vector3::new(0.0, 0.0, 2.0), ..Motion::default() };
         let environment = Environment::calm(vehicle).unwrap();
-        let plant = Plant::with(Model::RigidBody, start, environment, &realism, STEP_S).unwrap();
+        let plant = Plant::with_realism(Model::RigidBody, start, environment, &realism, STEP_S).unwrap();
         let sensors = Sensors::new(&Sensing { noise: Spread::all(0.001), ..Sensing::default() }, 11, STEP_S).unwrap();
         let setpoint = Setpoint { position_m: Vector3::new(0.0, 0.0, 2.0), ..Setpoint::default() };
         Hover { controller, memory: Screened::default(), plant, sensors, setpoint }
@@ -57,7 +57,7 @@ impl Hover {
     /// |Theta_hat| and delta_hat of each subsystem.
     fn norms(&self) -> PerAxis<[f32; 2]> {
         let estimates = &self.memory.control.estimates;
-        PerAxis::from_fn(|axis| [estimates.get(axis).theta.norm(), estimates.get(axis).delta])
+        PerAxis::from_fn(|axis| [estimates[axis].theta.norm(), estimates[axis].delta])
     }
 }
 
@@ -72,12 +72,12 @@ fn estimates_of_the_profile_flight_stay_bounded_over_ten_hours() {
         assert!(furthest < 0.05, "hour {hour}: {furthest} m away");
         let norms = hover.norms();
         for axis in Axis::ALL {
-            let [theta, delta] = *norms.get(axis);
-            let safeguards = gains.get(axis).safeguards;
+            let [theta, delta] = norms[axis];
+            let safeguards = gains[axis].safeguards;
             assert!(theta <= 0.9 * safeguards.theta_max, "hour {hour}, {axis:?}: |Theta_hat| = {theta}");
             assert!((0.0..=safeguards.delta_max).contains(&delta), "hour {hour}, {axis:?}: delta_hat = {delta}");
             // Nothing creeps: an hour is 36 time constants of the leakage.
-            let [theta_then, delta_then] = *first.get(axis);
+            let [theta_then, delta_then] = first[axis];
             assert!((theta - theta_then).abs() <= 0.2 * theta_then.max(0.1), "{axis:?}: {theta_then} to {theta}");
             assert!((delta - delta_then).abs() <= 0.2 * delta_then.max(0.01), "{axis:?}: {delta_then} to {delta}");
         }

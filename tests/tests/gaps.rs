@@ -74,7 +74,7 @@ fn filtered(command_filter_rad_s: f32) -> Settings {
 /// Both laws with the paper's gains.
 fn laws() -> (Adaptive, Backstepping) {
     let gains = Profile::Paper.gains();
-    let alphas = PerAxis::from_fn(|axis| gains.get(axis).backstepping);
+    let alphas = PerAxis::from_fn(|axis| gains[axis].backstepping);
     (Adaptive::new(gains).unwrap(), Backstepping::new(&Parameters::PAPER.to_f32(), alphas).unwrap())
 }
 
@@ -174,7 +174,7 @@ fn a_fast_roll_leaves_the_estimates_finite() {
         assert!(command.speeds.0.iter().all(|w| w.is_finite()));
         for axis in Axis::ALL {
             assert!(
-                memory.control.estimates.get(axis).theta.iter().all(|theta| theta.is_finite()),
+                memory.control.estimates[axis].theta.iter().all(|theta| theta.is_finite()),
                 "{} at {rate} rad/s",
                 axis.name()
             );
@@ -191,7 +191,7 @@ fn trembling_mn(delta: f32, epsilon: f32) -> f64 {
     let mut gains = Profile::Paper.gains();
     for axis in Axis::ALL {
         // Nothing is learnt: the threshold is that of delta, not of how it grew.
-        *gains.get_mut(axis) = adaptive::Gains { gamma: 0.0, eta: 0.0, epsilon, ..*gains.get(axis) };
+        gains[axis] = adaptive::Gains { gamma: 0.0, eta: 0.0, epsilon, ..gains[axis] };
     }
     let law = Adaptive::new(gains).unwrap();
     let vehicle = Parameters::PAPER;
@@ -234,7 +234,7 @@ fn the_robust_term_becomes_a_relay_at_2_epsilon_over_g_dt() {
 }
 
 fn with_epsilon(epsilon: f32) -> Contender {
-    let gains = PerAxis::from_fn(|axis| adaptive::Gains { epsilon, ..*Profile::Paper.gains().get(axis) });
+    let gains = PerAxis::from_fn(|axis| adaptive::Gains { epsilon, ..Profile::Paper.gains()[axis] });
     Contender { law: Gains::Afbc(gains), ..afbc() }
 }
 

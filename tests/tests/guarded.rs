@@ -44,7 +44,7 @@ impl Bench {
         let rotors = Rotors { time_constant_s: 0.02, max_rad_s: 317.0, ..Rotors::default() };
         let environment = Environment::calm(Parameters::PAPER).unwrap();
         let realism = Realism { rotors, ..realism };
-        let plant = Plant::with(Model::RigidBody, Motion::default(), environment, &realism, STEP_S).unwrap();
+        let plant = Plant::with_realism(Model::RigidBody, Motion::default(), environment, &realism, STEP_S).unwrap();
         let sensors = Sensors::new(&Sensing { noise, ..Sensing::default() }, 1, STEP_S).unwrap();
         Bench { controller, memory: Screened::default(), plant, sensors }
     }

@@ -125,7 +125,7 @@ const FOREVER: i64 = i64::MAX;
 enum Then {
     /// Flies on, never farther from its reference than this \[m\].
     Flies(f64),
-    /// Rides, then flies on: never farther from its reference than the first, within the second for the last 2 s \[m\].
+    /// Coasts, then flies on: never farther from its reference than the first, within the second for the last 2 s \[m\].
     Recovers(f64, f64),
     /// Comes down at most this fast \[m/s\], and disarms on the ground.
     Lands(f64),
@@ -230,7 +230,7 @@ const CASES: &[Case] = &[
     // Requests.
     asked(&[(5_000, Disarm)], case("asked to disarm in flight", Hover(1.5), &[], 10_000, Flies(0.1))),
     asked(&[(5_000, Kill)], case("stopped in flight", Hover(1.5), &[], 10_000, Stops(5_000))),
-    asked(&[(3_100, Kill)], case("stopped while riding", Hover(1.5), &[(States, 3000..FOREVER, Drop)], 10_000, Stops(3_100))),
+    asked(&[(3_100, Kill)], case("stopped while coasting", Hover(1.5), &[(States, 3000..FOREVER, Drop)], 10_000, Stops(3_100))),
     asked(&[(3_600, Kill)], case("stopped while descending", Hover(1.5), &[(States, 3000..FOREVER, Drop)], 10_000, Stops(3_600))),
     asked(&[(3_600, Arm)], case("asked to arm while descending", Hover(2.0), &[(States, 3000..3500, Drop)], 15_000, Lands(0.6))),
     asked(&[(5_000, Arm)], case("asked to arm in flight", Hover(2.0), &[], 10_000, Flies(0.1))),
@@ -351,7 +351,8 @@ fn fly(case: &Case) -> Seen {
     let scenario = case.flight.scenario();
     let ground = Realism { contact: Some(Contact::PAPER), ..Realism::default() };
     let mut plant =
-        Plant::with(scenario.model, scenario.initial, scenario.environment.clone(), &ground, STEP_S).expect("in range");
+        Plant::with_realism(scenario.model, scenario.initial, scenario.environment.clone(), &ground, STEP_S)
+            .expect("in range");
     let (mut station, mut host) = (Station::new(), Host::new().expect("in range"));
     let (mut up, mut down) = (Air::new(case.faults), Air::new(case.faults));
     let first_ms = case.faults.iter().map(|(_, when, _)| when.start).min().unwrap_or(0);
@@ -433,7 +434,7 @@ fn wrong(case: &Case, seen: &Seen) -> Vec<String> {
         }
     };
     let modes: Vec<_> = seen.modes.iter().map(|(_, mode, _)| *mode).collect();
-    let rode = modes.contains(&Mode::Riding);
+    let coasted = modes.contains(&Mode::Coasting);
     let (last_ms, last_mode, _) = *seen.modes.last().expect("one at least");
     match case.then {
         Flies(within_m) => {
@@ -441,15 +442,15 @@ fn wrong(case: &Case, seen: &Seen) -> Vec<String> {
             must(format!("within {within_m} m"), seen.worst_m <= within_m);
         }
         Recovers(within_m, settled_m) => {
-            must("it rides".into(), rode && !modes.contains(&Mode::Descending));
+            must("it coasts".into(), coasted && !modes.contains(&Mode::Descending));
             must("it flies in the end".into(), last_mode == Mode::Flying);
             must(format!("within {within_m} m"), seen.worst_m <= within_m);
             must(format!("in the end within {settled_m} m"), seen.last_m <= settled_m);
         }
         Lands(within_m_s) | GivesUp(within_m_s) => {
             must(
-                "it rides, descends, disarms".into(),
-                modes.ends_with(&[Mode::Riding, Mode::Descending, Mode::Disarmed]),
+                "it coasts, descends, disarms".into(),
+                modes.ends_with(&[Mode::Coasting, Mode::Descending, Mode::Disarmed]),
             );
             let lands = matches!(case.then, Lands(_));
             must("it disarms on the ground, or in the air".into(), seen.touched_down_before == lands);
@@ -506,7 +507,7 @@ fn every_case_ends_as_it_should() {
     check(CASES);
 }
 
-/// An outage in any part of the paper's flight. What is ridden out is recovered from. What is not ends softly on the
+/// An outage in any part of the paper's flight. What is coasted through is recovered from. What is not ends softly on the
 /// ground, if the state comes back within a second; later than that, the attitude may be lost by then.
 #[test]
 fn an_outage_may_come_at_any_time() {

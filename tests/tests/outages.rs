@@ -1,4 +1,4 @@
-//! Scenarios with `flight_core`: a controller inside the flight core rides out what it would not survive alone.
+//! Scenarios with `flight_core`: a controller inside the flight core coasts through what it would not survive alone.
 #![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be flown must stop the test")]
 
 use afbc_sim::flight::{Lost, Sample, fly};

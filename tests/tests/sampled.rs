@@ -44,11 +44,11 @@ fn fly<C: FlightController>(scenario: &Scenario, controller: C, mut tracker: Tra
     for now_ms in 1..ARMED_MS + (scenario.duration_s * 1e3) as u64 {
         let reference = scenario.trajectory.at(plant.time_s());
         if let Some(state) = tracker.turn(now_ms, plant.motion().measure()) {
-            inbox.measure(state);
+            inbox.put_state(state);
         }
-        inbox.aim(Stamped { value: reference.setpoint(), at_us: now_ms * 1000 });
+        inbox.put_setpoint(Stamped { value: reference.setpoint(), at_us: now_ms * 1000 });
         if now_ms == ARMED_MS {
-            inbox.ask(Asked { request: Request::Arm, ticket: 0 });
+            inbox.request(Asked { request: Request::Arm, ticket: 0 });
         }
         let tick = vehicle.tick(&mut memory, now_ms * 1000, &inbox.take());
         if now_ms >= ARMED_MS {

@@ -120,6 +120,6 @@ fn a_perfect_hover_does_not_trip() {
             assert_eq!(command.health.trip, None, "{mass_kg} kg");
         }
         let learnt = Guarded::learnt(&memory.control);
-        assert!(Axis::ALL.iter().all(|axis| learnt.get(*axis).theta.norm().is_finite()));
+        assert!(Axis::ALL.iter().all(|axis| learnt[*axis].theta.norm().is_finite()));
     }
 }

@@ -196,8 +196,8 @@ impl Subsystem {
             robust: estimate.delta * s,
             proportional: proportional(self.gains.backstepping.alpha2, errors),
         };
-        let (lesson, leakage) = (safeguards.lesson(e2, unallocated), safeguards.leakage(e2));
-        (terms, Rate { first, second, theta: gamma * lesson, delta: eta * lesson * s, leakage })
+        let (error, leakage) = (safeguards.adaptation_error(e2, unallocated), safeguards.leakage(e2));
+        (terms, Rate { first, second, theta: gamma * error, delta: eta * error * s, leakage })
     }
 
     /// u, and what there is to learn from it.
@@ -255,7 +255,7 @@ impl Adaptive {
     /// What the subsystem must have learnt to want `input` for these errors, with an estimate spread over its rules;
     /// `x` is x_1, x_2 of an attitude.
     pub(crate) fn resumed(&self, axis: Axis, input: f32, x: [f32; 2], errors: &Errors, norm_max: f32) -> Estimate {
-        let Subsystem { gains, basis, .. } = self.subsystems.get(axis);
+        let Subsystem { gains, basis, .. } = &self.subsystems[axis];
         let fuzzy = input - proportional(gains.backstepping.alpha2, errors);
         spread(fuzzy, &basis.weights(fuzzy_inputs(axis, x, errors)), norm_max)
     }
@@ -266,14 +266,14 @@ impl Law for Adaptive {
 
     #[inline(always)]
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Estimate) -> (f32, Errors) {
-        let subsystem = self.subsystems.get(axis);
+        let subsystem = &self.subsystems[axis];
         let errors = tracking.errors(subsystem.gains.backstepping.alpha1);
         let inputs = fuzzy_inputs(axis, [tracking.x1, tracking.x2], &errors);
-        (subsystem.step(&errors, inputs, *context.unallocated.get(axis), context, estimate), errors)
+        (subsystem.step(&errors, inputs, context.unallocated[axis], context, estimate), errors)
     }
 
     fn alpha1(&self, axis: Axis) -> f32 {
-        self.subsystems.get(axis).gains.backstepping.alpha1
+        self.subsystems[axis].gains.backstepping.alpha1
     }
 
     fn start(&self, estimates: &mut PerAxis<Estimate>, weight_n: f32) {

@@ -84,7 +84,7 @@ impl Backstepping {
     pub fn new(vehicle: &Parameters, gains: PerAxis<Gains>) -> Result<Self, OutOfRange> {
         vehicle.validate()?;
         for axis in Axis::ALL {
-            gains.get(axis).validate()?;
+            gains[axis].validate()?;
         }
         Ok(Backstepping { gains, model: Model::new(vehicle) })
     }
@@ -96,11 +96,11 @@ impl Law for Backstepping {
 
     #[inline]
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, (): &mut ()) -> (f32, Errors) {
-        classical(self.gains.get(axis), tracking, &self.model.dynamics(axis, context))
+        classical(&self.gains[axis], tracking, &self.model.dynamics(axis, context))
     }
 
     fn alpha1(&self, axis: Axis) -> f32 {
-        self.gains.get(axis).alpha1
+        self.gains[axis].alpha1
     }
 
     fn learnt((): &()) -> Estimate {

@@ -210,8 +210,8 @@ impl<L: Law> Controller<L> {
         let hover_n = self.hover_thrust_n(memory);
         let Cascade { estimates, errors, .. } = memory;
         let mut input = |axis: Axis, tracking: Tracking| {
-            let (u, e) = self.law.input(axis, &tracking, &context, estimates.get_mut(axis));
-            *errors.get_mut(axis) = e;
+            let (u, e) = self.law.input(axis, &tracking, &context, &mut estimates[axis]);
+            errors[axis] = e;
             u
         };
 
@@ -315,6 +315,6 @@ impl<L: Law> FlightController for Controller<L> {
     }
 
     fn learnt(memory: &Self::Memory) -> PerAxis<Estimate> {
-        PerAxis::from_fn(|axis| L::learnt(memory.estimates.get(axis)))
+        PerAxis::from_fn(|axis| L::learnt(&memory.estimates[axis]))
     }
 }

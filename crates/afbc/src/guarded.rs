@@ -102,7 +102,7 @@ impl Guarded {
         let swing_n = 2.0 * math::min(hover_n, settings.common.rotor_force_max_n - hover_n);
         HOVER_AUTHORITY.check(swing_n * model.hover_gain(Axis::Roll))?;
         HOVER_AUTHORITY.check(swing_n * model.hover_gain(Axis::Pitch))?;
-        let fixed = PerAxis::from_fn(|axis| gains.get(axis).into());
+        let fixed = gains.map(|gains| gains.into());
         Ok(Guarded {
             adaptive: Controller::new(vehicle, settings, Adaptive::new(gains)?)?,
             fallback: Controller::new(vehicle, settings, IntegralBackstepping::new(&vehicle, fixed)?)?,
@@ -122,7 +122,7 @@ impl Guarded {
     ) -> &'a Action {
         let StandIn { cascade, action } = memory.get_or_insert_with(|| {
             let hover_thrust_n = Some(self.adaptive.hover_thrust_n(afbc));
-            let resume = |axis| Integral { value: 0.0, resume: Some(*afbc.inputs.get(axis)), hover_thrust_n };
+            let resume = |axis| Integral { value: 0.0, resume: Some(afbc.inputs[axis]), hover_thrust_n };
             StandIn { cascade: afbc.handed_over(PerAxis::from_fn(resume)), action: Action::default() }
         });
         *action = self.fallback.cascade(cascade, state, setpoint, fresh);
@@ -141,7 +141,7 @@ impl Guarded {
                 _ => [eta.z, eta_dot.z],
             };
             let norm_max = self.monitor.theta_start(axis);
-            self.adaptive.law().resumed(axis, *inputs.get(axis), x, errors.get(axis), norm_max)
+            self.adaptive.law().resumed(axis, inputs[axis], x, &errors[axis], norm_max)
         }))
     }
 }

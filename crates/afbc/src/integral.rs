@@ -61,7 +61,7 @@ impl IntegralBackstepping {
     pub fn new(vehicle: &Parameters, gains: PerAxis<Gains>) -> Result<Self, OutOfRange> {
         vehicle.validate()?;
         for axis in Axis::ALL {
-            let Gains { backstepping, integral, integral_max } = gains.get(axis);
+            let Gains { backstepping, integral, integral_max } = &gains[axis];
             backstepping.validate()?;
             GAMMA.check(*integral)?;
             THETA_MAX.check(*integral_max)?;
@@ -75,19 +75,19 @@ impl Law for IntegralBackstepping {
 
     #[inline]
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, integral: &mut Integral) -> (f32, Errors) {
-        let Gains { backstepping, integral: kappa, integral_max } = self.gains.get(axis);
+        let Gains { backstepping, integral: kappa, integral_max } = &self.gains[axis];
         let (fixed, errors) = classical(backstepping, tracking, &self.model.dynamics(axis, context));
         if let Some(input) = integral.resume.take() {
             integral.value = input - fixed;
         }
         let i = math::min(math::max(integral.value, -integral_max), *integral_max);
-        let winds_up = errors.e2 * context.unallocated.get(axis) > 0.0;
+        let winds_up = errors.e2 * context.unallocated[axis] > 0.0;
         integral.value = if context.adapt && !winds_up { i + kappa * errors.e2 * context.dt_s } else { i };
         (fixed + i, errors)
     }
 
     fn alpha1(&self, axis: Axis) -> f32 {
-        self.gains.get(axis).backstepping.alpha1
+        self.gains[axis].backstepping.alpha1
     }
 
     fn hover_thrust_n(&self, z: &Integral, weight_n: f32) -> f32 {

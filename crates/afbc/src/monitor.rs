@@ -59,10 +59,10 @@ impl Bounds {
         let sluggish = |axis| math::max(paper.hover_gain(axis) / own.hover_gain(axis), 1.0);
         let lyapunov = PerAxis { roll: 0.5, pitch: 0.5, yaw: 10.0, z: 200.0, x: 1000.0, y: 1000.0 };
         Bounds {
-            theta: PerAxis::from_fn(|axis| 0.95 * gains.get(axis).safeguards.theta_max),
+            theta: PerAxis::from_fn(|axis| 0.95 * gains[axis].safeguards.theta_max),
             // Projection holds delta_hat at its bound as a matter of course; beyond it there is none.
-            delta: PerAxis::from_fn(|axis| 1.001 * gains.get(axis).safeguards.delta_max),
-            lyapunov: PerAxis::from_fn(|axis| lyapunov.get(axis) * sluggish(axis)),
+            delta: PerAxis::from_fn(|axis| 1.001 * gains[axis].safeguards.delta_max),
+            lyapunov: PerAxis::from_fn(|axis| lyapunov[axis] * sluggish(axis)),
             saturation_share: 0.9,
             swing_n: 0.5 * vehicle.mass_kg * vehicle.gravity_m_s2,
             swings_hz: 16.0,
@@ -75,9 +75,9 @@ impl Bounds {
     /// The first one out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
         for axis in Axis::ALL {
-            BOUND.check(*self.theta.get(axis))?;
-            BOUND.check(*self.delta.get(axis))?;
-            BOUND.check(*self.lyapunov.get(axis))?;
+            BOUND.check(self.theta[axis])?;
+            BOUND.check(self.delta[axis])?;
+            BOUND.check(self.lyapunov[axis])?;
         }
         SATURATION_SHARE.check(self.saturation_share)?;
         SWING.check(self.swing_n)?;
@@ -157,7 +157,7 @@ impl Figures {
     /// The subsystem that was looked at last, and what it has learnt.
     #[inline]
     pub fn latest(&self) -> (Axis, Norm) {
-        (self.axis, *self.norms.get(self.axis))
+        (self.axis, self.norms[self.axis])
     }
 }
 
@@ -183,7 +183,7 @@ impl Monitor {
         let model = Model::new(vehicle);
         Ok(Monitor {
             bounds,
-            theta_squared: PerAxis::from_fn(|axis| bounds.theta.get(axis) * bounds.theta.get(axis)),
+            theta_squared: PerAxis::from_fn(|axis| bounds.theta[axis] * bounds.theta[axis]),
             half_inverse_gain: PerAxis::from_fn(|axis| 0.5 / model.hover_gain(axis)),
             forget: 1.0 - math::exp(-dt_s / WINDOW_S),
         })
@@ -191,7 +191,7 @@ impl Monitor {
 
     /// |Theta_hat| to start from, of what is allowed the rest left to be learnt.
     pub(crate) fn theta_start(&self, axis: Axis) -> f32 {
-        0.75 * self.bounds.theta.get(axis)
+        0.75 * self.bounds.theta[axis]
     }
 
     /// Takes one step into account; tells what is wrong, if anything is.
@@ -200,13 +200,13 @@ impl Monitor {
         let axis = figures.axis.next();
         figures.axis = axis;
 
-        let estimate = cascade.estimates.get(axis);
+        let estimate = &cascade.estimates[axis];
         let norm = Norm { theta_squared: estimate.theta.norm_squared(), delta: estimate.delta };
-        *figures.norms.get_mut(axis) = norm;
+        figures.norms[axis] = norm;
 
-        let errors = cascade.errors.get(axis);
-        let v = 0.5 * errors.e1 * errors.e1 + self.half_inverse_gain.get(axis) * errors.e2 * errors.e2;
-        let lyapunov = figures.lyapunov.get_mut(axis);
+        let errors = &cascade.errors[axis];
+        let v = 0.5 * errors.e1 * errors.e1 + self.half_inverse_gain[axis] * errors.e2 * errors.e2;
+        let lyapunov = &mut figures.lyapunov[axis];
         // Its turn comes every sixth step.
         *lyapunov += 6.0 * self.forget * (v - *lyapunov);
 
@@ -227,11 +227,11 @@ impl Monitor {
             (cycles(thrust, inputs.z), Axis::Z),
         ];
 
-        if norm.theta_squared > *self.theta_squared.get(axis) {
+        if norm.theta_squared > self.theta_squared[axis] {
             Some(Trip::Theta(axis))
-        } else if norm.delta > *self.bounds.delta.get(axis) {
+        } else if norm.delta > self.bounds.delta[axis] {
             Some(Trip::Delta(axis))
-        } else if *lyapunov > *self.bounds.lyapunov.get(axis) {
+        } else if *lyapunov > self.bounds.lyapunov[axis] {
             Some(Trip::Lyapunov(axis))
         } else if figures.saturation_share > self.bounds.saturation_share {
             Some(Trip::Saturation)

@@ -37,7 +37,7 @@ impl Profile {
     pub fn gains_for(self, vehicle: &Parameters) -> PerAxis<adaptive::Gains> {
         let (paper, own) = (Model::new(&Parameters::PAPER.to_f32()), Model::new(vehicle));
         let gains = self.gains();
-        PerAxis::from_fn(|axis| gains.get(axis).scaled(paper.hover_gain(axis) / own.hover_gain(axis)))
+        PerAxis::from_fn(|axis| gains[axis].scaled(paper.hover_gain(axis) / own.hover_gain(axis)))
     }
 
     /// Gains of AFBC for the paper's vehicle; their `backstepping` part is the baseline's.

@@ -63,7 +63,7 @@ impl Safeguards {
 
     /// e: what there is to learn from e_2, when `unallocated` of the input that was wanted could not be given.
     #[inline]
-    pub(crate) fn lesson(&self, e2: f32, unallocated: f32) -> f32 {
+    pub(crate) fn adaptation_error(&self, e2: f32, unallocated: f32) -> f32 {
         if e2 * unallocated > 0.0 {
             0.0
         } else if e2 > self.dead_zone {

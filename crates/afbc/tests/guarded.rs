@@ -54,7 +54,7 @@ fn near() -> impl Strategy<Value = State> {
 fn same(before: &Stepped, after: &Stepped) -> Result<(), TestCaseError> {
     let (before, after) = (before.per_axis(), after.per_axis());
     for axis in Axis::ALL {
-        let (before, after) = (f64::from(*before.get(axis)), f64::from(*after.get(axis)));
+        let (before, after) = (f64::from(before[axis]), f64::from(after[axis]));
         prop_assert!((before - after).abs() <= 16.0 * U * (before.abs() + 20.0), "{axis:?}: {before}, then {after}");
     }
     Ok(())
@@ -89,7 +89,7 @@ proptest! {
             prop_assert_eq!(command.action.health.setpoint_rejected, !setpoint.is_plausible());
             prop_assert!(tripped.is_none() || memory.control.trip() == tripped, "re-engaged by itself");
             let learnt = Guarded::learnt(&memory.control);
-            prop_assert!(Axis::ALL.iter().all(|axis| learnt.get(*axis).theta.iter().all(|theta| theta.is_finite())));
+            prop_assert!(Axis::ALL.iter().all(|axis| learnt[*axis].theta.iter().all(|theta| theta.is_finite())));
         }
     }
 
@@ -224,7 +224,7 @@ fn a_tripped_controller_learns_nothing_and_says_why() {
     }
     // The monitor saw each subsystem's norm within the last six steps: one that went on learning would change them.
     let seen = *memory.control.figures();
-    assert!(Axis::ALL.iter().any(|axis| seen.norms.get(*axis).theta_squared > 0.0), "{seen:?}");
+    assert!(Axis::ALL.iter().any(|axis| seen.norms[*axis].theta_squared > 0.0), "{seen:?}");
     for _ in 0..1000 {
         let health = step(&controller, &mut memory, &state, &setpoint).action.health;
         assert_eq!(health, Health { trip: memory.control.trip(), saturated: health.saturated, ..Health::default() });
@@ -287,7 +287,7 @@ fn gains_are_scaled_by_what_an_input_does() {
         assert_eq!(profile.gains_for(&paper), profile.gains());
         let sluggish = Parameters { mass_kg: 2.0 * paper.mass_kg, inertia_kg_m2: 2.0 * paper.inertia_kg_m2, ..paper };
         for axis in Axis::ALL {
-            let (own, other) = (*profile.gains().get(axis), *profile.gains_for(&sluggish).get(axis));
+            let (own, other) = (profile.gains()[axis], profile.gains_for(&sluggish)[axis]);
             let times = if matches!(axis, Axis::X | Axis::Y) { 1.0 } else { 2.0 };
             assert_eq!(other.backstepping.alpha2, times * own.backstepping.alpha2);
             assert_eq!((other.gamma, other.eta), (times * own.gamma, times * own.eta));

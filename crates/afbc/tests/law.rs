@@ -166,7 +166,7 @@ proptest! {
         let law = Adaptive::new(gains).unwrap();
         let state = State::default();
         for axis in Axis::ALL {
-            let gains = *gains.get(axis);
+            let gains = gains[axis];
             let errors = tracking.errors(gains.backstepping.alpha1);
             let inputs = match axis {
                 Axis::Roll | Axis::Pitch | Axis::Yaw => [tracking.x1, tracking.x2],
@@ -216,7 +216,7 @@ fn a_gain_out_of_range_is_refused_by_name() {
         for (range, set) in cases {
             let with = |value: f32| {
                 let mut gains: PerAxis<Gains> = Profile::Paper.gains();
-                set(gains.get_mut(axis), value);
+                set(&mut gains[axis], value);
                 Adaptive::new(gains).map(|_| ()).map_err(|error| error.range.name)
             };
             let (min, max) = (range.min as f32, range.max as f32);

@@ -103,7 +103,7 @@ proptest! {
         let Limits { speed_max_m_s, climb_max_m_s, .. } = limits;
         for (i, axis, max) in [(0, Axis::X, speed_max_m_s), (1, Axis::Y, speed_max_m_s), (2, Axis::Z, climb_max_m_s)] {
             let (Errors { e1, e1_dot, e2 }, alpha1, max) =
-                (*command.trace.errors.get(axis), f64::from(gains.get(axis).backstepping.alpha1), f64::from(max));
+                (command.trace.errors[axis], f64::from(gains[axis].backstepping.alpha1), f64::from(max));
             let (distance, x1d_dot, x2) =
                 (setpoint.position_m[i] - state.position_m[i], setpoint.velocity_m_s[i], state.velocity_m_s[i]);
             let speed = alpha1 * f64::from(distance);
@@ -159,9 +159,9 @@ fn a_distant_setpoint_is_approached_at_the_speed_limit() {
     }
     let (vehicle, settings, gains) = (Parameters::PAPER.to_f32(), Profile::Flight.settings(), Profile::Flight.gains());
     check(&flight(settings.limits));
-    let fixed = PerAxis::from_fn(|axis| gains.get(axis).backstepping);
+    let fixed = PerAxis::from_fn(|axis| gains[axis].backstepping);
     check(&Controller::new(vehicle, settings, Backstepping::new(&vehicle, fixed).unwrap()).unwrap());
-    let integral = PerAxis::from_fn(|axis| gains.get(axis).into());
+    let integral = gains.map(|gains| gains.into());
     check(&Controller::new(vehicle, settings, IntegralBackstepping::new(&vehicle, integral).unwrap()).unwrap());
 }
 

@@ -59,13 +59,13 @@ fn watch(
 
 fn estimates(axis: Axis, estimate: Estimate) -> PerAxis<Estimate> {
     let mut estimates = PerAxis::default();
-    *estimates.get_mut(axis) = estimate;
+    estimates[axis] = estimate;
     estimates
 }
 
 fn input(axis: Axis, value: f32) -> Seen {
     let mut seen = hover();
-    *seen.inputs.get_mut(axis) += value;
+    seen.inputs[axis] += value;
     seen
 }
 
@@ -76,8 +76,8 @@ fn an_estimate_out_of_bounds_trips_within_six_steps() {
     let bounds = bounds();
     let monitor = monitor(bounds);
     for axis in Axis::ALL {
-        let (theta, delta) = (*bounds.theta.get(axis), *bounds.delta.get(axis));
-        assert!(theta < Profile::Flight.gains().get(axis).safeguards.theta_max);
+        let (theta, delta) = (bounds.theta[axis], bounds.delta[axis]);
+        assert!(theta < Profile::Flight.gains()[axis].safeguards.theta_max);
         let with = |theta: f32, delta: f32| {
             // |Theta_hat| of nine equal entries is three times each.
             let estimate = Estimate { theta: Matrix3::repeat(-theta / 3.0), delta };
@@ -98,11 +98,11 @@ fn large_errors_trip_when_they_last() {
     let monitor = monitor(bounds);
     let model = Model::new(&Parameters::PAPER.to_f32());
     for axis in Axis::ALL {
-        let bound = *bounds.lyapunov.get(axis);
+        let bound = bounds.lyapunov[axis];
         let with = |v: f32, steps| {
             let (e1, e2) = ((1.2 * v).sqrt(), (0.8 * v * model.hover_gain(axis)).sqrt());
             let mut seen = hover();
-            *seen.errors.get_mut(axis) = Errors { e1, e1_dot: 0.0, e2 };
+            seen.errors[axis] = Errors { e1, e1_dot: 0.0, e2 };
             watch(&monitor, steps, |_| (PerAxis::default(), seen))
         };
         assert_eq!(with(0.99 * bound, 20_000).1, None, "{axis:?}");
@@ -110,7 +110,7 @@ fn large_errors_trip_when_they_last() {
         assert_eq!(trip, Trip::Lyapunov(axis));
         // 1 - exp(-t) = 1/2 at 0.693 s; a round is six steps.
         assert!((680..=710).contains(&steps), "{axis:?} after {steps}");
-        let figure = *with(0.9 * bound, 1500).0.lyapunov.get(axis);
+        let figure = with(0.9 * bound, 1500).0.lyapunov[axis];
         assert!((figure / (0.9 * bound * (1.0 - (-1.5_f32).exp())) - 1.0).abs() < 0.01, "{axis:?}: {figure}");
     }
 }
@@ -171,8 +171,8 @@ proptest! {
         };
         let (_, trip) = watch(&monitor(bounds), 3000, |i| {
             let estimates = PerAxis::from_fn(|axis| Estimate {
-                theta: Matrix3::repeat(share * bounds.theta.get(axis) / 3.0 * noise()),
-                delta: share * bounds.delta.get(axis),
+                theta: Matrix3::repeat(share * bounds.theta[axis] / 3.0 * noise()),
+                delta: share * bounds.delta[axis],
             });
             let mut seen = hover();
             seen.inputs.roll += 0.49 * bounds.swing_n * noise();
@@ -180,7 +180,7 @@ proptest! {
             seen.inputs.yaw += 0.49 * bounds.swing_n * noise();
             seen.inputs.z += 0.49 * bounds.swing_n * noise();
             seen.errors = PerAxis::from_fn(|axis| Errors {
-                e1: (2.0 * share * bounds.lyapunov.get(axis)).sqrt() * noise(),
+                e1: (2.0 * share * bounds.lyapunov[axis]).sqrt() * noise(),
                 ..Errors::default()
             });
             seen.saturated = saturated && i.is_multiple_of(2);

@@ -20,17 +20,17 @@ fn adaptive(gains: PerAxis<Gains>, settings: Settings) -> Controller<Adaptive> {
 
 fn backstepping(gains: PerAxis<Gains>, settings: Settings) -> Controller<Backstepping> {
     let vehicle = Parameters::PAPER.to_f32();
-    let gains = PerAxis::from_fn(|axis| gains.get(axis).backstepping);
+    let gains = PerAxis::from_fn(|axis| gains[axis].backstepping);
     Controller::new(vehicle, settings, Backstepping::new(&vehicle, gains).unwrap()).unwrap()
 }
 
 fn estimates<L: Law>(memory: &Screened<Cascade<L::Estimate>>) -> PerAxis<Estimate> {
-    PerAxis::from_fn(|axis| L::learnt(memory.control.estimates.get(axis)))
+    PerAxis::from_fn(|axis| L::learnt(&memory.control.estimates[axis]))
 }
 
 fn check_estimates(estimates: &PerAxis<Estimate>) -> Result<(), TestCaseError> {
     for axis in Axis::ALL {
-        let estimate = estimates.get(axis);
+        let estimate = &estimates[axis];
         prop_assert!(
             estimate.delta.is_finite() && estimate.theta.iter().all(|t| t.is_finite()),
             "{axis:?} {estimate:?}"
@@ -87,7 +87,7 @@ proptest! {
             inputs.iter().map(|(state, setpoint)| {
                 let command = step(&controller, &mut memory, state, setpoint);
                 let estimates = estimates::<Adaptive>(&memory);
-                let learnt = Axis::ALL.map(|axis| estimates.get(axis).theta.map(f32::to_bits));
+                let learnt = Axis::ALL.map(|axis| estimates[axis].theta.map(f32::to_bits));
                 (command.action.speeds.0.map(f32::to_bits), learnt)
             }).collect::<Vec<_>>()
         };

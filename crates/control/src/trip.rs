@@ -1,6 +1,7 @@
 //! Why a controller no longer flies by its own law.
 
 use afbc_types::Axis;
+use core::fmt;
 
 /// Why the law is no longer trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,5 +46,11 @@ impl Trip {
             Trip::LimitCycle(Axis::Yaw) => "AFBC off: limit cycle of U3 (yaw)",
             Trip::LimitCycle(_) => "AFBC off: limit cycle of U4 (thrust)",
         }
+    }
+}
+
+impl fmt::Display for Trip {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.reason())
     }
 }

@@ -122,7 +122,7 @@ impl Blind {
     }
 
     /// Inputs that keep the last attitude and the trimmed thrust.
-    pub fn ride(&self, reckoning: &Reckoning) -> Inputs {
+    pub fn coast(&self, reckoning: &Reckoning) -> Inputs {
         self.hold(reckoning, &reckoning.held_rad, 1.0)
     }
 

@@ -47,14 +47,14 @@ impl Inbox {
 
     /// Takes in a measured state, stamped by a [`Tracker`](crate::Tracker); does nothing with one that is not
     /// [plausible](State::is_plausible).
-    pub fn measure(&mut self, state: Stamped<State>) {
+    pub fn put_state(&mut self, state: Stamped<State>) {
         if state.value.is_plausible() {
             self.state = Some(state);
         }
     }
 
     /// Takes in a setpoint, stamped on arrival; does nothing with one that is not [plausible](Setpoint::is_plausible).
-    pub fn aim(&mut self, setpoint: Stamped<Setpoint>) {
+    pub fn put_setpoint(&mut self, setpoint: Stamped<Setpoint>) {
         if setpoint.value.is_plausible() {
             self.setpoint = Some(setpoint);
         }
@@ -71,7 +71,7 @@ impl Inbox {
     }
 
     /// The oldest request, which the next tick answers.
-    pub fn request(&self) -> Option<Asked> {
+    pub fn asked(&self) -> Option<Asked> {
         self.requests.first().copied().flatten()
     }
 
@@ -85,13 +85,13 @@ impl Inbox {
         self.state = news.state.or(self.state);
         self.setpoint = news.setpoint.or(self.setpoint);
         for asked in news.requests.iter().flatten() {
-            self.ask(*asked);
+            self.request(*asked);
         }
     }
 
     /// Leaves a request for the next ticks, each of which answers one. False if [`REQUESTS_MAX`] wait already: it is not
     /// left then, unless it is [`Request::Kill`], which takes the newest one's place.
-    pub fn ask(&mut self, asked: Asked) -> bool {
+    pub fn request(&mut self, asked: Asked) -> bool {
         let free = self.requests.iter().position(Option::is_none);
         let newest = (asked.request == Request::Kill).then_some(REQUESTS_MAX - 1);
         match free.or(newest).and_then(|place| self.requests.get_mut(place)) {

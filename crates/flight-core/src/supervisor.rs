@@ -4,10 +4,10 @@ use afbc_control::math::abs_max;
 use afbc_types::{Setpoint, State, parameters};
 
 /// Older than this, a state is stale and the law may not fly on it \[us\].
-pub const RIDE_US: u64 = 20_000;
-/// Riding ends once states have been fresh for this long \[us\]: a tracker that stutters does not make the mode flicker.
+pub const COAST_US: u64 = 20_000;
+/// Coasting ends once states have been fresh for this long \[us\]: a tracker that stutters does not make the mode flicker.
 pub const STEADY_US: u64 = 100_000;
-/// Older than this, riding on ends and the vehicle comes down \[us\].
+/// Older than this, coasting ends and the vehicle comes down \[us\].
 pub const DESCEND_US: u64 = 250_000;
 /// Older than this, the attitude is anyone's guess and the motors stop \[us\]: two seconds of blind descent.
 pub const GIVE_UP_US: u64 = 2_250_000;
@@ -21,7 +21,7 @@ pub const REST_US: u64 = 1_000_000;
 /// ```text
 ///              Arm, and ready                age > 20 ms
 ///  +----------+              +----------+ --------------> +----------+
-///  | Disarmed | -----------> |  Flying  |                 |  Riding  |
+///  | Disarmed | -----------> |  Flying  |                 |  Coasting  |
 ///  +----------+              +----------+ <-------------- +----------+
 ///    ^      ^                     |     fresh for 100 ms       |
 ///    |      |                     | age > 250 ms               | age > 250 ms
@@ -33,7 +33,7 @@ pub const REST_US: u64 = 1_000_000;
 ///    +--- Kill, age > 2.25 s or tumbled, from anywhere; Disarm, from anywhere on the ground
 /// ```
 ///
-/// `age` is that of the newest plausible state. Disarmed at power-up. In Riding and Descending the law flies whenever the
+/// `age` is that of the newest plausible state. Disarmed at power-up. In Coasting and Descending the law flies whenever the
 /// state is fresh; without one the vehicle is flown blind ([`crate::blind`]).
 ///
 /// Descending does not lead back to Flying. The attitude has been unknown for a quarter of a second: whatever comes
@@ -49,7 +49,7 @@ pub enum Mode {
     /// The law flies on fresh states.
     Flying = 1,
     /// The state is stale, or was a moment ago.
-    Riding = 2,
+    Coasting = 2,
     /// Coming down, to disarm.
     Descending = 3,
 }
@@ -258,8 +258,8 @@ impl Mode {
             _ if self.end(observed).is_some() => Mode::Disarmed,
             Mode::Descending => Mode::Descending,
             _ if age_us > DESCEND_US => Mode::Descending,
-            _ if age_us > RIDE_US => Mode::Riding,
-            Mode::Riding if observed.steady_us < STEADY_US => Mode::Riding,
+            _ if age_us > COAST_US => Mode::Coasting,
+            Mode::Coasting if observed.steady_us < STEADY_US => Mode::Coasting,
             _ => Mode::Flying,
         }
     }

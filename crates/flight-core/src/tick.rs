@@ -5,7 +5,7 @@ use crate::descent::Descent;
 use crate::ground::Ground;
 use crate::inbox::{Inbox, Stamped};
 use crate::rate;
-use crate::supervisor::{ArmingLimits, End, Mode, Observed, RIDE_US, Refusal, Request, SETPOINT_STALE_US, Standing};
+use crate::supervisor::{ArmingLimits, COAST_US, End, Mode, Observed, Refusal, Request, SETPOINT_STALE_US, Standing};
 use crate::tumble::Tumble;
 use crate::witness::Witness;
 use afbc_control::{Action, FlightController, Mixer, Trace};
@@ -158,7 +158,7 @@ impl<C: FlightController> Vehicle<C> {
         let measured = memory.take_state(inbox, now_us);
         let state_age_us = memory.state.map_or(u64::MAX, |state| state.age_us(now_us));
         let fresh =
-            memory.state.filter(|_| state_age_us <= RIDE_US).map(|state| extrapolated(&state.value, state_age_us));
+            memory.state.filter(|_| state_age_us <= COAST_US).map(|state| extrapolated(&state.value, state_age_us));
         let fresh = fresh.as_ref();
         memory.watch(fresh, &self.limits, dt_s, now_us);
         let Memory { mode, rate, stale_us, restless_us, frozen_states, flight, .. } = memory;
@@ -168,7 +168,7 @@ impl<C: FlightController> Vehicle<C> {
         // Supervise.
         let rest_us = now_us.saturating_sub(*restless_us);
         let standing = Standing { state: fresh, setpoint, healthy: rate.healthy(), rest_us };
-        let asked = inbox.request();
+        let asked = inbox.asked();
         let observed = Observed {
             request: asked.map(|asked| asked.request),
             kill: inbox.kills(),
@@ -238,7 +238,7 @@ impl<C: FlightController> Vehicle<C> {
         flight.guide.descent = None;
         let inputs = match mode {
             Mode::Descending => self.blind.descend(&flight.reckoning),
-            _ => self.blind.ride(&flight.reckoning),
+            _ => self.blind.coast(&flight.reckoning),
         };
         self.lawless(flight, inputs)
     }
@@ -267,7 +267,7 @@ impl<M> Memory<M> {
     /// late is no stream of states), and a measurement of the vehicle in flight. Tells whether it did.
     fn take_state(&mut self, inbox: &Inbox, now_us: u64) -> bool {
         let newer = |state: &&Stamped<State>| {
-            state.age_us(now_us) <= RIDE_US && self.state.is_none_or(|held| state.at_us > held.at_us)
+            state.age_us(now_us) <= COAST_US && self.state.is_none_or(|held| state.at_us > held.at_us)
         };
         let Some(state) = inbox.state().filter(newer) else { return false };
         let armed = self.mode.armed();

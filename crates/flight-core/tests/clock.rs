@@ -57,12 +57,12 @@ fn play(mut sent: Vec<Sent>) -> Seen {
                 // The delay of the fastest state cannot be known.
                 let error_us = state.at_us.abs_diff(sent.measured_us + DELAY_US);
                 seen.age_error_us = seen.age_error_us.max(error_us);
-                inbox.measure(state);
+                inbox.put_state(state);
             }
         }
-        inbox.aim(Stamped { value: Setpoint::default(), at_us: now_us });
+        inbox.put_setpoint(Stamped { value: Setpoint::default(), at_us: now_us });
         if now_us == ARM_US {
-            assert!(inbox.ask(Asked { request: Request::Arm, ticket: 0 }));
+            assert!(inbox.request(Asked { request: Request::Arm, ticket: 0 }));
         }
         let mode = vehicle.tick(&mut memory, now_us, &inbox.take()).mode;
         if now_us >= ARM_US && seen.modes.last() != Some(&mode) {
@@ -131,7 +131,7 @@ const HOUR_US: u64 = 3_600_000_000;
 /// A Saturday in 2026, as microseconds since 1970.
 const WALL_US: u64 = 1_795_000_000_000_000;
 
-use Mode::{Flying as F, Riding as R};
+use Mode::{Coasting as R, Flying as F};
 
 /// A clock, the modes that follow, the largest error of an age \[us\].
 type Case = (&'static str, fn() -> Vec<Sent>, &'static [Mode], u64);

@@ -54,11 +54,11 @@ impl Bench {
         if tracked {
             let mut value = State::default();
             value.position_m.z = if at_us.is_multiple_of(2000) { 1e-6 } else { -1e-6 };
-            inbox.measure(Stamped { value, at_us });
+            inbox.put_state(Stamped { value, at_us });
         }
-        inbox.aim(Stamped { value: Setpoint::default(), at_us });
+        inbox.put_setpoint(Stamped { value: Setpoint::default(), at_us });
         if let Some(request) = request {
-            assert!(inbox.ask(Asked { request, ticket: 7 }));
+            assert!(inbox.request(Asked { request, ticket: 7 }));
         }
         self.vehicle.tick(&mut self.memory, at_us, &inbox)
     }
@@ -92,7 +92,7 @@ fn engaging_reaches_the_controller_in_flight_only() {
     assert_eq!(bench.memory.control(), Some(&1), "once");
 
     bench.wait(100, false);
-    assert!(bench.engages(false, Mode::Riding));
+    assert!(bench.engages(false, Mode::Coasting));
     bench.wait(200, false);
     assert!(bench.engages(false, Mode::Descending));
 

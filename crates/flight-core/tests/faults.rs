@@ -91,14 +91,14 @@ fn play(mut frames: Vec<Frame>) -> Seen {
     for ms in 0..END_MS {
         let (now_us, since_ms) = (ms * 1000, ms as i64 - FAULT_MS as i64);
         while let Some(frame) = frames.next_if(|frame| frame.at_ms <= since_ms) {
-            let ask = |inbox: &mut Inbox, request| assert!(inbox.ask(Asked { request, ticket: 0 }));
+            let ask = |inbox: &mut Inbox, request| assert!(inbox.request(Asked { request, ticket: 0 }));
             decoder.feed(&frame.bytes, |_, message| match message {
                 Uplink::State { sent_us, state } => {
                     if let Some(state) = tracker.stamp(1, sent_us, now_us, state) {
-                        inbox.measure(state);
+                        inbox.put_state(state);
                     }
                 }
-                Uplink::Setpoint(value) => inbox.aim(Stamped { value, at_us: now_us }),
+                Uplink::Setpoint(value) => inbox.put_setpoint(Stamped { value, at_us: now_us }),
                 Uplink::Command(Command::Arm) => ask(&mut inbox, Request::Arm),
                 Uplink::Command(Command::Engage) => ask(&mut inbox, Request::Engage),
                 Uplink::Command(Command::Disarm) => ask(&mut inbox, Request::Disarm),
@@ -164,7 +164,7 @@ fn mavlink_crc(bytes: &[u8], extra: u8) -> u16 {
 const FOREVER: std::ops::Range<i64> = 0..i64::MAX;
 
 use Command::Kill;
-use Mode::{Descending as D, Disarmed as X, Flying as F, Riding as R};
+use Mode::{Coasting as R, Descending as D, Disarmed as X, Flying as F};
 
 /// A fault, the modes that follow with the millisecond in which each begins, and what else must be seen.
 type Case = (&'static str, fn(&mut Vec<Frame>), &'static [(i64, Mode)], fn(&Seen) -> bool);
@@ -175,9 +175,9 @@ const CASES: &[Case] = &[
 
     // Dropping.
     ("20 ms without a state are nothing", |f| drop_states(f, 0..20), &[(0, F)], |s| s.counters.lost == 20),
-    ("21 ms are ridden out", |f| drop_states(f, 0..21), &[(0, F), (20, R), (120, F)], |s| s.counters.lost == 21),
-    ("100 ms are ridden out", |f| drop_states(f, 0..100), &[(0, F), (20, R), (199, F)], |_| true),
-    ("250 ms are ridden out", |f| drop_states(f, 0..250), &[(0, F), (20, R), (349, F)], |_| true),
+    ("21 ms are coasted through", |f| drop_states(f, 0..21), &[(0, F), (20, R), (120, F)], |s| s.counters.lost == 21),
+    ("100 ms are coasted through", |f| drop_states(f, 0..100), &[(0, F), (20, R), (199, F)], |_| true),
+    ("250 ms are coasted through", |f| drop_states(f, 0..250), &[(0, F), (20, R), (349, F)], |_| true),
     ("251 ms end in a descent, on the ground a second later", |f| drop_states(f, 0..251),
         &[(0, F), (20, R), (250, D), (1252, X)], |_| true),
     ("a state that never returns ends the flight", |f| drop_states(f, FOREVER),
@@ -188,7 +188,7 @@ const CASES: &[Case] = &[
         |f| states(f, FOREVER, |frame| (frame.at_ms % 2 == 0).then_some(())), &[(0, F)], |s| s.counters.lost > 1000),
     ("one state in 20 ms is enough",
         |f| states(f, FOREVER, |frame| (frame.at_ms % 20 == 0).then_some(())), &[(0, F)], |_| true),
-    ("outages of 40 ms are ridden out as one",
+    ("outages of 40 ms are coasted through as one",
         |f| { drop_states(f, 0..40); drop_states(f, 60..100); },
         &[(0, F), (20, R), (199, F)], |_| true),
     ("no setpoint: the position is held", |f| f.retain(|frame| frame.kind != Kind::Setpoint || frame.at_ms < 0),
@@ -272,7 +272,7 @@ const CASES: &[Case] = &[
     ("disarmed in flight: refused", |f| f.push(frame(10, Uplink::Command(Command::Disarm))),
         &[(0, F)], |s| s.answers == [Err(Refusal::InFlight)]),
     ("stopped in flight", |f| f.push(frame(10, Uplink::Command(Kill))), &[(0, F), (10, X)], |_| true),
-    ("stopped while riding", |f| { drop_states(f, FOREVER); f.push(frame(100, Uplink::Command(Kill))); },
+    ("stopped while coasting", |f| { drop_states(f, FOREVER); f.push(frame(100, Uplink::Command(Kill))); },
         &[(0, F), (20, R), (100, X)], |_| true),
     ("stopped while descending", |f| { drop_states(f, FOREVER); f.push(frame(400, Uplink::Command(Kill))); },
         &[(0, F), (20, R), (250, D), (400, X)], |_| true),

@@ -16,14 +16,14 @@ fn requests_wait_for_their_turn() {
     let (mut inbox, mut news) = (Inbox::default(), Inbox::default());
     for (ticket, request) in all.into_iter().enumerate() {
         let to = if ticket < 2 { &mut inbox } else { &mut news };
-        assert!(to.ask(asked(request, ticket)));
+        assert!(to.request(asked(request, ticket)));
     }
     inbox.post(&news);
     for (ticket, request) in all.into_iter().enumerate() {
         assert!(inbox.kills(), "it is among those that wait");
-        assert_eq!(inbox.take().request(), Some(asked(request, ticket)));
+        assert_eq!(inbox.take().asked(), Some(asked(request, ticket)));
     }
-    assert_eq!(inbox.take().request(), None, "a request is done with");
+    assert_eq!(inbox.take().asked(), None, "a request is done with");
     assert!(!inbox.kills());
 }
 
@@ -31,12 +31,12 @@ fn requests_wait_for_their_turn() {
 fn a_full_inbox_takes_the_request_to_kill_only() {
     let mut inbox = Inbox::default();
     for ticket in 0..REQUESTS_MAX {
-        assert!(inbox.ask(asked(Request::Arm, ticket)));
+        assert!(inbox.request(asked(Request::Arm, ticket)));
     }
     let full = inbox;
-    assert!(!inbox.ask(asked(Request::Disarm, 99)));
+    assert!(!inbox.request(asked(Request::Disarm, 99)));
     assert_eq!(inbox, full);
-    assert!(inbox.ask(asked(Request::Kill, 99)));
+    assert!(inbox.request(asked(Request::Kill, 99)));
     assert!(inbox.kills());
 }
 
@@ -44,13 +44,13 @@ fn a_full_inbox_takes_the_request_to_kill_only() {
 fn what_is_not_plausible_does_not_get_in() {
     let good = (Stamped { value: State::default(), at_us: 1 }, Stamped { value: Setpoint::default(), at_us: 1 });
     let mut inbox = Inbox::EMPTY;
-    inbox.measure(good.0);
-    inbox.aim(good.1);
+    inbox.put_state(good.0);
+    inbox.put_setpoint(good.1);
     for bad in [f32::NAN, f32::INFINITY, 2e5] {
         let position_m = Vector3::new(0.0, bad, 0.0);
         let mut news = Inbox::EMPTY;
-        news.measure(Stamped { value: State { position_m, ..State::default() }, at_us: 2 });
-        news.aim(Stamped { value: Setpoint { position_m, ..Setpoint::default() }, at_us: 2 });
+        news.put_state(Stamped { value: State { position_m, ..State::default() }, at_us: 2 });
+        news.put_setpoint(Stamped { value: Setpoint { position_m, ..Setpoint::default() }, at_us: 2 });
         assert_eq!(news, Inbox::EMPTY, "{bad}");
         inbox.post(&news);
     }

@@ -77,14 +77,14 @@ impl Bench {
     fn exactly(&mut self, value: State) -> Outcome {
         self.now_us += 1000;
         let at_us = self.now_us;
-        self.inbox.measure(Stamped { value, at_us });
+        self.inbox.put_state(Stamped { value, at_us });
         let position_m = Vector3::new(0.0, 0.0, self.thrust_n);
-        self.inbox.aim(Stamped { value: Setpoint { position_m, ..Setpoint::default() }, at_us });
+        self.inbox.put_setpoint(Stamped { value: Setpoint { position_m, ..Setpoint::default() }, at_us });
         self.vehicle.tick(&mut self.memory, at_us, &self.inbox.take())
     }
 
     fn ask(&mut self, request: Request) {
-        assert!(self.inbox.ask(Asked { request, ticket: 9 }));
+        assert!(self.inbox.request(Asked { request, ticket: 9 }));
     }
 
     /// So many ms in this state; the end of the flight, if it ended, and after how many.
@@ -233,7 +233,7 @@ fn a_repeated_state_is_as_old_as_its_first() {
         let outcome = bench.exactly(State::default());
         let mode = match age_ms {
             0..=20 => Mode::Flying,
-            21..=250 => Mode::Riding,
+            21..=250 => Mode::Coasting,
             251..=2250 => Mode::Descending,
             _ => Mode::Disarmed,
         };

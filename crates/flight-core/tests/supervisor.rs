@@ -1,16 +1,16 @@
 //! Every transition of the mode, every answer, and every reason against arming.
 
-use afbc_flight_core::supervisor::{DESCEND_US, GIVE_UP_US, Observed, REST_US, RIDE_US, STEADY_US, Standing};
+use afbc_flight_core::supervisor::{COAST_US, DESCEND_US, GIVE_UP_US, Observed, REST_US, STEADY_US, Standing};
 use afbc_flight_core::{ArmingLimits, End, Mode, Refusal, Request};
 use afbc_types::{Declared, Setpoint, State};
 use nalgebra::Vector3;
 
-const MODES: [Mode; 4] = [Mode::Disarmed, Mode::Flying, Mode::Riding, Mode::Descending];
+const MODES: [Mode; 4] = [Mode::Disarmed, Mode::Flying, Mode::Coasting, Mode::Descending];
 const REQUESTS: [Option<Request>; 5] =
     [None, Some(Request::Arm), Some(Request::Disarm), Some(Request::Kill), Some(Request::Engage)];
 
 /// Ages on both sides of each limit.
-const AGES_US: [u64; 8] = [0, RIDE_US, RIDE_US + 1, DESCEND_US, DESCEND_US + 1, GIVE_UP_US, GIVE_UP_US + 1, u64::MAX];
+const AGES_US: [u64; 8] = [0, COAST_US, COAST_US + 1, DESCEND_US, DESCEND_US + 1, GIVE_UP_US, GIVE_UP_US + 1, u64::MAX];
 
 /// In the air, with nothing asked for, and fresh states for long.
 const CALM: Observed = Observed {
@@ -48,11 +48,11 @@ fn disarmed_at_power_up() {
 /// What follows in flight from the age of the state alone, one row a mode, one column an age of `AGES_US`.
 #[test]
 fn in_flight_the_age_decides() {
-    use Mode::{Descending as D, Disarmed as X, Flying as F, Riding as R};
+    use Mode::{Coasting as R, Descending as D, Disarmed as X, Flying as F};
     let table = [
         (Mode::Disarmed, [X, X, X, X, X, X, X, X]),
         (Mode::Flying, [F, F, R, R, D, D, X, X]),
-        (Mode::Riding, [F, F, R, R, D, D, X, X]),
+        (Mode::Coasting, [F, F, R, R, D, D, X, X]),
         (Mode::Descending, [D, D, D, D, D, D, X, X]),
     ];
     for (mode, row) in table {
@@ -66,9 +66,9 @@ fn in_flight_the_age_decides() {
 }
 
 #[test]
-fn riding_ends_once_states_have_been_fresh_for_a_while() {
-    for (steady_us, expected) in [(0, Mode::Riding), (STEADY_US - 1, Mode::Riding), (STEADY_US, Mode::Flying)] {
-        assert_eq!(Mode::Riding.next(&Observed { steady_us, ..CALM }), expected);
+fn coasting_ends_once_states_have_been_fresh_for_a_while() {
+    for (steady_us, expected) in [(0, Mode::Coasting), (STEADY_US - 1, Mode::Coasting), (STEADY_US, Mode::Flying)] {
+        assert_eq!(Mode::Coasting.next(&Observed { steady_us, ..CALM }), expected);
         assert_eq!(Mode::Flying.next(&Observed { steady_us, ..CALM }), Mode::Flying);
     }
 }

@@ -45,7 +45,7 @@ impl Bench {
     }
 
     fn ask(&mut self, request: Request) {
-        assert!(self.inbox.ask(Asked { request, ticket: 3 }));
+        assert!(self.inbox.request(Asked { request, ticket: 3 }));
     }
 
     /// One that has been flying at `state` towards `setpoint` for a tick.
@@ -76,10 +76,10 @@ impl Bench {
         if let Some(mut value) = state {
             self.noise_m = -self.noise_m;
             value.position_m.z += self.noise_m;
-            self.inbox.measure(Stamped { value, at_us });
+            self.inbox.put_state(Stamped { value, at_us });
         }
         if let Some(value) = setpoint {
-            self.inbox.aim(Stamped { value, at_us });
+            self.inbox.put_setpoint(Stamped { value, at_us });
         }
         let inbox = self.inbox.take();
         self.vehicle.tick(&mut self.memory, self.now_us, &inbox)
@@ -161,7 +161,7 @@ fn a_lost_state_is_ridden_out_then_descended_on_then_given_up() {
         let outcome = bench.tick(None, Some(near()));
         let expected = match age_ms {
             0..=20 => Mode::Flying,
-            21..=250 => Mode::Riding,
+            21..=250 => Mode::Coasting,
             251..=2250 => Mode::Descending,
             _ => Mode::Disarmed,
         };
@@ -187,9 +187,9 @@ fn blind_thrust_is_the_weight_and_then_less() {
             bench.trace().inputs.thrust_n
         })
         .collect();
-    let (riding, descending) = (thrusts.get(100).expect("400 ticks"), thrusts.get(399).expect("400 ticks"));
-    assert!((riding / WEIGHT_N - 1.0).abs() < 0.05, "{riding}");
-    assert!((descending / riding - 0.9).abs() < 1e-5, "{descending}");
+    let (coasting, descending) = (thrusts.get(100).expect("400 ticks"), thrusts.get(399).expect("400 ticks"));
+    assert!((coasting / WEIGHT_N - 1.0).abs() < 0.05, "{coasting}");
+    assert!((descending / coasting - 0.9).abs() < 1e-5, "{descending}");
 }
 
 /// Roll of a plant with the nominal inertia, whose rotors do what they are told, under a steady moment from outside.
@@ -215,10 +215,10 @@ impl Roll {
     }
 }
 
-/// The state is lost while the vehicle rolls at 1 rad/s. Left alone it would be at 0.35 rad after the ride and at 2.3 rad
+/// The state is lost while the vehicle rolls at 1 rad/s. Left alone it would be at 0.35 rad after coasting and at 2.3 rad
 /// when the motors stop, and with the moment from outside, unknown, upside down long before.
 #[test]
-fn riding_stops_the_rotation_and_descending_levels() {
+fn coasting_stops_the_rotation_and_descending_levels() {
     for outside_n in [0.0, 0.02, -0.02] {
         let mut roll = Roll { angle: 0.0, rate: 0.0, outside_n };
         let mut bench = Bench::airborne(roll.state(), Setpoint::hold(&State::default()));
@@ -234,8 +234,8 @@ fn riding_stops_the_rotation_and_descending_levels() {
             roll.advance(&outcome);
             match age_ms {
                 250 => {
-                    assert!(roll.rate.abs() < 0.3, "{} rad/s after the ride", roll.rate);
-                    assert!((roll.angle - 0.1).abs() < 0.1, "{} rad after the ride", roll.angle);
+                    assert!(roll.rate.abs() < 0.3, "{} rad/s after coasting", roll.rate);
+                    assert!((roll.angle - 0.1).abs() < 0.1, "{} rad after coasting", roll.angle);
                     held = Some(outcome.mode);
                 }
                 1000 => assert!(roll.angle.abs() < 0.1, "{} rad while descending", roll.angle),
@@ -243,7 +243,7 @@ fn riding_stops_the_rotation_and_descending_levels() {
                 _ => {}
             }
         }
-        assert_eq!(held, Some(Mode::Riding));
+        assert_eq!(held, Some(Mode::Coasting));
     }
 }
 
@@ -302,11 +302,11 @@ fn states_that_are_stale_when_they_come_are_no_states() {
     let mut modes = Vec::new();
     for _ in 0..400 {
         let at_us = bench.now_us + 1000 - 30_000;
-        bench.inbox.measure(Stamped { value: State::default(), at_us });
+        bench.inbox.put_state(Stamped { value: State::default(), at_us });
         modes.push(bench.tick(None, Some(near())).mode);
     }
     modes.dedup();
-    assert_eq!(modes, [Mode::Flying, Mode::Riding, Mode::Descending]);
+    assert_eq!(modes, [Mode::Flying, Mode::Coasting, Mode::Descending]);
 }
 
 #[test]
@@ -333,7 +333,7 @@ proptest! {
                     rates_rad_s: Vector3::new(p, q, r),
                 };
                 let at_us = if at_us % 2 == 0 { bench.now_us } else { at_us };
-                bench.inbox.measure(Stamped { value, at_us });
+                bench.inbox.put_state(Stamped { value, at_us });
             }
             match request {
                 0..16 => bench.ask(Request::Arm),

@@ -344,7 +344,7 @@ impl Health {
     fn elements(&self) -> impl Iterator<Item = f32> {
         let Health { tick_us, tick_max_us, rate_hz, late_ticks, saturated_ticks, state_age_us, .. } = *self;
         let ticks = [tick_us, tick_max_us, rate_hz, late_ticks as f32, saturated_ticks as f32, state_age_us];
-        let estimates = [self.theta_norm, self.delta].map(|estimate| Axis::ALL.map(|axis| *estimate.get(axis)));
+        let estimates = [self.theta_norm, self.delta].map(|estimate| Axis::ALL.map(|axis| estimate[axis]));
         let StatesRefused { overtaken, late, elsewhere, frozen } = self.states_refused;
         let counts = self.link.to_array().into_iter().chain([self.unanswered, overtaken, late, elsewhere, frozen]);
         ticks.into_iter().chain(estimates.into_iter().flatten()).chain(counts.map(|count| count as f32))

@@ -57,7 +57,7 @@ impl Answers {
         match places.find(|(place, _)| place.is_none()) {
             Some((place, ticket)) => {
                 *place = Some(Open { command: id, from, at_us });
-                inbox.ask(Asked { request, ticket });
+                inbox.request(Asked { request, ticket });
             }
             // One that stops the motors is on its way.
             None if kills => self.answer(id, Answer::Accepted, from),

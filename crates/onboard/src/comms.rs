@@ -98,12 +98,12 @@ impl Comms {
             Uplink::State { sent_us, state: value } => {
                 let sender = u16::from_be_bytes([from.system, from.component]);
                 if let Some(measured) = tracker.stamp(sender, sent_us, *now_us, value) {
-                    news.measure(measured);
+                    news.put_state(measured);
                     *state = Some(value);
                     *state_is_news = true;
                 }
             }
-            Uplink::Setpoint(value) => news.aim(Stamped { value, at_us: *now_us }),
+            Uplink::Setpoint(value) => news.put_setpoint(Stamped { value, at_us: *now_us }),
             Uplink::Command(command) => answers.hear(command, from, *now_us, &mut news),
         });
         news
@@ -158,11 +158,11 @@ impl Comms {
             text(MavSeverity::MAV_SEVERITY_CRITICAL, TICK_OFF);
         }
         // While the vehicle flies blind no law says anything.
-        if report.mode != Mode::Riding {
+        if report.mode != Mode::Coasting {
             self.trip = trip;
         }
         if let Some((axis, norm)) = report.learnt {
-            *self.norms.get_mut(axis) = norm;
+            self.norms[axis] = norm;
         }
         if HEARTBEAT.is_due(self.tick) {
             let failsafe = self.failsafes.within(HEARTBEAT.period, self.tick);
@@ -189,8 +189,8 @@ impl Comms {
                 late_ticks: health.rate.off_ticks(),
                 saturated_ticks: report.saturated_ticks,
                 state_age_us: health.state_age_us as f32,
-                theta_norm: PerAxis::from_fn(|axis| norm(self.norms.get(axis))),
-                delta: PerAxis::from_fn(|axis| self.norms.get(axis).delta),
+                theta_norm: PerAxis::from_fn(|axis| norm(&self.norms[axis])),
+                delta: PerAxis::from_fn(|axis| self.norms[axis].delta),
                 link: *self.decoder.counters(),
                 unanswered: self.answers.unanswered(),
                 states_refused: StatesRefused { overtaken, late, elsewhere, frozen: health.frozen_states },

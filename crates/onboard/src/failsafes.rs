@@ -7,7 +7,7 @@ use afbc_link::MavSeverity;
 /// How bad it is, and what it is.
 pub(crate) type Notice = (MavSeverity, &'static str);
 
-const RIDING: Notice = (MavSeverity::MAV_SEVERITY_WARNING, "no fresh state for 20 ms: riding it out");
+const COASTING: Notice = (MavSeverity::MAV_SEVERITY_WARNING, "no fresh state for 20 ms: coasting");
 const DESCENDING: Notice = (MavSeverity::MAV_SEVERITY_CRITICAL, "no state for 0.25 s: coming down");
 const STATE_LOST: Notice = (MavSeverity::MAV_SEVERITY_EMERGENCY, "no state for 2.25 s: motors stopped");
 const TUMBLED: Notice = (MavSeverity::MAV_SEVERITY_EMERGENCY, "tumbled: motors stopped");
@@ -29,15 +29,15 @@ impl Failsafes {
         let entered = (*mode != self.mode).then_some(*mode);
         let given_up = matches!(ended, Some(End::StateLost | End::Tumbled));
         // A vehicle that comes down needs no setpoint.
-        let setpoint_lost = matches!(mode, Mode::Flying | Mode::Riding) && health.setpoint_stale;
+        let setpoint_lost = matches!(mode, Mode::Flying | Mode::Coasting) && health.setpoint_stale;
         let notices = [
-            (entered == Some(Mode::Riding)).then_some(RIDING),
+            (entered == Some(Mode::Coasting)).then_some(COASTING),
             (entered == Some(Mode::Descending)).then_some(DESCENDING),
             (*ended == Some(End::StateLost)).then_some(STATE_LOST),
             (*ended == Some(End::Tumbled)).then_some(TUMBLED),
             (setpoint_lost && !self.setpoint_lost).then_some(SETPOINT_LOST),
         ];
-        if matches!(mode, Mode::Riding | Mode::Descending) || given_up || setpoint_lost {
+        if matches!(mode, Mode::Coasting | Mode::Descending) || given_up || setpoint_lost {
             self.last = Some(tick);
         }
         (self.mode, self.setpoint_lost) = (*mode, setpoint_lost);

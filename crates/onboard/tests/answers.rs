@@ -196,7 +196,7 @@ fn every_refusal_is_told_with_its_reason() {
                 _ => (Command::Arm, 400),
             };
             bench.hear(Uplink::Command(command));
-            let asked = bench.inbox.take().request().expect("asked");
+            let asked = bench.inbox.take().asked().expect("asked");
             assert_eq!(asked.request, request);
             let answer = afbc_flight_core::Answer { ticket: asked.ticket, request, result: Err(refusal) };
             let said = bench.said(&Report { answer: Some(answer), ..idle });
@@ -262,7 +262,7 @@ fn everything_at_once_fits() {
         }
         bench.hear(Uplink::Command(Command::Arm));
         let odd = round % 2 == 1;
-        let mode = if odd { Mode::Riding } else { Mode::Disarmed };
+        let mode = if odd { Mode::Coasting } else { Mode::Disarmed };
         let ended = odd.then_some(End::StateLost);
         let mut report = Report { mode, ended, answer: Some(answer), time_us: bench.now_us, ..idle };
         report.health.setpoint_stale = odd;

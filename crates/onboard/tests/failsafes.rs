@@ -54,7 +54,7 @@ fn losing_the_state_is_told_step_by_step() {
     let (told, heartbeats) = fly(&mut bench, 5000, false, true);
     let severities: Vec<_> = told.iter().map(|(severity, _)| *severity).collect();
     assert_eq!(severities, [WARNING, CRITICAL, EMERGENCY], "{told:?}");
-    for ((_, text), word) in told.iter().zip(["riding", "coming down", "motors stopped"]) {
+    for ((_, text), word) in told.iter().zip(["coasting", "coming down", "motors stopped"]) {
         assert!(text.contains(word) && text.contains("state"), "{text}");
     }
     // Lost after 2.25 s, and a second more.
@@ -69,7 +69,7 @@ fn a_short_gap_shows_in_the_next_heartbeat() {
         let mut bench = Bench::flying();
         assert_eq!(fly(&mut bench, before, true, true).0, []);
         let (told, mut heartbeats) = fly(&mut bench, 30, false, true);
-        assert!(matches!(told.as_slice(), [(WARNING, text)] if text.contains("riding")), "{told:?}");
+        assert!(matches!(told.as_slice(), [(WARNING, text)] if text.contains("coasting")), "{told:?}");
         let (told, after) = fly(&mut bench, 3000, true, true);
         assert_eq!(told, []);
         heartbeats.extend(after);
@@ -98,7 +98,7 @@ fn a_disarmed_vehicle_needs_neither() {
 }
 
 fn modes() -> impl Strategy<Value = (Mode, usize)> {
-    let mode = prop_oneof![Just(Mode::Disarmed), Just(Mode::Flying), Just(Mode::Riding), Just(Mode::Descending)];
+    let mode = prop_oneof![Just(Mode::Disarmed), Just(Mode::Flying), Just(Mode::Coasting), Just(Mode::Descending)];
     (mode, prop_oneof![1..5usize, 1..1500usize])
 }
 
@@ -124,14 +124,14 @@ proptest! {
                 let entered = tick == 0 && mode != last;
                 let severities: Vec<_> = notices(&said).into_iter().map(|(severity, _)| severity).collect();
                 let expected = match mode {
-                    Mode::Riding if entered => vec![WARNING],
+                    Mode::Coasting if entered => vec![WARNING],
                     Mode::Descending if entered => vec![CRITICAL],
                     Mode::Disarmed if given_up => vec![EMERGENCY],
                     _ => vec![],
                 };
                 prop_assert_eq!(severities, expected);
 
-                let failsafe = matches!(mode, Mode::Riding | Mode::Descending) || given_up;
+                let failsafe = matches!(mode, Mode::Coasting | Mode::Descending) || given_up;
                 since = if failsafe { 0 } else { since.saturating_add(1) };
                 since_heartbeat |= failsafe;
                 if let Some(critical) = critical(&said) {

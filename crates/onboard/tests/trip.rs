@@ -65,7 +65,7 @@ fn a_gap_in_the_states_does_not_repeat_it() {
     assert_eq!(says(Mode::Flying, None), 0);
     assert_eq!(says(Mode::Flying, Some(trip)), 1);
     assert_eq!(says(Mode::Flying, Some(trip)), 0);
-    assert_eq!(says(Mode::Riding, None), 0);
+    assert_eq!(says(Mode::Coasting, None), 0);
     assert_eq!(says(Mode::Flying, Some(trip)), 0);
     assert_eq!(says(Mode::Flying, None), 0);
     assert_eq!(says(Mode::Flying, Some(trip)), 1);

@@ -15,7 +15,7 @@ pub const TICKS: u64 = 6_000;
 pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
     // At rest until it is armed.
     let (state, setpoint) = motion(tick.saturating_sub(ARMED) as f32 * 1e-3);
-    // Two gaps: one to ride out, one that ends in a descent.
+    // Two gaps: one to coast through, one that ends in a descent.
     let tracked = !(2_500..2_600).contains(&tick) && !(4_000..5_000).contains(&tick);
     if tracked {
         station.say(&Uplink::State { sent_us: tick * 1000, state });

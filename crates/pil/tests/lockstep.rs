@@ -30,8 +30,8 @@ fn every_bit_is_the_hosts() {
         modes.push(report.mode);
     }
     modes.dedup();
-    let [disarmed, flying, riding, descending] = [Mode::Disarmed, Mode::Flying, Mode::Riding, Mode::Descending];
-    assert_eq!(modes, [disarmed, flying, riding, flying, riding, descending, disarmed]);
+    let [disarmed, flying, coasting, descending] = [Mode::Disarmed, Mode::Flying, Mode::Coasting, Mode::Descending];
+    assert_eq!(modes, [disarmed, flying, coasting, flying, coasting, descending, disarmed]);
 
     let counts = replies.iter().map(|reply| reply.instructions);
     println!("instructions of the worst tick: {}", counts.max().unwrap());

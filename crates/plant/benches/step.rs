@@ -87,29 +87,29 @@ fn ideal(bencher: Bencher, model: Model) {
 #[divan::bench(args = MODELS, sample_count = 200, sample_size = 2000)]
 fn rotor_lag(bencher: Bencher, model: Model) {
     let realism = Realism { rotors: lag(), ..Realism::default() };
-    fly(bencher, Plant::with(model, start(), environment(), &realism, STEP_S).unwrap());
+    fly(bencher, Plant::with_realism(model, start(), environment(), &realism, STEP_S).unwrap());
 }
 
 #[divan::bench(args = MODELS, sample_count = 200, sample_size = 2000)]
 fn lag_drag_turbulence(bencher: Bencher, model: Model) {
-    fly(bencher, Plant::with(model, start(), environment(), &usual(), STEP_S).unwrap());
+    fly(bencher, Plant::with_realism(model, start(), environment(), &usual(), STEP_S).unwrap());
 }
 
 #[divan::bench(args = MODELS, sample_count = 200, sample_size = 2000)]
 fn all(bencher: Bencher, model: Model) {
-    fly(bencher, Plant::with(model, start(), environment(), &everything(), STEP_S).unwrap());
+    fly(bencher, Plant::with_realism(model, start(), environment(), &everything(), STEP_S).unwrap());
 }
 
 #[divan::bench(args = MODELS, sample_count = 200, sample_size = 2000)]
 fn drag_in_still_air(bencher: Bencher, model: Model) {
     let realism = Realism { drag: Some(Drag::PAPER), ..Realism::default() };
-    fly(bencher, Plant::with(model, start(), environment(), &realism, STEP_S).unwrap());
+    fly(bencher, Plant::with_realism(model, start(), environment(), &realism, STEP_S).unwrap());
 }
 
 /// As a campaign flies: everything usual, and the sensors.
 #[divan::bench(sample_count = 200, sample_size = 2000)]
 fn lag_drag_turbulence_sensors(bencher: Bencher) {
-    let mut plant = Plant::with(Model::RigidBody, start(), environment(), &usual(), STEP_S).unwrap();
+    let mut plant = Plant::with_realism(Model::RigidBody, start(), environment(), &usual(), STEP_S).unwrap();
     let mut sensors = sensors();
     bencher.counter(ItemsCount::new(1_usize)).bench_local(|| {
         let motion = plant.motion();

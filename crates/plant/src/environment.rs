@@ -201,9 +201,9 @@ impl Environment {
         let scale = PerAxis { roll: i.x, pitch: i.y, yaw: i.z, z: m, x: m, y: m };
         let mut a = PerAxis::<f64>::default();
         for gust in self.gusts.iter().filter(|g| active(g.start_s, g.end_s, t)) {
-            *a.get_mut(gust.axis) += match gust.kind {
+            a[gust.axis] += match gust.kind {
                 GustKind::Acceleration => gust.size,
-                GustKind::Force => gust.size / scale.get(gust.axis),
+                GustKind::Force => gust.size / scale[gust.axis],
             };
         }
         let changes = self.changes.iter().flat_map(|c| [c.start_s, c.end_s]);

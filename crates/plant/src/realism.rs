@@ -16,7 +16,7 @@ use nalgebra::{Vector3, Vector4};
 /// Accepted range of a step \[s\].
 pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
 
-/// What [`Plant::with`](crate::Plant::with) adds to a vehicle. The default adds nothing: the paper's plant to the bit, as
+/// What [`Plant::with_realism`](crate::Plant::with_realism) adds to a vehicle. The default adds nothing: the paper's plant to the bit, as
 /// long as no rotor is commanded beyond 10,000 rad/s.
 ///
 /// Measurement is apart, in [`Sensors`](crate::Sensors): it comes between this plant and its controller.
@@ -42,7 +42,7 @@ pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
 ///     ..Realism::default()
 /// };
 /// let environment = Environment::calm(Parameters::PAPER)?;
-/// let mut plant = Plant::with(Model::RigidBody, Motion::default(), environment, &realism, 0.001)?;
+/// let mut plant = Plant::with_realism(Model::RigidBody, Motion::default(), environment, &realism, 0.001)?;
 /// for _ in 0..100 {
 ///     plant.step(&RotorSpeeds(Vector4::repeat(199.9)), 0.001);
 /// }

@@ -111,7 +111,7 @@ impl Plant {
     ///
     /// # Errors
     /// The first setting out of range.
-    pub fn with(
+    pub fn with_realism(
         model: Model,
         initial: Motion,
         environment: Environment,

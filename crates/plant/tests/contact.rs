@@ -13,7 +13,7 @@ const MODELS: [Model; 2] = [Model::Simplified, Model::RigidBody];
 
 fn plant(model: Model, initial: Motion) -> Plant {
     let realism = Realism { contact: Some(C), ..Realism::default() };
-    Plant::with(model, initial, Environment::calm(P).unwrap(), &realism, STEP_S).unwrap()
+    Plant::with_realism(model, initial, Environment::calm(P).unwrap(), &realism, STEP_S).unwrap()
 }
 
 fn at(height_m: f64) -> Motion {
@@ -101,7 +101,7 @@ fn contact_that_the_step_cannot_follow_is_refused() {
     let refused = |contact: Contact, step_s| {
         let realism = Realism { contact: Some(contact), ..Realism::default() };
         let environment = Environment::calm(P).unwrap();
-        Plant::with(Model::RigidBody, Motion::default(), environment, &realism, step_s).unwrap_err().range.name
+        Plant::with_realism(Model::RigidBody, Motion::default(), environment, &realism, step_s).unwrap_err().range.name
     };
     assert_eq!(refused(C, 0.01), "sink_m");
     assert_eq!(refused(Contact { sink_m: 1e-4, ..C }, STEP_S), "sink_m");
@@ -150,7 +150,7 @@ fn thrust_near_the_ground_follows_cheeseman_and_bennett() {
 
     let realism = Realism { ground_effect: Some(effect), ..Realism::default() };
     let environment = Environment::calm(P).unwrap();
-    let mut plant = Plant::with(Model::RigidBody, at(0.2), environment, &realism, 1e-4).unwrap();
+    let mut plant = Plant::with_realism(Model::RigidBody, at(0.2), environment, &realism, 1e-4).unwrap();
     plant.step(&RotorSpeeds(Vector4::repeat(200.0)), 1e-4);
     let lift = 16.0 / 15.0 * 4.0 * P.thrust_factor_n_s2 * 4e4 / P.mass_kg - P.gravity_m_s2;
     assert!((plant.motion().velocity_m_s.z - lift * 1e-4).abs() < 1e-12);

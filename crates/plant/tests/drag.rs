@@ -23,7 +23,7 @@ fn none() -> Drag {
 fn plant(model: Model, initial: Motion, drag: Drag, steady_m_s: Vector3<f64>) -> Plant {
     let wind = Wind { steady_m_s, ..Wind::default() };
     let realism = Realism { drag: Some(drag), wind, ..Realism::default() };
-    Plant::with(model, initial, Environment::calm(P).unwrap(), &realism, STEP_S).unwrap()
+    Plant::with_realism(model, initial, Environment::calm(P).unwrap(), &realism, STEP_S).unwrap()
 }
 
 fn hover() -> RotorSpeeds {
@@ -131,7 +131,7 @@ fn drag_that_the_step_cannot_follow_is_refused() {
     let refused = |drag: Drag| {
         let realism = Realism { drag: Some(drag), ..Realism::default() };
         let environment = Environment::calm(P).unwrap();
-        Plant::with(Model::RigidBody, Motion::default(), environment, &realism, 0.02).unwrap_err().range.name
+        Plant::with_realism(Model::RigidBody, Motion::default(), environment, &realism, 0.02).unwrap_err().range.name
     };
     assert_eq!(refused(Drag { blade_n_s2_m: 0.01, ..none() }), "blade_n_s2_m");
     // Slow enough for the mass, but not for the inertia that the hubs turn.
@@ -205,7 +205,7 @@ proptest! {
         let after = |drag: Drag| {
             let wind = Wind { steady_m_s: wind, ..Wind::default() };
             let realism = Realism { drag: Some(drag), wind, ..Realism::default() };
-            let mut plant = Plant::with(model, initial, Environment::calm(P).unwrap(), &realism, SHORT_S).unwrap();
+            let mut plant = Plant::with_realism(model, initial, Environment::calm(P).unwrap(), &realism, SHORT_S).unwrap();
             plant.step(&speeds, SHORT_S);
             plant.motion()
         };
@@ -236,7 +236,7 @@ proptest! {
         let realism = Realism {
             drag: Some(none()), wind: Wind { steady_m_s: wind, ..Wind::default() }, ..Realism::default()
         };
-        let mut with = Plant::with(model, initial, environment(), &realism, STEP_S).unwrap();
+        let mut with = Plant::with_realism(model, initial, environment(), &realism, STEP_S).unwrap();
         let mut without = Plant::new(model, initial, environment());
         for _ in 0..100 {
             with.step(&RotorSpeeds(Vector4::from(speeds)), STEP_S);

@@ -61,7 +61,7 @@ fn flights_of_the_ideal_plant_stay_what_they_were() {
 #[test]
 fn realism_that_adds_nothing_changes_no_bit() {
     for model in [Model::Simplified, Model::RigidBody] {
-        let real = Plant::with(model, start(), environment(), &Realism::default(), STEP_S).unwrap();
+        let real = Plant::with_realism(model, start(), environment(), &Realism::default(), STEP_S).unwrap();
         assert_eq!(hash(real), hash(Plant::new(model, start(), environment())));
     }
 }

@@ -123,7 +123,7 @@ proptest! {
     ) {
         let model = if rigid { Model::RigidBody } else { Model::Simplified };
         let environment = Environment::calm(Parameters::PAPER).unwrap();
-        let mut plant = Plant::with(model, motion, environment, &realism, STEP_S).unwrap();
+        let mut plant = Plant::with_realism(model, motion, environment, &realism, STEP_S).unwrap();
         let mut sensors = Sensors::new(&sensing(), realism.seed, STEP_S).unwrap();
         for command in commands.iter().cycle().take(2000) {
             plant.step(&RotorSpeeds(Vector4::from(*command)), STEP_S);
@@ -139,7 +139,7 @@ proptest! {
     fn the_same_seed_flies_the_same_flight_to_the_bit(realism in realism(), motion in motion()) {
         let fly = || {
             let environment = Environment::calm(Parameters::PAPER).unwrap();
-            let mut plant = Plant::with(Model::RigidBody, motion, environment, &realism, STEP_S).unwrap();
+            let mut plant = Plant::with_realism(Model::RigidBody, motion, environment, &realism, STEP_S).unwrap();
             let mut sensors = Sensors::new(&sensing(), realism.seed, STEP_S).unwrap();
             let mut seen = Vec::new();
             for _ in 0..200 {
@@ -174,7 +174,7 @@ fn a_flight_with_everything_stays_what_it_is() {
     };
     let initial = Motion { position_m: Vector3::new(0.0, 0.0, 1.0), ..Motion::default() };
     let environment = Environment::calm(Parameters::PAPER).unwrap();
-    let mut plant = Plant::with(Model::RigidBody, initial, environment, &realism, STEP_S).unwrap();
+    let mut plant = Plant::with_realism(Model::RigidBody, initial, environment, &realism, STEP_S).unwrap();
     let mut sensors = Sensors::new(&sensing(), 11, STEP_S).unwrap();
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     for _ in 0..3000 {

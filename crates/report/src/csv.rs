@@ -47,7 +47,7 @@ fn lyapunov(model: &Model, sample: &Sample) -> PerAxis<f32> {
     let context =
         Context { state: &state, rotor_residual_rad_s, dt_s: 0.0, adapt: false, unallocated: PerAxis::default() };
     PerAxis::from_fn(|axis| {
-        let errors = sample.trace.errors.get(axis);
+        let errors = &sample.trace.errors[axis];
         0.5 * errors.e1 * errors.e1 + 0.5 * errors.e2 * errors.e2 / model.dynamics(axis, &context).g
     })
 }
@@ -137,21 +137,21 @@ fn columns(scenario: &Scenario, law: &Law) -> Vec<Column> {
             Axis::Z => ["m", "m_s", "n"],
             Axis::X | Axis::Y => ["m", "m_s", "m_s2"],
         };
-        add(format!("e1_{name}_{e1}"), Box::new(move |row| Single(row.sample.trace.errors.get(axis).e1)));
+        add(format!("e1_{name}_{e1}"), Box::new(move |row| Single(row.sample.trace.errors[axis].e1)));
         if backstepping {
-            add(format!("e2_{name}_{e2}"), Box::new(move |row| Single(row.sample.trace.errors.get(axis).e2)));
+            add(format!("e2_{name}_{e2}"), Box::new(move |row| Single(row.sample.trace.errors[axis].e2)));
         }
         if adaptive {
-            let estimate = move |row: &Row| *row.sample.estimates.get(axis);
+            let estimate = move |row: &Row| row.sample.estimates[axis];
             add(format!("delta_hat_{name}_{u}"), Box::new(move |row| Single(estimate(row).delta)));
             add(format!("theta_norm_{name}_{u}"), Box::new(move |row| Single(estimate(row).theta.norm())));
         }
         if backstepping {
-            add(format!("lyapunov_{name}"), Box::new(move |row| Single(*row.lyapunov.get(axis))));
+            add(format!("lyapunov_{name}"), Box::new(move |row| Single(row.lyapunov[axis])));
         }
     }
     if backstepping {
-        let sum = |row: &Row| Axis::ALL.iter().map(|&axis| row.lyapunov.get(axis)).sum();
+        let sum = |row: &Row| Axis::ALL.iter().map(|&axis| &row.lyapunov[axis]).sum();
         add("lyapunov_sum".into(), Box::new(move |row| Single(sum(row))));
     }
     if let Law::Guarded(_) = law {

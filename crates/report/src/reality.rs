@@ -67,7 +67,7 @@ fn sensors(scenario: &Scenario) -> Vec<(&'static str, String)> {
         let end = if outage.end_s.is_finite() { format!("to {:.4} s", outage.end_s) } else { "to the end".into() };
         add(true, "no state", format!("from {} s {end}", outage.start_s));
     }
-    add(scenario.flight_core, "flight core", "rides and descends while no state arrives".into());
+    add(scenario.flight_core, "flight core", "coasts and descends while no state arrives".into());
     if let Some(dropouts) = dropouts {
         add(true, "dropouts", format!("{} a second, {} s on average", dropouts.rate_hz, dropouts.mean_s));
     }

@@ -263,7 +263,7 @@ fn gains(contender: &Contender) -> Markup {
         p.quiet { (contender.kind().title()) ", " (settings) "." }
         @match &contender.law {
             Law::Afbc(gains) | Law::Guarded(gains) => (per_axis(&AFBC_GAINS, |axis| {
-                let g = gains.get(axis);
+                let g = &gains[axis];
                 vec![
                     g.backstepping.alpha1,
                     g.backstepping.alpha2,
@@ -280,7 +280,7 @@ fn gains(contender: &Contender) -> Markup {
                 ]
             })),
             Law::Backstepping(gains) => (per_axis(&["α₁", "α₂"], |axis| {
-                vec![gains.get(axis).alpha1, gains.get(axis).alpha2]
+                vec![gains[axis].alpha1, gains[axis].alpha2]
             })),
             law => (by_name(*law)),
         }

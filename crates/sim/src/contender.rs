@@ -118,7 +118,7 @@ impl Law {
 
 /// alpha_1 and alpha_2, which AFBC shares with backstepping.
 pub fn backstepping_part(gains: &PerAxis<adaptive::Gains>) -> PerAxis<backstepping::Gains> {
-    PerAxis::from_fn(|axis| gains.get(axis).backstepping)
+    PerAxis::from_fn(|axis| gains[axis].backstepping)
 }
 
 /// A controller as it flies: a name, a law with its gains, the settings around it.

@@ -76,7 +76,7 @@ pub fn held_out() -> Result<Vec<Scenario>, Box<dyn Error>> {
     ])
 }
 
-/// `scenario` on a link that goes down for 240 ms at each of these times; the flight core rides that out.
+/// `scenario` on a link that goes down for 240 ms at each of these times; the flight core coasts through that.
 fn blind(scenario: Scenario, starts_s: &[f64]) -> Scenario {
     let outages = starts_s.iter().map(|&start_s| Outage { start_s, end_s: start_s + 0.24 }).collect();
     Scenario { outages, flight_core: true, ..scenario }

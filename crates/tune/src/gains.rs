@@ -55,10 +55,10 @@ fn each_tunable(contender: &mut Contender, visit: Visit) {
 fn each_group<G: Copy>(gains: &mut PerAxis<G>, visit: &mut dyn FnMut(&str, &mut G)) {
     for group in GROUPS {
         let [first, ..] = group else { continue };
-        let mut shared = *gains.get(*first);
+        let mut shared = gains[*first];
         visit(&group.iter().map(|axis| axis.name()).collect::<Vec<_>>().join(", "), &mut shared);
         for axis in group {
-            *gains.get_mut(*axis) = shared;
+            gains[*axis] = shared;
         }
     }
 }
@@ -169,7 +169,7 @@ fn keys(contender: &Contender) -> Vec<Key> {
     match &mut law {
         Law::Afbc(gains) | Law::Guarded(gains) => {
             for axis in Axis::ALL {
-                let (table, gains) = (format!("gains.{}", axis.name()), gains.get_mut(axis));
+                let (table, gains) = (format!("gains.{}", axis.name()), &mut gains[axis]);
                 for (range, gain) in gains.tunables() {
                     put(&table, range.name, gain.to_string());
                 }
@@ -180,7 +180,7 @@ fn keys(contender: &Contender) -> Vec<Key> {
         }
         Law::Backstepping(gains) => {
             for axis in Axis::ALL {
-                for (range, gain) in gains.get_mut(axis).tunables() {
+                for (range, gain) in gains[axis].tunables() {
                     put(&format!("gains.{}", axis.name()), range.name, gain.to_string());
                 }
             }

@@ -30,7 +30,7 @@ fn afbc_gains(axis: Axis) -> adaptive::Gains {
         Axis::Z => (4.0, 8.0, 30.0, 0.9, 1.0),
         Axis::X | Axis::Y => (3.0, 6.0, 40.0, 0.3, 0.5),
     };
-    let mut gains = *Profile::Flight.gains().get(axis);
+    let mut gains = Profile::Flight.gains()[axis];
     gains.backstepping.alpha1 = alpha1;
     gains.backstepping.alpha2 = alpha2;
     gains.gamma = gamma;

@@ -1,5 +1,8 @@
 //! The six second-order subsystems of (7).
 
+use core::convert::Infallible;
+use core::ops::{Index, IndexMut};
+
 /// One of the six subsystems, in the paper's order i = 1..6.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Axis {
@@ -61,18 +64,35 @@ pub struct PerAxis<T> {
 impl<T> PerAxis<T> {
     /// Makes each axis' value from its name.
     pub fn from_fn(mut make: impl FnMut(Axis) -> T) -> Self {
-        PerAxis {
-            roll: make(Axis::Roll),
-            pitch: make(Axis::Pitch),
-            yaw: make(Axis::Yaw),
-            z: make(Axis::Z),
-            x: make(Axis::X),
-            y: make(Axis::Y),
-        }
+        let Ok(made) = Self::try_from_fn(|axis| Ok::<T, Infallible>(make(axis)));
+        made
     }
 
-    /// The value of `axis`.
-    pub const fn get(&self, axis: Axis) -> &T {
+    /// Makes each axis' value from its name, as long as that succeeds.
+    ///
+    /// # Errors
+    /// The first error of `make`.
+    pub fn try_from_fn<E>(mut make: impl FnMut(Axis) -> Result<T, E>) -> Result<Self, E> {
+        Ok(PerAxis {
+            roll: make(Axis::Roll)?,
+            pitch: make(Axis::Pitch)?,
+            yaw: make(Axis::Yaw)?,
+            z: make(Axis::Z)?,
+            x: make(Axis::X)?,
+            y: make(Axis::Y)?,
+        })
+    }
+
+    /// What `change` makes of each axis' value.
+    pub fn map<U>(&self, mut change: impl FnMut(&T) -> U) -> PerAxis<U> {
+        PerAxis::from_fn(|axis| change(&self[axis]))
+    }
+}
+
+impl<T> Index<Axis> for PerAxis<T> {
+    type Output = T;
+
+    fn index(&self, axis: Axis) -> &T {
         match axis {
             Axis::Roll => &self.roll,
             Axis::Pitch => &self.pitch,
@@ -82,9 +102,10 @@ impl<T> PerAxis<T> {
             Axis::Y => &self.y,
         }
     }
+}
 
-    /// The value of `axis`, to change it.
-    pub const fn get_mut(&mut self, axis: Axis) -> &mut T {
+impl<T> IndexMut<Axis> for PerAxis<T> {
+    fn index_mut(&mut self, axis: Axis) -> &mut T {
         match axis {
             Axis::Roll => &mut self.roll,
             Axis::Pitch => &mut self.pitch,

@@ -119,12 +119,12 @@ impl<G: Declared> Declared for PerAxis<G> {
         Axis::ALL.into_iter().try_for_each(|axis| {
             let in_axis =
                 &mut |declaration: &Declaration, value: Value<'_>| visit(&declaration.in_group(axis.name()), value);
-            self.get_mut(axis).visit_mut(in_axis)
+            self[axis].visit_mut(in_axis)
         })
     }
 
     fn together(&self) -> Result<(), OutOfRange> {
-        Axis::ALL.into_iter().try_for_each(|axis| self.get(axis).together())
+        Axis::ALL.into_iter().try_for_each(|axis| self[axis].together())
     }
 }
 
@@ -175,7 +175,7 @@ impl Field for bool {
 
 impl<T: Field> Field for PerAxis<T> {
     fn show<E>(&mut self, declaration: &Declaration, visit: Visit<'_, E>) -> Result<(), E> {
-        Axis::ALL.into_iter().try_for_each(|axis| self.get_mut(axis).show(&declaration.in_group(axis.name()), visit))
+        Axis::ALL.into_iter().try_for_each(|axis| self[axis].show(&declaration.in_group(axis.name()), visit))
     }
 }
 

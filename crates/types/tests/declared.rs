@@ -144,10 +144,10 @@ fn what_goes_together_is_checked_at_every_depth() {
     for axis in Axis::ALL {
         let mut axes = PerAxis::from_fn(|_| Inner::DEFAULT);
         assert_eq!(axes.validate(), Ok(()));
-        axes.get_mut(axis).second = 0.2;
+        axes[axis].second = 0.2;
         assert_eq!(axes.validate(), Err(error));
         // A range comes before what goes together, wherever it is.
-        axes.get_mut(axis.next()).first_m = 2.0;
+        axes[axis.next()].first_m = 2.0;
         assert_eq!(axes.validate().unwrap_err().range, Inner::FIRST.range);
     }
 }

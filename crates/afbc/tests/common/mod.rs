@@ -199,7 +199,7 @@ pub(crate) fn check_step(step: &Stepped, settings: &Settings) -> Result<(), Test
         .chain(trace.desired_rad)
         .chain(trace.filtered.iter().flat_map(|f| [f.angle, f.rate]))
         .chain(Axis::ALL.iter().flat_map(|axis| {
-            let errors = trace.errors.get(*axis);
+            let errors = &trace.errors[*axis];
             [errors.e1, errors.e1_dot, errors.e2]
         }));
     for number in numbers {

@@ -12,7 +12,7 @@ use core::convert::Infallible;
 /// Ticks before the first step: the flight core arms once it has measured its rate.
 const TICKS_HELD: u64 = WINDOW_US as u64 / PERIOD_US + 1;
 
-/// A controller that the flight core flies: without a state it rides blind, then descends.
+/// A controller that the flight core flies: without a state it coasts blind, then descends.
 pub struct Aboard<C: FlightController> {
     vehicle: Vehicle<C>,
     memory: Memory<C::Memory>,
@@ -36,9 +36,9 @@ impl<C: FlightController> Aboard<C> {
         self.now_us += PERIOD_US;
         let at_us = self.now_us;
         if let Some(value) = state {
-            self.inbox.measure(Stamped { value, at_us });
+            self.inbox.put_state(Stamped { value, at_us });
         }
-        self.inbox.aim(Stamped { value: setpoint, at_us });
+        self.inbox.put_setpoint(Stamped { value: setpoint, at_us });
         let inbox = self.inbox.take();
         let outcome = self.vehicle.tick(&mut self.memory, at_us, &inbox);
         Action { speeds: outcome.motors, forces: outcome.forces, health: outcome.health.control }
@@ -49,7 +49,7 @@ impl<C: FlightController> Aboard<C> {
         for _ in 0..TICKS_HELD {
             self.tick(Some(state), setpoint);
         }
-        self.inbox.ask(Asked { request: Request::Arm, ticket: 0 });
+        self.inbox.request(Asked { request: Request::Arm, ticket: 0 });
         self.tick(Some(state), setpoint);
     }
 }

@@ -107,7 +107,7 @@ impl Scenario {
             return Ok(Plant::new(self.model, self.initial, environment));
         }
         let realism = Realism { seed: self.seed, ..self.realism.clone() };
-        Plant::with(self.model, self.initial, environment, &realism, step_s)
+        Plant::with_realism(self.model, self.initial, environment, &realism, step_s)
     }
 
     /// The sensors, read every `step_s`; none if they are perfect.

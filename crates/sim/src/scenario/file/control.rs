@@ -23,7 +23,7 @@ pub(super) fn per_axis<G: Copy>(
     let mut gains = default;
     for axis in Axis::ALL {
         if let Some(table) = table.table(axis.name())? {
-            *gains.get_mut(axis) = read(table, default.get(axis))?;
+            gains[axis] = read(table, &default[axis])?;
         }
     }
     table.finish()?;
