@@ -1,0 +1,65 @@
+//! A law of one's own, flown against the plant: `cargo run --release -p afbc-sim --example own_law`.
+//!
+//! The law is small: acceleration by PD on position, thrust and tilt from that, moments by PD on attitude.
+#![allow(clippy::unwrap_used, reason = "an example whose parameters are not valid should say so")]
+
+use afbc_control::{Action, FlightController, Mixer, Trace};
+use afbc_sim::flight::{Alone, World, lockstep};
+use afbc_sim::scenario;
+use afbc_types::{Inputs, Parameters, Setpoint, State};
+use core::ops::ControlFlow;
+
+/// What is fixed: vehicle and mixer. What changed in flight would be in the type `Memory`.
+struct OwnLaw {
+    vehicle: Parameters,
+    mixer: Mixer,
+}
+
+impl FlightController for OwnLaw {
+    type Memory = ();
+
+    fn dt_s(&self) -> f32 {
+        0.001
+    }
+
+    fn mixer(&self) -> &Mixer {
+        &self.mixer
+    }
+
+    fn decide(&self, (): &mut (), state: &State, setpoint: &Setpoint, _fresh: bool) -> Action {
+        let Parameters { mass_kg, gravity_m_s2, arm_m, inertia_kg_m2, .. } = self.vehicle;
+        let acceleration = (setpoint.position_m - state.position_m) * 2.0
+            + (setpoint.velocity_m_s - state.velocity_m_s) * 2.5
+            + setpoint.acceleration_m_s2;
+        // Small angles, heading along x: positive pitch tilts the thrust to +x, positive roll to -y.
+        let tilt_rad =
+            [-acceleration.y / gravity_m_s2, acceleration.x / gravity_m_s2].map(|tilt| tilt.clamp(-0.4, 0.4));
+        let (eta, omega) = (state.attitude_rad, state.rates_rad_s);
+        let moment = |error: f32, rate: f32| 100.0 * error - 18.0 * rate;
+        self.mixer.action(&Inputs {
+            roll_n: moment(tilt_rad[0] - eta.x, omega.x) * inertia_kg_m2.x / arm_m,
+            pitch_n: moment(tilt_rad[1] - eta.y, omega.y) * inertia_kg_m2.y / arm_m,
+            yaw_n: 0.5 * (setpoint.yaw_rad - eta.z) - 0.5 * omega.z,
+            thrust_n: mass_kg * (gravity_m_s2 + acceleration.z),
+        })
+    }
+
+    fn trace((): &()) -> Trace {
+        Trace::default()
+    }
+}
+
+fn main() {
+    let text = scenario::built_in("hover").unwrap().text;
+    let scenario = scenario::parse("hover", text, "hover").unwrap();
+    let vehicle = scenario.vehicle.to_f32();
+    let law = OwnLaw { vehicle, mixer: Mixer::new(&vehicle, 3.0).unwrap() };
+    let mut world = World::new(&scenario, 0.001).unwrap();
+    let mut distance_m = 0.0;
+    let Ok(end) = lockstep(&mut world, &mut Alone::new(law), scenario.duration_s, |sample| {
+        distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
+        ControlFlow::Continue(())
+    });
+    println!("{}: {:?}, {distance_m:.4} m from its place in the end", scenario.name, end.lost);
+    assert!(end.lost.is_none() && distance_m < 0.05);
+}
