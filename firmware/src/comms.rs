@@ -2,9 +2,9 @@
 
 use crate::board::{Receiver, Transmitter};
 use crate::control::{self, Tick};
-use afbc_onboard::{Comms, REPORT_MAX};
+pub use afbc_onboard::Comms;
+use afbc_onboard::REPORT_MAX;
 use core::sync::atomic::{AtomicU32, Ordering};
-use embassy_executor::SendSpawner;
 use embassy_futures::select::{Either, select};
 use heapless::Vec;
 
@@ -18,13 +18,8 @@ pub fn bad_frames() -> u32 {
     BAD_FRAMES.load(Ordering::Relaxed)
 }
 
-/// Starts listening.
-pub fn spawn(spawner: SendSpawner, receiver: Receiver, transmitter: Transmitter) {
-    spawner.spawn(task(Comms::new(), receiver, transmitter).expect("spawned once"));
-}
-
-#[embassy_executor::task]
-async fn task(mut comms: Comms, mut receiver: Receiver, mut transmitter: Transmitter) {
+/// Listens, and reports every tick.
+pub async fn run(comms: &mut Comms, receiver: &mut impl Receiver, transmitter: &mut impl Transmitter) -> ! {
     let mut incoming = [0; READ_MAX];
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     loop {
@@ -35,7 +30,7 @@ async fn task(mut comms: Comms, mut receiver: Receiver, mut transmitter: Transmi
                 BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
             }
             Either::Second(tick) => {
-                report(&mut comms, &tick, &mut outgoing);
+                report(comms, &tick, &mut outgoing);
                 transmitter.transmit(&tick, &outgoing);
             }
         }

@@ -1,15 +1,15 @@
 //! The control tick, 1000 times a second.
 
-use crate::board::{self, Outputs};
+use crate::board::Board;
 use crate::time::{self, Stopwatch};
 use afbc_flight_core::Inbox;
-use afbc_onboard::{Flight, Report};
+pub use afbc_onboard::Flight;
+use afbc_onboard::Report;
 use core::cell::RefCell;
 use core::future::poll_fn;
 use core::pin::pin;
 use core::sync::atomic::{AtomicU32, Ordering};
 use core::task::Poll;
-use embassy_executor::SendSpawner;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
@@ -60,20 +60,23 @@ pub fn with_inbox(change: impl FnOnce(&mut Inbox)) {
     INBOX.lock(|inbox| inbox.try_borrow_mut().ok().map(|mut inbox| change(&mut inbox)));
 }
 
-/// Starts the tick, disarmed.
-pub fn spawn(spawner: SendSpawner, outputs: Outputs) {
+/// The vehicle, disarmed.
+///
+/// # Panics
+/// If one of its parameters is out of range.
+pub fn flight() -> Flight {
     let Ok(flight) = Flight::new() else { panic!("a parameter of the vehicle is out of range") };
-    spawner.spawn(task(flight, outputs).expect("spawned once"));
+    flight
 }
 
-#[embassy_executor::task]
-async fn task(mut flight: Flight, mut outputs: Outputs) {
+/// Ticks. By reference: what a task hands on by value, it has room for twice.
+pub async fn run(flight: &mut Flight, board: &mut impl Board) -> ! {
     loop {
         // Not by a ticker, whose periods begin whenever it was made: one that begins just after a control period, which
         // is when alarms go off, ticks twice in every other one.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
-        let report = tick(&mut flight, &mut outputs);
+        let report = tick(flight, board);
         let cycles = stopwatch.cycles();
         CYCLES.store(cycles, Ordering::Relaxed);
         CYCLES_MAX.fetch_max(cycles, Ordering::Relaxed);
@@ -88,21 +91,21 @@ async fn task(mut flight: Flight, mut outputs: Outputs) {
 /// The top loop: take the newest inputs; supervise, control and gate the motors ([`afbc_flight_core::tick`]); drive them; check
 /// the rate. Out of line, so that its stack and its instructions can be counted (`docs/budgets.md`).
 #[inline(never)]
-fn tick(flight: &mut Flight, outputs: &mut Outputs) -> Report {
+fn tick<B: Board>(flight: &mut Flight, board: &mut B) -> Report {
     let now_us = Instant::now().as_micros();
     // Borrowed by nobody else while it is locked; and the tick holds no panic.
     let inbox = INBOX.lock(|inbox| inbox.try_borrow_mut().map_or(Inbox::EMPTY, |mut inbox| inbox.take()));
 
-    if board::clock_has_failed() {
+    if board.clock_has_failed() {
         flight.distrust_clock();
     }
     let report = flight.tick(now_us, &inbox);
 
-    outputs.drive(report.throttles);
+    board.drive(report.throttles);
     // A task that has failed is started anew by a reset, once that ends no flight.
-    let may_reset = board::task_has_failed() && !report.mode.armed();
+    let may_reset = board.task_has_failed() && !report.mode.armed();
     if report.health.rate.alive && !may_reset {
-        outputs.feed_watchdog();
+        board.feed_watchdog();
     }
     report
 }

@@ -1,9 +1,10 @@
-//! AFBC on an STM32F405RG at 168 MHz: a thin shell around [`afbc_flight_core`] and [`afbc_link`], which decide everything.
+//! AFBC on an STM32F405 at 168 MHz: a thin shell around [`afbc_flight_core`] and [`afbc_onboard`], which decide everything.
 //!
-//! # Two images, one code
+//! # One firmware, an image per board
 //!
-//! `flight` is what flies. `pil` is the same control tick, link, supervisor, executors and time base, with another
-//! [`board`]: it trades bytes with the host once a control tick, so that an emulator can fly it in lockstep.
+//! What differs from board to board is behind the trait [`board::Board`]; each folder of `boards/` implements it and is an
+//! image. `boards/stm32f405` is what flies. `boards/emulated` is the same control tick, link, supervisor, executors and time
+//! base on a board that trades bytes with the host once per control tick, so that an emulator can fly it in lockstep.
 //!
 //! # Priorities
 //!
@@ -22,29 +23,30 @@
 //! USART1 comes before the control tick because it holds one byte, and the next comes within 11 us.
 #![no_std]
 
-#[cfg(not(feature = "pil"))]
-pub mod clocks;
+pub mod board;
 pub mod comms;
 pub mod control;
 pub mod executors;
 pub mod housekeeping;
-#[cfg(not(feature = "pil"))]
-pub mod reset;
 pub mod time;
 
-#[cfg_attr(feature = "pil", path = "board/pil.rs")]
-#[cfg_attr(not(feature = "pil"), path = "board/flight.rs")]
-pub mod board;
+use board::Board;
+use embassy_executor::SendSpawner;
 
-/// Starts everything; the core then idles between interrupts.
-pub fn run(mut core: cortex_m::Peripherals) -> ! {
+/// Starts everything; the core then idles between interrupts. `control` and `comms` start the tasks that work on the board:
+/// [`image!`] has them.
+pub fn run<B: Board>(
+    mut core: cortex_m::Peripherals,
+    control: impl FnOnce(SendSpawner, B),
+    comms: impl FnOnce(SendSpawner, B::Receiver, B::Transmitter),
+) -> ! {
     let executors = executors::start(&mut core);
-    let board = board::start(executors.control);
+    let (board, receiver, transmitter) = B::start(executors.control);
     time::start(core.SYST);
-    comms::spawn(executors.comms, board.receiver, board.transmitter);
-    control::spawn(executors.control, board.outputs);
+    comms(executors.comms, receiver, transmitter);
+    control(executors.control, board);
     housekeeping::spawn(executors.housekeeping);
     loop {
-        board::idle();
+        B::idle();
     }
 }

@@ -12,7 +12,7 @@ use std::time::Duration;
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Bytes that a line of 921,600 baud carries in a control period.
 const BYTES_PER_PERIOD: f64 = 92.16;
-/// Bytes that wake the link's task (`firmware/src/board/flight.rs`).
+/// Bytes that wake the link's task (`boards/stm32f405/src/board.rs`).
 const BYTES_PER_WAKE: f64 = 32.0;
 
 /// Instructions, the most of some counts.
@@ -39,7 +39,7 @@ impl Beside {
             linked.function_named(name).ok_or_else(|| Error::Protocol(format!("the image has no function {name}")))
         };
         let [encode, systick, byte, wake] =
-            [address("firmware::board::encode")?, address("SysTick")?, address("USART1")?, address("CAN2_RX0")?];
+            [address("flight::board::encode")?, address("SysTick")?, address("USART1")?, address("CAN2_RX0")?];
         let mut board = Board::boot(elf)?;
         let mut station = Station::default();
         for count in 1..=50_u32 {

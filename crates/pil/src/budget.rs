@@ -59,7 +59,7 @@ const WAKER: [&str; 3] =
 
 /// Each executor's interrupt, and the tasks that it polls through a pointer, each by a function that it alone calls.
 const EXECUTORS: [(&str, &[&str]); 3] = [
-    ("CAN2_TX", &["firmware::control::tick", "firmware::board::encode"]),
+    ("CAN2_TX", &["firmware::control::tick", "flight::board::encode"]),
     ("CAN2_RX0", &["firmware::comms::report"]),
     ("CAN2_RX1", &["firmware::housekeeping::deepest_stack"]),
 ];
@@ -202,7 +202,7 @@ impl Linked {
         self.find(name)
     }
 
-    /// The address of a symbol, by its name in the source: `firmware::board::start::RX`.
+    /// The address of a symbol, by its name in the source: `flight::board::RX`.
     pub fn symbol(&self, name: &str) -> Option<u32> {
         self.symbols.get(name).copied()
     }

@@ -1,6 +1,6 @@
 //! Lockstep with the `pil` image.
 //!
-//! Two FIFOs carry it; their format is stated in `firmware/src/board/pil.rs`.
+//! Two FIFOs carry it; their format is stated in `boards/emulated/src/board.rs`.
 
 use crate::Error;
 use crate::qemu::{self, Qemu};

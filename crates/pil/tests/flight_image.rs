@@ -178,7 +178,7 @@ fn few_bytes_do_not_wake_the_link() {
         return;
     };
     let wake = linked.function_named("embassy_executor::raw::waker::wake").unwrap();
-    let ring = linked.symbol("firmware::board::start::RX").unwrap();
+    let ring = linked.symbol("flight::board::RX").unwrap();
     board.send(&[1; 31]).unwrap();
     let gdb = board.halt().unwrap();
     // Ticks go on waking tasks, the link's too.

@@ -9,7 +9,7 @@ const LEVEL_2_7_V: u8 = 0b00;
 const OFF: u8 = 0b11;
 
 /// Logs both.
-pub fn log() {
+pub(crate) fn log() {
     let csr = RCC.csr().read();
     // The flags stay until they are cleared, through resets too.
     RCC.csr().modify(|csr| csr.set_rmvf(true));

@@ -1,15 +1,15 @@
-//! The image for the processor in the loop. A panic or fault ends the emulator with a status that says which.
+//! The image for the processor in the loop, on QEMU's STM32F405. A panic or fault ends the emulator with a status that says
+//! which.
 #![no_std]
 #![no_main]
+
+mod board;
 
 use core::panic::PanicInfo;
 use defmt_rtt as _;
 use semihosting::process::exit;
 
-#[cortex_m_rt::entry]
-fn main() -> ! {
-    firmware::run(cortex_m::Peripherals::take().expect("taken once"))
-}
+firmware::image!(board::Emulated);
 
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {

@@ -1,7 +1,13 @@
-//! The real board: clocks, link, motors, watchdog. Pins and wiring are in `docs/firmware.md`.
+//! Link, motors and watchdog of the STM32F405RG; wiring is in `docs/firmware.md`.
+//!
+//! | what | where |
+//! |---|---|
+//! | crystal | 8 MHz on PH0, PH1 ([`clocks`]) |
+//! | link | USART1: TX on PA9, RX on PA10 |
+//! | motors 1 to 4 | TIM8, channels 1 to 4: PC6, PC7, PC8, PC9; played by DMA2's stream 1 |
+//! | memory | `memory.x` at the workspace's root |
+//! | sensors | none yet, so no alignment: the state comes over the link |
 
-use crate::control::Tick;
-use crate::executors::priority;
 use crate::{clocks, reset};
 use afbc_flight_core::dshot::{BIT_RATE_HZ, Timing};
 use core::future::poll_fn;
@@ -24,6 +30,9 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Instant, with_deadline};
 use embedded_io_async::{BufRead, Write};
+use firmware::board::{self, Board};
+use firmware::control::Tick;
+use firmware::executors::priority;
 use static_cell::StaticCell;
 
 /// Bits per second of the link.
@@ -39,62 +48,88 @@ const WATCHDOG_US: u32 = 20_000;
 /// A frame to the motors that takes longer is given up \[us\].
 const TRANSFER_MAX_US: u64 = 2_000;
 /// Timers of the second peripheral bus run at the core's clock \[Hz\].
-const MOTOR_TIMER_HZ: u32 = crate::time::CORE_HZ;
+const MOTOR_TIMER_HZ: u32 = firmware::time::CORE_HZ;
 
 bind_interrupts!(struct Irqs {
     USART1 => usart::BufferedInterruptHandler<USART1>;
     DMA2_STREAM1 => dma::InterruptHandler<DMA2_CH1>;
 });
 
-/// What the board offers, set up and still.
-pub struct Board {
-    /// Motors and watchdog.
-    pub outputs: Outputs,
-    /// The link, in.
-    pub receiver: Receiver,
-    /// The link, out.
-    pub transmitter: Transmitter,
+/// Rings of the link's bytes.
+static RX: StaticCell<[u8; 1024]> = StaticCell::new();
+static TX: StaticCell<[u8; 1024]> = StaticCell::new();
+
+/// Newest throttles, for the motors' task.
+static THROTTLES: Signal<CriticalSectionRawMutex, [u16; 4]> = Signal::new();
+
+/// The board, brought up.
+pub(crate) struct Stm32f405 {
+    watchdog: IndependentWatchdog<'static, IWDG>,
 }
 
-/// Brings up clocks and peripherals. The motors' task runs with the control tick, right after it.
-pub fn start(control: SendSpawner) -> Board {
-    let p = clocks::start();
-    reset::log();
+impl Board for Stm32f405 {
+    type Receiver = Receiver;
+    type Transmitter = Transmitter;
 
-    static RX: StaticCell<[u8; 1024]> = StaticCell::new();
-    static TX: StaticCell<[u8; 1024]> = StaticCell::new();
-    let mut config = usart::Config::default();
-    config.baudrate = BAUD;
-    config.eager_reads = Some(READ_MIN);
-    let uart = BufferedUart::new(p.USART1, p.PA10, p.PA9, TX.init([0; 1024]), RX.init([0; 1024]), Irqs, config);
-    let (transmitter, receiver) = uart.expect("the baud rate divides the clock").split();
-    interrupt::USART1.set_priority(priority::UART);
+    fn start(control: SendSpawner) -> (Self, Receiver, Transmitter) {
+        let p = clocks::start();
+        reset::log();
 
-    let pin = OutputType::PushPull;
-    let pwm = SimplePwm::new(
-        p.TIM8,
-        Some(PwmPin::new(p.PC6, pin)),
-        Some(PwmPin::new(p.PC7, pin)),
-        Some(PwmPin::new(p.PC8, pin)),
-        Some(PwmPin::new(p.PC9, pin)),
-        Hertz(BIT_RATE_HZ),
-        CountingMode::EdgeAlignedUp,
-    );
-    let motors = Motors {
-        pwm,
-        dma: p.DMA2_CH1,
-        timing: Timing::new(MOTOR_TIMER_HZ).expect("the timer's clock is within its range"),
-        rows: Rows([[0; 4]; 17]),
-    };
-    interrupt::DMA2_STREAM1.set_priority(priority::MOTOR_DMA);
-    control.spawn(self::motors(motors).expect("spawned once"));
+        let mut config = usart::Config::default();
+        config.baudrate = BAUD;
+        config.eager_reads = Some(READ_MIN);
+        let uart = BufferedUart::new(p.USART1, p.PA10, p.PA9, TX.init([0; 1024]), RX.init([0; 1024]), Irqs, config);
+        let (transmitter, receiver) = uart.expect("the baud rate divides the clock").split();
+        interrupt::USART1.set_priority(priority::UART);
 
-    // A debugger that halts the core halts the watchdog.
-    pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
-    let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
-    watchdog.unleash();
+        let pin = OutputType::PushPull;
+        let pwm = SimplePwm::new(
+            p.TIM8,
+            Some(PwmPin::new(p.PC6, pin)),
+            Some(PwmPin::new(p.PC7, pin)),
+            Some(PwmPin::new(p.PC8, pin)),
+            Some(PwmPin::new(p.PC9, pin)),
+            Hertz(BIT_RATE_HZ),
+            CountingMode::EdgeAlignedUp,
+        );
+        let motors = Motors {
+            pwm,
+            dma: p.DMA2_CH1,
+            timing: Timing::new(MOTOR_TIMER_HZ).expect("the timer's clock is within its range"),
+            rows: Rows([[0; 4]; 17]),
+        };
+        interrupt::DMA2_STREAM1.set_priority(priority::MOTOR_DMA);
+        control.spawn(self::motors(motors).expect("spawned once"));
 
-    Board { outputs: Outputs { watchdog }, receiver: Receiver(receiver), transmitter: Transmitter(transmitter) }
+        // A debugger that halts the core halts the watchdog.
+        pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
+        let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
+        watchdog.unleash();
+
+        (Stm32f405 { watchdog }, Receiver(receiver), Transmitter(transmitter))
+    }
+
+    /// Sleeps.
+    fn idle() {
+        cortex_m::asm::wfi();
+    }
+
+    /// True if the crystal has failed: the chip's own oscillator has taken over.
+    fn clock_has_failed(&self) -> bool {
+        clocks::have_failed()
+    }
+
+    fn task_has_failed(&self) -> bool {
+        TASK_FAILED.load(Ordering::Relaxed)
+    }
+
+    fn drive(&mut self, throttles: [u16; 4]) {
+        THROTTLES.signal(throttles);
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.pet();
+    }
 }
 
 /// The motors' waveform: a row a bit, a column a motor. A burst of the DMA, four columns, must not cross 1 KiB.
@@ -131,9 +166,6 @@ fn encode(timing: &Timing, throttles: [u16; 4], rows: &mut Rows) {
     timing.rows(throttles, &mut rows.0);
 }
 
-/// Newest throttles, for the motors' task.
-static THROTTLES: Signal<CriticalSectionRawMutex, [u16; 4]> = Signal::new();
-
 #[embassy_executor::task]
 async fn motors(mut motors: Motors) {
     loop {
@@ -142,7 +174,7 @@ async fn motors(mut motors: Motors) {
 }
 
 /// Leaves the motors without a signal, whatever state the program is in. They stop by themselves then.
-pub fn stop_motors() {
+pub(crate) fn stop_motors() {
     use pac::gpio::vals::Moder;
     // Their pins become plain outputs, which hold 0 since start-up.
     pac::GPIOC.moder().modify(|mode| (6..=9).for_each(|pin| mode.set_moder(pin, Moder::OUTPUT)));
@@ -151,13 +183,8 @@ pub fn stop_motors() {
 /// A task that is not needed to fly has panicked.
 static TASK_FAILED: AtomicBool = AtomicBool::new(false);
 
-/// True if a task that is not needed to fly has panicked.
-pub fn task_has_failed() -> bool {
-    TASK_FAILED.load(Ordering::Relaxed)
-}
-
 /// Where a task that is not needed to fly ends when it panics: whatever is more urgent goes on.
-pub fn park() -> ! {
+pub(crate) fn park() -> ! {
     TASK_FAILED.store(true, Ordering::Relaxed);
     loop {
         // It may have panicked with interrupts off.
@@ -170,39 +197,11 @@ pub fn park() -> ! {
     }
 }
 
-/// True if the crystal has failed and the chip's own oscillator has taken over.
-pub fn clock_has_failed() -> bool {
-    clocks::have_failed()
-}
-
-/// Sleeps until the next interrupt.
-pub fn idle() {
-    cortex_m::asm::wfi();
-}
-
-/// Motors and watchdog.
-pub struct Outputs {
-    watchdog: IndependentWatchdog<'static, IWDG>,
-}
-
-impl Outputs {
-    /// Gives the motors their throttle: 0, or 48 to 2047.
-    pub fn drive(&mut self, throttles: [u16; 4]) {
-        THROTTLES.signal(throttles);
-    }
-
-    /// Keeps the chip from being reset.
-    pub fn feed_watchdog(&mut self) {
-        self.watchdog.pet();
-    }
-}
-
 /// The link, in.
-pub struct Receiver(BufferedUartRx<'static>);
+pub(crate) struct Receiver(BufferedUartRx<'static>);
 
-impl Receiver {
-    /// Reads the next bytes, and tells how many: waits for at least one.
-    pub fn receive(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize> {
+impl board::Receiver for Receiver {
+    fn receive(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize> {
         // A new reading each time, which the compiler knows not to be one that has ended: that would panic. An overrun
         // loses bytes, which the decoder notices.
         poll_fn(move |context| {
@@ -217,11 +216,11 @@ impl Receiver {
 }
 
 /// The link, out.
-pub struct Transmitter(BufferedUartTx<'static>);
+pub(crate) struct Transmitter(BufferedUartTx<'static>);
 
-impl Transmitter {
-    /// Sends what there was to say after `_tick`; leaves it out if the line is that far behind.
-    pub fn transmit(&mut self, _tick: &Tick, bytes: &[u8]) {
+impl board::Transmitter for Transmitter {
+    /// Leaves it out if the line is that far behind.
+    fn transmit(&mut self, _tick: &Tick, bytes: &[u8]) {
         // Takes all of them or, if the ring has no room, none; the driver forgets those who wait for room.
         if !bytes.is_empty() {
             let _ = poll_once(self.0.write(bytes));

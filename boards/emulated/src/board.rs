@@ -1,17 +1,18 @@
-//! The board of the processor in the loop: the host, by semihosting. The processor stands still, time included, while
-//! the host works.
+//! The board of the processor in the loop: the host, by semihosting, so no pins and no timers. The processor stands still,
+//! time included, while the host works. Memory is the flight image's, `memory.x` at the workspace's root.
 //!
 //! Two FIFOs, little-endian. `to_firmware`: a u32 length and that many bytes, all that reaches the link before the next
 //! control tick. `from_firmware`, for each of them: the tick's time \[us\] as u64; its core cycles, the deepest stack
 //! \[bytes\] and a length as u32; four throttles as u16; and as many bytes as the length says.
 
-use crate::control::Tick;
-use crate::housekeeping;
 use core::cell::Cell;
 use embassy_executor::SendSpawner;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
+use firmware::board::{self, Board};
+use firmware::control::Tick;
+use firmware::housekeeping;
 use semihosting::fs::File;
 use semihosting::io::{Read, Write};
 use semihosting::process::exit;
@@ -22,74 +23,66 @@ static LINK: Pipe<CriticalSectionRawMutex, 4096> = Pipe::new();
 /// Throttles of the last tick.
 static THROTTLES: Mutex<CriticalSectionRawMutex, Cell<[u16; 4]>> = Mutex::new(Cell::new([0; 4]));
 
-/// What the host offers.
-pub struct Board {
-    /// Motors and watchdog.
-    pub outputs: Outputs,
-    /// The link, in.
-    pub receiver: Receiver,
-    /// The link, out.
-    pub transmitter: Transmitter,
-}
+/// The host.
+pub(crate) struct Emulated;
 
-/// Opens the FIFOs and waits for the first tick's bytes.
-pub fn start(_control: SendSpawner) -> Board {
-    let mut transmitter = Transmitter {
-        to_firmware: File::open(c"to_firmware").expect("the host made the FIFO"),
-        from_firmware: File::create(c"from_firmware").expect("the host made the FIFO"),
-    };
-    transmitter.take_bytes();
-    Board { outputs: Outputs, receiver: Receiver, transmitter }
-}
+impl Board for Emulated {
+    type Receiver = Receiver;
+    type Transmitter = Transmitter;
 
-/// A panic ends the emulator.
-pub fn task_has_failed() -> bool {
-    false
-}
+    /// Opens the FIFOs and waits for the first tick's bytes.
+    fn start(_control: SendSpawner) -> (Self, Receiver, Transmitter) {
+        let mut transmitter = Transmitter {
+            to_firmware: File::open(c"to_firmware").expect("the host made the FIFO"),
+            from_firmware: File::create(c"from_firmware").expect("the host made the FIFO"),
+        };
+        transmitter.take_bytes();
+        (Emulated, Receiver, transmitter)
+    }
 
-/// The emulator's clock does not fail.
-pub fn clock_has_failed() -> bool {
-    false
-}
+    /// Counts on. A sleeping processor would let QEMU move its clock from another thread, which now and then moves it twice
+    /// over what the processor did just before: time would depend on the host's load.
+    fn idle() {
+        cortex_m::asm::nop();
+    }
 
-/// Counts on until the next interrupt. A sleeping processor would let QEMU move its clock from another thread, which now
-/// and then moves it twice over what the processor did just before: time would depend on the host's load.
-pub fn idle() {
-    cortex_m::asm::nop();
-}
+    /// The emulator's clock does not fail.
+    fn clock_has_failed(&self) -> bool {
+        false
+    }
 
-/// Motors and watchdog.
-pub struct Outputs;
+    /// A panic ends the emulator.
+    fn task_has_failed(&self) -> bool {
+        false
+    }
 
-impl Outputs {
     /// Notes the throttles for the reply.
-    pub fn drive(&mut self, throttles: [u16; 4]) {
+    fn drive(&mut self, throttles: [u16; 4]) {
         THROTTLES.lock(|cell| cell.set(throttles));
     }
 
     /// There is none.
-    pub fn feed_watchdog(&mut self) {}
+    fn feed_watchdog(&mut self) {}
 }
 
 /// The link, in.
-pub struct Receiver;
+pub(crate) struct Receiver;
 
-impl Receiver {
-    /// Reads the next bytes, and tells how many: waits for at least one.
-    pub fn receive(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize> {
+impl board::Receiver for Receiver {
+    fn receive(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize> {
         LINK.read(buffer)
     }
 }
 
 /// The link, out, and the hand-over to the host.
-pub struct Transmitter {
+pub(crate) struct Transmitter {
     to_firmware: File,
     from_firmware: File,
 }
 
-impl Transmitter {
-    /// Replies with what there was to say after `tick`, and waits for the next tick's bytes.
-    pub fn transmit(&mut self, tick: &Tick, bytes: &[u8]) {
+impl board::Transmitter for Transmitter {
+    /// Replies with it, and waits for the next tick's bytes.
+    fn transmit(&mut self, tick: &Tick, bytes: &[u8]) {
         let mut head = [0; 28];
         let words = [tick.cycles, housekeeping::stack_bytes(), bytes.len() as u32];
         let fields = tick.report.time_us.to_le_bytes().into_iter();
@@ -100,7 +93,9 @@ impl Transmitter {
         self.from_firmware.write_all(bytes).expect("the host reads");
         self.take_bytes();
     }
+}
 
+impl Transmitter {
     /// Hands the host's next bytes to the link. If the host has gone, so does the firmware.
     fn take_bytes(&mut self) {
         let mut length = [0; 4];

@@ -25,12 +25,12 @@ const LOCK_LOOKS: u32 = 5_000;
 static FAILED: AtomicBool = AtomicBool::new(false);
 
 /// True if the crystal has failed, at the start or in flight: nobody should take off.
-pub fn have_failed() -> bool {
+pub(crate) fn have_failed() -> bool {
     FAILED.load(Ordering::Relaxed)
 }
 
 /// Sets up clocks and flash. To be called once, in the state that a reset leaves.
-pub fn start() -> Peripherals {
+pub(crate) fn start() -> Peripherals {
     let crystal = crystal_starts();
     FAILED.store(!crystal, Ordering::Relaxed);
     let peripherals = embassy_stm32::init(config(crystal));

@@ -1,26 +1,24 @@
-//! The image that flies.
+//! The image that flies, on an STM32F405RG. Pins, timers and memory are in [`board`].
 #![no_std]
 #![no_main]
 
-#[cfg(feature = "pil")]
-compile_error!("the flight image has no feature pil: build it by cargo fw");
+mod board;
+mod clocks;
+mod reset;
 
 use core::panic::PanicInfo;
 use defmt_rtt as _;
 
-#[cortex_m_rt::entry]
-fn main() -> ! {
-    firmware::run(cortex_m::Peripherals::take().expect("taken once"))
-}
+firmware::image!(board::Stm32f405);
 
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {
     if firmware::executors::in_dispensable_task() {
         let (file, line) = info.location().map_or(("", 0), |place| (place.file(), place.line()));
         defmt::error!("a task has failed, flying on without it: {=str}:{=u32}", file, line);
-        firmware::board::park()
+        board::park()
     }
-    firmware::board::stop_motors();
+    board::stop_motors();
     defmt::error!("{}", defmt::Display2Format(info));
     wait_for_watchdog()
 }
@@ -36,7 +34,7 @@ mod hard_fault {
 }
 
 extern "C" fn fault() -> ! {
-    firmware::board::stop_motors();
+    board::stop_motors();
     defmt::error!("hard fault");
     wait_for_watchdog()
 }
