@@ -92,3 +92,15 @@ fn the_observer_can_break_off() {
     assert_eq!(end.unwrap(), End { lost: None, interrupted: true, disarmed: true });
     assert_eq!(steps, 100);
 }
+
+/// What does not reach a law alone does not reach the firmware either: it comes down, and says that its motors are off.
+#[test]
+fn a_link_that_stays_down_ends_the_flight() {
+    let mut scenario = scenario("hover", 20.0);
+    scenario.outages = vec![crate::scenario::Outage { start_s: 2.0, end_s: 20.0 }];
+    let (end, _) = fly_host(&scenario);
+    let lost = end.lost.expect("it cannot go on");
+    assert!(lost.time_s > 2.0, "{lost:?}");
+    scenario.outages.clear();
+    assert_eq!(fly_host(&scenario).0.lost, None);
+}

@@ -1,0 +1,182 @@
+//! How the code is laid out: no module imports one that imports it, and no crate is more than a fifth of the whole.
+#![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be read must stop the test")]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A module's path within its crate; the crate itself is empty.
+type Module = Vec<String>;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
+}
+
+/// Every Rust file below `folder`.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().path());
+    let of = |path: PathBuf| match path.extension() {
+        _ if path.is_dir() && !path.ends_with("target") => files(&path),
+        Some(extension) if extension == "rs" => vec![path],
+        _ => Vec::new(),
+    };
+    entries.flat_map(of).collect()
+}
+
+/// The folders of all crates.
+fn crates() -> Vec<PathBuf> {
+    let inner = fs::read_dir(root().join("crates")).unwrap().map(|entry| entry.unwrap().path());
+    inner.chain(["sitl", "tests", "firmware"].map(|name| root().join(name))).collect()
+}
+
+/// Code of the files of one crate, by module: neither comments nor tests.
+fn modules(src: &Path) -> BTreeMap<Module, String> {
+    let mut modules = BTreeMap::new();
+    for path in files(src) {
+        let within = path.strip_prefix(src).unwrap().with_extension("");
+        let mut module: Module = within.iter().map(|part| part.to_str().unwrap().to_owned()).collect();
+        if module.first().is_some_and(|first| first == "bin") || module.last().is_some_and(|last| last == "tests") {
+            continue;
+        }
+        if module.last().is_some_and(|last| ["mod", "lib", "main"].contains(&last.as_str())) {
+            module.pop();
+        }
+        let text = fs::read_to_string(&path).unwrap();
+        let text = text.split("\nmod tests {").next().unwrap();
+        let lines = text.lines().map(|line| line.split("//").next().unwrap());
+        modules.insert(module, lines.collect::<Vec<_>>().join(" "));
+    }
+    modules
+}
+
+/// The paths of a `use` tree: `a::{b, c::d}` is a::b and a::c::d. Names after `as` are left out.
+fn paths(tree: &str) -> Vec<Vec<String>> {
+    let tree = tree.trim();
+    if let Some(inner) = tree.strip_prefix('{').and_then(|tree| tree.strip_suffix('}')) {
+        let (mut depth, mut parts) = (0, vec![String::new()]);
+        for c in inner.chars() {
+            depth += i32::from(c == '{') - i32::from(c == '}');
+            match c {
+                ',' if depth == 0 => parts.push(String::new()),
+                _ => parts.last_mut().unwrap().push(c),
+            }
+        }
+        return parts.iter().filter(|part| !part.trim().is_empty()).flat_map(|part| paths(part)).collect();
+    }
+    match tree.split_once("::") {
+        Some((first, rest)) => {
+            paths(rest).into_iter().map(|path| [vec![first.trim().to_owned()], path].concat()).collect()
+        }
+        None => vec![vec![tree.split(" as ").next().unwrap().trim().to_owned()]],
+    }
+}
+
+/// A path as written in `module`, from the crate's root; none if it leads elsewhere.
+fn absolute(module: &Module, path: &[String], all: &BTreeMap<Module, String>) -> Option<Vec<String>> {
+    let ups = path.iter().take_while(|part| *part == "super").count();
+    let (base, rest) = match path.first()?.as_str() {
+        "crate" => (&[][..], path.get(1..)?),
+        "self" => (module.as_slice(), path.get(1..)?),
+        "super" => (module.get(..module.len().checked_sub(ups)?)?, path.get(ups..)?),
+        first if all.contains_key(&[module.as_slice(), &[first.to_owned()]].concat()) => (module.as_slice(), path),
+        _ => return None,
+    };
+    Some([base, rest].concat())
+}
+
+/// Which modules each imports. What a module hands on by `pub use` belongs to whoever takes it from there.
+fn imports(all: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Module>> {
+    // The module that a path leads into, and what is taken from it.
+    let target = |path: &[String]| {
+        let length = (0..=path.len()).rev().find(|&length| path.get(..length).is_some_and(|p| all.contains_key(p)));
+        let (module, rest) = path.split_at(length.unwrap_or(0));
+        (module.to_vec(), rest.first().cloned())
+    };
+    let (mut imports, mut handed_on) = (BTreeMap::<Module, Vec<Vec<String>>>::new(), BTreeMap::new());
+    for (module, code) in all {
+        // Only whole words: `use ` at the beginning of a statement.
+        for statement in code.split(';') {
+            let Some((before, tree)) = statement.rsplit_once("use ") else { continue };
+            let is_public = before.trim_end().ends_with("pub") || before.trim_end().ends_with(')');
+            for path in paths(tree).iter().filter_map(|path| absolute(module, path, all)) {
+                if is_public {
+                    handed_on.insert((module.clone(), path.last().cloned().unwrap()), path);
+                } else {
+                    imports.entry(module.clone()).or_default().push(path);
+                }
+            }
+        }
+        // And paths in the code itself, but of macros, which belong to the crate's root wherever they stand.
+        let words = code.split_inclusive(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
+        for word in words.filter(|word| word.starts_with("crate::") || word.starts_with("super::")) {
+            let Some(word) = (!word.ends_with('!')).then(|| word.trim_end_matches(|c: char| !c.is_alphanumeric()))
+            else {
+                continue;
+            };
+            let path: Vec<String> = word.split("::").map(str::to_owned).collect();
+            imports.entry(module.clone()).or_default().extend(absolute(module, &path, all));
+        }
+    }
+    let resolve = |path: &Vec<String>| {
+        let (mut module, mut name) = target(path);
+        while let Some(path) = name.as_ref().and_then(|name| handed_on.get(&(module.clone(), name.clone()))) {
+            (module, name) = target(path);
+        }
+        module
+    };
+    let of = |(module, paths): (&Module, &Vec<Vec<String>>)| {
+        (module.clone(), paths.iter().map(resolve).filter(|target| target != module).collect())
+    };
+    imports.iter().map(of).collect()
+}
+
+/// A circle of imports, if there is one: what imports nothing that is left is taken away, again and again.
+fn circle(mut imports: BTreeMap<Module, BTreeSet<Module>>) -> Vec<Module> {
+    loop {
+        let left: BTreeSet<Module> = imports.keys().cloned().collect();
+        let before = imports.len();
+        imports.retain(|_, targets| targets.iter().any(|target| left.contains(target)));
+        if imports.len() == before {
+            return imports.into_keys().collect();
+        }
+    }
+}
+
+#[test]
+fn no_module_imports_one_that_imports_it() {
+    // The firmware's board is one of several files under one name.
+    for folder in crates().iter().filter(|folder| !folder.ends_with("firmware")) {
+        let modules = modules(&folder.join("src"));
+        assert!(!modules.is_empty(), "{}", folder.display());
+        let circle = circle(imports(&modules));
+        assert!(circle.is_empty(), "{}: among these, or in what they need: {circle:?}", folder.display());
+    }
+}
+
+#[test]
+fn a_circle_is_found() {
+    let module = |name: &str| name.split("::").filter(|part| !part.is_empty()).map(str::to_owned).collect::<Module>();
+    let find = |files: &[(&str, &str)]| {
+        circle(imports(&files.iter().map(|(name, code)| (module(name), (*code).to_owned())).collect()))
+    };
+    assert!(find(&[("", "mod a; mod b;"), ("a", "use crate::b::B;"), ("b", "fn f() {}")]).is_empty());
+    assert_eq!(find(&[("a", "use crate::b::B;"), ("b", "use super::a::{self, A};")]).len(), 2);
+    assert_eq!(find(&[("a", "fn f() { crate::b::g() }"), ("b", "use crate::a::A;")]).len(), 2);
+    // Through a parent that hands on what its children hold.
+    let parent = ("p", "mod a; mod b; pub use a::A; pub use b::{B, C};");
+    assert!(find(&[parent, ("p::a", "use super::B;"), ("p::b", "fn f() {}")]).is_empty());
+    assert_eq!(find(&[parent, ("p::a", "use super::B;"), ("p::b", "use crate::p::A;")]).len(), 2);
+    // A parent that uses its child, which uses it.
+    assert_eq!(find(&[("p", "mod a; use a::f; struct P;"), ("p::a", "use super::P;")]).len(), 2);
+}
+
+#[test]
+fn no_crate_is_more_than_a_fifth_of_the_code() {
+    let lines = |path: &PathBuf| fs::read_to_string(path).unwrap().lines().count();
+    let sizes: Vec<(PathBuf, usize)> =
+        crates().into_iter().map(|folder| (folder.clone(), files(&folder).iter().map(lines).sum())).collect();
+    let whole: usize = sizes.iter().map(|(_, lines)| lines).sum();
+    for (folder, lines) in sizes {
+        assert!(5 * lines <= whole, "{}: {lines} of {whole} lines", folder.display());
+    }
+}
