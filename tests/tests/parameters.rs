@@ -3,11 +3,13 @@
 //! `WRITE=1 cargo test -p flight-tests --test parameters` writes the page.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
+use afbc::Profile;
+use afbc::monitor::Bounds;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Curve;
 use afbc_peers::{geometric, indi, pid};
 use afbc_plant::{Battery, Contact, Drag, Dropouts, GroundEffect, Rotors, Sensing, Turbulence, Wind};
-use afbc_types::{Declaration, Declared, OutOfRange, Parameters, Value};
+use afbc_types::{Declaration, Declared, OutOfRange, Parameters, PerAxis, Value};
 use core::convert::Infallible;
 use core::fmt::Write;
 use std::collections::BTreeSet;
@@ -17,7 +19,8 @@ use std::path::Path;
 /// One parameter, or one number of a vector.
 struct Row {
     name: String,
-    default: String,
+    /// In each of the group's columns.
+    values: Vec<String>,
     declaration: Declaration,
 }
 
@@ -25,27 +28,60 @@ struct Row {
 struct Group {
     title: &'static str,
     prefix: &'static str,
+    /// Headings of the columns of values: the default, or that of each profile.
+    columns: Vec<&'static str>,
     rows: Vec<Row>,
-    /// Whether the defaults are in range.
-    valid: Result<(), OutOfRange>,
+    /// Whether the values are in range, column by column.
+    valid: Vec<Result<(), OutOfRange>>,
 }
 
+/// A group whose parameters have one default.
 fn group(title: &'static str, prefix: &'static str, parameters: impl Declared) -> Group {
-    let mut rows = Vec::new();
-    let Ok(()) = parameters.visit(&mut |declaration, value| {
-        let defaults: Vec<String> = match &value {
-            Value::Single(numbers) => numbers.iter().map(|number| format!("{number:?}")).collect(),
-            Value::Double(numbers) => numbers.iter().map(|number| format!("{number:?}")).collect(),
-            Value::Switch(on) => vec![on.to_string()],
-        };
-        let coordinates = if defaults.len() == 1 { vec![None] } else { vec![Some('X'), Some('Y'), Some('Z')] };
-        for (coordinate, default) in coordinates.into_iter().zip(defaults) {
-            let name = declaration.name(prefix, coordinate).to_string();
-            rows.push(Row { name, default, declaration: *declaration });
-        }
-        Ok::<(), Infallible>(())
-    });
-    Group { title, prefix, rows, valid: parameters.validate() }
+    columns(title, prefix, [("default", parameters)])
+}
+
+/// A group whose parameters have a default in each profile.
+fn profiles<G: Declared>(title: &'static str, prefix: &'static str, of: fn(Profile) -> G) -> Group {
+    columns(title, prefix, Profile::ALL.map(|profile| (profile.name(), of(profile))))
+}
+
+fn columns<G: Declared, const N: usize>(
+    title: &'static str,
+    prefix: &'static str,
+    columns: [(&'static str, G); N],
+) -> Group {
+    let mut rows: Vec<Row> = Vec::new();
+    for (_, parameters) in &columns {
+        let mut at = 0;
+        let Ok(()) = parameters.visit(&mut |declaration, value| {
+            let values: Vec<String> = match &value {
+                Value::Single(numbers) => numbers.iter().map(|number| format!("{number:?}")).collect(),
+                Value::Double(numbers) => numbers.iter().map(|number| format!("{number:?}")).collect(),
+                Value::Switch(on) => vec![on.to_string()],
+            };
+            let coordinates = if values.len() == 1 { vec![None] } else { vec![Some('X'), Some('Y'), Some('Z')] };
+            for (coordinate, value) in coordinates.into_iter().zip(values) {
+                if rows.len() == at {
+                    let name = declaration.name(prefix, coordinate).to_string();
+                    rows.push(Row { name, values: Vec::new(), declaration: *declaration });
+                }
+                rows[at].values.push(value);
+                at += 1;
+            }
+            Ok::<(), Infallible>(())
+        });
+    }
+    let valid = columns.iter().map(|(_, parameters)| parameters.validate()).collect();
+    Group { title, prefix, columns: columns.iter().map(|(heading, _)| *heading).collect(), rows, valid }
+}
+
+/// AFBC's bounds on the paper's vehicle.
+fn bounds(profile: Profile) -> Bounds {
+    Bounds::new(&profile.gains(), &Parameters::PAPER.to_f32())
+}
+
+fn backstepping(profile: Profile) -> PerAxis<afbc::backstepping::Gains> {
+    profile.gains().map(|gains| gains.backstepping)
 }
 
 /// Everything that is declared, in the order of the page.
@@ -54,6 +90,10 @@ fn groups() -> Vec<Group> {
         group("Vehicle: `[vehicle]`, `[truth]`", "V_", Parameters::DEFAULT),
         group("Motors", "MOT_", Curve::DEFAULT),
         group("Arming", "ARM_", ArmingLimits::DEFAULT),
+        profiles("Control: `[settings]`, `[limits]`", "C_", Profile::settings),
+        profiles("AFBC: `[gains.AXIS]`", "A_", Profile::gains),
+        profiles("AFBC's monitor", "M_", bounds),
+        profiles("Backstepping: `[gains.AXIS]`", "B_", backstepping),
         group("PID: `[contender.gains]`", "PID_", pid::Gains::DEFAULT),
         group("Geometric: `[contender.gains]`", "GEO_", geometric::Gains::DEFAULT),
         group("INDI: `[contender.gains]`", "INDI_", indi::Gains::DEFAULT),
@@ -82,20 +122,23 @@ WRITE=1 cargo test -p flight-tests --test parameters
 **Name** is what a parameter is called on a ground station and in flash: its group's prefix, then an axis or a part of the
 group, then its id, and X, Y or Z of a vector. It has at most 16 characters, as MAVLink has room for, and stays what it is.
 **Key** is its name in [scenario files](scenarios.md). \"Tuned\" are those that `sitl tune` chooses; the others are for the
-vehicle and its task to say.
+vehicle and its task to say. Where there are two profiles, `flight` is what the firmware flies, and `paper` what scenario files
+start from.
 ";
 
 fn page() -> String {
     let mut page = HEAD.to_owned();
-    for Group { title, prefix, rows, .. } in groups() {
+    for Group { title, prefix, columns, rows, .. } in groups() {
         write!(page, "\n## {title}\n\nPrefix `{prefix}`.\n\n").unwrap();
-        page += "| name | key | unit | range | default | tuned | meaning |\n|---|---|---|---|---|---|---|\n";
-        for Row { name, default, declaration: Declaration { group, range, unit, tuned, meaning, .. } } in rows {
+        writeln!(page, "| name | key | unit | range | {} | tuned | meaning |", columns.join(" | ")).unwrap();
+        writeln!(page, "|---|---|---|---|{}---|---|", "---|".repeat(columns.len())).unwrap();
+        for Row { name, values, declaration: Declaration { group, range, unit, tuned, meaning, .. } } in rows {
             let key = if group.is_empty() { range.name.to_owned() } else { format!("{group}.{}", range.name) };
             let accepted =
                 if unit.is_empty() { "true, false".to_owned() } else { format!("{:?} to {:?}", range.min, range.max) };
             let (tuned, meaning) = (if tuned { "yes" } else { "" }, meaning.replace('|', "\\|"));
-            writeln!(page, "| `{name}` | `{key}` | {unit} | {accepted} | `{default}` | {tuned} | {meaning} |").unwrap();
+            let values = values.join("` | `");
+            writeln!(page, "| `{name}` | `{key}` | {unit} | {accepted} | `{values}` | {tuned} | {meaning} |").unwrap();
         }
     }
     page
@@ -124,16 +167,19 @@ fn names_are_unique_and_fit_mavlink() {
         assert!(!declaration.meaning.is_empty(), "{name} has no meaning");
         assert!(names.insert(name.clone()), "{name} twice");
     }
-    assert!(names.len() > 40, "{}", names.len());
+    assert!(names.len() > 150, "{}", names.len());
 }
 
-/// A key ends in its unit, so that nobody has to look it up; the paper's letters, and shares of something, have none.
+/// A key ends in its unit, so that nobody has to look it up; the paper's letters do not.
 #[test]
 fn a_key_ends_in_its_unit() {
+    const LETTERS: [&str; 3] = ["alpha1", "sigma", "lyapunov"];
     for Row { name, declaration: Declaration { range, unit, .. }, .. } in groups().into_iter().flat_map(|g| g.rows) {
         let ending: String = unit.to_lowercase().replace([' ', '/'], "_");
         // "1/s" is "_1_s", a plain number "1" has no ending.
-        let has_unit = !["1", ""].contains(&unit);
+        let has_unit = !["1", ""].contains(&unit) && !LETTERS.contains(&range.name);
+        // What depends on the axis has no one unit.
+        let has_unit = has_unit && !unit.contains("input") && !unit.contains(" or ");
         assert!(!has_unit || range.name.ends_with(&format!("_{ending}")), "{name}: {} in {unit}", range.name);
     }
 }
@@ -141,6 +187,6 @@ fn a_key_ends_in_its_unit() {
 #[test]
 fn every_default_is_accepted() {
     for Group { title, valid, .. } in groups() {
-        assert_eq!(valid, Ok(()), "{title}");
+        assert!(valid.iter().all(Result::is_ok), "{title}: {valid:?}");
     }
 }

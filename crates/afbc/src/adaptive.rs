@@ -1,45 +1,46 @@
 //! Adaptive fuzzy backstepping of one subsystem: the law (20)-(22) and its adaptation (32)-(34).
 
 use crate::backstepping::{self, proportional};
-use crate::fuzzy::{Basis, CENTRE, Membership, WIDTH};
+use crate::fuzzy::{Basis, Membership};
 use crate::law::{Context, Law, Tracking};
-use crate::safeguards::{DEAD_ZONE, DELTA_MAX, KAPPA, SIGMA, Safeguards, THETA_MAX};
+use crate::safeguards::Safeguards;
 use afbc_control::{Errors, Estimate, math};
-use afbc_types::{Axis, OutOfRange, PerAxis, Range};
+use afbc_types::{Axis, Declared, OutOfRange, PerAxis, parameters};
 use nalgebra::{Matrix3, Vector3};
-
-/// Accepted gamma.
-pub const GAMMA: Range = Range::new("gamma", 0.0, 1000.0);
-/// Accepted eta.
-pub const ETA: Range = Range::new("eta", 0.0, 1000.0);
-/// Accepted epsilon \[m/s or rad/s\].
-pub const EPSILON: Range = Range::new("epsilon", 1e-6, 100.0);
 
 /// Least thrust for hovering that is believed, as a share of the weight.
 const HOVER_SHARE_MIN: f32 = 0.3;
 
-/// Gains of one AFBC subsystem.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gains {
-    /// alpha_1, alpha_2.
-    pub backstepping: backstepping::Gains,
-    /// gamma: adaptation gain of Theta_hat (34).
-    pub gamma: f32,
-    /// eta: adaptation gain of delta_hat (33).
-    pub eta: f32,
-    /// epsilon: width of the robust term's transition (32) \[m/s or rad/s\].
-    pub epsilon: f32,
-    /// Gaussians over both inputs of the fuzzy system (22).
-    pub membership: Membership,
-    /// What keeps the estimates bounded.
-    pub safeguards: Safeguards,
+parameters! {
+    /// Gains of one AFBC subsystem. By default those of Section IV for attitude.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Gains {
+        /// alpha_1, alpha_2.
+        #[group("")]
+        pub backstepping: backstepping::Gains = backstepping::Gains::DEFAULT,
+        /// gamma: adaptation gain of Theta_hat (34).
+        #[parameter(GAMMA, "input per m or rad", 0.0..=1000.0, tuned)]
+        pub gamma: f32 = 1.2,
+        /// eta: adaptation gain of delta_hat (33).
+        #[parameter(ETA, "input per m or rad", 0.0..=1000.0, tuned)]
+        pub eta: f32 = 0.3,
+        /// epsilon: width of the robust term's transition (32).
+        #[parameter(EPSILON, "m/s or rad/s", 1e-6..=100.0)]
+        pub epsilon: f32 = 0.001,
+        /// Gaussians over both inputs of the fuzzy system (22).
+        #[group("")]
+        pub membership: Membership = Membership::DEFAULT,
+        /// What keeps the estimates bounded.
+        #[group("")]
+        pub safeguards: Safeguards = Safeguards::NONE,
+    }
 }
 
 impl Gains {
     /// The gains of a subsystem whose input has to be so many times as large.
     pub fn scaled(&self, scale: f32) -> Self {
         let Gains { backstepping: backstepping::Gains { alpha1, alpha2 }, gamma, eta, safeguards, .. } = *self;
-        let bound = |bound: f32| math::min(bound * scale, THETA_MAX.max as f32);
+        let bound = |bound: f32| math::min(bound * scale, Safeguards::THETAMAX.range.max as f32);
         Gains {
             backstepping: backstepping::Gains { alpha1, alpha2: alpha2 * scale },
             gamma: gamma * scale,
@@ -51,39 +52,6 @@ impl Gains {
             },
             ..*self
         }
-    }
-
-    /// Every gain that is a matter of taste, with the range to search it in.
-    pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 5] {
-        let [alpha1, alpha2] = self.backstepping.tunables();
-        [alpha1, alpha2, (&GAMMA, &mut self.gamma), (&ETA, &mut self.eta), (&DELTA_MAX, &mut self.safeguards.delta_max)]
-    }
-
-    /// What goes by rule, or is rather chosen once for the vehicle and its task, with the accepted range of each.
-    pub fn others(&mut self) -> [(&'static Range, &mut f32); 7] {
-        let Gains { epsilon, membership, safeguards, .. } = self;
-        [
-            (&EPSILON, epsilon),
-            (&CENTRE, &mut membership.centre),
-            (&WIDTH, &mut membership.width),
-            (&SIGMA, &mut safeguards.sigma),
-            (&KAPPA, &mut safeguards.kappa),
-            (&THETA_MAX, &mut safeguards.theta_max),
-            (&DEAD_ZONE, &mut safeguards.dead_zone),
-        ]
-    }
-
-    /// Checks every gain.
-    ///
-    /// # Errors
-    /// The first one out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        self.backstepping.validate()?;
-        GAMMA.check(self.gamma)?;
-        ETA.check(self.eta)?;
-        EPSILON.check(self.epsilon)?;
-        self.membership.validate()?;
-        self.safeguards.validate()
     }
 }
 
@@ -177,7 +145,7 @@ impl Subsystem {
     /// The subsystem with these gains.
     ///
     /// # Errors
-    /// As [`Gains::validate`].
+    /// The first gain out of range.
     pub fn new(gains: Gains) -> Result<Self, OutOfRange> {
         gains.validate()?;
         Ok(Subsystem { gains, basis: Basis::new(gains.membership)?, inverse_epsilon: 1.0 / gains.epsilon })

@@ -3,12 +3,7 @@
 use crate::law::{Context, Law, Tracking};
 use crate::model::{Dynamics, Model};
 use afbc_control::{Errors, Estimate};
-use afbc_types::{Axis, OutOfRange, Parameters, PerAxis, Range};
-
-/// Accepted alpha_1 \[1/s\].
-pub const ALPHA1: Range = Range::new("alpha1", 1e-2, 100.0);
-/// Accepted alpha_2, in the subsystem's input per m/s or rad/s.
-pub const ALPHA2: Range = Range::new("alpha2", 0.0, 1000.0);
+use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
 
 /// The ideal law u*_eq (16), for known f, g and dg/dt.
 #[inline]
@@ -44,28 +39,16 @@ pub(crate) fn classical(gains: &Gains, tracking: &Tracking, dynamics: &Dynamics)
     (ideal + proportional(alpha2, &errors), errors)
 }
 
-/// The two gains of one backstepping subsystem.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gains {
-    /// alpha_1 \[1/s\].
-    pub alpha1: f32,
-    /// alpha_2, in the subsystem's input per m/s or rad/s.
-    pub alpha2: f32,
-}
-
-impl Gains {
-    /// Both gains, with the range to search each in.
-    pub fn tunables(&mut self) -> [(&'static Range, &mut f32); 2] {
-        [(&ALPHA1, &mut self.alpha1), (&ALPHA2, &mut self.alpha2)]
-    }
-
-    /// Checks both gains.
-    ///
-    /// # Errors
-    /// The first one outside [`ALPHA1`], [`ALPHA2`].
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        ALPHA1.check(self.alpha1)?;
-        ALPHA2.check(self.alpha2)
+parameters! {
+    /// The two gains of one backstepping subsystem. By default those of Section IV for attitude, x and y.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Gains {
+        /// alpha_1 (12).
+        #[parameter(ALPHA1, "1/s", 1e-2..=100.0, tuned)]
+        pub alpha1: f32 = 1.0,
+        /// alpha_2 (21).
+        #[parameter(ALPHA2, "input per m/s or rad/s", 0.0..=1000.0, tuned)]
+        pub alpha2: f32 = 2.0,
     }
 }
 

@@ -7,31 +7,39 @@ use crate::limits::Limits;
 use afbc_control::command_filter::{BANDWIDTH, CommandFilter, Filtered};
 use afbc_control::mixer::{Allocation, Mixer};
 use afbc_control::{Action, Errors, Estimate, FlightController, Health, Trace, math};
-use afbc_types::{Axis, Inputs, OutOfRange, Parameters, PerAxis, Setpoint, State};
+use afbc_types::{Axis, Declared, Inputs, OutOfRange, Parameters, PerAxis, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
 /// Least vertical part of thrust over weight that a tilt is worked out with: what sinks faster does not tilt more. Ours.
 pub const VERTICAL_MIN: f32 = 0.3;
 
-/// Settings of the cascade around the law.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// What every controller has to know.
-    pub common: afbc_control::Settings,
-    /// Bandwidth of the filter on phi_d and theta_d \[rad/s\].
-    pub command_filter_rad_s: f32,
-    /// What position control may ask for.
-    pub limits: Limits,
-    /// Whether the desired attitude comes from the thrust really commanded; otherwise from (39), the thrust of hovering.
-    pub tilt_by_thrust: bool,
-    /// Whether an estimate stops growing towards a limit of rotors, tilt or acceleration that has been reached.
-    pub anti_windup: bool,
-    /// Whether estimates stay as they are, and rotors give thrust alone, while the vehicle stands on the
-    /// [`ground`](crate::ground).
-    pub freeze_on_ground: bool,
-    /// Whether to take over a vehicle in flight as it is: estimates that carry its weight, a command filter that starts
-    /// at its attitude. The paper starts from estimates of zero and at its first command.
-    pub bumpless: bool,
+parameters! {
+    /// Settings of the cascade around the law. By default the paper's.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Settings {
+        /// What every controller has to know.
+        #[group("")]
+        pub common: afbc_control::Settings = afbc_control::Settings::DEFAULT,
+        /// Bandwidth of the filter on phi_d and theta_d.
+        #[parameter(FILTER, "rad/s", BANDWIDTH.min..=BANDWIDTH.max, tuned)]
+        pub command_filter_rad_s: f32 = 40.0,
+        /// What position control may ask for.
+        #[group("limits")]
+        pub limits: Limits = Limits::NONE,
+        /// Whether the desired attitude comes from the thrust really commanded; otherwise from (39), the thrust of hovering.
+        #[switch(TILT_THRUST)]
+        pub tilt_by_thrust: bool = false,
+        /// Whether an estimate stops growing towards a limit of rotors, tilt or acceleration that has been reached.
+        #[switch(ANTI_WINDUP)]
+        pub anti_windup: bool = false,
+        /// Whether estimates stay as they are, and rotors give thrust alone, while the vehicle stands on the ground.
+        #[switch(FREEZE)]
+        pub freeze_on_ground: bool = false,
+        /// Whether to take over a vehicle in flight as it is: estimates that carry its weight, a command filter that starts
+        /// at its attitude. The paper starts from estimates of zero and at its first command.
+        #[switch(BUMPLESS)]
+        pub bumpless: bool = false,
+    }
 }
 
 impl Settings {
@@ -45,16 +53,6 @@ impl Settings {
     pub const fn with_rotor_force_max_n(mut self, force_n: f32) -> Self {
         self.common.rotor_force_max_n = force_n;
         self
-    }
-
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// The first one out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        self.common.validate()?;
-        BANDWIDTH.check(self.command_filter_rad_s)?;
-        self.limits.validate()
     }
 }
 

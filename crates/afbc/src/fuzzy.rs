@@ -13,34 +13,26 @@
 //! zero by zero or loses all its weights, where (18) as printed does from 1.7 rad/s on in `f32`.
 
 use afbc_control::math;
-use afbc_types::{OutOfRange, Range};
+use afbc_types::{Declared, OutOfRange, Range, parameters};
 use nalgebra::{Matrix3, Vector3};
 
-/// Accepted distance of the outer Gaussians, in the input's unit.
-pub const CENTRE: Range = Range::new("centre", 1e-3, 1e3);
-/// Accepted width, in the input's unit.
-pub const WIDTH: Range = Range::new("width", 1e-3, 1e3);
 /// Accepted centre / width. Beyond it neighbouring Gaussians no longer overlap: between them the basis is a switch.
 pub const SPREAD: Range = Range::new("centre / width", 0.1, 6.0);
 
-/// Three Gaussians of one width over one input: exp(-1/2 ((x - c_j)/s)^2), c_j in {-c, 0, c}.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Membership {
-    /// c: distance of the outer Gaussians from zero, in the input's unit.
-    pub centre: f32,
-    /// s: common width, in the input's unit.
-    pub width: f32,
-}
-
-impl Membership {
-    /// Checks centre and width.
-    ///
-    /// # Errors
-    /// The first value out of [`CENTRE`], [`WIDTH`] or [`SPREAD`].
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        CENTRE.check(self.centre)?;
-        WIDTH.check(self.width)?;
-        SPREAD.check(self.centre / self.width)
+parameters! {
+    /// Three Gaussians of one width over one input: exp(-1/2 ((x - c_j)/s)^2), c_j in {-c, 0, c}. By default those of
+    /// Section IV for attitude.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Membership {
+        /// c: distance of the outer Gaussians from zero, in the fuzzy inputs' unit.
+        #[parameter(CENTRE, "fuzzy input", 1e-3..=1e3)]
+        pub centre: f32 = 0.26,
+        /// s: common width, in the fuzzy inputs' unit.
+        #[parameter(WIDTH, "fuzzy input", 1e-3..=1e3)]
+        pub width: f32 = 0.1,
+    }
+    together(membership) {
+        SPREAD.check(membership.centre / membership.width)
     }
 }
 
@@ -57,7 +49,7 @@ impl Basis {
     /// The basis of `membership`.
     ///
     /// # Errors
-    /// As [`Membership::validate`].
+    /// The first of centre, width and [`SPREAD`] out of range.
     pub fn new(membership: Membership) -> Result<Self, OutOfRange> {
         membership.validate()?;
         let spread = membership.centre / membership.width;

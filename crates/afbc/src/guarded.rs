@@ -6,7 +6,7 @@ use crate::cascade::{Cascade, Controller, Settings};
 use crate::integral::{Integral, IntegralBackstepping};
 use crate::model::Model;
 use crate::monitor::{Bounds, Figures, Monitor};
-use crate::safeguards::THETA_MAX;
+use crate::safeguards::Safeguards;
 use afbc_control::{Action, Estimate, FlightController, Mixer, Trace, Trip, math};
 use afbc_types::{Axis, OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
 use nalgebra::Vector3;
@@ -95,7 +95,8 @@ impl Guarded {
     ) -> Result<Self, OutOfRange> {
         let weight_n = vehicle.mass_kg * vehicle.gravity_m_s2;
         Mixer::new(&vehicle, settings.common.rotor_force_max_n)?.check_hover(weight_n)?;
-        let hover = Range { min: libm::ceil(f64::from(HOVER_THETA * weight_n) * 1e4) / 1e4, ..THETA_MAX };
+        let hover =
+            Range { min: libm::ceil(f64::from(HOVER_THETA * weight_n) * 1e4) / 1e4, ..Safeguards::THETAMAX.range };
         hover.check(gains.z.safeguards.theta_max)?;
         // Two rotors at work, one up, one down, by what both have room for.
         let (hover_n, model) = (0.25 * weight_n, Model::new(&vehicle));

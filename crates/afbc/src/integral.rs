@@ -9,22 +9,22 @@
 //! g i*: the integral is (34) with a single rule. Krstic, Kanellakopoulos, Kokotovic, *Nonlinear and Adaptive Control
 //! Design*, 1995, section 4.2.
 
-use crate::adaptive::{self, GAMMA};
+use crate::adaptive;
 use crate::backstepping::{self, classical};
 use crate::law::{Context, Law, Tracking};
 use crate::model::Model;
-use crate::safeguards::THETA_MAX;
+use crate::safeguards::Safeguards;
 use afbc_control::{Errors, Estimate, math};
-use afbc_types::{Axis, OutOfRange, Parameters, PerAxis};
+use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis};
 
 /// Gains of one subsystem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// alpha_1, alpha_2.
     pub backstepping: backstepping::Gains,
-    /// kappa, within [`GAMMA`].
+    /// kappa, in the range of AFBC's gamma.
     pub integral: f32,
-    /// i_max, in the subsystem's input, within [`THETA_MAX`].
+    /// i_max, in the subsystem's input, in the range of AFBC's.
     pub integral_max: f32,
 }
 
@@ -63,8 +63,8 @@ impl IntegralBackstepping {
         for axis in Axis::ALL {
             let Gains { backstepping, integral, integral_max } = &gains[axis];
             backstepping.validate()?;
-            GAMMA.check(*integral)?;
-            THETA_MAX.check(*integral_max)?;
+            adaptive::Gains::GAMMA.range.check(*integral)?;
+            Safeguards::THETAMAX.range.check(*integral_max)?;
         }
         Ok(IntegralBackstepping { gains, model: Model::new(vehicle) })
     }

@@ -16,35 +16,34 @@ use crate::adaptive;
 use crate::cascade::Cascade;
 use crate::model::Model;
 use afbc_control::{Estimate, Trip, math};
-use afbc_types::{Axis, OutOfRange, Parameters, PerAxis, Range};
-
-/// Accepted bounds on |Theta_hat|, delta_hat and V_e.
-pub const BOUND: Range = Range::new("monitor_bound", 0.0, 1e9);
-/// Accepted share of saturated steps.
-pub const SATURATION_SHARE: Range = Range::new("saturation_share", 0.01, 1.0);
-/// Accepted least size of a reversal \[N\].
-pub const SWING: Range = Range::new("swing_n", 1e-3, 1e4);
-/// Accepted rate of reversals \[1/s\].
-pub const SWINGS: Range = Range::new("swings_hz", 0.1, 1e4);
+use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
 
 /// Time over which figures are averaged \[s\].
 pub const WINDOW_S: f32 = 1.0;
 
-/// What the monitor lets pass.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// |Theta_hat|, in the subsystem's input.
-    pub theta: PerAxis<f32>,
-    /// delta_hat, in the subsystem's input.
-    pub delta: PerAxis<f32>,
-    /// Mean V_e, with g that of hovering.
-    pub lyapunov: PerAxis<f32>,
-    /// Share of steps in which a rotor was at a limit, 0 to 1.
-    pub saturation_share: f32,
-    /// Least size of a reversal of an input that counts \[N\].
-    pub swing_n: f32,
-    /// Reversals of one input per second.
-    pub swings_hz: f32,
+parameters! {
+    /// What the monitor lets pass. By default what does not follow from gains and vehicle; [`Bounds::new`] gives the rest.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Bounds {
+        /// Bound on |Theta_hat|, in the subsystem's input.
+        #[parameter(THETA, "input", 0.0..=1e9)]
+        pub theta: PerAxis<f32> = PerAxis { roll: 1e9, pitch: 1e9, yaw: 1e9, z: 1e9, x: 1e9, y: 1e9 },
+        /// Bound on delta_hat, in the subsystem's input.
+        #[parameter(DELTA, "input", 0.0..=1e9)]
+        pub delta: PerAxis<f32> = PerAxis { roll: 1e9, pitch: 1e9, yaw: 1e9, z: 1e9, x: 1e9, y: 1e9 },
+        /// Bound on the mean of V_e, with g that of hovering.
+        #[parameter(LYAPUNOV, "m2 or rad2", 0.0..=1e9)]
+        pub lyapunov: PerAxis<f32> = PerAxis { roll: 0.5, pitch: 0.5, yaw: 10.0, z: 200.0, x: 1000.0, y: 1000.0 },
+        /// Largest share of steps in which a rotor was at a limit.
+        #[parameter(SAT_SHARE, "1", 0.01..=1.0)]
+        pub saturation_share: f32 = 0.9,
+        /// Least size of a reversal of an input that counts.
+        #[parameter(SWING, "N", 1e-3..=1e4)]
+        pub swing_n: f32 = 1e4,
+        /// Most reversals of one input per second.
+        #[parameter(SWINGS, "Hz", 0.1..=1e4)]
+        pub swings_hz: f32 = 16.0,
+    }
 }
 
 impl Bounds {
@@ -57,31 +56,14 @@ impl Bounds {
     pub fn new(gains: &PerAxis<adaptive::Gains>, vehicle: &Parameters) -> Self {
         let (paper, own) = (Model::new(&Parameters::PAPER.to_f32()), Model::new(vehicle));
         let sluggish = |axis| math::max(paper.hover_gain(axis) / own.hover_gain(axis), 1.0);
-        let lyapunov = PerAxis { roll: 0.5, pitch: 0.5, yaw: 10.0, z: 200.0, x: 1000.0, y: 1000.0 };
         Bounds {
             theta: PerAxis::from_fn(|axis| 0.95 * gains[axis].safeguards.theta_max),
             // Projection holds delta_hat at its bound as a matter of course; beyond it there is none.
             delta: PerAxis::from_fn(|axis| 1.001 * gains[axis].safeguards.delta_max),
-            lyapunov: PerAxis::from_fn(|axis| lyapunov[axis] * sluggish(axis)),
-            saturation_share: 0.9,
+            lyapunov: PerAxis::from_fn(|axis| Self::DEFAULT.lyapunov[axis] * sluggish(axis)),
             swing_n: 0.5 * vehicle.mass_kg * vehicle.gravity_m_s2,
-            swings_hz: 16.0,
+            ..Self::DEFAULT
         }
-    }
-
-    /// Checks every bound.
-    ///
-    /// # Errors
-    /// The first one out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        for axis in Axis::ALL {
-            BOUND.check(self.theta[axis])?;
-            BOUND.check(self.delta[axis])?;
-            BOUND.check(self.lyapunov[axis])?;
-        }
-        SATURATION_SHARE.check(self.saturation_share)?;
-        SWING.check(self.swing_n)?;
-        SWINGS.check(self.swings_hz)
     }
 }
 
@@ -173,7 +155,7 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// A monitor that is called every `dt_s` seconds (valid in [`afbc_control::settings::DT`]).
+    /// A monitor that is called every `dt_s` seconds (valid in [`afbc_control::Settings::DT`]).
     ///
     /// # Errors
     /// The first bound or parameter out of range.

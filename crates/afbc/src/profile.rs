@@ -76,17 +76,8 @@ impl Profile {
 
     /// Settings of the cascade.
     pub const fn settings(self) -> Settings {
-        let paper = Settings {
-            common: afbc_control::Settings { dt_s: 0.001, rotor_force_max_n: 1e4 },
-            command_filter_rad_s: 40.0,
-            limits: Limits::NONE,
-            tilt_by_thrust: false,
-            anti_windup: false,
-            freeze_on_ground: false,
-            bumpless: false,
-        };
         match self {
-            Profile::Paper => paper,
+            Profile::Paper => Settings::DEFAULT,
             Profile::Flight => Settings {
                 common: afbc_control::Settings { dt_s: 0.001, rotor_force_max_n: 3.0 },
                 limits: Limits {

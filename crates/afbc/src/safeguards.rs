@@ -17,49 +17,33 @@
 //!
 //! `docs/flight.md` derives the bound that then really follows.
 
-use afbc_types::{OutOfRange, Range};
+use afbc_types::parameters;
 
-/// Accepted sigma \[1/s\].
-pub const SIGMA: Range = Range::new("sigma", 0.0, 10.0);
-/// Accepted kappa, 1/s per unit of e_2.
-pub const KAPPA: Range = Range::new("kappa", 0.0, 100.0);
-/// Accepted bound on |Theta_hat|, in the subsystem's input.
-pub const THETA_MAX: Range = Range::new("theta_max", 0.0, 1e6);
-/// Accepted bound on delta_hat, in the subsystem's input.
-pub const DELTA_MAX: Range = Range::new("delta_max", 0.0, 1e6);
-/// Accepted dead zone \[m/s or rad/s\].
-pub const DEAD_ZONE: Range = Range::new("dead_zone", 0.0, 10.0);
-
-/// Safeguards of one subsystem's adaptation; each off at the value that [`Safeguards::NONE`] gives it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Safeguards {
-    /// sigma: leakage \[1/s\].
-    pub sigma: f32,
-    /// kappa: leakage that grows with the error \[1/s per m/s or rad/s\].
-    pub kappa: f32,
-    /// Bound on |Theta_hat|, in the subsystem's input.
-    pub theta_max: f32,
-    /// Bound on delta_hat, in the subsystem's input.
-    pub delta_max: f32,
-    /// |e_2| up to which nothing is learnt \[m/s or rad/s\].
-    pub dead_zone: f32,
+parameters! {
+    /// Safeguards of one subsystem's adaptation; each off by default.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Safeguards {
+        /// sigma: leakage of both estimates.
+        #[parameter(SIGMA, "1/s", 0.0..=10.0)]
+        pub sigma: f32 = 0.0,
+        /// kappa: leakage that grows with the error.
+        #[parameter(KAPPA, "1/s per m/s or rad/s", 0.0..=100.0)]
+        pub kappa: f32 = 0.0,
+        /// Bound on |Theta_hat|, in the subsystem's input.
+        #[parameter(THETAMAX, "input", 0.0..=1e6)]
+        pub theta_max: f32 = 1e6,
+        /// Bound on delta_hat, in the subsystem's input.
+        #[parameter(DELTAMAX, "input", 0.0..=1e6, tuned)]
+        pub delta_max: f32 = 1e6,
+        /// |e_2| up to which nothing is learnt.
+        #[parameter(DEADZONE, "m/s or rad/s", 0.0..=10.0)]
+        pub dead_zone: f32 = 0.0,
+    }
 }
 
 impl Safeguards {
     /// The law as printed.
-    pub const NONE: Self = Safeguards { sigma: 0.0, kappa: 0.0, theta_max: 1e6, delta_max: 1e6, dead_zone: 0.0 };
-
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first one out of range.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        SIGMA.check(self.sigma)?;
-        KAPPA.check(self.kappa)?;
-        THETA_MAX.check(self.theta_max)?;
-        DELTA_MAX.check(self.delta_max)?;
-        DEAD_ZONE.check(self.dead_zone)
-    }
+    pub const NONE: Self = Self::DEFAULT;
 
     /// e: what there is to learn from e_2, when `unallocated` of the input that was wanted could not be given.
     #[inline]

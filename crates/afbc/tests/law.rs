@@ -9,7 +9,7 @@ use afbc::law::Tracking;
 use afbc::model::Dynamics;
 use afbc::{Adaptive, Backstepping, Law, Profile, Safeguards};
 use afbc_control::Estimate;
-use afbc_types::{Axis, Parameters, PerAxis, State};
+use afbc_types::{Axis, Declaration, Parameters, PerAxis, State};
 use nalgebra::Matrix3;
 use proptest::prelude::*;
 
@@ -197,30 +197,29 @@ proptest! {
 /// Every gain is refused outside its range, by its name, and accepted at both ends.
 #[test]
 fn a_gain_out_of_range_is_refused_by_name() {
-    use afbc::{adaptive, fuzzy, safeguards};
     type Set = fn(&mut Gains, f32);
-    let cases: [(afbc_types::Range, Set); 11] = [
-        (backstepping::ALPHA1, |g, v| g.backstepping.alpha1 = v),
-        (backstepping::ALPHA2, |g, v| g.backstepping.alpha2 = v),
-        (adaptive::GAMMA, |g, v| g.gamma = v),
-        (adaptive::ETA, |g, v| g.eta = v),
-        (adaptive::EPSILON, |g, v| g.epsilon = v),
-        (safeguards::SIGMA, |g, v| g.safeguards.sigma = v),
-        (safeguards::KAPPA, |g, v| g.safeguards.kappa = v),
-        (safeguards::THETA_MAX, |g, v| g.safeguards.theta_max = v),
-        (safeguards::DELTA_MAX, |g, v| g.safeguards.delta_max = v),
-        (safeguards::DEAD_ZONE, |g, v| g.safeguards.dead_zone = v),
-        (fuzzy::WIDTH, |g, v| g.membership = Membership { centre: 2.0 * v, width: v }),
+    let cases: [(Declaration, Set); 11] = [
+        (backstepping::Gains::ALPHA1, |g, v| g.backstepping.alpha1 = v),
+        (backstepping::Gains::ALPHA2, |g, v| g.backstepping.alpha2 = v),
+        (Gains::GAMMA, |g, v| g.gamma = v),
+        (Gains::ETA, |g, v| g.eta = v),
+        (Gains::EPSILON, |g, v| g.epsilon = v),
+        (Safeguards::SIGMA, |g, v| g.safeguards.sigma = v),
+        (Safeguards::KAPPA, |g, v| g.safeguards.kappa = v),
+        (Safeguards::THETAMAX, |g, v| g.safeguards.theta_max = v),
+        (Safeguards::DELTAMAX, |g, v| g.safeguards.delta_max = v),
+        (Safeguards::DEADZONE, |g, v| g.safeguards.dead_zone = v),
+        (Membership::WIDTH, |g, v| g.membership = Membership { centre: 2.0 * v, width: v }),
     ];
     for axis in Axis::ALL {
-        for (range, set) in cases {
+        for (Declaration { range, .. }, set) in cases {
             let with = |value: f32| {
                 let mut gains: PerAxis<Gains> = Profile::Paper.gains();
                 set(&mut gains[axis], value);
                 Adaptive::new(gains).map(|_| ()).map_err(|error| error.range.name)
             };
             let (min, max) = (range.min as f32, range.max as f32);
-            if range != fuzzy::WIDTH {
+            if range != Membership::WIDTH.range {
                 assert_eq!(with(min), Ok(()), "{} = {min} on {}", range.name, axis.name());
                 assert_eq!(with(max), Ok(()), "{} = {max} on {}", range.name, axis.name());
                 for bad in [min.next_down(), max.next_up(), f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {

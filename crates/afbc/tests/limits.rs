@@ -7,7 +7,7 @@ use afbc::integral::IntegralBackstepping;
 use afbc::{Adaptive, Backstepping, Controller, Limits, Profile, Settings};
 use afbc_control::Errors;
 use afbc_control::{FlightController, Screened};
-use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
+use afbc_types::{Axis, Declaration, Declared, Parameters, PerAxis, Setpoint, State};
 use common::{Stepped, U, gains, limits, plausible, setpoint, settings, state, step};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -185,14 +185,14 @@ fn no_attitude_is_singular() {
 #[test]
 fn limits_out_of_range_are_refused_by_name() {
     type Set = fn(&mut Limits, f32);
-    let cases: [(afbc_types::Range, Set); 5] = [
-        (afbc::limits::TILT, |l, v| l.tilt_max_rad = v),
-        (afbc::limits::TILT_RATE, |l, v| l.tilt_rate_max_rad_s = v),
-        (afbc::limits::ACCELERATION, |l, v| l.acceleration_max_m_s2 = v),
-        (afbc::limits::SPEED, |l, v| l.speed_max_m_s = v),
-        (afbc::limits::CLIMB, |l, v| l.climb_max_m_s = v),
+    let cases: [(Declaration, Set); 5] = [
+        (Limits::TILT, |l, v| l.tilt_max_rad = v),
+        (Limits::RATE, |l, v| l.tilt_rate_max_rad_s = v),
+        (Limits::ACCEL, |l, v| l.acceleration_max_m_s2 = v),
+        (Limits::SPEED, |l, v| l.speed_max_m_s = v),
+        (Limits::CLIMB, |l, v| l.climb_max_m_s = v),
     ];
-    for (range, set) in cases {
+    for (Declaration { range, .. }, set) in cases {
         let with = |value| {
             let mut settings = Profile::Flight.settings();
             set(&mut settings.limits, value);

@@ -2,7 +2,7 @@
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 use afbc::model::Model;
-use afbc::monitor::{BOUND, Bounds, Figures, Monitor, SATURATION_SHARE, SWING, SWINGS};
+use afbc::monitor::{Bounds, Figures, Monitor};
 use afbc::{Cascade, Profile};
 use afbc_control::{Errors, Estimate, Trip};
 use afbc_types::{Axis, Parameters, PerAxis};
@@ -218,15 +218,15 @@ fn every_reason_is_its_own_and_fits_a_status_text() {
 #[test]
 fn bounds_out_of_range_are_refused_by_name() {
     type Set = fn(&mut Bounds, f32);
-    let cases: [(afbc_types::Range, Set); 6] = [
-        (BOUND, |b, v| b.theta.yaw = v),
-        (BOUND, |b, v| b.delta.x = v),
-        (BOUND, |b, v| b.lyapunov.roll = v),
-        (SATURATION_SHARE, |b, v| b.saturation_share = v),
-        (SWING, |b, v| b.swing_n = v),
-        (SWINGS, |b, v| b.swings_hz = v),
+    let cases: [(afbc_types::Declaration, Set); 6] = [
+        (Bounds::THETA, |b, v| b.theta.yaw = v),
+        (Bounds::DELTA, |b, v| b.delta.x = v),
+        (Bounds::LYAPUNOV, |b, v| b.lyapunov.roll = v),
+        (Bounds::SAT_SHARE, |b, v| b.saturation_share = v),
+        (Bounds::SWING, |b, v| b.swing_n = v),
+        (Bounds::SWINGS, |b, v| b.swings_hz = v),
     ];
-    for (range, set) in cases {
+    for (afbc_types::Declaration { range, .. }, set) in cases {
         let with = |value| {
             let mut bounds = bounds();
             set(&mut bounds, value);

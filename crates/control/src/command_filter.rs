@@ -37,7 +37,7 @@ pub struct Filtered {
 }
 
 impl CommandFilter {
-    /// A filter of the given bandwidth \[rad/s\], advanced every `dt_s` seconds (valid in [`crate::settings::DT`]).
+    /// A filter of the given bandwidth \[rad/s\], advanced every `dt_s` seconds (valid in [`crate::Settings::DT`]).
     ///
     /// # Errors
     /// If the bandwidth is outside [`BANDWIDTH`].

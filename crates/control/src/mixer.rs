@@ -12,12 +12,11 @@
 //! other forces may give more. Yaw that happens to make room is counted on only where all four inputs fit, and in a frame
 //! without symmetry a little pitch may make room for roll, so that more of one asked is not always more given.
 
+use crate::settings::Settings;
 use crate::{Action, Health, math};
-use afbc_types::{Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds};
+use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds};
 use nalgebra::{Matrix4, SMatrix, SVector, Vector4};
 
-/// Accepted largest force of one rotor \[N\].
-pub const FORCE_MAX: Range = Range::new("rotor_force_max_n", 1e-3, 1e4);
 /// Accepted position of a rotor along x and along y, in arm's lengths.
 pub const POSITION: Range = Range::new("rotor_position", -10.0, 10.0);
 /// Accepted determinant of B B^T over the product of its diagonal, 1 for a symmetric frame: near 0 the rotors cannot give
@@ -113,7 +112,7 @@ impl<const N: usize> Mixer<N> {
     /// If a parameter, a position or the limit is out of range, or the rotors cannot give all four inputs and hover.
     pub fn of(rotors: [Rotor; N], vehicle: &Parameters, force_max_n: f32) -> Result<Self, OutOfRange> {
         vehicle.validate()?;
-        FORCE_MAX.check(force_max_n)?;
+        Settings::FORCE_MAX.range.check(force_max_n)?;
         for rotor in &rotors {
             POSITION.check(rotor.x)?;
             POSITION.check(rotor.y)?;
@@ -148,7 +147,7 @@ impl<const N: usize> Mixer<N> {
     pub fn check_hover(&self, weight_n: f32) -> Result<(), OutOfRange> {
         // Rounded up to what people read.
         let needed_n = libm::ceil(f64::from(HOVER_MARGIN * weight_n * self.share.max()) * 1e4) / 1e4;
-        Range { min: needed_n, ..FORCE_MAX }.check(self.force_max)
+        Range { min: needed_n, ..Settings::FORCE_MAX.range }.check(self.force_max)
     }
 
     /// Rotor forces that give `inputs`, as far as the rotors' limits allow. A NaN is taken for 0, and reported as

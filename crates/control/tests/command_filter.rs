@@ -1,8 +1,8 @@
 //! Properties of the command filter at every bandwidth and step that is accepted.
 #![allow(clippy::unwrap_used, missing_docs)] // a filter that cannot be built must stop the test
 
+use afbc_control::Settings;
 use afbc_control::command_filter::{BANDWIDTH, CommandFilter, Filtered};
-use afbc_control::settings::DT;
 use core::f32::consts::FRAC_PI_2;
 use proptest::prelude::*;
 
@@ -18,7 +18,7 @@ fn bandwidth_and_step() -> impl Strategy<Value = (f32, f32)> {
             1 => Just(range.max as f32),
         ]
     };
-    (over(BANDWIDTH), over(DT))
+    (over(BANDWIDTH), over(Settings::DT.range))
 }
 
 fn filtered() -> impl Strategy<Value = Filtered> {

@@ -5,7 +5,8 @@
 //! `yaw >= 0` (no yaw takes no share of any room). `|missing| >= least` differs at equality alone, where either is right.
 #![allow(clippy::unwrap_used, missing_docs)] // a mixer that cannot be built must stop the test
 
-use afbc_control::mixer::{AUTHORITY, Allocation, FORCE_MAX, Mixer, PLUS, POSITION, Rotor, THRUST_SHARE};
+use afbc_control::Settings;
+use afbc_control::mixer::{AUTHORITY, Allocation, Mixer, PLUS, POSITION, Rotor, THRUST_SHARE};
 use afbc_types::{Inputs, Parameters, RotorForces};
 use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 use nalgebra::{Matrix4, SVector, Vector4};
@@ -329,7 +330,7 @@ fn nan_becomes_no_force_and_infinity_the_largest() {
 fn a_limit_out_of_range_is_refused_by_name() {
     let vehicle = Parameters::PAPER.to_f32();
     for limit in [0.0, -1.0, 2e4, f32::NAN, f32::INFINITY] {
-        assert_eq!(Mixer::new(&vehicle, limit).unwrap_err().range, FORCE_MAX);
+        assert_eq!(Mixer::new(&vehicle, limit).unwrap_err().range, Settings::FORCE_MAX.range);
     }
     let weightless = Parameters { mass_kg: 0.0, ..vehicle };
     assert_eq!(Mixer::new(&weightless, 10.0).unwrap_err().range.name, "mass_kg");

@@ -4,7 +4,7 @@ use crate::attitude::roll_pitch;
 use afbc_control::command_filter::Filtered;
 use afbc_control::mixer::{Allocation, Mixer};
 use afbc_control::{Action, Errors, Health, Settings, Trace};
-use afbc_types::{Inputs, OutOfRange, Parameters, PerAxis, RotorSpeeds};
+use afbc_types::{Declared, Inputs, OutOfRange, Parameters, PerAxis, RotorSpeeds};
 use nalgebra::{Matrix3, Vector3};
 
 /// The nominal vehicle.

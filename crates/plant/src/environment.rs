@@ -1,6 +1,6 @@
 //! What acts on the vehicle from outside, and how its parameters change, in time.
 
-use afbc_types::{Axis, OutOfRange, Parameters, PerAxis, Range};
+use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, Range};
 use alloc::vec::Vec;
 use nalgebra::Vector3;
 

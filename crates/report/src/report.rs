@@ -8,7 +8,7 @@ use afbc::{Limits, Settings};
 use afbc_sim::contender::{Contender, Law};
 use afbc_sim::scenario::Scenario;
 use afbc_sim::trajectory::Trajectory;
-use afbc_types::{Axis, Value};
+use afbc_types::{Axis, Declared, PerAxis, Value};
 use core::convert::Infallible;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -262,27 +262,9 @@ fn gains(contender: &Contender) -> Markup {
         h3 { (capitalised(contender.title())) }
         p.quiet { (contender.kind().title()) ", " (settings) "." }
         @match &contender.law {
-            Law::Afbc(gains) | Law::Guarded(gains) => (per_axis(&AFBC_GAINS, |axis| {
-                let g = &gains[axis];
-                vec![
-                    g.backstepping.alpha1,
-                    g.backstepping.alpha2,
-                    g.gamma,
-                    g.eta,
-                    g.epsilon,
-                    g.membership.centre,
-                    g.membership.width,
-                    g.safeguards.sigma,
-                    g.safeguards.kappa,
-                    g.safeguards.theta_max,
-                    g.safeguards.delta_max,
-                    g.safeguards.dead_zone,
-                ]
-            })),
-            Law::Backstepping(gains) => (per_axis(&["α₁", "α₂"], |axis| {
-                vec![gains[axis].alpha1, gains[axis].alpha2]
-            })),
-            law => (by_name(*law)),
+            Law::Afbc(gains) | Law::Guarded(gains) => (per_axis(&AFBC_GAINS, gains)),
+            Law::Backstepping(gains) => (per_axis(&["α₁", "α₂"], gains)),
+            law => (by_name(law)),
         }
     }
 }
@@ -290,24 +272,34 @@ fn gains(contender: &Contender) -> Markup {
 /// What the columns of AFBC's gains are called.
 const AFBC_GAINS: [&str; 12] = ["α₁", "α₂", "γ", "η", "ε", "centre", "width", "σ", "κ", "Θ max", "δ max", "dead zone"];
 
-fn per_axis(names: &[&str], gains: impl Fn(Axis) -> Vec<f32>) -> Markup {
+fn per_axis<G: Declared>(names: &[&str], gains: &PerAxis<G>) -> Markup {
     html! {
         div.scroll { table {
             thead { tr { td { "subsystem" } @for name in names { th scope="col" { (name) } } } }
-            tbody { @for axis in Axis::ALL { tr { td { (axis.name()) } @for gain in gains(axis) { td { (gain) } } } } }
+            tbody { @for axis in Axis::ALL { tr {
+                td { (axis.name()) }
+                @for (_, gain) in listed(&gains[axis]) { td { (gain) } }
+            } } }
         } }
     }
 }
 
-fn by_name(mut law: Law) -> Markup {
-    let mut gains = Vec::new();
-    let Ok(()) = law.each_gain(&mut |declaration, value| {
+fn by_name(law: &Law) -> Markup {
+    html! { div.scroll { table { tbody {
+        @for (name, gain) in listed(law) { tr { td { code { (name) } } td { (gain) } } }
+    } } } }
+}
+
+/// Key and value of each gain.
+fn listed(gains: &impl Declared) -> Vec<(&'static str, f32)> {
+    let mut list = Vec::new();
+    let Ok(()) = gains.visit(&mut |declaration, value| {
         if let Value::Single([gain]) = value {
-            gains.push((declaration.range.name, *gain));
+            list.push((declaration.range.name, *gain));
         }
         Ok::<(), Infallible>(())
     });
-    html! { div.scroll { table { tbody { @for (name, gain) in gains { tr { td { code { (name) } } td { (gain) } } } } } } }
+    list
 }
 
 fn start(scenario: &Scenario) -> String {

@@ -101,17 +101,27 @@ impl Law {
     pub const fn is_peer(&self) -> bool {
         matches!(self, Law::Pid(_) | Law::Geometric(_) | Law::Indi(_))
     }
+}
 
-    /// Shows each gain of a peer; none of AFBC and backstepping, which have a set for each axis.
-    ///
-    /// # Errors
-    /// The first that `visit` returns.
-    pub fn each_gain<E>(&mut self, visit: Visit<'_, E>) -> Result<(), E> {
+impl Declared for Law {
+    /// Shows each gain; AFBC's and backstepping's in a group for each axis.
+    fn visit_mut<E>(&mut self, visit: Visit<'_, E>) -> Result<(), E> {
         match self {
-            Law::Afbc(_) | Law::Guarded(_) | Law::Backstepping(_) => Ok(()),
+            Law::Afbc(gains) | Law::Guarded(gains) => gains.visit_mut(visit),
+            Law::Backstepping(gains) => gains.visit_mut(visit),
             Law::Pid(gains) => gains.visit_mut(visit),
             Law::Geometric(gains) => gains.visit_mut(visit),
             Law::Indi(gains) => gains.visit_mut(visit),
+        }
+    }
+
+    fn together(&self) -> Result<(), OutOfRange> {
+        match self {
+            Law::Afbc(gains) | Law::Guarded(gains) => gains.together(),
+            Law::Backstepping(gains) => gains.together(),
+            Law::Pid(gains) => gains.together(),
+            Law::Geometric(gains) => gains.together(),
+            Law::Indi(gains) => gains.together(),
         }
     }
 }

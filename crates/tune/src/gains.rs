@@ -1,12 +1,9 @@
 //! A contender's gains as coordinates of a search, and as text for a scenario file.
 
 use afbc::Profile;
-use afbc::limits::{ACCELERATION, CLIMB, SPEED, TILT, TILT_RATE};
-use afbc_control::command_filter::BANDWIDTH;
-use afbc_control::mixer::FORCE_MAX;
 use afbc_sim::contender::ControllerKind;
 use afbc_sim::contender::{Contender, Law};
-use afbc_types::{Axis, PerAxis, Range, Value};
+use afbc_types::{Axis, Declaration, Declared, PerAxis, Range, Value};
 use core::convert::Infallible;
 use core::fmt::Write;
 
@@ -16,39 +13,34 @@ const GROUPS: [&[Axis]; 4] = [&[Axis::Z], &[Axis::X, Axis::Y], &[Axis::Roll, Axi
 /// Where a gain stands, and what it may be.
 type Visit<'a> = &'a mut dyn FnMut(&str, &Range, &mut f32);
 
-/// Shows every gain of `contender` that is a matter of taste and not 0. At 0 it switches a part of its law off, which is
-/// another law; it stays there.
+/// Shows every gain of `contender` that is tuned and not 0. At 0 it switches a part of its law off, which is another law; it
+/// stays there.
 fn each_tunable(contender: &mut Contender, visit: Visit) {
-    let mut visit = |place: &str, (range, gain): (&Range, &mut f32)| {
-        if *gain > 0.0 {
-            visit(place, range, gain);
-        }
-    };
     match &mut contender.law {
-        Law::Afbc(gains) | Law::Guarded(gains) => {
-            each_group(gains, &mut |place, gains| {
-                let before = gains.safeguards.delta_max;
-                gains.tunables().into_iter().for_each(|knob| visit(place, knob));
-                // By rule, epsilon goes with the bound on delta_hat: their ratio is all that a limit cycle depends on.
-                if before > 0.0 {
-                    gains.epsilon *= gains.safeguards.delta_max / before;
-                }
-            });
-        }
-        Law::Backstepping(gains) => {
-            each_group(gains, &mut |place, gains| gains.tunables().into_iter().for_each(|knob| visit(place, knob)));
-        }
-        peer => {
-            let Ok(()) = peer.each_gain(&mut |declaration, value| {
-                if let (true, Value::Single([gain])) = (declaration.tuned, value) {
-                    visit("", (&declaration.range, gain));
-                }
-                Ok::<(), Infallible>(())
-            });
-            return;
-        }
+        Law::Afbc(gains) | Law::Guarded(gains) => each_group(gains, &mut |place, gains| {
+            let before = gains.safeguards.delta_max;
+            each_tuned(place, gains, visit);
+            // By rule, epsilon goes with the bound on delta_hat: their ratio is all that a limit cycle depends on.
+            if before > 0.0 {
+                gains.epsilon *= gains.safeguards.delta_max / before;
+            }
+        }),
+        Law::Backstepping(gains) => each_group(gains, &mut |place, gains| each_tuned(place, gains, visit)),
+        peer => return each_tuned("", peer, visit),
     }
-    visit("cascade", (&BANDWIDTH, &mut contender.settings.command_filter_rad_s));
+    each_tuned("cascade", &mut contender.settings, visit);
+}
+
+/// Shows every parameter of one group that is tuned and not 0.
+fn each_tuned(place: &str, parameters: &mut impl Declared, visit: Visit) {
+    let Ok(()) = parameters.visit_mut(&mut |declaration, value| {
+        if let (true, Value::Single([gain])) = (declaration.tuned, value)
+            && *gain > 0.0
+        {
+            visit(place, &declaration.range, gain);
+        }
+        Ok::<(), Infallible>(())
+    });
 }
 
 /// Shows the gains of the first axis of each group, then gives them to the whole group.
@@ -164,52 +156,25 @@ fn quoted(name: &str) -> String {
 /// Everything that a scenario file can say of a contender, but the time step, which is the file's.
 fn keys(contender: &Contender) -> Vec<Key> {
     let mut keys = Vec::new();
-    let mut put = |table: &str, key, value: String| keys.push(Key { table: table.into(), key, value });
-    let mut law = contender.law;
-    match &mut law {
-        Law::Afbc(gains) | Law::Guarded(gains) => {
-            for axis in Axis::ALL {
-                let (table, gains) = (format!("gains.{}", axis.name()), &mut gains[axis]);
-                for (range, gain) in gains.tunables() {
-                    put(&table, range.name, gain.to_string());
-                }
-                for (range, gain) in gains.others() {
-                    put(&table, range.name, gain.to_string());
-                }
-            }
+    // A law's groups are tables within its own; that of the settings is a table beside theirs.
+    let mut put = |table: String, key, value: Value<'_>| {
+        let value = match value {
+            Value::Single([number]) => number.to_string(),
+            Value::Switch(on) => on.to_string(),
+            _ => return Ok(()),
+        };
+        keys.push(Key { table, key, value });
+        Ok::<(), Infallible>(())
+    };
+    let Ok(()) = contender.law.visit(&mut |Declaration { group, range, .. }, value| {
+        put(if group.is_empty() { "gains".into() } else { format!("gains.{group}") }, range.name, value)
+    });
+    let Ok(()) = contender.settings.visit(&mut |declaration, value| {
+        let Declaration { group, range, .. } = declaration;
+        if range.name == afbc_control::Settings::DT.range.name {
+            return Ok(());
         }
-        Law::Backstepping(gains) => {
-            for axis in Axis::ALL {
-                for (range, gain) in gains[axis].tunables() {
-                    put(&format!("gains.{}", axis.name()), range.name, gain.to_string());
-                }
-            }
-        }
-        peer => {
-            let Ok(()) = peer.each_gain(&mut |declaration, value| {
-                if let Value::Single([gain]) = value {
-                    put("gains", declaration.range.name, gain.to_string());
-                }
-                Ok::<(), Infallible>(())
-            });
-        }
-    }
-    let settings = &contender.settings;
-    put("settings", BANDWIDTH.name, settings.command_filter_rad_s.to_string());
-    put("settings", FORCE_MAX.name, settings.common.rotor_force_max_n.to_string());
-    put("settings", "tilt_by_thrust", settings.tilt_by_thrust.to_string());
-    put("settings", "freeze_on_ground", settings.freeze_on_ground.to_string());
-    put("settings", "bumpless", settings.bumpless.to_string());
-    put("settings", "anti_windup", settings.anti_windup.to_string());
-    let limits = &settings.limits;
-    for (range, limit) in [
-        (&TILT, limits.tilt_max_rad),
-        (&TILT_RATE, limits.tilt_rate_max_rad_s),
-        (&ACCELERATION, limits.acceleration_max_m_s2),
-        (&SPEED, limits.speed_max_m_s),
-        (&CLIMB, limits.climb_max_m_s),
-    ] {
-        put("limits", range.name, limit.to_string());
-    }
+        put(if group.is_empty() { "settings" } else { group }.into(), range.name, value)
+    });
     keys
 }

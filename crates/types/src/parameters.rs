@@ -1,6 +1,6 @@
 //! The vehicle's physical parameters.
 
-use crate::{Declared, Number, OutOfRange, parameters};
+use crate::parameters;
 use nalgebra::Vector3;
 
 parameters! {
@@ -47,15 +47,5 @@ impl Parameters<f64> {
             drag_factor_n_m_s2: self.drag_factor_n_m_s2 as f32,
             gravity_m_s2: self.gravity_m_s2 as f32,
         }
-    }
-}
-
-impl<T: Number> Parameters<T> {
-    /// Checks every parameter, as [`Declared::validate`] does.
-    ///
-    /// # Errors
-    /// The first one out of range, by name.
-    pub fn validate(&self) -> Result<(), OutOfRange> {
-        Declared::validate(self)
     }
 }

@@ -5,17 +5,11 @@
     reason = "each test uses its own share; what cannot be built must stop the test"
 )]
 
-use afbc::adaptive::{EPSILON, ETA, GAMMA, Gains};
-use afbc::backstepping::{ALPHA1, ALPHA2};
+use afbc::adaptive::Gains;
 use afbc::fuzzy::Membership;
-use afbc::limits::{ACCELERATION, CLIMB, SPEED, TILT, TILT_RATE};
-use afbc::safeguards::{DEAD_ZONE, DELTA_MAX, KAPPA, SIGMA, THETA_MAX};
-use afbc::{Limits, Profile, Safeguards, Settings};
-use afbc_control::command_filter::BANDWIDTH;
-use afbc_control::mixer::FORCE_MAX;
-use afbc_control::settings::DT;
+use afbc::{Limits, Profile, Safeguards, Settings, backstepping};
 use afbc_control::{Action, FlightController, Screened, Trace};
-use afbc_types::{Axis, Inputs, Parameters, PerAxis, Range, Setpoint, State};
+use afbc_types::{Axis, Declaration, Declared, Inputs, Parameters, PerAxis, Setpoint, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
@@ -79,14 +73,16 @@ pub(crate) fn setpoint<S: Strategy<Value = f32> + 'static>(value: fn() -> S) -> 
     )
 }
 
-/// A value anywhere in `range`, its bounds drawn often.
-pub(crate) fn within(range: Range) -> impl Strategy<Value = f32> {
-    let (min, max) = (range.min as f32, range.max as f32);
+/// A value anywhere in the range of a parameter, its bounds drawn often.
+pub(crate) fn within(declaration: Declaration) -> impl Strategy<Value = f32> {
+    let (min, max) = (declaration.range.min as f32, declaration.range.max as f32);
     prop_oneof![4 => min..=max, 1 => Just(min), 1 => Just(max)]
 }
 
-/// A value anywhere in `range`, evenly over its orders of magnitude from a millionth of its end on, its bounds drawn often.
-pub(crate) fn spread(range: Range) -> impl Strategy<Value = f32> {
+/// A value anywhere in the range of a parameter, evenly over its orders of magnitude from a millionth of its end on, its
+/// bounds drawn often.
+pub(crate) fn spread(declaration: Declaration) -> impl Strategy<Value = f32> {
+    let range = declaration.range;
     let (min, max) = (range.min.max(1e-6 * range.max), range.max);
     prop_oneof![
         4 => (min.ln()..=max.ln()).prop_map(move |x| x.exp().clamp(min, max) as f32),
@@ -96,29 +92,41 @@ pub(crate) fn spread(range: Range) -> impl Strategy<Value = f32> {
 }
 
 pub(crate) fn limits() -> impl Strategy<Value = Limits> {
-    let any = (spread(TILT), spread(TILT_RATE), spread(ACCELERATION), spread(SPEED), spread(CLIMB)).prop_map(
-        |(tilt_max_rad, tilt_rate_max_rad_s, acceleration_max_m_s2, speed_max_m_s, climb_max_m_s)| Limits {
+    let any = (
+        spread(Limits::TILT),
+        spread(Limits::RATE),
+        spread(Limits::ACCEL),
+        spread(Limits::SPEED),
+        spread(Limits::CLIMB),
+    )
+        .prop_map(|(tilt_max_rad, tilt_rate_max_rad_s, acceleration_max_m_s2, speed_max_m_s, climb_max_m_s)| Limits {
             tilt_max_rad,
             tilt_rate_max_rad_s,
             acceleration_max_m_s2,
             speed_max_m_s,
             climb_max_m_s,
-        },
-    );
+        });
     prop_oneof![1 => Just(Limits::NONE), 1 => Just(Profile::Flight.settings().limits), 4 => any]
 }
 
 pub(crate) fn safeguards() -> impl Strategy<Value = Safeguards> {
-    let leakage = (spread(SIGMA), spread(KAPPA));
-    let bounds = (spread(THETA_MAX), spread(DELTA_MAX));
-    let any = (leakage, bounds, spread(DEAD_ZONE)).prop_map(|((sigma, kappa), (theta_max, delta_max), dead_zone)| {
-        Safeguards { sigma, kappa, theta_max, delta_max, dead_zone }
-    });
+    let leakage = (spread(Safeguards::SIGMA), spread(Safeguards::KAPPA));
+    let bounds = (spread(Safeguards::THETAMAX), spread(Safeguards::DELTAMAX));
+    let any = (leakage, bounds, spread(Safeguards::DEADZONE)).prop_map(
+        |((sigma, kappa), (theta_max, delta_max), dead_zone)| Safeguards {
+            sigma,
+            kappa,
+            theta_max,
+            delta_max,
+            dead_zone,
+        },
+    );
     prop_oneof![1 => Just(Safeguards::NONE), 4 => any]
 }
 
 pub(crate) fn settings() -> impl Strategy<Value = Settings> {
-    let numbers = (within(DT), within(BANDWIDTH), within(FORCE_MAX), limits());
+    let (dt, force) = (afbc_control::Settings::DT, afbc_control::Settings::FORCE_MAX);
+    let numbers = (within(dt), within(Settings::FILTER), within(force), limits());
     let any = (numbers, any::<[bool; 4]>()).prop_map(|(numbers, switches)| {
         let (dt_s, command_filter_rad_s, rotor_force_max_n, limits) = numbers;
         let [tilt_by_thrust, anti_windup, freeze_on_ground, bumpless] = switches;
@@ -138,7 +146,8 @@ pub(crate) fn settings() -> impl Strategy<Value = Settings> {
 /// One set of gains for one subsystem.
 pub(crate) fn gains_of_one() -> impl Strategy<Value = Gains> {
     let membership = (1e-3_f32..100.0, 0.1_f32..=6.0);
-    (within(ALPHA1), within(ALPHA2), within(GAMMA), within(ETA), within(EPSILON), membership, safeguards())
+    let (alpha1, alpha2) = (within(backstepping::Gains::ALPHA1), within(backstepping::Gains::ALPHA2));
+    (alpha1, alpha2, within(Gains::GAMMA), within(Gains::ETA), within(Gains::EPSILON), membership, safeguards())
         .prop_map(|(alpha1, alpha2, gamma, eta, epsilon, (width, spread), safeguards)| Gains {
             backstepping: afbc::backstepping::Gains { alpha1, alpha2 },
             gamma,

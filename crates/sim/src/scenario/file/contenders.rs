@@ -1,11 +1,11 @@
 //! `controllers`, `profile`, `monitor` and `[[contender]]`: who flies.
 
-use super::control::{axis_backstepping, axis_gains, per_axis, settings};
+use super::control::{gains, per_axis, settings};
 use crate::contender::{Contender, ControllerKind, Law, backstepping_part};
 use crate::reader::{FileError, Table};
 use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
-use afbc_types::{Declared, Parameters, PerAxis};
+use afbc_types::{Parameters, PerAxis};
 
 /// Longest name of a contender: what a table has room for.
 const NAME_LENGTH: usize = 32;
@@ -35,10 +35,11 @@ impl Defaults {
 pub(super) fn read(root: &mut Table<'_>, vehicle: &Parameters) -> Result<Vec<Contender>, FileError> {
     let controllers = root.choices("controllers", &ControllerKind::ALL, ControllerKind::name)?;
     let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(Profile::Paper);
-    let gains = per_axis(root.table("gains")?, profile.gains_for(vehicle), axis_gains)?;
+    let mut axes = profile.gains_for(vehicle);
+    per_axis(root.table("gains")?, &mut axes)?;
     let settings = settings(root, profile.settings(), true)?;
     let monitor = root.boolean("monitor")?.unwrap_or(false);
-    let defaults = Defaults { profile, gains, settings, monitor };
+    let defaults = Defaults { profile, gains: axes, settings, monitor };
 
     let tables = root.few_tables("contender")?;
     let kinds = controllers.unwrap_or(if tables.is_empty() { ControllerKind::PAPER.to_vec() } else { Vec::new() });
@@ -86,18 +87,11 @@ fn contender(
 /// The law with the gains in `table`; those that it leaves out are as in `default`.
 fn law(table: Option<Table<'_>>, mut default: Law) -> Result<Law, FileError> {
     match &mut default {
-        Law::Afbc(gains) | Law::Guarded(gains) => *gains = per_axis(table, *gains, axis_gains)?,
-        Law::Backstepping(gains) => *gains = per_axis(table, *gains, axis_backstepping)?,
-        Law::Pid(gains) => whole(table, gains)?,
-        Law::Geometric(gains) => whole(table, gains)?,
-        Law::Indi(gains) => whole(table, gains)?,
+        Law::Afbc(axes) | Law::Guarded(axes) => per_axis(table, axes)?,
+        Law::Backstepping(axes) => per_axis(table, axes)?,
+        Law::Pid(own) => gains(table, own)?,
+        Law::Geometric(own) => gains(table, own)?,
+        Law::Indi(own) => gains(table, own)?,
     }
     Ok(default)
-}
-
-/// Gains for the whole vehicle.
-fn whole(table: Option<Table<'_>>, gains: &mut impl Declared) -> Result<(), FileError> {
-    let Some(mut table) = table else { return Ok(()) };
-    table.declared(gains)?;
-    table.finish()
 }

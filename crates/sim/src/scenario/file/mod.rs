@@ -67,7 +67,7 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
     };
     let initial = motion::initial(root.table("initial")?, &trajectory.at(0.0))?;
     let environment = environment::read(&mut root, truth)?;
-    let step_s = contenders.first().map_or(afbc_control::settings::DT.max, Contender::step_s);
+    let step_s = contenders.first().map_or(afbc_control::Settings::DT.range.max, Contender::step_s);
     let realism = realism::read(&mut root, &truth, step_s)?;
     let sensing = sensors::read(root.table("sensors")?)?;
     let outages = environment::outages(&mut root)?;
