@@ -158,7 +158,7 @@ fn closed_loop_afbc_real(bencher: Bencher) {
 /// One flight of the built-in campaign under every contender, as it is flown: items are flights of one contender.
 #[divan::bench]
 fn campaign_flight(bencher: Bencher) {
-    let campaign = afbc_campaign::built_in("robustness").unwrap().campaign().unwrap();
+    let campaign = afbc_campaign::built_in("robustness").unwrap().read().unwrap();
     let mut flight = 0;
     bencher.counter(ItemsCount::new(campaign.scenario.contenders.len())).bench_local(|| {
         flight += 1;

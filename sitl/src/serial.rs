@@ -111,7 +111,7 @@ mod tests {
     use std::io::{Read, Write};
 
     fn scenario(name: &str, duration_s: f64) -> Scenario {
-        Scenario { duration_s, ..built_in(name).unwrap().scenario().unwrap() }
+        Scenario { duration_s, ..built_in(name).unwrap().read().unwrap() }
     }
 
     /// The host's autopilot behind a serial port.

@@ -256,14 +256,14 @@ fn a_killed_program_loses_nothing_that_was_finished() {
 fn built_in_campaigns_are_listed_and_templates() {
     let folder = folder("built-in");
     let list = String::from_utf8(sitl(&folder, &["campaigns"]).stdout).unwrap();
-    for built_in in campaign::BUILT_IN {
+    for built_in in &campaign::BUILT_IN {
         assert!(list.contains(built_in.name), "{list}");
         let printed = sitl(&folder, &["campaigns", built_in.name]);
         assert_eq!(printed.stdout, built_in.text.as_bytes());
-        let campaign = built_in.campaign().unwrap();
+        let campaign = built_in.read().unwrap();
         assert_eq!(campaign.name, built_in.name);
         assert!(!campaign.description.is_empty());
         campaign.rows(0).unwrap();
     }
-    assert_eq!(built_in("robustness").unwrap().campaign().unwrap().flights, 10_000);
+    assert_eq!(built_in("robustness").unwrap().read().unwrap().flights, 10_000);
 }

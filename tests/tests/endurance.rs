@@ -105,7 +105,7 @@ fn estimates_of_the_law_as_printed_drift_until_the_vehicle_is_lost() {
 /// allocation needs for the limit cycle of pitch.
 #[test]
 fn the_printed_hover_is_lost_upwards_and_level() {
-    let scenario = Scenario { duration_s: 300.0, ..built_in("hover").unwrap().scenario().unwrap() };
+    let scenario = Scenario { duration_s: 300.0, ..built_in("hover").unwrap().read().unwrap() };
     let fly = |kind| Run::fly(&scenario, scenario.contender(kind).unwrap(), 7).unwrap();
     let run = fly(ControllerKind::Afbc);
     let (lost, last) = (run.lost.unwrap(), run.log.last().unwrap());

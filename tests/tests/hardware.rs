@@ -7,7 +7,7 @@ use afbc_sim::run::Run;
 use afbc_sim::scenario::{Scenario, built_in};
 
 fn hardware() -> Scenario {
-    built_in("hardware").unwrap().scenario().unwrap()
+    built_in("hardware").unwrap().read().unwrap()
 }
 
 fn fly(kind: ControllerKind, profile: Profile, scenario: &Scenario) -> Run {

@@ -6,7 +6,7 @@ use afbc_sim::scenario::{Outage, Scenario, built_in};
 
 /// The paper's flight on hardware, on a link that is down for `length_s` from 7.45 s on: a gust begins meanwhile.
 fn scenario(length_s: f64, flight_core: bool) -> Scenario {
-    let mut scenario = built_in("hardware").unwrap().scenario().unwrap();
+    let mut scenario = built_in("hardware").unwrap().read().unwrap();
     scenario.duration_s = 20.0;
     scenario.outages = vec![Outage { start_s: 7.45, end_s: 7.45 + length_s }];
     scenario.flight_core = flight_core;

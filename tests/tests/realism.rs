@@ -7,7 +7,7 @@ use afbc_sim::run::Run;
 use afbc_sim::scenario::{Scenario, built_in, parse};
 
 fn scenario(name: &str, duration_s: f64) -> Scenario {
-    Scenario { duration_s, ..built_in(name).unwrap().scenario().unwrap() }
+    Scenario { duration_s, ..built_in(name).unwrap().read().unwrap() }
 }
 
 fn samples(scenario: &Scenario, kind: ControllerKind) -> Vec<Sample> {

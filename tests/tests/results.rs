@@ -34,7 +34,7 @@ fn the_results_page_is_what_the_code_does() {
 /// The table of `sitl compare`: the standard contenders in `hardware`, an asterisk on whatever is best as printed.
 #[test]
 fn the_table_on_real_rotors_is_what_flies() {
-    let scenario = built_in("hardware").unwrap().scenario().unwrap();
+    let scenario = built_in("hardware").unwrap().read().unwrap();
     let figures = |contender| {
         let metrics = Run::fly(&scenario, contender, u64::MAX).unwrap().metrics;
         let largest = metrics.max_abs.xyz().max();

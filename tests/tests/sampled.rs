@@ -79,7 +79,7 @@ fn flown(scenario: &Scenario, kind: ControllerKind, tracker: Tracker) -> (f64, b
 /// As close as on a state a millisecond, or nearly: extrapolation makes up for the rest. Without it PID and AFBC are lost.
 #[test]
 fn a_tracker_of_100_hz_that_is_10_ms_late_is_flown_on() {
-    let mut scenario = built_in("hardware").unwrap().scenario().unwrap();
+    let mut scenario = built_in("hardware").unwrap().read().unwrap();
     scenario.duration_s = 20.0;
     for kind in ControllerKind::ALL {
         let (best_m, flies) = flown(&scenario, kind, Tracker::new(1, 0));

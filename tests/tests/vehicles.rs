@@ -12,8 +12,8 @@ use proptest::prelude::*;
 
 /// The hover scenario for this vehicle, with rotors of 20 ms and of this largest force, starting a little off.
 fn scenario(vehicle: Parameters<f64>, force_max_n: f64) -> Scenario {
-    let hardware = built_in("hardware").unwrap().scenario().unwrap();
-    let mut scenario = built_in("hover").unwrap().scenario().unwrap();
+    let hardware = built_in("hardware").unwrap().read().unwrap();
+    let mut scenario = built_in("hover").unwrap().read().unwrap();
     scenario.vehicle = vehicle;
     scenario.environment = Environment::calm(vehicle).unwrap();
     scenario.duration_s = 6.0;

@@ -89,7 +89,7 @@ fn named(root: &Table<'_>, key: &str, name: &str, folder: &Path) -> Result<Scena
             };
             root.fault_at(key, format!("\"{name}\" is no built-in scenario; {cure}"))
         })?;
-        return built_in.scenario();
+        return built_in.read();
     }
     let path: PathBuf = folder.join(name);
     scenario::load(&path)

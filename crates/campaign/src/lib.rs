@@ -20,7 +20,7 @@ mod row;
 pub mod statistics;
 mod summary;
 
-pub use built_in::{BUILT_IN, BuiltIn, built_in, similar_built_in};
+pub use built_in::{BUILT_IN, built_in, similar_built_in};
 pub use draw::Draw;
 pub use error::Error;
 pub use file::parse;

@@ -123,7 +123,7 @@ impl Manifest {
     /// Where somebody's file lies is no part of the results, so that they are the same wherever it does.
     pub fn target(&self) -> String {
         let same = |plan: Campaign| fingerprint(&plan) == self.fingerprint;
-        let known = built_in(&self.name).and_then(|known| known.campaign().ok()).is_some_and(same);
+        let known = built_in(&self.name).and_then(|known| known.read().ok()).is_some_and(same);
         if known { self.name.clone() } else { format!("{}.toml", self.name) }
     }
 

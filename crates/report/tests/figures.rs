@@ -54,7 +54,7 @@ fn captions(folder: &Path) -> Vec<String> {
 }
 
 fn hover(duration_s: f64) -> Scenario {
-    Scenario { duration_s, ..built_in("hover").unwrap().scenario().unwrap() }
+    Scenario { duration_s, ..built_in("hover").unwrap().read().unwrap() }
 }
 
 fn named(name: &str) -> Contender {
@@ -75,7 +75,7 @@ fn gone_alike(names: &[&str], drawn: &[&str], flights: u64, lost: impl Fn(&str, 
         let quantity = QUANTITIES.iter().find(|quantity| quantity.range.name == *name).unwrap();
         Drawn { name: (*name).into(), meaning: quantity.meaning.into(), ends: [0.5, 1.5] }
     });
-    let any = campaign::built_in("robustness").unwrap().campaign().unwrap();
+    let any = campaign::built_in("robustness").unwrap().read().unwrap();
     let manifest = Manifest {
         name: "trial".into(),
         flights,
@@ -504,7 +504,7 @@ fn captions_mention_what_is_there_and_nothing_else() {
     assert!(captions(&fallen).iter().all(marked), "{:?}", captions(&fallen));
 
     // The printed law chatters on the paper's own vehicle.
-    let paper = Scenario { duration_s: 30.0, ..built_in("paper").unwrap().scenario().unwrap() };
+    let paper = Scenario { duration_s: 30.0, ..built_in("paper").unwrap().read().unwrap() };
     let chatter = folder("captions-chatter");
     let contender = paper.contenders.iter().find(|contender| contender.name == "afbc").unwrap().clone();
     let run = Run::fly(&paper, &contender, 10).unwrap();

@@ -131,7 +131,7 @@ fn landing(name: &'static str, length_s: f64) -> Result<Scenario, Box<dyn Error>
 }
 
 fn hardware() -> Result<Scenario, FileError> {
-    built_in("hardware").ok_or_else(|| FileError::whole("hardware", "no such scenario"))?.scenario()
+    built_in("hardware").ok_or_else(|| FileError::whole("hardware", "no such scenario"))?.read()
 }
 
 /// One calm flight of the hardware.

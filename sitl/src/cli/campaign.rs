@@ -9,10 +9,9 @@ use super::subject::Kind;
 use super::target::Target;
 use super::terminal::{Failure, print, say};
 use super::{interrupt, json};
-use afbc_campaign::{
-    self as campaign, BUILT_IN, BuiltIn, Campaign as Plan, Folder, Manifest, Shard, Summary, built_in,
-};
+use afbc_campaign::{self as campaign, BUILT_IN, Campaign as Plan, Folder, Manifest, Shard, Summary, built_in};
 use afbc_report::campaign as report;
+use afbc_sim::reader::BuiltIn;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -200,7 +199,7 @@ impl Campaigns {
         match self.name {
             Some(name) => print(built_in(&name).ok_or_else(|| Kind::Campaign.unknown(&name))?.text)?,
             None => {
-                let all = BUILT_IN.iter().map(BuiltIn::campaign).collect::<Result<Vec<_>, _>>()?;
+                let all = BUILT_IN.iter().map(BuiltIn::read).collect::<Result<Vec<_>, _>>()?;
                 match self.json.json {
                     true => json::print_value(&all.iter().map(json::campaign).collect::<Vec<_>>())?,
                     false => print(&all.iter().map(line).collect::<String>())?,

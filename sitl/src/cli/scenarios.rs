@@ -7,7 +7,8 @@ use super::target::Target;
 use super::terminal::{Failure, print};
 use afbc_campaign::Campaign;
 use afbc_sim::contender::Contender;
-use afbc_sim::scenario::{BUILT_IN, BuiltIn, Scenario, built_in};
+use afbc_sim::reader::BuiltIn;
+use afbc_sim::scenario::{BUILT_IN, Scenario, built_in};
 use clap::Args;
 use std::process::ExitCode;
 
@@ -30,7 +31,7 @@ impl Scenarios {
         match self.name {
             Some(name) => print(built_in(&name).ok_or_else(|| Kind::Scenario.unknown(&name))?.text)?,
             None => {
-                let all = BUILT_IN.iter().map(BuiltIn::scenario).collect::<Result<Vec<_>, _>>()?;
+                let all = BUILT_IN.iter().map(BuiltIn::read).collect::<Result<Vec<_>, _>>()?;
                 match self.json.json {
                     true => json::print_value(&all.iter().map(json::scenario).collect::<Vec<_>>())?,
                     false => print(&all.iter().map(line).collect::<String>())?,

@@ -178,10 +178,10 @@ mod tests {
 
     #[test]
     fn every_built_in_file_is_told_by_its_text() {
-        for known in scenario::BUILT_IN {
+        for known in &scenario::BUILT_IN {
             assert_eq!(Kind::of(known.text), Some(Kind::Scenario), "{}", known.name);
         }
-        for known in campaign::BUILT_IN {
+        for known in &campaign::BUILT_IN {
             assert_eq!(Kind::of(known.text), Some(Kind::Campaign), "{}", known.name);
         }
         assert_eq!(Kind::of(""), None);

@@ -204,7 +204,7 @@ fn odd_flights_have_figures_too() {
 /// figure says so, and marks no other place. In the panels of x, y and psi it is lost where the cross is.
 #[test]
 fn a_loss_beyond_a_panel_is_told_and_not_marked_elsewhere() {
-    let hover = Scenario { duration_s: 200.0, ..built_in("hover").unwrap().scenario().unwrap() };
+    let hover = Scenario { duration_s: 200.0, ..built_in("hover").unwrap().read().unwrap() };
     let flown = both(&hover);
     assert!(flown[0].run.lost.is_some() && flown[1].run.lost.is_none());
     let height_m = flown[0].run.log.last().unwrap().motion.position_m.z;
@@ -321,7 +321,7 @@ fn nothing_stale_stays_and_nothing_foreign_goes() {
 
 #[test]
 fn real_flights_of_many_contenders_leave_everything() {
-    let mut scenario = Scenario { duration_s: 6.0, ..built_in("storm").unwrap().scenario().unwrap() };
+    let mut scenario = Scenario { duration_s: 6.0, ..built_in("storm").unwrap().read().unwrap() };
     let named = |name: &str| Contender { name: name.into(), ..Contender::of(ControllerKind::Pid, Profile::Flight) };
     scenario.contenders.truncate(1);
     scenario.contenders.extend(["pid", "a/b", "a b", "<&\"'> δ = 0 of thirty-two."].map(named));

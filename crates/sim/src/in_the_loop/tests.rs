@@ -9,7 +9,7 @@ use crate::scenario::{Scenario, built_in};
 use core::ops::ControlFlow;
 
 fn scenario(name: &str, duration_s: f64) -> Scenario {
-    Scenario { duration_s, ..built_in(name).unwrap().scenario().unwrap() }
+    Scenario { duration_s, ..built_in(name).unwrap().read().unwrap() }
 }
 
 fn fly_host(scenario: &Scenario) -> (End, Metrics) {

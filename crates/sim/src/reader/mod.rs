@@ -1,10 +1,12 @@
 //! TOML files, read so that whatever is wrong is told in one line.
 
+mod built_in;
 mod error;
 mod file;
 mod table;
 pub mod words;
 
+pub use built_in::BuiltIn;
 pub use error::{FileError, Source};
 pub use file::{document, text, title};
 pub use table::Table;

@@ -6,6 +6,6 @@ mod built_in;
 mod definition;
 mod file;
 
-pub use built_in::{BUILT_IN, BuiltIn, built_in, similar_built_in};
+pub use built_in::{BUILT_IN, built_in, similar_built_in};
 pub use definition::{DURATION, Outage, Scenario};
 pub use file::{load, parse, read};

@@ -15,15 +15,15 @@ use afbc_plant::Model;
 
 #[test]
 fn built_in_paper_is_the_paper() {
-    let from_file = built_in("paper").unwrap().scenario().unwrap();
+    let from_file = built_in("paper").unwrap().read().unwrap();
     let from_code = Scenario { case: None, ..paper::scenario(Model::Simplified, Case::DEFAULT).unwrap() };
     assert_eq!(from_file, from_code);
 }
 
 #[test]
 fn built_in_scenarios_are_valid_and_named_after_their_files() {
-    for built_in in BUILT_IN {
-        let scenario = built_in.scenario().unwrap_or_else(|error| panic!("{error}"));
+    for built_in in &BUILT_IN {
+        let scenario = built_in.read().unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(scenario.name, built_in.name);
         assert!(!scenario.description.is_empty(), "{}", built_in.name);
     }
@@ -128,7 +128,7 @@ fn damaged_files_get_one_line() {
     let values =
         ["", "nan", "-1e300", "1e300", "\"\\n\"", "[]", "{}", "true", "[0, 0]", "1979-05-27", "{ a.b = [[1]] }"];
     let (mut refused, mut accepted) = (0, 0);
-    for built_in in BUILT_IN {
+    for built_in in &BUILT_IN {
         let lines: Vec<_> = built_in.text.lines().collect();
         for (at, line) in lines.iter().enumerate() {
             let key = line.split_once(" = ").map(|(key, _)| key);
