@@ -7,7 +7,7 @@ use std::path::Path;
 /// Begins the names of what is none of the results.
 pub(crate) const HIDDEN: &str = ".sitl.";
 
-/// Writes the file at `path` as [`Folder::place`] does.
+/// Writes the file at `path` as [`Folder::place`](crate::Folder::place) does.
 pub fn place(path: &Path, fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>) -> io::Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let temporary = path.with_file_name(format!("{HIDDEN}{name}.{}.tmp", std::process::id()));
