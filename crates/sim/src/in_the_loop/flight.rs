@@ -63,7 +63,7 @@ pub fn check(scenario: &Scenario) -> Result<(), Error> {
 
 /// Flies `scenario`, showing every step from t = 0 to the end.
 ///
-/// The vehicle is held where it starts until it is armed: that is t = 0. A step's [`Sample::command`] holds the rotor
+/// The vehicle is held where it starts until it is armed: that is t = 0. A step's [`Sample::action`] holds the rotor
 /// speeds and forces only, and nothing is known of the estimates. A vehicle that disarms in flight is lost. It is disarmed at
 /// the end, whatever the end is; after an error, the autopilot has to see to that itself.
 ///

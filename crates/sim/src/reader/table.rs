@@ -239,7 +239,7 @@ impl<'a> Table<'a> {
         array.iter().map(|item| self.table_in(item, key, &wanted)).collect()
     }
 
-    /// The tables of the array under `key`, [`MOST`] at most.
+    /// The tables of the array under `key`, at most 100.
     pub fn few_tables(&mut self, key: &'static str) -> Result<Vec<Table<'a>>, FileError> {
         let tables = self.tables(key)?;
         if tables.len() > MOST {
