@@ -105,8 +105,8 @@ fn a_pose_that_repeats_itself_is_ridden_out_and_descended_on() {
         println!("{speed_m_s} m/s: {seen:?}");
         let modes: Vec<_> = seen.modes.iter().map(|(_, mode)| *mode).collect();
         assert_eq!(modes, [Mode::Disarmed, Mode::Flying, Mode::Coasting, Mode::Descending, Mode::Disarmed]);
-        let riding_ms = seen.modes.get(2).unwrap().0 - FREEZES_MS;
-        assert!(riding_ms <= 25, "{riding_ms} ms");
+        let coasting_ms = seen.modes.get(2).unwrap().0 - FREEZES_MS;
+        assert!(coasting_ms <= 25, "{coasting_ms} ms");
         assert_eq!(seen.ended, Some(End::StateLost));
         assert!(seen.tilt_rad < 0.6, "{} rad", seen.tilt_rad);
         assert!(seen.touchdown_m_s.unwrap() < 3.5, "{seen:?}");

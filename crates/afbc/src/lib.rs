@@ -17,8 +17,8 @@
 //!
 //! Parameters are checked once, by name, when a [`Controller`] is built. After that a step cannot fail, allocate or
 //! panic, has no loop whose length depends on what it is given, and gives the same bits on host and target: all
-//! mathematics comes from [`afbc_control::math`]. Which branches it takes, and so how long it takes, does depend on its inputs: limits,
-//! projection, saturated rotors and the monitor cost what they do only where they act.
+//! mathematics comes from [`afbc_control::math`]. Which branches it takes, and so how long it takes, does depend on
+//! its inputs: limits, projection, saturated rotors and the monitor cost what they do only where they act.
 //!
 //! ```
 //! use afbc::{Adaptive, Controller, Profile};

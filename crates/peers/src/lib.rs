@@ -12,21 +12,24 @@
 //!
 //! # What they share
 //!
-//! * The interface: an [`afbc_types::State`] and an [`afbc_types::Setpoint`] in, an [`afbc_control::Action`] out, by way of U1..U4
-//!   and AFBC's own [`Mixer`](afbc_control::Mixer), so that no controller has a better allocation than another.
+//! * The interface: an [`afbc_types::State`] and an [`afbc_types::Setpoint`] in, an [`afbc_control::Action`] out, by
+//!   way of U1..U4 and the one [`Mixer`](afbc_control::Mixer), so that no controller has a better allocation than
+//!   another.
 //! * [`afbc_control::Settings`]: the time step and the rotors' limit.
 //! * Implausible input through [`afbc_control::Screen`]; filters and integrators rest while the state is not a new one.
 //! * The vehicle's nominal parameters scale everything, so gains are in 1/s and 1/s2 and serve vehicles of any size whose
 //!   rotors are as quick.
 //! * [`limits::Limits`]: thrust within what the rotors give, tilt below a maximum, yaw no dearer than it is worth.
-//! * Mathematics from [`afbc_control::math`] alone, so host and target give the same bits. Its sine is off by up to 1.2e-3, which
-//!   turns a tilt of 0.1 rad into 0.0987: a lasting 0.013 m/s2 at most where nothing integrates, and nothing elsewhere.
+//! * Mathematics from [`afbc_control::math`] alone, so host and target give the same bits. Its sine is off by up to
+//!   1.2e-3, which turns a tilt of 0.1 rad into 0.0987: a lasting 0.013 m/s2 at most where nothing integrates, and
+//!   nothing elsewhere.
 //!
 //! # Tuning
 //!
-//! Gains are plain structs, declared with their ranges. The tuner searches those that are a matter of taste (`tuned`); the
-//! others describe the vehicle and its task (largest tilt, rotor lag). The sets given here are for the vehicle of the paper's Section IV with rotors of 20 ms: those named `Gains::PAPER_VEHICLE` or after
-//! their source were tuned by hand, `Gains::TUNED` by `sitl tune` (`docs/tuning.md`).
+//! Gains are plain structs, declared with their ranges. The tuner searches those that are a matter of taste (`tuned`);
+//! the others describe the vehicle and its task (largest tilt, rotor lag). The sets given here are for the vehicle of
+//! the paper's Section IV with rotors of 20 ms: those named `Gains::PAPER_VEHICLE` or after their source were tuned by
+//! hand, `Gains::TUNED` by `sitl tune` (`docs/tuning.md`).
 //!
 //! ```
 //! use afbc_control::{FlightController, Screened, Settings};

@@ -16,8 +16,8 @@ use nalgebra::{Vector3, Vector4};
 /// Accepted range of a step \[s\].
 pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
 
-/// What [`Plant::with_realism`](crate::Plant::with_realism) adds to a vehicle. The default adds nothing: the paper's plant to the bit, as
-/// long as no rotor is commanded beyond 10,000 rad/s.
+/// What [`Plant::with_realism`](crate::Plant::with_realism) adds to a vehicle. The default adds nothing: the paper's
+/// plant to the bit, as long as no rotor is commanded beyond 10,000 rad/s.
 ///
 /// Measurement is apart, in [`Sensors`](crate::Sensors): it comes between this plant and its controller.
 ///
