@@ -111,19 +111,19 @@ fn groups() -> Vec<Group> {
 
 const HEAD: &str = "# Parameters
 
-Every parameter, as the code declares it (`parameters!` in [the types crate](../crates/types/src/declared.rs); how to add
-one: [ARCHITECTURE.md](../ARCHITECTURE.md#adding-things)). This page is written from the declarations, and
+Every parameter as declared in the code (`parameters!` in [the types crate](../crates/types/src/declared.rs); how to add
+one: [ARCHITECTURE.md](../ARCHITECTURE.md#adding-things)). This page is generated from the declarations, and
 `tests/tests/parameters.rs` compares it with them:
 
 ```sh
 WRITE=1 cargo test -p flight-tests --test parameters
 ```
 
-**Name** is what a parameter is called on a ground station and in flash: its group's prefix, then an axis or a part of the
-group, then its id, and X, Y or Z of a vector. It has at most 16 characters, as MAVLink has room for, and stays what it is.
-**Key** is its name in [scenario files](scenarios.md). \"Tuned\" are those that `sitl tune` chooses; the others are for the
-vehicle and its task to say. Where there are two profiles, `flight` is what the firmware flies, and `paper` what scenario files
-start from.
+**Name** is a parameter's name on a ground station and in flash: the prefix of its group, an axis or a part of the
+group, its id, and X, Y or Z of a vector. A name has at most 16 characters, MAVLink's limit, and never changes. **Key**
+is the name in [scenario files](scenarios.md). **Tuned** marks the parameters that `sitl tune` searches; the others
+belong to the vehicle and its task. Where there are two profiles, the firmware flies `flight`, and scenario files start
+from `paper`.
 ";
 
 fn page() -> String {

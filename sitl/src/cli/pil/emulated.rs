@@ -42,10 +42,10 @@ fn figures(comparison: &Comparison, seconds: f64) -> String {
     let [min, mean, max] = [instructions.min(), instructions.mean(), instructions.max()];
     let rate = *ticks as f64 / seconds;
     format!(
-        "ticks                {ticks}, {armed_ticks} of them armed, {rate:.0} a second\n\
+        "ticks                {ticks}, {armed_ticks} of them armed, {rate:.0} per second\n\
          differing ticks      {differing_ticks}{first}\n\
          differing bits       {differing_bits} of {bits}\n\
-         instructions a tick  min {min:.0}, mean {mean:.0}, max {max:.0}\n\
+         instructions/tick    min {min:.0}, mean {mean:.0}, max {max:.0}\n\
          late ticks           {late_ticks}\n\
          stack used           {stack_bytes} bytes\n"
     )
