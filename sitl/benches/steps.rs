@@ -5,16 +5,15 @@
 //! Runge-Kutta, gusts and parameter changes, nothing logged; items are steps.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a scenario that cannot be flown must stop the bench
 
-use afbc::Profile;
+use afbc::{Adaptive, Backstepping, Controller, Profile};
 use afbc_control::{FlightController, Screened};
 use afbc_plant::{Drag, Model, Plant, Realism, Rotors, Sensing, Spread, Turbulence, Wind};
 use afbc_sim::case::Case;
-use afbc_sim::contender::ControllerKind;
-use afbc_sim::contender::{Build, Contender};
+use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::flight::{Alone, Pilot, World, fly};
 use afbc_sim::paper::scenario;
 use afbc_sim::scenario::Scenario;
-use afbc_types::{PerAxis, RotorSpeeds, Setpoint, State};
+use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use nalgebra::Vector3;
@@ -43,22 +42,17 @@ fn recorded(model: Model, kind: ControllerKind) -> Vec<(State, Setpoint, RotorSp
     steps
 }
 
-/// The settings of every controller here.
-const PROFILE: Profile = Profile::Paper;
-
-fn backstepping() -> impl Build {
-    PerAxis::from_fn(|axis| PROFILE.gains()[axis].backstepping)
+fn afbc(profile: Profile) -> Controller<Adaptive> {
+    let law = Adaptive::new(profile.gains()).unwrap();
+    Controller::new(Parameters::PAPER.to_f32(), profile.settings(), law).unwrap()
 }
 
-fn controller<B: Build>(gains: &B, scenario: &Scenario) -> B::Controller {
-    gains.controller(scenario.vehicle.to_f32(), PROFILE.settings()).unwrap()
+fn backstepping(profile: Profile) -> Controller<Backstepping> {
+    let (vehicle, gains) = (Parameters::PAPER.to_f32(), profile.gains().map(|gains| gains.backstepping));
+    Controller::new(vehicle, profile.settings(), Backstepping::new(&vehicle, gains).unwrap()).unwrap()
 }
 
-fn control_step(bencher: Bencher, kind: ControllerKind, gains: impl Build) {
-    memory_and_step(bencher, kind, &controller(&gains, &paper(Model::RigidBody)));
-}
-
-fn memory_and_step<C: FlightController>(bencher: Bencher, kind: ControllerKind, controller: &C) {
+fn control_step(bencher: Bencher, kind: ControllerKind, controller: impl FlightController) {
     let steps = recorded(Model::RigidBody, kind);
     let mut memory = Screened::default();
     let mut at = 0;
@@ -71,12 +65,12 @@ fn memory_and_step<C: FlightController>(bencher: Bencher, kind: ControllerKind, 
 
 #[divan::bench]
 fn control_step_afbc(bencher: Bencher) {
-    control_step(bencher, ControllerKind::Afbc, PROFILE.gains());
+    control_step(bencher, ControllerKind::Afbc, afbc(Profile::Paper));
 }
 
 #[divan::bench]
 fn control_step_backstepping(bencher: Bencher) {
-    control_step(bencher, ControllerKind::Backstepping, backstepping());
+    control_step(bencher, ControllerKind::Backstepping, backstepping(Profile::Paper));
 }
 
 fn plant_step(bencher: Bencher, model: Model) {
@@ -102,16 +96,10 @@ fn plant_step_simplified(bencher: Bencher) {
     plant_step(bencher, Model::Simplified);
 }
 
-fn closed_loop(bencher: Bencher, model: Model, gains: impl Build) {
-    closed_loop_of(bencher, &paper(model), PROFILE, gains);
-}
-
-fn closed_loop_of(bencher: Bencher, scenario: &Scenario, profile: Profile, gains: impl Build) {
-    let settings = profile.settings();
-    let controller = || gains.controller(scenario.vehicle.to_f32(), settings).unwrap();
+fn closed_loop(bencher: Bencher, scenario: &Scenario, controller: impl FlightController + Copy) {
     bencher
         .counter(ItemsCount::new(STEPS))
-        .with_inputs(|| (World::new(scenario, 0.001).unwrap(), Alone::new(controller())))
+        .with_inputs(|| (World::new(scenario, 0.001).unwrap(), Alone::new(controller)))
         .bench_local_refs(|(world, pilot)| {
             for _ in 0..STEPS {
                 let Ok(sample) = pilot.step(world);
@@ -123,17 +111,17 @@ fn closed_loop_of(bencher: Bencher, scenario: &Scenario, profile: Profile, gains
 
 #[divan::bench]
 fn closed_loop_afbc_rigid_body(bencher: Bencher) {
-    closed_loop(bencher, Model::RigidBody, PROFILE.gains());
+    closed_loop(bencher, &paper(Model::RigidBody), afbc(Profile::Paper));
 }
 
 #[divan::bench]
 fn closed_loop_backstepping_rigid_body(bencher: Bencher) {
-    closed_loop(bencher, Model::RigidBody, backstepping());
+    closed_loop(bencher, &paper(Model::RigidBody), backstepping(Profile::Paper));
 }
 
 #[divan::bench]
 fn closed_loop_afbc_simplified(bencher: Bencher) {
-    closed_loop(bencher, Model::Simplified, PROFILE.gains());
+    closed_loop(bencher, &paper(Model::Simplified), afbc(Profile::Paper));
 }
 
 /// The paper's flight with everything that a campaign adds: lag, limits and delay of the rotors, drag, wind, turbulence,
@@ -152,7 +140,7 @@ fn real() -> Scenario {
 
 #[divan::bench]
 fn closed_loop_afbc_real(bencher: Bencher) {
-    closed_loop_of(bencher, &real(), Profile::Flight, Profile::Flight.gains());
+    closed_loop(bencher, &real(), afbc(Profile::Flight));
 }
 
 /// One flight of the built-in campaign under every contender, as it is flown: items are flights of one contender.

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+use afbc_sim::contender::ControllerKind;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -210,7 +211,7 @@ const BAD_TABLES: [(&str, &str); 68] = [
     (
         "[[contender]]\nname = \"a\"\ncontroller = \"lqr\"",
         ":6: contender.controller: \"lqr\" is unknown; \
-         it must be \"afbc\", \"backstepping\", \"pid\", \"geometric\" or \"indi\"",
+         it must be LAWS",
     ),
     (
         "[[contender]]\nname = \"a\"\ncontroller = \"afbc\"\nsettings = { dt_s = 0.002 }",
@@ -303,7 +304,7 @@ const BAD_FILES: [(&str, &str); 28] = [
     (
         "controllers = []",
         ":1: controllers: the list is empty; \
-         it must hold \"afbc\", \"backstepping\", \"pid\", \"geometric\" or \"indi\"",
+         it must hold LAWS",
     ),
     ("seed = 1.5", ":1: seed: 1.5 is not a whole number; leave out its decimals"),
     ("seed = 1000000001", ":1: seed: 1000000001 is out of range: it must lie within 0 to 1e9"),
@@ -316,7 +317,9 @@ const BAD_FILES: [(&str, &str); 28] = [
 
 /// What several messages have in common, written out.
 fn expand(message: &str) -> String {
+    let [laws @ .., last] = ControllerKind::ALL.map(|kind| format!("\"{}\"", kind.name()));
     message
+        .replace("LAWS", &format!("{} or {last}", laws.join(", ")))
         .replace("COMPARE", "`sitl scenarios hover` prints a file to compare with")
         .replace("NAME", "it must be 1 to 64 letters, digits, '-' or '_', since file names come from it")
         .replace(

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
+use afbc_sim::contender::ControllerKind;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -176,7 +177,8 @@ fn tune_improves_a_bad_start_alike_on_any_number_of_threads() {
 fn what_tune_prints_of_every_law_flies() {
     let folder = soft("every-law");
     let mut file = SOFT.to_owned();
-    for law in ["afbc", "backstepping", "pid", "geometric", "indi"] {
+    let laws = ControllerKind::ALL.map(ControllerKind::name);
+    for law in laws {
         let out = format!("{law}.toml");
         let arguments =
             ["tune", law, "--scenario", "circle", "--scenario", "soft.toml", "--budget", "20", "--out", &out];
@@ -186,14 +188,15 @@ fn what_tune_prints_of_every_law_flies() {
     }
     fs::write(folder.join("all.toml"), file).unwrap();
     let checked = succeeds(&sitl(&folder, &["check", "all.toml"]));
-    assert!(checked.contains("afbc-tuned, backstepping-tuned, pid-tuned, geometric-tuned, indi-tuned"), "{checked}");
+    assert!(checked.contains(&laws.map(|law| format!("{law}-tuned")).join(", ")), "{checked}");
 }
 
 #[test]
 fn tune_refuses_what_it_cannot_do() {
     let folder = soft("tune-refused");
     let line = refused(&sitl(&folder, &["tune", "lqr"]));
-    assert_eq!(line, "lqr: no such controller; the laws are afbc, backstepping, pid, geometric, indi\n");
+    let laws = ControllerKind::ALL.map(ControllerKind::name).join(", ");
+    assert_eq!(line, format!("lqr: no such controller; the laws are {laws}\n"));
     let line = refused(&sitl(&folder, &["tune", "hard", "--scenario", "soft.toml"]));
     assert!(line.ends_with("; the scenario's contenders backstepping, soft\n"), "{line}");
     let line = refused(&sitl(&folder, &["tune", "pid", "--out", "nowhere/pid.toml"]));

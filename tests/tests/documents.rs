@@ -3,6 +3,7 @@
 
 use afbc::Profile;
 use afbc::adaptive::Gains;
+use afbc_sim::contender::ControllerKind;
 use std::fs;
 use std::path::Path;
 
@@ -43,6 +44,24 @@ fn every_table_of_figures_is_compared_or_dated() {
         }
     }
     assert!(tables >= 8, "{tables} sections");
+}
+
+/// The keys of files and of `--json` that name a law list them all.
+#[test]
+fn pages_that_list_the_laws_list_all() {
+    for (page, text) in [
+        ("scenarios.md", include_str!("../../docs/scenarios.md")),
+        ("json.md", include_str!("../../docs/json.md")),
+        ("tuning.md", include_str!("../../docs/tuning.md")),
+    ] {
+        for kind in ControllerKind::ALL {
+            assert!(
+                text.contains(&format!("`{}`", kind.name())) || text.contains(&format!("`\"{}\"`", kind.name())),
+                "docs/{page} lacks {}",
+                kind.name()
+            );
+        }
+    }
 }
 
 #[test]

@@ -7,9 +7,9 @@ use afbc::Profile;
 use afbc::monitor::Bounds;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Curve;
-use afbc_peers::{geometric, indi, pid};
 use afbc_plant::{Battery, Contact, Drag, Dropouts, GroundEffect, Rotors, Sensing, Turbulence, Wind};
-use afbc_types::{Declaration, Declared, OutOfRange, Parameters, PerAxis, Value};
+use afbc_sim::contender::{ControllerKind, Law};
+use afbc_types::{Declaration, Declared, OutOfRange, Parameters, Value};
 use core::convert::Infallible;
 use core::fmt::Write;
 use std::collections::BTreeSet;
@@ -26,7 +26,7 @@ struct Row {
 
 /// Parameters that share a prefix.
 struct Group {
-    title: &'static str,
+    title: String,
     prefix: &'static str,
     /// Headings of the columns of values: the default, or that of each profile.
     columns: Vec<&'static str>,
@@ -36,17 +36,17 @@ struct Group {
 }
 
 /// A group whose parameters have one default.
-fn group(title: &'static str, prefix: &'static str, parameters: impl Declared) -> Group {
+fn group(title: impl Into<String>, prefix: &'static str, parameters: impl Declared) -> Group {
     columns(title, prefix, [("default", parameters)])
 }
 
 /// A group whose parameters have a default in each profile.
-fn profiles<G: Declared>(title: &'static str, prefix: &'static str, of: fn(Profile) -> G) -> Group {
+fn profiles<G: Declared>(title: impl Into<String>, prefix: &'static str, of: impl Fn(Profile) -> G) -> Group {
     columns(title, prefix, Profile::ALL.map(|profile| (profile.name(), of(profile))))
 }
 
 fn columns<G: Declared, const N: usize>(
-    title: &'static str,
+    title: impl Into<String>,
     prefix: &'static str,
     columns: [(&'static str, G); N],
 ) -> Group {
@@ -72,7 +72,7 @@ fn columns<G: Declared, const N: usize>(
         });
     }
     let valid = columns.iter().map(|(_, parameters)| parameters.validate()).collect();
-    Group { title, prefix, columns: columns.iter().map(|(heading, _)| *heading).collect(), rows, valid }
+    Group { title: title.into(), prefix, columns: columns.iter().map(|(heading, _)| *heading).collect(), rows, valid }
 }
 
 /// AFBC's bounds on the paper's vehicle.
@@ -80,23 +80,28 @@ fn bounds(profile: Profile) -> Bounds {
     Bounds::new(&profile.gains(), &Parameters::PAPER.to_f32())
 }
 
-fn backstepping(profile: Profile) -> PerAxis<afbc::backstepping::Gains> {
-    profile.gains().map(|gains| gains.backstepping)
+/// The gains of a law: those of each profile, or for a law outside the cascade its own.
+fn gains(kind: ControllerKind) -> Group {
+    let title = kind.title();
+    let title = format!("{}{}", title[..1].to_uppercase(), &title[1..]);
+    if kind.in_cascade() {
+        profiles(format!("{title}: `[gains.AXIS]`"), kind.prefix(), |profile| Law::of(kind, profile))
+    } else {
+        group(format!("{title}: `[contender.gains]`"), kind.prefix(), Law::of(kind, Profile::Flight))
+    }
 }
 
 /// Everything that is declared, in the order of the page.
 fn groups() -> Vec<Group> {
-    vec![
+    let mut groups = vec![
         group("Vehicle: `[vehicle]`, `[truth]`", "V_", Parameters::DEFAULT),
         group("Motors", "MOT_", Curve::DEFAULT),
         group("Arming", "ARM_", ArmingLimits::DEFAULT),
         profiles("Control: `[settings]`, `[limits]`", "C_", Profile::settings),
-        profiles("AFBC: `[gains.AXIS]`", "A_", Profile::gains),
         profiles("AFBC's monitor", "M_", bounds),
-        profiles("Backstepping: `[gains.AXIS]`", "B_", backstepping),
-        group("PID: `[contender.gains]`", "PID_", pid::Gains::DEFAULT),
-        group("Geometric: `[contender.gains]`", "GEO_", geometric::Gains::DEFAULT),
-        group("INDI: `[contender.gains]`", "INDI_", indi::Gains::DEFAULT),
+    ];
+    groups.extend(ControllerKind::ALL.map(gains));
+    groups.extend([
         group("Simulated rotors: `[rotors]`", "ROT_", Rotors::DEFAULT),
         group("Simulated battery: `[battery]`", "BAT_", Battery::DEFAULT),
         group("Simulated drag: `[drag]`", "DRAG_", Drag::DEFAULT),
@@ -106,7 +111,8 @@ fn groups() -> Vec<Group> {
         group("Simulated ground effect: `[ground]`", "GE_", GroundEffect::DEFAULT),
         group("Simulated sensors: `[sensors]`", "SENS_", Sensing::DEFAULT),
         group("Simulated dropouts: `[sensors.dropouts]`", "DROP_", Dropouts::DEFAULT),
-    ]
+    ]);
+    groups
 }
 
 const HEAD: &str = "# Parameters

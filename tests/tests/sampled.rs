@@ -4,9 +4,9 @@
 use afbc::Profile;
 use afbc_control::FlightController;
 use afbc_flight_core::{ArmingLimits, Asked, Inbox, Memory, Mode, Request, Stamped, Vehicle};
-use afbc_sim::contender::{Build, Contender, ControllerKind, Law, Monitored};
+use afbc_sim::contender::{Contender, ControllerKind, Task};
 use afbc_sim::scenario::{Scenario, built_in};
-use afbc_types::State;
+use afbc_types::{OutOfRange, State};
 use std::collections::VecDeque;
 
 /// When, in ms of power-up, the vehicle is armed and let go.
@@ -31,6 +31,20 @@ impl Tracker {
         }
         let arrives = |state: &Stamped<State>| state.at_us + self.late_ms * 1000 <= now_ms * 1000;
         if self.under_way.front().is_some_and(arrives) { self.under_way.pop_front() } else { None }
+    }
+}
+
+/// A flight on a tracker.
+struct OnTracker<'a> {
+    scenario: &'a Scenario,
+    tracker: Tracker,
+}
+
+impl Task for OnTracker<'_> {
+    type Output = (f64, bool);
+
+    fn with<C: FlightController>(self, controller: C) -> Result<(f64, bool), OutOfRange> {
+        Ok(fly(self.scenario, controller, self.tracker))
     }
 }
 
@@ -64,16 +78,8 @@ fn fly<C: FlightController>(scenario: &Scenario, controller: C, mut tracker: Tra
 }
 
 fn flown(scenario: &Scenario, kind: ControllerKind, tracker: Tracker) -> (f64, bool) {
-    let contender = Contender::of(kind, Profile::Flight);
-    let (vehicle, settings) = (scenario.vehicle.to_f32(), contender.settings);
-    match &contender.law {
-        Law::Afbc(gains) => fly(scenario, Monitored(gains).controller(vehicle, settings).unwrap(), tracker),
-        Law::Guarded(gains) => fly(scenario, Monitored(gains).controller(vehicle, settings).unwrap(), tracker),
-        Law::Backstepping(gains) => fly(scenario, gains.controller(vehicle, settings).unwrap(), tracker),
-        Law::Pid(gains) => fly(scenario, gains.controller(vehicle, settings).unwrap(), tracker),
-        Law::Geometric(gains) => fly(scenario, gains.controller(vehicle, settings).unwrap(), tracker),
-        Law::Indi(gains) => fly(scenario, gains.controller(vehicle, settings).unwrap(), tracker),
-    }
+    let contender = Contender::of(kind, Profile::Flight).monitored();
+    contender.build(scenario.vehicle.to_f32(), OnTracker { scenario, tracker }).unwrap()
 }
 
 /// As close as on a state a millisecond, or nearly: extrapolation makes up for the rest. Without it PID and AFBC are lost.

@@ -7,14 +7,12 @@
 )]
 
 use afbc::Profile;
-use afbc_sim::contender::{Contender, ControllerKind, Law};
+use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_tune::{LOST, by_hand, costs, held_out, mean, training};
 
 /// The law with the gains that `sitl tune` found; AFBC under its monitor, as in the search.
 fn found(kind: ControllerKind) -> Contender {
-    let contender = Contender::of(kind, Profile::Flight);
-    let law = if let Law::Afbc(gains) = contender.law { Law::Guarded(gains) } else { contender.law };
-    Contender { law, ..contender }
+    Contender::of(kind, Profile::Flight).monitored()
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use afbc::{Guarded, Profile};
 use afbc_plant::Environment;
-use afbc_sim::contender::{Contender, ControllerKind, Law};
+use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::flight::fly;
 use afbc_sim::scenario::{Scenario, built_in};
 use afbc_types::{Axis, Parameters};
@@ -28,11 +28,8 @@ fn hovers(kind: ControllerKind, vehicle: Parameters<f64>, margin: f64) -> Result
     let force_max_n = margin * vehicle.mass_kg * vehicle.gravity_m_s2 / 4.0;
     let scenario = scenario(vehicle, force_max_n);
     let settings = Profile::Flight.settings().with_rotor_force_max_n(force_max_n as f32);
-    let mut contender = Contender::of(kind, Profile::Flight).for_vehicle(&vehicle);
+    let mut contender = Contender::of(kind, Profile::Flight).for_vehicle(&vehicle).monitored();
     contender.settings = settings;
-    if let Law::Afbc(gains) = contender.law {
-        contender.law = Law::Guarded(gains);
-    }
     contender.check(vehicle.to_f32()).map_err(|error| error.to_string())?;
     let (mut distance_m, mut trip) = (f64::NAN, None);
     let lost = fly(&scenario, &contender, |sample| {

@@ -3,7 +3,7 @@
 use afbc::law::Context;
 use afbc::model::Model;
 use afbc_plant::{Sensing, Telemetry};
-use afbc_sim::contender::Law;
+use afbc_sim::contender::Contender;
 use afbc_sim::flight::Sample;
 use afbc_sim::flown::Flown;
 use afbc_sim::scenario::Scenario;
@@ -53,7 +53,7 @@ fn lyapunov(model: &Model, sample: &Sample) -> PerAxis<f32> {
 }
 
 /// Every column of a flight's log, left to right.
-fn columns(scenario: &Scenario, law: &Law) -> Vec<Column> {
+fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
     let mut columns = Vec::new();
     let mut add = |name: String, value: Box<dyn Fn(&Row) -> Number>| columns.push(Column { name, value });
     macro_rules! add {
@@ -128,7 +128,7 @@ fn columns(scenario: &Scenario, law: &Law) -> Vec<Column> {
     }
     add! { Flag "saturated": |s| s.action.health.saturated; }
     // What the others have in the place of e_2 and the estimates is nothing.
-    let (backstepping, adaptive) = (!law.is_peer(), matches!(law, Law::Afbc(_) | Law::Guarded(_)));
+    let (in_cascade, adaptive) = (contender.kind().in_cascade(), contender.gains().is_some());
     for axis in Axis::ALL {
         let name = axis.name();
         // Of e1, e2 and the subsystem's input.
@@ -138,7 +138,7 @@ fn columns(scenario: &Scenario, law: &Law) -> Vec<Column> {
             Axis::X | Axis::Y => ["m", "m_s", "m_s2"],
         };
         add(format!("e1_{name}_{e1}"), Box::new(move |row| Single(row.sample.trace.errors[axis].e1)));
-        if backstepping {
+        if in_cascade {
             add(format!("e2_{name}_{e2}"), Box::new(move |row| Single(row.sample.trace.errors[axis].e2)));
         }
         if adaptive {
@@ -146,15 +146,15 @@ fn columns(scenario: &Scenario, law: &Law) -> Vec<Column> {
             add(format!("delta_hat_{name}_{u}"), Box::new(move |row| Single(estimate(row).delta)));
             add(format!("theta_norm_{name}_{u}"), Box::new(move |row| Single(estimate(row).theta.norm())));
         }
-        if backstepping {
+        if in_cascade {
             add(format!("lyapunov_{name}"), Box::new(move |row| Single(row.lyapunov[axis])));
         }
     }
-    if backstepping {
+    if in_cascade {
         let sum = |row: &Row| Axis::ALL.iter().map(|&axis| &row.lyapunov[axis]).sum();
         add("lyapunov_sum".into(), Box::new(move |row| Single(sum(row))));
     }
-    if let Law::Guarded(_) = law {
+    if contender.monitored {
         add("tripped".into(), Box::new(|row| Flag(row.sample.action.health.trip.is_some())));
     }
     columns.extend(real(scenario));
@@ -216,7 +216,7 @@ fn given(sample: &Sample) -> afbc_types::Inputs {
 pub(super) fn write(out: &mut dyn Write, Flown { scenario, run }: &Flown) -> io::Result<()> {
     let vehicle: Parameters = scenario.vehicle.to_f32();
     let model = Model::new(&vehicle);
-    let columns = columns(scenario, &run.contender.law);
+    let columns = columns(scenario, &run.contender);
     let mut writer = csv::Writer::from_writer(out);
     writer.write_record(columns.iter().map(|column| &column.name))?;
     let mut digits = ryu::Buffer::new();

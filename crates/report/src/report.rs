@@ -237,14 +237,14 @@ fn gains(contender: &Contender) -> Markup {
         anti_windup,
     } = contender.settings;
     let mut settings = format!("steps of {dt_s} s, at most {rotor_force_max_n} N a rotor");
-    if !contender.law.is_peer() {
+    if contender.kind().in_cascade() {
         settings += &format!(", command filter {command_filter_rad_s} rad/s");
         let also = [
             (tilt_by_thrust, "tilt by thrust"),
             (freeze_on_ground, "frozen on the ground"),
             (bumpless, "bumpless"),
             (anti_windup, "anti-windup"),
-            (matches!(contender.law, Law::Guarded(_)), "monitored"),
+            (contender.monitored, "monitored"),
         ];
         settings.extend(also.into_iter().filter(|(on, _)| *on).map(|(_, word)| format!(", {word}")));
         if limits != Limits::NONE {
@@ -262,7 +262,7 @@ fn gains(contender: &Contender) -> Markup {
         h3 { (capitalised(contender.title())) }
         p.quiet { (contender.kind().title()) ", " (settings) "." }
         @match &contender.law {
-            Law::Afbc(gains) | Law::Guarded(gains) => (per_axis(&AFBC_GAINS, gains)),
+            Law::Afbc(gains) => (per_axis(&AFBC_GAINS, gains)),
             Law::Backstepping(gains) => (per_axis(&["α₁", "α₂"], gains)),
             law => (by_name(law)),
         }

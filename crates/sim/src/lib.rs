@@ -6,6 +6,7 @@ pub mod contender;
 pub mod flight;
 pub mod flown;
 pub mod in_the_loop;
+mod laws;
 pub mod metrics;
 pub mod paper;
 pub mod reader;

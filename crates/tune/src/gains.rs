@@ -1,9 +1,8 @@
 //! A contender's gains as coordinates of a search, and as text for a scenario file.
 
 use afbc::Profile;
-use afbc_sim::contender::ControllerKind;
-use afbc_sim::contender::{Contender, Law};
-use afbc_types::{Axis, Declaration, Declared, PerAxis, Range, Value};
+use afbc_sim::contender::{Contender, ControllerKind, Law};
+use afbc_types::{Axis, Declaration, Declared, Range, Value};
 use core::convert::Infallible;
 use core::fmt::Write;
 
@@ -16,43 +15,55 @@ type Visit<'a> = &'a mut dyn FnMut(&str, &Range, &mut f32);
 /// Shows every gain of `contender` that is tuned and not 0. At 0 it switches a part of its law off, which is another law; it
 /// stays there.
 fn each_tunable(contender: &mut Contender, visit: Visit) {
-    match &mut contender.law {
-        Law::Afbc(gains) | Law::Guarded(gains) => each_group(gains, &mut |place, gains| {
-            let before = gains.safeguards.delta_max;
-            each_tuned(place, gains, visit);
-            // By rule, epsilon goes with the bound on delta_hat: their ratio is all that a limit cycle depends on.
-            if before > 0.0 {
-                gains.epsilon *= gains.safeguards.delta_max / before;
-            }
-        }),
-        Law::Backstepping(gains) => each_group(gains, &mut |place, gains| each_tuned(place, gains, visit)),
-        peer => return each_tuned("", peer, visit),
+    let law = &mut contender.law;
+    if !law.kind().in_cascade() {
+        return each_tuned("", law, |_| true, visit);
     }
-    each_tuned("cascade", &mut contender.settings, visit);
+    for group in GROUPS {
+        each_of_group(law, group, visit);
+    }
+    each_tuned("cascade", &mut contender.settings, |_| true, visit);
 }
 
-/// Shows every parameter of one group that is tuned and not 0.
-fn each_tuned(place: &str, parameters: &mut impl Declared, visit: Visit) {
+/// Shows the gains of the first axis of `group`, then gives them to the others.
+fn each_of_group(law: &mut Law, group: &[Axis], visit: Visit) {
+    let [first, others @ ..] = group else { return };
+    let place = group.iter().map(|axis| axis.name()).collect::<Vec<_>>().join(", ");
+    let delta_max = |law: &Law| if let Law::Afbc(gains) = law { gains[*first].safeguards.delta_max } else { 0.0 };
+    let before = delta_max(law);
+    each_tuned(&place, law, |declaration| declaration.group == first.name(), visit);
+    // By rule, epsilon goes with the bound on delta_hat: their ratio is all that a limit cycle depends on.
+    if let (Law::Afbc(gains), true) = (&mut *law, before > 0.0) {
+        gains[*first].epsilon *= gains[*first].safeguards.delta_max / before;
+    }
+    let mut shared = Vec::new();
+    each_of_axis(law, *first, |gain| shared.push(*gain));
+    for axis in others {
+        let mut shared = shared.iter();
+        each_of_axis(law, *axis, |gain| *gain = shared.next().copied().unwrap_or(*gain));
+    }
+}
+
+/// Shows every gain of one axis.
+fn each_of_axis(law: &mut Law, axis: Axis, mut show: impl FnMut(&mut f32)) {
+    let Ok(()) = law.visit_mut(&mut |declaration, value| {
+        if let (true, Value::Single([gain])) = (declaration.group == axis.name(), value) {
+            show(gain);
+        }
+        Ok::<(), Infallible>(())
+    });
+}
+
+/// Shows every parameter that is `wanted`, tuned and not 0.
+fn each_tuned(place: &str, parameters: &mut impl Declared, wanted: impl Fn(&Declaration) -> bool, visit: Visit) {
     let Ok(()) = parameters.visit_mut(&mut |declaration, value| {
-        if let (true, Value::Single([gain])) = (declaration.tuned, value)
+        if let (true, Value::Single([gain])) = (declaration.tuned && wanted(declaration), value)
             && *gain > 0.0
         {
             visit(place, &declaration.range, gain);
         }
         Ok::<(), Infallible>(())
     });
-}
-
-/// Shows the gains of the first axis of each group, then gives them to the whole group.
-fn each_group<G: Copy>(gains: &mut PerAxis<G>, visit: &mut dyn FnMut(&str, &mut G)) {
-    for group in GROUPS {
-        let [first, ..] = group else { continue };
-        let mut shared = gains[*first];
-        visit(&group.iter().map(|axis| axis.name()).collect::<Vec<_>>().join(", "), &mut shared);
-        for axis in group {
-            gains[*axis] = shared;
-        }
-    }
 }
 
 /// The gains of `contender` as a point: the logarithm of each.
@@ -134,7 +145,7 @@ pub fn fragment(contender: &Contender) -> String {
         profile.name()
     );
     if contender.kind() == ControllerKind::Afbc {
-        let _ = writeln!(text, "monitor = {}", matches!(contender.law, Law::Guarded(_)));
+        let _ = writeln!(text, "monitor = {}", contender.monitored);
     }
     let mut table = "";
     for key in own.iter().filter(|key| !base.contains(key)) {

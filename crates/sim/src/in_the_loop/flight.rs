@@ -1,7 +1,7 @@
 //! The closed loop over the link.
 
 use super::{Autopilot, Error, Heard, Pace, Station};
-use crate::contender::{Contender, ControllerKind, Law};
+use crate::contender::{Contender, ControllerKind};
 use crate::flight::{Lost, Pilot, Sample, View, World, lockstep};
 use crate::scenario::Scenario;
 use afbc::Profile;
@@ -35,8 +35,7 @@ pub struct End {
 
 /// Who flies in the loop: AFBC in the profile `flight`, under its monitor.
 pub fn firmware() -> Contender {
-    let Contender { settings, .. } = Contender::of(ControllerKind::Afbc, Profile::Flight);
-    Contender { name: "firmware".into(), law: Law::Guarded(Profile::Flight.gains()), settings }
+    Contender { name: "firmware".into(), ..Contender::of(ControllerKind::Afbc, Profile::Flight).monitored() }
 }
 
 /// Whether the firmware can fly `scenario`. The [`firmware`] has its own profile; a scenario that leaves gains and settings

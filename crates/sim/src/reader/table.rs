@@ -40,11 +40,29 @@ impl<'a> Table<'a> {
         Ok(number.unwrap_or_default())
     }
 
-    /// Every key of `parameters` that is there, but `elsewhere`: the others stay as they are. A group within them has a table
-    /// of its own.
+    /// Every key of `parameters` that is there; the others stay as they are. A group within them has a table of its own.
+    pub fn declared(&mut self, parameters: &mut impl Declared) -> Result<(), FileError> {
+        self.declared_in("", parameters)
+    }
+
+    /// Every key of this group within `parameters` that is there; the others stay as they are.
+    pub fn declared_in(&mut self, group: &str, parameters: &mut impl Declared) -> Result<(), FileError> {
+        self.declared_where(parameters, |declaration| declaration.group == group)
+    }
+
+    /// Every key of `parameters` that is there, but `elsewhere`; the others stay as they are.
     pub fn declared_but(&mut self, elsewhere: &str, parameters: &mut impl Declared) -> Result<(), FileError> {
-        parameters.visit_mut(&mut |Declaration { group, range, .. }, value| {
-            if !group.is_empty() || range.name == elsewhere {
+        self.declared_where(parameters, |Declaration { group, range, .. }| group.is_empty() && range.name != elsewhere)
+    }
+
+    fn declared_where(
+        &mut self,
+        parameters: &mut impl Declared,
+        wanted: impl Fn(&Declaration) -> bool,
+    ) -> Result<(), FileError> {
+        parameters.visit_mut(&mut |declaration, value| {
+            let Declaration { range, .. } = declaration;
+            if !wanted(declaration) {
                 return Ok(());
             }
             match value {
@@ -62,11 +80,6 @@ impl<'a> Table<'a> {
             }
             Ok(())
         })
-    }
-
-    /// Every key of `parameters` that is there; the others stay as they are.
-    pub fn declared(&mut self, parameters: &mut impl Declared) -> Result<(), FileError> {
-        self.declared_but("", parameters)
     }
 
     /// Refuses a table in which `range.name` is missing.

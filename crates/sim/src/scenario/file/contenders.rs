@@ -1,10 +1,9 @@
 //! `controllers`, `profile`, `monitor` and `[[contender]]`: who flies.
 
-use super::control::{gains, per_axis, settings};
-use crate::contender::{Contender, ControllerKind, Law, backstepping_part};
+use super::control::{per_axis, settings, whole};
+use crate::contender::{Contender, ControllerKind, Law};
 use crate::reader::{FileError, Table};
-use afbc::adaptive::Gains;
-use afbc::{Profile, Settings};
+use afbc::{Profile, Settings, adaptive};
 use afbc_types::{Parameters, PerAxis};
 
 /// Longest name of a contender: what a table has room for.
@@ -13,21 +12,17 @@ const NAME_LENGTH: usize = 32;
 /// What a contender starts from.
 #[derive(Clone, Copy)]
 struct Defaults {
-    profile: Profile,
-    gains: PerAxis<Gains>,
+    gains: PerAxis<adaptive::Gains>,
     settings: Settings,
     /// Whether AFBC flies under its monitor.
     monitor: bool,
 }
 
 impl Defaults {
-    fn law(&self, kind: ControllerKind) -> Law {
-        match kind {
-            ControllerKind::Afbc if self.monitor => Law::Guarded(self.gains),
-            ControllerKind::Afbc => Law::Afbc(self.gains),
-            ControllerKind::Backstepping => Law::Backstepping(backstepping_part(&self.gains)),
-            _ => Law::of(kind, self.profile),
-        }
+    fn contender(&self, kind: ControllerKind) -> Contender {
+        let law = Law::beside(kind, &self.gains);
+        let contender = Contender { name: kind.name().into(), law, settings: self.settings, monitored: false };
+        if self.monitor { contender.monitored() } else { contender }
     }
 }
 
@@ -39,12 +34,11 @@ pub(super) fn read(root: &mut Table<'_>, vehicle: &Parameters) -> Result<Vec<Con
     per_axis(root.table("gains")?, &mut axes)?;
     let settings = settings(root, profile.settings(), true)?;
     let monitor = root.boolean("monitor")?.unwrap_or(false);
-    let defaults = Defaults { profile, gains: axes, settings, monitor };
+    let defaults = Defaults { gains: axes, settings, monitor };
 
     let tables = root.few_tables("contender")?;
     let kinds = controllers.unwrap_or(if tables.is_empty() { ControllerKind::PAPER.to_vec() } else { Vec::new() });
-    let short = |kind: ControllerKind| Contender { name: kind.name().into(), law: defaults.law(kind), settings };
-    let mut contenders: Vec<_> = kinds.into_iter().map(short).collect();
+    let mut contenders: Vec<_> = kinds.into_iter().map(|kind| defaults.contender(kind)).collect();
     for table in tables {
         contenders.push(contender(table, vehicle, defaults, &contenders)?);
     }
@@ -68,7 +62,6 @@ fn contender(
     let kind = table.need_choice("controller", &ControllerKind::ALL, ControllerKind::name)?;
     let mut defaults = match table.choice("profile", &Profile::ALL, Profile::name)? {
         Some(profile) => Defaults {
-            profile,
             gains: profile.gains_for(vehicle),
             settings: profile.settings().with_dt_s(file.settings.common.dt_s),
             monitor: file.monitor,
@@ -78,20 +71,14 @@ fn contender(
     if kind == ControllerKind::Afbc {
         defaults.monitor = table.boolean("monitor")?.unwrap_or(defaults.monitor);
     }
-    let law = law(table.table("gains")?, defaults.law(kind))?;
-    let settings = settings(&mut table, defaults.settings, false)?;
-    table.finish()?;
-    Ok(Contender { name, law, settings })
-}
-
-/// The law with the gains in `table`; those that it leaves out are as in `default`.
-fn law(table: Option<Table<'_>>, mut default: Law) -> Result<Law, FileError> {
-    match &mut default {
-        Law::Afbc(axes) | Law::Guarded(axes) => per_axis(table, axes)?,
-        Law::Backstepping(axes) => per_axis(table, axes)?,
-        Law::Pid(own) => gains(table, own)?,
-        Law::Geometric(own) => gains(table, own)?,
-        Law::Indi(own) => gains(table, own)?,
+    let mut contender = Contender { name, ..defaults.contender(kind) };
+    let gains = table.table("gains")?;
+    if kind.in_cascade() {
+        per_axis(gains, &mut contender.law)?
+    } else {
+        whole(gains, &mut contender.law)?
     }
-    Ok(default)
+    contender.settings = settings(&mut table, defaults.settings, false)?;
+    table.finish()?;
+    Ok(contender)
 }

@@ -4,21 +4,27 @@ use crate::reader::words::out_of_range;
 use crate::reader::{FileError, Table};
 use afbc::Settings;
 use afbc::fuzzy::Membership;
-use afbc_types::{Axis, Declared, PerAxis};
+use afbc_types::{Axis, Declared};
 
-/// One table for each axis; what is left out stays as it is.
-pub(super) fn per_axis<G: Declared>(table: Option<Table<'_>>, axes: &mut PerAxis<G>) -> Result<(), FileError> {
+/// Gains of which each axis has a table; what is left out stays as it is.
+pub(super) fn per_axis(table: Option<Table<'_>>, gains: &mut impl Declared) -> Result<(), FileError> {
     let Some(mut table) = table else { return Ok(()) };
     for axis in Axis::ALL {
-        gains(table.table(axis.name())?, &mut axes[axis])?;
+        if let Some(table) = table.table(axis.name())? {
+            group(table, axis.name(), gains)?;
+        }
     }
     table.finish()
 }
 
-/// One table for all of them; what is left out stays as it is.
-pub(super) fn gains(table: Option<Table<'_>>, gains: &mut impl Declared) -> Result<(), FileError> {
-    let Some(mut table) = table else { return Ok(()) };
-    table.declared(gains)?;
+/// Gains of the whole vehicle, in one table; what is left out stays as it is.
+pub(super) fn whole(table: Option<Table<'_>>, gains: &mut impl Declared) -> Result<(), FileError> {
+    table.map_or(Ok(()), |table| group(table, "", gains))
+}
+
+/// One group of gains, which has a table of its own.
+fn group(mut table: Table<'_>, name: &str, gains: &mut impl Declared) -> Result<(), FileError> {
+    table.declared_in(name, gains)?;
     // Each gain is in its range; what is left to refuse is how centre and width go together.
     gains.together().map_err(|error| {
         let problem = format!("{}; change one of the two", out_of_range(&error));

@@ -170,7 +170,7 @@ fn contenders_start_from_the_file_or_from_a_profile() {
     let paper = Profile::Paper.gains().z;
     assert_eq!((short.name.as_str(), z(short)), ("afbc", Gains { gamma: 5.0, ..paper }));
     assert_eq!(z(file), Gains { gamma: 5.0, eta: 0.1, ..paper });
-    assert_eq!(flight.law, Law::Guarded(Profile::Flight.gains()));
+    assert_eq!((flight.law, flight.monitored), (Law::Afbc(Profile::Flight.gains()), true));
     assert_eq!(flight.settings, Profile::Flight.settings().with_dt_s(0.002));
     let tuned = pid::Gains { tilt_p_1_s: 9.0, ..pid::Gains::TUNED };
     assert_eq!((pid.law, pid.settings), (Law::Pid(tuned), short.settings));

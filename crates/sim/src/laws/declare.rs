@@ -1,0 +1,118 @@
+//! What the [list of laws](super) makes of each of its entries.
+
+/// Declares the control laws, each with
+///
+/// * `name`: lower-case name, as in scenario files and logs; `title`: name for people;
+/// * `prefix`: begins the names of its gains on a ground station;
+/// * `in_cascade`: whether it is a law of AFBC's cascade, with the cascade's settings and gains for each axis;
+/// * `gains`: their type;
+/// * `tuned`: the gains that fly, where AFBC's are those given;
+/// * `by_hand`: the gains that a search begins with;
+/// * `controller`: what flies a vehicle.
+macro_rules! laws {
+    ($(
+        #[doc = $doc:literal]
+        $Law:ident {
+            name: $name:literal,
+            title: $title:literal,
+            prefix: $prefix:literal,
+            in_cascade: $in_cascade:literal,
+            gains: $Gains:ty,
+            tuned: |$afbc:pat_param| $tuned:expr,
+            by_hand: $by_hand:expr,
+            controller: |$vehicle:ident, $settings:ident, $gains:ident| $controller:expr,
+        }
+    )*) => {
+        /// A kind of control law.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum ControllerKind {
+            $( #[doc = $doc] $Law, )*
+        }
+
+        impl ControllerKind {
+            /// Every law.
+            pub const ALL: [ControllerKind; [$($name),*].len()] = [$( ControllerKind::$Law ),*];
+
+            /// Lower-case name, as in scenario files and logs.
+            pub const fn name(self) -> &'static str {
+                match self { $( ControllerKind::$Law => $name, )* }
+            }
+
+            /// Name for people.
+            pub const fn title(self) -> &'static str {
+                match self { $( ControllerKind::$Law => $title, )* }
+            }
+
+            /// What the names of its gains begin with on a ground station.
+            pub const fn prefix(self) -> &'static str {
+                match self { $( ControllerKind::$Law => $prefix, )* }
+            }
+
+            /// True if it is a law of AFBC's cascade, with gains for each axis; the others have one set for the whole vehicle.
+            pub const fn in_cascade(self) -> bool {
+                match self { $( ControllerKind::$Law => $in_cascade, )* }
+            }
+        }
+
+        /// A control law with its gains.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[expect(clippy::large_enum_variant, reason = "a law flies with its controller; this is copied before")]
+        pub enum Law {
+            $( #[doc = concat!("See [`ControllerKind::", stringify!($Law), "`].")] $Law($Gains), )*
+        }
+
+        impl Law {
+            /// The law of this kind with the gains that fly, where AFBC's are `afbc`: those that it shares with AFBC, or else
+            /// its own.
+            pub fn beside(kind: ControllerKind, afbc: &afbc_types::PerAxis<afbc::adaptive::Gains>) -> Self {
+                match kind {
+                    $( ControllerKind::$Law => {
+                        let $afbc = afbc;
+                        Law::$Law($tuned)
+                    } )*
+                }
+            }
+
+            /// The law of this kind with gains by hand, where a search begins.
+            pub fn by_hand(kind: ControllerKind) -> Self {
+                match kind { $( ControllerKind::$Law => Law::$Law($by_hand), )* }
+            }
+
+            /// Which law it is.
+            pub const fn kind(&self) -> ControllerKind {
+                match self { $( Law::$Law(_) => ControllerKind::$Law, )* }
+            }
+
+            /// Does something with the law's controller for a vehicle with these nominal parameters.
+            ///
+            /// # Errors
+            /// The first parameter, gain or setting out of range, or what `task` returns.
+            pub fn build<T: crate::contender::Task>(
+                &self,
+                vehicle: afbc_types::Parameters,
+                settings: afbc::Settings,
+                task: T,
+            ) -> Result<T::Output, afbc_types::OutOfRange> {
+                match *self {
+                    $( Law::$Law($gains) => {
+                        let ($vehicle, $settings) = (vehicle, settings);
+                        task.with($controller?)
+                    } )*
+                }
+            }
+        }
+
+        impl afbc_types::Declared for Law {
+            /// Shows each gain; those of a law in the cascade in a group for each axis.
+            fn visit_mut<E>(&mut self, visit: afbc_types::Visit<'_, E>) -> Result<(), E> {
+                match self { $( Law::$Law(gains) => gains.visit_mut(visit), )* }
+            }
+
+            fn together(&self) -> Result<(), afbc_types::OutOfRange> {
+                match self { $( Law::$Law(gains) => gains.together(), )* }
+            }
+        }
+    };
+}
+
+pub(super) use laws;

@@ -1,0 +1,91 @@
+//! The one list of control laws.
+
+mod declare;
+
+use afbc::{Adaptive, Backstepping, Controller, Profile, adaptive, backstepping};
+use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
+use afbc_types::{Axis, PerAxis};
+
+declare::laws! {
+    /// Adaptive fuzzy backstepping (20)-(22).
+    Afbc {
+        name: "afbc",
+        title: "AFBC",
+        prefix: "A_",
+        in_cascade: true,
+        gains: PerAxis<adaptive::Gains>,
+        tuned: |afbc| *afbc,
+        by_hand: by_hand(),
+        controller: |vehicle, settings, gains| Controller::new(vehicle, settings, Adaptive::new(gains)?),
+    }
+    /// Classical backstepping (16), (21).
+    Backstepping {
+        name: "backstepping",
+        title: "backstepping",
+        prefix: "B_",
+        in_cascade: true,
+        gains: PerAxis<backstepping::Gains>,
+        tuned: |afbc| afbc.map(|gains| gains.backstepping),
+        by_hand: by_hand().map(|gains| gains.backstepping),
+        controller: |vehicle, settings, gains| {
+            Controller::new(vehicle, settings, Backstepping::new(&vehicle, gains)?)
+        },
+    }
+    /// Cascaded PID, as autopilots fly.
+    Pid {
+        name: "pid",
+        title: "PID",
+        prefix: "PID_",
+        in_cascade: false,
+        gains: pid::Gains,
+        tuned: |_| pid::Gains::TUNED,
+        by_hand: pid::Gains::PAPER_VEHICLE,
+        controller: |vehicle, settings, gains| Pid::new(vehicle, settings.common, gains),
+    }
+    /// Geometric tracking on SE(3) with integral terms.
+    Geometric {
+        name: "geometric",
+        title: "geometric",
+        prefix: "GEO_",
+        in_cascade: false,
+        gains: geometric::Gains,
+        tuned: |_| geometric::Gains::TUNED,
+        by_hand: geometric::Gains::GOODARZI_2013,
+        controller: |vehicle, settings, gains| Geometric::new(vehicle, settings.common, gains),
+    }
+    /// Incremental nonlinear dynamic inversion.
+    Indi {
+        name: "indi",
+        title: "INDI",
+        prefix: "INDI_",
+        in_cascade: false,
+        gains: indi::Gains,
+        tuned: |_| indi::Gains::TUNED,
+        by_hand: indi::Gains::PAPER_VEHICLE,
+        controller: |vehicle, settings, gains| Indi::new(vehicle, settings.common, gains),
+    }
+}
+
+impl ControllerKind {
+    /// The two that the paper compares.
+    pub const PAPER: [ControllerKind; 2] = [ControllerKind::Afbc, ControllerKind::Backstepping];
+}
+
+/// AFBC's gains by hand, for the settings of the profile `flight`.
+fn by_hand() -> PerAxis<adaptive::Gains> {
+    PerAxis::from_fn(|axis| {
+        let (alpha1, alpha2, gamma, eta, delta_max) = match axis {
+            Axis::Roll | Axis::Pitch => (10.0, 0.7, 4.0, 0.3, 0.05),
+            Axis::Yaw => (3.0, 12.0, 20.0, 0.3, 0.5),
+            Axis::Z => (4.0, 8.0, 30.0, 0.9, 1.0),
+            Axis::X | Axis::Y => (3.0, 6.0, 40.0, 0.3, 0.5),
+        };
+        let mut gains = Profile::Flight.gains()[axis];
+        gains.backstepping = backstepping::Gains { alpha1, alpha2 };
+        gains.gamma = gamma;
+        gains.eta = eta;
+        gains.epsilon = Profile::flight_epsilon(axis, delta_max);
+        gains.safeguards.delta_max = delta_max;
+        gains
+    })
+}
