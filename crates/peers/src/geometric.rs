@@ -39,8 +39,9 @@
 use crate::attitude::{facing, geometric_error, heading, length, r_earth_body, unit};
 use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
+use crate::integral::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
 use crate::limits::Limits;
-use crate::pid::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
+use crate::loops::xy_and_z;
 use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
 use afbc_types::{Declared, OutOfRange, Parameters, Setpoint, State, parameters};
 use nalgebra::{Matrix3, Vector3};
@@ -88,7 +89,7 @@ parameters! {
         #[parameter(YAW_I, "1/s2", 0.0..=100.0, tuned)]
         pub yaw_i_1_s2: f32 = 80.71,
         /// w of the filter on s.
-        #[parameter(FILTER, "rad/s", 10.0..=300.0, tuned)]
+        #[parameter(FILTER, "rad/s", 10.0..=500.0, tuned)]
         pub filter_rad_s: f32 = 15.86,
         /// Largest sat(k_i int e_x), per coordinate.
         #[parameter(POS_INT_MAX, "m/s2", 0.0..=50.0)]
@@ -200,20 +201,20 @@ impl Geometric {
     pub fn new(vehicle: Parameters, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let body = Body::new(&vehicle, &settings)?;
         gains.validate()?;
-        let twice = |tilt, yaw| Vector3::new(tilt, tilt, yaw);
-        let (k_r, k_omega) = (twice(gains.tilt_p_1_s2, gains.yaw_p_1_s2), twice(gains.tilt_d_1_s, gains.yaw_d_1_s));
+        let (k_r, k_omega) =
+            (xy_and_z(gains.tilt_p_1_s2, gains.yaw_p_1_s2), xy_and_z(gains.tilt_d_1_s, gains.yaw_d_1_s));
         Ok(Geometric {
             body,
             limits: Limits::new(&vehicle, &settings, gains.tilt_max_rad),
             filter: Differentiator::new(gains.filter_rad_s, settings.dt_s)?,
             dt_s: settings.dt_s,
-            k_x: twice(gains.position_p_1_s2, gains.height_p_1_s2),
-            k_v: twice(gains.position_d_1_s, gains.height_d_1_s),
-            k_i: twice(gains.position_i_1_s3, gains.height_i_1_s3),
+            k_x: xy_and_z(gains.position_p_1_s2, gains.height_p_1_s2),
+            k_v: xy_and_z(gains.position_d_1_s, gains.height_d_1_s),
+            k_i: xy_and_z(gains.position_i_1_s3, gains.height_i_1_s3),
             position_integral_max: gains.position_integral_max_m_s2,
             k_r,
             k_omega,
-            k_integral: twice(gains.tilt_i_1_s2, gains.yaw_i_1_s2),
+            k_integral: xy_and_z(gains.tilt_i_1_s2, gains.yaw_i_1_s2),
             c: k_r.component_div(&k_omega),
         })
     }

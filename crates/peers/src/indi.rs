@@ -32,10 +32,11 @@
 //! * **On the ground** an increment finds no acceleration to compare with: thrust rises, within Limits, until
 //!   the vehicle lifts off or the setpoint lies below it. Do not step while disarmed.
 
-use crate::attitude::{facing, r_earth_body, tilt_prioritised_error, unit};
+use crate::attitude::{r_earth_body, unit};
 use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
-use crate::limits::{Limits, cylinder};
+use crate::limits::Limits;
+use crate::loops::{AttitudeLoop, AttitudeOutput, PositionLoop, PositionOutput, xy_and_z};
 use afbc_control::{Action, FlightController, Mixer, Settings, Trace, math};
 use afbc_types::{Declared, OutOfRange, Parameters, RotorSpeeds, Setpoint, State, parameters};
 use nalgebra::Vector3;
@@ -123,12 +124,9 @@ pub struct Indi {
     hover: RotorSpeeds,
     /// 1 - exp(-dt / tau)
     rotor_gain: f32,
-    position_p: Vector3<f32>,
-    velocity_p: Vector3<f32>,
-    attitude_p: Vector3<f32>,
+    position: PositionLoop,
+    attitude: AttitudeLoop,
     rate_p: Vector3<f32>,
-    yaw_weight: f32,
-    speed_max: f32,
 }
 
 /// What the controller remembers between steps.
@@ -153,7 +151,6 @@ impl Indi {
     pub fn new(vehicle: Parameters, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let body = Body::new(&vehicle, &settings)?;
         gains.validate()?;
-        let twice = |tilt, yaw| Vector3::new(tilt, tilt, yaw);
         let tau = gains.rotor_time_constant_s;
         Ok(Indi {
             body,
@@ -163,12 +160,13 @@ impl Indi {
             attitude_filter: Differentiator::new(gains.attitude_filter_rad_s, settings.dt_s)?,
             hover: body.hover(vehicle.gravity_m_s2),
             rotor_gain: if tau > 0.0 { 1.0 - math::exp(-settings.dt_s / tau) } else { 1.0 },
-            position_p: twice(gains.position_p_1_s, gains.height_p_1_s),
-            velocity_p: twice(gains.velocity_p_1_s, gains.climb_p_1_s),
-            attitude_p: twice(gains.tilt_p_1_s, gains.yaw_p_1_s / gains.yaw_weight),
-            rate_p: twice(gains.tilt_rate_p_1_s, gains.yaw_rate_p_1_s),
-            yaw_weight: gains.yaw_weight,
-            speed_max: gains.speed_max_m_s,
+            position: PositionLoop {
+                position_p: xy_and_z(gains.position_p_1_s, gains.height_p_1_s),
+                velocity_p: xy_and_z(gains.velocity_p_1_s, gains.climb_p_1_s),
+                speed_max_m_s: gains.speed_max_m_s,
+            },
+            attitude: AttitudeLoop::new(gains.tilt_p_1_s, gains.yaw_p_1_s, gains.yaw_weight),
+            rate_p: xy_and_z(gains.tilt_rate_p_1_s, gains.yaw_rate_p_1_s),
         })
     }
 }
@@ -206,29 +204,24 @@ impl FlightController for Indi {
         }
 
         // Position.
-        let position_error = setpoint.position_m - state.position_m;
-        let velocity_wanted =
-            setpoint.velocity_m_s + cylinder(&self.position_p.component_mul(&position_error), self.speed_max);
-        let velocity_error = velocity_wanted - state.velocity_m_s;
-        let acceleration = setpoint.acceleration_m_s2 + self.velocity_p.component_mul(&velocity_error);
-        let increment = acceleration - memory.velocity.derivative();
+        let PositionOutput { position_error_m, velocity_error_m_s, acceleration_m_s2 } =
+            self.position.output(state, setpoint);
+        let increment = acceleration_m_s2 - memory.velocity.derivative();
         let specific_force = self.limits.apply(&(memory.specific_force.value() + increment));
 
         // Attitude.
-        let desired = facing(&specific_force, setpoint.yaw_rad);
-        let attitude_error = tilt_prioritised_error(&r, &desired, self.yaw_weight);
-        let rates_wanted = self.attitude_p.component_mul(&attitude_error) + earth_z * setpoint.yaw_rate_rad_s;
-        let rate_error = rates_wanted - state.rates_rad_s;
-        let nu = self.rate_p.component_mul(&rate_error) + earth_z * setpoint.yaw_acceleration_rad_s2;
+        let AttitudeOutput { desired, attitude_error_rad, rates_rad_s, rate_error_rad_s } =
+            self.attitude.output(&r, &specific_force, state, setpoint);
+        let nu = self.rate_p.component_mul(&rate_error_rad_s) + earth_z * setpoint.yaw_acceleration_rad_s2;
         let increment = nu - memory.rates.derivative();
 
         let demand = Demand {
             thrust_n: self.body.mass_kg * specific_force.dot(&body_z).max(0.0),
             angular_acceleration_rad_s2: memory.rotor_acceleration.value() + increment,
-            acceleration_m_s2: acceleration,
+            acceleration_m_s2,
             desired,
-            desired_rates_rad_s: rates_wanted,
-            errors: [position_error, velocity_error, attitude_error, rate_error],
+            desired_rates_rad_s: rates_rad_s,
+            errors: [position_error_m, velocity_error_m_s, attitude_error_rad, rate_error_rad_s],
         };
         let (action, trace, _) = self.body.act(&demand);
         memory.trace = trace;

@@ -49,7 +49,9 @@ mod body;
 pub mod differentiator;
 pub mod geometric;
 pub mod indi;
+mod integral;
 pub mod limits;
+mod loops;
 pub mod pid;
 
 pub use geometric::Geometric;

@@ -21,16 +21,15 @@
 //! the whole specific force, not gravity plus its horizontal part; tracking anti-windup serves height too; derivatives
 //! are those of [`crate::differentiator`]; the rate integrator is not weakened at large errors.
 
-use crate::attitude::{facing, length, r_earth_body, tilt_prioritised_error};
+use crate::attitude::{length, r_earth_body};
 use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
-use crate::limits::{Limits, cylinder};
+use crate::integral::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
+use crate::limits::Limits;
+use crate::loops::{AttitudeLoop, AttitudeOutput, PositionLoop, PositionOutput, xy_and_z};
 use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
 use afbc_types::{Declared, OutOfRange, Parameters, Setpoint, State, parameters};
 use nalgebra::Vector3;
-
-/// Largest integral of the rate loop \[rad/s2\].
-pub(crate) const RATE_INTEGRAL_MAX_RAD_S2: f32 = 20.0;
 
 parameters! {
     /// Gains and limits. By default as `sitl tune` found them for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
@@ -49,10 +48,10 @@ parameters! {
         #[parameter(VEL_D, "1", 0.0..=2.0, tuned)]
         pub velocity_d: f32 = 0.07327,
         /// k_p along z.
-        #[parameter(HEIGHT_P, "1/s", 0.2..=10.0, tuned)]
+        #[parameter(HEIGHT_P, "1/s", 0.2..=20.0, tuned)]
         pub height_p_1_s: f32 = 2.518,
         /// k_v along z.
-        #[parameter(CLIMB_P, "1/s", 0.5..=20.0, tuned)]
+        #[parameter(CLIMB_P, "1/s", 0.5..=40.0, tuned)]
         pub climb_p_1_s: f32 = 10.75,
         /// k_i along z.
         #[parameter(CLIMB_I, "1/s2", 0.0..=200.0, tuned)]
@@ -85,7 +84,7 @@ parameters! {
         #[parameter(RATE_FF, "1/s", 0.0..=20.0, tuned)]
         pub rate_feed_forward_1_s: f32 = 0.0,
         /// Bandwidth of both derivatives.
-        #[parameter(FILTER, "rad/s", 20.0..=500.0, tuned)]
+        #[parameter(FILTER, "rad/s", 10.0..=500.0, tuned)]
         pub filter_rad_s: f32 = 140.7,
         /// How much of a large yaw error is corrected together with the tilt, 0 to 1.
         #[parameter(YAW_WEIGHT, "1", 0.05..=1.0)]
@@ -135,19 +134,16 @@ pub struct Pid {
     limits: Limits,
     differentiator: Differentiator,
     dt_s: f32,
-    position_p: Vector3<f32>,
-    velocity_p: Vector3<f32>,
+    position: PositionLoop,
     velocity_i: Vector3<f32>,
     velocity_d: Vector3<f32>,
     /// 2 / k_v
     anti_windup: Vector3<f32>,
-    attitude_p: Vector3<f32>,
+    attitude: AttitudeLoop,
     rate_p: Vector3<f32>,
     rate_i: Vector3<f32>,
     rate_d: Vector3<f32>,
     rate_feed_forward: f32,
-    yaw_weight: f32,
-    speed_max: f32,
 }
 
 /// What the controller remembers between steps.
@@ -173,44 +169,26 @@ impl Pid {
     pub fn new(vehicle: Parameters, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let body = Body::new(&vehicle, &settings)?;
         gains.validate()?;
-        let twice = |tilt, yaw| Vector3::new(tilt, tilt, yaw);
-        let velocity_p = twice(gains.velocity_p_1_s, gains.climb_p_1_s);
+        let velocity_p = xy_and_z(gains.velocity_p_1_s, gains.climb_p_1_s);
         Ok(Pid {
             body,
             limits: Limits::new(&vehicle, &settings, gains.tilt_max_rad),
             differentiator: Differentiator::new(gains.filter_rad_s, settings.dt_s)?,
             dt_s: settings.dt_s,
-            position_p: twice(gains.position_p_1_s, gains.height_p_1_s),
-            velocity_p,
-            velocity_i: twice(gains.velocity_i_1_s2, gains.climb_i_1_s2),
-            velocity_d: twice(gains.velocity_d, gains.climb_d),
+            position: PositionLoop {
+                position_p: xy_and_z(gains.position_p_1_s, gains.height_p_1_s),
+                velocity_p,
+                speed_max_m_s: gains.speed_max_m_s,
+            },
+            velocity_i: xy_and_z(gains.velocity_i_1_s2, gains.climb_i_1_s2),
+            velocity_d: xy_and_z(gains.velocity_d, gains.climb_d),
             anti_windup: velocity_p.map(|k| 2.0 / k),
-            attitude_p: twice(gains.tilt_p_1_s, gains.yaw_p_1_s / gains.yaw_weight),
-            rate_p: twice(gains.tilt_rate_p_1_s, gains.yaw_rate_p_1_s),
-            rate_i: twice(gains.tilt_rate_i_1_s2, gains.yaw_rate_i_1_s2),
-            rate_d: twice(gains.tilt_rate_d, 0.0),
+            attitude: AttitudeLoop::new(gains.tilt_p_1_s, gains.yaw_p_1_s, gains.yaw_weight),
+            rate_p: xy_and_z(gains.tilt_rate_p_1_s, gains.yaw_rate_p_1_s),
+            rate_i: xy_and_z(gains.tilt_rate_i_1_s2, gains.yaw_rate_i_1_s2),
+            rate_d: xy_and_z(gains.tilt_rate_d, 0.0),
             rate_feed_forward: gains.rate_feed_forward_1_s,
-            yaw_weight: gains.yaw_weight,
-            speed_max: gains.speed_max_m_s,
         })
-    }
-}
-
-/// `integral` one step further and within +-`max` in each coordinate.
-#[inline]
-pub(crate) fn integrate(integral: &Vector3<f32>, rate: &Vector3<f32>, dt_s: f32, max: f32) -> Vector3<f32> {
-    (integral + rate * dt_s).map(|i| i.max(-max).min(max))
-}
-
-/// `error`, unless it drives an integral further towards what is missing already.
-#[inline]
-pub(crate) fn away_from(error: f32, missing: f32) -> f32 {
-    if missing > 0.0 {
-        error.min(0.0)
-    } else if missing < 0.0 {
-        error.max(0.0)
-    } else {
-        error
     }
 }
 
@@ -237,46 +215,40 @@ impl FlightController for Pid {
         }
 
         // Position and velocity.
-        let position_error = setpoint.position_m - state.position_m;
-        let velocity_wanted =
-            setpoint.velocity_m_s + cylinder(&self.position_p.component_mul(&position_error), self.speed_max);
-        let velocity_error = velocity_wanted - state.velocity_m_s;
+        let PositionOutput { position_error_m, velocity_error_m_s, acceleration_m_s2 } =
+            self.position.output(state, setpoint);
         let acceleration =
-            setpoint.acceleration_m_s2 + self.velocity_p.component_mul(&velocity_error) + memory.velocity_integral
-                - self.velocity_d.component_mul(&memory.velocity.derivative());
+            acceleration_m_s2 + memory.velocity_integral - self.velocity_d.component_mul(&memory.velocity.derivative());
 
         // Thrust and attitude.
         let gravity = self.limits.gravity();
         let specific_force = self.limits.apply(&(acceleration + gravity));
         let missing = acceleration - (specific_force - gravity);
         let r = r_earth_body(&state.attitude_rad);
-        let desired = facing(&specific_force, setpoint.yaw_rad);
-        let attitude_error = tilt_prioritised_error(&r, &desired, self.yaw_weight);
+        let AttitudeOutput { desired, attitude_error_rad, rates_rad_s, rate_error_rad_s } =
+            self.attitude.output(&r, &specific_force, state, setpoint);
 
         // Rates.
-        let yaw_feed_forward = r.row(2).transpose() * setpoint.yaw_rate_rad_s;
-        let rates_wanted = self.attitude_p.component_mul(&attitude_error) + yaw_feed_forward;
-        let rate_error = rates_wanted - state.rates_rad_s;
-        let angular_acceleration = self.rate_p.component_mul(&rate_error) + memory.rate_integral
+        let angular_acceleration = self.rate_p.component_mul(&rate_error_rad_s) + memory.rate_integral
             - self.rate_d.component_mul(&memory.rates.derivative())
-            + rates_wanted * self.rate_feed_forward;
+            + rates_rad_s * self.rate_feed_forward;
 
         let demand = Demand {
             thrust_n: self.body.mass_kg * length(&specific_force),
             angular_acceleration_rad_s2: angular_acceleration,
             acceleration_m_s2: acceleration,
             desired,
-            desired_rates_rad_s: rates_wanted,
-            errors: [position_error, velocity_error, attitude_error, rate_error],
+            desired_rates_rad_s: rates_rad_s,
+            errors: [position_error_m, velocity_error_m_s, attitude_error_rad, rate_error_rad_s],
         };
         let (action, trace, unallocated) = self.body.act(&demand);
         memory.trace = trace;
 
         if fresh {
-            let unwound = velocity_error - self.anti_windup.component_mul(&missing);
+            let unwound = velocity_error_m_s - self.anti_windup.component_mul(&missing);
             memory.velocity_integral =
                 integrate(&memory.velocity_integral, &self.velocity_i.component_mul(&unwound), self.dt_s, gravity.z);
-            let allowed = rate_error.zip_map(&memory.unallocated, away_from);
+            let allowed = rate_error_rad_s.zip_map(&memory.unallocated, away_from);
             memory.rate_integral = integrate(
                 &memory.rate_integral,
                 &self.rate_i.component_mul(&allowed),

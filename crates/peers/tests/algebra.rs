@@ -6,10 +6,11 @@ mod harness;
 use afbc_control::{Action, FlightController, Screened, Trace};
 use afbc_peers::attitude::{facing, geometric_error, quaternion, r_earth_body, roll_pitch, tilt_prioritised_error};
 use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
-use afbc_types::{Declared, OutOfRange, Range, Setpoint, State, Value};
+use afbc_types::{Declaration, Declared, OutOfRange, Range, Setpoint, State, Value};
 use core::convert::Infallible;
 use harness::{Random, SETTINGS, vehicle};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
+use std::collections::BTreeMap;
 
 fn pid() -> Pid {
     Pid::new(vehicle(), SETTINGS, pid::Gains::PAPER_VEHICLE).unwrap()
@@ -368,6 +369,25 @@ fn increments_cancel_a_constant_moment() {
     // Without increments the angle would stay at 2 rad/s2 / (k_w k_a) = 83 mrad.
     assert!(late < 1e-4, "left: {late}");
     assert!(largest < 0.01, "largest: {largest}");
+}
+
+/// A gain that several peers have is one gain: it has one name, one unit and one range.
+#[test]
+fn gains_of_one_key_are_declared_alike() {
+    let mut declared: BTreeMap<&str, Declaration> = BTreeMap::new();
+    let mut shared = 0;
+    let mut visit = |declaration: &Declaration, _: Value<'_>| {
+        if let Some(before) = declared.insert(declaration.range.name, *declaration) {
+            let same = |d: Declaration| (d.id, d.range, d.unit, d.tuned);
+            assert_eq!(same(before), same(*declaration));
+            shared += 1;
+        }
+        Ok::<(), Infallible>(())
+    };
+    let Ok(()) = pid::Gains::DEFAULT.visit(&mut visit);
+    let Ok(()) = geometric::Gains::DEFAULT.visit(&mut visit);
+    let Ok(()) = indi::Gains::DEFAULT.visit(&mut visit);
+    assert!(shared > 10, "{shared}");
 }
 
 #[test]

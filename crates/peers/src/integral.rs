@@ -1,0 +1,24 @@
+//! Integrals that stay within bounds, and do not wind up.
+
+use nalgebra::Vector3;
+
+/// Largest integral of rate and attitude errors \[rad/s2\].
+pub(crate) const RATE_INTEGRAL_MAX_RAD_S2: f32 = 20.0;
+
+/// `integral` one step further and within +-`max` in each coordinate.
+#[inline]
+pub(crate) fn integrate(integral: &Vector3<f32>, rate: &Vector3<f32>, dt_s: f32, max: f32) -> Vector3<f32> {
+    (integral + rate * dt_s).map(|i| i.max(-max).min(max))
+}
+
+/// `error`, unless it drives an integral further towards what is missing already.
+#[inline]
+pub(crate) fn away_from(error: f32, missing: f32) -> f32 {
+    if missing > 0.0 {
+        error.min(0.0)
+    } else if missing < 0.0 {
+        error.max(0.0)
+    } else {
+        error
+    }
+}
