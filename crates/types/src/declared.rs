@@ -79,8 +79,11 @@ impl Value<'_> {
     }
 }
 
-/// What a visit does with each parameter; an error ends it.
-pub type Visit<'a, E> = &'a mut dyn FnMut(&Declaration, Value<'_>) -> Result<(), E>;
+/// What a visit does with each parameter; an error ends it. Implemented by closures. A call of it is static, so the proof of
+/// the firmware's stack follows it.
+pub trait Visit<E>: FnMut(&Declaration, Value<'_>) -> Result<(), E> {}
+
+impl<E, F: FnMut(&Declaration, Value<'_>) -> Result<(), E>> Visit<E> for F {}
 
 /// A group of parameters made by [`parameters!`](crate::parameters), or one for each axis.
 pub trait Declared: Clone {
@@ -88,13 +91,13 @@ pub trait Declared: Clone {
     ///
     /// # Errors
     /// The first that `visit` returns.
-    fn visit_mut<E>(&mut self, visit: Visit<'_, E>) -> Result<(), E>;
+    fn visit_mut<E>(&mut self, visit: &mut impl Visit<E>) -> Result<(), E>;
 
     /// Shows every parameter; changes that `visit` makes are lost.
     ///
     /// # Errors
     /// The first that `visit` returns.
-    fn visit<E>(&self, visit: Visit<'_, E>) -> Result<(), E> {
+    fn visit<E>(&self, visit: &mut impl Visit<E>) -> Result<(), E> {
         self.clone().visit_mut(visit)
     }
 
@@ -115,7 +118,7 @@ pub trait Declared: Clone {
 }
 
 impl<G: Declared> Declared for PerAxis<G> {
-    fn visit_mut<E>(&mut self, visit: Visit<'_, E>) -> Result<(), E> {
+    fn visit_mut<E>(&mut self, visit: &mut impl Visit<E>) -> Result<(), E> {
         Axis::ALL.into_iter().try_for_each(|axis| {
             let in_axis =
                 &mut |declaration: &Declaration, value: Value<'_>| visit(&declaration.in_group(axis.name()), value);
@@ -134,7 +137,7 @@ pub trait Field {
     ///
     /// # Errors
     /// The first that `visit` returns.
-    fn show<E>(&mut self, declaration: &Declaration, visit: Visit<'_, E>) -> Result<(), E>;
+    fn show<E>(&mut self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E>;
 }
 
 /// `f32`, of what flies, or `f64`, of the plant.
@@ -156,25 +159,25 @@ impl Number for f64 {
 }
 
 impl<T: Number> Field for T {
-    fn show<E>(&mut self, declaration: &Declaration, visit: Visit<'_, E>) -> Result<(), E> {
+    fn show<E>(&mut self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E> {
         visit(declaration, T::values(core::slice::from_mut(self)))
     }
 }
 
 impl<T: Number> Field for Vector3<T> {
-    fn show<E>(&mut self, declaration: &Declaration, visit: Visit<'_, E>) -> Result<(), E> {
+    fn show<E>(&mut self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E> {
         visit(declaration, T::values(self.as_mut_slice()))
     }
 }
 
 impl Field for bool {
-    fn show<E>(&mut self, declaration: &Declaration, visit: Visit<'_, E>) -> Result<(), E> {
+    fn show<E>(&mut self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E> {
         visit(declaration, Value::Switch(self))
     }
 }
 
 impl<T: Field> Field for PerAxis<T> {
-    fn show<E>(&mut self, declaration: &Declaration, visit: Visit<'_, E>) -> Result<(), E> {
+    fn show<E>(&mut self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E> {
         Axis::ALL.into_iter().try_for_each(|axis| self[axis].show(&declaration.in_group(axis.name()), visit))
     }
 }
@@ -257,7 +260,7 @@ macro_rules! parameters {
         }
 
         impl $(<$T: $crate::Number>)? $crate::Declared for $Group $(<$T>)? {
-            fn visit_mut<E>(&mut self, visit: $crate::Visit<'_, E>) -> Result<(), E> {
+            fn visit_mut<E>(&mut self, visit: &mut impl $crate::Visit<E>) -> Result<(), E> {
                 $(
                     $( $crate::Field::show(&mut self.$field, &Self::$id, visit)?; )?
                     $( $crate::Field::show(&mut self.$field, &Self::$switch, visit)?; )?

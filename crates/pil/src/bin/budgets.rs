@@ -58,6 +58,10 @@ fn run() -> Result<bool, Error> {
 
     // Once deep in start-up, and in one interrupt of each level on top of that.
     let start_up = flight.reach("main")?;
+    if !start_up.indirect.is_empty() {
+        let callers = start_up.indirect.join(", ");
+        return Err(Error::Protocol(format!("start-up calls through a pointer, which no proof follows, in {callers}")));
+    }
     let mut nested = start_up.stack_bytes;
     println!("{nested:6} bytes of stack: start-up and idling, by");
     for (name, bytes) in start_up.deepest.iter().filter(|(_, bytes)| *bytes > 0) {

@@ -104,7 +104,7 @@ macro_rules! laws {
 
         impl afbc_types::Declared for Law {
             /// Shows each gain; those of a law in the cascade in a group for each axis.
-            fn visit_mut<E>(&mut self, visit: afbc_types::Visit<'_, E>) -> Result<(), E> {
+            fn visit_mut<E>(&mut self, visit: &mut impl afbc_types::Visit<E>) -> Result<(), E> {
                 match self { $( Law::$Law(gains) => gains.visit_mut(visit), )* }
             }
 
