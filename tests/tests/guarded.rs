@@ -64,7 +64,7 @@ impl Bench {
     /// Flies so long, or until it trips.
     fn fly(&mut self, steps: usize, setpoint: &Setpoint) -> Option<Trip> {
         for _ in 0..steps {
-            self.step(setpoint);
+            let _ = self.step(setpoint);
             if self.memory.control.trip().is_some() {
                 break;
             }
@@ -146,7 +146,7 @@ fn a_flight_goes_on_across_a_trip_and_back() {
         before = bench.trace();
     }
     assert_eq!((last.health.trip, bench.memory.control.trip()), (None, Some(Trip::Theta(Axis::X))));
-    bench.step(&setpoint);
+    let _ = bench.step(&setpoint);
     bumpless(&before, &bench.trace(), "fallback");
     for _ in 0..20 * SECOND {
         let action = bench.step(&setpoint);
@@ -159,7 +159,7 @@ fn a_flight_goes_on_across_a_trip_and_back() {
     bench.controller = flight(|_| ());
     bench.controller.engage(&mut bench.memory.control);
     before = bench.trace();
-    bench.step(&setpoint);
+    let _ = bench.step(&setpoint);
     bumpless(&before, &bench.trace(), "engaged");
     for _ in 0..20 * SECOND {
         let action = bench.step(&setpoint);
@@ -178,7 +178,7 @@ fn the_fallback_flies_far() {
         let setpoint = Setpoint { position_m: Vector3::new(x, 0.0, z), ..Setpoint::default() };
         let mut fastest = 0.0_f64;
         for _ in 0..40 * SECOND {
-            bench.step(&setpoint);
+            let _ = bench.step(&setpoint);
             let motion = bench.plant.motion();
             fastest = fastest.max(motion.velocity_m_s.amax());
             assert!(motion.attitude_rad.xy().amax() < 1.0 && motion.position_m.z > -1.0, "{motion:?}");

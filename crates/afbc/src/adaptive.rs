@@ -38,6 +38,7 @@ parameters! {
 
 impl Gains {
     /// The gains of a subsystem whose input has to be so many times as large.
+    #[must_use]
     pub fn scaled(&self, scale: f32) -> Self {
         let Gains { backstepping: backstepping::Gains { alpha1, alpha2 }, gamma, eta, safeguards, .. } = *self;
         let bound = |bound: f32| math::min(bound * scale, Safeguards::THETAMAX.range.max as f32);

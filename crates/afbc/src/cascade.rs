@@ -6,7 +6,7 @@ use crate::law::{Context, Law, Tracking};
 use crate::limits::Limits;
 use afbc_control::command_filter::{BANDWIDTH, CommandFilter, Filtered};
 use afbc_control::mixer::{Allocation, Mixer};
-use afbc_control::{Action, Errors, Estimate, FlightController, Health, Trace, math};
+use afbc_control::{Action, Errors, Estimate, FlightController, Trace, math};
 use afbc_types::{Axis, Declared, Inputs, OutOfRange, Parameters, PerAxis, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
@@ -44,12 +44,14 @@ parameters! {
 
 impl Settings {
     /// The same with another time between steps.
+    #[must_use]
     pub const fn with_dt_s(mut self, dt_s: f32) -> Self {
         self.common.dt_s = dt_s;
         self
     }
 
     /// The same with rotors of another largest force.
+    #[must_use]
     pub const fn with_rotor_force_max_n(mut self, force_n: f32) -> Self {
         self.common.rotor_force_max_n = force_n;
         self
@@ -110,13 +112,12 @@ impl<E> Cascade<E> {
     pub(crate) fn trace(&self) -> Trace {
         let PerAxis { roll, pitch, yaw, z, x, y } = self.inputs;
         let Desired { rad, filtered } = self.desired.unwrap_or(Desired { rad: [0.0; 2], filtered: Default::default() });
-        Trace {
-            inputs: Inputs { roll_n: roll, pitch_n: pitch, yaw_n: yaw, thrust_n: z },
-            virtual_m_s2: [x, y],
-            desired_rad: rad,
-            filtered,
-            errors: self.errors,
-        }
+        let mut trace = Trace::default();
+        trace.inputs = Inputs { roll_n: roll, pitch_n: pitch, yaw_n: yaw, thrust_n: z };
+        trace.virtual_m_s2 = [x, y];
+        (trace.desired_rad, trace.filtered) = (rad, filtered);
+        trace.errors = self.errors;
+        trace
     }
 }
 
@@ -270,9 +271,8 @@ impl<L: Law> Controller<L> {
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3, thrust_n: u4 };
         // Moments would keep the thrust up, and tip a vehicle over that stands.
         let asked = if stands { Inputs { thrust_n: u4, ..Inputs::default() } } else { inputs };
-        let Allocation { forces, unallocated, saturated } = self.mixer.allocate(&asked);
+        let Allocation { forces, unallocated, saturated, .. } = self.mixer.allocate(&asked);
         let speeds = self.mixer.speeds(&forces);
-        let health = Health { saturated, ..Health::default() };
 
         memory.inputs = PerAxis { roll: u1, pitch: u2, yaw: u3, z: u4, x: u5, y: u6 };
         memory.desired = Some(Desired { rad: desired_rad, filtered });
@@ -288,7 +288,7 @@ impl<L: Law> Controller<L> {
                 y: u6 - a6,
             };
         }
-        Action { speeds, forces, health }
+        Action::new(speeds, forces, saturated)
     }
 }
 

@@ -7,6 +7,7 @@ use afbc_types::{Axis, Parameters, PerAxis};
 
 /// A named set of gains and settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Profile {
     /// Section IV as printed, and for what it leaves open: a command filter of 40 rad/s and rotors without a limit.
     Paper,

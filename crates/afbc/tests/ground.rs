@@ -60,7 +60,7 @@ fn estimates_freeze_on_the_ground_and_thaw_on_lift() {
         let mut memory = Screened::default();
         [(-1.0, 300), (-1.0, 3000), (1.0, 1), (1.0, 100)].map(|(z, steps)| {
             for _ in 0..steps {
-                controller.step(&mut memory, Some(&State::default()), &setpoint(z));
+                let _ = controller.step(&mut memory, Some(&State::default()), &setpoint(z));
             }
             memory.control.estimates
         })

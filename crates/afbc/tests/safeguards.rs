@@ -173,7 +173,7 @@ proptest! {
             let controller = Controller::new(Parameters::PAPER.to_f32(), settings, law).unwrap();
             let mut memory = Screened::default();
             for _ in 0..20 {
-                controller.step(&mut memory, Some(&state), &setpoint);
+                let _ = controller.step(&mut memory, Some(&state), &setpoint);
             }
             memory.control.estimates
         };

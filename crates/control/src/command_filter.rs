@@ -29,6 +29,8 @@ pub struct CommandFilter {
 
 /// The filter's state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Filtered {
     /// x \[rad\].
     pub angle: f32,
@@ -66,6 +68,7 @@ impl CommandFilter {
 
     /// The state one step later, `command` held meanwhile.
     #[inline]
+    #[must_use]
     pub fn advance(&self, state: &Filtered, command: f32) -> Filtered {
         let offset = state.angle - command;
         let slope = state.rate + self.bandwidth * offset;

@@ -9,6 +9,8 @@
 //! * [`mixer`]: U1..U4 to rotor forces and speeds, and back.
 //! * [`command_filter`]: a smooth reference with two derivatives.
 //! * [`math`]: where every transcendental function comes from; the same bits on host and target.
+//!
+//! Features `serde` and `defmt`, off by default, are those of [`afbc_types`]; here they add actions, health and traces.
 #![no_std]
 
 mod action;

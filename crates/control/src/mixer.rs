@@ -13,7 +13,7 @@
 //! without symmetry a little pitch may make room for roll, so that more of one asked is not always more given.
 
 use crate::settings::Settings;
-use crate::{Action, Health, math};
+use crate::{Action, math};
 use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds};
 use nalgebra::{Matrix4, SMatrix, SVector, Vector4};
 
@@ -36,6 +36,8 @@ const ROUNDING: f32 = 1e-6;
 
 /// Where a rotor is, and which way it turns the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rotor {
     /// Along body x, in arm's lengths.
     pub x: f32,
@@ -72,6 +74,10 @@ pub struct Mixer<const N: usize = 4> {
 
 /// Forces within the rotors' limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[must_use = "the forces are not applied"]
+#[non_exhaustive]
 pub struct Allocation<const N: usize = 4> {
     /// What the rotors can give of what was asked.
     pub forces: RotorForces<N>,
@@ -94,7 +100,7 @@ impl Mixer {
     #[inline]
     pub fn action(&self, inputs: &Inputs) -> Action {
         let Allocation { forces, saturated, .. } = self.allocate(inputs);
-        Action { speeds: self.speeds(&forces), forces, health: Health { saturated, ..Health::default() } }
+        Action::new(self.speeds(&forces), forces, saturated)
     }
 
     /// U1..U4 of the [`PLUS`] frame's rotor forces, (6).

@@ -5,6 +5,8 @@ use afbc_types::parameters;
 parameters! {
     /// What every controller has to know besides its vehicle and its gains.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+    #[cfg_attr(feature = "defmt", derive(defmt::Format))]
     pub struct Settings {
         /// Time between steps.
         #[parameter(DT, "s", 1e-4..=0.02)]

@@ -6,6 +6,9 @@ use nalgebra::Matrix3;
 
 /// What the last step wanted, and why; all zero before the first.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Trace {
     /// U1..U4 as the law wants them, before rotor limits.
     pub inputs: Inputs,
@@ -21,6 +24,8 @@ pub struct Trace {
 
 /// Tracking errors of one subsystem, in m or rad, and seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Errors {
     /// e_1 (9)
     pub e1: f32,
@@ -32,6 +37,8 @@ pub struct Errors {
 
 /// What one subsystem has learnt. Starts at zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
     /// Theta_hat, one consequent parameter per rule, a row for each Gaussian of the first input, a column for each of the
     /// second; in the subsystem's input.

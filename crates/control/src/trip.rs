@@ -5,6 +5,9 @@ use core::fmt;
 
 /// Why the law is no longer trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Trip {
     /// |Theta_hat| passed its bound.
     Theta(Axis),

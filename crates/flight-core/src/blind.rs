@@ -62,6 +62,7 @@ impl Reckoning {
     /// A state between two measurements: roll and pitch are as reckoned since the last one, for the rotors have been at
     /// work since. What that is worth: with 100 states a second, each 10 ms late, AFBC is lost on the measured rates.
     #[inline]
+    #[must_use]
     pub fn between(&self, state: &State) -> State {
         let (attitude, rates) = (&state.attitude_rad, &state.rates_rad_s);
         State {

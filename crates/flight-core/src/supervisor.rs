@@ -42,6 +42,7 @@ pub const REST_US: u64 = 1_000_000;
 ///
 /// The numbers go over the wire.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Mode {
     /// Motors off.
     #[default]
@@ -70,6 +71,7 @@ pub enum Request {
 
 /// Why a request is refused; for arming, the first reason that applies, in this order. The numbers go over the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Refusal {
     /// It is armed.
     AlreadyArmed = 1,
@@ -128,6 +130,7 @@ impl Refusal {
 
 /// Why a flight ended. The numbers go over the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum End {
     /// [`Request::Disarm`] on the ground.
     Disarmed = 1,
@@ -248,6 +251,7 @@ impl Mode {
     }
 
     /// The mode that follows from what is observed, by the diagram above.
+    #[must_use]
     pub fn next(self, observed: &Observed) -> Mode {
         let age_us = observed.state_age_us;
         match self {

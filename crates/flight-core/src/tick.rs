@@ -84,7 +84,9 @@ impl<M> Memory<M> {
     pub fn trace<C: FlightController<Memory = M>>(&self) -> Trace {
         match &self.flight {
             Some(Flight { lawless: Some(inputs), .. }) if self.mode.armed() => {
-                Trace { inputs: *inputs, ..Trace::default() }
+                let mut trace = Trace::default();
+                trace.inputs = *inputs;
+                trace
             }
             Some(Flight { control, .. }) if self.mode.armed() => C::trace(control),
             _ => Trace::default(),
@@ -120,6 +122,7 @@ pub struct Answer {
 
 /// What a tick decides.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Outcome {
     /// What the motors get: zero if disarmed.
     pub motors: RotorSpeeds,
@@ -152,6 +155,7 @@ impl<C: FlightController> Vehicle<C> {
 
     /// One tick, to be called every millisecond; `now_us` is the time since power-up and never goes back. Cannot fail.
     #[inline]
+    #[must_use = "the motors turn by it"]
     pub fn tick(&self, memory: &mut Memory<C::Memory>, now_us: u64, inbox: &Inbox) -> Outcome {
         let dt_s = self.controller.dt_s();
         // Take the newest inputs.

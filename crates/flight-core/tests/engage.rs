@@ -3,7 +3,7 @@
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_flight_core::{ArmingLimits, Asked, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle};
-use afbc_types::{Parameters, RotorForces, Setpoint, State};
+use afbc_types::{Parameters, RotorForces, RotorSpeeds, Setpoint, State};
 
 /// Counts how often it is engaged, and carries the vehicle.
 struct Counter(Mixer);
@@ -24,7 +24,7 @@ impl FlightController for Counter {
     }
 
     fn decide(&self, _: &mut u32, _: &State, _: &Setpoint, _: bool) -> Action {
-        Action { forces: RotorForces([1.2; 4].into()), ..Action::default() }
+        Action::new(RotorSpeeds::default(), RotorForces([1.2; 4].into()), false)
     }
 
     fn engage(&self, memory: &mut u32) -> bool {

@@ -34,7 +34,7 @@ impl FlightController for Lift {
 
     fn decide(&self, (): &mut (), _: &State, setpoint: &Setpoint, _: bool) -> Action {
         let force = setpoint.position_m.z / 4.0;
-        Action { forces: RotorForces([force; 4].into()), speeds: RotorSpeeds([300.0; 4].into()), ..Action::default() }
+        Action::new(RotorSpeeds([300.0; 4].into()), RotorForces([force; 4].into()), false)
     }
 }
 

@@ -116,7 +116,7 @@ fn flying_is_the_laws_step() {
     let mut bench = Bench::flying(State::default(), near());
     let controller = controller(Profile::Flight.settings());
     let mut memory = afbc_control::Screened::default();
-    controller.step(&mut memory, Some(&State::default()), &near());
+    let _ = controller.step(&mut memory, Some(&State::default()), &near());
     for tick in 0..500 {
         let t = tick as f32 * 1e-3;
         let mut state = State { position_m: Vector3::new(t, -t, 0.1 * t), ..State::default() };

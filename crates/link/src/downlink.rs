@@ -19,6 +19,7 @@ pub type Text = CharArray<50>;
 
 /// A message from the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Downlink {
     /// HEARTBEAT (0) of a quadrotor.
     Heartbeat {
@@ -79,6 +80,7 @@ pub enum Downlink {
 
 /// An answer to a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Answer {
     /// Done.
     Accepted,

@@ -79,6 +79,7 @@ impl Sender {
     }
 
     /// Writes `message` as a frame to the beginning of `buffer` and returns it.
+    #[must_use = "the bytes are yet to be sent"]
     pub fn send<'a>(&mut self, message: &impl Message, buffer: &'a mut [u8; FRAME_MAX]) -> &'a [u8] {
         let (head, rest) = buffer.split_at_mut(HEADER);
         let Some((payload, _)) = rest.split_first_chunk_mut::<PAYLOAD_MAX>() else { return &[] };

@@ -27,6 +27,7 @@ impl Format {
 
 /// Why a frame is dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Fault {
     /// The checksum is wrong: the frame was corrupted, or truncated and completed by what came after it.
     BadChecksum,

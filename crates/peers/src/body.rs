@@ -3,7 +3,7 @@
 use crate::attitude::roll_pitch;
 use afbc_control::command_filter::Filtered;
 use afbc_control::mixer::{Allocation, Mixer};
-use afbc_control::{Action, Errors, Health, Settings, Trace};
+use afbc_control::{Action, Errors, Settings, Trace};
 use afbc_types::{Declared, Inputs, OutOfRange, Parameters, PerAxis, RotorSpeeds};
 use nalgebra::{Matrix3, Vector3};
 
@@ -68,28 +68,26 @@ impl Body {
     pub(crate) fn act(&self, demand: &Demand) -> (Action, Trace, Vector3<f32>) {
         let wanted = demand.angular_acceleration_rad_s2.component_div(&self.effectiveness);
         let inputs = Inputs { roll_n: wanted.x, pitch_n: wanted.y, yaw_n: wanted.z, thrust_n: demand.thrust_n };
-        let Allocation { forces, unallocated, saturated } = self.mixer.allocate(&inputs);
+        let Allocation { forces, unallocated, saturated, .. } = self.mixer.allocate(&inputs);
 
         let desired_rad = roll_pitch(&demand.desired);
         let [roll, pitch] = desired_rad;
         let [p, q] = [demand.desired_rates_rad_s.x, demand.desired_rates_rad_s.y];
         let [position, velocity, attitude, rates] = demand.errors;
         let errors = |e1, e1_dot| Errors { e1, e1_dot, e2: 0.0 };
-        let health = Health { saturated, ..Health::default() };
-        let action = Action { speeds: self.mixer.speeds(&forces), forces, health };
-        let trace = Trace {
-            inputs,
-            virtual_m_s2: [demand.acceleration_m_s2.x, demand.acceleration_m_s2.y],
-            desired_rad,
-            filtered: [Filtered { angle: roll, rate: p }, Filtered { angle: pitch, rate: q }],
-            errors: PerAxis {
-                roll: errors(attitude.x, rates.x),
-                pitch: errors(attitude.y, rates.y),
-                yaw: errors(attitude.z, rates.z),
-                z: errors(position.z, velocity.z),
-                x: errors(position.x, velocity.x),
-                y: errors(position.y, velocity.y),
-            },
+        let action = Action::new(self.mixer.speeds(&forces), forces, saturated);
+        let mut trace = Trace::default();
+        trace.inputs = inputs;
+        trace.virtual_m_s2 = [demand.acceleration_m_s2.x, demand.acceleration_m_s2.y];
+        trace.desired_rad = desired_rad;
+        trace.filtered = [Filtered { angle: roll, rate: p }, Filtered { angle: pitch, rate: q }];
+        trace.errors = PerAxis {
+            roll: errors(attitude.x, rates.x),
+            pitch: errors(attitude.y, rates.y),
+            yaw: errors(attitude.z, rates.z),
+            z: errors(position.z, velocity.z),
+            x: errors(position.x, velocity.x),
+            y: errors(position.y, velocity.y),
         };
         (action, trace, Vector3::new(unallocated.roll_n, unallocated.pitch_n, unallocated.yaw_n))
     }

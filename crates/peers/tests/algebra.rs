@@ -287,13 +287,13 @@ fn an_integrator_does_not_wind_up_against_a_limit() {
     let far = Setpoint { position_m: Vector3::new(0.0, 0.0, 500.0), ..Setpoint::default() };
     let mut memory = Screened::<pid::Memory>::default();
     for _ in 0..20_000 {
-        pid().step(&mut memory, Some(&state), &far);
+        let _ = pid().step(&mut memory, Some(&state), &far);
     }
     // 20 s of 4 1/s2 times 3 m/s would be 240 m/s2, clipped to 9.81 m/s2.
     assert!(memory.control.velocity_integral.x < 4.0, "{:?}", memory.control.velocity_integral);
     let mut memory = Screened::<geometric::Memory>::default();
     for _ in 0..20_000 {
-        goodarzi().step(&mut memory, Some(&state), &far);
+        let _ = goodarzi().step(&mut memory, Some(&state), &far);
     }
     assert!(
         memory.control.position_integral.x == 0.0 && memory.control.position_integral.z == 0.0,
@@ -305,12 +305,12 @@ fn an_integrator_does_not_wind_up_against_a_limit() {
     let turned = Setpoint { yaw_rad: 2.5, ..Setpoint::default() };
     let mut memory = Screened::<pid::Memory>::default();
     for _ in 0..5000 {
-        pid().step(&mut memory, Some(&State::default()), &turned);
+        let _ = pid().step(&mut memory, Some(&State::default()), &turned);
     }
     assert!(memory.control.rate_integral.z < 0.1, "{:?}", memory.control.rate_integral);
     let mut memory = Screened::<geometric::Memory>::default();
     for _ in 0..5000 {
-        goodarzi().step(&mut memory, Some(&State::default()), &turned);
+        let _ = goodarzi().step(&mut memory, Some(&State::default()), &turned);
     }
     assert!(memory.control.attitude_integral.z < 0.1, "{:?}", memory.control.attitude_integral);
 }
@@ -321,8 +321,8 @@ fn no_integral_moves_on_a_stale_state() {
     let lost = State { position_m: Vector3::new(f32::NAN, 0.0, 0.0), ..State::default() };
     let (mut a, mut b) = (Screened::<pid::Memory>::default(), Screened::<geometric::Memory>::default());
     for _ in 0..100 {
-        pid().step(&mut a, Some(&state), &Setpoint::default());
-        goodarzi().step(&mut b, Some(&state), &Setpoint::default());
+        let _ = pid().step(&mut a, Some(&state), &Setpoint::default());
+        let _ = goodarzi().step(&mut b, Some(&state), &Setpoint::default());
     }
     let (before_a, before_b) = (a, b);
     for _ in 0..100 {

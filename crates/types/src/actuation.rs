@@ -4,6 +4,8 @@ use nalgebra::SVector;
 
 /// The inputs U1..U4 of (6), all in newtons: sums and differences of rotor forces, not moments.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Inputs {
     /// U1 = F3 - F1; the moment about body x is l U1.
     pub roll_n: f32,
@@ -17,6 +19,8 @@ pub struct Inputs {
 
 /// Thrust F1..F4 of each rotor, along body z \[N\].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RotorForces<const N: usize = 4>(pub SVector<f32, N>);
 
 impl<const N: usize> Default for RotorForces<N> {
@@ -28,6 +32,8 @@ impl<const N: usize> Default for RotorForces<N> {
 
 /// Speed omega_1..omega_4 of each rotor, never negative \[rad/s\].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RotorSpeeds<const N: usize = 4>(pub SVector<f32, N>);
 
 impl<const N: usize> Default for RotorSpeeds<N> {

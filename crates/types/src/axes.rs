@@ -5,6 +5,8 @@ use core::ops::{Index, IndexMut};
 
 /// One of the six subsystems, in the paper's order i = 1..6.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Axis {
     /// i = 1: phi, driven by U1.
     Roll,
@@ -37,6 +39,7 @@ impl Axis {
     }
 
     /// The next one in the paper's order, round and round.
+    #[must_use]
     pub const fn next(self) -> Self {
         match self {
             Axis::Roll => Axis::Pitch,
@@ -51,6 +54,8 @@ impl Axis {
 
 /// One `T` for each subsystem, in the paper's order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "each field is the axis it is named after")]
 pub struct PerAxis<T> {
     pub roll: T,
@@ -84,6 +89,7 @@ impl<T> PerAxis<T> {
     }
 
     /// What `change` makes of each axis' value.
+    #[must_use]
     pub fn map<U>(&self, mut change: impl FnMut(&T) -> U) -> PerAxis<U> {
         PerAxis::from_fn(|axis| change(&self[axis]))
     }

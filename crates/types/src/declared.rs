@@ -24,6 +24,7 @@ pub struct Declaration {
 
 impl Declaration {
     /// The same parameter in a group of this name; an empty name leaves it where it is.
+    #[must_use]
     pub const fn in_group(self, group: &'static str) -> Self {
         if group.is_empty() { self } else { Declaration { group, ..self } }
     }

@@ -18,6 +18,11 @@
 //!
 //! "(n)" with a number is always an equation of Yacef, Bouhali, Hamerlain, *Adaptive Fuzzy Backstepping Control for
 //! Trajectory Tracking of Unmanned Aerial Quadrotor*, as corrected in `docs/paper.md`.
+//!
+//! # Features
+//!
+//! Both off by default, both for no_std: `serde` reads and writes states, setpoints, inputs, rotors' forces and speeds, and
+//! physical parameters; `defmt` logs them on a board.
 #![no_std]
 
 mod actuation;

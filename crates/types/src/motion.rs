@@ -3,7 +3,11 @@
 use nalgebra::Vector3;
 
 /// Measured motion of the vehicle: the paper's assumption A1. Frames as in the crate's [conventions](crate).
+///
+/// Fields may be added: a literal ends in `..State::default()`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct State {
     /// xi = \[x, y, z\], earth frame \[m\].
     pub position_m: Vector3<f32>,
@@ -44,7 +48,11 @@ impl State {
 }
 
 /// Desired motion: \[x_d, y_d, z_d, psi_d\] with two derivatives (assumption A5).
+///
+/// Fields may be added: a literal ends in `..Setpoint::default()`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Setpoint {
     /// Earth frame \[m\].
     pub position_m: Vector3<f32>,

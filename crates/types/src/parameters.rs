@@ -7,6 +7,9 @@ parameters! {
     /// Physical parameters of a quadrotor, Section II and IV. The law holds nominal ones in `f32`, the plant its own, true
     /// ones in `f64`. Accepted are palm-sized vehicles to those that carry a person.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+    #[cfg_attr(feature = "serde", serde(bound = "T: crate::Number + serde::Serialize + serde::de::DeserializeOwned"))]
+    #[cfg_attr(feature = "defmt", derive(defmt::Format))]
     pub struct Parameters<T = f32, f64> {
         /// m: mass of the vehicle.
         #[parameter(MASS, "kg", 0.01..=500.0)]

@@ -5,6 +5,7 @@ use core::ops::RangeInclusive;
 
 /// The closed interval that a named quantity must lie in. The name ends in the unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Range {
     /// Name with unit, as in scenario files: `mass_kg`.
     pub name: &'static str,
@@ -42,6 +43,7 @@ impl Range {
 
 /// A quantity outside its [`Range`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OutOfRange {
     /// What was given.
     pub value: f64,

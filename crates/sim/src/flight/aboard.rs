@@ -41,16 +41,18 @@ impl<C: FlightController> Aboard<C> {
         self.inbox.put_setpoint(Stamped { value: setpoint, at_us });
         let inbox = self.inbox.take();
         let outcome = self.vehicle.tick(&mut self.memory, at_us, &inbox);
-        Action { speeds: outcome.motors, forces: outcome.forces, health: outcome.health.control }
+        let mut action = Action::new(outcome.motors, outcome.forces, false);
+        action.health = outcome.health.control;
+        action
     }
 
     /// Powers up and arms a vehicle that is held in this `state`.
     fn arm(&mut self, state: State, setpoint: Setpoint) {
         for _ in 0..TICKS_HELD {
-            self.tick(Some(state), setpoint);
+            let _ = self.tick(Some(state), setpoint);
         }
         self.inbox.request(Asked { request: Request::Arm, ticket: 0 });
-        self.tick(Some(state), setpoint);
+        let _ = self.tick(Some(state), setpoint);
     }
 }
 

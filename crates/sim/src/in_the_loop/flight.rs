@@ -111,7 +111,7 @@ impl<A: Autopilot> Pilot for Line<'_, A> {
         let view = if self.has_armed { self.turn(world)? } else { self.arm(world)? };
         let speeds = self.station.heard().speeds;
         let forces = RotorForces(speeds.0.map(|speed| self.thrust_factor_n_s2 * speed * speed));
-        Ok(view.sample(Action { speeds, forces, ..Action::default() }, Trace::default(), PerAxis::default()))
+        Ok(view.sample(Action::new(speeds, forces, false), Trace::default(), PerAxis::default()))
     }
 
     fn gave_up(&self) -> Option<&'static str> {

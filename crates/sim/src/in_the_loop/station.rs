@@ -118,7 +118,8 @@ impl Station {
                 heard.health = Some(health);
             }
             Downlink::Text { text, .. } => heard.text = Some(text),
-            Downlink::Heartbeat { .. } | Downlink::Attitude { .. } | Downlink::Position { .. } => {}
+            // Heartbeats, attitudes, positions.
+            _ => {}
         });
     }
 

@@ -1,0 +1,84 @@
+//! Feature `serde`: what is read is what was written, and how it is written is what others may rely on.
+#![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
+
+use afbc_control::{Action, Errors, Estimate, Health, Mixer, Settings, Trace, Trip};
+use afbc_types::{Axis, Inputs, Parameters, PerAxis, Setpoint, State};
+use core::fmt::Debug;
+use nalgebra::{Matrix3, Vector3};
+use proptest::prelude::*;
+use serde_json::json;
+
+/// Checks that `value` comes back.
+fn round_trip<T: serde::Serialize + serde::de::DeserializeOwned + Debug + PartialEq>(value: &T) {
+    let text = serde_json::to_string(value).unwrap();
+    assert_eq!(&serde_json::from_str::<T>(&text).unwrap(), value, "{text}");
+}
+
+/// Any finite number.
+fn number() -> impl Strategy<Value = f32> {
+    prop::num::f32::NORMAL | prop::num::f32::SUBNORMAL | prop::num::f32::ZERO
+}
+
+fn vector() -> impl Strategy<Value = Vector3<f32>> {
+    prop::array::uniform3(number()).prop_map(Vector3::from)
+}
+
+proptest! {
+    #[test]
+    fn what_goes_in_and_comes_out_is_read_as_written(
+        position_m in vector(), velocity_m_s in vector(), attitude_rad in vector(), rates_rad_s in vector(),
+        yaw_rad in number(), saturated: bool, axis in 0_usize..6, inputs in prop::array::uniform4(-9.0_f32..9.0),
+    ) {
+        round_trip(&State { position_m, velocity_m_s, attitude_rad, rates_rad_s });
+        let acceleration_m_s2 = rates_rad_s;
+        round_trip(&Setpoint { position_m, velocity_m_s, acceleration_m_s2, yaw_rad, ..Setpoint::default() });
+
+        let axis = *Axis::ALL.get(axis).unwrap();
+        let mixer = Mixer::new(&Parameters::PAPER.to_f32(), 3.0).unwrap();
+        let [roll_n, pitch_n, yaw_n, thrust_n] = inputs;
+        let inputs = Inputs { roll_n, pitch_n, yaw_n, thrust_n };
+        round_trip(&mixer.allocate(&inputs));
+        for trip in [Trip::Theta(axis), Trip::Delta(axis), Trip::Lyapunov(axis), Trip::Saturation, Trip::LimitCycle(axis)] {
+            let mut action = mixer.action(&inputs);
+            (action.health.saturated, action.health.trip) = (saturated, Some(trip));
+            round_trip::<Action>(&action);
+        }
+
+        let errors = PerAxis::from_fn(|axis| Errors { e1: yaw_rad, e2: axis as u8 as f32, ..Errors::default() });
+        let mut trace = Trace::default();
+        (trace.inputs, trace.errors, trace.virtual_m_s2) = (inputs, errors, [yaw_rad, roll_n]);
+        round_trip(&trace);
+        let mut estimate = Estimate::default();
+        (estimate.theta, estimate.delta) = (Matrix3::from_columns(&[position_m, velocity_m_s, attitude_rad]), yaw_rad);
+        round_trip(&estimate);
+    }
+}
+
+#[test]
+fn parameters_are_read_as_written() {
+    round_trip(&Parameters::PAPER);
+    round_trip(&Parameters::PAPER.to_f32());
+    round_trip(&Settings::DEFAULT);
+}
+
+/// Fields that a file does not have, because it is older or its author did not care, are at their defaults.
+#[test]
+fn a_state_or_setpoint_may_leave_out_what_is_zero() {
+    let height = Vector3::new(0.0, 0.0, 2.0);
+    let (state, setpoint) = (r#"{"position_m": [0, 0, 2]}"#, r#"{"position_m": [0, 0, 2], "yaw_rad": 0.5}"#);
+    assert_eq!(serde_json::from_str::<State>(state).unwrap(), State { position_m: height, ..State::default() });
+    let expected = Setpoint { position_m: height, yaw_rad: 0.5, ..Setpoint::default() };
+    assert_eq!(serde_json::from_str::<Setpoint>(setpoint).unwrap(), expected);
+}
+
+#[test]
+fn names_are_those_of_scenario_files() {
+    let mut health = Health::default();
+    health.trip = Some(Trip::LimitCycle(Axis::Pitch));
+    assert_eq!(serde_json::to_value(health).unwrap()["trip"], json!({ "limit_cycle": "pitch" }));
+    for axis in Axis::ALL {
+        assert_eq!(serde_json::to_value(axis).unwrap(), json!(axis.name()));
+    }
+    let speeds = Action::default().speeds;
+    assert_eq!(serde_json::to_value(speeds).unwrap(), json!([0.0, 0.0, 0.0, 0.0]));
+}
