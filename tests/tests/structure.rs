@@ -170,6 +170,33 @@ fn a_circle_is_found() {
     assert_eq!(find(&[("p", "mod a; use a::f; struct P;"), ("p::a", "use super::P;")]).len(), 2);
 }
 
+/// What a registry and its readers ask of a package; `scripts/check-packages` packs them and compiles each.
+#[test]
+fn crates_to_be_published_say_what_they_are() {
+    let mut published = Vec::new();
+    for folder in crates() {
+        let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+        let has = |start: &str| manifest.lines().any(|line| line.starts_with(start));
+        if has("publish") {
+            // As the workspace has it: false.
+            assert!(has("publish.workspace = true"), "{}", folder.display());
+            continue;
+        }
+        let name = folder.file_name().unwrap().to_str().unwrap().to_owned();
+        let told = ["description = ", "keywords = ", "categories = ", "readme = ", "license.", "rust-version."];
+        for key in told.into_iter().chain(["[package.metadata.docs.rs]", "all-features = true"]) {
+            assert!(has(key), "{name}: {key}");
+        }
+        for file in ["README.md", "LICENSE-MIT", "LICENSE-APACHE"] {
+            assert!(fs::read_to_string(folder.join(file)).is_ok_and(|text| text.lines().count() > 5), "{name}: {file}");
+        }
+        published.push(name);
+    }
+    published.sort();
+    assert_eq!(published, ["afbc", "control", "flight-core", "fpu", "link", "peers", "plant", "types"]);
+    assert!(fs::read_to_string(root().join("Cargo.toml")).unwrap().contains("\npublish = false\n"));
+}
+
 #[test]
 fn no_crate_is_more_than_a_fifth_of_the_code() {
     let lines = |path: &PathBuf| fs::read_to_string(path).unwrap().lines().count();
