@@ -36,19 +36,20 @@ pub struct Model {
 impl Model {
     /// The constants of (6) for a vehicle whose parameters are valid.
     pub fn new(vehicle: &Parameters) -> Self {
-        let Parameters { mass_kg, arm_m, rotor_inertia_kg_m2, thrust_factor_n_s2, drag_factor_n_m_s2, .. } = *vehicle;
+        let Parameters { mass_kg, rotor_inertia_kg_m2, gravity_m_s2, .. } = *vehicle;
         let (ix, iy, iz) = (vehicle.inertia_kg_m2.x, vehicle.inertia_kg_m2.y, vehicle.inertia_kg_m2.z);
+        let effectiveness = vehicle.effectiveness();
         Model {
             a1: (iy - iz) / ix,
             a2: rotor_inertia_kg_m2 / ix,
             a3: (iz - ix) / iy,
             a4: -rotor_inertia_kg_m2 / iy,
             a5: (ix - iy) / iz,
-            b1: arm_m / ix,
-            b2: arm_m / iy,
-            b3: drag_factor_n_m_s2 / thrust_factor_n_s2 / iz,
+            b1: effectiveness.x,
+            b2: effectiveness.y,
+            b3: effectiveness.z,
             mass: mass_kg,
-            gravity: vehicle.gravity_m_s2,
+            gravity: gravity_m_s2,
         }
     }
 

@@ -61,7 +61,7 @@ impl Bounds {
             // Projection holds delta_hat at its bound as a matter of course; beyond it there is none.
             delta: PerAxis::from_fn(|axis| 1.001 * gains[axis].safeguards.delta_max),
             lyapunov: PerAxis::from_fn(|axis| Self::DEFAULT.lyapunov[axis] * sluggish(axis)),
-            swing_n: 0.5 * vehicle.mass_kg * vehicle.gravity_m_s2,
+            swing_n: 0.5 * vehicle.weight_n(),
             ..Self::DEFAULT
         }
     }

@@ -76,11 +76,10 @@ impl Reckoning {
 impl Blind {
     /// For a nominal vehicle whose parameters are valid, stepped every `dt_s` seconds.
     pub fn new(vehicle: &Parameters, dt_s: f32) -> Self {
-        let inertia = vehicle.inertia_kg_m2.xy();
         Blind {
-            authority: inertia.map(|i| vehicle.arm_m / i),
-            inverse_authority: inertia / vehicle.arm_m,
-            weight_n: vehicle.mass_kg * vehicle.gravity_m_s2,
+            authority: vehicle.effectiveness().xy(),
+            inverse_authority: vehicle.inertia_kg_m2.xy() / vehicle.arm_m,
+            weight_n: vehicle.weight_n(),
             dt_s,
         }
     }

@@ -148,7 +148,7 @@ impl<C: FlightController> Vehicle<C> {
         parameters.validate()?;
         limits.validate()?;
         DT.check(controller.dt_s())?;
-        let weight_n = parameters.mass_kg * parameters.gravity_m_s2;
+        let weight_n = parameters.weight_n();
         controller.mixer().check_hover(weight_n)?;
         Ok(Vehicle { blind: Blind::new(&parameters, controller.dt_s()), controller, limits, weight_n })
     }

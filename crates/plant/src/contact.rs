@@ -56,7 +56,7 @@ impl Contact {
         // How fast a unit of force moves its own point at worst, all four feet at the longest lever.
         let lever_m = self.ground(vehicle).reach_m;
         let compliance = 1.0 / vehicle.mass_kg + lever_m * lever_m / vehicle.inertia_kg_m2.min();
-        let weight_n = vehicle.mass_kg * vehicle.gravity_m_s2;
+        let weight_n = vehicle.weight_n();
         let softest = weight_n * compliance * step_s * step_s / STIFFNESS_PER_STEP_MAX;
         Range { min: softest, ..Self::SINK.range }.check(self.sink_m)?;
         let per_ratio =
@@ -66,7 +66,7 @@ impl Contact {
 
     /// The ground as this vehicle meets it.
     pub(crate) fn ground(&self, vehicle: &Parameters<f64>) -> Ground {
-        let stiffness_n_m = vehicle.mass_kg * vehicle.gravity_m_s2 / (4.0 * self.sink_m);
+        let stiffness_n_m = vehicle.weight_n() / (4.0 * self.sink_m);
         let (feet, arm) = (self.foot_radius_m, vehicle.arm_m);
         let around = |radius: f64, z: f64| {
             [(radius, 0.0), (0.0, radius), (-radius, 0.0), (0.0, -radius)].map(|(x, y)| Vector3::new(x, y, z))

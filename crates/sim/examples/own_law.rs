@@ -27,7 +27,8 @@ impl FlightController for OwnLaw {
     }
 
     fn decide(&self, (): &mut (), state: &State, setpoint: &Setpoint, _fresh: bool) -> Action {
-        let Parameters { mass_kg, gravity_m_s2, arm_m, inertia_kg_m2, .. } = self.vehicle;
+        let Parameters { mass_kg, gravity_m_s2, .. } = self.vehicle;
+        let effectiveness = self.vehicle.effectiveness();
         let acceleration = (setpoint.position_m - state.position_m) * 2.0
             + (setpoint.velocity_m_s - state.velocity_m_s) * 2.5
             + setpoint.acceleration_m_s2;
@@ -37,8 +38,8 @@ impl FlightController for OwnLaw {
         let (eta, omega) = (state.attitude_rad, state.rates_rad_s);
         let moment = |error: f32, rate: f32| 100.0 * error - 18.0 * rate;
         self.mixer.action(&Inputs {
-            roll_n: moment(tilt_rad[0] - eta.x, omega.x) * inertia_kg_m2.x / arm_m,
-            pitch_n: moment(tilt_rad[1] - eta.y, omega.y) * inertia_kg_m2.y / arm_m,
+            roll_n: moment(tilt_rad[0] - eta.x, omega.x) / effectiveness.x,
+            pitch_n: moment(tilt_rad[1] - eta.y, omega.y) / effectiveness.y,
             yaw_n: 0.5 * (setpoint.yaw_rad - eta.z) - 0.5 * omega.z,
             thrust_n: mass_kg * (gravity_m_s2 + acceleration.z),
         })

@@ -3,6 +3,7 @@
 
 use crate::{Axis, OutOfRange, PerAxis, Range};
 use core::fmt::{self, Write};
+use core::ops::{Div, Mul};
 use nalgebra::Vector3;
 
 /// What is declared of one parameter.
@@ -142,7 +143,7 @@ pub trait Field {
 }
 
 /// `f32`, of what flies, or `f64`, of the plant.
-pub trait Number: nalgebra::Scalar + Copy + Into<f64> {
+pub trait Number: nalgebra::Scalar + Copy + Into<f64> + Mul<Output = Self> + Div<Output = Self> {
     /// One number, or the three of a vector.
     fn values(numbers: &mut [Self]) -> Value<'_>;
 }

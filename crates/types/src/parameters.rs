@@ -1,6 +1,6 @@
 //! The vehicle's physical parameters.
 
-use crate::parameters;
+use crate::{Number, parameters};
 use nalgebra::Vector3;
 
 parameters! {
@@ -32,6 +32,22 @@ parameters! {
         /// g: acceleration of free fall.
         #[parameter(GRAVITY, "m/s2", 0.1..=30.0)]
         pub gravity_m_s2: T = 9.81,
+    }
+}
+
+impl<T: Number> Parameters<T> {
+    /// m g: weight \[N\].
+    #[must_use]
+    pub fn weight_n(&self) -> T {
+        self.mass_kg * self.gravity_m_s2
+    }
+
+    /// l/Ix, l/Iy, (d/b)/Iz: angular acceleration about each body axis for each newton of U1, U2, U3 \[rad/s2 per N\].
+    #[must_use]
+    pub fn effectiveness(&self) -> Vector3<T> {
+        let (l, i) = (self.arm_m, &self.inertia_kg_m2);
+        let c = self.drag_factor_n_m_s2 / self.thrust_factor_n_s2;
+        Vector3::new(l / i.x, l / i.y, c / i.z)
     }
 }
 
