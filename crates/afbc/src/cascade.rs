@@ -1,9 +1,9 @@
 //! Six subsystems in one cascade: position gives thrust and desired attitude, attitude gives U1..U3, all give rotor
 //! speeds. Section III-D, Fig. 2.
 
-use crate::ground::Ground;
 use crate::law::{Context, Law, Tracking};
 use crate::limits::Limits;
+use crate::standstill::Standstill;
 use afbc_control::command_filter::{BANDWIDTH, CommandFilter, Filtered};
 use afbc_control::mixer::{Allocation, Mixer};
 use afbc_control::{Action, Errors, Estimate, FlightController, Trace, math};
@@ -97,15 +97,15 @@ pub struct Cascade<E> {
     desired: Option<Desired>,
     /// See [`Context::unallocated`].
     unallocated: PerAxis<f32>,
-    ground: Ground,
+    standstill: Standstill,
     rotor_residual_rad_s: f32,
 }
 
 impl<E> Cascade<E> {
     /// The same flight with other estimates, of another law.
     pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>) -> Cascade<F> {
-        let Cascade { errors, inputs, desired, unallocated, ground, rotor_residual_rad_s, .. } = *self;
-        Cascade { estimates, errors, inputs, desired, unallocated, ground, rotor_residual_rad_s }
+        let Cascade { errors, inputs, desired, unallocated, standstill, rotor_residual_rad_s, .. } = *self;
+        Cascade { estimates, errors, inputs, desired, unallocated, standstill, rotor_residual_rad_s }
     }
 
     /// Why the last step decided as it did.
@@ -183,7 +183,7 @@ impl<L: Law> Controller<L> {
     /// True if the ground carries the vehicle, as far as that is heeded.
     #[inline]
     pub(crate) fn stands(&self, memory: &Cascade<L::Estimate>) -> bool {
-        self.settings.freeze_on_ground && memory.ground.standing()
+        self.settings.freeze_on_ground && memory.standstill.stands()
     }
 
     /// (7)-(40) in their order; `fresh` as in [`FlightController::decide`].
@@ -276,7 +276,7 @@ impl<L: Law> Controller<L> {
 
         memory.inputs = PerAxis { roll: u1, pitch: u2, yaw: u3, z: u4, x: u5, y: u6 };
         memory.desired = Some(Desired { rad: desired_rad, filtered });
-        memory.ground.advance(u4, self.weight_n, &state.velocity_m_s, self.settings.common.dt_s);
+        memory.standstill.advance(u4, self.weight_n, &state.velocity_m_s, self.settings.common.dt_s);
         memory.rotor_residual_rad_s = speeds.residual_rad_s();
         if self.settings.anti_windup {
             memory.unallocated = PerAxis {

@@ -10,7 +10,7 @@
 //! 3. [`adaptive`]: the law (20)-(22) with its adaptation (32)-(34).
 //! 4. [`law`]: what a law in the cascade is; [`cascade`]: six subsystems, the desired attitude (39)-(40) and the command
 //!    filter make one [`Controller`], which is an [`afbc_control::FlightController`].
-//! 5. [`safeguards`], [`limits`], [`ground`]: what makes the printed law fit to fly, in [`Profile::Flight`].
+//! 5. [`safeguards`], [`limits`], [`standstill`]: what makes the printed law fit to fly, in [`Profile::Flight`].
 //! 6. [`monitor`], [`integral`], [`guarded`]: who watches AFBC, and who flies when it is not to be trusted.
 //!
 //! # What to expect
@@ -40,7 +40,6 @@ pub mod adaptive;
 pub mod backstepping;
 pub mod cascade;
 pub mod fuzzy;
-pub mod ground;
 pub mod guarded;
 pub mod integral;
 pub mod law;
@@ -49,6 +48,7 @@ pub mod model;
 pub mod monitor;
 mod profile;
 pub mod safeguards;
+pub mod standstill;
 
 pub use adaptive::Adaptive;
 pub use backstepping::Backstepping;

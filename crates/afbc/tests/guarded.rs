@@ -5,9 +5,9 @@
 mod common;
 
 use afbc::adaptive::Gains;
-use afbc::ground::LIFT_SHARE;
 use afbc::guarded::HOVER_THETA;
 use afbc::monitor::Bounds;
+use afbc::standstill::LIFT_SHARE;
 use afbc::{Adaptive, Controller, Guarded, Profile, guarded};
 use afbc_control::mixer::HOVER_MARGIN;
 use afbc_control::{Estimate, FlightController, Health, Screened, Trip};

@@ -1,5 +1,5 @@
 //! Coming down with a state that came back: straight down from where it came back, until the vehicle has landed
-//! ([`crate::ground`]). Ours.
+//! ([`crate::landing`]). Ours.
 
 use afbc_types::{Setpoint, State};
 

@@ -10,7 +10,7 @@
 //! 2. [`supervisor`]: the four modes and what leads from one to another.
 //! 3. [`inbox`]: what a tick works from, and how old it is; [`tracker`], [`clock`]: whose states those are, and when they
 //!    were measured.
-//! 4. [`ground`], [`tumble`], [`witness`]: whether the vehicle stands, has tipped over, or is not what its tracker says.
+//! 4. [`landing`], [`tumble`], [`witness`]: whether the vehicle stands, has tipped over, or is not what its tracker says.
 //! 5. [`blind`]: what the vehicle does without a measurement; [`descent`]: how it comes down with one.
 //! 6. [`rate`]: whether ticks come 1000 times a second.
 //! 7. [`motor`], [`dshot`]: rotor speed to throttle to the waveform on the wire.
@@ -20,8 +20,8 @@ pub mod blind;
 pub mod clock;
 pub mod descent;
 pub mod dshot;
-pub mod ground;
 pub mod inbox;
+pub mod landing;
 pub mod motor;
 pub mod rate;
 pub mod supervisor;

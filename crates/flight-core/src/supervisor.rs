@@ -225,7 +225,7 @@ pub struct Observed {
     pub state_age_us: u64,
     /// For how long no state has been stale \[us\].
     pub steady_us: u64,
-    /// False if the vehicle is on the ground ([`crate::ground`]).
+    /// False if the vehicle is on the ground ([`crate::landing`]).
     pub airborne: bool,
     /// True if it is upside down or spinning, beyond recovery ([`crate::tumble`]).
     pub tumbled: bool,

@@ -2,8 +2,8 @@
 
 use crate::blind::{Blind, Reckoning};
 use crate::descent::Descent;
-use crate::ground::Ground;
 use crate::inbox::{Inbox, Stamped};
+use crate::landing::LandDetector;
 use crate::rate;
 use crate::supervisor::{ArmingLimits, COAST_US, End, Mode, Observed, Refusal, Request, SETPOINT_STALE_US, Standing};
 use crate::tumble::Tumble;
@@ -49,7 +49,7 @@ struct Flight<M> {
     /// What the rotors were to do in the last tick, if no law said so.
     lawless: Option<Inputs>,
     guide: Guide,
-    ground: Ground,
+    landing: LandDetector,
     tumble: Tumble,
     witness: Witness,
     /// True if the tracker contradicted itself or the rotors: no more states in this flight.
@@ -179,7 +179,7 @@ impl<C: FlightController> Vehicle<C> {
             ready: if mode.armed() { Err(Refusal::AlreadyArmed) } else { self.limits.ready(&standing) },
             state_age_us,
             steady_us: now_us.saturating_sub(*stale_us),
-            airborne: flight.as_ref().is_some_and(|flight| flight.ground.airborne()),
+            airborne: flight.as_ref().is_some_and(|flight| flight.landing.airborne()),
             tumbled: flight.as_ref().is_some_and(|flight| flight.tumble.is_lost(now_us)),
         };
         let answer = asked.map(|asked| {
@@ -275,7 +275,7 @@ impl<M> Memory<M> {
         };
         let Some(state) = inbox.state().filter(newer) else { return false };
         let armed = self.mode.armed();
-        if let Some(flight) = self.flight.as_mut().filter(|flight| armed && flight.ground.airborne()) {
+        if let Some(flight) = self.flight.as_mut().filter(|flight| armed && flight.landing.airborne()) {
             let repeated = self.state.is_some_and(|held| held.value == state.value);
             flight.distrusts |= flight.witness.contradicts(&state.value, state.at_us);
             if repeated || flight.distrusts {
@@ -300,10 +300,10 @@ impl<M> Memory<M> {
         match fresh {
             Some(state) => {
                 flight.tumble.advance(state, now_us);
-                flight.ground.advance(state, flight.applied.thrust_n, now_us, dt_s);
-                flight.distrusts |= flight.ground.contradicts(now_us);
+                flight.landing.advance(state, flight.applied.thrust_n, now_us, dt_s);
+                flight.distrusts |= flight.landing.contradicts(now_us);
             }
-            None => flight.ground.advance_blind(now_us),
+            None => flight.landing.advance_blind(now_us),
         }
     }
 }
@@ -320,7 +320,7 @@ impl<M: Default> Flight<M> {
             applied: Inputs::default(),
             lawless: None,
             guide: Guide::default(),
-            ground: Ground::new(state, vehicle.weight_n, now_us),
+            landing: LandDetector::new(state, vehicle.weight_n, now_us),
             tumble: Tumble::default(),
             witness: Witness::new(state, now_us),
             distrusts: false,

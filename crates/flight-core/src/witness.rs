@@ -4,7 +4,7 @@
 //! |---|---|
 //! | the same state again, to the last bit | a measurement never repeats itself in the air |
 //! | a pose that stands, with a twist that says it moves | displacement against the integral of velocity and rates over a quarter of a second |
-//! | a vehicle that hangs still without thrust | [`crate::ground`] |
+//! | a vehicle that hangs still without thrust | [`crate::landing`] |
 //!
 //! A repeated state is no measurement: its age goes on. After either of the others the tracker is not believed for the rest
 //! of the flight. A pose that stands within noise while the vehicle hovers cannot be told from a vehicle that does.

@@ -4,7 +4,7 @@
 use afbc::{Adaptive, Controller, Profile, Settings};
 use afbc_control::{FlightController, Trace};
 use afbc_flight_core::descent::SINK_M_S;
-use afbc_flight_core::ground::{CARRIED_US, STILL_US};
+use afbc_flight_core::landing::{CARRIED_US, STILL_US};
 use afbc_flight_core::{
     Answer, ArmingLimits, Asked, End, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle,
 };

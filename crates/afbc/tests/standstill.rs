@@ -1,7 +1,7 @@
 //! Standing on the ground: told from the thrust that is wanted and from motion, and nothing is learnt meanwhile.
 #![allow(clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
 
-use afbc::ground::{Ground, LIFT_SHARE, STILL_M_S, STILL_S};
+use afbc::standstill::{LIFT_SHARE, STILL_M_S, STILL_S, Standstill};
 use afbc::{Adaptive, Controller, Profile, Settings};
 use afbc_control::{FlightController, Screened};
 use afbc_types::{Parameters, Setpoint, State};
@@ -13,11 +13,11 @@ const WEIGHT_N: f32 = 4.77;
 
 /// Whether a vehicle that has been so for `steps` stands.
 fn stands(thrust_n: f32, velocity_m_s: Vector3<f32>, steps: usize) -> bool {
-    let mut ground = Ground::default();
+    let mut standstill = Standstill::default();
     for _ in 0..steps {
-        ground.advance(thrust_n, WEIGHT_N, &velocity_m_s, DT_S);
+        standstill.advance(thrust_n, WEIGHT_N, &velocity_m_s, DT_S);
     }
-    ground.standing()
+    standstill.stands()
 }
 
 proptest! {
@@ -36,17 +36,17 @@ proptest! {
 fn a_light_vehicle_that_hovers_does_not_stand_and_one_that_lifts_off_no_longer() {
     // 60 % of the weight that the controller was told.
     assert!(!stands(0.6 * WEIGHT_N, Vector3::zeros(), 10_000));
-    let mut ground = Ground::default();
+    let mut standstill = Standstill::default();
     for _ in 0..1000 {
-        ground.advance(0.0, WEIGHT_N, &Vector3::zeros(), DT_S);
+        standstill.advance(0.0, WEIGHT_N, &Vector3::zeros(), DT_S);
     }
-    assert!(ground.standing());
-    let mut moving = ground;
+    assert!(standstill.stands());
+    let mut moving = standstill;
     moving.advance(0.0, WEIGHT_N, &Vector3::new(0.0, -0.49, 0.0), DT_S);
-    assert!(moving.standing(), "it rocks");
+    assert!(moving.stands(), "it rocks");
     moving.advance(0.0, WEIGHT_N, &Vector3::new(0.0, 0.0, -0.51), DT_S);
-    ground.advance(0.5 * WEIGHT_N, WEIGHT_N, &Vector3::zeros(), DT_S);
-    assert!(!ground.standing() && !moving.standing());
+    standstill.advance(0.5 * WEIGHT_N, WEIGHT_N, &Vector3::zeros(), DT_S);
+    assert!(!standstill.stands() && !moving.stands());
 }
 
 /// A vehicle on the ground whose setpoint is below it, until it is raised.

@@ -5,6 +5,9 @@
 //! thrust and motion agree that something else carries it: it was seen to sink and to stop, and it stays still for a second
 //! although its rotors do not carry it. One that is said to be still all along while its thrust falls away has not
 //! landed: its tracker has frozen.
+//!
+//! A law may look for a standstill of its own, to stop learning (`afbc::standstill`): from the thrust that it wants, and
+//! sooner, since no motor is disarmed for it.
 
 use afbc_control::math::abs_max;
 use afbc_types::State;
@@ -31,9 +34,9 @@ pub const FROZEN_US: u64 = 500_000;
 /// How long a vehicle has to hover for an earlier descent to be forgotten \[us\].
 pub const HOVER_US: u64 = 2_000_000;
 
-/// What is known of the ground.
+/// Tells whether the vehicle is in the air, and when it has landed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ground {
+pub struct LandDetector {
     airborne: bool,
     /// True if it has moved away from where it stood.
     left: bool,
@@ -49,10 +52,10 @@ pub struct Ground {
     uncarried_us: u64,
 }
 
-impl Ground {
+impl LandDetector {
     /// A vehicle of this weight that is armed in this state.
     pub fn new(state: &State, weight_n: f32, now_us: u64) -> Self {
-        Ground {
+        LandDetector {
             airborne: false,
             left: false,
             sank: false,
@@ -88,7 +91,7 @@ impl Ground {
         }
         if self.stands_for_us(now_us) > STILL_US && (self.sank || !self.left) {
             let usual_n = self.usual_n;
-            *self = Ground { usual_n, ..Ground::new(state, usual_n, now_us) };
+            *self = LandDetector { usual_n, ..LandDetector::new(state, usual_n, now_us) };
         }
     }
 
