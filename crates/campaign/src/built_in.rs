@@ -12,17 +12,17 @@ pub static BUILT_IN: [BuiltIn<Campaign>; 3] = [
     BuiltIn::new("faults", include_str!("../campaigns/faults.toml"), read),
 ];
 
-/// The built-in campaign called `name`.
+/// Returns the built-in campaign called `name`.
 pub fn built_in(name: &str) -> Option<&'static BuiltIn<Campaign>> {
     BuiltIn::named(&BUILT_IN, name)
 }
 
-/// The built-in campaign that somebody who wrote `name` may have meant.
+/// Returns the built-in campaign whose name is similar to `name`.
 pub fn similar_built_in(name: &str) -> Option<&'static BuiltIn<Campaign>> {
     BuiltIn::similar(&BUILT_IN, name)
 }
 
-/// A built-in campaign names no file of its own.
+/// Reads a built-in campaign, which refers to no other files.
 fn read(file: &str, text: &str, name: &str) -> Result<Campaign, FileError> {
     parse(file, text, name, Path::new(""))
 }

@@ -1,4 +1,4 @@
-//! Every contender in every scenario: who flies best.
+//! Comparison of contenders: each of them in each scenario.
 
 use afbc::Profile;
 use afbc_sim::contender::Contender;
@@ -11,7 +11,7 @@ use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 use rayon::prelude::*;
 
-/// Those who fly if nobody else is named: every law as it is meant to fly, and AFBC as printed.
+/// Returns the default contenders: every law with its profile for flight, and AFBC as printed.
 pub fn standard() -> Vec<Contender> {
     let flying = |kind| Contender::of(kind, Profile::Flight);
     let printed = Contender { name: "afbc-as-printed".into(), ..Contender::of(ControllerKind::Afbc, Profile::Paper) };
@@ -19,7 +19,8 @@ pub fn standard() -> Vec<Contender> {
     [flying(afbc), printed].into_iter().chain(others.map(flying)).collect()
 }
 
-/// All contenders of `scenarios`; of two that differ and share a name, the second is named after its scenario too.
+/// Returns all contenders of `scenarios`; of two different ones with the same name, the second gets its scenario's name
+/// too.
 pub fn contenders(scenarios: &[Scenario]) -> Vec<Contender> {
     let mut all: Vec<Contender> = Vec::new();
     for scenario in scenarios {
@@ -37,32 +38,32 @@ pub fn contenders(scenarios: &[Scenario]) -> Vec<Contender> {
     all
 }
 
-/// One scenario under every contender.
+/// Flights of one scenario under every contender.
 #[derive(Clone, Debug)]
 pub struct Comparison {
-    /// What was flown, and by whom.
+    /// The scenario, with its contenders.
     pub scenario: Scenario,
-    /// One for each of the scenario's contenders.
+    /// One entry for each of the scenario's contenders.
     pub entries: Vec<Entry>,
 }
 
 /// One contender's flights of one scenario.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// The flight with the scenario's own seed, with its log.
+    /// The flight with the scenario's own seed, including its log.
     pub first: Flown,
-    /// Every flight, that one first.
+    /// Results of every flight, that one first.
     pub flights: Vec<Outcome>,
 }
 
-/// What came of one flight.
+/// Result of one flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
     /// Seed of the flight's noise and weather.
     pub seed: u64,
     /// When and why the vehicle was lost, if it was.
     pub lost: Option<Lost>,
-    /// How well it was flown until then.
+    /// Errors and smoothness up to the end or the loss.
     pub metrics: Metrics,
 }
 
@@ -71,25 +72,25 @@ pub struct Outcome {
 pub struct Spread {
     /// The mean.
     pub mean: f64,
-    /// The standard deviation of the sample; 0 of a single value.
+    /// Standard deviation of the sample; 0 for a single value.
     pub deviation: f64,
 }
 
-/// A figure of merit: the smaller, the better.
+/// A figure of merit; smaller is better.
 pub struct Figure {
-    /// As a column of a file.
+    /// Name of its column in files.
     pub name: &'static str,
-    /// For people.
+    /// Name in tables and figures.
     pub title: &'static str,
-    /// Decimals that people see.
+    /// Decimals in tables.
     pub digits: usize,
-    /// What people see of 1.
+    /// Factor from the value to the one in tables.
     pub scale: f64,
-    /// From all figures of a flight.
+    /// Computes it from the metrics of a flight.
     pub value: fn(&Metrics) -> f64,
 }
 
-/// What contenders are compared by.
+/// Figures by which contenders are compared.
 pub const FIGURES: [Figure; 6] = [
     Figure { name: "rmse_x_m", title: "x [m]", digits: 4, scale: 1.0, value: |m| m.rmse.x },
     Figure { name: "rmse_y_m", title: "y [m]", digits: 4, scale: 1.0, value: |m| m.rmse.y },
@@ -106,17 +107,17 @@ pub const FIGURES: [Figure; 6] = [
 ];
 
 impl Entry {
-    /// Who flew.
+    /// Returns the contender.
     pub fn contender(&self) -> &Contender {
         &self.first.run.contender
     }
 
-    /// How many vehicles were lost.
+    /// Returns the number of vehicles lost.
     pub fn lost(&self) -> usize {
         self.flights.iter().filter(|flight| flight.lost.is_some()).count()
     }
 
-    /// Mean and spread of a figure over the flights, none of them lost: what a lost one would have come to, nobody knows.
+    /// Returns mean and standard deviation of a figure over the flights; none if a vehicle was lost.
     pub fn spread(&self, value: impl Fn(&Metrics) -> f64) -> Option<Spread> {
         if self.lost() > 0 {
             return None;
@@ -130,21 +131,21 @@ impl Entry {
 }
 
 impl Comparison {
-    /// Root mean square distance of each contender over that of backstepping, if both keep the vehicle.
+    /// Returns the root mean square distance of a contender divided by that of backstepping, if neither lost a vehicle.
     pub fn ratio(&self, entry: &Entry) -> Option<f64> {
         let distance = |entry: &Entry| entry.spread(|metrics| metrics.rmse.xyz().norm()).map(|spread| spread.mean);
         let classical = |entry: &&Entry| entry.contender().kind() == ControllerKind::Backstepping;
         let ratio = distance(entry)? / distance(self.entries.iter().find(classical)?)?;
-        // Of flights that were over before errors count, there is none.
+        // Not defined for flights that ended before errors count.
         Some(ratio).filter(|ratio| ratio.is_finite())
     }
 
-    /// Whether every flight is one of several with seeds of their own.
+    /// True if every contender flew with several seeds.
     pub fn is_repeated(&self) -> bool {
         self.entries.iter().any(|entry| entry.flights.len() > 1)
     }
 
-    /// Whether `entry` has the smallest mean of a figure, of those that kept the vehicle.
+    /// True if `entry` has the smallest mean of a figure among those that lost no vehicle.
     pub fn is_best(&self, entry: &Entry, figure: &Figure) -> bool {
         let mean = |entry: &Entry| entry.spread(figure.value).map(|spread| spread.mean);
         let Some(own) = mean(entry) else { return false };
@@ -152,9 +153,9 @@ impl Comparison {
     }
 }
 
-/// Flies every scenario under each of its contenders, with `seeds` seeds from the scenario's own on, on the current rayon
-/// pool; keeps every `log_every`-th step of the first. `progress` hears of each flight that is done. What comes of it is
-/// the same however many threads there are.
+/// Flies every scenario under each of its contenders, with `seeds` consecutive seeds from the scenario's own on, on the
+/// current rayon pool; logs every `log_every`-th step of the first flight. Calls `progress` after each flight. The
+/// result does not depend on the number of threads.
 ///
 /// # Errors
 /// The first parameter, gain or setting out of range.

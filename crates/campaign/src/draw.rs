@@ -1,4 +1,4 @@
-//! From a seed to flights.
+//! Drawing of flights from a seed.
 
 use crate::plan::{Campaign, Course, Spread};
 use crate::quantity::{self, QUANTITIES, Quantity};
@@ -6,22 +6,22 @@ use afbc_plant::noise::{Noise, Stream};
 use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 
-/// What one flight has drawn.
+/// Values drawn for one flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Draw {
-    /// Seed of the flight's own noise and weather: 53 bits, so that no tool rounds it.
+    /// Seed of the flight's noise and weather: 53 bits, so that no tool rounds it.
     pub seed: u64,
-    /// One for each of the campaign's spreads.
+    /// One value for each of the campaign's spreads.
     pub values: Vec<f64>,
 }
 
 impl Spread {
-    /// The quantity.
+    /// Returns the quantity.
     pub fn quantity(&self) -> Option<&'static Quantity> {
         QUANTITIES.get(self.quantity)
     }
 
-    /// The value at `share`, in \[0, 1), of the interval.
+    /// Returns the value at `share`, in \[0, 1), of the interval.
     fn at(&self, whole: bool, share: f64) -> f64 {
         let [low, high] = self.ends;
         if whole { low + libm::floor(share * (high - low + 1.0)) } else { low + share * (high - low) }
@@ -29,7 +29,7 @@ impl Spread {
 }
 
 impl Campaign {
-    /// What flight `flight` draws: a function of it and the campaign's seed.
+    /// Draws flight `flight`: a function of its index and the campaign's seed.
     pub fn draw(&self, flight: u64) -> Draw {
         let seed = mix(mix(self.seed).wrapping_add(flight)) >> 11;
         let mut noise = Noise::new(seed, Stream::Scenario);
@@ -41,26 +41,26 @@ impl Campaign {
         Draw { seed, values: self.spreads.iter().map(value).collect() }
     }
 
-    /// The reference of flight `flight`: in turn, so that all are flown equally often.
+    /// Returns the reference of flight `flight`; all are flown in turn.
     pub fn course(&self, flight: u64) -> Option<&Course> {
         self.courses.get((flight % self.courses.len().max(1) as u64) as usize)
     }
 
-    /// Flight `flight` as a scenario.
+    /// Returns flight `flight` as a scenario.
     ///
     /// # Errors
-    /// The first parameter that the draw brings out of range.
+    /// The first parameter that the draw puts out of range.
     pub fn flight(&self, flight: u64) -> Result<Scenario, OutOfRange> {
         self.with(flight, &self.draw(flight))
     }
 
-    /// Flight `flight` if every quantity were at the lower (0) or upper (1) end of its interval.
+    /// Returns flight `flight` with every quantity at the lower (0) or upper (1) end of its interval.
     pub(super) fn at_end(&self, flight: u64, end: usize) -> Result<Scenario, OutOfRange> {
         let values = self.spreads.iter().filter_map(|spread| spread.ends.get(end).copied()).collect();
         self.with(flight, &Draw { values, ..self.draw(flight) })
     }
 
-    /// Flight `flight` with this draw.
+    /// Returns flight `flight` with the given draw.
     pub(super) fn with(&self, flight: u64, draw: &Draw) -> Result<Scenario, OutOfRange> {
         let mut scenario = Scenario { seed: draw.seed, ..self.scenario.clone() };
         if let Some(course) = self.course(flight) {
@@ -72,7 +72,7 @@ impl Campaign {
     }
 }
 
-/// SplitMix64's next number after the state `x` (Steele, Lea, Flood 2014): a bijection that spreads neighbours apart.
+/// SplitMix64's output for the state `x` (Steele, Lea, Flood 2014): a bijection that separates neighbours.
 const fn mix(x: u64) -> u64 {
     let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -84,7 +84,7 @@ const fn mix(x: u64) -> u64 {
 mod tests {
     use super::mix;
 
-    /// The first numbers of the generator's published sequence from state 0.
+    /// The first outputs of the generator's published sequence from state 0.
     #[test]
     fn mix_is_splitmix64() {
         assert_eq!(mix(0), 0xe220_a839_7b1d_cdaf);

@@ -1,4 +1,4 @@
-//! What can keep a campaign from its results, in one line.
+//! Errors of campaigns, as one line each.
 
 use crate::manifest::Shard;
 use afbc_files as files;
@@ -7,47 +7,47 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
-/// One line for people.
+/// Why a campaign has no results, displayed as one line.
 #[derive(Debug)]
 pub enum Error {
-    /// A flight whose draw cannot be flown.
+    /// The draw of a flight is out of range.
     Draw {
-        /// Which.
+        /// Index of the flight.
         flight: u64,
-        /// Why.
+        /// The parameter out of range.
         error: OutOfRange,
     },
-    /// A file that cannot be read at all.
+    /// A file cannot be read.
     Unreadable {
-        /// Which.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// The system's error.
         source: io::Error,
     },
-    /// A file that is not what was written.
+    /// A file was changed after it was written.
     Damaged {
-        /// Which.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// What is wrong with it.
         problem: String,
     },
-    /// The folder holds results of something else.
+    /// The folder holds results of another campaign.
     Changed(PathBuf),
-    /// Another program is at work in the folder.
+    /// Another program is using the folder.
     Busy(PathBuf),
-    /// A shard without results yet.
+    /// A shard has no results yet.
     Unfinished(PathBuf),
     /// Results of different campaigns.
     Strangers([PathBuf; 2]),
-    /// Two folders with the same shard.
+    /// Two folders hold the same shard.
     Twice(Shard, [PathBuf; 2]),
-    /// A shard that is to be merged into itself.
+    /// The output folder is one of the shards to be merged.
     IntoPart(PathBuf),
-    /// Shards without a folder.
+    /// Shards that no folder holds.
     Missing(Vec<Shard>),
-    /// Something could not be written.
+    /// A file or folder could not be written.
     Output(files::Error),
-    /// Somebody has had enough.
+    /// The user interrupted the campaign.
     Stopped,
 }
 
@@ -55,10 +55,10 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Error::Draw { flight, error } => {
-                write!(f, "flight {flight} cannot be flown: {error}; narrow the spread that leads there")
+                write!(f, "flight {flight} cannot be flown: {error}; narrow the spread that causes this")
             }
             Error::Unreadable { path, source } => {
-                write!(f, "{}: cannot be read ({source}); see that it can, and start again", path.display())
+                write!(f, "{}: cannot be read ({source}); make it readable, and start again", path.display())
             }
             Error::Damaged { path, problem } => {
                 write!(

@@ -1,4 +1,4 @@
-//! Campaign files. The format is described, key by key, in `docs/campaigns.md`.
+//! Campaign files. `docs/campaigns.md` describes each key.
 
 use crate::plan::{Campaign, Course, Spread};
 use crate::quantity::{QUANTITIES, Quantity};
@@ -14,11 +14,11 @@ const FLIGHTS: Range = Range::new("flights", 1.0, 1e7);
 /// Accepted seeds: whole numbers that no tool rounds.
 const SEED: Range = Range::new("seed", 0.0, 9_007_199_254_740_991.0);
 
-/// Reads and checks a campaign from its `text`. Errors call it `file`; `name` is its name if it gives none itself;
-/// scenario files that it names are looked for from `folder`.
+/// Reads and checks a campaign from its `text`. `file` is its path for errors, `name` its name if it has no other, and
+/// `folder` the one to which the paths of scenario files are relative.
 ///
 /// # Errors
-/// One line on the first thing that is wrong.
+/// The first mistake, as one line.
 pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campaign, FileError> {
     reader::document(file, text, "campaigns robustness", |mut root| {
         let [name, description] = reader::title(&mut root, name)?;
@@ -34,11 +34,11 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campai
             None => Vec::new(),
         };
         let campaign = Campaign { name, description, flights, seed, scenario, courses, spreads };
-        // If both ends of every spread can be flown on every course, it takes bad luck for a flight in between not to be.
+        // If both ends of every spread are in range on every course, the flights between them normally are.
         for end in 0..2 {
             for flight in 0..campaign.courses.len() as u64 {
                 campaign.at_end(flight, end).and_then(|scenario| scenario.check()).map_err(|error| {
-                    root.fault("spread", format!("it leads to {}; narrow it", out_of_range(&error)))
+                    root.fault("spread", format!("it causes {}; narrow it", out_of_range(&error)))
                 })?;
             }
         }
@@ -47,7 +47,7 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campai
     })
 }
 
-/// What is not drawn: a scenario by name, or one written out here, which needs no trajectory if there is a course.
+/// Reads the scenario, by name or as a table, which needs no trajectory if there is a course.
 fn scenario(root: &mut Table<'_>, folder: &Path, course: Option<&Course>) -> Result<Scenario, FileError> {
     if let Some(table) = root.table_if("scenario")? {
         return scenario::read(table, "own", course.map(|course| &course.trajectory));
@@ -62,7 +62,7 @@ fn course(Scenario { name, trajectory, initial, .. }: Scenario) -> Course {
     Course { name, trajectory, initial }
 }
 
-/// The references of the scenarios that are listed, if there is a list.
+/// Reads the references of the scenarios in the list `trajectories`, if there is one.
 fn courses(root: &mut Table<'_>, folder: &Path) -> Result<Vec<Course>, FileError> {
     let Some(names) = root.texts("trajectories")? else { return Ok(Vec::new()) };
     let mut courses: Vec<Course> = Vec::new();
@@ -79,7 +79,7 @@ fn courses(root: &mut Table<'_>, folder: &Path) -> Result<Vec<Course>, FileError
     Ok(courses)
 }
 
-/// A scenario by its name: a plain one is built in, anything else is a file.
+/// Reads a scenario by name: a plain name is a built-in one, anything else a file.
 fn named(root: &Table<'_>, key: &str, name: &str, folder: &Path) -> Result<Scenario, FileError> {
     if !name.contains(['/', '\\', '.']) {
         let built_in = built_in(name).ok_or_else(|| {
@@ -105,7 +105,7 @@ fn spreads(mut table: Table<'_>, scenario: &Scenario) -> Result<Vec<Spread>, Fil
             return Err(table.fault_at(range.name, "only whole numbers are drawn; write whole ends"));
         }
         if let Some(needed) = needs.filter(|needed| !wanted.contains(needed)) {
-            return Err(table.fault_at(range.name, format!("it does nothing without {needed}; add that")));
+            return Err(table.fault_at(range.name, format!("it has no effect without {needed}; add that")));
         }
         if let Some(problem) = idle(range.name, scenario) {
             return Err(table.fault_at(range.name, problem));
@@ -117,12 +117,12 @@ fn spreads(mut table: Table<'_>, scenario: &Scenario) -> Result<Vec<Spread>, Fil
     Ok(spreads)
 }
 
-/// Why drawing this quantity would change nothing, if so.
+/// Returns why drawing this quantity would have no effect, if so.
 fn idle(name: &str, scenario: &Scenario) -> Option<&'static str> {
     let still = afbc_plant::Spread::default();
     match name {
         "wind_m_s" | "wind_20ft_m_s" if scenario.realism.drag.is_none() => {
-            Some("wind does nothing to a vehicle without drag; add [drag] to the scenario")
+            Some("wind has no effect on a vehicle without drag; add [drag] to the scenario")
         }
         "noise_ratio" if scenario.sensing.noise == still => {
             Some("the scenario has no noise to multiply; add [sensors] with noise to it")

@@ -1,4 +1,4 @@
-//! Flying a campaign on many cores, and putting together what was flown apart.
+//! Flying a campaign on many cores, and merging its shards.
 
 use crate::error::Error;
 use crate::folder::{Folder, Rows, finished};
@@ -11,13 +11,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Flies whatever `folder` lacks of `campaign`, on the current rayon pool. `progress` hears of every number of flights
-/// that is done, those of earlier runs first. What comes of it is the same however many threads there are.
+/// Flies the missing flights of `campaign` in `folder` on the current rayon pool. `progress` is called with the number
+/// of flights done so far, including earlier runs. The result does not depend on the number of threads.
 ///
-/// None if `stop` became true before the end: whole chunks are kept then.
+/// Returns none if `stop` became true before the end; complete chunks are kept.
 ///
 /// # Errors
-/// A flight that cannot be flown, results that cannot be written, or are damaged.
+/// A flight that cannot be flown, or results that cannot be written or are damaged.
 pub fn fly(
     campaign: &Campaign,
     folder: &Folder,
@@ -30,7 +30,7 @@ pub fn fly(
     }
 }
 
-/// What all flights together say, those that are missing flown before.
+/// Returns the results of all flights; flies the missing ones first.
 fn flown(
     campaign: &Campaign,
     folder: &Folder,
@@ -49,7 +49,7 @@ fn flown(
     Ok(summary.finish())
 }
 
-/// Flies the chunks that are not there, in order, flight by flight.
+/// Flies the missing chunks in order, flight by flight.
 fn fly_missing(
     campaign: &Campaign,
     folder: &Folder,
@@ -61,7 +61,8 @@ fn fly_missing(
     let missing = (0..folder.chunks()).filter(|chunk| !kept.contains(chunk));
     let jobs =
         missing.flat_map(|chunk| folder.chunk(chunk).enumerate().map(move |(place, flight)| (chunk, place, flight)));
-    // A thread takes the next flight; whoever brings the last of a chunk writes it. Only begun chunks are in memory.
+    // Each thread takes the next flight; the one that completes a chunk writes it. Only unfinished chunks are in
+    // memory.
     let (jobs, begun) = (Mutex::new(jobs.fuse()), Mutex::new(BTreeMap::<u64, BTreeMap<usize, Vec<Row>>>::new()));
     let failed = AtomicBool::new(false);
     let next = || match jobs.lock() {
@@ -90,16 +91,16 @@ fn fly_missing(
     };
     let work = |_: rayon::BroadcastContext<'_>| work().inspect_err(|_| failed.store(true, Ordering::Relaxed));
     let ends = rayon::broadcast(work);
-    // What went wrong matters more than that somebody has had enough.
+    // An error takes precedence over an interruption.
     let (stopped, others): (Vec<_>, Vec<_>) = ends.into_iter().partition(|end| matches!(end, Err(Error::Stopped)));
     others.into_iter().chain(stopped).collect()
 }
 
-/// Makes one whole of all `shards` of one campaign, in the folder `out`: the same bytes that one machine would have
-/// written. By `force`, whatever is in the way there is replaced.
+/// Merges all `shards` of one campaign into the folder `out`, with the same bytes that one machine would have written.
+/// With `force`, files of the same names there are replaced.
 ///
 /// # Errors
-/// Shards of different campaigns, a shard that is missing, unfinished or there twice, and what cannot be read or written.
+/// Shards of different campaigns, a missing, unfinished or duplicate shard, and files that cannot be read or written.
 pub fn merge(shards: &[PathBuf], out: &Path, force: bool) -> Result<(Folder, Summary), Error> {
     let is_out =
         |shard: &&PathBuf| shard.canonicalize().is_ok_and(|shard| out.canonicalize().is_ok_and(|out| out == shard));
@@ -132,7 +133,7 @@ pub fn merge(shards: &[PathBuf], out: &Path, force: bool) -> Result<(Folder, Sum
     let contenders = whole.contenders.len();
     let folder = Folder::open(out, whole, force)?;
     let mut summary = Summary::new(folder.manifest());
-    // Flight i is in shard i modulo their number.
+    // Flight i is in shard i modulo the number of shards.
     let flights = (0..folder.manifest().flights).flat_map(|flight| core::iter::repeat_n(flight, contenders));
     let mut rows: Vec<Rows> = parts.into_iter().map(|(_, rows)| rows).collect();
     let rows = flights.map(|flight| {

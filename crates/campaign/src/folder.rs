@@ -1,8 +1,8 @@
-//! Where results gather, so that what has been flown stays whatever happens.
+//! The folder of a campaign's results, in which finished flights are kept whatever happens.
 //!
-//! While a campaign is flown, each chunk of it that is finished becomes one file, at once and on the disk before it has a
-//! name. At the end all become `results.parquet`. Whoever starts again in the same folder goes on with what is missing.
-//! Every file carries its checksum, and none is believed without.
+//! While a campaign is flown, each finished chunk becomes a file, which is on the disk before it gets its name. At the
+//! end all chunks become `results.parquet`. Starting again in the same folder resumes the campaign. Every file has a
+//! checksum that is verified before use.
 
 use crate::error::Error;
 use crate::manifest::Manifest;
@@ -20,24 +20,24 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Flights of one chunk: seconds of work for one core.
+/// Flights per chunk: seconds of work for one core.
 pub(super) const CHUNK: u64 = 16;
-/// Chunks that are read at once while they become one file.
+/// Chunks that are read at once while they are joined.
 const BATCH: u64 = 64;
-/// All rows.
+/// File of all rows.
 const RESULTS: &str = "results.parquet";
-/// The manifest, there from the beginning.
+/// File of the manifest, present from the beginning.
 const MANIFEST: &str = "campaign.json";
 const CHUNKS: &str = "chunks";
 const LOCK: &str = ".sitl.lock";
-/// What a campaign's folder is marked with.
+/// Command recorded in the folder.
 const COMMAND: &str = "campaign";
 
-/// A folder that the results of one campaign, or of one shard, gather in. It is held against other programs.
+/// The folder of the results of one campaign or shard. It is locked against other programs.
 pub struct Folder {
     place: Place,
     manifest: Manifest,
-    /// Locked until it is closed.
+    /// Holds the lock until it is closed.
     _lock: File,
 }
 
@@ -50,11 +50,12 @@ struct Page<M> {
 }
 
 impl Folder {
-    /// The folder at `path`, created if need be, for the results of `manifest`. By `force`, whatever is in the way of them
-    /// is replaced.
+    /// Opens the folder at `path`, created if needed, for the results of `manifest`. With `force`, files of the same
+    /// names are replaced.
     ///
     /// # Errors
-    /// If it cannot be written, is in use, or holds anything else, or results of something else; nothing is touched then.
+    /// If it cannot be written, is in use, or holds anything other than results of `manifest`; nothing has been changed
+    /// then.
     pub fn open(path: &Path, manifest: Manifest, force: bool) -> Result<Self, Error> {
         let name = manifest.name.clone();
         let place = Place::find(path, COMMAND, &name, force)?;
@@ -66,18 +67,18 @@ impl Folder {
             Err(error) => return Err(error),
         };
         fs::create_dir_all(path).map_err(|source| files::Error::Write { path: path.into(), source })?;
-        // Never cut short: it might be somebody's, by force.
+        // Without truncation: with `force`, it may be somebody else's file.
         let lock = File::options().write(true).create(true).truncate(false).open(path.join(LOCK));
         let lock = lock.map_err(|source| place.error(LOCK, source))?;
         match lock.try_lock() {
             Err(TryLockError::WouldBlock) => return Err(Error::Busy(path.into())),
-            // Some network file systems know no locks: there, two must not be started at once.
+            // Some network file systems have no locks: there, two programs must not use the same folder.
             Err(TryLockError::Error(_)) | Ok(()) => {}
         }
         place.add(&[MANIFEST, RESULTS, CHUNKS, "summary.json", "report.html"])?;
         let folder = Folder { place, manifest, _lock: lock };
         if force && folder.results().is_err() {
-            // Of something else, or damaged.
+            // Results of another campaign, or damaged.
             fs::remove_file(path.join(RESULTS)).map_err(|source| folder.place.error(RESULTS, source))?;
         }
         if !is_known {
@@ -89,27 +90,27 @@ impl Folder {
         Ok(folder)
     }
 
-    /// Where the folder is.
+    /// Returns its path.
     pub fn path(&self) -> &Path {
         self.place.path()
     }
 
-    /// For what else comes of the campaign.
+    /// Returns the folder for other results of the campaign.
     pub fn place(&self) -> &Place {
         &self.place
     }
 
-    /// What the results are of.
+    /// Returns the manifest of the results.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
 
-    /// How many chunks there are when all are there.
+    /// Returns the number of all chunks.
     pub(super) fn chunks(&self) -> u64 {
         self.manifest.shard.count(self.manifest.flights).div_ceil(CHUNK)
     }
 
-    /// The flights of one chunk, at no more work for the last than for the first.
+    /// Returns the flights of a chunk, in constant time for any chunk.
     pub(super) fn chunk(&self, chunk: u64) -> impl Iterator<Item = u64> + use<> {
         let Manifest { shard, flights, .. } = self.manifest;
         (chunk * CHUNK..(chunk + 1) * CHUNK)
@@ -125,7 +126,7 @@ impl Folder {
         self.path().join(CHUNKS).join(Self::chunk_name(chunk))
     }
 
-    /// The chunks that have a file, by the names in the folder.
+    /// Returns the chunks that have a file, judging by its name.
     fn named_chunks(&self) -> impl Iterator<Item = u64> + use<> {
         let chunks = self.chunks();
         let entries = fs::read_dir(self.path().join(CHUNKS)).into_iter().flatten().flatten();
@@ -136,21 +137,21 @@ impl Folder {
         })
     }
 
-    /// The chunks that are there, whole and of this campaign.
+    /// Returns the chunks that are present, complete and of this campaign.
     pub(super) fn kept(&self, stop: &AtomicBool) -> BTreeSet<u64> {
         let named: Vec<u64> = self.named_chunks().collect();
         let is_kept = |chunk: &u64| !stop.load(Ordering::Relaxed) && self.read_chunk(*chunk).is_ok();
         named.into_par_iter().filter(is_kept).collect()
     }
 
-    /// The rows of one chunk, which are what they should be.
+    /// Reads and checks the rows of one chunk.
     fn read_chunk(&self, chunk: u64) -> Result<Vec<Row>, Error> {
         let path = self.chunk_path(chunk);
         let bytes = fs::read(&path).map_err(|error| unread(&path, error))?;
         seal::verify(&mut io::Cursor::new(&bytes)).map_err(|error| unread(&path, error))?;
         let reader = Reader::new(Bytes::from(bytes)).map_err(|error| damaged(&path, error))?;
         if !self.manifest.is_same(reader.manifest()) {
-            return Err(damaged(&path, "it is of another campaign"));
+            return Err(damaged(&path, "it belongs to another campaign"));
         }
         let rows = reader.collect::<Result<Vec<Row>, _>>().map_err(|error| damaged(&path, error))?;
         let contenders = &self.manifest.contenders;
@@ -162,7 +163,7 @@ impl Folder {
         }
     }
 
-    /// Keeps the rows of one chunk.
+    /// Writes the rows of one chunk.
     pub(super) fn put_chunk(&self, chunk: u64, rows: impl Iterator<Item = Row>) -> Result<(), Error> {
         let path = self.chunk_path(chunk);
         let written = fs::create_dir_all(self.path().join(CHUNKS))
@@ -170,7 +171,7 @@ impl Folder {
         written.map_err(|source| files::Error::Write { path, source }.into())
     }
 
-    /// All rows, if they are in one file already.
+    /// Returns all rows, if they are already in one file.
     pub(super) fn results(&self) -> Result<Option<Rows>, Error> {
         let rows = Rows::open(&self.path().join(RESULTS))?;
         match rows {
@@ -179,7 +180,7 @@ impl Folder {
         }
     }
 
-    /// The rows of all chunks, in order, a few of them in memory.
+    /// Returns the rows of all chunks, in order, with a few of them in memory.
     pub(super) fn rows(&self) -> impl Iterator<Item = Result<Row, Error>> {
         let chunks = self.chunks();
         (0..chunks).step_by(BATCH as usize).flat_map(move |first| {
@@ -192,29 +193,29 @@ impl Folder {
         })
     }
 
-    /// Makes one file of `rows`.
+    /// Writes one file of `rows`.
     ///
     /// # Errors
-    /// The first of the rows', or that the file cannot be written; there is none then.
+    /// The first error among the rows, or of writing; then no file is written.
     pub(super) fn write(&self, rows: impl Iterator<Item = Result<Row, Error>>) -> Result<(), Error> {
         let mut failure = None;
         let written = self.place.place(RESULTS, |out| {
             write(out, &self.manifest, rows.map_while(|row| row.map_err(|error| failure = Some(error)).ok()))?;
-            // Without this, an error on the way would leave a file that looks whole.
+            // Otherwise an error would leave an incomplete file that looks complete.
             if failure.is_some() { Err(io::ErrorKind::InvalidData.into()) } else { Ok(()) }
         });
         if let Some(error) = failure {
             return Err(error);
         }
         written?;
-        // They have done their duty; if they stay, they take room and nothing else. What else is there is not ours.
+        // The chunks are no longer needed; one that cannot be removed only takes space. Other files are left alone.
         self.named_chunks().for_each(|chunk| drop(fs::remove_file(self.chunk_path(chunk))));
         let _ = fs::remove_dir(self.path().join(CHUNKS));
         Ok(())
     }
 }
 
-/// The manifest at `path`, if there is one.
+/// Reads the manifest at `path`, if there is one.
 fn found(path: &Path) -> Result<Option<Manifest>, Error> {
     let bytes = match fs::read(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -225,7 +226,7 @@ fn found(path: &Path) -> Result<Option<Manifest>, Error> {
     Ok(Some(page.manifest))
 }
 
-/// Rows of a finished folder, and what they are of.
+/// Returns the rows of a finished folder with their manifest.
 pub(super) fn finished(path: &Path) -> Result<Rows, Error> {
     Rows::open(&path.join(RESULTS))?.ok_or_else(|| Error::Unfinished(path.into()))
 }
@@ -235,14 +236,14 @@ fn write(out: &mut (dyn Write + Send), manifest: &Manifest, mut rows: impl Itera
     rows.try_for_each(|row| writer.push(row)).and_then(|()| writer.finish()).map_err(io::Error::other)?.finish()
 }
 
-/// The rows of one file; an error names it.
+/// The rows of one file, with errors that name it.
 pub(super) struct Rows {
     path: PathBuf,
     rows: Reader<OnDisk>,
 }
 
 impl Rows {
-    /// The rows at `path`, if there is such a file, once it is sure that no bit of it has changed.
+    /// Opens the rows at `path`, if the file exists, after verifying its checksum.
     fn open(path: &Path) -> Result<Option<Self>, Error> {
         let mut file = match File::open(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -258,7 +259,7 @@ impl Rows {
         self.rows.manifest()
     }
 
-    /// The file ends too early, or something else is in it.
+    /// Returns the error that the file ends too early or holds other rows.
     pub(super) fn incomplete(&self) -> Error {
         damaged(&self.path, "rows are missing")
     }
@@ -272,7 +273,7 @@ impl Iterator for Rows {
     }
 }
 
-/// Why a file is not believed: the system does not give it, or it is not what was written.
+/// Returns the error of a file that cannot be read, or is not what was written.
 fn unread(path: &Path, source: io::Error) -> Error {
     match source.kind() {
         io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => damaged(path, source),

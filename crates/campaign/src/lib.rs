@@ -1,8 +1,8 @@
 //! Monte Carlo campaigns: one scenario, flown many times with drawn vehicles, weather and faults.
 //!
-//! Flight `i` is drawn from the campaign's seed and `i` alone, so it can be flown again by itself, on any machine; every
-//! contender flies the same draws. The format of campaign files is in `docs/campaigns.md`. [`compare`] flies scenarios as they
-//! are, under every contender.
+//! Flight `i` is drawn from the campaign's seed and `i` alone, so it can be flown again by itself on any machine. All
+//! contenders fly the same draws. `docs/campaigns.md` describes the format of campaign files. [`compare`] flies
+//! unmodified scenarios under every contender.
 #![forbid(unsafe_code)]
 
 mod built_in;

@@ -1,4 +1,4 @@
-//! What results are the results of: written beside and into them.
+//! The manifest of a campaign's results, stored next to them and in them.
 
 use crate::built_in::built_in;
 use crate::plan::{Campaign, Spread};
@@ -9,25 +9,25 @@ use std::fmt;
 use std::str::FromStr;
 use twox_hash::XxHash64;
 
-/// One of several parts that a campaign is flown in.
+/// One of several parts of a campaign, flown separately.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
-    /// From 1 on.
+    /// Index of the shard, from 1 on.
     pub index: u64,
-    /// How many there are.
+    /// Number of shards.
     pub of: u64,
 }
 
 impl Shard {
-    /// All of it.
+    /// The whole campaign.
     pub const WHOLE: Shard = Shard { index: 1, of: 1 };
 
-    /// How many of `flights` are of this part: every `of`-th.
+    /// Returns how many of `flights` belong to this shard: every `of`-th.
     pub fn count(&self, flights: u64) -> u64 {
         (flights + self.of - self.index) / self.of
     }
 
-    /// The `index`-th flight of this part, from 0 on.
+    /// Returns the `index`-th flight of this shard, from 0 on.
     pub fn flight(&self, index: u64) -> u64 {
         self.index - 1 + index * self.of
     }
@@ -54,39 +54,39 @@ impl fmt::Display for Shard {
 /// A drawn quantity.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Drawn {
-    /// Ends in the unit.
+    /// Name, which ends in the unit.
     pub name: String,
-    /// For people.
+    /// Meaning in words.
     pub meaning: String,
     /// Ends of the interval.
     pub ends: [f64; 2],
 }
 
-/// A campaign as its results know it.
+/// Description of the campaign that results belong to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
-    /// The campaign's.
+    /// Name of the campaign.
     pub name: String,
-    /// The campaign's.
+    /// Description of the campaign.
     pub description: String,
-    /// Of everything that determines the flights, this program's version included.
+    /// Fingerprint of everything that determines the flights, including this program's version.
     pub fingerprint: String,
-    /// The campaign's.
+    /// Seed of the campaign.
     pub seed: u64,
-    /// Each contender's.
+    /// Number of flights of each contender.
     pub flights: u64,
-    /// Names, in the order flown.
+    /// Names of the contenders, in the order flown.
     pub contenders: Vec<String>,
-    /// Names, in turn.
+    /// Names of the trajectories, which are flown in turn.
     pub trajectories: Vec<String>,
-    /// In the order of the columns.
+    /// Drawn quantities, in the order of the columns.
     pub drawn: Vec<Drawn>,
-    /// Which part of the campaign these results are.
+    /// The part of the campaign that these results are.
     pub shard: Shard,
 }
 
 impl Manifest {
-    /// The manifest of a part of `campaign`.
+    /// Creates the manifest of a shard of `campaign`.
     pub fn new(campaign: &Campaign, shard: Shard) -> Self {
         let drawn = |spread: &Spread| {
             let quantity = spread.quantity()?;
@@ -105,42 +105,42 @@ impl Manifest {
         }
     }
 
-    /// The columns of numbers.
+    /// Returns the columns of numbers.
     pub fn columns(&self) -> Vec<Column> {
         let drawn = self.drawn.iter().map(|drawn| Column { name: drawn.name.clone(), meaning: drawn.meaning.clone() });
         let figures = FIGURES.iter().map(|figure| Column { name: figure.name.into(), meaning: figure.meaning.into() });
         drawn.chain(figures).collect()
     }
 
-    /// The number that `row` has in the column of this name.
+    /// Returns the number of `row` in the column `name`.
     pub fn number(&self, row: &Row, name: &str) -> Option<f64> {
         let drawn = self.drawn.iter().position(|drawn| drawn.name == name);
         let figure = || Some(self.drawn.len() + FIGURES.iter().position(|figure| figure.name == name)?);
         row.numbers.get(drawn.or_else(figure)?).copied().flatten()
     }
 
-    /// What `sitl campaign` knows the campaign by: the name of a built-in one, or of a file called after the campaign.
-    /// Where somebody's file lies is no part of the results, so that they are the same wherever it does.
+    /// Returns the campaign's name for `sitl campaign`: that of a built-in one, or of a file named after the campaign.
+    /// The file's folder is left out, so that results do not depend on it.
     pub fn target(&self) -> String {
         let same = |plan: Campaign| fingerprint(&plan) == self.fingerprint;
         let known = built_in(&self.name).and_then(|known| known.read().ok()).is_some_and(same);
         if known { self.name.clone() } else { format!("{}.toml", self.name) }
     }
 
-    /// Whether `other` is of the same part of the same campaign, whatever the path of its file.
+    /// True if `other` belongs to the same shard of the same campaign, whatever the path of its file.
     pub fn is_same(&self, other: &Manifest) -> bool {
         self.fingerprint == other.fingerprint && self.shard == other.shard
     }
 
-    /// Whether `other` is of a part of the same campaign, cut in as many.
+    /// True if `other` belongs to a shard of the same campaign, with the same number of shards.
     pub fn is_sibling(&self, other: &Manifest) -> bool {
         self.fingerprint == other.fingerprint && self.shard.of == other.shard.of
     }
 }
 
-/// A number that another campaign, or another version of this program, would hardly share.
+/// Returns a fingerprint that differs between campaigns and between versions of this program.
 fn fingerprint(campaign: &Campaign) -> String {
-    // Names for people may change; whatever decides a flight is in the debug form, its numbers to the last bit.
+    // Names and descriptions are left out; the debug form contains everything that decides a flight, to the last bit.
     let Campaign { flights, seed, scenario, courses, spreads, .. } = campaign;
     let text = format!("{} {:?}", env!("CARGO_PKG_VERSION"), (flights, seed, scenario, courses, spreads));
     let mut hasher = XxHash64::with_seed(0);

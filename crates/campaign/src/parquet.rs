@@ -1,4 +1,4 @@
-//! Rows as Parquet files, and back.
+//! Writing and reading rows as Parquet files.
 
 use crate::manifest::Manifest;
 use crate::row::Row;
@@ -18,12 +18,12 @@ use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Rows that are written and read at once: a compromise between memory and the size of the file. Fewer in each of many
-/// parts, for they will be read all at once.
+/// Rows per row group, for chunks and for the whole file: a compromise between memory and file size. Chunks have
+/// smaller groups, since many are read at once.
 const GROUP_ROWS: [usize; 2] = [1 << 10, 1 << 16];
-/// Name under which a file carries its manifest.
+/// Metadata key of the manifest.
 const MANIFEST: &str = "campaign";
-/// Columns before those of numbers, with what is in them.
+/// Columns before the numbers, with their meaning.
 const LABELS: [(&str, &str); 7] = [
     ("flight", "index of the flight, from 0 on; `sitl campaign FILE --flight` flies it again"),
     ("seed", "seed of the flight's noise and weather"),
@@ -31,7 +31,7 @@ const LABELS: [(&str, &str); 7] = [
     ("trajectory", "name of the scenario that the reference is from"),
     ("lost", "whether the vehicle was lost"),
     ("lost_reason", "why"),
-    ("trip_reason", "why the contender's own monitor took another law, if it did"),
+    ("trip_reason", "why the contender's monitor switched to the fallback law, if it did"),
 ];
 
 fn schema(manifest: &Manifest) -> Result<Arc<Type>> {
@@ -53,7 +53,7 @@ fn schema(manifest: &Manifest) -> Result<Arc<Type>> {
     Type::group_type_builder("flights").with_fields(fields).build().map(Arc::new)
 }
 
-/// Writes rows in the order they come in.
+/// Writes rows in the given order.
 pub(super) struct Writer<W: Write + Send> {
     file: SerializedFileWriter<W>,
     group_rows: usize,
@@ -61,7 +61,7 @@ pub(super) struct Writer<W: Write + Send> {
 }
 
 impl<W: Write + Send> Writer<W> {
-    /// A file of `manifest`'s rows. The same rows give the same bytes.
+    /// Creates a file of `manifest`'s rows. The same rows give the same bytes.
     pub(super) fn new(out: W, manifest: &Manifest) -> Result<Self> {
         let external = |error: serde_json::Error| ParquetError::External(error.into());
         let meanings: serde_json::Map<_, _> = LABELS
@@ -72,7 +72,7 @@ impl<W: Write + Send> Writer<W> {
         let metadata = vec![
             KeyValue::new(MANIFEST.into(), serde_json::to_string(manifest).map_err(external)?),
             KeyValue::new("columns".into(), serde_json::to_string(&meanings).map_err(external)?),
-            // The last: it has to be near the end of the file.
+            // Last, since it has to be near the end of the file.
             KeyValue::new("checksum".into(), seal::OPEN.to_owned()),
         ];
         let properties = WriterProperties::builder()
@@ -122,7 +122,7 @@ fn put<T: DataType>(
     values: impl Iterator<Item = Option<T::T>>,
 ) -> Result<()> {
     let Some(mut column) = group.next_column()? else { return Err(shape()) };
-    // For each row, whether it has a value.
+    // Which rows have a value, and the values.
     let (mut present, mut dense) = (Vec::new(), Vec::new());
     for value in values {
         present.push(i16::from(value.is_some()));
@@ -132,7 +132,7 @@ fn put<T: DataType>(
     column.close()
 }
 
-/// A file that is open only while it is being read: of many parts, all at once would be more than the system allows.
+/// A file that is open only while it is read: many chunks at once would exceed the system's limit of open files.
 pub(super) struct OnDisk {
     pub(super) path: PathBuf,
     pub(super) length: u64,
@@ -160,8 +160,7 @@ impl ChunkReader for OnDisk {
     }
 }
 
-/// Reads rows in order. Of bytes that are not what was written, the library may make anything, a panic included: they are
-/// to be verified before.
+/// Reads rows in order. The file must be verified first: the library may panic on damaged data.
 pub(super) struct Reader<R: ChunkReader + 'static> {
     file: SerializedFileReader<R>,
     manifest: Manifest,
@@ -170,7 +169,7 @@ pub(super) struct Reader<R: ChunkReader + 'static> {
 }
 
 impl<R: ChunkReader + 'static> Reader<R> {
-    /// The rows in `source`.
+    /// Opens the rows in `source`.
     pub(super) fn new(source: R) -> Result<Self> {
         let file = SerializedFileReader::new(source)?;
         let metadata = file.metadata().file_metadata().key_value_metadata();
@@ -178,7 +177,7 @@ impl<R: ChunkReader + 'static> Reader<R> {
         let manifest: Manifest = manifest
             .and_then(|text| serde_json::from_str(text).ok())
             .ok_or_else(|| ParquetError::General("it is not a campaign's".into()))?;
-        // Reading a column as what it is not would panic.
+        // Reading a column as another type would panic.
         if file.metadata().file_metadata().schema() != schema(&manifest)?.as_ref() {
             return Err(shape());
         }

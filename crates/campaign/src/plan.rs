@@ -1,10 +1,10 @@
-//! What a campaign is.
+//! Definition of a campaign.
 
 use afbc_plant::Motion;
 use afbc_sim::scenario::Scenario;
 use afbc_sim::trajectory::Trajectory;
 
-/// A quantity and the interval that it is drawn from, evenly; a single value if both ends are the same.
+/// A quantity and the interval from which it is drawn uniformly; a single value if both ends are equal.
 #[derive(Clone, Copy, Debug)]
 pub struct Spread {
     /// Index in [`QUANTITIES`](crate::QUANTITIES).
@@ -13,10 +13,10 @@ pub struct Spread {
     pub ends: [f64; 2],
 }
 
-/// A reference, and how a flight along it begins.
+/// A reference, and the initial state of flights along it.
 #[derive(Clone, Debug)]
 pub struct Course {
-    /// The name of the scenario that it is from.
+    /// Name of the scenario it is from.
     pub name: String,
     /// The reference.
     pub trajectory: Trajectory,
@@ -27,18 +27,18 @@ pub struct Course {
 /// Everything that determines a campaign.
 #[derive(Clone, Debug)]
 pub struct Campaign {
-    /// Short name: file names come from it.
+    /// Short name, used in file names.
     pub name: String,
-    /// One line for people.
+    /// Description in one line.
     pub description: String,
-    /// How many flights each contender makes.
+    /// Number of flights of each contender.
     pub flights: u64,
-    /// Where every draw comes from.
+    /// Seed of every draw.
     pub seed: u64,
-    /// What is not drawn.
+    /// Everything that is not drawn.
     pub scenario: Scenario,
-    /// Flown in turn: flight `i` takes the one at `i` modulo their number. At least one.
+    /// Courses flown in turn: flight `i` takes the one at `i` modulo their number. At least one.
     pub courses: Vec<Course>,
-    /// In the order of [`QUANTITIES`](crate::QUANTITIES).
+    /// Quantities drawn, in the order of [`QUANTITIES`](crate::QUANTITIES).
     pub spreads: Vec<Spread>,
 }

@@ -1,4 +1,4 @@
-//! What can be drawn, quantity by quantity.
+//! Quantities that a campaign can draw.
 
 use afbc_plant::{Dropouts, Environment, Payload, RotorFault, Spread, Turbulence};
 use afbc_sim::scenario::Scenario;
@@ -6,31 +6,31 @@ use afbc_types::{OutOfRange, Parameters, Range};
 use core::f64::consts::TAU;
 use nalgebra::Vector3;
 
-/// One quantity that a campaign may draw.
+/// A quantity that a campaign can draw.
 pub struct Quantity {
-    /// Its name, which ends in its unit, and what is accepted. `ratio`s multiply what the scenario has.
+    /// Name, which ends in the unit, and accepted range. A `ratio` multiplies the scenario's value.
     pub range: Range,
-    /// For people.
+    /// Meaning in words.
     pub meaning: &'static str,
-    /// Whether only whole numbers are drawn.
+    /// True if only whole numbers are drawn.
     pub whole: bool,
-    /// Another quantity without which this one does nothing.
+    /// Another quantity without which this one has no effect.
     pub needs: Option<&'static str>,
-    /// Gives the flight its value.
+    /// Applies the value to a flight.
     apply: fn(&mut Flight, f64),
 }
 
-/// What is being put together from draws.
+/// A flight while draws are applied to it.
 struct Flight {
     scenario: Scenario,
     truth: Parameters<f64>,
     payload: Option<Payload>,
 }
 
-/// Puts `values` of `quantities`, in the order of [`QUANTITIES`], into `scenario`.
+/// Applies `values` of `quantities`, in the order of [`QUANTITIES`], to `scenario`.
 ///
 /// # Errors
-/// The first parameter that they bring out of range.
+/// The first parameter that they put out of range.
 pub(super) fn apply<'a>(
     scenario: Scenario,
     values: impl Iterator<Item = (&'a Quantity, f64)>,
@@ -62,8 +62,8 @@ const fn needing(needs: &'static str, quantity: Quantity) -> Quantity {
     Quantity { needs: Some(needs), ..quantity }
 }
 
-/// Every quantity. A flight draws one number for each, wanted or not, from the top: a quantity more in a campaign leaves
-/// the others as they were. New ones go to the end.
+/// Every quantity. A flight draws one number for each, used or not, in this order, so that adding a quantity to a
+/// campaign does not change the others. New ones are appended.
 pub static QUANTITIES: [Quantity; 23] = [
     quantity("mass_ratio", 0.01, 100.0, "true mass over the scenario's", |f, x| f.truth.mass_kg *= x),
     quantity("inertia_ratio", 0.01, 100.0, "true Ix, Iy, Iz over the scenario's", |f, x| f.truth.inertia_kg_m2 *= x),
@@ -76,26 +76,26 @@ pub static QUANTITIES: [Quantity; 23] = [
     quantity("rotor_time_constant_s", 0.0, 1.0, "lag of the rotors", |f, x| {
         f.scenario.realism.rotors.time_constant_s = x;
     }),
-    quantity("rotor_delay_s", 0.0, 0.5, "from command to rotors", |f, x| f.scenario.realism.rotors.delay_s = x),
-    quantity("rotor_efficiency", 0.0, 1.0, "share of its thrust that a failing rotor keeps", |f, efficiency| {
+    quantity("rotor_delay_s", 0.0, 0.5, "delay from command to rotors", |f, x| f.scenario.realism.rotors.delay_s = x),
+    quantity("rotor_efficiency", 0.0, 1.0, "remaining share of a failing rotor's thrust", |f, efficiency| {
         f.scenario.realism.rotors.faults.push(RotorFault { rotor: 1, efficiency, start_s: 0.0 });
     }),
     needing(
         "rotor_efficiency",
         Quantity {
             whole: true,
-            ..quantity("fault_rotor", 1.0, 4.0, "which rotor fails; without it, the first", |f, x| {
+            ..quantity("fault_rotor", 1.0, 4.0, "number of the failing rotor; by default the first", |f, x| {
                 f.scenario.realism.rotors.faults.last_mut().into_iter().for_each(|fault| fault.rotor = x as u8);
             })
         },
     ),
     needing(
         "rotor_efficiency",
-        quantity("fault_start_s", 0.0, 36_000.0, "when it fails; without it, at once", |f, x| {
+        quantity("fault_start_s", 0.0, 36_000.0, "time of the failure; by default 0", |f, x| {
             f.scenario.realism.rotors.faults.last_mut().into_iter().for_each(|fault| fault.start_s = x);
         }),
     ),
-    quantity("payload_kg", 0.0, 500.0, "mass of a payload that the law is not told of", |f, mass_kg| {
+    quantity("payload_kg", 0.0, 500.0, "mass of a payload, unknown to the law", |f, mass_kg| {
         f.payload = Some(Payload { mass_kg, below_m: 0.0, start_s: 0.0, end_s: f64::INFINITY });
     }),
     needing(
@@ -104,7 +104,7 @@ pub static QUANTITIES: [Quantity; 23] = [
             "payload_below_m",
             -10.0,
             10.0,
-            "where it hangs below the centre of mass; without it, there",
+            "distance of the payload below the centre of mass; by default 0",
             |f, x| {
                 f.payload.iter_mut().for_each(|payload| payload.below_m = x);
             },
@@ -112,7 +112,7 @@ pub static QUANTITIES: [Quantity; 23] = [
     ),
     needing(
         "payload_kg",
-        quantity("payload_start_s", 0.0, 36_000.0, "when it is taken up; without it, at once", |f, x| {
+        quantity("payload_start_s", 0.0, 36_000.0, "time at which the payload is taken up; by default 0", |f, x| {
             f.payload.iter_mut().for_each(|payload| payload.start_s = x);
         }),
     ),
@@ -121,24 +121,24 @@ pub static QUANTITIES: [Quantity; 23] = [
     }),
     needing(
         "wind_m_s",
-        quantity("wind_direction_rad", -TAU, TAU, "where it blows to, from +x to +y; without it, +x", |f, x| {
+        quantity("wind_direction_rad", -TAU, TAU, "direction the wind blows to, from +x to +y; by default +x", |f, x| {
             let wind = &mut f.scenario.realism.wind.steady_m_s;
             let (sin, cos) = libm::sincos(x);
             *wind = Vector3::new(cos, sin, 0.0) * wind.x;
         }),
     ),
-    quantity("wind_20ft_m_s", 0.0, 50.0, "wind at 20 ft that sets the turbulence's strength", |f, x| {
+    quantity("wind_20ft_m_s", 0.0, 50.0, "wind at 20 ft, which sets the intensity of the turbulence", |f, x| {
         let turbulence = &mut f.scenario.realism.wind.turbulence;
         *turbulence = Some(Turbulence { wind_20ft_m_s: x, ..turbulence.unwrap_or(Turbulence::MODERATE) });
     }),
     quantity("noise_ratio", 0.0, 100.0, "measurement noise over the scenario's", |f, x| {
         scale(&mut f.scenario.sensing.noise, x);
     }),
-    quantity("bias_ratio", 0.0, 100.0, "spread of the measurements' bias over the scenario's", |f, x| {
+    quantity("bias_ratio", 0.0, 100.0, "standard deviation of the measurement bias over the scenario's", |f, x| {
         scale(&mut f.scenario.sensing.bias, x);
     }),
-    quantity("sensor_delay_s", 0.0, 0.5, "from motion to measurement", |f, x| f.scenario.sensing.delay_s = x),
-    quantity("dropout_rate_hz", 0.0, 1000.0, "how often measurements stay away", |f, rate_hz| {
+    quantity("sensor_delay_s", 0.0, 0.5, "delay from motion to measurement", |f, x| f.scenario.sensing.delay_s = x),
+    quantity("dropout_rate_hz", 0.0, 1000.0, "rate of measurement dropouts", |f, rate_hz| {
         let dropouts = &mut f.scenario.sensing.dropouts;
         *dropouts = Some(Dropouts { rate_hz, ..dropouts.unwrap_or_default() });
     }),
@@ -148,19 +148,19 @@ pub static QUANTITIES: [Quantity; 23] = [
             "dropout_mean_s",
             0.0,
             60.0,
-            "how long, on average; without it, as in the scenario, or 0.02",
+            "mean length of a dropout; by default the scenario's, or 0.02",
             |f, x| {
                 f.scenario.sensing.dropouts.iter_mut().for_each(|dropouts| dropouts.mean_s = x);
             },
         ),
     ),
-    quantity("start_x_m", -100.0, 100.0, "start off the scenario's, along x", |f, x| {
+    quantity("start_x_m", -100.0, 100.0, "offset of the start from the scenario's, along x", |f, x| {
         f.scenario.initial.position_m.x += x
     }),
-    quantity("start_y_m", -100.0, 100.0, "start off the scenario's, along y", |f, x| {
+    quantity("start_y_m", -100.0, 100.0, "offset of the start from the scenario's, along y", |f, x| {
         f.scenario.initial.position_m.y += x
     }),
-    quantity("start_z_m", -100.0, 100.0, "start off the scenario's, along z", |f, x| {
+    quantity("start_z_m", -100.0, 100.0, "offset of the start from the scenario's, along z", |f, x| {
         f.scenario.initial.position_m.z += x
     }),
 ];

@@ -1,4 +1,4 @@
-//! What is kept of one flight of one contender.
+//! Result of one flight of one contender.
 
 use crate::plan::Campaign;
 use afbc_control::Trip;
@@ -8,54 +8,54 @@ use afbc_sim::metrics::{Accumulator, Metrics, is_settled, tracking_error};
 use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 
-/// One flight of one contender: a row of the results.
+/// Result of one flight of one contender: a row of the results.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// Index of the flight.
     pub flight: u64,
     /// Seed of its noise and weather.
     pub seed: u64,
-    /// Who flew.
+    /// Name of the contender.
     pub contender: String,
-    /// Along what.
+    /// Name of the trajectory.
     pub trajectory: String,
     /// Why the vehicle was lost, if it was.
     pub lost_reason: Option<String>,
-    /// Why the contender's own monitor took another law, if it did.
+    /// Why the contender's monitor switched to the fallback law, if it did.
     pub trip_reason: Option<String>,
-    /// What was drawn, then what [`FIGURES`] lists; nothing where there was nothing to measure.
+    /// Values drawn, then the [`FIGURES`]; none where there was nothing to measure.
     pub numbers: Vec<Option<f64>>,
 }
 
 /// A column of numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// Ends in the unit.
+    /// Name, which ends in the unit.
     pub name: String,
-    /// For people.
+    /// Meaning in words.
     pub meaning: String,
 }
 
 /// A figure of merit.
 pub struct Figure {
-    /// Ends in the unit.
+    /// Name, which ends in the unit.
     pub name: &'static str,
-    /// For people.
+    /// Meaning in words.
     pub meaning: &'static str,
     value: fn(&Outcome) -> Option<f64>,
 }
 
-/// How a flight went.
+/// Sums over one flight.
 #[derive(Clone, Debug, Default)]
 struct Outcome {
     lost: Option<Lost>,
     /// When and why the contender's monitor tripped, if it did.
     trip: Option<(f64, Trip)>,
     metrics: Metrics,
-    /// Steps in which errors have counted.
+    /// Number of steps in which errors were evaluated.
     settled: u64,
     max_position_m: f64,
-    /// Steps, and those of them in which a rotor was at its limit.
+    /// Number of steps, and of those with a rotor at its limit.
     steps: u64,
     saturated: u64,
 }
@@ -65,7 +65,7 @@ impl Outcome {
         (self.settled > 0).then_some(value)
     }
 
-    /// From one step to the next.
+    /// Returns `value`, a change between two steps, if there were two.
     fn changed(&self, value: f64) -> Option<f64> {
         (self.settled > 1).then_some(value)
     }
@@ -75,10 +75,11 @@ const fn figure(name: &'static str, meaning: &'static str, value: fn(&Outcome) -
     Figure { name, meaning, value }
 }
 
-/// Every figure of merit, in the order of the columns. Errors count from [`SETTLED_S`](afbc_sim::metrics::SETTLED_S) on.
+/// Every figure of merit, in the order of the columns. Errors are evaluated from
+/// [`SETTLED_S`](afbc_sim::metrics::SETTLED_S) on.
 pub static FIGURES: [Figure; 17] = [
     figure("lost_at_s", "when the vehicle was lost", |o| o.lost.map(|lost| lost.time_s)),
-    figure("tripped_at_s", "when the monitor took another law", |o| o.trip.map(|(time_s, _)| time_s)),
+    figure("tripped_at_s", "when the monitor switched to the fallback law", |o| o.trip.map(|(time_s, _)| time_s)),
     figure("rmse_x_m", "root mean square error along x", |o| o.measured(o.metrics.rmse.x)),
     figure("rmse_y_m", "root mean square error along y", |o| o.measured(o.metrics.rmse.y)),
     figure("rmse_z_m", "root mean square error along z", |o| o.measured(o.metrics.rmse.z)),
@@ -127,7 +128,7 @@ impl Campaign {
 }
 
 impl Outcome {
-    /// Flies, and keeps nothing but sums.
+    /// Flies, and keeps only sums.
     fn of(scenario: &Scenario, contender: &Contender) -> Result<Self, OutOfRange> {
         let mut outcome = Outcome::default();
         let mut metrics = Accumulator::default();

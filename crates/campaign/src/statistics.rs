@@ -1,23 +1,23 @@
-//! Few numbers for many flights.
+//! Statistics of many flights.
 
 use libm::sqrt;
 
-/// 97.5 % of the standard normal distribution lie below: two-sided 95 %.
+/// 97.5 % quantile of the standard normal distribution: two-sided 95 %.
 const Z: f64 = 1.959_963_984_540_054;
 
-/// A share with Wilson's 95 % score interval, which holds its level near 0 and 1 too, where few flights are lost.
+/// A share with Wilson's 95 % score interval, which is also valid near 0 and 1, where few flights are lost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Share {
-    /// What was observed.
+    /// Observed share.
     pub value: f64,
-    /// The interval's lower end.
+    /// Lower end of the interval.
     pub low: f64,
-    /// The interval's upper end.
+    /// Upper end of the interval.
     pub high: f64,
 }
 
 impl Share {
-    /// `hits` of `trials`; of no trial, nothing is known.
+    /// Returns the share of `hits` in `trials`; NaN without trials.
     pub fn of(hits: u64, trials: u64) -> Self {
         if trials == 0 {
             return Share { value: f64::NAN, low: 0.0, high: 1.0 };
@@ -26,15 +26,15 @@ impl Share {
         let scale = 1.0 + Z * Z / n;
         let centre = (p + Z * Z / (2.0 * n)) / scale;
         let half = Z / scale * sqrt(p * (1.0 - p) / n + Z * Z / (4.0 * n * n));
-        // At the ends the formula gives the end itself, but for rounding.
+        // At the ends the formula gives the end itself, except for rounding.
         let low = if hits == 0 { 0.0 } else { (centre - half).max(0.0) };
         let high = if hits == trials { 1.0 } else { (centre + half).min(1.0) };
         Share { value: p, low, high }
     }
 }
 
-/// The percentile of `sorted` values by nearest rank: the smallest value that at least `percent` of them do not exceed.
-/// It is always one of the values, never something between two. None of no values.
+/// Returns the percentile of `sorted` values by nearest rank: the smallest value that at least `percent` of them do not
+/// exceed. It is always one of the values. None without values.
 pub fn percentile(sorted: &[f64], percent: f64) -> Option<f64> {
     let rank = (percent / 100.0 * sorted.len() as f64).ceil().max(1.0) as usize;
     sorted.get(rank - 1).copied()
@@ -49,7 +49,7 @@ mod tests {
         assert!((a - b).abs() < 5e-5, "{a} != {b}");
     }
 
-    /// Against Newcombe 1998, Statistics in Medicine 17, table I, method 3.
+    /// Compared with Newcombe 1998, Statistics in Medicine 17, table I, method 3.
     #[test]
     fn wilson_interval_is_the_published_one() {
         for (hits, trials, low, high) in
@@ -58,7 +58,7 @@ mod tests {
             let share = Share::of(hits, trials);
             close(share.low, low);
             close(share.high, high);
-            // What is true of hits is true of misses, turned round.
+            // The interval of the misses is the mirror image.
             let misses = Share::of(trials - hits, trials);
             close(misses.low, 1.0 - high);
             close(misses.high, 1.0 - low);
@@ -82,7 +82,7 @@ mod tests {
         assert_eq!(percentile(&hundred, 90.0).unwrap(), 90.0);
         assert_eq!(percentile(&hundred, 99.0).unwrap(), 99.0);
         assert_eq!(percentile(&[], 50.0), None);
-        // A lost flight is worse than any.
+        // A lost flight ranks last.
         assert_eq!(percentile(&[0.1, 0.2, f64::INFINITY], 99.0).unwrap(), f64::INFINITY);
     }
 }

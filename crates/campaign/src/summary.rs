@@ -1,20 +1,20 @@
-//! What all flights together say, gathered row by row.
+//! Summary of all flights, accumulated row by row.
 
 use crate::manifest::Manifest;
 use crate::row::Row;
 use crate::statistics::Share;
 
-/// Intervals that a drawn quantity's spread is cut into.
+/// Number of intervals into which the range of a drawn quantity is divided.
 pub const BINS: usize = 10;
-/// How many of each contender's worst flights are named.
+/// Number of each contender's worst flights that are listed.
 const WORST: usize = 3;
 
-/// Flights, and those of them that ended well.
+/// Number of flights, and of those without a loss.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Count {
-    /// All.
+    /// All flights.
     pub flights: u64,
-    /// Not lost.
+    /// Flights that were not lost.
     pub kept: u64,
 }
 
@@ -24,18 +24,18 @@ impl Count {
         self.kept += u64::from(kept);
     }
 
-    /// The share that ended well.
+    /// Returns the share of flights that were not lost.
     pub fn share(&self) -> Share {
         Share::of(self.kept, self.flights)
     }
 }
 
-/// A flight that went badly.
+/// One of the worst flights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bad {
-    /// Which.
+    /// Index of the flight.
     pub flight: u64,
-    /// Along what.
+    /// Name of its trajectory.
     pub trajectory: String,
     /// When and why the vehicle was lost, if it was.
     pub lost: Option<(f64, String)>,
@@ -44,7 +44,7 @@ pub struct Bad {
 }
 
 impl Bad {
-    /// Rises with how bad it was: lost is worse than astray, and soon is worse than late.
+    /// Sort key that grows with how bad the flight was: a loss ranks above any error, an early loss above a late one.
     fn badness(&self) -> (bool, f64) {
         match &self.lost {
             Some((time_s, _)) => (true, -time_s),
@@ -53,44 +53,44 @@ impl Bad {
     }
 }
 
-/// How one contender did.
+/// Results of one contender.
 #[derive(Clone, Debug)]
 pub struct Tally {
-    /// Its name.
+    /// Name of the contender.
     pub contender: String,
     /// All of its flights.
     pub count: Count,
-    /// Flights in which its own monitor took another law.
+    /// Number of flights in which its monitor switched to the fallback law.
     pub tripped: u64,
-    /// Apart for each trajectory, in the campaign's order.
+    /// Counts for each trajectory, in the campaign's order.
     pub by_trajectory: Vec<Count>,
-    /// For each drawn quantity, apart for [`BINS`] equal parts of its interval.
+    /// Counts for each drawn quantity, in [`BINS`] equal parts of its interval.
     pub by_draw: Vec<[Count; BINS]>,
     /// Root mean square distances from the reference \[m\], sorted; infinite for a flight that was lost.
     pub rmse_position_m: Vec<f64>,
-    /// Largest distances from the reference \[m\], likewise.
+    /// Largest distances from the reference \[m\], sorted; infinite for a flight that was lost.
     pub max_position_m: Vec<f64>,
     /// Mean |change of U4| per step \[N\], sorted, of flights that were not lost.
     pub mean_abs_du4_n: Vec<f64>,
     /// Shares of steps with a rotor at its limit, sorted, of flights that were not lost.
     pub saturated_ratio: Vec<f64>,
-    /// The worst flights, the very worst first.
+    /// The worst flights, worst first.
     pub worst: Vec<Bad>,
 }
 
-/// How a campaign went.
+/// Results of a campaign.
 #[derive(Clone, Debug)]
 pub struct Summary {
-    /// What was flown.
+    /// What the results belong to.
     pub manifest: Manifest,
-    /// In the campaign's order.
+    /// Results of each contender, in the campaign's order.
     pub tallies: Vec<Tally>,
 }
 
 impl Summary {
-    /// Of no flight yet.
+    /// Creates the summary of no flight.
     pub fn new(manifest: &Manifest) -> Self {
-        // As much as there will be and no more: it is all that grows with the flights.
+        // Allocated once: this is all that grows with the number of flights.
         let values = || Vec::with_capacity(manifest.shard.count(manifest.flights) as usize);
         let tally = |contender: &String| Tally {
             contender: contender.clone(),
@@ -107,7 +107,7 @@ impl Summary {
         Summary { tallies: manifest.contenders.iter().map(tally).collect(), manifest: manifest.clone() }
     }
 
-    /// Takes one row into account.
+    /// Adds one row.
     pub fn add(&mut self, row: &Row) {
         let Summary { manifest, tallies } = self;
         let Some(tally) = tallies.iter_mut().find(|tally| tally.contender == row.contender) else { return };
@@ -138,7 +138,7 @@ impl Summary {
             rmse_position_m: number("rmse_position_m"),
         };
         tally.worst.push(bad);
-        // Stable: of two that are as bad, the earlier stays first.
+        // Stable: of two equally bad flights, the earlier comes first.
         tally.worst.sort_by(|a, b| {
             let ((a_lost, a), (b_lost, b)) = (a.badness(), b.badness());
             b_lost.cmp(&a_lost).then(b.total_cmp(&a))
@@ -146,7 +146,7 @@ impl Summary {
         tally.worst.truncate(WORST);
     }
 
-    /// Puts what is to be sorted in order, once all rows are in.
+    /// Sorts the values after the last row.
     pub fn finish(mut self) -> Self {
         for tally in &mut self.tallies {
             let Tally { rmse_position_m, max_position_m, mean_abs_du4_n, saturated_ratio, .. } = tally;
@@ -158,7 +158,7 @@ impl Summary {
     }
 }
 
-/// Which of [`BINS`] equal parts of an interval `value` lies in; the upper end belongs to the last.
+/// Returns which of [`BINS`] equal parts of an interval `value` lies in; the upper end belongs to the last.
 fn bin([low, high]: [f64; 2], value: f64) -> usize {
     ((value - low) / (high - low) * BINS as f64).clamp(0.0, BINS as f64 - 1.0) as usize
 }

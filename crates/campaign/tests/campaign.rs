@@ -1,4 +1,4 @@
-//! Campaigns: that their results are the same however they came about, and that nothing that was flown is lost.
+//! Campaigns: results do not depend on how they were computed, and no finished flight is lost.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
 
@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// A folder for each test, empty at first.
+/// An empty folder for each test.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("campaign").join(test);
     if folder.exists() {
@@ -19,7 +19,7 @@ fn folder(test: &str) -> PathBuf {
     folder
 }
 
-/// Short flights of two contenders on two courses, some of which are lost.
+/// Short flights of two contenders on two courses, some of them lost.
 const SMALL: &str = r#"
 name = "small"
 flights = 150
@@ -45,7 +45,7 @@ fn small() -> Campaign {
     parse(SMALL)
 }
 
-/// Flies all that `folder` lacks on `threads` cores.
+/// Flies everything missing in `folder` on `threads` cores.
 fn fly(campaign: &Campaign, path: &Path, shard: Shard, threads: usize) {
     let folder = Folder::open(path, Manifest::new(campaign, shard), false).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -57,7 +57,7 @@ fn results_of(path: &Path) -> Vec<u8> {
     fs::read(path.join("results.parquet")).unwrap()
 }
 
-/// What every other way must come to.
+/// The bytes that every other way must give.
 fn reference(campaign: &Campaign, folder: &Path) -> Vec<u8> {
     let path = folder.join("reference");
     fly(campaign, &path, Shard::WHOLE, 1);
@@ -70,7 +70,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
     let reference = reference(&campaign, &folder);
     fly(&campaign, &folder.join("many"), Shard::WHOLE, 5);
     assert_eq!(reference, results_of(&folder.join("many")));
-    // And they are the campaign's own.
+    // Another seed gives other results.
     let other = parse(&SMALL.replace("seed = 7", "seed = 8"));
     fly(&other, &folder.join("other"), Shard::WHOLE, 5);
     assert_ne!(reference, results_of(&folder.join("other")));
@@ -82,7 +82,7 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
     let reference = reference(&campaign, &folder);
     let path = folder.join("interrupted");
 
-    // Stopped after 100 of 150 flights, by one thread: six chunks of 16 are there, the seventh was begun.
+    // Stopped after 100 of 150 flights by one thread: six chunks of 16 are complete, the seventh was begun.
     {
         let (stop, done) = (AtomicBool::new(false), AtomicU64::new(0));
         let place = Folder::open(&path, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
@@ -101,7 +101,7 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
     let kept = chunks();
     assert_eq!(kept.len(), 6);
 
-    // One is torn, one is of another campaign, four are whole; and a file was being written.
+    // One is damaged, one is of another campaign, four are complete; and a temporary file remains.
     let files: Vec<_> = kept.iter().collect();
     fs::write(files[0].0, &files[0].1[..files[0].1.len() / 2]).unwrap();
     let other = folder.join("other");
@@ -121,7 +121,7 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
     }
     assert_eq!(resumed.into_inner(), 64, "the four whole chunks are not flown again");
     assert_eq!(reference, results_of(&path));
-    // Once more: nothing is left to fly.
+    // Resumed once more: nothing is left to fly.
     fly(&campaign, &path, Shard::WHOLE, 1);
     assert_eq!(reference, results_of(&path));
 }
@@ -136,7 +136,7 @@ fn shards_come_together_to_what_one_machine_gives() {
         path
     };
     let parts: Vec<_> = (1..=4).map(|index| part(index, 4)).collect();
-    // In whatever order they are named.
+    // In any order of the shards.
     let order: Vec<_> = [2, 0, 3, 1].into_iter().map(|i: usize| parts[i].clone()).collect();
     let (_, summary) = campaign::merge(&order, &folder.join("merged"), false).unwrap();
     assert_eq!(reference, results_of(&folder.join("merged")));
@@ -181,7 +181,7 @@ fn a_folder_belongs_to_one_campaign_and_one_program() {
         assert!(error.contains("not this one") && error.contains("--out"), "{to}: {error}");
     }
     assert!(refused(&campaign, Shard { index: 1, of: 2 }).contains("not this one"));
-    // Words for people, and where the file is, do not matter.
+    // Names, descriptions and the file's path do not matter.
     let renamed = campaign::parse("/elsewhere/small.toml", SMALL, "small", Path::new("")).unwrap();
     Folder::open(&folder, Manifest::new(&renamed, Shard::WHOLE), false).unwrap();
     Folder::open(&folder, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
@@ -211,7 +211,7 @@ fn a_flight_flown_again_gives_the_figures_of_its_row() {
     assert!((1..60).contains(&lost), "{lost} lost: a test of both kinds");
 }
 
-/// Every row of `SMALL`'s first flights.
+/// Returns every row of the first `flights` flights.
 fn rows(campaign: &Campaign, flights: u64) -> Vec<Row> {
     (0..flights).flat_map(|flight| campaign.rows(flight).unwrap()).collect()
 }
@@ -221,7 +221,7 @@ fn a_draw_depends_on_seed_and_flight_alone() {
     let campaign = small();
     let again = parse(&SMALL.replace("flights = 150", "flights = 9"));
     assert_eq!(rows(&campaign, 3), rows(&again, 3));
-    // A quantity more leaves the others as they were, wherever it stands.
+    // An additional quantity leaves the others unchanged, wherever it stands.
     let more = parse(&SMALL.replace("[spread]", "[spread]\ninertia_ratio = [0.5, 2.0]\nsensor_delay_s = [0.0, 0.004]"));
     for flight in 0..100 {
         let (few, many) = (campaign.draw(flight), more.draw(flight));
@@ -269,12 +269,12 @@ fn what_is_drawn_reaches_the_vehicle() {
     assert_eq!(rotors.faults.len(), 1);
     assert_eq!((rotors.faults[0].efficiency, f64::from(rotors.faults[0].rotor)), (values[3], values[4]));
     assert_eq!(rotors.faults[0].start_s, values[5]);
-    // In turn.
+    // Courses are flown in turn.
     assert_eq!(campaign.course(5).unwrap().name, "circle");
     assert_ne!(campaign.flight(4).unwrap().trajectory, flight.trajectory);
 }
 
-/// A campaign's files, and what is made of them with any bit of them flipped, any end cut off.
+/// No file of a campaign is used with any bit flipped or any end cut off.
 #[test]
 fn no_damaged_file_is_believed() {
     let folder = folder("damaged");
@@ -285,7 +285,7 @@ fn no_damaged_file_is_believed() {
     for (index, part) in (1..).zip(&parts) {
         fly(&campaign, part, Shard { index, of: 2 }, 1);
     }
-    // A chunk as an interrupted campaign leaves it.
+    // A chunk of an interrupted campaign.
     let begun = folder.join("begun");
     fly(&campaign, &begun, Shard::WHOLE, 1);
     fs::create_dir_all(begun.join("chunks")).unwrap();
@@ -296,7 +296,7 @@ fn no_damaged_file_is_believed() {
     let (results, chunks) = (open(&whole).unwrap(), open(&begun).unwrap());
     let again = || campaign::fly(&campaign, &results, &never, &|_| panic!("it is finished")).map(|_| ());
     let merged = || campaign::merge(&parts, &folder.join("merged"), false).map(|_| ());
-    // How many flights a campaign goes on from.
+    // Number of flights from which a campaign resumes.
     let kept = || {
         let (stop, kept) = (AtomicBool::new(false), AtomicU64::new(0));
         let first = |flights| {
@@ -319,7 +319,7 @@ fn no_damaged_file_is_believed() {
     assert!(!folder.join("merged").exists());
     drop(results);
     each_damage(&whole.join("campaign.json"), 1, |file| refused(file, open(&whole).map(|_| ())));
-    // As it was, all is well.
+    // Undamaged, everything is read.
     drop(chunks);
     fly(&campaign, &begun, Shard::WHOLE, 1);
     assert_eq!(results_of(&begun), results_of(&whole));
@@ -327,8 +327,8 @@ fn no_damaged_file_is_believed() {
     assert_eq!(results_of(&folder.join("merged")), results_of(&whole));
 }
 
-/// Shows `see` the file with a bit of every `stride`-th byte changed, with every bit of its first and last bytes, and with
-/// ends cut off; then it is as it was.
+/// Calls `see` with the file after changing a bit of every `stride`-th byte, every bit of its first and last bytes, and
+/// after truncations; then restores it.
 fn each_damage(path: &Path, stride: usize, mut see: impl FnMut(&Path)) {
     let whole = fs::read(path).unwrap();
     let mut damage = |bytes: &[u8]| {
@@ -378,8 +378,8 @@ fn a_damaged_folder_is_mended_by_what_its_error_says() {
     }
 }
 
-/// Whatever is done for a campaign before its first flight, and for a chunk, costs the same for ten million flights as for
-/// ten: one that is stopped after its first chunk comes back at all.
+/// The work before the first flight and for each chunk does not grow with the number of flights: a campaign of ten
+/// million that is stopped after its first chunk returns.
 #[test]
 fn ten_million_flights_start_with_the_first() {
     let folder = folder("ten-million");
@@ -397,14 +397,14 @@ fn ten_million_flights_start_with_the_first() {
             assert!(pool.install(|| campaign::fly(&campaign, &place, &stop, &progress)).unwrap().is_none());
             flown.into_inner()
         };
-        // Stopped before the first, nothing is flown.
+        // Stopped before the first flight, nothing is flown.
         assert_eq!((flown(u64::MAX, true), chunks()), (0, 0));
         assert_eq!((flown(16, false), chunks()), (16, 1));
         assert_eq!((flown(40, false), chunks()), (40, 2));
     }
 }
 
-/// What the system does not give is not damaged: to delete it would be bad advice.
+/// A file that cannot be read is not called damaged, since the advice would be to delete it.
 #[test]
 fn what_cannot_be_read_is_not_called_damaged() {
     let (folder, campaign) = (folder("unreadable"), parse(&SMALL.replace("= 150", "= 2").replace("= 6.0", "= 0.2")));
@@ -465,13 +465,13 @@ fn a_scenario_may_be_written_out() {
     let campaign = parse(&text);
     assert_eq!(campaign.scenario.contenders.len(), 1);
     assert_eq!(campaign.rows(0).unwrap()[0].contender, "me");
-    // Its own trajectory, if there are no others.
+    // The table's own trajectory is used if no others are listed.
     let line = "trajectories = [\"hover\", \"circle\"]\n";
     let error = campaign::parse("f", &text.replace(line, ""), "f", Path::new("")).unwrap_err().to_string();
     assert!(error.contains("scenario.trajectory: missing; "), "{error}");
     let own = "[scenario.trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 9]\n";
     assert_eq!(parse(&(text.replace(line, "") + own)).courses[0].initial.position_m.z, 9.0);
-    // What is wrong in it is found where it stands.
+    // A mistake in the table is reported with its key.
     let error = campaign::parse("f", &text.replace("\"pid\"", "\"pdi\""), "f", Path::new("")).unwrap_err().to_string();
     assert!(error.contains("contender.controller: \"pdi\" is unknown"), "{error}");
 }
@@ -481,7 +481,7 @@ fn the_documented_file_is_a_campaign() {
     let example = PAGE.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
     let campaign = campaign::parse("example", example, "example", Path::new("")).unwrap();
     assert_eq!(campaign.flights, 10_000);
-    // Whatever is listed as a key is in it.
+    // Every key in the page's table is in the example.
     for line in PAGE.lines().take_while(|line| !line.starts_with("## What is drawn")) {
         if let Some(key) = line.strip_prefix("| `").and_then(|line| line.split('`').next()) {
             assert!(example.contains(&format!("{key} = ")), "{key}");

@@ -1,30 +1,30 @@
-//! What can go wrong on the way to the disk.
+//! Errors of writing results.
 
 use std::path::PathBuf;
 use std::{fmt, io};
 
-/// Why something could not be put where it was wanted.
+/// Why a folder or file could not be written.
 #[derive(Debug)]
 pub enum Error {
     /// A folder or file that could not be written.
     Write {
-        /// Which one.
+        /// Path of the folder or file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: io::Error,
     },
-    /// Somebody else's folder or file.
+    /// A folder or file that the command did not write.
     Foreign {
-        /// Which one.
+        /// Path of the folder or file.
         path: PathBuf,
-        /// Whose.
+        /// Its owner, in words.
         whose: String,
     },
-    /// What says whose a folder is cannot be trusted.
+    /// The file that records the owner of a folder is damaged.
     Damaged {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// What is wrong with it.
         problem: String,
     },
 }

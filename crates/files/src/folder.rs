@@ -1,4 +1,4 @@
-//! A folder that one command has for itself.
+//! An output folder that belongs to one command.
 
 use crate::error::Error;
 use crate::place::{HIDDEN, place};
@@ -9,22 +9,22 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// What every folder that this program writes holds: whose it is, and which files in it are.
+/// File in every folder that this program writes, which records the command and its files.
 const MARKER: &str = ".sitl.json";
 #[derive(Serialize, Deserialize)]
 struct Marker {
-    /// What follows `sitl` on the command line.
+    /// The command, as after `sitl` on the command line.
     command: String,
-    /// Of what was flown.
+    /// Name of the scenario or campaign flown.
     name: String,
-    /// What the command has written, or is about to.
+    /// Files that the command has written, or is about to write.
     files: BTreeSet<String>,
     checksum: String,
 }
 
-/// A folder that one command has for itself, and puts files into whole.
+/// An output folder that belongs to one command. Files appear in it whole or not at all.
 ///
-/// Nothing in it that the command has not written is ever replaced or removed, unless by force.
+/// Files that the command has not written are never replaced or removed, unless by force.
 #[derive(Clone, Debug)]
 pub struct Folder {
     path: PathBuf,
@@ -34,11 +34,11 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// The folder at `path` for what `sitl <command>` makes of `name`, created with its parents if need be. By `force`,
-    /// files in the way may be replaced.
+    /// Opens the folder at `path` for the results of `sitl <command>` for `name`, created with its parents if needed.
+    /// With `force`, files of the same names may be replaced.
     ///
     /// # Errors
-    /// If it cannot be written, or is neither empty nor the command's own; nothing has been touched then.
+    /// If it cannot be written, or is neither empty nor the command's own; nothing has been changed then.
     pub fn open(path: &Path, command: &str, name: &str, force: bool) -> Result<Self, Error> {
         let folder = Folder::find(path, command, name, force)?;
         fs::create_dir_all(path).map_err(|source| Error::Write { path: path.into(), source })?;
@@ -46,7 +46,7 @@ impl Folder {
         Ok(folder)
     }
 
-    /// As [`open`](Self::open), before anything is made.
+    /// As [`open`](Self::open), without creating or changing anything.
     ///
     /// # Errors
     /// If it is neither empty nor the command's own.
@@ -55,12 +55,12 @@ impl Folder {
         folder.files().map(|_| folder)
     }
 
-    /// Where it is.
+    /// Returns its path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// That a file in it, called `name`, could not be written.
+    /// Returns the error that its file `name` could not be written.
     pub fn error(&self, name: &str, source: io::Error) -> Error {
         Error::Write { path: self.path.join(name), source }
     }
@@ -69,7 +69,7 @@ impl Folder {
         Error::Foreign { path: self.path.clone(), whose }
     }
 
-    /// The files that the command has written here before.
+    /// Returns the files that the command has written here before.
     fn files(&self) -> Result<BTreeSet<String>, Error> {
         let files = match self.marker() {
             Ok(Some(Marker { command, files, .. })) if command == self.command => Ok(files),
@@ -92,12 +92,12 @@ impl Folder {
         };
         seal::verify(&mut io::Cursor::new(&bytes))?;
         let marker: Marker = serde_json::from_slice(&bytes)?;
-        // They will be removed one day: nothing outside the folder may be among them.
+        // They will be removed some day, so none may be outside the folder.
         let is_plain = |name: &String| Path::new(name).file_name().is_some_and(|plain| plain == name.as_str());
         if marker.files.iter().all(is_plain) { Ok(Some(marker)) } else { Err(io::Error::other("a path in it")) }
     }
 
-    /// Whether there is nothing, not even the folder; what a killed program may have left does not count.
+    /// True if the folder is empty or missing; temporary files of a killed program do not count.
     fn is_empty(&self) -> Result<bool, Error> {
         let entries = match fs::read_dir(&self.path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(true),
@@ -106,10 +106,10 @@ impl Folder {
         Ok(entries.flatten().all(|entry| entry.file_name().to_string_lossy().starts_with(HIDDEN)))
     }
 
-    /// Makes `names` the command's own, before they are written.
+    /// Records `names` as the command's own, before they are written.
     ///
     /// # Errors
-    /// If one is there already and not the command's.
+    /// If one of them exists and is not the command's.
     pub fn add<N: AsRef<str>>(&self, names: &[N]) -> Result<(), Error> {
         let mut files = self.files()?;
         for name in names.iter().map(N::as_ref) {
@@ -124,8 +124,8 @@ impl Folder {
         self.mark(files)
     }
 
-    /// As [`add`](Self::add), and removes whatever else the command has written here before: none of it belongs beside
-    /// what comes now.
+    /// As [`add`](Self::add), and removes all other files that the command has written here before, since they belong
+    /// to earlier results.
     pub fn only<N: AsRef<str>>(&self, names: &[N]) -> Result<(), Error> {
         let before = self.files()?;
         self.add(names)?;
@@ -145,8 +145,8 @@ impl Folder {
         self.place(MARKER, |out| seal::json(out, &marker)).map(drop)
     }
 
-    /// Lets `fill` write a file under a temporary name, then gives it its own; an interrupted or failed run leaves the
-    /// file that was there before. What has its own name is on the disk, whatever happens to the power.
+    /// Lets `fill` write a file under a temporary name, and then renames it; an interrupted or failed run leaves the
+    /// previous file. A file with its final name is on the disk, even after a power cut.
     pub fn place(
         &self,
         name: &str,

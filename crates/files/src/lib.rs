@@ -1,4 +1,4 @@
-//! Folders of results: files that appear whole or not at all, carry a checksum, and never replace what is not theirs.
+//! Folders of results: files appear whole or not at all, carry a checksum, and never replace files of others.
 #![forbid(unsafe_code)]
 
 mod error;

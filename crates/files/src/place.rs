@@ -1,17 +1,17 @@
-//! How files come into being: whole or not at all.
+//! Atomic writing of files: whole or not at all.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Begins the names of what is none of the results.
+/// Prefix of the names of temporary files.
 pub(crate) const HIDDEN: &str = ".sitl.";
 
 /// Writes the file at `path` as [`Folder::place`](crate::Folder::place) does.
 pub fn place(path: &Path, fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>) -> io::Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let temporary = path.with_file_name(format!("{HIDDEN}{name}.{}.tmp", std::process::id()));
-    // Another program of this number may have been killed; where there is none, there is nothing to remove.
+    // A killed program of the same process id may have left one; usually there is nothing to remove.
     let _ = fs::remove_file(&temporary);
     let written = File::create_new(&temporary).and_then(|file| {
         let mut out = BufWriter::new(Disk { file, failure: None });
@@ -26,28 +26,28 @@ pub fn place(path: &Path, fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Resu
     })
 }
 
-/// Removes from the folder `dir` what a killed program has left half written.
+/// Removes temporary files of killed programs from the folder `dir`.
 pub fn sweep(dir: &Path) {
     for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
         if name.starts_with(HIDDEN) && name.ends_with(".tmp") {
-            // What cannot be removed does no harm either.
+            // A file that cannot be removed does no harm.
             let _ = fs::remove_file(entry.path());
         }
     }
 }
 
-/// A file that remembers why it could not be written.
+/// A file that records why writing to it failed.
 pub struct Disk {
     /// The file.
     pub file: File,
-    /// The system's number.
+    /// The system's error number.
     pub failure: Option<i32>,
 }
 
 impl Disk {
-    /// What the system said, if it said something: libraries wrap it so that its kind is lost.
+    /// Returns the system's error, if there was one: libraries wrap it so that its kind is lost.
     pub fn cause(&self, error: io::Error) -> io::Error {
         self.failure.map_or(error, io::Error::from_raw_os_error)
     }

@@ -1,4 +1,4 @@
-//! A checksum that a file carries in itself, and so wherever it goes.
+//! A checksum inside the file that it protects, so that copies are protected too.
 //!
 //! Near its end the file holds `xxh64:` and 16 digits: its own XXH64, computed with 16 zeros in their place.
 
@@ -6,34 +6,34 @@ use core::hash::Hasher;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use twox_hash::XxHash64;
 
-/// What a file holds before it is sealed.
+/// Tag in a file before it is sealed.
 pub const OPEN: &str = "xxh64:0000000000000000";
 const TAG: &[u8] = b"xxh64:";
 const ZEROS: &[u8; 16] = b"0000000000000000";
-/// The tag lies within this many bytes of the end.
+/// Number of bytes at the end within which the tag lies.
 const TAIL: usize = 4096;
 
-/// Where the digits begin, after the last tag.
+/// Returns where the digits of the last tag begin.
 fn digits(tail: &[u8]) -> Option<usize> {
     let tag = tail.windows(OPEN.len()).rposition(|window| window.starts_with(TAG))?;
     Some(tag + TAG.len())
 }
 
-/// Seals what is written into it, which holds [`OPEN`] near its end.
+/// Seals the data written to it, which contains [`OPEN`] near its end.
 pub struct Sealing<W> {
     out: W,
     hash: XxHash64,
-    /// The last bytes so far: the digits may be among them.
+    /// The last bytes so far, which may contain the digits.
     held: Vec<u8>,
 }
 
 impl<W: Write> Sealing<W> {
-    /// Seals what goes to `out`.
+    /// Creates a writer that seals its output to `out`.
     pub fn new(out: W) -> Self {
         Sealing { out, hash: XxHash64::with_seed(0), held: Vec::new() }
     }
 
-    /// Puts the checksum in its place.
+    /// Fills in the checksum.
     pub fn finish(mut self) -> io::Result<()> {
         self.hash.write(&self.held);
         let sum = format!("{:016x}", self.hash.finish());
@@ -60,7 +60,7 @@ impl<W: Write> Write for Sealing<W> {
     }
 }
 
-/// Writes `value`, which holds [`OPEN`] in its last field, and seals it.
+/// Writes `value`, whose last field contains [`OPEN`], and seals it.
 pub fn json(out: &mut dyn Write, value: &impl serde::Serialize) -> io::Result<()> {
     let mut out = Sealing::new(out);
     serde_json::to_writer_pretty(&mut out, value)?;
@@ -68,10 +68,10 @@ pub fn json(out: &mut dyn Write, value: &impl serde::Serialize) -> io::Result<()
     out.finish()
 }
 
-/// Whether a file is what was sealed, to the last bit.
+/// Checks that a sealed file is unchanged.
 ///
 /// # Errors
-/// One that says that it is not, or that it cannot be read.
+/// If it is changed, or cannot be read.
 pub fn verify(file: &mut (impl Read + Seek)) -> io::Result<()> {
     let broken = |problem: &str| io::Error::new(io::ErrorKind::InvalidData, problem);
     let start = file.seek(SeekFrom::End(0))?.saturating_sub(TAIL as u64);
@@ -115,14 +115,14 @@ mod tests {
         out
     }
 
-    /// Of every length around what is held back, however it is cut: the same checksum, and no flipped bit passes.
+    /// Checked for all lengths around that of the held bytes and all ways to cut the data into pieces.
     #[test]
     fn no_flipped_bit_passes() {
         for (before, after) in [(0, 0), (1, 9), (TAIL - 30, 8), (16 * TAIL, 100), (40 * TAIL + 1, TAIL - 50)] {
             let bytes = sealed(before, after, 1000);
             assert_eq!(bytes, sealed(before, after, 77_777));
             verify(&mut Cursor::new(&bytes)).unwrap();
-            // Every bit of the end, and some of the rest.
+            // Every bit of the end, and some of the others.
             let positions = (0..bytes.len()).filter(|at| at + 300 > bytes.len() || at % 1009 == 0);
             for (at, bit) in positions.flat_map(|at| (0..8).map(move |bit| (at, bit))) {
                 let mut flipped = bytes.clone();

@@ -1,6 +1,6 @@
-//! Who sends, and to whom.
+//! Sender and receiver of a message.
 
-/// Who sends, or is meant.
+/// MAVLink address of a sender or a receiver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Address {
     /// MAVLink system id; 0 means all.
@@ -10,7 +10,7 @@ pub struct Address {
 }
 
 impl Address {
-    /// True if what is sent to `target` is meant for this address.
+    /// True if a message to `target` is meant for this address.
     pub fn is_meant_by(self, target: Address) -> bool {
         (target.system == 0 || target.system == self.system)
             && (target.component == 0 || target.component == self.component)

@@ -1,4 +1,4 @@
-//! From a stream of bytes to messages.
+//! Decodes a stream of bytes into messages.
 
 use crate::address::Address;
 use crate::framing::{HEADER, Header, SIGNED_MAX, START, checksum};
@@ -7,14 +7,14 @@ use core::marker::PhantomData;
 use mavlink::Message as _;
 use mavlink::dialects::common::MavMessage;
 
-/// What came in since power-up. Each count stops at `u32::MAX`.
+/// Reception counts since power-up. Each count stops at `u32::MAX`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Messages delivered.
     pub received: u32,
     /// Frames dropped for [`Fault::BadChecksum`].
     pub bad_checksum: u32,
-    /// Frames dropped for [`Fault::Unknown`], or bytes that looked like their beginning.
+    /// Frames dropped for [`Fault::Unknown`], or bytes that looked like the start of such a frame.
     pub unknown: u32,
     /// Frames dropped for [`Fault::Oversized`].
     pub oversized: u32,
@@ -26,15 +26,14 @@ pub struct Counters {
     pub unsupported: u32,
     /// Frames dropped for [`Fault::Elsewhere`].
     pub elsewhere: u32,
-    /// Bytes that belonged to no frame whose checksum was right.
+    /// Bytes that belonged to no frame with a correct checksum.
     pub skipped_bytes: u32,
-    /// Frames that did not arrive, or whose checksum was wrong or could not be checked, by the gaps between one sender's
-    /// sequence numbers.
+    /// Frames that did not arrive, or had a wrong or unknown checksum, from the gaps in each sender's sequence numbers.
     pub lost: u32,
 }
 
 impl Counters {
-    /// All counts, in the order of the fields.
+    /// Returns all counts in the order of the fields.
     pub(crate) fn to_array(self) -> [u32; 10] {
         let Counters { received, bad_checksum, unknown, oversized, malformed, implausible, .. } = self;
         let Counters { unsupported, elsewhere, skipped_bytes, lost, .. } = self;
@@ -52,7 +51,7 @@ impl Counters {
         ]
     }
 
-    /// The counts that [`Counters::to_array`] gave.
+    /// Restores the counts from [`Counters::to_array`].
     pub(crate) fn from_array(counts: [u32; 10]) -> Self {
         let [
             received,
@@ -98,46 +97,47 @@ fn add(counter: &mut u32, count: u32) {
     *counter = counter.saturating_add(count);
 }
 
-/// Reads messages of one direction from a stream.
+/// Decodes the messages of one direction from a stream.
 ///
 /// # What is delivered
-/// A frame of a message that the direction carries, unsigned, no longer than the message, with the right checksum.
+/// Unsigned frames of a message that the direction carries, no longer than the message, with the right checksum.
 ///
-/// # What is not looked into
-/// Frames may carry other frames, meant for somebody else: TUNNEL, FILE_TRANSFER_PROTOCOL, LOG_DATA. Nothing is
+/// # Frames within frames
+/// Frames may contain other frames that are meant for somebody else: TUNNEL, FILE_TRANSFER_PROTOCOL, LOG_DATA. Nothing
+/// is
 /// delivered from within
 ///
-/// 1. a frame whose checksum is right, whatever comes behind it. That can be told of every message of MAVLink's
-///    `common` dialect, carried or not, signed or not, of any length and for anyone;
+/// 1. a frame with the right checksum, whatever follows it. The checksum can be verified for every message of MAVLink's
+///    `common` dialect, carried or not, signed or not, of any length and to any target;
 /// 2. any other frame, of another dialect or with a wrong checksum, if a start byte follows it.
 ///
-/// If something else follows, then its own start byte was none, as far as anyone can tell: it is skipped, and the search
-/// goes on behind it. No decoder can tell a frame whose first bytes were damaged from noise before the frames that it
-/// carries. MAVLink 1 is noise.
+/// If anything else follows, its start byte is taken for noise: it is skipped, and the search goes on behind it. No
+/// decoder can distinguish a frame whose first bytes were damaged from noise before the frames that it contains.
+/// MAVLink 1 frames are noise.
 ///
-/// # What noise costs
-/// A stray start byte holds back what comes after it until as many bytes are there as it announces, and one more: at
-/// most 281 bytes, 3.1 ms of a busy line at 921,600 baud. Frames are lost to it only if the last of these happens to be a
-/// start byte (rule 2), and then only those that lie wholly within the others: one that reaches beyond them is delivered.
-/// So every frame arrives that begins 280 bytes or more behind the last noise.
+/// # Effect of noise
+/// A stray start byte holds back what follows until as many bytes as it announces, plus one, have arrived: at most 281
+/// bytes, 3.1 ms of a busy line at 921,600 baud. It costs frames only if the last of these bytes happens to be a start
+/// byte (rule 2), and then only those that lie wholly within the others: one that reaches beyond them is delivered. So
+/// every frame arrives that begins 280 bytes or more behind the last noise.
 ///
-/// A truncated frame is such noise. One that lacks its last byte, if that was 0xFD, is completed by the first byte of the
-/// next frame, and then the rest of that one is noise.
+/// A truncated frame is noise, too. If its last byte is missing and was 0xFD, the first byte of the next frame
+/// completes it, and the rest of the next frame is noise.
 ///
-/// A checksum of 16 bits takes one of 65,536 damaged frames for a whole one, as MAVLink's always does.
+/// A checksum of 16 bits accepts one of 65,536 damaged frames, as always in MAVLink.
 ///
-/// In a stream without noise nothing is lost, and what can be checked is delivered with its last byte; unless several
-/// frames in a row cannot be checked and hold start bytes, which may hold it back as above.
+/// In a stream without noise nothing is lost, and frames that can be checked are delivered with their last byte, unless
+/// several frames in a row cannot be checked and contain start bytes, which may hold them back as above.
 ///
 /// # Cost
-/// Memory for the longest frame and a byte more. In a stream of intact frames a byte costs a copy and a step of its
-/// frame's checksum; in general, three steps for each start byte among the 280 bytes before it. At worst all of these
+/// Memory for the longest frame and one byte. In a stream of intact frames each byte costs a copy and one step of the
+/// checksum; in general, three steps for each start byte among the 280 bytes before it. In the worst case all of these
 /// fall due at once.
 pub struct Decoder<M> {
     receiver: Address,
     buffer: [u8; HELD_MAX],
     length: usize,
-    /// How many bytes at the front of the buffer belong to a frame that is not looked into (rule 2).
+    /// Number of bytes at the front of the buffer that belong to a frame whose contents are skipped (rule 2).
     sealed: usize,
     /// Sender and sequence number of the last frame.
     last: Option<(Address, u8)>,
@@ -145,23 +145,23 @@ pub struct Decoder<M> {
     messages: PhantomData<fn() -> M>,
 }
 
-/// The longest frame, and the byte behind it.
+/// Size of the longest frame and the byte behind it.
 const HELD_MAX: usize = SIGNED_MAX + 1;
 
-/// What the bytes held begin with.
+/// What the buffer begins with.
 enum Front<M> {
-    /// Nothing yet, or too little to tell.
+    /// Nothing, or too little to decide.
     Incomplete,
-    /// No frame, or one that is not looked at.
+    /// No frame, or one to be skipped.
     Garbage(Option<Fault>),
-    /// A frame of `length` bytes that cannot be checked, or is damaged, and a start byte behind it.
+    /// A frame of `length` bytes that is damaged or cannot be checked, followed by a start byte.
     Opaque { length: usize, fault: Fault },
-    /// A frame whose checksum is right, which begins behind the first `skipped` bytes.
+    /// A frame with the right checksum, which begins behind the first `skipped` bytes.
     Intact { skipped: usize, header: Header, message: Result<M, Fault> },
 }
 
 impl<M: Message> Decoder<M> {
-    /// Reads in the name of `receiver`.
+    /// Creates a decoder of messages to `receiver`.
     pub fn new(receiver: Address) -> Self {
         Decoder {
             receiver,
@@ -174,10 +174,10 @@ impl<M: Message> Decoder<M> {
         }
     }
 
-    /// Takes the next bytes of the stream and hands over every message that they complete, with its sender.
+    /// Takes the next bytes of the stream and delivers every message that they complete, with its sender.
     pub fn feed(&mut self, bytes: &[u8], mut deliver: impl FnMut(Address, M)) {
         for &byte in bytes {
-            // There is room: `advance` empties a full buffer, which tells of any frame.
+            // There is room, since `advance` always removes something from a full buffer.
             if let Some(next) = self.buffer.get_mut(self.length) {
                 *next = byte;
                 self.length += 1;
@@ -186,12 +186,12 @@ impl<M: Message> Decoder<M> {
         }
     }
 
-    /// What came in so far.
+    /// Returns the counts so far.
     pub fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// Deals with everything in the buffer that can be told.
+    /// Handles everything in the buffer that can be decided.
     fn advance(&mut self, deliver: &mut impl FnMut(Address, M)) {
         loop {
             match self.front() {
@@ -248,8 +248,9 @@ impl<M: Message> Decoder<M> {
         }
     }
 
-    /// What is held begins within sealed bytes with what may be a frame that reaches beyond them, and is not all there.
-    /// If the frame behind these bytes is, as of the last byte, and intact, then there is none before it.
+    /// The held bytes begin within sealed bytes, with what may be an incomplete frame that reaches beyond them. If the
+    /// frame
+    /// behind the sealed bytes is now complete and intact, there is no such frame.
     fn behind_sealed(&self, held: &[u8]) -> Front<M> {
         let behind = held.get(self.sealed..).filter(|_| self.sealed > 0).unwrap_or_default();
         let header = behind.first_chunk().map(Header::read).filter(|header| header.frame_length() == behind.len());
@@ -257,7 +258,7 @@ impl<M: Message> Decoder<M> {
         read.map_or(Front::Incomplete, |(header, message)| Front::Intact { skipped: self.sealed, header, message })
     }
 
-    /// The message in `frame`, if the frame's checksum is known and right.
+    /// Returns the message in `frame`, if the frame's checksum is known and right.
     fn read(&self, frame: &[u8], header: &Header) -> Option<Result<M, Fault>> {
         let end = HEADER + usize::from(header.length);
         let (summed, payload) = (frame.get(1..end)?, frame.get(HEADER..end)?);
@@ -272,7 +273,7 @@ impl<M: Message> Decoder<M> {
         })
     }
 
-    /// Skips the first byte, and then all up to one that may start a frame.
+    /// Skips the first byte and everything up to the next possible start of a frame.
     fn skip_to_start(&mut self) {
         let held = self.buffer.get(..self.length).unwrap_or_default();
         let skipped = 1 + held.iter().skip(1).take_while(|&&byte| byte != START).count();
@@ -280,7 +281,7 @@ impl<M: Message> Decoder<M> {
         self.remove(skipped);
     }
 
-    /// Drops the first `count` bytes of those held.
+    /// Drops the first `count` bytes held.
     fn remove(&mut self, count: usize) {
         if let Some(held) = self.buffer.get_mut(..self.length) {
             let count = count.min(held.len());
@@ -290,7 +291,7 @@ impl<M: Message> Decoder<M> {
         }
     }
 
-    /// Counts the gap before a frame. What comes out of order or twice is no gap.
+    /// Counts the gap in the sequence numbers before a frame. Out-of-order and duplicate frames are no gap.
     fn count_lost(&mut self, header: &Header) {
         let gap = match self.last {
             Some((from, sequence)) if from == header.from => header.sequence.wrapping_sub(sequence).wrapping_sub(1),
@@ -303,9 +304,9 @@ impl<M: Message> Decoder<M> {
     }
 }
 
-/// The seed of the checksum of any message of the `common` dialect.
+/// Returns the checksum's seed for any message of the `common` dialect.
 fn dialect_extra_crc(id: u32) -> Option<u8> {
-    /// The one message whose seed is 0, which stands for "not in the dialect", too.
+    /// The one message whose seed is 0, which otherwise means "not in the dialect".
     const COMPONENT_INFORMATION: u32 = 395;
     match MavMessage::extra_crc(id) {
         0 if id != COMPONENT_INFORMATION => None,

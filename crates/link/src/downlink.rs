@@ -1,4 +1,4 @@
-//! What the vehicle says.
+//! Messages from the vehicle.
 
 use crate::address::Address;
 use crate::decoder::Counters;
@@ -14,7 +14,7 @@ use mavlink::dialects::common::{
 use mavlink::types::CharArray;
 use nalgebra::{Vector3, Vector4};
 
-/// Words, up to 50 bytes.
+/// Text of up to 50 bytes.
 pub type Text = CharArray<50>;
 
 /// A message from the vehicle.
@@ -25,53 +25,53 @@ pub enum Downlink {
     Heartbeat {
         /// True if the motors may turn.
         armed: bool,
-        /// True if a failsafe flies, or did a moment ago: MAV_STATE_CRITICAL.
+        /// True if a failsafe is active or has just ended: MAV_STATE_CRITICAL.
         failsafe: bool,
         /// The vehicle's mode, its `custom_mode`.
         mode: u32,
     },
-    /// HIL_ACTUATOR_CONTROLS (93): what the rotors are told. The message has room for -1..1: each control is
-    /// omega_i / [`Downlink::SPEED_FULL_SCALE_RAD_S`], a power of two, so that the speed crosses without rounding.
+    /// HIL_ACTUATOR_CONTROLS (93): commanded rotor speeds. The message's range is -1..1: each control is omega_i /
+    /// [`Downlink::SPEED_FULL_SCALE_RAD_S`], a power of two, so that the speed is transmitted without rounding.
     Rotors {
-        /// Since power-up \[us\].
+        /// Time since power-up \[us\].
         time_us: u64,
         /// True if the motors may turn.
         armed: bool,
         /// omega_i
         speeds: RotorSpeeds,
     },
-    /// ATTITUDE (30), in our frames.
+    /// ATTITUDE (30), in the frames of [`afbc_types`].
     Attitude {
-        /// Since power-up \[ms\].
+        /// Time since power-up \[ms\].
         time_ms: u32,
         /// Roll, pitch, yaw \[rad\].
         attitude_rad: Vector3<f32>,
         /// p, q, r \[rad/s\].
         rates_rad_s: Vector3<f32>,
     },
-    /// LOCAL_POSITION_NED (32), in our frames.
+    /// LOCAL_POSITION_NED (32), in the frames of [`afbc_types`].
     Position {
-        /// Since power-up \[ms\].
+        /// Time since power-up \[ms\].
         time_ms: u32,
-        /// Earth frame \[m\].
+        /// Position in the earth frame \[m\].
         position_m: Vector3<f32>,
-        /// Earth frame \[m/s\].
+        /// Velocity in the earth frame \[m/s\].
         velocity_m_s: Vector3<f32>,
     },
     /// COMMAND_ACK (77).
     Answer {
-        /// What is answered, by its number.
+        /// Number of the command that is answered.
         command: u16,
         /// The answer.
         answer: Answer,
-        /// Who asked.
+        /// Sender of the command.
         to: Address,
     },
     /// STATUSTEXT (253).
     Text {
-        /// How bad it is.
+        /// Severity.
         severity: MavSeverity,
-        /// What it is.
+        /// Text.
         text: Text,
     },
     /// DEBUG_FLOAT_ARRAY (350) named "health".
@@ -82,32 +82,33 @@ pub enum Downlink {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Answer {
-    /// Done.
+    /// Carried out.
     Accepted,
-    /// Not now; the number of the reason, `result_param2`.
+    /// Refused for now, with the number of the reason in `result_param2`.
     Refused(i32),
-    /// Never, with these parameters.
+    /// Invalid parameters.
     Denied,
-    /// This vehicle does not know the command.
+    /// Unknown command.
     Unsupported,
-    /// Nobody knows what became of it.
+    /// Outcome unknown.
     Failed,
 }
 
-/// How the vehicle does, in the order of the array's elements. Counts cross as `f32`, exactly up to 2^24.
+/// State of the flight core and the link, in the order of the array's elements. Counts are sent as `f32`, exact up to
+/// 2^24.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Health {
-    /// Since power-up \[us\].
+    /// Time since power-up \[us\].
     pub time_us: u64,
-    /// Time that the last control tick took \[us\].
+    /// Duration of the last control tick \[us\].
     pub tick_us: f32,
-    /// Longest that one took so far \[us\].
+    /// Longest duration of a control tick so far \[us\].
     pub tick_max_us: f32,
     /// Ticks in the last second \[Hz\].
     pub rate_hz: f32,
-    /// Ticks that came late, or early, since power-up.
+    /// Ticks since power-up that came late or early.
     pub late_ticks: u32,
-    /// Ticks in which a rotor was asked for a force outside its limits.
+    /// Ticks in which a rotor was commanded a force outside its limits.
     pub saturated_ticks: u32,
     /// Age of the newest state \[us\].
     pub state_age_us: f32,
@@ -115,29 +116,29 @@ pub struct Health {
     pub theta_norm: PerAxis<f32>,
     /// Each subsystem's delta_hat.
     pub delta: PerAxis<f32>,
-    /// What was received and dropped.
+    /// Reception counts of the link.
     pub link: Counters,
-    /// Commands since power-up that got no answer: more came at once than could be answered.
+    /// Commands since power-up that were not answered, because more arrived at once than could be answered.
     pub unanswered: u32,
-    /// States that were not flown on.
+    /// States that were not used.
     pub states_refused: StatesRefused,
 }
 
-/// States since power-up that were not flown on, by reason.
+/// States since power-up that were not used, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StatesRefused {
-    /// A later one had overtaken it, or it came twice.
+    /// Out of order or duplicate.
     pub overtaken: u32,
-    /// It was too old when it came.
+    /// Too old on arrival.
     pub late: u32,
-    /// Another sender is in use.
+    /// From another sender than the one in use.
     pub elsewhere: u32,
-    /// It repeated the last one in flight, or came from a tracker that is not believed any more.
+    /// Repeating the last one in flight, or from a tracker that is no longer trusted.
     pub frozen: u32,
 }
 
 impl Downlink {
-    /// The rotor speed whose control is 1 \[rad/s\].
+    /// Rotor speed at a control of 1 \[rad/s\].
     pub const SPEED_FULL_SCALE_RAD_S: f32 = 32_768.0;
 }
 
@@ -279,8 +280,8 @@ const TEXT_EXTENSION: usize = 3;
 const HEALTH_ELEMENTS: usize = 58;
 const HEALTH: &str = "health";
 
-/// Command, result, progress, `result_param2`, target. By hand, since the `mavlink` crate refuses commands that its
-/// dialect does not know.
+/// Reads command, result, progress, `result_param2` and target. By hand, since the `mavlink` crate rejects commands
+/// that its dialect does not define.
 fn read_answer(payload: &[u8]) -> Result<Downlink, Fault> {
     let [low, high, result, _, reason @ .., system, component]: [u8; ANSWER_FIELDS] = field(payload, 0);
     let answer = match result {
@@ -342,7 +343,7 @@ fn read_health(data: &DEBUG_FLOAT_ARRAY_DATA, extension: [u8; 4 * HEALTH_ELEMENT
 }
 
 impl Health {
-    /// The array's elements.
+    /// Returns the array's elements.
     fn elements(&self) -> impl Iterator<Item = f32> {
         let Health { tick_us, tick_max_us, rate_hz, late_ticks, saturated_ticks, state_age_us, .. } = *self;
         let ticks = [tick_us, tick_max_us, rate_hz, late_ticks as f32, saturated_ticks as f32, state_age_us];

@@ -1,11 +1,12 @@
-//! The layout of a MAVLink 2 frame, and writing one.
+//! Layout and encoding of a MAVLink 2 frame.
 //!
 //! ```text
-//! 0xFD  length  incompatible  compatible  sequence  system  component  id (3)  payload (length)  checksum (2)  [signature (13)]
+//! 0xFD  length  incompatible  compatible  sequence  system  component  id (3)
+//! payload (length)  checksum (2)  [signature (13)]
 //! ```
 //!
-//! <https://mavlink.io/en/guide/serialization.html>. Frames with incompatibility flags are not understood; the one that
-//! says that a signature follows is, as far as a frame's length goes.
+//! <https://mavlink.io/en/guide/serialization.html>. Frames with incompatibility flags are not supported; the flag for
+//! a signature is only used to find the frame's length.
 
 use crate::address::Address;
 use crate::message::{Message, PAYLOAD_MAX};
@@ -16,7 +17,7 @@ pub(crate) const START: u8 = 0xFD;
 pub(crate) const HEADER: usize = 10;
 /// Bytes after the payload.
 pub(crate) const CHECKSUM: usize = 2;
-/// Bytes behind the checksum of a frame with the flag [`SIGNED`].
+/// Bytes after the checksum of a frame with the flag [`SIGNED`].
 const SIGNATURE: usize = 13;
 /// Incompatibility flag: a signature follows the checksum.
 const SIGNED: u8 = 1;
@@ -42,7 +43,7 @@ impl Header {
         Header { length, incompatible, sequence, from: Address { system, component }, id }
     }
 
-    /// Bytes from the first to the last of the frame.
+    /// Returns the number of bytes of the whole frame.
     pub(crate) fn frame_length(&self) -> usize {
         let signature = if self.incompatible & SIGNED != 0 { SIGNATURE } else { 0 };
         HEADER + usize::from(self.length) + CHECKSUM + signature
@@ -55,7 +56,7 @@ impl Header {
     }
 }
 
-/// CRC-16/MCRF4XX over all of a frame but its first byte and its checksum, and then the message's seed.
+/// Computes CRC-16/MCRF4XX over a frame without its first byte and checksum, followed by the message's seed.
 pub(crate) fn checksum(bytes: &[u8], extra_crc: u8) -> u16 {
     let accumulate = |crc: u16, byte: &u8| {
         let low = byte ^ crc as u8;
@@ -65,7 +66,7 @@ pub(crate) fn checksum(bytes: &[u8], extra_crc: u8) -> u16 {
     accumulate(bytes.iter().fold(0xFFFF, accumulate), &extra_crc)
 }
 
-/// Writes frames, numbering them.
+/// Encodes messages as numbered frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sender {
     from: Address,
@@ -73,7 +74,7 @@ pub struct Sender {
 }
 
 impl Sender {
-    /// Sends from `from`, beginning with sequence number 0.
+    /// Creates a sender with address `from`, beginning with sequence number 0.
     pub const fn new(from: Address) -> Self {
         Sender { from, sequence: 0 }
     }

@@ -1,18 +1,18 @@
-//! What crosses the wire between the vehicle and whoever tracks, commands, simulates or watches it: MAVLink 2.
+//! MAVLink 2 link between the vehicle and its trackers, commanders, simulators and ground stations.
 //!
 //! # Reading order
 //!
-//! 1. [`frames`]: the wire's axes point down, ours up; the one place where they meet.
-//! 2. [`Uplink`]: what comes in. [`Downlink`]: what goes out. Both can be written and read, for the other end is ours
-//!    too when it simulates.
-//! 3. [`Sender`]: from messages to bytes. [`Decoder`]: from bytes, in any pieces and with anything between them, to
-//!    messages, with [`Counters`] of what was dropped and why.
+//! 1. [`frames`]: conversion between the wire's frames (z down) and the workspace's (z up).
+//! 2. [`Uplink`]: messages to the vehicle. [`Downlink`]: messages from it. Both can be written and read, since the
+//!    simulator is the other end.
+//! 3. [`Sender`]: encodes messages. [`Decoder`]: decodes bytes, in any pieces and with anything between the frames, and
+//!    counts what it drops in [`Counters`].
 //!
-//! Layouts, checksums' seeds and enumerations come from the `mavlink` crate's `common` dialect; of its messages only
-//! those named here reach the image. Parameter messages are not spoken: gains are fixed and validated before flight.
-//! Signed frames are not understood and are dropped.
+//! Layouts, checksum seeds and enumerations come from the `mavlink` crate's `common` dialect; only the messages named
+//! here reach the image. Parameter messages are not supported: gains are fixed and validated before flight. Signed
+//! frames are not supported and are dropped.
 //!
-//! Nothing here panics or waits, whatever the bytes; memory is one frame.
+//! No input makes the crate panic or block; memory is one frame.
 //!
 //! ```
 //! use afbc_link::{Address, Decoder, FRAME_MAX, Sender, Uplink};

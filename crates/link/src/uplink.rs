@@ -1,4 +1,4 @@
-//! What comes to the vehicle.
+//! Messages to the vehicle.
 
 use crate::address::Address;
 use crate::frames::{Odometry, flip};
@@ -14,46 +14,45 @@ use nalgebra::Vector3;
 /// A message to the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Uplink {
-    /// HEARTBEAT (0): somebody is there.
+    /// HEARTBEAT (0) of a ground station or companion computer.
     Heartbeat,
     /// ODOMETRY (331): the full state, from motion capture, a companion computer or the simulator.
     ///
-    /// Read in frame MAV_FRAME_LOCAL_NED or MAV_FRAME_LOCAL_FRD with child frame MAV_FRAME_BODY_FRD, otherwise
-    /// [`Fault::Unsupported`]; so is a quality of -1, "odometry has failed". Covariances are not looked at.
+    /// Supported in frame MAV_FRAME_LOCAL_NED or MAV_FRAME_LOCAL_FRD with child frame MAV_FRAME_BODY_FRD, otherwise
+    /// [`Fault::Unsupported`]; so is a quality of -1, "odometry has failed". Covariances are ignored.
     State {
-        /// When it was measured, on the sender's clock \[us\].
+        /// Time of the measurement on the sender's clock \[us\].
         sent_us: u64,
-        /// In our frames; plausible.
+        /// Plausible state in the frames of [`afbc_types`].
         state: State,
     },
-    /// SET_POSITION_TARGET_LOCAL_NED (84) in MAV_FRAME_LOCAL_NED. The vehicle flies to positions and headings: if
-    /// `type_mask` says to ignore one of x, y, z or yaw, or that forces are meant, the message is
-    /// [`Fault::Unsupported`]. Ignored velocities, accelerations and yaw rate are zero. The message has no yaw
-    /// acceleration: zero.
+    /// SET_POSITION_TARGET_LOCAL_NED (84) in MAV_FRAME_LOCAL_NED. The vehicle needs a position and a heading: if
+    /// `type_mask` ignores one of x, y, z or yaw, or selects forces, the message is [`Fault::Unsupported`]. Ignored
+    /// velocities, accelerations and yaw rate are zero, and so is the yaw acceleration, which the message lacks.
     Setpoint(Setpoint),
     /// COMMAND_LONG (76) or COMMAND_INT (75). Written as COMMAND_LONG.
     Command(Command),
 }
 
-/// What COMMAND_LONG or COMMAND_INT asks for. Each has an answer, [`Downlink::Answer`](crate::Downlink::Answer).
+/// Request in COMMAND_LONG or COMMAND_INT, answered by [`Downlink::Answer`](crate::Downlink::Answer).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
-    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 1. Forcing it (param2 = 21196) makes no difference.
+    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 1. Forcing it (param2 = 21196) has no effect.
     Arm,
     /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 0.
     Disarm,
-    /// The same, forced (param2 = 21196): in flight, too.
+    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 0, forced (param2 = 21196): also in flight.
     Kill,
-    /// MAV_CMD_USER_1 (31010): give the flight back to AFBC after its monitor has tripped.
+    /// MAV_CMD_USER_1 (31010): engage AFBC again after its monitor has tripped.
     Engage,
-    /// One of these, by its number, with a parameter that it cannot have: to be answered with "denied".
+    /// One of these commands, by number, with an invalid parameter: answered with "denied".
     Denied(u16),
-    /// Anything else, by its number in whatever dialect: to be answered with "unsupported".
+    /// Any other command, by number, of any dialect: answered with "unsupported".
     Other(u16),
 }
 
 impl Command {
-    /// The MAVLink command's number, as its answer names it.
+    /// Returns the MAVLink command's number, for its answer.
     pub fn id(self) -> u16 {
         match self {
             Command::Arm | Command::Disarm | Command::Kill => ARM_DISARM,
@@ -108,7 +107,7 @@ impl Message for Uplink {
     }
 }
 
-/// The message's target, if it is not for `receiver`, drops it.
+/// Returns [`Fault::Elsewhere`] if the message's target is not `receiver`.
 fn meant_for(receiver: Address, system: u8, component: u8) -> Result<(), Fault> {
     if receiver.is_meant_by(Address { system, component }) { Ok(()) } else { Err(Fault::Elsewhere) }
 }
@@ -193,11 +192,11 @@ fn write_setpoint(setpoint: &Setpoint) -> SET_POSITION_TARGET_LOCAL_NED_DATA {
     data
 }
 
-/// param2 of MAV_CMD_COMPONENT_ARM_DISARM that forces it.
+/// Value of param2 of MAV_CMD_COMPONENT_ARM_DISARM that forces it.
 const FORCED: f32 = 21196.0;
 
-/// Where COMMAND_LONG and COMMAND_INT have the fields that matter, both alike: two parameters, number, target. By hand,
-/// since the `mavlink` crate refuses what its dialect does not know.
+/// Offsets of the fields used, equal in COMMAND_LONG and COMMAND_INT: two parameters, number, target. By hand, since
+/// the `mavlink` crate rejects commands that its dialect does not define.
 const COMMAND_FIELDS: [usize; 4] = [0, 4, 28, 30];
 
 fn read_command(payload: &[u8], receiver: Address) -> Result<Uplink, Fault> {
@@ -217,7 +216,7 @@ fn read_command(payload: &[u8], receiver: Address) -> Result<Uplink, Fault> {
     Ok(Uplink::Command(command))
 }
 
-/// The fields of COMMAND_LONG: seven parameters, number, target (all) and confirmation.
+/// Returns the fields of COMMAND_LONG: seven parameters, number, target (all) and confirmation.
 fn write_command(command: Command) -> impl Iterator<Item = u8> {
     let [param1, param2] = match command {
         Command::Arm => [1.0, 0.0],

@@ -1,4 +1,4 @@
-//! The stream: pieces, noise, corruption, truncation, frames within frames.
+//! Decoding of a stream: fragments, noise, corruption, truncation, frames within frames.
 #![allow(
     clippy::expect_used,
     clippy::indexing_slicing,
@@ -33,13 +33,13 @@ fn messages() -> impl Strategy<Value = Uplink> {
     ]
 }
 
-/// Frames of `messages`, by one sender.
+/// Frames of `messages` from one sender.
 fn frames(messages: &[Uplink]) -> Vec<Vec<u8>> {
     let mut sender = Sender::new(STATION);
     messages.iter().map(|message| sender.send(message, &mut [0; FRAME_MAX]).to_vec()).collect()
 }
 
-/// What `chunks` decode to, and the counts.
+/// Decoded messages of `chunks`, and the counts.
 fn decode<'a>(chunks: impl IntoIterator<Item = &'a [u8]>) -> (Vec<Uplink>, Counters) {
     let mut decoder = Decoder::new(VEHICLE);
     let mut messages = Vec::new();
@@ -52,21 +52,21 @@ fn decode<'a>(chunks: impl IntoIterator<Item = &'a [u8]>) -> (Vec<Uplink>, Count
 /// The longest frame there is \[bytes\]: with a signature.
 const LONGEST: usize = 280;
 
-/// Enough to tell what anything before it is.
+/// Enough bytes to decide about everything before them.
 const FLUSH: [u8; LONGEST + 1] = [0; LONGEST + 1];
 
 /// The `CRC_EXTRA` of a message of the `common` dialect.
 fn known_seed(id: u32) -> Option<u8> {
-    // That of COMPONENT_INFORMATION, and what the `mavlink` crate says of all that it does not know.
+    // COMPONENT_INFORMATION, and every message that the `mavlink` crate knows.
     Some(MavMessage::extra_crc(id)).filter(|&seed| seed != 0 || id == 395)
 }
 
-/// The same, or that of another dialect.
+/// The `CRC_EXTRA` of a message of the `common` dialect or of an invented other one.
 fn seed(id: u32) -> u8 {
     known_seed(id).unwrap_or(99)
 }
 
-/// The messages of those frames in `stream` that the specification and the stated rules leave.
+/// Messages in `stream` to be delivered according to the specification and the decoder's rules.
 fn expected(stream: &[u8]) -> Vec<Uplink> {
     let carried = |id: u32, length: usize| match id {
         0 => length <= 9,
@@ -83,7 +83,7 @@ fn expected(stream: &[u8]) -> Vec<Uplink> {
         .collect()
 }
 
-/// Payloads that hold whole frames, parts of frames, start bytes and noise.
+/// Payloads with whole frames, parts of frames, start bytes and noise.
 fn nesting_payloads() -> impl Strategy<Value = Vec<u8>> {
     let noise = prop::collection::vec(prop_oneof![3 => any::<u8>(), 1 => Just(0xFD), 1 => Just(0)], 0..40);
     let frame = messages().prop_map(|message| frames(&[message]).concat()).boxed();
@@ -99,8 +99,8 @@ fn nesting_payloads() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
-/// A frame, and its message if it is to be delivered: carried ones; others, from TUNNEL, FILE_TRANSFER_PROTOCOL and
-/// LOG_DATA to such as no dialect has, signed and not; carried ones that are signed or too long; any of these damaged
+/// A frame, and its message if it must be delivered: carried messages; others, from TUNNEL, FILE_TRANSFER_PROTOCOL and
+/// LOG_DATA to ones of no dialect, signed and unsigned; carried ones that are signed or too long; any of these damaged
 /// behind the header.
 fn top_level() -> impl Strategy<Value = (Vec<u8>, Option<Uplink>)> {
     let carried = messages().prop_map(|message| (frames(&[message]).concat(), Some(message))).boxed();
@@ -137,7 +137,7 @@ fn top_level() -> impl Strategy<Value = (Vec<u8>, Option<Uplink>)> {
     prop_oneof![2 => carried, 2 => other, 1 => damaged]
 }
 
-/// Anything that a line may hold: frames of all kinds, whole or cut at both ends, noise.
+/// Any content of a line: frames of all kinds, whole or cut at either end, noise.
 fn streams() -> impl Strategy<Value = Vec<u8>> {
     let index = any::<prop::sample::Index>;
     let cut = (top_level(), index(), index()).prop_map(|((bytes, _), from, to)| {
@@ -151,7 +151,7 @@ fn streams() -> impl Strategy<Value = Vec<u8>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
 
-    /// No bytes panic or hang it, and every byte is accounted for.
+    /// Arbitrary bytes cause no panic and no hang, and every byte is counted.
     #[test]
     fn arbitrary_bytes_do_no_harm(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
         let (messages, counters) = decode([bytes.as_slice()]);
@@ -159,16 +159,19 @@ proptest! {
         prop_assert!(counters.skipped_bytes as usize <= bytes.len());
     }
 
-    /// As above, with bytes that keep looking like the beginning of a frame.
+    /// The same for bytes that often look like the start of a frame.
     #[test]
-    fn almost_frames_do_no_harm(bytes in prop::collection::vec(
-        prop_oneof![Just(0xFD), Just(0), Just(1), Just(84), Just(76), Just(75), any::<u8>()], 0..2000)
+    fn almost_frames_do_no_harm(
+        bytes in prop::collection::vec(
+            prop_oneof![Just(0xFD), Just(0), Just(1), Just(84), Just(76), Just(75), any::<u8>()],
+            0..2000,
+        ),
     ) {
         let (messages, counters) = decode([bytes.as_slice()]);
         prop_assert_eq!(messages.len(), counters.received as usize);
     }
 
-    /// It does not matter how the stream is cut.
+    /// The result does not depend on how the stream is cut into pieces.
     #[test]
     fn pieces_make_no_difference(
         messages in prop::collection::vec(messages(), 1..20),
@@ -191,7 +194,7 @@ proptest! {
         prop_assert_eq!(&decode(pieces), &whole);
     }
 
-    /// A frame behind any noise arrives, before 280 bytes have come behind the noise.
+    /// A frame behind any noise arrives before 280 bytes have followed the noise.
     #[test]
     fn a_frame_behind_noise_arrives(noise in prop::collection::vec(any::<u8>(), 0..600), message in messages()) {
         let frame = frames(&[message]).concat();
@@ -200,8 +203,8 @@ proptest! {
         prop_assert!(counters.skipped_bytes as usize >= noise.len());
     }
 
-    /// Noise, a truncated frame included, costs no frame that begins 280 bytes or more behind it, whatever the noise;
-    /// and nothing is delivered that was not sent.
+    /// Noise, including truncated frames, costs no frame that begins 280 bytes or more behind it, and nothing is
+    /// delivered that was not sent.
     #[test]
     fn noise_costs_no_frame_beyond_its_reach(
         before in messages(),
@@ -213,7 +216,7 @@ proptest! {
         let sent = frames(&[&[before, cut], after.as_slice()].concat());
         let part = &sent[1][..keep.index(sent[1].len())];
         for (noise, cut_only) in [(part, true), (&noise, false)] {
-            // Or else the next frame is noise, too: `a_truncated_frame_may_be_completed_by_the_start_of_the_next`.
+            // Otherwise the next frame is noise, too: `a_truncated_frame_may_be_completed_by_the_start_of_the_next`.
             let intact = |end: &[u8]| reference::frames(&[noise, end].concat(), known_seed).len();
             prop_assume!(intact(&[]) == intact(&[0xFD]));
             let stream = [sent[0].as_slice(), noise, &sent[2..].concat(), &FLUSH].concat();
@@ -228,7 +231,7 @@ proptest! {
             prop_assert_eq!(messages[0], before);
             prop_assert!(messages.ends_with(far), "{} of {} and {}", messages.len(), near.len(), far.len());
             if cut_only {
-                // What was cut may have been completed by the first bytes of what follows.
+                // The truncated frame may have been completed by the first bytes of what follows.
                 let mut rest = [&[before, cut], after.as_slice()].concat().into_iter();
                 prop_assert!(messages.iter().all(|message| rest.any(|sent| sent == *message)));
                 prop_assert!(counters.lost as usize <= 1 + near.len());
@@ -236,8 +239,8 @@ proptest! {
         }
     }
 
-    /// A stream of whole frames: those carried are delivered, each with its last byte or the first ones of the next,
-    /// and nothing that lies within a frame.
+    /// Of a stream of whole frames, the carried ones are delivered, each with its last byte or the first ones of the
+    /// next frame, and nothing from within a frame.
     #[test]
     fn a_frame_within_a_frame_is_not_looked_at(top in prop::collection::vec(top_level(), 0..20)) {
         let last = frames(&[Uplink::Heartbeat]).concat();
@@ -252,22 +255,22 @@ proptest! {
         prop_assert_eq!(decode([stream.as_slice()]).0, sent);
     }
 
-    /// A frame that cannot be checked does not hold back the next one, whatever it holds.
+    /// A frame that cannot be checked does not delay the next one, whatever its content.
     #[test]
     fn a_stranger_holds_nothing_back((stranger, _) in top_level(), message in messages()) {
         let frame = frames(&[message]).concat();
         prop_assert_eq!(decode([stranger.as_slice(), &frame]).0.last().copied(), Some(message));
     }
 
-    /// Whatever the line holds, what is delivered is what the specification and the stated rules say.
+    /// The decoder delivers the same as the reference, for any content of the line.
     #[test]
     fn the_reference_delivers_the_same(stream in streams()) {
         prop_assert_eq!(decode([stream.as_slice()]).0, expected(&stream));
     }
 }
 
-/// Found by chance: a frame whose checksum ends in 0xFD lost its last byte, and the first byte of the next frame is just
-/// that one. The frame is whole again, and the next one has no beginning.
+/// Found by chance: a frame whose checksum ends in 0xFD loses its last byte, and the first byte of the next frame
+/// completes it. The next frame then lacks its first byte.
 #[test]
 fn a_truncated_frame_may_be_completed_by_the_start_of_the_next() {
     let x = 33.915_356;
@@ -280,8 +283,8 @@ fn a_truncated_frame_may_be_completed_by_the_start_of_the_next() {
     assert_eq!(counters.lost, 1);
 }
 
-/// Found by `scripts/soak`: a checksum of 16 bits is right once in 65,536 times. A request that was cut short goes on with
-/// the bytes of the next frame, and this time what it becomes counts: that is all that the checksum promises.
+/// Found by `scripts/soak`: a checksum of 16 bits is right by chance once in 65,536 times. Here a truncated request is
+/// completed by bytes of the next frame to a valid one, which is delivered.
 #[test]
 fn a_truncated_frame_may_become_another_by_chance() {
     let state = Uplink::State { sent_us: 14_286_421_826_361_620_939, state: State::default() };
@@ -295,7 +298,7 @@ fn a_truncated_frame_may_become_another_by_chance() {
     assert_ne!(messages[1], state);
 }
 
-/// Every change of every single byte: the frame is not taken for another, its neighbours arrive.
+/// Every change of a single byte: the frame is not taken for another one, and its neighbours arrive.
 #[test]
 fn a_corrupted_frame_is_dropped() {
     let state = State { position_m: Vector3::new(1.0, 2.0, 3.0), ..State::default() };
@@ -358,7 +361,7 @@ fn each_cause_has_its_count() {
         (&elsewhere, Counters { elsewhere: 1, ..one }),
     ];
     for (frame, expected) in cases {
-        // The next frame is read, as soon as it is there.
+        // The next frame is read as soon as it is complete.
         let (messages, counters) = decode([frame.as_slice(), &heartbeat]);
         assert_eq!((messages.last(), counters), (Some(&Uplink::Heartbeat), expected));
     }
@@ -380,8 +383,8 @@ fn gaps_between_sequence_numbers_are_counted() {
     assert_eq!(decode([sent[9].as_slice(), &foreign, &sent[10]]).1.lost, 0, "two senders");
 }
 
-/// TUNNEL, FILE_TRANSFER_PROTOCOL and LOG_DATA for somebody else that carry a request to disarm, whatever follows; the
-/// same in a frame of a message that no dialect knows, signed or damaged, if a frame follows.
+/// TUNNEL, FILE_TRANSFER_PROTOCOL and LOG_DATA for somebody else that contain a request to disarm, whatever follows;
+/// the same in a frame of a message of no dialect, signed or damaged, if a frame follows.
 #[test]
 fn a_frame_that_carries_another_is_skipped_whole() {
     let disarm = frames(&[Uplink::Command(Command::Disarm)]).concat();
@@ -406,7 +409,7 @@ fn a_frame_that_carries_another_is_skipped_whole() {
     }
 }
 
-/// Messages that this direction does not carry cost nothing: neither a frame, nor time, nor a count of lost ones.
+/// Messages that this direction does not carry cost neither a frame nor time, and do not count as lost.
 #[test]
 fn a_stream_with_strangers_loses_nothing() {
     let mut decoder = Decoder::new(VEHICLE);
@@ -414,7 +417,7 @@ fn a_stream_with_strangers_loses_nothing() {
     for round in 0..=u8::MAX {
         for (sequence, id) in [(0, 66), (1, 21), (2, 110), (4, 42_000)] {
             let sequence = round.wrapping_mul(5).wrapping_add(sequence);
-            // Start bytes, but none that the frame ends before.
+            // Start bytes whose announced frames end beyond this frame.
             let payload = [[0xFD, 5].repeat(20), vec![round; 100]].concat();
             let stranger = Frame { flags: 0, sequence, system: 255, component: 190, id, payload };
             decoder.feed(&stranger.bytes(seed(id)), |_, message: Uplink| panic!("{message:?}"));
@@ -428,6 +431,6 @@ fn a_stream_with_strangers_loses_nothing() {
             }
         }
     }
-    // Those of another dialect cannot be checked, and count as lost.
+    // Messages of another dialect cannot be checked and count as lost.
     assert_eq!(decoder.counters().lost, 255);
 }

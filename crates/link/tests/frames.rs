@@ -1,4 +1,4 @@
-//! The wire's frames against ours: known attitudes, and `f64` rotation matrices as the oracle.
+//! Conversion of frames: known attitudes, and `f64` rotation matrices as the oracle.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc_link::frames::{Odometry, euler, flip, quaternion};
@@ -27,12 +27,12 @@ fn with_attitude(attitude: [f32; 4]) -> Odometry {
 #[test]
 fn known_attitudes() {
     let half = core::f32::consts::FRAC_1_SQRT_2;
-    // (the wire's quaternion, what it means there, our roll, pitch and yaw)
+    // (the wire's quaternion, its meaning there, roll, pitch and yaw in the workspace's frames)
     let cases = [
         ([1.0, 0.0, 0.0, 0.0], "level, nose north", [0.0, 0.0, 0.0]),
-        ([half, 0.0, 0.0, half], "nose east: to our right", [0.0, 0.0, -FRAC_PI_2]),
+        ([half, 0.0, 0.0, half], "nose east: to the right", [0.0, 0.0, -FRAC_PI_2]),
         ([half, half, 0.0, 0.0], "right side down", [FRAC_PI_2, 0.0, 0.0]),
-        ([half, 0.0, half, 0.0], "nose up: our pitch is negative", [0.0, -FRAC_PI_2, 0.0]),
+        ([half, 0.0, half, 0.0], "nose up: negative pitch in the workspace", [0.0, -FRAC_PI_2, 0.0]),
         ([-1.0, 0.0, 0.0, 0.0], "level, the other sign", [0.0, 0.0, 0.0]),
         ([0.0, 0.0, 0.0, 1.0], "nose south", [0.0, 0.0, PI]),
     ];
@@ -49,14 +49,14 @@ fn positive_pitch_of_ours_tilts_the_thrust_forwards() {
     let state = State { attitude_rad: Vector3::new(0.0, 0.1, 0.0), ..State::default() };
     let thrust_earth = r_earth_body(&state.attitude_rad) * Vector3::z();
     assert!(thrust_earth.x > 0.0);
-    // On the wire the nose is down: the body's x axis points to positive z (down).
+    // On the wire the nose is down: the body's x axis points towards positive z (down).
     let [w, x, y, z] = Odometry::from_state(&state).attitude;
     assert!((rotation_of(&Quaternion::new(w, x, y, z)) * Vector3::x()).z > 0.0);
 }
 
 #[test]
 fn velocity_is_in_the_child_frame() {
-    // Nose east, flying forwards at 1 m/s and sinking at 2 m/s: in our frame to -y and -z.
+    // Nose east, flying forwards at 1 m/s and sinking at 2 m/s: towards -y and -z in the workspace's frame.
     let half = core::f32::consts::FRAC_1_SQRT_2;
     let mut odometry = with_attitude([half, 0.0, 0.0, half]);
     odometry.velocity_m_s = Vector3::new(1.0, 0.0, 2.0);
@@ -87,7 +87,7 @@ fn what_is_no_rotation_is_refused() {
     assert_eq!(far.to_state(), None);
 }
 
-/// Any quaternion of norm about 1, and, as often, one within 1e-3 rad of a pitch of 90 degrees.
+/// Quaternions of norm about 1; half of them within 1e-3 rad of a pitch of 90 degrees.
 fn attitudes() -> impl Strategy<Value = Quaternion<f32>> {
     let any = prop::array::uniform4(-1.0f32..1.0)
         .prop_filter("not too short", |q| q.iter().map(|c| c * c).sum::<f32>() > 0.01)
@@ -101,14 +101,14 @@ fn attitudes() -> impl Strategy<Value = Quaternion<f32>> {
     prop_oneof![any, near_gimbal]
 }
 
-/// Most that a velocity is changed by being turned into the body frame and back \[m/s\]. A turn v + 2w(q x v) + 2q x (q x v)
-/// rounds some ten times, each time by half of EPSILON of no more than the speed, and twice as much comes from |q|, which is
-/// 1 to two roundings and counts squared: 8 EPSILON of the speed a turn.
+/// Largest change of a velocity by being turned into the body frame and back \[m/s\]. A turn v + 2w(q x v) + 2q x (q x
+/// v) rounds some ten times, each time by at most half of EPSILON of the speed, and twice as much comes from |q|, which
+/// is 1 to two roundings and counts squared: 8 EPSILON of the speed per turn.
 fn rotated_twice(state: &State) -> f32 {
     16.0 * f32::EPSILON * state.velocity_m_s.norm()
 }
 
-/// Found by the property below when its bound was a number.
+/// Found by the property below when its bound was an absolute number.
 #[test]
 fn a_fast_state_crosses() {
     let state = State {
@@ -124,7 +124,7 @@ fn a_fast_state_crosses() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
-    /// The Euler angles turn as the quaternion does, at every attitude, and lie within their ranges.
+    /// The Euler angles are the same rotation as the quaternion at every attitude, and lie within their ranges.
     #[test]
     fn euler_angles_are_the_same_rotation(q in attitudes(), scale in 0.96f32..1.04) {
         let angles = euler(&(q * scale));
@@ -133,7 +133,7 @@ proptest! {
         prop_assert!(angles.x.abs() <= PI && angles.y.abs() <= FRAC_PI_2 && angles.z.abs() <= PI);
     }
 
-    /// The quaternion turns as the Euler angles do.
+    /// The quaternion is the same rotation as the Euler angles.
     #[test]
     fn quaternions_are_the_same_rotation(roll in -3.1f32..3.1, pitch in -1.57f32..1.57, yaw in -30.0f32..30.0) {
         let attitude = Vector3::new(roll, pitch, yaw);
@@ -141,7 +141,7 @@ proptest! {
         prop_assert!(difference < 2e-6, "{difference}");
     }
 
-    /// A state crosses the wire with no more than rounding.
+    /// A state is converted to the wire and back with rounding errors only.
     #[test]
     fn states_cross(
         position in prop::array::uniform3(-1e3f32..1e3),

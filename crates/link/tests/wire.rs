@@ -1,5 +1,5 @@
-//! Bytes on the wire against the `mavlink` crate's own serialiser, and against the specification where that crate has no
-//! say: extension fields, masks, frames, targets.
+//! Bytes on the wire compared with the `mavlink` crate's own serialiser, and with the specification where that crate
+//! has none: extension fields, masks, frames, targets.
 #![allow(
     clippy::expect_used,
     clippy::indexing_slicing,
@@ -27,14 +27,14 @@ fn bytes(message: &impl Message) -> Vec<u8> {
     Sender::new(STATION).send(message, &mut [0; FRAME_MAX]).to_vec()
 }
 
-/// A frame by the `mavlink` crate.
+/// A frame encoded by the `mavlink` crate.
 fn theirs(data: &impl MessageData) -> Vec<u8> {
     let mut raw = MAVLinkV2MessageRaw::new();
     raw.serialize_message_data(MavHeader { system_id: 255, component_id: 190, sequence: 0 }, data);
     raw.raw_bytes().to_vec()
 }
 
-/// The one message in `bytes`, or what was counted.
+/// The one message in `bytes`, or the counts.
 fn read<M: Message + Clone>(bytes: &[u8]) -> Result<M, Counters> {
     let mut decoder = Decoder::<M>::new(VEHICLE);
     let mut messages = Vec::new();
@@ -95,7 +95,7 @@ fn bytes_are_the_mavlink_crates() {
         COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, param1: 1.0, ..COMMAND_LONG_DATA::DEFAULT };
     assert_eq!(bytes(&Uplink::Command(Command::Arm)), theirs(&command));
 
-    // 31010, whatever its parameters say.
+    // Command 31010, whatever its parameters.
     let command = COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_USER_1, ..COMMAND_LONG_DATA::DEFAULT };
     let engage = Uplink::Command(Command::Engage);
     assert_eq!(bytes(&engage), theirs(&command));
@@ -119,7 +119,7 @@ fn answers_carry_their_extension_fields() {
         to: Address { system: 255, component: 190 },
     };
     let frame = bytes(&answer);
-    // command 400, temporarily rejected, no progress, result_param2, target.
+    // Command 400, temporarily rejected, no progress, result_param2, target.
     assert_eq!(frame[10..20], [0x90, 0x01, 1, 0, 4, 3, 2, 1, 255, 190]);
     assert_eq!(read(&frame), Ok(answer));
 }
@@ -188,7 +188,7 @@ fn odometry_in_another_frame_or_failed_is_unsupported() {
 
     let mut payload = [0; 233];
     odometry().ser(mavlink::MavlinkVersion::V2, &mut payload);
-    // Reset counter, type of the estimator, quality in percent: -1 says that odometry has failed.
+    // Reset counter, type of the estimator, quality in percent: -1 means that odometry has failed.
     payload[230..].copy_from_slice(&[5, 2, 80]);
     let good = raw(ODOMETRY_DATA::ID, &payload, ODOMETRY_DATA::EXTRA_CRC);
     assert!(matches!(self::read(&good), Ok(Uplink::State { .. })));
@@ -334,7 +334,7 @@ fn commands() {
     }
 }
 
-/// Whatever its number, in a dialect or not: who asked can be answered.
+/// Commands of any number, in a dialect or not, are read with their sender, so that they can be answered.
 #[test]
 fn every_command_is_read() {
     for id in 0..=u16::MAX {
@@ -347,7 +347,7 @@ fn every_command_is_read() {
                 _ => Command::Other(id),
             };
             assert_eq!(read(&raw(message, &payload, extra_crc)), Ok(Uplink::Command(expected)));
-            // Short of the zeros at its end.
+            // Without its trailing zeros.
             assert_eq!(read(&raw(message, &payload[..30], extra_crc)), Ok(Uplink::Command(expected)));
             assert_eq!(expected.id(), id);
         }
@@ -375,14 +375,14 @@ const SEVERITIES: [MavSeverity; 8] = [
 ];
 
 proptest! {
-    /// Rotor speeds cross without losing a bit.
+    /// Rotor speeds are transmitted without losing a bit.
     #[test]
     fn rotor_speeds_are_exact(speeds in prop::array::uniform4(0.0f32..32_768.0), time_us: u64, armed: bool) {
         let rotors = Downlink::Rotors { time_us, armed, speeds: RotorSpeeds(Vector4::from(speeds)) };
         prop_assert_eq!(read(&bytes(&rotors)), Ok(rotors));
     }
 
-    /// Every other message comes out as it went in, but for a state's rounding (`tests/frames.rs`).
+    /// Every other message is read as it was written, except for the rounding of a state (`tests/frames.rs`).
     #[test]
     fn messages_cross(
         v in prop::array::uniform3(-1e3f32..1e3),

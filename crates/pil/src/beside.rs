@@ -1,4 +1,4 @@
-//! What else runs in a control period of the `flight` image, counted instruction by instruction under the debugger.
+//! Counts, in the debugger, the instructions of everything that runs beside the control tick of the `flight` image.
 
 use crate::budget::Linked;
 use crate::exercise::motion;
@@ -8,31 +8,31 @@ use afbc_sim::in_the_loop::Station;
 use std::path::Path;
 use std::time::Duration;
 
-/// How long to wait for each of them.
+/// Longest wait for each function to run.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// Bytes that a line of 921,600 baud carries in a control period.
+/// Bytes per control period on a line of 921,600 baud.
 const BYTES_PER_PERIOD: f64 = 92.16;
 /// Bytes that wake the link's task (`boards/stm32f405/src/board.rs`).
 const BYTES_PER_WAKE: f64 = 32.0;
 
-/// Instructions, the most of some counts.
+/// Instruction counts, each the largest of a few samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Beside {
-    /// One frame for each of four motors.
+    /// Encoding one DSHOT frame for each of four motors.
     pub dshot: u32,
-    /// The time base's interrupt, with the control tick to wake.
+    /// The time base's interrupt when it wakes the control tick.
     pub systick: u32,
-    /// USART1's interrupt: a byte in, or one out, or both.
+    /// USART1's interrupt: a byte received, a byte sent, or both.
     pub byte: u32,
-    /// The link's task, woken once: bytes to read, or a tick to report, or both.
+    /// The link's task, woken once: with bytes to read, a tick to report, or both.
     pub wake: u32,
 }
 
 impl Beside {
-    /// Counts, while states come in.
+    /// Counts while the board receives states.
     ///
     /// # Errors
-    /// If QEMU or the image is missing, or the image does not come to what is counted.
+    /// If QEMU or the image is missing, or the image does not reach a function to be counted.
     pub fn count(elf: &Path) -> Result<Self, Error> {
         let linked = Linked::read(elf)?;
         let address = |name: &str| {
@@ -50,7 +50,7 @@ impl Beside {
         let gdb = board.halt()?;
         gdb.run_to(encode, PATIENCE)?;
         let dshot = gdb.count_function()?;
-        // Few in a row: an instruction takes the debugger longer than a control period takes the processor.
+        // Only a few samples: single steps are slower than the processor's real time.
         let mut most = |interrupt: u32, samples: u32| -> Result<u32, Error> {
             let mut most = 0;
             for _ in 0..samples {
@@ -62,8 +62,8 @@ impl Beside {
         Ok(Beside { dshot, systick: most(systick, 4)?, byte: most(byte, 12)?, wake: most(wake, 4)? })
     }
 
-    /// The link's share of a control period on a line that never pauses, in both directions at once: interrupts for every
-    /// byte, wakes for every 32 bytes and one for the tick.
+    /// Returns the link's share of a control period with both directions of the line at full rate: an interrupt for
+    /// every byte, a wake for every 32 bytes and one for the tick.
     pub fn link_per_period(&self) -> u32 {
         let wakes = BYTES_PER_PERIOD / BYTES_PER_WAKE + 1.0;
         (2.0 * BYTES_PER_PERIOD * f64::from(self.byte) + wakes * f64::from(self.wake)) as u32

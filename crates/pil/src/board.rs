@@ -11,22 +11,22 @@ use std::path::Path;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::Duration;
 
-/// How long [`Board::receive`] waits.
+/// Longest wait in [`Board::receive`].
 const PATIENCE: Duration = Duration::from_millis(100);
-/// A board that takes no bytes for this long is stuck.
+/// Time after which a board that accepts no bytes counts as stuck.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Status of USART1. The driver clears "transmission complete" by a load and a store of the whole register, and a byte that
-/// arrives in between is lost with its flag: on silicon within 3 cycles of 168 MHz, in QEMU whenever the store waits for the
-/// thread that brings the byte. QEMU does without the store.
+/// Status register of USART1. The driver clears "transmission complete" by a load and a store of the whole register,
+/// and a byte that arrives in between is lost with its flag: on silicon within 3 cycles of 168 MHz, in QEMU whenever
+/// the store waits for the thread that delivers the byte. The emulated image skips the store.
 const USART1_SR: u32 = 0x4001_1000;
 /// Interrupt control and state register: bit 31 raises a non-maskable interrupt.
 const ICSR: u32 = 0xE000_ED04;
 
-/// The `flight` image, booted and running, as fast as the host allows.
+/// The `flight` image, booted and running as fast as the host allows.
 ///
-/// Its time passes by instructions, so that it is not late because the host was busy; and its idle loop counts on instead
-/// of sleeping, so that time does not run away from the host that talks to it.
+/// Its clock counts instructions, so a busy host does not make it late. Its idle loop spins instead of sleeping, so
+/// that its time does not run ahead of the host.
 #[derive(Debug)]
 pub struct Board {
     qemu: Qemu,
@@ -38,15 +38,15 @@ pub struct Board {
 }
 
 impl Board {
-    /// Boots the image: returns when its clocks are up and it runs.
+    /// Boots the image; returns when its clocks are set up and it runs.
     ///
     /// # Errors
-    /// If QEMU or the image is missing, or the boot does not come to an end.
+    /// If QEMU or the image is missing, or the boot does not finish.
     pub fn boot(elf: &Path) -> Result<Self, Error> {
         Board::boot_with(elf, true)
     }
 
-    /// The same, on a board whose crystal does not start.
+    /// Boots the image on a board whose crystal does not start.
     ///
     /// # Errors
     /// As for [`Board::boot`].
@@ -79,31 +79,31 @@ impl Board {
         Ok(Board { qemu, gdb, clock_tree, usart1, received, clock_accesses })
     }
 
-    /// How often the image touched the clock tree while it booted.
+    /// Returns how often the image accessed the clock tree while booting.
     pub fn clock_accesses(&self) -> usize {
         self.clock_accesses
     }
 
-    /// What the image last wrote to a register of the [clock tree](crate::clock_tree).
+    /// Returns the value that the image last wrote to a register of the [clock tree](crate::clock_tree).
     pub fn clock_register(&self, register: u32) -> u32 {
         self.clock_tree.register(register)
     }
 
-    /// The crystal stops: returns when the image has switched to another clock.
+    /// Stops the crystal; returns when the image has switched to another clock.
     ///
     /// # Errors
-    /// If the image does not have it watched, or does not switch.
+    /// If the image has not enabled the clock security system, or does not switch.
     pub fn lose_crystal(&mut self) -> Result<(), Error> {
         self.gdb.halt()?;
         if !self.clock_tree.lose_crystal() {
-            return Err(Error::Protocol("nothing watches the crystal".into()));
+            return Err(Error::Protocol("the clock security system is off".into()));
         }
         self.gdb.store(ICSR, 1 << 31)?;
         self.clock_tree.switch(&mut self.gdb)?;
         self.gdb.resume()
     }
 
-    /// The debugger, with the processor halted; [`Gdb::resume`] lets it run on.
+    /// Halts the processor and returns the debugger; [`Gdb::resume`] lets it continue.
     ///
     /// # Errors
     /// If the board has ended.
@@ -113,16 +113,16 @@ impl Board {
         Ok(&mut self.gdb)
     }
 
-    /// Sends to USART1.
+    /// Sends bytes to USART1.
     ///
     /// # Errors
-    /// If the board has ended, or takes nothing.
+    /// If the board has ended, or accepts no bytes.
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), Error> {
         self.qemu.check()?;
         Ok(self.usart1.write_all(bytes)?)
     }
 
-    /// What USART1 sent since the last time; waits 0.1 s for something, and gives nothing if nothing comes.
+    /// Returns what USART1 has sent since the last call; waits up to 0.1 s, and returns nothing if nothing comes.
     ///
     /// # Errors
     /// If the board has ended.
@@ -138,7 +138,7 @@ impl Board {
     }
 }
 
-/// Where the idle loop sleeps.
+/// Returns the address of the idle loop's sleep instruction.
 fn idle(elf: &Path) -> Result<u32, Error> {
     // WFI; B to it
     const LOOP: [u8; 4] = [0x30, 0xBF, 0xFD, 0xE7];
@@ -151,8 +151,8 @@ fn idle(elf: &Path) -> Result<u32, Error> {
     Ok(text.address() as u32 + offset as u32)
 }
 
-/// Reads for as long as there is something. QEMU stands still, its debugger too, while nobody takes what it sends; and
-/// it sends bytes one by one, of which a socket holds no more than some three hundred.
+/// Reads as long as the board sends. QEMU, with its debugger, blocks while nobody reads its output; it sends single
+/// bytes, of which a socket buffers only some three hundred.
 fn listen(mut usart1: UnixStream) -> Receiver<Vec<u8>> {
     let (sender, received) = mpsc::channel();
     std::thread::spawn(move || {

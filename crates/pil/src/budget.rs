@@ -1,20 +1,19 @@
-//! What an image costs, read from the linked file: memory, and for one function its worst-case stack and whether it can
-//! panic.
+//! Memory use of a linked image, and for one function its worst-case stack and the panics that it can reach.
 //!
 //! The call graph comes from the machine code itself (Armv7-M manual, A5 to A7): every direct branch that leaves a
-//! function is taken for a call, and every instruction that lowers the stack pointer counts for the whole function. Both
-//! err on the side of more.
+//! function counts as a call, and every instruction that lowers the stack pointer counts for the whole function. Both
+//! overestimate.
 
 use crate::Error;
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
 
-/// Most instructions that a control tick may take: what the search for the worst one
-/// ([`crate::worst`]) has found, and a little more. At two and a half cycles each, 67 us of the 1000.
+/// Largest number of instructions of a control tick: the worst found by the search ([`crate::worst`]) and a margin. At
+/// 2.5 cycles each, 67 us of the 1000.
 pub const TICK_INSTRUCTIONS_MAX: u32 = 4_500;
 
-/// Where the flash lies.
+/// Address range of the flash.
 const FLASH: std::ops::Range<u64> = 0x0800_0000..0x0810_0000;
 
 /// A linked image.
@@ -22,11 +21,11 @@ const FLASH: std::ops::Range<u64> = 0x0800_0000..0x0810_0000;
 pub struct Linked {
     functions: BTreeMap<u32, Function>,
     symbols: BTreeMap<String, u32>,
-    /// What the image can log, as it stands in the source.
+    /// The image's log messages, as written in the source.
     pub log: Vec<String>,
     /// Bytes of flash: code, constants and initial values.
     pub flash_bytes: u64,
-    /// Bytes of RAM that are taken before the program starts, the stack aside.
+    /// Bytes of static RAM, without the stack.
     pub ram_bytes: u64,
 }
 
@@ -35,38 +34,39 @@ struct Function {
     name: String,
     stack_bytes: u32,
     calls: BTreeSet<u32>,
-    /// Calls through a pointer.
+    /// True if it calls through a pointer.
     is_indirect: bool,
 }
 
-/// What running one function can lead to.
+/// What a function can reach.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reach {
     /// Worst-case stack \[bytes\].
     pub stack_bytes: u32,
-    /// The chain of calls behind it, outermost first, each with its own share.
+    /// The chain of calls with that stack, outermost first, each with its own share.
     pub deepest: Vec<(String, u32)>,
-    /// The shortest chain of calls to each function that panics, outermost first. What a panic does is not looked at: it
-    /// ends whatever ran.
+    /// The shortest chain of calls to each function that panics, outermost first. What follows a panic is ignored,
+    /// since it ends whatever ran.
     pub panics: Vec<Vec<String>>,
     /// Functions that call through a pointer.
     pub indirect: Vec<String>,
 }
 
-/// What the executors' wakers lead to, which is what all calls through a pointer are, but those of [`EXECUTORS`].
+/// Executors' wakers, the targets of all calls through a pointer except those in [`EXECUTORS`].
 const WAKER: [&str; 3] =
     ["embassy_executor::raw::waker::wake", "embassy_executor::raw::waker::clone", "embassy_executor::raw::waker::drop"];
 
-/// Each executor's interrupt, and the tasks that it polls through a pointer, each by a function that it alone calls.
+/// Each executor's interrupt, and the tasks that it polls through a pointer, each identified by a function that only it
+/// calls.
 const EXECUTORS: [(&str, &[&str]); 3] = [
     ("CAN2_TX", &["firmware::control::tick", "flight::board::encode"]),
     ("CAN2_RX0", &["firmware::comms::report"]),
     ("CAN2_RX1", &["firmware::housekeeping::deepest_stack"]),
 ];
-/// The name of every task's function.
+/// Name of the function of every task.
 const POLL: &str = "embassy_executor::raw::TaskStorage<F>::poll";
 
-/// Interrupts of the flight image by priority, from the most urgent; those of one level do not nest.
+/// Interrupts of the flight image by priority, highest first; those of one level do not nest.
 pub const LEVELS: [(&str, &str); 7] = [
     ("-2", "NonMaskableInt"),
     ("1", "SysTick"),
@@ -76,14 +76,14 @@ pub const LEVELS: [(&str, &str); 7] = [
     ("8", "CAN2_RX0"),
     ("12", "CAN2_RX1"),
 ];
-/// What the processor pushes when it takes an interrupt: 26 words with the FPU's, and 1 to align them.
+/// Bytes that the processor pushes on an interrupt: 26 words with those of the FPU, and 1 for alignment.
 pub const FRAME_BYTES: u32 = 108;
 
 impl Linked {
     /// Reads an image.
     ///
     /// # Errors
-    /// If it is missing or no image.
+    /// If it is missing or not an image.
     pub fn read(elf: &Path) -> Result<Self, Error> {
         let bytes = std::fs::read(elf).map_err(|_| Error::NoImage(elf.to_owned()))?;
         let file = object::File::parse(bytes.as_slice()).map_err(|error| Error::Protocol(error.to_string()))?;
@@ -102,7 +102,7 @@ impl Linked {
             }
         }
 
-        // $t and $d mark where code and data begin within a section.
+        // $t and $d mark the beginning of code and data within a section.
         let marks: BTreeMap<u32, bool> = file
             .symbols()
             .filter_map(|symbol| {
@@ -115,7 +115,7 @@ impl Linked {
 
         let mut functions = BTreeMap::new();
         for symbol in file.symbols().filter(|symbol| symbol.kind() == SymbolKind::Text && symbol.size() > 0) {
-            // Bit 0 of a function's address says Thumb.
+            // Bit 0 of a function's address is the Thumb bit.
             let start = symbol.address() as u32 & !1;
             let code = symbol
                 .section_index()
@@ -134,10 +134,10 @@ impl Linked {
         Ok(Linked { functions, symbols: symbols.collect(), log, flash_bytes, ram_bytes })
     }
 
-    /// What running the function named `name` can lead to.
+    /// Returns what the function named `name` can reach.
     ///
     /// # Errors
-    /// If there is none of that name, or it can call itself.
+    /// If there is no such function, or it can call itself.
     pub fn reach(&self, name: &str) -> Result<Reach, Error> {
         let root = self.find(name).ok_or_else(|| Error::Protocol(format!("the image has no function {name}")))?;
         let mut walk = Walk { linked: self, depths: BTreeMap::new(), open: BTreeSet::new() };
@@ -147,7 +147,7 @@ impl Linked {
         Ok(Reach { stack_bytes, deepest, panics: self.panics(root)?, indirect })
     }
 
-    /// The shortest chain from `root` to each function that panics.
+    /// Returns the shortest chain from `root` to each function that panics.
     fn panics(&self, root: u32) -> Result<Vec<Vec<String>>, Error> {
         let mut chains = Vec::new();
         let mut seen = BTreeSet::from([root]);
@@ -173,7 +173,7 @@ impl Linked {
         self.functions.get(&address).ok_or_else(none)
     }
 
-    /// All that a function may call.
+    /// Returns all functions that a function may call.
     fn callees(&self, address: u32) -> Result<BTreeSet<u32>, Error> {
         let function = self.function(address)?;
         let mut callees = function.calls.clone();
@@ -188,7 +188,7 @@ impl Linked {
         Ok(callees)
     }
 
-    /// The task that calls the function `mark`.
+    /// Returns the task that calls the function `mark`.
     fn task(&self, mark: &str) -> Result<u32, Error> {
         let missing = |what: &str| Error::Protocol(format!("the image has no {what} {mark}"));
         let mark_address = self.find(mark).ok_or_else(|| missing("function"))?;
@@ -197,12 +197,12 @@ impl Linked {
         task.map(|(address, _)| *address).ok_or_else(|| missing("task that calls"))
     }
 
-    /// Where the function of this name begins.
+    /// Returns the start address of the function `name`.
     pub fn function_named(&self, name: &str) -> Option<u32> {
         self.find(name)
     }
 
-    /// The address of a symbol, by its name in the source: `flight::board::RX`.
+    /// Returns the address of a symbol by its name in the source: `flight::board::RX`.
     pub fn symbol(&self, name: &str) -> Option<u32> {
         self.symbols.get(name).copied()
     }
@@ -212,13 +212,13 @@ impl Linked {
     }
 }
 
-/// The deepest chain of calls below a function.
+/// Stack and chain of calls below a function, at the deepest.
 type Depth = (u32, Vec<(String, u32)>);
 
 struct Walk<'a> {
     linked: &'a Linked,
     depths: BTreeMap<u32, Depth>,
-    /// Functions that the walk is within.
+    /// Functions on the current path.
     open: BTreeSet<u32>,
 }
 
@@ -248,7 +248,7 @@ impl Walk<'_> {
 }
 
 impl Function {
-    /// True if it is where a panic begins.
+    /// True if a panic begins in this function.
     fn panics(&self) -> bool {
         self.name.contains("panic") || self.name.ends_with("_fail") || self.name.ends_with("_failed")
     }
@@ -290,13 +290,13 @@ impl Function {
     }
 }
 
-/// What an instruction does to stack and control flow.
+/// Effect of an instruction on stack and control flow.
 enum Effect {
-    /// Lowers the stack pointer by so many bytes.
+    /// Lowers the stack pointer by this many bytes.
     Push(u32),
-    /// Goes to its own address + 4 + this, perhaps for good.
+    /// Branches to its own address + 4 + this, with or without return.
     Branch(i32),
-    /// Goes to an address from a register.
+    /// Branches to an address from a register.
     Indirect,
     Other,
 }
@@ -356,17 +356,17 @@ impl Effect {
     }
 }
 
-/// The lowest `width` bits as a signed number.
+/// Returns the lowest `width` bits as a signed number.
 fn signed(bits: u32, width: u32) -> i32 {
     (bits << (32 - width)) as i32 >> (32 - width)
 }
 
-/// i:imm3:imm8 of a wide instruction.
+/// Returns i:imm3:imm8 of a wide instruction.
 fn immediate(first: u32, second: u32) -> u32 {
     (first >> 10 & 1) << 11 | (second >> 12 & 7) << 8 | second & 0xFF
 }
 
-/// ThumbExpandImm.
+/// ThumbExpandImm of the Armv7-M manual.
 fn expand(imm12: u32) -> u32 {
     let byte = imm12 & 0xFF;
     match imm12 >> 8 {

@@ -1,19 +1,19 @@
-//! Stands in for the status bits of the STM32F4's clock tree, which QEMU lacks.
+//! Emulates the status bits of the STM32F4's clock tree, which QEMU lacks.
 //!
-//! An image that starts its crystal waits for the ready bit, and waits for ever. So every access to the few registers
-//! concerned stops the processor; it then does its load or store by a single step, and a load is given what silicon
-//! would have answered to the stores seen so far. The image itself runs unchanged.
+//! An image that starts its crystal waits for the ready bit, here forever. So every access to the registers concerned
+//! stops the processor. It then executes its load or store by a single step, and a load receives the value that silicon
+//! would have returned after the stores so far. The image itself runs unchanged.
 
 use crate::Error;
 use crate::gdb::{Gdb, PC, Watch};
 use std::collections::HashMap;
 use std::time::Duration;
 
-/// Clock control of the chip (reference manual RM0090, 7.3).
+/// Clock control register (reference manual RM0090, 7.3).
 pub const RCC_CR: u32 = 0x4002_3800;
-/// The main locking loop's source and factors.
+/// Source and factors of the main PLL.
 pub const RCC_PLLCFGR: u32 = 0x4002_3804;
-/// Which clock the core runs from.
+/// Selection of the core's clock.
 pub const RCC_CFGR: u32 = 0x4002_3808;
 /// The flash's wait states, caches and prefetch (3.9.1).
 pub const FLASH_ACR: u32 = 0x4002_3C00;
@@ -26,7 +26,7 @@ const FLASH_OPTCR: u32 = 0x4002_3C14;
 const DBGMCU_IDCODE: u32 = 0xE004_2000;
 const SYST_CSR: u32 = 0xE000_E010;
 
-/// Every register watched, with its value at reset; option bytes as they leave the factory, on a chip of revision 2.
+/// Every register watched, with its reset value; option bytes as delivered, on a chip of revision 2.
 const WATCHED: [(u32, u32); 12] = [
     (RCC_CR, 0x0000_0083),
     (RCC_PLLCFGR, 0x2400_3010),
@@ -50,21 +50,21 @@ const SW: u32 = 0b11;
 const CSSF: u32 = 1 << 7;
 const CSSC: u32 = 1 << 23;
 
-/// How long the image may take to its next access.
+/// Longest time from one access of the image to the next.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// An image that touches the clock tree more often is lost in a loop.
+/// Number of accesses after which the image counts as caught in a loop.
 const ACCESSES_MAX: usize = 2000;
 
 /// The registers, as the image sees them.
 #[derive(Debug)]
 pub(crate) struct ClockTree {
     written: HashMap<u32, u32>,
-    /// Whether there is a crystal that starts.
+    /// Whether the crystal starts.
     crystal: bool,
 }
 
 impl ClockTree {
-    /// As a reset leaves it. Every access stops the processor from now on.
+    /// Returns the reset state. Every access stops the processor from now on.
     pub(crate) fn new(gdb: &mut Gdb, crystal: bool) -> Result<Self, Error> {
         for (register, _) in WATCHED {
             gdb.watch(watch(register), register)?;
@@ -72,19 +72,19 @@ impl ClockTree {
         Ok(ClockTree { written: HashMap::from(WATCHED), crystal })
     }
 
-    /// What was last written to `register`, or its value at reset.
+    /// Returns what was last written to `register`, or its reset value.
     pub(crate) fn register(&self, register: u32) -> u32 {
         self.written.get(&register).copied().unwrap_or(0)
     }
 
-    /// Runs a halted processor from reset until its clocks are set up and SysTick runs, and gives the number of accesses
-    /// that took. It is left halted.
+    /// Runs a halted processor from reset until its clocks are set up and SysTick runs, and returns the number of
+    /// accesses. The processor is halted again.
     pub(crate) fn boot(&mut self, gdb: &mut Gdb) -> Result<usize, Error> {
         self.serve(gdb, SYST_CSR, 1)
     }
 
-    /// The crystal stops, and with it what the clock security system watches: the hardware's part (RM0090, 7.2.7). True
-    /// if that raises a non-maskable interrupt.
+    /// Stops the crystal and does the hardware's part of the clock security system (RM0090, 7.2.7). True if that raises
+    /// a non-maskable interrupt.
     pub(crate) fn lose_crystal(&mut self) -> bool {
         self.crystal = false;
         let watched = self.register(RCC_CR) & CSSON != 0;
@@ -100,23 +100,23 @@ impl ClockTree {
         self.written.insert(register, change(self.register(register)));
     }
 
-    /// The image's part: runs a halted processor until the core runs from another clock. It is left halted.
+    /// Runs a halted processor until the image has switched the core to another clock. The processor is halted again.
     pub(crate) fn switch(&mut self, gdb: &mut Gdb) -> Result<usize, Error> {
         self.serve(gdb, RCC_CFGR, SW)
     }
 
-    /// Runs a halted processor until it sets one of `bits` in the register `last`, and gives the number of accesses that
-    /// took. It is left halted.
+    /// Runs a halted processor until it sets one of `bits` in the register `last`, and returns the number of accesses.
+    /// The processor is halted again.
     fn serve(&mut self, gdb: &mut Gdb, last: u32, bits: u32) -> Result<usize, Error> {
         for accesses in 1..ACCESSES_MAX {
             let Some(address) = gdb.run(PATIENCE)? else {
-                return Err(Error::Protocol("the image waits for something that never comes".into()));
+                return Err(Error::Protocol("the image waits without accessing the clock tree".into()));
             };
             let register = address & !3;
             let pc = gdb.register(PC)?;
             let access = Access::decode(gdb.memory(pc)?)?;
             if register == RCC_APB2RSTR {
-                // QEMU 10.0 ends in an assertion when this is stored to: go past the store.
+                // QEMU 10.0 fails an assertion on this store: skip it.
                 gdb.set_register(PC, pc + access.length)?;
                 continue;
             }
@@ -137,12 +137,12 @@ impl ClockTree {
                 return Ok(accesses);
             }
         }
-        Err(Error::Protocol(format!("{ACCESSES_MAX} accesses to the clock tree, and no end")))
+        Err(Error::Protocol(format!("{ACCESSES_MAX} accesses to the clock tree without an end")))
     }
 
-    /// What silicon answers to a load: every clock is ready as soon as it is on.
+    /// Returns silicon's answer to a load: every clock is ready as soon as it is on.
     fn answer(&self, register: u32) -> u32 {
-        /// `ready` follows `on`.
+        /// Sets the bit `ready` if the bit `on` is set.
         fn follow(value: u32, on: u32, ready: u32) -> u32 {
             value & !(1 << ready) | (value >> on & 1) << ready
         }
@@ -162,7 +162,7 @@ impl ClockTree {
     }
 }
 
-/// Runs a halted processor to its first store to `register`, and has it go past that instruction now and ever after.
+/// Runs a halted processor to its first store to `register`, and replaces that instruction by NOPs.
 pub(crate) fn skip_first_store(gdb: &mut Gdb, register: u32) -> Result<(), Error> {
     gdb.watch(Watch::Write, register)?;
     gdb.run(PATIENCE)?.ok_or_else(|| Error::Protocol(format!("nothing stores to {register:#x}")))?;
@@ -174,7 +174,7 @@ pub(crate) fn skip_first_store(gdb: &mut Gdb, register: u32) -> Result<(), Error
 }
 
 fn watch(register: u32) -> Watch {
-    // SysTick's counter lies beside it, and is read all the time.
+    // SysTick's counter lies next to it and is read all the time.
     if [RCC_APB2RSTR, SYST_CSR].contains(&register) { Watch::Write } else { Watch::Access }
 }
 
@@ -182,7 +182,7 @@ fn watch(register: u32) -> Watch {
 struct Access {
     is_load: bool,
     register: u32,
-    /// Of the instruction \[bytes\].
+    /// Length of the instruction \[bytes\].
     length: u32,
 }
 

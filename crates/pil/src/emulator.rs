@@ -1,6 +1,6 @@
 //! Lockstep with the `pil` image.
 //!
-//! Two FIFOs carry it; their format is stated in `boards/emulated/src/board.rs`.
+//! Bytes are exchanged over two FIFOs; `boards/emulated/src/board.rs` defines their format.
 
 use crate::Error;
 use crate::qemu::{self, Qemu};
@@ -12,37 +12,37 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long a tick may take on the host before the firmware counts as stuck.
+/// Time on the host after which a tick without an end counts as stuck.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// How often to look whether QEMU is still there.
+/// Interval of the checks that QEMU still runs.
 const LOOK: Duration = Duration::from_millis(500);
-/// Longest reply that is believed \[bytes\].
+/// Longest reply accepted \[bytes\].
 const REPLY_MAX: usize = 4096;
 
-/// What the firmware did in one control tick.
+/// Result of one control tick of the firmware.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Reply {
-    /// When the tick began, since power-up \[us\].
+    /// Start of the tick, since power-up \[us\].
     pub time_us: u64,
-    /// How long it took in cycles of 168 MHz, as the firmware itself sees it.
+    /// Duration in cycles of 168 MHz, as measured by the firmware.
     pub cycles: u32,
-    /// What that is in instructions, which is what the emulator really counts.
+    /// Duration in instructions, which is what the emulator counts.
     pub instructions: u32,
-    /// Most stack ever used, interrupts included, as of the last full second \[bytes\].
+    /// Largest stack depth so far, interrupts included, as of the last full second \[bytes\].
     pub stack_bytes: u32,
-    /// What the motors get: 0, or 48 to 2047.
+    /// Throttles of the motors: 0, or 48 to 2047.
     pub throttles: [u16; 4],
-    /// What went out over the link.
+    /// Bytes sent over the link.
     pub bytes: Vec<u8>,
 }
 
-/// The `pil` image, flying in lockstep with the host.
+/// The `pil` image, running in lockstep with the host.
 #[derive(Debug)]
 pub struct Emulator {
     qemu: Qemu,
     to_firmware: File,
     replies: Receiver<io::Result<Reply>>,
-    /// Writing end of the firmware's FIFO: as long as it is open, the reader waits for more.
+    /// Writing end of the firmware's FIFO: while it is open, the reader waits for more.
     hold: Option<File>,
     reader: Option<JoinHandle<()>>,
 }
@@ -56,7 +56,7 @@ impl Emulator {
         Emulator::start_slower(elf, 0)
     }
 
-    /// The same with a processor whose every instruction takes 2^`slower` times as long: 8 ns, 16 ns, 32 ns.
+    /// Starts the image on a processor whose every instruction takes 2^`slower` times as long: 8 ns, 16 ns, 32 ns.
     ///
     /// # Errors
     /// As for [`Emulator::start`].
@@ -68,7 +68,7 @@ impl Emulator {
             if !Command::new("mkfifo").arg(&path).status()?.success() {
                 return Err(Error::Protocol(format!("mkfifo {} failed", path.display())));
             }
-            // Open for both, a FIFO does not wait for its other end.
+            // Opened for reading and writing, a FIFO does not wait for its other end.
             Ok(OpenOptions::new().read(true).write(true).open(path)?)
         };
         let to_firmware = open("to_firmware")?;
@@ -90,7 +90,7 @@ impl Emulator {
         Ok(Emulator { qemu, to_firmware, replies, hold: Some(hold), reader: Some(reader) })
     }
 
-    /// One control tick: gives the firmware the bytes that reached it before, takes what it sent after.
+    /// Runs one control tick: delivers the bytes that arrived before it, and returns what the firmware sent after it.
     ///
     /// # Errors
     /// If the firmware panicked, faulted or hangs.

@@ -1,4 +1,4 @@
-//! What can go wrong between host and emulator.
+//! Errors between host and emulator.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -9,26 +9,26 @@ use std::time::Duration;
 pub enum Error {
     /// There is no QEMU for Arm.
     NoQemu,
-    /// This QEMU has no STM32F405, or one that will not do.
+    /// This QEMU has no STM32F405, or an unsuitable one.
     NoMachine,
     /// The Rust toolchain cannot compile for the processor.
     NoTarget,
     /// The image has not been built.
     NoImage(PathBuf),
-    /// Building the image failed; cargo said why.
+    /// Building the image failed; cargo printed the cause.
     Build,
     /// The emulator ended by itself.
     Exited(String),
     /// The firmware gave no answer for this long.
     Silent(Duration),
-    /// Something answered, but not what was asked.
+    /// Unexpected data from the emulator, its debugger or the image.
     Protocol(String),
     /// Files, sockets or processes of the host.
     Io(std::io::Error),
 }
 
 impl Error {
-    /// True if something has to be installed or built before this can work: a test may be skipped for it.
+    /// True if something has to be installed or built first: a test may be skipped for this error.
     pub fn is_missing(&self) -> bool {
         matches!(self, Error::NoQemu | Error::NoMachine | Error::NoTarget | Error::NoImage(_))
     }

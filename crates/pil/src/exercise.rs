@@ -1,4 +1,4 @@
-//! A flight in which everything happens, as the bytes that reach the vehicle: what tests compare and budgets measure.
+//! A flight with every kind of event, as the bytes that reach the vehicle, for comparisons and budgets.
 
 use afbc_link::{Command, Uplink};
 use afbc_sim::in_the_loop::Station;
@@ -10,12 +10,12 @@ const ARMED: u64 = 1_500;
 /// Ticks of the whole flight.
 pub const TICKS: u64 = 6_000;
 
-/// What reaches the link before `tick`: a flight, and everything that can go wrong with its link. To be asked for
-/// one tick after the other, from 0.
+/// Returns the bytes that reach the link before `tick`: a flight with every kind of link fault. To be called for
+/// consecutive ticks from 0 on.
 pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
-    // At rest until it is armed.
+    // At rest until armed.
     let (state, setpoint) = motion(tick.saturating_sub(ARMED) as f32 * 1e-3);
-    // Two gaps: one to coast through, one that ends in a descent.
+    // Two gaps: one that is coasted through, one that ends in a descent.
     let tracked = !(2_500..2_600).contains(&tick) && !(4_000..5_000).contains(&tick);
     if tracked {
         station.say(&Uplink::State { sent_us: tick * 1000, state });
@@ -24,9 +24,9 @@ pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
         station.say(&Uplink::Setpoint(setpoint));
     }
     match tick {
-        // The first is refused: the rate is not known yet.
+        // The first is refused, since the tick rate is not known yet.
         100 | ARMED => station.say(&Uplink::Command(Command::Arm)),
-        // The motion does not follow the rotors, so AFBC's monitor trips, time and again.
+        // The motion does not follow the rotors, so AFBC's monitor trips repeatedly.
         3_000 | 5_200 => station.say(&Uplink::Command(Command::Engage)),
         5_900 => station.say(&Uplink::Command(Command::Kill)),
         _ => (),
@@ -41,7 +41,7 @@ pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
     bytes
 }
 
-/// Some motion near hover in which every subsystem has something to do; `t` in seconds.
+/// Returns a motion near hover that excites every subsystem; `t` in seconds.
 pub fn motion(t: f32) -> (State, Setpoint) {
     let wave = |rate: f32| (rate * t).sin();
     let state = State {

@@ -1,4 +1,4 @@
-//! The little of GDB's remote protocol that it takes to watch a processor: registers, memory, watchpoints, run, step.
+//! The subset of GDB's remote protocol needed here: registers, memory, watchpoints, run, step.
 
 use crate::Error;
 use std::io::{BufRead, BufReader, ErrorKind, Write};
@@ -8,17 +8,17 @@ use std::time::{Duration, Instant};
 
 /// Number of the stack pointer.
 pub const SP: u32 = 13;
-/// Number of the program status register; its lowest 9 bits are the exception that runs.
+/// Number of the program status register; its lowest 9 bits are the active exception.
 pub const XPSR: u32 = 25;
 /// Number of the link register.
 const LR: u32 = 14;
 /// Number of the program counter.
 pub const PC: u32 = 15;
 
-/// A stub answers at once, or never.
+/// Longest wait for the stub's answer.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// What to watch at an address; the values are the protocol's.
+/// Accesses to watch; the values are the protocol's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Watch {
     /// Stores only.
@@ -34,7 +34,7 @@ pub struct Gdb {
 }
 
 impl Gdb {
-    /// Connects to the stub's socket, which need not be there yet, and leaves the processor halted.
+    /// Connects to the stub's socket, waiting until it exists, and leaves the processor halted.
     ///
     /// # Errors
     /// If there is none after 5 s.
@@ -42,13 +42,13 @@ impl Gdb {
         let stream = connect(socket)?;
         stream.set_read_timeout(Some(ANSWER_TIMEOUT))?;
         let mut gdb = Gdb { stream: BufReader::new(stream) };
-        // QEMU offers registers by name and number only to those who asked for their list.
+        // QEMU gives access to registers only after their list was requested.
         gdb.ask("qXfer:features:read:target.xml:0,ffb")?;
         gdb.ask("?")?;
         Ok(gdb)
     }
 
-    /// A core register.
+    /// Reads a core register.
     ///
     /// # Errors
     /// If the stub refuses.
@@ -66,7 +66,7 @@ impl Gdb {
         self.order(&format!("P{number:x}={:08x}", value.swap_bytes()))
     }
 
-    /// `N` bytes of memory.
+    /// Reads `N` bytes of memory.
     ///
     /// # Errors
     /// If the stub refuses.
@@ -84,8 +84,8 @@ impl Gdb {
         self.order(&format!("M{address:x},{:x}:{hex}", bytes.len()))
     }
 
-    /// Has a halted processor store a word, since the stub itself does not reach device registers. Uses the first bytes
-    /// of the core-coupled memory.
+    /// Makes a halted processor store a word, since the stub cannot write device registers. Uses the first bytes of the
+    /// core-coupled memory.
     ///
     /// # Errors
     /// If the stub refuses.
@@ -105,7 +105,7 @@ impl Gdb {
         Ok(())
     }
 
-    /// Stops the processor before it next touches the word at `address`.
+    /// Stops the processor before its next access to the word at `address`.
     ///
     /// # Errors
     /// If the stub refuses.
@@ -121,7 +121,7 @@ impl Gdb {
         self.order(&format!("z{},{address:x},4", watch as u32))
     }
 
-    /// One instruction.
+    /// Executes one instruction.
     ///
     /// # Errors
     /// If the stub refuses.
@@ -129,7 +129,7 @@ impl Gdb {
         self.ask("s").map(drop)
     }
 
-    /// Runs until a watchpoint stops the processor, and gives the address touched; `None` if it still runs after
+    /// Runs until a watchpoint stops the processor, and returns the address accessed; `None` if it still runs after
     /// `patience`.
     ///
     /// # Errors
@@ -149,7 +149,7 @@ impl Gdb {
         address.map(Some).ok_or(Error::Protocol(stop))
     }
 
-    /// Runs a halted processor until it comes to the instruction at `address`, from any other.
+    /// Runs a halted processor, which is elsewhere, to the instruction at `address`.
     ///
     /// # Errors
     /// If it does not within `patience`.
@@ -163,7 +163,7 @@ impl Gdb {
         self.order(&format!("z1,{address:x},2"))
     }
 
-    /// Instructions that a halted processor takes until the exception that it is in has ended; it takes no other meanwhile.
+    /// Counts the instructions of a halted processor until the present exception ends, with other interrupts held off.
     ///
     /// # Errors
     /// If the stub refuses, or there is no end.
@@ -173,7 +173,7 @@ impl Gdb {
         self.count_while(|gdb| Ok(exception(gdb)? == this))
     }
 
-    /// Instructions that a halted processor takes until the function that it has just entered returns.
+    /// Counts the instructions of a halted processor until the function just entered returns.
     ///
     /// # Errors
     /// If the stub refuses, or there is no end.
@@ -183,7 +183,7 @@ impl Gdb {
     }
 
     fn count_while(&mut self, mut within: impl FnMut(&mut Self) -> Result<bool, Error>) -> Result<u32, Error> {
-        /// Far more than anything takes that is counted so.
+        /// Far more than anything counted takes.
         const STEPS_MAX: u32 = 100_000;
         for steps in 1..STEPS_MAX {
             self.step()?;
@@ -194,16 +194,16 @@ impl Gdb {
         Err(Error::Protocol(format!("no end after {STEPS_MAX} instructions")))
     }
 
-    /// Halts a processor that runs.
+    /// Halts a running processor.
     ///
     /// # Errors
-    /// If it does not.
+    /// If it does not halt.
     pub fn halt(&mut self) -> Result<(), Error> {
         self.stream.get_mut().write_all(&[0x03])?;
         self.receive().map(drop)
     }
 
-    /// Lets a halted processor run, and does not wait for it to stop.
+    /// Lets a halted processor run, without waiting for it to stop.
     ///
     /// # Errors
     /// If the connection fails.
@@ -228,7 +228,7 @@ impl Gdb {
         Ok(write!(self.stream.get_mut(), "${packet}#{sum:02x}")?)
     }
 
-    /// The next packet, past acknowledgements.
+    /// Returns the next packet, skipping acknowledgements.
     fn receive(&mut self) -> Result<String, Error> {
         let mut packet = Vec::new();
         self.stream.read_until(b'#', &mut packet)?;

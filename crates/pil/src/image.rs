@@ -1,4 +1,4 @@
-//! The firmware's images: where they are, and how to build them.
+//! The firmware's images: finding and building them.
 
 use crate::Error;
 use std::path::{Path, PathBuf};
@@ -9,9 +9,9 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 /// One of the firmware's two images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Image {
-    /// What runs on the board.
+    /// The image for the board.
     Flight,
-    /// The same code, trading bytes with the host once a control tick: for [`crate::Emulator`].
+    /// The same code, exchanging bytes with the host once per control tick: for [`crate::Emulator`].
     Pil,
 }
 
@@ -23,7 +23,7 @@ impl Image {
         }
     }
 
-    /// The image as built last.
+    /// Returns the path of the last build.
     ///
     /// # Errors
     /// [`Error::NoImage`] if there is none.
@@ -33,7 +33,7 @@ impl Image {
         if path.is_file() { Ok(path) } else { Err(Error::NoImage(path)) }
     }
 
-    /// Builds the image by its cargo alias and gives its path. `FW_TOOLCHAIN`, if set, names the toolchain to take.
+    /// Builds the image by its cargo alias and returns its path. `FW_TOOLCHAIN`, if set, names the toolchain.
     ///
     /// # Errors
     /// [`Error::NoTarget`], [`Error::Build`].
@@ -52,7 +52,7 @@ impl Image {
     }
 }
 
-/// A tool of the firmware's toolchain.
+/// A command of the firmware's toolchain.
 fn toolchain(tool: &str) -> Command {
     let mut command = Command::new(tool);
     if let Some(toolchain) = std::env::var_os("FW_TOOLCHAIN") {

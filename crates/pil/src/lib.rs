@@ -1,16 +1,16 @@
 //! Processor in the loop: runs the firmware's images on an emulated Cortex-M4F, from the host.
 //!
-//! QEMU executes the target's own machine code, FPU included, but it is not the chip:
+//! QEMU executes the target's machine code, FPU included, but does not emulate the chip exactly:
 //!
 //! * It counts instructions (`-icount`), not cycles. Every count here is of instructions.
 //! * It has no DMA, no timer outputs, no clock tree and no sensors, and peripherals answer at once.
 //!
-//! Two images, two ways:
+//! There are two images and two ways to run them:
 //!
 //! * [`Emulator`] flies the `pil` image in lockstep: one [exchange](Emulator::exchange) of bytes is one control tick.
-//!   Time stands still while the host thinks, so every run gives the same bytes. [`Twins`] compare them with the host's.
-//! * [`Board`] boots the very `flight` image and talks to its USART1. A [debugger](gdb) lends the emulated chip the
-//!   clock tree's status bits, which it lacks.
+//!   Time stops while the host computes, so every run gives the same bytes. [`Twins`] compares them with the host's.
+//! * [`Board`] boots the unmodified `flight` image and talks to its USART1. A [debugger](gdb) supplies the status bits
+//!   of the clock tree, which the emulator lacks.
 //!
 //! ```no_run
 //! use pil::{Emulator, Image};

@@ -8,25 +8,26 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 /// QEMU's board with an STM32F405, from version 8.
 pub(crate) const OLIMEX: &str = "olimex-stm32-h405";
-/// The one of older versions, whose USART sends nothing by interrupt.
+/// The machine of older versions, whose USART does not send by interrupt.
 pub(crate) const NETDUINO: &str = "netduinoplus2";
 
-/// How long an instruction takes, as a power of two \[ns\]: 8 ns, unless a slower processor is wanted.
+/// Duration of an instruction, as a power of two \[ns\]: 8 ns by default.
 pub(crate) const SHIFT: u32 = 3;
 
-/// Lets time pass by instructions, 2^`shift` ns each, and stand still while the processor waits for the host.
+/// Returns the arguments that advance time by 2^`shift` ns per instruction, and stop it while the processor waits for
+/// the host.
 pub(crate) fn count_instructions(shift: u32) -> [String; 2] {
     ["-icount".into(), format!("shift={shift},sleep=off")]
 }
 
-/// Cycles of the 168 MHz core clock, as SysTick counts them, in instructions of 2^`shift` ns.
+/// Converts cycles of the 168 MHz core clock, as counted by SysTick, to instructions of 2^`shift` ns.
 pub(crate) fn instructions(cycles: u32, shift: u32) -> u32 {
-    // To the nearest: an instruction of 8 ns is 1.344 cycles.
+    // Rounded: an instruction of 8 ns is 1.344 cycles.
     let cycles_per_thousand = 168 << shift;
     ((u64::from(cycles) * 1000 + cycles_per_thousand / 2) / cycles_per_thousand) as u32
 }
 
-/// QEMU with an image, halted or running. Ends with this value, and takes its folder along.
+/// A QEMU process with an image, halted or running. Dropping it ends the process and removes its folder.
 #[derive(Debug)]
 pub(crate) struct Qemu {
     child: Child,
@@ -34,7 +35,7 @@ pub(crate) struct Qemu {
 }
 
 impl Qemu {
-    /// A new empty folder, for what host and emulator share.
+    /// Creates an empty folder shared by host and emulator.
     pub(crate) fn folder() -> Result<PathBuf, Error> {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let name = format!("pil-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
@@ -43,7 +44,7 @@ impl Qemu {
         Ok(folder)
     }
 
-    /// Starts `elf` in `folder` on the first of `machines` that this QEMU has, with these further arguments.
+    /// Starts `elf` in `folder` on the first of `machines` that this QEMU has, with further arguments.
     pub(crate) fn start(
         elf: &Path,
         folder: PathBuf,
@@ -72,12 +73,12 @@ impl Qemu {
 
     /// Ends QEMU.
     pub(crate) fn kill(&mut self) {
-        // It may have ended by itself already.
+        // It may already have ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 
-    /// [`Error::Exited`] if QEMU has ended.
+    /// Returns [`Error::Exited`] if QEMU has ended.
     pub(crate) fn check(&mut self) -> Result<(), Error> {
         match self.child.try_wait()? {
             Some(status) => Err(Error::Exited(status.to_string())),
@@ -93,12 +94,12 @@ impl Drop for Qemu {
     }
 }
 
-/// `QEMU_SYSTEM_ARM`, or else `qemu-system-arm` of the search path.
+/// Returns `QEMU_SYSTEM_ARM`, or else `qemu-system-arm` of the search path.
 fn program() -> std::ffi::OsString {
     std::env::var_os("QEMU_SYSTEM_ARM").unwrap_or_else(|| "qemu-system-arm".into())
 }
 
-/// The first of `machines` that this QEMU has.
+/// Returns the first of `machines` that this QEMU has.
 fn machine<'a>(machines: &[&'a str]) -> Result<&'a str, Error> {
     let help = Command::new(program()).args(["-machine", "help"]).output().map_err(|_| Error::NoQemu)?;
     let help = String::from_utf8_lossy(&help.stdout);

@@ -1,29 +1,30 @@
-//! The processor beside the host.
+//! Emulated processor and host, compared.
 
 use crate::emulator::{Emulator, Reply};
 use afbc_sim::in_the_loop::{Autopilot, Error, Host, Spread, Tick};
 use afbc_types::OutOfRange;
 
-/// The emulated processor flies; the host gets the same bytes at the same times, and every output of every tick is
-/// compared. As long as none differs, this is also what the host alone would have flown: the loop has no other input.
+/// The emulated processor and the same code on the host. The host gets the same bytes at the same times, and every
+/// output of every tick is compared. The loop has no other input, so as long as none differs, the host alone would have
+/// flown the same flight.
 pub struct Twins {
     emulator: Emulator,
     host: Host,
     comparison: Comparison,
 }
 
-/// What the comparison shows.
+/// Result of the comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Comparison {
     /// Control ticks compared.
     pub ticks: u64,
-    /// Of these, armed ones.
+    /// Armed ticks among them.
     pub armed_ticks: u64,
-    /// Bits compared: throttles and the link's bytes.
+    /// Bits compared: throttles and link bytes.
     pub bits: u64,
     /// Ticks with a bit that differs.
     pub differing_ticks: u64,
-    /// Bits that differ; those of a byte that only one side has sent are eight.
+    /// Bits that differ; a byte sent by one side only counts as eight.
     pub differing_bits: u64,
     /// The first tick with a bit that differs, counted from 0.
     pub first_difference: Option<u64>,
@@ -31,20 +32,20 @@ pub struct Comparison {
     pub instructions: Spread,
     /// Ticks that came late or early, by the processor's own clock.
     pub late_ticks: u32,
-    /// Most stack ever used, interrupts included \[bytes\].
+    /// Largest stack depth so far, interrupts included \[bytes\].
     pub stack_bytes: u32,
 }
 
 impl Twins {
-    /// Both, disarmed.
+    /// Creates both, disarmed.
     ///
     /// # Errors
-    /// The first parameter out of range; none in fact.
+    /// The first parameter out of range; does not occur.
     pub fn new(emulator: Emulator) -> Result<Self, OutOfRange> {
         Ok(Twins { emulator, host: Host::new()?, comparison: Comparison::default() })
     }
 
-    /// What was compared so far.
+    /// Returns the result so far.
     pub fn comparison(&self) -> &Comparison {
         &self.comparison
     }
@@ -53,7 +54,7 @@ impl Twins {
 impl Autopilot for Twins {
     fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error> {
         let reply = self.emulator.exchange(uplink).map_err(|error| Error::Autopilot(error.into()))?;
-        // Times are the processor's: they are measured, not computed.
+        // The times are the processor's, since they are measured, not computed.
         let tick = self.host.tick(uplink, reply.time_us, reply.cycles);
         self.comparison.add(&reply, &tick);
         hear(&reply.bytes);

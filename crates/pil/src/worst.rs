@@ -1,9 +1,9 @@
-//! A search for the control tick that takes the most instructions: random plausible states first, then a climb from the
+//! A search for the control tick with the most instructions: random plausible states first, then hill climbing from the
 //! worst of them.
 //!
-//! A tick's cost depends on what the law remembers, too, so this is one long flight: every candidate is flown for a few
-//! ticks, from wherever the ones before it have left the estimates. It finds a bad tick, and does not prove that there is no
-//! worse one.
+//! A tick's cost also depends on the law's memory, so this is one long flight: every candidate is flown for a few
+//! ticks, from the estimates that the previous ones left. The search finds a bad tick; it does not prove that there is
+//! no worse one.
 
 use crate::{Emulator, Error};
 use afbc_link::{Command, Uplink};
@@ -13,32 +13,32 @@ use nalgebra::Vector3;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// Ticks for which a candidate is flown, and then its mirror image: a tracker whose pose stands while its twist says that
-/// it moves is not believed for long.
+/// Ticks for which a candidate and then its mirror image are flown: a tracker with a constant pose and a non-zero twist
+/// is soon distrusted.
 const HOLD: u64 = 8;
 /// Ticks at rest before a vehicle is armed.
 const REST: u64 = 1_050;
-/// How many numbers make a candidate.
+/// Numbers per candidate.
 const NUMBERS: usize = 19;
-/// Largest of each: position \[m\], velocity \[m/s\], attitude \[rad\], rates \[rad/s\]; of the setpoint position \[m\],
-/// velocity \[m/s\], yaw \[rad\].
+/// Scale of each number: position \[m\], velocity \[m/s\], attitude \[rad\], rates \[rad/s\]; of the setpoint position
+/// \[m\], velocity \[m/s\], yaw \[rad\].
 const SCALES: [f32; NUMBERS] =
     [2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 0.6, 0.6, 3.0, 5.0, 5.0, 5.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 3.0];
 
-/// The worst tick that was found.
+/// The worst tick found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Worst {
-    /// What it took.
+    /// Its instructions.
     pub instructions: u32,
-    /// Candidates flown until then.
+    /// Index of the candidate in which it occurred.
     pub candidate: u64,
-    /// All of them.
+    /// Number of candidates.
     pub candidates: u64,
     /// Ticks flown with the motors on.
     pub ticks: u64,
 }
 
-/// Flies `candidates`; the same ones for the same `seed`.
+/// Flies `candidates`, which depend on `seed` only.
 ///
 /// # Errors
 /// If the emulator fails, or the vehicle does not arm.
@@ -47,11 +47,11 @@ pub fn search(emulator: Emulator, seed: u64, candidates: u64) -> Result<Worst, E
     let mut worst = Worst { candidates, ..Worst::default() };
     let (mut summit, mut height) = ([0.0; NUMBERS], 0);
     for candidate in 0..candidates {
-        // The first half is random; the other climbs.
+        // The first half is random; the second half climbs.
         let numbers = if candidate < candidates / 2 { flight.anywhere() } else { flight.near(&summit) };
         let mut instructions = 0;
         for tick in 0..2 * HOLD {
-            // The monitor trips all the time.
+            // The monitor trips repeatedly.
             if tick == 0 {
                 flight.station.say(&Uplink::Command(Command::Engage));
             }
@@ -82,18 +82,18 @@ struct Flight {
 }
 
 impl Flight {
-    /// A number in -1..1.
+    /// Draws a number in -1..1.
     fn number(&mut self) -> f32 {
         (self.random.next_u64() >> 40) as f32 / (1 << 23) as f32 - 1.0
     }
 
     fn anywhere(&mut self) -> [f32; NUMBERS] {
-        // Some far out, some near hover.
+        // Some far from hover, some near it.
         let reach = (self.number() + 1.0) / 2.0;
         [0.0; NUMBERS].map(|_| reach * self.number())
     }
 
-    /// Another one near `numbers`.
+    /// Draws a candidate near `numbers`.
     fn near(&mut self, numbers: &[f32; NUMBERS]) -> [f32; NUMBERS] {
         numbers.map(|number| match self.random.next_u64() % 8 {
             0 => self.number(),
@@ -104,7 +104,7 @@ impl Flight {
 
     fn inputs(&mut self, numbers: &[f32; NUMBERS], mirrored: bool) -> (State, Setpoint) {
         let sign = if mirrored { -1.0 } else { 1.0 };
-        // Never the same twice, as measurements are.
+        // Never twice the same, like measurements.
         let noise = 1e-5 * self.number();
         let mut scaled = numbers.iter().zip(SCALES).map(|(number, scale)| number * scale);
         let mut next = || scaled.next().unwrap_or(0.0);
@@ -119,7 +119,7 @@ impl Flight {
         (state, Setpoint { position_m, velocity_m_s, yaw_rad: next(), ..Setpoint::default() })
     }
 
-    /// One tick; what it took, if the motors were on.
+    /// Flies one tick; returns its instructions if the motors were on.
     fn fly(&mut self, state: State, setpoint: Setpoint) -> Result<Option<u32>, Error> {
         self.tick += 1;
         self.station.say(&Uplink::State { sent_us: self.tick * 1000, state });
@@ -128,7 +128,7 @@ impl Flight {
         Ok((reply.throttles != [0; 4]).then_some(reply.instructions))
     }
 
-    /// Puts it on the ground and arms it.
+    /// Puts the vehicle on the ground and arms it.
     fn arm(&mut self) -> Result<(), Error> {
         for tick in 0..3 * REST {
             if tick >= REST && tick.is_multiple_of(10) {

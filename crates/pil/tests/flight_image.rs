@@ -1,4 +1,4 @@
-//! The very image that flies, on an emulated board: it boots, ticks, listens and answers, and goes on without its crystal.
+//! The unmodified flight image on an emulated board: boot, ticks, link, and failures of its crystal and its tasks.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs, unreachable_pub, reason = "test")]
 
 mod common;
@@ -16,30 +16,30 @@ use pil::{Board, Image};
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
-/// Far longer than it takes, even on a machine that is busy with other things.
+/// Far longer than needed, even on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
-/// How often it is told where it is \[us\]: QEMU's USART takes some 8 kB/s.
+/// Interval between states sent to the board \[us\]: QEMU's USART takes some 8 kB/s.
 const EVERY_US: u64 = 30_000;
-/// What counts as 1 kHz; QEMU's USART may hold up a tick, by bytes faster than any line's.
+/// Accepted as 1 kHz; QEMU's USART delivers bytes faster than any line and may delay a tick.
 const RATE_HZ: std::ops::RangeInclusive<f32> = 997.0..=1003.0;
 /// SysTick's reload value register.
 const SYST_RVR: u32 = 0xE000_E014;
 
-/// Somebody who tells the board again and again where it is, and hears what it says.
+/// A tracker that keeps sending the same state, and collects the board's messages.
 struct Talk {
     board: Board,
     station: Station,
     decoder: Decoder<Downlink>,
     heard: Heard,
-    /// When it was last told \[us since its power-up\].
+    /// Time of the last state \[us since the board's power-up\].
     spoke_us: u64,
 }
 
-/// What the board said.
+/// The board's messages so far.
 #[derive(Debug, Default)]
 struct Heard {
     heartbeats: u32,
-    /// Of the newest rotor command \[us since power-up\].
+    /// Time of the newest rotor command \[us since power-up\].
     time_us: u64,
     health: Health,
     answers: HashSet<Answer>,
@@ -52,7 +52,7 @@ impl Talk {
         Talk { board, station: Station::default(), decoder, heard: Heard::default(), spoke_us: 0 }
     }
 
-    /// Talks, with `command` each time, until `enough`.
+    /// Talks, with `command` each time, until `enough` is true.
     fn until(&mut self, command: Option<Command>, enough: impl Fn(&Heard) -> bool) {
         let start = Instant::now();
         while !enough(&self.heard) {
@@ -66,8 +66,8 @@ impl Talk {
                 Downlink::Rotors { time_us, .. } => heard.time_us = time_us,
                 _ => (),
             });
-            // By the board's own clock, right after it told its time. Still, level, at its setpoint; the state goes last
-            // before the command, to be fresh when that arrives.
+            // By the board's own clock, right after its message. At rest, level, at the setpoint; the state is the last
+            // message before the command, to be fresh when that arrives.
             if heard.time_us >= spoke_us + EVERY_US {
                 let (state, setpoint) = motion(0.0);
                 self.station.say(&Uplink::Setpoint(setpoint));
@@ -79,8 +79,8 @@ impl Talk {
         }
     }
 
-    /// Asks to be armed until the answer says that all is well: it is refused for this only, that the vehicle has to be
-    /// told for a whole second without a gap that it is at rest, which QEMU's USART is too slow for.
+    /// Asks for arming until the only remaining reason for refusal is that the vehicle must report rest for a whole
+    /// second without a gap, which QEMU's USART is too slow for.
     fn ask(&mut self) {
         self.until(Some(Command::Arm), |heard| heard.texts.contains(Refusal::NotAtRest.reason()));
     }
@@ -88,15 +88,15 @@ impl Talk {
 
 /// Five wait states, prefetch, both caches.
 const FLASH_ON: u32 = 5 | 1 << 8 | 1 << 9 | 1 << 10;
-/// The locking loop's source is the crystal; its divider.
+/// Bit of RCC_PLLCFGR: the PLL's source is the crystal; its divider.
 const PLL_FROM_CRYSTAL: u32 = 1 << 22;
 const PLL_DIVIDER: u32 = 0x3F;
-/// The core runs from the locking loop.
+/// The core runs from the PLL.
 const CORE_FROM_PLL: u32 = 0b10;
 
 #[test]
 fn it_boots_ticks_and_listens() {
-    // That it comes back means that the image got past its clocks.
+    // Boot only returns if the image's clocks came up.
     let Some(mut board) = start_or_skip(Image::Flight, |elf| Board::boot(&elf)) else { return };
     assert!(board.clock_accesses() > 10, "the clock tree was set up");
     assert_eq!(board.clock_register(FLASH_ACR), FLASH_ON);
@@ -160,17 +160,17 @@ fn a_panic_of_the_link_does_not_stop_the_tick() {
         gdb.step().unwrap();
     }
     gdb.resume().unwrap();
-    // What was sent before, and then nothing: the link's task is gone.
+    // Bytes sent before the panic, and then nothing: the link's task has ended.
     let start = Instant::now();
     while !board.receive().unwrap().is_empty() {
-        assert!(start.elapsed() < PATIENCE, "it talks on");
+        assert!(start.elapsed() < PATIENCE, "the link still sends");
     }
 }
 
 /// USART1's interrupt.
 const USART1: u32 = 16 + 37;
 
-/// On a line that never pauses, to wake the link's task for every byte would take most of the processor's time.
+/// Waking the link's task for every byte would take most of the processor's time on a busy line.
 #[test]
 fn few_bytes_do_not_wake_the_link() {
     let Some((mut board, linked)) = start_or_skip(Image::Flight, |elf| Ok((Board::boot(&elf)?, Linked::read(&elf)?)))
@@ -181,7 +181,7 @@ fn few_bytes_do_not_wake_the_link() {
     let ring = linked.symbol("flight::board::RX").unwrap();
     board.send(&[1; 31]).unwrap();
     let gdb = board.halt().unwrap();
-    // Ticks go on waking tasks, the link's too.
+    // Ticks keep waking tasks, including the link's.
     while gdb.memory::<32>(ring).unwrap().iter().filter(|byte| **byte == 1).count() < 31 {
         gdb.step().unwrap(); // off the breakpoint
         gdb.run_to(wake, PATIENCE).unwrap();
@@ -198,7 +198,7 @@ fn it_has_a_log() {
     for line in ["tick {=u32} cycles, longest {=u32}", "started by {=str}"] {
         assert!(linked.log.iter().any(|logged| logged.contains(line)), "{line:?} in {:?}", linked.log);
     }
-    // It says something, and once a second more.
+    // It logs something at once, and one line per second.
     let header = linked.symbol("_SEGGER_RTT").unwrap();
     let written = header + 16 + 4 + 4 + 3 * 4;
     let mut said = || {
@@ -211,12 +211,12 @@ fn it_has_a_log() {
     assert!(first > 0, "started by ...");
     let start = Instant::now();
     while said() == first {
-        assert!(start.elapsed() < PATIENCE, "no line a second");
+        assert!(start.elapsed() < PATIENCE, "no line per second");
         std::thread::sleep(Duration::from_millis(50));
     }
 }
 
-/// Bottom of the RAM, and of the stack; and the stack's top (`memory.x`).
+/// Address range of the stack, at the bottom of the RAM (`memory.x`).
 const STACK: std::ops::Range<u32> = 0x2000_0000..0x2000_6000;
 const HARD_FAULT: u32 = 3;
 
@@ -225,7 +225,7 @@ fn a_stack_that_overflows_ends_in_the_fault_handler() {
     let Some(mut board) = start_or_skip(Image::Flight, |elf| Board::boot(&elf)) else { return };
     let start = Instant::now();
     while board.receive().unwrap().is_empty() {
-        assert!(start.elapsed() < PATIENCE, "it does not run");
+        assert!(start.elapsed() < PATIENCE, "the image does not run");
     }
 
     let gdb = board.halt().unwrap();
@@ -244,9 +244,9 @@ fn a_stack_that_overflows_ends_in_the_fault_handler() {
     assert!(STACK.contains(&(sp - 4)) && sp > STACK.end - 1024, "a fresh stack: {sp:#x}");
     gdb.resume().unwrap();
 
-    // What was sent before it failed, and then nothing.
+    // Bytes sent before it failed, and then nothing.
     while !board.receive().unwrap().is_empty() {
-        assert!(start.elapsed() < PATIENCE, "it talks on");
+        assert!(start.elapsed() < PATIENCE, "the link still sends");
     }
     assert_eq!(board.receive().unwrap(), [], "it is silent until the watchdog resets it");
 }

@@ -1,4 +1,4 @@
-//! The `pil` image against the host: the same calls, the same bits.
+//! The `pil` image compared with the host: the same calls, the same bits.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs, unreachable_pub, reason = "test")]
 
 mod common;
@@ -9,7 +9,7 @@ use common::start_or_skip;
 use pil::exercise::{TICKS, bytes_of_tick};
 use pil::{Emulator, Image, Reply};
 
-/// All replies of one flight.
+/// Returns all replies of one flight.
 fn fly(mut emulator: Emulator) -> Vec<Reply> {
     let mut station = Station::default();
     (0..TICKS).map(|tick| emulator.exchange(&bytes_of_tick(&mut station, tick)).unwrap()).collect()
@@ -43,11 +43,11 @@ fn every_run_is_the_same() {
     let first = fly(emulator);
     let second = fly(start_or_skip(Image::Pil, |elf| Emulator::start(&elf)).unwrap());
     let differs = first.iter().zip(&second).position(|(a, b)| a != b);
-    assert_eq!(differs, None, "tick that differs");
+    assert_eq!(differs, None, "index of the first tick that differs");
 }
 
-/// The control tick comes once in every control period, right at its start, however long the processor takes to get there:
-/// a faster or slower one creates its tasks at other moments of the first period.
+/// The control tick comes exactly once per control period, at its start, whatever the processor's speed: a faster or
+/// slower processor creates its tasks at other moments of the first period.
 #[test]
 fn the_tick_keeps_its_time_on_any_processor() {
     for slower in 0..3 {

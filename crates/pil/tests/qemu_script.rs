@@ -1,5 +1,5 @@
-//! `scripts/qemu.sh`, run twice at once, installs once and finishes what an earlier run left: against stand-ins for apt,
-//! dpkg and QEMU.
+//! `scripts/qemu.sh`, run twice at once, installs once and finishes what an earlier run left unfinished. Apt, dpkg and
+//! QEMU are replaced by stand-ins.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs, reason = "test")]
 
 use std::fs;
@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/qemu.sh");
 
-/// A program of the search path's first folder.
+/// Creates a program in the first folder of the search path.
 fn stand_in(folder: &Path, name: &str, body: &str) {
     let path = folder.join(name);
     fs::write(&path, format!("#!/bin/bash\n{body}\n")).unwrap();

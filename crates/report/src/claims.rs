@@ -1,4 +1,4 @@
-//! The paper's three claims about its own experiment, each weighed against what was flown.
+//! The paper's three claims about its experiment, checked on the flights.
 
 use afbc_sim::contender::ControllerKind;
 use afbc_sim::flown::Flown;
@@ -7,26 +7,26 @@ use afbc_sim::paper;
 use afbc_sim::run::Run;
 use nalgebra::Vector4;
 
-/// A claim of Section IV and what the flights say about it.
+/// A claim of Section IV and the result of checking it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Claim {
-    /// What the paper says.
+    /// The paper's claim.
     pub statement: String,
-    /// Whether the flights bear it out.
+    /// Whether the flights confirm it.
     pub holds: bool,
-    /// The figures behind that.
+    /// The figures that show it.
     pub evidence: String,
 }
 
-/// "Goes to zero": what is left of AFBC's error is at most this share of the error that backstepping keeps, on every axis.
-/// Not zero itself, since the last gust strikes 15 s before the end and yaw is still learning it then.
+/// Limit for "goes to zero": AFBC's remaining error as a share of backstepping's, on every axis. Not zero, since the
+/// last gust comes 15 s before the end and yaw is still adapting to it.
 pub const VANISHED: f64 = 0.25;
 
-/// What is left of an error is its mean size over this long at the end \[s\].
+/// The remaining error is the mean |error| over this long at the end \[s\].
 pub const TAIL_S: f64 = 5.0;
 
-/// The three claims, weighed for the first scenario that both laws have flown; none if there is no such scenario, or if it
-/// ends before the experiment does. A law that lost the vehicle bears nothing out.
+/// Checks the three claims on the first scenario that both laws have flown; none if there is no such scenario, or if it
+/// ends before the experiment does. No claim holds if a vehicle was lost.
 pub fn claims(flown: &[Flown]) -> Vec<Claim> {
     let find = |kind, of: &Flown| {
         let whole = of.scenario.duration_s >= paper::DURATION_S;
@@ -45,7 +45,7 @@ pub fn claims(flown: &[Flown]) -> Vec<Claim> {
         .to_vec()
 }
 
-/// Mean |error| over the last [`TAIL_S`].
+/// Returns the mean |error| over the last [`TAIL_S`].
 fn tail(run: &Run) -> Vector4<f64> {
     let end_s = run.log.last().map_or(0.0, |last| last.time_s);
     let tail = run.log.iter().filter(|sample| sample.time_s >= end_s - TAIL_S);
@@ -77,7 +77,7 @@ fn weigh(afbc: &Run, baseline: &Run) -> [(&'static str, bool, String); 3] {
     ]
 }
 
-/// Smaller on every axis.
+/// True if `a` is smaller on every axis.
 fn below(a: &Vector4<f64>, b: &Vector4<f64>) -> bool {
     a.iter().zip(b).all(|(a, b)| a < b)
 }

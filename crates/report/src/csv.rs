@@ -1,4 +1,4 @@
-//! One CSV for each run: every logged step, units in the header.
+//! One CSV file for each run, with every logged step and units in the header.
 
 use afbc::law::Context;
 use afbc::model::Model;
@@ -12,11 +12,11 @@ use csv::ByteRecord;
 use nalgebra::Vector4;
 use std::io::{self, Write};
 
-/// A value, written in as few digits as give it back exactly.
+/// A value, written with the fewest digits that restore it exactly.
 enum Number {
-    /// What the controller computes.
+    /// Computed by the controller.
     Single(f32),
-    /// What the plant and the reference are.
+    /// Computed by the plant or the reference.
     Double(f64),
     /// 0 or 1.
     Flag(bool),
@@ -24,10 +24,10 @@ enum Number {
 
 use Number::{Double, Flag, Single};
 
-/// What a column may show.
+/// Data of one row.
 struct Row<'a> {
     sample: &'a Sample,
-    /// Lowest and highest U1..U4 since the row before.
+    /// Lowest and highest U1..U4 since the previous row.
     extremes: &'a [Vector4<f64>; 2],
     /// See [`lyapunov`].
     lyapunov: PerAxis<f32>,
@@ -39,8 +39,8 @@ struct Column {
     value: Box<dyn Fn(&Row) -> Number>,
 }
 
-/// The terms of the Lyapunov functions (14), (27) that can be computed in flight: e_1^2 / 2 + e_2^2 / (2 g_i). What is
-/// left out is the distance of the estimates from values that nobody knows. g_i is the nominal vehicle's.
+/// Returns the computable terms of the Lyapunov functions (14), (27): e_1^2 / 2 + e_2^2 / (2 g_i), with g_i of the
+/// nominal vehicle. The terms of the estimate errors are left out, since the optimal values are unknown.
 fn lyapunov(model: &Model, sample: &Sample) -> PerAxis<f32> {
     let state = sample.motion.measure();
     let rotor_residual_rad_s = sample.action.speeds.residual_rad_s();
@@ -52,7 +52,7 @@ fn lyapunov(model: &Model, sample: &Sample) -> PerAxis<f32> {
     })
 }
 
-/// Every column of a flight's log, left to right.
+/// Returns every column of a flight's log, left to right.
 fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
     let mut columns = Vec::new();
     let mut add = |name: String, value: Box<dyn Fn(&Row) -> Number>| columns.push(Column { name, value });
@@ -88,7 +88,7 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
         "psi_d_rate_rad_s": |s| s.reference.yaw_rate_rad_s;
         "psi_d_acceleration_rad_s2": |s| s.reference.yaw_acceleration_rad_s2;
     }
-    // phi_d and theta_d: as (40) gives them, then as roll and pitch track them, behind the command filter.
+    // phi_d and theta_d: from (40), then behind the command filter, as tracked by roll and pitch.
     add! { Single
         "phi_d_raw_rad": |s| s.trace.desired_rad[0];
         "theta_d_raw_rad": |s| s.trace.desired_rad[1];
@@ -97,8 +97,8 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
         "phi_d_rate_rad_s": |s| s.trace.filtered[0].rate;
         "theta_d_rate_rad_s": |s| s.trace.filtered[1].rate;
     }
-    // U1..U4 as the rotors give them, then as the law wants them; further down, between which values they went since
-    // the row before.
+    // U1..U4 as produced by the rotors, then as demanded by the law; further down, their extremes since the previous
+    // row.
     add! { Single
         "u1_n": |s| given(s).roll_n;
         "u2_n": |s| given(s).pitch_n;
@@ -122,16 +122,16 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
     for (i, u) in ["u1", "u2", "u3", "u4"].into_iter().enumerate() {
         for (j, extreme) in ["min", "max"].into_iter().enumerate() {
             let value = move |row: &Row| row.extremes.get(j).and_then(|u| u.get(i)).copied();
-            // What the rotors give is computed in f32.
+            // The rotors' U1..U4 are computed in f32.
             add(format!("{u}_{extreme}_n"), Box::new(move |row| Single(value(row).unwrap_or(f64::NAN) as f32)));
         }
     }
     add! { Flag "saturated": |s| s.action.health.saturated; }
-    // What the others have in the place of e_2 and the estimates is nothing.
+    // Peers have neither e_2 nor estimates, so these columns are left out.
     let (in_cascade, adaptive) = (contender.kind().in_cascade(), contender.gains().is_some());
     for axis in Axis::ALL {
         let name = axis.name();
-        // Of e1, e2 and the subsystem's input.
+        // Units of e1, e2 and the subsystem's input.
         let [e1, e2, u] = match axis {
             Axis::Roll | Axis::Pitch | Axis::Yaw => ["rad", "rad_s", "n"],
             Axis::Z => ["m", "m_s", "n"],
@@ -161,7 +161,7 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
     columns
 }
 
-/// What rotors and air did, and what was measured, of a plant and of sensors that are not ideal.
+/// Returns the columns of non-ideal rotors, air and sensors.
 fn real(scenario: &Scenario) -> Vec<Column> {
     let mut columns = Vec::new();
     if !scenario.is_ideal() {
@@ -207,7 +207,7 @@ fn real(scenario: &Scenario) -> Vec<Column> {
     columns
 }
 
-/// U1..U4 as the rotors give them.
+/// Returns U1..U4 as produced by the rotors.
 fn given(sample: &Sample) -> afbc_types::Inputs {
     afbc_control::mixer::Mixer::inputs(&sample.action.forces)
 }

@@ -1,23 +1,23 @@
-//! Flights by scenario, and what their files are called.
+//! Flights grouped by scenario, and their file names.
 
 use crate::words::{case_words, slug};
 use afbc_sim::flown::Flown;
 use afbc_sim::scenario::Scenario;
 use std::collections::HashSet;
 
-/// The flights of one scenario, and what their files are called.
+/// The flights of one scenario, and their file names.
 pub(super) struct Group<'a> {
     /// The scenario that all of them flew.
     pub(super) scenario: &'a Scenario,
-    /// In the order flown; never empty.
+    /// Flights in the order flown; never empty.
     pub(super) flights: Vec<&'a Flown>,
-    /// One for each flight.
+    /// File name of each flight's log.
     pub(super) csv_names: Vec<String>,
-    /// Goes before `fig4-trajectory.svg`.
+    /// Prefix of `fig4-trajectory.svg` etc.
     pub(super) figure_prefix: String,
 }
 
-/// Sorts flights by scenario, in the order flown, and names their files.
+/// Groups flights by scenario, in the order flown, and names their files.
 pub(super) fn groups(flown: &[Flown]) -> Vec<Group<'_>> {
     let mut groups: Vec<Group<'_>> = Vec::new();
     for flight in flown {
@@ -46,7 +46,7 @@ pub(super) fn groups(flown: &[Flown]) -> Vec<Group<'_>> {
     groups
 }
 
-/// The scenario's name with whatever tells it from others of that name.
+/// Returns the scenario's name with what distinguishes it from others of that name.
 fn distinct_stem(scenario: &Scenario, all: &[&Scenario]) -> String {
     let own = case_words(scenario);
     let mut name = slug(&scenario.name);
@@ -59,7 +59,7 @@ fn distinct_stem(scenario: &Scenario, all: &[&Scenario]) -> String {
     name
 }
 
-/// `name`, with a number if it is taken. Some file systems do not tell A from a.
+/// Returns `name`, with a number if it is taken, also ignoring case, as some file systems do.
 fn unique(taken: &mut HashSet<String>, name: String) -> String {
     let mut candidate = name.clone();
     let mut number = 2;

@@ -1,7 +1,7 @@
-//! What flights leave behind: tables for the terminal, and in a folder CSV, JSON, figures and a page.
+//! Results of flights: tables for the terminal, and in a folder CSV, JSON, figures and a page.
 //!
-//! [`flights`], [`compare`] and [`campaign`] each `write` a folder and make a `table`. The same flights give the same bytes:
-//! nothing here knows the time of day or the machine.
+//! [`flights`], [`compare`] and [`campaign`] each have a function `write` for a folder and a function `table`. The same
+//! flights give the same bytes: nothing depends on the time of day or the machine.
 #![forbid(unsafe_code)]
 
 pub mod campaign;

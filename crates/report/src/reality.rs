@@ -1,9 +1,9 @@
-//! What a scenario adds to the paper's vehicle, in the report's words.
+//! What a scenario adds to the ideal vehicle, for the report.
 
 use afbc_plant::{Rotors, Sensing, Spread};
 use afbc_sim::scenario::Scenario;
 
-/// Name and value of each part that is there.
+/// Returns name and value of each part present.
 pub(super) fn rows(scenario: &Scenario) -> Vec<(&'static str, String)> {
     [rotors(scenario), air(scenario), sensors(scenario)].concat()
 }
@@ -69,7 +69,7 @@ fn sensors(scenario: &Scenario) -> Vec<(&'static str, String)> {
     }
     add(scenario.flight_core, "flight core", "coasts and descends while no state arrives".into());
     if let Some(dropouts) = dropouts {
-        add(true, "dropouts", format!("{} a second, {} s on average", dropouts.rate_hz, dropouts.mean_s));
+        add(true, "dropouts", format!("{} per second, {} s on average", dropouts.rate_hz, dropouts.mean_s));
     }
     rows
 }

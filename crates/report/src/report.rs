@@ -1,4 +1,4 @@
-//! One page with everything: tables, claims, figures, parameters. Needs no network and no other file.
+//! One self-contained page with tables, claims, figures and parameters.
 
 use crate::claims::Claim;
 use crate::figures::Figure;
@@ -12,8 +12,8 @@ use afbc_types::{Axis, Declared, PerAxis, Value};
 use core::convert::Infallible;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-/// Looks: one column; dark on white, or light on dark for those who prefer that, never on paper. Whatever is wider than
-/// the screen scrolls by itself.
+/// Style: one column, dark on white, or light on dark for readers who prefer it, except on paper. Elements wider than
+/// the screen scroll by themselves.
 const STYLE: &str = "
 :root { color-scheme: light dark; --paper: #fff; --ink: #1a1a1a; --quiet: #555; --rule: #888; --faint: #ccc;
   --good: #146c2e; --bad: #a12; }
@@ -65,10 +65,10 @@ figcaption { color: var(--quiet); font-size: .9rem; }
 }
 ";
 
-/// What an SVG needs as a file of its own, but not within a page.
+/// Namespace needed by an SVG file, but not within a page.
 const NAMESPACE: &str = " xmlns=\"http://www.w3.org/2000/svg\"";
 
-/// The page; `figures` holds one set for each group.
+/// Returns the page; `figures` holds one set for each group.
 pub(super) fn page(groups: &[Group], figures: &[Vec<Figure>], claims: &[Claim]) -> String {
     let title = match groups {
         [only] => only.scenario.description.as_str(),
@@ -152,7 +152,7 @@ fn section(group: &Group, figures: &[Figure]) -> Markup {
     }
 }
 
-/// The terminal's table.
+/// Returns the terminal's table as HTML.
 fn results(group: &Group) -> Markup {
     html! {
         table {
@@ -179,7 +179,7 @@ fn results(group: &Group) -> Markup {
     }
 }
 
-/// What determines the flight.
+/// Returns the parameters that determine the flight.
 pub(super) fn parameters(scenario: &Scenario) -> Markup {
     let vehicle = &scenario.vehicle;
     let inertia = &vehicle.inertia_kg_m2;
@@ -203,7 +203,9 @@ pub(super) fn parameters(scenario: &Scenario) -> Markup {
                     @let (letter, index) = words::gust(gust);
                     tr {
                         td { "gust " (letter) sub { (index) } }
-                        td.prose { (gust.size) " " (words::gust_unit(gust)) " from " (gust.start_s) " s " (until(gust.end_s)) }
+                        td.prose {
+                            (gust.size) " " (words::gust_unit(gust)) " from " (gust.start_s) " s " (until(gust.end_s))
+                        }
                     }
                 }
                 @for change in scenario.environment.changes() {
@@ -225,7 +227,7 @@ pub(super) fn parameters(scenario: &Scenario) -> Markup {
     }
 }
 
-/// Who flew: settings and gains.
+/// Returns settings and gains of a contender.
 fn gains(contender: &Contender) -> Markup {
     let Settings {
         common: afbc_control::Settings { dt_s, rotor_force_max_n },
@@ -269,7 +271,7 @@ fn gains(contender: &Contender) -> Markup {
     }
 }
 
-/// What the columns of AFBC's gains are called.
+/// Column heads of AFBC's gains.
 const AFBC_GAINS: [&str; 12] = ["α₁", "α₂", "γ", "η", "ε", "centre", "width", "σ", "κ", "Θ max", "δ max", "dead zone"];
 
 fn per_axis<G: Declared>(names: &[&str], gains: &PerAxis<G>) -> Markup {
@@ -290,7 +292,7 @@ fn by_name(law: &Law) -> Markup {
     } } } }
 }
 
-/// Key and value of each gain.
+/// Returns key and value of each gain.
 fn listed(gains: &impl Declared) -> Vec<(&'static str, f32)> {
     let mut list = Vec::new();
     let Ok(()) = gains.visit(&mut |declaration, value| {

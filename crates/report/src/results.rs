@@ -10,7 +10,7 @@ use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 use core::fmt::Write;
 
-/// The rows, top to bottom: each reading of the experiment, with its name for people.
+/// Returns the rows, top to bottom: each reading of the experiment with a readable name.
 pub fn cases() -> Vec<(String, Case)> {
     let case = |reading, uncertainty| Case { reading, uncertainty };
     let mut cases = vec![
@@ -30,10 +30,10 @@ pub fn cases() -> Vec<(String, Case)> {
     cases
 }
 
-/// The lines between which a page holds the table.
+/// Lines around the table in a page.
 pub const MARKERS: [&str; 2] = ["<!-- results: begin -->", "<!-- results: end -->"];
 
-/// A page up to and with the first marker's line, its table, and the rest; `None` if it lacks a marker.
+/// Splits a page into everything up to the first marker's line, the table, and the rest; `None` if a marker is missing.
 pub fn parts(page: &str) -> Option<(&str, &str, &str)> {
     let [begin, end] = MARKERS;
     let from = page.find(begin)? + begin.len() + 1;
@@ -41,17 +41,17 @@ pub fn parts(page: &str) -> Option<(&str, &str, &str)> {
     Some((page.get(..from)?, page.get(from..to)?, page.get(to..)?))
 }
 
-/// What is flown for the table, top to bottom, each with its name for people.
+/// Returns the scenarios of the table, top to bottom, each with a readable name.
 ///
 /// # Errors
-/// None in fact: the paper's parameters are in range.
+/// Does not occur: the paper's parameters are in range.
 pub fn scenarios() -> Result<Vec<(String, Scenario)>, OutOfRange> {
     let models = [Model::Simplified, Model::RigidBody];
     let rows = cases().into_iter().flat_map(|(name, case)| models.map(|model| (name.clone(), model, case)));
     rows.map(|(name, model, case)| Ok((name, scenario(model, case)?))).collect()
 }
 
-/// Flies each of `scenarios` under each of its contenders. `progress` hears of each flight that is done.
+/// Flies each of `scenarios` under each of its contenders; calls `progress` after each flight.
 ///
 /// # Errors
 /// The first parameter, gain or setting out of range.
@@ -67,7 +67,7 @@ pub fn fly(scenarios: Vec<(String, Scenario)>, progress: &dyn Fn()) -> Result<Ve
     Ok(flown)
 }
 
-/// The table in Markdown.
+/// Formats the table as Markdown.
 pub fn markdown(flown: &[(String, Flown)]) -> String {
     let mut table = String::from(
         "| scenario | plant | law | RMSE x | y | z | psi | max x | y | z | psi | final x | y | z | psi \

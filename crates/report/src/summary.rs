@@ -1,4 +1,4 @@
-//! `summary.json`: the figures of merit of each run, for programs.
+//! `summary.json`: the figures of merit of each run.
 
 use afbc::Profile;
 use afbc_sim::case::{Reading, Sign};
@@ -8,7 +8,7 @@ use nalgebra::Vector4;
 use serde::Serialize;
 use std::io::{self, Write};
 
-/// One run. Whatever does not apply, or could not be measured, is null.
+/// One run. A value that does not apply or could not be measured is null.
 #[derive(Serialize)]
 struct Summary<'a> {
     scenario: &'a str,
@@ -18,21 +18,21 @@ struct Summary<'a> {
     plant: &'a str,
     contender: &'a str,
     controller: &'a str,
-    /// Whose gains and settings those are, if a profile's.
+    /// The profile whose gains and settings were flown, if any.
     profile: Option<&'a str>,
     duration_s: f64,
     lost_at_s: Option<f64>,
     lost_reason: Option<&'a str>,
-    /// When and why AFBC's monitor put another law in its place.
+    /// Time at which AFBC's monitor switched to the fallback law, and why.
     tripped_at_s: Option<f64>,
     tripped_reason: Option<&'a str>,
     seed: u64,
-    /// From when on `rmse`, `max_abs` and `mean_abs_delta_u_n` count.
+    /// Time from which `rmse`, `max_abs` and `mean_abs_delta_u_n` are evaluated.
     measured_from_s: f64,
     rmse: Option<Outputs>,
     max_abs: Option<Outputs>,
     final_error: Outputs,
-    /// U1..U4, per control step.
+    /// Mean change of U1..U4 per control step.
     mean_abs_delta_u_n: Option<[f64; 4]>,
 }
 
@@ -79,7 +79,7 @@ fn summary(Flown { scenario, run }: &Flown) -> Summary<'_> {
 /// Writes an array with one object for each run.
 ///
 /// # Errors
-/// If `out` does not take it.
+/// If writing to `out` fails.
 pub fn write(out: &mut dyn Write, flown: &[Flown]) -> io::Result<()> {
     let summaries: Vec<_> = flown.iter().map(summary).collect();
     serde_json::to_writer_pretty(&mut *out, &summaries)?;

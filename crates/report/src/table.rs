@@ -1,4 +1,4 @@
-//! The table for the terminal: plain text, at most [`WIDTH`] columns.
+//! The table for the terminal: plain text of at most [`WIDTH`] columns.
 
 use crate::claims::Claim;
 use crate::groups::{Group, groups};
@@ -10,21 +10,21 @@ use nalgebra::Vector4;
 /// Widest line.
 const WIDTH: usize = 100;
 
-/// One block of figures: a title, the head of its four columns, and what to show.
+/// One block of figures: title, heads of its four columns, and values.
 pub(super) struct Block {
     pub(super) title: &'static str,
     pub(super) columns: [&'static str; 4],
     pub(super) digits: usize,
     pub(super) values: fn(&Metrics) -> Vector4<f64>,
-    /// False if there is something to show even of a flight too short for the others.
+    /// True if its figures need a flight beyond the settling time.
     pub(super) needs_settled: bool,
-    /// A flight that was lost has no figures worth comparing: the first block says so, the others leave it out.
+    /// True for the first block, which also lists lost flights; the others leave them out.
     pub(super) first: bool,
 }
 
 const OUTPUTS: [&str; 4] = ["x [m]", "y [m]", "z [m]", "psi [rad]"];
 
-/// Top to bottom.
+/// Blocks from top to bottom.
 pub(super) const BLOCKS: [Block; 4] = [
     Block { title: "RMSE", columns: OUTPUTS, digits: 4, values: |m| m.rmse, needs_settled: true, first: true },
     Block {
@@ -54,13 +54,13 @@ pub(super) const BLOCKS: [Block; 4] = [
 ];
 
 impl Block {
-    /// The flights that have a row here.
+    /// Returns the flights with a row in this block.
     pub(super) fn rows<'a>(&self, group: &'a Group<'_>) -> impl Iterator<Item = &'a Flown> {
         let all = self.first;
         group.flights.iter().copied().filter(move |flight| all || flight.run.lost.is_none())
     }
 
-    /// The four figures of a run, or dashes where there was nothing to measure.
+    /// Returns the four figures of a run, or dashes where there was nothing to measure.
     pub(super) fn cells(&self, flight: &Flown) -> [String; 4] {
         let values: [f64; 4] = (self.values)(&flight.run.metrics).into();
         if self.needs_settled && !flight.run.is_settled() {
@@ -70,7 +70,7 @@ impl Block {
     }
 }
 
-/// `value` with `digits` decimals, fewer for a number too large for its column, and no "-0.000".
+/// Formats `value` with `digits` decimals, fewer if it is too wide for its column, and without "-0.000".
 fn number(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     if text.len() > 11 {
@@ -82,16 +82,16 @@ fn number(value: f64, digits: usize) -> String {
     }
 }
 
-/// What the figures mean, in one sentence.
+/// Explains the figures in one sentence.
 pub(super) fn legend() -> String {
     format!(
-        "Error: reference minus vehicle, from {SETTLED_S} s to the end. Mean |dU| per step: how far each input jumps from one \
-         control step to the next; small is smooth."
+        "Error: reference minus vehicle, from {SETTLED_S} s to the end. Mean |dU| per step: mean absolute change of \
+         each input from one control step to the next."
     )
 }
 
-/// The flights and the claims as text: for each scenario, law and axis the RMSE, largest and final error, and for each
-/// input its smoothness.
+/// Formats flights and claims: for each scenario, law and axis the RMSE, largest and final error, and for each input
+/// its smoothness.
 pub fn table(flown: &[Flown], claims: &[Claim]) -> String {
     let mut lines = Vec::new();
     let groups = groups(flown);
@@ -116,10 +116,10 @@ pub fn table(flown: &[Flown], claims: &[Claim]) -> String {
     lines.join("\n")
 }
 
-/// The block of one scenario.
+/// Formats the block of one scenario.
 fn flights(group: &Group, lines: &mut Vec<String>) {
     wrap(lines, "", &format!("{}: {}", group.scenario.name, words::conditions(group.scenario)));
-    // Counted from what is printed, so that any name fits.
+    // Width of the longest printed name.
     let name_width = group.flights.iter().map(|flight| flight.run.contender.title().chars().count()).max().unwrap_or(0);
     let rule = "─".repeat(20 + name_width + 4 * 12);
     let mut head = [""; 4];
@@ -158,7 +158,7 @@ fn row(title: &str, name: &str, name_width: usize, cells: &[impl AsRef<str>; 4])
     format!("{title:<20}{name:<name_width$}{a:>12}{b:>12}{c:>12}{d:>12}")
 }
 
-/// Appends `text` behind `first`, broken between words; further lines start below the text.
+/// Appends `text` behind `first`, wrapped; further lines are aligned with the text.
 pub(super) fn wrap(lines: &mut Vec<String>, first: &str, text: &str) {
     let mut line = first.to_owned();
     let mut length = first.chars().count();

@@ -1,4 +1,4 @@
-//! Names and numbers for people, the same wherever they appear.
+//! Readable names and numbers.
 
 use afbc::Profile;
 use afbc_plant::{
@@ -10,14 +10,14 @@ use afbc_sim::run::Tripped;
 use afbc_sim::scenario::Scenario;
 use afbc_types::Axis;
 
-/// A file name without its ending: letters, digits, `-` and `_` of `name`, anything else as `-`.
+/// Returns a file name without extension: letters, digits, `-` and `_` of `name`, and `-` for anything else.
 pub(super) fn slug(name: &str) -> String {
     let keep = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' };
     let slug: String = name.chars().take(80).map(keep).collect();
     if slug.is_empty() { "flight".into() } else { slug }
 }
 
-/// What may tell scenarios of one name apart, as parts of a file name: reading, signs, plant, profile.
+/// Returns the words that distinguish scenarios of one name in file names: reading, signs, plant, profile.
 pub(super) fn case_words(scenario: &Scenario) -> [String; 4] {
     let reading = scenario.case.and_then(|case| case.reading).map_or("still-air", Reading::name);
     let sign = |sign| match sign {
@@ -30,14 +30,15 @@ pub(super) fn case_words(scenario: &Scenario) -> [String; 4] {
     [reading.into(), signs, scenario.model.name().into(), profile(scenario).map_or("tuned", Profile::name).into()]
 }
 
-/// The profile that all contenders share, if there is one.
+/// Returns the profile shared by all contenders, if any.
 fn profile(scenario: &Scenario) -> Option<Profile> {
     let mut profiles = scenario.contenders.iter().map(Contender::profile);
     let first = profiles.next()?;
     profiles.all(|profile| profile == first).then_some(first)?
 }
 
-/// One line that says what was flown: "rigid-body plant, persistent gusts, inertia +75 %, thrust factor -40 %, 60 s".
+/// Summarises the conditions in one line: "rigid-body plant, persistent gusts, inertia +75 %, thrust factor -40 %, 60
+/// s".
 pub(super) fn conditions(scenario: &Scenario) -> String {
     let mut words = vec![format!("{} plant", scenario.model.name())];
     match (scenario.case.and_then(|case| case.reading), scenario.environment.gusts().len()) {
@@ -55,7 +56,8 @@ pub(super) fn conditions(scenario: &Scenario) -> String {
     words.join(", ")
 }
 
-/// What is real about the flight, word by word: "rotors", "battery", "drag", "wind", "ground", "payload", "sensors", "outages".
+/// Names the non-ideal parts of a flight: "rotors", "battery", "drag", "wind", "ground", "payload", "sensors",
+/// "outages".
 fn real(scenario: &Scenario) -> Vec<&'static str> {
     let Realism { rotors, drag, wind, contact, ground_effect, .. } = &scenario.realism;
     let (faults, battery) = (!rotors.faults.is_empty(), rotors.battery.is_some());
@@ -74,17 +76,17 @@ fn real(scenario: &Scenario) -> Vec<&'static str> {
     words.into_iter().filter_map(|(there, word)| there.then_some(word)).collect()
 }
 
-/// "+0.2 kg"
+/// Example: "+0.2 kg".
 pub(super) fn payload(payload: &Payload) -> String {
     format!("{:+} kg", payload.mass_kg)
 }
 
-/// "rotor 1 at 80 %"
+/// Example: "rotor 1 at 80 %".
 pub(super) fn fault(fault: &RotorFault) -> String {
     format!("rotor {} at {} %", fault.rotor, (fault.efficiency * 1000.0).round() / 10.0)
 }
 
-/// "inertia +75 %"
+/// Example: "inertia +75 %".
 pub(super) fn change(change: &ParameterChange) -> String {
     let quantity = match change.quantity {
         Quantity::Mass => "mass",
@@ -92,12 +94,12 @@ pub(super) fn change(change: &ParameterChange) -> String {
         Quantity::ThrustFactor => "thrust factor",
         Quantity::DragFactor => "drag factor",
     };
-    // Tenths of a percent.
+    // Rounded to tenths of a percent.
     let percent = ((change.factor - 1.0) * 1000.0).round() / 10.0;
     format!("{quantity} {percent:+} %")
 }
 
-/// Letter and index of a gust: ("A", "x") for an acceleration, ("F", "x") for a force, ("T", "φ") for a moment.
+/// Returns letter and index of a gust: ("A", "x") for an acceleration, ("F", "x") for a force, ("T", "φ") for a moment.
 pub(super) fn gust(gust: &Gust) -> (&'static str, &'static str) {
     let letter = match (gust.kind, gust.axis) {
         (GustKind::Acceleration, _) => "A",
@@ -107,44 +109,45 @@ pub(super) fn gust(gust: &Gust) -> (&'static str, &'static str) {
     (letter, symbol(gust.axis))
 }
 
-/// "wind (3, 0, −1) m/s"
+/// Example: "wind (3, 0, −1) m/s".
 pub(super) fn wind_gust(gust: &CosineGust) -> String {
     let v = gust.velocity_m_s;
     format!("wind ({}, {}, {}) m/s", v.x, v.y, v.z).replace('-', "−")
 }
 
-/// A quantity that a campaign draws, with its unit: "steady wind [m/s]". An unknown one is its name in words.
+/// Returns the label of a quantity drawn by a campaign, with its unit: "steady wind [m/s]". An unknown one is spelt
+/// out.
 pub(super) fn drawn(name: &str) -> String {
     let words = match name {
-        "mass_ratio" => "true mass, over the believed",
-        "inertia_ratio" => "true inertia, over the believed",
-        "thrust_factor_ratio" => "true thrust factor, over the believed",
-        "drag_factor_ratio" => "true rotor drag factor, over the believed",
+        "mass_ratio" => "true over nominal mass",
+        "inertia_ratio" => "true over nominal inertia",
+        "thrust_factor_ratio" => "true over nominal thrust factor",
+        "drag_factor_ratio" => "true over nominal rotor drag factor",
         "rotor_time_constant_s" => "time constant of the rotors [s]",
         "rotor_delay_s" => "delay from command to rotors [s]",
-        "rotor_efficiency" => "thrust that a failing rotor keeps, as a share",
-        "fault_rotor" => "number of the rotor that fails",
-        "fault_start_s" => "when a rotor fails [s]",
+        "rotor_efficiency" => "remaining share of a failing rotor's thrust",
+        "fault_rotor" => "number of the failing rotor",
+        "fault_start_s" => "time of the rotor failure [s]",
         "payload_kg" => "mass of the payload [kg]",
         "payload_below_m" => "payload below the centre of mass [m]",
-        "payload_start_s" => "when the payload is taken up [s]",
+        "payload_start_s" => "time of taking up the payload [s]",
         "wind_m_s" => "steady wind [m/s]",
-        "wind_direction_rad" => "where the wind blows to, from +x to +y [rad]",
+        "wind_direction_rad" => "direction the wind blows to, from +x to +y [rad]",
         "wind_20ft_m_s" => "turbulence: wind at 20 ft [m/s]",
-        "noise_ratio" => "measurement noise, over the scenario's",
-        "bias_ratio" => "measurement bias, over the scenario's",
+        "noise_ratio" => "measurement noise over the scenario's",
+        "bias_ratio" => "measurement bias over the scenario's",
         "sensor_delay_s" => "delay from motion to measurement [s]",
-        "dropout_rate_hz" => "measurements stay away, per second [Hz]",
-        "dropout_mean_s" => "mean time without measurements [s]",
-        "start_x_m" => "start away from the scenario's, along x [m]",
-        "start_y_m" => "start away from the scenario's, along y [m]",
-        "start_z_m" => "start away from the scenario's, along z [m]",
+        "dropout_rate_hz" => "rate of measurement dropouts [Hz]",
+        "dropout_mean_s" => "mean length of a dropout [s]",
+        "start_x_m" => "offset of the start along x [m]",
+        "start_y_m" => "offset of the start along y [m]",
+        "start_z_m" => "offset of the start along z [m]",
         other => return other.replace('_', " "),
     };
     words.into()
 }
 
-/// Unit of a gust's size.
+/// Returns the unit of a gust's size.
 pub(super) fn gust_unit(gust: &Gust) -> &'static str {
     match (gust.kind, gust.axis) {
         (GustKind::Acceleration, Axis::X | Axis::Y | Axis::Z) => "m/s²",
@@ -154,7 +157,7 @@ pub(super) fn gust_unit(gust: &Gust) -> &'static str {
     }
 }
 
-/// The paper's letter for the coordinate of `axis`.
+/// Returns the paper's symbol for the coordinate of `axis`.
 pub(super) const fn symbol(axis: Axis) -> &'static str {
     match axis {
         Axis::Roll => "φ",
@@ -166,14 +169,14 @@ pub(super) const fn symbol(axis: Axis) -> &'static str {
     }
 }
 
-/// "lost at t = 15.625 s: tilted beyond 90 degrees"
+/// Example: "lost at t = 15.625 s: tilted beyond 90 degrees".
 pub(super) fn lost(lost: &afbc_sim::flight::Lost) -> String {
     format!("lost at t = {:.3} s: {}", lost.time_s, lost.reason)
 }
 
-/// "the monitor put backstepping in AFBC's place at t = 15.625 s: rotors stay saturated"
+/// Example: "the monitor switched to backstepping at t = 15.625 s: rotors stay saturated".
 pub(super) fn tripped(tripped: &Tripped) -> String {
     let reason = tripped.trip.reason();
     let reason = reason.strip_prefix("AFBC off: ").unwrap_or(reason);
-    format!("the monitor put backstepping in AFBC's place at t = {:.3} s: {reason}", tripped.time_s)
+    format!("the monitor switched to backstepping at t = {:.3} s: {reason}", tripped.time_s)
 }

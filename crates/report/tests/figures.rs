@@ -1,4 +1,4 @@
-//! What figures and pages show, whatever is flown: read back from the SVG and HTML as written.
+//! Contents of figures and pages, read back from the SVG and HTML as written.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
 
@@ -17,11 +17,11 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Names that need escapes or spaces among them; two share a colour, for there are fewer colours than names.
+/// Names, some with escapes or spaces; two share a colour, since there are fewer colours than names.
 const OWN: [&str; 14] =
     ["soft", "stiff", "no limits", "a", "b", "c", "d", "e", "f", "g", "pid-tuned", "AFBC 2", "<&> δ", "mine (storm)"];
 
-/// An empty folder of its own for each test.
+/// A separate empty folder for each test.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("figures").join(test);
     if folder.exists() {
@@ -30,12 +30,12 @@ fn folder(test: &str) -> PathBuf {
     folder
 }
 
-/// The same as a command's own.
+/// Opens it as a command's own.
 fn open(folder: &Path) -> Folder {
     Folder::open(folder, "test", "it", false).unwrap()
 }
 
-/// Every SVG that is in `folder`, by name.
+/// Returns every SVG in `folder`, by name.
 fn svgs(folder: &Path) -> BTreeMap<String, String> {
     let paths = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let svgs = paths.filter(|path| path.extension().is_some_and(|ending| ending == "svg"));
@@ -47,7 +47,7 @@ fn page(folder: &Path) -> String {
     fs::read_to_string(folder.join("report.html")).unwrap()
 }
 
-/// The words under each figure.
+/// Returns the caption of each figure.
 fn captions(folder: &Path) -> Vec<String> {
     let page = page(folder);
     page.split("<figcaption>").skip(1).map(|rest| rest.split("</figcaption>").next().unwrap().to_owned()).collect()
@@ -69,7 +69,7 @@ fn flown(scenario: &Scenario, names: &[&str]) -> Vec<Flown> {
     scenario.contenders.iter().map(fly).collect()
 }
 
-/// A campaign of `flights` in which those for whom `lost` holds were lost; all others went alike.
+/// A campaign of `flights` in which those for which `lost` holds were lost; all others have equal results.
 fn gone_alike(names: &[&str], drawn: &[&str], flights: u64, lost: impl Fn(&str, u64) -> bool) -> Summary {
     let drawn = drawn.iter().map(|name| {
         let quantity = QUANTITIES.iter().find(|quantity| quantity.range.name == *name).unwrap();
@@ -115,7 +115,7 @@ fn words(node: Node<'_, '_>) -> String {
         .to_owned()
 }
 
-/// All that is written in a figure, with where it stands.
+/// Returns all text in a figure with its position.
 fn labels(svg: &Document<'_>) -> Vec<(String, f64, f64)> {
     let texts = svg.descendants().filter(|node| node.has_tag_name("text"));
     texts.map(|text| (words(text), number(text, "x"), number(text, "y"))).collect()
@@ -125,7 +125,7 @@ fn number(node: Node<'_, '_>, attribute: &str) -> f64 {
     node.attribute(attribute).unwrap().parse().unwrap()
 }
 
-/// Stroke and dashes of the line that stands before `name` in the legend.
+/// Returns stroke and dashes of the line before `name` in the legend.
 fn legend(svg: &str, name: &str) -> Option<(String, String)> {
     let svg = Document::parse(svg).unwrap();
     let entry = svg.descendants().find(|node| node.has_tag_name("text") && words(*node) == name)?;
@@ -155,7 +155,7 @@ fn a_contender_has_one_color_in_every_report() {
     let mut colors: HashMap<String, BTreeSet<String>> = HashMap::new();
     let title = |name: &str| named(name).title().to_owned();
 
-    // All together, in another order, and each alone; a comparison; a campaign.
+    // All together, in another order, and each alone; in a comparison; in a campaign.
     let mut reports = Vec::new();
     let mut sets: Vec<Vec<&str>> = vec![names.clone(), backwards.clone()];
     sets.extend(names.iter().map(|name| vec![*name]));
@@ -167,7 +167,7 @@ fn a_contender_has_one_color_in_every_report() {
     let scenario = Scenario { contenders: backwards.iter().map(|name| named(name)).collect(), ..hover(0.2) };
     let out = folder("colors-compare");
     report::compare::write(&open(&out), &compare::fly(vec![scenario], 2, 1, &|| ()).unwrap()).unwrap();
-    // Bars have no legend: the name stands beside them.
+    // Bars have no legend: the name is next to them.
     let rmse = fs::read_to_string(out.join("rmse.svg")).unwrap();
     let rmse = Document::parse(&rmse).unwrap();
     for name in &names {
@@ -204,7 +204,7 @@ fn a_contender_has_one_color_in_every_report() {
     assert_eq!(known.len(), 7, "{known:?}");
 }
 
-/// Where 100 % is in each panel of a figure of shares, top to bottom.
+/// Returns the position of 100 % in each panel of a figure of shares, top to bottom.
 fn hundreds(svg: &Document<'_>) -> Vec<(f64, f64)> {
     labels(svg).into_iter().filter(|(text, ..)| text == "100").map(|(_, x, y)| (x, y)).collect()
 }
@@ -225,7 +225,7 @@ fn every_contender_shows_at_100_percent_with_its_interval() {
         let hundreds = hundreds(&success);
         assert_eq!(hundreds.len(), 2);
         for (left, top) in hundreds {
-            // Everybody flew in each tenth, and lost nobody: as many marks in a row, at places of their own.
+            // Every contender flew in each tenth without a loss: that many marks in a row, at different places.
             let middle = |node: &Node<'_, '_>| {
                 let points = points(*node);
                 let extent = |part: fn(&(f64, f64)) -> f64| {
@@ -246,7 +246,7 @@ fn every_contender_shows_at_100_percent_with_its_interval() {
                 let fellows = colors.iter().filter(|other| *other == color).count();
                 let own = row.iter().filter(|mark| mark.attribute("fill") == Some(color)).count();
                 assert_eq!(own, 10 * fellows);
-                // Bars go down from the marks, to where 20 flights without a loss leave it.
+                // Interval bars extend down from the marks, to the lower bound for 20 flights without a loss.
                 let is_bar = |line: &&Node<'_, '_>| {
                     let points = points(**line);
                     line.attribute("stroke") == Some(color)
@@ -259,7 +259,7 @@ fn every_contender_shows_at_100_percent_with_its_interval() {
             }
         }
 
-        // Curves that are the same lie within one another, and each ends in a mark of its own over its interval.
+        // Equal curves lie within one another, and each ends in a mark of its own over its interval.
         for name in ["position-error.svg", "smoothness.svg"] {
             let figure = Document::parse(&svgs[name]).unwrap();
             let long = |node: &Node<'_, '_>, tag| node.has_tag_name(tag) && points(*node).len() > 50;
@@ -329,7 +329,7 @@ fn panels_of_a_campaign_have_words_with_units() {
     }
 }
 
-/// Everything that may happen to a vehicle, much of it at once.
+/// A scenario with every kind of event, many at the same time.
 fn eventful() -> Scenario {
     let calm = hover(12.0);
     let gust = |axis, start_s, end_s| Gust { axis, kind: GustKind::Force, size: 0.01, start_s, end_s };
@@ -360,7 +360,7 @@ fn eventful() -> Scenario {
 fn events_that_overlap_are_told_apart_and_each_has_its_label() {
     let out = folder("events");
     flights::write(&open(&out), &flown(&eventful(), &["afbc"]), &[]).unwrap();
-    // Start and end of what is shaded, in seconds.
+    // Start and end of each shaded event, in seconds.
     let bands = [
         ("mass +10 %", 1.0, 8.0),
         ("inertia −10 %", 2.0, 9.0),
@@ -373,7 +373,7 @@ fn events_that_overlap_are_told_apart_and_each_has_its_label() {
         ("wind (0.5, −0.5, 0) m/s", 5.0, 8.0),
         ("wind (0.125, −0.5, 0) m/s", 6.5, 7.5),
     ];
-    // What stays for good is marked where it strikes.
+    // Permanent events are marked at their onset.
     let onsets = ["Fy", "wind (0.25, −0.5, 0) m/s"];
     for (name, svg) in svgs(&out).iter().filter(|(name, _)| !name.contains("fig4")) {
         let svg = Document::parse(svg).unwrap();
@@ -381,7 +381,7 @@ fn events_that_overlap_are_told_apart_and_each_has_its_label() {
         for label in onsets {
             assert_eq!(labels.iter().filter(|(text, ..)| text == label).count(), 1, "{name}: {label}");
         }
-        // The plot's own scale, from its time axis.
+        // The plot's scale, from its time axis.
         let tick = |text: &str| {
             let ticks = labels.iter().filter(|(label, ..)| label == text);
             ticks.max_by(|a, b| a.2.total_cmp(&b.2)).unwrap().1
@@ -411,7 +411,7 @@ fn events_that_overlap_are_told_apart_and_each_has_its_label() {
                 text == label && strip[1] < *at_y && *at_y < strip[1] + strip[3] && (at_x - strip[0]).abs() < 2000.0
             };
             assert!(labels.iter().any(|label| beside(&label)), "{name}: {label}");
-            // And every panel is shaded in the same tint.
+            // Every panel is shaded in the same tint.
             let shaded = rects
                 .iter()
                 .zip(&fills)
@@ -420,7 +420,7 @@ fn events_that_overlap_are_told_apart_and_each_has_its_label() {
             assert_eq!(shaded.count(), panels, "{name}: {label}");
             strips.push(*strip);
         }
-        // No band lies on another's.
+        // No two bands overlap.
         for (i, [x, y, width, _]) in strips.iter().enumerate() {
             for (other, [other_x, other_y, other_width, _]) in strips[..i].iter().enumerate() {
                 let apart = x + width <= *other_x || other_x + other_width <= *x || y != other_y;
@@ -449,7 +449,7 @@ fn two_of_the_same_that_overlap_are_told_apart() {
     flights::write(&open(&out), &flown(&two, &["afbc"]), &[]).unwrap();
     for (name, svg) in &svgs(&out) {
         let svg = Document::parse(svg).unwrap();
-        // On the time axis rows of tints, along the reference wide lines, one wider than the other.
+        // Rows of tints on the time axis, and wide lines along the reference, one wider than the other.
         let is_row = |node: &Node<'_, '_>| node.has_tag_name("rect") && number(*node, "height") < 80.0;
         let is_band = |node: &Node<'_, '_>| node.has_tag_name("polyline") && number(*node, "stroke-width") > 30.0;
         let rows = svg.descendants().filter(is_row).filter_map(|row| row.attribute("fill"));
@@ -464,21 +464,21 @@ fn two_of_the_same_that_overlap_are_told_apart() {
 }
 
 #[test]
-fn captions_mention_what_is_there_and_nothing_else() {
+fn captions_explain_exactly_what_the_figure_shows() {
     let mentions = |folder: &Path, word: &str| captions(folder).iter().filter(|text| text.contains(word)).count();
     let calm = folder("captions-calm");
     flights::write(&open(&calm), &flown(&hover(6.0), &["afbc", "pid"]), &[]).unwrap();
     assert_eq!(captions(&calm).len(), 5);
-    for word in ["gust", "Dots", "cross", "arrow", "Shaded", "chatter", "lost"] {
+    for word in ["gust", "Dots", "Cross", "Arrow", "Shaded", "chatter", "lost"] {
         assert_eq!(mentions(&calm, word), 0, "{word}: {:?}", captions(&calm));
     }
 
     let events = folder("captions-events");
     flights::write(&open(&events), &flown(&eventful(), &["afbc"]), &[]).unwrap();
     assert_eq!((mentions(&events, "gust"), mentions(&events, "Shaded")), (5, 5), "{:?}", captions(&events));
-    assert_eq!(mentions(&events, "cross"), 0);
+    assert_eq!(mentions(&events, "Cross"), 0);
 
-    // Only a change: no gust is there.
+    // Only a change, without a gust.
     let mut changed = eventful();
     changed.environment = Environment::new(
         changed.vehicle,
@@ -491,19 +491,19 @@ fn captions_mention_what_is_there_and_nothing_else() {
     flights::write(&open(&only), &flown(&changed, &["afbc"]), &[]).unwrap();
     assert_eq!((mentions(&only, "gust"), mentions(&only, "Shaded")), (0, 5), "{:?}", captions(&only));
 
-    // A vehicle that loses its rotors.
+    // A vehicle whose rotors fail.
     let mut falling = hover(8.0);
     falling.realism.rotors.faults = vec![RotorFault { rotor: 1, efficiency: 0.0, start_s: 1.0 }];
     let lost = flown(&falling, &["afbc"]);
     assert!(lost[0].run.lost.is_some());
     let fallen = folder("captions-lost");
     flights::write(&open(&fallen), &lost, &[]).unwrap();
-    // A cross where it was lost, or an arrow where that lies beyond the panel.
+    // A cross at the loss, or an arrow if it lies beyond the panel.
     assert_eq!(mentions(&fallen, "lost"), 5, "{:?}", captions(&fallen));
-    let marked = |text: &String| text.contains("A cross:") || text.contains("An arrow:");
+    let marked = |text: &String| text.contains("Cross:") || text.contains("Arrow:");
     assert!(captions(&fallen).iter().all(marked), "{:?}", captions(&fallen));
 
-    // The printed law chatters on the paper's own vehicle.
+    // The printed law chatters on the paper's vehicle.
     let paper = Scenario { duration_s: 30.0, ..built_in("paper").unwrap().read().unwrap() };
     let chatter = folder("captions-chatter");
     let contender = paper.contenders.iter().find(|contender| contender.name == "afbc").unwrap().clone();
@@ -512,7 +512,7 @@ fn captions_mention_what_is_there_and_nothing_else() {
     let said = captions(&chatter);
     assert_eq!(said.iter().filter(|text| text.contains("chatter")).count(), 1, "{said:?}");
 
-    // Comparisons: seeds only where there are several, losses where there are some.
+    // Comparisons: seeds are mentioned only if there are several, losses only if there are some.
     for (seeds, loses) in [(1, false), (3, false), (1, true)] {
         let scenario = if loses { falling.clone() } else { hover(6.0) };
         let scenario = Scenario { contenders: vec![named("afbc")], ..scenario };
@@ -540,17 +540,17 @@ fn captions_mention_what_is_there_and_nothing_else() {
         assert_eq!(said.len(), 3);
         assert_eq!(said[0].contains("lost"), loses, "{said:?}");
         assert_eq!(said[1].contains("lost"), loses, "{said:?}");
-        assert_eq!(page(&out).contains("A lost flight is worse"), loses);
+        assert_eq!(page(&out).contains("A lost flight ranks last"), loses);
         assert!(said[0].contains("95 %") && said[1].contains("95 %") && said[2].contains("95 %"), "{said:?}");
     }
-    // Nothing drawn, or nothing to measure: no figure rather than an empty one.
+    // Without drawn quantities, or without measurements: no figure rather than an empty one.
     let out = folder("captions-none");
     report::campaign::write(&open(&out), &gone_alike(&["afbc"], &[], 3, |_, _| true)).unwrap();
     assert_eq!(captions(&out).len(), 0, "{:?}", captions(&out));
     assert!(!page(&out).contains("Drawn"));
 }
 
-/// Elements of a page that are not within another that scrolls, by name.
+/// Returns the names of a page's elements that are not within a scrolling one.
 fn unscrolled(page: &str) -> Vec<String> {
     let mut open: Vec<(String, bool)> = Vec::new();
     let mut found = Vec::new();
@@ -604,7 +604,7 @@ fn pages_fit_a_phone_and_have_a_dark_mode() {
                     assert!(style.contains(&rule), "{name}: {part} {color} of {:?} stays", node.tag_name());
                 }
             }
-            // The page is what the file is, on ground of its own.
+            // The page has the file's figure, on its own background.
             let ground = svg.descendants().find(|node| node.has_tag_name("rect")).unwrap();
             assert_eq!(ground.attribute("fill"), Some("#FFFFFF"), "{name}");
         }

@@ -1,56 +1,56 @@
-//! Separable CMA-ES: an evolution strategy that learns how far to search along each coordinate.
+//! Separable CMA-ES: an evolution strategy that adapts its step along each coordinate.
 //!
-//! R. Ros, N. Hansen, *A simple modification in CMA-ES achieving linear time and space complexity*, PPSN X, 2008, with the
-//! constants of N. Hansen, *The CMA evolution strategy: a tutorial*, 2016. With a thousand evaluations and some twenty
-//! gains there is no time to learn a whole covariance matrix, and no need to: gains are parameters of their own scale.
+//! R. Ros, N. Hansen, *A simple modification in CMA-ES achieving linear time and space complexity*, PPSN X, 2008, with
+//! the constants of N. Hansen, *The CMA evolution strategy: a tutorial*, 2016. A thousand evaluations are too few to
+//! learn a full covariance matrix of some twenty gains, and gains differ mainly in scale.
 //!
-//! Written out here because a library's takes its logarithms and exponentials from the platform, and a search that differs
-//! in the last bit soon differs in all of them; here the same seed gives the same search on every machine.
+//! Implemented here because libraries use the platform's logarithms and exponentials, and a difference in the last bit
+//! soon changes the whole search. Here the same seed gives the same search on every machine.
 
 use afbc_plant::noise::{Noise, Stream};
 use libm::{exp, log, sqrt};
 
-/// A search for the smallest value of a function of a few numbers.
+/// A search for the minimum of a function of several numbers.
 #[derive(Clone, Debug)]
 pub(super) struct Search {
     coordinates: Vec<Coordinate>,
-    /// sigma: length of a step.
+    /// sigma: step size.
     step: f64,
     generation: u32,
     noise: Noise,
 }
 
-/// What is known of one coordinate.
+/// State of the search along one coordinate.
 #[derive(Clone, Copy, Debug)]
 struct Coordinate {
     mean: f64,
-    /// Of C's diagonal.
+    /// Diagonal element of C.
     variance: f64,
-    /// Of p_sigma: where the mean has been going, in steps.
+    /// Element of p_sigma: the recent movement of the mean, in steps.
     step_path: f64,
-    /// Of p_c: likewise, not scaled by the variance.
+    /// Element of p_c: the recent movement of the mean, not scaled by the variance.
     path: f64,
 }
 
 impl Search {
-    /// A search from `start`, where every coordinate is thought to be off by about `step`.
+    /// Starts a search at `start` with the initial step size `step` in every coordinate.
     pub(super) fn new(start: &[f64], step: f64, seed: u64) -> Self {
         let at = |&mean: &f64| Coordinate { mean, variance: 1.0, step_path: 0.0, path: 0.0 };
         let noise = Noise::new(seed, Stream::Scenario);
         Search { coordinates: start.iter().map(at).collect(), step, generation: 0, noise }
     }
 
-    /// The middle of the search.
+    /// Returns the mean of the search.
     pub(super) fn mean(&self) -> Vec<f64> {
         self.coordinates.iter().map(|coordinate| coordinate.mean).collect()
     }
 
-    /// How many points make a generation.
+    /// Returns the number of points per generation.
     pub(super) fn population(&self) -> usize {
         4 + (3.0 * log(self.coordinates.len().max(1) as f64)) as usize
     }
 
-    /// The points of the next generation.
+    /// Draws the points of the next generation.
     pub(super) fn ask(&mut self) -> Vec<Vec<f64>> {
         let population = self.population();
         let Search { coordinates, step, noise, .. } = self;
@@ -58,13 +58,13 @@ impl Search {
         (0..population).map(point).collect()
     }
 
-    /// Moves on, given the points of one generation, the best first.
+    /// Updates the search with the points of one generation, best first.
     pub(super) fn tell(&mut self, ranked: &[Vec<f64>]) {
         let n = self.coordinates.len() as f64;
         let weights = weights(ranked.len());
         let effective = 1.0 / weights.iter().map(|weight| weight * weight).sum::<f64>();
 
-        // Rates of learning; the diagonal allows those of C to be larger.
+        // Learning rates; a diagonal C allows larger ones.
         let c_step = (effective + 2.0) / (n + effective + 5.0);
         let damping = 1.0 + c_step + 2.0 * (sqrt((effective - 1.0) / (n + 1.0)) - 1.0).max(0.0);
         let c_path = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n);
@@ -83,11 +83,11 @@ impl Search {
             c.step_path = (1.0 - c_step) * c.step_path + push;
             length += c.step_path * c.step_path;
         }
-        // Against the length of a vector of n normal numbers.
+        // Relative to the expected length of a vector of n normal numbers.
         let length = sqrt(length) / (sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n)));
         self.generation += 1;
         let begun = sqrt(1.0 - exp(2.0 * f64::from(self.generation) * log(1.0 - c_step)));
-        // While the steps are much too short, p_c waits.
+        // While the steps are much too short, p_c is not updated.
         let follow = if length / begun < 1.4 + 2.0 / (n + 1.0) { 1.0 } else { 0.0 };
         for (i, c) in self.coordinates.iter_mut().enumerate() {
             let mean_move: f64 = weighted(i, c.mean).map(|(weight, y)| weight * y).sum();
@@ -101,7 +101,7 @@ impl Search {
     }
 }
 
-/// Of the better half of `points`, the better the more; they sum to 1.
+/// Returns the weights of the better half of `points`, decreasing with rank; they sum to 1.
 fn weights(points: usize) -> Vec<f64> {
     let raw: Vec<f64> = (1..=points / 2).map(|rank| log((points as f64 + 1.0) / 2.0) - log(rank as f64)).collect();
     let sum: f64 = raw.iter().sum();
@@ -112,7 +112,7 @@ fn weights(points: usize) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// The value of `f` in the middle of a search from all ones, after `evaluations`.
+    /// Returns `f` at the mean of a search from all ones after `evaluations`.
     fn minimum(f: impl Fn(&[f64]) -> f64, n: usize, evaluations: usize) -> f64 {
         let mut search = Search::new(&vec![1.0; n], 0.5, 1);
         for _ in 0..evaluations / search.population() {
@@ -133,7 +133,7 @@ mod tests {
         assert!(minimum(sphere, 1, 400) < 1e-9);
     }
 
-    /// Coordinates whose scales lie a factor of 1000 apart.
+    /// Finds a minimum with scales of the coordinates a factor of 1000 apart.
     #[test]
     fn learns_the_scale_of_each_coordinate() {
         let weight = |i: usize| libm::pow(1e6, i as f64 / 9.0);

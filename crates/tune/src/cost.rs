@@ -1,4 +1,4 @@
-//! What a contender is judged by.
+//! The cost of a contender's flights.
 
 use afbc_sim::contender::Contender;
 use afbc_sim::metrics::Metrics;
@@ -7,18 +7,18 @@ use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 use rayon::prelude::*;
 
-/// Root mean square distance from the reference that costs as much as 1 of the others \[m\].
+/// Root mean square distance from the reference with a cost of 1 \[m\].
 pub const POSITION_M: f64 = 0.1;
-/// Likewise, largest error along x, y and z, together \[m\].
+/// Combined largest error along x, y and z with a cost of 1 \[m\].
 pub const WORST_M: f64 = 0.3;
-/// Likewise, root mean square error of yaw \[rad\].
+/// Root mean square error of yaw with a cost of 1 \[rad\].
 pub const YAW_RAD: f64 = 0.1;
-/// Likewise, sum over U1..U4 of the mean |change| from step to step \[N\].
+/// Sum over U1..U4 of the mean |change per step| with a cost of 1 \[N\].
 pub const JUMP_N: f64 = 0.2;
-/// Cost of a flight that is lost at its end, or in which the monitor ends the law's; the earlier, the more, up to twice that.
+/// Cost of a flight that is lost, or in which the monitor trips, at its end; up to twice as much if earlier.
 pub const LOST: f64 = 100.0;
 
-/// What one flight costs.
+/// Returns the cost of one flight.
 pub fn cost(scenario: &Scenario, run: &Run) -> f64 {
     let tripped_s = run.tripped.map(|tripped| tripped.time_s);
     if let Some(end_s) = run.lost.map(|lost| lost.time_s).or(tripped_s) {
@@ -29,7 +29,7 @@ pub fn cost(scenario: &Scenario, run: &Run) -> f64 {
     errors + max_abs.xyz().norm() / WORST_M + jumps.sum() / JUMP_N
 }
 
-/// What each of `scenarios` costs under `contender`.
+/// Returns the cost of each of `scenarios` under `contender`.
 ///
 /// # Errors
 /// The first parameter, gain or setting out of range.
@@ -38,7 +38,7 @@ pub fn costs(scenarios: &[Scenario], contender: &Contender) -> Result<Vec<f64>, 
     scenarios.par_iter().map(fly).collect()
 }
 
-/// The mean over flights: what a contender is judged by.
+/// Returns the mean over flights, the cost of a contender.
 pub fn mean(costs: &[f64]) -> f64 {
     costs.iter().sum::<f64>() / costs.len() as f64
 }

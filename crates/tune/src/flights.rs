@@ -1,7 +1,7 @@
-//! What gains are judged by.
+//! Flights in which gains are evaluated.
 //!
-//! Every flight is that of the built-in scenario `hardware`: rotors that lag by 20 ms, obey a millisecond late and give 3 N
-//! each, a noisy state. The first is that scenario itself; each of the others adds one thing that goes wrong.
+//! Every flight is based on the built-in scenario `hardware`: rotors with a lag of 20 ms, a delay of 1 ms and at most 3
+//! N each, and a noisy state. The first is that scenario itself; each of the others adds one disturbance.
 
 use afbc_plant::{
     Contact, Drag, Environment, GroundEffect, Gust, GustKind, Motion, ParameterChange, Quantity, Turbulence,
@@ -13,15 +13,15 @@ use afbc_types::Axis;
 use nalgebra::Vector3;
 use std::error::Error;
 
-/// When things go wrong \[s\]: errors count by then.
+/// Onset of disturbances \[s\], when errors already count.
 const ONSET_S: f64 = 6.0;
-/// When the reference jumps \[s\]: half a second before errors count, so that what counts is how the vehicle settles.
+/// Time of the reference's step \[s\]: half a second before errors count, so that mainly the settling counts.
 const STEP_S: f64 = 4.5;
 
-/// The flights that gains are searched with.
+/// Returns the flights used in the search for gains.
 ///
 /// # Errors
-/// None in fact: a test flies them.
+/// None occurs: a test flies them.
 pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
     let to = Vector3::new(0.6, -0.4, 1.0);
     let eight = |name, change| Flight { trajectory: eight(8.0), change, ..Flight::new(name, 15.0) };
@@ -37,7 +37,7 @@ pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
         Flight { change: Some((Quantity::ThrustFactor, 0.6)), ..Flight::new("weak", 8.0) }.scenario()?,
         eight("heavy", Some((Quantity::Mass, 1.3))).scenario()?,
         late,
-        // As each gust begins, as parameters change, and on the way to somewhere else.
+        // An outage at the onset of each gust and parameter change, and during a step.
         Scenario {
             name: "outages".into(),
             duration_s: 45.0,
@@ -50,10 +50,10 @@ pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
     ])
 }
 
-/// Flights that no gain has seen in its search, to tell whether it has learnt or memorised.
+/// Returns the held-out flights, which are not used in the search, to detect overfitting.
 ///
 /// # Errors
-/// None in fact: a test flies them.
+/// None occurs: a test flies them.
 pub fn held_out() -> Result<Vec<Scenario>, Box<dyn Error>> {
     let fast = |name, change| Flight { trajectory: eight(6.0), change, ..Flight::new(name, 20.0) };
     let mut delayed = fast("delayed", None).scenario()?;
@@ -76,13 +76,13 @@ pub fn held_out() -> Result<Vec<Scenario>, Box<dyn Error>> {
     ])
 }
 
-/// `scenario` on a link that goes down for 240 ms at each of these times; the flight core coasts through that.
+/// Returns `scenario` with an outage of the link of 240 ms at each of these times; the flight core coasts through them.
 fn blind(scenario: Scenario, starts_s: &[f64]) -> Scenario {
     let outages = starts_s.iter().map(|&start_s| Outage { start_s, end_s: start_s + 0.24 }).collect();
     Scenario { outages, flight_core: true, ..scenario }
 }
 
-/// Pushes of a tenth of a second or less, each as hard as `strength`: about 2 m/s, or 2 rad/s.
+/// Returns a flight with pushes of at most a tenth of a second, of about `strength` times 2 m/s or 2 rad/s.
 fn upset(name: &'static str, strength: f64) -> Result<Scenario, Box<dyn Error>> {
     let pushes = [
         (Axis::Roll, 60.0, 0.03),
@@ -101,7 +101,7 @@ fn upset(name: &'static str, strength: f64) -> Result<Scenario, Box<dyn Error>> 
     Ok(Scenario { environment, ..scenario })
 }
 
-/// Corners in a wind, each turned at: from one to the next in a second.
+/// Returns a course with corners in wind, from each to the next in one second.
 fn course(name: &'static str, leg_m: f64) -> Result<Scenario, Box<dyn Error>> {
     let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)];
     let corner = |(k, (x, y)): (u32, (f64, f64))| {
@@ -117,7 +117,8 @@ fn course(name: &'static str, leg_m: f64) -> Result<Scenario, Box<dyn Error>> {
     Ok(scenario)
 }
 
-/// Down to the ground within `length_s` in a breeze, 3 s on it, where the reference is a little lower still, and up again.
+/// Returns a flight in light wind that lands within `length_s`, stays on the ground for 3 s with the reference slightly
+/// below it, and takes off again.
 fn landing(name: &'static str, length_s: f64) -> Result<Scenario, Box<dyn Error>> {
     let at = |time_s, height_m| Waypoint { time_s, position_m: Vector3::new(0.0, 0.0, height_m), yaw_rad: 0.0 };
     let down_s = ONSET_S + length_s;
@@ -134,12 +135,12 @@ fn hardware() -> Result<Scenario, FileError> {
     built_in("hardware").ok_or_else(|| FileError::whole("hardware", "no such scenario"))?.read()
 }
 
-/// One calm flight of the hardware.
+/// A flight of `hardware` without gusts.
 struct Flight {
     name: &'static str,
     duration_s: f64,
     trajectory: Trajectory,
-    /// What is different from the onset on, for half of what is left of the flight, and by which factor.
+    /// Quantity that changes at the onset for half of the remaining flight, and its factor.
     change: Option<(Quantity, f64)>,
 }
 
@@ -180,7 +181,7 @@ fn step(by_m: Vector3<f64>, turn_rad: f64) -> Trajectory {
     Trajectory::Step { from_m, to_m: from_m + by_m, at_s: STEP_S, yaw_rad: 0.5, turn_rad }
 }
 
-/// A lying eight, once round in `period_s`.
+/// Returns a horizontal figure of eight with the given period.
 fn eight(period_s: f64) -> Trajectory {
     let sine = |amplitude_m, period_s| Sine { amplitude_m, period_s, phase_rad: 0.0 };
     let sines = [sine(1.5, period_s), sine(0.75, 0.5 * period_s), sine(0.3, period_s)];

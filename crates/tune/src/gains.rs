@@ -6,14 +6,13 @@ use afbc_types::{Axis, Declaration, Declared, Range, Value};
 use core::convert::Infallible;
 use core::fmt::Write;
 
-/// Axes that share their gains: the vehicle flies along y as along x, and turns about them alike.
+/// Axes that share their gains: x and y, and roll and pitch, behave alike.
 const GROUPS: [&[Axis]; 4] = [&[Axis::Z], &[Axis::X, Axis::Y], &[Axis::Roll, Axis::Pitch], &[Axis::Yaw]];
 
-/// Where a gain stands, and what it may be.
+/// Called with name, range and value of a gain.
 type Visit<'a> = &'a mut dyn FnMut(&str, &Range, &mut f32);
 
-/// Shows every gain of `contender` that is tuned and not 0. At 0 it switches a part of its law off, which is another law; it
-/// stays there.
+/// Visits every tuned gain of `contender` that is not 0. A gain of 0 switches a part of its law off, and stays 0.
 fn each_tunable(contender: &mut Contender, visit: Visit) {
     let law = &mut contender.law;
     if !law.kind().in_cascade() {
@@ -25,14 +24,14 @@ fn each_tunable(contender: &mut Contender, visit: Visit) {
     each_tuned("cascade", &mut contender.settings, |_| true, visit);
 }
 
-/// Shows the gains of the first axis of `group`, then gives them to the others.
+/// Visits the gains of the first axis of `group`, then copies them to the others.
 fn each_of_group(law: &mut Law, group: &[Axis], visit: Visit) {
     let [first, others @ ..] = group else { return };
     let place = group.iter().map(|axis| axis.name()).collect::<Vec<_>>().join(", ");
     let delta_max = |law: &Law| if let Law::Afbc(gains) = law { gains[*first].safeguards.delta_max } else { 0.0 };
     let before = delta_max(law);
     each_tuned(&place, law, |declaration| declaration.group == first.name(), visit);
-    // By rule, epsilon goes with the bound on delta_hat: their ratio is all that a limit cycle depends on.
+    // By rule, epsilon is proportional to the bound on delta_hat: only their ratio determines the limit cycle.
     if let (Law::Afbc(gains), true) = (&mut *law, before > 0.0) {
         gains[*first].epsilon *= gains[*first].safeguards.delta_max / before;
     }
@@ -44,7 +43,7 @@ fn each_of_group(law: &mut Law, group: &[Axis], visit: Visit) {
     }
 }
 
-/// Shows every gain of one axis.
+/// Visits every gain of one axis.
 fn each_of_axis(law: &mut Law, axis: Axis, mut show: impl FnMut(&mut f32)) {
     let Ok(()) = law.visit_mut(&mut |declaration, value| {
         if let (true, Value::Single([gain])) = (declaration.group == axis.name(), value) {
@@ -54,7 +53,7 @@ fn each_of_axis(law: &mut Law, axis: Axis, mut show: impl FnMut(&mut f32)) {
     });
 }
 
-/// Shows every parameter that is `wanted`, tuned and not 0.
+/// Visits every parameter that is `wanted`, tuned and not 0.
 fn each_tuned(place: &str, parameters: &mut impl Declared, wanted: impl Fn(&Declaration) -> bool, visit: Visit) {
     let Ok(()) = parameters.visit_mut(&mut |declaration, value| {
         if let (true, Value::Single([gain])) = (declaration.tuned && wanted(declaration), value)
@@ -73,14 +72,14 @@ pub(super) fn point(contender: &Contender) -> Vec<f64> {
     logarithms
 }
 
-/// `start` with the gains of `point`, which moves to the nearest place where all are in range. To four digits: what is
-/// flown is what is written down.
+/// Returns `start` with the gains of `point`, which is moved into all ranges. Gains are rounded to four digits, so that
+/// the values flown are those written.
 pub(super) fn contender(start: &Contender, point: &mut [f64]) -> Contender {
     let mut contender = start.clone();
     let mut coordinates = point.iter_mut();
     each_tunable(&mut contender, &mut |_, range, gain| {
         let Some(x) = coordinates.next() else { return };
-        // log(0) is -inf, which limits nothing.
+        // log(0) is -inf, which does not limit.
         *x = x.clamp(libm::log(range.min), libm::log(range.max));
         *gain = four_digits(libm::exp(*x).clamp(range.min, range.max));
     });
@@ -96,13 +95,13 @@ fn four_digits(value: f64) -> f32 {
 pub struct Change {
     /// Axes and key: `x, y alpha1`; of a peer, the key alone.
     pub name: String,
-    /// Before.
+    /// Value before the search.
     pub from: f32,
-    /// After.
+    /// Value after the search.
     pub to: f32,
 }
 
-/// Every gain that was searched, as it was in `start` and is in `found`.
+/// Returns every gain searched, with its values in `start` and `found`.
 pub(super) fn changes(start: &Contender, found: &Contender) -> Vec<Change> {
     let mut changes = Vec::new();
     each_tunable(&mut start.clone(), &mut |place, range, gain| {
@@ -126,7 +125,7 @@ struct Key {
     value: String,
 }
 
-/// `contender` as `[[contender]]` of a scenario file: what its profile does not say already.
+/// Formats `contender` as `[[contender]]` of a scenario file, without keys that its profile implies.
 pub fn fragment(contender: &Contender) -> String {
     let profiles = Profile::ALL.map(|profile| {
         let keys = keys(&Contender::of(contender.kind(), profile));
@@ -159,15 +158,15 @@ pub fn fragment(contender: &Contender) -> String {
     text
 }
 
-/// A TOML string: names hold no control characters.
+/// Formats a TOML string; names have no control characters.
 fn quoted(name: &str) -> String {
     format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
-/// Everything that a scenario file can say of a contender, but the time step, which is the file's.
+/// Returns all keys of a contender in a scenario file, except the time step, which belongs to the file.
 fn keys(contender: &Contender) -> Vec<Key> {
     let mut keys = Vec::new();
-    // A law's groups are tables within its own; that of the settings is a table beside theirs.
+    // Groups of a law's gains are tables within its own; the settings are a table next to them.
     let mut put = |table: String, key, value: Value<'_>| {
         let value = match value {
             Value::Single([number]) => number.to_string(),

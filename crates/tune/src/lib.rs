@@ -1,6 +1,6 @@
-//! Finding gains, in one way for every law: the same flights, the same cost, the same search, the same effort.
+//! Search for gains, in the same way for every law: the same flights, cost, search and number of tries.
 //!
-//! `docs/tuning.md` says what that is and what came of it.
+//! `docs/tuning.md` describes it and its results.
 #![forbid(unsafe_code)]
 
 mod cma_es;

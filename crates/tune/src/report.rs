@@ -1,4 +1,4 @@
-//! What was found, as a piece of a scenario file.
+//! The result of a search as a piece of a scenario file.
 
 use crate::cost::{costs, mean};
 use crate::flights::held_out;
@@ -9,11 +9,11 @@ use afbc_sim::scenario::Scenario;
 use core::fmt::Write;
 use std::error::Error;
 
-/// The contender found, as `[[contender]]` of a scenario file, and before it, as comments, what it costs in each flight
-/// and which gains are how much larger than those of `start`.
+/// Formats the contender found as `[[contender]]` of a scenario file, preceded by comments with its cost in each flight
+/// and the change of each gain from `start`.
 ///
 /// # Errors
-/// None in fact: both have flown before.
+/// None occurs: both have flown before.
 pub fn report(start: &Contender, found: &Found, training: &[Scenario], seed: u64) -> Result<String, Box<dyn Error>> {
     let Found { contender, before, after, evaluations, changes } = found;
     let mut text = format!(

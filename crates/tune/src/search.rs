@@ -1,4 +1,4 @@
-//! The search.
+//! Search for the best gains.
 
 use crate::cma_es::Search;
 use crate::cost::{LOST, costs, mean};
@@ -8,27 +8,27 @@ use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 use rayon::prelude::*;
 
-/// First step of the search, in every gain's logarithm: by a third, up or down.
+/// Initial step size in the logarithm of every gain: about a third up or down.
 const STEP: f64 = 0.3;
 
-/// What a search has found.
+/// Result of a search.
 #[derive(Clone, Debug)]
 pub struct Found {
-    /// The best contender; the one that it started from, if none was better.
+    /// The best contender; the start, if none was better.
     pub contender: Contender,
     /// Cost of the start.
     pub before: f64,
-    /// Cost of the best.
+    /// Cost of the best contender.
     pub after: f64,
-    /// How many contenders were tried.
+    /// Number of contenders tried.
     pub evaluations: usize,
-    /// Every gain that was searched.
+    /// Every gain searched.
     pub changes: Vec<Change>,
 }
 
-/// Searches for the gains of `start` that cost least over `scenarios`, trying `budget` contenders, `start` included.
-/// `progress` hears how many have been tried and the least cost so far; if it returns false, the search ends
-/// there. What is found is the same however many threads there are.
+/// Searches for the gains of `start` with the lowest cost over `scenarios`, trying `budget` contenders, including
+/// `start`. `progress` is called with the number of tries and the lowest cost so far, and ends the search by returning
+/// false. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// If `start` cannot fly.
@@ -42,10 +42,11 @@ pub fn search(
     let before = mean(&costs(scenarios, start)?);
     let (mut best, mut after, mut evaluations) = (start.clone(), before, 1);
     let mut search = Search::new(&gains::point(start), STEP, seed);
-    // The middle of the search is often better than any point around it: the last try is kept for it, once it has moved.
+    // The mean of the search is often better than any point around it: the last try is reserved for it, once it has
+    // moved.
     let mut kept = 0;
     while evaluations + kept < budget && progress(evaluations, after) {
-        // Of the last generation as many points as there are tries left.
+        // The last generation has as many points as there are tries left.
         let mut points = search.ask();
         points.truncate(budget - kept - evaluations);
         let is_whole = points.len() == search.population();
@@ -72,11 +73,11 @@ pub fn search(
     Ok(Found { contender: best, before, after, evaluations, changes })
 }
 
-/// Contenders with the gains of `points`, and what they cost, the best first.
+/// Returns contenders with the gains of `points` and their costs, best first.
 fn rated(start: &Contender, scenarios: &[Scenario], points: Vec<Vec<f64>>) -> Vec<(f64, Contender, Vec<f64>)> {
     let rate = |mut point: Vec<f64>| {
         let contender = gains::contender(start, &mut point);
-        // Gains that do not go together cost as much as a flight that ends where it begins.
+        // Invalid combinations of gains cost as much as a flight lost at its start.
         let cost = costs(scenarios, &contender).map_or(2.0 * LOST, |costs| mean(&costs));
         (cost, contender, point)
     };

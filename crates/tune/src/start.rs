@@ -1,12 +1,13 @@
-//! Where a search begins: gains by hand, so that the same command finds the same gains again once they are the defaults.
+//! Starting points of the search: hand-tuned gains, so that the same command finds the same gains again.
 
 use afbc::Profile;
 use afbc_sim::contender::{Contender, ControllerKind, Law};
 
-/// Of the command filter, for AFBC and backstepping \[rad/s\].
+/// Command filter of AFBC and backstepping \[rad/s\].
 const FILTER_RAD_S: f32 = 40.0;
 
-/// The law of this kind with gains by hand, in the settings of the profile `flight`; AFBC under its monitor, as on board.
+/// Returns the law of this kind with hand-tuned gains and the settings of the profile `flight`; AFBC under its monitor,
+/// as on board.
 pub fn by_hand(kind: ControllerKind) -> Contender {
     let mut contender = Contender { law: Law::by_hand(kind), ..Contender::of(kind, Profile::Flight) };
     contender.settings.command_filter_rad_s = FILTER_RAD_S;

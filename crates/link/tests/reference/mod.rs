@@ -1,8 +1,9 @@
-//! Which frames a stream holds, by MAVLink's specification (<https://mavlink.io/en/guide/serialization.html>) and the
-//! rules that `afbc_link::Decoder` states: written from these alone, over the whole stream at once, to judge the decoder by.
+//! Reference decoder, to compare `afbc_link::Decoder` with: finds the frames of a whole stream at once. It was written
+//! from MAVLink's specification (<https://mavlink.io/en/guide/serialization.html>) and the rules in the decoder's
+//! documentation only.
 #![allow(clippy::indexing_slicing, unreachable_pub, reason = "shared by tests")]
 
-/// A frame whose checksum is right.
+/// A frame with the right checksum.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// Incompatibility flags.
@@ -22,7 +23,7 @@ pub fn crc(bytes: impl IntoIterator<Item = u8>) -> u16 {
 }
 
 impl Frame {
-    /// Its bytes; the signature, if there is one, signs nothing.
+    /// Returns the frame's bytes; a signature is not valid.
     pub fn bytes(&self, seed: u8) -> Vec<u8> {
         let Frame { flags, sequence, system, component, id, payload } = self;
         let mut bytes = vec![0xFD, payload.len() as u8, *flags, 0, *sequence, *system, *component];
@@ -34,13 +35,13 @@ impl Frame {
         bytes
     }
 
-    /// Where the frame that begins at `at` ends, if its header is all there.
+    /// Returns where the frame that begins at `at` ends, if its header is complete.
     fn end(stream: &[u8], at: usize) -> Option<usize> {
         let header = stream.get(at..at + 10)?;
         Some(at + 10 + usize::from(header[1]) + 2 + if header[2] & 1 == 1 { 13 } else { 0 })
     }
 
-    /// The frame from `at`, if it is all there and its checksum is right.
+    /// Returns the frame at `at`, if it is complete and its checksum is right.
     fn read(stream: &[u8], at: usize, seed: &impl Fn(u32) -> Option<u8>) -> Option<Self> {
         let frame = stream.get(at..Self::end(stream, at)?)?;
         let id = u32::from_le_bytes([frame[7], frame[8], frame[9], 0]);
@@ -52,8 +53,8 @@ impl Frame {
     }
 }
 
-/// True if there is a frame in `stream`, with the right checksum, that nobody sent: one that reaches across one of the
-/// `joints` between what was sent. Of 65,536 sums of 16 bits one is right by chance.
+/// True if `stream` contains a frame with the right checksum that nobody sent: one that reaches across one of the
+/// `joints` between sent pieces. A checksum of 16 bits is right by chance once in 65,536 times.
 pub fn any_by_chance(stream: &[u8], joints: &[usize], seed: impl Fn(u32) -> Option<u8>) -> bool {
     (0..stream.len()).filter(|&at| stream[at] == 0xFD).any(|at| {
         let end = Frame::end(stream, at).unwrap_or(at);
@@ -61,10 +62,10 @@ pub fn any_by_chance(stream: &[u8], joints: &[usize], seed: impl Fn(u32) -> Opti
     })
 }
 
-/// All frames of `stream` with the right checksum that do not lie within another frame. `seed` is a message's
-/// `CRC_EXTRA`, if it is known.
+/// Returns all frames of `stream` with the right checksum that do not lie within another frame. `seed` gives a
+/// message's `CRC_EXTRA`, if it is known.
 pub fn frames(stream: &[u8], seed: impl Fn(u32) -> Option<u8>) -> Vec<Frame> {
-    // Here; where the last frame that could not be checked ends; how much of the stream it took to get here.
+    // Position; end of the last frame that could not be checked; how much of the stream was needed to get here.
     let (mut at, mut sealed, mut known) = (0, 0, 0);
     let mut frames = Vec::new();
     while at < stream.len() {
@@ -74,7 +75,7 @@ pub fn frames(stream: &[u8], seed: impl Fn(u32) -> Option<u8>) -> Vec<Frame> {
             continue;
         }
         let Some(end) = Frame::end(stream, at) else {
-            // The header is cut off by the end of the stream; what is behind it is shorter than a frame.
+            // The header is cut off by the end of the stream; the rest is shorter than a frame.
             break;
         };
         known = known.max(at + 10);
@@ -82,7 +83,7 @@ pub fn frames(stream: &[u8], seed: impl Fn(u32) -> Option<u8>) -> Vec<Frame> {
             at += 1;
             continue;
         }
-        // Of two that may be there, this one and the one behind what is sealed, the one that is intact first.
+        // Of two possible frames, here and behind the sealed bytes, the one that is complete first.
         if at < sealed
             && let Some(other) = Frame::end(stream, sealed)
             && (known..end).contains(&other)

@@ -1,5 +1,5 @@
-//! Measures what the firmware costs and writes the table of `docs/budgets.md`; with `--check`, writes nothing. Either
-//! way it fails if a budget is passed. Both images must have been built.
+//! Measures the firmware's cost and writes the table of `docs/budgets.md`; with `--check`, writes nothing. Fails if a
+//! budget is exceeded. Both images must have been built.
 
 use afbc_sim::in_the_loop::Station;
 use pil::beside::Beside;
@@ -10,20 +10,20 @@ use pil::{Emulator, Error, Image};
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Where the table goes.
+/// The page with the table.
 const DOCUMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/budgets.md");
 const BEGIN: &str = "<!-- budgets: written by cargo run --release -p pil --bin budgets -->\n";
 const END: &str = "<!-- end -->\n";
 
-/// The function that is the control tick.
+/// Name of the control tick's function.
 const TICK: &str = "firmware::control::tick";
 
-/// Interrupts whose tasks are not needed to fly: a panic in one of them ends that task alone.
+/// Interrupts whose tasks are not needed in flight: a panic in one of them ends that task alone.
 const DISPENSABLE: [&str; 2] = ["CAN2_RX0", "CAN2_RX1"];
-/// Panics in the motors' output, all of its driver (`docs/budgets.md` names them).
+/// Panics in the motors' output, all in its driver (`docs/budgets.md` lists them).
 const VITAL_PANICS: u64 = 6;
 
-/// Of the search for the worst tick; more of either find a little more.
+/// Seed and size of the search for the worst tick; more candidates find slightly worse ticks.
 const SEED: u64 = 1;
 const CANDIDATES: u64 = 500;
 
@@ -32,7 +32,7 @@ struct Budget {
     what: &'static str,
     unit: &'static str,
     measured: u64,
-    /// None if the number only informs.
+    /// The largest value allowed; none if the figure is only informative.
     most: Option<u64>,
 }
 
@@ -47,7 +47,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// True if every budget is kept.
+/// True if every budget is met.
 fn run() -> Result<bool, Error> {
     let flight = Linked::read(&Image::Flight.find()?)?;
     let tick = flight.reach(TICK)?;
@@ -56,7 +56,7 @@ fn run() -> Result<bool, Error> {
     }
     println!("calls through a pointer, taken for the executor's waker: {}", tick.indirect.join(", "));
 
-    // Once deep in start-up, and in one interrupt of each level on top of that.
+    // The deepest chain of start-up, and on top of it one interrupt of each level.
     let start_up = flight.reach("main")?;
     if !start_up.indirect.is_empty() {
         let callers = start_up.indirect.join(", ");
@@ -100,7 +100,7 @@ fn run() -> Result<bool, Error> {
         line("USART1's interrupt, for a byte", "instructions", beside.byte.into(), Some(250)),
         line("link's task, woken once, most seen", "instructions", beside.wake.into(), None),
         line(
-            "link at full line rate both ways, a control period",
+            "link at full line rate both ways, per control period",
             "instructions",
             beside.link_per_period().into(),
             None,
@@ -111,10 +111,10 @@ fn run() -> Result<bool, Error> {
         line("stack of everything, worst case", "bytes", nested.into(), Some(24 * 1024)),
         line("stack of everything, deepest seen in the pil image", "bytes", stack, None),
         line("panics that the control tick can reach", "", tick.panics.len() as u64, Some(0)),
-        line("panics that other interrupts it takes to fly can reach", "", vital.len() as u64, Some(VITAL_PANICS)),
+        line("panics that other interrupts needed in flight can reach", "", vital.len() as u64, Some(VITAL_PANICS)),
         line("panics that link and housekeeping can reach, contained", "", dispensable.len() as u64, None),
         line("flash", "bytes", flight.flash_bytes, Some(96 * 1024)),
-        line("static RAM, stack aside", "bytes", flight.ram_bytes, Some(32 * 1024)),
+        line("static RAM without the stack", "bytes", flight.ram_bytes, Some(32 * 1024)),
     ];
     let table = table(&budgets);
     print!("{table}");
@@ -124,7 +124,7 @@ fn run() -> Result<bool, Error> {
     Ok(budgets.iter().all(|budget| budget.most.is_none_or(|most| budget.measured <= most)))
 }
 
-/// Least, mean and worst instructions of the ticks with the motors on, and the deepest stack \[bytes\].
+/// Returns least, mean and worst instructions of the ticks with the motors on, and the deepest stack \[bytes\].
 fn fly() -> Result<[u64; 4], Error> {
     let mut emulator = Emulator::start(&Image::Pil.find()?)?;
     let mut station = Station::default();
@@ -159,11 +159,11 @@ fn table(budgets: &[Budget]) -> String {
     table
 }
 
-/// Puts the table into the document, between its marks.
+/// Writes the table into the page, between its markers.
 fn write(table: &str) -> Result<(), Error> {
     let path = Path::new(DOCUMENT);
     let text = std::fs::read_to_string(path)?;
-    let unmarked = || Error::Protocol(format!("{} has lost its marks", path.display()));
+    let unmarked = || Error::Protocol(format!("{} lacks the markers of the table", path.display()));
     let (before, rest) = text.split_once(BEGIN).ok_or_else(unmarked)?;
     let (_, after) = rest.split_once(END).ok_or_else(unmarked)?;
     Ok(std::fs::write(path, [before, BEGIN, table, END, after].concat())?)

@@ -1,4 +1,4 @@
-//! What a campaign's table says, on the page and in the terminal.
+//! Contents of a campaign's table, for the page and the terminal.
 
 use afbc_campaign::statistics::{Share, percentile};
 use afbc_campaign::{Bad, Summary, Tally};
@@ -7,7 +7,7 @@ use afbc_sim::metrics::SETTLED_S;
 /// Percentiles that are reported.
 pub(super) const PERCENTS: [f64; 3] = [50.0, 90.0, 99.0];
 
-/// Head of the table: a group of columns, and the columns in it.
+/// Head of the table: groups of columns, each with its columns.
 pub(super) const HEADS: [(&str, &[&str]); 5] = [
     ("not lost", &["of all", "95 % interval"]),
     ("RMS distance [m]", &["median", "90 %", "99 %"]),
@@ -16,7 +16,7 @@ pub(super) const HEADS: [(&str, &[&str]); 5] = [
     ("fell back", &["of all"]),
 ];
 
-/// One line of the table: as many cells as [`HEADS`] has columns.
+/// Returns one line of the table, with as many cells as [`HEADS`] has columns.
 pub(super) fn cells(tally: &Tally) -> Vec<String> {
     let Share { value, low, high } = tally.count.share();
     let at = |values: &[f64], percent: f64, scale: f64, digits: usize| match percentile(values, percent) {
@@ -32,35 +32,35 @@ pub(super) fn cells(tally: &Tally) -> Vec<String> {
     cells
 }
 
-/// A share for people; of nothing, none.
+/// Formats a share as a percentage; "-" if there is none.
 pub(super) fn percent(share: f64) -> String {
     if share.is_nan() { "-".into() } else { format!("{:.2} %", 100.0 * share) }
 }
 
-/// How many flights each contender has made: of a shard, fewer than of the campaign.
+/// Returns the number of flights of each contender, for a shard only its own.
 pub(super) fn flights(summary: &Summary) -> u64 {
     summary.tallies.first().map_or(0, |tally| tally.count.flights)
 }
 
-/// What the columns mean, in few sentences.
+/// Explains the columns in a few sentences.
 pub(super) fn legend(summary: &Summary) -> String {
     let lost = summary.tallies.iter().any(|tally| tally.count.kept < tally.count.flights);
-    let worse = " A lost flight is worse than any other: where a percentile is one, it says so.";
+    let worse = " A lost flight ranks last; \"lost\" is a percentile that is one.";
     let (worse, of) = if lost { (worse, ", of flights that were not lost") } else { ("", "") };
     format!(
-        "Distances from the reference count from {SETTLED_S} s to the end.{worse} |ΔU₄|: mean jump of the thrust command from \
-         one control step to the next{of}. Fell back: the contender's own monitor took another law. Percentiles are nearest \
-         ranks, intervals Wilson's."
+        "Distances from the reference, from {SETTLED_S} s to the end.{worse} |ΔU₄|: mean absolute change of the thrust \
+         command per control step{of}. Fell back: the contender's monitor switched to the fallback law. Percentiles \
+         are nearest ranks, intervals Wilson's."
     )
 }
 
-/// How a bad flight went, and how to see it again; `target` is what `sitl campaign` knows the campaign by.
+/// Describes a bad flight and the command that flies it again; `target` is the campaign's name for `sitl campaign`.
 pub(super) fn bad(target: &str, tally: &Tally, bad: &Bad) -> [String; 2] {
     let how = match &bad.lost {
         Some((time_s, reason)) => format!("lost at t = {time_s:.3} s: {reason}"),
         None => match bad.rmse_position_m {
             Some(rmse_m) => format!("{rmse_m:.3} m from the reference, root mean square"),
-            None => format!("over before errors count, which is from {SETTLED_S} s on"),
+            None => format!("over before {SETTLED_S} s, from which errors count"),
         },
     };
     let quoted = |text: &str| if text.contains(' ') { format!("\"{text}\"") } else { text.to_owned() };

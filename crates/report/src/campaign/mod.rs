@@ -1,4 +1,4 @@
-//! What a campaign leaves behind: table, summary, figures, report.
+//! Results of a campaign: table, summary, figures, report.
 
 mod cells;
 mod page;
@@ -13,15 +13,15 @@ use afbc_campaign::Summary;
 use afbc_files::{Error, Folder};
 use std::path::PathBuf;
 
-/// Writes everything about a campaign but its rows into `folder`, and returns the paths written:
+/// Writes everything about a campaign except its rows into `folder`, and returns the paths written:
 ///
 /// * `position-error.svg`, `smoothness.svg`: distributions over all flights;
-/// * `success.svg`: what losses hang on;
-/// * `summary.json`: the same in numbers;
-/// * `report.html`: all of it on one page that needs no other file.
+/// * `success.svg`: losses against each drawn quantity;
+/// * `summary.json`: the figures as numbers;
+/// * `report.html`: everything on one self-contained page.
 ///
 /// # Errors
-/// The first file that could not be written, or is somebody else's.
+/// The first file that could not be written, or is not the command's.
 pub fn write(folder: &Folder, summary: &Summary) -> Result<Vec<PathBuf>, Error> {
     let figures = figures::campaign::draw(summary).map_err(|source| folder.error("figures", source))?;
     let svgs = figures.iter().map(|figure| format!("{}.svg", figure.name));

@@ -1,4 +1,4 @@
-//! A campaign on one page.
+//! The report of a campaign.
 
 use super::cells::{HEADS, bad, cells, flights, legend, percent};
 use crate::figures::Figure;
@@ -51,7 +51,7 @@ fn results(summary: &Summary) -> Markup {
     }
 }
 
-/// The share that was not lost, with its 95 % interval.
+/// Formats the share of flights not lost, with its 95 % interval.
 fn not_lost(count: &Count) -> Markup {
     let Share { value, low, high } = count.share();
     html! {
@@ -98,7 +98,13 @@ fn worst(summary: &Summary) -> Markup {
 fn drawn(summary: &Summary) -> Markup {
     html! {
         table {
-            thead { tr { th scope="col" { "quantity" } th.name scope="col" { "from, to" } th.name scope="col" { "in the file" } } }
+            thead {
+                tr {
+                    th scope="col" { "quantity" }
+                    th.name scope="col" { "from, to" }
+                    th.name scope="col" { "in the file" }
+                }
+            }
             tbody {
                 @for drawn in &summary.manifest.drawn {
                     @let [low, high] = drawn.ends;

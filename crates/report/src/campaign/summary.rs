@@ -1,4 +1,4 @@
-//! `summary.json` of a campaign, for programs.
+//! `summary.json` of a campaign.
 
 use super::cells::PERCENTS;
 use afbc_campaign::statistics::percentile;
@@ -23,10 +23,10 @@ struct Contender<'a> {
     /// Null where the percentile is a lost flight.
     rmse_position_m: Percentiles,
     max_position_m: Percentiles,
-    /// Of flights that were not lost.
+    /// Over flights that were not lost.
     mean_abs_du4_n: Percentiles,
     saturated_ratio: Percentiles,
-    /// The worst first.
+    /// Worst first.
     worst_flights: Vec<u64>,
 }
 
@@ -36,7 +36,7 @@ struct Success {
     flights: u64,
     kept: u64,
     success_ratio: f64,
-    /// Wilson's.
+    /// Wilson's score interval.
     success_interval_95: [f64; 2],
 }
 
@@ -52,7 +52,7 @@ impl From<&Count> for Success {
     }
 }
 
-/// Nearest ranks.
+/// Percentiles by nearest rank.
 #[derive(Serialize)]
 struct Percentiles {
     p50: Option<f64>,
@@ -85,7 +85,7 @@ fn contender<'a>(manifest: &'a Manifest, tally: &'a Tally) -> Contender<'a> {
 /// Writes one object.
 ///
 /// # Errors
-/// If `out` does not take it.
+/// If writing to `out` fails.
 pub fn write(out: &mut dyn Write, summary: &Summary) -> io::Result<()> {
     let contender = |tally| contender(&summary.manifest, tally);
     let page = Page { campaign: &summary.manifest, contenders: summary.tallies.iter().map(contender).collect() };

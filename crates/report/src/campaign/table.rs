@@ -7,8 +7,8 @@ use afbc_campaign::Summary;
 /// Space between columns.
 const GAP: usize = 2;
 
-/// How every contender did, and each one's worst flight with the command that flies it again; `target` is what
-/// `sitl campaign` knows the campaign by.
+/// Formats the results of every contender, and each one's worst flight with the command that flies it again; `target`
+/// is the campaign's name for `sitl campaign`.
 pub fn table(summary: &Summary, target: &str) -> String {
     let manifest = &summary.manifest;
     let mut lines = vec![format!("{}: {} flights each", manifest.name, flights(summary))];

@@ -1,10 +1,10 @@
-//! What a comparison's table says, on the page and in the terminal.
+//! Contents of a comparison's table, for the page and the terminal.
 
 use crate::words;
 use afbc_campaign::compare::{Comparison, Entry, FIGURES, Figure};
 use afbc_sim::metrics::SETTLED_S;
 
-/// The figures of one contender, and whether each is the best of its column; none if it lost a vehicle.
+/// Returns the figures of one contender, and whether each is the best of its column; none if it lost a vehicle.
 pub(super) fn cells(comparison: &Comparison, entry: &Entry) -> Option<Vec<(String, bool)>> {
     let cell = |figure: &Figure| {
         let spread = entry.spread(figure.value)?;
@@ -24,17 +24,17 @@ pub(super) fn number(value: f64, digits: usize) -> String {
     if value < 1e4 { format!("{value:.digits$}") } else { format!("{value:.2e}") }
 }
 
-/// Whether there is backstepping to set others against.
+/// True if backstepping flew, to compare others with.
 pub(super) fn has_ratio(comparison: &Comparison) -> bool {
     comparison.entries.iter().any(|entry| comparison.ratio(entry).is_some())
 }
 
-/// Heads of the columns.
+/// Returns the heads of the columns.
 pub(super) fn heads(comparison: &Comparison) -> Vec<&'static str> {
     FIGURES.iter().map(|figure| figure.title).chain(has_ratio(comparison).then_some("ratio")).collect()
 }
 
-/// What became of the vehicles of a contender that lost some.
+/// Describes the losses of a contender.
 pub(super) fn lost(entry: &Entry) -> String {
     let of = entry.flights.len();
     let first = entry.flights.iter().find_map(|flight| flight.lost.map(|lost| (flight.seed, lost)));
@@ -48,18 +48,18 @@ pub(super) fn lost(entry: &Entry) -> String {
     }
 }
 
-/// What the columns mean.
+/// Explains the columns.
 pub(super) fn legend(comparisons: &[Comparison]) -> String {
     let kept = |comparison: &Comparison| comparison.entries.iter().any(|entry| entry.lost() == 0);
     if !comparisons.iter().any(kept) {
-        return "Who loses a vehicle has no figures.".into();
+        return "A contender that lost a vehicle has no figures.".into();
     }
     let mut words = format!(
-        "Root mean square errors, and the largest of x, y and z, from {SETTLED_S} s to the end. |ΔU₄|: mean jump of the \
-         thrust from one control step to the next; small is smooth."
+        "Root mean square errors, and the largest of x, y and z, from {SETTLED_S} s to the end. |ΔU₄|: mean \
+         absolute change of the thrust per control step."
     );
     if comparisons.iter().any(has_ratio) {
-        words += " Ratio: root mean square distance from the reference, over backstepping's.";
+        words += " Ratio: root mean square distance from the reference, divided by backstepping's.";
     }
     words += " *: best of its column.";
     if comparisons.iter().any(Comparison::is_repeated) {

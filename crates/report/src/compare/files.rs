@@ -1,11 +1,11 @@
-//! A comparison for programs: `comparison.csv` and `comparison.json`.
+//! `comparison.csv` and `comparison.json`.
 
 use afbc_campaign::compare::{Comparison, Entry, FIGURES, Outcome, Spread};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-/// A row for each flight. Figures of a lost flight end with it.
+/// Writes a row for each flight. A lost flight's figures cover the time until the loss.
 pub(super) fn csv(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     let head = ["scenario", "contender", "controller", "seed"].into_iter().chain(FIGURES.iter().map(|f| f.name));
@@ -39,14 +39,14 @@ struct Contender<'a> {
     /// Null if a vehicle was lost.
     mean: BTreeMap<&'a str, Option<f64>>,
     standard_deviation: BTreeMap<&'a str, Option<f64>>,
-    /// Root mean square distance over backstepping's.
+    /// Root mean square distance divided by backstepping's.
     ratio: Option<f64>,
 }
 
-/// Writes an array with one object for each scenario: mean and spread over the seeds.
+/// Writes an array with one object for each scenario: mean and standard deviation over the seeds.
 ///
 /// # Errors
-/// If `out` does not take it.
+/// If writing to `out` fails.
 pub fn json(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
     let compared = comparisons.iter().map(|comparison| Compared {
         scenario: &comparison.scenario.name,

@@ -1,4 +1,4 @@
-//! What a comparison leaves behind: table, CSV, JSON, figures, report.
+//! Results of a comparison: table, CSV, JSON, figures, report.
 
 mod cells;
 mod files;
@@ -16,17 +16,17 @@ use afbc_sim::flown::Flown;
 use std::io;
 use std::path::PathBuf;
 
-/// Writes everything about `comparisons` into `folder`, in place of all that its command has left there before, and returns
-/// the paths written:
+/// Writes everything about `comparisons` into `folder`, replacing all earlier files of its command, and returns the
+/// paths written:
 ///
 /// * `comparison.csv`: a row for each flight;
-/// * `comparison.json`: the same, with mean and spread over the seeds;
-/// * `errors.svg`, `rmse.svg`: errors over time, and their root mean squares; of several scenarios, each has its own
-///   `<scenario>-errors.svg` etc.;
-/// * `report.html`: all of it on one page that needs no other file.
+/// * `comparison.json`: mean and standard deviation over the seeds;
+/// * `errors.svg`, `rmse.svg`: errors over time, and their root mean squares; with several scenarios,
+///   `<scenario>-errors.svg` etc. for each;
+/// * `report.html`: everything on one self-contained page.
 ///
 /// # Errors
-/// The first file that could not be written, or is somebody else's.
+/// The first file that could not be written, or is not the command's.
 pub fn write(folder: &Folder, comparisons: &[Comparison]) -> Result<Vec<PathBuf>, Error> {
     let flown: Vec<Flown> =
         comparisons.iter().flat_map(|comparison| &comparison.entries).map(|entry| entry.first.clone()).collect();

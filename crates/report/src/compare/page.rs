@@ -1,4 +1,4 @@
-//! A comparison on one page.
+//! The report of a comparison.
 
 use super::cells::{cells, heads, legend, lost};
 use crate::figures::Figure;
@@ -37,7 +37,9 @@ fn results(comparison: &Comparison) -> Markup {
                         th scope="row" { (entry.contender().title()) }
                         @match cells(comparison, entry) {
                             Some(cells) => {
-                                @for (cell, best) in cells { td { @if best { strong { (cell) } "*" } @else { (cell) } } }
+                                @for (cell, best) in cells {
+                                    td { @if best { strong { (cell) } "*" } @else { (cell) } }
+                                }
                             }
                             None => td.lost colspan=(heads.len()) { (lost(entry)) },
                         }

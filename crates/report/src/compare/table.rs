@@ -8,7 +8,7 @@ use afbc_campaign::compare::Comparison;
 /// Space between columns.
 const GAP: usize = 2;
 
-/// One block for each scenario, one line for each contender.
+/// Formats one block for each scenario with one line for each contender.
 pub fn table(comparisons: &[Comparison]) -> String {
     let mut lines = Vec::new();
     for comparison in comparisons {

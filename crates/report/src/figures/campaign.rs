@@ -1,4 +1,4 @@
-//! Figures of a whole campaign: distributions over its flights, and what its losses hang on.
+//! Figures of a campaign: distributions over its flights, and losses against drawn quantities.
 
 use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, marker, text, units};
 use super::figure::Figure;
@@ -14,35 +14,35 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 use std::io;
 
-/// Points of one curve at most.
+/// Largest number of points of a curve.
 const POINTS: usize = 400;
 const LINE_PX: f64 = 1.6;
 const LEFT_PX: f64 = 62.0;
 const BOTTOM_PX: f64 = 42.0;
 const MARGIN_PX: f64 = 16.0;
-/// What of the left is free.
+/// Free space at the left edge.
 const FREE_PX: f64 = 6.0;
-/// Height of a distribution, and of one of the panels.
+/// Heights of a distribution and of a success panel.
 const WIDE_PX: f64 = 330.0;
 const PANEL_PX: f64 = 200.0;
-/// Of a distribution's marks.
+/// Size of a distribution's marks.
 const MARK_PX: f64 = 4.0;
-/// How far apart marks at the same place are put, and what is the same line.
+/// Distance between marks at the same position, and below which lines count as coincident.
 const APART_PX: f64 = 8.0;
 const SAME_PX: f64 = 1.0;
-/// How much an interval hides of what is behind.
+/// Opacity of an interval.
 const INTERVAL_OPACITY: f64 = 0.15;
-/// The same of all intervals together, about.
+/// Approximate opacity of all intervals together.
 const INTERVALS_OPACITY: f64 = 0.6;
-/// Top of the axis of shares \[%\]: marks at 100 stay whole.
+/// Top of the axis of shares \[%\], so that marks at 100 are not cut off.
 const TOP: f64 = 104.0;
 
-/// Draws every figure of a campaign; none of no flight.
+/// Draws every figure of a campaign; none without flights.
 pub(crate) fn draw(summary: &Summary) -> io::Result<Vec<Figure>> {
     let flights = summary.tallies.first().map_or(0, |tally| tally.count.flights);
     let conditions = format!("{}: {flights} flights each", summary.manifest.name);
     let lost = summary.tallies.iter().any(|tally| tally.count.kept < tally.count.flights);
-    let ends = if lost { " A curve ends where the flights do that were not lost." } else { "" };
+    let ends = if lost { " A curve ends at the share of flights not lost." } else { "" };
     let errors = Distribution {
         title: "Position error",
         label: "root mean square distance from the reference [m]",
@@ -53,18 +53,18 @@ pub(crate) fn draw(summary: &Summary) -> io::Result<Vec<Figure>> {
             title: "Smoothness", label: "mean |ΔU₄| per step [N]", values: |tally| &tally.mean_abs_du4_n
         };
     let figure = |name, caption, svg: Option<String>| svg.map(|svg| Figure { name, caption, svg });
-    let interval = "Pale: the 95 % interval of that share. A mark: where a curve ends.";
+    let interval = "Pale: 95 % interval of the share. Mark: end of a curve.";
     let not_lost = if lost { " of the flights that were not lost" } else { " of the flights" };
     let spread = summary.manifest.drawn.iter().any(is_spread) && flights > 0;
     let figures = [
         figure(
             "position-error",
-            format!("What share of the flights stayed below which distance from the reference. {interval}{ends}"),
+            format!("Share of the flights below each distance from the reference. {interval}{ends}"),
             errors.draw(summary, &conditions)?,
         ),
         figure(
             "smoothness",
-            format!("What share{not_lost} kept the thrust command smoother than what. {interval}"),
+            format!("Share{not_lost} with a mean thrust change below each value. {interval}"),
             smoothness.draw(summary, &conditions)?,
         ),
         figure(
@@ -82,13 +82,13 @@ fn is_spread(drawn: &Drawn) -> bool {
     drawn.ends[0] < drawn.ends[1]
 }
 
-/// Names with their lines, in the campaign's order.
+/// Returns names with their lines, in the campaign's order.
 fn legend(summary: &Summary) -> Vec<(String, Ink)> {
     let names: Vec<&str> = summary.tallies.iter().map(|tally| tally.contender.as_str()).collect();
     names.iter().map(|name| (*name).to_owned()).zip(canvas::inks(&names, LINE_PX)).collect()
 }
 
-/// Title, conditions, and the legend with everybody's mark.
+/// Draws title, conditions, and the legend with each contender's mark.
 fn head(area: &Area, title: &str, conditions: &str, legend: &[(String, Ink)]) -> Result<(), Failure> {
     canvas::head(area, title, conditions, legend)?;
     for (index, ((_, ink), (x_px, y_px))) in legend.iter().zip(canvas::places(legend)).enumerate() {
@@ -98,18 +98,18 @@ fn head(area: &Area, title: &str, conditions: &str, legend: &[(String, Ink)]) ->
     Ok(())
 }
 
-/// What is at most how large in which share of the flights, over a logarithmic axis.
+/// Cumulative distribution over a logarithmic axis.
 struct Distribution {
     title: &'static str,
     label: &'static str,
     values: fn(&Tally) -> &[f64],
 }
 
-/// One contender's part of a distribution: value and how many flights \[%\] stayed below, with the interval's ends.
+/// One contender's part of a distribution: value and share of flights \[%\] below it, with the ends of its interval.
 type Curve = Vec<(f64, [f64; 3])>;
 
 impl Distribution {
-    /// The figure, if any flight has a value.
+    /// Draws the figure, if any flight has a value.
     fn draw(&self, summary: &Summary, conditions: &str) -> io::Result<Option<String>> {
         let Some(range) = self.range(summary) else { return Ok(None) };
         let curves: Vec<Curve> = summary.tallies.iter().map(|tally| curve((self.values)(tally), &range)).collect();
@@ -130,7 +130,7 @@ impl Distribution {
                 chart.draw_series([Polygon::new(interval, ink.color.mix(opacity).filled())])?;
             }
             for (index, (curve, (_, ink))) in curves.iter().zip(&legend).enumerate() {
-                // What later lines would hide is wide enough to be seen on both sides of them.
+                // A line hidden by later ones is wider, to be visible on both sides of them.
                 let hidden = curves.iter().skip(index + 1).filter(|later| coincide(curve, later, px)).count();
                 let ink = Ink { width_px: LINE_PX * (1.0 + 1.5 * hidden as f64), ..*ink };
                 let points: Vec<_> = curve.iter().map(|(value, [share, _, _])| (*value, *share)).collect();
@@ -153,7 +153,7 @@ impl Distribution {
         svg.map(Some)
     }
 
-    /// From the smallest value to what all but the worst few stay below: the very worst would squeeze the rest.
+    /// Returns the range from the smallest value to a high percentile: the worst few would squeeze the rest.
     fn range(&self, summary: &Summary) -> Option<Range<f64>> {
         let finite = |tally| (self.values)(tally).iter().filter(is_shown).copied();
         let low = summary.tallies.iter().flat_map(finite).fold(f64::INFINITY, f64::min);
@@ -167,7 +167,7 @@ fn is_shown(value: &&f64) -> bool {
     value.is_finite() && **value > 0.0
 }
 
-/// Few points of the distribution of `values`, sorted, within `range`.
+/// Returns a curve of few points through the distribution of the sorted `values` within `range`.
 fn curve(values: &[f64], range: &Range<f64>) -> Curve {
     let step = (values.len() / POINTS).max(1);
     let ranks = (0..values.len()).filter(|rank| (rank + 1) % step == 0 || rank + 1 == values.len());
@@ -179,19 +179,19 @@ fn curve(values: &[f64], range: &Range<f64>) -> Curve {
     points.collect()
 }
 
-/// Whether one curve hides most of another: at half of its points or more they are at the same place.
+/// True if one curve hides another: they coincide at half of its points or more.
 fn coincide(curve: &Curve, other: &Curve, px: impl Fn(f64) -> f64) -> bool {
     let at = |share: f64| other.iter().find(|(_, [of_other, _, _])| *of_other >= share).map(|(value, _)| px(*value));
     let same = |(value, [share, _, _]): &&(f64, [f64; 3])| at(*share).is_some_and(|x| (x - px(*value)).abs() < SAME_PX);
     !curve.is_empty() && 2 * curve.iter().filter(same).count() >= curve.len()
 }
 
-/// Share of flights that were not lost against every drawn quantity, panel by panel.
+/// Draws the share of flights not lost against each drawn quantity, a panel for each.
 fn success(summary: &Summary, conditions: &str) -> io::Result<String> {
     let legend = legend(summary);
     let title = "Success";
     let panels: Vec<_> = summary.manifest.drawn.iter().enumerate().filter(|(_, drawn)| is_spread(drawn)).collect();
-    // Many contenders need more room side by side.
+    // Many contenders side by side need more room.
     let columns = if legend.len() > 6 { 1 } else { 2 };
     let rows = panels.len().div_ceil(columns);
     let head_px = canvas::head_px(&legend);
@@ -211,14 +211,14 @@ fn success(summary: &Summary, conditions: &str) -> io::Result<String> {
     })
 }
 
-/// Where the axis of shares \[%\] begins: no interval goes below.
+/// Returns the lower end of the axis of shares \[%\]: below all intervals.
 fn lowest(summary: &Summary) -> f64 {
     let counts = summary.tallies.iter().flat_map(|tally| tally.by_draw.iter().flatten());
     let low = counts.filter(|count| count.flights > 0).map(|count| count.share().low).fold(1.0, f64::min);
     (10.0 * low).floor().min(9.0) * 10.0
 }
 
-/// One panel, `plot_px` wide, from `bottom` up.
+/// Draws one panel, `plot_px` wide, with `bottom` as the lower end of its axis.
 fn success_panel(
     area: &Area,
     drawn: &Drawn,
@@ -227,12 +227,12 @@ fn success_panel(
     plot_px: f64,
 ) -> Result<(), Failure> {
     let [low, high] = drawn.ends;
-    // As much room above 100 as with an axis from 0 on.
+    // As much room above 100 as with an axis from 0.
     let top = 100.0 + (TOP - 100.0) * (1.0 - bottom / 100.0);
     let mut chart = chart_on(area, 10.0).build_cartesian_2d(low..high, bottom..top)?;
     let digits = decimals((high - low) / 5.0);
     mesh(&mut chart, &words::drawn(&drawn.name), "not lost [%]", 6, &|x| short(*x, digits))?;
-    // Side by side within a tenth, a little apart from the next.
+    // Side by side within a tenth of the range, with a gap to the next.
     let bin_px = plot_px / BINS as f64;
     let apart_px = bin_px / (contenders.len() as f64 + 2.0);
     let mark_px = (0.55 * apart_px).clamp(1.5, MARK_PX);
@@ -257,7 +257,7 @@ fn success_panel(
     Ok(())
 }
 
-/// A chart with room for labels on the left and below.
+/// Creates a chart with room for labels on the left and below.
 fn chart_on<'a, 'b>(area: &'a Area<'b>, top_px: f64) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
     let mut chart = ChartBuilder::on(area);
     chart
@@ -268,7 +268,7 @@ fn chart_on<'a, 'b>(area: &'a Area<'b>, top_px: f64) -> ChartBuilder<'a, 'b, SVG
     chart
 }
 
-/// Frame, grid and words of a chart.
+/// Draws frame, grid and labels of a chart.
 fn mesh<X: Ranged<ValueType = f64> + ValueFormatter<f64>>(
     chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, RangedCoordf64>>,
     x_label: &str,
@@ -294,13 +294,13 @@ fn mesh<X: Ranged<ValueType = f64> + ValueFormatter<f64>>(
         .draw()
 }
 
-/// A number on a logarithmic axis, free of what the logarithm left behind the second digit.
+/// Formats a number on a logarithmic axis, without rounding errors of the logarithm.
 fn logarithmic(x: f64) -> String {
     let power = libm::floor(libm::log10(x));
     short(x, (1.0 - power).clamp(0.0, 9.0) as usize)
 }
 
-/// A number without zeros that say nothing.
+/// Formats a number without trailing zeros.
 fn short(x: f64, decimals: usize) -> String {
     let text = number(x, decimals);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }

@@ -1,4 +1,4 @@
-//! What all figures are drawn on and with.
+//! Drawing functions shared by all figures.
 
 use super::palette::{self, BLACK, GREY, WHITE};
 use plotters::coord::Shift;
@@ -6,35 +6,36 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::io;
 
-/// Drawing units to a pixel. The library rounds to whole units, which at one a pixel would show as jagged lines.
+/// Drawing units per pixel. The library rounds to whole units, and single pixels would give jagged lines.
 const SCALE: f64 = 4.0;
 /// Width of every figure.
 pub(super) const WIDTH_PX: f64 = 900.0;
 
-/// Least width of the lines in a legend.
+/// Smallest width of the lines in a legend.
 const LEGEND_PX: f64 = 2.5;
 
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub(super) type Failure = DrawingAreaErrorKind<io::Error>;
 
-/// How a line is drawn.
+/// Style of a line.
 #[derive(Clone, Copy)]
 pub(super) struct Ink {
     pub(super) color: RGBColor,
     pub(super) width_px: f64,
-    /// 0 is a whole line, every other number its own pattern of dashes.
+    /// 0 for a solid line, any other number for its own dash pattern.
     pub(super) dash: usize,
-    /// 1 hides what is behind.
+    /// Opacity, 0 to 1.
     pub(super) opacity: f64,
 }
 
-/// Dashes are numbered in this part of the opacity until the picture is done: the library does not know them.
+/// The dash number is stored in this part of the opacity until the picture is finished, since the library has no
+/// dashes.
 const DASH: f64 = 0.001;
-/// More are never told apart.
+/// Largest number of dash patterns.
 const DASHES: usize = 50;
 
 impl Ink {
-    /// A whole line.
+    /// Creates a solid line.
     pub(super) const fn new(color: RGBColor, width_px: f64) -> Self {
         Ink { color, width_px, dash: 0, opacity: 1.0 }
     }
@@ -45,18 +46,18 @@ impl Ink {
     }
 }
 
-/// Contenders' lines, one for each of `names`: of two that share a colour, the second is dashed.
+/// Returns a line for each of the contenders `names`: of two that share a colour, the second is dashed.
 pub(super) fn inks(names: &[&str], width_px: f64) -> Vec<Ink> {
     let ink = |(name, dash): (&&str, usize)| Ink { dash, ..Ink::new(palette::color(name), width_px) };
     names.iter().zip(palette::repeats(names)).map(ink).collect()
 }
 
-/// The attribute that stands for a dash until then.
+/// Returns the attribute that encodes a dash pattern.
 fn dash_opacity(dash: usize) -> String {
     format!(" opacity=\"{}\"", 1.0 - DASH * dash as f64)
 }
 
-/// Lengths on and off in pixels, longer with each round.
+/// Returns lengths on and off in pixels, longer for higher numbers.
 fn dash_pattern(dash: usize) -> String {
     const PATTERNS: [&[f64]; 5] = [&[7.0, 3.0], &[2.0, 3.0], &[10.0, 3.0, 2.0, 3.0], &[14.0, 5.0], &[4.0, 7.0]];
     let (pattern, round) = ((dash - 1) % PATTERNS.len(), 1 + (dash - 1) / PATTERNS.len());
@@ -65,23 +66,23 @@ fn dash_pattern(dash: usize) -> String {
     format!(" stroke-dasharray=\"{}\"", lengths.join(" "))
 }
 
-/// Pixels to drawing units.
+/// Converts pixels to drawing units.
 pub(super) fn units(px: f64) -> i32 {
     (px * SCALE).round() as i32
 }
 
-/// Text of a height in pixels. `⟨d⟩` makes a subscript.
+/// Text of a height in pixels. `⟨d⟩` gives a subscript.
 pub(super) fn text(size_px: f64, color: RGBColor, horizontal: HPos) -> TextStyle<'static> {
     styled(size_px, color, horizontal, FontStyle::Normal)
 }
 
 fn styled(size_px: f64, color: RGBColor, horizontal: HPos, style: FontStyle) -> TextStyle<'static> {
-    // The library sets type smaller than it is told by this factor.
+    // The library draws type smaller than requested by this factor.
     let font = FontDesc::new(FontFamily::SansSerif, size_px * SCALE * 1.24, style);
     TextStyle { font, color: color.to_backend_color(), pos: Pos::new(horizontal, VPos::Center) }
 }
 
-/// About how wide text is, without a font to measure.
+/// Estimates the width of text, without a font to measure.
 pub(super) fn text_width_px(text: &str, size_px: f64) -> f64 {
     0.5 * size_px * text.chars().filter(|c| !matches!(c, '⟨' | '⟩')).count() as f64
 }
@@ -102,12 +103,12 @@ pub(super) fn head(area: &Area, title: &str, conditions: &str, legend: &[(String
     Ok(())
 }
 
-/// Height that title and legend take.
+/// Returns the height of title and legend.
 pub(super) fn head_px(legend: &[(String, Ink)]) -> f64 {
     places(legend).last().map_or(42.0, |(_, y)| *y) + 12.0
 }
 
-/// Where each entry of the legend goes, line by line.
+/// Returns the position of each entry of the legend, line by line.
 pub(super) fn places(legend: &[(String, Ink)]) -> Vec<(f64, f64)> {
     let (mut x, mut y) = (14.0, 42.0);
     let place = |(name, _): &(String, Ink)| {
@@ -122,7 +123,7 @@ pub(super) fn places(legend: &[(String, Ink)]) -> Vec<(f64, f64)> {
     legend.iter().map(place).collect()
 }
 
-/// Lets `draw` fill a white picture.
+/// Returns an SVG of a white picture that `draw` has filled.
 pub(super) fn svg(height_px: f64, title: &str, draw: impl FnOnce(&Area) -> Result<(), Failure>) -> io::Result<String> {
     let mut svg = String::new();
     let size = (units(WIDTH_PX).unsigned_abs(), units(height_px).unsigned_abs());
@@ -130,11 +131,11 @@ pub(super) fn svg(height_px: f64, title: &str, draw: impl FnOnce(&Area) -> Resul
         let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
         area.fill(&WHITE).and_then(|()| draw(&area)).and_then(|()| area.present()).map_err(io::Error::other)?;
     }
-    // The library's own first tag lacks what makes drawing units small and corners round.
+    // The library's first tag lacks the attributes for drawing units and round corners.
     let body = svg.split_once('>').map_or("", |(_, body)| body);
     let body: String = body.lines().map(|line| subscripts(line) + "\n").collect();
     let body = body.replace(" opacity=\"1\"", "").replace("font-family=\"sans-serif\" ", "");
-    // Type stands out from what lies under it.
+    // A white outline separates type from what lies below it.
     let body = body.replace("<text ", "<text paint-order=\"stroke\" stroke=\"#FFFFFF\" stroke-width=\"10\" ");
     let body = (1..=DASHES).fold(body, |body, dash| body.replace(&dash_opacity(dash), &dash_pattern(dash)));
     let style = palette::dark_style(&body);
@@ -146,17 +147,17 @@ pub(super) fn svg(height_px: f64, title: &str, draw: impl FnOnce(&Area) -> Resul
     ))
 }
 
-/// `line` with each `⟨d⟩` lowered, and what follows raised again.
+/// Replaces each `⟨d⟩` of `line` by a lowered character.
 fn subscripts(line: &str) -> String {
     let lower = line.replace('⟨', "<tspan dy=\"0.3em\" font-size=\"75%\">");
     let raised = lower.replace('⟩', "</tspan><tspan dy=\"-0.225em\">");
     raised + &"</tspan>".repeat(line.matches('⟩').count())
 }
 
-/// Corners of the mark of contender number `index` around its middle, in drawing units: with colours, marks tell
-/// contenders apart for those who see no colours.
+/// Returns the corners of the mark of contender number `index` around its centre, in drawing units: marks distinguish
+/// contenders without colours.
 pub(super) fn marker(index: usize, px: f64) -> Vec<(i32, i32)> {
-    // Corners around the middle, the direction of the first in turns, and how far out every second one is.
+    // Number of corners, direction of the first in turns, and relative radius of every second one.
     const SHAPES: [(usize, f64, f64); 6] =
         [(16, 0.0, 0.85), (4, 0.125, 1.0), (3, -0.25, 1.0), (4, 0.0, 1.0), (8, 0.0, 0.35), (3, 0.25, 1.0)];
     let (corners, turn, second) = *SHAPES.get(index % SHAPES.len()).unwrap_or(&SHAPES[0]);

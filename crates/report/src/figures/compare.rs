@@ -10,17 +10,17 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 use std::io;
 
-/// The first of [`FIGURES`]: the errors.
+/// Number of panels: the errors are the first of [`FIGURES`].
 const PANELS: usize = 4;
 const BAR_PX: f64 = 18.0;
-/// Above the bars of one panel.
+/// Height above the bars of one panel.
 const TITLE_PX: f64 = 26.0;
 const MARGIN_PX: f64 = 14.0;
-/// Right of the longest bar: its number, and what it is known by.
+/// Width right of the longest bar, for its number.
 const NUMBER_PX: f64 = 60.0;
 const SPREAD_PX: f64 = 46.0;
 
-/// Bars of every contender's errors, two panels side by side; none of no contender.
+/// Draws bars of every contender's errors, two panels side by side; none without contenders.
 pub(crate) fn draw(comparison: &Comparison) -> io::Result<Option<Figure>> {
     if comparison.entries.is_empty() {
         return Ok(None);
@@ -37,18 +37,18 @@ pub(crate) fn draw(comparison: &Comparison) -> io::Result<Option<Figure>> {
         }
         Ok(())
     })?;
-    let mut caption = format!("Root mean square errors from {SETTLED_S} s to the end; short is good.");
+    let mut caption = format!("Root mean square errors from {SETTLED_S} s to the end; shorter is better.");
     let lost = |entry: &Entry| entry.lost() > 0;
     if comparison.is_repeated() && !comparison.entries.iter().all(lost) {
-        caption += " Mean over all seeds; a thin bar: one standard deviation to both sides.";
+        caption += " Mean over all seeds; thin bars: +-1 standard deviation.";
     }
     if comparison.entries.iter().any(lost) {
-        caption += " Who lost a vehicle has no bar.";
+        caption += " A contender that lost a vehicle has no bar.";
     }
     Ok(Some(Figure { name: "rmse", caption, svg }))
 }
 
-/// One error of every contender, from the corner at the left top.
+/// Draws one error of every contender, with the given top left corner.
 fn panel(area: &Area, comparison: &Comparison, index: usize, (left_px, top_px): (f64, f64)) -> Result<(), Failure> {
     let Some(figure) = FIGURES.get(index) else { return Ok(()) };
     let repeated = comparison.is_repeated();

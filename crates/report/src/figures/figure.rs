@@ -1,14 +1,14 @@
-//! A picture.
+//! A figure with its caption.
 
-/// One picture.
+/// A figure with its caption.
 pub(crate) struct Figure {
     /// File name without `.svg`.
     pub(crate) name: &'static str,
-    /// What there is to see, in one sentence.
+    /// Caption in one sentence or a few.
     pub(crate) caption: String,
-    /// The picture.
+    /// The picture as SVG.
     pub(crate) svg: String,
 }
 
-/// Said of figures with a cross.
-pub(super) const CROSS: &str = " A cross: where a vehicle was lost.";
+/// Caption of figures with a cross.
+pub(super) const CROSS: &str = " Cross: a vehicle was lost.";

@@ -1,4 +1,4 @@
-//! Counterparts of the paper's Figs. 4 to 8, all contenders of one scenario overlaid.
+//! Counterparts of the paper's Figs. 4 to 8, with all contenders of one scenario overlaid.
 
 use super::figure::Figure;
 use super::law::{LINE_PX, Law, REFERENCE};
@@ -11,24 +11,24 @@ use afbc_sim::metrics::tracking_error;
 use nalgebra::Vector4;
 use std::io;
 
-/// Something to draw over time.
+/// A quantity of a log row.
 type Value = fn(&Sample) -> f64;
 /// One of U1..U4.
 type Input = fn(&Vector4<f64>) -> f64;
 
-/// Fig. 5: label, what is flown, what is wanted.
+/// Fig. 5: label, actual value, reference.
 const OUTPUTS: [(&str, Value, Value); 4] = [
     ("x [m]", |s| s.motion.position_m.x, |s| s.reference.position_m.x),
     ("y [m]", |s| s.motion.position_m.y, |s| s.reference.position_m.y),
     ("z [m]", |s| s.motion.position_m.z, |s| s.reference.position_m.z),
     ("ψ [rad]", |s| s.motion.attitude_rad.z, |s| s.reference.yaw_rad),
 ];
-/// Fig. 6: likewise, but each law wants its own.
+/// Fig. 6: label, actual value, and the angle demanded by each law.
 const ATTITUDE: [(&str, Value, Value); 2] = [
     ("φ [rad]", |s| s.motion.attitude_rad.x, |s| s.trace.filtered[0].angle.into()),
     ("θ [rad]", |s| s.motion.attitude_rad.y, |s| s.trace.filtered[1].angle.into()),
 ];
-/// Fig. 7. The space that does not break is also one that does not vanish behind a subscript.
+/// Fig. 7. A no-break space survives next to a subscript.
 const ERRORS: [(&str, Value); 4] = [
     ("x⟨d⟩\u{a0}− x [m]", |s| tracking_error(s).x),
     ("y⟨d⟩\u{a0}− y [m]", |s| tracking_error(s).y),
@@ -44,9 +44,9 @@ pub(crate) fn errors(flights: &[&Flown]) -> io::Result<Option<Figure>> {
     Ok(fig7.map(|figure| Figure { name: "errors", ..figure }))
 }
 
-/// Draws every figure of one scenario's flights; of no flight, none.
+/// Draws every figure of one scenario's flights; none without flights.
 pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {
-    // The longest flight has met the most of the reference.
+    // The longest flight covers the most of the reference.
     let Some(longest) = flights.iter().max_by_key(|flight| flight.run.log.len()) else { return Ok(Vec::new()) };
     let scenario = &longest.scenario;
     let last_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
@@ -54,7 +54,7 @@ pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {
     let names: Vec<&str> = flights.iter().map(|flight| flight.run.contender.name.as_str()).collect();
     let inks = canvas::inks(&names, LINE_PX);
     let laws: Vec<Law> = flights.iter().zip(inks).map(|(flight, ink)| Law { flight, ink }).collect();
-    // The roughest behind, so that it hides nothing.
+    // The roughest lines are drawn first, so that they hide nothing.
     let mut rough_first: Vec<&Law> = laws.iter().collect();
     let roughness = |law: &Law| law.flight.run.metrics.mean_abs_delta_u.sum();
     rough_first.sort_by(|a, b| roughness(b).total_cmp(&roughness(a)));
@@ -89,7 +89,7 @@ pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {
         let (svg, seen) = Chart { title, conditions: &conditions, scenario, end_s, legend, panels }.draw()?;
         Ok::<_, io::Error>(Figure { name, caption: format!("{caption}{seen}"), svg })
     };
-    let jumps = if chatter { " A filled band is chatter: the input jumps between its edges." } else { "" };
+    let jumps = if chatter { " Filled band: chatter, the input jumps between its edges." } else { "" };
     let (trajectory, seen) = trajectory::draw(&laws, longest, &conditions, with_reference())?;
     Ok(vec![
         Figure { name: "fig4-trajectory", caption: format!("The flights in space.{seen}"), svg: trajectory },
@@ -102,7 +102,7 @@ pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {
         )?,
         chart(
             "fig6-attitude",
-            "Roll and pitch against the angles that the position loop asks for.",
+            "Roll and pitch against the angles demanded by the position loop.",
             "Roll and pitch",
             with_desired.collect(),
             attitude.into(),
@@ -110,7 +110,7 @@ pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {
         chart("fig7-errors", "Reference minus vehicle.", "Errors", law_legend().collect(), errors.into())?,
         chart(
             "fig8-inputs",
-            &format!("Inputs as the rotors give them.{jumps}"),
+            &format!("Inputs as produced by the rotors.{jumps}"),
             "Inputs",
             law_legend().collect(),
             controls.into(),

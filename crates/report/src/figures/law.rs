@@ -1,4 +1,4 @@
-//! A flight as lines in a figure.
+//! Lines of a flight in a figure.
 
 use super::canvas::Ink;
 use super::time_chart::{self, Line};
@@ -9,12 +9,12 @@ use afbc_sim::metrics::inputs;
 use nalgebra::Vector4;
 use plotters::style::RGBColor;
 
-/// What should be flown.
+/// Line of the reference.
 pub(super) const REFERENCE: Ink = Ink::new(palette::WANTED, 4.0);
 /// Width of a law's line.
 pub(super) const LINE_PX: f64 = 1.3;
 
-/// One law's flight, with what its lines are drawn in.
+/// One law's flight, with the style of its lines.
 pub(super) struct Law<'a> {
     pub(super) flight: &'a Flown,
     pub(super) ink: Ink,
@@ -29,12 +29,12 @@ impl Law<'_> {
         self.ink.color
     }
 
-    /// Wide and pale: what this law wants, behind what it gets.
+    /// Returns the wide and pale style for what this law demands, drawn behind its actual line.
     pub(super) fn pale(&self) -> Ink {
         Ink { opacity: 1.0 / 3.0, ..Ink::new(self.color(), REFERENCE.width_px) }
     }
 
-    /// The name, for the legend.
+    /// Returns the name for the legend.
     pub(super) fn title(&self) -> String {
         let title = self.flight.run.contender.title();
         match &self.flight.run.lost {
@@ -47,12 +47,12 @@ impl Law<'_> {
         self.flight.run.lost.map(|lost| lost.time_s)
     }
 
-    /// A value over time; `end_s` is the end of the time axis.
+    /// Returns a value over time; `end_s` is the end of the time axis.
     pub(super) fn line(&self, ink: Ink, end_s: f64, value: impl Fn(&Sample) -> f64) -> Line {
         self.drawn(ink, end_s, self.flight.run.log.iter().map(|sample| (sample.time_s, value(sample))))
     }
 
-    /// One of U1..U4 over time, with what it did between the rows of the log.
+    /// Returns one of U1..U4 over time, including its extremes between the rows of the log.
     pub(super) fn input(&self, end_s: f64, input: impl Fn(&Vector4<f64>) -> f64) -> Line {
         let rows = self.flight.run.log.iter().zip(&self.flight.run.input_extremes);
         let values = rows.flat_map(|(sample, [low, high])| {

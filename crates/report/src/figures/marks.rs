@@ -1,4 +1,4 @@
-//! What happens to the vehicle in flight, and how it is marked along the time axis.
+//! Events of a flight, and their marks along the time axis.
 
 use super::canvas::text_width_px;
 use super::palette::TINTS;
@@ -6,21 +6,21 @@ use crate::words;
 use afbc_sim::scenario::Scenario;
 use plotters::style::RGBColor;
 
-/// A time or an interval with a label.
+/// An event with a label, at a time or over an interval.
 #[derive(Clone, Debug)]
 pub(super) struct Mark {
     pub(super) label: String,
     pub(super) start_s: f64,
     pub(super) end_s: f64,
-    /// Whether the interval is shown; of what stays for good, only how it begins.
+    /// Whether the interval is shaded; for permanent changes only the onset is shown.
     pub(super) is_band: bool,
-    /// Of the band; another than those of bands that it overlaps.
+    /// Tint of the band, different from those of bands that it overlaps.
     pub(super) tint: RGBColor,
-    /// How many bands at most lie over one another where this one is laid on top; tells widths apart.
+    /// Largest number of bands below this one, which determines its width along the trajectory.
     pub(super) depth: usize,
-    /// Row of label and band, 0 at the bottom: nothing else is there at that time.
+    /// Row of label and band, 0 at the bottom; rows do not overlap in time.
     pub(super) lane: usize,
-    /// Where the middle of the label is, along the axis.
+    /// Position of the label's centre along the axis.
     pub(super) label_px: f64,
 }
 
@@ -30,21 +30,21 @@ impl Mark {
     }
 }
 
-/// Size of labels.
+/// Font size of labels.
 pub(super) const LABEL_PX: f64 = 11.0;
 
-/// Everything that is marked on one time axis.
+/// All marks of one time axis.
 pub(super) struct Marks {
-    /// The vehicle or what it knows is another than believed: parameters, payloads, rotor faults, no state.
+    /// Changes of the vehicle or its sensors: parameters, payloads, rotor faults, outages.
     pub(super) changes: Vec<Mark>,
-    /// Gusts, as forces and of wind.
+    /// Gusts, of force and of wind.
     pub(super) gusts: Vec<Mark>,
-    /// How many rows the labels take.
+    /// Number of rows of labels.
     pub(super) lanes: usize,
 }
 
-/// The marks of `scenario` on a time axis from 0 to `end_s`, `width_px` wide; those that begin and end at the same time
-/// are one.
+/// Returns the marks of `scenario` on a time axis from 0 to `end_s`, `width_px` wide. Events with the same start and
+/// end share a mark.
 pub(super) fn marks(scenario: &Scenario, end_s: f64, width_px: f64) -> Marks {
     let (environment, realism) = (&scenario.environment, &scenario.realism);
     let forces = environment.gusts().iter().map(|gust| {
@@ -67,7 +67,7 @@ pub(super) fn marks(scenario: &Scenario, end_s: f64, width_px: f64) -> Marks {
         gust.is_band = gust.end_s < end_s;
     }
     tell_apart(&mut gusts.iter_mut().chain(&mut changes));
-    // What each row has taken.
+    // Intervals taken in each row.
     let mut lanes = Vec::new();
     for mark in gusts.iter_mut().chain(&mut changes) {
         place(mark, width_px / end_s, width_px, &mut lanes);
@@ -75,7 +75,7 @@ pub(super) fn marks(scenario: &Scenario, end_s: f64, width_px: f64) -> Marks {
     Marks { changes, gusts, lanes: lanes.len() }
 }
 
-/// Marks within the axis, sorted, one for each interval unless its label grew beyond `longest_px`.
+/// Returns sorted marks within the axis, one for each interval unless its label would exceed `longest_px`.
 fn merged(intervals: impl Iterator<Item = (String, f64, f64)>, axis_end_s: f64, longest_px: f64) -> Vec<Mark> {
     let mut marks: Vec<Mark> = Vec::new();
     for (label, start_s, end_s) in intervals {
@@ -104,8 +104,8 @@ fn merged(intervals: impl Iterator<Item = (String, f64, f64)>, axis_end_s: f64, 
     marks
 }
 
-/// Gives bands their tints: the same for the same label and others for other labels, as far as they go; never the same
-/// for two that overlap, unless more do than there are tints.
+/// Assigns tints to bands: the same tint for the same label, different ones for different labels as far as possible,
+/// and never the same for two that overlap unless there are too few tints.
 fn tell_apart(marks: &mut dyn Iterator<Item = &mut Mark>) {
     let mut labels: Vec<String> = Vec::new();
     let mut done: Vec<Mark> = Vec::new();
@@ -124,7 +124,7 @@ fn tell_apart(marks: &mut dyn Iterator<Item = &mut Mark>) {
     }
 }
 
-/// Finds the lowest row where band and label of `mark` have room: the label on its band, or beside one that is too short.
+/// Finds the lowest row with room for band and label of `mark`; the label is on its band, or beside a short one.
 fn place(mark: &mut Mark, px_per_s: f64, width_px: f64, lanes: &mut Vec<Vec<(f64, f64)>>) {
     let half = (0.5 * text_width_px(&mark.label, LABEL_PX) + 3.0).min(0.5 * width_px);
     let (start_px, end_px) = (mark.start_s * px_per_s, mark.end_s * px_per_s);

@@ -1,7 +1,7 @@
 //! Figures, as SVG: of flights, comparisons and campaigns.
 //!
-//! Gusts are marked where they strike, and shaded is for how long something is the matter. A contender has the same colour
-//! in every figure, whoever else is in it.
+//! Onsets of gusts are marked, and intervals with a fault or changed parameters are shaded. A contender has the same
+//! colour in every figure.
 
 pub(super) mod campaign;
 mod canvas;

@@ -1,10 +1,10 @@
-//! Colours: one a controller, the same in every report, and each in a second shade for the dark.
+//! Colours: one for each controller, the same in every report, each in a light and a dark variant.
 
 use core::hash::Hasher;
 use plotters::style::RGBColor;
 use twox_hash::XxHash64;
 
-/// A colour on white paper, and the same on a dark screen.
+/// A colour for white paper, and its variant for a dark screen.
 type Shades = [RGBColor; 2];
 
 const fn shades(light: u32, dark: u32) -> Shades {
@@ -21,14 +21,14 @@ pub(super) const BLACK: RGBColor = rgb(0x1A1A1A);
 pub(super) const GREY: RGBColor = rgb(0x646464);
 pub(super) const GRID: RGBColor = rgb(0xE2E2E2);
 pub(super) const FRAME: RGBColor = rgb(0x969696);
-/// What should be flown.
+/// Colour of the reference.
 pub(super) const WANTED: RGBColor = rgb(0xB0B0B0);
-/// Where something begins or ends.
+/// Colour of onsets and ends.
 pub(super) const EDGE: RGBColor = rgb(0x828282);
-/// What happens to the vehicle: those that overlap are of different tints.
+/// Tints of events: overlapping ones differ.
 pub(super) const TINTS: [RGBColor; 5] = [rgb(0xF7EED4), rgb(0xD5E5F2), rgb(0xF6DCDC), rgb(0xDAEFD8), rgb(0xE6DDF4)];
 
-/// Everything that is not a contender's.
+/// All colours that belong to no contender.
 const ROLES: [Shades; 12] = [
     [WHITE, rgb(0x16181D)],
     [BLACK, rgb(0xE8E8E8)],
@@ -44,8 +44,8 @@ const ROLES: [Shades; 12] = [
     [TINTS[4], rgb(0x3D2E5A)],
 ];
 
-/// The contenders that this program brings along. Of any two, the colours stay apart for the colour-blind too, on white
-/// (contrast 3 : 1 and more) as in the dark (4 : 1 and more).
+/// Colours of the built-in contenders. Any two can be told apart also by the colour-blind, on white (contrast 3 : 1 or
+/// more) and in the dark (4 : 1 or more).
 const KNOWN: [(&str, Shades); 7] = [
     ("afbc", shades(0x0072B2, 0x7FA8ED)),
     ("backstepping", shades(0xD55E00, 0xC7613D)),
@@ -56,7 +56,7 @@ const KNOWN: [(&str, Shades); 7] = [
     ("afbc-monitored", shades(0x923002, 0xF5C299)),
 ];
 
-/// All others: their names choose.
+/// Colours of all others, chosen by a hash of the name.
 const OTHERS: [Shades; 10] = [
     shades(0x696C8C, 0xA1A5C7),
     shades(0x885B34, 0xDCB282),
@@ -70,10 +70,10 @@ const OTHERS: [Shades; 10] = [
     shades(0x760A03, 0xCA8E79),
 ];
 
-/// With this seed no two contenders of a built-in campaign choose the same.
+/// Seed of the hash, with which no two contenders of a built-in campaign share a colour.
 const SEED: u64 = 203;
 
-/// The colour of the contender of this name, whoever else flies.
+/// Returns the colour of the contender `name`, independent of other contenders.
 pub(super) fn color(name: &str) -> RGBColor {
     if let Some((_, [light, _])) = KNOWN.iter().find(|(known, _)| *known == name) {
         return *light;
@@ -84,18 +84,18 @@ pub(super) fn color(name: &str) -> RGBColor {
     OTHERS.get(choice as usize).map_or(BLACK, |[light, _]| *light)
 }
 
-/// For each of `names` how many before it have the same colour: what is to tell them apart.
+/// Returns for each of `names` how many before it have the same colour, to choose a dash pattern.
 pub(super) fn repeats(names: &[&str]) -> Vec<usize> {
     let before = |(index, name): (usize, &&str)| names.iter().take(index).filter(|n| color(n) == color(name)).count();
     names.iter().enumerate().map(before).collect()
 }
 
-/// As an attribute has it.
+/// Formats a colour as an attribute.
 fn hex(RGBColor(r, g, b): RGBColor) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
 
-/// Style that turns the colours of `svg` over for those who prefer a dark screen. Paper stays white.
+/// Returns the style that switches `svg` to dark colours where the reader prefers them, except on paper.
 pub(super) fn dark_style(svg: &str) -> String {
     let all = ROLES.iter().chain(KNOWN.iter().map(|(_, shades)| shades)).chain(&OTHERS);
     let mut rules = String::new();
@@ -127,14 +127,14 @@ mod tests {
         m.map(|row| row.iter().zip(v).map(|(a, b)| a * b).sum())
     }
 
-    /// WCAG 2.
+    /// Contrast ratio of WCAG 2.
     fn contrast(a: RGBColor, b: RGBColor) -> f64 {
         let luminance = |color| times(&[[0.2126, 0.7152, 0.0722], [0.0; 3], [0.0; 3]], linear(color))[0] + 0.05;
         let (a, b) = (luminance(a), luminance(b));
         a.max(b) / a.min(b)
     }
 
-    /// Machado, Oliveira and Fernandes 2009: nobody's, protanopes', deuteranopes', tritanopes' sight.
+    /// Normal sight, protanopia, deuteranopia, tritanopia (Machado, Oliveira and Fernandes 2009).
     const SIGHTS: [[[f64; 3]; 3]; 4] = [
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
@@ -142,7 +142,7 @@ mod tests {
         [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
     ];
 
-    /// Distance in Oklab, in hundredths, to whoever tells the two apart least.
+    /// Smallest distance over all sights, in hundredths of Oklab.
     fn distance(a: RGBColor, b: RGBColor) -> f64 {
         let lab = |color, sight| {
             let seen = times(sight, linear(color)).map(|part| part.clamp(0.0, 1.0));
@@ -178,7 +178,7 @@ mod tests {
                 let least = [3.0, 4.0][shade];
                 assert!(contrast(a[shade], paper) >= least, "{name}: {}", contrast(a[shade], paper));
                 for (other, b) in &KNOWN[..i] {
-                    // Okabe and Ito's six reach 6.
+                    // Okabe and Ito's palette of six reaches 6.
                     assert!(distance(a[shade], b[shade]) >= 8.0, "{name}, {other}: {}", distance(a[shade], b[shade]));
                 }
             }

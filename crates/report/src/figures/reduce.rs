@@ -1,7 +1,7 @@
-//! Fewer points, same picture.
+//! Reduction of the number of points without a visible change.
 
-/// At most four points a column of the time axis 0 to `end_s`: the first, the extremes and the last in it, in time
-/// order. What chatters within a column keeps its height. Values that are not finite are left out.
+/// Returns at most four points per column of the time axis 0 to `end_s`, in time order: the first, the extremes and the
+/// last, so chatter within a column keeps its height. Values that are not finite are left out.
 pub(super) fn envelope(values: impl Iterator<Item = (f64, f64)>, end_s: f64, columns: f64) -> Vec<(f64, f64)> {
     let mut points = Vec::new();
     let mut column: Option<(f64, [(f64, f64); 4])> = None;
@@ -31,8 +31,8 @@ pub(super) fn envelope(values: impl Iterator<Item = (f64, f64)>, end_s: f64, col
     points
 }
 
-/// The points that a line through `points` cannot do without: it strays by at most `tolerance` once both coordinates are
-/// multiplied by `scale` (Ramer, Douglas, Peucker).
+/// Simplifies a line: it deviates by at most `tolerance` after both coordinates are multiplied by `scale` (Ramer,
+/// Douglas, Peucker).
 pub(super) fn simplify(points: &[(f64, f64)], scale: (f64, f64), tolerance: f64) -> Vec<(f64, f64)> {
     let place = |p: &(f64, f64)| (p.0 * scale.0, p.1 * scale.1);
     let mut kept = Vec::new();
@@ -55,7 +55,7 @@ pub(super) fn simplify(points: &[(f64, f64)], scale: (f64, f64), tolerance: f64)
     kept
 }
 
-/// From `p` to the straight piece from `a` to `b`.
+/// Returns the distance of `p` from the segment between `a` and `b`.
 fn distance(p: (f64, f64), a: (f64, f64), b: (f64, f64)) -> f64 {
     let (dx, dy) = (b.0 - a.0, b.1 - a.1);
     let length2 = dx * dx + dy * dy;
@@ -63,7 +63,7 @@ fn distance(p: (f64, f64), a: (f64, f64), b: (f64, f64)) -> f64 {
     libm::hypot(p.0 - a.0 - along * dx, p.1 - a.1 - along * dy)
 }
 
-/// The pieces of a line that lie within `low..=high`, cut where it crosses.
+/// Returns the pieces of a line within `low..=high`, cut where it crosses the limits.
 pub(super) fn clip(points: &[(f64, f64)], low: f64, high: f64) -> Vec<Vec<(f64, f64)>> {
     let inside = |p: &(f64, f64)| p.1 >= low && p.1 <= high;
     let mut pieces: Vec<Vec<(f64, f64)>> = Vec::new();

@@ -1,4 +1,4 @@
-//! Panels one above the other that share one time axis.
+//! Panels above each other with a common time axis.
 
 use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
 use super::figure::CROSS;
@@ -13,58 +13,57 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 use std::io;
 
-/// Left of the panels: label and numbers.
+/// Width left of the panels, for label and numbers.
 const LEFT_PX: f64 = 74.0;
-/// What of that is left free.
+/// Free part of that width.
 const MARGIN_PX: f64 = 6.0;
 const RIGHT_PX: f64 = 16.0;
-/// Height of one panel, space between panels included.
+/// Height of one panel, including the space between panels.
 const PANEL_PX: f64 = 148.0;
 const GAP_PX: f64 = 12.0;
-/// Below the panels: numbers and label of the time axis.
+/// Height below the panels, for numbers and label of the time axis.
 const BOTTOM_PX: f64 = 42.0;
 const LANE_PX: f64 = 16.0;
-/// Width of a panel.
+/// Width of a panel's plot.
 pub(super) const PLOT_PX: f64 = WIDTH_PX - LEFT_PX - RIGHT_PX;
 
-/// Most numbers along each axis.
+/// Largest number of ticks on each axis.
 const T_TICKS: usize = 13;
 const Y_TICKS: usize = 6;
 
-/// Columns of a panel, one a pixel.
+/// Columns of a panel, one per pixel.
 pub(super) const COLUMNS: f64 = PLOT_PX;
 
-/// Below and above what a panel shows, in the panel's unit.
+/// Smallest room below and above the values, in the panel's unit.
 const LEAST_ROOM: f64 = 5e-3;
-/// A gust strikes; a band begins or ends.
+/// Line of a gust's onset, and of the ends of a band.
 const ONSET: Ink = Ink::new(EDGE, 0.75);
 const BAND_END: Ink = Ink { opacity: 0.5, ..ONSET };
-/// How much a band hides of another below it.
+/// Opacity of a band.
 const BAND_OPACITY: f64 = 0.6;
 
 /// A value over time.
 pub(super) struct Line {
     pub(super) ink: Ink,
-    /// Rising in time.
+    /// Points with increasing time.
     pub(super) points: Vec<(f64, f64)>,
-    /// When the vehicle was lost, if it was.
+    /// Time at which the vehicle was lost, if it was.
     pub(super) lost_s: Option<f64>,
-    /// What should be flown, rather than what was: no axis is drawn for it alone.
+    /// True for a reference, which does not extend the axis by itself.
     pub(super) is_reference: bool,
 }
 
-/// One quantity.
+/// A panel with one quantity.
 pub(super) struct Panel {
     pub(super) label: &'static str,
-    /// Whether zero has a line of its own.
+    /// Whether to draw a line at zero.
     pub(super) zero: bool,
-    /// Back to front.
+    /// Lines from back to front.
     pub(super) lines: Vec<Line>,
 }
 
 impl Panel {
-    /// Whether a line fills a band rather than being one: in at least a twentieth of the columns it goes up and down
-    /// by several of its own widths.
+    /// True if a line fills a band: in at least a twentieth of the columns it oscillates by several of its own widths.
     pub(super) fn has_chatter(&self, end_s: f64) -> bool {
         let range = range(&self.lines, LEAST_ROOM);
         let tall = 4.0 / (PANEL_PX - GAP_PX) * (range.end - range.start);
@@ -86,7 +85,7 @@ impl Panel {
 pub(super) struct Chart<'a> {
     pub(super) title: &'a str,
     pub(super) conditions: &'a str,
-    /// Where the marks come from.
+    /// Scenario whose events are marked.
     pub(super) scenario: &'a Scenario,
     pub(super) end_s: f64,
     pub(super) legend: Vec<(String, Ink)>,
@@ -94,16 +93,16 @@ pub(super) struct Chart<'a> {
 }
 
 impl Chart<'_> {
-    /// The figure as SVG, and what there is to see besides lines, in words.
+    /// Returns the figure as SVG, and an explanation of everything in it besides lines.
     pub(super) fn draw(&self) -> io::Result<(String, String)> {
         let marks = marks(self.scenario, self.end_s, PLOT_PX);
         let mut all = marks.gusts.iter().chain(&marks.changes);
         let mut words = String::new();
         if !marks.gusts.is_empty() {
-            words += " A thin line: a gust strikes.";
+            words += " Thin line: onset of a gust.";
         }
         if all.any(|mark| mark.is_band) {
-            words += " Shaded: while what is named above lasts.";
+            words += " Shaded: duration of the event named above.";
         }
         let losses = |panel: &Panel| {
             let range = range(&panel.lines, LEAST_ROOM);
@@ -116,7 +115,7 @@ impl Chart<'_> {
             words += CROSS;
         }
         if within.contains(&false) {
-            words += " An arrow: where one was lost beyond the panel.";
+            words += " Arrow: a vehicle was lost beyond the panel.";
         }
         Ok((self.svg(&marks)?, words))
     }
@@ -137,7 +136,7 @@ impl Chart<'_> {
         })
     }
 
-    /// One panel with its top at `y_px`; the last one carries the time axis.
+    /// Draws one panel with its top at `y_px`; the last one carries the time axis.
     fn panel(&self, area: &Area, panel: &Panel, y_px: f64, marks: &Marks, last: bool) -> Result<(), Failure> {
         let plot_height_px = PANEL_PX - GAP_PX;
         let bottom_px = if last { BOTTOM_PX } else { 0.0 };
@@ -189,7 +188,7 @@ impl Chart<'_> {
             chart.draw_series(pieces.iter().map(|piece| PathElement::new(simplify(piece, scale, 0.2), ink.style())))?;
             if let (Some(_), false, Some(&(t, v))) = (lost_s, is_reference, points.last()) {
                 let style = Ink::new(ink.color, 2.0).style();
-                // Beyond the panel, where it was in words: a cross at the edge would be one at another place.
+                // Beyond the panel the position is written: a cross at the edge would mark a wrong one.
                 let beyond = |arrow, edge| {
                     let words = format!("{arrow} {} ", number(v, decimals));
                     Text::new(words, (t, edge), text(LABEL_PX, ink.color, HPos::Right))
@@ -206,7 +205,7 @@ impl Chart<'_> {
     }
 }
 
-/// Labels of the marks on their bands, above the panels.
+/// Draws the labels of the marks on their bands, above the panels.
 fn labels(area: &Area, marks: &Marks, end_s: f64, top_px: f64) -> Result<(), Failure> {
     for mark in marks.gusts.iter().chain(&marks.changes) {
         let bottom_px = top_px - 3.0 - mark.lane as f64 * LANE_PX;
@@ -221,8 +220,8 @@ fn labels(area: &Area, marks: &Marks, end_s: f64, top_px: f64) -> Result<(), Fai
     Ok(())
 }
 
-/// What a panel shows: all of every flight. A flight that was lost may widen that to three times what the others need,
-/// and counts until shortly before its end; if no flight was better, nothing else limits it.
+/// Returns the range of a panel: all of every flight. A lost flight extends it to at most three times the others'
+/// range, and counts until shortly before its end; if all are lost, their range is not limited.
 pub(super) fn range(lines: &[Line], least_room: f64) -> Range<f64> {
     let all = extent(lines.iter());
     let survived = lines.iter().any(|line| line.lost_s.is_none() && !line.is_reference);
@@ -234,16 +233,16 @@ pub(super) fn range(lines: &[Line], least_room: f64) -> Range<f64> {
         }
         (all, _) => all.unwrap_or_default(),
     };
-    // Room above and below; a constant gets some too.
+    // Room above and below, also for a constant.
     let room = (0.06 * (high - low)).max(1e-3 * low.abs().max(high.abs())).max(least_room);
     low - room..high + room
 }
 
-/// Smallest and largest value of some lines, if there are any.
+/// Returns the smallest and largest value of some lines, if there are any.
 fn extent<'a>(lines: impl Iterator<Item = &'a Line>) -> Option<(f64, f64)> {
     let mut extent = None;
     for line in lines {
-        // A second before the end, or a tenth of a short flight.
+        // Until one second before the end, or a tenth for a short flight.
         let until_s = line.lost_s.map_or(f64::INFINITY, |lost_s| lost_s - (0.1 * lost_s).min(1.0));
         for &(_, v) in line.points.iter().filter(|(t, _)| *t <= until_s) {
             let (low, high) = extent.unwrap_or((v, v));
@@ -253,7 +252,7 @@ fn extent<'a>(lines: impl Iterator<Item = &'a Line>) -> Option<(f64, f64)> {
     extent
 }
 
-/// Decimals that the numbers on an axis need.
+/// Returns the number of decimals for the ticks of an axis.
 fn tick_decimals(range: Range<f64>, most: usize) -> usize {
     match RangedCoordf64::from(range).key_points(BoldPoints(most)).as_slice() {
         [first, second, ..] => decimals(second - first),
@@ -261,12 +260,12 @@ fn tick_decimals(range: Range<f64>, most: usize) -> usize {
     }
 }
 
-/// Decimals that tell numbers `step` apart.
+/// Returns the number of decimals that distinguishes numbers `step` apart.
 pub(super) fn decimals(step: f64) -> usize {
     (-libm::log10(step) - 1e-6).ceil().clamp(0.0, 9.0) as usize
 }
 
-/// A number on an axis, with a real minus sign.
+/// Formats a number on an axis, with a typographic minus sign.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {

@@ -20,25 +20,25 @@ const HEIGHT_PX: f64 = 660.0;
 const ROOM_PX: [f64; 4] = [110.0, 70.0, WIDTH_PX - 220.0, HEIGHT_PX - 70.0 - 62.0];
 /// Width of a band along the reference.
 const BAND_PX: f64 = 13.0;
-/// Height of the box in the lengths of its longer floor edge.
+/// Height of the box relative to its longer floor edge.
 const BOX_HEIGHT: f64 = 0.62;
 /// Direction to the eye: azimuth -55 degrees, elevation 24 degrees.
 const AZIMUTH_RAD: f64 = -0.96;
 const ELEVATION_RAD: f64 = 0.42;
 
-/// The box and how it falls on the picture.
+/// The box and its projection.
 struct View {
     low_m: Vector3<f64>,
     high_m: Vector3<f64>,
-    /// Edges as drawn, in one length.
+    /// Drawn lengths of the edges, in a common unit.
     edges: Vector3<f64>,
     px: f64,
     middle_px: (f64, f64),
 }
 
 impl View {
-    /// A view of the box between two corners, its room moved down by `below_px`. The floor is true to scale as long as that
-    /// leaves it wide enough.
+    /// Creates a view of the box between two corners, moved down by `below_px`. The floor is true to scale unless it
+    /// would become too narrow.
     fn new(low_m: Vector3<f64>, high_m: Vector3<f64>, below_px: f64) -> Self {
         let span = high_m - low_m;
         let longer = span.x.max(span.y);
@@ -46,13 +46,13 @@ impl View {
         let [left, top, width, height] = ROOM_PX;
         let view =
             View { low_m, high_m, edges, px: 1.0, middle_px: (left + 0.5 * width, top + below_px + 0.5 * height) };
-        // The far corners of the outline, seen from the middle.
+        // The far corners of the outline, relative to the centre.
         let (right, _) = view.direction(Vector3::new(0.5, 0.5, 0.0));
         let (_, down) = view.direction(Vector3::new(0.5, -0.5, -0.5));
         View { px: (0.5 * width / right).min(0.5 * height / down), ..view }
     }
 
-    /// Where a vector, counted in edges of the box, points on the picture: right and down.
+    /// Projects a vector, in edges of the box, to the picture: right and down.
     fn direction(&self, v: Vector3<f64>) -> (f64, f64) {
         let v = v.component_mul(&self.edges) * self.px;
         let ((sin_a, cos_a), (sin_e, cos_e)) = (libm::sincos(AZIMUTH_RAD), libm::sincos(ELEVATION_RAD));
@@ -60,7 +60,7 @@ impl View {
         (cos_a * v.y - sin_a * v.x, sin_e * toward - cos_e * v.z)
     }
 
-    /// Pixel of a place.
+    /// Returns the pixel of a point.
     fn at(&self, p: Vector3<f64>) -> (f64, f64) {
         let middle = 0.5 * (self.low_m + self.high_m);
         let (right, down) = self.direction((p - middle).component_div(&(self.high_m - self.low_m)));
@@ -72,7 +72,8 @@ impl View {
     }
 }
 
-/// Draws the flights of `laws` and the reference of the longest; tells what there is to see besides them, in words.
+/// Draws the flights of `laws` and the reference of the longest; returns an explanation of everything else in the
+/// picture.
 pub(super) fn draw(
     laws: &[Law],
     longest: &Flown,
@@ -92,7 +93,7 @@ pub(super) fn draw(
     };
     let ranges = [Vector3::x(), Vector3::y(), Vector3::z()].map(range_along);
     let marks = marks(scenario, end_s, PLOT_PX);
-    // Wider below narrower, where several bands lie over one another.
+    // Wider bands below narrower ones, where several overlap.
     let band = |change: &Mark| Ink::new(change.tint, BAND_PX + 6.0 * change.depth as f64);
     let mut changes: Vec<&Mark> = marks.changes.iter().collect();
     for (i, change) in changes.iter().enumerate() {
@@ -138,10 +139,10 @@ pub(super) fn draw(
     })?;
     let mut words = String::new();
     if dots {
-        words += " Dots: where the reference was when a gust struck.";
+        words += " Dots: position of the reference at the onset of a gust.";
     }
     if bands {
-        words += " Shaded: where it was while what the legend names lasted.";
+        words += " Shaded: its path during the event named in the legend.";
     }
     if crosses {
         words += CROSS;
@@ -153,8 +154,8 @@ fn pixel((x, y): (f64, f64)) -> (i32, i32) {
     (units(x), units(y))
 }
 
-/// Dots with their labels at those of the `places` that are in the box; of several at one place, the labels stand in a
-/// row. Tells how many places were.
+/// Draws labelled dots at the `places` that are in the box; labels of dots at the same place form a row. Returns the
+/// number of places.
 fn dot_all<'a>(
     area: &Area,
     view: &View,
@@ -176,7 +177,7 @@ fn dot_all<'a>(
     Ok(count)
 }
 
-/// A dot with a label on the side that faces away from the middle.
+/// Draws a dot with a label on the side away from the centre.
 fn dot(area: &Area, view: &View, (x, y): (f64, f64), label: &str) -> Result<(), Failure> {
     let (dx, dy) = (x - view.middle_px.0, y - view.middle_px.1);
     let away = 15.0 / libm::hypot(dx, dy).max(1.0);
@@ -186,8 +187,7 @@ fn dot(area: &Area, view: &View, (x, y): (f64, f64), label: &str) -> Result<(), 
     area.draw(&Text::new(label.to_owned(), place, text(LABEL_PX, BLACK, side)))
 }
 
-/// Draws a way through the box up to where it first leaves it, and tells where that is. What would be drawn twice, lap
-/// after lap, is drawn once.
+/// Draws a path through the box up to where it first leaves it, and returns that point. Repeated laps are drawn once.
 fn path(
     area: &Area,
     view: &View,
@@ -221,14 +221,14 @@ fn path(
     Ok(last)
 }
 
-/// Floor and back walls with their grid, numbers and names of the axes.
+/// Draws floor and back walls with grid, numbers and names of the axes.
 fn furniture(area: &Area, view: &View) -> Result<(), Failure> {
     let (low, high) = (view.low_m, view.high_m);
     let line = |a: Vector3<f64>, b: Vector3<f64>, color: RGBColor| {
         area.draw(&PathElement::new([pixel(view.at(a)), pixel(view.at(b))], Ink::new(color, 0.75).style()))
     };
-    // For each axis: the edge with the numbers and the parallel one behind it, each as the place where the axis is at
-    // zero and the way in which grid lines run from there over floor or wall; and where the numbers go.
+    // For each axis: the edge with the numbers and the parallel one behind it, each as the point at the axis's zero and
+    // the direction of grid lines on floor or wall; and the position of the numbers.
     let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
     let near = |axis: Vector3<f64>| low - axis.component_mul(&low);
     let right = Vector3::new(high.x, 0.0, low.z);
@@ -253,7 +253,7 @@ fn furniture(area: &Area, view: &View) -> Result<(), Failure> {
                 let from = edge + axis * value;
                 line(from, from + way.component_mul(&span), GRID)?;
             }
-            // The left corner belongs to the height.
+            // The left corner is labelled by the height.
             if axis != x || value - first > 0.04 * (last - first) {
                 label(value, 16.0, number(value, decimals(step)), text(LABEL_PX, GREY, HPos::Center))?;
             }
@@ -263,13 +263,13 @@ fn furniture(area: &Area, view: &View) -> Result<(), Failure> {
         }
         label(0.5 * (first + last), 50.0, name.to_owned(), text(12.0, BLACK, HPos::Center))?;
     }
-    // The three edges of the back walls that no numbers belong to.
+    // The three edges of the back walls without numbers.
     line(Vector3::new(low.x, low.y, high.z), Vector3::new(low.x, high.y, high.z), FRAME)?;
     line(Vector3::new(low.x, high.y, high.z), Vector3::new(high.x, high.y, high.z), FRAME)?;
     line(Vector3::new(high.x, high.y, low.z), Vector3::new(high.x, high.y, high.z), FRAME)
 }
 
-/// Round numbers within the interval, about six, and the step between them.
+/// Returns about six round numbers within the interval, and the step between them.
 fn ticks(low: f64, high: f64) -> (Vec<f64>, f64) {
     let rough = (high - low) / 6.0;
     let power = libm::pow(10.0, libm::log10(rough).floor());

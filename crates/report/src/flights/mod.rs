@@ -1,4 +1,4 @@
-//! Flights of one scenario or several: table, CSV, summary, figures, page.
+//! Results of flights: table, CSV, summary, figures, page.
 
 #[cfg(test)]
 mod tests;
@@ -13,21 +13,21 @@ use afbc_sim::flown::Flown;
 use std::io;
 use std::path::PathBuf;
 
-/// Writes everything about `flown` into `folder`, in place of all that its command has left there before, and returns the
-/// paths written:
+/// Writes everything about `flown` into `folder`, replacing all earlier files of its command, and returns the paths
+/// written:
 ///
 /// * `<stem>-<contender>.csv`: each run's log;
-/// * `fig4-trajectory.svg`, `fig5-outputs.svg`, `fig6-attitude.svg`, `fig7-errors.svg`, `fig8-inputs.svg`: the counterparts
-///   of the paper's figures, all contenders overlaid; of several scenarios, each has its own set `<stem>-fig4-trajectory.svg`
-///   etc.;
+/// * `fig4-trajectory.svg`, `fig5-outputs.svg`, `fig6-attitude.svg`, `fig7-errors.svg`, `fig8-inputs.svg`: the
+///   counterparts of the paper's figures, all contenders overlaid; with several scenarios, `<stem>-fig4-trajectory.svg`
+///   etc. for each;
 /// * `summary.json`: the figures of merit of each run;
-/// * `report.html`: all of it on one page that needs no other file.
+/// * `report.html`: everything on one self-contained page.
 ///
-/// The stem is the scenario's name. Scenarios that share a name add what tells them apart: reading, signs, plant,
-/// profile, or else a number. A file appears whole or not at all: each is written under a temporary name first.
+/// The stem is the scenario's name. Scenarios of the same name are distinguished by reading, signs, plant, profile, or
+/// else a number. A file appears whole or not at all: each is written under a temporary name first.
 ///
 /// # Errors
-/// The first file that could not be written, or is somebody else's.
+/// The first file that could not be written, or is not the command's.
 pub fn write(folder: &Folder, flown: &[Flown], claims: &[Claim]) -> Result<Vec<PathBuf>, Error> {
     let groups = groups::groups(flown);
     let draw = |group: &groups::Group<'_>| figures::flights::draw(&group.flights);

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 use std::collections::{BTreeMap, HashSet};
 use std::fs;
 
-/// A folder of its own for each test, gone afterwards.
+/// A separate folder for each test, removed afterwards.
 struct Scratch(PathBuf);
 
 impl Scratch {
@@ -21,12 +21,12 @@ impl Scratch {
         Scratch(std::env::temp_dir().join(format!("sitl-output-{name}-{}", std::process::id())))
     }
 
-    /// As a command's own.
+    /// Opens it as a command's own.
     fn open(&self) -> Folder {
         Folder::open(&self.0, "test", "it", false).unwrap()
     }
 
-    /// Every file by name, but for what says whose they are.
+    /// Returns every file by name, except the marker of the folder's owner.
     fn files(&self) -> BTreeMap<String, Vec<u8>> {
         let entries = fs::read_dir(&self.0).unwrap().map(|entry| entry.unwrap());
         let named = entries.map(|entry| (entry.file_name().into_string().unwrap(), entry.path()));
@@ -61,7 +61,7 @@ fn claims() -> Vec<Claim> {
     ]
 }
 
-/// Panics unless every SVG is well-formed and small.
+/// Checks that every SVG is well-formed and small, and returns their number.
 fn check_svgs(files: &BTreeMap<String, Vec<u8>>) -> usize {
     let svgs = files.iter().filter(|(name, _)| name.ends_with(".svg"));
     svgs.inspect(|(name, bytes)| {
@@ -80,7 +80,7 @@ fn writes_everything_twice_the_same() {
     let (first, second) = (Scratch::new("first"), Scratch::new("second"));
     let paths = write(&first.open(), &flown, &claims()).unwrap();
     write(&second.open(), &flown, &claims()).unwrap();
-    // And over what is there already.
+    // The second time over existing files.
     write(&second.open(), &flown, &claims()).unwrap();
     let files = first.files();
     assert_eq!(files, second.files());
@@ -171,7 +171,7 @@ fn table_fits_and_says_who_was_lost() {
 #[test]
 fn odd_flights_have_figures_too() {
     let calm = Scenario { name: "".into(), ..paper(Reading::Persistent, 0.1) };
-    // Everything at once, under a name made to break files and markup.
+    // Many events at once, under a name that needs escapes in files and markup.
     let gust = |axis, size| Gust { axis, kind: GustKind::Force, size, start_s: 1.0, end_s: 1.5 };
     let gusts = afbc_types::Axis::ALL.map(|axis| gust(axis, 0.001)).to_vec();
     let change = ParameterChange { quantity: Quantity::Mass, factor: 1.013, start_s: 0.5, end_s: f64::INFINITY };
@@ -182,7 +182,7 @@ fn odd_flights_have_figures_too() {
     };
     let mut flown = vec![fly(&calm, ControllerKind::Afbc), fly(&stormy, ControllerKind::Backstepping)];
     flown.extend(both(&paper(Reading::Forces, 20.0)));
-    // A vehicle that went nowhere fast.
+    // A vehicle without thrust.
     let mut broken = fly(&Scenario { name: "broken".into(), ..calm.clone() }, ControllerKind::Afbc);
     for sample in broken.run.log.iter_mut().skip(2) {
         sample.motion.position_m = Vector3::repeat(f64::NAN);
@@ -200,8 +200,9 @@ fn odd_flights_have_figures_too() {
     assert!(table(&flown, &[]).contains("mass +1.3 %"));
 }
 
-/// The law as printed climbs away from its hover and is lost 52 m up, with backstepping 50 m below it on the same panel: the
-/// figure says so, and marks no other place. In the panels of x, y and psi it is lost where the cross is.
+/// The law as printed climbs away from its hover and is lost 52 m up, while backstepping stays 50 m below it in the
+/// same panel. The figure states this, and marks no other place. In the panels of x, y and psi the cross is at the
+/// loss.
 #[test]
 fn a_loss_beyond_a_panel_is_told_and_not_marked_elsewhere() {
     let hover = Scenario { duration_s: 200.0, ..built_in("hover").unwrap().read().unwrap() };
@@ -258,14 +259,14 @@ fn an_error_names_the_path_and_the_cure() {
     assert!(error.contains("file: ") && error.contains("--out"), "{error}");
 }
 
-/// Whatever library writes: the system's own word is what is heard.
+/// Whatever library writes, the message contains the system's error.
 #[test]
 fn a_full_disk_says_free_some_space() {
     let scratch = Scratch::new("full");
     let folder = scratch.open();
     let flown = fly(&paper(Reading::Persistent, 0.1), ControllerKind::Afbc);
     let full = || fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    // Fills through a file on a disk that is full, under what the library wraps its errors in.
+    // Writes through a file on a full disk, with the error wrapped as the library wraps it.
     let fill = |name: &str, wrap: &dyn Fn(&mut dyn io::Write) -> io::Result<()>| {
         let mut disk = afbc_files::Disk { file: full(), failure: None };
         let failed = wrap(&mut disk).unwrap_err();
@@ -280,7 +281,7 @@ fn a_full_disk_says_free_some_space() {
     }
 }
 
-/// What a command has written before goes, what others have put there stays.
+/// Earlier files of the command are removed, files of others stay.
 #[test]
 fn nothing_stale_stays_and_nothing_foreign_goes() {
     let scratch = Scratch::new("stale");
@@ -294,7 +295,7 @@ fn nothing_stale_stays_and_nothing_foreign_goes() {
     assert_eq!(one["notes.csv"], b"mine");
     assert_eq!(one.len(), both.len());
 
-    // Somebody's file where one of ours would come, be it no more than a link.
+    // Somebody else's file, here a link, with the name of a result.
     fs::remove_file(scratch.0.join("paper-afbc.csv")).unwrap();
     write(&scratch.open(), &[], &[]).unwrap();
     std::os::unix::fs::symlink("nowhere", scratch.0.join("paper-afbc.csv")).unwrap();
@@ -305,7 +306,7 @@ fn nothing_stale_stays_and_nothing_foreign_goes() {
     assert!(fs::symlink_metadata(scratch.0.join("paper-afbc.csv")).unwrap().is_file());
     assert!(!scratch.0.join("nowhere").exists());
 
-    // Of another command; and what says so, with any bit of it flipped.
+    // A folder of another command; and a marker with any bit flipped.
     let refused = || Folder::open(&scratch.0, "other", "that", false).unwrap_err().to_string();
     assert!(refused().contains("holds what `sitl test` made of it;"), "{}", refused());
     let marker = scratch.0.join(".sitl.json");
