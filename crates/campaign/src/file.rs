@@ -37,9 +37,10 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campai
         // If both ends of every spread are in range on every course, the flights between them normally are.
         for end in 0..2 {
             for flight in 0..campaign.courses.len() as u64 {
-                campaign.at_end(flight, end).and_then(|scenario| scenario.check()).map_err(|error| {
-                    root.fault("spread", format!("it causes {}; narrow it", out_of_range(&error)))
-                })?;
+                campaign
+                    .at_end(flight, end)
+                    .and_then(|scenario| scenario.check())
+                    .map_err(|error| root.fault("spread", format!("it causes {}; narrow it", out_of_range(&error))))?;
             }
         }
         root.finish()?;

@@ -121,11 +121,17 @@ pub static QUANTITIES: [Quantity; 23] = [
     }),
     needing(
         "wind_m_s",
-        quantity("wind_direction_rad", -TAU, TAU, "direction the wind blows to, from +x to +y; by default +x", |f, x| {
-            let wind = &mut f.scenario.realism.wind.steady_m_s;
-            let (sin, cos) = libm::sincos(x);
-            *wind = Vector3::new(cos, sin, 0.0) * wind.x;
-        }),
+        quantity(
+            "wind_direction_rad",
+            -TAU,
+            TAU,
+            "direction the wind blows to, from +x to +y; by default +x",
+            |f, x| {
+                let wind = &mut f.scenario.realism.wind.steady_m_s;
+                let (sin, cos) = libm::sincos(x);
+                *wind = Vector3::new(cos, sin, 0.0) * wind.x;
+            },
+        ),
     ),
     quantity("wind_20ft_m_s", 0.0, 50.0, "wind at 20 ft, which sets the intensity of the turbulence", |f, x| {
         let turbulence = &mut f.scenario.realism.wind.turbulence;
