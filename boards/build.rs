@@ -1,10 +1,10 @@
-//! Linker arguments of a board's image: here, so that building from the workspace's root works and the host's crates
-//! stay clear of them.
+//! Linker arguments of a board's image. Set here, so that building from the workspace's root works and the host's
+//! crates are not affected.
 
 use std::path::Path;
 
 fn main() {
-    // The board's own memory map or, without one, the default board's, which lies at the workspace's root.
+    // The board's own memory map or, without one, the default board's at the workspace's root.
     let board = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folders = [board, board.ancestors().nth(2).expect("the workspace's root")];
     let folder = folders.into_iter().find(|folder| folder.join("memory.x").is_file()).expect("memory.x at the root");

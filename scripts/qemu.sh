@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes sure of a qemu-system-arm that runs both images: 8.2 or newer. Debian 12 has 7.2, whose USART sends nothing by
-# interrupt; its backports have a newer one, from the mirror that apt uses anyway.
+# Installs a qemu-system-arm that runs both images: 8.2 or newer. Debian 12 has 7.2, whose USART does not send by
+# interrupt; its backports, on the same mirror, have a newer one.
 set -euo pipefail
 
 # The version as a number: 802 for 8.2.
@@ -10,21 +10,19 @@ version() {
 }
 
 if [ "$(version)" -lt 802 ]; then
-    # One at a time: two at once leave packages half installed. Whoever waited finds it done. (apt locks each of its own
-    # steps, and waits for others' when told to; not the steps together.)
+    # One at a time: two at once leave packages half installed. (apt locks each of its steps, but not all together.)
     exec 9>"${TMPDIR:-/tmp}/qemu.sh.$(id -u).lock"
     flock 9
 fi
 if [ "$(version)" -lt 802 ]; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
     install="apt-get install -y -qq --no-install-recommends -o DPkg::Lock::Timeout=300"
-    # What an earlier run that was cut short left half installed.
+    # Finishes what an interrupted earlier run left half installed.
     $sudo dpkg --configure -a >/dev/null || true
     $sudo apt-get update -qq
     $sudo $install qemu-system-arm >/dev/null
     if [ "$(version)" -lt 802 ]; then
-        # The mirror that apt takes this release from, once more with the suite of backports; apt's settings stay as
-        # they are.
+        # Adds the backports suite of this release's mirror, for this command only; apt's settings are not changed.
         release=$(. /etc/os-release && echo "$VERSION_CODENAME")
         mirror=$(apt-get indextargets --format '$(REPO_URI)' \
             'Created-By: Packages' "Release: $release" 'Component: main' | head -1)

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# A Rust toolchain that compiles for thumbv7em-none-eabihf, as the value of RUSTUP_TOOLCHAIN on stdout.
+# Prints the value of RUSTUP_TOOLCHAIN for a Rust toolchain that compiles for thumbv7em-none-eabihf.
 #
 #   RUSTUP_TOOLCHAIN=$(scripts/thumb-toolchain.sh) cargo fw
 #
-# 1. The toolchain in use, if it has the target or rustup can add it.
+# 1. The current toolchain, if it has the target or rustup can add it.
 # 2. Otherwise, or with FW_FORCE_DEBIAN=1: Debian's rustc, with core and alloc compiled once (2 minutes) from Debian's
-#    sources into a sysroot of our own, by default ~/.cache/thumb-toolchain (or $1).
+#    sources into a separate sysroot, by default ~/.cache/thumb-toolchain (or $1).
 set -euo pipefail
 target=thumbv7em-none-eabihf
 host=x86_64-unknown-linux-gnu
@@ -21,7 +21,7 @@ if [ -z "${FW_FORCE_DEBIAN:-}" ]; then
         rustup show active-toolchain | cut -d' ' -f1
         exit
     fi
-    echo "rustup has no $target; taking Debian's compiler" >&2
+    echo "rustup has no $target; using Debian's compiler" >&2
 fi
 
 if [ ! -x /usr/bin/clippy-driver ] || [ ! -x /usr/bin/cargo ] || [ ! -d /usr/lib/rustlib/src/rust/library ]; then
@@ -39,7 +39,7 @@ fi
 rm -rf "$dir"
 mkdir -p "$dir/bin" "$dir/lib/rustlib/$target/lib" "$dir/lib/rustlib/$host/bin"
 
-# Debian's rustc takes /usr for its sysroot unless told otherwise; clippy heeds SYSROOT.
+# Debian's rustc uses /usr as its sysroot by default; clippy uses SYSROOT.
 for tool in rustc rustdoc; do
     printf '#!/bin/sh\nexec /usr/bin/%s --sysroot "%s" "$@"\n' $tool "$dir" >"$dir/bin/$tool"
 done
@@ -68,7 +68,7 @@ codegen-units = 1
 TOML
 (
     cd "$empty"
-    # RUSTC_BOOTSTRAP lets a stable compiler build its own core; nothing else is built that way.
+    # RUSTC_BOOTSTRAP lets a stable compiler build core; nothing else is built with it.
     env -u CARGO_TARGET_DIR -u RUSTC -u RUSTUP_TOOLCHAIN PATH=/usr/bin:/bin \
         RUSTC_BOOTSTRAP=1 RUSTFLAGS=-Cembed-bitcode=yes \
         cargo build -q --release --target $target \

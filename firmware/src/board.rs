@@ -1,50 +1,50 @@
-//! What the firmware asks of a board. A folder of `boards/` implements it and makes an image by [`image!`](crate::image):
-//! the one place where the two meet.
+//! Interface between firmware and board. A crate in `boards/` implements it and builds an image by
+//! [`image!`](crate::image), the only place where firmware and board meet.
 
 use crate::control::Tick;
 use embassy_executor::SendSpawner;
 
-/// A board: motors, watchdog, and whether it is well.
+/// A board: motors, watchdog and health.
 pub trait Board: Sized + 'static {
-    /// The link, in.
+    /// Receiving side of the link.
     type Receiver: Receiver + 'static;
-    /// The link, out.
+    /// Sending side of the link.
     type Transmitter: Transmitter + 'static;
 
-    /// Brings up clocks and peripherals; the core runs at [`CORE_HZ`](crate::time::CORE_HZ) from then on. To be called once.
-    /// A task of the board's own on `control` runs with the control tick, right after it.
+    /// Brings up clocks and peripherals; the core runs at [`CORE_HZ`](crate::time::CORE_HZ) from then on. To be called
+    /// once. A board's task spawned on `control` runs right after the control tick.
     fn start(control: SendSpawner) -> (Self, Self::Receiver, Self::Transmitter);
 
-    /// Passes the time until the next interrupt, or a part of it.
+    /// Waits for the next interrupt, or a part of that time.
     fn idle();
 
-    /// True if the clock has failed and another has taken over.
+    /// True if the crystal has failed and another clock has taken over.
     fn clock_has_failed(&self) -> bool;
 
-    /// True if a task that is not needed to fly has panicked.
+    /// True if a task that is not needed in flight has panicked.
     fn task_has_failed(&self) -> bool;
 
-    /// Gives the motors their throttle: 0, or 48 to 2047.
+    /// Outputs throttles to the motors: 0, or 48 to 2047.
     fn drive(&mut self, throttles: [u16; 4]);
 
-    /// Keeps the chip from being reset.
+    /// Feeds the watchdog.
     fn feed_watchdog(&mut self);
 }
 
-/// The link, in.
+/// Receiving side of the link.
 pub trait Receiver {
-    /// Reads the next bytes, and tells how many: waits for at least one.
+    /// Reads the next bytes and returns their number; waits for at least one.
     fn receive(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize> + Send;
 }
 
-/// The link, out.
+/// Sending side of the link.
 pub trait Transmitter {
-    /// Sends what there was to say after `tick`; never waits for the line.
+    /// Sends the messages after `tick`, without waiting for the line.
     fn transmit(&mut self, tick: &Tick, bytes: &[u8]);
 }
 
-/// Makes an image for a type that implements [`Board`](crate::board::Board): the program's entry, and the tasks whose type
-/// depends on the board. What happens on a panic or a fault is the board's own.
+/// Builds an image for a type that implements [`Board`](crate::board::Board): the program's entry, and the tasks whose
+/// type depends on the board. The board handles panics and faults.
 #[macro_export]
 macro_rules! image {
     ($board:ty) => {
@@ -62,7 +62,7 @@ macro_rules! image {
             $crate::comms::run(&mut comms, &mut receiver, &mut transmitter).await
         }
 
-        // Out of line: neither takes its stack while the other does.
+        // Out of line, so that their stacks are not used at the same time.
         #[inline(never)]
         fn spawn_control(spawner: embassy_executor::SendSpawner, board: $board) {
             spawner.spawn(control($crate::control::flight(), board).expect("spawned once"));

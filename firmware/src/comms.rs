@@ -1,4 +1,4 @@
-//! The link: bytes in, messages out, below the control tick.
+//! The link: receives and sends messages, at a lower priority than the control tick.
 
 use crate::board::{Receiver, Transmitter};
 use crate::control::{self, Tick};
@@ -8,17 +8,17 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_futures::select::{Either, select};
 use heapless::Vec;
 
-/// Most bytes read at once.
+/// Largest number of bytes read at once.
 const READ_MAX: usize = 128;
 
 static BAD_FRAMES: AtomicU32 = AtomicU32::new(0);
 
-/// Frames dropped since power-up.
+/// Returns the number of frames dropped since power-up.
 pub fn bad_frames() -> u32 {
     BAD_FRAMES.load(Ordering::Relaxed)
 }
 
-/// Listens, and reports every tick.
+/// Receives messages, and reports every tick.
 pub async fn run(comms: &mut Comms, receiver: &mut impl Receiver, transmitter: &mut impl Transmitter) -> ! {
     let mut incoming = [0; READ_MAX];
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
@@ -37,7 +37,7 @@ pub async fn run(comms: &mut Comms, receiver: &mut impl Receiver, transmitter: &
     }
 }
 
-/// All that there is to say after a tick. Out of line, as the control tick is, to be told from the other tasks.
+/// Sends all messages after a tick. Out of line, like the control tick, to be identified in the image.
 #[inline(never)]
 fn report(comms: &mut Comms, tick: &Tick, outgoing: &mut Vec<u8, REPORT_MAX>) {
     outgoing.clear();

@@ -1,4 +1,4 @@
-//! The control tick, 1000 times a second.
+//! The control tick, 1000 times per second.
 
 use crate::board::Board;
 use crate::time::{self, Stopwatch};
@@ -19,15 +19,15 @@ use heapless::Deque;
 /// Newest inputs, written by [`crate::comms`].
 static INBOX: Mutex<CriticalSectionRawMutex, RefCell<Inbox>> = Mutex::new(RefCell::new(Inbox::EMPTY));
 
-/// What the last ticks did, and that there are some. Not a channel, which panics if it is used while it is used.
+/// Results of the last ticks, and a signal that there are some. Not a channel, which panics when it is re-entered.
 static TICKS: Mutex<CriticalSectionRawMutex, RefCell<Deque<Tick, 8>>> = Mutex::new(RefCell::new(Deque::new()));
 static TICKED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
-/// What the oldest tick did that nobody has asked for yet. A tick never waits: if nobody asks for eight ticks, the next
-/// are left out.
+/// Waits for the result of the oldest tick not yet returned. A tick never waits: while eight results are queued,
+/// further ones are dropped.
 pub fn next_tick() -> impl Future<Output = Tick> {
     poll_fn(|context| {
-        // Before the look, so that none comes in between.
+        // Registered before looking, so that no tick is missed.
         let _ = pin!(TICKED.wait()).poll(context);
         match TICKS.lock(|ticks| ticks.try_borrow_mut().ok()?.pop_front()) {
             Some(tick) => Poll::Ready(tick),
@@ -40,27 +40,27 @@ pub fn next_tick() -> impl Future<Output = Tick> {
 static CYCLES: AtomicU32 = AtomicU32::new(0);
 static CYCLES_MAX: AtomicU32 = AtomicU32::new(0);
 
-/// How long the last control tick took, and the longest so far, interrupts included \[core cycles\].
+/// Returns the duration of the last control tick, and the longest so far, interrupts included \[core cycles\].
 pub fn cycles() -> [u32; 2] {
     [&CYCLES, &CYCLES_MAX].map(|cycles| cycles.load(Ordering::Relaxed))
 }
 
-/// One control tick.
+/// Result of one control tick.
 #[derive(Clone, Copy)]
 pub struct Tick {
-    /// What it decided.
+    /// Report of the flight core.
     pub report: Report,
-    /// How long it took, interrupts included \[core cycles\].
+    /// Duration, interrupts included \[core cycles\].
     pub cycles: u32,
 }
 
-/// Changes what the next tick will work from.
+/// Changes the inputs of the next tick.
 pub fn with_inbox(change: impl FnOnce(&mut Inbox)) {
-    // Borrowed by nobody else while it is locked; and no panic.
+    // Not borrowed elsewhere while it is locked; no panic in any case.
     INBOX.lock(|inbox| inbox.try_borrow_mut().ok().map(|mut inbox| change(&mut inbox)));
 }
 
-/// The vehicle, disarmed.
+/// Creates the vehicle, disarmed.
 ///
 /// # Panics
 /// If one of its parameters is out of range.
@@ -69,18 +69,18 @@ pub fn flight() -> Flight {
     flight
 }
 
-/// Ticks. By reference: what a task hands on by value, it has room for twice.
+/// Runs the ticks. `flight` is a reference, since a task would store a value twice.
 pub async fn run(flight: &mut Flight, board: &mut impl Board) -> ! {
     loop {
-        // Not by a ticker, whose periods begin whenever it was made: one that begins just after a control period, which
-        // is when alarms go off, ticks twice in every other one.
+        // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
+        // are due, it would tick twice in every second period.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
         let report = tick(flight, board);
         let cycles = stopwatch.cycles();
         CYCLES.store(cycles, Ordering::Relaxed);
         CYCLES_MAX.fetch_max(cycles, Ordering::Relaxed);
-        // Full if comms is behind: then this tick goes unreported.
+        // Full if the link's task falls behind: then this tick is not reported.
         let push = |ticks: &RefCell<Deque<_, _>>| ticks.try_borrow_mut().ok()?.push_back(Tick { report, cycles }).ok();
         if TICKS.lock(push).is_some() {
             TICKED.signal(());
@@ -88,12 +88,13 @@ pub async fn run(flight: &mut Flight, board: &mut impl Board) -> ! {
     }
 }
 
-/// The top loop: take the newest inputs; supervise, control and gate the motors ([`afbc_flight_core::tick`]); drive them; check
-/// the rate. Out of line, so that its stack and its instructions can be counted (`docs/budgets.md`).
+/// The top loop: takes the newest inputs; supervises, controls and gates the motors ([`afbc_flight_core::tick`]);
+/// drives them; checks the rate. Out of line, so that its stack and its instructions can be counted
+/// (`docs/budgets.md`).
 #[inline(never)]
 fn tick<B: Board>(flight: &mut Flight, board: &mut B) -> Report {
     let now_us = Instant::now().as_micros();
-    // Borrowed by nobody else while it is locked; and the tick holds no panic.
+    // Not borrowed elsewhere while it is locked; the tick has no panic.
     let inbox = INBOX.lock(|inbox| inbox.try_borrow_mut().map_or(Inbox::EMPTY, |mut inbox| inbox.take()));
 
     if board.clock_has_failed() {
@@ -102,7 +103,7 @@ fn tick<B: Board>(flight: &mut Flight, board: &mut B) -> Report {
     let report = flight.tick(now_us, &inbox);
 
     board.drive(report.throttles);
-    // A task that has failed is started anew by a reset, once that ends no flight.
+    // A reset restarts a failed task, once it does not end a flight.
     let may_reset = board.task_has_failed() && !report.mode.armed();
     if report.health.rate.alive && !may_reset {
         board.feed_watchdog();

@@ -1,6 +1,6 @@
-//! Three interrupt executors, and the order of all interrupts.
+//! Three interrupt executors, and the priorities of all interrupts.
 //!
-//! The executors borrow the lines of CAN2, which this firmware leaves off.
+//! The executors use the interrupt lines of CAN2, which this firmware does not need.
 
 use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::scb::{SystemHandler, VectActive};
@@ -8,12 +8,12 @@ use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 
-/// Of each interrupt; a lower number preempts a higher one. The chip has sixteen.
+/// Interrupt priorities; lower numbers preempt higher ones. The chip has sixteen.
 pub mod priority {
     use super::Priority;
     /// SysTick: [`crate::time`].
     pub const TIME: Priority = Priority::P1;
-    /// USART1's bytes.
+    /// Bytes of USART1.
     pub const UART: Priority = Priority::P2;
     /// [`crate::control`].
     pub const CONTROL: Priority = Priority::P4;
@@ -29,7 +29,7 @@ static CONTROL: InterruptExecutor = InterruptExecutor::new();
 static COMMS: InterruptExecutor = InterruptExecutor::new();
 static HOUSEKEEPING: InterruptExecutor = InterruptExecutor::new();
 
-/// True in a task that is not needed to fly, and in what it calls: the link's, housekeeping.
+/// True in a task that is not needed in flight: the link's, and housekeeping.
 pub fn in_dispensable_task() -> bool {
     let dispensable = [interrupt::CAN2_RX0, interrupt::CAN2_RX1];
     match SCB::vect_active() {
@@ -38,7 +38,7 @@ pub fn in_dispensable_task() -> bool {
     }
 }
 
-/// Where to spawn tasks.
+/// Spawners of the executors.
 #[expect(missing_docs, reason = "named after the module whose tasks each takes")]
 pub struct Executors {
     pub control: SendSpawner,

@@ -1,4 +1,4 @@
-//! What nobody waits for: logging, and a watch on the stack.
+//! Low-priority work: logging, and monitoring of the stack.
 
 use crate::{comms, control};
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -6,12 +6,12 @@ use cortex_m_rt::STACK_PAINT_VALUE;
 use embassy_executor::SendSpawner;
 use embassy_time::{Instant, Timer};
 
-/// How often \[us\].
+/// Period \[us\].
 const EVERY_US: u64 = 1_000_000;
 
 static STACK_BYTES: AtomicU32 = AtomicU32::new(0);
 
-/// Most stack ever used, all interrupts included, as of the last look a second ago at most \[bytes\].
+/// Returns the largest stack depth so far, all interrupts included, as of at most a second ago \[bytes\].
 pub fn stack_bytes() -> u32 {
     STACK_BYTES.load(Ordering::Relaxed)
 }
@@ -24,7 +24,7 @@ pub fn spawn(spawner: SendSpawner) {
 #[embassy_executor::task]
 async fn task() {
     loop {
-        // Without the checks for an overflow that would panic in 585,000 years.
+        // Wrapping, without a check for an overflow after 585,000 years that could panic.
         Timer::at(Instant::from_micros(Instant::now().as_micros().wrapping_add(EVERY_US))).await;
         STACK_BYTES.store(deepest_stack(), Ordering::Relaxed);
         let [last, longest] = control::cycles();
@@ -38,7 +38,7 @@ async fn task() {
     }
 }
 
-/// Bytes of the stack that no longer hold the paint that start-up left there.
+/// Returns how many bytes of the stack no longer hold the paint of start-up.
 #[expect(unsafe_code, reason = "the stack's bounds are linker symbols, and its unused part belongs to no object")]
 #[inline(never)]
 fn deepest_stack() -> u32 {

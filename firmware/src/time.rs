@@ -1,7 +1,7 @@
-//! Time base: embassy-time on SysTick, the one timer of the core that silicon and emulator share.
+//! Time base: embassy-time on SysTick, the one timer that silicon and emulator share.
 //!
-//! Its period of 1 ms is the control period; the counter within it gives the time to 1 us, and times the control tick
-//! in core cycles. Alarms have the resolution of the period.
+//! Its period of 1 ms is the control period. The counter within it resolves 1 us, and measures the control tick in core
+//! cycles. Alarms have the resolution of the period.
 
 use core::cell::{Cell, RefCell};
 use core::task::Waker;
@@ -26,17 +26,18 @@ struct SysTickDriver {
     alarms: Mutex<RefCell<[Option<Alarm>; ALARMS]>>,
 }
 
-/// Tasks that may wait for a time at once; four do. Any more are woken at once, and ask again.
+/// Number of tasks that can wait at the same time; four do. Further ones are woken at once and wait again.
 const ALARMS: usize = 8;
 
-/// A task that waits for a time.
+/// A task waiting for a time.
 struct Alarm {
     at_us: u64,
     waker: Waker,
 }
 
 impl SysTickDriver {
-    /// Nobody else has borrowed them while interrupts are off; and nothing here may panic, since nothing flies without it.
+    /// Calls `change` with the alarms. They are not borrowed elsewhere while interrupts are off, and nothing here may
+    /// panic, since nothing flies without it.
     fn with_alarms(&self, cs: CriticalSection, change: impl FnOnce(&mut [Option<Alarm>; ALARMS])) {
         if let Ok(mut alarms) = self.alarms.borrow(cs).try_borrow_mut() {
             change(&mut alarms);
@@ -49,7 +50,7 @@ embassy_time_driver::time_driver_impl!(static DRIVER: SysTickDriver = SysTickDri
     alarms: Mutex::new(RefCell::new([const { None }; ALARMS])),
 });
 
-/// Starts the time base, whose interrupt must have its priority by then. The core must run at [`CORE_HZ`].
+/// Starts the time base, whose interrupt priority must be set before. The core must run at [`CORE_HZ`].
 pub fn start(mut syst: SYST) {
     syst.set_clock_source(SystClkSource::Core);
     syst.set_reload(CYCLES_PER_TICK - 1);
@@ -58,7 +59,7 @@ pub fn start(mut syst: SYST) {
     syst.enable_counter();
 }
 
-/// When the next control period begins.
+/// Returns the start of the next control period.
 pub fn next_period() -> Instant {
     let period_us = critical_section::with(|cs| {
         let period_us = DRIVER.period_us.borrow(cs).get();
@@ -67,17 +68,17 @@ pub fn next_period() -> Instant {
     Instant::from_micros(period_us + US_PER_TICK)
 }
 
-/// A stopwatch in core cycles, for what takes less than one period.
+/// A stopwatch in core cycles, for durations of less than one period.
 #[derive(Clone, Copy)]
 pub struct Stopwatch(u32);
 
 impl Stopwatch {
-    /// Starts now.
+    /// Starts it.
     pub fn start() -> Self {
         Stopwatch(SYST::get_current())
     }
 
-    /// Core cycles since the start; under emulation with counted instructions, 1.344 an instruction.
+    /// Returns the core cycles since the start; under emulation, 1.344 per instruction.
     pub fn cycles(&self) -> u32 {
         // SysTick counts down and wraps from 0 to its reload value.
         let (start, now) = (self.0, SYST::get_current());
@@ -91,7 +92,7 @@ impl Driver for SysTickDriver {
             let mut period_us = self.period_us.borrow(cs).get();
             let mut left = SYST::get_current();
             if SCB::is_pendst_pending() {
-                // The period ended and its interrupt has yet to run; `left` may be from either side of that end.
+                // The period has ended, but its interrupt has not run yet; `left` may be from before or after the end.
                 period_us += US_PER_TICK;
                 left = SYST::get_current();
             }

@@ -1,7 +1,6 @@
-//! The link's decoders on arbitrary bytes, whole and in pieces: nothing panics, both ways deliver the same messages, every
-//! byte is accounted for, what was delivered is read back from its own frame, and no payload makes an implausible state.
-//! What is delivered, of arbitrary bytes and of frames within frames, is what a parser says that shares no code with the
-//! decoder.
+//! The link's decoders on arbitrary bytes, whole and in pieces: they do not panic, both ways deliver the same messages,
+//! every byte is counted, delivered messages are read back from their own frames, and no payload gives an implausible
+//! state. For arbitrary bytes and for frames within frames, they deliver the same as an independent reference.
 #![no_main]
 
 #[path = "../../crates/link/tests/reference/mod.rs"]
@@ -23,7 +22,7 @@ fn decode<'a, M: Message>(pieces: impl Iterator<Item = &'a [u8]>) -> (Vec<M>, Co
 
 fn check<M: Message + core::fmt::Debug>(bytes: &[u8]) {
     let (messages, counters) = decode::<M>(core::iter::once(bytes));
-    // As text: a NaN in telemetry is not equal to itself.
+    // As text, since a NaN in telemetry is not equal to itself.
     let whole = format!("{messages:?}");
     assert_eq!((whole, counters), {
         let (messages, counters) = decode::<M>(bytes.chunks(1));
@@ -43,7 +42,7 @@ fn seed(id: u32) -> Option<u8> {
     Some(MavMessage::extra_crc(id)).filter(|&seed| seed != 0 || id == 395)
 }
 
-/// The decoder delivers what the reference does.
+/// Checks that the decoder delivers the same as the reference.
 fn check_against_reference(stream: &[u8]) {
     let frames = reference::frames(stream, seed).into_iter();
     let expected: Vec<_> = frames
@@ -54,8 +53,8 @@ fn check_against_reference(stream: &[u8]) {
     assert_eq!(decode::<Uplink>(core::iter::once(stream)).0, expected);
 }
 
-/// A stream of frames with the right checksums, made of `bytes`: what kind, flags, how long, what for, payload. What for
-/// is to be sent, to be sent without its last byte, or to become the beginning of the next one's payload.
+/// Returns a stream of frames with the right checksums made of `bytes`: kind, flags, length, use, payload. A frame is
+/// sent, sent without its last byte, or becomes the beginning of the next one's payload.
 fn nested(mut bytes: &[u8]) -> Vec<u8> {
     const IDS: [u32; 10] = [0, 76, 84, 331, 385, 110, 120, 395, 42_000, 0xFF_FFFF];
     let (mut stream, mut carried) = (Vec::new(), Vec::new());
@@ -76,7 +75,7 @@ fn nested(mut bytes: &[u8]) -> Vec<u8> {
     stream
 }
 
-/// Payloads that arrived intact, of every message: what is read is safe to fly on.
+/// Checks that any payload that arrives intact gives a message that is safe to fly on.
 fn check_payload<M: Message>(payload: &[u8], flyable: impl Fn(&M) -> bool) {
     for id in 0..400 {
         if let Ok(message) = M::read(id, payload, VEHICLE) {

@@ -1,9 +1,9 @@
 //! Time of one step of each part, and closed-loop steps per second on one core.
 //!
-//! `cargo bench -p sitl`. Each single step cycles through what it meets in the paper's flight, so that no branch or
-//! exponential is always the same. The closed loop is a whole flight of 60 s at 1 kHz: reference, AFBC, rigid body by
-//! Runge-Kutta, gusts and parameter changes, nothing logged; items are steps.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a scenario that cannot be flown must stop the bench
+//! `cargo bench -p sitl`. Each single step cycles through inputs of the paper's flight, so that branches and
+//! exponentials vary. The closed loop is a whole flight of 60 s at 1 kHz: reference, AFBC, rigid body by Runge-Kutta,
+//! gusts and parameter changes, without a log; items are steps.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a failed scenario must stop it
 
 use afbc::{Adaptive, Backstepping, Controller, Profile};
 use afbc_control::{FlightController, Screened};
@@ -29,7 +29,7 @@ fn paper(model: Model) -> Scenario {
     scenario(model, Case::DEFAULT).unwrap()
 }
 
-/// What a controller is given, and what it commands, at every 60th step of the paper's flight.
+/// Inputs and outputs of a controller at every 60th step of the paper's flight.
 fn recorded(model: Model, kind: ControllerKind) -> Vec<(State, Setpoint, RotorSpeeds)> {
     let (mut steps, mut index) = (Vec::new(), 0_usize);
     fly(&paper(model), &Contender::of(kind, Profile::Paper), |sample| {
@@ -124,8 +124,8 @@ fn closed_loop_afbc_simplified(bencher: Bencher) {
     closed_loop(bencher, &paper(Model::Simplified), afbc(Profile::Paper));
 }
 
-/// The paper's flight with everything that a campaign adds: lag, limits and delay of the rotors, drag, wind, turbulence,
-/// noise, bias and delay of the measurements.
+/// The paper's flight with everything that a campaign adds: rotor lag, limits and delay, drag, wind, turbulence,
+/// measurement noise, bias and delay.
 fn real() -> Scenario {
     let rotors = Rotors { time_constant_s: 0.02, max_rad_s: 317.0, delay_s: 0.001, ..Rotors::default() };
     let wind =
@@ -143,7 +143,7 @@ fn closed_loop_afbc_real(bencher: Bencher) {
     closed_loop(bencher, &real(), afbc(Profile::Flight));
 }
 
-/// One flight of the built-in campaign under every contender, as it is flown: items are flights of one contender.
+/// One flight of a built-in campaign under every contender; items are flights of one contender.
 #[divan::bench]
 fn campaign_flight(bencher: Bencher) {
     let campaign = afbc_campaign::built_in("robustness").unwrap().read().unwrap();

@@ -1,8 +1,8 @@
-//! Flies the adaptive fuzzy backstepping controller and its baseline in software, from the command line.
+//! Command line of the simulator.
 //!
-//! Exit codes: 0, all went as it should; 1, a vehicle was lost that should not have been; 2, nothing was flown or its
-//! results could not be written, and one line on stderr says why; 130, it was interrupted: nothing was written, or
-//! what a campaign has flown is kept; one line says which.
+//! Exit codes: 0 for success; 1 if a vehicle was lost unexpectedly; 2 if nothing was flown or the results could not be
+//! written, with one line on stderr; 130 if interrupted, with one line that says whether nothing was written or a
+//! campaign's finished flights are kept.
 
 mod cli;
 mod serial;

@@ -1,4 +1,4 @@
-//! A board at the end of a serial port.
+//! A board connected to a serial port.
 
 use afbc_link::Command;
 use afbc_sim::in_the_loop::{Autopilot, Error, Station};
@@ -7,19 +7,19 @@ use std::io;
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// One exchange.
+/// Duration of one exchange.
 const PERIOD: Duration = Duration::from_millis(1);
-/// Longest wait between two looks at what has arrived.
+/// Longest wait between two reads.
 const NAP: Duration = Duration::from_micros(200);
-/// How long the port may take to accept what is written.
+/// Longest time for the port to accept what is written.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(200);
-/// How often a vehicle that is left is told to disarm: one frame may get lost.
+/// Number of disarm commands at the end, since one frame may get lost.
 const FAREWELLS: usize = 3;
 
-/// A board, in real time. Dropping it disarms the vehicle, whatever has happened.
+/// A board, in real time. Dropping it disarms the vehicle in any case.
 pub(crate) struct Serial {
     port: Box<dyn SerialPort>,
-    /// When the millisecond under way is over.
+    /// End of the present millisecond.
     deadline: Option<Instant>,
     late_max: Duration,
 }
@@ -28,22 +28,22 @@ impl Serial {
     /// Opens the port `device` at `baud`, 8N1.
     ///
     /// # Errors
-    /// One line for people.
+    /// A message for the user.
     pub(crate) fn open(device: &str, baud: u32) -> Result<Self, String> {
         Ok(Serial::new(serialport::new(device, baud).timeout(WRITE_TIMEOUT).open().map_err(no_port)?))
     }
 
-    /// Takes a port that is open.
+    /// Uses a port that is already open.
     pub(crate) fn new(port: Box<dyn SerialPort>) -> Self {
         Serial { port, deadline: None, late_max: Duration::ZERO }
     }
 
-    /// The longest that this side was behind real time: states are late by as much.
+    /// Returns the largest delay of this side behind real time, by which states are late.
     pub(crate) fn late_max(&self) -> Duration {
         self.late_max
     }
 
-    /// Gives `hear` what arrives until `deadline`.
+    /// Passes received bytes to `hear` until `deadline`.
     fn listen(&mut self, deadline: Instant, hear: &mut dyn FnMut(&[u8])) -> io::Result<()> {
         let mut buffer = [0; 4096];
         loop {
@@ -65,7 +65,7 @@ impl Autopilot for Serial {
         let deadline = *self.deadline.get_or_insert_with(Instant::now);
         self.listen(deadline, hear).map_err(failed)?;
         self.late_max = self.late_max.max(deadline.elapsed());
-        // From deadline to deadline, so that a delay is caught up with.
+        // From deadline to deadline, so that delays are caught up with.
         self.deadline = Some(deadline + PERIOD);
         self.port.write_all(uplink).map_err(failed)
     }
@@ -75,31 +75,31 @@ impl Drop for Serial {
     fn drop(&mut self) {
         let mut station = Station::new();
         (0..FAREWELLS).for_each(|_| station.command(Command::Kill));
-        // There is nobody left to tell if this fails; the vehicle comes down by itself once no more states come.
+        // A failure cannot be reported any more; without states the vehicle descends by itself.
         let _ = self.port.write_all(&station.take());
         let _ = self.port.flush();
     }
 }
 
-/// The names of all serial ports.
+/// Returns the names of all serial ports.
 ///
 /// # Errors
-/// One line for people.
+/// A message for the user.
 pub(crate) fn ports() -> Result<Vec<String>, String> {
     let ports = serialport::available_ports().map_err(no_port)?;
     Ok(ports.into_iter().map(|port| port.port_name).collect())
 }
 
 fn no_port(error: serialport::Error) -> String {
-    format!("the serial port cannot be opened ({error}); `sitl hitl --list` shows those there are")
+    format!("the serial port cannot be opened ({error}); `sitl hitl --list` shows the ports")
 }
 
 fn failed(error: io::Error) -> Error {
     Error::Autopilot(format!("the serial port failed ({error}); check the cable").into())
 }
 
-/// A pseudo-terminal is a serial port without a wire. Its other end ticks once for each millisecond that [`Serial`] waits,
-/// so that a busy machine slows both down and disturbs neither.
+/// Tests over a pseudo-terminal. Its other end ticks once for each millisecond that [`Serial`] waits, so a busy machine
+/// slows both down without an effect.
 #[cfg(all(test, unix))]
 #[allow(clippy::unwrap_used, reason = "tests")]
 mod tests {
@@ -118,7 +118,8 @@ mod tests {
     struct Board {
         host: Host,
         port: TTYPort,
-        /// A pseudo-terminal ends with the last program that uses it, and what is in it is lost; a wire does not.
+        /// Keeps the pseudo-terminal open: otherwise it ends, with unread bytes, when the other side closes it; a wire
+        /// does not.
         _wire: TTYPort,
         armed: bool,
     }
@@ -130,7 +131,7 @@ mod tests {
     }
 
     impl Board {
-        /// The board, and the port that leads to it.
+        /// Creates the board and the port connected to it.
         fn new() -> (Self, Serial) {
             let (here, there) = TTYPort::pair().unwrap();
             let wire = there.try_clone_native().unwrap();
@@ -196,8 +197,8 @@ mod tests {
         let Wired { serial, board } = wired;
         assert!(board.armed);
         drop(serial);
-        // A tick for each piece of what is left on the wire, however long that takes to come: far fewer than the 2250 after
-        // which it would give up by itself.
+        // A tick for each read of what remains on the wire: far fewer than the 2250 after which the board would disarm
+        // by itself.
         let start = std::time::Instant::now();
         let mut ticks = 0;
         while board.armed && ticks < 200 {

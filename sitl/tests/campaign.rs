@@ -1,4 +1,4 @@
-//! `sitl campaign`, `merge` and `campaigns`, from outside.
+//! Runs `sitl campaign`, `merge` and `campaigns`.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -9,7 +9,7 @@ use std::process::{Command, Output};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// A folder for each test, empty at first.
+/// An empty folder for each test.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("campaign").join(test);
     if folder.exists() {
@@ -19,7 +19,7 @@ fn folder(test: &str) -> PathBuf {
     folder
 }
 
-/// Short flights of two contenders on two courses, some of which are lost.
+/// Short flights of two contenders on two courses, some of them lost.
 const SMALL: &str = r#"
 name = "small"
 flights = 150
@@ -41,7 +41,7 @@ fn parse(text: &str) -> Campaign {
     campaign::parse("small.toml", text, "small", Path::new("")).unwrap()
 }
 
-/// Flies all that `folder` lacks on `threads` cores.
+/// Flies everything missing in `folder` on `threads` cores.
 fn fly(campaign: &Campaign, path: &Path, shard: Shard, threads: usize) {
     let folder = Folder::open(path, Manifest::new(campaign, shard), false).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -58,13 +58,13 @@ fn sitl(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_sitl")).current_dir(folder).args(arguments).output().unwrap()
 }
 
-/// What goes wrong: the line and key, and what is said.
+/// A mistake: text, its replacement, and the error's line, key and message.
 const BAD: [(&str, &str, &str); 22] = [
     ("flights = 150", "flights = 0", ":3: flights: 0 is out of range: it must lie within 1 to 1e7"),
     ("flights = 150", "flights = 1.5", ":3: flights: 1.5 is not a whole number"),
     ("flights = 150", "flight = 150", ":3: flight: unknown key; did you mean flights?"),
     ("seed = 7", "seed = -1", ":4: seed: -1 is out of range"),
-    // Not rounded to the nearest that a float can hold, which is the largest seed or one more.
+    // Not rounded to the nearest float, which is the largest seed or one more.
     ("seed = 7", "seed = 9007199254740992", ":4: seed: 9007199254740992 is out of range: it must lie within 0 to 9.0"),
     ("seed = 7", "seed = 9007199254740993", ":4: seed: 9007199254740993 is out of range"),
     ("seed = 7", "seed = 0x20000000000000", ":4: seed: 0x20000000000000 is out of range"),
@@ -85,7 +85,7 @@ const BAD: [(&str, &str, &str); 22] = [
     ("mass_ratio", "mas_ratio", ":10: spread.mas_ratio: unknown key; did you mean mass_ratio?"),
     ("[0.7, 1.3]", "[1.3, 0.7]", ":10: spread.mass_ratio: 1.3 is above 0.7; write the smaller end first"),
     ("[0.7, 1.3]", "[0.7, 130]", ":10: spread.mass_ratio: 130 is out of range: it must lie within 0.01 to 100"),
-    ("rotor_efficiency = [0.0, 1.0]\n", "", "spread.fault_rotor: it does nothing without rotor_efficiency"),
+    ("rotor_efficiency = [0.0, 1.0]\n", "", "spread.fault_rotor: it has no effect without rotor_efficiency"),
     ("[1, 4]", "[1.5, 4]", "spread.fault_rotor: only whole numbers are drawn"),
 ];
 
@@ -124,9 +124,9 @@ fn a_bad_file_gets_one_line() {
     }
 }
 
-/// Of many parts, all are needed at once, and the system gives a program few files at once.
+/// Merging needs all parts at once, but the system limits the number of open files.
 #[test]
-fn more_parts_than_open_files_come_together() {
+fn more_parts_than_open_files_are_merged() {
     let (folder, campaign) = (folder("many-parts"), parse(&SMALL.replace("= 150", "= 60").replace("= 6.0", "= 0.2")));
     fly(&campaign, &folder.join("whole"), Shard::WHOLE, 2);
     (1..=60).for_each(|index| fly(&campaign, &folder.join(format!("part-{index}")), Shard { index, of: 60 }, 1));
@@ -136,9 +136,10 @@ fn more_parts_than_open_files_come_together() {
     assert_eq!(results_of(&folder.join("whole")), results_of(&folder.join("merged")));
 }
 
-/// Before the first flight is over, and in the middle of it: none of these would end before the test's patience does.
+/// A signal before the end of the first flight, and in the middle of the campaign: neither would end by itself within
+/// the test.
 #[test]
-fn a_signal_stops_it_whatever_it_is_at() {
+fn a_signal_stops_it_at_any_time() {
     let folder = folder("signals");
     let text =
         SMALL.replace("flights = 150", "flights = 10000000").replace("= 6.0", "= 36000").replace("0.2, 1.2", "1, 1");
@@ -149,7 +150,7 @@ fn a_signal_stops_it_whatever_it_is_at() {
         let mut child = Command::new(env!("CARGO_BIN_EXE_sitl"));
         child.current_dir(&folder).args(["campaign", "long.toml", "--out"]).arg(&out);
         let child = child.stderr(std::process::Stdio::piped()).spawn().unwrap();
-        // From here on it listens.
+        // From here on it handles signals.
         while !out.join("campaign.json").exists() {
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -157,26 +158,26 @@ fn a_signal_stops_it_whatever_it_is_at() {
         let output = child.wait_with_output().unwrap();
         let error = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(130), "{error}");
-        assert!(error.contains("the same command goes on from there"), "{error}");
+        assert!(error.contains("the same command resumes"), "{error}");
         assert!(!out.join("results.parquet").exists());
     }
 }
 
 #[test]
-fn no_more_threads_than_help() {
+fn no_more_threads_than_useful() {
     let folder = folder("many-threads");
     fs::write(folder.join("few.toml"), SMALL.replace("150", "4").replace("= 6.0", "= 0.2")).unwrap();
     let cores = std::thread::available_parallelism().unwrap().get();
     let output = sitl(&folder, &["campaign", "few.toml", "--threads", "8000", "--out", "many"]);
     let error = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(0), "{error}");
-    assert!(error.contains(&format!("--threads 8000: flying on {}, for there are", cores.min(4))), "{error}");
+    assert!(error.contains(&format!("--threads 8000: flying on {}, since there are", cores.min(4))), "{error}");
     let output = sitl(&folder, &["campaign", "few.toml", "--threads", "1", "--out", "one"]);
     assert!(!String::from_utf8(output.stderr).unwrap().contains("--threads"));
     assert_eq!(results_of(&folder.join("many")), results_of(&folder.join("one")));
 }
 
-/// Errors count from 5 s on: before, there are none, and nothing takes their place.
+/// Errors are evaluated from 5 s on; shorter flights have none, as null rather than NaN.
 #[test]
 fn short_campaigns_hold_no_nan() {
     let folder = folder("short");
@@ -203,7 +204,7 @@ fn short_campaigns_hold_no_nan() {
     }
 }
 
-/// The whole way of a user: a run that is killed outright, the same command again, one flight flown again.
+/// A program is killed, the same command resumes, and one flight is flown again.
 #[test]
 fn a_killed_program_loses_nothing_that_was_finished() {
     let folder = folder("killed");
@@ -227,7 +228,7 @@ fn a_killed_program_loses_nothing_that_was_finished() {
         if !out.join("results.parquet").exists() {
             break;
         }
-        // On a busy machine it may be at its end before it is looked at again.
+        // On a busy machine it may finish before it is killed.
         fs::remove_dir_all(&out).unwrap();
     }
     let kept = chunks();

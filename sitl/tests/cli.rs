@@ -1,4 +1,4 @@
-//! The command line, from outside: what it refuses, what it writes, how it ends.
+//! The command line: what it refuses, what it writes, how it ends.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-/// An empty folder of its own for each test.
+/// An empty folder for each test.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cli").join(test);
     if folder.exists() {
@@ -40,7 +40,7 @@ fn stdout(output: &Output) -> String {
     String::from_utf8(output.stdout.clone()).unwrap()
 }
 
-/// Every file under `folder`, by path.
+/// Returns every file under `folder`, by path.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -54,10 +54,10 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// Three lines; what follows begins at line 4.
+/// Three lines; text after it begins at line 4.
 const HOVER: &str = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
 
-/// Files after [`HOVER`], and what is said of them.
+/// Text after [`HOVER`], and the error.
 const BAD_TABLES: [(&str, &str); 68] = [
     ("[[outage]]\nstart_s = -1", ":5: outage.start_s: -1 is out of range: it must lie within 0 to 36000 (seconds)"),
     ("[vehicle]\nmass_g = 486", ":5: vehicle.mass_g: unknown key; did you mean mass_kg (kilograms)?"),
@@ -135,7 +135,8 @@ const BAD_TABLES: [(&str, &str); 68] = [
     ("[[change]]\nparameter = \"mass\"\nstart_s = 1", ":4: change.factor: missing; add it"),
     (
         "[[change]]\nparameter = \"mass\"\nstart_s = 1\nfactor = 0.01",
-        ":7: change.factor: it makes mass_kg = 0.00486, out of range: it must lie within 0.01 to 500; change the factor",
+        ":7: change.factor: it makes mass_kg = 0.00486, out of range: it must lie within 0.01 to 500; \
+         change the factor",
     ),
     (
         "[[change]]\nparameter = \"mass\"\nstart_s = 1\nfactor = 100\n\
@@ -154,7 +155,8 @@ const BAD_TABLES: [(&str, &str); 68] = [
     ("[drag]\n[[wind.gust]]\nvelocity_m_s = [1, 0, 0]\nstart_s = 1", ":5: wind.gust.rise_s: missing; add it (seconds)"),
     (
         "[drag]\nblade_n_s2_m = 0.5",
-        ":5: drag.blade_n_s2_m: blade_n_s2_m = 0.5, out of range: it must lie within 0 to 0.0012034782790026014; change it",
+        ":5: drag.blade_n_s2_m: blade_n_s2_m = 0.5, out of range: it must lie within 0 to 0.0012034782790026014; \
+         change it",
     ),
     ("[drag]\narea_m2 = 1", ":5: drag.area_m2: it is a number and must be three numbers; write [x, y, z]"),
     (
@@ -189,7 +191,8 @@ const BAD_TABLES: [(&str, &str); 68] = [
     ),
     (
         "[[payload]]\nmass_kg = 499.9\nstart_s = 1",
-        ":5: payload.mass_kg: it makes mass_kg = 500.386, out of range: it must lie within 0.01 to 500; change the payload",
+        ":5: payload.mass_kg: it makes mass_kg = 500.386, out of range: it must lie within 0.01 to 500; \
+         change the payload",
     ),
     ("[sensors]\nnoise = 2", ":5: sensors.noise: 2 is out of range: it must lie within 0 to 1"),
     ("[sensors.noise]\nposition = 1", ":5: sensors.noise.position: unknown key; did you mean position_m (metres)?"),
@@ -243,7 +246,7 @@ const BAD_TABLES: [(&str, &str); 68] = [
     ("vehicle = 1", ":4: trajectory.vehicle: unknown key; known here: kind, position_m, yaw_rad"),
 ];
 
-/// Whole files, and what is said of them.
+/// Whole files, and the error.
 const BAD_FILES: [(&str, &str); 28] = [
     (
         "flight_core = true\n[trajectory]\nkind = \"paper\"\n[settings]\ndt_s = 0.002",
@@ -324,9 +327,9 @@ fn expand(message: &str) -> String {
         .replace("NAME", "it must be 1 to 64 letters, digits, '-' or '_', since file names come from it")
         .replace(
             "ALL",
-            "name, description, duration_s, seed, plant, vehicle, truth, controllers, profile, gains, settings, limits, monitor, \
-             contender, trajectory, initial, gust, change, payload, rotors, rotor_fault, battery, drag, wind, ground, \
-             sensors, outage, flight_core",
+            "name, description, duration_s, seed, plant, vehicle, truth, controllers, profile, gains, settings, \
+             limits, monitor, contender, trajectory, initial, gust, change, payload, rotors, rotor_fault, battery, \
+             drag, wind, ground, sensors, outage, flight_core",
         )
 }
 
@@ -443,7 +446,7 @@ fn a_lost_vehicle_ends_its_run_and_keeps_its_log() {
     let log = fs::read_to_string(folder.join("out/storm/storm-afbc.csv")).unwrap();
     assert!((200..900).contains(&log.lines().count()));
 
-    // The paper's reading that is known to lose the vehicle is no failure.
+    // The loss in the paper's reading `forces` is known and no failure.
     let output = sitl(&folder, &["--reading", "forces", "--log-hz", "10"]);
     assert_eq!((code(&output), stderr(&output)), (0, String::new()));
     assert!(stdout(&output).contains("lost at t = "));
@@ -478,7 +481,7 @@ fn two_runs_write_the_same_bytes() {
     assert!(a.len() > 2);
     assert!(a.values().eq(b.values()));
 
-    // The paper's flight is the same whether it comes from the file or from the code.
+    // The paper's flight is the same from its file and from the code.
     assert_eq!(code(&sitl(&folder, &["fly", "paper", "--out", "file"])), 0);
     assert_eq!(code(&sitl(&folder, &["paper", "--out", "code"])), 0);
     let log = |out: &str| fs::read(folder.join(out).join("paper-afbc.csv")).unwrap();
@@ -506,13 +509,13 @@ fn help_and_version_go_to_stdout() {
     }
 }
 
-/// Rows of a flight's log.
+/// Returns the number of rows of a flight's log.
 fn rows(log: &Path) -> usize {
     fs::read_to_string(log).unwrap().lines().count() - 1
 }
 
 #[test]
-fn a_long_flight_keeps_a_log_of_ordinary_size_unless_told_to_keep_more() {
+fn the_default_log_rate_is_reduced_for_a_long_flight() {
     let folder = folder("long");
     let log = folder.join("out/hover/hover-backstepping.csv");
     let fly = |arguments: &[&str]| {
@@ -523,7 +526,7 @@ fn a_long_flight_keeps_a_log_of_ordinary_size_unless_told_to_keep_more() {
     assert_eq!(fly(&["--duration", "600"]), (60_001, String::new()));
     let (rows, said) = fly(&["--duration", "1500"]);
     assert_eq!(rows, 1500 * 40 + 1);
-    assert!(said.starts_with("logs of 1500 s keep 40 rows a second; --log-hz 100 keeps more\n"), "{said}");
+    assert!(said.starts_with("logs of 1500 s keep 40 rows per second; --log-hz 100 keeps more\n"), "{said}");
     assert_eq!(fly(&["--duration", "601", "--log-hz", "100"]), (60_101, String::new()));
     assert_eq!(fly(&["--duration", "601", "--log-hz", "200"]), (120_201, String::new()));
 }

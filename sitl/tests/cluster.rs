@@ -1,4 +1,4 @@
-//! Campaigns on many machines, from outside: what a cluster's shell, log and disks see.
+//! Campaigns on a cluster: what its shell, logs and disks see.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// An empty folder of its own for each test.
+/// An empty folder for each test.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cluster").join(test);
     if folder.exists() {
@@ -20,13 +20,13 @@ fn sitl(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_sitl")).current_dir(folder).args(arguments).output().unwrap()
 }
 
-/// What is printed if all goes well.
+/// Returns the output of a successful command.
 fn succeeds(output: &Output) -> String {
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout.clone()).unwrap()
 }
 
-/// Short flights, some of which are lost.
+/// Short flights, some of them lost.
 const SHORT: &str = r#"
 name = "short"
 flights = 40
@@ -38,7 +38,7 @@ thrust_factor_ratio = [0.2, 1.2]
 rotor_time_constant_s = 0.02
 "#;
 
-/// Each machine has the campaign's file somewhere else, and under another name: the results are the same all the same.
+/// The results do not depend on the folder and name of the campaign's file.
 #[test]
 fn results_do_not_depend_on_where_the_file_is() {
     let folder = folder("paths");
@@ -51,7 +51,7 @@ fn results_do_not_depend_on_where_the_file_is() {
     let all: Vec<&str> = paths.into_iter().chain([absolute.as_str()]).collect();
     for (i, path) in all.iter().enumerate() {
         let table = succeeds(&sitl(&folder, &["campaign", path, "--out", &format!("whole-{i}")]));
-        // Who sits before the terminal can fly a flight again as it is printed.
+        // The terminal's table has a command that works from here.
         let quoted = if path.contains(' ') { format!("\"{path}\"") } else { (*path).to_owned() };
         assert!(table.contains(&format!("sitl campaign {quoted} --flight ")), "{table}");
     }
@@ -70,17 +70,17 @@ fn results_do_not_depend_on_where_the_file_is() {
     assert!(page.contains("sitl campaign short.toml --flight "));
 }
 
-/// The lines that a machine's log gets: one at the start, one for each tenth, each with what there is to know.
+/// The lines of a log: one at the start, and one for each tenth.
 fn lines(output: &Output) -> Vec<String> {
     String::from_utf8(output.stderr.clone()).unwrap().lines().map(str::to_owned).collect()
 }
 
-/// `RATE a TIME, N UNIT left`, all numbers whole and none of the waits nothing.
+/// True for `RATE per TIME, N UNIT left` with whole numbers and a wait above zero.
 fn is_rate_and_wait(text: &str) -> bool {
     let parts: Vec<_> = text.split(", ").collect();
     let [rate, wait] = parts.as_slice() else { return false };
     let whole = |number: &str| number.parse::<u64>().is_ok_and(|number| number > 0);
-    let rates = [" a second", " a minute", " an hour"];
+    let rates = [" per second", " per minute", " per hour"];
     let waits = [" s left", " min left", " h left"];
     rates.iter().any(|time| rate.strip_suffix(time).is_some_and(whole))
         && waits.iter().any(|unit| wait.strip_suffix(unit).is_some_and(whole))
@@ -105,11 +105,11 @@ fn a_log_without_a_terminal_shows_life() {
     }
     assert!(before >= 36, "{said:?}");
 
-    // What is there already is not flown again; nor is there anything to say of it.
+    // Finished flights are not flown again, and there is no progress.
     let again = sitl(&folder, &["campaign", "short.toml"]);
     assert!(lines(&again).iter().all(|line| line == "short: 40 of 40 flights"));
     assert_eq!(flown.stdout, again.stdout);
-    // The parts of it likewise, and whatever else takes its time.
+    // The same for a shard, and for other commands.
     let part = sitl(&folder, &["campaign", "short.toml", "--shard", "2/2"]);
     assert_eq!(lines(&part).first().unwrap(), "short: 0 of 20 flights");
     let compared = sitl(&folder, &["compare", "hover", "--seeds", "2", "--controllers", "pid"]);

@@ -1,4 +1,4 @@
-//! `sitl compare` and `sitl tune`, from outside.
+//! Runs `sitl compare` and `sitl tune`.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// An empty folder of its own for each test.
+/// An empty folder for each test.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("compare").join(test);
     if folder.exists() {
@@ -27,13 +27,13 @@ fn sitl(folder: &Path, arguments: &[&str]) -> Output {
     sitl_on("2", folder, arguments)
 }
 
-/// What is printed if all goes well.
+/// Returns the output of a successful command.
 fn succeeds(output: &Output) -> String {
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout.clone()).unwrap()
 }
 
-/// The one line that says why nothing was done.
+/// Returns the one line of an error.
 fn refused(output: &Output) -> String {
     assert_eq!(output.status.code(), Some(2));
     assert!(output.stdout.is_empty());
@@ -44,7 +44,7 @@ fn json(path: &Path) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
-/// A noisy circle of 8 s, and a PID that is far too soft.
+/// A noisy circle of 8 s, and a PID with much too low gains.
 const SOFT: &str = r#"
 name = "round"
 duration_s = 8.0
@@ -116,7 +116,7 @@ fn compares_over_seeds_alike_on_any_number_of_threads() {
     assert_eq!(rows.lines().count(), 1 + 2 * 2 * 3);
     let pid = &json(&folder.join("one/comparison.json"))[0]["contenders"][0];
     assert_eq!(pid["seeds"], serde_json::json!([0, 1, 2]));
-    // Another seed is another flight.
+    // Another seed gives another flight.
     assert!(pid["standard_deviation"]["rmse_x_m"].as_f64().unwrap() > 0.0);
 }
 
@@ -146,7 +146,7 @@ fn compare_refuses_what_it_cannot_fly() {
     assert!(!folder.join("out").exists());
 }
 
-/// The two costs in the first line of what `sitl tune` prints.
+/// The two costs in the first line of the output of `sitl tune`.
 fn costs(fragment: &str) -> [f64; 2] {
     let line = fragment.lines().next().unwrap();
     let after = |word: &str| line.split(word).nth(1).unwrap().split([',', ' ']).next().unwrap().parse().unwrap();
@@ -166,7 +166,7 @@ fn tune_improves_a_bad_start_alike_on_any_number_of_threads() {
     let [before, after] = costs(&fragment);
     assert!(after < 0.7 * before, "{before} to {after}");
 
-    // It goes into a scenario file as it is, and flies at the cost that it claims.
+    // The output is valid in a scenario file, and flies at the stated cost.
     fs::write(folder.join("tuned.toml"), format!("{SOFT}\n{fragment}")).unwrap();
     let again =
         succeeds(&sitl(&folder, &["tune", "soft-tuned", "--scenario", "tuned.toml", "--budget", "1", "--seed", "3"]));
@@ -204,7 +204,7 @@ fn tune_refuses_what_it_cannot_do() {
     refused(&sitl(&folder, &["tune", "pid", "--budget", "0"]));
 }
 
-/// The number of tries in the first line of what `sitl tune` prints.
+/// The number of tries in the first line of the output of `sitl tune`.
 fn tries(fragment: &str) -> &str {
     fragment.lines().next().unwrap().split("after ").nth(1).unwrap().split(' ').next().unwrap()
 }
@@ -212,7 +212,7 @@ fn tries(fragment: &str) -> &str {
 #[test]
 fn tune_tries_as_many_gains_as_it_was_told_to() {
     let folder = soft("budget");
-    // A generation of this PID's gains is some ten: below one, between two, and whole ones with what is left.
+    // A generation has some ten tries: budgets below one, between two, and of several with a remainder.
     for budget in ["1", "2", "9", "12", "13", "14", "40"] {
         let fragment = succeeds(&sitl(&folder, &["tune", "soft", "--scenario", "soft.toml", "--budget", budget]));
         assert_eq!(tries(&fragment), budget);

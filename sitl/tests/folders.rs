@@ -1,4 +1,4 @@
-//! Whose an output folder is: nothing that a command has not written is ever lost to it.
+//! Ownership of output folders: no command removes or replaces files that it has not written.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
@@ -8,7 +8,7 @@ use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// A folder for each test, with nothing but a scenario and a campaign in it.
+/// A folder for each test, with only a scenario and a campaign.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("folders").join(test);
     if folder.exists() {
@@ -29,7 +29,7 @@ fn sitl(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_sitl")).current_dir(folder).args(arguments).output().unwrap()
 }
 
-/// Every command that fills a folder, and the one that it counts as.
+/// Every command with an output folder, and the command recorded as its owner.
 const COMMANDS: [(&str, &[&str]); 6] = [
     ("paper", &["paper", "--duration", "0.5"]),
     ("fly", &["fly", "short.toml"]),
@@ -39,7 +39,7 @@ const COMMANDS: [(&str, &[&str]); 6] = [
     ("campaign", &["merge", "part-1", "part-2"]),
 ];
 
-/// What is in a folder: files with their bytes, links with where they lead, folders.
+/// Returns the content of a folder: files with their bytes, links with their targets, folders.
 fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -57,7 +57,7 @@ fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// Refused in one line that names the folder and the cures, and nothing in it has changed.
+/// Checks for an error of one line that names the folder and the remedies, with nothing changed.
 fn refused(folder: &Path, command: &[&str], out: &str, before: &BTreeMap<PathBuf, Vec<u8>>) {
     let output = sitl(folder, &[command, &["--out", out]].concat());
     let error = String::from_utf8(output.stderr).unwrap();
@@ -78,10 +78,10 @@ fn a_folder_of_one_command_is_refused_by_every_other() {
     for (number, (owner, command)) in COMMANDS.iter().enumerate() {
         let out = format!("own-{number}");
         let path = folder.join(&out);
-        // An empty one is anybody's.
+        // An empty folder can be used by any command.
         fs::create_dir(&path).unwrap();
         succeeds(&folder, command, &["--out", &out]);
-        // What others put there stays through everything.
+        // Files of others are never touched.
         fs::create_dir(path.join("mine")).unwrap();
         for name in ["notes.csv", "mine/figure.svg", "zzz.parquet"] {
             fs::write(path.join(name), name).unwrap();
@@ -91,7 +91,7 @@ fn a_folder_of_one_command_is_refused_by_every_other() {
         for (_, other) in COMMANDS.iter().filter(|(other, _)| other != owner) {
             refused(&folder, other, &out, &before);
         }
-        // By force, and then it is another's.
+        // With --force it becomes another command's.
         let (_, other) = COMMANDS.iter().find(|(other, _)| other != owner).unwrap();
         succeeds(&folder, other, &["--out", &out, "--force"]);
         refused(&folder, command, &out, &contents(&path));
@@ -103,7 +103,7 @@ fn a_folder_of_one_command_is_refused_by_every_other() {
     }
 }
 
-/// Puts something of somebody's into a folder.
+/// Puts a foreign file into a folder.
 type Make<'a> = &'a dyn Fn(&Path);
 
 #[test]
@@ -135,7 +135,7 @@ fn a_folder_of_nobody_is_refused_by_all() {
         }
     }
     let scenario = fs::read(folder.join("short.toml")).unwrap();
-    // Through a link to the folder too; and by force a link in it is replaced, not what it leads to.
+    // Through a link to the folder, too; --force replaces a link in it, not the link's target.
     symlink("notes", folder.join("linked")).unwrap();
     for (_, command) in COMMANDS {
         refused(&folder, command, "linked", &contents(&folder.join("linked")));
@@ -160,7 +160,7 @@ fn a_part_is_not_merged_into_itself() {
 }
 
 #[test]
-fn nothing_stale_stays_beside_a_new_report() {
+fn files_of_an_earlier_report_are_removed() {
     let folder = folder("stale");
     let csvs = |out: &str| {
         let names =

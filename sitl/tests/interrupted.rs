@@ -1,4 +1,4 @@
-//! Ctrl-C, from outside: commands that have nothing to show for half of their work end at once, with one line.
+//! Ctrl-C: commands without partial results end at once, with one line.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -7,7 +7,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// An empty folder of its own for each test.
+/// An empty folder for each test.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("interrupted").join(test);
     if folder.exists() {
@@ -17,7 +17,7 @@ fn folder(test: &str) -> PathBuf {
     folder
 }
 
-/// Ends `sitl` by `signal` once it has said on stderr that it flies; returns its exit code and the rest of what it said.
+/// Sends `signal` to `sitl` once it has reported progress on stderr; returns its exit code and the rest of stderr.
 fn interrupted(folder: &Path, arguments: &[&str], signal: &str) -> (Option<i32>, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sitl"));
     let command = command.current_dir(folder).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());

@@ -1,5 +1,5 @@
-//! What a program reads of `sitl`: JSON on stdout with the keys that docs/json.md lists, nothing else there; and what kind of
-//! file a file is.
+//! Output of `sitl` for programs: JSON on stdout with the keys of docs/json.md and nothing else; and recognition of
+//! scenario and campaign files.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
 
@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// An empty folder of its own for each test.
+/// An empty folder for each test.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("machine").join(test);
     if folder.exists() {
@@ -23,7 +23,7 @@ fn sitl(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_sitl")).current_dir(folder).args(arguments).output().unwrap()
 }
 
-/// What is printed if all goes well.
+/// Returns the output of a successful command.
 fn succeeds(folder: &Path, arguments: &[&str]) -> String {
     let output = sitl(folder, arguments);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -31,7 +31,7 @@ fn succeeds(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The one line that says why nothing was done.
+/// Returns the one line of an error.
 fn refused(folder: &Path, arguments: &[&str]) -> String {
     let output = sitl(folder, arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}");
@@ -43,7 +43,7 @@ fn refused(folder: &Path, arguments: &[&str]) -> String {
 
 const PAGE: &str = include_str!("../../docs/json.md");
 
-/// The keys in the tables of one section of the page.
+/// Returns the keys in the tables of one section of the page.
 fn documented(section: &str) -> BTreeSet<String> {
     let after = PAGE.split(&format!("\n## {section}\n")).nth(1).unwrap_or_else(|| panic!("no section {section}"));
     let rows = after.split("\n## ").next().unwrap().lines().filter(|line| line.starts_with("| `"));
@@ -56,7 +56,7 @@ fn keys(path: &str, value: &Value, found: &mut BTreeSet<String>) {
     match value {
         Value::Object(object) => {
             for (key, value) in object {
-                // Its keys are names.
+                // Keys of this object are names.
                 let key = if path.ends_with("by_trajectory") { "*" } else { key };
                 let dot = if path.is_empty() { "" } else { "." };
                 keys(&format!("{path}{dot}{key}"), value, found);
@@ -67,7 +67,7 @@ fn keys(path: &str, value: &Value, found: &mut BTreeSet<String>) {
     }
 }
 
-/// Every command of a section of the page prints what the section says; returns what the first printed.
+/// Checks that every command of a section prints the documented keys; returns the output of the first.
 fn prints(folder: &Path, section: &str, commands: &[&[&str]]) -> Value {
     let mut first = None;
     for command in commands {
@@ -117,7 +117,7 @@ fn lists_and_checks() {
 #[test]
 fn flights() {
     let folder = small("flights");
-    // Long enough for there to be figures.
+    // Long enough for all figures.
     let flown = prints(
         &folder,
         "Flights",
@@ -162,7 +162,7 @@ fn campaigns() {
 }
 
 #[test]
-fn errors_are_one_line_on_stderr_all_the_same() {
+fn errors_are_one_line_on_stderr_with_json_too() {
     let folder = small("errors");
     fs::write(folder.join("bad.toml"), SMALL.replace("flights = 20", "flights = 0")).unwrap();
     assert!(refused(&folder, &["check", "bad.toml", "--json"]).starts_with("bad.toml:3: flights: 0 is out of range"));
@@ -178,7 +178,7 @@ fn errors_are_one_line_on_stderr_all_the_same() {
 #[test]
 fn a_campaign_is_told_from_a_scenario() {
     let folder = small("kinds");
-    // A file without an ending, and one whose values are wrong, are of a kind all the same.
+    // The kind of a file is recognised without an extension, and with wrong values.
     fs::write(folder.join("plain"), SMALL).unwrap();
     fs::write(folder.join("bad.toml"), SMALL.replace("[0.6, 1.2]", "[6.0, 120]")).unwrap();
     fs::write(folder.join("bad-flight.toml"), "plant = 1\n[trajectory]\nkind = \"paper\"\n").unwrap();

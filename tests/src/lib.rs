@@ -1,12 +1,18 @@
-//! What the tests of the whole share: reading the golden tables.
+//! Golden tables shared by the workspace's tests.
 //!
-//! `golden/*.csv` come from an independent simulation of the paper in `f64`. Header names carry the unit where it is not
+//! `golden/*.csv` come from an independent simulation of the paper in `f64`. Headers include the unit where it is not
 //! plain SI. Rules are ordered with the first input outermost.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)] // a broken table must stop the test
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    reason = "a broken table must stop the test"
+)]
 
 use std::path::Path;
 
-/// Rows in every file of single-equation data. A test that names it cannot pass on a file that lost its rows.
+/// Rows in every file of single-equation data, so that a truncated file makes tests fail.
 pub const ROWS: usize = 200;
 
 /// A table of `golden/`, by column name.
@@ -24,10 +30,10 @@ pub struct Row<'a> {
     index: usize,
 }
 
-/// Reads `golden/{name}.csv`.
+/// Reads the table `golden/{name}.csv`.
 ///
 /// # Panics
-/// If there is no such file, or a row is not as long as the header.
+/// If there is no such file, or a row has another length than the header.
 pub fn golden(name: &str) -> Table {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden").join(format!("{name}.csv"));
     let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
@@ -41,14 +47,14 @@ pub fn golden(name: &str) -> Table {
 }
 
 impl Table {
-    /// Every row, in order.
+    /// Returns every row, in order.
     pub fn rows(&self) -> impl ExactSizeIterator<Item = Row<'_>> {
         (0..self.rows.len()).map(|index| Row { table: self, index })
     }
 }
 
 impl Row<'_> {
-    /// The text of a column.
+    /// Returns the text in a column.
     ///
     /// # Panics
     /// If there is no such column.
@@ -58,16 +64,16 @@ impl Row<'_> {
         &rows[self.index][at]
     }
 
-    /// The number in a column.
+    /// Returns the number in a column.
     ///
     /// # Panics
-    /// If there is no such column, or no number in it.
+    /// If there is no such column, or it holds no number.
     pub fn get(&self, column: &str) -> f64 {
         let text = self.text(column);
         text.parse().unwrap_or_else(|_| panic!("{}.csv, row {}: {column} = {text}", self.table.name, self.index))
     }
 
-    /// The numbers in several columns.
+    /// Returns the numbers in several columns.
     ///
     /// # Panics
     /// As [`Row::get`].
@@ -75,7 +81,7 @@ impl Row<'_> {
         columns.map(|column| self.get(column))
     }
 
-    /// The numbers in `{prefix}1` to `{prefix}9`.
+    /// Returns the numbers in `{prefix}1` to `{prefix}9`.
     ///
     /// # Panics
     /// As [`Row::get`].
@@ -83,13 +89,13 @@ impl Row<'_> {
         core::array::from_fn(|i| self.get(&format!("{prefix}{}", i + 1)))
     }
 
-    /// Where this row is, for a message.
+    /// Returns file and row number, for messages.
     pub fn place(&self) -> String {
         format!("{}.csv, row {}", self.table.name, self.index)
     }
 }
 
-/// The code in the README.
+/// The README, whose code is compiled as a documentation test.
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]
 pub struct Readme;

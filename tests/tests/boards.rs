@@ -1,4 +1,4 @@
-//! The firmware and its boards meet in one place, and the wiring that is written down is the one that is built.
+//! Firmware and boards meet in one place, and the documented wiring is that of the code.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a file that cannot be read must stop the test
 
 use std::collections::BTreeSet;
@@ -9,7 +9,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// Every Rust file below `folder`, with its text.
+/// Returns every Rust file below `folder`, with its text.
 fn sources(folder: &Path) -> Vec<(PathBuf, String)> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -23,7 +23,7 @@ fn sources(folder: &Path) -> Vec<(PathBuf, String)> {
     found
 }
 
-/// Names of pins in `text`: P, a port, a number.
+/// Returns the names of pins in `text`: P, a port, a number.
 fn pins(text: &str) -> BTreeSet<String> {
     let words = text.split(|c: char| !c.is_ascii_alphanumeric());
     let is_pin = |word: &&str| {
@@ -52,7 +52,7 @@ fn every_board_is_a_folder_and_meets_the_firmware_once() {
     }
 }
 
-/// No file is put in another's place, and no board is chosen, by conditional compilation.
+/// No board is selected by `#[path]` or conditional compilation.
 #[test]
 fn the_firmware_knows_no_board() {
     let firmware = sources(&root().join("firmware"));
@@ -79,7 +79,7 @@ fn the_wiring_is_what_the_board_uses() {
     let code = fs::read_to_string(root().join("boards/stm32f405/src/board.rs")).unwrap();
     let (head, body) = code.split_once("\nuse ").unwrap();
     assert_eq!(pins(body).len(), 6, "{:?}", pins(body));
-    // The crystal's and the debugger's are the chip's own.
+    // Those of crystal and debugger are fixed by the chip.
     let fixed = ["PH0", "PH1", "PA13", "PA14"].map(str::to_owned).into();
     assert_eq!(&pins(table) - &fixed, pins(body), "docs/firmware.md");
     assert_eq!(&pins(head) - &fixed, pins(body), "the board's own table");

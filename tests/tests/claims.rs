@@ -1,5 +1,10 @@
-//! The paper's three claims, from flights, in all four signs of the uncertainty and on both models of the vehicle.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a scenario that cannot be flown must stop the test
+//! The paper's three claims, checked by flights with all four signs of the uncertainty and both models of the vehicle.
+#![allow(
+    clippy::indexing_slicing,
+    clippy::unwrap_used,
+    missing_docs,
+    reason = "a scenario that cannot be flown must stop the test"
+)]
 
 use afbc_plant::{Environment, Gust, GustKind, Model, Motion};
 use afbc_report::claims::VANISHED;
@@ -20,7 +25,7 @@ fn fly_both(scenario: &Scenario) -> Vec<Flown> {
     scenario.contenders.iter().map(fly).collect()
 }
 
-/// Every default reading: four signs, two models.
+/// Returns every default reading: four signs, two models.
 fn readings() -> impl Iterator<Item = Scenario> {
     Uncertainty::ALL.into_iter().flat_map(|uncertainty| {
         [Model::Simplified, Model::RigidBody].map(move |model| {
@@ -33,7 +38,7 @@ fn below(a: Vector4<f64>, b: Vector4<f64>) -> bool {
     a.iter().zip(b.iter()).all(|(a, b)| a < b)
 }
 
-/// Mean and largest size of the error over the last 5 s.
+/// Returns mean and largest |error| over the last 5 s.
 fn late(run: &Run) -> (Vector4<f64>, Vector4<f64>) {
     let late = run.log.iter().filter(|sample| sample.time_s >= 55.0);
     let errors: Vec<_> = late.map(|sample| metrics::tracking_error(sample).abs()).collect();
@@ -41,7 +46,7 @@ fn late(run: &Run) -> (Vector4<f64>, Vector4<f64>) {
     (errors.iter().sum::<Vector4<f64>>() / errors.len() as f64, largest)
 }
 
-/// The figures themselves, without the help of [`claims`].
+/// Checks the figures themselves, without [`claims`].
 #[test]
 fn the_flights_bear_the_claims_out() {
     for scenario in readings() {
@@ -52,9 +57,9 @@ fn the_flights_bear_the_claims_out() {
         let (a, b): (&Metrics, &Metrics) = (&afbc.metrics, &baseline.metrics);
 
         // "Null error is achieved in all outputs for the AFBC controller ... which is not the case for backstepping".
-        // Over the last 5 s, so that no zero crossing passes for zero and no tremble for an error, AFBC's errors are
-        // millimetres (psi still on its way from the gust of 45 s), backstepping's decimetres. A start 1e-6 m away moves
-        // AFBC's figures by up to 1.3 mm and 6 mrad, which trembling amplifies, and backstepping's not at all.
+        // Over the last 5 s, so that neither a zero crossing nor chatter decides, AFBC's errors are millimetres (psi
+        // still decaying after the gust at 45 s), backstepping's decimetres. A start 1e-6 m away changes AFBC's figures
+        // by up to 1.3 mm and 6 mrad, amplified by chatter, and backstepping's not at all.
         let (mean, largest) = late(&afbc);
         let kept = b.final_error.abs();
         assert!(below(mean, Vector4::new(0.01, 0.01, 0.002, 0.07)), "{place}: AFBC is left with {mean}");
@@ -82,7 +87,7 @@ fn the_claims_as_reported_hold() {
         for claim in &claims {
             assert!(claim.holds, "{} {:?}: {claim:?}", scenario.model.name(), scenario.case);
         }
-        // The evidence is the figures: AFBC's and the baseline's RMSE along x stand in it, to the millimetre.
+        // The evidence contains the figures: AFBC's and the baseline's RMSE along x, to the millimetre.
         let tracking = claims.iter().find(|claim| claim.statement.contains("tracks better")).unwrap();
         for run in [&flown[0].run, &flown[1].run] {
             let figure = format!("x {:.3}", run.metrics.rmse.x);
@@ -91,7 +96,7 @@ fn the_claims_as_reported_hold() {
     }
 }
 
-/// A claim that cannot be borne out is not: each figure in turn made worse turns exactly its own claim.
+/// A claim without support fails: making each figure worse in turn makes exactly its own claim fail.
 #[test]
 fn a_claim_falls_with_its_figures() {
     let honest = fly_both(&scenario(Model::Simplified, Case::DEFAULT).unwrap());
@@ -100,7 +105,7 @@ fn a_claim_falls_with_its_figures() {
         change(&mut flown[0].run, &honest[1].run);
         claims(&flown).iter().map(|claim| claim.holds).collect::<Vec<_>>()
     };
-    // An error along one axis all through the last 5 s, as a share of what backstepping keeps there.
+    // An error along one axis during the last 5 s, as a share of the error that backstepping keeps there.
     let left = |run: &mut Run, baseline: &Run, axis: usize, share: f64| {
         let late = |sample: &&Sample| sample.time_s >= 55.0;
         let kept: Vec<f64> = baseline.log.iter().filter(late).map(|s| metrics::tracking_error(s)[axis].abs()).collect();
@@ -124,7 +129,7 @@ fn a_claim_falls_with_its_figures() {
         };
         assert_eq!(holds(&smoother), [true, true, false]);
     }
-    // Without both laws of one scenario there is nothing to say.
+    // Without flights of both laws there are no claims.
     assert_eq!(claims(&honest[..1]).len(), 0);
     let mut other = honest.clone();
     other[1].scenario.name = "another".into();
@@ -133,15 +138,15 @@ fn a_claim_falls_with_its_figures() {
 }
 
 #[test]
-fn a_lost_vehicle_bears_nothing_out() {
+fn no_claim_holds_if_a_vehicle_is_lost() {
     let forces = Case { reading: Some(Reading::Forces), ..Case::DEFAULT };
     let flown = fly_both(&scenario(Model::Simplified, forces).unwrap());
     assert!(flown.iter().all(|flown| flown.run.lost.is_some()));
     assert!(claims(&flown).iter().all(|claim| !claim.holds));
 }
 
-/// What backstepping keeps, in closed form: with f, g known but for A, (13) comes to rest where
-/// (1 + alpha_1 alpha_2) e_1 = A. Hover, a gust on x that stays; alpha_1 = 1, alpha_2 = 2, so A/3.
+/// Backstepping's remaining error in closed form: with f and g known except for A, (13) comes to rest where (1 +
+/// alpha_1 alpha_2) e_1 = A. Hover with a persistent gust on x; alpha_1 = 1, alpha_2 = 2, so A/3.
 #[test]
 fn backstepping_keeps_an_offset_of_the_gust_over_one_plus_both_gains() {
     for size in [0.3, 1.2, -0.9] {
@@ -156,14 +161,14 @@ fn backstepping_keeps_an_offset_of_the_gust_over_one_plus_both_gains() {
 
         let run = Run::fly(&scenario, scenario.contender(ControllerKind::Backstepping).unwrap(), u64::MAX).unwrap();
         let offset = size / (1.0 + 1.0 * 2.0);
-        // The vehicle holds its height, so thrust is weight over the cosine of the tilt, as (40) assumes, and g tan(theta)
-        // is u5: what is left is rounding, of f32 positions of 1 m (6e-8) times alpha_1 alpha_2, and micromath's cosine
-        // of a yaw of 0, which is exact. After 39 s nothing of the transient is left.
+        // The vehicle holds its height, so thrust is weight over the cosine of the tilt, as (40) assumes, and g
+        // tan(theta) is u5: only rounding remains, of f32 positions of 1 m (6e-8) times alpha_1 alpha_2, and
+        // micromath's cosine of a yaw of 0, which is exact. After 39 s the transient has decayed.
         let error = run.metrics.final_error;
         assert!((error.x - offset).abs() <= 1e-6, "{} m for {offset} m", error.x);
         assert!(error.y.abs() < 1e-6 && error.w.abs() < 1e-6, "{error}");
 
-        // AFBC keeps none: what it has learnt replaces the error. In 39 s it is down to a twentieth.
+        // AFBC keeps no error: adaptation removes it. After 39 s it is below a twentieth.
         let run = Run::fly(&scenario, scenario.contender(ControllerKind::Afbc).unwrap(), u64::MAX).unwrap();
         assert!(run.metrics.final_error.x.abs() < 0.05 * offset.abs(), "{} m of {offset} m", run.metrics.final_error.x);
     }

@@ -1,4 +1,4 @@
-//! The same flight twice gives the same bits in every number of every sample; the same test twice draws the same cases.
+//! Repeated flights give the same bits in every number of every sample; repeated property tests draw the same cases.
 #![allow(clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
 
 use afbc::Profile;
@@ -47,7 +47,7 @@ fn numbers(sample: &Sample) -> impl Iterator<Item = u64> {
     wide.into_iter().chain(narrow)
 }
 
-/// One number for all bits of a flight (FNV-1a), and how many samples it is made of.
+/// Returns a hash of all bits of a flight (FNV-1a), and its number of samples.
 fn digest(scenario: &Scenario, contender: &Contender) -> (u64, usize) {
     let (mut hash, mut samples) = (0xcbf2_9ce4_8422_2325_u64, 0);
     fly(scenario, contender, |sample| {
@@ -66,21 +66,21 @@ fn two_flights_are_the_same_to_the_bit() {
         for kind in ControllerKind::ALL {
             let contender = &Contender::of(kind, Profile::Paper);
             let mut scenario = scenario(model, Case::DEFAULT).unwrap();
-            scenario.duration_s = 25.0; // past both kinds of gusts and into the uncertainty
+            scenario.duration_s = 25.0; // beyond both kinds of gusts, with uncertain parameters
             let first = digest(&scenario, contender);
             assert_eq!(first.1, 25_001);
             assert_eq!(digest(&scenario, contender), first, "{} {}", model.name(), kind.name());
-            // Side by side with another flight, in another thread.
+            // Concurrently with another flight, in another thread.
             let elsewhere = std::thread::scope(|scope| scope.spawn(|| digest(&scenario, contender)).join().unwrap());
             assert_eq!(elsewhere, first);
-            // The digest sees a difference of one bit in 1e-15 m.
+            // The digest detects a difference in the last bit of a number.
             scenario.initial.position_m.z = scenario.initial.position_m.z.next_up();
-            assert_ne!(digest(&scenario, contender).0, first.0, "the digest is blind");
+            assert_ne!(digest(&scenario, contender).0, first.0, "the digest misses a changed bit");
         }
     }
 }
 
-/// `.cargo/config.toml` seeds every property test of the workspace, unless `scripts/soak` does.
+/// `.cargo/config.toml` sets the seed of every property test of the workspace, `scripts/soak` others.
 #[test]
 fn property_tests_draw_the_same_cases_every_time() {
     let config = ProptestConfig::with_cases(1);

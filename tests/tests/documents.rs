@@ -1,4 +1,4 @@
-//! Figures in the documents are held to the code, or say how and when they were measured.
+//! Figures in the documents are compared with the code, or state how and when they were measured.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a page that cannot be read must stop the test
 
 use afbc::Profile;
@@ -22,8 +22,8 @@ fn is_compared(root: &Path, text: &str, name: &str) -> bool {
     words.any(|word| word.ends_with(".rs") && fs::read_to_string(root.join(word)).is_ok_and(|code| code.contains(name)))
 }
 
-/// A table with columns that are aligned to the right holds figures. The section that it is in names the file that compares
-/// them, which reads the page, or says "Measured" with the day.
+/// A table with right-aligned columns holds figures. Its section names the file with the comparison, which reads the
+/// page, or says "Measured" with the date.
 #[test]
 fn every_table_of_figures_is_compared_or_dated() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
@@ -46,7 +46,7 @@ fn every_table_of_figures_is_compared_or_dated() {
     assert!(tables >= 8, "{tables} sections");
 }
 
-/// The keys of files and of `--json` that name a law list them all.
+/// Tables of keys that name laws list all of them.
 #[test]
 fn pages_that_list_the_laws_list_all() {
     for (page, text) in [
@@ -72,7 +72,7 @@ fn the_gains_of_the_profile_flight_are_those_on_its_page() {
         let Gains { backstepping, gamma, eta, epsilon, safeguards: s, .. } = gains;
         let figures =
             [backstepping.alpha1, backstepping.alpha2, *gamma, *eta, *epsilon, s.theta_max, s.delta_max, s.sigma];
-        // To half of the last digit that is written.
+        // To half of the last digit written.
         let close = |(cell, figure): (&str, &f32)| {
             let decimals = cell.split_once('.').map_or(0, |(_, decimals)| decimals.len());
             (cell.parse::<f32>().unwrap() - figure).abs() <= 0.501 * 0.1_f32.powi(decimals as i32)
@@ -94,7 +94,8 @@ fn the_gains_of_the_profile_flight_are_those_on_its_page() {
         format!("a command filter of {} rad/s", settings.command_filter_rad_s),
         format!("rotors that lag by 20 ms and give {} N each", settings.common.rotor_force_max_n),
         format!(
-            "tilt {} rad, tilt rate {} rad/s, acceleration {} m/s2, and for errors a speed of {} m/s, {} m/s vertically",
+            "tilt {} rad, tilt rate {} rad/s, acceleration {} m/s2, and for errors a speed of {} m/s, \
+             {} m/s vertically",
             l.tilt_max_rad, l.tilt_rate_max_rad_s, l.acceleration_max_m_s2, l.speed_max_m_s, l.climb_max_m_s
         ),
     ] {

@@ -1,4 +1,5 @@
-//! Trackers that freeze in flight: the firmware's code on the host, the rigid body above a ground, real frames between them.
+//! Trackers that freeze in flight: the firmware's code on the host and the rigid body above a ground, connected by
+//! MAVLink frames.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
 use afbc_flight_core::{End, Mode};
@@ -8,18 +9,18 @@ use afbc_sim::in_the_loop::{Host, Station};
 use afbc_types::{Parameters, State};
 use nalgebra::Vector3;
 
-/// When the vehicle is armed, and when the tracker freezes \[ms\].
+/// Times of arming and of the freeze \[ms\].
 const ARM_MS: u64 = 2_100;
 const FREEZES_MS: u64 = 9_100;
 
-/// What a frozen tracker sends.
+/// Output of a frozen tracker.
 #[derive(Clone, Copy, Debug)]
 enum Frozen {
-    /// The last state, to the bit.
+    /// The last state, bit for bit.
     Bits,
-    /// The last state, within noise.
+    /// The last state with noise.
     Noisy,
-    /// Nothing for so many ms, then the last state, to the bit or within noise.
+    /// Nothing for this many ms, then the last state, bit for bit or with noise.
     After(u64, bool),
 }
 
@@ -27,14 +28,14 @@ enum Frozen {
 struct Seen {
     modes: Vec<(u64, Mode)>,
     ended: Option<End>,
-    /// Height at which the flight ended \[m\], and largest tilt from the freeze up to then \[rad\].
+    /// Height at the end of the flight \[m\], and largest tilt from the freeze on \[rad\].
     ended_m: f64,
     tilt_rad: f64,
-    /// Speed at the first touch of the ground \[m/s\].
+    /// Speed at the first ground contact \[m/s\].
     touchdown_m_s: Option<f64>,
 }
 
-/// Climbs to `height_m`, flies along x at `speed_m_s`, and is frozen there.
+/// Climbs to `height_m`, flies along x at `speed_m_s`, and freezes the tracker there.
 fn fly(height_m: f64, speed_m_s: f64, frozen: Frozen) -> Seen {
     let ground = Realism { contact: Some(Contact::PAPER), ..Realism::default() };
     let start = Motion { position_m: Vector3::new(0.0, 0.0, 0.02), ..Motion::default() };
@@ -97,9 +98,9 @@ fn fly(height_m: f64, speed_m_s: f64, frozen: Frozen) -> Seen {
     seen
 }
 
-/// The issue in one line: the last pose at 1 m/s turned the vehicle upside down within a second, still Flying.
+/// Before the cure, a repeated pose at 1 m/s turned the vehicle upside down within a second, in mode Flying.
 #[test]
-fn a_pose_that_repeats_itself_is_ridden_out_and_descended_on() {
+fn a_repeated_state_is_coasted_through_and_ends_in_a_descent() {
     for speed_m_s in [0.0, 0.5, 1.0, 2.0] {
         let seen = fly(1.5, speed_m_s, Frozen::Bits);
         println!("{speed_m_s} m/s: {seen:?}");
@@ -113,9 +114,10 @@ fn a_pose_that_repeats_itself_is_ridden_out_and_descended_on() {
     }
 }
 
-/// Within noise it is seen by what its twist says: late, but its motors stop. (The attitude is gone by then.)
+/// With noise, the contradiction with the twist reveals it: late, when the attitude is already lost, but the motors
+/// stop.
 #[test]
-fn a_moving_pose_that_stands_within_noise_is_not_believed() {
+fn a_noisy_constant_pose_with_a_moving_twist_is_distrusted() {
     for speed_m_s in [1.0, 2.0] {
         let seen = fly(3.0, speed_m_s, Frozen::Noisy);
         println!("{speed_m_s} m/s: {seen:?}");
@@ -125,9 +127,9 @@ fn a_moving_pose_that_stands_within_noise_is_not_believed() {
     }
 }
 
-/// After an outage a frozen pose used to "land" the vehicle at 5 m, and cut its motors.
+/// After an outage, a frozen pose was once taken for a landing at 5 m, and stopped the motors.
 #[test]
-fn a_pose_that_comes_back_frozen_is_no_landing() {
+fn a_frozen_pose_after_an_outage_is_no_landing() {
     for gap_ms in [300, 1_000] {
         for noise in [false, true] {
             let seen = fly(5.0, 0.0, Frozen::After(gap_ms, noise));

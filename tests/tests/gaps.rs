@@ -1,4 +1,4 @@
-//! What the paper leaves open or gets wrong, held to what it was found to do: under the headings that `docs/paper.md` has for it.
+//! Checks of the gaps and errors in the paper, under the headings of `docs/paper.md`.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
 
 use afbc::adaptive::{self};
@@ -28,7 +28,7 @@ fn paper(case: Case) -> Scenario {
 // ---------------------------------------------------------------------------------------------------------------------
 // Decision 1: (12) needs d phi_d/dt and d theta_d/dt.
 
-/// A law that is told that phi_d and theta_d stand still, as an implementation without the filter's rates would be.
+/// A law that receives zero rates of phi_d and theta_d, like an implementation without the filter's rates.
 #[derive(Clone, Copy)]
 struct Rateless<L>(L);
 
@@ -54,7 +54,7 @@ impl<L: Law> Law for Rateless<L> {
     }
 }
 
-/// Flies the scenario and tells whether the law held it: upright to the end and nearer than 1 m after 5 s.
+/// Flies the scenario and returns whether the vehicle stayed upright, and within 1 m after 5 s.
 fn flies<L: Law>(scenario: &Scenario, settings: Settings, law: L) -> bool {
     let controller = Controller::new(scenario.vehicle.to_f32(), settings, law).unwrap();
     let mut world = World::new(scenario, f64::from(settings.common.dt_s)).unwrap();
@@ -66,7 +66,7 @@ fn flies<L: Law>(scenario: &Scenario, settings: Settings, law: L) -> bool {
     end == End::default()
 }
 
-/// The paper's settings, but for the command filter.
+/// The paper's settings with another command filter.
 fn filtered(command_filter_rad_s: f32) -> Settings {
     Settings { command_filter_rad_s, ..Profile::Paper.settings() }
 }
@@ -80,8 +80,8 @@ fn laws() -> (Adaptive, Backstepping) {
 
 #[test]
 fn without_the_rates_of_the_desired_angles_neither_law_flies() {
-    // Over the whole band in which both fly with them. (Beyond it the loss takes longer: at 1000 rad/s, nearly no filter
-    // at all, backstepping in calm air still swings within 0.3 m after 60 s, AFBC is 30 m off.)
+    // Over the whole band in which both fly with the rates. (Above it the loss takes longer: at 1000 rad/s, almost
+    // without a filter, backstepping in calm air still oscillates within 0.3 m after 60 s, and AFBC is 30 m away.)
     for bandwidth in [10.0, 20.0, 40.0, 80.0] {
         let (scenario, settings) = (paper(CALM), filtered(bandwidth));
         let (adaptive, backstepping) = laws();
@@ -118,7 +118,7 @@ fn printed(membership: Membership, inputs: [f32; 2]) -> [f32; 9] {
 }
 
 #[test]
-fn the_printed_basis_is_0_over_0_from_1_705_rad_s_and_ours_is_not() {
+fn the_printed_basis_is_0_over_0_from_1_705_rad_s_and_the_implemented_one_is_not() {
     let basis = Basis::new(ATTITUDE).unwrap();
     for step in 0..=2000_u16 {
         let rate = f32::from(step) / 200.0; // 0 to 10 rad/s
@@ -127,8 +127,8 @@ fn the_printed_basis_is_0_over_0_from_1_705_rad_s_and_ours_is_not() {
         let sum: f32 = ours.iter().sum();
         assert!((sum - 1.0).abs() < 1e-6 && ours.iter().all(|w| (0.0..=1.0).contains(w)), "{ours} at {rate} rad/s");
         if rate < 1.55 {
-            // The same basis, while no Gaussian that counts is below the normal numbers of f32: off by the rounding of
-            // exponents up to 87, six times.
+            // The same basis, as long as no relevant Gaussian is below the normal numbers of f32, except for the
+            // rounding of exponents up to 87, six times.
             for (a, b) in ours.iter().zip(printed) {
                 assert!((a - b).abs() < 4e-5, "{a} against {b} at {rate} rad/s");
             }
@@ -138,8 +138,8 @@ fn the_printed_basis_is_0_over_0_from_1_705_rad_s_and_ours_is_not() {
 }
 
 #[test]
-fn the_basis_is_exact_where_the_printed_one_is_lost() {
-    // In f64 (18) holds to 4.125 rad/s; up to there it is an oracle for what f32 cannot say as printed.
+fn the_basis_is_accurate_where_the_printed_one_underflows() {
+    // In f64 (18) holds up to 4.125 rad/s; up to there it is the oracle for the implemented one.
     let basis = Basis::new(ATTITUDE).unwrap();
     for step in 0..=400_u16 {
         let rate = f32::from(step) / 100.0;
@@ -158,7 +158,8 @@ fn the_basis_is_exact_where_the_printed_one_is_lost() {
     }
 }
 
-/// What it costs: a roll rate of 2 rad/s, half a turn in 1.5 s, makes every estimate of the printed basis NaN for good.
+/// The consequence: a roll rate of 2 rad/s, half a turn in 1.5 s, makes every estimate of the printed basis NaN
+/// forever.
 #[test]
 fn a_fast_roll_leaves_the_estimates_finite() {
     let controller = Controller::new(
@@ -185,12 +186,12 @@ fn a_fast_roll_leaves_the_estimates_finite() {
 // ---------------------------------------------------------------------------------------------------------------------
 // "What the printed gains cost": tanh(e_2 / 0.001) at 1 kHz is a relay.
 
-/// Mean |change of U1| per step over the last second of a hover with a roll of 0.01 rad to begin with, under a robust
-/// term that is held at `delta` \[mN\].
-fn trembling_mn(delta: f32, epsilon: f32) -> f64 {
+/// Returns mean |change of U1| per step during the last second of a hover with an initial roll of 0.01 rad, with
+/// delta_hat held at `delta` \[mN\].
+fn chatter_mn(delta: f32, epsilon: f32) -> f64 {
     let mut gains = Profile::Paper.gains();
     for axis in Axis::ALL {
-        // Nothing is learnt: the threshold is that of delta, not of how it grew.
+        // Without adaptation: the threshold applies to the value of delta_hat, not to its growth.
         gains[axis] = adaptive::Gains { gamma: 0.0, eta: 0.0, epsilon, ..gains[axis] };
     }
     let law = Adaptive::new(gains).unwrap();
@@ -198,7 +199,7 @@ fn trembling_mn(delta: f32, epsilon: f32) -> f64 {
     let controller = Controller::new(vehicle.to_f32(), Profile::Paper.settings(), law).unwrap();
     let mut memory: Screened<Cascade<Estimate>> = Screened::default();
     memory.control.estimates.roll.delta = delta;
-    // Held up by what the z subsystem would have learnt: the weight.
+    // The estimates of z carry the weight.
     memory.control.estimates.z.theta.fill((vehicle.mass_kg * vehicle.gravity_m_s2) as f32);
     let start = Motion { attitude_rad: Vector3::new(0.01, 0.0, 0.0), ..Motion::default() };
     let mut plant = Plant::new(Model::Simplified, start, Environment::calm(vehicle).unwrap());
@@ -217,17 +218,17 @@ fn trembling_mn(delta: f32, epsilon: f32) -> f64 {
 
 #[test]
 fn the_robust_term_becomes_a_relay_at_2_epsilon_over_g_dt() {
-    // One Euler step of e_2 under u = (delta / epsilon + alpha_2) e_2 is stable while g dt (delta / epsilon + alpha_2) < 2
-    // with g = l / Ix = 65.8: delta < 0.0284, or 0.030 without alpha_2. Found to 1 %.
+    // An Euler step of e_2 under u = (delta / epsilon + alpha_2) e_2 is stable while g dt (delta / epsilon + alpha_2) <
+    // 2 with g = l / Ix = 65.8: delta < 0.0284, or 0.030 without alpha_2. Located to 1 %.
     let (g, dt, alpha2) = (65.79_f32, 0.001, 2.0);
     for epsilon in [0.001, 0.002, 0.005] {
         let onset = epsilon * (2.0 / (g * dt) - alpha2);
-        let (mut quiet, mut trembling) = (0.5 * onset, 2.0 * onset);
-        assert!(trembling_mn(quiet, epsilon) < 0.01, "epsilon {epsilon}: trembles at {quiet}");
-        assert!(trembling_mn(trembling, epsilon) > 1.0, "epsilon {epsilon}: quiet at {trembling}");
-        while trembling - quiet > 0.01 * onset {
-            let middle = 0.5 * (quiet + trembling);
-            if trembling_mn(middle, epsilon) < 0.01 { quiet = middle } else { trembling = middle }
+        let (mut quiet, mut chattering) = (0.5 * onset, 2.0 * onset);
+        assert!(chatter_mn(quiet, epsilon) < 0.01, "epsilon {epsilon}: chatters at {quiet}");
+        assert!(chatter_mn(chattering, epsilon) > 1.0, "epsilon {epsilon}: quiet at {chattering}");
+        while chattering - quiet > 0.01 * onset {
+            let middle = 0.5 * (quiet + chattering);
+            if chatter_mn(middle, epsilon) < 0.01 { quiet = middle } else { chattering = middle }
         }
         assert!((0.98 * onset..1.01 * onset).contains(&quiet), "epsilon {epsilon}: onset {quiet}, {onset} predicted");
     }
@@ -242,8 +243,8 @@ fn afbc() -> Contender {
     Contender::of(ControllerKind::Afbc, Profile::Paper)
 }
 
-/// Mean |change of U1| per step \[mN\], apart for steps where delta_hat on roll is below and above 0.030.
-fn trembling_by_delta(scenario: &Scenario) -> [f64; 2] {
+/// Returns mean |change of U1| per step \[mN\], for steps with delta_hat of roll below and above 0.030.
+fn chatter_by_delta(scenario: &Scenario) -> [f64; 2] {
     let (mut sums, mut counts) = ([0.0; 2], [0_u32; 2]);
     let mut last: Option<Sample> = None;
     afbc_sim::flight::fly(scenario, &afbc(), |sample| {
@@ -259,22 +260,22 @@ fn trembling_by_delta(scenario: &Scenario) -> [f64; 2] {
 }
 
 #[test]
-fn in_flight_roll_trembles_once_delta_hat_has_passed_0_030() {
-    let [below, above] = trembling_by_delta(&paper(GUSTS));
+fn in_flight_roll_chatters_once_delta_hat_exceeds_0_030() {
+    let [below, above] = chatter_by_delta(&paper(GUSTS));
     assert!(below < 1.0 && above > 50.0, "{below} mN below, {above} mN above");
 }
 
 #[test]
-fn a_hundred_times_the_epsilon_flies_as_well_without_trembling() {
+fn a_hundred_times_the_epsilon_is_as_accurate_without_chatter() {
     for case in [GUSTS, Case::DEFAULT] {
         let printed = Run::fly(&paper(case), &with_epsilon(0.001), u64::MAX).unwrap();
         let wide = Run::fly(&paper(case), &with_epsilon(0.1), u64::MAX).unwrap();
         assert_eq!((printed.lost, wide.lost), (None, None));
         let mn = |run: &Run| run.metrics.mean_abs_delta_u * 1000.0;
-        // U1, U2 tremble by 50 mN and more a step as printed, and no longer.
+        // U1 and U2 chatter by 50 mN or more per step as printed, and no longer.
         assert!(mn(&printed).x > 50.0 && mn(&printed).y > 50.0, "{}", mn(&printed));
         assert!(mn(&wide).x < 0.5 && mn(&wide).y < 0.5, "{}", mn(&wide));
-        // As well: no error grows by more than a fifth and 5 mm, all stay below half of what backstepping leaves.
+        // As accurate: no error grows by more than a fifth and 5 mm, and all stay below half of backstepping's.
         let baseline =
             Run::fly(&paper(case), &Contender::of(ControllerKind::Backstepping, Profile::Paper), u64::MAX).unwrap();
         let errors = |run: &Run| -> [f64; 4] { run.metrics.rmse.into() };
@@ -298,7 +299,7 @@ fn as_persistent_accelerations_backstepping_keeps_an_error_and_afbc_does_not() {
     for model in [Model::Simplified, Model::RigidBody] {
         let [afbc, baseline] = both(Reading::Persistent, model);
         assert_eq!((afbc.lost, baseline.lost), (None, None));
-        // A / (1 + alpha_1 alpha_2) on x, y and psi: 1.2 / 3, and psi through g_3 = d / (b Iz) = 1.43.
+        // A / (1 + alpha_1 alpha_2) in x, y and psi: 1.2 / 3, and psi through g_3 = d / (b Iz) = 1.43.
         let kept = baseline.metrics.final_error.abs();
         assert!((0.3..0.5).contains(&kept.x) && (0.3..0.5).contains(&kept.y) && kept.w > 0.25, "{kept}");
         let left = afbc.metrics.final_error.abs();
@@ -321,10 +322,10 @@ fn after_pulses_of_1_s_both_recover() {
 fn as_forces_and_moments_both_lose_the_vehicle_to_the_moment_on_roll() {
     for model in [Model::Simplified, Model::RigidBody] {
         for run in both(Reading::Forces, model) {
-            // 1.2 N on 0.486 kg from 7.5 s on is survived. 1.2 N m on 0.0038 kg m2 from 15 s on is 316 rad/s2: it takes
-            // 4.8 N of difference between opposed rotors, more than the vehicle weighs, to hold it, and either the roll
-            // is lost (rigid body) or the thrust that goes with it, since roll comes before thrust where rotors are
-            // at zero, carries the vehicle away within 4 s.
+            // 1.2 N on 0.486 kg from 7.5 s on is survived. 1.2 N m on 0.0038 kg m2 from 15 s on is 316 rad/s2: holding
+            // it takes a difference of 4.8 N between opposed rotors, more than the weight. Either roll is lost (rigid
+            // body), or the vehicle climbs away within 4 s, since roll has priority over thrust when rotors are at
+            // zero.
             let lost = run.lost.unwrap();
             assert!((15.0..19.0).contains(&lost.time_s), "{} {}: {lost:?}", model.name(), run.contender.name);
         }

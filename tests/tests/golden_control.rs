@@ -1,6 +1,11 @@
-//! Every row of the control crate's golden data, in `f32`. Each tolerance is a bound on rounding that is worked out row
-//! by row, so it is as tight where numbers are small.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // what cannot be built or is missing must stop the test
+//! Every row of the control crate's golden data, in `f32`. Each tolerance is a bound on rounding, computed row by row,
+//! so it is also tight for small numbers.
+#![allow(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    missing_docs,
+    reason = "what cannot be built or is missing must stop the test"
+)]
 
 use afbc::Safeguards;
 use afbc::adaptive::{Gains, Subsystem};
@@ -28,16 +33,16 @@ fn assert_within(row: &Row<'_>, column: &str, got: f32, allowed: f64) {
     );
 }
 
-/// Bound on the relative error of a fuzzy weight. ln w_i moves by at most twice what the exponents k|x| and ln q move
-/// by. k|x| carries 6 roundings besides x's (c, s, two divisions by s, s again, the product) and the error of x itself;
-/// ln q = c^2 / 2s^2 carries 5. Another 20 cover the exponentials (2 each) and the products and sums around them.
+/// Bound on the relative error of a fuzzy weight. ln w_i changes by at most twice the change of the exponents k|x| and
+/// ln q. k|x| has 6 roundings besides x's (c, s, two divisions by s, s again, the product) and the error of x itself;
+/// ln q = c^2 / 2s^2 has 5. Another 20 cover the exponentials (2 each) and the products and sums around them.
 fn weight_bound(centre: f64, width: f64, inputs: [f64; 2], input_errors: [f64; 2]) -> f64 {
     let k = centre / (width * width);
     let exponents: f64 = inputs.iter().zip(input_errors).map(|(x, error)| k * (6.0 * U * x.abs() + error)).sum();
     2.0 * (exponents + 2.0 * 5.0 * U * 0.5 * (centre / width).powi(2)) + 20.0 * U
 }
 
-/// Below the normal numbers of `f32` a weight's error is absolute: 2^-150 over a sum that is at least q.
+/// Below the normal numbers of `f32` a weight's error is absolute: 2^-150 over a sum of at least q.
 const WEIGHT_FLOOR: f64 = 1e-36;
 
 #[test]
@@ -100,14 +105,14 @@ fn afbc_subsystem_agrees_in_every_row() {
         };
         let w_bound = weight_bound(centre, width, exact_inputs, input_errors);
 
-        // (22): a sum of nine products, w to its bound, theta and product and eight sums rounded. The weights follow from
-        // the golden rates: w_i = theta_dot_i / (gamma e_2).
+        // (22): a sum of nine products; w within its bound; theta, product and eight sums rounded. The weights follow
+        // from the golden rates: w_i = theta_dot_i / (gamma e_2).
         let theta_dot = row.nine("theta_dot");
         let products: f64 = theta_dot.iter().zip(theta).map(|(rate, theta)| (rate / (gamma * e2) * theta).abs()).sum();
         let fuzzy_error = products * (w_bound + 10.0 * U) + 9.0 * WEIGHT_FLOOR;
         assert_within(&row, "u_a", terms.fuzzy, fuzzy_error);
-        // (32): d tanh(s) <= ds; s = e_2 / epsilon carries e_2's error and three roundings, s tanh'(s) <= 0.448; tanh is
-        // within 1.4e-7; delta and the product are rounded.
+        // (32): d tanh(s) <= ds; s = e_2 / epsilon has e_2's error and three roundings, s tanh'(s) <= 0.448; tanh is
+        // accurate to 1.4e-7; delta and the product are rounded.
         let tanh_error = e2_error / epsilon + 0.448 * 3.0 * U + 1.4e-7;
         let robust_error = delta.abs() * (tanh_error + 2.0 * U);
         assert_within(&row, "u_r", terms.robust, robust_error);
@@ -155,7 +160,7 @@ fn backstepping_agrees_in_every_row() {
         let e2_error = e1_dot_error + alpha1 * (e1_error + 2.0 * U * e1.abs()) + U * e2.abs();
         assert_within(&row, "e1", errors.e1, e1_error);
         assert_within(&row, "e2", errors.e2, e2_error);
-        // (16): the errors' errors through their factors, and no term rounded more than 9 times on its way to u.
+        // (16): the errors of e1 and e2 through their factors, and at most 9 roundings of each term on its way to u.
         let carried = e1_error * (1.0 + alpha1 * alpha1) + e2_error * alpha1;
         let size = e1.abs() + alpha1 * e2.abs() + alpha1 * alpha1 * e1.abs() + x1d_ddot.abs() + f.abs();
         let u_eq_error = (carried + 9.0 * U * size) / g;
@@ -168,7 +173,7 @@ fn backstepping_agrees_in_every_row() {
 
 #[test]
 fn desired_attitude_agrees_in_every_row() {
-    /// Largest error of the control crate's sine and cosine; `crates/afbc/tests/math.rs` holds them to it.
+    /// Largest error of the control crate's sine and cosine, checked by `crates/control/tests/math.rs`.
     const TRIGONOMETRY: f64 = 1.2e-3;
     let gravity = Parameters::PAPER.gravity_m_s2;
     let table = golden("desired_attitude");
@@ -176,18 +181,19 @@ fn desired_attitude_agrees_in_every_row() {
     for row in table.rows() {
         let [u5, u6, psi] = row.all(["u5_m_s2", "u6_m_s2", "psi_rad"]);
         let [phi_d, theta_d] = desired_attitude(u5 as f32, u6 as f32, psi as f32, (1.0 / gravity) as f32);
-        // Sine and cosine each off by at most 1.2e-3, and a few roundings (8 U) of the sums: both tangents' numerators
-        // move by no more than that share of |u5| + |u6|. The arc tangent's slope is at most 1, its own error 1.2e-7.
+        // Sine and cosine are off by at most 1.2e-3 each, plus a few roundings (8 U) of the sums: the numerators of
+        // both tangents change by at most that share of |u5| + |u6|. The arc tangent's slope is at most 1, its own
+        // error 1.2e-7.
         let moved = (TRIGONOMETRY + 8.0 * U) * (u5.abs() + u6.abs()) / gravity;
         assert_within(&row, "theta_d_rad", theta_d, moved + 1.2e-7);
-        // phi_d holds cos(theta_d) = (1 + t^2)^-1/2 as well, whose slope in t is at most 0.385.
+        // phi_d also contains cos(theta_d) = (1 + t^2)^-1/2, whose slope in t is at most 0.385.
         let numerator = (u5 * psi.sin() - u6 * psi.cos()).abs() / gravity;
         assert_within(&row, "phi_d_rad", phi_d, moved + (numerator + moved) * 0.385 * moved + 1.2e-7);
     }
 }
 
-/// The same rows with sine and cosine taken out of the comparison: at a yaw where micromath's are exact enough, (40)
-/// holds to rounding. The wanted acceleration is turned by the golden yaw beforehand, in `f64`.
+/// The same rows without errors of sine and cosine: at a yaw where micromath's are accurate enough, (40) holds to
+/// rounding. The desired acceleration is rotated by the golden yaw beforehand, in `f64`.
 #[test]
 fn desired_attitude_without_yaw_agrees_to_rounding() {
     let gravity = Parameters::PAPER.gravity_m_s2;
@@ -202,7 +208,7 @@ fn desired_attitude_without_yaw_agrees_to_rounding() {
         let [u5, u6, psi] = row.all(["u5_m_s2", "u6_m_s2", "psi_rad"]);
         let (forward, right) = (u5 * psi.cos() + u6 * psi.sin(), u5 * psi.sin() - u6 * psi.cos());
         let [phi_d, theta_d] = desired_attitude(forward as f32, -right as f32, 0.0, (1.0 / gravity) as f32);
-        // micromath's sine of 0 is what it is; both tangents move by that share of the other component.
+        // micromath's sine of 0 is not exactly 0; both tangents change by that share of the other component.
         let sine_of_0 = f64::from(afbc_control::math::sin(0.0)).abs();
         let moved = (sine_of_0 + 8.0 * U) * (forward.abs() + right.abs()) / gravity;
         assert_within(&row, "theta_d_rad", theta_d, moved + 1.2e-7);
@@ -214,7 +220,7 @@ const SPEEDS: [&str; 4] = ["omega1_rad_s", "omega2_rad_s", "omega3_rad_s", "omeg
 const FORCES: [&str; 4] = ["f1_n", "f2_n", "f3_n", "f4_n"];
 const INPUTS: [&str; 4] = ["u1_n", "u2_n", "u3_n", "u4_n"];
 
-/// Rotors that give 20 N: none of the rows saturates.
+/// A mixer for rotors of 20 N, with which no row saturates.
 fn mixer() -> Mixer {
     Mixer::new(&Parameters::PAPER.to_f32(), 20.0).unwrap()
 }
@@ -231,7 +237,7 @@ fn mixer_agrees_from_speeds_to_inputs_in_every_row() {
             assert_within(&row, column, *got, 5.0 * U * expected);
         }
         let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = Mixer::inputs(&forces);
-        // Sums of at most four forces: 3 roundings more, of at most their total.
+        // Sums of at most four forces: 3 more roundings, each of at most their total.
         for (got, column) in [roll_n, pitch_n, yaw_n, thrust_n].into_iter().zip(INPUTS) {
             assert_within(&row, column, got, 8.0 * U * row.get("u4_n"));
         }
@@ -246,22 +252,22 @@ fn mixer_agrees_from_inputs_to_speeds_in_every_row() {
         let [roll_n, pitch_n, yaw_n, thrust_n] = row.all(INPUTS).map(|u| u as f32);
         let allocation = mixer().allocate(&Inputs { roll_n, pitch_n, yaw_n, thrust_n });
         assert!(!allocation.saturated, "{}", row.place());
-        // Each input is rounded once and each of two sums once more; the inputs together are at most 2 U4 in the sum.
+        // Each input is rounded once and each of two sums once more; the inputs add up to at most 2 U4.
         let allowed = 4.0 * U * row.get("u4_n");
         for (got, column) in allocation.forces.0.iter().zip(FORCES) {
             assert_within(&row, column, *got, allowed);
         }
         let speeds = mixer().speeds(&allocation.forces);
         for ((got, column), force) in speeds.0.iter().zip(SPEEDS).zip(row.all(FORCES)) {
-            // The root turns a force's error into b omega / 2 of it, and three roundings into half as many.
+            // The square root turns a force's error into b omega / 2 of it, and three roundings into half as many.
             let omega = row.get(column);
             assert_within(&row, column, *got, omega * (3.0 * U + 0.5 * allowed / (force - allowed)));
         }
     }
 }
 
-/// The virtual controls are accelerations: what (40) asks of the attitude, the plant of (6) gives at hover thrust (39).
-/// This ties the sign and frame of every golden file together.
+/// The virtual controls are accelerations: the attitude that (40) demands gives them in the plant of (6) at hover
+/// thrust (39). This checks that signs and frames of all golden files agree.
 #[test]
 fn desired_attitude_gives_the_wanted_acceleration_in_the_plant() {
     use afbc_plant::{Load, Motion, simplified};

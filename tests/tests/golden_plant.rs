@@ -6,8 +6,8 @@ use afbc_types::Parameters;
 use flight_tests::{ROWS, Row, golden};
 use nalgebra::Vector3;
 
-/// Relative to the expected number itself, with no allowance for cancellation: no result in the data is small enough
-/// beside its own terms to need one (all of them in fact hold to 1e-12).
+/// Relative to the expected number, without an allowance for cancellation: no result in the data is small compared with
+/// its own terms (in fact all agree to 1e-12).
 fn assert_close(row: &Row<'_>, column: &str, got: f64) {
     let expected = row.get(column);
     assert!(
@@ -31,7 +31,7 @@ fn load(row: &Row<'_>) -> Load {
     Load::new(&Parameters::PAPER, speeds, a_force, a_moment)
 }
 
-/// At a place and speed that must not matter.
+/// A motion whose position and velocity must not matter.
 fn motion(attitude_rad: [f64; 3], rates_rad_s: [f64; 3]) -> Motion {
     Motion {
         position_m: Vector3::new(3.0, -4.0, 5.0),
@@ -71,7 +71,7 @@ fn rigid_body_agrees_in_every_row() {
     }
 }
 
-/// The rigid body does not integrate Euler angles; its quaternion must turn as the golden Euler rates say.
+/// The rigid body does not integrate Euler angles; its quaternion must turn at the golden Euler rates.
 #[test]
 fn the_quaternion_turns_at_the_golden_euler_rates() {
     let table = golden("plant_rigid_body");

@@ -1,4 +1,5 @@
-//! AFBC under its monitor against the plant: what trips it, what does not, and how the vehicle flies across a hand-over.
+//! AFBC under its monitor in closed loop: what trips it, what does not, and the flight across a switch to the fallback
+//! law.
 #![allow(clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
 
 use afbc::monitor::Bounds;
@@ -19,7 +20,7 @@ fn guarded(profile: Profile, settings: Settings, bounds: Bounds) -> Guarded {
     Guarded::new(Parameters::PAPER.to_f32(), settings, profile.gains(), bounds).unwrap()
 }
 
-/// The profile `flight` under its own bounds, some of them changed.
+/// The profile `flight` under its own bounds, with some changed.
 fn flight(change: fn(&mut Bounds)) -> Guarded {
     let mut bounds = Bounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32());
     change(&mut bounds);
@@ -30,7 +31,7 @@ fn above(height_m: f32) -> Setpoint {
     Setpoint { position_m: Vector3::new(0.0, 0.0, height_m), ..Setpoint::default() }
 }
 
-/// One vehicle, its sensors, its controller and what that remembers.
+/// One vehicle with its sensors, its controller and the controller's memory.
 struct Bench {
     controller: Guarded,
     memory: Screened<guarded::Memory>,
@@ -39,7 +40,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// In the air, on rotors that lag by 20 ms and give 3 N each.
+    /// In the air, with a rotor lag of 20 ms and 3 N per rotor.
     fn real(controller: Guarded, realism: Realism, noise: Spread) -> Self {
         let rotors = Rotors { time_constant_s: 0.02, max_rad_s: 317.0, ..Rotors::default() };
         let environment = Environment::calm(Parameters::PAPER).unwrap();
@@ -49,7 +50,7 @@ impl Bench {
         Bench { controller, memory: Screened::default(), plant, sensors }
     }
 
-    /// Why the last step decided as it did.
+    /// Returns the trace of the last step.
     fn trace(&self) -> Trace {
         Guarded::trace(&self.memory.control)
     }
@@ -61,7 +62,7 @@ impl Bench {
         command
     }
 
-    /// Flies so long, or until it trips.
+    /// Flies for `steps`, or until the monitor trips.
     fn fly(&mut self, steps: usize, setpoint: &Setpoint) -> Option<Trip> {
         for _ in 0..steps {
             let _ = self.step(setpoint);
@@ -77,11 +78,11 @@ impl Bench {
     }
 }
 
-/// Position and velocity as motion capture gives them, attitude and rates as a small inertial sensor does.
+/// Noise of position and velocity from motion capture, of attitude and rates from a small inertial sensor.
 const NOISE: Spread = Spread { position_m: 0.002, velocity_m_s: 0.01, attitude_rad: 0.002, rates_rad_s: 0.02 };
 
-/// The paper's own flight, its gusts and uncertainty on: with the printed epsilon of 1 mm/s the robust terms chatter once
-/// they have grown, after more than half of it, and the detector sees it. Without the detector nothing trips.
+/// The paper's flight with its gusts and uncertainty: with the printed epsilon of 1 mm/s the robust terms chatter once
+/// they have grown, after more than half of it, and the detector trips. Without the detector nothing trips.
 #[test]
 fn the_printed_laws_chatter_is_a_limit_cycle() {
     let paper = paper::scenario(Model::Simplified, Case::DEFAULT).unwrap();
@@ -103,7 +104,7 @@ fn the_printed_laws_chatter_is_a_limit_cycle() {
     assert_eq!(fly(Bounds { swings_hz: 1e4, ..bounds }), None);
 }
 
-/// Noise, wind, turbulence and a course of steps: nothing that the flight profile's monitor would trip on.
+/// Noise, wind, turbulence and a course of steps do not trip the monitor of the profile `flight`.
 #[test]
 fn a_noisy_flight_in_wind_does_not_trip() {
     let wind =
@@ -118,8 +119,8 @@ fn a_noisy_flight_in_wind_does_not_trip() {
     }
 }
 
-/// A trip while the vehicle learns to lean against the wind: the inputs go on as they were, the fallback takes it back to
-/// its place, and so does AFBC when it is engaged again. It does not engage itself.
+/// A trip while the vehicle learns to tilt against the wind: the inputs continue without a jump, the fallback law
+/// returns to the setpoint, and so does AFBC once it is engaged again. It does not engage itself.
 #[test]
 fn a_flight_goes_on_across_a_trip_and_back() {
     let setpoint = above(0.0);
@@ -127,7 +128,7 @@ fn a_flight_goes_on_across_a_trip_and_back() {
     let realism = Realism { drag: Some(Drag::PAPER), wind, ..Realism::default() };
     let mut bench = Bench::real(flight(|bounds| bounds.theta.x = 0.2), realism, Spread::default());
 
-    // At the hand-over inputs change by no more than they do from one step to the next: 5 mN, 5 mm/s2.
+    // At the switch, inputs change by no more than from one step to the next: 5 mN, 5 mm/s2.
     let bumpless = |before: &Trace, after: &Trace, what: &str| {
         let wanted = |trace: &Trace| {
             let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = trace.inputs;
@@ -155,7 +156,7 @@ fn a_flight_goes_on_across_a_trip_and_back() {
     }
     assert!(bench.distance_m(&setpoint) < 0.01, "{} m off", bench.distance_m(&setpoint));
 
-    // Engaged under bounds that let the wind pass.
+    // Engaged with bounds that the wind does not exceed.
     bench.controller = flight(|_| ());
     bench.controller.engage(&mut bench.memory.control);
     before = bench.trace();
@@ -168,7 +169,7 @@ fn a_flight_goes_on_across_a_trip_and_back() {
     }
 }
 
-/// The fallback is led to places far beyond its speed limits, up, down and aside, and gets there.
+/// The fallback law reaches setpoints far beyond its speed limits, up, down and sideways.
 #[test]
 fn the_fallback_flies_far() {
     let tripped = |bounds: &mut Bounds| bounds.lyapunov = PerAxis { z: 0.0, ..bounds.lyapunov };

@@ -1,5 +1,5 @@
-//! The model that the baseline inverts against the plant: written twice, once in the control crate and once in the
-//! physics, which never see each other.
+//! The model inverted by the baseline compared with the plant: two independent implementations, in the control crates
+//! and in the plant.
 #![allow(clippy::indexing_slicing, missing_docs)] // what is missing must stop the test
 
 use afbc::law::Context;
@@ -12,7 +12,7 @@ use proptest::prelude::*;
 /// Rounding error of one `f32` operation, relative.
 const U: f64 = 1.0 / (1 << 24) as f64;
 
-/// Largest error of the control crate's sine and cosine; `crates/afbc/tests/math.rs` holds them to it.
+/// Largest error of the control crate's sine and cosine, checked by `crates/control/tests/math.rs`.
 const TRIGONOMETRY: f64 = 1.2e-3;
 
 fn parameters() -> impl Strategy<Value = Parameters<f64>> {
@@ -38,10 +38,13 @@ fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 5_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// f_i + g_i u_i of (7) is the plant's own acceleration, subsystem by subsystem, for any rotor speeds.
+    /// f_i + g_i u_i of (7) is the plant's acceleration in each subsystem, for any rotor speeds.
     #[test]
     fn the_nominal_model_is_the_simplified_plant(
-        p in parameters(), attitude_rad in vector(1.4), rates_rad_s in vector(5.0), speeds in prop::array::uniform4(0.0_f64..500.0),
+        p in parameters(),
+        attitude_rad in vector(1.4),
+        rates_rad_s in vector(5.0),
+        speeds in prop::array::uniform4(0.0_f64..500.0),
     ) {
         let motion = Motion { attitude_rad, rates_rad_s, ..Motion::default() };
         let load = Load::new(&p, speeds, Vector3::zeros(), Vector3::zeros());
@@ -51,7 +54,13 @@ proptest! {
         let [f1, f2, f3, f4] = speeds.map(|w| p.thrust_factor_n_s2 * w * w);
         let state: State = motion.measure();
         let residual = w1 - w2 + w3 - w4;
-        let context = Context { state: &state, rotor_residual_rad_s: residual as f32, dt_s: 0.001, adapt: true, unallocated: PerAxis::default() };
+        let context = Context {
+            state: &state,
+            rotor_residual_rad_s: residual as f32,
+            dt_s: 0.001,
+            adapt: true,
+            unallocated: PerAxis::default(),
+        };
         let model = model::Model::new(&p.to_f32());
 
         let (q, r) = (rates_rad_s.abs(), residual.abs());
@@ -60,28 +69,47 @@ proptest! {
         let gyroscopic = |i: f64, x: f64| p.rotor_inertia_kg_m2 / i * x * r;
         let total = f1 + f2 + f3 + f4;
         let (_, c_theta) = (attitude_rad.x.cos(), attitude_rad.y.cos());
-        // For each subsystem: the plant's acceleration, the paper's U_i, and the sum of the terms' sizes. A term of f is
-        // rounded at most 8 times on its way; z's cosines are micromath's.
+        // For each subsystem: the plant's acceleration, the paper's U_i, and the sum of the terms' magnitudes. A term
+        // of f is rounded at most 8 times; z contains micromath's cosines.
         let cases = [
-            (Axis::Roll, x_dot[9], f3 - f1, coupling(i.y, i.z, i.x, q.y, q.z) + gyroscopic(i.x, q.y) + p.arm_m * total / i.x),
-            (Axis::Pitch, x_dot[10], f4 - f2, coupling(i.z, i.x, i.y, q.x, q.z) + gyroscopic(i.y, q.x) + p.arm_m * total / i.y),
-            (Axis::Yaw, x_dot[11], f1 - f2 + f3 - f4, coupling(i.x, i.y, i.z, q.x, q.y) + p.drag_factor_n_m_s2 / p.thrust_factor_n_s2 * total / i.z),
+            (
+                Axis::Roll,
+                x_dot[9],
+                f3 - f1,
+                coupling(i.y, i.z, i.x, q.y, q.z) + gyroscopic(i.x, q.y) + p.arm_m * total / i.x,
+            ),
+            (
+                Axis::Pitch,
+                x_dot[10],
+                f4 - f2,
+                coupling(i.z, i.x, i.y, q.x, q.z) + gyroscopic(i.y, q.x) + p.arm_m * total / i.y,
+            ),
+            (
+                Axis::Yaw,
+                x_dot[11],
+                f1 - f2 + f3 - f4,
+                coupling(i.x, i.y, i.z, q.x, q.y) + p.drag_factor_n_m_s2 / p.thrust_factor_n_s2 * total / i.z,
+            ),
             (Axis::Z, x_dot[5], total, 9.81 + total / p.mass_kg),
         ];
         for (axis, expected, u, size) in cases {
             let dynamics = model.dynamics(axis, &context);
             let got = f64::from(dynamics.f) + f64::from(dynamics.g) * u;
             let trigonometry = if axis == Axis::Z {
-                // Both cosines off by 1.2e-3 at most; below a product of 0.1, g_4 stays there by design.
+                // Both cosines are off by at most 1.2e-3; below a product of 0.1, g_4 is limited by design.
                 prop_assume!(attitude_rad.x.cos() * c_theta > 0.11);
                 (2.0 + TRIGONOMETRY) * TRIGONOMETRY * total / p.mass_kg
             } else {
                 0.0
             };
             let allowed = 8.0 * U * size + trigonometry;
-            prop_assert!((got - expected).abs() <= allowed, "{}: {got}, the plant gives {expected}, allowed {allowed:e}", axis.name());
+            prop_assert!(
+                (got - expected).abs() <= allowed,
+                "{}: {got}, the plant gives {expected}, allowed {allowed:e}",
+                axis.name()
+            );
         }
-        // The virtual subsystems are accelerations as they stand.
+        // The virtual subsystems are plain accelerations.
         for axis in [Axis::X, Axis::Y] {
             prop_assert_eq!(model.dynamics(axis, &context), model::Dynamics { f: 0.0, g: 1.0, g_dot: 0.0 });
         }
@@ -93,7 +121,13 @@ proptest! {
         let p = Parameters::PAPER;
         let model = model::Model::new(&p.to_f32());
         let state: State = Motion { attitude_rad, rates_rad_s, ..Motion::default() }.measure();
-        let context = Context { state: &state, rotor_residual_rad_s: 0.0, dt_s: 0.001, adapt: true, unallocated: PerAxis::default() };
+        let context = Context {
+            state: &state,
+            rotor_residual_rad_s: 0.0,
+            dt_s: 0.001,
+            adapt: true,
+            unallocated: PerAxis::default(),
+        };
         let dynamics = model.dynamics(Axis::Z, &context);
         let g = |t: f64| {
             let eta = attitude_rad + rates_rad_s * t;
@@ -109,7 +143,7 @@ proptest! {
     }
 }
 
-/// Beyond a tilt of 84 degrees g_4 no longer falls: positive as assumption A4 asks, whatever the attitude.
+/// Beyond a tilt of 84 degrees g_4 no longer falls: it stays positive, as assumption A4 requires, at any attitude.
 #[test]
 fn g_4_stays_positive_at_any_tilt() {
     let model = model::Model::new(&Parameters::PAPER.to_f32());

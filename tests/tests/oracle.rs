@@ -1,5 +1,5 @@
-//! The paper's flight against the table of an independent simulation in `f64`: simplified model (6), the law as printed,
-//! errors over 5 s to 60 s.
+//! The paper's flight compared with the table of an independent simulation in `f64`: simplified model (6), the law as
+//! printed, errors over 5 s to 60 s.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)] // a table that cannot be flown must stop the test
 
 use afbc_plant::Model;
@@ -14,10 +14,10 @@ use std::sync::LazyLock;
 /// Rows of the table: 8 scenarios, two laws.
 const TABLE_ROWS: usize = 16;
 
-/// Figures below this are not compared: 10 % of them is within the table's own rounding \[m, rad\].
+/// Figures below this are not compared, since 10 % of them is within the table's rounding \[m, rad\].
 const SMALLEST: f64 = 0.01;
 
-/// The agreement asked for.
+/// Required relative agreement.
 const SHARE: f64 = 0.1;
 
 const RMSE: [&str; 4] = ["rmse_x_m", "rmse_y_m", "rmse_z_m", "rmse_psi_rad"];
@@ -68,7 +68,7 @@ static FLOWN: LazyLock<Vec<(Case, ControllerKind, Metrics)>> = LazyLock::new(|| 
     })
 });
 
-/// Compares one group of columns wherever `counts` says so; returns how many figures were compared.
+/// Compares one group of columns where `counts` is true; returns the number of figures compared.
 fn compare(
     columns: [&str; 4],
     figures: fn(&Metrics) -> [f64; 4],
@@ -137,10 +137,10 @@ fn largest_errors_agree_within_10_percent() {
     assert_eq!(compared, 51);
 }
 
-/// U4 under uncertainty is a relay that switches at every step: its mean change is well defined. The trembling of U1 and
-/// U2 is not, except where nothing but uncertainty excites it: it grows out of rounding once delta_hat passes a
-/// threshold, so when it starts depends on the width of the numbers. Rounding the measured state to `f32`, with the law
-/// itself in `f64`, moves the calm figure of U1 from 9 to 13 mN; there is no figure to agree on.
+/// U4 under uncertainty is a relay that switches at every step, so its mean change is well defined. The chatter of U1
+/// and U2 is not, unless it is excited only by the uncertainty: it grows from rounding errors once delta_hat exceeds a
+/// threshold, so its onset depends on the floating-point format. Rounding the measured state to `f32`, with the law in
+/// `f64`, changes the calm figure of U1 from 9 to 13 mN.
 #[test]
 fn changes_of_inputs_agree_within_10_percent_where_they_are_defined() {
     let figures = |metrics: &Metrics| (metrics.mean_abs_delta_u * 1000.0).into();
@@ -151,7 +151,7 @@ fn changes_of_inputs_agree_within_10_percent_where_they_are_defined() {
     assert_eq!(compared, 7);
 }
 
-/// The baseline's inputs are smooth to the table's last digit, 0.1 mN, and U3's are under either law.
+/// The baseline's inputs are smooth to the table's last digit, 0.1 mN, and so is U3 under either law.
 #[test]
 fn smooth_inputs_are_as_smooth_as_in_the_table() {
     let figures = |metrics: &Metrics| (metrics.mean_abs_delta_u * 1000.0).into();

@@ -1,10 +1,11 @@
-//! Scenarios with `flight_core`: a controller inside the flight core coasts through what it would not survive alone.
+//! Scenarios with `flight_core`: inside the flight core, a controller coasts through outages that it would not survive
+//! alone.
 #![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be flown must stop the test")]
 
 use afbc_sim::flight::{Lost, Sample, fly};
 use afbc_sim::scenario::{Outage, Scenario, built_in};
 
-/// The paper's flight on hardware, on a link that is down for `length_s` from 7.45 s on: a gust begins meanwhile.
+/// The paper's flight on hardware, with an outage of `length_s` from 7.45 s on, during which a gust begins.
 fn scenario(length_s: f64, flight_core: bool) -> Scenario {
     let mut scenario = built_in("hardware").unwrap().read().unwrap();
     scenario.duration_s = 20.0;
@@ -13,7 +14,7 @@ fn scenario(length_s: f64, flight_core: bool) -> Scenario {
     scenario
 }
 
-/// What became of each contender: its name, the loss, the largest distance from the reference \[m\], the last sample.
+/// Returns for each contender its name, the loss, the largest distance from the reference \[m\] and the last sample.
 fn outcomes(scenario: &Scenario) -> Vec<(String, Option<Lost>, f64, Sample)> {
     let outcome = |contender: &afbc_sim::contender::Contender| {
         let (mut worst_m, mut last) = (0.0_f64, None);
@@ -29,7 +30,7 @@ fn outcomes(scenario: &Scenario) -> Vec<(String, Option<Lost>, f64, Sample)> {
 }
 
 #[test]
-fn every_law_rides_out_what_the_flight_core_rides_out() {
+fn inside_the_flight_core_every_law_survives_an_outage() {
     let outcomes = outcomes(&scenario(0.24, true));
     assert_eq!(outcomes.len(), 5);
     for (name, lost, worst_m, _) in outcomes {
@@ -39,13 +40,13 @@ fn every_law_rides_out_what_the_flight_core_rides_out() {
 }
 
 #[test]
-fn alone_a_law_does_not_survive_a_second() {
+fn alone_no_law_survives_an_outage_of_a_second() {
     for (name, lost, ..) in outcomes(&scenario(1.0, false)) {
         assert!(lost.is_some(), "{name}");
     }
 }
 
-/// Nothing but the arming tick differs from a flight of the law alone.
+/// Only the arming tick differs from a flight of the law alone.
 #[test]
 fn without_an_outage_the_flight_core_changes_nothing() {
     let ends = [true, false].map(|flight_core| outcomes(&scenario(0.0, flight_core)));
@@ -56,7 +57,7 @@ fn without_an_outage_the_flight_core_changes_nothing() {
     }
 }
 
-/// A state that does not come back leads down, and motors that have stopped.
+/// Without states to the end, the vehicle descends and its motors stop.
 #[test]
 fn an_outage_to_the_end_ends_with_the_motors_off() {
     for (name, _, _, last) in outcomes(&scenario(f64::INFINITY, true)) {

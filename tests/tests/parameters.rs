@@ -1,4 +1,5 @@
-//! Every declared parameter: `docs/parameters.md` lists them, and their names serve a ground station for good.
+//! Every declared parameter is listed in `docs/parameters.md`, with a name that suits ground stations and never
+//! changes.
 //!
 //! `WRITE=1 cargo test -p flight-tests --test parameters` writes the page.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
@@ -16,10 +17,10 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-/// One parameter, or one number of a vector.
+/// One parameter, or one element of a vector.
 struct Row {
     name: String,
-    /// In each of the group's columns.
+    /// Value in each of the group's columns.
     values: Vec<String>,
     declaration: Declaration,
 }
@@ -28,19 +29,19 @@ struct Row {
 struct Group {
     title: String,
     prefix: &'static str,
-    /// Headings of the columns of values: the default, or that of each profile.
+    /// Headings of the value columns: the default, or each profile.
     columns: Vec<&'static str>,
     rows: Vec<Row>,
-    /// Whether the values are in range, column by column.
+    /// Whether the values of each column are in range.
     valid: Vec<Result<(), OutOfRange>>,
 }
 
-/// A group whose parameters have one default.
+/// Returns a group whose parameters have one default.
 fn group(title: impl Into<String>, prefix: &'static str, parameters: impl Declared) -> Group {
     columns(title, prefix, [("default", parameters)])
 }
 
-/// A group whose parameters have a default in each profile.
+/// Returns a group whose parameters have a default in each profile.
 fn profiles<G: Declared>(title: impl Into<String>, prefix: &'static str, of: impl Fn(Profile) -> G) -> Group {
     columns(title, prefix, Profile::ALL.map(|profile| (profile.name(), of(profile))))
 }
@@ -75,12 +76,12 @@ fn columns<G: Declared, const N: usize>(
     Group { title: title.into(), prefix, columns: columns.iter().map(|(heading, _)| *heading).collect(), rows, valid }
 }
 
-/// AFBC's bounds on the paper's vehicle.
+/// Returns AFBC's bounds for the paper's vehicle.
 fn bounds(profile: Profile) -> Bounds {
     Bounds::new(&profile.gains(), &Parameters::PAPER.to_f32())
 }
 
-/// The gains of a law: those of each profile, or for a law outside the cascade its own.
+/// Returns the gains of a law: those of each profile, or its own for a law outside the cascade.
 fn gains(kind: ControllerKind) -> Group {
     let title = kind.title();
     let title = format!("{}{}", title[..1].to_uppercase(), &title[1..]);
@@ -91,7 +92,7 @@ fn gains(kind: ControllerKind) -> Group {
     }
 }
 
-/// Everything that is declared, in the order of the page.
+/// Returns all declared parameters, in the order of the page.
 fn groups() -> Vec<Group> {
     let mut groups = vec![
         group("Vehicle: `[vehicle]`, `[truth]`", "V_", Parameters::DEFAULT),
@@ -176,15 +177,15 @@ fn names_are_unique_and_fit_mavlink() {
     assert!(names.len() > 150, "{}", names.len());
 }
 
-/// A key ends in its unit, so that nobody has to look it up; the paper's letters do not.
+/// A key ends in its unit, unless it is one of the paper's letters.
 #[test]
 fn a_key_ends_in_its_unit() {
     const LETTERS: [&str; 3] = ["alpha1", "sigma", "lyapunov"];
     for Row { name, declaration: Declaration { range, unit, .. }, .. } in groups().into_iter().flat_map(|g| g.rows) {
         let ending: String = unit.to_lowercase().replace([' ', '/'], "_");
-        // "1/s" is "_1_s", a plain number "1" has no ending.
+        // "1/s" is "_1_s"; a plain number "1" has no ending.
         let has_unit = !["1", ""].contains(&unit) && !LETTERS.contains(&range.name);
-        // What depends on the axis has no one unit.
+        // A unit that depends on the axis is left out.
         let has_unit = has_unit && !unit.contains("input") && !unit.contains(" or ");
         assert!(!has_unit || range.name.ends_with(&format!("_{ending}")), "{name}: {} in {unit}", range.name);
     }

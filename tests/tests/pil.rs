@@ -1,5 +1,5 @@
-//! The paper's flight, gusts and uncertainty on, flown by the firmware's own machine code on an emulated Cortex-M4F: in
-//! 60,000 ticks of control, no bit differs from what the same code gives on the host.
+//! The paper's flight, with gusts and uncertainty, flown by the firmware's machine code on an emulated Cortex-M4F: in
+//! 60,000 control ticks no bit differs from the same code on the host.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
 use afbc_plant::Model;
@@ -11,12 +11,13 @@ use pil::budget::TICK_INSTRUCTIONS_MAX;
 use pil::{Emulator, Image, Twins};
 use std::io::Write as _;
 
-/// The emulator, or none if this test has to be skipped, which it says on the terminal. Under CI nothing may be skipped.
+/// Returns the emulator, or none, with a message on the terminal, if the test has to be skipped. Under CI nothing may
+/// be skipped.
 fn emulator_or_skip() -> Option<Emulator> {
     match Image::Pil.find().and_then(|image| Emulator::start(&image)) {
         Ok(emulator) => Some(emulator),
         Err(error) if error.is_missing() && std::env::var_os("CI").is_none() => {
-            // Not println!: the test harness would hide it.
+            // Not println!, which the test harness would hide.
             let _ = writeln!(std::io::stderr(), "SKIPPED, nothing was tested: {error}");
             None
         }
@@ -42,6 +43,6 @@ fn the_papers_flight_is_the_hosts_bit_for_bit() {
     );
     assert_eq!((comparison.differing_ticks, comparison.differing_bits), (0, 0));
     assert_eq!(comparison.late_ticks, 0);
-    // The budget of docs/budgets.md, in the flight that chatters most. Counted, not timed: every run gives the same.
+    // The budget of docs/budgets.md, in the flight with the most chatter. Counted, not timed: every run gives the same.
     assert!(comparison.instructions.max() <= f64::from(TICK_INSTRUCTIONS_MAX), "{comparison:?}");
 }

@@ -23,17 +23,18 @@ fn every_law_flies_the_papers_experiment_on_hardware() {
     assert_eq!(runs.len(), ControllerKind::ALL.len());
     for run in &runs {
         assert_eq!(run.lost, None, "{}", run.contender.name);
-        // Thrust and inertia are off by 40 % and 75 %, gusts stay on: backstepping keeps most of a metre, the rest less.
+        // Thrust is off by 40 %, inertia by 75 %, and gusts persist: backstepping keeps an error of most of a metre,
+        // the others less.
         assert!(run.metrics.max_abs.xyz().amax() < 1.0, "{}: {}", run.contender.name, run.metrics.max_abs);
     }
-    // The paper's claim, where the paper did not make it: AFBC keeps less than half of backstepping's error.
+    // The paper's claim under other conditions: AFBC keeps less than half of backstepping's error.
     let rmse = |kind| runs.iter().find(|run| run.contender.kind() == kind).unwrap().metrics.rmse;
     let (afbc, baseline) = (rmse(ControllerKind::Afbc), rmse(ControllerKind::Backstepping));
     assert!(afbc.iter().zip(&baseline).all(|(a, b)| *a < 0.5 * b), "{afbc} against {baseline}");
 }
 
 #[test]
-fn the_storm_loses_nobody() {
+fn no_law_loses_the_vehicle_in_the_storm() {
     for seed in 7..10 {
         let scenario = Scenario { seed, ..scenario("storm", 60.0) };
         for contender in &scenario.contenders {
@@ -44,7 +45,7 @@ fn the_storm_loses_nobody() {
     }
 }
 
-/// The printed gains chatter on rotors that lag; the monitor sees it, and the law that stands in flies on.
+/// The printed gains chatter on rotors with a lag; the monitor detects it, and the fallback law takes over.
 #[test]
 fn a_monitor_that_trips_saves_the_vehicle() {
     let text = |monitor| {
@@ -65,7 +66,7 @@ fn a_monitor_that_trips_saves_the_vehicle() {
 }
 
 #[test]
-fn a_seed_makes_the_flight() {
+fn the_seed_determines_the_flight() {
     let storm = scenario("storm", 3.0);
     let ends = |scenario: &Scenario| {
         let last = samples(scenario, ControllerKind::Afbc).pop().unwrap();
@@ -77,7 +78,7 @@ fn a_seed_makes_the_flight() {
     assert_eq!(elsewhere, first);
     let other = ends(&Scenario { seed: storm.seed + 1, ..storm.clone() });
     assert!(other.0 != first.0 && other.1 != first.1);
-    // All contenders meet the same noise.
+    // All contenders have the same noise.
     let biased = parse("biased", "seed = 3\n[sensors]\nbias = 0.01\n[trajectory]\nkind = \"paper\"", "biased").unwrap();
     let first = |kind| {
         let sample = samples(&Scenario { duration_s: 0.1, ..biased.clone() }, kind).swap_remove(0);
@@ -102,7 +103,7 @@ fn in_a_dropout_nothing_is_learnt() {
             assert_eq!(now.estimates, before.estimates, "at {} s", now.time_s);
         }
     }
-    // 2 a second of 30 ms: some 600 of 10,000 steps.
+    // 2 per second of 30 ms each: some 600 of 10,000 steps.
     assert!((200..1500).contains(&missed), "{missed}");
 }
 

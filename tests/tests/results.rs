@@ -1,5 +1,11 @@
-//! docs/results.md says what the code does.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, missing_docs)] // a page that cannot be read must stop the test
+//! The tables of docs/results.md agree with the code.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    missing_docs,
+    reason = "a page that cannot be read must stop the test"
+)]
 
 use afbc_campaign::compare;
 use afbc_report::results;
@@ -8,7 +14,7 @@ use afbc_sim::scenario::built_in;
 
 const PAGE: &str = include_str!("../../docs/results.md");
 
-/// Figures may differ in the last printed digit, and by the 2 % that another host's rounding may do to chatter.
+/// True if figures differ by at most the last digit, or by the 2 % that another host's rounding may change chatter by.
 fn agree(page: &str, code: &str) -> bool {
     match (page.parse::<f64>(), code.parse::<f64>()) {
         (Ok(page), Ok(code)) => (page - code).abs() <= 1.5e-4 + 0.02 * code.abs(),
@@ -31,7 +37,8 @@ fn the_results_page_is_what_the_code_does() {
     }
 }
 
-/// The table of `sitl compare`: the standard contenders in `hardware`, an asterisk on whatever is best as printed.
+/// The table of `sitl compare`: the standard contenders in `hardware`, with an asterisk on the best of each column as
+/// printed.
 #[test]
 fn the_table_on_real_rotors_is_what_flies() {
     let scenario = built_in("hardware").unwrap().read().unwrap();

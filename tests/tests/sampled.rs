@@ -1,4 +1,4 @@
-//! Flights on a tracker as they are: 100 states a second, each 10 ms late, through the flight core.
+//! Flights with a realistic tracker through the flight core: 100 states per second, each 10 ms late.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
 use afbc::Profile;
@@ -9,10 +9,10 @@ use afbc_sim::scenario::{Scenario, built_in};
 use afbc_types::{OutOfRange, State};
 use std::collections::VecDeque;
 
-/// When, in ms of power-up, the vehicle is armed and let go.
+/// Time since power-up at which the vehicle is armed and released \[ms\].
 const ARMED_MS: u64 = 1_100;
 
-/// A tracker's states: one every so many ms, each so many ms late.
+/// A tracker: one state every so many ms, each so many ms late.
 struct Tracker {
     period_ms: u64,
     late_ms: u64,
@@ -24,7 +24,7 @@ impl Tracker {
         Tracker { period_ms, late_ms, under_way: VecDeque::new() }
     }
 
-    /// What arrives at `now_ms`, if the vehicle is in this state now.
+    /// Returns the state that arrives at `now_ms`, given the vehicle's present state.
     fn turn(&mut self, now_ms: u64, state: State) -> Option<Stamped<State>> {
         if now_ms.is_multiple_of(self.period_ms) {
             self.under_way.push_back(Stamped { value: state, at_us: now_ms * 1000 });
@@ -48,7 +48,7 @@ impl Task for OnTracker<'_> {
     }
 }
 
-/// Root mean square of the distance from the reference from 5 s on \[m\], and whether it flew to the end.
+/// Returns the root mean square distance from the reference from 5 s on \[m\], and whether the flight was completed.
 fn fly<C: FlightController>(scenario: &Scenario, controller: C, mut tracker: Tracker) -> (f64, bool) {
     let vehicle = Vehicle::new(scenario.vehicle.to_f32(), ArmingLimits::NONE, controller).unwrap();
     let (mut memory, mut inbox) = (Memory::default(), Inbox::default());
@@ -82,7 +82,8 @@ fn flown(scenario: &Scenario, kind: ControllerKind, tracker: Tracker) -> (f64, b
     contender.build(scenario.vehicle.to_f32(), OnTracker { scenario, tracker }).unwrap()
 }
 
-/// As close as on a state a millisecond, or nearly: extrapolation makes up for the rest. Without it PID and AFBC are lost.
+/// Nearly as accurate as with a state every millisecond, due to extrapolation. Without it PID and AFBC lose the
+/// vehicle.
 #[test]
 fn a_tracker_of_100_hz_that_is_10_ms_late_is_flown_on() {
     let mut scenario = built_in("hardware").unwrap().read().unwrap();

@@ -1,18 +1,18 @@
-//! How the code is laid out: no module imports one that imports it, and no crate is more than a fifth of the whole.
+//! Structure of the code: no circular imports between modules, and no crate larger than a fifth of the whole.
 #![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be read must stop the test")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A module's path within its crate; the crate itself is empty.
+/// Path of a module within its crate; empty for the crate itself.
 type Module = Vec<String>;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// Every Rust file below `folder`.
+/// Returns every Rust file below `folder`.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().path());
     let of = |path: PathBuf| match path.extension() {
@@ -23,13 +23,13 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     entries.flat_map(of).collect()
 }
 
-/// The folders of all crates.
+/// Returns the folders of all crates.
 fn crates() -> Vec<PathBuf> {
     let inner = fs::read_dir(root().join("crates")).unwrap().map(|entry| entry.unwrap().path());
     inner.chain(["sitl", "tests", "firmware"].map(|name| root().join(name))).collect()
 }
 
-/// Code of the files of one crate, by module: neither comments nor tests.
+/// Returns the code of one crate's files by module, without comments and tests.
 fn modules(src: &Path) -> BTreeMap<Module, String> {
     let mut modules = BTreeMap::new();
     for path in files(src) {
@@ -49,7 +49,7 @@ fn modules(src: &Path) -> BTreeMap<Module, String> {
     modules
 }
 
-/// The paths of a `use` tree: `a::{b, c::d}` is a::b and a::c::d. Names after `as` are left out.
+/// Returns the paths of a `use` tree: a::b and a::c::d for `a::{b, c::d}`. Names after `as` are left out.
 fn paths(tree: &str) -> Vec<Vec<String>> {
     let tree = tree.trim();
     if let Some(inner) = tree.strip_prefix('{').and_then(|tree| tree.strip_suffix('}')) {
@@ -71,7 +71,7 @@ fn paths(tree: &str) -> Vec<Vec<String>> {
     }
 }
 
-/// A path as written in `module`, from the crate's root; none if it leads elsewhere.
+/// Returns a path as written in `module`, from the crate's root; none if it leads elsewhere.
 fn absolute(module: &Module, path: &[String], all: &BTreeMap<Module, String>) -> Option<Vec<String>> {
     let ups = path.iter().take_while(|part| *part == "super").count();
     let (base, rest) = match path.first()?.as_str() {
@@ -84,9 +84,9 @@ fn absolute(module: &Module, path: &[String], all: &BTreeMap<Module, String>) ->
     Some([base, rest].concat())
 }
 
-/// Which modules each imports. What a module hands on by `pub use` belongs to whoever takes it from there.
+/// Returns the imports of each module. A path to something re-exported by `pub use` leads to where that is defined.
 fn imports(all: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Module>> {
-    // The module that a path leads into, and what is taken from it.
+    // The module that a path leads into, and the name taken from it.
     let target = |path: &[String]| {
         let length = (0..=path.len()).rev().find(|&length| path.get(..length).is_some_and(|p| all.contains_key(p)));
         let (module, rest) = path.split_at(length.unwrap_or(0));
@@ -106,7 +106,7 @@ fn imports(all: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Module>>
                 }
             }
         }
-        // And paths in the code itself, but of macros, which belong to the crate's root wherever they stand.
+        // Paths in the code itself, except of macros, which belong to the crate's root wherever they are defined.
         let words = code.split_inclusive(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
         for word in words.filter(|word| word.starts_with("crate::") || word.starts_with("super::")) {
             let Some(word) = (!word.ends_with('!')).then(|| word.trim_end_matches(|c: char| !c.is_alphanumeric()))
@@ -130,7 +130,7 @@ fn imports(all: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Module>>
     imports.iter().map(of).collect()
 }
 
-/// A circle of imports, if there is one: what imports nothing that is left is taken away, again and again.
+/// Returns the modules of circular imports, if any: modules without remaining imports are removed repeatedly.
 fn circle(mut imports: BTreeMap<Module, BTreeSet<Module>>) -> Vec<Module> {
     loop {
         let left: BTreeSet<Module> = imports.keys().cloned().collect();
@@ -162,11 +162,11 @@ fn a_circle_is_found() {
     assert!(find(&[("", "mod a; mod b;"), ("a", "use crate::b::B;"), ("b", "fn f() {}")]).is_empty());
     assert_eq!(find(&[("a", "use crate::b::B;"), ("b", "use super::a::{self, A};")]).len(), 2);
     assert_eq!(find(&[("a", "fn f() { crate::b::g() }"), ("b", "use crate::a::A;")]).len(), 2);
-    // Through a parent that hands on what its children hold.
+    // Through a parent that re-exports its children's items.
     let parent = ("p", "mod a; mod b; pub use a::A; pub use b::{B, C};");
     assert!(find(&[parent, ("p::a", "use super::B;"), ("p::b", "fn f() {}")]).is_empty());
     assert_eq!(find(&[parent, ("p::a", "use super::B;"), ("p::b", "use crate::p::A;")]).len(), 2);
-    // A parent that uses its child, which uses it.
+    // A parent that uses its child, which uses the parent.
     assert_eq!(find(&[("p", "mod a; use a::f; struct P;"), ("p::a", "use super::P;")]).len(), 2);
 }
 

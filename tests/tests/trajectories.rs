@@ -1,4 +1,4 @@
-//! Reference trajectories: analytic derivatives against differences, continuity, and what each is described to do.
+//! Reference trajectories: analytic derivatives compared with differences, continuity, and shape.
 #![allow(clippy::indexing_slicing, missing_docs)] // what is missing must stop the test
 
 use afbc_sim::trajectory::{Reference, Sine, Trajectory, Waypoint};
@@ -29,7 +29,7 @@ fn waypoints() -> impl Strategy<Value = Vec<Waypoint>> {
     })
 }
 
-/// Every kind that moves smoothly.
+/// Every kind of smooth trajectory.
 fn smooth() -> impl Strategy<Value = Trajectory> {
     prop_oneof![
         Just(Trajectory::Paper),
@@ -43,7 +43,7 @@ fn smooth() -> impl Strategy<Value = Trajectory> {
     ]
 }
 
-/// \[x, y, z, yaw\] of each order.
+/// \[x, y, z, yaw\] and their derivatives, by order.
 fn orders(r: &Reference) -> [[f64; 4]; 3] {
     let four = |v: Vector3<f64>, yaw| [v.x, v.y, v.z, yaw];
     [
@@ -53,7 +53,7 @@ fn orders(r: &Reference) -> [[f64; 4]; 3] {
     ]
 }
 
-/// The longest and the shortest time that the trajectory needs for its size: bounds on its derivatives.
+/// Longest and shortest time scale of the trajectory, for bounds on its derivatives.
 fn pace(trajectory: &Trajectory) -> (f64, f64) {
     match trajectory {
         Trajectory::Paper => (60.0, 60.0),
@@ -77,22 +77,31 @@ proptest! {
     fn derivatives_are_those_of_the_position(trajectory in smooth(), t in 0.0_f64..80.0) {
         let h = 1e-4;
         if let Trajectory::Waypoints(waypoints) = &trajectory {
-            // The third derivative jumps at a waypoint; differences across it are for the next test.
+            // The third derivative jumps at a waypoint; differences across it are left to the next test.
             prop_assume!(waypoints.iter().all(|waypoint| (waypoint.time_s - t).abs() > 2.0 * h));
         }
         let [back, here, ahead] = [t - h, t, t + h].map(|t| orders(&trajectory.at(t)));
-        // Sizes up to 40 m over the shortest time: the third derivative is at most 40 (2 pi / T)^3, or 60 * 40 / T^3 in
-        // minimum jerk, the fourth 360 * 40 / T^4 (or 40 (2 pi / T)^4). Differences are off by h^2/6 of those, and by
-        // rounding of 40 m (and of times up to 80 s) over h.
+        // Sizes up to 40 m over the shortest time: the third derivative is at most 40 (2 pi / T)^3, or 60 * 40 / T^3
+        // for minimum jerk, the fourth 360 * 40 / T^4 (or 40 (2 pi / T)^4). Differences are off by h^2/6 of those, and
+        // by the rounding of 40 m (and of times up to 80 s) over h.
         let shortest = pace(&trajectory).1;
         let third = 40.0 * 248.0 / shortest.powi(3);
         let fourth = 40.0 * 1559.0 / shortest.powi(4);
         let rounding = |speed: f64| 4.0 * f64::EPSILON * (40.0 + 80.0 * speed) / h;
         for axis in 0..4 {
             let rate = (ahead[0][axis] - back[0][axis]) / (2.0 * h);
-            prop_assert!((rate - here[1][axis]).abs() <= h * h / 6.0 * third + rounding(40.0 * 6.3 / shortest), "axis {axis}: {rate} for {}", here[1][axis]);
+            prop_assert!(
+                (rate - here[1][axis]).abs() <= h * h / 6.0 * third + rounding(40.0 * 6.3 / shortest),
+                "axis {axis}: {rate} for {}",
+                here[1][axis]
+            );
             let acceleration = (ahead[1][axis] - back[1][axis]) / (2.0 * h);
-            prop_assert!((acceleration - here[2][axis]).abs() <= h * h / 6.0 * fourth + rounding(40.0 * 40.0 / (shortest * shortest)), "axis {axis}: {acceleration} for {}", here[2][axis]);
+            prop_assert!(
+                (acceleration - here[2][axis]).abs()
+                    <= h * h / 6.0 * fourth + rounding(40.0 * 40.0 / (shortest * shortest)),
+                "axis {axis}: {acceleration} for {}",
+                here[2][axis]
+            );
         }
     }
 
@@ -113,14 +122,14 @@ proptest! {
                 }
             }
         }
-        // Rest before the first and after the last.
+        // At rest before the first and after the last.
         if let (Some(first), Some(last)) = (waypoints.first(), waypoints.last()) {
             prop_assert_eq!(trajectory.at(first.time_s - 1.0), Reference::rest(first.position_m, first.yaw_rad));
             prop_assert_eq!(trajectory.at(last.time_s + 1.0), Reference::rest(last.position_m, last.yaw_rad));
         }
     }
 
-    /// Between two waypoints the way is straight, and never overshoots either.
+    /// Between two waypoints the path is straight and does not overshoot.
     #[test]
     fn a_leg_is_straight_and_monotone(a in vector(20.0), b in vector(20.0), length in 0.5_f64..20.0) {
         let at = |time_s, position_m| Waypoint { time_s, position_m, yaw_rad: 0.0 };
@@ -139,7 +148,12 @@ proptest! {
     }
 
     #[test]
-    fn a_circle_is_round_level_and_counter_clockwise(centre_m in vector(10.0), radius_m in 0.1_f64..20.0, period_s in 2.0_f64..60.0, t in 0.0_f64..80.0) {
+    fn a_circle_is_round_level_and_counter_clockwise(
+        centre_m in vector(10.0),
+        radius_m in 0.1_f64..20.0,
+        period_s in 2.0_f64..60.0,
+        t in 0.0_f64..80.0,
+    ) {
         let circle = Trajectory::Circle { centre_m, radius_m, period_s, yaw_rad: 0.5 };
         let start = circle.at(0.0).position_m - centre_m;
         prop_assert!((start - Vector3::new(radius_m, 0.0, 0.0)).norm() <= 1e-12 * (1.0 + centre_m.norm() + radius_m));
@@ -152,7 +166,13 @@ proptest! {
     }
 
     #[test]
-    fn a_step_is_a_step(from_m in vector(10.0), to_m in vector(10.0), at_s in 0.1_f64..50.0, yaw_rad in -3.0_f64..3.0, turn_rad in -3.0_f64..3.0) {
+    fn a_step_is_a_step(
+        from_m in vector(10.0),
+        to_m in vector(10.0),
+        at_s in 0.1_f64..50.0,
+        yaw_rad in -3.0_f64..3.0,
+        turn_rad in -3.0_f64..3.0,
+    ) {
         let step = Trajectory::Step { from_m, to_m, at_s, yaw_rad, turn_rad };
         prop_assert_eq!(step.at(0.0), Reference::rest(from_m, yaw_rad));
         prop_assert_eq!(step.at(at_s.next_down()), Reference::rest(from_m, yaw_rad));
@@ -160,22 +180,19 @@ proptest! {
         prop_assert_eq!(step.at(at_s + 100.0), Reference::rest(to_m, yaw_rad + turn_rad));
     }
 
-    /// Section IV as printed, with its sines and their phases.
+    /// Section IV as printed, with its sines and phases.
     #[test]
     fn the_papers_trajectory_is_the_printed_one(t in 0.0_f64..120.0) {
         use core::f64::consts::{FRAC_PI_2, PI};
         let a = PI * t / 30.0;
         let r = Trajectory::Paper.at(t);
-        let printed = Vector3::new(
-            1.0 - (a + FRAC_PI_2).sin(),
-            -2.0 * (a + PI).sin(),
-            5.0 - 3.0 * (a + FRAC_PI_2).sin(),
-        );
+        let printed =
+            Vector3::new(1.0 - (a + FRAC_PI_2).sin(), -2.0 * (a + PI).sin(), 5.0 - 3.0 * (a + FRAC_PI_2).sin());
         prop_assert!((r.position_m - printed).amax() <= 1e-13);
         prop_assert!((r.yaw_rad - 0.43 * (a + PI).sin()).abs() <= 1e-14);
     }
 
-    /// The controller is told the same, rounded once.
+    /// The controller's setpoint is the reference, rounded once.
     #[test]
     fn the_setpoint_is_the_reference_rounded(trajectory in smooth(), t in 0.0_f64..80.0) {
         let reference = trajectory.at(t);

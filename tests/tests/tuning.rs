@@ -1,4 +1,4 @@
-//! What the gains that fly cost over the flights of the search, and over those held out, is what docs/tuning.md says.
+//! The costs of the gains that fly, in the training and the held-out flights, are those of docs/tuning.md.
 #![allow(
     clippy::unwrap_used,
     clippy::indexing_slicing,
@@ -10,7 +10,7 @@ use afbc::Profile;
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_tune::{LOST, by_hand, costs, held_out, mean, training};
 
-/// The law with the gains that `sitl tune` found; AFBC under its monitor, as in the search.
+/// Returns the law with the gains found by `sitl tune`; AFBC under its monitor, as in the search.
 fn found(kind: ControllerKind) -> Contender {
     Contender::of(kind, Profile::Flight).monitored()
 }

@@ -1,6 +1,12 @@
-//! The vehicles of `vehicles/`: each could exist, lifts itself with the margin that is asked for, says where its parameters
-//! come from, and has the figures of `docs/vehicles.md`.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)] // a broken file must stop the test
+//! The files of `vehicles/`: each vehicle is physically possible and has enough thrust, each value has a source, and
+//! the figures of `docs/vehicles.md` follow from them.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    missing_docs,
+    reason = "a broken file must stop the test"
+)]
 
 use afbc::guarded::HOVER_AUTHORITY;
 use afbc_control::mixer::HOVER_MARGIN;
@@ -15,11 +21,11 @@ const GRAVITY_M_S2: f64 = 9.81;
 
 struct Vehicle {
     text: String,
-    /// Every value by its path: `vehicle.mass_kg`, `rotor.0.position_m.1`.
+    /// Every value by path: `vehicle.mass_kg`, `rotor.0.position_m.1`.
     values: BTreeMap<String, String>,
 }
 
-/// Puts every value below `value` into `values`.
+/// Adds every value below `value` to `values`.
 fn flatten(path: &str, value: &DeValue<'_>, values: &mut BTreeMap<String, String>) {
     let mut inner = |key: &str, value: &DeValue<'_>| flatten(&format!("{path}.{key}"), value, values);
     match value {
@@ -27,7 +33,7 @@ fn flatten(path: &str, value: &DeValue<'_>, values: &mut BTreeMap<String, String
         DeValue::Array(array) => array.iter().enumerate().for_each(|(i, value)| inner(&i.to_string(), value.get_ref())),
         DeValue::Float(float) => drop(values.insert(path[1..].to_owned(), float.as_str().to_owned())),
         DeValue::String(text) => drop(values.insert(path[1..].to_owned(), text.to_string())),
-        // A number without a point is one that nobody has looked at.
+        // Numbers must be written with a decimal point.
         other => panic!("{path}: {other:?}"),
     }
 }
@@ -49,7 +55,7 @@ impl Vehicle {
         self.vector("vehicle.inertia_kg_m2")
     }
 
-    /// Place and spin of each rotor.
+    /// Position and spin of each rotor.
     fn rotors(&self) -> Vec<(Vector3<f64>, f64)> {
         let spins = (0..).map_while(|i| Some((i, self.values.get(&format!("rotor.{i}.spin"))?.as_str())));
         let rotor = |(i, spin)| {
@@ -63,7 +69,7 @@ impl Vehicle {
         spins.map(rotor).collect()
     }
 
-    /// Force of one rotor when hovering, all of them alike \[N\].
+    /// Force of each rotor in hover, all being equal \[N\].
     fn hover_n(&self) -> f64 {
         self.number("vehicle", "mass_kg") * GRAVITY_M_S2 / self.rotors().len() as f64
     }
@@ -76,7 +82,7 @@ impl Vehicle {
         self.number("rotors", "force_max_n") / self.hover_n()
     }
 
-    /// Angular acceleration about each axis, every rotor moving by what it has room for both ways \[rad/s2\].
+    /// Angular acceleration about each axis with every rotor at its smaller margin up or down \[rad/s2\].
     fn authority_rad_s2(&self) -> Vector3<f64> {
         let room_n = self.hover_n().min(self.number("rotors", "force_max_n") - self.hover_n());
         let lever = self.number("vehicle", "drag_factor_n_m_s2") / self.number("vehicle", "thrust_factor_n_s2");
@@ -85,7 +91,7 @@ impl Vehicle {
         (levers * room_n).component_div(&self.inertia_kg_m2())
     }
 
-    /// What the rotors' shafts take when hovering \[W\].
+    /// Shaft power in hover \[W\].
     fn hover_w(&self) -> f64 {
         let drag = self.number("vehicle", "drag_factor_n_m_s2");
         self.rotors().len() as f64 * drag * self.hover_rad_s().powi(3)
@@ -96,7 +102,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// Every file of `vehicles/`, by name.
+/// Returns every file of `vehicles/`, by name.
 fn vehicles() -> BTreeMap<String, Vehicle> {
     let files = fs::read_dir(root().join("vehicles")).unwrap().map(|entry| entry.unwrap().path());
     let vehicle = |path: std::path::PathBuf| {
@@ -127,7 +133,7 @@ fn the_papers_vehicle_is_the_papers() {
             gravity_m_s2: GRAVITY_M_S2,
         }
     );
-    // `afbc_types`: 1 at -y, 2 at +x, 3 at +y, 4 at -x; 1 and 3 push the body to positive yaw, against their spin.
+    // `afbc_types`: 1 at -y, 2 at +x, 3 at +y, 4 at -x; 1 and 3 yaw the body positively, against their spin.
     let frame: Vec<_> = vehicles["paper"].rotors().iter().map(|(at, spin)| (at.x, at.y, *spin)).collect();
     assert_eq!(frame, [(0.0, -0.25, -1.0), (0.25, 0.0, 1.0), (0.0, 0.25, -1.0), (-0.25, 0.0, 1.0)]);
 }
@@ -137,7 +143,7 @@ fn each_could_exist() {
     for (name, vehicle) in vehicles() {
         let (rotors, i) = (vehicle.rotors(), vehicle.inertia_kg_m2());
         assert!((4..=8).contains(&rotors.len()), "{name}: {} rotors", rotors.len());
-        // In hover all rotors are alike: they neither tip nor turn the vehicle.
+        // With equal rotor forces the vehicle hovers without a moment.
         let centre: Vector3<f64> = rotors.iter().map(|(at, _)| at).sum();
         assert!(centre.xy().norm() < 1e-9, "{name}: {centre}");
         assert_eq!(rotors.iter().map(|(_, spin)| spin).sum::<f64>(), 0.0, "{name}: spin");
@@ -154,7 +160,7 @@ fn each_could_exist() {
             (vehicle.number("rotors", "force_max_n"), vehicle.number("vehicle", "thrust_factor_n_s2"));
         let full_rad_s = vehicle.number("motor", "speed_max_rad_s");
         assert!(b * full_rad_s * full_rad_s > 0.999 * force_max_n, "{name}: {full_rad_s} rad/s");
-        // The battery can give what the rotors take at their largest force.
+        // The battery can supply the rotors at their largest force.
         let shaft_w = vehicle.hover_w() * vehicle.thrust_to_weight().powf(1.5);
         let taken_w = shaft_w / vehicle.number("battery", "efficiency") + vehicle.number("battery", "avionics_w");
         let given_w = vehicle.number("battery", "full_v").powi(2) / (4.0 * vehicle.number("battery", "resistance_ohm"));
@@ -173,7 +179,7 @@ fn each_flies_with_margin() {
     }
 }
 
-/// A value's own line names a source that the file's first lines list, or says that it is estimated or follows from others;
+/// Each value's line names a source listed at the top of the file, or says that it is estimated or follows from others,
 /// or a comment above it in the same paragraph does.
 #[test]
 fn each_says_where_its_parameters_come_from() {
@@ -195,7 +201,7 @@ fn each_says_where_its_parameters_come_from() {
         };
         let mut values = 0;
         for paragraph in vehicle.text.split("\n\n").filter(|paragraph| !paragraph.contains("description = ")) {
-            // The rotors have theirs above the first of them.
+            // The sources of the rotors are above the first one.
             let mut above = paragraph.starts_with("[[rotor]]");
             for line in paragraph.lines() {
                 if line.starts_with('#') {

@@ -1,4 +1,4 @@
-//! Vehicles of other sizes: whatever is not refused by name hovers under every law of the profile `flight`.
+//! Vehicles of other sizes: each hovers under every law of the profile `flight`, or is refused by name.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
 use afbc::{Guarded, Profile};
@@ -10,7 +10,7 @@ use afbc_types::{Axis, Parameters};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// The hover scenario for this vehicle, with rotors of 20 ms and of this largest force, starting a little off.
+/// Returns the hover scenario for this vehicle, with rotors of 20 ms and this largest force, with an initial error.
 fn scenario(vehicle: Parameters<f64>, force_max_n: f64) -> Scenario {
     let hardware = built_in("hardware").unwrap().read().unwrap();
     let mut scenario = built_in("hover").unwrap().read().unwrap();
@@ -23,7 +23,7 @@ fn scenario(vehicle: Parameters<f64>, force_max_n: f64) -> Scenario {
     scenario
 }
 
-/// Flies it, with rotors of `margin` times the force that hovering takes; the distance at the end \[m\], or why it was refused.
+/// Flies it with rotors of `margin` times the hover force; returns the final distance \[m\], or why it was refused.
 fn hovers(kind: ControllerKind, vehicle: Parameters<f64>, margin: f64) -> Result<f64, String> {
     let force_max_n = margin * vehicle.mass_kg * vehicle.gravity_m_s2 / 4.0;
     let scenario = scenario(vehicle, force_max_n);
@@ -40,7 +40,7 @@ fn hovers(kind: ControllerKind, vehicle: Parameters<f64>, margin: f64) -> Result
     Ok(distance_m)
 }
 
-/// A vehicle of this mass and size, its inertia that of masses at the rotors and in the middle.
+/// Returns a vehicle of this mass and size; `spread` sets the share of mass at the rotors.
 fn vehicle(mass_kg: f64, arm_m: f64, spread: f64) -> Parameters<f64> {
     let inertia = spread * mass_kg * arm_m * arm_m;
     Parameters {
@@ -70,10 +70,13 @@ fn five_laws_hover_vehicles_from_50_g_to_3_kg() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Refused by name, or flown: nothing in between.
+    /// Every vehicle is refused by name or hovers.
     #[test]
     fn what_is_not_refused_hovers(
-        mass_kg in 0.05..3.5_f64, arm_m in 0.05..0.4_f64, spread in 0.05..0.4_f64, margin in 0.8..3.0_f64,
+        mass_kg in 0.05..3.5_f64,
+        arm_m in 0.05..0.4_f64,
+        spread in 0.05..0.4_f64,
+        margin in 0.8..3.0_f64,
     ) {
         let vehicle = vehicle(mass_kg, arm_m, spread);
         let hover_n = mass_kg * 9.81 / 4.0;
@@ -82,13 +85,13 @@ proptest! {
             Ok(distance_m) => prop_assert!(margin > 1.299 && authority > 79.9 && distance_m < 0.03, "{distance_m} m"),
             Err(error) if error.contains("rotor_force_max_n") => prop_assert!(margin < 1.301, "{error}"),
             Err(error) if error.contains("hover_authority_rad_s2") => prop_assert!(authority < 80.1, "{error}"),
-            // Of the heaviest, yaw would have to learn faster than any gain may be.
+            // For the heaviest vehicles, the gain of yaw would be out of range.
             Err(error) => prop_assert!(error.contains("gamma") && vehicle.inertia_kg_m2.z > 0.1, "{error}"),
         }
     }
 }
 
-/// Found by the property above before they were refused: the first came no nearer than 0.2 m, the others tripped.
+/// Found by the property above before such vehicles were refused: the first stayed 0.2 m away, the others tripped.
 #[test]
 fn vehicles_that_turn_too_slowly_are_refused() {
     for (mass_kg, arm_m, spread, margin) in [
@@ -101,7 +104,7 @@ fn vehicles_that_turn_too_slowly_are_refused() {
     }
 }
 
-/// `Guarded` of the profile `flight` in a perfect hover, whatever the vehicle weighs: it does not trip.
+/// `Guarded` of the profile `flight` does not trip in an ideal hover, whatever the vehicle's weight.
 #[test]
 fn a_perfect_hover_does_not_trip() {
     use afbc_control::FlightController;

@@ -1,8 +1,8 @@
-//! The board of the processor in the loop: the host, by semihosting, so no pins and no timers. The processor stands still,
-//! time included, while the host works. Memory is the flight image's, `memory.x` at the workspace's root.
+//! The board of the processor in the loop: the host replaces pins and timers, by semihosting. The processor, including
+//! its time, stops while the host works. Memory is as in the flight image, `memory.x` at the workspace's root.
 //!
-//! Two FIFOs, little-endian. `to_firmware`: a u32 length and that many bytes, all that reaches the link before the next
-//! control tick. `from_firmware`, for each of them: the tick's time \[us\] as u64; its core cycles, the deepest stack
+//! Two FIFOs, little-endian. `to_firmware`: a u32 length and that many bytes, which reach the link before the next
+//! control tick. `from_firmware`, for each of these: the tick's time \[us\] as u64; its core cycles, the deepest stack
 //! \[bytes\] and a length as u32; four throttles as u16; and as many bytes as the length says.
 
 use core::cell::Cell;
@@ -17,13 +17,13 @@ use semihosting::fs::File;
 use semihosting::io::{Read, Write};
 use semihosting::process::exit;
 
-/// What reached the link, and the most that may reach it in one tick \[bytes\].
+/// Bytes received by the link, at most this many per tick.
 static LINK: Pipe<CriticalSectionRawMutex, 4096> = Pipe::new();
 
 /// Throttles of the last tick.
 static THROTTLES: Mutex<CriticalSectionRawMutex, Cell<[u16; 4]>> = Mutex::new(Cell::new([0; 4]));
 
-/// The host.
+/// The board.
 pub(crate) struct Emulated;
 
 impl Board for Emulated {
@@ -40,13 +40,13 @@ impl Board for Emulated {
         (Emulated, Receiver, transmitter)
     }
 
-    /// Counts on. A sleeping processor would let QEMU move its clock from another thread, which now and then moves it twice
-    /// over what the processor did just before: time would depend on the host's load.
+    /// Spins. While a processor sleeps, QEMU advances its clock from another thread, and sometimes counts the same time
+    /// twice, so time would depend on the host's load.
     fn idle() {
         cortex_m::asm::nop();
     }
 
-    /// The emulator's clock does not fail.
+    /// The emulated clock does not fail.
     fn clock_has_failed(&self) -> bool {
         false
     }
@@ -56,16 +56,16 @@ impl Board for Emulated {
         false
     }
 
-    /// Notes the throttles for the reply.
+    /// Stores the throttles for the reply.
     fn drive(&mut self, throttles: [u16; 4]) {
         THROTTLES.lock(|cell| cell.set(throttles));
     }
 
-    /// There is none.
+    /// There is no watchdog.
     fn feed_watchdog(&mut self) {}
 }
 
-/// The link, in.
+/// Receiving side of the link.
 pub(crate) struct Receiver;
 
 impl board::Receiver for Receiver {
@@ -74,14 +74,14 @@ impl board::Receiver for Receiver {
     }
 }
 
-/// The link, out, and the hand-over to the host.
+/// Sending side of the link, which also returns control to the host.
 pub(crate) struct Transmitter {
     to_firmware: File,
     from_firmware: File,
 }
 
 impl board::Transmitter for Transmitter {
-    /// Replies with it, and waits for the next tick's bytes.
+    /// Sends the reply, and waits for the next tick's bytes.
     fn transmit(&mut self, tick: &Tick, bytes: &[u8]) {
         let mut head = [0; 28];
         let words = [tick.cycles, housekeeping::stack_bytes(), bytes.len() as u32];
@@ -96,7 +96,7 @@ impl board::Transmitter for Transmitter {
 }
 
 impl Transmitter {
-    /// Hands the host's next bytes to the link. If the host has gone, so does the firmware.
+    /// Passes the host's next bytes to the link. Ends the firmware if the host has ended.
     fn take_bytes(&mut self) {
         let mut length = [0; 4];
         if self.to_firmware.read_exact(&mut length).is_err() {
@@ -109,8 +109,8 @@ impl Transmitter {
             self.to_firmware.read_exact(part).expect("the host sends what it announced");
             let mut left = &part[..];
             while !left.is_empty() {
-                // A ring takes what fits before its end, then the rest.
-                let taken = LINK.try_write(left).expect("the link takes 4096 bytes a tick");
+                // A ring accepts bytes up to its end, then the rest.
+                let taken = LINK.try_write(left).expect("the link takes 4096 bytes per tick");
                 left = left.get(taken..).unwrap_or_default();
             }
             length -= part.len();

@@ -1,5 +1,5 @@
-//! The image for the processor in the loop, on QEMU's STM32F405. A panic or fault ends the emulator with a status that says
-//! which.
+//! The image for the processor in the loop, on QEMU's STM32F405. A panic or fault ends the emulator with a distinct
+//! exit status.
 #![no_std]
 #![no_main]
 
@@ -17,7 +17,7 @@ fn panic(info: &PanicInfo) -> ! {
     exit(101)
 }
 
-#[allow(unsafe_code, reason = "the runtime asks for it: a fault may have left anything behind")]
+#[allow(unsafe_code, reason = "required by the runtime: a fault may leave any state")]
 #[cortex_m_rt::exception]
 unsafe fn HardFault(_: &cortex_m_rt::ExceptionFrame) -> ! {
     exit(102)

@@ -1,10 +1,10 @@
-//! Link, motors and watchdog of the STM32F405RG; wiring is in `docs/firmware.md`.
+//! Link, motors and watchdog of the STM32F405RG; `docs/firmware.md` shows the wiring.
 //!
 //! | what | where |
 //! |---|---|
 //! | crystal | 8 MHz on PH0, PH1 ([`clocks`]) |
 //! | link | USART1: TX on PA9, RX on PA10 |
-//! | motors 1 to 4 | TIM8, channels 1 to 4: PC6, PC7, PC8, PC9; played by DMA2's stream 1 |
+//! | motors 1 to 4 | TIM8, channels 1 to 4: PC6, PC7, PC8, PC9; driven by DMA2's stream 1 |
 //! | memory | `memory.x` at the workspace's root |
 //! | sensors | none yet, so no alignment: the state comes over the link |
 
@@ -37,15 +37,14 @@ use static_cell::StaticCell;
 
 /// Bits per second of the link.
 const BAUD: u32 = 921_600;
-/// So many bytes wake the reader \[0.35 ms of a line that never pauses\]; fewer do when the line falls idle, as it does
-/// after a message, and at the latest with the next control tick, after which the reader looks anyway. Waking for every
-/// byte would take most of the processor's time.
+/// Bytes that wake the reader \[0.35 ms of a busy line\]. Fewer wake it when the line becomes idle, as after a message,
+/// and it also runs after every control tick. Waking it for every byte would take most of the processor's time.
 const READ_MIN: usize = 32;
-/// The watchdog resets the chip if it is not fed for this long \[us\]: 13.6 to 37.6 ms, as its oscillator's 32 kHz may be
-/// anything from 17 to 47. A processor that stands still stops the motors
-/// sooner: motor controllers do so after some 20 ms without a frame.
+/// The watchdog resets the chip if it is not fed for this long \[us\]: in fact 13.6 to 37.6 ms, since its oscillator's
+/// nominal 32 kHz may be 17 to 47. Motor controllers stop sooner if the processor hangs, after some 20 ms without a
+/// frame.
 const WATCHDOG_US: u32 = 20_000;
-/// A frame to the motors that takes longer is given up \[us\].
+/// Longest transfer of a frame to the motors before it is aborted \[us\].
 const TRANSFER_MAX_US: u64 = 2_000;
 /// Timers of the second peripheral bus run at the core's clock \[Hz\].
 const MOTOR_TIMER_HZ: u32 = firmware::time::CORE_HZ;
@@ -55,14 +54,14 @@ bind_interrupts!(struct Irqs {
     DMA2_STREAM1 => dma::InterruptHandler<DMA2_CH1>;
 });
 
-/// Rings of the link's bytes.
+/// Ring buffers of the link.
 static RX: StaticCell<[u8; 1024]> = StaticCell::new();
 static TX: StaticCell<[u8; 1024]> = StaticCell::new();
 
 /// Newest throttles, for the motors' task.
 static THROTTLES: Signal<CriticalSectionRawMutex, [u16; 4]> = Signal::new();
 
-/// The board, brought up.
+/// The board after start-up.
 pub(crate) struct Stm32f405 {
     watchdog: IndependentWatchdog<'static, IWDG>,
 }
@@ -109,12 +108,12 @@ impl Board for Stm32f405 {
         (Stm32f405 { watchdog }, Receiver(receiver), Transmitter(transmitter))
     }
 
-    /// Sleeps.
+    /// Sleeps until the next interrupt.
     fn idle() {
         cortex_m::asm::wfi();
     }
 
-    /// True if the crystal has failed: the chip's own oscillator has taken over.
+    /// True if the crystal has failed and the chip's own oscillator has taken over.
     fn clock_has_failed(&self) -> bool {
         clocks::have_failed()
     }
@@ -132,11 +131,12 @@ impl Board for Stm32f405 {
     }
 }
 
-/// The motors' waveform: a row a bit, a column a motor. A burst of the DMA, four columns, must not cross 1 KiB.
+/// The motors' waveform, with a row for each bit and a column for each motor. A DMA burst of four columns must not
+/// cross 1 KiB.
 #[repr(align(8))]
 struct Rows([[u16; 4]; 17]);
 
-/// DSHOT600 on TIM8, channels 1 to 4, played by DMA.
+/// DSHOT600 on TIM8, channels 1 to 4, sent by DMA.
 struct Motors {
     pwm: SimplePwm<'static, TIM8>,
     dma: Peri<'static, DMA2_CH1>,
@@ -151,16 +151,16 @@ impl Motors {
         let rows = self.rows.0.as_flattened();
         let dma = self.dma.reborrow();
         let transfer = self.pwm.waveform_up_multi_channel(dma, Irqs, Channel::Ch1, Channel::Ch4, rows);
-        // Without the check for an overflow that would panic in 585,000 years.
+        // Wrapping, without a check for an overflow after 585,000 years that could panic.
         let deadline = Instant::from_micros(Instant::now().as_micros().wrapping_add(TRANSFER_MAX_US));
         if with_deadline(deadline, transfer).await.is_err() {
-            // The next frame sets the stream up anew.
-            defmt::warn!("the motors' DMA stands still");
+            // The next frame sets up the stream again.
+            defmt::warn!("the motors' DMA transfer has stopped");
         }
     }
 }
 
-/// Out of line, as the control tick is, to be counted.
+/// Encodes a frame for each motor. Out of line, like the control tick, to be counted.
 #[inline(never)]
 fn encode(timing: &Timing, throttles: [u16; 4], rows: &mut Rows) {
     timing.rows(throttles, &mut rows.0);
@@ -173,23 +173,23 @@ async fn motors(mut motors: Motors) {
     }
 }
 
-/// Leaves the motors without a signal, whatever state the program is in. They stop by themselves then.
+/// Stops the motors' signals, whatever state the program is in. The motor controllers then stop by themselves.
 pub(crate) fn stop_motors() {
     use pac::gpio::vals::Moder;
-    // Their pins become plain outputs, which hold 0 since start-up.
+    // The pins become plain outputs, whose output register is 0 since start-up.
     pac::GPIOC.moder().modify(|mode| (6..=9).for_each(|pin| mode.set_moder(pin, Moder::OUTPUT)));
 }
 
-/// A task that is not needed to fly has panicked.
+/// True if a task that is not needed in flight has panicked.
 static TASK_FAILED: AtomicBool = AtomicBool::new(false);
 
-/// Where a task that is not needed to fly ends when it panics: whatever is more urgent goes on.
+/// Ends a task that is not needed in flight after its panic; everything of higher priority continues.
 pub(crate) fn park() -> ! {
     TASK_FAILED.store(true, Ordering::Relaxed);
     loop {
         // It may have panicked with interrupts off.
-        #[expect(unsafe_code, reason = "the critical section that this may end is one that nobody returns to")]
-        // SAFETY: what it protected is tried before it is used: the inbox, the ticks, the alarms.
+        #[expect(unsafe_code, reason = "it ends a critical section that is never returned to")]
+        // SAFETY: the data that it protected is borrowed by try_borrow everywhere: the inbox, the ticks, the alarms.
         unsafe {
             cortex_m::interrupt::enable()
         };
@@ -197,13 +197,13 @@ pub(crate) fn park() -> ! {
     }
 }
 
-/// The link, in.
+/// Receiving side of the link.
 pub(crate) struct Receiver(BufferedUartRx<'static>);
 
 impl board::Receiver for Receiver {
     fn receive(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize> {
-        // A new reading each time, which the compiler knows not to be one that has ended: that would panic. An overrun
-        // loses bytes, which the decoder notices.
+        // A new read each time, since polling one that has ended would panic. An overrun loses bytes, which the decoder
+        // notices.
         poll_fn(move |context| {
             let length = ready!(pin!(self.0.fill_buf()).poll(context)).map_or(0, |bytes| {
                 buffer.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
@@ -215,13 +215,13 @@ impl board::Receiver for Receiver {
     }
 }
 
-/// The link, out.
+/// Sending side of the link.
 pub(crate) struct Transmitter(BufferedUartTx<'static>);
 
 impl board::Transmitter for Transmitter {
-    /// Leaves it out if the line is that far behind.
+    /// Drops the bytes if the line is too far behind.
     fn transmit(&mut self, _tick: &Tick, bytes: &[u8]) {
-        // Takes all of them or, if the ring has no room, none; the driver forgets those who wait for room.
+        // Accepts all bytes or, if the ring is full, none; the driver does not wake those who wait for room.
         if !bytes.is_empty() {
             let _ = poll_once(self.0.write(bytes));
         }

@@ -1,8 +1,8 @@
-//! Clocks of the real board: 168 MHz, the chip's rated speed, from the crystal, or, should that fail, from the chip's own
-//! oscillator; and a flash that keeps up with them.
+//! Clocks of the board: 168 MHz, the chip's rated speed, from the crystal or, if that fails, from the chip's own
+//! oscillator; and the flash settings for this speed.
 //!
-//! The oscillator of the chip is good to 1 % at room temperature: the vehicle flies on it, and everything is up to 1 %
-//! too fast or too slow, but nobody takes off on it ([`have_failed`]).
+//! The internal oscillator is accurate to 1 % at room temperature. The vehicle can fly on it, with all times up to 1 %
+//! too short or too long, but arming is refused ([`have_failed`]).
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_stm32::pac::rcc::vals::{Pllm, Pllsrc, Sw};
@@ -15,32 +15,32 @@ use embassy_stm32::{Config, Peripherals};
 
 /// The crystal \[Hz\].
 const CRYSTAL: Hertz = Hertz(8_000_000);
-/// How long a crystal may take to start \[ms\]; usually 2.
+/// Longest start-up time of a crystal \[ms\]; usually 2.
 const CRYSTAL_START_MS: u32 = 100;
 /// Core cycles in a millisecond, before the clocks are set up.
 const START_UP_CYCLES_PER_MS: u32 = 16_000;
-/// Looks at the locking loop until it counts as broken: at 16 MHz some 3 ms, of which it needs 0.3.
+/// Polls of the PLL until it counts as broken: at 16 MHz some 3 ms, of which it needs 0.3.
 const LOCK_LOOKS: u32 = 5_000;
 
 static FAILED: AtomicBool = AtomicBool::new(false);
 
-/// True if the crystal has failed, at the start or in flight: nobody should take off.
+/// True if the crystal has failed, at the start or in flight, so that arming must be refused.
 pub(crate) fn have_failed() -> bool {
     FAILED.load(Ordering::Relaxed)
 }
 
-/// Sets up clocks and flash. To be called once, in the state that a reset leaves.
+/// Sets up clocks and flash. To be called once after reset.
 pub(crate) fn start() -> Peripherals {
     let crystal = crystal_starts();
     FAILED.store(!crystal, Ordering::Relaxed);
     let peripherals = embassy_stm32::init(config(crystal));
     speed_up_flash();
-    // The clock security system: hardware that falls back on the chip's oscillator and raises an NMI.
+    // The clock security system switches to the chip's oscillator and raises an NMI if the crystal fails.
     RCC.cr().modify(|cr| cr.set_csson(crystal));
     peripherals
 }
 
-/// Turns the crystal on, since embassy's init would wait for it for ever.
+/// Turns the crystal on; embassy's init would wait for it forever.
 fn crystal_starts() -> bool {
     RCC.cr().modify(|cr| cr.set_hseon(true));
     (0..CRYSTAL_START_MS).any(|_| {
@@ -54,7 +54,7 @@ fn crystal_starts() -> bool {
 
 /// 168 MHz; buses at 168, 42 and 84 MHz.
 fn config(crystal: bool) -> Config {
-    // Both give the loop 2 MHz.
+    // Both give the PLL an input of 2 MHz.
     let (source, prediv) = if crystal { (PllSource::HSE, PllPreDiv::DIV4) } else { (PllSource::HSI, PllPreDiv::DIV8) };
     let mut config = Config::default();
     config.rcc.hse = crystal.then_some(Hse { freq: CRYSTAL, mode: HseMode::Oscillator });
@@ -68,13 +68,13 @@ fn config(crystal: bool) -> Config {
     config
 }
 
-/// First revision of the chip (Z) whose flash may prefetch; on revision A, prefetching corrupts what is fetched.
+/// First revision of the chip (Z) with a working flash prefetch; on revision A it corrupts the data.
 const REVISION_Z: u16 = 0x1001;
 
-/// Turns on the flash's caches and its prefetch, which embassy leaves off: five wait states a fetch are then seldom seen.
+/// Turns on the flash's caches and its prefetch, which embassy leaves off: they hide most of the five wait states.
 fn speed_up_flash() {
     let acr = FLASH.acr();
-    // Off now, as they must be to be emptied: a boot loader may have used them.
+    // Off now, as required for a flush: a boot loader may have used them.
     acr.modify(|acr| {
         acr.set_icrst(true);
         acr.set_dcrst(true);
@@ -88,8 +88,8 @@ fn speed_up_flash() {
     });
 }
 
-/// The crystal has failed: the core runs at 16 MHz by now. Back to 168, in less than a control period.
-#[allow(unsafe_code, reason = "the runtime asks for it: this interrupts critical sections")]
+/// Handles a failed crystal: the core runs at 16 MHz, and is set to 168 MHz again within a control period.
+#[allow(unsafe_code, reason = "required by the runtime: this interrupts critical sections")]
 #[cortex_m_rt::exception]
 unsafe fn NonMaskableInt() {
     if !RCC.cir().read().cssf() {

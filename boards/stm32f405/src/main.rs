@@ -15,7 +15,7 @@ firmware::image!(board::Stm32f405);
 fn panic(info: &PanicInfo) -> ! {
     if firmware::executors::in_dispensable_task() {
         let (file, line) = info.location().map_or(("", 0), |place| (place.file(), place.line()));
-        defmt::error!("a task has failed, flying on without it: {=str}:{=u32}", file, line);
+        defmt::error!("a task has failed, the flight continues without it: {=str}:{=u32}", file, line);
         board::park()
     }
     board::stop_motors();
@@ -25,7 +25,7 @@ fn panic(info: &PanicInfo) -> ! {
 
 #[expect(unsafe_code, reason = "nothing may be pushed before the stack pointer is set")]
 mod hard_fault {
-    /// Entered on any fault, perhaps with a stack that has left the RAM: takes a fresh one first.
+    /// Entered on any fault, possibly with a stack pointer outside the RAM: sets up a new stack first.
     #[unsafe(naked)]
     #[unsafe(no_mangle)]
     extern "C" fn HardFault() -> ! {
@@ -39,7 +39,7 @@ extern "C" fn fault() -> ! {
     wait_for_watchdog()
 }
 
-/// The watchdog resets the chip, which starts disarmed.
+/// Waits until the watchdog resets the chip, which starts disarmed.
 fn wait_for_watchdog() -> ! {
     cortex_m::interrupt::disable();
     loop {

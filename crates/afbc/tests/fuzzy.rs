@@ -1,5 +1,10 @@
 //! Properties of the fuzzy basis (17)-(19), for every membership that is accepted and every finite input.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a basis that cannot be built must stop the test
+#![allow(
+    clippy::indexing_slicing,
+    clippy::unwrap_used,
+    missing_docs,
+    reason = "a basis that cannot be built must stop the test"
+)]
 
 use afbc::fuzzy::{Basis, Membership, SPREAD};
 use afbc_types::{Declared, Range};

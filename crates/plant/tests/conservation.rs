@@ -1,5 +1,10 @@
 //! What physics conserves, the models must conserve; what is known in closed form, they must reproduce.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a plant that cannot be built must stop the test
+#![allow(
+    clippy::indexing_slicing,
+    clippy::unwrap_used,
+    missing_docs,
+    reason = "a plant that cannot be built must stop the test"
+)]
 
 use afbc_plant::integrate::rk4;
 use afbc_plant::{Environment, Load, Model, Motion, Plant, rigid_body, simplified};

@@ -1,5 +1,10 @@
 //! Gusts and parameter changes: how much, from exactly when, until exactly when.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // an environment that cannot be built must stop the test
+#![allow(
+    clippy::indexing_slicing,
+    clippy::unwrap_used,
+    missing_docs,
+    reason = "an environment that cannot be built must stop the test"
+)]
 
 use afbc_plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Plant, Quantity};
 use afbc_types::{Axis, Parameters, RotorSpeeds};

@@ -1,4 +1,4 @@
-//! `sitl campaign`, `sitl merge` and `sitl campaigns`: many flights.
+//! `sitl campaign`, `sitl merge` and `sitl campaigns`.
 
 use super::flying::{Flying, report};
 use super::json::Json;
@@ -21,30 +21,31 @@ use std::thread;
 
 /// Fly a campaign: one scenario, many times, with drawn vehicles, weather and faults
 ///
-/// Every contender flies the same draws. What is flown stays: after Ctrl-C or worse, the same command goes on. See
+/// Every contender flies the same draws. Finished flights are kept: after Ctrl-C or a crash, the same command resumes.
+/// See
 /// docs/campaigns.md.
 #[derive(Args, Debug)]
 pub(crate) struct Campaign {
     /// Name of a built-in campaign, or path of a campaign file
     campaign: Target,
 
-    /// Cores to fly on [default: all]; the results are the same
+    /// Number of cores [default: all]; the results do not depend on it
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<u64>,
 
-    /// Fly part I of N only, as one of N machines; `sitl merge` joins the parts
+    /// Fly only part I of N, as one of N machines; `sitl merge` joins the parts
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
 
-    /// Fly this one flight and report on it as `sitl fly` does; exits with 1 if a vehicle is lost
+    /// Fly only this flight and report on it as `sitl fly` does; exits with 1 if a vehicle is lost
     #[arg(long, value_name = "INDEX", conflicts_with_all = ["threads", "shard"])]
     flight: Option<u64>,
 
-    /// Contender of that one flight, instead of all; may be given more than once
+    /// Contender to fly with --flight, instead of all; may be given more than once
     #[arg(long = "contender", value_name = "NAME", requires = "flight")]
     contenders: Vec<String>,
 
-    /// Log rows a second of that one flight, a divisor of 1000 [default: 100; fewer of more than 10 minutes]
+    /// Log rows per second with --flight, a divisor of 1000 [default: 100; less for more than 10 minutes]
     #[arg(long, value_name = "HZ", requires = "flight")]
     log_hz: Option<LogRate>,
 
@@ -64,21 +65,19 @@ impl Campaign {
         }
         let shard = self.shard.unwrap_or(Shard::WHOLE);
         if shard.of > plan.flights {
-            return Err(
-                format!("--shard {shard}: there are only {} flights; cut them into fewer parts", plan.flights).into()
-            );
+            return Err(format!("--shard {shard}: there are only {} flights; use fewer parts", plan.flights).into());
         }
         let name =
             if shard.of > 1 { format!("{}-{}-of-{}", plan.name, shard.index, shard.of) } else { plan.name.clone() };
         let (out, flights) = (self.place.path(&name), shard.count(plan.flights));
         let threads = useful(self.threads, flights);
         interrupt::ends_with(format!(
-            "stopped; what was flown is in {}, and the same command goes on from there",
+            "stopped; finished flights are in {}, and the same command resumes",
             out.display()
         ))?;
         let folder = Folder::open(&out, Manifest::new(&plan, shard), self.place.force)?;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-        // The first to be heard of are those of earlier runs.
+        // Flights of earlier runs are reported first.
         let progress: OnceLock<Progress> = OnceLock::new();
         let done = |done| {
             let mut first = false;
@@ -98,7 +97,7 @@ impl Campaign {
         conclude(&folder, &summary, &self.campaign.to_string(), self.json)
     }
 
-    /// One flight, with all that can be shown of it.
+    /// Flies one flight, and writes everything about it.
     fn fly_again(self, plan: &Plan, flight: u64) -> Result<ExitCode, Failure> {
         if flight >= plan.flights {
             return Err(
@@ -126,18 +125,18 @@ fn threads(text: &str) -> Result<u64, &'static str> {
     text.parse().ok().filter(|threads| *threads > 0).ok_or("it must be a whole number from 1 on, such as 4")
 }
 
-/// As many of the `wanted` threads, or of all cores, as make `flights` go faster.
+/// Returns the smaller of the `wanted` number of threads, or of all cores, and of what is useful for `flights`.
 fn useful(wanted: Option<u64>, flights: u64) -> usize {
     let cores = thread::available_parallelism().map_or(1, |cores| cores.get() as u64);
     let most = cores.min(flights);
     if let Some(wanted) = wanted.filter(|wanted| *wanted > most) {
         let why = if flights < cores { format!("{flights} flights") } else { format!("{cores} cores") };
-        say(&format!("--threads {wanted}: flying on {most}, for there are {why}; more would be no faster"));
+        say(&format!("--threads {wanted}: flying on {most}, since there are {why}; more would not be faster"));
     }
     wanted.unwrap_or(most).min(most) as usize
 }
 
-/// Writes and prints what is to be said of all flights.
+/// Writes and prints the results of all flights.
 fn conclude(folder: &Folder, summary: &Summary, target: &str, json: Json) -> Result<ExitCode, Failure> {
     let out = folder.path();
     report::write(folder.place(), summary)?;
@@ -152,10 +151,10 @@ fn conclude(folder: &Folder, summary: &Summary, target: &str, json: Json) -> Res
     Ok(ExitCode::SUCCESS)
 }
 
-/// Join the parts of a campaign that `sitl campaign --shard` flew, into what one machine would have written
+/// Join the parts of a campaign flown by `sitl campaign --shard`, with the same result as on one machine
 #[derive(Args, Debug)]
 pub(crate) struct Merge {
-    /// Folder of each part, all of them
+    /// Folders of all parts
     #[arg(required = true, value_name = "DIR")]
     shards: Vec<PathBuf>,
 
@@ -163,7 +162,7 @@ pub(crate) struct Merge {
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
 
-    /// Write into that folder even if it holds something else; replaces what is in the way
+    /// Write into the folder even if it holds something else; replaces files of the same names
     #[arg(long)]
     force: bool,
 
@@ -174,7 +173,7 @@ pub(crate) struct Merge {
 impl Merge {
     /// Joins, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
-        interrupt::ends_with("stopped; the same command begins again".into())?;
+        interrupt::ends_with("stopped; the same command starts again".into())?;
         let (folder, summary) = campaign::merge(&self.shards, &self.out, self.force)?;
         conclude(&folder, &summary, &summary.manifest.target(), self.json)
     }
@@ -182,7 +181,7 @@ impl Merge {
 
 /// List the built-in campaigns, or print one of them to start from
 ///
-/// `sitl campaigns robustness > my.toml` makes a campaign file to change and to fly with `sitl campaign my.toml`.
+/// `sitl campaigns robustness > my.toml` writes a campaign file to edit and to fly with `sitl campaign my.toml`.
 #[derive(Args, Debug)]
 pub(crate) struct Campaigns {
     /// Built-in campaign to print

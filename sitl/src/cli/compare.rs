@@ -1,4 +1,4 @@
-//! `sitl compare`: every contender in every scenario.
+//! `sitl compare`.
 
 use super::json::Json;
 use super::log_rate::LogRate;
@@ -14,21 +14,21 @@ use afbc_sim::scenario::Scenario;
 use clap::Args;
 use std::process::ExitCode;
 
-/// Fly every controller through every scenario, and compare
+/// Fly every controller in every scenario, and compare them
 ///
-/// Without arguments: AFBC, AFBC as printed, backstepping, PID, geometric and INDI through the built-in scenario
-/// `hardware`. What is lost is part of the comparison and no failure.
+/// Without arguments: AFBC, AFBC as printed, backstepping, PID, geometric and INDI in the built-in scenario `hardware`.
+/// A lost vehicle is part of the comparison and does not change the exit code.
 #[derive(Args, Debug)]
 pub(crate) struct Compare {
-    /// Built-in scenarios or scenario files; all contenders of each fly all of them
+    /// Built-in scenarios or scenario files; the contenders of all of them fly each one
     #[arg(value_name = "SCENARIO")]
     scenarios: Vec<Target>,
 
-    /// Let these fly instead: contenders of the scenarios, afbc, afbc-as-printed, backstepping, pid, geometric, indi
+    /// Contenders to fly instead: those of the scenarios, afbc, afbc-as-printed, backstepping, pid, geometric, indi
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     controllers: Vec<String>,
 
-    /// Fly each scenario with this many seeds, from its own on, and compare means
+    /// Fly each scenario with this many consecutive seeds, from its own on, and compare means
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: u64,
 
@@ -77,7 +77,7 @@ impl Compare {
     }
 }
 
-/// Those called `names`, in that order: of the scenarios, or else of the standard ones.
+/// Returns the contenders `names`, in that order: of the scenarios, or else the standard ones.
 fn choose(own: &[Contender], names: &[String]) -> Result<Vec<Contender>, Failure> {
     let standard = standard();
     let mut chosen: Vec<Contender> = Vec::new();
@@ -97,7 +97,7 @@ fn choose(own: &[Contender], names: &[String]) -> Result<Vec<Contender>, Failure
     Ok(chosen)
 }
 
-/// Steps from row to row of the logs that figures are drawn from: one number, whoever flies.
+/// Returns the steps between rows of the logs for figures, the same for all contenders.
 fn log_every(scenarios: &[Scenario]) -> Result<u64, String> {
     let every = |scenario: &Scenario| {
         let usual = LogRate::usual(scenario.duration_s);

@@ -1,4 +1,4 @@
-//! `sitl fly`: one scenario.
+//! `sitl fly`.
 
 use super::flying::{Flying, report};
 use super::json::Json;
@@ -17,8 +17,8 @@ pub(crate) struct Fly {
     /// Name of a built-in scenario, or path of a scenario file
     scenario: Target,
 
-    /// Fly this law or contender alone; may be given more than once. A law that the scenario lacks flies with its default
-    /// gains
+    /// Fly only this law or contender; may be given more than once. A law that the scenario lacks flies with its
+    /// default gains
     #[arg(long = "controller", value_name = "NAME")]
     controllers: Vec<String>,
 
@@ -46,7 +46,7 @@ impl Fly {
     }
 }
 
-/// Keeps the contenders that are called one of `names` or fly a law called so, in their order, and adds laws that nobody
+/// Keeps the contenders named in `names`, or whose law is, in their order, and adds the laws named that no contender
 /// flies.
 fn choose(scenario: &mut Scenario, names: &[String]) -> Result<(), Failure> {
     let called = |contender: &Contender, name: &str| contender.name == name || contender.kind().name() == name;

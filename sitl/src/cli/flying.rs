@@ -1,4 +1,4 @@
-//! What `paper` and `fly` have in common: the options, the flights, the output.
+//! Options, flights and output shared by `paper` and `fly`.
 
 use super::json::Json;
 use super::log_rate::LogRate;
@@ -13,7 +13,7 @@ use afbc_sim::run::Run;
 use afbc_sim::scenario::{DURATION, Scenario};
 use clap::Args;
 
-/// Flights of more steps than this, about a second's worth, show their progress.
+/// Flights of more steps than this, about a second of computing time, show their progress.
 const QUIET_STEPS: f64 = 1e6;
 
 /// Options of every flight.
@@ -23,8 +23,9 @@ pub(crate) struct Flying {
     #[arg(long, value_name = "SECONDS", value_parser = duration)]
     pub(crate) duration: Option<f64>,
 
-    /// Log rows a second, a divisor of 1000; kept to the nearest whole number of control steps [default: 100; fewer of a
-    /// flight of more than 10 minutes]
+    /// Log rows per second, a divisor of 1000; rounded to whole numbers of control steps [default: 100; less for more
+    /// than 10
+    /// minutes]
     #[arg(long, value_name = "HZ")]
     pub(crate) log_hz: Option<LogRate>,
 }
@@ -36,7 +37,7 @@ fn duration(text: &str) -> Result<f64, String> {
 }
 
 impl Flying {
-    /// Flies every scenario under each of its contenders, once it is sure that `open` gives a folder for what comes of it.
+    /// Flies every scenario under each of its contenders, after checking that `open` gives an output folder.
     pub(crate) fn fly(
         self,
         mut scenarios: Vec<Scenario>,
@@ -69,7 +70,7 @@ impl Flying {
     }
 }
 
-/// Progress on stderr, run by run; nothing if it will not take long.
+/// Returns the progress on stderr, run by run; hidden for short flights.
 fn progress(scenarios: &[Scenario]) -> Progress {
     let steps = |s: &Scenario| s.contenders.iter().map(|contender| s.duration_s / contender.step_s()).sum::<f64>();
     if scenarios.iter().map(steps).sum::<f64>() < QUIET_STEPS {
@@ -80,7 +81,7 @@ fn progress(scenarios: &[Scenario]) -> Progress {
     Progress::new(name, "flights", runs as u64, 0)
 }
 
-/// Writes everything into `folder`, then prints the table and where to look.
+/// Writes everything into `folder`, then prints the table and the paths.
 pub(crate) fn report(folder: &Folder, flown: &[Flown], claims: &[Claim], json: Json) -> Result<(), Failure> {
     interrupt::is_too_late();
     let written = flights::write(folder, flown, claims)?;

@@ -1,4 +1,4 @@
-//! `sitl hitl`: a board in the loop.
+//! `sitl hitl`.
 
 use super::in_the_loop::{Flying, Recorder, outcome};
 use super::target::Target;
@@ -14,19 +14,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Fly a real board over a serial port, in real time
 ///
-/// The board flies a vehicle that is simulated here. ITS MOTOR OUTPUTS ARE LIVE: take the propellers off, or leave the
-/// motors unpowered. Ctrl-C disarms. See docs/hitl.md.
+/// The board flies a simulated vehicle, but ITS MOTOR OUTPUTS ARE LIVE: remove the propellers, or leave the motors
+/// unpowered. Ctrl-C disarms. See docs/hitl.md.
 #[derive(Args, Debug)]
 pub(crate) struct Hitl {
     /// Name of a built-in scenario, or path of a scenario file
     #[arg(default_value = "paper")]
     scenario: Target,
 
-    /// Serial port that the board is connected to
+    /// Serial port of the board
     #[arg(long, value_name = "DEVICE", required_unless_present = "list")]
     port: Option<String>,
 
-    /// Speed of the port; the firmware's is 921600
+    /// Baud rate of the port; the firmware's is 921600
     #[arg(long, value_name = "N", default_value_t = 921_600)]
     baud: u32,
 
@@ -82,7 +82,7 @@ impl Hitl {
     }
 }
 
-/// What the link and the board did.
+/// Formats statistics of the link and the board.
 fn figures(station: &Station) -> String {
     let (here, heard, round_trip) = (station.counters(), station.heard(), station.round_trip_ms());
     let health = heard.health.unwrap_or_default();
@@ -92,7 +92,7 @@ fn figures(station: &Station) -> String {
         "messages to here     {} received, {} lost, {} corrupt\n\
          messages to vehicle  {} received, {} lost, {} corrupt\n\
          round trip           min {min:.1}, mean {mean:.1}, max {max:.1} ms of {} questions, {} unanswered\n\
-         state age on board   {:.1} ms at most, of 10 looks a second\n\
+         state age on board   {:.1} ms at most, of 10 samples per second\n\
          control tick         {:.1} us at most, {:.0} Hz, {} late, {} saturated\n",
         here.received,
         here.lost,

@@ -1,4 +1,4 @@
-//! What `pil` and `hitl` have in common: the options, what is kept of the flight, what is said of it.
+//! Options, log and output shared by `pil` and `hitl`.
 
 use super::target::Target;
 use super::terminal::Failure;
@@ -19,12 +19,12 @@ pub(crate) struct Flying {
     #[arg(long, value_name = "SECONDS")]
     duration: Option<f64>,
 
-    /// Log the flight to this CSV file, 100 rows a second
+    /// Log the flight to this CSV file, 100 rows per second
     #[arg(long, value_name = "CSV")]
     out: Option<PathBuf>,
 }
 
-/// How the vehicle did beside a flight without a link, if it got to the end, and what else there is to say.
+/// Formats the errors next to those of a flight without a link, if it was completed, and how it ended.
 pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &End) -> Result<String, Failure> {
     let End { lost, interrupted, disarmed } = end;
     let mut text = match (lost, interrupted) {
@@ -33,7 +33,7 @@ pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &End) -> Resu
             in_the_loop::tracking(scenario.duration_s, metrics, &without_link)
         }
         (Some(lost), _) => format!("The vehicle was lost at t = {:.3} s: {}.\n", lost.time_s, lost.reason),
-        (None, true) => "The flight was broken off.\n".into(),
+        (None, true) => "The flight was aborted.\n".into(),
     };
     if !disarmed {
         text += "The vehicle did not confirm that it has disarmed.\n";
@@ -42,7 +42,7 @@ pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &End) -> Resu
 }
 
 impl Flying {
-    /// The scenario, if the firmware can fly it.
+    /// Returns the scenario, if the firmware can fly it.
     pub(crate) fn scenario(&self, target: &Target) -> Result<Scenario, Failure> {
         let mut scenario = target.scenario()?;
         scenario.duration_s = self.duration.unwrap_or(scenario.duration_s);
@@ -52,7 +52,7 @@ impl Flying {
     }
 }
 
-/// What is kept of a flight, and shown while it lasts.
+/// Log, metrics and progress of a flight.
 pub(crate) struct Recorder {
     metrics: Accumulator,
     log: Option<Log>,
@@ -60,11 +60,11 @@ pub(crate) struct Recorder {
     failure: Option<Error>,
 }
 
-/// Steps between two looks at the progress bar.
+/// Steps between updates of the progress bar.
 const PROGRESS_EVERY: u64 = 100;
 
 impl Recorder {
-    /// For a flight of `scenario`.
+    /// Creates the recorder of a flight of `scenario`.
     pub(crate) fn new(scenario: &Scenario, flying: &Flying) -> Result<Self, Failure> {
         let create = |path: &PathBuf| Log::create(path).map_err(|error| format!("{}: {error}", path.display()));
         let log = flying.out.as_ref().map(create).transpose()?;
@@ -75,7 +75,7 @@ impl Recorder {
         Ok(Recorder { metrics: Accumulator::default(), log, progress, failure: None })
     }
 
-    /// Takes one step into account; breaks the flight off if it cannot be logged.
+    /// Records one step; aborts the flight if it cannot be logged.
     pub(crate) fn observe(&mut self, sample: &Sample) -> ControlFlow<()> {
         self.metrics.add(sample);
         let step = (sample.time_s * 1000.0).round() as u64;
@@ -91,7 +91,7 @@ impl Recorder {
         }
     }
 
-    /// The figures of merit, once the log is complete.
+    /// Completes the log and returns the metrics.
     pub(crate) fn finish(self) -> Result<Metrics, Error> {
         self.progress.finish_and_clear();
         if let Some(failure) = self.failure {

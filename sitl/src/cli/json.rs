@@ -1,4 +1,4 @@
-//! `--json`: the same for machines, on stdout. docs/json.md lists every key.
+//! `--json`: results as JSON on stdout. docs/json.md lists every key.
 
 use super::terminal::{Failure, print};
 use afbc::Profile;
@@ -10,7 +10,7 @@ use clap::Args;
 use serde::Serialize;
 use std::io;
 
-/// Of every command that has something to say to machines.
+/// Option of every command with a JSON output.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Json {
     /// Print JSON instead, as docs/json.md describes it
@@ -30,7 +30,7 @@ pub(crate) fn print_value(value: &impl Serialize) -> Result<(), Failure> {
     print(&(serde_json::to_string_pretty(value)? + "\n"))
 }
 
-/// Who flies.
+/// A contender.
 #[derive(Serialize)]
 struct Who<'a> {
     name: &'a str,
@@ -46,7 +46,7 @@ fn who<'a>(contenders: &'a [Contender]) -> Vec<Who<'a>> {
     contenders.iter().map(who).collect()
 }
 
-/// What can be flown once.
+/// Summary of a scenario.
 #[derive(Serialize)]
 struct ScenarioWords<'a> {
     kind: &'static str,
@@ -58,7 +58,7 @@ struct ScenarioWords<'a> {
     contenders: Vec<Who<'a>>,
 }
 
-/// A scenario in a few words.
+/// Returns the summary of a scenario.
 pub(crate) fn scenario(scenario: &Scenario) -> impl Serialize + '_ {
     let Scenario { name, description, duration_s, model, seed, contenders, .. } = scenario;
     ScenarioWords {
@@ -72,7 +72,7 @@ pub(crate) fn scenario(scenario: &Scenario) -> impl Serialize + '_ {
     }
 }
 
-/// What can be flown many times.
+/// Summary of a campaign.
 #[derive(Serialize)]
 struct CampaignWords<'a> {
     kind: &'static str,
@@ -93,7 +93,7 @@ struct Drawn {
     ends: [f64; 2],
 }
 
-/// A campaign in a few words.
+/// Returns the summary of a campaign.
 pub(crate) fn campaign(campaign: &Campaign) -> impl Serialize + '_ {
     let Campaign { name, description, flights, seed, scenario, courses, spreads, .. } = campaign;
     let drawn =
@@ -112,7 +112,7 @@ pub(crate) fn campaign(campaign: &Campaign) -> impl Serialize + '_ {
     }
 }
 
-/// What a search has found.
+/// Result of a search for gains.
 #[derive(Serialize)]
 struct Tuned {
     controller: &'static str,
@@ -131,7 +131,7 @@ struct Gain {
     after: f32,
 }
 
-/// What a search with this seed has found, for the contender called `name`.
+/// Returns the result of a search with this seed for the contender `name`.
 pub(crate) fn tuned(found: &Found, name: &str, seed: u64) -> impl Serialize {
     let Found { contender, before, after, evaluations, changes } = found;
     let gain = |Change { name, from, to }: &Change| Gain { name: name.clone(), before: *from, after: *to };

@@ -1,17 +1,17 @@
-//! `--log-hz`: how much of a flight is kept.
+//! `--log-hz`: the rate of a flight's log.
 
 use afbc_sim::contender::Contender;
 use afbc_sim::scenario::Scenario;
 use std::str::FromStr;
 
-/// Most rows of one log: an hour at 100 Hz, and some.
+/// Largest number of rows of a log: somewhat more than an hour at 100 Hz.
 const ROWS: f64 = 500_000.0;
-/// Most rows of a log if nobody asks for more: ten minutes at 100 Hz, some 26 MB.
+/// Largest number of rows at the default rate: ten minutes at 100 Hz, some 26 MB.
 const PLENTY: f64 = 60_000.0;
-/// What is kept of a flight that is no longer than that, and what of longer ones \[Hz\].
+/// Default rates; the largest that is possible is used \[Hz\].
 const USUAL: [u16; 11] = [100, 50, 40, 25, 20, 10, 8, 5, 4, 2, 1];
 
-/// Log rows a second.
+/// Log rows per second.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LogRate(u16);
 
@@ -27,20 +27,20 @@ impl FromStr for LogRate {
 }
 
 impl LogRate {
-    /// 100 Hz, or what of the lower rates gives no more than plenty of rows in `duration_s`.
+    /// Returns 100 Hz, or the largest lower rate with at most [`PLENTY`] rows in `duration_s`.
     pub(crate) fn usual(duration_s: f64) -> Self {
         let fits = |hz: &u16| f64::from(*hz) * duration_s <= PLENTY;
         LogRate(USUAL.into_iter().find(fits).unwrap_or(1))
     }
 
-    /// One line if the usual rate leaves out what it keeps of shorter flights.
+    /// Returns a message if the default rate is reduced.
     pub(crate) fn thinned(duration_s: f64) -> Option<String> {
         let [full, ..] = USUAL;
         let LogRate(hz) = Self::usual(duration_s);
-        (hz < full).then(|| format!("logs of {duration_s} s keep {hz} rows a second; --log-hz {full} keeps more"))
+        (hz < full).then(|| format!("logs of {duration_s} s keep {hz} rows per second; --log-hz {full} keeps more"))
     }
 
-    /// Control steps from row to row, to the nearest whole number.
+    /// Returns the control steps between rows, rounded to a whole number.
     ///
     /// # Errors
     /// If the log of one run would be too long.
@@ -51,7 +51,7 @@ impl LogRate {
         if rows > ROWS {
             let duration_s = scenario.duration_s;
             return Err(format!(
-                "--log-hz {hz}: {duration_s} s would be {rows:.1e} rows a run, more than {ROWS:.1e}; lower it or --duration"
+                "--log-hz {hz}: {duration_s} s would give {rows:.1e} rows, more than {ROWS:.1e}; lower it or --duration"
             ));
         }
         Ok(steps as u64)

@@ -24,14 +24,14 @@ use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 use terminal::Failure;
 
-/// Flies an adaptive fuzzy backstepping (AFBC) quadrotor controller and classical backstepping in software.
+/// Flies an adaptive fuzzy backstepping (AFBC) quadrotor controller and other controllers in simulation.
 ///
-/// Without a command, `sitl` is `sitl paper`: it flies the experiment of Yacef, Bouhali and Hamerlain, prints how both
-/// laws did and writes logs, figures and a report.
+/// Without a command, `sitl` is `sitl paper`: it flies the experiment of Yacef, Bouhali and Hamerlain, prints the
+/// results of both laws and writes logs, figures and a report.
 #[derive(Debug, Parser)]
 #[command(version, args_conflicts_with_subcommands = true, max_term_width = 110)]
 #[command(
-    after_help = "Exit codes: 0 all well; 1 a vehicle was lost; 2 wrong input, or nothing could be written; 130 interrupted."
+    after_help = "Exit codes: 0 success; 1 a vehicle was lost; 2 wrong input, or nothing written; 130 interrupted"
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]
@@ -58,7 +58,7 @@ enum Command {
 }
 
 impl Cli {
-    /// Does what was asked for.
+    /// Runs the command.
     pub(crate) fn run(self) -> Result<ExitCode, Failure> {
         match self.command.unwrap_or(Command::Paper(self.paper)) {
             Command::Paper(paper) => paper.run(),

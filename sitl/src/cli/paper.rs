@@ -13,29 +13,29 @@ use afbc_sim::scenario::Scenario;
 use clap::{Args, ValueEnum};
 use std::process::ExitCode;
 
-/// Fly the paper's experiment under both laws and weigh its three claims
+/// Fly the paper's experiment under both laws and check its three claims
 ///
-/// The paper leaves open how its gusts of "1.2 N" are meant and which way its uncertain parameters are off; both can be
-/// chosen. Exits with 0 even if the `forces` reading loses the vehicle, which it does; any other loss gives 1.
+/// The paper does not define its gusts of "1.2 N" or the signs of its uncertain parameters; both can be chosen. Exits
+/// with 0 even if the `forces` reading loses the vehicle, as is known; any other loss gives 1.
 #[derive(Args, Debug)]
 pub(crate) struct Paper {
-    /// How the gusts are read
+    /// Reading of the gusts
     #[arg(long, value_enum, default_value = "persistent")]
     reading: GustReading,
 
     #[arg(long, value_enum, value_name = "SIGN", default_value = "+", hide_possible_values = true)]
-    #[arg(help = "Which way the inertia is off, by 75 %, from 20 s to 40 s: +, - or both")]
+    #[arg(help = "Sign of the inertia's error of 75 % from 20 s to 40 s: +, - or both")]
     inertia: Signs,
 
     #[arg(long, value_enum, value_name = "SIGN", default_value = "-", hide_possible_values = true)]
-    #[arg(help = "Which way the thrust factor is off, by 40 %, from 20 s to 40 s: +, - or both")]
+    #[arg(help = "Sign of the thrust factor's error of 40 % from 20 s to 40 s: +, - or both")]
     thrust: Signs,
 
-    /// Leave every parameter as the controllers believe it to be
+    /// Fly with nominal parameters
     #[arg(long, conflicts_with_all = ["inertia", "thrust"])]
     no_uncertainty: bool,
 
-    /// Which equations move the vehicle: the paper's (6), or the full rigid body (1)-(5)
+    /// Equations of motion: the paper's (6), or the full rigid body (1)-(5)
     #[arg(long, value_enum, default_value = "simplified")]
     plant: Plants,
 
@@ -51,15 +51,15 @@ pub(crate) struct Paper {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum GustReading {
-    /// Accelerations that stay on from their onset
+    /// Accelerations that persist from their onset
     Persistent,
     /// Accelerations for one second each
     Pulses,
-    /// Physical forces and moments that stay on
+    /// Physical forces and moments that persist
     Forces,
     /// No gusts
     None,
-    /// The first three, one after the other
+    /// The first three in turn
     All,
 }
 
@@ -119,7 +119,7 @@ impl Paper {
         Ok(ExitCode::from(u8::from(flown.iter().any(unexpectedly_lost))))
     }
 
-    /// Every combination that was asked for.
+    /// Returns every combination requested.
     fn scenarios(&self) -> Result<Vec<Scenario>, Failure> {
         let wanted = |u: &Uncertainty| self.inertia.include(u.inertia) && self.thrust.include(u.thrust);
         let uncertainties = if self.no_uncertainty {
@@ -139,7 +139,7 @@ impl Paper {
     }
 }
 
-/// Lost, and not in the reading that is known for it.
+/// True for a loss in any other than the `forces` reading.
 fn unexpectedly_lost(flown: &Flown) -> bool {
     let reading = flown.scenario.case.and_then(|case| case.reading);
     flown.run.lost.is_some() && reading != Some(Reading::Forces)

@@ -1,29 +1,29 @@
-//! Where results go: `--out` and `--force`.
+//! Output folder: `--out` and `--force`.
 
 use super::terminal::Failure;
 use afbc_files::Folder;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Options of every command that fills a folder.
+/// Options of every command with an output folder.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Place {
-    /// Folder for what comes of it [default: out/ and the name of what is flown]
+    /// Output folder [default: out/ and the name of the scenario, campaign or command]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Write into the folder even if it is not this command's own; replaces what is in the way
+    /// Write into the folder even if it holds something else; replaces files of the same names
     #[arg(long)]
     pub(crate) force: bool,
 }
 
 impl Place {
-    /// Where it is, `out/<name>` if nothing was said.
+    /// Returns its path, by default `out/<name>`.
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.out.clone().unwrap_or_else(|| Path::new("out").join(name))
     }
 
-    /// The folder, once it is sure that it can take what `sitl <command>` makes of `name`.
+    /// Opens the folder, after checking that it can be used for the results of `sitl <command>` for `name`.
     pub(crate) fn open(&self, command: &str, name: &str) -> Result<Folder, Failure> {
         Ok(Folder::open(&self.path(name), command, name, self.force)?)
     }

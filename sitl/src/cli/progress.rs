@@ -1,4 +1,4 @@
-//! How far a command has come, on stderr: a bar for people, lines for the log of a machine without a terminal.
+//! Progress of a command on stderr: a bar on a terminal, lines otherwise.
 
 use super::terminal::say;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -8,49 +8,49 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Without a terminal there is a line at the start, another whenever a further tenth is done, ...
+/// Without a terminal there is a line at the start, after each further tenth, ...
 const PARTS: u64 = 10;
-/// ... and another when there has been none for so long.
+/// ... and after this long without one.
 const SILENCE: Duration = Duration::from_secs(60);
 
-/// How far a command has come.
+/// Progress of a command.
 pub(crate) struct Progress {
     shared: Arc<Shared>,
-    /// Ends the [thread](remind) that breaks the silence, by being dropped.
+    /// Ends the [thread](remind) that writes lines after a silence, when dropped.
     silence: Option<(Sender<()>, JoinHandle<()>)>,
 }
 
-/// What every thread of the command knows of it.
+/// State shared by all threads of the command.
 struct Shared {
     name: String,
     unit: &'static str,
     total: u64,
     start: Instant,
-    /// None without a terminal.
+    /// The bar; none without a terminal.
     bar: Option<ProgressBar>,
     state: Mutex<State>,
 }
 
-/// What changes on the way.
+/// State that changes.
 struct State {
     count: Count,
-    /// Between count and rate.
+    /// Text between count and rate.
     note: String,
-    /// When there was a line.
+    /// Time of the last line.
     said: Instant,
 }
 
-/// What is done.
+/// Number of units done.
 #[derive(Clone, Copy, Default)]
 struct Count {
     done: u64,
-    /// By an earlier run: this one has not spent any time on it.
+    /// Number done by an earlier run, which does not count for the rate.
     before: u64,
 }
 
 impl Progress {
-    /// Of `total` `unit`, such as flights, `before` of which an earlier run has done; `name` tells them from others in a
-    /// log.
+    /// Creates the progress of `total` `unit`, such as flights, `before` of which an earlier run has done; `name`
+    /// identifies it in a log.
     pub(crate) fn new(name: &str, unit: &'static str, total: u64, before: u64) -> Self {
         let start = Instant::now();
         let bar = stderr().is_terminal().then(|| bar(total));
@@ -74,7 +74,7 @@ impl Progress {
         Progress { shared, silence }
     }
 
-    /// Without anything to be seen, of what will not take long.
+    /// Creates hidden progress, for short commands.
     pub(crate) fn hidden() -> Self {
         let state = Mutex::new(State { count: Count::default(), note: String::new(), said: Instant::now() });
         let bar = Some(ProgressBar::hidden());
@@ -82,7 +82,7 @@ impl Progress {
         Progress { shared: Arc::new(shared), silence: None }
     }
 
-    /// So many more are done.
+    /// Adds to the number done.
     pub(crate) fn add(&self, more: u64) {
         let mut state = self.shared.state();
         let part = |done: u64| u128::from(done) * u128::from(PARTS) / u128::from(self.shared.total.max(1));
@@ -92,7 +92,7 @@ impl Progress {
         self.shared.show(&mut state, due);
     }
 
-    /// Says `note` between count and rate from now on.
+    /// Sets the text between count and rate.
     pub(crate) fn note(&self, note: String) {
         let mut state = self.shared.state();
         state.note = note;
@@ -107,7 +107,7 @@ impl Drop for Progress {
         }
         if let Some((sender, thread)) = self.silence.take() {
             drop(sender);
-            // It has nothing to say but lines.
+            // The thread has no result.
             let _ = thread.join();
         }
     }
@@ -118,7 +118,7 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Brings the bar up to date; or, where there is none, writes a line if one is `due`.
+    /// Updates the bar or, without one, writes a line if one is `due`.
     fn show(&self, state: &mut State, due: bool) {
         let text = || words(state.count, self.total, self.unit, &state.note, self.start.elapsed());
         match &self.bar {
@@ -143,7 +143,7 @@ fn bar(total: u64) -> ProgressBar {
     bar
 }
 
-/// `120 of 10000 flights, 60 a second, 165 s left`; how fast and how long nobody knows before the first.
+/// Formats `120 of 10000 flights, 60 per second, 165 s left`; without rate and wait before the first.
 fn words(Count { done, before }: Count, total: u64, unit: &str, note: &str, elapsed: Duration) -> String {
     let mut text = format!("{done} of {total} {unit}{note}");
     let (flown, seconds) = ((done - before) as f64, elapsed.as_secs_f64());
@@ -153,18 +153,18 @@ fn words(Count { done, before }: Count, total: u64, unit: &str, note: &str, elap
     text
 }
 
-/// In whole ones: of a time in which there are several.
+/// Formats a rate as a whole number, per the shortest time that contains several.
 fn rate(per_s: f64) -> String {
     const SEVERAL: f64 = 9.5;
     let (rate, time) = match per_s {
-        _ if per_s >= SEVERAL => (per_s, "a second"),
-        _ if per_s * 60.0 >= SEVERAL => (per_s * 60.0, "a minute"),
-        _ => (per_s * 3600.0, "an hour"),
+        _ if per_s >= SEVERAL => (per_s, "per second"),
+        _ if per_s * 60.0 >= SEVERAL => (per_s * 60.0, "per minute"),
+        _ => (per_s * 3600.0, "per hour"),
     };
     format!("{rate:.0} {time}")
 }
 
-/// A time to wait, at least a second of it.
+/// Formats a waiting time of at least a second.
 fn wait(seconds: f64) -> String {
     match seconds {
         _ if seconds < 100.0 => format!("{:.0} s", seconds.ceil().max(1.0)),
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_promised_before_there_is_anything_to_go_by() {
+    fn rate_and_wait_are_left_out_before_the_first_flight() {
         assert_eq!(said(0, 0, 0.0), "0 of 10000 flights");
         assert_eq!(said(0, 0, 30.0), "0 of 10000 flights");
         assert_eq!(said(64, 64, 30.0), "64 of 10000 flights");
@@ -190,16 +190,16 @@ mod tests {
     }
 
     #[test]
-    fn what_an_earlier_run_has_done_does_not_count_for_the_rate() {
-        assert_eq!(said(1000, 0, 10.0), "1000 of 10000 flights, 100 a second, 90 s left");
-        assert_eq!(said(6000, 5000, 10.0), "6000 of 10000 flights, 100 a second, 40 s left");
+    fn flights_of_an_earlier_run_do_not_count_for_the_rate() {
+        assert_eq!(said(1000, 0, 10.0), "1000 of 10000 flights, 100 per second, 90 s left");
+        assert_eq!(said(6000, 5000, 10.0), "6000 of 10000 flights, 100 per second, 40 s left");
     }
 
     #[test]
-    fn rates_are_whole_and_waits_never_nothing() {
-        assert_eq!(said(9999, 0, 10.0), "9999 of 10000 flights, 1000 a second, 1 s left");
-        assert_eq!(said(100, 0, 10.0), "100 of 10000 flights, 10 a second, 17 min left");
-        assert_eq!(said(100, 0, 100.0), "100 of 10000 flights, 60 a minute, 3 h left");
-        assert_eq!(said(100, 0, 1000.0), "100 of 10000 flights, 360 an hour, 28 h left");
+    fn rates_are_whole_and_waits_are_not_zero() {
+        assert_eq!(said(9999, 0, 10.0), "9999 of 10000 flights, 1000 per second, 1 s left");
+        assert_eq!(said(100, 0, 10.0), "100 of 10000 flights, 10 per second, 17 min left");
+        assert_eq!(said(100, 0, 100.0), "100 of 10000 flights, 60 per minute, 3 h left");
+        assert_eq!(said(100, 0, 1000.0), "100 of 10000 flights, 360 per hour, 28 h left");
     }
 }

@@ -15,7 +15,7 @@ use std::process::ExitCode;
 /// Fly the paper's experiment in every reading and print the results as a Markdown table
 #[derive(Args, Debug)]
 pub(crate) struct Results {
-    /// Put the table into this page instead, between its two markers
+    /// Write the table into this page instead, between its two markers
     #[arg(long, value_name = "PAGE", conflicts_with = "json")]
     write: Option<PathBuf>,
 
@@ -49,7 +49,7 @@ impl Results {
     }
 }
 
-/// Flies everything that is in the table.
+/// Flies all scenarios of the table.
 fn fly() -> Result<Vec<(String, Flown)>, Failure> {
     interrupt::ends_it()?;
     let scenarios = results::scenarios()?;

@@ -1,4 +1,4 @@
-//! `sitl scenarios` and `sitl check`: what can be flown.
+//! `sitl scenarios` and `sitl check`.
 
 use super::json;
 use super::json::Json;
@@ -14,7 +14,7 @@ use std::process::ExitCode;
 
 /// List the built-in scenarios, or print one of them to start from
 ///
-/// `sitl scenarios hover > my.toml` makes a scenario file to change and to fly with `sitl fly my.toml`.
+/// `sitl scenarios hover > my.toml` writes a scenario file to edit and to fly with `sitl fly my.toml`.
 #[derive(Args, Debug)]
 pub(crate) struct Scenarios {
     /// Built-in scenario to print
@@ -47,7 +47,7 @@ fn line(scenario: &Scenario) -> String {
     format!("{name:<12}{duration_s:>4} s  {description}\n")
 }
 
-/// Check a scenario or a campaign without flying it; exits with 2 and one line on the first error
+/// Check a scenario or a campaign without flying it; exits with 2 and a message on the first error
 #[derive(Args, Debug)]
 pub(crate) struct Check {
     /// Name of a built-in scenario or campaign, or path of a file
@@ -58,7 +58,7 @@ pub(crate) struct Check {
 }
 
 impl Check {
-    /// Prints what would be flown.
+    /// Prints a summary of the file.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         match (self.scenario.either()?, self.json.json) {
             (Subject::Scenario(scenario), true) => json::print_value(&json::scenario(&scenario))?,

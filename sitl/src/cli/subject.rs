@@ -1,4 +1,4 @@
-//! What a name on the command line stands for: a scenario or a campaign, built in or in a file.
+//! Resolves a name on the command line to a scenario or a campaign, built in or in a file.
 
 use afbc_campaign::{self as campaign, Campaign};
 use afbc_sim::reader::{self, FileError};
@@ -6,41 +6,41 @@ use afbc_sim::scenario::{self, Scenario};
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
-/// What can be asked for.
+/// Kind of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// What `sitl fly` flies.
+    /// Flown by `sitl fly`.
     Scenario,
-    /// What `sitl campaign` flies.
+    /// Flown by `sitl campaign`.
     Campaign,
 }
 
-/// What there is.
+/// A scenario or a campaign, read.
 #[derive(Clone, Debug)]
 pub(crate) enum Subject {
-    /// What `sitl fly` flies.
+    /// Flown by `sitl fly`.
     Scenario(Scenario),
-    /// What `sitl campaign` flies.
+    /// Flown by `sitl campaign`.
     Campaign(Campaign),
 }
 
-/// What has been found, unread.
+/// A file found, but not parsed.
 struct Found {
     kind: Kind,
-    /// As it was asked for.
+    /// The name as given.
     shown: String,
-    /// What errors in the text are errors of.
+    /// File name for errors.
     file: String,
     text: String,
-    /// What it is called if it gives itself no name.
+    /// Name of the scenario or campaign, unless it has one of its own.
     name: String,
-    /// Where it looks for files.
+    /// Folder to which paths in it are relative.
     folder: PathBuf,
 }
 
-/// Keys at the top of a file that only a campaign has.
+/// Top-level keys that only a campaign has.
 const CAMPAIGN: [&str; 4] = ["flights", "spread", "scenario", "trajectories"];
-/// And one that only a scenario has, and no scenario lacks.
+/// Top-level key that every scenario and no campaign has.
 const SCENARIO: &str = "trajectory";
 
 impl Kind {
@@ -58,7 +58,7 @@ impl Kind {
         }
     }
 
-    /// What the `text` of a file is; none if it could be either.
+    /// Returns the kind of file by its `text`; none if it could be either.
     fn of(text: &str) -> Option<Kind> {
         let document = DeTable::parse(text).ok()?;
         let has = |key: &str| document.get_ref().contains_key(key);
@@ -85,7 +85,7 @@ impl Kind {
         }
     }
 
-    /// The one line for a `name` that neither stands for anything built in nor is a file's.
+    /// Returns the error that `name` is neither built in nor a file.
     pub(crate) fn unknown(self, name: &str) -> FileError {
         if let Some(Err(refused)) = self.other().built_in(name).map(|found| found.only(self)) {
             return refused;
@@ -100,8 +100,8 @@ impl Kind {
 }
 
 impl Found {
-    /// What `path` stands for: a plain name is a built-in one of this `kind` first, then a file, then a built-in one of the
-    /// other kind.
+    /// Finds `path`: a plain name is first a built-in one of this `kind`, then a file, then a built-in one of the other
+    /// kind.
     fn at(path: &Path, kind: Kind) -> Result<Self, FileError> {
         let plain = path.to_str().filter(|text| !text.contains(['/', '\\', '.']));
         if let Some(found) = plain.and_then(|name| kind.built_in(name)) {
@@ -122,13 +122,13 @@ impl Found {
         })
     }
 
-    /// Itself, if it is what was asked for.
+    /// Returns the file if it is of this kind.
     fn only(self, kind: Kind) -> Result<Self, FileError> {
         let Found { kind: found, shown, .. } = &self;
         let problem = match found {
             _ if *found == kind => return Ok(self),
             Kind::Scenario => format!(
-                "this is a scenario: sitl fly {shown}; `sitl campaigns robustness` prints a campaign that flies one many times"
+                "this is a scenario: sitl fly {shown}; `sitl campaigns robustness` prints a campaign to start from"
             ),
             Kind::Campaign => format!("this is a campaign: sitl campaign {shown}"),
         };
@@ -144,26 +144,26 @@ impl Found {
     }
 }
 
-/// The scenario that `path` stands for, checked.
+/// Reads and checks the scenario at `path`.
 ///
 /// # Errors
-/// One line on the first thing that is wrong, such as that it is a campaign.
+/// The first error, as one line, also if it is a campaign.
 pub(crate) fn scenario(path: &Path) -> Result<Scenario, FileError> {
     Found::at(path, Kind::Scenario)?.only(Kind::Scenario)?.scenario()
 }
 
-/// The campaign that `path` stands for, checked.
+/// Reads and checks the campaign at `path`.
 ///
 /// # Errors
-/// One line on the first thing that is wrong, such as that it is a scenario.
+/// The first error, as one line, also if it is a scenario.
 pub(crate) fn campaign(path: &Path) -> Result<Campaign, FileError> {
     Found::at(path, Kind::Campaign)?.only(Kind::Campaign)?.campaign()
 }
 
-/// Whichever of the two `path` stands for, checked.
+/// Reads and checks the scenario or campaign at `path`.
 ///
 /// # Errors
-/// One line on the first thing that is wrong.
+/// The first error, as one line.
 pub(crate) fn either(path: &Path) -> Result<Subject, FileError> {
     let found = Found::at(path, Kind::Scenario)?;
     match found.kind {

@@ -1,4 +1,4 @@
-//! A scenario or a campaign as it is named on the command line.
+//! A scenario or campaign named on the command line.
 
 use super::subject::{self, Subject};
 use super::terminal::Failure;
@@ -25,17 +25,17 @@ impl fmt::Display for Target {
 }
 
 impl Target {
-    /// The scenario, checked.
+    /// Reads and checks the scenario.
     pub(crate) fn scenario(&self) -> Result<Scenario, Failure> {
         Ok(subject::scenario(&self.0)?)
     }
 
-    /// The campaign, checked.
+    /// Reads and checks the campaign.
     pub(crate) fn campaign(&self) -> Result<Campaign, Failure> {
         Ok(subject::campaign(&self.0)?)
     }
 
-    /// Whichever of the two it is, checked.
+    /// Reads and checks the scenario or campaign.
     pub(crate) fn either(&self) -> Result<Subject, Failure> {
         Ok(subject::either(&self.0)?)
     }

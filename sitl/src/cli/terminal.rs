@@ -1,20 +1,20 @@
-//! What every command says to the terminal, and how it ends.
+//! Terminal output and exit codes of every command.
 
 use std::error::Error;
 use std::io::{self, Write};
 
-/// What stops a command: its text is one line for people.
+/// Error of a command, displayed as one line.
 pub(crate) type Failure = Box<dyn Error>;
 
-/// Exit code of a command that was asked to stop.
+/// Exit code of an interrupted command.
 pub(crate) const INTERRUPTED: u8 = 130;
 
-/// Says one line on stderr, to whoever is still listening.
+/// Writes one line to stderr, ignoring errors.
 pub(crate) fn say(line: &str) {
     let _ = writeln!(io::stderr().lock(), "{line}");
 }
 
-/// Prints to stdout. A reader who has seen enough, as in `sitl | head`, is no failure.
+/// Prints to stdout. A closed pipe, as in `sitl | head`, is no failure.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     match io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {

@@ -1,4 +1,4 @@
-//! `sitl tune`: gains for one contender.
+//! `sitl tune`.
 
 use super::json;
 use super::json::Json;
@@ -15,13 +15,13 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Search for gains: the same flights, cost, search and effort for every law
+/// Search for gains, with the same flights, cost, search and number of tries for every law
 ///
-/// Prints a [[contender]] to put into a scenario file, with what it costs before and after as comments. Ctrl-C ends the
-/// search early and keeps the best so far. See docs/tuning.md.
+/// Prints a [[contender]] for a scenario file, with its cost before and after as comments. Ctrl-C ends the search early
+/// and keeps the best gains so far. See docs/tuning.md.
 #[derive(Args, Debug)]
 pub(crate) struct Tune {
-    /// A law, to start from gains by hand, or a contender of the first --scenario, to start from its own
+    /// A law, to start from hand-tuned gains, or a contender of the first --scenario, to start from its gains
     #[arg(value_name = "CONTROLLER")]
     contender: String,
 
@@ -29,7 +29,7 @@ pub(crate) struct Tune {
     #[arg(long = "scenario", value_name = "SCENARIO")]
     scenarios: Vec<Target>,
 
-    /// How many sets of gains to try
+    /// Number of sets of gains to try
     #[arg(long, value_name = "N", default_value = "1000", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     budget: u32,
 
@@ -37,7 +37,7 @@ pub(crate) struct Tune {
     #[arg(long, default_value = "1")]
     seed: u64,
 
-    /// Put what is found into this file instead
+    /// Write the result into this file instead
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
@@ -85,7 +85,7 @@ impl Tune {
     }
 }
 
-/// Who is called `name`: a contender of `scenario`, or a law with gains by hand.
+/// Returns the contender `name`: of `scenario`, or a law with hand-tuned gains.
 fn start(name: &str, scenario: Option<&Scenario>) -> Result<Contender, Failure> {
     let own = scenario.map_or(&[][..], |scenario| &scenario.contenders);
     let law = || ControllerKind::ALL.into_iter().find(|kind| kind.name() == name);
@@ -99,7 +99,7 @@ fn start(name: &str, scenario: Option<&Scenario>) -> Result<Contender, Failure> 
     })
 }
 
-/// Fails if `path` cannot be a file: worth knowing before a long search.
+/// Checks that `path` can be a file, before a long search.
 fn writable(path: &std::path::Path) -> Result<(), Failure> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     if path.is_dir() {

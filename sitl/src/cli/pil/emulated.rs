@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// Flies `scenario` by `image`, or by the one that belongs to this source, and prints how that went.
+/// Flies `scenario` with `image`, or with the one built from this source, and prints the results.
 pub(super) fn fly(scenario: &Scenario, flying: &Flying, image: Option<PathBuf>) -> Result<ExitCode, Failure> {
     let mut recorder = Recorder::new(scenario, flying)?;
     let image = image.map_or_else(|| Image::Pil.build(), Ok)?;

@@ -1,4 +1,4 @@
-//! `sitl pil`: the processor in the loop.
+//! `sitl pil`.
 
 #[cfg(unix)]
 mod emulated;
@@ -12,9 +12,8 @@ use std::process::ExitCode;
 
 /// Fly the firmware on an emulated processor in lockstep, and compare every output of every tick with the host's
 ///
-/// QEMU runs the firmware's own machine code (`cargo fw-pil` builds it, and so does this command); the plant, gusts and
-/// all, is flown here, and nothing passes between the two but the link's bytes. Exits with 0 only if no bit differs and
-/// the vehicle was not lost.
+/// QEMU runs the firmware's machine code (built by this command or `cargo fw-pil`). The plant runs on the host, and
+/// both exchange only the link's bytes. Exits with 0 only if no bit differs and the vehicle was not lost.
 #[derive(Args, Debug)]
 pub(crate) struct Pil {
     /// Name of a built-in scenario, or path of a scenario file
@@ -24,7 +23,7 @@ pub(crate) struct Pil {
     #[command(flatten)]
     flying: Flying,
 
-    /// Image to fly, instead of building the one that belongs to this source
+    /// Image to fly, instead of building the one of this source
     #[arg(long, value_name = "ELF")]
     image: Option<PathBuf>,
 }
