@@ -1,5 +1,5 @@
-//! Flight without a measurement. The whole state comes over the wire, so while it stays away nothing on board says how
-//! the vehicle moves: all that is left is what it was doing and what the rotors have been told since. Ours.
+//! Flight without measurements. The whole state comes over the link, so during an outage only the last measurement and
+//! the commands to the rotors since are known. Not in the paper.
 //!
 //! Roll and pitch are dead-reckoned from the last measurement,
 //!
@@ -7,18 +7,18 @@
 //! d^2 x/dt^2 = (l/I) (U - U_trim)
 //! ```
 //!
-//! and held by a critically damped law on the reckoned angle, which stops the rotation that was measured last:
+//! and held by a critically damped law on the reckoned angle, which stops the rotation measured last:
 //!
 //! ```text
 //! U = U_trim - (I/l) (w^2 (x - x_held) + 2 w dx/dt)
 //! ```
 //!
-//! U_trim is what the vehicle needs to stay as it is: off-centre mass, wind, weight. For roll and pitch it is observed in
-//! flight, from how the measured rate departs from the reckoned one; thrust and yaw are the mean of what the rotors were
-//! told lately. Yaw gets no more than that: it has too little authority to be worth the thrust.
+//! U_trim are the inputs that keep the vehicle as it is: they compensate off-centre mass, wind and weight. For roll and
+//! pitch they are observed in flight, from the difference between measured and reckoned rates; for thrust and yaw they
+//! are the mean of the recent inputs. Yaw is not controlled further: its authority is too small to spend thrust on it.
 //!
-//! What the trim does not know makes the true attitude leave the reckoned one as t^2, so this serves for fractions of a
-//! second, and the descent that follows for two seconds.
+//! Errors of the trim make the true attitude diverge from the reckoned one as t^2, so this works for fractions of a
+//! second, and for the two seconds of the descent that follows.
 
 use afbc_control::math::{max, min};
 use afbc_types::{Inputs, Parameters, State};
@@ -28,12 +28,12 @@ use nalgebra::{Vector2, Vector3};
 pub const HOLD_RAD_S: f32 = 10.0;
 /// Time constant of the trim \[s\].
 pub const TRIM_S: f32 = 1.0;
-/// Most that one measured rate may depart from the reckoned one for the trim: a jump is no trim \[rad/s\].
+/// Largest difference between measured and reckoned rate that the trim uses per measurement, to ignore jumps \[rad/s\].
 pub const INNOVATION_MAX_RAD_S: f32 = 0.1;
 /// Share of the trimmed thrust while descending blind: 1 m/s2 downwards.
 pub const DESCENT_THRUST: f32 = 0.9;
 
-/// What is fixed: how the nominal vehicle turns.
+/// Fixed parameters: the nominal vehicle's response.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blind {
     /// l/Ix, l/Iy \[rad/s2 per N\].
@@ -45,22 +45,22 @@ pub struct Blind {
     dt_s: f32,
 }
 
-/// What moves: the dead-reckoned attitude, and the trim.
+/// Dead-reckoned attitude and trim.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reckoning {
-    /// Roll and pitch when last measured \[rad\].
+    /// Roll and pitch at the last measurement \[rad\].
     pub held_rad: Vector2<f32>,
-    /// Roll and pitch as reckoned \[rad\].
+    /// Dead-reckoned roll and pitch \[rad\].
     pub angle_rad: Vector2<f32>,
-    /// Their rates as reckoned \[rad/s\].
+    /// Their dead-reckoned rates \[rad/s\].
     pub rate_rad_s: Vector2<f32>,
     /// U_trim
     pub trim: Inputs,
 }
 
 impl Reckoning {
-    /// A state between two measurements: roll and pitch are as reckoned since the last one, for the rotors have been at
-    /// work since. What that is worth: with 100 states a second, each 10 ms late, AFBC is lost on the measured rates.
+    /// Returns the state between two measurements, with dead-reckoned roll, pitch and their rates. With 100 states per
+    /// second, each 10 ms late, AFBC would lose the vehicle on the last measured rates.
     #[inline]
     #[must_use]
     pub fn between(&self, state: &State) -> State {
@@ -74,7 +74,7 @@ impl Reckoning {
 }
 
 impl Blind {
-    /// For a nominal vehicle whose parameters are valid, stepped every `dt_s` seconds.
+    /// Creates it for a nominal vehicle with valid parameters, stepped every `dt_s` seconds.
     pub fn new(vehicle: &Parameters, dt_s: f32) -> Self {
         Blind {
             authority: vehicle.effectiveness().xy(),
@@ -84,21 +84,21 @@ impl Blind {
         }
     }
 
-    /// A vehicle about to take off, trimmed for the nominal weight.
+    /// Returns the reckoning of a vehicle before take-off, trimmed for the nominal weight.
     pub fn start(&self, state: &State) -> Reckoning {
         let angle_rad = state.attitude_rad.xy();
         let trim = Inputs { thrust_n: self.weight_n, ..Inputs::default() };
         Reckoning { held_rad: angle_rad, angle_rad, rate_rad_s: state.rates_rad_s.xy(), trim }
     }
 
-    /// One step of dead reckoning under what the rotors were told.
+    /// Advances the dead reckoning by one step with the inputs applied to the rotors.
     pub fn advance(&self, reckoning: &mut Reckoning, applied: &Inputs) {
         let excess = Vector2::new(applied.roll_n - reckoning.trim.roll_n, applied.pitch_n - reckoning.trim.pitch_n);
         reckoning.rate_rad_s += self.authority.component_mul(&excess) * self.dt_s;
         reckoning.angle_rad += reckoning.rate_rad_s * self.dt_s;
     }
 
-    /// Starts over from a measurement, and learns from how far it is from what was reckoned.
+    /// Restarts from a measurement, and corrects the trim by its difference from the reckoning.
     pub fn measure(&self, reckoning: &mut Reckoning, state: &State) {
         let rate_rad_s = state.rates_rad_s.xy();
         let innovation =
@@ -111,8 +111,8 @@ impl Blind {
         reckoning.held_rad = reckoning.angle_rad;
     }
 
-    /// Lets thrust and yaw of the trim follow what the law tells the rotors. A sample counts up to twice the weight in
-    /// thrust and a tenth of it in yaw: a transient is no trim.
+    /// Filters the law's thrust and yaw into the trim. A sample counts at most twice the weight in thrust and a tenth
+    /// of it in yaw, so that transients have little effect.
     pub fn trim(&self, reckoning: &mut Reckoning, applied: &Inputs) {
         let share = self.dt_s / TRIM_S;
         let yaw_max = 0.1 * self.weight_n;
@@ -121,12 +121,12 @@ impl Blind {
         *thrust_n += share * (min(max(applied.thrust_n, 0.0), 2.0 * self.weight_n) - *thrust_n);
     }
 
-    /// Inputs that keep the last attitude and the trimmed thrust.
+    /// Returns the inputs that hold the last attitude with the trimmed thrust.
     pub fn coast(&self, reckoning: &Reckoning) -> Inputs {
         self.hold(reckoning, &reckoning.held_rad, 1.0)
     }
 
-    /// Inputs that level the vehicle and let it sink.
+    /// Returns the inputs that level the vehicle and let it descend.
     pub fn descend(&self, reckoning: &Reckoning) -> Inputs {
         self.hold(reckoning, &Vector2::zeros(), DESCENT_THRUST)
     }

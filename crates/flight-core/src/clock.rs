@@ -1,40 +1,43 @@
-//! When a message was sent, on the vehicle's clock, from the time that its sender stamped on it. Ours.
+//! Converts a sender's time stamps to the vehicle's clock. Not in the paper.
 //!
-//! The zero of a sender's clock is unknown, and the clock may be slewed, stepped, wrapped or coarse. What is known of a
-//! message is its offset, arrival minus stamp: the difference of the two clocks plus the message's delay. The least offset
-//! of the last half to whole second ([`WINDOW_US`]) belongs to the fastest message; any other was late by what its own is
-//! more. So a message that was held up on its way is as old as it is, not as old as its arrival. The delay of the fastest
-//! message itself cannot be known, and a delay that stays longer than the window becomes part of it.
+//! The zero of a sender's clock is unknown, and the clock may be slewed, stepped, wrapped or coarse. The offset of a
+//! message, arrival minus stamp, is the difference of the two clocks plus the message's delay. The smallest offset of
+//! the last half to whole second ([`WINDOW_US`]) belongs to the fastest message; the delay of any other message is what
+//! its offset exceeds that by. So the age of a delayed message includes its delay. The delay of the fastest message
+//! itself is unknown, and a delay that lasts longer than the window becomes part of it.
 //!
-//! | the stamp | is taken for |
+//! | stamp | interpretation |
 //! |---|---|
-//! | up to 2 ms ahead of the fastest | a faster message: the new least offset, which also follows a clock that gains |
-//! | further ahead | an outlier: sent when it arrived. Five in a row are a clock that stepped ahead; of a sender's first messages, two |
-//! | not above the last one's | overtaken on its way: refused. Three in a row that rise among themselves for 15 ms, with the same offset to 3 ms, are a clock that stepped back or wrapped |
-//! | equal to the last one's on another message | a coarse clock's: it tells nothing, and the next ones no more than its resolution allows |
-//! | anything after 3 s of silence | a new clock's |
+//! | up to 2 ms ahead of the fastest | a faster message, now the smallest offset; also tracks a gaining clock |
+//! | further ahead | an outlier, taken as sent on arrival; repeated, a step ahead |
+//! | not above the previous one | out of order, refused; repeated and increasing, a step back or a wrap |
+//! | equal to the previous one, other content | coarse clock: ignored, and the next stamps count with its resolution |
+//! | any, after 3 s of silence | a new clock |
+//!
+//! A step ahead takes five stamps in a row, or two among a sender's first messages; a step back three in a row that
+//! increase for 15 ms and whose offsets lie within 3 ms.
 
-/// Half of the window over which the fastest message is sought \[us\].
+/// Half of the window in which the fastest message is determined \[us\].
 pub const WINDOW_US: u64 = 500_000;
-/// How far ahead of the fastest message another one is believed at once \[us\].
+/// Largest time ahead of the fastest message at which a stamp is accepted at once \[us\].
 pub const AHEAD_US: u64 = 2_000;
-/// Messages in a row that are further ahead than that until the clock is taken to have stepped.
+/// Consecutive messages further ahead than that which mean that the clock was stepped.
 pub const AHEAD_COUNT: u8 = 5;
-/// Messages in a row behind the last one, and how long they have to go on \[us\], until the clock is taken to have stepped.
+/// Consecutive messages behind the previous one, and their duration \[us\], which mean that the clock was stepped back.
 pub const BACK_COUNT: u8 = 3;
 /// See [`BACK_COUNT`].
 pub const BACK_US: u64 = 15_000;
-/// How far apart the offsets of these messages may lie \[us\].
+/// Largest difference between the offsets of these messages \[us\].
 pub const BACK_SPREAD_US: u64 = 3_000;
-/// The same among the first [`NEW_COUNT`] messages of a sender: its very first ones may have been slow.
+/// Like [`AHEAD_COUNT`], among the first [`NEW_COUNT`] messages of a sender, which may have been slow.
 pub const AHEAD_COUNT_NEW: u8 = 2;
 /// See [`AHEAD_COUNT_NEW`].
 pub const NEW_COUNT: u8 = 10;
-/// After a silence of this long everything is forgotten \[us\]: no flight depends on it by then
+/// Silence after which a clock is forgotten \[us\]; no flight depends on it by then
 /// ([`crate::supervisor::GIVE_UP_US`]).
 pub const SILENCE_US: u64 = 3_000_000;
 
-/// What is known of a sender's clock.
+/// Tracks one sender's clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SourceClock {
     known: Option<Known>,
@@ -44,34 +47,34 @@ pub struct SourceClock {
 struct Known {
     sent_us: u64,
     arrived_us: u64,
-    /// Messages heard, up to 255.
+    /// Number of messages, up to 255.
     heard: u8,
-    /// Least offset of the present half window and of the one before \[us\].
+    /// Smallest offset of the present half window and of the previous one \[us\].
     least_us: [i128; 2],
-    /// When the present half window began \[us\].
+    /// Start of the present half window \[us\].
     half_since_us: u64,
     step: Option<Step>,
-    /// Least time between two stamps \[us\], and until when stamps count as coarse as that.
+    /// Smallest time between two stamps \[us\], and time until which the clock counts as that coarse.
     tick_us: u64,
     coarse_until_us: u64,
 }
 
-/// Messages in a row that look like a clock that was stepped.
+/// Consecutive messages that indicate a step of the clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Step {
     ahead: bool,
     count: u8,
     since_us: u64,
     sent_us: u64,
-    /// Of those ahead the largest, of those behind the first.
+    /// Largest offset of messages ahead, or the first of messages behind.
     offset_us: i128,
 }
 
 impl SourceClock {
-    /// The time \[us\] on the vehicle's clock of a message stamped `sent_us`, which arrived at `arrived_us` of the vehicle's
-    /// clock; never after its arrival. `differs` tells whether it says anything else than the last one.
+    /// Returns the time \[us\] on the vehicle's clock of a message stamped `sent_us`, which arrived at `arrived_us` of
+    /// the vehicle's clock; never after its arrival. `differs` is true if its content differs from the previous one's.
     ///
-    /// `None` if it is the last one once more, or a later one overtook it: drop it.
+    /// `None` if it is a duplicate or out of order, and must be dropped.
     pub fn stamp(&mut self, sent_us: u64, arrived_us: u64, differs: bool) -> Option<u64> {
         let heard_lately = |known: &&mut Known| arrived_us.saturating_sub(known.arrived_us) <= SILENCE_US;
         let Some(known) = self.known.as_mut().filter(heard_lately) else {
@@ -106,7 +109,7 @@ impl SourceClock {
     }
 }
 
-/// Arrival minus stamp \[us\]; of any two times.
+/// Returns arrival minus stamp \[us\], for any two times.
 fn offset_us(sent_us: u64, arrived_us: u64) -> i128 {
     i128::from(arrived_us) - i128::from(sent_us)
 }
@@ -125,7 +128,7 @@ impl Known {
         }
     }
 
-    /// The offset of the fastest message in the window.
+    /// Returns the offset of the fastest message in the window.
     fn fastest_us(&self) -> i128 {
         let [present_us, before_us] = self.least_us;
         present_us.min(before_us)
@@ -135,7 +138,7 @@ impl Known {
         self.fastest_us() - offset_us(sent_us, arrived_us) > AHEAD_US.into()
     }
 
-    /// The time of a message that is no older than the last one, and not far ahead.
+    /// Returns the time of a message that is not older than the previous one, and not far ahead.
     fn stamp(&mut self, sent_us: u64, arrived_us: u64) -> u64 {
         let offset_us = offset_us(sent_us, arrived_us);
         (self.sent_us, self.arrived_us) = (sent_us, arrived_us);
@@ -152,7 +155,7 @@ impl Known {
         arrived_us.saturating_sub(late_us.saturating_sub(doubt_us))
     }
 
-    /// Counts a message that is too far ahead. The last of them begins a new window.
+    /// Counts a message that is too far ahead. The last one of a step begins a new window.
     fn steps_ahead(&mut self, sent_us: u64, arrived_us: u64) {
         let offset_us = offset_us(sent_us, arrived_us);
         let goes_on = |step: &Step| step.ahead && sent_us >= step.sent_us;
@@ -168,7 +171,7 @@ impl Known {
         }
     }
 
-    /// True if a message goes on where messages of a clock that was set back left off.
+    /// True if a message continues the messages of a clock that was set back.
     fn goes_on_back(&self, sent_us: u64, arrived_us: u64) -> bool {
         self.step.is_some_and(|step| {
             let spread_us = (offset_us(sent_us, arrived_us) - step.offset_us).unsigned_abs();
@@ -176,7 +179,7 @@ impl Known {
         })
     }
 
-    /// Counts a message that is older than the last one, or goes on from such; true if it shows that the clock was stepped
+    /// Counts a message that is older than the previous one, or continues such messages; true if the clock was stepped
     /// back.
     fn steps_back(&mut self, sent_us: u64, arrived_us: u64) -> bool {
         let offset_us = offset_us(sent_us, arrived_us);

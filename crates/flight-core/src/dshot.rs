@@ -1,23 +1,23 @@
 //! DSHOT600: sixteen bits to a motor controller, each a pulse whose length is its value.
 //!
 //! A bit lasts 1.67 us (600 kbit/s); its pulse is high for 1250 ns if it is one and for 625 ns if it is zero, that is
-//! for 3/4 and 3/8 of the bit. A timer that counts a bit per period and takes each pulse's length from memory plays the
-//! [`Waveform`].
+//! for 3/4 and 3/8 of the bit. The [`Waveform`] is output by a timer with one bit per period, whose compare values are
+//! read from memory.
 
 use afbc_types::{OutOfRange, Range};
 
-/// Bits in a second.
+/// Bits per second.
 pub const BIT_RATE_HZ: u32 = 600_000;
-/// Accepted clock of the timer \[Hz\]: pulses come out within 4 % of a bit, and a period fits the timer.
+/// Accepted clock of the timer \[Hz\]: pulse lengths are within 4 % of a bit, and a period fits the timer.
 pub const TIMER_CLOCK: Range = Range::new("timer_hz", 8e6, 500e6);
 
-/// One frame: 11 bits of throttle, one that asks for telemetry (never does), 4 of checksum; sent from the highest bit.
+/// A frame: 11 bits of throttle, the telemetry request (always off), 4 bits of checksum; sent from the highest bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame(u16);
 
 impl Frame {
-    /// The frame for a throttle of 0 (stop) or 48 to 2047. What is not a throttle stops the motor: 1 to 47 are commands
-    /// to the motor controller, which are of no use in flight.
+    /// Creates the frame for a throttle of 0 (stop) or 48 to 2047. Other values stop the motor: 1 to 47 are commands to
+    /// the motor controller, which are not used.
     pub const fn new(throttle: u16) -> Self {
         let throttle = match throttle {
             crate::motor::THROTTLE_MIN..=crate::motor::THROTTLE_MAX => throttle,
@@ -28,16 +28,16 @@ impl Frame {
         Frame(data << 4 | checksum)
     }
 
-    /// The sixteen bits.
+    /// Returns the sixteen bits.
     pub const fn bits(self) -> u16 {
         self.0
     }
 }
 
-/// Compare values of a frame: one pulse a bit, then a zero that leaves the line low.
+/// Compare values of a frame: one pulse per bit, then a zero that leaves the line low.
 pub type Waveform = [u16; 17];
 
-/// Lengths in timer counts.
+/// Pulse lengths in timer counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
     period: u16,
@@ -46,7 +46,7 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// The lengths for a timer that counts at `timer_hz`.
+    /// Computes the lengths for a timer that counts at `timer_hz`.
     ///
     /// # Errors
     /// If the clock is outside [`TIMER_CLOCK`].
@@ -59,12 +59,12 @@ impl Timing {
         Ok(Timing { period: counts(1, 1), one: counts(3, 4), zero: counts(3, 8) })
     }
 
-    /// Counts in a bit: the timer reloads at this, less one.
+    /// Returns the counts per bit; the timer reloads at one less.
     pub const fn period(&self) -> u16 {
         self.period
     }
 
-    /// What the timer plays for four motors at once: a row for each bit, a column for each motor, each column a
+    /// Computes the compare values of four motors: a row for each bit, a column for each motor, each column a
     /// [waveform](Self::waveform).
     pub fn rows(&self, throttles: [u16; 4], rows: &mut [[u16; 4]; 17]) {
         let mut frames = throttles.map(|throttle| Frame::new(throttle).bits());
@@ -76,12 +76,12 @@ impl Timing {
         *last = [0; 4];
     }
 
-    /// Length of a pulse.
+    /// Returns the length of a pulse.
     const fn pulse(&self, one: bool) -> u16 {
         if one { self.one } else { self.zero }
     }
 
-    /// What the timer plays for `frame`.
+    /// Returns the compare values of `frame`.
     pub fn waveform(&self, frame: Frame) -> Waveform {
         let mut bits = frame.bits();
         let mut waveform = [0; 17];

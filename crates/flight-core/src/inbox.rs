@@ -1,9 +1,9 @@
-//! What a tick works from: the newest of everything, when it was measured, and what is asked for.
+//! Inputs of a tick: the newest state and setpoint, with their times, and requests.
 
 use crate::supervisor::Request;
 use afbc_types::{Setpoint, State};
 
-/// A value and the time it belongs to, on the vehicle's clock.
+/// A value with its time on the vehicle's clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stamped<T> {
     /// The value.
@@ -13,74 +13,73 @@ pub struct Stamped<T> {
 }
 
 impl<T> Stamped<T> {
-    /// How long ago, at `now_us`. A stamp from the future is no measurement: it counts as infinitely old.
+    /// Returns its age at `now_us`. A stamp in the future is invalid and counts as infinitely old.
     pub fn age_us(&self, now_us: u64) -> u64 {
         now_us.checked_sub(self.at_us).unwrap_or(u64::MAX)
     }
 }
 
-/// A request, and the ticket by which whoever asked knows its answer.
+/// A request, with a ticket that identifies its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Asked {
-    /// What is asked for.
+    /// The request.
     pub request: Request,
-    /// Comes back with the answer; nothing else is done with it.
+    /// Returned with the answer, and not used otherwise.
     pub ticket: u8,
 }
 
-/// Most requests that wait at once.
+/// Largest number of queued requests.
 pub const REQUESTS_MAX: usize = 4;
 
-/// Newest inputs. The link writes it, the control tick takes it. What is not plausible does not get in: the tick trusts
-/// what it finds here.
+/// Newest inputs, written by the link and taken by the control tick. Implausible values are rejected here, so the tick
+/// need not check them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inbox {
     state: Option<Stamped<State>>,
     setpoint: Option<Stamped<Setpoint>>,
-    /// In the order in which they came, none behind an empty place.
+    /// Requests in the order of arrival, without gaps.
     requests: [Option<Asked>; REQUESTS_MAX],
 }
 
 impl Inbox {
-    /// Nothing yet.
+    /// An empty inbox.
     pub const EMPTY: Self = Inbox { state: None, setpoint: None, requests: [None; REQUESTS_MAX] };
 
-    /// Takes in a measured state, stamped by a [`Tracker`](crate::Tracker); does nothing with one that is not
-    /// [plausible](State::is_plausible).
+    /// Stores a measured state, stamped by a [`Tracker`](crate::Tracker), if it is [plausible](State::is_plausible).
     pub fn put_state(&mut self, state: Stamped<State>) {
         if state.value.is_plausible() {
             self.state = Some(state);
         }
     }
 
-    /// Takes in a setpoint, stamped on arrival; does nothing with one that is not [plausible](Setpoint::is_plausible).
+    /// Stores a setpoint, stamped on arrival, if it is [plausible](Setpoint::is_plausible).
     pub fn put_setpoint(&mut self, setpoint: Stamped<Setpoint>) {
         if setpoint.value.is_plausible() {
             self.setpoint = Some(setpoint);
         }
     }
 
-    /// Newest plausible state.
+    /// Returns the newest plausible state.
     pub fn state(&self) -> Option<&Stamped<State>> {
         self.state.as_ref()
     }
 
-    /// Newest plausible setpoint.
+    /// Returns the newest plausible setpoint.
     pub fn setpoint(&self) -> Option<&Stamped<Setpoint>> {
         self.setpoint.as_ref()
     }
 
-    /// The oldest request, which the next tick answers.
+    /// Returns the oldest request, which the next tick answers.
     pub fn asked(&self) -> Option<Asked> {
         self.requests.first().copied().flatten()
     }
 
-    /// True if one of the requests is [`Request::Kill`]: it does not wait for those before it.
+    /// True if one of the requests is [`Request::Kill`], which takes precedence over earlier ones.
     pub fn kills(&self) -> bool {
         self.requests.iter().flatten().any(|asked| asked.request == Request::Kill)
     }
 
-    /// Adds `news` to what the next tick will work from.
+    /// Merges `news` into this inbox.
     pub fn post(&mut self, news: &Inbox) {
         self.state = news.state.or(self.state);
         self.setpoint = news.setpoint.or(self.setpoint);
@@ -89,8 +88,8 @@ impl Inbox {
         }
     }
 
-    /// Leaves a request for the next ticks, each of which answers one. False if [`REQUESTS_MAX`] wait already: it is not
-    /// left then, unless it is [`Request::Kill`], which takes the newest one's place.
+    /// Queues a request; each tick answers one. False if [`REQUESTS_MAX`] are queued already: then it is dropped,
+    /// unless it is [`Request::Kill`], which replaces the newest one.
     pub fn request(&mut self, asked: Asked) -> bool {
         let free = self.requests.iter().position(Option::is_none);
         let newest = (asked.request == Request::Kill).then_some(REQUESTS_MAX - 1);
@@ -103,10 +102,10 @@ impl Inbox {
         }
     }
 
-    /// What the next tick works from: a copy of everything, and the oldest request is done with.
+    /// Returns a copy for the next tick, and removes the oldest request.
     pub fn take(&mut self) -> Inbox {
         let taken = *self;
-        // By hand: turning a slice round costs a hundred instructions.
+        // By hand, since rotating a slice costs a hundred instructions.
         let [_, second, third, fourth] = self.requests;
         self.requests = [second, third, fourth, None];
         taken

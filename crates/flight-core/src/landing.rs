@@ -1,59 +1,57 @@
-//! Whether the vehicle stands on something, from how it moves and what its rotors are told. Ours, in the manner of
-//! autopilots' land detectors.
+//! Land detector, from the vehicle's motion and its thrust, similar to those of autopilots. Not in the paper.
 //!
-//! Armed, a vehicle is on the ground until it moves away or its rotors have carried it for a moment. It has landed where
-//! thrust and motion agree that something else carries it: it was seen to sink and to stop, and it stays still for a second
-//! although its rotors do not carry it. One that is said to be still all along while its thrust falls away has not
-//! landed: its tracker has frozen.
+//! An armed vehicle is on the ground until it moves away or has been carried by its rotors for a moment. It has landed
+//! if it was seen to descend and stop, and then stays at rest for a second although its rotors do not carry it. If it
+//! appears to be at rest all the time while its thrust decreases, it has not landed: its tracker has frozen.
 //!
-//! A law may look for a standstill of its own, to stop learning (`afbc::standstill`): from the thrust that it wants, and
-//! sooner, since no motor is disarmed for it.
+//! `afbc::standstill` is a separate detector, which stops the adaptation: it uses the thrust demanded by the law, and
+//! is faster, since it does not stop the motors.
 
 use afbc_control::math::abs_max;
 use afbc_types::State;
 use nalgebra::Vector3;
 
-/// How far from where it stood a vehicle is in the air \[m\].
+/// Distance from where it stood at which a vehicle is in the air \[m\].
 pub const LEFT_M: f32 = 0.15;
-/// How fast a vehicle is in the air, along any axis \[m/s\].
+/// Speed along any axis at which a vehicle is in the air \[m/s\].
 pub const LEFT_M_S: f32 = 0.5;
-/// Speed along each axis up to which a vehicle is still \[m/s\].
+/// Speed along each axis up to which a vehicle is at rest \[m/s\].
 pub const STILL_M_S: f32 = 0.1;
-/// Speed downwards at which a vehicle is seen to sink \[m/s\].
+/// Downward speed at which a vehicle is descending \[m/s\].
 pub const SINKS_M_S: f32 = 0.2;
-/// Share of the usual thrust up to which rotors do not carry the vehicle.
+/// Share of the usual thrust up to which the rotors do not carry the vehicle.
 pub const CARRY_SHARE: f32 = 0.6;
-/// Time constant of the usual thrust \[s\].
+/// Time constant of the mean that gives the usual thrust \[s\].
 pub const USUAL_S: f32 = 5.0;
-/// How long rotors have to carry a vehicle for it to be in the air \[us\].
+/// Time for which rotors must carry a vehicle for it to be in the air \[us\].
 pub const CARRIED_US: u64 = 500_000;
-/// How long a vehicle has to be still and not carried to have landed \[us\].
+/// Time at rest without being carried after which a vehicle has landed \[us\].
 pub const STILL_US: u64 = 1_000_000;
-/// The same for one that was not seen to sink: from then on its tracker is not believed \[us\].
+/// The same time for a vehicle that was not seen to descend; after it the tracker is distrusted \[us\].
 pub const FROZEN_US: u64 = 500_000;
-/// How long a vehicle has to hover for an earlier descent to be forgotten \[us\].
+/// Time of hovering after which an earlier descent no longer counts \[us\].
 pub const HOVER_US: u64 = 2_000_000;
 
 /// Tells whether the vehicle is in the air, and when it has landed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LandDetector {
     airborne: bool,
-    /// True if it has moved away from where it stood.
+    /// True if the vehicle has moved away from where it stood.
     left: bool,
-    /// True if it was seen to sink since it last hovered.
+    /// True if a descent was seen since the vehicle last hovered.
     sank: bool,
-    /// Where it stood \[m\].
+    /// Position in which it stood \[m\].
     stood_m: Vector3<f32>,
     /// Mean thrust in the air \[N\].
     usual_n: f32,
-    /// When it was last not still, last carried and last not carried \[us\].
+    /// Times at which it was last not at rest, last carried and last not carried \[us\].
     moved_us: u64,
     carried_us: u64,
     uncarried_us: u64,
 }
 
 impl LandDetector {
-    /// A vehicle of this weight that is armed in this state.
+    /// Starts for a vehicle of this weight that is armed in this state.
     pub fn new(state: &State, weight_n: f32, now_us: u64) -> Self {
         LandDetector {
             airborne: false,
@@ -67,7 +65,7 @@ impl LandDetector {
         }
     }
 
-    /// Takes one tick with a fresh state into account, in which the rotors gave `thrust_n`.
+    /// Processes a tick with a fresh state, in which the rotors gave `thrust_n`.
     pub fn advance(&mut self, state: &State, thrust_n: f32, now_us: u64, dt_s: f32) {
         let speed_m_s = abs_max(&state.velocity_m_s);
         if speed_m_s > STILL_M_S {
@@ -95,22 +93,22 @@ impl LandDetector {
         }
     }
 
-    /// Takes one tick without a fresh state into account.
+    /// Processes a tick without a fresh state.
     pub fn advance_blind(&mut self, now_us: u64) {
         self.moved_us = now_us;
     }
 
-    /// True if nothing but its rotors carries the vehicle.
+    /// True if the vehicle is in the air.
     pub fn airborne(&self) -> bool {
         self.airborne
     }
 
-    /// True if the vehicle is said to hang still in the air, carried by nothing.
+    /// True if the state is at rest in the air without thrust, which only a frozen tracker reports.
     pub fn contradicts(&self, now_us: u64) -> bool {
         self.left && !self.sank && self.stands_for_us(now_us) > FROZEN_US
     }
 
-    /// For how long it has been still and not carried.
+    /// Returns for how long it has been at rest and not carried.
     fn stands_for_us(&self, now_us: u64) -> u64 {
         now_us.saturating_sub(self.moved_us.max(self.carried_us))
     }

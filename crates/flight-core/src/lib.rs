@@ -1,19 +1,19 @@
-//! The flight core around the law: who may fly, on what, and when the motors stop.
+//! The flight core around a control law: arming, failsafes, and motor gating.
 //!
-//! Frames and units are stated in [`afbc_types`]. Everything that decides anything in flight is here and runs on the
-//! host; firmware and simulator are shells that fill an [`Inbox`], call [`Vehicle::tick`] every millisecond and carry
-//! its [`Outcome`] away.
+//! [`afbc_types`] defines frames and units. All decisions in flight are made here, and run on the host too; firmware
+//! and simulator are shells that fill an [`Inbox`], call [`Vehicle::tick`] every millisecond and output its
+//! [`Outcome`].
 //!
 //! # Reading order
 //!
-//! 1. [`tick`]: the control tick on one page.
-//! 2. [`supervisor`]: the four modes and what leads from one to another.
-//! 3. [`inbox`]: what a tick works from, and how old it is; [`tracker`], [`clock`]: whose states those are, and when they
-//!    were measured.
-//! 4. [`landing`], [`tumble`], [`witness`]: whether the vehicle stands, has tipped over, or is not what its tracker says.
-//! 5. [`blind`]: what the vehicle does without a measurement; [`descent`]: how it comes down with one.
-//! 6. [`rate`]: whether ticks come 1000 times a second.
-//! 7. [`motor`], [`dshot`]: rotor speed to throttle to the waveform on the wire.
+//! 1. [`tick`]: the control tick.
+//! 2. [`supervisor`]: the four modes and their transitions.
+//! 3. [`inbox`]: the inputs of a tick and their ages; [`tracker`], [`clock`]: selection of states, and the time of
+//!    their measurement.
+//! 4. [`landing`], [`tumble`], [`witness`]: detection of landing, tumbling and frozen trackers.
+//! 5. [`blind`]: flight without measurements; [`descent`]: descent with measurements.
+//! 6. [`rate`]: supervision of the tick rate.
+//! 7. [`motor`], [`dshot`]: throttle curve, and the waveform to the motor controllers.
 #![no_std]
 
 pub mod blind;

@@ -1,4 +1,4 @@
-//! From rotor speed to throttle.
+//! Throttle curve: converts rotor speed to throttle.
 
 use afbc_control::math::{max, sqrt};
 use afbc_types::{Declared, OutOfRange, RotorSpeeds, parameters};
@@ -9,49 +9,49 @@ pub const THROTTLE_MIN: u16 = 48;
 pub const THROTTLE_MAX: u16 = 2047;
 
 parameters! {
-    /// The thrust curve of a motor with its controller and propeller: at throttle u in 0..1, the share of the largest
+    /// The thrust curve of a motor with its controller and propeller. At throttle u in 0..1, the share of the largest
     /// thrust is
     ///
     /// ```text
     /// F / F_max = (omega / omega_max)^2 = k u^2 + (1 - k) u
     /// ```
     ///
-    /// as in PX4's `THR_MDL_FAC`, k: 1 means that the speed follows the throttle, 0 that the thrust does. By default full
-    /// throttle gives 1000 rad/s, of which the paper's vehicle needs 200 to hover; to be measured for the vehicle at hand.
-    /// Not in the paper.
+    /// with k like PX4's `THR_MDL_FAC`: for 1 the speed is proportional to the throttle, for 0 the thrust is. By
+    /// default full throttle gives 1000 rad/s, of which the paper's vehicle needs 200 to hover; to be measured for a
+    /// real vehicle. Not in the paper.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Curve {
         /// omega_max: speed at full throttle.
         #[parameter(SPEED_MAX, "rad/s", 1.0..=32_768.0)]
         pub speed_max_rad_s: f32 = 1000.0,
-        /// k: whether the speed (1) or the thrust (0) follows the throttle, or something in between.
+        /// k: 1 if the speed is proportional to the throttle, 0 if the thrust is, or a value in between.
         #[parameter(LINEARITY, "1", 0.0..=1.0)]
         pub linearity: f32 = 1.0,
-        /// Throttle below which an armed motor never goes, so that it keeps turning.
+        /// Smallest throttle of an armed motor, which keeps it turning.
         #[parameter(IDLE, "1", 0.0..=0.3)]
         pub idle: f32 = 0.05,
     }
 }
 
-/// A motor whose curve is valid.
+/// A motor with a valid curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motor {
     curve: Curve,
-    /// Of the curve, in steps.
+    /// Idle throttle of the curve, in steps.
     idle: u16,
     inverse_speed_max: f32,
 }
 
-/// Steps of throttle between the least and the most.
+/// Steps of throttle between the smallest and the largest.
 const SPAN: u16 = THROTTLE_MAX - THROTTLE_MIN;
 
-/// Throttle in 0..1 in steps above [`THROTTLE_MIN`], to the nearest. 0 for less, and for NaN.
+/// Converts a throttle in 0..1 to steps above [`THROTTLE_MIN`], rounded. 0 for smaller values and NaN.
 fn steps(u: f32) -> u16 {
     (u * f32::from(SPAN) + 0.5) as u16
 }
 
 impl Motor {
-    /// A motor with this curve.
+    /// Creates a motor with this curve.
     ///
     /// # Errors
     /// The first value out of range.
@@ -60,22 +60,23 @@ impl Motor {
         Ok(Motor { curve, idle: steps(curve.idle), inverse_speed_max: 1.0 / curve.speed_max_rad_s })
     }
 
-    /// Throttle of all four motors: 0 if disarmed, 48 to 2047 if armed.
+    /// Returns the throttles of all four motors: 0 if disarmed, 48 to 2047 if armed.
     pub fn throttles(&self, armed: bool, speeds: &RotorSpeeds) -> [u16; 4] {
         let speeds: [f32; 4] = speeds.0.into();
         speeds.map(|speed| if armed { self.throttle(speed) } else { 0 })
     }
 
-    /// Throttle \[48 to 2047\] of an armed motor for `speed_rad_s`; never falls as the speed rises. Idle for what is not
-    /// a positive number, full throttle above the largest speed.
+    /// Returns the throttle \[48 to 2047\] of an armed motor for `speed_rad_s`, which never decreases with the speed.
+    /// Idle for anything but positive numbers, full throttle above the largest speed.
     pub fn throttle(&self, speed_rad_s: f32) -> u16 {
         let ratio = speed_rad_s * self.inverse_speed_max;
-        // The speed follows the throttle: nothing to invert.
+        // The speed is proportional to the throttle.
         let u = if self.curve.linearity == 1.0 { ratio } else { self.inverse_curve(max(ratio, 0.0)) };
         steps(u).max(self.idle).min(SPAN) + THROTTLE_MIN
     }
 
-    /// u in 0..1 with k u^2 + (1 - k) u = `ratio`^2: the quadratic's root in the form that holds for k = 0 too. 0 for NaN.
+    /// Returns u in 0..1 with k u^2 + (1 - k) u = `ratio`^2, by the form of the quadratic's root that is valid for k =
+    /// 0. 0 for NaN.
     fn inverse_curve(&self, ratio: f32) -> f32 {
         let share = ratio * ratio;
         let k = self.curve.linearity;

@@ -1,22 +1,22 @@
-//! Arming and failsafe: the five things that may be asked for, the four modes, and what leads from one to another.
+//! Arming and failsafes: requests, the four modes, and their transitions.
 
 use afbc_control::math::abs_max;
 use afbc_types::{Setpoint, State, parameters};
 
-/// Older than this, a state is stale and the law may not fly on it \[us\].
+/// Age above which a state is stale, and the law may not fly on it \[us\].
 pub const COAST_US: u64 = 20_000;
-/// Coasting ends once states have been fresh for this long \[us\]: a tracker that stutters does not make the mode flicker.
+/// Time for which states must have been fresh for coasting to end \[us\], so that the mode does not flicker.
 pub const STEADY_US: u64 = 100_000;
-/// Older than this, coasting ends and the vehicle comes down \[us\].
+/// Age of the state at which coasting ends and the vehicle descends \[us\].
 pub const DESCEND_US: u64 = 250_000;
-/// Older than this, the attitude is anyone's guess and the motors stop \[us\]: two seconds of blind descent.
+/// Age of the state at which the motors stop, since the attitude is unknown \[us\]: two seconds of blind descent.
 pub const GIVE_UP_US: u64 = 2_250_000;
-/// Older than this, a setpoint no longer counts: the vehicle holds its position \[us\].
+/// Age of the setpoint at which the vehicle holds its position instead \[us\].
 pub const SETPOINT_STALE_US: u64 = 500_000;
-/// Arming asks that the vehicle has been at rest for this long \[us\].
+/// Time at rest required for arming \[us\].
 pub const REST_US: u64 = 1_000_000;
 
-/// What the vehicle is doing.
+/// Flight mode.
 ///
 /// ```text
 ///              Arm, and ready                age > 20 ms
@@ -33,14 +33,14 @@ pub const REST_US: u64 = 1_000_000;
 ///    +--- Kill, age > 2.25 s or tumbled, from anywhere; Disarm, from anywhere on the ground
 /// ```
 ///
-/// `age` is that of the newest plausible state. Disarmed at power-up. In Coasting and Descending the law flies whenever the
-/// state is fresh; without one the vehicle is flown blind ([`crate::blind`]).
+/// `age` is that of the newest plausible state. The mode at power-up is Disarmed. In Coasting and Descending the law
+/// flies while the state is fresh; otherwise the vehicle is flown blind ([`crate::blind`]).
 ///
-/// Descending does not lead back to Flying. The attitude has been unknown for a quarter of a second: whatever comes
-/// back may be a tracker that recovers for a moment, and a vehicle that goes up and down with it is worse than one that
-/// comes down. A state that does come back is used, to come down under control ([`crate::descent`]).
+/// Descending does not return to Flying. The attitude has been unknown for a quarter of a second, and a tracker that
+/// recovers only for moments would make the vehicle descend and climb repeatedly. States that return are used to
+/// descend under control ([`crate::descent`]).
 ///
-/// The numbers go over the wire.
+/// The numbers are part of the link's protocol.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Mode {
@@ -51,48 +51,49 @@ pub enum Mode {
     Flying = 1,
     /// The state is stale, or was a moment ago.
     Coasting = 2,
-    /// Coming down, to disarm.
+    /// Descending in order to disarm.
     Descending = 3,
 }
 
-/// What the commander asks for.
+/// A request from the commander.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Request {
-    /// Start the motors: they idle for a tick, from the next one on the law flies.
+    /// Start the motors: they idle for a tick, then the law flies.
     Arm,
-    /// Stop the motors of a vehicle that is on the ground.
+    /// Stop the motors of a vehicle on the ground.
     Disarm,
-    /// Stop the motors now, wherever the vehicle is, before any other request.
+    /// Stop the motors immediately, also in flight; takes precedence over other requests.
     Kill,
-    /// Give the flight back to the controller, if it has fallen back on another law: the rotors stay as they are for a
-    /// tick, from the next one on it flies.
+    /// Engage the controller again after it has switched to its fallback law: the rotors hold for a tick, then it
+    /// flies.
     Engage,
 }
 
-/// Why a request is refused; for arming, the first reason that applies, in this order. The numbers go over the wire.
+/// Why a request is refused; for arming, the first reason that applies, in this order. The numbers are part of the
+/// link's protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// It is armed.
+    /// The vehicle is armed.
     AlreadyArmed = 1,
-    /// No plausible state for 20 ms, or never.
+    /// No plausible state within 20 ms.
     StateStale = 2,
     /// Roll or pitch above [`ArmingLimits::tilt_max_rad`].
     TiltTooLarge = 3,
-    /// No plausible setpoint for 500 ms, or never.
+    /// No plausible setpoint within 500 ms.
     SetpointMissing = 4,
-    /// The setpoint is farther from the vehicle than [`ArmingLimits::setpoint_distance_max_m`].
+    /// The distance to the setpoint exceeds [`ArmingLimits::setpoint_distance_max_m`].
     SetpointTooFar = 5,
-    /// The control tick is not known to keep its rate and its time ([`crate::rate`]), or its clock has failed.
+    /// Rate or timing of the control tick is wrong or unknown ([`crate::rate`]), or its clock has failed.
     Unhealthy = 6,
-    /// Within the last second it moved faster than [`ArmingLimits::speed_max_m_s`] or turned faster than
-    /// [`ArmingLimits::rate_max_rad_s`], or no state told.
+    /// Within the last second, speed or rate exceeded [`ArmingLimits::speed_max_m_s`] or
+    /// [`ArmingLimits::rate_max_rad_s`], or there was no state.
     NotAtRest = 7,
-    /// It is in flight, and only [`Request::Kill`] stops the motors there.
+    /// The vehicle is in flight, where only [`Request::Kill`] stops the motors.
     InFlight = 8,
-    /// It is not armed.
+    /// The vehicle is not armed.
     NotArmed = 9,
-    /// A request to stop the motors came after it.
+    /// A later request has stopped the motors.
     Overtaken = 10,
 }
 
@@ -111,7 +112,7 @@ impl Refusal {
         Refusal::Overtaken,
     ];
 
-    /// The reason in words, at most 50 characters.
+    /// Returns the reason as text of at most 50 characters.
     pub const fn reason(self) -> &'static str {
         match self {
             Refusal::AlreadyArmed => "arming refused: already armed",
@@ -119,16 +120,16 @@ impl Refusal {
             Refusal::TiltTooLarge => "arming refused: tilt too large",
             Refusal::SetpointMissing => "arming refused: no fresh setpoint",
             Refusal::SetpointTooFar => "arming refused: setpoint too far away",
-            Refusal::Unhealthy => "arming refused: tick off its 1000 Hz, or clock bad",
+            Refusal::Unhealthy => "arming refused: tick rate or clock is wrong",
             Refusal::NotAtRest => "arming refused: not at rest for a second",
             Refusal::InFlight => "disarming refused: in flight; force it to stop",
             Refusal::NotArmed => "refused: not armed",
-            Refusal::Overtaken => "refused: motors were stopped meanwhile",
+            Refusal::Overtaken => "refused: motors were stopped by a later request",
         }
     }
 }
 
-/// Why a flight ended. The numbers go over the wire.
+/// Why a flight ended. The numbers are part of the link's protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum End {
@@ -138,17 +139,17 @@ pub enum End {
     Killed = 2,
     /// The descent reached the ground.
     Landed = 3,
-    /// No state for too long.
+    /// No state for 2.25 s.
     StateLost = 4,
-    /// Upside down or spinning, beyond recovery ([`crate::tumble`]).
+    /// Upside down or spinning without recovery ([`crate::tumble`]).
     Tumbled = 5,
 }
 
 parameters! {
-    /// How far from its setpoint, how tilted and how restless a vehicle may be when it is armed. Not in the paper.
+    /// Limits of setpoint distance, tilt and motion for arming. Not in the paper.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct ArmingLimits {
-        /// Largest roll and largest pitch, each: 15 degrees.
+        /// Largest roll, and largest pitch: 15 degrees.
         #[parameter(TILT_MAX, "rad", 0.01..=0.8)]
         pub tilt_max_rad: f32 = 0.26,
         /// Largest distance between setpoint and position.
@@ -164,7 +165,7 @@ parameters! {
 }
 
 impl ArmingLimits {
-    /// No limit but that of what is plausible, for a simulated vehicle that is held until it flies.
+    /// No limit except that of plausible values, for a simulated vehicle that is held until it flies.
     pub const NONE: Self = ArmingLimits {
         tilt_max_rad: Self::TILT_MAX.range.max as f32,
         setpoint_distance_max_m: Self::DIST_MAX.range.max as f32,
@@ -172,16 +173,16 @@ impl ArmingLimits {
         rate_max_rad_s: Self::RATE_MAX.range.max as f32,
     };
 
-    /// True if a vehicle in this state neither moves nor turns.
+    /// True if a vehicle in this state neither moves nor rotates.
     pub fn at_rest(&self, state: &State) -> bool {
         state.velocity_m_s.norm_squared() <= self.speed_max_m_s * self.speed_max_m_s
             && abs_max(&state.rates_rad_s) <= self.rate_max_rad_s
     }
 
-    /// Whether a vehicle that is disarmed may be armed.
+    /// Checks whether a disarmed vehicle may be armed.
     ///
     /// # Errors
-    /// The first reason against it.
+    /// The first reason against arming.
     pub fn ready(&self, vehicle: &Standing) -> Result<(), Refusal> {
         let state = vehicle.state.ok_or(Refusal::StateStale)?;
         if state.attitude_rad.x.abs() > self.tilt_max_rad || state.attitude_rad.y.abs() > self.tilt_max_rad {
@@ -199,35 +200,35 @@ impl ArmingLimits {
     }
 }
 
-/// A vehicle that may be armed.
+/// State of a vehicle to be armed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Standing<'a> {
-    /// Its state, if that is plausible and fresh.
+    /// State, if plausible and fresh.
     pub state: Option<&'a State>,
-    /// Its setpoint, if that is plausible and fresh.
+    /// Setpoint, if plausible and fresh.
     pub setpoint: Option<&'a Setpoint>,
-    /// True if the control tick runs at its rate.
+    /// True if the control tick's rate is healthy.
     pub healthy: bool,
-    /// For how long it has been [at rest](ArmingLimits::at_rest) \[us\].
+    /// Time for which it has been [at rest](ArmingLimits::at_rest) \[us\].
     pub rest_us: u64,
 }
 
-/// What the supervisor decides from.
+/// Inputs of the supervisor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Observed {
-    /// The request whose turn it is.
+    /// The request to be answered in this tick.
     pub request: Option<Request>,
-    /// True if one that waits is [`Request::Kill`].
+    /// True if a queued request is [`Request::Kill`].
     pub kill: bool,
-    /// Whether a disarmed vehicle may be armed, [`ArmingLimits::ready`].
+    /// Result of [`ArmingLimits::ready`].
     pub ready: Result<(), Refusal>,
     /// Age of the newest plausible state \[us\]; `u64::MAX` if there is none.
     pub state_age_us: u64,
-    /// For how long no state has been stale \[us\].
+    /// Time for which no state has been stale \[us\].
     pub steady_us: u64,
     /// False if the vehicle is on the ground ([`crate::landing`]).
     pub airborne: bool,
-    /// True if it is upside down or spinning, beyond recovery ([`crate::tumble`]).
+    /// True if it is upside down or spinning without recovery ([`crate::tumble`]).
     pub tumbled: bool,
 }
 
@@ -237,7 +238,7 @@ impl Mode {
         !matches!(self, Mode::Disarmed)
     }
 
-    /// Why the flight ends, if it does, by the diagram above.
+    /// Returns why the flight ends, if it does, by the diagram of [`Mode`].
     pub fn end(self, observed: &Observed) -> Option<End> {
         match self {
             Mode::Disarmed => None,
@@ -250,7 +251,7 @@ impl Mode {
         }
     }
 
-    /// The mode that follows from what is observed, by the diagram above.
+    /// Returns the next mode, by the diagram of [`Mode`].
     #[must_use]
     pub fn next(self, observed: &Observed) -> Mode {
         let age_us = observed.state_age_us;
@@ -268,10 +269,10 @@ impl Mode {
         }
     }
 
-    /// The answer to `request` in this mode: done, or refused and why.
+    /// Returns the answer to `request` in this mode.
     ///
     /// # Errors
-    /// Why it is refused.
+    /// The reason for refusing it.
     pub fn answer(self, request: Request, observed: &Observed) -> Result<(), Refusal> {
         match request {
             Request::Kill => Ok(()),

@@ -1,4 +1,4 @@
-//! The control tick: take the newest inputs, supervise, control, gate the motors, check the rate.
+//! The control tick: takes the newest inputs, supervises, controls, gates the motors, checks the rate.
 
 use crate::blind::{Blind, Reckoning};
 use crate::descent::Descent;
@@ -11,10 +11,10 @@ use crate::witness::Witness;
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds, Setpoint, State};
 
-/// Accepted time between steps of a law that flies: the tick's \[s\].
+/// Accepted time step of a law: the tick's \[s\].
 pub const DT: Range = Range::new("dt_s", 0.001, 0.001);
 
-/// A vehicle with its controller: fixed from here on. What changes in flight is in [`Memory`].
+/// A vehicle with its controller. Constant; everything that changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle<C> {
     controller: C,
@@ -23,64 +23,64 @@ pub struct Vehicle<C> {
     weight_n: f32,
 }
 
-/// What a vehicle remembers between ticks.
+/// State of a vehicle that persists between ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory<M> {
     mode: Mode,
     rate: rate::Counter,
     /// The newest plausible state.
     state: Option<Stamped<State>>,
-    /// When the state was last stale \[us\].
+    /// Time at which the state was last stale \[us\].
     stale_us: u64,
-    /// When the vehicle was last not at rest, or there was no fresh state to tell \[us\].
+    /// Time at which the vehicle was last not at rest, or had no fresh state \[us\].
     restless_us: u64,
-    /// States that were refused because they repeated the last one in flight, or came from a tracker that is not believed.
+    /// Number of states refused because they repeated the last one in flight, or came from a distrusted tracker.
     frozen_states: u32,
     flight: Option<Flight<M>>,
 }
 
-/// What a vehicle remembers of one flight, from arming on.
+/// State of one flight, from arming on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Flight<M> {
     control: M,
     reckoning: Reckoning,
-    /// What the rotors were last told.
+    /// Inputs last applied to the rotors.
     applied: Inputs,
-    /// What the rotors were to do in the last tick, if no law said so.
+    /// Inputs of the last tick, if it had no step of the law.
     lawless: Option<Inputs>,
     guide: Guide,
     landing: LandDetector,
     tumble: Tumble,
     witness: Witness,
-    /// True if the tracker contradicted itself or the rotors: no more states in this flight.
+    /// True if the tracker contradicted itself or the thrust: its states are ignored for the rest of the flight.
     distrusts: bool,
 }
 
-/// Where to go when no setpoint says so.
+/// Setpoints for times without one from the commander.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Guide {
-    /// Where to stay while there is no setpoint.
+    /// Setpoint to hold while there is no other.
     hold: Option<Setpoint>,
     descent: Option<Descent>,
 }
 
 impl<M> Memory<M> {
-    /// What the vehicle is doing.
+    /// Returns the flight mode.
     pub fn mode(&self) -> Mode {
         self.mode
     }
 
-    /// The clock has failed and another has taken over: the vehicle is not armed again.
+    /// Records that the clock has failed and another has taken over: the vehicle is not armed again.
     pub fn distrust_clock(&mut self) {
         self.rate.distrust();
     }
 
-    /// What the controller remembers of this flight, or of the last one; none before the first.
+    /// Returns the controller's memory of this or the last flight; none before the first.
     pub fn control(&self) -> Option<&M> {
         self.flight.as_ref().map(|flight| &flight.control)
     }
 
-    /// Why the last tick decided as it did, under the controller `C`: while blind, inputs only; disarmed, all zero.
+    /// Returns the trace of the last tick with the controller `C`: only inputs while blind, zeros while disarmed.
     pub fn trace<C: FlightController<Memory = M>>(&self) -> Trace {
         match &self.flight {
             Some(Flight { lawless: Some(inputs), .. }) if self.mode.armed() => {
@@ -94,55 +94,55 @@ impl<M> Memory<M> {
     }
 }
 
-/// What a tick says about itself.
+/// Health of the flight core in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Health {
-    /// Of the law's step.
+    /// Health of the law's step.
     pub control: afbc_control::Health,
-    /// Of the tick's rate.
+    /// Rate and timing of the ticks.
     pub rate: rate::Report,
     /// Age of the newest plausible state \[us\]; `u64::MAX` if there is none.
     pub state_age_us: u64,
-    /// True if there is no plausible setpoint younger than 500 ms: an armed vehicle holds its position.
+    /// True if there is no plausible setpoint younger than 500 ms; an armed vehicle then holds its position.
     pub setpoint_stale: bool,
-    /// States since power-up that were no measurements of a vehicle in flight ([`crate::witness`]), up to `u32::MAX`.
+    /// States since power-up refused as frozen ([`crate::witness`]), up to `u32::MAX`.
     pub frozen_states: u32,
 }
 
 /// The answer to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Answer {
-    /// That of the request.
+    /// Ticket of the request.
     pub ticket: u8,
-    /// What was asked for.
+    /// The request.
     pub request: Request,
-    /// Done, or refused and why.
+    /// Done, or the reason for refusing it.
     pub result: Result<(), Refusal>,
 }
 
-/// What a tick decides.
+/// Result of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Outcome {
-    /// What the motors get: zero if disarmed.
+    /// Rotor speeds for the motors: zero if disarmed.
     pub motors: RotorSpeeds,
-    /// The force of each of them \[N\].
+    /// Force of each rotor \[N\].
     pub forces: RotorForces,
-    /// What the vehicle is doing.
+    /// Flight mode.
     pub mode: Mode,
-    /// How well.
+    /// Health of the flight core.
     pub health: Health,
-    /// The answer to this tick's request.
+    /// Answer to this tick's request.
     pub answer: Option<Answer>,
     /// Why the flight ended, if it did in this tick.
     pub ended: Option<End>,
 }
 
 impl<C: FlightController> Vehicle<C> {
-    /// A vehicle with these nominal parameters under `controller`, which was built for them.
+    /// Creates a vehicle with these nominal parameters and `controller`, which must be built for them.
     ///
     /// # Errors
-    /// The first parameter or limit out of range; the controller's time step must be the tick's, 1 ms, and its rotors must
+    /// The first parameter or limit out of range; also if the controller's time step is not 1 ms, or its rotors cannot
     /// lift the vehicle [with a margin](afbc_control::mixer::HOVER_MARGIN).
     pub fn new(parameters: Parameters, limits: ArmingLimits, controller: C) -> Result<Self, OutOfRange> {
         parameters.validate()?;
@@ -153,12 +153,13 @@ impl<C: FlightController> Vehicle<C> {
         Ok(Vehicle { blind: Blind::new(&parameters, controller.dt_s()), controller, limits, weight_n })
     }
 
-    /// One tick, to be called every millisecond; `now_us` is the time since power-up and never goes back. Cannot fail.
+    /// Runs one tick, to be called every millisecond. `now_us` is the time since power-up, which never goes back.
+    /// Cannot fail.
     #[inline]
-    #[must_use = "the motors turn by it"]
+    #[must_use = "the motors need its speeds"]
     pub fn tick(&self, memory: &mut Memory<C::Memory>, now_us: u64, inbox: &Inbox) -> Outcome {
         let dt_s = self.controller.dt_s();
-        // Take the newest inputs.
+        // Takes the newest inputs.
         let measured = memory.take_state(inbox, now_us);
         let state_age_us = memory.state.map_or(u64::MAX, |state| state.age_us(now_us));
         let fresh =
@@ -169,7 +170,7 @@ impl<C: FlightController> Vehicle<C> {
         let rate = rate.tick(now_us);
         let setpoint = inbox.setpoint().filter(|s| s.age_us(now_us) <= SETPOINT_STALE_US).map(|s| &s.value);
 
-        // Supervise.
+        // Supervises.
         let rest_us = now_us.saturating_sub(*restless_us);
         let standing = Standing { state: fresh, setpoint, healthy: rate.healthy(), rest_us };
         let asked = inbox.asked();
@@ -193,25 +194,25 @@ impl<C: FlightController> Vehicle<C> {
         }
         *mode = mode.next(&observed);
         let mode = *mode;
-        // Arming takes a tick of its own, in which the motors idle: setting up a flight and a step are too much for one.
+        // The tick of arming only sets up the flight, and the motors idle: a step would take too long.
         let arms = done(Request::Arm);
         if let (true, Some(state)) = (arms, fresh) {
             Flight::begin(flight, self, state, now_us);
         }
 
-        // Control.
+        // Controls.
         let action = match flight {
             Some(flight) if mode.armed() && !arms => {
                 flight.reckon(&self.blind, fresh.filter(|_| measured));
                 let engaged = done(Request::Engage) && self.controller.engage(&mut flight.control);
                 match fresh {
-                    // Taking over and a step would be too much, too: the rotors stay as they are.
+                    // Likewise, the tick of engaging has no step: the rotors keep their inputs.
                     _ if engaged => self.lawless(flight, flight.applied),
                     Some(state) => {
                         let between = (!measured).then(|| flight.reckoning.between(state));
                         let state = between.as_ref().unwrap_or(state);
                         let target = flight.guide.target(mode, state, setpoint, dt_s);
-                        // The inbox let plausible ones pass only.
+                        // The inbox only holds plausible values.
                         let action = self.controller.decide(&mut flight.control, state, target, true);
                         flight.lawless = None;
                         flight.applied = Mixer::inputs(&action.forces);
@@ -228,7 +229,7 @@ impl<C: FlightController> Vehicle<C> {
             _ => Action::default(),
         };
 
-        // Gate the motors.
+        // Gates the motors.
         let (motors, forces) = if mode.armed() { (action.speeds, action.forces) } else { Default::default() };
         let setpoint_stale = setpoint.is_none();
         let health =
@@ -236,7 +237,7 @@ impl<C: FlightController> Vehicle<C> {
         Outcome { motors, forces, mode, health, answer, ended }
     }
 
-    /// What the rotors do without a state.
+    /// Returns the action without a state.
     #[inline(always)]
     fn blind_action<M>(&self, flight: &mut Flight<M>, mode: Mode) -> Action {
         flight.guide.descent = None;
@@ -247,7 +248,7 @@ impl<C: FlightController> Vehicle<C> {
         self.lawless(flight, inputs)
     }
 
-    /// What the rotors do for these inputs, that no law wants.
+    /// Returns the action for inputs that do not come from the law.
     #[inline(always)]
     fn lawless<M>(&self, flight: &mut Flight<M>, inputs: Inputs) -> Action {
         flight.lawless = Some(inputs);
@@ -255,8 +256,8 @@ impl<C: FlightController> Vehicle<C> {
     }
 }
 
-/// The state `age_us` after it was measured, by the velocities and rates of that moment; as in the paper's model, those of
-/// the body stand in for those of the angles.
+/// Extrapolates the state by `age_us` with its velocities and rates; as in the paper's model, body rates replace the
+/// derivatives of the angles.
 fn extrapolated(state: &State, age_us: u64) -> State {
     let age_s = age_us as f32 * 1e-6;
     State {
@@ -267,8 +268,8 @@ fn extrapolated(state: &State, age_us: u64) -> State {
 }
 
 impl<M> Memory<M> {
-    /// Keeps the inbox's state if it is newer than the one at hand, not stale already (a stream of states that are always
-    /// late is no stream of states), and a measurement of the vehicle in flight. Tells whether it did.
+    /// Stores the inbox's state if it is newer than the present one, not already stale (states that are always late do
+    /// not count as states), and not from a frozen tracker. True if it was stored.
     fn take_state(&mut self, inbox: &Inbox, now_us: u64) -> bool {
         let newer = |state: &&Stamped<State>| {
             state.age_us(now_us) <= COAST_US && self.state.is_none_or(|held| state.at_us > held.at_us)
@@ -287,7 +288,7 @@ impl<M> Memory<M> {
         true
     }
 
-    /// Keeps account of what a fresh state, or none, says of the vehicle.
+    /// Updates the detectors with a fresh state, or none.
     fn watch(&mut self, fresh: Option<&State>, limits: &ArmingLimits, dt_s: f32, now_us: u64) {
         if fresh.is_none() {
             self.stale_us = now_us;
@@ -309,8 +310,8 @@ impl<M> Memory<M> {
 }
 
 impl<M: Default> Flight<M> {
-    /// Begins a flight where the last one was remembered.
-    // Out of line, so that the new memory is not put together on the tick's stack and copied.
+    /// Begins a flight, in the memory of the last one.
+    // Out of line, so that the new memory is not built on the tick's stack and copied.
     #[cold]
     #[inline(never)]
     fn begin<C>(flight: &mut Option<Self>, vehicle: &Vehicle<C>, state: &State, now_us: u64) {
@@ -329,7 +330,7 @@ impl<M: Default> Flight<M> {
 }
 
 impl<M> Flight<M> {
-    /// Dead reckoning over the last period, corrected by what was measured.
+    /// Advances the dead reckoning over the last period, corrected by a measurement if there is one.
     fn reckon(&mut self, blind: &Blind, measured: Option<&State>) {
         blind.advance(&mut self.reckoning, &self.applied);
         if let Some(state) = measured {
@@ -339,7 +340,7 @@ impl<M> Flight<M> {
 }
 
 impl Guide {
-    /// Where to go from a fresh `state`: down, to the setpoint, or nowhere if there is none.
+    /// Returns the setpoint for a fresh `state`: the descent's, the commander's, or a hold if there is none.
     fn target<'a>(&'a mut self, mode: Mode, state: &State, setpoint: Option<&'a Setpoint>, dt_s: f32) -> &'a Setpoint {
         if mode == Mode::Descending {
             let descent = self.descent.get_or_insert_with(|| Descent::new(state));

@@ -1,34 +1,34 @@
-//! Whose states are flown on, and which of them. Ours.
+//! Selection of the tracker, and of its states. Not in the paper.
 //!
-//! Each sender has a [`SourceClock`] of its own, and one sender is flown on at a time: the first one heard, until it has had
-//! nothing new to say for [`SILENT_US`]. Two trackers need not agree on where the origin is.
+//! Each sender has its own [`SourceClock`]. One sender is used at a time: the first one heard, until it has sent
+//! nothing new for [`SILENT_US`]. Two trackers need not have the same origin.
 
 use crate::clock::SourceClock;
 use crate::inbox::Stamped;
 use crate::supervisor::COAST_US;
 use afbc_types::State;
 
-/// Senders whose clocks are known at once; another one takes the place of the one that was silent for longest.
+/// Number of senders whose clocks are tracked; a further one replaces the one that has been silent longest.
 pub const SENDERS_MAX: usize = 4;
-/// How long the sender in use has nothing new to say before another one takes its place \[us\].
+/// Silence of the sender in use after which another one replaces it \[us\].
 pub const SILENT_US: u64 = 50_000;
 
-/// States that were not flown on, since power-up. Each count stops at `u32::MAX`.
+/// States that were not used, since power-up. Each count stops at `u32::MAX`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Refused {
-    /// A later one had overtaken it, or it came twice.
+    /// Out of order or duplicate.
     pub overtaken: u32,
-    /// It was older than 20 ms when it came.
+    /// Older than 20 ms on arrival.
     pub late: u32,
-    /// Another sender is in use.
+    /// From another sender than the one in use.
     pub elsewhere: u32,
 }
 
-/// Chooses and stamps states.
+/// Selects and stamps states.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tracker {
     senders: [Option<Sender>; SENDERS_MAX],
-    /// Who is flown on, and when it last had something new to say \[us\].
+    /// The sender in use, and when it last sent something new \[us\].
     in_use: Option<(u16, u64)>,
     refused: Refused,
 }
@@ -42,8 +42,8 @@ struct Sender {
 }
 
 impl Tracker {
-    /// The state that `sender` measured at `sent_us` of its own clock and that arrived at `arrived_us`, stamped on the
-    /// vehicle's clock; none if it is not to be flown on.
+    /// Returns the state that `sender` measured at `sent_us` of its own clock and that arrived at `arrived_us`, stamped
+    /// with the vehicle's clock; none if it must not be used.
     pub fn stamp(&mut self, sender: u16, sent_us: u64, arrived_us: u64, state: State) -> Option<Stamped<State>> {
         let known = self.sender(sender, arrived_us, &state);
         let differs = known.last != state;
@@ -65,12 +65,12 @@ impl Tracker {
         None
     }
 
-    /// What was refused so far.
+    /// Returns the counts of refused states.
     pub fn refused(&self) -> &Refused {
         &self.refused
     }
 
-    /// What is known of a sender; of a new one, nothing.
+    /// Returns the record of a sender, a new one if it is unknown.
     fn sender(&mut self, id: u16, now_us: u64, state: &State) -> &mut Sender {
         let new = Sender { id, clock: SourceClock::default(), last: *state, heard_us: now_us };
         let place = |place: &Option<Sender>| match place {

@@ -1,22 +1,22 @@
-//! A vehicle that is past recovery: on its side or its back, or spinning, for too long and not on its way back. Ours, after
-//! the tumble checks of autopilots (PX4's failure detector, the Crazyflie's supervisor).
+//! Detection of a vehicle beyond recovery: on its side or back, or spinning, for too long and not recovering. Not in
+//! the paper; similar to PX4's failure detector and the Crazyflie's supervisor.
 
 use afbc_control::math;
 use afbc_types::State;
 
-/// Cosine of the tilt below which a vehicle lies on its side or its back: 80 degrees.
+/// Cosine of the tilt below which a vehicle is on its side or back: 80 degrees.
 pub const TILT_COSINE_MIN: f32 = 0.17;
-/// Rate about body x and y together above which a vehicle spins \[rad/s\].
+/// Combined rate about body x and y above which a vehicle is spinning \[rad/s\].
 pub const SPIN_RAD_S: f32 = 10.0;
-/// How far a vehicle has to come up from where it lay lowest, in cosine of the tilt, to be on its way back.
+/// Increase of the cosine of the tilt from its lowest value that counts as recovering.
 pub const RIGHTING: f32 = 0.2;
-/// Longest that a vehicle may lie or spin without coming back \[us\].
+/// Longest time on the side or back, or spinning, without recovering \[us\].
 pub const LOST_US: u64 = 1_000_000;
-/// How long a vehicle has to be upright before it counts as recovered: one that rolls over and over is upright for
-/// shorter \[us\].
+/// Time upright after which a vehicle counts as recovered; one that rolls continuously is upright for shorter times
+/// \[us\].
 pub const UPRIGHT_US: u64 = 800_000;
 
-/// Since when a vehicle has not been upright.
+/// Detector of tumbling.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tumble {
     over: Option<Over>,
@@ -25,16 +25,16 @@ pub struct Tumble {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Over {
     since_us: u64,
-    /// Least cosine of the tilt in this time.
+    /// Lowest cosine of the tilt since it began.
     lowest: f32,
-    /// Since when it has been upright again.
+    /// Time since which it has been upright again.
     upright_since_us: Option<u64>,
-    /// True if it went over again before that was long enough: coming up is no way back then.
+    /// True if it tipped over again before that: then coming up does not count as recovering.
     again: bool,
 }
 
 impl Tumble {
-    /// Takes a fresh state into account.
+    /// Processes a fresh state.
     pub fn advance(&mut self, state: &State, now_us: u64) {
         let cosine = math::tilt_cosine(state.attitude_rad.x, state.attitude_rad.y);
         let spins = state.rates_rad_s.xy().norm_squared() > SPIN_RAD_S * SPIN_RAD_S;
@@ -58,7 +58,7 @@ impl Tumble {
         over.lowest = math::min(over.lowest, cosine);
     }
 
-    /// True if the vehicle is past recovery.
+    /// True if the vehicle is beyond recovery.
     pub fn is_lost(&self, now_us: u64) -> bool {
         self.over.is_some_and(|over| over.upright_since_us.is_none() && now_us.saturating_sub(over.since_us) > LOST_US)
     }

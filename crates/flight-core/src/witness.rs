@@ -1,13 +1,14 @@
-//! A tracker that has frozen: it goes on sending, but what it sends has nothing to do with the vehicle any more. Ours.
+//! Detection of a frozen tracker, which keeps sending states that no longer follow the vehicle. Not in the paper.
 //!
-//! | what it sends | is told from |
+//! | states sent | detected by |
 //! |---|---|
-//! | the same state again, to the last bit | a measurement never repeats itself in the air |
-//! | a pose that stands, with a twist that says it moves | displacement against the integral of velocity and rates over a quarter of a second |
-//! | a vehicle that hangs still without thrust | [`crate::landing`] |
+//! | the same state again, bit for bit | measurements never repeat exactly in the air |
+//! | a constant pose with a changing twist | displacement compared with the twist's integral over 0.25 s |
+//! | a vehicle at rest in the air without thrust | [`crate::landing`] |
 //!
-//! A repeated state is no measurement: its age goes on. After either of the others the tracker is not believed for the rest
-//! of the flight. A pose that stands within noise while the vehicle hovers cannot be told from a vehicle that does.
+//! A repeated state does not count as a measurement: its age increases. After either of the other two the tracker is
+//! distrusted for the rest of the flight. A constant pose with noise cannot be distinguished from a vehicle that
+//! hovers.
 
 use afbc_control::math::abs_max;
 use afbc_types::State;
@@ -15,11 +16,11 @@ use nalgebra::Vector3;
 
 /// Time over which displacements are compared \[us\].
 pub const WINDOW_US: u64 = 250_000;
-/// Least displacement that the twist has to tell of, along any axis \[m\].
+/// Smallest displacement by the twist, along any axis, for a comparison \[m\].
 pub const TRAVEL_M: f32 = 0.15;
-/// Least turn that the twist has to tell of, about body x or y \[rad\].
+/// Smallest rotation by the twist, about body x or y, for a comparison \[rad\].
 pub const TURN_RAD: f32 = 0.15;
-/// Share of it up to which a pose stands.
+/// Share of that up to which a pose counts as constant.
 pub const STANDS_SHARE: f32 = 0.2;
 
 /// Compares pose and twist over windows of [`WINDOW_US`].
@@ -34,16 +35,16 @@ pub struct Witness {
 }
 
 impl Witness {
-    /// Begins a window with a state measured at `at_us`.
+    /// Starts a window with a state measured at `at_us`.
     pub fn new(state: &State, at_us: u64) -> Self {
         let zero = Vector3::zeros();
         Witness { since_us: at_us, last_us: at_us, first: *state, travel_m: zero, turn_rad: zero }
     }
 
-    /// Takes a state measured at `at_us` into account; true if the pose stands although the twist says it moves.
+    /// Processes a state measured at `at_us`; true if the pose is constant although the twist is not zero.
     pub fn contradicts(&mut self, state: &State, at_us: u64) -> bool {
         let elapsed_us = at_us.saturating_sub(self.last_us);
-        // Nobody knows what it did in a longer gap.
+        // After a longer gap the motion in between is unknown.
         if elapsed_us > WINDOW_US {
             *self = Witness::new(state, at_us);
             return false;
@@ -59,7 +60,7 @@ impl Witness {
             let told = abs_max(&told);
             told > least && abs_max(&moved) < STANDS_SHARE * told
         };
-        // Roll and pitch stand in a tilted vehicle that spins about its own z.
+        // Roll and pitch are constant in a tilted vehicle that rotates about its own z.
         let level = |v: Vector3<f32>| Vector3::new(v.x, v.y, 0.0);
         let (moved_m, turned_rad) =
             (state.position_m - self.first.position_m, state.attitude_rad - self.first.attitude_rad);

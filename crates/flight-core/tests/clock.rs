@@ -1,4 +1,4 @@
-//! Clocks as trackers have them, each for a minute of hover: what becomes of the flight, and of the ages of its states.
+//! Realistic clock faults of trackers, each in a minute of hover: the modes of the flight, and the ages of its states.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc::{Adaptive, Controller, Profile};
@@ -8,15 +8,15 @@ use afbc_flight_core::{ArmingLimits, Asked, Inbox, Memory, Mode, Request, Source
 use afbc_types::{Parameters, Setpoint, State};
 use proptest::prelude::*;
 
-/// When the vehicle is armed, when something happens to the clock, and when the case ends \[us since power-up\].
+/// Times of arming, of the clock's fault, and of the end \[us since power-up\].
 const ARM_US: u64 = 2_000_000;
 const EVENT_US: u64 = 10_000_000;
 const END_US: u64 = 70_000_000;
-/// The tracker measures 100 times a second; a state needs a millisecond to arrive.
+/// The tracker measures 100 times per second; a state needs a millisecond to arrive.
 const PERIOD_US: u64 = 10_000;
 const DELAY_US: u64 = 1_000;
 
-/// A state under way.
+/// A state in transit.
 struct Sent {
     sender: u16,
     measured_us: u64,
@@ -24,17 +24,17 @@ struct Sent {
     arrives_us: u64,
 }
 
-/// What a case shows.
+/// Result of a case.
 #[derive(Debug, Default)]
 struct Seen {
-    /// In flight, in their order.
+    /// Modes in flight, in order.
     modes: Vec<Mode>,
-    /// Largest error of a state's age, of those that were flown on \[us\].
+    /// Largest error of the age of a state that was used \[us\].
     age_error_us: u64,
     refused: Refused,
 }
 
-/// The state of a hovering vehicle through a tracker's noise.
+/// The state of a hovering vehicle with a tracker's noise.
 fn hovering(measured_us: u64) -> State {
     let mut state = State::default();
     state.position_m.z = (measured_us / 1000 * 7919 % 1000) as f32 * 1e-8;
@@ -54,7 +54,7 @@ fn play(mut sent: Vec<Sent>) -> Seen {
         while let Some(sent) = sent.next_if(|sent| sent.arrives_us <= now_us) {
             let state = hovering(sent.measured_us);
             if let Some(state) = tracker.stamp(sent.sender, sent.stamp_us, now_us, state) {
-                // The delay of the fastest state cannot be known.
+                // The delay of the fastest state is unknown to the clock.
                 let error_us = state.at_us.abs_diff(sent.measured_us + DELAY_US);
                 seen.age_error_us = seen.age_error_us.max(error_us);
                 inbox.put_state(state);
@@ -73,7 +73,7 @@ fn play(mut sent: Vec<Sent>) -> Seen {
     seen
 }
 
-/// The states of one sender, stamped by `clock` from the true time.
+/// Returns the states of one sender, stamped by `clock` from the true time.
 fn stamped(clock: impl Fn(u64) -> u64) -> Vec<Sent> {
     let at =
         |measured_us| Sent { sender: 1, measured_us, stamp_us: clock(measured_us), arrives_us: measured_us + DELAY_US };
@@ -87,7 +87,7 @@ fn steps(by_us: i64) -> Vec<Sent> {
     )
 }
 
-/// One stamp that is this much ahead.
+/// A single stamp that is this much ahead.
 fn once_ahead(by_us: u64) -> Vec<Sent> {
     stamped(move |t| if t == EVENT_US { t + by_us } else { t })
 }
@@ -96,12 +96,12 @@ fn drifts(ppm: i64) -> Vec<Sent> {
     stamped(move |t| t.wrapping_add_signed(HOUR_US as i64 + t as i64 * ppm / 1_000_000))
 }
 
-/// Of this resolution.
+/// A clock of this resolution.
 fn coarse(resolution_us: u64) -> Vec<Sent> {
     stamped(move |t| (t + 12_345) / resolution_us * resolution_us)
 }
 
-/// Arrivals later by up to `by_us`, as if by chance.
+/// Arrivals delayed by pseudo-random times up to `by_us`.
 fn jitters(by_us: u64) -> Vec<Sent> {
     let mut sent = stamped(|t| t);
     for (n, sent) in sent.iter_mut().enumerate() {
@@ -110,13 +110,13 @@ fn jitters(by_us: u64) -> Vec<Sent> {
     sent
 }
 
-/// Two senders with clocks of their own, the first of which falls silent.
+/// Two senders with separate clocks, the first of which falls silent.
 fn two(until_us: u64) -> Vec<Sent> {
     let mut sent = stamped(|t| t);
     sent.retain(|sent| sent.measured_us < until_us);
     let mut other = stamped(|t| t / 3 + 77 * HOUR_US);
     for sent in &mut other {
-        // Not slower, but of another zero; between the first one's.
+        // As frequent as the first one's and between them, with another zero of the clock.
         sent.stamp_us = sent.measured_us + 77 * HOUR_US;
         sent.sender = 2;
         sent.measured_us += 4_000;
@@ -133,7 +133,7 @@ const WALL_US: u64 = 1_795_000_000_000_000;
 
 use Mode::{Coasting as R, Flying as F};
 
-/// A clock, the modes that follow, the largest error of an age \[us\].
+/// A clock, the modes that follow, and the largest error of an age \[us\].
 type Case = (&'static str, fn() -> Vec<Sent>, &'static [Mode], u64);
 
 #[rustfmt::skip]
@@ -159,7 +159,8 @@ const CASES: &[Case] = &[
     ("1000 ppm fast", || drifts(1000), &[F], 1_100),
     ("1000 ppm slow", || drifts(-1000), &[F], 1_100),
     ("slewed by 500 ppm for 20 s", || stamped(|t| t + t.clamp(EVENT_US, 3 * EVENT_US) / 2000), &[F], 600),
-    ("slewed back by 500 ppm for 20 s", || stamped(|t| HOUR_US + t - t.clamp(EVENT_US, 3 * EVENT_US) / 2000), &[F], 600),
+    ("slewed back by 500 ppm for 20 s",
+        || stamped(|t| HOUR_US + t - t.clamp(EVENT_US, 3 * EVENT_US) / 2000), &[F], 600),
     ("a resolution of 1 ms", || coarse(1_000), &[F], 1_000),
     ("a resolution of 15.625 ms", || coarse(15_625), &[F], 15_625),
     ("a resolution of 1 s", || coarse(1_000_000), &[F], 10_000),
@@ -179,7 +180,7 @@ fn ordinary_clocks_end_no_flight() {
     for (name, sent, modes, age_error_us) in CASES {
         let seen = play(sent());
         println!("{name:<45} {:?} {} us, {:?}", seen.modes, seen.age_error_us, seen.refused);
-        // Ticks take what has come a millisecond at a time.
+        // Ticks process arrivals once per millisecond.
         if seen.modes != *modes || seen.age_error_us > age_error_us + 1_000 {
             failures += &format!("{name}: expected {modes:?} within {age_error_us} us, saw {seen:?}\n");
         }
@@ -187,9 +188,9 @@ fn ordinary_clocks_end_no_flight() {
     assert!(failures.is_empty(), "\n{failures}");
 }
 
-/// Milliseconds sent as microseconds look like a delay that grows by 10 ms from state to state: the vehicle does not arm.
+/// Milliseconds sent as microseconds look like a delay that grows by 10 ms per state: the vehicle does not arm.
 #[test]
-fn a_clock_that_crawls_is_not_flown_on() {
+fn a_clock_that_counts_milliseconds_prevents_arming() {
     assert_eq!(play(stamped(|t| t / 1000)).modes, [Mode::Disarmed]);
 }
 
@@ -220,7 +221,7 @@ fn another_sender_takes_over_after_a_silence_only() {
     assert!(says(2, 2 * SILENT_US + 1));
 }
 
-/// One that says the same again and again is silent, too.
+/// A sender that repeats the same state counts as silent.
 #[test]
 fn a_frozen_sender_gives_way() {
     let mut tracker = Tracker::default();
@@ -240,8 +241,8 @@ fn delay_beyond_the_fastest_message_is_age() {
         (1_020_000, 70_000, Some(22_000)),
         (1_030_000, 71_000, Some(32_000)),
         (1_080_000, 82_000, Some(82_000)),
-        (1_079_000, 83_000, None), // overtaken
-        (1_080_000, 84_000, None), // twice
+        (1_079_000, 83_000, None), // out of order
+        (1_080_000, 84_000, None), // duplicate
         (1_081_000, 85_000, Some(83_000)),
     ] {
         assert_eq!(clock.stamp(sent, arrived, sent != 1_080_000 || arrived < 84_000), stamp, "sent at {sent}");
@@ -267,7 +268,7 @@ fn after_a_long_silence_a_clock_is_new() {
 }
 
 proptest! {
-    /// No times panic it, and none gives a message that was sent after it arrived.
+    /// No times cause a panic or a time after the arrival.
     #[test]
     fn any_times(times in prop::collection::vec((any::<u64>(), any::<u64>(), any::<bool>()), 0..50)) {
         let mut clock = SourceClock::default();
@@ -276,8 +277,8 @@ proptest! {
         }
     }
 
-    /// On a good clock behind any delays, a state is never taken for older than it is, beyond what the fastest one of the
-    /// last second tells of the clocks.
+    /// With a good clock and any delays, a state's age is never overestimated beyond the difference to the fastest one
+    /// of the last second.
     #[test]
     fn an_age_is_no_more_than_the_delay(
         steps in prop::collection::vec((1u64..50_000, 0u64..300_000), 1..100),
@@ -294,7 +295,7 @@ proptest! {
         }
     }
 
-    /// Whatever one stamp says, the flight goes on: a single outlier, in any direction.
+    /// A single wrong stamp, in any direction, does not end the flight.
     #[test]
     fn one_wrong_stamp_is_nothing(wrong in any::<u64>(), at in 200u64..400) {
         let (mut clock, mut worst_us) = (SourceClock::default(), 0);
@@ -306,14 +307,14 @@ proptest! {
                 None => prop_assert!(n == at, "state {n} was refused"),
             }
         }
-        // One that is a little behind is taken for late.
+        // A stamp that is slightly behind counts as late.
         prop_assert!(worst_us <= PERIOD_US + 2_000, "{worst_us} us");
     }
 
-    /// Whatever step a clock makes, states are flown on again within 50 ms, and never taken for older than a step back
-    /// that is smaller than a period makes them.
+    /// After any step of a clock, states are used again within 50 ms, and their age is overestimated by at most a step
+    /// back of less than a period.
     #[test]
-    fn any_step_is_got_over(step in any::<i64>(), period_us in 1_000u64..20_000) {
+    fn the_flight_continues_after_any_step(step in any::<i64>(), period_us in 1_000u64..20_000) {
         let mut clock = SourceClock::default();
         let mut last_us = 0;
         for n in 0..40_000_000 / period_us {

@@ -1,11 +1,11 @@
-//! The request to engage: it reaches the controller once, in flight only, and is answered.
+//! The request to engage reaches the controller once, only in flight, and is answered.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_flight_core::{ArmingLimits, Asked, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle};
 use afbc_types::{Parameters, RotorForces, RotorSpeeds, Setpoint, State};
 
-/// Counts how often it is engaged, and carries the vehicle.
+/// A controller that counts how often it is engaged, and gives the weight as thrust.
 struct Counter(Mixer);
 
 impl FlightController for Counter {
@@ -69,7 +69,7 @@ impl Bench {
         }
     }
 
-    /// Asks to engage in this mode; true if that reached the controller.
+    /// Requests engaging in this mode; true if that reached the controller.
     fn engages(&mut self, tracked: bool, mode: Mode) -> bool {
         let before = self.memory.control().copied();
         let outcome = self.tick(tracked, Some(Request::Engage));

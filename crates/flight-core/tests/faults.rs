@@ -1,5 +1,5 @@
-//! What the vehicle does when the link drops, delays, corrupts or reorders: real frames through the real decoder into the
-//! real tick, one fault a case. The vehicle stands still at its setpoint; closed loops are flown elsewhere.
+//! A link that drops, delays, corrupts or reorders frames, one fault per case: MAVLink frames through decoder and tick.
+//! The vehicle rests at its setpoint; closed loops are tested elsewhere.
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc::{Adaptive, Controller, Profile};
@@ -10,15 +10,15 @@ use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
 const STATION: Address = Address { system: 255, component: 190 };
 const VEHICLE: Address = Address { system: 1, component: 1 };
 
-/// When the vehicle is armed, when the fault begins, and when the case ends \[ms since power-up\].
+/// Times of arming, of the fault, and of the end \[ms since power-up\].
 const ARM_MS: u64 = 1_050;
 const FAULT_MS: u64 = 1_800;
 const END_MS: u64 = FAULT_MS + 4_000;
 
-/// A frame under way.
+/// A frame in transit.
 #[derive(Clone)]
 struct Frame {
-    /// When it arrives, from the beginning of the fault on \[ms\].
+    /// Time of arrival since the beginning of the fault \[ms\].
     at_ms: i64,
     kind: Kind,
     bytes: Vec<u8>,
@@ -31,7 +31,7 @@ enum Kind {
     Command,
 }
 
-/// An undisturbed flight: a state a millisecond, a setpoint every 100, one command.
+/// Frames of an undisturbed flight: a state per millisecond, a setpoint every 100 ms, one command.
 fn flight() -> Vec<Frame> {
     let mut sender = Sender::new(STATION);
     let mut frames = Vec::new();
@@ -43,7 +43,7 @@ fn flight() -> Vec<Frame> {
         if ms % 100 == 0 {
             push(Kind::Setpoint, Uplink::Setpoint(Setpoint::default()));
         }
-        // On a clock that is 7 s ahead.
+        // With a clock that is 7 s ahead.
         push(Kind::State, Uplink::State { sent_us: 7_000_000 + ms * 1000, state: standing(ms) });
         if ms == ARM_MS {
             push(Kind::Command, Uplink::Command(Command::Arm));
@@ -52,30 +52,30 @@ fn flight() -> Vec<Frame> {
     frames
 }
 
-/// A vehicle that stands still, through a tracker's noise.
+/// The state of a vehicle at rest with a tracker's noise.
 fn standing(ms: u64) -> State {
     let mut state = State::default();
     state.position_m.z = (ms * 7919 % 1000) as f32 * 1e-8;
     state
 }
 
-/// One frame of a message, sent by the same station, numbered apart.
+/// A frame with a message from the station.
 fn frame(at_ms: i64, message: Uplink) -> Frame {
     let bytes = Sender::new(Address { component: 1, ..STATION }).send(&message, &mut [0; FRAME_MAX]).to_vec();
     Frame { at_ms, kind: Kind::Command, bytes }
 }
 
-/// What a case shows, from the beginning of the fault on.
+/// Result of a case, from the beginning of the fault on.
 #[derive(Debug, Default)]
 struct Seen {
-    /// When each mode begins \[ms\].
+    /// Start of each mode \[ms\].
     modes: Vec<(i64, Mode)>,
     counters: Counters,
     answers: Vec<Result<Request, Refusal>>,
     setpoint_stale: bool,
 }
 
-/// Plays the frames, each at its time, those of one millisecond in their order here.
+/// Plays the frames at their times, those of the same millisecond in the given order.
 fn play(mut frames: Vec<Frame>) -> Seen {
     frames.sort_by_key(|frame| frame.at_ms);
     let (parameters, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
@@ -108,7 +108,7 @@ fn play(mut frames: Vec<Frame>) -> Seen {
         }
         let outcome = vehicle.tick(&mut memory, now_us, &inbox.take());
 
-        // The gate, in every tick of every case.
+        // Motor gating, in every tick of every case.
         let still = outcome.motors == RotorSpeeds::default();
         assert!(outcome.mode.armed() || still, "motors turn while disarmed");
         assert!(outcome.motors.0.iter().all(|speed| speed.is_finite() && *speed >= 0.0));
@@ -128,9 +128,9 @@ fn play(mut frames: Vec<Frame>) -> Seen {
     seen
 }
 
-// --- Faults. Each changes the frames of an undisturbed flight. ---
+// --- Faults, which change the frames of an undisturbed flight. ---
 
-/// States sent in these milliseconds, and in these only, go through `change`; `None` drops them.
+/// Applies `change` to the states sent in these milliseconds; `None` drops them.
 fn states(frames: &mut Vec<Frame>, when: std::ops::Range<i64>, change: impl Fn(&mut Frame) -> Option<()>) {
     frames.retain_mut(|frame| frame.kind != Kind::State || !when.contains(&frame.at_ms) || change(frame).is_some());
 }
@@ -146,7 +146,7 @@ fn delay_states(frames: &mut Vec<Frame>, when: std::ops::Range<i64>, by: impl Fn
     });
 }
 
-/// Changes the payload and makes the checksum right again.
+/// Changes the payload and corrects the checksum.
 fn rewrite(frame: &mut Frame, change: impl Fn(&mut [u8])) {
     let end = frame.bytes.len() - 2;
     change(&mut frame.bytes[10..end]);
@@ -166,14 +166,14 @@ const FOREVER: std::ops::Range<i64> = 0..i64::MAX;
 use Command::Kill;
 use Mode::{Coasting as R, Descending as D, Disarmed as X, Flying as F};
 
-/// A fault, the modes that follow with the millisecond in which each begins, and what else must be seen.
+/// A fault, the modes that follow with their first millisecond, and a further check.
 type Case = (&'static str, fn(&mut Vec<Frame>), &'static [(i64, Mode)], fn(&Seen) -> bool);
 
 #[rustfmt::skip]
 const CASES: &[Case] = &[
     ("no fault", |_| {}, &[(0, F)], |s| s.counters.lost == 0 && s.answers.is_empty()),
 
-    // Dropping.
+    // Dropped frames.
     ("20 ms without a state are nothing", |f| drop_states(f, 0..20), &[(0, F)], |s| s.counters.lost == 20),
     ("21 ms are coasted through", |f| drop_states(f, 0..21), &[(0, F), (20, R), (120, F)], |s| s.counters.lost == 21),
     ("100 ms are coasted through", |f| drop_states(f, 0..100), &[(0, F), (20, R), (199, F)], |_| true),
@@ -196,9 +196,10 @@ const CASES: &[Case] = &[
     ("the whole link is dead", |f| f.retain(|frame| frame.at_ms < 0),
         &[(0, F), (20, R), (250, D), (2250, X)], |s| s.setpoint_stale),
 
-    // Delaying.
+    // Delayed frames.
     ("15 ms late are nothing", |f| delay_states(f, FOREVER, |_| 15), &[(0, F)], |_| true),
-    // After a second of it nothing tells the delay from a clock that was set back, and the vehicle is seen to stand.
+    // After a second the delay cannot be distinguished from a clock that was set back, and the vehicle is seen to be at
+    // rest.
     ("30 ms late are as good as none at first", |f| delay_states(f, FOREVER, |_| 30),
         &[(0, F), (20, R), (250, D), (1706, X)], |_| true),
     ("a queue that builds up and empties", |f| delay_states(f, 0..100, |at| at.min(100 - at)),
@@ -214,7 +215,7 @@ const CASES: &[Case] = &[
         |f| for frame in f.iter_mut().filter(|f| f.kind == Kind::Setpoint && f.at_ms >= 0) { frame.at_ms += 400; },
         &[(0, F)], |s| !s.setpoint_stale),
 
-    // Corrupting.
+    // Corrupt frames.
     ("one state with a flipped bit", |f| states(f, 5..6, |frame| { frame.bytes[50] ^= 4; Some(()) }),
         &[(0, F)], |s| s.counters.bad_checksum == 1 && s.counters.lost == 1),
     ("100 ms of flipped bits", |f| states(f, 0..100, |frame| { frame.bytes[100] ^= 0x80; Some(()) }),
@@ -230,7 +231,10 @@ const CASES: &[Case] = &[
         Some(())
     }), &[(0, F)], |s| s.counters.skipped_bytes > 10_000 && s.counters.lost == 0),
     ("NaN positions for 50 ms",
-        |f| states(f, 0..50, |frame| { rewrite(frame, |p| p[8..12].copy_from_slice(&f32::NAN.to_le_bytes())); Some(()) }),
+        |f| states(f, 0..50, |frame| {
+            rewrite(frame, |p| p[8..12].copy_from_slice(&f32::NAN.to_le_bytes()));
+            Some(())
+        }),
         &[(0, F), (20, R), (149, F)], |s| s.counters.implausible == 50),
     ("no rotation for 300 ms", |f| states(f, 0..300, |frame| { rewrite(frame, |p| p[20..36].fill(0)); Some(()) }),
         &[(0, F), (20, R), (250, D), (1301, X)], |s| s.counters.implausible == 300),
@@ -243,9 +247,11 @@ const CASES: &[Case] = &[
         f.push(disarm);
     }, &[(0, F)], |s| s.answers.is_empty() && s.counters.bad_checksum == 1),
 
-    // Reordering and repeating.
-    ("states swapped in pairs", |f| delay_states(f, 0..1000, |at| if at % 2 == 0 { 2 } else { 0 }), &[(0, F)], |_| true),
-    ("states in blocks of 10, back to front", |f| delay_states(f, FOREVER, |at| 9 - at % 10 + 9 - at % 10), &[(0, F)], |_| true),
+    // Reordered and repeated frames.
+    ("states swapped in pairs", |f| delay_states(f, 0..1000, |at| if at % 2 == 0 { 2 } else { 0 }),
+        &[(0, F)], |_| true),
+    ("states in blocks of 10, back to front", |f| delay_states(f, FOREVER, |at| 9 - at % 10 + 9 - at % 10),
+        &[(0, F)], |_| true),
     ("every state twice", |f| { let again = f.clone(); f.extend(again.into_iter().filter(|f| f.at_ms >= 0)); },
         &[(0, F)], |s| s.counters.lost == 0),
     ("old states played back instead of new ones", |f| {
@@ -268,7 +274,7 @@ const CASES: &[Case] = &[
         f.push(frame(10, Uplink::Command(Kill)));
     }, &[(0, F), (10, X)], |s| s.answers == [Err(Refusal::Overtaken), Ok(Request::Kill)]),
 
-    // Commands while a fault lasts.
+    // Commands during a fault.
     ("disarmed in flight: refused", |f| f.push(frame(10, Uplink::Command(Command::Disarm))),
         &[(0, F)], |s| s.answers == [Err(Refusal::InFlight)]),
     ("stopped in flight", |f| f.push(frame(10, Uplink::Command(Kill))), &[(0, F), (10, X)], |_| true),

@@ -1,4 +1,4 @@
-//! Requests that meet, what gets in, and how old it is.
+//! Order of requests, rejection of implausible values, and ages.
 
 use afbc_flight_core::inbox::REQUESTS_MAX;
 use afbc_flight_core::{Asked, Inbox, Request, Stamped};
@@ -9,7 +9,7 @@ fn asked(request: Request, ticket: usize) -> Asked {
     Asked { request, ticket: ticket as u8 }
 }
 
-/// One a tick, in their order, whether asked at once or posted as news.
+/// One per tick, in order, whether requested directly or posted.
 #[test]
 fn requests_wait_for_their_turn() {
     let all = [Request::Arm, Request::Disarm, Request::Engage, Request::Kill];

@@ -1,4 +1,4 @@
-//! From rotor speed to throttle to frame to waveform.
+//! Rotor speed to throttle, frame and waveform.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc_flight_core::dshot::{Frame, Timing};
@@ -64,7 +64,7 @@ fn frames_by_hand() {
         (48, 0x0606),
         // 2047: 0xFFE, checksum F ^ F ^ E = E.
         (2047, 0xFFEE),
-        // Commands and what no throttle is stop the motor.
+        // Commands and invalid throttles stop the motor.
         (1, 0x0000),
         (47, 0x0000),
         (2048, 0x0000),
@@ -76,7 +76,7 @@ fn frames_by_hand() {
 
 #[test]
 fn the_waveform_of_a_frame() {
-    // The timers of an STM32F405 at 168 MHz: 84 MHz on the first bus, 140 counts a bit.
+    // The timers of an STM32F405 at 168 MHz: 84 MHz on the first bus, 140 counts per bit.
     let timing = Timing::new(84_000_000).expect("valid");
     assert_eq!(timing.period(), 140);
     let (one, zero) = (105, 53);
@@ -108,7 +108,7 @@ fn pulses_last_as_long_as_they_should_at_every_usual_clock() {
 }
 
 proptest! {
-    /// Faster never means less throttle.
+    /// A higher speed never gives less throttle.
     #[test]
     fn monotone(a in 0.0f32..2000.0, b in 0.0f32..2000.0, k in 0.0f32..=1.0, idle in 0.0f32..0.3) {
         let motor = motor(k, idle);
@@ -116,7 +116,7 @@ proptest! {
         prop_assert!(motor.throttle(slow) <= motor.throttle(fast));
     }
 
-    /// The throttle gives the speed back through the curve, to within half a step of it.
+    /// The curve converts the throttle back to the speed, to within half a step.
     #[test]
     fn inverts_the_curve(speed in 0.0f32..1000.0, k in 0.0f32..=1.0) {
         let u_of = |steps: f64| (steps / 1999.0).clamp(0.0, 1.0);
@@ -127,7 +127,7 @@ proptest! {
         prop_assert!(speed_at(u_of(steps + 0.51)) >= f64::from(speed) - 1e-3);
     }
 
-    /// Any receiver's check holds, and the waveform says the frame, bit for bit.
+    /// Frames pass a receiver's check, and the waveform has the frame's bits.
     #[test]
     fn waveforms_decode(throttle in 48u16..=2047) {
         let timing = Timing::new(84_000_000).expect("valid");
@@ -137,7 +137,7 @@ proptest! {
         prop_assert_eq!((bits ^ bits >> 4 ^ bits >> 8 ^ bits >> 12) & 0xF, 0);
     }
 
-    /// The four columns of a burst are the motors' waveforms, whatever the rows held before.
+    /// The four columns of a burst are the motors' waveforms, whatever the rows contained before.
     #[test]
     fn rows_are_waveforms_side_by_side(throttles in any::<[u16; 4]>(), before in any::<u16>()) {
         let timing = Timing::new(168_000_000).expect("valid");

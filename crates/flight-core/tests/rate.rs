@@ -1,17 +1,17 @@
-//! The rate's limits, and ticks at the wrong time.
+//! Limits of the rate, and ticks at wrong times.
 #![allow(clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc_flight_core::rate::{Counter, EARLY_US, LATE_US, Report, TICKS_MAX, TICKS_MIN, WINDOW_US};
 use proptest::prelude::*;
 
-/// The report after ticks every `period_us` for `seconds`.
+/// Returns the report after ticks every `period_us` for `seconds`.
 fn after(period_us: f64, seconds: f64) -> Report {
     let mut counter = Counter::default();
     let ticks = (seconds * 1e6 / period_us) as u64;
     (0..=ticks).map(|tick| counter.tick((tick as f64 * period_us) as u64)).last().unwrap_or_default()
 }
 
-/// What a counter reports of ticks this far apart, the first at 0.
+/// Returns the reports for ticks with these gaps, the first at 0.
 fn reports(gaps_us: impl IntoIterator<Item = u64>) -> Vec<Report> {
     let (mut counter, mut now_us) = (Counter::default(), 0);
     let first = counter.tick(now_us);
@@ -96,12 +96,14 @@ fn a_clock_that_has_failed_is_never_healthy_again() {
 }
 
 proptest! {
-    /// Healthy is exactly: a full second was counted and had 997 to 1003 ticks, and every gap that ended within the last
+    /// Healthy is exactly: a full second was counted with 997 to 1003 ticks, and every gap that ended within the last
     /// second was right.
     #[test]
     fn healthy_is_rate_and_gaps(
         stretches in prop::collection::vec(
-            (prop_oneof![4 => Just(1000), 4 => 890u64..1110, 1 => 0u64..4000], 1..1500usize), 1..8)
+            (prop_oneof![4 => Just(1000), 4 => 890u64..1110, 1 => 0u64..4000], 1..1500usize),
+            1..8,
+        ),
     ) {
         let gaps: Vec<u64> = stretches.iter().flat_map(|&(gap, times)| std::iter::repeat_n(gap, times)).collect();
         let reports = reports(gaps.iter().copied());
@@ -129,10 +131,12 @@ proptest! {
         }
     }
 
-    /// One tick that is missing, or one too many, anywhere in the last second forbids arming, and none in the second
-    /// before that does.
+    /// One missing or additional tick anywhere in the last second prevents arming, and none before that second does.
     #[test]
-    fn one_gap_is_enough(at in 0usize..2000, wrong in prop_oneof![0..u64::from(EARLY_US), u64::from(LATE_US) + 1..2600]) {
+    fn one_gap_is_enough(
+        at in 0usize..2000,
+        wrong in prop_oneof![0..u64::from(EARLY_US), u64::from(LATE_US) + 1..2600],
+    ) {
         let gaps = (0..4000).map(|index| if index == at + 500 { wrong } else { 1000 });
         let reports = reports(gaps);
         let (before, after) = (&reports[at + 500], &reports[at + 501..at + 1501]);
@@ -141,13 +145,13 @@ proptest! {
         prop_assert!(reports.last().is_some_and(Report::healthy));
     }
 
-    /// A tick is alive for as long as time moves on, however odd its rate: what flies is not reset.
+    /// A tick is alive as long as the clock advances, whatever its rate.
     #[test]
     fn alive_while_time_moves(gaps in prop::collection::vec(1u64..3_000_000, 1..300)) {
         prop_assert!(reports(gaps).iter().all(|report| report.alive));
     }
 
-    /// No times whatever panic it; a clock that stands still or goes back is dead, and nothing of this is healthy.
+    /// No times cause a panic; a clock that stands still or goes back is dead and not healthy.
     #[test]
     fn any_times(times in prop::collection::vec(any::<u64>(), 1..200)) {
         let mut counter = Counter::default();

@@ -1,5 +1,5 @@
-//! What the flight core makes of a vehicle that has tipped over, stands, falls, or is not what its tracker says: each by
-//! itself, with states made up. Closed loops are in `tests/tests/frozen.rs`.
+//! Detection of a vehicle that has tipped over, stands or falls, and of a frozen tracker, each with made-up states.
+//! `tests/tests/frozen.rs` has closed loops.
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
@@ -14,7 +14,7 @@ use proptest::prelude::*;
 
 const WEIGHT_N: f32 = 0.486 * 9.81;
 
-/// Gives a thrust of as many newtons as the setpoint is high.
+/// A controller whose thrust in newtons is the setpoint's height.
 struct Lift(Mixer);
 
 impl FlightController for Lift {
@@ -44,7 +44,7 @@ struct Bench {
     inbox: Inbox,
     now_us: u64,
     thrust_n: f32,
-    /// Where its velocity has taken it.
+    /// Position from integrating its velocity.
     travelled_m: Vector3<f32>,
 }
 
@@ -64,7 +64,7 @@ impl Bench {
         }
     }
 
-    /// A tick in which this state is measured, through a tracker's noise.
+    /// Runs a tick in which this state is measured, with a tracker's noise.
     fn tick(&mut self, state: State) -> Outcome {
         let mut value = state;
         self.travelled_m += state.velocity_m_s * 1e-3;
@@ -73,7 +73,7 @@ impl Bench {
         self.exactly(value)
     }
 
-    /// A tick in which this very state is measured.
+    /// Runs a tick in which exactly this state is measured.
     fn exactly(&mut self, value: State) -> Outcome {
         self.now_us += 1000;
         let at_us = self.now_us;
@@ -87,7 +87,7 @@ impl Bench {
         assert!(self.inbox.request(Asked { request, ticket: 9 }));
     }
 
-    /// So many ms in this state; the end of the flight, if it ended, and after how many.
+    /// Runs `ms` ticks in this state; returns when and why the flight ended, if it did.
     fn wait(&mut self, ms: u64, state: State) -> Option<(u64, End)> {
         (1..=ms).find_map(|ms| self.tick(state).ended.map(|end| (ms, end)))
     }
@@ -99,7 +99,7 @@ impl Bench {
         result
     }
 
-    /// One in the air.
+    /// A bench with a vehicle in the air.
     fn flying() -> Self {
         let mut bench = Bench::new();
         assert_eq!(bench.wait(1500, State::default()), None);
@@ -117,7 +117,7 @@ fn climbing(m_s: f32) -> State {
     State { velocity_m_s: Vector3::new(0.0, 0.0, m_s), ..State::default() }
 }
 
-/// On its side or its back for a second, however it lies.
+/// On its side or back for a second, in any direction.
 #[test]
 fn a_vehicle_that_lies_is_disarmed() {
     for roll_rad in [1.45, 2.0, 3.1, -1.6, -3.1] {
@@ -132,7 +132,7 @@ fn a_vehicle_that_lies_is_disarmed() {
 fn a_vehicle_that_leans_or_rights_itself_is_not() {
     let mut bench = Bench::flying();
     assert_eq!(bench.wait(20_000, rolled(1.2)), None);
-    // On its back for a moment, and on its way back for longer than a second.
+    // On its back for a moment, then recovering for longer than a second.
     assert_eq!(bench.wait(300, rolled(3.1)), None);
     for step in 0..1600 {
         assert_eq!(bench.wait(1, rolled(3.1 - step as f32 * 1e-3)), None, "{step} ms");
@@ -153,7 +153,7 @@ fn a_vehicle_that_spins_is_disarmed() {
         let (ms, end) = ended.expect("over and over");
         assert!(end == End::Tumbled && ms < 2_500, "{rate_rad_s} rad/s: {ms} ms");
     }
-    // About its own z it may.
+    // Rotation about its own z is allowed.
     let mut bench = Bench::flying();
     let spinning = State { rates_rad_s: Vector3::new(0.0, 0.0, 12.0), ..State::default() };
     assert_eq!(bench.wait(5_000, spinning), None);
@@ -177,7 +177,7 @@ fn nothing_that_moves_or_turns_is_armed() {
     }
 }
 
-/// An Arm that was held up on its way comes after the motors were stopped in the air.
+/// A delayed Arm arrives after the motors were stopped in the air.
 #[test]
 fn a_late_arm_does_not_start_a_falling_vehicle() {
     let mut bench = Bench::flying();
@@ -188,7 +188,7 @@ fn a_late_arm_does_not_start_a_falling_vehicle() {
         assert_eq!(bench.answer(Request::Arm, falling), Err(Refusal::NotAtRest), "{ms} ms");
         assert_eq!(bench.tick(falling).mode, Mode::Disarmed);
     }
-    // Nor the moment that it lies.
+    // Nor at the moment when it comes to rest.
     assert_eq!(bench.answer(Request::Arm, State::default()), Err(Refusal::NotAtRest));
     assert_eq!(bench.wait(REST_US / 1000, State::default()), None);
     assert_eq!(bench.answer(Request::Arm, State::default()), Ok(()));
@@ -196,7 +196,7 @@ fn a_late_arm_does_not_start_a_falling_vehicle() {
 
 #[test]
 fn disarming_is_for_the_ground() {
-    // Armed, and not carried by its rotors yet.
+    // Armed, and not yet carried by its rotors.
     let mut bench = Bench::new();
     bench.thrust_n = 0.3 * WEIGHT_N;
     bench.wait(1500, State::default());
@@ -204,11 +204,11 @@ fn disarming_is_for_the_ground() {
     bench.wait(5000, State::default());
     assert_eq!(bench.answer(Request::Disarm, State::default()), Ok(()));
 
-    // In the air, however still.
+    // In the air, also at rest.
     let mut bench = Bench::flying();
     assert_eq!(bench.answer(Request::Disarm, State::default()), Err(Refusal::InFlight));
     assert_eq!(bench.tick(State::default()).mode, Mode::Flying);
-    // Down again: it sinks, it stops, and its rotors rest.
+    // Landed: it descends, stops, and its thrust is low.
     assert_eq!(bench.wait(1000, climbing(0.6)), None);
     assert_eq!(bench.wait(1000, climbing(-0.6)), None);
     assert_eq!(bench.answer(Request::Disarm, climbing(-0.6)), Err(Refusal::InFlight));
@@ -219,7 +219,7 @@ fn disarming_is_for_the_ground() {
     assert_eq!(bench.answer(Request::Disarm, State::default()), Ok(()));
 }
 
-/// A state that repeats itself to the last bit is no measurement, in the air only.
+/// An exactly repeated state is no measurement, in the air only.
 #[test]
 fn a_repeated_state_is_as_old_as_its_first() {
     let mut bench = Bench::new();
@@ -242,9 +242,9 @@ fn a_repeated_state_is_as_old_as_its_first() {
     }
 }
 
-/// A pose that stands within noise while its twist says that it moves, along and about every axis.
+/// A noisy constant pose with a moving twist, along and about every axis.
 #[test]
-fn a_pose_that_stands_while_its_twist_moves_is_not_believed() {
+fn a_constant_pose_with_a_moving_twist_is_distrusted() {
     for axis in 0..5 {
         let mut bench = Bench::flying();
         let mut frozen = State::default();
@@ -252,7 +252,7 @@ fn a_pose_that_stands_while_its_twist_moves_is_not_believed() {
             0..3 => frozen.velocity_m_s[axis] = -1.0,
             _ => frozen.rates_rad_s[axis - 3] = 1.0,
         }
-        // It counts as in the air from its speed on; two windows at most.
+        // Its speed puts it in the air; detection takes two windows at most.
         let stands = |bench: &mut Bench| {
             bench.travelled_m = Vector3::zeros();
             bench.tick(frozen)
@@ -264,7 +264,7 @@ fn a_pose_that_stands_while_its_twist_moves_is_not_believed() {
     }
 }
 
-/// After an outage: a pose that hangs still at height while the thrust falls away is no landing.
+/// After an outage, a constant pose in the air while the thrust decreases is no landing.
 #[test]
 fn a_vehicle_that_hangs_without_thrust_has_not_landed() {
     let mut bench = Bench::flying();
@@ -277,10 +277,12 @@ fn a_vehicle_that_hangs_without_thrust_has_not_landed() {
 }
 
 proptest! {
-    /// Whatever is measured and asked for, in whatever order: no motor turns while disarmed, arming comes from rest, and a
-    /// plain Disarm never ends a flight in the air.
+    /// For any states and requests: no motor turns while disarmed, arming requires rest, and a plain Disarm never ends
+    /// a flight in the air.
     #[test]
-    fn any_flight(script in prop::collection::vec((0u8..8, -4.0f32..4.0, -4.0f32..4.0, 0.0f32..10.0, 1u64..600), 1..40)) {
+    fn any_flight(
+        script in prop::collection::vec((0u8..8, -4.0f32..4.0, -4.0f32..4.0, 0.0f32..10.0, 1u64..600), 1..40),
+    ) {
         let mut bench = Bench::new();
         let mut at_rest_us = 0;
         for (what, turn, climb, thrust_n, ms) in script {

@@ -12,7 +12,7 @@ const REQUESTS: [Option<Request>; 5] =
 /// Ages on both sides of each limit.
 const AGES_US: [u64; 8] = [0, COAST_US, COAST_US + 1, DESCEND_US, DESCEND_US + 1, GIVE_UP_US, GIVE_UP_US + 1, u64::MAX];
 
-/// In the air, with nothing asked for, and fresh states for long.
+/// In the air with long fresh states and no request.
 const CALM: Observed = Observed {
     request: None,
     kill: false,
@@ -23,7 +23,7 @@ const CALM: Observed = Observed {
     tumbled: false,
 };
 
-/// Everything that can be observed.
+/// Returns all combinations of mode and observations.
 fn all() -> impl Iterator<Item = (Mode, Observed)> {
     let flags = |n: usize| (n & 1 == 1, n & 2 == 2, n & 4 == 4);
     let cases = MODES.into_iter().flat_map(|mode| REQUESTS.into_iter().map(move |request| (mode, request)));
@@ -45,7 +45,7 @@ fn disarmed_at_power_up() {
     assert!(!Mode::default().armed());
 }
 
-/// What follows in flight from the age of the state alone, one row a mode, one column an age of `AGES_US`.
+/// Transitions in flight by the age of the state alone: a row for each mode, a column for each age of `AGES_US`.
 #[test]
 fn in_flight_the_age_decides() {
     use Mode::{Coasting as R, Descending as D, Disarmed as X, Flying as F};
@@ -73,9 +73,9 @@ fn coasting_ends_once_states_have_been_fresh_for_a_while() {
     }
 }
 
-/// The diagram, read off once more: what ends a flight, in the order of weight.
+/// The diagram once more: what ends a flight, in order of precedence.
 #[test]
-fn a_flight_ends_for_the_weightiest_reason() {
+fn a_flight_ends_for_the_reason_of_highest_precedence() {
     for (mode, seen) in all() {
         let reasons = [
             (seen.kill, End::Killed),
@@ -91,7 +91,7 @@ fn a_flight_ends_for_the_weightiest_reason() {
     }
 }
 
-/// Only a request to arm, which is granted, starts the motors; and a request changes nothing that is refused.
+/// Only a granted request to arm starts the motors, and a refused request has no effect.
 #[test]
 fn what_is_refused_changes_nothing() {
     for (mode, seen) in all() {

@@ -1,4 +1,4 @@
-//! The control tick against the law's own step, and blind flight against a plant.
+//! The control tick compared with the law's step, and blind flight with a plant.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc::{Adaptive, Controller, Profile, Settings};
@@ -30,7 +30,7 @@ struct Bench {
     memory: Memory<Adapted>,
     now_us: u64,
     inbox: Inbox,
-    /// Of the measured height, to and fro: no tracker says the same twice \[m\].
+    /// Alternating noise of the measured height, since trackers never repeat a state \[m\].
     noise_m: f32,
 }
 
@@ -39,7 +39,7 @@ impl Bench {
         Bench { vehicle: vehicle(), memory: Memory::default(), now_us: 0, inbox: Inbox::default(), noise_m: 0.0 }
     }
 
-    /// What was behind the last tick.
+    /// Returns the trace of the last tick.
     fn trace(&self) -> Trace {
         self.memory.trace::<Controller<Adaptive>>()
     }
@@ -48,7 +48,7 @@ impl Bench {
         assert!(self.inbox.request(Asked { request, ticket: 3 }));
     }
 
-    /// One that has been flying at `state` towards `setpoint` for a tick.
+    /// A bench that has been flying at `state` towards `setpoint` for a tick.
     fn flying(state: State, setpoint: Setpoint) -> Self {
         let mut bench = Bench::new();
         for _ in 0..1001 {
@@ -60,7 +60,7 @@ impl Bench {
         bench
     }
 
-    /// One that has been carried by its rotors for long enough to be in the air, under a tracker with noise.
+    /// A bench that has been carried by its rotors long enough to be in the air, with a tracker's noise.
     fn airborne(state: State, setpoint: Setpoint) -> Self {
         let mut bench = Bench { noise_m: 1e-6, ..Bench::flying(state, setpoint) };
         for _ in 0..CARRIED_US / 1000 {
@@ -69,7 +69,7 @@ impl Bench {
         bench
     }
 
-    /// A millisecond with what was measured and commanded in it.
+    /// Runs a tick with this measurement and setpoint.
     fn tick(&mut self, state: Option<State>, setpoint: Option<Setpoint>) -> Outcome {
         self.now_us += 1000;
         let at_us = self.now_us;
@@ -152,9 +152,9 @@ fn the_estimates_of_one_flight_are_not_those_of_the_next() {
     assert_eq!(bench.memory.control().expect("flown").estimates, fresh);
 }
 
-/// The tick in which each mode begins, and frozen estimates as long as the vehicle is blind.
+/// The tick in which each mode begins; estimates are frozen while the vehicle is blind.
 #[test]
-fn a_lost_state_is_ridden_out_then_descended_on_then_given_up() {
+fn a_lost_state_leads_to_coasting_descending_and_stopping() {
     let mut bench = Bench::airborne(State::default(), near());
     let mut frozen = None;
     for age_ms in 1..=2300 {
@@ -192,7 +192,7 @@ fn blind_thrust_is_the_weight_and_then_less() {
     assert!((descending / coasting - 0.9).abs() < 1e-5, "{descending}");
 }
 
-/// Roll of a plant with the nominal inertia, whose rotors do what they are told, under a steady moment from outside.
+/// Roll of a plant with the nominal inertia and ideal rotors, with a constant external moment.
 struct Roll {
     angle: f32,
     rate: f32,
@@ -215,8 +215,8 @@ impl Roll {
     }
 }
 
-/// The state is lost while the vehicle rolls at 1 rad/s. Left alone it would be at 0.35 rad after coasting and at 2.3 rad
-/// when the motors stop, and with the moment from outside, unknown, upside down long before.
+/// The state is lost while the vehicle rolls at 1 rad/s. Without control it would reach 0.35 rad after coasting and 2.3
+/// rad when the motors stop, and with the unknown external moment it would be upside down long before.
 #[test]
 fn coasting_stops_the_rotation_and_descending_levels() {
     for outside_n in [0.0, 0.02, -0.02] {
@@ -258,11 +258,11 @@ fn without_a_setpoint_the_vehicle_stays_where_it_is() {
     let outcome = bench.tick(Some(here), None);
     assert!(outcome.health.setpoint_stale);
     assert_eq!((outcome.mode, bench.trace().errors.x.e1), (Mode::Flying, 0.0));
-    // The place is that of the moment, not the vehicle's.
+    // The position is held as it was at that moment.
     let moved = State { position_m: Vector3::new(1.5, 2.0, 3.0), ..State::default() };
     bench.tick(Some(moved), None);
     assert_eq!(bench.trace().errors.x.e1, -0.5);
-    // A setpoint that comes back is followed.
+    // A returning setpoint is followed.
     bench.tick(Some(moved), Some(near()));
     assert_eq!(bench.trace().errors.x.e1, 0.3 - 1.5);
 }
@@ -284,7 +284,7 @@ fn a_state_that_comes_back_leads_the_descent_to_the_ground() {
         state.position_m.z -= SINK_M_S * 1e-3;
     }
     state.velocity_m_s.z = 0.0;
-    // The ground stops it. Its rotors must stop carrying it, too, and both for a second.
+    // It stops on the ground. Thrust must be low as well, and both for a second.
     let mut uncarried_ms = 0;
     let ended = (0..3000).find_map(|_| {
         uncarried_ms += u64::from(bench.trace().inputs.thrust_n < 0.6 * WEIGHT_N);
@@ -317,10 +317,13 @@ fn only_a_law_at_the_ticks_rate_flies() {
 }
 
 proptest! {
-    /// Whatever arrives whenever: motors get speeds, none when disarmed, and nothing panics.
+    /// With any inputs at any time, motors get valid speeds, zero when disarmed, and nothing panics.
     #[test]
-    fn any_inputs(script in prop::collection::vec(
-        (any::<u32>(), prop::option::of((any::<[f32; 12]>(), any::<u64>())), any::<u8>()), 1..100)
+    fn any_inputs(
+        script in prop::collection::vec(
+            (any::<u32>(), prop::option::of((any::<[f32; 12]>(), any::<u64>())), any::<u8>()),
+            1..100,
+        ),
     ) {
         let mut bench = Bench::flying(State::default(), near());
         for (later, state, request) in script {
