@@ -197,6 +197,13 @@ fn crates_to_be_published_say_what_they_are() {
     assert!(fs::read_to_string(root().join("Cargo.toml")).unwrap().contains("\npublish = false\n"));
 }
 
+/// What the README promises of the example.
+#[test]
+fn a_law_of_ones_own_takes_60_lines() {
+    let example = fs::read_to_string(root().join("crates/sim/examples/own_law.rs")).unwrap();
+    assert!(example.lines().count() <= 60, "{} lines", example.lines().count());
+}
+
 #[test]
 fn no_crate_is_more_than_a_fifth_of_the_code() {
     let lines = |path: &PathBuf| fs::read_to_string(path).unwrap().lines().count();

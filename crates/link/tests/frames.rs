@@ -1,7 +1,7 @@
 //! Conversion of frames: known attitudes, and `f64` rotation matrices as the oracle.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use afbc_link::frames::{Odometry, euler, flip, quaternion};
+use afbc_link::frames::{Odometry, flip};
 use afbc_types::State;
 use core::f32::consts::{FRAC_PI_2, PI};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
@@ -87,20 +87,6 @@ fn what_is_no_rotation_is_refused() {
     assert_eq!(far.to_state(), None);
 }
 
-/// Quaternions of norm about 1; half of them within 1e-3 rad of a pitch of 90 degrees.
-fn attitudes() -> impl Strategy<Value = Quaternion<f32>> {
-    let any = prop::array::uniform4(-1.0f32..1.0)
-        .prop_filter("not too short", |q| q.iter().map(|c| c * c).sum::<f32>() > 0.01)
-        .prop_map(|[w, x, y, z]| Quaternion::new(w, x, y, z).normalize());
-    let near_gimbal = (prop::bool::ANY, -1e-3f32..1e-3, -3.1f32..3.1, -3.1f32..3.1).prop_map(|(up, off, roll, yaw)| {
-        let pitch = if up { FRAC_PI_2 } else { -FRAC_PI_2 } + off;
-        let about = |axis, angle: f32| UnitQuaternion::from_axis_angle(&axis, f64::from(angle));
-        let q = about(Vector3::z_axis(), yaw) * about(Vector3::y_axis(), pitch) * about(Vector3::x_axis(), roll);
-        q.into_inner().cast()
-    });
-    prop_oneof![any, near_gimbal]
-}
-
 /// Largest change of a velocity by being turned into the body frame and back \[m/s\]. A turn v + 2w(q x v) + 2q x (q x
 /// v) rounds some ten times, each time by at most half of EPSILON of the speed, and twice as much comes from |q|, which
 /// is 1 to two roundings and counts squared: 8 EPSILON of the speed per turn.
@@ -123,23 +109,6 @@ fn a_fast_state_crosses() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
-
-    /// The Euler angles are the same rotation as the quaternion at every attitude, and lie within their ranges.
-    #[test]
-    fn euler_angles_are_the_same_rotation(q in attitudes(), scale in 0.96f32..1.04) {
-        let angles = euler(&(q * scale));
-        let difference = (r_earth_body(&angles) - rotation_of(&q)).amax();
-        prop_assert!(difference < 2e-6, "{difference} at {angles}");
-        prop_assert!(angles.x.abs() <= PI && angles.y.abs() <= FRAC_PI_2 && angles.z.abs() <= PI);
-    }
-
-    /// The quaternion is the same rotation as the Euler angles.
-    #[test]
-    fn quaternions_are_the_same_rotation(roll in -3.1f32..3.1, pitch in -1.57f32..1.57, yaw in -30.0f32..30.0) {
-        let attitude = Vector3::new(roll, pitch, yaw);
-        let difference = (rotation_of(&quaternion(&attitude)) - r_earth_body(&attitude)).amax();
-        prop_assert!(difference < 2e-6, "{difference}");
-    }
 
     /// A state is converted to the wire and back with rounding errors only.
     #[test]

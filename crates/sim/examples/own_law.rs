@@ -1,6 +1,4 @@
-//! A law of one's own, flown against the plant: `cargo run --release -p afbc-sim --example own_law`.
-//!
-//! The law is small: acceleration by PD on position, thrust and tilt from that, moments by PD on attitude.
+//! A law of one's own, PD on position and attitude, in a closed loop with the plant: `cargo run --example own_law`.
 #![allow(clippy::unwrap_used, reason = "an example whose parameters are not valid should say so")]
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
@@ -9,7 +7,7 @@ use afbc_sim::scenario;
 use afbc_types::{Inputs, Parameters, Setpoint, State};
 use core::ops::ControlFlow;
 
-/// What is fixed: vehicle and mixer. What changed in flight would be in the type `Memory`.
+/// What is fixed; what changes in flight belongs in the type `Memory`.
 struct OwnLaw {
     vehicle: Parameters,
     mixer: Mixer,
@@ -29,12 +27,10 @@ impl FlightController for OwnLaw {
     fn decide(&self, (): &mut (), state: &State, setpoint: &Setpoint, _fresh: bool) -> Action {
         let Parameters { mass_kg, gravity_m_s2, .. } = self.vehicle;
         let effectiveness = self.vehicle.effectiveness();
-        let acceleration = (setpoint.position_m - state.position_m) * 2.0
-            + (setpoint.velocity_m_s - state.velocity_m_s) * 2.5
-            + setpoint.acceleration_m_s2;
+        let (e, e_dot) = (setpoint.position_m - state.position_m, setpoint.velocity_m_s - state.velocity_m_s);
+        let acceleration = e * 2.0 + e_dot * 2.5 + setpoint.acceleration_m_s2;
         // Small angles, heading along x: positive pitch tilts the thrust to +x, positive roll to -y.
-        let tilt_rad =
-            [-acceleration.y / gravity_m_s2, acceleration.x / gravity_m_s2].map(|tilt| tilt.clamp(-0.4, 0.4));
+        let tilt_rad = [-acceleration.y, acceleration.x].map(|a| (a / gravity_m_s2).clamp(-0.4, 0.4));
         let (eta, omega) = (state.attitude_rad, state.rates_rad_s);
         let moment = |error: f32, rate: f32| 100.0 * error - 18.0 * rate;
         self.mixer.action(&Inputs {
@@ -51,12 +47,10 @@ impl FlightController for OwnLaw {
 }
 
 fn main() {
-    let text = scenario::built_in("hover").unwrap().text;
-    let scenario = scenario::parse("hover", text, "hover").unwrap();
+    let scenario = scenario::built_in("hover").unwrap().read().unwrap();
     let vehicle = scenario.vehicle.to_f32();
     let law = OwnLaw { vehicle, mixer: Mixer::new(&vehicle, 3.0).unwrap() };
-    let mut world = World::new(&scenario, 0.001).unwrap();
-    let mut distance_m = 0.0;
+    let (mut world, mut distance_m) = (World::new(&scenario, 0.001).unwrap(), 0.0);
     let Ok(end) = lockstep(&mut world, &mut Alone::new(law), scenario.duration_s, |sample| {
         distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
         ControlFlow::Continue(())

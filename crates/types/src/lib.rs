@@ -1,5 +1,6 @@
 //! The words that every other crate speaks: what a state, a setpoint, a rotor speed and a vehicle are.
-//! Types and their accepted ranges only, and the way to declare parameters ([`parameters!`]); nothing here decides anything.
+//! Types and their accepted ranges, attitudes as quaternions, and the way to declare parameters ([`parameters!`]); nothing
+//! here decides anything.
 //!
 //! # Conventions
 //!
@@ -26,6 +27,7 @@
 #![no_std]
 
 mod actuation;
+mod attitude;
 mod axes;
 mod declared;
 mod motion;
@@ -36,5 +38,6 @@ pub use actuation::{Inputs, RotorForces, RotorSpeeds};
 pub use axes::{Axis, PerAxis};
 pub use declared::{Declaration, Declared, Field, Name, Number, Value, Visit};
 pub use motion::{Setpoint, State};
+pub use nalgebra;
 pub use parameters::Parameters;
 pub use range::{OutOfRange, Range};
