@@ -7,7 +7,7 @@
 
 use afbc::{Adaptive, Backstepping, Controller, Profile};
 use afbc_control::{FlightController, Screened};
-use afbc_plant::{Drag, Model, Plant, Realism, Rotors, Sensing, Spread, Turbulence, Wind};
+use afbc_plant::{Deviations, Drag, Model, Plant, Realism, Rotors, Sensing, Turbulence, Wind};
 use afbc_sim::case::Case;
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::flight::{Alone, Pilot, World, fly};
@@ -130,7 +130,7 @@ fn real() -> Scenario {
     let rotors = Rotors { time_constant_s: 0.02, max_rad_s: 317.0, delay_s: 0.001, ..Rotors::default() };
     let wind =
         Wind { steady_m_s: Vector3::new(3.0, 1.0, 0.0), turbulence: Some(Turbulence::MODERATE), ..Wind::default() };
-    let (noise, bias) = (Spread::all(0.001), Spread::all(0.001));
+    let (noise, bias) = (Deviations::all(0.001), Deviations::all(0.001));
     Scenario {
         realism: Realism { rotors, wind, drag: Some(Drag::PAPER), ..Realism::default() },
         sensing: Sensing { noise, bias, delay_s: 0.002, dropouts: None },

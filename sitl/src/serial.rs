@@ -104,7 +104,7 @@ fn failed(error: io::Error) -> Error {
 #[allow(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use super::*;
-    use afbc_sim::in_the_loop::{End, Host, Pace, fly};
+    use afbc_sim::in_the_loop::{Host, LoopEnd, Pace, fly};
     use afbc_sim::scenario::{Scenario, built_in};
     use core::ops::ControlFlow;
     use serialport::TTYPort;
@@ -167,7 +167,7 @@ mod tests {
             furthest_m = furthest_m.max((sample.motion.position_m - sample.reference.position_m).norm());
             ControlFlow::Continue(())
         });
-        assert_eq!(end.unwrap(), End { lost: None, interrupted: false, disarmed: true });
+        assert_eq!(end.unwrap(), LoopEnd { lost: None, interrupted: false, disarmed: true });
         assert!(start.elapsed() > Duration::from_secs(3), "in real time: a second to arm, two to fly");
         let start_m = (scenario.initial.position_m - scenario.trajectory.at(0.0).position_m).norm();
         assert!(furthest_m < start_m + 0.1, "{furthest_m} m away, {start_m} m at the start");

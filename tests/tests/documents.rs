@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a page that cannot be read must stop the test
 
 use afbc::Profile;
-use afbc::adaptive::Gains;
+use afbc::adaptive;
 use afbc_sim::contender::ControllerKind;
 use std::fs;
 use std::path::Path;
@@ -68,8 +68,8 @@ fn pages_that_list_the_laws_list_all() {
 fn the_gains_of_the_profile_flight_are_those_on_its_page() {
     let page = include_str!("../../docs/flight.md");
     let (gains, settings) = (Profile::Flight.gains(), Profile::Flight.settings());
-    let row = |axes: &str, gains: &Gains| {
-        let Gains { backstepping, gamma, eta, epsilon, safeguards: s, .. } = gains;
+    let row = |axes: &str, gains: &adaptive::Gains| {
+        let adaptive::Gains { backstepping, gamma, eta, epsilon, safeguards: s, .. } = gains;
         let figures =
             [backstepping.alpha1, backstepping.alpha2, *gamma, *eta, *epsilon, s.theta_max, s.delta_max, s.sigma];
         // To half of the last digit written.

@@ -4,7 +4,7 @@
 use afbc::{Adaptive, Cascade, Controller, Profile};
 use afbc_control::Estimate;
 use afbc_control::{FlightController, Screened};
-use afbc_plant::sensors::Spread;
+use afbc_plant::sensors::Deviations;
 use afbc_plant::{Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors};
 use afbc_sim::contender::ControllerKind;
 use afbc_sim::flight::Sample;
@@ -36,7 +36,8 @@ impl Hover {
         let start = Motion { position_m: Vector3::new(0.0, 0.0, 2.0), ..Motion::default() };
         let environment = Environment::calm(vehicle).unwrap();
         let plant = Plant::with_realism(Model::RigidBody, start, environment, &realism, STEP_S).unwrap();
-        let sensors = Sensors::new(&Sensing { noise: Spread::all(0.001), ..Sensing::default() }, 11, STEP_S).unwrap();
+        let sensors =
+            Sensors::new(&Sensing { noise: Deviations::all(0.001), ..Sensing::default() }, 11, STEP_S).unwrap();
         let setpoint = Setpoint { position_m: Vector3::new(0.0, 0.0, 2.0), ..Setpoint::default() };
         Hover { controller, memory: Screened::default(), plant, sensors, setpoint }
     }

@@ -9,7 +9,7 @@ use afbc::{Adaptive, Backstepping, Cascade, Controller, Law, Profile, Settings};
 use afbc_control::{Errors, Estimate, FlightController, Screened};
 use afbc_plant::{Environment, Model, Motion, Plant};
 use afbc_sim::case::{Case, Reading};
-use afbc_sim::contender::{Contender, ControllerKind, Law as Gains};
+use afbc_sim::contender::{self, Contender, ControllerKind};
 use afbc_sim::flight::{Alone, End, Sample, World, lockstep};
 use afbc_sim::paper::scenario;
 use afbc_sim::run::Run;
@@ -236,7 +236,7 @@ fn the_robust_term_becomes_a_relay_at_2_epsilon_over_g_dt() {
 
 fn with_epsilon(epsilon: f32) -> Contender {
     let gains = PerAxis::from_fn(|axis| adaptive::Gains { epsilon, ..Profile::Paper.gains()[axis] });
-    Contender { law: Gains::Afbc(gains), ..afbc() }
+    Contender { law: contender::Law::Afbc(gains), ..afbc() }
 }
 
 fn afbc() -> Contender {

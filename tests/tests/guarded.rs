@@ -6,7 +6,7 @@ use afbc::monitor::Bounds;
 use afbc::{Guarded, Profile, Settings, guarded};
 use afbc_control::{Action, FlightController, Screened, Trace, Trip};
 use afbc_plant::{
-    Drag, Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors, Spread, Turbulence, Wind,
+    Deviations, Drag, Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors, Turbulence, Wind,
 };
 use afbc_sim::case::Case;
 use afbc_sim::paper;
@@ -41,7 +41,7 @@ struct Bench {
 
 impl Bench {
     /// In the air, with a rotor lag of 20 ms and 3 N per rotor.
-    fn real(controller: Guarded, realism: Realism, noise: Spread) -> Self {
+    fn real(controller: Guarded, realism: Realism, noise: Deviations) -> Self {
         let rotors = Rotors { time_constant_s: 0.02, max_rad_s: 317.0, ..Rotors::default() };
         let environment = Environment::calm(Parameters::PAPER).unwrap();
         let realism = Realism { rotors, ..realism };
@@ -79,7 +79,7 @@ impl Bench {
 }
 
 /// Noise of position and velocity from motion capture, of attitude and rates from a small inertial sensor.
-const NOISE: Spread = Spread { position_m: 0.002, velocity_m_s: 0.01, attitude_rad: 0.002, rates_rad_s: 0.02 };
+const NOISE: Deviations = Deviations { position_m: 0.002, velocity_m_s: 0.01, attitude_rad: 0.002, rates_rad_s: 0.02 };
 
 /// The paper's flight with its gusts and uncertainty: with the printed epsilon of 1 mm/s the robust terms chatter once
 /// they have grown, after more than half of it, and the detector trips. Without the detector nothing trips.
@@ -126,7 +126,7 @@ fn a_flight_goes_on_across_a_trip_and_back() {
     let setpoint = above(0.0);
     let wind = Wind { steady_m_s: Vector3::new(3.0, 0.0, 0.0), ..Wind::default() };
     let realism = Realism { drag: Some(Drag::PAPER), wind, ..Realism::default() };
-    let mut bench = Bench::real(flight(|bounds| bounds.theta.x = 0.2), realism, Spread::default());
+    let mut bench = Bench::real(flight(|bounds| bounds.theta.x = 0.2), realism, Deviations::default());
 
     // At the switch, inputs change by no more than from one step to the next: 5 mN, 5 mm/s2.
     let bumpless = |before: &Trace, after: &Trace, what: &str| {
@@ -173,7 +173,7 @@ fn a_flight_goes_on_across_a_trip_and_back() {
 #[test]
 fn the_fallback_flies_far() {
     let tripped = |bounds: &mut Bounds| bounds.lyapunov = PerAxis { z: 0.0, ..bounds.lyapunov };
-    let mut bench = Bench::real(flight(tripped), Realism::default(), Spread::default());
+    let mut bench = Bench::real(flight(tripped), Realism::default(), Deviations::default());
     assert_eq!(bench.fly(SECOND, &above(0.1)), Some(Trip::Lyapunov(Axis::Z)));
     for (x, z) in [(0.0, 30.0), (0.0, 2.0), (40.0, 2.0), (0.0, 20.0)] {
         let setpoint = Setpoint { position_m: Vector3::new(x, 0.0, z), ..Setpoint::default() };

@@ -8,7 +8,6 @@
 use afbc_flight_core::{Mode, Refusal, Request};
 use afbc_link::Command;
 use afbc_plant::{Contact, Environment, Model, Motion, Plant, Realism};
-use afbc_sim::case::Case as Reading;
 use afbc_sim::in_the_loop::{Host, Station};
 use afbc_sim::paper;
 use afbc_sim::scenario::Scenario;
@@ -42,7 +41,7 @@ enum Flight {
 
 impl Flight {
     fn scenario(self) -> Scenario {
-        let paper = paper::scenario(Model::RigidBody, Reading::DEFAULT).expect("in range");
+        let paper = paper::scenario(Model::RigidBody, afbc_sim::case::Case::DEFAULT).expect("in range");
         let hover = |height_m: f64, setpoint_m: f64| Scenario {
             environment: Environment::calm(Parameters::PAPER).expect("in range"),
             initial: Motion { position_m: Vector3::new(0.0, 0.0, height_m), ..Motion::default() },

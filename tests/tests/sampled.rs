@@ -3,7 +3,7 @@
 
 use afbc::Profile;
 use afbc_control::FlightController;
-use afbc_flight_core::{ArmingLimits, Asked, Inbox, Memory, Mode, Request, Stamped, Vehicle};
+use afbc_flight_core::{ArmingLimits, Asked, Inbox, Mode, Request, Stamped, Vehicle, VehicleMemory};
 use afbc_sim::contender::{Contender, ControllerKind, Task};
 use afbc_sim::scenario::{Scenario, built_in};
 use afbc_types::{OutOfRange, State};
@@ -51,7 +51,7 @@ impl Task for OnTracker<'_> {
 /// Returns the root mean square distance from the reference from 5 s on \[m\], and whether the flight was completed.
 fn fly<C: FlightController>(scenario: &Scenario, controller: C, mut tracker: Tracker) -> (f64, bool) {
     let vehicle = Vehicle::new(scenario.vehicle.to_f32(), ArmingLimits::NONE, controller).unwrap();
-    let (mut memory, mut inbox) = (Memory::default(), Inbox::default());
+    let (mut memory, mut inbox) = (VehicleMemory::default(), Inbox::default());
     let mut plant = scenario.plant(0.001).unwrap();
     let (mut squares, mut count) = (0.0, 0);
     let mut outcome = None;

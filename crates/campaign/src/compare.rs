@@ -69,7 +69,7 @@ pub struct Outcome {
 
 /// Mean and standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spread {
+pub struct Average {
     /// The mean.
     pub mean: f64,
     /// Standard deviation of the sample; 0 for a single value.
@@ -77,7 +77,7 @@ pub struct Spread {
 }
 
 /// A figure of merit; smaller is better.
-pub struct Figure {
+pub struct Measure {
     /// Name of its column in files.
     pub name: &'static str,
     /// Name in tables and figures.
@@ -91,13 +91,13 @@ pub struct Figure {
 }
 
 /// Figures by which contenders are compared.
-pub const FIGURES: [Figure; 6] = [
-    Figure { name: "rmse_x_m", title: "x [m]", digits: 4, scale: 1.0, value: |m| m.rmse.x },
-    Figure { name: "rmse_y_m", title: "y [m]", digits: 4, scale: 1.0, value: |m| m.rmse.y },
-    Figure { name: "rmse_z_m", title: "z [m]", digits: 4, scale: 1.0, value: |m| m.rmse.z },
-    Figure { name: "rmse_psi_rad", title: "ψ [rad]", digits: 4, scale: 1.0, value: |m| m.rmse.w },
-    Figure { name: "max_position_m", title: "max [m]", digits: 4, scale: 1.0, value: |m| m.max_abs.xyz().max() },
-    Figure {
+pub const MEASURES: [Measure; 6] = [
+    Measure { name: "rmse_x_m", title: "x [m]", digits: 4, scale: 1.0, value: |m| m.rmse.x },
+    Measure { name: "rmse_y_m", title: "y [m]", digits: 4, scale: 1.0, value: |m| m.rmse.y },
+    Measure { name: "rmse_z_m", title: "z [m]", digits: 4, scale: 1.0, value: |m| m.rmse.z },
+    Measure { name: "rmse_psi_rad", title: "ψ [rad]", digits: 4, scale: 1.0, value: |m| m.rmse.w },
+    Measure { name: "max_position_m", title: "max [m]", digits: 4, scale: 1.0, value: |m| m.max_abs.xyz().max() },
+    Measure {
         name: "mean_abs_delta_u4_n",
         title: "|ΔU₄| [mN]",
         digits: 1,
@@ -118,7 +118,7 @@ impl Entry {
     }
 
     /// Returns mean and standard deviation of a figure over the flights; none if a vehicle was lost.
-    pub fn spread(&self, value: impl Fn(&Metrics) -> f64) -> Option<Spread> {
+    pub fn average(&self, value: impl Fn(&Metrics) -> f64) -> Option<Average> {
         if self.lost() > 0 {
             return None;
         }
@@ -126,14 +126,14 @@ impl Entry {
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;
         let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
-        Some(Spread { mean, deviation: libm::sqrt(squares / (count - 1.0).max(1.0)) })
+        Some(Average { mean, deviation: libm::sqrt(squares / (count - 1.0).max(1.0)) })
     }
 }
 
 impl Comparison {
     /// Returns the root mean square distance of a contender divided by that of backstepping, if neither lost a vehicle.
     pub fn ratio(&self, entry: &Entry) -> Option<f64> {
-        let distance = |entry: &Entry| entry.spread(|metrics| metrics.rmse.xyz().norm()).map(|spread| spread.mean);
+        let distance = |entry: &Entry| entry.average(|metrics| metrics.rmse.xyz().norm()).map(|average| average.mean);
         let classical = |entry: &&Entry| entry.contender().kind() == ControllerKind::Backstepping;
         let ratio = distance(entry)? / distance(self.entries.iter().find(classical)?)?;
         // Not defined for flights that ended before errors count.
@@ -146,8 +146,8 @@ impl Comparison {
     }
 
     /// True if `entry` has the smallest mean of a figure among those that lost no vehicle.
-    pub fn is_best(&self, entry: &Entry, figure: &Figure) -> bool {
-        let mean = |entry: &Entry| entry.spread(figure.value).map(|spread| spread.mean);
+    pub fn is_best(&self, entry: &Entry, figure: &Measure) -> bool {
+        let mean = |entry: &Entry| entry.average(figure.value).map(|average| average.mean);
         let Some(own) = mean(entry) else { return false };
         self.entries.iter().filter_map(mean).all(|other| own <= other)
     }

@@ -120,7 +120,7 @@ fn spreads(mut table: Table<'_>, scenario: &Scenario) -> Result<Vec<Spread>, Fil
 
 /// Returns why drawing this quantity would have no effect, if so.
 fn idle(name: &str, scenario: &Scenario) -> Option<&'static str> {
-    let still = afbc_plant::Spread::default();
+    let still = afbc_plant::Deviations::default();
     match name {
         "wind_m_s" | "wind_20ft_m_s" if scenario.realism.drag.is_none() => {
             Some("wind has no effect on a vehicle without drag; add [drag] to the scenario")

@@ -1,6 +1,6 @@
 //! Quantities that a campaign can draw.
 
-use afbc_plant::{Dropouts, Environment, Payload, RotorFault, Spread, Turbulence};
+use afbc_plant::{Deviations, Dropouts, Environment, Payload, RotorFault, Turbulence};
 use afbc_sim::scenario::Scenario;
 use afbc_types::{OutOfRange, Parameters, Range};
 use core::f64::consts::TAU;
@@ -17,11 +17,11 @@ pub struct Quantity {
     /// Another quantity without which this one has no effect.
     pub needs: Option<&'static str>,
     /// Applies the value to a flight.
-    apply: fn(&mut Flight, f64),
+    apply: fn(&mut Assembly, f64),
 }
 
 /// A flight while draws are applied to it.
-struct Flight {
+struct Assembly {
     scenario: Scenario,
     truth: Parameters<f64>,
     payload: Option<Payload>,
@@ -36,11 +36,11 @@ pub(super) fn apply<'a>(
     values: impl Iterator<Item = (&'a Quantity, f64)>,
 ) -> Result<Scenario, OutOfRange> {
     let truth = *scenario.environment.nominal();
-    let mut flight = Flight { scenario, truth, payload: None };
+    let mut flight = Assembly { scenario, truth, payload: None };
     for (quantity, value) in values {
         (quantity.apply)(&mut flight, value);
     }
-    let Flight { mut scenario, truth, payload } = flight;
+    let Assembly { mut scenario, truth, payload } = flight;
     let old = &scenario.environment;
     let payloads = old.payloads().iter().copied().chain(payload).collect();
     scenario.environment =
@@ -53,7 +53,7 @@ const fn quantity(
     min: f64,
     max: f64,
     meaning: &'static str,
-    apply: fn(&mut Flight, f64),
+    apply: fn(&mut Assembly, f64),
 ) -> Quantity {
     Quantity { range: Range::new(name, min, max), meaning, whole: false, needs: None, apply }
 }
@@ -171,8 +171,8 @@ pub static QUANTITIES: [Quantity; 23] = [
     }),
 ];
 
-fn scale(spread: &mut Spread, ratio: f64) {
-    let Spread { position_m, velocity_m_s, attitude_rad, rates_rad_s } = spread;
+fn scale(spread: &mut Deviations, ratio: f64) {
+    let Deviations { position_m, velocity_m_s, attitude_rad, rates_rad_s } = spread;
     for size in [position_m, velocity_m_s, attitude_rad, rates_rad_s] {
         *size *= ratio;
     }

@@ -42,12 +42,12 @@ pub struct Figure {
     pub name: &'static str,
     /// Meaning in words.
     pub meaning: &'static str,
-    value: fn(&Outcome) -> Option<f64>,
+    value: fn(&Tally) -> Option<f64>,
 }
 
 /// Sums over one flight.
 #[derive(Clone, Debug, Default)]
-struct Outcome {
+struct Tally {
     lost: Option<Lost>,
     /// When and why the contender's monitor tripped, if it did.
     trip: Option<(f64, Trip)>,
@@ -60,7 +60,7 @@ struct Outcome {
     saturated: u64,
 }
 
-impl Outcome {
+impl Tally {
     fn measured(&self, value: f64) -> Option<f64> {
         (self.settled > 0).then_some(value)
     }
@@ -71,7 +71,7 @@ impl Outcome {
     }
 }
 
-const fn figure(name: &'static str, meaning: &'static str, value: fn(&Outcome) -> Option<f64>) -> Figure {
+const fn figure(name: &'static str, meaning: &'static str, value: fn(&Tally) -> Option<f64>) -> Figure {
     Figure { name, meaning, value }
 }
 
@@ -111,7 +111,7 @@ impl Campaign {
         let scenario = self.with(flight, &draw)?;
         let trajectory = self.course(flight).map(|course| course.name.as_str()).unwrap_or_default();
         let row = |contender: &Contender| {
-            let outcome = Outcome::of(&scenario, contender)?;
+            let outcome = Tally::of(&scenario, contender)?;
             let figures = FIGURES.iter().map(|figure| (figure.value)(&outcome));
             Ok(Row {
                 flight,
@@ -127,10 +127,10 @@ impl Campaign {
     }
 }
 
-impl Outcome {
+impl Tally {
     /// Flies, and keeps only sums.
     fn of(scenario: &Scenario, contender: &Contender) -> Result<Self, OutOfRange> {
-        let mut outcome = Outcome::default();
+        let mut outcome = Tally::default();
         let mut metrics = Accumulator::default();
         outcome.lost = fly(scenario, contender, |sample| {
             metrics.add(sample);

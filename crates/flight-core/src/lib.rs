@@ -34,5 +34,5 @@ pub use clock::SourceClock;
 pub use inbox::{Asked, Inbox, Stamped};
 pub use motor::Motor;
 pub use supervisor::{ArmingLimits, End, Mode, Refusal, Request};
-pub use tick::{Answer, Health, Memory, Outcome, Vehicle};
+pub use tick::{Answer, Health, Outcome, Vehicle, VehicleMemory};
 pub use tracker::Tracker;

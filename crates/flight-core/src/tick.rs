@@ -14,7 +14,7 @@ use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Range, RotorForces, R
 /// Accepted time step of a law: the tick's \[s\].
 pub const DT: Range = Range::new("dt_s", 0.001, 0.001);
 
-/// A vehicle with its controller. Constant; everything that changes in flight is in [`Memory`].
+/// A vehicle with its controller. Constant; everything that changes in flight is in [`VehicleMemory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle<C> {
     controller: C,
@@ -25,7 +25,7 @@ pub struct Vehicle<C> {
 
 /// State of a vehicle that persists between ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Memory<M> {
+pub struct VehicleMemory<M> {
     mode: Mode,
     rate: rate::Counter,
     /// The newest plausible state.
@@ -36,12 +36,12 @@ pub struct Memory<M> {
     restless_us: u64,
     /// Number of states refused because they repeated the last one in flight, or came from a distrusted tracker.
     frozen_states: u32,
-    flight: Option<Flight<M>>,
+    flight: Option<Armed<M>>,
 }
 
 /// State of one flight, from arming on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Flight<M> {
+struct Armed<M> {
     control: M,
     reckoning: Reckoning,
     /// Inputs last applied to the rotors.
@@ -64,7 +64,7 @@ struct Guide {
     descent: Option<Descent>,
 }
 
-impl<M> Memory<M> {
+impl<M> VehicleMemory<M> {
     /// Returns the flight mode.
     pub fn mode(&self) -> Mode {
         self.mode
@@ -83,12 +83,12 @@ impl<M> Memory<M> {
     /// Returns the trace of the last tick with the controller `C`: only inputs while blind, zeros while disarmed.
     pub fn trace<C: FlightController<Memory = M>>(&self) -> Trace {
         match &self.flight {
-            Some(Flight { lawless: Some(inputs), .. }) if self.mode.armed() => {
+            Some(Armed { lawless: Some(inputs), .. }) if self.mode.armed() => {
                 let mut trace = Trace::default();
                 trace.inputs = *inputs;
                 trace
             }
-            Some(Flight { control, .. }) if self.mode.armed() => C::trace(control),
+            Some(Armed { control, .. }) if self.mode.armed() => C::trace(control),
             _ => Trace::default(),
         }
     }
@@ -157,7 +157,7 @@ impl<C: FlightController> Vehicle<C> {
     /// Cannot fail.
     #[inline]
     #[must_use = "the motors need its speeds"]
-    pub fn tick(&self, memory: &mut Memory<C::Memory>, now_us: u64, inbox: &Inbox) -> Outcome {
+    pub fn tick(&self, memory: &mut VehicleMemory<C::Memory>, now_us: u64, inbox: &Inbox) -> Outcome {
         let dt_s = self.controller.dt_s();
         // Takes the newest inputs.
         let measured = memory.take_state(inbox, now_us);
@@ -166,7 +166,7 @@ impl<C: FlightController> Vehicle<C> {
             memory.state.filter(|_| state_age_us <= COAST_US).map(|state| extrapolated(&state.value, state_age_us));
         let fresh = fresh.as_ref();
         memory.watch(fresh, &self.limits, dt_s, now_us);
-        let Memory { mode, rate, stale_us, restless_us, frozen_states, flight, .. } = memory;
+        let VehicleMemory { mode, rate, stale_us, restless_us, frozen_states, flight, .. } = memory;
         let rate = rate.tick(now_us);
         let setpoint = inbox.setpoint().filter(|s| s.age_us(now_us) <= SETPOINT_STALE_US).map(|s| &s.value);
 
@@ -197,7 +197,7 @@ impl<C: FlightController> Vehicle<C> {
         // The tick of arming only sets up the flight, and the motors idle: a step would take too long.
         let arms = done(Request::Arm);
         if let (true, Some(state)) = (arms, fresh) {
-            Flight::begin(flight, self, state, now_us);
+            Armed::begin(flight, self, state, now_us);
         }
 
         // Controls.
@@ -239,7 +239,7 @@ impl<C: FlightController> Vehicle<C> {
 
     /// Returns the action without a state.
     #[inline(always)]
-    fn blind_action<M>(&self, flight: &mut Flight<M>, mode: Mode) -> Action {
+    fn blind_action<M>(&self, flight: &mut Armed<M>, mode: Mode) -> Action {
         flight.guide.descent = None;
         let inputs = match mode {
             Mode::Descending => self.blind.descend(&flight.reckoning),
@@ -250,7 +250,7 @@ impl<C: FlightController> Vehicle<C> {
 
     /// Returns the action for inputs that do not come from the law.
     #[inline(always)]
-    fn lawless<M>(&self, flight: &mut Flight<M>, inputs: Inputs) -> Action {
+    fn lawless<M>(&self, flight: &mut Armed<M>, inputs: Inputs) -> Action {
         flight.lawless = Some(inputs);
         self.controller.mixer().action(&inputs)
     }
@@ -267,7 +267,7 @@ fn extrapolated(state: &State, age_us: u64) -> State {
     }
 }
 
-impl<M> Memory<M> {
+impl<M> VehicleMemory<M> {
     /// Stores the inbox's state if it is newer than the present one, not already stale (states that are always late do
     /// not count as states), and not from a frozen tracker. True if it was stored.
     fn take_state(&mut self, inbox: &Inbox, now_us: u64) -> bool {
@@ -309,13 +309,13 @@ impl<M> Memory<M> {
     }
 }
 
-impl<M: Default> Flight<M> {
+impl<M: Default> Armed<M> {
     /// Begins a flight, in the memory of the last one.
     // Out of line, so that the new memory is not built on the tick's stack and copied.
     #[cold]
     #[inline(never)]
     fn begin<C>(flight: &mut Option<Self>, vehicle: &Vehicle<C>, state: &State, now_us: u64) {
-        *flight = Some(Flight {
+        *flight = Some(Armed {
             control: M::default(),
             reckoning: vehicle.blind.start(state),
             applied: Inputs::default(),
@@ -329,7 +329,7 @@ impl<M: Default> Flight<M> {
     }
 }
 
-impl<M> Flight<M> {
+impl<M> Armed<M> {
     /// Advances the dead reckoning over the last period, corrected by a measurement if there is one.
     fn reckon(&mut self, blind: &Blind, measured: Option<&State>) {
         blind.advance(&mut self.reckoning, &self.applied);

@@ -2,7 +2,7 @@
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
-use afbc_flight_core::{ArmingLimits, Asked, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle};
+use afbc_flight_core::{ArmingLimits, Asked, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory};
 use afbc_types::{Parameters, RotorForces, RotorSpeeds, Setpoint, State};
 
 /// A controller that counts how often it is engaged, and gives the weight as thrust.
@@ -35,7 +35,7 @@ impl FlightController for Counter {
 
 struct Bench {
     vehicle: Vehicle<Counter>,
-    memory: Memory<u32>,
+    memory: VehicleMemory<u32>,
     now_us: u64,
 }
 
@@ -44,7 +44,7 @@ impl Bench {
         let parameters = Parameters::PAPER.to_f32();
         let counter = Counter(Mixer::new(&parameters, 3.0).expect("valid"));
         let vehicle = Vehicle::new(parameters, ArmingLimits::default(), counter).expect("valid");
-        Bench { vehicle, memory: Memory::default(), now_us: 0 }
+        Bench { vehicle, memory: VehicleMemory::default(), now_us: 0 }
     }
 
     fn tick(&mut self, tracked: bool, request: Option<Request>) -> Outcome {

@@ -3,7 +3,9 @@
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc::{Adaptive, Controller, Profile};
-use afbc_flight_core::{Answer, ArmingLimits, Asked, Inbox, Memory, Mode, Refusal, Request, Stamped, Tracker, Vehicle};
+use afbc_flight_core::{
+    Answer, ArmingLimits, Asked, Inbox, Mode, Refusal, Request, Stamped, Tracker, Vehicle, VehicleMemory,
+};
 use afbc_link::{Address, Command, Counters, Decoder, FRAME_MAX, Sender, Uplink};
 use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
 
@@ -82,7 +84,7 @@ fn play(mut frames: Vec<Frame>) -> Seen {
     let law = Adaptive::new(Profile::Flight.gains()).expect("valid");
     let controller = Controller::new(parameters, settings, law).expect("valid");
     let vehicle = Vehicle::new(parameters, ArmingLimits::default(), controller).expect("valid");
-    let (mut memory, mut inbox, mut tracker) = (Memory::default(), Inbox::default(), Tracker::default());
+    let (mut memory, mut inbox, mut tracker) = (VehicleMemory::default(), Inbox::default(), Tracker::default());
     let mut decoder = Decoder::<Uplink>::new(VEHICLE);
     let mut seen = Seen::default();
     let mut frames = frames.iter().peekable();
@@ -164,133 +166,136 @@ fn mavlink_crc(bytes: &[u8], extra: u8) -> u16 {
 const FOREVER: std::ops::Range<i64> = 0..i64::MAX;
 
 use Command::Kill;
-use Mode::{Coasting as R, Descending as D, Disarmed as X, Flying as F};
+use Mode::{Coasting, Descending, Disarmed, Flying};
 
 /// A fault, the modes that follow with their first millisecond, and a further check.
 type Case = (&'static str, fn(&mut Vec<Frame>), &'static [(i64, Mode)], fn(&Seen) -> bool);
 
 #[rustfmt::skip]
 const CASES: &[Case] = &[
-    ("no fault", |_| {}, &[(0, F)], |s| s.counters.lost == 0 && s.answers.is_empty()),
+    ("no fault", |_| {}, &[(0, Flying)], |s| s.counters.lost == 0 && s.answers.is_empty()),
 
     // Dropped frames.
-    ("20 ms without a state are nothing", |f| drop_states(f, 0..20), &[(0, F)], |s| s.counters.lost == 20),
-    ("21 ms are coasted through", |f| drop_states(f, 0..21), &[(0, F), (20, R), (120, F)], |s| s.counters.lost == 21),
-    ("100 ms are coasted through", |f| drop_states(f, 0..100), &[(0, F), (20, R), (199, F)], |_| true),
-    ("250 ms are coasted through", |f| drop_states(f, 0..250), &[(0, F), (20, R), (349, F)], |_| true),
+    ("20 ms without a state are nothing", |f| drop_states(f, 0..20), &[(0, Flying)], |s| s.counters.lost == 20),
+    ("21 ms are coasted through", |f| drop_states(f, 0..21),
+        &[(0, Flying), (20, Coasting), (120, Flying)], |s| s.counters.lost == 21),
+    ("100 ms are coasted through", |f| drop_states(f, 0..100), &[(0, Flying), (20, Coasting), (199, Flying)], |_| true),
+    ("250 ms are coasted through", |f| drop_states(f, 0..250), &[(0, Flying), (20, Coasting), (349, Flying)], |_| true),
     ("251 ms end in a descent, on the ground a second later", |f| drop_states(f, 0..251),
-        &[(0, F), (20, R), (250, D), (1252, X)], |_| true),
+        &[(0, Flying), (20, Coasting), (250, Descending), (1252, Disarmed)], |_| true),
     ("a state that never returns ends the flight", |f| drop_states(f, FOREVER),
-        &[(0, F), (20, R), (250, D), (2250, X)], |_| true),
+        &[(0, Flying), (20, Coasting), (250, Descending), (2250, Disarmed)], |_| true),
     ("a state that returns late still lands the vehicle", |f| drop_states(f, 0..1500),
-        &[(0, F), (20, R), (250, D), (2501, X)], |_| true),
+        &[(0, Flying), (20, Coasting), (250, Descending), (2501, Disarmed)], |_| true),
     ("every second state missing is nothing",
-        |f| states(f, FOREVER, |frame| (frame.at_ms % 2 == 0).then_some(())), &[(0, F)], |s| s.counters.lost > 1000),
+        |f| states(f, FOREVER, |frame| (frame.at_ms % 2 == 0).then_some(())),
+        &[(0, Flying)], |s| s.counters.lost > 1000),
     ("one state in 20 ms is enough",
-        |f| states(f, FOREVER, |frame| (frame.at_ms % 20 == 0).then_some(())), &[(0, F)], |_| true),
+        |f| states(f, FOREVER, |frame| (frame.at_ms % 20 == 0).then_some(())), &[(0, Flying)], |_| true),
     ("outages of 40 ms are coasted through as one",
         |f| { drop_states(f, 0..40); drop_states(f, 60..100); },
-        &[(0, F), (20, R), (199, F)], |_| true),
+        &[(0, Flying), (20, Coasting), (199, Flying)], |_| true),
     ("no setpoint: the position is held", |f| f.retain(|frame| frame.kind != Kind::Setpoint || frame.at_ms < 0),
-        &[(0, F)], |s| s.setpoint_stale),
+        &[(0, Flying)], |s| s.setpoint_stale),
     ("the whole link is dead", |f| f.retain(|frame| frame.at_ms < 0),
-        &[(0, F), (20, R), (250, D), (2250, X)], |s| s.setpoint_stale),
+        &[(0, Flying), (20, Coasting), (250, Descending), (2250, Disarmed)], |s| s.setpoint_stale),
 
     // Delayed frames.
-    ("15 ms late are nothing", |f| delay_states(f, FOREVER, |_| 15), &[(0, F)], |_| true),
+    ("15 ms late are nothing", |f| delay_states(f, FOREVER, |_| 15), &[(0, Flying)], |_| true),
     // After a second the delay cannot be distinguished from a clock that was set back, and the vehicle is seen to be at
     // rest.
     ("30 ms late are as good as none at first", |f| delay_states(f, FOREVER, |_| 30),
-        &[(0, F), (20, R), (250, D), (1706, X)], |_| true),
+        &[(0, Flying), (20, Coasting), (250, Descending), (1706, Disarmed)], |_| true),
     ("a queue that builds up and empties", |f| delay_states(f, 0..100, |at| at.min(100 - at)),
-        &[(0, F), (41, R), (199, F)], |_| true),
+        &[(0, Flying), (41, Coasting), (199, Flying)], |_| true),
     ("a burst after a pause of 100 ms", |f| delay_states(f, 0..100, |at| 100 - at),
-        &[(0, F), (20, R), (199, F)], |s| s.counters.lost == 0),
-    ("jitter of 15 ms, some overtaken", |f| delay_states(f, FOREVER, |at| at * 7 % 16), &[(0, F)], |_| true),
+        &[(0, Flying), (20, Coasting), (199, Flying)], |s| s.counters.lost == 0),
+    ("jitter of 15 ms, some overtaken", |f| delay_states(f, FOREVER, |at| at * 7 % 16), &[(0, Flying)], |_| true),
     ("one state 500 ms late is not taken for new", |f| {
         delay_states(f, 100..101, |_| 500);
         drop_states(f, 590..700);
-    }, &[(0, F), (610, R), (799, F)], |_| true),
+    }, &[(0, Flying), (610, Coasting), (799, Flying)], |_| true),
     ("setpoints 400 ms late are still setpoints",
         |f| for frame in f.iter_mut().filter(|f| f.kind == Kind::Setpoint && f.at_ms >= 0) { frame.at_ms += 400; },
-        &[(0, F)], |s| !s.setpoint_stale),
+        &[(0, Flying)], |s| !s.setpoint_stale),
 
     // Corrupt frames.
     ("one state with a flipped bit", |f| states(f, 5..6, |frame| { frame.bytes[50] ^= 4; Some(()) }),
-        &[(0, F)], |s| s.counters.bad_checksum == 1 && s.counters.lost == 1),
+        &[(0, Flying)], |s| s.counters.bad_checksum == 1 && s.counters.lost == 1),
     ("100 ms of flipped bits", |f| states(f, 0..100, |frame| { frame.bytes[100] ^= 0x80; Some(()) }),
-        &[(0, F), (20, R), (199, F)], |s| s.counters.bad_checksum == 100),
+        &[(0, Flying), (20, Coasting), (199, Flying)], |s| s.counters.bad_checksum == 100),
     ("flipped bits for ever", |f| states(f, FOREVER, |frame| { frame.bytes[30] ^= 1; Some(()) }),
-        &[(0, F), (20, R), (250, D), (2250, X)], |_| true),
+        &[(0, Flying), (20, Coasting), (250, Descending), (2250, Disarmed)], |_| true),
     ("a length that swallows the next state", |f| states(f, 5..6, |frame| { frame.bytes[1] = 233; Some(()) }),
-        &[(0, F)], |s| s.counters.bad_checksum == 1 && s.counters.lost == 1),
+        &[(0, Flying)], |s| s.counters.bad_checksum == 1 && s.counters.lost == 1),
     ("truncated states for 30 ms", |f| states(f, 0..30, |frame| { frame.bytes.truncate(99); Some(()) }),
-        &[(0, F), (20, R), (129, F)], |s| s.counters.lost == 30),
+        &[(0, Flying), (20, Coasting), (129, Flying)], |s| s.counters.lost == 30),
     ("noise between states", |f| states(f, FOREVER, |frame| {
         frame.bytes.splice(0..0, [0xFD, 0, 0x55, 0xFD, 0xFD]);
         Some(())
-    }), &[(0, F)], |s| s.counters.skipped_bytes > 10_000 && s.counters.lost == 0),
+    }), &[(0, Flying)], |s| s.counters.skipped_bytes > 10_000 && s.counters.lost == 0),
     ("NaN positions for 50 ms",
         |f| states(f, 0..50, |frame| {
             rewrite(frame, |p| p[8..12].copy_from_slice(&f32::NAN.to_le_bytes()));
             Some(())
         }),
-        &[(0, F), (20, R), (149, F)], |s| s.counters.implausible == 50),
+        &[(0, Flying), (20, Coasting), (149, Flying)], |s| s.counters.implausible == 50),
     ("no rotation for 300 ms", |f| states(f, 0..300, |frame| { rewrite(frame, |p| p[20..36].fill(0)); Some(()) }),
-        &[(0, F), (20, R), (250, D), (1301, X)], |s| s.counters.implausible == 300),
+        &[(0, Flying), (20, Coasting), (250, Descending), (1301, Disarmed)], |s| s.counters.implausible == 300),
     ("states of another frame for 50 ms",
         |f| states(f, 0..50, |frame| { rewrite(frame, |p| p[228] = 4); Some(()) }),
-        &[(0, F), (20, R), (149, F)], |s| s.counters.unsupported == 50),
+        &[(0, Flying), (20, Coasting), (149, Flying)], |s| s.counters.unsupported == 50),
     ("a disarm command with a flipped bit does nothing", |f| {
         let mut disarm = frame(10, Uplink::Command(Command::Disarm));
         disarm.bytes[12] ^= 1;
         f.push(disarm);
-    }, &[(0, F)], |s| s.answers.is_empty() && s.counters.bad_checksum == 1),
+    }, &[(0, Flying)], |s| s.answers.is_empty() && s.counters.bad_checksum == 1),
 
     // Reordered and repeated frames.
     ("states swapped in pairs", |f| delay_states(f, 0..1000, |at| if at % 2 == 0 { 2 } else { 0 }),
-        &[(0, F)], |_| true),
+        &[(0, Flying)], |_| true),
     ("states in blocks of 10, back to front", |f| delay_states(f, FOREVER, |at| 9 - at % 10 + 9 - at % 10),
-        &[(0, F)], |_| true),
+        &[(0, Flying)], |_| true),
     ("every state twice", |f| { let again = f.clone(); f.extend(again.into_iter().filter(|f| f.at_ms >= 0)); },
-        &[(0, F)], |s| s.counters.lost == 0),
+        &[(0, Flying)], |s| s.counters.lost == 0),
     ("old states played back instead of new ones", |f| {
         let old = f.iter().find(|frame| frame.kind == Kind::State).expect("some").bytes.clone();
         for frame in f.iter_mut().filter(|f| f.kind == Kind::State && f.at_ms >= 0) {
             frame.bytes.clone_from(&old);
         }
-    }, &[(0, F), (20, R), (250, D), (2250, X)], |_| true),
+    }, &[(0, Flying), (20, Coasting), (250, Descending), (2250, Disarmed)], |_| true),
     ("arming again in flight is refused and changes nothing", |f| f.push(frame(10, Uplink::Command(Command::Arm))),
-        &[(0, F)], |s| s.answers == [Err(Refusal::AlreadyArmed)]),
+        &[(0, Flying)], |s| s.answers == [Err(Refusal::AlreadyArmed)]),
     ("stopped and armed within a millisecond: stopped, and not at rest", |f| {
         f.push(frame(10, Uplink::Command(Kill)));
         f.push(frame(10, Uplink::Command(Command::Arm)));
         for frame in f.iter_mut().filter(|f| f.kind == Kind::State && f.at_ms > 10) {
             rewrite(frame, |p| p[44..48].copy_from_slice(&1.0f32.to_le_bytes()));
         }
-    }, &[(0, F), (10, X)], |s| s.answers == [Ok(Request::Kill), Err(Refusal::NotAtRest)]),
+    }, &[(0, Flying), (10, Disarmed)], |s| s.answers == [Ok(Request::Kill), Err(Refusal::NotAtRest)]),
     ("armed and stopped within a millisecond: stopped", |f| {
         f.push(frame(10, Uplink::Command(Command::Arm)));
         f.push(frame(10, Uplink::Command(Kill)));
-    }, &[(0, F), (10, X)], |s| s.answers == [Err(Refusal::Overtaken), Ok(Request::Kill)]),
+    }, &[(0, Flying), (10, Disarmed)], |s| s.answers == [Err(Refusal::Overtaken), Ok(Request::Kill)]),
 
     // Commands during a fault.
     ("disarmed in flight: refused", |f| f.push(frame(10, Uplink::Command(Command::Disarm))),
-        &[(0, F)], |s| s.answers == [Err(Refusal::InFlight)]),
-    ("stopped in flight", |f| f.push(frame(10, Uplink::Command(Kill))), &[(0, F), (10, X)], |_| true),
+        &[(0, Flying)], |s| s.answers == [Err(Refusal::InFlight)]),
+    ("stopped in flight", |f| f.push(frame(10, Uplink::Command(Kill))), &[(0, Flying), (10, Disarmed)], |_| true),
     ("stopped while coasting", |f| { drop_states(f, FOREVER); f.push(frame(100, Uplink::Command(Kill))); },
-        &[(0, F), (20, R), (100, X)], |_| true),
+        &[(0, Flying), (20, Coasting), (100, Disarmed)], |_| true),
     ("stopped while descending", |f| { drop_states(f, FOREVER); f.push(frame(400, Uplink::Command(Kill))); },
-        &[(0, F), (20, R), (250, D), (400, X)], |_| true),
+        &[(0, Flying), (20, Coasting), (250, Descending), (400, Disarmed)], |_| true),
     ("armed again while descending: refused", |f| {
         drop_states(f, 0..300);
         f.push(frame(400, Uplink::Command(Command::Arm)));
-    }, &[(0, F), (20, R), (250, D), (1301, X)], |s| s.answers == [Err(Refusal::AlreadyArmed)]),
+    }, &[(0, Flying), (20, Coasting), (250, Descending), (1301, Disarmed)],
+        |s| s.answers == [Err(Refusal::AlreadyArmed)]),
     ("armed on the ground without a state: refused", |f| {
         drop_states(f, FOREVER);
         f.push(frame(10, Uplink::Command(Kill)));
         f.push(frame(500, Uplink::Command(Command::Arm)));
-    }, &[(0, F), (10, X)], |s| s.answers == [Ok(Request::Kill), Err(Refusal::StateStale)]),
+    }, &[(0, Flying), (10, Disarmed)], |s| s.answers == [Ok(Request::Kill), Err(Refusal::StateStale)]),
 ];
 
 #[test]

@@ -5,7 +5,7 @@
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_flight_core::supervisor::REST_US;
 use afbc_flight_core::{
-    Answer, ArmingLimits, Asked, End, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle,
+    Answer, ArmingLimits, Asked, End, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory,
 };
 use afbc_types::{Parameters, RotorForces, RotorSpeeds, Setpoint, State};
 use core::f32::consts::{PI, TAU};
@@ -40,7 +40,7 @@ impl FlightController for Lift {
 
 struct Bench {
     vehicle: Vehicle<Lift>,
-    memory: Memory<()>,
+    memory: VehicleMemory<()>,
     inbox: Inbox,
     now_us: u64,
     thrust_n: f32,
@@ -56,7 +56,7 @@ impl Bench {
         let vehicle = Vehicle::new(parameters, limits, lift).expect("valid");
         Bench {
             vehicle,
-            memory: Memory::default(),
+            memory: VehicleMemory::default(),
             inbox: Inbox::EMPTY,
             now_us: 0,
             thrust_n: WEIGHT_N,

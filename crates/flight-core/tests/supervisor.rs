@@ -48,12 +48,12 @@ fn disarmed_at_power_up() {
 /// Transitions in flight by the age of the state alone: a row for each mode, a column for each age of `AGES_US`.
 #[test]
 fn in_flight_the_age_decides() {
-    use Mode::{Coasting as R, Descending as D, Disarmed as X, Flying as F};
+    use Mode::{Coasting, Descending, Disarmed, Flying};
     let table = [
-        (Mode::Disarmed, [X, X, X, X, X, X, X, X]),
-        (Mode::Flying, [F, F, R, R, D, D, X, X]),
-        (Mode::Coasting, [F, F, R, R, D, D, X, X]),
-        (Mode::Descending, [D, D, D, D, D, D, X, X]),
+        (Disarmed, [Disarmed; 8]),
+        (Flying, [Flying, Flying, Coasting, Coasting, Descending, Descending, Disarmed, Disarmed]),
+        (Coasting, [Flying, Flying, Coasting, Coasting, Descending, Descending, Disarmed, Disarmed]),
+        (Descending, [Descending, Descending, Descending, Descending, Descending, Descending, Disarmed, Disarmed]),
     ];
     for (mode, row) in table {
         for (state_age_us, expected) in AGES_US.into_iter().zip(row) {

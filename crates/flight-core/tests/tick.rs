@@ -6,7 +6,7 @@ use afbc_control::{FlightController, Trace};
 use afbc_flight_core::descent::SINK_M_S;
 use afbc_flight_core::landing::{CARRIED_US, STILL_US};
 use afbc_flight_core::{
-    Answer, ArmingLimits, Asked, End, Inbox, Memory, Mode, Outcome, Refusal, Request, Stamped, Vehicle,
+    Answer, ArmingLimits, Asked, End, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory,
 };
 use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
@@ -27,7 +27,7 @@ fn vehicle() -> Vehicle<Controller<Adaptive>> {
 /// A vehicle, its memory and the time.
 struct Bench {
     vehicle: Vehicle<Controller<Adaptive>>,
-    memory: Memory<Adapted>,
+    memory: VehicleMemory<Adapted>,
     now_us: u64,
     inbox: Inbox,
     /// Alternating noise of the measured height, since trackers never repeat a state \[m\].
@@ -36,7 +36,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        Bench { vehicle: vehicle(), memory: Memory::default(), now_us: 0, inbox: Inbox::default(), noise_m: 0.0 }
+        Bench { vehicle: vehicle(), memory: VehicleMemory::default(), now_us: 0, inbox: Inbox::default(), noise_m: 0.0 }
     }
 
     /// Returns the trace of the last tick.

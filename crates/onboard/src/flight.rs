@@ -3,14 +3,14 @@
 use afbc::monitor::{Bounds, Norm};
 use afbc::{Guarded, Profile, guarded};
 use afbc_flight_core::motor::Curve;
-use afbc_flight_core::{Answer, ArmingLimits, End, Health, Inbox, Memory, Mode, Motor, Vehicle};
+use afbc_flight_core::{Answer, ArmingLimits, End, Health, Inbox, Mode, Motor, Vehicle, VehicleMemory};
 use afbc_types::{Axis, OutOfRange, Parameters, RotorSpeeds};
 
 /// The vehicle of the paper, under its law in the profile `flight`.
 #[derive(Clone, Debug)]
 pub struct Flight {
     vehicle: Vehicle<Guarded>,
-    memory: Memory<guarded::Memory>,
+    memory: VehicleMemory<guarded::Memory>,
     motor: Motor,
     saturated_ticks: u32,
 }
@@ -50,7 +50,7 @@ impl Flight {
         let controller = Guarded::new(parameters, settings, gains, bounds)?;
         Ok(Flight {
             vehicle: Vehicle::new(parameters, ArmingLimits::default(), controller)?,
-            memory: Memory::default(),
+            memory: VehicleMemory::default(),
             motor: Motor::new(Curve::DEFAULT)?,
             saturated_ticks: 0,
         })

@@ -1,7 +1,7 @@
 //! Emulated processor and host, compared.
 
 use crate::emulator::{Emulator, Reply};
-use afbc_sim::in_the_loop::{Autopilot, Error, Host, Spread, Tick};
+use afbc_sim::in_the_loop::{Autopilot, Error, Extremes, Host, Tick};
 use afbc_types::OutOfRange;
 
 /// The emulated processor and the same code on the host. The host gets the same bytes at the same times, and every
@@ -29,7 +29,7 @@ pub struct Comparison {
     /// The first tick with a bit that differs, counted from 0.
     pub first_difference: Option<u64>,
     /// Instructions of each armed control tick.
-    pub instructions: Spread,
+    pub instructions: Extremes,
     /// Ticks that came late or early, by the processor's own clock.
     pub late_ticks: u32,
     /// Largest stack depth so far, interrupts included \[bytes\].

@@ -43,7 +43,8 @@ pub struct Worst {
 /// # Errors
 /// If the emulator fails, or the vehicle does not arm.
 pub fn search(emulator: Emulator, seed: u64, candidates: u64) -> Result<Worst, Error> {
-    let mut flight = Flight { emulator, station: Station::default(), tick: 0, random: SplitMix64::seed_from_u64(seed) };
+    let mut flight =
+        EmulatedFlight { emulator, station: Station::default(), tick: 0, random: SplitMix64::seed_from_u64(seed) };
     let mut worst = Worst { candidates, ..Worst::default() };
     let (mut summit, mut height) = ([0.0; NUMBERS], 0);
     for candidate in 0..candidates {
@@ -74,14 +75,14 @@ pub fn search(emulator: Emulator, seed: u64, candidates: u64) -> Result<Worst, E
     Ok(worst)
 }
 
-struct Flight {
+struct EmulatedFlight {
     emulator: Emulator,
     station: Station,
     tick: u64,
     random: SplitMix64,
 }
 
-impl Flight {
+impl EmulatedFlight {
     /// Draws a number in -1..1.
     fn number(&mut self) -> f32 {
         (self.random.next_u64() >> 40) as f32 / (1 << 23) as f32 - 1.0

@@ -5,8 +5,8 @@
 #![allow(clippy::unwrap_used, missing_docs)] // a plant that cannot be built must stop the bench
 
 use afbc_plant::{
-    Battery, Contact, CosineGust, Drag, Dropouts, Environment, GroundEffect, Model, Motion, Plant, Realism, Rotors,
-    Sensing, Sensors, Spread, Turbulence, Wind,
+    Battery, Contact, CosineGust, Deviations, Drag, Dropouts, Environment, GroundEffect, Model, Motion, Plant, Realism,
+    Rotors, Sensing, Sensors, Turbulence, Wind,
 };
 use afbc_types::{Parameters, RotorSpeeds};
 use divan::counter::ItemsCount;
@@ -121,8 +121,8 @@ fn lag_drag_turbulence_sensors(bencher: Bencher) {
 
 fn sensors() -> Sensors {
     let sensing = Sensing {
-        noise: Spread::all(0.001),
-        bias: Spread::all(0.001),
+        noise: Deviations::all(0.001),
+        bias: Deviations::all(0.001),
         delay_s: 0.002,
         dropouts: Some(Dropouts { rate_hz: 1.0, mean_s: 0.01 }),
     };

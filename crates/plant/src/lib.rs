@@ -59,7 +59,7 @@ pub use load::Load;
 pub use motion::Motion;
 pub use realism::{Realism, STEP, Telemetry};
 pub use rotors::{RotorFault, Rotors, Start};
-pub use sensors::{Dropouts, Measurement, Sensing, Sensors, Spread};
+pub use sensors::{Deviations, Dropouts, Measurement, Sensing, Sensors};
 pub use turbulence::Turbulence;
 pub use vehicle::{Model, Plant};
 pub use wind::{CosineGust, Wind};

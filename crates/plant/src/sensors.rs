@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 parameters! {
     /// One number for each group of the state, the same for its three coordinates.
     #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct Spread {
+    pub struct Deviations {
         /// Standard deviation of the position, per coordinate.
         #[parameter(POS, "m", 0.0..=100.0)]
         pub position_m: f64 = 0.0,
@@ -26,10 +26,10 @@ parameters! {
     }
 }
 
-impl Spread {
+impl Deviations {
     /// The same number for every group, each in its own unit.
     pub const fn all(size: f64) -> Self {
-        Spread { position_m: size, velocity_m_s: size, attitude_rad: size, rates_rad_s: size }
+        Deviations { position_m: size, velocity_m_s: size, attitude_rad: size, rates_rad_s: size }
     }
 
     /// Normal numbers of these standard deviations.
@@ -65,10 +65,10 @@ parameters! {
     pub struct Sensing {
         /// Standard deviation of what is new at every step: white noise.
         #[group("noise")]
-        pub noise: Spread = Spread::DEFAULT,
+        pub noise: Deviations = Deviations::DEFAULT,
         /// Standard deviation of what is drawn once and stays for the flight.
         #[group("bias")]
-        pub bias: Spread = Spread::DEFAULT,
+        pub bias: Deviations = Deviations::DEFAULT,
         /// Time from motion to measurement, rounded to whole steps.
         #[parameter(DELAY, "s", 0.0..=0.5)]
         pub delay_s: f64 = 0.0,
@@ -94,7 +94,7 @@ pub struct Measurement {
 /// Sensors in use: noise and bias, then delay, then dropouts. Never fails; the first measurement always arrives.
 #[derive(Clone, Debug)]
 pub struct Sensors {
-    noise: Option<Spread>,
+    noise: Option<Deviations>,
     random: Noise,
     bias: Motion,
     delay: DelayLine<State>,
@@ -147,7 +147,7 @@ impl Sensors {
         let mut random = Noise::new(seed, Stream::Sensors);
         let steps = whole_steps(sensing.delay_s, step_s);
         Ok(Sensors {
-            noise: (sensing.noise != Spread::default()).then_some(sensing.noise),
+            noise: (sensing.noise != Deviations::default()).then_some(sensing.noise),
             bias: sensing.bias.draw(&mut random),
             random,
             delay: DelayLine::new(steps, State::default()),

@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use afbc_plant::{
-    Battery, Contact, CosineGust, Drag, Dropouts, Environment, GroundEffect, Model, Motion, Plant, Realism, RotorFault,
-    Rotors, Sag, Sensing, Sensors, Spread, Start, Turbulence, Wind,
+    Battery, Contact, CosineGust, Deviations, Drag, Dropouts, Environment, GroundEffect, Model, Motion, Plant, Realism,
+    RotorFault, Rotors, Sag, Sensing, Sensors, Start, Turbulence, Wind,
 };
 use afbc_types::{Parameters, RotorSpeeds};
 use nalgebra::{Vector3, Vector4};
@@ -95,8 +95,8 @@ fn motion() -> impl Strategy<Value = Motion> {
 
 fn sensing() -> Sensing {
     Sensing {
-        noise: Spread::all(0.01),
-        bias: Spread::all(0.05),
+        noise: Deviations::all(0.01),
+        bias: Deviations::all(0.05),
         delay_s: 0.003,
         dropouts: Some(Dropouts { rate_hz: 5.0, mean_s: 0.02 }),
     }

@@ -1,7 +1,7 @@
 //! Sensors against their own settings.
 #![allow(clippy::unwrap_used, clippy::float_cmp, clippy::indexing_slicing, missing_docs)]
 
-use afbc_plant::{Dropouts, Measurement, Motion, Sensing, Sensors, Spread};
+use afbc_plant::{Deviations, Dropouts, Measurement, Motion, Sensing, Sensors};
 use nalgebra::Vector3;
 
 const STEP_S: f64 = 0.001;
@@ -35,8 +35,8 @@ fn perfect_sensors_measure_the_motion() {
 /// Sample variances of Gaussian noise have a relative standard error of sqrt(2/n); bounds are five of them.
 #[test]
 fn noise_and_bias_are_as_large_as_asked() {
-    let noise = Spread { position_m: 0.02, velocity_m_s: 0.05, attitude_rad: 0.003, rates_rad_s: 0.01 };
-    let bias = Spread { position_m: 0.5, velocity_m_s: 0.1, attitude_rad: 0.02, rates_rad_s: 0.03 };
+    let noise = Deviations { position_m: 0.02, velocity_m_s: 0.05, attitude_rad: 0.003, rates_rad_s: 0.01 };
+    let bias = Deviations { position_m: 0.5, velocity_m_s: 0.1, attitude_rad: 0.02, rates_rad_s: 0.03 };
     let mut sensors = sensors(Sensing { noise, bias, ..Sensing::default() }, 5);
     let n = 200_000;
     let samples: Vec<_> = (0..n).map(|_| numbers(&sensors.measure(&Motion::default()))).collect();
@@ -62,7 +62,7 @@ fn noise_and_bias_are_as_large_as_asked() {
 /// Over flights, the bias is spread as asked; within one, it stays.
 #[test]
 fn bias_is_spread_over_flights() {
-    let sensing = Sensing { bias: Spread::all(0.1), ..Sensing::default() };
+    let sensing = Sensing { bias: Deviations::all(0.1), ..Sensing::default() };
     let flights = 2000;
     let mut squares = 0.0;
     for seed in 0..flights {
@@ -135,7 +135,7 @@ fn age_grows_in_a_dropout() {
 
 #[test]
 fn the_same_seed_measures_the_same_and_dropouts_do_not_change_the_noise() {
-    let sensing = Sensing { noise: Spread::all(0.01), bias: Spread::all(0.1), ..Sensing::default() };
+    let sensing = Sensing { noise: Deviations::all(0.01), bias: Deviations::all(0.1), ..Sensing::default() };
     let lossy = Sensing { dropouts: Some(Dropouts { rate_hz: 100.0, mean_s: 0.01 }), ..sensing };
     let run = |sensing, seed| {
         let mut sensors = sensors(sensing, seed);
@@ -152,8 +152,14 @@ fn the_same_seed_measures_the_same_and_dropouts_do_not_change_the_noise() {
 fn settings_out_of_range_are_refused_by_name() {
     let refused = |sensing: Sensing| Sensors::new(&sensing, 0, STEP_S).unwrap_err().range.name;
     let ok = Sensing::default;
-    assert_eq!(refused(Sensing { noise: Spread { position_m: -1.0, ..Spread::default() }, ..ok() }), "position_m");
-    assert_eq!(refused(Sensing { bias: Spread { rates_rad_s: f64::NAN, ..Spread::default() }, ..ok() }), "rates_rad_s");
+    assert_eq!(
+        refused(Sensing { noise: Deviations { position_m: -1.0, ..Deviations::default() }, ..ok() }),
+        "position_m"
+    );
+    assert_eq!(
+        refused(Sensing { bias: Deviations { rates_rad_s: f64::NAN, ..Deviations::default() }, ..ok() }),
+        "rates_rad_s"
+    );
     assert_eq!(refused(Sensing { delay_s: 1.0, ..ok() }), "delay_s");
     assert_eq!(refused(Sensing { dropouts: Some(Dropouts { rate_hz: -1.0, mean_s: 0.1 }), ..ok() }), "rate_hz");
     assert_eq!(Sensors::new(&ok(), 0, 0.0).unwrap_err().range.name, "step_s");

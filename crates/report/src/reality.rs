@@ -1,6 +1,6 @@
 //! What a scenario adds to the ideal vehicle, for the report.
 
-use afbc_plant::{Rotors, Sensing, Spread};
+use afbc_plant::{Deviations, Rotors, Sensing};
 use afbc_sim::scenario::Scenario;
 
 /// Returns name and value of each part present.
@@ -56,12 +56,12 @@ fn air(scenario: &Scenario) -> Vec<(&'static str, String)> {
 fn sensors(scenario: &Scenario) -> Vec<(&'static str, String)> {
     let Sensing { noise, bias, delay_s, dropouts } = scenario.sensing;
     let mut rows = Vec::new();
-    let spread = |s: Spread| {
+    let spread = |s: Deviations| {
         format!("{} m, {} m/s, {} rad, {} rad/s", s.position_m, s.velocity_m_s, s.attitude_rad, s.rates_rad_s)
     };
     let mut add = |there: bool, name, value: String| rows.extend(there.then_some((name, value)));
-    add(noise != Spread::default(), "sensor noise", spread(noise));
-    add(bias != Spread::default(), "sensor bias", spread(bias));
+    add(noise != Deviations::default(), "sensor noise", spread(noise));
+    add(bias != Deviations::default(), "sensor bias", spread(bias));
     add(delay_s != 0.0, "sensor delay", format!("{delay_s} s"));
     for outage in &scenario.outages {
         let end = if outage.end_s.is_finite() { format!("to {:.4} s", outage.end_s) } else { "to the end".into() };

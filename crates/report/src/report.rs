@@ -1,7 +1,7 @@
 //! One self-contained page with tables, claims, figures and parameters.
 
 use crate::claims::Claim;
-use crate::figures::Figure;
+use crate::figures::Picture;
 use crate::groups::Group;
 use crate::{reality, table, words};
 use afbc::{Limits, Settings};
@@ -69,7 +69,7 @@ figcaption { color: var(--quiet); font-size: .9rem; }
 const NAMESPACE: &str = " xmlns=\"http://www.w3.org/2000/svg\"";
 
 /// Returns the page; `figures` holds one set for each group.
-pub(super) fn page(groups: &[Group], figures: &[Vec<Figure>], claims: &[Claim]) -> String {
+pub(super) fn page(groups: &[Group], figures: &[Vec<Picture>], claims: &[Claim]) -> String {
     let title = match groups {
         [only] => only.scenario.description.as_str(),
         _ => "Flights",
@@ -107,7 +107,7 @@ pub(super) fn sheet(title: &str, body: &Markup) -> String {
 }
 
 /// A figure with its caption.
-pub(super) fn picture(figure: &Figure) -> Markup {
+pub(super) fn picture(figure: &Picture) -> Markup {
     html! {
         figure {
             div.scroll { (PreEscaped(figure.svg.replacen(NAMESPACE, "", 1))) }
@@ -135,7 +135,7 @@ fn verdicts(claims: &[Claim]) -> Markup {
     }
 }
 
-fn section(group: &Group, figures: &[Figure]) -> Markup {
+fn section(group: &Group, figures: &[Picture]) -> Markup {
     html! {
         h2 { (group.scenario.name) }
         p { (words::conditions(group.scenario)) "." }

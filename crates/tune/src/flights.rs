@@ -24,17 +24,18 @@ const STEP_S: f64 = 4.5;
 /// None occurs: a test flies them.
 pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
     let to = Vector3::new(0.6, -0.4, 1.0);
-    let eight = |name, change| Flight { trajectory: eight(8.0), change, ..Flight::new(name, 15.0) };
+    let eight = |name, change| TrainingFlight { trajectory: eight(8.0), change, ..TrainingFlight::new(name, 15.0) };
     let mut late = eight("late", None).scenario()?;
     late.realism.rotors.delay_s = 0.004;
-    let mut turbulent = Flight::new("turbulence", 20.0).scenario()?;
+    let mut turbulent = TrainingFlight::new("turbulence", 20.0).scenario()?;
     turbulent.realism.drag = Some(Drag::PAPER);
     turbulent.realism.wind.turbulence = Some(Turbulence::MODERATE);
     Ok(vec![
         hardware()?,
-        Flight { trajectory: step(to, 1.0), ..Flight::new("step", 12.0) }.scenario()?,
+        TrainingFlight { trajectory: step(to, 1.0), ..TrainingFlight::new("step", 12.0) }.scenario()?,
         turbulent,
-        Flight { change: Some((Quantity::ThrustFactor, 0.6)), ..Flight::new("weak", 8.0) }.scenario()?,
+        TrainingFlight { change: Some((Quantity::ThrustFactor, 0.6)), ..TrainingFlight::new("weak", 8.0) }
+            .scenario()?,
         eight("heavy", Some((Quantity::Mass, 1.3))).scenario()?,
         late,
         // An outage at the onset of each gust and parameter change, and during a step.
@@ -43,7 +44,10 @@ pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
             duration_s: 45.0,
             ..blind(hardware()?, &[7.45, 14.95, 19.9, 22.45, 29.95, 37.45])
         },
-        blind(Flight { trajectory: step(-to, -1.0), ..Flight::new("blind-step", 12.0) }.scenario()?, &[STEP_S + 0.5]),
+        blind(
+            TrainingFlight { trajectory: step(-to, -1.0), ..TrainingFlight::new("blind-step", 12.0) }.scenario()?,
+            &[STEP_S + 0.5],
+        ),
         landing("landing", 2.0)?,
         upset("upset", 1.0)?,
         course("course", 1.5)?,
@@ -55,7 +59,7 @@ pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
 /// # Errors
 /// None occurs: a test flies them.
 pub fn held_out() -> Result<Vec<Scenario>, Box<dyn Error>> {
-    let fast = |name, change| Flight { trajectory: eight(6.0), change, ..Flight::new(name, 20.0) };
+    let fast = |name, change| TrainingFlight { trajectory: eight(6.0), change, ..TrainingFlight::new(name, 20.0) };
     let mut delayed = fast("delayed", None).scenario()?;
     delayed.sensing.delay_s = 0.003;
     let mut windy = fast("wind", None).scenario()?;
@@ -64,7 +68,11 @@ pub fn held_out() -> Result<Vec<Scenario>, Box<dyn Error>> {
     windy.realism.wind.turbulence = Some(Turbulence::LIGHT);
     Ok(vec![
         Scenario { seed: 1001, ..hardware()? },
-        Flight { trajectory: step(Vector3::new(-0.4, 0.8, -0.3), 1.5), ..Flight::new("step-back", 12.0) }.scenario()?,
+        TrainingFlight {
+            trajectory: step(Vector3::new(-0.4, 0.8, -0.3), 1.5),
+            ..TrainingFlight::new("step-back", 12.0)
+        }
+        .scenario()?,
         windy,
         fast("light", Some((Quantity::Mass, 0.8))).scenario()?,
         fast("inert", Some((Quantity::Inertia, 1.75))).scenario()?,
@@ -96,7 +104,7 @@ fn upset(name: &'static str, strength: f64) -> Result<Scenario, Box<dyn Error>> 
         Gust { axis, kind: GustKind::Acceleration, size: size * strength, start_s, end_s: start_s + length_s }
     };
     let pushes = pushes.into_iter().zip(0..).map(push).collect();
-    let scenario = Flight::new(name, 20.0).scenario()?;
+    let scenario = TrainingFlight::new(name, 20.0).scenario()?;
     let environment = Environment::new(*scenario.environment.nominal(), Vec::new(), pushes)?;
     Ok(Scenario { environment, ..scenario })
 }
@@ -110,7 +118,9 @@ fn course(name: &'static str, leg_m: f64) -> Result<Scenario, Box<dyn Error>> {
         [arrived_s, arrived_s + 2.0].map(|time_s| Waypoint { time_s, position_m, yaw_rad })
     };
     let waypoints = (0..).zip(corners).flat_map(corner).collect();
-    let mut scenario = Flight { trajectory: Trajectory::Waypoints(waypoints), ..Flight::new(name, 22.0) }.scenario()?;
+    let mut scenario =
+        TrainingFlight { trajectory: Trajectory::Waypoints(waypoints), ..TrainingFlight::new(name, 22.0) }
+            .scenario()?;
     scenario.realism.drag = Some(Drag::PAPER);
     scenario.realism.wind.steady_m_s = Vector3::new(4.0, -2.0, 0.0);
     scenario.realism.wind.turbulence = Some(Turbulence::LIGHT);
@@ -123,7 +133,9 @@ fn landing(name: &'static str, length_s: f64) -> Result<Scenario, Box<dyn Error>
     let at = |time_s, height_m| Waypoint { time_s, position_m: Vector3::new(0.0, 0.0, height_m), yaw_rad: 0.0 };
     let down_s = ONSET_S + length_s;
     let waypoints = vec![at(ONSET_S, 1.0), at(down_s, 0.05), at(down_s + 3.0, 0.05), at(down_s + 5.0, 1.0)];
-    let mut scenario = Flight { trajectory: Trajectory::Waypoints(waypoints), ..Flight::new(name, 16.0) }.scenario()?;
+    let mut scenario =
+        TrainingFlight { trajectory: Trajectory::Waypoints(waypoints), ..TrainingFlight::new(name, 16.0) }
+            .scenario()?;
     scenario.realism.contact = Some(Contact::PAPER);
     scenario.realism.ground_effect = Some(GroundEffect::PAPER);
     scenario.realism.drag = Some(Drag::PAPER);
@@ -136,7 +148,7 @@ fn hardware() -> Result<Scenario, FileError> {
 }
 
 /// A flight of `hardware` without gusts.
-struct Flight {
+struct TrainingFlight {
     name: &'static str,
     duration_s: f64,
     trajectory: Trajectory,
@@ -144,10 +156,10 @@ struct Flight {
     change: Option<(Quantity, f64)>,
 }
 
-impl Flight {
+impl TrainingFlight {
     fn new(name: &'static str, duration_s: f64) -> Self {
         let trajectory = Trajectory::Hover { position_m: Vector3::new(0.0, 0.0, 3.0), yaw_rad: 0.0 };
-        Flight { name, duration_s, trajectory, change: None }
+        TrainingFlight { name, duration_s, trajectory, change: None }
     }
 
     fn scenario(self) -> Result<Scenario, Box<dyn Error>> {

@@ -1,11 +1,11 @@
 //! `sitl hitl`.
 
-use super::in_the_loop::{Flying, Recorder, outcome};
+use super::in_the_loop::{InTheLoop, Recorder, outcome};
 use super::target::Target;
 use super::terminal::{Failure, print};
 use crate::serial::{self, Serial};
 use afbc_sim::flight::Sample;
-use afbc_sim::in_the_loop::{self, End, Pace, Station};
+use afbc_sim::in_the_loop::{self, LoopEnd, Pace, Station};
 use clap::Args;
 use std::ops::ControlFlow;
 use std::process::ExitCode;
@@ -35,7 +35,7 @@ pub(crate) struct Hitl {
     list: bool,
 
     #[command(flatten)]
-    flying: Flying,
+    flying: InTheLoop,
 }
 
 impl Hitl {
@@ -77,7 +77,7 @@ impl Hitl {
             figures(&station),
             outcome(&scenario, &metrics, &end)?,
         ))?;
-        let End { lost, interrupted, disarmed } = end;
+        let LoopEnd { lost, interrupted, disarmed } = end;
         Ok(ExitCode::from(u8::from(lost.is_some() || interrupted || !disarmed)))
     }
 }

@@ -3,7 +3,7 @@
 use super::target::Target;
 use super::terminal::Failure;
 use afbc_sim::flight::Sample;
-use afbc_sim::in_the_loop::{self, End, Error, Log};
+use afbc_sim::in_the_loop::{self, Error, Log, LoopEnd};
 use afbc_sim::metrics::{Accumulator, Metrics};
 use afbc_sim::run::Run;
 use afbc_sim::scenario::{DURATION, Scenario};
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 
 /// Options of every flight in the loop.
 #[derive(Args, Clone, Debug)]
-pub(crate) struct Flying {
+pub(crate) struct InTheLoop {
     /// Length of the flight in seconds, instead of the scenario's
     #[arg(long, value_name = "SECONDS")]
     duration: Option<f64>,
@@ -25,8 +25,8 @@ pub(crate) struct Flying {
 }
 
 /// Formats the errors next to those of a flight without a link, if it was completed, and how it ended.
-pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &End) -> Result<String, Failure> {
-    let End { lost, interrupted, disarmed } = end;
+pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &LoopEnd) -> Result<String, Failure> {
+    let LoopEnd { lost, interrupted, disarmed } = end;
     let mut text = match (lost, interrupted) {
         (None, false) => {
             let without_link = Run::fly(scenario, &in_the_loop::firmware(), u64::MAX)?.metrics;
@@ -41,7 +41,7 @@ pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &End) -> Resu
     Ok(text)
 }
 
-impl Flying {
+impl InTheLoop {
     /// Returns the scenario, if the firmware can fly it.
     pub(crate) fn scenario(&self, target: &Target) -> Result<Scenario, Failure> {
         let mut scenario = target.scenario()?;
@@ -65,7 +65,7 @@ const PROGRESS_EVERY: u64 = 100;
 
 impl Recorder {
     /// Creates the recorder of a flight of `scenario`.
-    pub(crate) fn new(scenario: &Scenario, flying: &Flying) -> Result<Self, Failure> {
+    pub(crate) fn new(scenario: &Scenario, flying: &InTheLoop) -> Result<Self, Failure> {
         let create = |path: &PathBuf| Log::create(path).map_err(|error| format!("{}: {error}", path.display()));
         let log = flying.out.as_ref().map(create).transpose()?;
         let steps = (scenario.duration_s * 1000.0).round() as u64;

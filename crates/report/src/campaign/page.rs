@@ -1,14 +1,14 @@
 //! The report of a campaign.
 
 use super::cells::{HEADS, bad, cells, flights, legend, percent};
-use crate::figures::Figure;
+use crate::figures::Picture;
 use crate::report::{picture, sheet};
 use crate::words;
 use afbc_campaign::statistics::Share;
 use afbc_campaign::{Count, Summary};
 use maud::{Markup, html};
 
-pub(super) fn page(summary: &Summary, figures: &[Figure]) -> String {
+pub(super) fn page(summary: &Summary, figures: &[Picture]) -> String {
     let manifest = &summary.manifest;
     let title = if manifest.description.is_empty() { &manifest.name } else { &manifest.description };
     sheet(

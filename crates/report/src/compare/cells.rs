@@ -1,19 +1,19 @@
 //! Contents of a comparison's table, for the page and the terminal.
 
 use crate::words;
-use afbc_campaign::compare::{Comparison, Entry, FIGURES, Figure};
+use afbc_campaign::compare::{Comparison, Entry, MEASURES, Measure};
 use afbc_sim::metrics::SETTLED_S;
 
 /// Returns the figures of one contender, and whether each is the best of its column; none if it lost a vehicle.
 pub(super) fn cells(comparison: &Comparison, entry: &Entry) -> Option<Vec<(String, bool)>> {
-    let cell = |figure: &Figure| {
-        let spread = entry.spread(figure.value)?;
+    let cell = |figure: &Measure| {
+        let average = entry.average(figure.value)?;
         let [mean, deviation] =
-            [spread.mean, spread.deviation].map(|value| number(figure.scale * value, figure.digits));
+            [average.mean, average.deviation].map(|value| number(figure.scale * value, figure.digits));
         let text = if comparison.is_repeated() { format!("{mean} ±{deviation}") } else { mean };
         Some((text, comparison.is_best(entry, figure)))
     };
-    let mut cells = FIGURES.iter().map(cell).collect::<Option<Vec<_>>>()?;
+    let mut cells = MEASURES.iter().map(cell).collect::<Option<Vec<_>>>()?;
     if has_ratio(comparison) {
         cells.push((comparison.ratio(entry).map_or("-".into(), |ratio| format!("{ratio:.2}")), false));
     }
@@ -31,7 +31,7 @@ pub(super) fn has_ratio(comparison: &Comparison) -> bool {
 
 /// Returns the heads of the columns.
 pub(super) fn heads(comparison: &Comparison) -> Vec<&'static str> {
-    FIGURES.iter().map(|figure| figure.title).chain(has_ratio(comparison).then_some("ratio")).collect()
+    MEASURES.iter().map(|figure| figure.title).chain(has_ratio(comparison).then_some("ratio")).collect()
 }
 
 /// Describes the losses of a contender.

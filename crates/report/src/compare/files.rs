@@ -1,6 +1,6 @@
 //! `comparison.csv` and `comparison.json`.
 
-use afbc_campaign::compare::{Comparison, Entry, FIGURES, Outcome, Spread};
+use afbc_campaign::compare::{Average, Comparison, Entry, MEASURES, Outcome};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -8,14 +8,14 @@ use std::io::{self, Write};
 /// Writes a row for each flight. A lost flight's figures cover the time until the loss.
 pub(super) fn csv(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
-    let head = ["scenario", "contender", "controller", "seed"].into_iter().chain(FIGURES.iter().map(|f| f.name));
+    let head = ["scenario", "contender", "controller", "seed"].into_iter().chain(MEASURES.iter().map(|f| f.name));
     csv.write_record(head.chain(["lost_at_s"]))?;
     for comparison in comparisons {
         for entry in &comparison.entries {
             for Outcome { seed, lost, metrics } in &entry.flights {
                 let contender = entry.contender();
                 let who = [comparison.scenario.name.clone(), contender.name.clone(), contender.kind().name().into()];
-                let figures = FIGURES.iter().map(|figure| (figure.value)(metrics).to_string());
+                let figures = MEASURES.iter().map(|figure| (figure.value)(metrics).to_string());
                 let lost = lost.map_or(String::new(), |lost| lost.time_s.to_string());
                 csv.write_record(who.into_iter().chain([seed.to_string()]).chain(figures).chain([lost]))?;
             }
@@ -57,16 +57,16 @@ pub fn json(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
 }
 
 fn contender<'a>(comparison: &Comparison, entry: &'a Entry) -> Contender<'a> {
-    let figures = |part: fn(Spread) -> f64| {
-        FIGURES.iter().map(|figure| (figure.name, entry.spread(figure.value).map(part))).collect()
+    let figures = |part: fn(Average) -> f64| {
+        MEASURES.iter().map(|figure| (figure.name, entry.average(figure.value).map(part))).collect()
     };
     Contender {
         name: &entry.contender().name,
         controller: entry.contender().kind().name(),
         seeds: entry.flights.iter().map(|flight| flight.seed).collect(),
         lost: entry.lost(),
-        mean: figures(|spread| spread.mean),
-        standard_deviation: figures(|spread| spread.deviation),
+        mean: figures(|average| average.mean),
+        standard_deviation: figures(|average| average.deviation),
         ratio: comparison.ratio(entry),
     }
 }

@@ -8,7 +8,7 @@ mod table;
 pub use files::json;
 pub use table::table;
 
-use crate::figures::{self, Figure};
+use crate::figures::{self, Picture};
 use crate::groups::groups;
 use afbc_campaign::compare::Comparison;
 use afbc_files::{Error, Folder};
@@ -52,7 +52,7 @@ pub fn write(folder: &Folder, comparisons: &[Comparison]) -> Result<Vec<PathBuf>
     Ok(paths)
 }
 
-fn draw(comparison: &Comparison) -> io::Result<Vec<Figure>> {
+fn draw(comparison: &Comparison) -> io::Result<Vec<Picture>> {
     let flights: Vec<&Flown> = comparison.entries.iter().map(|entry| &entry.first).collect();
     Ok(vec![figures::compare::draw(comparison)?, figures::flights::errors(&flights)?].into_iter().flatten().collect())
 }

@@ -1,13 +1,13 @@
 //! The report of a comparison.
 
 use super::cells::{cells, heads, legend, lost};
-use crate::figures::Figure;
+use crate::figures::Picture;
 use crate::report::{parameters, picture, sheet};
 use crate::words;
 use afbc_campaign::compare::Comparison;
 use maud::{Markup, html};
 
-pub(super) fn page(comparisons: &[Comparison], figures: &[Vec<Figure>]) -> String {
+pub(super) fn page(comparisons: &[Comparison], figures: &[Vec<Picture>]) -> String {
     sheet(
         "Controllers compared",
         &html! {

@@ -1,8 +1,8 @@
 //! Figures of a campaign: distributions over its flights, and losses against drawn quantities.
 
 use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, marker, text, units};
-use super::figure::Figure;
 use super::palette::{BLACK, FRAME, GREY, GRID};
+use super::picture::Picture;
 use super::time_chart::{decimals, number};
 use crate::words;
 use afbc_campaign::statistics::{Share, percentile};
@@ -38,7 +38,7 @@ const INTERVALS_OPACITY: f64 = 0.6;
 const TOP: f64 = 104.0;
 
 /// Draws every figure of a campaign; none without flights.
-pub(crate) fn draw(summary: &Summary) -> io::Result<Vec<Figure>> {
+pub(crate) fn draw(summary: &Summary) -> io::Result<Vec<Picture>> {
     let flights = summary.tallies.first().map_or(0, |tally| tally.count.flights);
     let conditions = format!("{}: {flights} flights each", summary.manifest.name);
     let lost = summary.tallies.iter().any(|tally| tally.count.kept < tally.count.flights);
@@ -52,7 +52,7 @@ pub(crate) fn draw(summary: &Summary) -> io::Result<Vec<Figure>> {
         Distribution {
             title: "Smoothness", label: "mean |ΔU₄| per step [N]", values: |tally| &tally.mean_abs_du4_n
         };
-    let figure = |name, caption, svg: Option<String>| svg.map(|svg| Figure { name, caption, svg });
+    let figure = |name, caption, svg: Option<String>| svg.map(|svg| Picture { name, caption, svg });
     let interval = "Pale: 95 % interval of the share. Mark: end of a curve.";
     let not_lost = if lost { " of the flights that were not lost" } else { " of the flights" };
     let spread = summary.manifest.drawn.iter().any(is_spread) && flights > 0;

@@ -1,16 +1,16 @@
 //! Root mean square errors as bars.
 
 use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, text_width_px, units};
-use super::figure::Figure;
 use super::palette::{BLACK, FRAME, GREY, color};
+use super::picture::Picture;
 use crate::words;
-use afbc_campaign::compare::{Comparison, Entry, FIGURES, Spread};
+use afbc_campaign::compare::{Average, Comparison, Entry, MEASURES};
 use afbc_sim::metrics::SETTLED_S;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 use std::io;
 
-/// Number of panels: the errors are the first of [`FIGURES`].
+/// Number of panels: the errors are the first of [`MEASURES`].
 const PANELS: usize = 4;
 const BAR_PX: f64 = 18.0;
 /// Height above the bars of one panel.
@@ -21,7 +21,7 @@ const NUMBER_PX: f64 = 60.0;
 const SPREAD_PX: f64 = 46.0;
 
 /// Draws bars of every contender's errors, two panels side by side; none without contenders.
-pub(crate) fn draw(comparison: &Comparison) -> io::Result<Option<Figure>> {
+pub(crate) fn draw(comparison: &Comparison) -> io::Result<Option<Picture>> {
     if comparison.entries.is_empty() {
         return Ok(None);
     }
@@ -45,15 +45,15 @@ pub(crate) fn draw(comparison: &Comparison) -> io::Result<Option<Figure>> {
     if comparison.entries.iter().any(lost) {
         caption += " A contender that lost a vehicle has no bar.";
     }
-    Ok(Some(Figure { name: "rmse", caption, svg }))
+    Ok(Some(Picture { name: "rmse", caption, svg }))
 }
 
 /// Draws one error of every contender, with the given top left corner.
 fn panel(area: &Area, comparison: &Comparison, index: usize, (left_px, top_px): (f64, f64)) -> Result<(), Failure> {
-    let Some(figure) = FIGURES.get(index) else { return Ok(()) };
+    let Some(figure) = MEASURES.get(index) else { return Ok(()) };
     let repeated = comparison.is_repeated();
-    let spread = |entry: &Entry| entry.spread(figure.value);
-    let ends = comparison.entries.iter().filter_map(spread).map(|spread| spread.mean + spread.deviation);
+    let average = |entry: &Entry| entry.average(figure.value);
+    let ends = comparison.entries.iter().filter_map(average).map(|average| average.mean + average.deviation);
     let largest = ends.fold(1e-9, f64::max);
     let names = comparison.entries.iter().map(|entry| text_width_px(entry.contender().title(), 12.0));
     let zero_px = left_px + names.fold(0.0, f64::max) + 8.0;
@@ -66,7 +66,7 @@ fn panel(area: &Area, comparison: &Comparison, index: usize, (left_px, top_px): 
         let y_px = top_px + TITLE_PX + row as f64 * BAR_PX;
         let middle_px = y_px + 0.5 * BAR_PX;
         write(entry.contender().title().into(), zero_px - 8.0, middle_px, text(12.0, BLACK, HPos::Right))?;
-        let Some(Spread { mean, deviation }) = spread(entry) else {
+        let Some(Average { mean, deviation }) = average(entry) else {
             write("lost".into(), zero_px + 6.0, middle_px, text(11.0, GREY, HPos::Left))?;
             continue;
         };

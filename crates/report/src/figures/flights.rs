@@ -1,7 +1,7 @@
 //! Counterparts of the paper's Figs. 4 to 8, with all contenders of one scenario overlaid.
 
-use super::figure::Figure;
-use super::law::{LINE_PX, Law, REFERENCE};
+use super::picture::Picture;
+use super::plotted::{LINE_PX, Plotted, REFERENCE};
 use super::time_chart::{Chart, Line, Panel};
 use super::{canvas, trajectory};
 use crate::words;
@@ -39,13 +39,13 @@ const ERRORS: [(&str, Value); 4] = [
 const INPUTS: [(&str, Input); 4] = [("U₁ [N]", |u| u.x), ("U₂ [N]", |u| u.y), ("U₃ [N]", |u| u.z), ("U₄ [N]", |u| u.w)];
 
 /// Fig. 7 alone.
-pub(crate) fn errors(flights: &[&Flown]) -> io::Result<Option<Figure>> {
+pub(crate) fn errors(flights: &[&Flown]) -> io::Result<Option<Picture>> {
     let fig7 = draw(flights)?.into_iter().find(|figure| figure.name == "fig7-errors");
-    Ok(fig7.map(|figure| Figure { name: "errors", ..figure }))
+    Ok(fig7.map(|figure| Picture { name: "errors", ..figure }))
 }
 
 /// Draws every figure of one scenario's flights; none without flights.
-pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {
+pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Picture>> {
     // The longest flight covers the most of the reference.
     let Some(longest) = flights.iter().max_by_key(|flight| flight.run.log.len()) else { return Ok(Vec::new()) };
     let scenario = &longest.scenario;
@@ -53,20 +53,20 @@ pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {
     let end_s = if last_s > 0.0 { last_s } else { scenario.duration_s };
     let names: Vec<&str> = flights.iter().map(|flight| flight.run.contender.name.as_str()).collect();
     let inks = canvas::inks(&names, LINE_PX);
-    let laws: Vec<Law> = flights.iter().zip(inks).map(|(flight, ink)| Law { flight, ink }).collect();
+    let laws: Vec<Plotted> = flights.iter().zip(inks).map(|(flight, ink)| Plotted { flight, ink }).collect();
     // The roughest lines are drawn first, so that they hide nothing.
-    let mut rough_first: Vec<&Law> = laws.iter().collect();
-    let roughness = |law: &Law| law.flight.run.metrics.mean_abs_delta_u.sum();
+    let mut rough_first: Vec<&Plotted> = laws.iter().collect();
+    let roughness = |law: &Plotted| law.flight.run.metrics.mean_abs_delta_u.sum();
     rough_first.sort_by(|a, b| roughness(b).total_cmp(&roughness(a)));
     let each = |value: Value| rough_first.iter().map(move |law| law.line(law.ink(), end_s, value));
 
-    let reference = Law { flight: longest, ink: REFERENCE };
+    let reference = Plotted { flight: longest, ink: REFERENCE };
     let outputs = OUTPUTS.map(|(label, value, wanted)| {
         let wanted = Line { lost_s: None, is_reference: true, ..reference.line(REFERENCE, end_s, wanted) };
         Panel { label, zero: false, lines: core::iter::once(wanted).chain(each(value)).collect() }
     });
     let attitude = ATTITUDE.map(|(label, value, wanted)| {
-        let wanted = |law: &&Law| Line { is_reference: true, ..law.line(law.pale(), end_s, wanted) };
+        let wanted = |law: &&Plotted| Line { is_reference: true, ..law.line(law.pale(), end_s, wanted) };
         Panel { label, zero: true, lines: rough_first.iter().map(wanted).chain(each(value)).collect() }
     });
     let errors = ERRORS.map(|(label, value)| Panel { label, zero: true, lines: each(value).collect() });
@@ -87,12 +87,12 @@ pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Figure>> {
     let chatter = controls.iter().any(|panel| panel.has_chatter(end_s));
     let chart = |name, caption: &str, title, legend, panels| {
         let (svg, seen) = Chart { title, conditions: &conditions, scenario, end_s, legend, panels }.draw()?;
-        Ok::<_, io::Error>(Figure { name, caption: format!("{caption}{seen}"), svg })
+        Ok::<_, io::Error>(Picture { name, caption: format!("{caption}{seen}"), svg })
     };
     let jumps = if chatter { " Filled band: chatter, the input jumps between its edges." } else { "" };
     let (trajectory, seen) = trajectory::draw(&laws, longest, &conditions, with_reference())?;
     Ok(vec![
-        Figure { name: "fig4-trajectory", caption: format!("The flights in space.{seen}"), svg: trajectory },
+        Picture { name: "fig4-trajectory", caption: format!("The flights in space.{seen}"), svg: trajectory },
         chart(
             "fig5-outputs",
             "Position and yaw against their reference.",

@@ -6,13 +6,13 @@
 pub(super) mod campaign;
 mod canvas;
 pub(super) mod compare;
-mod figure;
 pub(super) mod flights;
-mod law;
 mod marks;
 mod palette;
+mod picture;
+mod plotted;
 mod reduce;
 mod time_chart;
 mod trajectory;
 
-pub(super) use figure::Figure;
+pub(super) use picture::Picture;

@@ -1,9 +1,9 @@
 //! Panels above each other with a common time axis.
 
 use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
-use super::figure::CROSS;
 use super::marks::{LABEL_PX, Mark, Marks, marks};
 use super::palette::{BLACK, EDGE, FRAME, GREY, GRID};
+use super::picture::CROSS;
 use super::reduce::{clip, simplify};
 use afbc_sim::scenario::Scenario;
 use core::ops::Range;

@@ -1,10 +1,10 @@
 //! The flights in space: a box seen from above its front right corner.
 
 use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
-use super::figure::CROSS;
-use super::law::{Law, REFERENCE};
 use super::marks::{LABEL_PX, Mark, marks};
 use super::palette::{BLACK, FRAME, GREY, GRID};
+use super::picture::CROSS;
+use super::plotted::{Plotted, REFERENCE};
 use super::reduce::simplify;
 use super::time_chart::{Line, PLOT_PX, decimals, number, range};
 
@@ -75,7 +75,7 @@ impl View {
 /// Draws the flights of `laws` and the reference of the longest; returns an explanation of everything else in the
 /// picture.
 pub(super) fn draw(
-    laws: &[Law],
+    laws: &[Plotted],
     longest: &Flown,
     conditions: &str,
     mut legend: Vec<(String, Ink)>,

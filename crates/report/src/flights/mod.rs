@@ -34,7 +34,7 @@ pub fn write(folder: &Folder, flown: &[Flown], claims: &[Claim]) -> Result<Vec<P
     let sets = groups.iter().map(draw).collect::<io::Result<Vec<_>>>();
     let sets = sets.map_err(|source| folder.error("figures", source))?;
     let svg_name =
-        |group: &groups::Group<'_>, figure: &figures::Figure| format!("{}{}.svg", group.figure_prefix, figure.name);
+        |group: &groups::Group<'_>, figure: &figures::Picture| format!("{}{}.svg", group.figure_prefix, figure.name);
     let mut names = vec!["summary.json".to_owned(), "report.html".to_owned()];
     for (group, figures) in groups.iter().zip(&sets) {
         names.extend(group.csv_names.iter().cloned());

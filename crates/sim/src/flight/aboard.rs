@@ -5,7 +5,7 @@ use super::sample::Sample;
 use super::world::World;
 use afbc_control::{Action, FlightController};
 use afbc_flight_core::rate::{PERIOD_US, WINDOW_US};
-use afbc_flight_core::{ArmingLimits, Asked, Inbox, Memory, Request, Stamped, Vehicle};
+use afbc_flight_core::{ArmingLimits, Asked, Inbox, Request, Stamped, Vehicle, VehicleMemory};
 use afbc_types::{OutOfRange, Parameters, Setpoint, State};
 use core::convert::Infallible;
 
@@ -15,7 +15,7 @@ const TICKS_HELD: u64 = WINDOW_US as u64 / PERIOD_US + 1;
 /// A controller that the flight core flies: without a state it coasts blind, then descends.
 pub struct Aboard<C: FlightController> {
     vehicle: Vehicle<C>,
-    memory: Memory<C::Memory>,
+    memory: VehicleMemory<C::Memory>,
     inbox: Inbox,
     /// Time since power-up \[us\].
     now_us: u64,
@@ -28,7 +28,7 @@ impl<C: FlightController> Aboard<C> {
     /// If the time step is not the flight core's, 1 ms.
     pub fn new(vehicle: Parameters, controller: C) -> Result<Self, OutOfRange> {
         let vehicle = Vehicle::new(vehicle, ArmingLimits::NONE, controller)?;
-        Ok(Aboard { vehicle, memory: Memory::default(), inbox: Inbox::default(), now_us: 0 })
+        Ok(Aboard { vehicle, memory: VehicleMemory::default(), inbox: Inbox::default(), now_us: 0 })
     }
 
     /// One tick, after what it is told.

@@ -24,7 +24,7 @@ const SILENT_MS: u64 = 500;
 
 /// How a flight came to its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct End {
+pub struct LoopEnd {
     /// When and why the vehicle was lost, if it was.
     pub lost: Option<Lost>,
     /// True if the observer broke off.
@@ -74,7 +74,7 @@ pub fn fly(
     autopilot: &mut impl Autopilot,
     pace: Pace,
     observe: impl FnMut(&Sample) -> ControlFlow<()>,
-) -> Result<End, Error> {
+) -> Result<LoopEnd, Error> {
     check(scenario)?;
     let mut world = World::new(scenario, STEP_S)?;
     let mut line = Line {
@@ -88,7 +88,7 @@ pub fn fly(
     };
     let flight = lockstep(&mut world, &mut line, scenario.duration_s, observe)?;
     let disarmed = line.disarm(&mut world)?;
-    Ok(End { lost: flight.lost, interrupted: flight.interrupted, disarmed })
+    Ok(LoopEnd { lost: flight.lost, interrupted: flight.interrupted, disarmed })
 }
 
 /// A station that talks with an autopilot, a millisecond at a time.

@@ -15,12 +15,12 @@
 
 mod autopilot;
 mod error;
+mod extremes;
 mod flight;
 mod host;
 mod log;
 mod pace;
 mod report;
-mod spread;
 mod station;
 
 #[cfg(test)]
@@ -28,10 +28,10 @@ mod tests;
 
 pub use autopilot::Autopilot;
 pub use error::Error;
-pub use flight::{End, check, firmware, fly};
+pub use extremes::Extremes;
+pub use flight::{LoopEnd, check, firmware, fly};
 pub use host::{Host, Tick};
 pub use log::Log;
 pub use pace::Pace;
 pub use report::tracking;
-pub use spread::Spread;
 pub use station::{Heard, Station};

@@ -1,6 +1,6 @@
 //! The other end of the link.
 
-use super::Spread;
+use super::Extremes;
 use afbc_flight_core::Refusal;
 use afbc_link::{
     Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, Health, MavCmd, Sender, Text, Uplink,
@@ -22,7 +22,7 @@ pub struct Station {
     heard: Heard,
     pinged: Option<Instant>,
     pings: u64,
-    round_trip_ms: Spread,
+    round_trip_ms: Extremes,
 }
 
 /// What the vehicle has said.
@@ -60,7 +60,7 @@ impl Station {
             heard: Heard::default(),
             pinged: None,
             pings: 0,
-            round_trip_ms: Spread::default(),
+            round_trip_ms: Extremes::default(),
         }
     }
 
@@ -134,7 +134,7 @@ impl Station {
     }
 
     /// Time from a question handed over to its answer \[ms\].
-    pub fn round_trip_ms(&self) -> &Spread {
+    pub fn round_trip_ms(&self) -> &Extremes {
         &self.round_trip_ms
     }
 

@@ -12,7 +12,7 @@ fn scenario(name: &str, duration_s: f64) -> Scenario {
     Scenario { duration_s, ..built_in(name).unwrap().read().unwrap() }
 }
 
-fn fly_host(scenario: &Scenario) -> (End, Metrics) {
+fn fly_host(scenario: &Scenario) -> (LoopEnd, Metrics) {
     let (mut station, mut host, mut metrics) = (Station::new(), Host::new().unwrap(), Accumulator::default());
     let end = fly(scenario, &mut station, &mut host, Pace::LOCKSTEP, |sample| {
         metrics.add(sample);
@@ -25,7 +25,7 @@ fn fly_host(scenario: &Scenario) -> (End, Metrics) {
 fn the_link_in_between_changes_nothing_that_matters() {
     let scenario = scenario("paper", 60.0);
     let (end, looped) = fly_host(&scenario);
-    assert_eq!(end, End { lost: None, interrupted: false, disarmed: true });
+    assert_eq!(end, LoopEnd { lost: None, interrupted: false, disarmed: true });
     let plain = Run::fly(&scenario, &firmware(), u64::MAX).unwrap().metrics;
     // The wire rounds the attitude to a quaternion of f32, and has no yaw acceleration.
     assert!((looped.rmse - plain.rmse).amax() < 1e-3, "{} {}", looped.rmse, plain.rmse);
@@ -89,7 +89,7 @@ fn the_observer_can_break_off() {
         steps += 1;
         if steps == 100 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
-    assert_eq!(end.unwrap(), End { lost: None, interrupted: true, disarmed: true });
+    assert_eq!(end.unwrap(), LoopEnd { lost: None, interrupted: true, disarmed: true });
     assert_eq!(steps, 100);
 }
 

@@ -1,6 +1,6 @@
 //! The flight in the emulator.
 
-use crate::cli::in_the_loop::{Flying, Recorder, outcome};
+use crate::cli::in_the_loop::{InTheLoop, Recorder, outcome};
 use crate::cli::terminal::{Failure, print};
 use afbc_sim::flight::Sample;
 use afbc_sim::in_the_loop::{self, Pace, Station};
@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 /// Flies `scenario` with `image`, or with the one built from this source, and prints the results.
-pub(super) fn fly(scenario: &Scenario, flying: &Flying, image: Option<PathBuf>) -> Result<ExitCode, Failure> {
+pub(super) fn fly(scenario: &Scenario, flying: &InTheLoop, image: Option<PathBuf>) -> Result<ExitCode, Failure> {
     let mut recorder = Recorder::new(scenario, flying)?;
     let image = image.map_or_else(|| Image::Pil.build(), Ok)?;
     let mut twins = Twins::new(Emulator::start(&image)?)?;

@@ -3,7 +3,7 @@
 #[cfg(unix)]
 mod emulated;
 
-use super::in_the_loop::Flying;
+use super::in_the_loop::InTheLoop;
 use super::target::Target;
 use super::terminal::Failure;
 use clap::Args;
@@ -21,7 +21,7 @@ pub(crate) struct Pil {
     scenario: Target,
 
     #[command(flatten)]
-    flying: Flying,
+    flying: InTheLoop,
 
     /// Image to fly, instead of building the one of this source
     #[arg(long, value_name = "ELF")]
@@ -38,10 +38,10 @@ impl Pil {
 
 #[cfg(not(unix))]
 mod emulated {
-    use super::{ExitCode, Failure, Flying, PathBuf};
+    use super::{ExitCode, Failure, InTheLoop, PathBuf};
     use afbc_sim::scenario::Scenario;
 
-    pub(super) fn fly(_: &Scenario, _: &Flying, _: Option<PathBuf>) -> Result<ExitCode, Failure> {
+    pub(super) fn fly(_: &Scenario, _: &InTheLoop, _: Option<PathBuf>) -> Result<ExitCode, Failure> {
         Err("the emulator needs Unix, for its pipes and sockets; `sitl fly` flies the same scenario without it".into())
     }
 }

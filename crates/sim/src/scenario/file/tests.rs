@@ -9,7 +9,7 @@ use crate::paper;
 use crate::reader::FileError;
 use crate::scenario::{BUILT_IN, Scenario, built_in};
 use afbc::Profile;
-use afbc::adaptive::Gains;
+use afbc::adaptive;
 use afbc_peers::pid;
 use afbc_plant::Model;
 
@@ -168,8 +168,8 @@ fn contenders_start_from_the_file_or_from_a_profile() {
     let [short, file, flight, pid] = contenders.as_slice() else { panic!("{contenders:?}") };
     let z = |contender: &Contender| contender.gains().unwrap().z;
     let paper = Profile::Paper.gains().z;
-    assert_eq!((short.name.as_str(), z(short)), ("afbc", Gains { gamma: 5.0, ..paper }));
-    assert_eq!(z(file), Gains { gamma: 5.0, eta: 0.1, ..paper });
+    assert_eq!((short.name.as_str(), z(short)), ("afbc", adaptive::Gains { gamma: 5.0, ..paper }));
+    assert_eq!(z(file), adaptive::Gains { gamma: 5.0, eta: 0.1, ..paper });
     assert_eq!((flight.law, flight.monitored), (Law::Afbc(Profile::Flight.gains()), true));
     assert_eq!(flight.settings, Profile::Flight.settings().with_dt_s(0.002));
     let tuned = pid::Gains { tilt_p_1_s: 9.0, ..pid::Gains::TUNED };

@@ -2,14 +2,14 @@
 
 /// Gathers numbers one by one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spread {
+pub struct Extremes {
     count: u64,
     sum: f64,
     min: f64,
     max: f64,
 }
 
-impl Spread {
+impl Extremes {
     /// Takes one more number into account.
     pub fn add(&mut self, value: f64) {
         (self.min, self.max) =

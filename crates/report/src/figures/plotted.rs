@@ -15,12 +15,12 @@ pub(super) const REFERENCE: Ink = Ink::new(palette::WANTED, 4.0);
 pub(super) const LINE_PX: f64 = 1.3;
 
 /// One law's flight, with the style of its lines.
-pub(super) struct Law<'a> {
+pub(super) struct Plotted<'a> {
     pub(super) flight: &'a Flown,
     pub(super) ink: Ink,
 }
 
-impl Law<'_> {
+impl Plotted<'_> {
     pub(super) fn ink(&self) -> Ink {
         self.ink
     }

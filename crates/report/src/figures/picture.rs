@@ -1,7 +1,7 @@
 //! A figure with its caption.
 
 /// A figure with its caption.
-pub(crate) struct Figure {
+pub(crate) struct Picture {
     /// File name without `.svg`.
     pub(crate) name: &'static str,
     /// Caption in one sentence or a few.
