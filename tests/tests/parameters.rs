@@ -1,19 +1,20 @@
 //! Every declared parameter is listed in `docs/parameters.md`, with a name that suits ground stations and never
-//! changes.
+//! changes, and those that scenario files take in `docs/scenarios.md`.
 //!
-//! `WRITE=1 cargo test -p flight-tests --test parameters` writes the page.
+//! `WRITE=1 cargo test -p flight-tests --test parameters` writes the first page and those rows of the other.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
 use afbc::Profile;
 use afbc::monitor::Bounds;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Curve;
-use afbc_plant::{Battery, Contact, Drag, Dropouts, GroundEffect, Rotors, Sensing, Turbulence, Wind};
+use afbc_plant::{Battery, Contact, Deviations, Drag, Dropouts, GroundEffect, Rotors, Sensing, Turbulence, Wind};
 use afbc_sim::contender::{ControllerKind, Law};
+use afbc_sim::reader::words::number;
 use afbc_types::{Declaration, Declared, OutOfRange, Parameters, Value};
 use core::convert::Infallible;
 use core::fmt::Write;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
@@ -46,6 +47,15 @@ fn profiles<G: Declared>(title: impl Into<String>, prefix: &'static str, of: imp
     columns(title, prefix, Profile::ALL.map(|profile| (profile.name(), of(profile))))
 }
 
+/// Returns a parameter's value, element by element, as in a scenario file.
+fn shown(value: &Value<'_>) -> Vec<String> {
+    match value {
+        Value::Single(numbers) => numbers.iter().map(|number| format!("{number:?}")).collect(),
+        Value::Double(numbers) => numbers.iter().map(|number| format!("{number:?}")).collect(),
+        Value::Switch(on) => vec![on.to_string()],
+    }
+}
+
 fn columns<G: Declared, const N: usize>(
     title: impl Into<String>,
     prefix: &'static str,
@@ -55,11 +65,7 @@ fn columns<G: Declared, const N: usize>(
     for (_, parameters) in &columns {
         let mut at = 0;
         let Ok(()) = parameters.visit(&mut |declaration, value| {
-            let values: Vec<String> = match &value {
-                Value::Single(numbers) => numbers.iter().map(|number| format!("{number:?}")).collect(),
-                Value::Double(numbers) => numbers.iter().map(|number| format!("{number:?}")).collect(),
-                Value::Switch(on) => vec![on.to_string()],
-            };
+            let values = shown(&value);
             let coordinates = if values.len() == 1 { vec![None] } else { vec![Some('X'), Some('Y'), Some('Z')] };
             for (coordinate, value) in coordinates.into_iter().zip(values) {
                 if rows.len() == at {
@@ -82,9 +88,14 @@ fn bounds(profile: Profile) -> Bounds {
 }
 
 /// Returns the gains of a law: those of each profile, or its own for a law outside the cascade.
-fn gains(kind: ControllerKind) -> Group {
+/// Returns the name of a control law at the beginning of a heading.
+fn heading(kind: ControllerKind) -> String {
     let title = kind.title();
-    let title = format!("{}{}", title[..1].to_uppercase(), &title[1..]);
+    format!("{}{}", title[..1].to_uppercase(), &title[1..])
+}
+
+fn gains(kind: ControllerKind) -> Group {
+    let title = heading(kind);
     if kind.in_cascade() {
         profiles(format!("{title}: `[gains.AXIS]`"), kind.prefix(), |profile| Law::of(kind, profile))
     } else {
@@ -151,18 +162,104 @@ fn page() -> String {
     page
 }
 
-#[test]
-fn the_page_lists_what_is_declared() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/parameters.md");
-    let declared = page();
-    if std::env::var_os("WRITE").is_some() {
-        fs::write(&path, &declared).unwrap();
+/// Returns the keys of one table of a scenario file, each with its row: key, range, default, meaning.
+fn keys(parameters: impl Declared) -> Vec<(&'static str, [String; 4])> {
+    let mut keys = Vec::new();
+    let Ok(()) = parameters.visit(&mut |declaration, value| {
+        let Declaration { group, range, unit, meaning, .. } = *declaration;
+        let values = shown(&value);
+        let (each, default) = match values.as_slice() {
+            [value] => ("", value.clone()),
+            values => (" each", format!("[{}]", values.join(", "))),
+        };
+        let accepted = match &value {
+            Value::Switch(_) => "`true`, `false`".to_owned(),
+            _ => format!("{} to {}{each}", number(range.min), number(range.max)),
+        };
+        // As a part of a sentence, unless it begins with a symbol or an abbreviation.
+        let (first, rest) = meaning.trim_end_matches('.').split_at(1);
+        let is_word = rest.starts_with(|c: char| c.is_lowercase() || c == ' ');
+        let first = if is_word { first.to_lowercase() } else { first.to_owned() };
+        // That a quantity is one of the subsystem's input is said in its meaning.
+        let is_told = is_in_key(declaration) || unit.ends_with("input");
+        let unit = if is_told { String::new() } else { format!(" \\[{unit}\\]") };
+        if group.is_empty() {
+            let meaning = format!("{first}{rest}").replace('|', "\\|") + &unit;
+            keys.push((range.name, [format!("`{}`", range.name), accepted, format!("`{default}`"), meaning]));
+        }
+        Ok::<(), Infallible>(())
+    });
+    keys
+}
+
+/// Returns the declared keys of the sections of `docs/scenarios.md`, by heading.
+fn sections() -> BTreeMap<String, Vec<(&'static str, [String; 4])>> {
+    let settings = Profile::Paper.settings();
+    let named = [
+        ("Vehicle", keys(Parameters::DEFAULT)),
+        ("Gains", keys(Profile::Paper.gains().roll)),
+        ("Settings", keys(settings)),
+        ("Limits", keys(settings.limits)),
+        ("Rotors", keys(Rotors::DEFAULT)),
+        ("Battery", keys(Battery::DEFAULT)),
+        ("Drag", keys(Drag::DEFAULT)),
+        ("Wind", keys(Wind::DEFAULT)),
+        ("Turbulence", keys(Turbulence::DEFAULT)),
+        ("Ground", [keys(Contact::DEFAULT), keys(GroundEffect::DEFAULT)].concat()),
+        ("Sensors", [keys(Sensing::DEFAULT), keys(Deviations::DEFAULT), keys(Dropouts::DEFAULT)].concat()),
+    ];
+    let peers = ControllerKind::ALL.into_iter().filter(|kind| !kind.in_cascade());
+    let peers = peers.map(|kind| (heading(kind), keys(Law::of(kind, Profile::Paper))));
+    named.map(|(heading, keys)| (heading.to_owned(), keys)).into_iter().chain(peers).collect()
+}
+
+/// Returns `page` with the rows of declared keys as they are declared. A default that is described in words stays.
+fn with_declared_rows(page: &str) -> String {
+    let mut sections = sections();
+    let mut lines: Vec<String> = Vec::new();
+    let (mut heading, mut written) = ("", BTreeSet::new());
+    for line in page.lines() {
+        if let Some((_, title)) = line.split_once("# ").filter(|_| line.starts_with('#')) {
+            heading = title;
+        }
+        let declared = sections.get(heading).and_then(|keys| {
+            let (key, row) = keys.iter().find(|(key, _)| line.starts_with(&format!("| `{key}` |")))?;
+            written.insert((heading, *key));
+            let [key, accepted, default, meaning] = row;
+            let default = line.split(" | ").nth(2).filter(|cell| !cell.starts_with('`')).unwrap_or(default);
+            Some(format!("| {key} | {accepted} | {default} | {meaning} |"))
+        });
+        lines.push(declared.unwrap_or_else(|| line.to_owned()));
     }
-    let written = fs::read_to_string(&path).unwrap_or_default();
+    for (heading, keys) in &mut sections {
+        keys.retain(|(key, _)| !written.contains(&(heading.as_str(), *key)));
+        assert!(keys.is_empty(), "docs/scenarios.md, {heading}: no row for {keys:?}");
+    }
+    lines.join("\n") + "\n"
+}
+
+/// Checks that the page `name` is what `declared` makes of it, or writes it.
+fn compare(name: &str, declared: impl Fn(&str) -> String) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs").join(name);
+    let written = fs::read_to_string(&path).unwrap();
+    let declared = declared(&written);
+    if std::env::var_os("WRITE").is_some() {
+        return fs::write(&path, &declared).unwrap();
+    }
     for (written, declared) in written.lines().zip(declared.lines()) {
         assert_eq!(written, declared, "run WRITE=1 cargo test -p flight-tests --test parameters");
     }
     assert_eq!(written, declared, "run WRITE=1 cargo test -p flight-tests --test parameters");
+}
+
+#[test]
+fn the_page_lists_what_is_declared() {
+    compare("parameters.md", |_| page());
+}
+
+#[test]
+fn scenario_keys_are_documented_as_declared() {
+    compare("scenarios.md", with_declared_rows);
 }
 
 #[test]
@@ -177,17 +274,22 @@ fn names_are_unique_and_fit_mavlink() {
     assert!(names.len() > 150, "{}", names.len());
 }
 
+/// True if a parameter has no unit, or its key ends in it.
+fn is_in_key(Declaration { range, unit, .. }: &Declaration) -> bool {
+    let ending: String = unit.to_lowercase().replace([' ', '/'], "_");
+    // "1/s" is "_1_s"; a plain number "1" has no ending.
+    ["1", ""].contains(unit) || range.name.ends_with(&format!("_{ending}"))
+}
+
 /// A key ends in its unit, unless it is one of the paper's letters.
 #[test]
 fn a_key_ends_in_its_unit() {
     const LETTERS: [&str; 3] = ["alpha1", "sigma", "lyapunov"];
-    for Row { name, declaration: Declaration { range, unit, .. }, .. } in groups().into_iter().flat_map(|g| g.rows) {
-        let ending: String = unit.to_lowercase().replace([' ', '/'], "_");
-        // "1/s" is "_1_s"; a plain number "1" has no ending.
-        let has_unit = !["1", ""].contains(&unit) && !LETTERS.contains(&range.name);
+    for Row { name, declaration, .. } in groups().into_iter().flat_map(|group| group.rows) {
+        let Declaration { range, unit, .. } = declaration;
         // A unit that depends on the axis is left out.
-        let has_unit = has_unit && !unit.contains("input") && !unit.contains(" or ");
-        assert!(!has_unit || range.name.ends_with(&format!("_{ending}")), "{name}: {} in {unit}", range.name);
+        let is_exempt = LETTERS.contains(&range.name) || unit.contains("input") || unit.contains(" or ");
+        assert!(is_exempt || is_in_key(&declaration), "{name}: {} in {unit}", range.name);
     }
 }
 
