@@ -1,4 +1,6 @@
 //! The body's axes in the earth frame.
+//!
+//! The plant's rotations are its own, in `f64`: no law is judged by the functions that it turns vectors with.
 
 use nalgebra::Vector3;
 

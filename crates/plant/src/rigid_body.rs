@@ -57,9 +57,7 @@ pub fn euler_rates(attitude_rad: &Vector3<f64>, rates_rad_s: &Vector3<f64>) -> V
 /// d/dt of the state vector, under a load that is held.
 #[inline]
 pub fn derivative(v: &Vector, load: &Load) -> Vector {
-    let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
-    let body_z = Vector3::new(2.0 * (w * y + x * z), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
-    pack(v, &load.acceleration(&body_z), &load.angular_acceleration(&Vector3::new(v[10], v[11], v[12])))
+    pack(v, &load.acceleration(&body_axes(v).up), &load.angular_acceleration(&Vector3::new(v[10], v[11], v[12])))
 }
 
 /// d/dt of the state vector from its accelerations.

@@ -33,16 +33,10 @@ pub fn motion(x: &Vector) -> Motion {
 /// f(X) of (6), under a load that is held.
 #[inline]
 pub fn derivative(x: &Vector, load: &Load) -> Vector {
-    let Motion { velocity_m_s, attitude_rad: eta, rates_rad_s: eta_dot, .. } = motion(x);
-    let (s_phi, c_phi) = (sin(eta.x), cos(eta.x));
-    let (s_theta, c_theta) = (sin(eta.y), cos(eta.y));
-    let (s_psi, c_psi) = (sin(eta.z), cos(eta.z));
-    let thrust_direction =
-        Vector3::new(c_phi * s_theta * c_psi + s_phi * s_psi, c_phi * s_theta * s_psi - s_phi * c_psi, c_phi * c_theta);
-
+    let Motion { velocity_m_s, rates_rad_s: eta_dot, .. } = motion(x);
     let mut x_dot = Vector::zeros();
     x_dot.fixed_rows_mut::<3>(0).copy_from(&velocity_m_s);
-    x_dot.fixed_rows_mut::<3>(3).copy_from(&load.acceleration(&thrust_direction));
+    x_dot.fixed_rows_mut::<3>(3).copy_from(&load.acceleration(&body_axes(x).up));
     x_dot.fixed_rows_mut::<3>(6).copy_from(&eta_dot);
     x_dot.fixed_rows_mut::<3>(9).copy_from(&load.angular_acceleration(&eta_dot));
     x_dot
