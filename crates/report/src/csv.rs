@@ -3,6 +3,7 @@
 use afbc::law::Context;
 use afbc::model::Model;
 use afbc_plant::{Sensing, Telemetry};
+use afbc_sim::columns::MOTION;
 use afbc_sim::contender::Contender;
 use afbc_sim::flight::Sample;
 use afbc_sim::flown::Flown;
@@ -61,32 +62,8 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
             $(add($name.into(), Box::new(|row| { let value: fn(&Sample) -> _ = $value; $kind(value(row.sample)) }));)*
         };
     }
-    add! { Double
-        "time_s": |s| s.time_s;
-        "x_m": |s| s.motion.position_m.x;
-        "y_m": |s| s.motion.position_m.y;
-        "z_m": |s| s.motion.position_m.z;
-        "vx_m_s": |s| s.motion.velocity_m_s.x;
-        "vy_m_s": |s| s.motion.velocity_m_s.y;
-        "vz_m_s": |s| s.motion.velocity_m_s.z;
-        "phi_rad": |s| s.motion.attitude_rad.x;
-        "theta_rad": |s| s.motion.attitude_rad.y;
-        "psi_rad": |s| s.motion.attitude_rad.z;
-        "p_rad_s": |s| s.motion.rates_rad_s.x;
-        "q_rad_s": |s| s.motion.rates_rad_s.y;
-        "r_rad_s": |s| s.motion.rates_rad_s.z;
-        "x_d_m": |s| s.reference.position_m.x;
-        "y_d_m": |s| s.reference.position_m.y;
-        "z_d_m": |s| s.reference.position_m.z;
-        "vx_d_m_s": |s| s.reference.velocity_m_s.x;
-        "vy_d_m_s": |s| s.reference.velocity_m_s.y;
-        "vz_d_m_s": |s| s.reference.velocity_m_s.z;
-        "ax_d_m_s2": |s| s.reference.acceleration_m_s2.x;
-        "ay_d_m_s2": |s| s.reference.acceleration_m_s2.y;
-        "az_d_m_s2": |s| s.reference.acceleration_m_s2.z;
-        "psi_d_rad": |s| s.reference.yaw_rad;
-        "psi_d_rate_rad_s": |s| s.reference.yaw_rate_rad_s;
-        "psi_d_acceleration_rad_s2": |s| s.reference.yaw_acceleration_rad_s2;
+    for (name, value) in MOTION {
+        add(name.into(), Box::new(move |row| Double(value(row.sample))));
     }
     // phi_d and theta_d: from (40), then behind the command filter, as tracked by roll and pitch.
     add! { Single

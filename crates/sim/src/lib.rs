@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod case;
+pub mod columns;
 pub mod contender;
 pub mod flight;
 pub mod flown;

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, reason = "tests")]
 
 use super::*;
+use crate::columns::MOTION;
 use crate::contender::Law;
 use crate::metrics::{Accumulator, Metrics};
 use crate::run::Run;
@@ -103,4 +104,36 @@ fn a_link_that_stays_down_ends_the_flight() {
     assert!(lost.time_s > 2.0, "{lost:?}");
     scenario.outages.clear();
     assert_eq!(fly_host(&scenario).0.lost, None);
+}
+
+/// The log of the loop has the columns that every log has, then the rotors', and a row for each 10 ms.
+#[test]
+fn the_log_has_the_columns_of_every_log() {
+    let scenario = scenario("hover", 0.5);
+    let path = std::env::temp_dir().join(format!("afbc-loop-log-{}.csv", std::process::id()));
+    let (mut station, mut host, mut log) = (Station::new(), Host::new().unwrap(), Log::create(&path).unwrap());
+    let mut logged = Vec::new();
+    let end = fly(&scenario, &mut station, &mut host, Pace::LOCKSTEP, |sample| {
+        log.add(sample).unwrap();
+        logged.push(*sample);
+        ControlFlow::Continue(())
+    });
+    log.finish().unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::remove_file(&path).unwrap();
+    assert!(end.is_ok());
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let header = lines.next().unwrap();
+    let motion = MOTION.map(|(name, _)| name);
+    assert_eq!(header[..motion.len()], motion);
+    assert_eq!(header[motion.len()..], ["omega1_rad_s", "omega2_rad_s", "omega3_rad_s", "omega4_rad_s"]);
+    let rows: Vec<Vec<f64>> = lines.map(|row| row.iter().map(|cell| cell.parse().unwrap()).collect()).collect();
+    assert_eq!(rows.len(), logged.len().div_ceil(10));
+    for (row, sample) in rows.iter().zip(logged.iter().step_by(10)) {
+        let mut expected = MOTION.map(|(_, value)| value(sample)).to_vec();
+        expected.extend(sample.action.speeds.0.iter().take(4).map(|speed| f64::from(*speed)));
+        // Speeds are written with the fewest digits that restore an f32.
+        let same = |(a, b): (&f64, &f64)| a == b || *a as f32 == *b as f32;
+        assert!(row.len() == expected.len() && row.iter().zip(&expected).all(same), "{row:?}, not {expected:?}");
+    }
 }

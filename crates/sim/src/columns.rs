@@ -1,0 +1,35 @@
+//! Quantities that every log of a flight has, by the names of their columns.
+
+use crate::flight::Sample;
+
+/// A column's name, which ends in its unit, and the value under it.
+pub type Column = (&'static str, fn(&Sample) -> f64);
+
+/// Time, true motion and reference.
+pub const MOTION: [Column; 25] = [
+    ("time_s", |s| s.time_s),
+    ("x_m", |s| s.motion.position_m.x),
+    ("y_m", |s| s.motion.position_m.y),
+    ("z_m", |s| s.motion.position_m.z),
+    ("vx_m_s", |s| s.motion.velocity_m_s.x),
+    ("vy_m_s", |s| s.motion.velocity_m_s.y),
+    ("vz_m_s", |s| s.motion.velocity_m_s.z),
+    ("phi_rad", |s| s.motion.attitude_rad.x),
+    ("theta_rad", |s| s.motion.attitude_rad.y),
+    ("psi_rad", |s| s.motion.attitude_rad.z),
+    ("p_rad_s", |s| s.motion.rates_rad_s.x),
+    ("q_rad_s", |s| s.motion.rates_rad_s.y),
+    ("r_rad_s", |s| s.motion.rates_rad_s.z),
+    ("x_d_m", |s| s.reference.position_m.x),
+    ("y_d_m", |s| s.reference.position_m.y),
+    ("z_d_m", |s| s.reference.position_m.z),
+    ("vx_d_m_s", |s| s.reference.velocity_m_s.x),
+    ("vy_d_m_s", |s| s.reference.velocity_m_s.y),
+    ("vz_d_m_s", |s| s.reference.velocity_m_s.z),
+    ("ax_d_m_s2", |s| s.reference.acceleration_m_s2.x),
+    ("ay_d_m_s2", |s| s.reference.acceleration_m_s2.y),
+    ("az_d_m_s2", |s| s.reference.acceleration_m_s2.z),
+    ("psi_d_rad", |s| s.reference.yaw_rad),
+    ("psi_d_rate_rad_s", |s| s.reference.yaw_rate_rad_s),
+    ("psi_d_acceleration_rad_s2", |s| s.reference.yaw_acceleration_rad_s2),
+];
