@@ -58,7 +58,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 const HOVER: &str = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
 
 /// Text after [`HOVER`], and the error.
-const BAD_TABLES: [(&str, &str); 68] = [
+const BAD_TABLES: [(&str, &str); 69] = [
     ("[[outage]]\nstart_s = -1", ":5: outage.start_s: -1 is out of range: it must lie within 0 to 36000 (seconds)"),
     ("[vehicle]\nmass_g = 486", ":5: vehicle.mass_g: unknown key; did you mean mass_kg (kilograms)?"),
     (
@@ -89,7 +89,7 @@ const BAD_TABLES: [(&str, &str); 68] = [
     ("[truth]\nmass = 0.5", ":5: truth.mass: unknown key; did you mean mass_kg (kilograms)?"),
     ("[gains.rol]\neta = 1", ":4: gains.rol: unknown key; did you mean roll?"),
     ("[gains]\nroll = 1", ":5: gains.roll: it is a number and must be a table; write one table: [gains.roll]"),
-    ("[gains.z]\neta = -1", ":5: gains.z.eta: -1 is out of range: it must lie within 0 to 1000"),
+    ("[gains.z]\neta = -1", ":5: gains.z.eta: -1 is out of range: it must lie within 0 to 1000 (input per m or rad)"),
     (
         "[gains.x]\neta = 1\nwidth = 0.1",
         ":4: gains.x.centre: centre / width = 100, out of range: it must lie within 0.1 to 6; change one of the two",
@@ -202,6 +202,7 @@ const BAD_TABLES: [(&str, &str); 68] = [
         ":5: limits.tilt_max_rad: 2 is out of range: it must lie within 0.05 to 1.57 (radians)",
     ),
     ("[gains.z]\nsigma = 11", ":5: gains.z.sigma: 11 is out of range: it must lie within 0 to 10 (1/s)"),
+    ("[gains.z]\nepsilom = 1", ":5: gains.z.epsilom: unknown key; did you mean epsilon (m/s or rad/s)?"),
     ("[[contender]]\ncontroller = \"afbc\"", ":4: contender.name: missing; give it one, such as \"gentle\""),
     (
         "[[contender]]\nname = \"a\\nb\"",

@@ -1,7 +1,7 @@
 //! Typed reading of TOML: every value is checked as it is read, and a key that nobody read is refused.
 
 use super::error::{FileError, Source};
-use super::words::{self, did_you_mean, nearest, one_of};
+use super::words::{self, nearest, one_of};
 use afbc_types::{Declaration, Declared, Range, Value};
 use nalgebra::Vector3;
 use toml::Spanned;
@@ -19,12 +19,14 @@ pub struct Table<'a> {
     start: usize,
     entries: &'a DeTable<'a>,
     read: Vec<&'static str>,
+    /// Declared keys among them, with the symbols of their units.
+    units: Vec<(&'static str, &'static str)>,
 }
 
 impl<'a> Table<'a> {
     /// The document as a table.
     pub fn root(source: Source<'a>, entries: &'a DeTable<'a>) -> Self {
-        Table { source, path: String::new(), start: 0, entries, read: Vec::new() }
+        Table { source, path: String::new(), start: 0, entries, read: Vec::new(), units: Vec::new() }
     }
 
     /// The number under `range.name`, if it is there.
@@ -61,10 +63,11 @@ impl<'a> Table<'a> {
         wanted: impl Fn(&Declaration) -> bool,
     ) -> Result<(), FileError> {
         parameters.visit_mut(&mut |declaration, value| {
-            let Declaration { range, .. } = declaration;
+            let Declaration { range, unit, .. } = declaration;
             if !wanted(declaration) {
                 return Ok(());
             }
+            self.units.push((range.name, unit));
             match value {
                 Value::Single([number]) => self.number(range)?.into_iter().for_each(|read| *number = read as f32),
                 Value::Double([number]) => self.number(range)?.into_iter().for_each(|read| *number = read),
@@ -87,7 +90,7 @@ impl<'a> Table<'a> {
         if self.has(range.name) {
             return Ok(());
         }
-        Err(self.missing(range.name, &format!("add it{}", words::unit(range.name))))
+        Err(self.missing(range.name, &format!("add it{}", self.unit(range.name))))
     }
 
     /// True if something stands under `key`.
@@ -160,7 +163,7 @@ impl<'a> Table<'a> {
     /// The three numbers under `key`, which must be there, each in `range`.
     pub fn need_vector(&mut self, key: &'static str, range: &Range) -> Result<Vector3<f64>, FileError> {
         let vector = self.vector(key, [range; 3])?;
-        vector.ok_or_else(|| self.missing(key, &format!("add three numbers{}", words::unit(key))))
+        vector.ok_or_else(|| self.missing(key, &format!("add three numbers{}", self.unit(key))))
     }
 
     /// The string under `key`, if it is there.
@@ -277,7 +280,7 @@ impl<'a> Table<'a> {
     pub fn finish(self) -> Result<(), FileError> {
         let Some((key, start)) = self.unread().min_by_key(|(_, start)| *start) else { return Ok(()) };
         let cure = match nearest(key, self.read.iter().copied()) {
-            Some(known) => did_you_mean(known),
+            Some(known) => self.did_you_mean(known),
             None => format!("known here: {}", self.read.join(", ")),
         };
         Err(self.unknown(key, start, &cure))
@@ -303,9 +306,20 @@ impl<'a> Table<'a> {
     pub fn missing(&self, key: &'static str, cure: &str) -> FileError {
         let slip = nearest(key, self.unread().map(|(unread, _)| unread));
         match self.unread().find(|(unread, _)| Some(*unread) == slip) {
-            Some((slip, start)) => self.unknown(slip, start, &did_you_mean(key)),
+            Some((slip, start)) => self.unknown(slip, start, &self.did_you_mean(key)),
             None => self.fault(key, format!("missing; {cure}")),
         }
+    }
+
+    /// The unit of `key`, for people.
+    fn unit(&self, key: &str) -> String {
+        let symbol = self.units.iter().find(|(declared, _)| *declared == key).map_or("", |(_, symbol)| symbol);
+        words::unit(key, symbol)
+    }
+
+    /// The cure for a slip of the pen.
+    fn did_you_mean(&self, key: &str) -> String {
+        format!("did you mean {key}{}?", self.unit(key))
     }
 
     /// The keys that nobody has read, and where they stand.
@@ -331,7 +345,7 @@ impl<'a> Table<'a> {
             DeValue::Integer(integer) => u64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|i| i as f64),
             _ => None,
         };
-        let unit = words::unit(key);
+        let unit = self.unit(key);
         let bounds = format!("it must lie within {} to {}{unit}", words::number(min), words::number(max));
         match number {
             None => Err(self.wrong_type(value, key, &format!("a number{unit}"), "digits without quotes")),
@@ -364,7 +378,8 @@ impl<'a> Table<'a> {
 
     fn table_in(&self, value: &'a Spanned<DeValue<'a>>, key: &str, cure: &str) -> Result<Table<'a>, FileError> {
         let entries = value.get_ref().as_table().ok_or_else(|| self.wrong_type(value, key, "a table", cure))?;
-        Ok(Table { source: self.source, path: self.dotted(key), start: value.span().start, entries, read: Vec::new() })
+        let (path, start) = (self.dotted(key), value.span().start);
+        Ok(Table { source: self.source, path, start, entries, read: Vec::new(), units: Vec::new() })
     }
 
     fn wrong_type(&self, value: &Spanned<DeValue<'_>>, key: &str, wanted: &str, cure: &str) -> FileError {

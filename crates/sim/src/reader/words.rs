@@ -6,7 +6,7 @@ use afbc_types::OutOfRange;
 const LIKENESS: f64 = 0.8;
 
 /// What the endings of keys mean, longest ending first.
-const UNITS: [(&str, &str); 30] = [
+const UNITS: [(&str, &str); 24] = [
     ("_kg_m3", "kilograms per cubic metre"),
     ("_n_s2_m", "newton seconds squared per metre"),
     ("_n_m_s2", "newton metre seconds squared"),
@@ -31,18 +31,16 @@ const UNITS: [(&str, &str); 30] = [
     ("_s", "seconds"),
     ("_v", "volts"),
     ("_w", "watts"),
-    ("sigma", "1/s"),
-    ("kappa", "1/s per m/s or rad/s"),
-    ("dead_zone", "m/s or rad/s"),
-    ("alpha1", "1/s"),
-    ("alpha2", "input per m/s or rad/s"),
-    ("epsilon", "m/s or rad/s"),
 ];
 
-/// ` (kilograms)` for `mass_kg`; nothing for a key without a unit.
-pub fn unit(key: &str) -> String {
-    let found = UNITS.iter().find(|(ending, _)| key.ends_with(ending));
-    found.map_or(String::new(), |(_, words)| format!(" ({words})"))
+/// Returns ` (kilograms)` for `mass_kg`, and for a key that does not end in a unit ` (1/s)`, the symbol that is declared
+/// of it, if any.
+pub fn unit(key: &str, symbol: &str) -> String {
+    match UNITS.iter().find(|(ending, _)| key.ends_with(ending)) {
+        Some((_, words)) => format!(" ({words})"),
+        None if ["", "1"].contains(&symbol) => String::new(),
+        None => format!(" ({symbol})"),
+    }
 }
 
 /// A number for people: decimal where that is short.
@@ -63,11 +61,6 @@ pub fn nearest<'w>(word: &str, words: impl Iterator<Item = &'w str>) -> Option<&
     let rated = words.map(|other| (strsim::jaro_winkler(word, other), other));
     let (likeness, best) = rated.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
     (likeness >= LIKENESS).then_some(best)
-}
-
-/// The cure for a slip of the pen.
-pub fn did_you_mean(key: &str) -> String {
-    format!("did you mean {key}{}?", unit(key))
 }
 
 /// `"step", "circle" or "hover"`.
