@@ -2,60 +2,24 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-use afbc_campaign::{self as campaign, Campaign, Folder, Manifest, Shard, built_in};
+mod common;
+
+use afbc_campaign::{self as campaign, Campaign, Manifest, Shard, built_in};
+use common::{command, folder, sitl, succeeds};
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-use std::sync::atomic::AtomicBool;
+use std::path::Path;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// An empty folder for each test.
-fn folder(test: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("campaign").join(test);
-    if folder.exists() {
-        fs::remove_dir_all(&folder).unwrap();
-    }
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
 /// Short flights of two contenders on two courses, some of them lost.
-const SMALL: &str = r#"
-name = "small"
-flights = 150
-seed = 7
-duration_s = 6.0
-scenario = "hover"
-trajectories = ["hover", "circle"]
-
-[spread]
-mass_ratio = [0.7, 1.3]
-thrust_factor_ratio = [0.2, 1.2]
-rotor_time_constant_s = 0.02
-rotor_efficiency = [0.0, 1.0]
-fault_rotor = [1, 4]
-fault_start_s = [1.0, 5.0]
-"#;
+const SMALL: &str = include_str!("../../crates/campaign/tests/small.toml");
 
 fn parse(text: &str) -> Campaign {
     campaign::parse("small.toml", text, "small", Path::new("")).unwrap()
 }
 
-/// Flies everything missing in `folder` on `threads` cores.
-fn fly(campaign: &Campaign, path: &Path, shard: Shard, threads: usize) {
-    let folder = Folder::open(path, Manifest::new(campaign, shard), false).unwrap();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let flown = pool.install(|| campaign::fly(campaign, &folder, &AtomicBool::new(false), &|_| ())).unwrap();
-    assert!(flown.is_some());
-}
-
 fn results_of(path: &Path) -> Vec<u8> {
     fs::read(path.join("results.parquet")).unwrap()
-}
-
-/// Every row of `SMALL`'s first flights.
-fn sitl(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sitl")).current_dir(folder).args(arguments).output().unwrap()
 }
 
 /// A mistake: text, its replacement, and the error's line, key and message.
@@ -127,9 +91,13 @@ fn a_bad_file_gets_one_line() {
 /// Merging needs all parts at once, but the system limits the number of open files.
 #[test]
 fn more_parts_than_open_files_are_merged() {
-    let (folder, campaign) = (folder("many-parts"), parse(&SMALL.replace("= 150", "= 60").replace("= 6.0", "= 0.2")));
-    fly(&campaign, &folder.join("whole"), Shard::WHOLE, 2);
-    (1..=60).for_each(|index| fly(&campaign, &folder.join(format!("part-{index}")), Shard { index, of: 60 }, 1));
+    let folder = folder("many-parts");
+    fs::write(folder.join("small.toml"), SMALL.replace("= 150", "= 60").replace("= 6.0", "= 0.2")).unwrap();
+    succeeds(&sitl(&folder, &["campaign", "small.toml", "--out", "whole"]));
+    for index in 1..=60 {
+        let (shard, out) = (format!("{index}/60"), format!("part-{index}"));
+        succeeds(&sitl(&folder, &["campaign", "small.toml", "--shard", &shard, "--out", &out]));
+    }
     let merge = format!("ulimit -n 40; {} merge part-* --out merged", env!("CARGO_BIN_EXE_sitl"));
     let output = Command::new("sh").current_dir(&folder).args(["-c", &merge]).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
@@ -147,9 +115,8 @@ fn a_signal_stops_it_at_any_time() {
     fs::write(folder.join("long.toml"), text.replace("fault_start_s = [1.0, 5.0]", "")).unwrap();
     for signal in ["-INT", "-TERM"] {
         let out = folder.join(format!("out{signal}"));
-        let mut child = Command::new(env!("CARGO_BIN_EXE_sitl"));
-        child.current_dir(&folder).args(["campaign", "long.toml", "--out"]).arg(&out);
-        let child = child.stderr(std::process::Stdio::piped()).spawn().unwrap();
+        let mut child = command(&folder, &["campaign", "long.toml", "--out"]);
+        let child = child.arg(&out).stderr(Stdio::piped()).spawn().unwrap();
         // From here on it handles signals.
         while !out.join("campaign.json").exists() {
             std::thread::sleep(Duration::from_millis(1));
@@ -215,11 +182,7 @@ fn a_killed_program_loses_nothing_that_was_finished() {
     let out = folder.join("out/small");
     let chunks = || fs::read_dir(out.join("chunks")).map_or(0, |entries| entries.flatten().count());
     loop {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_sitl"))
-            .current_dir(&folder)
-            .args(["campaign", "small.toml", "--threads", "2"])
-            .spawn()
-            .unwrap();
+        let mut child = command(&folder, &["campaign", "small.toml", "--threads", "2"]).spawn().unwrap();
         while chunks() < 2 && child.try_wait().unwrap().is_none() {
             std::thread::sleep(Duration::from_millis(1));
         }

@@ -2,31 +2,14 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod common;
+
 use afbc_sim::contender::ControllerKind;
+use common::{command, folder, sitl};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-
-/// An empty folder for each test.
-fn folder(test: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cli").join(test);
-    if folder.exists() {
-        fs::remove_dir_all(&folder).unwrap();
-    }
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
-fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_sitl"));
-    command.current_dir(folder).args(arguments);
-    command
-}
-
-fn sitl(folder: &Path, arguments: &[&str]) -> Output {
-    command(folder, arguments).output().unwrap()
-}
+use std::process::{Output, Stdio};
 
 fn code(output: &Output) -> i32 {
     output.status.code().unwrap()

@@ -2,42 +2,21 @@
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
+mod common;
+
 use afbc_sim::contender::ControllerKind;
+use common::{command, folder, refused, succeeds};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-/// An empty folder for each test.
-fn folder(test: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("compare").join(test);
-    if folder.exists() {
-        fs::remove_dir_all(&folder).unwrap();
-    }
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
+use std::process::Output;
 
 fn sitl_on(threads: &str, folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_sitl"));
-    command.current_dir(folder).args(arguments).env("RAYON_NUM_THREADS", threads).output().unwrap()
+    command(folder, arguments).env("RAYON_NUM_THREADS", threads).output().unwrap()
 }
 
 fn sitl(folder: &Path, arguments: &[&str]) -> Output {
     sitl_on("2", folder, arguments)
-}
-
-/// Returns the output of a successful command.
-fn succeeds(output: &Output) -> String {
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
-
-/// Returns the one line of an error.
-fn refused(output: &Output) -> String {
-    assert_eq!(output.status.code(), Some(2));
-    assert!(output.stdout.is_empty());
-    String::from_utf8(output.stderr.clone()).unwrap()
 }
 
 fn json(path: &Path) -> Value {

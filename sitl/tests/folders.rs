@@ -2,19 +2,17 @@
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
+mod common;
+
+use common::sitl;
 use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 /// A folder for each test, with only a scenario and a campaign.
 fn folder(test: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("folders").join(test);
-    if folder.exists() {
-        fs::remove_dir_all(&folder).unwrap();
-    }
-    fs::create_dir_all(&folder).unwrap();
+    let folder = common::folder(test);
     let hover = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
     fs::write(folder.join("short.toml"), format!("duration_s = 0.5\n{hover}")).unwrap();
     fs::write(folder.join("few.toml"), "flights = 3\nduration_s = 0.5\nscenario = \"short.toml\"\n").unwrap();
@@ -23,10 +21,6 @@ fn folder(test: &str) -> PathBuf {
         assert_eq!(sitl(&folder, &[&shard[..], &["--out", out]].concat()).status.code(), Some(0));
     }
     folder
-}
-
-fn sitl(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sitl")).current_dir(folder).args(arguments).output().unwrap()
 }
 
 /// Every command with an output folder, and the command recorded as its owner.

@@ -20,22 +20,7 @@ fn folder(test: &str) -> PathBuf {
 }
 
 /// Short flights of two contenders on two courses, some of them lost.
-const SMALL: &str = r#"
-name = "small"
-flights = 150
-seed = 7
-duration_s = 6.0
-scenario = "hover"
-trajectories = ["hover", "circle"]
-
-[spread]
-mass_ratio = [0.7, 1.3]
-thrust_factor_ratio = [0.2, 1.2]
-rotor_time_constant_s = 0.02
-rotor_efficiency = [0.0, 1.0]
-fault_rotor = [1, 4]
-fault_start_s = [1.0, 5.0]
-"#;
+const SMALL: &str = include_str!("small.toml");
 
 fn parse(text: &str) -> Campaign {
     campaign::parse("small.toml", text, "small", Path::new("")).unwrap()
