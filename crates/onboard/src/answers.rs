@@ -1,38 +1,37 @@
-//! An answer for everyone who asks.
+//! Answers to commands, each to its sender.
 
 use afbc_flight_core::inbox::REQUESTS_MAX;
 use afbc_flight_core::{Asked, Inbox, Request};
 use afbc_link::{Address, Answer, Command, Downlink};
 use heapless::Deque;
 
-/// Most answers that wait to be sent, beside those of the flight core. Whoever asks for more at once gets none, which is
-/// counted.
+/// Largest number of queued answers, besides those of the flight core. Further commands are not answered, but counted.
 pub const ANSWERS_MAX: usize = 32;
-/// Most of them that go out after one tick: more than commands can come in a millisecond at 921,600 baud.
+/// Answers sent per tick, more than commands can arrive in a millisecond at 921,600 baud.
 pub const ANSWERS_PER_TICK: usize = 3;
-/// A request that has no answer for this long was dealt with in a tick that went unreported \[us\].
+/// Time after which a request without an answer counts as handled in a tick whose report was lost \[us\].
 pub const FORGOTTEN_US: u64 = 100_000;
-/// The number of the reason for which a request is refused before it reaches the flight core: too many wait there.
+/// Number of the reason "too many requests are queued", for requests that do not reach the flight core.
 pub const BUSY: i32 = 0;
 
-/// Takes commands, and knows who is to be told what.
+/// Processes commands, and keeps track of the answers.
 #[derive(Default)]
 pub(crate) struct Answers {
-    /// What the flight core has been asked and has not answered; the place is the ticket. The first is for
-    /// [`Request::Kill`], which never has to wait for a place. So the flight core's inbox never overflows.
+    /// Requests that the flight core has not answered, indexed by ticket. The first place is reserved for
+    /// [`Request::Kill`], so that it is always accepted. The flight core's inbox never overflows.
     asked: [Option<Open>; REQUESTS_MAX],
     waiting: Deque<Told, ANSWERS_MAX>,
     unanswered: u32,
 }
 
-/// An answer that waits.
+/// A queued answer.
 struct Told {
     command: u16,
     answer: Answer,
     to: Address,
 }
 
-/// A request without an answer.
+/// A request that is not answered yet.
 #[derive(Clone, Copy)]
 struct Open {
     command: u16,
@@ -41,7 +40,7 @@ struct Open {
 }
 
 impl Answers {
-    /// Leaves what `command` asks of the flight core in `inbox`, and answers the rest.
+    /// Puts the request of `command` into `inbox`, or answers commands that are no requests.
     pub(crate) fn hear(&mut self, command: Command, from: Address, at_us: u64, inbox: &mut Inbox) {
         let id = command.id();
         let request = match command {
@@ -59,20 +58,20 @@ impl Answers {
                 *place = Some(Open { command: id, from, at_us });
                 inbox.request(Asked { request, ticket });
             }
-            // One that stops the motors is on its way.
+            // The motors are about to be stopped already.
             None if kills => self.answer(id, Answer::Accepted, from),
             None => self.answer(id, Answer::Refused(BUSY), from),
         }
     }
 
-    /// What the flight core answered in a tick, and to whom.
+    /// Converts the flight core's answer to a message, to its sender.
     pub(crate) fn settle(&mut self, answer: afbc_flight_core::Answer) -> Option<Downlink> {
         let Open { command, from: to, .. } = self.asked.get_mut(usize::from(answer.ticket))?.take()?;
         let answer = answer.result.map_or_else(|refusal| Answer::Refused(refusal as i32), |()| Answer::Accepted);
         Some(Downlink::Answer { command, answer, to })
     }
 
-    /// The next answer to be sent at `now_us`.
+    /// Returns the next answer to be sent at `now_us`.
     pub(crate) fn next(&mut self, now_us: u64) -> Option<Downlink> {
         let told = self.waiting.pop_front().or_else(|| {
             let forgotten = |open: &mut Open| now_us.saturating_sub(open.at_us) > FORGOTTEN_US;
@@ -82,7 +81,7 @@ impl Answers {
         told.map(|Told { command, answer, to }| Downlink::Answer { command, answer, to })
     }
 
-    /// Commands that got no answer.
+    /// Returns the number of commands that were not answered.
     pub(crate) fn unanswered(&self) -> u32 {
         self.unanswered
     }

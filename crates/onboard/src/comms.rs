@@ -1,4 +1,4 @@
-//! The half that talks.
+//! Communication: receives and sends messages.
 
 use crate::answers::{ANSWERS_PER_TICK, Answers};
 use crate::failsafes::Failsafes;
@@ -11,17 +11,17 @@ use afbc_flight_core::{Inbox, Mode, Stamped, Tracker};
 use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, Sender, StatesRefused, Text, Uplink};
 use afbc_types::{PerAxis, State};
 
-/// The vehicle on the link: system 1, component 1 (autopilot).
+/// Address of the vehicle: system 1, component 1 (autopilot).
 pub const ADDRESS: Address = Address { system: 1, component: 1 };
-/// Room for all that one tick may have to say \[bytes\].
+/// Largest size of all messages after one tick \[bytes\].
 pub const REPORT_MAX: usize = 768;
 
-/// What the pilot is told when the clock has failed.
-pub const CLOCK_FAILED: &str = "clock failed, flying on the spare one: land";
-/// What the pilot is told when the control tick does not keep its rate or its time any more.
-pub const TICK_OFF: &str = "control tick off its 1000 Hz: land";
+/// Text to the pilot when the clock has failed.
+pub const CLOCK_FAILED: &str = "clock failed, using the internal one: land";
+/// Text to the pilot when the control tick's rate or timing is wrong.
+pub const TICK_OFF: &str = "control tick rate is wrong: land";
 
-/// A message that goes out every `period` ticks, and in which of them.
+/// A message sent every `period` ticks, in the ticks given by `phase`.
 struct Schedule {
     period: u64,
     phase: u64,
@@ -33,7 +33,7 @@ impl Schedule {
     }
 }
 
-/// Once a second.
+/// 1 Hz.
 const HEARTBEAT: Schedule = Schedule { period: 1000, phase: 3 };
 /// 50 Hz.
 const ATTITUDE: Schedule = Schedule { period: 20, phase: 1 };
@@ -41,20 +41,20 @@ const ATTITUDE: Schedule = Schedule { period: 20, phase: 1 };
 const POSITION: Schedule = Schedule { period: 20, phase: 11 };
 /// 10 Hz.
 const HEALTH: Schedule = Schedule { period: 100, phase: 7 };
-/// 100 Hz, and after every tick that had a new state.
+/// 100 Hz, and after every tick with a new state.
 const ROTORS: Schedule = Schedule { period: 10, phase: 0 };
 
-/// Reads what comes in, and says what there is to say.
+/// Receives and sends messages.
 pub struct Comms {
     decoder: Decoder<Uplink>,
     sender: Sender,
     tracker: Tracker,
-    /// When the last tick began \[us\]: everything that arrives before the next one is stamped so.
+    /// Start of the last tick \[us\], the time stamp of everything that arrives before the next one.
     now_us: u64,
     tick: u64,
     tick_us_max: f32,
     state: Option<State>,
-    /// The state is newer than the last rotor command.
+    /// True if a state has arrived since the last rotor command.
     state_is_news: bool,
     answers: Answers,
     failsafes: Failsafes,
@@ -70,7 +70,7 @@ impl Default for Comms {
 }
 
 impl Comms {
-    /// Nothing heard yet.
+    /// Creates it with nothing received.
     pub fn new() -> Self {
         Comms {
             decoder: Decoder::new(ADDRESS),
@@ -89,7 +89,7 @@ impl Comms {
         }
     }
 
-    /// Takes the next bytes of the stream; returns what they tell the control tick, to be [posted](Inbox::post).
+    /// Processes the next bytes of the stream; returns new inputs for the control tick, to be [posted](Inbox::post).
     pub fn receive(&mut self, bytes: &[u8]) -> Inbox {
         let mut news = Inbox::default();
         let Comms { decoder, tracker, now_us, state, state_is_news, answers, .. } = self;
@@ -109,7 +109,7 @@ impl Comms {
         news
     }
 
-    /// Frames dropped since power-up, for any reason.
+    /// Returns the number of frames dropped since power-up, for any reason.
     pub fn bad_frames(&self) -> u32 {
         let c = self.decoder.counters();
         [c.bad_checksum, c.unknown, c.oversized, c.malformed, c.implausible, c.unsupported]
@@ -117,7 +117,7 @@ impl Comms {
             .fold(0, u32::saturating_add)
     }
 
-    /// Says what there is to say after a tick, frame by frame through `send`. `tick_cycles` is how long the tick took,
+    /// Sends all messages due after a tick, frame by frame, through `send`. `tick_cycles` is the duration of the tick
     /// in cycles of 168 MHz.
     pub fn report(&mut self, report: &Report, tick_cycles: u32, mut send: impl FnMut(&[u8])) {
         let mut buffer = [0; FRAME_MAX];
@@ -157,7 +157,7 @@ impl Comms {
         } else if before.healthy() && !rate.healthy() {
             text(MavSeverity::MAV_SEVERITY_CRITICAL, TICK_OFF);
         }
-        // While the vehicle flies blind no law says anything.
+        // While the vehicle flies blind there is no report of a law.
         if report.mode != Mode::Coasting {
             self.trip = trip;
         }

@@ -1,34 +1,34 @@
-//! What is told of failsafes: each once, in words, and all in the heartbeat, however short they are.
+//! Reports of failsafes: each once as text, and all in the heartbeat, however short they are.
 
 use crate::flight::Report;
 use afbc_flight_core::{End, Mode};
 use afbc_link::MavSeverity;
 
-/// How bad it is, and what it is.
+/// Severity and text of a report.
 pub(crate) type Notice = (MavSeverity, &'static str);
 
 const COASTING: Notice = (MavSeverity::MAV_SEVERITY_WARNING, "no fresh state for 20 ms: coasting");
-const DESCENDING: Notice = (MavSeverity::MAV_SEVERITY_CRITICAL, "no state for 0.25 s: coming down");
+const DESCENDING: Notice = (MavSeverity::MAV_SEVERITY_CRITICAL, "no state for 0.25 s: descending");
 const STATE_LOST: Notice = (MavSeverity::MAV_SEVERITY_EMERGENCY, "no state for 2.25 s: motors stopped");
 const TUMBLED: Notice = (MavSeverity::MAV_SEVERITY_EMERGENCY, "tumbled: motors stopped");
 const SETPOINT_LOST: Notice = (MavSeverity::MAV_SEVERITY_WARNING, "no setpoint for 0.5 s: holding the position");
 
-/// What the last tick was like.
+/// Failsafes of the last tick.
 #[derive(Default)]
 pub(crate) struct Failsafes {
     mode: Mode,
     setpoint_lost: bool,
-    /// The last tick with a failsafe.
+    /// Number of the last tick with a failsafe.
     last: Option<u64>,
 }
 
 impl Failsafes {
-    /// What there is to say of the tick numbered `tick`: what it began.
+    /// Returns the failsafes that begin in the tick numbered `tick`.
     pub(crate) fn watch(&mut self, report: &Report, tick: u64) -> impl Iterator<Item = Notice> + use<> {
         let Report { mode, ended, health, .. } = report;
         let entered = (*mode != self.mode).then_some(*mode);
         let given_up = matches!(ended, Some(End::StateLost | End::Tumbled));
-        // A vehicle that comes down needs no setpoint.
+        // A descending vehicle needs no setpoint.
         let setpoint_lost = matches!(mode, Mode::Flying | Mode::Coasting) && health.setpoint_stale;
         let notices = [
             (entered == Some(Mode::Coasting)).then_some(COASTING),

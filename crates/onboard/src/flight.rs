@@ -1,4 +1,4 @@
-//! The half that decides.
+//! The vehicle with its flight core and motors.
 
 use afbc::monitor::{Bounds, Norm};
 use afbc::{Guarded, Profile, guarded};
@@ -6,7 +6,7 @@ use afbc_flight_core::motor::Curve;
 use afbc_flight_core::{Answer, ArmingLimits, End, Health, Inbox, Mode, Motor, Vehicle, VehicleMemory};
 use afbc_types::{Axis, OutOfRange, Parameters, RotorSpeeds};
 
-/// The vehicle of the paper, under its law in the profile `flight`.
+/// The paper's vehicle under AFBC in the profile `flight`.
 #[derive(Clone, Debug)]
 pub struct Flight {
     vehicle: Vehicle<Guarded>,
@@ -15,31 +15,31 @@ pub struct Flight {
     saturated_ticks: u32,
 }
 
-/// What a control tick decided.
+/// Result of a control tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
-    /// When the tick began, since power-up \[us\].
+    /// Start of the tick, since power-up \[us\].
     pub time_us: u64,
-    /// What the vehicle is doing.
+    /// Flight mode.
     pub mode: Mode,
-    /// What the rotors are told: zero if disarmed.
+    /// Rotor speeds for the motors: zero if disarmed.
     pub motors: RotorSpeeds,
-    /// The same as throttle: 0 if disarmed, otherwise 48 to 2047.
+    /// Throttles for the motors: 0 if disarmed, otherwise 48 to 2047.
     pub throttles: [u16; 4],
-    /// How well it goes.
+    /// Health of the flight core.
     pub health: Health,
-    /// Ticks since power-up in which a rotor was asked for a force outside its limits.
+    /// Ticks since power-up in which a rotor was commanded a force outside its limits.
     pub saturated_ticks: u32,
-    /// How much the subsystem whose turn it was has learnt; none before the first flight.
+    /// Norms of the estimates of one subsystem, all reported in turn; none before the first flight.
     pub learnt: Option<(Axis, Norm)>,
-    /// The answer to a request.
+    /// Answer to a request.
     pub answer: Option<Answer>,
     /// Why the flight ended, if it did in this tick.
     pub ended: Option<End>,
 }
 
 impl Flight {
-    /// The vehicle, disarmed.
+    /// Creates the vehicle, disarmed.
     ///
     /// # Errors
     /// The first parameter out of range.
@@ -56,12 +56,12 @@ impl Flight {
         })
     }
 
-    /// The clock has failed and another has taken over: the vehicle is not armed again.
+    /// Records that the clock has failed and another has taken over: the vehicle is not armed again.
     pub fn distrust_clock(&mut self) {
         self.memory.distrust_clock();
     }
 
-    /// One control tick, to be called every millisecond; `now_us` is the time since power-up. Cannot fail.
+    /// Runs one control tick, to be called every millisecond; `now_us` is the time since power-up. Cannot fail.
     pub fn tick(&mut self, now_us: u64, inbox: &Inbox) -> Report {
         let outcome = self.vehicle.tick(&mut self.memory, now_us, inbox);
         if outcome.health.control.saturated {

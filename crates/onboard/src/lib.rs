@@ -1,8 +1,9 @@
-//! The firmware without its hardware: which vehicle it flies, and what goes between [`afbc_link`] and the flight core.
+//! The firmware without its hardware: the vehicle that it flies, and the services between [`afbc_link`] and the flight
+//! core.
 //!
-//! Two halves, because on the board the control tick interrupts everything else: [`Flight`] decides, every millisecond;
-//! [`Comms`] reads and writes messages, whenever there is time. The host that runs both in turn on the same bytes and
-//! times gets the same bytes back as from the processor, bit for bit.
+//! There are two parts, because on the board the control tick interrupts everything else: [`Flight`] runs the control
+//! tick every millisecond; [`Comms`] receives and sends messages in the remaining time. A host that runs both in turn
+//! with the same bytes and times gets the same bytes as the processor.
 //!
 //! ```
 //! use afbc_onboard::{Comms, Flight};

@@ -1,4 +1,4 @@
-//! Every command has its own answer, and whoever sent it gets it.
+//! Every command is answered to its sender.
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 mod common;
@@ -14,7 +14,7 @@ use proptest::prelude::*;
 
 const STATIONS: [Address; 3] = [STATION, Address { system: 254, component: 1 }, Address { system: 1, component: 191 }];
 
-/// Who is told what.
+/// An answer: command, result, receiver.
 type Told = (u16, Answer, Address);
 
 fn answers(said: &[Downlink]) -> Vec<Told> {
@@ -25,7 +25,7 @@ fn answers(said: &[Downlink]) -> Vec<Told> {
     said.iter().filter_map(answer).collect()
 }
 
-/// All answers of the next `ticks` ticks, in which nothing is heard.
+/// Returns all answers of the next `ticks` ticks, without input.
 fn listen(bench: &mut Bench, ticks: usize) -> Vec<Told> {
     (0..ticks).flat_map(|_| answers(&bench.step().1)).collect()
 }
@@ -38,7 +38,7 @@ fn texts(said: &[Downlink]) -> Vec<Text> {
     said.iter().filter_map(text).collect()
 }
 
-/// What a vehicle answers that has just been switched on.
+/// Returns the answer of a vehicle that has just been switched on.
 fn expected(command: Command) -> Answer {
     match command {
         Command::Arm => Answer::Refused(Refusal::StateStale as i32),
@@ -71,13 +71,16 @@ fn sorted(mut told: Vec<Told>) -> Vec<Told> {
 proptest! {
     /// Any commands of several stations, any number of them in one tick.
     #[test]
-    fn everyone_is_answered(asked in prop::collection::vec(
-        prop::collection::vec((commands(), prop::sample::select(STATIONS.as_slice())), 0..12), 1..20)
+    fn everyone_is_answered(
+        asked in prop::collection::vec(
+            prop::collection::vec((commands(), prop::sample::select(STATIONS.as_slice())), 0..12),
+            1..20,
+        ),
     ) {
         let mut bench = Bench::new();
         let (mut told, mut due) = (Vec::new(), Vec::new());
         for tick in asked {
-            // Those with the flight core are answered one a tick, the others three a tick.
+            // The flight core answers one request per tick; of other answers three are sent per tick.
             prop_assert!(answers(&bench.step().1).is_empty());
             let (mut requests, mut all) = (0, 0);
             for (command, from) in tick {
@@ -93,10 +96,12 @@ proptest! {
         prop_assert_eq!(sorted(told), sorted(due));
     }
 
-    /// More than there is room for: those that the flight core cannot take are refused, those that cannot be answered are
-    /// counted; but each is one or the other.
+    /// More commands than there is room for: requests that the flight core cannot accept are refused, commands that
+    /// cannot be answered are counted; each is one or the other.
     #[test]
-    fn nobody_is_forgotten(asked in prop::collection::vec((commands(), prop::sample::select(STATIONS.as_slice())), 0..200)) {
+    fn every_command_is_answered_or_counted(
+        asked in prop::collection::vec((commands(), prop::sample::select(STATIONS.as_slice())), 0..200),
+    ) {
         let mut bench = Bench::new();
         for (command, from) in &asked {
             bench.hear_from(*from, Uplink::Command(*command));
@@ -139,7 +144,7 @@ fn two_commands_of_one_tick_are_answered_to_their_senders() {
     assert_eq!(listen(&mut bench, 1000), []);
 }
 
-/// Every number, from either message, and none that is for somebody else.
+/// Any command number, in either message, unless addressed to somebody else.
 #[test]
 fn every_number_is_answered_unless_meant_for_others() {
     let mut bench = Bench::new();
@@ -168,7 +173,7 @@ fn crc(bytes: &[u8], extra: u8) -> u16 {
     })
 }
 
-/// In flight a plain request to disarm is refused, with the reason, and a forced one stops the motors.
+/// In flight a plain request to disarm is refused with the reason, and a forced one stops the motors.
 #[test]
 fn only_the_forced_one_disarms_in_flight() {
     let mut bench = Bench::flying();
@@ -183,7 +188,7 @@ fn only_the_forced_one_disarms_in_flight() {
     assert_eq!(answers(&said), [(400, Answer::Accepted, STATION)]);
 }
 
-/// Whatever the flight core answers: its number, and its reason in words.
+/// Every refusal of the flight core is sent with its number and its text.
 #[test]
 fn every_refusal_is_told_with_its_reason() {
     for request in [Request::Arm, Request::Disarm, Request::Engage] {
@@ -207,9 +212,9 @@ fn every_refusal_is_told_with_its_reason() {
     assert!(Refusal::ALL.iter().all(|refusal| *refusal as i32 != BUSY));
 }
 
-/// However many requests wait, there is a place for the one that stops the motors.
+/// A request to stop the motors is accepted however many requests are queued.
 #[test]
-fn a_kill_finds_its_place() {
+fn a_kill_is_always_accepted() {
     let mut bench = Bench::new();
     for _ in 0..20 {
         bench.hear(Uplink::Command(Command::Arm));
@@ -229,7 +234,8 @@ fn a_kill_finds_its_place() {
     assert!(told.contains(&(400, Answer::Accepted, second)) && told.contains(&(400, Answer::Accepted, third)));
 }
 
-/// The board leaves out reports if its link is behind: what was asked then is answered with "failed", and the place is free.
+/// If the link falls behind, reports are dropped; requests of such ticks are answered with "failed", and their places
+/// are free again.
 #[test]
 fn requests_whose_tick_went_unreported_fail() {
     let mut bench = Bench::new();
@@ -248,7 +254,7 @@ fn requests_whose_tick_went_unreported_fail() {
     assert_eq!(listen(&mut bench, 2), [(400, Answer::Accepted, STATION)]);
 }
 
-/// The most that a tick can have to say still fits, and all of it is said: [`Bench::said`] looks.
+/// The largest possible output of a tick fits and is sent completely, as [`Bench::said`] checks.
 #[test]
 fn everything_at_once_fits() {
     let mut bench = Bench::new();

@@ -1,4 +1,4 @@
-//! Failsafes are told: once, in words, and in the heartbeat for a period at least.
+//! Failsafes are reported once as text, and in at least one heartbeat.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 mod common;
@@ -22,7 +22,7 @@ fn notices(said: &[Downlink]) -> Vec<(MavSeverity, String)> {
     said.iter().filter_map(notice).collect()
 }
 
-/// What the heartbeat says of failsafes, if there is one.
+/// Returns whether the heartbeat reports a failsafe, if there is a heartbeat.
 fn critical(said: &[Downlink]) -> Option<bool> {
     let heartbeat = |message: &Downlink| match message {
         Downlink::Heartbeat { failsafe, .. } => Some(*failsafe),
@@ -31,7 +31,7 @@ fn critical(said: &[Downlink]) -> Option<bool> {
     said.iter().find_map(heartbeat)
 }
 
-/// What is told in this many ticks with states and with setpoints, or without; and what the heartbeats say.
+/// Runs ticks with or without states and setpoints; returns the texts, and what the heartbeats report.
 fn fly(bench: &mut Bench, ticks: u32, states: bool, setpoints: bool) -> (Vec<(MavSeverity, String)>, Vec<bool>) {
     let (mut told, mut heartbeats) = (Vec::new(), Vec::new());
     for _ in 0..ticks {
@@ -49,15 +49,15 @@ fn fly(bench: &mut Bench, ticks: u32, states: bool, setpoints: bool) -> (Vec<(Ma
 }
 
 #[test]
-fn losing_the_state_is_told_step_by_step() {
+fn losing_the_state_is_reported_step_by_step() {
     let mut bench = Bench::flying();
     let (told, heartbeats) = fly(&mut bench, 5000, false, true);
     let severities: Vec<_> = told.iter().map(|(severity, _)| *severity).collect();
     assert_eq!(severities, [WARNING, CRITICAL, EMERGENCY], "{told:?}");
-    for ((_, text), word) in told.iter().zip(["coasting", "coming down", "motors stopped"]) {
+    for ((_, text), word) in told.iter().zip(["coasting", "descending", "motors stopped"]) {
         assert!(text.contains(word) && text.contains("state"), "{text}");
     }
-    // Lost after 2.25 s, and a second more.
+    // Until 2.25 s, and for one more second.
     assert_eq!(heartbeats.iter().filter(|critical| **critical).count(), 3, "{heartbeats:?}");
     assert_eq!(heartbeats.last(), Some(&false));
 }
@@ -80,7 +80,7 @@ fn a_short_gap_shows_in_the_next_heartbeat() {
 }
 
 #[test]
-fn losing_the_setpoint_is_told_each_time() {
+fn losing_the_setpoint_is_reported_each_time() {
     let mut bench = Bench::flying();
     for _ in 0..3 {
         let (told, _) = fly(&mut bench, 2000, true, false);
@@ -92,7 +92,7 @@ fn losing_the_setpoint_is_told_each_time() {
 }
 
 #[test]
-fn a_disarmed_vehicle_needs_neither() {
+fn a_disarmed_vehicle_reports_no_failsafe() {
     let mut bench = Bench::new();
     assert_eq!(fly(&mut bench, 5000, false, false), (vec![], vec![false; 5]));
 }
@@ -105,8 +105,8 @@ fn modes() -> impl Strategy<Value = (Mode, usize)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whatever the modes, and for however long: each time one is entered it is told once; a heartbeat is critical if
-    /// there was a failsafe since the last one, and not if there was none for a second.
+    /// For any sequence of modes, each failsafe is reported once each time it begins; a heartbeat is critical if there
+    /// was a failsafe since the previous one, and not if there was none for a second.
     #[test]
     fn each_time_once(modes in prop::collection::vec(modes(), 1..12), tumbles: bool) {
         let mut bench = Bench::new();

@@ -1,4 +1,4 @@
-//! A control tick that does not keep its time, and a clock that fails: the pilot is told once, and arming is refused.
+//! Wrong rate or timing of the control tick, and a failing clock: the pilot is told once, and arming is refused.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc_flight_core::{Inbox, Mode, Refusal};
@@ -8,7 +8,7 @@ use afbc_types::{Setpoint, State};
 
 const STATION: Address = Address { system: 255, component: 190 };
 
-/// The firmware under a tick of any period, tracked at rest and told where to be.
+/// The firmware with ticks of any period, with states at rest and a setpoint.
 struct Bench {
     flight: Flight,
     comms: Comms,
@@ -17,7 +17,7 @@ struct Bench {
     decoder: Decoder<Downlink>,
     now_us: u64,
     mode: Mode,
-    /// What was said.
+    /// Texts sent.
     texts: Vec<String>,
     answers: Vec<Answer>,
 }
@@ -42,11 +42,11 @@ impl Bench {
         self.inbox.post(&news);
     }
 
-    /// So many ticks, so far apart.
+    /// Runs ticks with this period.
     fn run(&mut self, ticks: u32, period_us: u64) {
         for _ in 0..ticks {
             self.now_us += period_us;
-            // Never the same twice, as measurements are.
+            // Never twice the same, like measurements.
             let mut state = State::default();
             state.position_m.z = 1e-6 * (self.now_us % 11) as f32;
             self.hear(Uplink::State { sent_us: self.now_us, state });
@@ -63,7 +63,7 @@ impl Bench {
         }
     }
 
-    /// The answer to a request to arm.
+    /// Returns the answer to a request to arm.
     fn arm(&mut self) -> Answer {
         self.answers.clear();
         self.hear(Uplink::Command(Command::Arm));
@@ -73,29 +73,29 @@ impl Bench {
 }
 
 #[test]
-fn a_tick_off_its_time_is_told_and_does_not_end_the_flight() {
+fn wrong_tick_timing_is_reported_and_does_not_end_the_flight() {
     let mut bench = Bench::new();
     bench.run(1100, 1000);
     assert_eq!(bench.arm(), Answer::Accepted);
     bench.run(500, 1000);
     assert_eq!(bench.texts, [""; 0]);
 
-    // One that is missing; then a second in which every tick is 5 % late.
+    // A missing tick, then a second in which every tick is 5 % late.
     bench.run(1, 2000);
     assert_eq!(bench.texts, [TICK_OFF]);
     bench.run(2000, 1050);
-    assert_eq!((bench.mode, bench.texts.len()), (Mode::Flying, 1), "told once, and flies on");
+    assert_eq!((bench.mode, bench.texts.len()), (Mode::Flying, 1), "reported once, and continues flying");
 
     bench.hear(Uplink::Command(Command::Kill));
     bench.run(1, 1000);
     assert_eq!(bench.arm(), Answer::Refused(Refusal::Unhealthy as i32));
     bench.texts.clear();
     bench.run(3000, 1000);
-    assert_eq!(bench.arm(), Answer::Accepted, "it keeps its time again");
+    assert_eq!(bench.arm(), Answer::Accepted, "its timing is right again");
 }
 
 #[test]
-fn a_clock_that_fails_is_told_and_forbids_arming() {
+fn a_failed_clock_is_reported_and_prevents_arming() {
     let mut bench = Bench::new();
     bench.run(1100, 1000);
     assert_eq!(bench.arm(), Answer::Accepted);

@@ -1,4 +1,4 @@
-//! A trip on the link: its reason once, and the command that gives the flight back to AFBC.
+//! A trip of the monitor: its reason is sent once, and a command engages AFBC again.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 mod common;
@@ -18,7 +18,7 @@ fn accepted(command: MavCmd) -> Downlink {
     Downlink::Answer { command: command as u16, answer: Answer::Accepted, to: STATION }
 }
 
-/// The whole way: a vehicle that is held askew trips, says so once, and is given back by MAV_CMD_USER_1.
+/// A vehicle held at a wrong attitude trips, reports it once, and MAV_CMD_USER_1 engages AFBC again.
 #[test]
 fn a_trip_is_told_once_and_ended_by_command() {
     let mut bench = Bench::new();
@@ -50,7 +50,7 @@ fn a_trip_is_told_once_and_ended_by_command() {
     assert_eq!((report.health.control.trip, said), (None, vec![]), "AFBC flies");
 }
 
-/// Told again only if it trips again: not when states come back after a gap.
+/// A trip is reported again only if the monitor trips again, not when states return after a gap.
 #[test]
 fn a_gap_in_the_states_does_not_repeat_it() {
     let mut bench = Bench::new();

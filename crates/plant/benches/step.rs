@@ -1,7 +1,7 @@
-//! Time of one step of the plant, ideal and with everything that makes it real, and of one measurement.
+//! Time of one step of the plant, ideal and with all effects, and of one measurement.
 //!
-//! `cargo bench -p plant`. A few lines of feedback hold the vehicle in its place, so that it always meets the same air. The
-//! feedback's time, with that of [`Plant::motion`], is in every figure, and alone in `feedback_alone`.
+//! `cargo bench -p afbc-plant`. A simple feedback holds the vehicle in its place, so that conditions stay the same. Its
+//! time, with that of [`Plant::motion`], is part of every figure, and measured alone by `feedback_alone`.
 #![allow(clippy::unwrap_used, missing_docs)] // a plant that cannot be built must stop the bench
 
 use afbc_plant::{
@@ -54,7 +54,7 @@ fn environment() -> Environment {
     Environment::calm(Parameters::PAPER).unwrap()
 }
 
-/// Speeds around hover that keep the vehicle near its place.
+/// Returns speeds around hover that keep the vehicle near its place.
 fn feedback(motion: &Motion) -> RotorSpeeds {
     let eta = &motion.attitude_rad;
     let (p, q) = (motion.rates_rad_s.x, motion.rates_rad_s.y);
@@ -70,7 +70,7 @@ fn fly(bencher: Bencher, mut plant: Plant) {
         let speeds = feedback(&plant.motion());
         plant.step(black_box(&speeds), STEP_S);
     });
-    assert!(plant.motion().position_m.norm() < 1e3, "left the air it was measured in");
+    assert!(plant.motion().position_m.norm() < 1e3, "the vehicle has left its place");
 }
 
 #[divan::bench(sample_count = 200, sample_size = 2000)]
@@ -106,7 +106,7 @@ fn drag_in_still_air(bencher: Bencher, model: Model) {
     fly(bencher, Plant::with_realism(model, start(), environment(), &realism, STEP_S).unwrap());
 }
 
-/// As a campaign flies: everything usual, and the sensors.
+/// As in a campaign: usual effects and sensors.
 #[divan::bench(sample_count = 200, sample_size = 2000)]
 fn lag_drag_turbulence_sensors(bencher: Bencher) {
     let mut plant = Plant::with_realism(Model::RigidBody, start(), environment(), &usual(), STEP_S).unwrap();

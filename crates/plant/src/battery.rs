@@ -1,18 +1,18 @@
-//! A battery that sags under load and runs down.
+//! A battery whose voltage sags under load and falls with its charge.
 
 use afbc_types::{Range, parameters};
 use libm::sqrt;
 
 parameters! {
-    /// The Rint model, an open-circuit voltage behind a resistance (He, Xiong, Fan 2011, *Evaluation of lithium-ion battery
-    /// equivalent circuit models for state of charge estimation by an experimental approach*, Energies 4), its open-circuit
-    /// voltage falling linearly with the charge drawn.
+    /// The Rint model, an open-circuit voltage behind a resistance (He, Xiong, Fan 2011, *Evaluation of lithium-ion
+    /// battery equivalent circuit models for state of charge estimation by an experimental approach*, Energies 4), with
+    /// an open-circuit voltage that falls linearly with the charge drawn.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Battery {
-        /// Open-circuit voltage when full; the voltage at which the rotors reach their full speed.
+        /// Open-circuit voltage when full, at which the rotors reach their largest speed.
         #[parameter(FULL, "V", 1.0..=1000.0)]
         pub full_v: f64 = 12.6,
-        /// Open-circuit voltage when empty, no more than when full.
+        /// Open-circuit voltage when empty, at most that when full.
         #[parameter(EMPTY, "V", 0.1..=1000.0)]
         pub empty_v: f64 = 9.9,
         /// Internal resistance.
@@ -21,16 +21,16 @@ parameters! {
         /// Charge when full.
         #[parameter(CAPACITY, "A h", 0.001..=1000.0)]
         pub capacity_a_h: f64 = 1.5,
-        /// Share of the capacity that is left at the start.
+        /// Charge at the start, as a share of the capacity.
         #[parameter(CHARGE, "1", 0.0..=1.0)]
         pub initial_charge: f64 = 1.0,
-        /// Mechanical power of the rotors over electrical power: speed controller and motor together.
+        /// Mechanical power of the rotors over electrical power, for speed controller and motor together.
         #[parameter(EFFICIENCY, "1", 0.05..=1.0)]
         pub efficiency: f64 = 0.5,
         /// Power that avionics and payload draw.
         #[parameter(AVIONICS, "W", 0.0..=10_000.0)]
         pub avionics_w: f64 = 3.0,
-        /// What a lower voltage does.
+        /// Effect of a low voltage on the rotors.
         pub effect: Sag = Sag::Ceiling,
     }
     together(battery) {
@@ -38,36 +38,36 @@ parameters! {
     }
 }
 
-/// What a lower voltage does to the rotors, each in proportion to voltage over full voltage.
+/// Effect of a low voltage on the rotors, in proportion to voltage over full voltage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sag {
-    /// Lowers the largest speed: the speed controllers hold the commanded speed as long as they can.
+    /// Reduces the largest speed: speed controllers hold the commanded speed as long as they can.
     Ceiling,
-    /// Lowers every speed: the speed controllers apply a share of the voltage and do not know the speed.
+    /// Reduces every speed: speed controllers apply a share of the voltage, without feedback of the speed.
     Speed,
 }
 
 impl Battery {
-    /// Three lithium-polymer cells of 1.5 A h, enough for about a quarter of an hour of the paper's vehicle.
+    /// Three lithium-polymer cells of 1.5 A h, which carry the paper's vehicle for about a quarter of an hour.
     pub const THREE_CELLS: Self = Self::DEFAULT;
 }
 
-/// What a battery is doing.
+/// State of a battery.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Charge {
-    /// At the terminals, under load \[V\].
+    /// Voltage at the terminals, under load \[V\].
     pub voltage_v: f64,
-    /// \[A\]
+    /// Current \[A\].
     pub current_a: f64,
-    /// Share of the capacity that is left.
+    /// Remaining charge, as a share of the capacity.
     pub charge: f64,
 }
 
-/// A battery in use.
+/// A battery in simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct Discharge {
     battery: Battery,
-    /// Share of the capacity that one ampere draws in one step \[1/A\].
+    /// Share of the capacity drawn by one ampere in one step \[1/A\].
     per_ampere: f64,
     pub(crate) now: Charge,
 }
@@ -80,13 +80,13 @@ impl Discharge {
         discharge
     }
 
-    /// Voltage without load \[V\]. An empty battery has none: nothing flies on charge that is not there.
+    /// Returns the open-circuit voltage \[V\]; 0 for an empty battery, so that nothing flies on missing charge.
     fn open_circuit_v(&self) -> f64 {
         let Battery { full_v, empty_v, .. } = self.battery;
         if self.now.charge > 0.0 { empty_v + (full_v - empty_v) * self.now.charge } else { 0.0 }
     }
 
-    /// What the rotors' speeds are scaled by: voltage over full voltage.
+    /// Returns voltage over full voltage, which scales the rotors' speeds.
     #[inline]
     pub(crate) fn voltage_share(&self) -> f64 {
         self.now.voltage_v / self.battery.full_v
@@ -96,17 +96,17 @@ impl Discharge {
         self.battery.effect
     }
 
-    /// Supplies rotors that take `rotor_w` of mechanical power for one step.
+    /// Supplies rotors that draw `rotor_w` of mechanical power for one step.
     ///
-    /// Power P at the terminals takes the smaller current with (V_oc - R I) I = P. Beyond V_oc^2 / 4R there is none, and
-    /// the battery gives all that it can.
+    /// Power P at the terminals draws the smaller current with (V_oc - R I) I = P. Above V_oc^2 / 4R there is none, and
+    /// the battery gives its largest power.
     #[inline]
     pub(crate) fn supply(&mut self, rotor_w: f64) {
         let Battery { resistance_ohm: r, efficiency, avionics_w, .. } = self.battery;
         let power_w = rotor_w / efficiency + avionics_w;
         let v = self.open_circuit_v();
         let current_a = if v > 0.0 { 2.0 * power_w / (v + sqrt((v * v - 4.0 * r * power_w).max(0.0))) } else { 0.0 };
-        // At the limit the formula above overshoots; V_oc / 2R is what flows into a matched load.
+        // At the limit the formula above overshoots; V_oc / 2R is the current of a matched load.
         let current_a = if r > 0.0 { current_a.min(v / (2.0 * r)) } else { current_a };
         self.now.voltage_v = v - r * current_a;
         self.now.current_a = current_a;

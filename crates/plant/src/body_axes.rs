@@ -4,7 +4,7 @@
 
 use nalgebra::Vector3;
 
-/// The columns of `r_earth_body`. Written out, a rotation takes a third of the time of a general matrix product.
+/// The columns of `r_earth_body`. Written out, since a general matrix product takes three times as long.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BodyAxes {
     pub(crate) forward: Vector3<f64>,
@@ -13,19 +13,19 @@ pub(crate) struct BodyAxes {
 }
 
 impl BodyAxes {
-    /// Earth coordinates of a vector in body coordinates.
+    /// Converts a vector from body to earth coordinates.
     #[inline]
     pub(crate) fn to_earth(self, v: &Vector3<f64>) -> Vector3<f64> {
         self.forward * v.x + self.left * v.y + self.up * v.z
     }
 
-    /// Body coordinates of a vector in earth coordinates.
+    /// Converts a vector from earth to body coordinates.
     #[inline]
     pub(crate) fn to_body(self, v: &Vector3<f64>) -> Vector3<f64> {
         Vector3::new(self.forward.dot(v), self.left.dot(v), self.up.dot(v))
     }
 
-    /// Height of a vector in body coordinates.
+    /// Returns the height of a vector in body coordinates.
     #[inline]
     pub(crate) fn height(&self, v: &Vector3<f64>) -> f64 {
         self.forward.z * v.x + self.left.z * v.y + self.up.z * v.z

@@ -1,4 +1,4 @@
-//! Ground to stand on, and to fall on.
+//! Contact with the ground.
 
 use crate::body_axes::BodyAxes;
 use afbc_types::{Declared, OutOfRange, Parameters, Range, parameters};
@@ -6,21 +6,22 @@ use libm::sqrt;
 use nalgebra::Vector3;
 
 parameters! {
-    /// The ground, the plane z = 0, under four feet below the arms and under the four rotors, for landings upside down.
+    /// The ground, the plane z = 0, below four feet under the arms and the four rotors, which touch it upside down.
     ///
-    /// Each of these points is a spring and a damper that push and never pull, N = max(0, -k z - c dz/dt): the linear model
-    /// in D. W. Marhefka, D. E. Orin 1999, *A compliant contact model with nonlinear damping for simulation of robotic
-    /// systems*, IEEE Trans. SMC-A 29(6). Friction works against slip, viscous with the damper's c up to Coulomb's mu N,
-    /// which keeps the integration stable but lets a steady push creep: 10 mm/s under 0.3 N on the paper's vehicle.
+    /// Each of these points is a spring and a damper that push and never pull, N = max(0, -k z - c dz/dt): the linear
+    /// model in D. W. Marhefka, D. E. Orin 1999, *A compliant contact model with nonlinear damping for simulation of
+    /// robotic systems*, IEEE Trans. SMC-A 29(6). Friction opposes slip; it is viscous with the damper's c up to
+    /// Coulomb's mu N, which keeps the integration stable but lets a steady push creep: 10 mm/s under 0.3 N on the
+    /// paper's vehicle.
     ///
-    /// The smallest sink, and the largest damping, further depend on the vehicle and the step, so that the integration
-    /// stays stable ([`Contact::validate_for`]).
+    /// The smallest sink and the largest damping also depend on the vehicle and the step, so that the integration is
+    /// stable ([`Contact::validate_for`]).
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Contact {
-        /// How far the vehicle at rest sinks into its feet's springs; sets k.
+        /// Compression of the feet's springs by the vehicle at rest; determines k.
         #[parameter(SINK, "m", 1e-5..=0.5)]
         pub sink_m: f64 = 0.005,
-        /// Damping ratio of the vehicle bouncing on its feet; sets c. 1 does not bounce.
+        /// Damping ratio of the vehicle on its feet, where 1 does not bounce; determines c.
         #[parameter(DAMPING, "1", 0.05..=5.0)]
         pub damping_ratio: f64 = 0.7,
         /// mu: coefficient of friction.
@@ -38,8 +39,8 @@ parameters! {
     }
 }
 
-/// Largest (natural frequency times step)^2 of the stiffest motion, and largest damping rate times step. The Runge-Kutta
-/// method is stable to 8 and 2.78; the rest is for payloads dropped and inertia changed in flight.
+/// Largest (natural frequency times step)^2 of the stiffest motion, and largest damping rate times step. The
+/// Runge-Kutta method is stable to 8 and 2.78; the margin is for payloads released and inertia changed in flight.
 const STIFFNESS_PER_STEP_MAX: f64 = 0.5;
 const DAMPING_PER_STEP_MAX: f64 = 1.4;
 
@@ -47,13 +48,13 @@ impl Contact {
     /// A guess for the paper's vehicle.
     pub const PAPER: Self = Self::DEFAULT;
 
-    /// Checks every parameter, for this vehicle and step.
+    /// Checks every parameter for this vehicle and step.
     ///
     /// # Errors
-    /// The first one out of range, by name.
+    /// The first parameter out of range.
     pub fn validate_for(&self, vehicle: &Parameters<f64>, step_s: f64) -> Result<(), OutOfRange> {
         self.validate()?;
-        // How fast a unit of force moves its own point at worst, all four feet at the longest lever.
+        // Largest acceleration of a point per unit of force on it, with all four feet at the longest lever.
         let lever_m = self.ground(vehicle).reach_m;
         let compliance = 1.0 / vehicle.mass_kg + lever_m * lever_m / vehicle.inertia_kg_m2.min();
         let weight_n = vehicle.weight_n();
@@ -64,7 +65,7 @@ impl Contact {
         Range { max: DAMPING_PER_STEP_MAX / per_ratio, ..Self::DAMPING.range }.check(self.damping_ratio)
     }
 
-    /// The ground as this vehicle meets it.
+    /// Returns the ground as seen by this vehicle.
     pub(crate) fn ground(&self, vehicle: &Parameters<f64>) -> Ground {
         let stiffness_n_m = vehicle.weight_n() / (4.0 * self.sink_m);
         let (feet, arm) = (self.foot_radius_m, vehicle.arm_m);
@@ -83,19 +84,19 @@ impl Contact {
     }
 }
 
-/// Near is what a fall of this time, longer than any step, may reach \[s\].
+/// Time in which a falling vehicle may reach the ground for it to count as near, longer than any step \[s\].
 const NEAR_S: f64 = 0.04;
-/// And no less than this \[m\].
+/// Smallest distance that counts as near \[m\].
 const NEAR_M: f64 = 0.02;
 
-/// The ground under one vehicle.
+/// The ground below one vehicle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ground {
     /// k and c of each point.
     stiffness_n_m: f64,
     damping_n_s_m: f64,
     friction: f64,
-    /// Distance of the farthest point from the centre of mass: higher up, nothing touches.
+    /// Distance of the farthest point from the centre of mass; higher up, nothing touches the ground.
     reach_m: f64,
     /// Feet and rotors, body frame \[m\].
     points: [[Vector3<f64>; 4]; 2],
@@ -113,8 +114,8 @@ impl Ground {
         self.points.iter().flatten().any(|point| height_m + axes.height(point) < 0.0)
     }
 
-    /// Force, earth frame \[N\], and moment, body frame \[N m\], on a vehicle at `height_m` that moves.
-    // Apart: it is needed near the ground only.
+    /// Returns force, earth frame \[N\], and moment, body frame \[N m\], on a moving vehicle at `height_m`.
+    // Not inlined, since it is needed near the ground only.
     #[inline(never)]
     pub(crate) fn wrench(
         &self,
@@ -135,11 +136,11 @@ impl Ground {
         (force, moment)
     }
 
-    /// Force on one point that is `depth_m` below the ground, earth frame \[N\].
+    /// Returns the force on one point `depth_m` below the ground, earth frame \[N\].
     fn push(&self, depth_m: f64, velocity_m_s: &Vector3<f64>) -> Vector3<f64> {
         let normal_n = (self.stiffness_n_m * depth_m - self.damping_n_s_m * velocity_m_s.z).max(0.0);
         let slip_m_s = sqrt(velocity_m_s.x * velocity_m_s.x + velocity_m_s.y * velocity_m_s.y);
-        // The larger divisor of the two: viscous up to the limit, never a division by zero.
+        // The larger divisor of the two: viscous up to the limit, without a division by zero.
         let drag = self.damping_n_s_m * self.friction * normal_n
             / (self.damping_n_s_m * slip_m_s).max(self.friction * normal_n).max(f64::MIN_POSITIVE);
         Vector3::new(-drag * velocity_m_s.x, -drag * velocity_m_s.y, normal_n)

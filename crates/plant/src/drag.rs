@@ -1,39 +1,39 @@
-//! What the air does to a vehicle that moves through it: the paper's A_i = 1/2 rho C_i W^2 made concrete.
+//! Aerodynamic drag: a concrete form of the paper's A_i = 1/2 rho C_i W^2.
 
 use afbc_types::{Declared, OutOfRange, Parameters, Range, parameters};
 use libm::sqrt;
 use nalgebra::{Vector3, Vector4};
 
 parameters! {
-    /// Drag of blades and body by the airspeed W = velocity - wind, in body axes.
+    /// Drag of blades and body due to the airspeed W = velocity - wind, in body axes.
     ///
-    /// * **Blades**: rotor i is held back in its plane by k omega_i (W + Omega x r_i), with k = `blade_n_s2_m`, its own
-    ///   speed omega_i and the airspeed of its own hub at r_i, where that force acts: k sum(omega_i) W and, as the hubs
-    ///   circle the centre of mass, damping of yaw at 4 k omega l^2/Iz; rotors of unequal speed in wind give a yaw moment.
-    ///   Linear, and at hovering speeds the larger part. P. Martin, E. Salaun 2010, *The true role of accelerometer
-    ///   feedback in quadrotor control*, ICRA; M. Faessler, A. Franchi, D. Scaramuzza 2018, *Differential flatness of
-    ///   quadrotor dynamics subject to rotor drag*, RA-L 3(2), whose mass-normalised 0.2 to 0.6 1/s is this factor times the
-    ///   sum of the rotor speeds over the mass.
-    /// * **Body**: -1/2 rho C_i S_i |W| W_i along each body axis, which is the paper's A_i where the air flows along that
-    ///   axis. How the body turns does not matter to it.
+    /// * **Blades**: the blades of rotor i give a force -k omega_i (W + Omega x r_i) in the rotor plane, with k =
+    ///   `blade_n_s2_m`, that rotor's speed omega_i and the airspeed of its hub at r_i, where the force acts. The sum
+    ///   is -k sum(omega_i) W; since the hubs move around the centre of mass, yaw is damped with the rate 4 k omega
+    ///   l^2/Iz, and rotors of unequal speed in wind give a yaw moment. Linear, and the larger part at hover speeds. P.
+    ///   Martin, E. Salaun 2010, *The true role of accelerometer feedback in quadrotor control*, ICRA; M. Faessler, A.
+    ///   Franchi, D. Scaramuzza 2018, *Differential flatness of quadrotor dynamics subject to rotor drag*, RA-L 3(2),
+    ///   whose mass-normalised 0.2 to 0.6 1/s are this factor times the sum of the rotor speeds over the mass.
+    /// * **Body**: -1/2 rho C_i S_i |W| W_i along each body axis, which is the paper's A_i for flow along that axis.
+    ///   The body's rotation has no effect.
     ///
-    /// Wind acts through drag alone. The largest blade factor and area further depend on the vehicle and the step, so that
-    /// the integration stays stable up to [`AIRSPEED_M_S`] ([`Drag::validate_for`]).
+    /// Wind acts through drag only. The largest blade factor and area also depend on the vehicle and the step, so that
+    /// the integration is stable up to [`AIRSPEED_M_S`] ([`Drag::validate_for`]).
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Drag {
         /// rho: density of the air.
         #[parameter(DENSITY, "kg/m3", 0.0..=5.0)]
         pub air_density_kg_m3: f64 = 1.225,
-        /// Force of one rotor's blades per rotor speed and airspeed.
+        /// k: blade force of one rotor per rotor speed and in-plane airspeed.
         #[parameter(BLADE, "N s2/m", 0.0..=1.0)]
         pub blade_n_s2_m: f64 = 2.4e-4,
-        /// Rotor plane above the centre of mass, where the blades' force acts.
+        /// Height of the rotor plane above the centre of mass, where the blade forces act.
         #[parameter(ROT_HEIGHT, "m", -1.0..=1.0)]
         pub rotor_height_m: f64 = 0.02,
         /// C_i S_i: drag area along each body axis.
         #[parameter(AREA, "m2", 0.0..=100.0)]
         pub area_m2: Vector3<f64> = Vector3::new(0.01, 0.01, 0.02),
-        /// Where the body's force acts, from the centre of mass, body frame.
+        /// Point where the body's drag acts, from the centre of mass, body frame.
         #[parameter(CENTRE, "m", -1.0..=1.0)]
         pub centre_m: Vector3<f64> = Vector3::new(0.0, 0.0, 0.01),
     }
@@ -42,20 +42,21 @@ parameters! {
 /// Airspeed up to which drag is integrated stably \[m/s\].
 pub const AIRSPEED_M_S: f64 = 100.0;
 
-/// Largest product of a drag's rate and the step; the Runge-Kutta method is stable to 2.78.
+/// Largest product of a drag rate and the step; the Runge-Kutta method is stable to 2.78.
 const RATE_PER_STEP_MAX: f64 = 0.5;
 
 impl Drag {
     /// A guess for the paper's vehicle: blades at 0.4 1/s in hover, a body of about 0.1 m by 0.1 m.
     pub const PAPER: Self = Self::DEFAULT;
 
-    /// Checks every parameter, for a vehicle whose rotors turn at most at `max_rad_s` and this step.
+    /// Checks every parameter for a vehicle with rotor speeds up to `max_rad_s`, and this step.
     ///
     /// # Errors
-    /// The first one out of range, by name.
+    /// The first parameter out of range.
     pub fn validate_for(&self, vehicle: &Parameters<f64>, max_rad_s: f64, step_s: f64) -> Result<(), OutOfRange> {
         self.validate()?;
-        // What a force in the rotor plane does to the velocity of its hub, at most: it pushes, tilts and turns the vehicle.
+        // Largest rate at which a force in the rotor plane changes the velocity of its hub: it pushes, tilts and turns
+        // the vehicle.
         let Parameters { mass_kg, arm_m, inertia_kg_m2: i, .. } = vehicle;
         let (height_m, rate_max) = (self.rotor_height_m, RATE_PER_STEP_MAX / step_s);
         let hub_per_kg = 1.0 / mass_kg + height_m * height_m / i.x.min(i.y) + arm_m * arm_m / i.z;
@@ -64,7 +65,7 @@ impl Drag {
         Range { max: rate_max * mass_kg / per_area, ..Self::AREA.range }.check(self.area_m2.max())
     }
 
-    /// Drag over one step of a vehicle with arms of `arm_m`, its rotors turning at `speeds_rad_s`.
+    /// Returns the drag over one step of a vehicle with arms of `arm_m` and rotors at `speeds_rad_s`.
     #[inline]
     pub(crate) fn held(&self, speeds_rad_s: &Vector4<f64>, arm_m: f64) -> HeldDrag {
         let [w1, w2, w3, w4] = (*speeds_rad_s).into();
@@ -83,8 +84,8 @@ impl Drag {
     }
 }
 
-/// Drag with the rotor speeds held, to be asked for any motion. The blades' forces are summed over the rotors beforehand,
-/// which leaves the sums of k omega_i (1, x_i, y_i, x_i^2 + y_i^2).
+/// Drag at constant rotor speeds, as a function of the motion. The sums over the rotors of k omega_i (1, x_i, y_i,
+/// x_i^2 + y_i^2) are computed in advance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HeldDrag {
     /// Sum of k omega_i \[N s/m\].
@@ -102,11 +103,12 @@ pub(crate) struct HeldDrag {
 }
 
 impl HeldDrag {
-    /// Force \[N\] and moment \[N m\] at airspeed `w` \[m/s\] of the centre of mass and `rates` \[rad/s\], in body axes.
+    /// Returns force \[N\] and moment \[N m\] in body axes at airspeed `w` \[m/s\] of the centre of mass and `rates`
+    /// \[rad/s\].
     #[inline]
     pub(crate) fn wrench(&self, w: &Vector3<f64>, rates: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         let h = self.rotor_height_m;
-        // W + Omega x r in the middle of the rotors; from there, hub i moves on by r (-y_i, x_i).
+        // W + Omega x r in the middle of the rotor plane; hub i moves by r (-y_i, x_i) relative to it.
         let (x, y, r) = (w.x + rates.y * h, w.y - rates.x * h, rates.z);
         let blade = Vector3::new(
             self.lever_y_n_s * r - self.blade_n_s_m * x,

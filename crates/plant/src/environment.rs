@@ -1,78 +1,79 @@
-//! What acts on the vehicle from outside, and how its parameters change, in time.
+//! External disturbances, and changes of the vehicle's parameters over time.
 
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, Range};
 use alloc::vec::Vec;
 use nalgebra::Vector3;
 
-/// How a gust's size is to be read. Either way it is part of the paper's A_F = -\[A_x, A_y, A_z\] and
-/// A_T = -\[A_phi, A_theta, A_psi\]: a positive gust decelerates the positive direction.
+/// Meaning of a gust's size. In both cases it is part of the paper's A_F = -\[A_x, A_y, A_z\] and A_T = -\[A_phi,
+/// A_theta, A_psi\]: a positive gust pushes in the negative direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GustKind {
     /// The paper's A_i: m/s2 in the earth frame for x, y, z; rad/s2 in the body frame for roll, pitch, yaw.
     Acceleration,
-    /// A physical force \[N\] in the earth frame, or moment \[N m\] in the body frame, divided by the true mass or inertia.
+    /// A physical force \[N\] in the earth frame, or moment \[N m\] in the body frame, divided by the true mass or
+    /// inertia.
     Force,
 }
 
 /// A constant push on one axis from `start_s` to `end_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gust {
-    /// Which of A_phi, A_theta, A_psi, A_z, A_x, A_y.
+    /// One of A_phi, A_theta, A_psi, A_z, A_x, A_y.
     pub axis: Axis,
-    /// How to read `size`.
+    /// Meaning of `size`.
     pub kind: GustKind,
-    /// m/s2, rad/s2, N or N m.
+    /// Size in m/s2, rad/s2, N or N m.
     pub size: f64,
     /// Onset \[s\].
     pub start_s: f64,
-    /// End \[s\]; infinite for a push that stays.
+    /// End \[s\]; infinite for a gust that persists.
     pub end_s: f64,
 }
 
 /// A physical parameter that may change in flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// m
+    /// m: mass.
     Mass,
     /// Ix, Iy and Iz together.
     Inertia,
-    /// b
+    /// b: thrust factor.
     ThrustFactor,
-    /// d
+    /// d: drag factor.
     DragFactor,
 }
 
 /// Multiplies one parameter by `factor` from `start_s` to `end_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterChange {
-    /// Which parameter.
+    /// The parameter.
     pub quantity: Quantity,
-    /// 1 changes nothing.
+    /// Factor; 1 changes nothing.
     pub factor: f64,
     /// Start \[s\].
     pub start_s: f64,
-    /// End \[s\]; infinite for a change that stays.
+    /// End \[s\]; infinite for a permanent change.
     pub end_s: f64,
 }
 
-/// A point mass carried from `start_s` to `end_s` on the body's z axis, so that thrust still passes through the common
-/// centre of mass. It is taken up and let go at the vehicle's velocity; position and velocity are those of the common
+/// A point mass carried from `start_s` to `end_s` on the body's z axis, so that thrust still acts through the common
+/// centre of mass. It is taken up and released at the vehicle's velocity. Position and velocity are those of the common
 /// centre of mass, and do not jump.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Payload {
-    /// \[kg\]
+    /// Mass \[kg\].
     pub mass_kg: f64,
-    /// Below the centre of mass of vehicle and payloads listed before; negative for above \[m\].
+    /// Distance below the centre of mass of the vehicle and the payloads listed before; negative for above \[m\].
     pub below_m: f64,
     /// Start \[s\].
     pub start_s: f64,
-    /// End \[s\]; infinite for a payload that stays.
+    /// End \[s\]; infinite for a payload that is kept.
     pub end_s: f64,
 }
 
 /// Accepted range of a payload's mass \[kg\].
 pub const PAYLOAD_MASS: Range = Range::new("payload_mass_kg", 0.0, 500.0);
-/// Accepted range of a payload's place \[m\].
+/// Accepted range of a payload's distance below the centre of mass \[m\].
 pub const PAYLOAD_BELOW: Range = Range::new("below_m", -10.0, 10.0);
 
 impl Payload {
@@ -85,7 +86,7 @@ impl Payload {
     }
 }
 
-/// The vehicle's true parameters and everything that changes or pushes it.
+/// The vehicle's true parameters with their changes, gusts and payloads.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
     nominal: Parameters<f64>,
@@ -99,14 +100,14 @@ pub const GUST_SIZE: Range = Range::new("gust", -1e4, 1e4);
 /// Accepted start of a gust or a change \[s\].
 pub const START: Range = Range::new("start_s", 0.0, 1e6);
 
-/// Slack in the comparison of times, far below any step \[s\]: onset and step count may round differently.
+/// Tolerance when comparing times, far below any step \[s\], since onset and step count may round differently.
 const TIME_SLACK_S: f64 = 1e-9;
 
 fn active(start_s: f64, end_s: f64, t: f64) -> bool {
     start_s <= t + TIME_SLACK_S && t + TIME_SLACK_S < end_s
 }
 
-/// What holds from one moment to the next change.
+/// Parameters and disturbances that are constant until the next change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Segment {
     pub(crate) parameters: Parameters<f64>,
@@ -114,12 +115,12 @@ pub(crate) struct Segment {
     pub(crate) a_force: Vector3<f64>,
     /// \[A_phi, A_theta, A_psi\], body frame \[rad/s2\].
     pub(crate) a_moment: Vector3<f64>,
-    /// When the next change is due \[s\].
+    /// Time of the next change \[s\].
     pub(crate) until_s: f64,
 }
 
 impl Environment {
-    /// Still air and parameters that stay.
+    /// Creates an environment with still air and constant parameters.
     ///
     /// # Errors
     /// The first parameter out of range.
@@ -127,11 +128,10 @@ impl Environment {
         Self::new(nominal, Vec::new(), Vec::new())
     }
 
-    /// An environment with gusts, which add up, and parameter changes, which multiply.
+    /// Creates an environment with gusts, which add up, and parameter changes, which multiply.
     ///
     /// # Errors
-    /// The first parameter out of range, as it stands or at any time under the changes, or the first gust out of
-    /// [`GUST_SIZE`] or [`START`].
+    /// The first parameter out of range, initially or at any time, or the first gust out of [`GUST_SIZE`] or [`START`].
     pub fn new(nominal: Parameters<f64>, changes: Vec<ParameterChange>, gusts: Vec<Gust>) -> Result<Self, OutOfRange> {
         let environment = Environment { nominal, changes, gusts, payloads: Vec::new() };
         nominal.validate()?;
@@ -143,10 +143,10 @@ impl Environment {
         Ok(environment)
     }
 
-    /// The same environment with payloads, which come after the parameter changes: a changed vehicle takes them up.
+    /// Adds payloads, which are applied after the parameter changes.
     ///
     /// # Errors
-    /// The first payload out of range, or parameter out of range at any time under them.
+    /// The first payload out of range, or the first parameter out of range at any time with them.
     pub fn with_payloads(self, payloads: Vec<Payload>) -> Result<Self, OutOfRange> {
         for payload in &payloads {
             PAYLOAD_MASS.check(payload.mass_kg)?;
@@ -163,27 +163,27 @@ impl Environment {
         changes.chain(payloads).try_for_each(|edge| self.segment(edge).parameters.validate())
     }
 
-    /// The true parameters before any change.
+    /// Returns the true parameters before any change.
     pub fn nominal(&self) -> &Parameters<f64> {
         &self.nominal
     }
 
-    /// Every gust.
+    /// Returns every gust.
     pub fn gusts(&self) -> &[Gust] {
         &self.gusts
     }
 
-    /// Every parameter change.
+    /// Returns every parameter change.
     pub fn changes(&self) -> &[ParameterChange] {
         &self.changes
     }
 
-    /// Every payload.
+    /// Returns every payload.
     pub fn payloads(&self) -> &[Payload] {
         &self.payloads
     }
 
-    /// What holds at time `t` \[s\], and until when.
+    /// Returns what holds at time `t` \[s\], and until when.
     pub(crate) fn segment(&self, t: f64) -> Segment {
         let mut parameters = self.nominal;
         for change in self.changes.iter().filter(|c| active(c.start_s, c.end_s, t)) {

@@ -1,13 +1,13 @@
-//! More thrust near the ground.
+//! Ground effect: additional thrust near the ground.
 
 use afbc_types::parameters;
 
 parameters! {
-    /// Thrust near the ground over thrust far from it, at the same rotor speed: 1 / (1 - (R/4z)^2).
+    /// Thrust near the ground over thrust far from it at the same rotor speed: 1 / (1 - (R/4z)^2).
     ///
-    /// I. C. Cheeseman, W. E. Bennett 1955, *The effect of the ground on a helicopter rotor in forward flight*, ARC R&M 3021,
-    /// in hover: one rotor of radius R at height z, its source and its image. It holds from z = R/2 up; below, the ratio
-    /// stays at its value there, 4/3. The level rotor plane stands for all rotors, and drag moments are left alone.
+    /// I. C. Cheeseman, W. E. Bennett 1955, *The effect of the ground on a helicopter rotor in forward flight*, ARC R&M
+    /// 3021, in hover: one rotor of radius R at height z, its source and its image. Valid from z = R/2 up; below, the
+    /// ratio stays at its value there, 4/3. The level rotor plane represents all rotors; drag moments are not changed.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct GroundEffect {
         /// R: radius of a rotor.
@@ -23,7 +23,7 @@ impl GroundEffect {
     /// A guess for the paper's vehicle: propellers of 10 inches.
     pub const PAPER: Self = Self::DEFAULT;
 
-    /// The ratio for a vehicle whose centre of mass is at `height_m`.
+    /// Returns the ratio for a vehicle whose centre of mass is at `height_m`.
     #[inline]
     pub fn thrust_ratio(&self, height_m: f64) -> f64 {
         let z = (height_m + self.rotor_height_m).max(0.5 * self.rotor_radius_m);

@@ -2,7 +2,7 @@
 
 use nalgebra::SVector;
 
-/// One step of the classical fourth-order Runge-Kutta method for an autonomous dx/dt = f(x).
+/// Integrates an autonomous dx/dt = f(x) by one step of the classical fourth-order Runge-Kutta method.
 #[inline]
 pub fn rk4<const N: usize>(
     f: impl Fn(&SVector<f64, N>) -> SVector<f64, N>,

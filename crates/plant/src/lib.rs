@@ -1,15 +1,15 @@
-//! The vehicle's physics, in `f64`. Knows no controller: rotor speeds go in, motion comes out.
+//! Physics of the vehicle, in `f64`, without any controller: rotor speeds in, motion out.
 //!
-//! Two models of one vehicle: [`simplified`], the paper's (6), and [`rigid_body`], its (1)-(5) as corrected. Both take
-//! gusts and parameters that change in time from an [`Environment`], and both are integrated by the classical
-//! fourth-order Runge-Kutta method with the rotor speeds held over the step.
+//! There are two models of the vehicle: [`simplified`], the paper's (6), and [`rigid_body`], its (1)-(5) as corrected.
+//! Both take gusts and changing parameters from an [`Environment`], and both are integrated by the classical
+//! fourth-order Runge-Kutta method with constant rotor speeds during a step.
 //!
-//! That is the paper's plant. [`Realism`] adds what it leaves out, part by part: rotors with lag, limits, delay, faults and
-//! a battery, drag, wind with gusts and turbulence, ground. [`Sensors`] stand between a plant and its controller. All of
-//! it is reproducible from a seed.
+//! This is the paper's plant. [`Realism`] adds what it lacks, each part optional: rotors with lag, limits, delay,
+//! faults and a battery, drag, wind with gusts and turbulence, ground. [`Sensors`] measure the motion for a controller.
+//! Everything is reproducible from a seed.
 //!
-//! Frames, units and the meaning of "(n)" are stated in [`afbc_types`]. Trigonometry comes from the `libm` crate, so a
-//! flight gives the same bits on every host.
+//! [`afbc_types`] defines frames, units and the meaning of "(n)". Trigonometry comes from the `libm` crate, so a flight
+//! gives the same bits on every host.
 //!
 //! ```
 //! use afbc_types::{Parameters, RotorSpeeds};

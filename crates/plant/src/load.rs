@@ -1,9 +1,9 @@
-//! What acts on a vehicle over one step.
+//! Forces and moments over one step.
 
 use afbc_types::Parameters;
 use nalgebra::Vector3;
 
-/// Forces and moments held over one step.
+/// Forces and moments that are constant during one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
     /// Thrust of all rotors over mass, along body z \[m/s2\].
@@ -22,7 +22,7 @@ pub struct Load {
 }
 
 impl Load {
-    /// The load of rotors at `speeds_rad_s` on a vehicle with these parameters, with the paper's disturbances
+    /// Computes the load of rotors at `speeds_rad_s` on a vehicle with these parameters, with the paper's disturbances
     /// `a_force` = \[A_x, A_y, A_z\] (earth) and `a_moment` = \[A_phi, A_theta, A_psi\] (body).
     #[inline]
     pub fn new(
@@ -35,8 +35,8 @@ impl Load {
         Self::of_rotors(parameters, speeds_rad_s, squares, 1.0, a_force, a_moment)
     }
 
-    /// The same for rotors whose drag moments are those of the `squares` of their speeds \[rad2/s2\], as far as they are
-    /// whole, and whose thrusts are those times `thrust_ratio`.
+    /// Computes the load of rotors whose drag moments follow from the `squares` of their speeds \[rad2/s2\], already
+    /// multiplied by their efficiency, and whose thrusts are also multiplied by `thrust_ratio`.
     #[inline]
     pub(crate) fn of_rotors(
         parameters: &Parameters<f64>,
@@ -66,13 +66,13 @@ impl Load {
         }
     }
 
-    /// d^2 xi/dt^2 in the earth frame, for the direction of body z in the earth frame \[m/s2\].
+    /// Returns d^2 xi/dt^2 in the earth frame, given the direction of body z in the earth frame \[m/s2\].
     #[inline]
     pub(crate) fn acceleration(&self, body_z: &Vector3<f64>) -> Vector3<f64> {
         body_z * self.thrust_m_s2 - Vector3::new(0.0, 0.0, self.gravity_m_s2) - self.a_force
     }
 
-    /// d Omega/dt in the body frame \[rad/s2\]: rotors, Omega x I Omega, rotor gyroscopics, disturbance.
+    /// Returns d Omega/dt in the body frame \[rad/s2\]: rotors, Omega x I Omega, rotor gyroscopics, disturbance.
     #[inline]
     pub(crate) fn angular_acceleration(&self, rates: &Vector3<f64>) -> Vector3<f64> {
         let (p, q, r) = (rates.x, rates.y, rates.z);

@@ -3,7 +3,7 @@
 use afbc_types::State;
 use nalgebra::Vector3;
 
-/// True motion, in `f64`; the same quantities and frames as [`afbc_types::State`].
+/// True motion in `f64`, with the quantities and frames of [`afbc_types::State`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion {
     /// xi, earth frame \[m\].
@@ -17,7 +17,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// What a perfect sensor measures.
+    /// Returns the measurement of a perfect sensor.
     pub fn measure(&self) -> State {
         State {
             position_m: self.position_m.cast(),

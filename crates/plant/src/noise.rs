@@ -1,25 +1,26 @@
-//! Seeded random numbers: the same seed gives the same bits on every machine.
+//! Seeded random numbers, with the same bits on every machine.
 //!
-//! Bits come from xoshiro256++ (Blackman, Vigna 2021, *Scrambled linear pseudorandom number generators*), normal numbers
-//! from the ziggurat (Marsaglia, Tsang 2000, *The ziggurat method for generating random variables*, J. Stat. Softw. 5(8))
-//! with 256 layers. The ziggurat is written out here because a library's takes its logarithm from whatever mathematics
-//! another crate of the build has switched on; this one always takes it from `libm`.
+//! Bits come from xoshiro256++ (Blackman, Vigna 2021, *Scrambled linear pseudorandom number generators*), normal
+//! numbers from the ziggurat (Marsaglia, Tsang 2000, *The ziggurat method for generating random variables*, J. Stat.
+//! Softw. 5(8)) with 256 layers. The ziggurat is implemented here because a library's logarithm depends on the features
+//! that other crates of the build enable; this one always uses `libm`.
 
 use core::fmt;
 use libm::{exp, log};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// Who draws. Streams of one seed never meet: each begins 2^128 draws after the one before it.
+/// User of a stream of random numbers. Streams of one seed do not overlap: each begins 2^128 draws after the previous
+/// one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stream {
     /// Turbulence.
     Wind,
     /// Measurement noise and bias.
     Sensors,
-    /// When measurements stay away.
+    /// Dropouts of measurements.
     Dropouts,
-    /// What a campaign spreads: parameters, winds, faults.
+    /// Quantities drawn by a campaign: parameters, winds, faults.
     Scenario,
 }
 
@@ -29,7 +30,7 @@ pub struct Noise {
     bits: Xoshiro256PlusPlus,
 }
 
-// The generator's words say nothing to a reader.
+// The generator's internal state is not informative.
 impl fmt::Debug for Noise {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("Noise")
@@ -37,7 +38,7 @@ impl fmt::Debug for Noise {
 }
 
 impl Noise {
-    /// The numbers of `stream` under `seed`.
+    /// Creates the numbers of `stream` with `seed`.
     pub fn new(seed: u64, stream: Stream) -> Self {
         let mut bits = Xoshiro256PlusPlus::seed_from_u64(seed);
         for _ in 0..stream as usize {
@@ -46,20 +47,20 @@ impl Noise {
         Noise { bits }
     }
 
-    /// Uniform in \[0, 1), a multiple of 2^-53.
+    /// Draws a uniform number in \[0, 1), a multiple of 2^-53.
     #[inline]
     pub fn uniform(&mut self) -> f64 {
         const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
         (self.bits.next_u64() >> 11) as f64 * STEP
     }
 
-    /// Normal with mean 0 and variance 1.
+    /// Draws a normal number with mean 0 and variance 1.
     #[inline]
     pub fn normal(&mut self) -> f64 {
         const STEP: f64 = 1.0 / (1_u64 << 52) as f64;
         loop {
             let bits = self.bits.next_u64();
-            // The lowest eight bits choose the layer, the highest 53 the place within it: no bit serves both.
+            // The lowest eight bits select the layer, the highest 53 the position in it, so no bit is used twice.
             let Some(layer) = LAYERS.get((bits & 0xff) as usize) else { continue };
             let x = (bits.cast_signed() >> 11) as f64 * STEP * layer.width;
             if x.abs() < layer.width_above {
@@ -71,7 +72,7 @@ impl Noise {
         }
     }
 
-    /// The 1.2 % outside every layer's core: the tail below the lowest layer, or under the curve within the others.
+    /// Handles the 1.2 % outside of every layer's core: the tail, or the part near the curve.
     #[cold]
     fn beyond(&mut self, layer: &Layer, x: f64) -> Option<f64> {
         if layer.height == LAYERS_BASE_HEIGHT {
@@ -81,10 +82,10 @@ impl Noise {
         (y < exp(-0.5 * x * x)).then_some(x)
     }
 
-    /// A normal number beyond R (Marsaglia 1964).
+    /// Draws a normal number beyond R (Marsaglia 1964).
     fn tail(&mut self) -> f64 {
         loop {
-            // In (0, 1]: both logarithms are finite.
+            // In (0, 1], so both logarithms are finite.
             let (x, y) = (-log(1.0 - self.uniform()) / R, -log(1.0 - self.uniform()));
             if 2.0 * y > x * x {
                 return R + x;
@@ -93,17 +94,17 @@ impl Noise {
     }
 }
 
-/// Where the tail begins.
+/// Abscissa at which the tail begins.
 const R: f64 = 3.654_152_885_361_009;
-/// Area of each layer under exp(-x^2/2), the lowest with the tail.
+/// Area of each layer under exp(-x^2/2), the lowest including the tail.
 const AREA: f64 = 4.928_673_233_974_655e-3;
 
-/// One horizontal slice under exp(-x^2/2).
+/// One horizontal layer under exp(-x^2/2).
 #[derive(Clone, Copy)]
 struct Layer {
-    /// Its half width: the curve's abscissa at its lower edge. The lowest layer's is widened to hold the tail's area.
+    /// Half width: the curve's abscissa at the lower edge. The lowest layer is widened to include the tail's area.
     width: f64,
-    /// The half width of the next layer up: within it, every height of this layer is under the curve.
+    /// Half width of the next layer up; within it, every height of this layer is under the curve.
     width_above: f64,
     /// The curve's height at `width`.
     height: f64,
@@ -111,7 +112,7 @@ struct Layer {
     height_above: f64,
 }
 
-/// Marks the lowest layer, which has no lower edge on the curve.
+/// Height of the lowest layer, whose lower edge is not on the curve.
 const LAYERS_BASE_HEIGHT: f64 = 0.0;
 
 static LAYERS: [Layer; 256] = layers();
@@ -123,7 +124,7 @@ const fn layers() -> [Layer; 256] {
     let mut layers = [base; 256];
     let mut i = 1;
     while i < 256 {
-        // Each layer has the same area: x (y_above - y). The topmost ends at the peak.
+        // Each layer has the same area, x (y_above - y). The topmost ends at the peak.
         let (x_above, y_above) = if i == 255 { (0.0, 1.0) } else { (gauss_inverse(y + AREA / x, x), y + AREA / x) };
         layers[i] = Layer { width: x, width_above: x_above, height: y, height_above: y_above };
         (x, y) = (x_above, y_above);
@@ -132,7 +133,7 @@ const fn layers() -> [Layer; 256] {
     layers
 }
 
-/// exp(-x^2/2) by its series at a 64th of the exponent, squared six times.
+/// Returns exp(-x^2/2) from its series at a 64th of the exponent, squared six times.
 const fn gauss(x: f64) -> f64 {
     let small = -0.5 * x * x / 64.0;
     let (mut sum, mut term, mut n) = (1.0, 1.0, 1.0);
@@ -149,7 +150,7 @@ const fn gauss(x: f64) -> f64 {
     sum
 }
 
-/// x > 0 with exp(-x^2/2) = y by Newton's method from `x`, somewhat above it.
+/// Returns x > 0 with exp(-x^2/2) = y by Newton's method, starting at `x`, which is somewhat above it.
 const fn gauss_inverse(y: f64, mut x: f64) -> f64 {
     let mut round = 0;
     while round < 20 {

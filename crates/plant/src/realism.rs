@@ -1,4 +1,4 @@
-//! Everything that a real flight adds to the paper's vehicle, each part optional.
+//! Realistic effects that the paper's vehicle lacks, each optional.
 
 use crate::battery::Charge;
 use crate::body_axes::BodyAxes;
@@ -16,14 +16,14 @@ use nalgebra::{Vector3, Vector4};
 /// Accepted range of a step \[s\].
 pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
 
-/// What [`Plant::with_realism`](crate::Plant::with_realism) adds to a vehicle. The default adds nothing: the paper's
-/// plant to the bit, as long as no rotor is commanded beyond 10,000 rad/s.
+/// Effects added by [`Plant::with_realism`](crate::Plant::with_realism). The default adds nothing: the paper's plant,
+/// bit for bit, as long as no rotor is commanded beyond 10,000 rad/s.
 ///
-/// Measurement is apart, in [`Sensors`](crate::Sensors): it comes between this plant and its controller.
+/// Measurement is separate, in [`Sensors`](crate::Sensors), between the plant and its controller.
 ///
-/// Over a step, the commanded speeds, wind, ground effect and battery voltage are held at what they are when it begins,
-/// rotor speeds at what they are in its middle. Drag and ground contact are evaluated at every stage of the Runge-Kutta
-/// method. All of it acts on either model; in the simplified one, d eta/dt stands for Omega here as well.
+/// During a step, commanded speeds, wind, ground effect and battery voltage are constant at their values at its start,
+/// rotor speeds at those in its middle. Drag and ground contact are evaluated at every stage of the Runge-Kutta method.
+/// All effects apply to both models; the simplified one uses d eta/dt as Omega here as well.
 ///
 /// ```
 /// use afbc_types::{Parameters, RotorSpeeds};
@@ -51,36 +51,36 @@ pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Realism {
-    /// Lag, limits, delay, faults, battery.
+    /// Rotor lag, limits, delay, faults and battery.
     pub rotors: Rotors,
-    /// Blade and body drag. Without it, the air does nothing.
+    /// Blade and body drag. Without it, air has no effect.
     pub drag: Option<Drag>,
-    /// Steady wind, gusts, turbulence.
+    /// Steady wind, gusts and turbulence.
     pub wind: Wind,
-    /// Ground to stand on.
+    /// Contact with the ground.
     pub contact: Option<Contact>,
-    /// More thrust near the ground.
+    /// Additional thrust near the ground.
     pub ground_effect: Option<GroundEffect>,
-    /// Of everything random in the plant. The same seed gives the same flight.
+    /// Seed of all random effects in the plant. The same seed gives the same flight.
     pub seed: u64,
 }
 
-/// What rotors, air and ground did in one step.
+/// State of rotors, air, ground and battery after one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Telemetry {
-    /// At the step's end \[rad/s\].
+    /// Rotor speeds at the end of the step \[rad/s\].
     pub rotor_speeds_rad_s: Vector4<f64>,
     /// Velocity of the air, earth frame \[m/s\].
     pub wind_m_s: Vector3<f64>,
-    /// Thrust over what it is far from the ground.
+    /// Thrust over its value far from the ground.
     pub thrust_ratio: f64,
-    /// True if a foot or a rotor touched the ground when the step began.
+    /// True if a foot or a rotor touched the ground at the start of the step.
     pub on_ground: bool,
-    /// The battery, if there is one.
+    /// State of the battery, if there is one.
     pub battery: Option<Charge>,
 }
 
-/// [`Realism`] in use.
+/// [`Realism`] in simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct Effects {
     spin: Spin,
@@ -120,7 +120,7 @@ impl Effects {
         })
     }
 
-    /// What acts over the step that begins at `time_s` with the vehicle at this place and velocity.
+    /// Computes forces for the step that begins at `time_s` with the vehicle at this position and velocity.
     #[inline]
     pub(crate) fn begin_step(
         &mut self,
@@ -137,7 +137,7 @@ impl Effects {
         if let Some(effect) = &self.ground_effect {
             self.thrust_ratio = effect.thrust_ratio(position_m.z);
         }
-        // The ground is left out of a step that cannot reach it.
+        // The ground is left out if the step cannot reach it.
         let ground = self.ground.as_ref().filter(|ground| ground.is_near(position_m.z, velocity_m_s.z));
         self.on_ground = ground.is_some_and(|ground| ground.touches(position_m.z, &axes()));
         let load = Load::of_rotors(

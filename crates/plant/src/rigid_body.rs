@@ -1,4 +1,4 @@
-//! The full rigid body, (1)-(5) as corrected, its attitude a unit quaternion: no singularity.
+//! The full rigid body, (1)-(5) as corrected, with a unit quaternion as attitude, free of singularities.
 
 use crate::body_axes::BodyAxes;
 use crate::load::Load;
@@ -7,10 +7,10 @@ use crate::surroundings::Surroundings;
 use libm::{asin, atan2, cos, sin, sqrt};
 use nalgebra::{SVector, Vector3};
 
-/// \[x, y, z, their rates, quaternion w x y z (body to earth), p, q, r\]
+/// State vector: \[x, y, z, their rates, quaternion w x y z (body to earth), p, q, r\].
 pub type Vector = SVector<f64, 13>;
 
-/// The model's state vector for `motion`.
+/// Converts `motion` to the state vector.
 pub fn vector(motion: &Motion) -> Vector {
     let half = motion.attitude_rad * 0.5;
     let (s_phi, c_phi) = (sin(half.x), cos(half.x));
@@ -29,7 +29,7 @@ pub fn vector(motion: &Motion) -> Vector {
     x
 }
 
-/// The motion that a state vector stands for; yaw and roll within -pi to pi, pitch within -pi/2 to pi/2.
+/// Converts a state vector to the motion; yaw and roll within -pi to pi, pitch within -pi/2 to pi/2.
 #[inline]
 pub fn motion(v: &Vector) -> Motion {
     let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
@@ -45,7 +45,7 @@ pub fn motion(v: &Vector) -> Motion {
     }
 }
 
-/// d eta/dt = N(eta)^-1 Omega (1), as corrected. Singular at a pitch of 90 degrees.
+/// Returns d eta/dt = N(eta)^-1 Omega (1), as corrected. Singular at a pitch of 90 degrees.
 pub fn euler_rates(attitude_rad: &Vector3<f64>, rates_rad_s: &Vector3<f64>) -> Vector3<f64> {
     let (phi, theta) = (attitude_rad.x, attitude_rad.y);
     let (p, q, r) = (rates_rad_s.x, rates_rad_s.y, rates_rad_s.z);
@@ -54,13 +54,13 @@ pub fn euler_rates(attitude_rad: &Vector3<f64>, rates_rad_s: &Vector3<f64>) -> V
     Vector3::new(p + psi_dot * sin(theta), cos(phi) * q - sin(phi) * r, psi_dot)
 }
 
-/// d/dt of the state vector, under a load that is held.
+/// Returns the derivative of the state vector under a constant load.
 #[inline]
 pub fn derivative(v: &Vector, load: &Load) -> Vector {
     pack(v, &load.acceleration(&body_axes(v).up), &load.angular_acceleration(&Vector3::new(v[10], v[11], v[12])))
 }
 
-/// d/dt of the state vector from its accelerations.
+/// Returns the derivative of the state vector from its accelerations.
 #[inline]
 fn pack(v: &Vector, acceleration: &Vector3<f64>, angular_acceleration: &Vector3<f64>) -> Vector {
     let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
@@ -72,7 +72,7 @@ fn pack(v: &Vector, acceleration: &Vector3<f64>, angular_acceleration: &Vector3<
         acceleration.x,
         acceleration.y,
         acceleration.z,
-        // Half the product of the quaternion with [0, Omega].
+        // Half of the quaternion's product with [0, Omega].
         0.5 * (-x * p - y * q - z * r),
         0.5 * (w * p + y * r - z * q),
         0.5 * (w * q - x * r + z * p),
@@ -83,7 +83,7 @@ fn pack(v: &Vector, acceleration: &Vector3<f64>, angular_acceleration: &Vector3<
     ])
 }
 
-/// The body's axes, of a unit quaternion.
+/// Returns the body's axes from the unit quaternion.
 #[inline]
 pub(crate) fn body_axes(v: &Vector) -> BodyAxes {
     let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
@@ -94,7 +94,7 @@ pub(crate) fn body_axes(v: &Vector) -> BodyAxes {
     }
 }
 
-/// [`derivative`] with what acts by position and velocity.
+/// Returns [`derivative`] with the forces that depend on position and velocity.
 #[inline]
 pub(crate) fn derivative_in(v: &Vector, load: &Load, surroundings: &Surroundings) -> Vector {
     let (velocity, rates) = (Vector3::new(v[3], v[4], v[5]), Vector3::new(v[10], v[11], v[12]));
@@ -103,7 +103,7 @@ pub(crate) fn derivative_in(v: &Vector, load: &Load, surroundings: &Surroundings
     pack(v, &(a + load.acceleration(&axes.up)), &(angular + load.angular_acceleration(&rates)))
 }
 
-/// Scales the quaternion back to unit length, which integration loses slowly.
+/// Normalises the quaternion, whose length drifts slowly in the integration.
 #[inline]
 pub(crate) fn normalise(v: &mut Vector) {
     let (w, x, y, z) = (v[6], v[7], v[8], v[9]);

@@ -1,4 +1,4 @@
-//! Rotors that take time, have limits, wear, and hang on a battery.
+//! Rotors with lag, delay, limits and faults, supplied by a battery.
 
 use crate::battery::{Battery, Charge, Discharge, Sag};
 use crate::delay::{DelayLine, whole_steps};
@@ -8,29 +8,29 @@ use libm::{exp, sqrt};
 use nalgebra::Vector4;
 
 parameters! {
-    /// Between the commanded rotor speeds and thrust. The default is ideal: speeds are what is commanded, at once.
+    /// Dynamics between commanded rotor speeds and thrust. The default is ideal: commanded speeds are reached at once.
     ///
-    /// The order is that of the hardware: a command is delayed, scaled by the battery's voltage, limited, followed with a
-    /// lag.
+    /// The order is that of the hardware: a command is delayed, scaled by the battery's voltage, limited, and followed
+    /// with a lag.
     #[derive(Clone, Debug, PartialEq)]
     pub struct Rotors {
-        /// Time constant of d omega/dt = (commanded - omega)/tau; 0 for none.
+        /// Time constant of d omega/dt = (commanded - omega)/tau; 0 for no lag.
         #[parameter(LAG, "s", 0.0..=1.0)]
         pub time_constant_s: f64 = 0.0,
-        /// Time from command to the speed controllers, rounded to whole steps.
+        /// Delay from command to the speed controllers, rounded to whole steps.
         #[parameter(DELAY, "s", 0.0..=0.5)]
         pub delay_s: f64 = 0.0,
-        /// Smallest speed, at which rotors idle, no more than the largest.
+        /// Smallest speed, at which rotors idle; at most the largest.
         #[parameter(MIN, "rad/s", 0.0..=10_000.0)]
         pub min_rad_s: f64 = 0.0,
         /// Largest speed.
         #[parameter(MAX, "rad/s", 1.0..=10_000.0)]
         pub max_rad_s: f64 = 10_000.0,
-        /// What turns before the first command arrives.
+        /// Speeds before the first command arrives.
         pub start: Start = Start::Hover,
-        /// Rotors that lose thrust.
+        /// Faults that reduce a rotor's thrust.
         pub faults: Vec<RotorFault> = Vec::new(),
-        /// What the rotors hang on; without one, the voltage is always full.
+        /// Battery that supplies the rotors; without one, the voltage is constant.
         pub battery: Option<Battery> = None,
     }
     together(rotors) {
@@ -40,27 +40,27 @@ parameters! {
     }
 }
 
-/// What the rotors do, and were commanded to do, before the first command arrives.
+/// Speeds of the rotors, actual and commanded, before the first command arrives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// They carry the vehicle's weight: a flight that begins in the air begins without a bump.
+    /// Hover speed, for a flight that begins in the air without a transient.
     Hover,
-    /// They idle at their smallest speed: a flight that begins on the ground.
+    /// Smallest speed, for a flight that begins on the ground.
     Idle,
 }
 
-/// A rotor whose thrust, and with it its drag moment, is `efficiency` times what its speed gives: a worn or broken blade.
+/// A worn or broken rotor, whose thrust and drag moment are multiplied by `efficiency`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotorFault {
-    /// Which one, 1 to 4, numbered as in [`afbc_types`].
+    /// Number of the rotor, 1 to 4, as in [`afbc_types`].
     pub rotor: u8,
-    /// 1 is whole, 0 is dead. Faults of one rotor multiply.
+    /// Remaining share of the thrust: 1 is intact, 0 is dead. Faults of one rotor multiply.
     pub efficiency: f64,
     /// Onset \[s\].
     pub start_s: f64,
 }
 
-/// Accepted range of what makes a fault.
+/// Accepted ranges of a fault.
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod limits {
     use afbc_types::Range;
@@ -80,7 +80,7 @@ impl RotorFault {
 }
 
 impl Rotors {
-    /// Share of its thrust that each rotor gives at time `t` \[s\], and when that next changes.
+    /// Returns each rotor's share of its thrust at time `t` \[s\], and when that next changes.
     fn efficiency(&self, t: f64) -> (Vector4<f64>, f64) {
         let (mut efficiency, mut until_s) = (Vector4::repeat(1.0), f64::INFINITY);
         for fault in &self.faults {
@@ -94,26 +94,26 @@ impl Rotors {
     }
 }
 
-/// Slack in the comparison of times, far below any step \[s\].
+/// Tolerance when comparing times, far below any step \[s\].
 const TIME_SLACK_S: f64 = 1e-9;
 
-/// What the rotors do over one step.
+/// Rotor speeds over one step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drive {
     /// Speeds in the middle of the step \[rad/s\].
     pub(crate) speeds_rad_s: Vector4<f64>,
-    /// Their squares times each rotor's efficiency \[rad2/s2\].
+    /// Squares of the speeds times each rotor's efficiency \[rad2/s2\].
     pub(crate) squares: Vector4<f64>,
 }
 
-/// Rotors in motion.
+/// Rotors in simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct Spin {
     rotors: Rotors,
     commands: DelayLine<Vector4<f32>>,
-    /// exp(-dt / 2 tau): the share of a speed's distance to its target that is left after half a step.
+    /// exp(-dt / 2 tau): remaining share of a speed's distance to its target after half a step.
     half_step: f64,
-    /// Speeds now \[rad/s\].
+    /// Present speeds \[rad/s\].
     pub(crate) speeds_rad_s: Vector4<f64>,
     efficiency: Vector4<f64>,
     efficiency_until_s: f64,
@@ -121,7 +121,7 @@ pub(crate) struct Spin {
 }
 
 impl Spin {
-    /// Rotors that do what [`Start`] says on a vehicle with these parameters.
+    /// Creates rotors that start as [`Start`] says on a vehicle with these parameters.
     ///
     /// # Errors
     /// The first parameter out of range.
@@ -146,10 +146,10 @@ impl Spin {
         })
     }
 
-    /// Turns the rotors for one step from `t` \[s\], their command held.
+    /// Advances the rotors by one step from `t` \[s\] with a constant command.
     ///
-    /// The lag is discretised exactly. The load over the step is that of the speeds in its middle, which is right to
-    /// second order in the step. A command that is not a number counts as the smallest speed.
+    /// The lag is discretised exactly. The load over the step is that of the speeds in its middle, which is accurate to
+    /// second order. A command that is not a number counts as the smallest speed.
     #[inline]
     pub(crate) fn advance(&mut self, command_rad_s: Vector4<f32>, t: f64, drag_factor_n_m_s2: f64) -> Drive {
         if t >= self.efficiency_until_s {
@@ -172,7 +172,7 @@ impl Spin {
 
         let squares = middle.component_mul(&middle).component_mul(&self.efficiency);
         if let Some(battery) = &mut self.battery {
-            // Drag moment times speed; what accelerates the rotors comes back when they slow down.
+            // Drag moment times speed; the energy that accelerates the rotors is returned when they slow down.
             battery.supply(drag_factor_n_m_s2 * squares.dot(&middle));
         }
         Drive { speeds_rad_s: middle, squares }

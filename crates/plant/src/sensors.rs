@@ -1,4 +1,4 @@
-//! What reaches the controller of the true motion.
+//! Measurement of the true motion for the controller.
 
 use crate::delay::{DelayLine, whole_steps};
 use crate::motion::Motion;
@@ -8,7 +8,7 @@ use libm::exp;
 use nalgebra::Vector3;
 
 parameters! {
-    /// One number for each group of the state, the same for its three coordinates.
+    /// One number for each group of the state's coordinates, the same for its three coordinates.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Deviations {
         /// Standard deviation of the position, per coordinate.
@@ -27,12 +27,12 @@ parameters! {
 }
 
 impl Deviations {
-    /// The same number for every group, each in its own unit.
+    /// Returns the same number for every group, each in its own unit.
     pub const fn all(size: f64) -> Self {
         Deviations { position_m: size, velocity_m_s: size, attitude_rad: size, rates_rad_s: size }
     }
 
-    /// Normal numbers of these standard deviations.
+    /// Draws normal numbers of these standard deviations.
     #[inline]
     fn draw(&self, noise: &mut Noise) -> Motion {
         let mut three = |size: f64| Vector3::new(noise.normal(), noise.normal(), noise.normal()) * size;
@@ -46,33 +46,33 @@ impl Deviations {
 }
 
 parameters! {
-    /// Intervals without a measurement, as a two-state Markov chain (E. N. Gilbert 1960, *Capacity of a burst-noise
+    /// Intervals without measurements, as a two-state Markov chain (E. N. Gilbert 1960, *Capacity of a burst-noise
     /// channel*).
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Dropouts {
-        /// How often one begins while there is none.
+        /// Rate at which dropouts begin while there is none.
         #[parameter(RATE, "Hz", 0.0..=1000.0)]
         pub rate_hz: f64 = 0.0,
-        /// Mean length.
+        /// Mean length of a dropout.
         #[parameter(MEAN, "s", 0.0..=60.0)]
         pub mean_s: f64 = 0.02,
     }
 }
 
 parameters! {
-    /// How the state is measured. The default is perfect.
+    /// Properties of the measurement. The default is perfect.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Sensing {
-        /// Standard deviation of what is new at every step: white noise.
+        /// Standard deviation of white noise, drawn in every step.
         #[group("noise")]
         pub noise: Deviations = Deviations::DEFAULT,
-        /// Standard deviation of what is drawn once and stays for the flight.
+        /// Standard deviation of a constant bias, drawn once per flight.
         #[group("bias")]
         pub bias: Deviations = Deviations::DEFAULT,
-        /// Time from motion to measurement, rounded to whole steps.
+        /// Delay from motion to measurement, rounded to whole steps.
         #[parameter(DELAY, "s", 0.0..=0.5)]
         pub delay_s: f64 = 0.0,
-        /// Measurements that stay away.
+        /// Dropouts of measurements.
         pub dropouts: Option<Dropouts> = None,
     }
     together(sensing) {
@@ -80,18 +80,18 @@ parameters! {
     }
 }
 
-/// What the controller has at one step.
+/// Measurement in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measurement {
     /// The newest state that has arrived.
     pub state: State,
-    /// How long ago it was true \[s\]; before the first one has arrived it stands for the past too.
+    /// Age of that state \[s\]; the first state also stands for those before it.
     pub age_s: f64,
-    /// False in a dropout: `state` is what arrived before it.
+    /// False in a dropout: `state` is the last one before it.
     pub fresh: bool,
 }
 
-/// Sensors in use: noise and bias, then delay, then dropouts. Never fails; the first measurement always arrives.
+/// Sensors in simulation: noise and bias, then delay, then dropouts. The first measurement always arrives.
 #[derive(Clone, Debug)]
 pub struct Sensors {
     noise: Option<Deviations>,
@@ -101,17 +101,17 @@ pub struct Sensors {
     delay_s: f64,
     outage: Option<Outage>,
     step_s: f64,
-    /// What arrived last, if anything has.
+    /// The last state that arrived, if any.
     last: Option<State>,
     /// Steps since then.
     missed: u32,
 }
 
-/// Dropouts in time.
+/// Dropouts in simulation.
 #[derive(Clone, Debug)]
 struct Outage {
     random: Noise,
-    /// Probability per step that one begins, and that one ends.
+    /// Probabilities per step that a dropout begins, and that it ends.
     begins: f64,
     ends: f64,
     now: bool,
@@ -122,7 +122,7 @@ impl Outage {
         Outage {
             random: Noise::new(seed, Stream::Dropouts),
             begins: 1.0 - exp(-dropouts.rate_hz * step_s),
-            // A mean length of zero ends with certainty.
+            // A mean length of zero ends with probability 1.
             ends: 1.0 - exp(-step_s / dropouts.mean_s),
             now: false,
         }
@@ -137,7 +137,7 @@ impl Outage {
 }
 
 impl Sensors {
-    /// Sensors that are read every `step_s`. The seed may be the plant's: the streams are apart.
+    /// Creates sensors that are read every `step_s`. The seed may be the plant's, since the streams differ.
     ///
     /// # Errors
     /// The first setting out of range.
@@ -159,12 +159,12 @@ impl Sensors {
         })
     }
 
-    /// What was drawn for this flight.
+    /// Returns the bias drawn for this flight.
     pub fn bias(&self) -> &Motion {
         &self.bias
     }
 
-    /// Measures `motion`; once per step.
+    /// Measures `motion`; to be called once per step.
     #[inline]
     pub fn measure(&mut self, motion: &Motion) -> Measurement {
         let mut measured = sum(motion, &self.bias);

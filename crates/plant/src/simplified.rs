@@ -1,4 +1,4 @@
-//! The paper's simplified model (6): d eta/dt is taken for Omega.
+//! The paper's simplified model (6), with d eta/dt in place of Omega.
 
 use crate::body_axes::BodyAxes;
 use crate::load::Load;
@@ -7,10 +7,10 @@ use crate::surroundings::Surroundings;
 use libm::{cos, sin};
 use nalgebra::{SVector, Vector3};
 
-/// \[x, y, z, their rates, phi, theta, psi, their rates\]
+/// State vector: \[x, y, z, their rates, phi, theta, psi, their rates\].
 pub type Vector = SVector<f64, 12>;
 
-/// The model's state vector for `motion`.
+/// Converts `motion` to the state vector.
 pub fn vector(motion: &Motion) -> Vector {
     let mut x = Vector::zeros();
     x.fixed_rows_mut::<3>(0).copy_from(&motion.position_m);
@@ -20,7 +20,7 @@ pub fn vector(motion: &Motion) -> Vector {
     x
 }
 
-/// The motion that a state vector stands for.
+/// Converts a state vector to the motion.
 pub fn motion(x: &Vector) -> Motion {
     Motion {
         position_m: x.fixed_rows::<3>(0).into(),
@@ -30,7 +30,7 @@ pub fn motion(x: &Vector) -> Motion {
     }
 }
 
-/// f(X) of (6), under a load that is held.
+/// Returns f(X) of (6) under a constant load.
 #[inline]
 pub fn derivative(x: &Vector, load: &Load) -> Vector {
     let Motion { velocity_m_s, rates_rad_s: eta_dot, .. } = motion(x);
@@ -42,7 +42,7 @@ pub fn derivative(x: &Vector, load: &Load) -> Vector {
     x_dot
 }
 
-/// The body's axes: the columns of Rz(psi) Ry(theta) Rx(phi).
+/// Returns the body's axes: the columns of Rz(psi) Ry(theta) Rx(phi).
 #[inline]
 pub(crate) fn body_axes(x: &Vector) -> BodyAxes {
     let (s_phi, c_phi) = (sin(x[6]), cos(x[6]));
@@ -63,13 +63,13 @@ pub(crate) fn body_axes(x: &Vector) -> BodyAxes {
     }
 }
 
-/// [`derivative`] with what acts by position and velocity; here too, d eta/dt is taken for Omega.
+/// Returns [`derivative`] with the forces that depend on position and velocity; d eta/dt replaces Omega here, too.
 #[inline]
 pub(crate) fn derivative_in(x: &Vector, load: &Load, surroundings: &Surroundings) -> Vector {
     let (velocity, rates) = (Vector3::new(x[3], x[4], x[5]), Vector3::new(x[9], x[10], x[11]));
     let axes = body_axes(x);
     let (a, angular) = surroundings.accelerations(x[2], &velocity, &axes, &rates);
-    // As in `derivative`, with the thrust's direction at hand.
+    // As in `derivative`, with the known direction of thrust.
     let a = a + load.acceleration(&axes.up);
     let angular = angular + load.angular_acceleration(&rates);
     Vector::from([

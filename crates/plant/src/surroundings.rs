@@ -1,4 +1,4 @@
-//! What acts on the vehicle by where it is and how it moves: air and ground, inside a step.
+//! Forces of air and ground, which depend on position and velocity within a step.
 
 use crate::body_axes::BodyAxes;
 use crate::contact::Ground;
@@ -6,14 +6,14 @@ use crate::drag::HeldDrag;
 use afbc_types::Parameters;
 use nalgebra::Vector3;
 
-/// Air and ground over one step: the wind is held, drag and contact follow the motion within it.
+/// Air and ground over one step: the wind is constant, drag and contact follow the motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surroundings<'a> {
     drag: Option<HeldDrag>,
     /// Velocity of the air, earth frame \[m/s\].
     wind_m_s: Vector3<f64>,
     ground: Option<&'a Ground>,
-    /// 1/m and diag(I)^-1: divisions are dear.
+    /// 1/m and diag(I)^-1, since divisions are slow.
     per_mass: f64,
     per_inertia: Vector3<f64>,
 }
@@ -29,14 +29,14 @@ impl<'a> Surroundings<'a> {
         Surroundings { drag, wind_m_s, ground, per_mass: 1.0 / vehicle.mass_kg, per_inertia }
     }
 
-    /// True if nothing acts.
+    /// True if there are no such forces.
     #[inline]
     pub(crate) fn are_empty(&self) -> bool {
         self.drag.is_none() && self.ground.is_none()
     }
 
-    /// What they add to d^2 xi/dt^2 \[m/s2\], earth frame, and to d Omega/dt \[rad/s2\], body frame.
-    // Always: passing its vectors through memory costs more than its arithmetic.
+    /// Returns the contributions to d^2 xi/dt^2 \[m/s2\], earth frame, and to d Omega/dt \[rad/s2\], body frame.
+    // Always inlined: passing its vectors through memory costs more than its arithmetic.
     #[inline(always)]
     pub(crate) fn accelerations(
         &self,

@@ -1,4 +1,4 @@
-//! Dryden turbulence near the ground.
+//! Dryden turbulence at low altitude.
 
 use crate::noise::Noise;
 use afbc_types::parameters;
@@ -6,19 +6,19 @@ use libm::{exp, pow, sqrt};
 use nalgebra::Vector3;
 
 parameters! {
-    /// Dryden turbulence below 1,000 ft by MIL-F-8785C, 3.7.3: how strong and how large it is follows from the height and
-    /// from the wind at 20 ft.
+    /// Dryden turbulence below 1,000 ft by MIL-F-8785C, 3.7.3: intensity and length scale follow from the height and
+    /// the wind at 20 ft.
     ///
-    /// The spectra are those of a frozen field that the vehicle crosses at its airspeed V. A vehicle that hovers in still
-    /// air would meet none of it, so V is at least `airspeed_floor_m_s`: the field drifts past it at that speed. In wind,
-    /// the airspeed of a hovering vehicle is the wind's. The gusts' rotation (p, q, r) is left out: it turns wings, not
-    /// rotors.
+    /// The spectra are those of a frozen field that the vehicle crosses at its airspeed V. A vehicle that hovers in
+    /// still air would not cross it, so V is at least `airspeed_floor_m_s`, the speed at which the field drifts past
+    /// it. In wind, a hovering vehicle's airspeed is the wind speed. The rotational gusts (p, q, r) are left out, since
+    /// they act on wings, not rotors.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Turbulence {
-        /// W20, wind at 20 ft (6 m).
+        /// W20: wind at 20 ft (6 m).
         #[parameter(WIND_20FT, "m/s", 0.0..=50.0)]
         pub wind_20ft_m_s: f64 = 15.0 * KNOT_M_S,
-        /// Smallest speed at which the field drifts past.
+        /// Smallest speed at which the field drifts past the vehicle.
         #[parameter(FLOOR, "m/s", 0.1..=50.0)]
         pub airspeed_floor_m_s: f64 = 1.0,
     }
@@ -39,7 +39,7 @@ impl Turbulence {
         Turbulence { wind_20ft_m_s: knots * KNOT_M_S, ..Self::DEFAULT }
     }
 
-    /// What the turbulence is like at a height above ground, taken as 10 ft below and 1,000 ft above the model's range.
+    /// Returns the turbulence at a height above ground, limited to the model's range of 10 ft to 1,000 ft.
     pub fn at(&self, height_m: f64) -> Intensity {
         let h = (height_m / FOOT_M).clamp(10.0, 1000.0);
         let base = 0.177 + 0.000823 * h;
@@ -53,16 +53,16 @@ impl Turbulence {
     }
 }
 
-/// Strength and size of turbulence at one height.
+/// Intensity and length scale of turbulence at one height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intensity {
-    /// L_u = L_v \[m\].
+    /// L_u = L_v: horizontal length scale \[m\].
     pub horizontal_length_m: f64,
-    /// L_w \[m\].
+    /// L_w: vertical length scale \[m\].
     pub vertical_length_m: f64,
-    /// sigma_u = sigma_v \[m/s\].
+    /// sigma_u = sigma_v: horizontal standard deviation \[m/s\].
     pub horizontal_m_s: f64,
-    /// sigma_w \[m/s\].
+    /// sigma_w: vertical standard deviation \[m/s\].
     pub vertical_m_s: f64,
 }
 
@@ -74,7 +74,7 @@ struct Along {
 }
 
 impl Along {
-    /// For a step of `h` = V dt/L.
+    /// Computes the coefficients for a step of `h` = V dt/L.
     fn new(h: f64) -> Self {
         let a = exp(-h);
         Along { a, b: sqrt(1.0 - a * a) }
@@ -88,13 +88,13 @@ impl Along {
 
 /// The lateral and vertical filter (1 + sqrt(3) s)/(1 + s)^2, in units of L/V and sigma, discretised exactly.
 ///
-/// With the state \[x, dx/ds\] of 1/(1 + s)^2 under white noise of unit intensity, the velocity x + sqrt(3) dx/ds has unit
-/// variance, and the state's stationary covariance is P = I/4. Over a step h the state is multiplied by
-/// exp(-h) \[\[1 + h, h\], \[-h, 1 - h\]\] = F and gains noise of covariance P - F P F', here by its Cholesky factor.
+/// With the state \[x, dx/ds\] of 1/(1 + s)^2 under white noise of unit intensity, the velocity x + sqrt(3) dx/ds has
+/// unit variance, and the state's stationary covariance is P = I/4. Over a step h the state is multiplied by exp(-h)
+/// \[\[1 + h, h\], \[-h, 1 - h\]\] = F and gains noise of covariance P - F P F', here by its Cholesky factor.
 #[derive(Clone, Copy, Debug, Default)]
 struct Across {
     f: [[f64; 2]; 2],
-    /// Noise into x from each of two normal numbers, and into dx/ds from the second.
+    /// Factors from two normal numbers to x, and from the second to dx/ds.
     noise: [f64; 3],
 }
 
@@ -106,7 +106,7 @@ struct AcrossState {
 }
 
 impl Across {
-    /// For a step of `h` = V dt/L.
+    /// Computes the coefficients for a step of `h` = V dt/L.
     fn new(h: f64) -> Self {
         let decay = exp(-h);
         let d2 = decay * decay;
@@ -115,7 +115,7 @@ impl Across {
         let q_dd = 0.25 * (1.0 - d2 * (1.0 - 2.0 * h + 2.0 * h * h));
         let l_dd = sqrt(q_dd);
         let l_xd = q_xd / l_dd;
-        // Of the order of h^3: rounding may turn it negative.
+        // Of the order of h^3, so rounding may make it negative.
         let l_xx = sqrt((q_xx - l_xd * l_xd).max(0.0));
         Across { f: [[decay * (1.0 + h), decay * h], [-decay * h, decay * (1.0 - h)]], noise: [l_xx, l_xd, l_dd] }
     }
@@ -131,7 +131,7 @@ impl Across {
 }
 
 impl AcrossState {
-    /// A draw from the stationary distribution.
+    /// Draws a state from the stationary distribution.
     fn draw(noise: &mut Noise) -> Self {
         AcrossState { x: 0.5 * noise.normal(), x_dot: 0.5 * noise.normal() }
     }
@@ -143,17 +143,17 @@ impl AcrossState {
     }
 }
 
-/// How long the filters keep their height and airspeed \[s\].
+/// Time for which the filters use constant height and airspeed \[s\].
 const REFRESH_S: f64 = 0.05;
 
-/// Turbulence in time. Starts in its stationary state, and stays stationary while height and airspeed change, because the
-/// filters' states have unit variance whatever the length and strength.
+/// Turbulence in simulation. Starts in its stationary state, and stays stationary while height and airspeed change,
+/// because the filters' states have unit variance for any length scale and intensity.
 #[derive(Clone, Debug)]
 pub(crate) struct Eddies {
     turbulence: Turbulence,
     noise: Noise,
     step_s: f64,
-    /// Steps until the filters look at height and airspeed again, and between such looks.
+    /// Steps until the filters are updated with height and airspeed, and steps between updates.
     remaining: u32,
     period: u32,
     intensity: Intensity,
@@ -186,7 +186,7 @@ impl Eddies {
         }
     }
 
-    /// Velocity along, across (to the left of) and above the wind's direction, one step after the last \[m/s\].
+    /// Returns the velocity along, across (to the left of) and above the wind's direction, after one more step \[m/s\].
     #[inline]
     pub(crate) fn advance(&mut self, height_m: f64, airspeed_m_s: impl FnOnce() -> f64) -> Vector3<f64> {
         if self.remaining == 0 {

@@ -1,4 +1,4 @@
-//! One vehicle in one environment, stepped in time.
+//! One vehicle in one environment, advanced in time.
 
 use crate::body_axes::BodyAxes;
 use crate::environment::{Environment, Segment};
@@ -12,7 +12,7 @@ use afbc_types::{OutOfRange, RotorSpeeds};
 use alloc::boxed::Box;
 use nalgebra::Vector3;
 
-/// Which equations move the vehicle.
+/// Equations of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Model {
     /// (6), the paper's own simulation model.
@@ -22,7 +22,7 @@ pub enum Model {
 }
 
 impl Model {
-    /// Lower-case name, as in scenario files and logs.
+    /// Returns the lower-case name, as in scenario files and logs.
     pub const fn name(self) -> &'static str {
         match self {
             Model::Simplified => "simplified",
@@ -46,7 +46,7 @@ impl Body {
         }
     }
 
-    /// Moves by `dt_s` under a load that is held.
+    /// Advances by `dt_s` under a constant load.
     #[inline]
     fn advance(&mut self, load: &Load, dt_s: f64) {
         match self {
@@ -58,7 +58,7 @@ impl Body {
         }
     }
 
-    /// Moves by `dt_s` under a load that is held, and surroundings that act by position and velocity.
+    /// Advances by `dt_s` under a constant load and forces that depend on position and velocity.
     #[inline]
     fn advance_in(&mut self, load: &Load, surroundings: &Surroundings, dt_s: f64) {
         match self {
@@ -70,7 +70,7 @@ impl Body {
         }
     }
 
-    /// Position and velocity, which both models begin with.
+    /// Returns position and velocity.
     #[inline]
     fn place(&self) -> (Vector3<f64>, Vector3<f64>) {
         match self {
@@ -93,21 +93,21 @@ pub struct Plant {
     body: Body,
     environment: Environment,
     segment: Segment,
-    /// Boxed: the ideal plant stays small.
+    /// Boxed, so that the ideal plant stays small.
     effects: Option<Box<Effects>>,
     steps: u64,
     time_s: f64,
 }
 
 impl Plant {
-    /// A vehicle at rest in time: `initial` holds at t = 0. Its rotors are ideal, and nothing but the environment acts.
+    /// Creates a vehicle with the motion `initial` at t = 0, ideal rotors, and no forces but those of the environment.
     pub fn new(model: Model, initial: Motion, environment: Environment) -> Self {
         let body = Body::new(model, &initial);
         let segment = environment.segment(0.0);
         Plant { body, environment, segment, effects: None, steps: 0, time_s: 0.0 }
     }
 
-    /// The same vehicle with real rotors, air and ground, made for steps of `step_s`.
+    /// Creates a vehicle with realistic rotors, air and ground, for steps of `step_s`.
     ///
     /// # Errors
     /// The first setting out of range.
@@ -122,8 +122,8 @@ impl Plant {
         Ok(Plant { effects: Some(Box::new(effects)), ..Plant::new(model, initial, environment) })
     }
 
-    /// Moves the vehicle by `dt_s`, the commanded rotor speeds held; every call must give the same `dt_s`, and the one
-    /// that the plant was made for.
+    /// Advances the vehicle by `dt_s` with constant commanded rotor speeds. Every call must use the same `dt_s`, the
+    /// one that the plant was created for.
     #[inline]
     pub fn step(&mut self, speeds: &RotorSpeeds, dt_s: f64) {
         if self.time_s >= self.segment.until_s {
@@ -141,8 +141,8 @@ impl Plant {
         self.time_s = self.steps as f64 * dt_s;
     }
 
-    /// The step with everything that [`Realism`] adds.
-    // Apart, so that the ideal plant's step stays short.
+    /// Advances with all effects of [`Realism`].
+    // Not inlined, so that the ideal plant's step stays short.
     #[inline(never)]
     fn advance_in_effect(&mut self, speeds: &RotorSpeeds, dt_s: f64) {
         let Some(effects) = &mut self.effects else { return };
@@ -157,7 +157,7 @@ impl Plant {
         }
     }
 
-    /// True motion now.
+    /// Returns the present true motion.
     #[inline]
     pub fn motion(&self) -> Motion {
         match &self.body {
@@ -166,17 +166,18 @@ impl Plant {
         }
     }
 
-    /// What rotors, air and ground did in the last step; before the first one, at rest. `None` for an ideal plant.
+    /// Returns the state of rotors, air and ground after the last step, or at rest before the first. `None` for an
+    /// ideal plant.
     pub fn telemetry(&self) -> Option<Telemetry> {
         self.effects.as_ref().map(|effects| effects.telemetry())
     }
 
-    /// Time since the start \[s\].
+    /// Returns the time since the start \[s\].
     pub fn time_s(&self) -> f64 {
         self.time_s
     }
 
-    /// What surrounds the vehicle.
+    /// Returns the environment.
     pub fn environment(&self) -> &Environment {
         &self.environment
     }

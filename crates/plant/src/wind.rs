@@ -1,4 +1,4 @@
-//! Air in motion: steady wind, single gusts, turbulence.
+//! Wind: steady wind, discrete gusts, turbulence.
 
 use crate::noise::{Noise, Stream};
 use crate::turbulence::{Eddies, Turbulence};
@@ -9,17 +9,18 @@ use libm::{cos, sqrt};
 use nalgebra::Vector3;
 
 parameters! {
-    /// Velocity of the air over the earth, the sum of its parts. Acts on the vehicle through [`Drag`](crate::Drag).
+    /// Velocity of the air relative to the earth, the sum of three parts. Acts on the vehicle through
+    /// [`Drag`](crate::Drag).
     ///
-    /// Held over a step at its value at the step's start.
+    /// Constant during a step, at its value at the start.
     #[derive(Clone, Debug, PartialEq)]
     pub struct Wind {
-        /// Steady wind, where it blows to, earth frame.
+        /// Velocity of the steady wind, earth frame.
         #[parameter(STEADY, "m/s", -50.0..=50.0)]
         pub steady_m_s: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0),
-        /// One after the other, or one upon the other.
+        /// Discrete gusts, which may overlap.
         pub gusts: Vec<CosineGust> = Vec::new(),
-        /// Random; its longitudinal axis points where the steady wind blows, or along x.
+        /// Turbulence, whose longitudinal axis is in the direction of the steady wind, or along x.
         pub turbulence: Option<Turbulence> = None,
     }
     together(wind) {
@@ -28,23 +29,23 @@ parameters! {
     }
 }
 
-/// A gust that rises as V_m/2 (1 - cos(pi t/T)), stays, and falls as it rose.
+/// A gust that rises as V_m/2 (1 - cos(pi t/T)), holds, and falls like the rise.
 ///
 /// MIL-F-8785C's discrete gust rises over a distance d_m, which a vehicle at airspeed V crosses in T = d_m/V, and
-/// stays: `hold_s` infinite. With `hold_s` zero it is the full 1-cosine of CS-25.341.
+/// persists: infinite `hold_s`. With a `hold_s` of zero it is the full 1-cosine of CS-25.341.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CosineGust {
-    /// V_m, earth frame \[m/s\].
+    /// V_m: peak velocity, earth frame \[m/s\].
     pub velocity_m_s: Vector3<f64>,
     /// Onset \[s\].
     pub start_s: f64,
-    /// T \[s\].
+    /// T: time to the peak \[s\].
     pub rise_s: f64,
-    /// From the end of the rise to the beginning of the fall \[s\].
+    /// Time from the end of the rise to the beginning of the fall \[s\].
     pub hold_s: f64,
 }
 
-/// Accepted range of what makes a gust.
+/// Accepted ranges of a gust.
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod limits {
     use afbc_types::Range;
@@ -64,10 +65,10 @@ impl CosineGust {
         limits::HOLD.check(self.hold_s)
     }
 
-    /// Velocity at time `t` \[s\], earth frame \[m/s\].
+    /// Returns the velocity at time `t` \[s\], earth frame \[m/s\].
     pub fn at(&self, t: f64) -> Vector3<f64> {
         let since = t - self.start_s;
-        // The fall is the rise run backwards.
+        // The fall is the rise reversed.
         let before_end = since.min(2.0 * self.rise_s + self.hold_s - since);
         if before_end <= 0.0 {
             Vector3::zeros()
@@ -79,7 +80,7 @@ impl CosineGust {
     }
 }
 
-/// Wind in time.
+/// Wind in simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct Weather {
     wind: Wind,
@@ -100,7 +101,8 @@ impl Weather {
         Ok(Weather { wind, heading, eddies })
     }
 
-    /// Velocity of the air at time `t` \[s\] where the vehicle is, earth frame \[m/s\]. Every call is one step.
+    /// Returns the velocity of the air at time `t` \[s\] at the vehicle, earth frame \[m/s\]. Every call advances one
+    /// step.
     #[inline]
     pub(crate) fn advance(&mut self, t: f64, height_m: f64, velocity_m_s: &Vector3<f64>) -> Vector3<f64> {
         let mut air = self.wind.steady_m_s;

@@ -1,4 +1,4 @@
-//! Rotors against closed forms, the battery against its own energy.
+//! Rotors compared with closed forms, and the battery's energy balance.
 #![allow(clippy::unwrap_used, clippy::float_cmp, missing_docs)]
 
 use afbc_plant::{Battery, Charge, Environment, Model, Motion, Plant, Realism, RotorFault, Rotors, Sag, Start};
@@ -48,7 +48,7 @@ fn a_step_of_the_command_is_answered_by_an_exponential() {
     }
 }
 
-/// The velocity that thrust b omega^2 has given by `t`, in closed form: omega = W (1 - exp(-t/tau)).
+/// Velocity due to thrust b omega^2 by time `t`, in closed form: omega = W (1 - exp(-t/tau)).
 #[test]
 fn lagging_thrust_is_right_to_second_order() {
     let (tau, w, t) = (0.02_f64, 300.0, 0.1);
@@ -80,10 +80,10 @@ fn commands_arrive_exactly_as_many_steps_later() {
 }
 
 #[test]
-fn a_vehicle_that_hovers_begins_without_a_bump() {
+fn a_hovering_vehicle_starts_without_a_transient() {
     let mut plant = plant(Rotors { time_constant_s: 0.05, delay_s: 0.02, ..Rotors::default() });
     (0..1000).for_each(|_| plant.step(&command(hover_rad_s()), STEP_S));
-    // What is left is the command's rounding to f32.
+    // Only the rounding of the command to f32 remains.
     assert!(plant.motion().velocity_m_s.norm() < 1e-5);
 }
 
@@ -107,7 +107,7 @@ fn a_failing_rotor_loses_its_share_of_thrust_and_moment_at_its_time() {
     (0..10).for_each(|_| plant.step(&command(w), STEP_S));
     assert_eq!(plant.motion().rates_rad_s, Vector3::zeros());
     plant.step(&command(w), STEP_S);
-    // F2 = 0.6 b w^2: it pitches up for want of thrust in front, and yaws positively for want of rotor 2's moment.
+    // F2 = 0.6 b w^2: less thrust in front pitches the vehicle up, and less moment of rotor 2 yaws it positively.
     let (lost, rates) = (0.4 * w * w, plant.motion().rates_rad_s);
     assert!((rates.y - P.arm_m * P.thrust_factor_n_s2 * lost / P.inertia_kg_m2.y * STEP_S).abs() < 1e-6, "{rates}");
     assert!((rates.z - P.drag_factor_n_m_s2 * lost / P.inertia_kg_m2.z * STEP_S).abs() < 1e-6, "{rates}");
@@ -127,7 +127,7 @@ fn faults_of_one_rotor_multiply_and_a_dead_rotor_is_dead() {
         ideal.step(&RotorSpeeds(Vector4::new(200.0, 200.0, 0.0, 200.0)), STEP_S);
     });
     assert_eq!(twice.motion(), once.motion());
-    // The dead rotor still turns: the gyroscopic moment is all that tells it from a standing one.
+    // The dead rotor still turns: its gyroscopic moment is the only difference to a stopped one.
     let (dead, ideal) = (dead.motion().rates_rad_s, ideal.motion().rates_rad_s);
     assert!((dead - ideal).amax() < 0.02 * ideal.amax(), "{dead} {ideal}");
 }
@@ -136,7 +136,7 @@ fn battery_of(plant: &Plant) -> Charge {
     plant.telemetry().unwrap().battery.unwrap()
 }
 
-/// Every joule that leaves the cells is used by rotors and avionics or heats the battery.
+/// All energy from the cells goes to rotors and avionics or heats the battery.
 #[test]
 fn battery_energy_is_accounted_for() {
     let battery = Battery { capacity_a_h: 0.01, ..Battery::THREE_CELLS };
@@ -184,7 +184,7 @@ fn more_than_a_battery_can_give_is_not_given() {
     let battery = Battery { resistance_ohm: 1.0, avionics_w: 1000.0, ..Battery::THREE_CELLS };
     let mut plant = plant(Rotors { battery: Some(battery), ..Rotors::default() });
     plant.step(&command(200.0), STEP_S);
-    // A matched load: half the voltage.
+    // A matched load: half of the voltage.
     let Charge { voltage_v, current_a, .. } = battery_of(&plant);
     assert!((voltage_v - 6.3).abs() < 1e-9 && (current_a - 6.3).abs() < 1e-9);
 }

@@ -1,4 +1,4 @@
-//! What physics conserves, the models must conserve; what is known in closed form, they must reproduce.
+//! Conservation laws and closed-form solutions.
 #![allow(
     clippy::indexing_slicing,
     clippy::unwrap_used,
@@ -19,7 +19,7 @@ fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
     (-size..size, -size..size, -size..size).prop_map(|(x, y, z)| Vector3::new(x, y, z))
 }
 
-/// Principal inertias of a real body: each at most the sum of the others, here well apart.
+/// Principal inertias of a physical body: each at most the sum of the others, here by a margin.
 fn inertia() -> impl Strategy<Value = Vector3<f64>> {
     (0.002_f64..0.01, 0.002_f64..0.01, 0.1_f64..0.9)
         .prop_map(|(x, y, share)| Vector3::new(x, y, (x - y).abs() + share * (x + y - (x - y).abs())))
@@ -36,7 +36,7 @@ fn motion() -> impl Strategy<Value = Motion> {
     )
 }
 
-/// Body to earth: Rz(psi) Ry(theta) Rx(phi), written out from the convention of `afbc-types`.
+/// Rotation from body to earth, Rz(psi) Ry(theta) Rx(phi), from the convention of `afbc-types`.
 fn r_earth_body(eta: &Vector3<f64>) -> Matrix3<f64> {
     let (sx, cx) = eta.x.sin_cos();
     let (sy, cy) = eta.y.sin_cos();
@@ -47,7 +47,7 @@ fn r_earth_body(eta: &Vector3<f64>) -> Matrix3<f64> {
     rz * ry * rx
 }
 
-/// Energy of translation and height, energy of rotation, angular momentum in the earth frame.
+/// Translational and potential energy, rotational energy, angular momentum in the earth frame.
 fn conserved(p: &Parameters<f64>, m: &Motion) -> (f64, f64, Vector3<f64>) {
     let momentum = p.inertia_kg_m2.component_mul(&m.rates_rad_s);
     let translation = p.mass_kg * (0.5 * m.velocity_m_s.norm_squared() + p.gravity_m_s2 * m.position_m.z);
@@ -70,19 +70,23 @@ proptest! {
         let p = Parameters { inertia_kg_m2: inertia, ..Parameters::PAPER };
         let before = conserved(&p, &start);
         let after = conserved(&p, &fall(p, start, 1000).motion());
-        // Translation is a polynomial of second degree, which the method solves exactly: 1000 steps of rounding are left.
-        // Rotation at 5 rad/s and axis ratios up to 5 turns by at most 0.04 rad a step: (0.04)^5/120 = 1e-9 a step at
-        // the very worst, 1e-6 in 1000 steps.
+        // Translation is a polynomial of second degree, which the method solves exactly: 1000 steps of rounding remain.
+        // Rotation at 5 rad/s with axis ratios up to 5 turns by at most 0.04 rad per step: at most (0.04)^5/120 = 1e-9
+        // per step, 1e-6 in 1000 steps.
         let scale = p.mass_kg * (0.5 * 15.0 * 15.0 + G * 20.0);
         prop_assert!((after.0 - before.0).abs() <= 1e-11 * scale, "{} to {} J", before.0, after.0);
         prop_assert!((after.1 - before.1).abs() <= 1e-6 * before.1, "{} to {} J", before.1, after.1);
         prop_assert!((after.2 - before.2).norm() <= 1e-6 * before.2.norm(), "{} to {}", before.2, after.2);
     }
 
-    /// The rotors' own momentum I_r omega about body z belongs to the whole: with the rotors' thrust and drag taken away
-    /// (b, d -> their lower limits), gyroscopics do no work.
+    /// The rotors' momentum I_r omega about body z is part of the total: without thrust and drag (b and d at their
+    /// lower limits), gyroscopic moments do no work.
     #[test]
-    fn rotor_gyroscopics_do_no_work(inertia in inertia(), rates in vector(5.0), speeds in prop::array::uniform4(0.0_f64..500.0)) {
+    fn rotor_gyroscopics_do_no_work(
+        inertia in inertia(),
+        rates in vector(5.0),
+        speeds in prop::array::uniform4(0.0_f64..500.0),
+    ) {
         let p = Parameters { inertia_kg_m2: inertia, rotor_inertia_kg_m2: 1e-4, ..Parameters::PAPER };
         let still = Load::new(&p, [0.0; 4], Vector3::zeros(), Vector3::zeros());
         let turning = Load::new(&p, speeds, Vector3::zeros(), Vector3::zeros());
@@ -95,14 +99,14 @@ proptest! {
         let rotors = Vector3::new(l * b * (s3 - s1), l * b * (s4 - s2), d * (s1 - s2 + s3 - s4));
         let moment = (rates_dot(&turning) - rates_dot(&still)).component_mul(&inertia);
         let gyroscopic = moment - rotors;
-        // Momentum of rotors 1 and 3 points to negative body z, of 2 and 4 to positive; the moment is -Omega x h.
+        // The momentum of rotors 1 and 3 points to negative body z, of 2 and 4 to positive; the moment is -Omega x h.
         let h = Vector3::new(0.0, 0.0, -p.rotor_inertia_kg_m2 * (speeds[0] - speeds[1] + speeds[2] - speeds[3]));
         let scale = rotors.norm() + rates.norm() * h.norm() + 1e-3;
         prop_assert!((gyroscopic + rates.cross(&h)).norm() <= 1e-12 * scale, "{gyroscopic} for {}", -rates.cross(&h));
         prop_assert!(gyroscopic.dot(&rates).abs() <= 1e-12 * scale * (1.0 + rates.norm()));
     }
 
-    /// A body with Ix = Iy: its cross rates turn at (Iz - Ix)/Ix r and its yaw rate stays (Euler's closed form).
+    /// A body with Ix = Iy: p and q rotate at the rate (Iz - Ix)/Ix r, and r is constant (Euler's closed form).
     #[test]
     fn a_symmetric_top_precesses_as_euler_says(rates in vector(5.0), attitude in vector(1.0)) {
         let p = Parameters::PAPER;
@@ -111,27 +115,40 @@ proptest! {
         let end = fall(p, start, 1000).motion();
         let (s, c) = ((i.z - i.x) / i.x * rates.z).sin_cos(); // after 1 s
         let exact = Vector3::new(c * rates.x - s * rates.y, s * rates.x + c * rates.y, rates.z);
-        // (5e-3)^5/120 a step, 1000 steps: 3e-11 of the rates.
-        prop_assert!((end.rates_rad_s - exact).norm() <= 1e-10 * (1.0 + rates.norm()), "{} for {exact}", end.rates_rad_s);
+        // (5e-3)^5/120 per step, 1000 steps: 3e-11 of the rates.
+        prop_assert!(
+            (end.rates_rad_s - exact).norm() <= 1e-10 * (1.0 + rates.norm()),
+            "{} for {exact}",
+            end.rates_rad_s
+        );
     }
 
-    /// Euler angles to quaternion and back, and the body axes that the quaternion stands for.
+    /// Euler angles to quaternion and back, and the body axes of the quaternion.
     #[test]
-    fn attitude_survives_the_quaternion(start in motion()) {
+    fn attitude_is_preserved_by_the_quaternion(start in motion()) {
         let v = rigid_body::vector(&start);
         prop_assert!((v.fixed_rows::<4>(6).norm() - 1.0).abs() <= 4.0 * f64::EPSILON);
         let back = rigid_body::motion(&v);
-        // Roll and yaw lose 1/cos(pitch), at most 6; pitch up to 1.4 rad loses as much to asin.
-        prop_assert!((back.attitude_rad - start.attitude_rad).amax() <= 1e-14 * 6.0 * 3.0, "{} for {}", back.attitude_rad, start.attitude_rad);
-        prop_assert_eq!((back.position_m, back.velocity_m_s, back.rates_rad_s), (start.position_m, start.velocity_m_s, start.rates_rad_s));
-        // 1 m/s2 of thrust shows where body z points.
+        // Roll and yaw lose a factor of 1/cos(pitch), at most 6; pitch up to 1.4 rad loses as much to asin.
+        prop_assert!(
+            (back.attitude_rad - start.attitude_rad).amax() <= 1e-14 * 6.0 * 3.0,
+            "{} for {}",
+            back.attitude_rad,
+            start.attitude_rad
+        );
+        prop_assert_eq!(
+            (back.position_m, back.velocity_m_s, back.rates_rad_s),
+            (start.position_m, start.velocity_m_s, start.rates_rad_s)
+        );
+        // A thrust of 1 m/s2 shows the direction of body z.
         let p = Parameters { thrust_factor_n_s2: 1.0, mass_kg: 4.0, drag_factor_n_m_s2: 1e-12, ..Parameters::PAPER };
         let load = Load::new(&p, [1.0; 4], Vector3::new(0.0, 0.0, -G), Vector3::zeros());
         let body_z: Vector3<f64> = rigid_body::derivative(&v, &load).fixed_rows::<3>(3).into();
         prop_assert!((body_z - r_earth_body(&start.attitude_rad).column(2)).amax() <= 1e-14, "{body_z}");
     }
 
-    /// The quaternion's derivative is at right angles to it, so its length stays; and it is the attitude's derivative.
+    /// The quaternion's derivative is orthogonal to it, so its length is constant, and equals the attitude's
+    /// derivative.
     #[test]
     fn the_quaternion_stays_on_the_unit_sphere(start in motion()) {
         let v = rigid_body::vector(&start);
@@ -140,11 +157,11 @@ proptest! {
         let (q, q_dot) = (v.fixed_rows::<4>(6), f(&v).fixed_rows::<4>(6).into_owned());
         prop_assert!(q.dot(&q_dot).abs() <= 1e-14 * (1.0 + q_dot.norm()));
         prop_assert!((q_dot.norm() - 0.5 * start.rates_rad_s.norm()).abs() <= 1e-14 * (1.0 + q_dot.norm()));
-        // One unnormalised step loses at most the method's own (|Omega| dt / 2)^6 / 144.
+        // An unnormalised step loses at most the method's error (|Omega| dt / 2)^6 / 144.
         let after = rk4(f, &v, DT_S);
         prop_assert!((after.fixed_rows::<4>(6).norm() - 1.0).abs() <= 1e-15 + (0.005_f64).powi(6) / 144.0);
 
-        // Central difference of the Euler angles against euler_rates.
+        // Central difference of the Euler angles compared with euler_rates.
         let h = 1e-5;
         let (back, ahead) = (rigid_body::motion(&(v - f(&v) * h)), rigid_body::motion(&(v + f(&v) * h)));
         let mut difference = ahead.attitude_rad - back.attitude_rad;
@@ -152,12 +169,20 @@ proptest! {
         let rates = rigid_body::euler_rates(&start.attitude_rad, &start.rates_rad_s);
         // h^2/6 of a third derivative that grows as (|Omega| / cos(pitch))^3, and rounding over h.
         let steep = start.rates_rad_s.norm() / start.attitude_rad.y.cos();
-        prop_assert!((difference / (2.0 * h) - rates).amax() <= 1e-10 * (1.0 + steep * steep * steep) + 1e-9, "{} for {rates}", difference / (2.0 * h));
+        prop_assert!(
+            (difference / (2.0 * h) - rates).amax() <= 1e-10 * (1.0 + steep * steep * steep) + 1e-9,
+            "{} for {rates}",
+            difference / (2.0 * h)
+        );
     }
 
-    /// Near hover the two models differ in second order only: N(eta) there is the identity up to eta.
+    /// Near hover the two models differ in second order only, since N(eta) is the identity up to eta.
     #[test]
-    fn the_models_agree_near_hover(attitude in vector(1.0), rates in vector(1.0), spread in prop::array::uniform4(-1.0_f64..1.0)) {
+    fn the_models_agree_near_hover(
+        attitude in vector(1.0),
+        rates in vector(1.0),
+        spread in prop::array::uniform4(-1.0_f64..1.0),
+    ) {
         let p = Parameters::PAPER;
         let hover = (p.mass_kg * G / (4.0 * p.thrust_factor_n_s2)).sqrt();
         let apart = |size: f64| {
@@ -172,18 +197,23 @@ proptest! {
             let of = |f: fn(&Motion) -> Vector3<f64>| (f(&a) - f(&b)).norm();
             of(|m| m.position_m) + of(|m| m.velocity_m_s) + of(|m| m.attitude_rad) + of(|m| m.rates_rad_s)
         };
-        // In 0.2 s attitude and rates stay below about 3 times their start, the difference of attitudes below their
-        // product over that time: 3 * 3 * 0.2 * 3 axes.
+        // In 0.2 s attitude and rates stay below about 3 times their initial values, the difference of attitudes below
+        // their product over that time: 3 * 3 * 0.2 * 3 axes.
         let small = apart(1e-3);
         prop_assert!(small <= 6e-6, "{small:e} apart");
-        // Second order: a tenth of the perturbation leaves a hundredth of the difference, but for third-order terms.
+        // Second order: a tenth of the perturbation gives a hundredth of the difference, except for third-order terms.
         let smaller = apart(1e-4);
         prop_assert!(smaller <= 0.02 * small + 1e-12, "{small:e} and {smaller:e} apart");
     }
 
-    /// At rest in the air both models give the same accelerations at any attitude: they differ in kinematics only.
+    /// At rest in the air both models give the same accelerations at any attitude: only their kinematics differ.
     #[test]
-    fn the_models_share_their_forces(start in motion(), speeds in prop::array::uniform4(0.0_f64..500.0), a in vector(3.0), m in vector(3.0)) {
+    fn the_models_share_their_forces(
+        start in motion(),
+        speeds in prop::array::uniform4(0.0_f64..500.0),
+        a in vector(3.0),
+        m in vector(3.0),
+    ) {
         let load = Load::new(&Parameters::PAPER, speeds, a, m);
         let paper = simplified::derivative(&simplified::vector(&start), &load);
         let full = rigid_body::derivative(&rigid_body::vector(&start), &load);
@@ -193,7 +223,7 @@ proptest! {
     }
 }
 
-/// A turn about body z at a constant rate is a yaw at that rate, past +-pi, for a minute.
+/// A rotation about body z at a constant rate is a yaw at that rate, beyond +-pi, for a minute.
 #[test]
 fn a_flat_spin_turns_evenly() {
     let rate = 2.0;
@@ -205,13 +235,13 @@ fn a_flat_spin_turns_evenly() {
             let yaw = rate * f64::from(step) * DT_S;
             let error = plant.motion().attitude_rad.z - yaw;
             let error = error - core::f64::consts::TAU * (error / core::f64::consts::TAU).round();
-            // (rate dt / 2)^5 / 120 a step: 8e-18 each, so rounding of 60000 steps dominates.
+            // (rate dt / 2)^5 / 120 per step, 8e-18 each, so the rounding of 60000 steps dominates.
             assert!(error.abs() < 1e-11, "{error:e} rad after {step} steps");
         }
     }
 }
 
-/// Over the top: the rigid body pitches through 90 degrees, where Euler angles are singular, without noticing.
+/// The rigid body pitches through 90 degrees, where Euler angles are singular, without an effect.
 #[test]
 fn pitching_through_90_degrees_is_nothing_special() {
     let start = Motion { rates_rad_s: Vector3::new(0.0, 3.0, 0.0), ..Motion::default() };
@@ -221,16 +251,16 @@ fn pitching_through_90_degrees_is_nothing_special() {
         let angle = 3.0 * f64::from(step) * DT_S;
         let m = plant.motion();
         let body_z = r_earth_body(&m.attitude_rad).column(2).into_owned();
-        // asin loses half the digits at 90 degrees.
+        // asin loses half of the digits at 90 degrees.
         assert!((body_z - Vector3::new(angle.sin(), 0.0, angle.cos())).norm() < 1e-7, "{body_z} at {angle} rad");
         assert_eq!(m.rates_rad_s, start.rates_rad_s);
     }
 }
 
-/// Halving the step divides the error of the classical method by 16.
+/// Halving the step divides the error of the method by 16.
 #[test]
 fn the_integrator_is_of_fourth_order() {
-    // A pendulum with its closed form for the linear case, and a nonlinear one: dx/dt = -x^2, x(t) = 1/(1 + t).
+    // A linear oscillator, and a nonlinear equation: dx/dt = -x^2, x(t) = 1/(1 + t).
     let linear = |x: &SVector<f64, 2>| SVector::from([x[1], -x[0]]);
     let nonlinear = |x: &SVector<f64, 1>| SVector::from([-x[0] * x[0]]);
     let errors = |steps: u32| {
@@ -246,7 +276,7 @@ fn the_integrator_is_of_fourth_order() {
     }
 }
 
-/// So does halving the step of the vehicle itself: fixed rotor speeds, a second of tumbling.
+/// Halving the step of the vehicle does, too: constant rotor speeds, one second of tumbling.
 #[test]
 fn the_vehicle_is_integrated_to_fourth_order() {
     let start = Motion {

@@ -1,4 +1,4 @@
-//! The ground holds what stands and stops what falls; near it, thrust grows.
+//! Ground contact: standing, landing, sliding; and ground effect.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use afbc_plant::{Contact, Environment, GroundEffect, Model, Motion, Payload, Plant, Realism};
@@ -24,7 +24,7 @@ fn run(plant: &mut Plant, seconds: f64) {
     (0..(seconds / STEP_S) as u32).for_each(|_| plant.step(&RotorSpeeds::default(), STEP_S));
 }
 
-/// Motion, height, and what the springs hold: 1/2 k d^2 of each point below the ground.
+/// Kinetic and potential energy, including the springs: 1/2 k d^2 of each point below the ground.
 fn energy_j(motion: &Motion) -> f64 {
     let eta = &motion.attitude_rad;
     let r = Rotation3::from_euler_angles(eta.x, eta.y, eta.z);
@@ -72,7 +72,7 @@ fn a_vehicle_that_lands_upside_down_rests_on_its_rotors() {
     assert!((plant.motion().position_m.z - (C.rotor_height_m - C.sink_m)).abs() < 1e-6);
 }
 
-/// Coulomb: v^2 = 2 mu g s.
+/// Coulomb friction: v^2 = 2 mu g s.
 #[test]
 fn a_vehicle_that_slides_stops_after_the_distance_that_friction_gives() {
     let initial = Motion { velocity_m_s: Vector3::new(1.0, 0.0, 0.0), ..at(C.foot_depth_m - C.sink_m) };
@@ -91,7 +91,7 @@ fn the_ground_lets_go() {
     let lift = 4.0 * P.thrust_factor_n_s2 * 230.0_f64.powi(2) / P.mass_kg - P.gravity_m_s2;
     let telemetry = plant.telemetry().unwrap();
     assert!(!telemetry.on_ground && plant.motion().attitude_rad.amax() < 1e-12);
-    // The springs help with less than their sink's worth of height.
+    // The springs contribute less than their sink in height.
     let gained = plant.motion().position_m.z - C.foot_depth_m;
     assert!((gained - 0.5 * lift).abs() < 0.1, "{gained}");
 }
@@ -116,14 +116,18 @@ fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// However it falls: energy never grows, it does not tunnel, and in the end it lies still.
+    /// For any fall, energy never increases, the vehicle does not tunnel, and it comes to rest.
     #[test]
     fn a_vehicle_that_falls_loses_its_energy(
-        height in 0.3_f64..3.0, velocity in vector(3.0),
+        height in 0.3_f64..3.0,
+        velocity in vector(3.0),
         attitude in (-3.1_f64..3.1, -1.5_f64..1.5, -3.1_f64..3.1).prop_map(|(x, y, z)| Vector3::new(x, y, z)),
-        rates in vector(8.0)
+        rates in vector(8.0),
     ) {
-        let mut plant = plant(Model::RigidBody, Motion { velocity_m_s: velocity, attitude_rad: attitude, rates_rad_s: rates, ..at(height) });
+        let mut plant = plant(
+            Model::RigidBody,
+            Motion { velocity_m_s: velocity, attitude_rad: attitude, rates_rad_s: rates, ..at(height) },
+        );
         let start_j = energy_j(&plant.motion());
         let mut lowest_j = start_j;
         for _ in 0..20_000 {

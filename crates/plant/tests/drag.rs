@@ -1,4 +1,4 @@
-//! Drag against closed forms.
+//! Drag compared with closed forms.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use afbc_plant::{Drag, Environment, Gust, GustKind, Model, Motion, Plant, Realism, Wind};
@@ -59,7 +59,7 @@ fn blades_slow_a_level_vehicle_exponentially_to_the_winds_speed() {
             let expected = wind + (initial.velocity_m_s - wind) * gone;
             let velocity = plant.motion().velocity_m_s;
             assert!((velocity.xy() - expected.xy()).amax() < 1e-9);
-            // Nothing along the rotors' axes, save the rounding of the speeds.
+            // Nothing along the rotor axes, except the rounding of the speeds.
             assert!((velocity.z - 0.5).abs() < 1e-4);
         }
     }
@@ -85,8 +85,8 @@ fn drag_above_the_centre_of_mass_turns_the_vehicle_away_from_its_motion() {
     assert!((rates.x - 0.5 * -rates.y).abs() < 1e-3 * rates.y.abs());
 }
 
-/// The hubs circle the centre of mass at r l each, in the blades' way: dr/dt = -4 k omega l^2/Iz r, and nothing but yaw
-/// turns, since hubs at equal speed balance.
+/// The hubs move around the centre of mass at r l each, against the blade forces: dr/dt = -4 k omega l^2/Iz r. Only yaw
+/// changes, since hubs at equal speed balance.
 #[test]
 fn blades_brake_yaw_exponentially() {
     let drag = Drag { blade_n_s2_m: 2.4e-4, rotor_height_m: 0.02, ..none() };
@@ -106,12 +106,12 @@ fn blades_brake_yaw_exponentially() {
     }
 }
 
-/// Rotors 2 (front) and 4 (rear) at unequal speed in a wind from the right: the faster one is pushed harder.
+/// Rotors 2 (front) and 4 (rear) at unequal speed in wind from the right: the faster one has the larger force.
 #[test]
 fn unequal_rotors_in_wind_turn_the_vehicle_about_its_vertical_axis() {
     let drag = Drag { blade_n_s2_m: 2.4e-4, ..none() };
     let wind = Vector3::new(0.0, 5.0, 0.0);
-    // The squares of 1, 3 and 2, 4 add up to the same, so that the rotors' own drag moments cancel.
+    // The squares of 1, 3 and 2, 4 have the same sum, so that the rotors' drag moments cancel.
     let (front, rear) = (220.0_f32, 170.0_f32);
     let side = ((front * front + rear * rear) / 2.0).sqrt();
     let speeds = RotorSpeeds(Vector4::new(side, front, side, rear));
@@ -134,7 +134,7 @@ fn drag_that_the_step_cannot_follow_is_refused() {
         Plant::with_realism(Model::RigidBody, Motion::default(), environment, &realism, 0.02).unwrap_err().range.name
     };
     assert_eq!(refused(Drag { blade_n_s2_m: 0.01, ..none() }), "blade_n_s2_m");
-    // Slow enough for the mass, but not for the inertia that the hubs turn.
+    // Stable for the mass, but not for the inertia that the hubs rotate.
     assert_eq!(refused(Drag { blade_n_s2_m: 2.4e-4, ..none() }), "blade_n_s2_m");
     assert_eq!(refused(Drag { area_m2: Vector3::new(0.0, 0.0, 1.0), ..none() }), "area_m2");
     assert_eq!(refused(Drag { centre_m: Vector3::new(0.0, 0.0, 5.0), ..none() }), "centre_m");
@@ -145,13 +145,13 @@ fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
     (-size..size, -size..size, -size..size).prop_map(|(x, y, z)| Vector3::new(x, y, z))
 }
 
-/// Body to earth: Rz(psi) Ry(theta) Rx(phi).
+/// Rotation from body to earth: Rz(psi) Ry(theta) Rx(phi).
 fn r_earth_body(eta: &Vector3<f64>) -> Matrix3<f64> {
     *Rotation3::from_euler_angles(eta.x, eta.y, eta.z).matrix()
 }
 
-/// Force and moment of the blades, body axes: the sum over the rotors of k omega_i times the velocity of each hub through
-/// the air, in the rotor plane, where the hub is.
+/// Force and moment of the blades, body axes: the sum over the rotors of k omega_i times the in-plane velocity of each
+/// hub relative to the air, acting at the hub.
 fn blades(drag: &Drag, motion: &Motion, wind: &Vector3<f64>, speeds: &RotorSpeeds) -> (Vector3<f64>, Vector3<f64>) {
     let (l, h) = (P.arm_m, drag.rotor_height_m);
     let hubs = [(0.0, -l), (l, 0.0), (0.0, l), (-l, 0.0)].map(|(x, y)| Vector3::new(x, y, h));
@@ -167,15 +167,17 @@ fn blades(drag: &Drag, motion: &Motion, wind: &Vector3<f64>, speeds: &RotorSpeed
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Galilei: an observer who drifts with the wind sees a flight in still air.
+    /// Galilean invariance: for an observer drifting with the wind, the flight is one in still air.
     #[test]
     fn wind_is_motion_of_the_frame(
-        velocity in vector(10.0), wind in vector(15.0), attitude in vector(1.0), rates in vector(3.0), first in 0..2_usize
+        velocity in vector(10.0),
+        wind in vector(15.0),
+        attitude in vector(1.0),
+        rates in vector(3.0),
+        first in 0..2_usize,
     ) {
         let model = *MODELS.get(first).unwrap();
-        let still = Motion {
-            velocity_m_s: velocity, attitude_rad: attitude, rates_rad_s: rates, ..Motion::default()
-        };
+        let still = Motion { velocity_m_s: velocity, attitude_rad: attitude, rates_rad_s: rates, ..Motion::default() };
         let moving = Motion { velocity_m_s: velocity + wind, ..still };
         let mut in_still_air = plant(model, still, Drag::PAPER, Vector3::zeros());
         let mut in_wind = plant(model, moving, Drag::PAPER, wind);
@@ -189,23 +191,29 @@ proptest! {
         prop_assert!((b.rates_rad_s - a.rates_rad_s).amax() < 1e-6);
     }
 
-    /// What blade drag adds to the motion is the sum over the rotors, each at its own speed and with its own hub's airspeed.
+    /// The effect of blade drag on the motion is the sum over the rotors, each at its own speed and its own hub's
+    /// airspeed.
     #[test]
     fn each_rotor_is_held_back_at_its_own_hub(
-        velocity in vector(10.0), wind in vector(10.0), attitude in vector(1.0), rates in vector(5.0),
-        speeds in prop::array::uniform4(0.0_f32..400.0), height in -0.1..0.1, first in 0..2_usize
+        velocity in vector(10.0),
+        wind in vector(10.0),
+        attitude in vector(1.0),
+        rates in vector(5.0),
+        speeds in prop::array::uniform4(0.0_f32..400.0),
+        height in -0.1..0.1,
+        first in 0..2_usize,
     ) {
         const SHORT_S: f64 = 1e-5;
         let model = *MODELS.get(first).unwrap();
-        let initial = Motion {
-            velocity_m_s: velocity, attitude_rad: attitude, rates_rad_s: rates, ..Motion::default()
-        };
+        let initial =
+            Motion { velocity_m_s: velocity, attitude_rad: attitude, rates_rad_s: rates, ..Motion::default() };
         let speeds = RotorSpeeds(Vector4::from(speeds));
         let drag = Drag { blade_n_s2_m: 2.4e-4, rotor_height_m: height, ..none() };
         let after = |drag: Drag| {
             let wind = Wind { steady_m_s: wind, ..Wind::default() };
             let realism = Realism { drag: Some(drag), wind, ..Realism::default() };
-            let mut plant = Plant::with_realism(model, initial, Environment::calm(P).unwrap(), &realism, SHORT_S).unwrap();
+            let mut plant =
+                Plant::with_realism(model, initial, Environment::calm(P).unwrap(), &realism, SHORT_S).unwrap();
             plant.step(&speeds, SHORT_S);
             plant.motion()
         };
@@ -214,28 +222,32 @@ proptest! {
         let moment = (with.rates_rad_s - without.rates_rad_s).component_mul(&P.inertia_kg_m2) / SHORT_S;
         let (body_force, expected_moment) = blades(&drag, &initial, &wind, &speeds);
         let expected_force = r_earth_body(&attitude) * body_force;
-        // Over the step, rates of at most 9 rad/s and angular accelerations of 3000 rad/s2 change what acts by 1e-4 of
-        // what it can be: 0.4 N s/m at 36 m/s of a hub, at arms of 0.25 m.
+        // During the step, rates of at most 9 rad/s and angular accelerations of 3000 rad/s2 change the forces by 1e-4
+        // of their largest value: 0.4 N s/m at a hub speed of 36 m/s, with arms of 0.25 m.
         prop_assert!((force - expected_force).amax() < 2e-3, "{force} N, not {expected_force}");
         prop_assert!((moment - expected_moment).amax() < 5e-4, "{moment} N m, not {expected_moment}");
     }
 
-    /// Drag of nothing changes nothing: with surroundings or without, the models' equations are the same ones, to the bit.
+    /// Zero drag changes nothing: with or without surroundings, the models' equations give the same bits.
     #[test]
     fn drag_of_nothing_is_no_drag(
-        velocity in vector(10.0), wind in vector(10.0), attitude in vector(3.0), rates in vector(5.0),
-        speeds in prop::array::uniform4(0.0_f32..400.0), size in -2.0..2.0, axis in 0..6_usize, first in 0..2_usize
+        velocity in vector(10.0),
+        wind in vector(10.0),
+        attitude in vector(3.0),
+        rates in vector(5.0),
+        speeds in prop::array::uniform4(0.0_f32..400.0),
+        size in -2.0..2.0,
+        axis in 0..6_usize,
+        first in 0..2_usize,
     ) {
         let model = *MODELS.get(first).unwrap();
-        let initial = Motion {
-            velocity_m_s: velocity, attitude_rad: attitude, rates_rad_s: rates, ..Motion::default()
-        };
+        let initial =
+            Motion { velocity_m_s: velocity, attitude_rad: attitude, rates_rad_s: rates, ..Motion::default() };
         let axis = *Axis::ALL.get(axis).unwrap();
         let push = Gust { axis, kind: GustKind::Acceleration, size, start_s: 0.0, end_s: f64::INFINITY };
         let environment = || Environment::new(P, Vec::new(), vec![push]).unwrap();
-        let realism = Realism {
-            drag: Some(none()), wind: Wind { steady_m_s: wind, ..Wind::default() }, ..Realism::default()
-        };
+        let realism =
+            Realism { drag: Some(none()), wind: Wind { steady_m_s: wind, ..Wind::default() }, ..Realism::default() };
         let mut with = Plant::with_realism(model, initial, environment(), &realism, STEP_S).unwrap();
         let mut without = Plant::new(model, initial, environment());
         for _ in 0..100 {
@@ -245,11 +257,16 @@ proptest! {
         }
     }
 
-    /// Drag takes energy from the motion through the air, and gives none.
+    /// Drag only takes energy from the motion relative to the air.
     #[test]
     fn drag_never_pushes(velocity in vector(30.0), attitude in vector(1.0)) {
         let initial = Motion { velocity_m_s: velocity, attitude_rad: attitude, ..Motion::default() };
-        let mut dragged = plant(Model::RigidBody, initial, Drag { rotor_height_m: 0.0, centre_m: Vector3::zeros(), ..Drag::PAPER }, Vector3::zeros());
+        let mut dragged = plant(
+            Model::RigidBody,
+            initial,
+            Drag { rotor_height_m: 0.0, centre_m: Vector3::zeros(), ..Drag::PAPER },
+            Vector3::zeros(),
+        );
         let energy = |m: &Motion| 0.5 * m.velocity_m_s.norm_squared() + P.gravity_m_s2 * m.position_m.z;
         let mut before = energy(&dragged.motion());
         for _ in 0..500 {

@@ -1,4 +1,4 @@
-//! Gusts and parameter changes: how much, from exactly when, until exactly when.
+//! Gusts and parameter changes: size, exact onset and exact end.
 #![allow(
     clippy::indexing_slicing,
     clippy::unwrap_used,
@@ -21,7 +21,7 @@ fn change(quantity: Quantity, factor: f64, start_s: f64, end_s: f64) -> Paramete
     ParameterChange { quantity, factor, start_s, end_s }
 }
 
-/// Velocities and rates of a level vehicle, one entry a step and one before the first.
+/// Velocities and rates of a level vehicle, before the first step and after each.
 fn fly(environment: Environment, speeds: [f32; 4], dt_s: f64, steps: usize) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let mut plant = Plant::new(Model::Simplified, Motion::default(), environment);
     let mut motion = vec![(Vector3::zeros(), Vector3::zeros())];
@@ -32,7 +32,7 @@ fn fly(environment: Environment, speeds: [f32; 4], dt_s: f64, steps: usize) -> V
     motion
 }
 
-/// Which steps a push of 1 m/s2 on x acted in.
+/// Returns the steps in which a gust of 1 m/s2 on x acted.
 fn pushed_steps(start_s: f64, end_s: f64, dt_s: f64, steps: usize) -> Vec<usize> {
     let gusts = vec![gust(Axis::X, GustKind::Acceleration, 1.0, start_s, end_s)];
     let motion = fly(Environment::new(P, vec![], gusts).unwrap(), [0.0; 4], dt_s, steps);
@@ -46,11 +46,11 @@ fn pushed_steps(start_s: f64, end_s: f64, dt_s: f64, steps: usize) -> Vec<usize>
 
 #[test]
 fn a_gust_acts_from_its_onset_to_its_end_and_not_a_step_more() {
-    // Step n runs from n dt to (n + 1) dt under what holds at n dt.
+    // Step n lasts from n dt to (n + 1) dt, with the gusts present at n dt.
     assert_eq!(pushed_steps(0.010, 0.015, 0.001, 30), [10, 11, 12, 13, 14]);
     assert_eq!(pushed_steps(0.0, 0.002, 0.001, 10), [0, 1]);
     assert_eq!(pushed_steps(0.007, f64::INFINITY, 0.001, 10), [7, 8, 9]);
-    // Between two steps: the next one feels it.
+    // An onset between two steps acts from the next one on.
     assert_eq!(pushed_steps(0.0095, 0.0105, 0.001, 30), [10]);
     assert_eq!(pushed_steps(0.0101, 0.0109, 0.001, 30), Vec::<usize>::new());
     assert_eq!(pushed_steps(0.010, 0.010, 0.001, 30), Vec::<usize>::new());
@@ -59,10 +59,14 @@ fn a_gust_acts_from_its_onset_to_its_end_and_not_a_step_more() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// The paper's onsets are decimals that no binary step count hits exactly: 7.5 s, 22.5 s, any millisecond;
-    /// with steps of 9 ms, whose binary value is too small, a gust would come a step late but for the slack.
+    /// The paper's onsets are decimals that no binary step count represents exactly: 7.5 s, 22.5 s, any millisecond.
+    /// With steps of 9 ms, whose binary value is too small, a gust would begin a step late without the tolerance.
     #[test]
-    fn every_millisecond_is_hit_exactly(start in 0_usize..3000, length in 1_usize..50, dt_ms in prop::sample::select(vec![0.5, 1.0, 2.0, 4.0, 9.0])) {
+    fn every_millisecond_is_hit_exactly(
+        start in 0_usize..3000,
+        length in 1_usize..50,
+        dt_ms in prop::sample::select(vec![0.5, 1.0, 2.0, 4.0, 9.0]),
+    ) {
         let dt_s = dt_ms / 1000.0;
         let (start_s, end_s) = (start as f64 / 1000.0, (start + length) as f64 / 1000.0);
         let first = (start as f64 / dt_ms).ceil() as usize;
@@ -70,16 +74,22 @@ proptest! {
         prop_assert_eq!(pushed_steps(start_s, end_s, dt_s, last + 3), (first..last).collect::<Vec<_>>());
     }
 
-    /// Gusts add up, changes multiply, a force is over the mass of its moment; in any overlap.
+    /// In any overlap, gusts add up, changes multiply, and a force is divided by the present mass.
     #[test]
     fn overlaps_add_and_multiply(
-        edges in prop::array::uniform6(0_u32..40), factors in prop::array::uniform2(0.5_f64..2.0), sizes in prop::array::uniform2(-2.0_f64..2.0),
+        edges in prop::array::uniform6(0_u32..40),
+        factors in prop::array::uniform2(0.5_f64..2.0),
+        sizes in prop::array::uniform2(-2.0_f64..2.0),
     ) {
         let s = edges.map(|edge| f64::from(edge) / 1000.0);
         let span = |a: f64, b: f64| (a.min(b), a.max(b));
         let (m, g1, g2) = (span(s[0], s[1]), span(s[2], s[3]), span(s[4], s[5]));
-        let changes = vec![change(Quantity::Mass, factors[0], m.0, m.1), change(Quantity::Mass, factors[1], g1.0, g1.1)];
-        let gusts = vec![gust(Axis::X, GustKind::Force, sizes[0], g1.0, g1.1), gust(Axis::X, GustKind::Acceleration, sizes[1], g2.0, g2.1)];
+        let changes =
+            vec![change(Quantity::Mass, factors[0], m.0, m.1), change(Quantity::Mass, factors[1], g1.0, g1.1)];
+        let gusts = vec![
+            gust(Axis::X, GustKind::Force, sizes[0], g1.0, g1.1),
+            gust(Axis::X, GustKind::Acceleration, sizes[1], g2.0, g2.1),
+        ];
         let motion = fly(Environment::new(P, changes, gusts).unwrap(), [0.0; 4], 0.001, 45);
         let within = |span: (f64, f64), step: usize| {
             let (from, to) = ((span.0 * 1000.0).round() as usize, (span.1 * 1000.0).round() as usize);
@@ -88,7 +98,9 @@ proptest! {
         let mut exact = 0.0;
         for (step, (velocity, _)) in motion.iter().enumerate() {
             prop_assert!((velocity.x - exact).abs() < 1e-13, "step {step}: {} for {exact}", velocity.x);
-            let mass = P.mass_kg * if within(m, step) { factors[0] } else { 1.0 } * if within(g1, step) { factors[1] } else { 1.0 };
+            let mass = P.mass_kg
+                * if within(m, step) { factors[0] } else { 1.0 }
+                * if within(g1, step) { factors[1] } else { 1.0 };
             let force = if within(g1, step) { sizes[0] / mass } else { 0.0 };
             let push = if within(g2, step) { sizes[1] } else { 0.0 };
             exact -= 0.001 * (force + push);
@@ -96,7 +108,7 @@ proptest! {
     }
 }
 
-/// Each axis is pushed where it should be, in the direction of the paper's minus sign, by the size in its unit.
+/// A gust acts on its own axis, with the paper's minus sign, in its own unit.
 #[test]
 fn a_gust_pushes_its_own_axis_against_its_sign() {
     let i = P.inertia_kg_m2;
@@ -143,7 +155,7 @@ impl ConcatValues for [Vector3<f64>; 2] {
     }
 }
 
-/// A changed parameter changes what it should: acceleration, roll and yaw moment as computed by hand, during the change
+/// A parameter change has the expected effect: acceleration, roll and yaw moment as computed by hand, during the change
 /// only.
 #[test]
 fn a_parameter_change_acts_while_it_lasts() {
@@ -166,7 +178,7 @@ fn a_parameter_change_acts_while_it_lasts() {
     ];
     for (quantity, changed) in cases {
         for step in 0..3_usize {
-            // A fresh vehicle at rest for each step, so that only the rotors act.
+            // A new vehicle at rest for each step, so that only the rotors act.
             let (start, end) = (1.0 - step as f64, 2.0 - step as f64);
             let environment =
                 Environment::new(P, vec![change(quantity, 1.4, start * 1e-6, end * 1e-6)], vec![]).unwrap();
@@ -174,7 +186,7 @@ fn a_parameter_change_acts_while_it_lasts() {
             let (velocity, rates) = motion[1];
             let expected = if step == 1 { changed } else { wanted(1.0, 1.0, 1.0, 1.0) };
             for (got, expected) in [velocity.z, rates.x, rates.y, rates.z].into_iter().zip(expected) {
-                // Over 1 us the rates have hardly grown: their products are below 1e-9 of the moments.
+                // Within 1 us the rates hardly grow: their products are below 1e-9 of the moments.
                 assert!(
                     (got / 1e-6 - expected).abs() < 1e-7 * (1.0 + expected.abs()),
                     "{quantity:?}, step {step}: {} for {expected}",
@@ -207,7 +219,7 @@ fn a_change_that_leaves_the_range_is_refused_by_name() {
             );
         }
     }
-    // Each alone is fine, both together are not: 0.486 kg times 40 times 40.
+    // Each alone is valid, both together are not: 0.486 kg times 40 times 40.
     let both = vec![change(Quantity::Mass, 40.0, 1.0, 3.0), change(Quantity::Mass, 40.0, 2.0, 4.0)];
     assert_eq!(refused(both.clone()), Err("mass_kg"));
     let apart = vec![change(Quantity::Mass, 40.0, 1.0, 2.0), change(Quantity::Mass, 40.0, 2.0, 4.0)];
@@ -216,7 +228,7 @@ fn a_change_that_leaves_the_range_is_refused_by_name() {
     assert_eq!(Environment::calm(weightless).unwrap_err().range.name, "mass_kg");
 }
 
-/// The clock counts steps: after an hour it shows the hour.
+/// The clock counts steps, and is exact after an hour.
 #[test]
 fn time_does_not_drift() {
     let mut plant = Plant::new(Model::Simplified, Motion::default(), Environment::calm(P).unwrap());

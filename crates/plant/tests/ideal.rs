@@ -1,4 +1,4 @@
-//! The paper's plant is not touched by what can be added to it.
+//! The ideal plant does not change when optional effects are added to the code.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use afbc_plant::integrate::rk4;
@@ -51,7 +51,7 @@ fn hash(mut plant: Plant) -> u64 {
     hash
 }
 
-/// Recorded before anything could be added.
+/// Recorded before any effect was added.
 #[test]
 fn flights_of_the_ideal_plant_stay_what_they_were() {
     assert_eq!(hash(Plant::new(Model::Simplified, start(), environment())), 0x0640_40e6_7508_8793);

@@ -1,4 +1,4 @@
-//! Random numbers against what their distribution says, at five standard errors and fixed seeds.
+//! Random numbers compared with their distribution, within five standard errors and with fixed seeds.
 #![allow(clippy::indexing_slicing, missing_docs)]
 
 use afbc_plant::noise::{Noise, Stream};
@@ -14,7 +14,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     values.sum::<f64>() / N as f64
 }
 
-/// `found` is a mean of N numbers of variance `variance`.
+/// Checks that `found` is a mean of N numbers of variance `variance`.
 fn assert_mean(found: f64, expected: f64, variance: f64, what: &str) {
     let bound = 5.0 * (variance / N as f64).sqrt();
     assert!((found - expected).abs() < bound, "{what}: {found} is not {expected} within {bound}");
@@ -35,7 +35,7 @@ fn normal_numbers_have_a_normal_distributions_moments() {
 #[test]
 fn normal_numbers_have_a_normal_distributions_tails() {
     let x = normals(2, Stream::Wind);
-    // Through the layers' cores and edges, and beyond 3.654, where the tail's own method draws.
+    // Through the layers' cores and edges, and beyond 3.654, where the tail is drawn separately.
     for limit in [-4.5, -4.0, -3.654_152_9, -3.0, -1.0, -0.215, 0.0, 0.1, 0.5, 2.0, 3.5, 3.654_152_9, 3.8, 4.2] {
         let below = mean(x.iter().map(|&x| if x < limit { 1.0 } else { 0.0 }));
         let p = 0.5 * libm::erfc(-limit / core::f64::consts::SQRT_2);
@@ -61,7 +61,7 @@ fn streams_and_seeds_are_independent_and_reproducible() {
     }
 }
 
-/// Flights are replayed by seed, also by those that come later: these bits may never change.
+/// Flights are reproduced by seed, also by later versions: these bits must never change.
 #[test]
 fn numbers_stay_what_they_are() {
     let mut noise = Noise::new(2026, Stream::Sensors);

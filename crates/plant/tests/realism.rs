@@ -1,4 +1,4 @@
-//! Everything together: reproducible by seed, and finite whatever it is given.
+//! All effects together: reproducible by seed, and finite for any input.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use afbc_plant::{
@@ -107,7 +107,7 @@ fn finite(motion: &Motion) -> bool {
     [position_m, velocity_m_s, attitude_rad, rates_rad_s].iter().all(|v| v.iter().all(|x| x.is_finite()))
 }
 
-/// Any 32 bits as a commanded speed, numbers or not.
+/// Any 32 bits as a commanded speed, including NaN and infinity.
 fn commands() -> impl Strategy<Value = Vec<[f32; 4]>> {
     let usual = prop::array::uniform4(0.0..500.0_f32);
     let any_bits = prop::array::uniform4(any::<u32>().prop_map(f32::from_bits));
@@ -119,7 +119,10 @@ proptest! {
 
     #[test]
     fn nothing_accepted_leads_to_a_motion_that_is_not_finite(
-        realism in realism(), motion in motion(), commands in commands(), rigid in any::<bool>()
+        realism in realism(),
+        motion in motion(),
+        commands in commands(),
+        rigid in any::<bool>(),
     ) {
         let model = if rigid { Model::RigidBody } else { Model::Simplified };
         let environment = Environment::calm(Parameters::PAPER).unwrap();
@@ -152,7 +155,7 @@ proptest! {
     }
 }
 
-/// Flights are replayed by seed, also by those that come later, and on other machines.
+/// Flights are reproduced by seed, also by later versions and on other machines.
 #[test]
 fn a_flight_with_everything_stays_what_it_is() {
     let realism = Realism {

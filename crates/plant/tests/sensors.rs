@@ -1,4 +1,4 @@
-//! Sensors against their own settings.
+//! Sensors compared with their settings.
 #![allow(clippy::unwrap_used, clippy::float_cmp, clippy::indexing_slicing, missing_docs)]
 
 use afbc_plant::{Deviations, Dropouts, Measurement, Motion, Sensing, Sensors};
@@ -16,7 +16,7 @@ fn motion(k: u16) -> Motion {
     Motion { position_m: v(0), velocity_m_s: v(1), attitude_rad: v(2), rates_rad_s: v(3) }
 }
 
-/// The twelve numbers of a measurement of no motion.
+/// The twelve coordinates of a measurement at zero motion.
 fn numbers(measurement: &Measurement) -> Vec<f64> {
     let s = &measurement.state;
     let groups = [&s.position_m, &s.velocity_m_s, &s.attitude_rad, &s.rates_rad_s];
@@ -59,7 +59,7 @@ fn noise_and_bias_are_as_large_as_asked() {
     }
 }
 
-/// Over flights, the bias is spread as asked; within one, it stays.
+/// Over many flights, the bias has the requested spread; within one, it is constant.
 #[test]
 fn bias_is_spread_over_flights() {
     let sensing = Sensing { bias: Deviations::all(0.1), ..Sensing::default() };
@@ -81,15 +81,15 @@ fn measurements_arrive_exactly_as_many_steps_later() {
         let mut sensors = sensors(Sensing { delay_s, ..Sensing::default() }, 1);
         for k in 0..300_u16 {
             let measurement = sensors.measure(&motion(k));
-            // Until the first one arrives, it stands for the past.
+            // Until the first delayed state arrives, the first one is returned.
             assert_eq!(measurement.state, motion(k.saturating_sub(steps)).measure());
             assert!(measurement.fresh && (measurement.age_s - delay_s).abs() < 1e-12);
         }
     }
 }
 
-/// A two-state chain: begins with 1 - exp(-rate dt) and ends with 1 - exp(-dt/mean) per step. The share of time lost has,
-/// over n steps, a variance of p (1 - p)/n (1 + r)/(1 - r), r the chain's correlation from step to step.
+/// A two-state chain: begins with 1 - exp(-rate dt) and ends with 1 - exp(-dt/mean) per step. Over n steps, the share
+/// of time lost has a variance of p (1 - p)/n (1 + r)/(1 - r), with r the chain's correlation per step.
 #[test]
 fn dropouts_are_as_frequent_and_as_long_as_asked() {
     let dropouts = Dropouts { rate_hz: 2.0, mean_s: 0.05 };

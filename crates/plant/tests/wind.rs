@@ -1,8 +1,9 @@
-//! Wind against MIL-F-8785C: gusts by their shape, turbulence by the statistics of long samples.
+//! Wind compared with MIL-F-8785C: gusts by their shape, turbulence by statistics of long samples.
 //!
-//! A sample of length T of a stationary Gaussian process with autocorrelation rho has, in its autocovariance at any lag, a
-//! variance of at most 2/T times the integral of rho^2 over all lags (Bartlett 1946), in units of its own variance squared.
-//! That integral is L/V for the longitudinal velocity and 5/8 L/V for the others. Bounds are five standard errors.
+//! In a sample of length T of a stationary Gaussian process with autocorrelation rho, the autocovariance at any lag has
+//! a variance of at most 2/T times the integral of rho^2 over all lags (Bartlett 1946), in units of its own variance
+//! squared. That integral is L/V for the longitudinal velocity and 5/8 L/V for the others. Bounds are five standard
+//! errors.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
 
 use afbc_plant::{CosineGust, Environment, Gust, GustKind, Model, Motion, Plant, Realism, Turbulence, Wind};
@@ -12,7 +13,7 @@ use nalgebra::Vector3;
 const FOOT_M: f64 = 0.3048;
 const P: Parameters<f64> = Parameters::PAPER;
 
-/// A vehicle that floats where it is: weight lifted, rotors off, no drag.
+/// A vehicle that floats in place: weight compensated, rotors off, no drag.
 fn floating(height_m: f64, wind: Wind, seed: u64, step_s: f64) -> Plant {
     let lift =
         Gust { axis: Axis::Z, kind: GustKind::Acceleration, size: -P.gravity_m_s2, start_s: 0.0, end_s: f64::INFINITY };
@@ -54,7 +55,7 @@ fn a_gust_rises_and_falls_as_one_minus_cosine() {
 #[test]
 fn turbulence_has_the_specifications_strength_and_size() {
     let turbulence = Turbulence { wind_20ft_m_s: 10.0, airspeed_floor_m_s: 1.0 };
-    // At 1,000 ft, where the model ends, it is isotropic: L = 1,000 ft, sigma = 0.1 W20.
+    // At 1,000 ft, the upper end of the model, it is isotropic: L = 1,000 ft, sigma = 0.1 W20.
     let top = turbulence.at(1000.0 * FOOT_M);
     assert!((top.horizontal_length_m - 304.8).abs() < 1e-9 && (top.vertical_length_m - 304.8).abs() < 1e-9);
     assert!((top.horizontal_m_s - 1.0).abs() < 1e-12 && (top.vertical_m_s - 1.0).abs() < 1e-12);
@@ -125,7 +126,7 @@ fn turbulence_near_the_ground_has_the_dryden_autocovariance() {
     check_turbulence(2.0, 8.0, 0.01);
 }
 
-/// The discretisation is exact, so even steps as long as the turbulence itself have the right variance.
+/// The discretisation is exact, so even steps as long as the length scale give the right variance.
 #[test]
 fn coarse_steps_have_the_dryden_autocovariance() {
     check_turbulence(1.0, 50.0, 0.02);

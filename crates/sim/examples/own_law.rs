@@ -1,4 +1,4 @@
-//! A law of one's own, PD on position and attitude, in a closed loop with the plant: `cargo run --example own_law`.
+//! A new control law, PD on position and attitude, in a closed loop with the plant: `cargo run --example own_law`.
 #![allow(clippy::unwrap_used, reason = "an example whose parameters are not valid should say so")]
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
@@ -7,7 +7,7 @@ use afbc_sim::scenario;
 use afbc_types::{Inputs, Parameters, Setpoint, State};
 use core::ops::ControlFlow;
 
-/// What is fixed; what changes in flight belongs in the type `Memory`.
+/// Fixed parameters; anything that changes in flight belongs in the type `Memory`.
 struct OwnLaw {
     vehicle: Parameters,
     mixer: Mixer,

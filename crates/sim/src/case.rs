@@ -1,13 +1,13 @@
-//! How the paper's account of its experiment is read.
+//! Readings of the paper's description of its experiment.
 
-/// How the paper's "1.2 N" and "1.2 N m" are read (decision 3 in `docs/paper.md`).
+/// Reading of the paper's "1.2 N" and "1.2 N m" (decision 3 in `docs/paper.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
-    /// Accelerations of 1.2 m/s2 and 1.2 rad/s2 that stay on from their onset: the paper's claims hold.
+    /// Accelerations of 1.2 m/s2 and 1.2 rad/s2 that persist from their onset: the paper's claims hold.
     Persistent,
     /// The same accelerations for one second each.
     Pulses,
-    /// Physical forces and moments that stay on: 1.2 N m is 316 rad/s2 here, and loses the vehicle.
+    /// Physical forces and moments that persist: 1.2 N m is 316 rad/s2 here, and the vehicle is lost.
     Forces,
 }
 
@@ -15,7 +15,7 @@ impl Reading {
     /// Every reading.
     pub const ALL: [Reading; 3] = [Reading::Persistent, Reading::Pulses, Reading::Forces];
 
-    /// Lower-case name, as on the command line and in logs.
+    /// Returns the lower-case name, as on the command line and in logs.
     pub const fn name(self) -> &'static str {
         match self {
             Reading::Persistent => "persistent",
@@ -25,7 +25,7 @@ impl Reading {
     }
 }
 
-/// The direction of an uncertainty whose size alone is printed (decision 4 there).
+/// Sign of an uncertainty of which only the size is printed (decision 4 in `docs/paper.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sign {
     /// More than nominal.
@@ -35,7 +35,7 @@ pub enum Sign {
 }
 
 impl Sign {
-    /// 1 + or - `size`.
+    /// Returns 1 + or - `size`.
     pub(crate) const fn factor(self, size: f64) -> f64 {
         match self {
             Sign::Plus => 1.0 + size,
@@ -43,7 +43,7 @@ impl Sign {
         }
     }
 
-    /// "+" or "-".
+    /// Returns "+" or "-".
     pub const fn symbol(self) -> &'static str {
         match self {
             Sign::Plus => "+",
@@ -62,7 +62,7 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// Inertia up, thrust down: the hardest, and the default.
+    /// Inertia up, thrust down: the most difficult, and the default.
     pub const DEFAULT: Self = Uncertainty { inertia: Sign::Plus, thrust: Sign::Minus };
 
     /// All four combinations, the default first.
@@ -74,12 +74,12 @@ impl Uncertainty {
     ];
 }
 
-/// One reading of the experiment; `None` leaves gusts or uncertainty out.
+/// One variant of the experiment; `None` leaves out gusts or uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Case {
-    /// How the gusts are read.
+    /// Reading of the gusts.
     pub reading: Option<Reading>,
-    /// Which way the parameters are off.
+    /// Signs of the uncertain parameters.
     pub uncertainty: Option<Uncertainty>,
 }
 
@@ -87,7 +87,8 @@ impl Case {
     /// The default reading of Section IV.
     pub const DEFAULT: Self = Case { reading: Some(Reading::Persistent), uncertainty: Some(Uncertainty::DEFAULT) };
 
-    /// Short name: `calm`, `uncertain`, `gusts`, `pulses`, `forces`, or `paper` when both gusts and uncertainty are on.
+    /// Returns the short name: `calm`, `uncertain`, `gusts`, `pulses`, `forces`, or `paper` with both gusts and
+    /// uncertainty.
     pub const fn name(self) -> &'static str {
         match (self.reading, self.uncertainty) {
             (None, None) => "calm",

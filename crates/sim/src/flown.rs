@@ -1,4 +1,4 @@
-//! A flight and what was flown.
+//! A flight with its scenario.
 
 use crate::run::Run;
 use crate::scenario::Scenario;
@@ -6,8 +6,8 @@ use crate::scenario::Scenario;
 /// One contender's flight of one scenario.
 #[derive(Clone, Debug)]
 pub struct Flown {
-    /// What was flown.
+    /// The scenario flown.
     pub scenario: Scenario,
-    /// How it went.
+    /// The flight.
     pub run: Run,
 }

@@ -1,4 +1,5 @@
-//! World and pilots in lockstep: what is flown ([`scenario`]), by whom ([`contender`]), and how it went ([`run`]).
+//! Simulation in lockstep: scenarios ([`scenario`]), contenders ([`contender`]), and flights with their results
+//! ([`run`]).
 #![forbid(unsafe_code)]
 
 pub mod case;

@@ -3,7 +3,7 @@
 use crate::flight::Sample;
 use nalgebra::Vector4;
 
-/// Errors count from here on \[s\]: the start from afar is not tracking.
+/// Time from which errors are evaluated \[s\], since flights start far from the reference.
 pub const SETTLED_S: f64 = 5.0;
 
 /// Figures of merit: each vector is \[x, y, z, psi\] in m and rad, or \[U1, U2, U3, U4\] in N.
@@ -15,11 +15,11 @@ pub struct Metrics {
     pub max_abs: Vector4<f64>,
     /// Error at the end, reference minus vehicle.
     pub final_error: Vector4<f64>,
-    /// Mean |change of U| per step over the same time: what chatter costs.
+    /// Mean |change of U| per step from [`SETTLED_S`] to the end: a measure of chatter.
     pub mean_abs_delta_u: Vector4<f64>,
 }
 
-/// Gathers [`Metrics`] step by step.
+/// Accumulates [`Metrics`] step by step.
 #[derive(Clone, Debug, Default)]
 pub struct Accumulator {
     errors: u64,
@@ -31,7 +31,7 @@ pub struct Accumulator {
     last_u: Option<Vector4<f64>>,
 }
 
-/// Reference minus vehicle: \[x, y, z, psi\], yaw the short way round.
+/// Returns reference minus vehicle: \[x, y, z, psi\], with the yaw error wrapped to +-pi.
 pub fn tracking_error(sample: &Sample) -> Vector4<f64> {
     use core::f64::consts::TAU;
     let position = sample.reference.position_m - sample.motion.position_m;
@@ -39,20 +39,20 @@ pub fn tracking_error(sample: &Sample) -> Vector4<f64> {
     Vector4::new(position.x, position.y, position.z, yaw - TAU * libm::rint(yaw / TAU))
 }
 
-/// U1..U4 as the rotors give them \[N\].
+/// Returns U1..U4 as produced by the rotors \[N\].
 pub fn inputs(sample: &Sample) -> Vector4<f64> {
     let u = afbc_control::mixer::Mixer::inputs(&sample.action.forces);
     Vector4::new(u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n).cast()
 }
 
-/// Whether errors count at this time.
+/// True if errors are evaluated at this time.
 pub fn is_settled(time_s: f64) -> bool {
-    // Half a microsecond of slack: times are decimal, steps binary.
+    // A tolerance of half a microsecond, since times are decimal and steps binary.
     time_s >= SETTLED_S - 5e-7
 }
 
 impl Accumulator {
-    /// Takes one step into account.
+    /// Adds one step.
     pub fn add(&mut self, sample: &Sample) {
         let error = tracking_error(sample);
         self.last_error = error;
@@ -69,7 +69,7 @@ impl Accumulator {
         }
     }
 
-    /// The figures so far; zero where there was nothing to measure.
+    /// Returns the metrics so far; zero where there was nothing to measure.
     pub fn finish(&self) -> Metrics {
         let mean = |sum: Vector4<f64>, count: u64| if count == 0 { sum } else { sum / count as f64 };
         Metrics {

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 /// Length of the experiment \[s\].
 pub const DURATION_S: f64 = 60.0;
 
-/// When parameters are off \[s\].
+/// Interval of the uncertain parameters \[s\].
 pub const UNCERTAIN_S: [f64; 2] = [20.0, 40.0];
 
 /// Onset of each gust \[s\].
@@ -22,10 +22,10 @@ pub const GUSTS_S: [(Axis, f64); 6] =
 /// Size of each gust: m/s2 and rad/s2, or N and N m.
 const GUST: f64 = 1.2;
 
-/// The experiment in one reading, on one model of the vehicle.
+/// Returns one variant of the experiment, on one model of the vehicle.
 ///
 /// # Errors
-/// None in fact: the paper's parameters are in range.
+/// Does not occur: the paper's parameters are in range.
 pub fn scenario(model: Model, case: Case) -> Result<Scenario, OutOfRange> {
     let gusts = case.reading.map_or(Vec::new(), |reading| {
         let (kind, length_s) = match reading {

@@ -1,4 +1,4 @@
-//! One flight with everything that is reported of it.
+//! One flight with its log and metrics.
 
 use crate::contender::Contender;
 use crate::flight::{Lost, Sample, fly};
@@ -8,40 +8,40 @@ use afbc_control::Trip;
 use afbc_types::OutOfRange;
 use nalgebra::Vector4;
 
-/// A flown scenario under one contender.
+/// A flight of a scenario under one contender.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// Who flew.
+    /// The contender.
     pub contender: Contender,
     /// When and why the vehicle was lost, if it was.
     pub lost: Option<Lost>,
-    /// When and why AFBC's monitor put another law in its place, if it did.
+    /// When and why AFBC's monitor switched to the fallback law, if it did.
     pub tripped: Option<Tripped>,
     /// Figures of merit over every step.
     pub metrics: Metrics,
     /// Every `log_every`-th step, and the last one.
     pub log: Vec<Sample>,
-    /// For each row of the log, the lowest and the highest U1..U4 \[N\] of all steps since the row before: chatter is
-    /// faster than the log.
+    /// For each row of the log, the lowest and highest U1..U4 \[N\] of all steps since the previous row, since chatter
+    /// is faster than the log.
     pub input_extremes: Vec<[Vector4<f64>; 2]>,
 }
 
-/// What a monitor did.
+/// A trip of the monitor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tripped {
-    /// \[s\]
+    /// Time \[s\].
     pub time_s: f64,
-    /// Why.
+    /// Reason.
     pub trip: Trip,
 }
 
 impl Run {
-    /// Whether the flight reached the time from which errors count.
+    /// True if the flight reached the time from which errors are evaluated.
     pub fn is_settled(&self) -> bool {
         self.log.last().is_some_and(|last| last.time_s >= SETTLED_S)
     }
 
-    /// Flies `scenario` under `contender`, keeping every `log_every`-th step (at least 1).
+    /// Flies `scenario` under `contender`, logging every `log_every`-th step (at least 1).
     ///
     /// # Errors
     /// The first parameter, gain or setting out of range; nothing has been flown then.

@@ -1,36 +1,36 @@
 //! Reference trajectories with analytic first and second derivatives (assumption A5).
 //!
-//! Trigonometry is `libm`'s, so a flight gives the same bits on every host.
+//! Trigonometry comes from `libm`, so a flight gives the same bits on every host.
 
 use afbc_types::Setpoint;
 use core::f64::consts::{PI, TAU};
 use libm::{cos, sin, sincos};
 use nalgebra::Vector3;
 
-/// The reference at one time, earth frame; the quantities of [`Setpoint`] in `f64`.
+/// The reference at one time, earth frame, with the quantities of [`Setpoint`] in `f64`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reference {
-    /// \[m\]
+    /// Position \[m\].
     pub position_m: Vector3<f64>,
-    /// \[m/s\]
+    /// Velocity \[m/s\].
     pub velocity_m_s: Vector3<f64>,
-    /// \[m/s2\]
+    /// Acceleration \[m/s2\].
     pub acceleration_m_s2: Vector3<f64>,
-    /// psi_d \[rad\]
+    /// Yaw psi_d \[rad\].
     pub yaw_rad: f64,
-    /// \[rad/s\]
+    /// Yaw rate \[rad/s\].
     pub yaw_rate_rad_s: f64,
-    /// \[rad/s2\]
+    /// Yaw acceleration \[rad/s2\].
     pub yaw_acceleration_rad_s2: f64,
 }
 
 impl Reference {
-    /// Stand still there.
+    /// Returns a reference at rest.
     pub fn rest(position_m: Vector3<f64>, yaw_rad: f64) -> Self {
         Reference { position_m, yaw_rad, ..Reference::default() }
     }
 
-    /// What the controller is told.
+    /// Returns the controller's setpoint.
     #[inline]
     pub fn setpoint(&self) -> Setpoint {
         Setpoint {
@@ -44,30 +44,30 @@ impl Reference {
     }
 }
 
-/// A place to be at rest at a given time.
+/// A position in which to be at rest at a given time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waypoint {
-    /// \[s\]
+    /// Time \[s\].
     pub time_s: f64,
-    /// \[m\]
+    /// Position \[m\].
     pub position_m: Vector3<f64>,
-    /// \[rad\]
+    /// Yaw \[rad\].
     pub yaw_rad: f64,
 }
 
 /// A sine along one axis: amplitude sin(2 pi t / period + phase).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sine {
-    /// \[m\]
+    /// Amplitude \[m\].
     pub amplitude_m: f64,
-    /// \[s\]
+    /// Period \[s\].
     pub period_s: f64,
-    /// \[rad\]
+    /// Phase \[rad\].
     pub phase_rad: f64,
 }
 
 impl Sine {
-    /// Value and two derivatives at time `t`.
+    /// Returns value and two derivatives at time `t`.
     fn at(&self, t: f64) -> [f64; 3] {
         let rate = TAU / self.period_s;
         let (s, c) = sincos(rate * t + self.phase_rad);
@@ -78,55 +78,55 @@ impl Sine {
 /// A reference trajectory.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Trajectory {
-    /// Section IV: a tilted ellipse from 2 m to 8 m height, once round in 60 s.
+    /// Section IV: a tilted ellipse from 2 m to 8 m height with a period of 60 s.
     Paper,
-    /// One place, one heading.
+    /// A constant position and heading.
     Hover {
-        /// \[m\]
+        /// Position \[m\].
         position_m: Vector3<f64>,
-        /// \[rad\]
+        /// Yaw \[rad\].
         yaw_rad: f64,
     },
-    /// From one place to another at once.
+    /// A step of position and heading.
     Step {
-        /// Before `at_s` \[m\].
+        /// Position before `at_s` \[m\].
         from_m: Vector3<f64>,
-        /// From `at_s` on \[m\].
+        /// Position from `at_s` on \[m\].
         to_m: Vector3<f64>,
-        /// When \[s\].
+        /// Time of the step \[s\].
         at_s: f64,
-        /// Before `at_s` \[rad\].
+        /// Yaw before `at_s` \[rad\].
         yaw_rad: f64,
-        /// By how much it turns then \[rad\].
+        /// Change of yaw at `at_s` \[rad\].
         turn_rad: f64,
     },
     /// Level circle, counter-clockwise from above, starting at +x of the centre.
     Circle {
-        /// \[m\]
+        /// Centre \[m\].
         centre_m: Vector3<f64>,
-        /// \[m\]
+        /// Radius \[m\].
         radius_m: f64,
-        /// Once round \[s\].
+        /// Period \[s\].
         period_s: f64,
-        /// \[rad\]
+        /// Yaw \[rad\].
         yaw_rad: f64,
     },
-    /// One sine an axis about a centre.
+    /// A sine along each axis about a centre.
     Lissajous {
-        /// \[m\]
+        /// Centre \[m\].
         centre_m: Vector3<f64>,
-        /// x, y, z.
+        /// Sines along x, y, z.
         sines: [Sine; 3],
-        /// \[rad\]
+        /// Yaw \[rad\].
         yaw_rad: f64,
     },
-    /// Minimum-jerk motion from rest to rest between waypoints whose times rise; before the first and after the last,
-    /// rest. Position, velocity and acceleration are continuous.
+    /// Minimum-jerk motion from rest to rest between waypoints with increasing times; at rest before the first and
+    /// after the last. Position, velocity and acceleration are continuous.
     Waypoints(Vec<Waypoint>),
 }
 
 impl Trajectory {
-    /// The reference at time `t` \[s\].
+    /// Returns the reference at time `t` \[s\].
     #[inline]
     pub fn at(&self, t: f64) -> Reference {
         match self {
@@ -158,7 +158,7 @@ impl Trajectory {
     }
 }
 
-/// Section IV, with sin(a + pi/2) = cos a and sin(a + pi) = -sin a written out.
+/// Returns the reference of Section IV, with sin(a + pi/2) = cos a and sin(a + pi) = -sin a inserted.
 fn paper(t: f64) -> Reference {
     let rate = PI / 30.0;
     let (s, c) = sincos(rate * t);
@@ -172,7 +172,7 @@ fn paper(t: f64) -> Reference {
     }
 }
 
-/// Minimum jerk: 10 s^3 - 15 s^4 + 6 s^5 over each leg.
+/// Returns the minimum-jerk reference: 10 s^3 - 15 s^4 + 6 s^5 over each leg.
 fn between(waypoints: &[Waypoint], t: f64) -> Reference {
     let next = waypoints.partition_point(|waypoint| waypoint.time_s <= t);
     let before = next.checked_sub(1).and_then(|index| waypoints.get(index));

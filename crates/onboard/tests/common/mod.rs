@@ -1,4 +1,4 @@
-//! The firmware without its hardware, and stations that talk to it.
+//! The firmware without its hardware, and stations that communicate with it.
 #![allow(dead_code, unreachable_pub, clippy::expect_used, reason = "shared by tests")]
 
 use afbc_flight_core::Inbox;
@@ -27,7 +27,7 @@ impl Bench {
         }
     }
 
-    /// Armed, and carried by its rotors for long enough to be in flight.
+    /// Armed, and carried by its rotors long enough to be in flight.
     pub fn flying() -> Self {
         let mut bench = Bench::new();
         for tick in 0..2000 {
@@ -39,7 +39,7 @@ impl Bench {
         bench
     }
 
-    /// `from` says `message`.
+    /// Receives `message` from `from`.
     pub fn hear_from(&mut self, from: Address, message: Uplink) {
         self.hear_bytes(Sender::new(from).send(&message, &mut [0; FRAME_MAX]));
     }
@@ -53,22 +53,22 @@ impl Bench {
         self.hear_from(STATION, message);
     }
 
-    /// This state is measured.
+    /// Receives this state, with noise.
     pub fn measure(&mut self, state: &State) {
-        // No tracker says the same twice.
+        // A tracker never repeats a state exactly.
         let mut state = *state;
         state.position_m.z += (self.now_us % 1_000_000) as f32 * 1e-12;
         self.hear(Uplink::State { sent_us: self.now_us, state });
     }
 
-    /// A tick with nothing but what was heard; returns its report, and all that is said.
+    /// Runs a tick with what was received; returns its report and all messages.
     pub fn step(&mut self) -> (Report, Vec<Downlink>) {
         self.now_us += 1000;
         let report = self.flight.tick(self.now_us, &self.inbox.take());
         (report, self.said(&report))
     }
 
-    /// A tick with this state measured in it; returns its report, and what was said of answers and texts.
+    /// Runs a tick in which this state is received; returns its report, and the answers and texts.
     pub fn tick(&mut self, state: &State) -> (Report, Vec<Downlink>) {
         self.measure(state);
         self.hear(Uplink::Setpoint(Setpoint::default()));
@@ -77,7 +77,7 @@ impl Bench {
         (report, said)
     }
 
-    /// What is said after a tick that is reported so. It fits where the firmware puts it, and arrives.
+    /// Returns the messages after a tick with this report; checks that they fit the firmware's buffer and are decoded.
     pub fn said(&mut self, report: &Report) -> Vec<Downlink> {
         let (mut messages, mut length, mut frames) = (Vec::new(), 0, 0);
         let Bench { comms, decoder, .. } = self;

@@ -1,4 +1,4 @@
-//! Any controller inside the flight core: what a board does around its law, without the board and its link.
+//! Any controller inside the flight core, as on board, but without board and link.
 
 use super::pilot::Pilot;
 use super::sample::Sample;
@@ -9,10 +9,10 @@ use afbc_flight_core::{ArmingLimits, Asked, Inbox, Request, Stamped, Vehicle, Ve
 use afbc_types::{OutOfRange, Parameters, Setpoint, State};
 use core::convert::Infallible;
 
-/// Ticks before the first step: the flight core arms once it has measured its rate.
+/// Ticks before the first step: the flight core arms after it has measured its rate.
 const TICKS_HELD: u64 = WINDOW_US as u64 / PERIOD_US + 1;
 
-/// A controller that the flight core flies: without a state it coasts blind, then descends.
+/// A controller inside the flight core: without states it coasts blind, then descends.
 pub struct Aboard<C: FlightController> {
     vehicle: Vehicle<C>,
     memory: VehicleMemory<C::Memory>,
@@ -22,16 +22,16 @@ pub struct Aboard<C: FlightController> {
 }
 
 impl<C: FlightController> Aboard<C> {
-    /// `controller`, which was made for this vehicle, in a flight core that arms wherever it may.
+    /// Puts `controller`, which must be built for this vehicle, into a flight core without arming limits.
     ///
     /// # Errors
-    /// If the time step is not the flight core's, 1 ms.
+    /// If the time step is not 1 ms, the flight core's.
     pub fn new(vehicle: Parameters, controller: C) -> Result<Self, OutOfRange> {
         let vehicle = Vehicle::new(vehicle, ArmingLimits::NONE, controller)?;
         Ok(Aboard { vehicle, memory: VehicleMemory::default(), inbox: Inbox::default(), now_us: 0 })
     }
 
-    /// One tick, after what it is told.
+    /// Runs one tick with these inputs.
     fn tick(&mut self, state: Option<State>, setpoint: Setpoint) -> Action {
         self.now_us += PERIOD_US;
         let at_us = self.now_us;
@@ -59,7 +59,7 @@ impl<C: FlightController> Aboard<C> {
 impl<C: FlightController> Pilot for Aboard<C> {
     type Error = Infallible;
 
-    /// One tick. Before the first, as soon as there is a state, the vehicle is held where it is until it has armed.
+    /// Runs one tick. Before the first, once there is a state, the vehicle is held until it has armed.
     fn step(&mut self, world: &mut World) -> Result<Sample, Infallible> {
         let view = world.look();
         let (state, setpoint) = (view.state.filter(State::is_plausible), view.reference.setpoint());

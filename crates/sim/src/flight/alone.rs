@@ -1,4 +1,4 @@
-//! A law alone, as it is compared with others.
+//! A law without the flight core.
 
 use super::pilot::Pilot;
 use super::sample::Sample;
@@ -6,14 +6,14 @@ use super::world::World;
 use afbc_control::{FlightController, Screened};
 use core::convert::Infallible;
 
-/// A controller that turns the rotors itself.
+/// A controller that commands the rotors directly.
 pub struct Alone<C: FlightController> {
     controller: C,
     memory: Screened<C::Memory>,
 }
 
 impl<C: FlightController> Alone<C> {
-    /// `controller`, which has not flown yet.
+    /// Creates it with a controller that has not flown yet.
     pub fn new(controller: C) -> Self {
         Alone { controller, memory: Screened::default() }
     }
@@ -22,7 +22,7 @@ impl<C: FlightController> Alone<C> {
 impl<C: FlightController> Pilot for Alone<C> {
     type Error = Infallible;
 
-    // Always: copying a sample in and out of calls costs a fifth of the loop.
+    // Always inlined: copying a sample in and out of calls costs a fifth of the loop.
     #[inline(always)]
     fn step(&mut self, world: &mut World) -> Result<Sample, Infallible> {
         let view = world.look();

@@ -1,4 +1,4 @@
-//! A scenario under one contender.
+//! Flight of a scenario under one contender.
 
 use super::aboard::Aboard;
 use super::alone::Alone;
@@ -11,8 +11,8 @@ use afbc_control::FlightController;
 use afbc_types::OutOfRange;
 use core::ops::ControlFlow;
 
-/// Flies `scenario` under one contender, showing every step from t = 0 to the end; tells when the vehicle was lost, if it
-/// was.
+/// Flies `scenario` under one contender, and passes every step from t = 0 to the end to `observe`; returns when and why
+/// the vehicle was lost, if it was.
 ///
 /// # Errors
 /// The first parameter, gain or setting out of range; nothing has been flown then.

@@ -1,4 +1,4 @@
-//! The loop around world and pilot.
+//! The simulation loop.
 
 use super::pilot::Pilot;
 use super::sample::Sample;
@@ -9,29 +9,30 @@ use core::ops::ControlFlow;
 /// Distance from the reference beyond which a vehicle counts as lost \[m\].
 pub const LOST_DISTANCE_M: f64 = 50.0;
 
-/// Why and when a vehicle was given up.
+/// Time and reason of the loss of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lost {
-    /// \[s\]
+    /// Time \[s\].
     pub time_s: f64,
-    /// For people.
+    /// Reason in words.
     pub reason: &'static str,
 }
 
-/// How a flight came to its end.
+/// End of a flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct End {
     /// When and why the vehicle was lost, if it was.
     pub lost: Option<Lost>,
-    /// True if the observer broke off.
+    /// True if the observer ended it.
     pub interrupted: bool,
 }
 
-/// Flies for `duration_s`, until the vehicle is lost or `observe` breaks off, showing every step from t = 0 to the end.
+/// Flies for `duration_s`, until the vehicle is lost or `observe` ends the flight, and passes it every step from t = 0
+/// on.
 ///
 /// # Errors
-/// The pilot's own.
-// Always: a flight has one loop, and its pilot's step belongs into it.
+/// That of the pilot.
+// Always inlined: a flight has one loop, which includes its pilot's step.
 #[inline(always)]
 pub fn lockstep<P: Pilot>(
     world: &mut World,
@@ -54,8 +55,8 @@ pub fn lockstep<P: Pilot>(
     Ok(End::default())
 }
 
-/// Why the vehicle counts as lost, if it does. Assumption A3 rules out a tilt of 90 degrees; a vehicle that has come down
-/// on its feet is not lost.
+/// Returns why the vehicle counts as lost, if it does. Assumption A3 excludes a tilt of 90 degrees; a vehicle that has
+/// landed on its feet is not lost.
 fn lost(sample: &Sample) -> Option<&'static str> {
     let eta = &sample.motion.attitude_rad;
     let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();

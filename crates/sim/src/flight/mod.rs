@@ -1,8 +1,8 @@
-//! Lockstep flights: look, decide, observe, move the vehicle, once per step.
+//! Lockstep flights: measure, decide, observe, move the vehicle, once per step.
 //!
-//! A [`World`] is the vehicle, what pushes it and what is seen of it. A [`Pilot`] looks at it and says what the rotors shall
-//! do: a law [`Alone`], the flight core with a law inside ([`Aboard`]), or the firmware at the other end of a link
-//! ([`crate::in_the_loop`]). [`lockstep`] is the one loop around both.
+//! A [`World`] has the plant, its disturbances and its sensors. A [`Pilot`] reads the sensors and commands the rotors:
+//! a law [`Alone`], the flight core with a law inside ([`Aboard`]), or the firmware at the other end of a link
+//! ([`crate::in_the_loop`]). [`lockstep`] is the loop around both.
 
 mod aboard;
 mod alone;

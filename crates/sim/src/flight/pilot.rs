@@ -1,21 +1,21 @@
-//! What flies a vehicle, seen from the loop.
+//! Interface between the simulation loop and whatever flies the vehicle.
 
 use super::sample::Sample;
 use super::world::World;
 
-/// Whoever decides, once per step, what the rotors shall do.
+/// Commands the rotors once per step.
 pub trait Pilot {
-    /// Why it could not.
+    /// Error of the pilot.
     type Error;
 
-    /// One step: a look at the world, and what follows from it. A pilot that has to be started first looks as often as
-    /// that takes; the vehicle is held where it is meanwhile.
+    /// Runs one step: reads the world's sensors, and decides. A pilot that has to be started first may read them
+    /// repeatedly, while the vehicle is held.
     ///
     /// # Errors
-    /// If the pilot is gone, or does not start.
+    /// If the pilot has failed, or does not start.
     fn step(&mut self, world: &mut World) -> Result<Sample, Self::Error>;
 
-    /// Why it has given the vehicle up, if it has.
+    /// Returns why it has given up, if it has.
     fn gave_up(&self) -> Option<&'static str> {
         None
     }

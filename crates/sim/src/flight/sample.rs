@@ -1,27 +1,27 @@
-//! What a flight shows of each step.
+//! Record of one step of a flight.
 
 use crate::trajectory::Reference;
 use afbc_control::{Action, Estimate, Trace};
 use afbc_plant::{Measurement, Motion, Telemetry};
 use afbc_types::PerAxis;
 
-/// Everything there is to know at one step.
+/// All quantities of one step.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
-    /// \[s\]
+    /// Time \[s\].
     pub time_s: f64,
     /// True motion.
     pub motion: Motion,
-    /// What the sensors made of it; none if they are perfect.
+    /// Measurement by the sensors; none if they are perfect.
     pub measurement: Option<Measurement>,
-    /// What rotors, air and ground did in the step before; none of an ideal plant.
+    /// State of rotors, air and ground after the previous step; none for an ideal plant.
     pub telemetry: Option<Telemetry>,
-    /// Where the vehicle should be.
+    /// Reference at this time.
     pub reference: Reference,
-    /// What the controller decided.
+    /// The controller's output.
     pub action: Action,
-    /// Why.
+    /// The controller's trace.
     pub trace: Trace,
-    /// What the law has learnt; zero for one that learns nothing.
+    /// The law's estimates; zero for a law without adaptation.
     pub estimates: PerAxis<Estimate>,
 }

@@ -1,4 +1,4 @@
-//! The vehicle as it is, what pushes it, and what is seen of it.
+//! The plant with its disturbances and sensors.
 
 use super::sample::Sample;
 use crate::scenario::{Outage, Scenario};
@@ -7,7 +7,7 @@ use afbc_control::{Action, Estimate, Trace};
 use afbc_plant::{Measurement, Motion, Plant, Sensors, Telemetry};
 use afbc_types::{OutOfRange, PerAxis, RotorSpeeds, State};
 
-/// Everything around a pilot: plant, sensors, link and reference of a scenario.
+/// Plant, sensors, link and reference of a scenario.
 pub struct World {
     plant: Plant,
     sensors: Option<Sensors>,
@@ -16,25 +16,25 @@ pub struct World {
     dt_s: f64,
 }
 
-/// What there is to see at one time.
+/// What can be seen of the world at one time.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
-    /// \[s\]
+    /// Time \[s\].
     pub time_s: f64,
     /// True motion.
     pub motion: Motion,
-    /// What the sensors made of it; none if they are perfect.
+    /// Measurement by the sensors; none if they are perfect.
     pub measurement: Option<Measurement>,
-    /// What rotors, air and ground did in the step before; none of an ideal plant.
+    /// State of rotors, air and ground after the previous step; none for an ideal plant.
     pub telemetry: Option<Telemetry>,
-    /// Where the vehicle should be.
+    /// Reference at this time.
     pub reference: Reference,
-    /// What reaches the pilot of the motion, if anything new does.
+    /// State that reaches the pilot, if there is a new one.
     pub state: Option<State>,
 }
 
 impl World {
-    /// The world of `scenario` at t = 0, for steps of `dt_s`.
+    /// Creates the world of `scenario` at t = 0, for steps of `dt_s`.
     ///
     /// # Errors
     /// The first setting of plant or sensors out of range.
@@ -48,13 +48,13 @@ impl World {
         })
     }
 
-    /// Time from step to step \[s\].
+    /// Returns the time step \[s\].
     pub fn dt_s(&self) -> f64 {
         self.dt_s
     }
 
-    /// Measures; the vehicle stays where it is.
-    // Always: copying a view in and out of calls costs a fifth of the loop.
+    /// Measures, without moving the vehicle.
+    // Always inlined: copying a view in and out of calls costs a fifth of the loop.
     #[inline(always)]
     pub fn look(&mut self) -> View {
         let time_s = self.plant.time_s();
@@ -69,7 +69,7 @@ impl World {
         View { time_s, motion, measurement, telemetry, reference, state: state.filter(|_| !lost) }
     }
 
-    /// Moves the vehicle by one step with its rotors told to turn at `speeds`.
+    /// Moves the vehicle by one step with commanded rotor speeds `speeds`.
     #[inline]
     pub fn advance(&mut self, speeds: &RotorSpeeds) {
         self.plant.step(speeds, self.dt_s);
@@ -77,7 +77,7 @@ impl World {
 }
 
 impl View {
-    /// This view with what a pilot made of it.
+    /// Returns the sample of this view and a pilot's output.
     #[inline(always)]
     pub fn sample(self, action: Action, trace: Trace, estimates: PerAxis<Estimate>) -> Sample {
         let View { time_s, motion, measurement, telemetry, reference, .. } = self;
@@ -85,14 +85,14 @@ impl View {
     }
 }
 
-/// True if nothing that is sent at `time_s` arrives.
+/// True if a state sent at `time_s` is lost in an outage.
 #[cold]
 fn is_lost(outages: &[Outage], time_s: f64) -> bool {
     outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&time_s))
 }
 
-/// What a pilot is given of the motion, if there is anything new.
-// Apart, so that the step of an ideal flight stays short.
+/// Returns the new state for a pilot, if there is one, and the measurement.
+// Not inlined, so that the step of an ideal flight stays short.
 #[inline(never)]
 fn measure(sensors: &mut Sensors, motion: &Motion) -> (Option<State>, Option<Measurement>) {
     let measurement = sensors.measure(motion);

@@ -1,15 +1,16 @@
-//! What is flown against.
+//! Interface to an autopilot at the other end of the link.
 
 use super::Error;
 
-/// Whatever reads the link's bytes and answers with bytes.
+/// Receives the link's bytes and answers with bytes.
 pub trait Autopilot {
-    /// One millisecond of the loop: hands over `uplink`, gives `hear` what comes back, in pieces of any size.
+    /// Runs one millisecond of the loop: sends `uplink`, and passes the bytes received to `hear`, in pieces of any
+    /// size.
     ///
-    /// In lockstep this is one control tick: `hear` gets what the tick says about `uplink`. In real time it waits until
-    /// the millisecond is over, and `hear` gets what arrived meanwhile.
+    /// In lockstep this is one control tick, and `hear` gets its output. In real time it waits until the millisecond is
+    /// over, and `hear` gets what has arrived.
     ///
     /// # Errors
-    /// If the autopilot is gone.
+    /// If the autopilot has failed.
     fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error>;
 }

@@ -1,27 +1,27 @@
-//! What stops a flight in the loop.
+//! Errors of a flight in the loop.
 
 use afbc_types::OutOfRange;
 use std::fmt;
 
-/// Why a flight did not begin or come to its end. The text is one line for people.
+/// Why a flight did not start or was aborted; displayed as one line.
 #[derive(Debug)]
 pub enum Error {
-    /// The scenario wants what the firmware does not hold.
+    /// The scenario needs a setting that the firmware does not have.
     Mismatch(&'static str),
     /// The baud rate is too low for states that are fresh enough.
     Baud {
-        /// What was asked for \[baud\].
+        /// Baud rate given \[baud\].
         given: u32,
-        /// The least that will do \[baud\].
+        /// Smallest baud rate possible \[baud\].
         least: u32,
     },
-    /// Nothing that can be read comes from the vehicle.
+    /// No message from the vehicle can be read.
     Silent,
-    /// The vehicle answers, but does not arm; its last word on it.
+    /// The vehicle answers, but does not arm, with this reason.
     NotArmed(String),
     /// A parameter out of range.
     OutOfRange(OutOfRange),
-    /// The autopilot is gone, and why.
+    /// The autopilot has failed, with this error.
     Autopilot(Box<dyn std::error::Error + Send + Sync>),
     /// The log could not be written.
     Log(csv::Error),
@@ -39,7 +39,7 @@ impl fmt::Display for Error {
                 write!(f, "{given} baud is too slow for a state every 10 ms; take at least {least}")
             }
             Error::Silent => {
-                write!(f, "the vehicle says nothing; check its power, the port, the baud rate and the wires")
+                write!(f, "the vehicle sends nothing; check its power, the port, the baud rate and the wires")
             }
             Error::NotArmed(reason) => write!(f, "the vehicle did not arm: {reason}"),
             Error::OutOfRange(error) => error.fmt(f),

@@ -1,6 +1,6 @@
-//! Least, mean and greatest of many numbers.
+//! Minimum, mean and maximum of a series of numbers.
 
-/// Gathers numbers one by one.
+/// Accumulates numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Extremes {
     count: u64,
@@ -10,7 +10,7 @@ pub struct Extremes {
 }
 
 impl Extremes {
-    /// Takes one more number into account.
+    /// Adds a number.
     pub fn add(&mut self, value: f64) {
         (self.min, self.max) =
             if self.count == 0 { (value, value) } else { (self.min.min(value), self.max.max(value)) };
@@ -18,22 +18,22 @@ impl Extremes {
         self.sum += value;
     }
 
-    /// How many there were.
+    /// Returns how many were added.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// The least; 0 of none.
+    /// Returns the minimum; 0 without numbers.
     pub fn min(&self) -> f64 {
         self.min
     }
 
-    /// The mean; 0 of none.
+    /// Returns the mean; 0 without numbers.
     pub fn mean(&self) -> f64 {
         self.sum / self.count.max(1) as f64
     }
 
-    /// The greatest; 0 of none.
+    /// Returns the maximum; 0 without numbers.
     pub fn max(&self) -> f64 {
         self.max
     }

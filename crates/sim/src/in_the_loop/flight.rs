@@ -12,37 +12,37 @@ use core::ops::ControlFlow;
 
 /// Time between control ticks, and one step of the plant \[s\].
 const STEP_S: f64 = 0.001;
-/// How often arming and disarming are asked for until they are answered \[ms\].
+/// Interval of repeated requests to arm or disarm, until they are answered \[ms\].
 const ASK_EVERY_MS: u64 = 200;
-/// How long arming may take \[ms\]. The vehicle measures its rate over a second first, and ignores for three a sender
-/// whose clock was set back, which is what starting this program again looks like.
+/// Longest time for arming \[ms\]. The vehicle first measures its tick rate for a second, and ignores for three seconds
+/// a sender whose clock was set back, as happens when this program is restarted.
 const ARM_WITHIN_MS: u64 = 6_000;
-/// How long disarming may take \[ms\].
+/// Longest time for disarming \[ms\].
 const DISARM_WITHIN_MS: u64 = 1_000;
-/// A vehicle that has sent no rotor command for this long is gone \[ms\].
+/// Time without a rotor command after which the vehicle counts as gone \[ms\].
 const SILENT_MS: u64 = 500;
 
-/// How a flight came to its end.
+/// End of a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoopEnd {
     /// When and why the vehicle was lost, if it was.
     pub lost: Option<Lost>,
-    /// True if the observer broke off.
+    /// True if the observer ended it.
     pub interrupted: bool,
-    /// True if the vehicle said that its motors are off.
+    /// True if the vehicle has confirmed that its motors are off.
     pub disarmed: bool,
 }
 
-/// Who flies in the loop: AFBC in the profile `flight`, under its monitor.
+/// Returns the firmware's contender: AFBC in the profile `flight`, under its monitor.
 pub fn firmware() -> Contender {
     Contender { name: "firmware".into(), ..Contender::of(ControllerKind::Afbc, Profile::Flight).monitored() }
 }
 
-/// Whether the firmware can fly `scenario`. The [`firmware`] has its own profile; a scenario that leaves gains and settings
-/// as they are in any profile does not mind.
+/// Checks whether the firmware can fly `scenario`. The [`firmware`] has its own profile, which also replaces that of a
+/// scenario with unmodified gains and settings.
 ///
 /// # Errors
-/// [`Error::Mismatch`] names what the firmware holds otherwise.
+/// [`Error::Mismatch`] names what differs in the firmware.
 pub fn check(scenario: &Scenario) -> Result<(), Error> {
     let afbc = scenario.contender(ControllerKind::Afbc);
     let profile = |same: fn(&Contender, Profile) -> bool| {
@@ -60,11 +60,11 @@ pub fn check(scenario: &Scenario) -> Result<(), Error> {
     }
 }
 
-/// Flies `scenario`, showing every step from t = 0 to the end.
+/// Flies `scenario`, and passes every step from t = 0 to the end to `observe`.
 ///
-/// The vehicle is held where it starts until it is armed: that is t = 0. A step's [`Sample::action`] holds the rotor
-/// speeds and forces only, and nothing is known of the estimates. A vehicle that disarms in flight is lost. It is disarmed at
-/// the end, whatever the end is; after an error, the autopilot has to see to that itself.
+/// The vehicle is held at its start until it is armed, at t = 0. A step's [`Sample::action`] has only rotor speeds and
+/// forces, and the estimates are unknown. A vehicle that disarms in flight is lost. It is disarmed at the end in any
+/// case; after an error, the autopilot has to do so itself.
 ///
 /// # Errors
 /// If the firmware cannot fly the scenario, the vehicle does not arm, or the autopilot fails.
@@ -91,14 +91,14 @@ pub fn fly(
     Ok(LoopEnd { lost: flight.lost, interrupted: flight.interrupted, disarmed })
 }
 
-/// A station that talks with an autopilot, a millisecond at a time.
+/// A station connected to an autopilot, advanced by milliseconds.
 struct Line<'a, A> {
     station: &'a mut Station,
     autopilot: &'a mut A,
     pace: Pace,
     thrust_factor_n_s2: f32,
     now_ms: u64,
-    /// Since the last rotor command.
+    /// Time since the last rotor command.
     silent_ms: u64,
     has_armed: bool,
 }
@@ -106,7 +106,7 @@ struct Line<'a, A> {
 impl<A: Autopilot> Pilot for Line<'_, A> {
     type Error = Error;
 
-    /// The tick that arms the vehicle is the first.
+    /// The first step is the tick that arms the vehicle.
     fn step(&mut self, world: &mut World) -> Result<Sample, Error> {
         let view = if self.has_armed { self.turn(world)? } else { self.arm(world)? };
         let speeds = self.station.heard().speeds;
@@ -120,7 +120,7 @@ impl<A: Autopilot> Pilot for Line<'_, A> {
 }
 
 impl<A: Autopilot> Line<'_, A> {
-    /// One millisecond: says what is due, hears what comes.
+    /// Runs one millisecond: sends what is due, and receives.
     fn turn(&mut self, world: &mut World) -> Result<View, Error> {
         let Line { station, autopilot, pace, now_ms, silent_ms, .. } = self;
         let view = world.look();
@@ -141,7 +141,7 @@ impl<A: Autopilot> Line<'_, A> {
         if *silent_ms > SILENT_MS { Err(Error::Silent) } else { Ok(view) }
     }
 
-    /// Asks for `command` again and again, until it is `done` or `within_ms` is over; what was to be seen when it was done.
+    /// Repeats `command` until it is `done` or `within_ms` is over; returns the view at the time when it was done.
     fn ask(
         &mut self,
         command: Command,
@@ -161,7 +161,7 @@ impl<A: Autopilot> Line<'_, A> {
         Ok(None)
     }
 
-    /// Arms a vehicle that is held where it is, or that was left armed by whoever was here before.
+    /// Arms a vehicle that is held, or that a previous run has left armed.
     fn arm(&mut self, world: &mut World) -> Result<View, Error> {
         if self.disarm(world)?
             && let Some(view) = self.ask(Command::Arm, world, ARM_WITHIN_MS, |heard| heard.armed)?
@@ -173,7 +173,7 @@ impl<A: Autopilot> Line<'_, A> {
         Err(Error::NotArmed(reason.into()))
     }
 
-    /// True if the vehicle says that it has disarmed.
+    /// True if the vehicle confirms that it has disarmed.
     fn disarm(&mut self, world: &mut World) -> Result<bool, Error> {
         let done = |heard: &Heard| heard.answer == Some(Answer::Accepted) && !heard.armed;
         Ok(self.ask(Command::Kill, world, DISARM_WITHIN_MS, done)?.is_some())

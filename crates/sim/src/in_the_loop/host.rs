@@ -6,7 +6,7 @@ use afbc_flight_core::rate::PERIOD_US;
 use afbc_onboard::{Comms, Flight, Report};
 use afbc_types::OutOfRange;
 
-/// What the firmware is without its hardware, ticked in lockstep.
+/// The firmware without its hardware, ticked in lockstep.
 pub struct Host {
     flight: Flight,
     comms: Comms,
@@ -14,26 +14,26 @@ pub struct Host {
     time_us: u64,
 }
 
-/// What one control tick did.
+/// Result of one control tick.
 #[derive(Clone, Debug)]
 pub struct Tick {
-    /// What it decided.
+    /// Report of the control tick.
     pub report: Report,
-    /// What went out over the link.
+    /// Bytes sent over the link.
     pub bytes: Vec<u8>,
 }
 
 impl Host {
-    /// Powered up, disarmed.
+    /// Creates it powered up and disarmed.
     ///
     /// # Errors
-    /// The first parameter out of range; none in fact.
+    /// The first parameter out of range; does not occur.
     pub fn new() -> Result<Self, OutOfRange> {
         Ok(Host { flight: Flight::new()?, comms: Comms::new(), inbox: Inbox::default(), time_us: 0 })
     }
 
-    /// One control tick at `time_us` since power-up: `uplink` reached the link before it. It says that it took `cycles`
-    /// cycles of 168 MHz.
+    /// Runs one control tick at `time_us` since power-up, after `uplink` has reached the link. The tick reports a
+    /// duration of `cycles` cycles of 168 MHz.
     pub fn tick(&mut self, uplink: &[u8], time_us: u64, cycles: u32) -> Tick {
         self.inbox.post(&self.comms.receive(uplink));
         let report = self.flight.tick(time_us, &self.inbox.take());
@@ -43,7 +43,7 @@ impl Host {
         Tick { report, bytes }
     }
 
-    /// The tick that follows a millisecond after the last one, and takes no time.
+    /// Runs the tick a millisecond after the previous one, with a duration of zero.
     pub fn next_tick(&mut self, uplink: &[u8]) -> Tick {
         self.tick(uplink, self.time_us + PERIOD_US, 0)
     }

@@ -1,4 +1,4 @@
-//! A flight as a CSV file.
+//! CSV log of a flight in the loop.
 
 use super::Error;
 use crate::columns::MOTION;
@@ -7,20 +7,20 @@ use csv::Writer;
 use std::fs::File;
 use std::path::Path;
 
-/// Steps from row to row: 100 Hz.
+/// Steps per row: 100 Hz.
 const EVERY: u64 = 10;
 
 /// Rotors of the vehicle in the loop.
 const ROTORS: usize = 4;
 
-/// Writes a row every 10 ms: the vehicle's true motion, the reference, the rotor speeds that came over the link.
+/// Writes a row every 10 ms with the vehicle's true motion, the reference, and the rotor speeds from the link.
 pub struct Log {
     rows: Writer<File>,
     steps: u64,
 }
 
 impl Log {
-    /// Begins the file at `path`, over what was there.
+    /// Creates the file at `path`, overwriting an existing one.
     ///
     /// # Errors
     /// [`Error::Log`].
@@ -31,7 +31,7 @@ impl Log {
         Ok(Log { rows, steps: 0 })
     }
 
-    /// Takes one step into account.
+    /// Records one step.
     ///
     /// # Errors
     /// [`Error::Log`].
@@ -46,7 +46,7 @@ impl Log {
         Ok(())
     }
 
-    /// Ends the file.
+    /// Completes the file.
     ///
     /// # Errors
     /// [`Error::Log`].

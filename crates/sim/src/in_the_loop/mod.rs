@@ -1,17 +1,16 @@
-//! Flights in which the autopilot is the firmware, or stands in for it: the plant here, the law there, and between them
-//! nothing but the bytes of [`afbc_link`].
+//! Flights with the firmware, or a replacement for it, as autopilot: the plant here, the law there, connected by the
+//! bytes of [`afbc_link`] only.
 //!
 //! # Reading order
 //!
-//! 1. [`Autopilot`]: what takes bytes and gives bytes, once a millisecond.
-//! 2. [`Host`]: the firmware's code in this process. Other programs bring an emulated processor, or a board at the end of a
+//! 1. [`Autopilot`]: receives and sends bytes once per millisecond.
+//! 2. [`Host`]: the firmware's code in this process. Other implementations are an emulated processor, and a board on a
 //!    serial port.
-//! 3. [`Station`]: tracker, commander and listener in one, the other end of the link.
-//! 4. [`fly()`]: arms, lets the vehicle go, flies a scenario, disarms. [`Pace`] is how often it speaks.
+//! 3. [`Station`]: tracker, commander and ground station, at the other end of the link.
+//! 4. [`fly()`]: arms, releases the vehicle, flies a scenario, disarms. [`Pace`] sets the message rates.
 //!
-//! The firmware holds the paper's vehicle and flies its own law ([`firmware`]); a scenario that wants others is refused
-//! ([`check`]).
-//! Everything around the vehicle is the scenario's: equations, gusts, true parameters, start, trajectory.
+//! The firmware has the paper's vehicle and its own law ([`firmware`]); a scenario with others is refused ([`check`]).
+//! Plant, gusts, true parameters, start and trajectory are the scenario's.
 
 mod autopilot;
 mod error;

@@ -1,40 +1,40 @@
-//! How often the station speaks.
+//! Message rates of the station.
 
 use super::Error;
 
-/// Frames of a state, of a setpoint and of a question on the wire \[bytes\].
+/// Sizes of the frames of a state, a setpoint and a question \[bytes\].
 const STATE_BYTES: u64 = 242;
 const SETPOINT_BYTES: u64 = 65;
 const PING_BYTES: u64 = 45;
 /// Start bit, eight data bits, stop bit.
 const BITS_PER_BYTE: u64 = 10;
-/// Share of the line that may be used: what is left over lets a backlog go \[%\].
+/// Share of the line that is used; the rest lets a backlog drain \[%\].
 const LINE_USE_PERCENT: u64 = 90;
-/// Longest time between states \[ms\]: half of what the vehicle flies on.
+/// Longest time between states \[ms\]: half of the age at which they are stale.
 const STATE_PERIOD_MAX_MS: u64 = 10;
 /// Time between setpoints, and between questions, on a serial line \[ms\].
 const SETPOINT_PERIOD_MS: u64 = 10;
 const PING_PERIOD_MS: u64 = 100;
 
-/// Time from one message to the next \[ms\].
+/// Periods of messages \[ms\].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pace {
-    /// Of states.
+    /// Period of states.
     pub state_ms: u64,
-    /// Of setpoints.
+    /// Period of setpoints.
     pub setpoint_ms: u64,
-    /// Of questions that time the link, if any.
+    /// Period of questions that measure the round trip, if any.
     pub ping_ms: Option<u64>,
 }
 
 impl Pace {
-    /// Both at every control tick: what a flight without a link gets.
+    /// Both in every control tick, as without a link.
     pub const LOCKSTEP: Pace = Pace { state_ms: 1, setpoint_ms: 1, ping_ms: None };
 
-    /// As many states as a serial line of `baud` carries, a whole number of milliseconds apart.
+    /// Returns the rates for a serial line of `baud`: as many states as possible, with a period in whole milliseconds.
     ///
     /// # Errors
-    /// [`Error::Baud`] if they would be more than 10 ms apart.
+    /// [`Error::Baud`] if the period of states would exceed 10 ms.
     pub fn at(baud: u32) -> Result<Self, Error> {
         let bytes_per_s = u64::from(baud) * LINE_USE_PERCENT / 100 / BITS_PER_BYTE;
         let state_ms = bytes_per_s
@@ -49,13 +49,13 @@ impl Pace {
         }
     }
 
-    /// States in a second.
+    /// Returns the number of states per second.
     pub fn state_hz(&self) -> f64 {
         1000.0 / self.state_ms as f64
     }
 }
 
-/// What setpoints and questions take of a serial line.
+/// Returns the bytes per second of setpoints and questions.
 const fn other_bytes_per_s() -> u64 {
     SETPOINT_BYTES * 1000 / SETPOINT_PERIOD_MS + PING_BYTES * 1000 / PING_PERIOD_MS
 }

@@ -1,9 +1,9 @@
-//! Figures of merit, for the terminal.
+//! Tracking errors for the terminal.
 
 use crate::metrics::{Metrics, SETTLED_S};
 use nalgebra::Vector4;
 
-/// How well the vehicle kept to its reference over `duration_s` in the loop, beside the same flight without a link.
+/// Formats the tracking errors over `duration_s` in the loop, next to those of the same flight without a link.
 pub fn tracking(duration_s: f64, in_the_loop: &Metrics, without_link: &Metrics) -> String {
     type Values = fn(&Metrics) -> Vector4<f64>;
     let mut blocks: Vec<(&str, Values)> = Vec::new();

@@ -1,4 +1,4 @@
-//! The other end of the link.
+//! The simulator's end of the link.
 
 use super::Extremes;
 use afbc_flight_core::Refusal;
@@ -9,12 +9,12 @@ use afbc_onboard::BUSY;
 use afbc_types::{RotorSpeeds, Setpoint, State};
 use std::time::Instant;
 
-/// A ground station, by the usual numbers.
+/// Usual address of a ground station.
 const ADDRESS: Address = Address { system: 255, component: 190 };
-/// A command that the vehicle does not know, and says so: that shows how long an answer takes.
+/// An unsupported command, whose answer measures the round trip.
 const PING: u16 = MavCmd::MAV_CMD_REQUEST_MESSAGE as u16;
 
-/// Tracker, commander and listener in one.
+/// Tracker, commander and ground station.
 pub struct Station {
     sender: Sender,
     uplink: Vec<u8>,
@@ -25,22 +25,22 @@ pub struct Station {
     round_trip_ms: Extremes,
 }
 
-/// What the vehicle has said.
+/// Messages received from the vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Heard {
-    /// What the rotors were last told.
+    /// Last commanded rotor speeds.
     pub speeds: RotorSpeeds,
-    /// True if the motors may turn, by the last rotor command.
+    /// True if the motors may turn, from the last rotor command.
     pub armed: bool,
-    /// Rotor commands so far.
+    /// Number of rotor commands.
     pub rotor_commands: u64,
-    /// Its last report.
+    /// Last health message.
     pub health: Option<Health>,
-    /// Oldest state that it has reported to fly on, while armed \[us\].
+    /// Largest age of the state that it has reported while armed \[us\].
     pub state_age_max_us: f32,
     /// The answer to the last request to arm or disarm.
     pub answer: Option<Answer>,
-    /// Its last words.
+    /// Last text.
     pub text: Option<Text>,
 }
 
@@ -51,7 +51,7 @@ impl Default for Station {
 }
 
 impl Station {
-    /// Nothing said, nothing heard.
+    /// Creates a station that has sent and received nothing.
     pub fn new() -> Self {
         Station {
             sender: Sender::new(ADDRESS),
@@ -64,40 +64,40 @@ impl Station {
         }
     }
 
-    /// Adds a message to what is said next.
+    /// Queues a message.
     pub fn say(&mut self, message: &Uplink) {
         self.uplink.extend_from_slice(self.sender.send(message, &mut [0; FRAME_MAX]));
     }
 
-    /// Adds a measured state, `sent_us` on this side's clock, which must rise from state to state.
+    /// Queues a measured state with the time `sent_us` on this side's clock, which must increase.
     pub fn track(&mut self, sent_us: u64, state: State) {
         self.say(&Uplink::State { sent_us, state });
     }
 
-    /// Adds a setpoint.
+    /// Queues a setpoint.
     pub fn lead(&mut self, setpoint: Setpoint) {
         self.say(&Uplink::Setpoint(setpoint));
     }
 
-    /// Adds a command. The answer to the last one no longer counts.
+    /// Queues a command, and forgets the previous answer.
     pub fn command(&mut self, command: Command) {
         self.heard.answer = None;
         self.say(&Uplink::Command(command));
     }
 
-    /// Adds a question whose answer is timed from now on.
+    /// Queues a question, and starts timing its answer.
     pub fn ping(&mut self) {
         self.say(&Uplink::Command(Command::Other(PING)));
         self.pings += 1;
         self.pinged = Some(Instant::now());
     }
 
-    /// All that was said since the last time.
+    /// Returns all bytes queued since the last call.
     pub fn take(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.uplink)
     }
 
-    /// Takes the next bytes from the vehicle.
+    /// Processes bytes from the vehicle.
     pub fn hear(&mut self, bytes: &[u8]) {
         let Station { decoder, heard, pinged, round_trip_ms, .. } = self;
         decoder.feed(bytes, |_, message| match message {
@@ -118,38 +118,38 @@ impl Station {
                 heard.health = Some(health);
             }
             Downlink::Text { text, .. } => heard.text = Some(text),
-            // Heartbeats, attitudes, positions.
+            // Heartbeats, attitudes and positions are not used.
             _ => {}
         });
     }
 
-    /// What the vehicle has said.
+    /// Returns what the vehicle has sent.
     pub fn heard(&self) -> &Heard {
         &self.heard
     }
 
-    /// What came in, and what was dropped and why.
+    /// Returns the reception counts.
     pub fn counters(&self) -> &Counters {
         self.decoder.counters()
     }
 
-    /// Time from a question handed over to its answer \[ms\].
+    /// Returns the time from sending a question to its answer \[ms\].
     pub fn round_trip_ms(&self) -> &Extremes {
         &self.round_trip_ms
     }
 
-    /// Questions without an answer.
+    /// Returns the number of questions without an answer.
     pub fn unanswered(&self) -> u64 {
         self.pings - self.round_trip_ms.count()
     }
 }
 
 impl Heard {
-    /// Why the vehicle would not arm, in words.
+    /// Returns the reason for which the vehicle refused to arm.
     pub fn refusal(&self) -> Option<&'static str> {
         let Some(Answer::Refused(number)) = self.answer else { return None };
         let known = Refusal::ALL.into_iter().find(|refusal| *refusal as i32 == number).map(Refusal::reason);
-        let busy = (number == BUSY).then_some("refused: too many requests wait");
+        let busy = (number == BUSY).then_some("refused: too many requests are queued");
         Some(known.or(busy).unwrap_or("arming refused: reason unknown"))
     }
 }

@@ -28,7 +28,7 @@ fn the_link_in_between_changes_nothing_that_matters() {
     let (end, looped) = fly_host(&scenario);
     assert_eq!(end, LoopEnd { lost: None, interrupted: false, disarmed: true });
     let plain = Run::fly(&scenario, &firmware(), u64::MAX).unwrap().metrics;
-    // The wire rounds the attitude to a quaternion of f32, and has no yaw acceleration.
+    // The link rounds the attitude to an f32 quaternion, and has no yaw acceleration.
     assert!((looped.rmse - plain.rmse).amax() < 1e-3, "{} {}", looped.rmse, plain.rmse);
     assert!((looped.max_abs - plain.max_abs).amax() < 5e-3, "{} {}", looped.max_abs, plain.max_abs);
 }
@@ -94,7 +94,7 @@ fn the_observer_can_break_off() {
     assert_eq!(steps, 100);
 }
 
-/// What does not reach a law alone does not reach the firmware either: it comes down, and says that its motors are off.
+/// Outages apply to the firmware, too: the vehicle descends, and reports that its motors are off.
 #[test]
 fn a_link_that_stays_down_ends_the_flight() {
     let mut scenario = scenario("hover", 20.0);

@@ -1,14 +1,14 @@
-//! What the [list of laws](super) makes of each of its entries.
+//! The macro that expands the [list of laws](super).
 
 /// Declares the control laws, each with
 ///
-/// * `name`: lower-case name, as in scenario files and logs; `title`: name for people;
-/// * `prefix`: begins the names of its gains on a ground station;
+/// * `name`: lower-case name, as in scenario files and logs; `title`: name in tables and figures;
+/// * `prefix`: prefix of its gains' names on a ground station;
 /// * `in_cascade`: whether it is a law of AFBC's cascade, with the cascade's settings and gains for each axis;
 /// * `gains`: their type;
-/// * `tuned`: the gains that fly, where AFBC's are those given;
-/// * `by_hand`: the gains that a search begins with;
-/// * `controller`: what flies a vehicle.
+/// * `tuned`: the tuned gains, given AFBC's;
+/// * `by_hand`: the hand-tuned gains, from which a search starts;
+/// * `controller`: its controller.
 macro_rules! laws {
     ($(
         #[doc = $doc:literal]
@@ -33,22 +33,23 @@ macro_rules! laws {
             /// Every law.
             pub const ALL: [ControllerKind; [$($name),*].len()] = [$( ControllerKind::$Law ),*];
 
-            /// Lower-case name, as in scenario files and logs.
+            /// Returns the lower-case name, as in scenario files and logs.
             pub const fn name(self) -> &'static str {
                 match self { $( ControllerKind::$Law => $name, )* }
             }
 
-            /// Name for people.
+            /// Returns the name for tables and figures.
             pub const fn title(self) -> &'static str {
                 match self { $( ControllerKind::$Law => $title, )* }
             }
 
-            /// What the names of its gains begin with on a ground station.
+            /// Returns the prefix of its gains' names on a ground station.
             pub const fn prefix(self) -> &'static str {
                 match self { $( ControllerKind::$Law => $prefix, )* }
             }
 
-            /// True if it is a law of AFBC's cascade, with gains for each axis; the others have one set for the whole vehicle.
+            /// True for a law of AFBC's cascade, with gains for each axis; the others have one set for the whole
+            /// vehicle.
             pub const fn in_cascade(self) -> bool {
                 match self { $( ControllerKind::$Law => $in_cascade, )* }
             }
@@ -62,8 +63,8 @@ macro_rules! laws {
         }
 
         impl Law {
-            /// The law of this kind with the gains that fly, where AFBC's are `afbc`: those that it shares with AFBC, or else
-            /// its own.
+            /// Returns the law of this kind with its tuned gains, given AFBC's `afbc`: those that it shares with AFBC,
+            /// or its own.
             pub fn beside(kind: ControllerKind, afbc: &afbc_types::PerAxis<afbc::adaptive::Gains>) -> Self {
                 match kind {
                     $( ControllerKind::$Law => {
@@ -73,20 +74,20 @@ macro_rules! laws {
                 }
             }
 
-            /// The law of this kind with gains by hand, where a search begins.
+            /// Returns the law of this kind with hand-tuned gains, from which a search starts.
             pub fn by_hand(kind: ControllerKind) -> Self {
                 match kind { $( ControllerKind::$Law => Law::$Law($by_hand), )* }
             }
 
-            /// Which law it is.
+            /// Returns the kind of the law.
             pub const fn kind(&self) -> ControllerKind {
                 match self { $( Law::$Law(_) => ControllerKind::$Law, )* }
             }
 
-            /// Does something with the law's controller for a vehicle with these nominal parameters.
+            /// Runs `task` with the law's controller for a vehicle with these nominal parameters.
             ///
             /// # Errors
-            /// The first parameter, gain or setting out of range, or what `task` returns.
+            /// The first parameter, gain or setting out of range, or the error of `task`.
             pub fn build<T: crate::contender::Task>(
                 &self,
                 vehicle: afbc_types::Parameters,
@@ -103,7 +104,7 @@ macro_rules! laws {
         }
 
         impl afbc_types::Declared for Law {
-            /// Shows each gain; those of a law in the cascade in a group for each axis.
+            /// Visits each gain; those of a law in the cascade in a group for each axis.
             fn visit_mut<E>(&mut self, visit: &mut impl afbc_types::Visit<E>) -> Result<(), E> {
                 match self { $( Law::$Law(gains) => gains.visit_mut(visit), )* }
             }

@@ -31,7 +31,7 @@ declare::laws! {
             Controller::new(vehicle, settings, Backstepping::new(&vehicle, gains)?)
         },
     }
-    /// Cascaded PID, as autopilots fly.
+    /// Cascaded PID, as in autopilots.
     Pid {
         name: "pid",
         title: "PID",
@@ -71,7 +71,7 @@ impl ControllerKind {
     pub const PAPER: [ControllerKind; 2] = [ControllerKind::Afbc, ControllerKind::Backstepping];
 }
 
-/// AFBC's gains by hand, for the settings of the profile `flight`.
+/// Returns AFBC's hand-tuned gains, for the settings of the profile `flight`.
 fn by_hand() -> PerAxis<adaptive::Gains> {
     PerAxis::from_fn(|axis| {
         let (alpha1, alpha2, gamma, eta, delta_max) = match axis {

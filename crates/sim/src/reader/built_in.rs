@@ -1,21 +1,21 @@
-//! Files that come with the program: each is a template too.
+//! Files that come with the program, which are also templates.
 
 use super::error::FileError;
 use super::words::nearest;
 
-/// A file that comes with the program, and what it describes.
+/// A built-in file.
 #[derive(Clone, Copy, Debug)]
 pub struct BuiltIn<T: 'static> {
-    /// What the command line knows it by.
+    /// Name on the command line.
     pub name: &'static str,
-    /// The file.
+    /// Text of the file.
     pub text: &'static str,
-    /// Reads it: what errors call it, its text, its name.
+    /// Parses it, given the file's name for errors, its text and its name.
     parse: fn(&str, &str, &str) -> Result<T, FileError>,
 }
 
 impl<T> BuiltIn<T> {
-    /// The file `text` called `name`, which `parse` reads.
+    /// Creates the file `text` called `name`, which `parse` reads.
     pub const fn new(
         name: &'static str,
         text: &'static str,
@@ -24,20 +24,20 @@ impl<T> BuiltIn<T> {
         BuiltIn { name, text, parse }
     }
 
-    /// What the file describes.
+    /// Parses the file.
     ///
     /// # Errors
-    /// None in fact: a test reads every one.
+    /// Does not occur: a test reads every file.
     pub fn read(&self) -> Result<T, FileError> {
         (self.parse)(&format!("built-in {}", self.name), self.text, self.name)
     }
 
-    /// The one of `all` called `name`.
+    /// Returns the one of `all` called `name`.
     pub fn named(all: &'static [Self], name: &str) -> Option<&'static Self> {
         all.iter().find(|built_in| built_in.name == name)
     }
 
-    /// The one of `all` that somebody who wrote `name` may have meant.
+    /// Returns the one of `all` whose name is similar to `name`.
     pub fn similar(all: &'static [Self], name: &str) -> Option<&'static Self> {
         nearest(name, all.iter().map(|built_in| built_in.name)).and_then(|known| Self::named(all, known))
     }

@@ -1,8 +1,8 @@
-//! What is wrong with a scenario file, in one line.
+//! Errors in TOML files.
 
 use std::fmt;
 
-/// One line for people: `FILE:LINE: KEY: what is wrong; the cure`. A file that cannot be read has no line and no key.
+/// An error as one line: `FILE:LINE: KEY: problem; remedy`. An unreadable file has no line and no key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileError {
     file: String,
@@ -12,24 +12,24 @@ pub struct FileError {
 }
 
 impl FileError {
-    /// The file as a whole is of no use.
+    /// Creates an error about the file as a whole.
     pub fn whole(file: &str, problem: impl Into<String>) -> Self {
         FileError { file: file.into(), line: None, key: String::new(), problem: problem.into() }
     }
 
-    /// Something at byte `at` of `text`; `key` is empty if it is not about a key.
+    /// Creates an error at byte `at` of `text`; `key` is empty if it concerns no key.
     pub fn at(source: Source<'_>, at: usize, key: impl Into<String>, problem: impl Into<String>) -> Self {
         let line = 1 + source.text.bytes().take(at).filter(|&byte| byte == b'\n').count();
         FileError { file: source.file.into(), line: Some(line), key: key.into(), problem: problem.into() }
     }
 }
 
-/// A file's name, as the user gave it, and its text.
+/// A file's name, as given by the user, and its text.
 #[derive(Clone, Copy, Debug)]
 pub struct Source<'a> {
-    /// As it was asked for.
+    /// Name as given.
     pub file: &'a str,
-    /// All of it.
+    /// The whole text.
     pub text: &'a str,
 }
 
@@ -43,7 +43,7 @@ impl fmt::Display for FileError {
             line += &format!(": {}", self.key);
         }
         line += &format!(": {}", self.problem);
-        // Quoted keys, strings and file names may hold line breaks; this is one line whatever they hold.
+        // Quoted keys, strings and file names may contain line breaks; the error must be one line.
         line.chars()
             .try_for_each(|c| if c.is_control() { write!(f, "{}", c.escape_default()) } else { write!(f, "{c}") })
     }

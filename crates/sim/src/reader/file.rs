@@ -1,4 +1,4 @@
-//! What every TOML file of ours has: a size, a syntax, a name and a description.
+//! Reading of TOML files: size, syntax, name and description.
 
 use super::error::{FileError, Source};
 use super::table::Table;
@@ -9,13 +9,13 @@ use toml::de::DeTable;
 
 /// Longest name.
 const NAME_LENGTH: usize = 64;
-/// Largest file that is read at all \[bytes\].
+/// Largest file accepted \[bytes\].
 const FILE_SIZE: u64 = 1 << 20;
 
-/// The text of a file of this `kind`, of which there are built-in ones too.
+/// Returns the text of a file of this `kind`, which also has built-in files.
 ///
 /// # Errors
-/// If it cannot be read, or is too large or no text.
+/// If it cannot be read, is too large, or is not text.
 pub fn text(path: &Path, kind: &str) -> Result<String, FileError> {
     let read = || {
         let mut text = String::new();
@@ -36,10 +36,10 @@ pub fn text(path: &Path, kind: &str) -> Result<String, FileError> {
     })
 }
 
-/// Lets `read` make something of the `text` of a TOML file; `sitl SAMPLE` prints one that is right.
+/// Parses the `text` of a TOML file with `read`; `sitl SAMPLE` prints a valid one.
 ///
 /// # Errors
-/// If it is not TOML, and whatever `read` finds.
+/// If it is not TOML, and the errors of `read`.
 pub fn document<T>(
     file: &str,
     text: &str,
@@ -51,10 +51,10 @@ pub fn document<T>(
     read(Table::root(source, document.get_ref()))
 }
 
-/// Name and description; `name` if there is none.
+/// Returns name and description; the name is `name` if the file has none.
 ///
 /// # Errors
-/// If the name cannot be a part of a file name, or the description is more than a line.
+/// If the name cannot be part of a file name, or the description has several lines.
 pub fn title(root: &mut Table<'_>, name: &str) -> Result<[String; 2], FileError> {
     let name = root.text("name")?.unwrap_or(name).to_owned();
     if !is_file_name(&name) {
@@ -68,7 +68,7 @@ pub fn title(root: &mut Table<'_>, name: &str) -> Result<[String; 2], FileError>
     Ok([name, description])
 }
 
-/// What keeps a text from being TOML.
+/// Returns the error of a text that is not TOML.
 fn syntax(source: Source<'_>, error: &toml::de::Error, sample: &str) -> FileError {
     let span = error.span().unwrap_or_default();
     let near = source.text.get(span.clone()).and_then(|text| text.lines().next()).unwrap_or_default();
@@ -78,7 +78,7 @@ fn syntax(source: Source<'_>, error: &toml::de::Error, sample: &str) -> FileErro
     FileError::at(source, span.start, "syntax", problem)
 }
 
-/// Safe as a part of a file name on every system.
+/// True if `name` is valid in file names on every system.
 fn is_file_name(name: &str) -> bool {
     let safe = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_';
     (1..=NAME_LENGTH).contains(&name.len()) && name.bytes().all(safe)

@@ -1,4 +1,4 @@
-//! TOML files, read so that whatever is wrong is told in one line.
+//! Reading of TOML files, with errors of one line.
 
 mod built_in;
 mod error;

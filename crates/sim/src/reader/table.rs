@@ -1,4 +1,4 @@
-//! Typed reading of TOML: every value is checked as it is read, and a key that nobody read is refused.
+//! Typed access to TOML: every value is checked as it is read, and unknown keys are refused.
 
 use super::error::{FileError, Source};
 use super::words::{self, nearest, one_of};
@@ -7,52 +7,53 @@ use nalgebra::Vector3;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Most tables of one array that each step of a flight has to look at.
+/// Largest length of an array of tables that is searched in each step of a flight.
 const MOST: usize = 100;
 
-/// One table of a document, and which of its keys have been read.
+/// One table of a document, and its keys read so far.
 pub struct Table<'a> {
     source: Source<'a>,
-    /// Its dotted name; empty for the document itself.
+    /// Its dotted name; empty for the document.
     path: String,
-    /// Where it starts: what is missing is missing from here.
+    /// Its start, to which errors about missing keys refer.
     start: usize,
     entries: &'a DeTable<'a>,
     read: Vec<&'static str>,
-    /// Declared keys among them, with the symbols of their units.
+    /// Declared keys among those read, with their unit symbols.
     units: Vec<(&'static str, &'static str)>,
 }
 
 impl<'a> Table<'a> {
-    /// The document as a table.
+    /// Returns the document as a table.
     pub fn root(source: Source<'a>, entries: &'a DeTable<'a>) -> Self {
         Table { source, path: String::new(), start: 0, entries, read: Vec::new(), units: Vec::new() }
     }
 
-    /// The number under `range.name`, if it is there.
+    /// Returns the number under `range.name`, if present.
     pub fn number(&mut self, range: &Range) -> Result<Option<f64>, FileError> {
         let Some(value) = self.value(range.name) else { return Ok(None) };
         self.number_in(value, range.name, range).map(Some)
     }
 
-    /// The number under `range.name`, which must be there.
+    /// Returns the number under `range.name`, which is required.
     pub fn need_number(&mut self, range: &Range) -> Result<f64, FileError> {
         let number = self.number(range)?;
         self.require(range)?;
         Ok(number.unwrap_or_default())
     }
 
-    /// Every key of `parameters` that is there; the others stay as they are. A group within them has a table of its own.
+    /// Reads every key of `parameters` that is present; the others keep their values. Each group has a table of its
+    /// own.
     pub fn declared(&mut self, parameters: &mut impl Declared) -> Result<(), FileError> {
         self.declared_in("", parameters)
     }
 
-    /// Every key of this group within `parameters` that is there; the others stay as they are.
+    /// Reads every key of this group of `parameters` that is present; the others keep their values.
     pub fn declared_in(&mut self, group: &str, parameters: &mut impl Declared) -> Result<(), FileError> {
         self.declared_where(parameters, |declaration| declaration.group == group)
     }
 
-    /// Every key of `parameters` that is there, but `elsewhere`; the others stay as they are.
+    /// Reads every key of `parameters` that is present, except `elsewhere`; the others keep their values.
     pub fn declared_but(&mut self, elsewhere: &str, parameters: &mut impl Declared) -> Result<(), FileError> {
         self.declared_where(parameters, |Declaration { group, range, .. }| group.is_empty() && range.name != elsewhere)
     }
@@ -85,7 +86,7 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// Refuses a table in which `range.name` is missing.
+    /// Returns an error if `range.name` is missing.
     pub fn require(&self, range: &Range) -> Result<(), FileError> {
         if self.has(range.name) {
             return Ok(());
@@ -93,19 +94,19 @@ impl<'a> Table<'a> {
         Err(self.missing(range.name, &format!("add it{}", self.unit(range.name))))
     }
 
-    /// True if something stands under `key`.
+    /// True if `key` is present.
     pub fn has(&self, key: &str) -> bool {
         self.entries.contains_key(key)
     }
 
-    /// The whole number under `range.name`, to the last digit, if it is there.
+    /// Returns the whole number under `range.name`, exactly, if present.
     pub fn whole(&mut self, range: &Range) -> Result<Option<u64>, FileError> {
         let Some(value) = self.value(range.name) else { return Ok(None) };
         let (min, max) = (range.min as i128, range.max as i128);
         let bounds = format!("it must lie within {} to {}", words::number(range.min), words::number(range.max));
         let outside = |number: &str| self.refuse(value, range.name, format!("{number} is out of range: {bounds}"));
         match value.get_ref() {
-            // Through no float, which would round it.
+            // Without conversion to a float, which would round it.
             DeValue::Integer(integer) => {
                 let number = i128::from_str_radix(integer.as_str(), integer.radix()).ok();
                 let number = number.filter(|number| (min..=max).contains(number)).and_then(|n| u64::try_from(n).ok());
@@ -124,7 +125,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The interval `[low, high]` under `range.name`, or a single number that is both, if it is there.
+    /// Returns the interval `[low, high]` under `range.name`, or both ends from a single number, if present.
     pub fn interval(&mut self, range: &Range) -> Result<Option<[f64; 2]>, FileError> {
         let Some(value) = self.value(range.name) else { return Ok(None) };
         let number = |value| self.number_in(value, range.name, range);
@@ -146,7 +147,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The three numbers under `key`, each in its range, if they are there.
+    /// Returns the three numbers under `key`, each within its range, if present.
     pub fn vector(&mut self, key: &'static str, ranges: [&Range; 3]) -> Result<Option<Vector3<f64>>, FileError> {
         let Some(value) = self.value(key) else { return Ok(None) };
         let ([rx, ry, rz], array) = (ranges, value.get_ref().as_array());
@@ -160,24 +161,24 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The three numbers under `key`, which must be there, each in `range`.
+    /// Returns the three numbers under `key`, which are required, each within `range`.
     pub fn need_vector(&mut self, key: &'static str, range: &Range) -> Result<Vector3<f64>, FileError> {
         let vector = self.vector(key, [range; 3])?;
         vector.ok_or_else(|| self.missing(key, &format!("add three numbers{}", self.unit(key))))
     }
 
-    /// The string under `key`, if it is there.
+    /// Returns the string under `key`, if present.
     pub fn text(&mut self, key: &'static str) -> Result<Option<&'a str>, FileError> {
         let Some(value) = self.value(key) else { return Ok(None) };
         self.text_in(value, key).map(Some)
     }
 
-    /// The string under `key`, which must be there.
+    /// Returns the string under `key`, which is required.
     pub fn need_text(&mut self, key: &'static str, cure: &str) -> Result<&'a str, FileError> {
         self.text(key)?.ok_or_else(|| self.missing(key, cure))
     }
 
-    /// The strings listed under `key`, if the list is there.
+    /// Returns the strings in the list under `key`, if present.
     pub fn texts(&mut self, key: &'static str) -> Result<Option<Vec<&'a str>>, FileError> {
         let Some(value) = self.value(key) else { return Ok(None) };
         let Some(array) = value.get_ref().as_array() else {
@@ -186,7 +187,7 @@ impl<'a> Table<'a> {
         array.iter().map(|item| self.text_in(item, key)).collect::<Result<_, _>>().map(Some)
     }
 
-    /// The option whose name stands under `key`, if it is there.
+    /// Returns the option named under `key`, if present.
     pub fn choice<T: Copy>(
         &mut self,
         key: &'static str,
@@ -197,7 +198,7 @@ impl<'a> Table<'a> {
         self.choice_in(value, key, options, name).map(Some)
     }
 
-    /// The option whose name stands under `key`, which must be there.
+    /// Returns the option named under `key`, which is required.
     pub fn need_choice<T: Copy>(
         &mut self,
         key: &'static str,
@@ -208,7 +209,7 @@ impl<'a> Table<'a> {
         choice.ok_or_else(|| self.missing(key, &format!("it must be {}", one_of(options, name))))
     }
 
-    /// The options whose names are listed under `key`, at least one and none twice, if the list is there.
+    /// Returns the options named in the list under `key`, at least one and none twice, if present.
     pub fn choices<T: Copy + PartialEq>(
         &mut self,
         key: &'static str,
@@ -233,19 +234,19 @@ impl<'a> Table<'a> {
         Ok(Some(chosen))
     }
 
-    /// The table under `key`, if it is there.
+    /// Returns the table under `key`, if present.
     pub fn table(&mut self, key: &'static str) -> Result<Option<Table<'a>>, FileError> {
         let Some(value) = self.value(key) else { return Ok(None) };
         self.table_in(value, key, &format!("one table: [{}]", self.dotted(key))).map(Some)
     }
 
-    /// The table under `key`, if there is one rather than something else.
+    /// Returns the table under `key`, if present and a table.
     pub fn table_if(&mut self, key: &'static str) -> Result<Option<Table<'a>>, FileError> {
         let is_table = self.entries.get(key).is_some_and(|value| value.get_ref().is_table());
         if is_table { self.table(key) } else { Ok(None) }
     }
 
-    /// The tables of the array under `key`; none if it is not there.
+    /// Returns the tables of the array under `key`; none if it is missing.
     pub fn tables(&mut self, key: &'static str) -> Result<Vec<Table<'a>>, FileError> {
         let Some(value) = self.value(key) else { return Ok(Vec::new()) };
         let wanted = format!("[[{}]], once for each", self.dotted(key));
@@ -255,7 +256,7 @@ impl<'a> Table<'a> {
         array.iter().map(|item| self.table_in(item, key, &wanted)).collect()
     }
 
-    /// The tables of the array under `key`, at most 100.
+    /// Returns the tables of the array under `key`, at most 100.
     pub fn few_tables(&mut self, key: &'static str) -> Result<Vec<Table<'a>>, FileError> {
         let tables = self.tables(key)?;
         if tables.len() > MOST {
@@ -264,19 +265,19 @@ impl<'a> Table<'a> {
         Ok(tables)
     }
 
-    /// True or false, as it stands under `key`, if it is there.
+    /// Returns the boolean under `key`, if present.
     pub fn boolean(&mut self, key: &'static str) -> Result<Option<bool>, FileError> {
         let Some(value) = self.value(key) else { return Ok(None) };
         let boolean = value.get_ref().as_bool();
         boolean.map(Some).ok_or_else(|| self.wrong_type(value, key, "true or false", "true or false without quotes"))
     }
 
-    /// True if a table stands under `key`.
+    /// True if a table is under `key`.
     pub fn holds_table(&self, key: &str) -> bool {
         self.entries.get(key).is_some_and(|value| value.get_ref().is_table())
     }
 
-    /// Refuses the first key, from the top, that nobody read.
+    /// Returns an error for the first key that was not read.
     pub fn finish(self) -> Result<(), FileError> {
         let Some((key, start)) = self.unread().min_by_key(|(_, start)| *start) else { return Ok(()) };
         let cure = match nearest(key, self.read.iter().copied()) {
@@ -286,23 +287,23 @@ impl<'a> Table<'a> {
         Err(self.unknown(key, start, &cure))
     }
 
-    /// Refuses `key`, which has its place elsewhere.
+    /// Returns an error if `key` is present, since it belongs elsewhere.
     pub fn forbid(&self, key: &str, problem: &str) -> Result<(), FileError> {
         if self.has(key) { Err(self.fault_at(key, problem)) } else { Ok(()) }
     }
 
-    /// The whole table is refused on account of `key`.
+    /// Returns an error about the whole table, naming `key`.
     pub fn fault(&self, key: &str, problem: impl Into<String>) -> FileError {
         FileError::at(self.source, self.start, self.dotted(key), problem)
     }
 
-    /// The value under `key` is refused.
+    /// Returns an error about the value under `key`.
     pub fn fault_at(&self, key: &str, problem: impl Into<String>) -> FileError {
         let start = self.entries.get(key).map_or(self.start, |value| value.span().start);
         FileError::at(self.source, start, self.dotted(key), problem)
     }
 
-    /// `key` is needed and not there, unless an unread key looks like a slip of the pen.
+    /// Returns the error that `key` is missing, or that a similar unknown key is a misspelling.
     pub fn missing(&self, key: &'static str, cure: &str) -> FileError {
         let slip = nearest(key, self.unread().map(|(unread, _)| unread));
         match self.unread().find(|(unread, _)| Some(*unread) == slip) {
@@ -311,18 +312,18 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The unit of `key`, for people.
+    /// Returns the unit of `key` in words, as [`words::unit`].
     fn unit(&self, key: &str) -> String {
         let symbol = self.units.iter().find(|(declared, _)| *declared == key).map_or("", |(_, symbol)| symbol);
         words::unit(key, symbol)
     }
 
-    /// The cure for a slip of the pen.
+    /// Suggests `key` for a misspelt one.
     fn did_you_mean(&self, key: &str) -> String {
         format!("did you mean {key}{}?", self.unit(key))
     }
 
-    /// The keys that nobody has read, and where they stand.
+    /// Returns the keys that were not read, with their positions.
     fn unread(&self) -> impl Iterator<Item = (&str, usize)> {
         let keys = self.entries.iter().map(|(key, _)| (key.get_ref().as_ref(), key.span().start));
         keys.filter(|(key, _)| !self.read.contains(key))
@@ -403,7 +404,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Whether a float is a whole number as it is written, before any rounding; one that is not finite is another matter.
+/// True if a float is written as a whole number; infinities and NaN are handled elsewhere.
 fn is_whole(float: &str) -> bool {
     let number = float.parse().unwrap_or(f64::NAN);
     let is_round = float.contains(['e', 'E'])

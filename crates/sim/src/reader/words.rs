@@ -1,11 +1,11 @@
-//! Words for people: units, numbers, suggestions.
+//! Units, numbers and suggestions in messages.
 
 use afbc_types::OutOfRange;
 
-/// How alike two words must be for "did you mean".
+/// Smallest similarity of two words for "did you mean".
 const LIKENESS: f64 = 0.8;
 
-/// What the endings of keys mean, longest ending first.
+/// Units by the endings of keys, longest ending first.
 const UNITS: [(&str, &str); 24] = [
     ("_kg_m3", "kilograms per cubic metre"),
     ("_n_s2_m", "newton seconds squared per metre"),
@@ -33,8 +33,8 @@ const UNITS: [(&str, &str); 24] = [
     ("_w", "watts"),
 ];
 
-/// Returns ` (kilograms)` for `mass_kg`, and for a key that does not end in a unit ` (1/s)`, the symbol that is declared
-/// of it, if any.
+/// Returns ` (kilograms)` for `mass_kg`; for a key that does not end in a unit, its declared symbol as in ` (1/s)`, if
+/// any.
 pub fn unit(key: &str, symbol: &str) -> String {
     match UNITS.iter().find(|(ending, _)| key.ends_with(ending)) {
         Some((_, words)) => format!(" ({words})"),
@@ -43,27 +43,27 @@ pub fn unit(key: &str, symbol: &str) -> String {
     }
 }
 
-/// A number for people: decimal where that is short.
+/// Formats a number, in decimal notation where that is short.
 pub fn number(value: f64) -> String {
     if value == 0.0 || (1e-4..1e7).contains(&value.abs()) { format!("{value}") } else { format!("{value:e}") }
 }
 
-/// What is out of range, as a controller or plant found it.
+/// Formats an out-of-range error of a controller or plant.
 pub fn out_of_range(error: &OutOfRange) -> String {
     let OutOfRange { value, range } = error;
-    // To f32 precision, for a decimal in a file may have come through one.
+    // With f32 precision, since a decimal in a file may have been converted to f32.
     let (value, min, max) = (*value as f32, number(range.min), number(range.max));
     format!("{} = {value}, out of range: it must lie within {min} to {max}", range.name)
 }
 
-/// The word most like `word`, if any is like it at all.
+/// Returns the most similar word to `word`, if any is similar enough.
 pub fn nearest<'w>(word: &str, words: impl Iterator<Item = &'w str>) -> Option<&'w str> {
     let rated = words.map(|other| (strsim::jaro_winkler(word, other), other));
     let (likeness, best) = rated.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
     (likeness >= LIKENESS).then_some(best)
 }
 
-/// `"step", "circle" or "hover"`.
+/// Formats a list such as `"step", "circle" or "hover"`.
 pub fn one_of<T: Copy>(options: &[T], name: fn(T) -> &'static str) -> String {
     let quoted: Vec<_> = options.iter().map(|&option| format!("\"{}\"", name(option))).collect();
     match quoted.split_last() {

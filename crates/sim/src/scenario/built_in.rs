@@ -17,12 +17,12 @@ pub static BUILT_IN: [BuiltIn<Scenario>; 9] = [
     BuiltIn::new("storm", include_str!("../../scenarios/storm.toml"), parse),
 ];
 
-/// The built-in scenario called `name`.
+/// Returns the built-in scenario called `name`.
 pub fn built_in(name: &str) -> Option<&'static BuiltIn<Scenario>> {
     BuiltIn::named(&BUILT_IN, name)
 }
 
-/// The built-in scenario that somebody who wrote `name` may have meant.
+/// Returns the built-in scenario whose name is similar to `name`.
 pub fn similar_built_in(name: &str) -> Option<&'static BuiltIn<Scenario>> {
     BuiltIn::similar(&BUILT_IN, name)
 }

@@ -1,4 +1,4 @@
-//! What is flown: one vehicle, one trajectory, one environment, the controllers to compare.
+//! Definition of a scenario: one vehicle, one trajectory, one environment, the controllers to compare.
 
 use crate::case::Case;
 use crate::contender::{Contender, ControllerKind};
@@ -10,45 +10,45 @@ use afbc_types::{OutOfRange, Parameters, Range};
 /// Accepted length of a flight \[s\].
 pub const DURATION: Range = Range::new("duration_s", 0.1, 36_000.0);
 
-/// Accepted roll and pitch of a vehicle that the flight core is to arm \[rad\].
+/// Accepted roll and pitch of a vehicle to be armed by the flight core \[rad\].
 const ARMING_TILT: Range = Range::new("attitude_rad", -TILT_MAX, TILT_MAX);
 const TILT_MAX: f64 = ArmingLimits::TILT_MAX.range.max;
 
-/// An interval in which no state arrives: a link that is down.
+/// An interval in which no state arrives, since the link is down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outage {
-    /// From \[s\].
+    /// Start \[s\].
     pub start_s: f64,
-    /// To, where states arrive again \[s\].
+    /// End, from which states arrive again \[s\].
     pub end_s: f64,
 }
 
 /// Everything that determines a flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scenario {
-    /// Short name: file names come from it.
+    /// Short name, used in file names.
     pub name: String,
-    /// One line for people.
+    /// Description in one line.
     pub description: String,
-    /// Which reading of the paper's experiment this is, if it is one.
+    /// Variant of the paper's experiment, if it is one.
     pub case: Option<Case>,
     /// Length of the flight \[s\].
     pub duration_s: f64,
-    /// Equations that move the vehicle.
+    /// Equations of motion.
     pub model: Model,
-    /// The vehicle as the controllers believe it to be.
+    /// Nominal parameters, known to the controllers.
     pub vehicle: Parameters<f64>,
-    /// The vehicle as it is, and what pushes it.
+    /// True parameters with their changes, gusts and payloads.
     pub environment: Environment,
-    /// What rotors, air and ground add to the equations. Its own seed is not used.
+    /// Effects of rotors, air and ground. Its own seed is not used.
     pub realism: Realism,
-    /// How the motion is measured.
+    /// Properties of the measurement.
     pub sensing: Sensing,
-    /// When no state arrives at all.
+    /// Outages of the link.
     pub outages: Vec<Outage>,
     /// Whether the controllers fly inside the [flight core](crate::flight::Aboard), as on board.
     pub flight_core: bool,
-    /// Of everything random. The same seed gives the same flight.
+    /// Seed of all random effects. The same seed gives the same flight.
     pub seed: u64,
     /// Motion at t = 0.
     pub initial: Motion,
@@ -59,12 +59,12 @@ pub struct Scenario {
 }
 
 impl Scenario {
-    /// The first contender that flies a law of this kind.
+    /// Returns the first contender with a law of this kind.
     pub fn contender(&self, kind: ControllerKind) -> Option<&Contender> {
         self.contenders.iter().find(|contender| contender.kind() == kind)
     }
 
-    /// Builds every flight once, just as it would begin.
+    /// Checks the scenario by building every flight.
     ///
     /// # Errors
     /// The first parameter, gain or setting out of range.
@@ -77,10 +77,10 @@ impl Scenario {
         })
     }
 
-    /// Whether the flight core could take every contender up, if it is to.
+    /// Checks, if the flight core is used, whether it can fly every contender.
     ///
     /// # Errors
-    /// The first time step or tilt out of its range.
+    /// The first time step or tilt out of range.
     pub fn check_flight_core(&self) -> Result<(), OutOfRange> {
         if !self.flight_core {
             return Ok(());
@@ -97,7 +97,7 @@ impl Scenario {
         self.realism == Realism { seed: self.realism.seed, ..Realism::default() }
     }
 
-    /// The vehicle at t = 0, made for steps of `step_s`; the ideal one if nothing real was asked for.
+    /// Returns the vehicle at t = 0 for steps of `step_s`; an ideal one if no other effects are set.
     ///
     /// # Errors
     /// The first setting out of range.
@@ -110,7 +110,7 @@ impl Scenario {
         Plant::with_realism(self.model, self.initial, environment, &realism, step_s)
     }
 
-    /// The sensors, read every `step_s`; none if they are perfect.
+    /// Returns the sensors, read every `step_s`; none if they are perfect.
     ///
     /// # Errors
     /// The first setting out of range.

@@ -1,4 +1,4 @@
-//! What is flown: one vehicle, one trajectory, one environment, the controllers to compare.
+//! Scenarios: one vehicle, one trajectory, one environment, the controllers to compare.
 //!
 //! A scenario comes from [`crate::paper`], from a file ([`load`]) or from the [`built_in()`] ones.
 

@@ -1,4 +1,4 @@
-//! `controllers`, `profile`, `monitor` and `[[contender]]`: who flies.
+//! `controllers`, `profile`, `monitor` and `[[contender]]`: the contenders.
 
 use super::control::{per_axis, settings, whole};
 use crate::contender::{Contender, ControllerKind, Law};
@@ -6,10 +6,10 @@ use crate::reader::{FileError, Table};
 use afbc::{Profile, Settings, adaptive};
 use afbc_types::{Parameters, PerAxis};
 
-/// Longest name of a contender: what a table has room for.
+/// Longest name of a contender that fits the tables.
 const NAME_LENGTH: usize = 32;
 
-/// What a contender starts from.
+/// Defaults of a contender.
 #[derive(Clone, Copy)]
 struct Defaults {
     gains: PerAxis<adaptive::Gains>,
@@ -26,7 +26,7 @@ impl Defaults {
     }
 }
 
-/// Everyone who flies, those of `controllers` first.
+/// Reads all contenders, those of `controllers` first.
 pub(super) fn read(root: &mut Table<'_>, vehicle: &Parameters) -> Result<Vec<Contender>, FileError> {
     let controllers = root.choices("controllers", &ControllerKind::ALL, ControllerKind::name)?;
     let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(Profile::Paper);

@@ -1,4 +1,4 @@
-//! `[gains.AXIS]`, `[settings]` and `[limits]`, of a file or of a contender.
+//! `[gains.AXIS]`, `[settings]` and `[limits]` of a file or a contender.
 
 use crate::reader::words::out_of_range;
 use crate::reader::{FileError, Table};
@@ -6,7 +6,7 @@ use afbc::Settings;
 use afbc::fuzzy::Membership;
 use afbc_types::{Axis, Declared};
 
-/// Gains of which each axis has a table; what is left out stays as it is.
+/// Reads gains with a table for each axis; missing keys are unchanged.
 pub(super) fn per_axis(table: Option<Table<'_>>, gains: &mut impl Declared) -> Result<(), FileError> {
     let Some(mut table) = table else { return Ok(()) };
     for axis in Axis::ALL {
@@ -17,15 +17,15 @@ pub(super) fn per_axis(table: Option<Table<'_>>, gains: &mut impl Declared) -> R
     table.finish()
 }
 
-/// Gains of the whole vehicle, in one table; what is left out stays as it is.
+/// Reads gains of the whole vehicle in one table; missing keys are unchanged.
 pub(super) fn whole(table: Option<Table<'_>>, gains: &mut impl Declared) -> Result<(), FileError> {
     table.map_or(Ok(()), |table| group(table, "", gains))
 }
 
-/// One group of gains, which has a table of its own.
+/// Reads one group of gains, which has a table of its own.
 fn group(mut table: Table<'_>, name: &str, gains: &mut impl Declared) -> Result<(), FileError> {
     table.declared_in(name, gains)?;
-    // Each gain is in its range; what is left to refuse is how centre and width go together.
+    // Each gain is in its range; only the combination of centre and width remains to be checked.
     gains.together().map_err(|error| {
         let problem = format!("{}; change one of the two", out_of_range(&error));
         table.fault_at(Membership::CENTRE.range.name, problem)
@@ -33,7 +33,8 @@ fn group(mut table: Table<'_>, name: &str, gains: &mut impl Declared) -> Result<
     table.finish()
 }
 
-/// `[settings]` and `[limits]` in `parent`; what they leave out is as in `default`. Only the file's own have a time step.
+/// Reads `[settings]` and `[limits]` in `parent`; missing keys are as in `default`. Only the file's own have a time
+/// step.
 pub(super) fn settings(parent: &mut Table<'_>, default: Settings, with_step: bool) -> Result<Settings, FileError> {
     let mut settings = default;
     if let Some(mut table) = parent.table("settings")? {

@@ -1,4 +1,4 @@
-//! `[[gust]]`, `[[change]]`, `[[payload]]` and `[[outage]]`: what happens to the vehicle in flight.
+//! `[[gust]]`, `[[change]]`, `[[payload]]` and `[[outage]]`: events in flight.
 
 use crate::reader::words::out_of_range;
 use crate::reader::{FileError, Table};
@@ -6,34 +6,34 @@ use crate::scenario::definition::Outage;
 use afbc_plant::{Environment, Gust, GustKind, PAYLOAD_BELOW, ParameterChange, Payload, Quantity};
 use afbc_types::{Axis, Parameters, Range};
 
-/// Accepted start of whatever happens in flight \[s\].
+/// Accepted start of an event \[s\].
 pub(super) const START: Range = Range::new("start_s", 0.0, 36_000.0);
-/// Accepted length of it \[s\]; what has none stays to the end.
+/// Accepted duration of an event \[s\]; without one it lasts to the end.
 pub(super) const LENGTH: Range = Range::new("duration_s", 0.001, 36_000.0);
-/// Accepted factor of a change; the parameter must stay in range too.
+/// Accepted factor of a change; the result must also be in range.
 const FACTOR: Range = Range::new("factor", 0.001, 1000.0);
 /// Accepted mass of a payload \[kg\].
 const PAYLOAD_MASS: Range = Range::new("mass_kg", 0.0, afbc_plant::PAYLOAD_MASS.max);
 
-/// How large a gust along x, y or z may be.
+/// Accepted sizes of a gust along x, y or z.
 const LINEAR: [(Range, GustKind); 2] = [
     (Range::new("acceleration_m_s2", -1000.0, 1000.0), GustKind::Acceleration),
     (Range::new("force_n", -10_000.0, 10_000.0), GustKind::Force),
 ];
-/// How large a gust about roll, pitch or yaw may be.
+/// Accepted sizes of a gust about roll, pitch or yaw.
 const ANGULAR: [(Range, GustKind); 2] = [
     (Range::new("angular_acceleration_rad_s2", -1000.0, 1000.0), GustKind::Acceleration),
     (Range::new("moment_n_m", -10_000.0, 10_000.0), GustKind::Force),
 ];
 
-/// The environment of a vehicle with these true parameters.
+/// Reads the environment of a vehicle with these true parameters.
 pub(super) fn read(root: &mut Table<'_>, truth: Parameters<f64>) -> Result<Environment, FileError> {
     let gusts = root.tables("gust")?.into_iter().map(gust).collect::<Result<_, _>>()?;
     let tables = root.few_tables("change")?;
     let mut environment = Environment::new(truth, Vec::new(), gusts)
         .map_err(|error| root.fault_at("truth", format!("{}; change it", out_of_range(&error))))?;
     for mut table in tables {
-        // Changes that overlap multiply, so each is checked together with those before it.
+        // Overlapping changes multiply, so each is checked together with those before it.
         let mut changes = environment.changes().to_vec();
         changes.push(change(&mut table)?);
         environment = Environment::new(truth, changes, environment.gusts().to_vec()).map_err(|error| {
@@ -52,7 +52,7 @@ pub(super) fn read(root: &mut Table<'_>, truth: Parameters<f64>) -> Result<Envir
     Ok(environment)
 }
 
-/// When no state arrives.
+/// Reads the outages.
 pub(super) fn outages(root: &mut Table<'_>) -> Result<Vec<Outage>, FileError> {
     let outage = |mut table: Table<'_>| {
         let [start_s, end_s] = interval(&mut table)?;

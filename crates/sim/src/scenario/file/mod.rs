@@ -1,4 +1,4 @@
-//! Scenario files. The format is described, key by key, in `docs/scenarios.md`.
+//! Scenario files. `docs/scenarios.md` describes each key.
 
 mod contenders;
 mod control;
@@ -21,32 +21,32 @@ use afbc_plant::Model;
 use afbc_types::{Parameters, Range};
 use std::path::Path;
 
-/// Length of a flight that does not say how long it is \[s\].
+/// Default duration of a flight \[s\].
 const DURATION_S: f64 = 60.0;
 /// Accepted seeds.
 const SEED: Range = Range::new("seed", 0.0, 1e9);
 /// Reads and checks the scenario file at `path`.
 ///
 /// # Errors
-/// One line on the first thing that is wrong.
+/// The first mistake, as one line.
 pub fn load(path: &Path) -> Result<Scenario, FileError> {
     let text = reader::text(path, "scenario")?;
     let stem = path.file_stem().map_or("".into(), |stem| stem.to_string_lossy());
     parse(&path.display().to_string(), &text, &stem)
 }
 
-/// Reads and checks a scenario from its `text`. Errors call it `file`; `name` is its name if it gives none itself.
+/// Reads and checks a scenario from its `text`. `file` is its path for errors, `name` its name if it has no other.
 ///
 /// # Errors
-/// One line on the first thing that is wrong.
+/// The first mistake, as one line.
 pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> {
     reader::document(file, text, "scenarios hover", |root| read(root, name, None))
 }
 
-/// The scenario in `root`; `name` and `trajectory` are its own if it gives none itself.
+/// Reads the scenario in `root`; `name` and `trajectory` are the defaults.
 ///
 /// # Errors
-/// One line on the first thing that is wrong.
+/// The first mistake, as one line.
 pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) -> Result<Scenario, FileError> {
     let [name, description] = reader::title(&mut root, name)?;
     let duration_s = root.number(&DURATION)?.unwrap_or(DURATION_S);
@@ -94,7 +94,7 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
         let cure = "change that, or leave flight_core out";
         root.fault_at("flight_core", format!("it cannot fly with {}; {cure}", out_of_range(&error)))
     })?;
-    // Whatever the tables have let through, no flight begins with.
+    // Final check of combinations that the tables accept.
     scenario.check().map_err(|error| root.fault(error.range.name, format!("{}; change it", out_of_range(&error))))?;
     root.finish()?;
     Ok(scenario)

@@ -1,4 +1,4 @@
-//! `[initial]`: how the flight begins.
+//! `[initial]`: the initial state.
 
 use crate::reader::{FileError, Table};
 use crate::trajectory::Reference;
@@ -17,7 +17,7 @@ const YAW: Range = Range::new("attitude_rad", -100.0, 100.0);
 /// Accepted rate about each axis \[rad/s\].
 const RATES: Range = Range::new("rates_rad_s", -100.0, 100.0);
 
-/// The motion in `table`; what it leaves out is as at the start of the reference, level and not turning.
+/// Reads the motion in `table`; missing keys are as at the start of the reference, level and without rates.
 pub(super) fn initial(table: Option<Table<'_>>, start: &Reference) -> Result<Motion, FileError> {
     let default = Motion {
         position_m: start.position_m,

@@ -1,4 +1,5 @@
-//! `[rotors]`, `[[rotor_fault]]`, `[battery]`, `[drag]`, `[wind]` and `[ground]`: what the paper's vehicle leaves out.
+//! `[rotors]`, `[[rotor_fault]]`, `[battery]`, `[drag]`, `[wind]` and `[ground]`: effects that the paper's vehicle
+//! lacks.
 
 use super::environment::{LENGTH, START};
 use crate::reader::words::out_of_range;
@@ -9,12 +10,12 @@ use afbc_plant::{
 };
 use afbc_types::{Declared, OutOfRange, Parameters, Range};
 
-/// Accepted largest force of a rotor \[N\]; the speed that goes with it must be in range too.
+/// Accepted largest force of a rotor \[N\]; the corresponding speed must be in range, too.
 const FORCE_MAX: Range = Range::new("force_max_n", 0.001, 10_000.0);
 /// Accepted time from a gust's rise to its fall \[s\].
 const HOLD: Range = Range::new("hold_s", 0.0, LENGTH.max);
 
-/// What is real about a vehicle with these true parameters, in steps of `step_s`.
+/// Reads the effects for a vehicle with these true parameters, in steps of `step_s`.
 pub(super) fn read(root: &mut Table<'_>, truth: &Parameters<f64>, step_s: f64) -> Result<Realism, FileError> {
     let rotors = rotors(root, truth)?;
     let drag = match root.table("drag")? {
@@ -35,7 +36,7 @@ pub(super) fn read(root: &mut Table<'_>, truth: &Parameters<f64>, step_s: f64) -
     Ok(Realism { rotors, drag, wind, contact, ground_effect, seed: 0 })
 }
 
-/// `table` is refused on account of how its numbers go together.
+/// Returns errors about the combination of numbers in `table`.
 fn together(table: &Table<'_>) -> impl Fn(OutOfRange) -> FileError {
     |error| table.fault_at(error.range.name, format!("{}; change it", out_of_range(&error)))
 }
@@ -58,7 +59,7 @@ fn rotors(root: &mut Table<'_>, truth: &Parameters<f64>) -> Result<Rotors, FileE
     Ok(rotors)
 }
 
-/// The largest speed, if it is given by the force that goes with it.
+/// Reads the largest speed from a force, if it is given as one.
 fn max_by_force(table: &mut Table<'_>, rotors: &mut Rotors, truth: &Parameters<f64>) -> Result<(), FileError> {
     let max = &Rotors::MAX.range;
     let Some(force_n) = table.number(&FORCE_MAX)? else { return Ok(()) };
@@ -120,7 +121,7 @@ fn wind_of(mut table: Table<'_>) -> Result<Wind, FileError> {
     Ok(wind)
 }
 
-/// A name, or a table.
+/// Reads turbulence by name or as a table.
 fn turbulence_of(table: &mut Table<'_>) -> Result<Option<Turbulence>, FileError> {
     if !table.holds_table("turbulence") {
         let named = [Turbulence::LIGHT, Turbulence::MODERATE, Turbulence::SEVERE];

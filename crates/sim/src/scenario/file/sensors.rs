@@ -1,14 +1,14 @@
-//! `[sensors]`: what reaches the controllers of the true motion.
+//! `[sensors]`: measurement of the state for the controllers.
 
 use crate::reader::{FileError, Table};
 use afbc_plant::{Deviations, Dropouts, Sensing};
 use afbc_types::Range;
 
-/// Accepted size of one number for all of the state: what every part of it accepts.
+/// Accepted single number for all coordinates: the range that every coordinate accepts.
 const NOISE: Range = Range::new("noise", 0.0, Deviations::ATT.range.max);
 const BIAS: Range = Range::new("bias", 0.0, Deviations::ATT.range.max);
 
-/// The sensors of `table`; without one, perfect ones.
+/// Reads the sensors of `table`; perfect ones without it.
 pub(super) fn read(table: Option<Table<'_>>) -> Result<Sensing, FileError> {
     let Some(mut table) = table else { return Ok(Sensing::default()) };
     let mut sensing = Sensing::DEFAULT;
@@ -20,7 +20,7 @@ pub(super) fn read(table: Option<Table<'_>>) -> Result<Sensing, FileError> {
     Ok(sensing)
 }
 
-/// One number for all of the state, or a table with one for each part of it.
+/// Reads one number for all coordinates, or a table with one for each group.
 fn spread(table: &mut Table<'_>, all: &Range) -> Result<Deviations, FileError> {
     if !table.holds_table(all.name) {
         return Ok(table.number(all)?.map_or(Deviations::default(), Deviations::all));

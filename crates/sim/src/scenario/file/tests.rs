@@ -1,4 +1,4 @@
-//! Built-in scenarios against the code, and `docs/scenarios.md` against both.
+//! Built-in scenarios compared with the code, and `docs/scenarios.md` with both.
 
 #![expect(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
@@ -29,7 +29,7 @@ fn built_in_scenarios_are_valid_and_named_after_their_files() {
     }
 }
 
-/// One section of the page: its example, and its table's rows of key, range and default.
+/// One section of the page: its example, and the rows of its table with key, range and default.
 struct Section {
     example: String,
     rows: Vec<[String; 3]>,
@@ -50,13 +50,13 @@ fn sections() -> Vec<Section> {
     sections
 }
 
-/// The scenario of an example, with a trajectory if it has none.
+/// Parses an example, with a trajectory added if it has none.
 fn example(text: &str) -> Result<Scenario, FileError> {
     let hover = "\n[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
     parse("example", &format!("{text}{}", if text.contains("[trajectory]") { "" } else { hover }), "example")
 }
 
-/// `text` with the first line that sets `key` replaced.
+/// Replaces the first line of `text` that sets `key`.
 fn with_line(text: &str, key: &str, line: &str) -> String {
     let start = format!("{key} = ");
     let old = text.lines().find(|line| line.starts_with(&start)).unwrap_or_else(|| panic!("no {key} in {text}"));
@@ -71,7 +71,8 @@ fn documented_examples_are_valid_and_complete() {
         example(&text).unwrap_or_else(|error| panic!("{error} in\n{text}"));
         for line in text.lines().filter(|line| line.contains(" = ")) {
             let documented = rows.iter().any(|[key, ..]| line.starts_with(&format!("{} = ", key.trim_matches('`'))));
-            // What kind of table it is, and the head of a contender whose gains are the section's subject.
+            // The kind of a trajectory, and the head of a contender whose gains are the section's subject, are not in
+            // the table.
             let head = ["kind", "name", "controller"].iter().any(|key| line.starts_with(&format!("{key} = ")));
             assert!(documented || head, "{line}");
         }
@@ -87,7 +88,7 @@ fn documented_ranges_are_those_of_the_code() {
             if key == "name" || !range.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
                 continue;
             }
-            // Of "-1.5 to 1.5; yaw -100 to 100", "0 to 1e9, whole" the first is tried.
+            // Of "-1.5 to 1.5; yaw -100 to 100" and "0 to 1e9, whole" the first part is used.
             let range = range.split([';', ',']).next().unwrap().trim_end_matches(" each");
             let vector = text.contains(&format!("{key} = ["));
             let value = if vector { "[1e300, 1e300, 1e300]" } else { "1e300" };
@@ -122,7 +123,7 @@ fn documented_defaults_are_those_of_the_code() {
     assert!(checked > 35, "{checked}");
 }
 
-/// Whatever is done to a line of a file, either it is still a scenario that can be flown, or one line says what is wrong.
+/// With any damage to a line of a file, either it is a valid scenario, or there is one line with the error.
 #[test]
 fn damaged_files_get_one_line() {
     let values =

@@ -1,4 +1,4 @@
-//! `[trajectory]`: the reference, one table whose `kind` decides what else is in it.
+//! `[trajectory]`: the reference, a table whose `kind` determines its keys.
 
 use super::motion::POSITION;
 use crate::reader::{FileError, Table};
@@ -11,13 +11,13 @@ use nalgebra::Vector3;
 const YAW: Range = Range::new("yaw_rad", -100.0, 100.0);
 /// Accepted radius of a circle \[m\].
 const RADIUS: Range = Range::new("radius_m", 0.0, 10_000.0);
-/// Accepted time once round \[s\].
+/// Accepted period \[s\].
 const PERIOD: Range = Range::new("period_s", 0.1, 36_000.0);
 /// Accepted amplitude of a sine \[m\].
 const AMPLITUDE: Range = Range::new("amplitude_m", -10_000.0, 10_000.0);
 /// Accepted phase of a sine \[rad\].
 const PHASE: Range = Range::new("phase_rad", -100.0, 100.0);
-/// Accepted turn of a step \[rad\].
+/// Accepted change of heading at a step \[rad\].
 const TURN: Range = Range::new("turn_rad", -100.0, 100.0);
 /// Accepted time of a step \[s\].
 const STEP_TIME: Range = Range::new("at_s", 0.0, 36_000.0);
@@ -112,7 +112,7 @@ fn waypoints(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
                 );
                 return Err(table.fault_at(WAYPOINT_TIME.name, problem));
             }
-            // Peaks of minimum-jerk motion: 15/8 and 10/sqrt(3) of the mean.
+            // Peaks of minimum-jerk motion: 15/8 and 10/sqrt(3) times the mean.
             let leg_m = (waypoint.position_m - before.position_m).amax();
             slow_enough(&table, WAYPOINT_TIME.name, 1.875 * leg_m / length_s, 5.774 * leg_m / (length_s * length_s))?;
         }
@@ -125,7 +125,7 @@ fn waypoints(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     Ok(Trajectory::Waypoints(waypoints))
 }
 
-/// Refuses a reference that would be too fast for a controller to accept.
+/// Returns an error if the reference is too fast for a controller to accept.
 fn slow_enough(table: &Table<'_>, key: &str, speed_m_s: f64, acceleration_m_s2: f64) -> Result<(), FileError> {
     let along_x = |size: f64| Vector3::new(size as f32, 0.0, 0.0);
     let fastest = Setpoint {

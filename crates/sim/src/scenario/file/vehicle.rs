@@ -1,9 +1,9 @@
-//! `[vehicle]`, what the controller believes, and `[truth]`, what flies.
+//! `[vehicle]`, the nominal parameters, and `[truth]`, the true ones.
 
 use crate::reader::{FileError, Table};
 use afbc_types::Parameters;
 
-/// The parameters in `table`; those that it leaves out are as in `default`.
+/// Reads the parameters in `table`; missing keys are as in `default`.
 pub(super) fn read(table: Option<Table<'_>>, default: Parameters<f64>) -> Result<Parameters<f64>, FileError> {
     let mut vehicle = default;
     if let Some(mut table) = table {
