@@ -1,4 +1,4 @@
-//! One step of AFBC, a metre below its setpoint: `cargo run -p afbc --example hover`.
+//! One step of AFBC, one metre below its setpoint: `cargo run -p afbc --example hover`.
 
 use afbc::{Adaptive, Controller, Profile};
 use afbc_control::{FlightController, Screened};

@@ -8,11 +8,11 @@ use afbc_control::{Errors, Estimate, math};
 use afbc_types::{Axis, Declared, OutOfRange, PerAxis, parameters};
 use nalgebra::{Matrix3, Vector3};
 
-/// Least thrust for hovering that is believed, as a share of the weight.
+/// Smallest hover thrust accepted from the estimate, as a share of the weight.
 const HOVER_SHARE_MIN: f32 = 0.3;
 
 parameters! {
-    /// Gains of one AFBC subsystem. By default those of Section IV for attitude.
+    /// Gains of one AFBC subsystem. The defaults are those of Section IV for attitude.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Gains {
         /// alpha_1, alpha_2.
@@ -30,14 +30,14 @@ parameters! {
         /// Gaussians over both inputs of the fuzzy system (22).
         #[group("")]
         pub membership: Membership = Membership::DEFAULT,
-        /// What keeps the estimates bounded.
+        /// Safeguards that bound the estimates.
         #[group("")]
         pub safeguards: Safeguards = Safeguards::NONE,
     }
 }
 
 impl Gains {
-    /// The gains of a subsystem whose input has to be so many times as large.
+    /// Returns the gains of a subsystem whose input must be `scale` times as large.
     #[must_use]
     pub fn scaled(&self, scale: f32) -> Self {
         let Gains { backstepping: backstepping::Gains { alpha1, alpha2 }, gamma, eta, safeguards, .. } = *self;
@@ -56,7 +56,7 @@ impl Gains {
     }
 }
 
-/// How fast an [`Estimate`] learns and forgets; learning Theta_hat, gamma e_2 w(x), in its factors.
+/// Derivatives of an [`Estimate`]; that of Theta_hat, gamma e_2 w(x), in factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rate {
     first: Vector3<f32>,
@@ -68,31 +68,31 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// (34): gamma e_2 w(x).
+    /// Returns (34): gamma e_2 w(x).
     pub fn theta(&self) -> Matrix3<f32> {
         self.first * self.second.transpose() * self.theta
     }
 
-    /// (33): eta e_2 tanh(e_2/epsilon).
+    /// Returns (33): eta e_2 tanh(e_2/epsilon).
     pub fn delta(&self) -> f32 {
         self.delta
     }
 
-    /// The share of both estimates that is forgotten, by [`Safeguards`] \[1/s\].
+    /// Returns the leakage rate of both estimates, by [`Safeguards`] \[1/s\].
     pub fn leakage(&self) -> f32 {
         self.leakage
     }
 }
 
-/// The estimate whose u_a is `input` whatever the errors are, for the weights of the rules sum to one.
+/// Returns the estimate with u_a = `input` for any errors, since the weights of the rules sum to one.
 pub fn even(input: f32) -> Estimate {
     Estimate { theta: Matrix3::repeat(input), delta: 0.0 }
 }
 
-/// The estimate whose u_a is `input` where the rules have these weights: as even over the rules as |Theta_hat| of
-/// `norm_max` allows, and no smaller than the input takes.
+/// Returns the estimate with u_a = `input` for these weights of the rules: as even over the rules as |Theta_hat| <=
+/// `norm_max` allows, but at least as large as the input requires.
 fn spread(input: f32, weights: &Matrix3<f32>, norm_max: f32) -> Estimate {
-    // Of all such Theta_hat the smallest; what an even one has besides is at right angles to the weights.
+    // The smallest such Theta_hat; the rest of an even one is orthogonal to the weights.
     let least = weights * (input / weights.norm_squared());
     let rest = Matrix3::repeat(input) - least;
     let room = math::max(norm_max * norm_max - least.norm_squared(), 0.0);
@@ -101,11 +101,11 @@ fn spread(input: f32, weights: &Matrix3<f32>, norm_max: f32) -> Estimate {
     Estimate { theta: least + rest * share, delta: 0.0 }
 }
 
-/// One step of explicit Euler, projected into the bounds.
+/// Advances the estimate by one step of explicit Euler, with projection into the bounds.
 #[inline]
 fn advance(estimate: &mut Estimate, rate: &Rate, safeguards: &Safeguards, dt_s: f32) {
     let Safeguards { theta_max, delta_max, .. } = *safeguards;
-    // What leaks faster than a step is long is gone after it; it does not turn round.
+    // If the leakage is faster than the step, the estimate becomes zero instead of changing its sign.
     let keep = math::max(1.0 - rate.leakage * dt_s, 0.0);
     estimate.theta = estimate.theta * keep + rate.first * (rate.theta * dt_s) * rate.second.transpose();
     let square = estimate.theta.norm_squared();
@@ -143,7 +143,7 @@ pub struct Subsystem {
 }
 
 impl Subsystem {
-    /// The subsystem with these gains.
+    /// Creates the subsystem with these gains.
     ///
     /// # Errors
     /// The first gain out of range.
@@ -152,8 +152,8 @@ impl Subsystem {
         Ok(Subsystem { gains, basis: Basis::new(gains.membership)?, inverse_epsilon: 1.0 / gains.epsilon })
     }
 
-    /// (20), and d/dt of the estimate by (33), (34) with their [`Safeguards`], both from the estimate as it stands.
-    /// `unallocated` is what was wanted of the input in the last step and could not be given.
+    /// Returns (20), and the derivatives of the estimate by (33), (34) with their [`Safeguards`], both from the present
+    /// estimate. `unallocated` is the part of the input that could not be allocated in the last step.
     #[inline]
     pub fn law(&self, errors: &Errors, inputs: [f32; 2], estimate: &Estimate, unallocated: f32) -> (Terms, Rate) {
         let Gains { gamma, eta, safeguards, .. } = &self.gains;
@@ -169,8 +169,8 @@ impl Subsystem {
         (terms, Rate { first, second, theta: gamma * error, delta: eta * error * s, leakage })
     }
 
-    /// u, and what there is to learn from it.
-    // One copy for all six, out of line: so it has the processor's registers to itself.
+    /// Returns u and the derivatives of the estimate, in a form for the step.
+    // One copy for all six subsystems, not inlined, so that it can use all registers.
     #[inline(never)]
     fn step(
         &self,
@@ -188,7 +188,8 @@ impl Subsystem {
     }
 }
 
-/// Inputs of the fuzzy system (22), section IV: the angle and its rate for attitude, the error and its rate for position.
+/// Returns the inputs of the fuzzy system (22), Section IV: angle and rate for attitude, error and its rate for
+/// position.
 fn fuzzy_inputs(axis: Axis, x: [f32; 2], errors: &Errors) -> [f32; 2] {
     match axis {
         Axis::Roll | Axis::Pitch | Axis::Yaw => x,
@@ -203,7 +204,7 @@ pub struct Adaptive {
 }
 
 impl Adaptive {
-    /// The law with these gains.
+    /// Creates the law with these gains.
     ///
     /// # Errors
     /// The first gain out of range.
@@ -221,8 +222,8 @@ impl Adaptive {
         })
     }
 
-    /// What the subsystem must have learnt to want `input` for these errors, with an estimate spread over its rules;
-    /// `x` is x_1, x_2 of an attitude.
+    /// Returns the estimate for which the subsystem gives `input` with these errors, spread over its rules; `x` is x_1,
+    /// x_2 of an attitude.
     pub(crate) fn resumed(&self, axis: Axis, input: f32, x: [f32; 2], errors: &Errors, norm_max: f32) -> Estimate {
         let Subsystem { gains, basis, .. } = &self.subsystems[axis];
         let fuzzy = input - proportional(gains.backstepping.alpha2, errors);
@@ -250,7 +251,7 @@ impl Law for Adaptive {
     }
 
     fn hover_thrust_n(&self, z: &Estimate, weight_n: f32) -> f32 {
-        // The rule for no error and no speed.
+        // The rule for zero error and zero speed.
         math::max(z.theta.m22, HOVER_SHARE_MIN * weight_n)
     }
 

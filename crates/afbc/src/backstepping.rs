@@ -1,32 +1,33 @@
-//! Backstepping of one second-order subsystem (7), and the classical controller that the paper compares with.
+//! Backstepping of one second-order subsystem (7), and the classical controller that is the paper's baseline.
 
 use crate::law::{Context, Law, Tracking};
 use crate::model::{Dynamics, Model};
 use afbc_control::{Errors, Estimate};
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
 
-/// The ideal law u*_eq (16), for known f, g and dg/dt.
+/// Returns the ideal law u*_eq (16) for known f, g and dg/dt.
 #[inline]
 pub fn ideal(alpha1: f32, errors: &Errors, x1d_ddot: f32, dynamics: &Dynamics) -> f32 {
     let Errors { e1, e2, .. } = *errors;
     compensated(e1 + alpha1 * (e2 - alpha1 * e1) + x1d_ddot, e2, dynamics)
 }
 
-/// The input for an acceleration, with what (16) takes off for f and dg/dt.
+/// Returns the input for an acceleration, with the compensation of f and dg/dt in (16).
 #[inline]
 fn compensated(acceleration: f32, e2: f32, dynamics: &Dynamics) -> f32 {
     let Dynamics { f, g, g_dot } = *dynamics;
     (acceleration - f - 0.5 * g_dot / g * e2) / g
 }
 
-/// u_pd (21).
+/// Returns u_pd (21).
 #[inline]
 pub fn proportional(alpha2: f32, errors: &Errors) -> f32 {
     alpha2 * errors.e2
 }
 
-/// u*_eq + alpha_2 e_2 with the errors behind it. At the speed limit e_1 stands still, and (16) is for e_2 alone, whose
-/// rate is d^2 x_1d/dt^2 - f - g u: otherwise -alpha_1^2 e_1 would hold a vehicle back that comes up to its speed.
+/// Returns u*_eq + alpha_2 e_2, and the errors. At the speed limit e_1 is constant, and (16) applies to e_2 alone,
+/// whose derivative is d^2 x_1d/dt^2 - f - g u: otherwise -alpha_1^2 e_1 would slow down a vehicle that approaches the
+/// limit.
 #[inline]
 pub(crate) fn classical(gains: &Gains, tracking: &Tracking, dynamics: &Dynamics) -> (f32, Errors) {
     let Gains { alpha1, alpha2 } = *gains;
@@ -40,7 +41,7 @@ pub(crate) fn classical(gains: &Gains, tracking: &Tracking, dynamics: &Dynamics)
 }
 
 parameters! {
-    /// The two gains of one backstepping subsystem. By default those of Section IV for attitude, x and y.
+    /// The two gains of one backstepping subsystem. The defaults are those of Section IV for attitude, x and y.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Gains {
         /// alpha_1 (12).
@@ -60,7 +61,7 @@ pub struct Backstepping {
 }
 
 impl Backstepping {
-    /// The baseline for a vehicle with these nominal parameters.
+    /// Creates the baseline for a vehicle with these nominal parameters.
     ///
     /// # Errors
     /// The first parameter or gain out of range.
@@ -74,7 +75,7 @@ impl Backstepping {
 }
 
 impl Law for Backstepping {
-    /// A fixed law remembers nothing.
+    /// None: a fixed law has no memory.
     type Estimate = ();
 
     #[inline]

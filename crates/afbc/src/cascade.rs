@@ -1,4 +1,4 @@
-//! Six subsystems in one cascade: position gives thrust and desired attitude, attitude gives U1..U3, all give rotor
+//! Six subsystems in one cascade: position gives thrust and desired attitude, attitude gives U1..U3, and all give rotor
 //! speeds. Section III-D, Fig. 2.
 
 use crate::law::{Context, Law, Tracking};
@@ -10,47 +10,48 @@ use afbc_control::{Action, Errors, Estimate, FlightController, Trace, math};
 use afbc_types::{Axis, Declared, Inputs, OutOfRange, Parameters, PerAxis, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
-/// Least vertical part of thrust over weight that a tilt is worked out with: what sinks faster does not tilt more. Ours.
+/// Smallest vertical thrust over weight that the tilt is computed with, since a sinking vehicle must not tilt further.
+/// Not in the paper.
 pub const VERTICAL_MIN: f32 = 0.3;
 
 parameters! {
-    /// Settings of the cascade around the law. By default the paper's.
+    /// Settings of the cascade around the law. The defaults are the paper's.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Settings {
-        /// What every controller has to know.
+        /// Settings that every controller needs.
         #[group("")]
         pub common: afbc_control::Settings = afbc_control::Settings::DEFAULT,
         /// Bandwidth of the filter on phi_d and theta_d.
         #[parameter(FILTER, "rad/s", BANDWIDTH.min..=BANDWIDTH.max, tuned)]
         pub command_filter_rad_s: f32 = 40.0,
-        /// What position control may ask for.
+        /// Limits on the demands of position control.
         #[group("limits")]
         pub limits: Limits = Limits::NONE,
-        /// Whether the desired attitude comes from the thrust really commanded; otherwise from (39), the thrust of hovering.
+        /// Whether the desired attitude is computed with the commanded thrust, instead of the hover thrust (39).
         #[switch(TILT_THRUST)]
         pub tilt_by_thrust: bool = false,
-        /// Whether an estimate stops growing towards a limit of rotors, tilt or acceleration that has been reached.
+        /// Whether an estimate stops growing in the direction in which rotors, tilt or acceleration are at a limit.
         #[switch(ANTI_WINDUP)]
         pub anti_windup: bool = false,
-        /// Whether estimates stay as they are, and rotors give thrust alone, while the vehicle stands on the ground.
+        /// Whether adaptation stops, and rotors give thrust only, while the vehicle stands on the ground.
         #[switch(FREEZE)]
         pub freeze_on_ground: bool = false,
-        /// Whether to take over a vehicle in flight as it is: estimates that carry its weight, a command filter that starts
-        /// at its attitude. The paper starts from estimates of zero and at its first command.
+        /// Whether estimates start with the weight, and the command filter at the attitude, so that a vehicle in flight
+        /// is taken over without a jump. The paper starts with zero estimates and at its first command.
         #[switch(BUMPLESS)]
         pub bumpless: bool = false,
     }
 }
 
 impl Settings {
-    /// The same with another time between steps.
+    /// Returns the settings with another time step.
     #[must_use]
     pub const fn with_dt_s(mut self, dt_s: f32) -> Self {
         self.common.dt_s = dt_s;
         self
     }
 
-    /// The same with rotors of another largest force.
+    /// Returns the settings with another largest rotor force.
     #[must_use]
     pub const fn with_rotor_force_max_n(mut self, force_n: f32) -> Self {
         self.common.rotor_force_max_n = force_n;
@@ -58,7 +59,7 @@ impl Settings {
     }
 }
 
-/// A controller: fixed from here on. What changes in flight is in [`Cascade`].
+/// A controller. Constant; everything that changes in flight is in [`Cascade`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controller<L> {
     law: L,
@@ -69,31 +70,31 @@ pub struct Controller<L> {
     gravity_m_s2: f32,
     inverse_gravity: f32,
     tilt_max_tan: f32,
-    /// What all rotors give together \[N\].
+    /// Largest thrust of all rotors together \[N\].
     thrust_max_n: f32,
-    /// Largest e_1 of x, y and z \[m\]: alpha_1 times it is the largest speed.
+    /// Largest e_1 of x, y and z \[m\], which gives the speed limit by alpha_1 e_1.
     error_max_m: Vector3<f32>,
 }
 
-/// Desired roll and pitch of a step.
+/// Desired roll and pitch in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Desired {
     /// phi_d, theta_d of (40) \[rad\].
     rad: [f32; 2],
-    /// What the command filter made of the ones before: what roll and pitch tracked.
+    /// Filtered previous angles, which roll and pitch track.
     filtered: [Filtered; 2],
 }
 
-/// What the cascade remembers between steps.
+/// Memory of the cascade.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cascade<E> {
     /// Estimates of each subsystem.
     pub estimates: PerAxis<E>,
     /// Errors of each subsystem in the last step.
     pub errors: PerAxis<Errors>,
-    /// What each subsystem wanted in the last step: U1..U4 \[N\], u5, u6 \[m/s2\].
+    /// Inputs of each subsystem in the last step: U1..U4 \[N\], u5, u6 \[m/s2\].
     pub inputs: PerAxis<f32>,
-    /// What roll and pitch were to be in the last step; none before the first.
+    /// Desired roll and pitch in the last step; none before the first.
     desired: Option<Desired>,
     /// See [`Context::unallocated`].
     unallocated: PerAxis<f32>,
@@ -102,13 +103,13 @@ pub struct Cascade<E> {
 }
 
 impl<E> Cascade<E> {
-    /// The same flight with other estimates, of another law.
+    /// Returns the memory with the estimates of another law.
     pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>) -> Cascade<F> {
         let Cascade { errors, inputs, desired, unallocated, standstill, rotor_residual_rad_s, .. } = *self;
         Cascade { estimates, errors, inputs, desired, unallocated, standstill, rotor_residual_rad_s }
     }
 
-    /// Why the last step decided as it did.
+    /// Returns the trace of the last step.
     pub(crate) fn trace(&self) -> Trace {
         let PerAxis { roll, pitch, yaw, z, x, y } = self.inputs;
         let Desired { rad, filtered } = self.desired.unwrap_or(Desired { rad: [0.0; 2], filtered: Default::default() });
@@ -121,8 +122,8 @@ impl<E> Cascade<E> {
     }
 }
 
-/// Desired roll and pitch (40) \[rad\] for the wanted horizontal accelerations u5, u6 \[m/s2\] at yaw
-/// psi \[rad\]. `inverse_vertical` is mass over the vertical part of thrust: 1/g in hover, as in (39).
+/// Returns desired roll and pitch (40) \[rad\] for the horizontal accelerations u5, u6 \[m/s2\] at yaw psi \[rad\].
+/// `inverse_vertical` is mass over vertical thrust: 1/g in hover, as in (39).
 #[inline]
 pub fn desired_attitude(u5: f32, u6: f32, yaw_rad: f32, inverse_vertical: f32) -> [f32; 2] {
     let (sin_psi, cos_psi) = (math::sin(yaw_rad), math::cos(yaw_rad));
@@ -134,7 +135,7 @@ pub fn desired_attitude(u5: f32, u6: f32, yaw_rad: f32, inverse_vertical: f32) -
 }
 
 impl<L: Law> Controller<L> {
-    /// A controller for a vehicle with these nominal parameters.
+    /// Creates a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
     /// The first parameter or setting out of range.
@@ -161,7 +162,7 @@ impl<L: Law> Controller<L> {
         })
     }
 
-    /// The part of (u5, u6) that tilt and acceleration limits leave, its direction kept.
+    /// Returns (u5, u6), reduced to the limits of tilt and acceleration in the same direction.
     #[inline]
     fn limited(&self, u5: f32, u6: f32, vertical: f32) -> [f32; 2] {
         let max = math::min(vertical * self.tilt_max_tan, self.settings.limits.acceleration_max_m_s2);
@@ -170,23 +171,23 @@ impl<L: Law> Controller<L> {
         [u5 * scale, u6 * scale]
     }
 
-    /// The law in the cascade.
+    /// Returns the law in the cascade.
     pub(crate) fn law(&self) -> &L {
         &self.law
     }
 
-    /// U4 that it takes to hover \[N\], by what has been learnt: no more than the rotors give.
+    /// Returns the estimated hover thrust U4 \[N\], limited to what the rotors can give.
     pub(crate) fn hover_thrust_n(&self, memory: &Cascade<L::Estimate>) -> f32 {
         math::min(self.law.hover_thrust_n(&memory.estimates.z, self.weight_n), self.thrust_max_n)
     }
 
-    /// True if the ground carries the vehicle, as far as that is heeded.
+    /// True if the vehicle stands on the ground and `freeze_on_ground` is set.
     #[inline]
     pub(crate) fn stands(&self, memory: &Cascade<L::Estimate>) -> bool {
         self.settings.freeze_on_ground && memory.standstill.stands()
     }
 
-    /// (7)-(40) in their order; `fresh` as in [`FlightController::decide`].
+    /// Computes (7)-(40) in their order; `fresh` as in [`FlightController::decide`].
     #[inline(always)]
     pub(crate) fn cascade(
         &self,
@@ -229,7 +230,7 @@ impl<L: Law> Controller<L> {
         let u5 = input(Axis::X, approach(xi.x, xi_dot.x, p.x, v.x, a.x, max.x));
         let u6 = input(Axis::Y, approach(xi.y, xi_dot.y, p.y, v.y, a.y, max.y));
 
-        // Desired attitude with the derivatives that (12) and (16) ask for.
+        // Desired attitude, with the derivatives for (12) and (16).
         let (eta, eta_dot) = (state.attitude_rad, state.rates_rad_s);
         let (vertical, inverse_vertical) = if self.settings.tilt_by_thrust {
             let upward_n = math::min(u4, self.thrust_max_n) * math::tilt_cosine(eta.x, eta.y);
@@ -269,7 +270,7 @@ impl<L: Law> Controller<L> {
         );
 
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3, thrust_n: u4 };
-        // Moments would keep the thrust up, and tip a vehicle over that stands.
+        // Moments would increase the thrust and tip over a standing vehicle.
         let asked = if stands { Inputs { thrust_n: u4, ..Inputs::default() } } else { inputs };
         let Allocation { forces, unallocated, saturated, .. } = self.mixer.allocate(&asked);
         let speeds = self.mixer.speeds(&forces);

@@ -2,26 +2,26 @@
 //!
 //! The memberships of one input are three Gaussians of one width s at -c, 0 and c. A product of memberships factorises,
 //! and so does the sum in the denominator of (18): the nine weights are the outer product of two triples that each sum
-//! to one. Dividing a triple by its middle Gaussian leaves, with k = c/s^2 and q = exp(-c^2 / 2s^2),
+//! to one. Dividing a triple by its middle Gaussian gives, with k = c/s^2 and q = exp(-c^2 / 2s^2),
 //!
 //! ```text
 //! [q exp(-k x), 1, q exp(k x)]
 //! ```
 //!
-//! and multiplying by t = exp(-k|x|), which the normalisation undoes, leaves \[q t^2, t, q\] on the positive side: one
-//! exponential an input, of a number never positive, over a sum never below q. So no finite input overflows, divides
-//! zero by zero or loses all its weights, where (18) as printed does from 1.7 rad/s on in `f32`.
+//! and multiplying by t = exp(-k|x|), which the normalisation cancels, gives \[q t^2, t, q\] for positive x: one
+//! exponential per input, with an exponent that is never positive, over a sum of at least q. So no finite input
+//! overflows, divides zero by zero or makes all weights vanish, as (18) as printed does above 1.7 rad/s in `f32`.
 
 use afbc_control::math;
 use afbc_types::{Declared, OutOfRange, Range, parameters};
 use nalgebra::{Matrix3, Vector3};
 
-/// Accepted centre / width. Beyond it neighbouring Gaussians no longer overlap: between them the basis is a switch.
+/// Accepted centre / width. Above it neighbouring Gaussians do not overlap, and the basis becomes a switch.
 pub const SPREAD: Range = Range::new("centre / width", 0.1, 6.0);
 
 parameters! {
-    /// Three Gaussians of one width over one input: exp(-1/2 ((x - c_j)/s)^2), c_j in {-c, 0, c}. By default those of
-    /// Section IV for attitude.
+    /// Three Gaussians of one width over one input: exp(-1/2 ((x - c_j)/s)^2), c_j in {-c, 0, c}. The defaults are
+    /// those of Section IV for attitude.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Membership {
         /// c: distance of the outer Gaussians from zero, in the fuzzy inputs' unit.
@@ -36,7 +36,7 @@ parameters! {
     }
 }
 
-/// The basis of one subsystem, its constants worked out from a [`Membership`] that both inputs share.
+/// The basis of one subsystem, with constants computed from a [`Membership`] shared by both inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Basis {
     /// k / ln 2, k = c/s^2
@@ -46,7 +46,7 @@ pub struct Basis {
 }
 
 impl Basis {
-    /// The basis of `membership`.
+    /// Creates the basis of `membership`.
     ///
     /// # Errors
     /// The first of centre, width and [`SPREAD`] out of range.
@@ -56,27 +56,27 @@ impl Basis {
         Ok(Basis { k: spread / membership.width * core::f32::consts::LOG2_E, q: math::exp(-0.5 * spread * spread) })
     }
 
-    /// w(x) of (18), one weight a rule: row = the first input's Gaussian, column = the second's, from -c to c.
-    /// Every weight is within \[0, 1\] and they sum to one, for every finite input.
+    /// Returns w(x) of (18), one weight per rule: row = the first input's Gaussian, column = the second's, from -c to
+    /// c. Every weight is within \[0, 1\] and they sum to one, for every finite input.
     #[inline]
     pub fn weights(&self, inputs: [f32; 2]) -> Matrix3<f32> {
         let [first, second] = self.factors(inputs);
         first * second.transpose()
     }
 
-    /// The normalised memberships of each input: w(x) is their outer product, and seldom needed as such.
+    /// Returns the normalised memberships of each input, whose outer product is w(x).
     #[inline]
     pub fn factors(&self, inputs: [f32; 2]) -> [Vector3<f32>; 2] {
         let [first, second] = inputs;
         [self.triple(first), self.triple(second)]
     }
 
-    /// The normalised memberships of one input.
+    /// Returns the normalised memberships of one input.
     #[inline]
     fn triple(&self, x: f32) -> Vector3<f32> {
         let t = math::exp2(-self.k * x.abs());
         let (near, middle, far) = (self.q, t, self.q * t * t);
-        // Each triple by its own sum: so no weight exceeds 1, rounding included.
+        // Normalised by its own sum, so that no weight exceeds 1, rounding included.
         let scale = 1.0 / (near + middle + far);
         let (left, right) = if x < 0.0 { (near, far) } else { (far, near) };
         Vector3::new(left, middle, right) * scale

@@ -1,5 +1,5 @@
-//! AFBC under its [monitor](crate::monitor): when that trips, [integral backstepping](crate::integral) flies on from the
-//! very inputs at hand, and AFBC takes over again on command only.
+//! AFBC under its [monitor](crate::monitor). When the monitor trips, [integral backstepping](crate::integral) takes
+//! over with the last inputs; AFBC is engaged again on command only.
 
 use crate::adaptive::{self, Adaptive};
 use crate::cascade::{Cascade, Controller, Settings};
@@ -11,15 +11,15 @@ use afbc_control::{Action, Estimate, FlightController, Mixer, Trace, Trip, math}
 use afbc_types::{Axis, OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
 use nalgebra::Vector3;
 
-/// Least Theta_max of z, in weights: nine rules that hold the weight make |Theta_hat| = 3 weights, and rotors that give 60 %
-/// of their thrust make that 5.
+/// Smallest Theta_max of z, in weights: nine rules that each hold the weight give |Theta_hat| = 3 weights, and 5 with
+/// rotors that produce 60 % of their thrust.
 pub const HOVER_THETA: f32 = 5.0;
 
-/// Accepted angular acceleration about body x and about y that the rotors give around hover: the gains of the profile
-/// `flight` want half of what the paper's vehicle has, and hold no vehicle below 60 rad/s2 (`tests/tests/vehicles.rs`).
+/// Accepted angular acceleration about body x and y near hover: the gains of the profile `flight` need half of that of
+/// the paper's vehicle, and fail below 60 rad/s2 (`tests/tests/vehicles.rs`).
 pub const HOVER_AUTHORITY: Range = Range::new("hover_authority_rad_s2", 80.0, 1e9);
 
-/// AFBC with a monitor and a law to fall back on.
+/// AFBC with a monitor and a fallback law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guarded {
     adaptive: Controller<Adaptive>,
@@ -27,16 +27,16 @@ pub struct Guarded {
     monitor: Monitor,
 }
 
-/// A flight under the law that stands in.
+/// Memory of the fallback law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct StandIn {
     cascade: Cascade<Integral>,
-    /// Its last action. Kept here: coming back from a call, it would have an action put together in memory on AFBC's path,
-    /// too.
+    /// Its last action. Stored here, since returning it would make the compiler build an action in memory on AFBC's
+    /// path, too.
     action: Action,
 }
 
-/// The attitude behind the last inputs, and its rates: with those, what the other law goes on from.
+/// Attitude and rates of the last step, from which the other law continues.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Last {
     attitude_rad: Vector3<f32>,
@@ -50,43 +50,43 @@ impl Last {
     }
 }
 
-/// How AFBC's flight ended.
+/// Why AFBC's flight ended, and the last step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Tripped {
     trip: Trip,
-    /// Of the latest step, whoever flew it.
+    /// Of the last step under either law.
     last: Last,
 }
 
-/// What changes in flight.
+/// Memory of a flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory {
     afbc: Cascade<Estimate>,
     figures: Figures,
     tripped: Option<Tripped>,
-    /// From the first step after AFBC's last on.
+    /// The fallback law's memory, from its first step on.
     stand_in: Option<StandIn>,
 }
 
 impl Memory {
-    /// What the monitor saw of AFBC, last.
+    /// Returns the monitor's last figures of AFBC.
     pub fn figures(&self) -> &Figures {
         &self.figures
     }
 
-    /// Why AFBC does not fly, if it does not.
+    /// Returns why the monitor tripped, while the fallback law flies.
     pub fn trip(&self) -> Option<Trip> {
         self.tripped.map(|tripped| tripped.trip)
     }
 }
 
 impl Guarded {
-    /// AFBC with these gains, under a monitor with these bounds.
+    /// Creates AFBC with these gains, under a monitor with these bounds.
     ///
     /// # Errors
-    /// The first parameter, setting, gain or bound out of range; among them `rotor_force_max_n`, if the rotors do not lift
-    /// the vehicle [with a margin](afbc_control::mixer::HOVER_MARGIN), `theta_max` of z, if |Theta_hat| has no room for
-    /// [`HOVER_THETA`] weights, and [`HOVER_AUTHORITY`], if they turn it too slowly.
+    /// The first parameter, setting, gain or bound out of range; also `rotor_force_max_n` if the rotors cannot lift the
+    /// vehicle [with a margin](afbc_control::mixer::HOVER_MARGIN), `theta_max` of z if it is below [`HOVER_THETA`]
+    /// weights, and [`HOVER_AUTHORITY`] if the rotors turn the vehicle too slowly.
     pub fn new(
         vehicle: Parameters,
         settings: Settings,
@@ -98,7 +98,7 @@ impl Guarded {
         let hover =
             Range { min: libm::ceil(f64::from(HOVER_THETA * weight_n) * 1e4) / 1e4, ..Safeguards::THETAMAX.range };
         hover.check(gains.z.safeguards.theta_max)?;
-        // Two rotors at work, one up, one down, by what both have room for.
+        // Two rotors, one up and one down, by the smaller of their margins.
         let (hover_n, model) = (0.25 * weight_n, Model::new(&vehicle));
         let swing_n = 2.0 * math::min(hover_n, settings.common.rotor_force_max_n - hover_n);
         HOVER_AUTHORITY.check(swing_n * model.hover_gain(Axis::Roll))?;
@@ -111,7 +111,7 @@ impl Guarded {
         })
     }
 
-    /// One step of the law that stands in, in AFBC's place. The first one takes over: the step that trips has no time to.
+    /// Runs one step of the fallback law. Its first step initialises it, since the step that trips has no time to.
     #[cold]
     #[inline(never)]
     fn stand_in<'a>(
@@ -132,7 +132,7 @@ impl Guarded {
         action
     }
 
-    /// The flight that `cascade` is in with what AFBC must have learnt to go on from its last inputs.
+    /// Returns `cascade` with estimates for which AFBC continues with the last inputs.
     fn resumed<E>(&self, last: &Last, cascade: &Cascade<E>) -> Cascade<Estimate> {
         let (Last { attitude_rad: eta, rates_rad_s: eta_dot }, Cascade { inputs, errors, .. }) = (last, cascade);
         cascade.handed_over(PerAxis::from_fn(|axis| {
@@ -165,7 +165,7 @@ impl FlightController for Guarded {
             return *self.stand_in(stand_in, (afbc, tripped), (state, setpoint), fresh);
         }
         let action = self.adaptive.cascade(afbc, state, setpoint, fresh);
-        // On the ground a law may ask for less than nothing, for as long as it likes.
+        // On the ground a law may demand negative thrust indefinitely.
         if !self.adaptive.stands(afbc)
             && let Some(trip) = self.monitor.watch(figures, afbc, action.health.saturated)
         {
@@ -191,7 +191,7 @@ impl FlightController for Guarded {
         true
     }
 
-    /// Zero while the other law flies.
+    /// Zero while the fallback law flies.
     fn learnt(memory: &Memory) -> PerAxis<Estimate> {
         if memory.tripped.is_some() { PerAxis::default() } else { memory.afbc.estimates }
     }

@@ -1,5 +1,5 @@
-//! Backstepping with integral action: the fixed-gain law that stands in for AFBC when the [monitor](crate::monitor)
-//! has tripped.
+//! Backstepping with integral action: the fixed-gain fallback law for AFBC after a trip of the
+//! [monitor](crate::monitor).
 //!
 //! ```text
 //! u = u*_eq + alpha_2 e_2 + i        di/dt = kappa e_2,  |i| <= i_max
@@ -24,25 +24,25 @@ pub struct Gains {
     pub backstepping: backstepping::Gains,
     /// kappa, in the range of AFBC's gamma.
     pub integral: f32,
-    /// i_max, in the subsystem's input, in the range of AFBC's.
+    /// i_max in the subsystem's input, in the range of AFBC's theta_max.
     pub integral_max: f32,
 }
 
 impl From<&adaptive::Gains> for Gains {
-    /// As fast as AFBC with a single rule, and as far.
+    /// Returns gains as fast as AFBC with a single rule, with the same bound.
     fn from(gains: &adaptive::Gains) -> Self {
         Gains { backstepping: gains.backstepping, integral: gains.gamma, integral_max: gains.safeguards.theta_max }
     }
 }
 
-/// What one subsystem remembers.
+/// Memory of one subsystem.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Integral {
     /// i
     pub value: f32,
-    /// The input to go on from: the next step chooses i for it.
+    /// Input to continue with: the next step chooses i for it.
     pub resume: Option<f32>,
-    /// Of z: U4 that it takes to hover, as far as that has been learnt before \[N\].
+    /// Of z: the hover thrust U4 that AFBC has estimated before \[N\].
     pub hover_thrust_n: Option<f32>,
 }
 
@@ -54,7 +54,7 @@ pub struct IntegralBackstepping {
 }
 
 impl IntegralBackstepping {
-    /// The law for a vehicle with these nominal parameters.
+    /// Creates the law for a vehicle with these nominal parameters.
     ///
     /// # Errors
     /// The first parameter or gain out of range.
@@ -91,7 +91,7 @@ impl Law for IntegralBackstepping {
     }
 
     fn hover_thrust_n(&self, z: &Integral, weight_n: f32) -> f32 {
-        // Not weight and integral: that holds what a manoeuvre takes, too.
+        // Not weight and integral, which includes the thrust of manoeuvres.
         z.hover_thrust_n.unwrap_or(weight_n)
     }
 

@@ -1,67 +1,67 @@
-//! A control law in the [cascade](crate::cascade): what it is given of one subsystem, and what it gives.
+//! Interface of a control law in the [cascade](crate::cascade).
 
 use afbc_control::{Errors, Estimate};
 use afbc_types::{Axis, PerAxis, State};
 
-/// How one subsystem turns its errors into its input. AFBC and the baseline differ in nothing else.
+/// Computes a subsystem's input from its errors. AFBC and the baseline differ in this only.
 pub trait Law {
-    /// What the law remembers of one subsystem from step to step.
+    /// Memory of the law for one subsystem.
     type Estimate: Copy + Default + core::fmt::Debug;
 
-    /// u_i in the subsystem's own unit (N for roll, pitch, yaw and z; m/s2 for x and y), with the errors behind it.
-    /// May update the estimate, if the context lets it.
+    /// Returns u_i in the subsystem's unit (N for roll, pitch, yaw and z; m/s2 for x and y), and the errors. Updates
+    /// the estimate if the context allows it.
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Self::Estimate)
     -> (f32, Errors);
 
-    /// alpha_1 of the subsystem \[1/s\].
+    /// Returns alpha_1 of the subsystem \[1/s\].
     fn alpha1(&self, axis: Axis) -> f32;
 
-    /// Turns estimates that know nothing yet into those to start from in flight, for a vehicle of this weight.
+    /// Initialises the estimates for a start in flight, for a vehicle of this weight.
     fn start(&self, _estimates: &mut PerAxis<Self::Estimate>, _weight_n: f32) {}
 
-    /// U4 that it takes to hover \[N\], by the estimate of the z subsystem; for a law that does not know, the weight.
+    /// Returns the hover thrust U4 \[N\] by the estimate of the z subsystem; the weight for a law without an estimate.
     fn hover_thrust_n(&self, _z: &Self::Estimate, weight_n: f32) -> f32 {
         weight_n
     }
 
-    /// What `estimate` holds in AFBC's terms, for logs and monitors; zero for a law that learns nothing.
+    /// Returns `estimate` in AFBC's terms, for logs and monitors; zero for a law without adaptation.
     fn learnt(estimate: &Self::Estimate) -> Estimate;
 }
 
-/// What all six subsystems share in one step.
+/// Data shared by all six subsystems in one step.
 #[derive(Clone, Copy, Debug)]
 pub struct Context<'a> {
-    /// The state that the step works from.
+    /// State used in the step.
     pub state: &'a State,
     /// omega of (6), as last commanded \[rad/s\].
     pub rotor_residual_rad_s: f32,
     /// Time step \[s\].
     pub dt_s: f32,
-    /// False if estimates must stay as they are.
+    /// False if estimates must not change.
     pub adapt: bool,
-    /// What each subsystem wanted of its input in the last step and could not have; zero if it is not to care.
+    /// Part of each subsystem's input that could not be allocated in the last step; zero without anti-windup.
     pub unallocated: PerAxis<f32>,
 }
 
-/// What a subsystem is and what it should be: x_1, x_2 and the reference with two derivatives. In m or rad, and seconds.
+/// State and reference of a subsystem: x_1, x_2 and the reference with two derivatives, in m or rad, and seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tracking {
     /// x_1
     pub x1: f32,
     /// x_2 = d x_1/dt
     pub x2: f32,
-    /// e_1 = x_1d - x_1 (9), for yaw the short way round.
+    /// e_1 = x_1d - x_1 (9), for yaw wrapped to +-pi.
     pub e1: f32,
     /// d x_1d/dt
     pub x1d_dot: f32,
     /// d^2 x_1d/dt^2
     pub x1d_ddot: f32,
-    /// True if e_1 is less than the distance, since that would ask for more speed than is allowed.
+    /// True if e_1 is less than the distance because of the speed limit.
     pub limited: bool,
 }
 
 impl Tracking {
-    /// (9), (12): e_2 = d x_1d/dt + alpha_1 e_1 - x_2.
+    /// Returns (9), (12): e_2 = d x_1d/dt + alpha_1 e_1 - x_2.
     #[inline]
     pub fn errors(&self, alpha1: f32) -> Errors {
         let Tracking { e1, x1d_dot, x2, .. } = *self;

@@ -1,24 +1,24 @@
 //! Adaptive fuzzy backstepping control (AFBC) of a quadrotor, after Yacef, Bouhali and Hamerlain, and the classical
-//! backstepping law that it is compared with.
+//! backstepping law that is its baseline.
 //!
-//! Frames, units and the meaning of "(n)" are stated in [`afbc_types`]; corrections to the paper in `docs/paper.md`.
+//! [`afbc_types`] defines frames, units and the meaning of "(n)"; `docs/paper.md` lists corrections to the paper.
 //!
 //! # Reading order
 //!
 //! 1. [`fuzzy`]: nine rules from two inputs, (17)-(19).
 //! 2. [`backstepping`]: the errors (9)-(13), the ideal law (16), the baseline controller (21).
 //! 3. [`adaptive`]: the law (20)-(22) with its adaptation (32)-(34).
-//! 4. [`law`]: what a law in the cascade is; [`cascade`]: six subsystems, the desired attitude (39)-(40) and the command
-//!    filter make one [`Controller`], which is an [`afbc_control::FlightController`].
-//! 5. [`safeguards`], [`limits`], [`standstill`]: what makes the printed law fit to fly, in [`Profile::Flight`].
-//! 6. [`monitor`], [`integral`], [`guarded`]: who watches AFBC, and who flies when it is not to be trusted.
+//! 4. [`law`]: interface of a law; [`cascade`]: six subsystems, the desired attitude (39)-(40) and the command filter
+//!    form a [`Controller`], which is an [`afbc_control::FlightController`].
+//! 5. [`safeguards`], [`limits`], [`standstill`]: additions for real flight, used in [`Profile::Flight`].
+//! 6. [`monitor`], [`integral`], [`guarded`]: monitor and fallback law.
 //!
-//! # What to expect
+//! # Properties
 //!
-//! Parameters are checked once, by name, when a [`Controller`] is built. After that a step cannot fail, allocate or
-//! panic, has no loop whose length depends on what it is given, and gives the same bits on host and target: all
-//! mathematics comes from [`afbc_control::math`]. Which branches it takes, and so how long it takes, does depend on
-//! its inputs: limits, projection, saturated rotors and the monitor cost what they do only where they act.
+//! Parameters are checked when a [`Controller`] is built, with errors that name them. After that a step cannot fail,
+//! allocate or panic, has no loop whose length depends on its inputs, and gives the same bits on host and target: all
+//! mathematics comes from [`afbc_control::math`]. Its branches, and so its duration, depend on the inputs: limits,
+//! projection, saturated rotors and the monitor take time only when they act.
 //!
 //! ```
 //! use afbc::{Adaptive, Controller, Profile};

@@ -15,7 +15,7 @@ pub struct Dynamics {
     pub g_dot: f32,
 }
 
-/// Smallest cos(phi) cos(theta) that g_4 is computed with: a tilt of 84 degrees. Ours; the paper assumes A3 instead.
+/// Smallest cos(phi) cos(theta) for computing g_4: a tilt of 84 degrees. Not in the paper, which assumes A3 instead.
 pub const TILT_COSINE_MIN: f32 = 0.1;
 
 /// Constants a_1..a_5, b_1..b_3, 1/m and g of (6).
@@ -34,7 +34,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// The constants of (6) for a vehicle whose parameters are valid.
+    /// Computes the constants of (6) for a vehicle with valid parameters.
     pub fn new(vehicle: &Parameters) -> Self {
         let Parameters { mass_kg, rotor_inertia_kg_m2, gravity_m_s2, .. } = *vehicle;
         let (ix, iy, iz) = (vehicle.inertia_kg_m2.x, vehicle.inertia_kg_m2.y, vehicle.inertia_kg_m2.z);
@@ -53,7 +53,7 @@ impl Model {
         }
     }
 
-    /// g_i of `axis`, level.
+    /// Returns g_i of `axis` for a level vehicle.
     pub fn hover_gain(&self, axis: Axis) -> f32 {
         match axis {
             Axis::Roll => self.b1,
@@ -64,7 +64,7 @@ impl Model {
         }
     }
 
-    /// f_i, g_i and dg_i/dt of `axis`; d eta/dt is taken for Omega as in (6).
+    /// Returns f_i, g_i and dg_i/dt of `axis`, with d eta/dt in place of Omega as in (6).
     #[inline]
     pub fn dynamics(&self, axis: Axis, context: &Context) -> Dynamics {
         let rates = &context.state.rates_rad_s;

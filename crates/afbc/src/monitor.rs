@@ -1,16 +1,16 @@
-//! Watches AFBC fly, and says when it is no longer to be trusted. Ours.
+//! Monitor of AFBC, which trips when its estimates, errors or inputs leave their bounds. Not in the paper.
 //!
 //! | figure | of | trips beyond |
 //! |---|---|---|
 //! | \|Theta_hat\|, delta_hat | each subsystem | [`Bounds::theta`], [`Bounds::delta`] |
-//! | V_e = e_1^2/2 + e_2^2/2g, the part of (29) that can be computed, averaged over 1 s | each subsystem | [`Bounds::lyapunov`] |
+//! | V_e = e_1^2/2 + e_2^2/2g, the computable part of (29), mean over 1 s | each subsystem | [`Bounds::lyapunov`] |
 //! | share of steps with a saturated rotor, over 1 s | all | [`Bounds::saturation_share`] |
 //! | reversals of U1..U4 by more than [`Bounds::swing_n`], per second | each input | [`Bounds::swings_hz`] |
 //!
-//! The last is the limit-cycle detector: it counts turning points of the input that are further apart than a threshold,
-//! so it sees chatter from one step to the next and a slow oscillation alike, and neither manoeuvres nor noise below it.
+//! The last is the limit-cycle detector: it counts turning points of the input that are further apart than a threshold.
+//! So it detects chatter between steps as well as slow oscillations, but neither manoeuvres nor smaller noise.
 //!
-//! Norms and V_e are looked at for one subsystem a step, so each is at most six steps old.
+//! Norms and V_e are updated for one subsystem per step, so each is at most six steps old.
 
 use crate::adaptive;
 use crate::cascade::Cascade;
@@ -22,7 +22,8 @@ use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
 pub const WINDOW_S: f32 = 1.0;
 
 parameters! {
-    /// What the monitor lets pass. By default what does not follow from gains and vehicle; [`Bounds::new`] gives the rest.
+    /// Bounds of the monitor. The defaults are those that do not depend on gains and vehicle; [`Bounds::new`] computes
+    /// the others.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Bounds {
         /// Bound on |Theta_hat|, in the subsystem's input.
@@ -31,34 +32,34 @@ parameters! {
         /// Bound on delta_hat, in the subsystem's input.
         #[parameter(DELTA, "input", 0.0..=1e9)]
         pub delta: PerAxis<f32> = PerAxis { roll: 1e9, pitch: 1e9, yaw: 1e9, z: 1e9, x: 1e9, y: 1e9 },
-        /// Bound on the mean of V_e, with g that of hovering.
+        /// Bound on the mean of V_e, with the hover value of g.
         #[parameter(LYAPUNOV, "m2 or rad2", 0.0..=1e9)]
         pub lyapunov: PerAxis<f32> = PerAxis { roll: 0.5, pitch: 0.5, yaw: 10.0, z: 200.0, x: 1000.0, y: 1000.0 },
-        /// Largest share of steps in which a rotor was at a limit.
+        /// Largest share of steps with a rotor at a limit.
         #[parameter(SAT_SHARE, "1", 0.01..=1.0)]
         pub saturation_share: f32 = 0.9,
-        /// Least size of a reversal of an input that counts.
+        /// Smallest reversal of an input that is counted.
         #[parameter(SWING, "N", 1e-3..=1e4)]
         pub swing_n: f32 = 1e4,
-        /// Most reversals of one input per second.
+        /// Largest number of reversals of one input per second.
         #[parameter(SWINGS, "Hz", 0.1..=1e4)]
         pub swings_hz: f32 = 16.0,
     }
 }
 
 impl Bounds {
-    /// Bounds for a law with these gains on this vehicle, whose parameters must be valid: estimates that lean on their
-    /// projection, errors far beyond any manoeuvre, a limit cycle of half the weight: of a fifth, U3 makes too many from
-    /// noise of 20 mrad/s alone.
+    /// Computes bounds for a law with these gains on this vehicle, whose parameters must be valid: estimates that rely
+    /// on their projection, errors far beyond any manoeuvre, and a limit cycle of half the weight. (With a fifth, noise
+    /// of 20 mrad/s alone would give too many reversals of U3.)
     ///
-    /// V_e weighs e_2 by 1/g, so for a vehicle on which an input does less than on the paper's, its bound is as much larger;
-    /// for one on which it does more it stays, for e_1's sake.
+    /// V_e weighs e_2 by 1/g, so its bound increases with 1/g relative to the paper's vehicle; it does not decrease,
+    /// because of e_1.
     pub fn new(gains: &PerAxis<adaptive::Gains>, vehicle: &Parameters) -> Self {
         let (paper, own) = (Model::new(&Parameters::PAPER.to_f32()), Model::new(vehicle));
         let sluggish = |axis| math::max(paper.hover_gain(axis) / own.hover_gain(axis), 1.0);
         Bounds {
             theta: PerAxis::from_fn(|axis| 0.95 * gains[axis].safeguards.theta_max),
-            // Projection holds delta_hat at its bound as a matter of course; beyond it there is none.
+            // Projection normally holds delta_hat at its bound; beyond it projection has failed.
             delta: PerAxis::from_fn(|axis| 1.001 * gains[axis].safeguards.delta_max),
             lyapunov: PerAxis::from_fn(|axis| Self::DEFAULT.lyapunov[axis] * sluggish(axis)),
             swing_n: 0.5 * vehicle.weight_n(),
@@ -67,7 +68,7 @@ impl Bounds {
     }
 }
 
-/// How much one subsystem has learnt.
+/// Norms of the estimates of one subsystem.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Norm {
     /// |Theta_hat|^2
@@ -76,12 +77,12 @@ pub struct Norm {
     pub delta: f32,
 }
 
-/// Turning points of one input.
+/// Detector of turning points of one input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swing {
-    /// The furthest point in the present direction \[N\].
+    /// Extreme value in the present direction \[N\].
     extreme: f32,
-    /// The present direction: 1 or -1.
+    /// Present direction: 1 or -1.
     direction: f32,
     /// Reversals per second, averaged over [`WINDOW_S`].
     pub rate_hz: f32,
@@ -108,18 +109,18 @@ impl Swing {
     }
 }
 
-/// The figures as they stand.
+/// Present figures of the monitor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figures {
-    /// Of the estimates.
+    /// Norms of the estimates.
     pub norms: PerAxis<Norm>,
-    /// Mean V_e.
+    /// Mean of V_e.
     pub lyapunov: PerAxis<f32>,
     /// Share of steps with a saturated rotor.
     pub saturation_share: f32,
-    /// Of U1, U2, U3, U4.
+    /// Detectors of U1, U2, U3, U4.
     pub swings: [Swing; 4],
-    /// Whose turn it was.
+    /// Subsystem updated last.
     axis: Axis,
 }
 
@@ -136,26 +137,26 @@ impl Default for Figures {
 }
 
 impl Figures {
-    /// The subsystem that was looked at last, and what it has learnt.
+    /// Returns the subsystem updated last, and its norms.
     #[inline]
     pub fn latest(&self) -> (Axis, Norm) {
         (self.axis, self.norms[self.axis])
     }
 }
 
-/// A monitor: fixed from here on. What changes in flight is in [`Figures`].
+/// A monitor. Constant; everything that changes in flight is in [`Figures`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Monitor {
     bounds: Bounds,
     theta_squared: PerAxis<f32>,
     /// 1/2g
     half_inverse_gain: PerAxis<f32>,
-    /// Share of an average that one step replaces.
+    /// Share of an average that is replaced per step.
     forget: f32,
 }
 
 impl Monitor {
-    /// A monitor that is called every `dt_s` seconds (valid in [`afbc_control::Settings::DT`]).
+    /// Creates a monitor that is called every `dt_s` seconds (valid in [`afbc_control::Settings::DT`]).
     ///
     /// # Errors
     /// The first bound or parameter out of range.
@@ -171,12 +172,12 @@ impl Monitor {
         })
     }
 
-    /// |Theta_hat| to start from, of what is allowed the rest left to be learnt.
+    /// Returns the largest |Theta_hat| to start with, which leaves room for adaptation.
     pub(crate) fn theta_start(&self, axis: Axis) -> f32 {
         0.75 * self.bounds.theta[axis]
     }
 
-    /// Takes one step into account; tells what is wrong, if anything is.
+    /// Processes one step; returns why the monitor trips, if it does.
     #[inline]
     pub fn watch(&self, figures: &mut Figures, cascade: &Cascade<Estimate>, saturated: bool) -> Option<Trip> {
         let axis = figures.axis.next();
@@ -189,7 +190,7 @@ impl Monitor {
         let errors = &cascade.errors[axis];
         let v = 0.5 * errors.e1 * errors.e1 + self.half_inverse_gain[axis] * errors.e2 * errors.e2;
         let lyapunov = &mut figures.lyapunov[axis];
-        // Its turn comes every sixth step.
+        // Each subsystem is updated every sixth step.
         *lyapunov += 6.0 * self.forget * (v - *lyapunov);
 
         let saturated = if saturated { 1.0 } else { 0.0 };

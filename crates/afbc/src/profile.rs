@@ -9,10 +9,10 @@ use afbc_types::{Axis, Parameters, PerAxis};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Profile {
-    /// Section IV as printed, and for what it leaves open: a command filter of 40 rad/s and rotors without a limit.
+    /// Section IV as printed; values missing there are a command filter of 40 rad/s and unlimited rotors.
     Paper,
-    /// The same law made fit to fly: bounded estimates, a robust term without a limit cycle, limits on what is asked of
-    /// the vehicle. For the paper's vehicle with rotors that lag by 20 ms and give 3 N each. Ours: `docs/flight.md`.
+    /// The same law for real rotors: bounded estimates, a robust term without a limit cycle, limits on the demands. For
+    /// the paper's vehicle with rotors that lag by 20 ms and give 3 N each. Not in the paper: `docs/flight.md`.
     Flight,
 }
 
@@ -20,7 +20,7 @@ impl Profile {
     /// Every profile.
     pub const ALL: [Profile; 2] = [Profile::Paper, Profile::Flight];
 
-    /// Lower-case name, as in scenario files and logs.
+    /// Returns the lower-case name, as in scenario files and logs.
     pub const fn name(self) -> &'static str {
         match self {
             Profile::Paper => "paper",
@@ -28,20 +28,20 @@ impl Profile {
         }
     }
 
-    /// Gains of AFBC for a vehicle with these nominal parameters, which must be valid: [`Profile::gains`], scaled in the
-    /// unit of the input so that what the input does to the vehicle is the same.
+    /// Returns AFBC's gains for a vehicle with these nominal parameters, which must be valid: [`Profile::gains`],
+    /// scaled in the unit of the input so that its effect on the vehicle is the same.
     ///
-    /// With g_i of (6) when hovering, alpha_2, gamma, eta, Theta_max and delta_max are multiplied by g_i of the paper's
-    /// vehicle over g_i of this one: its mass for z, its inertia over its arm for roll and pitch, its inertia over d/b for
-    /// yaw. alpha_1, epsilon, the leakage and the membership functions are in rad and m, and stay. So vehicles of any size
-    /// fly alike whose rotors are as quick. Ours.
+    /// With the hover value of g_i of (6), alpha_2, gamma, eta, Theta_max and delta_max are multiplied by g_i of the
+    /// paper's vehicle over g_i of this one: by mass for z, by inertia over arm for roll and pitch, by inertia over d/b
+    /// for yaw. alpha_1, epsilon, the leakage and the membership functions are in rad and m, and are not scaled.
+    /// Vehicles with the same rotor lag then behave alike. Not in the paper.
     pub fn gains_for(self, vehicle: &Parameters) -> PerAxis<adaptive::Gains> {
         let (paper, own) = (Model::new(&Parameters::PAPER.to_f32()), Model::new(vehicle));
         let gains = self.gains();
         PerAxis::from_fn(|axis| gains[axis].scaled(paper.hover_gain(axis) / own.hover_gain(axis)))
     }
 
-    /// Gains of AFBC for the paper's vehicle; their `backstepping` part is the baseline's.
+    /// Returns AFBC's gains for the paper's vehicle; their `backstepping` part is the baseline's.
     pub fn gains(self) -> PerAxis<adaptive::Gains> {
         PerAxis::from_fn(|axis| {
             let (alpha1, alpha2) = match axis {
@@ -67,15 +67,15 @@ impl Profile {
         })
     }
 
-    /// epsilon of the profile `flight`, by rule, for a subsystem whose delta_hat goes up to `delta_max`.
+    /// Returns epsilon of the profile `flight` by rule, for a subsystem with delta_hat up to `delta_max`.
     ///
-    /// Near zero the robust term is a gain of delta_hat/epsilon: this keeps it, times g of the paper's vehicle, below half
-    /// of what an answer after 21 ms can take without a limit cycle (`docs/flight.md`).
+    /// Near zero the robust term is a gain of delta_hat/epsilon: the rule keeps it, times g of the paper's vehicle,
+    /// below half of the limit for a response time of 21 ms (`docs/flight.md`).
     pub fn flight_epsilon(axis: Axis, delta_max: f32) -> f32 {
         2.0 * Model::new(&Parameters::PAPER.to_f32()).hover_gain(axis) * ANSWER_S * delta_max
     }
 
-    /// Settings of the cascade.
+    /// Returns the settings of the cascade.
     pub const fn settings(self) -> Settings {
         match self {
             Profile::Paper => Settings::DEFAULT,
@@ -98,10 +98,10 @@ impl Profile {
     }
 }
 
-/// How long the vehicle takes to answer: a step and the rotors' lag \[s\].
+/// Response time of the vehicle: one step and the rotors' lag \[s\].
 const ANSWER_S: f32 = 0.021;
 
-/// The paper's law with gains of its own, bounded: what `sitl tune afbc` finds. `docs/flight.md` says what each does.
+/// Returns the bounded law's gains, as found by `sitl tune afbc`. `docs/flight.md` explains each.
 fn flight(axis: Axis, paper: adaptive::Gains) -> adaptive::Gains {
     let (alpha1, alpha2, gamma, eta, theta_max, delta_max) = match axis {
         Axis::Roll | Axis::Pitch => (5.257, 0.57, 2.787, 0.2387, 3.0, 0.1274),

@@ -1,6 +1,6 @@
-//! What keeps the estimates bounded and the robust term quiet. Ours: the printed law (33), (34) has none of it.
+//! Safeguards that bound the estimates and keep the robust term smooth. Not in the paper's law (33), (34).
 //!
-//! With e = e_2 behind the dead zone and s = tanh(e_2/epsilon), (33) and (34) become
+//! With e = e_2 after the dead zone and s = tanh(e_2/epsilon), (33) and (34) become
 //!
 //! ```text
 //! d Theta_hat/dt = gamma e w(x) - (sigma + kappa |e_2|) Theta_hat,   |Theta_hat| <= Theta_max
@@ -9,13 +9,13 @@
 //!
 //! * sigma > 0: sigma-modification, Ioannou and Kokotovic 1983. In V' (31) it adds
 //!   sigma/gamma Theta_tilde^T Theta_hat <= sigma/2gamma (|Theta*|^2 - |Theta_tilde|^2), the decay that (37) lacks.
-//! * kappa > 0: e-modification, Narendra and Annaswamy 1987. The same, but only while there is an error to learn from.
-//! * Theta_max, delta_max: projection, Pomet and Praly 1992. Never increases V as long as the optimum lies within.
-//! * Dead zone: no learning from errors that noise explains, Peterson and Narendra 1982.
-//! * Saturation ([`Settings::anti_windup`](crate::Settings)): an estimate does not grow towards a limit that has been
-//!   reached already.
+//! * kappa > 0: e-modification, Narendra and Annaswamy 1987. As sigma, but only while there is an error.
+//! * Theta_max, delta_max: projection, Pomet and Praly 1992. Never increases V as long as the optimum is within.
+//! * Dead zone: no adaptation to errors explained by noise, Peterson and Narendra 1982.
+//! * Anti-windup ([`Settings::anti_windup`](crate::Settings)): an estimate does not grow in the direction of a limit
+//!   that has been reached.
 //!
-//! `docs/flight.md` derives the bound that then really follows.
+//! `docs/flight.md` derives the resulting bound.
 
 use afbc_types::parameters;
 
@@ -35,17 +35,17 @@ parameters! {
         /// Bound on delta_hat, in the subsystem's input.
         #[parameter(DELTAMAX, "input", 0.0..=1e6, tuned)]
         pub delta_max: f32 = 1e6,
-        /// |e_2| up to which nothing is learnt.
+        /// Largest |e_2| without adaptation.
         #[parameter(DEADZONE, "m/s or rad/s", 0.0..=10.0)]
         pub dead_zone: f32 = 0.0,
     }
 }
 
 impl Safeguards {
-    /// The law as printed.
+    /// No safeguards: the law as printed.
     pub const NONE: Self = Self::DEFAULT;
 
-    /// e: what there is to learn from e_2, when `unallocated` of the input that was wanted could not be given.
+    /// Returns the adaptation error e for e_2, given the part `unallocated` of the input that could not be allocated.
     #[inline]
     pub(crate) fn adaptation_error(&self, e2: f32, unallocated: f32) -> f32 {
         if e2 * unallocated > 0.0 {
@@ -59,7 +59,7 @@ impl Safeguards {
         }
     }
 
-    /// sigma + kappa |e_2| \[1/s\].
+    /// Returns sigma + kappa |e_2| \[1/s\].
     #[inline]
     pub(crate) fn leakage(&self, e2: f32) -> f32 {
         self.sigma + self.kappa * e2.abs()

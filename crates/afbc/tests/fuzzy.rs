@@ -1,4 +1,4 @@
-//! Properties of the fuzzy basis (17)-(19), for every membership that is accepted and every finite input.
+//! Properties of the fuzzy basis (17)-(19), for every accepted membership and every finite input.
 #![allow(
     clippy::indexing_slicing,
     clippy::unwrap_used,
@@ -16,17 +16,18 @@ const WIDTH: Range = Membership::WIDTH.range;
 /// Rounding error of one `f32` operation, relative.
 const U: f64 = 1.0 / (1 << 24) as f64;
 
-/// Any finite `f32`: random bit patterns, with the extremes drawn often.
+/// Any finite `f32`: random bit patterns, often the extremes.
 fn finite() -> impl Strategy<Value = f32> {
     let edges = [0.0, f32::from_bits(1), f32::MIN_POSITIVE.next_down(), f32::MIN_POSITIVE, f32::EPSILON, 1.0, f32::MAX];
     prop_oneof![
         3 => prop::num::f32::ANY.prop_filter("finite", |x| x.is_finite()),
         2 => -30.0_f32..30.0,
-        1 => (prop::sample::select(edges.to_vec()), any::<bool>()).prop_map(|(x, negative)| if negative { -x } else { x }),
+        1 => (prop::sample::select(edges.to_vec()), any::<bool>())
+            .prop_map(|(x, negative)| if negative { -x } else { x }),
     ]
 }
 
-/// Any membership that is accepted, its bounds drawn often.
+/// Any accepted membership, often at its bounds.
 fn membership() -> impl Strategy<Value = Membership> {
     let spread =
         prop_oneof![3 => SPREAD.min..=SPREAD.max, 1 => Just(SPREAD.min), 1 => Just(SPREAD.max), 1 => Just(2.5)];
@@ -41,7 +42,7 @@ fn membership() -> impl Strategy<Value = Membership> {
         .prop_filter("accepted", |m| m.validate().is_ok())
 }
 
-/// (18) as it stands, in `f64` and normalised before the exponential.
+/// (18) in `f64`, normalised before the exponential.
 fn exact(membership: Membership, inputs: [f32; 2]) -> Matrix3<f64> {
     let (c, s) = (f64::from(membership.centre), f64::from(membership.width));
     let logit = |x: f32, j: usize| {
@@ -54,9 +55,9 @@ fn exact(membership: Membership, inputs: [f32; 2]) -> Matrix3<f64> {
     firing / firing.sum()
 }
 
-/// Bound on the relative error of a weight. ln w_i moves by at most twice what the exponents k|x| and ln q move by,
-/// where k|x| carries 7 roundings (c, s, two divisions by s, s again, x, the product) and ln q = c^2 / 2s^2 carries 5;
-/// another 20 cover the exponentials (2 each) and the products and sums around them.
+/// Bound on the relative error of a weight. ln w_i changes by at most twice the change of the exponents k|x| and ln q,
+/// where k|x| has 7 roundings (c, s, two divisions by s, s again, x, the product) and ln q = c^2 / 2s^2 has 5; another
+/// 20 cover the exponentials (2 each) and the products and sums around them.
 fn relative_bound(membership: Membership, inputs: [f32; 2]) -> f64 {
     let (c, s) = (f64::from(membership.centre), f64::from(membership.width));
     let exponents: f64 = inputs.iter().map(|x| c / (s * s) * f64::from(x.abs())).sum();
@@ -82,7 +83,7 @@ proptest! {
         let (w, exact) = (Basis::new(membership).unwrap().weights(inputs), exact(membership, inputs));
         let bound = relative_bound(membership, inputs);
         for (w, exact) in w.iter().zip(exact.iter()) {
-            // An exponential below the normal numbers of f32 is 0: 2^-126 over a sum that is at least q = 1.5e-8.
+            // An exponential below the normal numbers of f32 is 0: 2^-126 over a sum of at least q = 1.5e-8.
             let allowed = exact * bound + 8e-31;
             prop_assert!((f64::from(*w) - exact).abs() <= allowed, "{w:e} against {exact:e}, allowed {allowed:e}");
         }
@@ -92,7 +93,7 @@ proptest! {
     fn mirroring_an_input_mirrors_the_weights(membership in membership(), a in finite(), b in finite()) {
         let basis = Basis::new(membership).unwrap();
         let (w, first, second) = (basis.weights([a, b]), basis.weights([-a, b]), basis.weights([a, -b]));
-        // The triples are the same numbers in reverse; their sums may round differently, 2 roundings each way.
+        // The triples are the same numbers in reverse; their sums may round differently, by 2 roundings each.
         let near = |x: f32, y: f32| (f64::from(x) - f64::from(y)).abs() <= 8.0 * U * f64::from(x) + 1e-44;
         for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
             prop_assert!(near(w[(i, j)], first[(2 - i, j)]), "row {i}, column {j}: {w} against {first}");
@@ -102,8 +103,8 @@ proptest! {
 
     #[test]
     fn far_out_the_outer_rule_takes_all(membership in membership(), far in 200.0_f32..1e30) {
-        // From 200 widths on the next Gaussian is exp(-k x + c^2 / 2s^2) < exp(-200 * 0.1 + 18) of the outer one for the
-        // widest spread, which is the nearest to that bound: less than 0.14. It falls as x grows.
+        // From 200 widths on the next Gaussian is exp(-k x + c^2 / 2s^2) < exp(-200 * 0.1 + 18) of the outer one for
+        // the widest spread, the worst case: less than 0.14. It decreases with x.
         let basis = Basis::new(membership).unwrap();
         let x = far * membership.width;
         let w = basis.weights([x, -x]);

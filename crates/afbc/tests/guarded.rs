@@ -1,5 +1,5 @@
-//! AFBC under its monitor: what every step owes, the hand-over to the fallback and back, and that only a command leads
-//! back. Flown against a plant in `tests/tests/guarded.rs`.
+//! AFBC under its monitor: the checks of every step, the switch to the fallback law and back, and that only a command
+//! leads back. `tests/tests/guarded.rs` has closed loops.
 #![allow(clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 mod common;
@@ -16,7 +16,7 @@ use common::{Stepped, U, check_step, gains, plausible, setpoint, settings, state
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// What a flight remembers.
+/// Memory of a flight.
 type Flight = Screened<guarded::Memory>;
 
 const WEIGHT_N: f32 = 0.486 * 9.81;
@@ -29,18 +29,18 @@ fn bounds() -> Bounds {
     Bounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32())
 }
 
-/// Bounds that the first step breaks: V_e above nothing at all.
+/// Bounds exceeded in the first step: V_e above zero.
 fn hair_trigger() -> Bounds {
     Bounds { lyapunov: PerAxis { roll: 0.0, ..bounds().lyapunov }, ..bounds() }
 }
 
-/// Bounds that nothing breaks.
+/// Bounds that are never exceeded.
 fn lax() -> Bounds {
     let most = PerAxis::from_fn(|_| 1e9);
     Bounds { theta: most, delta: most, lyapunov: most, saturation_share: 1.0, swing_n: 1e4, swings_hz: 1e4 }
 }
 
-/// A state whose errors are not zero, and whose fallback stays within its integral's bounds.
+/// A state with errors that are not zero, and with a fallback law within its integral's bounds.
 fn near() -> impl Strategy<Value = State> {
     prop::array::uniform12(-0.05_f32..0.05).prop_map(|[x, y, z, u, v, w, a, b, c, p, q, r]| State {
         position_m: Vector3::new(x, y, z),
@@ -50,7 +50,7 @@ fn near() -> impl Strategy<Value = State> {
     })
 }
 
-/// Bumpless up to rounding: a few operations on numbers of this size.
+/// Checks for no jump beyond rounding: a few operations on numbers of this size.
 fn same(before: &Stepped, after: &Stepped) -> Result<(), TestCaseError> {
     let (before, after) = (before.per_axis(), after.per_axis());
     for axis in Axis::ALL {
@@ -63,17 +63,23 @@ fn same(before: &Stepped, after: &Stepped) -> Result<(), TestCaseError> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever arrives, tripped or not, engaged or not: finite commands within limits, and the screen's flags.
+    /// For any inputs, tripped or not, engaged or not: finite commands within limits, and the screen's flags.
     #[test]
-    fn whatever_it_is_given_the_motors_get_something_they_can_do(
-        gains in gains(), settings in settings(), trips: bool,
+    fn any_input_gives_valid_motor_commands(
+        gains in gains(),
+        settings in settings(),
+        trips: bool,
         inputs in prop::collection::vec((state(value), setpoint(value), prop::bool::weighted(0.1)), 50),
     ) {
         // A vehicle that can hover.
         let (mut gains, mut settings) = (gains, settings);
         gains.z.safeguards.theta_max = gains.z.safeguards.theta_max.max(1.001 * HOVER_THETA * WEIGHT_N);
         settings.common.rotor_force_max_n = settings.common.rotor_force_max_n.max(2.0);
-        let bounds = if trips { Bounds { lyapunov: PerAxis::from_fn(|_| 1.0), ..lax() } } else { Bounds::new(&gains, &Parameters::PAPER.to_f32()) };
+        let bounds = if trips {
+            Bounds { lyapunov: PerAxis::from_fn(|_| 1.0), ..lax() }
+        } else {
+            Bounds::new(&gains, &Parameters::PAPER.to_f32())
+        };
         let controller = Guarded::new(Parameters::PAPER.to_f32(), settings, gains, bounds).unwrap();
         let mut memory = Flight::default();
         for (state, setpoint, engage) in inputs {
@@ -93,11 +99,16 @@ proptest! {
         }
     }
 
-    /// Until it trips, it is AFBC to the bit; and engaging changes nothing.
+    /// Until it trips, it is AFBC bit for bit, and engaging has no effect.
     #[test]
     fn untripped_it_is_the_law(inputs in prop::collection::vec((state(plausible), setpoint(plausible)), 50)) {
         let controller = guarded(lax());
-        let law = Controller::new(Parameters::PAPER.to_f32(), Profile::Flight.settings(), Adaptive::new(Profile::Flight.gains()).unwrap()).unwrap();
+        let law = Controller::new(
+            Parameters::PAPER.to_f32(),
+            Profile::Flight.settings(),
+            Adaptive::new(Profile::Flight.gains()).unwrap(),
+        )
+        .unwrap();
         let (mut memory, mut other) = (Flight::default(), Screened::default());
         for (state, setpoint) in inputs {
             controller.engage(&mut memory.control);
@@ -108,19 +119,23 @@ proptest! {
         prop_assert_eq!(memory.control.trip(), None);
     }
 
-    /// At one and the same state the three steps around a trip, and those around engaging again, want the same inputs:
-    /// AFBC's last, the fallback's first; the fallback's last, AFBC's first.
+    /// At a constant state the three steps around a trip, and those around engaging again, have the same inputs: AFBC's
+    /// last, the fallback law's first; the fallback law's last, AFBC's first.
     #[test]
     fn hand_over_is_bumpless_there_and_back(state in near(), setpoint in near(), lasting in 0_usize..300) {
         // Otherwise there is no error of roll to trip on.
         prop_assume!(state.rates_rad_s.x.abs() > 1e-3);
-        let setpoint = Setpoint { position_m: setpoint.position_m, velocity_m_s: setpoint.velocity_m_s, ..Setpoint::default() };
+        let setpoint =
+            Setpoint { position_m: setpoint.position_m, velocity_m_s: setpoint.velocity_m_s, ..Setpoint::default() };
         let controller = guarded(hair_trigger());
         let mut memory = Flight::default();
         let last_of_afbc = step(&controller, &mut memory, &state, &setpoint);
-        prop_assert_eq!((last_of_afbc.action.health.trip, memory.control.trip()), (None, Some(Trip::Lyapunov(Axis::Roll))));
+        prop_assert_eq!(
+            (last_of_afbc.action.health.trip, memory.control.trip()),
+            (None, Some(Trip::Lyapunov(Axis::Roll)))
+        );
 
-        // Engaged at once, before the fallback has flown.
+        // Engaged at once, before the first step of the fallback law.
         let mut at_once = memory;
         controller.engage(&mut at_once.control);
         let first_of_afbc = step(&controller, &mut at_once, &state, &setpoint);
@@ -133,7 +148,7 @@ proptest! {
         for _ in 0..lasting {
             last_of_fallback = step(&controller, &mut memory, &state, &setpoint);
         }
-        // Otherwise it may stand by then, where nothing trips.
+        // Otherwise it may stand on the ground by then, where nothing trips.
         prop_assume!(last_of_fallback.trace.inputs.thrust_n >= LIFT_SHARE * WEIGHT_N);
         controller.engage(&mut memory.control);
         let first_of_afbc = step(&controller, &mut memory, &state, &setpoint);
@@ -141,10 +156,14 @@ proptest! {
         position_is_the_same(&last_of_fallback, &first_of_afbc)?;
     }
 
-    /// The same for attitude, whose reference moves on from step to step: held where it is by a filter at rest.
+    /// The same for attitude, whose reference changes from step to step: held constant by a filter at rest.
     #[test]
     fn hand_over_at_rest_is_bumpless_in_all_axes(height in -0.2_f32..0.2, yaw in -0.2_f32..0.2) {
-        let state = State { position_m: Vector3::new(0.0, 0.0, height), attitude_rad: Vector3::new(0.0, 0.0, yaw), ..State::default() };
+        let state = State {
+            position_m: Vector3::new(0.0, 0.0, height),
+            attitude_rad: Vector3::new(0.0, 0.0, yaw),
+            ..State::default()
+        };
         let controller = guarded(Bounds { lyapunov: PerAxis { z: 0.0, ..bounds().lyapunov }, ..bounds() });
         let mut memory = Flight::default();
         let mut commands = Vec::new();
@@ -163,7 +182,7 @@ proptest! {
     }
 }
 
-/// z, x, y and yaw: at one and the same state and setpoint, nothing that they track moves on its own.
+/// Checks z, x, y and yaw, whose references are constant at a constant state and setpoint.
 fn position_is_the_same(before: &Stepped, after: &Stepped) -> Result<(), TestCaseError> {
     let only = |command: &Stepped| {
         let mut command = *command;
@@ -173,14 +192,14 @@ fn position_is_the_same(before: &Stepped, after: &Stepped) -> Result<(), TestCas
     same(&only(before), &only(after))
 }
 
-/// A fallback whose integral may not go as far as the last input stops at its bound: bounded before bumpless.
+/// If the last input exceeds the bound of the fallback law's integral, the integral stops at its bound.
 #[test]
 fn the_fallback_takes_over_no_more_than_its_bound() {
     let gains = Profile::Flight.gains();
     let controller = guarded(hair_trigger());
     let mut memory = Flight::default();
     let state = State { attitude_rad: Vector3::new(0.3, 0.0, 0.0), ..State::default() };
-    // The filter starts at the attitude and is led back to level: errors, and AFBC's first steps.
+    // The filter starts at the attitude and returns to level, which gives errors and AFBC's first steps.
     let mut steps = 0;
     while memory.control.trip().is_none() {
         step(&controller, &mut memory, &state, &Setpoint::default());
@@ -194,7 +213,7 @@ fn the_fallback_takes_over_no_more_than_its_bound() {
     }
 }
 
-/// Standing on the ground with a setpoint below it is no fault, however long it takes and whatever saturates.
+/// Standing on the ground with a setpoint below it does not trip, for any time and with any saturation.
 #[test]
 fn the_ground_does_not_trip() {
     let controller = guarded(bounds());
@@ -205,7 +224,7 @@ fn the_ground_does_not_trip() {
         assert!(command.action.health.saturated);
     }
     assert_eq!(memory.control.trip(), None);
-    // The same in the air, sinking: it is one.
+    // In the air, sinking, it does.
     let sinking = State { velocity_m_s: Vector3::new(0.0, 0.0, -0.5), ..State::default() };
     for _ in 0..5_000 {
         step(&controller, &mut memory, &sinking, &below);
@@ -222,7 +241,7 @@ fn a_tripped_controller_learns_nothing_and_says_why() {
     while memory.control.trip().is_none() {
         step(&controller, &mut memory, &state, &setpoint);
     }
-    // The monitor saw each subsystem's norm within the last six steps: one that went on learning would change them.
+    // The monitor has updated each subsystem's norms within the last six steps: adaptation would change them.
     let seen = *memory.control.figures();
     assert!(Axis::ALL.iter().any(|axis| seen.norms[*axis].theta_squared > 0.0), "{seen:?}");
     for _ in 0..1000 {
@@ -246,7 +265,7 @@ fn bounds_and_gains_out_of_range_are_refused_by_name() {
     assert_eq!(name(settings.with_dt_s(0.0), gains, bounds()), "dt_s");
 }
 
-/// The needed figure is in the error.
+/// The error contains the value needed.
 #[test]
 fn a_vehicle_that_cannot_hover_is_refused_by_name() {
     let settings = Profile::Flight.settings();
@@ -266,10 +285,10 @@ fn a_vehicle_that_cannot_hover_is_refused_by_name() {
             }
         }
     }
-    // A light one with that inertia turns too slowly.
+    // A light vehicle with that inertia turns too slowly.
     let light = of_mass(0.05);
     assert_eq!(refusal(light, Profile::Flight.gains_for(&light)), Some(("hover_authority_rad_s2", 80.0)));
-    // With the gains of the paper's vehicle a heavier one would trip in a perfect hover, had it rotors that lift it.
+    // With the gains of the paper's vehicle a heavier one would trip in an ideal hover, if its rotors could lift it.
     let strong = |mass_kg: f32| {
         let gains = Profile::Flight.gains();
         let settings = settings.with_rotor_force_max_n(100.0);
@@ -280,7 +299,7 @@ fn a_vehicle_that_cannot_hover_is_refused_by_name() {
     assert_eq!((error.range.name, error.range.min), ("theta_max", 47.5786));
 }
 
-/// For the paper's vehicle they are the profile's own, to the bit; for one whose every input does half as much, those in the
+/// For the paper's vehicle they are the profile's own, bit for bit; if every input has half the effect, those in the
 /// input's unit are twice as large.
 #[test]
 fn gains_are_scaled_by_what_an_input_does() {
@@ -302,14 +321,14 @@ fn gains_are_scaled_by_what_an_input_does() {
     }
 }
 
-/// What AFBC goes on from is spread over its rules no wider than its monitor lets pass: it is engaged for good.
+/// The estimates after engaging are spread over the rules within the monitor's bounds, so it does not trip at once.
 #[test]
 fn engaging_does_not_trip_by_itself() {
     let bounds = bounds();
     for yaw_n in [0.5_f32, 1.5, -1.5, 2.4] {
         let (controller, (_, mut memory)) = (guarded(bounds), tripped(0, 0.0));
         step(&controller, &mut memory, &State::default(), &Setpoint::default());
-        // Held by force: the integral of gamma e_2 goes on, 1 mN a step.
+        // Held by force: the integral of gamma e_2 grows by 1 mN per step.
         let e2 = 1.0 / Profile::Flight.gains().yaw.gamma;
         let turning = Setpoint { yaw_rate_rad_s: e2.copysign(yaw_n), ..Setpoint::default() };
         for _ in 0..(yaw_n.abs() * 1e3) as usize {
@@ -331,10 +350,10 @@ fn engaging_does_not_trip_by_itself() {
     }
 }
 
-/// The law that stands in knows what AFBC had learnt of the weight: the tilt for an acceleration is the same.
+/// The fallback law keeps AFBC's learnt hover thrust: the tilt for an acceleration does not change.
 #[test]
 fn the_tilt_does_not_step_at_a_trip() {
-    // Of thrust, by (40) at yaw 0 [m/s2].
+    // Acceleration of the thrust by (40) at yaw 0 [m/s2].
     let vertical = |command: &Stepped| command.trace.virtual_m_s2[0] / command.trace.desired_rad[1].tan();
     let (controller, (before, mut memory)) = (guarded(bounds()), tripped(1500, 0.1));
     for _ in 0..20 {
@@ -350,8 +369,8 @@ fn the_tilt_does_not_step_at_a_trip() {
     }
 }
 
-/// A flight of a vehicle that sinks a little for so long, then is led aside, until errors of z trip it; and the step that
-/// did.
+/// A flight of a vehicle that sinks slightly for `steps`, then moves sideways, until errors of z trip it; returns the
+/// step that tripped.
 fn tripped(steps: usize, aside_m: f32) -> (Stepped, Flight) {
     let controller = guarded(bounds());
     let mut memory = Flight::default();

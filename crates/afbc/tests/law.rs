@@ -49,14 +49,18 @@ fn estimate() -> impl Strategy<Value = Estimate> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 5_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// What (16) with (21) does for known f, g and dg/dt. (15) says V_dot = -alpha_1 e_1^2 - alpha_2 e_2^2 of (14), but
-    /// divides e_1 by g on the way where (14) does not: that is true for g = 1 only, and otherwise e_1 e_2 (1 - 1/g) is
-    /// left over. The errors converge all the same: the law as printed gives half the sum of their squares the rate
+    /// The effect of (16) with (21) for known f, g and dg/dt. (15) claims V_dot = -alpha_1 e_1^2 - alpha_2 e_2^2 of
+    /// (14), but divides e_1 by g where (14) does not: this is true for g = 1 only, and otherwise e_1 e_2 (1 - 1/g)
+    /// remains. The errors still converge: with the law as printed, half the sum of their squares has the derivative
     /// -alpha_1 e_1^2 - g alpha_2 e_2^2 + dg/dt e_2^2 / 2g, never positive for a constant g.
     #[test]
     fn lyapunov(
-        tracking in tracking(), alpha1 in 0.01_f32..10.0, alpha2 in 0.0_f32..20.0,
-        f in -20.0_f32..20.0, g in prop_oneof![Just(1.0_f32), 0.05_f32..70.0], g_dot in prop_oneof![Just(0.0_f32), -5.0_f32..5.0],
+        tracking in tracking(),
+        alpha1 in 0.01_f32..10.0,
+        alpha2 in 0.0_f32..20.0,
+        f in -20.0_f32..20.0,
+        g in prop_oneof![Just(1.0_f32), 0.05_f32..70.0],
+        g_dot in prop_oneof![Just(0.0_f32), -5.0_f32..5.0],
     ) {
         let errors = tracking.errors(alpha1);
         let u = ideal(alpha1, &errors, tracking.x1d_ddot, &Dynamics { f, g, g_dot }) + proportional(alpha2, &errors);
@@ -65,8 +69,14 @@ proptest! {
         let [f, g, g_dot, x1d_ddot, u] = [f, g, g_dot, tracking.x1d_ddot, u].map(f64::from);
         let e1_dot = e2 - a1 * e1; // (13)
         let e2_dot = a1 * (e2 - a1 * e1) + x1d_ddot - f - g * u; // (13)
-        // u is rounded at most 12 times on the way from its largest terms; both rates hold e_2 g u, the first over g.
-        let terms = e1.abs() + a1 * e2.abs() + a1 * a1 * e1.abs() + x1d_ddot.abs() + f.abs() + (g_dot / g * e2).abs()
+        // u is rounded at most 12 times relative to its largest terms; both derivatives contain e_2 g u, the first over
+        // g.
+        let terms = e1.abs()
+            + a1 * e2.abs()
+            + a1 * a1 * e1.abs()
+            + x1d_ddot.abs()
+            + f.abs()
+            + (g_dot / g * e2).abs()
             + g * a2 * e2.abs();
         let allowed = 12.0 * U * terms * e2.abs() + 1e-12;
 
@@ -82,12 +92,15 @@ proptest! {
         prop_assert!(g != 1.0 || left_over == 0.0);
     }
 
-    /// At the speed limit e_1 stands still: (13) is d e_2/dt = d^2 x_1d/dt^2 - f - g u, and what (16) and (21) give it is
-    /// -g alpha_2 e_2. For x: f = 0, g = 1.
+    /// At the speed limit e_1 is constant: (13) is d e_2/dt = d^2 x_1d/dt^2 - f - g u, and (16) and (21) make it -g
+    /// alpha_2 e_2. For x: f = 0, g = 1.
     #[test]
     fn at_the_speed_limit_e2_decays(tracking in tracking(), alpha1 in 0.01_f32..10.0, alpha2 in 0.0_f32..20.0) {
         let tracking = Tracking { limited: true, ..tracking };
-        let law = Backstepping::new(&Parameters::PAPER.to_f32(), PerAxis::from_fn(|_| backstepping::Gains { alpha1, alpha2 }));
+        let law = Backstepping::new(
+            &Parameters::PAPER.to_f32(),
+            PerAxis::from_fn(|_| backstepping::Gains { alpha1, alpha2 }),
+        );
         let context = Context {
             state: &State::default(),
             rotor_residual_rad_s: 0.0,
@@ -98,10 +111,14 @@ proptest! {
         let (u, errors) = law.unwrap().input(Axis::X, &tracking, &context, &mut ());
         let [u, x1d_ddot, e2, a2] = [u, tracking.x1d_ddot, errors.e2, alpha2].map(f64::from);
         let e2_dot = x1d_ddot - u;
-        prop_assert!((e2_dot + a2 * e2).abs() <= 4.0 * U * (x1d_ddot.abs() + a2 * e2.abs()), "{e2_dot} for {}", -a2 * e2);
+        prop_assert!(
+            (e2_dot + a2 * e2).abs() <= 4.0 * U * (x1d_ddot.abs() + a2 * e2.abs()),
+            "{e2_dot} for {}",
+            -a2 * e2
+        );
     }
 
-    /// (12), (13): e_2 is what e_1's own dynamics leave over.
+    /// (12), (13): e_2 is what remains of e_1's dynamics.
     #[test]
     fn errors_obey_13(tracking in tracking(), alpha1 in 0.01_f32..10.0) {
         let errors = tracking.errors(alpha1);
@@ -116,7 +133,10 @@ proptest! {
     /// (20): u = u_a + u_r + u_pd, each as defined.
     #[test]
     fn the_law_is_the_sum_of_its_three_terms(
-        gains in gains(), tracking in tracking(), inputs in prop::array::uniform2(-3.0_f32..3.0), estimate in estimate(),
+        gains in gains(),
+        tracking in tracking(),
+        inputs in prop::array::uniform2(-3.0_f32..3.0),
+        estimate in estimate(),
     ) {
         let errors = tracking.errors(gains.backstepping.alpha1);
         let (terms, _) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
@@ -127,20 +147,23 @@ proptest! {
         let w = Basis::new(gains.membership).unwrap().weights(inputs);
         let products = w.zip_map(&estimate.theta, |w, theta| f64::from(w) * f64::from(theta));
         prop_assert!((f64::from(terms.fuzzy) - products.sum()).abs() <= 10.0 * U * products.abs().sum());
-        // A weighted mean lies between the smallest and the largest.
+        // A weighted mean is between the smallest and the largest.
         let slack = 16.0 * U as f32 * estimate.theta.abs().max();
         prop_assert!(terms.fuzzy >= estimate.theta.min() - slack && terms.fuzzy <= estimate.theta.max() + slack);
 
-        // (32): the quotient carries 2 roundings, and s tanh'(s) <= 0.448; tanh itself is within 1.4e-7.
+        // (32): the quotient has 2 roundings, and s tanh'(s) <= 0.448; tanh itself is accurate to 1.4e-7.
         let s = (f64::from(errors.e2) / f64::from(gains.epsilon)).tanh();
         let delta = f64::from(estimate.delta);
         prop_assert!((f64::from(terms.robust) - delta * s).abs() <= delta * (1.4e-7 + 2.0 * U));
     }
 
-    /// (33), (34): Theta_hat moves with the sign of e_2, in proportion to the weights; delta_hat can only grow.
+    /// (33), (34): Theta_hat changes with the sign of e_2, in proportion to the weights; delta_hat can only grow.
     #[test]
-    fn adaptation_goes_the_way_of_the_error(
-        gains in gains(), tracking in tracking(), inputs in prop::array::uniform2(-3.0_f32..3.0), estimate in estimate(),
+    fn adaptation_has_the_sign_of_the_error(
+        gains in gains(),
+        tracking in tracking(),
+        inputs in prop::array::uniform2(-3.0_f32..3.0),
+        estimate in estimate(),
     ) {
         let errors = tracking.errors(gains.backstepping.alpha1);
         let (_, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
@@ -148,7 +171,10 @@ proptest! {
         let e2 = f64::from(errors.e2);
         for (rate, w) in rate.theta().iter().zip(w.iter()) {
             let wanted = f64::from(gains.gamma) * e2 * f64::from(*w);
-            prop_assert!((f64::from(*rate) - wanted).abs() <= 3.0 * U * wanted.abs() + 1e-44, "{rate:e} for {wanted:e}");
+            prop_assert!(
+                (f64::from(*rate) - wanted).abs() <= 3.0 * U * wanted.abs() + 1e-44,
+                "{rate:e} for {wanted:e}"
+            );
         }
         // The weights sum to one, so the rates sum to gamma e_2.
         let total: f64 = rate.theta().iter().copied().map(f64::from).sum();
@@ -159,9 +185,13 @@ proptest! {
         prop_assert!((f64::from(rate.delta()) - wanted).abs() <= f64::from(gains.eta) * e2.abs() * (1.4e-7 + 5.0 * U));
     }
 
-    /// The six subsystems: which inputs each takes (Section IV), Euler's step, and the freeze.
+    /// The six subsystems: their fuzzy inputs (Section IV), Euler's step, and the freeze.
     #[test]
-    fn a_step_uses_the_estimate_as_it_stood_and_then_moves_it(tracking in tracking(), before in estimate(), dt_s in 1e-4_f32..0.02) {
+    fn a_step_uses_the_estimate_as_it_stood_and_then_moves_it(
+        tracking in tracking(),
+        before in estimate(),
+        dt_s in 1e-4_f32..0.02,
+    ) {
         let gains = Profile::Paper.gains();
         let law = Adaptive::new(gains).unwrap();
         let state = State::default();
@@ -175,7 +205,13 @@ proptest! {
             let (terms, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &before, 0.0);
 
             let mut frozen = before;
-            let context = Context { state: &state, rotor_residual_rad_s: 0.0, dt_s, adapt: false, unallocated: PerAxis::default() };
+            let context = Context {
+                state: &state,
+                rotor_residual_rad_s: 0.0,
+                dt_s,
+                adapt: false,
+                unallocated: PerAxis::default(),
+            };
             let (u, seen) = law.input(axis, &tracking, &context, &mut frozen);
             prop_assert_eq!((u, seen, frozen), (terms.sum(), errors, before));
 
@@ -183,7 +219,7 @@ proptest! {
             let (u, _) = law.input(axis, &tracking, &Context { adapt: true, ..context }, &mut moved);
             prop_assert_eq!(u, terms.sum());
             for ((moved, before), rate) in moved.theta.iter().zip(before.theta.iter()).zip(rate.theta().iter()) {
-                // The rate in its factors rounds four times on the way, the sum once.
+                // The rate's factors round four times, the sum once.
                 let step = f64::from(*rate) * f64::from(dt_s);
                 let exact = f64::from(*before) + step;
                 prop_assert!((f64::from(*moved) - exact).abs() <= U * exact.abs() + 8.0 * U * step.abs() + 1e-44);
@@ -194,7 +230,7 @@ proptest! {
     }
 }
 
-/// Every gain is refused outside its range, by its name, and accepted at both ends.
+/// Every gain is refused outside its range, by name, and accepted at both ends.
 #[test]
 fn a_gain_out_of_range_is_refused_by_name() {
     type Set = fn(&mut Gains, f32);

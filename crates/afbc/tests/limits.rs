@@ -1,4 +1,4 @@
-//! What the cascade may ask of the vehicle, for every limit that is accepted and every plausible state and setpoint.
+//! Limits on the demands of the cascade, for every accepted limit and every plausible state and setpoint.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 mod common;
@@ -30,7 +30,7 @@ fn flight(limits: Limits) -> Controller<Adaptive> {
 fn tilt_tangent(command: &Stepped) -> f64 {
     let [phi, theta] = command.trace.desired_rad.map(f64::from);
     let cosine = phi.cos() * theta.cos();
-    // By 1 - cos^2 = sin^2 phi + cos^2 phi sin^2 theta, which keeps its digits near zero.
+    // From 1 - cos^2 = sin^2 phi + cos^2 phi sin^2 theta, which is accurate near zero.
     (phi.sin().powi(2) + (phi.cos() * theta.sin()).powi(2)).sqrt() / cosine
 }
 
@@ -39,7 +39,9 @@ proptest! {
 
     #[test]
     fn tilt_and_tilt_rate_stay_within_their_limits(
-        gains in gains(), settings in settings(), inputs in prop::collection::vec((state(plausible), setpoint(plausible)), 20),
+        gains in gains(),
+        settings in settings(),
+        inputs in prop::collection::vec((state(plausible), setpoint(plausible)), 20),
     ) {
         let controller = adaptive(gains, settings);
         let mut memory = Screened::default();
@@ -50,23 +52,30 @@ proptest! {
         for (state, setpoint) in inputs {
             let command = step(&controller, &mut memory, &state, &setpoint);
             let tangent = tilt_tangent(&command);
-            // 90 degrees is 1.5708, and the tangent there ill-conditioned.
+            // 90 degrees is 1.5708, where the tangent is ill-conditioned.
             prop_assert!(tangent <= tangent_max * (1.0 + 4.0 * U * tangent_max), "{tangent} beyond {tangent_max}");
             for (now, then) in command.trace.filtered.iter().zip(before.unwrap_or(command.trace.filtered)) {
                 prop_assert!(f64::from(now.rate).abs() <= rate_max, "{now:?}");
                 let travel = (f64::from(now.angle) - f64::from(then.angle)).abs();
                 let rounding = 4.0 * U * (f64::from(then.angle).abs() + 1.0);
-                prop_assert!(travel <= rate_max * f64::from(settings.common.dt_s) * (1.0 + 4.0 * U) + rounding, "{travel} rad in a step");
+                prop_assert!(
+                    travel <= rate_max * f64::from(settings.common.dt_s) * (1.0 + 4.0 * U) + rounding,
+                    "{travel} rad in a step"
+                );
             }
             before = Some(command.trace.filtered);
         }
     }
 
-    /// (40) makes of (u5, u6), cut to its limits, the accelerations meant: with the vertical part of the thrust that is
-    /// commanded, along the same direction, at any yaw.
+    /// (40) gives the accelerations (u5, u6), reduced to the limits: with the vertical part of the commanded thrust, in
+    /// the same direction, at any yaw.
     #[test]
     fn limits_cut_the_size_and_keep_the_direction(
-        state in state(plausible), setpoint in setpoint(plausible), limits in limits(), yaw_rad in -9.0_f32..9.0, by_thrust: bool,
+        state in state(plausible),
+        setpoint in setpoint(plausible),
+        limits in limits(),
+        yaw_rad in -9.0_f32..9.0,
+        by_thrust: bool,
     ) {
         let attitude_rad = Vector3::new(state.attitude_rad.x, state.attitude_rad.y, yaw_rad);
         let state = State { attitude_rad, ..state };
@@ -86,17 +95,23 @@ proptest! {
         let (forward, left) = (vertical * theta.tan(), -vertical * phi.tan() / theta.cos());
         let (sin, cos) = f64::from(yaw_rad).sin_cos();
         let got = [forward * cos - left * sin, forward * sin + left * cos];
-        // Rotation; and the rounding of angles near 90 degrees, which their tangent magnifies.
+        // Rotation, and the rounding of angles near 90 degrees, amplified by their tangent.
         let steep = (scale * size / vertical).powi(2) + 1.0;
         let allowed = scale * size * ROTATION + 8.0 * U * vertical * steep;
-        prop_assert!((got[0] - scale * u5).hypot(got[1] - scale * u6) <= allowed, "{got:?} of {u5}, {u6} scaled by {scale}");
+        prop_assert!(
+            (got[0] - scale * u5).hypot(got[1] - scale * u6) <= allowed,
+            "{got:?} of {u5}, {u6} scaled by {scale}"
+        );
     }
 
-    /// (12) with alpha_1 e_1 of x, y and z kept within the speed limit, on top of the reference's own speed; e_1 is the
+    /// (12) with alpha_1 e_1 of x, y and z within the speed limit, in addition to the reference's speed; e_1 is the
     /// distance as long as that is within.
     #[test]
     fn errors_ask_for_no_more_than_the_speed_limit(
-        gains in gains(), limits in limits(), state in state(plausible), setpoint in setpoint(plausible),
+        gains in gains(),
+        limits in limits(),
+        state in state(plausible),
+        setpoint in setpoint(plausible),
     ) {
         let settings = Settings { limits, ..Profile::Flight.settings() };
         let command = step(&adaptive(gains, settings), &mut Screened::default(), &state, &setpoint);
@@ -111,15 +126,18 @@ proptest! {
             let wanted = f64::from(x1d_dot) + asked - f64::from(x2);
             let size = f64::from(x1d_dot).abs() + asked.abs() + f64::from(x2).abs();
             prop_assert!((f64::from(e2) - wanted).abs() <= 6.0 * U * size, "{axis:?}: {e2} for {wanted}");
-            prop_assert!((alpha1 * f64::from(e1) - asked).abs() <= 2.0 * U * asked.abs(), "{axis:?}: {e1} m of {distance} m");
+            prop_assert!(
+                (alpha1 * f64::from(e1) - asked).abs() <= 2.0 * U * asked.abs(),
+                "{axis:?}: {e1} m of {distance} m"
+            );
             prop_assert!(e1 == distance || speed.abs() > max * (1.0 - 2.0 * U), "{axis:?}: {e1} m of {distance} m");
             prop_assert_eq!(e1_dot, x1d_dot - x2);
         }
     }
 
-    /// A whole turn more or less of the setpoint's yaw changes nothing, and the way round is the short one.
+    /// Adding whole turns to the setpoint's yaw changes nothing, and the yaw error is wrapped to +-pi.
     #[test]
-    fn yaw_goes_the_short_way_round(yaw in -3.0_f32..3.0, wanted in -3.0_f32..3.0, turns in -20_i32..20) {
+    fn the_yaw_error_is_wrapped(yaw in -3.0_f32..3.0, wanted in -3.0_f32..3.0, turns in -20_i32..20) {
         let error = |yaw_rad: f32, wanted_rad: f32| {
             let state = State { attitude_rad: Vector3::new(0.0, 0.0, yaw_rad), ..State::default() };
             let setpoint = Setpoint { yaw_rad: wanted_rad, ..Setpoint::default() };
@@ -135,8 +153,8 @@ proptest! {
     }
 }
 
-/// However far away the setpoint is, every law starts towards it, and the fixed ones rest at the speed limit: beyond it
-/// e_1 (1 - alpha_1^2) of (16) must not drive them the other way.
+/// However far the setpoint is, every law accelerates towards it, and the fixed laws do not accelerate at the speed
+/// limit: beyond it e_1 (1 - alpha_1^2) of (16) must not act the other way.
 #[test]
 fn a_distant_setpoint_is_approached_at_the_speed_limit() {
     fn thrust<C: FlightController>(controller: &C, up_m: f32, climb_m_s: f32) -> f32 {
@@ -165,7 +183,7 @@ fn a_distant_setpoint_is_approached_at_the_speed_limit() {
     check(&Controller::new(vehicle, settings, IntegralBackstepping::new(&vehicle, integral).unwrap()).unwrap());
 }
 
-/// Attitudes all the way round, upside down included: no division by the tilt's cosine goes wrong.
+/// Attitudes at all angles, upside down included: no division by the cosine of the tilt fails.
 #[test]
 fn no_attitude_is_singular() {
     let controller = flight(Profile::Flight.settings().limits);

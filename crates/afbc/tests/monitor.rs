@@ -1,4 +1,4 @@
-//! Every figure of the monitor against its definition, and every trip: provoked, and not by a healthy flight.
+//! Every figure of the monitor compared with its definition, and every trip, which a healthy flight does not cause.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 use afbc::model::Model;
@@ -21,7 +21,7 @@ fn monitor(bounds: Bounds) -> Monitor {
     Monitor::new(&Parameters::PAPER.to_f32(), bounds, DT_S).unwrap()
 }
 
-/// What the monitor sees of a step.
+/// Inputs of the monitor in a step.
 #[derive(Clone, Copy, Default)]
 struct Seen {
     inputs: PerAxis<f32>,
@@ -29,19 +29,19 @@ struct Seen {
     saturated: bool,
 }
 
-/// A step of a vehicle that hovers.
+/// A step of a hovering vehicle.
 fn hover() -> Seen {
     Seen { inputs: PerAxis { z: WEIGHT_N, ..PerAxis::default() }, ..Seen::default() }
 }
 
-/// One step's look at what has been learnt and commanded.
+/// Processes one step with these estimates and inputs.
 fn look(monitor: &Monitor, figures: &mut Figures, estimates: PerAxis<Estimate>, seen: &Seen) -> Option<Trip> {
     let mut cascade = Cascade::default();
     (cascade.estimates, cascade.errors, cascade.inputs) = (estimates, seen.errors, seen.inputs);
     monitor.watch(figures, &cascade, seen.saturated)
 }
 
-/// The first trip of `steps` steps, and after how many.
+/// Returns the first trip in `steps` steps, and after how many.
 fn watch(
     monitor: &Monitor,
     steps: usize,
@@ -69,8 +69,8 @@ fn input(axis: Axis, value: f32) -> Seen {
     seen
 }
 
-/// Estimates beyond their bound trip within the six steps of a round, by name, while projection still has room for Theta;
-/// those just below never do.
+/// Estimates beyond their bound trip within the six steps of a round, by name, while projection still leaves room for
+/// Theta; those just below never do.
 #[test]
 fn an_estimate_out_of_bounds_trips_within_six_steps() {
     let bounds = bounds();
@@ -91,7 +91,7 @@ fn an_estimate_out_of_bounds_trips_within_six_steps() {
     }
 }
 
-/// Mean V_e follows its definition, 1 - exp(-t/1 s) of a lasting error, and trips by name once beyond its bound.
+/// The mean of V_e follows its definition, 1 - exp(-t/1 s) for a constant error, and trips by name beyond its bound.
 #[test]
 fn large_errors_trip_when_they_last() {
     let bounds = bounds();
@@ -132,8 +132,8 @@ fn lasting_saturation_trips_and_moments_of_it_do_not() {
     assert_eq!(with(|i| i % 5000 < 2000).1, None);
 }
 
-/// Swings per second are two per period of whatever is larger than the threshold from crest to trough; more than the bound
-/// trip, by name.
+/// Reversals per second are two per period of an oscillation larger than the threshold; more than the bound trip, by
+/// name.
 #[test]
 fn limit_cycles_are_counted_slow_and_fast() {
     let bounds = bounds();
@@ -152,7 +152,7 @@ fn limit_cycles_are_counted_slow_and_fast() {
         for (hz, amplitude) in [(9.0, large), (9.0, 100.0 * large), (100.0, 0.6 * large)] {
             assert_eq!(sine(axis, hz, amplitude).1.unwrap().1, Trip::LimitCycle(axis), "{hz} Hz");
         }
-        // From one step to the next.
+        // Between consecutive steps.
         let chatter = |i: usize| if i.is_multiple_of(2) { 0.0 } else { 1.01 * bounds.swing_n };
         let (steps, trip) = watch(&monitor, 100, |i| (PerAxis::default(), input(axis, chatter(i)))).1.unwrap();
         assert!(steps < 20 && trip == Trip::LimitCycle(axis), "{trip:?} after {steps}");
@@ -160,7 +160,7 @@ fn limit_cycles_are_counted_slow_and_fast() {
 }
 
 proptest! {
-    /// Noise of less than half the threshold on every input, and estimates and errors within bounds: nothing trips.
+    /// Noise of less than half the threshold on every input, and estimates and errors within bounds, do not trip.
     #[test]
     fn a_healthy_flight_does_not_trip(seed: u32, share in 0.0_f32..0.99, saturated: bool) {
         let bounds = bounds();
@@ -189,7 +189,7 @@ proptest! {
         prop_assert_eq!(trip, None);
     }
 
-    /// One look a step, round and round, and the figure is that of the estimate.
+    /// Updated one subsystem per step, the norms are those of the estimates.
     #[test]
     fn norms_are_those_of_the_estimates(theta in prop::array::uniform9(-0.1_f32..0.1), delta in 0.0_f32..0.05) {
         let estimate = Estimate { theta: Matrix3::from_row_slice(&theta), delta };

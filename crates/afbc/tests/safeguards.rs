@@ -1,4 +1,4 @@
-//! The safeguards against the equations that `safeguards.rs` documents, in `f64`, and what follows from them.
+//! The safeguards compared with the equations in `safeguards.rs`, in `f64`, and their consequences.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 mod common;
@@ -14,12 +14,12 @@ use common::{U, gains_of_one};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 
-/// A subsystem whose e_2 is `e2` exactly: e_1 = 0, x_2 = -e_2.
+/// A subsystem with e_2 = `e2` exactly: e_1 = 0, x_2 = -e_2.
 fn tracking(e2: f32) -> Tracking {
     Tracking { x2: -e2, ..Tracking::default() }
 }
 
-/// One step of the x subsystem; returns its u.
+/// Runs one step of the x subsystem; returns its u.
 fn step(gains: Gains, e2: f32, unallocated: f32, dt_s: f32, estimate: &mut Estimate) -> f32 {
     let law = Adaptive::new(PerAxis::from_fn(|_| gains)).unwrap();
     let context = Context {
@@ -32,13 +32,13 @@ fn step(gains: Gains, e2: f32, unallocated: f32, dt_s: f32, estimate: &mut Estim
     law.input(Axis::X, &tracking(e2), &context, estimate).0
 }
 
-/// The same in `f64`, as documented.
+/// The same step in `f64`, as documented.
 fn reference(gains: &Gains, e2: f32, unallocated: f32, dt_s: f32, before: &Estimate) -> (Matrix3<f64>, f64) {
     let Safeguards { sigma, kappa, theta_max, delta_max, dead_zone } = gains.safeguards;
     let [sigma, kappa, theta_max, delta_max, dead_zone] =
         [sigma, kappa, theta_max, delta_max, dead_zone].map(f64::from);
     let [gamma, eta, epsilon, dt] = [gains.gamma, gains.eta, gains.epsilon, dt_s].map(f64::from);
-    // e_1 = 0, so its rate is e_2.
+    // e_1 = 0, so its derivative is e_2.
     let w = Basis::new(gains.membership).unwrap().weights([0.0, e2]).map(f64::from);
     let towards_limit = f64::from(e2) * f64::from(unallocated) > 0.0;
     let e2 = f64::from(e2);
@@ -60,7 +60,7 @@ fn unallocated() -> impl Strategy<Value = f32> {
     prop_oneof![Just(0.0_f32), -1.0_f32..1.0, Just(f32::INFINITY), Just(f32::NEG_INFINITY)]
 }
 
-/// An estimate that the safeguards allow.
+/// An estimate within the safeguards' bounds.
 fn estimate(safeguards: Safeguards) -> impl Strategy<Value = Estimate> {
     (prop::array::uniform9(-1.0_f32..1.0), 0.0_f32..=1.0).prop_map(move |(theta, delta)| Estimate {
         theta: Matrix3::from_row_slice(&theta) * (safeguards.theta_max / 3.0),
@@ -77,12 +77,15 @@ proptest! {
 
     #[test]
     fn a_step_is_the_documented_one(
-        (gains, before) in gains_and_estimate(), e2 in error(), unallocated in unallocated(), dt_s in 1e-4_f32..=0.02,
+        (gains, before) in gains_and_estimate(),
+        e2 in error(),
+        unallocated in unallocated(),
+        dt_s in 1e-4_f32..=0.02,
     ) {
         let mut after = before;
         step(gains, e2, unallocated, dt_s, &mut after);
         let (theta, delta) = reference(&gains, e2, unallocated, dt_s, &before);
-        // What is added, each rounded some ten times; 1 - leakage dt is rounded as a whole.
+        // Increments rounded some ten times each; 1 - leakage dt is rounded as a whole.
         let [gamma, eta, dt, e2] = [gains.gamma, gains.eta, dt_s, e2].map(f64::from);
         let learnt = e2.abs() * dt;
         let theta_size = f64::from(before.theta.abs().max()) + gamma * learnt;
@@ -95,25 +98,30 @@ proptest! {
 
     #[test]
     fn estimates_never_leave_their_bounds(
-        gains in gains_of_one(), inputs in prop::collection::vec((error(), unallocated()), 1..100), dt_s in 1e-4_f32..=0.02,
+        gains in gains_of_one(),
+        inputs in prop::collection::vec((error(), unallocated()), 1..100),
+        dt_s in 1e-4_f32..=0.02,
     ) {
         let mut estimate = Estimate::default();
         let (theta_max, delta_max) = (f64::from(gains.safeguards.theta_max), gains.safeguards.delta_max);
         for (e2, unallocated) in inputs {
             let u = step(gains, e2, unallocated, dt_s, &mut estimate);
             let norm = estimate.theta.map(f64::from).norm();
-            // Nine squares summed, a root, a quotient and a product; squares below 1e-38 are nothing.
+            // Nine squares summed, a root, a quotient and a product; squares below 1e-38 vanish.
             prop_assert!(norm <= theta_max * (1.0 + 12.0 * U) + 1e-18, "{norm} beyond {theta_max}");
             prop_assert!((0.0..=delta_max).contains(&estimate.delta), "{} beyond {delta_max}", estimate.delta);
             prop_assert!(u.is_finite());
         }
     }
 
-    /// With `NONE`, Euler's step of (33), (34) to the bit: what leaks and bounds nothing changes nothing.
+    /// With `NONE` it is Euler's step of (33), (34), bit for bit.
     #[test]
     fn none_is_the_printed_law(
-        gains in gains_of_one(), e2 in error(), dt_s in 1e-4_f32..=0.02,
-        theta in prop::array::uniform9(-5.0_f32..5.0), delta in 0.0_f32..5.0,
+        gains in gains_of_one(),
+        e2 in error(),
+        dt_s in 1e-4_f32..=0.02,
+        theta in prop::array::uniform9(-5.0_f32..5.0),
+        delta in 0.0_f32..5.0,
     ) {
         let gains = Gains { safeguards: Safeguards::NONE, ..gains };
         let before = Estimate { theta: Matrix3::from_row_slice(&theta), delta };
@@ -130,24 +138,32 @@ proptest! {
         prop_assert_eq!(after.delta.to_bits(), printed.delta.to_bits());
     }
 
-    /// Inside the dead zone nothing is learnt: without leakage not one bit changes.
+    /// There is no adaptation within the dead zone: without leakage not one bit changes.
     #[test]
-    fn a_dead_zone_is_dead((gains, before) in gains_and_estimate(), share in -1.0_f32..=1.0, dead_zone in 1e-3_f32..10.0) {
+    fn there_is_no_adaptation_in_the_dead_zone(
+        (gains, before) in gains_and_estimate(),
+        share in -1.0_f32..=1.0,
+        dead_zone in 1e-3_f32..10.0,
+    ) {
         let bounds = Safeguards { theta_max: 1e6, delta_max: 1e6, ..gains.safeguards };
         let safeguards = Safeguards { sigma: 0.0, kappa: 0.0, dead_zone, ..bounds };
         let mut after = before;
         step(Gains { safeguards, ..gains }, share * dead_zone, 0.0, 0.001, &mut after);
         prop_assert_eq!(after, before);
-        // Beyond it, it is.
+        // Beyond it, there is.
         let mut after = Estimate::default();
         let able = Gains { gamma: 1.0, eta: 1.0, safeguards: Safeguards { delta_max: 1.0, ..safeguards }, ..gains };
         step(able, 1.1 * dead_zone, 0.0, 0.02, &mut after);
         prop_assert!(after.theta.min() >= 0.0 && after.theta.max() > 0.0 && after.delta > 0.0);
     }
 
-    /// Towards a limit that was reached nothing is learnt, away from it everything.
+    /// In the direction of a reached limit there is no adaptation, in the other direction full adaptation.
     #[test]
-    fn saturation_is_heeded_on_its_own_side((gains, before) in gains_and_estimate(), e2 in 1e-3_f32..10.0, missing in 1e-6_f32..100.0) {
+    fn anti_windup_acts_in_the_saturated_direction(
+        (gains, before) in gains_and_estimate(),
+        e2 in 1e-3_f32..10.0,
+        missing in 1e-6_f32..100.0,
+    ) {
         let safeguards = Safeguards { sigma: 0.0, kappa: 0.0, ..gains.safeguards };
         let gains = Gains { safeguards, ..gains };
         let fly = |e2, missing| {
@@ -161,13 +177,14 @@ proptest! {
         prop_assert_eq!(fly(e2, -missing), fly(e2, 0.0));
     }
 
-    /// A cascade that does not heed saturation learns the same, to the bit, with whatever rotors; one that does, does not.
+    /// Without anti-windup, adaptation does not depend on the rotors' limits, bit for bit; with it, it does.
     #[test]
-    fn saturation_is_heeded_if_so_set(up_m in 1.0_f32..3.0, roll_rad in 0.2_f32..1.0) {
+    fn anti_windup_acts_if_it_is_set(up_m in 1.0_f32..3.0, roll_rad in 0.2_f32..1.0) {
         let setpoint = Setpoint { position_m: Vector3::new(0.0, 0.0, up_m), ..Setpoint::default() };
         let state = State { attitude_rad: Vector3::new(roll_rad, 0.0, 0.0), ..State::default() };
         let fly = |anti_windup, rotor_force_max_n| {
-            let settings = Settings { anti_windup, ..Profile::Flight.settings().with_rotor_force_max_n(rotor_force_max_n) };
+            let settings =
+                Settings { anti_windup, ..Profile::Flight.settings().with_rotor_force_max_n(rotor_force_max_n) };
             let settings = Settings { tilt_by_thrust: false, ..settings };
             let law = Adaptive::new(Profile::Flight.gains()).unwrap();
             let controller = Controller::new(Parameters::PAPER.to_f32(), settings, law).unwrap();
@@ -184,8 +201,8 @@ proptest! {
     }
 }
 
-/// With no error, an estimate decays by exp(-sigma t); under a lasting error, delta_hat settles where learning and
-/// forgetting are equal.
+/// Without an error, an estimate decays by exp(-sigma t); under a constant error, delta_hat settles where adaptation
+/// and leakage are equal.
 #[test]
 fn leakage_forgets_at_its_rate() {
     let dt_s = 0.001;
@@ -196,7 +213,8 @@ fn leakage_forgets_at_its_rate() {
         for _ in 0..1000 {
             step(gains, 0.0, 0.0, dt_s, &mut estimate);
         }
-        // (1 - sigma dt)^n is below exp(-sigma n dt) by a share of sigma^2 dt n dt / 2, at most 5 %; rounding adds 1000 U.
+        // (1 - sigma dt)^n is below exp(-sigma n dt) by a share of sigma^2 dt n dt / 2, at most 5 %; rounding adds 1000
+        // U.
         let (exact, sigma) = ((-f64::from(sigma)).exp(), f64::from(sigma));
         let share = sigma * sigma * f64::from(dt_s) / 2.0 + 1e-4;
         for (got, start) in estimate.theta.iter().map(|theta| (theta, 2.0)).chain([(&estimate.delta, 3.0)]) {
@@ -213,15 +231,15 @@ fn leakage_forgets_at_its_rate() {
     }
     let settled = 2.0 * e2 * (e2 / 0.1).tanh() / (sigma + kappa * e2);
     assert!((estimate.delta / settled - 1.0).abs() < 1e-3, "{} for {settled}", estimate.delta);
-    // Without an error the e-modification forgets nothing.
+    // Without an error the e-modification has no effect.
     let safeguards = Safeguards { kappa: 100.0, ..Safeguards::NONE };
     let before = estimate;
     step(Gains { safeguards, ..gains }, 0.0, 0.0, dt_s, &mut estimate);
     assert_eq!(estimate, before);
 }
 
-/// A double integrator that is measured with noise: the printed delta_hat grows for as long as it flies, the flight
-/// profile's settles.
+/// A double integrator measured with noise: the printed delta_hat grows throughout the flight, that of the profile
+/// `flight` settles.
 #[test]
 fn noise_drives_the_printed_delta_hat_and_not_the_hardened() {
     const SECOND: u32 = 1000;

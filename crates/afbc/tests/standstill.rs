@@ -1,4 +1,4 @@
-//! Standing on the ground: told from the thrust that is wanted and from motion, and nothing is learnt meanwhile.
+//! Standing on the ground: detected from demanded thrust and motion, without adaptation.
 #![allow(clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
 
 use afbc::standstill::{LIFT_SHARE, STILL_M_S, STILL_S, Standstill};
@@ -11,7 +11,7 @@ use proptest::prelude::*;
 const DT_S: f32 = 0.001;
 const WEIGHT_N: f32 = 4.77;
 
-/// Whether a vehicle that has been so for `steps` stands.
+/// Whether a vehicle with these values for `steps` counts as standing.
 fn stands(thrust_n: f32, velocity_m_s: Vector3<f32>, steps: usize) -> bool {
     let mut standstill = Standstill::default();
     for _ in 0..steps {
@@ -23,7 +23,11 @@ fn stands(thrust_n: f32, velocity_m_s: Vector3<f32>, steps: usize) -> bool {
 proptest! {
     #[test]
     fn only_a_still_vehicle_with_little_thrust_stands(
-        share in 0.0_f32..2.0, x in -0.2_f32..0.2, y in -0.2_f32..0.2, z in -0.2_f32..0.2, steps in 0_usize..1000,
+        share in 0.0_f32..2.0,
+        x in -0.2_f32..0.2,
+        y in -0.2_f32..0.2,
+        z in -0.2_f32..0.2,
+        steps in 0_usize..1000,
     ) {
         prop_assume!((steps as f32 * DT_S - STILL_S).abs() > 2.0 * DT_S);
         let still = [x, y, z].iter().all(|v| v.abs() < STILL_M_S);
@@ -34,7 +38,7 @@ proptest! {
 
 #[test]
 fn a_light_vehicle_that_hovers_does_not_stand_and_one_that_lifts_off_no_longer() {
-    // 60 % of the weight that the controller was told.
+    // 60 % of the nominal weight.
     assert!(!stands(0.6 * WEIGHT_N, Vector3::zeros(), 10_000));
     let mut standstill = Standstill::default();
     for _ in 0..1000 {
@@ -49,7 +53,7 @@ fn a_light_vehicle_that_hovers_does_not_stand_and_one_that_lifts_off_no_longer()
     assert!(!standstill.stands() && !moving.stands());
 }
 
-/// A vehicle on the ground whose setpoint is below it, until it is raised.
+/// A vehicle on the ground with its setpoint below it, until the setpoint is raised.
 #[test]
 fn estimates_freeze_on_the_ground_and_thaw_on_lift() {
     let setpoint = |z| Setpoint { position_m: Vector3::new(0.3, 0.0, z), ..Setpoint::default() };
@@ -67,14 +71,14 @@ fn estimates_freeze_on_the_ground_and_thaw_on_lift() {
     };
     let [stood, still_standing, asked, lifted] = fly(true);
     assert_eq!(stood, still_standing);
-    // The step that asks for lift is still one from the ground; the next is not.
+    // The step that first demands lift still counts as standing; the next one does not.
     assert_eq!(asked, stood);
     assert!(lifted.z != stood.z && lifted.x != stood.x);
     let [stood, still_standing, ..] = fly(false);
     assert_ne!(stood, still_standing, "nothing to freeze");
 }
 
-/// However far aside its setpoint is and however tilted it stands: no moment tips the vehicle over, until it is to lift.
+/// For any setpoint and tilt: no moment tips over a standing vehicle until it is to lift off.
 #[test]
 fn a_standing_vehicle_is_not_tipped_over() {
     let law = Adaptive::new(Profile::Flight.gains()).unwrap();

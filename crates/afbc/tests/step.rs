@@ -1,4 +1,4 @@
-//! Properties of one controller step, for every law: whatever it is given, it answers with something a motor can do.
+//! Properties of one controller step, for every law: any input gives valid motor commands.
 #![allow(clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
 
 mod common;
@@ -39,7 +39,7 @@ fn check_estimates(estimates: &PerAxis<Estimate>) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// Flies a sequence of anything and checks what every step owes, and what it owes to what was wrong.
+/// Flies a sequence of arbitrary inputs, with the checks of every step and of rejected inputs.
 fn fly_anything<L: Law>(
     controller: &Controller<L>,
     settings: &Settings,
@@ -70,12 +70,20 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn whatever_afbc_is_given_the_motors_get_something_they_can_do(gains in gains(), settings in settings(), inputs in sequence(value)) {
+    fn any_input_to_afbc_gives_valid_motor_commands(
+        gains in gains(),
+        settings in settings(),
+        inputs in sequence(value),
+    ) {
         fly_anything(&adaptive(gains, settings), &settings, &inputs)?;
     }
 
     #[test]
-    fn whatever_backstepping_is_given_the_motors_get_something_they_can_do(gains in gains(), settings in settings(), inputs in sequence(value)) {
+    fn any_input_to_backstepping_gives_valid_motor_commands(
+        gains in gains(),
+        settings in settings(),
+        inputs in sequence(value),
+    ) {
         fly_anything(&backstepping(gains, settings), &settings, &inputs)?;
     }
 
@@ -84,21 +92,26 @@ proptest! {
         let controller = adaptive(gains, settings);
         let fly = || {
             let mut memory = Screened::default();
-            inputs.iter().map(|(state, setpoint)| {
-                let command = step(&controller, &mut memory, state, setpoint);
-                let estimates = estimates::<Adaptive>(&memory);
-                let learnt = Axis::ALL.map(|axis| estimates[axis].theta.map(f32::to_bits));
-                (command.action.speeds.0.map(f32::to_bits), learnt)
-            }).collect::<Vec<_>>()
+            inputs
+                .iter()
+                .map(|(state, setpoint)| {
+                    let command = step(&controller, &mut memory, state, setpoint);
+                    let estimates = estimates::<Adaptive>(&memory);
+                    let learnt = Axis::ALL.map(|axis| estimates[axis].theta.map(f32::to_bits));
+                    (command.action.speeds.0.map(f32::to_bits), learnt)
+                })
+                .collect::<Vec<_>>()
         };
         prop_assert_eq!(fly(), fly());
     }
 
-    /// While a state is implausible the step is the one that the last plausible state would have given, except that
-    /// nothing is learnt.
+    /// While a state is implausible the step is that of the last plausible state, but without adaptation.
     #[test]
     fn the_last_plausible_state_stands_in(
-        good in state(plausible), bad in state(value), setpoint in setpoint(plausible), next in setpoint(plausible),
+        good in state(plausible),
+        bad in state(value),
+        setpoint in setpoint(plausible),
+        next in setpoint(plausible),
     ) {
         prop_assume!(!bad.is_plausible());
         let controller = adaptive(Profile::Paper.gains(), Profile::Paper.settings());
@@ -116,11 +129,14 @@ proptest! {
         prop_assert_ne!(memory.control.estimates, other.control.estimates, "the plausible twin should have learnt");
     }
 
-    /// While a setpoint is implausible the last plausible one stands in, and learning goes on; before the first one, the
-    /// vehicle holds its place.
+    /// While a setpoint is implausible the last plausible one is used, with adaptation; before the first one, the
+    /// vehicle holds its position.
     #[test]
     fn the_last_plausible_setpoint_stands_in(
-        state in state(plausible), good in setpoint(plausible), bad in setpoint(value), after in state(plausible),
+        state in state(plausible),
+        good in setpoint(plausible),
+        bad in setpoint(value),
+        after in state(plausible),
     ) {
         prop_assume!(!bad.is_plausible());
         let controller = adaptive(Profile::Paper.gains(), Profile::Paper.settings());
@@ -141,8 +157,7 @@ proptest! {
     }
 }
 
-/// One field at a time, so that none is forgotten: NaN, infinite and just too large are refused, the largest accepted
-/// value is not.
+/// Each field separately: NaN, infinite and slightly too large values are refused, the largest accepted value is not.
 #[test]
 fn every_single_field_is_watched() {
     type SetState = fn(&mut State, f32);

@@ -1,4 +1,4 @@
-//! What the tests of the law share: anything that a sensor, a link or a file of settings may say, and what a step owes.
+//! Shared by the tests of the law: arbitrary inputs and settings, and the checks of every step.
 #![allow(
     dead_code,
     clippy::unwrap_used,
@@ -16,7 +16,7 @@ use proptest::prelude::*;
 /// Rounding error of one `f32` operation, relative.
 pub(crate) const U: f64 = 1.0 / (1 << 24) as f64;
 
-/// A value that a sensor or a link may deliver: mostly of flight's size, often anything at all.
+/// A value from a sensor or a link: mostly of realistic size, often arbitrary.
 pub(crate) fn value() -> impl Strategy<Value = f32> {
     let edges = [
         f32::NAN,
@@ -73,14 +73,14 @@ pub(crate) fn setpoint<S: Strategy<Value = f32> + 'static>(value: fn() -> S) -> 
     )
 }
 
-/// A value anywhere in the range of a parameter, its bounds drawn often.
+/// A value in the range of a parameter, often one of its bounds.
 pub(crate) fn within(declaration: Declaration) -> impl Strategy<Value = f32> {
     let (min, max) = (declaration.range.min as f32, declaration.range.max as f32);
     prop_oneof![4 => min..=max, 1 => Just(min), 1 => Just(max)]
 }
 
-/// A value anywhere in the range of a parameter, evenly over its orders of magnitude from a millionth of its end on, its
-/// bounds drawn often.
+/// A value in the range of a parameter, uniform over orders of magnitude from a millionth of its end on, often one of
+/// its bounds.
 pub(crate) fn spread(declaration: Declaration) -> impl Strategy<Value = f32> {
     let range = declaration.range;
     let (min, max) = (range.min.max(1e-6 * range.max), range.max);
@@ -143,7 +143,7 @@ pub(crate) fn settings() -> impl Strategy<Value = Settings> {
     prop_oneof![Just(Profile::Paper.settings()), Just(Profile::Flight.settings()), any]
 }
 
-/// One set of gains for one subsystem.
+/// Gains for one subsystem.
 pub(crate) fn gains_of_one() -> impl Strategy<Value = Gains> {
     let membership = (1e-3_f32..100.0, 0.1_f32..=6.0);
     let (alpha1, alpha2) = (within(backstepping::Gains::ALPHA1), within(backstepping::Gains::ALPHA2));
@@ -159,7 +159,7 @@ pub(crate) fn gains_of_one() -> impl Strategy<Value = Gains> {
         .prop_filter("accepted", |gains| gains.validate().is_ok())
 }
 
-/// One set of gains for all six subsystems, or a profile's.
+/// Gains for all six subsystems, or a profile's.
 pub(crate) fn gains() -> impl Strategy<Value = PerAxis<Gains>> {
     prop_oneof![
         Just(Profile::Paper.gains()),
@@ -168,7 +168,7 @@ pub(crate) fn gains() -> impl Strategy<Value = PerAxis<Gains>> {
     ]
 }
 
-/// What a step decided, and why.
+/// Action and trace of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Stepped {
     pub(crate) action: Action,
@@ -176,7 +176,7 @@ pub(crate) struct Stepped {
 }
 
 impl Stepped {
-    /// What each subsystem wants: U1..U4 \[N\], u5, u6 \[m/s2\].
+    /// Returns each subsystem's input: U1..U4 \[N\], u5, u6 \[m/s2\].
     pub(crate) fn per_axis(&self) -> PerAxis<f32> {
         let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = self.trace.inputs;
         let [x, y] = self.trace.virtual_m_s2;
@@ -184,7 +184,7 @@ impl Stepped {
     }
 }
 
-/// One step from a measurement.
+/// Runs one step with a measurement.
 pub(crate) fn step<C: FlightController>(
     controller: &C,
     memory: &mut Screened<C::Memory>,
@@ -195,7 +195,7 @@ pub(crate) fn step<C: FlightController>(
     Stepped { action, trace: C::trace(&memory.control) }
 }
 
-/// What every step owes: speeds and forces within the rotors' limits, everything finite.
+/// Checks every step: speeds and forces within the rotors' limits, everything finite.
 pub(crate) fn check_step(step: &Stepped, settings: &Settings) -> Result<(), TestCaseError> {
     let (limit, Stepped { action, trace }) = (settings.common.rotor_force_max_n, step);
     let fastest = (f64::from(limit) / Parameters::PAPER.thrust_factor_n_s2).sqrt() * (1.0 + 2e-7);
