@@ -5,7 +5,7 @@ use afbc_control::mixer::{Mixer, Rotor};
 use afbc_types::{Inputs, Parameters};
 
 fn main() {
-    // Front right, front left, rear left, rear right, in arm's lengths; neighbours turn against each other.
+    // Front right, front left, rear left, rear right, in arm lengths; adjacent rotors spin in opposite directions.
     let c = core::f32::consts::FRAC_1_SQRT_2;
     let rotor = |x, y, pushes_left| Rotor { x, y, pushes_left };
     let frame = [rotor(c, -c, true), rotor(c, c, false), rotor(-c, c, true), rotor(-c, -c, false)];

@@ -1,45 +1,45 @@
-//! What one step decides.
+//! Result of a control step.
 
 use crate::Trip;
 use afbc_types::{RotorForces, RotorSpeeds};
 
-/// What one step decides.
+/// Result of a control step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use = "the rotors turn by it"]
 #[non_exhaustive]
 pub struct Action {
-    /// omega_i, always finite and never negative.
+    /// Rotor speeds omega_i, always finite and never negative.
     pub speeds: RotorSpeeds,
-    /// F_i, within the rotors' limits.
+    /// Rotor forces F_i, within the rotors' limits.
     pub forces: RotorForces,
-    /// What went wrong.
+    /// Faults of the step.
     pub health: Health,
 }
 
 impl Action {
-    /// An action on a plausible state and setpoint.
+    /// An action from a plausible state and setpoint.
     #[inline]
     pub fn new(speeds: RotorSpeeds, forces: RotorForces, saturated: bool) -> Self {
         Action { speeds, forces, health: Health { saturated, ..Health::default() } }
     }
 }
 
-/// What went wrong in a step; all false in normal flight.
+/// Faults of a step; all false in normal flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Health {
-    /// There was no measurement, or an implausible one (see [`State::is_plausible`](afbc_types::State::is_plausible)); the
-    /// last plausible one stood in for it and no estimate changed. If there was none yet, the rotors stay still.
+    /// The measurement was missing or implausible (see [`State::is_plausible`](afbc_types::State::is_plausible)). The
+    /// last plausible one was used instead and no estimate changed; if there was none yet, the rotors stay stopped.
     pub state_rejected: bool,
-    /// The setpoint was implausible; the last plausible one stood in for it, or if there was none yet, a hold of the
-    /// position of that moment.
+    /// The setpoint was implausible. The last plausible one was used instead; if there was none yet, the position at
+    /// that moment is held.
     pub setpoint_rejected: bool,
-    /// A rotor was asked for a force outside its limits.
+    /// A rotor force was limited.
     pub saturated: bool,
-    /// Why another law flies in the controller's place, if one does.
+    /// Reason why a fallback law flies instead of the controller's own, if one does.
     pub trip: Option<Trip>,
 }

@@ -1,4 +1,4 @@
-//! Second-order command filter: a smooth reference with two derivatives from a raw command. Ours.
+//! Second-order command filter: a smooth reference with two derivatives from a raw command. Not in the paper.
 //!
 //! (12) needs d phi_d/dt and d theta_d/dt, which the paper does not provide. The filter is critically damped,
 //!
@@ -14,10 +14,10 @@ use afbc_types::{OutOfRange, Range};
 /// Accepted bandwidth w \[rad/s\].
 pub const BANDWIDTH: Range = Range::new("command_filter_rad_s", 1.0, 1000.0);
 
-/// Accepted largest rate behind the filter \[rad/s\].
+/// Accepted rate limit of the filter \[rad/s\].
 pub const RATE_MAX: Range = Range::new("tilt_rate_max_rad_s", 0.1, 1e6);
 
-/// The filter's constants.
+/// Constants of the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommandFilter {
     bandwidth: f32,
@@ -27,7 +27,7 @@ pub struct CommandFilter {
     rate_max: f32,
 }
 
-/// The filter's state.
+/// State of the filter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -39,7 +39,8 @@ pub struct Filtered {
 }
 
 impl CommandFilter {
-    /// A filter of the given bandwidth \[rad/s\], advanced every `dt_s` seconds (valid in [`crate::Settings::DT`]).
+    /// Makes a filter of the given bandwidth \[rad/s\], advanced every `dt_s` seconds (valid in
+    /// [`crate::Settings::DT`]).
     ///
     /// # Errors
     /// If the bandwidth is outside [`BANDWIDTH`].
@@ -49,7 +50,7 @@ impl CommandFilter {
         Ok(CommandFilter { bandwidth: bandwidth_rad_s, dt: dt_s, decay, rate_max: f32::INFINITY })
     }
 
-    /// The same filter with a rate of at most `rate_max_rad_s`.
+    /// Returns the same filter with a rate of at most `rate_max_rad_s`.
     ///
     /// # Errors
     /// If the rate is outside [`RATE_MAX`].
@@ -58,7 +59,7 @@ impl CommandFilter {
         Ok(CommandFilter { rate_max: rate_max_rad_s, ..self })
     }
 
-    /// d^2 x/dt^2 under `command` \[rad/s2\]: none beyond the rate limit.
+    /// Returns d^2 x/dt^2 under `command` \[rad/s2\]; zero in the direction of the rate limit while at it.
     #[inline]
     pub fn acceleration(&self, state: &Filtered, command: f32) -> f32 {
         let acceleration = self.bandwidth * (self.bandwidth * (command - state.angle) - 2.0 * state.rate);
@@ -66,7 +67,7 @@ impl CommandFilter {
         if limited { 0.0 } else { acceleration }
     }
 
-    /// The state one step later, `command` held meanwhile.
+    /// Returns the state one step later, with `command` held meanwhile.
     #[inline]
     #[must_use]
     pub fn advance(&self, state: &Filtered, command: f32) -> Filtered {
@@ -74,7 +75,7 @@ impl CommandFilter {
         let slope = state.rate + self.bandwidth * offset;
         let angle = command + (offset + slope * self.dt) * self.decay;
         let rate = (state.rate - self.bandwidth * slope * self.dt) * self.decay;
-        // A fast filter is at its command, and at rest, within a step.
+        // Within one step, a fast filter reaches its command and comes to rest.
         let travel = angle - state.angle;
         let fastest = if rate.abs() > self.rate_max { rate } else { travel };
         if rate.abs() <= self.rate_max && travel.abs() <= self.rate_max * self.dt {

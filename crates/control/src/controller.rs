@@ -1,19 +1,19 @@
-//! What every controller looks like from outside, so that one harness, one tuner and one campaign fly them all.
+//! Interface of all controllers: one test harness, tuner and campaign fly any of them.
 
 use crate::screen::Screened;
 use crate::{Action, Estimate, Health, Mixer, Trace};
 use afbc_types::{PerAxis, Setpoint, State};
 
-/// A controller from measured and wanted motion to rotor speeds.
+/// A controller: computes rotor speeds from the measured state and the setpoint.
 ///
-/// A controller is checked when it is built and fixed from then on; what changes in flight is in its memory. One step
-/// is called every [`dt_s`](FlightController::dt_s) seconds.
+/// A controller is validated when it is built and immutable from then on; everything that changes in flight is in its
+/// memory. [`step`](FlightController::step) must be called every [`dt_s`](FlightController::dt_s) seconds.
 ///
 /// ```
 /// use afbc_control::{Action, FlightController, Mixer, Screened, Trace};
 /// use afbc_types::{Inputs, OutOfRange, Parameters, Setpoint, State};
 ///
-/// /// Rotors that carry the weight, and nothing else.
+/// /// Carries the weight and does nothing else.
 /// struct Float(Mixer);
 ///
 /// impl FlightController for Float {
@@ -43,23 +43,23 @@ use afbc_types::{PerAxis, Setpoint, State};
 /// # Ok::<(), OutOfRange>(())
 /// ```
 pub trait FlightController {
-    /// What the controller itself remembers between steps.
+    /// State of the controller between steps.
     type Memory: Copy + Default + core::fmt::Debug;
 
-    /// Time between steps \[s\].
+    /// Returns the time between steps \[s\].
     fn dt_s(&self) -> f32;
 
-    /// How it shares its inputs out among the rotors.
+    /// Returns the mixer that allocates the inputs to the rotors.
     fn mixer(&self) -> &Mixer;
 
-    /// The decision of one step, from a plausible state and setpoint ([`State::is_plausible`],
-    /// [`Setpoint::is_plausible`]). If the state is not `fresh` but an old one, nothing is learnt, integrated or filtered
-    /// from it. Cannot fail or panic; gives finite rotor speeds within their limits.
+    /// Computes the action of one step from a plausible state and setpoint ([`State::is_plausible`],
+    /// [`Setpoint::is_plausible`]). If the state is not `fresh` but repeated, no estimate, integral or filter of
+    /// measurements is updated. Does not fail or panic; the rotor speeds are finite and within their limits.
     fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action;
 
-    /// One step from what was measured, if anything was, finite or not: [`FlightController::decide`] behind a
-    /// [`Screen`](crate::Screen). [`Action::health`] tells what was not plausible.
-    // Always: copying the action out of a call costs a tenth of a closed-loop step.
+    /// Performs one step from a measurement that may be missing, implausible or not finite:
+    /// [`FlightController::decide`] behind a [`Screen`](crate::Screen). [`Action::health`] reports rejected input.
+    // Inlined always: copying the action out of a call costs a tenth of a closed-loop step.
     #[inline(always)]
     fn step(&self, memory: &mut Screened<Self::Memory>, measured: Option<&State>, setpoint: &Setpoint) -> Action {
         let mut screened = Health::default();
@@ -73,16 +73,16 @@ pub trait FlightController {
         action
     }
 
-    /// Why the last step decided as it did.
+    /// Returns the internal signals of the last step.
     fn trace(memory: &Self::Memory) -> Trace;
 
-    /// What `memory` holds in AFBC's terms; zero for a controller that learns nothing.
+    /// Returns the estimates of an adaptive law, in AFBC's terms; zero for a law without any.
     fn learnt(_memory: &Self::Memory) -> PerAxis<Estimate> {
         PerAxis::default()
     }
 
-    /// Gives the flight back to a controller that has fallen back on another law, without a jump of its inputs; true if it
-    /// had. Does nothing to one that has not.
+    /// Returns control from a fallback law to the controller's own, without a jump of the inputs. True if the fallback
+    /// was active; otherwise nothing changes.
     fn engage(&self, _memory: &mut Self::Memory) -> bool {
         false
     }

@@ -1,16 +1,17 @@
-//! What every quadrotor controller shares: the interface that harness, flight core and firmware fly it by, and what it
-//! is built from.
+//! Parts shared by all quadrotor controllers: the interface between controller and harness, flight core or firmware,
+//! and the building blocks of controllers.
 //!
-//! Frames, units and the meaning of "(n)" are stated in [`afbc_types`].
+//! Frames, units and the meaning of "(n)" are defined in [`afbc_types`].
 //!
-//! * [`FlightController`]: a step from state and setpoint to an [`Action`]; a [`Trace`] of why. Laws are in other crates,
-//!   `afbc` and `afbc-peers`; a law of one's own needs this crate only.
-//! * [`Screened`]: the memory of a controller that implausible input does not reach.
-//! * [`mixer`]: U1..U4 to rotor forces and speeds, and back.
+//! * [`FlightController`]: a step from state and setpoint to an [`Action`], and a [`Trace`] of its internal signals.
+//!   Control laws are in the crates `afbc` and `afbc-peers`; a new law needs this crate only.
+//! * [`Screened`]: a controller's memory behind a screen that rejects implausible input.
+//! * [`mixer`]: control allocation, from U1..U4 to rotor forces and speeds, and back.
 //! * [`command_filter`]: a smooth reference with two derivatives.
-//! * [`math`]: where every transcendental function comes from; the same bits on host and target.
+//! * [`math`]: all transcendental functions, with bit-identical results on host and target.
 //!
-//! Features `serde` and `defmt`, off by default, are those of [`afbc_types`]; here they add actions, health and traces.
+//! Features `serde` and `defmt`, off by default, are those of [`afbc_types`]; here they also cover actions, health
+//! and traces.
 #![no_std]
 
 mod action;

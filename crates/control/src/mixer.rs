@@ -1,53 +1,54 @@
-//! Allocation of U1..U4 to rotor forces and rotor speeds, and back, for rotors anywhere in the body's x-y plane.
+//! Control allocation: U1..U4 to rotor forces and rotor speeds, and back, for rotors anywhere in the body's x-y plane.
 //!
-//! U = B F with one column of B a rotor: \[y/l, -x/l, spin, 1\]. Forces are F = P U with the pseudo-inverse
-//! P = B^T (B B^T)^-1: exact, and of all exact ones the smallest. When that breaks a rotor's limits, roll and pitch are
-//! served first, then thrust, yaw last:
+//! U = B F, where B has one column \[y/l, -x/l, spin, 1\] per rotor. Forces are F = P U with the pseudo-inverse
+//! P = B^T (B B^T)^-1: of all exact solutions the one of least norm. When it violates a rotor's limits, desaturation
+//! gives priority to roll and pitch, then thrust, yaw last:
 //!
-//! 1. roll and pitch are scaled down together until some thrust makes their forces P \[U1, U2, 0, 0\] fit the limits;
-//! 2. thrust moves by as little as makes room for them;
-//! 3. yaw gets the share that still fits.
+//! 1. roll and pitch are scaled down together until their forces P \[U1, U2, 0, 0\] fit the limits at some thrust;
+//! 2. thrust changes as little as necessary to make room for them;
+//! 3. yaw is scaled down to the room that is left.
 //!
-//! For four rotors on a cross, no other forces give more roll and pitch. More rotors leave a choice that is not searched:
-//! other forces may give more. Yaw that happens to make room is counted on only where all four inputs fit, and in a frame
-//! without symmetry a little pitch may make room for roll, so that more of one asked is not always more given.
+//! For four rotors on a cross, no allocation gives more roll and pitch. With more rotors, other solutions than the
+//! pseudo-inverse may give more; they are not searched. Yaw forces that would make room for roll and pitch are used
+//! only where all four inputs fit. In a frame without symmetry, a little pitch may make room for roll, so a larger
+//! demand does not always yield more.
 
 use crate::settings::Settings;
 use crate::{Action, math};
 use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds};
 use nalgebra::{Matrix4, SMatrix, SVector, Vector4};
 
-/// Accepted position of a rotor along x and along y, in arm's lengths.
+/// Accepted position of a rotor along x and along y, in arm lengths.
 pub const POSITION: Range = Range::new("rotor_position", -10.0, 10.0);
-/// Accepted determinant of B B^T over the product of its diagonal, 1 for a symmetric frame: near 0 the rotors cannot give
-/// all four inputs apart from each other.
+/// Accepted determinant of B B^T over the product of its diagonal. It is 1 for a symmetric frame; near 0 the rotors
+/// cannot give all four inputs independently.
 pub const AUTHORITY: Range = Range::new("rotor_authority", 1e-3, 1.001);
-/// Accepted share of one rotor in a thrust without moments: a frame that hovers on less does not hover.
+/// Accepted share of one rotor in a pure thrust. With a smaller or negative share, the frame cannot hover.
 pub const THRUST_SHARE: Range = Range::new("rotor_thrust_share", 1e-3, 1.0);
 
-/// Least largest force of a rotor over its part of the weight. Less leaves too little for roll and pitch, for a battery
-/// that sags, for a climb. Ours.
+/// Least ratio of a rotor's largest force to its share of the weight. Less leaves too little for roll and pitch, for
+/// battery sag and for a climb. Not in the paper.
 pub const HOVER_MARGIN: f32 = 1.3;
 
-/// Larger inputs than this are taken for it \[N\]: beyond what any rotors give, and within what can be reckoned with.
+/// Inputs are clamped to this size \[N\]: beyond what any rotors give, small enough for exact enough arithmetic.
 const ASKED_MAX: f32 = 1e9;
-/// What is missing of an input by rounding alone, as a share of the largest force.
+/// Unallocated input that is explained by rounding, relative to the largest force.
 const ROUNDING: f32 = 1e-6;
 
-/// Where a rotor is, and which way it turns the body.
+/// Position and direction of rotation of a rotor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rotor {
-    /// Along body x, in arm's lengths.
+    /// Position along body x, in arm lengths.
     pub x: f32,
-    /// Along body y, in arm's lengths.
+    /// Position along body y, in arm lengths.
     pub y: f32,
-    /// True if its drag pushes the body to positive yaw.
+    /// True if the rotor's drag moment acts towards positive yaw.
     pub pushes_left: bool,
 }
 
-/// The frame described in [`afbc_types`]: rotor 1 at -y, 2 at +x, 3 at +y, 4 at -x.
+/// The frame of [`afbc_types`]: rotor 1 at -y, 2 at +x, 3 at +y, 4 at -x.
 pub const PLUS: [Rotor; 4] = [
     Rotor { x: 0.0, y: -1.0, pushes_left: true },
     Rotor { x: 1.0, y: 0.0, pushes_left: false },
@@ -55,14 +56,14 @@ pub const PLUS: [Rotor; 4] = [
     Rotor { x: -1.0, y: 0.0, pushes_left: false },
 ];
 
-/// The mixer of a frame of `N` rotors, four to eight of them in practice.
+/// The mixer of a frame of `N` rotors, usually four to eight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mixer<const N: usize = 4> {
     /// B
     effectiveness: SMatrix<f32, 4, N>,
     /// P
     inverse: SMatrix<f32, N, 4>,
-    /// Of a thrust of 1 N, each rotor's part; and 1 over it.
+    /// Each rotor's share of a pure thrust, and its inverse.
     share: SVector<f32, N>,
     inverse_share: SVector<f32, N>,
     /// b
@@ -72,23 +73,23 @@ pub struct Mixer<const N: usize = 4> {
     force_max: f32,
 }
 
-/// Forces within the rotors' limits.
+/// Rotor forces within the limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use = "the forces are not applied"]
 #[non_exhaustive]
 pub struct Allocation<const N: usize = 4> {
-    /// What the rotors can give of what was asked.
+    /// Forces that the rotors can give.
     pub forces: RotorForces<N>,
-    /// What was asked and is not given: U - B F, or 0 where rounding explains it.
+    /// Part of the demand that is not given: U - B F, 0 where rounding explains the difference.
     pub unallocated: Inputs,
-    /// True if a rotor was asked for less than nothing or more than its limit.
+    /// True if a rotor force was limited.
     pub saturated: bool,
 }
 
 impl Mixer {
-    /// The mixer of the [`PLUS`] frame, for a vehicle whose rotors give 0 to `force_max_n`.
+    /// Makes the mixer of the [`PLUS`] frame, for rotors that give 0 to `force_max_n`.
     ///
     /// # Errors
     /// If a parameter or the limit is out of range.
@@ -96,14 +97,14 @@ impl Mixer {
         Self::of(PLUS, vehicle, force_max_n)
     }
 
-    /// What the rotors do for `inputs`, as far as their limits allow.
+    /// Returns the action for `inputs`, as far as the rotors' limits allow.
     #[inline]
     pub fn action(&self, inputs: &Inputs) -> Action {
         let Allocation { forces, saturated, .. } = self.allocate(inputs);
         Action::new(self.speeds(&forces), forces, saturated)
     }
 
-    /// U1..U4 of the [`PLUS`] frame's rotor forces, (6).
+    /// Returns U1..U4 of rotor forces of the [`PLUS`] frame, (6).
     #[inline]
     pub fn inputs(forces: &RotorForces) -> Inputs {
         let [f1, f2, f3, f4] = forces.0.into();
@@ -112,10 +113,10 @@ impl Mixer {
 }
 
 impl<const N: usize> Mixer<N> {
-    /// The mixer of any frame.
+    /// Makes the mixer of any frame.
     ///
     /// # Errors
-    /// If a parameter, a position or the limit is out of range, or the rotors cannot give all four inputs and hover.
+    /// If a parameter, a position or the limit is out of range, or if the rotors cannot give all four inputs and hover.
     pub fn of(rotors: [Rotor; N], vehicle: &Parameters, force_max_n: f32) -> Result<Self, OutOfRange> {
         vehicle.validate()?;
         Settings::FORCE_MAX.range.check(force_max_n)?;
@@ -146,27 +147,27 @@ impl<const N: usize> Mixer<N> {
         })
     }
 
-    /// Whether the rotors lift a vehicle of this weight with a margin of [`HOVER_MARGIN`].
+    /// Checks that the rotors lift a vehicle of this weight with a margin of [`HOVER_MARGIN`].
     ///
     /// # Errors
-    /// The largest force of one rotor, and what it would have to be at least.
+    /// The largest force of one rotor is too small; the error states the least accepted one.
     pub fn check_hover(&self, weight_n: f32) -> Result<(), OutOfRange> {
-        // Rounded up to what people read.
+        // Rounded up, for a readable number.
         let needed_n = libm::ceil(f64::from(HOVER_MARGIN * weight_n * self.share.max()) * 1e4) / 1e4;
         Range { min: needed_n, ..Settings::FORCE_MAX.range }.check(self.force_max)
     }
 
-    /// Rotor forces that give `inputs`, as far as the rotors' limits allow. A NaN is taken for 0, and reported as
+    /// Returns rotor forces that give `inputs`, as far as the rotors' limits allow. NaN counts as 0 and is reported as
     /// saturation.
     #[inline]
     pub fn allocate(&self, inputs: &Inputs) -> Allocation<N> {
         let wanted = Vector4::new(inputs.roll_n, inputs.pitch_n, inputs.yaw_n, inputs.thrust_n);
         let forces = self.inverse * wanted;
-        // One NaN makes every force a NaN, which is within no limits.
+        // One NaN makes every force NaN, which is not within any limits.
         if forces.iter().all(|&force| 0.0 <= force && force <= self.force_max) {
             return Allocation { forces: RotorForces(forces), unallocated: Inputs::default(), saturated: false };
         }
-        // The usual case by one comparison, which a NaN fails, too.
+        // False of NaN, too.
         let wanted = if wanted.norm_squared() <= ASKED_MAX * ASKED_MAX {
             wanted
         } else {
@@ -179,11 +180,11 @@ impl<const N: usize> Mixer<N> {
         Allocation { forces: RotorForces(forces), unallocated, saturated: true }
     }
 
-    /// The forces nearest to what is wanted, by priority.
+    /// Desaturates by priority.
     fn within_limits(&self, wanted: &Vector4<f32>) -> SVector<f32, N> {
         let column = |i: usize, u: f32| self.inverse.column(i) * u;
         let tilt = column(0, wanted.x) + column(1, wanted.y);
-        // The least thrust at which no rotor has to pull down, and the largest force then.
+        // The least thrust at which no rotor force is negative, and the largest force at that thrust.
         let (mut least, mut largest) = (f32::MIN, f32::MIN);
         for (force, inverse_share) in tilt.iter().zip(self.inverse_share.iter()) {
             least = math::max(least, -force * inverse_share);
@@ -203,29 +204,29 @@ impl<const N: usize> Mixer<N> {
         let yaw = column(2, wanted.z);
         let mut fits = 1.0_f32;
         for (force, yaw) in upright.iter().zip(yaw.iter()) {
-            // By rounding, less than none may be left: of no yaw, that takes no share.
+            // Rounding may leave negative room; the `max` prevents 0/0 for zero yaw.
             let room = math::max(if *yaw > 0.0 { self.force_max - force } else { *force }, 0.0);
             if yaw.abs() > room {
                 fits = math::min(fits, room / yaw.abs());
             }
         }
-        // Not `max`: that of 0 and -0 is either.
+        // Not `max`: `max` of 0 and -0 may be either.
         (upright + yaw * fits).map(|force| if force > 0.0 { math::min(force, self.force_max) } else { 0.0 })
     }
 
-    /// omega_i = sqrt(F_i / b), for forces that are not negative.
+    /// Returns omega_i = sqrt(F_i / b) of forces that are not negative.
     #[inline]
     pub fn speeds(&self, forces: &RotorForces<N>) -> RotorSpeeds<N> {
         RotorSpeeds(forces.0.map(|force| math::sqrt(force * self.inverse_thrust_factor)))
     }
 
-    /// F_i = b omega_i^2.
+    /// Returns F_i = b omega_i^2.
     #[inline]
     pub fn forces(&self, speeds: &RotorSpeeds<N>) -> RotorForces<N> {
         RotorForces(speeds.0.map(|speed| self.thrust_factor * speed * speed))
     }
 
-    /// U = B F.
+    /// Returns U = B F.
     #[inline]
     pub fn inputs_of(&self, forces: &RotorForces<N>) -> Inputs {
         let u = self.effectiveness * forces.0;

@@ -1,27 +1,27 @@
-//! What a controller may believe: implausible input never reaches a law.
+//! Input screen: keeps implausible states and setpoints away from the control law.
 
 use crate::Health;
 use afbc_types::{Setpoint, State};
 
-/// What a controller remembers between steps, with the last plausible state and setpoint.
+/// A controller's memory together with its input screen.
 ///
-/// The default is that of a controller that has not flown yet.
+/// The default is the memory before the first step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Screened<M> {
     screen: Screen,
-    /// Of the controller behind the screen.
+    /// Memory of the controller behind the screen.
     pub control: M,
 }
 
 impl<M> Screened<M> {
-    /// The screen, and the memory behind it.
+    /// Returns the screen and the memory behind it.
     #[inline]
     pub(crate) fn parts(&mut self) -> (&mut Screen, &mut M) {
         (&mut self.screen, &mut self.control)
     }
 }
 
-/// The last plausible state and setpoint.
+/// Last plausible state and setpoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Screen {
     state: Option<State>,
@@ -29,9 +29,10 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// The state and the setpoint to work from: those given where they are plausible, otherwise the last ones that were.
-    /// Without any plausible setpoint so far, a hold of the present position; without any plausible state so far, `None`.
-    /// `health` tells what was refused.
+    /// Returns the given state and setpoint where they are plausible, otherwise the last ones that were. Without any
+    /// plausible setpoint so far, the setpoint holds the present position; without any plausible state so far, the
+    /// result
+    /// is `None`. `health` reports what was rejected.
     #[inline]
     pub fn pass(
         &mut self,

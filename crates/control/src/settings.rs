@@ -1,9 +1,9 @@
-//! What every controller has to know besides its vehicle and its gains.
+//! Settings of every controller besides vehicle parameters and gains.
 
 use afbc_types::parameters;
 
 parameters! {
-    /// What every controller has to know besides its vehicle and its gains.
+    /// Settings of every controller besides vehicle parameters and gains.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -11,7 +11,7 @@ parameters! {
         /// Time between steps.
         #[parameter(DT, "s", 1e-4..=0.02)]
         pub dt_s: f32 = 0.001,
-        /// Largest force of one rotor. The default is no limit, as in the paper.
+        /// Largest force of one rotor. The default is practically unlimited, as in the paper.
         #[parameter(FORCE_MAX, "N", 1e-3..=1e4)]
         pub rotor_force_max_n: f32 = 1e4,
     }

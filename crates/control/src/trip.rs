@@ -1,9 +1,9 @@
-//! Why a controller no longer flies by its own law.
+//! Reasons for switching from the adaptive law to its fallback.
 
 use afbc_types::Axis;
 use core::fmt;
 
-/// Why the law is no longer trusted.
+/// Reason why the adaptive law was switched off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -13,16 +13,16 @@ pub enum Trip {
     Theta(Axis),
     /// delta_hat passed its bound.
     Delta(Axis),
-    /// Errors stayed large.
+    /// Tracking errors stayed large.
     Lyapunov(Axis),
     /// Rotors stayed at their limits.
     Saturation,
-    /// An input swings to and fro; z stands for the thrust.
+    /// An input oscillates persistently; z stands for the thrust.
     LimitCycle(Axis),
 }
 
 impl Trip {
-    /// The reason in words, at most 50 characters.
+    /// Returns the reason in words, at most 50 characters.
     pub const fn reason(self) -> &'static str {
         match self {
             Trip::Theta(Axis::Roll) => "AFBC off: Theta_hat of roll out of bounds",

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 /// Rounding error of one `f32` operation, relative.
 const U: f64 = 1.0 / (1 << 24) as f64;
 
-/// Any accepted bandwidth and step, their bounds drawn often; evenly spread over orders of magnitude.
+/// Any accepted bandwidth and step, log-uniform, with the bounds drawn often.
 fn bandwidth_and_step() -> impl Strategy<Value = (f32, f32)> {
     let over = |range: afbc_types::Range| {
         prop_oneof![
@@ -43,21 +43,27 @@ proptest! {
         let next = CommandFilter::new(w, dt).unwrap().advance(&state, command);
         let (w, dt) = (f64::from(w), f64::from(dt));
         let [angle, rate] = exact(w, dt, &state, command);
-        // The sizes that are added: |command|, |offset|, w dt |offset|, dt |rate|, with 8 roundings, and the decay's
-        // relative error of 1.2e-7 + u w dt for its rounded argument.
+        // Magnitudes of the summands: |command|, |offset|, w dt |offset|, dt |rate|, with 8 roundings, and the relative
+        // error of the decay: 1.2e-7 + u w dt for its rounded argument.
         let offset = f64::from(state.angle - command).abs();
         let slope = f64::from(state.rate).abs() + w * offset;
         let decay = (-w * dt).exp();
         let relative = 8.0 * U + 1.2e-7 + U * w * dt;
         let angle_size = f64::from(command.abs()) + (offset + slope * dt) * decay;
         let rate_size = (f64::from(state.rate).abs() + w * slope * dt) * decay;
-        // Rounding of the offset itself: u of both angles, carried by both sums.
+        // Rounding of the offset itself: u of both angles, which enters both sums.
         let carried = U * (f64::from(state.angle.abs()) + f64::from(command.abs())) * (1.0 + w * dt) * decay;
-        prop_assert!((f64::from(next.angle) - angle).abs() <= relative * angle_size + carried, "{next:?} for {angle}, {rate}");
-        prop_assert!((f64::from(next.rate) - rate).abs() <= relative * rate_size + w * (1.0 + w * dt) * carried, "{next:?} for {angle}, {rate}");
+        prop_assert!(
+            (f64::from(next.angle) - angle).abs() <= relative * angle_size + carried,
+            "{next:?} for {angle}, {rate}"
+        );
+        prop_assert!(
+            (f64::from(next.rate) - rate).abs() <= relative * rate_size + w * (1.0 + w * dt) * carried,
+            "{next:?} for {angle}, {rate}"
+        );
     }
 
-    /// `rate` is the derivative of `angle` and `acceleration` that of `rate`, by differences of the filter's own steps.
+    /// `rate` is the derivative of `angle` and `acceleration` that of `rate`, checked by differences of filter steps.
     #[test]
     fn rate_and_acceleration_are_derivatives(w in 1.0_f32..60.0, state in filtered(), command in -1.6_f32..1.6) {
         let dt = 1e-3_f32;
@@ -66,12 +72,12 @@ proptest! {
         let (w, h) = (f64::from(w), f64::from(dt));
         let mean = |a: f32, b: f32| (f64::from(a) + f64::from(b)) / 2.0;
         let difference = |a: f32, b: f32| (f64::from(b) - f64::from(a)) / h;
-        // The trapezium rule is off by h^2/12 of the second derivative. The third and fourth derivatives of
+        // The trapezoidal rule is off by h^2/12 of the second derivative. The third and fourth derivatives of
         // (A + B t) exp(-w t) are at most w^2 (3 B + w A) and w^3 (4 B + w A).
         let offset = f64::from(state.angle - command).abs();
         let b = f64::from(state.rate).abs() + w * offset;
         let (third, fourth) = (w * w * (3.0 * b + w * offset), w * w * w * (4.0 * b + w * offset));
-        // A difference quotient amplifies the roundings of what it subtracts by 1/h.
+        // A difference quotient amplifies the rounding errors of its operands by 1/h.
         let angle_rounding = 16.0 * U * (1.6 + offset + b * h) / h;
         let rate_rounding = 16.0 * U * (1.0 + w * h) * (f64::from(state.rate).abs() + w * (offset + 1.6)) / h;
         let rate_error = difference(state.angle, next.angle) - mean(state.rate, next.rate);
@@ -84,18 +90,25 @@ proptest! {
     #[test]
     fn it_converges_to_the_command((w, dt) in bandwidth_and_step(), state in filtered(), command in -1.6_f32..1.6) {
         let filter = CommandFilter::new(w, dt).unwrap();
-        // exp(-25) (1 + 25) is 4e-10 of the start.
+        // exp(-25) (1 + 25) is 4e-10 of the initial offset.
         let steps = (25.0 / (f64::from(w) * f64::from(dt))).ceil() as u32 + 1;
         let settled = (0..steps).fold(state, |state, _| filter.advance(&state, command));
-        // What is left is rounding: each step rounds the command's own size once, and a slow filter (w dt = 1e-4) sums
-        // the roundings of as many steps as its time constant 1/(w dt) is long.
+        // The rest is rounding: each step rounds the command's magnitude once, and a slow filter (w dt = 1e-4)
+        // accumulates
+        // the rounding errors of one time constant, 1/(w dt) steps.
         let lasting = 2.0 * U * f64::from(command.abs()) * (1.0 + 2.0 / (f64::from(w) * f64::from(dt)));
         let left = 4e-10 * (20.0 / f64::from(w) + 4.0);
-        prop_assert!((f64::from(settled.angle) - f64::from(command)).abs() <= lasting + left + 1e-7, "{settled:?} for {command}");
-        prop_assert!(f64::from(settled.rate).abs() <= f64::from(w) * (lasting + left + 1e-7), "{settled:?} for {command}");
+        prop_assert!(
+            (f64::from(settled.angle) - f64::from(command)).abs() <= lasting + left + 1e-7,
+            "{settled:?} for {command}"
+        );
+        prop_assert!(
+            f64::from(settled.rate).abs() <= f64::from(w) * (lasting + left + 1e-7),
+            "{settled:?} for {command}"
+        );
     }
 
-    /// From rest a critically damped filter never passes a command, whatever w dt is.
+    /// A critically damped filter that starts at rest never overshoots a command, whatever w dt is.
     #[test]
     fn it_does_not_overshoot((w, dt) in bandwidth_and_step(), from in -1.6_f32..1.6, command in -1.6_f32..1.6) {
         let filter = CommandFilter::new(w, dt).unwrap();
@@ -108,10 +121,12 @@ proptest! {
     }
 
     /// Commands within +-pi/2, as (40) gives them, keep angle and rate bounded in any order: the filter's impulse
-    /// response w^2 t exp(-w t) is positive with area 1, and that of its rate has the absolute area 2 w / e.
+    /// response w^2 t exp(-w t) is positive with area 1, and the absolute area of its derivative is 2 w / e.
     #[test]
     fn bounded_commands_keep_it_bounded(
-        (w, dt) in bandwidth_and_step(), commands in prop::collection::vec(-FRAC_PI_2..FRAC_PI_2, 1..300), relay in any::<bool>(),
+        (w, dt) in bandwidth_and_step(),
+        commands in prop::collection::vec(-FRAC_PI_2..FRAC_PI_2, 1..300),
+        relay in any::<bool>(),
     ) {
         let filter = CommandFilter::new(w, dt).unwrap();
         let mut state = Filtered::default();
@@ -119,27 +134,41 @@ proptest! {
             let command = if relay { FRAC_PI_2.copysign(command) } else { command };
             state = filter.advance(&state, command);
             prop_assert!(state.angle.abs() <= 1.5709, "{state:?}");
-            prop_assert!(f64::from(state.rate).abs() <= 2.0 * f64::from(w) / core::f64::consts::E * 1.5709, "{state:?}");
+            prop_assert!(
+                f64::from(state.rate).abs() <= 2.0 * f64::from(w) / core::f64::consts::E * 1.5709,
+                "{state:?}"
+            );
         }
     }
 
-    /// A rate limit binds rate and travel alike, leaves a slow filter alone to the bit, and never keeps it from its command.
+    /// A rate limit bounds rate and travel, does not change a slow filter by a bit, and never keeps the filter from
+    /// reaching its command.
     #[test]
-    fn a_rate_limit_limits((w, dt) in bandwidth_and_step(), state in filtered(), command in -1.6_f32..1.6, limit in 0.1_f32..30.0) {
+    fn a_rate_limit_limits(
+        (w, dt) in bandwidth_and_step(),
+        state in filtered(),
+        command in -1.6_f32..1.6,
+        limit in 0.1_f32..30.0,
+    ) {
         let free = CommandFilter::new(w, dt).unwrap();
         let filter = free.limited(limit).unwrap();
         let next = filter.advance(&state, command);
         prop_assert!(next.rate.abs() <= limit, "{next:?}");
         let travel = f64::from(next.angle) - f64::from(state.angle);
-        prop_assert!(travel.abs() <= f64::from(limit) * f64::from(dt) * (1.0 + 2.0 * U) + 2.0 * U * f64::from(next.angle.abs()));
+        prop_assert!(
+            travel.abs() <= f64::from(limit) * f64::from(dt) * (1.0 + 2.0 * U) + 2.0 * U * f64::from(next.angle.abs())
+        );
         let unlimited = free.advance(&state, command);
         if unlimited.rate.abs() <= limit && (unlimited.angle - state.angle).abs() <= limit * dt {
             prop_assert_eq!(next, unlimited);
         }
-        // At the limit and pressed against it, the rate is constant.
+        // At the limit with the command beyond it, the rate is constant.
         let pressed = Filtered { angle: command - limit - 1.0, rate: limit };
         let presses = free.acceleration(&pressed, command) > 0.0;
-        prop_assert_eq!(filter.acceleration(&pressed, command), if presses { 0.0 } else { free.acceleration(&pressed, command) });
+        prop_assert_eq!(
+            filter.acceleration(&pressed, command),
+            if presses { 0.0 } else { free.acceleration(&pressed, command) }
+        );
         let slower = Filtered { rate: 0.5 * limit, ..pressed };
         prop_assert_eq!(filter.acceleration(&slower, command), free.acceleration(&slower, command));
 

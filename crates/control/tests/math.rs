@@ -1,12 +1,12 @@
-//! The largest error of every function of `afbc_control::math` over its documented range, against `f64`. The bounds are the
-//! figures of its documentation.
+//! Largest error of every function of `afbc_control::math` over its documented range, against `f64`. The bounds are
+//! the documented figures.
 #![allow(missing_docs)]
 
 use afbc_control::math;
 use core::f32::consts::{FRAC_PI_2, PI};
 use proptest::prelude::*;
 
-/// Every finite `f32` of a sweep through the bit patterns of both signs: as dense near zero as far out.
+/// Every `stride`-th finite `f32` bit pattern of both signs: equally dense at all magnitudes.
 fn bit_sweep(stride: usize) -> impl Iterator<Item = f32> {
     (0..f32::INFINITY.to_bits()).step_by(stride).flat_map(|bits| [f32::from_bits(bits), -f32::from_bits(bits)])
 }
@@ -17,11 +17,11 @@ fn even_sweep(from: f32, to: f32, count: u32) -> impl Iterator<Item = f32> {
         .map(move |i| (f64::from(from) + (f64::from(to) - f64::from(from)) * f64::from(i) / f64::from(count)) as f32)
 }
 
-/// The largest error and where it is.
+/// The largest error and its position.
 fn worst(points: impl Iterator<Item = f32>, error: impl Fn(f32) -> f64) -> (f64, f32) {
     points.fold((0.0, 0.0), |(largest, at), x| {
         let e = error(x);
-        // Written so that a NaN is the worst of all.
+        // Written so that NaN counts as the worst.
         if e <= largest { (largest, at) } else { (e, x) }
     })
 }
@@ -30,8 +30,8 @@ fn absolute(ours: fn(f32) -> f32, exact: fn(f64) -> f64) -> impl Fn(f32) -> f64 
     move |x| (f64::from(ours(x)) - exact(f64::from(x))).abs()
 }
 
-/// Asserts that the largest error is at most `bound` and that the bound is no more than twice the truth, so that the
-/// documentation cannot go stale in either direction.
+/// Asserts that the largest error is at most `bound` and at least half of it, so that the documented figure can
+/// become wrong in neither direction.
 fn assert_figure(name: &str, (error, at): (f64, f32), bound: f64) {
     println!("{name}: {error:.4e} at {at:e}, documented {bound:e}");
     assert!(error <= bound, "{name}: error {error:e} at {at:e} is above the documented {bound:e}");
@@ -97,7 +97,7 @@ fn tan_and_tilt_cosine_are_as_exact_as_documented() {
     assert_figure("tilt_cosine, any angle", worst(even_sweep(-1000.0, 1000.0, 1_000_000), alone), 1.2e-3);
     let both =
         |x: f32| (f64::from(math::tilt_cosine(x, 1.3 * x)) - f64::from(x).cos() * f64::from(1.3 * x).cos()).abs();
-    // Two cosines, each within 1.2e-3.
+    // Two cosines, each exact to 1.2e-3.
     assert!(worst(even_sweep(-700.0, 700.0, 1_000_000), both).0 <= 2.4e-3);
 }
 
@@ -134,7 +134,11 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn no_random_point_is_worse_than_documented(x in prop::num::f32::NORMAL | prop::num::f32::SUBNORMAL, angle in -1000.0_f32..1000.0, low in -87.0_f32..0.0) {
+    fn no_random_point_is_worse_than_documented(
+        x in prop::num::f32::NORMAL | prop::num::f32::SUBNORMAL,
+        angle in -1000.0_f32..1000.0,
+        low in -87.0_f32..0.0,
+    ) {
         let exp = f64::from(low).exp();
         prop_assert!((f64::from(math::exp(low)) - exp).abs() <= 8e-8 * exp);
         prop_assert!(absolute(math::tanh, f64::tanh)(x) <= 1.2e-7);
@@ -147,8 +151,9 @@ proptest! {
     fn wrapping_moves_an_angle_by_whole_turns_into_plus_minus_pi(x in -2000.0_f32..2000.0) {
         let wrapped = math::wrap_angle(x);
         prop_assert!(wrapped.abs() <= PI, "{x} wraps to {wrapped}");
-        // The f32 turn is off by 1.75e-7, at most 318 of them fit into the range; the turns' product is rounded at 2000
-        // (6.1e-5), and so is the difference. Near an odd multiple of pi as much again is cut off.
+        // The f32 value of a turn is off by 1.75e-7, and at most 318 turns fit into the range; the product is rounded
+        // at
+        // 2000 (6.1e-5), and so is the difference. Near an odd multiple of pi, as much again is clipped.
         let turns = (f64::from(x) - f64::from(wrapped)) / core::f64::consts::TAU;
         prop_assert!((turns - turns.round()).abs() * core::f64::consts::TAU <= 2.6e-4, "{x} wraps to {wrapped}");
     }

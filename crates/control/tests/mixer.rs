@@ -1,8 +1,8 @@
-//! Properties of the mixer: there and back, its limits under anything, and who is served first.
+//! Properties of the mixer: inversion, limits under any input, and the order of priority.
 //!
-//! Some mutants of `allocation.rs` live on, since they change no result: another number for `ASKED_MAX * ASKED_MAX` (a
-//! shortcut past a clamp that leaves everything below `ASKED_MAX` alone), `largest >= force_max` (scales by 1) and
-//! `yaw >= 0` (no yaw takes no share of any room). `|missing| >= least` differs at equality alone, where either is right.
+//! Some mutants of `mixer.rs` survive because they change no result: another number for `ASKED_MAX * ASKED_MAX` (a
+//! shortcut past a clamp that does not change anything below `ASKED_MAX`), `largest >= force_max` (scales by 1) and
+//! `yaw >= 0` (zero yaw takes no room). `|missing| >= least` differs at equality only, where both are right.
 #![allow(clippy::unwrap_used, missing_docs)] // a mixer that cannot be built must stop the test
 
 use afbc_control::Settings;
@@ -32,7 +32,7 @@ fn list(inputs: &Inputs) -> [f32; 4] {
     [inputs.roll_n, inputs.pitch_n, inputs.yaw_n, inputs.thrust_n]
 }
 
-/// `N` rotors on a circle, every other one turning the other way, the first at `first_rad` from +x.
+/// `N` rotors on a circle with alternating directions of rotation, the first at `first_rad` from +x.
 fn circle<const N: usize>(first_rad: f32) -> [Rotor; N] {
     core::array::from_fn(|i| {
         let angle = first_rad + TAU * i as f32 / N as f32;
@@ -44,7 +44,7 @@ fn cross() -> [Rotor; 4] {
     circle(FRAC_PI_4)
 }
 
-/// Front rotors further apart and nearer than the rear ones.
+/// Front rotors further apart and closer to the centre than the rear ones.
 const UNEVEN: [Rotor; 4] = [
     Rotor { x: 0.6, y: 0.9, pushes_left: true },
     Rotor { x: 0.6, y: -0.9, pushes_left: false },
@@ -52,8 +52,8 @@ const UNEVEN: [Rotor; 4] = [
     Rotor { x: -0.9, y: 0.6, pushes_left: false },
 ];
 
-/// What every allocation owes, on every frame: forces within limits, nothing missing that was not asked for, and
-/// unallocated = U - B F.
+/// Properties of every allocation on every frame: forces within limits, nothing missing of an input that was not
+/// demanded, and unallocated = U - B F.
 fn check<const N: usize>(
     mixer: &Mixer<N>,
     limit: f32,
@@ -64,14 +64,14 @@ fn check<const N: usize>(
     let given = list(&mixer.inputs_of(&got.forces));
     for ((asked, given), missing) in list(asked).into_iter().zip(given).zip(list(&got.unallocated)) {
         let asked = if asked.is_nan() { 0.0 } else { asked.clamp(-1e9, 1e9) };
-        // Forces are rounded at the scale of the limit, and the difference at its own.
+        // Forces are rounded at the scale of the limit, the difference at its own.
         let allowed = 4e-6 * limit + 4.0 * U * asked.abs();
         prop_assert!((asked - given - missing).abs() <= allowed, "{asked} - {given} is not {missing}");
     }
     Ok(())
 }
 
-/// Four rotors about the centre, none where symmetry would put it.
+/// Four rotors around the centre, all off the positions of a symmetric frame.
 fn uneven() -> impl Strategy<Value = [Rotor; 4]> {
     let spread = || prop::array::uniform4(-0.4_f32..0.4);
     (spread(), spread()).prop_map(|(along, across)| {
@@ -86,7 +86,7 @@ fn uneven() -> impl Strategy<Value = [Rotor; 4]> {
     })
 }
 
-/// The largest share, 1 at most, that still fits; 0 does.
+/// The largest share, at most 1, for which `fits` holds; it holds for 0.
 fn largest(fits: impl Fn(f64) -> bool) -> f64 {
     if fits(1.0) {
         return 1.0;
@@ -103,13 +103,13 @@ fn anything() -> impl Strategy<Value = Inputs> {
     prop::array::uniform4(prop_oneof![prop::num::f32::ANY, -100.0_f32..100.0]).prop_map(inputs)
 }
 
-/// Whatever the frame: what its rotors can give they give, and whatever else is asked, they stay within limits.
+/// Feasible demands are given exactly, infeasible ones within the limits.
 fn any_frame<const N: usize>(rotors: [Rotor; N], shares: &[f32; 8], asked: &Inputs) -> Result<(), TestCaseError> {
     let limit = 3.0;
     let mixer = mixer_of(rotors, limit);
     check(&mixer, limit, asked, &mixer.allocate(asked))?;
 
-    // The forces of least size for some inputs, if within limits.
+    // The least-norm forces of some inputs, if within limits.
     let forces = SVector::<f32, N>::from_iterator(shares.iter().map(|share| limit * share));
     let wanted = mixer.inputs_of(&RotorForces(forces));
     let got = mixer.allocate(&wanted);
@@ -126,19 +126,19 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 10_000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn what_the_rotors_can_give_they_give(forces in prop::array::uniform4(0.0_f32..30.0)) {
+    fn feasible_demands_are_given_exactly(forces in prop::array::uniform4(0.0_f32..30.0)) {
         let wanted = Mixer::inputs(&RotorForces(Vector4::from(forces)));
         let mixer = mixer(31.0);
         let allocation = mixer.allocate(&wanted);
         let total: f32 = forces.iter().sum();
-        // A force is a sum of three terms of at most the total, each rounded twice; so are the inputs again.
+        // A force is a sum of three terms of at most the total, each rounded twice; so is an input.
         for (got, force) in allocation.forces.0.iter().zip(forces) {
             prop_assert!((got - force).abs() <= 6.0 * U * total, "{got} for {force}");
         }
         for (got, wanted) in list(&Mixer::inputs(&allocation.forces)).into_iter().zip(list(&wanted)) {
             prop_assert!((got - wanted).abs() <= 24.0 * U * total, "{got} for {wanted}");
         }
-        // A force that is nothing may come out as the rounding of nothing, negative and clipped; none else may.
+        // A zero force may come out as a tiny negative number and be clipped; no other force may.
         prop_assert!(!allocation.saturated || forces.iter().any(|force| *force <= 6.0 * U * total));
     }
 
@@ -151,9 +151,12 @@ proptest! {
         any_frame(circle::<8>(0.0), &shares, &asked)?;
     }
 
-    /// B F of the plus frame is (6), and its general mixer inverts it as the closed form does.
+    /// B F of the plus frame is (6), and the general mixer inverts it like the closed form.
     #[test]
-    fn the_plus_frame_is_that_of_6(forces in prop::array::uniform4(0.0_f32..30.0), asked in prop::array::uniform4(-10.0_f32..10.0)) {
+    fn the_plus_frame_is_equation_6(
+        forces in prop::array::uniform4(0.0_f32..30.0),
+        asked in prop::array::uniform4(-10.0_f32..10.0),
+    ) {
         let forces = RotorForces(Vector4::from(forces));
         let general = mixer(1e4).inputs_of(&forces);
         for (general, own) in list(&general).into_iter().zip(list(&Mixer::inputs(&forces))) {
@@ -161,7 +164,12 @@ proptest! {
         }
         let [u1, u2, u3, _] = asked;
         let u4 = 100.0;
-        let wanted = [(u4 + u3) / 4.0 - u1 / 2.0, (u4 - u3) / 4.0 - u2 / 2.0, (u4 + u3) / 4.0 + u1 / 2.0, (u4 - u3) / 4.0 + u2 / 2.0];
+        let wanted = [
+            (u4 + u3) / 4.0 - u1 / 2.0,
+            (u4 - u3) / 4.0 - u2 / 2.0,
+            (u4 + u3) / 4.0 + u1 / 2.0,
+            (u4 - u3) / 4.0 + u2 / 2.0,
+        ];
         let got = mixer(1e4).allocate(&inputs([u1, u2, u3, u4]));
         prop_assert!(!got.saturated);
         for (got, wanted) in got.forces.0.iter().zip(wanted) {
@@ -174,7 +182,7 @@ proptest! {
         let mixer = mixer(1e4);
         let forces = RotorForces(Vector4::from(force));
         let speeds = mixer.speeds(&forces);
-        // 1/b, the product and the root (which halves errors) forth; two products back.
+        // Forward: 1/b, the product and the root, which halves errors; back: two products.
         for (back, force) in mixer.forces(&speeds).0.iter().zip(force) {
             prop_assert!((back - force).abs() <= 6.0 * U * force, "{back} for {force}");
         }
@@ -198,18 +206,21 @@ proptest! {
         }
     }
 
-    /// Four rotors: roll and pitch in full if any forces within limits give them (found by trying all thrusts and yaws);
-    /// then thrust as near as can be; yaw never turned round, and given in full if there is room.
+    /// Four rotors: roll and pitch in full if any forces within limits give them (found by trying all thrusts and
+    /// yaws);
+    /// then thrust as close as possible; yaw never reversed, and in full if there is room.
     #[test]
     fn roll_and_pitch_come_first_then_thrust_then_yaw(
-        frame in prop::sample::select(vec![PLUS, cross()]), asked in prop::array::uniform4(-8.0_f32..8.0), limit in 0.5_f32..5.0,
+        frame in prop::sample::select(vec![PLUS, cross()]),
+        asked in prop::array::uniform4(-8.0_f32..8.0),
+        limit in 0.5_f32..5.0,
     ) {
         let mixer = mixer_of(frame, limit);
         let got = mixer.allocate(&inputs(asked));
         let [roll, pitch, yaw, thrust] = list(&mixer.inputs_of(&got.forces));
         let near = |a: f32, b: f32| (a - b).abs() <= 1e-5 * (limit + b.abs());
 
-        // Opposite rotors share a sum, and differ by what roll and pitch ask of them.
+        // The sum of opposite rotors is fixed; roll and pitch determine their difference.
         let [a, b, c, d] = frame;
         let difference = |p: &Rotor, q: &Rotor| {
             let (x, y) = (p.x - q.x, p.y - q.y);
@@ -218,44 +229,57 @@ proptest! {
         let widest = difference(&a, &c).abs().max(difference(&b, &d).abs());
         let fits = limit / widest;
         let share = fits.min(1.0);
-        prop_assert!(near(roll, share * asked[0]) && near(pitch, share * asked[1]), "{roll}, {pitch} are not {share} of {asked:?}");
+        prop_assert!(
+            near(roll, share * asked[0]) && near(pitch, share * asked[1]),
+            "{roll}, {pitch} are not {share} of {asked:?}"
+        );
 
-        // Everything fits: given in full, which the other tests see to.
+        // Unsaturated: given in full, which other tests check.
         if !got.saturated {
             return Ok(());
         }
         let (least, most) = (2.0 * widest * share, 4.0 * limit - 2.0 * widest * share);
         prop_assert!(near(thrust, asked[3].max(least).min(most)), "{thrust} of {} to {most} for {asked:?}", least);
-        prop_assert!(yaw * asked[2] >= -1e-5 * limit && yaw.abs() <= asked[2].abs() + 1e-5 * limit, "{yaw} for {asked:?}");
-        // As much yaw as leaves the widest pair that it brings nearer to a limit within it.
+        prop_assert!(
+            yaw * asked[2] >= -1e-5 * limit && yaw.abs() <= asked[2].abs() + 1e-5 * limit,
+            "{yaw} for {asked:?}"
+        );
+        // As much yaw as keeps the pair of rotors with the widest difference within the limit it is moved towards.
         let pair = |p: &Rotor, q: &Rotor| difference(p, q).abs() * share / 2.0;
-        let (up, down) = if (asked[2] > 0.0) == a.pushes_left { (pair(&a, &c), pair(&b, &d)) } else { (pair(&b, &d), pair(&a, &c)) };
+        let (up, down) =
+            if (asked[2] > 0.0) == a.pushes_left { (pair(&a, &c), pair(&b, &d)) } else { (pair(&b, &d), pair(&a, &c)) };
         let room = (limit - thrust / 4.0 - up).min(thrust / 4.0 - down).max(0.0);
         prop_assert!(near(yaw.abs(), asked[2].abs().min(4.0 * room)), "{yaw} with {room} for {asked:?}");
     }
 
-    /// The same of frames without symmetry, whose forces are found here by bisection: as much roll and pitch, in their
-    /// proportion, as any thrust makes fit; of such thrusts the nearest to what is asked; then as much yaw as fits.
+    /// The same order on frames without symmetry, with expected forces found by bisection: as much roll and pitch, in
+    /// their proportion, as fits at any thrust; of those thrusts the closest to the demand; then as much yaw as fits.
     #[test]
     fn uneven_frames_serve_in_the_same_order(
-        frame in uneven(), asked in prop::array::uniform4(-8.0_f32..8.0), no_yaw in prop::bool::weighted(0.2), limit in 0.5_f32..5.0,
+        frame in uneven(),
+        asked in prop::array::uniform4(-8.0_f32..8.0),
+        no_yaw in prop::bool::weighted(0.2),
+        limit in 0.5_f32..5.0,
     ) {
         let asked = if no_yaw { [asked[0], asked[1], 0.0, asked[3]] } else { asked };
         let columns = frame.map(|r| [f64::from(r.y), -f64::from(r.x), if r.pushes_left { 1.0 } else { -1.0 }, 1.0]);
         let inverse = Matrix4::from_columns(&columns.map(Vector4::from)).try_inverse().unwrap();
         let share: Vector4<f64> = inverse.column(3).into();
-        // Frames that hover on a twentieth of a rotor, or hardly tell yaw from the rest, round more than is allowed here.
+        // Frames with a tiny share of a rotor, or with nearly dependent inputs, round more than the tolerance below.
         prop_assume!(share.min() > 0.05 && inverse.abs().max() < 3.0);
         let (wanted, limit_n) = (Vector4::from(asked.map(f64::from)), f64::from(limit));
-        // Where all four fit, all four are given, which the other tests see to; where that is a matter of rounding, either.
+        // Where all four inputs fit, they are given in full, which other tests check; at the boundary either is right.
         let exact = inverse * wanted;
         prop_assume!(exact.min() < -1e-4 || exact.max() > limit_n + 1e-4);
         let tilt = inverse.column(0) * wanted.x + inverse.column(1) * wanted.y;
-        // Thrusts at which no force of `tilt` leaves its limits; the first is larger than the second if there is none.
+        // Range of thrusts at which no force of `tilt` violates its limits; empty if the first exceeds the second.
         let thrusts = |tilt: &Vector4<f64>| {
             (-tilt.component_div(&share).min(), (tilt.map(|force| limit_n - force)).component_div(&share).min())
         };
-        let scaled = largest(|scale| { let (least, most) = thrusts(&(tilt * scale)); least <= most });
+        let scaled = largest(|scale| {
+            let (least, most) = thrusts(&(tilt * scale));
+            least <= most
+        });
         let tilt = tilt * scaled;
         let (least, most) = thrusts(&tilt);
         let upright = tilt + share * wanted.w.min(most).max(least);
@@ -267,17 +291,23 @@ proptest! {
         let mixer = mixer_of(frame, limit);
         let got = mixer.allocate(&inputs(asked));
         check(&mixer, limit, &inputs(asked), &got)?;
-        // Forces are rounded at the scale of the largest on the way, at most 8 N times four entries of the inverse; the
-        // share of yaw that fits, by that over the yaw's force.
+        // Forces are rounded at the scale of the largest intermediate value, at most 8 N times four entries of the
+        // inverse;
+        // yaw's share by that over the yaw forces.
         for (got, wanted) in got.forces.0.iter().zip(&forces) {
-            prop_assert!((f64::from(*got) - wanted).abs() <= 1e-4 * (1.0 + limit_n), "{got} for {wanted} of {forces} for {asked:?}");
+            prop_assert!(
+                (f64::from(*got) - wanted).abs() <= 1e-4 * (1.0 + limit_n),
+                "{got} for {wanted} of {forces} for {asked:?}"
+            );
         }
     }
 
-    /// Asked for more roll, a symmetric frame never gives less.
+    /// A larger roll demand never yields less roll on a symmetric frame.
     #[test]
-    fn more_roll_asked_is_never_less_given(
-        frame in prop::sample::select(vec![PLUS, cross()]), asked in prop::array::uniform4(-8.0_f32..8.0), more in 0.0_f32..8.0,
+    fn more_roll_demand_never_yields_less_roll(
+        frame in prop::sample::select(vec![PLUS, cross()]),
+        asked in prop::array::uniform4(-8.0_f32..8.0),
+        more in 0.0_f32..8.0,
     ) {
         let mixer = mixer_of(frame, 3.0);
         let roll = |roll_n| mixer.inputs_of(&mixer.allocate(&Inputs { roll_n, ..inputs(asked) }).forces).roll_n;
@@ -287,7 +317,7 @@ proptest! {
         prop_assert!(all >= second - 1e-4, "{second}, then {all} for infinite roll");
     }
 
-    /// What is missing of one input alone is missing of that one alone: learning goes on in the others.
+    /// Unallocated input of one axis is not reported for others, whose adaptation must go on.
     #[test]
     fn rounding_is_not_reported_as_missing(roll in -0.5_f32..0.5, pitch in -0.5_f32..0.5, yaw in 6.0_f32..50.0) {
         let missing = mixer(3.0).allocate(&inputs([roll, pitch, yaw, 4.8])).unallocated;
@@ -296,9 +326,9 @@ proptest! {
     }
 }
 
-/// Rounding left less than no room for no yaw at all here, 0/0, and every rotor stood still.
+/// In this case rounding once left negative room for zero yaw, 0/0, and every rotor stopped.
 #[test]
-fn no_yaw_takes_no_share_of_no_room() {
+fn zero_yaw_without_room_does_not_stop_the_rotors() {
     let frame = [
         Rotor { x: 0.7713504, y: 0.68169683, pushes_left: true },
         Rotor { x: -1.0259535, y: 0.70710677, pushes_left: false },
@@ -315,13 +345,13 @@ fn nan_becomes_no_force_and_infinity_the_largest() {
     let all = mixer.allocate(&inputs([0.0, 0.0, 0.0, f32::NAN]));
     assert_eq!(all.forces.0, Vector4::zeros());
     assert!(all.saturated);
-    // What is asked of the others is given.
+    // The other inputs are given.
     let roll = mixer.allocate(&inputs([f32::NAN, 0.0, 0.0, 8.0]));
     assert_eq!(roll.forces.0, Vector4::repeat(2.0));
     assert!(roll.saturated);
     let roll = mixer.allocate(&inputs([f32::INFINITY, 0.0, 0.0, 8.0]));
     assert_eq!(roll.forces.0, Vector4::new(0.0, 5.0, 10.0, 5.0));
-    // Thrust before yaw.
+    // Thrust has priority over yaw.
     let opposed = mixer.allocate(&inputs([0.0, 0.0, f32::NEG_INFINITY, f32::INFINITY]));
     assert_eq!(opposed.forces.0, Vector4::repeat(10.0));
 }
@@ -347,7 +377,7 @@ fn a_frame_that_cannot_fly_is_refused_by_name() {
         assert_eq!(refused([Rotor { x: bad, ..first }, second, third, fourth]), POSITION);
         assert_eq!(refused([first, second, third, Rotor { y: bad, ..fourth }]), POSITION);
     }
-    // All turn the same way; too few; on one point.
+    // All spin the same way; too few rotors; all at one point.
     assert_eq!(refused(PLUS.map(|rotor| Rotor { pushes_left: true, ..rotor })), AUTHORITY);
     assert_eq!(refused(circle::<3>(0.1)), AUTHORITY);
     assert_eq!(refused(PLUS.map(|rotor| Rotor { x: 0.0, y: 0.0, ..rotor })), AUTHORITY);
@@ -361,9 +391,9 @@ fn a_frame_that_cannot_fly_is_refused_by_name() {
             );
         }
     }
-    // The centre of mass is outside the rotors: hovering would take one that pulls down.
+    // The centre of mass lies outside the rotors: one would have to pull down to hover.
     assert_eq!(refused(cross().map(|rotor| Rotor { x: rotor.x + 1.2, ..rotor })), THRUST_SHARE);
-    // A small frame is a frame.
+    // A small frame is accepted.
     assert!(
         Mixer::of(PLUS.map(|r| Rotor { x: 0.01 * r.x, y: 0.01 * r.y, ..r }), &Parameters::PAPER.to_f32(), 3.0).is_ok()
     );

@@ -1,4 +1,4 @@
-//! Feature `serde`: what is read is what was written, and how it is written is what others may rely on.
+//! Feature `serde`: values survive a round trip, and their format is what files and other programs rely on.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_control::{Action, Errors, Estimate, Health, Mixer, Settings, Trace, Trip};
@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 use serde_json::json;
 
-/// Checks that `value` comes back.
+/// Checks that `value` survives a round trip.
 fn round_trip<T: serde::Serialize + serde::de::DeserializeOwned + Debug + PartialEq>(value: &T) {
     let text = serde_json::to_string(value).unwrap();
     assert_eq!(&serde_json::from_str::<T>(&text).unwrap(), value, "{text}");
@@ -25,9 +25,15 @@ fn vector() -> impl Strategy<Value = Vector3<f32>> {
 
 proptest! {
     #[test]
-    fn what_goes_in_and_comes_out_is_read_as_written(
-        position_m in vector(), velocity_m_s in vector(), attitude_rad in vector(), rates_rad_s in vector(),
-        yaw_rad in number(), saturated: bool, axis in 0_usize..6, inputs in prop::array::uniform4(-9.0_f32..9.0),
+    fn values_survive_a_round_trip(
+        position_m in vector(),
+        velocity_m_s in vector(),
+        attitude_rad in vector(),
+        rates_rad_s in vector(),
+        yaw_rad in number(),
+        saturated: bool,
+        axis in 0_usize..6,
+        inputs in prop::array::uniform4(-9.0_f32..9.0),
     ) {
         round_trip(&State { position_m, velocity_m_s, attitude_rad, rates_rad_s });
         let acceleration_m_s2 = rates_rad_s;
@@ -38,7 +44,9 @@ proptest! {
         let [roll_n, pitch_n, yaw_n, thrust_n] = inputs;
         let inputs = Inputs { roll_n, pitch_n, yaw_n, thrust_n };
         round_trip(&mixer.allocate(&inputs));
-        for trip in [Trip::Theta(axis), Trip::Delta(axis), Trip::Lyapunov(axis), Trip::Saturation, Trip::LimitCycle(axis)] {
+        for trip in
+            [Trip::Theta(axis), Trip::Delta(axis), Trip::Lyapunov(axis), Trip::Saturation, Trip::LimitCycle(axis)]
+        {
             let mut action = mixer.action(&inputs);
             (action.health.saturated, action.health.trip) = (saturated, Some(trip));
             round_trip::<Action>(&action);
@@ -61,7 +69,7 @@ fn parameters_are_read_as_written() {
     round_trip(&Settings::DEFAULT);
 }
 
-/// Fields that a file does not have, because it is older or its author did not care, are at their defaults.
+/// Missing fields take their defaults.
 #[test]
 fn a_state_or_setpoint_may_leave_out_what_is_zero() {
     let height = Vector3::new(0.0, 0.0, 2.0);

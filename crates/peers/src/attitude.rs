@@ -1,16 +1,16 @@
-//! Attitudes as rotation matrices, and how far apart two of them are.
+//! Attitudes as rotation matrices, and attitude errors.
 //!
-//! A matrix R turns body coordinates into earth coordinates; its third column is the direction of the thrust. Errors are
-//! small rotations in body coordinates \[rad\], positive where the body must turn positively to reach the desired
-//! attitude.
+//! A matrix R turns body coordinates into earth coordinates; its third column is the direction of the thrust. An error
+//! is a small rotation in body coordinates \[rad\], positive where the body must rotate positively to reach the
+//! desired attitude.
 
 use afbc_control::math;
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
-/// Below this square of cos(tilt error / 2), two thrusts count as opposite.
+/// Two thrust directions count as opposite if cos(tilt error / 2) squared is below this.
 const OPPOSITE: f32 = 1e-6;
 
-/// R = Rz(psi) Ry(theta) Rx(phi) for eta = \[phi, theta, psi\] \[rad\].
+/// Returns R = Rz(psi) Ry(theta) Rx(phi) for eta = \[phi, theta, psi\] \[rad\].
 #[inline]
 pub fn r_earth_body(attitude_rad: &Vector3<f32>) -> Matrix3<f32> {
     let (s_phi, c_phi) = (math::sin(attitude_rad.x), math::cos(attitude_rad.x));
@@ -29,27 +29,27 @@ pub fn r_earth_body(attitude_rad: &Vector3<f32>) -> Matrix3<f32> {
     )
 }
 
-/// The horizontal unit vectors along and left of a heading.
+/// Returns the horizontal unit vectors along and to the left of a heading.
 #[inline]
 pub(crate) fn heading(yaw_rad: f32) -> [Vector3<f32>; 2] {
     let (s, c) = (math::sin(yaw_rad), math::cos(yaw_rad));
     [Vector3::new(c, s, 0.0), Vector3::new(-s, c, 0.0)]
 }
 
-/// The length of `v`.
+/// Returns the length of `v`.
 #[inline]
 pub(crate) fn length(v: &Vector3<f32>) -> f32 {
     math::sqrt(v.dot(v))
 }
 
-/// `v` at length 1; `v` must not be 0.
+/// Returns `v` scaled to length 1; `v` must not be 0.
 #[inline]
 pub(crate) fn unit(v: &Vector3<f32>) -> Vector3<f32> {
     v * (1.0 / length(v))
 }
 
-/// The attitude whose thrust points along `thrust`, of any length but above the horizon, and whose Euler yaw is `yaw_rad`:
-/// body x is square to the thrust and to the horizontal that is left of the heading.
+/// Returns the attitude whose thrust points along `thrust`, of any length but above the horizon, and whose Euler yaw is
+/// `yaw_rad`: body x is perpendicular to the thrust and to the horizontal left of the heading.
 #[inline]
 pub fn facing(thrust: &Vector3<f32>, yaw_rad: f32) -> Matrix3<f32> {
     let [_, left] = heading(yaw_rad);
@@ -58,21 +58,21 @@ pub fn facing(thrust: &Vector3<f32>, yaw_rad: f32) -> Matrix3<f32> {
     Matrix3::from_columns(&[x, z.cross(&x), z])
 }
 
-/// Roll and pitch of an attitude that is not upside down \[rad\].
+/// Returns roll and pitch of an attitude that is not upside down \[rad\].
 #[inline]
 pub fn roll_pitch(r: &Matrix3<f32>) -> [f32; 2] {
     let cos_theta = math::sqrt(r.m32 * r.m32 + r.m33 * r.m33);
     [math::atan(r.m32 / r.m33), math::atan(-r.m31 / cos_theta)]
 }
 
-/// The quaternion of a rotation matrix, its real part not negative. After Shepperd 1978: divided by the largest of its
-/// four parts, so never by little.
+/// Returns the quaternion of a rotation matrix, with a non-negative real part. Shepperd's method (1978) divides by the
+/// largest of the four parts, so never by a small number.
 #[inline]
 pub fn quaternion(r: &Matrix3<f32>) -> Quaternion<f32> {
-    // Four times the square of each part; they sum to 4.
+    // Four times the square of each part; the sum is 4.
     let (w, x) = (1.0 + r.m11 + r.m22 + r.m33, 1.0 + r.m11 - r.m22 - r.m33);
     let (y, z) = (1.0 - r.m11 + r.m22 - r.m33, 1.0 - r.m11 - r.m22 + r.m33);
-    // Four times the products of two different parts.
+    // Four times the products of pairs of parts.
     let (wx, wy, wz) = (r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12);
     let (xy, yz, xz) = (r.m12 + r.m21, r.m23 + r.m32, r.m13 + r.m31);
     let scaled = if w >= x && w >= y && w >= z {
@@ -88,11 +88,11 @@ pub fn quaternion(r: &Matrix3<f32>) -> Quaternion<f32> {
     scaled * (if scaled.w < 0.0 { -1.0 } else { 1.0 } / length)
 }
 
-/// The attitude error that turns the thrust the shortest way and yaw by only `yaw_weight` (0 to 1) of what is missing
-/// \[rad\]; for small errors the rotation vector with its third part times `yaw_weight`.
+/// Returns the attitude error that turns the thrust the shortest way and corrects only the share `yaw_weight` (0 to 1)
+/// of the yaw error \[rad\]. For small errors it is the rotation vector with its third part times `yaw_weight`.
 ///
-/// With q = \[q0, q1, q2, q3\] from the body to the desired attitude, split as q = q_tilt q_yaw (Brescianini and D'Andrea,
-/// *Tilt-prioritized quadrocopter attitude control*, IEEE TCST 28(2), 2020):
+/// With q = \[q0, q1, q2, q3\] from the body to the desired attitude, split as q = q_tilt q_yaw (Brescianini and
+/// D'Andrea, *Tilt-prioritized quadrocopter attitude control*, IEEE TCST 28(2), 2020):
 ///
 /// ```text
 /// n = sqrt(q0^2 + q3^2)
@@ -105,7 +105,7 @@ pub fn tilt_prioritised_error(r: &Matrix3<f32>, desired: &Matrix3<f32>, yaw_weig
     let q = quaternion(&(r.transpose() * desired));
     let n_squared = q.w * q.w + q.k * q.k;
     let weighted = if n_squared < OPPOSITE {
-        // Opposite thrusts: every way round is as short, and yaw has no meaning.
+        // Opposite thrusts: all ways round are equally short, and yaw is undefined.
         q
     } else {
         let inverse = 1.0 / math::sqrt(n_squared);
@@ -115,14 +115,15 @@ pub fn tilt_prioritised_error(r: &Matrix3<f32>, desired: &Matrix3<f32>, yaw_weig
             (q.w * q.j + q.i * q.k) * inverse,
             0.0,
         );
-        // q.w may be 0, never with q.k: atan of an infinity is pi/2.
+        // q.w may be 0, but not together with q.k: atan of infinity is pi/2.
         let half_yaw = yaw_weight * math::atan(q.k / q.w);
         tilt * Quaternion::new(math::cos(half_yaw), 0.0, 0.0, math::sin(half_yaw))
     };
     weighted.imag() * 2.0
 }
 
-/// -e_R of Lee, Leok and McClamroch: half the vector of R' R_d - R_d' R. Its size is the sine of the angle between.
+/// Returns -e_R of Lee, Leok and McClamroch: half the vector of R' R_d - R_d' R. Its size is the sine of the angle
+/// between both attitudes.
 #[inline]
 pub fn geometric_error(r: &Matrix3<f32>, desired: &Matrix3<f32>) -> Vector3<f32> {
     let q = r.transpose() * desired;

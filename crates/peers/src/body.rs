@@ -1,4 +1,4 @@
-//! From thrust and angular acceleration to an action: the nominal vehicle and its rotors.
+//! The nominal vehicle and its rotors: an action from thrust and angular acceleration.
 
 use crate::attitude::roll_pitch;
 use afbc_control::command_filter::Filtered;
@@ -13,29 +13,29 @@ pub(crate) struct Body {
     pub(crate) mixer: Mixer,
     pub(crate) mass_kg: f32,
     pub(crate) inertia_kg_m2: Vector3<f32>,
-    /// l/Ix, l/Iy, (d/b)/Iz: angular acceleration of U1..U3 \[rad/s2 per N\].
+    /// l/Ix, l/Iy, (d/b)/Iz: angular acceleration per newton of U1..U3 \[rad/s2 per N\].
     effectiveness: Vector3<f32>,
 }
 
-/// What a controller asks of the vehicle, and why.
+/// Demand of a controller on the vehicle, with its internal signals.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Demand {
     /// U4 \[N\].
     pub(crate) thrust_n: f32,
-    /// d Omega/dt from U1..U3 \[rad/s2\].
+    /// Part of d Omega/dt due to U1..U3 \[rad/s2\].
     pub(crate) angular_acceleration_rad_s2: Vector3<f32>,
-    /// Wanted acceleration, earth frame \[m/s2\].
+    /// Demanded acceleration, earth frame \[m/s2\].
     pub(crate) acceleration_m_s2: Vector3<f32>,
-    /// The attitude tracked.
+    /// Desired attitude.
     pub(crate) desired: Matrix3<f32>,
-    /// Its angular velocity, in its own frame \[rad/s\].
+    /// Angular velocity of the desired attitude, in the desired frame \[rad/s\].
     pub(crate) desired_rates_rad_s: Vector3<f32>,
     /// Setpoint minus state: position, velocity, attitude, rates.
     pub(crate) errors: [Vector3<f32>; 4],
 }
 
 impl Body {
-    /// The vehicle with these parameters.
+    /// Makes the vehicle with these parameters.
     pub(crate) fn new(vehicle: &Parameters, settings: &Settings) -> Result<Self, OutOfRange> {
         settings.validate()?;
         let mixer = Mixer::new(vehicle, settings.rotor_force_max_n)?;
@@ -45,25 +45,25 @@ impl Body {
         Ok(Body { mixer, mass_kg: vehicle.mass_kg, inertia_kg_m2: i, effectiveness })
     }
 
-    /// d Omega/dt that the rotors give under `inputs` \[rad/s2\].
+    /// Returns d Omega/dt due to the rotors under `inputs` \[rad/s2\].
     #[inline]
     pub(crate) fn angular_acceleration(&self, inputs: &Inputs) -> Vector3<f32> {
         Vector3::new(inputs.roll_n, inputs.pitch_n, inputs.yaw_n).component_mul(&self.effectiveness)
     }
 
-    /// -(I^-1)(Omega x I Omega): the part of d Omega/dt that the body's own turning causes \[rad/s2\].
+    /// Returns -(I^-1)(Omega x I Omega): the gyroscopic part of d Omega/dt \[rad/s2\].
     #[inline]
     pub(crate) fn coupling(&self, rates: &Vector3<f32>) -> Vector3<f32> {
         -rates.cross(&self.inertia_kg_m2.component_mul(rates)).component_div(&self.inertia_kg_m2)
     }
 
-    /// The rotor speeds at which the rotors carry the weight \[rad/s\].
+    /// Returns the rotor speeds at hover \[rad/s\].
     pub(crate) fn hover(&self, gravity_m_s2: f32) -> RotorSpeeds {
         let inputs = Inputs { thrust_n: self.mass_kg * gravity_m_s2, ..Inputs::default() };
         self.mixer.speeds(&self.mixer.allocate(&inputs).forces)
     }
 
-    /// The action for `demand`, why, and what of U1..U3 the rotors cannot give \[N\].
+    /// Returns the action for `demand`, its trace, and the unallocated part of U1..U3 \[N\].
     #[inline]
     pub(crate) fn act(&self, demand: &Demand) -> (Action, Trace, Vector3<f32>) {
         let wanted = demand.angular_acceleration_rad_s2.component_div(&self.effectiveness);

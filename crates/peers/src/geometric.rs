@@ -16,25 +16,28 @@
 //! # Decisions
 //!
 //! * **Gains** are the paper's over mass and inertia: k_x, k_R in 1/s2, k_v, k_Omega in 1/s. Yaw has its own k_R and
-//!   k_Omega, where the proof has one number for all three axes: yaw has a sixtieth of the others' authority.
-//! * **R_d, Omega_d and dOmega_d/dt** need two derivatives of s, and those of the setpoint end at acceleration. s passes a
-//!   critically damped second-order filter w^2/(s + w)^2 first, which gives the filtered s with ds/dt and d2s/dt2 exactly
-//!   (command-filtered, as AFBC's own desired attitude is); R_d follows the filtered s. Then with b1, b2, b3 the columns of R_d,
-//!   n = |s|, and x_C, y_C the horizontals along and left of the heading:
+//!   k_Omega, because its control authority is a sixtieth of roll and pitch; the proof has one number for all axes.
+//! * **R_d, Omega_d and dOmega_d/dt** need two derivatives of s, but the setpoint's highest derivative is acceleration.
+//!   So s first passes a critically damped second-order filter w^2/(s + w)^2, which gives the filtered s with ds/dt and
+//!   d2s/dt2 exactly (command filtering, as in AFBC); R_d follows the filtered s. Then, with b1, b2, b3 the columns of
+//!   R_d, n = |s|, and x_C, y_C the horizontals along and left of the heading:
 //!
 //!   ```text
 //!   Omega_d1 = -b2 . ds/dt / n,  Omega_d2 = b1 . ds/dt / n
 //!   Omega_d3 = (dpsi_d/dt b1 . x_C + Omega_d2 b3 . y_C) / (b2 . y_C)
 //!   ```
 //!
-//!   and dOmega_d/dt is the same with one derivative more on s and psi_d; products of rates are left out (at 1 rad/s they
-//!   are 1 rad/s2 where k_R e_R is tens).
-//! * **Heading**: b1 is square to y_C, so that the yaw of R_d is psi_d exactly; the paper projects a freely chosen
-//!   direction, which this is one choice of.
-//! * **Limits**: the paper assumes that s never vanishes and that the rotors give anything; here [`Limits`] see to it.
-//! * **Integrals**: of e_x alone for position, since the integral of e_v, which the source adds, is e_x and part of k_x
-//!   already. c = k_R / k_Omega in the attitude's. Both are held within +-[`Gains::position_integral_max_m_s2`] and
-//!   +-20 rad/s2, and not driven further towards what limits or rotors cannot give.
+//!   and dOmega_d/dt follows with one more derivative of s and psi_d. Products of rates are neglected: at 1 rad/s they
+//!   are 1 rad/s2, while k_R e_R is tens.
+//! * **Heading**: b1 is perpendicular to y_C, so that the yaw of R_d is exactly psi_d. The paper projects a freely
+//!   chosen
+//!   direction; this is one choice of it.
+//! * **Limits**: the paper assumes that s never vanishes and that rotor forces are unlimited; here [`Limits`] bounds s.
+//! * **Integrals**: the position integral is of e_x alone, because the integral of e_v, which the source adds, is e_x
+//!   and
+//!   thus part of k_x. In the attitude integral, c = k_R / k_Omega. The integrals are bounded by
+//! +-[`Gains::position_integral_max_m_s2`] and +-20 rad/s2; anti-windup stops them where limits or rotors are
+//! saturated.
 
 use crate::attitude::{facing, geometric_error, heading, length, r_earth_body, unit};
 use crate::body::{Body, Demand};
@@ -47,7 +50,8 @@ use afbc_types::{Declared, OutOfRange, Parameters, Setpoint, State, parameters};
 use nalgebra::{Matrix3, Vector3};
 
 parameters! {
-    /// Gains and limits. By default as `sitl tune` found them for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
+    /// Gains and limits. Defaults are the result of `sitl tune` for the paper's vehicle with a rotor lag of 20 ms
+    /// (`docs/tuning.md`).
     ///
     /// For the law of 2010, leave the four integrals (names with `_i_`) at 0.
     #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,10 +92,10 @@ parameters! {
         /// k_I of yaw.
         #[parameter(YAW_I, "1/s2", 0.0..=100.0, tuned)]
         pub yaw_i_1_s2: f32 = 80.71,
-        /// w of the filter on s.
+        /// w: bandwidth of the filter on the specific force.
         #[parameter(FILTER, "rad/s", 10.0..=500.0, tuned)]
         pub filter_rad_s: f32 = 15.86,
-        /// Largest sat(k_i int e_x), per coordinate.
+        /// Largest position integral, per coordinate.
         #[parameter(POS_INT_MAX, "m/s2", 0.0..=50.0)]
         pub position_integral_max_m_s2: f32 = 10.0,
         /// Largest tilt.
@@ -101,7 +105,7 @@ parameters! {
 }
 
 impl Gains {
-    /// The law of 2010, without integrals. Ours, by hand, for the paper's vehicle with rotors of 20 ms.
+    /// The law of 2010, without integrals. Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
     pub const LEE_2010: Self = Gains {
         position_p_1_s2: 16.0,
         position_d_1_s: 8.0,
@@ -120,15 +124,16 @@ impl Gains {
         tilt_max_rad: 0.7,
     };
 
-    /// With the integrals of 2013, as `sitl tune` found it for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
+    /// With the integrals of 2013, as tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms
+    /// (`docs/tuning.md`).
     pub const TUNED: Self = Self::DEFAULT;
 
-    /// With the integrals of 2013. Ours, by hand, for the paper's vehicle with rotors of 20 ms.
+    /// With the integrals of 2013. Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
     pub const GOODARZI_2013: Self =
         Gains { position_i_1_s3: 25.0, height_i_1_s3: 60.0, tilt_i_1_s2: 20.0, yaw_i_1_s2: 10.0, ..Self::LEE_2010 };
 }
 
-/// The controller: fixed from here on. What changes in flight is in [`Memory`].
+/// The controller. Immutable; what changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometric {
     body: Body,
@@ -147,33 +152,33 @@ pub struct Geometric {
     c: Vector3<f32>,
 }
 
-/// What the controller remembers between steps.
+/// State of the controller between steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory {
     /// sat(k_i int (x_d - x)), earth frame \[m/s2\].
     pub position_integral: Vector3<f32>,
     /// sat(-k_I int(e_Omega + c e_R)), body frame \[rad/s2\].
     pub attitude_integral: Vector3<f32>,
-    /// What of U1..U3 the rotors could not give in the last step \[N\].
+    /// Unallocated part of U1..U3 in the last step \[N\].
     unallocated: Vector3<f32>,
     specific_force: Smooth,
-    /// Of the last step.
+    /// Trace of the last step.
     trace: Trace,
 }
 
-/// R_d, Omega_d, dOmega_d/dt; the last two in the desired frame.
+/// R_d, Omega_d, dOmega_d/dt; Omega_d and its derivative in the desired frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Desired {
     /// R_d: desired frame to earth.
     pub r_earth_desired: Matrix3<f32>,
     /// Omega_d \[rad/s\].
     pub rates_rad_s: Vector3<f32>,
-    /// dOmega_d/dt, without products of rates \[rad/s2\].
+    /// dOmega_d/dt, products of rates neglected \[rad/s2\].
     pub rates_dot_rad_s2: Vector3<f32>,
 }
 
-/// The attitude along a specific force with its two derivatives, \[m/s2\], \[m/s3\], \[m/s4\], and the setpoint's heading. The
-/// specific force must point up.
+/// Returns the attitude along a specific force, given with its two derivatives \[m/s2\], \[m/s3\], \[m/s4\], at the
+/// setpoint's heading. The specific force must point up.
 #[inline]
 pub fn desired(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> Desired {
     let [s, s_dot, s_ddot] = specific_force;
@@ -181,7 +186,7 @@ pub fn desired(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> Desire
     let (b1, b2, b3) = (r.column(0), r.column(1), r.column(2));
     let [along, left] = heading(setpoint.yaw_rad);
     let per_length = 1.0 / length(&s);
-    // b2 . left is the cosine of the roll, above 0 as long as s points up.
+    // b2 . left is the cosine of the roll, positive because s points up.
     let turn = |s_dot: &Vector3<f32>, yaw_dot: f32| {
         let (p, q) = (-b2.dot(s_dot) * per_length, b1.dot(s_dot) * per_length);
         Vector3::new(p, q, (yaw_dot * b1.dot(&along) + q * b3.dot(&left)) / b2.dot(&left))
@@ -194,7 +199,7 @@ pub fn desired(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> Desire
 }
 
 impl Geometric {
-    /// A controller for a vehicle with these nominal parameters.
+    /// Makes a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
     /// The first parameter, setting or gain out of range.

@@ -1,11 +1,12 @@
 //! Incremental nonlinear dynamic inversion, of attitude and of position.
 //!
-//! Smeur, Chu, de Croon, *Adaptive incremental nonlinear dynamic inversion for attitude control of micro air vehicles*, JGCD
-//! 39(3), 2016, for attitude; Smeur, de Croon, Chu, *Cascaded incremental nonlinear dynamic inversion for MAV disturbance
-//! rejection*, Control Engineering Practice 73, 2018, for position, in the vector form of Tal and Karaman, *Accurate
-//! tracking of aggressive quadrotor trajectories using incremental nonlinear dynamic inversion and differential
-//! flatness*, IEEE TCST 29(3), 2021. Neither models a force or moment other than the rotors': what the vehicle is doing says
-//! what acts on it. Subscript f marks what passed a filter, one and the same in each equation:
+//! Smeur, Chu, de Croon, *Adaptive incremental nonlinear dynamic inversion for attitude control of micro air vehicles*,
+//! JGCD 39(3), 2016, for attitude; Smeur, de Croon, Chu, *Cascaded incremental nonlinear dynamic inversion for MAV
+//! disturbance rejection*, Control Engineering Practice 73, 2018, for position, in the vector form of Tal and Karaman,
+//! *Accurate tracking of aggressive quadrotor trajectories using incremental nonlinear dynamic inversion and
+//! differential flatness*, IEEE TCST 29(3), 2021. Only the rotors' forces and moments are modelled; all others are
+//! inferred from the measured acceleration. Subscript f marks filtered signals, with the same filter throughout an
+//! equation:
 //!
 //! ```text
 //! actuators  omega_i += (1 - exp(-dt/tau)) (omega_i commanded - omega_i)            rotor model, from limited commands
@@ -17,20 +18,21 @@
 //! ```
 //!
 //! With exact actuators, the acceleration follows its reference as the actuators follow their command, whatever the
-//! filter; the filter says how fast a disturbance is seen. Both filters are critically damped,
-//! w^2/(s + w)^2 (see [`crate::differentiator`]); Smeur's is of second order too, with 50 rad/s and a damping of 0.55.
+//! filter; the filter determines how fast a disturbance is detected. Both filters are critically damped,
+//! w^2/(s + w)^2 (see [`crate::differentiator`]); Smeur's is also of second order, with 50 rad/s and a damping of 0.55.
 //!
 //! # Decisions
 //!
-//! * **The rotor model** is a first-order lag of the speed with the time constant [`Gains::rotor_time_constant_s`]; it
-//!   starts at hover speeds. Being driven by what is commanded after rotor limits, it cannot wind up.
-//! * **Not adaptive**: G is the nominal one. A true effectiveness above the nominal by a factor k raises the loop gain by
-//!   as much.
-//! * **Left out**: the moment that spins the propellers up (G2 of the 2016 paper), which no model of this project's plant
-//!   has.
+//! * **Rotor model**: a first-order lag of the speed with the time constant [`Gains::rotor_time_constant_s`], initially
+//!   at hover. Its input is the command after rotor limits, so it cannot wind up.
+//! * **Not adaptive**: G is nominal. A true effectiveness of k times the nominal raises the loop gain by the factor k.
+//! * **Neglected**: the moment that accelerates the propellers (G2 of the 2016 paper), which this project's plant
+//!   models
+//!   do not have.
 //! * **The attitude error** is tilt-prioritised, as in [`crate::pid`].
-//! * **On the ground** an increment finds no acceleration to compare with: thrust rises, within Limits, until
-//!   the vehicle lifts off or the setpoint lies below it. Do not step while disarmed.
+//! * **On the ground**, the increments find no acceleration to match: thrust rises, within Limits, until the vehicle
+//!   lifts
+//!   off or the setpoint lies below it. Do not step while disarmed.
 
 use crate::attitude::{r_earth_body, unit};
 use crate::body::{Body, Demand};
@@ -42,7 +44,8 @@ use afbc_types::{Declared, OutOfRange, Parameters, RotorSpeeds, Setpoint, State,
 use nalgebra::Vector3;
 
 parameters! {
-    /// Gains and limits. By default as `sitl tune` found them for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
+    /// Gains and limits. Defaults are the result of `sitl tune` for the paper's vehicle with a rotor lag of 20 ms
+    /// (`docs/tuning.md`).
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Gains {
         /// k_p along x and y.
@@ -63,25 +66,25 @@ parameters! {
         /// k_w of roll and pitch.
         #[parameter(TILTRATE_P, "1/s", 2.0..=100.0, tuned)]
         pub tilt_rate_p_1_s: f32 = 14.82,
-        /// k_a of yaw for small errors; the weight is made up for.
+        /// k_a of yaw for small errors; not reduced by `yaw_weight`.
         #[parameter(YAW_P, "1/s", 0.2..=15.0, tuned)]
         pub yaw_p_1_s: f32 = 3.147,
         /// k_w of yaw.
         #[parameter(YAWRATE_P, "1/s", 0.5..=40.0, tuned)]
         pub yaw_rate_p_1_s: f32 = 4.979,
-        /// w of the filter on velocity and thrust.
+        /// w: bandwidth of the filter on velocity and thrust.
         #[parameter(POS_FILTER, "rad/s", 5.0..=300.0, tuned)]
         pub position_filter_rad_s: f32 = 71.32,
-        /// w of the filter on rates and U1..U3.
+        /// w: bandwidth of the filter on rates and U1..U3.
         #[parameter(ATT_FILTER, "rad/s", 10.0..=500.0, tuned)]
         pub attitude_filter_rad_s: f32 = 113.5,
-        /// tau of the rotor model.
+        /// tau: time constant of the rotor model.
         #[parameter(ROT_LAG, "s", 0.0..=0.5)]
         pub rotor_time_constant_s: f32 = 0.02,
-        /// How much of a large yaw error is corrected together with the tilt, 0 to 1.
+        /// Share of a large yaw error that is corrected together with the tilt, 0 to 1.
         #[parameter(YAW_WEIGHT, "1", 0.05..=1.0)]
         pub yaw_weight: f32 = 0.4,
-        /// Largest velocity that a position error may add, sideways and upwards.
+        /// Largest velocity due to a position error, horizontal and vertical.
         #[parameter(SPEED_MAX, "m/s", 0.1..=100.0)]
         pub speed_max_m_s: f32 = 3.0,
         /// Largest tilt.
@@ -91,10 +94,10 @@ parameters! {
 }
 
 impl Gains {
-    /// As `sitl tune` found it for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
+    /// As tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
     pub const TUNED: Self = Self::DEFAULT;
 
-    /// Ours, by hand, for the paper's vehicle with rotors of 20 ms.
+    /// Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
     pub const PAPER_VEHICLE: Self = Gains {
         position_p_1_s: 2.0,
         velocity_p_1_s: 4.5,
@@ -113,7 +116,7 @@ impl Gains {
     };
 }
 
-/// The controller: fixed from here on. What changes in flight is in [`Memory`].
+/// The controller. Immutable; what changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Indi {
     body: Body,
@@ -129,22 +132,22 @@ pub struct Indi {
     rate_p: Vector3<f32>,
 }
 
-/// What the controller remembers between steps.
+/// State of the controller between steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory {
-    /// The rotor model's speeds; none before the first step.
+    /// Speeds of the rotor model; none before the first step.
     rotors: Option<RotorSpeeds>,
     velocity: Smooth,
     specific_force: Smooth,
     rates: Smooth,
     /// G u \[rad/s2\]
     rotor_acceleration: Smooth,
-    /// Of the last step.
+    /// Trace of the last step.
     trace: Trace,
 }
 
 impl Indi {
-    /// A controller for a vehicle with these nominal parameters.
+    /// Makes a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
     /// The first parameter, setting or gain out of range.
@@ -191,10 +194,10 @@ impl FlightController for Indi {
         let r = r_earth_body(&state.attitude_rad);
         let (body_z, earth_z) = (unit(&r.column(2).into()), r.row(2).transpose());
 
-        // What the rotors do now, and what the vehicle makes of it.
+        // Present rotor forces by the model, and the measured reaction of the vehicle.
         let rotors = memory.rotors.unwrap_or(self.hover);
         let now = Mixer::inputs(&self.body.mixer.forces(&rotors));
-        // Without a new measurement all four rest, so that they stay in step.
+        // Without a new measurement no filter advances, so that all four stay synchronous.
         if fresh {
             let specific_force = body_z * (now.thrust_n / self.body.mass_kg);
             self.position_filter.advance(&mut memory.specific_force, &specific_force);

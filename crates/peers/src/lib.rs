@@ -1,35 +1,40 @@
-//! Established quadrotor controllers, for AFBC to be weighed against, in AFBC's own style: no_std, no alloc, fixed size,
-//! and behind the same [`FlightController`](afbc_control::FlightController).
+//! Established quadrotor controllers for comparison with AFBC, under the same constraints (no_std, no alloc, fixed
+//! size)
+//! and behind the same interface, [`FlightController`](afbc_control::FlightController).
 //!
-//! | controller | what it is | source |
+//! | controller | description | source |
 //! |---|---|---|
-//! | [`pid`] | cascaded PID with a tilt-prioritised attitude loop, as autopilots fly | PX4; Brescianini and D'Andrea 2018 |
-//! | [`geometric`] | tracking on SE(3), optionally with integral terms | Lee, Leok, McClamroch 2010; Goodarzi, Lee, Leok 2013 |
+//! | [`pid`] | cascaded PID with a tilt-prioritised attitude loop | PX4; Brescianini and D'Andrea 2018 |
+//! | [`geometric`] | tracking on SE(3), optionally with integrals | Lee, Leok, McClamroch 2010; Goodarzi et al. 2013 |
 //! | [`indi`] | incremental dynamic inversion of attitude and of position | Smeur, Chu, de Croon 2016 and 2018 |
 //!
-//! Each has its equations and its sources at the top of its file; where the source leaves something open, the same
-//! place says what was decided. Frames and units are stated in [`afbc_types`].
+//! The head of each file gives the equations, the sources and the decisions made where a source leaves something open.
+//! Frames and units are defined in [`afbc_types`].
 //!
-//! # What they share
+//! # Common to all
 //!
 //! * The interface: an [`afbc_types::State`] and an [`afbc_types::Setpoint`] in, an [`afbc_control::Action`] out, by
-//!   way of U1..U4 and the one [`Mixer`](afbc_control::Mixer), so that no controller has a better allocation than
+//!   way of U1..U4 and the same [`Mixer`](afbc_control::Mixer), so that no controller has a better allocation than
 //!   another.
-//! * [`afbc_control::Settings`]: the time step and the rotors' limit.
-//! * Implausible input through [`afbc_control::Screen`]; filters and integrators rest while the state is not a new one.
-//! * The vehicle's nominal parameters scale everything, so gains are in 1/s and 1/s2 and serve vehicles of any size whose
-//!   rotors are as quick.
-//! * [`limits::Limits`]: thrust within what the rotors give, tilt below a maximum, yaw no dearer than it is worth.
-//! * Mathematics from [`afbc_control::math`] alone, so host and target give the same bits. Its sine is off by up to
-//!   1.2e-3, which turns a tilt of 0.1 rad into 0.0987: a lasting 0.013 m/s2 at most where nothing integrates, and
-//!   nothing elsewhere.
+//! * [`afbc_control::Settings`]: time step and rotor limit.
+//! * Implausible input is rejected by [`afbc_control::Screen`]; filters and integrators do not advance on a repeated
+//!   state.
+//! * Nominal mass and inertia scale everything, so gains are in 1/s and 1/s2 and suit vehicles of any size with the
+//!   same
+//!   rotor lag.
+//! * [`limits::Limits`]: thrust within what the rotors give, and tilt below a maximum.
+//! * All mathematics is from [`afbc_control::math`], bit-identical on host and target. Its sine is off by up to 1.2e-3,
+//! which turns a tilt of 0.1 rad into 0.0987: without an integral a steady-state error of at most 0.013 m/s2, with one
+//!   none.
 //!
 //! # Tuning
 //!
-//! Gains are plain structs, declared with their ranges. The tuner searches those that are a matter of taste (`tuned`);
-//! the others describe the vehicle and its task (largest tilt, rotor lag). The sets given here are for the vehicle of
-//! the paper's Section IV with rotors of 20 ms: those named `Gains::PAPER_VEHICLE` or after their source were tuned by
-//! hand, `Gains::TUNED` by `sitl tune` (`docs/tuning.md`).
+//! Gains are plain structs, declared with their ranges. The tuner searches those marked `tuned`; the others describe
+//! the
+//! vehicle and its task (largest tilt, rotor lag). All sets given here are for the vehicle of the paper's Section IV
+//! with
+//! a rotor lag of 20 ms: `Gains::PAPER_VEHICLE` and those named after their source are hand-tuned, `Gains::TUNED` are
+//! by `sitl tune` (`docs/tuning.md`).
 //!
 //! ```
 //! use afbc_control::{FlightController, Screened, Settings};

@@ -1,15 +1,17 @@
-//! What the position loops may ask for.
+//! Limits on the demand of the position loops.
 
 use afbc_control::{Settings, math};
 use afbc_types::Parameters;
 use nalgebra::Vector3;
 
-/// Least vertical part of the specific force, as a share of gravity: thrust always points up and tells an attitude.
+/// Least vertical part of the specific force, as a share of gravity: thrust always points up and determines an
+/// attitude.
 const VERTICAL_MIN: f32 = 0.1;
-/// Largest vertical part as a share of the rotors' most: what is left still turns the vehicle and moves it sideways.
+/// Largest vertical part, as a share of the rotors' largest thrust: the rest remains for attitude and sideways
+/// acceleration.
 const VERTICAL_MAX: f32 = 0.9;
 
-/// Bounds of the specific force, which is thrust over mass as a vector of the earth frame \[m/s2\].
+/// Bounds of the specific force, i.e. the thrust vector over mass in the earth frame \[m/s2\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     gravity_m_s2: f32,
@@ -20,10 +22,10 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The bounds of a vehicle whose parameters, settings and largest tilt are valid.
+    /// Makes the bounds of a vehicle; parameters, settings and largest tilt must be valid.
     pub fn new(vehicle: &Parameters, settings: &Settings, tilt_max_rad: f32) -> Self {
         let vertical_min_m_s2 = VERTICAL_MIN * vehicle.gravity_m_s2;
-        // A vehicle whose rotors cannot even lift it asks for all that they have.
+        // A vehicle whose rotors cannot lift it must still have valid bounds.
         let max_m_s2 = (4.0 * settings.rotor_force_max_n / vehicle.mass_kg).max(2.0 * vertical_min_m_s2);
         Limits {
             gravity_m_s2: vehicle.gravity_m_s2,
@@ -34,15 +36,15 @@ impl Limits {
         }
     }
 
-    /// Gravity, as the specific force that balances it \[m/s2\].
+    /// Returns the specific force that balances gravity \[m/s2\].
     #[inline]
     pub fn gravity(&self) -> Vector3<f32> {
         Vector3::new(0.0, 0.0, self.gravity_m_s2)
     }
 
-    /// The nearest thing to `specific_force` that the vehicle should give, height before sideways: vertical part within
-    /// 10 % of gravity and 90 % of what the rotors have, then tilt within its limit and length within what the rotors have.
-    /// Always points up.
+    /// Returns the closest specific force that the vehicle should give, height before sideways: vertical part between
+    /// 10 % of gravity and 90 % of the rotors' largest thrust, then tilt and length within their limits. Always points
+    /// up.
     #[inline]
     pub fn apply(&self, specific_force: &Vector3<f32>) -> Vector3<f32> {
         let vertical = specific_force.z.max(self.vertical_min_m_s2).min(self.vertical_max_m_s2);
@@ -52,14 +54,14 @@ impl Limits {
     }
 }
 
-/// `v` with its horizontal part shortened to at most `max`.
+/// Returns `v` with its horizontal part shortened to at most `max`.
 #[inline]
 pub(crate) fn horizontally(v: &Vector3<f32>, max: f32) -> Vector3<f32> {
     let length = math::sqrt(v.x * v.x + v.y * v.y);
     if length > max { Vector3::new(v.x * (max / length), v.y * (max / length), v.z) } else { *v }
 }
 
-/// `v` with its horizontal part shortened to at most `max` and its vertical part clipped to `max`.
+/// Returns `v` with its horizontal part shortened to at most `max` and its vertical part clipped to `max`.
 #[inline]
 pub(crate) fn cylinder(v: &Vector3<f32>, max: f32) -> Vector3<f32> {
     let v = horizontally(v, max);

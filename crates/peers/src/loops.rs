@@ -1,11 +1,11 @@
-//! The outer loops that PID and INDI share: from position to acceleration, and from attitude to rates.
+//! Outer loops of PID and INDI: from position to acceleration, and from attitude to rates.
 
 use crate::attitude::{facing, tilt_prioritised_error};
 use crate::limits::cylinder;
 use afbc_types::{Setpoint, State};
 use nalgebra::{Matrix3, Vector3};
 
-/// A gain along x and y and another along z, or about them.
+/// Returns a vector with one gain for x and y, another for z.
 pub(crate) fn xy_and_z(xy: f32, z: f32) -> Vector3<f32> {
     Vector3::new(xy, xy, z)
 }
@@ -21,7 +21,7 @@ pub(crate) struct PositionLoop {
     pub(crate) speed_max_m_s: f32,
 }
 
-/// Errors and wanted acceleration, earth frame.
+/// Errors and demanded acceleration, earth frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PositionOutput {
     pub(crate) position_error_m: Vector3<f32>,
@@ -30,7 +30,7 @@ pub(crate) struct PositionOutput {
 }
 
 impl PositionLoop {
-    /// One step.
+    /// Computes one step.
     #[inline]
     pub(crate) fn output(&self, state: &State, setpoint: &Setpoint) -> PositionOutput {
         let position_error_m = setpoint.position_m - state.position_m;
@@ -45,12 +45,12 @@ impl PositionLoop {
 /// From attitude to rates: k_a e(R, R_d) + R' e_z dpsi_d/dt, e tilt-prioritised.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct AttitudeLoop {
-    /// k_a, that of yaw over its weight \[1/s\].
+    /// k_a; that of yaw divided by its weight \[1/s\].
     attitude_p: Vector3<f32>,
     yaw_weight: f32,
 }
 
-/// The desired attitude, then errors and wanted rates in the body frame.
+/// Desired attitude; errors and demanded rates in the body frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AttitudeOutput {
     /// R_d
@@ -61,12 +61,12 @@ pub(crate) struct AttitudeOutput {
 }
 
 impl AttitudeLoop {
-    /// `yaw_p_1_s` serves small errors of yaw, of which a share of `yaw_weight` counts.
+    /// Makes the loop; `yaw_p_1_s` is the gain for small yaw errors, whatever `yaw_weight` is.
     pub(crate) fn new(tilt_p_1_s: f32, yaw_p_1_s: f32, yaw_weight: f32) -> Self {
         AttitudeLoop { attitude_p: xy_and_z(tilt_p_1_s, yaw_p_1_s / yaw_weight), yaw_weight }
     }
 
-    /// One step in the attitude `r`, for a thrust along `specific_force`, which points up.
+    /// Computes one step in the attitude `r`, for a thrust along `specific_force`, which must point up.
     #[inline]
     pub(crate) fn output(
         &self,

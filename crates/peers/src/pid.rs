@@ -13,13 +13,15 @@
 //! inputs       U1 = Ix/l dp/dt, U2 = Iy/l dq/dt, U3 = Iz/(d/b) dr/dt
 //! ```
 //!
-//! Sources: PX4-Autopilot, `mc_pos_control` (PositionControl), `mc_att_control` (AttitudeControl) and `lib/rate_control`,
-//! read for their structure; the attitude error is Brescianini and D'Andrea's (see [`crate::attitude`]); the velocity
-//! loop's tracking anti-windup is Rundqwist's, *Anti-reset windup for PID controllers*, IFAC 1990.
+//! Sources: PX4-Autopilot, `mc_pos_control` (PositionControl), `mc_att_control` (AttitudeControl) and
+//! `lib/rate_control`, read for their structure; the attitude error is Brescianini and D'Andrea's (see
+//! [`crate::attitude`]); the tracking anti-windup of the velocity loop is Rundqwist's, *Anti-reset windup for PID
+//! controllers*, IFAC 1990.
 //!
-//! Differences from PX4: gains of the rate loop are in 1/s, since the moment is scaled by the inertia; the tilt follows
-//! the whole specific force, not gravity plus its horizontal part; tracking anti-windup serves height too; derivatives
-//! are those of [`crate::differentiator`]; the rate integrator is not weakened at large errors.
+//! Differences from PX4: gains of the rate loop are in 1/s, because the moment is scaled by the inertia; the tilt
+//! follows
+//! the whole specific force, not gravity plus its horizontal part; tracking anti-windup also covers height; derivatives
+//! are those of [`crate::differentiator`]; the rate integrator is not slowed down at large errors.
 
 use crate::attitude::{length, r_earth_body};
 use crate::body::{Body, Demand};
@@ -32,7 +34,8 @@ use afbc_types::{Declared, OutOfRange, Parameters, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
 parameters! {
-    /// Gains and limits. By default as `sitl tune` found them for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
+    /// Gains and limits. Defaults are the result of `sitl tune` for the paper's vehicle with a rotor lag of 20 ms
+    /// (`docs/tuning.md`).
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Gains {
         /// k_p along x and y.
@@ -62,7 +65,7 @@ parameters! {
         /// k_a of roll and pitch.
         #[parameter(TILT_P, "1/s", 1.0..=30.0, tuned)]
         pub tilt_p_1_s: f32 = 20.4,
-        /// k_a of yaw for small errors; the weight is made up for.
+        /// k_a of yaw for small errors; not reduced by `yaw_weight`.
         #[parameter(YAW_P, "1/s", 0.2..=15.0, tuned)]
         pub yaw_p_1_s: f32 = 2.053,
         /// k_w of roll and pitch.
@@ -80,16 +83,16 @@ parameters! {
         /// k_iw of yaw.
         #[parameter(YAWRATE_I, "1/s2", 0.0..=100.0, tuned)]
         pub yaw_rate_i_1_s2: f32 = 38.2,
-        /// f.
+        /// f: feed-forward of the rate setpoint.
         #[parameter(RATE_FF, "1/s", 0.0..=20.0, tuned)]
         pub rate_feed_forward_1_s: f32 = 0.0,
-        /// Bandwidth of both derivatives.
+        /// Bandwidth of the filters behind both derivatives.
         #[parameter(FILTER, "rad/s", 10.0..=500.0, tuned)]
         pub filter_rad_s: f32 = 140.7,
-        /// How much of a large yaw error is corrected together with the tilt, 0 to 1.
+        /// Share of a large yaw error that is corrected together with the tilt, 0 to 1.
         #[parameter(YAW_WEIGHT, "1", 0.05..=1.0)]
         pub yaw_weight: f32 = 0.4,
-        /// Largest velocity that a position error may add, sideways and upwards.
+        /// Largest velocity due to a position error, horizontal and vertical.
         #[parameter(SPEED_MAX, "m/s", 0.1..=100.0)]
         pub speed_max_m_s: f32 = 3.0,
         /// Largest tilt.
@@ -99,10 +102,10 @@ parameters! {
 }
 
 impl Gains {
-    /// As `sitl tune` found it for the paper's vehicle with rotors of 20 ms (`docs/tuning.md`).
+    /// As tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
     pub const TUNED: Self = Self::DEFAULT;
 
-    /// Ours, by hand, for the paper's vehicle with rotors of 20 ms.
+    /// Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
     pub const PAPER_VEHICLE: Self = Gains {
         position_p_1_s: 2.2,
         velocity_p_1_s: 6.0,
@@ -127,7 +130,7 @@ impl Gains {
     };
 }
 
-/// The controller: fixed from here on. What changes in flight is in [`Memory`].
+/// The controller. Immutable; what changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pid {
     body: Body,
@@ -146,23 +149,23 @@ pub struct Pid {
     rate_feed_forward: f32,
 }
 
-/// What the controller remembers between steps.
+/// State of the controller between steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory {
     /// i_v, earth frame \[m/s2\].
     pub velocity_integral: Vector3<f32>,
     /// i_w, body frame \[rad/s2\].
     pub rate_integral: Vector3<f32>,
-    /// What of U1..U3 the rotors could not give in the last step \[N\].
+    /// Unallocated part of U1..U3 in the last step \[N\].
     unallocated: Vector3<f32>,
     velocity: Smooth,
     rates: Smooth,
-    /// Of the last step.
+    /// Trace of the last step.
     trace: Trace,
 }
 
 impl Pid {
-    /// A controller for a vehicle with these nominal parameters.
+    /// Makes a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
     /// The first parameter, setting or gain out of range.

@@ -1,4 +1,4 @@
-//! What one step must answer, against formulas in `f64` and against symmetry.
+//! Single steps against formulas in `f64` and against symmetry.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 mod harness;
@@ -28,7 +28,7 @@ fn indi() -> Indi {
     Indi::new(vehicle(), SETTINGS, indi::Gains::PAPER_VEHICLE).unwrap()
 }
 
-/// The action after `steps` steps of one and the same input, and why.
+/// Returns action and trace after `steps` steps with constant input.
 fn after<C: FlightController>(controller: &C, steps: usize, state: &State, setpoint: &Setpoint) -> (Action, Trace) {
     let mut memory = Screened::<C::Memory>::default();
     let mut action = Action::default();
@@ -38,7 +38,7 @@ fn after<C: FlightController>(controller: &C, steps: usize, state: &State, setpo
     (action, C::trace(&memory.control))
 }
 
-/// Runs `check` on the first and on a later step of every peer.
+/// Runs `check` on the first and on a later step of every controller.
 fn of_each(state: &State, setpoint: &Setpoint, check: impl Fn(&str, (Action, Trace))) {
     for steps in [1, 5] {
         check("pid", after(&pid(), steps, state, setpoint));
@@ -63,7 +63,7 @@ fn without_error_the_rotors_carry_the_weight_and_nothing_else() {
             assert_eq!(action.health, afbc_control::Health::default(), "{name}");
         });
     }
-    // Heading along x, there is no rounding either.
+    // With the heading along x there is no rounding either.
     of_each(&State::default(), &Setpoint::default(), |name, (_, trace)| {
         if name != "indi" {
             assert_eq!(trace.inputs.thrust_n, WEIGHT_N, "{name}");
@@ -80,10 +80,10 @@ fn every_error_is_answered_in_the_right_direction() {
         change(&mut state);
         state
     };
-    // Below: more thrust. Rising: less.
+    // Below the setpoint: more thrust. Rising: less.
     of_each(&moved(|s| s.position_m.z = -0.1), &hold, |name, (_, c)| assert!(c.inputs.thrust_n > WEIGHT_N, "{name}"));
     of_each(&moved(|s| s.velocity_m_s.z = 0.1), &hold, |name, (_, c)| assert!(c.inputs.thrust_n < WEIGHT_N, "{name}"));
-    // Behind the setpoint along x: pitch up to tilt the thrust there; along y: roll the other way.
+    // Behind the setpoint along x: pitch up to tilt the thrust forward; along y: roll negatively.
     of_each(&moved(|s| s.position_m.x = -0.1), &hold, |name, (_, c)| {
         assert!(c.desired_rad[1] > 0.0 && c.desired_rad[0] == 0.0 && c.inputs.pitch_n >= 0.0, "{name}: {c:?}");
     });
@@ -91,7 +91,7 @@ fn every_error_is_answered_in_the_right_direction() {
         assert!(c.desired_rad[0] < 0.0 && c.desired_rad[1] == 0.0 && c.inputs.roll_n <= 0.0, "{name}: {c:?}");
     });
     of_each(&moved(|s| s.velocity_m_s.x = 0.1), &hold, |name, (_, c)| assert!(c.desired_rad[1] < 0.0, "{name}: {c:?}"));
-    // A positive angle or rate is turned back; but a tilt without an acceleration is, to INDI, leaning into a wind.
+    // A positive angle or rate is reduced; but to INDI, a tilt without acceleration is leaning into a wind.
     let tilted = |name: &str, u: f32| assert!(if name == "indi" { u.abs() < 1e-3 } else { u < -1e-2 }, "{name}: {u}");
     of_each(&moved(|s| s.attitude_rad.x = 0.1), &hold, |name, (_, c)| tilted(name, c.inputs.roll_n));
     of_each(&moved(|s| s.attitude_rad.y = 0.1), &hold, |name, (_, c)| tilted(name, c.inputs.pitch_n));
@@ -99,10 +99,10 @@ fn every_error_is_answered_in_the_right_direction() {
     of_each(&moved(|s| s.rates_rad_s.x = 0.1), &hold, |name, (_, c)| assert!(c.inputs.roll_n < -1e-3, "{name}"));
     of_each(&moved(|s| s.rates_rad_s.y = 0.1), &hold, |name, (_, c)| assert!(c.inputs.pitch_n < -1e-3, "{name}"));
     of_each(&moved(|s| s.rates_rad_s.z = 0.1), &hold, |name, (_, c)| assert!(c.inputs.yaw_n < -1e-3, "{name}"));
-    // Yaw goes the short way round.
+    // Yaw takes the short way round.
     let beyond = Setpoint { yaw_rad: -3.1, ..hold };
     of_each(&moved(|s| s.attitude_rad.z = 3.1), &beyond, |name, (_, c)| assert!(c.inputs.yaw_n > 0.0, "{name}"));
-    // Feed-forward: an acceleration wanted is an acceleration tilted for.
+    // Feed-forward: a desired acceleration gives a tilt.
     let sideways = Setpoint { acceleration_m_s2: Vector3::new(1.0, 0.0, 0.0), ..hold };
     of_each(&State::default(), &sideways, |name, (_, c)| {
         assert!(c.desired_rad[1] > 0.0 && c.desired_rad[0] == 0.0, "{name}: {c:?}");
@@ -123,7 +123,7 @@ fn vector(random: &mut Random, size: f64) -> Vector3<f64> {
 fn turning_the_scene_about_the_vertical_changes_nothing_for_the_body() {
     let mut random = Random(1);
     for _ in 0..300 {
-        // Small enough that no limit acts differently by rounding.
+        // Small enough that no limit is active in one frame and not in the other because of rounding.
         let (position, velocity) = (vector(&mut random, 0.5), vector(&mut random, 0.5));
         let attitude = Rotation3::from_scaled_axis(vector(&mut random, 0.4));
         let rates: Vector3<f32> = vector(&mut random, 0.5).cast();
@@ -153,7 +153,7 @@ fn turning_the_scene_about_the_vertical_changes_nothing_for_the_body() {
                 (a.inputs.pitch_n - b.inputs.pitch_n) * 65.8,
                 (a.inputs.yaw_n - b.inputs.yaw_n) * 1.43,
             );
-            // The error of a sine, 1.2e-3, four times over, times the stiffest loop's 330 1/s2.
+            // Four times the error of a sine, 1.2e-3, times the stiffest loop's 330 1/s2.
             assert!(difference.amax() < 1.6, "{name}: {difference:?} after a turn of {turn}");
             assert!((a.inputs.thrust_n - b.inputs.thrust_n).abs() < 0.03, "{name}: {a:?} {b:?}");
         };
@@ -169,7 +169,7 @@ fn turning_the_scene_about_the_vertical_changes_nothing_for_the_body() {
     }
 }
 
-/// R = Rz Ry Rx in `f64`, from the angles that an `f32` state can hold.
+/// Returns R = Rz Ry Rx in `f64`, from angles that an `f32` state can hold.
 fn exact(eta: &Vector3<f32>) -> Matrix3<f64> {
     *Rotation3::from_euler_angles(f64::from(eta.x), f64::from(eta.y), f64::from(eta.z)).matrix()
 }
@@ -184,7 +184,7 @@ fn attitude_errors_agree_with_their_formulas() {
         let r = r_earth_body(&eta);
         assert!((r.cast() - exact(&eta)).amax() < 3e-3);
 
-        // R_d by its definition: z along the thrust, x square to the left of the heading.
+        // R_d by its definition: z along the thrust, x perpendicular to the left of the heading.
         let desired = facing(&thrust.cast(), yaw as f32);
         let z = thrust.normalize();
         let x = Vector3::new(-yaw.sin(), yaw.cos(), 0.0).cross(&z).normalize();
@@ -195,7 +195,7 @@ fn attitude_errors_agree_with_their_formulas() {
         assert!((f64::from(roll) - angles.0).abs() < 3e-3 && (f64::from(pitch) - angles.1).abs() < 3e-3);
         assert!((angles.2 - yaw).abs() < 1e-9, "the yaw of R_d is psi_d");
 
-        // Lee: e_R = (R_d' R - R' R_d)^v / 2; positive e_R is a body turned too far.
+        // Lee: e_R = (R_d' R - R' R_d)^v / 2; positive for a body turned too far.
         let e = r_d.transpose() * exact(&eta) - exact(&eta).transpose() * r_d;
         let e_r = Vector3::new(e[(2, 1)], e[(0, 2)], e[(1, 0)]) / 2.0;
         let ours = -geometric_error(&r, &desired).cast::<f64>();
@@ -210,7 +210,7 @@ fn the_tilt_comes_first_and_yaw_by_its_weight() {
         let r = Rotation3::from_scaled_axis(vector(&mut random, 1.5));
         let r_d = Rotation3::from_scaled_axis(vector(&mut random, 1.5));
         let (a, b) = (r.matrix().cast(), r_d.matrix().cast());
-        // By geometry: the shortest turn of the thrust, then the turn about the thrust that is left.
+        // By geometry: the shortest rotation of the thrust, then the remaining rotation about the thrust.
         let (z, z_d) = (r * Vector3::z(), r_d * Vector3::z());
         let tilt = Rotation3::rotation_between(&z, &z_d).unwrap();
         let left: Rotation3<f64> = (tilt * r).inverse() * r_d;
@@ -220,13 +220,13 @@ fn the_tilt_comes_first_and_yaw_by_its_weight() {
             let q = nalgebra::UnitQuaternion::from_rotation_matrix(&(r.inverse() * turned));
             let q = if q.w < 0.0 { -q.into_inner() } else { q.into_inner() };
             let ours = tilt_prioritised_error(&a, &b, weight as f32).cast::<f64>();
-            // Which way round is shorter is rounding at half a turn of yaw.
+            // At half a turn of yaw, rounding decides the direction.
             if half_yaw.abs() < 1.5 {
                 assert!((ours - q.imag() * 2.0).amax() < 6e-3, "{ours:?} {q:?}");
             }
         }
     }
-    // Opposite thrusts, every way round, have an answer.
+    // Opposite thrusts with any axis between them.
     for axis in [Vector3::x_axis(), Vector3::y_axis(), Unit::new_normalize(Vector3::new(1.0, 2.0, 0.0))] {
         let upside_down = Rotation3::from_axis_angle(&axis, core::f32::consts::PI);
         let e = tilt_prioritised_error(&Matrix3::identity(), upside_down.matrix(), 0.4);
@@ -235,7 +235,7 @@ fn the_tilt_comes_first_and_yaw_by_its_weight() {
 }
 
 #[test]
-fn quaternions_are_their_matrices() {
+fn quaternions_match_their_matrices() {
     let mut random = Random(4);
     for _ in 0..5000 {
         let r = Rotation3::from_scaled_axis(vector(&mut random, core::f64::consts::PI));
@@ -247,7 +247,7 @@ fn quaternions_are_their_matrices() {
 
 #[test]
 fn desired_rates_are_the_derivative_of_the_desired_attitude() {
-    // A specific force and a heading that move; R_d by differences in f64, Omega_d = (R_d' dR_d/dt)^v.
+    // A moving specific force and heading; R_d by differences in f64, Omega_d = (R_d' dR_d/dt)^v.
     let force = |t: f64| Vector3::new(2.0 * (1.3 * t).sin(), 1.5 * (0.9 * t).cos(), 9.81 + (0.7 * t).sin());
     let yaw = |t: f64| 0.8 * (0.5 * t).sin();
     let attitude = |t: f64| {
@@ -274,7 +274,7 @@ fn desired_rates_are_the_derivative_of_the_desired_attitude() {
         let desired = geometric::desired(s, &setpoint);
         let (omega, omega_dot) = (rates(t), derivative(&rates, t));
         assert!((desired.rates_rad_s.cast::<f64>() - omega).amax() < 2e-3, "{desired:?} {omega:?}");
-        // What is left out is of second order in the rates.
+        // The neglected part is of second order in the rates.
         let (left_out, speed) = ((desired.rates_dot_rad_s2.cast::<f64>() - omega_dot).amax(), omega.norm());
         assert!(left_out < 5e-3 + 3.0 * speed * (speed + force_dot(t).norm() / 9.81), "{left_out} at {speed}");
     }
@@ -282,7 +282,7 @@ fn desired_rates_are_the_derivative_of_the_desired_attitude() {
 
 #[test]
 fn an_integrator_does_not_wind_up_against_a_limit() {
-    // Far away sideways and above for 20 s: tilt and thrust are at their limits all the time.
+    // Far away sideways and above for 20 s: tilt and thrust stay at their limits.
     let state = State { position_m: Vector3::new(-50.0, 0.0, 0.0), ..State::default() };
     let far = Setpoint { position_m: Vector3::new(0.0, 0.0, 500.0), ..Setpoint::default() };
     let mut memory = Screened::<pid::Memory>::default();
@@ -301,7 +301,7 @@ fn an_integrator_does_not_wind_up_against_a_limit() {
         memory.control.position_integral
     );
 
-    // A yaw error that the rotors cannot answer: the rate integral stays where it was.
+    // A yaw error beyond the rotors' authority: the rate integral does not move.
     let turned = Setpoint { yaw_rad: 2.5, ..Setpoint::default() };
     let mut memory = Screened::<pid::Memory>::default();
     for _ in 0..5000 {
@@ -339,7 +339,7 @@ fn no_integral_moves_on_a_stale_state() {
     );
 }
 
-/// Rotation about one axis alone: d rate/dt = (d/b)/Iz U3 + disturbance, the rotors' speeds behind their lag.
+/// Rotation about one axis only: d rate/dt = (d/b)/Iz U3 + disturbance, with rotor lag.
 #[test]
 fn increments_cancel_a_constant_moment() {
     let controller = indi();
@@ -371,7 +371,7 @@ fn increments_cancel_a_constant_moment() {
     assert!(largest < 0.01, "largest: {largest}");
 }
 
-/// A gain that several peers have is one gain: it has one name, one unit and one range.
+/// Gains of the same key have the same name, unit and range in all controllers.
 #[test]
 fn gains_of_one_key_are_declared_alike() {
     let mut declared: BTreeMap<&str, Declaration> = BTreeMap::new();
@@ -392,7 +392,7 @@ fn gains_of_one_key_are_declared_alike() {
 
 #[test]
 fn gains_out_of_range_are_refused_by_name() {
-    /// Builds a controller with each gain in turn put to a bad value: it is refused by that gain's name.
+    /// Sets each gain in turn to a bad value and checks that it is refused by name.
     fn refused<G: Declared + Copy>(gains: G, count: usize, build: fn(G) -> Result<(), OutOfRange>) {
         assert_eq!(build(gains), Ok(()));
         for bad in [|range: &Range| (range.max * 2.0) as f32, |_: &Range| f32::NAN, |_: &Range| -1.0] {

@@ -1,6 +1,6 @@
-//! Closed-loop flights of the rigid body with rotors of 20 ms: each peer converges, and how well.
+//! Closed-loop flights of the rigid body with a rotor lag of 20 ms: convergence and accuracy of each controller.
 //!
-//! The bounds are a fifth or so above what was measured, so that a change for the worse shows.
+//! The bounds are about a fifth above the measured values, so that a deterioration fails the test.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 mod harness;
@@ -26,7 +26,7 @@ fn indi() -> Indi {
     Indi::new(vehicle(), SETTINGS, indi::Gains::PAPER_VEHICLE).unwrap()
 }
 
-/// Root mean square errors of x, y, z \[m\] and psi \[rad\] within `bounds`.
+/// Asserts root mean square errors of x, y, z \[m\] and psi \[rad\] within `bounds`.
 #[track_caller]
 fn within(name: &str, figures: &Figures, bounds: [f64; 4]) {
     println!("{name}: {figures:.4?}");
@@ -36,7 +36,7 @@ fn within(name: &str, figures: &Figures, bounds: [f64; 4]) {
     );
 }
 
-/// Stays at rest where it is told to.
+/// Stays at rest.
 fn hovers<C: FlightController>(name: &str, controller: &C) {
     let place = [1.0, -2.0, 3.0];
     let start = at(place.map(f64::from), 0.7);
@@ -54,7 +54,7 @@ fn all_hover() {
     hovers("indi", &indi());
 }
 
-/// Gets there, and 6 s later is there, for a small step and for one that meets every limit.
+/// Arrives, and is at rest after 6 s, for a small step and for one that reaches every limit.
 fn steps<C: FlightController>(name: &str, controller: &C) {
     let start = at([0.0, 0.0, 2.0], 0.0);
     let figures = fly(controller, Rig::ALL, calm(), start, hover([2.0, 1.0, 3.0], 1.0), [6.0, 12.0]);
@@ -84,7 +84,8 @@ fn all_fly_a_circle() {
     within("indi", &figures(&indi(), start), [0.001, 0.001, 0.001, 0.001]);
 }
 
-/// The paper's flight with its gusts and uncertainties in all four signs, with lag, delay and noise, from 5 s to 60 s.
+/// The paper's flight with its gusts and uncertainties of all four sign combinations, with lag, delay and noise, from
+/// 5 s to 60 s.
 #[test]
 fn all_fly_the_papers_flight() {
     for (inertia, thrust) in [(1.75, 0.6), (1.75, 1.4), (0.25, 0.6), (0.25, 1.4)] {
@@ -95,7 +96,7 @@ fn all_fly_the_papers_flight() {
         }
         let environment = || disturbed(inertia, thrust);
         within("pid", &figures(&pid(), environment()), [0.010, 0.013, 0.027, 0.006]);
-        // Without integrals an offset stays: 1.2 m/s2 over k_x is 75 mm.
+        // Without integrals an offset remains: 1.2 m/s2 over k_x is 75 mm.
         within("lee", &figures(&lee(), environment()), [0.12, 0.10, 0.20, 0.03]);
         within("goodarzi", &figures(&goodarzi(), environment()), [0.011, 0.015, 0.035, 0.005]);
         within("indi", &figures(&indi(), environment()), [0.005, 0.008, 0.007, 0.002]);
@@ -103,7 +104,7 @@ fn all_fly_the_papers_flight() {
 }
 
 #[test]
-fn what_integrates_leaves_no_error_behind() {
+fn integrals_remove_the_steady_state_error() {
     fn left<C: FlightController>(controller: &C) -> f64 {
         fly(controller, Rig::LAG, disturbed(1.75, 0.6), paper_start(), paper, [59.0, 60.0]).max_abs.amax()
     }
@@ -113,7 +114,7 @@ fn what_integrates_leaves_no_error_behind() {
     assert!(left(&lee()) > 0.05);
 }
 
-/// Thrown: rolled and pitched over, turning, falling.
+/// Starts rolled and pitched over, rotating and falling.
 #[test]
 fn all_catch_a_vehicle_that_was_thrown() {
     fn figures<C: FlightController>(controller: &C) -> Figures {

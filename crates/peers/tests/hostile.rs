@@ -1,4 +1,4 @@
-//! Nothing that comes in gets anything but finite rotor speeds within their limits out.
+//! Any input gives finite rotor speeds within their limits.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 mod harness;
@@ -11,13 +11,15 @@ use harness::{SETTINGS, vehicle};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// Any bits, and often enough something that passes the screen: small, or at its very edge.
+/// Any bits, and often values that pass the screen: small, or exactly at its bounds.
 fn number() -> impl Strategy<Value = f32> {
     prop_oneof![
         1 => any::<u32>().prop_map(f32::from_bits),
         4 => -4.0f32..4.0,
         2 => -1e3f32..1e3,
-        1 => prop::sample::select(vec![0.0, -0.0, 1e3, -1e3, 1e5, -1e5, f32::MIN_POSITIVE, 1e-45, f32::NAN, f32::INFINITY]),
+        1 => prop::sample::select(
+            vec![0.0, -0.0, 1e3, -1e3, 1e5, -1e5, f32::MIN_POSITIVE, 1e-45, f32::NAN, f32::INFINITY],
+        ),
     ]
 }
 
@@ -44,7 +46,7 @@ fn motion() -> impl Strategy<Value = (State, Setpoint)> {
     (state, setpoint)
 }
 
-/// Each gain anywhere in its range, by the shares given.
+/// Sets each gain anywhere in its range, by the given shares.
 fn anywhere(gains: &mut impl Declared, shares: &[f64]) {
     let mut shares = shares.iter();
     let Ok(()) = gains.visit_mut(&mut |declaration, value| {
@@ -77,7 +79,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
-    fn whatever_comes_in_the_rotors_get_something_they_can_do(
+    fn any_input_gives_feasible_rotor_speeds(
         inputs in prop::collection::vec(motion(), 1..30),
         shares in prop::collection::vec(0.0..=1.0, 20),
         force_max in prop_oneof![Just(3.0f32), Just(1e4), Just(1e-3)],

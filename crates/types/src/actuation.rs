@@ -1,4 +1,4 @@
-//! What moves the vehicle: inputs, rotor forces, rotor speeds.
+//! Control inputs, rotor forces and rotor speeds.
 
 use nalgebra::SVector;
 
@@ -24,7 +24,7 @@ pub struct Inputs {
 pub struct RotorForces<const N: usize = 4>(pub SVector<f32, N>);
 
 impl<const N: usize> Default for RotorForces<N> {
-    /// Rotors that stand still.
+    /// All rotors at zero force.
     fn default() -> Self {
         RotorForces(SVector::zeros())
     }
@@ -37,7 +37,7 @@ impl<const N: usize> Default for RotorForces<N> {
 pub struct RotorSpeeds<const N: usize = 4>(pub SVector<f32, N>);
 
 impl<const N: usize> Default for RotorSpeeds<N> {
-    /// Rotors that stand still.
+    /// All rotors stopped.
     fn default() -> Self {
         RotorSpeeds(SVector::zeros())
     }

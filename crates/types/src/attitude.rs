@@ -9,8 +9,8 @@ const NORM_SQUARED_ERROR_MAX: f32 = 0.1;
 impl State {
     /// Returns the state of a vehicle whose attitude is given as a quaternion from body (FLU) to earth (z up)
     /// coordinates; position and velocity are in the earth frame, rates in the body frame, as in the crate's
-    /// [conventions](crate). Yaw is within \[-pi, pi\]. `None` if the quaternion is no rotation (its squared norm is not
-    /// within 0.9 to 1.1) or the state is not plausible ([`State::is_plausible`]).
+    /// [conventions](crate). Yaw is within \[-pi, pi\]. `None` if the quaternion is no rotation (its squared norm is
+    /// not within 0.9 to 1.1) or the state is not plausible ([`State::is_plausible`]).
     ///
     /// ```
     /// use afbc_types::State;

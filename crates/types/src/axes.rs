@@ -23,7 +23,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// All six, in the paper's order.
+    /// All six subsystems, in the paper's order.
     pub const ALL: [Axis; 6] = [Axis::Roll, Axis::Pitch, Axis::Yaw, Axis::Z, Axis::X, Axis::Y];
 
     /// Lower-case name, as in scenario files and logs.
@@ -38,7 +38,7 @@ impl Axis {
         }
     }
 
-    /// The next one in the paper's order, round and round.
+    /// Returns the next axis in the paper's order; after the last, the first.
     #[must_use]
     pub const fn next(self) -> Self {
         match self {
@@ -67,13 +67,13 @@ pub struct PerAxis<T> {
 }
 
 impl<T> PerAxis<T> {
-    /// Makes each axis' value from its name.
+    /// Calls `make` for each axis.
     pub fn from_fn(mut make: impl FnMut(Axis) -> T) -> Self {
         let Ok(made) = Self::try_from_fn(|axis| Ok::<T, Infallible>(make(axis)));
         made
     }
 
-    /// Makes each axis' value from its name, as long as that succeeds.
+    /// Calls `make` for each axis until one call fails.
     ///
     /// # Errors
     /// The first error of `make`.
@@ -88,7 +88,7 @@ impl<T> PerAxis<T> {
         })
     }
 
-    /// What `change` makes of each axis' value.
+    /// Applies `change` to each axis' value.
     #[must_use]
     pub fn map<U>(&self, mut change: impl FnMut(&T) -> U) -> PerAxis<U> {
         PerAxis::from_fn(|axis| change(&self[axis]))

@@ -1,43 +1,43 @@
-//! Parameters that are declared once: [`parameters!`](crate::parameters) makes a struct of plain fields, and of each
-//! field what files, tuners, documents and ground stations need to know of it.
+//! Declared parameters: [`parameters!`](crate::parameters) makes a struct of plain fields and, for each field, the
+//! metadata that files, tuners, documents and ground stations need.
 
 use crate::{Axis, OutOfRange, PerAxis, Range};
 use core::fmt::{self, Write};
 use core::ops::{Div, Mul};
 use nalgebra::Vector3;
 
-/// What is declared of one parameter.
+/// Metadata of one parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Declaration {
-    /// Short name that never changes: `MASS`. Upper-case letters, digits and underscores.
+    /// Short name that never changes, such as `MASS`: upper-case letters, digits and underscores.
     pub id: &'static str,
-    /// Group within the one that is visited, in lower case: an axis, or a table of its own in a file. Usually empty.
+    /// Group inside the visited struct, in lower case: an axis, or a sub-table of a file. Usually empty.
     pub group: &'static str,
     /// Key with unit, as in scenario files, and accepted range.
     pub range: Range,
-    /// Unit symbol: `m/s2`; `1` for a plain number, empty for a switch.
+    /// Unit symbol such as `m/s2`; `1` for a plain number, empty for a switch.
     pub unit: &'static str,
-    /// True if the tuner may choose it; otherwise the vehicle or its task decides.
+    /// True if the tuner may choose the value; otherwise the vehicle or its task determines it.
     pub tuned: bool,
     /// Meaning, from the field's documentation.
     pub meaning: &'static str,
 }
 
 impl Declaration {
-    /// The same parameter in a group of this name; an empty name leaves it where it is.
+    /// Returns the same declaration in the group `group`; an empty name changes nothing.
     #[must_use]
     pub const fn in_group(self, group: &'static str) -> Self {
         if group.is_empty() { self } else { Declaration { group, ..self } }
     }
 
-    /// Name on a ground station and in flash, at most 16 characters: `prefix`, group and id, and for a vector which of its
-    /// three numbers it is. `V_MASS`, `V_INERTIA_X`, `A_ROLL_GAMMA`.
+    /// Returns the name on a ground station and in flash, at most 16 characters: `prefix`, group, id and, for a vector,
+    /// the coordinate. Examples: `V_MASS`, `V_INERTIA_X`, `A_ROLL_GAMMA`.
     pub const fn name(&self, prefix: &'static str, coordinate: Option<char>) -> Name {
         Name { prefix, group: self.group, id: self.id, coordinate }
     }
 }
 
-/// A parameter's name in full; [`Declaration::name`].
+/// Full name of a parameter, made by [`Declaration::name`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Name {
     prefix: &'static str,
@@ -58,19 +58,19 @@ impl fmt::Display for Name {
     }
 }
 
-/// A parameter's value, in place.
+/// Mutable access to a parameter's value.
 #[derive(Debug, PartialEq)]
 pub enum Value<'a> {
-    /// One number, or the three of a vector.
+    /// One number, or the three of a vector, in `f32`.
     Single(&'a mut [f32]),
-    /// One number, or the three of a vector.
+    /// One number, or the three of a vector, in `f64`.
     Double(&'a mut [f64]),
     /// On or off.
     Switch(&'a mut bool),
 }
 
 impl Value<'_> {
-    /// The one number, or the three of a vector; none of a switch.
+    /// Returns the one number, or the three of a vector; nothing for a switch.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
         let (single, double): (&[f32], &[f64]) = match self {
             Value::Single(numbers) => (numbers, &[]),
@@ -81,38 +81,38 @@ impl Value<'_> {
     }
 }
 
-/// What a visit does with each parameter; an error ends it. Implemented by closures. A call of it is static, so the proof of
-/// the firmware's stack follows it.
+/// Action on each visited parameter; an error ends the visit. Implemented by closures and called statically, so that
+/// the firmware's stack analysis can follow the call.
 pub trait Visit<E>: FnMut(&Declaration, Value<'_>) -> Result<(), E> {}
 
 impl<E, F: FnMut(&Declaration, Value<'_>) -> Result<(), E>> Visit<E> for F {}
 
-/// A group of parameters made by [`parameters!`](crate::parameters), or one for each axis.
+/// A struct made by [`parameters!`](crate::parameters), or one such struct per axis.
 pub trait Declared: Clone {
-    /// Shows every parameter, in the order of the declaration, to read or to change.
+    /// Calls `visit` with every parameter, in the order of declaration, to read or to change it.
     ///
     /// # Errors
-    /// The first that `visit` returns.
+    /// The first error that `visit` returns.
     fn visit_mut<E>(&mut self, visit: &mut impl Visit<E>) -> Result<(), E>;
 
-    /// Shows every parameter; changes that `visit` makes are lost.
+    /// Calls `visit` with every parameter; changes that `visit` makes are lost.
     ///
     /// # Errors
-    /// The first that `visit` returns.
+    /// The first error that `visit` returns.
     fn visit<E>(&self, visit: &mut impl Visit<E>) -> Result<(), E> {
         self.clone().visit_mut(visit)
     }
 
-    /// Checks how parameters go together that are each in range.
+    /// Checks parameters that limit one another; each must already be in its own range.
     ///
     /// # Errors
-    /// The first that is out of the range that another one sets.
+    /// The first parameter outside the range that another one sets.
     fn together(&self) -> Result<(), OutOfRange>;
 
-    /// Checks every parameter, then how they go together.
+    /// Checks every parameter's range, then the parameters that limit one another.
     ///
     /// # Errors
-    /// The first one out of range, by name.
+    /// The first parameter out of range.
     fn validate(&self) -> Result<(), OutOfRange> {
         self.visit(&mut |declaration, value| value.numbers().try_for_each(|number| declaration.range.check(number)))?;
         self.together()
@@ -135,16 +135,16 @@ impl<G: Declared> Declared for PerAxis<G> {
 
 /// A type that a declared parameter may have.
 pub trait Field {
-    /// Shows the parameter, or one for each axis.
+    /// Calls `visit` with the parameter, once per axis if it has several.
     ///
     /// # Errors
-    /// The first that `visit` returns.
+    /// The first error that `visit` returns.
     fn show<E>(&mut self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E>;
 }
 
-/// `f32`, of what flies, or `f64`, of the plant.
+/// Number type of a parameter: `f32` in the controller, `f64` in the plant model.
 pub trait Number: nalgebra::Scalar + Copy + Into<f64> + Mul<Output = Self> + Div<Output = Self> {
-    /// One number, or the three of a vector.
+    /// Wraps one number, or the three of a vector, as a [`Value`].
     fn values(numbers: &mut [Self]) -> Value<'_>;
 }
 
@@ -184,17 +184,17 @@ impl<T: Field> Field for PerAxis<T> {
     }
 }
 
-/// Declares a struct of parameters: the one place that says what each is called and means, its unit, accepted range and
-/// default, and whether it is tuned.
+/// Declares a struct of parameters: name, meaning, unit, accepted range and default of each, and whether it is
+/// tuned.
 ///
-/// * `#[parameter(ID, "unit", min..=max)]`, with `, tuned` at the end if the tuner may choose it: a number, a vector whose
-///   three numbers have the same range, or a [`PerAxis`](crate::PerAxis) of either.
+/// * `#[parameter(ID, "unit", min..=max)]`, with `, tuned` at the end if the tuner may choose it: a number, a vector
+///   whose three numbers have the same range, or a [`PerAxis`](crate::PerAxis) of either.
 /// * `#[switch(ID)]`: a `bool`.
-/// * `#[group("")]`: a declared struct whose parameters join this one's; with a name, they are a group of their own.
-/// * A field with none of these is no parameter.
+/// * `#[group("")]`: a declared struct whose parameters join this struct's; with a name, they form a group.
+/// * A field without any of these attributes is not a parameter.
 ///
-/// The struct gets [`Declared`](crate::Declared), `DEFAULT`, [`Default`] and for each parameter a constant named by its id.
-/// What `together` says is checked in addition to the ranges.
+/// The struct gets [`Declared`](crate::Declared), `DEFAULT`, [`Default`] and one constant per parameter, named by its
+/// id. The optional `together` block is checked in addition to the ranges.
 ///
 /// ```
 /// use afbc_types::{Declared, Range, parameters};
@@ -283,10 +283,10 @@ macro_rules! parameters {
             }
         }
     };
-    // No parameter.
+    // A field without attribute: not a parameter.
     (@declare $field:ident [$($doc:literal)*]) => {};
     (@declare $field:ident [$($doc:literal)*] $id:ident, $unit:literal, $range:expr, [$($tuned:ident)?]) => {
-        #[doc = concat!("What is declared of `", stringify!($field), "`.")]
+        #[doc = concat!("Declaration of `", stringify!($field), "`.")]
         pub const $id: $crate::Declaration = $crate::Declaration {
             id: stringify!($id),
             group: "",

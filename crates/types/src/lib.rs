@@ -1,10 +1,9 @@
-//! The words that every other crate speaks: what a state, a setpoint, a rotor speed and a vehicle are.
-//! Types and their accepted ranges, attitudes as quaternions, and the way to declare parameters ([`parameters!`]); nothing
-//! here decides anything.
+//! Types shared by all crates: state, setpoint, control inputs, rotor speeds and physical parameters with their
+//! accepted ranges, attitudes as quaternions, and a macro that declares parameters ([`parameters!`]).
 //!
 //! # Conventions
 //!
-//! Stated once, here; every other crate refers to this page.
+//! The conventions of all crates:
 //!
 //! * **Units** are SI: metres, seconds, kilograms, newtons, radians. Field names carry them.
 //! * **Earth frame**: inertial, right-handed, z up. Gravity points to -z.
@@ -22,8 +21,8 @@
 //!
 //! # Features
 //!
-//! Both off by default, both for no_std: `serde` reads and writes states, setpoints, inputs, rotors' forces and speeds, and
-//! physical parameters; `defmt` logs them on a board.
+//! Both are off by default and work without std: `serde` reads and writes states, setpoints, inputs, rotor forces,
+//! rotor speeds and physical parameters; `defmt` logs them on a board.
 #![no_std]
 
 mod actuation;

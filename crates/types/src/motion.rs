@@ -1,4 +1,4 @@
-//! Where the vehicle is, and where it should be.
+//! Measured state and desired motion of the vehicle.
 
 use nalgebra::Vector3;
 
@@ -25,20 +25,20 @@ const POSITION_MAX_M: f32 = 1e5;
 const VELOCITY_MAX_M_S: f32 = 1e3;
 /// Largest acceleration of a setpoint, per coordinate \[m/s2\].
 const ACCELERATION_MAX_M_S2: f32 = 1e3;
-/// Largest angle: yaw may be unwrapped \[rad\].
+/// Largest angle \[rad\]. Larger than a turn, because yaw may be unwrapped.
 const ANGLE_MAX_RAD: f32 = 1e3;
 /// Largest angular rate or angular acceleration, per coordinate \[rad/s, rad/s2\].
 const RATE_MAX_RAD_S: f32 = 1e3;
 
-/// All coordinates finite and at most `max` in size.
+/// True if all coordinates are finite and at most `max` in size.
 fn within(vector: &Vector3<f32>, max: f32) -> bool {
-    // NaN fails every comparison, so this refuses it too.
+    // False of NaN.
     vector.x.abs() <= max && vector.y.abs() <= max && vector.z.abs() <= max
 }
 
 impl State {
     /// True if every value is finite and physically possible: at most 1e5 m, 1e3 m/s, 1e3 rad and 1e3 rad/s in size.
-    /// A controller may use no other state.
+    /// Controllers must reject any other state.
     pub fn is_plausible(&self) -> bool {
         within(&self.position_m, POSITION_MAX_M)
             && within(&self.velocity_m_s, VELOCITY_MAX_M_S)
@@ -54,22 +54,22 @@ impl State {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Setpoint {
-    /// Earth frame \[m\].
+    /// Position, earth frame \[m\].
     pub position_m: Vector3<f32>,
-    /// Earth frame \[m/s\].
+    /// Velocity, earth frame \[m/s\].
     pub velocity_m_s: Vector3<f32>,
-    /// Earth frame \[m/s2\].
+    /// Acceleration, earth frame \[m/s2\].
     pub acceleration_m_s2: Vector3<f32>,
-    /// psi_d \[rad\].
+    /// Heading psi_d \[rad\].
     pub yaw_rad: f32,
-    /// \[rad/s\]
+    /// Rate of the heading \[rad/s\].
     pub yaw_rate_rad_s: f32,
-    /// \[rad/s2\]
+    /// Angular acceleration of the heading \[rad/s2\].
     pub yaw_acceleration_rad_s2: f32,
 }
 
 impl Setpoint {
-    /// Stay where `state` is, with its heading, at rest.
+    /// Returns the setpoint that holds the position and heading of `state`, at rest.
     pub fn hold(state: &State) -> Self {
         Setpoint { position_m: state.position_m, yaw_rad: state.attitude_rad.z, ..Setpoint::default() }
     }

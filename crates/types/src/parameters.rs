@@ -4,8 +4,8 @@ use crate::{Number, parameters};
 use nalgebra::Vector3;
 
 parameters! {
-    /// Physical parameters of a quadrotor, Section II and IV. The law holds nominal ones in `f32`, the plant its own, true
-    /// ones in `f64`. Accepted are palm-sized vehicles to those that carry a person.
+    /// Physical parameters of a quadrotor, Sections II and IV. The control law holds its nominal values in `f32`, the
+    /// plant its true values in `f64`. The ranges admit vehicles from palm size to those that carry a person.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     #[cfg_attr(feature = "serde", serde(bound = "T: crate::Number + serde::Serialize + serde::de::DeserializeOwned"))]
@@ -14,7 +14,7 @@ parameters! {
         /// m: mass of the vehicle.
         #[parameter(MASS, "kg", 0.01..=500.0)]
         pub mass_kg: T = 0.486,
-        /// l: centre of mass to rotor shaft.
+        /// l: distance from the centre of mass to a rotor shaft.
         #[parameter(ARM, "m", 0.01..=10.0)]
         pub arm_m: T = 0.25,
         /// diag(Ix, Iy, Iz): inertia about the body axes.
@@ -23,10 +23,10 @@ parameters! {
         /// I_r: inertia of one rotor with its propeller, about its shaft.
         #[parameter(ROT_INERTIA, "kg m2", 0.0..=10.0)]
         pub rotor_inertia_kg_m2: T = 3.357e-5,
-        /// b: thrust of a rotor, F = b omega^2.
+        /// b: thrust factor of a rotor, F = b omega^2.
         #[parameter(THRUST, "N s2", 1e-10..=1.0)]
         pub thrust_factor_n_s2: T = 2.984e-5,
-        /// d: drag moment of a rotor, d omega^2.
+        /// d: drag factor of a rotor, moment = d omega^2.
         #[parameter(DRAG, "N m s2", 1e-12..=1.0)]
         pub drag_factor_n_m_s2: T = 3.232e-7,
         /// g: acceleration of free fall.
@@ -36,13 +36,13 @@ parameters! {
 }
 
 impl<T: Number> Parameters<T> {
-    /// m g: weight \[N\].
+    /// Weight m g \[N\].
     #[must_use]
     pub fn weight_n(&self) -> T {
         self.mass_kg * self.gravity_m_s2
     }
 
-    /// l/Ix, l/Iy, (d/b)/Iz: angular acceleration about each body axis for each newton of U1, U2, U3 \[rad/s2 per N\].
+    /// l/Ix, l/Iy, (d/b)/Iz: angular acceleration about each body axis per newton of U1, U2, U3 \[rad/s2 per N\].
     #[must_use]
     pub fn effectiveness(&self) -> Vector3<T> {
         let (l, i) = (self.arm_m, &self.inertia_kg_m2);
@@ -55,7 +55,7 @@ impl Parameters<f64> {
     /// The vehicle of Section IV.
     pub const PAPER: Self = Self::DEFAULT;
 
-    /// The same parameters, rounded for the controller.
+    /// The same parameters in the controller's precision.
     pub fn to_f32(&self) -> Parameters<f32> {
         Parameters {
             mass_kg: self.mass_kg as f32,

@@ -1,9 +1,9 @@
-//! Accepted intervals of physical quantities, by name.
+//! Accepted ranges of named physical quantities.
 
 use core::fmt;
 use core::ops::RangeInclusive;
 
-/// The closed interval that a named quantity must lie in. The name ends in the unit.
+/// Closed interval of a named quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Range {
@@ -16,17 +16,18 @@ pub struct Range {
 }
 
 impl Range {
-    /// A range; `min <= max`.
+    /// Makes a range; `min <= max`.
     pub const fn new(name: &'static str, min: f64, max: f64) -> Self {
         Range { name, min, max }
     }
 
-    /// The range of all values in `interval`, as it is written in a declaration.
+    /// Makes a range from an interval, as a declaration writes it.
     pub const fn over(name: &'static str, interval: RangeInclusive<f64>) -> Self {
         Range { name, min: *interval.start(), max: *interval.end() }
     }
 
-    /// `Ok` if `value` is finite and within the range, to `f32` precision: what a file may say, a controller may hold.
+    /// Checks that `value` is finite and within the range, to `f32` precision: a bound read from a file in decimal must
+    /// pass after rounding to the controller's precision.
     ///
     /// # Errors
     /// [`OutOfRange`] otherwise, NaN included.
@@ -45,9 +46,9 @@ impl Range {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OutOfRange {
-    /// What was given.
+    /// Rejected value.
     pub value: f64,
-    /// What is accepted.
+    /// Accepted range.
     pub range: Range,
 }
 

@@ -36,7 +36,7 @@ fn known_attitudes() {
     for (attitude, expected) in cases {
         for sign in [1.0, -1.0] {
             let angles = with_attitude(&(attitude * sign)).expect("a rotation").attitude_rad;
-            // Half a turn is the same both ways round.
+            // Half a turn is the same in both directions.
             let apart = (angles - Vector3::from(expected)).map(|angle| angle.abs().min((angle.abs() - 2.0 * PI).abs()));
             assert!(apart.amax() < 1e-6, "{attitude}: {angles}");
         }
@@ -48,7 +48,7 @@ fn known_attitudes() {
 }
 
 #[test]
-fn what_is_no_rotation_is_no_state() {
+fn what_is_not_a_rotation_is_rejected() {
     let f = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, 1.2, 0.9, 0.5, 0.0, 1e-30];
     for value in f {
         let mut attitudes = vec![Quaternion::new(value, 0.0, 0.0, 0.0), Quaternion::new(0.0, 0.0, value, 0.0)];
@@ -60,7 +60,7 @@ fn what_is_no_rotation_is_no_state() {
             assert_eq!(with_attitude(&attitude), None, "{attitude:?}");
         }
     }
-    // And motion that is not plausible, with an attitude that is.
+    // Implausible motion with a valid attitude.
     let (zero, level) = (Vector3::zeros(), Quaternion::identity());
     for wrong in [f32::NAN, f32::INFINITY, 2e5] {
         let wrong = Vector3::new(0.0, wrong, 0.0);
@@ -104,8 +104,8 @@ proptest! {
         prop_assert!(difference < 2e-6, "{difference}");
     }
 
-    /// A state converted to a quaternion and back is the same rotation, however close to a pitch of 90 degrees; everything
-    /// else is unchanged.
+    /// A state converted to a quaternion and back is the same rotation, however close to a pitch of 90 degrees;
+    /// everything else is unchanged.
     #[test]
     fn states_come_back(
         q in attitudes(),
@@ -118,6 +118,9 @@ proptest! {
         let again = from(&state.quaternion()).expect("a plausible state");
         prop_assert!((r_earth_body(&again.attitude_rad) - r_earth_body(&state.attitude_rad)).amax() < 4e-6);
         prop_assert_eq!(State { attitude_rad: state.attitude_rad, ..again }, state);
-        prop_assert_eq!((state.position_m, state.velocity_m_s, state.rates_rad_s), (position.into(), velocity.into(), rates.into()));
+        prop_assert_eq!(
+            (state.position_m, state.velocity_m_s, state.rates_rad_s),
+            (position.into(), velocity.into(), rates.into())
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! What [`parameters!`] makes of a declaration.
+//! Structs made by [`parameters!`].
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
 use afbc_types::{Axis, Declared, PerAxis, Range, Value, parameters};
@@ -23,7 +23,7 @@ parameters! {
 }
 
 parameters! {
-    /// Everything that can be declared.
+    /// One field of every kind.
     #[derive(Clone, Debug, PartialEq)]
     pub struct Outer {
         /// Flag.
@@ -40,14 +40,14 @@ parameters! {
         pub apart: Inner = Inner { first_m: 0.2, ..Inner::DEFAULT },
         /// No parameter.
         pub list: Vec<u8> = Vec::new(),
-        /// One for each axis.
+        /// One per axis.
         #[parameter(EACH, "N", 0.0..=f64::INFINITY)]
         pub each_n: PerAxis<f32> = PerAxis { roll: 1.0, pitch: 2.0, yaw: 3.0, z: 4.0, x: 5.0, y: 6.0 },
     }
 }
 
 parameters! {
-    /// Of either precision.
+    /// In either precision.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Either<T = f32, f64> {
         /// Mass.
@@ -59,7 +59,7 @@ parameters! {
     }
 }
 
-/// Name, key and numbers of each parameter, in the order of the visit; a switch is 0 or 1.
+/// Returns name, key and numbers of each parameter in the order of the visit; a switch is 0 or 1.
 fn listed(group: &impl Declared) -> Vec<(String, &'static str, Vec<f64>)> {
     let mut list = Vec::new();
     let Ok(()) = group.visit(&mut |declaration, value| {
@@ -72,7 +72,7 @@ fn listed(group: &impl Declared) -> Vec<(String, &'static str, Vec<f64>)> {
 }
 
 #[test]
-fn a_visit_shows_every_parameter_in_the_order_of_its_declaration() {
+fn a_visit_shows_every_parameter_in_order_of_declaration() {
     let names = |group: &Outer| listed(group).into_iter().map(|(name, ..)| name).collect::<Vec<_>>().join(" ");
     assert_eq!(
         names(&Outer::DEFAULT),
@@ -98,7 +98,8 @@ fn a_declaration_holds_all_that_was_written() {
     assert_eq!(Inner::default(), Inner { first_m: 0.1, second: -0.5 });
 }
 
-/// `Outer` with one number, the parameter's and the coordinate's, just past an end of its range; none if that is not there.
+/// Returns `Outer` with the number `target`, `coordinate` just outside an end of its range; `None` if there is no
+/// such number.
 fn past(target: usize, coordinate: usize, above: bool) -> Option<(Outer, Range)> {
     let (mut group, mut at, mut found) = (Outer::DEFAULT, 0, None);
     let Ok(()) = group.visit_mut(&mut |declaration, value| {
@@ -127,14 +128,14 @@ fn every_number_out_of_range_is_named() {
             checked += 1;
         }
     }
-    // Three of the vector and four of the nested, both ways; six axes, one way.
+    // Three numbers of the vector and four of the nested structs, both ends; six axes, one end.
     assert_eq!(checked, 2 * (3 + 4) + 6);
     let nan = Outer { vector_kg_m2: Vector3::new(1.0, f64::NAN, 1.0), ..Outer::DEFAULT };
     assert_eq!(nan.validate().unwrap_err().range, Outer::VECTOR.range);
 }
 
 #[test]
-fn what_goes_together_is_checked_at_every_depth() {
+fn parameters_that_limit_one_another_are_checked_at_every_depth() {
     assert_eq!(Outer::DEFAULT.validate(), Ok(()));
     let uneven = Inner { first_m: 0.1, second: 0.2 };
     let error = uneven.validate().unwrap_err();
@@ -146,7 +147,7 @@ fn what_goes_together_is_checked_at_every_depth() {
         assert_eq!(axes.validate(), Ok(()));
         axes[axis].second = 0.2;
         assert_eq!(axes.validate(), Err(error));
-        // A range comes before what goes together, wherever it is.
+        // A range is checked before parameters that limit one another, wherever it is.
         axes[axis.next()].first_m = 2.0;
         assert_eq!(axes.validate().unwrap_err().range, Inner::FIRST.range);
     }
@@ -177,7 +178,7 @@ fn a_group_may_serve_both_precisions() {
     assert_eq!(listed(&wide)[0].2, [0.3]);
     assert_eq!(listed(&narrow)[0].2, [f64::from(0.3_f32)]);
     assert_eq!(Either::<f32>::INERTIA, Either::<f64>::INERTIA);
-    // What a file may say, a controller may hold: the ends of a range are those of `f32`.
+    // The ends of a range are compared in `f32`: a decimal bound in a file must pass after rounding.
     assert_eq!(Either { mass_kg: 0.1_f32, ..narrow }.validate(), Ok(()));
     assert!(Either { mass_kg: 0.1_f32.next_down(), ..narrow }.validate().is_err());
 }

@@ -1,4 +1,4 @@
-//! Flights of any controller: the rigid body behind rotors that lag, a delay on the commands, noise on the measurements.
+//! Flights of any controller: a rigid body with rotor lag, delayed commands and measurement noise.
 
 #![allow(dead_code, reason = "each test file uses a part")]
 
@@ -8,14 +8,14 @@ use afbc_types::{Axis, Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use std::collections::VecDeque;
 
-/// 1 kHz and 3 N a rotor.
+/// 1 kHz and 3 N per rotor.
 pub(crate) const SETTINGS: Settings = Settings { dt_s: 0.001, rotor_force_max_n: 3.0 };
 
 pub(crate) fn vehicle() -> Parameters {
     Parameters::PAPER.to_f32()
 }
 
-/// Imperfections between controller and vehicle.
+/// Actuator and sensor imperfections.
 #[derive(Clone, Copy)]
 pub(crate) struct Rig {
     /// First-order lag of each rotor's speed \[s\].
@@ -31,7 +31,7 @@ impl Rig {
     pub(crate) const ALL: Rig = Rig { lag_s: 0.02, delay: 1, noise: 0.001 };
 }
 
-/// Uniform in 0..1 by xorshift64*.
+/// Uniform random numbers in 0..1 by xorshift64*.
 pub(crate) struct Random(pub u64);
 
 impl Random {
@@ -42,7 +42,7 @@ impl Random {
         (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Normal by the sum of twelve, tails cut at 6.
+    /// Returns a normal random number as a sum of twelve uniform ones, tails cut at 6.
     pub(crate) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
@@ -61,7 +61,7 @@ impl Random {
     }
 }
 
-/// What a flight was like, from `settled_s` on: x, y, z, psi.
+/// Figures of a flight from `settled_s` on, for x, y, z, psi.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Figures {
     pub(crate) rmse: Vector4<f64>,
@@ -126,7 +126,7 @@ pub(crate) fn fly<C: FlightController>(
     }
 }
 
-/// At rest somewhere.
+/// Returns a motion at rest.
 pub(crate) fn at(position_m: [f64; 3], yaw_rad: f64) -> Motion {
     Motion { position_m: position_m.into(), attitude_rad: Vector3::new(0.0, 0.0, yaw_rad), ..Motion::default() }
 }
@@ -135,7 +135,7 @@ pub(crate) fn hover(position_m: [f32; 3], yaw_rad: f32) -> impl Fn(f64) -> Setpo
     move |_| Setpoint { position_m: position_m.into(), yaw_rad, ..Setpoint::default() }
 }
 
-/// A level circle, once round in `period_s`, the nose along the velocity.
+/// A level circle, one turn in `period_s`, the nose along the velocity.
 pub(crate) fn circle(radius_m: f64, period_s: f64) -> impl Fn(f64) -> Setpoint {
     move |t| {
         let w = core::f64::consts::TAU / period_s;
@@ -166,7 +166,7 @@ pub(crate) fn paper(t: f64) -> Setpoint {
     }
 }
 
-/// Where the paper's flight starts: 1.5 m below the reference, 0.35 rad off.
+/// Start of the paper's flight: 1.5 m below the reference, 0.35 rad off.
 pub(crate) fn paper_start() -> Motion {
     at([0.0, 0.0, 0.5], 0.35)
 }
@@ -175,7 +175,8 @@ pub(crate) fn calm() -> Environment {
     Environment::calm(Parameters::PAPER).unwrap()
 }
 
-/// The paper's disturbances: accelerations of 1.2 that stay, one axis after the other; inertia and thrust factor off by these
+/// The paper's disturbances: constant accelerations of 1.2, one axis after the other; inertia and thrust factor are
+/// multiplied by these factors from 20 s to 40 s.
 /// factors from 20 s to 40 s.
 pub(crate) fn disturbed(inertia: f64, thrust: f64) -> Environment {
     let gusts =
