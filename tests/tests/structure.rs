@@ -1,9 +1,13 @@
-//! Structure of the code: no circular imports between modules, and no crate larger than a fifth of the whole.
+//! Structure of the code: no circular imports between modules, no crate larger than a fifth of the whole, no overlong
+//! lines.
 #![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be read must stop the test")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+
+/// Largest width of a line, as `max_width` in `rustfmt.toml`.
+const WIDTH: usize = 120;
 
 /// Path of a module within its crate; empty for the crate itself.
 type Module = Vec<String>;
@@ -12,15 +16,36 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// Returns every Rust file below `folder`.
-fn files(folder: &Path) -> Vec<PathBuf> {
+/// Returns every file below `folder`, without build products, results and version control.
+fn all_files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().path());
-    let of = |path: PathBuf| match path.extension() {
-        _ if path.is_dir() && !path.ends_with("target") => files(&path),
-        Some(extension) if extension == "rs" => vec![path],
-        _ => Vec::new(),
+    let of = |path: PathBuf| match path.file_name().and_then(|name| name.to_str()) {
+        Some("target" | "out" | ".git") | None => Vec::new(),
+        _ if path.is_dir() => all_files(&path),
+        _ => vec![path],
     };
     entries.flat_map(of).collect()
+}
+
+/// Returns every Rust file below `folder`.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let rust = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "rs");
+    all_files(folder).into_iter().filter(rust).collect()
+}
+
+/// Returns the numbers of a file's overlong lines. Excepted are listings, tables and lines with an address in Markdown.
+fn overlong(path: &Path, text: &str) -> Vec<usize> {
+    let markdown = path.extension().is_some_and(|extension| extension == "md");
+    let mut listing = false;
+    let mut numbers = Vec::new();
+    for (number, line) in (1..).zip(text.lines()) {
+        listing ^= markdown && line.trim_start().starts_with("```");
+        let excepted = markdown && (listing || line.starts_with('|') || line.contains("://"));
+        if !excepted && line.chars().count() > WIDTH {
+            numbers.push(number);
+        }
+    }
+    numbers
 }
 
 /// Returns the folders of all crates.
@@ -170,15 +195,15 @@ fn a_circle_is_found() {
     assert_eq!(find(&[("p", "mod a; use a::f; struct P;"), ("p::a", "use super::P;")]).len(), 2);
 }
 
-/// What a registry and its readers ask of a package; `scripts/check-packages` packs them and compiles each.
+/// Metadata and files that a registry requires or shows; `scripts/check-packages` packs and compiles each crate.
 #[test]
-fn crates_to_be_published_say_what_they_are() {
+fn crates_to_be_published_have_complete_metadata() {
     let mut published = Vec::new();
     for folder in crates() {
         let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
         let has = |start: &str| manifest.lines().any(|line| line.starts_with(start));
         if has("publish") {
-            // As the workspace has it: false.
+            // Inherited from the workspace: false.
             assert!(has("publish.workspace = true"), "{}", folder.display());
             continue;
         }
@@ -197,9 +222,9 @@ fn crates_to_be_published_say_what_they_are() {
     assert!(fs::read_to_string(root().join("Cargo.toml")).unwrap().contains("\npublish = false\n"));
 }
 
-/// What the README promises of the example.
+/// The README states the length of the example.
 #[test]
-fn a_law_of_ones_own_takes_60_lines() {
+fn a_custom_law_takes_at_most_60_lines() {
     let example = fs::read_to_string(root().join("crates/sim/examples/own_law.rs")).unwrap();
     assert!(example.lines().count() <= 60, "{} lines", example.lines().count());
 }
@@ -212,5 +237,34 @@ fn no_crate_is_more_than_a_fifth_of_the_code() {
     let whole: usize = sizes.iter().map(|(_, lines)| lines).sum();
     for (folder, lines) in sizes {
         assert!(5 * lines <= whole, "{}: {lines} of {whole} lines", folder.display());
+    }
+}
+
+#[test]
+fn lines_are_at_most_120_columns_wide() {
+    assert!(fs::read_to_string(root().join("rustfmt.toml")).unwrap().contains(&format!("max_width = {WIDTH}\n")));
+    let mut checked = 0;
+    for path in all_files(root()) {
+        let script = path.parent().is_some_and(|folder| folder.ends_with("scripts") || folder.ends_with(".ci"));
+        let text = path.extension().is_some_and(|extension| ["rs", "md", "toml"].iter().any(|text| extension == *text));
+        if !script && !text {
+            continue;
+        }
+        let text = fs::read_to_string(&path).unwrap();
+        assert_eq!(overlong(&path, &text), [], "lines of {}", path.display());
+        checked += 1;
+    }
+    assert!(checked > 200, "{checked} files");
+}
+
+/// Decisions that go beyond the paper are marked "Not in the paper".
+#[test]
+fn no_comment_says_ours() {
+    let marker = concat!("Our", "s");
+    for path in files(root()) {
+        let text = fs::read_to_string(&path).unwrap();
+        for punctuation in [".", ":", ","] {
+            assert!(!text.contains(&format!("{marker}{punctuation}")), "{}", path.display());
+        }
     }
 }

@@ -29,8 +29,8 @@ pub struct Odometry {
 }
 
 impl Odometry {
-    /// Returns the state in the workspace's frames; `None` if the quaternion is no rotation or the state is not plausible
-    /// ([`State::from_quaternion`]).
+    /// Returns the state in this project's frames; `None` if the quaternion is not a rotation or the state is not
+    /// plausible ([`State::from_quaternion`]).
     pub fn to_state(&self) -> Option<State> {
         let [w, x, y, z] = self.attitude;
         let attitude = Quaternion::new(w, x, -y, -z);
