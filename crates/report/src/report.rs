@@ -293,11 +293,12 @@ fn by_name(law: &Law) -> Markup {
 }
 
 /// Returns key and value of each gain.
-fn listed(gains: &impl Declared) -> Vec<(&'static str, f32)> {
+fn listed(gains: &impl Declared) -> Vec<(String, f32)> {
     let mut list = Vec::new();
     let Ok(()) = gains.visit(&mut |declaration, value| {
         if let Value::Single([gain]) = value {
-            list.push((declaration.range.name, *gain));
+            let dot = if declaration.group.is_empty() { "" } else { "." };
+            list.push((format!("{}{dot}{}", declaration.group, declaration.range.name), *gain));
         }
         Ok::<(), Infallible>(())
     });

@@ -1,6 +1,8 @@
 //! The one list of control laws.
 
 mod declare;
+#[cfg(test)]
+mod tests;
 
 use afbc::{Adaptive, Backstepping, Controller, Profile, adaptive, backstepping};
 use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};

@@ -1,0 +1,40 @@
+//! Every entry of the list is of one piece.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use super::{ControllerKind, Law};
+use crate::contender::Contender;
+use afbc::Profile;
+use afbc_types::{Axis, Declared, Parameters};
+use core::convert::Infallible;
+use std::collections::BTreeSet;
+
+#[test]
+fn names_and_prefixes_are_unique() {
+    let all = ControllerKind::ALL;
+    assert_eq!(all.map(ControllerKind::name).into_iter().collect::<BTreeSet<_>>().len(), all.len());
+    assert_eq!(all.map(ControllerKind::title).into_iter().collect::<BTreeSet<_>>().len(), all.len());
+    assert_eq!(all.map(ControllerKind::prefix).into_iter().collect::<BTreeSet<_>>().len(), all.len());
+}
+
+/// The gains of a law in the cascade are in a group for each axis, those of the others in none.
+#[test]
+fn each_law_has_gains_that_fly_the_papers_vehicle() {
+    let vehicle = Parameters::PAPER.to_f32();
+    for kind in ControllerKind::ALL {
+        let by_hand = Contender { law: Law::by_hand(kind), ..Contender::of(kind, Profile::Flight) };
+        for contender in [Contender::of(kind, Profile::Paper), Contender::of(kind, Profile::Flight), by_hand] {
+            assert_eq!(contender.kind(), kind);
+            contender.check(vehicle).unwrap();
+            contender.law.validate().unwrap();
+            let (mut groups, mut count) = (BTreeSet::new(), 0);
+            let Ok(()) = contender.law.visit(&mut |declaration, _| {
+                groups.insert(declaration.group);
+                count += 1;
+                Ok::<(), Infallible>(())
+            });
+            let axes = Axis::ALL.map(Axis::name);
+            let expected: BTreeSet<&str> = if kind.in_cascade() { axes.into() } else { [""].into() };
+            assert!(groups == expected && count > 0, "{}: {groups:?}", kind.name());
+        }
+    }
+}
