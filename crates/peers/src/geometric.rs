@@ -34,10 +34,9 @@
 //!   direction; this is one choice of it.
 //! * **Limits**: the paper assumes that s never vanishes and that rotor forces are unlimited; here [`Limits`] bounds s.
 //! * **Integrals**: the position integral is of e_x alone, because the integral of e_v, which the source adds, is e_x
-//!   and
-//!   thus part of k_x. In the attitude integral, c = k_R / k_Omega. The integrals are bounded by
-//! +-[`Gains::position_integral_max_m_s2`] and +-20 rad/s2; anti-windup stops them where limits or rotors are
-//! saturated.
+//!   and thus part of k_x. In the attitude integral, c = k_R / k_Omega. The integrals are bounded by
+//!   +-[`Gains::position_integral_max_m_s2`] and +-20 rad/s2; anti-windup stops them where limits or rotors are
+//!   saturated.
 
 use crate::attitude::{facing, geometric_error, heading, length, r_earth_body, unit};
 use crate::body::{Body, Demand};
