@@ -101,7 +101,7 @@ fn a_folder_of_one_command_is_refused_by_every_other() {
 type Make<'a> = &'a dyn Fn(&Path);
 
 #[test]
-fn a_folder_of_nobody_is_refused_by_all() {
+fn a_foreign_folder_is_refused_by_all_commands() {
     let folder = folder("foreign");
     let make: [(&str, Make); 8] = [
         ("notes", &|path| fs::write(path.join("notes.txt"), "mine").unwrap()),
@@ -172,7 +172,7 @@ fn files_of_an_earlier_report_are_removed() {
     assert_eq!(csvs("paper").len(), 6);
     succeeds(&folder, &paper, &[]);
     assert_eq!(csvs("paper"), ["paper-afbc.csv", "paper-backstepping.csv"]);
-    // Of two scenarios, each has figures of its own name.
+    // With two scenarios, each has figures under its own name.
     let longer = fs::read_to_string(folder.join("short.toml")).unwrap().replace("0.5", "0.6");
     fs::write(folder.join("longer.toml"), longer).unwrap();
     let names = |more: &[&str]| {

@@ -192,7 +192,7 @@ fn desired_attitude_agrees_in_every_row() {
     }
 }
 
-/// The same rows without errors of sine and cosine: at a yaw where micromath's are accurate enough, (40) holds to
+/// The golden rows without errors of sine and cosine: at a yaw where micromath's are accurate enough, (40) holds to
 /// rounding. The desired acceleration is rotated by the golden yaw beforehand, in `f64`.
 #[test]
 fn desired_attitude_without_yaw_agrees_to_rounding() {

@@ -180,7 +180,7 @@ fn keys(parameters: impl Declared) -> Vec<(&'static str, [String; 4])> {
         let (first, rest) = meaning.trim_end_matches('.').split_at(1);
         let is_word = rest.starts_with(|c: char| c.is_lowercase() || c == ' ');
         let first = if is_word { first.to_lowercase() } else { first.to_owned() };
-        // That a quantity is one of the subsystem's input is said in its meaning.
+        // The meaning states if a parameter is in the unit of the subsystem's input.
         let is_told = is_in_key(declaration) || unit.ends_with("input");
         let unit = if is_told { String::new() } else { format!(" \\[{unit}\\]") };
         if group.is_empty() {

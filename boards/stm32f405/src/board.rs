@@ -187,7 +187,7 @@ static TASK_FAILED: AtomicBool = AtomicBool::new(false);
 pub(crate) fn park() -> ! {
     TASK_FAILED.store(true, Ordering::Relaxed);
     loop {
-        // It may have panicked with interrupts off.
+        // The task may have panicked with interrupts disabled.
         #[expect(unsafe_code, reason = "it ends a critical section that is never returned to")]
         // SAFETY: the data that it protected is borrowed by try_borrow everywhere: the inbox, the ticks, the alarms.
         unsafe {

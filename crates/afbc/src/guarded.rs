@@ -50,11 +50,11 @@ impl Last {
     }
 }
 
-/// Why AFBC's flight ended, and the last step.
+/// Reason for the trip, and the last step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Tripped {
     trip: Trip,
-    /// Of the last step under either law.
+    /// Record of the last step, under either law.
     last: Last,
 }
 

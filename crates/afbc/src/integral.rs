@@ -38,11 +38,11 @@ impl From<&adaptive::Gains> for Gains {
 /// Memory of one subsystem.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Integral {
-    /// i
+    /// The integral i.
     pub value: f32,
     /// Input to continue with: the next step chooses i for it.
     pub resume: Option<f32>,
-    /// Of z: the hover thrust U4 that AFBC has estimated before \[N\].
+    /// For z: hover thrust U4 that AFBC estimated before the trip \[N\].
     pub hover_thrust_n: Option<f32>,
 }
 
@@ -91,7 +91,7 @@ impl Law for IntegralBackstepping {
     }
 
     fn hover_thrust_n(&self, z: &Integral, weight_n: f32) -> f32 {
-        // Not weight and integral, which includes the thrust of manoeuvres.
+        // Not weight plus integral, which would include the thrust of manoeuvres.
         z.hover_thrust_n.unwrap_or(weight_n)
     }
 

@@ -156,7 +156,7 @@ proptest! {
         position_is_the_same(&last_of_fallback, &first_of_afbc)?;
     }
 
-    /// The same for attitude, whose reference changes from step to step: held constant by a filter at rest.
+    /// Bumpless engagement for attitude, whose reference changes from step to step: held constant by a filter at rest.
     #[test]
     fn hand_over_at_rest_is_bumpless_in_all_axes(height in -0.2_f32..0.2, yaw in -0.2_f32..0.2) {
         let state = State {

@@ -32,7 +32,7 @@ fn step(gains: Gains, e2: f32, unallocated: f32, dt_s: f32, estimate: &mut Estim
     law.input(Axis::X, &tracking(e2), &context, estimate).0
 }
 
-/// The same step in `f64`, as documented.
+/// The adaptation step in `f64`, as documented.
 fn reference(gains: &Gains, e2: f32, unallocated: f32, dt_s: f32, before: &Estimate) -> (Matrix3<f64>, f64) {
     let Safeguards { sigma, kappa, theta_max, delta_max, dead_zone } = gains.safeguards;
     let [sigma, kappa, theta_max, delta_max, dead_zone] =

@@ -31,8 +31,7 @@ pub struct Screen {
 impl Screen {
     /// Returns the given state and setpoint where they are plausible, otherwise the last ones that were. Without any
     /// plausible setpoint so far, the setpoint holds the present position; without any plausible state so far, the
-    /// result
-    /// is `None`. `health` reports what was rejected.
+    /// result is `None`. `health` reports what was rejected.
     #[inline]
     pub fn pass(
         &mut self,

@@ -41,8 +41,7 @@ pub struct Errors {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
     /// Theta_hat: one consequent parameter per fuzzy rule, rows by the Gaussians of the first input, columns by those
-    /// of
-    /// the second; in the unit of the subsystem's input.
+    /// of the second; in the unit of the subsystem's input.
     pub theta: Matrix3<f32>,
     /// delta_hat: estimated bound of approximation error and disturbance; in the unit of the subsystem's input.
     pub delta: f32,

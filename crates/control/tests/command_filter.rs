@@ -94,8 +94,7 @@ proptest! {
         let steps = (25.0 / (f64::from(w) * f64::from(dt))).ceil() as u32 + 1;
         let settled = (0..steps).fold(state, |state, _| filter.advance(&state, command));
         // The rest is rounding: each step rounds the command's magnitude once, and a slow filter (w dt = 1e-4)
-        // accumulates
-        // the rounding errors of one time constant, 1/(w dt) steps.
+        // accumulates the rounding errors of one time constant, 1/(w dt) steps.
         let lasting = 2.0 * U * f64::from(command.abs()) * (1.0 + 2.0 / (f64::from(w) * f64::from(dt)));
         let left = 4e-10 * (20.0 / f64::from(w) + 4.0);
         prop_assert!(

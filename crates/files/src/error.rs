@@ -51,7 +51,7 @@ impl fmt::Display for Error {
             ),
             Error::Damaged { path, problem } => write!(
                 f,
-                "{}: damaged ({problem}), so nobody knows whose the folder is; choose another folder with --out, or \
+                "{}: damaged ({problem}), so the owner of the folder is unknown; choose another folder with --out, or \
                  replace what is in the way with --force",
                 path.display()
             ),

@@ -27,7 +27,7 @@ pub const USUAL_S: f32 = 5.0;
 pub const CARRIED_US: u64 = 500_000;
 /// Time at rest without being carried after which a vehicle has landed \[us\].
 pub const STILL_US: u64 = 1_000_000;
-/// The same time for a vehicle that was not seen to descend; after it the tracker is distrusted \[us\].
+/// Time at rest, not carried and without a descent before, after which the tracker is distrusted \[us\].
 pub const FROZEN_US: u64 = 500_000;
 /// Time of hovering after which an earlier descent no longer counts \[us\].
 pub const HOVER_US: u64 = 2_000_000;

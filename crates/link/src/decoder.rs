@@ -103,9 +103,8 @@ fn add(counter: &mut u32, count: u32) {
 /// Unsigned frames of a message that the direction carries, no longer than the message, with the right checksum.
 ///
 /// # Frames within frames
-/// Frames may contain other frames that are meant for somebody else: TUNNEL, FILE_TRANSFER_PROTOCOL, LOG_DATA. Nothing
-/// is
-/// delivered from within
+/// Frames may contain other frames that are addressed to other systems: TUNNEL, FILE_TRANSFER_PROTOCOL, LOG_DATA.
+/// Nothing is delivered from within
 ///
 /// 1. a frame with the right checksum, whatever follows it. The checksum can be verified for every message of MAVLink's
 ///    `common` dialect, carried or not, signed or not, of any length and to any target;
@@ -249,8 +248,7 @@ impl<M: Message> Decoder<M> {
     }
 
     /// The held bytes begin within sealed bytes, with what may be an incomplete frame that reaches beyond them. If the
-    /// frame
-    /// behind the sealed bytes is now complete and intact, there is no such frame.
+    /// frame behind the sealed bytes is now complete and intact, there is no such frame.
     fn behind_sealed(&self, held: &[u8]) -> Front<M> {
         let behind = held.get(self.sealed..).filter(|_| self.sealed > 0).unwrap_or_default();
         let header = behind.first_chunk().map(Header::read).filter(|header| header.frame_length() == behind.len());

@@ -41,7 +41,7 @@ pub enum Fault {
     Implausible,
     /// Understood, but not supported by this vehicle.
     Unsupported,
-    /// Addressed to somebody else.
+    /// Addressed to another system.
     Elsewhere,
 }
 

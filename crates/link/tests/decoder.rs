@@ -239,7 +239,7 @@ proptest! {
         }
     }
 
-    /// Of a stream of whole frames, the carried ones are delivered, each with its last byte or the first ones of the
+    /// In a stream of complete frames, the carried ones are delivered, each with its last byte or the first ones of the
     /// next frame, and nothing from within a frame.
     #[test]
     fn a_frame_within_a_frame_is_not_looked_at(top in prop::collection::vec(top_level(), 0..20)) {
@@ -383,7 +383,7 @@ fn gaps_between_sequence_numbers_are_counted() {
     assert_eq!(decode([sent[9].as_slice(), &foreign, &sent[10]]).1.lost, 0, "two senders");
 }
 
-/// TUNNEL, FILE_TRANSFER_PROTOCOL and LOG_DATA for somebody else that contain a request to disarm, whatever follows;
+/// TUNNEL, FILE_TRANSFER_PROTOCOL and LOG_DATA for another system that contain a request to disarm, whatever follows;
 /// the same in a frame of a message of no dialect, signed or damaged, if a frame follows.
 #[test]
 fn a_frame_that_carries_another_is_skipped_whole() {

@@ -144,7 +144,7 @@ fn two_commands_of_one_tick_are_answered_to_their_senders() {
     assert_eq!(listen(&mut bench, 1000), []);
 }
 
-/// Any command number, in either message, unless addressed to somebody else.
+/// Any command number, in either message, unless addressed to another system.
 #[test]
 fn every_number_is_answered_unless_meant_for_others() {
     let mut bench = Bench::new();

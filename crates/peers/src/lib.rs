@@ -1,6 +1,5 @@
 //! Established quadrotor controllers for comparison with AFBC, under the same constraints (no_std, no alloc, fixed
-//! size)
-//! and behind the same interface, [`FlightController`](afbc_control::FlightController).
+//! size) and behind the same interface, [`FlightController`](afbc_control::FlightController).
 //!
 //! | controller | description | source |
 //! |---|---|---|
@@ -29,11 +28,9 @@
 //! # Tuning
 //!
 //! Gains are plain structs, declared with their ranges. The tuner searches those marked `tuned`; the others describe
-//! the
-//! vehicle and its task (largest tilt, rotor lag). All sets given here are for the vehicle of the paper's Section IV
-//! with
-//! a rotor lag of 20 ms: `Gains::PAPER_VEHICLE` and those named after their source are hand-tuned, `Gains::TUNED` are
-//! by `sitl tune` (`docs/tuning.md`).
+//! the vehicle and its task (largest tilt, rotor lag). All sets given here are for the vehicle of the paper's Section
+//! IV with a rotor lag of 20 ms: `Gains::PAPER_VEHICLE` and those named after their source are hand-tuned,
+//! `Gains::TUNED` are by `sitl tune` (`docs/tuning.md`).
 //!
 //! ```
 //! use afbc_control::{FlightController, Screened, Settings};

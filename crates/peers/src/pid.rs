@@ -19,9 +19,8 @@
 //! controllers*, IFAC 1990.
 //!
 //! Differences from PX4: gains of the rate loop are in 1/s, because the moment is scaled by the inertia; the tilt
-//! follows
-//! the whole specific force, not gravity plus its horizontal part; tracking anti-windup also covers height; derivatives
-//! are those of [`crate::differentiator`]; the rate integrator is not slowed down at large errors.
+//! follows the whole specific force, not gravity plus its horizontal part; tracking anti-windup also covers height;
+//! derivatives are those of [`crate::differentiator`]; the rate integrator is not slowed down at large errors.
 
 use crate::attitude::{length, r_earth_body};
 use crate::body::{Body, Demand};

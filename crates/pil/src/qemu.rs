@@ -73,7 +73,7 @@ impl Qemu {
 
     /// Ends QEMU.
     pub(crate) fn kill(&mut self) {
-        // It may already have ended.
+        // QEMU may already have ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -4,7 +4,7 @@
 //! Both take gusts and changing parameters from an [`Environment`], and both are integrated by the classical
 //! fourth-order Runge-Kutta method with constant rotor speeds during a step.
 //!
-//! This is the paper's plant. [`Realism`] adds what it lacks, each part optional: rotors with lag, limits, delay,
+//! This is the paper's plant. [`Realism`] adds optional effects: rotors with lag, limits, delay,
 //! faults and a battery, drag, wind with gusts and turbulence, ground. [`Sensors`] measure the motion for a controller.
 //! Everything is reproducible from a seed.
 //!

@@ -115,7 +115,7 @@ impl Across {
         let q_dd = 0.25 * (1.0 - d2 * (1.0 - 2.0 * h + 2.0 * h * h));
         let l_dd = sqrt(q_dd);
         let l_xd = q_xd / l_dd;
-        // Of the order of h^3, so rounding may make it negative.
+        // The difference is of the order of h^3, so rounding may make it negative.
         let l_xx = sqrt((q_xx - l_xd * l_xd).max(0.0));
         Across { f: [[decay * (1.0 + h), decay * h], [-decay * h, decay * (1.0 - h)]], noise: [l_xx, l_xd, l_dd] }
     }

@@ -5,7 +5,7 @@
 pub enum Reading {
     /// Accelerations of 1.2 m/s2 and 1.2 rad/s2 that persist from their onset: the paper's claims hold.
     Persistent,
-    /// The same accelerations for one second each.
+    /// Accelerations as above, but for one second each.
     Pulses,
     /// Physical forces and moments that persist: 1.2 N m is 316 rad/s2 here, and the vehicle is lost.
     Forces,

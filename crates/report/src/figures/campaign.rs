@@ -69,8 +69,8 @@ pub(crate) fn draw(summary: &Summary) -> io::Result<Vec<Picture>> {
         ),
         figure(
             "success",
-            "Share of flights that were not lost, for each tenth of what was drawn. A bar: its 95 % interval; those of \
-             one tenth stand side by side."
+            "Share of flights that were not lost, for each tenth of the drawn values. Bars: 95 % intervals, side by side \
+             within a tenth."
                 .into(),
             spread.then(|| success(summary, &conditions)).transpose()?,
         ),

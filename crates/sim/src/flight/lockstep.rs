@@ -23,7 +23,7 @@ pub struct Lost {
 pub struct End {
     /// When and why the vehicle was lost, if it was.
     pub lost: Option<Lost>,
-    /// True if the observer ended it.
+    /// True if the observer ended the flight.
     pub interrupted: bool,
 }
 
@@ -31,7 +31,7 @@ pub struct End {
 /// on.
 ///
 /// # Errors
-/// That of the pilot.
+/// The pilot's error.
 // Always inlined: a flight has one loop, which includes its pilot's step.
 #[inline(always)]
 pub fn lockstep<P: Pilot>(
