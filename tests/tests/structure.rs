@@ -259,7 +259,7 @@ fn lines_are_at_most_120_columns_wide() {
 
 /// Decisions that go beyond the paper are marked "Not in the paper".
 #[test]
-fn no_comment_says_ours() {
+fn decisions_beyond_the_paper_have_one_marker() {
     let marker = concat!("Our", "s");
     for path in files(root()) {
         let text = fs::read_to_string(&path).unwrap();

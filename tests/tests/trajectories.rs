@@ -166,7 +166,7 @@ proptest! {
     }
 
     #[test]
-    fn a_step_is_a_step(
+    fn a_step_holds_one_pose_before_and_another_after(
         from_m in vector(10.0),
         to_m in vector(10.0),
         at_s in 0.1_f64..50.0,

@@ -122,7 +122,7 @@ proptest! {
     /// At a constant state the three steps around a trip, and those around engaging again, have the same inputs: AFBC's
     /// last, the fallback law's first; the fallback law's last, AFBC's first.
     #[test]
-    fn hand_over_is_bumpless_there_and_back(state in near(), setpoint in near(), lasting in 0_usize..300) {
+    fn hand_over_is_bumpless_in_both_directions(state in near(), setpoint in near(), lasting in 0_usize..300) {
         // Otherwise there is no error of roll to trip on.
         prop_assume!(state.rates_rad_s.x.abs() > 1e-3);
         let setpoint =

@@ -116,7 +116,7 @@ proptest! {
 
     /// With `NONE` it is Euler's step of (33), (34), bit for bit.
     #[test]
-    fn none_is_the_printed_law(
+    fn no_safeguards_give_the_printed_law(
         gains in gains_of_one(),
         e2 in error(),
         dt_s in 1e-4_f32..=0.02,

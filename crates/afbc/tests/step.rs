@@ -107,7 +107,7 @@ proptest! {
 
     /// While a state is implausible the step is that of the last plausible state, but without adaptation.
     #[test]
-    fn the_last_plausible_state_stands_in(
+    fn the_last_plausible_state_is_used_instead(
         good in state(plausible),
         bad in state(value),
         setpoint in setpoint(plausible),
@@ -132,7 +132,7 @@ proptest! {
     /// While a setpoint is implausible the last plausible one is used, with adaptation; before the first one, the
     /// vehicle holds its position.
     #[test]
-    fn the_last_plausible_setpoint_stands_in(
+    fn the_last_plausible_setpoint_is_used_instead(
         state in state(plausible),
         good in setpoint(plausible),
         bad in setpoint(value),
@@ -159,7 +159,7 @@ proptest! {
 
 /// Each field separately: NaN, infinite and slightly too large values are refused, the largest accepted value is not.
 #[test]
-fn every_single_field_is_watched() {
+fn every_field_is_checked_for_plausibility() {
     type SetState = fn(&mut State, f32);
     type SetSetpoint = fn(&mut Setpoint, f32);
     let states: [(SetState, f32); 12] = [

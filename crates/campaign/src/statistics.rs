@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn share_of_nothing_is_unknown() {
+    fn a_share_of_no_flights_is_unknown() {
         let share = Share::of(0, 0);
         assert!(share.value.is_nan());
         assert_eq!((share.low, share.high), (0.0, 1.0));

@@ -261,7 +261,7 @@ fn what_is_drawn_reaches_the_vehicle() {
 
 /// No file of a campaign is used with any bit flipped or any end cut off.
 #[test]
-fn no_damaged_file_is_believed() {
+fn damaged_files_are_refused() {
     let folder = folder("damaged");
     let campaign = parse(&SMALL.replace("flights = 150", "flights = 4").replace("= 6.0", "= 5.2"));
     let whole = folder.join("whole");
@@ -406,7 +406,7 @@ fn what_cannot_be_read_is_not_called_damaged() {
 }
 
 #[test]
-fn a_shard_is_every_so_manieth_flight() {
+fn a_shard_is_every_nth_flight() {
     for (flights, of) in [(1, 1), (150, 1), (150, 4), (16, 16), (17, 16), (31, 16), (100, 7)] {
         let mut seen = 0;
         for index in 1..=of {

@@ -301,7 +301,7 @@ proptest! {
 
     /// A single wrong stamp, in any direction, does not end the flight.
     #[test]
-    fn one_wrong_stamp_is_nothing(wrong in any::<u64>(), at in 200u64..400) {
+    fn a_single_wrong_stamp_is_tolerated(wrong in any::<u64>(), at in 200u64..400) {
         let (mut clock, mut worst_us) = (SourceClock::default(), 0);
         for n in 0..1000u64 {
             let (sent, arrived) = (HOUR_US + n * PERIOD_US, n * PERIOD_US + 500);

@@ -41,7 +41,7 @@ fn a_full_inbox_takes_the_request_to_kill_only() {
 }
 
 #[test]
-fn what_is_not_plausible_does_not_get_in() {
+fn implausible_values_do_not_enter_the_inbox() {
     let good = (Stamped { value: State::default(), at_us: 1 }, Stamped { value: Setpoint::default(), at_us: 1 });
     let mut inbox = Inbox::EMPTY;
     inbox.put_state(good.0);

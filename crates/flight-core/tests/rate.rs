@@ -99,7 +99,7 @@ proptest! {
     /// Healthy is exactly: a full second was counted with 997 to 1003 ticks, and every gap that ended within the last
     /// second was right.
     #[test]
-    fn healthy_is_rate_and_gaps(
+    fn health_depends_on_rate_and_gaps(
         stretches in prop::collection::vec(
             (prop_oneof![4 => Just(1000), 4 => 890u64..1110, 1 => 0u64..4000], 1..1500usize),
             1..8,
@@ -133,7 +133,7 @@ proptest! {
 
     /// One missing or additional tick anywhere in the last second prevents arming, and none before that second does.
     #[test]
-    fn one_gap_is_enough(
+    fn one_wrong_gap_is_enough_to_be_unhealthy(
         at in 0usize..2000,
         wrong in prop_oneof![0..u64::from(EARLY_US), u64::from(LATE_US) + 1..2600],
     ) {

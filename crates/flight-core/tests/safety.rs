@@ -129,7 +129,7 @@ fn a_vehicle_that_lies_is_disarmed() {
 }
 
 #[test]
-fn a_vehicle_that_leans_or_rights_itself_is_not() {
+fn a_vehicle_that_leans_or_rights_itself_is_not_disarmed() {
     let mut bench = Bench::flying();
     assert_eq!(bench.wait(20_000, rolled(1.2)), None);
     // On its back for a moment, then recovering for longer than a second.

@@ -297,7 +297,7 @@ fn a_state_that_comes_back_leads_the_descent_to_the_ground() {
 }
 
 #[test]
-fn states_that_are_stale_when_they_come_are_no_states() {
+fn states_that_arrive_stale_do_not_count() {
     let mut bench = Bench::airborne(State::default(), near());
     let mut modes = Vec::new();
     for _ in 0..400 {

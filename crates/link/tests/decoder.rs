@@ -161,7 +161,7 @@ proptest! {
 
     /// The same for bytes that often look like the start of a frame.
     #[test]
-    fn almost_frames_do_no_harm(
+    fn bytes_that_resemble_frames_do_no_harm(
         bytes in prop::collection::vec(
             prop_oneof![Just(0xFD), Just(0), Just(1), Just(84), Just(76), Just(75), any::<u8>()],
             0..2000,
@@ -173,7 +173,7 @@ proptest! {
 
     /// The result does not depend on how the stream is cut into pieces.
     #[test]
-    fn pieces_make_no_difference(
+    fn the_division_of_the_stream_makes_no_difference(
         messages in prop::collection::vec(messages(), 1..20),
         garbage in prop::collection::vec(any::<u8>(), 0..40),
         cuts in prop::collection::vec(1usize..300, 1..50),
@@ -257,7 +257,7 @@ proptest! {
 
     /// A frame that cannot be checked does not delay the next one, whatever its content.
     #[test]
-    fn a_stranger_holds_nothing_back((stranger, _) in top_level(), message in messages()) {
+    fn a_foreign_frame_does_not_delay_the_next((stranger, _) in top_level(), message in messages()) {
         let frame = frames(&[message]).concat();
         prop_assert_eq!(decode([stranger.as_slice(), &frame]).0.last().copied(), Some(message));
     }
@@ -411,7 +411,7 @@ fn a_frame_that_carries_another_is_skipped_whole() {
 
 /// Messages that this direction does not carry cost neither a frame nor time, and do not count as lost.
 #[test]
-fn a_stream_with_strangers_loses_nothing() {
+fn a_stream_with_foreign_frames_loses_no_message() {
     let mut decoder = Decoder::new(VEHICLE);
     let ours = Uplink::Setpoint(Setpoint::default());
     for round in 0..=u8::MAX {

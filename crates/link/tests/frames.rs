@@ -96,7 +96,7 @@ fn rotated_twice(state: &State) -> f32 {
 
 /// Found by the property below when its bound was an absolute number.
 #[test]
-fn a_fast_state_crosses() {
+fn a_fast_state_survives_the_link() {
     let state = State {
         velocity_m_s: Vector3::new(-18.270386, -17.043652, 18.831186),
         attitude_rad: Vector3::new(-0.48733982, -0.8878281, -2.867579),
@@ -112,7 +112,7 @@ proptest! {
 
     /// A state is converted to the wire and back with rounding errors only.
     #[test]
-    fn states_cross(
+    fn states_survive_the_link(
         position in prop::array::uniform3(-1e3f32..1e3),
         velocity in prop::array::uniform3(-20.0f32..20.0),
         attitude in (-3.1f32..3.1, -1.5f32..1.5, -3.1f32..3.1),

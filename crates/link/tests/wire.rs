@@ -384,7 +384,7 @@ proptest! {
 
     /// Every other message is read as it was written, except for the rounding of a state (`tests/frames.rs`).
     #[test]
-    fn messages_cross(
+    fn messages_survive_the_link(
         v in prop::array::uniform3(-1e3f32..1e3),
         w in prop::array::uniform3(-1e2f32..1e2),
         n: u32,

@@ -71,7 +71,7 @@ fn sorted(mut told: Vec<Told>) -> Vec<Told> {
 proptest! {
     /// Any commands of several stations, any number of them in one tick.
     #[test]
-    fn everyone_is_answered(
+    fn every_sender_is_answered(
         asked in prop::collection::vec(
             prop::collection::vec((commands(), prop::sample::select(STATIONS.as_slice())), 0..12),
             1..20,
@@ -146,7 +146,7 @@ fn two_commands_of_one_tick_are_answered_to_their_senders() {
 
 /// Any command number, in either message, unless addressed to another system.
 #[test]
-fn every_number_is_answered_unless_meant_for_others() {
+fn every_command_number_is_answered_unless_addressed_to_others() {
     let mut bench = Bench::new();
     for id in (0..=u16::MAX).step_by(7).filter(|id| ![400, 31_010].contains(id)) {
         let sent = Sender::new(STATION).send(&Uplink::Command(Command::Other(id)), &mut [0; FRAME_MAX]).to_vec();
@@ -256,7 +256,7 @@ fn requests_whose_tick_went_unreported_fail() {
 
 /// The largest possible output of a tick fits and is sent completely, as [`Bench::said`] checks.
 #[test]
-fn everything_at_once_fits() {
+fn the_largest_output_of_a_tick_is_sent_completely() {
     let mut bench = Bench::new();
     let (idle, _) = bench.tick(&State::default());
     let answer = afbc_flight_core::Answer { ticket: 1, request: Request::Arm, result: Err(Refusal::Unhealthy) };

@@ -108,7 +108,7 @@ proptest! {
     /// For any sequence of modes, each failsafe is reported once each time it begins; a heartbeat is critical if there
     /// was a failsafe since the previous one, and not if there was none for a second.
     #[test]
-    fn each_time_once(modes in prop::collection::vec(modes(), 1..12), tumbles: bool) {
+    fn each_failsafe_is_reported_once_each_time(modes in prop::collection::vec(modes(), 1..12), tumbles: bool) {
         let mut bench = Bench::new();
         let (idle, _) = bench.step();
         let (mut last, mut since, mut since_heartbeat) = (Mode::Disarmed, usize::MAX, false);

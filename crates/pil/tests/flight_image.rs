@@ -190,7 +190,7 @@ fn few_bytes_do_not_wake_the_link() {
 }
 
 #[test]
-fn it_has_a_log() {
+fn the_flight_image_has_a_log() {
     let Some((mut board, linked)) = start_or_skip(Image::Flight, |elf| Ok((Board::boot(&elf)?, Linked::read(&elf)?)))
     else {
         return;

@@ -85,7 +85,7 @@ fn a_vehicle_that_slides_stops_after_the_distance_that_friction_gives() {
 }
 
 #[test]
-fn the_ground_lets_go() {
+fn a_vehicle_lifts_off_the_ground() {
     let mut plant = plant(Model::RigidBody, at(C.foot_depth_m - C.sink_m));
     (0..1000).for_each(|_| plant.step(&RotorSpeeds(Vector4::repeat(230.0)), STEP_S));
     let lift = 4.0 * P.thrust_factor_n_s2 * 230.0_f64.powi(2) / P.mass_kg - P.gravity_m_s2;

@@ -230,7 +230,7 @@ proptest! {
 
     /// Zero drag changes nothing: with or without surroundings, the models' equations give the same bits.
     #[test]
-    fn drag_of_nothing_is_no_drag(
+    fn zero_drag_changes_nothing(
         velocity in vector(10.0),
         wind in vector(10.0),
         attitude in vector(3.0),

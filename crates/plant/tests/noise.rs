@@ -63,7 +63,7 @@ fn streams_and_seeds_are_independent_and_reproducible() {
 
 /// Flights are reproduced by seed, also by later versions: these bits must never change.
 #[test]
-fn numbers_stay_what_they_are() {
+fn random_numbers_never_change() {
     let mut noise = Noise::new(2026, Stream::Sensors);
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     for _ in 0..100_000 {

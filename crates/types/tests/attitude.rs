@@ -107,7 +107,7 @@ proptest! {
     /// A state converted to a quaternion and back is the same rotation, however close to a pitch of 90 degrees;
     /// everything else is unchanged.
     #[test]
-    fn states_come_back(
+    fn states_survive_a_round_trip(
         q in attitudes(),
         position in prop::array::uniform3(-1e5f32..1e5),
         velocity in prop::array::uniform3(-1e3f32..1e3),

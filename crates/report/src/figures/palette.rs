@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn a_color_hangs_on_the_name_alone_and_what_shares_one_is_numbered() {
+    fn a_color_depends_on_the_name_alone_and_shared_ones_are_numbered() {
         let names: Vec<String> = (0..40).map(|i| format!("contender {i}")).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let numbered: HashSet<_> = names.iter().zip(repeats(&names)).map(|(name, n)| (hex(color(name)), n)).collect();

@@ -169,7 +169,7 @@ fn table_fits_and_says_who_was_lost() {
 }
 
 #[test]
-fn odd_flights_have_figures_too() {
+fn unusual_flights_have_figures() {
     let calm = Scenario { name: "".into(), ..paper(Reading::Persistent, 0.1) };
     // Many events at once, under a name that needs escapes in files and markup.
     let gust = |axis, size| Gust { axis, kind: GustKind::Force, size, start_s: 1.0, end_s: 1.5 };
@@ -283,7 +283,7 @@ fn a_full_disk_says_free_some_space() {
 
 /// Earlier files of the command are removed, files of others stay.
 #[test]
-fn nothing_stale_stays_and_nothing_foreign_goes() {
+fn stale_files_are_removed_and_foreign_ones_kept() {
     let scratch = Scratch::new("stale");
     let [afbc, other] = ControllerKind::PAPER.map(|kind| fly(&paper(Reading::Persistent, 6.0), kind));
     write(&scratch.open(), &[afbc.clone(), other], &[]).unwrap();

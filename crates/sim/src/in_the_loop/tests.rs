@@ -23,7 +23,7 @@ fn fly_host(scenario: &Scenario) -> (LoopEnd, Metrics) {
 }
 
 #[test]
-fn the_link_in_between_changes_nothing_that_matters() {
+fn the_link_hardly_changes_the_metrics() {
     let scenario = scenario("paper", 60.0);
     let (end, looped) = fly_host(&scenario);
     assert_eq!(end, LoopEnd { lost: None, interrupted: false, disarmed: true });
