@@ -207,8 +207,7 @@ proptest! {
     }
 
     /// Four rotors: roll and pitch in full if any forces within limits give them (found by trying all thrusts and
-    /// yaws);
-    /// then thrust as close as possible; yaw never reversed, and in full if there is room.
+    /// yaws); then thrust as close as possible; yaw never reversed, and in full if there is room.
     #[test]
     fn roll_and_pitch_come_first_then_thrust_then_yaw(
         frame in prop::sample::select(vec![PLUS, cross()]),
@@ -292,8 +291,7 @@ proptest! {
         let got = mixer.allocate(&inputs(asked));
         check(&mixer, limit, &inputs(asked), &got)?;
         // Forces are rounded at the scale of the largest intermediate value, at most 8 N times four entries of the
-        // inverse;
-        // yaw's share by that over the yaw forces.
+        // inverse; yaw's share by that over the yaw forces.
         for (got, wanted) in got.forces.0.iter().zip(&forces) {
             prop_assert!(
                 (f64::from(*got) - wanted).abs() <= 1e-4 * (1.0 + limit_n),

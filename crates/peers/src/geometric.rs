@@ -30,8 +30,7 @@
 //!   and dOmega_d/dt follows with one more derivative of s and psi_d. Products of rates are neglected: at 1 rad/s they
 //!   are 1 rad/s2, while k_R e_R is tens.
 //! * **Heading**: b1 is perpendicular to y_C, so that the yaw of R_d is exactly psi_d. The paper projects a freely
-//!   chosen
-//!   direction; this is one choice of it.
+//!   chosen direction; this is one choice of it.
 //! * **Limits**: the paper assumes that s never vanishes and that rotor forces are unlimited; here [`Limits`] bounds s.
 //! * **Integrals**: the position integral is of e_x alone, because the integral of e_v, which the source adds, is e_x
 //!   and thus part of k_x. In the attitude integral, c = k_R / k_Omega. The integrals are bounded by

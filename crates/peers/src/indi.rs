@@ -27,12 +27,10 @@
 //!   at hover. Its input is the command after rotor limits, so it cannot wind up.
 //! * **Not adaptive**: G is nominal. A true effectiveness of k times the nominal raises the loop gain by the factor k.
 //! * **Neglected**: the moment that accelerates the propellers (G2 of the 2016 paper), which this project's plant
-//!   models
-//!   do not have.
+//!   models do not have.
 //! * **The attitude error** is tilt-prioritised, as in [`crate::pid`].
 //! * **On the ground**, the increments find no acceleration to match: thrust rises, within Limits, until the vehicle
-//!   lifts
-//!   off or the setpoint lies below it. Do not step while disarmed.
+//!   lifts off or the setpoint lies below it. Do not step while disarmed.
 
 use crate::attitude::{r_earth_body, unit};
 use crate::body::{Body, Demand};

@@ -69,8 +69,8 @@ pub(crate) fn draw(summary: &Summary) -> io::Result<Vec<Picture>> {
         ),
         figure(
             "success",
-            "Share of flights that were not lost, for each tenth of the drawn values. Bars: 95 % intervals, side by side \
-             within a tenth."
+            "Share of flights that were not lost, for each tenth of the drawn values. Bars: 95 % intervals, side by \
+             side within a tenth."
                 .into(),
             spread.then(|| success(summary, &conditions)).transpose()?,
         ),

@@ -1,4 +1,4 @@
-//! Every entry of the list is of one piece.
+//! Consistency of every entry in the list of laws.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use super::{ControllerKind, Law};
@@ -16,7 +16,7 @@ fn names_and_prefixes_are_unique() {
     assert_eq!(all.map(ControllerKind::prefix).into_iter().collect::<BTreeSet<_>>().len(), all.len());
 }
 
-/// The gains of a law in the cascade are in a group for each axis, those of the others in none.
+/// Gains of laws in the cascade are in one group per axis, those of the others in no group.
 #[test]
 fn each_law_has_gains_that_fly_the_papers_vehicle() {
     let vehicle = Parameters::PAPER.to_f32();
