@@ -2,6 +2,7 @@
 //! [`image!`](crate::image), the only place where firmware and board meet.
 
 use crate::control::Tick;
+use crate::vehicle::ROTORS;
 use embassy_executor::SendSpawner;
 
 /// A board: motors, watchdog and health.
@@ -10,6 +11,8 @@ pub trait Board: Sized + 'static {
     type Receiver: Receiver + 'static;
     /// Sending side of the link.
     type Transmitter: Transmitter + 'static;
+    /// Most motors that it drives.
+    const OUTPUTS: usize;
 
     /// Brings up clocks and peripherals; the core runs at [`CORE_HZ`](crate::time::CORE_HZ) from then on. To be called
     /// once. A board's task spawned on `control` runs right after the control tick.
@@ -25,7 +28,7 @@ pub trait Board: Sized + 'static {
     fn task_has_failed(&self) -> bool;
 
     /// Outputs throttles to the motors: 0, or 48 to 2047.
-    fn drive(&mut self, throttles: [u16; 4]);
+    fn drive(&mut self, throttles: [u16; ROTORS]);
 
     /// Feeds the watchdog.
     fn feed_watchdog(&mut self);
@@ -48,6 +51,11 @@ pub trait Transmitter {
 #[macro_export]
 macro_rules! image {
     ($board:ty) => {
+        const _: () = assert!(
+            $crate::vehicle::ROTORS <= <$board as $crate::board::Board>::OUTPUTS,
+            "the vehicle has more rotors than this board has outputs for motors; choose another VEHICLE"
+        );
+
         #[embassy_executor::task]
         async fn control(mut flight: $crate::control::Flight, mut board: $board) -> ! {
             $crate::control::run(&mut flight, &mut board).await

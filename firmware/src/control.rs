@@ -2,9 +2,8 @@
 
 use crate::board::Board;
 use crate::time::{self, Stopwatch};
+use crate::vehicle::{CONFIGURATION, ROTORS};
 use afbc_flight_core::Inbox;
-pub use afbc_onboard::Flight;
-use afbc_onboard::Report;
 use core::cell::RefCell;
 use core::future::poll_fn;
 use core::pin::pin;
@@ -15,6 +14,11 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Instant, Timer};
 use heapless::Deque;
+
+/// The vehicle under its law.
+pub type Flight = afbc_onboard::Flight<ROTORS>;
+/// What one of its ticks decided.
+pub type Report = afbc_onboard::Report<ROTORS>;
 
 /// Newest inputs, written by [`crate::comms`].
 static INBOX: Mutex<CriticalSectionRawMutex, RefCell<Inbox>> = Mutex::new(RefCell::new(Inbox::EMPTY));
@@ -65,7 +69,7 @@ pub fn with_inbox(change: impl FnOnce(&mut Inbox)) {
 /// # Panics
 /// If one of its parameters is out of range.
 pub fn flight() -> Flight {
-    let Ok(flight) = Flight::new() else { panic!("a parameter of the vehicle is out of range") };
+    let Ok(flight) = Flight::new(&CONFIGURATION) else { panic!("a parameter of the vehicle is out of range") };
     flight
 }
 

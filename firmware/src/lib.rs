@@ -31,6 +31,7 @@ pub mod control;
 pub mod executors;
 pub mod housekeeping;
 pub mod time;
+pub mod vehicle;
 
 use board::Board;
 use embassy_executor::SendSpawner;

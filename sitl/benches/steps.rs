@@ -30,7 +30,7 @@ fn paper(model: Model) -> Scenario {
 }
 
 /// Inputs and outputs of a controller at every 60th step of the paper's flight.
-fn recorded(model: Model, kind: ControllerKind) -> Vec<(State, Setpoint, RotorSpeeds)> {
+fn recorded(model: Model, kind: ControllerKind) -> Vec<(State, Setpoint, RotorSpeeds<8>)> {
     let (mut steps, mut index) = (Vec::new(), 0_usize);
     fly(&paper(model), &Contender::of(kind, Profile::Paper), |sample| {
         if index.is_multiple_of(60) {

@@ -162,7 +162,7 @@ const BAD_TABLES: [(&str, &str); 69] = [
     ("[[rotor_fault]]\nrotor = 5", ":5: rotor_fault.rotor: 5 is out of range: it must lie within 1 to 4"),
     (
         "[[rotor_fault]]\nrotor = 1.5\nefficiency = 1\nstart_s = 0",
-        ":5: rotor_fault.rotor: 1.5 is no rotor; it must be 1, 2, 3 or 4",
+        ":5: rotor_fault.rotor: 1.5 is no rotor; it must be a whole number, 1 to 4",
     ),
     (
         "[battery]\nfull_v = 9",
@@ -441,7 +441,10 @@ fn every_built_in_scenario_is_listed_checked_and_a_template() {
     let folder = folder("built_in");
     let list = stdout(&sitl(&folder, &["scenarios"]));
     let names: Vec<_> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
-    assert_eq!(names, ["paper", "hover", "step", "circle", "lissajous", "waypoints", "delivery", "hardware", "storm"]);
+    assert_eq!(
+        names,
+        ["paper", "hover", "step", "circle", "lissajous", "waypoints", "wind", "delivery", "hardware", "storm"]
+    );
     for name in names {
         let file = sitl(&folder, &["scenarios", name]);
         fs::write(folder.join("copy.toml"), &file.stdout).unwrap();

@@ -39,8 +39,8 @@ fn numbers(sample: &Sample) -> impl Iterator<Item = u64> {
         .chain(t.virtual_m_s2)
         .chain(t.desired_rad)
         .chain(t.filtered.into_iter().flat_map(|f| [f.angle, f.rate]))
-        .chain(<[f32; 4]>::from(a.speeds.0))
-        .chain(<[f32; 4]>::from(a.forces.0))
+        .chain(<[f32; 8]>::from(a.speeds.0))
+        .chain(<[f32; 8]>::from(a.forces.0))
         .chain(learnt);
     let wide: Vec<u64> = wide.map(f64::to_bits).collect();
     let narrow: Vec<u64> = narrow.map(|x| u64::from(x.to_bits())).collect();

@@ -222,7 +222,7 @@ const INPUTS: [&str; 4] = ["u1_n", "u2_n", "u3_n", "u4_n"];
 
 /// A mixer for rotors of 20 N, with which no row saturates.
 fn mixer() -> Mixer {
-    Mixer::new(&Parameters::PAPER.to_f32(), 20.0).unwrap()
+    Mixer::new(Parameters::PAPER.to_f32(), 20.0).unwrap()
 }
 
 #[test]
@@ -236,7 +236,7 @@ fn mixer_agrees_from_speeds_to_inputs_in_every_row() {
         for ((got, column), expected) in forces.0.iter().zip(FORCES).zip(row.all(FORCES)) {
             assert_within(&row, column, *got, 5.0 * U * expected);
         }
-        let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = Mixer::inputs(&forces);
+        let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = mixer().inputs(&forces);
         // Sums of at most four forces: 3 more roundings, each of at most their total.
         for (got, column) in [roll_n, pitch_n, yaw_n, thrust_n].into_iter().zip(INPUTS) {
             assert_within(&row, column, got, 8.0 * U * row.get("u4_n"));

@@ -415,9 +415,9 @@ fn fly(case: &Case) -> Seen {
                 seen.violations.push(format!("{what} at {now_ms} ms"));
             }
         };
-        let stopped = report.throttles == [0; 4] && report.motors == RotorSpeeds::default();
+        let stopped = report.throttles == [0; 8] && report.motors == RotorSpeeds::default();
         never("motors turn while disarmed", !report.mode.armed() && !stopped);
-        never("motors stop while armed", report.mode.armed() && report.throttles.contains(&0));
+        never("motors stop while armed", report.mode.armed() && report.throttles[..4].contains(&0));
         never(
             "the station hears of motors that turn while disarmed",
             !station.heard().armed && station.heard().speeds != RotorSpeeds::default(),

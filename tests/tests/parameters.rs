@@ -9,9 +9,10 @@ use afbc::monitor::Bounds;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Curve;
 use afbc_plant::{Battery, Contact, Deviations, Drag, Dropouts, GroundEffect, Rotors, Sensing, Turbulence, Wind};
+use afbc_reader::words::number;
 use afbc_sim::contender::{ControllerKind, Law};
-use afbc_sim::reader::words::number;
 use afbc_types::{Declaration, Declared, OutOfRange, Parameters, Value};
+use afbc_vehicles::Imu;
 use core::convert::Infallible;
 use core::fmt::Write;
 use std::collections::{BTreeMap, BTreeSet};
@@ -107,7 +108,8 @@ fn gains(kind: ControllerKind) -> Group {
 fn groups() -> Vec<Group> {
     let mut groups = vec![
         group("Vehicle: `[vehicle]`, `[truth]`", "V_", Parameters::DEFAULT),
-        group("Motors", "MOT_", Curve::DEFAULT),
+        group("Motors: `[motor]` of a vehicle file", "MOT_", Curve::DEFAULT),
+        group("Inertial sensor: `[imu]` of a vehicle file", "IMU_", Imu::DEFAULT),
         group("Arming", "ARM_", ArmingLimits::DEFAULT),
         profiles("Control: `[settings]`, `[limits]`", "C_", Profile::settings),
         profiles("AFBC's monitor", "M_", bounds),

@@ -4,7 +4,7 @@
 
 use afbc_plant::Model;
 use afbc_sim::case::Case;
-use afbc_sim::in_the_loop::{LoopEnd, Pace, Station, fly};
+use afbc_sim::in_the_loop::{Host, LoopEnd, Pace, Station, fly};
 use afbc_sim::paper::scenario;
 use core::ops::ControlFlow;
 use pil::budget::TICK_INSTRUCTIONS_MAX;
@@ -28,7 +28,7 @@ fn emulator_or_skip() -> Option<Emulator> {
 #[test]
 fn the_papers_flight_is_the_hosts_bit_for_bit() {
     let Some(emulator) = emulator_or_skip() else { return };
-    let mut twins = Twins::new(emulator).expect("in range");
+    let mut twins = Twins::new(emulator, Host::new().expect("in range"));
     let paper = scenario(Model::Simplified, Case::DEFAULT).expect("in range");
     let end = fly(&paper, &mut Station::new(), &mut twins, Pace::LOCKSTEP, |_| ControlFlow::Continue(()));
     assert_eq!(end.expect("flown"), LoopEnd { lost: None, interrupted: false, disarmed: true });

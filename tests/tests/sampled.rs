@@ -43,13 +43,17 @@ struct OnTracker<'a> {
 impl Task for OnTracker<'_> {
     type Output = (f64, bool);
 
-    fn with<C: FlightController>(self, controller: C) -> Result<(f64, bool), OutOfRange> {
+    fn with<C: FlightController<N>, const N: usize>(self, controller: C) -> Result<(f64, bool), OutOfRange> {
         Ok(fly(self.scenario, controller, self.tracker))
     }
 }
 
 /// Returns the root mean square distance from the reference from 5 s on \[m\], and whether the flight was completed.
-fn fly<C: FlightController>(scenario: &Scenario, controller: C, mut tracker: Tracker) -> (f64, bool) {
+fn fly<C: FlightController<N>, const N: usize>(
+    scenario: &Scenario,
+    controller: C,
+    mut tracker: Tracker,
+) -> (f64, bool) {
     let vehicle = Vehicle::new(scenario.vehicle.to_f32(), ArmingLimits::NONE, controller).unwrap();
     let (mut memory, mut inbox) = (VehicleMemory::default(), Inbox::default());
     let mut plant = scenario.plant(0.001).unwrap();
@@ -79,7 +83,7 @@ fn fly<C: FlightController>(scenario: &Scenario, controller: C, mut tracker: Tra
 
 fn flown(scenario: &Scenario, kind: ControllerKind, tracker: Tracker) -> (f64, bool) {
     let contender = Contender::of(kind, Profile::Flight).monitored();
-    contender.build(scenario.vehicle.to_f32(), OnTracker { scenario, tracker }).unwrap()
+    contender.build(&scenario.vehicle, &scenario.rotors, OnTracker { scenario, tracker }).unwrap()
 }
 
 /// Nearly as accurate as with a state every millisecond, due to extrapolation. Without it PID and AFBC lose the

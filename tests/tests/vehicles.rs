@@ -30,7 +30,7 @@ fn hovers(kind: ControllerKind, vehicle: Parameters<f64>, margin: f64) -> Result
     let settings = Profile::Flight.settings().with_rotor_force_max_n(force_max_n as f32);
     let mut contender = Contender::of(kind, Profile::Flight).for_vehicle(&vehicle).monitored();
     contender.settings = settings;
-    contender.check(vehicle.to_f32()).map_err(|error| error.to_string())?;
+    contender.check(&vehicle, &scenario.rotors).map_err(|error| error.to_string())?;
     let (mut distance_m, mut trip) = (f64::NAN, None);
     let lost = fly(&scenario, &contender, |sample| {
         distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
@@ -111,7 +111,7 @@ fn a_perfect_hover_does_not_trip() {
     for mass_kg in [0.3, 0.486, 0.8, 0.97, 1.3, 2.0, 3.5] {
         let vehicle = Parameters { mass_kg, ..Parameters::PAPER.to_f32() };
         let settings = Profile::Flight.settings().with_rotor_force_max_n(mass_kg * 6.0);
-        let gains = Profile::Flight.gains_for(&vehicle);
+        let gains = Profile::Flight.gains_for(&vehicle, afbc::LAG_S);
         let guarded = Guarded::new(vehicle, settings, gains, afbc::monitor::Bounds::new(&gains, &vehicle)).unwrap();
         let mut memory = afbc_control::Screened::default();
         for _ in 0..5_000 {

@@ -3,8 +3,10 @@
 //!
 //! Two FIFOs, little-endian. `to_firmware`: a u32 length and that many bytes, which reach the link before the next
 //! control tick. `from_firmware`, for each of these: the tick's time \[us\] as u64; its core cycles, the deepest stack
-//! \[bytes\] and a length as u32; four throttles as u16; and as many bytes as the length says.
+//! \[bytes\] and a length as u32; eight throttles as u16, 0 where there is no motor; and as many bytes as the length
+//! says.
 
+use afbc_types::ROTORS_MAX;
 use core::cell::Cell;
 use embassy_executor::SendSpawner;
 use embassy_sync::blocking_mutex::Mutex;
@@ -13,6 +15,7 @@ use embassy_sync::pipe::Pipe;
 use firmware::board::{self, Board};
 use firmware::control::Tick;
 use firmware::housekeeping;
+use firmware::vehicle::ROTORS;
 use semihosting::fs::File;
 use semihosting::io::{Read, Write};
 use semihosting::process::exit;
@@ -21,7 +24,7 @@ use semihosting::process::exit;
 static LINK: Pipe<CriticalSectionRawMutex, 4096> = Pipe::new();
 
 /// Throttles of the last tick.
-static THROTTLES: Mutex<CriticalSectionRawMutex, Cell<[u16; 4]>> = Mutex::new(Cell::new([0; 4]));
+static THROTTLES: Mutex<CriticalSectionRawMutex, Cell<[u16; ROTORS_MAX]>> = Mutex::new(Cell::new([0; ROTORS_MAX]));
 
 /// The board.
 pub(crate) struct Emulated;
@@ -29,6 +32,7 @@ pub(crate) struct Emulated;
 impl Board for Emulated {
     type Receiver = Receiver;
     type Transmitter = Transmitter;
+    const OUTPUTS: usize = ROTORS_MAX;
 
     /// Opens the FIFOs and waits for the first tick's bytes.
     fn start(_control: SendSpawner) -> (Self, Receiver, Transmitter) {
@@ -57,8 +61,10 @@ impl Board for Emulated {
     }
 
     /// Stores the throttles for the reply.
-    fn drive(&mut self, throttles: [u16; 4]) {
-        THROTTLES.lock(|cell| cell.set(throttles));
+    fn drive(&mut self, throttles: [u16; ROTORS]) {
+        let mut all = [0; ROTORS_MAX];
+        all.iter_mut().zip(throttles).for_each(|(to, from)| *to = from);
+        THROTTLES.lock(|cell| cell.set(all));
     }
 
     /// There is no watchdog.
@@ -83,7 +89,7 @@ pub(crate) struct Transmitter {
 impl board::Transmitter for Transmitter {
     /// Sends the reply, and waits for the next tick's bytes.
     fn transmit(&mut self, tick: &Tick, bytes: &[u8]) {
-        let mut head = [0; 28];
+        let mut head = [0; 36];
         let words = [tick.cycles, housekeeping::stack_bytes(), bytes.len() as u32];
         let fields = tick.report.time_us.to_le_bytes().into_iter();
         let fields = fields.chain(words.into_iter().flat_map(u32::to_le_bytes));

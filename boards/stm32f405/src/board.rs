@@ -33,8 +33,11 @@ use embedded_io_async::{BufRead, Write};
 use firmware::board::{self, Board};
 use firmware::control::Tick;
 use firmware::executors::priority;
+use firmware::vehicle::ROTORS;
 use static_cell::StaticCell;
 
+/// Motors: the channels of one timer.
+const OUTPUTS: usize = 4;
 /// Bits per second of the link.
 const BAUD: u32 = 921_600;
 /// Bytes that wake the reader \[0.35 ms of a busy line\]. Fewer wake it when the line becomes idle, as after a message,
@@ -59,7 +62,7 @@ static RX: StaticCell<[u8; 1024]> = StaticCell::new();
 static TX: StaticCell<[u8; 1024]> = StaticCell::new();
 
 /// Newest throttles, for the motors' task.
-static THROTTLES: Signal<CriticalSectionRawMutex, [u16; 4]> = Signal::new();
+static THROTTLES: Signal<CriticalSectionRawMutex, [u16; OUTPUTS]> = Signal::new();
 
 /// The board after start-up.
 pub(crate) struct Stm32f405 {
@@ -69,6 +72,7 @@ pub(crate) struct Stm32f405 {
 impl Board for Stm32f405 {
     type Receiver = Receiver;
     type Transmitter = Transmitter;
+    const OUTPUTS: usize = OUTPUTS;
 
     fn start(control: SendSpawner) -> (Self, Receiver, Transmitter) {
         let p = clocks::start();
@@ -95,7 +99,7 @@ impl Board for Stm32f405 {
             pwm,
             dma: p.DMA2_CH1,
             timing: Timing::new(MOTOR_TIMER_HZ).expect("the timer's clock is within its range"),
-            rows: Rows([[0; 4]; 17]),
+            rows: Rows([[0; OUTPUTS]; 17]),
         };
         interrupt::DMA2_STREAM1.set_priority(priority::MOTOR_DMA);
         control.spawn(self::motors(motors).expect("spawned once"));
@@ -122,8 +126,11 @@ impl Board for Stm32f405 {
         TASK_FAILED.load(Ordering::Relaxed)
     }
 
-    fn drive(&mut self, throttles: [u16; 4]) {
-        THROTTLES.signal(throttles);
+    fn drive(&mut self, throttles: [u16; ROTORS]) {
+        // An output without a motor stays at 0.
+        let mut outputs = [0; OUTPUTS];
+        outputs.iter_mut().zip(throttles).for_each(|(output, throttle)| *output = throttle);
+        THROTTLES.signal(outputs);
     }
 
     fn feed_watchdog(&mut self) {
@@ -134,7 +141,7 @@ impl Board for Stm32f405 {
 /// The motors' waveform, with a row for each bit and a column for each motor. A DMA burst of four columns must not
 /// cross 1 KiB.
 #[repr(align(8))]
-struct Rows([[u16; 4]; 17]);
+struct Rows([[u16; OUTPUTS]; 17]);
 
 /// DSHOT600 on TIM8, channels 1 to 4, sent by DMA.
 struct Motors {
@@ -146,7 +153,7 @@ struct Motors {
 
 impl Motors {
     /// Sends one frame to each motor; takes 28 us.
-    async fn send(&mut self, throttles: [u16; 4]) {
+    async fn send(&mut self, throttles: [u16; OUTPUTS]) {
         encode(&self.timing, throttles, &mut self.rows);
         let rows = self.rows.0.as_flattened();
         let dma = self.dma.reborrow();
@@ -162,7 +169,7 @@ impl Motors {
 
 /// Encodes a frame for each motor. Out of line, like the control tick, to be counted.
 #[inline(never)]
-fn encode(timing: &Timing, throttles: [u16; 4], rows: &mut Rows) {
+fn encode(timing: &Timing, throttles: [u16; OUTPUTS], rows: &mut Rows) {
     timing.rows(throttles, &mut rows.0);
 }
 

@@ -6,7 +6,7 @@ use afbc_types::{OutOfRange, Parameters, Setpoint, State};
 
 fn main() -> Result<(), OutOfRange> {
     let vehicle = Parameters::PAPER.to_f32();
-    let law = Adaptive::new(Profile::Flight.gains_for(&vehicle))?;
+    let law = Adaptive::new(Profile::Flight.gains_for(&vehicle, afbc::LAG_S))?;
     let controller = Controller::new(vehicle, Profile::Flight.settings(), law)?;
     let mut memory = Screened::default();
     let mut setpoint = Setpoint::default();

@@ -54,6 +54,22 @@ impl Gains {
             ..*self
         }
     }
+
+    /// The gains of a subsystem that may take `slowness` times as long: every gain by its power of time, so that errors
+    /// have the same course, only slower. What bounds disturbances stays, for those do not slow down, and with them
+    /// u_r.
+    pub fn slowed(&self, slowness: f32) -> Self {
+        let Gains { backstepping: backstepping::Gains { alpha1, alpha2 }, gamma, eta, epsilon, safeguards, .. } = *self;
+        let square = slowness * slowness;
+        Gains {
+            backstepping: backstepping::Gains { alpha1: alpha1 / slowness, alpha2: alpha2 / slowness },
+            gamma: gamma / square,
+            eta: eta / square,
+            epsilon: epsilon * slowness,
+            safeguards: Safeguards { sigma: safeguards.sigma / slowness, ..safeguards },
+            ..*self
+        }
+    }
 }
 
 /// Derivatives of an [`Estimate`]; that of Theta_hat, gamma e_2 w(x), in factors.
@@ -232,6 +248,9 @@ impl Adaptive {
 }
 
 impl Law for Adaptive {
+    /// What rotors do to a body that turns is part of what is learnt.
+    const USES_ROTOR_RESIDUAL: bool = false;
+
     type Estimate = Estimate;
 
     #[inline(always)]

@@ -7,7 +7,7 @@ use crate::standstill::Standstill;
 use afbc_control::command_filter::{BANDWIDTH, CommandFilter, Filtered};
 use afbc_control::mixer::{Allocation, Mixer};
 use afbc_control::{Action, Errors, Estimate, FlightController, Trace, math};
-use afbc_types::{Axis, Declared, Inputs, OutOfRange, Parameters, PerAxis, Setpoint, State, parameters};
+use afbc_types::{Airframe, Axis, Declared, Inputs, OutOfRange, Parameters, PerAxis, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
 /// Smallest vertical thrust over weight that the tilt is computed with, since a sinking vehicle must not tilt further.
@@ -61,9 +61,9 @@ impl Settings {
 
 /// A controller. Constant; everything that changes in flight is in [`Cascade`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Controller<L> {
+pub struct Controller<L, const N: usize = 4> {
     law: L,
-    mixer: Mixer,
+    mixer: Mixer<N>,
     filter: CommandFilter,
     settings: Settings,
     weight_n: f32,
@@ -103,9 +103,9 @@ pub struct Cascade<E> {
 }
 
 impl<E> Cascade<E> {
-    /// Returns the memory with the estimates of another law.
-    pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>) -> Cascade<F> {
-        let Cascade { errors, inputs, desired, unallocated, standstill, rotor_residual_rad_s, .. } = *self;
+    /// Returns the memory with the estimates of another law, which starts with this rotor residual.
+    pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>, rotor_residual_rad_s: f32) -> Cascade<F> {
+        let Cascade { errors, inputs, desired, unallocated, standstill, .. } = *self;
         Cascade { estimates, errors, inputs, desired, unallocated, standstill, rotor_residual_rad_s }
     }
 
@@ -134,13 +134,16 @@ pub fn desired_attitude(u5: f32, u6: f32, yaw_rad: f32, inverse_vertical: f32) -
     [math::atan(tan_phi), math::atan(tan_theta)]
 }
 
-impl<L: Law> Controller<L> {
+impl<L: Law, const N: usize> Controller<L, N> {
     /// Creates a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
     /// The first parameter or setting out of range.
-    pub fn new(vehicle: Parameters, settings: Settings, law: L) -> Result<Self, OutOfRange> {
+    pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, law: L) -> Result<Self, OutOfRange> {
         settings.validate()?;
+        let vehicle = vehicle.into();
+        let mixer = Mixer::new(vehicle, settings.common.rotor_force_max_n)?;
+        let Parameters { gravity_m_s2, .. } = vehicle.parameters;
         let Limits { speed_max_m_s, climb_max_m_s, .. } = settings.limits;
         let error_max = |axis, speed| speed / law.alpha1(axis);
         Ok(Controller {
@@ -150,15 +153,15 @@ impl<L: Law> Controller<L> {
                 error_max(Axis::Z, climb_max_m_s),
             ),
             law,
-            mixer: Mixer::new(&vehicle, settings.common.rotor_force_max_n)?,
             filter: CommandFilter::new(settings.command_filter_rad_s, settings.common.dt_s)?
                 .limited(settings.limits.tilt_rate_max_rad_s)?,
             settings,
-            weight_n: vehicle.mass_kg * vehicle.gravity_m_s2,
-            gravity_m_s2: vehicle.gravity_m_s2,
-            inverse_gravity: 1.0 / vehicle.gravity_m_s2,
+            weight_n: vehicle.parameters.weight_n(),
+            gravity_m_s2,
+            inverse_gravity: 1.0 / gravity_m_s2,
             tilt_max_tan: math::tan(settings.limits.tilt_max_rad),
-            thrust_max_n: 4.0 * settings.common.rotor_force_max_n,
+            thrust_max_n: mixer.thrust_max_n(),
+            mixer,
         })
     }
 
@@ -195,7 +198,7 @@ impl<L: Law> Controller<L> {
         state: &State,
         setpoint: &Setpoint,
         fresh: bool,
-    ) -> Action {
+    ) -> Action<N> {
         if memory.desired.is_none() && self.settings.bumpless {
             self.law.start(&mut memory.estimates, self.weight_n);
         }
@@ -272,14 +275,17 @@ impl<L: Law> Controller<L> {
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3, thrust_n: u4 };
         // Moments would increase the thrust and tip over a standing vehicle.
         let asked = if stands { Inputs { thrust_n: u4, ..Inputs::default() } } else { inputs };
-        let Allocation { forces, unallocated, saturated, .. } = self.mixer.allocate(&asked);
-        let speeds = self.mixer.speeds(&forces);
+        let allocation = self.mixer.allocate(&asked);
+        let action = self.mixer.carry_out(&allocation);
 
         memory.inputs = PerAxis { roll: u1, pitch: u2, yaw: u3, z: u4, x: u5, y: u6 };
         memory.desired = Some(Desired { rad: desired_rad, filtered });
         memory.standstill.advance(u4, self.weight_n, &state.velocity_m_s, self.settings.common.dt_s);
-        memory.rotor_residual_rad_s = speeds.residual_rad_s();
+        if L::USES_ROTOR_RESIDUAL {
+            memory.rotor_residual_rad_s = self.mixer.residual_rad_s(&action.speeds);
+        }
         if self.settings.anti_windup {
+            let Allocation { unallocated, .. } = allocation;
             memory.unallocated = PerAxis {
                 roll: unallocated.roll_n,
                 pitch: unallocated.pitch_n,
@@ -289,23 +295,23 @@ impl<L: Law> Controller<L> {
                 y: u6 - a6,
             };
         }
-        Action::new(speeds, forces, saturated)
+        action
     }
 }
 
-impl<L: Law> FlightController for Controller<L> {
+impl<L: Law, const N: usize> FlightController<N> for Controller<L, N> {
     type Memory = Cascade<L::Estimate>;
 
     fn dt_s(&self) -> f32 {
         self.settings.common.dt_s
     }
 
-    fn mixer(&self) -> &Mixer {
+    fn mixer(&self) -> &Mixer<N> {
         &self.mixer
     }
 
     #[inline(always)]
-    fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
+    fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
         self.cascade(memory, state, setpoint, fresh)
     }
 

@@ -7,8 +7,8 @@ use crate::integral::{Integral, IntegralBackstepping};
 use crate::model::Model;
 use crate::monitor::{Bounds, Figures, Monitor};
 use crate::safeguards::Safeguards;
-use afbc_control::{Action, Estimate, FlightController, Mixer, Trace, Trip, math};
-use afbc_types::{Axis, OutOfRange, Parameters, PerAxis, Range, Setpoint, State};
+use afbc_control::{Action, Estimate, FlightController, Mixer, Trace, Trip};
+use afbc_types::{Airframe, Axis, OutOfRange, PerAxis, Range, Setpoint, State};
 use nalgebra::Vector3;
 
 /// Smallest Theta_max of z, in weights: nine rules that each hold the weight give |Theta_hat| = 3 weights, and 5 with
@@ -21,19 +21,19 @@ pub const HOVER_AUTHORITY: Range = Range::new("hover_authority_rad_s2", 80.0, 1e
 
 /// AFBC with a monitor and a fallback law.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Guarded {
-    adaptive: Controller<Adaptive>,
-    fallback: Controller<IntegralBackstepping>,
+pub struct Guarded<const N: usize = 4> {
+    adaptive: Controller<Adaptive, N>,
+    fallback: Controller<IntegralBackstepping, N>,
     monitor: Monitor,
 }
 
 /// Memory of the fallback law.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct StandIn {
+struct StandIn<const N: usize> {
     cascade: Cascade<Integral>,
     /// Its last action. Stored here, since returning it would make the compiler build an action in memory on AFBC's
     /// path, too.
-    action: Action,
+    action: Action<N>,
 }
 
 /// Attitude and rates of the last step, from which the other law continues.
@@ -54,21 +54,23 @@ impl Last {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Tripped {
     trip: Trip,
+    /// omega of (6) after AFBC's last step \[rad/s\].
+    rotor_residual_rad_s: f32,
     /// Record of the last step, under either law.
     last: Last,
 }
 
 /// Memory of a flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Memory {
+pub struct Memory<const N: usize = 4> {
     afbc: Cascade<Estimate>,
     figures: Figures,
     tripped: Option<Tripped>,
     /// The fallback law's memory, from its first step on.
-    stand_in: Option<StandIn>,
+    stand_in: Option<StandIn<N>>,
 }
 
-impl Memory {
+impl<const N: usize> Memory<N> {
     /// Returns the monitor's last figures of AFBC.
     pub fn figures(&self) -> &Figures {
         &self.figures
@@ -80,7 +82,7 @@ impl Memory {
     }
 }
 
-impl Guarded {
+impl<const N: usize> Guarded<N> {
     /// Creates AFBC with these gains, under a monitor with these bounds.
     ///
     /// # Errors
@@ -88,26 +90,27 @@ impl Guarded {
     /// vehicle [with a margin](afbc_control::mixer::HOVER_MARGIN), `theta_max` of z if it is below [`HOVER_THETA`]
     /// weights, and [`HOVER_AUTHORITY`] if the rotors turn the vehicle too slowly.
     pub fn new(
-        vehicle: Parameters,
+        vehicle: impl Into<Airframe<N>>,
         settings: Settings,
         gains: PerAxis<adaptive::Gains>,
         bounds: Bounds,
     ) -> Result<Self, OutOfRange> {
-        let weight_n = vehicle.mass_kg * vehicle.gravity_m_s2;
-        Mixer::new(&vehicle, settings.common.rotor_force_max_n)?.check_hover(weight_n)?;
+        let vehicle = vehicle.into();
+        let Airframe { parameters, .. } = vehicle;
+        let weight_n = parameters.weight_n();
+        let mixer = Mixer::new(vehicle, settings.common.rotor_force_max_n)?;
+        mixer.check_hover(weight_n)?;
         let hover =
             Range { min: libm::ceil(f64::from(HOVER_THETA * weight_n) * 1e4) / 1e4, ..Safeguards::THETAMAX.range };
         hover.check(gains.z.safeguards.theta_max)?;
-        // Two rotors, one up and one down, by the smaller of their margins.
-        let (hover_n, model) = (0.25 * weight_n, Model::new(&vehicle));
-        let swing_n = 2.0 * math::min(hover_n, settings.common.rotor_force_max_n - hover_n);
-        HOVER_AUTHORITY.check(swing_n * model.hover_gain(Axis::Roll))?;
-        HOVER_AUTHORITY.check(swing_n * model.hover_gain(Axis::Pitch))?;
+        let ([roll_n, pitch_n], model) = (mixer.tilt_authority_n(weight_n), Model::new(&parameters));
+        HOVER_AUTHORITY.check(roll_n * model.hover_gain(Axis::Roll))?;
+        HOVER_AUTHORITY.check(pitch_n * model.hover_gain(Axis::Pitch))?;
         let fixed = gains.map(|gains| gains.into());
         Ok(Guarded {
             adaptive: Controller::new(vehicle, settings, Adaptive::new(gains)?)?,
-            fallback: Controller::new(vehicle, settings, IntegralBackstepping::new(&vehicle, fixed)?)?,
-            monitor: Monitor::new(&vehicle, bounds, settings.common.dt_s)?,
+            fallback: Controller::new(vehicle, settings, IntegralBackstepping::new(&parameters, fixed)?)?,
+            monitor: Monitor::new(&parameters, bounds, settings.common.dt_s)?,
         })
     }
 
@@ -116,15 +119,16 @@ impl Guarded {
     #[inline(never)]
     fn stand_in<'a>(
         &self,
-        memory: &'a mut Option<StandIn>,
+        memory: &'a mut Option<StandIn<N>>,
         (afbc, tripped): (&Cascade<Estimate>, &mut Tripped),
         (state, setpoint): (&State, &Setpoint),
         fresh: bool,
-    ) -> &'a Action {
+    ) -> &'a Action<N> {
         let StandIn { cascade, action } = memory.get_or_insert_with(|| {
             let hover_thrust_n = Some(self.adaptive.hover_thrust_n(afbc));
             let resume = |axis| Integral { value: 0.0, resume: Some(afbc.inputs[axis]), hover_thrust_n };
-            StandIn { cascade: afbc.handed_over(PerAxis::from_fn(resume)), action: Action::default() }
+            let cascade = afbc.handed_over(PerAxis::from_fn(resume), tripped.rotor_residual_rad_s);
+            StandIn { cascade, action: Action::default() }
         });
         *action = self.fallback.cascade(cascade, state, setpoint, fresh);
         action.health.trip = Some(tripped.trip);
@@ -135,7 +139,7 @@ impl Guarded {
     /// Returns `cascade` with estimates for which AFBC continues with the last inputs.
     fn resumed<E>(&self, last: &Last, cascade: &Cascade<E>) -> Cascade<Estimate> {
         let (Last { attitude_rad: eta, rates_rad_s: eta_dot }, Cascade { inputs, errors, .. }) = (last, cascade);
-        cascade.handed_over(PerAxis::from_fn(|axis| {
+        let estimates = PerAxis::from_fn(|axis| {
             let x = match axis {
                 Axis::Roll => [eta.x, eta_dot.x],
                 Axis::Pitch => [eta.y, eta_dot.y],
@@ -143,23 +147,25 @@ impl Guarded {
             };
             let norm_max = self.monitor.theta_start(axis);
             self.adaptive.law().resumed(axis, inputs[axis], x, &errors[axis], norm_max)
-        }))
+        });
+        // AFBC does not use it.
+        cascade.handed_over(estimates, 0.0)
     }
 }
 
-impl FlightController for Guarded {
-    type Memory = Memory;
+impl<const N: usize> FlightController<N> for Guarded<N> {
+    type Memory = Memory<N>;
 
     fn dt_s(&self) -> f32 {
         self.adaptive.dt_s()
     }
 
-    fn mixer(&self) -> &Mixer {
+    fn mixer(&self) -> &Mixer<N> {
         self.adaptive.mixer()
     }
 
     #[inline(always)]
-    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
+    fn decide(&self, memory: &mut Memory<N>, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
         let Memory { afbc, figures, tripped, stand_in } = memory;
         if let Some(tripped) = tripped {
             return *self.stand_in(stand_in, (afbc, tripped), (state, setpoint), fresh);
@@ -169,19 +175,20 @@ impl FlightController for Guarded {
         if !self.adaptive.stands(afbc)
             && let Some(trip) = self.monitor.watch(figures, afbc, action.health.saturated)
         {
-            *tripped = Some(Tripped { trip, last: Last::new(state) });
+            let rotor_residual_rad_s = self.adaptive.mixer().residual_rad_s(&action.speeds);
+            *tripped = Some(Tripped { trip, rotor_residual_rad_s, last: Last::new(state) });
         }
         action
     }
 
-    fn trace(memory: &Memory) -> Trace {
+    fn trace(memory: &Memory<N>) -> Trace {
         match &memory.stand_in {
             Some(stand_in) => stand_in.cascade.trace(),
             None => memory.afbc.trace(),
         }
     }
 
-    fn engage(&self, memory: &mut Memory) -> bool {
+    fn engage(&self, memory: &mut Memory<N>) -> bool {
         let Memory { afbc, tripped: Some(Tripped { last, .. }), stand_in, .. } = memory else { return false };
         let afbc = match stand_in {
             Some(StandIn { cascade, .. }) => self.resumed(last, cascade),
@@ -192,7 +199,7 @@ impl FlightController for Guarded {
     }
 
     /// Zero while the fallback law flies.
-    fn learnt(memory: &Memory) -> PerAxis<Estimate> {
+    fn learnt(memory: &Memory<N>) -> PerAxis<Estimate> {
         if memory.tripped.is_some() { PerAxis::default() } else { memory.afbc.estimates }
     }
 }

@@ -5,6 +5,9 @@ use afbc_types::{Axis, PerAxis, State};
 
 /// Computes a subsystem's input from its errors. AFBC and the baseline differ in this only.
 pub trait Law {
+    /// True if the law uses [`Context::rotor_residual_rad_s`].
+    const USES_ROTOR_RESIDUAL: bool = true;
+
     /// Memory of the law for one subsystem.
     type Estimate: Copy + Default + core::fmt::Debug;
 

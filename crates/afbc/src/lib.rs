@@ -56,5 +56,5 @@ pub use cascade::{Cascade, Controller, Settings};
 pub use guarded::Guarded;
 pub use law::Law;
 pub use limits::Limits;
-pub use profile::Profile;
+pub use profile::{LAG_S, Profile, slowness};
 pub use safeguards::Safeguards;

@@ -3,6 +3,7 @@
 use crate::fuzzy::Membership;
 use crate::model::Model;
 use crate::{Limits, Safeguards, Settings, adaptive, backstepping};
+use afbc_control::math;
 use afbc_types::{Axis, Parameters, PerAxis};
 
 /// A named set of gains and settings.
@@ -28,17 +29,41 @@ impl Profile {
         }
     }
 
-    /// Returns AFBC's gains for a vehicle with these nominal parameters, which must be valid: [`Profile::gains`],
-    /// scaled in the unit of the input so that its effect on the vehicle is the same.
+    /// Returns AFBC's gains for a vehicle with these nominal parameters, which must be valid, and a rotor lag of
+    /// `lag_s`: [`Profile::gains`], scaled so that the vehicle behaves as the paper's does. Not in the paper.
     ///
-    /// With the hover value of g_i of (6), alpha_2, gamma, eta, Theta_max and delta_max are multiplied by g_i of the
-    /// paper's vehicle over g_i of this one: by mass for z, by inertia over arm for roll and pitch, by inertia over d/b
-    /// for yaw. alpha_1, epsilon, the leakage and the membership functions are in rad and m, and are not scaled.
-    /// Vehicles with the same rotor lag then behave alike. Not in the paper.
-    pub fn gains_for(self, vehicle: &Parameters) -> PerAxis<adaptive::Gains> {
+    /// * **Mass and inertia**: with the hover value of g_i of (6), alpha_2, gamma, eta, Theta_max and delta_max are
+    ///   multiplied by g_i of the paper's vehicle over g_i of this one: by mass for z, by inertia over arm for roll and
+    ///   pitch, by inertia over d/b for yaw. alpha_1, epsilon, the leakage and the membership functions are in rad and
+    ///   m, and are not scaled.
+    /// * **Rotor lag**, `flight` only: see [`slowness`] and [`adaptive::Gains::slowed`].
+    pub fn gains_for(self, vehicle: &Parameters, lag_s: f32) -> PerAxis<adaptive::Gains> {
         let (paper, own) = (Model::new(&Parameters::PAPER.to_f32()), Model::new(vehicle));
         let gains = self.gains();
-        PerAxis::from_fn(|axis| gains[axis].scaled(paper.hover_gain(axis) / own.hover_gain(axis)))
+        PerAxis::from_fn(|axis| {
+            let scaled = gains[axis].scaled(paper.hover_gain(axis) / own.hover_gain(axis));
+            match self {
+                Profile::Paper => scaled,
+                Profile::Flight => scaled.slowed(slowness(lag_s)),
+            }
+        })
+    }
+
+    /// Settings of the cascade for a vehicle whose rotors give `force_max_n` each with a lag of `lag_s`. In the profile
+    /// `flight` the command filter and the largest rate of tilt slow down as the gains do.
+    pub fn settings_for(self, force_max_n: f32, lag_s: f32) -> Settings {
+        let settings = self.settings();
+        match self {
+            Profile::Paper => settings,
+            Profile::Flight => Settings {
+                command_filter_rad_s: settings.command_filter_rad_s / slowness(lag_s),
+                limits: Limits {
+                    tilt_rate_max_rad_s: settings.limits.tilt_rate_max_rad_s / slowness(lag_s),
+                    ..settings.limits
+                },
+                ..settings.with_rotor_force_max_n(force_max_n)
+            },
+        }
     }
 
     /// Returns AFBC's gains for the paper's vehicle; their `backstepping` part is the baseline's.
@@ -98,8 +123,17 @@ impl Profile {
     }
 }
 
+/// Lag of the rotors that the profile `flight` is tuned for \[s\].
+pub const LAG_S: f32 = 0.02;
+
 /// Response time of the vehicle: one step and the rotors' lag \[s\].
 const ANSWER_S: f32 = 0.021;
+
+/// How many times as long as the paper's a vehicle takes to do anything whose rotors lag by `lag_s` \[s\]; quicker
+/// rotors make no quicker vehicle, for noise and the command filter stay.
+pub fn slowness(lag_s: f32) -> f32 {
+    math::max(lag_s / LAG_S, 1.0)
+}
 
 /// Returns the bounded law's gains, as found by `sitl tune afbc`. `docs/flight.md` explains each.
 fn flight(axis: Axis, paper: adaptive::Gains) -> adaptive::Gains {

@@ -277,7 +277,7 @@ fn a_vehicle_that_cannot_hover_is_refused_by_name() {
     for mass_kg in [0.3, 0.486, 0.61, 0.8, 0.94, 0.95, 0.97, 1.22, 2.0, 50.0] {
         let vehicle = of_mass(mass_kg);
         let needed_n = HOVER_MARGIN * mass_kg * 9.81 / 4.0;
-        match refusal(vehicle, Profile::Flight.gains_for(&vehicle)) {
+        match refusal(vehicle, Profile::Flight.gains_for(&vehicle, afbc::LAG_S)) {
             None => assert!(needed_n <= 3.0, "{mass_kg} kg"),
             Some((name, least)) => {
                 assert!(needed_n > 3.0, "{mass_kg} kg");
@@ -287,7 +287,7 @@ fn a_vehicle_that_cannot_hover_is_refused_by_name() {
     }
     // A light vehicle with that inertia turns too slowly.
     let light = of_mass(0.05);
-    assert_eq!(refusal(light, Profile::Flight.gains_for(&light)), Some(("hover_authority_rad_s2", 80.0)));
+    assert_eq!(refusal(light, Profile::Flight.gains_for(&light, afbc::LAG_S)), Some(("hover_authority_rad_s2", 80.0)));
     // With the gains of the paper's vehicle a heavier one would trip in an ideal hover, if its rotors could lift it.
     let strong = |mass_kg: f32| {
         let gains = Profile::Flight.gains();
@@ -305,10 +305,10 @@ fn a_vehicle_that_cannot_hover_is_refused_by_name() {
 fn gains_are_scaled_by_what_an_input_does() {
     for profile in Profile::ALL {
         let paper = Parameters::PAPER.to_f32();
-        assert_eq!(profile.gains_for(&paper), profile.gains());
+        assert_eq!(profile.gains_for(&paper, afbc::LAG_S), profile.gains());
         let sluggish = Parameters { mass_kg: 2.0 * paper.mass_kg, inertia_kg_m2: 2.0 * paper.inertia_kg_m2, ..paper };
         for axis in Axis::ALL {
-            let (own, other) = (profile.gains()[axis], profile.gains_for(&sluggish)[axis]);
+            let (own, other) = (profile.gains()[axis], profile.gains_for(&sluggish, afbc::LAG_S)[axis]);
             let times = if matches!(axis, Axis::X | Axis::Y) { 1.0 } else { 2.0 };
             assert_eq!(other.backstepping.alpha2, times * own.backstepping.alpha2);
             assert_eq!((other.gamma, other.eta), (times * own.gamma, times * own.eta));

@@ -54,6 +54,15 @@ impl Campaign {
         self.with(flight, &self.draw(flight))
     }
 
+    /// Checks both ends of every spread on every course; if they are in range, the flights between them normally are.
+    ///
+    /// # Errors
+    /// The first parameter out of range.
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        let flights = 0..self.courses.len() as u64;
+        (0..2).try_for_each(|end| flights.clone().try_for_each(|flight| self.at_end(flight, end)?.check()))
+    }
+
     /// Returns flight `flight` with every quantity at the lower (0) or upper (1) end of its interval.
     pub(super) fn at_end(&self, flight: u64, end: usize) -> Result<Scenario, OutOfRange> {
         let values = self.spreads.iter().filter_map(|spread| spread.ends.get(end).copied()).collect();

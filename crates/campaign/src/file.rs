@@ -2,9 +2,9 @@
 
 use crate::plan::{Campaign, Course, Spread};
 use crate::quantity::{QUANTITIES, Quantity};
-use afbc_sim::reader::Table;
-use afbc_sim::reader::words::out_of_range;
-use afbc_sim::reader::{self, FileError};
+use afbc_reader::FileError;
+use afbc_reader::Table;
+use afbc_reader::words::out_of_range;
 use afbc_sim::scenario::{self, DURATION, Scenario, built_in, similar_built_in};
 use afbc_types::Range;
 use std::path::{Path, PathBuf};
@@ -20,8 +20,8 @@ const SEED: Range = Range::new("seed", 0.0, 9_007_199_254_740_991.0);
 /// # Errors
 /// The first mistake, as one line.
 pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campaign, FileError> {
-    reader::document(file, text, "campaigns robustness", |mut root| {
-        let [name, description] = reader::title(&mut root, name)?;
+    afbc_reader::document(file, text, "campaigns robustness", |mut root| {
+        let [name, description] = afbc_reader::title(&mut root, name)?;
         let flights = root.whole(&FLIGHTS)?.ok_or_else(|| root.missing(FLIGHTS.name, "say how many to fly"))?;
         let seed = root.whole(&SEED)?.unwrap_or(1);
         let duration_s = root.number(&DURATION)?;
@@ -34,15 +34,9 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campai
             None => Vec::new(),
         };
         let campaign = Campaign { name, description, flights, seed, scenario, courses, spreads };
-        // If both ends of every spread are in range on every course, the flights between them normally are.
-        for end in 0..2 {
-            for flight in 0..campaign.courses.len() as u64 {
-                campaign
-                    .at_end(flight, end)
-                    .and_then(|scenario| scenario.check())
-                    .map_err(|error| root.fault("spread", format!("it causes {}; narrow it", out_of_range(&error))))?;
-            }
-        }
+        campaign
+            .check()
+            .map_err(|error| root.fault("spread", format!("it causes {}; narrow it", out_of_range(&error))))?;
         root.finish()?;
         Ok(campaign)
     })

@@ -1,7 +1,7 @@
 //! Result of a control step.
 
 use crate::Trip;
-use afbc_types::{RotorForces, RotorSpeeds};
+use afbc_types::{Inputs, ROTORS_MAX, RotorForces, RotorSpeeds};
 
 /// Result of a control step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -9,20 +9,27 @@ use afbc_types::{RotorForces, RotorSpeeds};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use = "the rotors turn by it"]
 #[non_exhaustive]
-pub struct Action {
+pub struct Action<const N: usize = 4> {
     /// Rotor speeds omega_i, always finite and never negative.
-    pub speeds: RotorSpeeds,
+    pub speeds: RotorSpeeds<N>,
     /// Rotor forces F_i, within the rotors' limits.
-    pub forces: RotorForces,
+    pub forces: RotorForces<N>,
+    /// U1..U4 of those forces.
+    pub given: Inputs,
     /// Faults of the step.
     pub health: Health,
 }
 
-impl Action {
-    /// An action from a plausible state and setpoint.
+impl<const N: usize> Action<N> {
+    /// An action from a plausible state and setpoint: rotor forces with their speeds and the inputs that they give.
     #[inline]
-    pub fn new(speeds: RotorSpeeds, forces: RotorForces, saturated: bool) -> Self {
-        Action { speeds, forces, health: Health { saturated, ..Health::default() } }
+    pub fn new(speeds: RotorSpeeds<N>, forces: RotorForces<N>, given: Inputs, saturated: bool) -> Self {
+        Action { speeds, forces, given, health: Health { saturated, ..Health::default() } }
+    }
+
+    /// The same action, with zeros for the rotors that this vehicle has not.
+    pub fn padded(&self) -> Action<ROTORS_MAX> {
+        Action { speeds: self.speeds.padded(), forces: self.forces.padded(), given: self.given, health: self.health }
     }
 }
 

@@ -4,7 +4,7 @@ use crate::screen::Screened;
 use crate::{Action, Estimate, Health, Mixer, Trace};
 use afbc_types::{PerAxis, Setpoint, State};
 
-/// A controller: computes rotor speeds from the measured state and the setpoint.
+/// A controller: computes the speeds of `N` rotors from the measured state and the setpoint.
 ///
 /// A controller is validated when it is built and immutable from then on; everything that changes in flight is in its
 /// memory. [`step`](FlightController::step) must be called every [`dt_s`](FlightController::dt_s) seconds.
@@ -36,13 +36,13 @@ use afbc_types::{PerAxis, Setpoint, State};
 ///     }
 /// }
 ///
-/// let float = Float(Mixer::new(&Parameters::PAPER.to_f32(), 3.0)?);
+/// let float = Float(Mixer::new(Parameters::PAPER.to_f32(), 3.0)?);
 /// let mut memory = Screened::default();
 /// let action = float.step(&mut memory, Some(&State::default()), &Setpoint::default());
 /// assert!((action.forces.0.sum() - 0.486 * 9.81).abs() < 1e-5);
 /// # Ok::<(), OutOfRange>(())
 /// ```
-pub trait FlightController {
+pub trait FlightController<const N: usize = 4> {
     /// State of the controller between steps.
     type Memory: Copy + Default + core::fmt::Debug;
 
@@ -50,18 +50,18 @@ pub trait FlightController {
     fn dt_s(&self) -> f32;
 
     /// Returns the mixer that allocates the inputs to the rotors.
-    fn mixer(&self) -> &Mixer;
+    fn mixer(&self) -> &Mixer<N>;
 
     /// Computes the action of one step from a plausible state and setpoint ([`State::is_plausible`],
     /// [`Setpoint::is_plausible`]). If the state is not `fresh` but repeated, no estimate, integral or filter of
     /// measurements is updated. Does not fail or panic; the rotor speeds are finite and within their limits.
-    fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action;
+    fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N>;
 
     /// Performs one step from a measurement that may be missing, implausible or not finite:
     /// [`FlightController::decide`] behind a [`Screen`](crate::Screen). [`Action::health`] reports rejected input.
     // Inlined always: copying the action out of a call costs a tenth of a closed-loop step.
     #[inline(always)]
-    fn step(&self, memory: &mut Screened<Self::Memory>, measured: Option<&State>, setpoint: &Setpoint) -> Action {
+    fn step(&self, memory: &mut Screened<Self::Memory>, measured: Option<&State>, setpoint: &Setpoint) -> Action<N> {
         let mut screened = Health::default();
         let (screen, control) = memory.parts();
         let Some((state, setpoint)) = screen.pass(measured, setpoint, &mut screened) else {

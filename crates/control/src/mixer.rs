@@ -15,11 +15,9 @@
 
 use crate::settings::Settings;
 use crate::{Action, math};
-use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds};
+use afbc_types::{Airframe, Declared, Inputs, OutOfRange, ROTOR_POSITION, Range, Rotor, RotorForces, RotorSpeeds};
 use nalgebra::{Matrix4, SMatrix, SVector, Vector4};
 
-/// Accepted position of a rotor along x and along y, in arm lengths.
-pub const POSITION: Range = Range::new("rotor_position", -10.0, 10.0);
 /// Accepted determinant of B B^T over the product of its diagonal. It is 1 for a symmetric frame; near 0 the rotors
 /// cannot give all four inputs independently.
 pub const AUTHORITY: Range = Range::new("rotor_authority", 1e-3, 1.001);
@@ -34,27 +32,6 @@ pub const HOVER_MARGIN: f32 = 1.3;
 const ASKED_MAX: f32 = 1e9;
 /// Unallocated input that is explained by rounding, relative to the largest force.
 const ROUNDING: f32 = 1e-6;
-
-/// Position and direction of rotation of a rotor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Rotor {
-    /// Position along body x, in arm lengths.
-    pub x: f32,
-    /// Position along body y, in arm lengths.
-    pub y: f32,
-    /// True if the rotor's drag moment acts towards positive yaw.
-    pub pushes_left: bool,
-}
-
-/// The frame of [`afbc_types`]: rotor 1 at -y, 2 at +x, 3 at +y, 4 at -x.
-pub const PLUS: [Rotor; 4] = [
-    Rotor { x: 0.0, y: -1.0, pushes_left: true },
-    Rotor { x: 1.0, y: 0.0, pushes_left: false },
-    Rotor { x: 0.0, y: 1.0, pushes_left: true },
-    Rotor { x: -1.0, y: 0.0, pushes_left: false },
-];
 
 /// The mixer of a frame of `N` rotors, usually four to eight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,47 +59,26 @@ pub struct Mixer<const N: usize = 4> {
 pub struct Allocation<const N: usize = 4> {
     /// Forces that the rotors can give.
     pub forces: RotorForces<N>,
+    /// U1..U4 of those forces, B F.
+    pub given: Inputs,
     /// Part of the demand that is not given: U - B F, 0 where rounding explains the difference.
     pub unallocated: Inputs,
     /// True if a rotor force was limited.
     pub saturated: bool,
 }
 
-impl Mixer {
-    /// Makes the mixer of the [`PLUS`] frame, for rotors that give 0 to `force_max_n`.
-    ///
-    /// # Errors
-    /// If a parameter or the limit is out of range.
-    pub fn new(vehicle: &Parameters, force_max_n: f32) -> Result<Self, OutOfRange> {
-        Self::of(PLUS, vehicle, force_max_n)
-    }
-
-    /// Returns the action for `inputs`, as far as the rotors' limits allow.
-    #[inline]
-    pub fn action(&self, inputs: &Inputs) -> Action {
-        let Allocation { forces, saturated, .. } = self.allocate(inputs);
-        Action::new(self.speeds(&forces), forces, saturated)
-    }
-
-    /// Returns U1..U4 of rotor forces of the [`PLUS`] frame, (6).
-    #[inline]
-    pub fn inputs(forces: &RotorForces) -> Inputs {
-        let [f1, f2, f3, f4] = forces.0.into();
-        Inputs { roll_n: f3 - f1, pitch_n: f4 - f2, yaw_n: f1 - f2 + f3 - f4, thrust_n: f1 + f2 + f3 + f4 }
-    }
-}
-
 impl<const N: usize> Mixer<N> {
-    /// Makes the mixer of any frame.
+    /// Makes the mixer of a vehicle whose rotors give 0 to `force_max_n` each.
     ///
     /// # Errors
     /// If a parameter, a position or the limit is out of range, or if the rotors cannot give all four inputs and hover.
-    pub fn of(rotors: [Rotor; N], vehicle: &Parameters, force_max_n: f32) -> Result<Self, OutOfRange> {
-        vehicle.validate()?;
+    pub fn new(vehicle: impl Into<Airframe<N>>, force_max_n: f32) -> Result<Self, OutOfRange> {
+        let Airframe { parameters, rotors } = vehicle.into();
+        parameters.validate()?;
         Settings::FORCE_MAX.range.check(force_max_n)?;
         for rotor in &rotors {
-            POSITION.check(rotor.x)?;
-            POSITION.check(rotor.y)?;
+            ROTOR_POSITION.check(rotor.x)?;
+            ROTOR_POSITION.check(rotor.y)?;
         }
         let spin = |rotor: &Rotor| if rotor.pushes_left { 1.0 } else { -1.0 };
         let columns = rotors.map(|rotor| Vector4::new(rotor.y, -rotor.x, spin(&rotor), 1.0));
@@ -135,7 +91,7 @@ impl<const N: usize> Mixer<N> {
             THRUST_SHARE.check(*share)?;
         }
         let inverse_share = share.map(|share| 1.0 / share);
-        let b = vehicle.thrust_factor_n_s2;
+        let b = parameters.thrust_factor_n_s2;
         Ok(Mixer {
             effectiveness,
             inverse,
@@ -157,15 +113,53 @@ impl<const N: usize> Mixer<N> {
         Range { min: needed_n, ..Settings::FORCE_MAX.range }.check(self.force_max)
     }
 
+    /// What the rotors do for `inputs`, as far as their limits allow.
+    #[inline]
+    pub fn action(&self, inputs: &Inputs) -> Action<N> {
+        self.carry_out(&self.allocate(inputs))
+    }
+
+    /// The action that gives the rotors what was allocated.
+    #[inline]
+    pub fn carry_out(&self, allocation: &Allocation<N>) -> Action<N> {
+        let Allocation { forces, given, saturated, .. } = *allocation;
+        Action::new(self.speeds(&forces), forces, given, saturated)
+    }
+
+    /// Thrust of all rotors at their limit \[N\].
+    pub fn thrust_max_n(&self) -> f32 {
+        N as f32 * self.force_max
+    }
+
+    /// Largest U1 alone and largest U2 alone, both ways, around a hover under this weight \[N\]; none if the rotors do
+    /// not lift it.
+    pub fn tilt_authority_n(&self, weight_n: f32) -> [f32; 2] {
+        [0, 1].map(|input| {
+            let column = self.inverse.column(input);
+            let largest = |most, (share, part): (&f32, &f32)| {
+                let hover_n = share * weight_n;
+                let room_n = math::max(math::min(hover_n, self.force_max - hover_n), 0.0);
+                if *part == 0.0 { most } else { math::min(most, room_n / part.abs()) }
+            };
+            self.share.iter().zip(column.iter()).fold(f32::MAX, largest)
+        })
+    }
+
     /// Returns rotor forces that give `inputs`, as far as the rotors' limits allow. NaN counts as 0 and is reported as
     /// saturation.
-    #[inline]
+    #[inline(always)]
     pub fn allocate(&self, inputs: &Inputs) -> Allocation<N> {
         let wanted = Vector4::new(inputs.roll_n, inputs.pitch_n, inputs.yaw_n, inputs.thrust_n);
         let forces = self.inverse * wanted;
         // One NaN makes every force NaN, which is not within any limits.
         if forces.iter().all(|&force| 0.0 <= force && force <= self.force_max) {
-            return Allocation { forces: RotorForces(forces), unallocated: Inputs::default(), saturated: false };
+            let forces = RotorForces(forces);
+            return Allocation {
+                forces,
+                given: self.inputs(&forces),
+                unallocated: Inputs::default(),
+                saturated: false,
+            };
         }
         // False of NaN, too.
         let wanted = if wanted.norm_squared() <= ASKED_MAX * ASKED_MAX {
@@ -173,14 +167,22 @@ impl<const N: usize> Mixer<N> {
         } else {
             wanted.map(|u| if u.is_nan() { 0.0 } else { u.clamp(-ASKED_MAX, ASKED_MAX) })
         };
-        let forces = self.within_limits(&wanted);
+        let forces = RotorForces(self.within_limits(&wanted));
+        let given = self.inputs(&forces);
         let least = ROUNDING * self.force_max;
-        let missing = (wanted - self.effectiveness * forces).map(|u| if u.abs() > least { u } else { 0.0 });
-        let unallocated = Inputs { roll_n: missing.x, pitch_n: missing.y, yaw_n: missing.z, thrust_n: missing.w };
-        Allocation { forces: RotorForces(forces), unallocated, saturated: true }
+        let missing = |wanted: f32, given: f32| if (wanted - given).abs() > least { wanted - given } else { 0.0 };
+        let unallocated = Inputs {
+            roll_n: missing(wanted.x, given.roll_n),
+            pitch_n: missing(wanted.y, given.pitch_n),
+            yaw_n: missing(wanted.z, given.yaw_n),
+            thrust_n: missing(wanted.w, given.thrust_n),
+        };
+        Allocation { forces, given, unallocated, saturated: true }
     }
 
     /// Desaturates by priority.
+    // Always, as its caller: the allocation stays in registers instead of being copied.
+    #[inline(always)]
     fn within_limits(&self, wanted: &Vector4<f32>) -> SVector<f32, N> {
         let column = |i: usize, u: f32| self.inverse.column(i) * u;
         let tilt = column(0, wanted.x) + column(1, wanted.y);
@@ -226,10 +228,20 @@ impl<const N: usize> Mixer<N> {
         RotorForces(speeds.0.map(|speed| self.thrust_factor * speed * speed))
     }
 
+    /// The residual omega of (6): speeds of the rotors that push to positive yaw less those of the others \[rad/s\].
+    #[inline]
+    pub fn residual_rad_s(&self, speeds: &RotorSpeeds<N>) -> f32 {
+        let columns = self.effectiveness.column_iter();
+        speeds.0.iter().zip(columns).fold(0.0, |sum, (speed, column)| sum + speed * column.z)
+    }
+
     /// Returns U = B F.
     #[inline]
-    pub fn inputs_of(&self, forces: &RotorForces<N>) -> Inputs {
-        let u = self.effectiveness * forces.0;
-        Inputs { roll_n: u.x, pitch_n: u.y, yaw_n: u.z, thrust_n: u.w }
+    pub fn inputs(&self, forces: &RotorForces<N>) -> Inputs {
+        let total =
+            |weighted: SVector<f32, N>| weighted.iter().copied().reduce(|sum, part| sum + part).unwrap_or_default();
+        let by = |row: usize| total(self.effectiveness.row(row).transpose().component_mul(&forces.0));
+        // The last row of B is ones.
+        Inputs { roll_n: by(0), pitch_n: by(1), yaw_n: by(2), thrust_n: total(forces.0) }
     }
 }

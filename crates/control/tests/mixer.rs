@@ -6,8 +6,8 @@
 #![allow(clippy::unwrap_used, missing_docs)] // a mixer that cannot be built must stop the test
 
 use afbc_control::Settings;
-use afbc_control::mixer::{AUTHORITY, Allocation, Mixer, PLUS, POSITION, Rotor, THRUST_SHARE};
-use afbc_types::{Inputs, Parameters, RotorForces};
+use afbc_control::mixer::{AUTHORITY, Allocation, Mixer, THRUST_SHARE};
+use afbc_types::{Airframe, Inputs, PLUS, Parameters, ROTOR_POSITION, Rotor, RotorForces};
 use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 use nalgebra::{Matrix4, SVector, Vector4};
 use proptest::prelude::*;
@@ -16,11 +16,11 @@ use proptest::prelude::*;
 const U: f32 = 1.0 / (1 << 24) as f32;
 
 fn mixer_of<const N: usize>(rotors: [Rotor; N], force_max_n: f32) -> Mixer<N> {
-    Mixer::of(rotors, &Parameters::PAPER.to_f32(), force_max_n).unwrap()
+    Mixer::new(airframe(rotors), force_max_n).unwrap()
 }
 
 fn mixer(force_max_n: f32) -> Mixer {
-    Mixer::new(&Parameters::PAPER.to_f32(), force_max_n).unwrap()
+    Mixer::new(Parameters::PAPER.to_f32(), force_max_n).unwrap()
 }
 
 fn inputs(values: [f32; 4]) -> Inputs {
@@ -61,7 +61,7 @@ fn check<const N: usize>(
     got: &Allocation<N>,
 ) -> Result<(), TestCaseError> {
     prop_assert!(got.forces.0.iter().all(|force| (0.0..=limit).contains(force)), "{got:?}");
-    let given = list(&mixer.inputs_of(&got.forces));
+    let given = list(&mixer.inputs(&got.forces));
     for ((asked, given), missing) in list(asked).into_iter().zip(given).zip(list(&got.unallocated)) {
         let asked = if asked.is_nan() { 0.0 } else { asked.clamp(-1e9, 1e9) };
         // Forces are rounded at the scale of the limit, the difference at its own.
@@ -99,6 +99,17 @@ fn largest(fits: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
+/// The vehicle of the paper with other rotors.
+fn airframe<const N: usize>(rotors: [Rotor; N]) -> Airframe<N> {
+    Airframe { rotors, parameters: Parameters::PAPER.to_f32() }
+}
+
+/// U1..U4 of the paper's frame, (6).
+fn six(forces: &RotorForces) -> Inputs {
+    let [f1, f2, f3, f4] = forces.0.into();
+    Inputs { roll_n: f3 - f1, pitch_n: f4 - f2, yaw_n: f1 - f2 + f3 - f4, thrust_n: f1 + f2 + f3 + f4 }
+}
+
 fn anything() -> impl Strategy<Value = Inputs> {
     prop::array::uniform4(prop_oneof![prop::num::f32::ANY, -100.0_f32..100.0]).prop_map(inputs)
 }
@@ -111,11 +122,11 @@ fn any_frame<const N: usize>(rotors: [Rotor; N], shares: &[f32; 8], asked: &Inpu
 
     // The least-norm forces of some inputs, if within limits.
     let forces = SVector::<f32, N>::from_iterator(shares.iter().map(|share| limit * share));
-    let wanted = mixer.inputs_of(&RotorForces(forces));
+    let wanted = mixer.inputs(&RotorForces(forces));
     let got = mixer.allocate(&wanted);
     check(&mixer, limit, &wanted, &got)?;
     if N == 4 || !got.saturated {
-        for (got, wanted) in list(&mixer.inputs_of(&got.forces)).into_iter().zip(list(&wanted)) {
+        for (got, wanted) in list(&mixer.inputs(&got.forces)).into_iter().zip(list(&wanted)) {
             prop_assert!((got - wanted).abs() <= 3e-6 * limit * N as f32, "{got} for {wanted}");
         }
     }
@@ -127,7 +138,7 @@ proptest! {
 
     #[test]
     fn feasible_demands_are_given_exactly(forces in prop::array::uniform4(0.0_f32..30.0)) {
-        let wanted = Mixer::inputs(&RotorForces(Vector4::from(forces)));
+        let wanted = six(&RotorForces(Vector4::from(forces)));
         let mixer = mixer(31.0);
         let allocation = mixer.allocate(&wanted);
         let total: f32 = forces.iter().sum();
@@ -135,7 +146,7 @@ proptest! {
         for (got, force) in allocation.forces.0.iter().zip(forces) {
             prop_assert!((got - force).abs() <= 6.0 * U * total, "{got} for {force}");
         }
-        for (got, wanted) in list(&Mixer::inputs(&allocation.forces)).into_iter().zip(list(&wanted)) {
+        for (got, wanted) in list(&six(&allocation.forces)).into_iter().zip(list(&wanted)) {
             prop_assert!((got - wanted).abs() <= 24.0 * U * total, "{got} for {wanted}");
         }
         // A zero force may come out as a tiny negative number and be clipped; no other force may.
@@ -158,8 +169,8 @@ proptest! {
         asked in prop::array::uniform4(-10.0_f32..10.0),
     ) {
         let forces = RotorForces(Vector4::from(forces));
-        let general = mixer(1e4).inputs_of(&forces);
-        for (general, own) in list(&general).into_iter().zip(list(&Mixer::inputs(&forces))) {
+        let general = mixer(1e4).inputs(&forces);
+        for (general, own) in list(&general).into_iter().zip(list(&six(&forces))) {
             prop_assert!((general - own).abs() <= 4.0 * U * forces.0.sum());
         }
         let [u1, u2, u3, _] = asked;
@@ -216,7 +227,7 @@ proptest! {
     ) {
         let mixer = mixer_of(frame, limit);
         let got = mixer.allocate(&inputs(asked));
-        let [roll, pitch, yaw, thrust] = list(&mixer.inputs_of(&got.forces));
+        let [roll, pitch, yaw, thrust] = list(&mixer.inputs(&got.forces));
         let near = |a: f32, b: f32| (a - b).abs() <= 1e-5 * (limit + b.abs());
 
         // The sum of opposite rotors is fixed; roll and pitch determine their difference.
@@ -308,7 +319,7 @@ proptest! {
         more in 0.0_f32..8.0,
     ) {
         let mixer = mixer_of(frame, 3.0);
-        let roll = |roll_n| mixer.inputs_of(&mixer.allocate(&Inputs { roll_n, ..inputs(asked) }).forces).roll_n;
+        let roll = |roll_n| mixer.inputs(&mixer.allocate(&Inputs { roll_n, ..inputs(asked) }).forces).roll_n;
         let [first, second] = [asked[0].abs(), asked[0].abs() + more].map(roll);
         prop_assert!(second >= first - 1e-5, "{first}, then {second}");
         let all = roll(f32::INFINITY);
@@ -358,22 +369,22 @@ fn nan_becomes_no_force_and_infinity_the_largest() {
 fn a_limit_out_of_range_is_refused_by_name() {
     let vehicle = Parameters::PAPER.to_f32();
     for limit in [0.0, -1.0, 2e4, f32::NAN, f32::INFINITY] {
-        assert_eq!(Mixer::new(&vehicle, limit).unwrap_err().range, Settings::FORCE_MAX.range);
+        assert_eq!(Mixer::new(vehicle, limit).unwrap_err().range, Settings::FORCE_MAX.range);
     }
     let weightless = Parameters { mass_kg: 0.0, ..vehicle };
-    assert_eq!(Mixer::new(&weightless, 10.0).unwrap_err().range.name, "mass_kg");
+    assert_eq!(Mixer::new(weightless, 10.0).unwrap_err().range.name, "mass_kg");
 }
 
 #[test]
 fn a_frame_that_cannot_fly_is_refused_by_name() {
     fn refused<const N: usize>(rotors: [Rotor; N]) -> afbc_types::Range {
-        Mixer::of(rotors, &Parameters::PAPER.to_f32(), 3.0).unwrap_err().range
+        Mixer::new(airframe(rotors), 3.0).unwrap_err().range
     }
     for bad in [11.0, -11.0, f32::NAN, f32::INFINITY] {
         let [first, rest @ ..] = PLUS;
         let [second, third, fourth] = rest;
-        assert_eq!(refused([Rotor { x: bad, ..first }, second, third, fourth]), POSITION);
-        assert_eq!(refused([first, second, third, Rotor { y: bad, ..fourth }]), POSITION);
+        assert_eq!(refused([Rotor { x: bad, ..first }, second, third, fourth]), ROTOR_POSITION);
+        assert_eq!(refused([first, second, third, Rotor { y: bad, ..fourth }]), ROTOR_POSITION);
     }
     // All spin the same way; too few rotors; all at one point.
     assert_eq!(refused(PLUS.map(|rotor| Rotor { pushes_left: true, ..rotor })), AUTHORITY);
@@ -392,7 +403,5 @@ fn a_frame_that_cannot_fly_is_refused_by_name() {
     // The centre of mass lies outside the rotors: one would have to pull down to hover.
     assert_eq!(refused(cross().map(|rotor| Rotor { x: rotor.x + 1.2, ..rotor })), THRUST_SHARE);
     // A small frame is accepted.
-    assert!(
-        Mixer::of(PLUS.map(|r| Rotor { x: 0.01 * r.x, y: 0.01 * r.y, ..r }), &Parameters::PAPER.to_f32(), 3.0).is_ok()
-    );
+    assert!(Mixer::new(airframe(PLUS.map(|r| Rotor { x: 0.01 * r.x, y: 0.01 * r.y, ..r })), 3.0).is_ok());
 }

@@ -64,16 +64,16 @@ impl Timing {
         self.period
     }
 
-    /// Computes the compare values of four motors: a row for each bit, a column for each motor, each column a
+    /// Computes the compare values of several motors: a row for each bit, a column for each motor, each column a
     /// [waveform](Self::waveform).
-    pub fn rows(&self, throttles: [u16; 4], rows: &mut [[u16; 4]; 17]) {
+    pub fn rows<const N: usize>(&self, throttles: [u16; N], rows: &mut [[u16; N]; 17]) {
         let mut frames = throttles.map(|throttle| Frame::new(throttle).bits());
         let [bits @ .., last] = rows;
         for row in bits {
             *row = frames.map(|bits| self.pulse(bits & 0x8000 != 0));
             frames = frames.map(|bits| bits << 1);
         }
-        *last = [0; 4];
+        *last = [0; N];
     }
 
     /// Returns the length of a pulse.

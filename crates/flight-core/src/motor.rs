@@ -60,9 +60,9 @@ impl Motor {
         Ok(Motor { curve, idle: steps(curve.idle), inverse_speed_max: 1.0 / curve.speed_max_rad_s })
     }
 
-    /// Returns the throttles of all four motors: 0 if disarmed, 48 to 2047 if armed.
-    pub fn throttles(&self, armed: bool, speeds: &RotorSpeeds) -> [u16; 4] {
-        let speeds: [f32; 4] = speeds.0.into();
+    /// Returns the throttle of every motor: 0 if disarmed, 48 to 2047 if armed.
+    pub fn throttles<const N: usize>(&self, armed: bool, speeds: &RotorSpeeds<N>) -> [u16; N] {
+        let speeds: [f32; N] = speeds.0.into();
         speeds.map(|speed| if armed { self.throttle(speed) } else { 0 })
     }
 

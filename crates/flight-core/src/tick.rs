@@ -8,7 +8,7 @@ use crate::rate;
 use crate::supervisor::{ArmingLimits, COAST_US, End, Mode, Observed, Refusal, Request, SETPOINT_STALE_US, Standing};
 use crate::tumble::Tumble;
 use crate::witness::Witness;
-use afbc_control::{Action, FlightController, Mixer, Trace};
+use afbc_control::{Action, FlightController, Trace};
 use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds, Setpoint, State};
 
 /// Accepted time step of a law: the tick's \[s\].
@@ -16,7 +16,7 @@ pub const DT: Range = Range::new("dt_s", 0.001, 0.001);
 
 /// A vehicle with its controller. Constant; everything that changes in flight is in [`VehicleMemory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Vehicle<C> {
+pub struct Vehicle<C, const N: usize = 4> {
     controller: C,
     blind: Blind,
     limits: ArmingLimits,
@@ -81,7 +81,7 @@ impl<M> VehicleMemory<M> {
     }
 
     /// Returns the trace of the last tick with the controller `C`: only inputs while blind, zeros while disarmed.
-    pub fn trace<C: FlightController<Memory = M>>(&self) -> Trace {
+    pub fn trace<C: FlightController<N, Memory = M>, const N: usize>(&self) -> Trace {
         match &self.flight {
             Some(Armed { lawless: Some(inputs), .. }) if self.mode.armed() => {
                 let mut trace = Trace::default();
@@ -123,11 +123,11 @@ pub struct Answer {
 /// Result of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Outcome {
+pub struct Outcome<const N: usize = 4> {
     /// Rotor speeds for the motors: zero if disarmed.
-    pub motors: RotorSpeeds,
+    pub motors: RotorSpeeds<N>,
     /// Force of each rotor \[N\].
-    pub forces: RotorForces,
+    pub forces: RotorForces<N>,
     /// Flight mode.
     pub mode: Mode,
     /// Health of the flight core.
@@ -138,7 +138,7 @@ pub struct Outcome {
     pub ended: Option<End>,
 }
 
-impl<C: FlightController> Vehicle<C> {
+impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
     /// Creates a vehicle with these nominal parameters and `controller`, which must be built for them.
     ///
     /// # Errors
@@ -157,7 +157,7 @@ impl<C: FlightController> Vehicle<C> {
     /// Cannot fail.
     #[inline]
     #[must_use = "the motors need its speeds"]
-    pub fn tick(&self, memory: &mut VehicleMemory<C::Memory>, now_us: u64, inbox: &Inbox) -> Outcome {
+    pub fn tick(&self, memory: &mut VehicleMemory<C::Memory>, now_us: u64, inbox: &Inbox) -> Outcome<N> {
         let dt_s = self.controller.dt_s();
         // Takes the newest inputs.
         let measured = memory.take_state(inbox, now_us);
@@ -197,7 +197,7 @@ impl<C: FlightController> Vehicle<C> {
         // The tick of arming only sets up the flight, and the motors idle: a step would take too long.
         let arms = done(Request::Arm);
         if let (true, Some(state)) = (arms, fresh) {
-            Armed::begin(flight, self, state, now_us);
+            Armed::begin(flight, &self.blind, self.weight_n, state, now_us);
         }
 
         // Controls.
@@ -215,13 +215,13 @@ impl<C: FlightController> Vehicle<C> {
                         // The inbox only holds plausible values.
                         let action = self.controller.decide(&mut flight.control, state, target, true);
                         flight.lawless = None;
-                        flight.applied = Mixer::inputs(&action.forces);
+                        flight.applied = action.given;
                         self.blind.trim(&mut flight.reckoning, &flight.applied);
                         action
                     }
                     None => {
                         let action = self.blind_action(flight, mode);
-                        flight.applied = Mixer::inputs(&action.forces);
+                        flight.applied = action.given;
                         action
                     }
                 }
@@ -239,7 +239,7 @@ impl<C: FlightController> Vehicle<C> {
 
     /// Returns the action without a state.
     #[inline(always)]
-    fn blind_action<M>(&self, flight: &mut Armed<M>, mode: Mode) -> Action {
+    fn blind_action<M>(&self, flight: &mut Armed<M>, mode: Mode) -> Action<N> {
         flight.guide.descent = None;
         let inputs = match mode {
             Mode::Descending => self.blind.descend(&flight.reckoning),
@@ -250,7 +250,7 @@ impl<C: FlightController> Vehicle<C> {
 
     /// Returns the action for inputs that do not come from the law.
     #[inline(always)]
-    fn lawless<M>(&self, flight: &mut Armed<M>, inputs: Inputs) -> Action {
+    fn lawless<M>(&self, flight: &mut Armed<M>, inputs: Inputs) -> Action<N> {
         flight.lawless = Some(inputs);
         self.controller.mixer().action(&inputs)
     }
@@ -314,14 +314,14 @@ impl<M: Default> Armed<M> {
     // Out of line, so that the new memory is not built on the tick's stack and copied.
     #[cold]
     #[inline(never)]
-    fn begin<C>(flight: &mut Option<Self>, vehicle: &Vehicle<C>, state: &State, now_us: u64) {
+    fn begin(flight: &mut Option<Self>, blind: &Blind, weight_n: f32, state: &State, now_us: u64) {
         *flight = Some(Armed {
             control: M::default(),
-            reckoning: vehicle.blind.start(state),
+            reckoning: blind.start(state),
             applied: Inputs::default(),
             lawless: None,
             guide: Guide::default(),
-            landing: LandDetector::new(state, vehicle.weight_n, now_us),
+            landing: LandDetector::new(state, weight_n, now_us),
             tumble: Tumble::default(),
             witness: Witness::new(state, now_us),
             distrusts: false,

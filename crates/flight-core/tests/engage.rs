@@ -3,7 +3,7 @@
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_flight_core::{ArmingLimits, Asked, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory};
-use afbc_types::{Parameters, RotorForces, RotorSpeeds, Setpoint, State};
+use afbc_types::{Inputs, Parameters, RotorForces, RotorSpeeds, Setpoint, State};
 
 /// A controller that counts how often it is engaged, and gives the weight as thrust.
 struct Counter(Mixer);
@@ -24,7 +24,8 @@ impl FlightController for Counter {
     }
 
     fn decide(&self, _: &mut u32, _: &State, _: &Setpoint, _: bool) -> Action {
-        Action::new(RotorSpeeds::default(), RotorForces([1.2; 4].into()), false)
+        let given = Inputs { thrust_n: 4.8, ..Inputs::default() };
+        Action::new(RotorSpeeds::default(), RotorForces([1.2; 4].into()), given, false)
     }
 
     fn engage(&self, memory: &mut u32) -> bool {
@@ -42,7 +43,7 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         let parameters = Parameters::PAPER.to_f32();
-        let counter = Counter(Mixer::new(&parameters, 3.0).expect("valid"));
+        let counter = Counter(Mixer::new(parameters, 3.0).expect("valid"));
         let vehicle = Vehicle::new(parameters, ArmingLimits::default(), counter).expect("valid");
         Bench { vehicle, memory: VehicleMemory::default(), now_us: 0 }
     }

@@ -7,7 +7,7 @@ use afbc_flight_core::supervisor::REST_US;
 use afbc_flight_core::{
     Answer, ArmingLimits, Asked, End, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory,
 };
-use afbc_types::{Parameters, RotorForces, RotorSpeeds, Setpoint, State};
+use afbc_types::{Inputs, Parameters, RotorForces, RotorSpeeds, Setpoint, State};
 use core::f32::consts::{PI, TAU};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -34,7 +34,8 @@ impl FlightController for Lift {
 
     fn decide(&self, (): &mut (), _: &State, setpoint: &Setpoint, _: bool) -> Action {
         let force = setpoint.position_m.z / 4.0;
-        Action::new(RotorSpeeds([300.0; 4].into()), RotorForces([force; 4].into()), false)
+        let given = Inputs { thrust_n: setpoint.position_m.z, ..Inputs::default() };
+        Action::new(RotorSpeeds([300.0; 4].into()), RotorForces([force; 4].into()), given, false)
     }
 }
 
@@ -52,7 +53,7 @@ impl Bench {
     fn new() -> Self {
         let limits = ArmingLimits { setpoint_distance_max_m: 100.0, ..ArmingLimits::default() };
         let parameters = Parameters::PAPER.to_f32();
-        let lift = Lift(Mixer::new(&parameters, 3.0).expect("valid"));
+        let lift = Lift(Mixer::new(parameters, 3.0).expect("valid"));
         let vehicle = Vehicle::new(parameters, limits, lift).expect("valid");
         Bench {
             vehicle,

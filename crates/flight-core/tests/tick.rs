@@ -41,7 +41,7 @@ impl Bench {
 
     /// Returns the trace of the last tick.
     fn trace(&self) -> Trace {
-        self.memory.trace::<Controller<Adaptive>>()
+        self.memory.trace::<Controller<Adaptive>, 4>()
     }
 
     fn ask(&mut self, request: Request) {

@@ -4,7 +4,7 @@ use crate::address::Address;
 use crate::decoder::Counters;
 use crate::frames::flip;
 use crate::message::{Fault, Format, Message, PAYLOAD_MAX, extension, field, parse, put, put_extended, put_fields};
-use afbc_types::{Axis, PerAxis, RotorSpeeds};
+use afbc_types::{Axis, PerAxis, ROTORS_MAX, RotorSpeeds};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     ATTITUDE_DATA, COMMAND_ACK_DATA, DEBUG_FLOAT_ARRAY_DATA, HEARTBEAT_DATA, HIL_ACTUATOR_CONTROLS_DATA,
@@ -12,7 +12,7 @@ use mavlink::dialects::common::{
     MavType, STATUSTEXT_DATA,
 };
 use mavlink::types::CharArray;
-use nalgebra::{Vector3, Vector4};
+use nalgebra::{SVector, Vector3};
 
 /// Text of up to 50 bytes.
 pub type Text = CharArray<50>;
@@ -37,8 +37,8 @@ pub enum Downlink {
         time_us: u64,
         /// True if the motors may turn.
         armed: bool,
-        /// omega_i
-        speeds: RotorSpeeds,
+        /// omega_i; 0 for rotors that the vehicle has not.
+        speeds: RotorSpeeds<ROTORS_MAX>,
     },
     /// ATTITUDE (30), in the frames of [`afbc_types`].
     Attitude {
@@ -230,8 +230,8 @@ fn write_heartbeat(armed: bool, failsafe: bool, mode: u32) -> HEARTBEAT_DATA {
 }
 
 fn read_rotors(data: &HIL_ACTUATOR_CONTROLS_DATA) -> Result<Downlink, Fault> {
-    let [a, b, c, d, ..] = data.controls;
-    let controls = Vector4::new(a, b, c, d);
+    let [a, b, c, d, e, f, g, h, ..] = data.controls;
+    let controls = SVector::from([a, b, c, d, e, f, g, h]);
     if !controls.iter().all(|control| (0.0..=1.0).contains(control)) {
         return Err(Fault::Implausible);
     }
@@ -242,7 +242,7 @@ fn read_rotors(data: &HIL_ACTUATOR_CONTROLS_DATA) -> Result<Downlink, Fault> {
     })
 }
 
-fn write_rotors(time_us: u64, armed: bool, speeds: &RotorSpeeds) -> HIL_ACTUATOR_CONTROLS_DATA {
+fn write_rotors(time_us: u64, armed: bool, speeds: &RotorSpeeds<ROTORS_MAX>) -> HIL_ACTUATOR_CONTROLS_DATA {
     let mut data = HIL_ACTUATOR_CONTROLS_DATA {
         time_usec: time_us,
         flags: HilActuatorControlsFlags::empty(),

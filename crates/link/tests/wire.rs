@@ -17,7 +17,7 @@ use mavlink::dialects::common::{
     PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MessageData};
-use nalgebra::{Vector3, Vector4};
+use nalgebra::{SVector, Vector3};
 use proptest::prelude::*;
 
 const STATION: Address = Address { system: 255, component: 190 };
@@ -377,8 +377,8 @@ const SEVERITIES: [MavSeverity; 8] = [
 proptest! {
     /// Rotor speeds are transmitted without losing a bit.
     #[test]
-    fn rotor_speeds_are_exact(speeds in prop::array::uniform4(0.0f32..32_768.0), time_us: u64, armed: bool) {
-        let rotors = Downlink::Rotors { time_us, armed, speeds: RotorSpeeds(Vector4::from(speeds)) };
+    fn rotor_speeds_are_exact(speeds in prop::array::uniform8(0.0f32..32_768.0), time_us: u64, armed: bool) {
+        let rotors = Downlink::Rotors { time_us, armed, speeds: RotorSpeeds(SVector::from(speeds)) };
         prop_assert_eq!(read(&bytes(&rotors)), Ok(rotors));
     }
 

@@ -119,7 +119,7 @@ impl Comms {
 
     /// Sends all messages due after a tick, frame by frame, through `send`. `tick_cycles` is the duration of the tick
     /// in cycles of 168 MHz.
-    pub fn report(&mut self, report: &Report, tick_cycles: u32, mut send: impl FnMut(&[u8])) {
+    pub fn report<const N: usize>(&mut self, report: &Report<N>, tick_cycles: u32, mut send: impl FnMut(&[u8])) {
         let mut buffer = [0; FRAME_MAX];
         let mut say = |message: Downlink| send(self.sender.send(&message, &mut buffer));
 
@@ -131,7 +131,7 @@ impl Comms {
         let armed = report.mode.armed();
         if self.state_is_news || ROTORS.is_due(self.tick) {
             self.state_is_news = false;
-            say(Downlink::Rotors { time_us: report.time_us, armed, speeds: report.motors });
+            say(Downlink::Rotors { time_us: report.time_us, armed, speeds: report.motors.padded() });
         }
         if let Some(answer) = report.answer.and_then(|answer| self.answers.settle(answer)) {
             say(answer);

@@ -1,31 +1,32 @@
 //! The vehicle with its flight core and motors.
 
+use crate::configuration::Configuration;
 use afbc::monitor::{Bounds, Norm};
-use afbc::{Guarded, Profile, guarded};
-use afbc_flight_core::motor::Curve;
+use afbc::{Guarded, guarded};
 use afbc_flight_core::{Answer, ArmingLimits, End, Health, Inbox, Mode, Motor, Vehicle, VehicleMemory};
-use afbc_types::{Axis, OutOfRange, Parameters, RotorSpeeds};
+use afbc_types::{Axis, OutOfRange, ROTORS_MAX, RotorSpeeds};
+use core::array;
 
-/// The paper's vehicle under AFBC in the profile `flight`.
+/// A vehicle under AFBC with its monitor.
 #[derive(Clone, Debug)]
-pub struct Flight {
-    vehicle: Vehicle<Guarded>,
-    memory: VehicleMemory<guarded::Memory>,
+pub struct Flight<const N: usize = 4> {
+    vehicle: Vehicle<Guarded<N>, N>,
+    memory: VehicleMemory<guarded::Memory<N>>,
     motor: Motor,
     saturated_ticks: u32,
 }
 
 /// Result of a control tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Report {
+pub struct Report<const N: usize = 4> {
     /// Start of the tick, since power-up \[us\].
     pub time_us: u64,
     /// Flight mode.
     pub mode: Mode,
     /// Rotor speeds for the motors: zero if disarmed.
-    pub motors: RotorSpeeds,
+    pub motors: RotorSpeeds<N>,
     /// Throttles for the motors: 0 if disarmed, otherwise 48 to 2047.
-    pub throttles: [u16; 4],
+    pub throttles: [u16; N],
     /// Health of the flight core.
     pub health: Health,
     /// Ticks since power-up in which a rotor was commanded a force outside its limits.
@@ -38,20 +39,31 @@ pub struct Report {
     pub ended: Option<End>,
 }
 
-impl Flight {
+impl<const N: usize> Report<N> {
+    /// The same report, with zeros for the rotors that this vehicle has not.
+    #[must_use]
+    pub fn padded(&self) -> Report<ROTORS_MAX> {
+        let Report { time_us, mode, motors, throttles, health, saturated_ticks, learnt, answer, ended } = *self;
+        let throttles = array::from_fn(|i| throttles.get(i).copied().unwrap_or_default());
+        let motors = motors.padded();
+        Report { time_us, mode, motors, throttles, health, saturated_ticks, learnt, answer, ended }
+    }
+}
+
+impl<const N: usize> Flight<N> {
     /// Creates the vehicle, disarmed.
     ///
     /// # Errors
-    /// The first parameter out of range.
-    pub fn new() -> Result<Self, OutOfRange> {
-        let (parameters, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
-        let gains = Profile::Flight.gains_for(&parameters);
-        let bounds = Bounds::new(&gains, &parameters);
-        let controller = Guarded::new(parameters, settings, gains, bounds)?;
+    /// The first parameter, setting or gain out of range, or the first that leaves the vehicle without a margin to
+    /// hover.
+    pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
+        let Configuration { airframe, settings, gains, curve } = configuration;
+        let bounds = Bounds::new(gains, &airframe.parameters);
+        let controller = Guarded::new(*airframe, *settings, *gains, bounds)?;
         Ok(Flight {
-            vehicle: Vehicle::new(parameters, ArmingLimits::default(), controller)?,
+            vehicle: Vehicle::new(airframe.parameters, ArmingLimits::default(), controller)?,
             memory: VehicleMemory::default(),
-            motor: Motor::new(Curve::DEFAULT)?,
+            motor: Motor::new(*curve)?,
             saturated_ticks: 0,
         })
     }
@@ -62,7 +74,7 @@ impl Flight {
     }
 
     /// Runs one control tick, to be called every millisecond; `now_us` is the time since power-up. Cannot fail.
-    pub fn tick(&mut self, now_us: u64, inbox: &Inbox) -> Report {
+    pub fn tick(&mut self, now_us: u64, inbox: &Inbox) -> Report<N> {
         let outcome = self.vehicle.tick(&mut self.memory, now_us, inbox);
         if outcome.health.control.saturated {
             self.saturated_ticks = self.saturated_ticks.saturating_add(1);

@@ -6,10 +6,11 @@
 //! with the same bytes and times gets the same bytes as the processor.
 //!
 //! ```
-//! use afbc_onboard::{Comms, Flight};
+//! use afbc_onboard::{Comms, Configuration, Flight};
 //! use afbc_flight_core::Inbox;
 //!
-//! let (mut flight, mut comms, mut inbox) = (Flight::new()?, Comms::new(), Inbox::default());
+//! let mut flight = Flight::new(&Configuration::default())?;
+//! let (mut comms, mut inbox) = (Comms::new(), Inbox::default());
 //! inbox.post(&comms.receive(b"MAVLink, or noise"));
 //! let report = flight.tick(1_000, &inbox.take());
 //! assert_eq!(report.throttles, [0; 4]); // disarmed
@@ -20,9 +21,11 @@
 
 mod answers;
 mod comms;
+mod configuration;
 mod failsafes;
 mod flight;
 
 pub use answers::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, FORGOTTEN_US};
 pub use comms::{ADDRESS, CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
+pub use configuration::Configuration;
 pub use flight::{Flight, Report};

@@ -3,7 +3,7 @@
 
 use afbc_flight_core::{Inbox, Mode, Refusal};
 use afbc_link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
-use afbc_onboard::{CLOCK_FAILED, Comms, Flight, TICK_OFF};
+use afbc_onboard::{CLOCK_FAILED, Comms, Configuration, Flight, TICK_OFF};
 use afbc_types::{Setpoint, State};
 
 const STATION: Address = Address { system: 255, component: 190 };
@@ -25,7 +25,7 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         Bench {
-            flight: Flight::new().expect("valid"),
+            flight: Flight::new(&Configuration::default()).expect("valid"),
             comms: Comms::new(),
             inbox: Inbox::default(),
             sender: Sender::new(STATION),

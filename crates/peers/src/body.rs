@@ -4,13 +4,13 @@ use crate::attitude::roll_pitch;
 use afbc_control::command_filter::Filtered;
 use afbc_control::mixer::{Allocation, Mixer};
 use afbc_control::{Action, Errors, Settings, Trace};
-use afbc_types::{Declared, Inputs, OutOfRange, Parameters, PerAxis, RotorSpeeds};
+use afbc_types::{Airframe, Declared, Inputs, OutOfRange, PerAxis, RotorSpeeds};
 use nalgebra::{Matrix3, Vector3};
 
 /// The nominal vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Body {
-    pub(crate) mixer: Mixer,
+pub(crate) struct Body<const N: usize> {
+    pub(crate) mixer: Mixer<N>,
     pub(crate) mass_kg: f32,
     pub(crate) inertia_kg_m2: Vector3<f32>,
     /// l/Ix, l/Iy, (d/b)/Iz: angular acceleration per newton of U1..U3 \[rad/s2 per N\].
@@ -34,15 +34,14 @@ pub(crate) struct Demand {
     pub(crate) errors: [Vector3<f32>; 4],
 }
 
-impl Body {
+impl<const N: usize> Body<N> {
     /// Makes the vehicle with these parameters.
-    pub(crate) fn new(vehicle: &Parameters, settings: &Settings) -> Result<Self, OutOfRange> {
+    pub(crate) fn new(vehicle: &Airframe<N>, settings: &Settings) -> Result<Self, OutOfRange> {
         settings.validate()?;
-        let mixer = Mixer::new(vehicle, settings.rotor_force_max_n)?;
-        let (l, i) = (vehicle.arm_m, vehicle.inertia_kg_m2);
-        let c = vehicle.drag_factor_n_m_s2 / vehicle.thrust_factor_n_s2;
-        let effectiveness = Vector3::new(l / i.x, l / i.y, c / i.z);
-        Ok(Body { mixer, mass_kg: vehicle.mass_kg, inertia_kg_m2: i, effectiveness })
+        let mixer = Mixer::new(*vehicle, settings.rotor_force_max_n)?;
+        let vehicle = &vehicle.parameters;
+        let (inertia_kg_m2, effectiveness) = (vehicle.inertia_kg_m2, vehicle.effectiveness());
+        Ok(Body { mixer, mass_kg: vehicle.mass_kg, inertia_kg_m2, effectiveness })
     }
 
     /// Returns d Omega/dt due to the rotors under `inputs` \[rad/s2\].
@@ -58,24 +57,25 @@ impl Body {
     }
 
     /// Returns the rotor speeds at hover \[rad/s\].
-    pub(crate) fn hover(&self, gravity_m_s2: f32) -> RotorSpeeds {
-        let inputs = Inputs { thrust_n: self.mass_kg * gravity_m_s2, ..Inputs::default() };
+    pub(crate) fn hover(&self, weight_n: f32) -> RotorSpeeds<N> {
+        let inputs = Inputs { thrust_n: weight_n, ..Inputs::default() };
         self.mixer.speeds(&self.mixer.allocate(&inputs).forces)
     }
 
     /// Returns the action for `demand`, its trace, and the unallocated part of U1..U3 \[N\].
     #[inline]
-    pub(crate) fn act(&self, demand: &Demand) -> (Action, Trace, Vector3<f32>) {
+    pub(crate) fn act(&self, demand: &Demand) -> (Action<N>, Trace, Vector3<f32>) {
         let wanted = demand.angular_acceleration_rad_s2.component_div(&self.effectiveness);
         let inputs = Inputs { roll_n: wanted.x, pitch_n: wanted.y, yaw_n: wanted.z, thrust_n: demand.thrust_n };
-        let Allocation { forces, unallocated, saturated, .. } = self.mixer.allocate(&inputs);
+        let allocation = self.mixer.allocate(&inputs);
+        let Allocation { unallocated, .. } = allocation;
 
         let desired_rad = roll_pitch(&demand.desired);
         let [roll, pitch] = desired_rad;
         let [p, q] = [demand.desired_rates_rad_s.x, demand.desired_rates_rad_s.y];
         let [position, velocity, attitude, rates] = demand.errors;
         let errors = |e1, e1_dot| Errors { e1, e1_dot, e2: 0.0 };
-        let action = Action::new(self.mixer.speeds(&forces), forces, saturated);
+        let action = self.mixer.carry_out(&allocation);
         let mut trace = Trace::default();
         trace.inputs = inputs;
         trace.virtual_m_s2 = [demand.acceleration_m_s2.x, demand.acceleration_m_s2.y];

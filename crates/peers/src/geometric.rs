@@ -44,7 +44,7 @@ use crate::integral::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
 use crate::limits::Limits;
 use crate::loops::xy_and_z;
 use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
-use afbc_types::{Declared, OutOfRange, Parameters, Setpoint, State, parameters};
+use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
 use nalgebra::{Matrix3, Vector3};
 
 parameters! {
@@ -133,8 +133,8 @@ impl Gains {
 
 /// The controller. Immutable; what changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Geometric {
-    body: Body,
+pub struct Geometric<const N: usize = 4> {
+    body: Body<N>,
     limits: Limits,
     filter: Differentiator,
     dt_s: f32,
@@ -196,19 +196,21 @@ pub fn desired(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> Desire
     }
 }
 
-impl Geometric {
+impl<const N: usize> Geometric<N> {
     /// Makes a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
     /// The first parameter, setting or gain out of range.
-    pub fn new(vehicle: Parameters, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
+    pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
+        let vehicle = vehicle.into();
         let body = Body::new(&vehicle, &settings)?;
+        let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
         gains.validate()?;
         let (k_r, k_omega) =
             (xy_and_z(gains.tilt_p_1_s2, gains.yaw_p_1_s2), xy_and_z(gains.tilt_d_1_s, gains.yaw_d_1_s));
         Ok(Geometric {
             body,
-            limits: Limits::new(&vehicle, &settings, gains.tilt_max_rad),
+            limits: Limits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
             filter: Differentiator::new(gains.filter_rad_s, settings.dt_s)?,
             dt_s: settings.dt_s,
             k_x: xy_and_z(gains.position_p_1_s2, gains.height_p_1_s2),
@@ -223,14 +225,14 @@ impl Geometric {
     }
 }
 
-impl FlightController for Geometric {
+impl<const N: usize> FlightController<N> for Geometric<N> {
     type Memory = Memory;
 
     fn dt_s(&self) -> f32 {
         self.dt_s
     }
 
-    fn mixer(&self) -> &Mixer {
+    fn mixer(&self) -> &Mixer<N> {
         &self.body.mixer
     }
 
@@ -239,7 +241,7 @@ impl FlightController for Geometric {
     }
 
     #[inline]
-    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
+    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
         // Position.
         let gravity = self.limits.gravity();
         let position_error = setpoint.position_m - state.position_m;

@@ -38,7 +38,7 @@ use crate::differentiator::{Differentiator, Smooth};
 use crate::limits::Limits;
 use crate::loops::{AttitudeLoop, AttitudeOutput, PositionLoop, PositionOutput, xy_and_z};
 use afbc_control::{Action, FlightController, Mixer, Settings, Trace, math};
-use afbc_types::{Declared, OutOfRange, Parameters, RotorSpeeds, Setpoint, State, parameters};
+use afbc_types::{Airframe, Declared, OutOfRange, RotorSpeeds, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
 parameters! {
@@ -116,13 +116,13 @@ impl Gains {
 
 /// The controller. Immutable; what changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Indi {
-    body: Body,
+pub struct Indi<const N: usize = 4> {
+    body: Body<N>,
     dt_s: f32,
     limits: Limits,
     position_filter: Differentiator,
     attitude_filter: Differentiator,
-    hover: RotorSpeeds,
+    hover: RotorSpeeds<N>,
     /// 1 - exp(-dt / tau)
     rotor_gain: f32,
     position: PositionLoop,
@@ -132,9 +132,9 @@ pub struct Indi {
 
 /// State of the controller between steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Memory {
+pub struct Memory<const N: usize = 4> {
     /// Speeds of the rotor model; none before the first step.
-    rotors: Option<RotorSpeeds>,
+    rotors: Option<RotorSpeeds<N>>,
     velocity: Smooth,
     specific_force: Smooth,
     rates: Smooth,
@@ -144,22 +144,24 @@ pub struct Memory {
     trace: Trace,
 }
 
-impl Indi {
+impl<const N: usize> Indi<N> {
     /// Makes a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
     /// The first parameter, setting or gain out of range.
-    pub fn new(vehicle: Parameters, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
+    pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
+        let vehicle = vehicle.into();
         let body = Body::new(&vehicle, &settings)?;
+        let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
         gains.validate()?;
         let tau = gains.rotor_time_constant_s;
         Ok(Indi {
             body,
             dt_s: settings.dt_s,
-            limits: Limits::new(&vehicle, &settings, gains.tilt_max_rad),
+            limits: Limits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
             position_filter: Differentiator::new(gains.position_filter_rad_s, settings.dt_s)?,
             attitude_filter: Differentiator::new(gains.attitude_filter_rad_s, settings.dt_s)?,
-            hover: body.hover(vehicle.gravity_m_s2),
+            hover: body.hover(vehicle.weight_n()),
             rotor_gain: if tau > 0.0 { 1.0 - math::exp(-settings.dt_s / tau) } else { 1.0 },
             position: PositionLoop {
                 position_p: xy_and_z(gains.position_p_1_s, gains.height_p_1_s),
@@ -172,29 +174,29 @@ impl Indi {
     }
 }
 
-impl FlightController for Indi {
-    type Memory = Memory;
+impl<const N: usize> FlightController<N> for Indi<N> {
+    type Memory = Memory<N>;
 
     fn dt_s(&self) -> f32 {
         self.dt_s
     }
 
-    fn mixer(&self) -> &Mixer {
+    fn mixer(&self) -> &Mixer<N> {
         &self.body.mixer
     }
 
-    fn trace(memory: &Memory) -> Trace {
+    fn trace(memory: &Memory<N>) -> Trace {
         memory.trace
     }
 
     #[inline]
-    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
+    fn decide(&self, memory: &mut Memory<N>, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
         let r = r_earth_body(&state.attitude_rad);
         let (body_z, earth_z) = (unit(&r.column(2).into()), r.row(2).transpose());
 
         // Present rotor forces by the model, and the measured reaction of the vehicle.
         let rotors = memory.rotors.unwrap_or(self.hover);
-        let now = Mixer::inputs(&self.body.mixer.forces(&rotors));
+        let now = self.body.mixer.inputs(&self.body.mixer.forces(&rotors));
         // Without a new measurement no filter advances, so that all four stay synchronous.
         if fresh {
             let specific_force = body_z * (now.thrust_n / self.body.mass_kg);

@@ -54,7 +54,9 @@ mod integral;
 pub mod limits;
 mod loops;
 pub mod pid;
+mod slowed;
 
 pub use geometric::Geometric;
 pub use indi::Indi;
 pub use pid::Pid;
+pub use slowed::slowed;

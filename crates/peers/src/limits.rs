@@ -1,6 +1,6 @@
 //! Limits on the demand of the position loops.
 
-use afbc_control::{Settings, math};
+use afbc_control::math;
 use afbc_types::Parameters;
 use nalgebra::Vector3;
 
@@ -22,11 +22,12 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Makes the bounds of a vehicle; parameters, settings and largest tilt must be valid.
-    pub fn new(vehicle: &Parameters, settings: &Settings, tilt_max_rad: f32) -> Self {
+    /// Makes the bounds of a vehicle whose rotors give `thrust_max_n` together; parameters and largest tilt must be
+    /// valid.
+    pub fn new(vehicle: &Parameters, thrust_max_n: f32, tilt_max_rad: f32) -> Self {
         let vertical_min_m_s2 = VERTICAL_MIN * vehicle.gravity_m_s2;
         // A vehicle whose rotors cannot lift it must still have valid bounds.
-        let max_m_s2 = (4.0 * settings.rotor_force_max_n / vehicle.mass_kg).max(2.0 * vertical_min_m_s2);
+        let max_m_s2 = (thrust_max_n / vehicle.mass_kg).max(2.0 * vertical_min_m_s2);
         Limits {
             gravity_m_s2: vehicle.gravity_m_s2,
             vertical_min_m_s2,

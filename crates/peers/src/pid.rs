@@ -29,7 +29,7 @@ use crate::integral::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
 use crate::limits::Limits;
 use crate::loops::{AttitudeLoop, AttitudeOutput, PositionLoop, PositionOutput, xy_and_z};
 use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
-use afbc_types::{Declared, OutOfRange, Parameters, Setpoint, State, parameters};
+use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
 parameters! {
@@ -131,8 +131,8 @@ impl Gains {
 
 /// The controller. Immutable; what changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pid {
-    body: Body,
+pub struct Pid<const N: usize = 4> {
+    body: Body<N>,
     limits: Limits,
     differentiator: Differentiator,
     dt_s: f32,
@@ -163,18 +163,20 @@ pub struct Memory {
     trace: Trace,
 }
 
-impl Pid {
+impl<const N: usize> Pid<N> {
     /// Makes a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
     /// The first parameter, setting or gain out of range.
-    pub fn new(vehicle: Parameters, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
+    pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
+        let vehicle = vehicle.into();
         let body = Body::new(&vehicle, &settings)?;
+        let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
         gains.validate()?;
         let velocity_p = xy_and_z(gains.velocity_p_1_s, gains.climb_p_1_s);
         Ok(Pid {
             body,
-            limits: Limits::new(&vehicle, &settings, gains.tilt_max_rad),
+            limits: Limits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
             differentiator: Differentiator::new(gains.filter_rad_s, settings.dt_s)?,
             dt_s: settings.dt_s,
             position: PositionLoop {
@@ -194,14 +196,14 @@ impl Pid {
     }
 }
 
-impl FlightController for Pid {
+impl<const N: usize> FlightController<N> for Pid<N> {
     type Memory = Memory;
 
     fn dt_s(&self) -> f32 {
         self.dt_s
     }
 
-    fn mixer(&self) -> &Mixer {
+    fn mixer(&self) -> &Mixer<N> {
         &self.body.mixer
     }
 
@@ -210,7 +212,7 @@ impl FlightController for Pid {
     }
 
     #[inline]
-    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
+    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
         if fresh {
             self.differentiator.advance(&mut memory.velocity, &state.velocity_m_s);
             self.differentiator.advance(&mut memory.rates, &state.rates_rad_s);

@@ -343,7 +343,7 @@ fn no_integral_moves_on_a_stale_state() {
 #[test]
 fn increments_cancel_a_constant_moment() {
     let controller = indi();
-    let mixer = afbc_control::mixer::Mixer::new(&vehicle(), SETTINGS.rotor_force_max_n).unwrap();
+    let mixer = afbc_control::mixer::Mixer::new(vehicle(), SETTINGS.rotor_force_max_n).unwrap();
     let mut memory = Screened::<indi::Memory>::default();
     let mut rotors = nalgebra::Vector4::repeat(libm::sqrt(f64::from(WEIGHT_N) / 4.0 / 2.984e-5));
     let effectiveness = 3.232e-7 / 2.984e-5 / 0.0076;
@@ -358,7 +358,7 @@ fn increments_cancel_a_constant_moment() {
         };
         let command = controller.step(&mut memory, Some(&state), &Setpoint::default());
         rotors += (command.speeds.0.cast::<f64>() - rotors) * lag;
-        let u = afbc_control::mixer::Mixer::inputs(&mixer.forces(&afbc_types::RotorSpeeds(rotors.cast())));
+        let u = mixer.inputs(&mixer.forces(&afbc_types::RotorSpeeds(rotors.cast())));
         rate += (effectiveness * f64::from(u.yaw_n) + disturbance) * dt_s;
         angle += rate * dt_s;
         largest = angle.abs().max(largest);

@@ -4,6 +4,7 @@
 
 use crate::Error;
 use crate::qemu::{self, Qemu};
+use afbc_types::ROTORS_MAX;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -30,8 +31,8 @@ pub struct Reply {
     pub instructions: u32,
     /// Largest stack depth so far, interrupts included, as of the last full second \[bytes\].
     pub stack_bytes: u32,
-    /// Throttles of the motors: 0, or 48 to 2047.
-    pub throttles: [u16; 4],
+    /// Throttles of the motors: 0, or 48 to 2047; 0 where there is no motor.
+    pub throttles: [u16; ROTORS_MAX],
     /// Bytes sent over the link.
     pub bytes: Vec<u8>,
 }
@@ -135,7 +136,7 @@ fn read_reply(from: &mut impl Read, shift: u32) -> io::Result<Reply> {
     let cycles = u32::from_le_bytes(field(from)?);
     let stack_bytes = u32::from_le_bytes(field(from)?);
     let length = u32::from_le_bytes(field(from)?) as usize;
-    let mut throttles = [0; 4];
+    let mut throttles = [0; ROTORS_MAX];
     for throttle in &mut throttles {
         *throttle = u16::from_le_bytes(field(from)?);
     }

@@ -33,11 +33,12 @@ impl Image {
         if path.is_file() { Ok(path) } else { Err(Error::NoImage(path)) }
     }
 
-    /// Builds the image by its cargo alias and returns its path. `FW_TOOLCHAIN`, if set, names the toolchain.
+    /// Builds the image by its cargo alias, for `vehicle` or the default one, and returns its path. `FW_TOOLCHAIN`, if
+    /// set, names the toolchain.
     ///
     /// # Errors
     /// [`Error::NoTarget`], [`Error::Build`].
-    pub fn build(self) -> Result<PathBuf, Error> {
+    pub fn build(self, vehicle: Option<&Path>) -> Result<PathBuf, Error> {
         let libraries = toolchain("rustc").args(["--print", "target-libdir", "--target", TARGET]).output()?;
         let libraries = PathBuf::from(String::from_utf8_lossy(&libraries.stdout).trim());
         if !libraries.is_dir() {
@@ -47,7 +48,17 @@ impl Image {
             Image::Flight => "fw",
             Image::Pil => "fw-pil",
         };
-        let status = toolchain("cargo").arg(alias).current_dir(workspace()).stdout(Stdio::null()).status()?;
+        let mut cargo = toolchain("cargo");
+        match vehicle {
+            Some(vehicle) => {
+                // A file is told from a name of `vehicles/`; cargo runs elsewhere.
+                let file = std::path::absolute(vehicle).ok().filter(|path| path.is_file());
+                cargo.env("VEHICLE", file.as_deref().unwrap_or(vehicle))
+            }
+            // The host beside it flies the default one.
+            None => cargo.env_remove("VEHICLE"),
+        };
+        let status = cargo.arg(alias).current_dir(workspace()).stdout(Stdio::null()).status()?;
         if status.success() { self.find() } else { Err(Error::Build) }
     }
 }

@@ -15,7 +15,7 @@
 //! ```no_run
 //! use pil::{Emulator, Image};
 //!
-//! let mut emulator = Emulator::start(&Image::Pil.build()?)?;
+//! let mut emulator = Emulator::start(&Image::Pil.build(None)?)?;
 //! let reply = emulator.exchange(b"MAVLink in")?;
 //! println!("{} instructions, {} bytes out", reply.instructions, reply.bytes.len());
 //! # Ok::<(), pil::Error>(())

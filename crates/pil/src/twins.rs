@@ -2,7 +2,6 @@
 
 use crate::emulator::{Emulator, Reply};
 use afbc_sim::in_the_loop::{Autopilot, Error, Extremes, Host, Tick};
-use afbc_types::OutOfRange;
 
 /// The emulated processor and the same code on the host. The host gets the same bytes at the same times, and every
 /// output of every tick is compared. The loop has no other input, so as long as none differs, the host alone would have
@@ -37,12 +36,9 @@ pub struct Comparison {
 }
 
 impl Twins {
-    /// Creates both, disarmed.
-    ///
-    /// # Errors
-    /// The first parameter out of range; does not occur.
-    pub fn new(emulator: Emulator) -> Result<Self, OutOfRange> {
-        Ok(Twins { emulator, host: Host::new()?, comparison: Comparison::default() })
+    /// Creates both, disarmed; `host` must have the firmware of the vehicle that the image was built for.
+    pub fn new(emulator: Emulator, host: Host) -> Self {
+        Twins { emulator, host, comparison: Comparison::default() }
     }
 
     /// Returns the result so far.

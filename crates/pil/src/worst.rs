@@ -126,7 +126,7 @@ impl EmulatedFlight {
         self.station.say(&Uplink::State { sent_us: self.tick * 1000, state });
         self.station.say(&Uplink::Setpoint(setpoint));
         let reply = self.emulator.exchange(&self.station.take())?;
-        Ok((reply.throttles != [0; 4]).then_some(reply.instructions))
+        Ok((reply.throttles.iter().any(|throttle| *throttle != 0)).then_some(reply.instructions))
     }
 
     /// Puts the vehicle on the ground and arms it.

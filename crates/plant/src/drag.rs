@@ -1,19 +1,21 @@
 //! Aerodynamic drag: a concrete form of the paper's A_i = 1/2 rho C_i W^2.
 
+use crate::frame::{Frame, Lanes, Sums};
 use afbc_types::{Declared, OutOfRange, Parameters, Range, parameters};
 use libm::sqrt;
-use nalgebra::{Vector3, Vector4};
+use nalgebra::Vector3;
 
 parameters! {
     /// Drag of blades and body due to the airspeed W = velocity - wind, in body axes.
     ///
     /// * **Blades**: the blades of rotor i give a force -k omega_i (W + Omega x r_i) in the rotor plane, with k =
     ///   `blade_n_s2_m`, that rotor's speed omega_i and the airspeed of its hub at r_i, where the force acts. The sum
-    ///   is -k sum(omega_i) W; since the hubs move around the centre of mass, yaw is damped with the rate 4 k omega
-    ///   l^2/Iz, and rotors of unequal speed in wind give a yaw moment. Linear, and the larger part at hover speeds. P.
-    ///   Martin, E. Salaun 2010, *The true role of accelerometer feedback in quadrotor control*, ICRA; M. Faessler, A.
-    ///   Franchi, D. Scaramuzza 2018, *Differential flatness of quadrotor dynamics subject to rotor drag*, RA-L 3(2),
-    ///   whose mass-normalised 0.2 to 0.6 1/s are this factor times the sum of the rotor speeds over the mass.
+    ///   is -k sum(omega_i) W; since the hubs move around the centre of mass, yaw is damped, on the paper's frame with
+    ///   the rate 4 k omega l^2/Iz, and rotors of unequal speed in wind give a yaw moment. Linear, and the larger part
+    ///   at hover speeds. P. Martin, E. Salaun 2010, *The true role of accelerometer feedback in quadrotor control*,
+    ///   ICRA; M. Faessler, A. Franchi, D. Scaramuzza 2018, *Differential flatness of quadrotor dynamics subject to
+    ///   rotor drag*, RA-L 3(2), whose mass-normalised 0.2 to 0.6 1/s are this factor times the sum of the rotor speeds
+    ///   over the mass.
     /// * **Body**: -1/2 rho C_i S_i |W| W_i along each body axis, which is the paper's A_i for flow along that axis.
     ///   The body's rotation has no effect.
     ///
@@ -49,34 +51,39 @@ impl Drag {
     /// A guess for the paper's vehicle: blades at 0.4 1/s in hover, a body of about 0.1 m by 0.1 m.
     pub const PAPER: Self = Self::DEFAULT;
 
-    /// Checks every parameter for a vehicle with rotor speeds up to `max_rad_s`, and this step.
+    /// Checks every parameter for a vehicle with this frame and rotor speeds up to `max_rad_s`, and this step.
     ///
     /// # Errors
     /// The first parameter out of range.
-    pub fn validate_for(&self, vehicle: &Parameters<f64>, max_rad_s: f64, step_s: f64) -> Result<(), OutOfRange> {
+    pub fn validate_for(
+        &self,
+        vehicle: &Parameters<f64>,
+        frame: &Frame,
+        max_rad_s: f64,
+        step_s: f64,
+    ) -> Result<(), OutOfRange> {
         self.validate()?;
         // Largest rate at which a force in the rotor plane changes the velocity of its hub: it pushes, tilts and turns
         // the vehicle.
         let Parameters { mass_kg, arm_m, inertia_kg_m2: i, .. } = vehicle;
         let (height_m, rate_max) = (self.rotor_height_m, RATE_PER_STEP_MAX / step_s);
-        let hub_per_kg = 1.0 / mass_kg + height_m * height_m / i.x.min(i.y) + arm_m * arm_m / i.z;
-        Range { max: rate_max / (4.0 * max_rad_s * hub_per_kg), ..Self::BLADE.range }.check(self.blade_n_s2_m)?;
+        let hub_per_kg = 1.0 / mass_kg + height_m * height_m / i.x.min(i.y) + arm_m * arm_m * frame.square_max() / i.z;
+        Range { max: rate_max / (frame.count() as f64 * max_rad_s * hub_per_kg), ..Self::BLADE.range }
+            .check(self.blade_n_s2_m)?;
         let per_area = self.air_density_kg_m3 * AIRSPEED_M_S;
         Range { max: rate_max * mass_kg / per_area, ..Self::AREA.range }.check(self.area_m2.max())
     }
 
     /// Returns the drag over one step of a vehicle with arms of `arm_m` and rotors at `speeds_rad_s`.
     #[inline]
-    pub(crate) fn held(&self, speeds_rad_s: &Vector4<f64>, arm_m: f64) -> HeldDrag {
-        let [w1, w2, w3, w4] = (*speeds_rad_s).into();
-        let blade_n_s_m = self.blade_n_s2_m * (w1 + w2 + w3 + w4);
+    pub(crate) fn held(&self, frame: &Frame, speeds_rad_s: &Lanes, arm_m: f64) -> HeldDrag {
+        let Sums { all, x, y, square, .. } = frame.sums(speeds_rad_s);
         let lever = self.blade_n_s2_m * arm_m;
         HeldDrag {
-            blade_n_s_m,
-            // Rotor 2 at +x, 4 at -x, 3 at +y, 1 at -y.
-            lever_x_n_s: lever * (w2 - w4),
-            lever_y_n_s: lever * (w3 - w1),
-            yaw_n_m_s: blade_n_s_m * arm_m * arm_m,
+            blade_n_s_m: self.blade_n_s2_m * all,
+            lever_x_n_s: lever * x,
+            lever_y_n_s: lever * y,
+            yaw_n_m_s: self.blade_n_s2_m * square * arm_m * arm_m,
             rotor_height_m: self.rotor_height_m,
             body_n_s2_m2: self.area_m2 * (0.5 * self.air_density_kg_m3),
             centre_m: self.centre_m,
@@ -94,7 +101,7 @@ pub(crate) struct HeldDrag {
     lever_x_n_s: f64,
     /// Sum of k omega_i y_i \[N s\].
     lever_y_n_s: f64,
-    /// Sum of k omega_i l^2 \[N m s\].
+    /// Sum of k omega_i (x_i^2 + y_i^2) \[N m s\].
     yaw_n_m_s: f64,
     rotor_height_m: f64,
     /// 1/2 rho C_i S_i \[N s2/m2\].

@@ -1,5 +1,6 @@
 //! External disturbances, and changes of the vehicle's parameters over time.
 
+use crate::frame::Frame;
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, Range};
 use alloc::vec::Vec;
 use nalgebra::Vector3;
@@ -90,6 +91,7 @@ impl Payload {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
     nominal: Parameters<f64>,
+    frame: Frame,
     changes: Vec<ParameterChange>,
     gusts: Vec<Gust>,
     payloads: Vec<Payload>,
@@ -133,7 +135,7 @@ impl Environment {
     /// # Errors
     /// The first parameter out of range, initially or at any time, or the first gust out of [`GUST_SIZE`] or [`START`].
     pub fn new(nominal: Parameters<f64>, changes: Vec<ParameterChange>, gusts: Vec<Gust>) -> Result<Self, OutOfRange> {
-        let environment = Environment { nominal, changes, gusts, payloads: Vec::new() };
+        let environment = Environment { nominal, frame: Frame::default(), changes, gusts, payloads: Vec::new() };
         nominal.validate()?;
         for gust in &environment.gusts {
             GUST_SIZE.check(gust.size)?;
@@ -157,6 +159,23 @@ impl Environment {
         Ok(environment)
     }
 
+    /// The same changes, gusts and payloads of a vehicle with other parameters.
+    ///
+    /// # Errors
+    /// The first parameter out of range, as it stands or at any time under them.
+    pub fn on(&self, nominal: Parameters<f64>) -> Result<Self, OutOfRange> {
+        nominal.validate()?;
+        let environment = Environment { nominal, ..self.clone() };
+        environment.validate_changes()?;
+        Ok(environment)
+    }
+
+    /// The same environment of a vehicle with this frame instead of the paper's.
+    #[must_use]
+    pub fn with_frame(self, frame: Frame) -> Self {
+        Environment { frame, ..self }
+    }
+
     fn validate_changes(&self) -> Result<(), OutOfRange> {
         let changes = self.changes.iter().flat_map(|c| [c.start_s, c.end_s]);
         let payloads = self.payloads.iter().flat_map(|p| [p.start_s, p.end_s]);
@@ -166,6 +185,11 @@ impl Environment {
     /// Returns the true parameters before any change.
     pub fn nominal(&self) -> &Parameters<f64> {
         &self.nominal
+    }
+
+    /// Where the rotors are.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
     }
 
     /// Returns every gust.

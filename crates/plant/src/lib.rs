@@ -18,7 +18,7 @@
 //! let environment = Environment::calm(Parameters::PAPER)?;
 //! let mut plant = Plant::new(Model::RigidBody, Motion::default(), environment);
 //! for _ in 0..1000 {
-//!     plant.step(&RotorSpeeds::default(), 0.001);
+//!     plant.step(&RotorSpeeds::<4>::default(), 0.001);
 //! }
 //! assert!((plant.motion().velocity_m_s.z + 9.81).abs() < 1e-9); // one second of free fall
 //! # Ok::<(), afbc_types::OutOfRange>(())
@@ -33,6 +33,7 @@ pub mod contact;
 mod delay;
 pub mod drag;
 mod environment;
+mod frame;
 pub mod ground_effect;
 pub mod integrate;
 mod load;
@@ -54,6 +55,7 @@ pub use drag::Drag;
 pub use environment::{
     Environment, GUST_SIZE, Gust, GustKind, PAYLOAD_BELOW, PAYLOAD_MASS, ParameterChange, Payload, Quantity, START,
 };
+pub use frame::{Frame, Lanes};
 pub use ground_effect::GroundEffect;
 pub use load::Load;
 pub use motion::Motion;

@@ -1,5 +1,6 @@
 //! Forces and moments over one step.
 
+use crate::frame::{Frame, Lanes, Sums};
 use afbc_types::Parameters;
 use nalgebra::Vector3;
 
@@ -22,8 +23,8 @@ pub struct Load {
 }
 
 impl Load {
-    /// Computes the load of rotors at `speeds_rad_s` on a vehicle with these parameters, with the paper's disturbances
-    /// `a_force` = \[A_x, A_y, A_z\] (earth) and `a_moment` = \[A_phi, A_theta, A_psi\] (body).
+    /// Computes the load of rotors at `speeds_rad_s` on a vehicle with these parameters and the paper's frame, with the
+    /// paper's disturbances `a_force` = \[A_x, A_y, A_z\] (earth) and `a_moment` = \[A_phi, A_theta, A_psi\] (body).
     #[inline]
     pub fn new(
         parameters: &Parameters<f64>,
@@ -31,8 +32,22 @@ impl Load {
         a_force: Vector3<f64>,
         a_moment: Vector3<f64>,
     ) -> Self {
+        let [w1, w2, w3, w4] = speeds_rad_s;
+        let speeds = Lanes::from([w1, w2, w3, w4, 0.0, 0.0, 0.0, 0.0]);
+        Self::ideal(parameters, &Frame::default(), &speeds, a_force, a_moment)
+    }
+
+    /// The same on any frame.
+    #[inline]
+    pub(crate) fn ideal(
+        parameters: &Parameters<f64>,
+        frame: &Frame,
+        speeds_rad_s: &Lanes,
+        a_force: Vector3<f64>,
+        a_moment: Vector3<f64>,
+    ) -> Self {
         let squares = speeds_rad_s.map(|w| w * w);
-        Self::of_rotors(parameters, speeds_rad_s, squares, 1.0, a_force, a_moment)
+        Self::of_rotors(parameters, frame, [speeds_rad_s, &squares], 1.0, a_force, a_moment)
     }
 
     /// Computes the load of rotors whose drag moments follow from the `squares` of their speeds \[rad2/s2\], already
@@ -40,25 +55,20 @@ impl Load {
     #[inline]
     pub(crate) fn of_rotors(
         parameters: &Parameters<f64>,
-        speeds_rad_s: [f64; 4],
-        squares: [f64; 4],
+        frame: &Frame,
+        [speeds_rad_s, squares]: [&Lanes; 2],
         thrust_ratio: f64,
         a_force: Vector3<f64>,
         a_moment: Vector3<f64>,
     ) -> Self {
         let Parameters { mass_kg, arm_m, inertia_kg_m2: i, rotor_inertia_kg_m2, .. } = *parameters;
-        let [w1, w2, w3, w4] = speeds_rad_s;
-        let [s1, s2, s3, s4] = squares;
+        let Sums { all, x, y, spin, .. } = frame.sums(squares);
         let (b, d) = (thrust_ratio * parameters.thrust_factor_n_s2, parameters.drag_factor_n_m_s2);
-        let momentum = rotor_inertia_kg_m2 * (w1 - w2 + w3 - w4);
+        let momentum = rotor_inertia_kg_m2 * frame.sums(speeds_rad_s).spin;
         Load {
-            thrust_m_s2: b * (s1 + s2 + s3 + s4) / mass_kg,
+            thrust_m_s2: b * all / mass_kg,
             gravity_m_s2: parameters.gravity_m_s2,
-            rotor_rad_s2: Vector3::new(
-                arm_m * b * (s3 - s1) / i.x,
-                arm_m * b * (s4 - s2) / i.y,
-                d * (s1 - s2 + s3 - s4) / i.z,
-            ),
+            rotor_rad_s2: Vector3::new(arm_m * b * y / i.x, arm_m * b * -x / i.y, d * spin / i.z),
             a_force,
             a_moment,
             coupling: Vector3::new((i.y - i.z) / i.x, (i.z - i.x) / i.y, (i.x - i.y) / i.z),

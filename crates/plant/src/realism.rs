@@ -4,14 +4,15 @@ use crate::battery::Charge;
 use crate::body_axes::BodyAxes;
 use crate::contact::{Contact, Ground};
 use crate::drag::Drag;
-use crate::environment::Segment;
+use crate::environment::{Environment, Segment};
+use crate::frame::{Frame, Lanes};
 use crate::ground_effect::GroundEffect;
 use crate::load::Load;
 use crate::rotors::{Rotors, Spin};
 use crate::surroundings::Surroundings;
 use crate::wind::{Weather, Wind};
-use afbc_types::{Declared, OutOfRange, Parameters, Range, RotorSpeeds};
-use nalgebra::{Vector3, Vector4};
+use afbc_types::{Declared, OutOfRange, Range};
+use nalgebra::Vector3;
 
 /// Accepted range of a step \[s\].
 pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
@@ -68,8 +69,8 @@ pub struct Realism {
 /// State of rotors, air, ground and battery after one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Telemetry {
-    /// Rotor speeds at the end of the step \[rad/s\].
-    pub rotor_speeds_rad_s: Vector4<f64>,
+    /// Rotor speeds at the end of the step \[rad/s\]; 0 for rotors that the vehicle does not have.
+    pub rotor_speeds_rad_s: Lanes,
     /// Velocity of the air, earth frame \[m/s\].
     pub wind_m_s: Vector3<f64>,
     /// Thrust over its value far from the ground.
@@ -83,6 +84,7 @@ pub struct Telemetry {
 /// [`Realism`] in simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct Effects {
+    frame: Frame,
     spin: Spin,
     drag: Option<Drag>,
     weather: Weather,
@@ -94,13 +96,14 @@ pub(crate) struct Effects {
 }
 
 impl Effects {
-    pub(crate) fn new(realism: &Realism, vehicle: &Parameters<f64>, step_s: f64) -> Result<Self, OutOfRange> {
+    pub(crate) fn new(realism: &Realism, environment: &Environment, step_s: f64) -> Result<Self, OutOfRange> {
         let Realism { rotors, drag, wind, contact, ground_effect, seed } = realism;
+        let (vehicle, frame) = (environment.nominal(), environment.frame());
         STEP.check(step_s)?;
-        let spin = Spin::new(rotors.clone(), vehicle, step_s)?;
+        let spin = Spin::new(rotors.clone(), vehicle, frame, step_s)?;
         let weather = Weather::new(wind.clone(), *seed, step_s)?;
         if let Some(drag) = drag {
-            drag.validate_for(vehicle, rotors.max_rad_s, step_s)?;
+            drag.validate_for(vehicle, frame, rotors.max_rad_s, step_s)?;
         }
         if let Some(contact) = contact {
             contact.validate_for(vehicle, step_s)?;
@@ -109,6 +112,7 @@ impl Effects {
             ground_effect.validate()?;
         }
         Ok(Effects {
+            frame: *frame,
             spin,
             drag: *drag,
             weather,
@@ -124,7 +128,7 @@ impl Effects {
     #[inline]
     pub(crate) fn begin_step(
         &mut self,
-        speeds: &RotorSpeeds,
+        speeds: &Lanes,
         segment: &Segment,
         time_s: f64,
         position_m: &Vector3<f64>,
@@ -132,7 +136,7 @@ impl Effects {
         axes: impl FnOnce() -> BodyAxes,
     ) -> (Load, Surroundings<'_>) {
         let Segment { parameters, a_force, a_moment, .. } = segment;
-        let drive = self.spin.advance(speeds.0, time_s, parameters.drag_factor_n_m_s2);
+        let drive = self.spin.advance(&self.frame, speeds, time_s, parameters.drag_factor_n_m_s2);
         self.wind_m_s = self.weather.advance(time_s, position_m.z, velocity_m_s);
         if let Some(effect) = &self.ground_effect {
             self.thrust_ratio = effect.thrust_ratio(position_m.z);
@@ -142,13 +146,13 @@ impl Effects {
         self.on_ground = ground.is_some_and(|ground| ground.touches(position_m.z, &axes()));
         let load = Load::of_rotors(
             parameters,
-            drive.speeds_rad_s.into(),
-            drive.squares.into(),
+            &self.frame,
+            [&drive.speeds_rad_s, &drive.squares],
             self.thrust_ratio,
             *a_force,
             *a_moment,
         );
-        let drag = self.drag.as_ref().map(|drag| drag.held(&drive.speeds_rad_s, parameters.arm_m));
+        let drag = self.drag.as_ref().map(|drag| drag.held(&self.frame, &drive.speeds_rad_s, parameters.arm_m));
         (load, Surroundings::new(parameters, drag, self.wind_m_s, ground))
     }
 

@@ -2,10 +2,11 @@
 
 use crate::battery::{Battery, Charge, Discharge, Sag};
 use crate::delay::{DelayLine, whole_steps};
+use crate::frame;
+use crate::frame::{Frame, Lanes};
 use afbc_types::{Declared, OutOfRange, Parameters, Range, parameters};
 use alloc::vec::Vec;
 use libm::{exp, sqrt};
-use nalgebra::Vector4;
 
 parameters! {
     /// Dynamics between commanded rotor speeds and thrust. The default is ideal: commanded speeds are reached at once.
@@ -52,7 +53,7 @@ pub enum Start {
 /// A worn or broken rotor, whose thrust and drag moment are multiplied by `efficiency`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotorFault {
-    /// Number of the rotor, 1 to 4, as in [`afbc_types`].
+    /// Number of the rotor, from 1, in the order of the frame.
     pub rotor: u8,
     /// Remaining share of the thrust: 1 is intact, 0 is dead. Faults of one rotor multiply.
     pub efficiency: f64,
@@ -64,7 +65,7 @@ pub struct RotorFault {
 #[expect(missing_docs, reason = "named after the field that each bounds")]
 pub mod limits {
     use afbc_types::Range;
-    pub const ROTOR: Range = Range::new("rotor", 1.0, 4.0);
+    pub const ROTOR: Range = Range::new("rotor", 1.0, afbc_types::ROTORS_MAX as f64);
     pub const EFFICIENCY: Range = Range::new("efficiency", 0.0, 1.0);
     pub const START: Range = Range::new("start_s", 0.0, f64::INFINITY);
 }
@@ -81,8 +82,8 @@ impl RotorFault {
 
 impl Rotors {
     /// Returns each rotor's share of its thrust at time `t` \[s\], and when that next changes.
-    fn efficiency(&self, t: f64) -> (Vector4<f64>, f64) {
-        let (mut efficiency, mut until_s) = (Vector4::repeat(1.0), f64::INFINITY);
+    fn efficiency(&self, frame: &Frame, t: f64) -> (Lanes, f64) {
+        let (mut efficiency, mut until_s) = (frame.repeat(1.0), f64::INFINITY);
         for fault in &self.faults {
             if fault.start_s > t + TIME_SLACK_S {
                 until_s = until_s.min(fault.start_s - TIME_SLACK_S);
@@ -101,21 +102,21 @@ const TIME_SLACK_S: f64 = 1e-9;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drive {
     /// Speeds in the middle of the step \[rad/s\].
-    pub(crate) speeds_rad_s: Vector4<f64>,
+    pub(crate) speeds_rad_s: Lanes,
     /// Squares of the speeds times each rotor's efficiency \[rad2/s2\].
-    pub(crate) squares: Vector4<f64>,
+    pub(crate) squares: Lanes,
 }
 
 /// Rotors in simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct Spin {
     rotors: Rotors,
-    commands: DelayLine<Vector4<f32>>,
+    commands: DelayLine<Lanes>,
     /// exp(-dt / 2 tau): remaining share of a speed's distance to its target after half a step.
     half_step: f64,
     /// Present speeds \[rad/s\].
-    pub(crate) speeds_rad_s: Vector4<f64>,
-    efficiency: Vector4<f64>,
+    pub(crate) speeds_rad_s: Lanes,
+    efficiency: Lanes,
     efficiency_until_s: f64,
     battery: Option<Discharge>,
 }
@@ -125,20 +126,30 @@ impl Spin {
     ///
     /// # Errors
     /// The first parameter out of range.
-    pub(crate) fn new(rotors: Rotors, vehicle: &Parameters<f64>, step_s: f64) -> Result<Self, OutOfRange> {
+    pub(crate) fn new(
+        rotors: Rotors,
+        vehicle: &Parameters<f64>,
+        frame: &Frame,
+        step_s: f64,
+    ) -> Result<Self, OutOfRange> {
         rotors.validate()?;
-        let start_rad_s = match rotors.start {
-            Start::Hover => sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / (4.0 * vehicle.thrust_factor_n_s2))
-                .max(rotors.min_rad_s)
-                .min(rotors.max_rad_s),
-            Start::Idle => rotors.min_rad_s,
+        let count = frame.count() as f64;
+        for fault in &rotors.faults {
+            Range { max: count, ..limits::ROTOR }.check(fault.rotor)?;
+        }
+        let hover = |share: f64| {
+            sqrt(vehicle.weight_n() * share / vehicle.thrust_factor_n_s2).max(rotors.min_rad_s).min(rotors.max_rad_s)
         };
-        let (efficiency, efficiency_until_s) = rotors.efficiency(0.0);
+        let start_rad_s = match rotors.start {
+            Start::Hover => frame.masked(&frame.hover_shares().map(hover)),
+            Start::Idle => frame.repeat(rotors.min_rad_s),
+        };
+        let (efficiency, efficiency_until_s) = rotors.efficiency(frame, 0.0);
         Ok(Spin {
-            commands: DelayLine::new(whole_steps(rotors.delay_s, step_s), Vector4::repeat(start_rad_s as f32)),
+            commands: DelayLine::new(whole_steps(rotors.delay_s, step_s), start_rad_s.map(|w| f64::from(w as f32))),
             // At tau = 0 this is exp(-infinity) = 0: no lag.
             half_step: exp(-0.5 * step_s / rotors.time_constant_s),
-            speeds_rad_s: Vector4::repeat(start_rad_s),
+            speeds_rad_s: start_rad_s,
             efficiency,
             efficiency_until_s,
             battery: rotors.battery.map(|battery| Discharge::new(battery, step_s)),
@@ -151,9 +162,9 @@ impl Spin {
     /// The lag is discretised exactly. The load over the step is that of the speeds in its middle, which is accurate to
     /// second order. A command that is not a number counts as the smallest speed.
     #[inline]
-    pub(crate) fn advance(&mut self, command_rad_s: Vector4<f32>, t: f64, drag_factor_n_m_s2: f64) -> Drive {
+    pub(crate) fn advance(&mut self, frame: &Frame, command_rad_s: &Lanes, t: f64, drag_factor_n_m_s2: f64) -> Drive {
         if t >= self.efficiency_until_s {
-            (self.efficiency, self.efficiency_until_s) = self.rotors.efficiency(t);
+            (self.efficiency, self.efficiency_until_s) = self.rotors.efficiency(frame, t);
         }
         let (mut scale, mut ceiling) = (1.0, self.rotors.max_rad_s);
         if let Some(battery) = &self.battery {
@@ -165,15 +176,15 @@ impl Spin {
         }
         // max first, so that it replaces NaN.
         let floor = self.rotors.min_rad_s;
-        let command = self.commands.pass(command_rad_s);
-        let target = command.map(|w| (f64::from(w) * scale).max(floor).min(ceiling));
+        let command = self.commands.pass(*command_rad_s);
+        let target = frame.masked(&command.map(|w| (w * scale).max(floor).min(ceiling)));
         let middle = target + (self.speeds_rad_s - target) * self.half_step;
         self.speeds_rad_s = target + (middle - target) * self.half_step;
 
         let squares = middle.component_mul(&middle).component_mul(&self.efficiency);
         if let Some(battery) = &mut self.battery {
             // Drag moment times speed; the energy that accelerates the rotors is returned when they slow down.
-            battery.supply(drag_factor_n_m_s2 * squares.dot(&middle));
+            battery.supply(drag_factor_n_m_s2 * frame::power(&squares, &middle));
         }
         Drive { speeds_rad_s: middle, squares }
     }

@@ -2,6 +2,7 @@
 
 use crate::body_axes::BodyAxes;
 use crate::environment::{Environment, Segment};
+use crate::frame::Lanes;
 use crate::integrate::rk4;
 use crate::load::Load;
 use crate::motion::Motion;
@@ -118,14 +119,15 @@ impl Plant {
         realism: &Realism,
         step_s: f64,
     ) -> Result<Self, OutOfRange> {
-        let effects = Effects::new(realism, environment.nominal(), step_s)?;
+        let effects = Effects::new(realism, &environment, step_s)?;
         Ok(Plant { effects: Some(Box::new(effects)), ..Plant::new(model, initial, environment) })
     }
 
-    /// Advances the vehicle by `dt_s` with constant commanded rotor speeds. Every call must use the same `dt_s`, the
-    /// one that the plant was created for.
+    /// Advances the vehicle by `dt_s` with constant commanded rotor speeds; a rotor without a command stands still.
+    /// Every call must use the same `dt_s`, the one that the plant was created for.
     #[inline]
-    pub fn step(&mut self, speeds: &RotorSpeeds, dt_s: f64) {
+    pub fn step<const N: usize>(&mut self, speeds: &RotorSpeeds<N>, dt_s: f64) {
+        let speeds = &self.environment.frame().speeds(speeds);
         if self.time_s >= self.segment.until_s {
             self.segment = self.environment.segment(self.time_s);
         }
@@ -133,7 +135,7 @@ impl Plant {
             self.advance_in_effect(speeds, dt_s);
         } else {
             let Segment { parameters, a_force, a_moment, .. } = &self.segment;
-            let load = Load::new(parameters, speeds.0.map(f64::from).into(), *a_force, *a_moment);
+            let load = Load::ideal(parameters, self.environment.frame(), speeds, *a_force, *a_moment);
             self.body.advance(&load, dt_s);
         }
         // Counted, not summed, so that time does not drift.
@@ -144,7 +146,7 @@ impl Plant {
     /// Advances with all effects of [`Realism`].
     // Not inlined, so that the ideal plant's step stays short.
     #[inline(never)]
-    fn advance_in_effect(&mut self, speeds: &RotorSpeeds, dt_s: f64) {
+    fn advance_in_effect(&mut self, speeds: &Lanes, dt_s: f64) {
         let Some(effects) = &mut self.effects else { return };
         let (position, velocity) = self.body.place();
         let body = &self.body;

@@ -23,7 +23,7 @@ fn command(w: f64) -> RotorSpeeds {
 }
 
 fn speeds(plant: &Plant) -> Vector4<f64> {
-    plant.telemetry().unwrap().rotor_speeds_rad_s
+    plant.telemetry().unwrap().rotor_speeds_rad_s.fixed_rows::<4>(0).into()
 }
 
 fn hover_rad_s() -> f64 {

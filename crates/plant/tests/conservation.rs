@@ -57,7 +57,7 @@ fn conserved(p: &Parameters<f64>, m: &Motion) -> (f64, f64, Vector3<f64>) {
 fn fall(p: Parameters<f64>, start: Motion, steps: usize) -> Plant {
     let mut plant = Plant::new(Model::RigidBody, start, Environment::calm(p).unwrap());
     for _ in 0..steps {
-        plant.step(&RotorSpeeds::default(), DT_S);
+        plant.step(&RotorSpeeds::<4>::default(), DT_S);
     }
     plant
 }
@@ -230,7 +230,7 @@ fn a_flat_spin_turns_evenly() {
     let start = Motion { rates_rad_s: Vector3::new(0.0, 0.0, rate), ..Motion::default() };
     let mut plant = Plant::new(Model::RigidBody, start, Environment::calm(Parameters::PAPER).unwrap());
     for step in 1..=60_000_u32 {
-        plant.step(&RotorSpeeds::default(), DT_S);
+        plant.step(&RotorSpeeds::<4>::default(), DT_S);
         if step % 1000 == 0 {
             let yaw = rate * f64::from(step) * DT_S;
             let error = plant.motion().attitude_rad.z - yaw;
@@ -247,7 +247,7 @@ fn pitching_through_90_degrees_is_nothing_special() {
     let start = Motion { rates_rad_s: Vector3::new(0.0, 3.0, 0.0), ..Motion::default() };
     let mut plant = Plant::new(Model::RigidBody, start, Environment::calm(Parameters::PAPER).unwrap());
     for step in 1..=2000_u32 {
-        plant.step(&RotorSpeeds::default(), DT_S);
+        plant.step(&RotorSpeeds::<4>::default(), DT_S);
         let angle = 3.0 * f64::from(step) * DT_S;
         let m = plant.motion();
         let body_z = r_earth_body(&m.attitude_rad).column(2).into_owned();

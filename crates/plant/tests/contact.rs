@@ -21,7 +21,7 @@ fn at(height_m: f64) -> Motion {
 }
 
 fn run(plant: &mut Plant, seconds: f64) {
-    (0..(seconds / STEP_S) as u32).for_each(|_| plant.step(&RotorSpeeds::default(), STEP_S));
+    (0..(seconds / STEP_S) as u32).for_each(|_| plant.step(&RotorSpeeds::<4>::default(), STEP_S));
 }
 
 /// Kinetic and potential energy, including the springs: 1/2 k d^2 of each point below the ground.
@@ -55,7 +55,7 @@ fn a_vehicle_at_rest_stays_at_rest() {
 fn a_vehicle_that_lands_comes_to_rest_on_its_feet() {
     for model in MODELS {
         let mut plant = plant(model, at(0.5));
-        plant.step(&RotorSpeeds::default(), STEP_S);
+        plant.step(&RotorSpeeds::<4>::default(), STEP_S);
         assert!(!plant.telemetry().unwrap().on_ground);
         run(&mut plant, 5.0);
         let motion = plant.motion();
@@ -131,7 +131,7 @@ proptest! {
         let start_j = energy_j(&plant.motion());
         let mut lowest_j = start_j;
         for _ in 0..20_000 {
-            plant.step(&RotorSpeeds::default(), STEP_S);
+            plant.step(&RotorSpeeds::<4>::default(), STEP_S);
             let motion = plant.motion();
             let now_j = energy_j(&motion);
             prop_assert!(now_j < lowest_j + 2e-3 * start_j, "{now_j} J after {lowest_j} J of {start_j} J");

@@ -37,7 +37,7 @@ fn a_falling_body_reaches_its_terminal_velocity_as_it_should() {
     for model in MODELS {
         let mut plant = plant(model, Motion::default(), drag, Vector3::zeros());
         for k in 1..=15_000 {
-            plant.step(&RotorSpeeds::default(), STEP_S);
+            plant.step(&RotorSpeeds::<4>::default(), STEP_S);
             let expected = -terminal * (P.gravity_m_s2 * f64::from(k) * STEP_S / terminal).tanh();
             assert!((plant.motion().velocity_m_s.z - expected).abs() < 1e-9);
         }
@@ -270,7 +270,7 @@ proptest! {
         let energy = |m: &Motion| 0.5 * m.velocity_m_s.norm_squared() + P.gravity_m_s2 * m.position_m.z;
         let mut before = energy(&dragged.motion());
         for _ in 0..500 {
-            dragged.step(&RotorSpeeds::default(), STEP_S);
+            dragged.step(&RotorSpeeds::<4>::default(), STEP_S);
             let now = energy(&dragged.motion());
             prop_assert!(now <= before + 1e-9);
             before = now;

@@ -126,7 +126,7 @@ fn a_gust_pushes_its_own_axis_against_its_sign() {
                 let size = 0.02;
                 let environment = Environment::new(P, vec![], vec![gust(axis, kind, size, 0.0, 1.0)]).unwrap();
                 let mut plant = Plant::new(model, Motion::default(), environment);
-                plant.step(&RotorSpeeds::default(), 0.001);
+                plant.step(&RotorSpeeds::<4>::default(), 0.001);
                 let m = plant.motion();
                 let gravity = Vector3::new(0.0, 0.0, P.gravity_m_s2 * 0.001);
                 let gained = [m.rates_rad_s, m.velocity_m_s + gravity].concat_values();
@@ -233,7 +233,7 @@ fn a_change_that_leaves_the_range_is_refused_by_name() {
 fn time_does_not_drift() {
     let mut plant = Plant::new(Model::Simplified, Motion::default(), Environment::calm(P).unwrap());
     for _ in 0..3_600_000_u32 {
-        plant.step(&RotorSpeeds::default(), 0.001);
+        plant.step(&RotorSpeeds::<4>::default(), 0.001);
     }
     assert_eq!(plant.time_s(), 3600.0);
 }

@@ -24,7 +24,7 @@ fn floating(height_m: f64, wind: Wind, seed: u64, step_s: f64) -> Plant {
 }
 
 fn air(plant: &mut Plant, step_s: f64) -> Vector3<f64> {
-    plant.step(&RotorSpeeds::default(), step_s);
+    plant.step(&RotorSpeeds::<4>::default(), step_s);
     plant.telemetry().unwrap().wind_m_s
 }
 

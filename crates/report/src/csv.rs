@@ -44,9 +44,9 @@ struct Column {
 /// nominal vehicle. The terms of the estimate errors are left out, since the optimal values are unknown.
 fn lyapunov(model: &Model, sample: &Sample) -> PerAxis<f32> {
     let state = sample.motion.measure();
-    let rotor_residual_rad_s = sample.action.speeds.residual_rad_s();
+    // g_i depends on neither the rotors nor the step.
     let context =
-        Context { state: &state, rotor_residual_rad_s, dt_s: 0.0, adapt: false, unallocated: PerAxis::default() };
+        Context { state: &state, rotor_residual_rad_s: 0.0, dt_s: 0.0, adapt: false, unallocated: PerAxis::default() };
     PerAxis::from_fn(|axis| {
         let errors = &sample.trace.errors[axis];
         0.5 * errors.e1 * errors.e1 + 0.5 * errors.e2 * errors.e2 / model.dynamics(axis, &context).g
@@ -77,24 +77,25 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
     // U1..U4 as produced by the rotors, then as demanded by the law; further down, their extremes since the previous
     // row.
     add! { Single
-        "u1_n": |s| given(s).roll_n;
-        "u2_n": |s| given(s).pitch_n;
-        "u3_n": |s| given(s).yaw_n;
-        "u4_n": |s| given(s).thrust_n;
+        "u1_n": |s| s.action.given.roll_n;
+        "u2_n": |s| s.action.given.pitch_n;
+        "u3_n": |s| s.action.given.yaw_n;
+        "u4_n": |s| s.action.given.thrust_n;
         "u1_wanted_n": |s| s.trace.inputs.roll_n;
         "u2_wanted_n": |s| s.trace.inputs.pitch_n;
         "u3_wanted_n": |s| s.trace.inputs.yaw_n;
         "u4_wanted_n": |s| s.trace.inputs.thrust_n;
         "u5_m_s2": |s| s.trace.virtual_m_s2[0];
         "u6_m_s2": |s| s.trace.virtual_m_s2[1];
-        "f1_n": |s| s.action.forces.0.x;
-        "f2_n": |s| s.action.forces.0.y;
-        "f3_n": |s| s.action.forces.0.z;
-        "f4_n": |s| s.action.forces.0.w;
-        "omega1_rad_s": |s| s.action.speeds.0.x;
-        "omega2_rad_s": |s| s.action.speeds.0.y;
-        "omega3_rad_s": |s| s.action.speeds.0.z;
-        "omega4_rad_s": |s| s.action.speeds.0.w;
+    }
+    let rotors = 0..scenario.rotors.len();
+    for i in rotors.clone() {
+        let force = move |row: &Row| Single(row.sample.action.forces.0.get(i).copied().unwrap_or_default());
+        add(format!("f{}_n", i + 1), Box::new(force));
+    }
+    for i in rotors {
+        let speed = move |row: &Row| Single(row.sample.action.speeds.0.get(i).copied().unwrap_or_default());
+        add(format!("omega{}_rad_s", i + 1), Box::new(speed));
     }
     for (i, u) in ["u1", "u2", "u3", "u4"].into_iter().enumerate() {
         for (j, extreme) in ["min", "max"].into_iter().enumerate() {
@@ -142,14 +143,15 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
 fn real(scenario: &Scenario) -> Vec<Column> {
     let mut columns = Vec::new();
     if !scenario.is_ideal() {
+        for i in 0..scenario.rotors.len() {
+            let speed = move |t: &Telemetry| t.rotor_speeds_rad_s.get(i).copied().unwrap_or(f64::NAN);
+            let value = move |row: &Row| Double(row.sample.telemetry.as_ref().map_or(f64::NAN, speed));
+            columns.push(Column { name: format!("rotor{}_rad_s", i + 1), value: Box::new(value) });
+        }
         let mut add = |name: &str, value: fn(&Telemetry) -> f64| {
             let value = move |row: &Row| Double(row.sample.telemetry.as_ref().map_or(f64::NAN, value));
             columns.push(Column { name: name.into(), value: Box::new(value) });
         };
-        add("rotor1_rad_s", |t| t.rotor_speeds_rad_s.x);
-        add("rotor2_rad_s", |t| t.rotor_speeds_rad_s.y);
-        add("rotor3_rad_s", |t| t.rotor_speeds_rad_s.z);
-        add("rotor4_rad_s", |t| t.rotor_speeds_rad_s.w);
         add("wind_x_m_s", |t| t.wind_m_s.x);
         add("wind_y_m_s", |t| t.wind_m_s.y);
         add("wind_z_m_s", |t| t.wind_m_s.z);
@@ -182,11 +184,6 @@ fn real(scenario: &Scenario) -> Vec<Column> {
         columns.push(Column { name: "measurement_fresh".into(), value: Box::new(fresh) });
     }
     columns
-}
-
-/// Returns U1..U4 as produced by the rotors.
-fn given(sample: &Sample) -> afbc_types::Inputs {
-    afbc_control::mixer::Mixer::inputs(&sample.action.forces)
 }
 
 /// Writes the header and one line for each logged step.

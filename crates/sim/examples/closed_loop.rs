@@ -11,7 +11,7 @@ const DT_S: f64 = 0.001;
 
 fn main() -> Result<(), OutOfRange> {
     let believed = Parameters::PAPER.to_f32();
-    let law = Adaptive::new(Profile::Flight.gains_for(&believed))?;
+    let law = Adaptive::new(Profile::Flight.gains_for(&believed, afbc::LAG_S))?;
     let controller = Controller::new(believed, Profile::Flight.settings(), law)?;
     let mut memory = Screened::default();
 

@@ -49,7 +49,7 @@ impl FlightController for OwnLaw {
 fn main() {
     let scenario = scenario::built_in("hover").unwrap().read().unwrap();
     let vehicle = scenario.vehicle.to_f32();
-    let law = OwnLaw { vehicle, mixer: Mixer::new(&vehicle, 3.0).unwrap() };
+    let law = OwnLaw { vehicle, mixer: Mixer::new(vehicle, 3.0).unwrap() };
     let (mut world, mut distance_m) = (World::new(&scenario, 0.001).unwrap(), 0.0);
     let Ok(end) = lockstep(&mut world, &mut Alone::new(law), scenario.duration_s, |sample| {
         distance_m = (sample.motion.position_m - sample.reference.position_m).norm();

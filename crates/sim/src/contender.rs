@@ -2,15 +2,31 @@
 
 pub use crate::laws::{ControllerKind, Law};
 
+use crate::laws::law_gains;
 use afbc::monitor::Bounds;
-use afbc::{Guarded, Profile, Settings, adaptive};
-use afbc_control::{FlightController, Mixer};
-use afbc_types::{OutOfRange, Parameters, PerAxis};
+use afbc::{Guarded, LAG_S, Profile, Settings, adaptive, slowness};
+use afbc_control::FlightController;
+use afbc_peers::slowed;
+use afbc_reader::FileError;
+use afbc_types::{Airframe, OutOfRange, Parameters, PerAxis, Rotor, with_rotors};
+use afbc_vehicles::Vehicle;
 
 impl Law {
     /// Returns a law with the gains of `profile`; profiles differ for AFBC and backstepping only.
     pub fn of(kind: ControllerKind, profile: Profile) -> Self {
         Law::beside(kind, &profile.gains())
+    }
+
+    /// The law of this kind with its gains for this vehicle: by rule ([`Profile::gains_for`], [`slowed`]) or, in the
+    /// profile `flight`, as the vehicle's file says.
+    ///
+    /// # Errors
+    /// One line on what is wrong with the gains in the vehicle's file.
+    pub fn on(kind: ControllerKind, vehicle: &Vehicle, profile: Profile) -> Result<Self, FileError> {
+        let law = Law::beside(kind, &vehicle.gains(profile));
+        // Those of the cascade are slowed already.
+        let law = if kind.in_cascade() { law } else { slowed(law, slowness(vehicle.lag_s())) };
+        if profile == Profile::Flight { law_gains(vehicle, law) } else { Ok(law) }
     }
 }
 
@@ -43,7 +59,7 @@ impl Contender {
     /// vehicle ([`Profile::gains_for`]); others are unchanged. The peers' laws scale with the vehicle themselves.
     pub fn for_vehicle(self, vehicle: &Parameters<f64>) -> Self {
         let Some(profile) = self.gains_of() else { return self };
-        Contender { law: Law::beside(self.kind(), &profile.gains_for(&vehicle.to_f32())), ..self }
+        Contender { law: Law::beside(self.kind(), &profile.gains_for(&vehicle.to_f32(), LAG_S)), ..self }
     }
 
     /// Returns the kind of its law.
@@ -83,18 +99,37 @@ impl Contender {
         decimal(self.settings.common.dt_s)
     }
 
-    /// Runs `task` with the controller of a vehicle with these nominal parameters.
+    /// Returns the contender on another vehicle: that vehicle's gains and settings in `profile` replace its own; the
+    /// time step and the monitor stay.
+    ///
+    /// # Errors
+    /// One line on what is wrong with the gains in the vehicle's file.
+    pub fn on(self, vehicle: &Vehicle, profile: Profile) -> Result<Self, FileError> {
+        let law = Law::on(self.kind(), vehicle, profile)?;
+        let settings = vehicle.settings(profile).with_dt_s(self.settings.common.dt_s);
+        Ok(Contender { law, settings, ..self })
+    }
+
+    /// Runs `task` with the controller of a vehicle with these nominal parameters and rotors.
     ///
     /// # Errors
     /// The first parameter, gain or setting out of range, or the error of `task`.
-    pub fn build<T: Task>(&self, vehicle: Parameters, task: T) -> Result<T::Output, OutOfRange> {
-        match &self.law {
-            Law::Afbc(gains) if self.monitored => {
-                let bounds = Bounds::new(gains, &vehicle);
-                task.with(Guarded::new(vehicle, self.settings, *gains, bounds)?)
+    pub fn build<T: Task>(
+        &self,
+        parameters: &Parameters<f64>,
+        rotors: &[Rotor<f64>],
+        task: T,
+    ) -> Result<T::Output, OutOfRange> {
+        with_rotors!(rotors.len(), N => {
+            let vehicle = Airframe::<N>::new(parameters, rotors)?;
+            match &self.law {
+                Law::Afbc(gains) if self.monitored => {
+                    let bounds = Bounds::new(gains, &vehicle.parameters);
+                    task.with(Guarded::new(vehicle, self.settings, *gains, bounds)?)
+                }
+                law => law.build(vehicle, self.settings, task),
             }
-            law => law.build(vehicle, self.settings, task),
-        }
+        })
     }
 
     /// Builds the controller, as a flight would, to check it.
@@ -102,10 +137,8 @@ impl Contender {
     /// # Errors
     /// The first parameter, gain or setting out of range; also if the rotors cannot lift the vehicle [with a
     /// margin](afbc_control::mixer::HOVER_MARGIN).
-    pub fn check(&self, vehicle: Parameters) -> Result<(), OutOfRange> {
-        let mixer = Mixer::new(&vehicle, self.settings.common.rotor_force_max_n)?;
-        mixer.check_hover(vehicle.mass_kg * vehicle.gravity_m_s2)?;
-        self.build(vehicle, Check)
+    pub fn check(&self, parameters: &Parameters<f64>, rotors: &[Rotor<f64>]) -> Result<(), OutOfRange> {
+        self.build(parameters, rotors, Check { weight_n: parameters.to_f32().weight_n() })
     }
 }
 
@@ -123,16 +156,18 @@ pub trait Task {
     ///
     /// # Errors
     /// A further value out of range.
-    fn with<C: FlightController>(self, controller: C) -> Result<Self::Output, OutOfRange>;
+    fn with<C: FlightController<N>, const N: usize>(self, controller: C) -> Result<Self::Output, OutOfRange>;
 }
 
-/// A task that does nothing: the controller can be built.
-struct Check;
+/// A task that checks only: the controller can be built, and its rotors lift the vehicle.
+struct Check {
+    weight_n: f32,
+}
 
 impl Task for Check {
     type Output = ();
 
-    fn with<C: FlightController>(self, _: C) -> Result<(), OutOfRange> {
-        Ok(())
+    fn with<C: FlightController<N>, const N: usize>(self, controller: C) -> Result<(), OutOfRange> {
+        controller.mixer().check_hover(self.weight_n)
     }
 }

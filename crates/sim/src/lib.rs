@@ -11,7 +11,6 @@ pub mod in_the_loop;
 mod laws;
 pub mod metrics;
 pub mod paper;
-pub mod reader;
 pub mod run;
 pub mod scenario;
 pub mod trajectory;

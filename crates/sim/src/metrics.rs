@@ -41,7 +41,7 @@ pub fn tracking_error(sample: &Sample) -> Vector4<f64> {
 
 /// Returns U1..U4 as produced by the rotors \[N\].
 pub fn inputs(sample: &Sample) -> Vector4<f64> {
-    let u = afbc_control::mixer::Mixer::inputs(&sample.action.forces);
+    let u = sample.action.given;
     Vector4::new(u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n).cast()
 }
 

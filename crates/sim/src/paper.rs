@@ -6,7 +6,7 @@ use crate::scenario::Scenario;
 use crate::trajectory::Trajectory;
 use afbc::Profile;
 use afbc_plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Quantity, Realism, Sensing};
-use afbc_types::{Axis, OutOfRange, Parameters};
+use afbc_types::{Axis, OutOfRange, PLUS, Parameters};
 use nalgebra::Vector3;
 
 /// Length of the experiment \[s\].
@@ -47,6 +47,8 @@ pub fn scenario(model: Model, case: Case) -> Result<Scenario, OutOfRange> {
         duration_s: DURATION_S,
         model,
         vehicle: Parameters::PAPER,
+        rotors: PLUS.map(|rotor| rotor.to_f64()).to_vec(),
+        vehicle_file: None,
         environment: Environment::new(Parameters::PAPER, changes, gusts)?,
         realism: Realism::default(),
         sensing: Sensing::default(),

@@ -6,7 +6,7 @@
 use afbc_plant::{
     Contact, Drag, Environment, GroundEffect, Gust, GustKind, Motion, ParameterChange, Quantity, Turbulence,
 };
-use afbc_sim::reader::FileError;
+use afbc_reader::FileError;
 use afbc_sim::scenario::{Outage, Scenario, built_in};
 use afbc_sim::trajectory::{Sine, Trajectory, Waypoint};
 use afbc_types::Axis;

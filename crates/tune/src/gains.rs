@@ -1,8 +1,10 @@
 //! A contender's gains as coordinates of a search, and as text for a scenario file.
 
 use afbc::Profile;
+use afbc_reader::FileError;
 use afbc_sim::contender::{Contender, ControllerKind, Law};
 use afbc_types::{Axis, Declaration, Declared, Range, Value};
+use afbc_vehicles::{CASCADE, Vehicle};
 use core::convert::Infallible;
 use core::fmt::Write;
 
@@ -156,6 +158,28 @@ pub fn fragment(contender: &Contender) -> String {
         let _ = writeln!(text, "{} = {}", key.key, key.value);
     }
     text
+}
+
+/// Gains of `contender` as `[gains.flight]` of the file of `vehicle`: what is not by rule.
+///
+/// # Errors
+/// None in fact: the vehicle's gains have been read before.
+pub(super) fn vehicle_fragment(contender: &Contender, vehicle: &Vehicle) -> Result<String, FileError> {
+    let law = contender.kind().name();
+    let base = keys(&contender.clone().on(vehicle, Profile::Flight)?);
+    let (mut text, mut table) = (String::new(), String::new());
+    for Key { table: own, key, value } in keys(contender).iter().filter(|key| !base.contains(key)) {
+        let place = match own.strip_prefix("gains") {
+            Some(axis) => format!("gains.flight.{law}{axis}"),
+            None => format!("gains.flight.{CASCADE}"),
+        };
+        if table != place {
+            let _ = writeln!(text, "{}[{place}]", if table.is_empty() { "" } else { "\n" });
+            table = place;
+        }
+        let _ = writeln!(text, "{key} = {value}");
+    }
+    Ok(text)
 }
 
 /// Formats a TOML string; names have no control characters.

@@ -1,27 +1,31 @@
 //! The result of a search as a piece of a scenario file.
 
 use crate::cost::{costs, mean};
-use crate::flights::held_out;
-use crate::gains::fragment;
+use crate::gains::{fragment, vehicle_fragment};
 use crate::search::Found;
 use afbc_sim::contender::Contender;
 use afbc_sim::scenario::Scenario;
 use core::fmt::Write;
 use std::error::Error;
 
-/// Formats the contender found as `[[contender]]` of a scenario file, preceded by comments with its cost in each flight
-/// and the change of each gain from `start`.
+/// Formats the contender found as `[[contender]]` of a scenario file or, if the flights are on a vehicle of a file, as
+/// `[gains]` of that file, preceded by comments with its cost in each flight and the change of each gain from `start`.
 ///
 /// # Errors
 /// None occurs: both have flown before.
-pub fn report(start: &Contender, found: &Found, training: &[Scenario], seed: u64) -> Result<String, Box<dyn Error>> {
+pub fn report(
+    start: &Contender,
+    found: &Found,
+    [training, held_out]: [&[Scenario]; 2],
+    seed: u64,
+) -> Result<String, Box<dyn Error>> {
     let Found { contender, before, after, evaluations, changes } = found;
     let mut text = format!(
         "# {} after {evaluations} tries with seed {seed}: cost {after:.4}, before {before:.4}\n#\n",
         contender.kind().title()
     );
     text += "# flight              before     after\n";
-    for (title, flights) in [("training", training), ("held out", &held_out()?)] {
+    for (title, flights) in [("training", training), ("held out", held_out)] {
         let (before, after) = (costs(flights, start)?, costs(flights, contender)?);
         // Writing to a String cannot fail.
         for (scenario, (before, after)) in flights.iter().zip(before.iter().zip(&after)) {
@@ -35,6 +39,9 @@ pub fn report(start: &Contender, found: &Found, training: &[Scenario], seed: u64
         let _ = writeln!(text, "# {:<width$} {:>10} -> {}", change.name, change.from, change.to);
     }
     text.push('\n');
-    text += &fragment(&Contender { name: format!("{}-tuned", start.name), ..contender.clone() });
+    text += &match training.first().and_then(|scenario| scenario.vehicle_file.as_ref()) {
+        Some(vehicle) => vehicle_fragment(contender, vehicle)?,
+        None => fragment(&Contender { name: format!("{}-tuned", start.name), ..contender.clone() }),
+    };
     Ok(text)
 }

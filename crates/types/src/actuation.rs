@@ -1,5 +1,6 @@
 //! Control inputs, rotor forces and rotor speeds.
 
+use crate::{ROTORS_MAX, Rotor};
 use nalgebra::SVector;
 
 /// The inputs U1..U4 of (6), all in newtons: sums and differences of rotor forces, not moments.
@@ -7,17 +8,38 @@ use nalgebra::SVector;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Inputs {
-    /// U1 = F3 - F1; the moment about body x is l U1.
+    /// U1 = sum of y_i F_i / l, F3 - F1 on the paper's frame; the moment about body x is l U1.
     pub roll_n: f32,
-    /// U2 = F4 - F2; the moment about body y is l U2.
+    /// U2 = -(sum of x_i F_i) / l, F4 - F2 on the paper's frame; the moment about body y is l U2.
     pub pitch_n: f32,
-    /// U3 = F1 - F2 + F3 - F4; the moment about body z is (d/b) U3.
+    /// U3: the forces of the rotors that push to positive yaw less those of the others, F1 - F2 + F3 - F4 on the
+    /// paper's frame; the moment about body z is (d/b) U3.
     pub yaw_n: f32,
-    /// U4 = F1 + F2 + F3 + F4, along body z.
+    /// U4 = sum of F_i, along body z.
     pub thrust_n: f32,
 }
 
-/// Thrust F1..F4 of each rotor, along body z \[N\].
+impl Inputs {
+    /// U = B F of rotors at these places that give `forces_n` \[N\]; rotors without a force, and forces without a
+    /// rotor, do nothing.
+    pub fn of(rotors: &[Rotor], forces_n: &[f32]) -> Self {
+        let mut inputs = Inputs::default();
+        for (rotor, force_n) in rotors.iter().zip(forces_n) {
+            inputs.roll_n += rotor.y * force_n;
+            inputs.pitch_n -= rotor.x * force_n;
+            inputs.yaw_n += if rotor.pushes_left { *force_n } else { -force_n };
+            inputs.thrust_n += force_n;
+        }
+        inputs
+    }
+}
+
+/// `values`, and 0 for each rotor that there is not.
+fn padded<const N: usize>(values: &SVector<f32, N>) -> SVector<f32, ROTORS_MAX> {
+    SVector::from_fn(|i, _| values.get(i).copied().unwrap_or_default())
+}
+
+/// Thrust F_i of each rotor, along body z \[N\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -30,7 +52,7 @@ impl<const N: usize> Default for RotorForces<N> {
     }
 }
 
-/// Speed omega_1..omega_4 of each rotor, never negative \[rad/s\].
+/// Speed omega_i of each rotor, never negative \[rad/s\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -43,9 +65,18 @@ impl<const N: usize> Default for RotorSpeeds<N> {
     }
 }
 
-impl RotorSpeeds {
-    /// The residual omega = omega_1 - omega_2 + omega_3 - omega_4 of (6) \[rad/s\].
-    pub fn residual_rad_s(&self) -> f32 {
-        self.0.x - self.0.y + self.0.z - self.0.w
+impl<const N: usize> RotorForces<N> {
+    /// The same forces, with zeros for the rotors that this vehicle has not.
+    #[must_use]
+    pub fn padded(&self) -> RotorForces<ROTORS_MAX> {
+        RotorForces(padded(&self.0))
+    }
+}
+
+impl<const N: usize> RotorSpeeds<N> {
+    /// The same speeds, with zeros for the rotors that this vehicle has not.
+    #[must_use]
+    pub fn padded(&self) -> RotorSpeeds<ROTORS_MAX> {
+        RotorSpeeds(padded(&self.0))
     }
 }

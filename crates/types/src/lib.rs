@@ -12,8 +12,9 @@
 //!   `r_earth_body = Rz(psi) Ry(theta) Rx(phi)` turns body coordinates into earth coordinates. Each angle is
 //!   right-handed about its axis: positive pitch tilts the thrust to +x, positive roll tilts it to -y.
 //! * **Rates**: Omega = \[p, q, r\], the angular velocity of the body in body coordinates.
-//! * **Rotors**: 1 at -y, 2 at +x, 3 at +y, 4 at -x, each at the arm's length. Rotors 1 and 3 push the body
-//!   to positive yaw (they spin negatively about body z), rotors 2 and 4 to negative yaw.
+//! * **Rotors**: four to eight, anywhere in the body's x-y plane ([`Rotor`]). The paper's frame is [`PLUS`]: 1 at -y, 2
+//!   at +x, 3 at +y, 4 at -x, each at the arm's length; rotors 1 and 3 push the body to positive yaw (they spin
+//!   negatively about body z), rotors 2 and 4 to negative yaw.
 //! * **Subsystems** i = 1..6 of the paper's (7): roll, pitch, yaw, z, x, y. See [`PerAxis`].
 //!
 //! "(n)" with a number is always an equation of Yacef, Bouhali, Hamerlain, *Adaptive Fuzzy Backstepping Control for
@@ -29,6 +30,7 @@ mod actuation;
 mod attitude;
 mod axes;
 mod declared;
+mod frame;
 mod motion;
 mod parameters;
 mod range;
@@ -36,6 +38,7 @@ mod range;
 pub use actuation::{Inputs, RotorForces, RotorSpeeds};
 pub use axes::{Axis, PerAxis};
 pub use declared::{Declaration, Declared, Field, Name, Number, Value, Visit};
+pub use frame::{Airframe, PLUS, ROTOR_POSITION, ROTORS, ROTORS_MAX, Rotor};
 pub use motion::{Setpoint, State};
 pub use nalgebra;
 pub use parameters::Parameters;

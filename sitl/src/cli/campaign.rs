@@ -8,10 +8,11 @@ use super::progress::Progress;
 use super::subject::Kind;
 use super::target::Target;
 use super::terminal::{Failure, print, say};
+use super::vehicle::OnVehicle;
 use super::{interrupt, json};
 use afbc_campaign::{self as campaign, BUILT_IN, Campaign as Plan, Folder, Manifest, Shard, Summary, built_in};
+use afbc_reader::BuiltIn;
 use afbc_report::campaign as report;
-use afbc_sim::reader::BuiltIn;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -50,6 +51,9 @@ pub(crate) struct Campaign {
     log_hz: Option<LogRate>,
 
     #[command(flatten)]
+    on: OnVehicle,
+
+    #[command(flatten)]
     place: Place,
 
     #[command(flatten)]
@@ -59,7 +63,7 @@ pub(crate) struct Campaign {
 impl Campaign {
     /// Flies, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
-        let plan = self.campaign.campaign()?;
+        let plan = self.on.campaign(self.campaign.campaign()?)?;
         if let Some(flight) = self.flight {
             return self.fly_again(&plan, flight);
         }

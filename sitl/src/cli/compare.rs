@@ -6,7 +6,9 @@ use super::place::Place;
 use super::progress::Progress;
 use super::target::Target;
 use super::terminal::{Failure, print};
+use super::vehicle::OnVehicle;
 use super::{interrupt, json};
+use afbc::Profile;
 use afbc_campaign::compare::{self, standard};
 use afbc_report::compare as report;
 use afbc_sim::contender::Contender;
@@ -33,6 +35,9 @@ pub(crate) struct Compare {
     seeds: u64,
 
     #[command(flatten)]
+    on: OnVehicle,
+
+    #[command(flatten)]
     place: Place,
 
     #[command(flatten)]
@@ -47,8 +52,15 @@ impl Compare {
         let own = if self.scenarios.is_empty() { standard() } else { compare::contenders(&scenarios) };
         let contenders = if self.controllers.is_empty() { own } else { choose(&own, &self.controllers)? };
         for scenario in &mut scenarios {
-            let own = |contender: &Contender| contender.clone().for_vehicle(&scenario.vehicle);
-            scenario.contenders = contenders.iter().map(own).collect();
+            *scenario = self.on.put(scenario.clone())?;
+            let own = |contender: &Contender| match &scenario.vehicle_file {
+                Some(vehicle) => {
+                    let profile = contender.profile().unwrap_or(Profile::Flight);
+                    contender.clone().on(vehicle, profile)
+                }
+                None => Ok(contender.clone().for_vehicle(&scenario.vehicle)),
+            };
+            scenario.contenders = contenders.iter().map(own).collect::<Result<_, _>>()?;
             scenario.check()?;
         }
         let log_every = log_every(&scenarios)?;

@@ -5,6 +5,7 @@ use super::json::Json;
 use super::place::Place;
 use super::target::Target;
 use super::terminal::Failure;
+use super::vehicle::OnVehicle;
 use afbc::Profile;
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::scenario::Scenario;
@@ -23,6 +24,9 @@ pub(crate) struct Fly {
     controllers: Vec<String>,
 
     #[command(flatten)]
+    on: OnVehicle,
+
+    #[command(flatten)]
     flying: Flying,
 
     #[command(flatten)]
@@ -39,6 +43,7 @@ impl Fly {
         if !self.controllers.is_empty() {
             choose(&mut scenario, &self.controllers)?;
         }
+        let scenario = self.on.put(scenario)?;
         let name = scenario.name.clone();
         let (folder, flown) = self.flying.fly(vec![scenario], || self.place.open("fly", &name))?;
         report(&folder, &flown, &[], self.json)?;
@@ -61,7 +66,11 @@ fn choose(scenario: &mut Scenario, names: &[String]) -> Result<(), Failure> {
                 format!("no such controller; the laws are {laws}, the scenario's contenders {}", own.join(", "));
             return Err(format!("--controller {}: {problem}", name.escape_debug()).into());
         };
-        let mut contender = Contender::of(kind, Profile::Paper).for_vehicle(&scenario.vehicle);
+        let mut contender = Contender::of(kind, Profile::Paper);
+        contender = match &scenario.vehicle_file {
+            Some(vehicle) => contender.on(vehicle, Profile::Flight)?,
+            None => contender.for_vehicle(&scenario.vehicle),
+        };
         if let Some(other) = scenario.contenders.first() {
             contender.settings = other.settings;
         }

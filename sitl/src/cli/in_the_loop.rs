@@ -2,6 +2,7 @@
 
 use super::target::Target;
 use super::terminal::Failure;
+use super::vehicle::OnVehicle;
 use afbc_sim::flight::Sample;
 use afbc_sim::in_the_loop::{self, Error, Log, LoopEnd};
 use afbc_sim::metrics::{Accumulator, Metrics};
@@ -19,6 +20,9 @@ pub(crate) struct InTheLoop {
     #[arg(long, value_name = "SECONDS")]
     duration: Option<f64>,
 
+    #[command(flatten)]
+    pub(super) on: OnVehicle,
+
     /// Log the flight to this CSV file, 100 rows per second
     #[arg(long, value_name = "CSV")]
     out: Option<PathBuf>,
@@ -29,7 +33,7 @@ pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &LoopEnd) -> 
     let LoopEnd { lost, interrupted, disarmed } = end;
     let mut text = match (lost, interrupted) {
         (None, false) => {
-            let without_link = Run::fly(scenario, &in_the_loop::firmware(), u64::MAX)?.metrics;
+            let without_link = Run::fly(scenario, &in_the_loop::firmware(scenario)?, u64::MAX)?.metrics;
             in_the_loop::tracking(scenario.duration_s, metrics, &without_link)
         }
         (Some(lost), _) => format!("The vehicle was lost at t = {:.3} s: {}.\n", lost.time_s, lost.reason),
@@ -44,7 +48,7 @@ pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &LoopEnd) -> 
 impl InTheLoop {
     /// Returns the scenario, if the firmware can fly it.
     pub(crate) fn scenario(&self, target: &Target) -> Result<Scenario, Failure> {
-        let mut scenario = target.scenario()?;
+        let mut scenario = self.on.put(target.scenario()?)?;
         scenario.duration_s = self.duration.unwrap_or(scenario.duration_s);
         DURATION.check(scenario.duration_s)?;
         in_the_loop::check(&scenario).map_err(|error| format!("{}: {error}", scenario.name))?;
@@ -66,7 +70,9 @@ const PROGRESS_EVERY: u64 = 100;
 impl Recorder {
     /// Creates the recorder of a flight of `scenario`.
     pub(crate) fn new(scenario: &Scenario, flying: &InTheLoop) -> Result<Self, Failure> {
-        let create = |path: &PathBuf| Log::create(path).map_err(|error| format!("{}: {error}", path.display()));
+        let create = |path: &PathBuf| {
+            Log::create(path, scenario.rotors.len()).map_err(|error| format!("{}: {error}", path.display()))
+        };
         let log = flying.out.as_ref().map(create).transpose()?;
         let steps = (scenario.duration_s * 1000.0).round() as u64;
         let progress = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr());

@@ -19,6 +19,7 @@ mod subject;
 mod target;
 mod terminal;
 mod tune;
+mod vehicle;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -52,6 +53,7 @@ enum Command {
     Check(scenarios::Check),
     Scenarios(scenarios::Scenarios),
     Campaigns(campaign::Campaigns),
+    Vehicles(vehicle::Vehicles),
     Results(results::Results),
     Pil(pil::Pil),
     Hitl(hitl::Hitl),
@@ -70,6 +72,7 @@ impl Cli {
             Command::Check(check) => check.run(),
             Command::Scenarios(scenarios) => scenarios.run(),
             Command::Campaigns(campaigns) => campaigns.run(),
+            Command::Vehicles(vehicles) => vehicles.run(),
             Command::Results(results) => results.run(),
             Command::Pil(pil) => pil.run(),
             Command::Hitl(hitl) => hitl.run(),

@@ -1,7 +1,7 @@
 //! Resolves a name on the command line to a scenario or a campaign, built in or in a file.
 
 use afbc_campaign::{self as campaign, Campaign};
-use afbc_sim::reader::{self, FileError};
+use afbc_reader::FileError;
 use afbc_sim::scenario::{self, Scenario};
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
@@ -110,7 +110,7 @@ impl Found {
         if let Some(name) = plain.filter(|_| !path.exists()) {
             return kind.other().built_in(name).ok_or_else(|| kind.unknown(name));
         }
-        let text = reader::text(path, kind.name())?;
+        let text = afbc_reader::text(path, kind.name())?;
         let shown = path.display().to_string();
         Ok(Found {
             kind: Kind::of(&text).unwrap_or(kind),

@@ -5,6 +5,8 @@ use super::json::Json;
 use super::progress::Progress;
 use super::target::Target;
 use super::terminal::{Failure, print};
+use super::vehicle::OnVehicle;
+use afbc::Profile;
 use afbc_files::Error;
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::scenario::Scenario;
@@ -17,8 +19,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Search for gains, with the same flights, cost, search and number of tries for every law
 ///
-/// Prints a [[contender]] for a scenario file, with its cost before and after as comments. Ctrl-C ends the search early
-/// and keeps the best gains so far. See docs/tuning.md.
+/// Prints a [[contender]] for a scenario file or, with --vehicle, [gains] for that vehicle's file, with the cost before
+/// and after as comments. Ctrl-C ends the search early and keeps the best gains so far. See docs/tuning.md.
 #[derive(Args, Debug)]
 pub(crate) struct Tune {
     /// A law, to start from hand-tuned gains, or a contender of the first --scenario, to start from its gains
@@ -28,6 +30,9 @@ pub(crate) struct Tune {
     /// Fly this built-in scenario or scenario file instead of the training flights; may be given more than once
     #[arg(long = "scenario", value_name = "SCENARIO")]
     scenarios: Vec<Target>,
+
+    #[command(flatten)]
+    on: OnVehicle,
 
     /// Number of sets of gains to try
     #[arg(long, value_name = "N", default_value = "1000", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -49,8 +54,15 @@ impl Tune {
     /// Searches, then prints or writes.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let scenarios = self.scenarios.iter().map(Target::scenario).collect::<Result<Vec<_>, _>>()?;
-        let start = start(&self.contender, scenarios.first())?;
-        let training = if scenarios.is_empty() { tune::training()? } else { scenarios };
+        let mut start = start(&self.contender, scenarios.first())?;
+        if let Some(vehicle) = self.on.vehicle()? {
+            start = start.on(&vehicle, Profile::Flight)?;
+        }
+        let put = |scenarios: Vec<Scenario>| {
+            scenarios.into_iter().map(|scenario| self.on.put(scenario)).collect::<Result<Vec<_>, _>>()
+        };
+        let training = put(if scenarios.is_empty() { tune::training()? } else { scenarios })?;
+        let held_out = put(tune::held_out()?)?;
         if let Some(out) = &self.out {
             writable(out)?;
         }
@@ -68,7 +80,7 @@ impl Tune {
         })?;
         drop(progress);
 
-        let report = || tune::report(&start, &found, &training, self.seed);
+        let report = || tune::report(&start, &found, [&training, &held_out], self.seed);
         if let Some(out) = &self.out {
             std::fs::write(out, report()?).map_err(|source| Error::Write { path: out.clone(), source })?;
         }

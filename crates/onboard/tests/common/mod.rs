@@ -3,7 +3,7 @@
 
 use afbc_flight_core::Inbox;
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
-use afbc_onboard::{Comms, Flight, REPORT_MAX, Report};
+use afbc_onboard::{Comms, Configuration, Flight, REPORT_MAX, Report};
 use afbc_types::{Setpoint, State};
 
 pub const STATION: Address = Address { system: 255, component: 190 };
@@ -19,7 +19,7 @@ pub struct Bench {
 impl Bench {
     pub fn new() -> Self {
         Bench {
-            flight: Flight::new().expect("valid"),
+            flight: Flight::new(&Configuration::default()).expect("valid"),
             comms: Comms::new(),
             inbox: Inbox::default(),
             decoder: Decoder::new(STATION),

@@ -120,7 +120,7 @@ fn csv_holds_every_logged_step() {
     for (row, sample) in flown.run.log.iter().enumerate() {
         assert_eq!(value(row, "time_s"), sample.time_s);
         assert_eq!(value(row, "z_m"), sample.motion.position_m.z);
-        assert_eq!(value(row, "f3_n") as f32, sample.action.forces.0.z);
+        assert_eq!(value(row, "f3_n") as f32, sample.action.forces.0[2]);
     }
     // z - z_d = -1.5 m at rest, alpha_1 = 3, g_4 = 1/m: V = 1.5^2/2 + (3 * 1.5)^2/2 * 0.486.
     assert!((value(0, "e2_z_m_s") - 4.5).abs() < 1e-6);

@@ -3,7 +3,7 @@
 use super::pilot::Pilot;
 use super::sample::Sample;
 use super::world::World;
-use afbc_control::{Action, FlightController};
+use afbc_control::{Action, FlightController, Mixer};
 use afbc_flight_core::rate::{PERIOD_US, WINDOW_US};
 use afbc_flight_core::{ArmingLimits, Asked, Inbox, Request, Stamped, Vehicle, VehicleMemory};
 use afbc_types::{OutOfRange, Parameters, Setpoint, State};
@@ -13,26 +13,28 @@ use core::convert::Infallible;
 const TICKS_HELD: u64 = WINDOW_US as u64 / PERIOD_US + 1;
 
 /// A controller inside the flight core: without states it coasts blind, then descends.
-pub struct Aboard<C: FlightController> {
-    vehicle: Vehicle<C>,
+pub struct Aboard<C: FlightController<N>, const N: usize> {
+    vehicle: Vehicle<C, N>,
+    mixer: Mixer<N>,
     memory: VehicleMemory<C::Memory>,
     inbox: Inbox,
     /// Time since power-up \[us\].
     now_us: u64,
 }
 
-impl<C: FlightController> Aboard<C> {
+impl<C: FlightController<N>, const N: usize> Aboard<C, N> {
     /// Puts `controller`, which must be built for this vehicle, into a flight core without arming limits.
     ///
     /// # Errors
     /// If the time step is not 1 ms, the flight core's.
     pub fn new(vehicle: Parameters, controller: C) -> Result<Self, OutOfRange> {
+        let mixer = *controller.mixer();
         let vehicle = Vehicle::new(vehicle, ArmingLimits::NONE, controller)?;
-        Ok(Aboard { vehicle, memory: VehicleMemory::default(), inbox: Inbox::default(), now_us: 0 })
+        Ok(Aboard { vehicle, mixer, memory: VehicleMemory::default(), inbox: Inbox::default(), now_us: 0 })
     }
 
     /// Runs one tick with these inputs.
-    fn tick(&mut self, state: Option<State>, setpoint: Setpoint) -> Action {
+    fn tick(&mut self, state: Option<State>, setpoint: Setpoint) -> Action<N> {
         self.now_us += PERIOD_US;
         let at_us = self.now_us;
         if let Some(value) = state {
@@ -41,7 +43,8 @@ impl<C: FlightController> Aboard<C> {
         self.inbox.put_setpoint(Stamped { value: setpoint, at_us });
         let inbox = self.inbox.take();
         let outcome = self.vehicle.tick(&mut self.memory, at_us, &inbox);
-        let mut action = Action::new(outcome.motors, outcome.forces, false);
+        let given = self.mixer.inputs(&outcome.forces);
+        let mut action = Action::new(outcome.motors, outcome.forces, given, false);
         action.health = outcome.health.control;
         action
     }
@@ -56,7 +59,7 @@ impl<C: FlightController> Aboard<C> {
     }
 }
 
-impl<C: FlightController> Pilot for Aboard<C> {
+impl<C: FlightController<N>, const N: usize> Pilot for Aboard<C, N> {
     type Error = Infallible;
 
     /// Runs one tick. Before the first, once there is a state, the vehicle is held until it has armed.
@@ -70,6 +73,6 @@ impl<C: FlightController> Pilot for Aboard<C> {
         action.health.state_rejected = state.is_none();
         action.health.setpoint_rejected = !setpoint.is_plausible();
         let estimates = self.memory.control().map(C::learnt).unwrap_or_default();
-        Ok(view.sample(action, self.memory.trace::<C>(), estimates))
+        Ok(view.sample(action, self.memory.trace::<C, N>(), estimates))
     }
 }

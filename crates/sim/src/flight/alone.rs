@@ -7,19 +7,19 @@ use afbc_control::{FlightController, Screened};
 use core::convert::Infallible;
 
 /// A controller that commands the rotors directly.
-pub struct Alone<C: FlightController> {
+pub struct Alone<C: FlightController<N>, const N: usize> {
     controller: C,
     memory: Screened<C::Memory>,
 }
 
-impl<C: FlightController> Alone<C> {
+impl<C: FlightController<N>, const N: usize> Alone<C, N> {
     /// Creates it with a controller that has not flown yet.
     pub fn new(controller: C) -> Self {
         Alone { controller, memory: Screened::default() }
     }
 }
 
-impl<C: FlightController> Pilot for Alone<C> {
+impl<C: FlightController<N>, const N: usize> Pilot for Alone<C, N> {
     type Error = Infallible;
 
     // Always inlined: copying a sample in and out of calls costs a fifth of the loop.

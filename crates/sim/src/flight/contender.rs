@@ -21,7 +21,7 @@ pub fn fly(
     contender: &Contender,
     observe: impl FnMut(&Sample),
 ) -> Result<Option<Lost>, OutOfRange> {
-    contender.build(scenario.vehicle.to_f32(), Fly { scenario, observe })
+    contender.build(&scenario.vehicle, &scenario.rotors, Fly { scenario, observe })
 }
 
 struct Fly<'a, O> {
@@ -32,7 +32,7 @@ struct Fly<'a, O> {
 impl<O: FnMut(&Sample)> Task for Fly<'_, O> {
     type Output = Option<Lost>;
 
-    fn with<C: FlightController>(self, controller: C) -> Result<Option<Lost>, OutOfRange> {
+    fn with<C: FlightController<N>, const N: usize>(self, controller: C) -> Result<Option<Lost>, OutOfRange> {
         let Fly { scenario, mut observe } = self;
         let mut world = World::new(scenario, decimal(controller.dt_s()))?;
         let observe = |sample: &Sample| {

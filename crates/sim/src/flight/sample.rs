@@ -3,7 +3,7 @@
 use crate::trajectory::Reference;
 use afbc_control::{Action, Estimate, Trace};
 use afbc_plant::{Measurement, Motion, Telemetry};
-use afbc_types::PerAxis;
+use afbc_types::{PerAxis, ROTORS_MAX};
 
 /// All quantities of one step.
 #[derive(Clone, Copy, Debug)]
@@ -18,8 +18,8 @@ pub struct Sample {
     pub telemetry: Option<Telemetry>,
     /// Reference at this time.
     pub reference: Reference,
-    /// The controller's output.
-    pub action: Action,
+    /// The controller's output; 0 for rotors that the vehicle does not have.
+    pub action: Action<ROTORS_MAX>,
     /// The controller's trace.
     pub trace: Trace,
     /// The law's estimates; zero for a law without adaptation.

@@ -5,7 +5,7 @@ use crate::scenario::{Outage, Scenario};
 use crate::trajectory::{Reference, Trajectory};
 use afbc_control::{Action, Estimate, Trace};
 use afbc_plant::{Measurement, Motion, Plant, Sensors, Telemetry};
-use afbc_types::{OutOfRange, PerAxis, RotorSpeeds, State};
+use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX, RotorSpeeds, State};
 
 /// Plant, sensors, link and reference of a scenario.
 pub struct World {
@@ -71,7 +71,7 @@ impl World {
 
     /// Moves the vehicle by one step with commanded rotor speeds `speeds`.
     #[inline]
-    pub fn advance(&mut self, speeds: &RotorSpeeds) {
+    pub fn advance(&mut self, speeds: &RotorSpeeds<ROTORS_MAX>) {
         self.plant.step(speeds, self.dt_s);
     }
 }
@@ -79,9 +79,9 @@ impl World {
 impl View {
     /// Returns the sample of this view and a pilot's output.
     #[inline(always)]
-    pub fn sample(self, action: Action, trace: Trace, estimates: PerAxis<Estimate>) -> Sample {
+    pub fn sample<const N: usize>(self, action: Action<N>, trace: Trace, estimates: PerAxis<Estimate>) -> Sample {
         let View { time_s, motion, measurement, telemetry, reference, .. } = self;
-        Sample { time_s, motion, measurement, telemetry, reference, action, trace, estimates }
+        Sample { time_s, motion, measurement, telemetry, reference, action: action.padded(), trace, estimates }
     }
 }
 

@@ -7,7 +7,8 @@ use crate::scenario::Scenario;
 use afbc::Profile;
 use afbc_control::{Action, Trace};
 use afbc_link::{Answer, Command};
-use afbc_types::{Parameters, PerAxis, RotorForces};
+use afbc_reader::FileError;
+use afbc_types::{Inputs, Parameters, PerAxis, Rotor, RotorForces};
 use core::ops::ControlFlow;
 
 /// Time between control ticks, and one step of the plant \[s\].
@@ -33,9 +34,14 @@ pub struct LoopEnd {
     pub disarmed: bool,
 }
 
-/// Returns the firmware's contender: AFBC in the profile `flight`, under its monitor.
-pub fn firmware() -> Contender {
-    Contender { name: "firmware".into(), ..Contender::of(ControllerKind::Afbc, Profile::Flight).monitored() }
+/// Returns the firmware's contender: AFBC in the profile `flight` for the vehicle of `scenario`, under its monitor.
+///
+/// # Errors
+/// One line on what is wrong with the gains in the vehicle's file.
+pub fn firmware(scenario: &Scenario) -> Result<Contender, FileError> {
+    let afbc =
+        Contender { name: "firmware".into(), ..Contender::of(ControllerKind::Afbc, Profile::Flight).monitored() };
+    scenario.vehicle_file.as_ref().map_or(Ok(afbc.clone()), |vehicle| afbc.clone().on(vehicle, Profile::Flight))
 }
 
 /// Checks whether the firmware can fly `scenario`. The [`firmware`] has its own profile, which also replaces that of a
@@ -45,14 +51,17 @@ pub fn firmware() -> Contender {
 /// [`Error::Mismatch`] names what differs in the firmware.
 pub fn check(scenario: &Scenario) -> Result<(), Error> {
     let afbc = scenario.contender(ControllerKind::Afbc);
-    let profile = |same: fn(&Contender, Profile) -> bool| {
+    let any = |same: &dyn Fn(&Contender, Profile) -> bool| {
         afbc.is_none_or(|afbc| Profile::ALL.into_iter().any(|profile| same(afbc, profile)))
     };
+    let file = scenario.vehicle_file.as_ref();
+    let gains = |profile: Profile| file.map_or(profile.gains(), |file| file.gains(profile));
+    let settings = |profile: Profile| file.map_or(profile.settings(), |file| file.settings(profile));
     let agreed = [
-        (scenario.vehicle == Parameters::PAPER, "another vehicle"),
+        (scenario.vehicle == file.map_or(Parameters::PAPER, |file| file.parameters), "another vehicle"),
         (afbc.is_some(), "another law"),
-        (profile(|afbc, profile| afbc.gains() == Some(&profile.gains())), "other gains"),
-        (profile(|afbc, profile| afbc.settings == profile.settings()), "other settings"),
+        (any(&|afbc, profile| afbc.gains() == Some(&gains(profile))), "other gains"),
+        (any(&|afbc, profile| afbc.settings == settings(profile)), "other settings"),
     ];
     match agreed.into_iter().find(|(agreed, _)| !agreed) {
         Some((_, what)) => Err(Error::Mismatch(what)),
@@ -81,6 +90,7 @@ pub fn fly(
         station,
         autopilot,
         pace,
+        rotors: scenario.rotors.iter().map(|rotor| rotor.to_f32()).collect(),
         thrust_factor_n_s2: scenario.vehicle.to_f32().thrust_factor_n_s2,
         now_ms: 0,
         silent_ms: 0,
@@ -96,6 +106,7 @@ struct Line<'a, A> {
     station: &'a mut Station,
     autopilot: &'a mut A,
     pace: Pace,
+    rotors: Vec<Rotor>,
     thrust_factor_n_s2: f32,
     now_ms: u64,
     /// Time since the last rotor command.
@@ -111,7 +122,8 @@ impl<A: Autopilot> Pilot for Line<'_, A> {
         let view = if self.has_armed { self.turn(world)? } else { self.arm(world)? };
         let speeds = self.station.heard().speeds;
         let forces = RotorForces(speeds.0.map(|speed| self.thrust_factor_n_s2 * speed * speed));
-        Ok(view.sample(Action::new(speeds, forces, false), Trace::default(), PerAxis::default()))
+        let given = Inputs::of(&self.rotors, forces.0.as_slice());
+        Ok(view.sample(Action::new(speeds, forces, given, false), Trace::default(), PerAxis::default()))
     }
 
     fn gave_up(&self) -> Option<&'static str> {

@@ -1,35 +1,65 @@
 //! The firmware's code in this process.
 
 use super::{Autopilot, Error};
+use afbc::Profile;
 use afbc_flight_core::Inbox;
 use afbc_flight_core::rate::PERIOD_US;
-use afbc_onboard::{Comms, Flight, Report};
-use afbc_types::OutOfRange;
+use afbc_onboard::{Comms, Configuration, Flight, Report};
+use afbc_types::{Airframe, OutOfRange, ROTORS_MAX, with_rotors};
+use afbc_vehicles::Vehicle;
 
 /// The firmware without its hardware, ticked in lockstep.
 pub struct Host {
-    flight: Flight,
+    flight: Box<dyn Core>,
     comms: Comms,
     inbox: Inbox,
     time_us: u64,
+}
+
+/// The half that decides, of a vehicle with any number of rotors.
+trait Core {
+    fn tick(&mut self, now_us: u64, inbox: &Inbox) -> Report<ROTORS_MAX>;
+}
+
+impl<const N: usize> Core for Flight<N> {
+    fn tick(&mut self, now_us: u64, inbox: &Inbox) -> Report<ROTORS_MAX> {
+        Flight::tick(self, now_us, inbox).padded()
+    }
 }
 
 /// Result of one control tick.
 #[derive(Clone, Debug)]
 pub struct Tick {
     /// Report of the control tick.
-    pub report: Report,
+    pub report: Report<ROTORS_MAX>,
     /// Bytes sent over the link.
     pub bytes: Vec<u8>,
 }
 
 impl Host {
-    /// Creates it powered up and disarmed.
+    /// Creates the firmware of the paper's vehicle, powered up and disarmed.
     ///
     /// # Errors
     /// The first parameter out of range; does not occur.
     pub fn new() -> Result<Self, OutOfRange> {
-        Ok(Host { flight: Flight::new()?, comms: Comms::new(), inbox: Inbox::default(), time_us: 0 })
+        Ok(Self::of(Box::new(Flight::new(&Configuration::default())?)))
+    }
+
+    /// The firmware of this vehicle, powered up, disarmed.
+    ///
+    /// # Errors
+    /// The first parameter out of range; none in fact, for a vehicle is checked when its file is read.
+    pub fn for_vehicle(vehicle: &Vehicle) -> Result<Self, OutOfRange> {
+        let (settings, gains) = (vehicle.settings(Profile::Flight), vehicle.gains(Profile::Flight));
+        let curve = vehicle.curve;
+        with_rotors!(vehicle.rotors.len(), N => {
+            let airframe = Airframe::<N>::new(&vehicle.parameters, &vehicle.rotors)?;
+            Ok(Self::of(Box::new(Flight::new(&Configuration { airframe, settings, gains, curve })?)))
+        })
+    }
+
+    fn of(flight: Box<dyn Core>) -> Self {
+        Host { flight, comms: Comms::new(), inbox: Inbox::default(), time_us: 0 }
     }
 
     /// Runs one control tick at `time_us` since power-up, after `uplink` has reached the link. The tick reports a

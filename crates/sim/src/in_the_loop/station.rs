@@ -6,7 +6,7 @@ use afbc_link::{
     Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, Health, MavCmd, Sender, Text, Uplink,
 };
 use afbc_onboard::BUSY;
-use afbc_types::{RotorSpeeds, Setpoint, State};
+use afbc_types::{ROTORS_MAX, RotorSpeeds, Setpoint, State};
 use std::time::Instant;
 
 /// Usual address of a ground station.
@@ -29,7 +29,7 @@ pub struct Station {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Heard {
     /// Last commanded rotor speeds.
-    pub speeds: RotorSpeeds,
+    pub speeds: RotorSpeeds<ROTORS_MAX>,
     /// True if the motors may turn, from the last rotor command.
     pub armed: bool,
     /// Number of rotor commands.

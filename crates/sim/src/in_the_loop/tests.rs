@@ -27,7 +27,7 @@ fn the_link_hardly_changes_the_metrics() {
     let scenario = scenario("paper", 60.0);
     let (end, looped) = fly_host(&scenario);
     assert_eq!(end, LoopEnd { lost: None, interrupted: false, disarmed: true });
-    let plain = Run::fly(&scenario, &firmware(), u64::MAX).unwrap().metrics;
+    let plain = Run::fly(&scenario, &firmware(&scenario).unwrap(), u64::MAX).unwrap().metrics;
     // The link rounds the attitude to an f32 quaternion, and has no yaw acceleration.
     assert!((looped.rmse - plain.rmse).amax() < 1e-3, "{} {}", looped.rmse, plain.rmse);
     assert!((looped.max_abs - plain.max_abs).amax() < 5e-3, "{} {}", looped.max_abs, plain.max_abs);
@@ -111,7 +111,7 @@ fn a_link_that_stays_down_ends_the_flight() {
 fn the_log_has_the_columns_of_every_log() {
     let scenario = scenario("hover", 0.5);
     let path = std::env::temp_dir().join(format!("afbc-loop-log-{}.csv", std::process::id()));
-    let (mut station, mut host, mut log) = (Station::new(), Host::new().unwrap(), Log::create(&path).unwrap());
+    let (mut station, mut host, mut log) = (Station::new(), Host::new().unwrap(), Log::create(&path, 4).unwrap());
     let mut logged = Vec::new();
     let end = fly(&scenario, &mut station, &mut host, Pace::LOCKSTEP, |sample| {
         log.add(sample).unwrap();

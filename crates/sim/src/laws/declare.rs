@@ -84,13 +84,13 @@ macro_rules! laws {
                 match self { $( Law::$Law(_) => ControllerKind::$Law, )* }
             }
 
-            /// Runs `task` with the law's controller for a vehicle with these nominal parameters.
+            /// Runs `task` with the law's controller for this vehicle.
             ///
             /// # Errors
             /// The first parameter, gain or setting out of range, or the error of `task`.
-            pub fn build<T: crate::contender::Task>(
+            pub fn build<T: crate::contender::Task, const N: usize>(
                 &self,
-                vehicle: afbc_types::Parameters,
+                vehicle: afbc_types::Airframe<N>,
                 settings: afbc::Settings,
                 task: T,
             ) -> Result<T::Output, afbc_types::OutOfRange> {

@@ -1,8 +1,11 @@
 //! The one list of control laws.
 
 mod declare;
+mod gains;
 #[cfg(test)]
 mod tests;
+
+pub(crate) use gains::{law_gains, per_axis, whole};
 
 use afbc::{Adaptive, Backstepping, Controller, Profile, adaptive, backstepping};
 use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
@@ -30,7 +33,7 @@ declare::laws! {
         tuned: |afbc| afbc.map(|gains| gains.backstepping),
         by_hand: by_hand().map(|gains| gains.backstepping),
         controller: |vehicle, settings, gains| {
-            Controller::new(vehicle, settings, Backstepping::new(&vehicle, gains)?)
+            Controller::new(vehicle, settings, Backstepping::new(&vehicle.parameters, gains)?)
         },
     }
     /// Cascaded PID, as in autopilots.

@@ -4,7 +4,7 @@
 use super::{ControllerKind, Law};
 use crate::contender::Contender;
 use afbc::Profile;
-use afbc_types::{Axis, Declared, Parameters};
+use afbc_types::{Axis, Declared, PLUS, Parameters};
 use core::convert::Infallible;
 use std::collections::BTreeSet;
 
@@ -19,12 +19,12 @@ fn names_and_prefixes_are_unique() {
 /// Gains of laws in the cascade are in one group per axis, those of the others in no group.
 #[test]
 fn each_law_has_gains_that_fly_the_papers_vehicle() {
-    let vehicle = Parameters::PAPER.to_f32();
+    let rotors = PLUS.map(|rotor| rotor.to_f64());
     for kind in ControllerKind::ALL {
         let by_hand = Contender { law: Law::by_hand(kind), ..Contender::of(kind, Profile::Flight) };
         for contender in [Contender::of(kind, Profile::Paper), Contender::of(kind, Profile::Flight), by_hand] {
             assert_eq!(contender.kind(), kind);
-            contender.check(vehicle).unwrap();
+            contender.check(&Parameters::PAPER, &rotors).unwrap();
             contender.law.validate().unwrap();
             let (mut groups, mut count) = (BTreeSet::new(), 0);
             let Ok(()) = contender.law.visit(&mut |declaration, _| {

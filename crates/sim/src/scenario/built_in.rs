@@ -2,16 +2,17 @@
 
 use super::definition::Scenario;
 use super::file::parse;
-use crate::reader::BuiltIn;
+use afbc_reader::BuiltIn;
 
 /// Every built-in scenario.
-pub static BUILT_IN: [BuiltIn<Scenario>; 9] = [
+pub static BUILT_IN: [BuiltIn<Scenario>; 10] = [
     BuiltIn::new("paper", include_str!("../../scenarios/paper.toml"), parse),
     BuiltIn::new("hover", include_str!("../../scenarios/hover.toml"), parse),
     BuiltIn::new("step", include_str!("../../scenarios/step.toml"), parse),
     BuiltIn::new("circle", include_str!("../../scenarios/circle.toml"), parse),
     BuiltIn::new("lissajous", include_str!("../../scenarios/lissajous.toml"), parse),
     BuiltIn::new("waypoints", include_str!("../../scenarios/waypoints.toml"), parse),
+    BuiltIn::new("wind", include_str!("../../scenarios/wind.toml"), parse),
     BuiltIn::new("delivery", include_str!("../../scenarios/delivery.toml"), parse),
     BuiltIn::new("hardware", include_str!("../../scenarios/hardware.toml"), parse),
     BuiltIn::new("storm", include_str!("../../scenarios/storm.toml"), parse),

@@ -3,9 +3,13 @@
 use crate::case::Case;
 use crate::contender::{Contender, ControllerKind};
 use crate::trajectory::Trajectory;
+use afbc::Profile;
 use afbc_flight_core::ArmingLimits;
-use afbc_plant::{Environment, Model, Motion, Plant, Realism, Sensing, Sensors};
-use afbc_types::{OutOfRange, Parameters, Range};
+use afbc_plant::{Environment, Frame, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors};
+use afbc_reader::FileError;
+use afbc_reader::words::out_of_range;
+use afbc_types::{OutOfRange, Parameters, Range, Rotor};
+use afbc_vehicles::Vehicle;
 
 /// Accepted length of a flight \[s\].
 pub const DURATION: Range = Range::new("duration_s", 0.1, 36_000.0);
@@ -38,6 +42,10 @@ pub struct Scenario {
     pub model: Model,
     /// Nominal parameters, known to the controllers.
     pub vehicle: Parameters<f64>,
+    /// Its rotors, in the order of their numbers: four to eight.
+    pub rotors: Vec<Rotor<f64>>,
+    /// The vehicle file that all of this vehicle comes from, if it comes from one.
+    pub vehicle_file: Option<Vehicle>,
     /// True parameters with their changes, gusts and payloads.
     pub environment: Environment,
     /// Effects of rotors, air and ground. Its own seed is not used.
@@ -64,6 +72,33 @@ impl Scenario {
         self.contenders.iter().find(|contender| contender.kind() == kind)
     }
 
+    /// The same flight on another vehicle: everything about the vehicle comes from its file, masses, rotors, battery,
+    /// drag, ground and the gains of `profile`. What happens in flight stays: reference, wind, gusts, faults, changes,
+    /// payloads, sensors, outages.
+    ///
+    /// # Errors
+    /// One line on what is wrong with the gains in the vehicle's file, or on what is out of range on this vehicle.
+    pub fn on(self, vehicle: &Vehicle, profile: Profile) -> Result<Self, FileError> {
+        let unfit = |error: OutOfRange| {
+            FileError::whole(&vehicle.name, format!("{} cannot fly it: {}", self.name, out_of_range(&error)))
+        };
+        let environment = self.environment.on(vehicle.parameters).map_err(unfit)?;
+        let Realism { wind, seed, rotors: Rotors { faults, start, .. }, .. } = self.realism.clone();
+        let rotors = Rotors { faults, start, ..vehicle.realism.rotors.clone() };
+        let contenders = self.contenders.iter().map(|contender| contender.clone().on(vehicle, profile));
+        let scenario = Scenario {
+            vehicle: vehicle.parameters,
+            rotors: vehicle.rotors.clone(),
+            vehicle_file: Some(vehicle.clone()),
+            environment,
+            realism: Realism { rotors, wind, seed, ..vehicle.realism.clone() },
+            contenders: contenders.collect::<Result<_, _>>()?,
+            ..self.clone()
+        };
+        scenario.check().map_err(unfit)?;
+        Ok(scenario)
+    }
+
     /// Checks the scenario by building every flight.
     ///
     /// # Errors
@@ -71,7 +106,7 @@ impl Scenario {
     pub fn check(&self) -> Result<(), OutOfRange> {
         self.check_flight_core()?;
         self.contenders.iter().try_for_each(|contender| {
-            contender.check(self.vehicle.to_f32())?;
+            contender.check(&self.vehicle, &self.rotors)?;
             self.plant(contender.step_s())?;
             self.sensors(contender.step_s()).map(drop)
         })
@@ -102,7 +137,7 @@ impl Scenario {
     /// # Errors
     /// The first setting out of range.
     pub fn plant(&self, step_s: f64) -> Result<Plant, OutOfRange> {
-        let environment = self.environment.clone();
+        let environment = self.environment.clone().with_frame(Frame::new(&self.rotors)?);
         if self.is_ideal() {
             return Ok(Plant::new(self.model, self.initial, environment));
         }

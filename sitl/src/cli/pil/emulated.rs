@@ -3,7 +3,7 @@
 use crate::cli::in_the_loop::{InTheLoop, Recorder, outcome};
 use crate::cli::terminal::{Failure, print};
 use afbc_sim::flight::Sample;
-use afbc_sim::in_the_loop::{self, Pace, Station};
+use afbc_sim::in_the_loop::{self, Host, Pace, Station};
 use afbc_sim::scenario::Scenario;
 use pil::{Comparison, Emulator, Image, Twins};
 use std::path::PathBuf;
@@ -13,8 +13,9 @@ use std::time::Instant;
 /// Flies `scenario` with `image`, or with the one built from this source, and prints the results.
 pub(super) fn fly(scenario: &Scenario, flying: &InTheLoop, image: Option<PathBuf>) -> Result<ExitCode, Failure> {
     let mut recorder = Recorder::new(scenario, flying)?;
-    let image = image.map_or_else(|| Image::Pil.build(), Ok)?;
-    let mut twins = Twins::new(Emulator::start(&image)?)?;
+    let image = image.map_or_else(|| Image::Pil.build(flying.on.name()), Ok)?;
+    let host = scenario.vehicle_file.as_ref().map_or_else(Host::new, Host::for_vehicle)?;
+    let mut twins = Twins::new(Emulator::start(&image)?, host);
 
     let start = Instant::now();
     let observe = |sample: &Sample| recorder.observe(sample);

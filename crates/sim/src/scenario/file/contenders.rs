@@ -1,56 +1,99 @@
 //! `controllers`, `profile`, `monitor` and `[[contender]]`: the contenders.
 
-use super::control::{per_axis, settings, whole};
+use super::control::settings;
 use crate::contender::{Contender, ControllerKind, Law};
-use crate::reader::{FileError, Table};
-use afbc::{Profile, Settings, adaptive};
+use crate::laws::{law_gains, per_axis, whole};
+use afbc::{LAG_S, Profile, Settings, adaptive};
+use afbc_reader::{FileError, Table};
 use afbc_types::{Parameters, PerAxis};
+use afbc_vehicles::Vehicle;
 
 /// Longest name of a contender that fits the tables.
 const NAME_LENGTH: usize = 32;
 
+/// The vehicle that contenders fly: one of a file, or the paper's with these nominal parameters.
+#[derive(Clone, Copy)]
+pub(super) enum Flown<'a> {
+    File(&'a Vehicle),
+    Paper(&'a Parameters<f64>),
+}
+
+impl Flown<'_> {
+    /// Gains of AFBC.
+    fn gains(self, profile: Profile) -> PerAxis<adaptive::Gains> {
+        match self {
+            Flown::File(vehicle) => vehicle.gains(profile),
+            Flown::Paper(parameters) => profile.gains_for(&parameters.to_f32(), LAG_S),
+        }
+    }
+
+    fn settings(self, profile: Profile) -> Settings {
+        match self {
+            Flown::File(vehicle) => vehicle.settings(profile),
+            Flown::Paper(_) => profile.settings(),
+        }
+    }
+
+    /// The profile of a file that names none: the paper's law is for the paper's rotors, which do not lag.
+    fn profile(self) -> Profile {
+        match self {
+            Flown::File(_) => Profile::Flight,
+            Flown::Paper(_) => Profile::Paper,
+        }
+    }
+
+    /// The law of this kind, AFBC's gains being `afbc`.
+    fn law(self, kind: ControllerKind, profile: Profile, afbc: &PerAxis<adaptive::Gains>) -> Result<Law, FileError> {
+        let law = Law::beside(kind, afbc);
+        match self {
+            Flown::File(vehicle) if !kind.in_cascade() => Law::on(kind, vehicle, profile),
+            Flown::File(vehicle) if kind != ControllerKind::Afbc && profile == Profile::Flight => {
+                law_gains(vehicle, law)
+            }
+            _ => Ok(law),
+        }
+    }
+}
+
 /// Defaults of a contender.
 #[derive(Clone, Copy)]
-struct Defaults {
+struct Defaults<'a> {
+    flown: Flown<'a>,
+    profile: Profile,
     gains: PerAxis<adaptive::Gains>,
     settings: Settings,
     /// Whether AFBC flies under its monitor.
     monitor: bool,
 }
 
-impl Defaults {
-    fn contender(&self, kind: ControllerKind) -> Contender {
-        let law = Law::beside(kind, &self.gains);
+impl Defaults<'_> {
+    fn contender(&self, kind: ControllerKind) -> Result<Contender, FileError> {
+        let law = self.flown.law(kind, self.profile, &self.gains)?;
         let contender = Contender { name: kind.name().into(), law, settings: self.settings, monitored: false };
-        if self.monitor { contender.monitored() } else { contender }
+        Ok(if self.monitor { contender.monitored() } else { contender })
     }
 }
 
 /// Reads all contenders, those of `controllers` first.
-pub(super) fn read(root: &mut Table<'_>, vehicle: &Parameters) -> Result<Vec<Contender>, FileError> {
+pub(super) fn read(root: &mut Table<'_>, flown: Flown<'_>) -> Result<Vec<Contender>, FileError> {
     let controllers = root.choices("controllers", &ControllerKind::ALL, ControllerKind::name)?;
-    let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(Profile::Paper);
-    let mut axes = profile.gains_for(vehicle);
+    let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(flown.profile());
+    let mut axes = flown.gains(profile);
     per_axis(root.table("gains")?, &mut axes)?;
-    let settings = settings(root, profile.settings(), true)?;
+    let settings = settings(root, flown.settings(profile), true)?;
     let monitor = root.boolean("monitor")?.unwrap_or(false);
-    let defaults = Defaults { gains: axes, settings, monitor };
+    let defaults = Defaults { flown, profile, gains: axes, settings, monitor };
 
     let tables = root.few_tables("contender")?;
     let kinds = controllers.unwrap_or(if tables.is_empty() { ControllerKind::PAPER.to_vec() } else { Vec::new() });
-    let mut contenders: Vec<_> = kinds.into_iter().map(|kind| defaults.contender(kind)).collect();
+    let mut contenders = kinds.into_iter().map(|kind| defaults.contender(kind)).collect::<Result<Vec<_>, _>>()?;
     for table in tables {
-        contenders.push(contender(table, vehicle, defaults, &contenders)?);
+        contenders.push(contender(table, defaults, &contenders)?);
     }
     Ok(contenders)
 }
 
-fn contender(
-    mut table: Table<'_>,
-    vehicle: &Parameters,
-    file: Defaults,
-    others: &[Contender],
-) -> Result<Contender, FileError> {
+fn contender(mut table: Table<'_>, file: Defaults<'_>, others: &[Contender]) -> Result<Contender, FileError> {
     let name = table.need_text("name", "give it one, such as \"gentle\"")?.to_owned();
     if !(1..=NAME_LENGTH).contains(&name.chars().count()) || name.chars().any(char::is_control) {
         let problem = format!("it cannot be a name; make it one plain line of 1 to {NAME_LENGTH} characters");
@@ -62,16 +105,17 @@ fn contender(
     let kind = table.need_choice("controller", &ControllerKind::ALL, ControllerKind::name)?;
     let mut defaults = match table.choice("profile", &Profile::ALL, Profile::name)? {
         Some(profile) => Defaults {
-            gains: profile.gains_for(vehicle),
-            settings: profile.settings().with_dt_s(file.settings.common.dt_s),
-            monitor: file.monitor,
+            profile,
+            gains: file.flown.gains(profile),
+            settings: file.flown.settings(profile).with_dt_s(file.settings.common.dt_s),
+            ..file
         },
         None => file,
     };
     if kind == ControllerKind::Afbc {
         defaults.monitor = table.boolean("monitor")?.unwrap_or(defaults.monitor);
     }
-    let mut contender = Contender { name, ..defaults.contender(kind) };
+    let mut contender = Contender { name, ..defaults.contender(kind)? };
     let gains = table.table("gains")?;
     if kind.in_cascade() {
         per_axis(gains, &mut contender.law)?

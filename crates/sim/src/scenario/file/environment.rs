@@ -1,9 +1,9 @@
 //! `[[gust]]`, `[[change]]`, `[[payload]]` and `[[outage]]`: events in flight.
 
-use crate::reader::words::out_of_range;
-use crate::reader::{FileError, Table};
 use crate::scenario::definition::Outage;
 use afbc_plant::{Environment, Gust, GustKind, PAYLOAD_BELOW, ParameterChange, Payload, Quantity};
+use afbc_reader::words::out_of_range;
+use afbc_reader::{FileError, Table};
 use afbc_types::{Axis, Parameters, Range};
 
 /// Accepted start of an event \[s\].

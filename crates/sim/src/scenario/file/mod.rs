@@ -14,11 +14,13 @@ mod tests;
 
 use super::definition::{DURATION, Scenario};
 use crate::contender::Contender;
-use crate::reader::words::out_of_range;
-use crate::reader::{self, FileError, Table};
 use crate::trajectory::Trajectory;
-use afbc_plant::Model;
-use afbc_types::{Parameters, Range};
+use afbc_plant::{Frame, Model, Realism};
+use afbc_reader::words::out_of_range;
+use afbc_reader::{FileError, Table};
+use afbc_types::{PLUS, Range};
+use afbc_vehicles::parts;
+use contenders::Flown;
 use std::path::Path;
 
 /// Default duration of a flight \[s\].
@@ -30,7 +32,7 @@ const SEED: Range = Range::new("seed", 0.0, 1e9);
 /// # Errors
 /// The first mistake, as one line.
 pub fn load(path: &Path) -> Result<Scenario, FileError> {
-    let text = reader::text(path, "scenario")?;
+    let text = afbc_reader::text(path, "scenario")?;
     let stem = path.file_stem().map_or("".into(), |stem| stem.to_string_lossy());
     parse(&path.display().to_string(), &text, &stem)
 }
@@ -40,7 +42,7 @@ pub fn load(path: &Path) -> Result<Scenario, FileError> {
 /// # Errors
 /// The first mistake, as one line.
 pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> {
-    reader::document(file, text, "scenarios hover", |root| read(root, name, None))
+    afbc_reader::document(file, text, "scenarios hover", |root| read(root, name, None))
 }
 
 /// Reads the scenario in `root`; `name` and `trajectory` are the defaults.
@@ -48,15 +50,16 @@ pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> 
 /// # Errors
 /// The first mistake, as one line.
 pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) -> Result<Scenario, FileError> {
-    let [name, description] = reader::title(&mut root, name)?;
+    let [name, description] = afbc_reader::title(&mut root, name)?;
     let duration_s = root.number(&DURATION)?.unwrap_or(DURATION_S);
     let models = [Model::Simplified, Model::RigidBody];
     let seed = root.whole(&SEED)?.unwrap_or(0);
     let model = root.choice("plant", &models, Model::name)?.unwrap_or(Model::RigidBody);
 
-    let vehicle = vehicle::read(root.table("vehicle")?, Parameters::PAPER)?;
-    let truth = vehicle::read(root.table("truth")?, vehicle)?;
-    let contenders = contenders::read(&mut root, &vehicle.to_f32())?;
+    let (vehicle_file, vehicle) = vehicle::read(root.table("vehicle")?)?;
+    let truth = parts::parameters(root.table("truth")?, vehicle)?;
+    let flown = vehicle_file.as_ref().map_or(Flown::Paper(&vehicle), Flown::File);
+    let contenders = contenders::read(&mut root, flown)?;
     let trajectory = match (root.table("trajectory")?, trajectory) {
         (Some(table), _) => trajectory::read(table)?,
         (None, Some(trajectory)) => trajectory.clone(),
@@ -68,7 +71,10 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
     let initial = motion::initial(root.table("initial")?, &trajectory.at(0.0))?;
     let environment = environment::read(&mut root, truth)?;
     let step_s = contenders.first().map_or(afbc_control::Settings::DT.range.max, Contender::step_s);
-    let realism = realism::read(&mut root, &truth, step_s)?;
+    let rotors = vehicle_file.as_ref().map_or(PLUS.map(|rotor| rotor.to_f64()).to_vec(), |file| file.rotors.clone());
+    let frame = Frame::new(&rotors).map_err(|error| root.fault("vehicle", out_of_range(&error)))?;
+    let real = vehicle_file.as_ref().map_or(Realism::default(), |file| file.realism.clone());
+    let realism = realism::read(&mut root, &real, &truth, &frame, step_s)?;
     let sensing = sensors::read(root.table("sensors")?)?;
     let outages = environment::outages(&mut root)?;
     let flight_core = root.boolean("flight_core")?.unwrap_or(false);
@@ -80,6 +86,8 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
         duration_s,
         model,
         vehicle,
+        rotors,
+        vehicle_file,
         environment,
         realism,
         sensing,

@@ -2,25 +2,36 @@
 //! lacks.
 
 use super::environment::{LENGTH, START};
-use crate::reader::words::out_of_range;
-use crate::reader::{FileError, Table};
 use afbc_plant::rotors::limits::{EFFICIENCY, ROTOR};
 use afbc_plant::{
-    Battery, Contact, CosineGust, Drag, GroundEffect, Realism, RotorFault, Rotors, Sag, Start, Turbulence, Wind, wind,
+    Battery, Contact, CosineGust, Drag, Frame, GroundEffect, Realism, RotorFault, Turbulence, Wind, wind,
 };
-use afbc_types::{Declared, OutOfRange, Parameters, Range};
+use afbc_reader::{FileError, Table};
+use afbc_types::{Parameters, Range};
+use afbc_vehicles::parts::{self, Conditions};
 
-/// Accepted largest force of a rotor \[N\]; the corresponding speed must be in range, too.
-const FORCE_MAX: Range = Range::new("force_max_n", 0.001, 10_000.0);
 /// Accepted time from a gust's rise to its fall \[s\].
 const HOLD: Range = Range::new("hold_s", 0.0, LENGTH.max);
 
-/// Reads the effects for a vehicle with these true parameters, in steps of `step_s`.
-pub(super) fn read(root: &mut Table<'_>, truth: &Parameters<f64>, step_s: f64) -> Result<Realism, FileError> {
-    let rotors = rotors(root, truth)?;
+/// Reads the effects for a vehicle with these true parameters and this frame, in steps of `step_s`; what the file
+/// leaves out is as in `default`.
+pub(super) fn read(
+    root: &mut Table<'_>,
+    default: &Realism,
+    truth: &Parameters<f64>,
+    frame: &Frame,
+    step_s: f64,
+) -> Result<Realism, FileError> {
+    let mut rotors = parts::rotors(root.table("rotors")?, default.rotors.clone(), truth)?;
+    let faults = root.few_tables("rotor_fault")?.into_iter().map(|table| fault(table, frame.count()));
+    rotors.faults = faults.collect::<Result<_, _>>()?;
+    if let Some(table) = root.table("battery")? {
+        rotors.battery = Some(parts::battery(table, rotors.battery.unwrap_or(Battery::THREE_CELLS))?);
+    }
+    let conditions = Conditions { parameters: truth, frame, rotor_max_rad_s: rotors.max_rad_s, step_s };
     let drag = match root.table("drag")? {
-        Some(table) => Some(drag_of(table, truth, rotors.max_rad_s, step_s)?),
-        None => None,
+        Some(table) => Some(parts::drag(table, default.drag.unwrap_or(Drag::PAPER), "", &conditions)?),
+        None => default.drag,
     };
     let wind = match root.table("wind")? {
         Some(table) => wind_of(table)?,
@@ -30,52 +41,22 @@ pub(super) fn read(root: &mut Table<'_>, truth: &Parameters<f64>, step_s: f64) -
         return Err(root.fault_at("wind", "wind acts through drag, and there is none; add [drag]"));
     }
     let (contact, ground_effect) = match root.table("ground")? {
-        Some(table) => ground(table, truth, step_s)?,
-        None => (None, None),
+        Some(table) => {
+            let contact = default.contact.unwrap_or(Contact::PAPER);
+            let default = (contact, default.ground_effect.unwrap_or(GroundEffect::PAPER));
+            let (contact, ground_effect) = parts::ground(table, default, "", truth, step_s)?;
+            (Some(contact), ground_effect)
+        }
+        None => (default.contact, default.ground_effect),
     };
     Ok(Realism { rotors, drag, wind, contact, ground_effect, seed: 0 })
 }
 
-/// Returns errors about the combination of numbers in `table`.
-fn together(table: &Table<'_>) -> impl Fn(OutOfRange) -> FileError {
-    |error| table.fault_at(error.range.name, format!("{}; change it", out_of_range(&error)))
-}
-
-fn rotors(root: &mut Table<'_>, truth: &Parameters<f64>) -> Result<Rotors, FileError> {
-    let mut rotors = Rotors::DEFAULT;
-    if let Some(mut table) = root.table("rotors")? {
-        let start = table.choice("start", &[Start::Hover, Start::Idle], |start| match start {
-            Start::Hover => "hover",
-            Start::Idle => "idle",
-        })?;
-        rotors.start = start.unwrap_or(rotors.start);
-        table.declared(&mut rotors)?;
-        max_by_force(&mut table, &mut rotors, truth)?;
-        rotors.validate().map_err(together(&table))?;
-        table.finish()?;
-    }
-    rotors.faults = root.few_tables("rotor_fault")?.into_iter().map(fault).collect::<Result<_, _>>()?;
-    rotors.battery = root.table("battery")?.map(battery_of).transpose()?;
-    Ok(rotors)
-}
-
-/// Reads the largest speed from a force, if it is given as one.
-fn max_by_force(table: &mut Table<'_>, rotors: &mut Rotors, truth: &Parameters<f64>) -> Result<(), FileError> {
-    let max = &Rotors::MAX.range;
-    let Some(force_n) = table.number(&FORCE_MAX)? else { return Ok(()) };
-    if table.has(max.name) {
-        let problem = format!("a second limit; write it or {}, not both", max.name);
-        return Err(table.fault_at(FORCE_MAX.name, problem));
-    }
-    rotors.max_rad_s = libm::sqrt(force_n / truth.thrust_factor_n_s2);
-    let problem = |error| format!("it makes {}; change the force", out_of_range(&error));
-    max.check(rotors.max_rad_s).map_err(|error| table.fault_at(FORCE_MAX.name, problem(error)))
-}
-
-fn fault(mut table: Table<'_>) -> Result<RotorFault, FileError> {
-    let rotor = table.need_number(&ROTOR)?;
+/// Reads a fault of one of `count` rotors.
+fn fault(mut table: Table<'_>, count: usize) -> Result<RotorFault, FileError> {
+    let rotor = table.need_number(&Range { max: count as f64, ..ROTOR })?;
     if rotor.fract() != 0.0 {
-        return Err(table.fault_at(ROTOR.name, format!("{rotor} is no rotor; it must be 1, 2, 3 or 4")));
+        return Err(table.fault_at(ROTOR.name, format!("{rotor} is no rotor; it must be a whole number, 1 to {count}")));
     }
     let fault = RotorFault {
         rotor: rotor as u8,
@@ -84,32 +65,6 @@ fn fault(mut table: Table<'_>) -> Result<RotorFault, FileError> {
     };
     table.finish()?;
     Ok(fault)
-}
-
-fn battery_of(mut table: Table<'_>) -> Result<Battery, FileError> {
-    let mut battery = Battery::THREE_CELLS;
-    let effect = table.choice("effect", &[Sag::Ceiling, Sag::Speed], |effect| match effect {
-        Sag::Ceiling => "ceiling",
-        Sag::Speed => "speed",
-    })?;
-    battery.effect = effect.unwrap_or(battery.effect);
-    table.declared(&mut battery)?;
-    battery.validate().map_err(together(&table))?;
-    table.finish()?;
-    Ok(battery)
-}
-
-fn drag_of(
-    mut table: Table<'_>,
-    truth: &Parameters<f64>,
-    rotor_max_rad_s: f64,
-    step_s: f64,
-) -> Result<Drag, FileError> {
-    let mut drag = Drag::PAPER;
-    table.declared(&mut drag)?;
-    drag.validate_for(truth, rotor_max_rad_s, step_s).map_err(together(&table))?;
-    table.finish()?;
-    Ok(drag)
 }
 
 fn wind_of(mut table: Table<'_>) -> Result<Wind, FileError> {
@@ -149,19 +104,4 @@ fn gust(mut table: Table<'_>) -> Result<CosineGust, FileError> {
     };
     table.finish()?;
     Ok(gust)
-}
-
-fn ground(
-    mut table: Table<'_>,
-    truth: &Parameters<f64>,
-    step_s: f64,
-) -> Result<(Option<Contact>, Option<GroundEffect>), FileError> {
-    let (mut contact, mut effect) = (Contact::PAPER, GroundEffect::PAPER);
-    table.declared(&mut contact)?;
-    contact.validate_for(truth, step_s).map_err(together(&table))?;
-    table.declared_but(GroundEffect::ROT_HEIGHT.range.name, &mut effect)?;
-    effect.rotor_height_m = contact.rotor_height_m;
-    let with_effect = table.boolean("ground_effect")?.unwrap_or(true);
-    table.finish()?;
-    Ok((Some(contact), with_effect.then_some(effect)))
 }

@@ -1,7 +1,7 @@
 //! `[sensors]`: measurement of the state for the controllers.
 
-use crate::reader::{FileError, Table};
 use afbc_plant::{Deviations, Dropouts, Sensing};
+use afbc_reader::{FileError, Table};
 use afbc_types::Range;
 
 /// Accepted single number for all coordinates: the range that every coordinate accepts.

@@ -6,12 +6,12 @@ use super::parse;
 use crate::case::Case;
 use crate::contender::{Contender, Law};
 use crate::paper;
-use crate::reader::FileError;
 use crate::scenario::{BUILT_IN, Scenario, built_in};
 use afbc::Profile;
 use afbc::adaptive;
 use afbc_peers::pid;
 use afbc_plant::Model;
+use afbc_reader::FileError;
 
 #[test]
 fn built_in_paper_is_the_paper() {

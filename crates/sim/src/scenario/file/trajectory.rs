@@ -1,8 +1,8 @@
 //! `[trajectory]`: the reference, a table whose `kind` determines its keys.
 
 use super::motion::POSITION;
-use crate::reader::{FileError, Table};
 use crate::trajectory::{Sine, Trajectory, Waypoint};
+use afbc_reader::{FileError, Table};
 use afbc_types::{Range, Setpoint};
 use core::f64::consts::TAU;
 use nalgebra::Vector3;

@@ -1,14 +1,29 @@
-//! `[vehicle]`, the nominal parameters, and `[truth]`, the true ones.
+//! `[vehicle]`: the nominal parameters, or the name of a vehicle file.
 
-use crate::reader::{FileError, Table};
+use afbc_reader::{FileError, Table};
 use afbc_types::Parameters;
+use afbc_vehicles::{Vehicle, parts};
+use std::path::Path;
 
-/// Reads the parameters in `table`; missing keys are as in `default`.
-pub(super) fn read(table: Option<Table<'_>>, default: Parameters<f64>) -> Result<Parameters<f64>, FileError> {
-    let mut vehicle = default;
-    if let Some(mut table) = table {
-        table.declared(&mut vehicle)?;
-        table.finish()?;
+/// Returns the vehicle that the table names, if it names one, and the nominal parameters: those of that vehicle,
+/// otherwise the paper's with the keys of the table in their place.
+pub(super) fn read(table: Option<Table<'_>>) -> Result<(Option<Vehicle>, Parameters<f64>), FileError> {
+    let Some(mut table) = table else { return Ok((None, Parameters::PAPER)) };
+    let Some(name) = table.text("name")? else {
+        return Ok((None, parts::parameters(Some(table), Parameters::PAPER)?));
+    };
+    let vehicle = named(&table, name)?;
+    let parameters = vehicle.parameters;
+    table.finish()?;
+    Ok((Some(vehicle), parameters))
+}
+
+/// Reads a vehicle: a plain name is a built-in one, anything else a file, relative to the folder of the scenario.
+fn named(table: &Table<'_>, name: &str) -> Result<Vehicle, FileError> {
+    if name.contains(['/', '\\', '.']) {
+        let folder = Path::new(table.file()).parent().unwrap_or(Path::new(""));
+        return afbc_vehicles::load(&folder.join(name));
     }
-    Ok(vehicle)
+    let built_in = afbc_vehicles::built_in(name).ok_or_else(|| table.fault_at("name", afbc_vehicles::unknown(name)))?;
+    built_in.read()
 }

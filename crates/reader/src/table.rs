@@ -29,6 +29,11 @@ impl<'a> Table<'a> {
         Table { source, path: String::new(), start: 0, entries, read: Vec::new(), units: Vec::new() }
     }
 
+    /// What errors call the file.
+    pub fn file(&self) -> &'a str {
+        self.source.file
+    }
+
     /// Returns the number under `range.name`, if present.
     pub fn number(&mut self, range: &Range) -> Result<Option<f64>, FileError> {
         let Some(value) = self.value(range.name) else { return Ok(None) };

@@ -1,0 +1,51 @@
+//! Gains and settings for rotors that lag more than those of the paper's vehicle.
+#![allow(missing_docs)]
+
+use afbc::{LAG_S, Profile, slowness};
+use afbc_types::{Axis, Parameters};
+
+fn close(a: f32, b: f32) -> bool {
+    (a - b).abs() <= 1e-6 * b.abs()
+}
+
+#[test]
+fn quick_rotors_change_nothing_and_slow_ones_change_every_gain_by_its_power_of_time() {
+    let paper = Parameters::PAPER.to_f32();
+    let (base, settings) = (Profile::Flight.gains(), Profile::Flight.settings());
+    for quick in [0.0, 0.5 * LAG_S, LAG_S] {
+        assert_eq!(slowness(quick), 1.0);
+        assert_eq!(Profile::Flight.gains_for(&paper, quick), base);
+        assert_eq!(Profile::Flight.settings_for(3.0, quick), settings);
+    }
+    for k in [1.5_f32, 4.0] {
+        let (gains, slow) =
+            (Profile::Flight.gains_for(&paper, k * LAG_S), Profile::Flight.settings_for(2.0, k * LAG_S));
+        for axis in Axis::ALL {
+            let (g, b) = (&gains[axis], &base[axis]);
+            assert!(close(g.backstepping.alpha1, b.backstepping.alpha1 / k), "{}", axis.name());
+            assert!(close(g.backstepping.alpha2, b.backstepping.alpha2 / k), "{}", axis.name());
+            assert!(close(g.gamma, b.gamma / (k * k)) && close(g.eta, b.eta / (k * k)), "{}", axis.name());
+            assert!(close(g.epsilon, b.epsilon * k), "{}", axis.name());
+            assert!(close(g.safeguards.sigma, b.safeguards.sigma / k), "{}", axis.name());
+            // Disturbances do not slow down.
+            assert_eq!(g.safeguards.theta_max, b.safeguards.theta_max);
+            assert_eq!(g.safeguards.delta_max, b.safeguards.delta_max);
+            assert_eq!(g.membership, b.membership);
+            // Near zero the robust term is a gain of delta_hat/epsilon: it slows down as alpha_2 does.
+            let robust = |gains: &afbc::adaptive::Gains| gains.safeguards.delta_max / gains.epsilon;
+            assert!(close(robust(g) / robust(b), g.backstepping.alpha2 / b.backstepping.alpha2), "{}", axis.name());
+        }
+        assert!(close(slow.command_filter_rad_s, settings.command_filter_rad_s / k));
+        assert!(close(slow.limits.tilt_rate_max_rad_s, settings.limits.tilt_rate_max_rad_s / k));
+        assert_eq!(slow.common.rotor_force_max_n, 2.0);
+        assert_eq!(slow.limits.speed_max_m_s, settings.limits.speed_max_m_s);
+    }
+}
+
+/// The printed law is for rotors without lag, whatever the vehicle's are.
+#[test]
+fn the_printed_gains_do_not_slow_down() {
+    let paper = Parameters::PAPER.to_f32();
+    assert_eq!(Profile::Paper.gains_for(&paper, 0.1), Profile::Paper.gains());
+    assert_eq!(Profile::Paper.settings_for(1.0, 0.1), Profile::Paper.settings());
+}

@@ -1,0 +1,31 @@
+//! What makes the firmware that of one vehicle.
+
+use afbc::adaptive::Gains;
+use afbc::{Profile, Settings};
+use afbc_flight_core::motor::Curve;
+use afbc_types::{Airframe, Parameters, PerAxis};
+
+/// What the firmware is told of the vehicle that it flies; `vehicles/` has one for each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Configuration<const N: usize = 4> {
+    /// Nominal parameters and rotors.
+    pub airframe: Airframe<N>,
+    /// Settings of AFBC, largest force of a rotor among them.
+    pub settings: Settings,
+    /// Gains of AFBC for this vehicle.
+    pub gains: PerAxis<Gains>,
+    /// Throttle curve of the motors.
+    pub curve: Curve,
+}
+
+impl Default for Configuration {
+    /// The paper's vehicle in the profile `flight`.
+    fn default() -> Self {
+        Configuration {
+            airframe: Parameters::PAPER.to_f32().into(),
+            settings: Profile::Flight.settings(),
+            gains: Profile::Flight.gains(),
+            curve: Curve::DEFAULT,
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! Gains for rotors that lag more than those that the gains were tuned for.
+
+use afbc_types::{Declaration, Declared, Value};
+use core::convert::Infallible;
+
+/// The power of time in a unit: what has it grows by that power of a time.
+fn time_power(unit: &str) -> i32 {
+    match unit {
+        "s" => 1,
+        "1/s" | "rad/s" => -1,
+        "1/s2" => -2,
+        "1/s3" => -3,
+        _ => 0,
+    }
+}
+
+/// The gains of a vehicle that may take `slowness` times as long: every one by its power of time, within its range, so
+/// that errors have the same course, only slower. Limits in m/s, m/s2 and rad stay.
+#[must_use]
+pub fn slowed<G: Declared>(mut gains: G, slowness: f32) -> G {
+    let scale = |Declaration { unit, range, .. }: &Declaration, value: Value<'_>| {
+        let factor = (0..time_power(unit).abs()).fold(1.0, |factor, _| factor * slowness);
+        let factor = if time_power(unit) < 0 { 1.0 / factor } else { factor };
+        if let Value::Single(numbers) = value {
+            // Unchanged to the bit for the lag that the gains were tuned for.
+            let scaled = numbers.iter_mut().filter(|_| factor != 1.0);
+            scaled.for_each(|number| *number = (*number * factor).max(range.min as f32).min(range.max as f32));
+        }
+        Ok::<(), Infallible>(())
+    };
+    let Ok(()) = gains.visit_mut(&mut { scale });
+    gains
+}

@@ -1,0 +1,51 @@
+//! Gains for slower rotors: every gain by its power of time, told from its key rather than from its unit.
+#![allow(missing_docs)]
+
+use afbc_peers::{geometric, indi, pid, slowed};
+use afbc_types::Declared;
+use core::convert::Infallible;
+
+/// Key, value and range of every number.
+fn numbers(gains: &impl Declared) -> Vec<(&'static str, f64, [f64; 2])> {
+    let mut numbers = Vec::new();
+    let Ok(()) = gains.visit(&mut |declaration, value| {
+        let range = declaration.range;
+        numbers.extend(value.numbers().map(|number| (range.name, number, [range.min, range.max])));
+        Ok::<(), Infallible>(())
+    });
+    numbers
+}
+
+/// The power of time in a key's unit.
+fn power(key: &str) -> i32 {
+    if key.ends_with("_1_s3") {
+        -3
+    } else if key.ends_with("_1_s2") {
+        -2
+    } else if key.ends_with("_1_s") || key.ends_with("_rad_s") {
+        -1
+    } else if key == "rotor_time_constant_s" {
+        1
+    } else {
+        0
+    }
+}
+
+fn check(gains: &impl Declared) {
+    for slowness in [1.0_f32, 1.65, 3.6] {
+        let slow = numbers(&slowed(gains.clone(), slowness));
+        for ((key, before, [min, max]), (_, after, _)) in numbers(gains).into_iter().zip(slow) {
+            let expected = (before * f64::from(slowness).powi(power(key))).clamp(min, max);
+            assert!((after - expected).abs() <= 1e-6 * expected.abs(), "{key}: {after} of {before}, not {expected}");
+            assert!(slowness > 1.0 || after == before, "{key} is {after}, not {before}");
+        }
+    }
+    assert!(numbers(gains).iter().filter(|(key, ..)| power(key) != 0).count() >= 8);
+}
+
+#[test]
+fn every_gain_slows_down_by_its_power_of_time() {
+    check(&pid::Gains::TUNED);
+    check(&geometric::Gains::TUNED);
+    check(&indi::Gains::TUNED);
+}

@@ -1,0 +1,152 @@
+//! Where the rotors are, as sums over them need it.
+
+use afbc_types::{OutOfRange, PLUS, ROTOR_POSITION, ROTORS, ROTORS_MAX, Rotor, RotorSpeeds};
+use nalgebra::{SMatrix, SVector, Vector4};
+
+type Matrix4xX8 = SMatrix<f64, 4, ROTORS_MAX>;
+
+/// One number for each rotor that a vehicle may have; 0 for those that it has not.
+pub type Lanes = SVector<f64, ROTORS_MAX>;
+
+/// The rotors of a vehicle. The default is the paper's frame, [`PLUS`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    count: usize,
+    /// 1 for each rotor.
+    present: Lanes,
+    /// Positions, in arm's lengths.
+    x: Lanes,
+    y: Lanes,
+    /// x^2 + y^2
+    square: Lanes,
+    /// 1 for a rotor that pushes the body to positive yaw, -1 for the others.
+    spin: Lanes,
+}
+
+/// What the rotors do together: sums over them, weighted by where they are.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sums {
+    /// Of all.
+    pub(crate) all: f64,
+    /// By position, in arm's lengths.
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    /// By the square of the distance from body z.
+    pub(crate) square: f64,
+    /// By the direction in which each turns the body.
+    pub(crate) spin: f64,
+}
+
+/// The sum of products, in the order of the rotors.
+#[inline]
+fn dot(weights: &Lanes, values: &Lanes) -> f64 {
+    weights.iter().zip(values.iter()).fold(0.0, |sum, (weight, value)| sum + weight * value)
+}
+
+/// The sum of squares times speeds: in pairs, as four rotors have always been summed.
+#[inline]
+pub(crate) fn power(squares: &Lanes, speeds: &Lanes) -> f64 {
+    let products = squares.component_mul(speeds);
+    let [mut even, mut odd] = [0.0; 2];
+    for pair in products.as_slice().chunks_exact(2) {
+        if let [first, second] = pair {
+            even += first;
+            odd += second;
+        }
+    }
+    even + odd
+}
+
+impl Frame {
+    /// The frame of these rotors.
+    ///
+    /// # Errors
+    /// If there are fewer than four or more than eight, or one is out of [`ROTOR_POSITION`].
+    pub fn new(rotors: &[Rotor<f64>]) -> Result<Self, OutOfRange> {
+        ROTORS.check(rotors.len() as f64)?;
+        for rotor in rotors {
+            ROTOR_POSITION.check(rotor.x)?;
+            ROTOR_POSITION.check(rotor.y)?;
+        }
+        Ok(Self::of(rotors))
+    }
+
+    fn of(rotors: &[Rotor<f64>]) -> Self {
+        let lanes = |of: fn(&Rotor<f64>) -> f64| Lanes::from_fn(|i, _| rotors.get(i).map_or(0.0, of));
+        Frame {
+            count: rotors.len(),
+            present: lanes(|_| 1.0),
+            x: lanes(|rotor| rotor.x),
+            y: lanes(|rotor| rotor.y),
+            square: lanes(|rotor| rotor.x * rotor.x + rotor.y * rotor.y),
+            spin: lanes(Rotor::spin),
+        }
+    }
+
+    /// Number of rotors.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Square of the distance of the outermost rotor from body z, in arm's lengths.
+    pub(crate) fn square_max(&self) -> f64 {
+        self.square.max()
+    }
+
+    /// `values` where there is a rotor, 0 elsewhere.
+    #[inline]
+    pub(crate) fn masked(&self, values: &Lanes) -> Lanes {
+        self.present.component_mul(values)
+    }
+
+    /// Each rotor's part of a thrust without moments: of all such parts, those of the least sum of squares. Equal where
+    /// the frame allows.
+    pub(crate) fn hover_shares(&self) -> Lanes {
+        let equal = self.present / self.count as f64;
+        let Sums { x, y, spin, .. } = self.sums(&equal);
+        if x == 0.0 && y == 0.0 && spin == 0.0 {
+            return equal;
+        }
+        let b = Matrix4xX8::from_rows(&[
+            self.y.transpose(),
+            -self.x.transpose(),
+            self.spin.transpose(),
+            self.present.transpose(),
+        ]);
+        let shares = (b * b.transpose()).try_inverse().map(|inverse| b.transpose() * inverse * Vector4::w());
+        // Rotors only push.
+        shares.filter(|shares| shares.min() >= 0.0).unwrap_or(equal)
+    }
+
+    /// `value` for each rotor.
+    pub(crate) fn repeat(&self, value: f64) -> Lanes {
+        self.present * value
+    }
+
+    /// The speeds that are commanded; a rotor that is told nothing stands still.
+    #[inline]
+    pub(crate) fn speeds<const N: usize>(&self, speeds: &RotorSpeeds<N>) -> Lanes {
+        let mut lanes = Lanes::zeros();
+        let present = lanes.iter_mut().take(self.count);
+        present.zip(speeds.0.iter()).for_each(|(lane, speed)| *lane = f64::from(*speed));
+        lanes
+    }
+
+    /// `values`, which are 0 where there is no rotor, summed.
+    #[inline]
+    pub(crate) fn sums(&self, values: &Lanes) -> Sums {
+        Sums {
+            all: dot(&self.present, values),
+            x: dot(&self.x, values),
+            y: dot(&self.y, values),
+            square: dot(&self.square, values),
+            spin: dot(&self.spin, values),
+        }
+    }
+}
+
+impl Default for Frame {
+    fn default() -> Self {
+        Self::of(&PLUS.map(|rotor| rotor.to_f64()))
+    }
+}

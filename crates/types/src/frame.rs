@@ -1,0 +1,109 @@
+//! Where the rotors are.
+
+use crate::{OutOfRange, Parameters, Range};
+
+/// Most rotors that a vehicle has.
+pub const ROTORS_MAX: usize = 8;
+
+/// Accepted number of rotors.
+pub const ROTORS: Range = Range::new("rotors", 4.0, ROTORS_MAX as f64);
+
+/// Accepted position of a rotor along x and along y, in arm's lengths.
+pub const ROTOR_POSITION: Range = Range::new("rotor_position", -10.0, 10.0);
+
+/// Position of a rotor, and the direction in which it turns the body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Rotor<T = f32> {
+    /// Along body x, in [arm's lengths](crate::Parameters::arm_m).
+    pub x: T,
+    /// Along body y, in arm's lengths.
+    pub y: T,
+    /// True if its drag pushes the body to positive yaw: seen from above, the rotor turns clockwise.
+    pub pushes_left: bool,
+}
+
+/// The paper's frame: rotor 1 at -y, 2 at +x, 3 at +y, 4 at -x.
+pub const PLUS: [Rotor; 4] = [
+    Rotor { x: 0.0, y: -1.0, pushes_left: true },
+    Rotor { x: 1.0, y: 0.0, pushes_left: false },
+    Rotor { x: 0.0, y: 1.0, pushes_left: true },
+    Rotor { x: -1.0, y: 0.0, pushes_left: false },
+];
+
+impl Rotor {
+    /// The same rotor in double precision, as the plant has it.
+    #[must_use]
+    pub fn to_f64(&self) -> Rotor<f64> {
+        Rotor { x: self.x.into(), y: self.y.into(), pushes_left: self.pushes_left }
+    }
+}
+
+impl Rotor<f64> {
+    /// The same rotor, rounded for the controller.
+    #[must_use]
+    pub fn to_f32(&self) -> Rotor {
+        Rotor { x: self.x as f32, y: self.y as f32, pushes_left: self.pushes_left }
+    }
+
+    /// 1 if the rotor pushes the body to positive yaw, otherwise -1.
+    #[must_use]
+    pub fn spin(&self) -> f64 {
+        if self.pushes_left { 1.0 } else { -1.0 }
+    }
+}
+
+/// A vehicle as a controller knows it: nominal parameters, and where its `N` rotors are.
+///
+/// [`Parameters`] alone stand for a vehicle with the paper's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Airframe<const N: usize = 4> {
+    /// Nominal parameters.
+    pub parameters: Parameters,
+    /// In the order of the motors' outputs.
+    pub rotors: [Rotor; N],
+}
+
+impl From<Parameters> for Airframe {
+    fn from(parameters: Parameters) -> Self {
+        Airframe { parameters, rotors: PLUS }
+    }
+}
+
+impl<const N: usize> Airframe<N> {
+    /// The vehicle with these parameters and rotors, as its controller knows it.
+    ///
+    /// # Errors
+    /// If there are not `N` rotors.
+    pub fn new(parameters: &Parameters<f64>, rotors: &[Rotor<f64>]) -> Result<Self, OutOfRange> {
+        let exactly = Range { min: N as f64, max: N as f64, ..ROTORS };
+        let rotors: &[Rotor<f64>; N] =
+            rotors.try_into().map_err(|_| OutOfRange { value: rotors.len() as f64, range: exactly })?;
+        Ok(Airframe { parameters: parameters.to_f32(), rotors: rotors.map(|rotor| rotor.to_f32()) })
+    }
+}
+
+/// Evaluates an expression in which `N` is the number of rotors, 4 to 8, as a constant: the way from a vehicle that a
+/// file describes to the code made for its number of rotors.
+///
+/// ```
+/// let room = afbc_types::with_rotors!(6, N => [0.0_f32; N].len());
+/// assert_eq!(room, 6);
+/// ```
+#[macro_export]
+macro_rules! with_rotors {
+    ($count:expr, $N:ident => $body:expr) => {
+        match $count {
+            4 => $crate::with_rotors!(@ 4, $N => $body),
+            5 => $crate::with_rotors!(@ 5, $N => $body),
+            6 => $crate::with_rotors!(@ 6, $N => $body),
+            7 => $crate::with_rotors!(@ 7, $N => $body),
+            _ => $crate::with_rotors!(@ 8, $N => $body),
+        }
+    };
+    (@ $count:literal, $N:ident => $body:expr) => {{
+        const $N: usize = $count;
+        $body
+    }};
+}

@@ -1,0 +1,29 @@
+//! Vehicles that come with the program.
+
+use crate::file::parse;
+use crate::vehicle::Vehicle;
+use afbc_reader::BuiltIn;
+
+/// Every built-in vehicle.
+pub static BUILT_IN: [BuiltIn<Vehicle>; 6] = [
+    BuiltIn::new("paper", include_str!("../../../vehicles/paper.toml"), parse),
+    BuiltIn::new("crazyflie", include_str!("../../../vehicles/crazyflie.toml"), parse),
+    BuiltIn::new("hummingbird", include_str!("../../../vehicles/hummingbird.toml"), parse),
+    BuiltIn::new("racer", include_str!("../../../vehicles/racer.toml"), parse),
+    BuiltIn::new("iris", include_str!("../../../vehicles/iris.toml"), parse),
+    BuiltIn::new("f550", include_str!("../../../vehicles/f550.toml"), parse),
+];
+
+/// The built-in vehicle called `name`.
+pub fn built_in(name: &str) -> Option<&'static BuiltIn<Vehicle>> {
+    BuiltIn::named(&BUILT_IN, name)
+}
+
+/// What to say of a `name` that is no built-in vehicle's.
+pub fn unknown(name: &str) -> String {
+    let cure = match BuiltIn::similar(&BUILT_IN, name) {
+        Some(known) => format!("did you mean {}?", known.name),
+        None => "`sitl vehicles` lists the built-in ones; a file needs its path, as in ./my.toml".into(),
+    };
+    format!("\"{name}\" is no built-in vehicle; {cure}")
+}

@@ -1,0 +1,195 @@
+//! Vehicle files.
+
+use crate::parts::{self, Conditions, FORCE_MAX};
+use crate::vehicle::{CASCADE, Imu, Vehicle};
+use afbc::adaptive::Gains;
+use afbc::{Profile, Settings};
+use afbc_flight_core::motor::Curve;
+use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, Realism, Rotors};
+use afbc_reader::words::out_of_range;
+use afbc_reader::{FileError, Table};
+use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, ROTOR_POSITION, ROTORS, Range, Rotor};
+use nalgebra::Vector3;
+use std::path::Path;
+
+/// Accepted position of a rotor \[m\]; in arm's lengths it must lie within [`ROTOR_POSITION`] too.
+const POSITION: Range = Range::new("position_m", -100.0, 100.0);
+/// How far `arm_m` may be from the mean distance of the rotors, as a share of it.
+const ARM_TOLERANCE: f64 = 0.01;
+/// Step that drag and ground are checked for \[s\]; a scenario with a longer one checks them again.
+const STEP_S: f64 = 0.001;
+/// What to do about a vehicle that does not hover with a margin.
+const UNFIT: &str = "AFBC would not fly it with a margin: stronger or quicker rotors, less mass, or gains of its own";
+
+/// Reads and checks the vehicle file at `path`.
+///
+/// # Errors
+/// One line on the first thing that is wrong.
+pub fn load(path: &Path) -> Result<Vehicle, FileError> {
+    let text = afbc_reader::text(path, "vehicle")?;
+    let stem = path.file_stem().map_or("".into(), |stem| stem.to_string_lossy());
+    parse(&path.display().to_string(), &text, &stem)
+}
+
+/// Reads and checks a vehicle from its `text`. Errors call it `file`; `name` is its name if it gives none itself.
+///
+/// # Errors
+/// One line on the first thing that is wrong.
+pub fn parse(file: &str, text: &str, name: &str) -> Result<Vehicle, FileError> {
+    afbc_reader::document(file, text, "vehicles paper", |root| read(root, file, text, name))
+}
+
+/// One direction in which a rotor turns.
+#[derive(Clone, Copy)]
+enum Spin {
+    Ccw,
+    Cw,
+}
+
+impl Spin {
+    const fn name(self) -> &'static str {
+        match self {
+            Spin::Ccw => "ccw",
+            Spin::Cw => "cw",
+        }
+    }
+}
+
+fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehicle, FileError> {
+    let [name, description] = afbc_reader::title(&mut root, name)?;
+    let parameters = masses(need(&mut root, "vehicle")?)?;
+    let (rotors, rotor_height_m) = frame(&mut root, parameters.arm_m)?;
+    let (actuators, force_max_n) = actuators(&mut root, &parameters)?;
+    let curve = motor(need(&mut root, "motor")?)?;
+    let frame = Frame::new(&rotors).map_err(|error| root.fault_at("rotor", out_of_range(&error)))?;
+    let conditions =
+        Conditions { parameters: &parameters, frame: &frame, rotor_max_rad_s: actuators.max_rad_s, step_s: STEP_S };
+    let drag = |table| {
+        let default = Drag { rotor_height_m, ..Drag::DEFAULT };
+        parts::drag(table, default, Drag::ROT_HEIGHT.range.name, &conditions)
+    };
+    let ground = |table| {
+        let default = (Contact { rotor_height_m, ..Contact::DEFAULT }, GroundEffect::DEFAULT);
+        parts::ground(table, default, Contact::ROT_HEIGHT.range.name, &parameters, STEP_S)
+    };
+    let drag = root.table("drag")?.map(drag).transpose()?;
+    let (contact, ground_effect) = root.table("ground")?.map(ground).transpose()?.unzip();
+    let mut imu = Imu::DEFAULT;
+    if let Some(mut table) = root.table("imu")? {
+        table.declared(&mut imu)?;
+        table.finish()?;
+    }
+    let lag_s = actuators.time_constant_s as f32;
+    let mut flight_gains = Profile::Flight.gains_for(&parameters.to_f32(), lag_s);
+    let mut flight_settings = Profile::Flight.settings_for(force_max_n as f32, lag_s);
+    gains(&mut root, &mut flight_gains, &mut flight_settings)?;
+    let realism =
+        Realism { rotors: actuators, drag, contact, ground_effect: ground_effect.flatten(), ..Realism::default() };
+    let (text, file) = (text.into(), file.into());
+    let vehicle = Vehicle {
+        name,
+        description,
+        parameters,
+        rotors,
+        force_max_n,
+        realism,
+        curve,
+        imu,
+        flight_gains,
+        flight_settings,
+        text,
+        file,
+    };
+    let unfit = |error: OutOfRange| root.fault(error.range.name, format!("{}; {UNFIT}", out_of_range(&error)));
+    vehicle.check().map_err(unfit)?;
+    root.finish()?;
+    Ok(vehicle)
+}
+
+/// The table under `key`, which must be there.
+fn need<'a>(root: &mut Table<'a>, key: &'static str) -> Result<Table<'a>, FileError> {
+    root.table(key)?.ok_or_else(|| root.missing(key, &format!("add [{key}], as in vehicles/paper.toml")))
+}
+
+/// `[vehicle]`: nothing but gravity has a default.
+fn masses(mut table: Table<'_>) -> Result<Parameters<f64>, FileError> {
+    let mut parameters = Parameters::PAPER;
+    table.declared(&mut parameters)?;
+    parameters.visit(&mut |declaration, _| {
+        let is_known = declaration.range.name == Parameters::<f64>::GRAVITY.range.name;
+        if is_known { Ok(()) } else { table.require(&declaration.range) }
+    })?;
+    table.finish()?;
+    Ok(parameters)
+}
+
+/// `[[rotor]]`: the rotors in arm's lengths, and their mean height \[m\].
+fn frame(root: &mut Table<'_>, arm_m: f64) -> Result<(Vec<Rotor<f64>>, f64), FileError> {
+    let (mut rotors, mut places_m) = (Vec::new(), Vec::new());
+    for mut table in root.few_tables("rotor")? {
+        let at_m = table.need_vector(POSITION.name, &POSITION)?;
+        let spin = table.need_choice("spin", &[Spin::Ccw, Spin::Cw], Spin::name)?;
+        let rotor = Rotor { x: at_m.x / arm_m, y: at_m.y / arm_m, pushes_left: matches!(spin, Spin::Cw) };
+        for along in [rotor.x, rotor.y] {
+            let problem =
+                |error| format!("{}, in arm's lengths; move the rotor, or change arm_m", out_of_range(&error));
+            ROTOR_POSITION.check(along).map_err(|error| table.fault_at(POSITION.name, problem(error)))?;
+        }
+        table.finish()?;
+        rotors.push(rotor);
+        places_m.push(at_m);
+    }
+    ROTORS.check(rotors.len() as f64).map_err(|_| {
+        let cure = "add one [[rotor]] with position_m and spin for each of four to eight rotors";
+        root.fault_at("rotor", format!("{} rotors; {cure}", rotors.len()))
+    })?;
+    let mean = |of: fn(&Vector3<f64>) -> f64| places_m.iter().map(of).sum::<f64>() / places_m.len() as f64;
+    let distance_m = mean(|at_m| libm::hypot(at_m.x, at_m.y));
+    if (distance_m - arm_m).abs() > ARM_TOLERANCE * distance_m {
+        let problem = format!("arm_m is {arm_m}, but the rotors are {distance_m:.4} m from the z axis; change either");
+        return Err(root.fault_at("rotor", problem));
+    }
+    Ok((rotors, mean(|at_m| at_m.z)))
+}
+
+/// `[rotors]` and `[battery]`, and the largest force of a rotor \[N\].
+fn actuators(root: &mut Table<'_>, parameters: &Parameters<f64>) -> Result<(Rotors, f64), FileError> {
+    let table = need(root, "rotors")?;
+    table.require(&Rotors::LAG.range)?;
+    table.require(&FORCE_MAX)?;
+    let mut rotors = parts::rotors(Some(table), Rotors::DEFAULT, parameters)?;
+    rotors.battery = root.table("battery")?.map(|table| parts::battery(table, Battery::THREE_CELLS)).transpose()?;
+    let force_max_n = parameters.thrust_factor_n_s2 * rotors.max_rad_s * rotors.max_rad_s;
+    Ok((rotors, force_max_n))
+}
+
+/// `[motor]`: nothing has a default.
+fn motor(mut table: Table<'_>) -> Result<Curve, FileError> {
+    let mut curve = Curve::DEFAULT;
+    table.declared(&mut curve)?;
+    curve.visit(&mut |declaration, _| table.require(&declaration.range))?;
+    table.finish()?;
+    Ok(curve)
+}
+
+/// `[gains.flight.afbc.AXIS]` and `[gains.flight.cascade]`; the gains of other laws are read by those who know the
+/// laws.
+fn gains(root: &mut Table<'_>, gains: &mut PerAxis<Gains>, settings: &mut Settings) -> Result<(), FileError> {
+    let Some(mut all) = root.table("gains")? else { return Ok(()) };
+    let Some(mut flight) = all.table(Profile::Flight.name())? else { return all.finish() };
+    if let Some(mut axes) = flight.table("afbc")? {
+        for axis in Axis::ALL {
+            if let Some(mut table) = axes.table(axis.name())? {
+                table.declared(&mut gains[axis])?;
+                table.finish()?;
+            }
+        }
+        axes.finish()?;
+    }
+    if let Some(mut cascade) = flight.table(CASCADE)? {
+        let filter_rad_s = cascade.number(&Settings::FILTER.range)?;
+        filter_rad_s.into_iter().for_each(|filter_rad_s| settings.command_filter_rad_s = filter_rad_s as f32);
+        cascade.finish()?;
+    }
+    all.finish()
+}

@@ -1,0 +1,129 @@
+//! The tables that vehicle files and scenario files share: `[vehicle]`, `[rotors]`, `[battery]`, `[drag]`, `[ground]`.
+//! Each function takes what a table leaves out from a default.
+
+use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, Rotors, Sag, Start};
+use afbc_reader::words::out_of_range;
+use afbc_reader::{FileError, Table};
+use afbc_types::{Declared, OutOfRange, Parameters, Range};
+
+/// Accepted largest force of a rotor \[N\]; the speed that goes with it must be in range too.
+pub const FORCE_MAX: Range = Range::new("force_max_n", 0.001, 10_000.0);
+
+/// What drag depends on: the vehicle, its fastest rotor, and the step of the simulation.
+#[derive(Clone, Copy, Debug)]
+pub struct Conditions<'a> {
+    /// True parameters.
+    pub parameters: &'a Parameters<f64>,
+    /// Where the rotors are.
+    pub frame: &'a Frame,
+    /// Largest speed of a rotor \[rad/s\].
+    pub rotor_max_rad_s: f64,
+    /// Step of the simulation \[s\].
+    pub step_s: f64,
+}
+
+/// `table` is refused on account of how its numbers go together.
+fn together(table: &Table<'_>) -> impl Fn(OutOfRange) -> FileError {
+    |error| table.fault_at(error.range.name, format!("{}; change it", out_of_range(&error)))
+}
+
+/// Masses, arm, inertia and rotor factors.
+///
+/// # Errors
+/// One line on the first thing that is wrong, here and below.
+pub fn parameters(table: Option<Table<'_>>, default: Parameters<f64>) -> Result<Parameters<f64>, FileError> {
+    let mut parameters = default;
+    if let Some(mut table) = table {
+        table.declared(&mut parameters)?;
+        table.finish()?;
+    }
+    Ok(parameters)
+}
+
+/// Lag, delay and limits of the rotors of a vehicle with these true parameters.
+///
+/// # Errors
+/// As [`parameters`].
+pub fn rotors(table: Option<Table<'_>>, default: Rotors, truth: &Parameters<f64>) -> Result<Rotors, FileError> {
+    let mut rotors = default;
+    if let Some(mut table) = table {
+        let start = table.choice("start", &[Start::Hover, Start::Idle], |start| match start {
+            Start::Hover => "hover",
+            Start::Idle => "idle",
+        })?;
+        rotors.start = start.unwrap_or(rotors.start);
+        table.declared(&mut rotors)?;
+        max_by_force(&mut table, &mut rotors, truth)?;
+        rotors.validate().map_err(together(&table))?;
+        table.finish()?;
+    }
+    Ok(rotors)
+}
+
+/// The largest speed, if it is given by the force that goes with it.
+fn max_by_force(table: &mut Table<'_>, rotors: &mut Rotors, truth: &Parameters<f64>) -> Result<(), FileError> {
+    let max = &Rotors::MAX.range;
+    let Some(force_n) = table.number(&FORCE_MAX)? else { return Ok(()) };
+    if table.has(max.name) {
+        let problem = format!("a second limit; write it or {}, not both", max.name);
+        return Err(table.fault_at(FORCE_MAX.name, problem));
+    }
+    rotors.max_rad_s = libm::sqrt(force_n / truth.thrust_factor_n_s2);
+    let problem = |error| format!("it makes {}; change the force", out_of_range(&error));
+    max.check(rotors.max_rad_s).map_err(|error| table.fault_at(FORCE_MAX.name, problem(error)))
+}
+
+/// What the rotors hang on.
+///
+/// # Errors
+/// As [`parameters`].
+pub fn battery(mut table: Table<'_>, default: Battery) -> Result<Battery, FileError> {
+    let mut battery = default;
+    let effect = table.choice("effect", &[Sag::Ceiling, Sag::Speed], |effect| match effect {
+        Sag::Ceiling => "ceiling",
+        Sag::Speed => "speed",
+    })?;
+    battery.effect = effect.unwrap_or(battery.effect);
+    table.declared(&mut battery)?;
+    battery.validate().map_err(together(&table))?;
+    table.finish()?;
+    Ok(battery)
+}
+
+/// What the air does. A key called `elsewhere` is not accepted; none is called "".
+///
+/// # Errors
+/// As [`parameters`].
+pub fn drag(
+    mut table: Table<'_>,
+    default: Drag,
+    elsewhere: &str,
+    conditions: &Conditions<'_>,
+) -> Result<Drag, FileError> {
+    let Conditions { parameters, frame, rotor_max_rad_s, step_s } = *conditions;
+    let mut drag = default;
+    table.declared_but(elsewhere, &mut drag)?;
+    drag.validate_for(parameters, frame, rotor_max_rad_s, step_s).map_err(together(&table))?;
+    table.finish()?;
+    Ok(drag)
+}
+
+/// Feet and propellers near the ground. A key called `elsewhere` is not accepted; none is called "".
+///
+/// # Errors
+/// As [`parameters`].
+pub fn ground(
+    mut table: Table<'_>,
+    (mut contact, mut effect): (Contact, GroundEffect),
+    elsewhere: &str,
+    truth: &Parameters<f64>,
+    step_s: f64,
+) -> Result<(Contact, Option<GroundEffect>), FileError> {
+    table.declared_but(elsewhere, &mut contact)?;
+    contact.validate_for(truth, step_s).map_err(together(&table))?;
+    table.declared_but(GroundEffect::ROT_HEIGHT.range.name, &mut effect)?;
+    effect.rotor_height_m = contact.rotor_height_m;
+    let with_effect = table.boolean("ground_effect")?.unwrap_or(true);
+    table.finish()?;
+    Ok((contact, with_effect.then_some(effect)))
+}

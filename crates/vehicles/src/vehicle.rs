@@ -1,0 +1,104 @@
+//! A vehicle, as its file describes it.
+
+use afbc::adaptive::Gains;
+use afbc::guarded::Guarded;
+use afbc::monitor::Bounds;
+use afbc::{Profile, Settings};
+use afbc_flight_core::motor::Curve;
+use afbc_plant::Realism;
+use afbc_reader::{FileError, Table};
+use afbc_types::{Airframe, OutOfRange, Parameters, PerAxis, Rotor, parameters, with_rotors};
+use nalgebra::Vector3;
+
+parameters! {
+    /// How the inertial sensor is mounted.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Imu {
+        /// Position of the sensor, from the centre of mass, body frame.
+        #[parameter(POS, "m", -10.0..=10.0)]
+        pub position_m: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0),
+        /// Roll, pitch and yaw of the sensor in the body frame.
+        #[parameter(ATT, "rad", -7.0..=7.0)]
+        pub attitude_rad: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0),
+    }
+}
+
+/// Table of the settings of AFBC's cascade, beside those of the laws' gains.
+pub const CASCADE: &str = "cascade";
+
+/// A vehicle, as its file describes it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Vehicle {
+    /// Short name.
+    pub name: String,
+    /// One line for people.
+    pub description: String,
+    /// Masses, arm and rotor factors.
+    pub parameters: Parameters<f64>,
+    /// Four to eight rotors, in the order of the motors' outputs.
+    pub rotors: Vec<Rotor<f64>>,
+    /// Largest force of one rotor \[N\].
+    pub force_max_n: f64,
+    /// Rotors with their lag, limits and battery; drag and ground. The air is still.
+    pub realism: Realism,
+    /// Throttle curve of the motors.
+    pub curve: Curve,
+    /// Mounting of the inertial sensor.
+    pub imu: Imu,
+    /// Gains of AFBC in the profile `flight`: by rule ([`Profile::gains_for`]), or as the file says.
+    pub flight_gains: PerAxis<Gains>,
+    /// Settings of AFBC's cascade in the profile `flight`: by rule ([`Profile::settings_for`]), or as the file says.
+    pub flight_settings: Settings,
+    /// The file itself, for whoever reads the gains of other laws from it, and what errors call it.
+    pub(crate) text: String,
+    pub(crate) file: String,
+}
+
+impl Vehicle {
+    /// Lag of the rotors \[s\].
+    pub fn lag_s(&self) -> f32 {
+        self.realism.rotors.time_constant_s as f32
+    }
+
+    /// Gains of AFBC in `profile`.
+    pub fn gains(&self, profile: Profile) -> PerAxis<Gains> {
+        if profile == Profile::Flight {
+            return self.flight_gains;
+        }
+        profile.gains_for(&self.parameters.to_f32(), self.lag_s())
+    }
+
+    /// Settings of AFBC's cascade in `profile`.
+    pub fn settings(&self, profile: Profile) -> Settings {
+        if profile == Profile::Flight {
+            return self.flight_settings;
+        }
+        profile.settings_for(self.force_max_n as f32, self.lag_s())
+    }
+
+    /// Lets `read` take gains of the profile `flight` from the file, which has a table for each law; nothing if it has
+    /// none.
+    ///
+    /// # Errors
+    /// Those of `read`.
+    pub fn law_gains(&self, read: impl FnOnce(Table<'_>) -> Result<(), FileError>) -> Result<(), FileError> {
+        afbc_reader::document(&self.file, &self.text, "vehicles paper", |mut root| {
+            let Some(mut all) = root.table("gains")? else { return Ok(()) };
+            all.table(Profile::Flight.name())?.map_or(Ok(()), read)
+        })
+    }
+
+    /// Whether AFBC can fly it with a margin, under its monitor.
+    ///
+    /// # Errors
+    /// The first parameter, setting or gain out of range; the rotors must lift the vehicle and turn it with a margin
+    /// ([`Guarded::new`]).
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        let (settings, gains) = (self.settings(Profile::Flight), self.flight_gains);
+        let bounds = Bounds::new(&gains, &self.parameters.to_f32());
+        with_rotors!(self.rotors.len(), N => {
+            let airframe = Airframe::<N>::new(&self.parameters, &self.rotors)?;
+            Guarded::new(airframe, settings, gains, bounds).map(drop)
+        })
+    }
+}

@@ -1,0 +1,125 @@
+//! Vehicle files: the built-in ones, and what is wrong with others, in one line.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)]
+
+use afbc::Profile;
+use afbc_vehicles::{BUILT_IN, Vehicle, built_in, parse};
+
+fn text(name: &str) -> &'static str {
+    built_in(name).unwrap().text
+}
+
+fn changed(name: &str, from: &str, to: &str) -> String {
+    let text = text(name);
+    assert!(text.contains(from), "no {from} in {name}");
+    text.replacen(from, to, 1)
+}
+
+fn refused(text: &str) -> String {
+    let error = parse("my.toml", text, "my").unwrap_err().to_string();
+    assert!(!error.contains('\n') && error.starts_with("my.toml"), "{error}");
+    error
+}
+
+#[test]
+fn every_built_in_vehicle_is_valid_and_named_after_its_file() {
+    for known in &BUILT_IN {
+        let vehicle = known.read().unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(vehicle.name, known.name);
+        assert!(!vehicle.description.is_empty());
+        let arm = vehicle.rotors.iter().map(|rotor| rotor.x.hypot(rotor.y)).sum::<f64>() / vehicle.rotors.len() as f64;
+        assert!((arm - 1.0).abs() < 0.01, "{}: {arm}", known.name);
+    }
+}
+
+/// The paper's vehicle in the profile flight is what the firmware flew before there were vehicle files, to the bit.
+#[test]
+fn the_papers_vehicle_has_the_profiles_gains() {
+    let paper = built_in("paper").unwrap().read().unwrap();
+    assert_eq!(paper.gains(Profile::Flight), Profile::Flight.gains());
+    assert_eq!(paper.settings(Profile::Flight), Profile::Flight.settings());
+    assert_eq!(paper.gains(Profile::Paper), Profile::Paper.gains());
+    assert_eq!(paper.settings(Profile::Paper), Profile::Paper.settings());
+    assert_eq!(paper.curve, afbc_flight_core::motor::Curve::DEFAULT);
+    assert_eq!(paper.rotors, afbc_types::PLUS.map(|rotor| rotor.to_f64()).to_vec());
+}
+
+#[test]
+fn what_cannot_hover_with_a_margin_is_refused_by_name() {
+    let heavy = refused(&changed("iris", "force_max_n = 7.066", "force_max_n = 4.5"));
+    assert!(heavy.contains("rotor_force_max_n") && heavy.contains("would not fly"), "{heavy}");
+    let sluggish =
+        refused(&changed("iris", "inertia_kg_m2 = [0.0089, 0.0164, 0.0193]", "inertia_kg_m2 = [0.0089, 0.029, 0.03]"));
+    assert!(sluggish.contains("hover_authority_rad_s2"), "{sluggish}");
+    // All rotors turn one way: no yaw apart from thrust.
+    let spinless = refused(&text("paper").replace("\"ccw\"", "\"cw\""));
+    assert!(spinless.contains("rotor_authority"), "{spinless}");
+}
+
+#[test]
+fn one_line_names_file_place_and_cure() {
+    for (text, expected) in [
+        (changed("racer", "mass_kg", "mass_g"), "my.toml:15: vehicle.mass_g: unknown key; did you mean mass_kg"),
+        (changed("racer", "arm_m = 0.125", "arm_m = 0.2"), "arm_m is 0.2, but the rotors are 0.1250 m"),
+        (changed("racer", "spin = \"ccw\"", "spin = \"left\""), "rotor.spin"),
+        (changed("racer", "time_constant_s", "#"), "rotors.time_constant_s: missing"),
+        (changed("racer", "force_max_n = 8.5", "#"), "rotors.force_max_n: missing"),
+        (changed("racer", "idle = 0.055", "#"), "motor.idle: missing"),
+        (changed("racer", "thrust_factor_n_s2 = 1.562522e-6", "#"), "vehicle.thrust_factor_n_s2: missing"),
+        (changed("racer", "[vehicle]", "[vehicl]"), "did you mean vehicle"),
+        (
+            changed("racer", "inertia_kg_m2 = [0.0025, 0.0021, 0.0043]", "inertia_kg_m2 = [0.0025, nan, 0.0043]"),
+            "inertia_kg_m2",
+        ),
+        (text("racer").to_owned() + "[[rotor]]\nposition_m = [0.0, 0.0, 0.0]\nspin = \"cw\"\n", "arm_m is 0.125, but"),
+        (text("f550").replace("[[rotor]]", "[[rotr]]"), "rotor"),
+        (text("racer").to_owned() + "[gains.flight.afbc.roll]\nalpha_1 = 3.0\n", "did you mean alpha1"),
+        (text("racer").to_owned() + "[gains.flights.afbc.roll]\nalpha1 = 3.0\n", "did you mean flight"),
+        (text("racer").to_owned() + "[drag2]\n", "drag2: unknown key"),
+        ("x".into(), "syntax"),
+    ] {
+        let error = refused(&text);
+        assert!(error.contains(expected), "{error}, not {expected}");
+    }
+}
+
+#[test]
+fn gains_of_the_file_replace_those_of_the_rule() {
+    let gains = "[gains.flight.afbc.z]\nalpha1 = 1.25\n[gains.flight.cascade]\ncommand_filter_rad_s = 33.0\n";
+    let own: Vehicle = parse("my.toml", &(text("racer").to_owned() + gains), "my").unwrap();
+    let rule = built_in("racer").unwrap().read().unwrap();
+    let mut expected = rule.gains(Profile::Flight);
+    expected.z.backstepping.alpha1 = 1.25;
+    assert_eq!(own.gains(Profile::Flight), expected);
+    assert_eq!(own.settings(Profile::Flight).command_filter_rad_s, 33.0);
+    assert_eq!(own.gains(Profile::Paper), rule.gains(Profile::Paper));
+}
+
+/// Whatever is done to a line, either it is still a vehicle that flies, or one line says what is wrong.
+#[test]
+fn damaged_files_get_one_line() {
+    let values = ["", "nan", "-1e300", "1e300", "\"\\n\"", "[]", "{}", "true", "[0, 0]", "1e-12", "{ a.b = [[1]] }"];
+    let (mut refusals, mut accepted) = (0, 0);
+    for known in &BUILT_IN {
+        let lines: Vec<_> = known.text.lines().collect();
+        for (at, line) in lines.iter().enumerate().filter(|(_, line)| !line.is_empty() && !line.starts_with('#')) {
+            let key = line.split_once(" = ").map(|(key, _)| key);
+            let mut damaged: Vec<_> = key.map_or(Vec::new(), |key| values.map(|v| format!("{key} = {v}")).to_vec());
+            damaged.extend([String::new(), format!("{line}\n{line}"), format!("x{line}")]);
+            for damaged in damaged {
+                let text = [&lines[..at], &[damaged.as_str()], &lines[at + 1..]].concat().join("\n");
+                match parse("damaged", &text, "damaged") {
+                    Ok(vehicle) => {
+                        vehicle.check().unwrap();
+                        accepted += 1;
+                    }
+                    Err(error) => {
+                        let error = error.to_string();
+                        assert!(error.starts_with("damaged:") && !error.contains('\n'), "{error}");
+                        refusals += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(refusals > 2500 && accepted > 100, "{refusals} refused, {accepted} accepted");
+}

@@ -1,0 +1,13 @@
+//! The vehicle that this image flies, from its file: `VEHICLE=... cargo fw` ([`build.rs`](../../build.rs)).
+//!
+//! Which one it is, is decided when the image is built, and everything about it is checked there.
+
+use afbc::adaptive::Gains;
+use afbc::fuzzy::Membership;
+use afbc::{Limits, Safeguards, Settings, backstepping};
+use afbc_flight_core::motor::Curve;
+use afbc_onboard::Configuration;
+use afbc_types::{Airframe, Parameters, PerAxis, Rotor};
+use nalgebra::Vector3;
+
+include!(concat!(env!("OUT_DIR"), "/vehicle.rs"));

@@ -1,0 +1,96 @@
+//! `--vehicle` and `sitl vehicles`: what flies.
+
+use super::terminal::{Failure, print};
+use afbc::Profile;
+use afbc_campaign::Campaign;
+use afbc_reader::words::out_of_range;
+use afbc_reader::{BuiltIn, FileError};
+use afbc_sim::contender::{ControllerKind, Law};
+use afbc_sim::scenario::Scenario;
+use afbc_vehicles::{BUILT_IN, Vehicle, built_in, unknown};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Of every command that flies.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct OnVehicle {
+    /// Fly this instead of the scenario's vehicle, with its gains of the profile `flight`: name of a built-in vehicle,
+    /// or path of a vehicle file
+    #[arg(long, value_name = "VEHICLE")]
+    vehicle: Option<PathBuf>,
+}
+
+impl OnVehicle {
+    /// The vehicle that was asked for, checked.
+    pub(crate) fn vehicle(&self) -> Result<Option<Vehicle>, Failure> {
+        Ok(self.vehicle.as_deref().map(named).transpose()?)
+    }
+
+    /// The scenario on the vehicle that was asked for, or as it is.
+    pub(crate) fn put(&self, scenario: Scenario) -> Result<Scenario, Failure> {
+        match self.vehicle()? {
+            Some(vehicle) => Ok(scenario.on(&vehicle, Profile::Flight)?),
+            None => Ok(scenario),
+        }
+    }
+
+    /// The campaign on the vehicle that was asked for, or as it is.
+    pub(crate) fn campaign(&self, campaign: Campaign) -> Result<Campaign, Failure> {
+        if self.vehicle.is_none() {
+            return Ok(campaign);
+        }
+        let campaign = Campaign { scenario: self.put(campaign.scenario)?, ..campaign };
+        campaign.check().map_err(|error| format!("{}: {}; narrow its spread", campaign.name, out_of_range(&error)))?;
+        Ok(campaign)
+    }
+
+    /// What was asked for, as the firmware's build script takes it.
+    pub(crate) fn name(&self) -> Option<&Path> {
+        self.vehicle.as_deref()
+    }
+}
+
+/// The vehicle that `path` stands for, checked: a plain name is a built-in one first, then a file.
+fn named(path: &Path) -> Result<Vehicle, FileError> {
+    let plain = path.to_str().filter(|text| !text.contains(['/', '\\', '.']));
+    let vehicle = match plain {
+        Some(name) => match built_in(name) {
+            Some(known) => known.read(),
+            None if !path.exists() => Err(FileError::whole("--vehicle", unknown(name))),
+            None => afbc_vehicles::load(path),
+        },
+        None => afbc_vehicles::load(path),
+    }?;
+    // Gains of every law, so that a slip in a table's name is told whoever flies.
+    Law::on(ControllerKind::Afbc, &vehicle, Profile::Flight)?;
+    Ok(vehicle)
+}
+
+/// List the built-in vehicles, or print one of them to start from
+///
+/// `sitl vehicles racer > my.toml` makes a vehicle file to change and to fly with `sitl fly hover --vehicle my.toml`.
+/// See docs/vehicles.md.
+#[derive(Args, Debug)]
+pub(crate) struct Vehicles {
+    /// Built-in vehicle to print
+    name: Option<String>,
+}
+
+impl Vehicles {
+    /// Prints the list or the file.
+    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        match self.name {
+            Some(name) => print(built_in(&name).ok_or_else(|| FileError::whole(&name, unknown(&name)))?.text)?,
+            None => {
+                let all = BUILT_IN.iter().map(BuiltIn::read).collect::<Result<Vec<_>, _>>()?;
+                print(&all.iter().map(line).collect::<String>())?;
+            }
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+fn line(Vehicle { name, description, rotors, .. }: &Vehicle) -> String {
+    format!("{name:<12}{} rotors  {description}\n", rotors.len())
+}
