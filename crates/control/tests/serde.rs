@@ -40,7 +40,7 @@ proptest! {
         round_trip(&Setpoint { position_m, velocity_m_s, acceleration_m_s2, yaw_rad, ..Setpoint::default() });
 
         let axis = *Axis::ALL.get(axis).unwrap();
-        let mixer = Mixer::new(&Parameters::PAPER.to_f32(), 3.0).unwrap();
+        let mixer = Mixer::new(Parameters::PAPER.to_f32(), 3.0).unwrap();
         let [roll_n, pitch_n, yaw_n, thrust_n] = inputs;
         let inputs = Inputs { roll_n, pitch_n, yaw_n, thrust_n };
         round_trip(&mixer.allocate(&inputs));
@@ -89,6 +89,6 @@ fn names_are_those_of_scenario_files() {
     for axis in Axis::ALL {
         assert_eq!(serde_json::to_value(axis).unwrap(), json!(axis.name()));
     }
-    let speeds = Action::default().speeds;
+    let speeds = <Action>::default().speeds;
     assert_eq!(serde_json::to_value(speeds).unwrap(), json!([0.0, 0.0, 0.0, 0.0]));
 }
