@@ -1,11 +1,9 @@
 //! The board of the processor in the loop: the host replaces pins and timers, by semihosting. The processor, including
 //! its time, stops while the host works. Memory is as in the flight image, `memory.x` at the workspace's root.
 //!
-//! Two FIFOs, little-endian. `to_firmware`: a u32 length and that many bytes, which reach the link before the next
-//! control tick. `from_firmware`, for each of these: the tick's time \[us\] as u64; its core cycles, the deepest stack
-//! \[bytes\] and a length as u32; eight throttles as u16, 0 where there is no motor; and as many bytes as the length
-//! says.
+//! Two FIFOs, `to_firmware` and `from_firmware`, carry the wire of [`afbc_onboard::ReplyHead`].
 
+use afbc_onboard::ReplyHead;
 use afbc_types::ROTORS_MAX;
 use core::cell::Cell;
 use embassy_executor::SendSpawner;
@@ -89,13 +87,14 @@ pub(crate) struct Transmitter {
 impl board::Transmitter for Transmitter {
     /// Sends the reply, and waits for the next tick's bytes.
     fn transmit(&mut self, tick: &Tick, bytes: &[u8]) {
-        let mut head = [0; 36];
-        let words = [tick.cycles, housekeeping::stack_bytes(), bytes.len() as u32];
-        let fields = tick.report.time_us.to_le_bytes().into_iter();
-        let fields = fields.chain(words.into_iter().flat_map(u32::to_le_bytes));
-        let fields = fields.chain(THROTTLES.lock(Cell::get).into_iter().flat_map(u16::to_le_bytes));
-        head.iter_mut().zip(fields).for_each(|(to, from)| *to = from);
-        self.from_firmware.write_all(&head).expect("the host reads");
+        let head = ReplyHead {
+            time_us: tick.report.time_us,
+            cycles: tick.cycles,
+            stack_bytes: housekeeping::stack_bytes(),
+            length: bytes.len() as u32,
+            throttles: THROTTLES.lock(Cell::get),
+        };
+        self.from_firmware.write_all(&head.to_bytes()).expect("the host reads");
         self.from_firmware.write_all(bytes).expect("the host reads");
         self.take_bytes();
     }

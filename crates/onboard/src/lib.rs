@@ -24,8 +24,10 @@ mod comms;
 mod configuration;
 mod failsafes;
 mod flight;
+mod lockstep;
 
 pub use answers::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, FORGOTTEN_US};
 pub use comms::{ADDRESS, CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
 pub use configuration::Configuration;
 pub use flight::{Flight, Report};
+pub use lockstep::ReplyHead;

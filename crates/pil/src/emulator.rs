@@ -1,9 +1,10 @@
 //! Lockstep with the `pil` image.
 //!
-//! Bytes are exchanged over two FIFOs; `boards/emulated/src/board.rs` defines their format.
+//! Bytes are exchanged over two FIFOs, in the format of [`ReplyHead`].
 
 use crate::Error;
 use crate::qemu::{self, Qemu};
+use afbc_onboard::ReplyHead;
 use afbc_types::ROTORS_MAX;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
@@ -127,23 +128,13 @@ impl Drop for Emulator {
 }
 
 fn read_reply(from: &mut impl Read, shift: u32) -> io::Result<Reply> {
-    /// The next field.
-    fn field<const N: usize>(from: &mut impl Read) -> io::Result<[u8; N]> {
-        let mut bytes = [0; N];
-        from.read_exact(&mut bytes).map(|()| bytes)
-    }
-    let time_us = u64::from_le_bytes(field(from)?);
-    let cycles = u32::from_le_bytes(field(from)?);
-    let stack_bytes = u32::from_le_bytes(field(from)?);
-    let length = u32::from_le_bytes(field(from)?) as usize;
-    let mut throttles = [0; ROTORS_MAX];
-    for throttle in &mut throttles {
-        *throttle = u16::from_le_bytes(field(from)?);
-    }
-    if length > REPLY_MAX {
+    let mut head = [0; ReplyHead::LEN];
+    from.read_exact(&mut head)?;
+    let ReplyHead { time_us, cycles, stack_bytes, length, throttles } = ReplyHead::from_bytes(&head);
+    if length as usize > REPLY_MAX {
         return Err(io::Error::new(io::ErrorKind::InvalidData, format!("a reply of {length} bytes")));
     }
-    let mut bytes = vec![0; length];
+    let mut bytes = vec![0; length as usize];
     from.read_exact(&mut bytes)?;
     Ok(Reply { time_us, cycles, instructions: qemu::instructions(cycles, shift), stack_bytes, throttles, bytes })
 }

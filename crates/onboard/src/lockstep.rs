@@ -1,0 +1,51 @@
+//! The wire between the emulated board and the host, which stand still for each other.
+//!
+//! Two streams of bytes, little-endian. To the firmware: a `u32` length and that many bytes, which reach the link before
+//! the next control tick. From the firmware, for each of these: a [`ReplyHead`] and as many bytes as it says.
+
+use afbc_types::ROTORS_MAX;
+
+/// Head of what the firmware replies after a control tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReplyHead {
+    /// Start of the tick, since power-up \[us\].
+    pub time_us: u64,
+    /// Duration of the tick \[cycles of 168 MHz\].
+    pub cycles: u32,
+    /// Largest stack depth so far \[bytes\].
+    pub stack_bytes: u32,
+    /// Bytes sent over the link, which follow.
+    pub length: u32,
+    /// Throttles of the motors: 0, or 48 to 2047; 0 where there is no motor.
+    pub throttles: [u16; ROTORS_MAX],
+}
+
+impl ReplyHead {
+    /// Length on the wire \[bytes\].
+    pub const LEN: usize = 8 + 3 * 4 + 2 * ROTORS_MAX;
+
+    /// Returns the head as it crosses the wire.
+    pub fn to_bytes(&self) -> [u8; Self::LEN] {
+        let ReplyHead { time_us, cycles, stack_bytes, length, throttles } = *self;
+        let words = [cycles, stack_bytes, length].into_iter().flat_map(u32::to_le_bytes);
+        let fields =
+            time_us.to_le_bytes().into_iter().chain(words).chain(throttles.into_iter().flat_map(u16::to_le_bytes));
+        let mut bytes = [0; Self::LEN];
+        bytes.iter_mut().zip(fields).for_each(|(to, from)| *to = from);
+        bytes
+    }
+
+    /// Reads a head.
+    pub fn from_bytes(bytes: &[u8; Self::LEN]) -> Self {
+        let mut rest = bytes.iter().copied();
+        let mut next =
+            |size: usize| (0..size).fold(0, |value, i| value | u64::from(rest.next().unwrap_or(0)) << (8 * i));
+        ReplyHead {
+            time_us: next(8),
+            cycles: next(4) as u32,
+            stack_bytes: next(4) as u32,
+            length: next(4) as u32,
+            throttles: [(); ROTORS_MAX].map(|()| next(2) as u16),
+        }
+    }
+}
