@@ -61,49 +61,52 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
     let (rotors, rotor_height_m) = frame(&mut root, parameters.arm_m)?;
     let (actuators, force_max_n) = actuators(&mut root, &parameters)?;
     let curve = motor(need(&mut root, "motor")?)?;
-    let frame = Frame::new(&rotors).map_err(|error| root.fault_at("rotor", out_of_range(&error)))?;
-    let conditions =
-        Conditions { parameters: &parameters, frame: &frame, rotor_max_rad_s: actuators.max_rad_s, step_s: STEP_S };
-    let drag = |table| {
-        let default = Drag { rotor_height_m, ..Drag::DEFAULT };
-        parts::drag(table, default, Drag::ROT_HEIGHT.range.name, &conditions)
-    };
-    let ground = |table| {
-        let default = (Contact { rotor_height_m, ..Contact::DEFAULT }, GroundEffect::DEFAULT);
-        parts::ground(table, default, Contact::ROT_HEIGHT.range.name, &parameters, STEP_S)
-    };
-    let drag = root.table("drag")?.map(drag).transpose()?;
-    let (contact, ground_effect) = root.table("ground")?.map(ground).transpose()?.unzip();
-    let mut imu = Imu::DEFAULT;
-    if let Some(mut table) = root.table("imu")? {
-        table.declared(&mut imu)?;
-        table.finish()?;
-    }
     let lag_s = actuators.time_constant_s as f32;
     let mut flight_gains = Profile::Flight.gains_for(&parameters.to_f32(), lag_s);
     let mut flight_settings = Profile::Flight.settings_for(force_max_n as f32, lag_s);
     gains(&mut root, &mut flight_gains, &mut flight_settings)?;
-    let realism =
-        Realism { rotors: actuators, drag, contact, ground_effect: ground_effect.flatten(), ..Realism::default() };
-    let (text, file) = (text.into(), file.into());
-    let vehicle = Vehicle {
+    let mut vehicle = Vehicle {
         name,
         description,
         parameters,
         rotors,
         force_max_n,
-        realism,
+        realism: Realism { rotors: actuators, ..Realism::default() },
         curve,
-        imu,
+        imu: Imu::DEFAULT,
         flight_gains,
         flight_settings,
-        text,
-        file,
+        text: text.into(),
+        file: file.into(),
     };
+    // First of all: what does not fly needs no drag.
     let unfit = |error: OutOfRange| root.fault(error.range.name, format!("{}; {UNFIT}", out_of_range(&error)));
     vehicle.check().map_err(unfit)?;
+    surroundings(&mut root, &mut vehicle, rotor_height_m)?;
+    if let Some(mut table) = root.table("imu")? {
+        table.declared(&mut vehicle.imu)?;
+        table.finish()?;
+    }
     root.finish()?;
     Ok(vehicle)
+}
+
+/// `[drag]` and `[ground]`.
+fn surroundings(root: &mut Table<'_>, vehicle: &mut Vehicle, rotor_height_m: f64) -> Result<(), FileError> {
+    let Vehicle { parameters, rotors, realism, .. } = vehicle;
+    let frame = Frame::new(rotors).map_err(|error| root.fault_at("rotor", out_of_range(&error)))?;
+    if let Some(table) = root.table("drag")? {
+        let default = Drag { rotor_height_m, ..Drag::DEFAULT };
+        let rotor_max_rad_s = realism.rotors.max_rad_s;
+        let conditions = Conditions { parameters, frame: &frame, rotor_max_rad_s, step_s: STEP_S };
+        realism.drag = Some(parts::drag(table, default, Drag::ROT_HEIGHT.range.name, &conditions)?);
+    }
+    if let Some(table) = root.table("ground")? {
+        let default = (Contact { rotor_height_m, ..Contact::DEFAULT }, GroundEffect::DEFAULT);
+        let (contact, effect) = parts::ground(table, default, Contact::ROT_HEIGHT.range.name, parameters, STEP_S)?;
+        (realism.contact, realism.ground_effect) = (Some(contact), effect);
+    }
+    Ok(())
 }
 
 /// The table under `key`, which must be there.

@@ -45,8 +45,10 @@ fn the_papers_vehicle_has_the_profiles_gains() {
 
 #[test]
 fn what_cannot_hover_with_a_margin_is_refused_by_name() {
-    let heavy = refused(&changed("iris", "force_max_n = 7.066", "force_max_n = 4.5"));
-    assert!(heavy.contains("rotor_force_max_n") && heavy.contains("would not fly"), "{heavy}");
+    let weak = refused(&changed("iris", "force_max_n = 7.066", "force_max_n = 4.5"));
+    assert!(weak.contains("rotor_force_max_n") && weak.contains("would not fly"), "{weak}");
+    let heavy = refused(&changed("racer", "mass_kg = 0.752", "mass_kg = 5.0"));
+    assert!(heavy.contains("rotor_force_max_n") && heavy.contains("at least") | heavy.contains("within"), "{heavy}");
     let sluggish =
         refused(&changed("iris", "inertia_kg_m2 = [0.0089, 0.0164, 0.0193]", "inertia_kg_m2 = [0.0089, 0.029, 0.03]"));
     assert!(sluggish.contains("hover_authority_rad_s2"), "{sluggish}");
