@@ -55,9 +55,9 @@ impl Gains {
         }
     }
 
-    /// The gains of a subsystem that may take `slowness` times as long: every gain by its power of time, so that errors
-    /// have the same course, only slower. What bounds disturbances stays, for those do not slow down, and with them
-    /// u_r.
+    /// Returns the gains of a subsystem that is `slowness` times slower: each is scaled by its power of time, so that
+    /// errors take the same course, only slower. Bounds of the estimates stay, since disturbances do not slow down. Not
+    /// in the paper.
     pub fn slowed(&self, slowness: f32) -> Self {
         let Gains { backstepping: backstepping::Gains { alpha1, alpha2 }, gamma, eta, epsilon, safeguards, .. } = *self;
         let square = slowness * slowness;

@@ -49,8 +49,8 @@ impl Profile {
         })
     }
 
-    /// Settings of the cascade for a vehicle whose rotors give `force_max_n` each with a lag of `lag_s`. In the profile
-    /// `flight` the command filter and the largest rate of tilt slow down as the gains do.
+    /// Returns the cascade's settings for rotors that give `force_max_n` each with a lag of `lag_s`. In the profile
+    /// `flight`, command filter and largest tilt rate slow down as the gains do.
     pub fn settings_for(self, force_max_n: f32, lag_s: f32) -> Settings {
         let settings = self.settings();
         match self {
@@ -129,8 +129,8 @@ pub const LAG_S: f32 = 0.02;
 /// Response time of the vehicle: one step and the rotors' lag \[s\].
 const ANSWER_S: f32 = 0.021;
 
-/// How many times as long as the paper's a vehicle takes to do anything whose rotors lag by `lag_s` \[s\]; quicker
-/// rotors make no quicker vehicle, for noise and the command filter stay.
+/// Returns the factor by which a vehicle with a rotor lag of `lag_s` \[s\] is slower than the paper's; at least 1, since
+/// quicker rotors change neither noise nor command filter. Not in the paper.
 pub fn slowness(lag_s: f32) -> f32 {
     math::max(lag_s / LAG_S, 1.0)
 }

@@ -27,7 +27,7 @@ impl<const N: usize> Action<N> {
         Action { speeds, forces, given, health: Health { saturated, ..Health::default() } }
     }
 
-    /// The same action, with zeros for the rotors that this vehicle has not.
+    /// Returns the action extended with zeros to the largest number of rotors.
     pub fn padded(&self) -> Action<ROTORS_MAX> {
         Action { speeds: self.speeds.padded(), forces: self.forces.padded(), given: self.given, health: self.health }
     }

@@ -131,8 +131,8 @@ impl<const N: usize> Mixer<N> {
         N as f32 * self.force_max
     }
 
-    /// Largest U1 alone and largest U2 alone, both ways, around a hover under this weight \[N\]; none if the rotors do
-    /// not lift it.
+    /// Returns the largest U1 and the largest U2 that are possible in both directions at hover with this weight \[N\];
+    /// 0 if the rotors do not lift it.
     pub fn tilt_authority_n(&self, weight_n: f32) -> [f32; 2] {
         [0, 1].map(|input| {
             let column = self.inverse.column(input);

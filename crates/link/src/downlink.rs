@@ -37,7 +37,7 @@ pub enum Downlink {
         time_us: u64,
         /// True if the motors may turn.
         armed: bool,
-        /// omega_i; 0 for rotors that the vehicle has not.
+        /// omega_i; 0 for rotors that the vehicle does not have.
         speeds: RotorSpeeds<ROTORS_MAX>,
     },
     /// ATTITUDE (30), in the frames of [`afbc_types`].

@@ -40,7 +40,7 @@ pub struct Report<const N: usize = 4> {
 }
 
 impl<const N: usize> Report<N> {
-    /// The same report, with zeros for the rotors that this vehicle has not.
+    /// Returns the report extended with zeros to the largest number of rotors.
     #[must_use]
     pub fn padded(&self) -> Report<ROTORS_MAX> {
         let Report { time_us, mode, motors, throttles, health, saturated_ticks, learnt, answer, ended } = *self;

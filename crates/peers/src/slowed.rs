@@ -1,9 +1,9 @@
-//! Gains for rotors that lag more than those that the gains were tuned for.
+//! Gains for rotors with more lag than those that the gains were tuned for.
 
 use afbc_types::{Declaration, Declared, Value};
 use core::convert::Infallible;
 
-/// The power of time in a unit: what has it grows by that power of a time.
+/// Returns the power of time in a unit.
 fn time_power(unit: &str) -> i32 {
     match unit {
         "s" => 1,
@@ -14,8 +14,8 @@ fn time_power(unit: &str) -> i32 {
     }
 }
 
-/// The gains of a vehicle that may take `slowness` times as long: every one by its power of time, within its range, so
-/// that errors have the same course, only slower. Limits in m/s, m/s2 and rad stay.
+/// Returns the gains of a vehicle that is `slowness` times slower: each is scaled by its power of time, within its range,
+/// so that errors take the same course, only slower. Limits in m/s, m/s2 and rad stay.
 #[must_use]
 pub fn slowed<G: Declared>(mut gains: G, slowness: f32) -> G {
     let scale = |Declaration { unit, range, .. }: &Declaration, value: Value<'_>| {

@@ -1,11 +1,11 @@
-//! Where the rotors are, as sums over them need it.
+//! Positions and directions of the rotors, in the form that sums over them need.
 
 use afbc_types::{OutOfRange, PLUS, ROTOR_POSITION, ROTORS, ROTORS_MAX, Rotor, RotorSpeeds};
 use nalgebra::{SMatrix, SVector, Vector4};
 
 type Matrix4xX8 = SMatrix<f64, 4, ROTORS_MAX>;
 
-/// One number for each rotor that a vehicle may have; 0 for those that it has not.
+/// One number per rotor, 0 beyond the number of rotors.
 pub type Lanes = SVector<f64, ROTORS_MAX>;
 
 /// The rotors of a vehicle. The default is the paper's frame, [`PLUS`].
@@ -14,7 +14,7 @@ pub struct Frame {
     count: usize,
     /// 1 for each rotor.
     present: Lanes,
-    /// Positions, in arm's lengths.
+    /// Positions, in arm lengths.
     x: Lanes,
     y: Lanes,
     /// x^2 + y^2
@@ -23,27 +23,27 @@ pub struct Frame {
     spin: Lanes,
 }
 
-/// What the rotors do together: sums over them, weighted by where they are.
+/// Sums over the rotors, weighted by position and direction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sums {
-    /// Of all.
+    /// Unweighted sum.
     pub(crate) all: f64,
-    /// By position, in arm's lengths.
+    /// Sums weighted by position, in arm lengths.
     pub(crate) x: f64,
     pub(crate) y: f64,
-    /// By the square of the distance from body z.
+    /// Sum weighted by the square of the distance from body z.
     pub(crate) square: f64,
-    /// By the direction in which each turns the body.
+    /// Sum weighted by the yaw direction, 1 or -1.
     pub(crate) spin: f64,
 }
 
-/// The sum of products, in the order of the rotors.
+/// Returns the sum of products, in the order of the rotors.
 #[inline]
 fn dot(weights: &Lanes, values: &Lanes) -> f64 {
     weights.iter().zip(values.iter()).fold(0.0, |sum, (weight, value)| sum + weight * value)
 }
 
-/// The sum of squares times speeds: in pairs, as four rotors have always been summed.
+/// Returns the sum of squares times speeds, even and odd rotors apart: results of four rotors depend on this order.
 #[inline]
 pub(crate) fn power(squares: &Lanes, speeds: &Lanes) -> f64 {
     let products = squares.component_mul(speeds);
@@ -58,7 +58,7 @@ pub(crate) fn power(squares: &Lanes, speeds: &Lanes) -> f64 {
 }
 
 impl Frame {
-    /// The frame of these rotors.
+    /// Makes the frame of these rotors.
     ///
     /// # Errors
     /// If there are fewer than four or more than eight, or one is out of [`ROTOR_POSITION`].
@@ -88,19 +88,19 @@ impl Frame {
         self.count
     }
 
-    /// Square of the distance of the outermost rotor from body z, in arm's lengths.
+    /// Square of the distance of the outermost rotor from body z, in arm lengths.
     pub(crate) fn square_max(&self) -> f64 {
         self.square.max()
     }
 
-    /// `values` where there is a rotor, 0 elsewhere.
+    /// Returns `values` with 0 beyond the number of rotors.
     #[inline]
     pub(crate) fn masked(&self, values: &Lanes) -> Lanes {
         self.present.component_mul(values)
     }
 
-    /// Each rotor's part of a thrust without moments: of all such parts, those of the least sum of squares. Equal where
-    /// the frame allows.
+    /// Returns the share of each rotor in a thrust without moments, with the least sum of squares; equal shares if the
+    /// frame allows them.
     pub(crate) fn hover_shares(&self) -> Lanes {
         let equal = self.present / self.count as f64;
         let Sums { x, y, spin, .. } = self.sums(&equal);
@@ -118,12 +118,12 @@ impl Frame {
         shares.filter(|shares| shares.min() >= 0.0).unwrap_or(equal)
     }
 
-    /// `value` for each rotor.
+    /// Returns `value` for each rotor.
     pub(crate) fn repeat(&self, value: f64) -> Lanes {
         self.present * value
     }
 
-    /// The speeds that are commanded; a rotor that is told nothing stands still.
+    /// Returns the commanded speeds; a rotor without a command stands still.
     #[inline]
     pub(crate) fn speeds<const N: usize>(&self, speeds: &RotorSpeeds<N>) -> Lanes {
         let mut lanes = Lanes::zeros();
@@ -132,7 +132,7 @@ impl Frame {
         lanes
     }
 
-    /// `values`, which are 0 where there is no rotor, summed.
+    /// Sums `values`, which must be 0 beyond the number of rotors.
     #[inline]
     pub(crate) fn sums(&self, values: &Lanes) -> Sums {
         Sums {

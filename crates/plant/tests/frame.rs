@@ -105,7 +105,7 @@ fn too_few_too_many_and_too_far_are_refused() {
     assert_eq!((refused(&[rotor; 3]), refused(&[rotor; 9])), ("rotors", "rotors"));
     assert_eq!(refused(&[rotor, rotor, rotor, Rotor { x: f64::NAN, ..rotor }]), "rotor_position");
     assert_eq!(refused(&[rotor, rotor, rotor, Rotor { y: 11.0, ..rotor }]), "rotor_position");
-    // A fault of a rotor that there is not.
+    // A fault of a rotor that does not exist.
     let fault = RotorFault { rotor: 5, efficiency: 0.5, start_s: 0.0 };
     let realism = Realism { rotors: Rotors { faults: vec![fault], ..Rotors::DEFAULT }, ..Realism::default() };
     let on = |count| {

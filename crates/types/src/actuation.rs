@@ -20,8 +20,7 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// U = B F of rotors at these places that give `forces_n` \[N\]; rotors without a force, and forces without a
-    /// rotor, do nothing.
+    /// Returns U = B F for rotors at these positions with `forces_n` \[N\]. Extra rotors or forces are ignored.
     pub fn of(rotors: &[Rotor], forces_n: &[f32]) -> Self {
         let mut inputs = Inputs::default();
         for (rotor, force_n) in rotors.iter().zip(forces_n) {
@@ -34,7 +33,7 @@ impl Inputs {
     }
 }
 
-/// `values`, and 0 for each rotor that there is not.
+/// Returns `values` extended with zeros to the largest number of rotors.
 fn padded<const N: usize>(values: &SVector<f32, N>) -> SVector<f32, ROTORS_MAX> {
     SVector::from_fn(|i, _| values.get(i).copied().unwrap_or_default())
 }
@@ -66,7 +65,7 @@ impl<const N: usize> Default for RotorSpeeds<N> {
 }
 
 impl<const N: usize> RotorForces<N> {
-    /// The same forces, with zeros for the rotors that this vehicle has not.
+    /// Returns the forces extended with zeros to the largest number of rotors.
     #[must_use]
     pub fn padded(&self) -> RotorForces<ROTORS_MAX> {
         RotorForces(padded(&self.0))
@@ -74,7 +73,7 @@ impl<const N: usize> RotorForces<N> {
 }
 
 impl<const N: usize> RotorSpeeds<N> {
-    /// The same speeds, with zeros for the rotors that this vehicle has not.
+    /// Returns the speeds extended with zeros to the largest number of rotors.
     #[must_use]
     pub fn padded(&self) -> RotorSpeeds<ROTORS_MAX> {
         RotorSpeeds(padded(&self.0))

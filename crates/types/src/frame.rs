@@ -1,14 +1,14 @@
-//! Where the rotors are.
+//! Positions and directions of the rotors.
 
 use crate::{OutOfRange, Parameters, Range};
 
-/// Most rotors that a vehicle has.
+/// Largest number of rotors.
 pub const ROTORS_MAX: usize = 8;
 
 /// Accepted number of rotors.
 pub const ROTORS: Range = Range::new("rotors", 4.0, ROTORS_MAX as f64);
 
-/// Accepted position of a rotor along x and along y, in arm's lengths.
+/// Accepted position of a rotor along x and along y, in arm lengths.
 pub const ROTOR_POSITION: Range = Range::new("rotor_position", -10.0, 10.0);
 
 /// Position of a rotor, and the direction in which it turns the body.
@@ -16,9 +16,9 @@ pub const ROTOR_POSITION: Range = Range::new("rotor_position", -10.0, 10.0);
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rotor<T = f32> {
-    /// Along body x, in [arm's lengths](crate::Parameters::arm_m).
+    /// Along body x, in [arm lengths](crate::Parameters::arm_m).
     pub x: T,
-    /// Along body y, in arm's lengths.
+    /// Along body y, in arm lengths.
     pub y: T,
     /// True if its drag pushes the body to positive yaw: seen from above, the rotor turns clockwise.
     pub pushes_left: bool,
@@ -33,7 +33,7 @@ pub const PLUS: [Rotor; 4] = [
 ];
 
 impl Rotor {
-    /// The same rotor in double precision, as the plant has it.
+    /// Returns the rotor in double precision, for the plant.
     #[must_use]
     pub fn to_f64(&self) -> Rotor<f64> {
         Rotor { x: self.x.into(), y: self.y.into(), pushes_left: self.pushes_left }
@@ -41,20 +41,20 @@ impl Rotor {
 }
 
 impl Rotor<f64> {
-    /// The same rotor, rounded for the controller.
+    /// Returns the rotor rounded to single precision, for a controller.
     #[must_use]
     pub fn to_f32(&self) -> Rotor {
         Rotor { x: self.x as f32, y: self.y as f32, pushes_left: self.pushes_left }
     }
 
-    /// 1 if the rotor pushes the body to positive yaw, otherwise -1.
+    /// Returns 1 if the rotor pushes the body to positive yaw, otherwise -1.
     #[must_use]
     pub fn spin(&self) -> f64 {
         if self.pushes_left { 1.0 } else { -1.0 }
     }
 }
 
-/// A vehicle as a controller knows it: nominal parameters, and where its `N` rotors are.
+/// A vehicle as a controller knows it: nominal parameters and the positions of its `N` rotors.
 ///
 /// [`Parameters`] alone stand for a vehicle with the paper's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,7 +72,7 @@ impl From<Parameters> for Airframe {
 }
 
 impl<const N: usize> Airframe<N> {
-    /// The vehicle with these parameters and rotors, as its controller knows it.
+    /// Makes the airframe with these parameters and rotors.
     ///
     /// # Errors
     /// If there are not `N` rotors.
@@ -84,8 +84,8 @@ impl<const N: usize> Airframe<N> {
     }
 }
 
-/// Evaluates an expression in which `N` is the number of rotors, 4 to 8, as a constant: the way from a vehicle that a
-/// file describes to the code made for its number of rotors.
+/// Evaluates an expression in which `N` is the number of rotors, 4 to 8, as a constant: selects the code for the number
+/// of rotors that a file states.
 ///
 /// ```
 /// let room = afbc_types::with_rotors!(6, N => [0.0_f32; N].len());

@@ -12,13 +12,13 @@ use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, ROTOR_POSITION
 use nalgebra::Vector3;
 use std::path::Path;
 
-/// Accepted position of a rotor \[m\]; in arm's lengths it must lie within [`ROTOR_POSITION`] too.
+/// Accepted position of a rotor \[m\]; in arm lengths it must lie within [`ROTOR_POSITION`], too.
 const POSITION: Range = Range::new("position_m", -100.0, 100.0);
-/// How far `arm_m` may be from the mean distance of the rotors, as a share of it.
+/// Largest relative difference between `arm_m` and the mean distance of the rotors.
 const ARM_TOLERANCE: f64 = 0.01;
-/// Step that drag and ground are checked for \[s\]; a scenario with a longer one checks them again.
+/// Time step for which drag and ground are checked \[s\]; a scenario checks them again for its own.
 const STEP_S: f64 = 0.001;
-/// What to do about a vehicle that does not hover with a margin.
+/// Cure for a vehicle that does not hover with a margin.
 const UNFIT: &str = "AFBC would not fly it with a margin: stronger or quicker rotors, less mass, or gains of its own";
 
 /// Reads and checks the vehicle file at `path`.
@@ -39,7 +39,7 @@ pub fn parse(file: &str, text: &str, name: &str) -> Result<Vehicle, FileError> {
     afbc_reader::document(file, text, "vehicles paper", |root| read(root, file, text, name))
 }
 
-/// One direction in which a rotor turns.
+/// Direction of rotation of a rotor, seen from above.
 #[derive(Clone, Copy)]
 enum Spin {
     Ccw,
@@ -79,7 +79,7 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
         text: text.into(),
         file: file.into(),
     };
-    // First of all: what does not fly needs no drag.
+    // Before drag and ground, whose checks would refuse the same vehicle for a less useful reason.
     let unfit = |error: OutOfRange| root.fault(error.range.name, format!("{}; {UNFIT}", out_of_range(&error)));
     vehicle.check().map_err(unfit)?;
     surroundings(&mut root, &mut vehicle, rotor_height_m)?;
@@ -91,7 +91,7 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
     Ok(vehicle)
 }
 
-/// `[drag]` and `[ground]`.
+/// Reads `[drag]` and `[ground]`.
 fn surroundings(root: &mut Table<'_>, vehicle: &mut Vehicle, rotor_height_m: f64) -> Result<(), FileError> {
     let Vehicle { parameters, rotors, realism, .. } = vehicle;
     let frame = Frame::new(rotors).map_err(|error| root.fault_at("rotor", out_of_range(&error)))?;
@@ -109,12 +109,12 @@ fn surroundings(root: &mut Table<'_>, vehicle: &mut Vehicle, rotor_height_m: f64
     Ok(())
 }
 
-/// The table under `key`, which must be there.
+/// Returns the table under `key`, which is required.
 fn need<'a>(root: &mut Table<'a>, key: &'static str) -> Result<Table<'a>, FileError> {
     root.table(key)?.ok_or_else(|| root.missing(key, &format!("add [{key}], as in vehicles/paper.toml")))
 }
 
-/// `[vehicle]`: nothing but gravity has a default.
+/// Reads `[vehicle]`, where only gravity has a default.
 fn masses(mut table: Table<'_>) -> Result<Parameters<f64>, FileError> {
     let mut parameters = Parameters::PAPER;
     table.declared(&mut parameters)?;
@@ -126,7 +126,7 @@ fn masses(mut table: Table<'_>) -> Result<Parameters<f64>, FileError> {
     Ok(parameters)
 }
 
-/// `[[rotor]]`: the rotors in arm's lengths, and their mean height \[m\].
+/// Reads `[[rotor]]`; returns the rotors in arm lengths and their mean height \[m\].
 fn frame(root: &mut Table<'_>, arm_m: f64) -> Result<(Vec<Rotor<f64>>, f64), FileError> {
     let (mut rotors, mut places_m) = (Vec::new(), Vec::new());
     for mut table in root.few_tables("rotor")? {
@@ -155,7 +155,7 @@ fn frame(root: &mut Table<'_>, arm_m: f64) -> Result<(Vec<Rotor<f64>>, f64), Fil
     Ok((rotors, mean(|at_m| at_m.z)))
 }
 
-/// `[rotors]` and `[battery]`, and the largest force of a rotor \[N\].
+/// Reads `[rotors]` and `[battery]`; returns them with the largest force of a rotor \[N\].
 fn actuators(root: &mut Table<'_>, parameters: &Parameters<f64>) -> Result<(Rotors, f64), FileError> {
     let table = need(root, "rotors")?;
     table.require(&Rotors::LAG.range)?;
@@ -166,7 +166,7 @@ fn actuators(root: &mut Table<'_>, parameters: &Parameters<f64>) -> Result<(Roto
     Ok((rotors, force_max_n))
 }
 
-/// `[motor]`: nothing has a default.
+/// Reads `[motor]`, where nothing has a default.
 fn motor(mut table: Table<'_>) -> Result<Curve, FileError> {
     let mut curve = Curve::DEFAULT;
     table.declared(&mut curve)?;
@@ -175,8 +175,8 @@ fn motor(mut table: Table<'_>) -> Result<Curve, FileError> {
     Ok(curve)
 }
 
-/// `[gains.flight.afbc.AXIS]` and `[gains.flight.cascade]`; the gains of other laws are read by those who know the
-/// laws.
+/// Reads `[gains.flight.afbc.AXIS]` and `[gains.flight.cascade]`; the gains of other laws are read where the laws are
+/// known.
 fn gains(root: &mut Table<'_>, gains: &mut PerAxis<Gains>, settings: &mut Settings) -> Result<(), FileError> {
     let Some(mut all) = root.table("gains")? else { return Ok(()) };
     let Some(mut flight) = all.table(Profile::Flight.name())? else { return all.finish() };

@@ -1,4 +1,4 @@
-//! A vehicle, as its file describes it.
+//! A vehicle as its file describes it.
 
 use afbc::adaptive::Gains;
 use afbc::guarded::Guarded;
@@ -11,7 +11,7 @@ use afbc_types::{Airframe, OutOfRange, Parameters, PerAxis, Rotor, parameters, w
 use nalgebra::Vector3;
 
 parameters! {
-    /// How the inertial sensor is mounted.
+    /// Mounting of the inertial sensor.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Imu {
         /// Position of the sensor, from the centre of mass, body frame.
@@ -26,12 +26,12 @@ parameters! {
 /// Table of the settings of AFBC's cascade, beside those of the laws' gains.
 pub const CASCADE: &str = "cascade";
 
-/// A vehicle, as its file describes it.
+/// A vehicle as its file describes it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vehicle {
     /// Short name.
     pub name: String,
-    /// One line for people.
+    /// One-line description.
     pub description: String,
     /// Masses, arm and rotor factors.
     pub parameters: Parameters<f64>,
@@ -49,7 +49,7 @@ pub struct Vehicle {
     pub flight_gains: PerAxis<Gains>,
     /// Settings of AFBC's cascade in the profile `flight`: by rule ([`Profile::settings_for`]), or as the file says.
     pub flight_settings: Settings,
-    /// The file itself, for whoever reads the gains of other laws from it, and what errors call it.
+    /// Text and name of the file, from which the gains of other laws are read.
     pub(crate) text: String,
     pub(crate) file: String,
 }
@@ -76,8 +76,7 @@ impl Vehicle {
         profile.settings_for(self.force_max_n as f32, self.lag_s())
     }
 
-    /// Lets `read` take gains of the profile `flight` from the file, which has a table for each law; nothing if it has
-    /// none.
+    /// Calls `read` with the gains of the profile `flight` in the file, a table per law, if there are any.
     ///
     /// # Errors
     /// Those of `read`.
@@ -88,7 +87,7 @@ impl Vehicle {
         })
     }
 
-    /// Whether AFBC can fly it with a margin, under its monitor.
+    /// Checks that AFBC can fly the vehicle with a margin, under its monitor.
     ///
     /// # Errors
     /// The first parameter, setting or gain out of range; the rotors must lift the vehicle and turn it with a margin

@@ -37,7 +37,7 @@ fn group(mut table: Table<'_>, name: &str, gains: &mut impl Declared) -> Result<
 /// `law` with those of its gains that the file of `vehicle` holds.
 ///
 /// # Errors
-/// One line on the first thing that is wrong, such as gains of a law that there is not.
+/// One line on the first thing that is wrong, such as gains of an unknown law.
 pub(crate) fn law_gains(vehicle: &Vehicle, mut law: Law) -> Result<Law, FileError> {
     vehicle.law_gains(|mut laws| {
         // Settings of the cascade are not a law's own.
