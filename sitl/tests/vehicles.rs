@@ -1,0 +1,64 @@
+//! Runs `sitl vehicles` and `--vehicle`.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod common;
+
+use common::{folder, refused, sitl, succeeds};
+use std::fs;
+
+#[test]
+fn every_built_in_vehicle_is_listed_and_a_template() {
+    let folder = folder("built_in");
+    let list = succeeds(&sitl(&folder, &["vehicles"]));
+    let names: Vec<_> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert_eq!(names, ["paper", "crazyflie", "hummingbird", "racer", "iris", "f550"]);
+    for name in names {
+        let text = succeeds(&sitl(&folder, &["vehicles", name]));
+        fs::write(folder.join("mine.toml"), text).unwrap();
+        let flight = ["fly", "hover", "--vehicle", "mine.toml", "--duration", "0.1", "--force"];
+        assert!(succeeds(&sitl(&folder, &flight)).starts_with("hover: rigid-body plant, real rotors, battery, drag"));
+    }
+}
+
+/// Columns for six rotors, and the same flight whether command line or scenario names the vehicle.
+#[test]
+fn a_scenario_may_name_its_vehicle() {
+    let folder = folder("named");
+    let hover = "controllers = [\"afbc\"]\nduration_s = 2.0\n[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 2]\n";
+    fs::write(folder.join("own.toml"), format!("{hover}[vehicle]\nname = \"f550\"\n")).unwrap();
+    fs::write(folder.join("any.toml"), hover).unwrap();
+    succeeds(&sitl(&folder, &["fly", "own.toml", "--out", "a"]));
+    succeeds(&sitl(&folder, &["fly", "any.toml", "--vehicle", "f550", "--out", "b"]));
+    let csv = |out: &str| {
+        let files = fs::read_dir(folder.join(out)).unwrap().map(|entry| entry.unwrap().path());
+        let log = files.into_iter().find(|path| path.extension().is_some_and(|extension| extension == "csv")).unwrap();
+        fs::read_to_string(log).unwrap()
+    };
+    let (own, any) = (csv("a"), csv("b"));
+    assert!(own.starts_with("time_s") && own.contains("omega6_rad_s") && !own.contains("omega7_rad_s"));
+    assert_eq!(own, any);
+}
+
+#[test]
+fn a_vehicle_that_is_not_there_or_does_not_fly_gets_one_line() {
+    let folder = folder("refused");
+    let racer = succeeds(&sitl(&folder, &["vehicles", "racer"]));
+    fs::write(folder.join("heavy.toml"), racer.replacen("mass_kg = 0.752", "mass_kg = 5.0", 1)).unwrap();
+    fs::write(folder.join("slip.toml"), format!("{racer}[gains.flight.pdi]\ntilt_p_1_s = 9.0\n")).unwrap();
+    let pinned = "[vehicle]\nname = \"racr\"\n[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 2]\n";
+    fs::write(folder.join("pinned.toml"), pinned).unwrap();
+    for (arguments, expected) in [
+        (&["fly", "hover", "--vehicle", "racr"][..], "did you mean racer?"),
+        (&["fly", "hover", "--vehicle", "./none.toml"], "./none.toml: no such file; `sitl vehicles` lists"),
+        (&["fly", "hover", "--vehicle", "heavy.toml"], "heavy.toml:1: rotor_force_max_n"),
+        (&["compare", "hover", "--vehicle", "slip.toml"], "gains.flight.pdi: unknown key; known here: cascade, afbc"),
+        (&["vehicles", "nothing"], "no built-in vehicle"),
+        (&["fly", "pinned.toml"], "pinned.toml:2: vehicle.name: \"racr\" is no built-in vehicle; did you mean racer?"),
+        (&["pil", "hover", "--vehicle", "racr"], "did you mean racer?"),
+    ] {
+        let error = refused(&sitl(&folder, arguments));
+        assert!(error.contains(expected) && error.lines().count() == 1, "{error}, not {expected}");
+    }
+    assert!(!folder.join("out").exists(), "nothing is written");
+}
