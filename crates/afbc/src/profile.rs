@@ -129,8 +129,8 @@ pub const LAG_S: f32 = 0.02;
 /// Response time of the vehicle: one step and the rotors' lag \[s\].
 const ANSWER_S: f32 = 0.021;
 
-/// Returns the factor by which a vehicle with a rotor lag of `lag_s` \[s\] is slower than the paper's; at least 1, since
-/// quicker rotors change neither noise nor command filter. Not in the paper.
+/// Returns the factor by which a vehicle with a rotor lag of `lag_s` \[s\] is slower than the paper's; at least 1,
+/// since quicker rotors change neither noise nor command filter. Not in the paper.
 pub fn slowness(lag_s: f32) -> f32 {
     math::max(lag_s / LAG_S, 1.0)
 }

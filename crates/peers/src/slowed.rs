@@ -14,8 +14,8 @@ fn time_power(unit: &str) -> i32 {
     }
 }
 
-/// Returns the gains of a vehicle that is `slowness` times slower: each is scaled by its power of time, within its range,
-/// so that errors take the same course, only slower. Limits in m/s, m/s2 and rad stay.
+/// Returns the gains of a vehicle that is `slowness` times slower: each is scaled by its power of time, within its
+/// range, so that errors take the same course, only slower. Limits in m/s, m/s2 and rad stay.
 #[must_use]
 pub fn slowed<G: Declared>(mut gains: G, slowness: f32) -> G {
     let scale = |Declaration { unit, range, .. }: &Declaration, value: Value<'_>| {
