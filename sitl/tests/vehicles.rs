@@ -62,3 +62,22 @@ fn a_vehicle_that_is_not_there_or_does_not_fly_gets_one_line() {
     }
     assert!(!folder.join("out").exists(), "nothing is written");
 }
+
+/// What was flown stays, whatever the path and the comments of the vehicle's file; another vehicle is another campaign.
+#[test]
+fn a_campaign_goes_on_with_the_same_vehicle_from_elsewhere() {
+    let folder = folder("campaign");
+    let racer = succeeds(&sitl(&folder, &["vehicles", "racer"]));
+    fs::create_dir(folder.join("elsewhere")).unwrap();
+    fs::write(folder.join("mine.toml"), &racer).unwrap();
+    fs::write(folder.join("elsewhere/copy.toml"), format!("# A copy.\n{racer}")).unwrap();
+    fs::write(folder.join("other.toml"), racer.replacen("mass_kg = 0.752", "mass_kg = 0.8", 1)).unwrap();
+    let campaign = "flights = 2\nduration_s = 0.5\nscenario = \"hover\"\n[spread]\nmass_ratio = [0.9, 1.1]\n";
+    fs::write(folder.join("small.toml"), campaign).unwrap();
+    let fly = |vehicle| sitl(&folder, &["campaign", "small.toml", "--vehicle", vehicle, "--out", "out"]);
+    succeeds(&fly("mine.toml"));
+    let flown = fs::read(folder.join("out/results.parquet")).unwrap();
+    succeeds(&fly("elsewhere/copy.toml"));
+    assert_eq!(fs::read(folder.join("out/results.parquet")).unwrap(), flown);
+    refused(&fly("other.toml"));
+}

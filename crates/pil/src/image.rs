@@ -33,8 +33,8 @@ impl Image {
         if path.is_file() { Ok(path) } else { Err(Error::NoImage(path)) }
     }
 
-    /// Builds the image by its cargo alias, for `vehicle` or the default one, and returns its path. `FW_TOOLCHAIN`, if
-    /// set, names the toolchain.
+    /// Builds the image by its cargo alias, for `vehicle` (a name in `vehicles/` or an absolute path) or the default
+    /// one, and returns its path. `FW_TOOLCHAIN`, if set, names the toolchain.
     ///
     /// # Errors
     /// [`Error::NoTarget`], [`Error::Build`].
@@ -50,11 +50,7 @@ impl Image {
         };
         let mut cargo = toolchain("cargo");
         match vehicle {
-            Some(vehicle) => {
-                // A file is told from a name of `vehicles/`; cargo runs elsewhere.
-                let file = std::path::absolute(vehicle).ok().filter(|path| path.is_file());
-                cargo.env("VEHICLE", file.as_deref().unwrap_or(vehicle))
-            }
+            Some(vehicle) => cargo.env("VEHICLE", vehicle),
             // The host beside it flies the default one.
             None => cargo.env_remove("VEHICLE"),
         };

@@ -98,7 +98,7 @@ impl Campaign {
         let summary = pool.install(|| campaign::fly(&plan, &folder, &never, &done));
         drop(progress);
         let summary = summary?.ok_or("stopped")?;
-        conclude(&folder, &summary, &self.campaign.to_string(), self.json)
+        conclude(&folder, &summary, &self.on.arguments(&self.campaign), self.json)
     }
 
     /// Flies one flight, and writes everything about it.

@@ -1,5 +1,6 @@
 //! `--vehicle` and `sitl vehicles`: what flies.
 
+use super::target::Target;
 use super::terminal::{Failure, print};
 use afbc::Profile;
 use afbc_campaign::Campaign;
@@ -45,9 +46,16 @@ impl OnVehicle {
         Ok(campaign)
     }
 
-    /// What was asked for, as the firmware's build script takes it.
-    pub(crate) fn name(&self) -> Option<&Path> {
-        self.vehicle.as_deref()
+    /// The vehicle as the firmware's build script takes it: the name of a built-in one, or an absolute path.
+    pub(crate) fn for_firmware(&self) -> Result<Option<PathBuf>, Failure> {
+        let Some(path) = &self.vehicle else { return Ok(None) };
+        let known = path.to_str().is_some_and(|name| built_in(name).is_some());
+        Ok(Some(if known { path.clone() } else { std::path::absolute(path)? }))
+    }
+
+    /// The arguments of the same command on `target`.
+    pub(crate) fn arguments(&self, target: &Target) -> String {
+        self.vehicle.as_ref().map_or(target.to_string(), |path| format!("{target} --vehicle {}", path.display()))
     }
 }
 

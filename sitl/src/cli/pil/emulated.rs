@@ -13,7 +13,10 @@ use std::time::Instant;
 /// Flies `scenario` with `image`, or with the one built from this source, and prints the results.
 pub(super) fn fly(scenario: &Scenario, flying: &InTheLoop, image: Option<PathBuf>) -> Result<ExitCode, Failure> {
     let mut recorder = Recorder::new(scenario, flying)?;
-    let image = image.map_or_else(|| Image::Pil.build(flying.on.name()), Ok)?;
+    let image = match image {
+        Some(image) => image,
+        None => Image::Pil.build(flying.on.for_firmware()?.as_deref())?,
+    };
     let host = scenario.vehicle_file.as_ref().map_or_else(Host::new, Host::for_vehicle)?;
     let mut twins = Twins::new(Emulator::start(&image)?, host);
 
