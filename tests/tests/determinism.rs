@@ -24,6 +24,8 @@ fn numbers(sample: &Sample) -> impl Iterator<Item = u64> {
             r.position_m,
             r.velocity_m_s,
             r.acceleration_m_s2,
+            r.jerk_m_s3,
+            r.snap_m_s4,
         ]
         .into_iter()
         .flat_map(<[f64; 3]>::from),

@@ -70,6 +70,11 @@ fn pace(trajectory: &Trajectory) -> (f64, f64) {
     }
 }
 
+/// \[x, y, z\], from the acceleration to the snap.
+fn higher(r: &Reference) -> [Vector3<f64>; 3] {
+    [r.acceleration_m_s2, r.jerk_m_s3, r.snap_m_s4]
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 5_000, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -103,6 +108,31 @@ proptest! {
                 here[2][axis]
             );
         }
+    }
+
+    /// Fourth order differences of the acceleration: jerk and snap.
+    #[test]
+    fn jerk_and_snap_are_the_derivatives_of_the_acceleration(trajectory in smooth(), t in 0.0_f64..80.0) {
+        let (shortest, h) = (pace(&trajectory).1, 1e-3 * pace(&trajectory).1);
+        if let Trajectory::Waypoints(waypoints) = &trajectory {
+            // The jerk jumps at a waypoint.
+            prop_assume!(waypoints.iter().all(|waypoint| (waypoint.time_s - t).abs() > 3.0 * h));
+        }
+        let at = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|k| higher(&trajectory.at(t + k * h)));
+        let [jerk, snap] = [0, 1].map(|order| {
+            let [a, b, c, d] = [0, 1, 3, 4].map(|k: usize| at[k][order]);
+            (a - d + (c - b) * 8.0) / (12.0 * h)
+        });
+        // Sizes up to 40 m. Differences are off by h^4/30 of a fifth derivative more, and by the rounding of the value
+        // and of times up to 80 s over h; a derivative of order n is at most 40 (2 pi / T)^n, or 360 * 40 / T^n.
+        let bound = |order: i32| {
+            let size = |n: i32| 40.0 * (6.3_f64.powi(n) + 360.0) / shortest.powi(n);
+            let rounding = f64::EPSILON * (size(order) + 80.0 * size(order + 1));
+            h.powi(4) / 30.0 * size(order + 5) + 4.0 * rounding / h
+        };
+        let [_, told_jerk, told_snap] = at[2];
+        prop_assert!((jerk - told_jerk).amax() <= bound(2), "{jerk} for {told_jerk}");
+        prop_assert!((snap - told_snap).amax() <= bound(3), "{snap} for {told_snap}");
     }
 
     #[test]
@@ -203,5 +233,7 @@ proptest! {
             [s.acceleration_m_s2.x, s.acceleration_m_s2.y, s.acceleration_m_s2.z, s.yaw_acceleration_rad_s2],
         ];
         prop_assert_eq!(told, orders(&reference).map(|order| order.map(|x| x as f32)));
+        let told = [s.acceleration_m_s2, s.jerk_m_s3, s.snap_m_s4];
+        prop_assert_eq!(told, higher(&reference).map(|order| order.cast()));
     }
 }

@@ -176,7 +176,7 @@ fn every_field_is_checked_for_plausibility() {
         (|s, v| s.rates_rad_s.y = v, 1e3),
         (|s, v| s.rates_rad_s.z = v, 1e3),
     ];
-    let setpoints: [(SetSetpoint, f32); 12] = [
+    let setpoints: [(SetSetpoint, f32); 18] = [
         (|s, v| s.position_m.x = v, 1e5),
         (|s, v| s.position_m.y = v, 1e5),
         (|s, v| s.position_m.z = v, 1e5),
@@ -186,6 +186,12 @@ fn every_field_is_checked_for_plausibility() {
         (|s, v| s.acceleration_m_s2.x = v, 1e3),
         (|s, v| s.acceleration_m_s2.y = v, 1e3),
         (|s, v| s.acceleration_m_s2.z = v, 1e3),
+        (|s, v| s.jerk_m_s3.x = v, 1e5),
+        (|s, v| s.jerk_m_s3.y = v, 1e5),
+        (|s, v| s.jerk_m_s3.z = v, 1e5),
+        (|s, v| s.snap_m_s4.x = v, 1e7),
+        (|s, v| s.snap_m_s4.y = v, 1e7),
+        (|s, v| s.snap_m_s4.z = v, 1e7),
         (|s, v| s.yaw_rad = v, 1e3),
         (|s, v| s.yaw_rate_rad_s = v, 1e3),
         (|s, v| s.yaw_acceleration_rad_s2 = v, 1e3),

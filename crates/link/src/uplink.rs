@@ -173,7 +173,8 @@ fn read_setpoint(data: &SET_POSITION_TARGET_LOCAL_NED_DATA, receiver: Address) -
         )),
         yaw_rad: -data.yaw,
         yaw_rate_rad_s: -unless(Mask::POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE, data.yaw_rate),
-        yaw_acceleration_rad_s2: 0.0,
+        // The message has no jerk, snap or angular acceleration.
+        ..Setpoint::default()
     };
     if setpoint.is_plausible() { Ok(Uplink::Setpoint(setpoint)) } else { Err(Fault::Implausible) }
 }

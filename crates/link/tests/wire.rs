@@ -256,7 +256,7 @@ fn every_type_mask_means_what_the_specification_says() {
             acceleration_m_s2: Vector3::new(unless(bit(6), 7.0), unless(bit(7), -8.0), unless(bit(8), -9.0)),
             yaw_rad: -0.1,
             yaw_rate_rad_s: unless(bit(11), -0.2),
-            yaw_acceleration_rad_s2: 0.0,
+            ..Setpoint::default()
         };
         assert_eq!(read, Ok(Uplink::Setpoint(expected)), "{mask:#b}");
     }
@@ -401,7 +401,7 @@ proptest! {
             acceleration_m_s2: a * 0.1,
             yaw_rad: b.x,
             yaw_rate_rad_s: b.y,
-            yaw_acceleration_rad_s2: 0.0,
+            ..Setpoint::default()
         };
         for message in [
             Uplink::Heartbeat,

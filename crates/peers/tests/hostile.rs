@@ -32,17 +32,18 @@ fn motion() -> impl Strategy<Value = (State, Setpoint)> {
         (vector(), vector(), vector(), vector()).prop_map(|(position_m, velocity_m_s, attitude_rad, rates_rad_s)| {
             State { position_m, velocity_m_s, attitude_rad, rates_rad_s }
         });
-    let setpoint =
-        (vector(), vector(), vector(), vector()).prop_map(|(position_m, velocity_m_s, acceleration_m_s2, yaw)| {
-            Setpoint {
-                position_m,
-                velocity_m_s,
-                acceleration_m_s2,
-                yaw_rad: yaw.x,
-                yaw_rate_rad_s: yaw.y,
-                yaw_acceleration_rad_s2: yaw.z,
-            }
-        });
+    let setpoint = [vector(), vector(), vector(), vector(), vector(), vector()].prop_map(
+        |[position_m, velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4, yaw]| Setpoint {
+            position_m,
+            velocity_m_s,
+            acceleration_m_s2,
+            jerk_m_s3: jerk_m_s3 * 100.0,
+            snap_m_s4: snap_m_s4 * 1e4,
+            yaw_rad: yaw.x,
+            yaw_rate_rad_s: yaw.y,
+            yaw_acceleration_rad_s2: yaw.z,
+        },
+    );
     (state, setpoint)
 }
 

@@ -1,4 +1,4 @@
-//! Reference trajectories with analytic first and second derivatives (assumption A5).
+//! Reference trajectories with analytic derivatives: two of position and heading (assumption A5), and jerk and snap.
 //!
 //! Trigonometry comes from `libm`, so a flight gives the same bits on every host.
 
@@ -16,6 +16,10 @@ pub struct Reference {
     pub velocity_m_s: Vector3<f64>,
     /// Acceleration \[m/s2\].
     pub acceleration_m_s2: Vector3<f64>,
+    /// Jerk \[m/s3\].
+    pub jerk_m_s3: Vector3<f64>,
+    /// Snap \[m/s4\].
+    pub snap_m_s4: Vector3<f64>,
     /// Yaw psi_d \[rad\].
     pub yaw_rad: f64,
     /// Yaw rate \[rad/s\].
@@ -37,6 +41,8 @@ impl Reference {
             position_m: self.position_m.cast(),
             velocity_m_s: self.velocity_m_s.cast(),
             acceleration_m_s2: self.acceleration_m_s2.cast(),
+            jerk_m_s3: self.jerk_m_s3.cast(),
+            snap_m_s4: self.snap_m_s4.cast(),
             yaw_rad: self.yaw_rad as f32,
             yaw_rate_rad_s: self.yaw_rate_rad_s as f32,
             yaw_acceleration_rad_s2: self.yaw_acceleration_rad_s2 as f32,
@@ -67,11 +73,14 @@ pub struct Sine {
 }
 
 impl Sine {
-    /// Returns value and two derivatives at time `t`.
-    fn at(&self, t: f64) -> [f64; 3] {
+    /// Returns value and four derivatives at time `t`.
+    fn at(&self, t: f64) -> [f64; 5] {
         let rate = TAU / self.period_s;
         let (s, c) = sincos(rate * t + self.phase_rad);
-        [self.amplitude_m * s, self.amplitude_m * rate * c, -self.amplitude_m * rate * rate * s]
+        let [value, first] = [self.amplitude_m * s, self.amplitude_m * rate * c];
+        let second = -self.amplitude_m * rate * rate * s;
+        let [third, fourth] = [first, second].map(|derivative| -rate * rate * derivative);
+        [value, first, second, third, fourth]
     }
 }
 
@@ -121,7 +130,7 @@ pub enum Trajectory {
         yaw_rad: f64,
     },
     /// Minimum-jerk motion from rest to rest between waypoints with increasing times; at rest before the first and
-    /// after the last. Position, velocity and acceleration are continuous.
+    /// after the last. Position, velocity and acceleration are continuous; the jerk jumps at each waypoint.
     Waypoints(Vec<Waypoint>),
 }
 
@@ -137,19 +146,25 @@ impl Trajectory {
             Trajectory::Circle { centre_m, radius_m, period_s, yaw_rad } => {
                 let rate = TAU / period_s;
                 let radius = Vector3::new(cos(rate * t), sin(rate * t), 0.0) * *radius_m;
+                let velocity_m_s = Vector3::new(-radius.y, radius.x, 0.0) * rate;
+                let acceleration_m_s2 = -radius * (rate * rate);
                 Reference {
                     position_m: centre_m + radius,
-                    velocity_m_s: Vector3::new(-radius.y, radius.x, 0.0) * rate,
-                    acceleration_m_s2: -radius * (rate * rate),
+                    velocity_m_s,
+                    acceleration_m_s2,
+                    jerk_m_s3: velocity_m_s * -(rate * rate),
+                    snap_m_s4: acceleration_m_s2 * -(rate * rate),
                     ..Reference::rest(*centre_m, *yaw_rad)
                 }
             }
             Trajectory::Lissajous { centre_m, sines, yaw_rad } => {
-                let [[x, vx, ax], [y, vy, ay], [z, vz, az]] = sines.map(|sine| sine.at(t));
+                let [[x, vx, ax, jx, sx], [y, vy, ay, jy, sy], [z, vz, az, jz, sz]] = sines.map(|sine| sine.at(t));
                 Reference {
                     position_m: centre_m + Vector3::new(x, y, z),
                     velocity_m_s: Vector3::new(vx, vy, vz),
                     acceleration_m_s2: Vector3::new(ax, ay, az),
+                    jerk_m_s3: Vector3::new(jx, jy, jz),
+                    snap_m_s4: Vector3::new(sx, sy, sz),
                     ..Reference::rest(*centre_m, *yaw_rad)
                 }
             }
@@ -162,10 +177,14 @@ impl Trajectory {
 fn paper(t: f64) -> Reference {
     let rate = PI / 30.0;
     let (s, c) = sincos(rate * t);
+    let velocity_m_s = Vector3::new(s, 2.0 * c, 3.0 * s) * rate;
+    let acceleration_m_s2 = Vector3::new(c, -2.0 * s, 3.0 * c) * (rate * rate);
     Reference {
         position_m: Vector3::new(1.0 - c, 2.0 * s, 5.0 - 3.0 * c),
-        velocity_m_s: Vector3::new(s, 2.0 * c, 3.0 * s) * rate,
-        acceleration_m_s2: Vector3::new(c, -2.0 * s, 3.0 * c) * (rate * rate),
+        velocity_m_s,
+        acceleration_m_s2,
+        jerk_m_s3: velocity_m_s * -(rate * rate),
+        snap_m_s4: acceleration_m_s2 * -(rate * rate),
         yaw_rad: -0.43 * s,
         yaw_rate_rad_s: -0.43 * rate * c,
         yaw_acceleration_rad_s2: 0.43 * rate * rate * s,
@@ -186,11 +205,15 @@ fn between(waypoints: &[Waypoint], t: f64) -> Reference {
     let blend = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
     let blend_dot = 30.0 * s * s * (1.0 - s) * (1.0 - s) / length;
     let blend_ddot = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (length * length);
+    let jerk = 60.0 * (1.0 - 6.0 * s * (1.0 - s)) / (length * length * length);
+    let snap = 360.0 * (2.0 * s - 1.0) / (length * length * length * length);
     let (leg, turn) = (to.position_m - from.position_m, to.yaw_rad - from.yaw_rad);
     Reference {
         position_m: from.position_m + leg * blend,
         velocity_m_s: leg * blend_dot,
         acceleration_m_s2: leg * blend_ddot,
+        jerk_m_s3: leg * jerk,
+        snap_m_s4: leg * snap,
         yaw_rad: from.yaw_rad + turn * blend,
         yaw_rate_rad_s: turn * blend_dot,
         yaw_acceleration_rad_s2: turn * blend_ddot,

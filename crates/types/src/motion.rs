@@ -25,6 +25,10 @@ const POSITION_MAX_M: f32 = 1e5;
 const VELOCITY_MAX_M_S: f32 = 1e3;
 /// Largest acceleration of a setpoint, per coordinate \[m/s2\].
 const ACCELERATION_MAX_M_S2: f32 = 1e3;
+/// Largest jerk of a setpoint, per coordinate \[m/s3\]: of the largest acceleration on a circle of 0.06 s.
+const JERK_MAX_M_S3: f32 = 1e5;
+/// Largest snap of a setpoint, per coordinate \[m/s4\]: of that jerk on the same circle.
+const SNAP_MAX_M_S4: f32 = 1e7;
 /// Largest angle \[rad\]. Larger than a turn, because yaw may be unwrapped.
 const ANGLE_MAX_RAD: f32 = 1e3;
 /// Largest angular rate or angular acceleration, per coordinate \[rad/s, rad/s2\].
@@ -47,7 +51,9 @@ impl State {
     }
 }
 
-/// Desired motion: \[x_d, y_d, z_d, psi_d\] with two derivatives (assumption A5).
+/// Desired motion: \[x_d, y_d, z_d, psi_d\] with two derivatives (assumption A5), and two more of the position (not in
+/// the paper) for laws that feed them forward. Who does not know jerk and snap leaves them at zero, as the link does:
+/// no message carries them.
 ///
 /// Fields may be added: a literal ends in `..Setpoint::default()`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -60,6 +66,10 @@ pub struct Setpoint {
     pub velocity_m_s: Vector3<f32>,
     /// Acceleration, earth frame \[m/s2\].
     pub acceleration_m_s2: Vector3<f32>,
+    /// Jerk, the derivative of the acceleration, earth frame \[m/s3\].
+    pub jerk_m_s3: Vector3<f32>,
+    /// Snap, the derivative of the jerk, earth frame \[m/s4\].
+    pub snap_m_s4: Vector3<f32>,
     /// Heading psi_d \[rad\].
     pub yaw_rad: f32,
     /// Rate of the heading \[rad/s\].
@@ -75,11 +85,13 @@ impl Setpoint {
     }
 
     /// True if every value is finite and within the bounds of [`State::is_plausible`], accelerations at most 1e3 m/s2
-    /// and 1e3 rad/s2.
+    /// and 1e3 rad/s2, jerk at most 1e5 m/s3, snap at most 1e7 m/s4.
     pub fn is_plausible(&self) -> bool {
         within(&self.position_m, POSITION_MAX_M)
             && within(&self.velocity_m_s, VELOCITY_MAX_M_S)
             && within(&self.acceleration_m_s2, ACCELERATION_MAX_M_S2)
+            && within(&self.jerk_m_s3, JERK_MAX_M_S3)
+            && within(&self.snap_m_s4, SNAP_MAX_M_S4)
             && self.yaw_rad.abs() <= ANGLE_MAX_RAD
             && self.yaw_rate_rad_s.abs() <= RATE_MAX_RAD_S
             && self.yaw_acceleration_rad_s2.abs() <= RATE_MAX_RAD_S

@@ -69,6 +69,7 @@ pub(crate) fn setpoint<S: Strategy<Value = f32> + 'static>(value: fn() -> S) -> 
             yaw_rad: yaw.x,
             yaw_rate_rad_s: yaw.y,
             yaw_acceleration_rad_s2: yaw.z,
+            ..Setpoint::default()
         },
     )
 }

@@ -141,13 +141,16 @@ pub(crate) fn circle(radius_m: f64, period_s: f64) -> impl Fn(f64) -> Setpoint {
         let w = core::f64::consts::TAU / period_s;
         let (s, c) = libm::sincos(w * t);
         let radius = Vector3::new(c, s, 0.0) * radius_m;
+        let velocity = Vector3::new(-radius.y, radius.x, 0.0) * w;
         Setpoint {
             position_m: (radius + Vector3::new(0.0, 0.0, 2.0)).cast(),
-            velocity_m_s: (Vector3::new(-radius.y, radius.x, 0.0) * w).cast(),
+            velocity_m_s: velocity.cast(),
             acceleration_m_s2: (-radius * w * w).cast(),
+            jerk_m_s3: (-velocity * w * w).cast(),
+            snap_m_s4: (radius * w * w * w * w).cast(),
             yaw_rad: afbc_control::math::wrap_angle((w * t + core::f64::consts::FRAC_PI_2) as f32),
             yaw_rate_rad_s: w as f32,
-            yaw_acceleration_rad_s2: 0.0,
+            ..Setpoint::default()
         }
     }
 }
@@ -156,10 +159,14 @@ pub(crate) fn circle(radius_m: f64, period_s: f64) -> impl Fn(f64) -> Setpoint {
 pub(crate) fn paper(t: f64) -> Setpoint {
     let rate = core::f64::consts::PI / 30.0;
     let (s, c) = libm::sincos(rate * t);
+    let velocity = Vector3::new(s, 2.0 * c, 3.0 * s) * rate;
+    let acceleration = Vector3::new(c, -2.0 * s, 3.0 * c) * (rate * rate);
     Setpoint {
         position_m: Vector3::new(1.0 - c, 2.0 * s, 5.0 - 3.0 * c).cast(),
-        velocity_m_s: (Vector3::new(s, 2.0 * c, 3.0 * s) * rate).cast(),
-        acceleration_m_s2: (Vector3::new(c, -2.0 * s, 3.0 * c) * (rate * rate)).cast(),
+        velocity_m_s: velocity.cast(),
+        acceleration_m_s2: acceleration.cast(),
+        jerk_m_s3: (velocity * -(rate * rate)).cast(),
+        snap_m_s4: (acceleration * -(rate * rate)).cast(),
         yaw_rad: (-0.43 * s) as f32,
         yaw_rate_rad_s: (-0.43 * rate * c) as f32,
         yaw_acceleration_rad_s2: (0.43 * rate * rate * s) as f32,

@@ -78,7 +78,7 @@ fn circle(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let centre_m = table.need_vector("centre_m", &POSITION)?;
     let (radius_m, period_s) = (table.need_number(&RADIUS)?, table.need_number(&PERIOD)?);
     let rate = TAU / period_s;
-    slow_enough(table, PERIOD.name, radius_m * rate, radius_m * rate * rate)?;
+    slow_enough(table, PERIOD.name, [1, 2, 3, 4].map(|order| radius_m * rate.powi(order)))?;
     Ok(Trajectory::Circle { centre_m, radius_m, period_s, yaw_rad: yaw(table)? })
 }
 
@@ -88,8 +88,8 @@ fn lissajous(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let period_s = table.need_vector("period_s", &PERIOD)?;
     let phase_rad = table.vector("phase_rad", [&PHASE; 3])?.unwrap_or_default();
     let rate = period_s.map(|period_s| TAU / period_s);
-    let speed_m_s = amplitude_m.component_mul(&rate);
-    slow_enough(table, PERIOD.name, speed_m_s.amax(), speed_m_s.component_mul(&rate).amax())?;
+    let peak = |order| amplitude_m.zip_map(&rate, |amplitude_m, rate| amplitude_m * rate.powi(order)).amax();
+    slow_enough(table, PERIOD.name, [1, 2, 3, 4].map(peak))?;
     let sine = |amplitude_m, period_s, phase_rad| Sine { amplitude_m, period_s, phase_rad };
     let sines = amplitude_m.zip_zip_map(&period_s, &phase_rad, sine).into();
     Ok(Trajectory::Lissajous { centre_m, sines, yaw_rad: yaw(table)? })
@@ -112,9 +112,10 @@ fn waypoints(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
                 );
                 return Err(table.fault_at(WAYPOINT_TIME.name, problem));
             }
-            // Peaks of minimum-jerk motion: 15/8 and 10/sqrt(3) times the mean.
             let leg_m = (waypoint.position_m - before.position_m).amax();
-            slow_enough(&table, WAYPOINT_TIME.name, 1.875 * leg_m / length_s, 5.774 * leg_m / (length_s * length_s))?;
+            // Peaks of minimum-jerk motion over unit distance in unit time: 15/8, 10/sqrt(3), 60, 360.
+            let peaks = [(1.875, 1), (5.774, 2), (60.0, 3), (360.0, 4)];
+            slow_enough(&table, WAYPOINT_TIME.name, peaks.map(|(peak, order)| peak * leg_m / length_s.powi(order)))?;
         }
         table.finish()?;
         waypoints.push(waypoint);
@@ -125,17 +126,16 @@ fn waypoints(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     Ok(Trajectory::Waypoints(waypoints))
 }
 
-/// Returns an error if the reference is too fast for a controller to accept.
-fn slow_enough(table: &Table<'_>, key: &str, speed_m_s: f64, acceleration_m_s2: f64) -> Result<(), FileError> {
-    let along_x = |size: f64| Vector3::new(size as f32, 0.0, 0.0);
-    let fastest = Setpoint {
-        velocity_m_s: along_x(speed_m_s),
-        acceleration_m_s2: along_x(acceleration_m_s2),
-        ..Setpoint::default()
-    };
+/// Returns an error if the reference is too fast for a controller to accept; `peaks` are those of its derivatives from
+/// the speed to the snap, in m and s.
+fn slow_enough(table: &Table<'_>, key: &str, peaks: [f64; 4]) -> Result<(), FileError> {
+    let [velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4] = peaks.map(|size| Vector3::new(size as f32, 0.0, 0.0));
+    let fastest = Setpoint { velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4, ..Setpoint::default() };
     if fastest.is_plausible() {
         return Ok(());
     }
-    let peak = format!("it asks for {speed_m_s:.3e} m/s and {acceleration_m_s2:.3e} m/s2");
-    Err(table.fault_at(key, format!("{peak}, more than a controller accepts (1000 of either); allow more time")))
+    let [speed, acceleration, jerk, snap] = peaks;
+    let peak = format!("it asks for {speed:.3e} m/s, {acceleration:.3e} m/s2, {jerk:.3e} m/s3 and {snap:.3e} m/s4");
+    let accepted = "more than a controller accepts (1e3, 1e3, 1e5 and 1e7 of these)";
+    Err(table.fault_at(key, format!("{peak}, {accepted}; allow more time")))
 }
