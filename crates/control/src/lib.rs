@@ -8,6 +8,7 @@
 //! * [`Screened`]: a controller's memory behind a screen that rejects implausible input.
 //! * [`mixer`]: control allocation, from U1..U4 to rotor forces and speeds, and back.
 //! * [`command_filter`]: a smooth reference with two derivatives.
+//! * [`smoothing`]: low-pass filters on the inputs.
 //! * [`math`]: all transcendental functions, with bit-identical results on host and target.
 //!
 //! Features `serde` and `defmt`, off by default, are those of [`afbc_types`]; here they also cover actions, health
@@ -21,6 +22,7 @@ pub mod math;
 pub mod mixer;
 mod screen;
 pub mod settings;
+pub mod smoothing;
 mod trace;
 mod trip;
 
@@ -30,5 +32,6 @@ pub use mixer::Mixer;
 pub use nalgebra;
 pub use screen::{Screen, Screened};
 pub use settings::Settings;
+pub use smoothing::{Smoother, Smoothing};
 pub use trace::{Errors, Estimate, Trace};
 pub use trip::Trip;
