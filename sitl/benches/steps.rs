@@ -133,7 +133,7 @@ fn real() -> Scenario {
     let (noise, bias) = (Deviations::all(0.001), Deviations::all(0.001));
     Scenario {
         realism: Realism { rotors, wind, drag: Some(Drag::PAPER), ..Realism::default() },
-        sensing: Sensing { noise, bias, delay_s: 0.002, dropouts: None },
+        sensing: Sensing { noise, bias, delay_s: 0.002, ..Sensing::DEFAULT },
         ..paper(Model::RigidBody)
     }
 }

@@ -1,9 +1,16 @@
-//! Flights with a realistic tracker through the flight core: 100 states per second, each 10 ms late.
-#![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
+//! Flights with a realistic tracker, 100 states per second, each 10 ms late: through the flight core, and as scenarios
+//! say it.
+#![allow(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    missing_docs,
+    reason = "a flight that cannot begin must fail the test"
+)]
 
 use afbc::Profile;
 use afbc_control::FlightController;
 use afbc_flight_core::{ArmingLimits, Asked, Inbox, Mode, Request, Stamped, Vehicle, VehicleMemory};
+use afbc_plant::Sensing;
 use afbc_sim::contender::{Contender, ControllerKind, Task};
 use afbc_sim::scenario::{Scenario, built_in};
 use afbc_types::{OutOfRange, State};
@@ -100,5 +107,47 @@ fn a_tracker_of_100_hz_that_is_10_ms_late_is_flown_on() {
             println!("{}: every {period_ms} ms, {late_ms} ms late: {rms_m:.4} m ({best_m:.4} m)", kind.name());
             assert!(flies && rms_m < best_m + 0.003, "{}: {rms_m} m instead of {best_m} m", kind.name());
         }
+    }
+}
+
+/// Flies `hardware` for 8 s with states every so many s, so late, and returns what was flown and measured, and the root
+/// mean square distance from the reference from 5 s on \[m\].
+fn sampled(kind: ControllerKind, [period_s, delay_s]: [f64; 2], gyro: bool, core: bool) -> (Vec<[State; 2]>, f64) {
+    let mut scenario = built_in("hardware").unwrap().read().unwrap();
+    scenario.sensing = Sensing { period_s, delay_s, gyro, ..Sensing::DEFAULT };
+    (scenario.duration_s, scenario.flight_core) = (8.0, core);
+    let (mut seen, mut squares, mut count) = (Vec::new(), 0.0, 0.0);
+    let lost = afbc_sim::flight::fly(&scenario, &Contender::of(kind, Profile::Flight).monitored(), |sample| {
+        seen.push([sample.motion.measure(), sample.measurement.map_or(State::default(), |m| m.state)]);
+        assert!(!sample.action.health.state_rejected, "a state between samples is none that was rejected");
+        if sample.time_s > 5.0 {
+            squares += (sample.motion.position_m - sample.reference.position_m).norm_squared();
+            count += 1.0;
+        }
+    });
+    assert_eq!(lost.unwrap(), None, "{}", kind.name());
+    (seen, (squares / count).sqrt())
+}
+
+/// A law is given a state in every step: that of 10 to 19 ms ago, and with a gyro the rates of now.
+#[test]
+fn a_scenario_says_sampled_and_late_states_with_a_gyro() {
+    for gyro in [false, true] {
+        let (seen, _) = sampled(ControllerKind::Geometric, [0.01, 0.01], gyro, false);
+        for (k, [now, measured]) in seen.iter().enumerate().skip(20) {
+            let [taken, _] = seen[(k - 10) / 10 * 10];
+            let rates_rad_s = if gyro { now.rates_rad_s } else { taken.rates_rad_s };
+            assert_eq!(*measured, State { rates_rad_s, ..taken }, "step {k}");
+        }
+    }
+}
+
+/// The flight core is given a state when one arrives, and extrapolates between them. A bare law that holds each for 40 ms
+/// strays nine times as far.
+#[test]
+fn the_flight_core_extrapolates_between_the_samples_of_a_scenario() {
+    for kind in ControllerKind::PAPER {
+        let [aboard_m, alone_m] = [true, false].map(|core| sampled(kind, [0.04, 0.0], false, core).1);
+        assert!(aboard_m < 0.5 * alone_m, "{}: {aboard_m} m, {alone_m} m", kind.name());
     }
 }

@@ -125,6 +125,7 @@ fn sensors() -> Sensors {
         bias: Deviations::all(0.001),
         delay_s: 0.002,
         dropouts: Some(Dropouts { rate_hz: 1.0, mean_s: 0.01 }),
+        ..Sensing::DEFAULT
     };
     Sensors::new(&sensing, 1, STEP_S).unwrap()
 }

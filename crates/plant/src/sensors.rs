@@ -72,6 +72,13 @@ parameters! {
         /// Delay from motion to measurement, rounded to whole steps.
         #[parameter(DELAY, "s", 0.0..=0.5)]
         pub delay_s: f64 = 0.0,
+        /// Time between measured states, rounded to whole steps; 0 measures one in every step. In between, the last one
+        /// stands.
+        #[parameter(PERIOD, "s", 0.0..=0.5)]
+        pub period_s: f64 = 0.0,
+        /// Whether the angular rates arrive in every step and without delay, as from a gyroscope beside the controller.
+        #[switch(GYRO)]
+        pub gyro: bool = false,
         /// Dropouts of measurements.
         pub dropouts: Option<Dropouts> = None,
     }
@@ -83,15 +90,17 @@ parameters! {
 /// Measurement in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measurement {
-    /// The newest state that has arrived.
+    /// The newest state that has arrived; with a gyro, its rates are those of this step.
     pub state: State,
-    /// Age of that state \[s\]; the first state also stands for those before it.
+    /// Age of that state, rates of a gyro apart \[s\]; the first state also stands for those before it.
     pub age_s: f64,
     /// False in a dropout: `state` is the last one before it.
     pub fresh: bool,
+    /// Whether anything arrived in this step, a state or a gyro's rates; between samples, `state` is held.
+    pub new: bool,
 }
 
-/// Sensors in simulation: noise and bias, then delay, then dropouts. The first measurement always arrives.
+/// Sensors in simulation: noise and bias, then sampling and delay, then dropouts. The first measurement always arrives.
 #[derive(Clone, Debug)]
 pub struct Sensors {
     noise: Option<Deviations>,
@@ -99,12 +108,16 @@ pub struct Sensors {
     bias: Motion,
     delay: DelayLine<State>,
     delay_s: f64,
+    /// Steps from one sample to the next, and until the next one arrives.
+    period: usize,
+    until: usize,
+    gyro: bool,
     outage: Option<Outage>,
     step_s: f64,
     /// The last state that arrived, if any.
     last: Option<State>,
     /// Steps since then.
-    missed: u32,
+    since: u32,
 }
 
 /// Dropouts in simulation.
@@ -146,16 +159,21 @@ impl Sensors {
         crate::realism::STEP.check(step_s)?;
         let mut random = Noise::new(seed, Stream::Sensors);
         let steps = whole_steps(sensing.delay_s, step_s);
+        let period = whole_steps(sensing.period_s, step_s).max(1);
         Ok(Sensors {
             noise: (sensing.noise != Deviations::default()).then_some(sensing.noise),
             bias: sensing.bias.draw(&mut random),
             random,
             delay: DelayLine::new(steps, State::default()),
             delay_s: steps as f64 * step_s,
+            period,
+            // The sample of the first step, which stands for those before it, arrives so many steps later.
+            until: steps % period,
+            gyro: sensing.gyro,
             outage: sensing.dropouts.as_ref().map(|dropouts| Outage::new(dropouts, seed, step_s)),
             step_s,
             last: None,
-            missed: 0,
+            since: 0,
         })
     }
 
@@ -172,25 +190,27 @@ impl Sensors {
             measured = sum(&measured, &spread.draw(&mut self.random));
         }
         let state = measured.measure();
-        let Some(last) = self.last else {
+        let first = self.last.is_none();
+        if first {
             self.delay.refill(state);
-            self.last = Some(state);
-            return self.measurement(state);
-        };
-        let arriving = self.delay.pass(state);
-        if self.outage.as_mut().is_some_and(Outage::advance) {
-            self.missed += 1;
-            return self.measurement(last);
         }
-        self.missed = 0;
-        self.last = Some(arriving);
-        self.measurement(arriving)
-    }
-
-    #[inline]
-    fn measurement(&self, state: State) -> Measurement {
-        let age_s = self.delay_s + f64::from(self.missed) * self.step_s;
-        Measurement { state, age_s, fresh: self.missed == 0 }
+        let arriving = self.delay.pass(state);
+        let sampled = self.until == 0 || first;
+        self.until = if self.until == 0 { self.period } else { self.until } - 1;
+        let mut newest = self.last.unwrap_or(state);
+        let fresh = first || !self.outage.as_mut().is_some_and(Outage::advance);
+        if fresh && sampled {
+            newest = arriving;
+            self.since = 0;
+        } else {
+            self.since += 1;
+        }
+        if fresh && self.gyro {
+            newest.rates_rad_s = state.rates_rad_s;
+        }
+        self.last = Some(newest);
+        let age_s = self.delay_s + f64::from(self.since) * self.step_s;
+        Measurement { state: newest, age_s, fresh, new: fresh && (sampled || self.gyro) }
     }
 }
 

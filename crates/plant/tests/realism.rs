@@ -99,6 +99,7 @@ fn sensing() -> Sensing {
         bias: Deviations::all(0.05),
         delay_s: 0.003,
         dropouts: Some(Dropouts { rate_hz: 5.0, mean_s: 0.02 }),
+        ..Sensing::DEFAULT
     }
 }
 

@@ -28,7 +28,7 @@ fn perfect_sensors_measure_the_motion() {
     let mut sensors = sensors(Sensing::default(), 1);
     for k in 0..100 {
         let measurement = sensors.measure(&motion(k));
-        assert_eq!(measurement, Measurement { state: motion(k).measure(), age_s: 0.0, fresh: true });
+        assert_eq!(measurement, Measurement { state: motion(k).measure(), age_s: 0.0, fresh: true, new: true });
     }
 }
 
@@ -86,6 +86,59 @@ fn measurements_arrive_exactly_as_many_steps_later() {
             assert!(measurement.fresh && (measurement.age_s - delay_s).abs() < 1e-12);
         }
     }
+}
+
+/// At step k there stands the sample of the last whole period that has arrived by then, and a gyro's rates of step k.
+#[test]
+fn samples_arrive_once_per_period_and_stand_in_between() {
+    for (period, late, gyro) in [(10, 0, false), (10, 10, true), (10, 3, true), (7, 20, false), (1, 4, true)] {
+        let at = |steps: u16| f64::from(steps) * STEP_S;
+        let mut sensors = sensors(Sensing { period_s: at(period), delay_s: at(late), gyro, ..Sensing::default() }, 1);
+        for k in 0..300_u16 {
+            let measurement = sensors.measure(&motion(k));
+            let sampled = k.saturating_sub(late) / period * period;
+            let mut expected = motion(sampled).measure();
+            if gyro {
+                expected.rates_rad_s = motion(k).measure().rates_rad_s;
+            }
+            assert_eq!(measurement.state, expected, "step {k}, every {period}, {late} late");
+            assert!(measurement.fresh);
+            let arrives = k == 0 || (k + period - late % period).is_multiple_of(period);
+            assert_eq!(measurement.new, arrives || gyro, "step {k}, every {period}, {late} late");
+            if k >= late {
+                assert!((measurement.age_s - at(k - sampled)).abs() < 1e-9);
+            }
+        }
+    }
+}
+
+/// Sampling draws the same noise as measuring in every step, and a dropout loses what would have arrived in it, a gyro's
+/// rates included.
+#[test]
+fn samples_have_the_noise_of_their_step_and_dropouts_lose_them() {
+    let noisy = Sensing { noise: Deviations::all(0.01), ..Sensing::default() };
+    let sampled = Sensing { period_s: 0.01, gyro: true, ..noisy };
+    let lossy = Sensing { dropouts: Some(Dropouts { rate_hz: 20.0, mean_s: 0.01 }), ..sampled };
+    let run = |sensing| {
+        let mut sensors = sensors(sensing, 3);
+        (0..5000).map(|k| sensors.measure(&motion(k))).collect::<Vec<_>>()
+    };
+    let (every, sampled, lossy) = (run(noisy), run(sampled), run(lossy));
+    let mut lost = 0;
+    for (k, (a, b)) in sampled.iter().zip(&lossy).enumerate() {
+        assert_eq!(a.state.position_m, every[k / 10 * 10].state.position_m);
+        assert_eq!(a.state.rates_rad_s, every[k].state.rates_rad_s);
+        assert_eq!(b.new, b.fresh);
+        if b.fresh {
+            assert_eq!(b.state.rates_rad_s, every[k].state.rates_rad_s);
+        } else {
+            assert_eq!(b.state, lossy[k - 1].state);
+        }
+        let taken = k - (b.age_s / STEP_S).round() as usize;
+        assert_eq!(b.state.position_m, every[taken].state.position_m, "the age is the position's");
+        lost += u32::from(taken.is_multiple_of(10) && taken < k / 10 * 10);
+    }
+    assert!(lost > 100, "{lost}");
 }
 
 /// A two-state chain: begins with 1 - exp(-rate dt) and ends with 1 - exp(-dt/mean) per step. Over n steps, the share
@@ -161,6 +214,7 @@ fn settings_out_of_range_are_refused_by_name() {
         "rates_rad_s"
     );
     assert_eq!(refused(Sensing { delay_s: 1.0, ..ok() }), "delay_s");
+    assert_eq!(refused(Sensing { period_s: 1.0, ..ok() }), "period_s");
     assert_eq!(refused(Sensing { dropouts: Some(Dropouts { rate_hz: -1.0, mean_s: 0.1 }), ..ok() }), "rate_hz");
     assert_eq!(Sensors::new(&ok(), 0, 0.0).unwrap_err().range.name, "step_s");
 }

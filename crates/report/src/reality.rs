@@ -54,7 +54,7 @@ fn air(scenario: &Scenario) -> Vec<(&'static str, String)> {
 }
 
 fn sensors(scenario: &Scenario) -> Vec<(&'static str, String)> {
-    let Sensing { noise, bias, delay_s, dropouts } = scenario.sensing;
+    let Sensing { noise, bias, delay_s, period_s, gyro, dropouts } = scenario.sensing;
     let mut rows = Vec::new();
     let spread = |s: Deviations| {
         format!("{} m, {} m/s, {} rad, {} rad/s", s.position_m, s.velocity_m_s, s.attitude_rad, s.rates_rad_s)
@@ -63,6 +63,8 @@ fn sensors(scenario: &Scenario) -> Vec<(&'static str, String)> {
     add(noise != Deviations::default(), "sensor noise", spread(noise));
     add(bias != Deviations::default(), "sensor bias", spread(bias));
     add(delay_s != 0.0, "sensor delay", format!("{delay_s} s"));
+    add(period_s != 0.0, "states", format!("every {period_s} s"));
+    add(gyro, "rates", "of a gyro, in every step and without delay".into());
     for outage in &scenario.outages {
         let end = if outage.end_s.is_finite() { format!("to {:.4} s", outage.end_s) } else { "to the end".into() };
         add(true, "no state", format!("from {} s {end}", outage.start_s));

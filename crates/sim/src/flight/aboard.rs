@@ -69,7 +69,8 @@ impl<C: FlightController<N>, const N: usize> Pilot for Aboard<C, N> {
         if let Some(state) = state.filter(|_| self.now_us == 0) {
             self.arm(state, setpoint);
         }
-        let mut action = if self.now_us > 0 { self.tick(state, setpoint) } else { Action::default() };
+        let mut action =
+            if self.now_us > 0 { self.tick(state.filter(|_| view.new), setpoint) } else { Action::default() };
         action.health.state_rejected = state.is_none();
         action.health.setpoint_rejected = !setpoint.is_plausible();
         let estimates = self.memory.control().map(C::learnt).unwrap_or_default();

@@ -29,8 +29,10 @@ pub struct View {
     pub telemetry: Option<Telemetry>,
     /// Reference at this time.
     pub reference: Reference,
-    /// State that reaches the pilot, if there is a new one.
+    /// Newest state that has reached the pilot, held between samples; none in a dropout or an outage.
     pub state: Option<State>,
+    /// Whether it has just arrived.
+    pub new: bool,
 }
 
 impl World {
@@ -66,7 +68,8 @@ impl World {
         let reference = self.trajectory.at(time_s);
         let lost = !self.outages.is_empty() && is_lost(&self.outages, time_s);
         let telemetry = self.plant.telemetry();
-        View { time_s, motion, measurement, telemetry, reference, state: state.filter(|_| !lost) }
+        let new = measurement.is_none_or(|measurement| measurement.new);
+        View { time_s, motion, measurement, telemetry, reference, state: state.filter(|_| !lost), new }
     }
 
     /// Moves the vehicle by one step with commanded rotor speeds `speeds`.
@@ -91,7 +94,7 @@ fn is_lost(outages: &[Outage], time_s: f64) -> bool {
     outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&time_s))
 }
 
-/// Returns the new state for a pilot, if there is one, and the measurement.
+/// Returns the state for a pilot, unless there is a dropout, and the measurement.
 // Not inlined, so that the step of an ideal flight stays short.
 #[inline(never)]
 fn measure(sensors: &mut Sensors, motion: &Motion) -> (Option<State>, Option<Measurement>) {
