@@ -112,8 +112,8 @@ fn samples_arrive_once_per_period_and_stand_in_between() {
     }
 }
 
-/// Sampling draws the same noise as measuring in every step, and a dropout loses what would have arrived in it, a gyro's
-/// rates included.
+/// Sampling draws the same noise as measuring in every step, and a dropout loses what would have arrived in it, with a
+/// gyro's rates.
 #[test]
 fn samples_have_the_noise_of_their_step_and_dropouts_lose_them() {
     let noisy = Sensing { noise: Deviations::all(0.01), ..Sensing::default() };
