@@ -81,8 +81,8 @@ const BAD_TABLES: [(&str, &str); 69] = [
     (
         "[settings]\nrate_hz = 500",
         ":5: settings.rate_hz: unknown key; \
-         known here: dt_s, rotor_force_max_n, command_filter_rad_s, tilt_by_thrust, anti_windup, freeze_on_ground, \
-         bumpless",
+         known here: dt_s, rotor_force_max_n, raised_thrust_max, command_filter_rad_s, tilt_by_thrust, anti_windup, \
+         freeze_on_ground, bumpless",
     ),
     (
         "[initial]\nattitude_rad = [1.6, 0, 0]",

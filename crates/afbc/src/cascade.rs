@@ -142,7 +142,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, law: L) -> Result<Self, OutOfRange> {
         settings.validate()?;
         let vehicle = vehicle.into();
-        let mixer = Mixer::new(vehicle, settings.common.rotor_force_max_n)?;
+        let mixer = settings.common.mixer(vehicle)?;
         let Parameters { gravity_m_s2, .. } = vehicle.parameters;
         let Limits { speed_max_m_s, climb_max_m_s, .. } = settings.limits;
         let error_max = |axis, speed| speed / law.alpha1(axis);

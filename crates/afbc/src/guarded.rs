@@ -98,7 +98,7 @@ impl<const N: usize> Guarded<N> {
         let vehicle = vehicle.into();
         let Airframe { parameters, .. } = vehicle;
         let weight_n = parameters.weight_n();
-        let mixer = Mixer::new(vehicle, settings.common.rotor_force_max_n)?;
+        let mixer = settings.common.mixer(vehicle)?;
         mixer.check_hover(weight_n)?;
         let hover =
             Range { min: libm::ceil(f64::from(HOVER_THETA * weight_n) * 1e4) / 1e4, ..Safeguards::THETAMAX.range };

@@ -105,7 +105,7 @@ impl Profile {
         match self {
             Profile::Paper => Settings::DEFAULT,
             Profile::Flight => Settings {
-                common: afbc_control::Settings { dt_s: 0.001, rotor_force_max_n: 3.0 },
+                common: afbc_control::Settings { rotor_force_max_n: 3.0, ..afbc_control::Settings::DEFAULT },
                 limits: Limits {
                     tilt_max_rad: 0.7,
                     tilt_rate_max_rad_s: 6.0,

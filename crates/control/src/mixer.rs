@@ -4,9 +4,13 @@
 //! P = B^T (B B^T)^-1: of all exact solutions the one of least norm. When it violates a rotor's limits, desaturation
 //! gives priority to roll and pitch, then thrust, yaw last:
 //!
-//! 1. roll and pitch are scaled down together until their forces P \[U1, U2, 0, 0\] fit the limits at some thrust;
+//! 1. roll and pitch are scaled down together until their forces P \[U1, U2, 0, 0\] fit the limits at some thrust, and
+//!    until the least thrust that they need does not exceed the demanded one or [`Mixer::with_raised_thrust_max_n`];
 //! 2. thrust changes as little as necessary to make room for them;
 //! 3. yaw is scaled down to the room that is left.
+//!
+//! A rotor's load is its force over its share of a pure thrust: L_i = Q_i \[U1, U2, U3\] + U4, within 0 and F_max over
+//! the share. So thrust adds to every load alike. The steps above choose the inputs; forces follow from those.
 //!
 //! For four rotors on a cross, no allocation gives more roll and pitch. With more rotors, other solutions than the
 //! pseudo-inverse may give more; they are not searched. Yaw forces that would make room for roll and pitch are used
@@ -30,24 +34,32 @@ pub const HOVER_MARGIN: f32 = 1.3;
 
 /// Inputs are clamped to this size \[N\]: beyond what any rotors give, small enough for exact enough arithmetic.
 const ASKED_MAX: f32 = 1e9;
-/// Unallocated input that is explained by rounding, relative to the largest force.
-const ROUNDING: f32 = 1e-6;
+/// Yaw by which a rotor's load changes less than this share of it leaves the rotor's limits alone.
+const YAW_LOAD_MIN: f32 = 1e-6;
 
 /// The mixer of a frame of `N` rotors, usually four to eight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mixer<const N: usize = 4> {
     /// B
     effectiveness: SMatrix<f32, 4, N>,
-    /// P
-    inverse: SMatrix<f32, N, 4>,
-    /// Each rotor's share of a pure thrust, and its inverse.
+    /// Columns of Q: load of each rotor by U1, by U2 and by U3.
+    roll: SVector<f32, N>,
+    pitch: SVector<f32, N>,
+    yaw: SVector<f32, N>,
+    /// 1/|Q| of yaw; infinite for a rotor that yaw does not load.
+    inverse_yaw: SVector<f32, N>,
+    /// Each rotor's share of a pure thrust.
     share: SVector<f32, N>,
-    inverse_share: SVector<f32, N>,
+    /// Largest load of each rotor, and its inverse.
+    most: SVector<f32, N>,
+    inverse_most: SVector<f32, N>,
     /// b
     thrust_factor: f32,
     /// 1/b
     inverse_thrust_factor: f32,
     force_max: f32,
+    /// Largest thrust that is raised for roll and pitch.
+    raised_thrust_max: f32,
 }
 
 /// Rotor forces within the limits.
@@ -59,11 +71,11 @@ pub struct Mixer<const N: usize = 4> {
 pub struct Allocation<const N: usize = 4> {
     /// Forces that the rotors can give.
     pub forces: RotorForces<N>,
-    /// U1..U4 of those forces, B F.
+    /// U1..U4 of those forces: B F, up to rounding.
     pub given: Inputs,
-    /// Part of the demand that is not given: U - B F, 0 where rounding explains the difference.
+    /// Part of the demand that is not given: demanded less given inputs.
     pub unallocated: Inputs,
-    /// True if a rotor force was limited.
+    /// True if the demand violates a rotor's limits.
     pub saturated: bool,
 }
 
@@ -90,17 +102,34 @@ impl<const N: usize> Mixer<N> {
         for share in &share {
             THRUST_SHARE.check(*share)?;
         }
-        let inverse_share = share.map(|share| 1.0 / share);
-        let b = parameters.thrust_factor_n_s2;
+        let load = |input| inverse.column(input).component_div(&share);
+        // The largest load whose force, rounded, does not exceed the limit.
+        let most = share.map(|share| {
+            let most = force_max_n / share;
+            if share * most > force_max_n { most.next_down() } else { most }
+        });
+        let (b, yaw) = (parameters.thrust_factor_n_s2, load(2));
         Ok(Mixer {
             effectiveness,
-            inverse,
+            roll: load(0),
+            pitch: load(1),
+            yaw,
+            inverse_yaw: yaw.map(|load| if load.abs() > YAW_LOAD_MIN { 1.0 / load.abs() } else { f32::INFINITY }),
             share,
-            inverse_share,
+            most,
+            inverse_most: most.map(|most| 1.0 / most),
             thrust_factor: b,
             inverse_thrust_factor: 1.0 / b,
             force_max: force_max_n,
+            raised_thrust_max: f32::MAX,
         })
+    }
+
+    /// Returns the same mixer, but roll and pitch raise the thrust to `thrust_n` at most; they do not lower a larger
+    /// demand.
+    #[must_use]
+    pub fn with_raised_thrust_max_n(self, thrust_n: f32) -> Self {
+        Mixer { raised_thrust_max: thrust_n, ..self }
     }
 
     /// Checks that the rotors lift a vehicle of this weight with a margin of [`HOVER_MARGIN`].
@@ -134,86 +163,93 @@ impl<const N: usize> Mixer<N> {
     /// Returns the largest U1 and the largest U2 that are possible in both directions at hover with this weight \[N\];
     /// 0 if the rotors do not lift it.
     pub fn tilt_authority_n(&self, weight_n: f32) -> [f32; 2] {
-        [0, 1].map(|input| {
-            let column = self.inverse.column(input);
-            let largest = |most, (share, part): (&f32, &f32)| {
-                let hover_n = share * weight_n;
-                let room_n = math::max(math::min(hover_n, self.force_max - hover_n), 0.0);
-                if *part == 0.0 { most } else { math::min(most, room_n / part.abs()) }
+        [&self.roll, &self.pitch].map(|loads| {
+            let largest = |possible, (load, most): (&f32, &f32)| {
+                let room = math::max(math::min(weight_n, most - weight_n), 0.0);
+                if *load == 0.0 { possible } else { math::min(possible, room / load.abs()) }
             };
-            self.share.iter().zip(column.iter()).fold(f32::MAX, largest)
+            loads.iter().zip(self.most.iter()).fold(f32::MAX, largest)
         })
     }
 
     /// Returns rotor forces that give `inputs`, as far as the rotors' limits allow. NaN counts as 0 and is reported as
     /// saturation.
+    // Always, as what it calls: the allocation stays in registers instead of being copied.
     #[inline(always)]
     pub fn allocate(&self, inputs: &Inputs) -> Allocation<N> {
-        let wanted = Vector4::new(inputs.roll_n, inputs.pitch_n, inputs.yaw_n, inputs.thrust_n);
-        let forces = self.inverse * wanted;
-        // One NaN makes every force NaN, which is not within any limits.
-        if forces.iter().all(|&force| 0.0 <= force && force <= self.force_max) {
-            let forces = RotorForces(forces);
-            return Allocation {
-                forces,
-                given: self.inputs(&forces),
-                unallocated: Inputs::default(),
-                saturated: false,
-            };
+        let tilt = self.tilt(inputs);
+        let loads = self.loads(&tilt, inputs);
+        // One NaN makes every load NaN, which is not within any limits.
+        if loads.iter().zip(self.most.iter()).all(|(load, most)| 0.0 <= *load && load <= most) {
+            let forces = RotorForces(loads.component_mul(&self.share));
+            return Allocation { forces, given: *inputs, unallocated: Inputs::default(), saturated: false };
         }
+        let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = *inputs;
         // False of NaN, too.
-        let wanted = if wanted.norm_squared() <= ASKED_MAX * ASKED_MAX {
-            wanted
+        let usual = Vector4::new(roll_n, pitch_n, yaw_n, thrust_n).norm_squared() <= ASKED_MAX * ASKED_MAX;
+        let (wanted, tilt) = if usual {
+            (*inputs, tilt)
         } else {
-            wanted.map(|u| if u.is_nan() { 0.0 } else { u.clamp(-ASKED_MAX, ASKED_MAX) })
+            let tame = |u: f32| if u.is_nan() { 0.0 } else { u.clamp(-ASKED_MAX, ASKED_MAX) };
+            let [roll_n, pitch_n, yaw_n, thrust_n] = [roll_n, pitch_n, yaw_n, thrust_n].map(tame);
+            let tamed = Inputs { roll_n, pitch_n, yaw_n, thrust_n };
+            (tamed, self.tilt(&tamed))
         };
-        let forces = RotorForces(self.within_limits(&wanted));
-        let given = self.inputs(&forces);
-        let least = ROUNDING * self.force_max;
-        let missing = |wanted: f32, given: f32| if (wanted - given).abs() > least { wanted - given } else { 0.0 };
+        let (given, loads) = self.within_limits(&wanted, tilt);
+        // What rounding leaves outside. Not `max`: `max` of 0 and -0 may be either.
+        let loads = loads.zip_map(&self.most, |load, most| if load > 0.0 { math::min(load, most) } else { 0.0 });
         let unallocated = Inputs {
-            roll_n: missing(wanted.x, given.roll_n),
-            pitch_n: missing(wanted.y, given.pitch_n),
-            yaw_n: missing(wanted.z, given.yaw_n),
-            thrust_n: missing(wanted.w, given.thrust_n),
+            roll_n: wanted.roll_n - given.roll_n,
+            pitch_n: wanted.pitch_n - given.pitch_n,
+            yaw_n: wanted.yaw_n - given.yaw_n,
+            thrust_n: wanted.thrust_n - given.thrust_n,
         };
-        Allocation { forces, given, unallocated, saturated: true }
+        Allocation { forces: RotorForces(loads.component_mul(&self.share)), given, unallocated, saturated: true }
     }
 
-    /// Desaturates by priority.
-    // Always, as its caller: the allocation stays in registers instead of being copied.
+    /// Returns the loads by roll and pitch.
     #[inline(always)]
-    fn within_limits(&self, wanted: &Vector4<f32>) -> SVector<f32, N> {
-        let column = |i: usize, u: f32| self.inverse.column(i) * u;
-        let tilt = column(0, wanted.x) + column(1, wanted.y);
-        // The least thrust at which no rotor force is negative, and the largest force at that thrust.
-        let (mut least, mut largest) = (f32::MIN, f32::MIN);
-        for (force, inverse_share) in tilt.iter().zip(self.inverse_share.iter()) {
-            least = math::max(least, -force * inverse_share);
-        }
-        for (force, share) in tilt.iter().zip(self.share.iter()) {
-            largest = math::max(largest, force + share * least);
-        }
-        let scale = if largest > self.force_max { self.force_max / largest } else { 1.0 };
-        let (tilt, least) = (tilt * scale, least * scale);
+    fn tilt(&self, inputs: &Inputs) -> SVector<f32, N> {
+        self.roll * inputs.roll_n + self.pitch * inputs.pitch_n
+    }
 
-        let mut most = f32::MAX;
-        for (force, inverse_share) in tilt.iter().zip(self.inverse_share.iter()) {
-            most = math::min(most, (self.force_max - force) * inverse_share);
-        }
-        let upright = tilt + self.share * math::max(math::min(wanted.w, most), least);
+    /// Returns the loads by all inputs, given those by roll and pitch.
+    #[inline(always)]
+    fn loads(&self, tilt: &SVector<f32, N>, inputs: &Inputs) -> SVector<f32, N> {
+        (tilt + self.yaw * inputs.yaw_n).add_scalar(inputs.thrust_n)
+    }
 
-        let yaw = column(2, wanted.z);
-        let mut fits = 1.0_f32;
-        for (force, yaw) in upright.iter().zip(yaw.iter()) {
-            // Rounding may leave negative room; the `max` prevents 0/0 for zero yaw.
-            let room = math::max(if *yaw > 0.0 { self.force_max - force } else { *force }, 0.0);
-            if yaw.abs() > room {
-                fits = math::min(fits, room / yaw.abs());
-            }
+    /// Desaturates by priority: returns the inputs that are given instead of `wanted`, and their loads.
+    #[inline(always)]
+    fn within_limits(&self, wanted: &Inputs, mut tilt: SVector<f32, N>) -> (Inputs, SVector<f32, N>) {
+        let Inputs { mut roll_n, mut pitch_n, mut yaw_n, mut thrust_n } = *wanted;
+        // Thrusts at which the loads by roll and pitch are within limits; none if the first exceeds the second.
+        let least = -tilt.iter().copied().fold(f32::MAX, math::min);
+        let most = self.most.iter().zip(tilt.iter()).fold(f32::MAX, |most, (own, tilt)| math::min(most, own - tilt));
+        let raised = math::max(thrust_n, self.raised_thrust_max);
+        if least <= most && least <= raised {
+            thrust_n = math::max(math::min(thrust_n, most), least);
+        } else {
+            // Of the largest load at the least thrust.
+            let share = |largest, (own, tilt): (&f32, &f32)| math::max(largest, (least + tilt) * own);
+            let excess = self.inverse_most.iter().zip(tilt.iter()).fold(1.0, share);
+            let scale = math::min(1.0 / excess, raised / least);
+            (roll_n, pitch_n, tilt, thrust_n) = (roll_n * scale, pitch_n * scale, tilt * scale, least * scale);
         }
-        // Not `max`: `max` of 0 and -0 may be either.
-        (upright + yaw * fits).map(|force| if force > 0.0 { math::min(force, self.force_max) } else { 0.0 })
+
+        let upright = tilt.add_scalar(thrust_n);
+        let mut fits = f32::MAX;
+        for (((load, most), yaw), inverse_yaw) in
+            upright.iter().zip(self.most.iter()).zip(self.yaw.iter()).zip(self.inverse_yaw.iter())
+        {
+            let room = if yaw * yaw_n > 0.0 { most - load } else { *load };
+            // Rounding may leave negative room. A rotor without both room and yaw gives NaN, which `min` ignores.
+            fits = math::min(room.abs() * inverse_yaw, fits);
+        }
+        if yaw_n.abs() > fits {
+            yaw_n = fits.copysign(yaw_n);
+        }
+        (Inputs { roll_n, pitch_n, yaw_n, thrust_n }, upright + self.yaw * yaw_n)
     }
 
     /// Returns omega_i = sqrt(F_i / b) of forces that are not negative.

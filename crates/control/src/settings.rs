@@ -1,6 +1,7 @@
 //! Settings of every controller besides vehicle parameters and gains.
 
-use afbc_types::parameters;
+use crate::Mixer;
+use afbc_types::{Airframe, OutOfRange, parameters};
 
 parameters! {
     /// Settings of every controller besides vehicle parameters and gains.
@@ -14,5 +15,21 @@ parameters! {
         /// Largest force of one rotor. The default is practically unlimited, as in the paper.
         #[parameter(FORCE_MAX, "N", 1e-3..=1e4)]
         pub rotor_force_max_n: f32 = 1e4,
+        /// Share of the weight to which thrust is raised, at most, to make room for roll and pitch. The default is no
+        /// limit but the rotors'.
+        #[parameter(RAISE_MAX, "1", 0.1..=1e6)]
+        pub raised_thrust_max: f32 = 1e6,
+    }
+}
+
+impl Settings {
+    /// Makes the mixer of `vehicle` within these limits of rotors and thrust.
+    ///
+    /// # Errors
+    /// If a parameter, a position or the limit is out of range, or if the rotors cannot give all four inputs and hover.
+    pub fn mixer<const N: usize>(&self, vehicle: impl Into<Airframe<N>>) -> Result<Mixer<N>, OutOfRange> {
+        let vehicle = vehicle.into();
+        let raised_thrust_max_n = self.raised_thrust_max * vehicle.parameters.weight_n();
+        Ok(Mixer::new(vehicle, self.rotor_force_max_n)?.with_raised_thrust_max_n(raised_thrust_max_n))
     }
 }

@@ -1,8 +1,8 @@
 //! Properties of the mixer: inversion, limits under any input, and the order of priority.
 //!
 //! Some mutants of `mixer.rs` survive because they change no result: another number for `ASKED_MAX * ASKED_MAX` (a
-//! shortcut past a clamp that does not change anything below `ASKED_MAX`), `largest >= force_max` (scales by 1) and
-//! `yaw >= 0` (zero yaw takes no room). `|missing| >= least` differs at equality only, where both are right.
+//! shortcut past a clamp that does not change anything below `ASKED_MAX`), `least < most` (scales by 1) and `yaw >= 0`
+//! (zero yaw takes no room).
 #![allow(clippy::unwrap_used, missing_docs)] // a mixer that cannot be built must stop the test
 
 use afbc_control::Settings;
@@ -263,13 +263,15 @@ proptest! {
     }
 
     /// The same order on frames without symmetry, with expected forces found by bisection: as much roll and pitch, in
-    /// their proportion, as fits at any thrust; of those thrusts the closest to the demand; then as much yaw as fits.
+    /// their proportion, as fits at any thrust, but needs none above the demand and the largest raised thrust; of those
+    /// thrusts the closest to the demand; then as much yaw as fits.
     #[test]
     fn uneven_frames_serve_in_the_same_order(
         frame in uneven(),
         asked in prop::array::uniform4(-8.0_f32..8.0),
         no_yaw in prop::bool::weighted(0.2),
         limit in 0.5_f32..5.0,
+        raised in prop_oneof![Just(f32::MAX), 0.1_f32..10.0],
     ) {
         let asked = if no_yaw { [asked[0], asked[1], 0.0, asked[3]] } else { asked };
         let columns = frame.map(|r| [f64::from(r.y), -f64::from(r.x), if r.pushes_left { 1.0 } else { -1.0 }, 1.0]);
@@ -286,9 +288,10 @@ proptest! {
         let thrusts = |tilt: &Vector4<f64>| {
             (-tilt.component_div(&share).min(), (tilt.map(|force| limit_n - force)).component_div(&share).min())
         };
+        let raised_n = wanted.w.max(f64::from(raised));
         let scaled = largest(|scale| {
             let (least, most) = thrusts(&(tilt * scale));
-            least <= most
+            least <= most && least <= raised_n
         });
         let tilt = tilt * scaled;
         let (least, most) = thrusts(&tilt);
@@ -298,7 +301,7 @@ proptest! {
         let fits = |part: f64| (upright + yaw * part).iter().all(|force| (-slack..=limit_n + slack).contains(force));
         let forces = upright + yaw * largest(fits);
 
-        let mixer = mixer_of(frame, limit);
+        let mixer = mixer_of(frame, limit).with_raised_thrust_max_n(raised);
         let got = mixer.allocate(&inputs(asked));
         check(&mixer, limit, &inputs(asked), &got)?;
         // Forces are rounded at the scale of the largest intermediate value, at most 8 N times four entries of the
@@ -308,6 +311,32 @@ proptest! {
                 (f64::from(*got) - wanted).abs() <= 1e-4 * (1.0 + limit_n),
                 "{got} for {wanted} of {forces} for {asked:?}"
             );
+        }
+    }
+
+    /// Roll and pitch raise no thrust above the limit and the demand, keep their proportion, and are given as without
+    /// the limit where they need no more.
+    #[test]
+    fn roll_and_pitch_raise_the_thrust_to_the_limit_at_most(
+        frame in prop_oneof![Just(PLUS), Just(cross()), uneven()],
+        asked in anything(),
+        raised in 0.1_f32..10.0,
+    ) {
+        let free = mixer_of(frame, 3.0);
+        let limited = free.with_raised_thrust_max_n(raised);
+        let (whole, got) = (free.allocate(&asked), limited.allocate(&asked));
+        check(&limited, 3.0, &asked, &got)?;
+        // A NaN is not more.
+        let most = raised.max(asked.thrust_n);
+        prop_assert!(got.given.thrust_n <= most * (1.0 + 4.0 * U), "{got:?} for {asked:?}, at most {most}");
+        if !whole.saturated || whole.given.thrust_n <= most * (1.0 - 4.0 * U) {
+            prop_assert_eq!(got, whole);
+        } else {
+            prop_assert!(got.saturated);
+            let (got, whole) = (got.given, whole.given);
+            let area = got.roll_n * whole.pitch_n - got.pitch_n * whole.roll_n;
+            prop_assert!(area.abs() <= 1e-4, "{got:?} is not along {whole:?}");
+            prop_assert!(got.roll_n * whole.roll_n >= 0.0 && got.roll_n.abs() <= whole.roll_n.abs() * (1.0 + 8.0 * U));
         }
     }
 
@@ -363,6 +392,22 @@ fn nan_becomes_no_force_and_infinity_the_largest() {
     // Thrust has priority over yaw.
     let opposed = mixer.allocate(&inputs([0.0, 0.0, f32::NEG_INFINITY, f32::INFINITY]));
     assert_eq!(opposed.forces.0, Vector4::repeat(10.0));
+}
+
+/// The setting is a share of the weight, without effect by default.
+#[test]
+fn the_largest_raised_thrust_is_a_share_of_the_weight() {
+    let vehicle = Parameters::PAPER.to_f32();
+    let thrust_n = |settings: Settings| {
+        let mixer = settings.mixer(vehicle).unwrap();
+        mixer.allocate(&inputs([3.0, 0.0, 0.0, 1.0])).given.thrust_n
+    };
+    let settings = Settings { rotor_force_max_n: 10.0, ..Settings::DEFAULT };
+    // Two rotors of 0 and 3 N; the other two carry as much together.
+    assert_eq!(thrust_n(settings), 6.0);
+    let share = 0.8;
+    let limited = thrust_n(Settings { raised_thrust_max: share, ..settings });
+    assert!((limited - share * vehicle.weight_n()).abs() < 1e-5, "{limited}");
 }
 
 #[test]

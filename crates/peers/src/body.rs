@@ -38,7 +38,7 @@ impl<const N: usize> Body<N> {
     /// Makes the vehicle with these parameters.
     pub(crate) fn new(vehicle: &Airframe<N>, settings: &Settings) -> Result<Self, OutOfRange> {
         settings.validate()?;
-        let mixer = Mixer::new(*vehicle, settings.rotor_force_max_n)?;
+        let mixer = settings.mixer(*vehicle)?;
         let vehicle = &vehicle.parameters;
         let (inertia_kg_m2, effectiveness) = (vehicle.inertia_kg_m2, vehicle.effectiveness());
         Ok(Body { mixer, mass_kg: vehicle.mass_kg, inertia_kg_m2, effectiveness })

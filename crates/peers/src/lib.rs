@@ -37,7 +37,7 @@
 //! use afbc_types::{Parameters, Setpoint, State};
 //! use afbc_peers::pid::{Gains, Pid};
 //!
-//! let settings = Settings { dt_s: 0.001, rotor_force_max_n: 3.0 };
+//! let settings = Settings { rotor_force_max_n: 3.0, ..Settings::DEFAULT };
 //! let controller = Pid::new(Parameters::PAPER.to_f32(), settings, Gains::PAPER_VEHICLE)?;
 //! let action = controller.step(&mut Screened::default(), Some(&State::default()), &Setpoint::default());
 //! assert!((action.forces.0.sum() - 0.486 * 9.81).abs() < 1e-5); // nothing to correct: the weight

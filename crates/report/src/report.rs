@@ -230,7 +230,7 @@ pub(super) fn parameters(scenario: &Scenario) -> Markup {
 /// Returns settings and gains of a contender.
 fn gains(contender: &Contender) -> Markup {
     let Settings {
-        common: afbc_control::Settings { dt_s, rotor_force_max_n },
+        common: afbc_control::Settings { dt_s, rotor_force_max_n, raised_thrust_max },
         command_filter_rad_s,
         limits,
         tilt_by_thrust,
@@ -239,6 +239,9 @@ fn gains(contender: &Contender) -> Markup {
         anti_windup,
     } = contender.settings;
     let mut settings = format!("steps of {dt_s} s, at most {rotor_force_max_n} N a rotor");
+    if raised_thrust_max < afbc_control::Settings::RAISE_MAX.range.max as f32 {
+        settings += &format!(", thrust raised to {raised_thrust_max} of the weight");
+    }
     if contender.kind().in_cascade() {
         settings += &format!(", command filter {command_filter_rad_s} rad/s");
         let also = [

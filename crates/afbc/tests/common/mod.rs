@@ -126,13 +126,14 @@ pub(crate) fn safeguards() -> impl Strategy<Value = Safeguards> {
 }
 
 pub(crate) fn settings() -> impl Strategy<Value = Settings> {
-    let (dt, force) = (afbc_control::Settings::DT, afbc_control::Settings::FORCE_MAX);
-    let numbers = (within(dt), within(Settings::FILTER), within(force), limits());
+    use afbc_control::Settings as Common;
+    let common = (within(Common::DT), within(Common::FORCE_MAX), within(Common::RAISE_MAX));
+    let numbers = (common, within(Settings::FILTER), limits());
     let any = (numbers, any::<[bool; 4]>()).prop_map(|(numbers, switches)| {
-        let (dt_s, command_filter_rad_s, rotor_force_max_n, limits) = numbers;
+        let ((dt_s, rotor_force_max_n, raised_thrust_max), command_filter_rad_s, limits) = numbers;
         let [tilt_by_thrust, anti_windup, freeze_on_ground, bumpless] = switches;
         Settings {
-            common: afbc_control::Settings { dt_s, rotor_force_max_n },
+            common: Common { dt_s, rotor_force_max_n, raised_thrust_max },
             command_filter_rad_s,
             limits,
             tilt_by_thrust,

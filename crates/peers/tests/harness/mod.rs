@@ -9,7 +9,7 @@ use nalgebra::{Vector3, Vector4};
 use std::collections::VecDeque;
 
 /// 1 kHz and 3 N per rotor.
-pub(crate) const SETTINGS: Settings = Settings { dt_s: 0.001, rotor_force_max_n: 3.0 };
+pub(crate) const SETTINGS: Settings = Settings { rotor_force_max_n: 3.0, ..Settings::DEFAULT };
 
 pub(crate) fn vehicle() -> Parameters {
     Parameters::PAPER.to_f32()
