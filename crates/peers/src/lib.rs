@@ -49,6 +49,7 @@ pub mod attitude;
 mod body;
 pub mod differentiator;
 pub mod geometric;
+mod hover_thrust;
 pub mod indi;
 mod integral;
 pub mod limits;

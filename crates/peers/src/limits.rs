@@ -43,12 +43,19 @@ impl Limits {
         Vector3::new(0.0, 0.0, self.gravity_m_s2)
     }
 
+    /// Returns the vertical part of a specific force within its limits: between 10 % of gravity and 90 % of the rotors'
+    /// largest thrust.
+    #[inline]
+    pub(crate) fn vertical(&self, vertical_m_s2: f32) -> f32 {
+        vertical_m_s2.max(self.vertical_min_m_s2).min(self.vertical_max_m_s2)
+    }
+
     /// Returns the closest specific force that the vehicle should give, height before sideways: vertical part between
     /// 10 % of gravity and 90 % of the rotors' largest thrust, then tilt and length within their limits. Always points
     /// up.
     #[inline]
     pub fn apply(&self, specific_force: &Vector3<f32>) -> Vector3<f32> {
-        let vertical = specific_force.z.max(self.vertical_min_m_s2).min(self.vertical_max_m_s2);
+        let vertical = self.vertical(specific_force.z);
         let left_over = math::sqrt(self.max_m_s2 * self.max_m_s2 - vertical * vertical);
         let bounded = horizontally(specific_force, left_over.min(self.tan_tilt * vertical));
         Vector3::new(bounded.x, bounded.y, vertical)

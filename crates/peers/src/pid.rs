@@ -6,25 +6,35 @@
 //! position     v_sp = v_d + sat(k_p (p_d - p))
 //! velocity     a_sp = a_d + k_v (v_sp - v) + i_v - d_v dv/dt
 //!              di_v/dt = k_i ((v_sp - v) - (2 / k_v) (a_sp - a_given)), |i_v| <= g
-//! thrust       s = a_given + g e_z, within Limits; U4 = m |s|; R_d points along s, its yaw is psi_d
+//! thrust       s_z = h (a_sp_z + g),  s_xy = s_z a_sp_xy / g,  s within Limits
+//!              R_d along s: its tilt is that of [a_sp_x, a_sp_y, g]; its yaw is psi_d
+//!              U4 = m |s| = m s_z / cos(tilt of R_d)
+//!              a_given = [g s_x / s_z, g s_y / s_z, s_z / h - g]
+//! hover thrust h, see the estimator; each change of h moves i_v so that s_z does not change
 //! attitude     Omega_sp = k_a e(R, R_d) + R' e_z dpsi_d/dt, e tilt-prioritised
 //! rates        dOmega/dt = k_w (Omega_sp - Omega) + i_w - d_w dOmega/dt|measured + f Omega_sp
 //!              di_w/dt = k_iw (Omega_sp - Omega), not towards what the rotors could not give, |i_w| <= 20 rad/s2
 //! inputs       U1 = Ix/l dp/dt, U2 = Iy/l dq/dt, U3 = Iz/(d/b) dr/dt
 //! ```
 //!
-//! Sources: PX4-Autopilot, `mc_pos_control` (PositionControl), `mc_att_control` (AttitudeControl) and
-//! `lib/rate_control`, read for their structure; the attitude error is Brescianini and D'Andrea's (see
+//! The tilt comes from the horizontal acceleration and gravity alone, so that an error of the thrust, which i_v or h
+//! makes good, does not change the horizontal acceleration. The estimator of h is in `hover_thrust.rs`.
+//!
+//! Sources: PX4-Autopilot, `mc_pos_control` (PositionControl), `mc_hover_thrust_estimator`, `mc_att_control`
+//! (AttitudeControl) and `lib/rate_control`, read for their structure; the attitude error is Brescianini and D'Andrea's (see
 //! [`crate::attitude`]); the tracking anti-windup of the velocity loop is Rundqwist's, *Anti-reset windup for PID
 //! controllers*, IFAC 1990.
 //!
-//! Differences from PX4: gains of the rate loop are in 1/s, because the moment is scaled by the inertia; the tilt
-//! follows the whole specific force, not gravity plus its horizontal part; tracking anti-windup also covers height;
-//! derivatives are those of [`crate::differentiator`]; the rate integrator is not slowed down at large errors.
+//! Differences from PX4: gains of the rate loop are in 1/s, because the moment is scaled by the inertia; thrust is in
+//! newtons, so h is relative to the nominal weight; [`Limits`] keep no margin for horizontal thrust; tracking
+//! anti-windup also covers height, and along x and y it compares with what the tilt gives, not with what tilt and
+//! thrust give together; derivatives are those of [`crate::differentiator`]; the rate integrator is not slowed down at
+//! large errors.
 
 use crate::attitude::{length, r_earth_body};
 use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
+use crate::hover_thrust::{HoverThrust, HoverThrustEstimator};
 use crate::integral::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
 use crate::limits::Limits;
 use crate::loops::{AttitudeLoop, AttitudeOutput, PositionLoop, PositionOutput, xy_and_z};
@@ -42,10 +52,10 @@ parameters! {
         pub position_p_1_s: f32 = 1.742,
         /// k_v along x and y.
         #[parameter(VEL_P, "1/s", 0.5..=20.0, tuned)]
-        pub velocity_p_1_s: f32 = 4.347,
+        pub velocity_p_1_s: f32 = 4.0,
         /// k_i along x and y.
         #[parameter(VEL_I, "1/s2", 0.0..=200.0, tuned)]
-        pub velocity_i_1_s2: f32 = 33.16,
+        pub velocity_i_1_s2: f32 = 20.0,
         /// d_v along x and y.
         #[parameter(VEL_D, "1", 0.0..=2.0, tuned)]
         pub velocity_d: f32 = 0.07327,
@@ -61,15 +71,18 @@ parameters! {
         /// d_v along z.
         #[parameter(CLIMB_D, "1", 0.0..=2.0, tuned)]
         pub climb_d: f32 = 0.0,
+        /// w: bandwidth of the estimate of the hover thrust; 0 for none.
+        #[parameter(HOVER, "1/s", 0.0..=2.0, tuned)]
+        pub hover_thrust_1_s: f32 = 0.1,
         /// k_a of roll and pitch.
         #[parameter(TILT_P, "1/s", 1.0..=30.0, tuned)]
-        pub tilt_p_1_s: f32 = 20.4,
+        pub tilt_p_1_s: f32 = 15.0,
         /// k_a of yaw for small errors; not reduced by `yaw_weight`.
         #[parameter(YAW_P, "1/s", 0.2..=15.0, tuned)]
         pub yaw_p_1_s: f32 = 2.053,
         /// k_w of roll and pitch.
         #[parameter(TILTRATE_P, "1/s", 2.0..=100.0, tuned)]
-        pub tilt_rate_p_1_s: f32 = 19.43,
+        pub tilt_rate_p_1_s: f32 = 25.0,
         /// k_iw of roll and pitch.
         #[parameter(TILTRATE_I, "1/s2", 0.0..=500.0, tuned)]
         pub tilt_rate_i_1_s2: f32 = 12.49,
@@ -106,14 +119,15 @@ impl Gains {
 
     /// Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
     pub const PAPER_VEHICLE: Self = Gains {
-        position_p_1_s: 2.2,
-        velocity_p_1_s: 6.0,
+        position_p_1_s: 2.0,
+        velocity_p_1_s: 5.0,
         velocity_i_1_s2: 12.0,
         velocity_d: 0.05,
         height_p_1_s: 2.0,
         climb_p_1_s: 7.0,
         climb_i_1_s2: 30.0,
         climb_d: 0.0,
+        hover_thrust_1_s: 0.1,
         tilt_p_1_s: 11.0,
         yaw_p_1_s: 2.0,
         tilt_rate_p_1_s: 30.0,
@@ -141,6 +155,7 @@ pub struct Pid<const N: usize = 4> {
     velocity_d: Vector3<f32>,
     /// 2 / k_v
     anti_windup: Vector3<f32>,
+    hover_thrust: HoverThrustEstimator,
     attitude: AttitudeLoop,
     rate_p: Vector3<f32>,
     rate_i: Vector3<f32>,
@@ -157,6 +172,13 @@ pub struct Memory {
     pub rate_integral: Vector3<f32>,
     /// Unallocated part of U1..U3 in the last step \[N\].
     unallocated: Vector3<f32>,
+    hover_thrust: HoverThrust,
+    /// U4 given in the last step \[N\]; none before the first.
+    thrust_n: Option<f32>,
+    /// a_sp_z of the last step \[m/s2\].
+    climb_m_s2: f32,
+    /// t: vertical thrust over nominal weight, delayed like `velocity`; x and y are 0.
+    thrust_share: Smooth,
     velocity: Smooth,
     rates: Smooth,
     /// Trace of the last step.
@@ -187,12 +209,28 @@ impl<const N: usize> Pid<N> {
             velocity_i: xy_and_z(gains.velocity_i_1_s2, gains.climb_i_1_s2),
             velocity_d: xy_and_z(gains.velocity_d, gains.climb_d),
             anti_windup: velocity_p.map(|k| 2.0 / k),
+            hover_thrust: HoverThrustEstimator::new(gains.hover_thrust_1_s, vehicle.gravity_m_s2, settings.dt_s),
             attitude: AttitudeLoop::new(gains.tilt_p_1_s, gains.yaw_p_1_s, gains.yaw_weight),
             rate_p: xy_and_z(gains.tilt_rate_p_1_s, gains.yaw_rate_p_1_s),
             rate_i: xy_and_z(gains.tilt_rate_i_1_s2, gains.yaw_rate_i_1_s2),
             rate_d: xy_and_z(gains.tilt_rate_d, 0.0),
             rate_feed_forward: gains.rate_feed_forward_1_s,
         })
+    }
+}
+
+impl<const N: usize> Pid<N> {
+    /// Estimates the hover thrust anew after a thrust `thrust_n` along a body axis of which `upright` is the vertical
+    /// part; the integral takes over what the new estimate would change.
+    #[inline]
+    fn estimate_hover_thrust(&self, memory: &mut Memory, thrust_n: f32, upright: f32) {
+        let gravity_m_s2 = self.limits.gravity().z;
+        let share = thrust_n * upright / (self.body.mass_kg * gravity_m_s2);
+        self.differentiator.advance(&mut memory.thrust_share, &Vector3::new(0.0, 0.0, share));
+        let (measured_m_s2, before) = (memory.velocity.derivative().z, memory.hover_thrust.share());
+        self.hover_thrust.advance(&mut memory.hover_thrust, measured_m_s2, memory.thrust_share.value().z);
+        let change = before / memory.hover_thrust.share() - 1.0;
+        memory.velocity_integral.z += (memory.climb_m_s2 + gravity_m_s2) * change;
     }
 }
 
@@ -213,9 +251,13 @@ impl<const N: usize> FlightController<N> for Pid<N> {
 
     #[inline]
     fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
+        let r = r_earth_body(&state.attitude_rad);
         if fresh {
             self.differentiator.advance(&mut memory.velocity, &state.velocity_m_s);
             self.differentiator.advance(&mut memory.rates, &state.rates_rad_s);
+            if let Some(thrust_n) = memory.thrust_n {
+                self.estimate_hover_thrust(memory, thrust_n, r.m33);
+            }
         }
 
         // Position and velocity.
@@ -225,10 +267,12 @@ impl<const N: usize> FlightController<N> for Pid<N> {
             acceleration_m_s2 + memory.velocity_integral - self.velocity_d.component_mul(&memory.velocity.derivative());
 
         // Thrust and attitude.
-        let gravity = self.limits.gravity();
-        let specific_force = self.limits.apply(&(acceleration + gravity));
-        let missing = acceleration - (specific_force - gravity);
-        let r = r_earth_body(&state.attitude_rad);
+        let (g, h) = (self.limits.gravity().z, memory.hover_thrust.share());
+        let vertical = self.limits.vertical(h * (acceleration.z + g));
+        let wanted = Vector3::new(acceleration.x, acceleration.y, g) * (vertical / g);
+        let specific_force = self.limits.apply(&wanted);
+        let tilted = specific_force * (g / specific_force.z);
+        let missing = acceleration - Vector3::new(tilted.x, tilted.y, specific_force.z / h - g);
         let AttitudeOutput { desired, attitude_error_rad, rates_rad_s, rate_error_rad_s } =
             self.attitude.output(&r, &specific_force, state, setpoint);
 
@@ -247,11 +291,12 @@ impl<const N: usize> FlightController<N> for Pid<N> {
         };
         let (action, trace, unallocated) = self.body.act(&demand);
         memory.trace = trace;
+        (memory.thrust_n, memory.climb_m_s2) = (Some(action.given.thrust_n), acceleration.z);
 
         if fresh {
             let unwound = velocity_error_m_s - self.anti_windup.component_mul(&missing);
             memory.velocity_integral =
-                integrate(&memory.velocity_integral, &self.velocity_i.component_mul(&unwound), self.dt_s, gravity.z);
+                integrate(&memory.velocity_integral, &self.velocity_i.component_mul(&unwound), self.dt_s, g);
             let allowed = rate_error_rad_s.zip_map(&memory.unallocated, away_from);
             memory.rate_integral = integrate(
                 &memory.rate_integral,

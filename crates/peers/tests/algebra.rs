@@ -280,6 +280,38 @@ fn desired_rates_are_the_derivative_of_the_desired_attitude() {
     }
 }
 
+/// PID's tilt is that of \[a_x, a_y, g\]: whatever the height error does to the thrust, and to the thrust it adds what
+/// the tilt takes from the vertical.
+#[test]
+fn the_height_of_pid_does_not_tilt_it_and_its_tilt_costs_no_height() {
+    let mut random = Random(7);
+    for _ in 0..300 {
+        let (position, velocity) = (vector(&mut random, 0.5).cast::<f32>(), vector(&mut random, 0.3).cast::<f32>());
+        let yaw_rad = vector(&mut random, 3.0).x as f32;
+        let of = |height: f32, sideways: f32| {
+            let keep = Vector3::new(sideways, sideways, height);
+            let mut state = State {
+                position_m: position.component_mul(&keep),
+                velocity_m_s: velocity.component_mul(&keep),
+                ..State::default()
+            };
+            state.attitude_rad.z = yaw_rad;
+            after(&pid(), 1, &state, &Setpoint { yaw_rad, ..Setpoint::default() }).1
+        };
+        let (both, level, flat) = (of(1.0, 1.0), of(1.0, 0.0), of(0.0, 1.0));
+        for (a, b) in both.desired_rad.into_iter().zip(flat.desired_rad) {
+            assert!((a - b).abs() < 1e-5, "{both:?} {flat:?}");
+        }
+        let [roll, pitch] = both.desired_rad.map(f64::from);
+        let vertical = f64::from(both.inputs.thrust_n) * roll.cos() * pitch.cos();
+        assert!((vertical - f64::from(level.inputs.thrust_n)).abs() < 1e-4, "{both:?} {level:?}");
+        // tan(tilt) g is the demanded acceleration.
+        let tilt = (1.0 / (roll.cos() * pitch.cos()).powi(2) - 1.0).sqrt();
+        let demanded = both.virtual_m_s2[0].hypot(both.virtual_m_s2[1]);
+        assert!((tilt * 9.81 - f64::from(demanded)).abs() < 1e-4 * 9.81, "{both:?}");
+    }
+}
+
 #[test]
 fn an_integrator_does_not_wind_up_against_a_limit() {
     // Far away sideways and above for 20 s: tilt and thrust stay at their limits.
@@ -410,7 +442,7 @@ fn gains_out_of_range_are_refused_by_name() {
             }
         }
     }
-    refused(pid::Gains::PAPER_VEHICLE, 20, |gains| Pid::new(vehicle(), SETTINGS, gains).map(drop));
+    refused(pid::Gains::PAPER_VEHICLE, 21, |gains| Pid::new(vehicle(), SETTINGS, gains).map(drop));
     refused(geometric::Gains::GOODARZI_2013, 15, |gains| Geometric::new(vehicle(), SETTINGS, gains).map(drop));
     refused(indi::Gains::PAPER_VEHICLE, 14, |gains| Indi::new(vehicle(), SETTINGS, gains).map(drop));
     let gains = pid::Gains { tilt_max_rad: 1.5, ..pid::Gains::PAPER_VEHICLE };

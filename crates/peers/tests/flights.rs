@@ -7,7 +7,11 @@ mod harness;
 
 use afbc_control::FlightController;
 use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
-use harness::{Figures, Rig, SETTINGS, at, calm, circle, disturbed, fly, hover, paper, paper_start, vehicle};
+use afbc_plant::{Environment, ParameterChange, Quantity};
+use afbc_types::Parameters;
+use harness::{
+    Figures, Random, Rig, SETTINGS, at, calm, circle, disturbed, fly, fly_on, hover, paper, paper_start, vehicle,
+};
 use nalgebra::{Vector3, Vector4};
 
 fn pid() -> Pid {
@@ -128,4 +132,32 @@ fn all_catch_a_vehicle_that_was_thrown() {
     within("lee", &figures(&lee()), [3e-4; 4]);
     within("goodarzi", &figures(&goodarzi()), [3e-4; 4]);
     within("indi", &figures(&indi()), [3e-4; 4]);
+}
+
+/// With rotors of any strength, PID's estimate of the hover thrust takes over what its integral holds, and the vehicle
+/// does not move for it.
+#[test]
+fn the_hover_thrust_takes_over_from_the_integral() {
+    let place = [0.0, 0.0, 3.0];
+    let mut random = Random(11);
+    for _ in 0..20 {
+        let (strength, mass) = (0.65 + 0.75 * random.uniform(), 0.8 + 0.4 * random.uniform());
+        let environment = || {
+            let changes = [(Quantity::ThrustFactor, strength), (Quantity::Mass, mass)]
+                .map(|(quantity, factor)| ParameterChange { quantity, factor, start_s: 2.0, end_s: f64::INFINITY });
+            Environment::new(Parameters::PAPER, changes.to_vec(), Vec::new()).unwrap()
+        };
+        let flown = |hover_thrust_1_s| {
+            let gains = pid::Gains { hover_thrust_1_s, ..pid::Gains::PAPER_VEHICLE };
+            let controller = Pid::new(vehicle(), SETTINGS, gains).unwrap();
+            let start = at(place.map(f64::from), 0.0);
+            let (figures, memory) = fly_on(&controller, Rig::LAG, environment(), start, hover(place, 0.0), [6.0, 20.0]);
+            (figures.max_abs.z, memory.control.velocity_integral.z)
+        };
+        let ((moved, held), (moved_without, held_without)) = (flown(1.0), flown(0.0));
+        let needed = 9.81 * (mass / strength - 1.0);
+        assert!((f64::from(held_without) - needed).abs() < 0.01, "{held_without} for {needed}");
+        assert!(f64::from(held).abs() < 0.01 * (1.0 + needed.abs()), "{held} is left of {needed}");
+        assert!(moved < moved_without + 0.003, "{moved} m, without the estimate {moved_without} m");
+    }
 }

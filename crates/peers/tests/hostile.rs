@@ -82,7 +82,7 @@ proptest! {
     #[test]
     fn any_input_gives_feasible_rotor_speeds(
         inputs in prop::collection::vec(motion(), 1..30),
-        shares in prop::collection::vec(0.0..=1.0, 20),
+        shares in prop::collection::vec(0.0..=1.0, 32),
         force_max in prop_oneof![Just(3.0f32), Just(1e4), Just(1e-3)],
     ) {
         let settings = Settings { rotor_force_max_n: force_max, ..SETTINGS };

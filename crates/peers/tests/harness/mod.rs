@@ -80,8 +80,20 @@ pub(crate) fn fly<C: FlightController>(
     environment: Environment,
     initial: Motion,
     reference: impl Fn(f64) -> Setpoint,
-    [settled_s, duration_s]: [f64; 2],
+    times_s: [f64; 2],
 ) -> Figures {
+    fly_on(controller, rig, environment, initial, reference, times_s).0
+}
+
+/// The same, with the controller's memory at the end.
+pub(crate) fn fly_on<C: FlightController>(
+    controller: &C,
+    rig: Rig,
+    environment: Environment,
+    initial: Motion,
+    reference: impl Fn(f64) -> Setpoint,
+    [settled_s, duration_s]: [f64; 2],
+) -> (Figures, Screened<C::Memory>) {
     let dt_s = 0.001;
     let mut plant = Plant::new(Model::RigidBody, initial, environment);
     let mut memory = Screened::<C::Memory>::default();
@@ -117,13 +129,14 @@ pub(crate) fn fly<C: FlightController>(
         }
         plant.step(&RotorSpeeds(rotors.cast()), dt_s);
     }
-    Figures {
+    let figures = Figures {
         rmse: (sum / count).map(libm::sqrt),
         max_abs,
         last,
         delta_u4_n: delta / count,
         saturated: saturated / count,
-    }
+    };
+    (figures, memory)
 }
 
 /// Returns a motion at rest.

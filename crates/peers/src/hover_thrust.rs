@@ -1,0 +1,72 @@
+//! Estimate of the thrust that hovering takes, in the manner of PX4's `ZeroOrderHoverThrustEkf`.
+//!
+//! A Kalman filter of one state: h, the hover thrust as a share of the nominal weight, a random walk. Its measurement is
+//! the vertical acceleration a_z under the vertical thrust t, a share of the nominal weight too:
+//!
+//! ```text
+//! a_z = g (t / h - 1) + noise of 1 m/s2,   H = d a_z / d h = -g t / h^2
+//! P += (w dt / g)^2
+//! K = P H / (H^2 P + 1),   h += K sat(a_z - g (t / h - 1)),   P = (1 - K H) P,   0.4 <= h <= 2.5
+//! ```
+//!
+//! In hover it settles to K H = w dt: a low-pass filter of the bandwidth w. PX4's default (`HTE_HT_NOISE` at half
+//! throttle) is w = 0.07 1/s.
+//!
+//! Differences from PX4: the noise is constant, PX4's least, where PX4 estimates it; an innovation beyond three standard
+//! deviations counts as three, where PX4 rejects it and, after some of them, raises P; h starts as certain.
+
+use afbc_control::math;
+
+/// Least and largest h.
+const SHARE: [f32; 2] = [0.4, 2.5];
+/// Standard deviation of the noise \[m/s2\].
+const NOISE_M_S2: f32 = 1.0;
+/// Largest innovation in its standard deviations: PX4's `HTE_ACC_GATE`.
+const GATE: f32 = 3.0;
+
+/// The estimator. Immutable; what changes in flight is in [`HoverThrust`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct HoverThrustEstimator {
+    gravity_m_s2: f32,
+    /// (w dt / g)^2
+    growth: f32,
+}
+
+/// The estimate; at first the nominal weight.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct HoverThrust {
+    /// h - 1
+    excess: f32,
+    /// P
+    variance: f32,
+}
+
+impl HoverThrust {
+    /// h: hover thrust over nominal weight.
+    #[inline]
+    pub(crate) fn share(&self) -> f32 {
+        1.0 + self.excess
+    }
+}
+
+impl HoverThrustEstimator {
+    /// Makes an estimator of the given w, advanced every `dt_s` seconds; with w = 0 h stays 1.
+    pub(crate) fn new(bandwidth_1_s: f32, gravity_m_s2: f32, dt_s: f32) -> Self {
+        let step = bandwidth_1_s * dt_s / gravity_m_s2 * NOISE_M_S2;
+        HoverThrustEstimator { gravity_m_s2, growth: step * step }
+    }
+
+    /// Feeds a_z under t = `thrust_share`.
+    #[inline]
+    pub(crate) fn advance(&self, estimate: &mut HoverThrust, acceleration_m_s2: f32, thrust_share: f32) {
+        let (g, h) = (self.gravity_m_s2, estimate.share());
+        let slope = -g * thrust_share / (h * h);
+        let variance = estimate.variance + self.growth;
+        let innovation_variance = slope * slope * variance + NOISE_M_S2 * NOISE_M_S2;
+        let gain = variance * slope / innovation_variance;
+        let most = GATE * math::sqrt(innovation_variance);
+        let innovation = (acceleration_m_s2 - g * (thrust_share / h - 1.0)).max(-most).min(most);
+        let share = (h + gain * innovation).max(SHARE[0]).min(SHARE[1]);
+        *estimate = HoverThrust { excess: share - 1.0, variance: (1.0 - gain * slope) * variance };
+    }
+}
