@@ -103,23 +103,33 @@ pub fn quaternion(r: &Matrix3<f32>) -> Quaternion<f32> {
 #[inline]
 pub fn tilt_prioritised_error(r: &Matrix3<f32>, desired: &Matrix3<f32>, yaw_weight: f32) -> Vector3<f32> {
     let q = quaternion(&(r.transpose() * desired));
-    let n_squared = q.w * q.w + q.k * q.k;
-    let weighted = if n_squared < OPPOSITE {
-        // Opposite thrusts: all ways round are equally short, and yaw is undefined.
-        q
-    } else {
-        let inverse = 1.0 / math::sqrt(n_squared);
-        let tilt = Quaternion::new(
-            n_squared * inverse,
-            (q.w * q.i - q.j * q.k) * inverse,
-            (q.w * q.j + q.i * q.k) * inverse,
-            0.0,
-        );
+    let weighted = tilt(&q).map_or(q, |(tilt, _)| {
         // q.w may be 0, but not together with q.k: atan of infinity is pi/2.
         let half_yaw = yaw_weight * math::atan(q.k / q.w);
         tilt * Quaternion::new(math::cos(half_yaw), 0.0, 0.0, math::sin(half_yaw))
-    };
+    });
     weighted.imag() * 2.0
+}
+
+/// Returns the same attitude error in two parts, the tilt's in x and y, the yaw's in z \[rad\]:
+/// 2 Im(q_tilt) + 2 Im(q_yaw).
+#[inline]
+pub fn tilt_and_yaw_error(r: &Matrix3<f32>, desired: &Matrix3<f32>) -> Vector3<f32> {
+    let q = quaternion(&(r.transpose() * desired));
+    let parts = tilt(&q).map_or(q.imag(), |(tilt, per_n)| Vector3::new(tilt.i, tilt.j, q.k * per_n));
+    parts * 2.0
+}
+
+/// q_tilt and 1/n; none for opposite thrusts, where all ways round are equally short and yaw is undefined.
+#[inline]
+fn tilt(q: &Quaternion<f32>) -> Option<(Quaternion<f32>, f32)> {
+    let n_squared = q.w * q.w + q.k * q.k;
+    if n_squared < OPPOSITE {
+        return None;
+    }
+    let inverse = 1.0 / math::sqrt(n_squared);
+    let [i, j] = [(q.w * q.i - q.j * q.k) * inverse, (q.w * q.j + q.i * q.k) * inverse];
+    Some((Quaternion::new(n_squared * inverse, i, j, 0.0), inverse))
 }
 
 /// Returns -e_R of Lee, Leok and McClamroch: half the vector of R' R_d - R_d' R. Its size is the sine of the angle

@@ -17,18 +17,11 @@
 //!
 //! * **Gains** are the paper's over mass and inertia: k_x, k_R in 1/s2, k_v, k_Omega in 1/s. Yaw has its own k_R and
 //!   k_Omega, because its control authority is a sixtieth of roll and pitch; the proof has one number for all axes.
-//! * **R_d, Omega_d and dOmega_d/dt** need two derivatives of s, but the setpoint's highest derivative is acceleration.
-//!   So s first passes a critically damped second-order filter w^2/(s + w)^2, which gives the filtered s with ds/dt and
-//!   d2s/dt2 exactly (command filtering, as in AFBC); R_d follows the filtered s. Then, with b1, b2, b3 the columns of
-//!   R_d, n = |s|, and x_C, y_C the horizontals along and left of the heading:
-//!
-//!   ```text
-//!   Omega_d1 = -b2 . ds/dt / n,  Omega_d2 = b1 . ds/dt / n
-//!   Omega_d3 = (dpsi_d/dt b1 . x_C + Omega_d2 b3 . y_C) / (b2 . y_C)
-//!   ```
-//!
-//!   and dOmega_d/dt follows with one more derivative of s and psi_d. Products of rates are neglected: at 1 rad/s they
-//!   are 1 rad/s2, while k_R e_R is tens.
+//! * **R_d, Omega_d and dOmega_d/dt** need two derivatives of s, which contains the measured state. So s first passes a
+//!   critically damped second-order filter w^2/(s + w)^2, which gives the filtered s with ds/dt and d2s/dt2 exactly
+//!   (command filtering, as in AFBC); R_d follows the filtered s. Omega_d then is that of [`crate::flatness`], and
+//!   dOmega_d/dt follows with one more derivative of s and psi_d. Its products of rates are neglected: at 1 rad/s they
+//!   are 1 rad/s2, while k_R e_R is tens. The setpoint's jerk and snap are not used.
 //! * **Heading**: b1 is perpendicular to y_C, so that the yaw of R_d is exactly psi_d. The paper projects a freely
 //!   chosen direction; this is one choice of it.
 //! * **Limits**: the paper assumes that s never vanishes and that rotor forces are unlimited; here [`Limits`] bounds s.
@@ -37,15 +30,16 @@
 //!   +-[`Gains::position_integral_max_m_s2`] and +-20 rad/s2; anti-windup stops them where limits or rotors are
 //!   saturated.
 
-use crate::attitude::{facing, geometric_error, heading, length, r_earth_body, unit};
+use crate::attitude::{geometric_error, r_earth_body, unit};
 use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
+use crate::flatness::{Desired, Frame};
 use crate::integral::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
 use crate::limits::Limits;
-use crate::loops::xy_and_z;
+use crate::loops::{TrackingLoop, TrackingOutput, xy_and_z};
 use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
 use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 parameters! {
     /// Gains and limits. Defaults are the result of `sitl tune` for the paper's vehicle with a rotor lag of 20 ms
@@ -134,14 +128,10 @@ impl Gains {
 /// The controller. Immutable; what changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometric<const N: usize = 4> {
-    body: Body<N>,
-    limits: Limits,
+    pub(crate) body: Body<N>,
+    position: TrackingLoop,
     filter: Differentiator,
     dt_s: f32,
-    k_x: Vector3<f32>,
-    k_v: Vector3<f32>,
-    k_i: Vector3<f32>,
-    position_integral_max: f32,
     k_r: Vector3<f32>,
     k_omega: Vector3<f32>,
     /// k_I
@@ -164,35 +154,23 @@ pub struct Memory {
     trace: Trace,
 }
 
-/// R_d, Omega_d, dOmega_d/dt; Omega_d and its derivative in the desired frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Desired {
-    /// R_d: desired frame to earth.
-    pub r_earth_desired: Matrix3<f32>,
-    /// Omega_d \[rad/s\].
-    pub rates_rad_s: Vector3<f32>,
-    /// dOmega_d/dt, products of rates neglected \[rad/s2\].
-    pub rates_dot_rad_s2: Vector3<f32>,
+/// What the integrals learn from a step.
+pub(crate) struct Lesson {
+    position: TrackingOutput,
+    /// -(e_Omega + c e_R) \[rad/s\]
+    attitude: Vector3<f32>,
 }
 
 /// Returns the attitude along a specific force, given with its two derivatives \[m/s2\], \[m/s3\], \[m/s4\], at the
-/// setpoint's heading. The specific force must point up.
+/// setpoint's heading; products of rates are neglected. The specific force must point up.
 #[inline]
 pub fn desired(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> Desired {
     let [s, s_dot, s_ddot] = specific_force;
-    let r = facing(&s, setpoint.yaw_rad);
-    let (b1, b2, b3) = (r.column(0), r.column(1), r.column(2));
-    let [along, left] = heading(setpoint.yaw_rad);
-    let per_length = 1.0 / length(&s);
-    // b2 . left is the cosine of the roll, positive because s points up.
-    let turn = |s_dot: &Vector3<f32>, yaw_dot: f32| {
-        let (p, q) = (-b2.dot(s_dot) * per_length, b1.dot(s_dot) * per_length);
-        Vector3::new(p, q, (yaw_dot * b1.dot(&along) + q * b3.dot(&left)) / b2.dot(&left))
-    };
+    let frame = Frame::new(&s, setpoint.yaw_rad);
     Desired {
-        r_earth_desired: r,
-        rates_rad_s: turn(&s_dot, setpoint.yaw_rate_rad_s),
-        rates_dot_rad_s2: turn(&s_ddot, setpoint.yaw_acceleration_rad_s2),
+        r_earth_desired: frame.r,
+        rates_rad_s: frame.turn(&s_dot, setpoint.yaw_rate_rad_s),
+        rates_dot_rad_s2: frame.turn(&s_ddot, setpoint.yaw_acceleration_rad_s2),
     }
 }
 
@@ -210,48 +188,28 @@ impl<const N: usize> Geometric<N> {
             (xy_and_z(gains.tilt_p_1_s2, gains.yaw_p_1_s2), xy_and_z(gains.tilt_d_1_s, gains.yaw_d_1_s));
         Ok(Geometric {
             body,
-            limits: Limits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
+            position: TrackingLoop {
+                position_p: xy_and_z(gains.position_p_1_s2, gains.height_p_1_s2),
+                position_d: xy_and_z(gains.position_d_1_s, gains.height_d_1_s),
+                position_i: xy_and_z(gains.position_i_1_s3, gains.height_i_1_s3),
+                integral_max_m_s2: gains.position_integral_max_m_s2,
+                limits: Limits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
+                dt_s: settings.dt_s,
+            },
             filter: Differentiator::new(gains.filter_rad_s, settings.dt_s)?,
             dt_s: settings.dt_s,
-            k_x: xy_and_z(gains.position_p_1_s2, gains.height_p_1_s2),
-            k_v: xy_and_z(gains.position_d_1_s, gains.height_d_1_s),
-            k_i: xy_and_z(gains.position_i_1_s3, gains.height_i_1_s3),
-            position_integral_max: gains.position_integral_max_m_s2,
             k_r,
             k_omega,
             k_integral: xy_and_z(gains.tilt_i_1_s2, gains.yaw_i_1_s2),
             c: k_r.component_div(&k_omega),
         })
     }
-}
 
-impl<const N: usize> FlightController<N> for Geometric<N> {
-    type Memory = Memory;
-
-    fn dt_s(&self) -> f32 {
-        self.dt_s
-    }
-
-    fn mixer(&self) -> &Mixer<N> {
-        &self.body.mixer
-    }
-
-    fn trace(memory: &Memory) -> Trace {
-        memory.trace
-    }
-
+    /// Computes the demand of one step, and what the integrals learn from it.
     #[inline]
-    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
-        // Position.
-        let gravity = self.limits.gravity();
-        let position_error = setpoint.position_m - state.position_m;
-        let velocity_error = setpoint.velocity_m_s - state.velocity_m_s;
-        let acceleration = self.k_x.component_mul(&position_error)
-            + self.k_v.component_mul(&velocity_error)
-            + memory.position_integral
-            + setpoint.acceleration_m_s2;
-        let wanted = acceleration + gravity;
-        let specific_force = self.limits.apply(&wanted);
+    pub(crate) fn demand(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint) -> (Demand, Lesson) {
+        let position = self.position.output(state, setpoint, &memory.position_integral);
+        let specific_force = position.specific_force_m_s2;
 
         // Desired attitude.
         self.filter.advance(&mut memory.specific_force, &specific_force);
@@ -276,24 +234,20 @@ impl<const N: usize> FlightController<N> for Geometric<N> {
         let demand = Demand {
             thrust_n: self.body.mass_kg * specific_force.dot(&unit(&r.column(2).into())).max(0.0),
             angular_acceleration_rad_s2: angular_acceleration,
-            acceleration_m_s2: acceleration,
+            acceleration_m_s2: position.acceleration_m_s2,
             desired: r_earth_desired,
             desired_rates_rad_s: rates_rad_s,
-            errors: [position_error, velocity_error, attitude_error, rate_error],
+            errors: [position.position_error_m, position.velocity_error_m_s, attitude_error, rate_error],
         };
-        let (action, trace, unallocated) = self.body.act(&demand);
-        memory.trace = trace;
+        (demand, Lesson { position, attitude: rate_error + self.c.component_mul(&attitude_error) })
+    }
 
+    /// Advances the integrals if the state was `fresh`; `unallocated` is that part of U1..U3.
+    #[inline]
+    pub(crate) fn learn(&self, memory: &mut Memory, lesson: &Lesson, fresh: bool, unallocated: Vector3<f32>) {
         if fresh {
-            let allowed = position_error.zip_map(&(wanted - specific_force), away_from);
-            memory.position_integral = integrate(
-                &memory.position_integral,
-                &self.k_i.component_mul(&allowed),
-                self.dt_s,
-                self.position_integral_max,
-            );
-            let driving = rate_error + self.c.component_mul(&attitude_error);
-            let allowed = driving.zip_map(&memory.unallocated, away_from);
+            self.position.learn(&mut memory.position_integral, &lesson.position);
+            let allowed = lesson.attitude.zip_map(&memory.unallocated, away_from);
             memory.attitude_integral = integrate(
                 &memory.attitude_integral,
                 &self.k_integral.component_mul(&allowed),
@@ -302,6 +256,30 @@ impl<const N: usize> FlightController<N> for Geometric<N> {
             );
         }
         memory.unallocated = unallocated;
+    }
+}
+
+impl<const N: usize> FlightController<N> for Geometric<N> {
+    type Memory = Memory;
+
+    fn dt_s(&self) -> f32 {
+        self.dt_s
+    }
+
+    fn mixer(&self) -> &Mixer<N> {
+        &self.body.mixer
+    }
+
+    fn trace(memory: &Memory) -> Trace {
+        memory.trace
+    }
+
+    #[inline]
+    fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
+        let (demand, lesson) = self.demand(memory, state, setpoint);
+        let (action, trace, unallocated) = self.body.act(&demand);
+        memory.trace = trace;
+        self.learn(memory, &lesson, fresh, unallocated);
         action
     }
 }

@@ -1,7 +1,7 @@
 //! Estimate of the thrust that hovering takes, in the manner of PX4's `ZeroOrderHoverThrustEkf`.
 //!
-//! A Kalman filter of one state: h, the hover thrust as a share of the nominal weight, a random walk. Its measurement is
-//! the vertical acceleration a_z under the vertical thrust t, a share of the nominal weight too:
+//! A Kalman filter of one state: h, the hover thrust as a share of the nominal weight, a random walk. Its measurement
+//! is the vertical acceleration a_z under the vertical thrust t, a share of the nominal weight too:
 //!
 //! ```text
 //! a_z = g (t / h - 1) + noise of 1 m/s2,   H = d a_z / d h = -g t / h^2
@@ -12,13 +12,15 @@
 //! In hover it settles to K H = w dt: a low-pass filter of the bandwidth w. PX4's default (`HTE_HT_NOISE` at half
 //! throttle) is w = 0.07 1/s.
 //!
-//! Differences from PX4: the noise is constant, PX4's least, where PX4 estimates it; an innovation beyond three standard
-//! deviations counts as three, where PX4 rejects it and, after some of them, raises P; h starts as certain.
+//! Differences from PX4: the noise is constant, PX4's least, where PX4 estimates it; an innovation beyond three
+//! standard deviations counts as three, where PX4 rejects it and, after some of them, raises P; h starts as certain.
 
 use afbc_control::math;
 
-/// Least and largest h.
-const SHARE: [f32; 2] = [0.4, 2.5];
+/// Least h.
+const SHARE_MIN: f32 = 0.4;
+/// Largest h.
+const SHARE_MAX: f32 = 2.5;
 /// Standard deviation of the noise \[m/s2\].
 const NOISE_M_S2: f32 = 1.0;
 /// Largest innovation in its standard deviations: PX4's `HTE_ACC_GATE`.
@@ -66,7 +68,7 @@ impl HoverThrustEstimator {
         let gain = variance * slope / innovation_variance;
         let most = GATE * math::sqrt(innovation_variance);
         let innovation = (acceleration_m_s2 - g * (thrust_share / h - 1.0)).max(-most).min(most);
-        let share = (h + gain * innovation).max(SHARE[0]).min(SHARE[1]);
+        let share = math::min(math::max(h + gain * innovation, SHARE_MIN), SHARE_MAX);
         *estimate = HoverThrust { excess: share - 1.0, variance: (1.0 - gain * slope) * variance };
     }
 }

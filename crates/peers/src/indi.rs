@@ -12,8 +12,9 @@
 //! actuators  omega_i += (1 - exp(-dt/tau)) (omega_i commanded - omega_i)            rotor model, from limited commands
 //! position   a_ref = a_d + k_v (v_d + sat(k_p (p_d - p)) - v)
 //!            s = (U4/m R e_z)_f + a_ref - (dv/dt)_f, within Limits;  U4 = m s . R e_z
-//! attitude   R_d along s with yaw psi_d;  Omega_ref = k_a e(R, R_d) + R' e_z dpsi_d/dt
-//!            nu = k_w (Omega_ref - Omega) + R' e_z d2psi_d/dt2
+//! attitude   R_d along s with yaw psi_d;  Omega_d, dOmega_d/dt from s, jerk and snap of the setpoint, psi_d
+//!            Omega_ref = k_a e(R, R_d) + R' R_d Omega_d
+//!            nu = k_w (Omega_ref - Omega) + R' R_d dOmega_d/dt - Omega x R' R_d Omega_d
 //!            dOmega/dt = (G u)_f + nu - (dOmega/dt)_f,  G u = [l/Ix U1, l/Iy U2, (d/b)/Iz U3]
 //! ```
 //!
@@ -23,8 +24,14 @@
 //!
 //! # Decisions
 //!
+//! * **Feed-forward** is Tal and Karaman's: Omega_d and dOmega_d/dt by [`crate::flatness`] from the setpoint's jerk and
+//!   snap, which are those of the specific force while gravity is constant. They turn the commanded s, not the
+//!   reference's. Where jerk and snap are zero because nobody gives them, R_d follows s by feedback alone.
 //! * **Rotor model**: a first-order lag of the speed with the time constant [`Gains::rotor_time_constant_s`], initially
 //!   at hover. Its input is the command after rotor limits, so it cannot wind up.
+//! * **What it is told of the rotors**: that time constant, 20 ms by default, which is the lag of the rotors that all
+//!   gains here are for; [`crate::slowed`] scales it for others. It is not told of their delay. At lags from half to
+//!   twice what it is told it still flies (`tests/flights.rs`).
 //! * **Not adaptive**: G is nominal. A true effectiveness of k times the nominal raises the loop gain by the factor k.
 //! * **Neglected**: the moment that accelerates the propellers (G2 of the 2016 paper), which this project's plant
 //!   models do not have.
@@ -35,10 +42,13 @@
 use crate::attitude::{r_earth_body, unit};
 use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
+use crate::flatness::{Desired, flat};
+use crate::increment::{Increment, Reaction};
 use crate::limits::Limits;
 use crate::loops::{AttitudeLoop, AttitudeOutput, PositionLoop, PositionOutput, xy_and_z};
-use afbc_control::{Action, FlightController, Mixer, Settings, Trace, math};
-use afbc_types::{Airframe, Declared, OutOfRange, RotorSpeeds, Setpoint, State, parameters};
+use crate::rotor_model::{RotorModel, Spin};
+use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
+use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
 parameters! {
@@ -121,10 +131,8 @@ pub struct Indi<const N: usize = 4> {
     dt_s: f32,
     limits: Limits,
     position_filter: Differentiator,
-    attitude_filter: Differentiator,
-    hover: RotorSpeeds<N>,
-    /// 1 - exp(-dt / tau)
-    rotor_gain: f32,
+    increment: Increment,
+    rotors: RotorModel<N>,
     position: PositionLoop,
     attitude: AttitudeLoop,
     rate_p: Vector3<f32>,
@@ -133,13 +141,10 @@ pub struct Indi<const N: usize = 4> {
 /// State of the controller between steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory<const N: usize = 4> {
-    /// Speeds of the rotor model; none before the first step.
-    rotors: Option<RotorSpeeds<N>>,
+    rotors: Spin<N>,
     velocity: Smooth,
     specific_force: Smooth,
-    rates: Smooth,
-    /// G u \[rad/s2\]
-    rotor_acceleration: Smooth,
+    reaction: Reaction,
     /// Trace of the last step.
     trace: Trace,
 }
@@ -154,15 +159,13 @@ impl<const N: usize> Indi<N> {
         let body = Body::new(&vehicle, &settings)?;
         let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
         gains.validate()?;
-        let tau = gains.rotor_time_constant_s;
         Ok(Indi {
             body,
             dt_s: settings.dt_s,
             limits: Limits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
             position_filter: Differentiator::new(gains.position_filter_rad_s, settings.dt_s)?,
-            attitude_filter: Differentiator::new(gains.attitude_filter_rad_s, settings.dt_s)?,
-            hover: body.hover(vehicle.weight_n()),
-            rotor_gain: if tau > 0.0 { 1.0 - math::exp(-settings.dt_s / tau) } else { 1.0 },
+            increment: Increment(Differentiator::new(gains.attitude_filter_rad_s, settings.dt_s)?),
+            rotors: RotorModel::new(&body, vehicle.weight_n(), gains.rotor_time_constant_s, settings.dt_s),
             position: PositionLoop {
                 position_p: xy_and_z(gains.position_p_1_s, gains.height_p_1_s),
                 velocity_p: xy_and_z(gains.velocity_p_1_s, gains.climb_p_1_s),
@@ -192,18 +195,17 @@ impl<const N: usize> FlightController<N> for Indi<N> {
     #[inline]
     fn decide(&self, memory: &mut Memory<N>, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
         let r = r_earth_body(&state.attitude_rad);
-        let (body_z, earth_z) = (unit(&r.column(2).into()), r.row(2).transpose());
+        let body_z = unit(&r.column(2).into());
 
         // Present rotor forces by the model, and the measured reaction of the vehicle.
-        let rotors = memory.rotors.unwrap_or(self.hover);
-        let now = self.body.mixer.inputs(&self.body.mixer.forces(&rotors));
+        let now = self.rotors.inputs(&self.body, &memory.rotors);
         // Without a new measurement no filter advances, so that all four stay synchronous.
         if fresh {
             let specific_force = body_z * (now.thrust_n / self.body.mass_kg);
             self.position_filter.advance(&mut memory.specific_force, &specific_force);
             self.position_filter.advance(&mut memory.velocity, &state.velocity_m_s);
-            self.attitude_filter.advance(&mut memory.rotor_acceleration, &self.body.angular_acceleration(&now));
-            self.attitude_filter.advance(&mut memory.rates, &state.rates_rad_s);
+            let given = self.body.angular_acceleration(&now);
+            self.increment.measure(&mut memory.reaction, &given, &state.rates_rad_s);
         }
 
         // Position.
@@ -213,14 +215,18 @@ impl<const N: usize> FlightController<N> for Indi<N> {
         let specific_force = self.limits.apply(&(memory.specific_force.value() + increment));
 
         // Attitude.
-        let AttitudeOutput { desired, attitude_error_rad, rates_rad_s, rate_error_rad_s } =
-            self.attitude.output(&r, &specific_force, state, setpoint);
-        let nu = self.rate_p.component_mul(&rate_error_rad_s) + earth_z * setpoint.yaw_acceleration_rad_s2;
-        let increment = nu - memory.rates.derivative();
+        let Desired { r_earth_desired: desired, rates_rad_s: omega_d, rates_dot_rad_s2 } =
+            flat([specific_force, setpoint.jerk_m_s3, setpoint.snap_m_s4], setpoint);
+        let to_body = r.transpose() * desired;
+        let omega_d = to_body * omega_d;
+        let AttitudeOutput { attitude_error_rad, rates_rad_s, rate_error_rad_s } =
+            self.attitude.output(&r, &desired, &omega_d, state);
+        let nu = self.rate_p.component_mul(&rate_error_rad_s) + to_body * rates_dot_rad_s2
+            - state.rates_rad_s.cross(&omega_d);
 
         let demand = Demand {
             thrust_n: self.body.mass_kg * specific_force.dot(&body_z).max(0.0),
-            angular_acceleration_rad_s2: memory.rotor_acceleration.value() + increment,
+            angular_acceleration_rad_s2: self.increment.invert(&memory.reaction, &nu),
             acceleration_m_s2,
             desired,
             desired_rates_rad_s: rates_rad_s,
@@ -228,7 +234,7 @@ impl<const N: usize> FlightController<N> for Indi<N> {
         };
         let (action, trace, _) = self.body.act(&demand);
         memory.trace = trace;
-        memory.rotors = Some(RotorSpeeds(rotors.0 + (action.speeds.0 - rotors.0) * self.rotor_gain));
+        self.rotors.advance(&mut memory.rotors, &action.speeds);
         action
     }
 }

@@ -5,7 +5,7 @@
 //! |---|---|---|
 //! | [`pid`] | cascaded PID with a tilt-prioritised attitude loop | PX4; Brescianini and D'Andrea 2018 |
 //! | [`geometric`] | tracking on SE(3), optionally with integrals | Lee, Leok, McClamroch 2010; Goodarzi et al. 2013 |
-//! | [`indi`] | incremental dynamic inversion of attitude and of position | Smeur, Chu, de Croon 2016 and 2018 |
+//! | [`indi`] | incremental dynamic inversion of attitude and position | Smeur et al. 2016, 2018; Tal, Karaman 2021 |
 //!
 //! The head of each file gives the equations, the sources and the decisions made where a source leaves something open.
 //! Frames and units are defined in [`afbc_types`].
@@ -48,13 +48,16 @@
 pub mod attitude;
 mod body;
 pub mod differentiator;
+pub mod flatness;
 pub mod geometric;
 mod hover_thrust;
+mod increment;
 pub mod indi;
 mod integral;
 pub mod limits;
 mod loops;
 pub mod pid;
+mod rotor_model;
 mod slowed;
 
 pub use geometric::Geometric;

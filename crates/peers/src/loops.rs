@@ -1,7 +1,9 @@
-//! Outer loops of PID and INDI: from position to acceleration, and from attitude to rates.
+//! Outer loops: from position to acceleration, cascaded (PID, INDI) or with one error (geometric, DFBC), and from
+//! attitude to rates.
 
-use crate::attitude::{facing, tilt_prioritised_error};
-use crate::limits::cylinder;
+use crate::attitude::tilt_prioritised_error;
+use crate::integral::{away_from, integrate};
+use crate::limits::{Limits, cylinder};
 use afbc_types::{Setpoint, State};
 use nalgebra::{Matrix3, Vector3};
 
@@ -42,7 +44,58 @@ impl PositionLoop {
     }
 }
 
-/// From attitude to rates: k_a e(R, R_d) + R' e_z dpsi_d/dt, e tilt-prioritised.
+/// From position to acceleration: k_x (p_d - p) + k_v (v_d - v) + sat(k_i int (p_d - p)) + a_d.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct TrackingLoop {
+    /// k_x \[1/s2\]
+    pub(crate) position_p: Vector3<f32>,
+    /// k_v \[1/s\]
+    pub(crate) position_d: Vector3<f32>,
+    /// k_i \[1/s3\]
+    pub(crate) position_i: Vector3<f32>,
+    /// Largest integral, per coordinate \[m/s2\].
+    pub(crate) integral_max_m_s2: f32,
+    pub(crate) limits: Limits,
+    pub(crate) dt_s: f32,
+}
+
+/// Errors, demanded acceleration and specific force, earth frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TrackingOutput {
+    pub(crate) position_error_m: Vector3<f32>,
+    pub(crate) velocity_error_m_s: Vector3<f32>,
+    pub(crate) acceleration_m_s2: Vector3<f32>,
+    /// Within limits.
+    pub(crate) specific_force_m_s2: Vector3<f32>,
+    /// What the limits take from the specific force.
+    missing_m_s2: Vector3<f32>,
+}
+
+impl TrackingLoop {
+    /// Computes one step; `integral` is sat(k_i int (p_d - p)).
+    #[inline]
+    pub(crate) fn output(&self, state: &State, setpoint: &Setpoint, integral: &Vector3<f32>) -> TrackingOutput {
+        let position_error_m = setpoint.position_m - state.position_m;
+        let velocity_error_m_s = setpoint.velocity_m_s - state.velocity_m_s;
+        let acceleration_m_s2 = self.position_p.component_mul(&position_error_m)
+            + self.position_d.component_mul(&velocity_error_m_s)
+            + integral
+            + setpoint.acceleration_m_s2;
+        let wanted = acceleration_m_s2 + self.limits.gravity();
+        let specific_force_m_s2 = self.limits.apply(&wanted);
+        let missing_m_s2 = wanted - specific_force_m_s2;
+        TrackingOutput { position_error_m, velocity_error_m_s, acceleration_m_s2, specific_force_m_s2, missing_m_s2 }
+    }
+
+    /// Advances the integral, not towards what the limits took.
+    #[inline]
+    pub(crate) fn learn(&self, integral: &mut Vector3<f32>, output: &TrackingOutput) {
+        let allowed = output.position_error_m.zip_map(&output.missing_m_s2, away_from);
+        *integral = integrate(integral, &self.position_i.component_mul(&allowed), self.dt_s, self.integral_max_m_s2);
+    }
+}
+
+/// From attitude to rates: k_a e(R, R_d) + Omega_ff, e tilt-prioritised.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct AttitudeLoop {
     /// k_a; that of yaw divided by its weight \[1/s\].
@@ -50,11 +103,9 @@ pub(crate) struct AttitudeLoop {
     yaw_weight: f32,
 }
 
-/// Desired attitude; errors and demanded rates in the body frame.
+/// Errors and demanded rates in the body frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AttitudeOutput {
-    /// R_d
-    pub(crate) desired: Matrix3<f32>,
     pub(crate) attitude_error_rad: Vector3<f32>,
     pub(crate) rates_rad_s: Vector3<f32>,
     pub(crate) rate_error_rad_s: Vector3<f32>,
@@ -66,19 +117,17 @@ impl AttitudeLoop {
         AttitudeLoop { attitude_p: xy_and_z(tilt_p_1_s, yaw_p_1_s / yaw_weight), yaw_weight }
     }
 
-    /// Computes one step in the attitude `r`, for a thrust along `specific_force`, which must point up.
+    /// Computes one step in the attitude `r`, towards `desired` with the rates `feed_forward_rad_s` in the body frame.
     #[inline]
     pub(crate) fn output(
         &self,
         r: &Matrix3<f32>,
-        specific_force: &Vector3<f32>,
+        desired: &Matrix3<f32>,
+        feed_forward_rad_s: &Vector3<f32>,
         state: &State,
-        setpoint: &Setpoint,
     ) -> AttitudeOutput {
-        let desired = facing(specific_force, setpoint.yaw_rad);
-        let attitude_error_rad = tilt_prioritised_error(r, &desired, self.yaw_weight);
-        let earth_z = r.row(2).transpose();
-        let rates_rad_s = self.attitude_p.component_mul(&attitude_error_rad) + earth_z * setpoint.yaw_rate_rad_s;
-        AttitudeOutput { desired, attitude_error_rad, rates_rad_s, rate_error_rad_s: rates_rad_s - state.rates_rad_s }
+        let attitude_error_rad = tilt_prioritised_error(r, desired, self.yaw_weight);
+        let rates_rad_s = self.attitude_p.component_mul(&attitude_error_rad) + feed_forward_rad_s;
+        AttitudeOutput { attitude_error_rad, rates_rad_s, rate_error_rad_s: rates_rad_s - state.rates_rad_s }
     }
 }

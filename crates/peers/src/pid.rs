@@ -21,8 +21,8 @@
 //! makes good, does not change the horizontal acceleration. The estimator of h is in `hover_thrust.rs`.
 //!
 //! Sources: PX4-Autopilot, `mc_pos_control` (PositionControl), `mc_hover_thrust_estimator`, `mc_att_control`
-//! (AttitudeControl) and `lib/rate_control`, read for their structure; the attitude error is Brescianini and D'Andrea's (see
-//! [`crate::attitude`]); the tracking anti-windup of the velocity loop is Rundqwist's, *Anti-reset windup for PID
+//! (AttitudeControl) and `lib/rate_control`, read for their structure; the attitude error is Brescianini and D'Andrea's
+//! (see [`crate::attitude`]); the tracking anti-windup of the velocity loop is Rundqwist's, *Anti-reset windup for PID
 //! controllers*, IFAC 1990.
 //!
 //! Differences from PX4: gains of the rate loop are in 1/s, because the moment is scaled by the inertia; thrust is in
@@ -31,7 +31,7 @@
 //! thrust give together; derivatives are those of [`crate::differentiator`]; the rate integrator is not slowed down at
 //! large errors.
 
-use crate::attitude::{length, r_earth_body};
+use crate::attitude::{facing, length, r_earth_body};
 use crate::body::{Body, Demand};
 use crate::differentiator::{Differentiator, Smooth};
 use crate::hover_thrust::{HoverThrust, HoverThrustEstimator};
@@ -273,8 +273,10 @@ impl<const N: usize> FlightController<N> for Pid<N> {
         let specific_force = self.limits.apply(&wanted);
         let tilted = specific_force * (g / specific_force.z);
         let missing = acceleration - Vector3::new(tilted.x, tilted.y, specific_force.z / h - g);
-        let AttitudeOutput { desired, attitude_error_rad, rates_rad_s, rate_error_rad_s } =
-            self.attitude.output(&r, &specific_force, state, setpoint);
+        let desired = facing(&specific_force, setpoint.yaw_rad);
+        let turning = r.row(2).transpose() * setpoint.yaw_rate_rad_s;
+        let AttitudeOutput { attitude_error_rad, rates_rad_s, rate_error_rad_s } =
+            self.attitude.output(&r, &desired, &turning, state);
 
         // Rates.
         let angular_acceleration = self.rate_p.component_mul(&rate_error_rad_s) + memory.rate_integral

@@ -5,6 +5,7 @@ mod harness;
 
 use afbc_control::{Action, FlightController, Screened, Trace};
 use afbc_peers::attitude::{facing, geometric_error, quaternion, r_earth_body, roll_pitch, tilt_prioritised_error};
+use afbc_peers::flatness::flat;
 use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
 use afbc_types::{Declaration, Declared, OutOfRange, Range, Setpoint, State, Value};
 use core::convert::Infallible;
@@ -248,7 +249,17 @@ fn quaternions_match_their_matrices() {
 #[test]
 fn desired_rates_are_the_derivative_of_the_desired_attitude() {
     // A moving specific force and heading; R_d by differences in f64, Omega_d = (R_d' dR_d/dt)^v.
-    let force = |t: f64| Vector3::new(2.0 * (1.3 * t).sin(), 1.5 * (0.9 * t).cos(), 9.81 + (0.7 * t).sin());
+    for [size, pace] in [[1.0, 1.0], [2.5, 1.0], [2.5, 2.5]] {
+        rates_of([size, pace]);
+    }
+}
+
+/// The same for specific forces of this size and pace.
+fn rates_of([size, pace]: [f64; 2]) {
+    let force = |t: f64| {
+        let t = pace * t;
+        Vector3::new(2.0 * size * (1.3 * t).sin(), 1.5 * size * (0.9 * t).cos(), 9.81 + size * (0.7 * t).sin())
+    };
     let yaw = |t: f64| 0.8 * (0.5 * t).sin();
     let attitude = |t: f64| {
         let z = force(t).normalize();
@@ -273,7 +284,14 @@ fn desired_rates_are_the_derivative_of_the_desired_attitude() {
         let s = [force(t).cast(), force_dot(t).cast(), derivative(&force_dot, t).cast()];
         let desired = geometric::desired(s, &setpoint);
         let (omega, omega_dot) = (rates(t), derivative(&rates, t));
-        assert!((desired.rates_rad_s.cast::<f64>() - omega).amax() < 2e-3, "{desired:?} {omega:?}");
+        let error = (desired.rates_rad_s.cast::<f64>() - omega).amax();
+        assert!(error < 2e-3 * omega.norm().max(1.0), "{desired:?} {omega:?}");
+        // With the products of rates nothing is left but the error of a sine.
+        let exact = flat(s, &setpoint);
+        let same = (exact.r_earth_desired, exact.rates_rad_s) == (desired.r_earth_desired, desired.rates_rad_s);
+        assert!(same, "{exact:?} {desired:?}");
+        let error = (exact.rates_dot_rad_s2.cast::<f64>() - omega_dot).amax();
+        assert!(error < 4e-3 * (1.0 + omega_dot.norm() + omega.norm_squared()), "{error} of {omega_dot:?} {omega:?}");
         // The neglected part is of second order in the rates.
         let (left_out, speed) = ((desired.rates_dot_rad_s2.cast::<f64>() - omega_dot).amax(), omega.norm());
         assert!(left_out < 5e-3 + 3.0 * speed * (speed + force_dot(t).norm() / 9.81), "{left_out} at {speed}");

@@ -7,8 +7,9 @@ mod harness;
 
 use afbc_control::FlightController;
 use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
-use afbc_plant::{Environment, ParameterChange, Quantity};
-use afbc_types::Parameters;
+use afbc_plant::{Environment, Motion, ParameterChange, Quantity};
+use afbc_types::{Parameters, Setpoint};
+use core::f64::consts::FRAC_PI_2;
 use harness::{
     Figures, Random, Rig, SETTINGS, at, calm, circle, disturbed, fly, fly_on, hover, paper, paper_start, vehicle,
 };
@@ -79,7 +80,7 @@ fn all_follow_a_step() {
 #[test]
 fn all_fly_a_circle() {
     let start = at([2.0, 0.0, 2.0], core::f64::consts::FRAC_PI_2);
-    fn figures<C: FlightController>(controller: &C, start: afbc_plant::Motion) -> Figures {
+    fn figures<C: FlightController>(controller: &C, start: Motion) -> Figures {
         fly(controller, Rig::LAG, calm(), start, circle(2.0, 6.0), [6.0, 20.0])
     }
     within("pid", &figures(&pid(), start), [0.003, 0.003, 0.001, 0.002]);
@@ -159,5 +160,67 @@ fn the_hover_thrust_takes_over_from_the_integral() {
         assert!((f64::from(held_without) - needed).abs() < 0.01, "{held_without} for {needed}");
         assert!(f64::from(held).abs() < 0.01 * (1.0 + needed.abs()), "{held} is left of {needed}");
         assert!(moved < moved_without + 0.003, "{moved} m, without the estimate {moved_without} m");
+    }
+}
+
+/// A horizontal figure of eight of 2 m with rising and falling.
+fn eight(period_s: f64) -> impl Fn(f64) -> Setpoint {
+    move |t| {
+        let w = core::f64::consts::TAU / period_s;
+        // Value and derivatives of sin(n w t), for n = 1, 2.
+        let sine = |order: usize, n: f64| (n * w).powi(order as i32) * libm::sin(n * w * t + order as f64 * FRAC_PI_2);
+        let at = |order| Vector3::new(2.0 * sine(order, 1.0), sine(order, 2.0), 0.3 * sine(order, 1.0)).cast::<f32>();
+        Setpoint {
+            position_m: at(0) + Vector3::new(0.0, 0.0, 3.0),
+            velocity_m_s: at(1),
+            acceleration_m_s2: at(2),
+            jerk_m_s3: at(3),
+            snap_m_s4: at(4),
+            ..Setpoint::default()
+        }
+    }
+}
+
+/// Start on a reference.
+fn upon(reference: &Setpoint) -> Motion {
+    let mut start = at(reference.position_m.cast().into(), f64::from(reference.yaw_rad));
+    start.velocity_m_s = reference.velocity_m_s.cast();
+    start
+}
+
+/// Distance from the eight after two of its rounds, largest \[m\].
+fn off_the_eight<C: FlightController>(controller: &C, rig: Rig, period_s: f64, told: impl Fn(&mut Setpoint)) -> f64 {
+    let path = eight(period_s);
+    let reference = |t| {
+        let mut setpoint = path(t);
+        told(&mut setpoint);
+        setpoint
+    };
+    let times = [period_s, 3.0 * period_s];
+    fly(controller, rig, calm(), upon(&path(0.0)), reference, times).max_abs.xyz().norm()
+}
+
+/// With ideal rotors nothing but the steps of a millisecond keeps INDI from a flat trajectory; without jerk and snap it
+/// is off by many times as much.
+#[test]
+fn jerk_and_snap_keep_indi_on_its_path() {
+    let gains = indi::Gains { rotor_time_constant_s: 0.0, ..indi::Gains::PAPER_VEHICLE };
+    let indi = Indi::new(vehicle(), SETTINGS, gains).unwrap();
+    let ideal = Rig { lag_s: 0.0, delay: 0, noise: 0.0 };
+    for period_s in [8.0, 6.0, 5.0] {
+        let with = off_the_eight(&indi, ideal, period_s, |_| ());
+        let without = off_the_eight(&indi, ideal, period_s, |s| {
+            (s.jerk_m_s3, s.snap_m_s4) = (Vector3::zeros(), Vector3::zeros())
+        });
+        assert!(with < 5e-4 && with < 0.02 * without, "{with} m, without jerk and snap {without} m in {period_s} s");
+    }
+}
+
+/// What INDI is told of the rotors need not be exact.
+#[test]
+fn indi_flies_rotors_of_half_to_twice_the_lag_it_is_told() {
+    for lag_s in [0.01, 0.015, 0.02, 0.03, 0.04] {
+        let off = off_the_eight(&indi(), Rig { lag_s, ..Rig::ALL }, 6.0, |_| ());
+        assert!(off < 0.003, "{off} m with a lag of {lag_s} s");
     }
 }

@@ -1,0 +1,37 @@
+//! Incremental inversion of the rotational dynamics, shared by INDI and DFBC.
+//!
+//! ```text
+//! dOmega/dt = (G u)_f + nu - (dOmega/dt)_f
+//! ```
+//!
+//! Whatever turns the vehicle besides the rotors is in (dOmega/dt)_f - (G u)_f. Both pass the same filter.
+
+use crate::differentiator::{Differentiator, Smooth};
+use nalgebra::Vector3;
+
+/// The filter of both signals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Increment(pub(crate) Differentiator);
+
+/// What the rotors give and how the vehicle reacts, filtered.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Reaction {
+    /// G u \[rad/s2\]
+    rotor_acceleration: Smooth,
+    rates: Smooth,
+}
+
+impl Increment {
+    /// Feeds G u and the measured rates of this step; without a new measurement neither, so that both stay synchronous.
+    #[inline]
+    pub(crate) fn measure(&self, reaction: &mut Reaction, given_rad_s2: &Vector3<f32>, rates_rad_s: &Vector3<f32>) {
+        self.0.advance(&mut reaction.rotor_acceleration, given_rad_s2);
+        self.0.advance(&mut reaction.rates, rates_rad_s);
+    }
+
+    /// Returns the part of dOmega/dt that the rotors must give for a total of `nu` \[rad/s2\].
+    #[inline]
+    pub(crate) fn invert(&self, reaction: &Reaction, nu: &Vector3<f32>) -> Vector3<f32> {
+        reaction.rotor_acceleration.value() + (nu - reaction.rates.derivative())
+    }
+}
