@@ -96,7 +96,8 @@ pub static QUANTITIES: [Quantity; 23] = [
         }),
     ),
     quantity("payload_kg", 0.0, 500.0, "mass of a payload, unknown to the law", |f, mass_kg| {
-        f.payload = Some(Payload { mass_kg, below_m: 0.0, start_s: 0.0, end_s: f64::INFINITY });
+        f.payload =
+            Some(Payload { mass_kg, below_m: 0.0, ahead_m: 0.0, left_m: 0.0, start_s: 0.0, end_s: f64::INFINITY });
     }),
     needing(
         "payload_kg",

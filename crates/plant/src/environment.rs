@@ -3,7 +3,7 @@
 use crate::frame::Frame;
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, Range};
 use alloc::vec::Vec;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 /// Meaning of a gust's size. In both cases it is part of the paper's A_F = -\[A_x, A_y, A_z\] and A_T = -\[A_phi,
 /// A_theta, A_psi\]: a positive gust pushes in the negative direction.
@@ -42,6 +42,12 @@ pub enum Quantity {
     ThrustFactor,
     /// d: drag factor.
     DragFactor,
+    /// Moment of the rotors' thrusts about body x: the effect of U1. Below 0: the wrong sign.
+    RollMoment,
+    /// Likewise about body y, the effect of U2.
+    PitchMoment,
+    /// Moment of the rotors' drag about body z: the effect of U3.
+    YawMoment,
 }
 
 /// Multiplies one parameter by `factor` from `start_s` to `end_s`.
@@ -57,15 +63,19 @@ pub struct ParameterChange {
     pub end_s: f64,
 }
 
-/// A point mass carried from `start_s` to `end_s` on the body's z axis, so that thrust still acts through the common
-/// centre of mass. It is taken up and released at the vehicle's velocity. Position and velocity are those of the common
-/// centre of mass, and do not jump.
+/// A point mass carried from `start_s` to `end_s`. It is taken up and released at the vehicle's velocity. Position and
+/// velocity are those of the common centre of mass, and do not jump. Beside the body's z axis it moves that centre away
+/// from the thrust, whose moment follows; products of inertia, and the same shift for drag and ground, are left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Payload {
     /// Mass \[kg\].
     pub mass_kg: f64,
     /// Distance below the centre of mass of the vehicle and the payloads listed before; negative for above \[m\].
     pub below_m: f64,
+    /// Distance ahead of that centre; negative for behind \[m\].
+    pub ahead_m: f64,
+    /// Distance to the left of it; negative for the right \[m\].
+    pub left_m: f64,
     /// Start \[s\].
     pub start_s: f64,
     /// End \[s\]; infinite for a payload that is kept.
@@ -76,14 +86,24 @@ pub struct Payload {
 pub const PAYLOAD_MASS: Range = Range::new("payload_mass_kg", 0.0, 500.0);
 /// Accepted range of a payload's distance below the centre of mass \[m\].
 pub const PAYLOAD_BELOW: Range = Range::new("below_m", -10.0, 10.0);
+/// Accepted range of a payload's distance ahead of the centre of mass \[m\].
+pub const PAYLOAD_AHEAD: Range = Range::new("ahead_m", -10.0, 10.0);
+/// Accepted range of a payload's distance to the left of the centre of mass \[m\].
+pub const PAYLOAD_LEFT: Range = Range::new("left_m", -10.0, 10.0);
 
 impl Payload {
-    /// Adds the payload's mass, and by the parallel axis theorem m m_p/(m + m_p) h^2 to Ix and Iy.
-    fn load(&self, vehicle: &mut Parameters<f64>) {
-        let total_kg = vehicle.mass_kg + self.mass_kg;
-        let across = vehicle.mass_kg * self.mass_kg / total_kg * self.below_m * self.below_m;
+    /// Adds the payload's mass, by the parallel axis theorem m m_p/(m + m_p) times the square of its distance from each
+    /// axis to Ix, Iy and Iz, and its shift of the centre of mass.
+    fn load(&self, vehicle: &mut Parameters<f64>, rig: &mut Rig) {
+        let Payload { mass_kg, below_m, ahead_m, left_m, .. } = *self;
+        let total_kg = vehicle.mass_kg + mass_kg;
+        let [below, ahead, left] = [below_m, ahead_m, left_m].map(|distance_m| distance_m * distance_m);
+        let reduced_kg = vehicle.mass_kg * mass_kg / total_kg;
         vehicle.mass_kg = total_kg;
-        vehicle.inertia_kg_m2 += Vector3::new(across, across, 0.0);
+        vehicle.inertia_kg_m2 += reduced_kg * Vector3::new(left + below, ahead + below, ahead + left);
+        let share = mass_kg / total_kg;
+        rig.lever_m.x += share * left_m;
+        rig.lever_m.y -= share * ahead_m;
     }
 }
 
@@ -109,10 +129,27 @@ fn active(start_s: f64, end_s: f64, t: f64) -> bool {
     start_s <= t + TIME_SLACK_S && t + TIME_SLACK_S < end_s
 }
 
+/// How the rotors' wrench reaches the body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rig {
+    /// Factors on the rotors' moments about body x, y, z.
+    pub(crate) moments: Vector3<f64>,
+    /// Moments about body x and y that the thrust takes away, per thrust \[m\]: it acts beside the centre of mass.
+    pub(crate) lever_m: Vector2<f64>,
+}
+
+impl Rig {
+    /// As built: the thrust acts through the centre of mass.
+    pub(crate) fn intact() -> Self {
+        Rig { moments: Vector3::repeat(1.0), lever_m: Vector2::zeros() }
+    }
+}
+
 /// Parameters and disturbances that are constant until the next change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Segment {
     pub(crate) parameters: Parameters<f64>,
+    pub(crate) rig: Rig,
     /// \[A_x, A_y, A_z\], earth frame \[m/s2\].
     pub(crate) a_force: Vector3<f64>,
     /// \[A_phi, A_theta, A_psi\], body frame \[rad/s2\].
@@ -153,6 +190,8 @@ impl Environment {
         for payload in &payloads {
             PAYLOAD_MASS.check(payload.mass_kg)?;
             PAYLOAD_BELOW.check(payload.below_m)?;
+            PAYLOAD_AHEAD.check(payload.ahead_m)?;
+            PAYLOAD_LEFT.check(payload.left_m)?;
         }
         let environment = Environment { payloads, ..self };
         environment.validate_changes()?;
@@ -209,17 +248,20 @@ impl Environment {
 
     /// Returns what holds at time `t` \[s\], and until when.
     pub(crate) fn segment(&self, t: f64) -> Segment {
-        let mut parameters = self.nominal;
+        let (mut parameters, mut rig) = (self.nominal, Rig::intact());
         for change in self.changes.iter().filter(|c| active(c.start_s, c.end_s, t)) {
             match change.quantity {
                 Quantity::Mass => parameters.mass_kg *= change.factor,
                 Quantity::Inertia => parameters.inertia_kg_m2 *= change.factor,
                 Quantity::ThrustFactor => parameters.thrust_factor_n_s2 *= change.factor,
                 Quantity::DragFactor => parameters.drag_factor_n_m_s2 *= change.factor,
+                Quantity::RollMoment => rig.moments.x *= change.factor,
+                Quantity::PitchMoment => rig.moments.y *= change.factor,
+                Quantity::YawMoment => rig.moments.z *= change.factor,
             }
         }
         for payload in self.payloads.iter().filter(|p| active(p.start_s, p.end_s, t)) {
-            payload.load(&mut parameters);
+            payload.load(&mut parameters, &mut rig);
         }
         let (m, i) = (parameters.mass_kg, parameters.inertia_kg_m2);
         let scale = PerAxis { roll: i.x, pitch: i.y, yaw: i.z, z: m, x: m, y: m };
@@ -237,6 +279,7 @@ impl Environment {
             changes.chain(gusts).chain(payloads).filter(|&edge| edge > t + TIME_SLACK_S).fold(f64::INFINITY, f64::min);
         Segment {
             parameters,
+            rig,
             a_force: Vector3::new(a.x, a.y, a.z),
             a_moment: Vector3::new(a.roll, a.pitch, a.yaw),
             until_s: until_s - TIME_SLACK_S,

@@ -42,6 +42,7 @@ pub mod noise;
 mod realism;
 pub mod rigid_body;
 pub mod rotors;
+mod sensor_fault;
 pub mod sensors;
 pub mod simplified;
 mod surroundings;
@@ -53,7 +54,8 @@ pub use battery::{Battery, Charge, Sag};
 pub use contact::Contact;
 pub use drag::Drag;
 pub use environment::{
-    Environment, GUST_SIZE, Gust, GustKind, PAYLOAD_BELOW, PAYLOAD_MASS, ParameterChange, Payload, Quantity, START,
+    Environment, GUST_SIZE, Gust, GustKind, PAYLOAD_AHEAD, PAYLOAD_BELOW, PAYLOAD_LEFT, PAYLOAD_MASS, ParameterChange,
+    Payload, Quantity, START,
 };
 pub use frame::{Frame, Lanes};
 pub use ground_effect::GroundEffect;
@@ -61,6 +63,7 @@ pub use load::Load;
 pub use motion::Motion;
 pub use realism::{Realism, STEP, Telemetry};
 pub use rotors::{RotorFault, Rotors, Start};
+pub use sensor_fault::{Misreading, SensorFault, SensorFaults};
 pub use sensors::{Deviations, Dropouts, Measurement, Sensing, Sensors};
 pub use turbulence::Turbulence;
 pub use vehicle::{Model, Plant};

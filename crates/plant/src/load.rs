@@ -1,5 +1,6 @@
 //! Forces and moments over one step.
 
+use crate::environment::Rig;
 use crate::frame::{Frame, Lanes, Sums};
 use afbc_types::Parameters;
 use nalgebra::Vector3;
@@ -34,20 +35,21 @@ impl Load {
     ) -> Self {
         let [w1, w2, w3, w4] = speeds_rad_s;
         let speeds = Lanes::from([w1, w2, w3, w4, 0.0, 0.0, 0.0, 0.0]);
-        Self::ideal(parameters, &Frame::default(), &speeds, a_force, a_moment)
+        Self::ideal(parameters, &Rig::intact(), &Frame::default(), &speeds, a_force, a_moment)
     }
 
-    /// The same on any frame.
+    /// The same on any frame, however its rotors act on the body.
     #[inline]
     pub(crate) fn ideal(
         parameters: &Parameters<f64>,
+        rig: &Rig,
         frame: &Frame,
         speeds_rad_s: &Lanes,
         a_force: Vector3<f64>,
         a_moment: Vector3<f64>,
     ) -> Self {
         let squares = speeds_rad_s.map(|w| w * w);
-        Self::of_rotors(parameters, frame, [speeds_rad_s, &squares], 1.0, a_force, a_moment)
+        Self::of_rotors(parameters, rig, frame, [speeds_rad_s, &squares], 1.0, a_force, a_moment)
     }
 
     /// Computes the load of rotors whose drag moments follow from the `squares` of their speeds \[rad2/s2\], already
@@ -55,6 +57,7 @@ impl Load {
     #[inline]
     pub(crate) fn of_rotors(
         parameters: &Parameters<f64>,
+        rig: &Rig,
         frame: &Frame,
         [speeds_rad_s, squares]: [&Lanes; 2],
         thrust_ratio: f64,
@@ -64,11 +67,16 @@ impl Load {
         let Parameters { mass_kg, arm_m, inertia_kg_m2: i, rotor_inertia_kg_m2, .. } = *parameters;
         let Sums { all, x, y, spin, .. } = frame.sums(squares);
         let (b, d) = (thrust_ratio * parameters.thrust_factor_n_s2, parameters.drag_factor_n_m_s2);
+        let (thrust_n, Rig { moments, lever_m }) = (b * all, rig);
         let momentum = rotor_inertia_kg_m2 * frame.sums(speeds_rad_s).spin;
         Load {
-            thrust_m_s2: b * all / mass_kg,
+            thrust_m_s2: thrust_n / mass_kg,
             gravity_m_s2: parameters.gravity_m_s2,
-            rotor_rad_s2: Vector3::new(arm_m * b * y / i.x, arm_m * b * -x / i.y, d * spin / i.z),
+            rotor_rad_s2: Vector3::new(
+                moments.x * (arm_m * b * y / i.x) - lever_m.x * thrust_n / i.x,
+                moments.y * (arm_m * b * -x / i.y) - lever_m.y * thrust_n / i.y,
+                moments.z * (d * spin / i.z),
+            ),
             a_force,
             a_moment,
             coupling: Vector3::new((i.y - i.z) / i.x, (i.z - i.x) / i.y, (i.x - i.y) / i.z),

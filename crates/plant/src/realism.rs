@@ -135,7 +135,7 @@ impl Effects {
         velocity_m_s: &Vector3<f64>,
         axes: impl FnOnce() -> BodyAxes,
     ) -> (Load, Surroundings<'_>) {
-        let Segment { parameters, a_force, a_moment, .. } = segment;
+        let Segment { parameters, rig, a_force, a_moment, .. } = segment;
         let drive = self.spin.advance(&self.frame, speeds, time_s, parameters.drag_factor_n_m_s2);
         self.wind_m_s = self.weather.advance(time_s, position_m.z, velocity_m_s);
         if let Some(effect) = &self.ground_effect {
@@ -146,6 +146,7 @@ impl Effects {
         self.on_ground = ground.is_some_and(|ground| ground.touches(position_m.z, &axes()));
         let load = Load::of_rotors(
             parameters,
+            rig,
             &self.frame,
             [&drive.speeds_rad_s, &drive.squares],
             self.thrust_ratio,

@@ -134,8 +134,8 @@ impl Plant {
         if self.effects.is_some() {
             self.advance_in_effect(speeds, dt_s);
         } else {
-            let Segment { parameters, a_force, a_moment, .. } = &self.segment;
-            let load = Load::ideal(parameters, self.environment.frame(), speeds, *a_force, *a_moment);
+            let Segment { parameters, rig, a_force, a_moment, .. } = &self.segment;
+            let load = Load::ideal(parameters, rig, self.environment.frame(), speeds, *a_force, *a_moment);
             self.body.advance(&load, dt_s);
         }
         // Counted, not summed, so that time does not drift.

@@ -1,7 +1,9 @@
 //! Ground contact: standing, landing, sliding; and ground effect.
-#![allow(clippy::unwrap_used, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
 
-use afbc_plant::{Contact, Environment, GroundEffect, Model, Motion, Payload, Plant, Realism};
+use afbc_plant::{
+    Contact, Environment, GroundEffect, Model, Motion, ParameterChange, Payload, Plant, Quantity, Realism,
+};
 use afbc_types::{Parameters, RotorSpeeds};
 use nalgebra::{Rotation3, Vector3, Vector4};
 use proptest::prelude::*;
@@ -162,7 +164,7 @@ fn thrust_near_the_ground_follows_cheeseman_and_bennett() {
 
 #[test]
 fn a_payload_brings_its_mass_and_its_inertia() {
-    let payload = Payload { mass_kg: 0.2, below_m: 0.1, start_s: 0.5, end_s: 1.0 };
+    let payload = Payload { mass_kg: 0.2, below_m: 0.1, ahead_m: 0.0, left_m: 0.0, start_s: 0.5, end_s: 1.0 };
     let environment = Environment::calm(P).unwrap().with_payloads(vec![payload]).unwrap();
     let mut plant = Plant::new(Model::RigidBody, Motion::default(), environment);
     let command = RotorSpeeds(Vector4::new(200.0, 200.0, 210.0, 200.0));
@@ -198,4 +200,69 @@ fn a_payload_brings_its_mass_and_its_inertia() {
     assert_eq!(Environment::calm(P).unwrap().with_payloads(vec![too_heavy]).unwrap_err().range.name, "mass_kg");
     let negative = Payload { mass_kg: -0.1, ..payload };
     assert_eq!(Environment::calm(P).unwrap().with_payloads(vec![negative]).unwrap_err().range.name, "payload_mass_kg");
+}
+
+/// Returns linear and angular acceleration, body frame, of a level vehicle in its first step.
+fn first_step(environment: Environment, speeds: [f32; 4]) -> (Vector3<f64>, Vector3<f64>) {
+    const STEP_S: f64 = 1e-5;
+    let mut plant = Plant::new(Model::RigidBody, Motion::default(), environment);
+    plant.step(&RotorSpeeds(Vector4::from(speeds)), STEP_S);
+    (plant.motion().velocity_m_s / STEP_S, plant.motion().rates_rad_s / STEP_S)
+}
+
+/// The torque of each rotor about the common centre of two bodies, over their inertia about it, both summed body by
+/// body; with two payloads, over the one after the other.
+#[test]
+fn a_payload_beside_the_axis_tilts_the_vehicle() {
+    let (ahead_m, left_m) = (0.03, -0.02);
+    let payload = Payload { mass_kg: 0.1, below_m: 0.05, ahead_m, left_m, start_s: 0.0, end_s: f64::INFINITY };
+    let loaded = Environment::calm(P).unwrap().with_payloads(vec![payload]).unwrap();
+    let speeds = [205.0, 210.0, 190.0, 220.0];
+    let (linear, angular) = first_step(loaded, speeds);
+
+    let total_kg = P.mass_kg + payload.mass_kg;
+    let place = Vector3::new(ahead_m, left_m, -payload.below_m);
+    let centre = place * (payload.mass_kg / total_kg);
+    let about = |place: Vector3<f64>, mass_kg: f64| {
+        let r = place - centre;
+        mass_kg * Vector3::new(r.y * r.y + r.z * r.z, r.x * r.x + r.z * r.z, r.x * r.x + r.y * r.y)
+    };
+    let inertia = P.inertia_kg_m2 + about(Vector3::zeros(), P.mass_kg) + about(place, payload.mass_kg);
+    let l = P.arm_m;
+    // The paper's plus: rotors 1 to 4 at -y, +x, +y, -x; the drag of 1 and 3 turns the body positively.
+    let places = [[0.0, -l], [l, 0.0], [0.0, l], [-l, 0.0]].map(|[x, y]| Vector3::new(x, y, 0.0));
+    let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
+    for ((place, speed), turn) in places.iter().zip(speeds).zip([1.0, -1.0, 1.0, -1.0]) {
+        let square = f64::from(speed).powi(2);
+        let thrust = Vector3::z() * (P.thrust_factor_n_s2 * square);
+        force += thrust;
+        torque += (place - centre).cross(&thrust) + Vector3::z() * (turn * P.drag_factor_n_m_s2 * square);
+    }
+    assert!((linear - (force / total_kg - Vector3::z() * P.gravity_m_s2)).norm() < 1e-4, "{linear}");
+    assert!((angular - torque.component_div(&inertia)).norm() < 1e-3 * angular.norm(), "{angular}");
+    assert!(angular.y > 1.0, "weight ahead lowers the nose");
+
+    let both = vec![payload, Payload { ahead_m: -ahead_m, left_m: -left_m, ..payload }];
+    let (_, balanced) = first_step(Environment::calm(P).unwrap().with_payloads(both).unwrap(), [200.0; 4]);
+    assert!(balanced.norm() < angular.norm());
+    let far = Payload { ahead_m: 11.0, ..payload };
+    assert_eq!(Environment::calm(P).unwrap().with_payloads(vec![far]).unwrap_err().range.name, "ahead_m");
+}
+
+/// Moments scaled by the fault are those of the intact vehicle times the factor, the other two as before.
+#[test]
+fn a_wrong_sign_turns_one_moment_round() {
+    let speeds = [205.0, 210.0, 190.0, 220.0];
+    let (_, intact) = first_step(Environment::calm(P).unwrap(), speeds);
+    assert!(intact.amin() > 0.1);
+    let moments = [Quantity::RollMoment, Quantity::PitchMoment, Quantity::YawMoment];
+    for (index, quantity) in moments.into_iter().enumerate() {
+        for factor in [-1.0, 0.5, 2.0] {
+            let change = ParameterChange { quantity, factor, start_s: 0.0, end_s: f64::INFINITY };
+            let (_, changed) = first_step(Environment::new(P, vec![change], Vec::new()).unwrap(), speeds);
+            let mut expected: Vector3<f64> = intact;
+            expected[index] *= factor;
+            assert!((changed - expected).norm() < 1e-3 * intact.norm(), "{quantity:?} {factor}: {changed}");
+        }
+    }
 }

@@ -163,7 +163,7 @@ fn real(scenario: &Scenario) -> Vec<Column> {
             add("battery_charge", |t| t.battery.map_or(f64::NAN, |battery| battery.charge));
         }
     }
-    if scenario.sensing != Sensing::default() {
+    if scenario.sensing != Sensing::default() || !scenario.sensor_faults.is_empty() {
         let mut add = |name: &str, value: fn(&State) -> f32| {
             let value = move |row: &Row| Single(row.sample.measurement.as_ref().map_or(f32::NAN, |m| value(&m.state)));
             columns.push(Column { name: name.into(), value: Box::new(value) });

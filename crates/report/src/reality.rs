@@ -65,9 +65,13 @@ fn sensors(scenario: &Scenario) -> Vec<(&'static str, String)> {
     add(delay_s != 0.0, "sensor delay", format!("{delay_s} s"));
     add(period_s != 0.0, "states", format!("every {period_s} s"));
     add(gyro, "rates", "of a gyro, in every step and without delay".into());
+    let until = |end_s: f64| if end_s.is_finite() { format!("to {end_s:.4} s") } else { "to the end".into() };
+    for fault in &scenario.sensor_faults {
+        let what = crate::words::sensor_fault(fault);
+        add(true, "sensor fault", format!("{what} from {} s {}", fault.start_s, until(fault.end_s)));
+    }
     for outage in &scenario.outages {
-        let end = if outage.end_s.is_finite() { format!("to {:.4} s", outage.end_s) } else { "to the end".into() };
-        add(true, "no state", format!("from {} s {end}", outage.start_s));
+        add(true, "no state", format!("from {} s {}", outage.start_s, until(outage.end_s)));
     }
     add(scenario.flight_core, "flight core", "coasts and descends while no state arrives".into());
     if let Some(dropouts) = dropouts {

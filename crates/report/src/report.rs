@@ -217,7 +217,7 @@ pub(super) fn parameters(scenario: &Scenario) -> Markup {
                 @for payload in scenario.environment.payloads() {
                     tr {
                         td { "payload " (words::payload(payload)) }
-                        td.prose { (payload.below_m) " m below, from " (payload.start_s) " s " (until(payload.end_s)) }
+                        td.prose { (words::place(payload)) ", from " (payload.start_s) " s " (until(payload.end_s)) }
                     }
                 }
                 @for (name, value) in reality::rows(scenario) { tr { td { (name) } td.prose { (value) } } }

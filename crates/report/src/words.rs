@@ -2,7 +2,8 @@
 
 use afbc::Profile;
 use afbc_plant::{
-    CosineGust, Gust, GustKind, ParameterChange, Payload, Quantity, Realism, RotorFault, Rotors, Sensing, Wind,
+    CosineGust, Gust, GustKind, Misreading, ParameterChange, Payload, Quantity, Realism, RotorFault, Rotors, Sensing,
+    SensorFault, Wind,
 };
 use afbc_sim::case::{Reading, Sign};
 use afbc_sim::contender::Contender;
@@ -56,8 +57,8 @@ pub(super) fn conditions(scenario: &Scenario) -> String {
     words.join(", ")
 }
 
-/// Names the non-ideal parts of a flight: "rotors", "battery", "drag", "wind", "ground", "payload", "sensors",
-/// "outages".
+/// Names the non-ideal parts of a flight: "rotors", "battery", "drag", "wind", "ground", "payload", "sensors", "sensor
+/// fault", "outages".
 fn real(scenario: &Scenario) -> Vec<&'static str> {
     let Realism { rotors, drag, wind, contact, ground_effect, .. } = &scenario.realism;
     let (faults, battery) = (!rotors.faults.is_empty(), rotors.battery.is_some());
@@ -71,6 +72,7 @@ fn real(scenario: &Scenario) -> Vec<&'static str> {
         (contact.is_some() || ground_effect.is_some(), "ground"),
         (!scenario.environment.payloads().is_empty(), "payload"),
         (scenario.sensing != Sensing::default(), "real sensors"),
+        (!scenario.sensor_faults.is_empty(), "sensor fault"),
         (!scenario.outages.is_empty(), "outages"),
     ];
     words.into_iter().filter_map(|(there, word)| there.then_some(word)).collect()
@@ -79,6 +81,14 @@ fn real(scenario: &Scenario) -> Vec<&'static str> {
 /// Example: "+0.2 kg".
 pub(super) fn payload(payload: &Payload) -> String {
     format!("{:+} kg", payload.mass_kg)
+}
+
+/// Example: "0.05 m below", "0 m below, 0.1 m ahead, -0.02 m left".
+pub(super) fn place(payload: &Payload) -> String {
+    let Payload { below_m, ahead_m, left_m, .. } = payload;
+    let beside =
+        if [*ahead_m, *left_m] == [0.0; 2] { String::new() } else { format!(", {ahead_m} m ahead, {left_m} m left") };
+    format!("{below_m} m below{beside}")
 }
 
 /// Example: "rotor 1 at 80 %".
@@ -93,10 +103,30 @@ pub(super) fn change(change: &ParameterChange) -> String {
         Quantity::Inertia => "inertia",
         Quantity::ThrustFactor => "thrust factor",
         Quantity::DragFactor => "drag factor",
+        Quantity::RollMoment => "roll moment",
+        Quantity::PitchMoment => "pitch moment",
+        Quantity::YawMoment => "yaw moment",
     };
+    if matches!(change.quantity, Quantity::RollMoment | Quantity::PitchMoment | Quantity::YawMoment) {
+        return format!("{quantity} of the rotors times {}", change.factor);
+    }
     // Rounded to tenths of a percent.
     let percent = ((change.factor - 1.0) * 1000.0).round() / 10.0;
     format!("{quantity} {percent:+} %")
+}
+
+/// Example: "pitch frozen", "x times -1", "z off by 0.5 m", "all frozen".
+pub(super) fn sensor_fault(fault: &SensorFault) -> String {
+    let (name, unit) = match fault.axis {
+        None => ("all", ""),
+        Some(axis @ (Axis::X | Axis::Y | Axis::Z)) => (axis.name(), "m"),
+        Some(axis) => (axis.name(), "rad"),
+    };
+    match fault.misreading {
+        Misreading::Factor(factor) => format!("{name} times {factor}"),
+        Misreading::Offset(offset) => format!("{name} off by {offset} {unit}"),
+        Misreading::Frozen => format!("{name} frozen"),
+    }
 }
 
 /// Returns letter and index of a gust: ("A", "x") for an acceleration, ("F", "x") for a force, ("T", "φ") for a moment.

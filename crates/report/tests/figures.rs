@@ -343,7 +343,8 @@ fn eventful() -> Scenario {
         ],
         vec![gust(afbc_types::Axis::X, 2.5, 3.5), gust(afbc_types::Axis::Y, 3.0, f64::INFINITY)],
     );
-    let payload = Payload { mass_kg: 0.02, below_m: 0.0, start_s: 3.5, end_s: f64::INFINITY };
+    let payload =
+        Payload { mass_kg: 0.02, below_m: 0.0, ahead_m: 0.0, left_m: 0.0, start_s: 3.5, end_s: f64::INFINITY };
     let mut scenario = Scenario {
         environment: environment.unwrap().with_payloads(vec![payload]).unwrap(),
         outages: vec![Outage { start_s: 4.0, end_s: 4.05 }, Outage { start_s: 6.0, end_s: 6.05 }],

@@ -52,6 +52,7 @@ pub fn scenario(model: Model, case: Case) -> Result<Scenario, OutOfRange> {
         environment: Environment::new(Parameters::PAPER, changes, gusts)?,
         realism: Realism::default(),
         sensing: Sensing::default(),
+        sensor_faults: Vec::new(),
         outages: Vec::new(),
         flight_core: false,
         seed: 0,

@@ -4,13 +4,14 @@ use super::sample::Sample;
 use crate::scenario::{Outage, Scenario};
 use crate::trajectory::{Reference, Trajectory};
 use afbc_control::{Action, Estimate, Trace};
-use afbc_plant::{Measurement, Motion, Plant, Sensors, Telemetry};
+use afbc_plant::{Measurement, Motion, Plant, SensorFaults, Sensors, Telemetry};
 use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX, RotorSpeeds, State};
 
 /// Plant, sensors, link and reference of a scenario.
 pub struct World {
     plant: Plant,
     sensors: Option<Sensors>,
+    faults: SensorFaults,
     outages: Vec<Outage>,
     trajectory: Trajectory,
     dt_s: f64,
@@ -44,6 +45,7 @@ impl World {
         Ok(World {
             plant: scenario.plant(dt_s)?,
             sensors: scenario.sensors(dt_s)?,
+            faults: SensorFaults::new(&scenario.sensor_faults),
             outages: scenario.outages.clone(),
             trajectory: scenario.trajectory.clone(),
             dt_s,
@@ -63,7 +65,7 @@ impl World {
         let motion = self.plant.motion();
         let (state, measurement) = match &mut self.sensors {
             None => (Some(motion.measure()), None),
-            Some(sensors) => measure(sensors, &motion),
+            Some(sensors) => measure(sensors, &self.faults.seen(&motion, time_s)),
         };
         let reference = self.trajectory.at(time_s);
         let lost = !self.outages.is_empty() && is_lost(&self.outages, time_s);

@@ -5,7 +5,7 @@ use crate::contender::{Contender, ControllerKind};
 use crate::trajectory::Trajectory;
 use afbc::Profile;
 use afbc_flight_core::ArmingLimits;
-use afbc_plant::{Environment, Frame, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors};
+use afbc_plant::{Environment, Frame, Model, Motion, Plant, Realism, Rotors, Sensing, SensorFault, Sensors};
 use afbc_reader::FileError;
 use afbc_reader::words::out_of_range;
 use afbc_types::{OutOfRange, Parameters, Range, Rotor};
@@ -52,6 +52,8 @@ pub struct Scenario {
     pub realism: Realism,
     /// Properties of the measurement.
     pub sensing: Sensing,
+    /// Faults of the measurement.
+    pub sensor_faults: Vec<SensorFault>,
     /// Outages of the link.
     pub outages: Vec<Outage>,
     /// Whether the controllers fly inside the [flight core](crate::flight::Aboard), as on board.
@@ -150,7 +152,7 @@ impl Scenario {
     /// # Errors
     /// The first setting out of range.
     pub fn sensors(&self, step_s: f64) -> Result<Option<Sensors>, OutOfRange> {
-        if self.sensing == Sensing::default() {
+        if self.sensing == Sensing::default() && self.sensor_faults.is_empty() {
             return Ok(None);
         }
         Sensors::new(&self.sensing, self.seed, step_s).map(Some)

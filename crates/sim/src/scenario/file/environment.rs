@@ -1,7 +1,9 @@
 //! `[[gust]]`, `[[change]]`, `[[payload]]` and `[[outage]]`: events in flight.
 
 use crate::scenario::definition::Outage;
-use afbc_plant::{Environment, Gust, GustKind, PAYLOAD_BELOW, ParameterChange, Payload, Quantity};
+use afbc_plant::{
+    Environment, Gust, GustKind, PAYLOAD_AHEAD, PAYLOAD_BELOW, PAYLOAD_LEFT, ParameterChange, Payload, Quantity,
+};
 use afbc_reader::words::out_of_range;
 use afbc_reader::{FileError, Table};
 use afbc_types::{Axis, Parameters, Range};
@@ -12,6 +14,8 @@ pub(super) const START: Range = Range::new("start_s", 0.0, 36_000.0);
 pub(super) const LENGTH: Range = Range::new("duration_s", 0.001, 36_000.0);
 /// Accepted factor of a change; the result must also be in range.
 const FACTOR: Range = Range::new("factor", 0.001, 1000.0);
+/// Accepted factor on a moment of the rotors; below 0 it has the wrong sign.
+const MOMENT_FACTOR: Range = Range::new("factor", -1000.0, 1000.0);
 /// Accepted mass of a payload \[kg\].
 const PAYLOAD_MASS: Range = Range::new("mass_kg", 0.0, afbc_plant::PAYLOAD_MASS.max);
 
@@ -64,9 +68,10 @@ pub(super) fn outages(root: &mut Table<'_>) -> Result<Vec<Outage>, FileError> {
 
 fn payload(table: &mut Table<'_>) -> Result<Payload, FileError> {
     let mass_kg = table.need_number(&PAYLOAD_MASS)?;
-    let below_m = table.number(&PAYLOAD_BELOW)?.unwrap_or(0.0);
+    let [below_m, ahead_m, left_m] = [PAYLOAD_BELOW, PAYLOAD_AHEAD, PAYLOAD_LEFT].map(|range| table.number(&range));
+    let [below_m, ahead_m, left_m] = [below_m?, ahead_m?, left_m?].map(Option::unwrap_or_default);
     let [start_s, end_s] = interval(table)?;
-    Ok(Payload { mass_kg, below_m, start_s, end_s })
+    Ok(Payload { mass_kg, below_m, ahead_m, left_m, start_s, end_s })
 }
 
 fn gust(mut table: Table<'_>) -> Result<Gust, FileError> {
@@ -88,19 +93,31 @@ fn gust(mut table: Table<'_>) -> Result<Gust, FileError> {
 }
 
 fn change(table: &mut Table<'_>) -> Result<ParameterChange, FileError> {
-    let quantities = [Quantity::Mass, Quantity::Inertia, Quantity::ThrustFactor, Quantity::DragFactor];
+    let quantities = [
+        Quantity::Mass,
+        Quantity::Inertia,
+        Quantity::ThrustFactor,
+        Quantity::DragFactor,
+        Quantity::RollMoment,
+        Quantity::PitchMoment,
+        Quantity::YawMoment,
+    ];
     let quantity = table.need_choice("parameter", &quantities, |quantity| match quantity {
         Quantity::Mass => "mass",
         Quantity::Inertia => "inertia",
         Quantity::ThrustFactor => "thrust-factor",
         Quantity::DragFactor => "drag-factor",
+        Quantity::RollMoment => "roll-moment",
+        Quantity::PitchMoment => "pitch-moment",
+        Quantity::YawMoment => "yaw-moment",
     })?;
-    let factor = table.need_number(&FACTOR)?;
+    let is_moment = matches!(quantity, Quantity::RollMoment | Quantity::PitchMoment | Quantity::YawMoment);
+    let factor = table.need_number(if is_moment { &MOMENT_FACTOR } else { &FACTOR })?;
     let [start_s, end_s] = interval(table)?;
     Ok(ParameterChange { quantity, factor, start_s, end_s })
 }
 
-fn interval(table: &mut Table<'_>) -> Result<[f64; 2], FileError> {
+pub(super) fn interval(table: &mut Table<'_>) -> Result<[f64; 2], FileError> {
     let start_s = table.need_number(&START)?;
     let length_s = table.number(&LENGTH)?.unwrap_or(f64::INFINITY);
     Ok([start_s, start_s + length_s])

@@ -76,6 +76,7 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
     let real = vehicle_file.as_ref().map_or(Realism::default(), |file| file.realism.clone());
     let realism = realism::read(&mut root, &real, &truth, &frame, step_s)?;
     let sensing = sensors::read(root.table("sensors")?)?;
+    let sensor_faults = sensors::faults(&mut root)?;
     let outages = environment::outages(&mut root)?;
     let flight_core = root.boolean("flight_core")?.unwrap_or(false);
 
@@ -91,6 +92,7 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
         environment,
         realism,
         sensing,
+        sensor_faults,
         outages,
         flight_core,
         seed,

@@ -1,12 +1,19 @@
-//! `[sensors]`: measurement of the state for the controllers.
+//! `[sensors]` and `[[sensor_fault]]`: measurement of the state for the controllers.
 
-use afbc_plant::{Deviations, Dropouts, Sensing};
+use super::environment::interval;
+use afbc_plant::{Deviations, Dropouts, Misreading, Sensing, SensorFault};
 use afbc_reader::{FileError, Table};
-use afbc_types::Range;
+use afbc_types::{Axis, Range};
 
 /// Accepted single number for all coordinates: the range that every coordinate accepts.
 const NOISE: Range = Range::new("noise", 0.0, Deviations::ATT.range.max);
 const BIAS: Range = Range::new("bias", 0.0, Deviations::ATT.range.max);
+
+/// Accepted factor on a measured coordinate and its rate.
+const FACTOR: Range = Range::new("factor", -1000.0, 1000.0);
+/// Accepted offsets of a position and an angle.
+const OFFSET: Range = Range::new("offset_m", -10_000.0, 10_000.0);
+const TURN: Range = Range::new("offset_rad", -10.0, 10.0);
 
 /// Reads the sensors of `table`; perfect ones without it.
 pub(super) fn read(table: Option<Table<'_>>) -> Result<Sensing, FileError> {
@@ -39,4 +46,31 @@ fn dropouts(mut table: Table<'_>) -> Result<Dropouts, FileError> {
     table.require(&Dropouts::MEAN.range)?;
     table.finish()?;
     Ok(dropouts)
+}
+
+/// Reads the faults of the measurement.
+pub(super) fn faults(root: &mut Table<'_>) -> Result<Vec<SensorFault>, FileError> {
+    root.few_tables("sensor_fault")?.into_iter().map(fault).collect()
+}
+
+fn fault(mut table: Table<'_>) -> Result<SensorFault, FileError> {
+    let axis = table.choice("axis", &Axis::ALL, Axis::name)?;
+    let offset = match axis {
+        Some(Axis::Roll | Axis::Pitch | Axis::Yaw) => TURN,
+        _ => OFFSET,
+    };
+    let frozen = table.boolean("frozen")?.unwrap_or(false).then_some(Misreading::Frozen);
+    let factor = table.number(&FACTOR)?.map(Misreading::Factor);
+    let offset_by = table.number(&offset)?.map(Misreading::Offset);
+    let known = format!("it takes one of factor, {} and frozen = true", offset.name);
+    let mut misreadings = [factor, offset_by, frozen].into_iter().flatten();
+    let (Some(misreading), None) = (misreadings.next(), misreadings.next()) else {
+        return Err(table.fault(FACTOR.name, format!("{known}, and no more")));
+    };
+    if axis.is_none() && misreading != Misreading::Frozen {
+        return Err(table.missing("axis", "name the axis; only a frozen state may be the whole one"));
+    }
+    let [start_s, end_s] = interval(&mut table)?;
+    table.finish()?;
+    Ok(SensorFault { axis, misreading, start_s, end_s })
 }

@@ -66,7 +66,7 @@ fn with_line(text: &str, key: &str, line: &str) -> String {
 #[test]
 fn documented_examples_are_valid_and_complete() {
     let sections = sections();
-    assert_eq!(sections.len(), 30);
+    assert_eq!(sections.len(), 32);
     for Section { example: text, rows } in sections {
         example(&text).unwrap_or_else(|error| panic!("{error} in\n{text}"));
         for line in text.lines().filter(|line| line.contains(" = ")) {
@@ -177,4 +177,57 @@ fn contenders_start_from_the_file_or_from_a_profile() {
     assert_eq!((pid.law, pid.settings), (Law::Pid(tuned), short.settings));
     // Without controllers, a contender is alone.
     assert_eq!(example("[[contender]]\nname = \"a\"\ncontroller = \"indi\"\n").unwrap().contenders.len(), 1);
+}
+
+#[test]
+fn sensor_faults_and_paces_that_contradict_themselves_are_refused() {
+    let refused = |text: &str| example(text).unwrap_err().to_string();
+    let fault = |keys: &str| refused(&format!("[[sensor_fault]]\nstart_s = 1\n{keys}"));
+    let one = "takes one of factor, offset_m and frozen = true, and no more";
+    for keys in [
+        "axis = \"x\"",
+        "axis = \"x\"\nfrozen = false",
+        "axis = \"x\"\nfactor = -1\nfrozen = true",
+        "axis = \"z\"\nfactor = 2\noffset_m = 1",
+    ] {
+        assert!(fault(keys).contains(one), "{}", fault(keys));
+    }
+    assert!(fault("axis = \"yaw\"\noffset_m = 1").contains("factor, offset_rad and"));
+    assert!(fault("factor = -1").contains("axis: missing; name the axis"));
+    let circle = "[trajectory]\nkind = \"circle\"\ncentre_m = [0, 0, 1]\nradius_m = 2\n";
+    let both = refused(&format!("{circle}period_s = 3\nacceleration_m_s2 = 4"));
+    assert!(both.contains("period_s: a second pace"), "{both}");
+    assert!(
+        refused(&format!("{}acceleration_m_s2 = 4", circle.replace("= 2", "= 0"))).contains("more than a controller")
+    );
+}
+
+/// The paces of a circle and a lemniscate are those asked for: the largest acceleration and speed of their references.
+#[test]
+fn a_circle_has_its_acceleration_and_a_lemniscate_its_speed_and_its_size() {
+    let circle = "kind = \"circle\"\nradius_m = 2.5\nacceleration_m_s2 = 14.7";
+    let lemniscate = "kind = \"lemniscate\"\nhalf_length_m = 3.5\nspeed_m_s = 6.0";
+    let peaks = |keys: &str| {
+        let trajectory = example(&format!("[trajectory]\ncentre_m = [1, 2, 3]\n{keys}")).unwrap().trajectory;
+        let at = (0..200_000).map(|k| trajectory.at(1e-4 * f64::from(k)));
+        at.fold([0.0_f64; 4], |[speed, acceleration, x, y], at| {
+            let from = at.position_m - nalgebra::Vector3::new(1.0, 2.0, 3.0);
+            assert_eq!(from.z, 0.0);
+            [
+                speed.max(at.velocity_m_s.norm()),
+                acceleration.max(at.acceleration_m_s2.norm()),
+                x.max(from.x.abs()),
+                y.max(from.y.abs()),
+            ]
+        })
+    };
+    let close = |value: f64, expected: f64| assert!((value / expected - 1.0).abs() < 1e-3, "{value}, {expected}");
+    let [_, acceleration, radius, _] = peaks(circle);
+    close(acceleration, 14.7);
+    close(radius, 2.5);
+    let [speed, acceleration, x, y] = peaks(lemniscate);
+    close(speed, 6.0);
+    close(x, 3.5);
+    close(y, 1.75);
+    close(acceleration, 1.0625 * 36.0 / 3.5);
 }

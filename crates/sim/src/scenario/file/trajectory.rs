@@ -4,13 +4,20 @@ use super::motion::POSITION;
 use crate::trajectory::{Sine, Trajectory, Waypoint};
 use afbc_reader::{FileError, Table};
 use afbc_types::{Range, Setpoint};
-use core::f64::consts::TAU;
+use core::f64::consts::{SQRT_2, TAU};
+use libm::sqrt;
 use nalgebra::Vector3;
 
 /// Accepted heading \[rad\].
 const YAW: Range = Range::new("yaw_rad", -100.0, 100.0);
 /// Accepted radius of a circle \[m\].
 const RADIUS: Range = Range::new("radius_m", 0.0, 10_000.0);
+/// Accepted acceleration towards the centre of a circle \[m/s2\].
+const CENTRIPETAL: Range = Range::new("acceleration_m_s2", 0.001, 1000.0);
+/// Accepted distance from the centre of a lemniscate to its ends \[m\].
+const HALF_LENGTH: Range = Range::new("half_length_m", 0.01, 10_000.0);
+/// Accepted largest speed on a lemniscate \[m/s\].
+const SPEED: Range = Range::new("speed_m_s", 0.001, 1000.0);
 /// Accepted period \[s\].
 const PERIOD: Range = Range::new("period_s", 0.1, 36_000.0);
 /// Accepted amplitude of a sine \[m\].
@@ -30,12 +37,14 @@ enum Kind {
     Hover,
     Step,
     Circle,
+    Lemniscate,
     Lissajous,
     Waypoints,
 }
 
 impl Kind {
-    const ALL: [Kind; 6] = [Kind::Paper, Kind::Hover, Kind::Step, Kind::Circle, Kind::Lissajous, Kind::Waypoints];
+    const ALL: [Kind; 7] =
+        [Kind::Paper, Kind::Hover, Kind::Step, Kind::Circle, Kind::Lemniscate, Kind::Lissajous, Kind::Waypoints];
 
     const fn name(self) -> &'static str {
         match self {
@@ -43,6 +52,7 @@ impl Kind {
             Kind::Hover => "hover",
             Kind::Step => "step",
             Kind::Circle => "circle",
+            Kind::Lemniscate => "lemniscate",
             Kind::Lissajous => "lissajous",
             Kind::Waypoints => "waypoints",
         }
@@ -63,6 +73,7 @@ pub(super) fn read(mut table: Table<'_>) -> Result<Trajectory, FileError> {
             turn_rad: table.number(&TURN)?.unwrap_or(0.0),
         },
         Kind::Circle => circle(&mut table)?,
+        Kind::Lemniscate => lemniscate(&mut table)?,
         Kind::Lissajous => lissajous(&mut table)?,
         Kind::Waypoints => waypoints(&mut table)?,
     };
@@ -76,10 +87,30 @@ fn yaw(table: &mut Table<'_>) -> Result<f64, FileError> {
 
 fn circle(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let centre_m = table.need_vector("centre_m", &POSITION)?;
-    let (radius_m, period_s) = (table.need_number(&RADIUS)?, table.need_number(&PERIOD)?);
+    let radius_m = table.need_number(&RADIUS)?;
+    let (period_s, key) = match table.number(&CENTRIPETAL)? {
+        Some(acceleration_m_s2) => {
+            table.forbid(PERIOD.name, "a second pace; acceleration_m_s2 gives the period, so leave out one of them")?;
+            (TAU * sqrt(radius_m / acceleration_m_s2), CENTRIPETAL.name)
+        }
+        None => (table.need_number(&PERIOD)?, PERIOD.name),
+    };
     let rate = TAU / period_s;
-    slow_enough(table, PERIOD.name, [1, 2, 3, 4].map(|order| radius_m * rate.powi(order)))?;
+    slow_enough(table, key, [1, 2, 3, 4].map(|order| radius_m * rate.powi(order)))?;
     Ok(Trajectory::Circle { centre_m, radius_m, period_s, yaw_rad: yaw(table)? })
+}
+
+/// Gerono's lemniscate, x = a sin(w t), y = a/2 sin(2 w t), which is fastest in the middle: sqrt(2) a w.
+fn lemniscate(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
+    let centre_m = table.need_vector("centre_m", &POSITION)?;
+    let (half_m, speed_m_s) = (table.need_number(&HALF_LENGTH)?, table.need_number(&SPEED)?);
+    let rate = speed_m_s / (SQRT_2 * half_m);
+    // Each derivative is at most both coordinates' together.
+    slow_enough(table, SPEED.name, [1, 2, 3, 4].map(|n| half_m * rate.powi(n) * (1.0 + 2.0_f64.powi(n - 1))))?;
+    let period_s = TAU / rate;
+    let sine = |amplitude_m, period_s| Sine { amplitude_m, period_s, phase_rad: 0.0 };
+    let sines = [sine(half_m, period_s), sine(0.5 * half_m, 0.5 * period_s), sine(0.0, period_s)];
+    Ok(Trajectory::Lissajous { centre_m, sines, yaw_rad: yaw(table)? })
 }
 
 fn lissajous(table: &mut Table<'_>) -> Result<Trajectory, FileError> {

@@ -1,0 +1,89 @@
+//! Faults of the measurement: a coordinate that freezes, is offset, or is scaled, be it by -1.
+
+use crate::motion::Motion;
+use afbc_types::Axis;
+use alloc::vec::Vec;
+
+/// What is wrong with a measured coordinate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Misreading {
+    /// Coordinate and rate are multiplied; below 0 is the wrong sign.
+    Factor(f64),
+    /// The coordinate is this much too large \[m\] or \[rad\]; its rate is right.
+    Offset(f64),
+    /// Coordinate and rate stay as they were at the onset.
+    Frozen,
+}
+
+/// A fault from `start_s` to `end_s`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorFault {
+    /// x, y, z: that coordinate and its velocity; roll, pitch, yaw: that angle and the rate about the same body axis.
+    /// None for the whole state.
+    pub axis: Option<Axis>,
+    /// What is wrong.
+    pub misreading: Misreading,
+    /// Onset \[s\].
+    pub start_s: f64,
+    /// End \[s\]; infinite for a fault that stays.
+    pub end_s: f64,
+}
+
+/// The faults of a flight, which act one after the other, as listed.
+#[derive(Clone, Debug, Default)]
+pub struct SensorFaults {
+    /// Each with the motion at its onset.
+    faults: Vec<(SensorFault, Option<Motion>)>,
+}
+
+/// Tolerance when comparing times, far below any step \[s\].
+const TIME_SLACK_S: f64 = 1e-9;
+
+impl SensorFaults {
+    /// Creates the faults of a flight that has not begun.
+    pub fn new(faults: &[SensorFault]) -> Self {
+        SensorFaults { faults: faults.iter().map(|fault| (*fault, None)).collect() }
+    }
+
+    /// Returns `motion` at `time_s` as faulty sensors see it. To be called in every step.
+    pub fn seen(&mut self, motion: &Motion, time_s: f64) -> Motion {
+        let mut seen = *motion;
+        let now_s = time_s + TIME_SLACK_S;
+        for (fault, held) in &mut self.faults {
+            if (fault.start_s..fault.end_s).contains(&now_s) {
+                let held = *held.get_or_insert(seen);
+                let axes = Axis::ALL.into_iter().filter(|axis| fault.axis.is_none_or(|only| only == *axis));
+                axes.for_each(|axis| fault.misreading.apply(axis, &mut seen, &held));
+            }
+        }
+        seen
+    }
+}
+
+impl Misreading {
+    /// Changes one coordinate of `seen`, and its rate; `held` is the motion at the onset.
+    fn apply(self, axis: Axis, seen: &mut Motion, held: &Motion) {
+        let [coordinate, rate] = coordinates(seen, axis);
+        match self {
+            Misreading::Factor(factor) => {
+                *coordinate *= factor;
+                *rate *= factor;
+            }
+            Misreading::Offset(offset) => *coordinate += offset,
+            Misreading::Frozen => [*coordinate, *rate] = coordinates(&mut { *held }, axis).map(|number| *number),
+        }
+    }
+}
+
+/// Returns the coordinate of this axis, and its rate.
+fn coordinates(motion: &mut Motion, axis: Axis) -> [&mut f64; 2] {
+    let Motion { position_m, velocity_m_s, attitude_rad, rates_rad_s } = motion;
+    match axis {
+        Axis::X => [&mut position_m.x, &mut velocity_m_s.x],
+        Axis::Y => [&mut position_m.y, &mut velocity_m_s.y],
+        Axis::Z => [&mut position_m.z, &mut velocity_m_s.z],
+        Axis::Roll => [&mut attitude_rad.x, &mut rates_rad_s.x],
+        Axis::Pitch => [&mut attitude_rad.y, &mut rates_rad_s.y],
+        Axis::Yaw => [&mut attitude_rad.z, &mut rates_rad_s.z],
+    }
+}
