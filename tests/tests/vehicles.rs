@@ -55,7 +55,7 @@ fn vehicle(mass_kg: f64, arm_m: f64, spread: f64) -> Parameters<f64> {
 }
 
 #[test]
-fn five_laws_hover_vehicles_from_50_g_to_3_kg() {
+fn every_law_hovers_vehicles_from_50_g_to_3_kg() {
     for (mass_kg, arm_m, spread) in
         [(0.05, 0.05, 0.2), (0.25, 0.1, 0.1), (0.7, 0.15, 0.15), (1.5, 0.25, 0.15), (3.0, 0.35, 0.1)]
     {

@@ -151,7 +151,7 @@ pub struct Memory {
     unallocated: Vector3<f32>,
     specific_force: Smooth,
     /// Trace of the last step.
-    trace: Trace,
+    pub(crate) trace: Trace,
 }
 
 /// What the integrals learn from a step.

@@ -6,6 +6,8 @@
 //! | [`pid`] | cascaded PID with a tilt-prioritised attitude loop | PX4; Brescianini and D'Andrea 2018 |
 //! | [`geometric`] | tracking on SE(3), optionally with integrals | Lee, Leok, McClamroch 2010; Goodarzi et al. 2013 |
 //! | [`indi`] | incremental dynamic inversion of attitude and position | Smeur et al. 2016, 2018; Tal, Karaman 2021 |
+//! | [`l1`] | geometric, with L1-adaptive compensation of thrust and moments | Wu et al. 2022, 2025 |
+//! | [`dfbc`] | differential flatness, incremental inversion of the moments | Sun et al. 2022 |
 //!
 //! The head of each file gives the equations, the sources and the decisions made where a source leaves something open.
 //! Frames and units are defined in [`afbc_types`].
@@ -47,6 +49,7 @@
 
 pub mod attitude;
 mod body;
+pub mod dfbc;
 pub mod differentiator;
 pub mod flatness;
 pub mod geometric;
@@ -54,13 +57,16 @@ mod hover_thrust;
 mod increment;
 pub mod indi;
 mod integral;
+pub mod l1;
 pub mod limits;
 mod loops;
 pub mod pid;
 mod rotor_model;
 mod slowed;
 
+pub use dfbc::Dfbc;
 pub use geometric::Geometric;
 pub use indi::Indi;
+pub use l1::L1;
 pub use pid::Pid;
 pub use slowed::slowed;

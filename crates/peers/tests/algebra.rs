@@ -6,7 +6,7 @@ mod harness;
 use afbc_control::{Action, FlightController, Screened, Trace};
 use afbc_peers::attitude::{facing, geometric_error, quaternion, r_earth_body, roll_pitch, tilt_prioritised_error};
 use afbc_peers::flatness::flat;
-use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
+use afbc_peers::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
 use afbc_types::{Declaration, Declared, OutOfRange, Range, Setpoint, State, Value};
 use core::convert::Infallible;
 use harness::{Random, SETTINGS, vehicle};
@@ -29,6 +29,16 @@ fn indi() -> Indi {
     Indi::new(vehicle(), SETTINGS, indi::Gains::PAPER_VEHICLE).unwrap()
 }
 
+/// L1 on the geometric controller of [`lee`].
+fn l1() -> L1 {
+    let gains = l1::Gains { geometric: geometric::Gains::LEE_2010, ..l1::Gains::BY_HAND };
+    L1::new(vehicle(), SETTINGS, gains).unwrap()
+}
+
+fn dfbc() -> Dfbc {
+    Dfbc::new(vehicle(), SETTINGS, dfbc::Gains::PAPER_VEHICLE).unwrap()
+}
+
 /// Returns action and trace after `steps` steps with constant input.
 fn after<C: FlightController>(controller: &C, steps: usize, state: &State, setpoint: &Setpoint) -> (Action, Trace) {
     let mut memory = Screened::<C::Memory>::default();
@@ -46,6 +56,8 @@ fn of_each(state: &State, setpoint: &Setpoint, check: impl Fn(&str, (Action, Tra
         check("lee", after(&lee(), steps, state, setpoint));
         check("goodarzi", after(&goodarzi(), steps, state, setpoint));
         check("indi", after(&indi(), steps, state, setpoint));
+        check("l1", after(&l1(), steps, state, setpoint));
+        check("dfbc", after(&dfbc(), steps, state, setpoint));
     }
 }
 
@@ -165,6 +177,12 @@ fn turning_the_scene_about_the_vertical_changes_nothing_for_the_body() {
                 after(&indi(), steps, &state, &setpoint),
                 after(&indi(), steps, &turned_state, &turned_setpoint),
                 "indi",
+            );
+            same(after(&l1(), steps, &state, &setpoint), after(&l1(), steps, &turned_state, &turned_setpoint), "l1");
+            same(
+                after(&dfbc(), steps, &state, &setpoint),
+                after(&dfbc(), steps, &turned_state, &turned_setpoint),
+                "dfbc",
             );
         }
     }
@@ -437,7 +455,9 @@ fn gains_of_one_key_are_declared_alike() {
     let Ok(()) = pid::Gains::DEFAULT.visit(&mut visit);
     let Ok(()) = geometric::Gains::DEFAULT.visit(&mut visit);
     let Ok(()) = indi::Gains::DEFAULT.visit(&mut visit);
-    assert!(shared > 10, "{shared}");
+    let Ok(()) = l1::Gains::DEFAULT.visit(&mut visit);
+    let Ok(()) = dfbc::Gains::DEFAULT.visit(&mut visit);
+    assert!(shared > 35, "{shared}");
 }
 
 #[test]
@@ -463,6 +483,8 @@ fn gains_out_of_range_are_refused_by_name() {
     refused(pid::Gains::PAPER_VEHICLE, 21, |gains| Pid::new(vehicle(), SETTINGS, gains).map(drop));
     refused(geometric::Gains::GOODARZI_2013, 15, |gains| Geometric::new(vehicle(), SETTINGS, gains).map(drop));
     refused(indi::Gains::PAPER_VEHICLE, 14, |gains| Indi::new(vehicle(), SETTINGS, gains).map(drop));
+    refused(l1::Gains::BY_HAND, 19, |gains| L1::new(vehicle(), SETTINGS, gains).map(drop));
+    refused(dfbc::Gains::PAPER_VEHICLE, 14, |gains| Dfbc::new(vehicle(), SETTINGS, gains).map(drop));
     let gains = pid::Gains { tilt_max_rad: 1.5, ..pid::Gains::PAPER_VEHICLE };
     assert_eq!(gains.validate().unwrap_err().range.name, "tilt_max_rad");
     let gains = indi::Gains { rotor_time_constant_s: -0.1, ..indi::Gains::PAPER_VEHICLE };

@@ -6,9 +6,9 @@
 mod harness;
 
 use afbc_control::FlightController;
-use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
-use afbc_plant::{Environment, Motion, ParameterChange, Quantity};
-use afbc_types::{Parameters, Setpoint};
+use afbc_peers::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
+use afbc_plant::{Environment, Gust, GustKind, Motion, ParameterChange, Quantity};
+use afbc_types::{Axis, Parameters, Setpoint};
 use core::f64::consts::FRAC_PI_2;
 use harness::{
     Figures, Random, Rig, SETTINGS, at, calm, circle, disturbed, fly, fly_on, hover, paper, paper_start, vehicle,
@@ -29,6 +29,14 @@ fn goodarzi() -> Geometric {
 
 fn indi() -> Indi {
     Indi::new(vehicle(), SETTINGS, indi::Gains::PAPER_VEHICLE).unwrap()
+}
+
+fn l1() -> L1 {
+    L1::new(vehicle(), SETTINGS, l1::Gains::BY_HAND).unwrap()
+}
+
+fn dfbc() -> Dfbc {
+    Dfbc::new(vehicle(), SETTINGS, dfbc::Gains::PAPER_VEHICLE).unwrap()
 }
 
 /// Asserts root mean square errors of x, y, z \[m\] and psi \[rad\] within `bounds`.
@@ -57,6 +65,8 @@ fn all_hover() {
     hovers("lee", &lee());
     hovers("goodarzi", &goodarzi());
     hovers("indi", &indi());
+    hovers("l1", &l1());
+    hovers("dfbc", &dfbc());
 }
 
 /// Arrives, and is at rest after 6 s, for a small step and for one that reaches every limit.
@@ -74,6 +84,8 @@ fn all_follow_a_step() {
     steps("lee", &lee());
     steps("goodarzi", &goodarzi());
     steps("indi", &indi());
+    steps("l1", &l1());
+    steps("dfbc", &dfbc());
 }
 
 /// 2 m of radius in 6 s, the nose along the velocity: 2.1 m/s, 2.2 m/s2.
@@ -87,6 +99,8 @@ fn all_fly_a_circle() {
     within("lee", &figures(&lee(), start), [0.005, 0.005, 0.001, 0.005]);
     within("goodarzi", &figures(&goodarzi(), start), [0.004, 0.004, 0.001, 0.002]);
     within("indi", &figures(&indi(), start), [0.001, 0.001, 0.001, 0.001]);
+    within("l1", &figures(&l1(), start), [0.0075, 0.0075, 0.001, 0.004]);
+    within("dfbc", &figures(&dfbc(), start), [0.001, 0.001, 0.001, 0.001]);
 }
 
 /// The paper's flight with its gusts and uncertainties of all four sign combinations, with lag, delay and noise, from
@@ -105,6 +119,8 @@ fn all_fly_the_papers_flight() {
         within("lee", &figures(&lee(), environment()), [0.12, 0.10, 0.20, 0.03]);
         within("goodarzi", &figures(&goodarzi(), environment()), [0.011, 0.015, 0.035, 0.005]);
         within("indi", &figures(&indi(), environment()), [0.005, 0.008, 0.007, 0.002]);
+        within("l1", &figures(&l1(), environment()), [0.0126, 0.0126, 0.0085, 0.0026]);
+        within("dfbc", &figures(&dfbc(), environment()), [0.018, 0.025, 0.042, 0.001]);
     }
 }
 
@@ -116,6 +132,8 @@ fn integrals_remove_the_steady_state_error() {
     assert!(left(&pid()) < 0.001);
     assert!(left(&goodarzi()) < 0.001);
     assert!(left(&indi()) < 0.002);
+    assert!(left(&l1()) < 0.001);
+    assert!(left(&dfbc()) < 0.001);
     assert!(left(&lee()) > 0.05);
 }
 
@@ -133,6 +151,8 @@ fn all_catch_a_vehicle_that_was_thrown() {
     within("lee", &figures(&lee()), [3e-4; 4]);
     within("goodarzi", &figures(&goodarzi()), [3e-4; 4]);
     within("indi", &figures(&indi()), [3e-4; 4]);
+    within("l1", &figures(&l1()), [3e-4; 4]);
+    within("dfbc", &figures(&dfbc()), [3e-4; 4]);
 }
 
 /// With rotors of any strength, PID's estimate of the hover thrust takes over what its integral holds, and the vehicle
@@ -216,6 +236,21 @@ fn jerk_and_snap_keep_indi_on_its_path() {
     }
 }
 
+/// DFBC too: with ideal rotors nothing keeps it from a flat trajectory; without jerk and snap it is far off.
+#[test]
+fn jerk_and_snap_keep_dfbc_on_its_path() {
+    let gains = dfbc::Gains { rotor_time_constant_s: 0.0, ..dfbc::Gains::PAPER_VEHICLE };
+    let dfbc = Dfbc::new(vehicle(), SETTINGS, gains).unwrap();
+    let ideal = Rig { lag_s: 0.0, delay: 0, noise: 0.0 };
+    for period_s in [8.0, 6.0, 5.0] {
+        let with = off_the_eight(&dfbc, ideal, period_s, |_| ());
+        let without = off_the_eight(&dfbc, ideal, period_s, |s| {
+            (s.jerk_m_s3, s.snap_m_s4) = (Vector3::zeros(), Vector3::zeros())
+        });
+        assert!(with < 0.002 && with < 0.05 * without, "{with} m, without jerk and snap {without} m in {period_s} s");
+    }
+}
+
 /// What INDI is told of the rotors need not be exact.
 #[test]
 fn indi_flies_rotors_of_half_to_twice_the_lag_it_is_told() {
@@ -223,4 +258,100 @@ fn indi_flies_rotors_of_half_to_twice_the_lag_it_is_told() {
         let off = off_the_eight(&indi(), Rig { lag_s, ..Rig::ALL }, 6.0, |_| ());
         assert!(off < 0.003, "{off} m with a lag of {lag_s} s");
     }
+}
+
+/// A vehicle whose mass, inertia and thrust factor differ at random from what the controllers know, pushed by a
+/// constant force and moment.
+struct Stranger {
+    factors: [(Quantity, f64); 3],
+    /// Against each axis: linear \[m/s2\], then angular \[rad/s2\].
+    push: [f64; 6],
+}
+
+impl Stranger {
+    fn new(random: &mut Random) -> Self {
+        let mut within = |low: f64, high: f64| low + (high - low) * random.uniform();
+        let factors = [
+            (Quantity::Mass, within(0.8, 1.25)),
+            (Quantity::Inertia, within(0.7, 1.4)),
+            (Quantity::ThrustFactor, within(0.8, 1.2)),
+        ];
+        let push = [1.0, 1.0, 1.0, 2.0, 2.0, 0.5].map(|size| within(-size, size));
+        Stranger { factors, push }
+    }
+
+    fn environment(&self) -> Environment {
+        let always = |(quantity, factor)| ParameterChange { quantity, factor, start_s: 0.0, end_s: f64::INFINITY };
+        let axes = [Axis::X, Axis::Y, Axis::Z, Axis::Roll, Axis::Pitch, Axis::Yaw];
+        let gust = |(axis, size)| Gust { axis, kind: GustKind::Acceleration, size, start_s: 1.0, end_s: f64::INFINITY };
+        let gusts = axes.into_iter().zip(self.push).map(gust).collect();
+        Environment::new(Parameters::PAPER, self.factors.map(always).to_vec(), gusts).unwrap()
+    }
+}
+
+/// Every law with an integral or an increment brings every stranger to rest where it should be.
+#[test]
+fn strangers_come_to_rest_where_they_should() {
+    fn lands<C: FlightController>(name: &str, controller: &C, stranger: &Stranger) -> C::Memory {
+        let start = at([0.5, -0.3, 2.5], 0.3);
+        let (figures, memory) =
+            fly_on(controller, Rig::LAG, stranger.environment(), start, hover([0.0, 0.0, 3.0], 0.0), [18.0, 20.0]);
+        let off = figures.max_abs;
+        assert!(off.amax() < 0.01, "{name}: {off:?} of {:?}, {:?}", stranger.factors, stranger.push);
+        memory.control
+    }
+    let mut random = Random(13);
+    for _ in 0..20 {
+        let stranger = Stranger::new(&mut random);
+        lands("pid", &pid(), &stranger);
+        lands("goodarzi", &goodarzi(), &stranger);
+        lands("indi", &indi(), &stranger);
+        lands("dfbc", &dfbc(), &stranger);
+
+        // What L1 estimates is what its model lacks: at rest, the force that the modelled thrust is short of.
+        let estimate = lands("l1", &l1(), &stranger);
+        let [(_, mass), (_, inertia), (_, thrust)] = stranger.factors;
+        let pushed = -Vector3::new(stranger.push[0], stranger.push[1], stranger.push[2]);
+        // The true thrust over mass balances gravity and push; the model believes in mass / thrust times as much.
+        let gravity = Vector3::new(0.0, 0.0, 9.81);
+        let lacking = gravity - (gravity - pushed) * (mass / thrust);
+        let error = (estimate.force_m_s2.cast::<f64>() - lacking).norm();
+        assert!(error < 0.01 * 9.81, "{:?} for {lacking:?}", estimate.force_m_s2);
+        // The moments that the rotors give balance the push; the model believes in inertia / thrust times as much, but
+        // for yaw, which the drag of the rotors gives, in inertia times as much.
+        let pushed = -Vector3::new(stranger.push[3], stranger.push[4], stranger.push[5]);
+        let lacking = pushed.component_mul(&Vector3::new(1.0 / thrust, 1.0 / thrust, 1.0)) * inertia;
+        let error = (estimate.moment_rad_s2.cast::<f64>() - lacking).norm();
+        assert!(error < 0.02 * (1.0 + lacking.norm()), "{:?} for {lacking:?}", estimate.moment_rad_s2);
+    }
+}
+
+/// L1 as in its source has no integral: what the rotors can cancel it cancels all the same, what they cannot stays.
+#[test]
+fn l1_rejects_what_is_matched() {
+    let left = |push: [f64; 6], adapting: bool| {
+        let stranger = Stranger {
+            factors: [(Quantity::Mass, 1.0), (Quantity::Inertia, 1.0), (Quantity::ThrustFactor, 1.0)],
+            push,
+        };
+        let start = at([0.0, 0.0, 3.0], 0.0);
+        let (environment, path, times) = (stranger.environment(), hover([0.0, 0.0, 3.0], 0.0), [14.0, 15.0]);
+        let gains = l1::Gains::WU_2022;
+        let figures = if adapting {
+            let l1 = L1::new(vehicle(), SETTINGS, gains).unwrap();
+            fly(&l1, Rig::LAG, environment, start, path, times)
+        } else {
+            let base = Geometric::new(vehicle(), SETTINGS, gains.geometric).unwrap();
+            fly(&base, Rig::LAG, environment, start, path, times)
+        };
+        figures.max_abs.xyz().norm() + figures.max_abs.w
+    };
+    for axis in [2, 3, 4, 5] {
+        let mut push = [0.0; 6];
+        push[axis] = 1.0;
+        let (with, without) = (left(push, true), left(push, false));
+        assert!(with < 0.02 * without, "axis {axis}: {with} of {without}");
+    }
+    let (with, without) = (left([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], true), left([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], false));
+    assert!(with > 0.5 * without, "{with} of {without}");
 }

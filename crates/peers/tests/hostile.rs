@@ -4,7 +4,7 @@
 mod harness;
 
 use afbc_control::{FlightController, Screened, Settings};
-use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
+use afbc_peers::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
 use afbc_types::{Declared, Range, Setpoint, State, Value};
 use core::convert::Infallible;
 use harness::{SETTINGS, vehicle};
@@ -100,16 +100,30 @@ proptest! {
         harmless(&Indi::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
         anywhere(&mut gains, &shares);
         harmless(&Indi::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
+
+        let mut gains = l1::Gains::BY_HAND;
+        harmless(&L1::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
+        anywhere(&mut gains, &shares);
+        harmless(&L1::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
+
+        let mut gains = dfbc::Gains::PAPER_VEHICLE;
+        harmless(&Dfbc::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
+        anywhere(&mut gains, &shares);
+        harmless(&Dfbc::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
     }
 }
 
 #[test]
 fn the_same_input_gives_the_same_bits() {
-    let state = State { position_m: Vector3::new(0.1, 0.2, 0.3), ..State::default() };
-    let controller = Indi::new(vehicle(), SETTINGS, indi::Gains::PAPER_VEHICLE).unwrap();
-    let run = || {
-        let mut memory = Screened::<indi::Memory>::default();
-        (0..100).map(|_| controller.step(&mut memory, Some(&state), &Setpoint::default())).collect::<Vec<_>>()
-    };
-    assert_eq!(run(), run());
+    fn twice<C: FlightController>(controller: &C) {
+        let state = State { position_m: Vector3::new(0.1, 0.2, 0.3), ..State::default() };
+        let run = || {
+            let mut memory = Screened::<C::Memory>::default();
+            (0..100).map(|_| controller.step(&mut memory, Some(&state), &Setpoint::default())).collect::<Vec<_>>()
+        };
+        assert_eq!(run(), run());
+    }
+    twice(&Indi::new(vehicle(), SETTINGS, indi::Gains::PAPER_VEHICLE).unwrap());
+    twice(&L1::new(vehicle(), SETTINGS, l1::Gains::BY_HAND).unwrap());
+    twice(&Dfbc::new(vehicle(), SETTINGS, dfbc::Gains::PAPER_VEHICLE).unwrap());
 }

@@ -1,7 +1,7 @@
 //! Gains for slower rotors: every gain by its power of time, told from its key rather than from its unit.
 #![allow(missing_docs)]
 
-use afbc_peers::{geometric, indi, pid, slowed};
+use afbc_peers::{dfbc, geometric, indi, l1, pid, slowed};
 use afbc_types::Declared;
 use core::convert::Infallible;
 
@@ -48,4 +48,6 @@ fn every_gain_slows_down_by_its_power_of_time() {
     check(&pid::Gains::TUNED);
     check(&geometric::Gains::TUNED);
     check(&indi::Gains::TUNED);
+    check(&l1::Gains::TUNED);
+    check(&dfbc::Gains::TUNED);
 }

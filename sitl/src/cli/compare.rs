@@ -18,15 +18,16 @@ use std::process::ExitCode;
 
 /// Fly every controller in every scenario, and compare them
 ///
-/// Without arguments: AFBC, AFBC as printed, backstepping, PID, geometric and INDI in the built-in scenario `hardware`.
-/// A lost vehicle is part of the comparison and does not change the exit code.
+/// Without arguments: AFBC, AFBC as printed, backstepping, PID, geometric, INDI, L1 and DFBC in the built-in scenario
+/// `hardware`. A lost vehicle is part of the comparison and does not change the exit code.
 #[derive(Args, Debug)]
 pub(crate) struct Compare {
     /// Built-in scenarios or scenario files; the contenders of all of them fly each one
     #[arg(value_name = "SCENARIO")]
     scenarios: Vec<Target>,
 
-    /// Contenders to fly instead: those of the scenarios, afbc, afbc-as-printed, backstepping, pid, geometric, indi
+    /// Contenders to fly instead: those of the scenarios, afbc, afbc-as-printed, backstepping, pid, geometric, indi,
+    /// l1, dfbc
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     controllers: Vec<String>,
 

@@ -8,7 +8,7 @@ mod tests;
 pub(crate) use gains::{law_gains, per_axis, whole};
 
 use afbc::{Adaptive, Backstepping, Controller, Profile, adaptive, backstepping};
-use afbc_peers::{Geometric, Indi, Pid, geometric, indi, pid};
+use afbc_peers::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
 use afbc_types::{Axis, PerAxis};
 
 declare::laws! {
@@ -68,6 +68,28 @@ declare::laws! {
         tuned: |_| indi::Gains::TUNED,
         by_hand: indi::Gains::PAPER_VEHICLE,
         controller: |vehicle, settings, gains| Indi::new(vehicle, settings.common, gains),
+    }
+    /// Geometric tracking with L1-adaptive compensation of thrust and moments.
+    L1 {
+        name: "l1",
+        title: "L1",
+        prefix: "L1_",
+        in_cascade: false,
+        gains: l1::Gains,
+        tuned: |_| l1::Gains::TUNED,
+        by_hand: l1::Gains::BY_HAND,
+        controller: |vehicle, settings, gains| L1::new(vehicle, settings.common, gains),
+    }
+    /// Differential-flatness-based control with incremental inversion of the moments.
+    Dfbc {
+        name: "dfbc",
+        title: "DFBC",
+        prefix: "DFBC_",
+        in_cascade: false,
+        gains: dfbc::Gains,
+        tuned: |_| dfbc::Gains::TUNED,
+        by_hand: dfbc::Gains::PAPER_VEHICLE,
+        controller: |vehicle, settings, gains| Dfbc::new(vehicle, settings.common, gains),
     }
 }
 

@@ -1,0 +1,228 @@
+//! Differential-flatness-based control with an incremental inner loop.
+//!
+//! Sun, Romero, Foehn, Kaufmann, Scaramuzza, *A comparative study of nonlinear MPC and differential-flatness-based
+//! control for quadrotor agile flight*, IEEE T-RO 38(6), 2022, Section IV: a PD law on position, the attitude error of
+//! Brescianini and D'Andrea (see [`crate::attitude`]), feed-forward of the reference's own rates and angular
+//! accelerations, and incremental inversion of the moments as in [`crate::indi`]. Subscript f marks filtered signals:
+//!
+//! ```text
+//! actuators  omega_i += (1 - exp(-dt/tau)) (omega_i commanded - omega_i)      rotor model, from limited commands
+//! position   s = k_x (p_d - p) + k_v (v_d - v) + sat(k_i int (p_d - p)) + a_d + g e_z, within Limits
+//!            U4 = m s . R e_z;  R_d along s with yaw psi_d
+//! reference  R_r, Omega_r, dOmega_r/dt from a_d + g e_z, within Limits, jerk, snap, psi_d
+//! attitude   nu = k_R e(R, R_d) + k_Omega (R' R_r Omega_r - Omega) + R' R_r dOmega_r/dt - Omega x R' R_r Omega_r
+//! inversion  dOmega/dt = (G u)_f + nu - (dOmega/dt)_f,  G u = [l/Ix U1, l/Iy U2, (d/b)/Iz U3]
+//! ```
+//!
+//! # Decisions
+//!
+//! * **Error**: e = \[2 Im(q_tilt), 2 Im(q_yaw)\], with k_R of its own for yaw, as in the source.
+//! * **Feed-forward** is the reference's, whatever the vehicle does: Omega_r and dOmega_r/dt are those of the flat
+//!   trajectory (see [`crate::flatness`]), turned into the body frame.
+//! * **Integral**, 0 in the source: its PD law keeps an error under every steady force. As in [`crate::geometric`].
+//! * **Desaturation**: the source allocates by a quadratic program that gives up thrust first, then yaw, then roll and
+//!   pitch. The mixer that all controllers share gives up yaw first, in closed form.
+//! * **Drag**: the source's model of the rotors' drag is left out; the integral and the increments cover it.
+//! * **What it is told of the rotors**: the time constant [`Gains::rotor_time_constant_s`], like INDI.
+
+use crate::attitude::{facing, r_earth_body, tilt_and_yaw_error, unit};
+use crate::body::{Body, Demand};
+use crate::differentiator::Differentiator;
+use crate::flatness::flat;
+use crate::increment::{Increment, Reaction};
+use crate::limits::Limits;
+use crate::loops::{TrackingLoop, xy_and_z};
+use crate::rotor_model::{RotorModel, Spin};
+use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
+use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
+use nalgebra::Vector3;
+
+parameters! {
+    /// Gains and limits. Defaults are the result of `sitl tune` for the paper's vehicle with a rotor lag of 20 ms
+    /// (`docs/tuning.md`).
+    ///
+    /// For the law of the source, leave both integrals (names with `_i_`) at 0.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Gains {
+        /// k_x along x and y.
+        #[parameter(POS_P, "1/s2", 0.5..=100.0, tuned)]
+        pub position_p_1_s2: f32 = 16.8,
+        /// k_v along x and y.
+        #[parameter(POS_D, "1/s", 0.5..=20.0, tuned)]
+        pub position_d_1_s: f32 = 6.346,
+        /// k_i along x and y.
+        #[parameter(POS_I, "1/s3", 0.0..=200.0, tuned)]
+        pub position_i_1_s3: f32 = 14.0,
+        /// k_x along z.
+        #[parameter(HEIGHT_P, "1/s2", 0.5..=200.0, tuned)]
+        pub height_p_1_s2: f32 = 36.19,
+        /// k_v along z.
+        #[parameter(HEIGHT_D, "1/s", 0.5..=60.0, tuned)]
+        pub height_d_1_s: f32 = 17.25,
+        /// k_i along z.
+        #[parameter(HEIGHT_I, "1/s3", 0.0..=300.0, tuned)]
+        pub height_i_1_s3: f32 = 30.55,
+        /// k_R of roll and pitch.
+        #[parameter(TILT_P, "1/s2", 10.0..=1000.0, tuned)]
+        pub tilt_p_1_s2: f32 = 271.5,
+        /// k_Omega of roll and pitch.
+        #[parameter(TILT_D, "1/s", 2.0..=100.0, tuned)]
+        pub tilt_d_1_s: f32 = 24.99,
+        /// k_R of yaw.
+        #[parameter(YAW_P, "1/s2", 0.5..=200.0, tuned)]
+        pub yaw_p_1_s2: f32 = 23.9,
+        /// k_Omega of yaw.
+        #[parameter(YAW_D, "1/s", 0.5..=40.0, tuned)]
+        pub yaw_d_1_s: f32 = 8.12,
+        /// w: bandwidth of the filter on rates and U1..U3.
+        #[parameter(ATT_FILTER, "rad/s", 10.0..=500.0, tuned)]
+        pub attitude_filter_rad_s: f32 = 190.7,
+        /// tau: time constant of the rotor model.
+        #[parameter(ROT_LAG, "s", 0.0..=0.5)]
+        pub rotor_time_constant_s: f32 = 0.02,
+        /// Largest position integral, per coordinate.
+        #[parameter(POS_INT_MAX, "m/s2", 0.0..=50.0)]
+        pub position_integral_max_m_s2: f32 = 10.0,
+        /// Largest tilt.
+        #[parameter(TILT_MAX, "rad", 0.05..=1.2)]
+        pub tilt_max_rad: f32 = 0.7,
+    }
+}
+
+impl Gains {
+    /// As tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
+    pub const TUNED: Self = Self::DEFAULT;
+
+    /// Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
+    pub const PAPER_VEHICLE: Self = Gains {
+        position_p_1_s2: 12.0,
+        position_d_1_s: 6.0,
+        position_i_1_s3: 12.0,
+        height_p_1_s2: 25.0,
+        height_d_1_s: 10.0,
+        height_i_1_s3: 40.0,
+        tilt_p_1_s2: 200.0,
+        tilt_d_1_s: 22.0,
+        yaw_p_1_s2: 16.0,
+        yaw_d_1_s: 6.0,
+        attitude_filter_rad_s: 80.0,
+        rotor_time_constant_s: 0.02,
+        position_integral_max_m_s2: 10.0,
+        tilt_max_rad: 0.7,
+    };
+
+    /// The law of the source, without integrals. Hand-tuned for the same vehicle.
+    pub const SUN_2022: Self = Gains { position_i_1_s3: 0.0, height_i_1_s3: 0.0, ..Self::PAPER_VEHICLE };
+}
+
+/// The controller. Immutable; what changes in flight is in [`Memory`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dfbc<const N: usize = 4> {
+    body: Body<N>,
+    dt_s: f32,
+    position: TrackingLoop,
+    increment: Increment,
+    rotors: RotorModel<N>,
+    k_r: Vector3<f32>,
+    k_omega: Vector3<f32>,
+}
+
+/// State of the controller between steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Memory<const N: usize = 4> {
+    /// sat(k_i int (p_d - p)), earth frame \[m/s2\].
+    pub position_integral: Vector3<f32>,
+    rotors: Spin<N>,
+    reaction: Reaction,
+    /// Trace of the last step.
+    trace: Trace,
+}
+
+impl<const N: usize> Dfbc<N> {
+    /// Makes a controller for a vehicle with these nominal parameters.
+    ///
+    /// # Errors
+    /// The first parameter, setting or gain out of range.
+    pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
+        let vehicle = vehicle.into();
+        let body = Body::new(&vehicle, &settings)?;
+        let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
+        gains.validate()?;
+        Ok(Dfbc {
+            body,
+            dt_s: settings.dt_s,
+            position: TrackingLoop {
+                position_p: xy_and_z(gains.position_p_1_s2, gains.height_p_1_s2),
+                position_d: xy_and_z(gains.position_d_1_s, gains.height_d_1_s),
+                position_i: xy_and_z(gains.position_i_1_s3, gains.height_i_1_s3),
+                integral_max_m_s2: gains.position_integral_max_m_s2,
+                limits: Limits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
+                dt_s: settings.dt_s,
+            },
+            increment: Increment(Differentiator::new(gains.attitude_filter_rad_s, settings.dt_s)?),
+            rotors: RotorModel::new(&body, vehicle.weight_n(), gains.rotor_time_constant_s, settings.dt_s),
+            k_r: xy_and_z(gains.tilt_p_1_s2, gains.yaw_p_1_s2),
+            k_omega: xy_and_z(gains.tilt_d_1_s, gains.yaw_d_1_s),
+        })
+    }
+}
+
+impl<const N: usize> FlightController<N> for Dfbc<N> {
+    type Memory = Memory<N>;
+
+    fn dt_s(&self) -> f32 {
+        self.dt_s
+    }
+
+    fn mixer(&self) -> &Mixer<N> {
+        &self.body.mixer
+    }
+
+    fn trace(memory: &Memory<N>) -> Trace {
+        memory.trace
+    }
+
+    #[inline]
+    fn decide(&self, memory: &mut Memory<N>, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
+        let r = r_earth_body(&state.attitude_rad);
+        let omega = state.rates_rad_s;
+        if fresh {
+            let now = self.rotors.inputs(&self.body, &memory.rotors);
+            self.increment.measure(&mut memory.reaction, &self.body.angular_acceleration(&now), &omega);
+        }
+
+        // Position.
+        let position = self.position.output(state, setpoint, &memory.position_integral);
+        let specific_force = position.specific_force_m_s2;
+        let desired = facing(&specific_force, setpoint.yaw_rad);
+
+        // Attitude.
+        let limits = &self.position.limits;
+        let flying = limits.apply(&(setpoint.acceleration_m_s2 + limits.gravity()));
+        let reference = flat([flying, setpoint.jerk_m_s3, setpoint.snap_m_s4], setpoint);
+        let to_body = r.transpose() * reference.r_earth_desired;
+        let omega_r = to_body * reference.rates_rad_s;
+        let attitude_error = tilt_and_yaw_error(&r, &desired);
+        let rate_error = omega_r - omega;
+        let nu = self.k_r.component_mul(&attitude_error)
+            + self.k_omega.component_mul(&rate_error)
+            + to_body * reference.rates_dot_rad_s2
+            - omega.cross(&omega_r);
+
+        let demand = Demand {
+            thrust_n: self.body.mass_kg * specific_force.dot(&unit(&r.column(2).into())).max(0.0),
+            angular_acceleration_rad_s2: self.increment.invert(&memory.reaction, &nu),
+            acceleration_m_s2: position.acceleration_m_s2,
+            desired,
+            desired_rates_rad_s: reference.rates_rad_s,
+            errors: [position.position_error_m, position.velocity_error_m_s, attitude_error, rate_error],
+        };
+        let (action, trace, _) = self.body.act(&demand);
+        memory.trace = trace;
+        self.rotors.advance(&mut memory.rotors, &action.speeds);
+        if fresh {
+            self.position.learn(&mut memory.position_integral, &position);
+        }
+        action
+    }
+}
