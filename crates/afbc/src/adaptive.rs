@@ -1,7 +1,7 @@
 //! Adaptive fuzzy backstepping of one subsystem: the law (20)-(22) and its adaptation (32)-(34).
 
 use crate::backstepping::{self, proportional};
-use crate::fuzzy::{Basis, Membership};
+use crate::fuzzy::{Basis, Firing, Membership};
 use crate::law::{Context, Law, Tracking};
 use crate::safeguards::Safeguards;
 use afbc_control::{Errors, Estimate, math};
@@ -72,12 +72,12 @@ impl Gains {
     }
 }
 
-/// Derivatives of an [`Estimate`]; that of Theta_hat, gamma e_2 w(x), in factors.
+/// Derivatives of an [`Estimate`]; that of Theta_hat, gamma e_2 w(x), in factors ([`Firing`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rate {
     first: Vector3<f32>,
     second: Vector3<f32>,
-    /// gamma e_2
+    /// gamma e_2 over the sum of the firing strengths
     theta: f32,
     delta: f32,
     leakage: f32,
@@ -123,11 +123,9 @@ fn advance(estimate: &mut Estimate, rate: &Rate, safeguards: &Safeguards, dt_s: 
     let Safeguards { theta_max, delta_max, .. } = *safeguards;
     // If the leakage is faster than the step, the estimate becomes zero instead of changing its sign.
     let keep = math::max(1.0 - rate.leakage * dt_s, 0.0);
-    estimate.theta = estimate.theta * keep + rate.first * (rate.theta * dt_s) * rate.second.transpose();
-    let square = estimate.theta.norm_squared();
-    if square > theta_max * theta_max {
-        estimate.theta *= theta_max / math::sqrt(square);
-    }
+    let theta = estimate.theta * keep + rate.first * (rate.theta * dt_s) * rate.second.transpose();
+    let square = theta.norm_squared();
+    estimate.theta = if square > theta_max * theta_max { theta * (theta_max / math::sqrt(square)) } else { theta };
     estimate.delta = math::min(estimate.delta * keep + rate.delta * dt_s, delta_max);
 }
 
@@ -174,15 +172,15 @@ impl Subsystem {
     pub fn law(&self, errors: &Errors, inputs: [f32; 2], estimate: &Estimate, unallocated: f32) -> (Terms, Rate) {
         let Gains { gamma, eta, safeguards, .. } = &self.gains;
         let e2 = errors.e2;
-        let [first, second] = self.basis.factors(inputs);
+        let Firing { first, second, share } = self.basis.fire(inputs);
         let s = math::tanh(e2 * self.inverse_epsilon);
         let terms = Terms {
-            fuzzy: first.dot(&(estimate.theta * second)),
+            fuzzy: first.dot(&(estimate.theta * second)) * share,
             robust: estimate.delta * s,
             proportional: proportional(self.gains.backstepping.alpha2, errors),
         };
         let (error, leakage) = (safeguards.adaptation_error(e2, unallocated), safeguards.leakage(e2));
-        (terms, Rate { first, second, theta: gamma * error, delta: eta * error * s, leakage })
+        (terms, Rate { first, second, theta: gamma * error * share, delta: eta * error * s, leakage })
     }
 
     /// Returns u and the derivatives of the estimate, in a form for the step.

@@ -10,7 +10,8 @@
 //!
 //! and multiplying by t = exp(-k|x|), which the normalisation cancels, gives \[q t^2, t, q\] for positive x: one
 //! exponential per input, with an exponent that is never positive, over a sum of at least q. So no finite input
-//! overflows, divides zero by zero or makes all weights vanish, as (18) as printed does above 1.7 rad/s in `f32`.
+//! overflows, divides zero by zero or makes all weights vanish, as (18) as printed does above 1.7 rad/s in `f32`. The
+//! law leaves the triples as they are, and divides once, by the product of both sums ([`Firing`]).
 
 use afbc_control::math;
 use afbc_types::{Declared, OutOfRange, Range, parameters};
@@ -58,27 +59,39 @@ impl Basis {
 
     /// Returns w(x) of (18), one weight per rule: row = the first input's Gaussian, column = the second's, from -c to
     /// c. Every weight is within \[0, 1\] and they sum to one, for every finite input.
-    #[inline]
     pub fn weights(&self, inputs: [f32; 2]) -> Matrix3<f32> {
-        let [first, second] = self.factors(inputs);
+        // Each divided by its own sum, so that no weight exceeds 1, rounding included.
+        let [first, second] = inputs.map(|x| {
+            let (memberships, sum) = self.memberships(x);
+            memberships / sum
+        });
         first * second.transpose()
     }
 
-    /// Returns the normalised memberships of each input, whose outer product is w(x).
+    /// Returns the firing strengths of the rules, w(x) in factors.
     #[inline]
-    pub fn factors(&self, inputs: [f32; 2]) -> [Vector3<f32>; 2] {
-        let [first, second] = inputs;
-        [self.triple(first), self.triple(second)]
+    pub fn fire(&self, [x1, x2]: [f32; 2]) -> Firing {
+        let ((first, first_sum), (second, second_sum)) = (self.memberships(x1), self.memberships(x2));
+        Firing { first, second, share: 1.0 / (first_sum * second_sum) }
     }
 
-    /// Returns the normalised memberships of one input.
+    /// Returns the memberships of one input, over the middle one times t, and their sum.
     #[inline]
-    fn triple(&self, x: f32) -> Vector3<f32> {
+    fn memberships(&self, x: f32) -> (Vector3<f32>, f32) {
         let t = math::exp2(-self.k * x.abs());
         let (near, middle, far) = (self.q, t, self.q * t * t);
-        // Normalised by its own sum, so that no weight exceeds 1, rounding included.
-        let scale = 1.0 / (near + middle + far);
         let (left, right) = if x < 0.0 { (near, far) } else { (far, near) };
-        Vector3::new(left, middle, right) * scale
+        (Vector3::new(left, middle, right), near + middle + far)
     }
+}
+
+/// Firing strengths of the nine rules: w(x) = `first` `second`^T `share`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Firing {
+    /// Memberships of the first input, times any number.
+    pub first: Vector3<f32>,
+    /// Memberships of the second input, times any number.
+    pub second: Vector3<f32>,
+    /// 1 over the sum of their products.
+    pub share: f32,
 }

@@ -4,7 +4,7 @@
 mod common;
 
 use afbc::adaptive::Gains;
-use afbc::fuzzy::Basis;
+use afbc::fuzzy::{Basis, Firing};
 use afbc::law::Context;
 use afbc::law::Tracking;
 use afbc::{Adaptive, Controller, Law, Profile, Safeguards, Settings};
@@ -125,10 +125,10 @@ proptest! {
     ) {
         let gains = Gains { safeguards: Safeguards::NONE, ..gains };
         let before = Estimate { theta: Matrix3::from_row_slice(&theta), delta };
-        let [first, second] = Basis::new(gains.membership).unwrap().factors([0.0, e2]);
+        let Firing { first, second, share } = Basis::new(gains.membership).unwrap().fire([0.0, e2]);
         let s = afbc_control::math::tanh(e2 * (1.0 / gains.epsilon));
         let printed = Estimate {
-            theta: before.theta + first * (gains.gamma * e2 * dt_s) * second.transpose(),
+            theta: before.theta + first * (gains.gamma * e2 * share * dt_s) * second.transpose(),
             delta: before.delta + gains.eta * e2 * s * dt_s,
         };
         prop_assume!(printed.theta.norm() < 1e6 && printed.delta < 1e6);

@@ -9,21 +9,41 @@
 
 use micromath::F32Ext;
 
-/// 2^x for x <= 0: the nearest integer to x goes into the exponent's bits; 2^f of the remaining fraction is the
-/// minimax polynomial for relative error. Takes a third of the time of libm's. Error at most 9e-8 relative for
-/// x >= -126; 0 below and for NaN.
+/// Powers of 2 between 1 and 2 that [`exp2`] looks up.
+const STEPS: usize = 64;
+
+/// Bits of 2^(i/64), less those that i itself adds to the exponent.
+const POWERS: [u32; STEPS] = {
+    let mut powers = [0; STEPS];
+    let mut i = 0;
+    while i < STEPS {
+        // e^y by its series, to 1e-17.
+        let y = core::f64::consts::LN_2 * i as f64 / STEPS as f64;
+        let (mut power, mut n) = (1.0, 20.0);
+        while n > 0.0 {
+            power = 1.0 + y / n * power;
+            n -= 1.0;
+        }
+        powers[i] = (power as f32).to_bits() - ((i as u32) << 17);
+        i += 1;
+    }
+    powers
+};
+
+/// 2^x for x <= 0: a table's power of the nearest 64th to x, times 2^f of the remainder by the quadratic of least
+/// relative error. Takes a fourth of the time of libm's. Error at most 1.5e-7 relative for x >= -126; 2^-126 below and
+/// for NaN.
 #[inline]
 pub fn exp2(x: f32) -> f32 {
-    const P: [f32; 6] = [core::f32::consts::LN_2, 0.24022648, 0.055503618, 0.009618529, 0.0013390387, 0.00015320831];
-    // Numbers of this size have no fractional bits: the addition rounds x to an integer and leaves it, with the
-    // exponent's bias, in the lowest bits.
-    const LARGE: f32 = 12_582_912.0 + 127.0;
+    let x = max(x, -126.0);
+    // Numbers of this size have six fractional bits: the addition rounds x to a 64th and leaves it in the lowest bits.
+    const LARGE: f32 = 196_608.0;
     let n = x + LARGE;
     let f = x - (n - LARGE);
-    let p = P[0] + f * (P[1] + f * (P[2] + f * (P[3] + f * (P[4] + f * P[5]))));
-    let y = (1.0 + f * p) * f32::from_bits(n.to_bits() << 23);
-    // At the end and without a branch, so that several exponentials in a row share the loaded constants.
-    if x >= -126.0 { y } else { 0.0 }
+    let bits = n.to_bits();
+    let power = POWERS.get(bits as usize % STEPS).copied().unwrap_or_default();
+    let power = f32::from_bits(power.wrapping_add(bits << 17));
+    power + power * (f * (0.693_149_7 + f * 0.240_226_5))
 }
 
 /// e^x; libm. For construction only. Error at most 8e-8 relative for -87 <= x <= 0, 0 below -104.
