@@ -75,12 +75,13 @@ pub fn flight() -> Flight {
 
 /// Runs the ticks. `flight` is a reference, since a task would store a value twice.
 pub async fn run(flight: &mut Flight, board: &mut impl Board) -> ! {
+    let mut inbox = Inbox::EMPTY;
     loop {
         // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
         // are due, it would tick twice in every second period.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
-        let report = tick(flight, board);
+        let report = tick(flight, &mut inbox, board);
         let cycles = stopwatch.cycles();
         CYCLES.store(cycles, Ordering::Relaxed);
         CYCLES_MAX.fetch_max(cycles, Ordering::Relaxed);
@@ -96,15 +97,15 @@ pub async fn run(flight: &mut Flight, board: &mut impl Board) -> ! {
 /// drives them; checks the rate. Out of line, so that its stack and its instructions can be counted
 /// (`docs/budgets.md`).
 #[inline(never)]
-fn tick<B: Board>(flight: &mut Flight, board: &mut B) -> Report {
+fn tick<B: Board>(flight: &mut Flight, inbox: &mut Inbox, board: &mut B) -> Report {
     let now_us = Instant::now().as_micros();
     // Not borrowed elsewhere while it is locked; the tick has no panic.
-    let inbox = INBOX.lock(|inbox| inbox.try_borrow_mut().map_or(Inbox::EMPTY, |mut inbox| inbox.take()));
+    INBOX.lock(|shared| shared.try_borrow_mut().ok().map(|mut shared| shared.take_into(inbox)));
 
     if board.clock_has_failed() {
         flight.distrust_clock();
     }
-    let report = flight.tick(now_us, &inbox);
+    let report = flight.tick(now_us, inbox);
 
     board.drive(report.throttles);
     // A reset restarts a failed task, once it does not end a flight.

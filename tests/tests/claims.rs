@@ -163,7 +163,7 @@ fn backstepping_keeps_an_offset_of_the_gust_over_one_plus_both_gains() {
         let offset = size / (1.0 + 1.0 * 2.0);
         // The vehicle holds its height, so thrust is weight over the cosine of the tilt, as (40) assumes, and g
         // tan(theta) is u5: only rounding remains, of f32 positions of 1 m (6e-8) times alpha_1 alpha_2, and
-        // micromath's cosine of a yaw of 0, which is exact. After 39 s the transient has decayed.
+        // the cosine of a yaw of 0, which is exact. After 39 s the transient has decayed.
         let error = run.metrics.final_error;
         assert!((error.x - offset).abs() <= 1e-6, "{} m for {offset} m", error.x);
         assert!(error.y.abs() < 1e-6 && error.w.abs() < 1e-6, "{error}");

@@ -174,14 +174,14 @@ fn backstepping_agrees_in_every_row() {
 #[test]
 fn desired_attitude_agrees_in_every_row() {
     /// Largest error of the control crate's sine and cosine, checked by `crates/control/tests/math.rs`.
-    const TRIGONOMETRY: f64 = 1.2e-3;
+    const TRIGONOMETRY: f64 = 1.7e-4;
     let gravity = Parameters::PAPER.gravity_m_s2;
     let table = golden("desired_attitude");
     assert_eq!(table.rows().len(), ROWS);
     for row in table.rows() {
         let [u5, u6, psi] = row.all(["u5_m_s2", "u6_m_s2", "psi_rad"]);
         let [phi_d, theta_d] = desired_attitude(u5 as f32, u6 as f32, psi as f32, (1.0 / gravity) as f32);
-        // Sine and cosine are off by at most 1.2e-3 each, plus a few roundings (8 U) of the sums: the numerators of
+        // Sine and cosine are off by at most 1.7e-4 each, plus a few roundings (8 U) of the sums: the numerators of
         // both tangents change by at most that share of |u5| + |u6|. The arc tangent's slope is at most 1, its own
         // error 1.2e-7.
         let moved = (TRIGONOMETRY + 8.0 * U) * (u5.abs() + u6.abs()) / gravity;
@@ -192,23 +192,20 @@ fn desired_attitude_agrees_in_every_row() {
     }
 }
 
-/// The golden rows without errors of sine and cosine: at a yaw where micromath's are accurate enough, (40) holds to
+/// The golden rows without errors of sine and cosine: at a yaw where they are accurate enough, (40) holds to
 /// rounding. The desired acceleration is rotated by the golden yaw beforehand, in `f64`.
 #[test]
 fn desired_attitude_without_yaw_agrees_to_rounding() {
     let gravity = Parameters::PAPER.gravity_m_s2;
     let [_, level_theta] = desired_attitude(gravity as f32, 0.0, 0.0, (1.0 / gravity) as f32);
-    assert!(
-        (level_theta - core::f32::consts::FRAC_PI_4).abs() < 1e-6,
-        "micromath's cosine of 0 is not 1: {level_theta}"
-    );
+    assert!((level_theta - core::f32::consts::FRAC_PI_4).abs() < 1e-6, "the cosine of 0 is not 1: {level_theta}");
     let table = golden("desired_attitude");
     assert_eq!(table.rows().len(), ROWS);
     for row in table.rows() {
         let [u5, u6, psi] = row.all(["u5_m_s2", "u6_m_s2", "psi_rad"]);
         let (forward, right) = (u5 * psi.cos() + u6 * psi.sin(), u5 * psi.sin() - u6 * psi.cos());
         let [phi_d, theta_d] = desired_attitude(forward as f32, -right as f32, 0.0, (1.0 / gravity) as f32);
-        // micromath's sine of 0 is not exactly 0; both tangents change by that share of the other component.
+        // If the sine of 0 is not exactly 0, both tangents change by that share of the other component.
         let sine_of_0 = f64::from(afbc_control::math::sin(0.0)).abs();
         let moved = (sine_of_0 + 8.0 * U) * (forward.abs() + right.abs()) / gravity;
         assert_within(&row, "theta_d_rad", theta_d, moved + 1.2e-7);

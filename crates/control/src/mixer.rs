@@ -46,8 +46,8 @@ pub struct Mixer<const N: usize = 4> {
     roll: SVector<f32, N>,
     pitch: SVector<f32, N>,
     yaw: SVector<f32, N>,
-    /// 1/|Q| of yaw; infinite for a rotor that yaw does not load.
-    inverse_yaw: SVector<f32, N>,
+    /// Room for yaw to the left and to the right.
+    room: [YawRoom<N>; 2],
     /// Each rotor's share of a pure thrust.
     share: SVector<f32, N>,
     /// Largest load of each rotor, and its inverse.
@@ -60,6 +60,35 @@ pub struct Mixer<const N: usize = 4> {
     force_max: f32,
     /// Largest thrust that is raised for roll and pitch.
     raised_thrust_max: f32,
+}
+
+/// Largest |U3| in one direction that leaves each rotor within its limits: `unloaded` + `slope` times its load.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct YawRoom<const N: usize> {
+    unloaded: SVector<f32, N>,
+    slope: SVector<f32, N>,
+}
+
+impl<const N: usize> YawRoom<N> {
+    /// Computes it for yaw that changes the loads, which are at most `most`, by `yaw` per newton.
+    fn new(yaw: &SVector<f32, N>, most: &SVector<f32, N>) -> Self {
+        YawRoom {
+            unloaded: yaw.zip_map(most, |yaw, most| match yaw {
+                _ if yaw.abs() < YAW_LOAD_MIN => f32::MAX,
+                _ if yaw > 0.0 => most / yaw,
+                _ => 0.0,
+            }),
+            slope: yaw.map(|yaw| if yaw.abs() < YAW_LOAD_MIN { 0.0 } else { -1.0 / yaw }),
+        }
+    }
+
+    /// Returns the largest |U3| for all rotors with these loads.
+    #[inline(always)]
+    fn of(&self, loads: &SVector<f32, N>) -> f32 {
+        let rooms = self.slope.component_mul(loads) + self.unloaded;
+        // Rounding may leave a load beyond its limits.
+        math::max(rooms.iter().copied().fold(f32::MAX, math::min), 0.0)
+    }
 }
 
 /// Rotor forces within the limits.
@@ -77,6 +106,18 @@ pub struct Allocation<const N: usize = 4> {
     pub unallocated: Inputs,
     /// True if the demand violates a rotor's limits.
     pub saturated: bool,
+}
+
+impl Settings {
+    /// Makes the mixer of `vehicle` within these limits of rotors and thrust.
+    ///
+    /// # Errors
+    /// If a parameter, a position or the limit is out of range, or if the rotors cannot give all four inputs and hover.
+    pub fn mixer<const N: usize>(&self, vehicle: impl Into<Airframe<N>>) -> Result<Mixer<N>, OutOfRange> {
+        let vehicle = vehicle.into();
+        let raised_thrust_max_n = self.raised_thrust_max * vehicle.parameters.weight_n();
+        Ok(Mixer::new(vehicle, self.rotor_force_max_n)?.with_raised_thrust_max_n(raised_thrust_max_n))
+    }
 }
 
 impl<const N: usize> Mixer<N> {
@@ -114,7 +155,7 @@ impl<const N: usize> Mixer<N> {
             roll: load(0),
             pitch: load(1),
             yaw,
-            inverse_yaw: yaw.map(|load| if load.abs() > YAW_LOAD_MIN { 1.0 / load.abs() } else { f32::INFINITY }),
+            room: [YawRoom::new(&yaw, &most), YawRoom::new(&-yaw, &most)],
             share,
             most,
             inverse_most: most.map(|most| 1.0 / most),
@@ -238,14 +279,8 @@ impl<const N: usize> Mixer<N> {
         }
 
         let upright = tilt.add_scalar(thrust_n);
-        let mut fits = f32::MAX;
-        for (((load, most), yaw), inverse_yaw) in
-            upright.iter().zip(self.most.iter()).zip(self.yaw.iter()).zip(self.inverse_yaw.iter())
-        {
-            let room = if yaw * yaw_n > 0.0 { most - load } else { *load };
-            // Rounding may leave negative room. A rotor without both room and yaw gives NaN, which `min` ignores.
-            fits = math::min(room.abs() * inverse_yaw, fits);
-        }
+        let [left, right] = &self.room;
+        let fits = if yaw_n > 0.0 { left } else { right }.of(&upright);
         if yaw_n.abs() > fits {
             yaw_n = fits.copysign(yaw_n);
         }

@@ -1,7 +1,6 @@
 //! Settings of every controller besides vehicle parameters and gains.
 
-use crate::Mixer;
-use afbc_types::{Airframe, OutOfRange, parameters};
+use afbc_types::parameters;
 
 parameters! {
     /// Settings of every controller besides vehicle parameters and gains.
@@ -19,17 +18,5 @@ parameters! {
         /// limit but the rotors'.
         #[parameter(RAISE_MAX, "1", 0.1..=1e6)]
         pub raised_thrust_max: f32 = 1e6,
-    }
-}
-
-impl Settings {
-    /// Makes the mixer of `vehicle` within these limits of rotors and thrust.
-    ///
-    /// # Errors
-    /// If a parameter, a position or the limit is out of range, or if the rotors cannot give all four inputs and hover.
-    pub fn mixer<const N: usize>(&self, vehicle: impl Into<Airframe<N>>) -> Result<Mixer<N>, OutOfRange> {
-        let vehicle = vehicle.into();
-        let raised_thrust_max_n = self.raised_thrust_max * vehicle.parameters.weight_n();
-        Ok(Mixer::new(vehicle, self.rotor_force_max_n)?.with_raised_thrust_max_n(raised_thrust_max_n))
     }
 }

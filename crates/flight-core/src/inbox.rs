@@ -13,9 +13,10 @@ pub struct Stamped<T> {
 }
 
 impl<T> Stamped<T> {
-    /// Returns its age at `now_us`. A stamp in the future is invalid and counts as infinitely old.
-    pub fn age_us(&self, now_us: u64) -> u64 {
-        now_us.checked_sub(self.at_us).unwrap_or(u64::MAX)
+    /// Returns its age at `now_us`, at most `u32::MAX` (71 minutes). A stamp in the future is invalid and counts as
+    /// that old.
+    pub fn age_us(&self, now_us: u64) -> u32 {
+        u32::try_from(now_us.wrapping_sub(self.at_us)).unwrap_or(u32::MAX)
     }
 }
 
@@ -104,10 +105,37 @@ impl Inbox {
 
     /// Returns a copy for the next tick, and removes the oldest request.
     pub fn take(&mut self) -> Inbox {
-        let taken = *self;
+        let mut taken = Inbox::EMPTY;
+        self.take_into(&mut taken);
+        taken
+    }
+
+    /// Does as [`take`](Self::take), in place of the copy for the last tick.
+    #[inline]
+    pub fn take_into(&mut self, taken: &mut Inbox) {
+        taken.state = self.state;
+        match (&self.setpoint, &mut taken.setpoint) {
+            (Some(new), Some(old)) => {
+                copy(&new.value, &mut old.value);
+                old.at_us = new.at_us;
+            }
+            (new, old) => *old = *new,
+        }
+        taken.requests = self.requests;
         // By hand, since rotating a slice costs a hundred instructions.
         let [_, second, third, fourth] = self.requests;
         self.requests = [second, third, fourth, None];
-        taken
     }
+}
+
+/// Copies field by field, since the copy of a large struct is a call of a slow loop.
+fn copy(from: &Setpoint, to: &mut Setpoint) {
+    let Setpoint { position_m, velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4, .. } = from;
+    to.position_m = *position_m;
+    to.velocity_m_s = *velocity_m_s;
+    to.acceleration_m_s2 = *acceleration_m_s2;
+    to.jerk_m_s3 = *jerk_m_s3;
+    to.snap_m_s4 = *snap_m_s4;
+    let Setpoint { yaw_rad, yaw_rate_rad_s, yaw_acceleration_rad_s2, .. } = from;
+    (to.yaw_rad, to.yaw_rate_rad_s, to.yaw_acceleration_rad_s2) = (*yaw_rad, *yaw_rate_rad_s, *yaw_acceleration_rad_s2);
 }

@@ -24,13 +24,13 @@ pub const CARRY_SHARE: f32 = 0.6;
 /// Time constant of the mean that gives the usual thrust \[s\].
 pub const USUAL_S: f32 = 5.0;
 /// Time for which rotors must carry a vehicle for it to be in the air \[us\].
-pub const CARRIED_US: u64 = 500_000;
+pub const CARRIED_US: u32 = 500_000;
 /// Time at rest without being carried after which a vehicle has landed \[us\].
-pub const STILL_US: u64 = 1_000_000;
+pub const STILL_US: u32 = 1_000_000;
 /// Time at rest, not carried and without a descent before, after which the tracker is distrusted \[us\].
-pub const FROZEN_US: u64 = 500_000;
+pub const FROZEN_US: u32 = 500_000;
 /// Time of hovering after which an earlier descent no longer counts \[us\].
-pub const HOVER_US: u64 = 2_000_000;
+pub const HOVER_US: u32 = 2_000_000;
 
 /// Tells whether the vehicle is in the air, and when it has landed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,58 +44,65 @@ pub struct LandDetector {
     stood_m: Vector3<f32>,
     /// Mean thrust in the air \[N\].
     usual_n: f32,
-    /// Times at which it was last not at rest, last carried and last not carried \[us\].
-    moved_us: u64,
-    carried_us: u64,
-    uncarried_us: u64,
+    /// Times for which it has been at rest, carried and not carried \[us\].
+    still_us: u32,
+    carried_us: u32,
+    uncarried_us: u32,
 }
 
 impl LandDetector {
     /// Starts for a vehicle of this weight that is armed in this state.
-    pub fn new(state: &State, weight_n: f32, now_us: u64) -> Self {
+    pub fn new(state: &State, weight_n: f32) -> Self {
         LandDetector {
             airborne: false,
             left: false,
             sank: false,
             stood_m: state.position_m,
             usual_n: weight_n,
-            moved_us: now_us,
-            carried_us: now_us,
-            uncarried_us: now_us,
+            still_us: 0,
+            carried_us: 0,
+            uncarried_us: 0,
         }
     }
 
-    /// Processes a tick with a fresh state, in which the rotors gave `thrust_n`.
-    pub fn advance(&mut self, state: &State, thrust_n: f32, now_us: u64, dt_s: f32) {
-        let speed_m_s = abs_max(&state.velocity_m_s);
-        if speed_m_s > STILL_M_S {
-            self.moved_us = now_us;
+    /// Processes a tick with a fresh state, `gap_us` after the last one, in which the rotors gave `thrust_n`.
+    pub fn advance(&mut self, state: &State, thrust_n: f32, gap_us: u32, dt_s: f32) {
+        let faster = |speed_m_s: f32| state.velocity_m_s.iter().any(|velocity_m_s| velocity_m_s.abs() > speed_m_s);
+        self.wait(gap_us);
+        if faster(STILL_M_S) {
+            self.still_us = 0;
         }
         if thrust_n > CARRY_SHARE * self.usual_n {
-            self.carried_us = now_us;
+            self.uncarried_us = 0;
         } else {
-            self.uncarried_us = now_us;
+            self.carried_us = 0;
         }
         self.sank |= state.velocity_m_s.z < -SINKS_M_S;
-        self.left |= speed_m_s > LEFT_M_S || abs_max(&(state.position_m - self.stood_m)) > LEFT_M;
-        self.airborne |= self.left || now_us.saturating_sub(self.uncarried_us) >= CARRIED_US;
+        self.left = self.left || faster(LEFT_M_S) || abs_max(&(state.position_m - self.stood_m)) > LEFT_M;
+        self.airborne |= self.left || self.carried_us >= CARRIED_US;
         if self.airborne {
             self.usual_n += dt_s / USUAL_S * (thrust_n - self.usual_n);
         }
 
-        let still_us = now_us.saturating_sub(self.moved_us);
-        if still_us >= HOVER_US && self.carried_us == now_us {
+        if self.still_us >= HOVER_US && self.uncarried_us == 0 {
             self.sank = false;
         }
-        if self.stands_for_us(now_us) > STILL_US && (self.sank || !self.left) {
+        if self.stands_for_us() > STILL_US && (self.sank || !self.left) {
             let usual_n = self.usual_n;
-            *self = LandDetector { usual_n, ..LandDetector::new(state, usual_n, now_us) };
+            *self = LandDetector { usual_n, ..LandDetector::new(state, usual_n) };
         }
     }
 
     /// Processes a tick without a fresh state.
-    pub fn advance_blind(&mut self, now_us: u64) {
-        self.moved_us = now_us;
+    pub fn advance_blind(&mut self, gap_us: u32) {
+        self.wait(gap_us);
+        self.still_us = 0;
+    }
+
+    fn wait(&mut self, gap_us: u32) {
+        for time_us in [&mut self.still_us, &mut self.carried_us, &mut self.uncarried_us] {
+            *time_us = time_us.saturating_add(gap_us);
+        }
     }
 
     /// True if the vehicle is in the air.
@@ -104,12 +111,12 @@ impl LandDetector {
     }
 
     /// True if the state is at rest in the air without thrust, which only a frozen tracker reports.
-    pub fn contradicts(&self, now_us: u64) -> bool {
-        self.left && !self.sank && self.stands_for_us(now_us) > FROZEN_US
+    pub fn contradicts(&self) -> bool {
+        self.left && !self.sank && self.stands_for_us() > FROZEN_US
     }
 
     /// Returns for how long it has been at rest and not carried.
-    fn stands_for_us(&self, now_us: u64) -> u64 {
-        now_us.saturating_sub(self.moved_us.max(self.carried_us))
+    fn stands_for_us(&self) -> u32 {
+        self.still_us.min(self.uncarried_us)
     }
 }

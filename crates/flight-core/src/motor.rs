@@ -38,7 +38,7 @@ parameters! {
 pub struct Motor {
     curve: Curve,
     /// Idle throttle of the curve, in steps.
-    idle: u16,
+    idle: u32,
     inverse_speed_max: f32,
 }
 
@@ -46,8 +46,9 @@ pub struct Motor {
 const SPAN: u16 = THROTTLE_MAX - THROTTLE_MIN;
 
 /// Converts a throttle in 0..1 to steps above [`THROTTLE_MIN`], rounded. 0 for smaller values and NaN.
-fn steps(u: f32) -> u16 {
-    (u * f32::from(SPAN) + 0.5) as u16
+// To 32 bits, which the processor's own conversion saturates to.
+fn steps(u: f32) -> u32 {
+    (u * f32::from(SPAN) + 0.5) as u32
 }
 
 impl Motor {
@@ -72,7 +73,7 @@ impl Motor {
         let ratio = speed_rad_s * self.inverse_speed_max;
         // The speed is proportional to the throttle.
         let u = if self.curve.linearity == 1.0 { ratio } else { self.inverse_curve(max(ratio, 0.0)) };
-        steps(u).max(self.idle).min(SPAN) + THROTTLE_MIN
+        steps(u).max(self.idle).min(SPAN.into()) as u16 + THROTTLE_MIN
     }
 
     /// Returns u in 0..1 with k u^2 + (1 - k) u = `ratio`^2, by the form of the quadratic's root that is valid for k =

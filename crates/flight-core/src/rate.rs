@@ -59,6 +59,8 @@ impl Report {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counter {
     last_us: Option<u64>,
+    /// Time between the last two ticks \[us\].
+    gap_us: u32,
     /// Time since the present window began \[us\].
     window_us: u32,
     /// Ticks in the present window.
@@ -71,7 +73,7 @@ pub struct Counter {
 impl Default for Counter {
     /// Starts without any fault.
     fn default() -> Self {
-        Counter { last_us: None, window_us: 0, ticks: 0, right_us: WINDOW_US, report: Report::default() }
+        Counter { last_us: None, gap_us: 0, window_us: 0, ticks: 0, right_us: WINDOW_US, report: Report::default() }
     }
 }
 
@@ -80,9 +82,11 @@ impl Counter {
     pub fn tick(&mut self, now_us: u64) -> Report {
         let report = &mut self.report;
         report.alive = true;
+        self.gap_us = 0;
         if let Some(last_us) = self.last_us {
             // 0 if the clock goes back; limited to about an hour.
-            let gap_us = now_us.saturating_sub(last_us).min(u64::from(u32::MAX)) as u32;
+            let gap_us = u32::try_from(now_us.saturating_sub(last_us)).unwrap_or(u32::MAX);
+            self.gap_us = gap_us;
             report.alive = gap_us > 0;
             self.window_us = self.window_us.saturating_add(gap_us);
             self.right_us = self.right_us.saturating_add(gap_us);
@@ -102,6 +106,11 @@ impl Counter {
         self.ticks = self.ticks.saturating_add(1);
         self.last_us = Some(now_us);
         *report
+    }
+
+    /// Returns the time between the last two ticks \[us\]; 0 before the second one.
+    pub fn gap_us(&self) -> u32 {
+        self.gap_us
     }
 
     /// Records that the clock has failed and another has taken over: the rate is not healthy any more.

@@ -4,17 +4,17 @@ use afbc_control::math::abs_max;
 use afbc_types::{Setpoint, State, parameters};
 
 /// Age above which a state is stale, and the law may not fly on it \[us\].
-pub const COAST_US: u64 = 20_000;
+pub const COAST_US: u32 = 20_000;
 /// Time for which states must have been fresh for coasting to end \[us\], so that the mode does not flicker.
-pub const STEADY_US: u64 = 100_000;
+pub const STEADY_US: u32 = 100_000;
 /// Age of the state at which coasting ends and the vehicle descends \[us\].
-pub const DESCEND_US: u64 = 250_000;
+pub const DESCEND_US: u32 = 250_000;
 /// Age of the state at which the motors stop, since the attitude is unknown \[us\]: two seconds of blind descent.
-pub const GIVE_UP_US: u64 = 2_250_000;
+pub const GIVE_UP_US: u32 = 2_250_000;
 /// Age of the setpoint at which the vehicle holds its position instead \[us\].
-pub const SETPOINT_STALE_US: u64 = 500_000;
+pub const SETPOINT_STALE_US: u32 = 500_000;
 /// Time at rest required for arming \[us\].
-pub const REST_US: u64 = 1_000_000;
+pub const REST_US: u32 = 1_000_000;
 
 /// Flight mode.
 ///
@@ -210,7 +210,7 @@ pub struct Standing<'a> {
     /// True if the control tick's rate is healthy.
     pub healthy: bool,
     /// Time for which it has been [at rest](ArmingLimits::at_rest) \[us\].
-    pub rest_us: u64,
+    pub rest_us: u32,
 }
 
 /// Inputs of the supervisor.
@@ -222,10 +222,10 @@ pub struct Observed {
     pub kill: bool,
     /// Result of [`ArmingLimits::ready`].
     pub ready: Result<(), Refusal>,
-    /// Age of the newest plausible state \[us\]; `u64::MAX` if there is none.
-    pub state_age_us: u64,
+    /// Age of the newest plausible state \[us\]; `u32::MAX` if there is none.
+    pub state_age_us: u32,
     /// Time for which no state has been stale \[us\].
-    pub steady_us: u64,
+    pub steady_us: u32,
     /// False if the vehicle is on the ground ([`crate::landing`]).
     pub airborne: bool,
     /// True if it is upside down or spinning without recovery ([`crate::tumble`]).
@@ -254,13 +254,17 @@ impl Mode {
     /// Returns the next mode, by the diagram of [`Mode`].
     #[must_use]
     pub fn next(self, observed: &Observed) -> Mode {
+        if self.end(observed).is_some() { Mode::Disarmed } else { self.onward(observed) }
+    }
+
+    /// Returns the next mode, if no flight ends.
+    pub(crate) fn onward(self, observed: &Observed) -> Mode {
         let age_us = observed.state_age_us;
         match self {
-            Mode::Disarmed if self.answer(Request::Arm, observed).is_ok() && observed.request == Some(Request::Arm) => {
+            Mode::Disarmed if observed.request == Some(Request::Arm) && self.answer(Request::Arm, observed).is_ok() => {
                 Mode::Flying
             }
             Mode::Disarmed => Mode::Disarmed,
-            _ if self.end(observed).is_some() => Mode::Disarmed,
             Mode::Descending => Mode::Descending,
             _ if age_us > DESCEND_US => Mode::Descending,
             _ if age_us > COAST_US => Mode::Coasting,

@@ -30,10 +30,10 @@ pub struct VehicleMemory<M> {
     rate: rate::Counter,
     /// The newest plausible state.
     state: Option<Stamped<State>>,
-    /// Time at which the state was last stale \[us\].
-    stale_us: u64,
-    /// Time at which the vehicle was last not at rest, or had no fresh state \[us\].
-    restless_us: u64,
+    /// Time for which no state has been stale \[us\].
+    steady_us: u32,
+    /// Time for which the vehicle has been at rest, with fresh states \[us\].
+    rest_us: u32,
     /// Number of states refused because they repeated the last one in flight, or came from a distrusted tracker.
     frozen_states: u32,
     flight: Option<Armed<M>>,
@@ -101,8 +101,8 @@ pub struct Health {
     pub control: afbc_control::Health,
     /// Rate and timing of the ticks.
     pub rate: rate::Report,
-    /// Age of the newest plausible state \[us\]; `u64::MAX` if there is none.
-    pub state_age_us: u64,
+    /// Age of the newest plausible state \[us\]; `u32::MAX` if there is none.
+    pub state_age_us: u32,
     /// True if there is no plausible setpoint younger than 500 ms; an armed vehicle then holds its position.
     pub setpoint_stale: bool,
     /// States since power-up refused as frozen ([`crate::witness`]), up to `u32::MAX`.
@@ -160,28 +160,27 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
     pub fn tick(&self, memory: &mut VehicleMemory<C::Memory>, now_us: u64, inbox: &Inbox) -> Outcome<N> {
         let dt_s = self.controller.dt_s();
         // Takes the newest inputs.
+        let rate = memory.rate.tick(now_us);
         let measured = memory.take_state(inbox, now_us);
-        let state_age_us = memory.state.map_or(u64::MAX, |state| state.age_us(now_us));
+        let state_age_us = memory.state.map_or(u32::MAX, |state| state.age_us(now_us));
         let fresh =
             memory.state.filter(|_| state_age_us <= COAST_US).map(|state| extrapolated(&state.value, state_age_us));
         let fresh = fresh.as_ref();
-        memory.watch(fresh, &self.limits, dt_s, now_us);
-        let VehicleMemory { mode, rate, stale_us, restless_us, frozen_states, flight, .. } = memory;
-        let rate = rate.tick(now_us);
+        memory.watch(fresh, &self.limits, dt_s);
+        let VehicleMemory { mode, steady_us, rest_us, frozen_states, flight, .. } = memory;
         let setpoint = inbox.setpoint().filter(|s| s.age_us(now_us) <= SETPOINT_STALE_US).map(|s| &s.value);
 
         // Supervises.
-        let rest_us = now_us.saturating_sub(*restless_us);
-        let standing = Standing { state: fresh, setpoint, healthy: rate.healthy(), rest_us };
+        let standing = Standing { state: fresh, setpoint, healthy: rate.healthy(), rest_us: *rest_us };
         let asked = inbox.asked();
         let observed = Observed {
             request: asked.map(|asked| asked.request),
-            kill: inbox.kills(),
+            kill: asked.is_some() && inbox.kills(),
             ready: if mode.armed() { Err(Refusal::AlreadyArmed) } else { self.limits.ready(&standing) },
             state_age_us,
-            steady_us: now_us.saturating_sub(*stale_us),
+            steady_us: *steady_us,
             airborne: flight.as_ref().is_some_and(|flight| flight.landing.airborne()),
-            tumbled: flight.as_ref().is_some_and(|flight| flight.tumble.is_lost(now_us)),
+            tumbled: flight.as_ref().is_some_and(|flight| flight.tumble.is_lost()),
         };
         let answer = asked.map(|asked| {
             let result = mode.answer(asked.request, &observed);
@@ -190,9 +189,9 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         let done = |request| answer.is_some_and(|answer| answer.request == request && answer.result.is_ok());
         let ended = mode.end(&observed);
         if ended.is_some() && observed.airborne {
-            *restless_us = now_us;
+            *rest_us = 0;
         }
-        *mode = mode.next(&observed);
+        *mode = if ended.is_some() { Mode::Disarmed } else { mode.onward(&observed) };
         let mode = *mode;
         // The tick of arming only sets up the flight, and the motors idle: a step would take too long.
         let arms = done(Request::Arm);
@@ -258,7 +257,7 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
 
 /// Extrapolates the state by `age_us` with its velocities and rates; as in the paper's model, body rates replace the
 /// derivatives of the angles.
-fn extrapolated(state: &State, age_us: u64) -> State {
+fn extrapolated(state: &State, age_us: u32) -> State {
     let age_s = age_us as f32 * 1e-6;
     State {
         position_m: state.position_m + state.velocity_m_s * age_s,
@@ -289,22 +288,23 @@ impl<M> VehicleMemory<M> {
     }
 
     /// Updates the detectors with a fresh state, or none.
-    fn watch(&mut self, fresh: Option<&State>, limits: &ArmingLimits, dt_s: f32, now_us: u64) {
-        if fresh.is_none() {
-            self.stale_us = now_us;
-        }
-        if !fresh.is_some_and(|state| limits.at_rest(state)) {
-            self.restless_us = now_us;
-        }
+    fn watch(&mut self, fresh: Option<&State>, limits: &ArmingLimits, dt_s: f32) {
+        let gap_us = self.rate.gap_us();
+        let longer = |time_us: u32, lasts| if lasts { time_us.saturating_add(gap_us) } else { 0 };
+        self.steady_us = longer(self.steady_us, fresh.is_some());
+        self.rest_us = longer(self.rest_us, fresh.is_some_and(|state| limits.at_rest(state)));
         let armed = self.mode.armed();
         let Some(flight) = self.flight.as_mut().filter(|_| armed) else { return };
         match fresh {
             Some(state) => {
-                flight.tumble.advance(state, now_us);
-                flight.landing.advance(state, flight.applied.thrust_n, now_us, dt_s);
-                flight.distrusts |= flight.landing.contradicts(now_us);
+                flight.tumble.advance(state, gap_us);
+                flight.landing.advance(state, flight.applied.thrust_n, gap_us, dt_s);
+                flight.distrusts |= flight.landing.contradicts();
             }
-            None => flight.landing.advance_blind(now_us),
+            None => {
+                flight.tumble.advance_blind(gap_us);
+                flight.landing.advance_blind(gap_us);
+            }
         }
     }
 }
@@ -321,7 +321,7 @@ impl<M: Default> Armed<M> {
             applied: Inputs::default(),
             lawless: None,
             guide: Guide::default(),
-            landing: LandDetector::new(state, weight_n, now_us),
+            landing: LandDetector::new(state, weight_n),
             tumble: Tumble::default(),
             witness: Witness::new(state, now_us),
             distrusts: false,

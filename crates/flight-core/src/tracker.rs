@@ -52,7 +52,7 @@ impl Tracker {
         let Refused { overtaken, late, elsewhere } = &mut self.refused;
         let refused = match (at_us, self.in_use) {
             (None, _) => overtaken,
-            (Some(at_us), _) if arrived_us - at_us > COAST_US => late,
+            (Some(at_us), _) if arrived_us - at_us > COAST_US.into() => late,
             (_, Some((id, news_us))) if id != sender && arrived_us.saturating_sub(news_us) <= SILENT_US => elsewhere,
             (Some(at_us), in_use) => {
                 if differs || in_use.is_none_or(|(id, _)| id != sender) {

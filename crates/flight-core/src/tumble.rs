@@ -6,15 +6,17 @@ use afbc_types::State;
 
 /// Cosine of the tilt below which a vehicle is on its side or back: 80 degrees.
 pub const TILT_COSINE_MIN: f32 = 0.17;
+/// Roll and pitch up to which the cosine of the tilt is larger than that for sure \[rad\].
+const UPRIGHT_RAD: f32 = 1.1;
 /// Combined rate about body x and y above which a vehicle is spinning \[rad/s\].
 pub const SPIN_RAD_S: f32 = 10.0;
 /// Increase of the cosine of the tilt from its lowest value that counts as recovering.
 pub const RIGHTING: f32 = 0.2;
 /// Longest time on the side or back, or spinning, without recovering \[us\].
-pub const LOST_US: u64 = 1_000_000;
+pub const LOST_US: u32 = 1_000_000;
 /// Time upright after which a vehicle counts as recovered; one that rolls continuously is upright for shorter times
 /// \[us\].
-pub const UPRIGHT_US: u64 = 800_000;
+pub const UPRIGHT_US: u32 = 800_000;
 
 /// Detector of tumbling.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,42 +26,63 @@ pub struct Tumble {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Over {
-    since_us: u64,
+    /// Time since it began \[us\].
+    for_us: u32,
     /// Lowest cosine of the tilt since it began.
     lowest: f32,
-    /// Time since which it has been upright again.
-    upright_since_us: Option<u64>,
+    /// Time for which it has been upright again; none if it is not.
+    upright_us: Option<u32>,
     /// True if it tipped over again before that: then coming up does not count as recovering.
     again: bool,
 }
 
 impl Tumble {
-    /// Processes a fresh state.
-    pub fn advance(&mut self, state: &State, now_us: u64) {
-        let cosine = math::tilt_cosine(state.attitude_rad.x, state.attitude_rad.y);
-        let spins = state.rates_rad_s.xy().norm_squared() > SPIN_RAD_S * SPIN_RAD_S;
+    /// Processes a fresh state, `gap_us` after the last one.
+    #[inline]
+    pub fn advance(&mut self, state: &State, gap_us: u32) {
+        let (attitude, rates) = (&state.attitude_rad, &state.rates_rad_s);
+        let spins = rates.xy().norm_squared() > SPIN_RAD_S * SPIN_RAD_S;
+        // Upright for sure, without a cosine.
+        let tilt_rad = math::max(attitude.x.abs(), attitude.y.abs());
+        if self.over.is_some() || spins || tilt_rad > UPRIGHT_RAD {
+            self.look(math::tilt_cosine(attitude.x, attitude.y), spins, gap_us);
+        }
+    }
+
+    /// Processes a state that may be over.
+    fn look(&mut self, cosine: f32, spins: bool, gap_us: u32) {
         let upright = cosine >= TILT_COSINE_MIN && !spins;
-        let new = Over { since_us: now_us, lowest: cosine, upright_since_us: None, again: false };
+        let new = Over { for_us: 0, lowest: cosine, upright_us: None, again: false };
         let Some(over) = &mut self.over else {
             self.over = (!upright).then_some(new);
             return;
         };
+        over.for_us = over.for_us.saturating_add(gap_us);
         if upright {
-            let since_us = *over.upright_since_us.get_or_insert(now_us);
-            if now_us.saturating_sub(since_us) >= UPRIGHT_US {
+            let upright_us = over.upright_us.map_or(0, |upright_us| upright_us.saturating_add(gap_us));
+            over.upright_us = Some(upright_us);
+            if upright_us >= UPRIGHT_US {
                 self.over = None;
             }
             return;
         }
-        over.again |= over.upright_since_us.take().is_some();
+        over.again |= over.upright_us.take().is_some();
         if cosine > over.lowest + RIGHTING && !spins && !over.again {
             *over = new;
         }
         over.lowest = math::min(over.lowest, cosine);
     }
 
+    /// Processes a tick without a fresh state.
+    pub fn advance_blind(&mut self, gap_us: u32) {
+        if let Some(over) = &mut self.over {
+            over.for_us = over.for_us.saturating_add(gap_us);
+            over.upright_us = over.upright_us.map(|upright_us| upright_us.saturating_add(gap_us));
+        }
+    }
+
     /// True if the vehicle is beyond recovery.
-    pub fn is_lost(&self, now_us: u64) -> bool {
-        self.over.is_some_and(|over| over.upright_since_us.is_none() && now_us.saturating_sub(over.since_us) > LOST_US)
+    pub fn is_lost(&self) -> bool {
+        self.over.is_some_and(|over| over.upright_us.is_none() && over.for_us > LOST_US)
     }
 }

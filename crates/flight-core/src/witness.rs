@@ -15,7 +15,7 @@ use afbc_types::State;
 use nalgebra::Vector3;
 
 /// Time over which displacements are compared \[us\].
-pub const WINDOW_US: u64 = 250_000;
+pub const WINDOW_US: u32 = 250_000;
 /// Smallest displacement by the twist, along any axis, for a comparison \[m\].
 pub const TRAVEL_M: f32 = 0.15;
 /// Smallest rotation by the twist, about body x or y, for a comparison \[rad\].
@@ -26,9 +26,13 @@ pub const STANDS_SHARE: f32 = 0.2;
 /// Compares pose and twist over windows of [`WINDOW_US`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Witness {
-    since_us: u64,
+    /// Time of the last state \[us\].
     last_us: u64,
-    first: State,
+    /// Time since the window began \[us\].
+    window_us: u32,
+    /// Pose at its beginning.
+    position_m: Vector3<f32>,
+    attitude_rad: Vector3<f32>,
     /// Integral of the velocity \[m\] and of the rates \[rad\] over the window.
     travel_m: Vector3<f32>,
     turn_rad: Vector3<f32>,
@@ -37,36 +41,43 @@ pub struct Witness {
 impl Witness {
     /// Starts a window with a state measured at `at_us`.
     pub fn new(state: &State, at_us: u64) -> Self {
+        let State { position_m, attitude_rad, .. } = *state;
         let zero = Vector3::zeros();
-        Witness { since_us: at_us, last_us: at_us, first: *state, travel_m: zero, turn_rad: zero }
+        Witness { last_us: at_us, window_us: 0, position_m, attitude_rad, travel_m: zero, turn_rad: zero }
     }
 
     /// Processes a state measured at `at_us`; true if the pose is constant although the twist is not zero.
+    #[inline]
     pub fn contradicts(&mut self, state: &State, at_us: u64) -> bool {
-        let elapsed_us = at_us.saturating_sub(self.last_us);
         // After a longer gap the motion in between is unknown.
+        let elapsed_us = u32::try_from(at_us.wrapping_sub(self.last_us)).unwrap_or(u32::MAX);
         if elapsed_us > WINDOW_US {
             *self = Witness::new(state, at_us);
             return false;
         }
         let elapsed_s = elapsed_us as f32 * 1e-6;
         self.last_us = at_us;
+        self.window_us += elapsed_us;
         self.travel_m += state.velocity_m_s * elapsed_s;
         self.turn_rad += state.rates_rad_s * elapsed_s;
-        if at_us.saturating_sub(self.since_us) < WINDOW_US {
+        if self.window_us < WINDOW_US {
             return false;
         }
+        let contradicts = self.stands(state);
+        *self = Witness::new(state, at_us);
+        contradicts
+    }
+
+    /// True if the pose is that of the window's beginning although the twist is not zero.
+    fn stands(&self, state: &State) -> bool {
         let stands = |moved: Vector3<f32>, told: Vector3<f32>, least: f32| {
             let told = abs_max(&told);
             told > least && abs_max(&moved) < STANDS_SHARE * told
         };
         // Roll and pitch are constant in a tilted vehicle that rotates about its own z.
         let level = |v: Vector3<f32>| Vector3::new(v.x, v.y, 0.0);
-        let (moved_m, turned_rad) =
-            (state.position_m - self.first.position_m, state.attitude_rad - self.first.attitude_rad);
-        let contradicts = stands(moved_m, self.travel_m, TRAVEL_M)
-            || self.turn_rad.z.abs() < TURN_RAD && stands(level(turned_rad), level(self.turn_rad), TURN_RAD);
-        *self = Witness::new(state, at_us);
-        contradicts
+        let (moved_m, turned_rad) = (state.position_m - self.position_m, state.attitude_rad - self.attitude_rad);
+        stands(moved_m, self.travel_m, TRAVEL_M)
+            || self.turn_rad.z.abs() < TURN_RAD && stands(level(turned_rad), level(self.turn_rad), TURN_RAD)
     }
 }

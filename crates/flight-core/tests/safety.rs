@@ -171,7 +171,7 @@ fn nothing_that_moves_or_turns_is_armed() {
         };
         bench.wait(1_500, moving);
         assert_eq!(bench.answer(Request::Arm, moving), Err(Refusal::NotAtRest), "{velocity} m/s, {rate} rad/s");
-        bench.wait(REST_US / 1000 - 2, State::default());
+        bench.wait(u64::from(REST_US / 1000 - 2), State::default());
         assert_eq!(bench.answer(Request::Arm, State::default()), Err(Refusal::NotAtRest));
         bench.wait(2, State::default());
         assert_eq!(bench.answer(Request::Arm, State::default()), Ok(()));
@@ -191,7 +191,7 @@ fn a_late_arm_does_not_start_a_falling_vehicle() {
     }
     // Nor at the moment when it comes to rest.
     assert_eq!(bench.answer(Request::Arm, State::default()), Err(Refusal::NotAtRest));
-    assert_eq!(bench.wait(REST_US / 1000, State::default()), None);
+    assert_eq!(bench.wait(u64::from(REST_US / 1000), State::default()), None);
     assert_eq!(bench.answer(Request::Arm, State::default()), Ok(()));
 }
 
@@ -239,7 +239,7 @@ fn a_repeated_state_is_as_old_as_its_first() {
             _ => Mode::Disarmed,
         };
         assert_eq!((outcome.mode, outcome.health.state_age_us), (mode, age_ms * 1000));
-        assert_eq!(u64::from(outcome.health.frozen_states), age_ms);
+        assert_eq!(outcome.health.frozen_states, age_ms);
     }
 }
 

@@ -10,7 +10,7 @@ const REQUESTS: [Option<Request>; 5] =
     [None, Some(Request::Arm), Some(Request::Disarm), Some(Request::Kill), Some(Request::Engage)];
 
 /// Ages on both sides of each limit.
-const AGES_US: [u64; 8] = [0, COAST_US, COAST_US + 1, DESCEND_US, DESCEND_US + 1, GIVE_UP_US, GIVE_UP_US + 1, u64::MAX];
+const AGES_US: [u32; 8] = [0, COAST_US, COAST_US + 1, DESCEND_US, DESCEND_US + 1, GIVE_UP_US, GIVE_UP_US + 1, u32::MAX];
 
 /// In the air with long fresh states and no request.
 const CALM: Observed = Observed {
@@ -18,7 +18,7 @@ const CALM: Observed = Observed {
     kill: false,
     ready: Ok(()),
     state_age_us: 0,
-    steady_us: u64::MAX,
+    steady_us: u32::MAX,
     airborne: true,
     tumbled: false,
 };
@@ -133,7 +133,7 @@ fn readiness_names_the_first_reason_against_it() {
     let level = tilted(0.0, 0.0, 3.0);
     let cases = [
         (level, at(0.0, 0.0, 0.0), true, REST_US, Ok(())),
-        (tilted(0.2, -0.2, 3.0), at(0.0, 0.0, 2.0), true, u64::MAX, Ok(())),
+        (tilted(0.2, -0.2, 3.0), at(0.0, 0.0, 2.0), true, u32::MAX, Ok(())),
         (None, at(0.0, 0.0, 0.0), true, REST_US, Err(Refusal::StateStale)),
         (None, None, false, 0, Err(Refusal::StateStale)),
         (tilted(0.21, 0.0, 0.0), None, false, 0, Err(Refusal::TiltTooLarge)),

@@ -287,7 +287,7 @@ fn a_state_that_comes_back_leads_the_descent_to_the_ground() {
     // It stops on the ground. Thrust must be low as well, and both for a second.
     let mut uncarried_ms = 0;
     let ended = (0..3000).find_map(|_| {
-        uncarried_ms += u64::from(bench.trace().inputs.thrust_n < 0.6 * WEIGHT_N);
+        uncarried_ms += u32::from(bench.trace().inputs.thrust_n < 0.6 * WEIGHT_N);
         let outcome = bench.tick(Some(state), Some(near()));
         assert!(outcome.mode == Mode::Descending || outcome.motors == RotorSpeeds::default());
         outcome.ended
