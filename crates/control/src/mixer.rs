@@ -50,9 +50,10 @@ pub struct Mixer<const N: usize = 4> {
     room: [YawRoom<N>; 2],
     /// Each rotor's share of a pure thrust.
     share: SVector<f32, N>,
-    /// Largest load of each rotor, and its inverse.
+    /// Largest load of each rotor.
     most: SVector<f32, N>,
-    inverse_most: SVector<f32, N>,
+    /// The same, if all rotors have the same share.
+    common_most: Option<f32>,
     /// b
     thrust_factor: f32,
     /// 1/b
@@ -60,6 +61,18 @@ pub struct Mixer<const N: usize = 4> {
     force_max: f32,
     /// Largest thrust that is raised for roll and pitch.
     raised_thrust_max: f32,
+}
+
+/// Returns the smallest of some loads.
+#[inline(always)]
+fn lowest<const N: usize>(loads: &SVector<f32, N>) -> f32 {
+    loads.iter().copied().reduce(math::min).unwrap_or_default()
+}
+
+/// Returns the largest of some loads.
+#[inline(always)]
+fn highest<const N: usize>(loads: &SVector<f32, N>) -> f32 {
+    loads.iter().copied().reduce(math::max).unwrap_or_default()
 }
 
 /// Largest |U3| in one direction that leaves each rotor within its limits: `unloaded` + `slope` times its load.
@@ -85,9 +98,8 @@ impl<const N: usize> YawRoom<N> {
     /// Returns the largest |U3| for all rotors with these loads.
     #[inline(always)]
     fn of(&self, loads: &SVector<f32, N>) -> f32 {
-        let rooms = self.slope.component_mul(loads) + self.unloaded;
         // Rounding may leave a load beyond its limits.
-        math::max(rooms.iter().copied().fold(f32::MAX, math::min), 0.0)
+        math::max(lowest(&(self.slope.component_mul(loads) + self.unloaded)), 0.0)
     }
 }
 
@@ -158,7 +170,7 @@ impl<const N: usize> Mixer<N> {
             room: [YawRoom::new(&yaw, &most), YawRoom::new(&-yaw, &most)],
             share,
             most,
-            inverse_most: most.map(|most| 1.0 / most),
+            common_most: (most.min() == most.max()).then_some(most.max()),
             thrust_factor: b,
             inverse_thrust_factor: 1.0 / b,
             force_max: force_max_n,
@@ -265,16 +277,21 @@ impl<const N: usize> Mixer<N> {
     fn within_limits(&self, wanted: &Inputs, mut tilt: SVector<f32, N>) -> (Inputs, SVector<f32, N>) {
         let Inputs { mut roll_n, mut pitch_n, mut yaw_n, mut thrust_n } = *wanted;
         // Thrusts at which the loads by roll and pitch are within limits; none if the first exceeds the second.
-        let least = -tilt.iter().copied().fold(f32::MAX, math::min);
-        let most = self.most.iter().zip(tilt.iter()).fold(f32::MAX, |most, (own, tilt)| math::min(most, own - tilt));
+        let least = -lowest(&tilt);
+        let most = match self.common_most {
+            Some(most) => most - highest(&tilt),
+            None => lowest(&(self.most - tilt)),
+        };
         let raised = math::max(thrust_n, self.raised_thrust_max);
         if least <= most && least <= raised {
             thrust_n = math::max(math::min(thrust_n, most), least);
         } else {
             // Of the largest load at the least thrust.
-            let share = |largest, (own, tilt): (&f32, &f32)| math::max(largest, (least + tilt) * own);
-            let excess = self.inverse_most.iter().zip(tilt.iter()).fold(1.0, share);
-            let scale = math::min(1.0 / excess, raised / least);
+            let excess = match self.common_most {
+                Some(own) => (least + own - most) / own,
+                None => highest(&tilt.add_scalar(least).component_div(&self.most)),
+            };
+            let scale = math::min(1.0 / math::max(excess, 1.0), raised / least);
             (roll_n, pitch_n, tilt, thrust_n) = (roll_n * scale, pitch_n * scale, tilt * scale, least * scale);
         }
 

@@ -77,7 +77,7 @@ impl Inbox {
 
     /// True if one of the requests is [`Request::Kill`], which takes precedence over earlier ones.
     pub fn kills(&self) -> bool {
-        self.requests.iter().flatten().any(|asked| asked.request == Request::Kill)
+        self.requests.iter().map_while(|asked| *asked).any(|asked| asked.request == Request::Kill)
     }
 
     /// Merges `news` into this inbox.

@@ -81,22 +81,18 @@ impl Counter {
     /// Processes a tick, with the time since power-up.
     pub fn tick(&mut self, now_us: u64) -> Report {
         let report = &mut self.report;
-        report.alive = true;
-        self.gap_us = 0;
-        if let Some(last_us) = self.last_us {
-            // 0 if the clock goes back; limited to about an hour.
-            let gap_us = u32::try_from(now_us.saturating_sub(last_us)).unwrap_or(u32::MAX);
-            self.gap_us = gap_us;
-            report.alive = gap_us > 0;
-            self.window_us = self.window_us.saturating_add(gap_us);
-            self.right_us = self.right_us.saturating_add(gap_us);
-            if gap_us > LATE_US {
-                report.late_ticks = report.late_ticks.saturating_add(1);
-                self.right_us = 0;
-            } else if gap_us < EARLY_US {
-                report.early_ticks = report.early_ticks.saturating_add(1);
-                self.right_us = 0;
-            }
+        let first = self.last_us.is_none();
+        let last_us = self.last_us.replace(now_us).unwrap_or(now_us);
+        // 0 if the clock goes back; limited to about an hour.
+        self.gap_us = u32::try_from(now_us.saturating_sub(last_us)).unwrap_or(u32::MAX);
+        report.alive = first || self.gap_us > 0;
+        self.window_us = self.window_us.saturating_add(self.gap_us);
+        self.right_us = self.right_us.saturating_add(self.gap_us);
+        let (late, early) = (self.gap_us > LATE_US, self.gap_us < EARLY_US && !first);
+        if late || early {
+            let count = if late { &mut report.late_ticks } else { &mut report.early_ticks };
+            *count = count.saturating_add(1);
+            self.right_us = 0;
         }
         report.steady = self.right_us >= WINDOW_US;
         if self.window_us >= WINDOW_US {
@@ -104,7 +100,6 @@ impl Counter {
             (self.window_us, self.ticks) = (0, 0);
         }
         self.ticks = self.ticks.saturating_add(1);
-        self.last_us = Some(now_us);
         *report
     }
 

@@ -171,12 +171,15 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         let setpoint = inbox.setpoint().filter(|s| s.age_us(now_us) <= SETPOINT_STALE_US).map(|s| &s.value);
 
         // Supervises.
-        let standing = Standing { state: fresh, setpoint, healthy: rate.healthy(), rest_us: *rest_us };
+        let ready = || {
+            let standing = Standing { state: fresh, setpoint, healthy: rate.healthy(), rest_us: *rest_us };
+            self.limits.ready(&standing)
+        };
         let asked = inbox.asked();
         let observed = Observed {
             request: asked.map(|asked| asked.request),
             kill: asked.is_some() && inbox.kills(),
-            ready: if mode.armed() { Err(Refusal::AlreadyArmed) } else { self.limits.ready(&standing) },
+            ready: if mode.armed() { Err(Refusal::AlreadyArmed) } else { ready() },
             state_age_us,
             steady_us: *steady_us,
             airborne: flight.as_ref().is_some_and(|flight| flight.landing.airborne()),
