@@ -125,6 +125,105 @@ fn compare_refuses_what_it_cannot_fly() {
     assert!(!folder.join("out").exists());
 }
 
+/// Two flights, on the racer and on the paper's vehicle, with a published figure.
+const SUITE: &str = r#"
+description = "two"
+
+[[source]]
+name = "someone"
+citation = "a paper"
+differs = "flown"
+
+[[flight]]
+name = "racing"
+duration_s = 7.0
+vehicle = { name = "racer" }
+sensors = { noise = 0.001 }
+trajectory = { kind = "circle", centre_m = [0, 0, 2], radius_m = 1.0, period_s = 4.0 }
+published = [{ law = "theirs", rms_m = 0.0123, source = "someone" }]
+
+[[flight]]
+name = "weak"
+like = "racing"
+sensors = { noise = 0.0 }
+rotor_fault = [{ rotor = 2, efficiency = 0.0, start_s = 6.0 }]
+"#;
+
+#[test]
+fn a_suite_is_one_report_alike_on_any_number_of_threads() {
+    let folder = folder("suite");
+    fs::write(folder.join("two.toml"), SUITE).unwrap();
+    let fly = |threads, out| {
+        let of =
+            ["compare", "--suite", "two.toml", "--controllers", "pid,afbc-monitored", "--seeds", "2", "--out", out];
+        succeeds(&sitl_on(threads, &folder, &of))
+    };
+    let table = fly("1", "one");
+    fly("3", "three");
+    for file in ["suite.csv", "suite.json", "report.html", "racing.svg", "weak.svg"] {
+        let [one, three] = ["one", "three"].map(|out| fs::read(folder.join(out).join(file)).unwrap());
+        assert!(one == three, "{file}");
+    }
+    assert!(table.contains("2 of 2 lost") && table.contains("PID"), "{table}");
+    assert_eq!(fs::read_to_string(folder.join("one/suite.csv")).unwrap().lines().count(), 1 + 2 * 2 * 2);
+    let flights = json(&folder.join("one/suite.json"));
+    let [racing, weak] = [0, 1].map(|flight| flights[flight]["contenders"][0].clone());
+    assert_eq!((&weak["lost"], &weak["mean"]["rms_m"], &racing["lost"]), (&2.into(), &Value::Null, &0.into()));
+    let page = fs::read_to_string(folder.join("one/report.html")).unwrap();
+    for word in ["0.0123", "someone", "a paper", "flown", "lost at t = ", "rotor fault", "<svg"] {
+        assert!(page.contains(word), "no {word}");
+    }
+    // The folder is its own: other results do not overwrite it.
+    let other = refused(&sitl(&folder, &["compare", "hover", "--out", "one"]));
+    assert_eq!(other.lines().count(), 1, "{other}");
+}
+
+#[test]
+fn a_suites_table_is_written_between_its_markers() {
+    let folder = folder("suite-page");
+    fs::write(folder.join("two.toml"), SUITE).unwrap();
+    let before = "# Page\n\n<!-- suite two: begin -->\nold\n<!-- suite two: end -->\nrest\n";
+    fs::write(folder.join("page.md"), before).unwrap();
+    let write = ["compare", "--suite", "two.toml", "--controllers", "pid", "--write", "page.md"];
+    assert_eq!(succeeds(&sitl(&folder, &write)), "");
+    let page = fs::read_to_string(folder.join("page.md")).unwrap();
+    assert!(
+        page.starts_with("# Page\n\n<!-- suite two: begin -->\n| flight | PID |\n|---|--:|\n| `racing`: "),
+        "{page}"
+    );
+    assert!(page.ends_with("<!-- suite two: end -->\nrest\n") && !page.contains("old"), "{page}");
+    assert!(page.contains("| `weak`:  | lost 6.") && page.contains("theirs 0.0123 (someone)"), "{page}");
+    succeeds(&sitl(&folder, &write));
+    assert_eq!(fs::read_to_string(folder.join("page.md")).unwrap(), page, "written again");
+    assert!(!folder.join("out").exists());
+
+    fs::write(folder.join("page.md"), "no markers").unwrap();
+    let line = refused(&sitl(&folder, &write));
+    assert!(line.starts_with("page.md: no place for the table; add the lines <!-- suite two: begin -->"), "{line}");
+}
+
+#[test]
+fn a_suite_that_cannot_be_flown_is_refused_in_one_line() {
+    let folder = folder("suite-refused");
+    fs::write(folder.join("bad.toml"), SUITE.replace("like = \"racing\"", "like = \"nobody\"")).unwrap();
+    for (arguments, expected) in [
+        (&["--suite", "feild"][..], "feild: no such suite; did you mean field?"),
+        (&["--suite", "./nothing.toml"], "./nothing.toml: no such file; `sitl suites` lists the built-in ones"),
+        (&["--suite", "bad.toml"], "bad.toml:19: flight.like: no flight above is called \"nobody\""),
+        (&["--suite", "faults", "--controllers", "sof"], "--controllers sof: no such controller; there are afbc,"),
+    ] {
+        let line = refused(&sitl(&folder, &[&["compare"], arguments].concat()));
+        assert!(line.starts_with(expected) && line.lines().count() == 1, "{line}");
+    }
+    refused(&sitl(&folder, &["compare", "hover", "--suite", "field"]));
+    refused(&sitl(&folder, &["compare", "--suite", "field", "--vehicle", "racer"]));
+    refused(&sitl(&folder, &["compare", "--write", "page.md"]));
+    assert!(!folder.join("out").exists());
+    let listed = succeeds(&sitl(&folder, &["suites"]));
+    assert!(listed.contains("field ") && listed.contains("faults "), "{listed}");
+    fs::write(folder.join("copy.toml"), succeeds(&sitl(&folder, &["suites", "faults"]))).unwrap();
+}
+
 /// The two costs in the first line of the output of `sitl tune`.
 fn costs(fragment: &str) -> [f64; 2] {
     let line = fragment.lines().next().unwrap();

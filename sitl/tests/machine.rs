@@ -117,6 +117,33 @@ fn flights() {
     assert_eq!(serde_json::from_str::<Value>(&paper).unwrap()[0]["scenario"], "paper");
 }
 
+const SUITE: &str = r#"
+[[source]]
+name = "someone"
+citation = "a paper"
+differs = "everything"
+
+[[flight]]
+name = "still"
+duration_s = 6.0
+trajectory = { kind = "hover", position_m = [0, 0, 1] }
+published = [{ law = "theirs", rms_m = 0.01, source = "someone" }]
+"#;
+
+#[test]
+fn suites() {
+    let folder = small("suites");
+    fs::write(folder.join("suite.toml"), SUITE).unwrap();
+    let flown = prints(&folder, "Suites", &[&["compare", "--suite", "suite.toml", "--controllers", "pid"]]);
+    let file = fs::read(folder.join("out/suite/suite.json")).unwrap();
+    assert_eq!(flown, serde_json::from_slice::<Value>(&file).unwrap());
+    assert_eq!(
+        (&flown[0]["contenders"][0]["lost"], &flown[0]["published"][0]["differs"]),
+        (&0.into(), &"everything".into())
+    );
+    assert!(refused(&folder, &["compare", "--suite", "nothing", "--json"]).starts_with("nothing: no such suite; "));
+}
+
 #[test]
 fn comparisons_and_gains() {
     let folder = small("comparisons");

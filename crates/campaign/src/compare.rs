@@ -1,12 +1,12 @@
 //! Comparison of contenders: each of them in each scenario.
 
 use afbc::Profile;
-use afbc_sim::contender::Contender;
-use afbc_sim::contender::ControllerKind;
+use afbc_reader::FileError;
+use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::flight::Lost;
 use afbc_sim::flown::Flown;
 use afbc_sim::metrics::Metrics;
-use afbc_sim::run::Run;
+use afbc_sim::run::{Run, Tripped};
 use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 use rayon::prelude::*;
@@ -17,6 +17,26 @@ pub fn standard() -> Vec<Contender> {
     let printed = Contender { name: "afbc-as-printed".into(), ..Contender::of(ControllerKind::Afbc, Profile::Paper) };
     let [afbc, others @ ..] = ControllerKind::ALL;
     [flying(afbc), printed].into_iter().chain(others.map(flying)).collect()
+}
+
+/// Returns the contenders of a suite: the default ones, and AFBC under its monitor.
+pub fn standard_and_monitored() -> Vec<Contender> {
+    let guarded = Contender::of(ControllerKind::Afbc, Profile::Flight).monitored();
+    let guarded = Contender { name: "afbc-monitored".into(), ..guarded };
+    standard().into_iter().chain([guarded]).collect()
+}
+
+/// Gives `scenario` these contenders, each with its gains for the scenario's vehicle, and checks them.
+///
+/// # Errors
+/// One line on what is wrong with the gains in the vehicle's file, or the first gain or setting out of range.
+pub fn fly_under(scenario: &mut Scenario, contenders: &[Contender]) -> Result<(), FileError> {
+    let own = |contender: &Contender| match &scenario.vehicle_file {
+        Some(vehicle) => contender.clone().on(vehicle, contender.profile().unwrap_or(Profile::Flight)),
+        None => Ok(contender.clone().for_vehicle(&scenario.vehicle)),
+    };
+    scenario.contenders = contenders.iter().map(own).collect::<Result<_, _>>()?;
+    scenario.check().map_err(|error| FileError::whole(&scenario.name, error.to_string()))
 }
 
 /// Returns all contenders of `scenarios`; of two different ones with the same name, the second gets its scenario's name
@@ -63,6 +83,8 @@ pub struct Outcome {
     pub seed: u64,
     /// When and why the vehicle was lost, if it was.
     pub lost: Option<Lost>,
+    /// When and why AFBC's monitor switched to the fallback law, if it did.
+    pub tripped: Option<Tripped>,
     /// Errors and smoothness up to the end or the loss.
     pub metrics: Metrics,
 }
@@ -169,7 +191,7 @@ pub fn fly(
         let scenario = Scenario { seed: scenario.seed + number, ..scenario.clone() };
         let run = Run::fly(&scenario, contender, if number == 0 { log_every } else { u64::MAX })?;
         progress();
-        Ok((Outcome { seed: scenario.seed, lost: run.lost, metrics: run.metrics }, run))
+        Ok((Outcome { seed: scenario.seed, lost: run.lost, tripped: run.tripped, metrics: run.metrics }, run))
     };
     let entry = |scenario: &Scenario, contender: &Contender| {
         let flown: Vec<(Outcome, Run)> = (0..seeds.max(1))

@@ -75,7 +75,7 @@ fn courses(root: &mut Table<'_>, folder: &Path) -> Result<Vec<Course>, FileError
 }
 
 /// Reads a scenario by name: a plain name is a built-in one, anything else a file.
-fn named(root: &Table<'_>, key: &str, name: &str, folder: &Path) -> Result<Scenario, FileError> {
+pub(crate) fn named(root: &Table<'_>, key: &str, name: &str, folder: &Path) -> Result<Scenario, FileError> {
     if !name.contains(['/', '\\', '.']) {
         let built_in = built_in(name).ok_or_else(|| {
             let cure = match similar_built_in(name) {

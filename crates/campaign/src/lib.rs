@@ -2,7 +2,7 @@
 //!
 //! Flight `i` is drawn from the campaign's seed and `i` alone, so it can be flown again by itself on any machine. All
 //! contenders fly the same draws. `docs/campaigns.md` describes the format of campaign files. [`compare`] flies
-//! unmodified scenarios under every contender.
+//! unmodified scenarios under every contender, [`suite`] lists of them.
 #![forbid(unsafe_code)]
 
 mod built_in;
@@ -18,6 +18,7 @@ mod plan;
 mod quantity;
 mod row;
 pub mod statistics;
+pub mod suite;
 mod summary;
 
 pub use built_in::{BUILT_IN, built_in, similar_built_in};

@@ -1,6 +1,7 @@
 //! Reading of TOML files: size, syntax, name and description.
 
 use super::error::{FileError, Source};
+use super::heirs;
 use super::table::Table;
 use std::fs::File;
 use std::io::{self, Read};
@@ -48,6 +49,24 @@ pub fn document<T>(
 ) -> Result<T, FileError> {
     let source = Source { file, text };
     let document = DeTable::parse(text).map_err(|error| syntax(source, &error, sample))?;
+    read(Table::root(source, document.get_ref()))
+}
+
+/// As [`document`], where a table of the list `list` may say `like = "NAME"`: it takes over what an earlier one of this
+/// name says and it does not, except the keys `own`.
+///
+/// # Errors
+/// As [`document`]. A `like` that names no earlier table is left for `read` to refuse.
+pub fn document_with_heirs<T>(
+    file: &str,
+    text: &str,
+    sample: &str,
+    (list, own): (&str, &[&str]),
+    read: impl FnOnce(Table<'_>) -> Result<T, FileError>,
+) -> Result<T, FileError> {
+    let source = Source { file, text };
+    let mut document = DeTable::parse(text).map_err(|error| syntax(source, &error, sample))?;
+    heirs::inherit(document.get_mut(), list, own);
     read(Table::root(source, document.get_ref()))
 }
 

@@ -3,10 +3,12 @@
 mod built_in;
 mod error;
 mod file;
+mod heirs;
 mod table;
 pub mod words;
 
 pub use built_in::BuiltIn;
 pub use error::{FileError, Source};
-pub use file::{document, text, title};
+pub use file::{document, document_with_heirs, text, title};
+pub use heirs::LIKE;
 pub use table::Table;

@@ -1,5 +1,6 @@
 //! The results table of `docs/results.md`: the paper's flight in every reading, on both models, under both laws.
 
+use crate::markers;
 use afbc_plant::Model;
 use afbc_sim::case::{Case, Reading, Uncertainty};
 use afbc_sim::flown::Flown;
@@ -33,12 +34,9 @@ pub fn cases() -> Vec<(String, Case)> {
 /// Lines around the table in a page.
 pub const MARKERS: [&str; 2] = ["<!-- results: begin -->", "<!-- results: end -->"];
 
-/// Splits a page into everything up to the first marker's line, the table, and the rest; `None` if a marker is missing.
+/// Splits a page at its [`MARKERS`].
 pub fn parts(page: &str) -> Option<(&str, &str, &str)> {
-    let [begin, end] = MARKERS;
-    let from = page.find(begin)? + begin.len() + 1;
-    let to = page.find(end).filter(|&to| to >= from)?;
-    Some((page.get(..from)?, page.get(from..to)?, page.get(to..)?))
+    markers::parts(page, MARKERS)
 }
 
 /// Returns the scenarios of the table, top to bottom, each with a readable name.

@@ -8,8 +8,14 @@ use afbc::{Guarded, LAG_S, Profile, Settings, adaptive, slowness};
 use afbc_control::FlightController;
 use afbc_peers::slowed;
 use afbc_reader::FileError;
-use afbc_types::{Airframe, OutOfRange, Parameters, PerAxis, Rotor, with_rotors};
+use afbc_types::{Airframe, Declaration, Declared, OutOfRange, Parameters, PerAxis, Rotor, Value, with_rotors};
 use afbc_vehicles::Vehicle;
+use core::convert::Infallible;
+
+/// Name of every law's limit on the tilt.
+const TILT_MAX: &str = "tilt_max_rad";
+/// Acceleration of free fall, for a limit \[m/s2\].
+const G_M_S2: f32 = 9.81;
 
 impl Law {
     /// Returns a law with the gains of `profile`; profiles differ for AFBC and backstepping only.
@@ -60,6 +66,22 @@ impl Contender {
     pub fn for_vehicle(self, vehicle: &Parameters<f64>) -> Self {
         let Some(profile) = self.gains_of() else { return self };
         Contender { law: Law::beside(self.kind(), &profile.gains_for(&vehicle.to_f32(), LAG_S)), ..self }
+    }
+
+    /// Returns it free to tilt as far as `tilt_max_rad`, where it is limited more; the cascade's largest horizontal
+    /// acceleration follows, g tan(tilt).
+    #[must_use]
+    pub fn free_to_tilt(mut self, tilt_max_rad: f32) -> Self {
+        let limits = &mut self.settings.limits;
+        limits.tilt_max_rad = limits.tilt_max_rad.max(tilt_max_rad);
+        limits.acceleration_max_m_s2 = limits.acceleration_max_m_s2.max(G_M_S2 * libm::tanf(tilt_max_rad));
+        let Ok(()) = self.law.visit_mut(&mut |declaration: &Declaration, value: Value<'_>| {
+            if let (TILT_MAX, Value::Single([tilt])) = (declaration.range.name, value) {
+                *tilt = tilt.max(tilt_max_rad).min(declaration.range.max as f32);
+            }
+            Ok::<(), Infallible>(())
+        });
+        self
     }
 
     /// Returns the kind of its law.

@@ -13,6 +13,8 @@ pub struct Metrics {
     pub rmse: Vector4<f64>,
     /// Largest absolute error from [`SETTLED_S`] to the end.
     pub max_abs: Vector4<f64>,
+    /// Largest distance from the reference from [`SETTLED_S`] to the end \[m\].
+    pub max_distance_m: f64,
     /// Error at the end, reference minus vehicle.
     pub final_error: Vector4<f64>,
     /// Mean |change of U| per step from [`SETTLED_S`] to the end: a measure of chatter.
@@ -26,6 +28,7 @@ pub struct Accumulator {
     changes: u64,
     sum_squares: Vector4<f64>,
     max_abs: Vector4<f64>,
+    max_distance_m: f64,
     last_error: Vector4<f64>,
     sum_abs_delta_u: Vector4<f64>,
     last_u: Option<Vector4<f64>>,
@@ -62,6 +65,7 @@ impl Accumulator {
         self.errors += 1;
         self.sum_squares += error.component_mul(&error);
         self.max_abs = self.max_abs.sup(&error.abs());
+        self.max_distance_m = self.max_distance_m.max(error.xyz().norm());
         let u = inputs(sample);
         if let Some(last) = self.last_u.replace(u) {
             self.changes += 1;
@@ -75,6 +79,7 @@ impl Accumulator {
         Metrics {
             rmse: mean(self.sum_squares, self.errors).map(libm::sqrt),
             max_abs: self.max_abs,
+            max_distance_m: self.max_distance_m,
             final_error: self.last_error,
             mean_abs_delta_u: mean(self.sum_abs_delta_u, self.changes),
         }

@@ -7,27 +7,36 @@ use super::progress::Progress;
 use super::target::Target;
 use super::terminal::{Failure, print};
 use super::vehicle::OnVehicle;
-use super::{interrupt, json};
-use afbc::Profile;
+use super::{interrupt, json, suite};
 use afbc_campaign::compare::{self, standard};
 use afbc_report::compare as report;
 use afbc_sim::contender::Contender;
 use afbc_sim::scenario::Scenario;
 use clap::Args;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Fly every controller in every scenario, and compare them
 ///
-/// Without arguments: AFBC, AFBC as printed, backstepping, PID, geometric, INDI, L1 and DFBC in the built-in scenario
-/// `hardware`. A lost vehicle is part of the comparison and does not change the exit code.
+/// Without arguments: AFBC, AFBC as printed, and every other law in the built-in scenario `hardware`. With `--suite`:
+/// these, and AFBC under its monitor, in every flight of a suite, each on that flight's vehicle; one report, in
+/// out/suite. A lost vehicle is part of the comparison and does not change the exit code.
 #[derive(Args, Debug)]
 pub(crate) struct Compare {
     /// Built-in scenarios or scenario files; the contenders of all of them fly each one
     #[arg(value_name = "SCENARIO")]
     scenarios: Vec<Target>,
 
-    /// Contenders to fly instead: those of the scenarios, afbc, afbc-as-printed, backstepping, pid, geometric, indi,
-    /// l1, dfbc
+    /// Fly this suite instead: name of a built-in one (`sitl suites`), or path of a file
+    #[arg(long, value_name = "SUITE", conflicts_with_all = ["scenarios", "vehicle"])]
+    suite: Option<PathBuf>,
+
+    /// Write the suite's table into this page, between its two markers, and nothing else
+    #[arg(long, value_name = "PAGE", requires = "suite", conflicts_with_all = ["json", "out", "force"])]
+    write: Option<PathBuf>,
+
+    /// Contenders to fly instead, by name: those of the scenarios, any law (afbc, pid...), afbc-as-printed; with
+    /// `--suite` also afbc-monitored
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     controllers: Vec<String>,
 
@@ -48,21 +57,19 @@ pub(crate) struct Compare {
 impl Compare {
     /// Flies, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        if let Some(path) = &self.suite {
+            let suite = suite::named(path)?;
+            let own = compare::standard_and_monitored();
+            let contenders = if self.controllers.is_empty() { own } else { choose(&own, &self.controllers)? };
+            return suite::run(&suite, &contenders, self.seeds, self.write, &self.place, &self.json);
+        }
         let named = if self.scenarios.is_empty() { &[Target::from("hardware")][..] } else { &self.scenarios };
         let mut scenarios = named.iter().map(Target::scenario).collect::<Result<Vec<_>, _>>()?;
         let own = if self.scenarios.is_empty() { standard() } else { compare::contenders(&scenarios) };
         let contenders = if self.controllers.is_empty() { own } else { choose(&own, &self.controllers)? };
         for scenario in &mut scenarios {
             *scenario = self.on.put(scenario.clone())?;
-            let own = |contender: &Contender| match &scenario.vehicle_file {
-                Some(vehicle) => {
-                    let profile = contender.profile().unwrap_or(Profile::Flight);
-                    contender.clone().on(vehicle, profile)
-                }
-                None => Ok(contender.clone().for_vehicle(&scenario.vehicle)),
-            };
-            scenario.contenders = contenders.iter().map(own).collect::<Result<_, _>>()?;
-            scenario.check()?;
+            compare::fly_under(scenario, &contenders)?;
         }
         let log_every = log_every(&scenarios)?;
         interrupt::ends_it()?;
@@ -111,7 +118,7 @@ fn choose(own: &[Contender], names: &[String]) -> Result<Vec<Contender>, Failure
 }
 
 /// Returns the steps between rows of the logs for figures, the same for all contenders.
-fn log_every(scenarios: &[Scenario]) -> Result<u64, String> {
+pub(super) fn log_every(scenarios: &[Scenario]) -> Result<u64, String> {
     let every = |scenario: &Scenario| {
         let usual = LogRate::usual(scenario.duration_s);
         let steps = scenario.contenders.iter().map(|contender| usual.steps(scenario, contender));

@@ -9,6 +9,7 @@ mod in_the_loop;
 mod interrupt;
 mod json;
 mod log_rate;
+mod page;
 mod paper;
 mod pil;
 mod place;
@@ -16,6 +17,7 @@ mod progress;
 mod results;
 mod scenarios;
 mod subject;
+mod suite;
 mod target;
 mod terminal;
 mod tune;
@@ -53,6 +55,7 @@ enum Command {
     Check(scenarios::Check),
     Scenarios(scenarios::Scenarios),
     Campaigns(campaign::Campaigns),
+    Suites(suite::Suites),
     Vehicles(vehicle::Vehicles),
     Results(results::Results),
     Pil(pil::Pil),
@@ -72,6 +75,7 @@ impl Cli {
             Command::Check(check) => check.run(),
             Command::Scenarios(scenarios) => scenarios.run(),
             Command::Campaigns(campaigns) => campaigns.run(),
+            Command::Suites(suites) => suites.run(),
             Command::Vehicles(vehicles) => vehicles.run(),
             Command::Results(results) => results.run(),
             Command::Pil(pil) => pil.run(),

@@ -3,12 +3,11 @@
 use super::json::Json;
 use super::progress::Progress;
 use super::terminal::{Failure, print};
-use super::{interrupt, json};
+use super::{interrupt, json, page};
 use afbc_report::flights;
 use afbc_report::results;
 use afbc_sim::flown::Flown;
 use clap::Args;
-use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -37,14 +36,7 @@ impl Results {
             }
             return Ok(ExitCode::SUCCESS);
         };
-        let name = path.display();
-        let page = fs::read_to_string(&path).map_err(|error| format!("{name}: cannot be read ({error})"))?;
-        let Some((before, _, after)) = results::parts(&page) else {
-            let [begin, end] = results::MARKERS;
-            return Err(format!("{name}: no place for the table; add the lines {begin} and {end}").into());
-        };
-        let page = format!("{before}{}{after}", results::markdown(&fly()?));
-        fs::write(&path, page).map_err(|error| format!("{name}: cannot be written ({error})"))?;
+        page::write(&path, results::MARKERS, || Ok(results::markdown(&fly()?)))?;
         Ok(ExitCode::SUCCESS)
     }
 }

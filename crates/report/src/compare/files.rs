@@ -12,7 +12,7 @@ pub(super) fn csv(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result
     csv.write_record(head.chain(["lost_at_s"]))?;
     for comparison in comparisons {
         for entry in &comparison.entries {
-            for Outcome { seed, lost, metrics } in &entry.flights {
+            for Outcome { seed, lost, metrics, .. } in &entry.flights {
                 let contender = entry.contender();
                 let who = [comparison.scenario.name.clone(), contender.name.clone(), contender.kind().name().into()];
                 let figures = MEASURES.iter().map(|figure| (figure.value)(metrics).to_string());

@@ -1,0 +1,160 @@
+//! Suites: named lists of flights, with what others have published about them. `docs/suites.md` describes the format.
+
+use crate::compare;
+use crate::file::named;
+use afbc_reader::{BuiltIn, FileError, LIKE, Table};
+use afbc_sim::contender::Contender;
+use afbc_sim::scenario::{self, Scenario};
+use afbc_types::Range;
+use std::path::Path;
+
+/// A suite of flights.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Suite {
+    /// Short name, used in file names.
+    pub name: String,
+    /// Description in one line.
+    pub description: String,
+    /// Where published figures come from.
+    pub sources: Vec<Source>,
+    /// The flights, in order; each scenario's contenders are replaced by those who fly the suite.
+    pub flights: Vec<Flight>,
+}
+
+/// Where published figures come from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Source {
+    /// Short name.
+    pub name: String,
+    /// What it is, and where in it the figures are.
+    pub citation: String,
+    /// How those flights differ from these.
+    pub differs: String,
+}
+
+/// A flight of a suite.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Flight {
+    /// What is flown.
+    pub scenario: Scenario,
+    /// Tilt that every contender is allowed, if it is limited more \[rad\].
+    pub tilt_max_rad: Option<f64>,
+    /// Figures that others have published.
+    pub published: Vec<Published>,
+}
+
+/// A published figure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Published {
+    /// Who flew.
+    pub law: String,
+    /// Root mean square distance from the reference \[m\].
+    pub rms_m: f64,
+    /// Place of its source in the suite's list.
+    pub source: usize,
+}
+
+/// Every built-in suite.
+pub static SUITES: [BuiltIn<Suite>; 2] = [
+    BuiltIn::new("field", include_str!("../suites/field.toml"), read),
+    BuiltIn::new("faults", include_str!("../suites/faults.toml"), read),
+];
+
+/// Accepted tilt \[rad\].
+const TILT_MAX: Range = Range::new("tilt_max_rad", 0.05, 1.2);
+/// Accepted published distance \[m\].
+const RMS: Range = Range::new("rms_m", 0.0, 1000.0);
+/// Keys of a flight that its heirs do not take over.
+const OWN: [&str; 4] = ["name", "description", "published", LIKE];
+
+impl Suite {
+    /// Returns the scenarios with `contenders`, each with its gains for that scenario's vehicle.
+    ///
+    /// # Errors
+    /// One line on a gain or setting out of range.
+    pub fn under(&self, contenders: &[Contender]) -> Result<Vec<Scenario>, FileError> {
+        let put = |flight: &Flight| {
+            let mut scenario = flight.scenario.clone();
+            compare::fly_under(&mut scenario, contenders)?;
+            if let Some(tilt_max_rad) = flight.tilt_max_rad {
+                let free = |contender: Contender| contender.free_to_tilt(tilt_max_rad as f32);
+                scenario.contenders = scenario.contenders.into_iter().map(free).collect();
+            }
+            Ok(scenario)
+        };
+        self.flights.iter().map(put).collect()
+    }
+}
+
+/// Reads and checks a suite from its `text`. `file` is its path for errors, `name` its name if it has no other, and
+/// `folder` the one to which the paths of scenario files are relative.
+///
+/// # Errors
+/// The first mistake, as one line.
+pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Suite, FileError> {
+    afbc_reader::document_with_heirs(file, text, "suites field", ("flight", &OWN), |mut root| {
+        let [name, description] = afbc_reader::title(&mut root, name)?;
+        let sources: Vec<Source> = root.few_tables("source")?.into_iter().map(source).collect::<Result<_, _>>()?;
+        let mut flights: Vec<Flight> = Vec::new();
+        for table in root.few_tables("flight")? {
+            flights.push(flight(table, &sources, &flights, folder)?);
+        }
+        if flights.is_empty() {
+            return Err(root.missing("flight", "add [[flight]], once for each, with a name and a scenario"));
+        }
+        root.finish()?;
+        Ok(Suite { name, description, sources, flights })
+    })
+}
+
+/// Reads a built-in suite.
+fn read(file: &str, text: &str, name: &str) -> Result<Suite, FileError> {
+    parse(file, text, name, Path::new(""))
+}
+
+fn source(mut table: Table<'_>) -> Result<Source, FileError> {
+    let mut text = |key, cure| table.need_text(key, cure).map(str::to_owned);
+    let name = text("name", "give it one, to which published figures refer")?;
+    let citation = text("citation", "say who published what, and where")?;
+    let differs = text("differs", "say how those flights differ from these")?;
+    table.finish()?;
+    Ok(Source { name, citation, differs })
+}
+
+fn flight(mut table: Table<'_>, sources: &[Source], earlier: &[Flight], folder: &Path) -> Result<Flight, FileError> {
+    let names = || earlier.iter().map(|flight| flight.scenario.name.as_str());
+    let name = table.need_text("name", "give the flight one")?;
+    if names().any(|other| other == name) {
+        return Err(table.fault_at("name", format!("\"{name}\" is the name of another flight; choose another")));
+    }
+    if let Some(like) = table.text(LIKE)?.filter(|like| names().all(|other| other != *like)) {
+        return Err(table.fault_at(LIKE, format!("no flight above is called \"{like}\"; name one of those")));
+    }
+    let published = table.few_tables("published")?.into_iter().map(|table| figure(table, sources));
+    let published = published.collect::<Result<_, _>>()?;
+    let tilt_max_rad = table.number(&TILT_MAX)?;
+    for key in ["controllers", "contender", "profile", "monitor"] {
+        table.forbid(key, "a suite is flown by those who are compared; leave it out")?;
+    }
+    let scenario = match table.text("scenario")? {
+        Some(file) => {
+            let scenario = Scenario { name: name.into(), ..named(&table, "scenario", file, folder)? };
+            table.text("description")?;
+            table.finish()?;
+            scenario
+        }
+        None => scenario::read(table, name, None)?,
+    };
+    Ok(Flight { scenario, tilt_max_rad, published })
+}
+
+fn figure(mut table: Table<'_>, sources: &[Source]) -> Result<Published, FileError> {
+    let law = table.need_text("law", "say who flew")?.to_owned();
+    let rms_m = table.need_number(&RMS)?;
+    let name = table.need_text("source", "name one of the [[source]]")?;
+    let source = sources.iter().position(|source| source.name == name);
+    let source =
+        source.ok_or_else(|| table.fault_at("source", format!("\"{name}\" is no [[source]] of this file; add it")))?;
+    table.finish()?;
+    Ok(Published { law, rms_m, source })
+}

@@ -1,0 +1,104 @@
+//! `suite.csv` and `suite.json`.
+
+use super::Flown;
+use super::cells::FIGURES;
+use afbc_campaign::compare::{Entry, Outcome};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+
+/// Writes a row for each flight of each contender. A lost flight's figures cover the time until the loss.
+pub(super) fn csv(out: &mut dyn Write, flown: Flown<'_>) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(out);
+    let inputs = (1..=4).map(|input| format!("mean_abs_delta_u{input}_n"));
+    let head = ["flight", "contender", "controller", "seed", "rms_m", "largest_m", "rmse_psi_rad"].map(String::from);
+    let tail = ["lost_at_s", "lost", "tripped_at_s", "trip"].map(String::from);
+    csv.write_record(head.into_iter().chain(inputs).chain(tail))?;
+    for comparison in flown.comparisons {
+        for entry in &comparison.entries {
+            for Outcome { seed, lost, tripped, metrics } in &entry.flights {
+                let contender = entry.contender();
+                let who = [comparison.scenario.name.clone(), contender.name.clone(), contender.kind().name().into()];
+                let errors = [metrics.rmse.xyz().norm(), metrics.max_distance_m, metrics.rmse.w];
+                let inputs = metrics.mean_abs_delta_u.iter().copied();
+                let figures = errors.into_iter().chain(inputs).map(|figure| figure.to_string());
+                let lost = lost.map_or([String::new(), String::new()], |l| [l.time_s.to_string(), l.reason.into()]);
+                let trip =
+                    tripped.map_or([String::new(), String::new()], |t| [t.time_s.to_string(), t.trip.reason().into()]);
+                let row = who.into_iter().chain([seed.to_string()]).chain(figures).chain(lost).chain(trip);
+                csv.write_record(row)?;
+            }
+        }
+    }
+    csv.flush()
+}
+
+#[derive(Serialize)]
+struct Flight<'a> {
+    flight: &'a str,
+    description: &'a str,
+    published: Vec<Published<'a>>,
+    contenders: Vec<Contender<'a>>,
+}
+
+#[derive(Serialize)]
+struct Published<'a> {
+    law: &'a str,
+    rms_m: f64,
+    source: &'a str,
+    differs: &'a str,
+}
+
+#[derive(Serialize)]
+struct Contender<'a> {
+    name: &'a str,
+    controller: &'a str,
+    seeds: Vec<u64>,
+    lost: usize,
+    first_lost_at_s: Option<f64>,
+    tripped: usize,
+    first_tripped_at_s: Option<f64>,
+    first_trip: Option<&'a str>,
+    /// Null if a vehicle was lost.
+    mean: BTreeMap<&'a str, Option<f64>>,
+}
+
+/// Writes an array with one object for each flight: means over the seeds, losses and trips.
+///
+/// # Errors
+/// If writing to `out` fails.
+pub fn json(out: &mut dyn Write, flown: Flown<'_>) -> io::Result<()> {
+    let sources = &flown.suite.sources;
+    let flights = flown.rows().map(|(flight, comparison)| Flight {
+        flight: &comparison.scenario.name,
+        description: &comparison.scenario.description,
+        published: flight
+            .published
+            .iter()
+            .filter_map(|figure| {
+                let source = sources.get(figure.source)?;
+                let (citation, differs) = (source.citation.as_str(), source.differs.as_str());
+                Some(Published { law: &figure.law, rms_m: figure.rms_m, source: citation, differs })
+            })
+            .collect(),
+        contenders: comparison.entries.iter().map(contender).collect(),
+    });
+    serde_json::to_writer_pretty(&mut *out, &flights.collect::<Vec<_>>())?;
+    writeln!(out)
+}
+
+fn contender(entry: &Entry) -> Contender<'_> {
+    let lost = entry.flights.iter().find_map(|flight| flight.lost);
+    let trips: Vec<_> = entry.flights.iter().filter_map(|flight| flight.tripped).collect();
+    Contender {
+        name: &entry.contender().name,
+        controller: entry.contender().kind().name(),
+        seeds: entry.flights.iter().map(|flight| flight.seed).collect(),
+        lost: entry.lost(),
+        first_lost_at_s: lost.map(|lost| lost.time_s),
+        tripped: trips.len(),
+        first_tripped_at_s: trips.first().map(|trip| trip.time_s),
+        first_trip: trips.first().map(|trip| trip.trip.reason()),
+        mean: FIGURES.iter().map(|f| (f.name, entry.average(f.value).map(|average| average.mean))).collect(),
+    }
+}

@@ -1,0 +1,68 @@
+//! Results of a suite: one table of flights and contenders, for page, terminal and documents, CSV and JSON.
+
+mod cells;
+mod files;
+mod markdown;
+mod page;
+mod table;
+
+pub use files::json;
+pub use markdown::{markdown, markers};
+pub use table::table;
+
+use crate::figures::{self, Picture};
+use afbc_campaign::compare::Comparison;
+use afbc_campaign::suite::{Flight, Suite};
+use afbc_files::{Error, Folder};
+use std::io;
+use std::path::PathBuf;
+
+/// A suite that was flown.
+#[derive(Clone, Copy, Debug)]
+pub struct Flown<'a> {
+    /// What was flown.
+    pub suite: &'a Suite,
+    /// Its flights under every contender, in the suite's order.
+    pub comparisons: &'a [Comparison],
+}
+
+impl<'a> Flown<'a> {
+    /// Returns each flight with its results.
+    pub(crate) fn rows(self) -> impl Iterator<Item = (&'a Flight, &'a Comparison)> {
+        self.suite.flights.iter().zip(self.comparisons)
+    }
+}
+
+/// Writes everything about a suite into `folder`, replacing all earlier files of its command, and returns the paths
+/// written:
+///
+/// * `suite.csv`: a row for each flight of each contender;
+/// * `suite.json`: means over the seeds, losses and trips;
+/// * `<flight>.svg`: errors of every contender over time, with the suite's own seed;
+/// * `report.html`: everything on one self-contained page.
+///
+/// # Errors
+/// The first file that could not be written, or is not the command's.
+pub fn write(folder: &Folder, flown: Flown<'_>) -> Result<Vec<PathBuf>, Error> {
+    let drawn = flown.comparisons.iter().map(draw).collect::<io::Result<Vec<_>>>();
+    let drawn = drawn.map_err(|source| folder.error("figures", source))?;
+    let name = |comparison: &Comparison| format!("{}.svg", comparison.scenario.name);
+    let svgs: Vec<_> = flown.comparisons.iter().zip(&drawn).filter_map(|(c, p)| Some((name(c), p.as_ref()?))).collect();
+    let names = ["suite.csv", "suite.json", "report.html"].into_iter();
+    folder.only(&names.chain(svgs.iter().map(|(name, _)| name.as_str())).collect::<Vec<_>>())?;
+
+    let mut paths = vec![
+        folder.place("suite.csv", |out| files::csv(out, flown))?,
+        folder.place("suite.json", |out| files::json(out, flown))?,
+    ];
+    for (name, picture) in &svgs {
+        paths.push(folder.place(name, |out| out.write_all(picture.svg.as_bytes()))?);
+    }
+    let page = page::page(flown, &drawn);
+    paths.push(folder.place("report.html", |out| out.write_all(page.as_bytes()))?);
+    Ok(paths)
+}
+
+fn draw(comparison: &Comparison) -> io::Result<Option<Picture>> {
+    figures::flights::errors(&comparison.entries.iter().map(|entry| &entry.first).collect::<Vec<_>>())
+}

@@ -1,0 +1,102 @@
+//! The report of a suite.
+
+use super::Flown;
+use super::cells::{FIGURES, Figure, lost, trip};
+use crate::figures::Picture;
+use crate::report::{picture, sheet};
+use crate::words;
+use afbc_campaign::suite::Flight;
+use afbc_sim::metrics::SETTLED_S;
+use maud::{Markup, html};
+
+pub(super) fn page(flown: Flown<'_>, pictures: &[Option<Picture>]) -> String {
+    let suite = flown.suite;
+    sheet(
+        &format!("Suite {}", suite.name),
+        &html! {
+            p { (suite.description) "." }
+            p.quiet {
+                "Every contender flies the same vehicle through the same noise and weather, with gains tuned for it by "
+                "the vehicle's rule. Figures are evaluated from " (SETTLED_S) " s to the end. *: best of its flight."
+            }
+            @for figure in &FIGURES { h2 { (figure.title) } div.scroll { (results(flown, figure)) } }
+            @if flown.rows().any(|(flight, _)| !flight.published.is_empty()) { (published(flown)) }
+            @for ((flight, comparison), drawn) in flown.rows().zip(pictures) {
+                h2 { (flight.scenario.name) }
+                @if !comparison.scenario.description.is_empty() { p { (comparison.scenario.description) "." } }
+                p.quiet { (words::conditions(&comparison.scenario)) (tilt(flight)) "." }
+                @for entry in &comparison.entries {
+                    @if let Some(trip) = trip(entry) { p { (entry.contender().title()) ": " (trip) "." } }
+                    @for lost in entry.flights.iter().filter_map(|flight| flight.lost).take(1) {
+                        p { (entry.contender().title()) ": " (words::lost(&lost)) "." }
+                    }
+                }
+                @if let Some(drawn) = drawn { (picture(drawn)) }
+            }
+        },
+    )
+}
+
+fn tilt(flight: &Flight) -> String {
+    flight.tilt_max_rad.map_or(String::new(), |tilt_rad| format!(", a tilt of up to {tilt_rad} rad"))
+}
+
+/// A row for each flight, a column for each contender.
+fn results(flown: Flown<'_>, figure: &Figure) -> Markup {
+    html! {
+        table {
+            thead { tr {
+                td {}
+                @for entry in flown.comparisons.first().iter().flat_map(|first| &first.entries) {
+                    th scope="col" { (entry.contender().title()) }
+                }
+            } }
+            tbody {
+                @for comparison in flown.comparisons {
+                    tr {
+                        th scope="row" { (comparison.scenario.name) }
+                        @for entry in &comparison.entries {
+                            @match (lost(entry), figure.text(entry)) {
+                                (None, Some(text)) => td {
+                                    @if figure.is_best(comparison, entry) { strong { (text) } "*" } @else { (text) }
+                                    @if trip(entry).is_some() { " trip" }
+                                },
+                                (lost, _) => td.lost {
+                                    (lost.unwrap_or_default()) @if trip(entry).is_some() { ", trip" }
+                                },
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What others have published about the flights.
+fn published(flown: Flown<'_>) -> Markup {
+    let figures = flown.rows().flat_map(|(flight, _)| flight.published.iter().map(move |figure| (flight, figure)));
+    html! {
+        h2 { "Published" }
+        div.scroll { table {
+            thead { tr {
+                td {} th { "who flew" } th { "root mean square distance [m]" } th { "source" }
+            } }
+            tbody {
+                @for (flight, figure) in figures {
+                    tr {
+                        th scope="row" { (flight.scenario.name) }
+                        td.name { (figure.law) }
+                        td { (figure.rms_m) }
+                        td { @if let Some(source) = flown.suite.sources.get(figure.source) { (source.name) } }
+                    }
+                }
+            }
+        } }
+        dl {
+            @for source in &flown.suite.sources {
+                div { dt { (source.name) } dd { (source.citation) ". What differs: " (source.differs) "." } }
+            }
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! `sitl compare --suite` and `sitl suites`: named lists of flights.
+
+use super::json::Json;
+use super::place::Place;
+use super::progress::Progress;
+use super::terminal::{Failure, print};
+use super::{interrupt, json, page};
+use afbc_campaign::compare::{self, Comparison};
+use afbc_campaign::suite::{SUITES, Suite, parse};
+use afbc_reader::{BuiltIn, FileError};
+use afbc_report::suite::{self as report, Flown};
+use afbc_sim::contender::Contender;
+use clap::Args;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// List the built-in suites of flights, or print one of them to start from
+///
+/// `sitl suites field > my.toml` writes a suite to edit and to fly with `sitl compare --suite my.toml`.
+#[derive(Args, Debug)]
+pub(crate) struct Suites {
+    /// Built-in suite to print
+    name: Option<String>,
+}
+
+impl Suites {
+    /// Prints the list or the file.
+    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        match self.name {
+            Some(name) => print(BuiltIn::named(&SUITES, &name).ok_or_else(|| unknown(&name))?.text)?,
+            None => {
+                let all = SUITES.iter().map(BuiltIn::read).collect::<Result<Vec<_>, _>>()?;
+                print(&all.iter().map(line).collect::<String>())?;
+            }
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+fn line(Suite { name, description, flights, .. }: &Suite) -> String {
+    format!("{name:<12}{:>4} flights  {description}\n", flights.len())
+}
+
+fn unknown(name: &str) -> FileError {
+    let cure = match BuiltIn::similar(&SUITES, name) {
+        Some(known) => format!("did you mean {}?", known.name),
+        None => "`sitl suites` lists the built-in ones; a file needs its path, as in ./my.toml".into(),
+    };
+    FileError::whole(name, format!("no such suite; {cure}"))
+}
+
+/// Reads the suite at `path`: a plain name is first a built-in one, then a file.
+pub(super) fn named(path: &Path) -> Result<Suite, FileError> {
+    let plain = path.to_str().filter(|text| !text.contains(['/', '\\', '.']));
+    if let Some(name) = plain {
+        match BuiltIn::named(&SUITES, name) {
+            Some(known) => return known.read(),
+            None if !path.exists() => return Err(unknown(name)),
+            None => {}
+        }
+    }
+    let text = afbc_reader::text(path, "suite")?;
+    let stem = path.file_stem().map_or("".into(), OsStr::to_string_lossy);
+    parse(&path.display().to_string(), &text, &stem, path.parent().unwrap_or(Path::new("")))
+}
+
+/// Flies `suite` under `contenders`; then writes the folder and prints, or writes the table into a page.
+pub(super) fn run(
+    suite: &Suite,
+    contenders: &[Contender],
+    seeds: u64,
+    write: Option<PathBuf>,
+    place: &Place,
+    json: &Json,
+) -> Result<ExitCode, Failure> {
+    if let Some(path) = write {
+        let [begin, end] = report::markers(&suite.name);
+        page::write(&path, [&begin, &end], || {
+            let comparisons = fly(suite, contenders, seeds, || Ok(()))?;
+            Ok(report::markdown(Flown { suite, comparisons: &comparisons }))
+        })?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let mut folder = None;
+    let comparisons = fly(suite, contenders, seeds, || {
+        folder = Some(place.open("suite", "suite")?);
+        Ok(())
+    })?;
+    let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };
+    let flown = Flown { suite, comparisons: &comparisons };
+    let written = report::write(&folder, flown)?;
+    if json.json {
+        json::print_written(|out| report::json(out, flown))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let (table, folder) = (report::table(flown), folder.path());
+    let page = folder.join("report.html");
+    let (count, folder) = (written.len(), folder.display());
+    print(&format!("{}\n\n{count} files in {folder}; open {}\n", table.trim_end(), page.display()))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Flies the suite, after `ready`, when all its scenarios are known to be right.
+fn fly(
+    suite: &Suite,
+    contenders: &[Contender],
+    seeds: u64,
+    ready: impl FnOnce() -> Result<(), Failure>,
+) -> Result<Vec<Comparison>, Failure> {
+    let scenarios = suite.under(contenders)?;
+    let log_every = super::compare::log_every(&scenarios)?;
+    interrupt::ends_it()?;
+    ready()?;
+    let flights: u64 = scenarios.iter().map(|scenario| scenario.contenders.len() as u64 * seeds).sum();
+    let progress = Progress::new("compare", "flights", flights, 0);
+    let comparisons = compare::fly(scenarios, seeds, log_every, &|| progress.add(1))?;
+    drop(progress);
+    interrupt::is_too_late();
+    Ok(comparisons)
+}
