@@ -72,3 +72,51 @@ impl HoverThrustEstimator {
         *estimate = HoverThrust { excess: share - 1.0, variance: (1.0 - gain * slope) * variance };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const G: f32 = 9.81;
+    const DT_S: f32 = 0.001;
+
+    /// What a vehicle whose hover thrust is `h` measures under the thrust `t`.
+    fn measured(h: f32, t: f32) -> f32 {
+        G * (t / h - 1.0)
+    }
+
+    #[test]
+    fn the_hover_thrust_is_found_within_the_time_that_the_bandwidth_says() {
+        let estimator = HoverThrustEstimator::new(0.5, G, DT_S);
+        for h in [0.5_f32, 0.8, 1.0, 1.3, 1.7, 2.2] {
+            for t in [h, 0.8 * h, 1.2 * h] {
+                let mut estimate = HoverThrust::default();
+                let mut error_at = |time_s: f32| {
+                    (0..(time_s / DT_S) as usize).for_each(|_| estimator.advance(&mut estimate, measured(h, t), t));
+                    (estimate.share() - h).abs()
+                };
+                // K H = w dt |H| / g, as soon as P has grown for some 1/w: quick for a small h, slow for a large one.
+                let (early, late) = (error_at(1.0), error_at(29.0));
+                assert!(h == 1.0 || early > 0.2 * (1.0 - h).abs(), "{early} of {h} after 1 s");
+                assert!(late < 0.005 * h, "{late} of {h} after 30 s");
+            }
+        }
+        // Bandwidth 0: the nominal weight.
+        let mut estimate = HoverThrust::default();
+        let none = HoverThrustEstimator::new(0.0, G, DT_S);
+        (0..1000).for_each(|_| none.advance(&mut estimate, measured(1.5, 1.0), 1.0));
+        assert!(estimate.share() == 1.0);
+    }
+
+    #[test]
+    fn a_blow_hardly_counts() {
+        let estimator = HoverThrustEstimator::new(0.5, G, DT_S);
+        let mut estimate = HoverThrust::default();
+        (0..20_000).for_each(|_| estimator.advance(&mut estimate, measured(1.0, 1.0), 1.0));
+        (0..20).for_each(|_| estimator.advance(&mut estimate, 100.0, 1.0));
+        assert!((estimate.share() - 1.0).abs() < 0.005, "{}", estimate.share());
+        // Without thrust nothing is learnt: every h explains a free fall.
+        (0..1000).for_each(|_| estimator.advance(&mut estimate, 5.0, 0.0));
+        assert!((estimate.share() - 1.0).abs() < 0.005, "{}", estimate.share());
+    }
+}

@@ -4,8 +4,11 @@
 mod harness;
 
 use afbc_control::{Action, FlightController, Screened, Trace};
-use afbc_peers::attitude::{facing, geometric_error, quaternion, r_earth_body, roll_pitch, tilt_prioritised_error};
+use afbc_peers::attitude::{
+    facing, geometric_error, quaternion, r_earth_body, roll_pitch, tilt_and_yaw_error, tilt_prioritised_error,
+};
 use afbc_peers::flatness::flat;
+use afbc_peers::limits::Limits;
 use afbc_peers::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
 use afbc_types::{Declaration, Declared, OutOfRange, Range, Setpoint, State, Value};
 use core::convert::Infallible;
@@ -384,27 +387,150 @@ fn an_integrator_does_not_wind_up_against_a_limit() {
 }
 
 #[test]
-fn no_integral_moves_on_a_stale_state() {
-    let state = State { position_m: Vector3::new(-0.1, 0.2, 0.3), ..State::default() };
-    let lost = State { position_m: Vector3::new(f32::NAN, 0.0, 0.0), ..State::default() };
-    let (mut a, mut b) = (Screened::<pid::Memory>::default(), Screened::<geometric::Memory>::default());
-    for _ in 0..100 {
-        let _ = pid().step(&mut a, Some(&state), &Setpoint::default());
-        let _ = goodarzi().step(&mut b, Some(&state), &Setpoint::default());
+fn nothing_is_learnt_from_a_stale_state() {
+    /// Returns what is learnt before and after a hundred steps without a plausible state.
+    fn learnt<C: FlightController, L: PartialEq + core::fmt::Debug>(controller: &C, of: fn(&C::Memory) -> L) -> [L; 3] {
+        let state = State { position_m: Vector3::new(-0.1, 0.2, 0.3), ..State::default() };
+        let lost = State { position_m: Vector3::new(f32::NAN, 0.0, 0.0), ..State::default() };
+        let mut memory = Screened::<C::Memory>::default();
+        let before = of(&memory.control);
+        for _ in 0..100 {
+            let _ = controller.step(&mut memory, Some(&state), &Setpoint::default());
+        }
+        let learnt = of(&memory.control);
+        for _ in 0..100 {
+            assert!(controller.step(&mut memory, Some(&lost), &Setpoint::default()).health.state_rejected);
+        }
+        [before, learnt, of(&memory.control)]
     }
-    let (before_a, before_b) = (a, b);
-    for _ in 0..100 {
-        assert!(pid().step(&mut a, Some(&lost), &Setpoint::default()).health.state_rejected);
-        assert!(goodarzi().step(&mut b, Some(&lost), &Setpoint::default()).health.state_rejected);
+    fn check<L: PartialEq + core::fmt::Debug>([before, learnt, after]: [L; 3]) {
+        assert!(before != learnt && learnt == after, "{before:?} {learnt:?} {after:?}");
     }
-    assert_eq!(
-        (a.control.velocity_integral, a.control.rate_integral),
-        (before_a.control.velocity_integral, before_a.control.rate_integral)
-    );
-    assert_eq!(
-        (b.control.position_integral, b.control.attitude_integral),
-        (before_b.control.position_integral, before_b.control.attitude_integral)
-    );
+    check(learnt(&pid(), |memory| (memory.velocity_integral, memory.rate_integral)));
+    check(learnt(&goodarzi(), |memory| (memory.position_integral, memory.attitude_integral)));
+    check(learnt(&l1(), |memory| (memory.force_m_s2, memory.moment_rad_s2)));
+    check(learnt(&dfbc(), |memory| memory.position_integral));
+}
+
+/// After an outage in which the vehicle has moved, L1 does not take the jump of the state for a disturbance.
+#[test]
+fn l1_starts_its_prediction_again_after_an_outage() {
+    let mut memory = Screened::<l1::Memory>::default();
+    let state = State::default();
+    for _ in 0..100 {
+        let _ = l1().step(&mut memory, Some(&state), &Setpoint::default());
+    }
+    for _ in 0..200 {
+        let _ = l1().step(&mut memory, None, &Setpoint::default());
+    }
+    let moved = State { velocity_m_s: Vector3::new(1.0, -1.0, -2.0), rates_rad_s: Vector3::repeat(0.5), ..state };
+    let _ = l1().step(&mut memory, Some(&moved), &Setpoint::default());
+    let l1::Memory { force_m_s2, moment_rad_s2, .. } = memory.control;
+    // In the steps before, the vehicle stood still at hover thrust: nothing was unexplained.
+    assert!(force_m_s2.amax() < 0.1 && moment_rad_s2.amax() < 0.1, "{force_m_s2:?} {moment_rad_s2:?}");
+}
+
+/// What the law of the head of `dfbc.rs` demands, and what that of `indi.rs` does, in `f64`: on the first step there is
+/// nothing in the filters, and the rotors are at hover.
+#[test]
+fn demanded_accelerations_are_those_of_the_formulas() {
+    let effectiveness = Vector3::new(65.789_47, 65.789_47, 1.425_1);
+    let limits = Limits::new(&vehicle(), 12.0, 0.7);
+    let mut random = Random(5);
+    for _ in 0..500 {
+        let attitude = Rotation3::from_scaled_axis(vector(&mut random, 0.3));
+        let state = State {
+            position_m: vector(&mut random, 0.1).cast(),
+            velocity_m_s: vector(&mut random, 0.1).cast(),
+            attitude_rad: euler(&attitude),
+            rates_rad_s: vector(&mut random, 3.0).cast(),
+        };
+        let setpoint = Setpoint {
+            acceleration_m_s2: vector(&mut random, 2.0).cast(),
+            jerk_m_s3: vector(&mut random, 20.0).cast(),
+            snap_m_s4: vector(&mut random, 50.0).cast(),
+            yaw_rad: vector(&mut random, 0.3).x as f32,
+            yaw_rate_rad_s: vector(&mut random, 1.0).x as f32,
+            ..Setpoint::default()
+        };
+        let (r, omega) = (*attitude.matrix(), state.rates_rad_s.cast::<f64>());
+        let r_single = r.cast::<f32>();
+        // R' R_d Omega_d, and its derivative by that of each factor, for a specific force.
+        let fed_forward = |s: Vector3<f32>| {
+            let flat = flat([s, setpoint.jerk_m_s3, setpoint.snap_m_s4], &setpoint);
+            let to_body = r.transpose() * flat.r_earth_desired.cast::<f64>();
+            let rates = to_body * flat.rates_rad_s.cast::<f64>();
+            (rates, to_body * flat.rates_dot_rad_s2.cast::<f64>() - omega.cross(&rates))
+        };
+        let check = |name: &str, trace: &Trace, expected: Vector3<f64>| {
+            let u = trace.inputs;
+            let demanded = Vector3::new(u.roll_n, u.pitch_n, u.yaw_n).cast::<f64>().component_mul(&effectiveness);
+            // The error of a sine, 1.2e-3, of angles times 250 1/s2, and of rates of 3 rad/s and accelerations.
+            let error = (demanded - expected).amax();
+            assert!(error < 1.2 + 0.01 * expected.amax(), "{name}: {demanded:?}, not {expected:?}");
+        };
+        let gravity = limits.gravity();
+
+        let gains = dfbc::Gains::PAPER_VEHICLE;
+        let wanted = setpoint.acceleration_m_s2
+            - state.position_m.component_mul(&Vector3::new(12.0, 12.0, 25.0))
+            - state.velocity_m_s.component_mul(&Vector3::new(6.0, 6.0, 10.0));
+        let desired = facing(&limits.apply(&(wanted + gravity)), setpoint.yaw_rad);
+        let (rates, acceleration) = fed_forward(limits.apply(&(setpoint.acceleration_m_s2 + gravity)));
+        let k_r = Vector3::new(gains.tilt_p_1_s2, gains.tilt_p_1_s2, gains.yaw_p_1_s2);
+        let k_omega = Vector3::new(gains.tilt_d_1_s, gains.tilt_d_1_s, gains.yaw_d_1_s).cast::<f64>();
+        let nu = tilt_and_yaw_error(&r_single, &desired).component_mul(&k_r).cast::<f64>()
+            + k_omega.component_mul(&(rates - omega))
+            + acceleration;
+        check("dfbc", &after(&dfbc(), 1, &state, &setpoint).1, nu);
+
+        let gains = indi::Gains::PAPER_VEHICLE;
+        let velocity = -state.velocity_m_s - state.position_m.component_mul(&Vector3::new(2.0, 2.0, 3.0));
+        let wanted = setpoint.acceleration_m_s2 + velocity.component_mul(&Vector3::new(4.5, 4.5, 8.0));
+        let s = limits.apply(&(r_single * gravity + wanted));
+        let (rates, acceleration) = fed_forward(s);
+        let yaw_p = gains.yaw_p_1_s / gains.yaw_weight;
+        let error = tilt_prioritised_error(&r_single, &facing(&s, setpoint.yaw_rad), gains.yaw_weight);
+        let wanted =
+            error.component_mul(&Vector3::new(gains.tilt_p_1_s, gains.tilt_p_1_s, yaw_p)).cast::<f64>() + rates;
+        let k_w = Vector3::new(gains.tilt_rate_p_1_s, gains.tilt_rate_p_1_s, gains.yaw_rate_p_1_s).cast::<f64>();
+        check("indi", &after(&indi(), 1, &state, &setpoint).1, k_w.component_mul(&(wanted - omega)) + acceleration);
+    }
+}
+
+/// A vehicle that moves as L1's model says, rotors ideal, plus constant accelerations: they are estimated within two
+/// steps, up to e^(-a dt) and the bounds.
+#[test]
+fn l1_estimates_what_the_model_does_not_explain() {
+    let gains = l1::Gains { rotor_time_constant_s: 0.0, ..l1::Gains::BY_HAND };
+    let l1 = L1::new(vehicle(), SETTINGS, gains).unwrap();
+    let inertia = Vector3::new(0.0038, 0.0038, 0.0076);
+    let effectiveness = Vector3::new(65.789_47, 65.789_47, 1.425_1);
+    let mut random = Random(6);
+    for _ in 0..100 {
+        let mut memory = Screened::<l1::Memory>::default();
+        let (force, moment) = (vector(&mut random, 30.0), vector(&mut random, 150.0));
+        let (mut velocity, mut rates) = (vector(&mut random, 1.0), vector(&mut random, 2.0));
+        let attitude_rad = vector(&mut random, 0.4).cast::<f32>();
+        let body_z = r_earth_body(&attitude_rad).column(2).normalize().cast::<f64>();
+        for _ in 0..4 {
+            let state =
+                State { velocity_m_s: velocity.cast(), attitude_rad, rates_rad_s: rates.cast(), ..State::default() };
+            let u = l1.step(&mut memory, Some(&state), &Setpoint::default()).given;
+            let turned = Vector3::new(u.roll_n, u.pitch_n, u.yaw_n).cast::<f64>().component_mul(&effectiveness);
+            let coupling = -rates.cross(&inertia.component_mul(&rates)).component_div(&inertia);
+            velocity += (body_z * (f64::from(u.thrust_n) / 0.486) - Vector3::new(0.0, 0.0, 9.81) + force) * 1e-3;
+            rates += (turned + coupling + moment) * 1e-3;
+        }
+        let left = (-5.0e-3_f64).exp();
+        let close = |estimate: Vector3<f32>, true_value: Vector3<f64>, max: f64| {
+            let expected = true_value.map(|x| (left * x).clamp(-max, max));
+            (estimate.cast::<f64>() - expected).amax() < 2e-3 * max.min(20.0)
+        };
+        let l1::Memory { force_m_s2, moment_rad_s2, .. } = memory.control;
+        assert!(close(force_m_s2, force, 20.0), "{force_m_s2:?} of {force:?}");
+        assert!(close(moment_rad_s2, moment, 100.0), "{moment_rad_s2:?} of {moment:?}");
+    }
 }
 
 /// Rotation about one axis only: d rate/dt = (d/b)/Iz U3 + disturbance, with rotor lag.
