@@ -155,7 +155,8 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
 
     /// Runs one tick, to be called every millisecond. `now_us` is the time since power-up, which never goes back.
     /// Cannot fail.
-    #[inline]
+    // Always: copying the outcome out of a call costs a hundred instructions.
+    #[inline(always)]
     #[must_use = "the motors need its speeds"]
     pub fn tick(&self, memory: &mut VehicleMemory<C::Memory>, now_us: u64, inbox: &Inbox) -> Outcome<N> {
         let dt_s = self.controller.dt_s();
