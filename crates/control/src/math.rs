@@ -138,5 +138,7 @@ pub fn tilt_cosine(phi: f32, theta: f32) -> f32 {
 #[inline]
 pub fn wrap_angle(x: f32) -> f32 {
     use core::f32::consts::{PI, TAU};
-    if x.abs() <= PI { x } else { (x - TAU * round(x / TAU)).clamp(-PI, PI) }
+    // At most half a turn, whose product with a turn is pi exactly.
+    let turns = x * (1.0 / TAU);
+    if x.abs() <= PI { x } else { (turns - round(turns)) * TAU }
 }
