@@ -113,7 +113,8 @@ const BAD_TABLES: [(&str, &str); 69] = [
     (
         "[[change]]\nparameter = \"weight\"",
         ":5: change.parameter: \"weight\" is unknown; \
-         it must be \"mass\", \"inertia\", \"thrust-factor\" or \"drag-factor\"",
+         it must be \"mass\", \"inertia\", \"thrust-factor\", \"drag-factor\", \
+         \"roll-moment\", \"pitch-moment\" or \"yaw-moment\"",
     ),
     ("[[change]]\nparameter = \"mass\"\nstart_s = 1", ":4: change.factor: missing; add it"),
     (
@@ -251,7 +252,7 @@ const BAD_FILES: [(&str, &str); 28] = [
     (
         "[trajectory]\nkind = \"spiral\"",
         ":2: trajectory.kind: \"spiral\" is unknown; \
-         it must be \"paper\", \"hover\", \"step\", \"circle\", \"lissajous\" or \"waypoints\"",
+         it must be \"paper\", \"hover\", \"step\", \"circle\", \"lemniscate\", \"lissajous\" or \"waypoints\"",
     ),
     ("[trajectory]\nkind = \"paper\"\nradius_m = 1", ":3: trajectory.radius_m: unknown key; known here: kind"),
     (
@@ -313,7 +314,7 @@ fn expand(message: &str) -> String {
             "ALL",
             "name, description, duration_s, seed, plant, vehicle, truth, controllers, profile, gains, settings, \
              limits, monitor, contender, trajectory, initial, gust, change, payload, rotors, rotor_fault, battery, \
-             drag, wind, ground, sensors, outage, flight_core",
+             drag, wind, ground, sensors, sensor_fault, outage, flight_core",
         )
 }
 
