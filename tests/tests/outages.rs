@@ -2,6 +2,7 @@
 //! alone.
 #![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be flown must stop the test")]
 
+use afbc_sim::contender::ControllerKind;
 use afbc_sim::flight::{Lost, Sample, fly};
 use afbc_sim::scenario::{Outage, Scenario, built_in};
 
@@ -32,7 +33,7 @@ fn outcomes(scenario: &Scenario) -> Vec<(String, Option<Lost>, f64, Sample)> {
 #[test]
 fn inside_the_flight_core_every_law_survives_an_outage() {
     let outcomes = outcomes(&scenario(0.24, true));
-    assert_eq!(outcomes.len(), 5);
+    assert_eq!(outcomes.len(), ControllerKind::ALL.len());
     for (name, lost, worst_m, _) in outcomes {
         assert_eq!(lost, None, "{name}");
         assert!(worst_m < 0.5, "{name}: {worst_m} m");

@@ -142,8 +142,8 @@ fn a_scenario_says_sampled_and_late_states_with_a_gyro() {
     }
 }
 
-/// The flight core is given a state when one arrives, and extrapolates between them. A bare law that holds each for 40 ms
-/// strays nine times as far.
+/// The flight core is given a state when one arrives, and extrapolates between them. A bare law that holds each for 40
+/// ms strays nine times as far.
 #[test]
 fn the_flight_core_extrapolates_between_the_samples_of_a_scenario() {
     for kind in ControllerKind::PAPER {

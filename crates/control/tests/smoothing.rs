@@ -32,7 +32,8 @@ proptest! {
     /// The solution of dU/dt = w (U_law - U) with U_law held over each step, in `f64`.
     #[test]
     fn the_filters_are_first_order_lags(
-        w in prop_oneof![1.0_f32..1e4, Just(0.0)], dt_s in Settings::DT.range.min as f32..=Settings::DT.range.max as f32,
+        w in prop_oneof![1.0_f32..1e4, Just(0.0)],
+        dt_s in Settings::DT.range.min as f32..=Settings::DT.range.max as f32,
         first in inputs(), held in inputs(), steps in 1..200,
     ) {
         let smoother = Smoother::new(&smoothing(w), dt_s).unwrap();
@@ -56,7 +57,9 @@ proptest! {
 
     /// An input that is not finite passes, and leaves nothing behind.
     #[test]
-    fn nothing_stays_of_an_input_that_is_not_finite(w in 1.0_f32..1e4, before in inputs(), after in inputs(), which in 0..3) {
+    fn nothing_stays_of_an_input_that_is_not_finite(
+        w in 1.0_f32..1e4, before in inputs(), after in inputs(), which in 0..3,
+    ) {
         let smoother = Smoother::new(&smoothing(w), 0.001).unwrap();
         let mut last = None;
         let _ = smoother.advance(&mut last, &before);

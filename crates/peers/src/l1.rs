@@ -55,10 +55,10 @@ parameters! {
         pub predictor_1_s: f32 = 5.0,
         /// w_1: bandwidth of the filter on the thrust's compensation.
         #[parameter(THRUST_BW, "rad/s", 1.0..=200.0, tuned)]
-        pub thrust_bandwidth_rad_s: f32 = 15.6,
+        pub thrust_bandwidth_rad_s: f32 = 21.88,
         /// w_2: bandwidth of the filter on the moments' compensation.
         #[parameter(MOMENT_BW, "rad/s", 1.0..=200.0, tuned)]
-        pub moment_bandwidth_rad_s: f32 = 7.168,
+        pub moment_bandwidth_rad_s: f32 = 6.91,
         /// tau: time constant of the rotor model.
         #[parameter(ROT_LAG, "s", 0.0..=0.5)]
         pub rotor_time_constant_s: f32 = 0.02,
@@ -77,9 +77,21 @@ impl Gains {
         ..geometric::Gains::LEE_2010
     };
 
-    /// The tuned geometric controller, without integrals of the attitude.
-    const TUNED_BASE: geometric::Gains =
-        geometric::Gains { tilt_i_1_s2: 0.0, yaw_i_1_s2: 0.0, ..geometric::Gains::TUNED };
+    /// The geometric controller as tuned under the adaptation, without integrals of the attitude.
+    const TUNED_BASE: geometric::Gains = geometric::Gains {
+        position_p_1_s2: 16.44,
+        position_d_1_s: 9.246,
+        position_i_1_s3: 9.914,
+        height_p_1_s2: 24.08,
+        height_d_1_s: 8.826,
+        height_i_1_s3: 3.046,
+        tilt_p_1_s2: 168.4,
+        tilt_d_1_s: 64.45,
+        yaw_p_1_s2: 32.96,
+        yaw_d_1_s: 8.616,
+        filter_rad_s: 17.25,
+        ..Self::BASE
+    };
 
     /// As tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
     pub const TUNED: Self = Self::DEFAULT;

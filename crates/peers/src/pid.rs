@@ -49,58 +49,58 @@ parameters! {
     pub struct Gains {
         /// k_p along x and y.
         #[parameter(POS_P, "1/s", 0.2..=10.0, tuned)]
-        pub position_p_1_s: f32 = 1.742,
+        pub position_p_1_s: f32 = 1.853,
         /// k_v along x and y.
         #[parameter(VEL_P, "1/s", 0.5..=20.0, tuned)]
-        pub velocity_p_1_s: f32 = 4.0,
+        pub velocity_p_1_s: f32 = 5.075,
         /// k_i along x and y.
         #[parameter(VEL_I, "1/s2", 0.0..=200.0, tuned)]
-        pub velocity_i_1_s2: f32 = 20.0,
+        pub velocity_i_1_s2: f32 = 38.48,
         /// d_v along x and y.
         #[parameter(VEL_D, "1", 0.0..=2.0, tuned)]
-        pub velocity_d: f32 = 0.07327,
+        pub velocity_d: f32 = 0.04989,
         /// k_p along z.
         #[parameter(HEIGHT_P, "1/s", 0.2..=20.0, tuned)]
-        pub height_p_1_s: f32 = 2.518,
+        pub height_p_1_s: f32 = 2.996,
         /// k_v along z.
         #[parameter(CLIMB_P, "1/s", 0.5..=40.0, tuned)]
-        pub climb_p_1_s: f32 = 10.75,
+        pub climb_p_1_s: f32 = 13.75,
         /// k_i along z.
         #[parameter(CLIMB_I, "1/s2", 0.0..=200.0, tuned)]
-        pub climb_i_1_s2: f32 = 97.01,
+        pub climb_i_1_s2: f32 = 81.78,
         /// d_v along z.
         #[parameter(CLIMB_D, "1", 0.0..=2.0, tuned)]
         pub climb_d: f32 = 0.0,
         /// w: bandwidth of the estimate of the hover thrust; 0 for none.
         #[parameter(HOVER, "1/s", 0.0..=2.0, tuned)]
-        pub hover_thrust_1_s: f32 = 0.1,
+        pub hover_thrust_1_s: f32 = 0.09762,
         /// k_a of roll and pitch.
         #[parameter(TILT_P, "1/s", 1.0..=30.0, tuned)]
-        pub tilt_p_1_s: f32 = 15.0,
+        pub tilt_p_1_s: f32 = 19.89,
         /// k_a of yaw for small errors; not reduced by `yaw_weight`.
         #[parameter(YAW_P, "1/s", 0.2..=15.0, tuned)]
-        pub yaw_p_1_s: f32 = 2.053,
+        pub yaw_p_1_s: f32 = 2.795,
         /// k_w of roll and pitch.
         #[parameter(TILTRATE_P, "1/s", 2.0..=100.0, tuned)]
-        pub tilt_rate_p_1_s: f32 = 25.0,
+        pub tilt_rate_p_1_s: f32 = 32.8,
         /// k_iw of roll and pitch.
         #[parameter(TILTRATE_I, "1/s2", 0.0..=500.0, tuned)]
-        pub tilt_rate_i_1_s2: f32 = 12.49,
+        pub tilt_rate_i_1_s2: f32 = 25.44,
         /// d_w of roll and pitch.
         #[parameter(TILTRATE_D, "1", 0.0..=3.0, tuned)]
-        pub tilt_rate_d: f32 = 0.1676,
+        pub tilt_rate_d: f32 = 0.08299,
         /// k_w of yaw.
         #[parameter(YAWRATE_P, "1/s", 0.5..=40.0, tuned)]
-        pub yaw_rate_p_1_s: f32 = 5.905,
+        pub yaw_rate_p_1_s: f32 = 6.008,
         /// k_iw of yaw.
         #[parameter(YAWRATE_I, "1/s2", 0.0..=100.0, tuned)]
-        pub yaw_rate_i_1_s2: f32 = 38.2,
+        pub yaw_rate_i_1_s2: f32 = 7.619,
         /// f: feed-forward of the rate setpoint.
         #[parameter(RATE_FF, "1/s", 0.0..=20.0, tuned)]
         pub rate_feed_forward_1_s: f32 = 0.0,
         /// Bandwidth of the filters behind both derivatives.
         #[parameter(FILTER, "rad/s", 10.0..=500.0, tuned)]
-        pub filter_rad_s: f32 = 140.7,
+        pub filter_rad_s: f32 = 157.0,
         /// Share of a large yaw error that is corrected together with the tilt, 0 to 1.
         #[parameter(YAW_WEIGHT, "1", 0.05..=1.0)]
         pub yaw_weight: f32 = 0.4,

@@ -11,7 +11,6 @@ use super::{interrupt, json, suite};
 use afbc_campaign::compare::{self, standard};
 use afbc_report::compare as report;
 use afbc_sim::contender::Contender;
-use afbc_sim::scenario::Scenario;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -71,7 +70,7 @@ impl Compare {
             *scenario = self.on.put(scenario.clone())?;
             compare::fly_under(scenario, &contenders)?;
         }
-        let log_every = log_every(&scenarios)?;
+        let log_every = LogRate::common(&scenarios)?;
         interrupt::ends_it()?;
         let folder = self.place.open("compare", "compare")?;
         let flights: u64 = scenarios.iter().map(|scenario| scenario.contenders.len() as u64 * self.seeds).sum();
@@ -115,15 +114,4 @@ fn choose(own: &[Contender], names: &[String]) -> Result<Vec<Contender>, Failure
         chosen.push(contender.clone());
     }
     Ok(chosen)
-}
-
-/// Returns the steps between rows of the logs for figures, the same for all contenders.
-pub(super) fn log_every(scenarios: &[Scenario]) -> Result<u64, String> {
-    let every = |scenario: &Scenario| {
-        let usual = LogRate::usual(scenario.duration_s);
-        let steps = scenario.contenders.iter().map(|contender| usual.steps(scenario, contender));
-        steps.collect::<Result<Vec<_>, _>>()
-    };
-    let every = scenarios.iter().map(every).collect::<Result<Vec<_>, _>>()?;
-    Ok(every.into_iter().flatten().max().unwrap_or(1))
 }

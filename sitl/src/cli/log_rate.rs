@@ -40,6 +40,20 @@ impl LogRate {
         (hz < full).then(|| format!("logs of {duration_s} s keep {hz} rows per second; --log-hz {full} keeps more"))
     }
 
+    /// Returns the control steps between rows of figures' logs, the same for all contenders of all `scenarios`.
+    ///
+    /// # Errors
+    /// If the log of one run would be too long.
+    pub(crate) fn common(scenarios: &[Scenario]) -> Result<u64, String> {
+        let every = |scenario: &Scenario| {
+            let usual = Self::usual(scenario.duration_s);
+            let steps = scenario.contenders.iter().map(|contender| usual.steps(scenario, contender));
+            steps.collect::<Result<Vec<_>, _>>()
+        };
+        let every = scenarios.iter().map(every).collect::<Result<Vec<_>, _>>()?;
+        Ok(every.into_iter().flatten().max().unwrap_or(1))
+    }
+
     /// Returns the control steps between rows, rounded to a whole number.
     ///
     /// # Errors

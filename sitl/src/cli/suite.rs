@@ -1,6 +1,7 @@
 //! `sitl compare --suite` and `sitl suites`: named lists of flights.
 
 use super::json::Json;
+use super::log_rate::LogRate;
 use super::place::Place;
 use super::progress::Progress;
 use super::terminal::{Failure, print};
@@ -109,7 +110,7 @@ fn fly(
     ready: impl FnOnce() -> Result<(), Failure>,
 ) -> Result<Vec<Comparison>, Failure> {
     let scenarios = suite.under(contenders)?;
-    let log_every = super::compare::log_every(&scenarios)?;
+    let log_every = LogRate::common(&scenarios)?;
     interrupt::ends_it()?;
     ready()?;
     let flights: u64 = scenarios.iter().map(|scenario| scenario.contenders.len() as u64 * seeds).sum();
