@@ -38,8 +38,8 @@ use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
 parameters! {
-    /// Gains and limits. Defaults are the result of `sitl tune` for the paper's vehicle with a rotor lag of 20 ms
-    /// (`docs/tuning.md`).
+    /// Gains and limits. Defaults are for the paper's vehicle with a rotor lag of 20 ms: a short search of `sitl tune`,
+    /// integrals of the position raised by hand for slower vehicles (`docs/tuning.md`).
     ///
     /// For the law of the source, leave both integrals (names with `_i_`) at 0.
     #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,7 +90,7 @@ parameters! {
 }
 
 impl Gains {
-    /// As tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
+    /// The defaults: tuned, with integrals raised by hand.
     pub const TUNED: Self = Self::DEFAULT;
 
     /// Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
