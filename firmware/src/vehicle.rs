@@ -4,7 +4,9 @@
 
 use afbc::adaptive::Gains;
 use afbc::fuzzy::Membership;
+use afbc::reference::ReferenceModel;
 use afbc::{Limits, Safeguards, Settings, backstepping};
+use afbc_control::Smoothing;
 use afbc_flight_core::motor::Curve;
 use afbc_onboard::Configuration;
 use afbc_types::{Airframe, Parameters, PerAxis, Rotor};

@@ -72,7 +72,7 @@ const BAD_TABLES: [(&str, &str); 69] = [
     ("[truth]\nmass = 0.5", ":5: truth.mass: unknown key; did you mean mass_kg (kilograms)?"),
     ("[gains.rol]\neta = 1", ":4: gains.rol: unknown key; did you mean roll?"),
     ("[gains]\nroll = 1", ":5: gains.roll: it is a number and must be a table; write one table: [gains.roll]"),
-    ("[gains.z]\neta = -1", ":5: gains.z.eta: -1 is out of range: it must lie within 0 to 1000 (input per m or rad)"),
+    ("[gains.z]\neta = -1", ":5: gains.z.eta: -1 is out of range: it must lie within 0 to 10000 (input per m or rad)"),
     (
         "[gains.x]\neta = 1\nwidth = 0.1",
         ":4: gains.x.centre: centre / width = 100, out of range: it must lie within 0.1 to 6; change one of the two",
@@ -82,7 +82,9 @@ const BAD_TABLES: [(&str, &str); 69] = [
         "[settings]\nrate_hz = 500",
         ":5: settings.rate_hz: unknown key; \
          known here: dt_s, rotor_force_max_n, raised_thrust_max, command_filter_rad_s, tilt_by_thrust, anti_windup, \
-         freeze_on_ground, bumpless",
+         freeze_on_ground, bumpless, feed_forward, reference_xy_rad_s, reference_z_rad_s, reference_yaw_rad_s, \
+         reference_acceleration_m_s2, reference_turn_rad_s2, reference_yaw_rate_rad_s, smooth_tilt_rad_s, \
+         smooth_yaw_rad_s, smooth_lift_rad_s, lead_s",
     ),
     (
         "[initial]\nattitude_rad = [1.6, 0, 0]",
@@ -207,7 +209,7 @@ const BAD_TABLES: [(&str, &str); 69] = [
     ),
     (
         "[[contender]]\nname = \"a\"\ncontroller = \"backstepping\"\n[contender.gains.x]\ngamma = 1",
-        ":8: contender.gains.x.gamma: unknown key; known here: alpha1, alpha2",
+        ":8: contender.gains.x.gamma: unknown key; known here: alpha1, alpha2, stiffness",
     ),
     (
         "[[contender]]\nname = \"a\"\ncontroller = \"pid\"\n[contender.gains]\nposition_p = 1",

@@ -70,8 +70,17 @@ fn the_gains_of_the_profile_flight_are_those_on_its_page() {
     let (gains, settings) = (Profile::Flight.gains(), Profile::Flight.settings());
     let row = |axes: &str, gains: &adaptive::Gains| {
         let adaptive::Gains { backstepping, gamma, eta, epsilon, safeguards: s, .. } = gains;
-        let figures =
-            [backstepping.alpha1, backstepping.alpha2, *gamma, *eta, *epsilon, s.theta_max, s.delta_max, s.sigma];
+        let figures = [
+            backstepping.alpha1,
+            backstepping.alpha2,
+            backstepping.stiffness,
+            *gamma,
+            *eta,
+            *epsilon,
+            s.theta_max,
+            s.delta_max,
+            s.sigma,
+        ];
         // To half of the last digit written.
         let close = |(cell, figure): (&str, &f32)| {
             let decimals = cell.split_once('.').map_or(0, |(_, decimals)| decimals.len());

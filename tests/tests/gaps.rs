@@ -45,8 +45,8 @@ impl<L: Law> Law for Rateless<L> {
         }
     }
 
-    fn alpha1(&self, axis: Axis) -> f32 {
-        self.0.alpha1(axis)
+    fn approach(&self, axis: Axis, known: Option<&afbc::model::Model>) -> f32 {
+        self.0.approach(axis, known)
     }
 
     fn learnt(estimate: &L::Estimate) -> Estimate {

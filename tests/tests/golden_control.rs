@@ -72,7 +72,11 @@ fn afbc_subsystem_agrees_in_every_row() {
         let [x1, x2, x1d, x1d_dot, delta] = row.all(["x1", "x2", "x1d", "x1d_dot", "delta_hat"]);
         let theta = row.nine("theta");
         let gains = Gains {
-            backstepping: backstepping::Gains { alpha1: alpha1 as f32, alpha2: alpha2 as f32 },
+            backstepping: backstepping::Gains {
+                alpha1: alpha1 as f32,
+                alpha2: alpha2 as f32,
+                ..backstepping::Gains::DEFAULT
+            },
             gamma: gamma as f32,
             eta: eta as f32,
             epsilon: epsilon as f32,
@@ -147,11 +151,12 @@ fn backstepping_agrees_in_every_row() {
             e1: x1d as f32 - x1 as f32,
             x1d_dot: x1d_dot as f32,
             x1d_ddot: x1d_ddot as f32,
-            limited: false,
+            approach_1_s: None,
         };
         let errors = tracking.errors(alpha1 as f32);
         let dynamics = Dynamics { f: f as f32, g: g as f32, g_dot: 0.0 };
-        let u_eq = ideal(alpha1 as f32, &errors, tracking.x1d_ddot, &dynamics);
+        let gains = backstepping::Gains { alpha1: alpha1 as f32, ..backstepping::Gains::DEFAULT };
+        let u_eq = ideal(&gains, &errors, tracking.x1d_ddot, &dynamics);
         let u = u_eq + proportional(alpha2 as f32, &errors);
 
         let [e1, e2] = row.all(["e1", "e2"]);

@@ -544,7 +544,8 @@ fn an_outage_may_come_at_any_time() {
         .step_by(5_100)
         .flat_map(|start_ms| {
             [
-                outage(start_ms, 240, 8_000, Recovers(0.6, 0.5)),
+                // The first begins while the vehicle is still on its way from 1.5 m off.
+                outage(start_ms, 240, 8_000, Recovers(if start_ms < 2_000 { 0.85 } else { 0.6 }, 0.5)),
                 outage(start_ms, 300, 30_000, Lands(0.7)),
                 outage(start_ms, 1000, 30_000, Lands(0.9)),
             ]

@@ -2,10 +2,9 @@
 //! and in the plant.
 #![allow(clippy::indexing_slicing, missing_docs)] // what is missing must stop the test
 
-use afbc::law::Context;
 use afbc::model;
 use afbc_plant::{Load, Motion, simplified};
-use afbc_types::{Axis, Parameters, PerAxis, State};
+use afbc_types::{Axis, Parameters, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
@@ -54,13 +53,6 @@ proptest! {
         let [f1, f2, f3, f4] = speeds.map(|w| p.thrust_factor_n_s2 * w * w);
         let state: State = motion.measure();
         let residual = w1 - w2 + w3 - w4;
-        let context = Context {
-            state: &state,
-            rotor_residual_rad_s: residual as f32,
-            dt_s: 0.001,
-            adapt: true,
-            unallocated: PerAxis::default(),
-        };
         let model = model::Model::new(&p.to_f32());
 
         let (q, r) = (rates_rad_s.abs(), residual.abs());
@@ -93,7 +85,7 @@ proptest! {
             (Axis::Z, x_dot[5], total, 9.81 + total / p.mass_kg),
         ];
         for (axis, expected, u, size) in cases {
-            let dynamics = model.dynamics(axis, &context);
+            let dynamics = model.dynamics(axis, &state, residual as f32);
             let got = f64::from(dynamics.f) + f64::from(dynamics.g) * u;
             let trigonometry = if axis == Axis::Z {
                 // Both cosines are off by at most 1.7e-4; below a product of 0.1, g_4 is limited by design.
@@ -111,7 +103,8 @@ proptest! {
         }
         // The virtual subsystems are plain accelerations.
         for axis in [Axis::X, Axis::Y] {
-            prop_assert_eq!(model.dynamics(axis, &context), model::Dynamics { f: 0.0, g: 1.0, g_dot: 0.0 });
+            let wanted = model::Dynamics { f: 0.0, g: 1.0, g_dot: 0.0 };
+            prop_assert_eq!(model.dynamics(axis, &state, residual as f32), wanted);
         }
     }
 
@@ -121,14 +114,7 @@ proptest! {
         let p = Parameters::PAPER;
         let model = model::Model::new(&p.to_f32());
         let state: State = Motion { attitude_rad, rates_rad_s, ..Motion::default() }.measure();
-        let context = Context {
-            state: &state,
-            rotor_residual_rad_s: 0.0,
-            dt_s: 0.001,
-            adapt: true,
-            unallocated: PerAxis::default(),
-        };
-        let dynamics = model.dynamics(Axis::Z, &context);
+        let dynamics = model.dynamics(Axis::Z, &state, 0.0);
         let g = |t: f64| {
             let eta = attitude_rad + rates_rad_s * t;
             eta.x.cos() * eta.y.cos() / p.mass_kg
@@ -150,14 +136,7 @@ fn g_4_stays_positive_at_any_tilt() {
     for step in -2000..=2000_i16 {
         let tilt = f32::from(step) / 100.0;
         let state = State { attitude_rad: Vector3::new(tilt, 0.3 * tilt, 0.0), ..State::default() };
-        let context = Context {
-            state: &state,
-            rotor_residual_rad_s: 0.0,
-            dt_s: 0.001,
-            adapt: true,
-            unallocated: PerAxis::default(),
-        };
-        let g = model.dynamics(Axis::Z, &context).g;
+        let g = model.dynamics(Axis::Z, &state, 0.0).g;
         assert!(g >= 0.999 * model::TILT_COSINE_MIN / 0.486, "{g} at {tilt} rad");
     }
 }

@@ -85,7 +85,7 @@ fn columns<G: Declared, const N: usize>(
 
 /// Returns AFBC's bounds for the paper's vehicle.
 fn bounds(profile: Profile) -> Bounds {
-    Bounds::new(&profile.gains(), &Parameters::PAPER.to_f32())
+    Bounds::new(&profile.gains(), &Parameters::PAPER.to_f32(), &profile.settings())
 }
 
 /// Returns the gains of a law: those of each profile, or its own for a law outside the cascade.
@@ -286,7 +286,7 @@ fn is_in_key(Declaration { range, unit, .. }: &Declaration) -> bool {
 /// A key ends in its unit, unless it is one of the paper's letters.
 #[test]
 fn a_key_ends_in_its_unit() {
-    const LETTERS: [&str; 3] = ["alpha1", "sigma", "lyapunov"];
+    const LETTERS: [&str; 4] = ["alpha1", "stiffness", "sigma", "error"];
     for Row { name, declaration, .. } in groups().into_iter().flat_map(|group| group.rows) {
         let Declaration { range, unit, .. } = declaration;
         // A unit that depends on the axis is left out.

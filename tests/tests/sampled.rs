@@ -111,8 +111,13 @@ fn a_tracker_of_100_hz_that_is_10_ms_late_is_flown_on() {
 }
 
 /// Flies `hardware` for 8 s with states every so many s, so late, and returns what was flown and measured, and the root
-/// mean square distance from the reference from 5 s on \[m\].
-fn sampled(kind: ControllerKind, [period_s, delay_s]: [f64; 2], gyro: bool, core: bool) -> (Vec<[State; 2]>, f64) {
+/// mean square distance from the reference from 5 s on \[m\]; none if the vehicle is lost.
+fn sampled(
+    kind: ControllerKind,
+    [period_s, delay_s]: [f64; 2],
+    gyro: bool,
+    core: bool,
+) -> (Vec<[State; 2]>, Option<f64>) {
     let mut scenario = built_in("hardware").unwrap().read().unwrap();
     scenario.sensing = Sensing { period_s, delay_s, gyro, ..Sensing::DEFAULT };
     (scenario.duration_s, scenario.flight_core) = (8.0, core);
@@ -125,8 +130,7 @@ fn sampled(kind: ControllerKind, [period_s, delay_s]: [f64; 2], gyro: bool, core
             count += 1.0;
         }
     });
-    assert_eq!(lost.unwrap(), None, "{}", kind.name());
-    (seen, (squares / count).sqrt())
+    (seen, lost.unwrap().is_none().then(|| (squares / count).sqrt()))
 }
 
 /// A law is given a state in every step: that of 10 to 19 ms ago, and with a gyro the rates of now.
@@ -142,12 +146,15 @@ fn a_scenario_says_sampled_and_late_states_with_a_gyro() {
     }
 }
 
-/// The flight core is given a state when one arrives, and extrapolates between them. A bare law that holds each for 40
-/// ms strays nine times as far.
+/// The flight core is given a state when one arrives, and extrapolates between them. PID alone, which holds each for 60
+/// ms, loses the vehicle; AFBC stands 40 ms of either.
 #[test]
 fn the_flight_core_extrapolates_between_the_samples_of_a_scenario() {
-    for kind in ControllerKind::PAPER {
-        let [aboard_m, alone_m] = [true, false].map(|core| sampled(kind, [0.04, 0.0], false, core).1);
-        assert!(aboard_m < 0.5 * alone_m, "{}: {aboard_m} m, {alone_m} m", kind.name());
+    use ControllerKind::{Afbc, Pid};
+    let flown = |kind, period_s, core| sampled(kind, [period_s, 0.0], false, core).1;
+    assert_eq!(flown(Pid, 0.06, false), None);
+    for (kind, period_s, core) in [(Pid, 0.06, true), (Afbc, 0.04, true), (Afbc, 0.04, false)] {
+        let rms_m = flown(kind, period_s, core);
+        assert!(rms_m.is_some_and(|rms_m| rms_m < 0.015), "{}: {rms_m:?} m", kind.name());
     }
 }

@@ -3,6 +3,7 @@
 use crate::backstepping::{self, proportional};
 use crate::fuzzy::{Basis, Firing, Membership};
 use crate::law::{Context, Law, Tracking};
+use crate::model::Model;
 use crate::safeguards::Safeguards;
 use afbc_control::{Errors, Estimate, math};
 use afbc_types::{Axis, Declared, OutOfRange, PerAxis, parameters};
@@ -19,10 +20,10 @@ parameters! {
         #[group("")]
         pub backstepping: backstepping::Gains = backstepping::Gains::DEFAULT,
         /// gamma: adaptation gain of Theta_hat (34).
-        #[parameter(GAMMA, "input per m or rad", 0.0..=1000.0, tuned)]
+        #[parameter(GAMMA, "input per m or rad", 0.0..=10000.0, tuned)]
         pub gamma: f32 = 1.2,
         /// eta: adaptation gain of delta_hat (33).
-        #[parameter(ETA, "input per m or rad", 0.0..=1000.0, tuned)]
+        #[parameter(ETA, "input per m or rad", 0.0..=10000.0, tuned)]
         pub eta: f32 = 0.3,
         /// epsilon: width of the robust term's transition (32).
         #[parameter(EPSILON, "m/s or rad/s", 1e-6..=100.0)]
@@ -40,10 +41,10 @@ impl Gains {
     /// Returns the gains of a subsystem whose input must be `scale` times as large.
     #[must_use]
     pub fn scaled(&self, scale: f32) -> Self {
-        let Gains { backstepping: backstepping::Gains { alpha1, alpha2 }, gamma, eta, safeguards, .. } = *self;
+        let Gains { backstepping, gamma, eta, safeguards, .. } = *self;
         let bound = |bound: f32| math::min(bound * scale, Safeguards::THETAMAX.range.max as f32);
         Gains {
-            backstepping: backstepping::Gains { alpha1, alpha2: alpha2 * scale },
+            backstepping: backstepping::Gains { alpha2: backstepping.alpha2 * scale, ..backstepping },
             gamma: gamma * scale,
             eta: eta * scale,
             safeguards: Safeguards {
@@ -59,10 +60,15 @@ impl Gains {
     /// errors take the same course, only slower. Bounds of the estimates stay, since disturbances do not slow down. Not
     /// in the paper.
     pub fn slowed(&self, slowness: f32) -> Self {
-        let Gains { backstepping: backstepping::Gains { alpha1, alpha2 }, gamma, eta, epsilon, safeguards, .. } = *self;
+        let Gains { backstepping, gamma, eta, epsilon, safeguards, .. } = *self;
+        let backstepping::Gains { alpha1, alpha2, stiffness } = backstepping;
         let square = slowness * slowness;
         Gains {
-            backstepping: backstepping::Gains { alpha1: alpha1 / slowness, alpha2: alpha2 / slowness },
+            backstepping: backstepping::Gains {
+                alpha1: alpha1 / slowness,
+                alpha2: alpha2 / slowness,
+                stiffness: stiffness / square,
+            },
             gamma: gamma / square,
             eta: eta / square,
             epsilon: epsilon * slowness,
@@ -236,12 +242,20 @@ impl Adaptive {
         })
     }
 
-    /// Returns the estimate for which the subsystem gives `input` with these errors, spread over its rules; `x` is x_1,
-    /// x_2 of an attitude.
-    pub(crate) fn resumed(&self, axis: Axis, input: f32, x: [f32; 2], errors: &Errors, norm_max: f32) -> Estimate {
-        let Subsystem { gains, basis, .. } = &self.subsystems[axis];
-        let fuzzy = input - proportional(gains.backstepping.alpha2, errors);
-        spread(fuzzy, &basis.weights(fuzzy_inputs(axis, x, errors)), norm_max)
+    /// Returns u_pd (21) of the subsystem.
+    pub(crate) fn proportional(&self, axis: Axis, errors: &Errors) -> f32 {
+        proportional(self.subsystems[axis].gains.backstepping.alpha2, errors)
+    }
+
+    /// Returns u_a (22) of the subsystem; `x` is x_1, x_2 of an attitude.
+    pub(crate) fn fuzzy(&self, axis: Axis, x: [f32; 2], errors: &Errors, estimate: &Estimate) -> f32 {
+        self.subsystems[axis].basis.weights(fuzzy_inputs(axis, x, errors)).dot(&estimate.theta)
+    }
+
+    /// Returns the estimate for which u_a is `fuzzy` with these errors, spread over the rules; `x` is x_1, x_2 of an
+    /// attitude.
+    pub(crate) fn resumed(&self, axis: Axis, fuzzy: f32, x: [f32; 2], errors: &Errors, norm_max: f32) -> Estimate {
+        spread(fuzzy, &self.subsystems[axis].basis.weights(fuzzy_inputs(axis, x, errors)), norm_max)
     }
 }
 
@@ -256,20 +270,24 @@ impl Law for Adaptive {
         let subsystem = &self.subsystems[axis];
         let errors = tracking.errors(subsystem.gains.backstepping.alpha1);
         let inputs = fuzzy_inputs(axis, [tracking.x1, tracking.x2], &errors);
-        (subsystem.step(&errors, inputs, context.unallocated[axis], context, estimate), errors)
+        let known = context.known.map_or(0.0, |model| {
+            backstepping::known(&subsystem.gains.backstepping, tracking, &errors, &context.dynamics(model, axis))
+        });
+        (known + subsystem.step(&errors, inputs, context.unallocated[axis], context, estimate), errors)
     }
 
-    fn alpha1(&self, axis: Axis) -> f32 {
-        self.subsystems[axis].gains.backstepping.alpha1
+    fn approach(&self, axis: Axis, known: Option<&Model>) -> f32 {
+        let gains = &self.subsystems[axis].gains.backstepping;
+        known.map_or(gains.alpha1, |model| gains.approach(model.hover_gain(axis)))
     }
 
     fn start(&self, estimates: &mut PerAxis<Estimate>, weight_n: f32) {
         estimates.z = even(weight_n);
     }
 
-    fn hover_thrust_n(&self, z: &Estimate, weight_n: f32) -> f32 {
+    fn hover_thrust_n(&self, z: &Estimate, weight_n: f32, known_n: f32) -> f32 {
         // The rule for zero error and zero speed.
-        math::max(z.theta.m22, HOVER_SHARE_MIN * weight_n)
+        math::max(known_n + z.theta.m22, HOVER_SHARE_MIN * weight_n)
     }
 
     fn learnt(estimate: &Estimate) -> Estimate {

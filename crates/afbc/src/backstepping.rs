@@ -5,18 +5,29 @@ use crate::model::{Dynamics, Model};
 use afbc_control::{Errors, Estimate};
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
 
-/// Returns the ideal law u*_eq (16) for known f, g and dg/dt.
+/// Returns the ideal law u*_eq (16) for known f, g and dg/dt, with c e_1 for e_1.
 #[inline]
-pub fn ideal(alpha1: f32, errors: &Errors, x1d_ddot: f32, dynamics: &Dynamics) -> f32 {
-    let Errors { e1, e2, .. } = *errors;
-    compensated(e1 + alpha1 * (e2 - alpha1 * e1) + x1d_ddot, e2, dynamics)
+pub fn ideal(gains: &Gains, errors: &Errors, x1d_ddot: f32, dynamics: &Dynamics) -> f32 {
+    let (Gains { alpha1, stiffness, .. }, Errors { e1, e2, .. }) = (*gains, *errors);
+    compensated(stiffness * e1 + alpha1 * (e2 - alpha1 * e1) + x1d_ddot, e2, dynamics)
 }
 
 /// Returns the input for an acceleration, with the compensation of f and dg/dt in (16).
 #[inline]
 fn compensated(acceleration: f32, e2: f32, dynamics: &Dynamics) -> f32 {
     let Dynamics { f, g, g_dot } = *dynamics;
-    (acceleration - f - 0.5 * g_dot / g * e2) / g
+    let drift = if g_dot == 0.0 { 0.0 } else { 0.5 * g_dot / g * e2 };
+    (acceleration - f - drift) / g
+}
+
+/// Returns [`ideal`], c e_1 + alpha_1 de_1/dt at the speed limit by [`Tracking::errors`]'s e_2.
+#[inline]
+pub(crate) fn known(gains: &Gains, tracking: &Tracking, errors: &Errors, dynamics: &Dynamics) -> f32 {
+    if tracking.approach_1_s.is_some() {
+        compensated(gains.alpha1 * errors.e2 + tracking.x1d_ddot, errors.e2, dynamics)
+    } else {
+        ideal(gains, errors, tracking.x1d_ddot, dynamics)
+    }
 }
 
 /// Returns u_pd (21).
@@ -25,23 +36,15 @@ pub fn proportional(alpha2: f32, errors: &Errors) -> f32 {
     alpha2 * errors.e2
 }
 
-/// Returns u*_eq + alpha_2 e_2, and the errors. At the speed limit e_1 is constant, and (16) applies to e_2 alone,
-/// whose derivative is d^2 x_1d/dt^2 - f - g u: otherwise -alpha_1^2 e_1 would slow down a vehicle that approaches the
-/// limit.
+/// Returns u*_eq + alpha_2 e_2, and the errors.
 #[inline]
 pub(crate) fn classical(gains: &Gains, tracking: &Tracking, dynamics: &Dynamics) -> (f32, Errors) {
-    let Gains { alpha1, alpha2 } = *gains;
-    let errors = tracking.errors(alpha1);
-    let ideal = if tracking.limited {
-        compensated(tracking.x1d_ddot, errors.e2, dynamics)
-    } else {
-        ideal(alpha1, &errors, tracking.x1d_ddot, dynamics)
-    };
-    (ideal + proportional(alpha2, &errors), errors)
+    let errors = tracking.errors(gains.alpha1);
+    (known(gains, tracking, &errors, dynamics) + proportional(gains.alpha2, &errors), errors)
 }
 
 parameters! {
-    /// The two gains of one backstepping subsystem. The defaults are those of Section IV for attitude, x and y.
+    /// The gains of one backstepping subsystem. The defaults are those of Section IV for attitude, x and y.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Gains {
         /// alpha_1 (12).
@@ -50,6 +53,18 @@ parameters! {
         /// alpha_2 (21).
         #[parameter(ALPHA2, "input per m/s or rad/s", 0.0..=1000.0, tuned)]
         pub alpha2: f32 = 2.0,
+        /// c: weight of e_1 in V = c e_1^2/2 + e_2^2/2g, and so of e_1 in (16). The paper's is 1.
+        #[parameter(STIFF, "1/s2", 0.0..=10000.0, tuned)]
+        pub stiffness: f32 = 1.0,
+    }
+}
+
+impl Gains {
+    /// Returns the speed of approach per error \[1/s\] at which [`known`] and u_pd are zero, for g of the input:
+    /// position over rate gain.
+    pub(crate) fn approach(&self, g: f32) -> f32 {
+        let gain = self.alpha2 * g;
+        (self.stiffness + self.alpha1 * gain) / (self.alpha1 + gain)
     }
 }
 
@@ -80,11 +95,11 @@ impl Law for Backstepping {
 
     #[inline]
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, (): &mut ()) -> (f32, Errors) {
-        classical(&self.gains[axis], tracking, &self.model.dynamics(axis, context))
+        classical(&self.gains[axis], tracking, &context.dynamics(&self.model, axis))
     }
 
-    fn alpha1(&self, axis: Axis) -> f32 {
-        self.gains[axis].alpha1
+    fn approach(&self, axis: Axis, _known: Option<&Model>) -> f32 {
+        self.gains[axis].approach(self.model.hover_gain(axis))
     }
 
     fn learnt((): &()) -> Estimate {

@@ -3,10 +3,12 @@
 
 use crate::law::{Context, Law, Tracking};
 use crate::limits::Limits;
+use crate::model::{Model, euler_rates};
+use crate::reference::{Detours, Reference, ReferenceModel};
 use crate::standstill::Standstill;
 use afbc_control::command_filter::{BANDWIDTH, CommandFilter, Filtered};
 use afbc_control::mixer::{Allocation, Mixer};
-use afbc_control::{Action, Errors, Estimate, FlightController, Trace, math};
+use afbc_control::{Action, Errors, Estimate, FlightController, Smoothed, Smoother, Smoothing, Trace, math};
 use afbc_types::{Airframe, Axis, Declared, Inputs, OutOfRange, Parameters, PerAxis, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
@@ -40,6 +42,17 @@ parameters! {
         /// is taken over without a jump. The paper starts with zero estimates and at its first command.
         #[switch(BUMPLESS)]
         pub bumpless: bool = false,
+        /// Whether the law is given the known part of (16) by the nominal model, so that only the rest is learnt, and
+        /// roll and pitch the derivatives that follow from jerk and snap of the setpoint, instead of the command
+        /// filter's second derivative, which is mostly noise.
+        #[switch(FEED_FORWARD)]
+        pub feed_forward: bool = false,
+        /// Reference model between setpoint and law.
+        #[group("")]
+        pub reference: ReferenceModel = ReferenceModel::DEFAULT,
+        /// Low-pass filters on U1..U4.
+        #[group("")]
+        pub smoothing: Smoothing = Smoothing::DEFAULT,
     }
 }
 
@@ -49,6 +62,21 @@ impl Settings {
     pub const fn with_dt_s(mut self, dt_s: f32) -> Self {
         self.common.dt_s = dt_s;
         self
+    }
+
+    /// Returns the settings of a vehicle that is `slowness` times slower: command filter, tilt rate, reference model
+    /// and filters of the inputs follow. Limits of speed and acceleration stay, since they belong to the task. Not in
+    /// the paper.
+    #[must_use]
+    pub fn slowed(self, slowness: f32) -> Self {
+        let Settings { command_filter_rad_s, limits, reference, smoothing, .. } = self;
+        Settings {
+            command_filter_rad_s: command_filter_rad_s / slowness,
+            limits: Limits { tilt_rate_max_rad_s: limits.tilt_rate_max_rad_s / slowness, ..limits },
+            reference: reference.slowed(slowness),
+            smoothing: smoothing.slowed(slowness),
+            ..self
+        }
     }
 
     /// Returns the settings with another largest rotor force.
@@ -63,6 +91,10 @@ impl Settings {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controller<L, const N: usize = 4> {
     law: L,
+    /// Nominal model for the feed-forward.
+    model: Model,
+    reference: Option<Reference>,
+    smoother: Smoother,
     mixer: Mixer<N>,
     filter: CommandFilter,
     settings: Settings,
@@ -72,8 +104,8 @@ pub struct Controller<L, const N: usize = 4> {
     tilt_max_tan: f32,
     /// Largest thrust of all rotors together \[N\].
     thrust_max_n: f32,
-    /// Largest e_1 of x, y and z \[m\], which gives the speed limit by alpha_1 e_1.
-    error_max_m: Vector3<f32>,
+    /// Of x, y and z: largest e_1 \[m\], and the speed of approach per e_1 \[1/s\], which make the speed limit.
+    approach: [(f32, f32); 3],
 }
 
 /// Desired roll and pitch in one step.
@@ -81,6 +113,8 @@ pub struct Controller<L, const N: usize = 4> {
 struct Desired {
     /// phi_d, theta_d of (40) \[rad\].
     rad: [f32; 2],
+    /// The angles for the command filter: the same, ahead by its lag.
+    commanded: [f32; 2],
     /// Filtered previous angles, which roll and pitch track.
     filtered: [Filtered; 2],
 }
@@ -92,29 +126,51 @@ pub struct Cascade<E> {
     pub estimates: PerAxis<E>,
     /// Errors of each subsystem in the last step.
     pub errors: PerAxis<Errors>,
+    /// Distance of each subsystem from its reference in the last step, e_1 without the speed limit \[m or rad\].
+    pub distances: PerAxis<f32>,
     /// Inputs of each subsystem in the last step: U1..U4 \[N\], u5, u6 \[m/s2\].
     pub inputs: PerAxis<f32>,
+    /// U1..U4 asked of the mixer in the last step, behind the filters.
+    pub asked: Inputs,
     /// Desired roll and pitch in the last step; none before the first.
     desired: Option<Desired>,
     /// See [`Context::unallocated`].
     unallocated: PerAxis<f32>,
     standstill: Standstill,
     rotor_residual_rad_s: f32,
+    /// See [`Reference`]; none before the first step.
+    detours: Option<Detours>,
+    /// See [`Smoother`].
+    smoothed: Option<Smoothed>,
 }
 
 impl<E> Cascade<E> {
     /// Returns the memory with the estimates of another law, which starts with this rotor residual.
     pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>, rotor_residual_rad_s: f32) -> Cascade<F> {
-        let Cascade { errors, inputs, desired, unallocated, standstill, .. } = *self;
-        Cascade { estimates, errors, inputs, desired, unallocated, standstill, rotor_residual_rad_s }
+        let Cascade { errors, distances, inputs, asked, desired, unallocated, standstill, detours, smoothed, .. } =
+            *self;
+        Cascade {
+            estimates,
+            errors,
+            distances,
+            inputs,
+            asked,
+            desired,
+            unallocated,
+            standstill,
+            rotor_residual_rad_s,
+            detours,
+            smoothed,
+        }
     }
 
     /// Returns the trace of the last step.
     pub(crate) fn trace(&self) -> Trace {
-        let PerAxis { roll, pitch, yaw, z, x, y } = self.inputs;
-        let Desired { rad, filtered } = self.desired.unwrap_or(Desired { rad: [0.0; 2], filtered: Default::default() });
+        let PerAxis { x, y, .. } = self.inputs;
+        let (rad, filtered) =
+            self.desired.map_or(([0.0; 2], Default::default()), |Desired { rad, filtered, .. }| (rad, filtered));
         let mut trace = Trace::default();
-        trace.inputs = Inputs { roll_n: roll, pitch_n: pitch, yaw_n: yaw, thrust_n: z };
+        trace.inputs = self.asked;
         trace.virtual_m_s2 = [x, y];
         (trace.desired_rad, trace.filtered) = (rad, filtered);
         trace.errors = self.errors;
@@ -124,14 +180,52 @@ impl<E> Cascade<E> {
 
 /// Returns desired roll and pitch (40) \[rad\] for the horizontal accelerations u5, u6 \[m/s2\] at yaw psi \[rad\].
 /// `inverse_vertical` is mass over vertical thrust: 1/g in hover, as in (39).
-#[inline]
 pub fn desired_attitude(u5: f32, u6: f32, yaw_rad: f32, inverse_vertical: f32) -> [f32; 2] {
-    let (sin_psi, cos_psi) = (math::sin(yaw_rad), math::cos(yaw_rad));
-    let tan_theta = (u5 * cos_psi + u6 * sin_psi) * inverse_vertical;
-    // cos(atan t) = 1 / sqrt(1 + t^2)
-    let cos_theta = 1.0 / math::sqrt(1.0 + tan_theta * tan_theta);
-    let tan_phi = (u5 * sin_psi - u6 * cos_psi) * inverse_vertical * cos_theta;
-    [math::atan(tan_phi), math::atan(tan_theta)]
+    Tilt::new(u5, u6, yaw_rad, inverse_vertical).rad
+}
+
+/// Returns a vector reduced to a norm of `max` in the same direction.
+#[inline]
+fn within([x, y]: [f32; 2], max: f32) -> [f32; 2] {
+    let square = x * x + y * y;
+    let scale = if square > max * max { max / math::sqrt(square) } else { 1.0 };
+    [x * scale, y * scale]
+}
+
+/// Desired roll and pitch, and how they turn with the horizontal acceleration.
+struct Tilt {
+    sin_psi: f32,
+    cos_psi: f32,
+    /// phi_d, theta_d of (40) \[rad\].
+    rad: [f32; 2],
+    /// Derivatives of (40) with yaw and thrust held: d phi/d tan phi cos theta and d theta/d tan theta, over the
+    /// vertical acceleration.
+    gains: [f32; 2],
+}
+
+impl Tilt {
+    #[inline(always)]
+    fn new(u5: f32, u6: f32, yaw_rad: f32, inverse_vertical: f32) -> Self {
+        let (sin_psi, cos_psi) = (math::sin(yaw_rad), math::cos(yaw_rad));
+        let tan_theta = (u5 * cos_psi + u6 * sin_psi) * inverse_vertical;
+        // cos(atan t) = 1 / sqrt(1 + t^2)
+        let cos_theta = 1.0 / math::sqrt(1.0 + tan_theta * tan_theta);
+        let tan_phi = (u5 * sin_psi - u6 * cos_psi) * inverse_vertical * cos_theta;
+        let roll = cos_theta * inverse_vertical / (1.0 + tan_phi * tan_phi);
+        Tilt {
+            sin_psi,
+            cos_psi,
+            rad: [math::atan(tan_phi), math::atan(tan_theta)],
+            gains: [roll, cos_theta * cos_theta * inverse_vertical],
+        }
+    }
+
+    /// Returns the derivatives of roll and pitch for that of the acceleration, along x and y.
+    #[inline]
+    fn turned(&self, x: f32, y: f32) -> [f32; 2] {
+        let [roll, pitch] = self.gains;
+        [(x * self.sin_psi - y * self.cos_psi) * roll, (x * self.cos_psi + y * self.sin_psi) * pitch]
+    }
 }
 
 impl<L: Law, const N: usize> Controller<L, N> {
@@ -145,14 +239,22 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let mixer = settings.common.mixer(vehicle)?;
         let Parameters { gravity_m_s2, .. } = vehicle.parameters;
         let Limits { speed_max_m_s, climb_max_m_s, .. } = settings.limits;
-        let error_max = |axis, speed| speed / law.alpha1(axis);
+        let model = Model::new(&vehicle.parameters);
+        let known = settings.feed_forward.then_some(&model);
+        let approach = |axis, speed| {
+            let approach_1_s = law.approach(axis, known);
+            (speed / approach_1_s, approach_1_s)
+        };
         Ok(Controller {
-            error_max_m: Vector3::new(
-                error_max(Axis::X, speed_max_m_s),
-                error_max(Axis::Y, speed_max_m_s),
-                error_max(Axis::Z, climb_max_m_s),
-            ),
+            approach: [
+                approach(Axis::X, speed_max_m_s),
+                approach(Axis::Y, speed_max_m_s),
+                approach(Axis::Z, climb_max_m_s),
+            ],
             law,
+            model,
+            reference: Reference::new(&settings.reference, &settings.limits, settings.common.dt_s),
+            smoother: Smoother::new(&settings.smoothing, settings.common.dt_s)?,
             filter: CommandFilter::new(settings.command_filter_rad_s, settings.common.dt_s)?
                 .limited(settings.limits.tilt_rate_max_rad_s)?,
             settings,
@@ -168,10 +270,18 @@ impl<L: Law, const N: usize> Controller<L, N> {
     /// Returns (u5, u6), reduced to the limits of tilt and acceleration in the same direction.
     #[inline]
     fn limited(&self, u5: f32, u6: f32, vertical: f32) -> [f32; 2] {
-        let max = math::min(vertical * self.tilt_max_tan, self.settings.limits.acceleration_max_m_s2);
-        let square = u5 * u5 + u6 * u6;
-        let scale = if square > max * max { max / math::sqrt(square) } else { 1.0 };
-        [u5 * scale, u6 * scale]
+        within([u5, u6], math::min(vertical * self.tilt_max_tan, self.settings.limits.acceleration_max_m_s2))
+    }
+
+    /// True if the law is given the known part of its input.
+    pub(crate) fn feeds_forward(&self) -> bool {
+        self.settings.feed_forward
+    }
+
+    /// Returns d eta/dt: the body's rates as in (6), or with feed-forward what follows from them.
+    #[inline(always)]
+    pub(crate) fn turning(&self, state: &State) -> Vector3<f32> {
+        if self.settings.feed_forward { euler_rates(state) } else { state.rates_rad_s }
     }
 
     /// Returns the law in the cascade.
@@ -181,13 +291,35 @@ impl<L: Law, const N: usize> Controller<L, N> {
 
     /// Returns the estimated hover thrust U4 \[N\], limited to what the rotors can give.
     pub(crate) fn hover_thrust_n(&self, memory: &Cascade<L::Estimate>) -> f32 {
-        math::min(self.law.hover_thrust_n(&memory.estimates.z, self.weight_n), self.thrust_max_n)
+        let hover_n = self.law.hover_thrust_n(&memory.estimates.z, self.weight_n, self.known_weight_n());
+        math::min(hover_n, self.thrust_max_n)
+    }
+
+    /// Returns the weight \[N\] as far as the law need not learn it.
+    fn known_weight_n(&self) -> f32 {
+        if self.settings.feed_forward { self.weight_n } else { 0.0 }
     }
 
     /// True if the vehicle stands on the ground and `freeze_on_ground` is set.
     #[inline]
     pub(crate) fn stands(&self, memory: &Cascade<L::Estimate>) -> bool {
         self.settings.freeze_on_ground && memory.standstill.stands()
+    }
+
+    /// Computes the input of one subsystem, and its errors.
+    // Always, so that all subsystems share what they compute.
+    #[inline(always)]
+    fn input(
+        &self,
+        axis: Axis,
+        tracking: Tracking,
+        context: &Context,
+        estimate: &mut L::Estimate,
+        errors: &mut Errors,
+    ) -> f32 {
+        let (u, e) = self.law.input(axis, &tracking, context, estimate);
+        *errors = e;
+        u
     }
 
     /// Computes (7)-(40) in their order; `fresh` as in [`FlightController::decide`].
@@ -200,8 +332,15 @@ impl<L: Law, const N: usize> Controller<L, N> {
         fresh: bool,
     ) -> Action<N> {
         if memory.desired.is_none() && self.settings.bumpless {
-            self.law.start(&mut memory.estimates, self.weight_n);
+            self.law.start(&mut memory.estimates, self.weight_n - self.known_weight_n());
         }
+        let reference = match &self.reference {
+            Some(reference) => {
+                let detours = memory.detours.get_or_insert_with(|| reference.start(state, setpoint));
+                reference.advance(detours, state, setpoint)
+            }
+            None => *setpoint,
+        };
         let stands = self.stands(memory);
         let context = Context {
             state,
@@ -209,77 +348,136 @@ impl<L: Law, const N: usize> Controller<L, N> {
             dt_s: self.settings.common.dt_s,
             adapt: fresh && !stands,
             unallocated: memory.unallocated,
+            known: self.settings.feed_forward.then_some(&self.model),
         };
         let hover_n = self.hover_thrust_n(memory);
         let Cascade { estimates, errors, .. } = memory;
-        let mut input = |axis: Axis, tracking: Tracking| {
-            let (u, e) = self.law.input(axis, &tracking, &context, &mut estimates[axis]);
-            errors[axis] = e;
-            u
-        };
+
+        let eta = state.attitude_rad;
+        let eta_dot = self.turning(state);
+        let tilt_cosine = math::tilt_cosine(eta.x, eta.y);
 
         // Position: subsystems 4, 5, 6.
-        let (p, v, a) = (setpoint.position_m, setpoint.velocity_m_s, setpoint.acceleration_m_s2);
+        let (p, v, a) = (reference.position_m, reference.velocity_m_s, reference.acceleration_m_s2);
         let (xi, xi_dot) = (state.position_m, state.velocity_m_s);
-        let track = |x1, x2, e1, x1d_dot, x1d_ddot| Tracking { x1, x2, e1, x1d_dot, x1d_ddot, limited: false };
-        let approach = |x1: f32, x2, x1d: f32, x1d_dot, x1d_ddot, max: f32| {
+        let track = |x1, x2, e1, x1d_dot, x1d_ddot| Tracking { x1, x2, e1, x1d_dot, x1d_ddot, approach_1_s: None };
+        let approach = |x1: f32, x2, x1d: f32, x1d_dot, x1d_ddot, (max_m, approach): (f32, f32)| {
             let distance = x1d - x1;
-            let limited = distance.abs() > max;
-            let e1 = if limited { max.copysign(distance) } else { distance };
-            Tracking { x1, x2, e1, x1d_dot, x1d_ddot, limited }
+            let (e1, approach_1_s) =
+                if distance.abs() > max_m { (max_m.copysign(distance), Some(approach)) } else { (distance, None) };
+            Tracking { x1, x2, e1, x1d_dot, x1d_ddot, approach_1_s }
         };
-        let max = &self.error_max_m;
-        let u4 = input(Axis::Z, approach(xi.z, xi_dot.z, p.z, v.z, a.z, max.z));
-        let u5 = input(Axis::X, approach(xi.x, xi_dot.x, p.x, v.x, a.x, max.x));
-        let u6 = input(Axis::Y, approach(xi.y, xi_dot.y, p.y, v.y, a.y, max.y));
+        let [x_max, y_max, z_max] = self.approach;
+        let u4 = self.input(
+            Axis::Z,
+            approach(xi.z, xi_dot.z, p.z, v.z, a.z, z_max),
+            &context,
+            &mut estimates.z,
+            &mut errors.z,
+        );
+        let u5 = self.input(
+            Axis::X,
+            approach(xi.x, xi_dot.x, p.x, v.x, a.x, x_max),
+            &context,
+            &mut estimates.x,
+            &mut errors.x,
+        );
+        let u6 = self.input(
+            Axis::Y,
+            approach(xi.y, xi_dot.y, p.y, v.y, a.y, y_max),
+            &context,
+            &mut estimates.y,
+            &mut errors.y,
+        );
 
         // Desired attitude, with the derivatives for (12) and (16).
-        let (eta, eta_dot) = (state.attitude_rad, state.rates_rad_s);
         let (vertical, inverse_vertical) = if self.settings.tilt_by_thrust {
-            let upward_n = math::min(u4, self.thrust_max_n) * math::tilt_cosine(eta.x, eta.y);
+            let upward_n = math::min(u4, self.thrust_max_n) * tilt_cosine;
             let share = math::max(upward_n / hover_n, VERTICAL_MIN);
             (self.gravity_m_s2 * share, self.inverse_gravity / share)
         } else {
             (self.gravity_m_s2, self.inverse_gravity)
         };
         let [a5, a6] = self.limited(u5, u6, vertical);
-        let desired_rad = desired_attitude(a5, a6, eta.z, inverse_vertical);
-        let [phi_d, theta_d] = desired_rad;
+        let tilt = Tilt::new(a5, a6, eta.z, inverse_vertical);
+        let (mut commanded, mut forward_rad_s2) = (tilt.rad, [0.0; 2]);
+        if self.settings.feed_forward {
+            let (j, s) = (&reference.jerk_m_s3, &reference.snap_m_s4);
+            let rates = tilt.turned(j.x, j.y);
+            forward_rad_s2 = tilt.turned(s.x, s.y);
+            // Ahead of the filter by its lag: its output is then the angle that was meant.
+            let lag_s = 1.0 / self.settings.command_filter_rad_s;
+            for ((angle, rate), acceleration) in commanded.iter_mut().zip(rates).zip(forward_rad_s2) {
+                *angle += lag_s * (2.0 * rate + lag_s * acceleration);
+            }
+            // No tilt exceeds the norm of roll and pitch.
+            commanded = within(commanded, self.settings.limits.tilt_max_rad);
+        }
+        let [phi_d, theta_d] = commanded;
         let at_rest = |angle| Filtered { angle, rate: 0.0 };
-        let start = if self.settings.bumpless { [eta.x, eta.y] } else { desired_rad };
+        let start = if self.settings.bumpless { [eta.x, eta.y] } else { tilt.rad };
         let filtered = match &memory.desired {
             None => start.map(at_rest),
-            Some(Desired { rad: [phi_d, theta_d], filtered: [roll_d, pitch_d] }) => {
+            Some(Desired { commanded: [phi_d, theta_d], filtered: [roll_d, pitch_d], .. }) => {
                 [self.filter.advance(roll_d, *phi_d), self.filter.advance(pitch_d, *theta_d)]
             }
         };
         let [roll_d, pitch_d] = filtered;
 
         // Attitude: subsystems 1, 2, 3.
-        let roll_d_ddot = self.filter.acceleration(&roll_d, phi_d);
-        let pitch_d_ddot = self.filter.acceleration(&pitch_d, theta_d);
-        let u1 = input(Axis::Roll, track(eta.x, eta_dot.x, roll_d.angle - eta.x, roll_d.rate, roll_d_ddot));
-        let u2 = input(Axis::Pitch, track(eta.y, eta_dot.y, pitch_d.angle - eta.y, pitch_d.rate, pitch_d_ddot));
-        let u3 = input(
+        let [roll_d_ddot, pitch_d_ddot] = if self.settings.feed_forward {
+            forward_rad_s2
+        } else {
+            [self.filter.acceleration(&roll_d, phi_d), self.filter.acceleration(&pitch_d, theta_d)]
+        };
+        let u1 = self.input(
+            Axis::Roll,
+            track(eta.x, eta_dot.x, roll_d.angle - eta.x, roll_d.rate, roll_d_ddot),
+            &context,
+            &mut estimates.roll,
+            &mut errors.roll,
+        );
+        let u2 = self.input(
+            Axis::Pitch,
+            track(eta.y, eta_dot.y, pitch_d.angle - eta.y, pitch_d.rate, pitch_d_ddot),
+            &context,
+            &mut estimates.pitch,
+            &mut errors.pitch,
+        );
+        let u3 = self.input(
             Axis::Yaw,
             Tracking {
                 x1: eta.z,
                 x2: eta_dot.z,
-                e1: math::wrap_angle(setpoint.yaw_rad - eta.z),
-                x1d_dot: setpoint.yaw_rate_rad_s,
-                x1d_ddot: setpoint.yaw_acceleration_rad_s2,
-                limited: false,
+                e1: math::wrap_angle(reference.yaw_rad - eta.z),
+                x1d_dot: reference.yaw_rate_rad_s,
+                x1d_ddot: reference.yaw_acceleration_rad_s2,
+                approach_1_s: None,
             },
+            &context,
+            &mut estimates.yaw,
+            &mut errors.yaw,
         );
 
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3, thrust_n: u4 };
+        let inputs = self.smoother.advance(&mut memory.smoothed, &inputs);
+        memory.asked = inputs;
         // Moments would increase the thrust and tip over a standing vehicle.
-        let asked = if stands { Inputs { thrust_n: u4, ..Inputs::default() } } else { inputs };
+        let asked = if stands { Inputs { thrust_n: inputs.thrust_n, ..Inputs::default() } } else { inputs };
         let allocation = self.mixer.allocate(&asked);
         let action = self.mixer.carry_out(&allocation);
 
+        let distance_m = p - xi;
+        memory.distances = PerAxis {
+            roll: memory.errors.roll.e1,
+            pitch: memory.errors.pitch.e1,
+            yaw: memory.errors.yaw.e1,
+            z: distance_m.z,
+            x: distance_m.x,
+            y: distance_m.y,
+        };
         memory.inputs = PerAxis { roll: u1, pitch: u2, yaw: u3, z: u4, x: u5, y: u6 };
-        memory.desired = Some(Desired { rad: desired_rad, filtered });
+        memory.desired = Some(Desired { rad: tilt.rad, commanded, filtered });
         memory.standstill.advance(u4, self.weight_n, &state.velocity_m_s, self.settings.common.dt_s);
         if L::USES_ROTOR_RESIDUAL {
             memory.rotor_residual_rad_s = self.mixer.residual_rad_s(&action.speeds);

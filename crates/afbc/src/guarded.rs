@@ -7,13 +7,16 @@ use crate::integral::{Integral, IntegralBackstepping};
 use crate::model::Model;
 use crate::monitor::{Bounds, Figures, Monitor};
 use crate::safeguards::Safeguards;
-use afbc_control::{Action, Estimate, FlightController, Mixer, Trace, Trip};
+use afbc_control::{Action, Errors, Estimate, FlightController, Mixer, Trace, Trip};
 use afbc_types::{Airframe, Axis, OutOfRange, PerAxis, Range, Setpoint, State};
 use nalgebra::Vector3;
 
-/// Smallest Theta_max of z, in weights: nine rules that each hold the weight give |Theta_hat| = 3 weights, and 5 with
-/// rotors that produce 60 % of their thrust.
-pub const HOVER_THETA: f32 = 5.0;
+/// Smallest Theta_max of z, in weights. With feed-forward, rotors that produce 45 % of their thrust need 1.2 of it on
+/// the rule of hover. Without, nine rules that each hold the weight give |Theta_hat| = 3 weights, and rotors that
+/// produce 60 % of their thrust 5.
+const fn hover_theta(feed_forward: bool) -> f32 {
+    if feed_forward { 1.8 } else { 5.0 }
+}
 
 /// Accepted angular acceleration about body x and y near hover: the gains of the profile `flight` need half of that of
 /// the paper's vehicle, and fail below 60 rad/s2 (`tests/tests/vehicles.rs`).
@@ -36,18 +39,11 @@ struct StandIn<const N: usize> {
     action: Action<N>,
 }
 
-/// Attitude and rates of the last step, from which the other law continues.
+/// Attitude and d eta/dt of the last step, from which the other law continues.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Last {
     attitude_rad: Vector3<f32>,
-    rates_rad_s: Vector3<f32>,
-}
-
-impl Last {
-    #[inline]
-    fn new(state: &State) -> Self {
-        Last { attitude_rad: state.attitude_rad, rates_rad_s: state.rates_rad_s }
-    }
+    turning_rad_s: Vector3<f32>,
 }
 
 /// Reason for the trip, and the last step.
@@ -87,8 +83,8 @@ impl<const N: usize> Guarded<N> {
     ///
     /// # Errors
     /// The first parameter, setting, gain or bound out of range; also `rotor_force_max_n` if the rotors cannot lift the
-    /// vehicle [with a margin](afbc_control::mixer::HOVER_MARGIN), `theta_max` of z if it is below [`HOVER_THETA`]
-    /// weights, and [`HOVER_AUTHORITY`] if the rotors turn the vehicle too slowly.
+    /// vehicle [with a margin](afbc_control::mixer::HOVER_MARGIN), `theta_max` of z if it leaves no room
+    /// for hover on weak rotors, and [`HOVER_AUTHORITY`] if the rotors turn the vehicle too slowly.
     pub fn new(
         vehicle: impl Into<Airframe<N>>,
         settings: Settings,
@@ -100,8 +96,10 @@ impl<const N: usize> Guarded<N> {
         let weight_n = parameters.weight_n();
         let mixer = settings.common.mixer(vehicle)?;
         mixer.check_hover(weight_n)?;
-        let hover =
-            Range { min: libm::ceil(f64::from(HOVER_THETA * weight_n) * 1e4) / 1e4, ..Safeguards::THETAMAX.range };
+        let hover = Range {
+            min: libm::ceil(f64::from(hover_theta(settings.feed_forward) * weight_n) * 1e4) / 1e4,
+            ..Safeguards::THETAMAX.range
+        };
         hover.check(gains.z.safeguards.theta_max)?;
         let ([roll_n, pitch_n], model) = (mixer.tilt_authority_n(weight_n), Model::new(&parameters));
         HOVER_AUTHORITY.check(roll_n * model.hover_gain(Axis::Roll))?;
@@ -110,7 +108,7 @@ impl<const N: usize> Guarded<N> {
         Ok(Guarded {
             adaptive: Controller::new(vehicle, settings, Adaptive::new(gains)?)?,
             fallback: Controller::new(vehicle, settings, IntegralBackstepping::new(&parameters, fixed)?)?,
-            monitor: Monitor::new(&parameters, bounds, settings.common.dt_s)?,
+            monitor: Monitor::new(bounds, settings.common.dt_s)?,
         })
     }
 
@@ -132,21 +130,39 @@ impl<const N: usize> Guarded<N> {
         });
         *action = self.fallback.cascade(cascade, state, setpoint, fresh);
         action.health.trip = Some(tripped.trip);
-        tripped.last = Last::new(state);
+        tripped.last = self.last(state);
         action
     }
 
-    /// Returns `cascade` with estimates for which AFBC continues with the last inputs.
-    fn resumed<E>(&self, last: &Last, cascade: &Cascade<E>) -> Cascade<Estimate> {
-        let (Last { attitude_rad: eta, rates_rad_s: eta_dot }, Cascade { inputs, errors, .. }) = (last, cascade);
+    /// Returns the record of a step.
+    #[inline]
+    fn last(&self, state: &State) -> Last {
+        Last { attitude_rad: state.attitude_rad, turning_rad_s: self.adaptive.turning(state) }
+    }
+
+    /// Returns `cascade` with estimates for which AFBC continues with the last inputs. With feed-forward, u_a is what
+    /// was learnt by either law, since both give the same known part.
+    fn resumed<E>(
+        &self,
+        last: &Last,
+        cascade: &Cascade<E>,
+        learnt: impl Fn(Axis, [f32; 2], &Errors, &E) -> f32,
+    ) -> Cascade<Estimate> {
+        let (Last { attitude_rad: eta, turning_rad_s: eta_dot }, Cascade { inputs, errors, .. }) = (last, cascade);
+        let law = self.adaptive.law();
         let estimates = PerAxis::from_fn(|axis| {
             let x = match axis {
                 Axis::Roll => [eta.x, eta_dot.x],
                 Axis::Pitch => [eta.y, eta_dot.y],
                 _ => [eta.z, eta_dot.z],
             };
-            let norm_max = self.monitor.theta_start(axis);
-            self.adaptive.law().resumed(axis, inputs[axis], x, &errors[axis], norm_max)
+            let errors = &errors[axis];
+            let fuzzy = if self.adaptive.feeds_forward() {
+                learnt(axis, x, errors, &cascade.estimates[axis])
+            } else {
+                inputs[axis] - law.proportional(axis, errors)
+            };
+            law.resumed(axis, fuzzy, x, errors, self.monitor.theta_start(axis))
         });
         // AFBC does not use it.
         cascade.handed_over(estimates, 0.0)
@@ -176,7 +192,7 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
             && let Some(trip) = self.monitor.watch(figures, afbc, action.health.saturated)
         {
             let rotor_residual_rad_s = self.adaptive.mixer().residual_rad_s(&action.speeds);
-            *tripped = Some(Tripped { trip, rotor_residual_rad_s, last: Last::new(state) });
+            *tripped = Some(Tripped { trip, rotor_residual_rad_s, last: self.last(state) });
         }
         action
     }
@@ -191,8 +207,8 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
     fn engage(&self, memory: &mut Memory<N>) -> bool {
         let Memory { afbc, tripped: Some(Tripped { last, .. }), stand_in, .. } = memory else { return false };
         let afbc = match stand_in {
-            Some(StandIn { cascade, .. }) => self.resumed(last, cascade),
-            None => self.resumed(last, afbc),
+            Some(StandIn { cascade, .. }) => self.resumed(last, cascade, |_, _, _, integral| integral.value),
+            None => self.resumed(last, afbc, |axis, x, errors, own| self.adaptive.law().fuzzy(axis, x, errors, own)),
         };
         *memory = Memory { afbc, ..Memory::default() };
         true

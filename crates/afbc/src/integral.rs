@@ -76,7 +76,7 @@ impl Law for IntegralBackstepping {
     #[inline]
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, integral: &mut Integral) -> (f32, Errors) {
         let Gains { backstepping, integral: kappa, integral_max } = &self.gains[axis];
-        let (fixed, errors) = classical(backstepping, tracking, &self.model.dynamics(axis, context));
+        let (fixed, errors) = classical(backstepping, tracking, &context.dynamics(&self.model, axis));
         if let Some(input) = integral.resume.take() {
             integral.value = input - fixed;
         }
@@ -86,11 +86,11 @@ impl Law for IntegralBackstepping {
         (fixed + i, errors)
     }
 
-    fn alpha1(&self, axis: Axis) -> f32 {
-        self.gains[axis].backstepping.alpha1
+    fn approach(&self, axis: Axis, _: Option<&Model>) -> f32 {
+        self.gains[axis].backstepping.approach(self.model.hover_gain(axis))
     }
 
-    fn hover_thrust_n(&self, z: &Integral, weight_n: f32) -> f32 {
+    fn hover_thrust_n(&self, z: &Integral, weight_n: f32, _: f32) -> f32 {
         // Not weight plus integral, which would include the thrust of manoeuvres.
         z.hover_thrust_n.unwrap_or(weight_n)
     }

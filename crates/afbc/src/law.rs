@@ -1,5 +1,6 @@
 //! Interface of a control law in the [cascade](crate::cascade).
 
+use crate::model::{Dynamics, Model};
 use afbc_control::{Errors, Estimate};
 use afbc_types::{Axis, PerAxis, State};
 
@@ -16,14 +17,14 @@ pub trait Law {
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Self::Estimate)
     -> (f32, Errors);
 
-    /// Returns alpha_1 of the subsystem \[1/s\].
-    fn alpha1(&self, axis: Axis) -> f32;
+    /// Returns the speed of approach per error e_1 \[1/s\] at which the law holds a constant error.
+    fn approach(&self, axis: Axis, known: Option<&Model>) -> f32;
 
     /// Initialises the estimates for a start in flight, for a vehicle of this weight.
     fn start(&self, _estimates: &mut PerAxis<Self::Estimate>, _weight_n: f32) {}
 
     /// Returns the hover thrust U4 \[N\] by the estimate of the z subsystem; the weight for a law without an estimate.
-    fn hover_thrust_n(&self, _z: &Self::Estimate, weight_n: f32) -> f32 {
+    fn hover_thrust_n(&self, _z: &Self::Estimate, weight_n: f32, _known_n: f32) -> f32 {
         weight_n
     }
 
@@ -44,6 +45,16 @@ pub struct Context<'a> {
     pub adapt: bool,
     /// Part of each subsystem's input that could not be allocated in the last step; zero without anti-windup.
     pub unallocated: PerAxis<f32>,
+    /// Nominal model that the law may use; none for the law as printed.
+    pub known: Option<&'a Model>,
+}
+
+impl Context<'_> {
+    /// Returns f, g and dg/dt of a subsystem by `model` in this step.
+    #[inline]
+    pub(crate) fn dynamics(&self, model: &Model, axis: Axis) -> Dynamics {
+        model.dynamics(axis, self.state, self.rotor_residual_rad_s)
+    }
 }
 
 /// State and reference of a subsystem: x_1, x_2 and the reference with two derivatives, in m or rad, and seconds.
@@ -59,16 +70,17 @@ pub struct Tracking {
     pub x1d_dot: f32,
     /// d^2 x_1d/dt^2
     pub x1d_ddot: f32,
-    /// True if e_1 is less than the distance because of the speed limit.
-    pub limited: bool,
+    /// Speed of approach per e_1 \[1/s\] while the speed limit keeps e_1 below the distance.
+    pub approach_1_s: Option<f32>,
 }
 
 impl Tracking {
-    /// Returns (9), (12): e_2 = d x_1d/dt + alpha_1 e_1 - x_2.
+    /// Returns (9), (12): e_2 = d x_1d/dt + alpha_1 e_1 - x_2; at the speed limit with the speed of approach for
+    /// alpha_1, so that e_2 and what is learnt from it are zero at that speed.
     #[inline]
     pub fn errors(&self, alpha1: f32) -> Errors {
-        let Tracking { e1, x1d_dot, x2, .. } = *self;
+        let Tracking { e1, x1d_dot, x2, approach_1_s, .. } = *self;
         let e1_dot = x1d_dot - x2;
-        Errors { e1, e1_dot, e2: e1_dot + alpha1 * e1 }
+        Errors { e1, e1_dot, e2: e1_dot + approach_1_s.unwrap_or(alpha1) * e1 }
     }
 }

@@ -47,6 +47,7 @@ pub mod limits;
 pub mod model;
 pub mod monitor;
 mod profile;
+pub mod reference;
 pub mod safeguards;
 pub mod standstill;
 

@@ -1,8 +1,8 @@
 //! The nominal model (7) that the baseline inverts: f_i, g_i without disturbances (A_F = A_T = 0).
 
-use crate::law::Context;
 use afbc_control::math;
-use afbc_types::{Axis, Parameters};
+use afbc_types::{Axis, Parameters, State};
+use nalgebra::Vector3;
 
 /// d x_2/dt = f + g u of one subsystem, and dg/dt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,8 +15,25 @@ pub struct Dynamics {
     pub g_dot: f32,
 }
 
-/// Smallest cos(phi) cos(theta) for computing g_4: a tilt of 84 degrees. Not in the paper, which assumes A3 instead.
+/// Smallest cos(phi) cos(theta) for computing g_4, and cos(theta) for d eta/dt: a tilt of 84 degrees. Not in the paper,
+/// which assumes A3 instead.
 pub const TILT_COSINE_MIN: f32 = 0.1;
+
+/// Returns d eta/dt for the rates of the body, which (6) takes for equal:
+///
+/// ```text
+/// d psi/dt = (q sin phi + r cos phi) / cos theta
+/// d phi/dt = p + sin theta d psi/dt
+/// d theta/dt = q cos phi - r sin phi
+/// ```
+#[inline(always)]
+pub(crate) fn euler_rates(state: &State) -> Vector3<f32> {
+    let (phi, theta) = (state.attitude_rad.x, state.attitude_rad.y);
+    let [p, q, r] = state.rates_rad_s.into();
+    let (sin_phi, cos_phi) = (math::sin(phi), math::cos(phi));
+    let psi_dot = (q * sin_phi + r * cos_phi) / math::max(math::cos(theta), TILT_COSINE_MIN);
+    Vector3::new(p + math::sin(theta) * psi_dot, q * cos_phi - r * sin_phi, psi_dot)
+}
 
 /// Constants a_1..a_5, b_1..b_3, 1/m and g of (6).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,17 +82,16 @@ impl Model {
     }
 
     /// Returns f_i, g_i and dg_i/dt of `axis`, with d eta/dt in place of Omega as in (6).
-    #[inline]
-    pub fn dynamics(&self, axis: Axis, context: &Context) -> Dynamics {
-        let rates = &context.state.rates_rad_s;
-        let omega = context.rotor_residual_rad_s;
+    #[inline(always)]
+    pub fn dynamics(&self, axis: Axis, state: &State, rotor_residual_rad_s: f32) -> Dynamics {
+        let (rates, omega) = (&state.rates_rad_s, rotor_residual_rad_s);
         let constant = |f, g| Dynamics { f, g, g_dot: 0.0 };
         match axis {
             Axis::Roll => constant(rates.y * rates.z * self.a1 + rates.y * self.a2 * omega, self.b1),
             Axis::Pitch => constant(rates.x * rates.z * self.a3 + rates.x * self.a4 * omega, self.b2),
             Axis::Yaw => constant(rates.x * rates.y * self.a5, self.b3),
             Axis::Z => {
-                let (phi, theta) = (context.state.attitude_rad.x, context.state.attitude_rad.y);
+                let (phi, theta) = (state.attitude_rad.x, state.attitude_rad.y);
                 let (cos_phi, cos_theta) = (math::cos(phi), math::cos(theta));
                 let tilt_cosine_dot = -math::sin(phi) * cos_theta * rates.x - cos_phi * math::sin(theta) * rates.y;
                 Dynamics {

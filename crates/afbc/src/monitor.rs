@@ -3,23 +3,28 @@
 //! | figure | of | trips beyond |
 //! |---|---|---|
 //! | \|Theta_hat\|, delta_hat | each subsystem | [`Bounds::theta`], [`Bounds::delta`] |
-//! | V_e = e_1^2/2 + e_2^2/2g, the computable part of (29), mean over 1 s | each subsystem | [`Bounds::lyapunov`] |
+//! | \|e_1\| from the reference, mean over 1 s | each subsystem | [`Bounds::error`] |
 //! | share of steps with a saturated rotor, over 1 s | all | [`Bounds::saturation_share`] |
 //! | reversals of U1..U4 by more than [`Bounds::swing_n`], per second | each input | [`Bounds::swings_hz`] |
 //!
 //! The last is the limit-cycle detector: it counts turning points of the input that are further apart than a threshold.
 //! So it detects chatter between steps as well as slow oscillations, but neither manoeuvres nor smaller noise.
 //!
-//! Norms and V_e are updated for one subsystem per step, so each is at most six steps old.
+//! Norms and errors are updated for one subsystem per step, so each is at most six steps old.
 
 use crate::adaptive;
-use crate::cascade::Cascade;
-use crate::model::Model;
+use crate::cascade::{Cascade, Settings};
 use afbc_control::{Estimate, Trip, math};
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
 
 /// Time over which figures are averaged \[s\].
 pub const WINDOW_S: f32 = 1.0;
+
+/// Largest |Theta_hat| as a share of what carries the vehicle: of the weight for U1..U4, of g for u5, u6.
+pub const TRIM_SHARE: PerAxis<f32> = PerAxis { roll: 0.75, pitch: 0.75, yaw: 2.2, z: 1.6, x: 2.2, y: 2.2 };
+
+/// Share of its projection's bound that |Theta_hat| must stay below.
+const THETA_SHARE: f32 = 0.95;
 
 parameters! {
     /// Bounds of the monitor. The defaults are those that do not depend on gains and vehicle; [`Bounds::new`] computes
@@ -32,9 +37,9 @@ parameters! {
         /// Bound on delta_hat, in the subsystem's input.
         #[parameter(DELTA, "input", 0.0..=1e9)]
         pub delta: PerAxis<f32> = PerAxis { roll: 1e9, pitch: 1e9, yaw: 1e9, z: 1e9, x: 1e9, y: 1e9 },
-        /// Bound on the mean of V_e, with the hover value of g.
-        #[parameter(LYAPUNOV, "m2 or rad2", 0.0..=1e9)]
-        pub lyapunov: PerAxis<f32> = PerAxis { roll: 0.5, pitch: 0.5, yaw: 10.0, z: 200.0, x: 1000.0, y: 1000.0 },
+        /// Bound on the mean distance from the reference, |e_1|.
+        #[parameter(ERROR, "m or rad", 0.0..=1e9)]
+        pub error: PerAxis<f32> = PerAxis { roll: 0.7, pitch: 0.7, yaw: 1.0, z: 1.0, x: 1.5, y: 1.5 },
         /// Largest share of steps with a rotor at a limit.
         #[parameter(SAT_SHARE, "1", 0.01..=1.0)]
         pub saturation_share: f32 = 0.9,
@@ -48,21 +53,22 @@ parameters! {
 }
 
 impl Bounds {
-    /// Computes bounds for a law with these gains on this vehicle, whose parameters must be valid: estimates that rely
-    /// on their projection, errors far beyond any manoeuvre, and a limit cycle of half the weight. (With a fifth, noise
-    /// of 20 mrad/s alone would give too many reversals of U3.)
-    ///
-    /// V_e weighs e_2 by 1/g, so its bound increases with 1/g relative to the paper's vehicle; it does not decrease,
-    /// because of e_1.
-    pub fn new(gains: &PerAxis<adaptive::Gains>, vehicle: &Parameters) -> Self {
-        let (paper, own) = (Model::new(&Parameters::PAPER.to_f32()), Model::new(vehicle));
-        let sluggish = |axis| math::max(paper.hover_gain(axis) / own.hover_gain(axis), 1.0);
+    /// Computes bounds for a law with these gains and settings on this vehicle, whose parameters must be valid:
+    /// estimates that are about to rely on their projection, and a limit cycle of half the weight. (With a fifth, noise
+    /// of 20 mrad/s alone would give too many reversals of U3.) With feed-forward, estimates are what the model does
+    /// not know, zero in a nominal hover, and bounded to [`TRIM_SHARE`] of what carries the vehicle, too.
+    pub fn new(gains: &PerAxis<adaptive::Gains>, vehicle: &Parameters, settings: &Settings) -> Self {
+        let weight_n = vehicle.weight_n();
+        let theta = |axis: Axis| {
+            let projection = THETA_SHARE * gains[axis].safeguards.theta_max;
+            let carries = if matches!(axis, Axis::X | Axis::Y) { vehicle.gravity_m_s2 } else { weight_n };
+            if settings.feed_forward { math::min(TRIM_SHARE[axis] * carries, projection) } else { projection }
+        };
         Bounds {
-            theta: PerAxis::from_fn(|axis| 0.95 * gains[axis].safeguards.theta_max),
+            theta: PerAxis::from_fn(theta),
             // Projection normally holds delta_hat at its bound; beyond it projection has failed.
             delta: PerAxis::from_fn(|axis| 1.001 * gains[axis].safeguards.delta_max),
-            lyapunov: PerAxis::from_fn(|axis| Self::DEFAULT.lyapunov[axis] * sluggish(axis)),
-            swing_n: 0.5 * vehicle.weight_n(),
+            swing_n: 0.5 * weight_n,
             ..Self::DEFAULT
         }
     }
@@ -114,8 +120,8 @@ impl Swing {
 pub struct Figures {
     /// Norms of the estimates.
     pub norms: PerAxis<Norm>,
-    /// Mean of V_e.
-    pub lyapunov: PerAxis<f32>,
+    /// Mean of |e_1| \[m or rad\].
+    pub error: PerAxis<f32>,
     /// Share of steps with a saturated rotor.
     pub saturation_share: f32,
     /// Detectors of U1, U2, U3, U4.
@@ -128,7 +134,7 @@ impl Default for Figures {
     fn default() -> Self {
         Figures {
             norms: PerAxis::default(),
-            lyapunov: PerAxis::default(),
+            error: PerAxis::default(),
             saturation_share: 0.0,
             swings: [Swing::default(); 4],
             axis: Axis::Y,
@@ -149,8 +155,6 @@ impl Figures {
 pub struct Monitor {
     bounds: Bounds,
     theta_squared: PerAxis<f32>,
-    /// 1/2g
-    half_inverse_gain: PerAxis<f32>,
     /// Share of an average that is replaced per step.
     forget: f32,
 }
@@ -159,15 +163,12 @@ impl Monitor {
     /// Creates a monitor that is called every `dt_s` seconds (valid in [`afbc_control::Settings::DT`]).
     ///
     /// # Errors
-    /// The first bound or parameter out of range.
-    pub fn new(vehicle: &Parameters, bounds: Bounds, dt_s: f32) -> Result<Self, OutOfRange> {
-        vehicle.validate()?;
+    /// The first bound out of range.
+    pub fn new(bounds: Bounds, dt_s: f32) -> Result<Self, OutOfRange> {
         bounds.validate()?;
-        let model = Model::new(vehicle);
         Ok(Monitor {
             bounds,
             theta_squared: PerAxis::from_fn(|axis| bounds.theta[axis] * bounds.theta[axis]),
-            half_inverse_gain: PerAxis::from_fn(|axis| 0.5 / model.hover_gain(axis)),
             forget: 1.0 - math::exp(-dt_s / WINDOW_S),
         })
     }
@@ -187,39 +188,33 @@ impl Monitor {
         let norm = Norm { theta_squared: estimate.theta.norm_squared(), delta: estimate.delta };
         figures.norms[axis] = norm;
 
-        let errors = &cascade.errors[axis];
-        let v = 0.5 * errors.e1 * errors.e1 + self.half_inverse_gain[axis] * errors.e2 * errors.e2;
-        let lyapunov = &mut figures.lyapunov[axis];
+        let error = &mut figures.error[axis];
         // Each subsystem is updated every sixth step.
-        *lyapunov += 6.0 * self.forget * (v - *lyapunov);
+        *error += 6.0 * self.forget * (cascade.distances[axis].abs() - *error);
 
         let saturated = if saturated { 1.0 } else { 0.0 };
         figures.saturation_share += self.forget * (saturated - figures.saturation_share);
 
         let [roll, pitch, yaw, thrust] = &mut figures.swings;
         let Bounds { swing_n, swings_hz, .. } = self.bounds;
-        let cycles = |swing: &mut Swing, input| {
-            swing.advance(input, swing_n, self.forget);
-            swing.rate_hz > swings_hz
-        };
-        let inputs = &cascade.inputs;
-        let cycles = [
-            (cycles(roll, inputs.roll), Axis::Roll),
-            (cycles(pitch, inputs.pitch), Axis::Pitch),
-            (cycles(yaw, inputs.yaw), Axis::Yaw),
-            (cycles(thrust, inputs.z), Axis::Z),
-        ];
+        let asked = &cascade.asked;
+        roll.advance(asked.roll_n, swing_n, self.forget);
+        pitch.advance(asked.pitch_n, swing_n, self.forget);
+        yaw.advance(asked.yaw_n, swing_n, self.forget);
+        thrust.advance(asked.thrust_n, swing_n, self.forget);
 
         if norm.theta_squared > self.theta_squared[axis] {
             Some(Trip::Theta(axis))
         } else if norm.delta > self.bounds.delta[axis] {
             Some(Trip::Delta(axis))
-        } else if *lyapunov > self.bounds.lyapunov[axis] {
-            Some(Trip::Lyapunov(axis))
+        } else if *error > self.bounds.error[axis] {
+            Some(Trip::Error(axis))
         } else if figures.saturation_share > self.bounds.saturation_share {
             Some(Trip::Saturation)
         } else {
-            cycles.iter().find(|(cycles, _)| *cycles).map(|(_, axis)| Trip::LimitCycle(*axis))
+            let axes = [Axis::Roll, Axis::Pitch, Axis::Yaw, Axis::Z];
+            let cycling = figures.swings.iter().zip(axes).find(|(swing, _)| swing.rate_hz > swings_hz);
+            cycling.map(|(_, axis)| Trip::LimitCycle(axis))
         }
     }
 }

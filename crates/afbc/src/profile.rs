@@ -2,8 +2,9 @@
 
 use crate::fuzzy::Membership;
 use crate::model::Model;
+use crate::reference::ReferenceModel;
 use crate::{Limits, Safeguards, Settings, adaptive, backstepping};
-use afbc_control::math;
+use afbc_control::{Smoothing, math};
 use afbc_types::{Axis, Parameters, PerAxis};
 
 /// A named set of gains and settings.
@@ -50,19 +51,12 @@ impl Profile {
     }
 
     /// Returns the cascade's settings for rotors that give `force_max_n` each with a lag of `lag_s`. In the profile
-    /// `flight`, command filter and largest tilt rate slow down as the gains do.
+    /// `flight` they slow down as the gains do: [`Settings::slowed`].
     pub fn settings_for(self, force_max_n: f32, lag_s: f32) -> Settings {
         let settings = self.settings();
         match self {
             Profile::Paper => settings,
-            Profile::Flight => Settings {
-                command_filter_rad_s: settings.command_filter_rad_s / slowness(lag_s),
-                limits: Limits {
-                    tilt_rate_max_rad_s: settings.limits.tilt_rate_max_rad_s / slowness(lag_s),
-                    ..settings.limits
-                },
-                ..settings.with_rotor_force_max_n(force_max_n)
-            },
+            Profile::Flight => settings.slowed(slowness(lag_s)).with_rotor_force_max_n(force_max_n),
         }
     }
 
@@ -78,7 +72,7 @@ impl Profile {
                 Axis::Z | Axis::X | Axis::Y => Membership { centre: 10.0, width: 4.0 },
             };
             let paper = adaptive::Gains {
-                backstepping: backstepping::Gains { alpha1, alpha2 },
+                backstepping: backstepping::Gains { alpha1, alpha2, ..backstepping::Gains::DEFAULT },
                 gamma: if axis == Axis::Z { 2.8 } else { 1.2 },
                 eta: if axis == Axis::Z { 0.9 } else { 0.3 },
                 epsilon: 0.001,
@@ -95,9 +89,9 @@ impl Profile {
     /// Returns epsilon of the profile `flight` by rule, for a subsystem with delta_hat up to `delta_max`.
     ///
     /// Near zero the robust term is a gain of delta_hat/epsilon: the rule keeps it, times g of the paper's vehicle,
-    /// below half of the limit for a response time of 21 ms (`docs/flight.md`).
+    /// below half of the limit for the subsystem's response time (`docs/flight.md`).
     pub fn flight_epsilon(axis: Axis, delta_max: f32) -> f32 {
-        2.0 * Model::new(&Parameters::PAPER.to_f32()).hover_gain(axis) * ANSWER_S * delta_max
+        2.0 * Model::new(&Parameters::PAPER.to_f32()).hover_gain(axis) * answer_s(axis) * delta_max
     }
 
     /// Returns the settings of the cascade.
@@ -105,7 +99,7 @@ impl Profile {
         match self {
             Profile::Paper => Settings::DEFAULT,
             Profile::Flight => Settings {
-                common: afbc_control::Settings { rotor_force_max_n: 3.0, ..afbc_control::Settings::DEFAULT },
+                common: afbc_control::Settings { dt_s: 0.001, rotor_force_max_n: 3.0, raised_thrust_max: 0.8 },
                 limits: Limits {
                     tilt_max_rad: 0.7,
                     tilt_rate_max_rad_s: 6.0,
@@ -113,11 +107,26 @@ impl Profile {
                     speed_max_m_s: 5.0,
                     climb_max_m_s: 3.0,
                 },
-                command_filter_rad_s: 66.7,
+                command_filter_rad_s: 71.38,
                 tilt_by_thrust: true,
                 anti_windup: true,
                 freeze_on_ground: true,
                 bumpless: true,
+                feed_forward: true,
+                reference: ReferenceModel {
+                    reference_xy_rad_s: 3.998,
+                    reference_z_rad_s: 6.555,
+                    reference_yaw_rad_s: 17.24,
+                    reference_acceleration_m_s2: 8.0,
+                    reference_turn_rad_s2: 15.45,
+                    reference_yaw_rate_rad_s: 3.0,
+                },
+                smoothing: Smoothing {
+                    smooth_tilt_rad_s: 148.5,
+                    smooth_yaw_rad_s: 103.4,
+                    smooth_lift_rad_s: 116.9,
+                    lead_s: 0.02174,
+                },
             },
         }
     }
@@ -126,8 +135,15 @@ impl Profile {
 /// Lag of the rotors that the profile `flight` is tuned for \[s\].
 pub const LAG_S: f32 = 0.02;
 
-/// Response time of the vehicle: one step and the rotors' lag \[s\].
-const ANSWER_S: f32 = 0.021;
+/// Response time of a subsystem on the paper's vehicle with states that are 20 ms old: step, rotors' lag and age,
+/// behind the filters of roll and pitch, behind the attitude for x and y \[s\].
+const fn answer_s(axis: Axis) -> f32 {
+    match axis {
+        Axis::Yaw | Axis::Z => 0.041,
+        Axis::Roll | Axis::Pitch => 0.08,
+        Axis::X | Axis::Y => 0.12,
+    }
+}
 
 /// Returns the factor by which a vehicle with a rotor lag of `lag_s` \[s\] is slower than the paper's; at least 1,
 /// since quicker rotors change neither noise nor command filter. Not in the paper.
@@ -137,14 +153,18 @@ pub fn slowness(lag_s: f32) -> f32 {
 
 /// Returns the bounded law's gains, as found by `sitl tune afbc`. `docs/flight.md` explains each.
 fn flight(axis: Axis, paper: adaptive::Gains) -> adaptive::Gains {
-    let (alpha1, alpha2, gamma, eta, theta_max, delta_max) = match axis {
-        Axis::Roll | Axis::Pitch => (5.257, 0.57, 2.787, 0.2387, 3.0, 0.1274),
-        Axis::Yaw => (1.988, 7.693, 39.83, 0.08335, 6.0, 0.2576),
-        Axis::Z => (2.845, 5.273, 127.8, 0.5931, 30.0, 1.684),
-        Axis::X | Axis::Y => (2.227, 9.236, 38.87, 0.128, 15.0, 0.6565),
+    let (alpha1, alpha2, stiffness, gamma, eta, theta_max, delta_max) = match axis {
+        Axis::Roll | Axis::Pitch => (1.354, 0.6903, 86.34, 0.5007, 0.3118, 4.0, 0.0253),
+        Axis::Yaw => (4.118, 7.51, 30.91, 42.36, 0.008247, 12.0, 0.3347),
+        Axis::Z => (1.757, 9.294, 18.25, 186.0, 0.2582, 10.0, 3.19),
+        Axis::X | Axis::Y => (2.243, 7.891, 1.005, 52.67, 0.04455, 25.0, 0.7606),
+    };
+    let membership = match axis {
+        Axis::Roll | Axis::Pitch | Axis::Yaw => Membership { centre: 3.0, width: 1.2 },
+        Axis::Z | Axis::X | Axis::Y => paper.membership,
     };
     let epsilon = Profile::flight_epsilon(axis, delta_max);
     let safeguards = Safeguards { sigma: 0.01, kappa: 0.0, theta_max, delta_max, dead_zone: 0.0 };
-    let backstepping = backstepping::Gains { alpha1, alpha2 };
-    adaptive::Gains { backstepping, gamma, eta, epsilon, safeguards, ..paper }
+    let backstepping = backstepping::Gains { alpha1, alpha2, stiffness };
+    adaptive::Gains { backstepping, gamma, eta, epsilon, membership, safeguards }
 }

@@ -4,9 +4,9 @@
 mod common;
 
 use afbc::integral::IntegralBackstepping;
-use afbc::{Adaptive, Backstepping, Controller, Limits, Profile, Settings};
-use afbc_control::Errors;
-use afbc_control::{FlightController, Screened};
+use afbc::reference::ReferenceModel;
+use afbc::{Adaptive, Backstepping, Controller, Limits, Profile, Settings, backstepping};
+use afbc_control::{Errors, FlightController, Screened, Smoothing};
 use afbc_types::{Axis, Declaration, Declared, Parameters, PerAxis, Setpoint, State};
 use common::{Stepped, U, gains, limits, plausible, setpoint, settings, state, step};
 use nalgebra::Vector3;
@@ -22,8 +22,13 @@ fn adaptive(gains: PerAxis<afbc::adaptive::Gains>, settings: Settings) -> Contro
     Controller::new(Parameters::PAPER.to_f32(), settings, Adaptive::new(gains).unwrap()).unwrap()
 }
 
+/// The profile's settings without what has a memory between setpoint and law, and between law and rotors.
+fn direct() -> Settings {
+    Settings { reference: ReferenceModel::DEFAULT, smoothing: Smoothing::DEFAULT, ..Profile::Flight.settings() }
+}
+
 fn flight(limits: Limits) -> Controller<Adaptive> {
-    adaptive(Profile::Flight.gains(), Settings { limits, ..Profile::Flight.settings() })
+    adaptive(Profile::Flight.gains(), Settings { limits, ..direct() })
 }
 
 /// Tangent of the angle between vertical and thrust in the desired attitude.
@@ -79,7 +84,7 @@ proptest! {
     ) {
         let attitude_rad = Vector3::new(state.attitude_rad.x, state.attitude_rad.y, yaw_rad);
         let state = State { attitude_rad, ..state };
-        let settings = Settings { limits, tilt_by_thrust: by_thrust, ..Profile::Flight.settings() };
+        let settings = Settings { limits, tilt_by_thrust: by_thrust, ..direct() };
         let command = step(&adaptive(Profile::Flight.gains(), settings), &mut Screened::default(), &state, &setpoint);
 
         let [u5, u6] = command.trace.virtual_m_s2.map(f64::from);
@@ -104,33 +109,39 @@ proptest! {
         );
     }
 
-    /// (12) with alpha_1 e_1 of x, y and z within the speed limit, in addition to the reference's speed; e_1 is the
-    /// distance as long as that is within.
+    /// (12) with e_1 of x, y and z such that the speed of approach is within the limit, in addition to the reference's
+    /// speed: alpha_1 e_1, and with feed-forward position over rate gain. Within it e_1 is the distance.
+    // At the limit e_2 has the speed of approach for alpha_1.
     #[test]
     fn errors_ask_for_no_more_than_the_speed_limit(
         gains in gains(),
         limits in limits(),
         state in state(plausible),
         setpoint in setpoint(plausible),
+        feed_forward: bool,
     ) {
-        let settings = Settings { limits, ..Profile::Flight.settings() };
+        let settings = Settings { limits, feed_forward, ..direct() };
         let command = step(&adaptive(gains, settings), &mut Screened::default(), &state, &setpoint);
         let Limits { speed_max_m_s, climb_max_m_s, .. } = limits;
         for (i, axis, max) in [(0, Axis::X, speed_max_m_s), (1, Axis::Y, speed_max_m_s), (2, Axis::Z, climb_max_m_s)] {
-            let (Errors { e1, e1_dot, e2 }, alpha1, max) =
-                (command.trace.errors[axis], f64::from(gains[axis].backstepping.alpha1), f64::from(max));
+            let backstepping::Gains { alpha1, alpha2, stiffness } = gains[axis].backstepping;
+            let [alpha1, alpha2, c, max] = [alpha1, alpha2, stiffness, max].map(f64::from);
+            let Errors { e1, e1_dot, e2 } = command.trace.errors[axis];
+            let gain = alpha2 * if axis == Axis::Z { 1.0 / 0.486 } else { 1.0 };
+            let approach = if feed_forward { (c + alpha1 * gain) / (alpha1 + gain) } else { alpha1 };
             let (distance, x1d_dot, x2) =
                 (setpoint.position_m[i] - state.position_m[i], setpoint.velocity_m_s[i], state.velocity_m_s[i]);
-            let speed = alpha1 * f64::from(distance);
+            let speed = approach * f64::from(distance);
             let asked = speed.clamp(-max, max);
-            let wanted = f64::from(x1d_dot) + asked - f64::from(x2);
-            let size = f64::from(x1d_dot).abs() + asked.abs() + f64::from(x2).abs();
-            prop_assert!((f64::from(e2) - wanted).abs() <= 6.0 * U * size, "{axis:?}: {e2} for {wanted}");
+            let slope = if e1 == distance { alpha1 } else { approach };
+            let wanted = f64::from(x1d_dot) + slope * f64::from(e1) - f64::from(x2);
+            let size = f64::from(x1d_dot).abs() + slope * f64::from(e1).abs() + f64::from(x2).abs();
+            prop_assert!((f64::from(e2) - wanted).abs() <= 10.0 * U * size, "{axis:?}: {e2} for {wanted}");
             prop_assert!(
-                (alpha1 * f64::from(e1) - asked).abs() <= 2.0 * U * asked.abs(),
+                (approach * f64::from(e1) - asked).abs() <= 8.0 * U * asked.abs(),
                 "{axis:?}: {e1} m of {distance} m"
             );
-            prop_assert!(e1 == distance || speed.abs() > max * (1.0 - 2.0 * U), "{axis:?}: {e1} m of {distance} m");
+            prop_assert!(e1 == distance || speed.abs() > max * (1.0 - 8.0 * U), "{axis:?}: {e1} m of {distance} m");
             prop_assert_eq!(e1_dot, x1d_dot - x2);
         }
     }
@@ -175,7 +186,7 @@ fn a_distant_setpoint_is_approached_at_the_speed_limit() {
             }
         }
     }
-    let (vehicle, settings, gains) = (Parameters::PAPER.to_f32(), Profile::Flight.settings(), Profile::Flight.gains());
+    let (vehicle, settings, gains) = (Parameters::PAPER.to_f32(), direct(), Profile::Flight.gains());
     check(&flight(settings.limits));
     let fixed = PerAxis::from_fn(|axis| gains[axis].backstepping);
     check(&Controller::new(vehicle, settings, Backstepping::new(&vehicle, fixed).unwrap()).unwrap());

@@ -1,11 +1,10 @@
 //! Every figure of the monitor compared with its definition, and every trip, which a healthy flight does not cause.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
-use afbc::model::Model;
-use afbc::monitor::{Bounds, Figures, Monitor};
-use afbc::{Cascade, Profile};
-use afbc_control::{Errors, Estimate, Trip};
-use afbc_types::{Axis, Parameters, PerAxis};
+use afbc::monitor::{Bounds, Figures, Monitor, TRIM_SHARE};
+use afbc::{Cascade, Profile, Settings};
+use afbc_control::{Estimate, Trip};
+use afbc_types::{Axis, Inputs, Parameters, PerAxis};
 use nalgebra::Matrix3;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
@@ -14,18 +13,18 @@ const DT_S: f32 = 0.001;
 const WEIGHT_N: f32 = 0.486 * 9.81;
 
 fn bounds() -> Bounds {
-    Bounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32())
+    Bounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32(), &Profile::Flight.settings())
 }
 
 fn monitor(bounds: Bounds) -> Monitor {
-    Monitor::new(&Parameters::PAPER.to_f32(), bounds, DT_S).unwrap()
+    Monitor::new(bounds, DT_S).unwrap()
 }
 
 /// Inputs of the monitor in a step.
 #[derive(Clone, Copy, Default)]
 struct Seen {
     inputs: PerAxis<f32>,
-    errors: PerAxis<Errors>,
+    distances: PerAxis<f32>,
     saturated: bool,
 }
 
@@ -37,7 +36,9 @@ fn hover() -> Seen {
 /// Processes one step with these estimates and inputs.
 fn look(monitor: &Monitor, figures: &mut Figures, estimates: PerAxis<Estimate>, seen: &Seen) -> Option<Trip> {
     let mut cascade = Cascade::default();
-    (cascade.estimates, cascade.errors, cascade.inputs) = (estimates, seen.errors, seen.inputs);
+    let PerAxis { roll, pitch, yaw, z, .. } = seen.inputs;
+    cascade.asked = Inputs { roll_n: roll, pitch_n: pitch, yaw_n: yaw, thrust_n: z };
+    (cascade.estimates, cascade.distances) = (estimates, seen.distances);
     monitor.watch(figures, &cascade, seen.saturated)
 }
 
@@ -91,27 +92,43 @@ fn an_estimate_out_of_bounds_trips_within_six_steps() {
     }
 }
 
-/// The mean of V_e follows its definition, 1 - exp(-t/1 s) for a constant error, and trips by name beyond its bound.
+/// The mean distance follows its definition, 1 - exp(-t/1 s) for a constant error of either sign, and trips by name
+/// beyond its bound.
 #[test]
 fn large_errors_trip_when_they_last() {
     let bounds = bounds();
     let monitor = monitor(bounds);
-    let model = Model::new(&Parameters::PAPER.to_f32());
-    for axis in Axis::ALL {
-        let bound = bounds.lyapunov[axis];
-        let with = |v: f32, steps| {
-            let (e1, e2) = ((1.2 * v).sqrt(), (0.8 * v * model.hover_gain(axis)).sqrt());
+    for (axis, sign) in Axis::ALL.into_iter().flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
+        let bound = bounds.error[axis];
+        let with = |e1: f32, steps| {
             let mut seen = hover();
-            seen.errors[axis] = Errors { e1, e1_dot: 0.0, e2 };
+            seen.distances[axis] = sign * e1;
             watch(&monitor, steps, |_| (PerAxis::default(), seen))
         };
         assert_eq!(with(0.99 * bound, 20_000).1, None, "{axis:?}");
         let (steps, trip) = with(2.0 * bound, 20_000).1.unwrap();
-        assert_eq!(trip, Trip::Lyapunov(axis));
+        assert_eq!(trip, Trip::Error(axis));
         // 1 - exp(-t) = 1/2 at 0.693 s; a round is six steps.
         assert!((680..=710).contains(&steps), "{axis:?} after {steps}");
-        let figure = with(0.9 * bound, 1500).0.lyapunov[axis];
+        let figure = with(0.9 * bound, 1500).0.error[axis];
         assert!((figure / (0.9 * bound * (1.0 - (-1.5_f32).exp())) - 1.0).abs() < 0.01, "{axis:?}: {figure}");
+    }
+}
+
+/// With feed-forward, bounds are shares of what carries the vehicle, but below the projection's; without, estimates
+/// hold the weight, too, and only the projection bounds them.
+#[test]
+fn bounds_of_estimates_are_shares_of_what_carries_the_vehicle() {
+    let (gains, vehicle) = (Profile::Flight.gains(), Parameters::PAPER.to_f32());
+    for feed_forward in [true, false] {
+        let settings = Settings { feed_forward, ..Profile::Flight.settings() };
+        let bounds = Bounds::new(&gains, &vehicle, &settings);
+        for axis in Axis::ALL {
+            let projection = 0.95 * gains[axis].safeguards.theta_max;
+            let carries = if matches!(axis, Axis::X | Axis::Y) { 9.81 } else { WEIGHT_N };
+            let wanted = if feed_forward { projection.min(TRIM_SHARE[axis] * carries) } else { projection };
+            assert!((bounds.theta[axis] / wanted - 1.0).abs() < 1e-6, "{axis:?}");
+        }
     }
 }
 
@@ -179,10 +196,7 @@ proptest! {
             seen.inputs.pitch += 0.49 * bounds.swing_n * noise();
             seen.inputs.yaw += 0.49 * bounds.swing_n * noise();
             seen.inputs.z += 0.49 * bounds.swing_n * noise();
-            seen.errors = PerAxis::from_fn(|axis| Errors {
-                e1: (2.0 * share * bounds.lyapunov[axis]).sqrt() * noise(),
-                ..Errors::default()
-            });
+            seen.distances = PerAxis::from_fn(|axis| share * bounds.error[axis] * noise());
             seen.saturated = saturated && i.is_multiple_of(2);
             (estimates, seen)
         });
@@ -208,7 +222,7 @@ proptest! {
 #[test]
 fn every_reason_is_its_own_and_fits_a_status_text() {
     let mut trips = vec![Trip::Saturation];
-    trips.extend(Axis::ALL.into_iter().flat_map(|axis| [Trip::Theta(axis), Trip::Delta(axis), Trip::Lyapunov(axis)]));
+    trips.extend(Axis::ALL.into_iter().flat_map(|axis| [Trip::Theta(axis), Trip::Delta(axis), Trip::Error(axis)]));
     trips.extend([Axis::Roll, Axis::Pitch, Axis::Yaw, Axis::Z].map(Trip::LimitCycle));
     let reasons: BTreeSet<_> = trips.iter().map(|trip| trip.reason()).collect();
     assert_eq!(reasons.len(), trips.len());
@@ -221,7 +235,7 @@ fn bounds_out_of_range_are_refused_by_name() {
     let cases: [(afbc_types::Declaration, Set); 6] = [
         (Bounds::THETA, |b, v| b.theta.yaw = v),
         (Bounds::DELTA, |b, v| b.delta.x = v),
-        (Bounds::LYAPUNOV, |b, v| b.lyapunov.roll = v),
+        (Bounds::ERROR, |b, v| b.error.roll = v),
         (Bounds::SAT_SHARE, |b, v| b.saturation_share = v),
         (Bounds::SWING, |b, v| b.swing_n = v),
         (Bounds::SWINGS, |b, v| b.swings_hz = v),
@@ -230,7 +244,7 @@ fn bounds_out_of_range_are_refused_by_name() {
         let with = |value| {
             let mut bounds = bounds();
             set(&mut bounds, value);
-            Monitor::new(&Parameters::PAPER.to_f32(), bounds, DT_S).map(|_| ()).map_err(|error| error.range.name)
+            Monitor::new(bounds, DT_S).map(|_| ()).map_err(|error| error.range.name)
         };
         assert_eq!((with(range.min as f32), with(range.max as f32)), (Ok(()), Ok(())));
         for bad in [-1.0, 1e10, f32::NAN, f32::INFINITY] {

@@ -28,6 +28,7 @@ fn step(gains: Gains, e2: f32, unallocated: f32, dt_s: f32, estimate: &mut Estim
         dt_s,
         adapt: true,
         unallocated: PerAxis { x: unallocated, ..PerAxis::default() },
+        known: None,
     };
     law.input(Axis::X, &tracking(e2), &context, estimate).0
 }
@@ -261,6 +262,7 @@ fn noise_drives_the_printed_delta_hat_and_not_the_hardened() {
                     dt_s: 0.001,
                     adapt: true,
                     unallocated: PerAxis::default(),
+                    known: None,
                 };
                 let (u, _) = law.input(Axis::X, &tracking, &context, &mut estimate);
                 v += (u + 0.3) * 0.001;

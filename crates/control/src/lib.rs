@@ -32,6 +32,6 @@ pub use mixer::Mixer;
 pub use nalgebra;
 pub use screen::{Screen, Screened};
 pub use settings::Settings;
-pub use smoothing::{Smoother, Smoothing};
+pub use smoothing::{Smoothed, Smoother, Smoothing};
 pub use trace::{Errors, Estimate, Trace};
 pub use trip::Trip;

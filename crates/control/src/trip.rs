@@ -13,8 +13,8 @@ pub enum Trip {
     Theta(Axis),
     /// delta_hat passed its bound.
     Delta(Axis),
-    /// Tracking errors stayed large.
-    Lyapunov(Axis),
+    /// The mean distance from the reference passed its bound.
+    Error(Axis),
     /// Rotors stayed at their limits.
     Saturation,
     /// An input oscillates persistently; z stands for the thrust.
@@ -37,12 +37,12 @@ impl Trip {
             Trip::Delta(Axis::Z) => "AFBC off: delta_hat of z out of bounds",
             Trip::Delta(Axis::X) => "AFBC off: delta_hat of x out of bounds",
             Trip::Delta(Axis::Y) => "AFBC off: delta_hat of y out of bounds",
-            Trip::Lyapunov(Axis::Roll) => "AFBC off: errors of roll stay large",
-            Trip::Lyapunov(Axis::Pitch) => "AFBC off: errors of pitch stay large",
-            Trip::Lyapunov(Axis::Yaw) => "AFBC off: errors of yaw stay large",
-            Trip::Lyapunov(Axis::Z) => "AFBC off: errors of z stay large",
-            Trip::Lyapunov(Axis::X) => "AFBC off: errors of x stay large",
-            Trip::Lyapunov(Axis::Y) => "AFBC off: errors of y stay large",
+            Trip::Error(Axis::Roll) => "AFBC off: errors of roll stay large",
+            Trip::Error(Axis::Pitch) => "AFBC off: errors of pitch stay large",
+            Trip::Error(Axis::Yaw) => "AFBC off: errors of yaw stay large",
+            Trip::Error(Axis::Z) => "AFBC off: errors of z stay large",
+            Trip::Error(Axis::X) => "AFBC off: errors of x stay large",
+            Trip::Error(Axis::Y) => "AFBC off: errors of y stay large",
             Trip::Saturation => "AFBC off: rotors stay saturated",
             Trip::LimitCycle(Axis::Roll) => "AFBC off: limit cycle of U1 (roll)",
             Trip::LimitCycle(Axis::Pitch) => "AFBC off: limit cycle of U2 (pitch)",

@@ -45,7 +45,7 @@ proptest! {
         let inputs = Inputs { roll_n, pitch_n, yaw_n, thrust_n };
         round_trip(&mixer.allocate(&inputs));
         for trip in
-            [Trip::Theta(axis), Trip::Delta(axis), Trip::Lyapunov(axis), Trip::Saturation, Trip::LimitCycle(axis)]
+            [Trip::Theta(axis), Trip::Delta(axis), Trip::Error(axis), Trip::Saturation, Trip::LimitCycle(axis)]
         {
             let mut action = mixer.action(&inputs);
             (action.health.saturated, action.health.trip) = (saturated, Some(trip));

@@ -2,20 +2,16 @@
 #![allow(clippy::unwrap_used, missing_docs)] // filters that cannot be built must stop the test
 
 use afbc_control::{Settings, Smoother, Smoothing};
-use afbc_types::{Declared, Inputs};
+use afbc_types::Inputs;
 use proptest::prelude::*;
 
-fn smoothing(bandwidth_rad_s: f32) -> Smoothing {
-    let mut smoothing = Smoothing::DEFAULT;
-    smoothing
-        .visit_mut(&mut |_, value| {
-            if let afbc_types::Value::Single([bandwidth]) = value {
-                *bandwidth = bandwidth_rad_s;
-            }
-            Ok::<(), ()>(())
-        })
-        .unwrap();
-    smoothing
+fn smoothing(bandwidth_rad_s: f32, lead_s: f32) -> Smoothing {
+    Smoothing {
+        smooth_tilt_rad_s: bandwidth_rad_s,
+        smooth_yaw_rad_s: bandwidth_rad_s,
+        smooth_lift_rad_s: bandwidth_rad_s,
+        lead_s,
+    }
 }
 
 fn inputs() -> impl Strategy<Value = Inputs> {
@@ -29,30 +25,63 @@ fn inputs() -> impl Strategy<Value = Inputs> {
 }
 
 proptest! {
-    /// The solution of dU/dt = w (U_law - U) with U_law held over each step, in `f64`.
+    /// The response to a step: with q = exp(-w dt) and k = 1 - q, n steps leave q^n (1 + n k (1 - T w)) of it, and of
+    /// U3, which has no lead, q^n (1 + n k).
     #[test]
-    fn the_filters_are_first_order_lags(
-        w in prop_oneof![1.0_f32..1e4, Just(0.0)],
+    fn the_filters_have_two_poles_and_a_lead(
+        w in prop_oneof![1.0_f32..1e4, Just(0.0)], lead_s in prop_oneof![Just(0.0_f32), 0.0_f32..0.1],
         dt_s in Settings::DT.range.min as f32..=Settings::DT.range.max as f32,
         first in inputs(), held in inputs(), steps in 1..200,
     ) {
-        let smoother = Smoother::new(&smoothing(w), dt_s).unwrap();
+        let smoother = Smoother::new(&smoothing(w, lead_s), dt_s).unwrap();
         let mut last = None;
         prop_assert_eq!(smoother.advance(&mut last, &first), first);
         let mut filtered = first;
         for _ in 0..steps {
             filtered = smoother.advance(&mut last, &held);
         }
-        let left = if w > 0.0 { (-f64::from(w) * f64::from(dt_s) * f64::from(steps)).exp() } else { 0.0 };
-        for (from, to, now) in [
-            (first.roll_n, held.roll_n, filtered.roll_n),
-            (first.pitch_n, held.pitch_n, filtered.pitch_n),
-            (first.yaw_n, held.yaw_n, filtered.yaw_n),
-            (first.thrust_n, held.thrust_n, filtered.thrust_n),
+        let (w, n) = (f64::from(w), f64::from(steps));
+        let q = (-w * f64::from(dt_s)).exp();
+        let left = |lead_s: f32| match w > 0.0 {
+            true => q.powf(n) * (1.0 + n * (1.0 - q) * (1.0 - f64::from(lead_s) * w)),
+            false => 0.0,
+        };
+        for (from, to, now, lead_s) in [
+            (first.roll_n, held.roll_n, filtered.roll_n, lead_s),
+            (first.pitch_n, held.pitch_n, filtered.pitch_n, lead_s),
+            (first.yaw_n, held.yaw_n, filtered.yaw_n, 0.0),
+            (first.thrust_n, held.thrust_n, filtered.thrust_n, lead_s),
         ] {
-            let exact = f64::from(to) + (f64::from(from) - f64::from(to)) * left;
-            prop_assert!((f64::from(now) - exact).abs() < 0.02, "{now} instead of {exact}");
+            let step = f64::from(from) - f64::from(to);
+            let exact = f64::from(to) + step * left(lead_s);
+            let allowed = 1e-3 * (1.0 + f64::from(lead_s) * w) * (1.0 + step.abs());
+            prop_assert!((f64::from(now) - exact).abs() < allowed, "{now} instead of {exact}");
         }
+    }
+
+    /// White noise of the inputs changes them from step to step as the impulse response k^2 (n + 1) q^n does.
+    #[test]
+    fn noise_becomes_as_much_less_as_the_filter_says(w in prop_oneof![Just(300.0_f32), 100.0_f32..500.0], seed: u64) {
+        let smoother = Smoother::new(&smoothing(w, 0.0), 0.001).unwrap();
+        let (mut last, mut before) = (None, [Inputs::default(); 2]);
+        let (mut raw, mut filtered) = (0.0_f64, 0.0_f64);
+        let mut random = seed;
+        for step in 0..40_000 {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let inputs = Inputs { pitch_n: (random >> 40) as f32 / (1 << 24) as f32 - 0.5, ..Inputs::default() };
+            let now = [inputs, smoother.advance(&mut last, &inputs)];
+            // What the first input leaves has gone by then.
+            let counts = if step > 1000 { 1.0 } else { 0.0 };
+            raw += counts * f64::from(now[0].pitch_n - before[0].pitch_n).powi(2);
+            filtered += counts * f64::from(now[1].pitch_n - before[1].pitch_n).powi(2);
+            before = now;
+        }
+        let k = 1.0 - (-f64::from(w) * 1e-3).exp();
+        let response = |n: i32| k * k * f64::from(n + 1) * (1.0 - k).powi(n);
+        let squares: f64 = (0..400).map(|n| (response(n) - if n > 0 { response(n - 1) } else { 0.0 }).powi(2)).sum();
+        let (ratio, wanted) = ((filtered / raw).sqrt(), (0.5 * squares).sqrt());
+        prop_assert!((0.95..1.05).contains(&(ratio / wanted)), "{ratio} instead of {wanted}");
+        prop_assert!((w - 300.0).abs() > 1.0 || (0.055..0.06).contains(&wanted), "{wanted}");
     }
 
     /// An input that is not finite passes, and leaves nothing behind.
@@ -60,7 +89,7 @@ proptest! {
     fn nothing_stays_of_an_input_that_is_not_finite(
         w in 1.0_f32..1e4, before in inputs(), after in inputs(), which in 0..3,
     ) {
-        let smoother = Smoother::new(&smoothing(w), 0.001).unwrap();
+        let smoother = Smoother::new(&smoothing(w, 0.01), 0.001).unwrap();
         let mut last = None;
         let _ = smoother.advance(&mut last, &before);
         let wrong = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY].get(which as usize).copied().unwrap();
@@ -81,6 +110,7 @@ fn no_filter_is_no_filter() {
         (Smoothing { smooth_tilt_rad_s: -1.0, ..Smoothing::DEFAULT }, "smooth_tilt_rad_s"),
         (Smoothing { smooth_yaw_rad_s: f32::NAN, ..Smoothing::DEFAULT }, "smooth_yaw_rad_s"),
         (Smoothing { smooth_lift_rad_s: 2e4, ..Smoothing::DEFAULT }, "smooth_lift_rad_s"),
+        (Smoothing { lead_s: 0.6, ..Smoothing::DEFAULT }, "lead_s"),
     ] {
         assert_eq!(Smoother::new(&smoothing, 0.001).unwrap_err().range.name, name);
     }

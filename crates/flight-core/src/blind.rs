@@ -4,10 +4,11 @@
 //! Roll and pitch are dead-reckoned from the last measurement,
 //!
 //! ```text
-//! d^2 x/dt^2 = (l/I) (U - U_trim)
+//! d^2 x/dt^2 = (l/I) (U_a - U_trim),   lag dU_a/dt = U - U_a
 //! ```
 //!
-//! and held by a critically damped law on the reckoned angle, which stops the rotation measured last:
+//! where U_a is what rotors with a lag have made of the inputs, and held by a critically damped law on the reckoned
+//! angle, which stops the rotation measured last:
 //!
 //! ```text
 //! U = U_trim - (I/l) (w^2 (x - x_held) + 2 w dx/dt)
@@ -26,6 +27,9 @@ use nalgebra::{Vector2, Vector3};
 
 /// w: bandwidth of the hold \[rad/s\].
 pub const HOLD_RAD_S: f32 = 10.0;
+/// Lag of the reckoned rotors \[s\]: that of the paper's vehicle. Without it, laws whose inputs lead the rotors lose a
+/// vehicle whose states come every 10 ms.
+pub const LAG_S: f32 = 0.02;
 /// Time constant of the trim \[s\].
 pub const TRIM_S: f32 = 1.0;
 /// Largest difference between measured and reckoned rate that the trim uses per measurement, to ignore jumps \[rad/s\].
@@ -54,6 +58,8 @@ pub struct Reckoning {
     pub angle_rad: Vector2<f32>,
     /// Their dead-reckoned rates \[rad/s\].
     pub rate_rad_s: Vector2<f32>,
+    /// U_a of roll and pitch \[N\].
+    pub acting_n: Vector2<f32>,
     /// U_trim
     pub trim: Inputs,
 }
@@ -88,12 +94,15 @@ impl Blind {
     pub fn start(&self, state: &State) -> Reckoning {
         let angle_rad = state.attitude_rad.xy();
         let trim = Inputs { thrust_n: self.weight_n, ..Inputs::default() };
-        Reckoning { held_rad: angle_rad, angle_rad, rate_rad_s: state.rates_rad_s.xy(), trim }
+        let rate_rad_s = state.rates_rad_s.xy();
+        Reckoning { held_rad: angle_rad, angle_rad, rate_rad_s, acting_n: Vector2::zeros(), trim }
     }
 
-    /// Advances the dead reckoning by one step with the inputs applied to the rotors.
+    /// Advances the dead reckoning by one step with the inputs asked of the rotors.
     pub fn advance(&self, reckoning: &mut Reckoning, applied: &Inputs) {
-        let excess = Vector2::new(applied.roll_n - reckoning.trim.roll_n, applied.pitch_n - reckoning.trim.pitch_n);
+        let asked_n = Vector2::new(applied.roll_n, applied.pitch_n);
+        reckoning.acting_n += (asked_n - reckoning.acting_n) * (self.dt_s / LAG_S);
+        let excess = reckoning.acting_n - Vector2::new(reckoning.trim.roll_n, reckoning.trim.pitch_n);
         reckoning.rate_rad_s += self.authority.component_mul(&excess) * self.dt_s;
         reckoning.angle_rad += reckoning.rate_rad_s * self.dt_s;
     }

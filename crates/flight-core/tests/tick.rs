@@ -1,6 +1,7 @@
 //! The control tick compared with the law's step, and blind flight with a plant.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
+use afbc::reference::ReferenceModel;
 use afbc::{Adaptive, Controller, Profile, Settings};
 use afbc_control::{FlightController, Trace};
 use afbc_flight_core::descent::SINK_M_S;
@@ -14,14 +15,18 @@ use proptest::prelude::*;
 
 type Adapted = afbc::Cascade<afbc_control::Estimate>;
 
+/// Without a reference model, errors are distances from the setpoint.
+fn settings() -> Settings {
+    Settings { reference: ReferenceModel::DEFAULT, ..Profile::Flight.settings() }
+}
+
 fn controller(settings: Settings) -> Controller<Adaptive> {
     let law = Adaptive::new(Profile::Flight.gains()).expect("valid");
     Controller::new(Parameters::PAPER.to_f32(), settings, law).expect("valid")
 }
 
 fn vehicle() -> Vehicle<Controller<Adaptive>> {
-    let settings = Profile::Flight.settings();
-    Vehicle::new(Parameters::PAPER.to_f32(), ArmingLimits::default(), controller(settings)).expect("valid")
+    Vehicle::new(Parameters::PAPER.to_f32(), ArmingLimits::default(), controller(settings())).expect("valid")
 }
 
 /// A vehicle, its memory and the time.
@@ -114,7 +119,7 @@ fn disarmed_motors_are_off_and_arming_waits_for_the_rate() {
 #[test]
 fn flying_is_the_laws_step() {
     let mut bench = Bench::flying(State::default(), near());
-    let controller = controller(Profile::Flight.settings());
+    let controller = controller(settings());
     let mut memory = afbc_control::Screened::default();
     let _ = controller.step(&mut memory, Some(&State::default()), &near());
     for tick in 0..500 {

@@ -58,7 +58,7 @@ impl<const N: usize> Flight<N> {
     /// hover.
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
         let Configuration { airframe, settings, gains, curve } = configuration;
-        let bounds = Bounds::new(gains, &airframe.parameters);
+        let bounds = Bounds::new(gains, &airframe.parameters, settings);
         let controller = Guarded::new(*airframe, *settings, *gains, bounds)?;
         Ok(Flight {
             vehicle: Vehicle::new(airframe.parameters, ArmingLimits::default(), controller)?,

@@ -3,7 +3,7 @@
 use crate::attitude::roll_pitch;
 use afbc_control::command_filter::Filtered;
 use afbc_control::mixer::{Allocation, Mixer};
-use afbc_control::{Action, Errors, Settings, Trace};
+use afbc_control::{Action, Errors, Settings, Smoothed, Smoother, Smoothing, Trace};
 use afbc_types::{Airframe, Declared, Inputs, OutOfRange, PerAxis, RotorSpeeds};
 use nalgebra::{Matrix3, Vector3};
 
@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Body<const N: usize> {
     pub(crate) mixer: Mixer<N>,
+    smoother: Smoother,
     pub(crate) mass_kg: f32,
     pub(crate) inertia_kg_m2: Vector3<f32>,
     /// l/Ix, l/Iy, (d/b)/Iz: angular acceleration per newton of U1..U3 \[rad/s2 per N\].
@@ -35,13 +36,14 @@ pub(crate) struct Demand {
 }
 
 impl<const N: usize> Body<N> {
-    /// Makes the vehicle with these parameters.
-    pub(crate) fn new(vehicle: &Airframe<N>, settings: &Settings) -> Result<Self, OutOfRange> {
+    /// Makes the vehicle with these parameters and filters on its inputs.
+    pub(crate) fn new(vehicle: &Airframe<N>, settings: &Settings, smoothing: &Smoothing) -> Result<Self, OutOfRange> {
         settings.validate()?;
         let mixer = settings.mixer(*vehicle)?;
+        let smoother = Smoother::new(smoothing, settings.dt_s)?;
         let vehicle = &vehicle.parameters;
         let (inertia_kg_m2, effectiveness) = (vehicle.inertia_kg_m2, vehicle.effectiveness());
-        Ok(Body { mixer, mass_kg: vehicle.mass_kg, inertia_kg_m2, effectiveness })
+        Ok(Body { mixer, smoother, mass_kg: vehicle.mass_kg, inertia_kg_m2, effectiveness })
     }
 
     /// Returns d Omega/dt due to the rotors under `inputs` \[rad/s2\].
@@ -62,11 +64,12 @@ impl<const N: usize> Body<N> {
         self.mixer.speeds(&self.mixer.allocate(&inputs).forces)
     }
 
-    /// Returns the action for `demand`, its trace, and the unallocated part of U1..U3 \[N\].
+    /// Returns the action for `demand`, filtered, its trace, and the unallocated part of U1..U3 \[N\].
     #[inline]
-    pub(crate) fn act(&self, demand: &Demand) -> (Action<N>, Trace, Vector3<f32>) {
+    pub(crate) fn act(&self, demand: &Demand, smoothed: &mut Option<Smoothed>) -> (Action<N>, Trace, Vector3<f32>) {
         let wanted = demand.angular_acceleration_rad_s2.component_div(&self.effectiveness);
         let inputs = Inputs { roll_n: wanted.x, pitch_n: wanted.y, yaw_n: wanted.z, thrust_n: demand.thrust_n };
+        let inputs = self.smoother.advance(smoothed, &inputs);
         let allocation = self.mixer.allocate(&inputs);
         let Allocation { unallocated, .. } = allocation;
 

@@ -33,7 +33,7 @@ use crate::increment::{Increment, Reaction};
 use crate::limits::Limits;
 use crate::loops::{TrackingLoop, xy_and_z};
 use crate::rotor_model::{RotorModel, Spin};
-use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
+use afbc_control::{Action, FlightController, Mixer, Settings, Smoothed, Smoothing, Trace};
 use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
@@ -46,37 +46,37 @@ parameters! {
     pub struct Gains {
         /// k_x along x and y.
         #[parameter(POS_P, "1/s2", 0.5..=100.0, tuned)]
-        pub position_p_1_s2: f32 = 16.8,
+        pub position_p_1_s2: f32 = 29.63,
         /// k_v along x and y.
         #[parameter(POS_D, "1/s", 0.5..=20.0, tuned)]
-        pub position_d_1_s: f32 = 6.346,
+        pub position_d_1_s: f32 = 11.49,
         /// k_i along x and y.
         #[parameter(POS_I, "1/s3", 0.0..=200.0, tuned)]
-        pub position_i_1_s3: f32 = 14.0,
+        pub position_i_1_s3: f32 = 97.35,
         /// k_x along z.
         #[parameter(HEIGHT_P, "1/s2", 0.5..=200.0, tuned)]
-        pub height_p_1_s2: f32 = 36.19,
+        pub height_p_1_s2: f32 = 80.15,
         /// k_v along z.
         #[parameter(HEIGHT_D, "1/s", 0.5..=60.0, tuned)]
-        pub height_d_1_s: f32 = 17.25,
+        pub height_d_1_s: f32 = 35.46,
         /// k_i along z.
         #[parameter(HEIGHT_I, "1/s3", 0.0..=300.0, tuned)]
-        pub height_i_1_s3: f32 = 30.55,
+        pub height_i_1_s3: f32 = 80.74,
         /// k_R of roll and pitch.
         #[parameter(TILT_P, "1/s2", 10.0..=1000.0, tuned)]
-        pub tilt_p_1_s2: f32 = 271.5,
+        pub tilt_p_1_s2: f32 = 308.4,
         /// k_Omega of roll and pitch.
         #[parameter(TILT_D, "1/s", 2.0..=100.0, tuned)]
-        pub tilt_d_1_s: f32 = 24.99,
+        pub tilt_d_1_s: f32 = 30.35,
         /// k_R of yaw.
         #[parameter(YAW_P, "1/s2", 0.5..=200.0, tuned)]
-        pub yaw_p_1_s2: f32 = 23.9,
+        pub yaw_p_1_s2: f32 = 80.07,
         /// k_Omega of yaw.
         #[parameter(YAW_D, "1/s", 0.5..=40.0, tuned)]
-        pub yaw_d_1_s: f32 = 8.12,
+        pub yaw_d_1_s: f32 = 15.04,
         /// w: bandwidth of the filter on rates and U1..U3.
         #[parameter(ATT_FILTER, "rad/s", 10.0..=500.0, tuned)]
-        pub attitude_filter_rad_s: f32 = 190.7,
+        pub attitude_filter_rad_s: f32 = 78.07,
         /// tau: time constant of the rotor model.
         #[parameter(ROT_LAG, "s", 0.0..=0.5)]
         pub rotor_time_constant_s: f32 = 0.02,
@@ -86,6 +86,14 @@ parameters! {
         /// Largest tilt.
         #[parameter(TILT_MAX, "rad", 0.05..=1.2)]
         pub tilt_max_rad: f32 = 0.7,
+        /// Filters on U1..U4.
+        #[group("")]
+        pub smoothing: Smoothing = Smoothing {
+            smooth_tilt_rad_s: 165.9,
+            smooth_yaw_rad_s: 77.37,
+            smooth_lift_rad_s: 118.2,
+            lead_s: 0.02233,
+        },
     }
 }
 
@@ -109,6 +117,7 @@ impl Gains {
         rotor_time_constant_s: 0.02,
         position_integral_max_m_s2: 10.0,
         tilt_max_rad: 0.7,
+        smoothing: Smoothing::DEFAULT,
     };
 
     /// The law of the source, without integrals. Hand-tuned for the same vehicle.
@@ -134,6 +143,7 @@ pub struct Memory<const N: usize = 4> {
     pub position_integral: Vector3<f32>,
     rotors: Spin<N>,
     reaction: Reaction,
+    smoothed: Option<Smoothed>,
     /// Trace of the last step.
     trace: Trace,
 }
@@ -145,7 +155,7 @@ impl<const N: usize> Dfbc<N> {
     /// The first parameter, setting or gain out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
-        let body = Body::new(&vehicle, &settings)?;
+        let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
         let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
         gains.validate()?;
         Ok(Dfbc {
@@ -217,7 +227,7 @@ impl<const N: usize> FlightController<N> for Dfbc<N> {
             desired_rates_rad_s: reference.rates_rad_s,
             errors: [position.position_error_m, position.velocity_error_m_s, attitude_error, rate_error],
         };
-        let (action, trace, _) = self.body.act(&demand);
+        let (action, trace, _) = self.body.act(&demand, &mut memory.smoothed);
         memory.trace = trace;
         self.rotors.advance(&mut memory.rotors, &action.speeds);
         if fresh {

@@ -37,7 +37,7 @@ use crate::flatness::{Desired, Frame};
 use crate::integral::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
 use crate::limits::Limits;
 use crate::loops::{TrackingLoop, TrackingOutput, xy_and_z};
-use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
+use afbc_control::{Action, FlightController, Mixer, Settings, Smoothed, Smoothing, Trace};
 use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
@@ -50,49 +50,57 @@ parameters! {
     pub struct Gains {
         /// k_x along x and y.
         #[parameter(POS_P, "1/s2", 0.5..=100.0, tuned)]
-        pub position_p_1_s2: f32 = 20.64,
+        pub position_p_1_s2: f32 = 40.04,
         /// k_v along x and y.
         #[parameter(POS_D, "1/s", 0.5..=20.0, tuned)]
-        pub position_d_1_s: f32 = 10.56,
+        pub position_d_1_s: f32 = 13.28,
         /// k_i along x and y.
         #[parameter(POS_I, "1/s3", 0.0..=200.0, tuned)]
-        pub position_i_1_s3: f32 = 14.41,
+        pub position_i_1_s3: f32 = 121.5,
         /// k_x along z.
         #[parameter(HEIGHT_P, "1/s2", 0.5..=200.0, tuned)]
-        pub height_p_1_s2: f32 = 43.87,
+        pub height_p_1_s2: f32 = 77.3,
         /// k_v along z.
         #[parameter(HEIGHT_D, "1/s", 0.5..=60.0, tuned)]
-        pub height_d_1_s: f32 = 19.27,
+        pub height_d_1_s: f32 = 35.27,
         /// k_i along z.
         #[parameter(HEIGHT_I, "1/s3", 0.0..=300.0, tuned)]
-        pub height_i_1_s3: f32 = 65.01,
+        pub height_i_1_s3: f32 = 103.0,
         /// k_R of roll and pitch.
         #[parameter(TILT_P, "1/s2", 10.0..=1000.0, tuned)]
-        pub tilt_p_1_s2: f32 = 175.4,
+        pub tilt_p_1_s2: f32 = 186.0,
         /// k_Omega of roll and pitch.
         #[parameter(TILT_D, "1/s", 2.0..=100.0, tuned)]
-        pub tilt_d_1_s: f32 = 37.89,
+        pub tilt_d_1_s: f32 = 35.59,
         /// k_I of roll and pitch.
         #[parameter(TILT_I, "1/s2", 0.0..=500.0, tuned)]
-        pub tilt_i_1_s2: f32 = 96.35,
+        pub tilt_i_1_s2: f32 = 36.35,
         /// k_R of yaw.
         #[parameter(YAW_P, "1/s2", 0.5..=200.0, tuned)]
-        pub yaw_p_1_s2: f32 = 19.11,
+        pub yaw_p_1_s2: f32 = 78.08,
         /// k_Omega of yaw.
         #[parameter(YAW_D, "1/s", 0.5..=40.0, tuned)]
-        pub yaw_d_1_s: f32 = 6.932,
+        pub yaw_d_1_s: f32 = 17.88,
         /// k_I of yaw.
         #[parameter(YAW_I, "1/s2", 0.0..=100.0, tuned)]
-        pub yaw_i_1_s2: f32 = 80.71,
+        pub yaw_i_1_s2: f32 = 24.38,
         /// w: bandwidth of the filter on the specific force.
         #[parameter(FILTER, "rad/s", 10.0..=500.0, tuned)]
-        pub filter_rad_s: f32 = 15.86,
+        pub filter_rad_s: f32 = 26.57,
         /// Largest position integral, per coordinate.
         #[parameter(POS_INT_MAX, "m/s2", 0.0..=50.0)]
         pub position_integral_max_m_s2: f32 = 10.0,
         /// Largest tilt.
         #[parameter(TILT_MAX, "rad", 0.05..=1.2)]
         pub tilt_max_rad: f32 = 0.7,
+        /// Filters on U1..U4.
+        #[group("")]
+        pub smoothing: Smoothing = Smoothing {
+            smooth_tilt_rad_s: 95.14,
+            smooth_yaw_rad_s: 130.3,
+            smooth_lift_rad_s: 78.81,
+            lead_s: 0.02341,
+        },
     }
 }
 
@@ -114,6 +122,7 @@ impl Gains {
         filter_rad_s: 60.0,
         position_integral_max_m_s2: 10.0,
         tilt_max_rad: 0.7,
+        smoothing: Smoothing::DEFAULT,
     };
 
     /// With the integrals of 2013, as tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms
@@ -150,6 +159,7 @@ pub struct Memory {
     /// Unallocated part of U1..U3 in the last step \[N\].
     unallocated: Vector3<f32>,
     specific_force: Smooth,
+    pub(crate) smoothed: Option<Smoothed>,
     /// Trace of the last step.
     pub(crate) trace: Trace,
 }
@@ -181,7 +191,7 @@ impl<const N: usize> Geometric<N> {
     /// The first parameter, setting or gain out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
-        let body = Body::new(&vehicle, &settings)?;
+        let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
         let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
         gains.validate()?;
         let (k_r, k_omega) =
@@ -277,7 +287,7 @@ impl<const N: usize> FlightController<N> for Geometric<N> {
     #[inline]
     fn decide(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
         let (demand, lesson) = self.demand(memory, state, setpoint);
-        let (action, trace, unallocated) = self.body.act(&demand);
+        let (action, trace, unallocated) = self.body.act(&demand, &mut memory.smoothed);
         memory.trace = trace;
         self.learn(memory, &lesson, fresh, unallocated);
         action

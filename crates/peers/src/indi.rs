@@ -47,7 +47,7 @@ use crate::increment::{Increment, Reaction};
 use crate::limits::Limits;
 use crate::loops::{AttitudeLoop, AttitudeOutput, PositionLoop, PositionOutput, xy_and_z};
 use crate::rotor_model::{RotorModel, Spin};
-use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
+use afbc_control::{Action, FlightController, Mixer, Settings, Smoothed, Smoothing, Trace};
 use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
@@ -58,34 +58,34 @@ parameters! {
     pub struct Gains {
         /// k_p along x and y.
         #[parameter(POS_P, "1/s", 0.2..=10.0, tuned)]
-        pub position_p_1_s: f32 = 3.227,
+        pub position_p_1_s: f32 = 2.98,
         /// k_v along x and y.
         #[parameter(VEL_P, "1/s", 0.5..=20.0, tuned)]
-        pub velocity_p_1_s: f32 = 5.183,
+        pub velocity_p_1_s: f32 = 6.464,
         /// k_p along z.
         #[parameter(HEIGHT_P, "1/s", 0.2..=20.0, tuned)]
-        pub height_p_1_s: f32 = 2.841,
+        pub height_p_1_s: f32 = 2.595,
         /// k_v along z.
         #[parameter(CLIMB_P, "1/s", 0.5..=40.0, tuned)]
-        pub climb_p_1_s: f32 = 7.548,
+        pub climb_p_1_s: f32 = 12.75,
         /// k_a of roll and pitch.
         #[parameter(TILT_P, "1/s", 1.0..=30.0, tuned)]
-        pub tilt_p_1_s: f32 = 15.04,
+        pub tilt_p_1_s: f32 = 13.02,
         /// k_w of roll and pitch.
         #[parameter(TILTRATE_P, "1/s", 2.0..=100.0, tuned)]
-        pub tilt_rate_p_1_s: f32 = 14.82,
+        pub tilt_rate_p_1_s: f32 = 16.83,
         /// k_a of yaw for small errors; not reduced by `yaw_weight`.
         #[parameter(YAW_P, "1/s", 0.2..=15.0, tuned)]
-        pub yaw_p_1_s: f32 = 3.147,
+        pub yaw_p_1_s: f32 = 9.716,
         /// k_w of yaw.
         #[parameter(YAWRATE_P, "1/s", 0.5..=40.0, tuned)]
-        pub yaw_rate_p_1_s: f32 = 4.979,
+        pub yaw_rate_p_1_s: f32 = 13.95,
         /// w: bandwidth of the filter on velocity and thrust.
         #[parameter(POS_FILTER, "rad/s", 5.0..=300.0, tuned)]
-        pub position_filter_rad_s: f32 = 71.32,
+        pub position_filter_rad_s: f32 = 146.5,
         /// w: bandwidth of the filter on rates and U1..U3.
         #[parameter(ATT_FILTER, "rad/s", 10.0..=500.0, tuned)]
-        pub attitude_filter_rad_s: f32 = 113.5,
+        pub attitude_filter_rad_s: f32 = 110.0,
         /// tau: time constant of the rotor model.
         #[parameter(ROT_LAG, "s", 0.0..=0.5)]
         pub rotor_time_constant_s: f32 = 0.02,
@@ -98,6 +98,14 @@ parameters! {
         /// Largest tilt.
         #[parameter(TILT_MAX, "rad", 0.05..=1.2)]
         pub tilt_max_rad: f32 = 0.7,
+        /// Filters on U1..U4.
+        #[group("")]
+        pub smoothing: Smoothing = Smoothing {
+            smooth_tilt_rad_s: 192.4,
+            smooth_yaw_rad_s: 126.8,
+            smooth_lift_rad_s: 123.8,
+            lead_s: 0.01395,
+        },
     }
 }
 
@@ -121,6 +129,7 @@ impl Gains {
         yaw_weight: 0.4,
         speed_max_m_s: 3.0,
         tilt_max_rad: 0.7,
+        smoothing: Smoothing::DEFAULT,
     };
 }
 
@@ -145,6 +154,7 @@ pub struct Memory<const N: usize = 4> {
     velocity: Smooth,
     specific_force: Smooth,
     reaction: Reaction,
+    smoothed: Option<Smoothed>,
     /// Trace of the last step.
     trace: Trace,
 }
@@ -156,7 +166,7 @@ impl<const N: usize> Indi<N> {
     /// The first parameter, setting or gain out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
-        let body = Body::new(&vehicle, &settings)?;
+        let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
         let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
         gains.validate()?;
         Ok(Indi {
@@ -232,7 +242,7 @@ impl<const N: usize> FlightController<N> for Indi<N> {
             desired_rates_rad_s: rates_rad_s,
             errors: [position_error_m, velocity_error_m_s, attitude_error_rad, rate_error_rad_s],
         };
-        let (action, trace, _) = self.body.act(&demand);
+        let (action, trace, _) = self.body.act(&demand, &mut memory.smoothed);
         memory.trace = trace;
         self.rotors.advance(&mut memory.rotors, &action.speeds);
         action

@@ -33,7 +33,7 @@ use crate::attitude::{r_earth_body, unit};
 use crate::differentiator::{Differentiator, Smooth};
 use crate::geometric::{self, Geometric};
 use crate::rotor_model::{RotorModel, Spin};
-use afbc_control::{Action, FlightController, Mixer, Settings, Trace, math};
+use afbc_control::{Action, FlightController, Mixer, Settings, Smoothing, Trace, math};
 use afbc_types::{Airframe, Declared, Inputs, OutOfRange, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
@@ -55,10 +55,10 @@ parameters! {
         pub predictor_1_s: f32 = 5.0,
         /// w_1: bandwidth of the filter on the thrust's compensation.
         #[parameter(THRUST_BW, "rad/s", 1.0..=200.0, tuned)]
-        pub thrust_bandwidth_rad_s: f32 = 21.88,
+        pub thrust_bandwidth_rad_s: f32 = 29.42,
         /// w_2: bandwidth of the filter on the moments' compensation.
         #[parameter(MOMENT_BW, "rad/s", 1.0..=200.0, tuned)]
-        pub moment_bandwidth_rad_s: f32 = 6.91,
+        pub moment_bandwidth_rad_s: f32 = 8.337,
         /// tau: time constant of the rotor model.
         #[parameter(ROT_LAG, "s", 0.0..=0.5)]
         pub rotor_time_constant_s: f32 = 0.02,
@@ -79,17 +79,23 @@ impl Gains {
 
     /// The geometric controller as tuned under the adaptation, without integrals of the attitude.
     const TUNED_BASE: geometric::Gains = geometric::Gains {
-        position_p_1_s2: 16.44,
-        position_d_1_s: 9.246,
-        position_i_1_s3: 9.914,
-        height_p_1_s2: 24.08,
-        height_d_1_s: 8.826,
-        height_i_1_s3: 3.046,
-        tilt_p_1_s2: 168.4,
-        tilt_d_1_s: 64.45,
-        yaw_p_1_s2: 32.96,
-        yaw_d_1_s: 8.616,
-        filter_rad_s: 17.25,
+        position_p_1_s2: 32.67,
+        position_d_1_s: 15.58,
+        position_i_1_s3: 200.0,
+        height_p_1_s2: 44.29,
+        height_d_1_s: 17.82,
+        height_i_1_s3: 30.0,
+        tilt_p_1_s2: 167.8,
+        tilt_d_1_s: 83.34,
+        yaw_p_1_s2: 60.82,
+        yaw_d_1_s: 14.78,
+        filter_rad_s: 28.1,
+        smoothing: Smoothing {
+            smooth_tilt_rad_s: 126.8,
+            smooth_yaw_rad_s: 90.25,
+            smooth_lift_rad_s: 115.5,
+            lead_s: 0.01285,
+        },
         ..Self::BASE
     };
 
@@ -231,7 +237,7 @@ impl<const N: usize> FlightController<N> for L1<N> {
         let (mut demand, lesson) = self.geometric.demand(&mut memory.geometric, state, setpoint);
         demand.thrust_n = (demand.thrust_n - body.mass_kg * memory.thrust).max(0.0);
         demand.angular_acceleration_rad_s2 -= memory.moment.value();
-        let (action, trace, unallocated) = body.act(&demand);
+        let (action, trace, unallocated) = body.act(&demand, &mut memory.geometric.smoothed);
         self.geometric.learn(&mut memory.geometric, &lesson, fresh, unallocated);
         memory.geometric.trace = trace;
 

@@ -38,7 +38,7 @@ use crate::hover_thrust::{HoverThrust, HoverThrustEstimator};
 use crate::integral::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
 use crate::limits::Limits;
 use crate::loops::{AttitudeLoop, AttitudeOutput, PositionLoop, PositionOutput, xy_and_z};
-use afbc_control::{Action, FlightController, Mixer, Settings, Trace};
+use afbc_control::{Action, FlightController, Mixer, Settings, Smoothed, Smoothing, Trace};
 use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
@@ -49,58 +49,58 @@ parameters! {
     pub struct Gains {
         /// k_p along x and y.
         #[parameter(POS_P, "1/s", 0.2..=10.0, tuned)]
-        pub position_p_1_s: f32 = 1.853,
+        pub position_p_1_s: f32 = 1.705,
         /// k_v along x and y.
         #[parameter(VEL_P, "1/s", 0.5..=20.0, tuned)]
-        pub velocity_p_1_s: f32 = 5.075,
+        pub velocity_p_1_s: f32 = 5.894,
         /// k_i along x and y.
         #[parameter(VEL_I, "1/s2", 0.0..=200.0, tuned)]
-        pub velocity_i_1_s2: f32 = 38.48,
+        pub velocity_i_1_s2: f32 = 53.9,
         /// d_v along x and y.
         #[parameter(VEL_D, "1", 0.0..=2.0, tuned)]
-        pub velocity_d: f32 = 0.04989,
+        pub velocity_d: f32 = 0.1938,
         /// k_p along z.
         #[parameter(HEIGHT_P, "1/s", 0.2..=20.0, tuned)]
-        pub height_p_1_s: f32 = 2.996,
+        pub height_p_1_s: f32 = 2.376,
         /// k_v along z.
         #[parameter(CLIMB_P, "1/s", 0.5..=40.0, tuned)]
-        pub climb_p_1_s: f32 = 13.75,
+        pub climb_p_1_s: f32 = 16.68,
         /// k_i along z.
         #[parameter(CLIMB_I, "1/s2", 0.0..=200.0, tuned)]
-        pub climb_i_1_s2: f32 = 81.78,
+        pub climb_i_1_s2: f32 = 145.5,
         /// d_v along z.
         #[parameter(CLIMB_D, "1", 0.0..=2.0, tuned)]
         pub climb_d: f32 = 0.0,
         /// w: bandwidth of the estimate of the hover thrust; 0 for none.
         #[parameter(HOVER, "1/s", 0.0..=2.0, tuned)]
-        pub hover_thrust_1_s: f32 = 0.09762,
+        pub hover_thrust_1_s: f32 = 0.1173,
         /// k_a of roll and pitch.
         #[parameter(TILT_P, "1/s", 1.0..=30.0, tuned)]
-        pub tilt_p_1_s: f32 = 19.89,
+        pub tilt_p_1_s: f32 = 23.75,
         /// k_a of yaw for small errors; not reduced by `yaw_weight`.
         #[parameter(YAW_P, "1/s", 0.2..=15.0, tuned)]
-        pub yaw_p_1_s: f32 = 2.795,
+        pub yaw_p_1_s: f32 = 5.471,
         /// k_w of roll and pitch.
         #[parameter(TILTRATE_P, "1/s", 2.0..=100.0, tuned)]
-        pub tilt_rate_p_1_s: f32 = 32.8,
+        pub tilt_rate_p_1_s: f32 = 23.94,
         /// k_iw of roll and pitch.
         #[parameter(TILTRATE_I, "1/s2", 0.0..=500.0, tuned)]
-        pub tilt_rate_i_1_s2: f32 = 25.44,
+        pub tilt_rate_i_1_s2: f32 = 20.08,
         /// d_w of roll and pitch.
         #[parameter(TILTRATE_D, "1", 0.0..=3.0, tuned)]
-        pub tilt_rate_d: f32 = 0.08299,
+        pub tilt_rate_d: f32 = 0.1306,
         /// k_w of yaw.
         #[parameter(YAWRATE_P, "1/s", 0.5..=40.0, tuned)]
-        pub yaw_rate_p_1_s: f32 = 6.008,
+        pub yaw_rate_p_1_s: f32 = 17.62,
         /// k_iw of yaw.
         #[parameter(YAWRATE_I, "1/s2", 0.0..=100.0, tuned)]
-        pub yaw_rate_i_1_s2: f32 = 7.619,
+        pub yaw_rate_i_1_s2: f32 = 93.7,
         /// f: feed-forward of the rate setpoint.
         #[parameter(RATE_FF, "1/s", 0.0..=20.0, tuned)]
         pub rate_feed_forward_1_s: f32 = 0.0,
         /// Bandwidth of the filters behind both derivatives.
         #[parameter(FILTER, "rad/s", 10.0..=500.0, tuned)]
-        pub filter_rad_s: f32 = 157.0,
+        pub filter_rad_s: f32 = 111.6,
         /// Share of a large yaw error that is corrected together with the tilt, 0 to 1.
         #[parameter(YAW_WEIGHT, "1", 0.05..=1.0)]
         pub yaw_weight: f32 = 0.4,
@@ -110,6 +110,14 @@ parameters! {
         /// Largest tilt.
         #[parameter(TILT_MAX, "rad", 0.05..=1.2)]
         pub tilt_max_rad: f32 = 0.7,
+        /// Filters on U1..U4.
+        #[group("")]
+        pub smoothing: Smoothing = Smoothing {
+            smooth_tilt_rad_s: 118.1,
+            smooth_yaw_rad_s: 119.6,
+            smooth_lift_rad_s: 90.08,
+            lead_s: 0.04678,
+        },
     }
 }
 
@@ -140,6 +148,7 @@ impl Gains {
         yaw_weight: 0.4,
         speed_max_m_s: 3.0,
         tilt_max_rad: 0.7,
+        smoothing: Smoothing::DEFAULT,
     };
 }
 
@@ -181,6 +190,7 @@ pub struct Memory {
     thrust_share: Smooth,
     velocity: Smooth,
     rates: Smooth,
+    smoothed: Option<Smoothed>,
     /// Trace of the last step.
     trace: Trace,
 }
@@ -192,7 +202,7 @@ impl<const N: usize> Pid<N> {
     /// The first parameter, setting or gain out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
-        let body = Body::new(&vehicle, &settings)?;
+        let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
         let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
         gains.validate()?;
         let velocity_p = xy_and_z(gains.velocity_p_1_s, gains.climb_p_1_s);
@@ -291,7 +301,7 @@ impl<const N: usize> FlightController<N> for Pid<N> {
             desired_rates_rad_s: rates_rad_s,
             errors: [position_error_m, velocity_error_m_s, attitude_error_rad, rate_error_rad_s],
         };
-        let (action, trace, unallocated) = self.body.act(&demand);
+        let (action, trace, unallocated) = self.body.act(&demand, &mut memory.smoothed);
         memory.trace = trace;
         (memory.thrust_n, memory.climb_m_s2) = (Some(action.given.thrust_n), acceleration.z);
 

@@ -606,11 +606,11 @@ fn gains_out_of_range_are_refused_by_name() {
             }
         }
     }
-    refused(pid::Gains::PAPER_VEHICLE, 21, |gains| Pid::new(vehicle(), SETTINGS, gains).map(drop));
-    refused(geometric::Gains::GOODARZI_2013, 15, |gains| Geometric::new(vehicle(), SETTINGS, gains).map(drop));
-    refused(indi::Gains::PAPER_VEHICLE, 14, |gains| Indi::new(vehicle(), SETTINGS, gains).map(drop));
-    refused(l1::Gains::BY_HAND, 19, |gains| L1::new(vehicle(), SETTINGS, gains).map(drop));
-    refused(dfbc::Gains::PAPER_VEHICLE, 14, |gains| Dfbc::new(vehicle(), SETTINGS, gains).map(drop));
+    refused(pid::Gains::PAPER_VEHICLE, 25, |gains| Pid::new(vehicle(), SETTINGS, gains).map(drop));
+    refused(geometric::Gains::GOODARZI_2013, 19, |gains| Geometric::new(vehicle(), SETTINGS, gains).map(drop));
+    refused(indi::Gains::PAPER_VEHICLE, 18, |gains| Indi::new(vehicle(), SETTINGS, gains).map(drop));
+    refused(l1::Gains::BY_HAND, 23, |gains| L1::new(vehicle(), SETTINGS, gains).map(drop));
+    refused(dfbc::Gains::PAPER_VEHICLE, 18, |gains| Dfbc::new(vehicle(), SETTINGS, gains).map(drop));
     let gains = pid::Gains { tilt_max_rad: 1.5, ..pid::Gains::PAPER_VEHICLE };
     assert_eq!(gains.validate().unwrap_err().range.name, "tilt_max_rad");
     let gains = indi::Gains { rotor_time_constant_s: -0.1, ..indi::Gains::PAPER_VEHICLE };

@@ -24,7 +24,7 @@ fn power(key: &str) -> i32 {
         -2
     } else if key.ends_with("_1_s") || key.ends_with("_rad_s") {
         -1
-    } else if key == "rotor_time_constant_s" {
+    } else if ["rotor_time_constant_s", "lead_s"].contains(&key) {
         1
     } else {
         0

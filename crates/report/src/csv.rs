@@ -1,6 +1,5 @@
 //! One CSV file for each run, with every logged step and units in the header.
 
-use afbc::law::Context;
 use afbc::model::Model;
 use afbc_plant::{Sensing, Telemetry};
 use afbc_sim::columns::MOTION;
@@ -44,12 +43,10 @@ struct Column {
 /// nominal vehicle. The terms of the estimate errors are left out, since the optimal values are unknown.
 fn lyapunov(model: &Model, sample: &Sample) -> PerAxis<f32> {
     let state = sample.motion.measure();
-    // g_i depends on neither the rotors nor the step.
-    let context =
-        Context { state: &state, rotor_residual_rad_s: 0.0, dt_s: 0.0, adapt: false, unallocated: PerAxis::default() };
+    // g_i does not depend on the rotors.
     PerAxis::from_fn(|axis| {
         let errors = &sample.trace.errors[axis];
-        0.5 * errors.e1 * errors.e1 + 0.5 * errors.e2 * errors.e2 / model.dynamics(axis, &context).g
+        0.5 * errors.e1 * errors.e1 + 0.5 * errors.e2 * errors.e2 / model.dynamics(axis, &state, 0.0).g
     })
 }
 

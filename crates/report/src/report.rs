@@ -4,7 +4,9 @@ use crate::claims::Claim;
 use crate::figures::Picture;
 use crate::groups::Group;
 use crate::{reality, table, words};
+use afbc::reference::ReferenceModel;
 use afbc::{Limits, Settings};
+use afbc_control::Smoothing;
 use afbc_sim::contender::{Contender, Law};
 use afbc_sim::scenario::Scenario;
 use afbc_sim::trajectory::Trajectory;
@@ -237,6 +239,9 @@ fn gains(contender: &Contender) -> Markup {
         freeze_on_ground,
         bumpless,
         anti_windup,
+        feed_forward,
+        reference,
+        smoothing,
     } = contender.settings;
     let mut settings = format!("steps of {dt_s} s, at most {rotor_force_max_n} N a rotor");
     if raised_thrust_max < afbc_control::Settings::RAISE_MAX.range.max as f32 {
@@ -249,6 +254,7 @@ fn gains(contender: &Contender) -> Markup {
             (freeze_on_ground, "frozen on the ground"),
             (bumpless, "bumpless"),
             (anti_windup, "anti-windup"),
+            (feed_forward, "feed-forward"),
             (contender.monitored, "monitored"),
         ];
         settings.extend(also.into_iter().filter(|(on, _)| *on).map(|(_, word)| format!(", {word}")));
@@ -262,20 +268,36 @@ fn gains(contender: &Contender) -> Markup {
                 limits.climb_max_m_s
             );
         }
+        if reference != ReferenceModel::DEFAULT {
+            settings += &format!(
+                ", reference model: {} rad/s for x and y, {} z, {} yaw, {} m/s²",
+                reference.reference_xy_rad_s,
+                reference.reference_z_rad_s,
+                reference.reference_yaw_rad_s,
+                reference.reference_acceleration_m_s2
+            );
+        }
+        if smoothing != Smoothing::DEFAULT {
+            settings += &format!(
+                ", filters: {} rad/s for U1 and U2, {} U3, {} U4, lead {} s",
+                smoothing.smooth_tilt_rad_s, smoothing.smooth_yaw_rad_s, smoothing.smooth_lift_rad_s, smoothing.lead_s
+            );
+        }
     }
     html! {
         h3 { (capitalised(contender.title())) }
         p.quiet { (contender.kind().title()) ", " (settings) "." }
         @match &contender.law {
             Law::Afbc(gains) => (per_axis(&AFBC_GAINS, gains)),
-            Law::Backstepping(gains) => (per_axis(&["α₁", "α₂"], gains)),
+            Law::Backstepping(gains) => (per_axis(&["α₁", "α₂", "c"], gains)),
             law => (by_name(law)),
         }
     }
 }
 
 /// Column heads of AFBC's gains.
-const AFBC_GAINS: [&str; 12] = ["α₁", "α₂", "γ", "η", "ε", "centre", "width", "σ", "κ", "Θ max", "δ max", "dead zone"];
+const AFBC_GAINS: [&str; 13] =
+    ["α₁", "α₂", "c", "γ", "η", "ε", "centre", "width", "σ", "κ", "Θ max", "δ max", "dead zone"];
 
 fn per_axis<G: Declared>(names: &[&str], gains: &PerAxis<G>) -> Markup {
     html! {

@@ -146,7 +146,7 @@ impl Contender {
             let vehicle = Airframe::<N>::new(parameters, rotors)?;
             match &self.law {
                 Law::Afbc(gains) if self.monitored => {
-                    let bounds = Bounds::new(gains, &vehicle.parameters);
+                    let bounds = Bounds::new(gains, &vehicle.parameters, &self.settings);
                     task.with(Guarded::new(vehicle, self.settings, *gains, bounds)?)
                 }
                 law => law.build(vehicle, self.settings, task),

@@ -12,11 +12,11 @@ pub const POSITION_M: f64 = 0.1;
 /// Combined largest error along x, y and z with a cost of 1 \[m\].
 pub const WORST_M: f64 = 0.3;
 /// Root mean square error of yaw with a cost of 1 \[rad\].
-pub const YAW_RAD: f64 = 0.1;
+pub const YAW_RAD: f64 = 0.05;
 /// Sum over U1..U4 of the mean |change per step| with a cost of 1 \[N\].
-pub const JUMP_N: f64 = 0.2;
+pub const JUMP_N: f64 = 0.5;
 /// Cost of a flight that is lost, or in which the monitor trips, at its end; up to twice as much if earlier.
-pub const LOST: f64 = 100.0;
+pub const LOST: f64 = 1000.0;
 
 /// Returns the cost of one flight.
 pub fn cost(scenario: &Scenario, run: &Run) -> f64 {
@@ -26,7 +26,7 @@ pub fn cost(scenario: &Scenario, run: &Run) -> f64 {
     }
     let Metrics { rmse, max_abs, mean_abs_delta_u: jumps, .. } = &run.metrics;
     let errors = rmse.xyz().norm() / POSITION_M + rmse.w / YAW_RAD;
-    errors + max_abs.xyz().norm() / WORST_M + jumps.sum() / JUMP_N
+    0.03 + errors + max_abs.xyz().norm() / WORST_M + jumps.sum() / JUMP_N
 }
 
 /// Returns the cost of each of `scenarios` under `contender`.
@@ -38,7 +38,8 @@ pub fn costs(scenarios: &[Scenario], contender: &Contender) -> Result<Vec<f64>, 
     scenarios.par_iter().map(fly).collect()
 }
 
-/// Returns the mean over flights, the cost of a contender.
+/// Returns the geometric mean over flights, the cost of a contender: each flight counts by what part of its cost is
+/// saved, however large it is.
 pub fn mean(costs: &[f64]) -> f64 {
-    costs.iter().sum::<f64>() / costs.len() as f64
+    libm::exp(costs.iter().copied().map(libm::log).sum::<f64>() / costs.len() as f64)
 }

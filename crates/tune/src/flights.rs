@@ -25,7 +25,7 @@ const STEP_S: f64 = 4.5;
 pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
     let to = Vector3::new(0.6, -0.4, 1.0);
     let eight = |name, change| TrainingFlight { trajectory: eight(8.0), change, ..TrainingFlight::new(name, 15.0) };
-    let mut late = eight("late", None).scenario()?;
+    let mut late = windy(eight("late", None))?;
     late.realism.rotors.delay_s = 0.004;
     let mut turbulent = TrainingFlight::new("turbulence", 20.0).scenario()?;
     turbulent.realism.drag = Some(Drag::PAPER);
@@ -36,7 +36,7 @@ pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
         turbulent,
         TrainingFlight { change: Some((Quantity::ThrustFactor, 0.6)), ..TrainingFlight::new("weak", 8.0) }
             .scenario()?,
-        eight("heavy", Some((Quantity::Mass, 1.3))).scenario()?,
+        windy(eight("heavy", Some((Quantity::Mass, 1.3))))?,
         late,
         // An outage at the onset of each gust and parameter change, and during a step.
         Scenario {
@@ -51,6 +51,10 @@ pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
         landing("landing", 2.0)?,
         upset("upset", 1.0)?,
         course("course", 1.5)?,
+        Hardware { state_delay_s: 0.02, ..Hardware::default() }.flight("old", eight("", None))?,
+        Hardware { rotor_lag_s: 0.04, ..Hardware::default() }.flight("slow", eight("", None))?,
+        Hardware { rate_noise_rad_s: 0.05, ..Hardware::default() }.flight("noisy", eight("", None))?,
+        Hardware { tracker: true, state_delay_s: 0.02, ..Hardware::default() }.flight("tracker", eight("", None))?,
     ])
 }
 
@@ -60,12 +64,12 @@ pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
 /// None occurs: a test flies them.
 pub fn held_out() -> Result<Vec<Scenario>, Box<dyn Error>> {
     let fast = |name, change| TrainingFlight { trajectory: eight(6.0), change, ..TrainingFlight::new(name, 20.0) };
-    let mut delayed = fast("delayed", None).scenario()?;
+    let mut delayed = windy(fast("delayed", None))?;
     delayed.sensing.delay_s = 0.003;
-    let mut windy = fast("wind", None).scenario()?;
-    windy.realism.drag = Some(Drag::PAPER);
-    windy.realism.wind.steady_m_s = Vector3::new(4.0, 2.0, 0.0);
-    windy.realism.wind.turbulence = Some(Turbulence::LIGHT);
+    let mut wind = fast("wind", None).scenario()?;
+    wind.realism.drag = Some(Drag::PAPER);
+    wind.realism.wind.steady_m_s = Vector3::new(4.0, 2.0, 0.0);
+    wind.realism.wind.turbulence = Some(Turbulence::LIGHT);
     Ok(vec![
         Scenario { seed: 1001, ..hardware()? },
         TrainingFlight {
@@ -73,14 +77,20 @@ pub fn held_out() -> Result<Vec<Scenario>, Box<dyn Error>> {
             ..TrainingFlight::new("step-back", 12.0)
         }
         .scenario()?,
-        windy,
-        fast("light", Some((Quantity::Mass, 0.8))).scenario()?,
-        fast("inert", Some((Quantity::Inertia, 1.75))).scenario()?,
+        wind,
+        windy(fast("light", Some((Quantity::Mass, 0.8))))?,
+        windy(fast("inert", Some((Quantity::Inertia, 1.75))))?,
         delayed,
         blind(fast("outages", Some((Quantity::Mass, 1.15))).scenario()?, &[ONSET_S - 0.05, 8.3, 11.0, 13.7, 16.4]),
         landing("landing-fast", 1.2)?,
         upset("upset-back", -0.8)?,
         course("course-back", -1.2)?,
+        Hardware { state_delay_s: 0.012, ..Hardware::default() }.flight("old", fast("", None))?,
+        Hardware { rotor_lag_s: 0.01, ..Hardware::default() }.flight("quick", fast("", None))?,
+        Hardware { rotor_lag_s: 0.03, rate_noise_rad_s: 0.02, ..Hardware::default() }
+            .flight("noisy", fast("", None))?,
+        Hardware { tracker: true, state_delay_s: 0.01, rate_noise_rad_s: 0.02, ..Hardware::default() }
+            .flight("tracker", fast("", None))?,
     ])
 }
 
@@ -145,6 +155,46 @@ fn landing(name: &'static str, length_s: f64) -> Result<Scenario, Box<dyn Error>
 
 fn hardware() -> Result<Scenario, FileError> {
     built_in("hardware").ok_or_else(|| FileError::whole("hardware", "no such scenario"))?.read()
+}
+
+/// Returns `flight` in moderate turbulence.
+fn windy(flight: TrainingFlight) -> Result<Scenario, Box<dyn Error>> {
+    let mut scenario = flight.scenario()?;
+    scenario.realism.drag = Some(Drag::PAPER);
+    scenario.realism.wind.turbulence = Some(Turbulence::MODERATE);
+    Ok(scenario)
+}
+
+/// What differs from the sensors and rotors of `hardware`.
+struct Hardware {
+    /// Whether states come from a tracker of 100 Hz, and rates from a gyroscope.
+    tracker: bool,
+    /// Age of every state \[s\].
+    state_delay_s: f64,
+    /// Standard deviation of the noise of the rates, rad/s.
+    rate_noise_rad_s: f64,
+    /// Time constant of the rotors \[s\].
+    rotor_lag_s: f64,
+}
+
+impl Default for Hardware {
+    fn default() -> Self {
+        Hardware { tracker: false, state_delay_s: 0.0, rate_noise_rad_s: 0.001, rotor_lag_s: 0.02 }
+    }
+}
+
+impl Hardware {
+    /// Returns `flight` in light turbulence with these sensors and rotors.
+    fn flight(self, name: &'static str, flight: TrainingFlight) -> Result<Scenario, Box<dyn Error>> {
+        let mut scenario = windy(TrainingFlight { name, ..flight })?;
+        scenario.sensing.delay_s = self.state_delay_s;
+        if self.tracker {
+            (scenario.sensing.period_s, scenario.sensing.gyro) = (0.01, true);
+        }
+        scenario.sensing.noise.rates_rad_s = self.rate_noise_rad_s;
+        scenario.realism.rotors.time_constant_s = self.rotor_lag_s;
+        Ok(scenario)
+    }
 }
 
 /// A flight of `hardware` without gusts.

@@ -1,15 +1,22 @@
 //! Starting points of the search: hand-tuned gains, so that the same command finds the same gains again.
 
-use afbc::Profile;
+use afbc::reference::ReferenceModel;
+use afbc::{Profile, Settings};
+use afbc_control::Smoothing;
 use afbc_sim::contender::{Contender, ControllerKind, Law};
 
-/// Command filter of AFBC and backstepping \[rad/s\].
-const FILTER_RAD_S: f32 = 40.0;
-
-/// Returns the law of this kind with hand-tuned gains and the settings of the profile `flight`; AFBC under its monitor,
-/// as on board.
+/// Returns the law of this kind with hand-tuned gains, limits of the profile `flight` and a hand-tuned cascade; AFBC
+/// under its monitor, as on board.
 pub fn by_hand(kind: ControllerKind) -> Contender {
-    let mut contender = Contender { law: Law::by_hand(kind), ..Contender::of(kind, Profile::Flight) };
-    contender.settings.command_filter_rad_s = FILTER_RAD_S;
-    contender.monitored()
+    let contender = Contender { law: Law::by_hand(kind), ..Contender::of(kind, Profile::Flight) };
+    let reference = ReferenceModel {
+        reference_xy_rad_s: 5.0,
+        reference_z_rad_s: 6.5,
+        reference_yaw_rad_s: 17.0,
+        reference_turn_rad_s2: 15.0,
+        ..contender.settings.reference
+    };
+    let settings =
+        Settings { command_filter_rad_s: 75.0, reference, smoothing: Smoothing::BY_HAND, ..contender.settings };
+    Contender { settings, ..contender }.monitored()
 }

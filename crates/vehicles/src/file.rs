@@ -190,8 +190,13 @@ fn gains(root: &mut Table<'_>, gains: &mut PerAxis<Gains>, settings: &mut Settin
         axes.finish()?;
     }
     if let Some(mut cascade) = flight.table(CASCADE)? {
-        let filter_rad_s = cascade.number(&Settings::FILTER.range)?;
-        filter_rad_s.into_iter().for_each(|filter_rad_s| settings.command_filter_rad_s = filter_rad_s as f32);
+        cascade.forbid(afbc_control::Settings::DT.range.name, "the time step is the scenario's; take it out")?;
+        cascade.forbid(
+            afbc_control::Settings::FORCE_MAX.range.name,
+            "the rotors' largest force follows from [rotors]; take it out",
+        )?;
+        cascade.declared(settings)?;
+        cascade.declared_in("limits", settings)?;
         cascade.finish()?;
     }
     all.finish()

@@ -103,7 +103,7 @@ impl Vehicle {
     /// ([`Guarded::new`]).
     pub fn check(&self) -> Result<(), OutOfRange> {
         let (settings, gains) = (self.settings(Profile::Flight), self.flight_gains);
-        let bounds = Bounds::new(&gains, &self.parameters.to_f32());
+        let bounds = Bounds::new(&gains, &self.parameters.to_f32(), &settings);
         with_rotors!(self.rotors.len(), N => {
             let airframe = Airframe::<N>::new(&self.parameters, &self.rotors)?;
             Guarded::new(airframe, settings, gains, bounds).map(drop)

@@ -7,8 +7,9 @@
 
 use afbc::adaptive::Gains;
 use afbc::fuzzy::Membership;
+use afbc::reference::ReferenceModel;
 use afbc::{Limits, Profile, Safeguards, Settings, backstepping};
-use afbc_control::{Action, FlightController, Screened, Trace};
+use afbc_control::{Action, FlightController, Screened, Smoothing, Trace};
 use afbc_types::{Axis, Declaration, Declared, Inputs, Parameters, PerAxis, Setpoint, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -129,9 +130,40 @@ pub(crate) fn settings() -> impl Strategy<Value = Settings> {
     use afbc_control::Settings as Common;
     let common = (within(Common::DT), within(Common::FORCE_MAX), within(Common::RAISE_MAX));
     let numbers = (common, within(Settings::FILTER), limits());
-    let any = (numbers, any::<[bool; 4]>()).prop_map(|(numbers, switches)| {
+    let model = (
+        within(ReferenceModel::REF_XY),
+        within(ReferenceModel::REF_Z),
+        within(ReferenceModel::REF_YAW),
+        within(ReferenceModel::REF_ACC),
+        within(ReferenceModel::REF_TURN),
+        within(ReferenceModel::REF_YAWRATE),
+    )
+        .prop_map(|(reference_xy_rad_s, reference_z_rad_s, reference_yaw_rad_s, acceleration, turn, yaw_rate)| {
+            ReferenceModel {
+                reference_xy_rad_s,
+                reference_z_rad_s,
+                reference_yaw_rad_s,
+                reference_acceleration_m_s2: acceleration,
+                reference_turn_rad_s2: turn,
+                reference_yaw_rate_rad_s: yaw_rate,
+            }
+        });
+    let smoothing = (
+        within(Smoothing::SMOOTH_TILT),
+        within(Smoothing::SMOOTH_YAW),
+        within(Smoothing::SMOOTH_LIFT),
+        within(Smoothing::LEAD),
+    )
+        .prop_map(|(smooth_tilt_rad_s, smooth_yaw_rad_s, smooth_lift_rad_s, lead_s)| Smoothing {
+            smooth_tilt_rad_s,
+            smooth_yaw_rad_s,
+            smooth_lift_rad_s,
+            lead_s,
+        });
+    let added = (prop_oneof![Just(ReferenceModel::DEFAULT), model], prop_oneof![Just(Smoothing::DEFAULT), smoothing]);
+    let any = (numbers, any::<[bool; 5]>(), added).prop_map(|(numbers, switches, (reference, smoothing))| {
         let ((dt_s, rotor_force_max_n, raised_thrust_max), command_filter_rad_s, limits) = numbers;
-        let [tilt_by_thrust, anti_windup, freeze_on_ground, bumpless] = switches;
+        let [tilt_by_thrust, anti_windup, freeze_on_ground, bumpless, feed_forward] = switches;
         Settings {
             common: Common { dt_s, rotor_force_max_n, raised_thrust_max },
             command_filter_rad_s,
@@ -140,6 +172,9 @@ pub(crate) fn settings() -> impl Strategy<Value = Settings> {
             anti_windup,
             freeze_on_ground,
             bumpless,
+            feed_forward,
+            reference,
+            smoothing,
         }
     });
     prop_oneof![Just(Profile::Paper.settings()), Just(Profile::Flight.settings()), any]
@@ -148,10 +183,11 @@ pub(crate) fn settings() -> impl Strategy<Value = Settings> {
 /// Gains for one subsystem.
 pub(crate) fn gains_of_one() -> impl Strategy<Value = Gains> {
     let membership = (1e-3_f32..100.0, 0.1_f32..=6.0);
-    let (alpha1, alpha2) = (within(backstepping::Gains::ALPHA1), within(backstepping::Gains::ALPHA2));
-    (alpha1, alpha2, within(Gains::GAMMA), within(Gains::ETA), within(Gains::EPSILON), membership, safeguards())
-        .prop_map(|(alpha1, alpha2, gamma, eta, epsilon, (width, spread), safeguards)| Gains {
-            backstepping: afbc::backstepping::Gains { alpha1, alpha2 },
+    let backstepping =
+        (within(backstepping::Gains::ALPHA1), within(backstepping::Gains::ALPHA2), within(backstepping::Gains::STIFF));
+    (backstepping, within(Gains::GAMMA), within(Gains::ETA), within(Gains::EPSILON), membership, safeguards())
+        .prop_map(|((alpha1, alpha2, stiffness), gamma, eta, epsilon, (width, spread), safeguards)| Gains {
+            backstepping: afbc::backstepping::Gains { alpha1, alpha2, stiffness },
             gamma,
             eta,
             epsilon,

@@ -113,7 +113,7 @@ fn run() -> Result<bool, Error> {
         line("panics that the control tick can reach", "", tick.panics.len() as u64, Some(0)),
         line("panics that other interrupts needed in flight can reach", "", vital.len() as u64, Some(VITAL_PANICS)),
         line("panics that link and housekeeping can reach, contained", "", dispensable.len() as u64, None),
-        line("flash", "bytes", flight.flash_bytes, Some(96 * 1024)),
+        line("flash", "bytes", flight.flash_bytes, Some(128 * 1024)),
         line("static RAM without the stack", "bytes", flight.ram_bytes, Some(32 * 1024)),
     ];
     let table = table(&budgets);

@@ -197,12 +197,13 @@ mod tests {
     }
 
     #[test]
-    fn contenders_of_one_built_in_campaign_differ() {
+    fn contenders_of_one_built_in_campaign_differ_while_there_are_colors() {
         for built_in in &BUILT_IN {
             let campaign: Campaign = built_in.read().unwrap();
             let names: Vec<_> = campaign.scenario.contenders.iter().map(|contender| contender.name.as_str()).collect();
             let colors: HashSet<_> = names.iter().map(|name| hex(color(name))).collect();
-            assert_eq!(colors.len(), names.len(), "{}: {names:?}", built_in.name);
+            let all = if names.len() <= OTHERS.len() { names.len() } else { OTHERS.len() / 2 };
+            assert!(colors.len() >= all, "{}: {names:?}", built_in.name);
         }
     }
 

@@ -7,7 +7,8 @@ mod tests;
 
 pub(crate) use gains::{law_gains, per_axis, whole};
 
-use afbc::{Adaptive, Backstepping, Controller, Profile, adaptive, backstepping};
+use afbc::{Adaptive, Backstepping, Controller, Profile, Safeguards, adaptive, backstepping};
+use afbc_control::Smoothing;
 use afbc_peers::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
 use afbc_types::{Axis, PerAxis};
 
@@ -44,7 +45,7 @@ declare::laws! {
         in_cascade: false,
         gains: pid::Gains,
         tuned: |_| pid::Gains::TUNED,
-        by_hand: pid::Gains::PAPER_VEHICLE,
+        by_hand: pid::Gains { smoothing: Smoothing::BY_HAND, ..pid::Gains::PAPER_VEHICLE },
         controller: |vehicle, settings, gains| Pid::new(vehicle, settings.common, gains),
     }
     /// Geometric tracking on SE(3) with integral terms.
@@ -55,7 +56,7 @@ declare::laws! {
         in_cascade: false,
         gains: geometric::Gains,
         tuned: |_| geometric::Gains::TUNED,
-        by_hand: geometric::Gains::GOODARZI_2013,
+        by_hand: geometric::Gains { smoothing: Smoothing::BY_HAND, ..geometric::Gains::GOODARZI_2013 },
         controller: |vehicle, settings, gains| Geometric::new(vehicle, settings.common, gains),
     }
     /// Incremental nonlinear dynamic inversion.
@@ -66,7 +67,7 @@ declare::laws! {
         in_cascade: false,
         gains: indi::Gains,
         tuned: |_| indi::Gains::TUNED,
-        by_hand: indi::Gains::PAPER_VEHICLE,
+        by_hand: indi::Gains { smoothing: Smoothing::BY_HAND, ..indi::Gains::PAPER_VEHICLE },
         controller: |vehicle, settings, gains| Indi::new(vehicle, settings.common, gains),
     }
     /// Geometric tracking with L1-adaptive compensation of thrust and moments.
@@ -77,7 +78,10 @@ declare::laws! {
         in_cascade: false,
         gains: l1::Gains,
         tuned: |_| l1::Gains::TUNED,
-        by_hand: l1::Gains::BY_HAND,
+        by_hand: l1::Gains {
+            geometric: geometric::Gains { smoothing: Smoothing::BY_HAND, ..l1::Gains::BY_HAND.geometric },
+            ..l1::Gains::BY_HAND
+        },
         controller: |vehicle, settings, gains| L1::new(vehicle, settings.common, gains),
     }
     /// Differential-flatness-based control with incremental inversion of the moments.
@@ -88,7 +92,7 @@ declare::laws! {
         in_cascade: false,
         gains: dfbc::Gains,
         tuned: |_| dfbc::Gains::TUNED,
-        by_hand: dfbc::Gains::PAPER_VEHICLE,
+        by_hand: dfbc::Gains { smoothing: Smoothing::BY_HAND, ..dfbc::Gains::PAPER_VEHICLE },
         controller: |vehicle, settings, gains| Dfbc::new(vehicle, settings.common, gains),
     }
 }
@@ -101,18 +105,20 @@ impl ControllerKind {
 /// Returns AFBC's hand-tuned gains, for the settings of the profile `flight`.
 fn by_hand() -> PerAxis<adaptive::Gains> {
     PerAxis::from_fn(|axis| {
-        let (alpha1, alpha2, gamma, eta, delta_max) = match axis {
-            Axis::Roll | Axis::Pitch => (10.0, 0.7, 4.0, 0.3, 0.05),
-            Axis::Yaw => (3.0, 12.0, 20.0, 0.3, 0.5),
-            Axis::Z => (4.0, 8.0, 30.0, 0.9, 1.0),
-            Axis::X | Axis::Y => (3.0, 6.0, 40.0, 0.3, 0.5),
+        let (alpha1, alpha2, stiffness, gamma, eta, delta_max) = match axis {
+            Axis::Roll | Axis::Pitch => (1.2, 0.6, 86.0, 0.3, 0.06, 0.028),
+            Axis::Yaw => (4.0, 7.5, 30.0, 42.0, 0.01, 0.33),
+            Axis::Z => (1.7, 9.5, 3.6, 180.0, 2.3, 2.9),
+            Axis::X | Axis::Y => (11.0, 2.0, 2.1, 26.0, 0.035, 0.75),
         };
-        let mut gains = Profile::Flight.gains()[axis];
-        gains.backstepping = backstepping::Gains { alpha1, alpha2 };
-        gains.gamma = gamma;
-        gains.eta = eta;
-        gains.epsilon = Profile::flight_epsilon(axis, delta_max);
-        gains.safeguards.delta_max = delta_max;
-        gains
+        let gains = Profile::Flight.gains()[axis];
+        adaptive::Gains {
+            backstepping: backstepping::Gains { alpha1, alpha2, stiffness },
+            gamma,
+            eta,
+            epsilon: Profile::flight_epsilon(axis, delta_max),
+            safeguards: Safeguards { delta_max, ..gains.safeguards },
+            ..gains
+        }
     })
 }

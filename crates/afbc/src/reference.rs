@@ -1,0 +1,221 @@
+//! Reference model: turns jumps of the setpoint into motion that the vehicle can follow, so that the error of a step is
+//! not learnt as a disturbance. Not in the paper.
+//!
+//! The law tracks x_1d = setpoint + d. The detour d takes up every jump of the setpoint, in position and in velocity,
+//! and decays by
+//!
+//! ```text
+//! d^3 d/dt^3 = 3w (a_c - d^2 d/dt^2)     a_c = sat(w (v_c - dd/dt), a_max)     v_c = -sat(w/3 d, v_max)
+//! ```
+//!
+//! which is (s + w)^3 d = 0 within the limits; further away, v_c leaves half of a_max for braking. A setpoint that
+//! moves as its derivatives say does not jump: it is tracked as it is, and nothing is added to it. Of a jump, the
+//! detour takes only the part that keeps the reference nearer to the vehicle: after an interruption in which the
+//! vehicle went on, the reference goes on, too.
+//!
+//! Reference models of this kind: Ioannou and Sun, *Robust Adaptive Control*, 1996, chapter 5 (model reference
+//! control); Landau 1974 for the error that an adaptive law should see.
+
+use crate::limits::Limits;
+use afbc_control::math;
+use afbc_types::{Setpoint, State, parameters};
+
+parameters! {
+    /// The reference model. The default is none.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct ReferenceModel {
+        /// w of x and y; 0 for none.
+        #[parameter(REF_XY, "rad/s", 0.0..=50.0, tuned)]
+        pub reference_xy_rad_s: f32 = 0.0,
+        /// w of z; 0 for none.
+        #[parameter(REF_Z, "rad/s", 0.0..=50.0, tuned)]
+        pub reference_z_rad_s: f32 = 0.0,
+        /// w of yaw; 0 for none.
+        #[parameter(REF_YAW, "rad/s", 0.0..=50.0, tuned)]
+        pub reference_yaw_rad_s: f32 = 0.0,
+        /// a_max of x, y and z, each.
+        #[parameter(REF_ACC, "m/s2", 0.1..=1e3)]
+        pub reference_acceleration_m_s2: f32 = 1e3,
+        /// a_max of yaw.
+        #[parameter(REF_TURN, "rad/s2", 0.1..=1e3, tuned)]
+        pub reference_turn_rad_s2: f32 = 1e3,
+        /// v_max of yaw. That of x, y and z is the cascade's limit on the speed.
+        #[parameter(REF_YAWRATE, "rad/s", 0.1..=1e3)]
+        pub reference_yaw_rate_rad_s: f32 = 1e3,
+    }
+}
+
+impl ReferenceModel {
+    /// Returns the model of a vehicle that is `slowness` times slower.
+    #[must_use]
+    pub(crate) fn slowed(self, slowness: f32) -> Self {
+        ReferenceModel {
+            reference_xy_rad_s: self.reference_xy_rad_s / slowness,
+            reference_z_rad_s: self.reference_z_rad_s / slowness,
+            reference_yaw_rad_s: self.reference_yaw_rad_s / slowness,
+            ..self
+        }
+    }
+}
+
+/// Detour of one coordinate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Detour {
+    /// d, dd/dt, d^2 d/dt^2
+    d: [f32; 3],
+    /// Position and velocity expected of the next setpoint.
+    expected: [f32; 2],
+}
+
+/// Memory of the reference model.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Detours {
+    x: Detour,
+    y: Detour,
+    z: Detour,
+    yaw: Detour,
+}
+
+/// Constants of one coordinate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Coordinate {
+    /// w \[rad/s\].
+    bandwidth: f32,
+    /// w/3 \[rad/s\].
+    approach: f32,
+    acceleration_max: f32,
+    speed_max: f32,
+    /// d beyond which v_c brakes; there w/3 d brakes with half of a_max.
+    far: f32,
+}
+
+/// A coordinate of the setpoint with three derivatives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Point {
+    x: f32,
+    v: f32,
+    a: f32,
+    j: f32,
+}
+
+/// The part of `jump` to take off `d`, so that it comes as near as possible to `vehicle`.
+#[inline]
+fn taken_up(d: f32, jump: f32, vehicle: f32) -> f32 {
+    let (low, high) = if jump > 0.0 { (d - jump, d) } else { (d, d - jump) };
+    math::min(math::max(vehicle, low), high)
+}
+
+impl Coordinate {
+    fn new(bandwidth: f32, acceleration_max: f32, speed_max: f32) -> Self {
+        let approach = bandwidth / 3.0;
+        let far = if approach > 0.0 { 0.5 * acceleration_max / (approach * approach) } else { 0.0 };
+        Coordinate { bandwidth, approach, acceleration_max, speed_max, far }
+    }
+
+    /// v_c
+    #[inline]
+    fn speed(&self, d: f32) -> f32 {
+        let distance = d.abs();
+        let speed = if distance > self.far {
+            math::sqrt(self.acceleration_max * (distance - 0.5 * self.far))
+        } else {
+            self.approach * distance
+        };
+        -math::min(speed, self.speed_max).copysign(d)
+    }
+
+    /// Adds the detour to `point`, for a vehicle at `from` from it with velocity `rate` relative to it, and advances by
+    /// one step; `jump` is the distance of `point` from the one expected.
+    #[inline(always)]
+    fn advance(&self, detour: &mut Detour, point: Point, [jump, from, rate]: [f32; 3], dt_s: f32) -> Point {
+        let Detour { d: [d, d_dot, d_ddot], expected } = detour;
+        *d = taken_up(*d, jump, from);
+        *d_dot = taken_up(*d_dot, point.v - expected[1], rate);
+        let a_max = self.acceleration_max;
+        let a_c = math::min(math::max(self.bandwidth * (self.speed(*d) - *d_dot), -a_max), a_max);
+        // The detour accelerates the reference as a whole no further than a_max.
+        let (lowest, highest) = (math::min(-a_max - point.a, 0.0), math::max(a_max - point.a, 0.0));
+        *d_ddot = math::min(math::max(*d_ddot, lowest), highest);
+        let d_dddot = 3.0 * self.bandwidth * (a_c - *d_ddot);
+        let half = 0.5 * dt_s;
+        *expected = [point.x + dt_s * (point.v + half * point.a), point.v + dt_s * (point.a + half * point.j)];
+        let reference = Point { x: point.x + *d, v: point.v + *d_dot, a: point.a + *d_ddot, j: point.j + d_dddot };
+        *d += dt_s * (*d_dot + half * *d_ddot);
+        *d_dot += dt_s * *d_ddot;
+        *d_ddot += dt_s * d_dddot;
+        reference
+    }
+}
+
+/// The reference model with its constants; everything that changes in flight is in [`Detours`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference {
+    xy: Coordinate,
+    z: Coordinate,
+    yaw: Coordinate,
+    dt_s: f32,
+}
+
+impl Reference {
+    /// Makes the model from valid settings, advanced every `dt_s` seconds; none if every bandwidth is 0.
+    pub fn new(model: &ReferenceModel, limits: &Limits, dt_s: f32) -> Option<Self> {
+        let ReferenceModel { reference_acceleration_m_s2: acceleration, .. } = *model;
+        let (turn, yaw_rate) = (model.reference_turn_rad_s2, model.reference_yaw_rate_rad_s);
+        (model.reference_xy_rad_s + model.reference_z_rad_s + model.reference_yaw_rad_s > 0.0).then(|| Reference {
+            xy: Coordinate::new(model.reference_xy_rad_s, acceleration, limits.speed_max_m_s),
+            z: Coordinate::new(model.reference_z_rad_s, acceleration, limits.climb_max_m_s),
+            yaw: Coordinate::new(model.reference_yaw_rad_s, turn, yaw_rate),
+            dt_s,
+        })
+    }
+
+    /// Returns the memory of a flight that begins with this state and setpoint: the reference starts at the vehicle.
+    pub fn start(&self, state: &State, setpoint: &Setpoint) -> Detours {
+        let detour = |x1: f32, x2: f32, x: f32, v: f32| Detour { d: [x1 - x, x2 - v, 0.0], expected: [x, v] };
+        let (at, speed) = (&state.position_m, &state.velocity_m_s);
+        let (p, v) = (&setpoint.position_m, &setpoint.velocity_m_s);
+        let turn = math::wrap_angle(state.attitude_rad.z - setpoint.yaw_rad);
+        Detours {
+            x: detour(at.x, speed.x, p.x, v.x),
+            y: detour(at.y, speed.y, p.y, v.y),
+            z: detour(at.z, speed.z, p.z, v.z),
+            yaw: Detour {
+                d: [turn, state.rates_rad_s.z - setpoint.yaw_rate_rad_s, 0.0],
+                expected: [setpoint.yaw_rad, setpoint.yaw_rate_rad_s],
+            },
+        }
+    }
+
+    /// Adds the detour along one axis.
+    #[inline(always)]
+    fn along(&self, model: &Coordinate, detour: &mut Detour, x1: f32, x2: f32, [x, v, a, j]: [&mut f32; 4]) {
+        if model.bandwidth > 0.0 {
+            let point = Point { x: *x, v: *v, a: *a, j: *j };
+            let [from, rate, jump] = [x1 - *x, x2 - *v, *x - detour.expected[0]];
+            let point = model.advance(detour, point, [jump, from, rate], self.dt_s);
+            (*x, *v, *a, *j) = (point.x, point.v, point.a, point.j);
+        }
+    }
+
+    /// Returns `setpoint` with the detours, and advances them by one step.
+    // One copy for both laws, not inlined, so that it can use all registers.
+    #[inline(never)]
+    pub fn advance(&self, detours: &mut Detours, state: &State, setpoint: &Setpoint) -> Setpoint {
+        let mut reference = *setpoint;
+        let Setpoint { position_m: p, velocity_m_s: v, acceleration_m_s2: a, jerk_m_s3: j, .. } = &mut reference;
+        let (at, speed) = (&state.position_m, &state.velocity_m_s);
+        self.along(&self.xy, &mut detours.x, at.x, speed.x, [&mut p.x, &mut v.x, &mut a.x, &mut j.x]);
+        self.along(&self.xy, &mut detours.y, at.y, speed.y, [&mut p.y, &mut v.y, &mut a.y, &mut j.y]);
+        self.along(&self.z, &mut detours.z, at.z, speed.z, [&mut p.z, &mut v.z, &mut a.z, &mut j.z]);
+        if self.yaw.bandwidth > 0.0 {
+            let Setpoint { yaw_rad, yaw_rate_rad_s, yaw_acceleration_rad_s2, .. } = &mut reference;
+            let point = Point { x: *yaw_rad, v: *yaw_rate_rad_s, a: *yaw_acceleration_rad_s2, j: 0.0 };
+            let from = math::wrap_angle(state.attitude_rad.z - point.x);
+            let jump = math::wrap_angle(point.x - detours.yaw.expected[0]);
+            let rate = state.rates_rad_s.z - point.v;
+            let point = self.yaw.advance(&mut detours.yaw, point, [jump, from, rate], self.dt_s);
+            (*yaw_rad, *yaw_rate_rad_s, *yaw_acceleration_rad_s2) = (point.x, point.v, point.a);
+        }
+        reference
+    }
+}

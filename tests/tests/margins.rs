@@ -1,0 +1,100 @@
+//! Margins of the profile `flight`, monitored as on board: fast curves, delay, sampled states, noise, and the vehicles
+//! that it was once lost with.
+#![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
+
+use afbc::Profile;
+use afbc_plant::{Drag, Environment, Turbulence};
+use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_sim::run::Run;
+use afbc_sim::scenario::{Scenario, built_in};
+use afbc_sim::trajectory::{Sine, Trajectory};
+use nalgebra::Vector3;
+
+fn flown(kind: ControllerKind) -> Contender {
+    Contender::of(kind, Profile::Flight).monitored()
+}
+
+/// `hardware` without gusts and parameter changes, on a figure of eight of this half-length that takes this time.
+fn eight(half_length_m: f64, period_s: f64, height_m: f64) -> Scenario {
+    let mut scenario = built_in("hardware").unwrap().read().unwrap();
+    scenario.environment = Environment::calm(*scenario.environment.nominal()).unwrap();
+    let sine = |amplitude_m, period_s| Sine { amplitude_m, period_s, phase_rad: 0.0 };
+    let sines = [sine(half_length_m, period_s), sine(half_length_m / 2.0, period_s / 2.0), sine(height_m, period_s)];
+    scenario.trajectory = Trajectory::Lissajous { centre_m: Vector3::new(0.0, 0.0, 3.0), sines, yaw_rad: 0.0 };
+    let begin = scenario.trajectory.at(0.0);
+    (scenario.initial.position_m, scenario.initial.velocity_m_s) = (begin.position_m, begin.velocity_m_s);
+    scenario.duration_s = 20.0;
+    scenario
+}
+
+/// An eight of 3 m in 8 s in light turbulence.
+fn turbulent(seed: u64) -> Scenario {
+    let mut scenario = Scenario { seed, ..eight(1.5, 8.0, 0.3) };
+    scenario.realism.drag = Some(Drag::PAPER);
+    scenario.realism.wind.turbulence = Some(Turbulence::LIGHT);
+    scenario
+}
+
+/// Flies it without being lost or handed over, and returns the RMS distance from the reference \[m\] and the largest
+/// mean change of an input \[N\].
+fn fly(scenario: &Scenario) -> (f64, f64) {
+    let run = Run::fly(scenario, &flown(ControllerKind::Afbc), u64::MAX).unwrap();
+    assert!(run.lost.is_none() && run.tripped.is_none(), "{:?} {:?}", run.lost, run.tripped);
+    (run.metrics.rmse.xyz().norm(), run.metrics.mean_abs_delta_u.max())
+}
+
+/// A lemniscate of 6 m at 4 m/s at most: every derivative is known, so that next to nothing is left to learn.
+#[test]
+fn a_fast_curve_is_no_disturbance() {
+    let speed_m_s = 4.0;
+    let period_s = core::f64::consts::TAU * 3.0 * 2.0_f64.sqrt() / speed_m_s;
+    let (rms_m, _) = fly(&eight(3.0, period_s, 0.0));
+    assert!(rms_m < 0.002, "{rms_m} m");
+}
+
+/// A state that is 20 ms old is flown on without chatter, which would be 100 mN and more.
+#[test]
+fn delay_of_20_ms_does_not_chatter() {
+    for seed in 1..=3 {
+        let mut scenario = turbulent(seed);
+        scenario.sensing.delay_s = 0.02;
+        let (rms_m, change_n) = fly(&scenario);
+        assert!(rms_m < 0.03 && change_n < 0.03, "seed {seed}: {rms_m} m, {change_n} N");
+    }
+}
+
+/// 100 states per second that are 20 ms old, with a gyroscope at 1 kHz.
+#[test]
+fn a_slow_tracker_with_a_gyroscope_suffices() {
+    for seed in 1..=3 {
+        let mut scenario = turbulent(seed);
+        (scenario.sensing.delay_s, scenario.sensing.period_s, scenario.sensing.gyro) = (0.02, 0.01, true);
+        let (rms_m, _) = fly(&scenario);
+        assert!(rms_m < 0.03, "seed {seed}: {rms_m} m");
+    }
+}
+
+/// Noise of 0.05 rad/s on the rates costs at most a tenth more than under PID with its filters (5 % with seed 1).
+#[test]
+fn noisy_rates_cost_hardly_more_than_under_pid() {
+    for seed in 1..=3 {
+        let mut scenario = turbulent(seed);
+        scenario.sensing.noise.rates_rad_s = 0.05;
+        let [afbc, pid] = [ControllerKind::Afbc, ControllerKind::Pid]
+            .map(|kind| afbc_tune::cost(&scenario, &Run::fly(&scenario, &flown(kind), u64::MAX).unwrap()));
+        assert!(afbc <= 1.1 * pid, "seed {seed}: {afbc}, PID {pid}");
+    }
+}
+
+/// Two light vehicles with large inertia, in whose limit cycle of roll and pitch the mixer once raised the thrust
+/// until they were 36 and 46 m too high.
+#[test]
+fn no_vehicle_is_lifted_by_its_own_limit_cycle() {
+    let campaign = afbc_campaign::built_in("robustness").unwrap().read().unwrap();
+    for flight in [9540, 8555] {
+        let scenario = campaign.flight(flight).unwrap();
+        let run = Run::fly(&scenario, &flown(ControllerKind::Afbc).for_vehicle(&scenario.vehicle), u64::MAX).unwrap();
+        let largest_m = run.metrics.max_abs.xyz().norm();
+        assert!(run.lost.is_none() && largest_m < 0.05, "flight {flight}: {:?}, {largest_m} m", run.lost);
+    }
+}

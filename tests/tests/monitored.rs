@@ -1,0 +1,75 @@
+//! The monitor in flight: faults trip it for what they are and in time, hard flights do not.
+#![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
+
+use afbc::Profile;
+use afbc_campaign::suite::{SUITES, Suite};
+use afbc_control::Trip;
+use afbc_plant::{Drag, Environment, ParameterChange, Quantity, Turbulence};
+use afbc_reader::BuiltIn;
+use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_sim::flight::fly;
+use afbc_sim::scenario::{Scenario, built_in};
+use afbc_sim::trajectory::Trajectory;
+use afbc_types::Axis;
+use nalgebra::Vector3;
+
+/// Time of every fault in the suite `faults` \[s\].
+const FAULT_S: f64 = 10.0;
+
+/// Flies AFBC as on board, and returns when and why the monitor tripped and how far from the reference, in the largest
+/// coordinate, the vehicle was \[m\].
+fn trip(scenario: &Scenario) -> Option<(f64, Trip, f64)> {
+    let contender = Contender::of(ControllerKind::Afbc, Profile::Flight).monitored().for_vehicle(&scenario.vehicle);
+    let mut tripped = None;
+    let _ = fly(scenario, &contender, |sample| {
+        let off_m = (sample.motion.position_m - sample.reference.position_m).amax();
+        let first = sample.action.health.trip.filter(|_| tripped.is_none());
+        tripped = first.map(|trip| (sample.time_s, trip, off_m)).or(tripped);
+    })
+    .unwrap();
+    tripped
+}
+
+/// A wrong sign, whose error the law itself makes larger and larger, ends within two seconds and a few metres, and a
+/// rotor that is too weak to hover with in half a minute.
+#[test]
+fn faults_trip_for_what_they_are_and_in_time() {
+    let suite: Suite = BuiltIn::named(&SUITES, "faults").unwrap().read().unwrap();
+    let scenarios = suite.under(&[Contender::of(ControllerKind::Afbc, Profile::Flight)]).unwrap();
+    let expected = [
+        ("sign-x", Trip::Error(Axis::X), 2.0, 7.0),
+        ("sign-y", Trip::Error(Axis::Y), 2.0, 7.0),
+        ("sign-z", Trip::Error(Axis::Z), 2.0, 7.0),
+        ("sign-yaw", Trip::Error(Axis::Yaw), 2.0, 7.0),
+        ("sign-yaw-moment", Trip::Error(Axis::Yaw), 2.0, 7.0),
+        ("rotor-1-40", Trip::Saturation, 5.0, 1.0),
+    ];
+    for (name, reason, within_s, within_m) in expected {
+        let scenario = scenarios.iter().find(|scenario| scenario.name == name).unwrap();
+        let (time_s, trip, off_m) = trip(scenario).unwrap();
+        assert_eq!(trip, reason, "{name}");
+        assert!(time_s - FAULT_S < within_s && off_m < within_m, "{name}: at {time_s} s, {off_m} m off");
+    }
+}
+
+/// Steps of weak and heavy vehicles in every direction, in wind and moderate turbulence: hard, but no faults.
+#[test]
+fn hard_flights_do_not_trip() {
+    let hardware = built_in("hardware").unwrap().read().unwrap();
+    let from_m = Vector3::new(0.0, 0.0, 3.0);
+    for (mass, thrust) in [(1.0, 1.0), (0.8, 1.1), (1.3, 0.75), (1.0, 0.6)] {
+        for step_m in [[0.0, 0.0, 2.0], [0.0, 0.0, -2.0], [4.0, 0.0, 0.0], [-3.0, 3.0, 0.5]] {
+            let mut scenario = Scenario { duration_s: 15.0, ..hardware.clone() };
+            let change = |quantity, factor| ParameterChange { quantity, factor, start_s: 1.0, end_s: f64::INFINITY };
+            let changes = vec![change(Quantity::Mass, mass), change(Quantity::ThrustFactor, thrust)];
+            scenario.environment = Environment::new(*hardware.environment.nominal(), changes, Vec::new()).unwrap();
+            scenario.initial.position_m = from_m;
+            let to_m = from_m + Vector3::from(step_m);
+            scenario.trajectory = Trajectory::Step { from_m, to_m, at_s: 6.0, yaw_rad: 0.0, turn_rad: 1.5 };
+            scenario.realism.drag = Some(Drag::PAPER);
+            scenario.realism.wind.steady_m_s = Vector3::new(3.0, -2.0, 0.0);
+            scenario.realism.wind.turbulence = Some(Turbulence::MODERATE);
+            assert_eq!(trip(&scenario), None, "mass {mass}, thrust {thrust}, step {step_m:?}");
+        }
+    }
+}
