@@ -30,8 +30,8 @@ fn trip(scenario: &Scenario) -> Option<(f64, Trip, f64)> {
     tripped
 }
 
-/// A wrong sign, whose error the law itself makes larger and larger, ends within two seconds and a few metres, and a
-/// rotor that is too weak to hover with in half a minute.
+/// A wrong sign, whose error the law itself makes larger and larger, trips within two seconds and a few metres, a rotor
+/// at 40 % within five. (With a wrong sign of roll or pitch the vehicle tumbles before any monitor could help.)
 #[test]
 fn faults_trip_for_what_they_are_and_in_time() {
     let suite: Suite = BuiltIn::named(&SUITES, "faults").unwrap().read().unwrap();

@@ -43,7 +43,7 @@ struct Column {
 /// nominal vehicle. The terms of the estimate errors are left out, since the optimal values are unknown.
 fn lyapunov(model: &Model, sample: &Sample) -> PerAxis<f32> {
     let state = sample.motion.measure();
-    // g_i does not depend on the rotors.
+    // With the paper's weight c = 1 of e_1. g_i does not depend on the rotors.
     PerAxis::from_fn(|axis| {
         let errors = &sample.trace.errors[axis];
         0.5 * errors.e1 * errors.e1 + 0.5 * errors.e2 * errors.e2 / model.dynamics(axis, &state, 0.0).g

@@ -184,7 +184,7 @@ impl Default for Hardware {
 }
 
 impl Hardware {
-    /// Returns `flight` in light turbulence with these sensors and rotors.
+    /// Returns `flight` in moderate turbulence with these sensors and rotors.
     fn flight(self, name: &'static str, flight: TrainingFlight) -> Result<Scenario, Box<dyn Error>> {
         let mut scenario = windy(TrainingFlight { name, ..flight })?;
         scenario.sensing.delay_s = self.state_delay_s;

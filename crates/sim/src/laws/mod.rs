@@ -102,7 +102,8 @@ impl ControllerKind {
     pub const PAPER: [ControllerKind; 2] = [ControllerKind::Afbc, ControllerKind::Backstepping];
 }
 
-/// Returns AFBC's hand-tuned gains, for the settings of the profile `flight`.
+/// Returns the gains from which AFBC's search starts, an earlier search's rounded, for the settings of the profile
+/// `flight`.
 fn by_hand() -> PerAxis<adaptive::Gains> {
     PerAxis::from_fn(|axis| {
         let (alpha1, alpha2, stiffness, gamma, eta, delta_max) = match axis {
