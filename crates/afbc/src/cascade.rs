@@ -101,6 +101,8 @@ pub struct Controller<L, const N: usize = 4> {
     weight_n: f32,
     gravity_m_s2: f32,
     inverse_gravity: f32,
+    /// Lag 1/w of the command filter \[s\].
+    command_lag_s: f32,
     tilt_max_tan: f32,
     /// Largest thrust of all rotors together \[N\].
     thrust_max_n: f32,
@@ -261,6 +263,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
             weight_n: vehicle.parameters.weight_n(),
             gravity_m_s2,
             inverse_gravity: 1.0 / gravity_m_s2,
+            command_lag_s: 1.0 / settings.command_filter_rad_s,
             tilt_max_tan: math::tan(settings.limits.tilt_max_rad),
             thrust_max_n: mixer.thrust_max_n(),
             mixer,
@@ -368,27 +371,12 @@ impl<L: Law, const N: usize> Controller<L, N> {
             Tracking { x1, x2, e1, x1d_dot, x1d_ddot, approach_1_s }
         };
         let [x_max, y_max, z_max] = self.approach;
-        let u4 = self.input(
-            Axis::Z,
-            approach(xi.z, xi_dot.z, p.z, v.z, a.z, z_max),
-            &context,
-            &mut estimates.z,
-            &mut errors.z,
-        );
-        let u5 = self.input(
-            Axis::X,
-            approach(xi.x, xi_dot.x, p.x, v.x, a.x, x_max),
-            &context,
-            &mut estimates.x,
-            &mut errors.x,
-        );
-        let u6 = self.input(
-            Axis::Y,
-            approach(xi.y, xi_dot.y, p.y, v.y, a.y, y_max),
-            &context,
-            &mut estimates.y,
-            &mut errors.y,
-        );
+        let z = approach(xi.z, xi_dot.z, p.z, v.z, a.z, z_max);
+        let u4 = self.input(Axis::Z, z, &context, &mut estimates.z, &mut errors.z);
+        let x = approach(xi.x, xi_dot.x, p.x, v.x, a.x, x_max);
+        let u5 = self.input(Axis::X, x, &context, &mut estimates.x, &mut errors.x);
+        let y = approach(xi.y, xi_dot.y, p.y, v.y, a.y, y_max);
+        let u6 = self.input(Axis::Y, y, &context, &mut estimates.y, &mut errors.y);
 
         // Desired attitude, with the derivatives for (12) and (16).
         let (vertical, inverse_vertical) = if self.settings.tilt_by_thrust {
@@ -406,7 +394,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
             let rates = tilt.turned(j.x, j.y);
             forward_rad_s2 = tilt.turned(s.x, s.y);
             // Ahead of the filter by its lag: its output is then the angle that was meant.
-            let lag_s = 1.0 / self.settings.command_filter_rad_s;
+            let lag_s = self.command_lag_s;
             for ((angle, rate), acceleration) in commanded.iter_mut().zip(rates).zip(forward_rad_s2) {
                 *angle += lag_s * (2.0 * rate + lag_s * acceleration);
             }
@@ -430,34 +418,13 @@ impl<L: Law, const N: usize> Controller<L, N> {
         } else {
             [self.filter.acceleration(&roll_d, phi_d), self.filter.acceleration(&pitch_d, theta_d)]
         };
-        let u1 = self.input(
-            Axis::Roll,
-            track(eta.x, eta_dot.x, roll_d.angle - eta.x, roll_d.rate, roll_d_ddot),
-            &context,
-            &mut estimates.roll,
-            &mut errors.roll,
-        );
-        let u2 = self.input(
-            Axis::Pitch,
-            track(eta.y, eta_dot.y, pitch_d.angle - eta.y, pitch_d.rate, pitch_d_ddot),
-            &context,
-            &mut estimates.pitch,
-            &mut errors.pitch,
-        );
-        let u3 = self.input(
-            Axis::Yaw,
-            Tracking {
-                x1: eta.z,
-                x2: eta_dot.z,
-                e1: math::wrap_angle(reference.yaw_rad - eta.z),
-                x1d_dot: reference.yaw_rate_rad_s,
-                x1d_ddot: reference.yaw_acceleration_rad_s2,
-                approach_1_s: None,
-            },
-            &context,
-            &mut estimates.yaw,
-            &mut errors.yaw,
-        );
+        let roll = track(eta.x, eta_dot.x, roll_d.angle - eta.x, roll_d.rate, roll_d_ddot);
+        let u1 = self.input(Axis::Roll, roll, &context, &mut estimates.roll, &mut errors.roll);
+        let pitch = track(eta.y, eta_dot.y, pitch_d.angle - eta.y, pitch_d.rate, pitch_d_ddot);
+        let u2 = self.input(Axis::Pitch, pitch, &context, &mut estimates.pitch, &mut errors.pitch);
+        let turn = math::wrap_angle(reference.yaw_rad - eta.z);
+        let yaw = track(eta.z, eta_dot.z, turn, reference.yaw_rate_rad_s, reference.yaw_acceleration_rad_s2);
+        let u3 = self.input(Axis::Yaw, yaw, &context, &mut estimates.yaw, &mut errors.yaw);
 
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3, thrust_n: u4 };
         let inputs = self.smoother.advance(&mut memory.smoothed, &inputs);

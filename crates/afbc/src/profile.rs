@@ -101,9 +101,9 @@ impl Profile {
             Profile::Flight => Settings {
                 common: afbc_control::Settings { dt_s: 0.001, rotor_force_max_n: 3.0, raised_thrust_max: 0.8 },
                 limits: Limits {
-                    tilt_max_rad: 0.7,
+                    tilt_max_rad: 1.0,
                     tilt_rate_max_rad_s: 6.0,
-                    acceleration_max_m_s2: 9.0,
+                    acceleration_max_m_s2: 16.0,
                     speed_max_m_s: 5.0,
                     climb_max_m_s: 3.0,
                 },

@@ -85,7 +85,7 @@ parameters! {
         pub position_integral_max_m_s2: f32 = 10.0,
         /// Largest tilt.
         #[parameter(TILT_MAX, "rad", 0.05..=1.2)]
-        pub tilt_max_rad: f32 = 0.7,
+        pub tilt_max_rad: f32 = 1.0,
         /// Filters on U1..U4.
         #[group("")]
         pub smoothing: Smoothing = Smoothing {
@@ -116,7 +116,7 @@ impl Gains {
         attitude_filter_rad_s: 80.0,
         rotor_time_constant_s: 0.02,
         position_integral_max_m_s2: 10.0,
-        tilt_max_rad: 0.7,
+        tilt_max_rad: 1.0,
         smoothing: Smoothing::DEFAULT,
     };
 

@@ -109,7 +109,7 @@ parameters! {
         pub speed_max_m_s: f32 = 3.0,
         /// Largest tilt.
         #[parameter(TILT_MAX, "rad", 0.05..=1.2)]
-        pub tilt_max_rad: f32 = 0.7,
+        pub tilt_max_rad: f32 = 1.0,
         /// Filters on U1..U4.
         #[group("")]
         pub smoothing: Smoothing = Smoothing {
@@ -147,7 +147,7 @@ impl Gains {
         filter_rad_s: 100.0,
         yaw_weight: 0.4,
         speed_max_m_s: 3.0,
-        tilt_max_rad: 0.7,
+        tilt_max_rad: 1.0,
         smoothing: Smoothing::DEFAULT,
     };
 }
