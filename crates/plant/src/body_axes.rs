@@ -13,6 +13,16 @@ pub(crate) struct BodyAxes {
 }
 
 impl BodyAxes {
+    /// Returns the axes of a body with this unit quaternion, body to earth.
+    #[inline]
+    pub(crate) fn of_quaternion(w: f64, x: f64, y: f64, z: f64) -> Self {
+        BodyAxes {
+            forward: Vector3::new(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)),
+            left: Vector3::new(2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)),
+            up: Vector3::new(2.0 * (w * y + x * z), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)),
+        }
+    }
+
     /// Converts a vector from body to earth coordinates.
     #[inline]
     pub(crate) fn to_earth(self, v: &Vector3<f64>) -> Vector3<f64> {

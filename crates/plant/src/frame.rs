@@ -1,6 +1,7 @@
 //! Positions and directions of the rotors, in the form that sums over them need.
 
-use afbc_types::{OutOfRange, PLUS, ROTOR_POSITION, ROTORS, ROTORS_MAX, Rotor, RotorSpeeds};
+use afbc_types::{OutOfRange, PLUS, Parameters, ROTOR_POSITION, ROTORS, ROTORS_MAX, Rotor, RotorSpeeds};
+use libm::sqrt;
 use nalgebra::{SMatrix, SVector, Vector4};
 
 type Matrix4xX8 = SMatrix<f64, 4, ROTORS_MAX>;
@@ -116,6 +117,11 @@ impl Frame {
         let shares = (b * b.transpose()).try_inverse().map(|inverse| b.transpose() * inverse * Vector4::w());
         // Rotors only push.
         shares.filter(|shares| shares.min() >= 0.0).unwrap_or(equal)
+    }
+
+    /// Returns the speeds at which the rotors carry this vehicle \[rad/s\].
+    pub(crate) fn hover_rad_s(&self, vehicle: &Parameters<f64>) -> Lanes {
+        self.hover_shares().map(|share| sqrt(vehicle.weight_n() * share / vehicle.thrust_factor_n_s2))
     }
 
     /// Returns `value` for each rotor.

@@ -84,6 +84,11 @@ impl Load {
         }
     }
 
+    /// Returns the thrust of all rotors over mass \[m/s2\].
+    pub(crate) fn thrust_m_s2(&self) -> f64 {
+        self.thrust_m_s2
+    }
+
     /// Returns d^2 xi/dt^2 in the earth frame, given the direction of body z in the earth frame \[m/s2\].
     #[inline]
     pub(crate) fn acceleration(&self, body_z: &Vector3<f64>) -> Vector3<f64> {

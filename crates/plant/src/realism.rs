@@ -3,7 +3,7 @@
 use crate::battery::Charge;
 use crate::body_axes::BodyAxes;
 use crate::contact::{Contact, Ground};
-use crate::drag::Drag;
+use crate::drag::{Drag, HeldDrag};
 use crate::environment::{Environment, Segment};
 use crate::frame::{Frame, Lanes};
 use crate::ground_effect::GroundEffect;
@@ -11,7 +11,7 @@ use crate::load::Load;
 use crate::rotors::{Rotors, Spin};
 use crate::surroundings::Surroundings;
 use crate::wind::{Weather, Wind};
-use afbc_types::{Declared, OutOfRange, Range};
+use afbc_types::{Declared, OutOfRange, Parameters, Range};
 use nalgebra::Vector3;
 
 /// Accepted range of a step \[s\].
@@ -87,6 +87,8 @@ pub(crate) struct Effects {
     frame: Frame,
     spin: Spin,
     drag: Option<Drag>,
+    /// Drag at the rotor speeds of the last step; none before the first.
+    held: Option<HeldDrag>,
     weather: Weather,
     ground: Option<Ground>,
     ground_effect: Option<GroundEffect>,
@@ -115,6 +117,7 @@ impl Effects {
             frame: *frame,
             spin,
             drag: *drag,
+            held: None,
             weather,
             ground: contact.map(|contact| contact.ground(vehicle)),
             ground_effect: *ground_effect,
@@ -141,8 +144,8 @@ impl Effects {
         if let Some(effect) = &self.ground_effect {
             self.thrust_ratio = effect.thrust_ratio(position_m.z);
         }
-        // The ground is left out if the step cannot reach it.
-        let ground = self.ground.as_ref().filter(|ground| ground.is_near(position_m.z, velocity_m_s.z));
+        self.held = self.drag.as_ref().map(|drag| drag.held(&self.frame, &drive.speeds_rad_s, parameters.arm_m));
+        let ground = self.near(position_m.z, velocity_m_s.z);
         self.on_ground = ground.is_some_and(|ground| ground.touches(position_m.z, &axes()));
         let load = Load::of_rotors(
             parameters,
@@ -153,8 +156,34 @@ impl Effects {
             *a_force,
             *a_moment,
         );
-        let drag = self.drag.as_ref().map(|drag| drag.held(&self.frame, &drive.speeds_rad_s, parameters.arm_m));
-        (load, Surroundings::new(parameters, drag, self.wind_m_s, ground))
+        (load, self.surroundings(parameters, position_m.z, velocity_m_s.z))
+    }
+
+    /// Returns the load of the rotors at their present speeds, before the first step.
+    pub(crate) fn start(&self, segment: &Segment) -> Load {
+        let Segment { parameters, rig, a_force, a_moment, .. } = segment;
+        let speeds = &self.spin.speeds_rad_s;
+        Load::of_rotors(
+            parameters,
+            rig,
+            &self.frame,
+            [speeds, &self.spin.squares()],
+            self.thrust_ratio,
+            *a_force,
+            *a_moment,
+        )
+    }
+
+    /// Returns air and ground for a vehicle at this height and climb rate, with the wind and rotors of the last step.
+    #[inline]
+    pub(crate) fn surroundings(&self, parameters: &Parameters<f64>, height_m: f64, climb_m_s: f64) -> Surroundings<'_> {
+        Surroundings::new(parameters, self.held, self.wind_m_s, self.near(height_m, climb_m_s))
+    }
+
+    /// Returns the ground, unless a step cannot reach it.
+    #[inline]
+    fn near(&self, height_m: f64, climb_m_s: f64) -> Option<&Ground> {
+        self.ground.as_ref().filter(|ground| ground.is_near(height_m, climb_m_s))
     }
 
     pub(crate) fn telemetry(&self) -> Telemetry {

@@ -10,21 +10,26 @@ use nalgebra::{SVector, Vector3};
 /// State vector: \[x, y, z, their rates, quaternion w x y z (body to earth), p, q, r\].
 pub type Vector = SVector<f64, 13>;
 
-/// Converts `motion` to the state vector.
-pub fn vector(motion: &Motion) -> Vector {
-    let half = motion.attitude_rad * 0.5;
+/// Returns the unit quaternion, w x y z, body to earth, of roll, pitch and yaw.
+pub(crate) fn quaternion(attitude_rad: &Vector3<f64>) -> [f64; 4] {
+    let half = attitude_rad * 0.5;
     let (s_phi, c_phi) = (sin(half.x), cos(half.x));
     let (s_theta, c_theta) = (sin(half.y), cos(half.y));
     let (s_psi, c_psi) = (sin(half.z), cos(half.z));
-    let mut x = Vector::zeros();
-    x.fixed_rows_mut::<3>(0).copy_from(&motion.position_m);
-    x.fixed_rows_mut::<3>(3).copy_from(&motion.velocity_m_s);
-    x.fixed_rows_mut::<4>(6).copy_from_slice(&[
+    [
         c_psi * c_theta * c_phi + s_psi * s_theta * s_phi,
         c_psi * c_theta * s_phi - s_psi * s_theta * c_phi,
         c_psi * s_theta * c_phi + s_psi * c_theta * s_phi,
         s_psi * c_theta * c_phi - c_psi * s_theta * s_phi,
-    ]);
+    ]
+}
+
+/// Converts `motion` to the state vector.
+pub fn vector(motion: &Motion) -> Vector {
+    let mut x = Vector::zeros();
+    x.fixed_rows_mut::<3>(0).copy_from(&motion.position_m);
+    x.fixed_rows_mut::<3>(3).copy_from(&motion.velocity_m_s);
+    x.fixed_rows_mut::<4>(6).copy_from_slice(&quaternion(&motion.attitude_rad));
     x.fixed_rows_mut::<3>(10).copy_from(&motion.rates_rad_s);
     x
 }
@@ -86,12 +91,7 @@ fn pack(v: &Vector, acceleration: &Vector3<f64>, angular_acceleration: &Vector3<
 /// Returns the body's axes from the unit quaternion.
 #[inline]
 pub(crate) fn body_axes(v: &Vector) -> BodyAxes {
-    let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
-    BodyAxes {
-        forward: Vector3::new(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)),
-        left: Vector3::new(2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)),
-        up: Vector3::new(2.0 * (w * y + x * z), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)),
-    }
+    BodyAxes::of_quaternion(v[6], v[7], v[8], v[9])
 }
 
 /// Returns [`derivative`] with the forces that depend on position and velocity.

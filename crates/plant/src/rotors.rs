@@ -6,7 +6,7 @@ use crate::frame;
 use crate::frame::{Frame, Lanes};
 use afbc_types::{Declared, OutOfRange, Parameters, Range, parameters};
 use alloc::vec::Vec;
-use libm::{exp, sqrt};
+use libm::exp;
 
 parameters! {
     /// Dynamics between commanded rotor speeds and thrust. The default is ideal: commanded speeds are reached at once.
@@ -137,11 +137,10 @@ impl Spin {
         for fault in &rotors.faults {
             Range { max: count, ..limits::ROTOR }.check(fault.rotor)?;
         }
-        let hover = |share: f64| {
-            sqrt(vehicle.weight_n() * share / vehicle.thrust_factor_n_s2).max(rotors.min_rad_s).min(rotors.max_rad_s)
-        };
         let start_rad_s = match rotors.start {
-            Start::Hover => frame.masked(&frame.hover_shares().map(hover)),
+            Start::Hover => {
+                frame.masked(&frame.hover_rad_s(vehicle).map(|w| w.max(rotors.min_rad_s).min(rotors.max_rad_s)))
+            }
             Start::Idle => frame.repeat(rotors.min_rad_s),
         };
         let (efficiency, efficiency_until_s) = rotors.efficiency(frame, 0.0);
@@ -187,6 +186,11 @@ impl Spin {
             battery.supply(drag_factor_n_m_s2 * frame::power(&squares, &middle));
         }
         Drive { speeds_rad_s: middle, squares }
+    }
+
+    /// Returns the squares of the present speeds times each rotor's efficiency \[rad2/s2\].
+    pub(crate) fn squares(&self) -> Lanes {
+        self.speeds_rad_s.component_mul(&self.speeds_rad_s).component_mul(&self.efficiency)
     }
 
     pub(crate) fn charge(&self) -> Option<Charge> {

@@ -42,6 +42,28 @@ pub fn derivative(x: &Vector, load: &Load) -> Vector {
     x_dot
 }
 
+/// Returns Omega = N(eta) d eta/dt and its derivative from eta and its two derivatives.
+pub(crate) fn body_rates(
+    eta: &Vector3<f64>,
+    eta_dot: &Vector3<f64>,
+    eta_dot_dot: &Vector3<f64>,
+) -> (Vector3<f64>, Vector3<f64>) {
+    let (s_phi, c_phi) = (sin(eta.x), cos(eta.x));
+    let (s_theta, c_theta) = (sin(eta.y), cos(eta.y));
+    let of = |v: &Vector3<f64>| {
+        Vector3::new(v.x - s_theta * v.z, c_phi * v.y + s_phi * c_theta * v.z, c_phi * c_theta * v.z - s_phi * v.y)
+    };
+    let rates = of(eta_dot);
+    // d N/dt d eta/dt: roll turns the last two rows into each other, and pitch changes those that hold theta.
+    let (by_roll, by_pitch) = (eta_dot.x, eta_dot.y * eta_dot.z);
+    let turning = Vector3::new(
+        -c_theta * by_pitch,
+        by_roll * rates.z - s_phi * s_theta * by_pitch,
+        -by_roll * rates.y - c_phi * s_theta * by_pitch,
+    );
+    (rates, of(eta_dot_dot) + turning)
+}
+
 /// Returns the body's axes: the columns of Rz(psi) Ry(theta) Rx(phi).
 #[inline]
 pub(crate) fn body_axes(x: &Vector) -> BodyAxes {

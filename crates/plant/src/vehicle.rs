@@ -8,10 +8,11 @@ use crate::load::Load;
 use crate::motion::Motion;
 use crate::realism::{Effects, Realism, Telemetry};
 use crate::surroundings::Surroundings;
+use crate::truth::Truth;
 use crate::{rigid_body, simplified};
 use afbc_types::{OutOfRange, RotorSpeeds};
 use alloc::boxed::Box;
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, SVector, Vector3};
 
 /// Equations of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,6 +72,16 @@ impl Body {
         }
     }
 
+    /// Returns d^2 xi/dt^2, earth frame \[m/s2\], and the derivative of the model's rates \[rad/s2\].
+    fn accelerations(&self, load: &Load, surroundings: Option<&Surroundings>) -> (Vector3<f64>, Vector3<f64>) {
+        match (self, surroundings) {
+            (Body::Simplified(x), None) => halves(&simplified::derivative(x, load), 9),
+            (Body::Simplified(x), Some(s)) => halves(&simplified::derivative_in(x, load, s), 9),
+            (Body::RigidBody(x), None) => halves(&rigid_body::derivative(x, load), 10),
+            (Body::RigidBody(x), Some(s)) => halves(&rigid_body::derivative_in(x, load, s), 10),
+        }
+    }
+
     /// Returns position and velocity.
     #[inline]
     fn place(&self) -> (Vector3<f64>, Vector3<f64>) {
@@ -88,6 +99,11 @@ impl Body {
     }
 }
 
+/// Returns the derivatives of velocity and rates, which begin at row `rates`.
+fn halves<const N: usize>(derivative: &SVector<f64, N>, rates: usize) -> (Vector3<f64>, Vector3<f64>) {
+    (derivative.fixed_rows::<3>(3).into(), derivative.fixed_rows::<3>(rates).into())
+}
+
 /// One vehicle in one environment.
 #[derive(Clone, Debug)]
 pub struct Plant {
@@ -96,6 +112,12 @@ pub struct Plant {
     segment: Segment,
     /// Boxed, so that the ideal plant stays small.
     effects: Option<Box<Effects>>,
+    /// Load of the last step, or of rotors that hover or start before the first.
+    load: Load,
+    /// Rotor speeds of the last step, or those that hover, of an ideal plant.
+    speeds_rad_s: Lanes,
+    /// Speed at which the fastest rotor of the nominal vehicle hovers \[rad/s\].
+    hover_rad_s: f64,
     steps: u64,
     time_s: f64,
 }
@@ -105,7 +127,11 @@ impl Plant {
     pub fn new(model: Model, initial: Motion, environment: Environment) -> Self {
         let body = Body::new(model, &initial);
         let segment = environment.segment(0.0);
-        Plant { body, environment, segment, effects: None, steps: 0, time_s: 0.0 }
+        let Segment { parameters, rig, a_force, a_moment, .. } = &segment;
+        let speeds_rad_s = environment.frame().hover_rad_s(environment.nominal());
+        let hover_rad_s = speeds_rad_s.max();
+        let load = Load::ideal(parameters, rig, environment.frame(), &speeds_rad_s, *a_force, *a_moment);
+        Plant { body, environment, segment, effects: None, load, speeds_rad_s, hover_rad_s, steps: 0, time_s: 0.0 }
     }
 
     /// Creates a vehicle with realistic rotors, air and ground, for steps of `step_s`.
@@ -120,7 +146,8 @@ impl Plant {
         step_s: f64,
     ) -> Result<Self, OutOfRange> {
         let effects = Effects::new(realism, &environment, step_s)?;
-        Ok(Plant { effects: Some(Box::new(effects)), ..Plant::new(model, initial, environment) })
+        let ideal = Plant::new(model, initial, environment);
+        Ok(Plant { load: effects.start(&ideal.segment), effects: Some(Box::new(effects)), ..ideal })
     }
 
     /// Advances the vehicle by `dt_s` with constant commanded rotor speeds; a rotor without a command stands still.
@@ -135,8 +162,9 @@ impl Plant {
             self.advance_in_effect(speeds, dt_s);
         } else {
             let Segment { parameters, rig, a_force, a_moment, .. } = &self.segment;
-            let load = Load::ideal(parameters, rig, self.environment.frame(), speeds, *a_force, *a_moment);
-            self.body.advance(&load, dt_s);
+            self.load = Load::ideal(parameters, rig, self.environment.frame(), speeds, *a_force, *a_moment);
+            self.speeds_rad_s = *speeds;
+            self.body.advance(&self.load, dt_s);
         }
         // Counted, not summed, so that time does not drift.
         self.steps += 1;
@@ -152,10 +180,42 @@ impl Plant {
         let body = &self.body;
         let (load, surroundings) =
             effects.begin_step(speeds, &self.segment, self.time_s, &position, &velocity, || body.axes());
+        self.load = load;
         if surroundings.are_empty() {
             self.body.advance(&load, dt_s);
         } else {
             self.body.advance_in(&load, &surroundings, dt_s);
+        }
+    }
+
+    /// Returns what instruments feel now: the motion with its accelerations under the forces of the last step.
+    pub fn truth(&self) -> Truth {
+        let (parameters, motion) = (&self.segment.parameters, self.motion());
+        let surroundings = self.effects.as_ref().map(|effects| {
+            let (height_m, climb_m_s) = (motion.position_m.z, motion.velocity_m_s.z);
+            effects.surroundings(parameters, height_m, climb_m_s)
+        });
+        let (acceleration_m_s2, angular) = self.body.accelerations(&self.load, surroundings.as_ref());
+        let (attitude, rates_rad_s, angular_acceleration_rad_s2) = match &self.body {
+            Body::RigidBody(x) => ([x[6], x[7], x[8], x[9]], motion.rates_rad_s, angular),
+            Body::Simplified(_) => {
+                let (rates, angular) = simplified::body_rates(&motion.attitude_rad, &motion.rates_rad_s, &angular);
+                (rigid_body::quaternion(&motion.attitude_rad), rates, angular)
+            }
+        };
+        let [w, x, y, z] = attitude;
+        Truth {
+            time_s: self.time_s,
+            position_m: motion.position_m,
+            velocity_m_s: motion.velocity_m_s,
+            attitude: Quaternion::new(w, x, y, z),
+            rates_rad_s,
+            acceleration_m_s2,
+            angular_acceleration_rad_s2,
+            gravity_m_s2: parameters.gravity_m_s2,
+            rotor_speeds_rad_s: self.telemetry().map_or(self.speeds_rad_s, |telemetry| telemetry.rotor_speeds_rad_s),
+            hover_rad_s: self.hover_rad_s,
+            thrust_share: self.load.thrust_m_s2() * parameters.mass_kg / self.environment.nominal().weight_n(),
         }
     }
 
