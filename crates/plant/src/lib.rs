@@ -5,8 +5,8 @@
 //! fourth-order Runge-Kutta method with constant rotor speeds during a step.
 //!
 //! This is the paper's plant. [`Realism`] adds optional effects: rotors with lag, limits, delay,
-//! faults and a battery, drag, wind with gusts and turbulence, ground. [`Sensors`] measure the motion for a controller.
-//! Everything is reproducible from a seed.
+//! faults and a battery, drag, wind with gusts and turbulence, ground. [`Sensors`] measure the motion for a controller,
+//! as a perfect tracker would; [`Instruments`] are the sensors of a real vehicle. Everything is reproducible from a seed.
 //!
 //! [`afbc_types`] defines frames, units and the meaning of "(n)". Trigonometry comes from the `libm` crate, so a flight
 //! gives the same bits on every host.
@@ -32,9 +32,11 @@ mod body_axes;
 pub mod contact;
 mod delay;
 pub mod drag;
+mod dropouts;
 mod environment;
 mod frame;
 pub mod ground_effect;
+pub mod instruments;
 pub mod integrate;
 mod load;
 mod motion;
@@ -54,18 +56,20 @@ pub mod wind;
 pub use battery::{Battery, Charge, Sag};
 pub use contact::Contact;
 pub use drag::Drag;
+pub use dropouts::Dropouts;
 pub use environment::{
     Environment, GUST_SIZE, Gust, GustKind, PAYLOAD_AHEAD, PAYLOAD_BELOW, PAYLOAD_LEFT, PAYLOAD_MASS, ParameterChange,
     Payload, Quantity, START,
 };
 pub use frame::{Frame, Lanes};
 pub use ground_effect::GroundEffect;
+pub use instruments::{Instruments, Readings, Suite};
 pub use load::Load;
 pub use motion::Motion;
 pub use realism::{Realism, STEP, Telemetry};
 pub use rotors::{RotorFault, Rotors, Start};
 pub use sensor_fault::{Misreading, SensorFault, SensorFaults};
-pub use sensors::{Deviations, Dropouts, Measurement, Sensing, Sensors};
+pub use sensors::{Deviations, Measurement, Sensing, Sensors};
 pub use truth::Truth;
 pub use turbulence::Turbulence;
 pub use vehicle::{Model, Plant};

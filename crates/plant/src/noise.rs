@@ -22,6 +22,26 @@ pub enum Stream {
     Dropouts,
     /// Quantities drawn by a campaign: parameters, winds, faults.
     Scenario,
+    /// Gyroscope and accelerometer.
+    Imu,
+    /// Phases of the rotors' vibration.
+    Vibration,
+    /// Errors and delays of a tracker.
+    Tracker,
+    /// Dropouts of a tracker.
+    TrackerLoss,
+    /// Freezes of a tracker.
+    TrackerFreeze,
+    /// Errors and delays of a GNSS receiver.
+    Gnss,
+    /// Losses of a GNSS receiver.
+    GnssLoss,
+    /// Barometer.
+    Barometer,
+    /// Magnetometer.
+    Magnetometer,
+    /// Noise of broken instruments.
+    Failures,
 }
 
 /// A stream of random numbers.

@@ -1,10 +1,10 @@
 //! Measurement of the true motion for the controller.
 
 use crate::delay::{DelayLine, whole_steps};
+use crate::dropouts::{Dropouts, Outage};
 use crate::motion::Motion;
 use crate::noise::{Noise, Stream};
 use afbc_types::{Declared, OutOfRange, State, parameters};
-use libm::exp;
 use nalgebra::Vector3;
 
 parameters! {
@@ -42,20 +42,6 @@ impl Deviations {
             attitude_rad: three(self.attitude_rad),
             rates_rad_s: three(self.rates_rad_s),
         }
-    }
-}
-
-parameters! {
-    /// Intervals without measurements, as a two-state Markov chain (E. N. Gilbert 1960, *Capacity of a burst-noise
-    /// channel*).
-    #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct Dropouts {
-        /// Rate at which dropouts begin while there is none.
-        #[parameter(RATE, "Hz", 0.0..=1000.0)]
-        pub rate_hz: f64 = 0.0,
-        /// Mean length of a dropout.
-        #[parameter(MEAN, "s", 0.0..=60.0)]
-        pub mean_s: f64 = 0.02,
     }
 }
 
@@ -120,35 +106,6 @@ pub struct Sensors {
     since: u32,
 }
 
-/// Dropouts in simulation.
-#[derive(Clone, Debug)]
-struct Outage {
-    random: Noise,
-    /// Probabilities per step that a dropout begins, and that it ends.
-    begins: f64,
-    ends: f64,
-    now: bool,
-}
-
-impl Outage {
-    fn new(dropouts: &Dropouts, seed: u64, step_s: f64) -> Self {
-        Outage {
-            random: Noise::new(seed, Stream::Dropouts),
-            begins: 1.0 - exp(-dropouts.rate_hz * step_s),
-            // A mean length of zero ends with probability 1.
-            ends: 1.0 - exp(-step_s / dropouts.mean_s),
-            now: false,
-        }
-    }
-
-    #[inline]
-    fn advance(&mut self) -> bool {
-        let chance = self.random.uniform();
-        self.now = if self.now { chance >= self.ends } else { chance < self.begins };
-        self.now
-    }
-}
-
 impl Sensors {
     /// Creates sensors that are read every `step_s`. The seed may be the plant's, since the streams differ.
     ///
@@ -170,7 +127,10 @@ impl Sensors {
             // The sample of the first step, which stands for those before it, arrives so many steps later.
             until: steps % period,
             gyro: sensing.gyro,
-            outage: sensing.dropouts.as_ref().map(|dropouts| Outage::new(dropouts, seed, step_s)),
+            outage: sensing
+                .dropouts
+                .as_ref()
+                .map(|dropouts| Outage::new(dropouts, Noise::new(seed, Stream::Dropouts), step_s)),
             step_s,
             last: None,
             since: 0,

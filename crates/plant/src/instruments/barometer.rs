@@ -1,0 +1,104 @@
+//! Barometer.
+
+use super::markov::Markov;
+use super::schedule::{Clock, Transit};
+use crate::noise::{Noise, Stream};
+use crate::truth::Truth;
+use afbc_types::parameters;
+use alloc::vec::Vec;
+use libm::{exp, round};
+use nalgebra::Vector3;
+
+parameters! {
+    /// Properties of a barometer, in metres of height: 1 Pa is 0.083 m near sea level. The default is perfect and
+    /// immediate.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Barometer {
+        /// Measurements per second.
+        #[parameter(RATE, "Hz", 0.1..=1000.0)]
+        pub rate_hz: f64 = 50.0,
+        /// Delay from motion to arrival.
+        #[parameter(DELAY, "s", 0.0..=1.0)]
+        pub delay_s: f64 = 0.0,
+        /// Standard deviation of white noise.
+        #[parameter(NOISE, "m", 0.0..=100.0)]
+        pub noise_m: f64 = 0.0,
+        /// Standard deviation of a constant offset, drawn once per flight.
+        #[parameter(OFFSET, "m", 0.0..=1000.0)]
+        pub offset_m: f64 = 0.0,
+        /// Standard deviation of the drift of sensor and weather, a first-order Gauss-Markov process.
+        #[parameter(DRIFT, "m", 0.0..=1000.0)]
+        pub drift_m: f64 = 0.0,
+        /// Correlation time of the drift.
+        #[parameter(DRIFT_TIME, "s", 0.001..=1e5)]
+        pub drift_time_s: f64 = 600.0,
+        /// Error by the pressure under the rotors on the ground at a thrust of the weight, which makes the height too
+        /// low and grows with the thrust.
+        #[parameter(WASH, "m", -100.0..=100.0)]
+        pub wash_m: f64 = 0.0,
+        /// Height at which that error is down to 1/e.
+        #[parameter(WASH_HEIGHT, "m", 0.01..=100.0)]
+        pub wash_height_m: f64 = 0.3,
+        /// Step of the output; 0 for none.
+        #[parameter(LSB, "m", 0.0..=10.0)]
+        pub lsb_m: f64 = 0.0,
+    }
+}
+
+/// A height above the origin of the earth frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeightFix {
+    /// Time at which it was true \[s\].
+    pub true_at_s: f64,
+    /// Height \[m\].
+    pub height_m: f64,
+}
+
+/// A barometer in simulation.
+#[derive(Clone, Debug)]
+pub(super) struct Pressure {
+    barometer: Barometer,
+    clock: Clock,
+    random: Noise,
+    offset_m: f64,
+    drift: Markov,
+    transit: Transit<HeightFix>,
+}
+
+impl Pressure {
+    pub(super) fn new(barometer: &Barometer, seed: u64, step_s: f64) -> Self {
+        let mut random = Noise::new(seed, Stream::Barometer);
+        let period_s = (1.0 / barometer.rate_hz).max(step_s);
+        Pressure {
+            barometer: *barometer,
+            clock: Clock::new(barometer.rate_hz, step_s),
+            offset_m: random.normal() * barometer.offset_m,
+            drift: Markov::new(Vector3::z() * barometer.drift_m, barometer.drift_time_s, period_s, &mut random),
+            random,
+            transit: Transit::new(),
+        }
+    }
+
+    /// Returns the heights that arrive in this step. Each passes `spoil` when it is taken.
+    pub(super) fn measure(
+        &mut self,
+        truth: &Truth,
+        spoil: impl FnOnce(HeightFix) -> Option<HeightFix>,
+    ) -> Vec<HeightFix> {
+        if self.clock.ticks() {
+            let fix = HeightFix { true_at_s: truth.time_s, height_m: self.height_m(truth) };
+            let arrives_s = truth.time_s + self.barometer.delay_s;
+            spoil(fix).into_iter().for_each(|fix| self.transit.send(arrives_s, fix));
+        }
+        self.transit.arrived(truth.time_s)
+    }
+
+    fn height_m(&mut self, truth: &Truth) -> f64 {
+        let Barometer { noise_m, wash_m, wash_height_m, lsb_m, .. } = self.barometer;
+        self.drift.advance(&mut self.random);
+        let height = truth.position_m.z;
+        let wash = wash_m * truth.thrust_share * exp(-height.max(0.0) / wash_height_m);
+        let sensed = height - wash + self.offset_m + self.drift.value.z + self.random.normal() * noise_m;
+        if lsb_m > 0.0 { round(sensed / lsb_m) * lsb_m } else { sensed }
+    }
+}

@@ -1,0 +1,258 @@
+//! Failures of instruments.
+
+use super::barometer::HeightFix;
+use super::gnss::GnssFix;
+use super::imu::ImuReading;
+use super::magnetometer::FieldFix;
+use super::markov::draw;
+use super::tracker::TrackerFix;
+use crate::noise::{Noise, Stream};
+use afbc_types::{OutOfRange, Range};
+use alloc::vec::Vec;
+use libm::{cos, sin};
+use nalgebra::{Quaternion, Vector3};
+
+/// What is wrong with an instrument.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Failure {
+    /// The inertial sensor repeats the sample before the onset.
+    ImuStuck,
+    /// The inertial sensor is silent.
+    ImuDead,
+    /// The inertial sensor has additional white noise of these standard deviations per sample.
+    ImuNoisy {
+        /// \[rad/s\].
+        rates_rad_s: f64,
+        /// \[m/s2\].
+        specific_force_m_s2: f64,
+    },
+    /// The inertial sensor saturates at these values.
+    ImuClipped {
+        /// \[rad/s\].
+        rates_rad_s: f64,
+        /// \[m/s2\].
+        specific_force_m_s2: f64,
+    },
+    /// The inertial sensor has an additional bias, in sensor axes.
+    ImuBiased {
+        /// \[rad/s\].
+        rates_rad_s: Vector3<f64>,
+        /// \[m/s2\].
+        specific_force_m_s2: Vector3<f64>,
+    },
+    /// The tracker sends nothing.
+    TrackerLost,
+    /// The tracker sends the pose before the onset, with new stamps.
+    TrackerFrozen,
+    /// The tracker's frame has moved, and turned about its origin.
+    TrackerJumped {
+        /// \[m\].
+        by_m: Vector3<f64>,
+        /// \[rad\].
+        yaw_rad: f64,
+    },
+    /// The GNSS receiver sends nothing.
+    GnssLost,
+    /// The GNSS receiver's position is off.
+    GnssJumped {
+        /// \[m\].
+        by_m: Vector3<f64>,
+    },
+    /// The barometer sends nothing.
+    BarometerLost,
+    /// The barometer repeats the height before the onset.
+    BarometerStuck,
+    /// The barometer's port is blocked: its noise goes on around the pressure at the onset.
+    BarometerBlocked,
+    /// The magnetometer sends nothing.
+    MagnetometerLost,
+    /// The magnetometer repeats the field before the onset.
+    MagnetometerStuck,
+    /// The magnetometer is in an additional field, body frame.
+    MagnetometerDisturbed {
+        /// \[uT\].
+        field_ut: Vector3<f64>,
+    },
+}
+
+/// A failure from `start_s` to `end_s`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InstrumentFault {
+    /// What is wrong.
+    pub failure: Failure,
+    /// Onset \[s\].
+    pub start_s: f64,
+    /// End \[s\]; infinite for a failure that stays.
+    pub end_s: f64,
+}
+
+/// Accepted ranges of a failure's numbers.
+#[expect(missing_docs, reason = "named after the field that each bounds")]
+pub mod limits {
+    use afbc_types::Range;
+    pub const RATES: Range = Range::new("rates_rad_s", 0.0, 1000.0);
+    pub const FORCE: Range = Range::new("specific_force_m_s2", 0.0, 10_000.0);
+    pub const RATES_BIAS: Range = Range::new("rates_rad_s", -1000.0, 1000.0);
+    pub const FORCE_BIAS: Range = Range::new("specific_force_m_s2", -10_000.0, 10_000.0);
+    pub const JUMP: Range = Range::new("by_m", -10_000.0, 10_000.0);
+    pub const YAW: Range = Range::new("yaw_rad", -10.0, 10.0);
+    pub const FIELD: Range = Range::new("field_ut", -100_000.0, 100_000.0);
+    pub const START: Range = Range::new("start_s", 0.0, f64::INFINITY);
+}
+
+impl InstrumentFault {
+    /// # Errors
+    /// The first number out of range, by name.
+    pub(super) fn validate(&self) -> Result<(), OutOfRange> {
+        limits::START.check(self.start_s)?;
+        let each = |range: Range, vector: &Vector3<f64>| vector.iter().try_for_each(|&number| range.check(number));
+        match &self.failure {
+            Failure::ImuNoisy { rates_rad_s, specific_force_m_s2 }
+            | Failure::ImuClipped { rates_rad_s, specific_force_m_s2 } => {
+                limits::RATES.check(*rates_rad_s)?;
+                limits::FORCE.check(*specific_force_m_s2)
+            }
+            Failure::ImuBiased { rates_rad_s, specific_force_m_s2 } => {
+                each(limits::RATES_BIAS, rates_rad_s)?;
+                each(limits::FORCE_BIAS, specific_force_m_s2)
+            }
+            Failure::TrackerJumped { by_m, yaw_rad } => {
+                each(limits::JUMP, by_m)?;
+                limits::YAW.check(*yaw_rad)
+            }
+            Failure::GnssJumped { by_m } => each(limits::JUMP, by_m),
+            Failure::MagnetometerDisturbed { field_ut } => each(limits::FIELD, field_ut),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What an instrument said before the onset.
+#[derive(Clone, Copy, Debug, Default)]
+struct Held {
+    imu: Option<ImuReading>,
+    tracker: Option<TrackerFix>,
+    height: Option<HeightFix>,
+    true_height_m: Option<f64>,
+    field: Option<FieldFix>,
+}
+
+/// The failures of a flight, which act one after the other, as listed.
+#[derive(Clone, Debug)]
+pub(super) struct Failures {
+    faults: Vec<(InstrumentFault, Held)>,
+    /// The last of each.
+    last: Held,
+    random: Noise,
+}
+
+/// Tolerance when comparing times, far below any step \[s\].
+const TIME_SLACK_S: f64 = 1e-9;
+
+impl Failures {
+    pub(super) fn new(faults: &[InstrumentFault], seed: u64) -> Self {
+        let faults = faults.iter().map(|fault| (*fault, Held::default())).collect();
+        Failures { faults, last: Held::default(), random: Noise::new(seed, Stream::Failures) }
+    }
+
+    /// Returns the failures that act at `now_s`, each with what it holds.
+    fn active(faults: &mut [(InstrumentFault, Held)], now_s: f64) -> impl Iterator<Item = (Failure, &mut Held)> {
+        let now_s = now_s + TIME_SLACK_S;
+        let active = faults.iter_mut().filter(move |(fault, _)| (fault.start_s..fault.end_s).contains(&now_s));
+        active.map(|(fault, held)| (fault.failure, held))
+    }
+
+    pub(super) fn imu(&mut self, mut seen: ImuReading) -> Option<ImuReading> {
+        let before = *self.last.imu.get_or_insert(seen);
+        let mut alive = true;
+        for (failure, held) in Self::active(&mut self.faults, seen.at_s) {
+            let ImuReading { at_s, rates_rad_s: rates, specific_force_m_s2: force } = &mut seen;
+            match failure {
+                Failure::ImuStuck => seen = ImuReading { at_s: *at_s, ..*held.imu.get_or_insert(before) },
+                Failure::ImuDead => alive = false,
+                Failure::ImuNoisy { rates_rad_s, specific_force_m_s2 } => {
+                    *rates += draw(&mut self.random) * rates_rad_s;
+                    *force += draw(&mut self.random) * specific_force_m_s2;
+                }
+                Failure::ImuClipped { rates_rad_s, specific_force_m_s2 } => {
+                    *rates = rates.map(|rate| rate.clamp(-rates_rad_s, rates_rad_s));
+                    *force = force.map(|force| force.clamp(-specific_force_m_s2, specific_force_m_s2));
+                }
+                Failure::ImuBiased { rates_rad_s, specific_force_m_s2 } => {
+                    (*rates, *force) = (*rates + rates_rad_s, *force + specific_force_m_s2);
+                }
+                _ => {}
+            }
+        }
+        self.last.imu = Some(seen);
+        alive.then_some(seen)
+    }
+
+    pub(super) fn tracker(&mut self, now_s: f64, mut seen: TrackerFix) -> Option<TrackerFix> {
+        let before = *self.last.tracker.get_or_insert(seen);
+        let mut alive = true;
+        for (failure, held) in Self::active(&mut self.faults, now_s) {
+            match failure {
+                Failure::TrackerLost => alive = false,
+                Failure::TrackerFrozen => {
+                    seen = TrackerFix { true_at_s: seen.true_at_s, ..*held.tracker.get_or_insert(before) };
+                }
+                Failure::TrackerJumped { by_m, yaw_rad } => {
+                    let (c, s) = (cos(yaw_rad), sin(yaw_rad));
+                    let [[x, y, z]] = seen.position_m.data.0;
+                    seen.position_m = by_m + Vector3::new(c * x - s * y, s * x + c * y, z);
+                    let turn = Quaternion::new(cos(0.5 * yaw_rad), 0.0, 0.0, sin(0.5 * yaw_rad));
+                    seen.attitude = turn * seen.attitude;
+                }
+                _ => {}
+            }
+        }
+        self.last.tracker = Some(seen);
+        alive.then_some(seen)
+    }
+
+    pub(super) fn gnss(&mut self, mut seen: GnssFix) -> Option<GnssFix> {
+        let mut alive = true;
+        for (failure, _) in Self::active(&mut self.faults, seen.true_at_s) {
+            match failure {
+                Failure::GnssLost => alive = false,
+                Failure::GnssJumped { by_m } => seen.position_m += by_m,
+                _ => {}
+            }
+        }
+        alive.then_some(seen)
+    }
+
+    /// `true_height_m` is what the height would be without an error.
+    pub(super) fn barometer(&mut self, true_height_m: f64, mut seen: HeightFix) -> Option<HeightFix> {
+        let before = *self.last.height.get_or_insert(seen);
+        let mut alive = true;
+        for (failure, held) in Self::active(&mut self.faults, seen.true_at_s) {
+            match failure {
+                Failure::BarometerLost => alive = false,
+                Failure::BarometerStuck => seen.height_m = held.height.get_or_insert(before).height_m,
+                Failure::BarometerBlocked => {
+                    seen.height_m += *held.true_height_m.get_or_insert(true_height_m) - true_height_m;
+                }
+                _ => {}
+            }
+        }
+        self.last.height = Some(seen);
+        alive.then_some(seen)
+    }
+
+    pub(super) fn magnetometer(&mut self, mut seen: FieldFix) -> Option<FieldFix> {
+        let before = *self.last.field.get_or_insert(seen);
+        let mut alive = true;
+        for (failure, held) in Self::active(&mut self.faults, seen.true_at_s) {
+            match failure {
+                Failure::MagnetometerLost => alive = false,
+                Failure::MagnetometerStuck => seen.field_ut = held.field.get_or_insert(before).field_ut,
+                Failure::MagnetometerDisturbed { field_ut } => seen.field_ut += field_ut,
+                _ => {}
+            }
+        }
+        self.last.field = Some(seen);
+        alive.then_some(seen)
+    }
+}

@@ -1,0 +1,207 @@
+//! Inertial measurement unit: gyroscope and accelerometer.
+
+use super::mounting::{Mounted, Mounting};
+use super::triad::{Quality, Triad};
+use super::vibration::Vibration;
+use crate::noise::{Noise, Stream};
+use crate::truth::Truth;
+use afbc_types::parameters;
+use nalgebra::Vector3;
+
+parameters! {
+    /// Properties of a gyroscope. The default is perfect.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Gyroscope {
+        /// One-sided density of white noise, as in data sheets: its standard deviation in a sample is this times the
+        /// root of half the sampling rate, before the filter.
+        #[parameter(NOISE, "rad/s/rtHz", 0.0..=0.1)]
+        pub noise_rad_s_rthz: f64 = 0.0,
+        /// Standard deviation of the bias instability, a first-order Gauss-Markov process.
+        #[parameter(INSTAB, "rad/s", 0.0..=1.0)]
+        pub instability_rad_s: f64 = 0.0,
+        /// Correlation time of the bias instability.
+        #[parameter(INSTAB_T, "s", 0.001..=1e5)]
+        pub instability_time_s: f64 = 100.0,
+        /// Random walk of the bias: its standard deviation after one second, which grows with the root of time.
+        #[parameter(WALK, "rad/s2/rtHz", 0.0..=0.1)]
+        pub walk_rad_s2_rthz: f64 = 0.0,
+        /// Standard deviation of a constant bias, drawn once per flight.
+        #[parameter(BIAS, "rad/s", 0.0..=1.0)]
+        pub bias_rad_s: f64 = 0.0,
+        /// Standard deviation of each axis's scale factor error, drawn once per flight.
+        #[parameter(SCALE, "1", 0.0..=0.1)]
+        pub scale: f64 = 0.0,
+        /// Standard deviation of each axis's angles to the other two, drawn once per flight.
+        #[parameter(MISALIGN, "rad", 0.0..=0.1)]
+        pub misalignment_rad: f64 = 0.0,
+        /// Largest rate that is measured; 0 for no limit.
+        #[parameter(RANGE, "rad/s", 0.0..=1000.0)]
+        pub range_rad_s: f64 = 0.0,
+        /// Step of the output; 0 for none.
+        #[parameter(LSB, "rad/s", 0.0..=1.0)]
+        pub lsb_rad_s: f64 = 0.0,
+        /// Cut-off of the second-order anti-alias filter; 0 for none.
+        #[parameter(CUTOFF, "Hz", 0.0..=10_000.0)]
+        pub cutoff_hz: f64 = 0.0,
+        /// Amplitude of the vibration from one hovering rotor at its frequency, which grows with the square of the
+        /// speed.
+        #[parameter(VIBR, "rad/s", 0.0..=10.0)]
+        pub vibration_rad_s: f64 = 0.0,
+    }
+}
+
+parameters! {
+    /// Properties of an accelerometer. The default is perfect.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Accelerometer {
+        /// One-sided density of white noise, as in data sheets: its standard deviation in a sample is this times the
+        /// root of half the sampling rate, before the filter.
+        #[parameter(NOISE, "m/s2/rtHz", 0.0..=1.0)]
+        pub noise_m_s2_rthz: f64 = 0.0,
+        /// Standard deviation of the bias instability, a first-order Gauss-Markov process.
+        #[parameter(INSTAB, "m/s2", 0.0..=10.0)]
+        pub instability_m_s2: f64 = 0.0,
+        /// Correlation time of the bias instability.
+        #[parameter(INSTAB_T, "s", 0.001..=1e5)]
+        pub instability_time_s: f64 = 100.0,
+        /// Random walk of the bias: its standard deviation after one second, which grows with the root of time.
+        #[parameter(WALK, "m/s3/rtHz", 0.0..=1.0)]
+        pub walk_m_s3_rthz: f64 = 0.0,
+        /// Standard deviation of a constant bias, drawn once per flight.
+        #[parameter(BIAS, "m/s2", 0.0..=10.0)]
+        pub bias_m_s2: f64 = 0.0,
+        /// Standard deviation of each axis's scale factor error, drawn once per flight.
+        #[parameter(SCALE, "1", 0.0..=0.1)]
+        pub scale: f64 = 0.0,
+        /// Standard deviation of each axis's angles to the other two, drawn once per flight.
+        #[parameter(MISALIGN, "rad", 0.0..=0.1)]
+        pub misalignment_rad: f64 = 0.0,
+        /// Largest specific force that is measured; 0 for no limit.
+        #[parameter(RANGE, "m/s2", 0.0..=10_000.0)]
+        pub range_m_s2: f64 = 0.0,
+        /// Step of the output; 0 for none.
+        #[parameter(LSB, "m/s2", 0.0..=1.0)]
+        pub lsb_m_s2: f64 = 0.0,
+        /// Cut-off of the second-order anti-alias filter; 0 for none.
+        #[parameter(CUTOFF, "Hz", 0.0..=10_000.0)]
+        pub cutoff_hz: f64 = 0.0,
+        /// Amplitude of the vibration from one hovering rotor at its frequency, which grows with the square of the
+        /// speed.
+        #[parameter(VIBR, "m/s2", 0.0..=1000.0)]
+        pub vibration_m_s2: f64 = 0.0,
+    }
+}
+
+parameters! {
+    /// Properties of an inertial measurement unit, which is read in every step. The default is perfect.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Imu {
+        /// Gyroscope.
+        #[group("gyro")]
+        pub gyro: Gyroscope = Gyroscope::DEFAULT,
+        /// Accelerometer.
+        #[group("accel")]
+        pub accel: Accelerometer = Accelerometer::DEFAULT,
+        /// Amplitudes of the vibration at one, two and three times a rotor's frequency, relative to the first.
+        #[parameter(HARMONICS, "1", 0.0..=10.0)]
+        pub harmonics: Vector3<f64> = Vector3::new(1.0, 0.5, 0.25),
+        /// Place on the vehicle.
+        pub mounting: Mounting = Mounting::DEFAULT,
+    }
+    together(imu) {
+        imu.mounting.validate()
+    }
+}
+
+/// One sample, in sensor axes ([`Mounting`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImuReading {
+    /// Time of the sample \[s\].
+    pub at_s: f64,
+    /// Angular rate \[rad/s\].
+    pub rates_rad_s: Vector3<f64>,
+    /// Specific force, +g upward at rest \[m/s2\].
+    pub specific_force_m_s2: Vector3<f64>,
+}
+
+/// True biases of an inertial measurement unit, in sensor axes: constant part, instability and random walk.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImuBias {
+    /// Of the gyroscope \[rad/s\].
+    pub rates_rad_s: Vector3<f64>,
+    /// Of the accelerometer \[m/s2\].
+    pub specific_force_m_s2: Vector3<f64>,
+}
+
+impl Gyroscope {
+    fn quality(&self) -> Quality {
+        Quality {
+            noise: self.noise_rad_s_rthz,
+            instability: self.instability_rad_s,
+            instability_s: self.instability_time_s,
+            walk: self.walk_rad_s2_rthz,
+            bias: self.bias_rad_s,
+            scale: self.scale,
+            misalignment: self.misalignment_rad,
+            range: self.range_rad_s,
+            lsb: self.lsb_rad_s,
+            cutoff_hz: self.cutoff_hz,
+        }
+    }
+}
+
+impl Accelerometer {
+    fn quality(&self) -> Quality {
+        Quality {
+            noise: self.noise_m_s2_rthz,
+            instability: self.instability_m_s2,
+            instability_s: self.instability_time_s,
+            walk: self.walk_m_s3_rthz,
+            bias: self.bias_m_s2,
+            scale: self.scale,
+            misalignment: self.misalignment_rad,
+            range: self.range_m_s2,
+            lsb: self.lsb_m_s2,
+            cutoff_hz: self.cutoff_hz,
+        }
+    }
+}
+
+/// An inertial measurement unit in simulation.
+#[derive(Clone, Debug)]
+pub(super) struct Inertial {
+    mounted: Mounted,
+    gyro: Triad,
+    accel: Triad,
+    vibration: Vibration,
+    random: Noise,
+}
+
+impl Inertial {
+    pub(super) fn new(imu: &Imu, seed: u64, step_s: f64) -> Self {
+        let mut random = Noise::new(seed, Stream::Imu);
+        let amplitudes = [imu.gyro.vibration_rad_s, imu.accel.vibration_m_s2];
+        Inertial {
+            mounted: Mounted::new(&imu.mounting),
+            gyro: Triad::new(&imu.gyro.quality(), &mut random, step_s),
+            accel: Triad::new(&imu.accel.quality(), &mut random, step_s),
+            vibration: Vibration::new(amplitudes, imu.harmonics, seed, step_s),
+            random,
+        }
+    }
+
+    /// Returns the sample of this step.
+    pub(super) fn sample(&mut self, truth: &Truth) -> ImuReading {
+        let [rates, force] = self.mounted.feel(truth);
+        let [shaken, pushed] = self.vibration.advance(truth, [&self.gyro.filter, &self.accel.filter]);
+        ImuReading {
+            at_s: truth.time_s,
+            rates_rad_s: self.gyro.measure(&rates, &shaken, &mut self.random),
+            specific_force_m_s2: self.accel.measure(&force, &pushed, &mut self.random),
+        }
+    }
+
+    pub(super) fn bias(&self) -> ImuBias {
+        ImuBias { rates_rad_s: self.gyro.bias(), specific_force_m_s2: self.accel.bias() }
+    }
+}

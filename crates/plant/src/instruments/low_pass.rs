@@ -1,0 +1,46 @@
+//! Anti-alias filter.
+
+use core::f64::consts::{PI, SQRT_2};
+use libm::{sqrt, tan};
+use nalgebra::Vector3;
+
+/// Second-order Butterworth low-pass of three coordinates, by the bilinear transform with the cut-off kept. None below
+/// half the sampling rate is no filter for the samples.
+#[derive(Clone, Debug)]
+pub(super) struct LowPass {
+    cutoff_hz: f64,
+    /// b0 = b2 = b1/2, a1, a2; none lets everything pass.
+    weights: Option<[f64; 3]>,
+    /// State of the transposed direct form II; none before the first value.
+    state: Option<[Vector3<f64>; 2]>,
+}
+
+impl LowPass {
+    /// Creates a filter; a cut-off of 0 is none.
+    pub(super) fn new(cutoff_hz: f64, step_s: f64) -> Self {
+        let weights = (cutoff_hz > 0.0 && cutoff_hz * step_s < 0.5).then(|| {
+            let k = tan(PI * cutoff_hz * step_s);
+            let scale = 1.0 / (1.0 + SQRT_2 * k + k * k);
+            [k * k * scale, 2.0 * (k * k - 1.0) * scale, (1.0 - SQRT_2 * k + k * k) * scale]
+        });
+        LowPass { cutoff_hz, weights, state: None }
+    }
+
+    /// Returns the filtered value; the first one counts as having stood for ever.
+    pub(super) fn pass(&mut self, value: Vector3<f64>) -> Vector3<f64> {
+        let Some([b, a1, a2]) = self.weights else { return value };
+        let [first, second] = self.state.unwrap_or([value * (1.0 - b), value * (b - a2)]);
+        let out = value * b + first;
+        self.state = Some([value * (2.0 * b) - out * a1 + second, value * b - out * a2]);
+        out
+    }
+
+    /// Returns the share of an oscillation of this frequency that the analogue filter lets pass to the samples.
+    pub(super) fn share(&self, frequency_hz: f64) -> f64 {
+        if self.cutoff_hz == 0.0 {
+            return 1.0;
+        }
+        let ratio = frequency_hz / self.cutoff_hz;
+        1.0 / sqrt(1.0 + ratio * ratio * ratio * ratio)
+    }
+}

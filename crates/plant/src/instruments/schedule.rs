@@ -1,0 +1,57 @@
+//! Sampling and delay of fixes.
+
+use alloc::vec::Vec;
+use libm::floor;
+
+/// Tolerance when comparing times, far below any step \[s\].
+const TIME_SLACK_S: f64 = 1e-9;
+
+/// The steps at which a sensor of any rate samples: the first one, then the first after each period.
+#[derive(Clone, Debug)]
+pub(super) struct Clock {
+    /// Samples per step.
+    per_step: f64,
+    steps: u64,
+    taken: u64,
+}
+
+impl Clock {
+    pub(super) fn new(rate_hz: f64, step_s: f64) -> Self {
+        Clock { per_step: rate_hz * step_s, steps: 0, taken: 0 }
+    }
+
+    /// Returns whether this step is one of them; to be called in every step.
+    pub(super) fn ticks(&mut self) -> bool {
+        let due = floor(self.steps as f64 * self.per_step + TIME_SLACK_S) as u64 + 1;
+        self.steps += 1;
+        let ticks = due > self.taken;
+        self.taken = due;
+        ticks
+    }
+}
+
+/// Fixes on their way, which arrive in the order of their arrival times.
+#[derive(Clone, Debug)]
+pub(super) struct Transit<T> {
+    /// Each with its arrival \[s\], in that order.
+    waiting: Vec<(f64, T)>,
+}
+
+impl<T> Transit<T> {
+    pub(super) fn new() -> Self {
+        Transit { waiting: Vec::new() }
+    }
+
+    /// Sends a fix that arrives at `arrives_s`.
+    pub(super) fn send(&mut self, arrives_s: f64, fix: T) {
+        let place = self.waiting.partition_point(|(earlier_s, _)| *earlier_s <= arrives_s);
+        self.waiting.insert(place, (arrives_s, fix));
+    }
+
+    /// Returns the fixes that have arrived by `now_s`.
+    pub(super) fn arrived(&mut self, now_s: f64) -> Vec<T> {
+        let count = self.waiting.partition_point(|(arrives_s, _)| *arrives_s <= now_s + TIME_SLACK_S);
+        // Without an allocation in most steps.
+        if count == 0 { Vec::new() } else { self.waiting.drain(..count).map(|(_, fix)| fix).collect() }
+    }
+}

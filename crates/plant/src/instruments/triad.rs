@@ -1,0 +1,86 @@
+//! Three axes of an inertial sensor, gyroscope or accelerometer.
+
+use super::low_pass::LowPass;
+use super::markov::{Markov, draw};
+use crate::noise::Noise;
+use libm::{round, sqrt};
+use nalgebra::{Matrix3, Vector3};
+
+/// Properties of a triad, in the unit of what it measures. Zero is none.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Quality {
+    /// One-sided density of white noise, per root of hertz.
+    pub(super) noise: f64,
+    /// Stationary standard deviation and correlation time \[s\] of the bias instability.
+    pub(super) instability: f64,
+    pub(super) instability_s: f64,
+    /// Standard deviation of the bias's random walk after one second.
+    pub(super) walk: f64,
+    /// Standard deviations of bias, scale factor and misalignment, drawn once.
+    pub(super) bias: f64,
+    pub(super) scale: f64,
+    pub(super) misalignment: f64,
+    /// Largest value, and step of the output.
+    pub(super) range: f64,
+    pub(super) lsb: f64,
+    /// Cut-off of the anti-alias filter \[Hz\].
+    pub(super) cutoff_hz: f64,
+}
+
+/// A triad in simulation: scale and misalignment, bias and noise, then filter, range and quantisation.
+#[derive(Clone, Debug)]
+pub(super) struct Triad {
+    distortion: Matrix3<f64>,
+    constant: Vector3<f64>,
+    instability: Markov,
+    walk: Vector3<f64>,
+    walk_per_step: f64,
+    white: f64,
+    pub(super) filter: LowPass,
+    range: f64,
+    lsb: f64,
+}
+
+impl Triad {
+    pub(super) fn new(quality: &Quality, random: &mut Noise, step_s: f64) -> Self {
+        let constant = draw(random) * quality.bias;
+        let scale = draw(random) * quality.scale;
+        let mut distortion = Matrix3::from_fn(|_, _| random.normal() * quality.misalignment);
+        distortion.set_diagonal(&(Vector3::repeat(1.0) + scale));
+        let instability = Vector3::repeat(quality.instability);
+        Triad {
+            distortion,
+            constant,
+            instability: Markov::new(instability, quality.instability_s, step_s, random),
+            walk: Vector3::zeros(),
+            walk_per_step: quality.walk * sqrt(step_s),
+            // The density up to half the sampling rate.
+            white: quality.noise * sqrt(0.5 / step_s),
+            filter: LowPass::new(quality.cutoff_hz, step_s),
+            range: if quality.range > 0.0 { quality.range } else { f64::INFINITY },
+            lsb: quality.lsb,
+        }
+    }
+
+    /// Returns the present bias: constant, instability and random walk.
+    pub(super) fn bias(&self) -> Vector3<f64> {
+        self.constant + self.instability.value + self.walk
+    }
+
+    /// Measures `truth`, sensor axes, with `vibration`, which has passed the filter.
+    pub(super) fn measure(
+        &mut self,
+        truth: &Vector3<f64>,
+        vibration: &Vector3<f64>,
+        random: &mut Noise,
+    ) -> Vector3<f64> {
+        self.instability.advance(random);
+        self.walk += draw(random) * self.walk_per_step;
+        let analogue = self.distortion * truth + self.bias() + draw(random) * self.white;
+        let (range, lsb) = (self.range, self.lsb);
+        (self.filter.pass(analogue) + vibration).map(|value| {
+            let value = value.clamp(-range, range);
+            if lsb > 0.0 { round(value / lsb) * lsb } else { value }
+        })
+    }
+}

@@ -1,0 +1,80 @@
+//! Vibration at the rotors' frequencies.
+
+use super::low_pass::LowPass;
+use crate::frame::Lanes;
+use crate::noise::{Noise, Stream};
+use crate::truth::Truth;
+use core::f64::consts::TAU;
+use libm::{cos, floor, sin};
+use nalgebra::Vector3;
+
+/// Harmonics of each rotor's frequency that the body vibrates at.
+const HARMONICS: usize = 3;
+
+/// Cosine and sine of a phase.
+type Phase = (f64, f64);
+
+/// Sum over the rotors of A_k (omega/omega_hover)^2 cos(k theta + phi) on each axis, with theta the rotor's angle and
+/// phases phi that are drawn once. An unbalanced rotor pushes with its mass times omega^2, hence the square.
+#[derive(Clone, Debug)]
+pub(super) struct Vibration {
+    /// Angle of each rotor, within 0 to 2 pi \[rad\].
+    angle: Lanes,
+    /// Speeds at the last step.
+    speeds_rad_s: Option<Lanes>,
+    /// Phases by rotor, harmonic, sensor (gyroscope, accelerometer) and axis.
+    phases: [[[[Phase; 3]; 2]; HARMONICS]; afbc_types::ROTORS_MAX],
+    /// Amplitudes of the harmonics, relative.
+    harmonics: Vector3<f64>,
+    /// Amplitudes at hover of a rotor's first harmonic, by sensor.
+    amplitudes: [f64; 2],
+    step_s: f64,
+}
+
+impl Vibration {
+    /// Creates the vibration of amplitudes `[rad/s, m/s2]`.
+    pub(super) fn new(amplitudes: [f64; 2], harmonics: Vector3<f64>, seed: u64, step_s: f64) -> Self {
+        let mut random = Noise::new(seed, Stream::Vibration);
+        let angle = Lanes::from_fn(|_, _| TAU * random.uniform());
+        let mut phases = [[[[(1.0, 0.0); 3]; 2]; HARMONICS]; afbc_types::ROTORS_MAX];
+        phases.as_flattened_mut().as_flattened_mut().as_flattened_mut().iter_mut().for_each(|phase| {
+            let phi = TAU * random.uniform();
+            *phase = (cos(phi), sin(phi));
+        });
+        Vibration { angle, speeds_rad_s: None, phases, harmonics, amplitudes, step_s }
+    }
+
+    /// Returns the vibration as `[angular rate, specific force]` after the sensors' filters.
+    pub(super) fn advance(&mut self, truth: &Truth, filters: [&LowPass; 2]) -> [Vector3<f64>; 2] {
+        let mut sum = [Vector3::zeros(); 2];
+        if self.amplitudes == [0.0; 2] || truth.hover_rad_s == 0.0 {
+            return sum;
+        }
+        let now = truth.rotor_speeds_rad_s;
+        let mean = (self.speeds_rad_s.unwrap_or(now) + now) * 0.5;
+        self.speeds_rad_s = Some(now);
+        let rotors = self.angle.iter_mut().zip(mean.iter()).zip(now.iter()).zip(&self.phases);
+        for (((angle, mean), speed), phases) in rotors {
+            if *speed == 0.0 && *mean == 0.0 {
+                continue;
+            }
+            let turned = *angle + mean * self.step_s;
+            *angle = turned - TAU * floor(turned / TAU);
+            let (c, s) = (cos(*angle), sin(*angle));
+            let growth = (speed / truth.hover_rad_s) * (speed / truth.hover_rad_s);
+            // Cosine and sine of k theta.
+            let (mut ck, mut sk, mut k) = (1.0, 0.0, 0.0);
+            for (phases, relative) in phases.iter().zip(self.harmonics.iter()) {
+                (ck, sk, k) = (ck * c - sk * s, sk * c + ck * s, k + 1.0);
+                let frequency_hz = k * speed / TAU;
+                let sensors = sum.iter_mut().zip(phases).zip(self.amplitudes).zip(filters);
+                for (((sum, [x, y, z]), amplitude), filter) in sensors {
+                    let size = amplitude * relative * growth * filter.share(frequency_hz);
+                    let part = |(cos_phi, sin_phi): &Phase| ck * cos_phi - sk * sin_phi;
+                    *sum += Vector3::new(part(x), part(y), part(z)) * size;
+                }
+            }
+        }
+        sum
+    }
+}

@@ -1,0 +1,156 @@
+//! The tracker compared with its declared properties, within five standard errors and with fixed seeds.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::float_cmp, missing_docs)] // tests
+
+mod common;
+
+use afbc_plant::instruments::{Tracker, TrackerFix};
+use afbc_plant::{Dropouts, Suite, Truth};
+use common::{STEP_S, assert_sigma, coordinates, mean, rest, rotation, run};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+fn with(tracker: Tracker) -> Suite {
+    Suite { tracker: Some(tracker), ..Suite::default() }
+}
+
+/// A motion whose position tells its step: x is the number of milliseconds.
+fn moving(k: u32) -> Truth {
+    let attitude = UnitQuaternion::from_euler_angles(0.2, -0.3, 0.5 + 1e-4 * f64::from(k % 1000)).into_inner();
+    Truth { position_m: Vector3::new(f64::from(k), -2.0, 3.0), attitude, ..rest() }
+}
+
+/// Fixes, each with the step of its arrival.
+fn fixes(tracker: Tracker, seed: u64, steps: u32) -> Vec<(u32, TrackerFix)> {
+    let readings = run(with(tracker), seed, steps, moving);
+    (0..).zip(readings).flat_map(|(k, readings)| readings.tracker.into_iter().map(move |fix| (k, fix))).collect()
+}
+
+/// Step at which a fix was true, by its stamp.
+fn taken(fix: &TrackerFix) -> u32 {
+    (fix.true_at_s / STEP_S).round() as u32
+}
+
+#[test]
+fn a_perfect_one_sends_the_truth_at_once_at_its_rate() {
+    for (rate_hz, steps) in [(100.0, 10.0), (240.0, 1000.0 / 240.0), (1000.0, 1.0), (7.0, 1000.0 / 7.0)] {
+        let fixes = fixes(Tracker { rate_hz, ..Tracker::DEFAULT }, 1, 5000);
+        let expected: Vec<u32> =
+            (0..).map(|n| (f64::from(n) * steps - 1e-6).ceil() as u32).take_while(|k| *k < 5000).collect();
+        assert_eq!(fixes.iter().map(|(k, _)| *k).collect::<Vec<_>>(), expected, "{rate_hz} Hz");
+        for (k, fix) in fixes {
+            let truth = moving(k);
+            assert_eq!(fix.true_at_s, f64::from(k) * STEP_S);
+            assert_eq!((fix.position_m, fix.attitude), (truth.position_m, truth.attitude));
+        }
+    }
+}
+
+/// A fix arrives in the first step after its delay, which is uniform within the jitter, and its stamp is the time of its
+/// motion.
+#[test]
+fn delays_are_spread_as_declared_and_stamps_tell_them() {
+    let tracker = Tracker { delay_s: 0.0105, jitter_s: 0.004, rate_hz: 250.0, ..Tracker::DEFAULT };
+    let fixes = fixes(tracker, 2, 200_000);
+    let mut late = Vec::new();
+    for (k, fix) in &fixes {
+        assert_eq!(fix.position_m.x, f64::from(taken(fix)), "the pose is that of the stamp");
+        late.push(f64::from(k - taken(fix)) * STEP_S);
+    }
+    // Uniform within 6.5 to 14.5 ms, rounded up: 7 to 15 ms.
+    assert!(late.iter().all(|late| (0.0069..0.0151).contains(late)));
+    let n = late.len() as f64;
+    // Eight whole steps: seven full ones and the ends' halves, so the mean of the ceiling is half a step more.
+    assert!((mean(&late) - 0.011).abs() < 5.0 * (0.004 / 3.0_f64.sqrt()) / n.sqrt() + 1e-5, "{}", mean(&late));
+    let spread: Vec<f64> = late.iter().map(|late| late - 0.011).collect();
+    let variance = 0.004_f64.powi(2) / 3.0 + STEP_S * STEP_S / 12.0;
+    assert!((common::power(&spread) / variance - 1.0).abs() < 0.05);
+    // Those of one delay arrive in their order, some of these do not.
+    assert!(fixes.windows(2).any(|w| w[1].1.true_at_s < w[0].1.true_at_s));
+    let preset = self::fixes(Tracker::MOCAP_100, 2, 100_000);
+    assert!(preset.iter().all(|(k, fix)| (8..=12).contains(&(k - taken(fix)))));
+    assert!(preset.windows(2).all(|w| w[1].1.true_at_s > w[0].1.true_at_s));
+}
+
+#[test]
+fn stamps_have_their_errors() {
+    let tracker = Tracker { stamp_s: 0.003, stamp_noise_s: 0.001, ..Tracker::DEFAULT };
+    let errors: Vec<f64> =
+        fixes(tracker, 3, 100_000).iter().map(|(k, fix)| fix.true_at_s - f64::from(*k) * STEP_S - 0.003).collect();
+    assert_sigma(&errors, 0.001, "stamps");
+    assert!(mean(&errors).abs() < 5.0 * 0.001 / (errors.len() as f64).sqrt());
+}
+
+/// Errors of a fix that arrives at once: position, and rotation about the body's axes.
+fn errors(fixes: &[(u32, TrackerFix)]) -> (Vec<f64>, Vec<f64>) {
+    let position = fixes.iter().map(|(k, fix)| fix.position_m - moving(*k).position_m);
+    let attitude = fixes.iter().map(|(k, fix)| rotation(moving(*k).attitude.conjugate() * fix.attitude));
+    (coordinates(position), coordinates(attitude))
+}
+
+#[test]
+fn noise_has_its_spread_and_outliers_their_share() {
+    let tracker = Tracker { position_m: 0.002, attitude_rad: 0.004, ..Tracker::DEFAULT };
+    let clean = fixes(tracker, 4, 500_000);
+    let (position, attitude) = errors(&clean);
+    assert_sigma(&position, 0.002, "position");
+    assert_sigma(&attitude, 0.004, "attitude");
+    assert!(clean.iter().all(|(_, fix)| (fix.attitude.norm() - 1.0).abs() < 1e-12));
+
+    let dirty = fixes(Tracker { outliers: 0.02, outlier_m: 3.0, outlier_rad: 0.1, ..tracker }, 4, 500_000);
+    let (mut far, mut turned) = (Vec::new(), Vec::new());
+    for ((k, fix), (_, clean)) in dirty.iter().zip(&clean) {
+        // An outlier changes its own fix and no other one's noise.
+        if fix != clean {
+            far.push(fix.position_m - clean.position_m);
+            turned.push(rotation(moving(*k).attitude.conjugate() * fix.attitude));
+        }
+    }
+    let (n, share) = (dirty.len() as f64, far.len() as f64 / dirty.len() as f64);
+    assert!((share - 0.02).abs() < 5.0 * (0.02 * 0.98 / n).sqrt(), "{share}");
+    assert_sigma(&coordinates(far), 3.0, "outliers");
+    assert_sigma(&coordinates(turned), (0.1_f64.powi(2) + 0.004_f64.powi(2)).sqrt(), "turned outliers");
+}
+
+#[test]
+fn the_frame_is_shifted_and_turned() {
+    let (frame_m, frame_yaw_rad) = (Vector3::new(1.0, 2.0, -0.5), 0.7);
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.7);
+    for (k, fix) in fixes(Tracker { frame_m, frame_yaw_rad, ..Tracker::DEFAULT }, 5, 1000) {
+        let truth = moving(k);
+        assert!((fix.position_m - (turn * truth.position_m + frame_m)).norm() < 1e-9);
+        let expected: Quaternion<f64> = turn.into_inner() * truth.attitude;
+        assert!((fix.attitude - expected).norm() < 1e-12);
+    }
+}
+
+/// Dropouts and freezes take the share of time of a two-state chain; a frozen pose is an old one with a new stamp, and
+/// neither changes the noise of the others.
+#[test]
+fn dropouts_lose_fixes_and_freezes_repeat_them() {
+    let noisy = Tracker { position_m: 0.001, ..Tracker::DEFAULT };
+    let chain = Dropouts { rate_hz: 0.5, mean_s: 0.2 };
+    let all = fixes(noisy, 6, 2_000_000);
+    let share = |count: usize| {
+        let (begins, ends) = (1.0 - (-0.5 * STEP_S).exp(), 1.0 - (-STEP_S / 0.2).exp());
+        let (p, r) = (begins / (begins + ends), 1.0 - begins - ends);
+        let found = count as f64 / all.len() as f64;
+        let bound = 5.0 * (p * (1.0 - p) / 2e6 * (1.0 + r) / (1.0 - r)).sqrt();
+        assert!((found - p).abs() < bound, "{found}, not {p} within {bound}");
+    };
+    let lossy = fixes(Tracker { loss: chain, ..noisy }, 6, 2_000_000);
+    let mut kept = all.iter();
+    assert!(lossy.iter().all(|fix| kept.any(|other| other == fix)), "what arrives is as without dropouts");
+    share(all.len() - lossy.len());
+
+    let frozen = fixes(Tracker { freeze: chain, ..noisy }, 6, 2_000_000);
+    assert_eq!(frozen.len(), all.len());
+    let mut count = 0;
+    for i in 1..all.len() {
+        let ((k, fix), (_, true_one)) = (frozen[i], all[i]);
+        assert_eq!(fix.true_at_s, f64::from(k) * STEP_S);
+        if fix != true_one {
+            count += 1;
+            assert_eq!((fix.position_m, fix.attitude), (frozen[i - 1].1.position_m, frozen[i - 1].1.attitude));
+        }
+    }
+    share(count);
+}
