@@ -316,7 +316,7 @@ fn expand(message: &str) -> String {
             "ALL",
             "name, description, duration_s, seed, plant, vehicle, truth, controllers, profile, gains, settings, \
              limits, monitor, contender, trajectory, initial, gust, change, payload, rotors, rotor_fault, battery, \
-             drag, wind, ground, sensors, sensor_fault, outage, flight_core",
+             drag, wind, ground, sensors, sensor_fault, instruments, instrument_fault, outage, flight_core",
         )
 }
 

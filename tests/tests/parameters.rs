@@ -8,11 +8,11 @@ use afbc::Profile;
 use afbc::monitor::Bounds;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Curve;
+use afbc_plant::instruments::{Accelerometer, Barometer, Gnss, Gyroscope, Imu, Magnetometer, Mounting, Tracker};
 use afbc_plant::{Battery, Contact, Deviations, Drag, Dropouts, GroundEffect, Rotors, Sensing, Turbulence, Wind};
 use afbc_reader::words::number;
 use afbc_sim::contender::{ControllerKind, Law};
 use afbc_types::{Declaration, Declared, OutOfRange, Parameters, Value};
-use afbc_vehicles::Imu;
 use core::convert::Infallible;
 use core::fmt::Write;
 use std::collections::{BTreeMap, BTreeSet};
@@ -109,7 +109,7 @@ fn groups() -> Vec<Group> {
     let mut groups = vec![
         group("Vehicle: `[vehicle]`, `[truth]`", "V_", Parameters::DEFAULT),
         group("Motors: `[motor]` of a vehicle file", "MOT_", Curve::DEFAULT),
-        group("Inertial sensor: `[imu]` of a vehicle file", "IMU_", Imu::DEFAULT),
+        group("Inertial sensor: `[imu]` of a vehicle file", "IMU_", Mounting::DEFAULT),
         group("Arming", "ARM_", ArmingLimits::DEFAULT),
         profiles("Control: `[settings]`, `[limits]`", "C_", Profile::settings),
         profiles("AFBC's monitor", "M_", bounds),
@@ -125,6 +125,11 @@ fn groups() -> Vec<Group> {
         group("Simulated ground effect: `[ground]`", "GE_", GroundEffect::DEFAULT),
         group("Simulated sensors: `[sensors]`", "SENS_", Sensing::DEFAULT),
         group("Simulated dropouts: `[sensors.dropouts]`", "DROP_", Dropouts::DEFAULT),
+        group("Simulated inertial sensor: `[instruments.imu]`", "I_", Imu::DEFAULT),
+        group("Simulated tracker: `[instruments.tracker]`", "TRK_", Tracker::DEFAULT),
+        group("Simulated GNSS receiver: `[instruments.gnss]`", "GNSS_", Gnss::DEFAULT),
+        group("Simulated barometer: `[instruments.barometer]`", "BARO_", Barometer::DEFAULT),
+        group("Simulated magnetometer: `[instruments.magnetometer]`", "MAG_", Magnetometer::DEFAULT),
     ]);
     groups
 }
@@ -209,6 +214,14 @@ fn sections() -> BTreeMap<String, Vec<(&'static str, [String; 4])>> {
         ("Turbulence", keys(Turbulence::DEFAULT)),
         ("Ground", [keys(Contact::DEFAULT), keys(GroundEffect::DEFAULT)].concat()),
         ("Sensors", [keys(Sensing::DEFAULT), keys(Deviations::DEFAULT), keys(Dropouts::DEFAULT)].concat()),
+        ("Inertial sensor", keys(Imu::DEFAULT)),
+        ("Gyroscope", keys(Gyroscope::DEFAULT)),
+        ("Accelerometer", keys(Accelerometer::DEFAULT)),
+        ("Tracker", keys(Tracker::DEFAULT)),
+        ("Losses and freezes", keys(Dropouts::DEFAULT)),
+        ("GNSS receiver", keys(Gnss::DEFAULT)),
+        ("Barometer", keys(Barometer::DEFAULT)),
+        ("Magnetometer", keys(Magnetometer::DEFAULT)),
     ];
     let peers = ControllerKind::ALL.into_iter().filter(|kind| !kind.in_cascade());
     let peers = peers.map(|kind| (heading(kind), keys(Law::of(kind, Profile::Paper))));

@@ -6,7 +6,8 @@
 //!
 //! This is the paper's plant. [`Realism`] adds optional effects: rotors with lag, limits, delay,
 //! faults and a battery, drag, wind with gusts and turbulence, ground. [`Sensors`] measure the motion for a controller,
-//! as a perfect tracker would; [`Instruments`] are the sensors of a real vehicle. Everything is reproducible from a seed.
+//! as a perfect tracker would; [`Instruments`] are the sensors of a real vehicle. Everything is reproducible from a
+//! seed.
 //!
 //! [`afbc_types`] defines frames, units and the meaning of "(n)". Trigonometry comes from the `libm` crate, so a flight
 //! gives the same bits on every host.

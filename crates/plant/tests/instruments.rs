@@ -197,12 +197,12 @@ fn the_inertial_sensor_fails_as_declared() {
             assert_eq!(ill.specific_force_m_s2, well.specific_force_m_s2.map(|force| force.clamp(-5.0, 5.0)));
         }
     });
-    let (rates_rad_s, specific_force_m_s2) = (Vector3::new(0.1, 0.2, 0.3), Vector3::new(-1.0, 0.0, 2.0));
-    compare(Failure::ImuBiased { rates_rad_s, specific_force_m_s2 }, |k, well, ill| {
+    let (rates_bias_rad_s, force_bias_m_s2) = (Vector3::new(0.1, 0.2, 0.3), Vector3::new(-1.0, 0.0, 2.0));
+    compare(Failure::ImuBiased { rates_bias_rad_s, force_bias_m_s2 }, |k, well, ill| {
         if k > 0 {
             let (well, ill) = (well.imu.unwrap(), ill.imu.unwrap());
-            assert_eq!(ill.rates_rad_s, well.rates_rad_s + rates_rad_s);
-            assert_eq!(ill.specific_force_m_s2, well.specific_force_m_s2 + specific_force_m_s2);
+            assert_eq!(ill.rates_rad_s, well.rates_rad_s + rates_bias_rad_s);
+            assert_eq!(ill.specific_force_m_s2, well.specific_force_m_s2 + force_bias_m_s2);
         }
     });
 }

@@ -5,7 +5,7 @@ use crate::contender::{Contender, ControllerKind};
 use crate::scenario::Scenario;
 use crate::trajectory::Trajectory;
 use afbc::Profile;
-use afbc_plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Quantity, Realism, Sensing};
+use afbc_plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Quantity, Realism, Sensing, Suite};
 use afbc_types::{Axis, OutOfRange, PLUS, Parameters};
 use nalgebra::Vector3;
 
@@ -53,6 +53,8 @@ pub fn scenario(model: Model, case: Case) -> Result<Scenario, OutOfRange> {
         realism: Realism::default(),
         sensing: Sensing::default(),
         sensor_faults: Vec::new(),
+        instruments: Suite::default(),
+        instrument_faults: Vec::new(),
         outages: Vec::new(),
         flight_core: false,
         seed: 0,

@@ -1,10 +1,11 @@
 //! Vehicle files.
 
 use crate::parts::{self, Conditions, FORCE_MAX};
-use crate::vehicle::{CASCADE, Imu, Vehicle};
+use crate::vehicle::{CASCADE, Vehicle};
 use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
 use afbc_flight_core::motor::Curve;
+use afbc_plant::instruments::Mounting;
 use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, Realism, Rotors};
 use afbc_reader::words::out_of_range;
 use afbc_reader::{FileError, Table};
@@ -73,7 +74,7 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
         force_max_n,
         realism: Realism { rotors: actuators, ..Realism::default() },
         curve,
-        imu: Imu::DEFAULT,
+        imu: Mounting::DEFAULT,
         flight_gains,
         flight_settings,
         text: text.into(),

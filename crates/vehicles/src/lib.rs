@@ -10,4 +10,4 @@ mod vehicle;
 
 pub use built_in::{BUILT_IN, built_in, unknown};
 pub use file::{load, parse};
-pub use vehicle::{CASCADE, Imu, Vehicle};
+pub use vehicle::{CASCADE, Vehicle};

@@ -6,23 +6,10 @@ use afbc::monitor::Bounds;
 use afbc::{Profile, Settings};
 use afbc_flight_core::motor::Curve;
 use afbc_plant::Realism;
+use afbc_plant::instruments::Mounting;
 use afbc_reader::{FileError, Table};
-use afbc_types::{Airframe, OutOfRange, Parameters, PerAxis, Rotor, parameters, with_rotors};
+use afbc_types::{Airframe, OutOfRange, Parameters, PerAxis, Rotor, with_rotors};
 use core::fmt;
-use nalgebra::Vector3;
-
-parameters! {
-    /// Mounting of the inertial sensor.
-    #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct Imu {
-        /// Position of the sensor, from the centre of mass, body frame.
-        #[parameter(POS, "m", -10.0..=10.0)]
-        pub position_m: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0),
-        /// Roll, pitch and yaw of the sensor in the body frame.
-        #[parameter(ATT, "rad", -7.0..=7.0)]
-        pub attitude_rad: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0),
-    }
-}
 
 /// Table of the settings of AFBC's cascade, beside those of the laws' gains.
 pub const CASCADE: &str = "cascade";
@@ -45,7 +32,7 @@ pub struct Vehicle {
     /// Throttle curve of the motors.
     pub curve: Curve,
     /// Mounting of the inertial sensor.
-    pub imu: Imu,
+    pub imu: Mounting,
     /// Gains of AFBC in the profile `flight`: by rule ([`Profile::gains_for`]), or as the file says.
     pub flight_gains: PerAxis<Gains>,
     /// Settings of AFBC's cascade in the profile `flight`: by rule ([`Profile::settings_for`]), or as the file says.

@@ -36,9 +36,9 @@ pub enum Failure {
     /// The inertial sensor has an additional bias, in sensor axes.
     ImuBiased {
         /// \[rad/s\].
-        rates_rad_s: Vector3<f64>,
+        rates_bias_rad_s: Vector3<f64>,
         /// \[m/s2\].
-        specific_force_m_s2: Vector3<f64>,
+        force_bias_m_s2: Vector3<f64>,
     },
     /// The tracker sends nothing.
     TrackerLost,
@@ -75,6 +75,30 @@ pub enum Failure {
     },
 }
 
+impl Failure {
+    /// Returns the name, as in scenario files: the instrument, and what is wrong.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Failure::ImuStuck => "imu-stuck",
+            Failure::ImuDead => "imu-dead",
+            Failure::ImuNoisy { .. } => "imu-noisy",
+            Failure::ImuClipped { .. } => "imu-clipped",
+            Failure::ImuBiased { .. } => "imu-biased",
+            Failure::TrackerLost => "tracker-lost",
+            Failure::TrackerFrozen => "tracker-frozen",
+            Failure::TrackerJumped { .. } => "tracker-jumped",
+            Failure::GnssLost => "gnss-lost",
+            Failure::GnssJumped { .. } => "gnss-jumped",
+            Failure::BarometerLost => "barometer-lost",
+            Failure::BarometerStuck => "barometer-stuck",
+            Failure::BarometerBlocked => "barometer-blocked",
+            Failure::MagnetometerLost => "magnetometer-lost",
+            Failure::MagnetometerStuck => "magnetometer-stuck",
+            Failure::MagnetometerDisturbed { .. } => "magnetometer-disturbed",
+        }
+    }
+}
+
 /// A failure from `start_s` to `end_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InstrumentFault {
@@ -92,8 +116,8 @@ pub mod limits {
     use afbc_types::Range;
     pub const RATES: Range = Range::new("rates_rad_s", 0.0, 1000.0);
     pub const FORCE: Range = Range::new("specific_force_m_s2", 0.0, 10_000.0);
-    pub const RATES_BIAS: Range = Range::new("rates_rad_s", -1000.0, 1000.0);
-    pub const FORCE_BIAS: Range = Range::new("specific_force_m_s2", -10_000.0, 10_000.0);
+    pub const RATES_BIAS: Range = Range::new("rates_bias_rad_s", -1000.0, 1000.0);
+    pub const FORCE_BIAS: Range = Range::new("force_bias_m_s2", -10_000.0, 10_000.0);
     pub const JUMP: Range = Range::new("by_m", -10_000.0, 10_000.0);
     pub const YAW: Range = Range::new("yaw_rad", -10.0, 10.0);
     pub const FIELD: Range = Range::new("field_ut", -100_000.0, 100_000.0);
@@ -112,9 +136,9 @@ impl InstrumentFault {
                 limits::RATES.check(*rates_rad_s)?;
                 limits::FORCE.check(*specific_force_m_s2)
             }
-            Failure::ImuBiased { rates_rad_s, specific_force_m_s2 } => {
-                each(limits::RATES_BIAS, rates_rad_s)?;
-                each(limits::FORCE_BIAS, specific_force_m_s2)
+            Failure::ImuBiased { rates_bias_rad_s, force_bias_m_s2 } => {
+                each(limits::RATES_BIAS, rates_bias_rad_s)?;
+                each(limits::FORCE_BIAS, force_bias_m_s2)
             }
             Failure::TrackerJumped { by_m, yaw_rad } => {
                 each(limits::JUMP, by_m)?;
@@ -178,8 +202,8 @@ impl Failures {
                     *rates = rates.map(|rate| rate.clamp(-rates_rad_s, rates_rad_s));
                     *force = force.map(|force| force.clamp(-specific_force_m_s2, specific_force_m_s2));
                 }
-                Failure::ImuBiased { rates_rad_s, specific_force_m_s2 } => {
-                    (*rates, *force) = (*rates + rates_rad_s, *force + specific_force_m_s2);
+                Failure::ImuBiased { rates_bias_rad_s, force_bias_m_s2 } => {
+                    (*rates, *force) = (*rates + rates_bias_rad_s, *force + force_bias_m_s2);
                 }
                 _ => {}
             }

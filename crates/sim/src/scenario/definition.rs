@@ -5,7 +5,10 @@ use crate::contender::{Contender, ControllerKind};
 use crate::trajectory::Trajectory;
 use afbc::Profile;
 use afbc_flight_core::ArmingLimits;
-use afbc_plant::{Environment, Frame, Model, Motion, Plant, Realism, Rotors, Sensing, SensorFault, Sensors};
+use afbc_plant::instruments::{Imu, InstrumentFault, Mounting};
+use afbc_plant::{
+    Environment, Frame, Instruments, Model, Motion, Plant, Realism, Rotors, Sensing, SensorFault, Sensors, Suite,
+};
 use afbc_reader::FileError;
 use afbc_reader::words::out_of_range;
 use afbc_types::{OutOfRange, Parameters, Range, Rotor};
@@ -54,6 +57,10 @@ pub struct Scenario {
     pub sensing: Sensing,
     /// Faults of the measurement.
     pub sensor_faults: Vec<SensorFault>,
+    /// Instruments of the vehicle, for its estimator; their mounting is the vehicle file's.
+    pub instruments: Suite,
+    /// Failures of the instruments.
+    pub instrument_faults: Vec<InstrumentFault>,
     /// Outages of the link.
     pub outages: Vec<Outage>,
     /// Whether the controllers fly inside the [flight core](crate::flight::Aboard), as on board.
@@ -110,6 +117,7 @@ impl Scenario {
         self.contenders.iter().try_for_each(|contender| {
             contender.check(&self.vehicle, &self.rotors)?;
             self.plant(contender.step_s())?;
+            self.instruments(contender.step_s())?;
             self.sensors(contender.step_s()).map(drop)
         })
     }
@@ -156,5 +164,18 @@ impl Scenario {
             return Ok(None);
         }
         Sensors::new(&self.sensing, self.seed, step_s).map(Some)
+    }
+
+    /// Returns the instruments, read every `step_s`; none if the vehicle has none.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub fn instruments(&self, step_s: f64) -> Result<Option<Instruments>, OutOfRange> {
+        if self.instruments == Suite::default() {
+            return Ok(None);
+        }
+        let mounting = self.vehicle_file.as_ref().map_or(Mounting::DEFAULT, |file| file.imu);
+        let suite = Suite { imu: self.instruments.imu.map(|imu| Imu { mounting, ..imu }), ..self.instruments };
+        Instruments::new(&suite, &self.instrument_faults, self.seed, step_s).map(Some)
     }
 }

@@ -3,6 +3,7 @@
 mod contenders;
 mod control;
 mod environment;
+mod instruments;
 mod motion;
 mod realism;
 mod sensors;
@@ -77,6 +78,8 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
     let realism = realism::read(&mut root, &real, &truth, &frame, step_s)?;
     let sensing = sensors::read(root.table("sensors")?)?;
     let sensor_faults = sensors::faults(&mut root)?;
+    let instruments = instruments::read(root.table("instruments")?)?;
+    let instrument_faults = instruments::faults(&mut root, &instruments)?;
     let outages = environment::outages(&mut root)?;
     let flight_core = root.boolean("flight_core")?.unwrap_or(false);
 
@@ -93,6 +96,8 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
         realism,
         sensing,
         sensor_faults,
+        instruments,
+        instrument_faults,
         outages,
         flight_core,
         seed,

@@ -1,0 +1,118 @@
+//! `[instruments]` and `[[instrument_fault]]`: the sensors of a real vehicle, for its estimator.
+
+use super::environment::interval;
+use afbc_plant::Suite;
+use afbc_plant::instruments::{Barometer, Failure, Gnss, Imu, InstrumentFault, Magnetometer, Preset, Tracker, limits};
+use afbc_reader::{FileError, Table};
+use afbc_types::Declared;
+use nalgebra::Vector3;
+
+/// Every kind of failure; the numbers are read.
+const FAILURES: [Failure; 16] = {
+    let zero = Vector3::new(0.0, 0.0, 0.0);
+    [
+        Failure::ImuStuck,
+        Failure::ImuDead,
+        Failure::ImuNoisy { rates_rad_s: 0.0, specific_force_m_s2: 0.0 },
+        Failure::ImuClipped { rates_rad_s: 0.0, specific_force_m_s2: 0.0 },
+        Failure::ImuBiased { rates_bias_rad_s: zero, force_bias_m_s2: zero },
+        Failure::TrackerLost,
+        Failure::TrackerFrozen,
+        Failure::TrackerJumped { by_m: zero, yaw_rad: 0.0 },
+        Failure::GnssLost,
+        Failure::GnssJumped { by_m: zero },
+        Failure::BarometerLost,
+        Failure::BarometerStuck,
+        Failure::BarometerBlocked,
+        Failure::MagnetometerLost,
+        Failure::MagnetometerStuck,
+        Failure::MagnetometerDisturbed { field_ut: zero },
+    ]
+};
+
+/// Reads the instruments of `table`; none without it.
+pub(super) fn read(table: Option<Table<'_>>) -> Result<Suite, FileError> {
+    let Some(mut table) = table else { return Ok(Suite::default()) };
+    let suite = Suite {
+        imu: part(&mut table, "imu", &Imu::PRESETS, &["gyro", "accel"])?,
+        tracker: part(&mut table, "tracker", &Tracker::PRESETS, &["loss", "freeze"])?,
+        gnss: part(&mut table, "gnss", &Gnss::PRESETS, &["loss"])?,
+        barometer: part(&mut table, "barometer", &Barometer::PRESETS, &[])?,
+        magnetometer: part(&mut table, "magnetometer", &Magnetometer::PRESETS, &[])?,
+    };
+    table.finish()?;
+    Ok(suite)
+}
+
+/// Reads an instrument by the name of a part, or as a table, with a table for each of its groups, that may name one.
+fn part<T: Declared + Default + Copy>(
+    table: &mut Table<'_>,
+    key: &'static str,
+    presets: &[Preset<T>],
+    groups: &[&'static str],
+) -> Result<Option<T>, FileError> {
+    if !table.holds_table(key) {
+        return Ok(table.choice(key, presets, |preset| preset.name)?.map(|preset| preset.settings));
+    }
+    let Some(mut table) = table.table(key)? else { return Ok(None) };
+    let preset = table.choice("part", presets, |preset| preset.name)?;
+    let mut settings = preset.map_or(T::default(), |preset| preset.settings);
+    table.declared(&mut settings)?;
+    for group in groups {
+        if let Some(mut table) = table.table(group)? {
+            table.declared_in(group, &mut settings)?;
+            table.finish()?;
+        }
+    }
+    table.finish()?;
+    Ok(Some(settings))
+}
+
+/// Reads the failures of the instruments.
+pub(super) fn faults(root: &mut Table<'_>, suite: &Suite) -> Result<Vec<InstrumentFault>, FileError> {
+    root.few_tables("instrument_fault")?.into_iter().map(|table| fault(table, suite)).collect()
+}
+
+fn fault(mut table: Table<'_>, suite: &Suite) -> Result<InstrumentFault, FileError> {
+    let kind = table.need_choice("failure", &FAILURES, Failure::name)?;
+    let failure = match kind {
+        Failure::ImuNoisy { .. } => Failure::ImuNoisy {
+            rates_rad_s: table.need_number(&limits::RATES)?,
+            specific_force_m_s2: table.need_number(&limits::FORCE)?,
+        },
+        Failure::ImuClipped { .. } => Failure::ImuClipped {
+            rates_rad_s: table.need_number(&limits::RATES)?,
+            specific_force_m_s2: table.need_number(&limits::FORCE)?,
+        },
+        Failure::ImuBiased { .. } => Failure::ImuBiased {
+            rates_bias_rad_s: table.need_vector(limits::RATES_BIAS.name, &limits::RATES_BIAS)?,
+            force_bias_m_s2: table.need_vector(limits::FORCE_BIAS.name, &limits::FORCE_BIAS)?,
+        },
+        Failure::TrackerJumped { .. } => Failure::TrackerJumped {
+            by_m: table.need_vector(limits::JUMP.name, &limits::JUMP)?,
+            yaw_rad: table.number(&limits::YAW)?.unwrap_or(0.0),
+        },
+        Failure::GnssJumped { .. } => {
+            Failure::GnssJumped { by_m: table.need_vector(limits::JUMP.name, &limits::JUMP)? }
+        }
+        Failure::MagnetometerDisturbed { .. } => {
+            Failure::MagnetometerDisturbed { field_ut: table.need_vector(limits::FIELD.name, &limits::FIELD)? }
+        }
+        plain => plain,
+    };
+    let (instrument, _) = failure.name().split_once('-').unwrap_or_default();
+    let there = match instrument {
+        "imu" => suite.imu.is_some(),
+        "tracker" => suite.tracker.is_some(),
+        "gnss" => suite.gnss.is_some(),
+        "barometer" => suite.barometer.is_some(),
+        _ => suite.magnetometer.is_some(),
+    };
+    if !there {
+        let problem = format!("there is no {instrument} to fail; add it to [instruments]");
+        return Err(table.fault_at("failure", problem));
+    }
+    let [start_s, end_s] = interval(&mut table)?;
+    table.finish()?;
+    Ok(InstrumentFault { failure, start_s, end_s })
+}

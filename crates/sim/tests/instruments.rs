@@ -1,0 +1,98 @@
+//! The instruments in scenario files.
+#![allow(clippy::unwrap_used, missing_docs)] // tests
+
+use afbc_plant::instruments::{Barometer, Gnss, Imu, Tracker};
+use afbc_plant::{Dropouts, Suite, Truth};
+use afbc_reader::FileError;
+use afbc_sim::scenario::{Scenario, parse};
+use nalgebra::Vector3;
+
+fn example(text: &str) -> Result<Scenario, FileError> {
+    let hover = "\n[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
+    parse("example", &format!("{text}{hover}"), "example")
+}
+
+/// A part by its name is its preset; a table begins with its part, or with a perfect instrument, and changes the keys
+/// given, in the groups too.
+#[test]
+fn instruments_are_parts_or_tables() {
+    let read = |text: &str| example(text).unwrap().instruments;
+    assert_eq!(read(""), Suite::default());
+    let named = read("[instruments]\nimu = \"bmi270\"\ntracker = \"mocap-100\"\nbarometer = \"bmp388\"");
+    let (imu, tracker) = (Some(Imu::BMI270), Some(Tracker::MOCAP_100));
+    assert_eq!(named, Suite { imu, tracker, barometer: Some(Barometer::BMP388), ..Suite::default() });
+    let changed = "[instruments.imu]\npart = \"mpu-6000\"\ngyro.bias_rad_s = 0.5\naccel = { vibration_m_s2 = 3 }\n\
+                   [instruments.gnss]\nrate_hz = 5\nloss = { rate_hz = 0.1, mean_s = 2 }";
+    let mut imu = Imu::MPU_6000;
+    (imu.gyro.bias_rad_s, imu.accel.vibration_m_s2) = (0.5, 3.0);
+    let loss = Dropouts { rate_hz: 0.1, mean_s: 2.0 };
+    let gnss = Gnss { rate_hz: 5.0, loss, ..Gnss::DEFAULT };
+    assert_eq!(read(changed), Suite { imu: Some(imu), gnss: Some(gnss), ..Suite::default() });
+}
+
+#[test]
+fn instruments_and_faults_that_do_not_exist_are_refused() {
+    let refused = |text: &str| example(text).unwrap_err().to_string();
+    let cases = [
+        (
+            "[instruments]\nimu = \"bmi160\"",
+            "example:2: instruments.imu: \"bmi160\" is unknown; it must be \
+          \"icm-42688-p\", \"bmi270\" or \"mpu-6000\"",
+        ),
+        (
+            "[instruments]\ncompass = \"ist8310\"",
+            "example:2: instruments.compass: unknown key; known here: imu, tracker, \
+          gnss, barometer, magnetometer",
+        ),
+        (
+            "[instruments.imu.gyro]\nscale = 0.2",
+            "example:2: instruments.imu.gyro.scale: 0.2 is out of range: it must lie \
+          within 0 to 0.1",
+        ),
+        (
+            "[instruments.imu.gyro]\nbias = 0.2",
+            "example:2: instruments.imu.gyro.bias: unknown key; did you mean \
+          bias_rad_s (radians per second)?",
+        ),
+        (
+            "[instruments.tracker]\npart = \"vicon\"",
+            "example:2: instruments.tracker.part: \"vicon\" is unknown; it must \
+          be \"mocap-100\"",
+        ),
+        (
+            "[[instrument_fault]]\nfailure = \"imu-dead\"\nstart_s = 1",
+            "example:2: instrument_fault.failure: there is no \
+          imu to fail; add it to [instruments]",
+        ),
+        (
+            "[instruments]\nimu = \"bmi270\"\n[[instrument_fault]]\nfailure = \"imu-noisy\"\nrates_rad_s = 1\nstart_s = 1",
+            "example:3: instrument_fault.specific_force_m_s2: missing; add it (metres per second squared)",
+        ),
+        (
+            "[instruments]\nimu = \"bmi270\"\n[[instrument_fault]]\nfailure = \"imu-dead\"\nby_m = [1, 0, 0]\nstart_s = 1",
+            "example:5: instrument_fault.by_m: unknown key; known here: failure, start_s, duration_s",
+        ),
+    ];
+    for (text, message) in cases {
+        assert_eq!(refused(text), message);
+    }
+}
+
+/// The inertial sensor sits where the vehicle's file says: beside the centre of mass it feels the turning.
+#[test]
+fn the_inertial_sensor_is_mounted_as_the_vehicle_says() {
+    let scenario = |name: &str| {
+        let text = format!("vehicle.name = \"{name}\"\n[instruments]\nimu = \"icm-42688-p\"\n");
+        example(&text).unwrap()
+    };
+    let felt = |scenario: Scenario| {
+        let still = scenario.plant(0.001).unwrap().truth();
+        let turning = Truth { rates_rad_s: Vector3::x() * 10.0, ..still };
+        let read = |truth| scenario.instruments(0.001).unwrap().unwrap().measure(truth).imu.unwrap();
+        read(&turning).specific_force_m_s2.z - read(&still).specific_force_m_s2.z
+    };
+    // 20 mm above the centre of mass: -omega^2 r, within scale, misalignment and the step of the output.
+    assert!((felt(scenario("iris")) + 100.0 * 0.02).abs() < 0.03);
+    assert!(felt(scenario("paper")).abs() < 0.01);
+    assert!(example("").unwrap().instruments(0.001).unwrap().is_none());
+}
