@@ -446,7 +446,20 @@ fn every_built_in_scenario_is_listed_checked_and_a_template() {
     let names: Vec<_> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
     assert_eq!(
         names,
-        ["paper", "hover", "step", "circle", "lissajous", "waypoints", "wind", "delivery", "hardware", "storm"]
+        [
+            "paper",
+            "hover",
+            "step",
+            "circle",
+            "lissajous",
+            "waypoints",
+            "wind",
+            "delivery",
+            "hardware",
+            "storm",
+            "mocap",
+            "outdoor"
+        ]
     );
     for name in names {
         let file = sitl(&folder, &["scenarios", name]);

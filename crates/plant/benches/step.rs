@@ -1,12 +1,13 @@
-//! Time of one step of the plant, ideal and with all effects, and of one measurement.
+//! Time of one step of the plant, ideal and with all effects, and of one measurement by sensors or instruments.
 //!
 //! `cargo bench -p afbc-plant`. A simple feedback holds the vehicle in its place, so that conditions stay the same. Its
 //! time, with that of [`Plant::motion`], is part of every figure, and measured alone by `feedback_alone`.
 #![allow(clippy::unwrap_used, missing_docs)] // a plant that cannot be built must stop the bench
 
+use afbc_plant::instruments::{Barometer, Gnss, Imu, Magnetometer, Tracker};
 use afbc_plant::{
-    Battery, Contact, CosineGust, Deviations, Drag, Dropouts, Environment, GroundEffect, Model, Motion, Plant, Realism,
-    Rotors, Sensing, Sensors, Turbulence, Wind,
+    Battery, Contact, CosineGust, Deviations, Drag, Dropouts, Environment, GroundEffect, Instruments, Model, Motion,
+    Plant, Realism, Rotors, Sensing, Sensors, Suite, Turbulence, Wind,
 };
 use afbc_types::{Parameters, RotorSpeeds};
 use divan::counter::ItemsCount;
@@ -128,6 +129,35 @@ fn sensors() -> Sensors {
         ..Sensing::DEFAULT
     };
     Sensors::new(&sensing, 1, STEP_S).unwrap()
+}
+
+/// What instruments feel of a vehicle with all effects.
+#[divan::bench(sample_count = 200, sample_size = 2000)]
+fn truth(bencher: Bencher) {
+    let plant = Plant::with_realism(Model::RigidBody, start(), environment(), &everything(), STEP_S).unwrap();
+    bencher.counter(ItemsCount::new(1_usize)).bench_local(|| black_box(&plant).truth());
+}
+
+/// All instruments of a vehicle that flies outdoors, and a tracker.
+#[divan::bench(args = [false, true], sample_count = 200, sample_size = 2000)]
+fn instruments(bencher: Bencher, vibration: bool) {
+    let mut imu = Imu::ICM_42688_P;
+    if vibration {
+        (imu.gyro.vibration_rad_s, imu.accel.vibration_m_s2) = (0.02, 1.0);
+    }
+    let suite = Suite {
+        imu: Some(imu),
+        tracker: Some(Tracker::MOCAP_100),
+        gnss: Some(Gnss::M10),
+        barometer: Some(Barometer::DPS310),
+        magnetometer: Some(Magnetometer::IST8310),
+    };
+    let mut truth = Plant::new(Model::RigidBody, start(), environment()).truth();
+    let mut instruments = Instruments::new(&suite, &[], 1, STEP_S).unwrap();
+    bencher.counter(ItemsCount::new(1_usize)).bench_local(|| {
+        truth.time_s += STEP_S;
+        instruments.measure(black_box(&truth))
+    });
 }
 
 #[divan::bench(sample_count = 200, sample_size = 2000)]

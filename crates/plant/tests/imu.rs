@@ -227,6 +227,7 @@ fn a_mounted_sensor_feels_its_own_place() {
         let expected = axes.inverse() * (body.inverse() * (acceleration + Vector3::z() * G));
         assert!((sample.specific_force_m_s2 - expected).norm() < 1e-3, "{expected:?}");
         assert!((sample.rates_rad_s - axes.inverse() * rates).norm() < 1e-12);
+        assert!((mounting.to_body(&sample.rates_rad_s) - rates).norm() < 1e-12);
     }
 }
 

@@ -33,8 +33,8 @@ fn taken(fix: &TrackerFix) -> u32 {
 fn a_perfect_one_sends_the_truth_at_once_at_its_rate() {
     for (rate_hz, steps) in [(100.0, 10.0), (240.0, 1000.0 / 240.0), (1000.0, 1.0), (7.0, 1000.0 / 7.0)] {
         let fixes = fixes(Tracker { rate_hz, ..Tracker::DEFAULT }, 1, 5000);
-        let expected: Vec<u32> =
-            (0..).map(|n| (f64::from(n) * steps - 1e-6).ceil() as u32).take_while(|k| *k < 5000).collect();
+        let due = (0..).map(|n| (f64::from(n) * steps - 1e-6).ceil() as u32);
+        let expected: Vec<u32> = due.take_while(|k| *k < 5000).collect();
         assert_eq!(fixes.iter().map(|(k, _)| *k).collect::<Vec<_>>(), expected, "{rate_hz} Hz");
         for (k, fix) in fixes {
             let truth = moving(k);
@@ -65,6 +65,9 @@ fn delays_are_spread_as_declared_and_stamps_tell_them() {
     assert!((common::power(&spread) / variance - 1.0).abs() < 0.05);
     // Those of one delay arrive in their order, some of these do not.
     assert!(fixes.windows(2).any(|w| w[1].1.true_at_s < w[0].1.true_at_s));
+    // None arrives before its motion.
+    let early = self::fixes(Tracker { delay_s: 0.001, jitter_s: 0.1, ..tracker }, 2, 10_000);
+    assert!(early.iter().any(|(k, fix)| *k == taken(fix)) && early.iter().all(|(k, fix)| *k >= taken(fix)));
     let preset = self::fixes(Tracker::MOCAP_100, 2, 100_000);
     assert!(preset.iter().all(|(k, fix)| (8..=12).contains(&(k - taken(fix)))));
     assert!(preset.windows(2).all(|w| w[1].1.true_at_s > w[0].1.true_at_s));

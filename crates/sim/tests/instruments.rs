@@ -33,48 +33,39 @@ fn instruments_are_parts_or_tables() {
 #[test]
 fn instruments_and_faults_that_do_not_exist_are_refused() {
     let refused = |text: &str| example(text).unwrap_err().to_string();
+    let imu = "[instruments]\nimu = \"bmi270\"\n";
+    let parts = "\"icm-42688-p\", \"bmi270\" or \"mpu-6000\"";
+    let known = "imu, tracker, gnss, barometer, magnetometer";
     let cases = [
-        (
-            "[instruments]\nimu = \"bmi160\"",
-            "example:2: instruments.imu: \"bmi160\" is unknown; it must be \
-          \"icm-42688-p\", \"bmi270\" or \"mpu-6000\"",
-        ),
-        (
-            "[instruments]\ncompass = \"ist8310\"",
-            "example:2: instruments.compass: unknown key; known here: imu, tracker, \
-          gnss, barometer, magnetometer",
-        ),
+        ("[instruments]\nimu = \"bmi160\"", format!("2: instruments.imu: \"bmi160\" is unknown; it must be {parts}")),
+        ("[instruments]\ncompass = \"ist8310\"", format!("2: instruments.compass: unknown key; known here: {known}")),
         (
             "[instruments.imu.gyro]\nscale = 0.2",
-            "example:2: instruments.imu.gyro.scale: 0.2 is out of range: it must lie \
-          within 0 to 0.1",
+            "2: instruments.imu.gyro.scale: 0.2 is out of range: it must lie within 0 to 0.1".into(),
         ),
         (
             "[instruments.imu.gyro]\nbias = 0.2",
-            "example:2: instruments.imu.gyro.bias: unknown key; did you mean \
-          bias_rad_s (radians per second)?",
+            "2: instruments.imu.gyro.bias: unknown key; did you mean bias_rad_s (radians per second)?".into(),
         ),
         (
             "[instruments.tracker]\npart = \"vicon\"",
-            "example:2: instruments.tracker.part: \"vicon\" is unknown; it must \
-          be \"mocap-100\"",
+            "2: instruments.tracker.part: \"vicon\" is unknown; it must be \"mocap-100\"".into(),
         ),
         (
             "[[instrument_fault]]\nfailure = \"imu-dead\"\nstart_s = 1",
-            "example:2: instrument_fault.failure: there is no \
-          imu to fail; add it to [instruments]",
+            "2: instrument_fault.failure: there is no imu to fail; add it to [instruments]".into(),
         ),
         (
-            "[instruments]\nimu = \"bmi270\"\n[[instrument_fault]]\nfailure = \"imu-noisy\"\nrates_rad_s = 1\nstart_s = 1",
-            "example:3: instrument_fault.specific_force_m_s2: missing; add it (metres per second squared)",
+            &format!("{imu}[[instrument_fault]]\nfailure = \"imu-noisy\"\nrates_rad_s = 1\nstart_s = 1"),
+            "3: instrument_fault.specific_force_m_s2: missing; add it (metres per second squared)".into(),
         ),
         (
-            "[instruments]\nimu = \"bmi270\"\n[[instrument_fault]]\nfailure = \"imu-dead\"\nby_m = [1, 0, 0]\nstart_s = 1",
-            "example:5: instrument_fault.by_m: unknown key; known here: failure, start_s, duration_s",
+            &format!("{imu}[[instrument_fault]]\nfailure = \"imu-dead\"\nby_m = [1, 0, 0]\nstart_s = 1"),
+            "5: instrument_fault.by_m: unknown key; known here: failure, start_s, duration_s".into(),
         ),
     ];
     for (text, message) in cases {
-        assert_eq!(refused(text), message);
+        assert_eq!(refused(text), format!("example:{message}"));
     }
 }
 

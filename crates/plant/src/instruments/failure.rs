@@ -1,4 +1,4 @@
-//! Failures of instruments.
+//! Failures of instruments. Each acts on what is taken while it lasts; what is on its way still arrives.
 
 use super::barometer::HeightFix;
 use super::gnss::GnssFix;

@@ -19,11 +19,18 @@ parameters! {
     }
 }
 
+impl Mounting {
+    /// Converts a vector from sensor to body coordinates, as flight software does that knows the mounting.
+    pub fn to_body(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        Mounted::new(self).axes.to_earth(v)
+    }
+}
+
 /// A mounting with its rotation worked out.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mounted {
     position_m: Vector3<f64>,
-    /// Sensor axes in the body frame.
+    /// Sensor axes in the body frame, which stands for the earth's here.
     axes: BodyAxes,
 }
 

@@ -5,7 +5,7 @@ use super::file::parse;
 use afbc_reader::BuiltIn;
 
 /// Every built-in scenario.
-pub static BUILT_IN: [BuiltIn<Scenario>; 10] = [
+pub static BUILT_IN: [BuiltIn<Scenario>; 12] = [
     BuiltIn::new("paper", include_str!("../../scenarios/paper.toml"), parse),
     BuiltIn::new("hover", include_str!("../../scenarios/hover.toml"), parse),
     BuiltIn::new("step", include_str!("../../scenarios/step.toml"), parse),
@@ -16,6 +16,8 @@ pub static BUILT_IN: [BuiltIn<Scenario>; 10] = [
     BuiltIn::new("delivery", include_str!("../../scenarios/delivery.toml"), parse),
     BuiltIn::new("hardware", include_str!("../../scenarios/hardware.toml"), parse),
     BuiltIn::new("storm", include_str!("../../scenarios/storm.toml"), parse),
+    BuiltIn::new("mocap", include_str!("../../scenarios/mocap.toml"), parse),
+    BuiltIn::new("outdoor", include_str!("../../scenarios/outdoor.toml"), parse),
 ];
 
 /// Returns the built-in scenario called `name`.
