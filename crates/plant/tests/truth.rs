@@ -69,8 +69,8 @@ fn turned(before: &Quaternion<f64>, after: &Quaternion<f64>, dt_s: f64) -> Vecto
 
 /// In the air, accelerations and rates agree with the differences over a step, as the mean of both its ends. The bound
 /// is half of what one step changes: lagging rotors 0.015 m/s2, turbulence some 0.05 m/s2; without drag, 1 m/s2 would
-/// be missing. On the ground, where dampers act at once when a foot touches, the sum over 10 ms agrees with the change of
-/// velocity within half of some such jumps, 20 m/s2 for 0.1 ms each; without the ground 0.1 m/s would be missing.
+/// be missing. On the ground, where dampers act at once when a foot touches, the sum over 10 ms agrees with the change
+/// of velocity within half of some such jumps, 20 m/s2 for 0.1 ms each; without the ground 0.1 m/s would be missing.
 #[test]
 fn accelerations_and_rates_are_those_of_the_motion() {
     const DT_S: f64 = 1e-4;
