@@ -4,7 +4,7 @@
 mod common;
 
 use afbc_plant::instruments::{Accelerometer, Gyroscope, Imu, ImuReading, Mounting};
-use afbc_plant::{Environment, Model, Motion, Plant, Suite, Truth};
+use afbc_plant::{Drag, Environment, Model, Motion, Plant, Realism, Rotors, Suite, Truth, Turbulence, Wind};
 use afbc_types::{Parameters, RotorSpeeds};
 use common::{STEP_S, assert_correlation, assert_sigma, assert_sigma_of, coordinates, instruments, mean, rest, run};
 use core::f64::consts::{PI, TAU};
@@ -228,6 +228,59 @@ fn a_mounted_sensor_feels_its_own_place() {
         assert!((sample.specific_force_m_s2 - expected).norm() < 1e-3, "{expected:?}");
         assert!((sample.rates_rad_s - axes.inverse() * rates).norm() < 1e-12);
         assert!((mounting.to_body(&sample.rates_rad_s) - rates).norm() < 1e-12);
+    }
+}
+
+/// Speeds around hover that keep the vehicle near the origin, on a wandering course.
+fn feedback(motion: &Motion, time_s: f64) -> RotorSpeeds<4> {
+    let Motion { position_m: position, velocity_m_s: velocity, attitude_rad: eta, rates_rad_s: rates } = motion;
+    let aim = Vector3::new((0.9 * time_s).sin(), (0.7 * time_s).cos() - 1.0, 0.3 * (0.5 * time_s).sin());
+    let off = position - aim;
+    let roll = 8.0 * rates.x + 40.0 * (eta.x - 0.1 * velocity.y - 0.05 * off.y);
+    let pitch = 8.0 * rates.y + 40.0 * (eta.y + 0.1 * velocity.x + 0.05 * off.x);
+    let (up, yaw) = (200.0 - 20.0 * off.z - 20.0 * velocity.z, 3.0 * (1.3 * time_s).sin());
+    RotorSpeeds(Vector4::new(up + roll + yaw, up + pitch - yaw, up - roll + yaw, up - pitch - yaw).map(|w| w as f32))
+}
+
+/// Who adds up what a perfect sensor reads, with the mean of each two samples, knows where the vehicle is after ten
+/// seconds of turbulent flight: frames, signs and gravity are one. A step's load is new, so that each sample is late by
+/// at most a step: 1 ms of 5 m/s2 is 5 mm/s.
+#[test]
+fn a_perfect_one_navigates() {
+    for model in [Model::RigidBody, Model::Simplified] {
+        let realism = Realism {
+            rotors: Rotors { time_constant_s: 0.02, max_rad_s: 317.0, ..Rotors::default() },
+            drag: Some(Drag::PAPER),
+            wind: Wind {
+                steady_m_s: Vector3::new(2.0, -1.0, 0.0),
+                turbulence: Some(Turbulence::LIGHT),
+                ..Wind::default()
+            },
+            ..Realism::default()
+        };
+        let environment = Environment::calm(Parameters::PAPER).unwrap();
+        let mut plant = Plant::with_realism(model, Motion::default(), environment, &realism, STEP_S).unwrap();
+        let mut sensor = instruments(with(Imu::DEFAULT), 1);
+        let mut last = sensor.measure(&plant.truth()).imu.unwrap();
+        let (mut q, mut v, mut p) = (UnitQuaternion::identity(), Vector3::zeros(), Vector3::zeros());
+        let (mut travelled, mut tilt) = (0.0, 0.0_f64);
+        for k in 0..10_000 {
+            plant.step(&feedback(&plant.motion(), f64::from(k) * STEP_S), STEP_S);
+            let now = sensor.measure(&plant.truth()).imu.unwrap();
+            let before = q * last.specific_force_m_s2;
+            q *= UnitQuaternion::from_scaled_axis((last.rates_rad_s + now.rates_rad_s) * (STEP_S / 2.0));
+            let a = (before + q * now.specific_force_m_s2) / 2.0 - Vector3::z() * G;
+            p += v * STEP_S + a * (STEP_S * STEP_S / 2.0);
+            v += a * STEP_S;
+            last = now;
+            travelled += v.norm() * STEP_S;
+            tilt = tilt.max(plant.motion().attitude_rad.xy().norm());
+        }
+        let truth = plant.truth();
+        assert!(travelled > 3.0 && tilt > 0.1, "{travelled} m, {tilt} rad");
+        assert!((v - truth.velocity_m_s).norm() < 0.01, "{:?}", v - truth.velocity_m_s);
+        assert!((p - truth.position_m).norm() < 0.05, "{:?}", p - truth.position_m);
+        assert!(q.angle_to(&UnitQuaternion::new_normalize(truth.attitude)) < 1e-3);
     }
 }
 

@@ -116,6 +116,6 @@ impl Receiver {
             velocity_sigma_m_s: reported * velocity_m_s,
         };
         let delay_s = self.gnss.delay_s + self.gnss.jitter_s * (2.0 * self.random.uniform() - 1.0);
-        (fix, truth.time_s + delay_s.max(0.0))
+        (fix, truth.time_s + delay_s)
     }
 }

@@ -134,7 +134,7 @@ impl Tracking {
             position_m: frame_m + Vector3::new(c * x - s * y, s * x + c * y, z) + position,
             attitude: yaw * truth.attitude * rotation(&turn),
         };
-        (fix, truth.time_s + delay_s.max(0.0))
+        (fix, truth.time_s + delay_s)
     }
 }
 
