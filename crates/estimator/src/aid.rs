@@ -1,0 +1,141 @@
+//! Aiding sensors: what each said last, and whether it is believed.
+
+use nalgebra::Vector3;
+
+/// What an aiding sensor tells. A fix of several kinds is judged kind by kind: a receiver whose position jumps may still
+/// have a good velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Aid {
+    /// Position from a tracker.
+    TrackerPosition,
+    /// Attitude from a tracker.
+    TrackerAttitude,
+    /// Position from a GNSS receiver.
+    GnssPosition,
+    /// Velocity from a GNSS receiver.
+    GnssVelocity,
+    /// Height from a barometer.
+    Height,
+    /// Heading, from a magnetometer or told.
+    Heading,
+}
+
+impl Aid {
+    /// All kinds.
+    pub const ALL: [Aid; 6] =
+        [Aid::TrackerPosition, Aid::TrackerAttitude, Aid::GnssPosition, Aid::GnssVelocity, Aid::Height, Aid::Heading];
+}
+
+/// Record of one kind of aid.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AidRecord {
+    /// Normalised innovation squared of the last measurement, whether it was accepted or not: the sum over its scalars of
+    /// innovation^2 / variance. Of a rejected one with three coordinates, it is a lower bound.
+    pub nis: f32,
+    /// Number of scalars in `nis`; its expectation.
+    pub scalars: u8,
+    /// Number of measurements fused, up to `u32::MAX`.
+    pub accepted: u32,
+    /// Number of measurements rejected by the gate, up to `u32::MAX`.
+    pub rejected: u32,
+    /// Time of the last measurement that was fused \[us\].
+    pub accepted_us: Option<u64>,
+    /// Time of the first of the measurements that were all rejected, up to now \[us\].
+    pub rejected_since_us: Option<u64>,
+    /// Time of the newest measurement looked at \[us\].
+    pub(crate) newest_us: Option<u64>,
+}
+
+impl AidRecord {
+    /// True if a measurement of the last `time_us` was fused.
+    #[must_use]
+    pub fn is_live(&self, now_us: u64, time_us: u64) -> bool {
+        self.accepted_us.is_some_and(|at_us| now_us.saturating_sub(at_us) <= time_us)
+    }
+
+    pub(crate) fn accept(&mut self, at_us: u64) {
+        self.accepted = self.accepted.saturating_add(1);
+        self.accepted_us = Some(at_us);
+        self.rejected_since_us = None;
+    }
+
+    /// Records a rejection, and returns the time for which there was nothing else \[us\].
+    pub(crate) fn reject(&mut self, at_us: u64) -> u64 {
+        self.rejected = self.rejected.saturating_add(1);
+        at_us.saturating_sub(*self.rejected_since_us.get_or_insert(at_us))
+    }
+}
+
+/// Records of all kinds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Aids {
+    /// Position from a tracker.
+    pub tracker_position: AidRecord,
+    /// Attitude from a tracker.
+    pub tracker_attitude: AidRecord,
+    /// Position from a GNSS receiver.
+    pub gnss_position: AidRecord,
+    /// Velocity from a GNSS receiver.
+    pub gnss_velocity: AidRecord,
+    /// Height from a barometer.
+    pub height: AidRecord,
+    /// Heading.
+    pub heading: AidRecord,
+}
+
+impl Aids {
+    /// Returns the record of one kind.
+    #[must_use]
+    pub fn of(&self, aid: Aid) -> &AidRecord {
+        match aid {
+            Aid::TrackerPosition => &self.tracker_position,
+            Aid::TrackerAttitude => &self.tracker_attitude,
+            Aid::GnssPosition => &self.gnss_position,
+            Aid::GnssVelocity => &self.gnss_velocity,
+            Aid::Height => &self.height,
+            Aid::Heading => &self.heading,
+        }
+    }
+
+    pub(crate) fn of_mut(&mut self, aid: Aid) -> &mut AidRecord {
+        match aid {
+            Aid::TrackerPosition => &mut self.tracker_position,
+            Aid::TrackerAttitude => &mut self.tracker_attitude,
+            Aid::GnssPosition => &mut self.gnss_position,
+            Aid::GnssVelocity => &mut self.gnss_velocity,
+            Aid::Height => &mut self.height,
+            Aid::Heading => &mut self.heading,
+        }
+    }
+
+    /// True if another aid than `aid` that tells the same was fused within the last `time_us`.
+    pub(crate) fn has_other(&self, aid: Aid, now_us: u64, time_us: u64) -> bool {
+        let live = |other: &AidRecord| other.is_live(now_us, time_us);
+        match aid {
+            Aid::TrackerPosition => live(&self.gnss_position),
+            Aid::GnssPosition => live(&self.tracker_position),
+            Aid::GnssVelocity => live(&self.tracker_position) || live(&self.gnss_position),
+            Aid::TrackerAttitude => live(&self.heading),
+            Aid::Heading => live(&self.tracker_attitude),
+            Aid::Height => false,
+        }
+    }
+
+    /// True if position or velocity was fused within the last `time_us`.
+    pub(crate) fn holds_velocity(&self, now_us: u64, time_us: u64) -> bool {
+        [&self.tracker_position, &self.gnss_position, &self.gnss_velocity]
+            .into_iter()
+            .any(|aid| aid.is_live(now_us, time_us))
+    }
+
+    /// True if position was fused within the last `time_us`.
+    pub(crate) fn holds_position(&self, now_us: u64, time_us: u64) -> bool {
+        [&self.tracker_position, &self.gnss_position].into_iter().any(|aid| aid.is_live(now_us, time_us))
+    }
+}
+
+/// True if an innovation of this size is accepted: nu^2 <= gate^2 s in every coordinate.
+pub(crate) fn passes(innovation: &Vector3<f32>, variance: &Vector3<f32>, gate_squared: f32) -> bool {
+    let inside = |nu: f32, s: f32| nu * nu <= gate_squared * s;
+    inside(innovation.x, variance.x) && inside(innovation.y, variance.y) && inside(innovation.z, variance.z)
+}

@@ -1,0 +1,190 @@
+//! Start at rest: level from the specific force, bias of the gyroscope from its mean, heading from whoever tells it.
+
+use crate::measurement::{ImuSample, Measurement};
+use crate::rotation::{atan2, levelling, matrix, normalized, twist};
+use crate::settings::Settings;
+use afbc_control::math::{abs_max, sqrt, tilt_cosine};
+use core::fmt;
+use nalgebra::{Quaternion, Vector3};
+
+/// Why the estimator has not started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Unready {
+    /// No sample of the inertial sensors within 20 ms.
+    #[default]
+    NoImu,
+    /// At rest so far, but not yet for long enough.
+    Settling,
+    /// Rates or specific force change.
+    Moving,
+    /// The mean rate is larger than any bias.
+    Turning,
+    /// The specific force is not that of rest: falling, accelerating, or a wrong scale.
+    NotGravity,
+    /// Too far from level.
+    Tilted,
+}
+
+impl fmt::Display for Unready {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Unready::NoImu => "no samples of the inertial sensors",
+            Unready::Settling => "at rest, but not yet for long enough",
+            Unready::Moving => "the vehicle is moved: leave it at rest",
+            Unready::Turning => "the vehicle turns, or the gyroscope's bias is too large: leave it at rest",
+            Unready::NotGravity => "the accelerometer does not show the acceleration of free fall: is it at rest?",
+            Unready::Tilted => "the vehicle is tilted: put it on level ground",
+        })
+    }
+}
+
+/// Running mean and sum of squared deviations (Welford).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Mean {
+    mean: Vector3<f32>,
+    squares: Vector3<f32>,
+}
+
+impl Mean {
+    fn add(&mut self, value: &Vector3<f32>, share: f32) {
+        let deviation = value - self.mean;
+        self.mean += deviation * share;
+        self.squares += deviation.component_mul(&(value - self.mean));
+    }
+
+    /// True if no coordinate's standard deviation is above `limit`.
+    fn is_still(&self, count: f32, limit: f32) -> bool {
+        abs_max(&self.squares) <= limit * limit * count
+    }
+}
+
+/// What has been seen since the vehicle came to rest.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Align {
+    since_us: Option<u64>,
+    count: f32,
+    rates: Mean,
+    force: Mean,
+    /// Means of the first half.
+    half: Option<(Vector3<f32>, Vector3<f32>)>,
+    /// Sum of the magnetic fields, their number, and their variance.
+    field: (Vector3<f32>, f32, f32),
+    /// Attitude of the tracker, and its standard deviation.
+    pose: Option<(Quaternion<f32>, f32)>,
+    /// Heading told, and its standard deviation.
+    heading: Option<(f32, f32)>,
+    pub(crate) why: Unready,
+}
+
+/// The state at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Aligned {
+    pub(crate) attitude: Quaternion<f32>,
+    pub(crate) gyro_bias: Vector3<f32>,
+    /// Standard deviation of the heading; none if nobody told it \[rad\].
+    pub(crate) heading_sigma: Option<f32>,
+    /// Mean field in the earth frame, if there was one.
+    pub(crate) field: Option<Vector3<f32>>,
+    /// Length of the time at rest \[s\].
+    pub(crate) time_s: f32,
+}
+
+impl Align {
+    /// Begins again, because of `why`.
+    pub(crate) fn again(&mut self, why: Unready) {
+        *self = Align { why, ..Align::default() };
+    }
+
+    /// Takes a measurement, for the heading.
+    pub(crate) fn hear(&mut self, measurement: &Measurement) {
+        match measurement {
+            Measurement::MagneticField { field, sigma } => {
+                self.field.0 += field;
+                self.field.1 += 1.0;
+                self.field.2 = sigma * sigma;
+            }
+            Measurement::Pose { attitude: [w, x, y, z], attitude_sigma_rad, .. } => {
+                self.pose = Some((normalized(&Quaternion::new(*w, *x, *y, *z)), *attitude_sigma_rad));
+            }
+            Measurement::Heading { heading_rad, sigma_rad } => self.heading = Some((*heading_rad, *sigma_rad)),
+            _ => {}
+        }
+    }
+
+    /// Takes a sample; returns the state once the vehicle has been at rest for long enough.
+    pub(crate) fn advance(&mut self, sample: &ImuSample, settings: &Settings) -> Option<Aligned> {
+        let Some(since_us) = self.since_us else {
+            let why = if self.why == Unready::NoImu { Unready::Settling } else { self.why };
+            self.again(why);
+            self.since_us = Some(sample.at_us);
+            return None;
+        };
+        let elapsed_s = sample.at_us.saturating_sub(since_us) as f32 * 1e-6;
+        let (rate, force) = (settings.still_rate_rad_s, settings.still_accel_m_s2);
+        self.count += 1.0;
+        let share = 1.0 / self.count;
+        self.rates.add(&sample.rates_rad_s, share);
+        self.force.add(&sample.specific_force_m_s2, share);
+
+        // A sample far off, or a spread too large, begins anew at once.
+        let far = |value: &Vector3<f32>, mean: &Mean, limit: f32| abs_max(&(value - mean.mean)) > 6.0 * limit;
+        let moves = far(&sample.rates_rad_s, &self.rates, rate)
+            || far(&sample.specific_force_m_s2, &self.force, force)
+            || (self.count >= 20.0
+                && !(self.rates.is_still(self.count, rate) && self.force.is_still(self.count, force)));
+        // Slow motion: the means of both halves differ.
+        if elapsed_s >= 0.5 * settings.align_s && self.half.is_none() {
+            self.half = Some((self.rates.mean, self.force.mean));
+        }
+        let drifts = elapsed_s >= settings.align_s
+            && self.half.is_some_and(|(rates, specific)| {
+                abs_max(&(self.rates.mean - rates)) > 0.25 * rate
+                    || abs_max(&(self.force.mean - specific)) > 0.25 * force
+            });
+        let norm = sqrt(self.force.mean.norm_squared());
+        let refused = if moves || drifts {
+            Some(Unready::Moving)
+        } else if abs_max(&self.rates.mean) > settings.gyro_bias_max_rad_s && self.count >= 20.0 {
+            Some(Unready::Turning)
+        } else if (norm - settings.gravity_m_s2).abs() > 2.0 * force + settings.accel_bias_m_s2 && self.count >= 20.0 {
+            Some(Unready::NotGravity)
+        } else if self.count >= 20.0 && self.force.mean.z < tilt_cosine(settings.align_tilt_rad, 0.0) * norm {
+            Some(Unready::Tilted)
+        } else {
+            None
+        };
+        if let Some(why) = refused {
+            self.again(why);
+            return None;
+        }
+        // The reason of the last refusal stays for a while, to be read.
+        if elapsed_s > 0.1 * settings.align_s {
+            self.why = Unready::Settling;
+        }
+        (elapsed_s >= settings.align_s).then(|| self.result(norm, elapsed_s, settings)).flatten()
+    }
+
+    fn result(&self, norm: f32, time_s: f32, settings: &Settings) -> Option<Aligned> {
+        let level = levelling(&(self.force.mean * (1.0 / norm)))?;
+        let (sum, count, variance) = self.field;
+        let field = (count > 0.0).then(|| matrix(&level) * (sum * (1.0 / count)));
+        // Turn about z that is missing, and its standard deviation; the tracker before the told before the field.
+        let nose = matrix(&level);
+        let told = self.heading.map(|(heading, sigma)| (heading - atan2(nose.m21, nose.m11), sigma));
+        let by_field = field.map(|field| {
+            let horizontal = field.x * field.x + field.y * field.y;
+            let tilt = settings.accel_bias_m_s2 / settings.gravity_m_s2 * field.z;
+            (-settings.declination_rad - atan2(field.y, field.x), sqrt((variance + tilt * tilt) / horizontal))
+        });
+        let pose = self.pose.map(|(attitude, sigma)| (twist(&attitude, &level), sigma));
+        let turn = pose.or(told).or(by_field).filter(|(turn, sigma)| turn.is_finite() && *sigma < 0.5);
+        let about_z = crate::rotation::about_z(turn.map_or(0.0, |(turn, _)| turn));
+        Some(Aligned {
+            attitude: normalized(&(about_z * level)),
+            gyro_bias: self.rates.mean,
+            heading_sigma: turn.map(|(_, sigma)| sigma),
+            field: field.map(|field| matrix(&about_z) * field),
+            time_s,
+        })
+    }
+}

@@ -1,0 +1,532 @@
+//! Covariance of the error, in blocks, and its two operations: prediction and the update by a scalar.
+//!
+//! The errors are, each added to the nominal state to give the truth,
+//!
+//! ```text
+//! theta   rotation in the EARTH frame: R_true = (1 + [theta]x) R                       [rad]
+//! v, p    velocity and position in the earth frame                                     [m/s, m]
+//! g, a    biases of gyroscope and accelerometer in the body frame                      [rad/s, m/s2]
+//! b       offset of the barometer                                                      [m]
+//! ```
+//!
+//! Sola's global angular error (section 7.2) rather than the local one: the attitude then has no transition of its own,
+//! a third of the prediction's cost less, the third component *is* the heading's error at any tilt, so an unknown
+//! heading stays in one state, and the error of a past attitude is that of the present one. Over an interval of T with
+//! the mean rotation R, C = R T, and S the change of velocity by specific force,
+//!
+//! ```text
+//! theta' = theta - C g        v' = v - S x theta - C a        p' = p + T v
+//! ```
+//!
+//! with all of the right-hand side at the beginning of the interval; terms of the second order in T are left out, as in
+//! PX4's EKF2. The 16th state, the barometer's offset, is one column more; without it, a filter that averages a
+//! barometer is sure of a height that it cannot know.
+
+use afbc_control::math::{max, min, sqrt};
+use nalgebra::{Matrix3, Vector3};
+
+type Block = Matrix3<f32>;
+
+/// One coordinate of a vector.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Coordinate {
+    X,
+    Y,
+    Z,
+}
+
+impl Coordinate {
+    pub(crate) const ALL: [Coordinate; 3] = [Coordinate::X, Coordinate::Y, Coordinate::Z];
+
+    /// Returns this coordinate of a vector.
+    #[inline]
+    pub(crate) fn of(self, vector: &Vector3<f32>) -> f32 {
+        match self {
+            Coordinate::X => vector.x,
+            Coordinate::Y => vector.y,
+            Coordinate::Z => vector.z,
+        }
+    }
+
+    /// Returns the unit vector.
+    #[inline]
+    pub(crate) fn unit(self) -> Vector3<f32> {
+        match self {
+            Coordinate::X => Vector3::new(1.0, 0.0, 0.0),
+            Coordinate::Y => Vector3::new(0.0, 1.0, 0.0),
+            Coordinate::Z => Vector3::new(0.0, 0.0, 1.0),
+        }
+    }
+
+    #[inline]
+    fn column(self, m: &Block) -> Vector3<f32> {
+        match self {
+            Coordinate::X => Vector3::new(m.m11, m.m21, m.m31),
+            Coordinate::Y => Vector3::new(m.m12, m.m22, m.m32),
+            Coordinate::Z => Vector3::new(m.m13, m.m23, m.m33),
+        }
+    }
+
+    #[inline]
+    fn row(self, m: &Block) -> Vector3<f32> {
+        match self {
+            Coordinate::X => Vector3::new(m.m11, m.m12, m.m13),
+            Coordinate::Y => Vector3::new(m.m21, m.m22, m.m23),
+            Coordinate::Z => Vector3::new(m.m31, m.m32, m.m33),
+        }
+    }
+}
+
+/// Row of a Jacobian: what a scalar measurement makes of the errors. Velocity and position enter by one coordinate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Row {
+    pub(crate) coordinate: Coordinate,
+    pub(crate) theta: Vector3<f32>,
+    pub(crate) velocity: f32,
+    pub(crate) position: f32,
+    /// By the gyroscope's bias, where it counts.
+    pub(crate) gyro: Option<Vector3<f32>>,
+    /// By the accelerometer's bias, where it counts.
+    pub(crate) accel: Option<Vector3<f32>>,
+    /// By the barometer's offset.
+    pub(crate) baro: f32,
+}
+
+/// One number per error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Errors {
+    pub(crate) theta: Vector3<f32>,
+    pub(crate) velocity: Vector3<f32>,
+    pub(crate) position: Vector3<f32>,
+    pub(crate) gyro: Vector3<f32>,
+    pub(crate) accel: Vector3<f32>,
+    pub(crate) baro: f32,
+}
+
+impl Errors {
+    /// Returns every number multiplied.
+    pub(crate) fn scaled(&self, factor: f32) -> Self {
+        Errors {
+            theta: self.theta * factor,
+            velocity: self.velocity * factor,
+            position: self.position * factor,
+            gyro: self.gyro * factor,
+            accel: self.accel * factor,
+            baro: self.baro * factor,
+        }
+    }
+}
+
+impl Row {
+    /// Returns the product with `errors`.
+    pub(crate) fn dot(&self, errors: &Errors) -> f32 {
+        self.theta.dot(&errors.theta)
+            + self.velocity * self.coordinate.of(&errors.velocity)
+            + self.position * self.coordinate.of(&errors.position)
+            + self.gyro.map_or(0.0, |gyro| gyro.dot(&errors.gyro))
+            + self.accel.map_or(0.0, |accel| accel.dot(&errors.accel))
+            + self.baro * errors.baro
+    }
+}
+
+/// Variances that a prediction adds per second.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Growth {
+    pub(crate) theta: f32,
+    pub(crate) velocity: f32,
+    pub(crate) gyro: f32,
+    pub(crate) accel: f32,
+    pub(crate) baro: f32,
+}
+
+/// What the nominal state did over the interval of a prediction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Interval {
+    /// T \[s\].
+    pub(crate) time_s: f32,
+    /// C = R T with the mean rotation.
+    pub(crate) turn: Block,
+    /// S: change of the velocity by specific force \[m/s\].
+    pub(crate) thrust: Vector3<f32>,
+}
+
+/// The covariance: the upper triangle of blocks, `tv` being the covariance of theta and v. Diagonal blocks are
+/// symmetric.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Covariance {
+    pub(crate) tt: Block,
+    pub(crate) tv: Block,
+    pub(crate) tp: Block,
+    pub(crate) tg: Block,
+    pub(crate) ta: Block,
+    pub(crate) vv: Block,
+    pub(crate) vp: Block,
+    pub(crate) vg: Block,
+    pub(crate) va: Block,
+    pub(crate) pp: Block,
+    pub(crate) pg: Block,
+    pub(crate) pa: Block,
+    pub(crate) gg: Block,
+    pub(crate) ga: Block,
+    pub(crate) aa: Block,
+    pub(crate) tb: Vector3<f32>,
+    pub(crate) vb: Vector3<f32>,
+    pub(crate) pb: Vector3<f32>,
+    pub(crate) gb: Vector3<f32>,
+    pub(crate) ab: Vector3<f32>,
+    pub(crate) bb: f32,
+}
+
+/// -s x, column by column: the matrix -[s]x from the left.
+#[inline]
+fn minus_cross(s: &Vector3<f32>, m: &Block) -> Block {
+    Block::new(
+        s.z * m.m21 - s.y * m.m31, s.z * m.m22 - s.y * m.m32, s.z * m.m23 - s.y * m.m33,
+        s.x * m.m31 - s.z * m.m11, s.x * m.m32 - s.z * m.m12, s.x * m.m33 - s.z * m.m13,
+        s.y * m.m11 - s.x * m.m21, s.y * m.m12 - s.x * m.m22, s.y * m.m13 - s.x * m.m23,
+    )
+}
+
+/// The matrix (-[s]x)' from the right: each row crossed.
+#[inline]
+fn crossed_minus(m: &Block, s: &Vector3<f32>) -> Block {
+    Block::new(
+        m.m12 * s.z - m.m13 * s.y, m.m13 * s.x - m.m11 * s.z, m.m11 * s.y - m.m12 * s.x,
+        m.m22 * s.z - m.m23 * s.y, m.m23 * s.x - m.m21 * s.z, m.m21 * s.y - m.m22 * s.x,
+        m.m32 * s.z - m.m33 * s.y, m.m33 * s.x - m.m31 * s.z, m.m31 * s.y - m.m32 * s.x,
+    )
+}
+
+/// The product with the transpose of `b`.
+#[inline]
+fn by_transpose(a: &Block, b: &Block) -> Block {
+    a * b.transpose()
+}
+
+/// Copies the upper triangle to the lower one.
+#[inline]
+fn mirror(m: &mut Block) {
+    m.m21 = m.m12;
+    m.m31 = m.m13;
+    m.m32 = m.m23;
+}
+
+/// Adds to the diagonal.
+#[inline]
+fn add_diagonal(m: &mut Block, variance: f32) {
+    m.m11 += variance;
+    m.m22 += variance;
+    m.m33 += variance;
+}
+
+/// m -= x y'.
+#[inline]
+fn subtract_outer(m: &mut Block, x: &Vector3<f32>, y: &Vector3<f32>) {
+    m.m11 -= x.x * y.x;
+    m.m21 -= x.y * y.x;
+    m.m31 -= x.z * y.x;
+    m.m12 -= x.x * y.y;
+    m.m22 -= x.y * y.y;
+    m.m32 -= x.z * y.y;
+    m.m13 -= x.x * y.z;
+    m.m23 -= x.y * y.z;
+    m.m33 -= x.z * y.z;
+}
+
+/// Smallest and largest variance of one error.
+struct Bounds {
+    least: f32,
+    most: f32,
+}
+
+/// (1e-5 rad)^2 and the variance of an angle that may be anything.
+const THETA: Bounds = Bounds { least: 1e-10, most: 3.3 };
+const VELOCITY: Bounds = Bounds { least: 1e-8, most: 1e4 };
+const POSITION: Bounds = Bounds { least: 1e-9, most: 1e8 };
+const GYRO: Bounds = Bounds { least: 1e-13, most: 0.25 };
+const ACCEL: Bounds = Bounds { least: 1e-9, most: 25.0 };
+const BARO: Bounds = Bounds { least: 1e-8, most: 1e8 };
+
+impl Covariance {
+    /// Predicts over `interval`: P = F P F' + Q, as three substitutions, position first, in blocks.
+    #[inline]
+    pub(crate) fn predict(&mut self, interval: &Interval, growth: &Growth) {
+        let Interval { time_s, turn, thrust } = interval;
+        let (t, c, s) = (*time_s, turn, thrust);
+
+        // p' = p + T v.
+        self.pp += (self.vp + self.vp.transpose()) * t + self.vv * (t * t);
+        self.tp += self.tv * t;
+        self.vp += self.vv * t;
+        self.pg += self.vg * t;
+        self.pa += self.va * t;
+        self.pb += self.vb * t;
+
+        // v' = v - S x theta - C a.
+        let vv = self.vv + minus_cross(s, &self.tv) - by_transpose(c, &self.va);
+        self.tv += crossed_minus(&self.tt, s) - by_transpose(&self.ta, c);
+        self.va += minus_cross(s, &self.ta) - c * self.aa;
+        self.vv = vv + crossed_minus(&self.tv.transpose(), s) - by_transpose(&self.va, c);
+        self.vp += minus_cross(s, &self.tp) - by_transpose(c, &self.pa);
+        self.vg += minus_cross(s, &self.tg) - by_transpose(c, &self.ga);
+        self.vb += self.tb.cross(s) - c * self.ab;
+
+        // theta' = theta - C g.
+        let tt = self.tt - by_transpose(c, &self.tg);
+        self.tg -= c * self.gg;
+        self.tt = tt - by_transpose(&self.tg, c);
+        self.tv -= by_transpose(c, &self.vg);
+        self.tp -= by_transpose(c, &self.pg);
+        self.ta -= c * self.ga;
+        self.tb -= c * self.gb;
+
+        self.grow(t, growth);
+        self.hold();
+    }
+
+    /// Adds the noise of `time_s`.
+    #[inline]
+    fn grow(&mut self, time_s: f32, growth: &Growth) {
+        add_diagonal(&mut self.tt, growth.theta * time_s);
+        add_diagonal(&mut self.vv, growth.velocity * time_s);
+        add_diagonal(&mut self.gg, growth.gyro * time_s);
+        add_diagonal(&mut self.aa, growth.accel * time_s);
+        self.bb += growth.baro * time_s;
+    }
+
+    /// Adds variances to attitude and velocity.
+    pub(crate) fn roughen(&mut self, (theta, velocity): (f32, f32)) {
+        add_diagonal(&mut self.tt, theta);
+        add_diagonal(&mut self.vv, velocity);
+    }
+
+    /// True if every variance is finite.
+    pub(crate) fn is_sound(&self) -> bool {
+        let sum = self.tt.trace() + self.vv.trace() + self.pp.trace() + self.gg.trace() + self.aa.trace() + self.bb;
+        sum.is_finite()
+    }
+
+    /// Holds every variance within its bounds, and the diagonal blocks symmetric. Raising a variance, and scaling an
+    /// error down with all its covariances, both leave the matrix positive.
+    #[inline]
+    pub(crate) fn hold(&mut self) {
+        let Covariance { tt, vv, pp, gg, aa, bb, .. } = self;
+        for (block, bounds) in [(tt, THETA), (vv, VELOCITY), (pp, POSITION), (gg, GYRO), (aa, ACCEL)] {
+            mirror(block);
+            block.m11 = max(block.m11, bounds.least);
+            block.m22 = max(block.m22, bounds.least);
+            block.m33 = max(block.m33, bounds.least);
+        }
+        *bb = max(*bb, BARO.least);
+        let [theta, velocity, position, gyro, accel] =
+            [(&self.tt, THETA), (&self.vv, VELOCITY), (&self.pp, POSITION), (&self.gg, GYRO), (&self.aa, ACCEL)]
+                .map(|(block, bounds)| max(max(block.m11, block.m22), block.m33) > bounds.most);
+        if theta || velocity || position || gyro || accel || self.bb > BARO.most {
+            self.limit();
+        }
+    }
+
+    /// Scales every error whose variance is too large.
+    #[cold]
+    #[inline(never)]
+    fn limit(&mut self) {
+        let factor = |variance: f32, bounds: &Bounds| {
+            if variance > bounds.most { sqrt(bounds.most / variance) * 0.9999 } else { 1.0 }
+        };
+        let of = |m: &Block, bounds: Bounds| {
+            Vector3::new(factor(m.m11, &bounds), factor(m.m22, &bounds), factor(m.m33, &bounds))
+        };
+        let (t, v, p) = (of(&self.tt, THETA), of(&self.vv, VELOCITY), of(&self.pp, POSITION));
+        let (g, a, b) = (of(&self.gg, GYRO), of(&self.aa, ACCEL), factor(self.bb, &BARO));
+        self.scale(&Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b });
+    }
+
+    /// Multiplies each error, and with it its row and its column.
+    fn scale(&mut self, by: &Errors) {
+        let Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b } = by;
+        let scale = |m: &mut Block, x: &Vector3<f32>, y: &Vector3<f32>| m.component_mul_assign(&(x * y.transpose()));
+        for (block, y) in [(&mut self.tt, t), (&mut self.tv, v), (&mut self.tp, p), (&mut self.tg, g), (&mut self.ta, a)] {
+            scale(block, t, y);
+        }
+        for (block, y) in [(&mut self.vv, v), (&mut self.vp, p), (&mut self.vg, g), (&mut self.va, a)] {
+            scale(block, v, y);
+        }
+        for (block, y) in [(&mut self.pp, p), (&mut self.pg, g), (&mut self.pa, a)] {
+            scale(block, p, y);
+        }
+        scale(&mut self.gg, g, g);
+        scale(&mut self.ga, g, a);
+        scale(&mut self.aa, a, a);
+        for (column, x) in
+            [(&mut self.tb, t), (&mut self.vb, v), (&mut self.pb, p), (&mut self.gb, g), (&mut self.ab, a)]
+        {
+            column.component_mul_assign(&(x * *b));
+        }
+        self.bb *= b * b;
+    }
+
+    /// Forgets what is known of some errors: those with a zero in `keep` lose their variance and all covariances.
+    pub(crate) fn forget(&mut self, keep: &Errors) {
+        self.scale(keep);
+    }
+
+    /// Returns P h.
+    #[inline]
+    pub(crate) fn times(&self, row: &Row) -> Errors {
+        let at = row.coordinate;
+        let mut y = Errors {
+            theta: self.tt * row.theta,
+            velocity: self.tv.tr_mul(&row.theta),
+            position: self.tp.tr_mul(&row.theta),
+            gyro: self.tg.tr_mul(&row.theta),
+            accel: self.ta.tr_mul(&row.theta),
+            baro: self.tb.dot(&row.theta),
+        };
+        if row.velocity != 0.0 {
+            let h = row.velocity;
+            y.theta += at.column(&self.tv) * h;
+            y.velocity += at.column(&self.vv) * h;
+            y.position += at.row(&self.vp) * h;
+            y.gyro += at.row(&self.vg) * h;
+            y.accel += at.row(&self.va) * h;
+            y.baro += at.of(&self.vb) * h;
+        }
+        if row.position != 0.0 {
+            let h = row.position;
+            y.theta += at.column(&self.tp) * h;
+            y.velocity += at.column(&self.vp) * h;
+            y.position += at.column(&self.pp) * h;
+            y.gyro += at.row(&self.pg) * h;
+            y.accel += at.row(&self.pa) * h;
+            y.baro += at.of(&self.pb) * h;
+        }
+        if let Some(h) = &row.gyro {
+            y.theta += self.tg * h;
+            y.velocity += self.vg * h;
+            y.position += self.pg * h;
+            y.gyro += self.gg * h;
+            y.accel += self.ga.tr_mul(h);
+            y.baro += self.gb.dot(h);
+        }
+        if let Some(h) = &row.accel {
+            y.theta += self.ta * h;
+            y.velocity += self.va * h;
+            y.position += self.pa * h;
+            y.gyro += self.ga * h;
+            y.accel += self.aa * h;
+            y.baro += self.ab.dot(h);
+        }
+        if row.baro != 0.0 {
+            let h = row.baro;
+            y.theta += self.tb * h;
+            y.velocity += self.vb * h;
+            y.position += self.pb * h;
+            y.gyro += self.gb * h;
+            y.accel += self.ab * h;
+            y.baro += self.bb * h;
+        }
+        y
+    }
+
+    /// Subtracts k w'.
+    #[inline]
+    fn subtract(&mut self, k: &Errors, w: &Errors) {
+        subtract_outer(&mut self.tt, &k.theta, &w.theta);
+        subtract_outer(&mut self.tv, &k.theta, &w.velocity);
+        subtract_outer(&mut self.tp, &k.theta, &w.position);
+        subtract_outer(&mut self.tg, &k.theta, &w.gyro);
+        subtract_outer(&mut self.ta, &k.theta, &w.accel);
+        subtract_outer(&mut self.vv, &k.velocity, &w.velocity);
+        subtract_outer(&mut self.vp, &k.velocity, &w.position);
+        subtract_outer(&mut self.vg, &k.velocity, &w.gyro);
+        subtract_outer(&mut self.va, &k.velocity, &w.accel);
+        subtract_outer(&mut self.pp, &k.position, &w.position);
+        subtract_outer(&mut self.pg, &k.position, &w.gyro);
+        subtract_outer(&mut self.pa, &k.position, &w.accel);
+        subtract_outer(&mut self.gg, &k.gyro, &w.gyro);
+        subtract_outer(&mut self.ga, &k.gyro, &w.accel);
+        subtract_outer(&mut self.aa, &k.accel, &w.accel);
+        self.tb -= k.theta * w.baro;
+        self.vb -= k.velocity * w.baro;
+        self.pb -= k.position * w.baro;
+        self.gb -= k.gyro * w.baro;
+        self.ab -= k.accel * w.baro;
+        self.bb -= k.baro * w.baro;
+    }
+
+    /// Fuses a scalar whose P h is `y` and whose innovation has the variance `s`, with the optimal gain K = y/s: P - y
+    /// y'/s, which is symmetric to the last bit.
+    #[inline]
+    pub(crate) fn fuse(&mut self, y: &Errors, s: f32) {
+        let w = y.scaled(1.0 / sqrt(s));
+        self.subtract(&w, &w);
+        self.hold();
+    }
+
+    /// Fuses a scalar with any gain `k`: P - k y' - y k' + k s k' = P - k w' - w k' with w = y - k s/2. This is Joseph's
+    /// form, positive whatever the gain.
+    pub(crate) fn fuse_with(&mut self, k: &Errors, y: &Errors, s: f32) {
+        let half = k.scaled(0.5 * s);
+        let w = Errors {
+            theta: y.theta - half.theta,
+            velocity: y.velocity - half.velocity,
+            position: y.position - half.position,
+            gyro: y.gyro - half.gyro,
+            accel: y.accel - half.accel,
+            baro: y.baro - half.baro,
+        };
+        self.subtract(k, &w);
+        self.subtract(&w, k);
+        self.hold();
+    }
+
+    /// Returns the variances.
+    pub(crate) fn variances(&self) -> Errors {
+        Errors {
+            theta: self.tt.diagonal(),
+            velocity: self.vv.diagonal(),
+            position: self.pp.diagonal(),
+            gyro: self.gg.diagonal(),
+            accel: self.aa.diagonal(),
+            baro: self.bb,
+        }
+    }
+
+    /// Returns the matrix as rows, in the order theta, v, p, g, a, b.
+    pub(crate) fn rows(&self) -> [[f32; 16]; 16] {
+        let c = self;
+        let blocks = [
+            [c.tt, c.tv, c.tp, c.tg, c.ta],
+            [c.tv.transpose(), c.vv, c.vp, c.vg, c.va],
+            [c.tp.transpose(), c.vp.transpose(), c.pp, c.pg, c.pa],
+            [c.tg.transpose(), c.vg.transpose(), c.pg.transpose(), c.gg, c.ga],
+            [c.ta.transpose(), c.va.transpose(), c.pa.transpose(), c.ga.transpose(), c.aa],
+        ];
+        let border = [c.tb, c.vb, c.pb, c.gb, c.ab];
+        let mut rows = [[0.0; 16]; 16];
+        let (body, last) = rows.split_at_mut(15);
+        for ((three, blocks), column) in body.chunks_exact_mut(3).zip(&blocks).zip(&border) {
+            for (row, at) in three.iter_mut().zip(Coordinate::ALL) {
+                let numbers = blocks.iter().flat_map(|block| {
+                    let row = at.row(block);
+                    [row.x, row.y, row.z]
+                });
+                let numbers = numbers.chain([at.of(column)]);
+                row.iter_mut().zip(numbers).for_each(|(to, from)| *to = from);
+            }
+        }
+        let numbers = border.iter().flat_map(|column| [column.x, column.y, column.z]).chain([c.bb]);
+        last.iter_mut().flatten().zip(numbers).for_each(|(to, from)| *to = from);
+        rows
+    }
+}
+
+/// The largest standard deviation of three variances.
+pub(crate) fn largest_sigma(variances: &Vector3<f32>) -> f32 {
+    sqrt(max(max(variances.x, variances.y), variances.z))
+}
+
+/// The smaller of a variance and what is possible for an angle.
+pub(crate) fn angle_variance(variance: f32) -> f32 {
+    min(variance, THETA.most)
+}

@@ -1,0 +1,244 @@
+//! The estimator: what happens in a step.
+
+use crate::align::Unready;
+use crate::covariance::{Growth, largest_sigma};
+use crate::estimate::{Estimate, Sigmas, Validity};
+use crate::imu::LowPass;
+use crate::measurement::ImuSample;
+use crate::memory::{Memory, NO_INTERVAL};
+use crate::rotation::euler;
+use crate::settings::Settings;
+use afbc_control::math::{sqrt, wrap_angle};
+use afbc_types::{Declared, OutOfRange, State};
+use nalgebra::Vector3;
+
+/// Time between predictions of the covariance \[us\]; a sample later than this less half a millisecond is due.
+const PREDICT_US: u64 = 3_500;
+/// Scalars fused per step without prediction.
+const SCALARS: usize = 2;
+/// Sample in the future \[us\], sample too old \[us\].
+const EARLY_US: u64 = 50_000;
+const OLD_US: u64 = 1_000_000;
+/// Gap between samples that counts as one, and that starts the filter again \[us\].
+const GAP_US: u64 = 20_000;
+const LOST_US: u64 = 250_000;
+/// What a vehicle may do in a gap: rates \[rad/s\] and accelerations \[m/s2\] that the samples around it do not show.
+const GAP_RAD_S: f32 = 0.5;
+const GAP_M_S2: f32 = 3.0;
+/// Variances per second that a clipped sample adds, attitude and velocity.
+const CLIPPED: (f32, f32) = (0.5, 50.0);
+
+/// The estimator. Constant; what changes is in [`Memory`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimator {
+    pub(crate) settings: Settings,
+    growth: Growth,
+    low_pass: LowPass,
+    pub(crate) gate_squared: f32,
+    pub(crate) reacquire_us: u64,
+    pub(crate) coast_us: u64,
+    /// Direction of magnetic north in the earth frame, whose x is north and y west.
+    pub(crate) magnetic_north_rad: f32,
+    pub(crate) inclination_error_max: f32,
+}
+
+impl Estimator {
+    /// Makes an estimator.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub fn new(settings: Settings) -> Result<Self, OutOfRange> {
+        settings.validate()?;
+        let square = |x: f32| x * x;
+        let microseconds = |time_s: f32| (time_s * 1e6) as u64;
+        Ok(Estimator {
+            growth: Growth {
+                theta: square(settings.gyro_noise_rad_s_rthz),
+                velocity: square(settings.accel_noise_m_s2_rthz),
+                gyro: square(settings.gyro_walk_rad_s_rts),
+                accel: square(settings.accel_walk_m_s2_rts),
+                baro: square(settings.baro_walk_m_rts),
+            },
+            low_pass: LowPass::new(settings.rates_cutoff_hz),
+            gate_squared: square(settings.gate_sigmas),
+            reacquire_us: microseconds(settings.reacquire_s),
+            coast_us: microseconds(settings.coast_s),
+            magnetic_north_rad: wrap_angle(-settings.declination_rad),
+            inclination_error_max: settings.inclination_error_max_rad,
+            settings,
+        })
+    }
+
+    /// Returns the settings.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Starts in a given state: in the air after a restart, or where a simulation begins. Biases are zero; the
+    /// measurement that comes first sets what is not known: a position with a sigma of 1 km or more, a heading with one
+    /// of 1 rad or more. A state that is not [plausible](State::is_plausible), or a sigma that is negative or not
+    /// finite, changes nothing: false.
+    pub fn start_at(&self, memory: &mut Memory, now_us: u64, state: &State, sigmas: &Sigmas) -> bool {
+        let valid = |v: &Vector3<f32>| v.iter().all(|sigma| (0.0..=1e4).contains(sigma));
+        let Sigmas { attitude_rad, velocity_m_s, position_m, gyro_bias_rad_s, accel_bias_m_s2, .. } = sigmas;
+        let all = [attitude_rad, velocity_m_s, position_m, gyro_bias_rad_s, accel_bias_m_s2].into_iter().all(valid);
+        let usable = all && state.is_plausible();
+        if usable {
+            memory.begin_at(now_us, state, sigmas);
+        }
+        usable
+    }
+
+    /// Runs one step, to be called every millisecond: takes the newest sample of the inertial sensors, if there is a
+    /// new one, predicts or fuses, and returns the estimate at the time of that sample. `now_us` is the time since
+    /// power-up. Cannot fail: whatever is given, the estimate is finite.
+    #[must_use = "the estimate is its only result"]
+    pub fn step(&self, memory: &mut Memory, now_us: u64, imu: Option<&ImuSample>) -> Estimate {
+        let predicted = imu.is_some_and(|sample| self.take(memory, now_us, sample));
+        if memory.runs {
+            if memory.history.is_unsettled() && !predicted {
+                memory.history.settle();
+            } else if !predicted {
+                self.fuse(memory, now_us, SCALARS);
+            }
+        } else {
+            self.listen(memory, now_us);
+        }
+        self.report(memory, now_us)
+    }
+
+    /// Takes a sample. True if the covariance was predicted.
+    fn take(&self, memory: &mut Memory, now_us: u64, sample: &ImuSample) -> bool {
+        let last_us = memory.monitor.at_us();
+        let possible = sample.at_us <= now_us.saturating_add(EARLY_US) && sample.at_us.saturating_add(OLD_US) >= now_us;
+        let newer = last_us.is_none_or(|last_us| sample.at_us > last_us);
+        if !(sample.is_plausible() && possible && (newer || memory.monitor.is_lost())) {
+            memory.monitor.refuse();
+            return false;
+        }
+        let clipped = memory.monitor.take(sample, &self.settings);
+        let rates = sample.rates_rad_s - memory.nominal.gyro_bias;
+        self.low_pass.advance(&mut memory.smoothed, &rates);
+        let since_us = last_us.and_then(|last_us| sample.at_us.checked_sub(last_us));
+        if !memory.runs {
+            self.align(memory, sample);
+            return false;
+        }
+        let Some(gap_us) = since_us.filter(|since_us| *since_us < LOST_US) else {
+            // The first sample after a start in the air, or after the loss of the samples or of their time.
+            if last_us.is_some() {
+                memory.restart(sample.at_us);
+            }
+            memory.covariance_us = sample.at_us;
+            memory.history.clear();
+            memory.remember(sample.at_us);
+            memory.nominal.begin(sample);
+            return false;
+        };
+        let dt_s = gap_us as f32 * 1e-6;
+        if gap_us > GAP_US {
+            let (turn, speed) = (GAP_RAD_S * dt_s, GAP_M_S2 * dt_s);
+            memory.rough.0 += turn * turn;
+            memory.rough.1 += speed * speed;
+        }
+        if clipped {
+            memory.rough.0 += CLIPPED.0 * dt_s;
+            memory.rough.1 += CLIPPED.1 * dt_s;
+        }
+        memory.interval.thrust += memory.nominal.advance(sample, dt_s, self.settings.gravity_m_s2);
+        memory.interval.time_s += dt_s;
+        let due = sample.at_us.saturating_sub(memory.covariance_us) >= PREDICT_US;
+        if due {
+            self.predict(memory, sample);
+        }
+        due
+    }
+
+    /// Predicts the covariance up to the present, and remembers the state.
+    fn predict(&self, memory: &mut Memory, sample: &ImuSample) {
+        let mut interval = memory.interval;
+        interval.turn = (memory.rotation + memory.nominal.rotation) * (0.5 * interval.time_s);
+        memory.covariance.predict(&interval, &self.growth);
+        memory.covariance.roughen(memory.rough);
+        memory.rotation = memory.nominal.rotation;
+        memory.interval = NO_INTERVAL;
+        memory.rough = (0.0, 0.0);
+        if memory.nominal.is_sound() && memory.covariance.is_sound() {
+            memory.remember(sample.at_us);
+        } else {
+            memory.restart(sample.at_us);
+            memory.nominal.begin(sample);
+        }
+    }
+
+    /// Waits for rest.
+    fn align(&self, memory: &mut Memory, sample: &ImuSample) {
+        if let Some(aligned) = memory.align.advance(sample, &self.settings) {
+            memory.begin(sample.at_us, &aligned, &self.settings);
+            memory.nominal.begin(sample);
+        }
+    }
+
+    /// Before the start, hears who tells the heading.
+    fn listen(&self, memory: &mut Memory, now_us: u64) {
+        if memory.monitor.health(now_us, &self.settings).missing {
+            memory.align.again(Unready::NoImu);
+        }
+        let recent = now_us.saturating_sub(OLD_US);
+        while let Some(measurement) = memory.queue.take(|_| true) {
+            if measurement.at_us >= recent {
+                memory.align.hear(&measurement.value);
+            }
+        }
+    }
+
+    /// Says what is known.
+    fn report(&self, memory: &Memory, now_us: u64) -> Estimate {
+        let imu = memory.monitor.health(now_us, &self.settings);
+        let Memory { nominal, aids, resets, dropped, .. } = memory;
+        let mut estimate = Estimate { imu, aids: *aids, resets: *resets, dropped: *dropped, ..Estimate::default() };
+        estimate.at_us = memory.monitor.at_us().unwrap_or(now_us);
+        estimate.attitude = [1.0, 0.0, 0.0, 0.0];
+        estimate.state.rates_rad_s = memory.smoothed.output;
+        if !memory.runs {
+            estimate.unready = Some(memory.align.why);
+            return estimate;
+        }
+        let q = &nominal.attitude;
+        estimate.attitude = [q.w, q.i, q.j, q.k];
+        estimate.state.attitude_rad = euler(q);
+        estimate.state.velocity_m_s = nominal.velocity;
+        estimate.state.position_m = nominal.position;
+        estimate.gyro_bias_rad_s = nominal.gyro_bias;
+        estimate.accel_bias_m_s2 = nominal.accel_bias;
+        estimate.height_offset_m = memory.height_offset;
+        let variances = memory.covariance.variances();
+        let root = |v: &Vector3<f32>| v.map(sqrt);
+        estimate.sigmas = Sigmas {
+            attitude_rad: root(&variances.theta),
+            velocity_m_s: root(&variances.velocity),
+            position_m: root(&variances.position),
+            gyro_bias_rad_s: root(&variances.gyro),
+            accel_bias_m_s2: root(&variances.accel),
+            height_offset_m: sqrt(variances.baro),
+        };
+        let s = &self.settings;
+        let at_us = estimate.at_us;
+        let tilt = estimate.sigmas.attitude_rad.xy().max();
+        let attitude = imu.is_usable() && tilt <= s.tilt_sigma_max_rad;
+        let heading = attitude && memory.knows.heading && estimate.sigmas.attitude_rad.z <= s.heading_sigma_max_rad;
+        let held = memory.on_ground || aids.holds_velocity(at_us, self.coast_us);
+        let (fast, far) = (largest_sigma(&variances.velocity), largest_sigma(&variances.position));
+        let velocity = attitude && held && fast <= s.velocity_sigma_max_m_s;
+        let placed = aids.holds_position(at_us, self.coast_us);
+        let position = velocity && placed && memory.knows.position && far <= s.position_sigma_max_m;
+        let height = position
+            || attitude
+                && aids.height.is_live(at_us, self.coast_us)
+                && estimate.sigmas.position_m.z <= s.position_sigma_max_m
+                && estimate.sigmas.velocity_m_s.z <= s.velocity_sigma_max_m_s;
+        estimate.validity = Validity { attitude, heading, velocity, position, height };
+        estimate
+    }
+}

@@ -1,0 +1,327 @@
+//! From the queue into the state: one scalar at a time.
+//!
+//! A scalar z = h'x + noise of variance r corrects by the gain K = P h/s, s = h' P h + r. Scalars of one fix follow one
+//! another, each with the innovation against the state as corrected so far; their innovations' squares over s then add
+//! up to the normalised innovation squared of the whole fix.
+
+use crate::aid::{Aid, passes};
+use crate::covariance::{Coordinate, Errors};
+use crate::estimator::Estimator;
+use crate::horizon::{Horizon, Target};
+use crate::memory::Memory;
+use crate::queue::{Fix, Part, parts};
+use crate::restart::reference;
+use crate::rotation::{atan2, renormalized, small, twist};
+use afbc_control::math::{abs_max, max, min, wrap_angle};
+use nalgebra::Vector3;
+
+/// Oldest measurement \[us\].
+const LATE_US: u64 = 250_000;
+/// Time in the future from which on a measurement is refused \[us\].
+const EARLY_US: u64 = 20_000;
+/// A scalar leaves at least this share of a variance: in `f32`, what remains of more is rounding.
+const LEFT: f32 = 1e-4;
+/// Time for which another aid counts as present \[us\].
+const PRESENT_US: u64 = 1_000_000;
+/// Interval of the pseudo-measurements of rest \[us\], and their standard deviations on the ground and in the air \[m/s\].
+const STILL_US: u64 = 200_000;
+const STILL_M_S: f32 = 0.05;
+const ALOFT_M_S: f32 = 3.0;
+/// Time within which a second reset doubts the attitude \[us\].
+const AGAIN_US: u64 = 10_000_000;
+/// Velocity that a tracker's jump leaves unknown \[m2/s2\].
+const JUMP_VARIANCE: f32 = 1.0;
+
+fn count(number: &mut u32) {
+    *number = number.saturating_add(1);
+}
+
+impl Estimator {
+    /// Fuses up to `scalars` scalars, and begins the fixes that they belong to.
+    pub(crate) fn fuse(&self, memory: &mut Memory, now_us: u64, scalars: usize) {
+        for _ in 0..scalars {
+            if memory.fix.is_none() {
+                memory.fix = self.next_fix(memory, now_us);
+            }
+            let Some(fix) = memory.fix else { break };
+            memory.fix = self.fuse_scalar(memory, fix);
+        }
+    }
+
+    /// Returns the next fix to fuse: the oldest measurement in the queue that is of the past, or a pseudo-measurement of
+    /// rest.
+    fn next_fix(&self, memory: &mut Memory, now_us: u64) -> Option<Fix> {
+        let newest_us = memory.covariance_us;
+        let due = |at_us: u64| at_us <= newest_us || at_us > now_us.saturating_add(EARLY_US);
+        let Some(measurement) = memory.queue.take(|waiting| due(waiting.at_us)) else {
+            return self.rest(memory);
+        };
+        let at_us = measurement.at_us;
+        if at_us > newest_us {
+            count(&mut memory.dropped.early);
+            return None;
+        }
+        let past = memory.history.at(at_us as u32).filter(|_| newest_us - at_us <= LATE_US);
+        let Some(past) = past else {
+            count(&mut memory.dropped.late);
+            return None;
+        };
+        let mut parts = parts(&measurement.value);
+        for part in &mut parts {
+            let Some(aid) = part.and_then(|part| part.aid) else { continue };
+            let record = memory.aids.of_mut(aid);
+            if record.newest_us.is_some_and(|newest_us| at_us <= newest_us) {
+                count(&mut memory.dropped.overtaken);
+                *part = None;
+            } else {
+                record.newest_us = Some(at_us);
+            }
+        }
+        if parts.iter().all(Option::is_none) {
+            return None;
+        }
+        Some(Fix { at_us, past, parts, next: 0, nis: 0.0 })
+    }
+
+    /// Returns a pseudo-measurement of rest if one is due: on the ground; or in the air without any aid, where it keeps
+    /// roll and pitch level in the long run.
+    fn rest(&self, memory: &mut Memory) -> Option<Fix> {
+        let at_us = memory.covariance_us;
+        let unaided = !memory.aids.holds_velocity(at_us, self.coast_us);
+        let sigma = if memory.on_ground { STILL_M_S } else { ALOFT_M_S };
+        if !(memory.on_ground || unaided) || at_us.saturating_sub(memory.still_us) < STILL_US {
+            return None;
+        }
+        memory.still_us = at_us;
+        let past = memory.history.at(at_us as u32)?;
+        let variance = Vector3::repeat(sigma * sigma);
+        let part = Part { aid: None, target: Target::Velocity(Vector3::zeros()), variance };
+        Some(Fix { at_us, past, parts: [Some(part), None], next: 0, nis: 0.0 })
+    }
+
+    /// Fuses the next scalar of `fix`, and returns what is left of it.
+    #[inline(always)]
+    fn fuse_scalar(&self, memory: &mut Memory, mut fix: Fix) -> Option<Fix> {
+        let [first, second] = fix.parts;
+        let rest = second.map(|_| Fix { parts: [second, None], next: 0, nis: 0.0, ..fix });
+        let Some(part) = first else { return rest };
+        let present = memory.history.newest()?;
+        let horizon = Horizon::new(&present, &memory.history.corrected(&fix.past), self.settings.gravity_m_s2);
+        if fix.next == 0 && !self.admits(memory, &fix, &part, &horizon) {
+            return rest;
+        }
+        let coordinate = match fix.next {
+            0 => Coordinate::X,
+            1 => Coordinate::Y,
+            _ => Coordinate::Z,
+        };
+        let Some((innovation, row)) =
+            horizon.row(&part.target, coordinate, memory.height_offset, self.magnetic_north_rad)
+        else {
+            return rest;
+        };
+        let y = memory.covariance.times(&row);
+        let hph = max(row.dot(&y), 0.0);
+        let r = match &part.target {
+            Target::Field(field) => field_variance(&horizon.field(field), part.variance.x),
+            _ => coordinate.of(&part.variance),
+        };
+        let s = hph + max(r, LEFT * hph);
+        let nis = innovation * innovation / s;
+        let scalars = part.target.scalars();
+        if scalars == 1 && nis > self.gate_squared {
+            self.reject(memory, &fix, &part, nis, &horizon);
+            return rest;
+        }
+        match part.target {
+            // The field corrects what it tells, the heading, and the gyroscope's bias that turned it: a disturbed one
+            // must not tilt the vehicle.
+            Target::Field(_) => {
+                let zero = Vector3::zeros();
+                let k = Errors {
+                    theta: Vector3::new(0.0, 0.0, y.theta.z),
+                    velocity: zero,
+                    position: zero,
+                    gyro: y.gyro,
+                    accel: zero,
+                    baro: 0.0,
+                };
+                let k = k.scaled(1.0 / s);
+                memory.covariance.fuse_with(&k, &y, s);
+                self.correct(memory, &k.scaled(innovation));
+            }
+            _ => {
+                memory.covariance.fuse(&y, s);
+                self.correct(memory, &y.scaled(innovation / s));
+            }
+        }
+        fix.next += 1;
+        fix.nis += nis;
+        if fix.next < scalars {
+            return Some(fix);
+        }
+        if let Some(aid) = part.aid {
+            let record = memory.aids.of_mut(aid);
+            (record.nis, record.scalars) = (fix.nis, scalars);
+            record.accept(fix.at_us);
+        }
+        rest
+    }
+
+    /// Adds corrections to the state.
+    fn correct(&self, memory: &mut Memory, by: &Errors) {
+        let limited = |bias: Vector3<f32>, most: f32| bias.map(|x| max(-most, min(x, most)));
+        let turn = small(&by.theta);
+        let nominal = &mut memory.nominal;
+        nominal.turn_to(renormalized(&(turn * nominal.attitude)));
+        nominal.velocity += by.velocity;
+        // The correction is of the covariance's time, the state of up to 3 ms later.
+        let moved = by.position + by.velocity * memory.interval.time_s;
+        nominal.move_by(&moved);
+        nominal.gyro_bias = limited(nominal.gyro_bias + by.gyro, self.settings.gyro_bias_max_rad_s);
+        nominal.accel_bias = limited(nominal.accel_bias + by.accel, self.settings.accel_bias_max_m_s2);
+        memory.height_offset += by.baro;
+        memory.history.correct(&turn, &by.velocity, &by.position);
+    }
+
+    /// True if the part of a fix is to be fused. Otherwise it was rejected, or the state was set to it.
+    #[inline]
+    fn admits(&self, memory: &mut Memory, fix: &Fix, part: &Part, horizon: &Horizon) -> bool {
+        let variances = memory.covariance.variances();
+        let past = horizon.past();
+        let (innovation, variance) = match &part.target {
+            Target::Position(position) => {
+                let innovation = position - past.position;
+                if !memory.knows.position {
+                    memory.reset_position(&innovation, &part.variance);
+                    self.accept(memory, fix, part);
+                    return false;
+                }
+                let tau_s = horizon.tau_s();
+                let along = memory.covariance.vp.diagonal();
+                (innovation, variances.position - along * (2.0 * tau_s) + variances.velocity * (tau_s * tau_s))
+            }
+            Target::Velocity(velocity) => (velocity - past.velocity, variances.velocity),
+            Target::Attitude(attitude) => {
+                if !memory.knows.heading {
+                    memory.reset_heading(twist(attitude, &past.attitude), part.variance.z);
+                    self.accept(memory, fix, part);
+                    return false;
+                }
+                (crate::rotation::difference(attitude, &past.attitude), variances.theta)
+            }
+            Target::Height(height) => {
+                if !memory.knows.height_offset {
+                    memory.reset_height_offset(height - past.position.z, part.variance.x);
+                    self.accept(memory, fix, part);
+                    return false;
+                }
+                return true;
+            }
+            Target::Field(field) => {
+                let field = horizon.field(field);
+                let Some((strength, inclination)) = reference(&field) else { return false };
+                let (usual, steep) = *memory.field.get_or_insert((strength, inclination));
+                let slope = self.inclination_error_max * max(0.2, afbc_control::math::sqrt(1.0 - steep * steep));
+                if (strength - usual).abs() > self.settings.field_error_max * usual
+                    || (inclination - steep).abs() > slope
+                {
+                    count(&mut memory.dropped.disturbed);
+                    return false;
+                }
+                if !memory.knows.heading {
+                    let turn = wrap_angle(self.magnetic_north_rad - atan2(field.y, field.x));
+                    let slope = field.z * field.z / max(field.x * field.x + field.y * field.y, 1e-3 * strength);
+                    let variance = field_variance(&field, part.variance.x)
+                        + min(slope, 100.0) * max(variances.theta.x, variances.theta.y);
+                    memory.reset_heading(turn, variance);
+                    self.accept(memory, fix, part);
+                    return false;
+                }
+                return true;
+            }
+            Target::Heading(heading) => {
+                if !memory.knows.heading {
+                    memory.reset_heading(wrap_angle(heading - horizon.heading()), part.variance.x);
+                    self.accept(memory, fix, part);
+                    return false;
+                }
+                return true;
+            }
+        };
+        let s = variance + part.variance;
+        let passes = passes(&innovation, &s, self.gate_squared);
+        if !passes {
+            let nis = innovation.x * innovation.x / s.x;
+            let nis = max(nis, max(innovation.y * innovation.y / s.y, innovation.z * innovation.z / s.z));
+            self.reject(memory, fix, part, nis, horizon);
+        }
+        passes
+    }
+
+    fn accept(&self, memory: &mut Memory, fix: &Fix, part: &Part) {
+        if let Some(aid) = part.aid {
+            memory.aids.of_mut(aid).accept(fix.at_us);
+        }
+    }
+
+    /// Records a rejection; after too long, sets the state to the measurement, unless another aid contradicts it.
+    #[cold]
+    fn reject(&self, memory: &mut Memory, fix: &Fix, part: &Part, nis: f32, horizon: &Horizon) {
+        let Some(aid) = part.aid else { return };
+        let record = memory.aids.of_mut(aid);
+        (record.nis, record.scalars) = (nis, part.target.scalars());
+        let lasted_us = record.reject(fix.at_us);
+        if lasted_us < self.reacquire_us || memory.aids.has_other(aid, fix.at_us, PRESENT_US) {
+            return;
+        }
+        let past = horizon.past();
+        match &part.target {
+            Target::Position(position) => {
+                memory.reset_position(&(position - past.position), &part.variance);
+                if aid == Aid::TrackerPosition {
+                    memory.doubt_velocity(JUMP_VARIANCE);
+                }
+                self.doubt(memory, fix.at_us);
+            }
+            Target::Velocity(velocity) => {
+                memory.reset_velocity(&(velocity - past.velocity), &part.variance);
+                self.doubt(memory, fix.at_us);
+            }
+            Target::Attitude(attitude) => {
+                // Roll and pitch are the IMU's; a tracker that contradicts them stays rejected.
+                let turn = twist(attitude, &past.attitude);
+                let variance = memory.covariance.tt.m33 + part.variance.z;
+                if turn * turn <= self.gate_squared * variance {
+                    return;
+                }
+                memory.reset_heading(turn, part.variance.z);
+            }
+            Target::Height(height) => memory.reset_height_offset(height - past.position.z, part.variance.x),
+            Target::Field(field) => {
+                let direction = horizon.field(field);
+                let turn = wrap_angle(self.magnetic_north_rad - atan2(direction.y, direction.x));
+                memory.reset_heading(turn, field_variance(&direction, part.variance.x));
+            }
+            Target::Heading(heading) => {
+                memory.reset_heading(wrap_angle(heading - horizon.heading()), part.variance.x);
+            }
+        }
+        self.accept(memory, fix, part);
+    }
+
+    /// Doubts the attitude if this reset is the second within ten seconds.
+    fn doubt(&self, memory: &mut Memory, at_us: u64) {
+        if memory.reset_us.is_some_and(|reset_us| at_us.saturating_sub(reset_us) < AGAIN_US) {
+            memory.doubt_tilt();
+        }
+        memory.reset_us = Some(at_us);
+    }
+}
+
+/// Variance of the direction of a field's horizontal part; that of its coordinates is `variance`.
+fn field_variance(field: &Vector3<f32>, variance: f32) -> f32 {
+    let horizontal = field.x * field.x + field.y * field.y;
+    let floor = 1e-6 * abs_max(field) * abs_max(field);
+    variance / max(horizontal, floor) + 1e-6
+}

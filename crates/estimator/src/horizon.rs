@@ -1,0 +1,156 @@
+//! From the error of a past state to that of the present, in closed form.
+//!
+//! Between the time of a measurement and the present, tau later, the error moves by the filter's own equations
+//! ([`crate::covariance`]). Solved backwards, with C = tau R (the mean rotation), S the change of velocity by specific
+//! force and D the integral of the change still to come,
+//!
+//! ```text
+//! theta_past = theta + C g
+//! v_past     = v + S x theta + C a                                S = v - v_past + g tau e_z
+//! p_past     = p - tau v - D x theta - (tau/2) C a                D = tau v - (p - p_past) + g tau^2/2 e_z
+//! ```
+//!
+//! so a late measurement corrects the present as if it had been fused in time and all since had been replayed, but for
+//! the noise of the inertial sensors in between. Terms of the gyroscope's bias in v and p are left out: 5e-5 m/s for
+//! 1e-3 rad/s and 100 ms.
+
+use crate::covariance::{Coordinate, Row};
+use crate::history::Past;
+use crate::rotation::{atan2, difference, matrix};
+use afbc_control::math::wrap_angle;
+use nalgebra::{Matrix3, Quaternion, Vector3};
+
+/// What a scalar measures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Target {
+    Position(Vector3<f32>),
+    Velocity(Vector3<f32>),
+    Attitude(Quaternion<f32>),
+    /// Height with the barometer's offset.
+    Height(f32),
+    /// Direction of the horizontal field, and the field.
+    Field(Vector3<f32>),
+    Heading(f32),
+}
+
+/// A past state seen from the present.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Horizon {
+    past: Past,
+    /// Rotation at that time.
+    rotation: Matrix3<f32>,
+    tau_s: f32,
+    /// C.
+    turn: Matrix3<f32>,
+    /// S.
+    thrust: Vector3<f32>,
+    /// D.
+    distance: Vector3<f32>,
+}
+
+impl Horizon {
+    /// Looks from `present`, at the time of the covariance, back to `past`.
+    pub(crate) fn new(present: &Past, past: &Past, gravity: f32) -> Self {
+        let tau_s = present.at_us.wrapping_sub(past.at_us) as i32 as f32 * 1e-6;
+        let rotation = matrix(&past.attitude);
+        let turn = (rotation + matrix(&present.attitude)) * (0.5 * tau_s);
+        let mut thrust = present.velocity - past.velocity;
+        thrust.z += gravity * tau_s;
+        let mut distance = present.velocity * tau_s - (present.position - past.position);
+        distance.z += 0.5 * gravity * tau_s * tau_s;
+        Horizon { past: *past, rotation, tau_s, turn, thrust, distance }
+    }
+
+    /// Returns the past state.
+    pub(crate) fn past(&self) -> &Past {
+        &self.past
+    }
+
+    /// Returns the age of the past state \[s\].
+    pub(crate) fn tau_s(&self) -> f32 {
+        self.tau_s
+    }
+
+    /// Returns the field in the earth frame.
+    pub(crate) fn field(&self, field: &Vector3<f32>) -> Vector3<f32> {
+        self.rotation * field
+    }
+
+    /// Yaw of the past state.
+    pub(crate) fn heading(&self) -> f32 {
+        atan2(self.rotation.m21, self.rotation.m11)
+    }
+
+    /// Returns the innovation of `target` at `coordinate` (the first one for scalars) and its Jacobian; `None` where
+    /// there is no heading: with the nose or the field upright. `baro` is the estimated offset, `north` the direction
+    /// of magnetic north in the earth frame \[rad\].
+    pub(crate) fn row(&self, target: &Target, coordinate: Coordinate, baro: f32, north: f32) -> Option<(f32, Row)> {
+        let at = coordinate;
+        let unit = at.unit();
+        let none = Row {
+            coordinate,
+            theta: Vector3::zeros(),
+            velocity: 0.0,
+            position: 0.0,
+            gyro: None,
+            accel: None,
+            baro: 0.0,
+        };
+        // An angle: the error's product with `theta`.
+        let angle = |innovation: f32, theta: Vector3<f32>| {
+            (innovation, Row { theta, gyro: Some(self.turn.tr_mul(&theta)), ..none })
+        };
+        match target {
+            Target::Position(position) => {
+                Some((at.of(&(position - self.past.position)), self.position_row(at, none)))
+            }
+            Target::Velocity(velocity) => {
+                let row = Row {
+                    theta: unit.cross(&self.thrust),
+                    velocity: 1.0,
+                    accel: Some(self.turn.tr_mul(&unit)),
+                    ..none
+                };
+                Some((at.of(&(velocity - self.past.velocity)), row))
+            }
+            Target::Attitude(attitude) => Some(angle(at.of(&difference(attitude, &self.past.attitude)), unit)),
+            Target::Height(height) => {
+                let at = Coordinate::Z;
+                let row = Row { baro: 1.0, ..self.position_row(at, Row { coordinate: at, ..none }) };
+                Some((height - self.past.position.z - baro, row))
+            }
+            Target::Field(field) => {
+                let field = self.field(field);
+                let theta = upright(&field)?;
+                Some(angle(wrap_angle(north - atan2(field.y, field.x)), theta))
+            }
+            Target::Heading(heading) => {
+                let nose = Vector3::new(self.rotation.m11, self.rotation.m21, self.rotation.m31);
+                let theta = upright(&nose)?;
+                Some(angle(wrap_angle(heading - self.heading()), theta))
+            }
+        }
+    }
+
+    fn position_row(&self, at: Coordinate, none: Row) -> Row {
+        let unit = at.unit();
+        Row {
+            theta: self.distance.cross(&unit),
+            velocity: -self.tau_s,
+            position: 1.0,
+            accel: Some(self.turn.tr_mul(&unit) * (-0.5 * self.tau_s)),
+            ..none
+        }
+    }
+}
+
+/// Change of the direction of a vector's horizontal part by a rotation of the earth frame; `None` within 10 degrees of
+/// upright.
+fn upright(vector: &Vector3<f32>) -> Option<Vector3<f32>> {
+    let horizontal = vector.x * vector.x + vector.y * vector.y;
+    if horizontal < 0.03 * vector.norm_squared() {
+        return None;
+    }
+    let slope = -vector.z / horizontal;
+    Some(Vector3::new(slope * vector.x, slope * vector.y, 1.0))
+}

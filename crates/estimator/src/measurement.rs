@@ -1,0 +1,157 @@
+//! What the sensors say, and which of it is refused at the door.
+
+use nalgebra::Vector3;
+
+/// A sample of the inertial sensors, in the body frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImuSample {
+    /// Time at which it was true, on the clock of `now_us` \[us\].
+    pub at_us: u64,
+    /// Angular rates \[rad/s\].
+    pub rates_rad_s: Vector3<f32>,
+    /// Specific force, that is acceleration less gravity: +9.81 along body z when level and at rest \[m/s2\].
+    pub specific_force_m_s2: Vector3<f32>,
+}
+
+/// A value with the time at which it was true.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Timed<T> {
+    /// The value.
+    pub value: T,
+    /// Time on the clock of `now_us` \[us\].
+    pub at_us: u64,
+}
+
+/// What an aiding sensor measured, in the earth and body frames of [`afbc_types`].
+///
+/// Standard deviations are positive; those below a tenth of a millimetre, of a milliradian or a millimetre per second
+/// count as that much.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Measurement {
+    /// A tracker's pose.
+    Pose {
+        /// Position in the earth frame \[m\].
+        position_m: Vector3<f32>,
+        /// Quaternion w, x, y, z from body to earth, of either sign, with a squared norm within 0.9 to 1.1.
+        attitude: [f32; 4],
+        /// Standard deviation of each coordinate of the position \[m\].
+        position_sigma_m: f32,
+        /// Standard deviation of the attitude about each axis \[rad\].
+        attitude_sigma_rad: f32,
+    },
+    /// A tracker's position alone.
+    Position {
+        /// Position in the earth frame \[m\].
+        position_m: Vector3<f32>,
+        /// Standard deviation of each coordinate \[m\].
+        sigma_m: f32,
+    },
+    /// A GNSS receiver's fix, as local coordinates ([`Origin::local`](crate::Origin::local)).
+    Gnss {
+        /// Position in the earth frame \[m\].
+        position_m: Vector3<f32>,
+        /// Velocity in the earth frame \[m/s\].
+        velocity_m_s: Vector3<f32>,
+        /// Standard deviation of x and of y \[m\].
+        horizontal_sigma_m: f32,
+        /// Standard deviation of z \[m\].
+        vertical_sigma_m: f32,
+        /// Standard deviation of each coordinate of the velocity \[m/s\].
+        speed_sigma_m_s: f32,
+    },
+    /// A barometer's height above any fixed reference; its offset is estimated.
+    Height {
+        /// Height, upwards \[m\].
+        height_m: f32,
+        /// Standard deviation without the slow drift of the offset \[m\].
+        sigma_m: f32,
+    },
+    /// A magnetometer's field, in the body frame, in any unit that does not change.
+    MagneticField {
+        /// Field.
+        field: Vector3<f32>,
+        /// Standard deviation of each coordinate, in the same unit.
+        sigma: f32,
+    },
+    /// A heading: the yaw angle, from any source.
+    Heading {
+        /// Yaw \[rad\].
+        heading_rad: f32,
+        /// Standard deviation \[rad\].
+        sigma_rad: f32,
+    },
+}
+
+/// Largest coordinate of a position \[m\].
+const POSITION_MAX_M: f32 = 5e4;
+/// Largest coordinate of a velocity \[m/s\].
+const VELOCITY_MAX_M_S: f32 = 150.0;
+/// Largest heading, which may be unwrapped \[rad\].
+const HEADING_MAX_RAD: f32 = 1e3;
+/// Largest coordinate and smallest norm of a field, in any usual unit from tesla to nanotesla.
+const FIELD_MAX: f32 = 1e7;
+const FIELD_MIN: f32 = 1e-7;
+/// Largest standard deviation of anything.
+const SIGMA_MAX: f32 = 1e4;
+/// Accepted deviation of a quaternion's squared norm from 1.
+const NORM_SQUARED_ERROR_MAX: f32 = 0.1;
+/// Largest rates \[rad/s\] and specific force \[m/s2\] of a sample.
+const RATE_MAX_RAD_S: f32 = 200.0;
+const FORCE_MAX_M_S2: f32 = 2000.0;
+
+/// True if every coordinate is finite and at most `max` in size.
+fn within(vector: &Vector3<f32>, max: f32) -> bool {
+    // False of NaN.
+    vector.x.abs() <= max && vector.y.abs() <= max && vector.z.abs() <= max
+}
+
+/// True of a usable standard deviation.
+fn is_sigma(sigma: f32) -> bool {
+    sigma > 0.0 && sigma <= SIGMA_MAX
+}
+
+impl ImuSample {
+    /// True if every value is finite and at most 200 rad/s and 2000 m/s2 in size.
+    #[must_use]
+    pub fn is_plausible(&self) -> bool {
+        within(&self.rates_rad_s, RATE_MAX_RAD_S) && within(&self.specific_force_m_s2, FORCE_MAX_M_S2)
+    }
+}
+
+impl Measurement {
+    /// True if every value is finite and possible: positions up to 50 km, velocities up to 150 m/s per coordinate,
+    /// rotations that are ones, fields that are not zero, standard deviations above 0 and up to 1e4.
+    #[must_use]
+    pub fn is_plausible(&self) -> bool {
+        match self {
+            Measurement::Pose { position_m, attitude: [w, x, y, z], position_sigma_m, attitude_sigma_rad } => {
+                within(position_m, POSITION_MAX_M)
+                    && (w * w + x * x + y * y + z * z - 1.0).abs() <= NORM_SQUARED_ERROR_MAX
+                    && is_sigma(*position_sigma_m)
+                    && is_sigma(*attitude_sigma_rad)
+            }
+            Measurement::Position { position_m, sigma_m } => within(position_m, POSITION_MAX_M) && is_sigma(*sigma_m),
+            Measurement::Gnss {
+                position_m,
+                velocity_m_s,
+                horizontal_sigma_m,
+                vertical_sigma_m,
+                speed_sigma_m_s,
+            } => {
+                within(position_m, POSITION_MAX_M)
+                    && within(velocity_m_s, VELOCITY_MAX_M_S)
+                    && is_sigma(*horizontal_sigma_m)
+                    && is_sigma(*vertical_sigma_m)
+                    && is_sigma(*speed_sigma_m_s)
+            }
+            Measurement::Height { height_m, sigma_m } => height_m.abs() <= POSITION_MAX_M && is_sigma(*sigma_m),
+            Measurement::MagneticField { field, sigma } => {
+                let largest = afbc_control::math::abs_max(field);
+                within(field, FIELD_MAX) && largest >= FIELD_MIN && *sigma > 0.0 && *sigma <= FIELD_MAX
+            }
+            Measurement::Heading { heading_rad, sigma_rad } => {
+                heading_rad.abs() <= HEADING_MAX_RAD && is_sigma(*sigma_rad)
+            }
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Everything that changes in an estimator.
+
+use crate::aid::Aids;
+use crate::align::Align;
+use crate::covariance::{Covariance, Interval};
+use crate::estimate::{Dropped, Resets};
+use crate::history::History;
+use crate::imu::{Monitor, Smoothed};
+use crate::measurement::{Measurement, Timed};
+use crate::nominal::Nominal;
+use crate::queue::{Fix, Queue};
+use nalgebra::{Matrix3, Vector3};
+
+/// Memory of an estimator. The default is that before the first sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Memory {
+    /// True once the filter runs.
+    pub(crate) runs: bool,
+    pub(crate) on_ground: bool,
+    pub(crate) align: Align,
+    pub(crate) monitor: Monitor,
+    pub(crate) smoothed: Smoothed,
+    pub(crate) nominal: Nominal,
+    pub(crate) covariance: Covariance,
+    /// Time of the covariance and of the newest entry of the history \[us\].
+    pub(crate) covariance_us: u64,
+    /// What happened since then.
+    pub(crate) interval: Interval,
+    /// Rotation at that time.
+    pub(crate) rotation: Matrix3<f32>,
+    /// Variances that the next prediction adds for clipped or missing samples: attitude and velocity.
+    pub(crate) rough: (f32, f32),
+    pub(crate) history: History,
+    pub(crate) queue: Queue,
+    /// The fix that is being fused.
+    pub(crate) fix: Option<Fix>,
+    /// Offset of the barometer \[m\]; meaningful if known.
+    pub(crate) height_offset: f32,
+    pub(crate) knows: Known,
+    /// Strength and sine of the inclination of the magnetic field, once known.
+    pub(crate) field: Option<(f32, f32)>,
+    pub(crate) aids: Aids,
+    /// Time of the last pseudo-measurement \[us\].
+    pub(crate) still_us: u64,
+    /// Time of the last reset that a rejection caused \[us\].
+    pub(crate) reset_us: Option<u64>,
+    pub(crate) resets: Resets,
+    pub(crate) dropped: Dropped,
+}
+
+/// What has been told at all since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Known {
+    pub(crate) position: bool,
+    pub(crate) heading: bool,
+    pub(crate) height_offset: bool,
+}
+
+/// No time.
+pub(crate) const NO_INTERVAL: Interval = Interval {
+    time_s: 0.0,
+    turn: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    thrust: Vector3::new(0.0, 0.0, 0.0),
+};
+
+impl Default for Memory {
+    fn default() -> Self {
+        Memory {
+            runs: false,
+            on_ground: false,
+            align: Align::default(),
+            monitor: Monitor::default(),
+            smoothed: Smoothed::default(),
+            nominal: Nominal::default(),
+            covariance: Covariance::default(),
+            covariance_us: 0,
+            interval: NO_INTERVAL,
+            rotation: Matrix3::identity(),
+            rough: (0.0, 0.0),
+            history: History::default(),
+            queue: Queue::default(),
+            fix: None,
+            height_offset: 0.0,
+            knows: Known::default(),
+            field: None,
+            aids: Aids::default(),
+            still_us: 0,
+            reset_us: None,
+            resets: Resets::default(),
+            dropped: Dropped::default(),
+        }
+    }
+}
+
+impl Memory {
+    /// Hands over a measurement, to be fused by one of the next steps. An implausible one
+    /// ([`Measurement::is_plausible`]) is refused; if eight are waiting, the oldest gives way. Both are counted.
+    pub fn offer(&mut self, measurement: &Timed<Measurement>) {
+        if !measurement.value.is_plausible() {
+            self.dropped.implausible = self.dropped.implausible.saturating_add(1);
+        } else if self.queue.push(measurement) {
+            self.dropped.crowded = self.dropped.crowded.saturating_add(1);
+        }
+    }
+
+    /// Tells whether the vehicle stands on the ground with its motors off. Its velocity is then held at zero, which
+    /// holds the biases before take-off. False at the beginning.
+    pub fn set_on_ground(&mut self, on_ground: bool) {
+        self.on_ground = on_ground;
+    }
+
+    /// True once the filter runs.
+    #[must_use]
+    pub fn runs(&self) -> bool {
+        self.runs
+    }
+
+    /// Returns the covariance of the errors as rows, symmetric, in the order: rotation in the earth frame \[rad\],
+    /// velocity \[m/s\], position \[m\], gyroscope's bias \[rad/s\], accelerometer's bias \[m/s2\], barometer's offset
+    /// \[m\]. Each error is truth less estimate. For tests and logs; not cheap.
+    #[must_use]
+    pub fn covariance(&self) -> [[f32; 16]; 16] {
+        self.covariance.rows()
+    }
+}

@@ -1,0 +1,122 @@
+//! Measurements that wait, and the fix that is being fused.
+
+use crate::aid::Aid;
+use crate::history::Past;
+use crate::horizon::Target;
+use crate::measurement::{Measurement, Timed};
+use crate::rotation::normalized;
+use afbc_control::math::max;
+use nalgebra::{Quaternion, Vector3};
+
+/// Number of measurements that may wait.
+const WAITING_MAX: usize = 8;
+
+/// Measurements in the order of arrival, without gaps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Queue {
+    waiting: [Option<Timed<Measurement>>; WAITING_MAX],
+}
+
+impl Queue {
+    /// Appends; true if the oldest one had to give way.
+    pub(crate) fn push(&mut self, measurement: &Timed<Measurement>) -> bool {
+        let full = self.waiting.iter().all(Option::is_some);
+        if full {
+            self.remove(0);
+        }
+        if let Some(free) = self.waiting.iter_mut().find(|place| place.is_none()) {
+            *free = Some(*measurement);
+        }
+        full
+    }
+
+    /// Removes and returns the oldest measurement that is `due`.
+    pub(crate) fn take(&mut self, due: impl Fn(&Timed<Measurement>) -> bool) -> Option<Timed<Measurement>> {
+        let place = self.waiting.iter().position(|waiting| waiting.as_ref().is_some_and(&due))?;
+        let taken = self.waiting.get(place).copied().flatten();
+        self.remove(place);
+        taken
+    }
+
+    fn remove(&mut self, place: usize) {
+        if let Some(rest) = self.waiting.get_mut(place..) {
+            let mut next = None;
+            for waiting in rest.iter_mut().rev() {
+                core::mem::swap(waiting, &mut next);
+            }
+        }
+    }
+}
+
+/// One kind of aid in a fix: one scalar or three.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Part {
+    pub(crate) aid: Option<Aid>,
+    pub(crate) target: Target,
+    /// Variances of its scalars; the first one of a single scalar.
+    pub(crate) variance: Vector3<f32>,
+}
+
+/// A measurement that is being fused, scalar by scalar.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Fix {
+    pub(crate) at_us: u64,
+    /// State at its time, without corrections.
+    pub(crate) past: Past,
+    pub(crate) parts: [Option<Part>; 2],
+    /// Number of the first part's next scalar.
+    pub(crate) next: u8,
+    /// Normalised innovation squared of this part so far.
+    pub(crate) nis: f32,
+}
+
+/// Smallest standard deviations: position \[m\], velocity \[m/s\], angle \[rad\].
+const LEAST: f32 = 1e-4;
+const LEAST_M_S: f32 = 1e-3;
+
+impl Target {
+    /// Number of scalars.
+    pub(crate) fn scalars(&self) -> u8 {
+        match self {
+            Target::Position(_) | Target::Velocity(_) | Target::Attitude(_) => 3,
+            Target::Height(_) | Target::Field(_) | Target::Heading(_) => 1,
+        }
+    }
+}
+
+/// Returns the parts of a measurement. The variance of a field is that of its coordinates; its heading's depends on the
+/// attitude.
+pub(crate) fn parts(measurement: &Measurement) -> [Option<Part>; 2] {
+    let square = |sigma: f32, least: f32| max(sigma, least) * max(sigma, least);
+    let part = |aid, target, variance: Vector3<f32>| Some(Part { aid: Some(aid), target, variance });
+    let same = |variance: f32| Vector3::new(variance, variance, variance);
+    match *measurement {
+        Measurement::Pose { position_m, attitude: [w, x, y, z], position_sigma_m, attitude_sigma_rad } => {
+            let attitude = normalized(&Quaternion::new(w, x, y, z));
+            [
+                part(Aid::TrackerPosition, Target::Position(position_m), same(square(position_sigma_m, LEAST))),
+                part(Aid::TrackerAttitude, Target::Attitude(attitude), same(square(attitude_sigma_rad, LEAST))),
+            ]
+        }
+        Measurement::Position { position_m, sigma_m } => {
+            [part(Aid::TrackerPosition, Target::Position(position_m), same(square(sigma_m, LEAST))), None]
+        }
+        Measurement::Gnss { position_m, velocity_m_s, horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s } => {
+            let (horizontal, vertical) = (square(horizontal_sigma_m, LEAST), square(vertical_sigma_m, LEAST));
+            let position = Vector3::new(horizontal, horizontal, vertical);
+            [
+                part(Aid::GnssPosition, Target::Position(position_m), position),
+                part(Aid::GnssVelocity, Target::Velocity(velocity_m_s), same(square(speed_sigma_m_s, LEAST_M_S))),
+            ]
+        }
+        Measurement::Height { height_m, sigma_m } => {
+            [part(Aid::Height, Target::Height(height_m), same(square(sigma_m, LEAST))), None]
+        }
+        Measurement::MagneticField { field, sigma } => {
+            [part(Aid::Heading, Target::Field(field), same(sigma * sigma)), None]
+        }
+        Measurement::Heading { heading_rad, sigma_rad } => {
+            [part(Aid::Heading, Target::Heading(heading_rad), same(square(sigma_rad, LEAST))), None]
+        }
+    }
+}

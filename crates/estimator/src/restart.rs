@@ -1,0 +1,220 @@
+//! Starts, and resets of parts of the state.
+
+use crate::align::Aligned;
+use crate::covariance::{Covariance, Errors, angle_variance};
+use crate::estimate::Sigmas;
+use crate::history::Past;
+use crate::memory::{Known, Memory, NO_INTERVAL};
+use crate::nominal::Nominal;
+use crate::rotation::{about_z, identity, matrix, normalized};
+use crate::settings::Settings;
+use afbc_control::math::{abs_max, max};
+use afbc_types::State;
+use nalgebra::{Matrix3, Quaternion, Vector3};
+
+/// Variance of an angle that may be anything, pi^2/3.
+const ANY_ANGLE: f32 = 3.28;
+/// Standard deviations of velocity at rest \[m/s\], and of position before it is told \[m\].
+const REST_M_S: f32 = 0.01;
+const UNTOLD_M: f32 = 0.01;
+/// Tilt that a doubted attitude may be off \[rad\].
+const DOUBT_RAD: f32 = 0.2;
+
+/// Keeps all errors.
+const KEEP: Errors = {
+    const ONES: Vector3<f32> = Vector3::new(1.0, 1.0, 1.0);
+    Errors { theta: ONES, velocity: ONES, position: ONES, gyro: ONES, accel: ONES, baro: 1.0 }
+};
+const NONE: Vector3<f32> = Vector3::new(0.0, 0.0, 0.0);
+
+/// Diagonal block.
+fn diagonal(variances: &Vector3<f32>) -> Matrix3<f32> {
+    Matrix3::from_diagonal(variances)
+}
+
+fn squared(sigma: &Vector3<f32>) -> Vector3<f32> {
+    sigma.component_mul(sigma)
+}
+
+fn count(number: &mut u32) {
+    *number = number.saturating_add(1);
+}
+
+impl Memory {
+    /// Starts at rest.
+    pub(crate) fn begin(&mut self, now_us: u64, aligned: &Aligned, settings: &Settings) {
+        let Settings { gravity_m_s2: gravity, accel_bias_m_s2: bias, .. } = *settings;
+        let mut nominal = Nominal::new(aligned.attitude);
+        nominal.gyro_bias = aligned.gyro_bias;
+        // Levelling took the accelerometer's bias for a tilt: theta = (-(R a)_y, (R a)_x, 0)/g.
+        let r = &nominal.rotation;
+        let by_bias = Matrix3::new(-r.m21, -r.m22, -r.m23, r.m11, r.m12, r.m13, 0.0, 0.0, 0.0) * (1.0 / gravity);
+        let of_mean = |noise: f32| noise * noise / aligned.time_s;
+        let noise = of_mean(settings.accel_noise_m_s2_rthz) / (gravity * gravity) + 2.5e-7;
+        let tilt = bias * bias / (gravity * gravity) + noise;
+        let heading = aligned.heading_sigma.map_or(ANY_ANGLE, |sigma| sigma * sigma);
+        let walk = settings.gyro_walk_rad_s_rts;
+        let gyro = of_mean(settings.gyro_noise_rad_s_rthz) + walk * walk * aligned.time_s + 1e-10;
+        self.covariance = Covariance {
+            tt: diagonal(&Vector3::new(tilt, tilt, heading)),
+            ta: by_bias * (bias * bias),
+            vv: diagonal(&Vector3::repeat(REST_M_S * REST_M_S)),
+            pp: diagonal(&Vector3::repeat(UNTOLD_M * UNTOLD_M)),
+            gg: diagonal(&Vector3::repeat(gyro)),
+            aa: diagonal(&Vector3::repeat(bias * bias)),
+            ..Covariance::default()
+        };
+        self.knows = Known { heading: aligned.heading_sigma.is_some(), ..Known::default() };
+        self.field = aligned.field.and_then(|field| reference(&field));
+        self.run(now_us, nominal);
+    }
+
+    /// Starts in the state `state`, known as well as `sigmas` say, which are limited to what is possible.
+    pub(crate) fn begin_at(&mut self, now_us: u64, state: &State, sigmas: &Sigmas) {
+        let mut nominal = Nominal::new(normalized(&state.quaternion().into_inner()));
+        nominal.velocity = state.velocity_m_s;
+        nominal.move_to(state.position_m);
+        let theta = squared(&sigmas.attitude_rad).map(angle_variance);
+        self.covariance = Covariance {
+            tt: diagonal(&theta),
+            vv: diagonal(&squared(&sigmas.velocity_m_s)),
+            pp: diagonal(&squared(&sigmas.position_m)),
+            gg: diagonal(&squared(&sigmas.gyro_bias_rad_s)),
+            aa: diagonal(&squared(&sigmas.accel_bias_m_s2)),
+            ..Covariance::default()
+        };
+        let heading = theta.z < 1.0;
+        let position = abs_max(&sigmas.position_m) < 1e3;
+        self.knows = Known { position, heading, height_offset: false };
+        self.field = None;
+        self.monitor.forget();
+        self.run(now_us, nominal);
+    }
+
+    /// Starts again where the filter is or, if that is not finite, at the last state that was.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn restart(&mut self, now_us: u64) {
+        count(&mut self.resets.restarts);
+        let old = self.nominal;
+        let past = self.history.newest();
+        let sound = |q: &Quaternion<f32>| (q.norm_squared() - 1.0).abs() < 0.1;
+        let attitude = [Some(old.attitude), past.map(|past| past.attitude)].into_iter().flatten().find(sound);
+        let finite = |v: &Vector3<f32>, most: f32| abs_max(v) < most && v.norm_squared().is_finite();
+        let or_none = |v: Vector3<f32>, most: f32| if finite(&v, most) { v } else { NONE };
+        let mut nominal = Nominal::new(attitude.map_or(identity(), |attitude| normalized(&attitude)));
+        nominal.velocity = or_none(old.velocity, 50.0);
+        nominal.gyro_bias = or_none(old.gyro_bias, 1.0);
+        nominal.accel_bias = or_none(old.accel_bias, 5.0);
+        nominal.move_to(or_none(old.position, 5e4));
+        self.covariance = Covariance {
+            tt: diagonal(&Vector3::new(0.1, 0.1, ANY_ANGLE)),
+            vv: diagonal(&Vector3::repeat(25.0)),
+            pp: diagonal(&Vector3::repeat(100.0)),
+            gg: diagonal(&Vector3::repeat(4e-4)),
+            aa: diagonal(&Vector3::repeat(0.1)),
+            ..Covariance::default()
+        };
+        self.knows = Known::default();
+        self.align.again(crate::align::Unready::Moving);
+        self.run(now_us, nominal);
+    }
+
+    fn run(&mut self, now_us: u64, nominal: Nominal) {
+        self.runs = true;
+        self.nominal = nominal;
+        self.rotation = nominal.rotation;
+        self.interval = NO_INTERVAL;
+        self.rough = (0.0, 0.0);
+        self.fix = None;
+        self.height_offset = 0.0;
+        self.still_us = now_us;
+        self.covariance.hold();
+        self.history.clear();
+        self.remember(now_us);
+    }
+
+    /// Stores the present state in the history; the covariance is of the same time.
+    pub(crate) fn remember(&mut self, at_us: u64) {
+        self.covariance_us = at_us;
+        self.history.store(&Past {
+            at_us: at_us as u32,
+            attitude: self.nominal.attitude,
+            velocity: self.nominal.velocity,
+            position: self.nominal.position,
+        });
+    }
+
+    /// Moves the position by `by`, and takes `variance` for it.
+    pub(crate) fn reset_position(&mut self, by: &Vector3<f32>, variance: &Vector3<f32>) {
+        count(&mut self.resets.position);
+        self.nominal.move_to(self.nominal.position + by);
+        self.history.correct(&identity(), &NONE, by);
+        self.covariance.forget(&Errors { position: NONE, baro: 0.0, ..KEEP });
+        self.covariance.pp = diagonal(variance);
+        self.knows.position = true;
+        // The offset was that of another height.
+        self.knows.height_offset = false;
+        self.covariance.hold();
+    }
+
+    /// Changes the velocity by `by`, and takes `variance` for it.
+    pub(crate) fn reset_velocity(&mut self, by: &Vector3<f32>, variance: &Vector3<f32>) {
+        count(&mut self.resets.velocity);
+        self.nominal.velocity += by;
+        self.history.correct(&identity(), by, &NONE);
+        self.covariance.forget(&Errors { velocity: NONE, ..KEEP });
+        self.covariance.vv = diagonal(variance);
+        self.covariance.hold();
+    }
+
+    /// Turns the heading by `by`, and takes `variance` for it.
+    pub(crate) fn reset_heading(&mut self, by: f32, variance: f32) {
+        count(&mut self.resets.heading);
+        let turn = about_z(by);
+        self.nominal.turn_to(normalized(&(turn * self.nominal.attitude)));
+        self.rotation = matrix(&turn) * self.rotation;
+        self.history.correct(&turn, &NONE, &NONE);
+        self.covariance.forget(&Errors { theta: Vector3::new(1.0, 1.0, 0.0), ..KEEP });
+        self.covariance.tt.m33 = variance;
+        self.knows.heading = true;
+        self.covariance.hold();
+    }
+
+    /// Takes the barometer's offset from a measured height: offset = measured - z + noise, so its error is that of the
+    /// noise less that of z.
+    pub(crate) fn reset_height_offset(&mut self, offset: f32, variance: f32) {
+        count(&mut self.resets.height);
+        self.height_offset = offset;
+        self.knows.height_offset = true;
+        let of_z = |m: &Matrix3<f32>| -Vector3::new(m.m13, m.m23, m.m33);
+        let c = &mut self.covariance;
+        (c.tb, c.vb, c.pb) = (of_z(&c.tp), of_z(&c.vp), of_z(&c.pp));
+        (c.gb, c.ab) = (of_z(&c.pg.transpose()), of_z(&c.pa.transpose()));
+        c.bb = c.pp.m33 + variance;
+        c.hold();
+    }
+
+    /// Doubts roll and pitch, after the second reset in a row.
+    pub(crate) fn doubt_tilt(&mut self) {
+        count(&mut self.resets.tilt);
+        let variance = DOUBT_RAD * DOUBT_RAD;
+        let tt = &mut self.covariance.tt;
+        tt.m11 += variance;
+        tt.m22 += variance;
+        self.covariance.hold();
+    }
+
+    /// Makes the velocity unknown, at least as much as `variance`.
+    pub(crate) fn doubt_velocity(&mut self, variance: f32) {
+        let vv = self.covariance.vv.diagonal().map(|old| max(old, variance));
+        self.covariance.forget(&Errors { velocity: NONE, ..KEEP });
+        self.covariance.vv = diagonal(&vv);
+    }
+}
+
+/// Strength and sine of the inclination of a field in the earth frame.
+pub(crate) fn reference(field: &Vector3<f32>) -> Option<(f32, f32)> {
+    let strength = afbc_control::math::sqrt(field.norm_squared());
+    (strength > 0.0).then(|| (strength, field.z / strength))
+}
