@@ -81,10 +81,15 @@ pub(crate) struct Align {
 pub(crate) struct Aligned {
     pub(crate) attitude: Quaternion<f32>,
     pub(crate) gyro_bias: Vector3<f32>,
-    /// Standard deviation of the heading; none if nobody told it \[rad\].
-    pub(crate) heading_sigma: Option<f32>,
+    /// Variance of the heading at the right tilt; none if nobody told it.
+    pub(crate) heading_variance: Option<f32>,
+    /// Heading per rotation about the earth's x and y, if a field told it: its dip makes of a tilt a heading.
+    pub(crate) dip: (f32, f32),
     /// Mean field in the earth frame, if there was one.
     pub(crate) field: Option<Vector3<f32>>,
+    /// Variances of the means of rates and specific force, per axis.
+    pub(crate) rates_variance: f32,
+    pub(crate) force_variance: f32,
     /// Length of the time at rest \[s\].
     pub(crate) time_s: f32,
 }
@@ -168,22 +173,30 @@ impl Align {
         let level = levelling(&(self.force.mean * (1.0 / norm)))?;
         let (sum, count, variance) = self.field;
         let field = (count > 0.0).then(|| matrix(&level) * (sum * (1.0 / count)));
-        // Turn about z that is missing, and its standard deviation; the tracker before the told before the field.
+        // Turn about z that is missing, and its variance; the tracker before the told before the field.
         let nose = matrix(&level);
-        let told = self.heading.map(|(heading, sigma)| (heading - atan2(nose.m21, nose.m11), sigma));
+        let told = self.heading.map(|(heading, sigma)| (heading - atan2(nose.m21, nose.m11), sigma * sigma, false));
         let by_field = field.map(|field| {
             let horizontal = field.x * field.x + field.y * field.y;
-            let tilt = settings.accel_bias_m_s2 / settings.gravity_m_s2 * field.z;
-            (-settings.declination_rad - atan2(field.y, field.x), sqrt((variance + tilt * tilt) / horizontal))
+            (-settings.declination_rad - atan2(field.y, field.x), variance / (count * horizontal), true)
         });
-        let pose = self.pose.map(|(attitude, sigma)| (twist(&attitude, &level), sigma));
-        let turn = pose.or(told).or(by_field).filter(|(turn, sigma)| turn.is_finite() && *sigma < 0.5);
-        let about_z = crate::rotation::about_z(turn.map_or(0.0, |(turn, _)| turn));
+        let pose = self.pose.map(|(attitude, sigma)| (twist(&attitude, &level), sigma * sigma, false));
+        let turn = pose.or(told).or(by_field).filter(|(turn, variance, _)| turn.is_finite() && *variance < 0.25);
+        let about_z = crate::rotation::about_z(turn.map_or(0.0, |(turn, ..)| turn));
+        let field = field.map(|field| matrix(&about_z) * field);
+        let dip = field.filter(|_| turn.is_some_and(|(_, _, by_field)| by_field)).map_or((0.0, 0.0), |field| {
+            let slope = -field.z / (field.x * field.x + field.y * field.y);
+            (slope * field.x, slope * field.y)
+        });
+        let of_mean = |mean: &Mean| abs_max(&mean.squares) / (self.count * self.count);
         Some(Aligned {
             attitude: normalized(&(about_z * level)),
             gyro_bias: self.rates.mean,
-            heading_sigma: turn.map(|(_, sigma)| sigma),
-            field: field.map(|field| matrix(&about_z) * field),
+            heading_variance: turn.map(|(_, variance, _)| variance),
+            dip,
+            field,
+            rates_variance: of_mean(&self.rates),
+            force_variance: of_mean(&self.force),
             time_s,
         })
     }

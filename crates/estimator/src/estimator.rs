@@ -8,7 +8,7 @@ use crate::measurement::ImuSample;
 use crate::memory::{Memory, NO_INTERVAL};
 use crate::rotation::euler;
 use crate::settings::Settings;
-use afbc_control::math::{sqrt, wrap_angle};
+use afbc_control::math::{max, min, sqrt, wrap_angle};
 use afbc_types::{Declared, OutOfRange, State};
 use nalgebra::Vector3;
 
@@ -25,6 +25,8 @@ const LOST_US: u64 = 250_000;
 /// What a vehicle may do in a gap: rates \[rad/s\] and accelerations \[m/s2\] that the samples around it do not show.
 const GAP_RAD_S: f32 = 0.5;
 const GAP_M_S2: f32 = 3.0;
+/// Time for which an error of the second order lasts \[s\].
+const BENT_S: f32 = 0.5;
 /// Variances per second that a clipped sample adds, attitude and velocity.
 const CLIPPED: (f32, f32) = (0.5, 50.0);
 
@@ -159,7 +161,9 @@ impl Estimator {
     fn predict(&self, memory: &mut Memory, sample: &ImuSample) {
         let mut interval = memory.interval;
         interval.turn = (memory.rotation + memory.nominal.rotation) * (0.5 * interval.time_s);
-        memory.covariance.predict(&interval, &self.growth);
+        let mut growth = self.growth;
+        growth.velocity += self.bent(memory);
+        memory.covariance.predict(&interval, &growth);
         memory.covariance.roughen(memory.rough);
         memory.rotation = memory.nominal.rotation;
         memory.interval = NO_INTERVAL;
@@ -170,6 +174,16 @@ impl Estimator {
             memory.restart(sample.at_us);
             memory.nominal.begin(sample);
         }
+    }
+
+    /// Returns the variance per second of the velocity that the linear model misses: the acceleration's error of the
+    /// second order in the angles, g theta_tilt theta, for a second. It matters at the start, where levelling has left
+    /// an angle of 0.01 rad and the model's own noise is below 1e-3 m/s2.
+    fn bent(&self, memory: &Memory) -> f32 {
+        let theta = memory.covariance.variances().theta;
+        let tilt = max(theta.x, theta.y);
+        let gravity = self.settings.gravity_m_s2;
+        BENT_S * gravity * gravity * tilt * (tilt + min(theta.z, 1.0))
     }
 
     /// Waits for rest.

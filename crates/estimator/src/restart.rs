@@ -15,8 +15,10 @@ use nalgebra::{Matrix3, Quaternion, Vector3};
 /// Variance of an angle that may be anything, pi^2/3.
 const ANY_ANGLE: f32 = 3.28;
 /// Standard deviations of velocity at rest \[m/s\], and of position before it is told \[m\].
-const REST_M_S: f32 = 0.01;
+const REST_M_S: f32 = 2e-3;
 const UNTOLD_M: f32 = 0.01;
+/// Variance of levelling besides its noise \[rad2\].
+const LEVEL: f32 = 1e-8;
 /// Tilt that a doubted attitude may be off \[rad\].
 const DOUBT_RAD: f32 = 0.2;
 
@@ -46,17 +48,23 @@ impl Memory {
         let Settings { gravity_m_s2: gravity, accel_bias_m_s2: bias, .. } = *settings;
         let mut nominal = Nominal::new(aligned.attitude);
         nominal.gyro_bias = aligned.gyro_bias;
-        // Levelling took the accelerometer's bias for a tilt: theta = (-(R a)_y, (R a)_x, 0)/g.
-        let r = &nominal.rotation;
-        let by_bias = Matrix3::new(-r.m21, -r.m22, -r.m23, r.m11, r.m12, r.m13, 0.0, 0.0, 0.0) * (1.0 / gravity);
-        let of_mean = |noise: f32| noise * noise / aligned.time_s;
-        let noise = of_mean(settings.accel_noise_m_s2_rthz) / (gravity * gravity) + 2.5e-7;
-        let tilt = bias * bias / (gravity * gravity) + noise;
-        let heading = aligned.heading_sigma.map_or(ANY_ANGLE, |sigma| sigma * sigma);
+        // Levelling took the accelerometer's bias for a tilt: theta = (-(R a)_y, (R a)_x)/g; and a field took the tilt
+        // for a heading.
+        let r = nominal.rotation;
+        let (x, y) = (-r.row(1) * (1.0 / gravity), r.row(0) * (1.0 / gravity));
+        let (dip_x, dip_y) = aligned.dip;
+        let by_bias = Matrix3::from_rows(&[x, y, -(x * dip_x + y * dip_y)]);
+        // What is of the second order: the bias along z changes the divisor, the heading's error the direction.
+        let share = bias * bias / (gravity * gravity);
+        let dips = 1.0 + dip_x * dip_x + dip_y * dip_y;
+        let second = share * (share + aligned.heading_variance.unwrap_or(0.0) + dips * share) + LEVEL;
+        let of_mean = |noise: f32, seen: f32| max(noise * noise / aligned.time_s, seen);
+        let tilt = of_mean(settings.accel_noise_m_s2_rthz, aligned.force_variance) / (gravity * gravity) + second;
+        let heading = aligned.heading_variance.unwrap_or(ANY_ANGLE) + second * dips;
         let walk = settings.gyro_walk_rad_s_rts;
-        let gyro = of_mean(settings.gyro_noise_rad_s_rthz) + walk * walk * aligned.time_s + 1e-10;
+        let gyro = of_mean(settings.gyro_noise_rad_s_rthz, aligned.rates_variance) + walk * walk * aligned.time_s;
         self.covariance = Covariance {
-            tt: diagonal(&Vector3::new(tilt, tilt, heading)),
+            tt: by_bias * by_bias.transpose() * (bias * bias) + diagonal(&Vector3::new(tilt, tilt, heading)),
             ta: by_bias * (bias * bias),
             vv: diagonal(&Vector3::repeat(REST_M_S * REST_M_S)),
             pp: diagonal(&Vector3::repeat(UNTOLD_M * UNTOLD_M)),
@@ -64,7 +72,7 @@ impl Memory {
             aa: diagonal(&Vector3::repeat(bias * bias)),
             ..Covariance::default()
         };
-        self.knows = Known { heading: aligned.heading_sigma.is_some(), ..Known::default() };
+        self.knows = Known { heading: aligned.heading_variance.is_some(), ..Known::default() };
         self.field = aligned.field.and_then(|field| reference(&field));
         self.run(now_us, nominal);
     }

@@ -11,15 +11,17 @@ parameters! {
         /// Acceleration of free fall.
         #[parameter(GRAVITY, "m/s2", 9.7..=9.9)]
         pub gravity_m_s2: f32 = 9.81,
-        /// Noise density of the gyroscope, vibration included. The default is four times that of an ICM-42688-P.
+        /// Noise density of the gyroscope, vibration and all that the model leaves out included. The default is for flight
+        /// on any vehicle; the part alone has 5e-5 (ICM-42688-P).
         #[parameter(GYR_NOISE, "rad/s/sqrt(Hz)", 1e-6..=0.1)]
-        pub gyro_noise_rad_s_rthz: f32 = 2e-4,
-        /// Noise density of the accelerometer, vibration included. The default is seven times that of an ICM-42688-P.
+        pub gyro_noise_rad_s_rthz: f32 = 1e-3,
+        /// Noise density of the accelerometer, vibration and all that the model leaves out included. The default is for
+        /// flight on any vehicle; the part alone has 7e-4 (ICM-42688-P).
         #[parameter(ACC_NOISE, "m/s2/sqrt(Hz)", 1e-5..=1.0)]
-        pub accel_noise_m_s2_rthz: f32 = 5e-3,
+        pub accel_noise_m_s2_rthz: f32 = 2e-2,
         /// Random walk of the gyroscope's bias, per root of a second.
         #[parameter(GYR_WALK, "rad/s/sqrt(s)", 1e-8..=0.01)]
-        pub gyro_walk_rad_s_rts: f32 = 2e-5,
+        pub gyro_walk_rad_s_rts: f32 = 5e-5,
         /// Random walk of the accelerometer's bias, per root of a second.
         #[parameter(ACC_WALK, "m/s2/sqrt(s)", 1e-7..=0.1)]
         pub accel_walk_m_s2_rts: f32 = 3e-4,

@@ -1,5 +1,5 @@
 //! A synthetic flight in `f64`: truth, inertial samples that fit it exactly, and noisy sensors.
-#![allow(dead_code, reason = "each test uses a part")]
+#![allow(dead_code, unreachable_pub, reason = "each test uses a part")]
 
 use afbc_estimator::{Estimate, Estimator, ImuSample, Measurement, Memory, Settings, Timed};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
