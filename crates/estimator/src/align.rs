@@ -13,7 +13,7 @@ pub enum Unready {
     /// No sample of the inertial sensors within 20 ms.
     #[default]
     NoImu,
-    /// At rest so far, but not yet for long enough.
+    /// At rest since the first sample, but not yet for long enough. After a refusal its reason stays until the start.
     Settling,
     /// Rates or specific force change.
     Moving,
@@ -162,10 +162,7 @@ impl Align {
             self.again(why);
             return None;
         }
-        // The reason of the last refusal stays for a while, to be read.
-        if elapsed_s > 0.1 * settings.align_s {
-            self.why = Unready::Settling;
-        }
+        // The reason of the last refusal stays, to be read.
         (elapsed_s >= settings.align_s).then(|| self.result(norm, elapsed_s, settings)).flatten()
     }
 

@@ -284,6 +284,18 @@ impl Covariance {
         self.hold();
     }
 
+    /// Turns the angular error by a rotation of the nominal attitude: theta = r theta.
+    #[inline]
+    pub(crate) fn turn(&mut self, r: &Block) {
+        self.tt = by_transpose(&(r * self.tt), r);
+        self.tv = r * self.tv;
+        self.tp = r * self.tp;
+        self.tg = r * self.tg;
+        self.ta = r * self.ta;
+        self.tb = r * self.tb;
+        mirror(&mut self.tt);
+    }
+
     /// Adds the noise of `time_s`.
     #[inline]
     fn grow(&mut self, time_s: f32, growth: &Growth) {

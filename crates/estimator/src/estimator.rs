@@ -6,7 +6,7 @@ use crate::estimate::{Estimate, Sigmas, Validity};
 use crate::imu::LowPass;
 use crate::measurement::ImuSample;
 use crate::memory::{Memory, NO_INTERVAL};
-use crate::rotation::euler;
+use crate::rotation::{euler, identity, matrix, renormalized};
 use crate::settings::Settings;
 use afbc_control::math::{max, min, sqrt, wrap_angle};
 use afbc_types::{Declared, OutOfRange, State};
@@ -26,7 +26,7 @@ const LOST_US: u64 = 250_000;
 const GAP_RAD_S: f32 = 0.5;
 const GAP_M_S2: f32 = 3.0;
 /// Time for which an error of the second order lasts \[s\].
-const BENT_S: f32 = 0.5;
+const BENT_S: f32 = 1.0;
 /// Variances per second that a clipped sample adds, attitude and velocity.
 const CLIPPED: (f32, f32) = (0.5, 50.0);
 
@@ -163,6 +163,8 @@ impl Estimator {
         interval.turn = (memory.rotation + memory.nominal.rotation) * (0.5 * interval.time_s);
         let mut growth = self.growth;
         growth.velocity += self.bent(memory);
+        memory.covariance.turn(&matrix(&renormalized(&memory.turned)));
+        memory.turned = identity();
         memory.covariance.predict(&interval, &growth);
         memory.covariance.roughen(memory.rough);
         memory.rotation = memory.nominal.rotation;

@@ -29,8 +29,8 @@ const STILL_M_S: f32 = 0.05;
 const ALOFT_M_S: f32 = 3.0;
 /// Time within which a second reset doubts the attitude \[us\].
 const AGAIN_US: u64 = 10_000_000;
-/// Velocity that a tracker's jump leaves unknown \[m2/s2\].
-const JUMP_VARIANCE: f32 = 1.0;
+/// Variance of the velocity after a tracker's jump, which tells none; two more positions do \[m2/s2\].
+const JUMP_VARIANCE: f32 = 100.0;
 
 fn count(number: &mut u32) {
     *number = number.saturating_add(1);
@@ -181,6 +181,7 @@ impl Estimator {
         nominal.gyro_bias = limited(nominal.gyro_bias + by.gyro, self.settings.gyro_bias_max_rad_s);
         nominal.accel_bias = limited(nominal.accel_bias + by.accel, self.settings.accel_bias_max_m_s2);
         memory.height_offset += by.baro;
+        memory.turned = turn * memory.turned;
         memory.history.correct(&turn, &by.velocity, &by.position);
     }
 
@@ -204,7 +205,9 @@ impl Estimator {
             Target::Velocity(velocity) => (velocity - past.velocity, variances.velocity),
             Target::Attitude(attitude) => {
                 if !memory.knows.heading {
-                    memory.reset_heading(twist(attitude, &past.attitude), part.variance.z);
+                    // As good as roll and pitch are: they mix with it.
+                    let variance = part.variance.z + max(variances.theta.x, variances.theta.y);
+                    memory.reset_heading(twist(attitude, &past.attitude), variance);
                     self.accept(memory, fix, part);
                     return false;
                 }
@@ -295,7 +298,8 @@ impl Estimator {
                 if turn * turn <= self.gate_squared * variance {
                     return;
                 }
-                memory.reset_heading(turn, part.variance.z);
+                let tilt = memory.covariance.tt;
+                memory.reset_heading(turn, part.variance.z + max(tilt.m11, tilt.m22));
             }
             Target::Height(height) => memory.reset_height_offset(height - past.position.z, part.variance.x),
             Target::Field(field) => {

@@ -152,19 +152,21 @@ impl History {
                 earlier = middle;
             }
         }
-        Some(between(self.entry(earlier)?, self.entry(later)?, at_us))
+        Some(between(self.entry(earlier)?, self.entry(later)?, &self.shift.velocity, at_us))
     }
 }
 
-/// Interpolates: the position with both velocities (Hermite's cubic), the others linearly.
-fn between(a: &Past, b: &Past, at_us: u32) -> Past {
+/// Interpolates: the position with both velocities (Hermite's cubic), the others linearly. Positions follow from the
+/// corrected velocities, which are those stored and `shift`.
+fn between(a: &Past, b: &Past, shift: &Vector3<f32>, at_us: u32) -> Past {
     let span_us = b.at_us.wrapping_sub(a.at_us) as f32;
     let x = at_us.wrapping_sub(a.at_us) as f32 / span_us;
     let span_s = span_us * 1e-6;
     let nearer = if a.attitude.dot(&b.attitude) < 0.0 { -b.attitude } else { b.attitude };
     // What the velocities add to the straight line between the positions.
     let chord = b.position - a.position;
-    let (from, to) = (a.velocity * span_s - chord, b.velocity * span_s - chord);
+    let bend = |velocity: &Vector3<f32>| (velocity + shift) * span_s - chord;
+    let (from, to) = (bend(&a.velocity), bend(&b.velocity));
     Past {
         at_us,
         attitude: normalized(&(a.attitude * (1.0 - x) + nearer * x)),

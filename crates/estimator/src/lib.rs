@@ -28,3 +28,6 @@ pub use imu::{ImuHealth, MISSING_US};
 pub use measurement::{ImuSample, Measurement, Timed};
 pub use memory::Memory;
 pub use settings::Settings;
+
+#[cfg(test)]
+mod tests;

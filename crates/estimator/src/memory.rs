@@ -9,7 +9,8 @@ use crate::imu::{Monitor, Smoothed};
 use crate::measurement::{Measurement, Timed};
 use crate::nominal::Nominal;
 use crate::queue::{Fix, Queue};
-use nalgebra::{Matrix3, Vector3};
+use crate::rotation::identity;
+use nalgebra::{Matrix3, Quaternion, Vector3};
 
 /// Memory of an estimator. The default is that before the first sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +29,8 @@ pub struct Memory {
     pub(crate) interval: Interval,
     /// Rotation at that time.
     pub(crate) rotation: Matrix3<f32>,
+    /// Corrections of the attitude since that time.
+    pub(crate) turned: Quaternion<f32>,
     /// Variances that the next prediction adds for clipped or missing samples: attitude and velocity.
     pub(crate) rough: (f32, f32),
     pub(crate) history: History,
@@ -76,6 +79,7 @@ impl Default for Memory {
             covariance_us: 0,
             interval: NO_INTERVAL,
             rotation: Matrix3::identity(),
+            turned: identity(),
             rough: (0.0, 0.0),
             history: History::default(),
             queue: Queue::default(),

@@ -134,6 +134,7 @@ impl Memory {
         self.rotation = nominal.rotation;
         self.interval = NO_INTERVAL;
         self.rough = (0.0, 0.0);
+        self.turned = identity();
         self.fix = None;
         self.height_offset = 0.0;
         self.still_us = now_us;
@@ -183,6 +184,7 @@ impl Memory {
         self.nominal.turn_to(normalized(&(turn * self.nominal.attitude)));
         self.rotation = matrix(&turn) * self.rotation;
         self.history.correct(&turn, &NONE, &NONE);
+        self.covariance.turn(&matrix(&turn));
         self.covariance.forget(&Errors { theta: Vector3::new(1.0, 1.0, 0.0), ..KEEP });
         self.covariance.tt.m33 = variance;
         self.knows.heading = true;

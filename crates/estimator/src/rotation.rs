@@ -10,12 +10,27 @@ pub(crate) fn identity() -> Quaternion<f32> {
 }
 
 /// Rotation by a vector \[rad\], by the series of sine and cosine up to the fourth order of half the angle; 1e-7 at 0.5
-/// rad.
+/// rad. Of unit norm for any vector.
+#[inline]
 pub(crate) fn small(turn_rad: &Vector3<f32>) -> Quaternion<f32> {
     let square = 0.25 * turn_rad.norm_squared();
+    if square > 0.0625 {
+        return large(turn_rad, square);
+    }
     let scale = 0.5 * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0)));
     let w = 1.0 - square * (0.5 - square * (1.0 / 24.0));
     Quaternion::new(w, scale * turn_rad.x, scale * turn_rad.y, scale * turn_rad.z)
+}
+
+/// The same for large angles, with the square of half the angle.
+#[cold]
+#[inline(never)]
+fn large(turn_rad: &Vector3<f32>, square: f32) -> Quaternion<f32> {
+    let half = sqrt(square);
+    // Wrapped, since sines of large numbers are costly.
+    let (sine, cosine) = libm::sincosf(afbc_control::math::wrap_angle(half));
+    let scale = 0.5 * sine / half;
+    Quaternion::new(cosine, scale * turn_rad.x, scale * turn_rad.y, scale * turn_rad.z)
 }
 
 /// Rotation by an angle about the earth's z, of the right norm to `f32` precision.

@@ -65,7 +65,7 @@ parameters! {
         pub align_s: f32 = 1.0,
         /// Largest standard deviation of the gyroscope at rest, per axis.
         #[parameter(STILL_RATE, "rad/s", 1e-3..=1.0)]
-        pub still_rate_rad_s: f32 = 0.03,
+        pub still_rate_rad_s: f32 = 0.015,
         /// Largest standard deviation of the accelerometer at rest, per axis; twice it is the largest deviation of the
         /// mean from free fall.
         #[parameter(STILL_ACC, "m/s2", 0.01..=5.0)]

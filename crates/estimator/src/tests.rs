@@ -1,0 +1,359 @@
+//! Covariance and Jacobians against dense `f64` mathematics written independently of them.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
+
+extern crate std;
+
+use crate::covariance::{Coordinate, Covariance, Errors, Growth, Interval, Row};
+use crate::history::{History, Past};
+use crate::horizon::{Horizon, Target};
+use nalgebra::{Matrix3, Quaternion, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+use std::vec::Vec;
+
+type M16 = SMatrix<f64, 16, 16>;
+type V16 = SVector<f64, 16>;
+type V3 = Vector3<f64>;
+
+/// Typical sizes of the errors.
+const SIZES: [f64; 6] = [0.02, 0.3, 0.5, 0.003, 0.08, 0.4];
+
+fn size(i: usize) -> f64 {
+    SIZES[i / 3]
+}
+
+/// Blocks of a matrix.
+fn blocks(p: &M16) -> Covariance {
+    let block = |i: usize, j: usize| {
+        p.fixed_view::<3, 3>(3 * i, 3 * j).map(|x| x as f32).into_owned()
+    };
+    let column = |i: usize| p.fixed_view::<3, 1>(3 * i, 15).map(|x| x as f32).into_owned();
+    Covariance {
+        tt: block(0, 0), tv: block(0, 1), tp: block(0, 2), tg: block(0, 3), ta: block(0, 4),
+        vv: block(1, 1), vp: block(1, 2), vg: block(1, 3), va: block(1, 4),
+        pp: block(2, 2), pg: block(2, 3), pa: block(2, 4),
+        gg: block(3, 3), ga: block(3, 4),
+        aa: block(4, 4),
+        tb: column(0), vb: column(1), pb: column(2), gb: column(3), ab: column(4),
+        bb: p[(15, 15)] as f32,
+    }
+}
+
+fn dense(p: &Covariance) -> M16 {
+    let rows = p.rows();
+    M16::from_fn(|i, j| f64::from(rows[i][j]))
+}
+
+fn dense_errors(e: &Errors) -> V16 {
+    let parts = [e.theta, e.velocity, e.position, e.gyro, e.accel];
+    V16::from_fn(|i, _| f64::from(if i == 15 { e.baro } else { parts[i / 3][i % 3] }))
+}
+
+fn dense_row(row: &Row) -> V16 {
+    let none = Vector3::zeros();
+    let at = row.coordinate.unit();
+    dense_errors(&Errors {
+        theta: row.theta,
+        velocity: at * row.velocity,
+        position: at * row.position,
+        gyro: row.gyro.unwrap_or(none),
+        accel: row.accel.unwrap_or(none),
+        baro: row.baro,
+    })
+}
+
+/// Largest difference, element by element, in shares of the product of both standard deviations.
+fn difference(ours: &M16, theirs: &M16) -> f64 {
+    let of = |i, j| (ours[(i, j)] - theirs[(i, j)]).abs() / (theirs[(i, i)] * theirs[(j, j)]).sqrt();
+    (0..16).flat_map(|i| (0..16).map(move |j| (i, j))).map(|(i, j)| of(i, j)).fold(0.0, f64::max)
+}
+
+fn numbers<const N: usize>() -> impl Strategy<Value = [f64; N]> {
+    proptest::array::uniform(-1.0..1.0_f64)
+}
+
+/// A positive matrix of errors of the usual sizes, rounded to what the filter can hold.
+fn covariance() -> impl Strategy<Value = M16> {
+    proptest::collection::vec(-1.0..1.0_f64, 256).prop_map(|x| {
+        let a = M16::from_iterator(x) + M16::identity();
+        let b = a * a.transpose() / 6.0 + M16::identity() * 0.03;
+        let p = M16::from_fn(|i, j| size(i) * size(j) * b[(i, j)]);
+        dense(&blocks(&p))
+    })
+}
+
+fn vector([x, y, z]: [f64; 3]) -> V3 {
+    V3::new(x, y, z)
+}
+
+fn row() -> impl Strategy<Value = Row> {
+    (numbers::<3>(), numbers::<3>(), numbers::<3>(), numbers::<3>(), 0..3_usize, any::<[bool; 6]>()).prop_map(
+        |(theta, gyro, accel, [v, p, b], coordinate, on)| {
+            let single = |x: [f64; 3]| vector(x).map(|x| x as f32);
+            let number = |x: f64, on: bool| if on { x as f32 } else { 0.0 };
+            Row {
+                coordinate: Coordinate::ALL[coordinate],
+                theta: single(theta),
+                velocity: number(v, on[0]),
+                position: number(p, on[1]),
+                gyro: on[2].then(|| single(gyro)),
+                accel: on[3].then(|| single(accel)),
+                baro: number(b, on[4]),
+            }
+        },
+    )
+}
+
+/// The transition as a dense matrix.
+fn transition(interval: &Interval) -> M16 {
+    let mut f = M16::identity();
+    let t = f64::from(interval.time_s);
+    let c = interval.turn.map(f64::from);
+    let s = interval.thrust.map(f64::from).cross_matrix();
+    f.fixed_view_mut::<3, 3>(0, 9).copy_from(&-c);
+    f.fixed_view_mut::<3, 3>(3, 0).copy_from(&-s);
+    f.fixed_view_mut::<3, 3>(3, 12).copy_from(&-c);
+    f.fixed_view_mut::<3, 3>(6, 3).copy_from(&(Matrix3::identity() * t));
+    f
+}
+
+const GROWTH: Growth = Growth { theta: 1e-6, velocity: 4e-4, gyro: 1e-9, accel: 1e-7, baro: 4e-4 };
+
+proptest! {
+    #[test]
+    fn prediction_is_f_p_f_plus_q(p in covariance(), turn in numbers::<3>(), thrust in numbers::<3>(), t in 1e-3..0.02_f64) {
+        let rotation: Matrix3<f64> = Rotation3::new(vector(turn) * 3.0).into_inner();
+        let interval = Interval {
+            time_s: t as f32,
+            turn: rotation.map(|x| (x * t) as f32),
+            thrust: (vector(thrust) * 30.0 * t).map(|x| x as f32),
+        };
+        let f = transition(&interval);
+        let growth = [GROWTH.theta, GROWTH.velocity, 0.0, GROWTH.gyro, GROWTH.accel, GROWTH.baro];
+        let q = M16::from_diagonal(&V16::from_fn(|i, _| f64::from(growth[i / 3]) * t));
+        let mut ours = blocks(&p);
+        ours.predict(&interval, &GROWTH);
+        let theirs = f * p * f.transpose() + q;
+        prop_assert!(difference(&dense(&ours), &theirs) < 2e-6, "{}", difference(&dense(&ours), &theirs));
+    }
+
+    #[test]
+    fn update_is_josephs(p in covariance(), row in row(), variance in 1e-4..1.0_f64, any_gain in numbers::<16>()) {
+        let h = dense_row(&row);
+        prop_assume!(h.norm() > 0.1);
+        let s = h.dot(&(p * h)) + variance;
+        let ours = blocks(&p);
+        let y = ours.times(&row);
+        let scale = V16::from_fn(|i, _| p[(i, i)].sqrt());
+        let off = (dense_errors(&y) - p * h).component_div(&scale).norm();
+        prop_assert!(off < 1e-5 * s.sqrt(), "P h: {off}");
+        prop_assert!((f64::from(row.dot(&y)) + variance - s).abs() < 1e-5 * s, "h P h");
+        let joseph = |k: &V16| {
+            let i = M16::identity() - k * h.transpose();
+            i * p * i.transpose() + k * k.transpose() * variance
+        };
+        // The optimal gain.
+        let mut optimal = ours;
+        optimal.fuse(&y, s as f32);
+        let theirs = joseph(&(p * h / s));
+        prop_assert!(difference(&dense(&optimal), &theirs) < 1e-4, "{}", difference(&dense(&optimal), &theirs));
+        // Any other.
+        let k = V16::from_fn(|i, _| any_gain[i] * size(i) / s.sqrt());
+        let part = |i: usize| k.fixed_rows::<3>(3 * i).map(|x| x as f32).into_owned();
+        let gain = Errors {
+            theta: part(0), velocity: part(1), position: part(2), gyro: part(3), accel: part(4), baro: k[15] as f32,
+        };
+        let mut other = ours;
+        other.fuse_with(&gain, &y, s as f32);
+        let theirs = joseph(&k);
+        prop_assert!(difference(&dense(&other), &theirs) < 1e-5, "{}", difference(&dense(&other), &theirs));
+        let ours = dense(&other);
+        prop_assert_eq!(ours, ours.transpose());
+    }
+
+    /// Too large a variance is cut with all its covariances, so the matrix stays positive.
+    #[test]
+    fn bounds_leave_it_positive(p in covariance(), which in 0..16_usize, factor in 1e3..1e8_f64) {
+        let scale = M16::from_diagonal(&V16::from_fn(|i, _| if i == which { factor } else { 1.0 }));
+        let mut ours = blocks(&(scale * p * scale));
+        ours.hold();
+        let held = dense(&ours);
+        prop_assert!(held.iter().all(|x| x.is_finite()) && held[(which, which)] < 1.001e8);
+        let sigma = V16::from_fn(|i, _| held[(i, i)].sqrt());
+        let correlation = M16::from_fn(|i, j| held[(i, j)] / (sigma[i] * sigma[j]));
+        prop_assert!(correlation.cholesky().is_some());
+    }
+}
+
+/// A state in `f64`, with biases.
+#[derive(Clone, Copy)]
+struct True {
+    r: Rotation3<f64>,
+    v: V3,
+    p: V3,
+    g: V3,
+    a: V3,
+}
+
+const GRAVITY: f64 = 9.81;
+
+/// What gyroscope and accelerometer show at `t`.
+fn shown(t: f64, a: &[f64; 6]) -> (V3, V3) {
+    let rates = V3::new(2.0 * a[0] + (20.0 * t).sin(), 2.0 * a[1], 2.0 * a[2] + 10.0 * t);
+    (rates, V3::new(3.0 * a[3], 3.0 * a[4] + 20.0 * t, 10.0 + 4.0 * a[5]))
+}
+
+/// Goes back by `tau`, in steps of 0.1 ms.
+fn back(mut x: True, tau: f64, a: &[f64; 6]) -> True {
+    let steps = (tau / 1e-4).round() as usize;
+    for i in 0..steps {
+        let dt = tau / steps as f64;
+        let (rates, force) = shown(tau - (i as f64 + 0.5) * dt, a);
+        let before = x.r * Rotation3::new(-(rates - x.g) * dt);
+        let middle = x.r * Rotation3::new(-(rates - x.g) * (0.5 * dt));
+        let acceleration = middle * (force - x.a) - V3::new(0.0, 0.0, GRAVITY);
+        x.p -= x.v * dt - acceleration * (0.5 * dt * dt);
+        x.v -= acceleration * dt;
+        x.r = before;
+    }
+    x
+}
+
+/// Adds an error.
+fn moved(x: &True, e: &V16) -> True {
+    let part = |i: usize| e.fixed_rows::<3>(3 * i).into_owned();
+    True { r: Rotation3::new(part(0)) * x.r, v: x.v + part(1), p: x.p + part(2), g: x.g + part(3), a: x.a + part(4) }
+}
+
+fn past(x: &True, at_us: u32) -> Past {
+    let q = UnitQuaternion::from_rotation_matrix(&x.r).into_inner();
+    let single = |v: V3| v.map(|x| x as f32);
+    Past {
+        at_us,
+        attitude: Quaternion::new(q.w as f32, q.i as f32, q.j as f32, q.k as f32),
+        velocity: single(x.v),
+        position: single(x.p),
+    }
+}
+
+fn angle(v: &V3) -> f64 {
+    v.y.atan2(v.x)
+}
+
+proptest! {
+    /// The row of every measurement, up to 250 ms old, against the difference that an error of the present makes of the
+    /// past by way of all samples in between, sampled and integrated here.
+    #[test]
+    fn jacobians_are_finite_differences(
+        turn in numbers::<3>(), v in numbers::<3>(), p in numbers::<3>(), motion in numbers::<6>(),
+        tau_ms in 0..250_u32, field in numbers::<3>(),
+    ) {
+        let tau = f64::from(tau_ms) * 1e-3;
+        let r = Rotation3::new(V3::new(0.6 * turn[0], 0.6 * turn[1], 3.0 * turn[2]));
+        let now = True { r, v: vector(v) * 5.0, p: vector(p) * 20.0, g: V3::zeros(), a: V3::zeros() };
+        let then = back(now, tau, &motion);
+        let at_us = 1_000_000 - tau_ms * 1000;
+        let horizon = Horizon::new(&past(&now, 1_000_000), &past(&then, at_us), GRAVITY as f32);
+        let field = vector(field) + V3::new(1.0, 0.0, -1.5);
+        // The measured field in the body.
+        let body = (then.r.inverse() * field).map(|x| x as f32);
+        let north = angle(&field) as f32;
+        let nose = |x: &True| angle(&(x.r * V3::x()));
+        let upright = (then.r * V3::x()).z.abs() > 0.8 || field.z.abs() > 0.9 * field.norm();
+
+        for i in 0..15 {
+            let step = 1e-5 * size(i) / size(0);
+            let error = V16::from_fn(|j, _| if i == j { step } else { 0.0 });
+            let (plus, minus) = (back(moved(&now, &error), tau, &motion), back(moved(&now, &-error), tau, &motion));
+            let slope = |of: &dyn Fn(&True) -> f64| (of(&plus) - of(&minus)) / (2.0 * step);
+            for (c, coordinate) in Coordinate::ALL.into_iter().enumerate() {
+                let zero = Vector3::zeros();
+                let row = |target: Target| horizon.row(&target, coordinate, 0.0, north).unwrap().1;
+                let (p_row, v_row) = (row(Target::Position(zero)), row(Target::Velocity(zero)));
+                let a_row = row(Target::Attitude(past(&then, 0).attitude));
+                // Small: the skew part.
+                let rotated = |x: &True| {
+                    let m = (x.r * then.r.inverse()).into_inner();
+                    [m.m32 - m.m23, m.m13 - m.m31, m.m21 - m.m12][c] * 0.5
+                };
+                let mut pairs: Vec<(&str, f64, f64)> = Vec::new();
+                pairs.push(("attitude", slope(&rotated), dense_row(&a_row)[i]));
+                pairs.push(("velocity", slope(&|x| x.v[c]), dense_row(&v_row)[i]));
+                pairs.push(("position", slope(&|x| x.p[c]), dense_row(&p_row)[i]));
+                if c == 2 {
+                    let h_row = row(Target::Height(0.0));
+                    prop_assert_eq!(h_row.baro, 1.0);
+                    pairs.push(("height", slope(&|x| x.p.z), dense_row(&h_row)[i]));
+                }
+                if c == 0 && !upright {
+                    pairs.push(("field", slope(&|x| angle(&(x.r * then.r.inverse() * field)) ), dense_row(&row(Target::Field(body)))[i]));
+                    pairs.push(("heading", slope(&nose), dense_row(&row(Target::Heading(0.0)))[i]));
+                }
+                for (name, theirs, ours) in pairs {
+                    // Left out: what the gyroscope's bias does to velocity and position; the mean rotation is that of
+                    // both ends only.
+                    let bound = match (name, i / 3) {
+                        ("velocity", 3) => 0.5 * 16.0 * tau * tau,
+                        ("position" | "height", 3) => 16.0 * tau * tau * tau / 3.0,
+                        (_, 3 | 4) => 4.0 * tau * tau * (1.0 + 3.0 * tau),
+                        _ => 0.0,
+                    };
+                    prop_assert!(
+                        (theirs - ours).abs() <= bound + 2e-3 * theirs.abs() + 2e-4,
+                        "{name} {c} by error {i}: {theirs}, not {ours}; {tau} s",
+                    );
+                }
+            }
+        }
+    }
+
+    /// The innovation of a measurement that is right is nothing, whatever the age.
+    #[test]
+    fn history_interpolates(motion in numbers::<6>(), back_us in 0..200_000_u32, by in numbers::<6>()) {
+        let now = True {
+            r: Rotation3::identity(), v: V3::new(1.0, 2.0, 3.0), p: V3::new(10.0, 20.0, 5.0), g: V3::zeros(), a: V3::zeros(),
+        };
+        let mut history = History::default();
+        let base = u32::MAX - 100_000;
+        for i in (0..63).rev() {
+            let x = back(now, f64::from(i) * 4e-3, &motion.map(|x| x * 0.3));
+            history.store(&past(&x, base.wrapping_add(252_000 - i * 4000)));
+        }
+        let at_us = base.wrapping_add(252_000 - back_us);
+        let x = back(now, f64::from(back_us) * 1e-6, &motion.map(|x| x * 0.3));
+        let found = history.corrected(&history.at(at_us).unwrap());
+        prop_assert!((found.position.map(f64::from) - x.p).norm() < 1e-4);
+        prop_assert!((found.velocity.map(f64::from) - x.v).norm() < 2e-3);
+        let q = past(&x, 0).attitude;
+        prop_assert!(1.0 - q.dot(&found.attitude).abs() < 1e-6);
+        // Corrections move the past, and rewriting it changes nothing.
+        let v = Vector3::new(by[0], by[1], by[2]).map(|x| x as f32);
+        let p = Vector3::new(by[3], by[4], by[5]).map(|x| 20.0 * x as f32);
+        history.correct(&crate::rotation::about_z(0.5), &v, &p);
+        let corrected = history.corrected(&history.at(at_us).unwrap());
+        prop_assert!((corrected.velocity - found.velocity - v).norm() < 1e-5);
+        // A correction of the velocity bends the curve between two entries: by a tenth of its way in 4 ms.
+        prop_assert!((corrected.position - found.position - p).norm() < 1e-3);
+        history.settle();
+        let settled = history.corrected(&history.at(at_us).unwrap());
+        prop_assert!((corrected.position - settled.position).norm() < 1e-4 && !history.is_unsettled());
+        // Nothing before the oldest, nothing after the newest.
+        prop_assert!(history.at(base.wrapping_add(252_001)).is_none());
+        prop_assert!(history.at(base.wrapping_add(3_999)).is_none());
+    }
+
+    #[test]
+    fn angles(x in -10.0..10.0_f32, y in -10.0..10.0_f32, v in numbers::<3>()) {
+        prop_assert!((f64::from(crate::rotation::atan2(y, x)) - f64::from(y).atan2(f64::from(x))).abs() < 4e-7);
+        let q = UnitQuaternion::new(vector(v) * 1.7);
+        let single = q.into_inner().coords.map(|x| x as f32);
+        let ours = crate::rotation::euler(&Quaternion::from(single));
+        let (roll, pitch, yaw) = q.euler_angles();
+        prop_assert!((ours.map(f64::from) - V3::new(roll, pitch, yaw)).norm() < 2e-5 || pitch.abs() > 1.5);
+        let turn = vector(v) * 0.3;
+        let small = crate::rotation::small(&turn.map(|x| x as f32));
+        let exact = UnitQuaternion::new(turn);
+        prop_assert!((small.coords.map(f64::from) - exact.coords).norm() < 2e-7);
+        let back = crate::rotation::difference(&small, &crate::rotation::identity());
+        prop_assert!((back.map(f64::from) - turn).norm() < 1e-6);
+    }
+}
