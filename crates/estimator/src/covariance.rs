@@ -181,9 +181,15 @@ pub(crate) struct Covariance {
 #[inline]
 fn minus_cross(s: &Vector3<f32>, m: &Block) -> Block {
     Block::new(
-        s.z * m.m21 - s.y * m.m31, s.z * m.m22 - s.y * m.m32, s.z * m.m23 - s.y * m.m33,
-        s.x * m.m31 - s.z * m.m11, s.x * m.m32 - s.z * m.m12, s.x * m.m33 - s.z * m.m13,
-        s.y * m.m11 - s.x * m.m21, s.y * m.m12 - s.x * m.m22, s.y * m.m13 - s.x * m.m23,
+        s.z * m.m21 - s.y * m.m31,
+        s.z * m.m22 - s.y * m.m32,
+        s.z * m.m23 - s.y * m.m33,
+        s.x * m.m31 - s.z * m.m11,
+        s.x * m.m32 - s.z * m.m12,
+        s.x * m.m33 - s.z * m.m13,
+        s.y * m.m11 - s.x * m.m21,
+        s.y * m.m12 - s.x * m.m22,
+        s.y * m.m13 - s.x * m.m23,
     )
 }
 
@@ -191,9 +197,15 @@ fn minus_cross(s: &Vector3<f32>, m: &Block) -> Block {
 #[inline]
 fn crossed_minus(m: &Block, s: &Vector3<f32>) -> Block {
     Block::new(
-        m.m12 * s.z - m.m13 * s.y, m.m13 * s.x - m.m11 * s.z, m.m11 * s.y - m.m12 * s.x,
-        m.m22 * s.z - m.m23 * s.y, m.m23 * s.x - m.m21 * s.z, m.m21 * s.y - m.m22 * s.x,
-        m.m32 * s.z - m.m33 * s.y, m.m33 * s.x - m.m31 * s.z, m.m31 * s.y - m.m32 * s.x,
+        m.m12 * s.z - m.m13 * s.y,
+        m.m13 * s.x - m.m11 * s.z,
+        m.m11 * s.y - m.m12 * s.x,
+        m.m22 * s.z - m.m23 * s.y,
+        m.m23 * s.x - m.m21 * s.z,
+        m.m21 * s.y - m.m22 * s.x,
+        m.m32 * s.z - m.m33 * s.y,
+        m.m33 * s.x - m.m31 * s.z,
+        m.m31 * s.y - m.m32 * s.x,
     )
 }
 
@@ -357,7 +369,9 @@ impl Covariance {
     fn scale(&mut self, by: &Errors) {
         let Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b } = by;
         let scale = |m: &mut Block, x: &Vector3<f32>, y: &Vector3<f32>| m.component_mul_assign(&(x * y.transpose()));
-        for (block, y) in [(&mut self.tt, t), (&mut self.tv, v), (&mut self.tp, p), (&mut self.tg, g), (&mut self.ta, a)] {
+        for (block, y) in
+            [(&mut self.tt, t), (&mut self.tv, v), (&mut self.tp, p), (&mut self.tg, g), (&mut self.ta, a)]
+        {
             scale(block, t, y);
         }
         for (block, y) in [(&mut self.vv, v), (&mut self.vp, p), (&mut self.vg, g), (&mut self.va, a)] {
@@ -438,6 +452,13 @@ impl Covariance {
             y.baro += self.bb * h;
         }
         y
+    }
+
+    /// Returns the variances of the row's position and velocity, each by itself.
+    #[inline]
+    pub(crate) fn motion_variance(&self, row: &Row) -> f32 {
+        let of = |m: &Block| row.coordinate.of(&m.diagonal());
+        row.position * row.position * of(&self.pp) + row.velocity * row.velocity * of(&self.vv)
     }
 
     /// Subtracts k w'.

@@ -26,7 +26,7 @@ const LOST_US: u64 = 250_000;
 const GAP_RAD_S: f32 = 0.5;
 const GAP_M_S2: f32 = 3.0;
 /// Time for which an error of the second order lasts \[s\].
-const BENT_S: f32 = 1.0;
+const BENT_S: f32 = 0.7;
 /// Variances per second that a clipped sample adds, attitude and velocity.
 const CLIPPED: (f32, f32) = (0.5, 50.0);
 
@@ -41,6 +41,8 @@ pub struct Estimator {
     pub(crate) coast_us: u64,
     /// Direction of magnetic north in the earth frame, whose x is north and y west.
     pub(crate) magnetic_north_rad: f32,
+    /// Its cosine and sine.
+    pub(crate) magnetic_north: (f32, f32),
     pub(crate) inclination_error_max: f32,
 }
 
@@ -66,6 +68,7 @@ impl Estimator {
             reacquire_us: microseconds(settings.reacquire_s),
             coast_us: microseconds(settings.coast_s),
             magnetic_north_rad: wrap_angle(-settings.declination_rad),
+            magnetic_north: (libm::cosf(settings.declination_rad), -libm::sinf(settings.declination_rad)),
             inclination_error_max: settings.inclination_error_max_rad,
             settings,
         })
@@ -185,7 +188,7 @@ impl Estimator {
         let theta = memory.covariance.variances().theta;
         let tilt = max(theta.x, theta.y);
         let gravity = self.settings.gravity_m_s2;
-        BENT_S * gravity * gravity * tilt * (tilt + min(theta.z, 1.0))
+        BENT_S * gravity * gravity * min(tilt * (tilt + min(theta.z, 1.0)), 0.1)
     }
 
     /// Waits for rest.

@@ -7,12 +7,12 @@
 use crate::aid::{Aid, passes};
 use crate::covariance::{Coordinate, Errors};
 use crate::estimator::Estimator;
-use crate::horizon::{Horizon, Target};
+use crate::horizon::{Expected, Horizon, Target};
 use crate::memory::Memory;
 use crate::queue::{Fix, Part, parts};
 use crate::restart::reference;
 use crate::rotation::{atan2, renormalized, small, twist};
-use afbc_control::math::{abs_max, max, min, wrap_angle};
+use afbc_control::math::{abs_max, max, min, sqrt, wrap_angle};
 use nalgebra::Vector3;
 
 /// Oldest measurement \[us\].
@@ -21,6 +21,9 @@ const LATE_US: u64 = 250_000;
 const EARLY_US: u64 = 20_000;
 /// A scalar leaves at least this share of a variance: in `f32`, what remains of more is rounding.
 const LEFT: f32 = 1e-4;
+/// Rounding of the variance of a past position, in shares of those of the present position and of the way since: it is
+/// their small difference when the velocity is not known.
+const ROUNDING: f32 = 1e-6;
 /// Time for which another aid counts as present \[us\].
 const PRESENT_US: u64 = 1_000_000;
 /// Interval of the pseudo-measurements of rest \[us\], and their standard deviations on the ground and in the air \[m/s\].
@@ -115,9 +118,8 @@ impl Estimator {
             1 => Coordinate::Y,
             _ => Coordinate::Z,
         };
-        let Some((innovation, row)) =
-            horizon.row(&part.target, coordinate, memory.height_offset, self.magnetic_north_rad)
-        else {
+        let expected = Expected { height_offset: memory.height_offset, field: self.expected_field(memory) };
+        let Some((innovation, row)) = horizon.row(&part.target, coordinate, &expected) else {
             return rest;
         };
         let y = memory.covariance.times(&row);
@@ -126,7 +128,7 @@ impl Estimator {
             Target::Field(field) => field_variance(&horizon.field(field), part.variance.x),
             _ => coordinate.of(&part.variance),
         };
-        let s = hph + max(r, LEFT * hph);
+        let s = hph + max(r, max(LEFT * hph, ROUNDING * memory.covariance.motion_variance(&row)));
         let nis = innovation * innovation / s;
         let scalars = part.target.scalars();
         if scalars == 1 && nis > self.gate_squared {
@@ -194,7 +196,7 @@ impl Estimator {
             Target::Position(position) => {
                 let innovation = position - past.position;
                 if !memory.knows.position {
-                    memory.reset_position(&innovation, &part.variance);
+                    memory.reset_position(&innovation, &part.variance, horizon.tau_s());
                     self.accept(memory, fix, part);
                     return false;
                 }
@@ -225,7 +227,7 @@ impl Estimator {
                 let field = horizon.field(field);
                 let Some((strength, inclination)) = reference(&field) else { return false };
                 let (usual, steep) = *memory.field.get_or_insert((strength, inclination));
-                let slope = self.inclination_error_max * max(0.2, afbc_control::math::sqrt(1.0 - steep * steep));
+                let slope = self.inclination_error_max * max(0.2, sqrt(1.0 - steep * steep));
                 if (strength - usual).abs() > self.settings.field_error_max * usual
                     || (inclination - steep).abs() > slope
                 {
@@ -262,6 +264,14 @@ impl Estimator {
         passes
     }
 
+    /// Returns the direction of the magnetic field in the earth frame.
+    #[inline]
+    fn expected_field(&self, memory: &Memory) -> Vector3<f32> {
+        let steep = memory.field.map_or(0.0, |(_, steep)| steep);
+        let level = sqrt(max(1.0 - steep * steep, 0.0));
+        Vector3::new(level * self.magnetic_north.0, level * self.magnetic_north.1, steep)
+    }
+
     fn accept(&self, memory: &mut Memory, fix: &Fix, part: &Part) {
         if let Some(aid) = part.aid {
             memory.aids.of_mut(aid).accept(fix.at_us);
@@ -281,10 +291,10 @@ impl Estimator {
         let past = horizon.past();
         match &part.target {
             Target::Position(position) => {
-                memory.reset_position(&(position - past.position), &part.variance);
                 if aid == Aid::TrackerPosition {
                     memory.doubt_velocity(JUMP_VARIANCE);
                 }
+                memory.reset_position(&(position - past.position), &part.variance, horizon.tau_s());
                 self.doubt(memory, fix.at_us);
             }
             Target::Velocity(velocity) => {

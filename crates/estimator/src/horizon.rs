@@ -33,6 +33,15 @@ pub(crate) enum Target {
     Heading(f32),
 }
 
+/// What is expected of barometer and magnetometer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Expected {
+    /// Offset of the barometer \[m\].
+    pub(crate) height_offset: f32,
+    /// Magnetic field in the earth frame, of any strength.
+    pub(crate) field: Vector3<f32>,
+}
+
 /// A past state seen from the present.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Horizon {
@@ -82,9 +91,8 @@ impl Horizon {
     }
 
     /// Returns the innovation of `target` at `coordinate` (the first one for scalars) and its Jacobian; `None` where
-    /// there is no heading: with the nose or the field upright. `baro` is the estimated offset, `north` the direction
-    /// of magnetic north in the earth frame \[rad\].
-    pub(crate) fn row(&self, target: &Target, coordinate: Coordinate, baro: f32, north: f32) -> Option<(f32, Row)> {
+    /// there is no heading: with the nose or the field upright.
+    pub(crate) fn row(&self, target: &Target, coordinate: Coordinate, expected: &Expected) -> Option<(f32, Row)> {
         let at = coordinate;
         let unit = at.unit();
         let none = Row {
@@ -101,9 +109,7 @@ impl Horizon {
             (innovation, Row { theta, gyro: Some(self.turn.tr_mul(&theta)), ..none })
         };
         match target {
-            Target::Position(position) => {
-                Some((at.of(&(position - self.past.position)), self.position_row(at, none)))
-            }
+            Target::Position(position) => Some((at.of(&(position - self.past.position)), self.position_row(at, none))),
             Target::Velocity(velocity) => {
                 let row = Row {
                     theta: unit.cross(&self.thrust),
@@ -117,11 +123,13 @@ impl Horizon {
             Target::Height(height) => {
                 let at = Coordinate::Z;
                 let row = Row { baro: 1.0, ..self.position_row(at, Row { coordinate: at, ..none }) };
-                Some((height - self.past.position.z - baro, row))
+                Some((height - self.past.position.z - expected.height_offset, row))
             }
             Target::Field(field) => {
                 let field = self.field(field);
-                let theta = upright(&field)?;
+                // The Jacobian of the expected field: that of the measured one has its noise, which would tell a tilt.
+                let theta = upright(&expected.field)?;
+                let north = atan2(expected.field.y, expected.field.x);
                 Some(angle(wrap_angle(north - atan2(field.y, field.x)), theta))
             }
             Target::Heading(heading) => {

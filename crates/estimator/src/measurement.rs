@@ -131,13 +131,7 @@ impl Measurement {
                     && is_sigma(*attitude_sigma_rad)
             }
             Measurement::Position { position_m, sigma_m } => within(position_m, POSITION_MAX_M) && is_sigma(*sigma_m),
-            Measurement::Gnss {
-                position_m,
-                velocity_m_s,
-                horizontal_sigma_m,
-                vertical_sigma_m,
-                speed_sigma_m_s,
-            } => {
+            Measurement::Gnss { position_m, velocity_m_s, horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s } => {
                 within(position_m, POSITION_MAX_M)
                     && within(velocity_m_s, VELOCITY_MAX_M_S)
                     && is_sigma(*horizontal_sigma_m)

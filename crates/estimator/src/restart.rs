@@ -154,17 +154,20 @@ impl Memory {
         });
     }
 
-    /// Moves the position by `by`, and takes `variance` for it.
-    pub(crate) fn reset_position(&mut self, by: &Vector3<f32>, variance: &Vector3<f32>) {
+    /// Moves the position by `by`, and takes `variance` for that of `tau_s` ago; since then the velocity's error has
+    /// moved it.
+    pub(crate) fn reset_position(&mut self, by: &Vector3<f32>, variance: &Vector3<f32>, tau_s: f32) {
         count(&mut self.resets.position);
         self.nominal.move_to(self.nominal.position + by);
         self.history.correct(&identity(), &NONE, by);
-        self.covariance.forget(&Errors { position: NONE, baro: 0.0, ..KEEP });
-        self.covariance.pp = diagonal(variance);
+        let c = &mut self.covariance;
+        c.forget(&Errors { position: NONE, baro: 0.0, ..KEEP });
+        c.pp = diagonal(variance) + c.vv * (tau_s * tau_s);
+        (c.tp, c.vp, c.pg, c.pa) = (c.tv * tau_s, c.vv * tau_s, c.vg * tau_s, c.va * tau_s);
+        c.hold();
         self.knows.position = true;
         // The offset was that of another height.
         self.knows.height_offset = false;
-        self.covariance.hold();
     }
 
     /// Changes the velocity by `by`, and takes `variance` for it.

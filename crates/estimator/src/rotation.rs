@@ -61,9 +61,15 @@ pub(crate) fn matrix(q: &Quaternion<f32>) -> Matrix3<f32> {
     let (xy, xz, yz) = (x2 * q.j, x2 * q.k, y2 * q.k);
     let (wx, wy, wz) = (x2 * q.w, y2 * q.w, z2 * q.w);
     Matrix3::new(
-        1.0 - (yy + zz), xy - wz, xz + wy,
-        xy + wz, 1.0 - (xx + zz), yz - wx,
-        xz - wy, yz + wx, 1.0 - (xx + yy),
+        1.0 - (yy + zz),
+        xy - wz,
+        xz + wy,
+        xy + wz,
+        1.0 - (xx + zz),
+        yz - wx,
+        xz - wy,
+        yz + wx,
+        1.0 - (xx + yy),
     )
 }
 
@@ -74,11 +80,7 @@ pub(crate) fn difference(to: &Quaternion<f32>, from: &Quaternion<f32>) -> Vector
     let vector = q.imag();
     let sine = sqrt(vector.norm_squared());
     // The angle per unit of the vector, 2 for small ones.
-    let scale = if sine < 0.05 {
-        2.0 + sine * sine * (1.0 / 3.0)
-    } else {
-        2.0 * atan2(sine, q.w.abs()) / sine
-    };
+    let scale = if sine < 0.05 { 2.0 + sine * sine * (1.0 / 3.0) } else { 2.0 * atan2(sine, q.w.abs()) / sine };
     vector * if q.w < 0.0 { -scale } else { scale }
 }
 

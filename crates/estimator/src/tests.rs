@@ -5,7 +5,7 @@ extern crate std;
 
 use crate::covariance::{Coordinate, Covariance, Errors, Growth, Interval, Row};
 use crate::history::{History, Past};
-use crate::horizon::{Horizon, Target};
+use crate::horizon::{Expected, Horizon, Target};
 use nalgebra::{Matrix3, Quaternion, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use std::vec::Vec;
@@ -23,17 +23,29 @@ fn size(i: usize) -> f64 {
 
 /// Blocks of a matrix.
 fn blocks(p: &M16) -> Covariance {
-    let block = |i: usize, j: usize| {
-        p.fixed_view::<3, 3>(3 * i, 3 * j).map(|x| x as f32).into_owned()
-    };
+    let block = |i: usize, j: usize| p.fixed_view::<3, 3>(3 * i, 3 * j).map(|x| x as f32).into_owned();
     let column = |i: usize| p.fixed_view::<3, 1>(3 * i, 15).map(|x| x as f32).into_owned();
     Covariance {
-        tt: block(0, 0), tv: block(0, 1), tp: block(0, 2), tg: block(0, 3), ta: block(0, 4),
-        vv: block(1, 1), vp: block(1, 2), vg: block(1, 3), va: block(1, 4),
-        pp: block(2, 2), pg: block(2, 3), pa: block(2, 4),
-        gg: block(3, 3), ga: block(3, 4),
+        tt: block(0, 0),
+        tv: block(0, 1),
+        tp: block(0, 2),
+        tg: block(0, 3),
+        ta: block(0, 4),
+        vv: block(1, 1),
+        vp: block(1, 2),
+        vg: block(1, 3),
+        va: block(1, 4),
+        pp: block(2, 2),
+        pg: block(2, 3),
+        pa: block(2, 4),
+        gg: block(3, 3),
+        ga: block(3, 4),
         aa: block(4, 4),
-        tb: column(0), vb: column(1), pb: column(2), gb: column(3), ab: column(4),
+        tb: column(0),
+        vb: column(1),
+        pb: column(2),
+        gb: column(3),
+        ab: column(4),
         bb: p[(15, 15)] as f32,
     }
 }
@@ -256,7 +268,7 @@ proptest! {
         let field = vector(field) + V3::new(1.0, 0.0, -1.5);
         // The measured field in the body.
         let body = (then.r.inverse() * field).map(|x| x as f32);
-        let north = angle(&field) as f32;
+        let expected = Expected { height_offset: 0.0, field: field.map(|x| x as f32) };
         let nose = |x: &True| angle(&(x.r * V3::x()));
         let upright = (then.r * V3::x()).z.abs() > 0.8 || field.z.abs() > 0.9 * field.norm();
 
@@ -267,7 +279,7 @@ proptest! {
             let slope = |of: &dyn Fn(&True) -> f64| (of(&plus) - of(&minus)) / (2.0 * step);
             for (c, coordinate) in Coordinate::ALL.into_iter().enumerate() {
                 let zero = Vector3::zeros();
-                let row = |target: Target| horizon.row(&target, coordinate, 0.0, north).unwrap().1;
+                let row = |target: Target| horizon.row(&target, coordinate, &expected).unwrap().1;
                 let (p_row, v_row) = (row(Target::Position(zero)), row(Target::Velocity(zero)));
                 let a_row = row(Target::Attitude(past(&then, 0).attitude));
                 // Small: the skew part.

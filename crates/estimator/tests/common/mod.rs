@@ -58,9 +58,15 @@ pub fn log(r: &M3) -> V3 {
 pub fn matrix(q: [f32; 4]) -> M3 {
     let [w, x, y, z] = q.map(f64::from);
     M3::new(
-        1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
-        2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
-        2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y - w * z),
+        2.0 * (x * z + w * y),
+        2.0 * (x * y + w * z),
+        1.0 - 2.0 * (x * x + z * z),
+        2.0 * (y * z - w * x),
+        2.0 * (x * z - w * y),
+        2.0 * (y * z + w * x),
+        1.0 - 2.0 * (x * x + y * y),
     )
 }
 
@@ -116,7 +122,8 @@ pub fn hover(t: f64) -> (V3, f64) {
 pub fn fly(path: Path, time_s: f64) -> Vec<Moment> {
     const H: f64 = 1e-3;
     // Derivatives of the fourth order.
-    let velocity = |t: f64| (path(t - 2.0 * H).0 - path(t + 2.0 * H).0 + (path(t + H).0 - path(t - H).0) * 8.0) / (12.0 * H);
+    let velocity =
+        |t: f64| (path(t - 2.0 * H).0 - path(t + 2.0 * H).0 + (path(t + H).0 - path(t - H).0) * 8.0) / (12.0 * H);
     let acceleration = |t: f64| {
         let near = path(t + H).0 + path(t - H).0;
         let far = path(t + 2.0 * H).0 + path(t - 2.0 * H).0;
@@ -184,8 +191,7 @@ pub struct Sensors {
 }
 
 pub const MOCAP: Sensors = Sensors { tracker: Some((1e-3, 3.5e-3)), gnss: None, baro: None, mag: None };
-pub const OUTDOOR: Sensors =
-    Sensors { tracker: None, gnss: Some((0.8, 1.2, 0.1)), baro: Some(0.15), mag: Some(0.01) };
+pub const OUTDOOR: Sensors = Sensors { tracker: None, gnss: Some((0.8, 1.2, 0.1)), baro: Some(0.15), mag: Some(0.01) };
 
 /// Magnetic field in the earth frame: north and down.
 pub fn field() -> V3 {
@@ -301,8 +307,7 @@ impl<'a> Flight<'a> {
         self.baro_offset += self.noise.normal() * 0.02 * root_dt;
         let rates = moment.rates + self.gyro_bias + self.noise.vector(self.imu.gyro / root_dt);
         let force = moment.force + self.accel_bias + self.noise.vector(self.imu.accel / root_dt);
-        let mut sample =
-            ImuSample { at_us: now_us, rates_rad_s: single(&rates), specific_force_m_s2: single(&force) };
+        let mut sample = ImuSample { at_us: now_us, rates_rad_s: single(&rates), specific_force_m_s2: single(&force) };
         let given = imu(&mut sample);
         self.sample = sample;
         let now = self.now;
