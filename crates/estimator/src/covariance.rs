@@ -259,6 +259,16 @@ const GYRO: Bounds = Bounds { least: 1e-13, most: 0.25 };
 const ACCEL: Bounds = Bounds { least: 1e-9, most: 25.0 };
 const BARO: Bounds = Bounds { least: 1e-8, most: 1e8 };
 
+/// Mirrors a diagonal block and raises its variances to the least; true if one is too large.
+#[inline]
+fn held(block: &mut Block, bounds: &Bounds) -> bool {
+    mirror(block);
+    block.m11 = max(block.m11, bounds.least);
+    block.m22 = max(block.m22, bounds.least);
+    block.m33 = max(block.m33, bounds.least);
+    block.m11 > bounds.most || block.m22 > bounds.most || block.m33 > bounds.most
+}
+
 impl Covariance {
     /// Predicts over `interval`: P = F P F' + Q, as three substitutions, position first, in blocks.
     #[inline]
@@ -334,17 +344,12 @@ impl Covariance {
     /// error down with all its covariances, both leave the matrix positive.
     #[inline]
     pub(crate) fn hold(&mut self) {
-        let Covariance { tt, vv, pp, gg, aa, bb, .. } = self;
-        for (block, bounds) in [(tt, THETA), (vv, VELOCITY), (pp, POSITION), (gg, GYRO), (aa, ACCEL)] {
-            mirror(block);
-            block.m11 = max(block.m11, bounds.least);
-            block.m22 = max(block.m22, bounds.least);
-            block.m33 = max(block.m33, bounds.least);
-        }
-        *bb = max(*bb, BARO.least);
-        let [theta, velocity, position, gyro, accel] =
-            [(&self.tt, THETA), (&self.vv, VELOCITY), (&self.pp, POSITION), (&self.gg, GYRO), (&self.aa, ACCEL)]
-                .map(|(block, bounds)| max(max(block.m11, block.m22), block.m33) > bounds.most);
+        let theta = held(&mut self.tt, &THETA);
+        let velocity = held(&mut self.vv, &VELOCITY);
+        let position = held(&mut self.pp, &POSITION);
+        let gyro = held(&mut self.gg, &GYRO);
+        let accel = held(&mut self.aa, &ACCEL);
+        self.bb = max(self.bb, BARO.least);
         if theta || velocity || position || gyro || accel || self.bb > BARO.most {
             self.limit();
         }

@@ -1,6 +1,5 @@
 //! What the estimator says.
 
-use crate::aid::Aids;
 use crate::align::Unready;
 use crate::imu::ImuHealth;
 use afbc_types::State;
@@ -98,10 +97,6 @@ pub struct Estimate {
     pub unready: Option<Unready>,
     /// Health of the inertial sensors.
     pub imu: ImuHealth,
-    /// Aiding sensors.
-    pub aids: Aids,
     /// Resets since the memory's beginning.
     pub resets: Resets,
-    /// Measurements not looked at since the memory's beginning.
-    pub dropped: Dropped,
 }

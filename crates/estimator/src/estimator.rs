@@ -141,7 +141,8 @@ impl Estimator {
             memory.nominal.begin(sample);
             return false;
         };
-        let dt_s = gap_us as f32 * 1e-6;
+        // Less than a quarter of a second.
+        let dt_s = gap_us as u32 as f32 * 1e-6;
         if gap_us > GAP_US {
             let (turn, speed) = (GAP_RAD_S * dt_s, GAP_M_S2 * dt_s);
             memory.rough.0 += turn * turn;
@@ -215,8 +216,8 @@ impl Estimator {
     /// Says what is known.
     fn report(&self, memory: &Memory, now_us: u64) -> Estimate {
         let imu = memory.monitor.health(now_us, &self.settings);
-        let Memory { nominal, aids, resets, dropped, .. } = memory;
-        let mut estimate = Estimate { imu, aids: *aids, resets: *resets, dropped: *dropped, ..Estimate::default() };
+        let Memory { nominal, aids, resets, .. } = memory;
+        let mut estimate = Estimate { imu, resets: *resets, ..Estimate::default() };
         estimate.at_us = memory.monitor.at_us().unwrap_or(now_us);
         estimate.attitude = [1.0, 0.0, 0.0, 0.0];
         estimate.state.rates_rad_s = memory.smoothed.output;

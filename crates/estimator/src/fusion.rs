@@ -46,8 +46,9 @@ impl Estimator {
             if memory.fix.is_none() {
                 memory.fix = self.next_fix(memory, now_us);
             }
-            let Some(fix) = memory.fix else { break };
-            memory.fix = self.fuse_scalar(memory, fix);
+            if !self.fuse_scalar(memory) {
+                memory.end_part();
+            }
         }
     }
 
@@ -56,7 +57,7 @@ impl Estimator {
     fn next_fix(&self, memory: &mut Memory, now_us: u64) -> Option<Fix> {
         let newest_us = memory.covariance_us;
         let due = |at_us: u64| at_us <= newest_us || at_us > now_us.saturating_add(EARLY_US);
-        let Some(measurement) = memory.queue.take(|waiting| due(waiting.at_us)) else {
+        let Some(measurement) = memory.queue.take(due) else {
             return self.rest(memory);
         };
         let at_us = measurement.at_us;
@@ -102,25 +103,23 @@ impl Estimator {
         Some(Fix { at_us, past, parts: [Some(part), None], next: 0, nis: 0.0 })
     }
 
-    /// Fuses the next scalar of `fix`, and returns what is left of it.
+    /// Fuses the next scalar; false if the part of the fix that it belongs to is done.
     #[inline(always)]
-    fn fuse_scalar(&self, memory: &mut Memory, mut fix: Fix) -> Option<Fix> {
-        let [first, second] = fix.parts;
-        let rest = second.map(|_| Fix { parts: [second, None], next: 0, nis: 0.0, ..fix });
-        let Some(part) = first else { return rest };
-        let present = memory.history.newest()?;
-        let horizon = Horizon::new(&present, &memory.history.corrected(&fix.past), self.settings.gravity_m_s2);
-        if fix.next == 0 && !self.admits(memory, &fix, &part, &horizon) {
-            return rest;
+    fn fuse_scalar(&self, memory: &mut Memory) -> bool {
+        let Some(Fix { at_us, past, parts: [Some(part), _], next, .. }) = memory.fix else { return false };
+        let Some(present) = memory.history.newest() else { return false };
+        let horizon = Horizon::new(&present, &memory.history.corrected(&past), self.settings.gravity_m_s2);
+        if next == 0 && !self.admits(memory, at_us, &part, &horizon) {
+            return false;
         }
-        let coordinate = match fix.next {
+        let coordinate = match next {
             0 => Coordinate::X,
             1 => Coordinate::Y,
             _ => Coordinate::Z,
         };
         let expected = Expected { height_offset: memory.height_offset, field: self.expected_field(memory) };
         let Some((innovation, row)) = horizon.row(&part.target, coordinate, &expected) else {
-            return rest;
+            return false;
         };
         let y = memory.covariance.times(&row);
         let hph = max(row.dot(&y), 0.0);
@@ -132,8 +131,8 @@ impl Estimator {
         let nis = innovation * innovation / s;
         let scalars = part.target.scalars();
         if scalars == 1 && nis > self.gate_squared {
-            self.reject(memory, &fix, &part, nis, &horizon);
-            return rest;
+            self.reject(memory, at_us, &part, nis, &horizon);
+            return false;
         }
         match part.target {
             // The field corrects what it tells, the heading, and the gyroscope's bias that turned it: a disturbed one
@@ -157,17 +156,18 @@ impl Estimator {
                 self.correct(memory, &y.scaled(innovation / s));
             }
         }
+        let Some(fix) = &mut memory.fix else { return false };
         fix.next += 1;
         fix.nis += nis;
         if fix.next < scalars {
-            return Some(fix);
+            return true;
         }
         if let Some(aid) = part.aid {
             let record = memory.aids.of_mut(aid);
             (record.nis, record.scalars) = (fix.nis, scalars);
-            record.accept(fix.at_us);
+            record.accept(at_us);
         }
-        rest
+        false
     }
 
     /// Adds corrections to the state.
@@ -189,7 +189,7 @@ impl Estimator {
 
     /// True if the part of a fix is to be fused. Otherwise it was rejected, or the state was set to it.
     #[inline]
-    fn admits(&self, memory: &mut Memory, fix: &Fix, part: &Part, horizon: &Horizon) -> bool {
+    fn admits(&self, memory: &mut Memory, at_us: u64, part: &Part, horizon: &Horizon) -> bool {
         let variances = memory.covariance.variances();
         let past = horizon.past();
         let (innovation, variance) = match &part.target {
@@ -197,7 +197,7 @@ impl Estimator {
                 let innovation = position - past.position;
                 if !memory.knows.position {
                     memory.reset_position(&innovation, &part.variance, horizon.tau_s());
-                    self.accept(memory, fix, part);
+                    self.accept(memory, at_us, part);
                     return false;
                 }
                 let tau_s = horizon.tau_s();
@@ -210,7 +210,7 @@ impl Estimator {
                     // As good as roll and pitch are: they mix with it.
                     let variance = part.variance.z + max(variances.theta.x, variances.theta.y);
                     memory.reset_heading(twist(attitude, &past.attitude), variance);
-                    self.accept(memory, fix, part);
+                    self.accept(memory, at_us, part);
                     return false;
                 }
                 (crate::rotation::difference(attitude, &past.attitude), variances.theta)
@@ -218,7 +218,7 @@ impl Estimator {
             Target::Height(height) => {
                 if !memory.knows.height_offset {
                     memory.reset_height_offset(height - past.position.z, part.variance.x);
-                    self.accept(memory, fix, part);
+                    self.accept(memory, at_us, part);
                     return false;
                 }
                 return true;
@@ -240,7 +240,7 @@ impl Estimator {
                     let variance = field_variance(&field, part.variance.x)
                         + min(slope, 100.0) * max(variances.theta.x, variances.theta.y);
                     memory.reset_heading(turn, variance);
-                    self.accept(memory, fix, part);
+                    self.accept(memory, at_us, part);
                     return false;
                 }
                 return true;
@@ -248,7 +248,7 @@ impl Estimator {
             Target::Heading(heading) => {
                 if !memory.knows.heading {
                     memory.reset_heading(wrap_angle(heading - horizon.heading()), part.variance.x);
-                    self.accept(memory, fix, part);
+                    self.accept(memory, at_us, part);
                     return false;
                 }
                 return true;
@@ -259,7 +259,7 @@ impl Estimator {
         if !passes {
             let nis = innovation.x * innovation.x / s.x;
             let nis = max(nis, max(innovation.y * innovation.y / s.y, innovation.z * innovation.z / s.z));
-            self.reject(memory, fix, part, nis, horizon);
+            self.reject(memory, at_us, part, nis, horizon);
         }
         passes
     }
@@ -272,20 +272,20 @@ impl Estimator {
         Vector3::new(level * self.magnetic_north.0, level * self.magnetic_north.1, steep)
     }
 
-    fn accept(&self, memory: &mut Memory, fix: &Fix, part: &Part) {
+    fn accept(&self, memory: &mut Memory, at_us: u64, part: &Part) {
         if let Some(aid) = part.aid {
-            memory.aids.of_mut(aid).accept(fix.at_us);
+            memory.aids.of_mut(aid).accept(at_us);
         }
     }
 
     /// Records a rejection; after too long, sets the state to the measurement, unless another aid contradicts it.
     #[cold]
-    fn reject(&self, memory: &mut Memory, fix: &Fix, part: &Part, nis: f32, horizon: &Horizon) {
+    fn reject(&self, memory: &mut Memory, at_us: u64, part: &Part, nis: f32, horizon: &Horizon) {
         let Some(aid) = part.aid else { return };
         let record = memory.aids.of_mut(aid);
         (record.nis, record.scalars) = (nis, part.target.scalars());
-        let lasted_us = record.reject(fix.at_us);
-        if lasted_us < self.reacquire_us || memory.aids.has_other(aid, fix.at_us, PRESENT_US) {
+        let lasted_us = record.reject(at_us);
+        if lasted_us < self.reacquire_us || memory.aids.has_other(aid, at_us, PRESENT_US) {
             return;
         }
         let past = horizon.past();
@@ -295,11 +295,11 @@ impl Estimator {
                     memory.doubt_velocity(JUMP_VARIANCE);
                 }
                 memory.reset_position(&(position - past.position), &part.variance, horizon.tau_s());
-                self.doubt(memory, fix.at_us);
+                self.doubt(memory, at_us);
             }
             Target::Velocity(velocity) => {
                 memory.reset_velocity(&(velocity - past.velocity), &part.variance);
-                self.doubt(memory, fix.at_us);
+                self.doubt(memory, at_us);
             }
             Target::Attitude(attitude) => {
                 // Roll and pitch are the IMU's; a tracker that contradicts them stays rejected.
@@ -321,7 +321,7 @@ impl Estimator {
                 memory.reset_heading(wrap_angle(heading - horizon.heading()), part.variance.x);
             }
         }
-        self.accept(memory, fix, part);
+        self.accept(memory, at_us, part);
     }
 
     /// Doubts the attitude if this reset is the second within ten seconds.
@@ -330,6 +330,19 @@ impl Estimator {
             memory.doubt_tilt();
         }
         memory.reset_us = Some(at_us);
+    }
+}
+
+impl Memory {
+    /// Ends the part of the fix that is being fused, and the fix with its last one.
+    fn end_part(&mut self) {
+        if let Some(fix) = &mut self.fix {
+            let [first, second] = &mut fix.parts;
+            (*first, fix.next, fix.nis) = (second.take(), 0, 0.0);
+            if first.is_none() {
+                self.fix = None;
+            }
+        }
     }
 }
 

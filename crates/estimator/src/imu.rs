@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 /// Time without a sample after which the IMU is missing \[us\].
 pub const MISSING_US: u64 = 20_000;
 /// Time that clipping is told after a clipped sample \[us\].
-const CLIPPED_US: u64 = 200_000;
+const CLIPPED_US: u32 = 200_000;
 /// Share of the squared change that a sample replaces.
 const SHARE: f32 = 0.01;
 
@@ -101,10 +101,11 @@ impl Monitor {
     pub(crate) fn health(&self, now_us: u64, settings: &Settings) -> ImuHealth {
         let at_us = self.at_us();
         let squared = |limit: f32| limit * limit;
-        let since = |from_us: u64| at_us.map_or(0, |at_us| at_us.saturating_sub(from_us));
+        let since =
+            |from_us: u64| at_us.map_or(0, |at_us| u32::try_from(at_us.saturating_sub(from_us)).unwrap_or(u32::MAX));
         ImuHealth {
             missing: at_us.is_none_or(|at_us| now_us.saturating_sub(at_us) > MISSING_US),
-            stuck: settings.stuck_s > 0.0 && since(self.same_us) as f32 * 1e-6 > settings.stuck_s,
+            stuck: settings.stuck_s > 0.0 && since(self.same_us) > (settings.stuck_s * 1e6) as u32,
             clipped: self.clipped_us.is_some_and(|clipped_us| since(clipped_us) < CLIPPED_US),
             noisy: self.rates_change > squared(settings.gyro_noisy_rad_s)
                 || self.force_change > squared(settings.accel_noisy_m_s2),

@@ -113,6 +113,18 @@ impl Memory {
         self.on_ground = on_ground;
     }
 
+    /// Returns the records of the aiding sensors: normalised innovations squared, and what was fused and rejected.
+    #[must_use]
+    pub fn aids(&self) -> &Aids {
+        &self.aids
+    }
+
+    /// Returns the numbers of measurements that were not even looked at.
+    #[must_use]
+    pub fn dropped(&self) -> &Dropped {
+        &self.dropped
+    }
+
     /// True once the filter runs.
     #[must_use]
     pub fn runs(&self) -> bool {

@@ -11,40 +11,40 @@ use nalgebra::{Quaternion, Vector3};
 /// Number of measurements that may wait.
 const WAITING_MAX: usize = 8;
 
-/// Measurements in the order of arrival, without gaps.
+/// Measurements, each with the number of its arrival.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Queue {
-    waiting: [Option<Timed<Measurement>>; WAITING_MAX],
+    waiting: [Option<(u32, Timed<Measurement>)>; WAITING_MAX],
+    arrived: u32,
 }
 
 impl Queue {
     /// Appends; true if the oldest one had to give way.
     pub(crate) fn push(&mut self, measurement: &Timed<Measurement>) -> bool {
-        let full = self.waiting.iter().all(Option::is_some);
-        if full {
-            self.remove(0);
-        }
-        if let Some(free) = self.waiting.iter_mut().find(|place| place.is_none()) {
-            *free = Some(*measurement);
-        }
+        let arrived = self.arrived;
+        self.arrived = arrived.wrapping_add(1);
+        // A free place, or else the oldest one's.
+        let age = |place: &Option<(u32, Timed<Measurement>)>| {
+            place.as_ref().map_or(u32::MAX, |(number, _)| arrived.wrapping_sub(*number))
+        };
+        let Some(place) = self.waiting.iter_mut().max_by_key(|place| age(place)) else { return false };
+        let full = place.is_some();
+        *place = Some((arrived, *measurement));
         full
     }
 
-    /// Removes and returns the oldest measurement that is `due`.
-    pub(crate) fn take(&mut self, due: impl Fn(&Timed<Measurement>) -> bool) -> Option<Timed<Measurement>> {
-        let place = self.waiting.iter().position(|waiting| waiting.as_ref().is_some_and(&due))?;
-        let taken = self.waiting.get(place).copied().flatten();
-        self.remove(place);
-        taken
-    }
-
-    fn remove(&mut self, place: usize) {
-        if let Some(rest) = self.waiting.get_mut(place..) {
-            let mut next = None;
-            for waiting in rest.iter_mut().rev() {
-                core::mem::swap(waiting, &mut next);
+    /// Removes and returns the oldest measurement whose time is `due`.
+    pub(crate) fn take(&mut self, due: impl Fn(u64) -> bool) -> Option<Timed<Measurement>> {
+        let arrived = self.arrived;
+        let mut oldest: Option<(u32, &mut Option<(u32, Timed<Measurement>)>)> = None;
+        for place in &mut self.waiting {
+            let Some((number, waiting)) = place else { continue };
+            let age = arrived.wrapping_sub(*number);
+            if due(waiting.at_us) && oldest.as_ref().is_none_or(|(other, _)| age > *other) {
+                oldest = Some((age, place));
             }
         }
+        oldest.and_then(|(_, place)| place.take()).map(|(_, measurement)| measurement)
     }
 }
 

@@ -33,7 +33,7 @@ fn check<const N: usize>(name: &str, sensors: Sensors, aids: &[Aid]) {
         for ms in 1..=20_000 {
             let estimate = flight.step();
             for ((aid, fused), nis) in aids.iter().zip(&mut fused).zip(&mut nis) {
-                let record = estimate.aids.of(*aid);
+                let record = flight.memory.aids().of(*aid);
                 if record.accepted > *fused {
                     *fused = record.accepted;
                     if ms > 3000 {
