@@ -259,13 +259,19 @@ const GYRO: Bounds = Bounds { least: 1e-13, most: 0.25 };
 const ACCEL: Bounds = Bounds { least: 1e-9, most: 25.0 };
 const BARO: Bounds = Bounds { least: 1e-8, most: 1e8 };
 
+/// Raises the variances of a block to the least.
+#[inline]
+fn raised(block: &mut Block, least: f32) {
+    block.m11 = max(block.m11, least);
+    block.m22 = max(block.m22, least);
+    block.m33 = max(block.m33, least);
+}
+
 /// Mirrors a diagonal block and raises its variances to the least; true if one is too large.
 #[inline]
 fn held(block: &mut Block, bounds: &Bounds) -> bool {
     mirror(block);
-    block.m11 = max(block.m11, bounds.least);
-    block.m22 = max(block.m22, bounds.least);
-    block.m33 = max(block.m33, bounds.least);
+    raised(block, bounds.least);
     block.m11 > bounds.most || block.m22 > bounds.most || block.m33 > bounds.most
 }
 
@@ -338,6 +344,17 @@ impl Covariance {
     pub(crate) fn is_sound(&self) -> bool {
         let sum = self.tt.trace() + self.vv.trace() + self.pp.trace() + self.gg.trace() + self.aa.trace() + self.bb;
         sum.is_finite()
+    }
+
+    /// Raises every variance to the least.
+    #[inline]
+    fn raise(&mut self) {
+        raised(&mut self.tt, THETA.least);
+        raised(&mut self.vv, VELOCITY.least);
+        raised(&mut self.pp, POSITION.least);
+        raised(&mut self.gg, GYRO.least);
+        raised(&mut self.aa, ACCEL.least);
+        self.bb = max(self.bb, BARO.least);
     }
 
     /// Holds every variance within its bounds, and the diagonal blocks symmetric. Raising a variance, and scaling an
@@ -498,7 +515,7 @@ impl Covariance {
     pub(crate) fn fuse(&mut self, y: &Errors, s: f32) {
         let w = y.scaled(1.0 / sqrt(s));
         self.subtract(&w, &w);
-        self.hold();
+        self.raise();
     }
 
     /// Fuses a scalar with any gain `k`: P - k y' - y k' + k s k' = P - k w' - w k' with w = y - k s/2. This is Joseph's
@@ -515,7 +532,10 @@ impl Covariance {
         };
         self.subtract(k, &w);
         self.subtract(&w, k);
-        self.hold();
+        for block in [&mut self.tt, &mut self.vv, &mut self.pp, &mut self.gg, &mut self.aa] {
+            mirror(block);
+        }
+        self.raise();
     }
 
     /// Returns the variances.

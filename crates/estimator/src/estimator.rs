@@ -14,8 +14,6 @@ use nalgebra::Vector3;
 
 /// Time between predictions of the covariance \[us\]; a sample later than this less half a millisecond is due.
 const PREDICT_US: u64 = 3_500;
-/// Scalars fused per step without prediction.
-const SCALARS: usize = 2;
 /// Sample in the future \[us\], sample too old \[us\].
 const EARLY_US: u64 = 50_000;
 const OLD_US: u64 = 1_000_000;
@@ -105,7 +103,7 @@ impl Estimator {
             if memory.history.is_unsettled() && !predicted {
                 memory.history.settle();
             } else if !predicted {
-                self.fuse(memory, now_us, SCALARS);
+                self.fuse(memory, now_us);
             }
         } else {
             self.listen(memory, now_us);

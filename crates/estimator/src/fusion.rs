@@ -24,6 +24,8 @@ const LEFT: f32 = 1e-4;
 /// Rounding of the variance of a past position, in shares of those of the present position and of the way since: it is
 /// their small difference when the velocity is not known.
 const ROUNDING: f32 = 1e-6;
+/// Waiting measurements from which on two scalars are fused in a step.
+const CROWD: u8 = 3;
 /// Time for which another aid counts as present \[us\].
 const PRESENT_US: u64 = 1_000_000;
 /// Interval of the pseudo-measurements of rest \[us\], and their standard deviations on the ground and in the air \[m/s\].
@@ -40,21 +42,27 @@ fn count(number: &mut u32) {
 }
 
 impl Estimator {
-    /// Fuses up to `scalars` scalars, and begins the fixes that they belong to.
-    pub(crate) fn fuse(&self, memory: &mut Memory, now_us: u64, scalars: usize) {
+    /// Fuses one scalar, and a second one if measurements pile up; the first scalar of a fix is alone in its step.
+    pub(crate) fn fuse(&self, memory: &mut Memory, now_us: u64) {
+        let scalars = if memory.queue.waiting() >= CROWD { 2 } else { 1 };
         for _ in 0..scalars {
-            if memory.fix.is_none() {
-                memory.fix = self.next_fix(memory, now_us);
+            let begins = memory.fix.is_none();
+            if begins && !self.begin_fix(memory, now_us) {
+                break;
             }
             if !self.fuse_scalar(memory) {
                 memory.end_part();
             }
+            if begins {
+                break;
+            }
         }
     }
 
-    /// Returns the next fix to fuse: the oldest measurement in the queue that is of the past, or a pseudo-measurement of
-    /// rest.
-    fn next_fix(&self, memory: &mut Memory, now_us: u64) -> Option<Fix> {
+    /// Begins the next fix: the oldest measurement in the queue that is of the past, or a pseudo-measurement of rest;
+    /// false if there is none.
+    #[inline]
+    fn begin_fix(&self, memory: &mut Memory, now_us: u64) -> bool {
         let newest_us = memory.covariance_us;
         let due = |at_us: u64| at_us <= newest_us || at_us > now_us.saturating_add(EARLY_US);
         let Some(measurement) = memory.queue.take(due) else {
@@ -63,12 +71,12 @@ impl Estimator {
         let at_us = measurement.at_us;
         if at_us > newest_us {
             count(&mut memory.dropped.early);
-            return None;
+            return false;
         }
         let past = memory.history.at(at_us as u32).filter(|_| newest_us - at_us <= LATE_US);
         let Some(past) = past else {
             count(&mut memory.dropped.late);
-            return None;
+            return false;
         };
         let mut parts = parts(&measurement.value);
         for part in &mut parts {
@@ -81,26 +89,28 @@ impl Estimator {
                 record.newest_us = Some(at_us);
             }
         }
-        if parts.iter().all(Option::is_none) {
-            return None;
+        let any = parts.iter().any(Option::is_some);
+        if any {
+            memory.fix = Some(Fix { at_us, past, parts, next: 0, nis: 0.0 });
         }
-        Some(Fix { at_us, past, parts, next: 0, nis: 0.0 })
+        any
     }
 
-    /// Returns a pseudo-measurement of rest if one is due: on the ground; or in the air without any aid, where it keeps
+    /// Begins a pseudo-measurement of rest if one is due: on the ground; or in the air without any aid, where it keeps
     /// roll and pitch level in the long run.
-    fn rest(&self, memory: &mut Memory) -> Option<Fix> {
+    fn rest(&self, memory: &mut Memory) -> bool {
         let at_us = memory.covariance_us;
         let unaided = !memory.aids.holds_velocity(at_us, self.coast_us);
         let sigma = if memory.on_ground { STILL_M_S } else { ALOFT_M_S };
         if !(memory.on_ground || unaided) || at_us.saturating_sub(memory.still_us) < STILL_US {
-            return None;
+            return false;
         }
         memory.still_us = at_us;
-        let past = memory.history.at(at_us as u32)?;
+        let Some(past) = memory.history.newest_raw() else { return false };
         let variance = Vector3::repeat(sigma * sigma);
         let part = Part { aid: None, target: Target::Velocity(Vector3::zeros()), variance };
-        Some(Fix { at_us, past, parts: [Some(part), None], next: 0, nis: 0.0 })
+        memory.fix = Some(Fix { at_us, past, parts: [Some(part), None], next: 0, nis: 0.0 });
+        true
     }
 
     /// Fuses the next scalar; false if the part of the fix that it belongs to is done.

@@ -111,6 +111,11 @@ impl History {
         (self.shift.velocity, self.shift.position) = (Vector3::zeros(), Vector3::zeros());
     }
 
+    /// Returns the newest entry, without corrections.
+    pub(crate) fn newest_raw(&self) -> Option<Past> {
+        self.entry(0).copied()
+    }
+
     /// Returns the newest entry, corrected.
     #[inline]
     pub(crate) fn newest(&self) -> Option<Past> {

@@ -16,9 +16,15 @@ const WAITING_MAX: usize = 8;
 pub(crate) struct Queue {
     waiting: [Option<(u32, Timed<Measurement>)>; WAITING_MAX],
     arrived: u32,
+    count: u8,
 }
 
 impl Queue {
+    /// Number of measurements.
+    pub(crate) fn waiting(&self) -> u8 {
+        self.count
+    }
+
     /// Appends; true if the oldest one had to give way.
     pub(crate) fn push(&mut self, measurement: &Timed<Measurement>) -> bool {
         let arrived = self.arrived;
@@ -30,11 +36,15 @@ impl Queue {
         let Some(place) = self.waiting.iter_mut().max_by_key(|place| age(place)) else { return false };
         let full = place.is_some();
         *place = Some((arrived, *measurement));
+        self.count += u8::from(!full);
         full
     }
 
     /// Removes and returns the oldest measurement whose time is `due`.
     pub(crate) fn take(&mut self, due: impl Fn(u64) -> bool) -> Option<Timed<Measurement>> {
+        if self.count == 0 {
+            return None;
+        }
         let arrived = self.arrived;
         let mut oldest: Option<(u32, &mut Option<(u32, Timed<Measurement>)>)> = None;
         for place in &mut self.waiting {
@@ -44,7 +54,9 @@ impl Queue {
                 oldest = Some((age, place));
             }
         }
-        oldest.and_then(|(_, place)| place.take()).map(|(_, measurement)| measurement)
+        let (_, measurement) = oldest?.1.take()?;
+        self.count -= 1;
+        Some(measurement)
     }
 }
 
