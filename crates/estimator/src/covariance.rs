@@ -9,10 +9,11 @@
 //! b       offset of the barometer                                                      [m]
 //! ```
 //!
-//! Sola's global angular error (section 7.2) rather than the local one: the attitude then has no transition of its own,
-//! a third of the prediction's cost less, the third component *is* the heading's error at any tilt, so an unknown
-//! heading stays in one state, and the error of a past attitude is that of the present one. Over an interval of T with
-//! the mean rotation R, C = R T, and S the change of velocity by specific force,
+//! This is Sola's global angular error (section 7.2) rather than the local one: the attitude then has no transition of
+//! its own, the third component *is* the heading's error at any tilt, so an unknown heading stays in one state, and the
+//! error of a past attitude is that of the present one. When the attitude is corrected, the error is turned with it
+//! ([`Covariance::turn`]), as the local one is by itself; the crate's documentation says what for. Over an interval of T
+//! with the mean rotation R, C = R T, and S the change of velocity by specific force,
 //!
 //! ```text
 //! theta' = theta - C g        v' = v - S x theta - C a        p' = p + T v

@@ -25,8 +25,8 @@ const GAP_RAD_S: f32 = 0.5;
 const GAP_M_S2: f32 = 3.0;
 /// Time for which an error of the second order lasts \[s\].
 const BENT_S: f32 = 0.7;
-/// Variances per second that a clipped sample adds, attitude and velocity.
-const CLIPPED: (f32, f32) = (0.5, 50.0);
+/// Variances per second that a clipped sample adds, attitude and velocity: 0.8 rad and 2.4 m/s for 30 ms of them.
+const CLIPPED: (f32, f32) = (20.0, 200.0);
 
 /// The estimator. Constant; what changes is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,12 +143,10 @@ impl Estimator {
         let dt_s = gap_us as u32 as f32 * 1e-6;
         if gap_us > GAP_US {
             let (turn, speed) = (GAP_RAD_S * dt_s, GAP_M_S2 * dt_s);
-            memory.rough.0 += turn * turn;
-            memory.rough.1 += speed * speed;
+            memory.roughen(sample.at_us, turn * turn, speed * speed);
         }
         if clipped {
-            memory.rough.0 += CLIPPED.0 * dt_s;
-            memory.rough.1 += CLIPPED.1 * dt_s;
+            memory.roughen(sample.at_us, CLIPPED.0 * dt_s, CLIPPED.1 * dt_s);
         }
         memory.interval.thrust += memory.nominal.advance(sample, dt_s, self.settings.gravity_m_s2);
         memory.interval.time_s += dt_s;

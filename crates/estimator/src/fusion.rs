@@ -108,7 +108,7 @@ impl Estimator {
         memory.still_us = at_us;
         let Some(past) = memory.history.newest_raw() else { return false };
         let variance = Vector3::repeat(sigma * sigma);
-        let part = Part { aid: None, target: Target::Velocity(Vector3::zeros()), variance };
+        let part = Part { aid: None, target: Target::Velocity(Vector3::zeros()), variance, rough: 0.0 };
         memory.fix = Some(Fix { at_us, past, parts: [Some(part), None], next: 0, nis: 0.0 });
         true
     }
@@ -116,9 +116,10 @@ impl Estimator {
     /// Fuses the next scalar; false if the part of the fix that it belongs to is done.
     #[inline(always)]
     fn fuse_scalar(&self, memory: &mut Memory) -> bool {
-        let Some(Fix { at_us, past, parts: [Some(part), _], next, .. }) = memory.fix else { return false };
+        let Some(Fix { at_us, past, parts: [Some(mut part), _], next, .. }) = memory.fix else { return false };
         let Some(present) = memory.history.newest() else { return false };
         let horizon = Horizon::new(&present, &memory.history.corrected(&past), self.settings.gravity_m_s2);
+        part.roughen(memory.roughened_since(at_us), horizon.tau_s());
         if next == 0 && !self.admits(memory, at_us, &part, &horizon) {
             return false;
         }
@@ -134,7 +135,7 @@ impl Estimator {
         let y = memory.covariance.times(&row);
         let hph = max(row.dot(&y), 0.0);
         let r = match &part.target {
-            Target::Field(field) => field_variance(&horizon.field(field), part.variance.x),
+            Target::Field(field) => field_variance(&horizon.field(field), part.variance.x) + part.rough,
             _ => coordinate.of(&part.variance),
         };
         let s = hph + max(r, max(LEFT * hph, ROUNDING * memory.covariance.motion_variance(&row)));
@@ -306,6 +307,10 @@ impl Estimator {
                 }
                 memory.reset_position(&(position - past.position), &part.variance, horizon.tau_s());
                 self.doubt(memory, at_us);
+                // The same tracker contradicts the attitude too.
+                if memory.aids.tracker_attitude.rejected_since_us.is_some() && aid == Aid::TrackerPosition {
+                    memory.doubt_tilt();
+                }
             }
             Target::Velocity(velocity) => {
                 memory.reset_velocity(&(velocity - past.velocity), &part.variance);

@@ -142,12 +142,7 @@ impl Horizon {
 
     fn position_row(&self, at: Coordinate, none: Row) -> Row {
         let unit = at.unit();
-        Row {
-            theta: self.distance.cross(&unit),
-            velocity: -self.tau_s,
-            position: 1.0,
-            ..none
-        }
+        Row { theta: self.distance.cross(&unit), velocity: -self.tau_s, position: 1.0, ..none }
     }
 }
 

@@ -33,6 +33,8 @@ pub struct Memory {
     pub(crate) turned: Quaternion<f32>,
     /// Variances that the next prediction adds for clipped or missing samples: attitude and velocity.
     pub(crate) rough: (f32, f32),
+    /// The same, summed up to now, and the time of the last such sample \[us\].
+    pub(crate) lately: ((f32, f32), u64),
     pub(crate) history: History,
     pub(crate) queue: Queue,
     /// The fix that is being fused.
@@ -59,6 +61,9 @@ pub(crate) struct Known {
     pub(crate) height_offset: bool,
 }
 
+/// Time for which rough samples are summed up: longer than any measurement is late \[us\].
+const LATELY_US: u64 = 300_000;
+
 /// No time.
 pub(crate) const NO_INTERVAL: Interval = Interval {
     time_s: 0.0,
@@ -81,6 +86,7 @@ impl Default for Memory {
             rotation: Matrix3::identity(),
             turned: identity(),
             rough: (0.0, 0.0),
+            lately: ((0.0, 0.0), 0),
             history: History::default(),
             queue: Queue::default(),
             fix: None,
@@ -111,6 +117,21 @@ impl Memory {
     /// holds the biases before take-off. False at the beginning.
     pub fn set_on_ground(&mut self, on_ground: bool) {
         self.on_ground = on_ground;
+    }
+
+    /// Adds variances of attitude and velocity for a sample at `at_us` that tells less than usual.
+    #[cold]
+    pub(crate) fn roughen(&mut self, at_us: u64, theta: f32, velocity: f32) {
+        self.rough = (self.rough.0 + theta, self.rough.1 + velocity);
+        let (sum, last_us) = self.lately;
+        let (before, soon) = (sum, at_us.saturating_sub(last_us) <= LATELY_US);
+        let (old_theta, old_velocity) = if soon { before } else { (0.0, 0.0) };
+        self.lately = ((old_theta + theta, old_velocity + velocity), at_us);
+    }
+
+    /// Returns the variances of attitude and velocity that such samples have added since `at_us`, at most.
+    pub(crate) fn roughened_since(&self, at_us: u64) -> (f32, f32) {
+        if at_us < self.lately.1 { self.lately.0 } else { (0.0, 0.0) }
     }
 
     /// Returns the records of the aiding sensors: normalised innovations squared, and what was fused and rejected.

@@ -45,16 +45,12 @@ impl Queue {
         if self.count == 0 {
             return None;
         }
-        let arrived = self.arrived;
-        let mut oldest: Option<(u32, &mut Option<(u32, Timed<Measurement>)>)> = None;
-        for place in &mut self.waiting {
-            let Some((number, waiting)) = place else { continue };
-            let age = arrived.wrapping_sub(*number);
-            if due(waiting.at_us) && oldest.as_ref().is_none_or(|(other, _)| age > *other) {
-                oldest = Some((age, place));
-            }
-        }
-        let (_, measurement) = oldest?.1.take()?;
+        let age = |number: u32| self.arrived.wrapping_sub(number);
+        let due = |(place, waiting): (usize, &Option<(u32, Timed<Measurement>)>)| {
+            waiting.as_ref().filter(|(_, waiting)| due(waiting.at_us)).map(|(number, _)| (age(*number), place))
+        };
+        let (_, oldest) = self.waiting.iter().enumerate().filter_map(due).max()?;
+        let (_, measurement) = self.waiting.get_mut(oldest)?.take()?;
         self.count -= 1;
         Some(measurement)
     }
@@ -67,6 +63,25 @@ pub(crate) struct Part {
     pub(crate) target: Target,
     /// Variances of its scalars; the first one of a single scalar.
     pub(crate) variance: Vector3<f32>,
+    /// Variance of a field's direction that comes on top.
+    pub(crate) rough: f32,
+}
+
+impl Part {
+    /// Adds to the variances what clipped or missing samples since the measurement have made uncertain.
+    #[inline]
+    pub(crate) fn roughen(&mut self, (theta, velocity): (f32, f32), tau_s: f32) {
+        if theta + velocity > 0.0 {
+            let more = match self.target {
+                Target::Position(_) | Target::Height(_) => velocity * tau_s * tau_s,
+                Target::Velocity(_) => velocity,
+                Target::Attitude(_) | Target::Heading(_) => theta,
+                Target::Field(_) => 0.0,
+            };
+            self.variance += Vector3::repeat(more);
+            self.rough = theta;
+        }
+    }
 }
 
 /// A measurement that is being fused, scalar by scalar.
@@ -100,7 +115,7 @@ impl Target {
 /// attitude.
 pub(crate) fn parts(measurement: &Measurement) -> [Option<Part>; 2] {
     let square = |sigma: f32, least: f32| max(sigma, least) * max(sigma, least);
-    let part = |aid, target, variance: Vector3<f32>| Some(Part { aid: Some(aid), target, variance });
+    let part = |aid, target, variance: Vector3<f32>| Some(Part { aid: Some(aid), target, variance, rough: 0.0 });
     let same = |variance: f32| Vector3::new(variance, variance, variance);
     match *measurement {
         Measurement::Pose { position_m, attitude: [w, x, y, z], position_sigma_m, attitude_sigma_rad } => {
