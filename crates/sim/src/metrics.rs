@@ -1,7 +1,7 @@
 //! Figures of merit of one flight.
 
 use crate::flight::Sample;
-use nalgebra::Vector4;
+use nalgebra::{Vector3, Vector4};
 
 /// Time from which errors are evaluated \[s\], since flights start far from the reference.
 pub const SETTLED_S: f64 = 5.0;
@@ -19,6 +19,23 @@ pub struct Metrics {
     pub final_error: Vector4<f64>,
     /// Mean |change of U| per step from [`SETTLED_S`] to the end: a measure of chatter.
     pub mean_abs_delta_u: Vector4<f64>,
+    /// How good the vehicle's own estimate was from [`SETTLED_S`] to the end; none without instruments.
+    pub estimate: Option<EstimateMetrics>,
+}
+
+/// Errors of the vehicle's own estimate: root mean squares of each coordinate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EstimateMetrics {
+    /// Position \[m\].
+    pub position_m: Vector3<f64>,
+    /// Velocity \[m/s\].
+    pub velocity_m_s: Vector3<f64>,
+    /// Rotation about the axes of the earth frame; the third is the heading \[rad\].
+    pub attitude_rad: Vector3<f64>,
+    /// Mean normalised estimation error squared of these nine; nine if the estimator is consistent.
+    pub nees: f64,
+    /// Share of the time in which the estimate was valid.
+    pub valid_ratio: f64,
 }
 
 /// Accumulates [`Metrics`] step by step.
@@ -32,6 +49,9 @@ pub struct Accumulator {
     last_error: Vector4<f64>,
     sum_abs_delta_u: Vector4<f64>,
     last_u: Option<Vector4<f64>>,
+    /// Sums of squares, and sums of the rest, of as many steps as have an estimate.
+    estimate: EstimateMetrics,
+    estimates: u64,
 }
 
 /// Returns reference minus vehicle: \[x, y, z, psi\], with the yaw error wrapped to +-pi.
@@ -71,17 +91,36 @@ impl Accumulator {
             self.changes += 1;
             self.sum_abs_delta_u += (u - last).abs();
         }
+        if let Some(estimated) = &sample.estimated {
+            let square = |error: &Vector3<f32>| error.cast::<f64>().map(|x| x * x);
+            self.estimates += 1;
+            self.estimate.position_m += square(&estimated.position_error_m);
+            self.estimate.velocity_m_s += square(&estimated.velocity_error_m_s);
+            self.estimate.attitude_rad += square(&estimated.attitude_error_rad);
+            self.estimate.nees += f64::from(estimated.nees);
+            self.estimate.valid_ratio += f64::from(u8::from(estimated.valid));
+        }
     }
 
     /// Returns the metrics so far; zero where there was nothing to measure.
     pub fn finish(&self) -> Metrics {
         let mean = |sum: Vector4<f64>, count: u64| if count == 0 { sum } else { sum / count as f64 };
+        let EstimateMetrics { position_m, velocity_m_s, attitude_rad, nees, valid_ratio } = self.estimate;
+        let count = self.estimates as f64;
+        let root = |sum: Vector3<f64>| (sum / count).map(libm::sqrt);
         Metrics {
             rmse: mean(self.sum_squares, self.errors).map(libm::sqrt),
             max_abs: self.max_abs,
             max_distance_m: self.max_distance_m,
             final_error: self.last_error,
             mean_abs_delta_u: mean(self.sum_abs_delta_u, self.changes),
+            estimate: (self.estimates > 0).then(|| EstimateMetrics {
+                position_m: root(position_m),
+                velocity_m_s: root(velocity_m_s),
+                attitude_rad: root(attitude_rad),
+                nees: nees / count,
+                valid_ratio: valid_ratio / count,
+            }),
         }
     }
 }

@@ -1,20 +1,24 @@
 //! Lockstep flights: measure, decide, observe, move the vehicle, once per step.
 //!
-//! A [`World`] has the plant, its disturbances and its sensors. A [`Pilot`] reads the sensors and commands the rotors:
+//! A [`World`] has the plant, its disturbances and its sensors; a vehicle with an inertial sensor estimates its state
+//! itself, by the estimator that flies on board. A [`Pilot`] reads the sensors and commands the rotors:
 //! a law [`Alone`], the flight core with a law inside ([`Aboard`]), or the firmware at the other end of a link
 //! ([`crate::in_the_loop`]). [`lockstep`] is the loop around both.
 
 mod aboard;
 mod alone;
 mod contender;
+mod estimation;
 mod lockstep;
 mod pilot;
 mod sample;
+mod told;
 mod world;
 
 pub use aboard::Aboard;
 pub use alone::Alone;
 pub use contender::fly;
+pub use estimation::{CARRIED_S, Estimated, REST_S};
 pub use lockstep::{End, LOST_DISTANCE_M, Lost, lockstep};
 pub use pilot::Pilot;
 pub use sample::Sample;

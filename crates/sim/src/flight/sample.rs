@@ -1,5 +1,6 @@
 //! Record of one step of a flight.
 
+use super::estimation::Estimated;
 use crate::trajectory::Reference;
 use afbc_control::{Action, Estimate, Trace};
 use afbc_plant::{Measurement, Motion, Telemetry};
@@ -14,6 +15,8 @@ pub struct Sample {
     pub motion: Motion,
     /// Measurement by the sensors; none if they are perfect.
     pub measurement: Option<Measurement>,
+    /// The vehicle's own estimate against the truth; none without instruments.
+    pub estimated: Option<Estimated>,
     /// State of rotors, air and ground after the previous step; none for an ideal plant.
     pub telemetry: Option<Telemetry>,
     /// Reference at this time.

@@ -1,5 +1,6 @@
 //! The plant with its disturbances and sensors.
 
+use super::estimation::{Estimated, Navigator};
 use super::sample::Sample;
 use crate::scenario::{Outage, Scenario};
 use crate::trajectory::{Reference, Trajectory};
@@ -10,6 +11,8 @@ use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX, RotorSpeeds, State};
 /// Plant, sensors, link and reference of a scenario.
 pub struct World {
     plant: Plant,
+    /// What the vehicle flies on if it has an inertial sensor; the sensors otherwise.
+    navigator: Option<Box<Navigator>>,
     sensors: Option<Sensors>,
     faults: SensorFaults,
     outages: Vec<Outage>,
@@ -26,6 +29,8 @@ pub struct View {
     pub motion: Motion,
     /// Measurement by the sensors; none if they are perfect.
     pub measurement: Option<Measurement>,
+    /// The vehicle's own estimate against the truth; none without instruments.
+    pub estimated: Option<Estimated>,
     /// State of rotors, air and ground after the previous step; none for an ideal plant.
     pub telemetry: Option<Telemetry>,
     /// Reference at this time.
@@ -42,8 +47,10 @@ impl World {
     /// # Errors
     /// The first setting of plant or sensors out of range.
     pub fn new(scenario: &Scenario, dt_s: f64) -> Result<Self, OutOfRange> {
+        let plant = scenario.plant(dt_s)?;
         Ok(World {
-            plant: scenario.plant(dt_s)?,
+            navigator: Navigator::new(scenario, dt_s, &plant.truth())?,
+            plant,
             sensors: scenario.sensors(dt_s)?,
             faults: SensorFaults::new(&scenario.sensor_faults),
             outages: scenario.outages.clone(),
@@ -63,6 +70,9 @@ impl World {
     pub fn look(&mut self) -> View {
         let time_s = self.plant.time_s();
         let motion = self.plant.motion();
+        if let Some(navigator) = &mut self.navigator {
+            return navigated(navigator, &self.plant, self.trajectory.at(time_s));
+        }
         let (state, measurement) = match &mut self.sensors {
             None => (Some(motion.measure()), None),
             Some(sensors) => measure(sensors, &self.faults.seen(&motion, time_s)),
@@ -71,7 +81,8 @@ impl World {
         let lost = !self.outages.is_empty() && is_lost(&self.outages, time_s);
         let telemetry = self.plant.telemetry();
         let new = measurement.is_none_or(|measurement| measurement.new);
-        View { time_s, motion, measurement, telemetry, reference, state: state.filter(|_| !lost), new }
+        let state = state.filter(|_| !lost);
+        View { time_s, motion, measurement, estimated: None, telemetry, reference, state, new }
     }
 
     /// Moves the vehicle by one step with commanded rotor speeds `speeds`.
@@ -85,9 +96,19 @@ impl View {
     /// Returns the sample of this view and a pilot's output.
     #[inline(always)]
     pub fn sample<const N: usize>(self, action: Action<N>, trace: Trace, estimates: PerAxis<Estimate>) -> Sample {
-        let View { time_s, motion, measurement, telemetry, reference, .. } = self;
-        Sample { time_s, motion, measurement, telemetry, reference, action: action.padded(), trace, estimates }
+        let View { time_s, motion, measurement, estimated, telemetry, reference, .. } = self;
+        let action = action.padded();
+        Sample { time_s, motion, measurement, estimated, telemetry, reference, action, trace, estimates }
     }
+}
+
+/// Looks at the world with the vehicle's own instruments.
+// Not inlined, so that the step of an ideal flight stays short.
+#[inline(never)]
+fn navigated(navigator: &mut Navigator, plant: &Plant, reference: Reference) -> View {
+    let (time_s, motion, telemetry) = (plant.time_s(), plant.motion(), plant.telemetry());
+    let (state, estimated) = navigator.look(&plant.truth());
+    View { time_s, motion, measurement: None, estimated: Some(estimated), telemetry, reference, state, new: true }
 }
 
 /// True if a state sent at `time_s` is lost in an outage.

@@ -4,6 +4,7 @@ use crate::case::Case;
 use crate::contender::{Contender, ControllerKind};
 use crate::trajectory::Trajectory;
 use afbc::Profile;
+use afbc_estimator::Settings;
 use afbc_flight_core::ArmingLimits;
 use afbc_plant::instruments::{Imu, InstrumentFault, Mounting};
 use afbc_plant::{
@@ -20,6 +21,9 @@ pub const DURATION: Range = Range::new("duration_s", 0.1, 36_000.0);
 /// Accepted roll and pitch of a vehicle to be armed by the flight core \[rad\].
 const ARMING_TILT: Range = Range::new("attitude_rad", -TILT_MAX, TILT_MAX);
 const TILT_MAX: f64 = ArmingLimits::TILT_MAX.range.max;
+
+/// Accepted roll and pitch at the start of a vehicle that estimates its state, which levels itself there \[rad\].
+const LEVEL: Range = Range::new("attitude_rad", -0.8, 0.8);
 
 /// An interval in which no state arrives, since the link is down.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,6 +118,7 @@ impl Scenario {
     /// The first parameter, gain or setting out of range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         self.check_flight_core()?;
+        self.check_estimator()?;
         self.contenders.iter().try_for_each(|contender| {
             contender.check(&self.vehicle, &self.rotors)?;
             self.plant(contender.step_s())?;
@@ -132,6 +137,22 @@ impl Scenario {
         }
         ARMING_TILT.check(self.initial.attitude_rad.x)?;
         ARMING_TILT.check(self.initial.attitude_rad.y)?;
+        self.contenders
+            .iter()
+            .try_for_each(|contender| afbc_flight_core::tick::DT.check(contender.settings.common.dt_s))
+    }
+
+    /// Checks, if the vehicle has an inertial sensor, whether its estimator can fly it.
+    ///
+    /// # Errors
+    /// The first time step, tilt or gravity out of range.
+    fn check_estimator(&self) -> Result<(), OutOfRange> {
+        if self.instruments.imu.is_none() {
+            return Ok(());
+        }
+        Settings::GRAVITY.range.check(self.vehicle.gravity_m_s2)?;
+        LEVEL.check(self.initial.attitude_rad.x)?;
+        LEVEL.check(self.initial.attitude_rad.y)?;
         self.contenders
             .iter()
             .try_for_each(|contender| afbc_flight_core::tick::DT.check(contender.settings.common.dt_s))

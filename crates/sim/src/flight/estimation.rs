@@ -1,0 +1,205 @@
+//! The vehicle's own estimate: instruments, the conversion of what they read, and the estimator.
+
+use super::told::{self, Calibration};
+use crate::scenario::{Outage, Scenario};
+use afbc_estimator::{Estimate, Estimator, Memory};
+use afbc_plant::instruments::{Imu, Mounting};
+use afbc_plant::{Instruments, Suite, Truth};
+use afbc_types::{OutOfRange, State};
+use nalgebra::{Quaternion, SMatrix, SVector, Vector3};
+
+/// Time before t = 0 for which a vehicle stands at rest in the attitude of its start, its rotors still, while the
+/// estimator levels itself, finds the gyroscope's bias and hears the other instruments \[s\].
+pub const REST_S: f64 = 2.0;
+/// Time after that in which it is carried to its start, and accelerated to the velocity there \[s\].
+pub const CARRIED_S: f64 = 1.0;
+
+/// Steps between two evaluations of [`Estimated::nees`], which costs as much as the estimator.
+const NEES_EVERY: u64 = 10;
+
+/// An estimate against the truth of the same time. Each error is truth less estimate; rotations are about the axes of
+/// the earth frame, as are their standard deviations.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimated {
+    /// Error of the position \[m\].
+    pub position_error_m: Vector3<f32>,
+    /// Its standard deviation, as the estimator states it \[m\].
+    pub position_sigma_m: Vector3<f32>,
+    /// Error of the velocity \[m/s\].
+    pub velocity_error_m_s: Vector3<f32>,
+    /// Its standard deviation \[m/s\].
+    pub velocity_sigma_m_s: Vector3<f32>,
+    /// Error of the attitude, a rotation vector \[rad\].
+    pub attitude_error_rad: Vector3<f32>,
+    /// Its standard deviation \[rad\].
+    pub attitude_sigma_rad: Vector3<f32>,
+    /// Normalised estimation error squared of these nine, e^T P^-1 e: nine on the average if the estimator is
+    /// consistent. That of the last multiple of 10 ms.
+    pub nees: f32,
+    /// True if attitude, heading, velocity and position are valid: the pilot has the state.
+    pub valid: bool,
+}
+
+/// Instruments and estimator of a vehicle.
+pub(super) struct Navigator {
+    instruments: Instruments,
+    suite: Suite,
+    calibration: Calibration,
+    estimator: Estimator,
+    memory: Memory,
+    outages: Vec<Outage>,
+    step_s: f64,
+    /// Steps since the beginning of settling, and how many of these there are before t = 0.
+    steps: u64,
+    settling: u64,
+    /// Time and result of the last look \[s\].
+    last: Option<(f64, Option<State>, Estimated)>,
+}
+
+impl Navigator {
+    /// Creates the one of `scenario`, if it has an inertial sensor, which has settled in `truth`.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub(super) fn new(scenario: &Scenario, step_s: f64, truth: &Truth) -> Result<Option<Box<Self>>, OutOfRange> {
+        let (Some(imu), Some(instruments)) = (scenario.instruments.imu, scenario.instruments(step_s)?) else {
+            return Ok(None);
+        };
+        let mounting = scenario.vehicle_file.as_ref().map_or(Mounting::DEFAULT, |file| file.imu);
+        let mut navigator = Box::new(Navigator {
+            instruments,
+            suite: scenario.instruments,
+            calibration: Calibration::new(&mounting, step_s),
+            estimator: estimator(scenario, &imu, step_s)?,
+            memory: Memory::default(),
+            outages: scenario.outages.clone(),
+            step_s,
+            steps: 0,
+            settling: ((REST_S + CARRIED_S) / step_s).round() as u64,
+            last: None,
+        });
+        navigator.settle(truth);
+        Ok(Some(navigator))
+    }
+
+    /// Lets the vehicle stand at rest, and carries it to its start.
+    fn settle(&mut self, start: &Truth) {
+        let carried = Truth {
+            rates_rad_s: Vector3::zeros(),
+            angular_acceleration_rad_s2: Vector3::zeros(),
+            rotor_speeds_rad_s: start.rotor_speeds_rad_s * 0.0,
+            thrust_share: 0.0,
+            ..*start
+        };
+        for step in 0..self.settling {
+            let time_s = (step as f64 - self.settling as f64) * self.step_s;
+            // Time for which it has been accelerated.
+            let moving_s = (time_s + CARRIED_S).max(0.0);
+            let rests = moving_s == 0.0;
+            let acceleration = start.velocity_m_s * if rests { 0.0 } else { 1.0 / CARRIED_S };
+            let still_m = start.position_m - start.velocity_m_s * (0.5 * CARRIED_S);
+            self.memory.set_on_ground(rests);
+            let _ = self.step(&Truth {
+                time_s,
+                position_m: still_m + acceleration * (0.5 * moving_s * moving_s),
+                velocity_m_s: acceleration * moving_s,
+                acceleration_m_s2: acceleration,
+                ..carried
+            });
+        }
+        self.memory.set_on_ground(false);
+    }
+
+    /// Returns the state for the pilot, none while it is not valid, and how good it is. The same again as long as the
+    /// vehicle is held.
+    pub(super) fn look(&mut self, truth: &Truth) -> (Option<State>, Estimated) {
+        if let Some((time_s, state, estimated)) = self.last
+            && time_s == truth.time_s
+        {
+            return (state, estimated);
+        }
+        let estimate = self.step(truth);
+        let validity = &estimate.validity;
+        let valid = validity.attitude && validity.heading && validity.velocity && validity.position;
+        let nees = match self.last {
+            Some((_, _, last)) if self.steps % NEES_EVERY != 0 => last.nees,
+            _ => self.nees(&estimate, truth) as f32,
+        };
+        let errors = errors(&estimate, truth).cast::<f32>();
+        let part = |i: usize| Vector3::from(errors.fixed_rows::<3>(i));
+        let estimated = Estimated {
+            attitude_error_rad: part(0),
+            attitude_sigma_rad: estimate.sigmas.attitude_rad,
+            velocity_error_m_s: part(3),
+            velocity_sigma_m_s: estimate.sigmas.velocity_m_s,
+            position_error_m: part(6),
+            position_sigma_m: estimate.sigmas.position_m,
+            nees,
+            valid,
+        };
+        let state = valid.then_some(estimate.state);
+        self.last = Some((truth.time_s, state, estimated));
+        (state, estimated)
+    }
+
+    /// Reads the instruments and runs the estimator.
+    fn step(&mut self, truth: &Truth) -> Estimate {
+        let readings = self.instruments.measure(truth);
+        let (settling, step_s) = (self.settling as f64, self.step_s);
+        // The estimator's clock begins a step before settling: no time of it is zero.
+        let at_us = |time_s: f64| ((time_s + (settling + 1.0) * step_s) * 1e6).round().max(0.0) as u64;
+        let Navigator { memory, suite, .. } = self;
+        // The tracker is on the ground: what it sends in an outage of the link is lost.
+        let heard = !self.outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&truth.time_s));
+        if let Some(tracker) = suite.tracker.filter(|_| heard) {
+            readings.tracker.iter().for_each(|fix| memory.offer(&told::pose(fix, &tracker, at_us)));
+        }
+        readings.gnss.iter().for_each(|fix| memory.offer(&told::gnss(fix, at_us)));
+        if let Some(barometer) = suite.barometer {
+            readings.barometer.iter().for_each(|fix| memory.offer(&told::height(fix, &barometer, at_us)));
+        }
+        if let Some(magnetometer) = suite.magnetometer {
+            readings.magnetometer.iter().for_each(|fix| memory.offer(&told::field(fix, &magnetometer, at_us)));
+        }
+        let sample = readings.imu.map(|reading| self.calibration.sample(&reading, at_us(reading.at_s)));
+        self.steps += 1;
+        self.estimator.step(&mut self.memory, at_us(truth.time_s), sample.as_ref())
+    }
+
+    /// Returns the normalised estimation error squared of rotation, velocity and position; not a number if the
+    /// covariance is not positive.
+    fn nees(&self, estimate: &Estimate, truth: &Truth) -> f64 {
+        let rows = self.memory.covariance();
+        let at = |i: usize, j: usize| rows.get(i).and_then(|row| row.get(j)).map_or(f64::NAN, |&cell| f64::from(cell));
+        // Scaled, so that units do not matter.
+        let scale = SVector::<f64, 9>::from_fn(|i, _| libm::sqrt(at(i, i)));
+        let correlation = SMatrix::<f64, 9, 9>::from_fn(|i, j| at(i, j) / (scale[i] * scale[j]));
+        let e = errors(estimate, truth).component_div(&scale);
+        correlation.cholesky().map_or(f64::NAN, |factor| factor.solve(&e).dot(&e))
+    }
+}
+
+/// Returns the estimator for the instruments of `scenario`.
+///
+/// # Errors
+/// The first setting out of range.
+pub(super) fn estimator(scenario: &Scenario, imu: &Imu, step_s: f64) -> Result<Estimator, OutOfRange> {
+    let gravity_m_s2 = scenario.vehicle.gravity_m_s2;
+    Estimator::new(told::settings(&scenario.instruments, imu, scenario.rotors.len(), gravity_m_s2, step_s))
+}
+
+/// Truth less estimate, in the order of the covariance: rotation about the axes of the earth frame \[rad\], velocity
+/// \[m/s\], position \[m\].
+fn errors(estimate: &Estimate, truth: &Truth) -> SVector<f64, 9> {
+    let [w, x, y, z] = estimate.attitude.map(f64::from);
+    let turn = truth.attitude * Quaternion::new(w, -x, -y, -z);
+    let turn = if turn.w < 0.0 { -turn } else { turn };
+    let sine = turn.vector().norm();
+    // angle/sin(angle/2), whose limit is 2.
+    let per_sine = if sine > 1e-9 { 2.0 * libm::atan2(sine, turn.w) / sine } else { 2.0 };
+    let mut errors = SVector::<f64, 9>::zeros();
+    errors.fixed_rows_mut::<3>(0).copy_from(&(turn.vector() * per_sine));
+    errors.fixed_rows_mut::<3>(3).copy_from(&(truth.velocity_m_s - estimate.state.velocity_m_s.cast()));
+    errors.fixed_rows_mut::<3>(6).copy_from(&(truth.position_m - estimate.state.position_m.cast()));
+    errors
+}

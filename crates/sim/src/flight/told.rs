@@ -1,0 +1,161 @@
+//! What an estimator is told of its instruments: settings and measurements.
+//!
+//! A vehicle's software knows the data sheets of its parts and how they are mounted, not what was drawn for this
+//! flight: bias, scale, hard iron, slow errors of a receiver.
+
+use afbc_estimator::{ImuSample, Measurement, Settings, Timed};
+use afbc_plant::Suite;
+use afbc_plant::instruments::{
+    Barometer, FieldFix, GnssFix, HeightFix, Imu, ImuReading, Magnetometer, Mounting, Tracker, TrackerFix,
+};
+use nalgebra::{Matrix3, Vector3};
+
+/// Rate and specific force at which errors of scale and alignment count, each for a second: those of brisk flight.
+const BRISK_RAD_S: f64 = 0.5;
+const BRISK_M_S2: f64 = 2.0;
+/// Speed at which the noise of a tracker's stamps counts \[m/s\].
+const STAMPED_M_S: f64 = 1.0;
+/// Time for which an error of a magnetometer that turns with the vehicle counts as the same \[s\].
+const IRON_S: f64 = 1.0;
+/// Smallest standard deviation that is told, in the unit of each.
+const SIGMA_MIN: f64 = 1e-4;
+
+/// Root of the sum of squares.
+fn root(parts: &[f64]) -> f64 {
+    libm::sqrt(parts.iter().map(|part| part * part).sum())
+}
+
+/// Error of quantisation.
+fn step(lsb: f64) -> f64 {
+    lsb / libm::sqrt(12.0)
+}
+
+/// Root mean square of the vibration of `rotors` in hover, if the first harmonic of one has this amplitude.
+fn vibration(amplitude: f64, imu: &Imu, rotors: usize) -> f64 {
+    amplitude * libm::sqrt(0.5 * rotors as f64) * imu.harmonics.norm()
+}
+
+/// Returns the settings for these instruments on a vehicle of so many rotors, if their samples are `step_s` apart.
+///
+/// Densities of data sheets are one-sided: a random walk grows with half their square. Vibration counts as if it were
+/// white: less than that in the long run, as much over a period.
+pub(super) fn settings(suite: &Suite, imu: &Imu, rotors: usize, gravity_m_s2: f64, step_s: f64) -> Settings {
+    let per_root_s = libm::sqrt(step_s);
+    let Imu { gyro, accel, .. } = imu;
+    let gyro_noise = root(&[
+        gyro.noise_rad_s_rthz / libm::sqrt(2.0),
+        step(gyro.lsb_rad_s) * per_root_s,
+        vibration(gyro.vibration_rad_s, imu, rotors) * per_root_s,
+        root(&[gyro.scale, gyro.misalignment_rad]) * BRISK_RAD_S,
+    ]);
+    let accel_noise = root(&[
+        accel.noise_m_s2_rthz / libm::sqrt(2.0),
+        step(accel.lsb_m_s2) * per_root_s,
+        vibration(accel.vibration_m_s2, imu, rotors) * per_root_s,
+        root(&[accel.scale, accel.misalignment_rad]) * BRISK_M_S2,
+    ]);
+    // What a Gauss-Markov process adds per root of a second.
+    let markov = |sigma: f64, time_s: f64| sigma * libm::sqrt(2.0 / time_s);
+    let gyro_walk = root(&[gyro.walk_rad_s2_rthz, markov(gyro.instability_rad_s, gyro.instability_time_s)]);
+    let accel_walk = root(&[accel.walk_m_s3_rthz, markov(accel.instability_m_s2, accel.instability_time_s)]);
+    let accel_bias = root(&[accel.bias_m_s2, accel.instability_m_s2, accel.scale * gravity_m_s2]);
+    let accel_bias = root(&[accel_bias, accel.misalignment_rad * gravity_m_s2]);
+    let drift = suite.barometer.map_or(0.0, |it| markov(it.drift_m, it.drift_time_s));
+    let range = |range: f64, most: f64| if range > 0.0 { range.min(most) as f32 } else { most as f32 };
+    // A perfect sensor at rest says the same again and again.
+    let is_noisy = |noise: f64, lsb: f64| noise > 0.0 && noise / per_root_s > lsb;
+    let moves = is_noisy(gyro.noise_rad_s_rthz, gyro.lsb_rad_s) || is_noisy(accel.noise_m_s2_rthz, accel.lsb_m_s2);
+    let most = |value: f64, low: f64, high: f64| value.clamp(low, high) as f32;
+    Settings {
+        gravity_m_s2: gravity_m_s2 as f32,
+        gyro_noise_rad_s_rthz: most(gyro_noise, 1e-5, 0.1),
+        accel_noise_m_s2_rthz: most(accel_noise, 1e-4, 1.0),
+        gyro_walk_rad_s_rts: most(gyro_walk, 1e-6, 0.01),
+        accel_walk_m_s2_rts: most(accel_walk, 1e-5, 0.1),
+        accel_bias_m_s2: most(accel_bias, 1e-3, 1.0),
+        gyro_bias_max_rad_s: most(5.0 * gyro.bias_rad_s, 0.35, 1.0),
+        baro_walk_m_rts: most(drift, 1e-4, 1.0),
+        declination_rad: suite.magnetometer.map_or(0.0, |it| it.declination_rad.clamp(-3.2, 3.2)) as f32,
+        gyro_range_rad_s: range(gyro.range_rad_s, 100.0),
+        accel_range_m_s2: range(accel.range_m_s2, 1000.0),
+        stuck_s: if moves { Settings::DEFAULT.stuck_s } else { 0.0 },
+        ..Settings::DEFAULT
+    }
+}
+
+/// The calibration of a mounted inertial sensor.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Calibration {
+    /// Sensor to body axes.
+    to_body: Matrix3<f64>,
+    position_m: Vector3<f64>,
+    step_s: f64,
+    /// Rates of the last sample, body frame \[rad/s\].
+    last: Option<Vector3<f64>>,
+}
+
+impl Calibration {
+    pub(super) fn new(mounting: &Mounting, step_s: f64) -> Self {
+        let columns = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| mounting.to_body(&axis));
+        let to_body = Matrix3::from_columns(&columns);
+        Calibration { to_body, position_m: mounting.position_m, step_s, last: None }
+    }
+
+    /// Returns rates and the specific force of the centre of mass, body frame: what the sensor feels less
+    /// d omega/dt x r + omega x (omega x r), with the derivative from the last sample to this one.
+    pub(super) fn sample(&mut self, reading: &ImuReading, at_us: u64) -> ImuSample {
+        let omega = self.to_body * reading.rates_rad_s;
+        let change = self.last.replace(omega).map_or(Vector3::zeros(), |last| (omega - last) / self.step_s);
+        let r = &self.position_m;
+        let force = self.to_body * reading.specific_force_m_s2 - change.cross(r) - omega.cross(&omega.cross(r));
+        ImuSample { at_us, rates_rad_s: omega.cast(), specific_force_m_s2: force.cast() }
+    }
+}
+
+/// Tells a value of `time_s` on the clock that `at_us` converts to.
+fn timed(value: Measurement, time_s: f64, at_us: impl Fn(f64) -> u64) -> Timed<Measurement> {
+    Timed { value, at_us: at_us(time_s) }
+}
+
+fn sigma(parts: &[f64]) -> f32 {
+    root(parts).max(SIGMA_MIN) as f32
+}
+
+/// Tells a pose.
+pub(super) fn pose(fix: &TrackerFix, tracker: &Tracker, at_us: impl Fn(f64) -> u64) -> Timed<Measurement> {
+    let q = fix.attitude.coords;
+    let value = Measurement::Pose {
+        position_m: fix.position_m.cast(),
+        attitude: [q.w, q.x, q.y, q.z].map(|part| part as f32),
+        position_sigma_m: sigma(&[tracker.position_m, tracker.stamp_noise_s * STAMPED_M_S]),
+        attitude_sigma_rad: sigma(&[tracker.attitude_rad]).max(1e-3),
+    };
+    timed(value, fix.true_at_s, at_us)
+}
+
+/// Tells a fix, as good as the receiver says.
+pub(super) fn gnss(fix: &GnssFix, at_us: impl Fn(f64) -> u64) -> Timed<Measurement> {
+    let value = Measurement::Gnss {
+        position_m: fix.position_m.cast(),
+        velocity_m_s: fix.velocity_m_s.cast(),
+        horizontal_sigma_m: sigma(&[fix.horizontal_sigma_m]),
+        vertical_sigma_m: sigma(&[fix.vertical_sigma_m]),
+        speed_sigma_m_s: sigma(&[fix.velocity_sigma_m_s]).max(1e-3),
+    };
+    timed(value, fix.true_at_s, at_us)
+}
+
+/// Tells a height.
+pub(super) fn height(fix: &HeightFix, barometer: &Barometer, at_us: impl Fn(f64) -> u64) -> Timed<Measurement> {
+    let sigma_m = sigma(&[barometer.noise_m, step(barometer.lsb_m)]);
+    timed(Measurement::Height { height_m: fix.height_m as f32, sigma_m }, fix.true_at_s, at_us)
+}
+
+/// Tells a field. Hard and soft iron and the motors' field are the same from one measurement to the next, so that they
+/// count as the noise that averages to as much over [`IRON_S`].
+pub(super) fn field(fix: &FieldFix, part: &Magnetometer, at_us: impl Fn(f64) -> u64) -> Timed<Measurement> {
+    let iron = root(&[part.hard_iron_ut, part.soft_iron * part.strength_ut, part.motor_ut.amax()]);
+    let repeated = libm::sqrt((part.rate_hz * IRON_S).max(1.0));
+    let sigma = sigma(&[part.noise_ut, step(part.lsb_ut), iron * repeated]);
+    timed(Measurement::MagneticField { field: fix.field_ut.cast(), sigma }, fix.true_at_s, at_us)
+}
