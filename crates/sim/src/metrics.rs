@@ -1,6 +1,7 @@
 //! Figures of merit of one flight.
 
-use crate::flight::Sample;
+use crate::flight::{Innovation, Sample};
+use afbc_estimator::Aid;
 use nalgebra::{Vector3, Vector4};
 
 /// Time from which errors are evaluated \[s\], since flights start far from the reference.
@@ -36,6 +37,21 @@ pub struct EstimateMetrics {
     pub nees: f64,
     /// Share of the time in which the estimate was valid.
     pub valid_ratio: f64,
+    /// How the measurements agreed with it, in the order of [`Aid::ALL`].
+    pub aids: [AidMetrics; Aid::ALL.len()],
+}
+
+/// How the measurements of one kind agreed with the estimate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AidMetrics {
+    /// Number of measurements fused.
+    pub fused: u64,
+    /// Number of their scalars.
+    pub scalars: u64,
+    /// Number of measurements that the gate rejected.
+    pub rejected: u64,
+    /// Mean normalised innovation squared per scalar of those fused; one if both are consistent.
+    pub nis: f64,
 }
 
 /// Accumulates [`Metrics`] step by step.
@@ -99,13 +115,26 @@ impl Accumulator {
             self.estimate.attitude_rad += square(&estimated.attitude_error_rad);
             self.estimate.nees += f64::from(estimated.nees);
             self.estimate.valid_ratio += f64::from(u8::from(estimated.valid));
+            estimated.innovation.iter().for_each(|innovation| self.add_innovation(innovation));
+        }
+    }
+
+    fn add_innovation(&mut self, innovation: &Innovation) {
+        let of_aid = Aid::ALL.iter().zip(&mut self.estimate.aids).find(|(aid, _)| **aid == innovation.aid);
+        let Some((_, metrics)) = of_aid else { return };
+        if innovation.fused {
+            metrics.fused += 1;
+            metrics.scalars += u64::from(innovation.scalars);
+            metrics.nis += f64::from(innovation.nis);
+        } else {
+            metrics.rejected += 1;
         }
     }
 
     /// Returns the metrics so far; zero where there was nothing to measure.
     pub fn finish(&self) -> Metrics {
         let mean = |sum: Vector4<f64>, count: u64| if count == 0 { sum } else { sum / count as f64 };
-        let EstimateMetrics { position_m, velocity_m_s, attitude_rad, nees, valid_ratio } = self.estimate;
+        let EstimateMetrics { position_m, velocity_m_s, attitude_rad, nees, valid_ratio, aids } = self.estimate;
         let count = self.estimates as f64;
         let root = |sum: Vector3<f64>| (sum / count).map(libm::sqrt);
         Metrics {
@@ -120,6 +149,7 @@ impl Accumulator {
                 attitude_rad: root(attitude_rad),
                 nees: nees / count,
                 valid_ratio: valid_ratio / count,
+                aids: aids.map(|aid| AidMetrics { nis: aid.nis / aid.scalars.max(1) as f64, ..aid }),
             }),
         }
     }

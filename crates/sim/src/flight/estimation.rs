@@ -2,7 +2,7 @@
 
 use super::told::{self, Calibration};
 use crate::scenario::{Outage, Scenario};
-use afbc_estimator::{Estimate, Estimator, Memory};
+use afbc_estimator::{Aid, Estimate, Estimator, Memory};
 use afbc_plant::instruments::{Imu, Mounting};
 use afbc_plant::{Instruments, Suite, Truth};
 use afbc_types::{OutOfRange, State};
@@ -38,6 +38,21 @@ pub struct Estimated {
     pub nees: f32,
     /// True if attitude, heading, velocity and position are valid: the pilot has the state.
     pub valid: bool,
+    /// The measurement that was judged in this step, if there was one.
+    pub innovation: Option<Innovation>,
+}
+
+/// How a measurement agreed with the estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Innovation {
+    /// What it tells.
+    pub aid: Aid,
+    /// Normalised innovation squared, the sum over its scalars: as many as these on the average if both are consistent.
+    pub nis: f32,
+    /// Number of scalars.
+    pub scalars: u8,
+    /// Whether it was fused; the gate rejected it otherwise.
+    pub fused: bool,
 }
 
 /// Instruments and estimator of a vehicle.
@@ -118,6 +133,7 @@ impl Navigator {
         {
             return (state, estimated);
         }
+        let judged = self.judged();
         let estimate = self.step(truth);
         let validity = &estimate.validity;
         let valid = validity.attitude && validity.heading && validity.velocity && validity.position;
@@ -136,10 +152,28 @@ impl Navigator {
             position_sigma_m: estimate.sigmas.position_m,
             nees,
             valid,
+            innovation: self.innovation(&judged),
         };
         let state = valid.then_some(estimate.state);
         self.last = Some((truth.time_s, state, estimated));
         (state, estimated)
+    }
+
+    /// Returns the numbers of measurements fused and rejected, by aid.
+    fn judged(&self) -> [(u32, u32); Aid::ALL.len()] {
+        Aid::ALL.map(|aid| self.memory.aids().of(aid)).map(|record| (record.accepted, record.rejected))
+    }
+
+    /// Returns the measurement that was judged since these were `before`. The filter judges one in a step; if it ever
+    /// were two, the first counts.
+    fn innovation(&self, before: &[(u32, u32); Aid::ALL.len()]) -> Option<Innovation> {
+        let (aid, (accepted, _)) = Aid::ALL.into_iter().zip(before).find(|(aid, (accepted, rejected))| {
+            let record = self.memory.aids().of(*aid);
+            (record.accepted, record.rejected) != (*accepted, *rejected)
+        })?;
+        let record = self.memory.aids().of(aid);
+        let fused = record.accepted != *accepted;
+        Some(Innovation { aid, nis: record.nis, scalars: record.scalars, fused })
     }
 
     /// Reads the instruments and runs the estimator.

@@ -18,7 +18,7 @@ mod world;
 pub use aboard::Aboard;
 pub use alone::Alone;
 pub use contender::fly;
-pub use estimation::{CARRIED_S, Estimated, REST_S};
+pub use estimation::{CARRIED_S, Estimated, Innovation, REST_S};
 pub use lockstep::{End, LOST_DISTANCE_M, Lost, lockstep};
 pub use pilot::Pilot;
 pub use sample::Sample;

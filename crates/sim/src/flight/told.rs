@@ -10,9 +10,11 @@ use afbc_plant::instruments::{
 };
 use nalgebra::{Matrix3, Vector3};
 
-/// Rate and specific force at which errors of scale and alignment count, each for a second: those of brisk flight.
-const BRISK_RAD_S: f64 = 0.5;
-const BRISK_M_S2: f64 = 2.0;
+/// Rate and acceleration at which errors of scale and alignment count, each for a second.
+const TURNING_RAD_S: f64 = 0.2;
+const SPEEDING_M_S2: f64 = 1.0;
+/// Share of the vibration that counts as white noise: what the errors of a hundred flights ask for.
+const SHAKEN: f64 = 0.55;
 /// Speed at which the noise of a tracker's stamps counts \[m/s\].
 const STAMPED_M_S: f64 = 1.0;
 /// Time for which an error of a magnetometer that turns with the vehicle counts as the same \[s\].
@@ -30,15 +32,15 @@ fn step(lsb: f64) -> f64 {
     lsb / libm::sqrt(12.0)
 }
 
-/// Root mean square of the vibration of `rotors` in hover, if the first harmonic of one has this amplitude.
+/// Vibration of `rotors` in hover that counts, root mean square, if the first harmonic of one has this amplitude.
 fn vibration(amplitude: f64, imu: &Imu, rotors: usize) -> f64 {
-    amplitude * libm::sqrt(0.5 * rotors as f64) * imu.harmonics.norm()
+    SHAKEN * amplitude * libm::sqrt(0.5 * rotors as f64) * imu.harmonics.norm()
 }
 
 /// Returns the settings for these instruments on a vehicle of so many rotors, if their samples are `step_s` apart.
 ///
-/// Densities of data sheets are one-sided: a random walk grows with half their square. Vibration counts as if it were
-/// white: less than that in the long run, as much over a period.
+/// Densities of data sheets are one-sided: a random walk grows with half their square. Vibration is bounded, but
+/// to a filter that is corrected every few of its periods it is like a random walk, of a share of it.
 pub(super) fn settings(suite: &Suite, imu: &Imu, rotors: usize, gravity_m_s2: f64, step_s: f64) -> Settings {
     let per_root_s = libm::sqrt(step_s);
     let Imu { gyro, accel, .. } = imu;
@@ -46,13 +48,13 @@ pub(super) fn settings(suite: &Suite, imu: &Imu, rotors: usize, gravity_m_s2: f6
         gyro.noise_rad_s_rthz / libm::sqrt(2.0),
         step(gyro.lsb_rad_s) * per_root_s,
         vibration(gyro.vibration_rad_s, imu, rotors) * per_root_s,
-        root(&[gyro.scale, gyro.misalignment_rad]) * BRISK_RAD_S,
+        root(&[gyro.scale, gyro.misalignment_rad]) * TURNING_RAD_S,
     ]);
     let accel_noise = root(&[
         accel.noise_m_s2_rthz / libm::sqrt(2.0),
         step(accel.lsb_m_s2) * per_root_s,
         vibration(accel.vibration_m_s2, imu, rotors) * per_root_s,
-        root(&[accel.scale, accel.misalignment_rad]) * BRISK_M_S2,
+        root(&[accel.scale, accel.misalignment_rad]) * SPEEDING_M_S2,
     ]);
     // What a Gauss-Markov process adds per root of a second.
     let markov = |sigma: f64, time_s: f64| sigma * libm::sqrt(2.0 / time_s);
