@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-/// What an aiding sensor tells. A fix of several kinds is judged kind by kind: a receiver whose position jumps may still
-/// have a good velocity.
+/// What an aiding sensor tells. A fix of several kinds is judged kind by kind: a receiver whose position jumps may
+/// still have a good velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Aid {
     /// Position from a tracker.
@@ -29,8 +29,8 @@ impl Aid {
 /// Record of one kind of aid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AidRecord {
-    /// Normalised innovation squared of the last measurement, whether it was accepted or not: the sum over its scalars of
-    /// innovation^2 / variance. Of a rejected one with three coordinates, it is a lower bound.
+    /// Normalised innovation squared of the last measurement, whether it was accepted or not: the sum over its scalars
+    /// of innovation^2 / variance. Of a rejected one with three coordinates, it is a lower bound.
     pub nis: f32,
     /// Number of scalars in `nis`; its expectation.
     pub scalars: u8,

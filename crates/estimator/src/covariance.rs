@@ -12,8 +12,8 @@
 //! This is Sola's global angular error (section 7.2) rather than the local one: the attitude then has no transition of
 //! its own, the third component *is* the heading's error at any tilt, so an unknown heading stays in one state, and the
 //! error of a past attitude is that of the present one. When the attitude is corrected, the error is turned with it
-//! ([`Covariance::turn`]), as the local one is by itself; the crate's documentation says what for. Over an interval of T
-//! with the mean rotation R, C = R T, and S the change of velocity by specific force,
+//! ([`Covariance::turn`]), as the local one is by itself; the crate's documentation says what for. Over an interval of
+//! T with the mean rotation R, C = R T, and S the change of velocity by specific force,
 //!
 //! ```text
 //! theta' = theta - C g        v' = v - S x theta - C a        p' = p + T v
@@ -519,8 +519,8 @@ impl Covariance {
         self.raise();
     }
 
-    /// Fuses a scalar with any gain `k`: P - k y' - y k' + k s k' = P - k w' - w k' with w = y - k s/2. This is Joseph's
-    /// form, positive whatever the gain.
+    /// Fuses a scalar with any gain `k`: P - k y' - y k' + k s k' = P - k w' - w k' with w = y - k s/2. This is
+    /// Joseph's form, positive whatever the gain.
     pub(crate) fn fuse_with(&mut self, k: &Errors, y: &Errors, s: f32) {
         let half = k.scaled(0.5 * s);
         let w = Errors {

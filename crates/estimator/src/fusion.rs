@@ -28,7 +28,8 @@ const ROUNDING: f32 = 1e-6;
 const CROWD: u8 = 3;
 /// Time for which another aid counts as present \[us\].
 const PRESENT_US: u64 = 1_000_000;
-/// Interval of the pseudo-measurements of rest \[us\], and their standard deviations on the ground and in the air \[m/s\].
+/// Interval of the pseudo-measurements of rest \[us\], and their standard deviations on the ground and in the air
+/// \[m/s\].
 const STILL_US: u64 = 200_000;
 const STILL_M_S: f32 = 0.05;
 const ALOFT_M_S: f32 = 3.0;

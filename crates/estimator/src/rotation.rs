@@ -9,12 +9,12 @@ pub(crate) fn identity() -> Quaternion<f32> {
     Quaternion::new(1.0, 0.0, 0.0, 0.0)
 }
 
-/// Rotation by a vector \[rad\], by the series of sine and cosine up to the fourth order of half the angle; 1e-7 at 0.5
-/// rad. Of unit norm for any vector.
+/// Rotation by a vector \[rad\], by the series of sine and cosine up to the fourth order of half the angle; 1e-7 at
+/// 0.35 rad. Of unit norm for any vector.
 #[inline]
 pub(crate) fn small(turn_rad: &Vector3<f32>) -> Quaternion<f32> {
     let square = 0.25 * turn_rad.norm_squared();
-    if square > 0.0625 {
+    if square > 0.03 {
         return large(turn_rad, square);
     }
     let scale = 0.5 * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0)));
@@ -73,8 +73,8 @@ pub(crate) fn matrix(q: &Quaternion<f32>) -> Matrix3<f32> {
     )
 }
 
-/// Vector of the rotation \[rad\] from `from` to `to` in the earth frame: to = small(v) from. Exact for small angles, and
-/// of the right direction up to half a turn.
+/// Vector of the rotation \[rad\] from `from` to `to` in the earth frame: to = small(v) from. Exact for small angles,
+/// and of the right direction up to half a turn.
 pub(crate) fn difference(to: &Quaternion<f32>, from: &Quaternion<f32>) -> Vector3<f32> {
     let q = to * from.conjugate();
     let vector = q.imag();
@@ -103,7 +103,8 @@ pub(crate) fn atan2(y: f32, x: f32) -> f32 {
     if x > 0.0 { angle } else { angle + PI.copysign(y) }
 }
 
-/// Roll, pitch and yaw of a unit quaternion \[rad\]; see `afbc_types::State::from_quaternion`, whose formulas these are.
+/// Roll, pitch and yaw of a unit quaternion \[rad\]; see `afbc_types::State::from_quaternion`, whose formulas these
+/// are.
 pub(crate) fn euler(q: &Quaternion<f32>) -> Vector3<f32> {
     let (a, b, c, d) = (q.w - q.j, q.i + q.k, q.w + q.j, q.i - q.k);
     let (sum, remainder) = (atan2(b, a), atan2(d, c));

@@ -11,8 +11,8 @@ parameters! {
         /// Acceleration of free fall.
         #[parameter(GRAVITY, "m/s2", 9.7..=9.9)]
         pub gravity_m_s2: f32 = 9.81,
-        /// Noise density of the gyroscope, vibration and all that the model leaves out included. The default is for flight
-        /// on any vehicle; the part alone has 5e-5 (ICM-42688-P).
+        /// Noise density of the gyroscope, vibration and all that the model leaves out included. The default is for
+        /// flight on any vehicle; the part alone has 5e-5 (ICM-42688-P).
         #[parameter(GYR_NOISE, "rad/s/sqrt(Hz)", 1e-6..=0.1)]
         pub gyro_noise_rad_s_rthz: f32 = 1e-3,
         /// Noise density of the accelerometer, vibration and all that the model leaves out included. The default is for

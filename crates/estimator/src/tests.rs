@@ -132,7 +132,9 @@ const GROWTH: Growth = Growth { theta: 1e-6, velocity: 4e-4, gyro: 1e-9, accel: 
 
 proptest! {
     #[test]
-    fn prediction_is_f_p_f_plus_q(p in covariance(), turn in numbers::<3>(), thrust in numbers::<3>(), t in 1e-3..0.02_f64) {
+    fn prediction_is_f_p_f_plus_q(
+        p in covariance(), turn in numbers::<3>(), thrust in numbers::<3>(), t in 1e-3..0.02_f64,
+    ) {
         let rotation: Matrix3<f64> = Rotation3::new(vector(turn) * 3.0).into_inner();
         let interval = Interval {
             time_s: t as f32,
@@ -297,7 +299,8 @@ proptest! {
                     pairs.push(("height", slope(&|x| x.p.z), dense_row(&h_row)[i]));
                 }
                 if c == 0 && !upright {
-                    pairs.push(("field", slope(&|x| angle(&(x.r * then.r.inverse() * field)) ), dense_row(&row(Target::Field(body)))[i]));
+                    let seen = |x: &True| angle(&(x.r * then.r.inverse() * field));
+                    pairs.push(("field", slope(&seen), dense_row(&row(Target::Field(body)))[i]));
                     pairs.push(("heading", slope(&nose), dense_row(&row(Target::Heading(0.0)))[i]));
                 }
                 for (name, theirs, ours) in pairs {
@@ -322,7 +325,11 @@ proptest! {
     #[test]
     fn history_interpolates(motion in numbers::<6>(), back_us in 0..200_000_u32, by in numbers::<6>()) {
         let now = True {
-            r: Rotation3::identity(), v: V3::new(1.0, 2.0, 3.0), p: V3::new(10.0, 20.0, 5.0), g: V3::zeros(), a: V3::zeros(),
+            r: Rotation3::identity(),
+            v: V3::new(1.0, 2.0, 3.0),
+            p: V3::new(10.0, 20.0, 5.0),
+            g: V3::zeros(),
+            a: V3::zeros(),
         };
         let mut history = History::default();
         let base = u32::MAX - 100_000;

@@ -118,6 +118,49 @@ fn the_tracker_is_gone_in_hover() {
     assert!(one < 0.2 && three < 1.5, "{one} m, {three} m");
 }
 
+/// A tracker that is 230 ms late: in the flown figure, the vehicle is 0.7 m further on by then.
+#[test]
+fn a_late_tracker() {
+    let truth = fly(eight, 16.0);
+    let mut flight = Flight::new(&truth, ICM, MOCAP, 5);
+    flight.late_ms = 220.0;
+    let (mut position, mut behind) = (Rms::default(), Rms::default());
+    for ms in 0..16_000 {
+        let estimate = flight.step();
+        if ms > 8000 {
+            position.add(flight.errors(&estimate).fixed_rows::<3>(6).norm());
+            behind.add((flight.moment().p - truth[ms - 230].p).norm());
+        }
+    }
+    let (error, behind) = (position.value(), behind.value());
+    println!("tracker 230 ms late: {error:.4} m, where the vehicle was {behind:.2} m behind");
+    assert!(behind > 0.4 && error < 0.005, "{error} m, {behind} m");
+    assert_eq!((flight.memory.aids().tracker_position.rejected, flight.memory.dropped().crowded), (0, 0));
+    assert!(flight.memory.aids().tracker_position.accepted > 1300);
+}
+
+/// Told to be on the ground, the filter holds velocity and biases without any aid; otherwise they drift away.
+#[test]
+fn on_the_ground() {
+    let truth = fly(common::rest, 120.0);
+    let nothing = common::Sensors::default();
+    let mut drifts = [0.0, 0.0];
+    for (on_ground, drift) in [true, false].into_iter().zip(&mut drifts) {
+        let mut flight = Flight::new(&truth, ICM, nothing, 8);
+        flight.memory.set_on_ground(on_ground);
+        let mut last = flight.step();
+        for _ in 1..120_000 {
+            last = flight.step();
+        }
+        assert_eq!(last.validity.velocity, on_ground);
+        assert!(last.validity.attitude);
+        *drift = flight.errors(&last).fixed_rows::<3>(3).norm();
+        let gyro = flight.errors(&last).fixed_rows::<2>(9).norm();
+        assert!(!on_ground || gyro < 1e-4, "{gyro} rad/s");
+    }
+    assert!(drifts[0] < 0.02 && drifts[1] > 5.0 * drifts[0], "{drifts:?} m/s");
+}
+
 /// At a kilometre, a position in `f32` has steps of 0.06 mm: a slow vehicle must still move.
 #[test]
 fn far_away_and_slow() {

@@ -209,6 +209,8 @@ pub struct Flight<'a> {
     pub gyro_bias: V3,
     pub accel_bias: V3,
     pub baro_offset: f64,
+    /// Delay of all sensors besides their own [ms].
+    pub late_ms: f64,
     /// Index of the next moment.
     pub now: usize,
     /// Measurements under way, with the millisecond of their arrival.
@@ -235,6 +237,7 @@ impl<'a> Flight<'a> {
             gyro_bias,
             accel_bias,
             baro_offset: 37.0,
+            late_ms: 0.0,
             now: 0,
             under_way: Vec::new(),
             sample: ImuSample::default(),
@@ -253,8 +256,9 @@ impl<'a> Flight<'a> {
     fn sense(&mut self) {
         let at_us = self.now_us();
         let moment = self.truth[self.now];
+        let late_ms = self.late_ms;
         let mut send = |delay_ms: f64, value| {
-            self.under_way.push((self.now + delay_ms.round() as usize, Timed { value, at_us }));
+            self.under_way.push((self.now + (delay_ms + late_ms).round() as usize, Timed { value, at_us }));
         };
         if let Some((position, attitude)) = self.sensors.tracker.filter(|_| self.now % 10 == 3) {
             let r = exp(&self.noise.vector(attitude)) * moment.r;
