@@ -100,8 +100,9 @@ impl Estimator {
     pub fn step(&self, memory: &mut Memory, now_us: u64, imu: Option<&ImuSample>) -> Estimate {
         let predicted = imu.is_some_and(|sample| self.take(memory, now_us, sample));
         if memory.runs {
-            if memory.history.is_unsettled() && !predicted {
-                memory.history.settle();
+            // Between fixes, since a fix holds a state of before.
+            if memory.history.is_unsettled() && memory.fix.is_none() && !predicted {
+                memory.history.settle(self.settings.gravity_m_s2);
             } else if !predicted {
                 self.fuse(memory, now_us);
             }
@@ -167,6 +168,7 @@ impl Estimator {
         memory.turned = identity();
         memory.covariance.predict(&interval, &growth);
         memory.covariance.roughen(memory.rough);
+        memory.history.advance(interval.time_s, &interval.thrust);
         memory.rotation = memory.nominal.rotation;
         memory.interval = NO_INTERVAL;
         memory.rough = (0.0, 0.0);

@@ -119,7 +119,9 @@ impl Estimator {
     fn fuse_scalar(&self, memory: &mut Memory) -> bool {
         let Some(Fix { at_us, past, parts: [Some(mut part), _], next, .. }) = memory.fix else { return false };
         let Some(present) = memory.history.newest() else { return false };
-        let horizon = Horizon::new(&present, &memory.history.corrected(&past), self.settings.gravity_m_s2);
+        let gravity = self.settings.gravity_m_s2;
+        let Some(past) = memory.history.corrected(&past, gravity) else { return false };
+        let horizon = Horizon::new(&present, &past, gravity);
         part.roughen(memory.roughened_since(at_us), horizon.tau_s());
         if next == 0 && !self.admits(memory, at_us, &part, &horizon) {
             return false;
@@ -196,7 +198,7 @@ impl Estimator {
         nominal.accel_bias = limited(nominal.accel_bias + by.accel, self.settings.accel_bias_max_m_s2);
         memory.height_offset += by.baro;
         memory.turned = turn * memory.turned;
-        memory.history.correct(&turn, &by.velocity, &by.position);
+        memory.history.correct(&turn, &by.theta, &by.velocity, &by.position);
     }
 
     /// True if the part of a fix is to be fused. Otherwise it was rejected, or the state was set to it.

@@ -1,9 +1,15 @@
 //! Past states, so that a measurement meets the state of its own time.
 //!
-//! Corrections of the present hold for the past too. They are not written into 64 entries each time: an entry is stored
-//! without the corrections made so far, and gets all those made up to now when it is looked up. That a correction of
-//! velocity made the past position differ, and one of tilt the past velocity, is left out here (it is the product of a
-//! correction and a delay: 2 mm for 0.02 m/s and 100 ms); the Jacobian of the measurement ([`crate::horizon`]) has it.
+//! Corrections of the present hold for the past too: otherwise the next late measurement would tell the same error again,
+//! and have it corrected twice. They are not written into 64 entries each time. The sum of all corrections is itself an
+//! error, (theta, v, p), that moves by the filter's equations ([`crate::horizon`]):
+//!
+//! ```text
+//! theta' = theta        v' = v - S x theta        p' = p + T v
+//! ```
+//!
+//! An entry is stored without it. When it is looked up, tau later, it gets the sum of the present taken back to its time:
+//! v + S x theta and p - tau v - D x theta.
 
 use crate::rotation::{identity, normalized, renormalized};
 use afbc_control::math::abs_max;
@@ -11,8 +17,10 @@ use nalgebra::{Quaternion, Vector3};
 
 /// Number of entries; a power of two.
 const ENTRIES: usize = 64;
-/// Corrections of position \[m\] and velocity \[m/s\] above which all entries are rewritten, to keep their last bits.
+/// Corrections of position \[m\] and velocity \[m/s\] above which all entries are rewritten, to keep their last bits, and
+/// of the rotation \[rad\], to keep the sum linear.
 const SHIFT_MAX: f32 = 8.0;
+const TURN_MAX: f32 = 0.1;
 
 /// State at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +35,10 @@ pub(crate) struct Past {
 /// Sum of corrections.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Shift {
+    /// The rotation, exactly.
     attitude: Quaternion<f32>,
+    /// Rotation since the entries were rewritten.
+    theta: Vector3<f32>,
     velocity: Vector3<f32>,
     position: Vector3<f32>,
 }
@@ -52,7 +63,7 @@ pub(crate) struct History {
 impl Default for History {
     fn default() -> Self {
         let zero = Vector3::zeros();
-        let shift = Shift { attitude: identity(), velocity: zero, position: zero };
+        let shift = Shift { attitude: identity(), theta: zero, velocity: zero, position: zero };
         History { entries: [NOTHING; ENTRIES], stored: 0, filled: 0, shift }
     }
 }
@@ -62,7 +73,7 @@ impl History {
     pub(crate) fn clear(&mut self) {
         self.filled = 0;
         let zero = Vector3::zeros();
-        self.shift = Shift { attitude: identity(), velocity: zero, position: zero };
+        self.shift = Shift { attitude: identity(), theta: zero, velocity: zero, position: zero };
     }
 
     /// Returns the entry stored `back` entries ago, without corrections.
@@ -70,6 +81,13 @@ impl History {
     fn entry(&self, back: u32) -> Option<&Past> {
         let place = self.stored.wrapping_sub(1).wrapping_sub(back) as usize % ENTRIES;
         self.entries.get(place).filter(|_| back < self.filled)
+    }
+
+    /// Moves the sum of corrections by `time_s`, in which specific force has changed the velocity by `thrust`.
+    pub(crate) fn advance(&mut self, time_s: f32, thrust: &Vector3<f32>) {
+        let change = thrust.cross(&self.shift.theta);
+        self.shift.position += (self.shift.velocity - change * 0.5) * time_s;
+        self.shift.velocity -= change;
     }
 
     /// Stores the state of the present.
@@ -87,28 +105,40 @@ impl History {
         self.filled = (self.filled + 1).min(ENTRIES as u32);
     }
 
-    /// Adds a correction of the present: the rotation `turn` in the earth frame, velocity and position.
-    pub(crate) fn correct(&mut self, turn: &Quaternion<f32>, velocity: &Vector3<f32>, position: &Vector3<f32>) {
+    /// Adds a correction of the present: the rotation `theta` in the earth frame, which is `turn`, velocity and position.
+    pub(crate) fn correct(
+        &mut self,
+        turn: &Quaternion<f32>,
+        theta: &Vector3<f32>,
+        velocity: &Vector3<f32>,
+        position: &Vector3<f32>,
+    ) {
         self.shift.attitude = renormalized(&(turn * self.shift.attitude));
+        self.shift.theta += theta;
         self.shift.velocity += velocity;
         self.shift.position += position;
     }
 
     /// True if the corrections have grown so large that [`settle`](Self::settle) is due.
     pub(crate) fn is_unsettled(&self) -> bool {
-        abs_max(&self.shift.velocity) > SHIFT_MAX || abs_max(&self.shift.position) > SHIFT_MAX
+        abs_max(&self.shift.velocity) > SHIFT_MAX
+            || abs_max(&self.shift.position) > SHIFT_MAX
+            || abs_max(&self.shift.theta) > TURN_MAX
     }
 
     /// Writes the corrections of position and velocity into all entries.
     #[cold]
     #[inline(never)]
-    pub(crate) fn settle(&mut self) {
-        let Shift { velocity, position, .. } = self.shift;
+    pub(crate) fn settle(&mut self, gravity: f32) {
+        let Some(newest) = self.newest_raw() else { return };
+        let shift = self.shift;
         for entry in &mut self.entries {
+            let (velocity, position) = shift.of(entry, &newest, gravity);
             entry.velocity += velocity;
             entry.position += position;
         }
-        (self.shift.velocity, self.shift.position) = (Vector3::zeros(), Vector3::zeros());
+        let zero = Vector3::zeros();
+        (self.shift.theta, self.shift.velocity, self.shift.position) = (zero, zero, zero);
     }
 
     /// Returns the newest entry, without corrections.
@@ -119,18 +149,24 @@ impl History {
     /// Returns the newest entry, corrected.
     #[inline]
     pub(crate) fn newest(&self) -> Option<Past> {
-        self.entry(0).map(|entry| self.corrected(entry))
+        self.entry(0).map(|entry| Past {
+            at_us: entry.at_us,
+            attitude: self.shift.attitude * entry.attitude,
+            velocity: entry.velocity + self.shift.velocity,
+            position: entry.position + self.shift.position,
+        })
     }
 
-    /// Returns `raw` with all corrections.
+    /// Returns `raw` with all corrections, `None` before the first entry.
     #[inline]
-    pub(crate) fn corrected(&self, raw: &Past) -> Past {
-        Past {
+    pub(crate) fn corrected(&self, raw: &Past, gravity: f32) -> Option<Past> {
+        let (velocity, position) = self.shift.of(raw, self.entry(0)?, gravity);
+        Some(Past {
             at_us: raw.at_us,
             attitude: self.shift.attitude * raw.attitude,
-            velocity: raw.velocity + self.shift.velocity,
-            position: raw.position + self.shift.position,
-        }
+            velocity: raw.velocity + velocity,
+            position: raw.position + position,
+        })
     }
 
     /// Returns the state at `at_us`, interpolated and without corrections, `None` if it is before the oldest or after
@@ -157,20 +193,39 @@ impl History {
                 earlier = middle;
             }
         }
-        Some(between(self.entry(earlier)?, self.entry(later)?, &self.shift.velocity, at_us))
+        Some(between(self.entry(earlier)?, self.entry(later)?, at_us))
     }
 }
 
-/// Interpolates: the position with both velocities (Hermite's cubic), the others linearly. Positions follow from the
-/// corrected velocities, which are those stored and `shift`.
-fn between(a: &Past, b: &Past, shift: &Vector3<f32>, at_us: u32) -> Past {
+impl Shift {
+    /// Returns the corrections of velocity and position at the time of `raw`; both entries are without corrections.
+    #[inline]
+    fn of(&self, raw: &Past, newest: &Past, gravity: f32) -> (Vector3<f32>, Vector3<f32>) {
+        let (tau_s, thrust, distance) = way(newest, raw, gravity);
+        (self.velocity + thrust.cross(&self.theta), self.position - self.velocity * tau_s - distance.cross(&self.theta))
+    }
+}
+
+/// Returns tau \[s\], S and D from `past` to `present` ([`crate::horizon`]).
+#[inline]
+pub(crate) fn way(present: &Past, past: &Past, gravity: f32) -> (f32, Vector3<f32>, Vector3<f32>) {
+    let tau_s = present.at_us.wrapping_sub(past.at_us) as i32 as f32 * 1e-6;
+    let mut thrust = present.velocity - past.velocity;
+    thrust.z += gravity * tau_s;
+    let mut distance = present.velocity * tau_s - (present.position - past.position);
+    distance.z += 0.5 * gravity * tau_s * tau_s;
+    (tau_s, thrust, distance)
+}
+
+/// Interpolates: the position with both velocities (Hermite's cubic), the others linearly.
+fn between(a: &Past, b: &Past, at_us: u32) -> Past {
     let span_us = b.at_us.wrapping_sub(a.at_us) as f32;
     let x = at_us.wrapping_sub(a.at_us) as f32 / span_us;
     let span_s = span_us * 1e-6;
     let nearer = if a.attitude.dot(&b.attitude) < 0.0 { -b.attitude } else { b.attitude };
     // What the velocities add to the straight line between the positions.
     let chord = b.position - a.position;
-    let bend = |velocity: &Vector3<f32>| (velocity + shift) * span_s - chord;
+    let bend = |velocity: &Vector3<f32>| velocity * span_s - chord;
     let (from, to) = (bend(&a.velocity), bend(&b.velocity));
     Past {
         at_us,

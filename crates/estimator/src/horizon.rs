@@ -15,7 +15,7 @@
 //! for 1e-3 rad/s and 100 ms, and that of the accelerometer's in p, 1e-4 m for 0.02 m/s2 and 100 ms.
 
 use crate::covariance::{Coordinate, Row};
-use crate::history::Past;
+use crate::history::{Past, way};
 use crate::rotation::{atan2, difference, matrix};
 use afbc_control::math::wrap_angle;
 use nalgebra::{Matrix3, Quaternion, Vector3};
@@ -60,13 +60,9 @@ pub(crate) struct Horizon {
 impl Horizon {
     /// Looks from `present`, at the time of the covariance, back to `past`.
     pub(crate) fn new(present: &Past, past: &Past, gravity: f32) -> Self {
-        let tau_s = present.at_us.wrapping_sub(past.at_us) as i32 as f32 * 1e-6;
+        let (tau_s, thrust, distance) = way(present, past, gravity);
         let rotation = matrix(&past.attitude);
         let turn = (rotation + matrix(&present.attitude)) * (0.5 * tau_s);
-        let mut thrust = present.velocity - past.velocity;
-        thrust.z += gravity * tau_s;
-        let mut distance = present.velocity * tau_s - (present.position - past.position);
-        distance.z += 0.5 * gravity * tau_s * tau_s;
         Horizon { past: *past, rotation, tau_s, turn, thrust, distance }
     }
 

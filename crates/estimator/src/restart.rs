@@ -159,7 +159,7 @@ impl Memory {
     pub(crate) fn reset_position(&mut self, by: &Vector3<f32>, variance: &Vector3<f32>, tau_s: f32) {
         count(&mut self.resets.position);
         self.nominal.move_to(self.nominal.position + by);
-        self.history.correct(&identity(), &NONE, by);
+        self.history.correct(&identity(), &NONE, &NONE, by);
         let c = &mut self.covariance;
         c.forget(&Errors { position: NONE, baro: 0.0, ..KEEP });
         c.pp = diagonal(variance) + c.vv * (tau_s * tau_s);
@@ -174,7 +174,7 @@ impl Memory {
     pub(crate) fn reset_velocity(&mut self, by: &Vector3<f32>, variance: &Vector3<f32>) {
         count(&mut self.resets.velocity);
         self.nominal.velocity += by;
-        self.history.correct(&identity(), by, &NONE);
+        self.history.correct(&identity(), &NONE, by, &NONE);
         self.covariance.forget(&Errors { velocity: NONE, ..KEEP });
         self.covariance.vv = diagonal(variance);
         self.covariance.hold();
@@ -186,7 +186,7 @@ impl Memory {
         let turn = about_z(by);
         self.nominal.turn_to(normalized(&(turn * self.nominal.attitude)));
         self.rotation = matrix(&turn) * self.rotation;
-        self.history.correct(&turn, &NONE, &NONE);
+        self.history.correct(&turn, &NONE, &NONE, &NONE);
         self.covariance.turn(&matrix(&turn));
         self.covariance.forget(&Errors { theta: Vector3::new(1.0, 1.0, 0.0), ..KEEP });
         self.covariance.tt.m33 = variance;

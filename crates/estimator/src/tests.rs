@@ -339,22 +339,30 @@ proptest! {
         }
         let at_us = base.wrapping_add(252_000 - back_us);
         let x = back(now, f64::from(back_us) * 1e-6, &motion.map(|x| x * 0.3));
-        let found = history.corrected(&history.at(at_us).unwrap());
+        let g = GRAVITY as f32;
+        let found = history.corrected(&history.at(at_us).unwrap(), g).unwrap();
         prop_assert!((found.position.map(f64::from) - x.p).norm() < 1e-4);
         prop_assert!((found.velocity.map(f64::from) - x.v).norm() < 2e-3);
         let q = past(&x, 0).attitude;
         prop_assert!(1.0 - q.dot(&found.attitude).abs() < 1e-6);
-        // Corrections move the past, and rewriting it changes nothing.
-        let v = Vector3::new(by[0], by[1], by[2]).map(|x| x as f32);
-        let p = Vector3::new(by[3], by[4], by[5]).map(|x| 20.0 * x as f32);
-        history.correct(&crate::rotation::about_z(0.5), &v, &p);
-        let corrected = history.corrected(&history.at(at_us).unwrap());
-        prop_assert!((corrected.velocity - found.velocity - v).norm() < 1e-5);
-        // A correction of the velocity bends the curve between two entries: by a tenth of its way in 4 ms.
-        prop_assert!((corrected.position - found.position - p).norm() < 1e-3);
-        history.settle();
-        let settled = history.corrected(&history.at(at_us).unwrap());
-        prop_assert!((corrected.position - settled.position).norm() < 1e-4 && !history.is_unsettled());
+        // Corrections of the present are those of the past that would have led to it: the same samples, gone back from
+        // the corrected state.
+        let part = |i: usize, size: f64| vector([by[i], by[i + 1], by[i + 2]]) * size;
+        let (theta, v, p) = (part(0, 0.02), part(3, 1.0), part(1, 5.0));
+        let single = |v: &V3| v.map(|x| x as f32);
+        let (turn, theta_f) = (crate::rotation::small(&single(&theta)), single(&theta));
+        history.correct(&turn, &theta_f, &single(&v), &single(&p));
+        let corrected = history.corrected(&history.at(at_us).unwrap(), g).unwrap();
+        let error = V16::from_iterator(theta.iter().chain(&v).chain(&p).copied().chain([0.0; 7]));
+        let y = back(moved(&now, &error), f64::from(back_us) * 1e-6, &motion.map(|x| x * 0.3));
+        prop_assert!((corrected.velocity.map(f64::from) - y.v).norm() < 4e-3);
+        prop_assert!((corrected.position.map(f64::from) - y.p).norm() < 1e-3);
+        prop_assert!(1.0 - past(&y, 0).attitude.dot(&corrected.attitude).abs() < 1e-6);
+        // Rewriting the entries changes nothing.
+        history.settle(g);
+        let settled = history.corrected(&history.at(at_us).unwrap(), g).unwrap();
+        prop_assert!((corrected.position - settled.position).norm() < 2e-4 && !history.is_unsettled());
+        prop_assert!((corrected.velocity - settled.velocity).norm() < 2e-3);
         // Nothing before the oldest, nothing after the newest.
         prop_assert!(history.at(base.wrapping_add(252_001)).is_none());
         prop_assert!(history.at(base.wrapping_add(3_999)).is_none());
