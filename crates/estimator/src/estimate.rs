@@ -60,7 +60,7 @@ pub struct Resets {
 pub struct Dropped {
     /// Not finite, absurd, or with an unusable standard deviation.
     pub implausible: u32,
-    /// Older than 250 ms, or than the oldest state kept.
+    /// Older than 270 ms when its turn came, or than the oldest state kept.
     pub late: u32,
     /// More than 20 ms in the future.
     pub early: u32,

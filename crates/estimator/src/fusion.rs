@@ -15,8 +15,8 @@ use crate::rotation::{atan2, renormalized, small, twist};
 use afbc_control::math::{abs_max, max, min, sqrt, wrap_angle};
 use nalgebra::Vector3;
 
-/// Oldest measurement \[us\].
-const LATE_US: u64 = 250_000;
+/// Oldest measurement when its turn comes: 250 ms and the time to wait for it \[us\].
+const LATE_US: u64 = 270_000;
 /// Time in the future from which on a measurement is refused \[us\].
 const EARLY_US: u64 = 20_000;
 /// A scalar leaves at least this share of a variance: in `f32`, what remains of more is rounding.

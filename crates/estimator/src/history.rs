@@ -1,24 +1,24 @@
 //! Past states, so that a measurement meets the state of its own time.
 //!
-//! Corrections of the present hold for the past too: otherwise the next late measurement would tell the same error again,
-//! and have it corrected twice. They are not written into 64 entries each time. The sum of all corrections is itself an
-//! error, (theta, v, p), that moves by the filter's equations ([`crate::horizon`]):
+//! Corrections of the present hold for the past too: otherwise the next late measurement would tell the same error
+//! again, and have it corrected twice. They are not written into every entry each time. The sum of all corrections is
+//! itself an error, (theta, v, p), that moves by the filter's equations ([`crate::horizon`]):
 //!
 //! ```text
 //! theta' = theta        v' = v - S x theta        p' = p + T v
 //! ```
 //!
-//! An entry is stored without it. When it is looked up, tau later, it gets the sum of the present taken back to its time:
-//! v + S x theta and p - tau v - D x theta.
+//! An entry is stored without it. When it is looked up, tau later, it gets the sum of the present taken back to its
+//! time: v + S x theta and p - tau v - D x theta.
 
 use crate::rotation::{identity, normalized, renormalized};
 use afbc_control::math::abs_max;
 use nalgebra::{Quaternion, Vector3};
 
-/// Number of entries; a power of two.
-const ENTRIES: usize = 64;
-/// Corrections of position \[m\] and velocity \[m/s\] above which all entries are rewritten, to keep their last bits, and
-/// of the rotation \[rad\], to keep the sum linear.
+/// Number of entries: 284 ms of 4 ms each, since a measurement of 250 ms may wait for its turn.
+const ENTRIES: usize = 72;
+/// Corrections of position \[m\] and velocity \[m/s\] above which all entries are rewritten, to keep their last bits,
+/// and of the rotation \[rad\], to keep the sum linear.
 const SHIFT_MAX: f32 = 8.0;
 const TURN_MAX: f32 = 0.1;
 
@@ -54,8 +54,8 @@ const NOTHING: Past = Past {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct History {
     entries: [Past; ENTRIES],
-    /// Number of entries ever stored; the newest is at this number less one.
-    stored: u32,
+    /// Place of the newest entry.
+    newest: u32,
     filled: u32,
     shift: Shift,
 }
@@ -64,7 +64,7 @@ impl Default for History {
     fn default() -> Self {
         let zero = Vector3::zeros();
         let shift = Shift { attitude: identity(), theta: zero, velocity: zero, position: zero };
-        History { entries: [NOTHING; ENTRIES], stored: 0, filled: 0, shift }
+        History { entries: [NOTHING; ENTRIES], newest: 0, filled: 0, shift }
     }
 }
 
@@ -79,8 +79,8 @@ impl History {
     /// Returns the entry stored `back` entries ago, without corrections.
     #[inline]
     fn entry(&self, back: u32) -> Option<&Past> {
-        let place = self.stored.wrapping_sub(1).wrapping_sub(back) as usize % ENTRIES;
-        self.entries.get(place).filter(|_| back < self.filled)
+        let place = if back <= self.newest { self.newest - back } else { self.newest + ENTRIES as u32 - back };
+        self.entries.get(place as usize).filter(|_| back < self.filled)
     }
 
     /// Moves the sum of corrections by `time_s`, in which specific force has changed the velocity by `thrust`.
@@ -98,14 +98,15 @@ impl History {
             velocity: state.velocity - self.shift.velocity,
             position: state.position - self.shift.position,
         };
-        if let Some(place) = self.entries.get_mut(self.stored as usize % ENTRIES) {
+        self.newest = if self.newest + 1 < ENTRIES as u32 { self.newest + 1 } else { 0 };
+        if let Some(place) = self.entries.get_mut(self.newest as usize) {
             *place = raw;
         }
-        self.stored = self.stored.wrapping_add(1);
         self.filled = (self.filled + 1).min(ENTRIES as u32);
     }
 
-    /// Adds a correction of the present: the rotation `theta` in the earth frame, which is `turn`, velocity and position.
+    /// Adds a correction of the present: the rotation `theta` in the earth frame, which is `turn`, velocity and
+    /// position.
     pub(crate) fn correct(
         &mut self,
         turn: &Quaternion<f32>,
