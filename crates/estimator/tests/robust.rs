@@ -591,13 +591,19 @@ fn starts_in_flight_where_it_is_told() {
 }
 
 /// Hours at rest, where the accelerometer's bias and the tilt cannot be told apart, on samples of 4 ms: by default a
-/// quarter of an hour of a tracker and two hours outdoors; `HOURS=10` flies ten of each.
+/// quarter of an hour of a tracker and two hours outdoors; `HOURS=10` flies ten of each. With the settings of the part,
+/// outdoors, the standard deviation of a horizontal bias is up to a third of the error after ten hours; with the
+/// defaults it is not.
 #[test]
 fn hours_leave_it_sound() {
     let told: Option<f64> = std::env::var("HOURS").ok().map(|hours| hours.parse().unwrap());
-    for (hours, sensors) in [(told.unwrap_or(0.25), MOCAP), (told.unwrap_or(2.0), OUTDOOR)] {
+    for (hours, sensors, settings) in [
+        (told.unwrap_or(0.25), MOCAP, settings(&ICM)),
+        (told.unwrap_or(1.0), OUTDOOR, settings(&ICM)),
+        (told.unwrap_or(2.0), OUTDOOR, Settings::DEFAULT),
+    ] {
         let steps = (hours * 900_000.0) as u64;
-        let estimator = Estimator::new(settings(&ICM)).unwrap();
+        let estimator = Estimator::new(settings).unwrap();
         let mut memory = Memory::default();
         let mut noise = Noise::new(6);
         let (mut gyro, mut accel) = (noise.vector(ICM.gyro_bias), noise.vector(ICM.accel_bias));
@@ -673,6 +679,9 @@ fn hours_leave_it_sound() {
             }
         }
         println!("{hours} h: beyond 2 sigma, of {checks}: {over:?}");
+        // One in twenty by chance, and by chance more of few.
+        let most = if settings == Settings::DEFAULT { checks / 8 } else { checks };
+        assert!(over.iter().all(|over| *over <= most), "{over:?} of {checks}");
     }
 }
 
