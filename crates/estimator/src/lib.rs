@@ -66,6 +66,8 @@
 //!   holds the height, and the standard deviation grows with the offset's random walk.
 //! * The **magnetometer** corrects the heading and the gyroscope's bias, nothing else: a disturbed field cannot tilt
 //!   the vehicle. A field whose strength or inclination is not that of the start is not used.
+//! * A **heading** that neither tracker nor magnetometer tells follows from the motion once the vehicle accelerates,
+//!   but never counts as valid: an error of nearly half a turn may stay, with a small standard deviation.
 //! * **At rest on the ground** ([`Memory::set_on_ground`]) the velocity is held at zero. In the air without any aid for
 //!   [`Settings::coast_s`] a weak zero (3 m/s) keeps roll and pitch level; velocity and position are then invalid.
 //!

@@ -3,7 +3,7 @@
 
 mod common;
 
-use afbc_estimator::Settings;
+use afbc_estimator::{Measurement, Settings};
 use common::{Flight, ICM, MOCAP, OUTDOOR, Rms, double, eight, exp, fly, hover, log, matrix, settings};
 
 /// Root mean squares of the errors.
@@ -138,6 +138,30 @@ fn a_late_tracker() {
     assert!(behind > 0.4 && error < 0.005, "{error} m, {behind} m");
     assert_eq!((flight.memory.aids().tracker_position.rejected, flight.memory.dropped().crowded), (0, 0));
     assert!(flight.memory.aids().tracker_position.accepted > 1300);
+}
+
+/// A heading that nobody tells is found by flying, from two radians off; but it is never valid, since from three it may
+/// not be.
+#[test]
+fn an_untold_heading() {
+    let truth = fly(|t| (eight(t).0, eight(t).1 - 2.0), 20.0);
+    for (sensors, most) in [(MOCAP, 0.01), (common::Sensors { mag: None, ..OUTDOOR }, 0.05)] {
+        let mut flight = Flight::new(&truth, ICM, sensors, 6);
+        for ms in 0..20_000 {
+            let estimate = flight.step_with(
+                |_| true,
+                |measurement| {
+                    if let Measurement::Pose { position_m, position_sigma_m: sigma_m, .. } = measurement.value {
+                        measurement.value = Measurement::Position { position_m, sigma_m };
+                    }
+                    true
+                },
+            );
+            let heading = flight.errors(&estimate)[2].abs();
+            assert!(ms < 15_000 || heading < most, "{ms} ms: {heading} rad");
+            assert!(!estimate.validity.heading);
+        }
+    }
 }
 
 /// Told to be on the ground, the filter holds velocity and biases without any aid; otherwise they drift away.
