@@ -2,7 +2,7 @@
 
 use afbc::model::Model;
 use afbc_plant::{Sensing, Telemetry};
-use afbc_sim::columns::MOTION;
+use afbc_sim::columns::{ESTIMATE, MOTION};
 use afbc_sim::contender::Contender;
 use afbc_sim::flight::Sample;
 use afbc_sim::flown::Flown;
@@ -179,6 +179,14 @@ fn real(scenario: &Scenario) -> Vec<Column> {
         add("r_measured_rad_s", |s| s.rates_rad_s.z);
         let fresh = |row: &Row| Flag(row.sample.measurement.is_some_and(|measurement| measurement.fresh));
         columns.push(Column { name: "measurement_fresh".into(), value: Box::new(fresh) });
+    }
+    if scenario.instruments.imu.is_some() {
+        for (name, value) in ESTIMATE {
+            let value = move |row: &Row| Single(row.sample.estimated.as_ref().map_or(f32::NAN, value));
+            columns.push(Column { name: name.into(), value: Box::new(value) });
+        }
+        let valid = |row: &Row| Flag(row.sample.estimated.is_some_and(|estimated| estimated.valid));
+        columns.push(Column { name: "estimate_valid".into(), value: Box::new(valid) });
     }
     columns
 }

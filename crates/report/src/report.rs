@@ -146,6 +146,9 @@ fn section(group: &Group, figures: &[Picture]) -> Markup {
             @if let Some(tripped) = &flight.run.tripped {
                 p { (flight.run.contender.title()) ": " (words::tripped(tripped)) "." }
             }
+            @if let Some(estimate) = &flight.run.metrics.estimate {
+                p { (flight.run.contender.title()) ": " (words::estimate(estimate)) "." }
+            }
         }
         p.quiet { (table::legend()) }
         @for figure in figures { (picture(figure)) }

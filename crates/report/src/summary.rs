@@ -3,7 +3,7 @@
 use afbc::Profile;
 use afbc_sim::case::{Reading, Sign};
 use afbc_sim::flown::Flown;
-use afbc_sim::metrics::SETTLED_S;
+use afbc_sim::metrics::{Aid, AidMetrics, EstimateMetrics, SETTLED_S};
 use nalgebra::Vector4;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -34,6 +34,64 @@ struct Summary<'a> {
     final_error: Outputs,
     /// Mean change of U1..U4 per control step.
     mean_abs_delta_u_n: Option<[f64; 4]>,
+    /// The vehicle's own estimate.
+    estimate: Option<Estimate>,
+}
+
+#[derive(Serialize)]
+struct Estimate {
+    position_rms_m: f64,
+    horizontal_rms_m: f64,
+    velocity_rms_m_s: f64,
+    attitude_rms_deg: f64,
+    tilt_rms_deg: f64,
+    heading_rms_deg: f64,
+    nees_mean: f64,
+    valid_ratio: f64,
+    aids: Vec<AidWords>,
+}
+
+#[derive(Serialize)]
+struct AidWords {
+    name: &'static str,
+    fused: u64,
+    rejected: u64,
+    nis_mean: Option<f64>,
+}
+
+impl From<EstimateMetrics> for Estimate {
+    fn from(metrics: EstimateMetrics) -> Self {
+        let EstimateMetrics { position_m, velocity_m_s, attitude_rad, nees, valid_ratio, aids } = metrics;
+        let heard = Aid::ALL.into_iter().zip(aids).filter(|(_, aid)| aid.fused + aid.rejected > 0);
+        let aid = |(aid, AidMetrics { fused, rejected, nis, .. })| AidWords {
+            name: name(aid),
+            fused,
+            rejected,
+            nis_mean: (fused > 0).then_some(nis),
+        };
+        Estimate {
+            position_rms_m: position_m.norm(),
+            horizontal_rms_m: position_m.xy().norm(),
+            velocity_rms_m_s: velocity_m_s.norm(),
+            attitude_rms_deg: attitude_rad.norm().to_degrees(),
+            tilt_rms_deg: attitude_rad.xy().norm().to_degrees(),
+            heading_rms_deg: attitude_rad.z.to_degrees(),
+            nees_mean: nees,
+            valid_ratio,
+            aids: heard.map(aid).collect(),
+        }
+    }
+}
+
+const fn name(aid: Aid) -> &'static str {
+    match aid {
+        Aid::TrackerPosition => "tracker-position",
+        Aid::TrackerAttitude => "tracker-attitude",
+        Aid::GnssPosition => "gnss-position",
+        Aid::GnssVelocity => "gnss-velocity",
+        Aid::Height => "height",
+        Aid::Heading => "heading",
+    }
 }
 
 #[derive(Serialize)]
@@ -73,6 +131,7 @@ fn summary(Flown { scenario, run }: &Flown) -> Summary<'_> {
         max_abs: measured(run.metrics.max_abs).map(Outputs::from),
         final_error: run.metrics.final_error.into(),
         mean_abs_delta_u_n: measured(run.metrics.mean_abs_delta_u).map(Into::into),
+        estimate: run.metrics.estimate.map(Estimate::from),
     }
 }
 

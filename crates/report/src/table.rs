@@ -150,6 +150,9 @@ fn flights(group: &Group, lines: &mut Vec<String>) {
         if let Some(tripped) = &flight.run.tripped {
             wrap(lines, "", &format!("{}: {}.", flight.run.contender.title(), words::tripped(tripped)));
         }
+        if let Some(estimate) = &flight.run.metrics.estimate {
+            wrap(lines, "", &format!("{}: {}.", flight.run.contender.title(), words::estimate(estimate)));
+        }
     }
 }
 

@@ -7,6 +7,7 @@ use afbc_plant::{
 };
 use afbc_sim::case::{Reading, Sign};
 use afbc_sim::contender::Contender;
+use afbc_sim::metrics::EstimateMetrics;
 use afbc_sim::run::Tripped;
 use afbc_sim::scenario::Scenario;
 use afbc_types::Axis;
@@ -58,7 +59,7 @@ pub(super) fn conditions(scenario: &Scenario) -> String {
 }
 
 /// Names the non-ideal parts of a flight: "rotors", "battery", "drag", "wind", "ground", "payload", "sensors", "sensor
-/// fault", "outages".
+/// fault", "own estimate", "instrument fault", "outages".
 fn real(scenario: &Scenario) -> Vec<&'static str> {
     let Realism { rotors, drag, wind, contact, ground_effect, .. } = &scenario.realism;
     let (faults, battery) = (!rotors.faults.is_empty(), rotors.battery.is_some());
@@ -73,6 +74,8 @@ fn real(scenario: &Scenario) -> Vec<&'static str> {
         (!scenario.environment.payloads().is_empty(), "payload"),
         (scenario.sensing != Sensing::default(), "real sensors"),
         (!scenario.sensor_faults.is_empty(), "sensor fault"),
+        (scenario.instruments.imu.is_some(), "own estimate"),
+        (!scenario.instrument_faults.is_empty(), "instrument fault"),
         (!scenario.outages.is_empty(), "outages"),
     ];
     words.into_iter().filter_map(|(there, word)| there.then_some(word)).collect()
@@ -202,6 +205,17 @@ pub(super) const fn symbol(axis: Axis) -> &'static str {
 /// Example: "lost at t = 15.625 s: tilted beyond 90 degrees".
 pub(super) fn lost(lost: &afbc_sim::flight::Lost) -> String {
     format!("lost at t = {:.3} s: {}", lost.time_s, lost.reason)
+}
+
+/// Example: "its estimate is off by 0.0010 m, 0.018 m/s and 0.07 degrees (root mean squares), NEES 9.4 of 9".
+pub(super) fn estimate(estimate: &EstimateMetrics) -> String {
+    let EstimateMetrics { position_m, velocity_m_s, attitude_rad, nees, .. } = estimate;
+    let (position_m, velocity_m_s, attitude_deg) =
+        (position_m.norm(), velocity_m_s.norm(), attitude_rad.norm().to_degrees());
+    format!(
+        "its estimate is off by {position_m:.4} m, {velocity_m_s:.3} m/s and {attitude_deg:.2} degrees (root mean \
+         squares), NEES {nees:.1} of 9"
+    )
 }
 
 /// Example: "the monitor switched to backstepping at t = 15.625 s: rotors stay saturated".

@@ -1,6 +1,6 @@
 //! Quantities that every log of a flight has, by the names of their columns.
 
-use crate::flight::Sample;
+use crate::flight::{Estimated, Sample};
 
 /// A column's name, which ends in its unit, and the value under it.
 pub type Column = (&'static str, fn(&Sample) -> f64);
@@ -32,4 +32,28 @@ pub const MOTION: [Column; 25] = [
     ("psi_d_rad", |s| s.reference.yaw_rad),
     ("psi_d_rate_rad_s", |s| s.reference.yaw_rate_rad_s),
     ("psi_d_acceleration_rad_s2", |s| s.reference.yaw_acceleration_rad_s2),
+];
+
+/// Errors of the vehicle's own estimate, truth less estimate, and their standard deviations; `rx`, `ry` and `rz` are the
+/// rotation about the axes of the earth frame.
+pub const ESTIMATE: [(&str, fn(&Estimated) -> f32); 19] = [
+    ("x_estimate_error_m", |e| e.position_error_m.x),
+    ("x_estimate_sigma_m", |e| e.position_sigma_m.x),
+    ("y_estimate_error_m", |e| e.position_error_m.y),
+    ("y_estimate_sigma_m", |e| e.position_sigma_m.y),
+    ("z_estimate_error_m", |e| e.position_error_m.z),
+    ("z_estimate_sigma_m", |e| e.position_sigma_m.z),
+    ("vx_estimate_error_m_s", |e| e.velocity_error_m_s.x),
+    ("vx_estimate_sigma_m_s", |e| e.velocity_sigma_m_s.x),
+    ("vy_estimate_error_m_s", |e| e.velocity_error_m_s.y),
+    ("vy_estimate_sigma_m_s", |e| e.velocity_sigma_m_s.y),
+    ("vz_estimate_error_m_s", |e| e.velocity_error_m_s.z),
+    ("vz_estimate_sigma_m_s", |e| e.velocity_sigma_m_s.z),
+    ("rx_estimate_error_rad", |e| e.attitude_error_rad.x),
+    ("rx_estimate_sigma_rad", |e| e.attitude_sigma_rad.x),
+    ("ry_estimate_error_rad", |e| e.attitude_error_rad.y),
+    ("ry_estimate_sigma_rad", |e| e.attitude_sigma_rad.y),
+    ("rz_estimate_error_rad", |e| e.attitude_error_rad.z),
+    ("rz_estimate_sigma_rad", |e| e.attitude_sigma_rad.z),
+    ("estimate_nees", |e| e.nees),
 ];

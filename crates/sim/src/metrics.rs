@@ -1,7 +1,8 @@
 //! Figures of merit of one flight.
 
 use crate::flight::{Innovation, Sample};
-use afbc_estimator::Aid;
+pub use afbc_estimator::Aid;
+
 use nalgebra::{Vector3, Vector4};
 
 /// Time from which errors are evaluated \[s\], since flights start far from the reference.

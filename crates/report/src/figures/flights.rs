@@ -5,7 +5,7 @@ use super::plotted::{LINE_PX, Plotted, REFERENCE};
 use super::time_chart::{Chart, Line, Panel};
 use super::{canvas, trajectory};
 use crate::words;
-use afbc_sim::flight::Sample;
+use afbc_sim::flight::{Estimated, Sample};
 use afbc_sim::flown::Flown;
 use afbc_sim::metrics::tracking_error;
 use nalgebra::Vector4;
@@ -34,6 +34,21 @@ const ERRORS: [(&str, Value); 4] = [
     ("y⟨d⟩\u{a0}− y [m]", |s| tracking_error(s).y),
     ("z⟨d⟩\u{a0}− z [m]", |s| tracking_error(s).z),
     ("ψ⟨d⟩\u{a0}− ψ [rad]", |s| tracking_error(s).w),
+];
+/// A coordinate of the vehicle's own estimate: label, error and standard deviation.
+type Coordinate = (&'static str, fn(&Estimated) -> f32, fn(&Estimated) -> f32);
+
+/// The estimate's errors: in centimetres and degrees, since they are small.
+const ESTIMATE: [Coordinate; 9] = [
+    ("x [cm]", |e| 100.0 * e.position_error_m.x, |e| 100.0 * e.position_sigma_m.x),
+    ("y [cm]", |e| 100.0 * e.position_error_m.y, |e| 100.0 * e.position_sigma_m.y),
+    ("z [cm]", |e| 100.0 * e.position_error_m.z, |e| 100.0 * e.position_sigma_m.z),
+    ("v⟨x⟩ [cm/s]", |e| 100.0 * e.velocity_error_m_s.x, |e| 100.0 * e.velocity_sigma_m_s.x),
+    ("v⟨y⟩ [cm/s]", |e| 100.0 * e.velocity_error_m_s.y, |e| 100.0 * e.velocity_sigma_m_s.y),
+    ("v⟨z⟩ [cm/s]", |e| 100.0 * e.velocity_error_m_s.z, |e| 100.0 * e.velocity_sigma_m_s.z),
+    ("about x [°]", |e| e.attitude_error_rad.x.to_degrees(), |e| e.attitude_sigma_rad.x.to_degrees()),
+    ("about y [°]", |e| e.attitude_error_rad.y.to_degrees(), |e| e.attitude_sigma_rad.y.to_degrees()),
+    ("about z [°]", |e| e.attitude_error_rad.z.to_degrees(), |e| e.attitude_sigma_rad.z.to_degrees()),
 ];
 /// Fig. 8.
 const INPUTS: [(&str, Input); 4] = [("U₁ [N]", |u| u.x), ("U₂ [N]", |u| u.y), ("U₃ [N]", |u| u.z), ("U₄ [N]", |u| u.w)];
@@ -76,6 +91,20 @@ pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Picture>> {
         lines: rough_first.iter().map(|law| law.input(end_s, input)).collect(),
     });
 
+    let of = |sample: &Sample, value: fn(&Estimated) -> f32| sample.estimated.map_or(f64::NAN, |e| value(&e).into());
+    let estimate = ESTIMATE.map(|(label, error, sigma)| {
+        let band = |law: &&Plotted| {
+            let edge = |sign: f64| law.line(law.pale(), end_s, move |s| sign * 3.0 * of(s, sigma));
+            [1.0, -1.0].map(|sign| Line { is_reference: true, ..edge(sign) })
+        };
+        let lines = rough_first.iter().flat_map(band);
+        Panel {
+            label,
+            zero: true,
+            lines: lines.chain(rough_first.iter().map(|law| law.line(law.ink(), end_s, |s| of(s, error)))).collect(),
+        }
+    });
+
     let law_legend = || laws.iter().map(|law| (law.title(), law.ink()));
     let with_reference = || core::iter::once(("reference".to_owned(), REFERENCE)).chain(law_legend()).collect();
     let with_desired = laws.iter().flat_map(|law| {
@@ -91,7 +120,7 @@ pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Picture>> {
     };
     let jumps = if chatter { " Filled band: chatter, the input jumps between its edges." } else { "" };
     let (trajectory, seen) = trajectory::draw(&laws, longest, &conditions, with_reference())?;
-    Ok(vec![
+    let mut pictures = vec![
         Picture { name: "fig4-trajectory", caption: format!("The flights in space.{seen}"), svg: trajectory },
         chart(
             "fig5-outputs",
@@ -115,5 +144,12 @@ pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Picture>> {
             law_legend().collect(),
             controls.into(),
         )?,
-    ])
+    ];
+    if scenario.instruments.imu.is_some() {
+        let caption =
+            "The vehicle's own estimate: truth minus estimate, and three times its standard deviation (pale).";
+        let panels = estimate.into();
+        pictures.push(chart("fig9-estimate", caption, "Estimate", law_legend().collect(), panels)?);
+    }
+    Ok(pictures)
 }

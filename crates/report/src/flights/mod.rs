@@ -19,7 +19,7 @@ use std::path::PathBuf;
 /// * `<stem>-<contender>.csv`: each run's log;
 /// * `fig4-trajectory.svg`, `fig5-outputs.svg`, `fig6-attitude.svg`, `fig7-errors.svg`, `fig8-inputs.svg`: the
 ///   counterparts of the paper's figures, all contenders overlaid; with several scenarios, `<stem>-fig4-trajectory.svg`
-///   etc. for each;
+///   etc. for each; `fig9-estimate.svg` for vehicles that estimate their own state;
 /// * `summary.json`: the figures of merit of each run;
 /// * `report.html`: everything on one self-contained page.
 ///

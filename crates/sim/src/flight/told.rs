@@ -18,7 +18,7 @@ const SHAKEN: f64 = 0.55;
 /// Speed at which the noise of a tracker's stamps counts \[m/s\].
 const STAMPED_M_S: f64 = 1.0;
 /// Time for which an error of a magnetometer that turns with the vehicle counts as the same \[s\].
-const IRON_S: f64 = 1.0;
+const IRON_S: f64 = 10.0;
 /// Smallest standard deviation that is told, in the unit of each.
 const SIGMA_MIN: f64 = 1e-4;
 
