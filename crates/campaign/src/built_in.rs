@@ -6,9 +6,10 @@ use afbc_reader::{BuiltIn, FileError};
 use std::path::Path;
 
 /// Every built-in campaign.
-pub static BUILT_IN: [BuiltIn<Campaign>; 3] = [
+pub static BUILT_IN: [BuiltIn<Campaign>; 4] = [
     BuiltIn::new("robustness", include_str!("../campaigns/robustness.toml"), read),
     BuiltIn::new("ablation", include_str!("../campaigns/ablation.toml"), read),
+    BuiltIn::new("estimation", include_str!("../campaigns/estimation.toml"), read),
     BuiltIn::new("faults", include_str!("../campaigns/faults.toml"), read),
 ];
 

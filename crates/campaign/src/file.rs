@@ -2,6 +2,7 @@
 
 use crate::plan::{Campaign, Course, Spread};
 use crate::quantity::{QUANTITIES, Quantity};
+use afbc_plant::Suite;
 use afbc_reader::FileError;
 use afbc_reader::Table;
 use afbc_reader::words::out_of_range;
@@ -115,7 +116,29 @@ fn spreads(mut table: Table<'_>, scenario: &Scenario) -> Result<Vec<Spread>, Fil
 /// Returns why drawing this quantity would have no effect, if so.
 fn idle(name: &str, scenario: &Scenario) -> Option<&'static str> {
     let still = afbc_plant::Deviations::default();
+    let Suite { imu, tracker, gnss, barometer, magnetometer } = &scenario.instruments;
+    let lacks = |there: bool, cure| (!there).then_some(cure);
     match name {
+        "imu_part" => lacks(imu.is_some(), "the scenario has no inertial sensor; add imu to its [instruments]"),
+        "vibration_ratio" if imu.is_none_or(|imu| imu.gyro.vibration_rad_s + imu.accel.vibration_m_s2 == 0.0) => {
+            Some("the scenario has no vibration to multiply; add it to [instruments.imu]")
+        }
+        "barometer_part" => lacks(barometer.is_some(), "the scenario has no barometer; add one to its [instruments]"),
+        "magnetometer_part" => {
+            lacks(magnetometer.is_some(), "the scenario has no magnetometer; add one to its [instruments]")
+        }
+        "aiding" if tracker.is_none() || gnss.is_none() => {
+            Some("the scenario has nothing to choose from; add tracker and gnss to its [instruments]")
+        }
+        name if name.starts_with("tracker_") => {
+            lacks(tracker.is_some(), "the scenario has no tracker; add one to its [instruments]")
+        }
+        name if name.starts_with("gnss_") => {
+            lacks(gnss.is_some(), "the scenario has no GNSS receiver; add gnss to its [instruments]")
+        }
+        "sensor_delay_s" | "dropout_rate_hz" if imu.is_some() => {
+            Some("it has no effect on a vehicle that estimates its state; draw tracker_delay_s and the like")
+        }
         "wind_m_s" | "wind_20ft_m_s" if scenario.realism.drag.is_none() => {
             Some("wind has no effect on a vehicle without drag; add [drag] to the scenario")
         }

@@ -1,6 +1,7 @@
 //! Quantities that a campaign can draw.
 
-use afbc_plant::{Deviations, Dropouts, Environment, Payload, RotorFault, Turbulence};
+use afbc_plant::instruments::{Accelerometer, Barometer, Gyroscope, Imu, Magnetometer, Preset};
+use afbc_plant::{Deviations, Dropouts, Environment, Payload, RotorFault, Suite, Turbulence};
 use afbc_sim::scenario::Scenario;
 use afbc_types::{OutOfRange, Parameters, Range};
 use core::f64::consts::TAU;
@@ -62,9 +63,13 @@ const fn needing(needs: &'static str, quantity: Quantity) -> Quantity {
     Quantity { needs: Some(needs), ..quantity }
 }
 
+const fn whole(quantity: Quantity) -> Quantity {
+    Quantity { whole: true, ..quantity }
+}
+
 /// Every quantity. A flight draws one number for each, used or not, in this order, so that adding a quantity to a
 /// campaign does not change the others. New ones are appended.
-pub static QUANTITIES: [Quantity; 23] = [
+pub static QUANTITIES: [Quantity; 35] = [
     quantity("mass_ratio", 0.01, 100.0, "true mass over the scenario's", |f, x| f.truth.mass_kg *= x),
     quantity("inertia_ratio", 0.01, 100.0, "true Ix, Iy, Iz over the scenario's", |f, x| f.truth.inertia_kg_m2 *= x),
     quantity("thrust_factor_ratio", 0.01, 100.0, "true thrust factor over the scenario's", |f, x| {
@@ -170,7 +175,75 @@ pub static QUANTITIES: [Quantity; 23] = [
     quantity("start_z_m", -100.0, 100.0, "offset of the start from the scenario's, along z", |f, x| {
         f.scenario.initial.position_m.z += x
     }),
+    whole(quantity("imu_part", 1.0, 3.0, "inertial sensor: 1 ICM-42688-P, 2 BMI270, 3 MPU-6000", |f, x| {
+        let chosen = part(&Imu::PRESETS, x);
+        f.scenario.instruments.imu.iter_mut().zip(chosen).for_each(|(imu, chosen)| {
+            let gyro = Gyroscope { vibration_rad_s: imu.gyro.vibration_rad_s, ..chosen.gyro };
+            let accel = Accelerometer { vibration_m_s2: imu.accel.vibration_m_s2, ..chosen.accel };
+            (imu.gyro, imu.accel) = (gyro, accel);
+        });
+    })),
+    quantity("vibration_ratio", 0.0, 100.0, "vibration of the inertial sensor over the scenario's", |f, x| {
+        f.scenario.instruments.imu.iter_mut().for_each(|imu| {
+            imu.gyro.vibration_rad_s *= x;
+            imu.accel.vibration_m_s2 *= x;
+        });
+    }),
+    whole(quantity("barometer_part", 1.0, 2.0, "barometer: 1 DPS310, 2 BMP388", |f, x| {
+        let chosen = part(&Barometer::PRESETS, x);
+        f.scenario.instruments.barometer.iter_mut().zip(chosen).for_each(|(old, chosen)| *old = chosen);
+    })),
+    whole(quantity("magnetometer_part", 1.0, 2.0, "magnetometer: 1 IST8310, 2 QMC5883L", |f, x| {
+        let chosen = part(&Magnetometer::PRESETS, x);
+        f.scenario.instruments.magnetometer.iter_mut().zip(chosen).for_each(|(old, chosen)| *old = chosen);
+    })),
+    quantity("tracker_delay_s", 0.0, 1.0, "mean delay of the tracker", |f, x| {
+        f.scenario.instruments.tracker.iter_mut().for_each(|tracker| tracker.delay_s = x);
+    }),
+    quantity("tracker_outliers", 0.0, 1.0, "share of the tracker's fixes that are outliers", |f, x| {
+        f.scenario.instruments.tracker.iter_mut().for_each(|tracker| tracker.outliers = x);
+    }),
+    quantity("tracker_loss_rate_hz", 0.0, 1000.0, "rate of the tracker's dropouts", |f, x| {
+        f.scenario.instruments.tracker.iter_mut().for_each(|tracker| tracker.loss.rate_hz = x);
+    }),
+    needing(
+        "tracker_loss_rate_hz",
+        quantity("tracker_loss_mean_s", 0.0, 60.0, "their mean length; by default the scenario's", |f, x| {
+            f.scenario.instruments.tracker.iter_mut().for_each(|tracker| tracker.loss.mean_s = x);
+        }),
+    ),
+    quantity("gnss_delay_s", 0.0, 1.0, "mean delay of the GNSS receiver", |f, x| {
+        f.scenario.instruments.gnss.iter_mut().for_each(|gnss| gnss.delay_s = x);
+    }),
+    quantity("gnss_loss_rate_hz", 0.0, 1000.0, "rate of the GNSS receiver's dropouts", |f, x| {
+        f.scenario.instruments.gnss.iter_mut().for_each(|gnss| gnss.loss.rate_hz = x);
+    }),
+    needing(
+        "gnss_loss_rate_hz",
+        quantity("gnss_loss_mean_s", 0.0, 60.0, "their mean length; by default the scenario's", |f, x| {
+            f.scenario.instruments.gnss.iter_mut().for_each(|gnss| gnss.loss.mean_s = x);
+        }),
+    ),
+    whole(quantity(
+        "aiding",
+        1.0,
+        2.0,
+        "what aids the inertial sensor: 1 the tracker alone, 2 all others alone",
+        |f, x| {
+            let suite = &mut f.scenario.instruments;
+            *suite = if x < 1.5 {
+                Suite { imu: suite.imu, tracker: suite.tracker, ..Suite::default() }
+            } else {
+                Suite { tracker: None, ..*suite }
+            };
+        },
+    )),
 ];
+
+/// Returns the part of this number, from 1 on.
+fn part<T: Copy>(parts: &[Preset<T>], number: f64) -> Option<T> {
+    parts.get((number as usize).checked_sub(1)?).map(|part| part.settings)
+}
 
 fn scale(spread: &mut Deviations, ratio: f64) {
     let Deviations { position_m, velocity_m_s, attitude_rad, rates_rad_s } = spread;

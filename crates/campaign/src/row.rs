@@ -77,7 +77,7 @@ const fn figure(name: &'static str, meaning: &'static str, value: fn(&Tally) -> 
 
 /// Every figure of merit, in the order of the columns. Errors are evaluated from
 /// [`SETTLED_S`](afbc_sim::metrics::SETTLED_S) on.
-pub static FIGURES: [Figure; 17] = [
+pub static FIGURES: [Figure; 21] = [
     figure("lost_at_s", "when the vehicle was lost", |o| o.lost.map(|lost| lost.time_s)),
     figure("tripped_at_s", "when the monitor switched to the fallback law", |o| o.trip.map(|(time_s, _)| time_s)),
     figure("rmse_x_m", "root mean square error along x", |o| o.measured(o.metrics.rmse.x)),
@@ -98,6 +98,18 @@ pub static FIGURES: [Figure; 17] = [
     figure("mean_abs_du4_n", "mean |change of U4| per step", |o| o.changed(o.metrics.mean_abs_delta_u.w)),
     figure("saturated_ratio", "share of all steps with a rotor at its limit", |o| {
         Some(o.saturated as f64 / o.steps as f64)
+    }),
+    figure("estimate_position_rms_m", "root mean square error of the vehicle's own position", |o| {
+        o.metrics.estimate.map(|estimate| estimate.position_m.norm())
+    }),
+    figure("estimate_velocity_rms_m_s", "root mean square error of its velocity", |o| {
+        o.metrics.estimate.map(|estimate| estimate.velocity_m_s.norm())
+    }),
+    figure("estimate_attitude_rms_rad", "root mean square error of its attitude", |o| {
+        o.metrics.estimate.map(|estimate| estimate.attitude_rad.norm())
+    }),
+    figure("estimate_nees", "mean normalised estimation error squared of these nine", |o| {
+        o.metrics.estimate.map(|estimate| estimate.nees)
     }),
 ];
 

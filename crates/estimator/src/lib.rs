@@ -71,6 +71,11 @@
 //! * **At rest on the ground** ([`Memory::set_on_ground`]) the velocity is held at zero. In the air without any aid for
 //!   [`Settings::coast_s`] a weak zero (3 m/s) keeps roll and pitch level; velocity and position are then invalid.
 //!
+//! # For a controller
+//!
+//! When an aid comes back after seconds without, position and velocity jump to where they are. [`Easing`] tells a
+//! controller the same state without the jump.
+//!
 //! # When something is wrong
 //!
 //! Each kind of measurement has a gate. One that is rejected for [`Settings::reacquire_s`] without a break, with nobody
@@ -90,6 +95,7 @@
 mod aid;
 mod align;
 mod covariance;
+mod ease;
 mod estimate;
 mod estimator;
 mod fusion;
@@ -107,6 +113,7 @@ mod settings;
 
 pub use aid::{Aid, AidRecord, Aids};
 pub use align::Unready;
+pub use ease::Easing;
 pub use estimate::{Dropped, Estimate, Resets, Sigmas, Validity};
 pub use estimator::Estimator;
 pub use geodetic::Origin;

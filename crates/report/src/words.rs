@@ -175,6 +175,18 @@ pub(super) fn drawn(name: &str) -> String {
         "start_x_m" => "offset of the start along x [m]",
         "start_y_m" => "offset of the start along y [m]",
         "start_z_m" => "offset of the start along z [m]",
+        "imu_part" => "inertial sensor",
+        "vibration_ratio" => "vibration over the scenario's",
+        "barometer_part" => "barometer",
+        "magnetometer_part" => "magnetometer",
+        "tracker_delay_s" => "delay of the tracker [s]",
+        "tracker_outliers" => "share of outliers of the tracker",
+        "tracker_loss_rate_hz" => "rate of dropouts of the tracker [Hz]",
+        "tracker_loss_mean_s" => "mean length of a dropout of the tracker [s]",
+        "gnss_delay_s" => "delay of the GNSS receiver [s]",
+        "gnss_loss_rate_hz" => "rate of dropouts of the GNSS receiver [Hz]",
+        "gnss_loss_mean_s" => "mean length of a dropout of the GNSS receiver [s]",
+        "aiding" => "tracker (1) or GNSS, barometer and magnetometer (2)",
         other => return other.replace('_', " "),
     };
     words.into()

@@ -2,7 +2,7 @@
 
 use super::told::{self, Calibration};
 use crate::scenario::{Outage, Scenario};
-use afbc_estimator::{Aid, Estimate, Estimator, Memory};
+use afbc_estimator::{Aid, Easing, Estimate, Estimator, Memory};
 use afbc_plant::instruments::{Imu, Mounting};
 use afbc_plant::{Instruments, Suite, Truth};
 use afbc_types::{OutOfRange, State};
@@ -62,6 +62,7 @@ pub(super) struct Navigator {
     calibration: Calibration,
     estimator: Estimator,
     memory: Memory,
+    easing: Easing,
     outages: Vec<Outage>,
     step_s: f64,
     /// Steps since the beginning of settling, and how many of these there are before t = 0.
@@ -87,6 +88,7 @@ impl Navigator {
             calibration: Calibration::new(&mounting, step_s),
             estimator: estimator(scenario, &imu, step_s)?,
             memory: Memory::default(),
+            easing: Easing::default(),
             outages: scenario.outages.clone(),
             step_s,
             steps: 0,
@@ -154,7 +156,7 @@ impl Navigator {
             valid,
             innovation: self.innovation(&judged),
         };
-        let state = valid.then_some(estimate.state);
+        let state = Some(self.easing.step(&estimate)).filter(|_| valid);
         self.last = Some((truth.time_s, state, estimated));
         (state, estimated)
     }

@@ -16,7 +16,7 @@ mod tests;
 use super::definition::{DURATION, Scenario};
 use crate::contender::Contender;
 use crate::trajectory::Trajectory;
-use afbc_plant::{Frame, Model, Realism};
+use afbc_plant::{Frame, Model, Realism, Sensing};
 use afbc_reader::words::out_of_range;
 use afbc_reader::{FileError, Table};
 use afbc_types::{PLUS, Range};
@@ -80,6 +80,11 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
     let sensor_faults = sensors::faults(&mut root)?;
     let instruments = instruments::read(root.table("instruments")?)?;
     let instrument_faults = instruments::faults(&mut root, &instruments)?;
+    if instruments.imu.is_some() && (sensing != Sensing::default() || !sensor_faults.is_empty()) {
+        let key = if sensor_faults.is_empty() { "sensors" } else { "sensor_fault" };
+        let problem = "it has no effect on a vehicle that estimates its state; leave it out, or the inertial sensor";
+        return Err(root.fault_at(key, problem));
+    }
     let outages = environment::outages(&mut root)?;
     let flight_core = root.boolean("flight_core")?.unwrap_or(false);
 

@@ -1,0 +1,109 @@
+//! Corrections that a controller shall not feel as a jump.
+
+use crate::estimate::{Estimate, Resets};
+use afbc_control::math::min;
+use afbc_types::State;
+use nalgebra::Vector3;
+
+/// Share of a standard deviation below which it falls in a step only if something was found again.
+const FALLS: f32 = 0.9;
+/// Time in which what was hidden decays to 1/e \[s\].
+const DECAY_S: f32 = 0.3;
+
+/// Hides the jumps of position and velocity when an aid comes back: the state begins where it was, and approaches the
+/// estimate within a second. Corrections of usual size pass as they are, and so do attitude and rates.
+///
+/// The default is that before the first estimate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Easing {
+    last: Option<Estimate>,
+    /// Estimate less the state told.
+    position_m: Vector3<f32>,
+    velocity_m_s: Vector3<f32>,
+}
+
+impl Easing {
+    /// Returns the state to tell for this estimate; to be called with every one. Nothing is hidden of an estimate whose
+    /// position has not been valid before.
+    #[must_use = "the state is its result"]
+    pub fn step(&mut self, estimate: &Estimate) -> State {
+        let mut state = estimate.state;
+        let last = self.last.replace(*estimate).filter(|last| last.validity.position && estimate.validity.position);
+        let Some(last) = last else {
+            *self = Easing { last: self.last, ..Easing::default() };
+            return state;
+        };
+        let dt_s = min(estimate.at_us.saturating_sub(last.at_us) as f32 * 1e-6, DECAY_S);
+        let stays = 1.0 - dt_s / DECAY_S;
+        (self.position_m, self.velocity_m_s) = (self.position_m * stays, self.velocity_m_s * stays);
+        if found(&last, estimate) {
+            self.position_m += state.position_m - last.state.position_m - last.state.velocity_m_s * dt_s;
+            self.velocity_m_s += state.velocity_m_s - last.state.velocity_m_s;
+        }
+        state.position_m -= self.position_m;
+        state.velocity_m_s -= self.velocity_m_s;
+        state
+    }
+}
+
+/// True if this estimate is much surer than the last, or was set anew.
+fn found(last: &Estimate, estimate: &Estimate) -> bool {
+    let falls = |now: &Vector3<f32>, before: &Vector3<f32>| {
+        now.x < FALLS * before.x || now.y < FALLS * before.y || now.z < FALLS * before.z
+    };
+    let sets = |resets: &Resets| (resets.position, resets.velocity);
+    falls(&estimate.sigmas.position_m, &last.sigmas.position_m)
+        || falls(&estimate.sigmas.velocity_m_s, &last.sigmas.velocity_m_s)
+        || sets(&estimate.resets) != sets(&last.resets)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Easing;
+    use crate::estimate::{Estimate, Sigmas, Validity};
+    use nalgebra::Vector3;
+
+    /// An estimate of a vehicle at 1 m/s whose position is off by `error_m`.
+    fn estimate(ms: u64, error_m: f32, sigma_m: f32) -> Estimate {
+        let sigmas = Sigmas { position_m: Vector3::repeat(sigma_m), ..Sigmas::default() };
+        let mut estimate = Estimate { at_us: 1000 * ms, sigmas, ..Estimate::default() };
+        estimate.validity = Validity { position: true, ..Validity::default() };
+        estimate.state.velocity_m_s.x = 1.0;
+        estimate.state.position_m.x = 1e-3 * ms as f32 + error_m;
+        estimate
+    }
+
+    #[test]
+    fn a_return_is_eased_and_then_forgotten() {
+        let mut easing = Easing::default();
+        for ms in 0..3000 {
+            let back = ms >= 1000;
+            let (error_m, sigma_m) = if back { (0.0, 1e-3) } else { (0.2, 0.1) };
+            let told = easing.step(&estimate(ms, error_m, sigma_m)).position_m.x - 1e-3 * ms as f32;
+            let expected = if back { 0.2 * (-1e-3 * (ms - 1000) as f32 / 0.3).exp() } else { 0.2 };
+            assert!((told - expected).abs() < 2e-3, "{ms} ms: {told} m, not {expected} m");
+        }
+    }
+
+    /// A vehicle that accelerates and usual corrections are told as they are.
+    #[test]
+    fn nothing_else_is_eased() {
+        let mut easing = Easing::default();
+        for ms in 0..100 {
+            let mut estimate = estimate(ms, 1e-3 * (ms % 7) as f32, if ms % 10 == 0 { 0.95e-3 } else { 1e-3 });
+            estimate.state.velocity_m_s.z = 0.1 * ms as f32;
+            assert_eq!(easing.step(&estimate), estimate.state);
+        }
+    }
+
+    /// The first fix, and the first after the position was lost, are told at once.
+    #[test]
+    fn the_first_position_is_not_eased() {
+        let mut easing = Easing::default();
+        for ms in 0..100 {
+            let mut estimate = estimate(ms, if ms < 50 { 5.0 } else { 0.0 }, if ms < 50 { 9.0 } else { 1e-3 });
+            estimate.validity.position = ms >= 50;
+            assert_eq!(easing.step(&estimate), estimate.state);
+        }
+    }
+}

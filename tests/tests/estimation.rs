@@ -1,0 +1,296 @@
+//! Flights on the vehicle's own estimate: how accurate and how honest it is in the closed loop. `docs/estimation.md`
+//! shows the figures; `--nocapture` prints them.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // what cannot be flown must stop the test
+
+use afbc_plant::instruments::{Failure, InstrumentFault};
+use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_sim::flight::{Estimated, Sample, World, fly};
+use afbc_sim::metrics::{Accumulator, Aid, EstimateMetrics, Metrics, SETTLED_S};
+use afbc_sim::scenario::{Outage, Scenario, built_in};
+use afbc_sim::trajectory::Trajectory;
+use nalgebra::{Vector3, Vector4};
+
+fn scenario(name: &str) -> Scenario {
+    built_in(name).unwrap().read().unwrap()
+}
+
+fn afbc(scenario: &Scenario) -> &Contender {
+    scenario.contender(ControllerKind::Afbc).unwrap()
+}
+
+/// Flies under AFBC, which must keep the vehicle.
+fn flown(scenario: &Scenario, mut observe: impl FnMut(&Sample)) -> Metrics {
+    let mut metrics = Accumulator::default();
+    let lost = fly(scenario, afbc(scenario), |sample| {
+        metrics.add(sample);
+        observe(sample);
+    });
+    assert_eq!(lost.unwrap(), None, "{}, seed {}", scenario.name, scenario.seed);
+    metrics.finish()
+}
+
+/// Mean squares over flights with the seeds 1 to `flights`: of the estimate's errors, and the largest errors of
+/// tracking.
+fn accuracy(scenario: &Scenario, flights: u64) -> (EstimateMetrics, Vector4<f64>) {
+    let mut sum = EstimateMetrics::default();
+    let mut tracking = Vector4::zeros();
+    for seed in 1..=flights {
+        let metrics = flown(&Scenario { seed, ..scenario.clone() }, |_| ());
+        let estimate = metrics.estimate.unwrap();
+        assert_eq!(estimate.valid_ratio, 1.0, "seed {seed}");
+        let square = |v: &Vector3<f64>| v.component_mul(v) / flights as f64;
+        sum.position_m += square(&estimate.position_m);
+        sum.velocity_m_s += square(&estimate.velocity_m_s);
+        sum.attitude_rad += square(&estimate.attitude_rad);
+        tracking = tracking.sup(&metrics.rmse);
+    }
+    let root = |v: Vector3<f64>| v.map(f64::sqrt);
+    let [position_m, velocity_m_s, attitude_rad] = [sum.position_m, sum.velocity_m_s, sum.attitude_rad].map(root);
+    (EstimateMetrics { position_m, velocity_m_s, attitude_rad, ..sum }, tracking)
+}
+
+/// The paper's trajectory in front of a motion-capture system.
+#[test]
+fn indoors() {
+    let (estimate, tracking) = accuracy(&scenario("mocap"), 10);
+    let (p, v, a) = (estimate.position_m.norm(), estimate.velocity_m_s.norm(), estimate.attitude_rad.norm());
+    println!("mocap: {p:.5} m, {v:.4} m/s, {:.3} deg; tracking at most {tracking:.4}", a.to_degrees());
+    assert!(p <= 0.003 && v <= 0.02 && a.to_degrees() <= 0.3, "{p} m, {v} m/s, {a} rad");
+    assert!(tracking.max() <= 0.01, "{tracking}");
+}
+
+/// The paper's trajectory on GNSS, barometer and magnetometer. What the receiver's slow error is, no filter can tell:
+/// the position is as good as the receiver, and better than half of it where its error is noise.
+#[test]
+fn outdoors() {
+    let scenario = scenario("outdoor");
+    let (estimate, _) = accuracy(&scenario, 20);
+    let own_m = |scenario: &Scenario| {
+        let gnss = scenario.instruments.gnss.unwrap();
+        (2.0 * (gnss.horizontal_m * gnss.horizontal_m + gnss.noise_m * gnss.noise_m)).sqrt()
+    };
+    let report = |name: &str, scenario: &Scenario, estimate: &EstimateMetrics| {
+        let (h, v) = (estimate.position_m.xy().norm(), estimate.velocity_m_s.norm());
+        let tilt = estimate.attitude_rad.xy().norm().to_degrees();
+        let heading = estimate.attitude_rad.z.to_degrees();
+        let own_m = own_m(scenario);
+        println!(
+            "{name}: horizontal {h:.3} m of {own_m:.3} m, {v:.4} m/s, tilt {tilt:.3} deg, heading {heading:.2} deg"
+        );
+        assert!(v <= 0.15 && tilt <= 1.0 && heading <= 3.0, "{name}: {v} m/s, {tilt} deg, {heading} deg");
+        h / own_m
+    };
+    let share = report("outdoor", &scenario, &estimate);
+    assert!(share <= 1.05, "{share}");
+    let mut fast = scenario;
+    fast.instruments.gnss.as_mut().unwrap().horizontal_m = 0.0;
+    fast.instruments.gnss.as_mut().unwrap().vertical_m = 0.0;
+    let (estimate, _) = accuracy(&fast, 20);
+    let share = report("outdoor, a receiver without slow error", &fast, &estimate);
+    assert!(share <= 0.5, "{share}");
+}
+
+/// A hover in which the tracker is gone for `gap_s`: the largest distance from the reference, and the largest changes
+/// of the inputs per step before, and from its return on.
+fn without_tracker(gap_s: f64, seed: u64) -> (f64, f64, f64) {
+    let mut scenario = scenario("mocap");
+    let position_m = Vector3::new(0.0, 0.0, 2.0);
+    scenario.trajectory = Trajectory::Hover { position_m, yaw_rad: 0.0 };
+    scenario.initial.position_m = position_m;
+    scenario.initial.attitude_rad = Vector3::zeros();
+    scenario.initial.velocity_m_s = Vector3::zeros();
+    (scenario.duration_s, scenario.seed) = (20.0, seed);
+    let [start_s, end_s] = [10.0, 10.0 + gap_s];
+    scenario.instrument_faults = vec![InstrumentFault { failure: Failure::TrackerLost, start_s, end_s }];
+    let (mut far_m, mut before, mut after) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let mut last: Option<Vector4<f64>> = None;
+    flown(&scenario, |sample| {
+        let u = afbc_sim::metrics::inputs(sample);
+        let change = last.replace(u).map_or(0.0, |last| (u - last).amax());
+        if (SETTLED_S..start_s).contains(&sample.time_s) {
+            before = before.max(change);
+        } else if sample.time_s >= start_s {
+            far_m = far_m.max((sample.motion.position_m - position_m).norm());
+            after = after.max(if sample.time_s >= end_s { change } else { 0.0 });
+            assert!(sample.estimated.unwrap().valid, "{} s", sample.time_s);
+        }
+    });
+    (far_m, before, after)
+}
+
+#[test]
+fn the_tracker_is_gone_in_hover() {
+    for (gap_s, most_m) in [(1.0, 0.2), (3.0, 1.5)] {
+        let flights: Vec<_> = (1..=20).map(|seed| without_tracker(gap_s, seed)).collect();
+        let far_m = flights.iter().fold(0.0_f64, |far_m, flight| far_m.max(flight.0));
+        let before = flights.iter().fold(0.0_f64, |most, flight| most.max(flight.1));
+        let after = flights.iter().fold(0.0_f64, |most, flight| most.max(flight.2));
+        // Vibration changes the inputs too; the return of the tracker no more than that.
+        println!("{gap_s} s without tracker: {far_m:.3} m; inputs change by {before:.4} N before, {after:.4} N after");
+        assert!(far_m <= most_m, "{gap_s} s: {far_m} m");
+        assert!(after <= 1.2 * before, "{gap_s} s: {after} N after {before} N");
+    }
+}
+
+/// A tracker that does not return: the position is invalid after 5 s, and the pilot is not told one.
+#[test]
+fn a_tracker_gone_for_good_is_admitted() {
+    let mut scenario = scenario("mocap");
+    let failure = Failure::TrackerLost;
+    scenario.instrument_faults = vec![InstrumentFault { failure, start_s: 1.0, end_s: f64::INFINITY }];
+    let mut world = World::new(&scenario, 0.001).unwrap();
+    let mut lost_s = None;
+    for _ in 0..8000 {
+        let view = world.look();
+        assert_eq!(view.state.is_some(), view.estimated.unwrap().valid);
+        if view.state.is_none() {
+            lost_s.get_or_insert(view.time_s);
+        }
+        // Free fall, but that is for the controller to care about.
+        world.advance(&Default::default());
+    }
+    let lost_s = lost_s.unwrap();
+    assert!((5.0..7.0).contains(&lost_s), "{lost_s} s");
+}
+
+/// A vehicle that is held is not measured again, however often somebody looks.
+#[test]
+fn looking_twice_changes_nothing() {
+    let mut world = World::new(&scenario("outdoor"), 0.001).unwrap();
+    let first = world.look();
+    let second = world.look();
+    assert_eq!((first.state, first.estimated), (second.state, second.estimated));
+    assert!(first.state.is_some(), "it has settled before t = 0");
+}
+
+/// An outage of the link takes the tracker away, not the estimate.
+#[test]
+fn an_outage_is_not_one_of_the_estimate() {
+    let mut scenario = scenario("mocap");
+    scenario.duration_s = 12.0;
+    scenario.outages = vec![Outage { start_s: 6.0, end_s: 7.0 }];
+    let (mut within, mut before) = (0.0_f32, 0.0_f32);
+    flown(&scenario, |sample| {
+        let estimated = sample.estimated.unwrap();
+        assert!(estimated.valid);
+        let sigma = estimated.position_sigma_m.max();
+        if (SETTLED_S..6.0).contains(&sample.time_s) {
+            before = before.max(sigma);
+        } else if sample.time_s < 7.0 {
+            within = within.max(sigma);
+        }
+    });
+    assert!(within > 3.0 * before, "{within} m and {before} m");
+}
+
+#[test]
+fn every_law_flies_on_it() {
+    for name in ["mocap", "outdoor"] {
+        let scenario = Scenario { duration_s: 15.0, ..scenario(name) };
+        assert_eq!(scenario.contenders.len(), ControllerKind::ALL.len());
+        for contender in &scenario.contenders {
+            let mut estimates = 0;
+            let lost = fly(&scenario, contender, |sample| estimates += u32::from(sample.estimated.is_some()));
+            assert_eq!((lost.unwrap(), estimates), (None, 15_001), "{name}, {}", contender.name);
+        }
+    }
+}
+
+#[test]
+fn the_same_flight_twice() {
+    let estimates = || {
+        let mut all: Vec<Estimated> = Vec::new();
+        let scenario = Scenario { duration_s: 2.0, ..scenario("outdoor") };
+        flown(&scenario, |sample| all.extend(sample.estimated));
+        all
+    };
+    let first = estimates();
+    assert_eq!(first.len(), 2001);
+    assert!(first == estimates());
+}
+
+/// Means over the flights of a Monte Carlo.
+#[derive(Default)]
+struct Consistency {
+    /// NEES of the nine at each of [`TIMES_S`].
+    nees: [f64; TIMES_S.len()],
+    /// Squared error over variance of attitude, velocity and position, each coordinate, at these times.
+    ratios: [Vector3<f64>; 3],
+    /// Of each aid: normalised innovations squared, their scalars, measurements rejected.
+    nis: [(f64, u64, u64); Aid::ALL.len()],
+}
+
+const FLIGHTS: u64 = 100;
+const TIMES_S: [f64; 4] = [6.0, 8.0, 10.0, 12.0];
+
+fn monte_carlo(scenario: &Scenario) -> Consistency {
+    let mut sum = Consistency::default();
+    for seed in 1..=FLIGHTS {
+        let scenario = Scenario { seed, duration_s: 12.0, ..scenario.clone() };
+        let metrics = flown(&scenario, |sample| {
+            let Some(i) = TIMES_S.iter().position(|time_s| (sample.time_s - time_s).abs() < 1e-6) else { return };
+            let e = sample.estimated.unwrap();
+            sum.nees[i] += f64::from(e.nees) / FLIGHTS as f64;
+            let pairs = [
+                (e.attitude_error_rad, e.attitude_sigma_rad),
+                (e.velocity_error_m_s, e.velocity_sigma_m_s),
+                (e.position_error_m, e.position_sigma_m),
+            ];
+            for (ratio, (error, sigma)) in sum.ratios.iter_mut().zip(pairs) {
+                let normal = error.component_div(&sigma).cast::<f64>();
+                *ratio += normal.component_mul(&normal) / (FLIGHTS as usize * TIMES_S.len()) as f64;
+            }
+        });
+        for (sum, aid) in sum.nis.iter_mut().zip(metrics.estimate.unwrap().aids) {
+            *sum = (sum.0 + aid.nis * aid.scalars as f64, sum.1 + aid.scalars, sum.2 + aid.rejected);
+        }
+    }
+    println!("{}: NEES {:.2?}", scenario.name, sum.nees);
+    for (name, ratio) in ["attitude", "velocity", "position"].iter().zip(&sum.ratios) {
+        println!("  {name}: squared error over variance {:.2?}", ratio.as_slice());
+    }
+    for (aid, (nis, scalars, rejected)) in Aid::ALL.iter().zip(&sum.nis).filter(|(_, (_, scalars, _))| *scalars > 0) {
+        println!("  {aid:?}: NIS per scalar {:.3} of {scalars}, rejected {rejected}", nis / *scalars as f64);
+    }
+    sum
+}
+
+impl Consistency {
+    fn nis(&self, aid: Aid) -> f64 {
+        let (sum, scalars, _) = self.nis[Aid::ALL.iter().position(|one| *one == aid).unwrap()];
+        sum / scalars as f64
+    }
+}
+
+/// Bounds of 95 % of the mean over the flights of chi-square numbers with `degrees` of freedom: normal, since many.
+fn is_consistent(mean: f64, degrees: f64) -> bool {
+    (mean - degrees).abs() <= 1.96 * (2.0 * degrees / FLIGHTS as f64).sqrt()
+}
+
+#[test]
+fn consistent_indoors() {
+    let found = monte_carlo(&scenario("mocap"));
+    for (nees, time_s) in found.nees.iter().zip(TIMES_S) {
+        assert!(is_consistent(*nees, 9.0), "{nees} at {time_s} s");
+    }
+    for aid in [Aid::TrackerPosition, Aid::TrackerAttitude] {
+        assert!((0.9..1.05).contains(&found.nis(aid)), "{aid:?}: {}", found.nis(aid));
+    }
+}
+
+/// The position is not consistent outdoors, since the filter takes the receiver's slow error for noise; nothing else may
+/// be more wrong than it says.
+#[test]
+fn consistent_outdoors() {
+    let slow = scenario("outdoor");
+    let mut fast = slow.clone();
+    fast.name = "outdoor, a receiver without slow error".into();
+    fast.instruments.gnss.as_mut().unwrap().horizontal_m = 0.0;
+    fast.instruments.gnss.as_mut().unwrap().vertical_m = 0.0;
+    for (scenario, position) in [(&slow, false), (&fast, true)] {
+        let found = monte_carlo(scenario);
+        for (ratio, judged) in found.ratios.iter().zip([true, true, position]) {
+            assert!(!judged || ratio.max() <= 1.3, "{}: {:?}", scenario.name, found.ratios);
+        }
+    }
+}
