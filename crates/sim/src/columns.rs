@@ -34,9 +34,12 @@ pub const MOTION: [Column; 25] = [
     ("psi_d_acceleration_rad_s2", |s| s.reference.yaw_acceleration_rad_s2),
 ];
 
+/// A column of the vehicle's own estimate.
+pub type EstimateColumn = (&'static str, fn(&Estimated) -> f32);
+
 /// Errors of the vehicle's own estimate, truth less estimate, and their standard deviations; `rx`, `ry` and `rz` are the
 /// rotation about the axes of the earth frame.
-pub const ESTIMATE: [(&str, fn(&Estimated) -> f32); 19] = [
+pub const ESTIMATE: [EstimateColumn; 19] = [
     ("x_estimate_error_m", |e| e.position_error_m.x),
     ("x_estimate_sigma_m", |e| e.position_sigma_m.x),
     ("y_estimate_error_m", |e| e.position_error_m.y),

@@ -140,7 +140,7 @@ impl Navigator {
         let validity = &estimate.validity;
         let valid = validity.attitude && validity.heading && validity.velocity && validity.position;
         let nees = match self.last {
-            Some((_, _, last)) if self.steps % NEES_EVERY != 0 => last.nees,
+            Some((_, _, last)) if !self.steps.is_multiple_of(NEES_EVERY) => last.nees,
             _ => self.nees(&estimate, truth) as f32,
         };
         let errors = errors(&estimate, truth).cast::<f32>();
@@ -208,8 +208,9 @@ impl Navigator {
         let rows = self.memory.covariance();
         let at = |i: usize, j: usize| rows.get(i).and_then(|row| row.get(j)).map_or(f64::NAN, |&cell| f64::from(cell));
         // Scaled, so that units do not matter.
-        let scale = SVector::<f64, 9>::from_fn(|i, _| libm::sqrt(at(i, i)));
-        let correlation = SMatrix::<f64, 9, 9>::from_fn(|i, j| at(i, j) / (scale[i] * scale[j]));
+        let covariance = SMatrix::<f64, 9, 9>::from_fn(at);
+        let scale = covariance.diagonal().map(libm::sqrt);
+        let correlation = covariance.component_div(&(scale * scale.transpose()));
         let e = errors(estimate, truth).component_div(&scale);
         correlation.cholesky().map_or(f64::NAN, |factor| factor.solve(&e).dot(&e))
     }

@@ -163,6 +163,7 @@ pub(super) fn field(fix: &FieldFix, part: &Magnetometer, at_us: impl Fn(f64) -> 
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "what cannot be built must stop the test")]
 mod tests {
     use super::Calibration;
     use afbc_plant::instruments::{Imu, Mounting};
