@@ -49,7 +49,8 @@ fn keys(path: &str, value: &Value, found: &mut BTreeSet<String>) {
     }
 }
 
-/// Checks that every command of a section prints the documented keys, or null in place of all those of one object; returns the output of the first.
+/// Checks that every command of a section prints the documented keys, or null in place of all those of one object;
+/// returns the output of the first.
 fn prints(folder: &Path, section: &str, commands: &[&[&str]]) -> Value {
     let mut first = None;
     for command in commands {
