@@ -278,8 +278,8 @@ fn consistent_indoors() {
     }
 }
 
-/// The position is not consistent outdoors, since the filter takes the receiver's slow error for noise; nothing else may
-/// be more wrong than it says.
+/// The position is not consistent outdoors, since the filter takes the receiver's slow error for noise; nothing else
+/// may be more wrong than it says.
 #[test]
 fn consistent_outdoors() {
     let slow = scenario("outdoor");

@@ -37,8 +37,8 @@ pub const MOTION: [Column; 25] = [
 /// A column of the vehicle's own estimate.
 pub type EstimateColumn = (&'static str, fn(&Estimated) -> f32);
 
-/// Errors of the vehicle's own estimate, truth less estimate, and their standard deviations; `rx`, `ry` and `rz` are the
-/// rotation about the axes of the earth frame.
+/// Errors of the vehicle's own estimate, truth less estimate, and their standard deviations; `rx`, `ry` and `rz` are
+/// the rotation about the axes of the earth frame.
 pub const ESTIMATE: [EstimateColumn; 19] = [
     ("x_estimate_error_m", |e| e.position_error_m.x),
     ("x_estimate_sigma_m", |e| e.position_sigma_m.x),
