@@ -40,6 +40,10 @@ fn instruments_and_faults_that_do_not_exist_are_refused() {
         ("[instruments]\nimu = \"bmi160\"", format!("2: instruments.imu: \"bmi160\" is unknown; it must be {parts}")),
         ("[instruments]\ncompass = \"ist8310\"", format!("2: instruments.compass: unknown key; known here: {known}")),
         (
+            "[instruments]\ngnss = \"m10\"",
+            "1: instruments.imu: missing; add it, since the other instruments have no effect without it".into(),
+        ),
+        (
             "[instruments.imu.gyro]\nscale = 0.2",
             "2: instruments.imu.gyro.scale: 0.2 is out of range: it must lie within 0 to 0.1".into(),
         ),

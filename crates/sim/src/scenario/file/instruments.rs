@@ -40,8 +40,9 @@ pub(super) fn read(table: Option<Table<'_>>) -> Result<Suite, FileError> {
         barometer: part(&mut table, "barometer", &Barometer::PRESETS, &[])?,
         magnetometer: part(&mut table, "magnetometer", &Magnetometer::PRESETS, &[])?,
     };
+    let blind = table.fault("imu", "missing; add it, since the other instruments have no effect without it");
     table.finish()?;
-    Ok(suite)
+    if suite.imu.is_some() { Ok(suite) } else { Err(blind) }
 }
 
 /// Reads an instrument by the name of a part, or as a table, with a table for each of its groups, that may name one.

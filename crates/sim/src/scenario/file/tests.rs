@@ -50,10 +50,13 @@ fn sections() -> Vec<Section> {
     sections
 }
 
-/// Parses an example, with a trajectory added if it has none.
+/// Parses an example, with a trajectory added if it has none, and an inertial sensor if it has other instruments only.
 fn example(text: &str) -> Result<Scenario, FileError> {
     let hover = "\n[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
-    parse("example", &format!("{text}{}", if text.contains("[trajectory]") { "" } else { hover }), "example")
+    let added = if text.contains("[trajectory]") { "" } else { hover };
+    let alone = text.contains("[instruments.") && !text.contains("[instruments.imu");
+    let imu = if alone { "\n[instruments.imu]\n" } else { "" };
+    parse("example", &format!("{text}{added}{imu}"), "example")
 }
 
 /// Replaces the first line of `text` that sets `key`.
