@@ -81,7 +81,7 @@ fn outdoors() {
         h / own_m
     };
     let share = report("outdoor", &scenario, &estimate);
-    assert!(share <= 1.05, "{share}");
+    assert!(share <= 1.0, "{share}");
     let mut fast = scenario;
     fast.instruments.gnss.as_mut().unwrap().horizontal_m = 0.0;
     fast.instruments.gnss.as_mut().unwrap().vertical_m = 0.0;
@@ -90,9 +90,9 @@ fn outdoors() {
     assert!(share <= 0.5, "{share}");
 }
 
-/// A hover in which the tracker is gone for `gap_s`: the largest distance from the reference, and the largest changes
+/// A hover in which the tracker fails for `gap_s`: the largest distance from the reference, and the largest changes
 /// of the inputs per step before, and from its return on.
-fn without_tracker(gap_s: f64, seed: u64) -> (f64, f64, f64) {
+fn without_tracker(failure: Failure, gap_s: f64, seed: u64) -> (f64, f64, f64) {
     let mut scenario = scenario("mocap");
     let position_m = Vector3::new(0.0, 0.0, 2.0);
     scenario.trajectory = Trajectory::Hover { position_m, yaw_rad: 0.0 };
@@ -101,7 +101,7 @@ fn without_tracker(gap_s: f64, seed: u64) -> (f64, f64, f64) {
     scenario.initial.velocity_m_s = Vector3::zeros();
     (scenario.duration_s, scenario.seed) = (20.0, seed);
     let [start_s, end_s] = [10.0, 10.0 + gap_s];
-    scenario.instrument_faults = vec![InstrumentFault { failure: Failure::TrackerLost, start_s, end_s }];
+    scenario.instrument_faults = vec![InstrumentFault { failure, start_s, end_s }];
     let (mut far_m, mut before, mut after) = (0.0_f64, 0.0_f64, 0.0_f64);
     let mut last: Option<Vector4<f64>> = None;
     flown(&scenario, |sample| {
@@ -120,23 +120,32 @@ fn without_tracker(gap_s: f64, seed: u64) -> (f64, f64, f64) {
 
 #[test]
 fn the_tracker_is_gone_in_hover() {
-    for (gap_s, most_m) in [(1.0, 0.2), (3.0, 1.5)] {
-        let flights: Vec<_> = (1..=20).map(|seed| without_tracker(gap_s, seed)).collect();
+    let (lost, frozen) = (Failure::TrackerLost, Failure::TrackerFrozen);
+    for (failure, gap_s, most_m) in [(lost, 1.0, 0.2), (lost, 3.0, 1.5), (frozen, 3.0, 1.5)] {
+        let flights: Vec<_> = (1..=20).map(|seed| without_tracker(failure, gap_s, seed)).collect();
         let far_m = flights.iter().fold(0.0_f64, |far_m, flight| far_m.max(flight.0));
         let before = flights.iter().fold(0.0_f64, |most, flight| most.max(flight.1));
         let after = flights.iter().fold(0.0_f64, |most, flight| most.max(flight.2));
         // Vibration changes the inputs too; the return of the tracker no more than that.
-        println!("{gap_s} s without tracker: {far_m:.3} m; inputs change by {before:.4} N before, {after:.4} N after");
+        println!(
+            "{} for {gap_s} s: {far_m:.3} m; inputs change by {before:.4} N before, {after:.4} N after",
+            failure.name()
+        );
         assert!(far_m <= most_m, "{gap_s} s: {far_m} m");
         assert!(after <= 1.2 * before, "{gap_s} s: {after} N after {before} N");
     }
 }
 
-/// A tracker that does not return: the position is invalid after 5 s, and the pilot is not told one.
+/// A tracker that does not return, or says the same for ever: the position is invalid after 5 s, and the pilot is not
+/// told one.
 #[test]
 fn a_tracker_gone_for_good_is_admitted() {
+    admitted(Failure::TrackerLost);
+    admitted(Failure::TrackerFrozen);
+}
+
+fn admitted(failure: Failure) {
     let mut scenario = scenario("mocap");
-    let failure = Failure::TrackerLost;
     scenario.instrument_faults = vec![InstrumentFault { failure, start_s: 1.0, end_s: f64::INFINITY }];
     let mut world = World::new(&scenario, 0.001).unwrap();
     let mut lost_s = None;
@@ -278,8 +287,8 @@ fn consistent_indoors() {
     }
 }
 
-/// The position is not consistent outdoors, since the filter takes the receiver's slow error for noise; nothing else
-/// may be more wrong than it says.
+/// Nothing may be more wrong than it says: no error, no position by the receiver's slow error, no innovation but those
+/// that the document explains.
 #[test]
 fn consistent_outdoors() {
     let slow = scenario("outdoor");
@@ -287,10 +296,55 @@ fn consistent_outdoors() {
     fast.name = "outdoor, a receiver without slow error".into();
     fast.instruments.gnss.as_mut().unwrap().horizontal_m = 0.0;
     fast.instruments.gnss.as_mut().unwrap().vertical_m = 0.0;
-    for (scenario, position) in [(&slow, false), (&fast, true)] {
+    for (scenario, height) in [(&slow, 1.3), (&fast, 1.02)] {
         let found = monte_carlo(scenario);
-        for (ratio, judged) in found.ratios.iter().zip([true, true, position]) {
-            assert!(!judged || ratio.max() <= 1.3, "{}: {:?}", scenario.name, found.ratios);
-        }
+        let name = &scenario.name;
+        // Stated somewhat too large, for vibration: below the lower bound, never above the upper one.
+        let most = 9.0 + 1.96 * (18.0 / FLIGHTS as f64).sqrt();
+        assert!(found.nees.iter().all(|nees| (6.0..most).contains(nees)), "{name}: {:?}", found.nees);
+        assert!(found.ratios.iter().all(|ratio| ratio.max() <= 1.3), "{name}: {:?}", found.ratios);
+        // 95 % of 21 000 scalars.
+        assert!((0.981..1.019).contains(&found.nis(Aid::GnssPosition)), "{name}: {}", found.nis(Aid::GnssPosition));
+        assert!((0.9..1.019).contains(&found.nis(Aid::GnssVelocity)), "{name}: {}", found.nis(Aid::GnssVelocity));
+        assert!((0.98..height).contains(&found.nis(Aid::Height)), "{name}: {}", found.nis(Aid::Height));
+        assert!(found.nis(Aid::Heading) < 0.02, "{name}: {}", found.nis(Aid::Heading));
+    }
+}
+
+/// Hours of flight, a tenth of one each by default; `HOURS=10` flies ten: the covariance is positive and bounded, and
+/// no error grows that its standard deviation does not tell.
+#[test]
+fn hours_of_flight() {
+    let hours: f64 = std::env::var("HOURS").map_or(0.1, |hours| hours.parse().unwrap());
+    for (name, sigma_m, degrees) in [("mocap", 0.01, 10.0), ("outdoor", 3.0, 11.0)] {
+        let scenario = Scenario { duration_s: 3600.0 * hours, ..scenario(name) };
+        let (mut checks, mut far, mut nees, mut sigmas) = (0.0, Vec::from([0.0; 9]), 0.0, [0.0_f32; 3]);
+        flown(&scenario, |sample| {
+            let e = sample.estimated.unwrap();
+            // Not a number if the covariance is not positive.
+            assert!(e.valid && e.nees.is_finite(), "{name}, {} s: {e:?}", sample.time_s);
+            if sample.time_s < SETTLED_S || (sample.time_s + 0.5).fract() > 0.0005 {
+                return;
+            }
+            let pairs = [
+                (e.attitude_error_rad, e.attitude_sigma_rad),
+                (e.velocity_error_m_s, e.velocity_sigma_m_s),
+                (e.position_error_m, e.position_sigma_m),
+            ];
+            let ratios = pairs.iter().flat_map(|(error, sigma)| error.component_div(sigma).data.0[0]);
+            for (i, ratio) in ratios.enumerate() {
+                assert!(ratio.abs() < 6.0, "{name}, {} s, state {i}: {ratio} sigma", sample.time_s);
+                far[i] += f64::from(u8::from(ratio.abs() > 3.0));
+            }
+            let largest = [e.attitude_sigma_rad.max(), e.velocity_sigma_m_s.max(), e.position_sigma_m.max()];
+            sigmas.iter_mut().zip(largest).for_each(|(most, sigma)| *most = most.max(sigma));
+            (checks, nees) = (checks + 1.0, nees + f64::from(e.nees));
+        });
+        let nees = nees / checks;
+        println!("{name}, {hours} h: NEES {nees:.2}, largest sigma {sigmas:.3?}, of {checks} beyond 3 sigma {far:?}");
+        // One in 370 by chance; errors last for minutes outdoors.
+        assert!(far.iter().all(|far| *far <= 10.0 + 0.01 * checks), "{name}: {far:?} of {checks}");
+        assert!(sigmas[0] < 0.05 && sigmas[1] < 0.1 && sigmas[2] < sigma_m, "{name}: {sigmas:?}");
+        assert!(nees < degrees, "{name}: {nees}");
     }
 }

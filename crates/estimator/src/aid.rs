@@ -66,6 +66,25 @@ impl AidRecord {
     }
 }
 
+/// The pose that a tracker repeats.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Repeated {
+    pose: Option<(Vector3<f32>, [f32; 4])>,
+    since_us: u64,
+}
+
+impl Repeated {
+    /// Returns the time for which a tracker has sent this pose, the same in every bit \[us\]; a position alone has no
+    /// attitude.
+    pub(crate) fn lasts_us(&mut self, position: &Vector3<f32>, attitude: &[f32; 4], at_us: u64) -> u64 {
+        let pose = Some((*position, *attitude));
+        if self.pose != pose {
+            *self = Repeated { pose, since_us: at_us };
+        }
+        at_us.saturating_sub(self.since_us)
+    }
+}
+
 /// Records of all kinds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aids {

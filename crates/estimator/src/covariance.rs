@@ -23,10 +23,11 @@
 //! PX4's EKF2. The 16th state, the barometer's offset, is one column more; without it, a filter that averages a
 //! barometer is sure of a height that it cannot know.
 
+use crate::slow::Slow;
 use afbc_control::math::{max, min, sqrt};
 use nalgebra::{Matrix3, Vector3};
 
-type Block = Matrix3<f32>;
+pub(crate) type Block = Matrix3<f32>;
 
 /// One coordinate of a vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,8 +60,9 @@ impl Coordinate {
         }
     }
 
+    /// Returns this column.
     #[inline]
-    fn column(self, m: &Block) -> Vector3<f32> {
+    pub(crate) fn column(self, m: &Block) -> Vector3<f32> {
         match self {
             Coordinate::X => Vector3::new(m.m11, m.m21, m.m31),
             Coordinate::Y => Vector3::new(m.m12, m.m22, m.m32),
@@ -68,8 +70,9 @@ impl Coordinate {
         }
     }
 
+    /// Returns this row.
     #[inline]
-    fn row(self, m: &Block) -> Vector3<f32> {
+    pub(crate) fn row(self, m: &Block) -> Vector3<f32> {
         match self {
             Coordinate::X => Vector3::new(m.m11, m.m12, m.m13),
             Coordinate::Y => Vector3::new(m.m21, m.m22, m.m23),
@@ -91,6 +94,8 @@ pub(crate) struct Row {
     pub(crate) accel: Option<Vector3<f32>>,
     /// By the barometer's offset.
     pub(crate) baro: f32,
+    /// Whether the GNSS receiver's slow error at this coordinate comes on top.
+    pub(crate) slow: bool,
 }
 
 /// One number per error.
@@ -102,6 +107,8 @@ pub(crate) struct Errors {
     pub(crate) gyro: Vector3<f32>,
     pub(crate) accel: Vector3<f32>,
     pub(crate) baro: f32,
+    /// Of the GNSS receiver's slow error, where it is considered; no gain corrects it.
+    pub(crate) slow: Vector3<f32>,
 }
 
 impl Errors {
@@ -114,6 +121,7 @@ impl Errors {
             gyro: self.gyro * factor,
             accel: self.accel * factor,
             baro: self.baro * factor,
+            slow: self.slow * factor,
         }
     }
 }
@@ -127,6 +135,7 @@ impl Row {
             + self.gyro.map_or(0.0, |gyro| gyro.dot(&errors.gyro))
             + self.accel.map_or(0.0, |accel| accel.dot(&errors.accel))
             + self.baro * errors.baro
+            + if self.slow { self.coordinate.of(&errors.slow) } else { 0.0 }
     }
 }
 
@@ -176,11 +185,12 @@ pub(crate) struct Covariance {
     pub(crate) gb: Vector3<f32>,
     pub(crate) ab: Vector3<f32>,
     pub(crate) bb: f32,
+    pub(crate) slow: Slow,
 }
 
 /// -s x, column by column: the matrix -[s]x from the left.
 #[inline]
-fn minus_cross(s: &Vector3<f32>, m: &Block) -> Block {
+pub(crate) fn minus_cross(s: &Vector3<f32>, m: &Block) -> Block {
     Block::new(
         s.z * m.m21 - s.y * m.m31,
         s.z * m.m22 - s.y * m.m32,
@@ -234,7 +244,7 @@ fn add_diagonal(m: &mut Block, variance: f32) {
 
 /// m -= x y'.
 #[inline]
-fn subtract_outer(m: &mut Block, x: &Vector3<f32>, y: &Vector3<f32>) {
+pub(crate) fn subtract_outer(m: &mut Block, x: &Vector3<f32>, y: &Vector3<f32>) {
     m.m11 -= x.x * y.x;
     m.m21 -= x.y * y.x;
     m.m31 -= x.z * y.x;
@@ -282,6 +292,7 @@ impl Covariance {
     pub(crate) fn predict(&mut self, interval: &Interval, growth: &Growth) {
         let Interval { time_s, turn, thrust } = interval;
         let (t, c, s) = (*time_s, turn, thrust);
+        self.slow.predict(interval);
 
         // p' = p + T v.
         self.pp += (self.vp + self.vp.transpose()) * t + self.vv * (t * t);
@@ -322,6 +333,7 @@ impl Covariance {
         self.tg = r * self.tg;
         self.ta = r * self.ta;
         self.tb = r * self.tb;
+        self.slow.turn(r);
         mirror(&mut self.tt);
     }
 
@@ -385,12 +397,12 @@ impl Covariance {
         };
         let (t, v, p) = (of(&self.tt, THETA), of(&self.vv, VELOCITY), of(&self.pp, POSITION));
         let (g, a, b) = (of(&self.gg, GYRO), of(&self.aa, ACCEL), factor(self.bb, &BARO));
-        self.scale(&Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b });
+        self.scale(&Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b, slow: Vector3::zeros() });
     }
 
     /// Multiplies each error, and with it its row and its column.
     fn scale(&mut self, by: &Errors) {
-        let Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b } = by;
+        let Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b, .. } = by;
         let scale = |m: &mut Block, x: &Vector3<f32>, y: &Vector3<f32>| m.component_mul_assign(&(x * y.transpose()));
         for (block, y) in
             [(&mut self.tt, t), (&mut self.tv, v), (&mut self.tp, p), (&mut self.tg, g), (&mut self.ta, a)]
@@ -412,6 +424,7 @@ impl Covariance {
             column.component_mul_assign(&(x * *b));
         }
         self.bb *= b * b;
+        self.slow.scale(by);
     }
 
     /// Forgets what is known of some errors: those with a zero in `keep` lose their variance and all covariances.
@@ -430,6 +443,7 @@ impl Covariance {
             gyro: self.tg.tr_mul(&row.theta),
             accel: self.ta.tr_mul(&row.theta),
             baro: self.tb.dot(&row.theta),
+            slow: Vector3::zeros(),
         };
         if row.velocity != 0.0 {
             let h = row.velocity;
@@ -474,6 +488,7 @@ impl Covariance {
             y.accel += self.ab * h;
             y.baro += self.bb * h;
         }
+        self.slow.complete(row, &mut y);
         y
     }
 
@@ -516,6 +531,7 @@ impl Covariance {
     pub(crate) fn fuse(&mut self, y: &Errors, s: f32) {
         let w = y.scaled(1.0 / sqrt(s));
         self.subtract(&w, &w);
+        self.slow.subtract(&w, &w);
         self.raise();
     }
 
@@ -530,9 +546,11 @@ impl Covariance {
             gyro: y.gyro - half.gyro,
             accel: y.accel - half.accel,
             baro: y.baro - half.baro,
+            slow: y.slow,
         };
         self.subtract(k, &w);
         self.subtract(&w, k);
+        self.slow.subtract(k, y);
         for block in [&mut self.tt, &mut self.vv, &mut self.pp, &mut self.gg, &mut self.aa] {
             mirror(block);
         }
@@ -548,6 +566,7 @@ impl Covariance {
             gyro: self.gg.diagonal(),
             accel: self.aa.diagonal(),
             baro: self.bb,
+            slow: self.slow.variance,
         }
     }
 

@@ -70,6 +70,8 @@ pub struct Dropped {
     pub crowded: u32,
     /// A magnetic field of another strength or inclination than at the start.
     pub disturbed: u32,
+    /// The pose of a tracker that has repeated it for too long.
+    pub frozen: u32,
 }
 
 /// State, its uncertainty and its validity; new with every call of [`Estimator::step`](crate::Estimator::step).

@@ -37,6 +37,7 @@ pub struct Estimator {
     pub(crate) gate_squared: f32,
     pub(crate) reacquire_us: u64,
     pub(crate) coast_us: u64,
+    pub(crate) frozen_us: u64,
     /// Direction of magnetic north in the earth frame, whose x is north and y west.
     pub(crate) magnetic_north_rad: f32,
     /// Its cosine and sine.
@@ -65,6 +66,8 @@ impl Estimator {
             gate_squared: square(settings.gate_sigmas),
             reacquire_us: microseconds(settings.reacquire_s),
             coast_us: microseconds(settings.coast_s),
+            // Never: longer than any time.
+            frozen_us: if settings.frozen_s > 0.0 { microseconds(settings.frozen_s) } else { u64::MAX },
             magnetic_north_rad: wrap_angle(-settings.declination_rad),
             magnetic_north: (libm::cosf(settings.declination_rad), -libm::sinf(settings.declination_rad)),
             inclination_error_max: settings.inclination_error_max_rad,

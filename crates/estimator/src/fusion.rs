@@ -8,6 +8,7 @@ use crate::aid::{Aid, passes};
 use crate::covariance::{Coordinate, Errors};
 use crate::estimator::Estimator;
 use crate::horizon::{Expected, Horizon, Target};
+use crate::measurement::Measurement;
 use crate::memory::Memory;
 use crate::queue::{Fix, Part, parts};
 use crate::restart::reference;
@@ -80,6 +81,7 @@ impl Estimator {
             return false;
         };
         let mut parts = parts(&measurement.value);
+        let fix_us = memory.aids.gnss_position.newest_us;
         for part in &mut parts {
             let Some(aid) = part.and_then(|part| part.aid) else { continue };
             let record = memory.aids.of_mut(aid);
@@ -90,11 +92,48 @@ impl Estimator {
                 record.newest_us = Some(at_us);
             }
         }
+        match (&measurement.value, &mut parts) {
+            (Measurement::Gnss { .. }, [Some(part), _]) => {
+                self.divide(memory, part, at_us.saturating_sub(fix_us.unwrap_or(0)));
+            }
+            (Measurement::Pose { position_m, attitude, .. }, [Some(_), _])
+                if self.is_frozen(memory, position_m, attitude, at_us) =>
+            {
+                return false;
+            }
+            (Measurement::Position { position_m, .. }, [Some(_), _])
+                if self.is_frozen(memory, position_m, &[0.0; 4], at_us) =>
+            {
+                return false;
+            }
+            _ => {}
+        }
         let any = parts.iter().any(Option::is_some);
         if any {
             memory.fix = Some(Fix { at_us, past, parts, next: 0, nis: 0.0 });
         }
         any
+    }
+
+    /// True if a tracker has repeated this pose for too long. What it said meanwhile is no reason to believe it later.
+    #[inline]
+    fn is_frozen(&self, memory: &mut Memory, position: &Vector3<f32>, attitude: &[f32; 4], at_us: u64) -> bool {
+        let is_frozen = memory.repeated.lasts_us(position, attitude, at_us) > self.frozen_us;
+        if is_frozen {
+            count(&mut memory.dropped.frozen);
+            memory.aids.tracker_position.rejected_since_us = None;
+            memory.aids.tracker_attitude.rejected_since_us = None;
+        }
+        is_frozen
+    }
+
+    /// Divides the variance of a receiver's position, whose last fix was `since_us` before: noise, and the slow error.
+    fn divide(&self, memory: &mut Memory, part: &mut Part, since_us: u64) {
+        let noise = self.settings.gnss_noise_m * self.settings.gnss_noise_m;
+        let white = part.variance.map(|variance| min(variance, noise));
+        let kept = max(1.0 - since_us as f32 * 1e-6 / self.settings.gnss_slow_s, 0.0);
+        memory.covariance.slow.follow(&(part.variance - white), kept);
+        part.variance = white;
     }
 
     /// Begins a pseudo-measurement of rest if one is due: on the ground; or in the air without any aid, where it keeps
@@ -132,9 +171,10 @@ impl Estimator {
             _ => Coordinate::Z,
         };
         let expected = Expected { height_offset: memory.height_offset, field: self.expected_field(memory) };
-        let Some((innovation, row)) = horizon.row(&part.target, coordinate, &expected) else {
+        let Some((innovation, mut row)) = horizon.row(&part.target, coordinate, &expected) else {
             return false;
         };
+        row.slow = part.is_slow();
         let y = memory.covariance.times(&row);
         let hph = max(row.dot(&y), 0.0);
         let r = match &part.target {
@@ -160,6 +200,7 @@ impl Estimator {
                     gyro: y.gyro,
                     accel: zero,
                     baro: 0.0,
+                    slow: zero,
                 };
                 let k = k.scaled(1.0 / s);
                 memory.covariance.fuse_with(&k, &y, s);
@@ -210,13 +251,15 @@ impl Estimator {
             Target::Position(position) => {
                 let innovation = position - past.position;
                 if !memory.knows.position {
-                    memory.reset_position(&innovation, &part.variance, horizon.tau_s());
+                    memory.reset_position(&innovation, part, horizon.tau_s());
                     self.accept(memory, at_us, part);
                     return false;
                 }
                 let tau_s = horizon.tau_s();
                 let along = memory.covariance.vp.diagonal();
-                (innovation, variances.position - along * (2.0 * tau_s) + variances.velocity * (tau_s * tau_s))
+                let variance = variances.position - along * (2.0 * tau_s) + variances.velocity * (tau_s * tau_s);
+                let slow = if part.is_slow() { memory.covariance.slow.of_position(tau_s) } else { Vector3::zeros() };
+                (innovation, (variance + slow).map(|variance| max(variance, 0.0)))
             }
             Target::Velocity(velocity) => (velocity - past.velocity, variances.velocity),
             Target::Attitude(attitude) => {
@@ -308,7 +351,7 @@ impl Estimator {
                 if aid == Aid::TrackerPosition {
                     memory.doubt_velocity(JUMP_VARIANCE);
                 }
-                memory.reset_position(&(position - past.position), &part.variance, horizon.tau_s());
+                memory.reset_position(&(position - past.position), part, horizon.tau_s());
                 self.doubt(memory, at_us);
                 // The same tracker contradicts the attitude too.
                 if memory.aids.tracker_attitude.rejected_since_us.is_some() && aid == Aid::TrackerPosition {

@@ -99,6 +99,7 @@ impl Horizon {
             gyro: None,
             accel: None,
             baro: 0.0,
+            slow: false,
         };
         // An angle: the error's product with `theta`.
         let angle = |innovation: f32, theta: Vector3<f32>| {

@@ -32,7 +32,8 @@
 //! 2017; PX4's EKF2; Mueller, Hamer, D'Andrea, *Fusing ultra-wideband range measurements with accelerometers and rate
 //! gyroscopes for quadrocopter state estimation*, ICRA 2015, which the Crazyflie flies). The [nominal state](nominal)
 //! follows every sample of the inertial sensors. Its error is small, so it is estimated linearly: 15 errors (rotation,
-//! velocity, position, biases of gyroscope and accelerometer) and a 16th, the barometer's offset. [Their
+//! velocity, position, biases of gyroscope and accelerometer) and a 16th, the barometer's offset; three more, a GNSS
+//! receiver's [slow error](slow), are considered without being estimated. [Their
 //! covariance](covariance) is predicted every 4 ms from what the samples since then add up to, block by block, since
 //! most of the transition matrix is zeros and ones.
 //!
@@ -59,7 +60,11 @@
 //!
 //! * A **tracker** and a **GNSS receiver** both tell the position in the earth frame. Their origins must be the same;
 //!   whichever comes first sets the position, and one that contradicts the other is rejected as long as the other is
-//!   there. The receiver's antenna is taken to be at the centre of mass, as is the IMU.
+//!   there. The receiver's antenna is taken to be at the centre of mass, as is the IMU: who mounts them elsewhere
+//!   corrects the measurements.
+//! * Of the standard deviation that a receiver reports, [`Settings::gnss_noise_m`] is noise, and the rest an
+//!   [error that stays for minutes](slow), which further fixes do not average: the position is as good as the receiver.
+//! * A tracker that repeats its pose in every bit for [`Settings::frozen_s`] is frozen, and not believed.
 //! * The **barometer**'s offset is a state. It is set so that the first height agrees with the position then: with
 //!   z = 0 at the start, and with the tracker's or the receiver's z from their first fix on. The receiver's height then
 //!   corrects the offset's drift and the barometer the receiver's noise; without either of these two, the barometer
@@ -87,8 +92,8 @@
 //! # Reading order
 //!
 //! [`measurement`], [`settings`], [`estimate`]: in and out. [`estimator`]: a step. [`align`]: the start. [`nominal`],
-//! [`covariance`]: prediction. [`history`], [`horizon`], [`queue`], [`fusion`]: measurements. [`aid`], [`restart`],
-//! [`imu`]: gates, resets, health. [`rotation`], [`geodetic`]: small mathematics.
+//! [`covariance`]: prediction. [`history`], [`horizon`], [`queue`], [`fusion`], [`slow`]: measurements. [`aid`],
+//! [`restart`], [`imu`]: gates, resets, health. [`rotation`], [`geodetic`]: small mathematics.
 #![no_std]
 #![allow(rustdoc::private_intra_doc_links, reason = "the modules' documentation is for their reader")]
 
@@ -110,6 +115,7 @@ mod queue;
 mod restart;
 mod rotation;
 mod settings;
+mod slow;
 
 pub use aid::{Aid, AidRecord, Aids};
 pub use align::Unready;

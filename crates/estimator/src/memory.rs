@@ -1,6 +1,6 @@
 //! Everything that changes in an estimator.
 
-use crate::aid::Aids;
+use crate::aid::{Aids, Repeated};
 use crate::align::Align;
 use crate::covariance::{Covariance, Interval};
 use crate::estimate::{Dropped, Resets};
@@ -45,6 +45,7 @@ pub struct Memory {
     /// Strength and sine of the inclination of the magnetic field, once known.
     pub(crate) field: Option<(f32, f32)>,
     pub(crate) aids: Aids,
+    pub(crate) repeated: Repeated,
     /// Time of the last pseudo-measurement \[us\].
     pub(crate) still_us: u64,
     /// Time of the last reset that a rejection caused \[us\].
@@ -94,6 +95,7 @@ impl Default for Memory {
             knows: Known::default(),
             field: None,
             aids: Aids::default(),
+            repeated: Repeated::default(),
             still_us: 0,
             reset_us: None,
             resets: Resets::default(),

@@ -68,6 +68,12 @@ pub(crate) struct Part {
 }
 
 impl Part {
+    /// True of what a GNSS receiver's slow error comes on top of.
+    #[inline]
+    pub(crate) fn is_slow(&self) -> bool {
+        self.aid == Some(Aid::GnssPosition)
+    }
+
     /// Adds to the variances what clipped or missing samples since the measurement have made uncertain.
     #[inline]
     pub(crate) fn roughen(&mut self, (theta, velocity): (f32, f32), tau_s: f32) {

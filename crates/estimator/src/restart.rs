@@ -1,11 +1,12 @@
 //! Starts, and resets of parts of the state.
 
 use crate::align::Aligned;
-use crate::covariance::{Covariance, Errors, angle_variance};
+use crate::covariance::{Coordinate, Covariance, Errors, angle_variance};
 use crate::estimate::Sigmas;
 use crate::history::Past;
 use crate::memory::{Known, Memory, NO_INTERVAL};
 use crate::nominal::Nominal;
+use crate::queue::Part;
 use crate::rotation::{about_z, identity, matrix, normalized};
 use crate::settings::Settings;
 use afbc_control::math::{abs_max, max};
@@ -25,7 +26,7 @@ const DOUBT_RAD: f32 = 0.2;
 /// Keeps all errors.
 const KEEP: Errors = {
     const ONES: Vector3<f32> = Vector3::new(1.0, 1.0, 1.0);
-    Errors { theta: ONES, velocity: ONES, position: ONES, gyro: ONES, accel: ONES, baro: 1.0 }
+    Errors { theta: ONES, velocity: ONES, position: ONES, gyro: ONES, accel: ONES, baro: 1.0, slow: NONE }
 };
 const NONE: Vector3<f32> = Vector3::new(0.0, 0.0, 0.0);
 
@@ -154,16 +155,26 @@ impl Memory {
         });
     }
 
-    /// Moves the position by `by`, and takes `variance` for that of `tau_s` ago; since then the velocity's error has
-    /// moved it.
-    pub(crate) fn reset_position(&mut self, by: &Vector3<f32>, variance: &Vector3<f32>, tau_s: f32) {
+    /// Moves the position by `by`, and takes the part's variance for that of `tau_s` ago; since then the velocity's
+    /// error has moved it. A GNSS receiver's position is off by its slow error too, to the other side.
+    pub(crate) fn reset_position(&mut self, by: &Vector3<f32>, part: &Part, tau_s: f32) {
         count(&mut self.resets.position);
         self.nominal.move_to(self.nominal.position + by);
         self.history.correct(&identity(), &NONE, &NONE, by);
         let c = &mut self.covariance;
         c.forget(&Errors { position: NONE, baro: 0.0, ..KEEP });
-        c.pp = diagonal(variance) + c.vv * (tau_s * tau_s);
+        c.pp = diagonal(&part.variance) + c.vv * (tau_s * tau_s);
         (c.tp, c.vp, c.pg, c.pa) = (c.tv * tau_s, c.vv * tau_s, c.vg * tau_s, c.va * tau_s);
+        c.slow.position = c.slow.velocity * tau_s;
+        if part.is_slow() {
+            c.pp += diagonal(&c.slow.variance);
+            c.slow.position -= diagonal(&c.slow.variance);
+            c.pp -= (c.slow.velocity + c.slow.velocity.transpose()) * tau_s;
+            c.tp -= c.slow.theta;
+            c.vp -= c.slow.velocity;
+            c.pg -= c.slow.gyro.transpose();
+            c.pa -= c.slow.accel.transpose();
+        }
         c.hold();
         self.knows.position = true;
         // The offset was that of another height.
@@ -205,6 +216,7 @@ impl Memory {
         (c.tb, c.vb, c.pb) = (of_z(&c.tp), of_z(&c.vp), of_z(&c.pp));
         (c.gb, c.ab) = (of_z(&c.pg.transpose()), of_z(&c.pa.transpose()));
         c.bb = c.pp.m33 + variance;
+        c.slow.baro = -Coordinate::Z.row(&c.slow.position);
         c.hold();
     }
 

@@ -13,17 +13,17 @@ parameters! {
         pub gravity_m_s2: f32 = 9.81,
         /// Noise density of the gyroscope, vibration and all that the model leaves out included. The default is for
         /// flight on any vehicle; the part alone has 5e-5 (ICM-42688-P).
-        #[parameter(GYR_NOISE, "rad/s/sqrt(Hz)", 1e-6..=0.1)]
+        #[parameter(GYR_NOISE, "rad/s/rtHz", 1e-6..=0.1)]
         pub gyro_noise_rad_s_rthz: f32 = 1e-3,
         /// Noise density of the accelerometer, vibration and all that the model leaves out included. The default is for
         /// flight on any vehicle; the part alone has 7e-4 (ICM-42688-P).
-        #[parameter(ACC_NOISE, "m/s2/sqrt(Hz)", 1e-5..=1.0)]
+        #[parameter(ACC_NOISE, "m/s2/rtHz", 1e-5..=1.0)]
         pub accel_noise_m_s2_rthz: f32 = 2e-2,
         /// Random walk of the gyroscope's bias, per root of a second.
-        #[parameter(GYR_WALK, "rad/s/sqrt(s)", 1e-8..=0.01)]
+        #[parameter(GYR_WALK, "rad/s/rts", 1e-8..=0.01)]
         pub gyro_walk_rad_s_rts: f32 = 5e-5,
         /// Random walk of the accelerometer's bias, per root of a second.
-        #[parameter(ACC_WALK, "m/s2/sqrt(s)", 1e-7..=0.1)]
+        #[parameter(ACC_WALK, "m/s2/rts", 1e-7..=0.1)]
         pub accel_walk_m_s2_rts: f32 = 3e-4,
         /// Standard deviation of the accelerometer's bias at the start, which levelling cannot tell from a tilt.
         #[parameter(ACC_BIAS, "m/s2", 1e-3..=1.0)]
@@ -35,8 +35,20 @@ parameters! {
         #[parameter(ACC_BIAS_MAX, "m/s2", 0.1..=5.0)]
         pub accel_bias_max_m_s2: f32 = 1.5,
         /// Random walk of the barometer's offset, per root of a second.
-        #[parameter(BARO_WALK, "m/sqrt(s)", 1e-4..=1.0)]
+        #[parameter(BARO_WALK, "m/rts", 1e-4..=1.0)]
         pub baro_walk_m_rts: f32 = 0.02,
+
+        /// Noise of a GNSS receiver's position from fix to fix, standard deviation per coordinate. The rest of the
+        /// standard deviation that it reports is an error that changes slowly, which is not averaged.
+        #[parameter(GNSS_NOISE, "m", 0.01..=1000.0)]
+        pub gnss_noise_m: f32 = 0.5,
+        /// Correlation time of that slow error.
+        #[parameter(GNSS_SLOW, "s", 1.0..=1e5)]
+        pub gnss_slow_s: f32 = 120.0,
+        /// Time of identical poses or positions after which a tracker counts as frozen, and is not believed; 0 for
+        /// never.
+        #[parameter(FROZEN, "s", 0.0..=10.0)]
+        pub frozen_s: f32 = 0.2,
 
         /// Largest accepted innovation, in standard deviations.
         #[parameter(GATE, "1", 2.0..=20.0)]

@@ -6,24 +6,31 @@ extern crate std;
 use crate::covariance::{Coordinate, Covariance, Errors, Growth, Interval, Row};
 use crate::history::{History, Past};
 use crate::horizon::{Expected, Horizon, Target};
+use crate::slow::Slow;
 use nalgebra::{Matrix3, Quaternion, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use std::vec::Vec;
 
-type M16 = SMatrix<f64, 16, 16>;
-type V16 = SVector<f64, 16>;
+/// The filter's 16 errors, and a receiver's slow error.
+type M19 = SMatrix<f64, 19, 19>;
+type V19 = SVector<f64, 19>;
 type V3 = Vector3<f64>;
 
-/// Typical sizes of the errors.
-const SIZES: [f64; 6] = [0.02, 0.3, 0.5, 0.003, 0.08, 0.4];
+/// Typical sizes of the errors, by three; the last are the barometer's offset and the slow error.
+const SIZES: [f64; 5] = [0.02, 0.3, 0.5, 0.003, 0.08];
 
 fn size(i: usize) -> f64 {
-    SIZES[i / 3]
+    match i {
+        0..15 => SIZES[i / 3],
+        15 => 0.4,
+        _ => 1.2,
+    }
 }
 
 /// Blocks of a matrix.
-fn blocks(p: &M16) -> Covariance {
+fn blocks(p: &M19) -> Covariance {
     let block = |i: usize, j: usize| p.fixed_view::<3, 3>(3 * i, 3 * j).map(|x| x as f32).into_owned();
+    let slow = |i: usize| p.fixed_view::<3, 3>(3 * i, 16).map(|x| x as f32).into_owned();
     let column = |i: usize| p.fixed_view::<3, 1>(3 * i, 15).map(|x| x as f32).into_owned();
     Covariance {
         tt: block(0, 0),
@@ -47,20 +54,45 @@ fn blocks(p: &M16) -> Covariance {
         gb: column(3),
         ab: column(4),
         bb: p[(15, 15)] as f32,
+        slow: Slow {
+            variance: Vector3::from_fn(|i, _| p[(16 + i, 16 + i)] as f32),
+            theta: slow(0),
+            velocity: slow(1),
+            position: slow(2),
+            gyro: slow(3),
+            accel: slow(4),
+            baro: Vector3::from_fn(|i, _| p[(15, 16 + i)] as f32),
+        },
     }
 }
 
-fn dense(p: &Covariance) -> M16 {
+fn dense(p: &Covariance) -> M19 {
     let rows = p.rows();
-    M16::from_fn(|i, j| f64::from(rows[i][j]))
+    let slow = [&p.slow.theta, &p.slow.velocity, &p.slow.position, &p.slow.gyro, &p.slow.accel];
+    let with_slow = |i: usize, j: usize| match i {
+        0..15 => slow[i / 3][(i % 3, j)],
+        15 => p.slow.baro[j],
+        _ if i == 16 + j => p.slow.variance[j],
+        _ => 0.0,
+    };
+    M19::from_fn(|i, j| {
+        let (i, j) = (i.min(j), i.max(j));
+        f64::from(if j < 16 { rows[i][j] } else { with_slow(i, j - 16) })
+    })
 }
 
-fn dense_errors(e: &Errors) -> V16 {
+fn dense_errors(e: &Errors) -> V19 {
     let parts = [e.theta, e.velocity, e.position, e.gyro, e.accel];
-    V16::from_fn(|i, _| f64::from(if i == 15 { e.baro } else { parts[i / 3][i % 3] }))
+    V19::from_fn(|i, _| {
+        f64::from(match i {
+            0..15 => parts[i / 3][i % 3],
+            15 => e.baro,
+            _ => e.slow[i - 16],
+        })
+    })
 }
 
-fn dense_row(row: &Row) -> V16 {
+fn dense_row(row: &Row) -> V19 {
     let none = Vector3::zeros();
     let at = row.coordinate.unit();
     dense_errors(&Errors {
@@ -70,13 +102,14 @@ fn dense_row(row: &Row) -> V16 {
         gyro: row.gyro.unwrap_or(none),
         accel: row.accel.unwrap_or(none),
         baro: row.baro,
+        slow: if row.slow { at } else { none },
     })
 }
 
 /// Largest difference, element by element, in shares of the product of both standard deviations.
-fn difference(ours: &M16, theirs: &M16) -> f64 {
+fn difference(ours: &M19, theirs: &M19) -> f64 {
     let of = |i, j| (ours[(i, j)] - theirs[(i, j)]).abs() / (theirs[(i, i)] * theirs[(j, j)]).sqrt();
-    (0..16).flat_map(|i| (0..16).map(move |j| (i, j))).map(|(i, j)| of(i, j)).fold(0.0, f64::max)
+    (0..19).flat_map(|i| (0..19).map(move |j| (i, j))).map(|(i, j)| of(i, j)).fold(0.0, f64::max)
 }
 
 fn numbers<const N: usize>() -> impl Strategy<Value = [f64; N]> {
@@ -84,11 +117,15 @@ fn numbers<const N: usize>() -> impl Strategy<Value = [f64; N]> {
 }
 
 /// A positive matrix of errors of the usual sizes, rounded to what the filter can hold.
-fn covariance() -> impl Strategy<Value = M16> {
-    proptest::collection::vec(-1.0..1.0_f64, 256).prop_map(|x| {
-        let a = M16::from_iterator(x) + M16::identity();
-        let b = a * a.transpose() / 6.0 + M16::identity() * 0.03;
-        let p = M16::from_fn(|i, j| size(i) * size(j) * b[(i, j)]);
+fn covariance() -> impl Strategy<Value = M19> {
+    proptest::collection::vec(-1.0..1.0_f64, 19 * 19).prop_map(|x| {
+        // The slow error's coordinates are independent of each other.
+        let mut a = M19::from_iterator(x) + M19::identity();
+        a.fixed_rows_mut::<3>(16).fill(0.0);
+        (16..19).for_each(|i| a[(i, i)] = 1.5);
+        let b = a * a.transpose() / 6.0;
+        let floor = V19::from_fn(|i, _| if i < 16 { 0.03 } else { 0.0 });
+        let p = M19::from_fn(|i, j| size(i) * size(j) * (b[(i, j)] + if i == j { floor[i] } else { 0.0 }));
         dense(&blocks(&p))
     })
 }
@@ -110,14 +147,15 @@ fn row() -> impl Strategy<Value = Row> {
                 gyro: on[2].then(|| single(gyro)),
                 accel: on[3].then(|| single(accel)),
                 baro: number(b, on[4]),
+                slow: on[5],
             }
         },
     )
 }
 
 /// The transition as a dense matrix.
-fn transition(interval: &Interval) -> M16 {
-    let mut f = M16::identity();
+fn transition(interval: &Interval) -> M19 {
+    let mut f = M19::identity();
     let t = f64::from(interval.time_s);
     let c = interval.turn.map(f64::from);
     let s = interval.thrust.map(f64::from).cross_matrix();
@@ -143,7 +181,7 @@ proptest! {
         };
         let f = transition(&interval);
         let growth = [GROWTH.theta, GROWTH.velocity, 0.0, GROWTH.gyro, GROWTH.accel, GROWTH.baro];
-        let q = M16::from_diagonal(&V16::from_fn(|i, _| f64::from(growth[i / 3]) * t));
+        let q = M19::from_diagonal(&V19::from_fn(|i, _| if i < 16 { f64::from(growth[i / 3]) * t } else { 0.0 }));
         let mut ours = blocks(&p);
         ours.predict(&interval, &GROWTH);
         let theirs = f * p * f.transpose() + q;
@@ -157,24 +195,26 @@ proptest! {
         let s = h.dot(&(p * h)) + variance;
         let ours = blocks(&p);
         let y = ours.times(&row);
-        let scale = V16::from_fn(|i, _| p[(i, i)].sqrt());
+        let scale = V19::from_fn(|i, _| p[(i, i)].sqrt());
         let off = (dense_errors(&y) - p * h).component_div(&scale).norm();
         prop_assert!(off < 1e-5 * s.sqrt(), "P h: {off}");
         prop_assert!((f64::from(row.dot(&y)) + variance - s).abs() < 1e-5 * s, "h P h");
-        let joseph = |k: &V16| {
-            let i = M16::identity() - k * h.transpose();
+        let joseph = |k: &V19| {
+            let i = M19::identity() - k * h.transpose();
             i * p * i.transpose() + k * k.transpose() * variance
         };
         // The optimal gain.
         let mut optimal = ours;
         optimal.fuse(&y, s as f32);
-        let theirs = joseph(&(p * h / s));
+        let considered = |k: V19| V19::from_fn(|i, _| if i < 16 { k[i] } else { 0.0 });
+        let theirs = joseph(&considered(p * h / s));
         prop_assert!(difference(&dense(&optimal), &theirs) < 1e-4, "{}", difference(&dense(&optimal), &theirs));
         // Any other.
-        let k = V16::from_fn(|i, _| any_gain[i] * size(i) / s.sqrt());
+        let k = V19::from_fn(|i, _| if i < 16 { any_gain[i] * size(i) / s.sqrt() } else { 0.0 });
         let part = |i: usize| k.fixed_rows::<3>(3 * i).map(|x| x as f32).into_owned();
         let gain = Errors {
             theta: part(0), velocity: part(1), position: part(2), gyro: part(3), accel: part(4), baro: k[15] as f32,
+            slow: Vector3::zeros(),
         };
         let mut other = ours;
         other.fuse_with(&gain, &y, s as f32);
@@ -184,16 +224,29 @@ proptest! {
         prop_assert_eq!(ours, ours.transpose());
     }
 
+    /// A receiver that is surer or less sure of itself than before.
+    #[test]
+    fn another_slow_error_leaves_it_positive(p in covariance(), to in numbers::<3>(), share in 0.0..1.0_f64) {
+        let variance = vector(to).map(|x| (x * x * 4.0 + 1e-3) as f32);
+        let mut ours = blocks(&p);
+        ours.slow.follow(&variance, share as f32);
+        let theirs = dense(&ours);
+        prop_assert_eq!(theirs.fixed_view::<16, 16>(0, 0), p.fixed_view::<16, 16>(0, 0));
+        let sigma = V19::from_fn(|i, _| theirs[(i, i)].sqrt());
+        let correlation = M19::from_fn(|i, j| theirs[(i, j)] / (sigma[i] * sigma[j]));
+        prop_assert!(correlation.symmetric_eigenvalues().min() > -1e-6);
+    }
+
     /// Too large a variance is cut with all its covariances, so the matrix stays positive.
     #[test]
     fn bounds_leave_it_positive(p in covariance(), which in 0..16_usize, factor in 1e3..1e8_f64) {
-        let scale = M16::from_diagonal(&V16::from_fn(|i, _| if i == which { factor } else { 1.0 }));
+        let scale = M19::from_diagonal(&V19::from_fn(|i, _| if i == which { factor } else { 1.0 }));
         let mut ours = blocks(&(scale * p * scale));
         ours.hold();
         let held = dense(&ours);
         prop_assert!(held.iter().all(|x| x.is_finite()) && held[(which, which)] < 1.001e8);
-        let sigma = V16::from_fn(|i, _| held[(i, i)].sqrt());
-        let correlation = M16::from_fn(|i, j| held[(i, j)] / (sigma[i] * sigma[j]));
+        let sigma = V19::from_fn(|i, _| held[(i, i)].sqrt());
+        let correlation = M19::from_fn(|i, j| held[(i, j)] / (sigma[i] * sigma[j]));
         prop_assert!(correlation.cholesky().is_some());
     }
 }
@@ -234,7 +287,7 @@ fn back(mut x: True, tau: f64, a: &[f64; 6]) -> True {
 }
 
 /// Adds an error.
-fn moved(x: &True, e: &V16) -> True {
+fn moved(x: &True, e: &V19) -> True {
     let part = |i: usize| e.fixed_rows::<3>(3 * i).into_owned();
     True { r: Rotation3::new(part(0)) * x.r, v: x.v + part(1), p: x.p + part(2), g: x.g + part(3), a: x.a + part(4) }
 }
@@ -277,7 +330,7 @@ proptest! {
 
         for i in 0..15 {
             let step = 1e-5 * size(i) / size(0);
-            let error = V16::from_fn(|j, _| if i == j { step } else { 0.0 });
+            let error = V19::from_fn(|j, _| if i == j { step } else { 0.0 });
             let (plus, minus) = (back(moved(&now, &error), tau, &motion), back(moved(&now, &-error), tau, &motion));
             let slope = |of: &dyn Fn(&True) -> f64| (of(&plus) - of(&minus)) / (2.0 * step);
             for (c, coordinate) in Coordinate::ALL.into_iter().enumerate() {
@@ -354,7 +407,7 @@ proptest! {
         let (turn, theta_f) = (crate::rotation::small(&single(&theta)), single(&theta));
         history.correct(&turn, &theta_f, &single(&v), &single(&p));
         let corrected = history.corrected(&history.at(at_us).unwrap(), g).unwrap();
-        let error = V16::from_iterator(theta.iter().chain(&v).chain(&p).copied().chain([0.0; 7]));
+        let error = V19::from_iterator(theta.iter().chain(&v).chain(&p).copied().chain([0.0; 10]));
         let y = back(moved(&now, &error), f64::from(back_us) * 1e-6, &motion.map(|x| x * 0.3));
         prop_assert!((corrected.velocity.map(f64::from) - y.v).norm() < 4e-3);
         prop_assert!((corrected.position.map(f64::from) - y.p).norm() < 1e-3);

@@ -196,7 +196,7 @@ fn at_rest(ms: usize, sensors: Sensors, change: impl Fn(usize, &mut ImuSample)) 
     (last, flight.memory)
 }
 
-const NOTHING: Sensors = Sensors { tracker: None, gnss: None, baro: None, mag: None };
+const NOTHING: Sensors = Sensors { tracker: None, gnss: None, slow: None, baro: None, mag: None };
 
 #[test]
 fn starts_at_rest_level_and_unbiased() {
@@ -339,6 +339,52 @@ fn a_moved_tracker_is_believed_after_a_while() {
     );
     let reset_ms = reset_ms.unwrap();
     assert!((7000..7200).contains(&reset_ms), "{reset_ms} ms");
+}
+
+/// A tracker that repeats its pose under new times, as a hovering vehicle's would hardly differ from it.
+#[test]
+fn a_frozen_tracker_is_not_believed() {
+    let held = core::cell::RefCell::new(None);
+    let mut frozen = 0;
+    flown(
+        hover,
+        MOCAP,
+        20,
+        |_, _| true,
+        |ms, measurement| {
+            if (6000..14_000).contains(&ms) {
+                measurement.value = *held.borrow_mut().get_or_insert(measurement.value);
+            }
+            true
+        },
+        |ms, estimate, flight| {
+            let error = position_error(estimate, flight);
+            assert!(ms < 3000 || ms > 8000 || error < 0.1, "{ms} ms: {error} m");
+            // Lost within the time of coasting, and found again.
+            let lost = (11_300..14_000).contains(&ms);
+            let turns = ms < 1100 || (11_100..11_300).contains(&ms) || (14_000..14_100).contains(&ms);
+            assert!(turns || estimate.validity.position == !lost, "{ms} ms");
+            assert!(ms < 15_000 || error < 0.005, "{ms} ms: {error} m");
+            frozen = flight.memory.dropped().frozen;
+        },
+    );
+    assert!((770..=790).contains(&frozen), "{frozen}");
+    // By default only: a tracker without noise repeats itself.
+    let estimator = |frozen_s| Estimator::new(Settings { frozen_s, ..settings(&ICM) }).unwrap();
+    for (frozen_s, all) in [(0.0, true), (Settings::DEFAULT.frozen_s, false)] {
+        let (estimate, mut memory) = at_rest(1500, NOTHING, |_, _| ());
+        for ms in 1..1000 {
+            let at_us = estimate.at_us + 1000 * ms;
+            let rates_rad_s = Vector3::new(1e-4 * (ms % 3) as f32, 0.0, 0.0);
+            let sample = ImuSample { at_us, rates_rad_s, specific_force_m_s2: Vector3::new(0.0, 0.0, 9.81) };
+            if ms % 10 == 0 {
+                let value = Measurement::Position { position_m: Vector3::zeros(), sigma_m: 0.01 };
+                memory.offer(&Timed { value, at_us: at_us - 5000 });
+            }
+            let _ = estimator(frozen_s).step(&mut memory, at_us, Some(&sample));
+        }
+        assert_eq!(memory.dropped().frozen == 0, all, "{frozen_s} s");
+    }
 }
 
 #[test]

@@ -173,6 +173,8 @@ pub fn settings(imu: &Imu) -> Settings {
         accel_walk_m_s2_rts: imu.accel_walk as f32,
         accel_bias_m_s2: imu.accel_bias as f32,
         baro_walk_m_rts: 0.02,
+        // All of it.
+        gnss_noise_m: 100.0,
         ..Settings::DEFAULT
     }
 }
@@ -184,14 +186,17 @@ pub struct Sensors {
     pub tracker: Option<(f64, f64)>,
     /// At 10 Hz, 100 ms late: horizontal, vertical [m], speed [m/s].
     pub gnss: Option<(f64, f64, f64)>,
+    /// Slow error of its position, per coordinate [m] with a correlation time [s].
+    pub slow: Option<(f64, f64)>,
     /// At 50 Hz, 20 ms late [m].
     pub baro: Option<f64>,
     /// At 50 Hz, 10 ms late, of a field of 1 at an inclination of 63 degrees.
     pub mag: Option<f64>,
 }
 
-pub const MOCAP: Sensors = Sensors { tracker: Some((1e-3, 3.5e-3)), gnss: None, baro: None, mag: None };
-pub const OUTDOOR: Sensors = Sensors { tracker: None, gnss: Some((0.8, 1.2, 0.1)), baro: Some(0.15), mag: Some(0.01) };
+pub const MOCAP: Sensors = Sensors { tracker: Some((1e-3, 3.5e-3)), gnss: None, slow: None, baro: None, mag: None };
+pub const OUTDOOR: Sensors =
+    Sensors { tracker: None, gnss: Some((0.8, 1.2, 0.1)), slow: None, baro: Some(0.15), mag: Some(0.01) };
 
 /// Magnetic field in the earth frame: north and down.
 pub fn field() -> V3 {
@@ -209,6 +214,8 @@ pub struct Flight<'a> {
     pub gyro_bias: V3,
     pub accel_bias: V3,
     pub baro_offset: f64,
+    /// The receiver's slow error; drawn with the first fix.
+    pub slow: Option<V3>,
     /// Delay of all sensors besides their own [ms].
     pub late_ms: f64,
     /// Index of the next moment.
@@ -237,6 +244,7 @@ impl<'a> Flight<'a> {
             gyro_bias,
             accel_bias,
             baro_offset: 37.0,
+            slow: None,
             late_ms: 0.0,
             now: 0,
             under_way: Vec::new(),
@@ -274,14 +282,22 @@ impl<'a> Flight<'a> {
             );
         }
         if let Some((horizontal, vertical, speed)) = self.sensors.gnss.filter(|_| self.now % 100 == 17) {
-            let error = self.noise.vector(1.0).component_mul(&V3::new(horizontal, horizontal, vertical));
+            let mut error = self.noise.vector(1.0).component_mul(&V3::new(horizontal, horizontal, vertical));
+            let mut told = (horizontal, vertical);
+            if let Some((sigma, time_s)) = self.sensors.slow {
+                let (stays, new) = ((-0.1 / time_s).exp(), self.noise.vector(sigma));
+                let slow = self.slow.map_or(new, |slow| slow * stays + new * (1.0 - stays * stays).sqrt());
+                self.slow = Some(slow);
+                error += slow;
+                told = (horizontal.hypot(sigma), vertical.hypot(sigma));
+            }
             send(
                 100.0,
                 Measurement::Gnss {
                     position_m: single(&(moment.p + error)),
                     velocity_m_s: single(&(moment.v + self.noise.vector(speed))),
-                    horizontal_sigma_m: horizontal as f32,
-                    vertical_sigma_m: vertical as f32,
+                    horizontal_sigma_m: told.0 as f32,
+                    vertical_sigma_m: told.1 as f32,
                     speed_sigma_m_s: speed as f32,
                 },
             );

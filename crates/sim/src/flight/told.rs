@@ -67,6 +67,7 @@ pub(super) fn settings(suite: &Suite, imu: &Imu, rotors: usize, gravity_m_s2: f6
     // A perfect sensor at rest says the same again and again.
     let is_noisy = |noise: f64, lsb: f64| noise > 0.0 && noise / per_root_s > lsb;
     let moves = is_noisy(gyro.noise_rad_s_rthz, gyro.lsb_rad_s) || is_noisy(accel.noise_m_s2_rthz, accel.lsb_m_s2);
+    let differs = suite.tracker.is_some_and(|it| it.position_m > 0.0 || it.attitude_rad > 0.0);
     let most = |value: f64, low: f64, high: f64| value.clamp(low, high) as f32;
     Settings {
         gravity_m_s2: gravity_m_s2 as f32,
@@ -77,10 +78,13 @@ pub(super) fn settings(suite: &Suite, imu: &Imu, rotors: usize, gravity_m_s2: f6
         accel_bias_m_s2: most(accel_bias, 1e-3, 1.0),
         gyro_bias_max_rad_s: most(5.0 * gyro.bias_rad_s, 0.35, 1.0),
         baro_walk_m_rts: most(drift, 1e-4, 1.0),
+        gnss_noise_m: suite.gnss.map_or(Settings::DEFAULT.gnss_noise_m, |it| most(it.noise_m, 0.01, 1000.0)),
+        gnss_slow_s: suite.gnss.map_or(Settings::DEFAULT.gnss_slow_s, |it| most(it.correlation_time_s, 1.0, 1e5)),
         declination_rad: suite.magnetometer.map_or(0.0, |it| it.declination_rad.clamp(-3.2, 3.2)) as f32,
         gyro_range_rad_s: range(gyro.range_rad_s, 100.0),
         accel_range_m_s2: range(accel.range_m_s2, 1000.0),
         stuck_s: if moves { Settings::DEFAULT.stuck_s } else { 0.0 },
+        frozen_s: if differs { Settings::DEFAULT.frozen_s } else { 0.0 },
         ..Settings::DEFAULT
     }
 }
