@@ -71,6 +71,8 @@ impl AidRecord {
 pub(crate) struct Repeated {
     pose: Option<(Vector3<f32>, [f32; 4])>,
     since_us: u64,
+    /// Whether what it did to the velocity has been doubted.
+    pub(crate) doubted: bool,
 }
 
 impl Repeated {
@@ -79,7 +81,7 @@ impl Repeated {
     pub(crate) fn lasts_us(&mut self, position: &Vector3<f32>, attitude: &[f32; 4], at_us: u64) -> u64 {
         let pose = Some((*position, *attitude));
         if self.pose != pose {
-            *self = Repeated { pose, since_us: at_us };
+            *self = Repeated { pose, since_us: at_us, doubted: false };
         }
         at_us.saturating_sub(self.since_us)
     }

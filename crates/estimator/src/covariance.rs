@@ -23,121 +23,10 @@
 //! PX4's EKF2. The 16th state, the barometer's offset, is one column more; without it, a filter that averages a
 //! barometer is sure of a height that it cannot know.
 
+use crate::errors::{Block, Coordinate, Errors, Interval, Row, minus_cross, subtract_outer};
 use crate::slow::Slow;
 use afbc_control::math::{max, min, sqrt};
-use nalgebra::{Matrix3, Vector3};
-
-pub(crate) type Block = Matrix3<f32>;
-
-/// One coordinate of a vector.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Coordinate {
-    X,
-    Y,
-    Z,
-}
-
-impl Coordinate {
-    pub(crate) const ALL: [Coordinate; 3] = [Coordinate::X, Coordinate::Y, Coordinate::Z];
-
-    /// Returns this coordinate of a vector.
-    #[inline]
-    pub(crate) fn of(self, vector: &Vector3<f32>) -> f32 {
-        match self {
-            Coordinate::X => vector.x,
-            Coordinate::Y => vector.y,
-            Coordinate::Z => vector.z,
-        }
-    }
-
-    /// Returns the unit vector.
-    #[inline]
-    pub(crate) fn unit(self) -> Vector3<f32> {
-        match self {
-            Coordinate::X => Vector3::new(1.0, 0.0, 0.0),
-            Coordinate::Y => Vector3::new(0.0, 1.0, 0.0),
-            Coordinate::Z => Vector3::new(0.0, 0.0, 1.0),
-        }
-    }
-
-    /// Returns this column.
-    #[inline]
-    pub(crate) fn column(self, m: &Block) -> Vector3<f32> {
-        match self {
-            Coordinate::X => Vector3::new(m.m11, m.m21, m.m31),
-            Coordinate::Y => Vector3::new(m.m12, m.m22, m.m32),
-            Coordinate::Z => Vector3::new(m.m13, m.m23, m.m33),
-        }
-    }
-
-    /// Returns this row.
-    #[inline]
-    pub(crate) fn row(self, m: &Block) -> Vector3<f32> {
-        match self {
-            Coordinate::X => Vector3::new(m.m11, m.m12, m.m13),
-            Coordinate::Y => Vector3::new(m.m21, m.m22, m.m23),
-            Coordinate::Z => Vector3::new(m.m31, m.m32, m.m33),
-        }
-    }
-}
-
-/// Row of a Jacobian: what a scalar measurement makes of the errors. Velocity and position enter by one coordinate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Row {
-    pub(crate) coordinate: Coordinate,
-    pub(crate) theta: Vector3<f32>,
-    pub(crate) velocity: f32,
-    pub(crate) position: f32,
-    /// By the gyroscope's bias, where it counts.
-    pub(crate) gyro: Option<Vector3<f32>>,
-    /// By the accelerometer's bias, where it counts.
-    pub(crate) accel: Option<Vector3<f32>>,
-    /// By the barometer's offset.
-    pub(crate) baro: f32,
-    /// Whether the GNSS receiver's slow error at this coordinate comes on top.
-    pub(crate) slow: bool,
-}
-
-/// One number per error.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Errors {
-    pub(crate) theta: Vector3<f32>,
-    pub(crate) velocity: Vector3<f32>,
-    pub(crate) position: Vector3<f32>,
-    pub(crate) gyro: Vector3<f32>,
-    pub(crate) accel: Vector3<f32>,
-    pub(crate) baro: f32,
-    /// Of the GNSS receiver's slow error, where it is considered; no gain corrects it.
-    pub(crate) slow: Vector3<f32>,
-}
-
-impl Errors {
-    /// Returns every number multiplied.
-    pub(crate) fn scaled(&self, factor: f32) -> Self {
-        Errors {
-            theta: self.theta * factor,
-            velocity: self.velocity * factor,
-            position: self.position * factor,
-            gyro: self.gyro * factor,
-            accel: self.accel * factor,
-            baro: self.baro * factor,
-            slow: self.slow * factor,
-        }
-    }
-}
-
-impl Row {
-    /// Returns the product with `errors`.
-    pub(crate) fn dot(&self, errors: &Errors) -> f32 {
-        self.theta.dot(&errors.theta)
-            + self.velocity * self.coordinate.of(&errors.velocity)
-            + self.position * self.coordinate.of(&errors.position)
-            + self.gyro.map_or(0.0, |gyro| gyro.dot(&errors.gyro))
-            + self.accel.map_or(0.0, |accel| accel.dot(&errors.accel))
-            + self.baro * errors.baro
-            + if self.slow { self.coordinate.of(&errors.slow) } else { 0.0 }
-    }
-}
+use nalgebra::Vector3;
 
 /// Variances that a prediction adds per second.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,17 +36,6 @@ pub(crate) struct Growth {
     pub(crate) gyro: f32,
     pub(crate) accel: f32,
     pub(crate) baro: f32,
-}
-
-/// What the nominal state did over the interval of a prediction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Interval {
-    /// T \[s\].
-    pub(crate) time_s: f32,
-    /// C = R T with the mean rotation.
-    pub(crate) turn: Block,
-    /// S: change of the velocity by specific force \[m/s\].
-    pub(crate) thrust: Vector3<f32>,
 }
 
 /// The covariance: the upper triangle of blocks, `tv` being the covariance of theta and v. Diagonal blocks are
@@ -186,22 +64,6 @@ pub(crate) struct Covariance {
     pub(crate) ab: Vector3<f32>,
     pub(crate) bb: f32,
     pub(crate) slow: Slow,
-}
-
-/// -s x, column by column: the matrix -[s]x from the left.
-#[inline]
-pub(crate) fn minus_cross(s: &Vector3<f32>, m: &Block) -> Block {
-    Block::new(
-        s.z * m.m21 - s.y * m.m31,
-        s.z * m.m22 - s.y * m.m32,
-        s.z * m.m23 - s.y * m.m33,
-        s.x * m.m31 - s.z * m.m11,
-        s.x * m.m32 - s.z * m.m12,
-        s.x * m.m33 - s.z * m.m13,
-        s.y * m.m11 - s.x * m.m21,
-        s.y * m.m12 - s.x * m.m22,
-        s.y * m.m13 - s.x * m.m23,
-    )
 }
 
 /// The matrix (-[s]x)' from the right: each row crossed.
@@ -240,20 +102,6 @@ fn add_diagonal(m: &mut Block, variance: f32) {
     m.m11 += variance;
     m.m22 += variance;
     m.m33 += variance;
-}
-
-/// m -= x y'.
-#[inline]
-pub(crate) fn subtract_outer(m: &mut Block, x: &Vector3<f32>, y: &Vector3<f32>) {
-    m.m11 -= x.x * y.x;
-    m.m21 -= x.y * y.x;
-    m.m31 -= x.z * y.x;
-    m.m12 -= x.x * y.y;
-    m.m22 -= x.y * y.y;
-    m.m32 -= x.z * y.y;
-    m.m13 -= x.x * y.z;
-    m.m23 -= x.y * y.z;
-    m.m33 -= x.z * y.z;
 }
 
 /// Smallest and largest variance of one error.

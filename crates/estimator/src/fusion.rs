@@ -5,7 +5,7 @@
 //! up to the normalised innovation squared of the whole fix.
 
 use crate::aid::{Aid, passes};
-use crate::covariance::{Coordinate, Errors};
+use crate::errors::{Coordinate, Errors};
 use crate::estimator::Estimator;
 use crate::horizon::{Expected, Horizon, Target};
 use crate::measurement::Measurement;
@@ -38,6 +38,9 @@ const ALOFT_M_S: f32 = 3.0;
 const AGAIN_US: u64 = 10_000_000;
 /// Variance of the velocity after a tracker's jump, which tells none; two more positions do \[m2/s2\].
 const JUMP_VARIANCE: f32 = 100.0;
+/// Variance of the velocity after a freeze, which has told for a while that the vehicle stands still: (0.1 m/s)^2,
+/// since faster ones contradict it \[m2/s2\].
+const FROZEN_VARIANCE: f32 = 0.01;
 
 fn count(number: &mut u32) {
     *number = number.saturating_add(1);
@@ -121,6 +124,10 @@ impl Estimator {
         let is_frozen = memory.repeated.lasts_us(position, attitude, at_us) > self.frozen_us;
         if is_frozen {
             count(&mut memory.dropped.frozen);
+            if !memory.repeated.doubted {
+                memory.repeated.doubted = true;
+                memory.doubt_velocity(FROZEN_VARIANCE);
+            }
             memory.aids.tracker_position.rejected_since_us = None;
             memory.aids.tracker_attitude.rejected_since_us = None;
         }

@@ -14,7 +14,7 @@
 //! the noise of the inertial sensors in between. Left out are the terms of the gyroscope's bias in v and p, 5e-5 m/s
 //! for 1e-3 rad/s and 100 ms, and that of the accelerometer's in p, 1e-4 m for 0.02 m/s2 and 100 ms.
 
-use crate::covariance::{Coordinate, Row};
+use crate::errors::{Coordinate, Row};
 use crate::history::{Past, way};
 use crate::rotation::{atan2, difference, matrix};
 use afbc_control::math::wrap_angle;

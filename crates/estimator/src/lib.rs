@@ -92,8 +92,8 @@
 //! # Reading order
 //!
 //! [`measurement`], [`settings`], [`estimate`]: in and out. [`estimator`]: a step. [`align`]: the start. [`nominal`],
-//! [`covariance`]: prediction. [`history`], [`horizon`], [`queue`], [`fusion`], [`slow`]: measurements. [`aid`],
-//! [`restart`], [`imu`]: gates, resets, health. [`rotation`], [`geodetic`]: small mathematics.
+//! [`errors`], [`covariance`]: prediction. [`history`], [`horizon`], [`queue`], [`fusion`], [`slow`]: measurements.
+//! [`aid`], [`restart`], [`imu`]: gates, resets, health. [`rotation`], [`geodetic`]: small mathematics.
 #![no_std]
 #![allow(rustdoc::private_intra_doc_links, reason = "the modules' documentation is for their reader")]
 
@@ -101,6 +101,7 @@ mod aid;
 mod align;
 mod covariance;
 mod ease;
+mod errors;
 mod estimate;
 mod estimator;
 mod fusion;

@@ -2,7 +2,8 @@
 
 use crate::aid::{Aids, Repeated};
 use crate::align::Align;
-use crate::covariance::{Covariance, Interval};
+use crate::covariance::Covariance;
+use crate::errors::Interval;
 use crate::estimate::{Dropped, Resets};
 use crate::history::History;
 use crate::imu::{Monitor, Smoothed};

@@ -1,7 +1,8 @@
 //! Starts, and resets of parts of the state.
 
 use crate::align::Aligned;
-use crate::covariance::{Coordinate, Covariance, Errors, angle_variance};
+use crate::covariance::{Covariance, angle_variance};
+use crate::errors::{Coordinate, Errors};
 use crate::estimate::Sigmas;
 use crate::history::Past;
 use crate::memory::{Known, Memory, NO_INTERVAL};

@@ -7,7 +7,7 @@
 //! is kept is the covariance X of the filter's errors with d. A fix then measures p + d + noise with what is known of
 //! both; the position's variance never falls to that of an average, and its innovations have the noise alone.
 
-use crate::covariance::{Block, Errors, Interval, Row, minus_cross, subtract_outer};
+use crate::errors::{Block, Errors, Interval, Row, minus_cross, subtract_outer};
 use nalgebra::Vector3;
 
 /// Variances of the slow error and its covariances with the errors; each column belongs to a coordinate of d.

@@ -3,7 +3,8 @@
 
 extern crate std;
 
-use crate::covariance::{Coordinate, Covariance, Errors, Growth, Interval, Row};
+use crate::covariance::{Covariance, Growth};
+use crate::errors::{Coordinate, Errors, Interval, Row};
 use crate::history::{History, Past};
 use crate::horizon::{Expected, Horizon, Target};
 use crate::slow::Slow;
