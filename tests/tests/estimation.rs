@@ -164,6 +164,18 @@ fn admitted(failure: Failure) {
     assert!((5.0..7.0).contains(&lost_s), "{lost_s} s");
 }
 
+/// A tracker that is silent at first: the vehicle rests until it speaks.
+#[test]
+fn nobody_starts_without_an_estimate() {
+    let mut scenario = scenario("mocap");
+    let tracker = scenario.instruments.tracker.as_mut().unwrap();
+    (tracker.loss.rate_hz, tracker.loss.mean_s) = (0.5, 1.0);
+    for seed in 1..=100 {
+        let view = World::new(&Scenario { seed, ..scenario.clone() }, 0.001).unwrap().look();
+        assert!(view.state.is_some() && view.time_s == 0.0, "seed {seed}");
+    }
+}
+
 /// A vehicle that is held is not measured again, however often somebody looks.
 #[test]
 fn looking_twice_changes_nothing() {

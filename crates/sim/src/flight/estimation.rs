@@ -13,6 +13,8 @@ use nalgebra::{Quaternion, SMatrix, SVector, Vector3};
 pub const REST_S: f64 = 2.0;
 /// Time after that in which it is carried to its start, and accelerated to the velocity there \[s\].
 pub const CARRIED_S: f64 = 1.0;
+/// Time by which it rests longer, at most, if the estimate is not valid then: nobody starts on none \[s\].
+const WAITS_S: u32 = 5;
 
 /// Steps between two evaluations of [`Estimated::nees`], which costs as much as the estimator.
 const NEES_EVERY: u64 = 10;
@@ -78,11 +80,25 @@ impl Navigator {
     /// # Errors
     /// The first setting out of range.
     pub(super) fn new(scenario: &Scenario, step_s: f64, truth: &Truth) -> Result<Option<Box<Self>>, OutOfRange> {
+        let mut settled = None;
+        for waits_s in 0..=WAITS_S {
+            let Some(mut navigator) = Self::at_rest(scenario, step_s, f64::from(waits_s))? else { return Ok(None) };
+            let is_ready = navigator.settle(truth);
+            settled = Some(navigator);
+            if is_ready {
+                break;
+            }
+        }
+        Ok(settled)
+    }
+
+    /// Creates one that will rest for `waits_s` longer than usual.
+    fn at_rest(scenario: &Scenario, step_s: f64, waits_s: f64) -> Result<Option<Box<Self>>, OutOfRange> {
         let (Some(imu), Some(instruments)) = (scenario.instruments.imu, scenario.instruments(step_s)?) else {
             return Ok(None);
         };
         let mounting = scenario.vehicle_file.as_ref().map_or(Mounting::DEFAULT, |file| file.imu);
-        let mut navigator = Box::new(Navigator {
+        Ok(Some(Box::new(Navigator {
             instruments,
             suite: scenario.instruments,
             calibration: Calibration::new(&mounting, step_s),
@@ -92,15 +108,14 @@ impl Navigator {
             outages: scenario.outages.clone(),
             step_s,
             steps: 0,
-            settling: ((REST_S + CARRIED_S) / step_s).round() as u64,
+            settling: ((REST_S + waits_s + CARRIED_S) / step_s).round() as u64,
             last: None,
-        });
-        navigator.settle(truth);
-        Ok(Some(navigator))
+        })))
     }
 
-    /// Lets the vehicle stand at rest, and carries it to its start.
-    fn settle(&mut self, start: &Truth) {
+    /// Lets the vehicle stand at rest, and carries it to its start. True if the estimate is valid then.
+    fn settle(&mut self, start: &Truth) -> bool {
+        let mut is_ready = false;
         let carried = Truth {
             rates_rad_s: Vector3::zeros(),
             angular_acceleration_rad_s2: Vector3::zeros(),
@@ -116,15 +131,17 @@ impl Navigator {
             let acceleration = start.velocity_m_s * if rests { 0.0 } else { 1.0 / CARRIED_S };
             let still_m = start.position_m - start.velocity_m_s * (0.5 * CARRIED_S);
             self.memory.set_on_ground(rests);
-            let _ = self.step(&Truth {
+            let estimate = self.step(&Truth {
                 time_s,
                 position_m: still_m + acceleration * (0.5 * moving_s * moving_s),
                 velocity_m_s: acceleration * moving_s,
                 acceleration_m_s2: acceleration,
                 ..carried
             });
+            is_ready = is_valid(&estimate);
         }
         self.memory.set_on_ground(false);
+        is_ready
     }
 
     /// Returns the state for the pilot, none while it is not valid, and how good it is. The same again as long as the
@@ -137,8 +154,7 @@ impl Navigator {
         }
         let judged = self.judged();
         let estimate = self.step(truth);
-        let validity = &estimate.validity;
-        let valid = validity.attitude && validity.heading && validity.velocity && validity.position;
+        let valid = is_valid(&estimate);
         let nees = match self.last {
             Some((_, _, last)) if !self.steps.is_multiple_of(NEES_EVERY) => last.nees,
             _ => self.nees(&estimate, truth) as f32,
@@ -214,6 +230,12 @@ impl Navigator {
         let e = errors(estimate, truth).component_div(&scale);
         correlation.cholesky().map_or(f64::NAN, |factor| factor.solve(&e).dot(&e))
     }
+}
+
+/// True if a pilot may fly on it.
+fn is_valid(estimate: &Estimate) -> bool {
+    let validity = &estimate.validity;
+    validity.attitude && validity.heading && validity.velocity && validity.position
 }
 
 /// Returns the estimator for the instruments of `scenario`.
