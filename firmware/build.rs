@@ -45,7 +45,8 @@ fn source(vehicle: &Vehicle) -> String {
          pub const ROTORS: usize = {count};\n\
          /// What the firmware is told of it.\n\
          pub const CONFIGURATION: Configuration<ROTORS> = Configuration {{\n\
-         airframe: {airframe},\nsettings: {settings},\ngains: {gains},\ncurve: {curve},\n}};\n",
+         airframe: {airframe},\nsettings: {settings},\ngains: {gains},\ncurve: {curve},\n\
+         estimation: afbc_onboard::Estimation::DEFAULT,\n}};\n",
         name = vehicle.name,
         settings = literal(&settings),
         gains = literal(&gains),

@@ -3,6 +3,7 @@
 
 use crate::control::Tick;
 use crate::vehicle::ROTORS;
+use afbc_onboard::Readings;
 use embassy_executor::SendSpawner;
 
 /// A board: motors, watchdog and health.
@@ -26,6 +27,11 @@ pub trait Board: Sized + 'static {
 
     /// True if a task that is not needed in flight has panicked.
     fn task_has_failed(&self) -> bool;
+
+    /// Returns what the sensors have read since the last tick; nothing from a board without them.
+    fn sense(&mut self) -> Readings {
+        Readings::NONE
+    }
 
     /// Outputs throttles to the motors: 0, or 48 to 2047.
     fn drive(&mut self, throttles: [u16; ROTORS]);

@@ -105,7 +105,7 @@ fn tick<B: Board>(flight: &mut Flight, inbox: &mut Inbox, board: &mut B) -> Repo
     if board.clock_has_failed() {
         flight.distrust_clock();
     }
-    let report = flight.tick(now_us, inbox);
+    let report = flight.tick(now_us, inbox, &board.sense());
 
     board.drive(report.throttles);
     // A reset restarts a failed task, once it does not end a flight.

@@ -3,7 +3,7 @@
 //!
 //! Two FIFOs, `to_firmware` and `from_firmware`, carry the wire of [`afbc_onboard::ReplyHead`].
 
-use afbc_onboard::ReplyHead;
+use afbc_onboard::{Readings, ReplyHead};
 use afbc_types::ROTORS_MAX;
 use core::cell::Cell;
 use embassy_executor::SendSpawner;
@@ -20,6 +20,9 @@ use semihosting::process::exit;
 
 /// Bytes received by the link, at most this many per tick.
 static LINK: Pipe<CriticalSectionRawMutex, 4096> = Pipe::new();
+
+/// Readings of the sensors for the next tick.
+static READINGS: Mutex<CriticalSectionRawMutex, Cell<Readings>> = Mutex::new(Cell::new(Readings::NONE));
 
 /// Throttles of the last tick.
 static THROTTLES: Mutex<CriticalSectionRawMutex, Cell<[u16; ROTORS_MAX]>> = Mutex::new(Cell::new([0; ROTORS_MAX]));
@@ -56,6 +59,11 @@ impl Board for Emulated {
     /// A panic ends the emulator.
     fn task_has_failed(&self) -> bool {
         false
+    }
+
+    /// Takes what the host has sent.
+    fn sense(&mut self) -> Readings {
+        READINGS.lock(|cell| cell.replace(Readings::NONE))
     }
 
     /// Stores the throttles for the reply.
@@ -101,12 +109,15 @@ impl board::Transmitter for Transmitter {
 }
 
 impl Transmitter {
-    /// Passes the host's next bytes to the link. Ends the firmware if the host has ended.
+    /// Passes the host's readings to the next tick, and its bytes to the link. Ends the firmware if the host has ended.
     fn take_bytes(&mut self) {
-        let mut length = [0; 4];
-        if self.to_firmware.read_exact(&mut length).is_err() {
+        let mut readings = [0; Readings::LEN];
+        if self.to_firmware.read_exact(&mut readings).is_err() {
             exit(0);
         }
+        READINGS.lock(|cell| cell.set(Readings::from_bytes(&readings)));
+        let mut length = [0; 4];
+        self.to_firmware.read_exact(&mut length).expect("the host sends what it announced");
         let mut length = u32::from_le_bytes(length) as usize;
         let mut buffer = [0; 256];
         while length > 0 {

@@ -1,6 +1,6 @@
 //! Inputs of a tick: the newest state and setpoint, with their times, and requests.
 
-use crate::supervisor::Request;
+use crate::supervisor::{Refusal, Request};
 use afbc_types::{Setpoint, State};
 
 /// A value with its time on the vehicle's clock.
@@ -37,6 +37,8 @@ pub const REQUESTS_MAX: usize = 4;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inbox {
     state: Option<Stamped<State>>,
+    adrift: Option<Stamped<State>>,
+    missing: Option<Refusal>,
     setpoint: Option<Stamped<Setpoint>>,
     /// Requests in the order of arrival, without gaps.
     requests: [Option<Asked>; REQUESTS_MAX],
@@ -44,13 +46,30 @@ pub struct Inbox {
 
 impl Inbox {
     /// An empty inbox.
-    pub const EMPTY: Self = Inbox { state: None, setpoint: None, requests: [None; REQUESTS_MAX] };
+    pub const EMPTY: Self =
+        Inbox { state: None, adrift: None, missing: None, setpoint: None, requests: [None; REQUESTS_MAX] };
 
     /// Stores a measured state, stamped by a [`Tracker`](crate::Tracker), if it is [plausible](State::is_plausible).
     pub fn put_state(&mut self, state: Stamped<State>) {
         if state.value.is_plausible() {
             self.state = Some(state);
         }
+    }
+
+    /// Stores a state of the vehicle's own estimate in place of any other.
+    pub fn locate(&mut self, state: Stamped<State>) {
+        (self.state, self.adrift, self.missing) = (Some(state).filter(|state| state.value.is_plausible()), None, None);
+    }
+
+    /// Stores a state of the vehicle's own estimate, which `missing` something and does not know where it is: attitude,
+    /// rates, height and vertical velocity may be used, the horizontal position and velocity may not. It replaces any
+    /// other state. Without one, what the link says stands.
+    pub fn put_adrift(&mut self, state: Option<Stamped<State>>, missing: Refusal) {
+        self.adrift = state.filter(|state| state.value.is_plausible());
+        if self.adrift.is_some() {
+            self.state = None;
+        }
+        self.missing = Some(missing);
     }
 
     /// Stores a setpoint, stamped on arrival, if it is [plausible](Setpoint::is_plausible).
@@ -63,6 +82,16 @@ impl Inbox {
     /// Returns the newest plausible state.
     pub fn state(&self) -> Option<&Stamped<State>> {
         self.state.as_ref()
+    }
+
+    /// Returns the newest state of a vehicle that [does not know where it is](Self::put_adrift).
+    pub fn adrift(&self) -> Option<&Stamped<State>> {
+        self.adrift.as_ref()
+    }
+
+    /// Returns what the vehicle's estimate misses; none if it has none of its own.
+    pub fn missing(&self) -> Option<Refusal> {
+        self.missing
     }
 
     /// Returns the newest plausible setpoint.
@@ -83,6 +112,8 @@ impl Inbox {
     /// Merges `news` into this inbox.
     pub fn post(&mut self, news: &Inbox) {
         self.state = news.state.or(self.state);
+        self.adrift = news.adrift.or(self.adrift);
+        self.missing = news.missing.or(self.missing);
         self.setpoint = news.setpoint.or(self.setpoint);
         for asked in news.requests.iter().flatten() {
             self.request(*asked);
@@ -113,7 +144,7 @@ impl Inbox {
     /// Does as [`take`](Self::take), in place of the copy for the last tick.
     #[inline]
     pub fn take_into(&mut self, taken: &mut Inbox) {
-        taken.state = self.state;
+        (taken.state, taken.adrift, taken.missing) = (self.state, self.adrift, self.missing);
         match (&self.setpoint, &mut taken.setpoint) {
             (Some(new), Some(old)) => {
                 copy(&new.value, &mut old.value);

@@ -9,7 +9,7 @@ pub const COAST_US: u32 = 20_000;
 pub const STEADY_US: u32 = 100_000;
 /// Age of the state at which coasting ends and the vehicle descends \[us\].
 pub const DESCEND_US: u32 = 250_000;
-/// Age of the state at which the motors stop, since the attitude is unknown \[us\]: two seconds of blind descent.
+/// Age of the attitude at which the motors stop \[us\]: two seconds of blind descent.
 pub const GIVE_UP_US: u32 = 2_250_000;
 /// Age of the setpoint at which the vehicle holds its position instead \[us\].
 pub const SETPOINT_STALE_US: u32 = 500_000;
@@ -30,11 +30,13 @@ pub const REST_US: u32 = 1_000_000;
 ///    |      +---------------| Descending | <-------------------+
 ///    |    on the ground     +------------+
 ///    |
-///    +--- Kill, age > 2.25 s or tumbled, from anywhere; Disarm, from anywhere on the ground
+///    +--- Kill, tumbled, or attitude's age > 2.25 s, from anywhere; Disarm, from anywhere on the ground
 /// ```
 ///
 /// `age` is that of the newest plausible state. The mode at power-up is Disarmed. In Coasting and Descending the law
-/// flies while the state is fresh; otherwise the vehicle is flown blind ([`crate::blind`]).
+/// flies while the state is fresh. A vehicle that knows its attitude but not where it is, is held level and descends
+/// without drifting away on purpose ([`crate::descent`]), for as long as it takes; otherwise it is flown blind
+/// ([`crate::blind`]).
 ///
 /// Descending does not return to Flying. The attitude has been unknown for a quarter of a second, and a tracker that
 /// recovers only for moments would make the vehicle descend and climb repeatedly. States that return are used to
@@ -95,11 +97,17 @@ pub enum Refusal {
     NotArmed = 9,
     /// A later request has stopped the motors.
     Overtaken = 10,
+    /// The vehicle's own estimate has not found its level: no samples, or it is moved.
+    AttitudeUnknown = 11,
+    /// The vehicle's own estimate has no heading.
+    HeadingUnknown = 12,
+    /// The vehicle's own estimate has no position.
+    PositionUnknown = 13,
 }
 
 impl Refusal {
     /// Every reason.
-    pub const ALL: [Refusal; 10] = [
+    pub const ALL: [Refusal; 13] = [
         Refusal::AlreadyArmed,
         Refusal::StateStale,
         Refusal::TiltTooLarge,
@@ -110,6 +118,9 @@ impl Refusal {
         Refusal::InFlight,
         Refusal::NotArmed,
         Refusal::Overtaken,
+        Refusal::AttitudeUnknown,
+        Refusal::HeadingUnknown,
+        Refusal::PositionUnknown,
     ];
 
     /// Returns the reason as text of at most 50 characters.
@@ -125,6 +136,9 @@ impl Refusal {
             Refusal::InFlight => "disarming refused: in flight; force it to stop",
             Refusal::NotArmed => "refused: not armed",
             Refusal::Overtaken => "refused: motors were stopped by a later request",
+            Refusal::AttitudeUnknown => "arming refused: estimator has no attitude yet",
+            Refusal::HeadingUnknown => "arming refused: estimator has no heading",
+            Refusal::PositionUnknown => "arming refused: estimator has no position",
         }
     }
 }
@@ -139,7 +153,7 @@ pub enum End {
     Killed = 2,
     /// The descent reached the ground.
     Landed = 3,
-    /// No state for 2.25 s.
+    /// No state and no attitude for 2.25 s.
     StateLost = 4,
     /// Upside down or spinning without recovery ([`crate::tumble`]).
     Tumbled = 5,
@@ -184,7 +198,7 @@ impl ArmingLimits {
     /// # Errors
     /// The first reason against arming.
     pub fn ready(&self, vehicle: &Standing) -> Result<(), Refusal> {
-        let state = vehicle.state.ok_or(Refusal::StateStale)?;
+        let state = vehicle.state.ok_or(vehicle.missing.unwrap_or(Refusal::StateStale))?;
         if state.attitude_rad.x.abs() > self.tilt_max_rad || state.attitude_rad.y.abs() > self.tilt_max_rad {
             return Err(Refusal::TiltTooLarge);
         }
@@ -205,6 +219,8 @@ impl ArmingLimits {
 pub struct Standing<'a> {
     /// State, if plausible and fresh.
     pub state: Option<&'a State>,
+    /// What the vehicle's own estimate misses, if it has one and misses something.
+    pub missing: Option<Refusal>,
     /// Setpoint, if plausible and fresh.
     pub setpoint: Option<&'a Setpoint>,
     /// True if the control tick's rate is healthy.
@@ -224,6 +240,9 @@ pub struct Observed {
     pub ready: Result<(), Refusal>,
     /// Age of the newest plausible state \[us\]; `u32::MAX` if there is none.
     pub state_age_us: u32,
+    /// Age of the newest attitude \[us\]: that of the state, or less if the vehicle knows its attitude but not where
+    /// it is.
+    pub attitude_age_us: u32,
     /// Time for which no state has been stale \[us\].
     pub steady_us: u32,
     /// False if the vehicle is on the ground ([`crate::landing`]).
@@ -245,7 +264,7 @@ impl Mode {
             _ if observed.kill => Some(End::Killed),
             _ if observed.request == Some(Request::Disarm) && !observed.airborne => Some(End::Disarmed),
             _ if observed.tumbled => Some(End::Tumbled),
-            _ if observed.state_age_us > GIVE_UP_US => Some(End::StateLost),
+            _ if observed.attitude_age_us > GIVE_UP_US => Some(End::StateLost),
             Mode::Descending if !observed.airborne => Some(End::Landed),
             _ => None,
         }

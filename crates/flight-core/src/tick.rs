@@ -10,6 +10,7 @@ use crate::tumble::Tumble;
 use crate::witness::Witness;
 use afbc_control::{Action, FlightController, Trace};
 use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds, Setpoint, State};
+use nalgebra::Vector3;
 
 /// Accepted time step of a law: the tick's \[s\].
 pub const DT: Range = Range::new("dt_s", 0.001, 0.001);
@@ -30,6 +31,8 @@ pub struct VehicleMemory<M> {
     rate: rate::Counter,
     /// The newest plausible state.
     state: Option<Stamped<State>>,
+    /// Time of the newest attitude, with or without a position \[us\].
+    oriented_us: Option<u64>,
     /// Time for which no state has been stale \[us\].
     steady_us: u32,
     /// Time for which the vehicle has been at rest, with fresh states \[us\].
@@ -62,6 +65,8 @@ struct Guide {
     /// Setpoint to hold while there is no other.
     hold: Option<Setpoint>,
     descent: Option<Descent>,
+    /// Descent of a vehicle that does not know where it is.
+    adrift: Option<Descent>,
 }
 
 impl<M> VehicleMemory<M> {
@@ -167,13 +172,17 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         let fresh =
             memory.state.filter(|_| state_age_us <= COAST_US).map(|state| extrapolated(&state.value, state_age_us));
         let fresh = fresh.as_ref();
-        memory.watch(fresh, &self.limits, dt_s);
-        let VehicleMemory { mode, steady_us, rest_us, frozen_states, flight, .. } = memory;
+        let adrift = inbox.adrift().filter(|_| fresh.is_none()).and_then(|state| upright(state, now_us));
+        memory.orient(inbox);
+        memory.watch(fresh, adrift.as_ref(), &self.limits, dt_s);
+        let VehicleMemory { mode, steady_us, rest_us, frozen_states, oriented_us, flight, .. } = memory;
+        let age_us = |at_us: Option<u64>| at_us.map_or(u32::MAX, |at_us| Stamped { value: (), at_us }.age_us(now_us));
         let setpoint = inbox.setpoint().filter(|s| s.age_us(now_us) <= SETPOINT_STALE_US).map(|s| &s.value);
 
         // Supervises.
         let ready = || {
-            let standing = Standing { state: fresh, setpoint, healthy: rate.healthy(), rest_us: *rest_us };
+            let missing = inbox.missing();
+            let standing = Standing { state: fresh, missing, setpoint, healthy: rate.healthy(), rest_us: *rest_us };
             self.limits.ready(&standing)
         };
         let asked = inbox.asked();
@@ -182,6 +191,7 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
             kill: asked.is_some() && inbox.kills(),
             ready: if mode.armed() { Err(Refusal::AlreadyArmed) } else { ready() },
             state_age_us,
+            attitude_age_us: age_us(*oriented_us),
             steady_us: *steady_us,
             airborne: flight.as_ref().is_some_and(|flight| flight.landing.airborne()),
             tumbled: flight.as_ref().is_some_and(|flight| flight.tumble.is_lost()),
@@ -206,12 +216,12 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         // Controls.
         let action = match flight {
             Some(flight) if mode.armed() && !arms => {
-                flight.reckon(&self.blind, fresh.filter(|_| measured));
+                flight.reckon(&self.blind, fresh.filter(|_| measured).or(adrift.as_ref()));
                 let engaged = done(Request::Engage) && self.controller.engage(&mut flight.control);
-                match fresh {
+                match (fresh, &adrift) {
                     // Likewise, the tick of engaging has no step: the rotors keep their inputs.
                     _ if engaged => self.lawless(flight, flight.applied),
-                    Some(state) => {
+                    (Some(state), _) => {
                         let between = (!measured).then(|| flight.reckoning.between(state));
                         let state = between.as_ref().unwrap_or(state);
                         let target = flight.guide.target(mode, state, setpoint, dt_s);
@@ -222,7 +232,15 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
                         self.blind.trim(&mut flight.reckoning, &flight.applied);
                         action
                     }
-                    None => {
+                    (None, Some(state)) => {
+                        let target = flight.guide.down(state, dt_s);
+                        let action = self.controller.decide(&mut flight.control, state, target, true);
+                        flight.lawless = None;
+                        flight.applied = action.given;
+                        self.blind.trim(&mut flight.reckoning, &flight.applied);
+                        action
+                    }
+                    (None, None) => {
                         let action = self.blind_action(flight, mode);
                         flight.applied = action.given;
                         action
@@ -243,7 +261,7 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
     /// Returns the action without a state.
     #[inline(always)]
     fn blind_action<M>(&self, flight: &mut Armed<M>, mode: Mode) -> Action<N> {
-        flight.guide.descent = None;
+        (flight.guide.descent, flight.guide.adrift) = (None, None);
         let inputs = match mode {
             Mode::Descending => self.blind.descend(&flight.reckoning),
             _ => self.blind.coast(&flight.reckoning),
@@ -291,21 +309,31 @@ impl<M> VehicleMemory<M> {
         true
     }
 
-    /// Updates the detectors with a fresh state, or none.
-    fn watch(&mut self, fresh: Option<&State>, limits: &ArmingLimits, dt_s: f32) {
+    /// Notes the time of the newest attitude.
+    fn orient(&mut self, inbox: &Inbox) {
+        let times = [self.state.map(|state| state.at_us), inbox.adrift().map(|state| state.at_us), self.oriented_us];
+        self.oriented_us = times.into_iter().flatten().max();
+    }
+
+    /// Updates the detectors with a fresh state, or with that of a vehicle adrift, or none.
+    fn watch(&mut self, fresh: Option<&State>, adrift: Option<&State>, limits: &ArmingLimits, dt_s: f32) {
         let gap_us = self.rate.gap_us();
         let longer = |time_us: u32, lasts| if lasts { time_us.saturating_add(gap_us) } else { 0 };
         self.steady_us = longer(self.steady_us, fresh.is_some());
         self.rest_us = longer(self.rest_us, fresh.is_some_and(|state| limits.at_rest(state)));
         let armed = self.mode.armed();
         let Some(flight) = self.flight.as_mut().filter(|_| armed) else { return };
-        match fresh {
-            Some(state) => {
+        match (fresh, adrift) {
+            (Some(state), _) => {
                 flight.tumble.advance(state, gap_us);
                 flight.landing.advance(state, flight.applied.thrust_n, gap_us, dt_s);
                 flight.distrusts |= flight.landing.contradicts();
             }
-            None => {
+            (None, Some(state)) => {
+                flight.tumble.advance(state, gap_us);
+                flight.landing.advance_adrift(state, flight.applied.thrust_n, gap_us, dt_s);
+            }
+            (None, None) => {
                 flight.tumble.advance_blind(gap_us);
                 flight.landing.advance_blind(gap_us);
             }
@@ -343,9 +371,28 @@ impl<M> Armed<M> {
     }
 }
 
+/// Returns the state of a vehicle that does not know where it is, if it is fresh: it stands over the origin as far as
+/// the law can tell, so that nothing drives it sideways but what the law has learnt of the wind.
+fn upright(state: &Stamped<State>, now_us: u64) -> Option<State> {
+    (state.age_us(now_us) <= COAST_US).then(|| {
+        let State { position_m, velocity_m_s, .. } = state.value;
+        let vertical = |v: Vector3<f32>| Vector3::new(0.0, 0.0, v.z);
+        State { position_m: vertical(position_m), velocity_m_s: vertical(velocity_m_s), ..state.value }
+    })
+}
+
 impl Guide {
+    /// Returns the setpoint for a vehicle that does not know where it is: downwards.
+    fn down(&mut self, state: &State, dt_s: f32) -> &Setpoint {
+        (self.hold, self.descent) = (None, None);
+        let descent = self.adrift.get_or_insert_with(|| Descent::new(state));
+        descent.advance(dt_s);
+        descent.setpoint()
+    }
+
     /// Returns the setpoint for a fresh `state`: the descent's, the commander's, or a hold if there is none.
     fn target<'a>(&'a mut self, mode: Mode, state: &State, setpoint: Option<&'a Setpoint>, dt_s: f32) -> &'a Setpoint {
+        self.adrift = None;
         if mode == Mode::Descending {
             let descent = self.descent.get_or_insert_with(|| Descent::new(state));
             descent.advance(dt_s);

@@ -18,6 +18,7 @@ const CALM: Observed = Observed {
     kill: false,
     ready: Ok(()),
     state_age_us: 0,
+    attitude_age_us: 0,
     steady_us: u32::MAX,
     airborne: true,
     tumbled: false,
@@ -30,13 +31,22 @@ fn all() -> impl Iterator<Item = (Mode, Observed)> {
     let cases = cases.flat_map(|case| AGES_US.into_iter().map(move |age| (case, age)));
     let cases = cases.flat_map(|case| [0, STEADY_US - 1, STEADY_US].into_iter().map(move |steady| (case, steady)));
     let cases = cases.flat_map(|case| [Ok(()), Err(Refusal::TiltTooLarge)].into_iter().map(move |ready| (case, ready)));
-    cases.flat_map(move |((((mode, request), state_age_us), steady_us), ready)| {
-        (0..8).map(move |n| {
-            let (waits, airborne, tumbled) = flags(n);
-            let kill = waits || request == Some(Request::Kill);
-            (mode, Observed { request, kill, ready, state_age_us, steady_us, airborne, tumbled })
+    cases
+        .flat_map(move |((((mode, request), state_age_us), steady_us), ready)| {
+            (0..8).map(move |n| {
+                let (waits, airborne, tumbled) = flags(n);
+                let kill = waits || request == Some(Request::Kill);
+                let seen = Observed { request, kill, ready, state_age_us, steady_us, airborne, tumbled, ..CALM };
+                (mode, seen)
+            })
         })
-    })
+        // The attitude is known for as long as the state, or longer.
+        .flat_map(|(mode, seen)| {
+            AGES_US
+                .into_iter()
+                .filter(move |age| *age <= seen.state_age_us)
+                .map(move |attitude_age_us| (mode, Observed { attitude_age_us, ..seen }))
+        })
 }
 
 #[test]
@@ -58,8 +68,13 @@ fn in_flight_the_age_decides() {
     for (mode, row) in table {
         for (state_age_us, expected) in AGES_US.into_iter().zip(row) {
             for ready in [Ok(()), Err(Refusal::TiltTooLarge)] {
-                let observed = Observed { ready, state_age_us, ..CALM };
+                let observed = Observed { ready, state_age_us, attitude_age_us: state_age_us, ..CALM };
                 assert_eq!(mode.next(&observed), expected, "{mode:?}, {observed:?}");
+                // With an attitude the descent takes as long as it takes.
+                let adrift = Observed { attitude_age_us: GIVE_UP_US, ..observed };
+                let given_up = state_age_us > GIVE_UP_US && mode.armed();
+                let next = if given_up { Descending } else { expected };
+                assert_eq!(mode.next(&adrift), next, "{mode:?}, {adrift:?}");
             }
         }
     }
@@ -81,7 +96,7 @@ fn a_flight_ends_for_the_reason_of_highest_precedence() {
             (seen.kill, End::Killed),
             (seen.request == Some(Request::Disarm) && !seen.airborne, End::Disarmed),
             (seen.tumbled, End::Tumbled),
-            (seen.state_age_us > GIVE_UP_US, End::StateLost),
+            (seen.attitude_age_us > GIVE_UP_US, End::StateLost),
             (mode == Mode::Descending && !seen.airborne, End::Landed),
         ];
         let end = reasons.into_iter().find(|(holds, _)| *holds && mode.armed()).map(|(_, end)| end);
@@ -145,8 +160,13 @@ fn readiness_names_the_first_reason_against_it() {
         (level, at(1.0, 1.0, 1.0), true, REST_US - 1, Err(Refusal::NotAtRest)),
     ];
     for (state, setpoint, healthy, rest_us, expected) in cases {
-        let standing = Standing { state: state.as_ref(), setpoint: setpoint.as_ref(), healthy, rest_us };
+        let (state, setpoint) = (state.as_ref(), setpoint.as_ref());
+        let standing = Standing { state, missing: None, setpoint, healthy, rest_us };
         assert_eq!(limits.ready(&standing), expected, "{standing:?}");
+        // An estimate of one's own says what it misses.
+        let missing = Some(Refusal::HeadingUnknown);
+        let unknown = Standing { state: None, missing, ..standing };
+        assert_eq!(limits.ready(&unknown), Err(Refusal::HeadingUnknown));
     }
 }
 

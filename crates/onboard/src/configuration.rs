@@ -2,6 +2,7 @@
 
 use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
+use afbc_estimator::Settings as Estimation;
 use afbc_flight_core::motor::Curve;
 use afbc_types::{Airframe, Parameters, PerAxis};
 
@@ -16,6 +17,8 @@ pub struct Configuration<const N: usize = 4> {
     pub gains: PerAxis<Gains>,
     /// Throttle curve of the motors.
     pub curve: Curve,
+    /// Settings of the estimator.
+    pub estimation: Estimation,
 }
 
 impl Default for Configuration {
@@ -26,6 +29,7 @@ impl Default for Configuration {
             settings: Profile::Flight.settings(),
             gains: Profile::Flight.gains(),
             curve: Curve::DEFAULT,
+            estimation: Estimation::DEFAULT,
         }
     }
 }

@@ -245,7 +245,7 @@ fn requests_whose_tick_went_unreported_fail() {
         }
         for _ in 0..REQUESTS_MAX {
             bench.now_us += 1000;
-            bench.flight.tick(bench.now_us, &bench.inbox.take());
+            bench.flight.tick(bench.now_us, &mut bench.inbox.take(), &afbc_onboard::Readings::NONE);
         }
         let told = listen(&mut bench, FORGOTTEN_US as usize / 1000 + 10);
         assert_eq!(told, [(400, Answer::Failed, STATION); REQUESTS_MAX - 1]);

@@ -51,7 +51,7 @@ impl Bench {
             state.position_m.z = 1e-6 * (self.now_us % 11) as f32;
             self.hear(Uplink::State { sent_us: self.now_us, state });
             self.hear(Uplink::Setpoint(Setpoint::default()));
-            let report = self.flight.tick(self.now_us, &self.inbox.take());
+            let report = self.flight.tick(self.now_us, &mut self.inbox.take(), &afbc_onboard::Readings::NONE);
             self.mode = report.mode;
             let Bench { comms, decoder, texts, answers, .. } = self;
             let mut hear = |_: Address, message: Downlink| match message {

@@ -4,7 +4,7 @@
 
 use crate::Error;
 use crate::qemu::{self, Qemu};
-use afbc_onboard::ReplyHead;
+use afbc_onboard::{Readings, ReplyHead};
 use afbc_types::ROTORS_MAX;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
@@ -43,6 +43,7 @@ pub struct Reply {
 pub struct Emulator {
     qemu: Qemu,
     to_firmware: File,
+    readings: Readings,
     replies: Receiver<io::Result<Reply>>,
     /// Writing end of the firmware's FIFO: while it is open, the reader waits for more.
     hold: Option<File>,
@@ -89,7 +90,13 @@ impl Emulator {
                 }
             }
         });
-        Ok(Emulator { qemu, to_firmware, replies, hold: Some(hold), reader: Some(reader) })
+        let readings = Readings::NONE;
+        Ok(Emulator { qemu, to_firmware, readings, replies, hold: Some(hold), reader: Some(reader) })
+    }
+
+    /// Sets what the vehicle's own sensors read for the next tick alone.
+    pub fn sense(&mut self, readings: &Readings) {
+        self.readings = *readings;
     }
 
     /// Runs one control tick: delivers the bytes that arrived before it, and returns what the firmware sent after it.
@@ -97,7 +104,8 @@ impl Emulator {
     /// # Errors
     /// If the firmware panicked, faulted or hangs.
     pub fn exchange(&mut self, to_firmware: &[u8]) -> Result<Reply, Error> {
-        let mut frame = (to_firmware.len() as u32).to_le_bytes().to_vec();
+        let mut frame = core::mem::take(&mut self.readings).to_bytes().to_vec();
+        frame.extend_from_slice(&(to_firmware.len() as u32).to_le_bytes());
         frame.extend_from_slice(to_firmware);
         self.to_firmware.write_all(&frame)?;
 

@@ -1,6 +1,7 @@
 //! Emulated processor and host, compared.
 
 use crate::emulator::{Emulator, Reply};
+use afbc_onboard::Readings;
 use afbc_sim::in_the_loop::{Autopilot, Error, Extremes, Host, Tick};
 
 /// The emulated processor and the same code on the host. The host gets the same bytes at the same times, and every
@@ -48,6 +49,11 @@ impl Twins {
 }
 
 impl Autopilot for Twins {
+    fn sense(&mut self, readings: &Readings) {
+        self.emulator.sense(readings);
+        self.host.sense(readings);
+    }
+
     fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error> {
         let reply = self.emulator.exchange(uplink).map_err(|error| Error::Autopilot(error.into()))?;
         // The times are the processor's, since they are measured, not computed.

@@ -64,7 +64,7 @@ impl Bench {
     /// Runs a tick with what was received; returns its report and all messages.
     pub fn step(&mut self) -> (Report, Vec<Downlink>) {
         self.now_us += 1000;
-        let report = self.flight.tick(self.now_us, &self.inbox.take());
+        let report = self.flight.tick(self.now_us, &mut self.inbox.take(), &afbc_onboard::Readings::NONE);
         (report, self.said(&report))
     }
 

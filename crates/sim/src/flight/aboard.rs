@@ -5,7 +5,7 @@ use super::sample::Sample;
 use super::world::World;
 use afbc_control::{Action, FlightController, Mixer};
 use afbc_flight_core::rate::{PERIOD_US, WINDOW_US};
-use afbc_flight_core::{ArmingLimits, Asked, Inbox, Request, Stamped, Vehicle, VehicleMemory};
+use afbc_flight_core::{ArmingLimits, Asked, Inbox, Refusal, Request, Stamped, Vehicle, VehicleMemory};
 use afbc_types::{OutOfRange, Parameters, Setpoint, State};
 use core::convert::Infallible;
 
@@ -34,11 +34,14 @@ impl<C: FlightController<N>, const N: usize> Aboard<C, N> {
     }
 
     /// Runs one tick with these inputs.
-    fn tick(&mut self, state: Option<State>, setpoint: Setpoint) -> Action<N> {
+    fn tick(&mut self, state: Option<State>, adrift: Option<State>, setpoint: Setpoint) -> Action<N> {
         self.now_us += PERIOD_US;
         let at_us = self.now_us;
-        if let Some(value) = state {
-            self.inbox.put_state(Stamped { value, at_us });
+        let stamped = |value| Stamped { value, at_us };
+        match (state, adrift) {
+            (Some(state), _) => self.inbox.locate(stamped(state)),
+            (None, Some(_)) => self.inbox.put_adrift(adrift.map(stamped), Refusal::PositionUnknown),
+            (None, None) => {}
         }
         self.inbox.put_setpoint(Stamped { value: setpoint, at_us });
         let inbox = self.inbox.take();
@@ -52,10 +55,10 @@ impl<C: FlightController<N>, const N: usize> Aboard<C, N> {
     /// Powers up and arms a vehicle that is held in this `state`.
     fn arm(&mut self, state: State, setpoint: Setpoint) {
         for _ in 0..TICKS_HELD {
-            let _ = self.tick(Some(state), setpoint);
+            let _ = self.tick(Some(state), None, setpoint);
         }
         self.inbox.request(Asked { request: Request::Arm, ticket: 0 });
-        let _ = self.tick(Some(state), setpoint);
+        let _ = self.tick(Some(state), None, setpoint);
     }
 }
 
@@ -69,8 +72,11 @@ impl<C: FlightController<N>, const N: usize> Pilot for Aboard<C, N> {
         if let Some(state) = state.filter(|_| self.now_us == 0) {
             self.arm(state, setpoint);
         }
-        let mut action =
-            if self.now_us > 0 { self.tick(state.filter(|_| view.new), setpoint) } else { Action::default() };
+        let mut action = if self.now_us > 0 {
+            self.tick(state.filter(|_| view.new), view.adrift, setpoint)
+        } else {
+            Action::default()
+        };
         action.health.state_rejected = state.is_none();
         action.health.setpoint_rejected = !setpoint.is_plausible();
         let estimates = self.memory.control().map(C::learnt).unwrap_or_default();

@@ -1,10 +1,11 @@
 //! The vehicle's own estimate: instruments, the conversion of what they read, and the estimator.
 
-use super::told::{self, Calibration};
-use crate::scenario::{Outage, Scenario};
+use super::sensing::{Sensing, still};
+use super::told;
+use crate::scenario::Scenario;
 use afbc_estimator::{Aid, Easing, Estimate, Estimator, Memory};
-use afbc_plant::instruments::{Imu, Mounting};
-use afbc_plant::{Instruments, Suite, Truth};
+use afbc_plant::Truth;
+use afbc_plant::instruments::Imu;
 use afbc_types::{OutOfRange, State};
 use nalgebra::{Quaternion, SMatrix, SVector, Vector3};
 
@@ -59,19 +60,26 @@ pub struct Innovation {
 
 /// Instruments and estimator of a vehicle.
 pub(super) struct Navigator {
-    instruments: Instruments,
-    suite: Suite,
-    calibration: Calibration,
+    sensing: Sensing,
     estimator: Estimator,
     memory: Memory,
     easing: Easing,
-    outages: Vec<Outage>,
     step_s: f64,
     /// Steps since the beginning of settling, and how many of these there are before t = 0.
     steps: u64,
     settling: u64,
     /// Time and result of the last look \[s\].
-    last: Option<(f64, Option<State>, Estimated)>,
+    last: Option<(f64, Look)>,
+}
+
+/// What the pilot is told.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Look {
+    /// The state, if it is valid.
+    pub(super) state: Option<State>,
+    /// The state of a vehicle that knows its attitude, but not all of the rest.
+    pub(super) adrift: Option<State>,
+    pub(super) estimated: Estimated,
 }
 
 impl Navigator {
@@ -94,18 +102,14 @@ impl Navigator {
 
     /// Creates one that will rest for `waits_s` longer than usual.
     fn at_rest(scenario: &Scenario, step_s: f64, waits_s: f64) -> Result<Option<Box<Self>>, OutOfRange> {
-        let (Some(imu), Some(instruments)) = (scenario.instruments.imu, scenario.instruments(step_s)?) else {
+        let (Some(imu), Some(sensing)) = (scenario.instruments.imu, Sensing::new(scenario, step_s)?) else {
             return Ok(None);
         };
-        let mounting = scenario.vehicle_file.as_ref().map_or(Mounting::DEFAULT, |file| file.imu);
         Ok(Some(Box::new(Navigator {
-            instruments,
-            suite: scenario.instruments,
-            calibration: Calibration::new(&mounting, step_s),
+            sensing,
             estimator: estimator(scenario, &imu, step_s)?,
             memory: Memory::default(),
             easing: Easing::default(),
-            outages: scenario.outages.clone(),
             step_s,
             steps: 0,
             settling: ((REST_S + waits_s + CARRIED_S) / step_s).round() as u64,
@@ -116,13 +120,6 @@ impl Navigator {
     /// Lets the vehicle stand at rest, and carries it to its start. True if the estimate is valid then.
     fn settle(&mut self, start: &Truth) -> bool {
         let mut is_ready = false;
-        let carried = Truth {
-            rates_rad_s: Vector3::zeros(),
-            angular_acceleration_rad_s2: Vector3::zeros(),
-            rotor_speeds_rad_s: start.rotor_speeds_rad_s * 0.0,
-            thrust_share: 0.0,
-            ..*start
-        };
         for step in 0..self.settling {
             let time_s = (step as f64 - self.settling as f64) * self.step_s;
             // Time for which it has been accelerated.
@@ -132,11 +129,10 @@ impl Navigator {
             let still_m = start.position_m - start.velocity_m_s * (0.5 * CARRIED_S);
             self.memory.set_on_ground(rests);
             let estimate = self.step(&Truth {
-                time_s,
                 position_m: still_m + acceleration * (0.5 * moving_s * moving_s),
                 velocity_m_s: acceleration * moving_s,
                 acceleration_m_s2: acceleration,
-                ..carried
+                ..still(start, time_s)
             });
             is_ready = is_valid(&estimate);
         }
@@ -144,19 +140,18 @@ impl Navigator {
         is_ready
     }
 
-    /// Returns the state for the pilot, none while it is not valid, and how good it is. The same again as long as the
-    /// vehicle is held.
-    pub(super) fn look(&mut self, truth: &Truth) -> (Option<State>, Estimated) {
-        if let Some((time_s, state, estimated)) = self.last
+    /// Returns what the pilot is told, and how good it is. The same again as long as the vehicle is held.
+    pub(super) fn look(&mut self, truth: &Truth) -> Look {
+        if let Some((time_s, look)) = self.last
             && time_s == truth.time_s
         {
-            return (state, estimated);
+            return look;
         }
         let judged = self.judged();
         let estimate = self.step(truth);
         let valid = is_valid(&estimate);
         let nees = match self.last {
-            Some((_, _, last)) if !self.steps.is_multiple_of(NEES_EVERY) => last.nees,
+            Some((_, last)) if !self.steps.is_multiple_of(NEES_EVERY) => last.estimated.nees,
             _ => self.nees(&estimate, truth) as f32,
         };
         let errors = errors(&estimate, truth).cast::<f32>();
@@ -172,9 +167,11 @@ impl Navigator {
             valid,
             innovation: self.innovation(&judged),
         };
-        let state = Some(self.easing.step(&estimate)).filter(|_| valid);
-        self.last = Some((truth.time_s, state, estimated));
-        (state, estimated)
+        let state = Some(self.easing.step(&estimate));
+        let adrift = state.filter(|_| !valid && estimate.validity.attitude);
+        let look = Look { state: state.filter(|_| valid), adrift, estimated };
+        self.last = Some((truth.time_s, look));
+        look
     }
 
     /// Returns the numbers of measurements fused and rejected, by aid.
@@ -196,24 +193,11 @@ impl Navigator {
 
     /// Reads the instruments and runs the estimator.
     fn step(&mut self, truth: &Truth) -> Estimate {
-        let readings = self.instruments.measure(truth);
         let (settling, step_s) = (self.settling as f64, self.step_s);
         // The estimator's clock begins a step before settling: no time of it is zero.
         let at_us = |time_s: f64| ((time_s + (settling + 1.0) * step_s) * 1e6).round().max(0.0) as u64;
-        let Navigator { memory, suite, .. } = self;
-        // The tracker is on the ground: what it sends in an outage of the link is lost.
-        let heard = !self.outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&truth.time_s));
-        if let Some(tracker) = suite.tracker.filter(|_| heard) {
-            readings.tracker.iter().for_each(|fix| memory.offer(&told::pose(fix, &tracker, at_us)));
-        }
-        readings.gnss.iter().for_each(|fix| memory.offer(&told::gnss(fix, at_us)));
-        if let Some(barometer) = suite.barometer {
-            readings.barometer.iter().for_each(|fix| memory.offer(&told::height(fix, &barometer, at_us)));
-        }
-        if let Some(magnetometer) = suite.magnetometer {
-            readings.magnetometer.iter().for_each(|fix| memory.offer(&told::field(fix, &magnetometer, at_us)));
-        }
-        let sample = readings.imu.map(|reading| self.calibration.sample(&reading, at_us(reading.at_s)));
+        let Navigator { sensing, memory, .. } = self;
+        let sample = sensing.read(truth, at_us, |measurement| memory.offer(measurement));
         self.steps += 1;
         self.estimator.step(&mut self.memory, at_us(truth.time_s), sample.as_ref())
     }

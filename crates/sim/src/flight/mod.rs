@@ -12,6 +12,7 @@ mod estimation;
 mod lockstep;
 mod pilot;
 mod sample;
+mod sensing;
 mod told;
 mod world;
 
@@ -22,4 +23,5 @@ pub use estimation::{CARRIED_S, Estimated, Innovation, REST_S};
 pub use lockstep::{End, LOST_DISTANCE_M, Lost, lockstep};
 pub use pilot::Pilot;
 pub use sample::Sample;
+pub use sensing::STANDS_S;
 pub use world::{View, World};

@@ -1,11 +1,13 @@
 //! The plant with its disturbances and sensors.
 
-use super::estimation::{Estimated, Navigator};
+use super::estimation::{Estimated, Look, Navigator};
 use super::sample::Sample;
+use super::sensing::Wired;
 use crate::scenario::{Outage, Scenario};
 use crate::trajectory::{Reference, Trajectory};
 use afbc_control::{Action, Estimate, Trace};
-use afbc_plant::{Measurement, Motion, Plant, SensorFaults, Sensors, Telemetry};
+use afbc_onboard::Readings;
+use afbc_plant::{Measurement, Motion, Plant, SensorFaults, Sensors, Suite, Telemetry};
 use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX, RotorSpeeds, State};
 
 /// Plant, sensors, link and reference of a scenario.
@@ -13,6 +15,8 @@ pub struct World {
     plant: Plant,
     /// What the vehicle flies on if it has an inertial sensor; the sensors otherwise.
     navigator: Option<Box<Navigator>>,
+    /// What a vehicle with its own estimator reads.
+    wired: Option<Box<Wired>>,
     sensors: Option<Sensors>,
     faults: SensorFaults,
     outages: Vec<Outage>,
@@ -37,6 +41,8 @@ pub struct View {
     pub reference: Reference,
     /// Newest state that has reached the pilot, held between samples; none in a dropout or an outage.
     pub state: Option<State>,
+    /// Estimate of a vehicle that knows its attitude, but not where it is.
+    pub adrift: Option<State>,
     /// Whether it has just arrived.
     pub new: bool,
 }
@@ -50,6 +56,7 @@ impl World {
         let plant = scenario.plant(dt_s)?;
         Ok(World {
             navigator: Navigator::new(scenario, dt_s, &plant.truth())?,
+            wired: None,
             plant,
             sensors: scenario.sensors(dt_s)?,
             faults: SensorFaults::new(&scenario.sensor_faults),
@@ -57,6 +64,26 @@ impl World {
             trajectory: scenario.trajectory.clone(),
             dt_s,
         })
+    }
+
+    /// Creates the world of `scenario` for a vehicle that runs its own estimator. With instruments, it stands where it
+    /// starts for [`STANDS_S`](super::STANDS_S) of looks before t = 0.
+    ///
+    /// # Errors
+    /// The first setting of plant or sensors out of range.
+    pub fn wired(scenario: &Scenario, dt_s: f64) -> Result<Self, OutOfRange> {
+        let wired = Wired::new(scenario, dt_s)?;
+        Ok(World { wired, ..World::new(&Scenario { instruments: Suite::default(), ..scenario.clone() }, dt_s)? })
+    }
+
+    /// Returns what the instruments of a [wired](Self::wired) world read in the last look.
+    pub fn readings(&self) -> Option<&Readings> {
+        self.wired.as_deref().map(Wired::readings)
+    }
+
+    /// True if the vehicle of a [wired](Self::wired) world still stands before t = 0.
+    pub fn stands(&self) -> bool {
+        self.wired.as_deref().is_some_and(Wired::stands)
     }
 
     /// Returns the time step \[s\].
@@ -70,6 +97,9 @@ impl World {
     pub fn look(&mut self) -> View {
         let time_s = self.plant.time_s();
         let motion = self.plant.motion();
+        if let Some(wired) = &mut self.wired {
+            wired.look(&self.plant.truth());
+        }
         if let Some(navigator) = &mut self.navigator {
             return navigated(navigator, &self.plant, self.trajectory.at(time_s));
         }
@@ -82,7 +112,7 @@ impl World {
         let telemetry = self.plant.telemetry();
         let new = measurement.is_none_or(|measurement| measurement.new);
         let state = state.filter(|_| !lost);
-        View { time_s, motion, measurement, estimated: None, telemetry, reference, state, new }
+        View { time_s, motion, measurement, estimated: None, telemetry, reference, state, adrift: None, new }
     }
 
     /// Moves the vehicle by one step with commanded rotor speeds `speeds`.
@@ -107,8 +137,18 @@ impl View {
 #[inline(never)]
 fn navigated(navigator: &mut Navigator, plant: &Plant, reference: Reference) -> View {
     let (time_s, motion, telemetry) = (plant.time_s(), plant.motion(), plant.telemetry());
-    let (state, estimated) = navigator.look(&plant.truth());
-    View { time_s, motion, measurement: None, estimated: Some(estimated), telemetry, reference, state, new: true }
+    let Look { state, adrift, estimated } = navigator.look(&plant.truth());
+    View {
+        time_s,
+        motion,
+        measurement: None,
+        estimated: Some(estimated),
+        telemetry,
+        reference,
+        state,
+        adrift,
+        new: true,
+    }
 }
 
 /// True if a state sent at `time_s` is lost in an outage.

@@ -85,7 +85,7 @@ pub fn fly(
     observe: impl FnMut(&Sample) -> ControlFlow<()>,
 ) -> Result<LoopEnd, Error> {
     check(scenario)?;
-    let mut world = World::new(scenario, STEP_S)?;
+    let mut world = World::wired(scenario, STEP_S)?;
     let mut line = Line {
         station,
         autopilot,
@@ -136,7 +136,9 @@ impl<A: Autopilot> Line<'_, A> {
     fn turn(&mut self, world: &mut World) -> Result<View, Error> {
         let Line { station, autopilot, pace, now_ms, silent_ms, .. } = self;
         let view = world.look();
-        if let Some(state) = view.state.filter(|_| now_ms.is_multiple_of(pace.state_ms)) {
+        if let Some(readings) = world.readings() {
+            autopilot.sense(readings);
+        } else if let Some(state) = view.state.filter(|_| now_ms.is_multiple_of(pace.state_ms)) {
             station.track(*now_ms * 1000, state);
         }
         if now_ms.is_multiple_of(pace.setpoint_ms) {
@@ -175,9 +177,11 @@ impl<A: Autopilot> Line<'_, A> {
 
     /// Arms a vehicle that is held, or that a previous run has left armed.
     fn arm(&mut self, world: &mut World) -> Result<View, Error> {
-        if self.disarm(world)?
-            && let Some(view) = self.ask(Command::Arm, world, ARM_WITHIN_MS, |heard| heard.armed)?
-        {
+        let is_silent = self.disarm(world)?;
+        while world.stands() {
+            self.turn(world)?;
+        }
+        if is_silent && let Some(view) = self.ask(Command::Arm, world, ARM_WITHIN_MS, |heard| heard.armed)? {
             self.has_armed = true;
             return Ok(view);
         }

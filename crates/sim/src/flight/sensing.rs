@@ -1,0 +1,132 @@
+//! What a vehicle's own sensors say: the instruments' readings as an estimator is told them.
+
+use super::told::{self, Calibration};
+use crate::scenario::{Outage, Scenario};
+use afbc_estimator::{ImuSample, Measurement, Timed};
+use afbc_onboard::{AIDS_MAX, Aged, Readings};
+use afbc_plant::instruments::Mounting;
+use afbc_plant::{Instruments, Suite, Truth};
+use afbc_types::OutOfRange;
+use nalgebra::Vector3;
+use std::collections::VecDeque;
+
+/// Time for which a vehicle with an estimator of its own stands at its start before t = 0 \[s\].
+pub const STANDS_S: f64 = 4.0;
+
+/// Instruments of a vehicle, with what its software knows of them.
+pub(super) struct Sensing {
+    instruments: Instruments,
+    suite: Suite,
+    calibration: Calibration,
+    outages: Vec<Outage>,
+}
+
+impl Sensing {
+    /// Creates those of `scenario`, if there is an inertial sensor among them.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub(super) fn new(scenario: &Scenario, step_s: f64) -> Result<Option<Self>, OutOfRange> {
+        let instruments = scenario.instruments(step_s)?.filter(|_| scenario.instruments.imu.is_some());
+        let mounting = scenario.vehicle_file.as_ref().map_or(Mounting::DEFAULT, |file| file.imu);
+        Ok(instruments.map(|instruments| Sensing {
+            instruments,
+            suite: scenario.instruments,
+            calibration: Calibration::new(&mounting, step_s),
+            outages: scenario.outages.clone(),
+        }))
+    }
+
+    /// Reads the instruments, and passes what arrives from the aiding ones to `offer`. `at_us` is the vehicle's clock.
+    pub(super) fn read(
+        &mut self,
+        truth: &Truth,
+        at_us: impl Fn(f64) -> u64,
+        mut offer: impl FnMut(&Timed<Measurement>),
+    ) -> Option<ImuSample> {
+        let readings = self.instruments.measure(truth);
+        let Sensing { suite, outages, .. } = self;
+        // The tracker is on the ground: what it sends in an outage of the link is lost.
+        let heard = !outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&truth.time_s));
+        if let Some(tracker) = suite.tracker.filter(|_| heard) {
+            readings.tracker.iter().for_each(|fix| offer(&told::pose(fix, &tracker, &at_us)));
+        }
+        readings.gnss.iter().for_each(|fix| offer(&told::gnss(fix, &at_us)));
+        if let Some(barometer) = suite.barometer {
+            readings.barometer.iter().for_each(|fix| offer(&told::height(fix, &barometer, &at_us)));
+        }
+        if let Some(magnetometer) = suite.magnetometer {
+            readings.magnetometer.iter().for_each(|fix| offer(&told::field(fix, &magnetometer, &at_us)));
+        }
+        readings.imu.map(|reading| self.calibration.sample(&reading, at_us(reading.at_s)))
+    }
+}
+
+/// Returns the truth of a vehicle that stands where `start` is, its rotors still.
+pub(super) fn still(start: &Truth, time_s: f64) -> Truth {
+    Truth {
+        time_s,
+        velocity_m_s: Vector3::zeros(),
+        acceleration_m_s2: Vector3::zeros(),
+        rates_rad_s: Vector3::zeros(),
+        angular_acceleration_rad_s2: Vector3::zeros(),
+        rotor_speeds_rad_s: start.rotor_speeds_rad_s * 0.0,
+        thrust_share: 0.0,
+        ..*start
+    }
+}
+
+/// Sensors wired to a vehicle that runs its own estimator.
+pub(super) struct Wired {
+    sensing: Sensing,
+    step_s: f64,
+    /// Looks so far.
+    looks: u64,
+    readings: Readings,
+    /// Measurements that wait for a tick that takes them.
+    waiting: VecDeque<Timed<Measurement>>,
+}
+
+impl Wired {
+    /// Creates the sensors of `scenario`, if there are any.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub(super) fn new(scenario: &Scenario, step_s: f64) -> Result<Option<Box<Self>>, OutOfRange> {
+        let wired =
+            |sensing| Box::new(Wired { sensing, step_s, looks: 0, readings: Readings::NONE, waiting: VecDeque::new() });
+        Ok(Sensing::new(scenario, step_s)?.map(wired))
+    }
+
+    /// True if the vehicle still stands before t = 0.
+    pub(super) fn stands(&self) -> bool {
+        self.looks < (STANDS_S / self.step_s).round() as u64
+    }
+
+    /// Returns what was read in the last look.
+    pub(super) fn readings(&self) -> &Readings {
+        &self.readings
+    }
+
+    /// Reads all sensors; before t = 0 those of a vehicle at rest.
+    pub(super) fn look(&mut self, truth: &Truth) {
+        let step_s = self.step_s;
+        let before_s = if self.stands() { self.looks as f64 * step_s - STANDS_S } else { 0.0 };
+        let seen = if self.stands() { still(truth, before_s) } else { *truth };
+        self.looks += 1;
+        // The clock begins a step before the first look: no time of it is zero.
+        let at_us = |time_s: f64| ((time_s + STANDS_S + step_s) * 1e6).round().max(0.0) as u64;
+        let now_us = at_us(seen.time_s);
+        let age_us = |at_us: u64| u32::try_from(now_us.saturating_sub(at_us)).unwrap_or(u32::MAX);
+        let Wired { sensing, waiting, readings, .. } = self;
+        let sample = sensing.read(&seen, at_us, |measurement| waiting.push_back(*measurement));
+        readings.imu = sample.map(|sample| Aged {
+            value: [sample.rates_rad_s, sample.specific_force_m_s2],
+            age_us: age_us(sample.at_us),
+        });
+        readings.aids = [None; AIDS_MAX];
+        for slot in &mut readings.aids {
+            *slot = waiting.pop_front().map(|Timed { value, at_us }| Aged { value, age_us: age_us(at_us) });
+        }
+    }
+}
