@@ -55,9 +55,10 @@ pub struct Published {
 }
 
 /// Every built-in suite.
-pub static SUITES: [BuiltIn<Suite>; 2] = [
+pub static SUITES: [BuiltIn<Suite>; 3] = [
     BuiltIn::new("field", include_str!("../suites/field.toml"), read),
     BuiltIn::new("faults", include_str!("../suites/faults.toml"), read),
+    BuiltIn::new("sensors", include_str!("../suites/sensors.toml"), read),
 ];
 
 /// Accepted tilt \[rad\].

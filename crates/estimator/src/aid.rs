@@ -135,7 +135,8 @@ impl Aids {
         match aid {
             Aid::TrackerPosition => live(&self.gnss_position),
             Aid::GnssPosition => live(&self.tracker_position),
-            Aid::GnssVelocity => live(&self.tracker_position) || live(&self.gnss_position),
+            // Its position, which is off by metres, contradicts no velocity.
+            Aid::GnssVelocity => live(&self.tracker_position),
             Aid::TrackerAttitude => live(&self.heading),
             Aid::Heading => live(&self.tracker_attitude),
             Aid::Height => false,

@@ -23,6 +23,9 @@ const UNTOLD_M: f32 = 0.01;
 const LEVEL: f32 = 1e-8;
 /// Tilt that a doubted attitude may be off \[rad\].
 const DOUBT_RAD: f32 = 0.2;
+/// Change of the biases that goes with it: gyroscope \[rad/s\], accelerometer \[m/s2\].
+const DOUBT_RAD_S: f32 = 0.02;
+const DOUBT_M_S2: f32 = 0.2;
 
 /// Keeps all errors.
 const KEEP: Errors = {
@@ -228,6 +231,9 @@ impl Memory {
         let tt = &mut self.covariance.tt;
         tt.m11 += variance;
         tt.m22 += variance;
+        // What made it wrong is often a bias that is not what it was.
+        self.covariance.gg += diagonal(&Vector3::repeat(DOUBT_RAD_S * DOUBT_RAD_S));
+        self.covariance.aa += diagonal(&Vector3::repeat(DOUBT_M_S2 * DOUBT_M_S2));
         self.covariance.hold();
     }
 

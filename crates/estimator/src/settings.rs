@@ -107,7 +107,7 @@ parameters! {
         pub accel_range_m_s2: f32 = 156.9,
         /// Time of identical samples after which the IMU counts as stuck; 0 for never.
         #[parameter(STUCK, "s", 0.0..=10.0)]
-        pub stuck_s: f32 = 0.05,
+        pub stuck_s: f32 = 0.015,
         /// Change of the rates from sample to sample, root mean square, above which the IMU counts as noisy.
         #[parameter(GYR_NOISY, "rad/s", 0.01..=100.0)]
         pub gyro_noisy_rad_s: f32 = 2.0,

@@ -482,7 +482,7 @@ fn faults_of_the_imu_are_told() {
             }
         },
     );
-    assert!((2050..2060).contains(&stuck_ms.unwrap()), "{stuck_ms:?}");
+    assert!((2015..2025).contains(&stuck_ms.unwrap()), "{stuck_ms:?}");
     // Dead.
     flown(
         hover,

@@ -1,0 +1,149 @@
+//! Faults of the vehicle's own sensors, inside the flight core: what becomes of the vehicle. Compares the table of
+//! `docs/sensor-faults.md`, or writes it with `WRITE=1`.
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)] // what cannot be flown must stop the test
+
+use afbc::Profile;
+use afbc_campaign::suite::SUITES;
+use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_sim::flight::fly;
+use afbc_sim::scenario::Scenario;
+use std::{env, fs, thread};
+
+const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/sensor-faults.md");
+const BEGIN: &str = "<!-- sensor faults: tests/tests/sensor_faults.rs -->\n";
+const END: &str = "<!-- end -->\n";
+
+/// Onset of every fault \[s\].
+const ONSET_S: f64 = 10.0;
+/// Height of the centre of mass below which a vehicle touches the ground \[m\].
+const GROUND_M: f64 = 0.15;
+/// Fastest touch-down of a vehicle that knows its attitude, and of one without a height \[m/s\].
+const TOUCH_M_S: f64 = 0.8;
+const HEIGHTLESS_M_S: f64 = 2.0;
+/// Those without a height.
+const HEIGHTLESS: [&str; 2] = ["tracker-and-barometer-lost", "gnss-and-barometer-lost"];
+/// Seeds of every fault.
+const SEEDS: u64 = 4;
+/// Without an inertial sensor there is no attitude: blind descent, whose end is a fall.
+const BLIND: [&str; 5] =
+    ["imu-stuck-indoors", "imu-dead-indoors", "imu-stuck-outdoors", "imu-dead-outdoors", "tracker-and-imu-lost"];
+/// Two degrees per second of error that come at once: the filter may take longer to find the bias than it takes to fall.
+const TOO_MUCH: [&str; 1] = ["gyro-biased-outdoors"];
+
+/// What became of a vehicle, from the onset on.
+#[derive(Clone, Debug, Default)]
+struct Outcome {
+    /// Largest distance from the reference before it touched the ground \[m\].
+    off_m: f64,
+    /// Largest tilt before that \[rad\].
+    tilt_rad: f64,
+    /// Vertical speed at which it first touched the ground \[m/s\].
+    touched_m_s: Option<f64>,
+    /// Height at which the motors stopped \[m\].
+    stopped_m: Option<f64>,
+    tumbled: bool,
+    /// Fastest touch-down that counts as a landing \[m/s\].
+    gentle_m_s: f64,
+}
+
+impl Outcome {
+    fn of(scenario: &Scenario) -> Self {
+        let is_heightless = HEIGHTLESS.contains(&scenario.name.as_str());
+        let gentle_m_s = if is_heightless { HEIGHTLESS_M_S } else { TOUCH_M_S };
+        let mut outcome = Outcome { gentle_m_s, ..Outcome::default() };
+        let contender = Contender::of(ControllerKind::Afbc, Profile::Flight).monitored();
+        let lost = fly(scenario, &contender, |sample| {
+            if sample.time_s < ONSET_S {
+                return;
+            }
+            let (p, eta) = (&sample.motion.position_m, &sample.motion.attitude_rad);
+            if p.z < GROUND_M {
+                outcome.touched_m_s.get_or_insert(sample.motion.velocity_m_s.z.abs());
+            }
+            if outcome.touched_m_s.is_none() {
+                outcome.tilt_rad = outcome.tilt_rad.max((eta.x.cos() * eta.y.cos()).acos());
+                outcome.off_m = outcome.off_m.max((p - sample.reference.position_m).norm());
+            }
+            if sample.action.speeds.0.iter().all(|speed| *speed == 0.0) {
+                outcome.stopped_m.get_or_insert(p.z);
+            }
+        });
+        outcome.tumbled = lost.unwrap().is_some();
+        outcome
+    }
+
+    fn flies_on(&self) -> bool {
+        !self.tumbled && self.touched_m_s.is_none() && self.stopped_m.is_none()
+    }
+
+    /// True if it came down upright and gently, and the motors stopped on the ground.
+    fn lands(&self) -> bool {
+        !self.tumbled
+            && self.touched_m_s.is_some_and(|speed| speed < self.gentle_m_s)
+            && self.stopped_m.is_some_and(|height| height < GROUND_M)
+    }
+
+    fn words(&self) -> String {
+        let touched = self.touched_m_s.map(|speed| format!(", touches the ground at {speed:.1} m/s"));
+        let stopped = self.stopped_m.filter(|height| *height > GROUND_M);
+        match (self.flies_on(), self.lands(), self.tumbled, stopped) {
+            (true, ..) => "flies on".into(),
+            (_, true, ..) => format!("lands{}", touched.unwrap_or_default()),
+            (_, _, true, _) => "descends blind, tumbles".into(),
+            (.., Some(height)) => {
+                format!("descends blind, motors stop at {height:.1} m{}", touched.unwrap_or_default())
+            }
+            _ => format!("descends blind{}", touched.unwrap_or_default()),
+        }
+    }
+}
+
+/// Flies every flight of the suite with this seed.
+fn flown(seed: u64) -> Vec<(Scenario, Outcome)> {
+    let suite = SUITES.iter().find(|suite| suite.name == "sensors").unwrap().read().unwrap();
+    let scenarios = suite.flights.into_iter().map(|flight| Scenario { seed, ..flight.scenario });
+    thread::scope(|threads| {
+        let fly = |scenario: Scenario| {
+            threads.spawn(move || {
+                let outcome = Outcome::of(&scenario);
+                (scenario, outcome)
+            })
+        };
+        let flights: Vec<_> = scenarios.map(fly).collect();
+        flights.into_iter().map(|flight| flight.join().unwrap()).collect()
+    })
+}
+
+/// Whoever knows the attitude flies on or lands, wherever the vehicle is.
+#[test]
+fn no_fault_stops_the_motors_in_the_air_but_the_loss_of_the_attitude() {
+    for seed in 1..=SEEDS {
+        for (scenario, outcome) in flown(seed) {
+            let among = |names: &[&str]| names.contains(&scenario.name.as_str());
+            let is_blind = among(&BLIND);
+            let name = format!("{}, seed {seed}: {outcome:?}", scenario.name);
+            assert!(is_blind || among(&TOO_MUCH) || outcome.flies_on() || outcome.lands(), "{name}");
+            // None is excused without need.
+            assert!(!is_blind || !outcome.flies_on(), "{name}");
+        }
+    }
+}
+
+#[test]
+fn the_page_is_what_flies() {
+    let row = |(scenario, outcome): &(Scenario, Outcome)| {
+        let Outcome { off_m, tilt_rad, .. } = outcome;
+        let (name, what) = (&scenario.name, &scenario.description);
+        format!("| `{name}`: {what} | {} | {off_m:.2} | {:.0} |\n", outcome.words(), tilt_rad.to_degrees())
+    };
+    let rows: String = flown(1).iter().map(row).collect();
+    let table = format!("| fault | outcome | off \\[m\\] | tilt \\[deg\\] |\n|---|---|--:|--:|\n{rows}");
+    let page = fs::read_to_string(PAGE).unwrap();
+    let (before, rest) = page.split_once(BEGIN).unwrap();
+    let (kept, after) = rest.split_once(END).unwrap();
+    if env::var_os("WRITE").is_some() {
+        fs::write(PAGE, format!("{before}{BEGIN}{table}{END}{after}")).unwrap();
+    } else {
+        assert_eq!(kept, table, "WRITE=1 writes it");
+    }
+}
