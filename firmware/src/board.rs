@@ -28,9 +28,9 @@ pub trait Board: Sized + 'static {
     /// True if a task that is not needed in flight has panicked.
     fn task_has_failed(&self) -> bool;
 
-    /// Returns what the sensors have read since the last tick; nothing from a board without them.
-    fn sense(&mut self) -> Readings {
-        Readings::NONE
+    /// Sets `readings` to what the sensors have read since the last tick; nothing from a board without them.
+    fn sense(&mut self, readings: &mut Readings) {
+        readings.clear();
     }
 
     /// Outputs throttles to the motors: 0, or 48 to 2047.

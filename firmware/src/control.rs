@@ -4,6 +4,7 @@ use crate::board::Board;
 use crate::time::{self, Stopwatch};
 use crate::vehicle::{CONFIGURATION, ROTORS};
 use afbc_flight_core::Inbox;
+use afbc_onboard::Readings;
 use core::cell::RefCell;
 use core::future::poll_fn;
 use core::pin::pin;
@@ -75,13 +76,13 @@ pub fn flight() -> Flight {
 
 /// Runs the ticks. `flight` is a reference, since a task would store a value twice.
 pub async fn run(flight: &mut Flight, board: &mut impl Board) -> ! {
-    let mut inbox = Inbox::EMPTY;
+    let (mut inbox, mut readings) = (Inbox::EMPTY, Readings::NONE);
     loop {
         // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
         // are due, it would tick twice in every second period.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
-        let report = tick(flight, &mut inbox, board);
+        let report = tick(flight, &mut inbox, &mut readings, board);
         let cycles = stopwatch.cycles();
         CYCLES.store(cycles, Ordering::Relaxed);
         CYCLES_MAX.fetch_max(cycles, Ordering::Relaxed);
@@ -97,7 +98,7 @@ pub async fn run(flight: &mut Flight, board: &mut impl Board) -> ! {
 /// drives them; checks the rate. Out of line, so that its stack and its instructions can be counted
 /// (`docs/budgets.md`).
 #[inline(never)]
-fn tick<B: Board>(flight: &mut Flight, inbox: &mut Inbox, board: &mut B) -> Report {
+fn tick<B: Board>(flight: &mut Flight, inbox: &mut Inbox, readings: &mut Readings, board: &mut B) -> Report {
     let now_us = Instant::now().as_micros();
     // Not borrowed elsewhere while it is locked; the tick has no panic.
     INBOX.lock(|shared| shared.try_borrow_mut().ok().map(|mut shared| shared.take_into(inbox)));
@@ -105,7 +106,8 @@ fn tick<B: Board>(flight: &mut Flight, inbox: &mut Inbox, board: &mut B) -> Repo
     if board.clock_has_failed() {
         flight.distrust_clock();
     }
-    let report = flight.tick(now_us, inbox, &board.sense());
+    board.sense(readings);
+    let report = flight.tick(now_us, inbox, readings);
 
     board.drive(report.throttles);
     // A reset restarts a failed task, once it does not end a flight.

@@ -5,7 +5,7 @@
 
 use afbc_onboard::{Readings, ReplyHead};
 use afbc_types::ROTORS_MAX;
-use core::cell::Cell;
+use core::cell::{Cell, RefCell};
 use embassy_executor::SendSpawner;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -21,8 +21,8 @@ use semihosting::process::exit;
 /// Bytes received by the link, at most this many per tick.
 static LINK: Pipe<CriticalSectionRawMutex, 4096> = Pipe::new();
 
-/// Readings of the sensors for the next tick.
-static READINGS: Mutex<CriticalSectionRawMutex, Cell<Readings>> = Mutex::new(Cell::new(Readings::NONE));
+/// Readings of the sensors for the next tick; none once they are taken.
+static READINGS: Mutex<CriticalSectionRawMutex, RefCell<Option<Readings>>> = Mutex::new(RefCell::new(None));
 
 /// Throttles of the last tick.
 static THROTTLES: Mutex<CriticalSectionRawMutex, Cell<[u16; ROTORS_MAX]>> = Mutex::new(Cell::new([0; ROTORS_MAX]));
@@ -62,8 +62,14 @@ impl Board for Emulated {
     }
 
     /// Takes what the host has sent.
-    fn sense(&mut self) -> Readings {
-        READINGS.lock(|cell| cell.replace(Readings::NONE))
+    fn sense(&mut self, readings: &mut Readings) {
+        READINGS.lock(|cell| match &mut *cell.borrow_mut() {
+            Some(sent) if sent.imu.is_some() => {
+                readings.clone_from(sent);
+                sent.clear();
+            }
+            _ => readings.clear(),
+        });
     }
 
     /// Stores the throttles for the reply.
@@ -115,7 +121,7 @@ impl Transmitter {
         if self.to_firmware.read_exact(&mut readings).is_err() {
             exit(0);
         }
-        READINGS.lock(|cell| cell.set(Readings::from_bytes(&readings)));
+        READINGS.lock(|cell| cell.replace(Some(Readings::from_bytes(&readings))));
         let mut length = [0; 4];
         self.to_firmware.read_exact(&mut length).expect("the host sends what it announced");
         let mut length = u32::from_le_bytes(length) as usize;

@@ -1,6 +1,6 @@
 //! Corrections that a controller shall not feel as a jump.
 
-use crate::estimate::{Estimate, Resets};
+use crate::estimate::Estimate;
 use afbc_control::math::min;
 use afbc_types::State;
 use nalgebra::Vector3;
@@ -16,29 +16,57 @@ const DECAY_S: f32 = 0.3;
 /// The default is that before the first estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Easing {
-    last: Option<Estimate>,
+    last: Option<Seen>,
     /// Estimate less the state told.
     position_m: Vector3<f32>,
     velocity_m_s: Vector3<f32>,
+}
+
+/// What of the last estimate is needed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Seen {
+    at_us: u64,
+    position_m: Vector3<f32>,
+    velocity_m_s: Vector3<f32>,
+    position_sigma_m: Vector3<f32>,
+    velocity_sigma_m_s: Vector3<f32>,
+    /// Resets of position and velocity.
+    resets: (u32, u32),
+}
+
+impl Seen {
+    fn of(estimate: &Estimate) -> Self {
+        let Estimate { at_us, state, sigmas, resets, .. } = estimate;
+        Seen {
+            at_us: *at_us,
+            position_m: state.position_m,
+            velocity_m_s: state.velocity_m_s,
+            position_sigma_m: sigmas.position_m,
+            velocity_sigma_m_s: sigmas.velocity_m_s,
+            resets: (resets.position, resets.velocity),
+        }
+    }
 }
 
 impl Easing {
     /// Returns the state to tell for this estimate; to be called with every one. Nothing is hidden of an estimate whose
     /// position has not been valid before.
     #[must_use = "the state is its result"]
+    #[inline]
     pub fn step(&mut self, estimate: &Estimate) -> State {
         let mut state = estimate.state;
-        let last = self.last.replace(*estimate).filter(|last| last.validity.position && estimate.validity.position);
-        let Some(last) = last else {
-            *self = Easing { last: self.last, ..Easing::default() };
+        let seen = estimate.validity.position.then(|| Seen::of(estimate));
+        let last = core::mem::replace(&mut self.last, seen);
+        let (Some(last), Some(seen)) = (last, &seen) else {
+            (self.position_m, self.velocity_m_s) = Default::default();
             return state;
         };
-        let dt_s = min(estimate.at_us.saturating_sub(last.at_us) as f32 * 1e-6, DECAY_S);
+        let dt_s = min(seen.at_us.saturating_sub(last.at_us) as f32 * 1e-6, DECAY_S);
         let stays = 1.0 - dt_s / DECAY_S;
         (self.position_m, self.velocity_m_s) = (self.position_m * stays, self.velocity_m_s * stays);
-        if found(&last, estimate) {
-            self.position_m += state.position_m - last.state.position_m - last.state.velocity_m_s * dt_s;
-            self.velocity_m_s += state.velocity_m_s - last.state.velocity_m_s;
+        if found(&last, seen) {
+            self.position_m += state.position_m - last.position_m - last.velocity_m_s * dt_s;
+            self.velocity_m_s += state.velocity_m_s - last.velocity_m_s;
         }
         state.position_m -= self.position_m;
         state.velocity_m_s -= self.velocity_m_s;
@@ -47,14 +75,13 @@ impl Easing {
 }
 
 /// True if this estimate is much surer than the last, or was set anew.
-fn found(last: &Estimate, estimate: &Estimate) -> bool {
+fn found(last: &Seen, now: &Seen) -> bool {
     let falls = |now: &Vector3<f32>, before: &Vector3<f32>| {
         now.x < FALLS * before.x || now.y < FALLS * before.y || now.z < FALLS * before.z
     };
-    let sets = |resets: &Resets| (resets.position, resets.velocity);
-    falls(&estimate.sigmas.position_m, &last.sigmas.position_m)
-        || falls(&estimate.sigmas.velocity_m_s, &last.sigmas.velocity_m_s)
-        || sets(&estimate.resets) != sets(&last.resets)
+    falls(&now.position_sigma_m, &last.position_sigma_m)
+        || falls(&now.velocity_sigma_m_s, &last.velocity_sigma_m_s)
+        || now.resets != last.resets
 }
 
 #[cfg(test)]

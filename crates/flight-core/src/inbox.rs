@@ -56,16 +56,17 @@ impl Inbox {
         }
     }
 
-    /// Stores a state of the vehicle's own estimate in place of any other.
+    /// Stores a state of the vehicle's own estimate, which is always [plausible](State::is_plausible), in place of any
+    /// other.
     pub fn locate(&mut self, state: Stamped<State>) {
-        (self.state, self.adrift, self.missing) = (Some(state).filter(|state| state.value.is_plausible()), None, None);
+        (self.state, self.adrift, self.missing) = (Some(state), None, None);
     }
 
     /// Stores a state of the vehicle's own estimate, which `missing` something and does not know where it is: attitude,
     /// rates, height and vertical velocity may be used, the horizontal position and velocity may not. It replaces any
     /// other state. Without one, what the link says stands.
     pub fn put_adrift(&mut self, state: Option<Stamped<State>>, missing: Refusal) {
-        self.adrift = state.filter(|state| state.value.is_plausible());
+        self.adrift = state;
         if self.adrift.is_some() {
             self.state = None;
         }
@@ -144,7 +145,13 @@ impl Inbox {
     /// Does as [`take`](Self::take), in place of the copy for the last tick.
     #[inline]
     pub fn take_into(&mut self, taken: &mut Inbox) {
-        (taken.state, taken.adrift, taken.missing) = (self.state, self.adrift, self.missing);
+        taken.state = self.state;
+        // Hardly ever there: only the mark is copied.
+        match &self.adrift {
+            Some(adrift) => taken.adrift = Some(*adrift),
+            None => taken.adrift = None,
+        }
+        taken.missing = self.missing;
         match (&self.setpoint, &mut taken.setpoint) {
             (Some(new), Some(old)) => {
                 copy(&new.value, &mut old.value);

@@ -311,8 +311,8 @@ impl<M> VehicleMemory<M> {
 
     /// Notes the time of the newest attitude.
     fn orient(&mut self, inbox: &Inbox) {
-        let times = [self.state.map(|state| state.at_us), inbox.adrift().map(|state| state.at_us), self.oriented_us];
-        self.oriented_us = times.into_iter().flatten().max();
+        let newest = inbox.adrift().map(|state| state.at_us).max(self.state.map(|state| state.at_us));
+        self.oriented_us = self.oriented_us.max(newest);
     }
 
     /// Updates the detectors with a fresh state, or with that of a vehicle adrift, or none.

@@ -41,7 +41,7 @@ const ATTITUDE: Schedule = Schedule { period: 20, phase: 1 };
 const POSITION: Schedule = Schedule { period: 20, phase: 11 };
 /// 10 Hz.
 const HEALTH: Schedule = Schedule { period: 100, phase: 7 };
-/// 100 Hz, and after every tick with a new state.
+/// 100 Hz, and after every tick with a new state, the link's or the vehicle's own.
 const ROTORS: Schedule = Schedule { period: 10, phase: 0 };
 
 /// Receives and sends messages.
@@ -99,8 +99,7 @@ impl Comms {
                 let sender = u16::from_be_bytes([from.system, from.component]);
                 if let Some(measured) = tracker.stamp(sender, sent_us, *now_us, value) {
                     news.put_state(measured);
-                    *state = Some(value);
-                    *state_is_news = true;
+                    (*state, *state_is_news) = (Some(value), true);
                 }
             }
             Uplink::Setpoint(value) => news.put_setpoint(Stamped { value, at_us: *now_us }),
@@ -129,6 +128,9 @@ impl Comms {
         self.tick_us_max = self.tick_us_max.max(tick_us);
 
         let armed = report.mode.armed();
+        if let Some(estimate) = report.estimate {
+            (self.state, self.state_is_news) = (Some(estimate), true);
+        }
         if self.state_is_news || ROTORS.is_due(self.tick) {
             self.state_is_news = false;
             say(Downlink::Rotors { time_us: report.time_us, armed, speeds: report.motors.padded() });

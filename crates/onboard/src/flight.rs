@@ -85,7 +85,7 @@ impl<const N: usize> Flight<N> {
     // Always: copying the report out of a call costs a hundred instructions.
     #[inline(always)]
     pub fn tick(&mut self, now_us: u64, inbox: &mut Inbox, readings: &Readings) -> Report<N> {
-        let estimate = self.navigation.tick(now_us, readings, inbox).map(|estimate| estimate.state);
+        let estimate = self.navigation.tick(now_us, readings, inbox);
         let outcome = self.vehicle.tick(&mut self.memory, now_us, inbox);
         if outcome.health.control.saturated {
             self.saturated_ticks = self.saturated_ticks.saturating_add(1);

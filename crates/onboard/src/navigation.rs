@@ -36,8 +36,10 @@ impl Navigation {
         })
     }
 
-    /// Takes the readings of a tick at `now_us` and tells `inbox` what the vehicle knows; none before the first sample.
-    pub fn tick(&mut self, now_us: u64, readings: &Readings, inbox: &mut Inbox) -> Option<Estimate> {
+    /// Takes the readings of a tick at `now_us`, tells `inbox` what the vehicle knows, and returns the estimated state;
+    /// none before the first sample.
+    #[inline(always)]
+    pub fn tick(&mut self, now_us: u64, readings: &Readings, inbox: &mut Inbox) -> Option<State> {
         let sample = readings.sample(now_us);
         self.senses |= sample.is_some();
         if !self.senses {
@@ -52,12 +54,13 @@ impl Navigation {
         }
         let estimate = self.estimator.step(&mut self.memory, now_us, sample.as_ref());
         tell(&estimate, self.easing.step(&estimate), now_us, inbox);
-        Some(estimate)
+        Some(estimate.state)
     }
 }
 
 /// Tells `inbox` the eased `state` of an `estimate` as far as it is valid. What the link says of the state stands only
 /// while the estimate has no attitude: after the inertial sensor has failed.
+#[inline(always)]
 pub fn tell(estimate: &Estimate, state: State, now_us: u64, inbox: &mut Inbox) {
     let stamped = Stamped { value: state, at_us: now_us };
     let validity = &estimate.validity;

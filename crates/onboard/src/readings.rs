@@ -4,7 +4,7 @@ use afbc_estimator::{ImuSample, Measurement, Timed};
 use nalgebra::Vector3;
 
 /// Most measurements of aiding sensors that a tick takes; further ones wait for the next.
-pub const AIDS_MAX: usize = 4;
+pub const AIDS_MAX: usize = 2;
 
 /// A value that was true some time before the tick that takes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,6 +43,14 @@ impl Readings {
     pub const NONE: Self = Readings { imu: None, aids: [None; AIDS_MAX] };
     /// Length on the [wire](crate::ReplyHead) \[bytes\].
     pub const LEN: usize = IMU_LEN + AIDS_MAX * AID_LEN;
+
+    /// Forgets all readings.
+    pub fn clear(&mut self) {
+        self.imu = None;
+        for aid in &mut self.aids {
+            *aid = None;
+        }
+    }
 
     /// Returns the sample with its time, for a tick at `now_us`.
     pub(crate) fn sample(&self, now_us: u64) -> Option<ImuSample> {

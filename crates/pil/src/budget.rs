@@ -12,6 +12,10 @@ use std::path::Path;
 /// Largest number of instructions of a control tick: the worst found by the search ([`crate::worst`]) and a margin. At
 /// 2.5 cycles each, 67 us of the 1000.
 pub const TICK_INSTRUCTIONS_MAX: u32 = 4_500;
+/// The same of a vehicle that flies on its own estimate.
+pub const ESTIMATING_INSTRUCTIONS_MAX: u32 = 14_000;
+/// Largest mean of these.
+pub const ESTIMATING_INSTRUCTIONS_MEAN: u32 = 8_000;
 
 /// Address range of the flash.
 const FLASH: std::ops::Range<u64> = 0x0800_0000..0x0810_0000;

@@ -6,7 +6,9 @@
 //! no worse one.
 
 use crate::{Emulator, Error};
+use afbc_estimator::Measurement;
 use afbc_link::{Command, Uplink};
+use afbc_onboard::{AIDS_MAX, Aged, Readings};
 use afbc_sim::in_the_loop::Station;
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
@@ -38,13 +40,23 @@ pub struct Worst {
     pub ticks: u64,
 }
 
+/// What the vehicle flies on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// States of the link.
+    Link,
+    /// Its own estimate, with more measurements than it can fuse, which agree neither with the samples nor with one
+    /// another.
+    Estimate,
+}
+
 /// Flies `candidates`, which depend on `seed` only.
 ///
 /// # Errors
 /// If the emulator fails, or the vehicle does not arm.
-pub fn search(emulator: Emulator, seed: u64, candidates: u64) -> Result<Worst, Error> {
-    let mut flight =
-        EmulatedFlight { emulator, station: Station::default(), tick: 0, random: SplitMix64::seed_from_u64(seed) };
+pub fn search(emulator: Emulator, source: Source, seed: u64, candidates: u64) -> Result<Worst, Error> {
+    let random = SplitMix64::seed_from_u64(seed);
+    let mut flight = EmulatedFlight { emulator, source, station: Station::default(), tick: 0, random };
     let mut worst = Worst { candidates, ..Worst::default() };
     let (mut summit, mut height) = ([0.0; NUMBERS], 0);
     for candidate in 0..candidates {
@@ -77,6 +89,7 @@ pub fn search(emulator: Emulator, seed: u64, candidates: u64) -> Result<Worst, E
 
 struct EmulatedFlight {
     emulator: Emulator,
+    source: Source,
     station: Station,
     tick: u64,
     random: SplitMix64,
@@ -123,10 +136,55 @@ impl EmulatedFlight {
     /// Flies one tick; returns its instructions if the motors were on.
     fn fly(&mut self, state: State, setpoint: Setpoint) -> Result<Option<u32>, Error> {
         self.tick += 1;
-        self.station.say(&Uplink::State { sent_us: self.tick * 1000, state });
+        match self.source {
+            Source::Link => self.station.say(&Uplink::State { sent_us: self.tick * 1000, state }),
+            Source::Estimate => {
+                let readings = self.readings(&state);
+                self.emulator.sense(&readings);
+            }
+        }
         self.station.say(&Uplink::Setpoint(setpoint));
         let reply = self.emulator.exchange(&self.station.take())?;
         Ok((reply.throttles.iter().any(|throttle| *throttle != 0)).then_some(reply.instructions))
+    }
+
+    /// Returns a sample, and measurements of a vehicle in this state, of any age; on the ground those of a tracker alone.
+    fn readings(&mut self, state: &State) -> Readings {
+        let [noise, other] = [1e-3 * self.number(), 1e-3 * self.number()];
+        let force_m_s2 = Vector3::new(noise, other, 9.81) + 0.1 * state.velocity_m_s;
+        let imu = Some(Aged { value: [state.rates_rad_s.add_scalar(noise), force_m_s2], age_us: 0 });
+        let q = state.quaternion().coords;
+        let pose = Measurement::Pose {
+            position_m: state.position_m.add_scalar(other),
+            attitude: [q.w, q.x, q.y, q.z],
+            position_sigma_m: 0.01,
+            attitude_sigma_rad: 0.02,
+        };
+        if *state == State::default() {
+            return Readings { imu, aids: [Some(Aged { value: pose, age_us: 2_000 }), None] };
+        }
+        let kinds = [
+            pose,
+            Measurement::Gnss {
+                position_m: state.position_m,
+                velocity_m_s: state.velocity_m_s,
+                horizontal_sigma_m: 1.0,
+                vertical_sigma_m: 2.0,
+                speed_sigma_m_s: 0.1,
+            },
+            Measurement::Height { height_m: state.position_m.z, sigma_m: 0.1 },
+            Measurement::MagneticField { field: Vector3::new(20.0, other, -40.0), sigma: 0.5 },
+            Measurement::Heading { heading_rad: state.attitude_rad.z, sigma_rad: 0.1 },
+        ];
+        let mut aid = |_| {
+            let random = self.random.next_u64();
+            let value = kinds.get(random as usize % (kinds.len() + 1)).copied()?;
+            Some(Aged { value, age_us: (random >> 32) as u32 % 250_000 })
+        };
+        let mut readings = Readings { imu, aids: [None; AIDS_MAX] };
+        let drawn = [aid(0), aid(1)].into_iter().flatten();
+        readings.aids.iter_mut().zip(drawn).for_each(|(slot, aid)| *slot = Some(aid));
+        readings
     }
 
     /// Puts the vehicle on the ground and arms it.

@@ -181,7 +181,9 @@ impl<A: Autopilot> Line<'_, A> {
         while world.stands() {
             self.turn(world)?;
         }
-        if is_silent && let Some(view) = self.ask(Command::Arm, world, ARM_WITHIN_MS, |heard| heard.armed)? {
+        // Its own sensors stand still from t = 0 until it flies.
+        let within_ms = if world.readings().is_some() { 5 } else { ARM_WITHIN_MS };
+        if is_silent && let Some(view) = self.ask(Command::Arm, world, within_ms, |heard| heard.armed)? {
             self.has_armed = true;
             return Ok(view);
         }

@@ -1,0 +1,81 @@
+//! A minute on the vehicle's own estimate, flown by the firmware's machine code on an emulated Cortex-M4F with every
+//! preset of an instrument: no bit of estimate and rotor commands differs from the same code on the host.
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
+
+use afbc_plant::instruments::{Barometer, Imu, Magnetometer};
+use afbc_sim::in_the_loop::{Host, LoopEnd, Pace, Station, fly};
+use afbc_sim::scenario::{Scenario, built_in};
+use core::ops::ControlFlow;
+use pil::budget::{ESTIMATING_INSTRUCTIONS_MAX, ESTIMATING_INSTRUCTIONS_MEAN};
+use pil::{Emulator, Image, Twins};
+use std::io::Write as _;
+use std::thread;
+
+/// Every inertial sensor indoors, and every pair of barometer and magnetometer outdoors with one of them.
+fn flights() -> Vec<Scenario> {
+    let scenario = |name: &str| built_in(name).expect("built in").read().expect("valid");
+    let with = |mut scenario: Scenario, imu: Imu| {
+        // Vibration and mounting are the vehicle's.
+        let Some(old) = scenario.instruments.imu else { panic!("{} has none", scenario.name) };
+        let mut imu = Imu { mounting: old.mounting, ..imu };
+        imu.gyro.vibration_rad_s = old.gyro.vibration_rad_s;
+        imu.accel.vibration_m_s2 = old.accel.vibration_m_s2;
+        scenario.instruments.imu = Some(imu);
+        scenario
+    };
+    let parts = [Imu::ICM_42688_P, Imu::BMI270, Imu::MPU_6000];
+    let indoors = parts.map(|imu| with(scenario("mocap"), imu));
+    let pairs = [(Barometer::DPS310, Magnetometer::IST8310), (Barometer::BMP388, Magnetometer::QMC5883L)];
+    let outdoors = pairs.into_iter().zip(parts).map(|((barometer, magnetometer), imu)| {
+        // A receiver whose error at the start leaves the first setpoint within the limit for arming.
+        let mut outdoors = Scenario { seed: 2, ..with(scenario("outdoor"), imu) };
+        (outdoors.instruments.barometer, outdoors.instruments.magnetometer) = (Some(barometer), Some(magnetometer));
+        outdoors
+    });
+    indoors.into_iter().chain(outdoors).collect()
+}
+
+/// Flies one. Skipped, with a line, without the emulator or its image; never under CI.
+fn compare(scenario: &Scenario) {
+    let emulator = match Image::Pil.find().and_then(|image| Emulator::start(&image)) {
+        Ok(emulator) => emulator,
+        Err(error) if error.is_missing() && std::env::var_os("CI").is_none() => {
+            // Not println!, which the test harness would hide.
+            let _ = writeln!(std::io::stderr(), "SKIPPED, nothing was tested: {error}");
+            return;
+        }
+        Err(error) => panic!("{error}"),
+    };
+    let mut twins = Twins::new(emulator, Host::new().expect("in range"));
+    let mut off_m: f64 = 0.0;
+    let end = fly(scenario, &mut Station::new(), &mut twins, Pace::LOCKSTEP, |sample| {
+        // It starts away from the reference.
+        let distance_m =
+            if sample.time_s < 5.0 { 0.0 } else { (sample.motion.position_m - sample.reference.position_m).norm() };
+        off_m = off_m.max(distance_m);
+        ControlFlow::Continue(())
+    });
+    assert_eq!(end.expect("flown"), LoopEnd { lost: None, interrupted: false, disarmed: true }, "{}", scenario.name);
+    let comparison = twins.comparison();
+    println!("{}: at most {off_m:.3} m off, {comparison:?}", scenario.name);
+    assert!(comparison.armed_ticks > 60_000, "{comparison:?}");
+    assert_eq!(
+        comparison.first_difference, None,
+        "unless the image is older than the source (cargo fw-pil): {comparison:?}"
+    );
+    let instructions = &comparison.instructions;
+    assert!(instructions.max() <= f64::from(ESTIMATING_INSTRUCTIONS_MAX), "{comparison:?}");
+    assert!(instructions.mean() <= f64::from(ESTIMATING_INSTRUCTIONS_MEAN), "{comparison:?}");
+    // Indoors it flies as well as on the states of a tracker; outdoors the receiver's error is its own.
+    let allowed_m = if scenario.instruments.tracker.is_some() { 0.02 } else { 6.0 };
+    assert!(off_m < allowed_m, "{}: {off_m} m", scenario.name);
+}
+
+#[test]
+fn the_estimate_is_the_hosts_bit_for_bit() {
+    thread::scope(|threads| {
+        for scenario in flights() {
+            threads.spawn(move || compare(&scenario));
+        }
+    });
+}
