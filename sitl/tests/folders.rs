@@ -10,12 +10,13 @@ use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 
-/// A folder for each test, with only a scenario and a campaign.
+/// A folder for each test, with only a scenario, a campaign and a log.
 fn folder(test: &str) -> PathBuf {
     let folder = common::folder(test);
     let hover = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
     fs::write(folder.join("short.toml"), format!("duration_s = 0.5\n{hover}")).unwrap();
     fs::write(folder.join("few.toml"), "flights = 3\nduration_s = 0.5\nscenario = \"short.toml\"\n").unwrap();
+    common::log_at_rest(&folder, 3);
     let shards = [["campaign", "few.toml", "--shard", "1/2"], ["campaign", "few.toml", "--shard", "2/2"]];
     for (shard, out) in shards.iter().zip(["part-1", "part-2"]) {
         assert_eq!(sitl(&folder, &[&shard[..], &["--out", out]].concat()).status.code(), Some(0));
@@ -24,10 +25,11 @@ fn folder(test: &str) -> PathBuf {
 }
 
 /// Every command with an output folder, and the command recorded as its owner.
-const COMMANDS: [(&str, &[&str]); 6] = [
+const COMMANDS: [(&str, &[&str]); 7] = [
     ("paper", &["paper", "--duration", "0.5"]),
     ("fly", &["fly", "short.toml"]),
     ("compare", &["compare", "short.toml"]),
+    ("replay", &["replay", "rest.csv"]),
     ("campaign", &["campaign", "few.toml"]),
     ("campaign --flight", &["campaign", "few.toml", "--flight", "1"]),
     ("campaign", &["merge", "part-1", "part-2"]),

@@ -44,13 +44,14 @@ fn keys(path: &str, value: &Value, found: &mut BTreeSet<String>) {
                 keys(&format!("{path}{dot}{key}"), value, found);
             }
         }
+        Value::Array(array) if array.is_empty() => drop(found.insert(format!("{path}[]"))),
         Value::Array(array) => array.iter().for_each(|value| keys(&format!("{path}[]"), value, found)),
         _ => drop(found.insert(path.to_owned())),
     }
 }
 
-/// Checks that every command of a section prints the documented keys, or null in place of all those of one object;
-/// returns the output of the first.
+/// Checks that every command of a section prints the documented keys, or null or nothing in place of all those of one
+/// object or array; returns the output of the first.
 fn prints(folder: &Path, section: &str, commands: &[&[&str]]) -> Value {
     let mut first = None;
     for command in commands {
@@ -181,6 +182,15 @@ fn campaigns() {
 }
 
 #[test]
+fn replays() {
+    let folder = folder("replays");
+    common::log_at_rest(&folder, 14);
+    let replayed = prints(&folder, "Replays", &[&["replay", "rest.csv"]]);
+    let file: Value = serde_json::from_slice(&fs::read(folder.join("out/replay-rest/summary.json")).unwrap()).unwrap();
+    assert_eq!(replayed, file);
+}
+
+#[test]
 fn errors_are_one_line_on_stderr_with_json_too() {
     let folder = small("errors");
     fs::write(folder.join("bad.toml"), SMALL.replace("flights = 20", "flights = 0")).unwrap();
@@ -192,6 +202,7 @@ fn errors_are_one_line_on_stderr_with_json_too() {
     refused(&folder, &["compare", "nothing", "--json"]);
     refused(&folder, &["tune", "nothing", "--json"]);
     refused(&folder, &["merge", "nothing", "--out", "merged", "--json"]);
+    refused(&folder, &["replay", "nothing", "--json"]);
 }
 
 #[test]

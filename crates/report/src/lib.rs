@@ -1,7 +1,7 @@
 //! Results of flights: tables for the terminal, and in a folder CSV, JSON, figures and a page.
 //!
-//! [`flights`], [`compare`] and [`campaign`] each have a function `write` for a folder and a function `table`. The same
-//! flights give the same bytes: nothing depends on the time of day or the machine.
+//! [`flights`], [`compare`], [`campaign`] and [`replay`] each have a function `write` for a folder and a function
+//! `table`. The same flights give the same bytes: nothing depends on the time of day or the machine.
 #![forbid(unsafe_code)]
 
 pub mod campaign;
@@ -13,6 +13,7 @@ pub mod flights;
 mod groups;
 pub mod markers;
 mod reality;
+pub mod replay;
 mod report;
 pub mod results;
 pub mod suite;

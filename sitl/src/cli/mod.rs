@@ -14,6 +14,7 @@ mod paper;
 mod pil;
 mod place;
 mod progress;
+mod replay;
 mod results;
 mod scenarios;
 mod subject;
@@ -58,6 +59,7 @@ enum Command {
     Suites(suite::Suites),
     Vehicles(vehicle::Vehicles),
     Results(results::Results),
+    Replay(replay::Replay),
     Pil(pil::Pil),
     Hitl(hitl::Hitl),
 }
@@ -78,6 +80,7 @@ impl Cli {
             Command::Suites(suites) => suites.run(),
             Command::Vehicles(vehicles) => vehicles.run(),
             Command::Results(results) => results.run(),
+            Command::Replay(replay) => replay.run(),
             Command::Pil(pil) => pil.run(),
             Command::Hitl(hitl) => hitl.run(),
         }

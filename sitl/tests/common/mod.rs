@@ -41,3 +41,39 @@ pub(crate) fn refused(output: &Output) -> String {
     assert!(output.stdout.is_empty());
     error
 }
+
+/// Writes `rest.csv`, a log of so many seconds at rest as PX4-ECL's are, and the estimate beside it: 2 degrees of
+/// heading, 0.1 m/s to the north and 0.3 m to the east off.
+pub(crate) fn log_at_rest(folder: &Path, duration_s: u64) {
+    let (mut log, mut seed) = (String::new(), 1_u64);
+    let mut noise = |size: f64| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        size * ((seed >> 33) as f64 / f64::from(1_u32 << 30) - 1.0)
+    };
+    let head: Vec<_> = (0..24).map(|index| format!("state[{index}]")).collect();
+    let mut estimate = format!("Timestamp,{}\n", head.join(","));
+    let place = [85_456_073.0, 473_977_508.0].map(|number: f64| format!("{number}")).join(",");
+    for step in 1..=250 * duration_s {
+        let at_us = 4000 * step;
+        let rates = [noise(1e-3), noise(1e-3), noise(1e-3)];
+        let force = [noise(0.02), noise(0.02), noise(0.02) - 9.81];
+        let numbers: Vec<_> = force.iter().chain(&rates).map(f64::to_string).collect();
+        log += &format!("{at_us},imu,{}\n", numbers.join(","));
+        if step % 5 == 0 {
+            let [x, y, z] = [0.21 + noise(1e-3), noise(1e-3), 0.43 + noise(1e-3)];
+            log += &format!("{at_us},mag,{x},{y},{z}\n{at_us},baro,{}\n", 488.0 + noise(0.1));
+        }
+        if step % 50 == 0 {
+            log += &format!("{at_us},gps,488000,{place},{},{},{}\n", noise(0.01), noise(0.01), noise(0.01));
+        }
+        if step % 25 == 0 {
+            let (s, c) = 1.0_f64.to_radians().sin_cos();
+            let mut state = [0.0; 24];
+            state[..10].copy_from_slice(&[c, 0.0, 0.0, s, 0.1, 0.0, 0.0, 0.0, 0.3, 0.0]);
+            let state: Vec<_> = state.iter().map(f64::to_string).collect();
+            estimate += &format!("{at_us},{}\n", state.join(","));
+        }
+    }
+    fs::write(folder.join("rest.csv"), log).unwrap();
+    fs::write(folder.join("rest_ekf2.csv"), estimate).unwrap();
+}

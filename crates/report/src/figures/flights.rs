@@ -1,8 +1,9 @@
 //! Counterparts of the paper's Figs. 4 to 8, with all contenders of one scenario overlaid.
 
+use super::marks::marks;
 use super::picture::Picture;
 use super::plotted::{LINE_PX, Plotted, REFERENCE};
-use super::time_chart::{Chart, Line, Panel};
+use super::time_chart::{Chart, Line, PLOT_PX, Panel};
 use super::{canvas, trajectory};
 use crate::words;
 use afbc_sim::flight::{Estimated, Sample};
@@ -115,7 +116,8 @@ pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Picture>> {
     let conditions = format!("{}: {}", scenario.name, words::conditions(scenario));
     let chatter = controls.iter().any(|panel| panel.has_chatter(end_s));
     let chart = |name, caption: &str, title, legend, panels| {
-        let (svg, seen) = Chart { title, conditions: &conditions, scenario, end_s, legend, panels }.draw()?;
+        let marks = marks(scenario, end_s, PLOT_PX);
+        let (svg, seen) = Chart { title, conditions: &conditions, marks, end_s, legend, panels }.draw()?;
         Ok::<_, io::Error>(Picture { name, caption: format!("{caption}{seen}"), svg })
     };
     let jumps = if chatter { " Filled band: chatter, the input jumps between its edges." } else { "" };

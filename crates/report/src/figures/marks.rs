@@ -41,6 +41,8 @@ pub(super) struct Marks {
     pub(super) gusts: Vec<Mark>,
     /// Number of rows of labels.
     pub(super) lanes: usize,
+    /// What a thin line means.
+    pub(super) onset: &'static str,
 }
 
 /// Returns the marks of `scenario` on a time axis from 0 to `end_s`, `width_px` wide. Events with the same start and
@@ -67,12 +69,29 @@ pub(super) fn marks(scenario: &Scenario, end_s: f64, width_px: f64) -> Marks {
         gust.is_band = gust.end_s < end_s;
     }
     tell_apart(&mut gusts.iter_mut().chain(&mut changes));
+    placed(changes, gusts, end_s, width_px, " Thin line: onset of a gust.")
+}
+
+/// Returns the marks of moments, each with its label and time, on the same axis; `onset` says what they are.
+pub(super) fn moments(
+    moments: impl Iterator<Item = (String, f64)>,
+    end_s: f64,
+    width_px: f64,
+    onset: &'static str,
+) -> Marks {
+    let mut moments = merged(moments.map(|(label, time_s)| (label, time_s, f64::INFINITY)), end_s, 0.5 * width_px);
+    moments.iter_mut().for_each(|mark| mark.is_band = false);
+    placed(Vec::new(), moments, end_s, width_px, onset)
+}
+
+/// Returns the marks, each in its row.
+fn placed(mut changes: Vec<Mark>, mut gusts: Vec<Mark>, end_s: f64, width_px: f64, onset: &'static str) -> Marks {
     // Intervals taken in each row.
     let mut lanes = Vec::new();
     for mark in gusts.iter_mut().chain(&mut changes) {
         place(mark, width_px / end_s, width_px, &mut lanes);
     }
-    Marks { changes, gusts, lanes: lanes.len() }
+    Marks { changes, gusts, lanes: lanes.len(), onset }
 }
 
 /// Returns sorted marks within the axis, one for each interval unless its label would exceed `longest_px`.

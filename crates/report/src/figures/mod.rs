@@ -1,4 +1,4 @@
-//! Figures, as SVG: of flights, comparisons and campaigns.
+//! Figures, as SVG: of flights, comparisons, campaigns and recorded flights.
 //!
 //! Onsets of gusts are marked, and intervals with a fault or changed parameters are shaded. A contender has the same
 //! colour in every figure.
@@ -12,6 +12,7 @@ mod palette;
 mod picture;
 mod plotted;
 mod reduce;
+pub(super) mod replay;
 mod time_chart;
 mod trajectory;
 

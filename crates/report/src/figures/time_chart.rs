@@ -1,11 +1,10 @@
 //! Panels above each other with a common time axis.
 
 use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
-use super::marks::{LABEL_PX, Mark, Marks, marks};
+use super::marks::{LABEL_PX, Mark, Marks};
 use super::palette::{BLACK, EDGE, FRAME, GREY, GRID};
 use super::picture::CROSS;
 use super::reduce::{clip, simplify};
-use afbc_sim::scenario::Scenario;
 use core::ops::Range;
 use plotters::coord::ranged1d::{BoldPoints, Ranged};
 use plotters::coord::types::RangedCoordf64;
@@ -85,8 +84,8 @@ impl Panel {
 pub(super) struct Chart<'a> {
     pub(super) title: &'a str,
     pub(super) conditions: &'a str,
-    /// Scenario whose events are marked.
-    pub(super) scenario: &'a Scenario,
+    /// Events that are marked, for the width of a plot.
+    pub(super) marks: Marks,
     pub(super) end_s: f64,
     pub(super) legend: Vec<(String, Ink)>,
     pub(super) panels: Vec<Panel>,
@@ -95,11 +94,11 @@ pub(super) struct Chart<'a> {
 impl Chart<'_> {
     /// Returns the figure as SVG, and an explanation of everything in it besides lines.
     pub(super) fn draw(&self) -> io::Result<(String, String)> {
-        let marks = marks(self.scenario, self.end_s, PLOT_PX);
+        let marks = &self.marks;
         let mut all = marks.gusts.iter().chain(&marks.changes);
         let mut words = String::new();
         if !marks.gusts.is_empty() {
-            words += " Thin line: onset of a gust.";
+            words += marks.onset;
         }
         if all.any(|mark| mark.is_band) {
             words += " Shaded: duration of the event named above.";
@@ -117,7 +116,7 @@ impl Chart<'_> {
         if within.contains(&false) {
             words += " Arrow: a vehicle was lost beyond the panel.";
         }
-        Ok((self.svg(&marks)?, words))
+        Ok((self.svg(marks)?, words))
     }
 
     fn svg(&self, marks: &Marks) -> io::Result<String> {

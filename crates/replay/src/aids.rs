@@ -1,0 +1,115 @@
+//! Measurements as a log tells them, and what the estimator is told of their errors.
+
+use crate::recording::{Aiding, Sensor, Source, flip};
+use afbc_estimator::{Measurement, Origin, Timed};
+use nalgebra::Vector3;
+
+/// Smallest standard deviations of a receiver's position, height \[m\] and velocity \[m/s\], and the largest: receivers
+/// state what is left of their noise, not what is the same for minutes. Those of EKF2.
+const HORIZONTAL_M: (f64, f64) = (0.5, 100.0);
+const VERTICAL_M: (f64, f64) = (1.0, 100.0);
+const SPEED_M_S: (f64, f64) = (0.3, 10.0);
+/// What is taken for a velocity that is not told \[m/s\].
+const UNTOLD_M_S: f32 = 1e3;
+/// Noise of a barometer in flight \[m\], and of a magnetometer \[gauss\].
+const BAROMETER_M: f32 = 0.5;
+const FIELD_GAUSS: f32 = 0.05;
+/// Least time between two heights or two fields: more of them tell nothing new \[us\].
+const SPARSE_US: u64 = 15_000;
+/// Largest distance of a fix from the middle one \[degrees\]: 50 km are as far as the estimator goes.
+const FAR_DEG: f64 = 0.4;
+
+/// A fix of a GNSS receiver.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fix {
+    pub(crate) arrived_us: u64,
+    /// Latitude and longitude \[degrees\], altitude \[m\].
+    pub(crate) place: [f64; 3],
+    /// North, east, down \[m/s\], if told.
+    pub(crate) velocity_m_s: Option<[f64; 3]>,
+    /// Standard deviations as the receiver states them; those that it does not are the smallest.
+    pub(crate) horizontal_m: f64,
+    pub(crate) vertical_m: f64,
+    pub(crate) speed_m_s: f64,
+}
+
+impl Fix {
+    /// True if the numbers are those of a place.
+    pub(crate) fn is_place(&self) -> bool {
+        let [latitude, longitude, altitude] = self.place;
+        // A receiver without a fix says zero.
+        Origin::new(latitude, longitude, altitude).is_some() && (latitude, longitude) != (0.0, 0.0)
+    }
+}
+
+/// Returns the first fix that is not far from the middle one.
+pub(crate) fn begin(fixes: &[Fix]) -> Option<&Fix> {
+    let middle = |of: fn(&Fix) -> f64| {
+        let mut all: Vec<f64> = fixes.iter().map(of).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied()
+    };
+    let (latitude, longitude) = (middle(|fix| fix.place[0])?, middle(|fix| fix.place[1])?);
+    let near = |fix: &&Fix| (fix.place[0] - latitude).abs() < FAR_DEG && (fix.place[1] - longitude).abs() < FAR_DEG;
+    fixes.iter().find(near)
+}
+
+/// Returns fixes as measurements; `delay_us` is the receiver's.
+pub(crate) fn gnss(fixes: &[Fix], origin: &Origin, delay_us: u64) -> Vec<Aiding> {
+    let sigma = |stated: f64, (least, most): (f64, f64)| stated.max(least).min(most) as f32;
+    let aiding = |fix: &Fix| {
+        let [latitude, longitude, altitude] = fix.place;
+        let speed_sigma_m_s = fix.velocity_m_s.map_or(UNTOLD_M_S, |_| sigma(fix.speed_m_s, SPEED_M_S));
+        let value = Measurement::Gnss {
+            position_m: origin.local(latitude, longitude, altitude),
+            velocity_m_s: fix.velocity_m_s.map_or(Vector3::zeros(), flip),
+            horizontal_sigma_m: sigma(fix.horizontal_m, HORIZONTAL_M),
+            vertical_sigma_m: sigma(fix.vertical_m, VERTICAL_M),
+            speed_sigma_m_s,
+        };
+        aided(value, fix.arrived_us, fix.arrived_us, delay_us)
+    };
+    fixes.iter().map(aiding).collect()
+}
+
+/// Returns a height as a measurement.
+pub(crate) fn height(arrived_us: u64, at_us: u64, height_m: f64, delay_us: u64) -> Aiding {
+    let value = Measurement::Height { height_m: height_m as f32, sigma_m: BAROMETER_M };
+    aided(value, arrived_us, at_us, delay_us)
+}
+
+/// Returns a field as a measurement.
+pub(crate) fn field(arrived_us: u64, at_us: u64, gauss: [f64; 3], delay_us: u64) -> Aiding {
+    let value = Measurement::MagneticField { field: flip(gauss), sigma: FIELD_GAUSS };
+    aided(value, arrived_us, at_us, delay_us)
+}
+
+fn aided(value: Measurement, arrived_us: u64, at_us: u64, delay_us: u64) -> Aiding {
+    Aiding { arrived_us, measurement: Timed { value, at_us: at_us.saturating_sub(delay_us) } }
+}
+
+/// Keeps usable measurements in order, heights and fields no more often than they tell anything; appends them to `all`
+/// and says where they come from. `raw` is the number of samples in the log.
+pub(crate) fn collect(all: &mut Vec<Aiding>, sensor: Sensor, topic: &str, raw: usize, aiding: Vec<Aiding>) -> Source {
+    let usable: Vec<_> = aiding.into_iter().filter(|aiding| aiding.measurement.value.is_plausible()).collect();
+    let (mut kept, _) = crate::order::rising(usable, |aiding| aiding.measurement.at_us);
+    if sensor != Sensor::Gnss {
+        kept = sparse(kept, SPARSE_US, |aiding| aiding.measurement.at_us);
+    }
+    let used = kept.len();
+    all.append(&mut kept);
+    Source { sensor, topic: topic.into(), used, skipped: raw.saturating_sub(used) }
+}
+
+/// Keeps samples at least so far apart.
+pub(crate) fn sparse<T>(samples: Vec<T>, apart_us: u64, at_us: impl Fn(&T) -> u64) -> Vec<T> {
+    let mut last_us: Option<u64> = None;
+    let mut keep = |sample: &T| {
+        let keep = last_us.is_none_or(|last_us| at_us(sample) >= last_us.saturating_add(apart_us));
+        if keep {
+            last_us = Some(at_us(sample));
+        }
+        keep
+    };
+    samples.into_iter().filter(|sample| keep(sample)).collect()
+}

@@ -1,0 +1,44 @@
+//! Magnetic declination by NOAA's World Magnetic Model.
+
+use world_magnetic_model::GeomagneticField;
+use world_magnetic_model::time::{Date, Duration};
+use world_magnetic_model::uom::si::angle::{degree, radian};
+use world_magnetic_model::uom::si::f32::{Angle, Length};
+use world_magnetic_model::uom::si::length::meter;
+
+/// The years that the model covers, as days since 1970: 2020 to 2029.
+const DAYS: (i64, i64) = (18_262, 21_914);
+
+/// Returns the declination at a place and time, positive to the east; none where the model has none, near the poles. A
+/// time beyond the model's counts as its end: the declination changes by 0.2 degrees in a year.
+pub(crate) fn at(latitude_deg: f64, longitude_deg: f64, altitude_m: f64, utc_us: Option<f64>) -> Option<f32> {
+    let days = utc_us.filter(|utc_us| utc_us.is_finite()).map_or(DAYS.0, |utc_us| (utc_us / 86_400e6) as i64);
+    let epoch = Date::from_ordinal_date(1970, 1).ok()?;
+    let date = epoch.checked_add(Duration::days(days.clamp(DAYS.0, DAYS.1)))?;
+    let field = GeomagneticField::new(
+        Length::new::<meter>(altitude_m as f32),
+        Angle::new::<degree>(latitude_deg as f32),
+        Angle::new::<degree>(longitude_deg as f32),
+        date,
+    );
+    field.ok().map(|field| field.declination().get::<radian>()).filter(|angle| angle.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::at;
+
+    /// NOAA's calculator, WMM-2020 and 2025: Zurich, Sydney.
+    #[test]
+    fn is_noaas() {
+        let zurich = at(47.3977, 8.5456, 488.0, Some(1.7107e15)).map(f32::to_degrees);
+        assert!(zurich.is_some_and(|deg| (deg - 3.4).abs() < 0.3), "{zurich:?}");
+        let sydney = at(-33.87, 151.21, 0.0, Some(1.7356e15)).map(f32::to_degrees);
+        assert!(sydney.is_some_and(|deg| (deg - 12.8).abs() < 0.3), "{sydney:?}");
+        // Before and after the model, and without a time.
+        for utc_us in [Some(0.0), Some(1e18), Some(f64::NAN), None] {
+            assert!(at(47.0, 8.0, 0.0, utc_us).is_some_and(|angle| angle > 0.03));
+        }
+        assert_eq!(at(f64::NAN, 8.0, 0.0, None), None);
+    }
+}

@@ -1,0 +1,181 @@
+//! The CSV of PX4-ECL's replay tests: `time_us,kind,values`, and its filter's estimate in a file beside it.
+
+use crate::aids::{self, Fix};
+use crate::order::rising;
+use crate::recording::{LoggedState, Recording, Sensor, Source, flip, flip_rotation};
+use crate::{declination, states};
+use afbc_estimator::{ImuSample, Origin};
+use std::collections::HashMap;
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Delay of the receiver, PX4's default \[us\].
+const GNSS_DELAY_US: u64 = 110_000;
+/// Kinds of lines.
+const KINDS: [&str; 13] =
+    ["imu", "gps", "baro", "mag", "landed", "airspeed", "flow", "range", "vio", "ev", "drag", "terrain", "wind"];
+/// Length of an excerpt of a bad file.
+const EXCERPT: usize = 40;
+
+/// Times and values of one kind of line.
+type Lines = Vec<(u64, Vec<f64>)>;
+
+/// Reads a log, and the estimate in the file beside it that is called as it, with `_ekf2` at the end.
+///
+/// # Errors
+/// What is wrong with it, and what to do.
+pub(crate) fn read(bytes: &[u8], path: &Path) -> Result<Recording, String> {
+    let mut lines = lines(bytes)?;
+    let mut of = |kind: &str| lines.kinds.remove(kind).unwrap_or_default();
+    let mut recording = Recording { format: "PX4-ECL CSV", ..Recording::default() };
+    let vector = |values: &[f64], from: usize| {
+        let part = |index: usize| values.get(from + index).copied().unwrap_or(f64::NAN);
+        [part(0), part(1), part(2)]
+    };
+    let imu = of("imu");
+    let sample = |(at_us, values): &(u64, Vec<f64>)| ImuSample {
+        at_us: *at_us,
+        rates_rad_s: flip(vector(values, 3)),
+        specific_force_m_s2: flip(vector(values, 0)),
+    };
+    let samples: Vec<_> = imu.iter().map(sample).filter(ImuSample::is_plausible).collect();
+    recording.imu = rising(samples, |sample| sample.at_us).0;
+    let used = recording.imu.len();
+    if used == 0 {
+        let what = if imu.is_empty() { "no line of kind imu" } else { "no usable line of kind imu" };
+        return Err(format!("{what}; a line is time_us,imu, accelerometer and gyroscope: six numbers"));
+    }
+    let skipped = imu.len() - used;
+    recording.sources.push(Source { sensor: Sensor::Imu, topic: "imu".into(), used, skipped });
+
+    let gps = of("gps");
+    let fix = |(at_us, values): &(u64, Vec<f64>)| {
+        let [altitude, latitude, longitude] = vector(values, 0);
+        let velocity_m_s = vector(values, 3);
+        let fix = Fix {
+            arrived_us: *at_us,
+            place: [latitude * 1e-7, longitude * 1e-7, altitude * 1e-3],
+            velocity_m_s: velocity_m_s.iter().all(|speed| speed.is_finite()).then_some(velocity_m_s),
+            horizontal_m: 0.0,
+            vertical_m: 0.0,
+            speed_m_s: 0.0,
+        };
+        fix.is_place().then_some(fix)
+    };
+    let fixes: Vec<Fix> = gps.iter().filter_map(fix).collect();
+    let first = aids::begin(&fixes).copied();
+    if let Some(Fix { place: [latitude, longitude, altitude], .. }) = first {
+        recording.origin = Origin::new(latitude, longitude, altitude);
+        recording.declination_rad = declination::at(latitude, longitude, altitude, None).unwrap_or_default();
+    }
+    let gnss = recording.origin.map_or(Vec::new(), |origin| aids::gnss(&fixes, &origin, GNSS_DELAY_US));
+    let first_of = |values: &[f64]| values.first().copied().unwrap_or(f64::NAN);
+    let (baro, mag) = (of("baro"), of("mag"));
+    let heights = baro.iter().map(|(at_us, values)| aids::height(*at_us, *at_us, first_of(values), 0)).collect();
+    let fields = mag.iter().map(|(at_us, values)| aids::field(*at_us, *at_us, vector(values, 0), 0)).collect();
+    let mut aiding = Vec::new();
+    recording.sources.push(aids::collect(&mut aiding, Sensor::Gnss, "gps", gps.len(), gnss));
+    recording.sources.push(aids::collect(&mut aiding, Sensor::Barometer, "baro", baro.len(), heights));
+    recording.sources.push(aids::collect(&mut aiding, Sensor::Magnetometer, "mag", mag.len(), fields));
+    aiding.sort_by_key(|aiding| aiding.arrived_us);
+    recording.aiding = aiding;
+    let landed = of("landed").into_iter().map(|(at_us, values)| (at_us, first_of(&values) > 0.0)).collect();
+    recording.landed = rising(landed, |(at_us, _)| *at_us).0;
+    if let Some((count, first)) = lines.bad {
+        recording.notes.push(format!("{count} lines were skipped; the first is line {first}."));
+    }
+    beside(path, &mut recording);
+    Ok(recording)
+}
+
+/// A file's lines by kind.
+struct Read {
+    kinds: HashMap<String, Lines>,
+    /// Number of the others, and which is the first.
+    bad: Option<(usize, u64)>,
+}
+
+fn lines(bytes: &[u8]) -> Result<Read, String> {
+    const WANTED: &str = "a log is a PX4 ULog or a PX4-ECL CSV (lines of time_us,kind,values)";
+    if bytes.is_empty() {
+        return Err(format!("empty; {WANTED}"));
+    }
+    let mut read = Read { kinds: HashMap::new(), bad: None };
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(bytes);
+    let mut record = csv::ByteRecord::new();
+    let mut good = 0_usize;
+    loop {
+        let line = reader.position().line();
+        match reader.read_byte_record(&mut record) {
+            Ok(false) => break,
+            Ok(true) => {
+                if let Some((kind, entry)) = entry(&record) {
+                    read.kinds.entry(kind).or_default().push(entry);
+                    good += 1;
+                    continue;
+                }
+            }
+            Err(_) => {}
+        }
+        let bad = read.bad.get_or_insert((0, line));
+        bad.0 += 1;
+        // A picture or a video has no lines.
+        if good == 0 && bad.0 > 1000 {
+            break;
+        }
+    }
+    if good == 0 {
+        let excerpt: String = String::from_utf8_lossy(bytes).chars().take(EXCERPT).collect();
+        return Err(format!("not a log: it begins with \"{}\"; {WANTED}", excerpt.escape_debug()));
+    }
+    Ok(read)
+}
+
+/// Returns kind, time and values of a line.
+fn entry(record: &csv::ByteRecord) -> Option<(String, (u64, Vec<f64>))> {
+    let text = |index: usize| std::str::from_utf8(record.get(index)?).ok().map(str::trim);
+    let at_us: u64 = text(0)?.parse().ok()?;
+    let kind = text(1).filter(|kind| KINDS.contains(kind))?;
+    let values = (2..record.len()).map(|index| text(index)?.parse().ok());
+    Some((kind.to_owned(), (at_us, values.collect::<Option<Vec<f64>>>()?)))
+}
+
+/// Reads the estimate beside the log; that it is not there, or no estimate, is told.
+fn beside(path: &Path, recording: &mut Recording) {
+    let file = estimate_path(path);
+    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let read = fs::read(&file).ok().and_then(|bytes| estimates(&bytes)).unwrap_or_default();
+    let (raw, attitudes) = (read.len(), read.iter().map(|(attitude, _)| *attitude));
+    let (attitudes, source) =
+        states::collect(attitudes.filter(|state| state.attitude.is_some()).collect(), raw, Sensor::Attitude, &name);
+    recording.sources.push(source);
+    let motions = read.iter().filter_map(|(_, motion)| *motion).collect();
+    let (motions, source) = states::collect(motions, raw, Sensor::Motion, &name);
+    recording.sources.push(source);
+    recording.states = states::merged(attitudes, motions);
+}
+
+fn estimate_path(path: &Path) -> PathBuf {
+    let mut name = OsString::from(path.file_stem().unwrap_or_default());
+    name.push("_ekf2.csv");
+    path.with_file_name(name)
+}
+
+/// Returns attitude and motion of each line; none if a column is missing.
+fn estimates(bytes: &[u8]) -> Option<Vec<(LoggedState, Option<LoggedState>)>> {
+    let mut reader = csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).from_reader(bytes);
+    let head = reader.byte_headers().ok()?.clone();
+    let column = |name: &str| head.iter().position(|field| field == name.as_bytes());
+    let time = column("Timestamp")?;
+    let columns = (0..10).map(|index| column(&format!("state[{index}]"))).collect::<Option<Vec<_>>>()?;
+    let state = |record: csv::ByteRecord| {
+        let number = |index: usize| -> Option<f64> { std::str::from_utf8(record.get(index)?).ok()?.parse().ok() };
+        let at_us = number(time).filter(|at_us| *at_us >= 0.0)? as u64;
+        let values = columns.iter().map(|column| number(*column)).collect::<Option<Vec<f64>>>()?;
+        let &[w, qx, qy, qz, vx, vy, vz, x, y, z] = values.as_slice() else { return None };
+        let attitude = LoggedState { at_us, attitude: flip_rotation([w, qx, qy, qz]), ..LoggedState::default() };
+        Some((attitude, states::motion(at_us, Some(flip([vx, vy, vz])), Some(flip([x, y, z])))))
+    };
+    Some(reader.into_byte_records().filter_map(|record| state(record.ok()?)).collect())
+}

@@ -1,0 +1,39 @@
+//! Recorded flights through the estimator, beside the estimate in the log.
+//!
+//! [`read`] makes a [`Recording`] of a PX4 ULog or a PX4-ECL CSV, in this project's frames; [`fly`] runs the estimator
+//! over it, a step a millisecond, and compares. Whatever is in a file, nothing here panics: what cannot be used is
+//! skipped, counted and told.
+#![forbid(unsafe_code)]
+
+mod aids;
+mod compare;
+mod declination;
+mod ecl;
+mod order;
+mod recording;
+mod run;
+mod states;
+mod ulog;
+
+pub use compare::{Figure, Figures};
+pub use recording::{Aiding, LoggedReset, LoggedState, Recording, Sensor, Source};
+pub use run::{Replayed, Row, Start, fly};
+
+use afbc_reader::FileError;
+use std::fs;
+use std::path::Path;
+
+/// Reads the log at `path`.
+///
+/// # Errors
+/// One line, if it cannot be read, is not a log, or has no samples of an inertial sensor.
+pub fn read(path: &Path) -> Result<Recording, FileError> {
+    let shown = path.display().to_string();
+    let failed = |problem: String| FileError::whole(&shown, problem);
+    let bytes = fs::read(path).map_err(|error| failed(format!("cannot be read ({error}); give the path of a log")))?;
+    let recording = match ulog::is_ulog(&bytes) {
+        true => ulog::read(&bytes),
+        false => ecl::read(&bytes, path),
+    };
+    recording.map_err(failed)
+}

@@ -1,0 +1,145 @@
+//! What a log tells, in this project's frames and units.
+
+use afbc_estimator::{ImuSample, Measurement, Origin, Timed};
+use nalgebra::Vector3;
+
+/// A sensor, or a part of the log's own estimate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sensor {
+    /// Gyroscope and accelerometer.
+    Imu,
+    /// GNSS receiver.
+    Gnss,
+    /// Barometer.
+    Barometer,
+    /// Magnetometer.
+    Magnetometer,
+    /// The log's estimate of the attitude.
+    Attitude,
+    /// The log's estimate of velocity and position.
+    Motion,
+}
+
+impl Sensor {
+    /// Its name, for people.
+    #[must_use]
+    pub const fn title(self) -> &'static str {
+        match self {
+            Sensor::Imu => "inertial sensor",
+            Sensor::Gnss => "GNSS",
+            Sensor::Barometer => "barometer",
+            Sensor::Magnetometer => "magnetometer",
+            Sensor::Attitude => "the log's attitude",
+            Sensor::Motion => "the log's velocity and position",
+        }
+    }
+}
+
+/// Where a sensor's samples come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// Whose.
+    pub sensor: Sensor,
+    /// Topic or kind of line; that which is missing if there are no samples.
+    pub topic: String,
+    /// Number of samples used.
+    pub used: usize,
+    /// Number of samples not used: not finite, out of order, without a fix, or more than are needed.
+    pub skipped: usize,
+}
+
+/// A measurement and when it arrived.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aiding {
+    /// Time of its arrival \[us\].
+    pub arrived_us: u64,
+    /// The measurement with the time at which it was true.
+    pub measurement: Timed<Measurement>,
+}
+
+/// The log's own estimate at one time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LoggedState {
+    /// Time \[us\].
+    pub at_us: u64,
+    /// Quaternion w, x, y, z from body to earth.
+    pub attitude: Option<[f32; 4]>,
+    /// Velocity in the earth frame, if the log calls it valid \[m/s\].
+    pub velocity_m_s: Option<Vector3<f32>>,
+    /// Position from the recording's origin, if the log calls it valid \[m\].
+    pub position_m: Option<Vector3<f32>>,
+}
+
+/// A jump of the log's own estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoggedReset {
+    /// Time \[us\].
+    pub at_us: u64,
+    /// What jumped.
+    pub what: &'static str,
+    /// By how much; not a number if the log does not say.
+    pub by: f64,
+    /// Its unit.
+    pub unit: &'static str,
+}
+
+/// A recorded flight.
+#[derive(Clone, Debug, Default)]
+pub struct Recording {
+    /// Kind of log.
+    pub format: &'static str,
+    /// Samples of the inertial sensor in the order of time, at least one.
+    pub imu: Vec<ImuSample>,
+    /// Measurements in the order of their arrival.
+    pub aiding: Vec<Aiding>,
+    /// The log's own estimate in the order of time.
+    pub states: Vec<LoggedState>,
+    /// Its jumps.
+    pub resets: Vec<LoggedReset>,
+    /// From when on the log says that the vehicle is on the ground, or not \[us\].
+    pub landed: Vec<(u64, bool)>,
+    /// Origin of all positions, if there is one.
+    pub origin: Option<Origin>,
+    /// Direction of magnetic north, positive to the east \[rad\].
+    pub declination_rad: f32,
+    /// Where everything comes from.
+    pub sources: Vec<Source>,
+    /// What else is to be told, a sentence each.
+    pub notes: Vec<String>,
+}
+
+impl Recording {
+    /// Length of the recording \[s\].
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        let ends = (self.imu.first(), self.imu.last());
+        if let (Some(first), Some(last)) = ends { (last.at_us - first.at_us) as f64 * 1e-6 } else { 0.0 }
+    }
+
+    /// Median rate of the inertial sensor \[Hz\]; 0 for a single sample.
+    #[must_use]
+    pub fn imu_rate_hz(&self) -> f64 {
+        let mut steps: Vec<u64> =
+            self.imu.iter().zip(self.imu.iter().skip(1)).map(|(a, b)| b.at_us - a.at_us).collect();
+        let middle = steps.len() / 2;
+        let median = (middle < steps.len()).then(|| *steps.select_nth_unstable(middle).1);
+        median.map_or(0.0, |step_us| 1e6 / step_us as f64)
+    }
+
+    /// Parts that the log lacks.
+    pub fn missing(&self) -> impl Iterator<Item = &Source> {
+        self.sources.iter().filter(|source| source.used == 0)
+    }
+}
+
+/// A vector of PX4's frames, north-east-down or forward-right-down, in this project's.
+pub(crate) fn flip([x, y, z]: [f64; 3]) -> Vector3<f32> {
+    Vector3::new(x as f32, -y as f32, -z as f32)
+}
+
+/// A rotation between PX4's frames as one between this project's; none if it is not a rotation.
+pub(crate) fn flip_rotation([w, x, y, z]: [f64; 4]) -> Option<[f32; 4]> {
+    let norm = libm::sqrt(w * w + x * x + y * y + z * z);
+    // False of NaN.
+    ((norm - 1.0).abs() < 0.05).then(|| [w, x, -y, -z].map(|part| (part / norm) as f32))
+}

@@ -1,0 +1,236 @@
+//! The estimator over a recording.
+
+use crate::compare::{Figures, turn};
+use crate::recording::{LoggedState, Recording};
+use afbc_estimator::{Aids, Dropped, Estimate, Estimator, ImuHealth, Memory, Resets, Settings, Sigmas, Unready};
+use afbc_types::{OutOfRange, State};
+use nalgebra::{Quaternion, Vector3};
+
+/// Time between two steps \[us\].
+const STEP_US: u64 = 1_000;
+/// Time after the last sample for which there are steps without one \[us\]: nothing happens later.
+const WAIT_US: u64 = 400_000;
+/// Gap in our estimate over which nothing is compared \[us\].
+const GAP_US: u64 = 50_000;
+/// Time between two rows if the log has no estimate \[us\].
+const GRID_US: u64 = 20_000;
+/// Time after the start from which on estimates are compared \[us\].
+const SETTLED_US: u64 = 10_000_000;
+/// Time at rest after which the start is taken from the log \[us\].
+const PATIENT_US: u64 = 5_000_000;
+/// Speed at which a vehicle flies, if the log does not tell when it has landed \[m/s\].
+const FLIES_M_S: f32 = 1.0;
+/// Age of a state in the log from which a start is taken \[us\].
+const FRESH_US: u64 = 200_000;
+
+/// How the estimator started.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// At rest, by itself, at this time of the recording \[s\].
+    AtRest(f64),
+    /// In the log's state at this time of the recording \[s\], since it would not start by itself, or the vehicle was
+    /// in the air.
+    FromLog(f64, Option<Unready>),
+    /// Not at all.
+    Never(Unready),
+}
+
+/// Our estimate at one time, beside the log's.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// Time from the recording's first sample on \[s\].
+    pub time_s: f64,
+    /// This estimator's, interpolated between two samples; none before the start and in gaps.
+    pub ours: Option<Estimate>,
+    /// The log's.
+    pub logged: LoggedState,
+}
+
+impl Row {
+    /// Returns the log's attitude less ours as a rotation about the axes of the earth frame \[rad\].
+    #[must_use]
+    pub fn turn_rad(&self) -> Option<Vector3<f64>> {
+        Some(turn(&self.logged.attitude?, &self.ours?.attitude))
+    }
+}
+
+/// What the estimator made of a recording.
+#[derive(Clone, Debug)]
+pub struct Replayed {
+    /// Our estimate and the log's over time.
+    pub rows: Vec<Row>,
+    /// Their differences from [`from_s`](Self::from_s) on.
+    pub figures: Figures,
+    /// Ten seconds after the start, or as asked for \[s\].
+    pub from_s: f64,
+    /// How it started.
+    pub start: Start,
+    /// What was fused.
+    pub aids: Aids,
+    /// What was not even looked at.
+    pub dropped: Dropped,
+    /// Our own resets.
+    pub resets: Resets,
+    /// Health of the inertial sensor at the end.
+    pub imu: ImuHealth,
+}
+
+/// Runs the estimator over a recording; figures are of the time from `from_s` on, by default ten seconds after the
+/// start.
+///
+/// # Errors
+/// A setting out of range.
+pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOfRange> {
+    let settings = Settings { declination_rad: recording.declination_rad, ..Settings::DEFAULT };
+    let first_us = recording.imu.first().map_or(0, |sample| sample.at_us);
+    let mut run = Run {
+        estimator: Estimator::new(settings)?,
+        memory: Memory::default(),
+        recording,
+        first_us,
+        arrived: 0,
+        start: Start::Never(Unready::NoImu),
+    };
+    let grid;
+    let states = if recording.states.is_empty() {
+        let last_us = recording.imu.last().map_or(0, |sample| sample.at_us);
+        let times = (first_us..=last_us).step_by(GRID_US as usize);
+        grid = times.map(|at_us| LoggedState { at_us, ..LoggedState::default() }).collect::<Vec<_>>();
+        &grid
+    } else {
+        &recording.states
+    };
+    let mut states = states.iter().skip_while(|state| state.at_us < first_us).peekable();
+    let (mut rows, mut figures) = (Vec::new(), Figures::default());
+    let (mut before, mut now_us, mut sampled_us) = (Estimate::default(), first_us, first_us);
+    for sample in &recording.imu {
+        while now_us + STEP_US < sample.at_us && now_us < sampled_us + WAIT_US {
+            now_us += STEP_US;
+            run.step(now_us, None);
+        }
+        (now_us, sampled_us) = (sample.at_us, sample.at_us);
+        let now = run.step(now_us, Some(sample));
+        while let Some(logged) = states.next_if(|state| state.at_us <= now_us) {
+            let time_s = (logged.at_us - first_us) as f64 * 1e-6;
+            let ours = between(&before, &now, logged.at_us);
+            let from_s = from_s.or(run.began_s().map(|began_s| began_s + SETTLED_US as f64 * 1e-6));
+            if let (Some(ours), true) = (&ours, from_s.is_some_and(|from_s| time_s >= from_s)) {
+                figures.add(logged, ours);
+            }
+            rows.push(Row { time_s, ours, logged: *logged });
+        }
+        before = now;
+    }
+    let began_s = run.began_s().unwrap_or_default();
+    Ok(Replayed {
+        rows,
+        figures,
+        from_s: from_s.unwrap_or(began_s + SETTLED_US as f64 * 1e-6),
+        start: run.start,
+        aids: *run.memory.aids(),
+        dropped: *run.memory.dropped(),
+        resets: before.resets,
+        imu: before.imu,
+    })
+}
+
+/// The estimator in the middle of a recording.
+struct Run<'a> {
+    estimator: Estimator,
+    memory: Memory,
+    recording: &'a Recording,
+    first_us: u64,
+    /// Number of measurements that have arrived.
+    arrived: usize,
+    start: Start,
+}
+
+impl Run<'_> {
+    fn step(&mut self, now_us: u64, sample: Option<&afbc_estimator::ImuSample>) -> Estimate {
+        while let Some(aiding) = self.recording.aiding.get(self.arrived).filter(|it| it.arrived_us <= now_us) {
+            self.memory.offer(&aiding.measurement);
+            self.arrived += 1;
+        }
+        let began = self.memory.runs();
+        let estimate = self.estimator.step(&mut self.memory, now_us, sample);
+        if let Some(why) = estimate.unready {
+            self.start = Start::Never(why);
+            self.start_from_log(now_us, why);
+        } else if !began {
+            self.start = Start::AtRest(self.time_s(now_us));
+        }
+        estimate
+    }
+
+    fn time_s(&self, now_us: u64) -> f64 {
+        now_us.saturating_sub(self.first_us) as f64 * 1e-6
+    }
+
+    fn began_s(&self) -> Option<f64> {
+        match self.start {
+            Start::AtRest(time_s) | Start::FromLog(time_s, _) => Some(time_s),
+            Start::Never(_) => None,
+        }
+    }
+
+    /// Starts in the log's state if the vehicle flies, or has not been at rest for long.
+    fn start_from_log(&mut self, now_us: u64, why: Unready) {
+        let states = &self.recording.states;
+        let fresh = |state: &&LoggedState| state.at_us + FRESH_US >= now_us;
+        let until = states.partition_point(|state| state.at_us <= now_us);
+        let lately = || states.iter().take(until).rev().take_while(fresh);
+        let velocity = lately().find_map(|state| state.velocity_m_s);
+        let landed = self.recording.landed.iter().rfind(|(at_us, _)| *at_us <= now_us).map(|(_, landed)| *landed);
+        let flies = match landed {
+            Some(landed) => !landed,
+            None => velocity.is_some_and(|velocity| velocity.norm() > FLIES_M_S),
+        };
+        if !flies && now_us < self.first_us + PATIENT_US {
+            return;
+        }
+        let Some([w, x, y, z]) = lately().find_map(|state| state.attitude) else { return };
+        let position = lately().find_map(|state| state.position_m);
+        let zero = Vector3::zeros();
+        let (place, speed) = (position.unwrap_or(zero), velocity.unwrap_or(zero));
+        let Some(state) = State::from_quaternion(place, speed, &Quaternion::new(w, x, y, z), zero) else { return };
+        // As good as such estimates usually are; one of 10 km is none, so that the first fix sets the position.
+        let sigmas = Sigmas {
+            attitude_rad: Vector3::new(0.05, 0.05, 0.1),
+            velocity_m_s: Vector3::repeat(if velocity.is_some() { 0.5 } else { 5.0 }),
+            position_m: Vector3::repeat(if position.is_some() { 2.0 } else { 1e4 }),
+            gyro_bias_rad_s: Vector3::repeat(0.02),
+            accel_bias_m_s2: Vector3::repeat(0.2),
+            height_offset_m: 0.0,
+        };
+        if self.estimator.start_at(&mut self.memory, now_us, &state, &sigmas) {
+            self.start = Start::FromLog(self.time_s(now_us), (!flies).then_some(why));
+        }
+    }
+}
+
+/// Returns our estimate at a time between two samples, with the uncertainty and validity of the second; none before the
+/// start and in gaps.
+fn between(before: &Estimate, now: &Estimate, at_us: u64) -> Option<Estimate> {
+    if before.unready.is_some() || now.unready.is_some() {
+        return None;
+    }
+    let (from_us, to_us) = (before.at_us, now.at_us);
+    if !(from_us..=to_us).contains(&at_us) || to_us - from_us > GAP_US || from_us == 0 {
+        return (to_us == at_us).then_some(*now);
+    }
+    let share = if to_us > from_us { (at_us - from_us) as f32 / (to_us - from_us) as f32 } else { 1.0 };
+    let mix = |a: &Vector3<f32>, b: &Vector3<f32>| a + (b - a) * share;
+    let quaternion = |q: [f32; 4]| Quaternion::new(q[0], q[1], q[2], q[3]);
+    let (a, b) = (quaternion(before.attitude), quaternion(now.attitude));
+    let b = if a.dot(&b) < 0.0 { -b } else { b };
+    let mixed = (a * (1.0 - share) + b * share).normalize();
+    let mut ours = *now;
+    ours.at_us = at_us;
+    ours.attitude = [mixed.w, mixed.i, mixed.j, mixed.k];
+    let (position, velocity) = (
+        mix(&before.state.position_m, &now.state.position_m),
+        mix(&before.state.velocity_m_s, &now.state.velocity_m_s),
+    );
+    ours.state = State::from_quaternion(position, velocity, &mixed, now.state.rates_rad_s).unwrap_or(now.state);
+    Some(ours)
+}

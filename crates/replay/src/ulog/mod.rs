@@ -1,0 +1,20 @@
+//! PX4's ULog.
+//!
+//! `px4-ulog` parses; records are cut here, so that a damaged one costs itself, and not the rest of the log.
+
+mod records;
+mod table;
+mod topics;
+
+pub(crate) use records::is_ulog;
+
+use crate::recording::Recording;
+
+/// Reads a log.
+///
+/// # Errors
+/// What is wrong with it, and what to do.
+pub(crate) fn read(bytes: &[u8]) -> Result<Recording, String> {
+    let tables = table::read(bytes)?;
+    topics::recording(&tables)
+}

@@ -1,0 +1,297 @@
+//! Fields of a log's topics, as numbers.
+
+use super::records::{End, HEADER, Piece, each};
+use px4_ulog::stream_parser::LogParser;
+use px4_ulog::stream_parser::model::{
+    DataMessage, DropoutMessage, FlattenedFieldType as Type, FlattenedFormat, ParameterMessage,
+};
+use std::cell::RefCell;
+use std::collections::{HashMap, HashSet};
+
+/// A topic, and the fields of any of its layouts that are read.
+pub(super) type Topic = (&'static str, &'static [&'static str]);
+
+pub(super) const SENSOR_COMBINED: Topic = (
+    "sensor_combined",
+    &[
+        "timestamp",
+        "gyro_rad[0]",
+        "gyro_rad[1]",
+        "gyro_rad[2]",
+        "accelerometer_m_s2[0]",
+        "accelerometer_m_s2[1]",
+        "accelerometer_m_s2[2]",
+        "gyro_integral_dt",
+        "magnetometer_ga[0]",
+        "magnetometer_ga[1]",
+        "magnetometer_ga[2]",
+        "magnetometer_timestamp_relative",
+        "baro_alt_meter",
+        "baro_timestamp_relative",
+    ],
+);
+const GNSS: &[&str] = &[
+    "timestamp",
+    "latitude_deg",
+    "longitude_deg",
+    "altitude_msl_m",
+    "lat",
+    "lon",
+    "alt",
+    "fix_type",
+    "eph",
+    "epv",
+    "s_variance_m_s",
+    "vel_n_m_s",
+    "vel_e_m_s",
+    "vel_d_m_s",
+    "vel_ned_valid",
+    "time_utc_usec",
+];
+pub(super) const VEHICLE_GPS_POSITION: Topic = ("vehicle_gps_position", GNSS);
+pub(super) const SENSOR_GPS: Topic = ("sensor_gps", GNSS);
+pub(super) const VEHICLE_MAGNETOMETER: Topic = (
+    "vehicle_magnetometer",
+    &["timestamp", "timestamp_sample", "magnetometer_ga[0]", "magnetometer_ga[1]", "magnetometer_ga[2]"],
+);
+pub(super) const SENSOR_MAG: Topic = ("sensor_mag", &["timestamp", "timestamp_sample", "x", "y", "z"]);
+pub(super) const VEHICLE_AIR_DATA: Topic =
+    ("vehicle_air_data", &["timestamp", "timestamp_sample", "baro_alt_meter", "baro_pressure_pa"]);
+pub(super) const SENSOR_BARO: Topic = ("sensor_baro", &["timestamp", "timestamp_sample", "altitude", "pressure"]);
+pub(super) const VEHICLE_ATTITUDE: Topic = (
+    "vehicle_attitude",
+    &["timestamp", "timestamp_sample", "q[0]", "q[1]", "q[2]", "q[3]", "quat_reset_counter", "delta_q_reset[0]"],
+);
+pub(super) const VEHICLE_LOCAL_POSITION: Topic = (
+    "vehicle_local_position",
+    &[
+        "timestamp",
+        "timestamp_sample",
+        "x",
+        "y",
+        "z",
+        "vx",
+        "vy",
+        "vz",
+        "xy_valid",
+        "z_valid",
+        "v_xy_valid",
+        "v_z_valid",
+        "ref_lat",
+        "ref_lon",
+        "ref_alt",
+        "xy_reset_counter",
+        "delta_xy[0]",
+        "delta_xy[1]",
+        "z_reset_counter",
+        "delta_z",
+        "vxy_reset_counter",
+        "delta_vxy[0]",
+        "delta_vxy[1]",
+        "vz_reset_counter",
+        "delta_vz",
+    ],
+);
+pub(super) const VEHICLE_LAND_DETECTED: Topic = ("vehicle_land_detected", &["timestamp", "landed"]);
+
+const TOPICS: [Topic; 10] = [
+    SENSOR_COMBINED,
+    VEHICLE_GPS_POSITION,
+    SENSOR_GPS,
+    VEHICLE_MAGNETOMETER,
+    SENSOR_MAG,
+    VEHICLE_AIR_DATA,
+    SENSOR_BARO,
+    VEHICLE_ATTITUDE,
+    VEHICLE_LOCAL_POSITION,
+    VEHICLE_LAND_DETECTED,
+];
+
+/// A message: its fields in the order of its [`Topic`]; not a number where its layout lacks one.
+pub(super) struct Row {
+    fields: &'static [&'static str],
+    values: Box<[f64]>,
+}
+
+impl Row {
+    /// Returns a field; not a number if it is not there.
+    pub(super) fn get(&self, name: &str) -> f64 {
+        let index = self.fields.iter().position(|field| *field == name);
+        index.and_then(|index| self.values.get(index)).copied().unwrap_or(f64::NAN)
+    }
+
+    /// Returns three fields.
+    pub(super) fn vector(&self, names: [&str; 3]) -> [f64; 3] {
+        names.map(|name| self.get(name))
+    }
+
+    /// Returns its time \[us\].
+    pub(super) fn timestamp_us(&self) -> u64 {
+        self.get("timestamp") as u64
+    }
+
+    /// Returns the time at which it was true: that of its sample, if it is told, or else its own \[us\].
+    pub(super) fn sampled_us(&self) -> u64 {
+        let (sample, at) = (self.get("timestamp_sample"), self.get("timestamp"));
+        if sample > 0.0 && sample <= at && at - sample < 1e6 { sample as u64 } else { at as u64 }
+    }
+}
+
+/// What is read of a log.
+#[derive(Default)]
+pub(super) struct Tables {
+    /// Messages by topic and instance, in the order of the file.
+    rows: HashMap<(&'static str, u8), Vec<Row>>,
+    parameters: HashMap<String, f64>,
+    /// What is to be told of the file.
+    pub(super) notes: Vec<String>,
+}
+
+impl Tables {
+    /// Returns the instances of a topic that have messages, lowest first.
+    pub(super) fn instances(&self, topic: Topic) -> Vec<(u8, &[Row])> {
+        let of = self.rows.iter().filter(|((name, _), _)| *name == topic.0);
+        let mut instances: Vec<_> = of.map(|((_, instance), rows)| (*instance, rows.as_slice())).collect();
+        instances.sort_by_key(|(instance, _)| *instance);
+        instances
+    }
+
+    /// Returns the messages of a topic's lowest instance.
+    pub(super) fn first(&self, topic: Topic) -> &[Row] {
+        self.instances(topic).first().map_or(&[], |(_, rows)| rows)
+    }
+
+    /// Returns a parameter, if the log has it and it is a number.
+    pub(super) fn parameter(&self, name: &str) -> Option<f64> {
+        self.parameters.get(name).copied().filter(|value| value.is_finite())
+    }
+}
+
+/// Where a topic's fields lie in a message.
+struct Plan {
+    topic: Topic,
+    places: Vec<Option<(Type, u16)>>,
+}
+
+impl Plan {
+    fn of(format: &FlattenedFormat) -> Option<Self> {
+        let topic = *TOPICS.iter().find(|(name, _)| *name == format.message_name())?;
+        let place = |name: &&str| {
+            let field = format.field_iter().find(|field| field.flattened_field_name == *name)?;
+            Some((field.field_type.clone(), field.offset))
+        };
+        Some(Plan { topic, places: topic.1.iter().map(place).collect() })
+    }
+}
+
+/// Returns the number at a place of a message.
+fn number(data: &[u8], (kind, offset): &(Type, u16)) -> Option<f64> {
+    let from = data.get(usize::from(*offset)..)?;
+    Some(match kind {
+        Type::Int8 => f64::from(i8::from_le_bytes(*from.first_chunk()?)),
+        Type::UInt8 | Type::Bool | Type::Char => f64::from(u8::from_le_bytes(*from.first_chunk()?)),
+        Type::Int16 => f64::from(i16::from_le_bytes(*from.first_chunk()?)),
+        Type::UInt16 => f64::from(u16::from_le_bytes(*from.first_chunk()?)),
+        Type::Int32 => f64::from(i32::from_le_bytes(*from.first_chunk()?)),
+        Type::UInt32 => f64::from(u32::from_le_bytes(*from.first_chunk()?)),
+        // Times in microseconds are exact up to 285 years.
+        Type::Int64 => i64::from_le_bytes(*from.first_chunk()?) as f64,
+        Type::UInt64 => u64::from_le_bytes(*from.first_chunk()?) as f64,
+        Type::Float => f64::from(f32::from_le_bytes(*from.first_chunk()?)),
+        Type::Double => f64::from_le_bytes(*from.first_chunk()?),
+    })
+}
+
+/// Which records are read: damage to any other does not matter.
+#[derive(Default)]
+struct Wanted {
+    ids: HashSet<[u8; 2]>,
+}
+
+impl Wanted {
+    fn has(&mut self, record: &[u8]) -> bool {
+        let is_topic = |name: &[u8]| TOPICS.iter().any(|(topic, _)| topic.as_bytes() == name);
+        match record.get(2..) {
+            Some([b'B' | b'P' | b'O', ..]) => true,
+            Some([b'F', format @ ..]) => format.split(|byte| *byte == b':').next().is_some_and(is_topic),
+            Some([b'A', _, low, high, name @ ..]) => {
+                let wanted = is_topic(name);
+                if wanted {
+                    self.ids.insert([*low, *high]);
+                }
+                wanted
+            }
+            Some([b'D', low, high, ..]) => self.ids.contains(&[*low, *high]),
+            _ => false,
+        }
+    }
+}
+
+/// Reads the topics above and all parameters.
+///
+/// # Errors
+/// What is wrong with the file, if nothing can be read.
+pub(super) fn read(bytes: &[u8]) -> Result<Tables, String> {
+    let tables = RefCell::new(Tables::default());
+    let mut plans: HashMap<u16, Option<Plan>> = HashMap::new();
+    let (mut dropouts, mut dropped_ms) = (0_u64, 0_u64);
+    let mut on_data = |message: &DataMessage<'_>| {
+        let plan = plans.entry(message.msg_id).or_insert_with(|| Plan::of(message.flattened_format));
+        if let Some(Plan { topic: (name, fields), places }) = plan {
+            let value = |place: &Option<_>| place.as_ref().and_then(|place| number(message.data, place));
+            let values = places.iter().map(|place| value(place).unwrap_or(f64::NAN)).collect();
+            let key = (*name, message.multi_id.value());
+            tables.borrow_mut().rows.entry(key).or_default().push(Row { fields, values });
+        }
+    };
+    // The value at the beginning; a later change is another flight's.
+    let mut on_parameter = |parameter: &ParameterMessage<'_>| {
+        let (name, value) = match parameter {
+            ParameterMessage::Float(name, value, _) => (name, f64::from(*value)),
+            ParameterMessage::Int32(name, value, _) => (name, f64::from(*value)),
+        };
+        tables.borrow_mut().parameters.entry((*name).to_owned()).or_insert(value);
+    };
+    let mut on_dropout = |dropout: &DropoutMessage| {
+        dropouts += 1;
+        dropped_ms += u64::from(dropout.duration_ms);
+    };
+    let mut parser = LogParser::default();
+    parser.set_data_message_callback(&mut on_data);
+    parser.set_parameter_message_callback(&mut on_parameter);
+    parser.set_dropout_message_callback(&mut on_dropout);
+
+    let whole = |problem: &str| format!("{problem}; copy it from the vehicle again");
+    let header = bytes.get(..HEADER).ok_or_else(|| whole("cut within the first 16 bytes"))?;
+    parser.consume_bytes(header).map_err(|error| whole(&error.description))?;
+    let (mut pieces, mut length, mut first) = (0_u64, 0, None);
+    let mut wanted = Wanted::default();
+    let end = each(bytes, |piece, at| {
+        let lost = match piece {
+            Piece::Record(record) if !wanted.has(record) => return,
+            Piece::Record(record) => match parser.consume_bytes(record) {
+                Ok(()) => return,
+                Err(_) => record.len(),
+            },
+            Piece::Junk(length) => length,
+        };
+        first.get_or_insert(at);
+        pieces += 1;
+        length += lost;
+    });
+    drop(parser);
+    let mut tables = tables.into_inner();
+    match end {
+        End::Whole => {}
+        End::Cut(at) => tables.notes.push(format!("The file ends within the record at byte {at}: it is cut.")),
+        End::Lost(at) => tables.notes.push(format!("Nothing can be read from byte {at} on.")),
+    }
+    if let Some(first) = first {
+        let what = format!("{pieces} pieces, {length} bytes in all, the first at byte {first}");
+        tables.notes.push(format!("Damaged pieces were skipped: {what}."));
+    }
+    if dropouts > 0 {
+        tables.notes.push(format!("The logger dropped out {dropouts} times, {dropped_ms} ms in all."));
+    }
+    Ok(tables)
+}

@@ -1,0 +1,307 @@
+//! What PX4's topics mean, in their old and new layouts.
+
+use super::table::{
+    Row, SENSOR_BARO, SENSOR_COMBINED, SENSOR_GPS, SENSOR_MAG, Tables, Topic, VEHICLE_AIR_DATA, VEHICLE_ATTITUDE,
+    VEHICLE_GPS_POSITION, VEHICLE_LAND_DETECTED, VEHICLE_LOCAL_POSITION, VEHICLE_MAGNETOMETER,
+};
+use crate::aids::{self, Fix};
+use crate::order::rising;
+use crate::recording::{Aiding, LoggedReset, LoggedState, Recording, Sensor, Source, flip, flip_rotation};
+use crate::{declination, states};
+use afbc_estimator::{ImuSample, Origin};
+
+/// Delay of a receiver if the log does not say \[ms\]: PX4's default.
+const GNSS_DELAY_MS: f64 = 110.0;
+/// A relative time of old layouts that says that there is nothing.
+const NOTHING: f64 = i32::MAX as f64;
+
+/// Returns what the tables tell.
+///
+/// # Errors
+/// If there is no inertial sensor.
+pub(super) fn recording(tables: &Tables) -> Result<Recording, String> {
+    let mut recording = Recording { format: "PX4 ULog", notes: tables.notes.clone(), ..Recording::default() };
+    recording.sources.push(imu(tables, &mut recording.imu)?);
+    let fixes = Fixes::read(tables, &mut recording.notes);
+    let first = aids::begin(&fixes.fixes).copied();
+    recording.origin = reference(tables).or_else(|| {
+        let [latitude, longitude, altitude] = first?.place;
+        Origin::new(latitude, longitude, altitude)
+    });
+    let delay_us =
+        |name: &str, usual_ms: f64| (tables.parameter(name).unwrap_or(usual_ms).clamp(0.0, 1000.0) * 1e3) as u64;
+    let gnss = match &recording.origin {
+        Some(origin) => aids::gnss(&fixes.fixes, origin, delay_us("EKF2_GPS_DELAY", GNSS_DELAY_MS)),
+        None => Vec::new(),
+    };
+    let mut aiding = Vec::new();
+    recording.sources.push(aids::collect(&mut aiding, Sensor::Gnss, fixes.topic, fixes.raw, gnss));
+    recording.sources.push(barometer(tables, &mut aiding, delay_us("EKF2_BARO_DELAY", 0.0)));
+    recording.sources.push(magnetometer(tables, &mut aiding, delay_us("EKF2_MAG_DELAY", 0.0)));
+    aiding.sort_by_key(|aiding| aiding.arrived_us);
+    recording.aiding = aiding;
+    recording.declination_rad = declination(tables, first.as_ref(), fixes.utc_us, &mut recording.notes);
+
+    let (attitudes, source) = attitudes(tables);
+    recording.sources.push(source);
+    let (motions, source) = motions(tables, recording.origin.as_ref());
+    recording.sources.push(source);
+    recording.states = states::merged(attitudes, motions);
+    recording.resets = resets(tables);
+    let landed = |row: &Row| (row.timestamp_us(), row.get("landed") > 0.0);
+    recording.landed = rising(tables.first(VEHICLE_LAND_DETECTED).iter().map(landed).collect(), |(at, _)| *at).0;
+    Ok(recording)
+}
+
+/// Reads the samples of the inertial sensor. Each is the mean over its time of integration, so it was true in the
+/// middle of that.
+fn imu(tables: &Tables, samples: &mut Vec<ImuSample>) -> Result<Source, String> {
+    let (topic, rows) = (SENSOR_COMBINED.0, tables.first(SENSOR_COMBINED));
+    let sample = |row: &Row| {
+        let integral = row.get("gyro_integral_dt");
+        // Microseconds, in old layouts seconds.
+        let integral_us = if integral < 1.0 { integral * 1e6 } else { integral };
+        let half_us = if (0.0..=1e5).contains(&integral_us) { (0.5 * integral_us) as u64 } else { 0 };
+        ImuSample {
+            at_us: row.timestamp_us().saturating_sub(half_us),
+            rates_rad_s: flip(row.vector(["gyro_rad[0]", "gyro_rad[1]", "gyro_rad[2]"])),
+            specific_force_m_s2: flip(row.vector([
+                "accelerometer_m_s2[0]",
+                "accelerometer_m_s2[1]",
+                "accelerometer_m_s2[2]",
+            ])),
+        }
+    };
+    let plausible: Vec<_> = rows.iter().map(sample).filter(ImuSample::is_plausible).collect();
+    let (kept, _) = rising(plausible, |sample| sample.at_us);
+    if kept.is_empty() {
+        let damage = tables.notes.join(" ");
+        let cure = match damage.is_empty() {
+            true => "log it (SDLOG_PROFILE with the default topics), or give another log".to_owned(),
+            false => format!("copy the log from the vehicle again ({damage})"),
+        };
+        return Err(match rows.len() {
+            0 => format!("no samples of an inertial sensor: topic {topic} is missing; {cure}"),
+            count => format!("no usable sample of an inertial sensor among {count} of topic {topic}; {cure}"),
+        });
+    }
+    *samples = kept;
+    Ok(Source { sensor: Sensor::Imu, topic: topic.into(), used: samples.len(), skipped: rows.len() - samples.len() })
+}
+
+/// Fixes of the receiver with the most of them.
+struct Fixes {
+    topic: &'static str,
+    fixes: Vec<Fix>,
+    raw: usize,
+    /// Time of day of the last fix that tells it.
+    utc_us: Option<f64>,
+}
+
+impl Fixes {
+    /// `vehicle_gps_position` is what EKF2 has used, of one receiver or several; logs without it have the receivers'
+    /// own `sensor_gps`.
+    fn read(tables: &Tables, notes: &mut Vec<String>) -> Self {
+        let mut best = Fixes { topic: VEHICLE_GPS_POSITION.0, fixes: Vec::new(), raw: 0, utc_us: None };
+        for topic in [VEHICLE_GPS_POSITION, SENSOR_GPS] {
+            let instances = tables.instances(topic);
+            let mut used = 0;
+            for (instance, rows) in &instances {
+                let fixes: Vec<_> = rows.iter().filter_map(fix).collect();
+                if fixes.len() > best.fixes.len() || best.raw == 0 {
+                    let utc_us = rows.iter().map(|row| row.get("time_utc_usec")).rfind(|utc_us| *utc_us > 0.0);
+                    best = Fixes { topic: topic.0, fixes, raw: rows.len(), utc_us };
+                    used = *instance;
+                }
+            }
+            if !best.fixes.is_empty() {
+                if instances.len() > 1 {
+                    let count = instances.len();
+                    notes.push(format!("Of {count} receivers in {}, the one with the number {used} is used.", topic.0));
+                }
+                break;
+            }
+        }
+        best
+    }
+}
+
+/// Returns a fix in three dimensions.
+fn fix(row: &Row) -> Option<Fix> {
+    // Degrees and metres, in old layouts 1e-7 degrees and millimetres.
+    let either = |new: &str, old: &str, scale: f64| {
+        let new = row.get(new);
+        if new.is_finite() { new } else { row.get(old) * scale }
+    };
+    let place = [
+        either("latitude_deg", "lat", 1e-7),
+        either("longitude_deg", "lon", 1e-7),
+        either("altitude_msl_m", "alt", 1e-3),
+    ];
+    let velocity_m_s = row.vector(["vel_n_m_s", "vel_e_m_s", "vel_d_m_s"]);
+    let told = velocity_m_s.iter().all(|speed| speed.is_finite()) && row.get("vel_ned_valid") != 0.0;
+    let fix = Fix {
+        arrived_us: row.timestamp_us(),
+        place,
+        velocity_m_s: told.then_some(velocity_m_s),
+        horizontal_m: row.get("eph"),
+        vertical_m: row.get("epv"),
+        speed_m_s: row.get("s_variance_m_s"),
+    };
+    (row.get("fix_type") >= 3.0 && fix.is_place()).then_some(fix)
+}
+
+/// Returns the first reference of the log's own position, so that both have the same origin.
+fn reference(tables: &Tables) -> Option<Origin> {
+    tables.first(VEHICLE_LOCAL_POSITION).iter().find_map(own_origin)
+}
+
+fn own_origin(row: &Row) -> Option<Origin> {
+    let [latitude, longitude, altitude] = row.vector(["ref_lat", "ref_lon", "ref_alt"]);
+    // Zero until there is one, in old layouts.
+    Origin::new(latitude, longitude, altitude).filter(|_| (latitude, longitude) != (0.0, 0.0))
+}
+
+/// Heights, from the first topic that has any.
+fn barometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> Source {
+    let air = |row: &Row| {
+        let height_m = row.get("baro_alt_meter");
+        if height_m.is_finite() { height_m } else { height_of(row.get("baro_pressure_pa")) }
+    };
+    let sensor = |row: &Row| {
+        let height_m = row.get("altitude");
+        // Pascal, in old layouts hectopascal.
+        let pressure = row.get("pressure");
+        let pressure_pa = if pressure < 2000.0 { 100.0 * pressure } else { pressure };
+        if height_m.is_finite() { height_m } else { height_of(pressure_pa) }
+    };
+    let own = |value: &dyn Fn(&Row) -> f64, topic: Topic| -> Vec<Aiding> {
+        let rows = tables.first(topic).iter();
+        rows.map(|row| aids::height(row.timestamp_us(), row.sampled_us(), value(row), delay_us)).collect()
+    };
+    let combined = |row: &Row| {
+        let at_us = relative(row, "baro_timestamp_relative")?;
+        Some(aids::height(row.timestamp_us(), at_us, row.get("baro_alt_meter"), delay_us))
+    };
+    let mut candidates = vec![
+        (VEHICLE_AIR_DATA, own(&air, VEHICLE_AIR_DATA)),
+        (SENSOR_COMBINED, tables.first(SENSOR_COMBINED).iter().filter_map(combined).collect()),
+        (SENSOR_BARO, own(&sensor, SENSOR_BARO)),
+    ];
+    first_usable(&mut candidates, all, Sensor::Barometer)
+}
+
+/// Fields, from the first topic that has any.
+fn magnetometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> Source {
+    const GAUSS: [&str; 3] = ["magnetometer_ga[0]", "magnetometer_ga[1]", "magnetometer_ga[2]"];
+    let own = |names: [&str; 3], topic: Topic| -> Vec<Aiding> {
+        let rows = tables.first(topic).iter();
+        rows.map(|row| aids::field(row.timestamp_us(), row.sampled_us(), row.vector(names), delay_us)).collect()
+    };
+    let combined = |row: &Row| {
+        let at_us = relative(row, "magnetometer_timestamp_relative")?;
+        Some(aids::field(row.timestamp_us(), at_us, row.vector(GAUSS), delay_us))
+    };
+    let mut candidates = vec![
+        (VEHICLE_MAGNETOMETER, own(GAUSS, VEHICLE_MAGNETOMETER)),
+        (SENSOR_COMBINED, tables.first(SENSOR_COMBINED).iter().filter_map(combined).collect()),
+        (SENSOR_MAG, own(["x", "y", "z"], SENSOR_MAG)),
+    ];
+    first_usable(&mut candidates, all, Sensor::Magnetometer)
+}
+
+/// Takes the first topic with a usable measurement; that of today is missing if none has.
+fn first_usable(candidates: &mut [(Topic, Vec<Aiding>)], all: &mut Vec<Aiding>, sensor: Sensor) -> Source {
+    let usable = |aiding: &Aiding| aiding.measurement.value.is_plausible();
+    let found = candidates.iter().position(|(_, aiding)| aiding.iter().any(usable)).unwrap_or(0);
+    match candidates.get_mut(found) {
+        Some((topic, aiding)) => aids::collect(all, sensor, topic.0, aiding.len(), std::mem::take(aiding)),
+        None => Source { sensor, topic: String::new(), used: 0, skipped: 0 },
+    }
+}
+
+/// Returns the time of a part of an old layout's `sensor_combined`; none where there is nothing new in it.
+fn relative(row: &Row, name: &str) -> Option<u64> {
+    let relative_us = row.get(name);
+    let at_us = row.get("timestamp") + relative_us;
+    (relative_us < NOTHING && relative_us.abs() < 1e6 && at_us >= 0.0).then_some(at_us as u64)
+}
+
+/// Height of a pressure in the standard atmosphere \[m\].
+fn height_of(pressure_pa: f64) -> f64 {
+    44_330.8 * (1.0 - libm::pow(pressure_pa / 101_325.0, 0.190_263))
+}
+
+/// Returns the declination at the first fix; without one, that which the vehicle has stored.
+fn declination(tables: &Tables, first: Option<&Fix>, utc_us: Option<f64>, notes: &mut Vec<String>) -> f32 {
+    let stored = tables.parameter("EKF2_MAG_DECL").map(|degrees| degrees.to_radians() as f32);
+    let modelled = first.and_then(|fix| declination::at(fix.place[0], fix.place[1], fix.place[2], utc_us));
+    modelled.or(stored.filter(|angle| angle.abs() <= core::f32::consts::PI)).unwrap_or_else(|| {
+        notes.push("Nobody tells the declination: the heading is magnetic.".into());
+        0.0
+    })
+}
+
+fn attitudes(tables: &Tables) -> (Vec<LoggedState>, Source) {
+    let rows = tables.first(VEHICLE_ATTITUDE);
+    let state = |row: &Row| {
+        let q = flip_rotation(["q[0]", "q[1]", "q[2]", "q[3]"].map(|name| row.get(name)))?;
+        Some(LoggedState { at_us: row.sampled_us(), attitude: Some(q), ..LoggedState::default() })
+    };
+    states::collect(rows.iter().filter_map(state).collect(), rows.len(), Sensor::Attitude, VEHICLE_ATTITUDE.0)
+}
+
+fn motions(tables: &Tables, origin: Option<&Origin>) -> (Vec<LoggedState>, Source) {
+    let rows = tables.first(VEHICLE_LOCAL_POSITION);
+    let state = |row: &Row| {
+        let valid = |names: [&str; 2]| names.iter().all(|name| row.get(name) > 0.0);
+        let velocity = flip(row.vector(["vx", "vy", "vz"]));
+        // From the reference of this row, which may change.
+        let reference = || {
+            let own = own_origin(row).and(origin)?;
+            let [latitude, longitude, altitude] = row.vector(["ref_lat", "ref_lon", "ref_alt"]);
+            Some(own.local(latitude, longitude, altitude))
+        };
+        let position = reference().map(|from| from + flip(row.vector(["x", "y", "z"])));
+        states::motion(
+            row.sampled_us(),
+            Some(velocity).filter(|_| valid(["v_xy_valid", "v_z_valid"])),
+            position.filter(|_| valid(["xy_valid", "z_valid"])),
+        )
+    };
+    let states = rows.iter().filter_map(state).collect();
+    states::collect(states, rows.len(), Sensor::Motion, VEHICLE_LOCAL_POSITION.0)
+}
+
+/// A counter of resets, what it counts, the jump's coordinates, their factor and unit.
+type Counter = (&'static str, &'static str, &'static [&'static str], &'static str);
+
+const COUNTERS: [Counter; 4] = [
+    ("xy_reset_counter", "position", &["delta_xy[0]", "delta_xy[1]"], "m"),
+    ("z_reset_counter", "height", &["delta_z"], "m"),
+    ("vxy_reset_counter", "velocity", &["delta_vxy[0]", "delta_vxy[1]"], "m/s"),
+    ("vz_reset_counter", "vertical velocity", &["delta_vz"], "m/s"),
+];
+
+/// Returns the jumps of the log's own estimate.
+fn resets(tables: &Tables) -> Vec<LoggedReset> {
+    let mut resets = Vec::new();
+    let mut count = |rows: &[Row], counter: &str, what, unit, by: &dyn Fn(&Row) -> f64| {
+        for (before, row) in rows.iter().zip(rows.iter().skip(1)) {
+            let (old, new) = (before.get(counter), row.get(counter));
+            if old.is_finite() && new.is_finite() && old != new {
+                resets.push(LoggedReset { at_us: row.timestamp_us(), what, by: by(row), unit });
+            }
+        }
+    };
+    let motion = tables.first(VEHICLE_LOCAL_POSITION);
+    for (counter, what, parts, unit) in COUNTERS {
+        let size = |row: &Row| libm::sqrt(parts.iter().map(|part| row.get(part) * row.get(part)).sum());
+        count(motion, counter, what, unit, &size);
+    }
+    // The angle of a rotation from its w.
+    let turn = |row: &Row| 2.0 * libm::acos(row.get("delta_q_reset[0]").abs().min(1.0)).to_degrees();
+    count(tables.first(VEHICLE_ATTITUDE), "quat_reset_counter", "attitude", "degrees", &turn);
+    resets.sort_by_key(|reset| reset.at_us);
+    resets
+}

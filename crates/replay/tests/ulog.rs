@@ -1,0 +1,194 @@
+//! PX4 logs that the test writes itself, in old and new layouts, whole and damaged.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
+
+mod common;
+
+use afbc_replay::{Recording, Replayed, Sensor, Start, fly, read};
+use common::{Kind, file, log, replay};
+
+/// Checks that estimate and truth agree: attitude \[degrees\], velocity \[m/s\], position \[m\].
+fn agrees(replayed: &Replayed, what: &str) {
+    let f = &replayed.figures;
+    let [attitude, velocity, position] = [f.attitude, f.velocity, f.position].map(|figure| figure.rms().unwrap());
+    println!("{what}: {attitude:.3} deg, {velocity:.3} m/s, {position:.3} m");
+    assert!(attitude < 0.5 && velocity < 0.06 && position < 0.1, "{what}: {attitude}, {velocity}, {position}");
+    assert!(f.attitude.valid_ratio() > Some(0.95), "{what}: {:?}", f.attitude);
+}
+
+fn missing(recording: &Recording) -> Vec<Sensor> {
+    recording.missing().map(|source| source.sensor).collect()
+}
+
+#[test]
+fn old_and_new_layouts_say_the_same() {
+    for rate_hz in [100, 250, 1000] {
+        let both = [false, true].map(|old| {
+            let kind = Kind { old, rate_hz, ..Kind::default() };
+            let (recording, replayed) = replay(&format!("layout-{old}-{rate_hz}.ulg"), &log(&kind));
+            agrees(&replayed, &format!("old {old}, {rate_hz} Hz"));
+            assert!(matches!(replayed.start, Start::AtRest(at_s) if at_s < 1.5), "{:?}", replayed.start);
+            assert_eq!(missing(&recording), []);
+            assert!((recording.imu_rate_hz() - rate_hz as f64).abs() < 1.0);
+            let resets = replayed.resets;
+            assert_eq!((resets.position, resets.velocity, resets.restarts), (1, 0, 0));
+            recording
+        });
+        let [new, old] = both
+            .map(|recording| recording.sources.iter().map(|source| (source.sensor, source.used)).collect::<Vec<_>>());
+        assert_eq!(new, old);
+    }
+}
+
+/// Heading counts only with a magnetometer, velocity and position only with a receiver.
+#[test]
+fn a_log_that_lacks_a_topic_flies_on_the_rest() {
+    for old in [false, true] {
+        let without = |topic| {
+            let kind = Kind { old, without: vec![topic], ..Kind::default() };
+            replay(&format!("without-{old}-{topic}.ulg"), &log(&kind))
+        };
+        let (recording, replayed) = without("vehicle_air_data");
+        assert_eq!(missing(&recording), [Sensor::Barometer]);
+        agrees(&replayed, "no barometer");
+
+        let (recording, Replayed { figures, .. }) = without("vehicle_gps_position");
+        assert_eq!(missing(&recording), [Sensor::Gnss]);
+        assert_eq!((figures.velocity.rms(), figures.position.rms()), (None, None));
+        assert!(figures.attitude.rms() < Some(6.0), "{:?}", figures.attitude.rms());
+        assert!(figures.tilt.rms().is_some());
+
+        let (recording, Replayed { figures, .. }) = without("vehicle_magnetometer");
+        assert_eq!(missing(&recording), [Sensor::Magnetometer]);
+        assert_eq!((figures.attitude.rms(), figures.heading.rms()), (None, None));
+        assert!(figures.tilt.rms() < Some(1.0) && figures.position.rms() < Some(1.0), "{figures:?}");
+
+        let (recording, Replayed { figures, rows, .. }) = without("vehicle_attitude");
+        assert_eq!(missing(&recording), [Sensor::Attitude]);
+        assert!(figures.attitude.rms().is_none() && figures.velocity.rms() < Some(0.06));
+        assert!(!rows.is_empty());
+
+        let (recording, Replayed { figures, .. }) = without("vehicle_local_position");
+        assert_eq!(missing(&recording), [Sensor::Motion]);
+        assert!(figures.velocity.rms().is_none() && figures.attitude.rms() < Some(0.5));
+    }
+    // Our estimate alone.
+    let kind = Kind { without: vec!["vehicle_attitude", "vehicle_local_position"], ..Kind::default() };
+    let (recording, replayed) = replay("alone.ulg", &log(&kind));
+    assert_eq!(missing(&recording), [Sensor::Attitude, Sensor::Motion]);
+    assert!(replayed.rows.iter().any(|row| row.ours.is_some_and(|ours| ours.validity.position)));
+    // Nothing to fly on.
+    let kind = Kind { without: vec!["sensor_combined"], ..Kind::default() };
+    let error = read(&file("imu.ulg", &log(&kind))).unwrap_err().to_string();
+    assert!(error.contains("imu.ulg") && error.contains("sensor_combined") && error.contains("SDLOG"), "{error}");
+}
+
+#[test]
+fn a_log_that_begins_in_the_air_starts_in_its_own_state() {
+    for without in [vec![], vec!["vehicle_land_detected"]] {
+        let kind = Kind { begins_s: 4.0, without, ..Kind::default() };
+        let (_, replayed) = replay("air.ulg", &log(&kind));
+        assert!(matches!(replayed.start, Start::FromLog(at_s, None) if at_s < 0.5), "{:?}", replayed.start);
+        agrees(&replayed, "in the air");
+    }
+    // Without an attitude in the log there is no start.
+    let kind = Kind { begins_s: 4.0, without: vec!["vehicle_attitude"], ..Kind::default() };
+    let (_, replayed) = replay("air-alone.ulg", &log(&kind));
+    assert!(matches!(replayed.start, Start::Never(_)), "{:?}", replayed.start);
+    assert!(replayed.rows.iter().all(|row| row.ours.is_none()));
+}
+
+/// The log's position jumps by 10 m with its reference: the place is the same, and the reset is told.
+#[test]
+fn resets_of_the_log_are_told_and_its_references_followed() {
+    let (recording, replayed) = replay("reset.ulg", &log(&Kind { reset_s: 17.0, ..Kind::default() }));
+    agrees(&replayed, "reset");
+    assert_eq!(recording.resets.len(), 1, "{:?}", recording.resets);
+    let reset = &recording.resets[0];
+    assert_eq!((reset.what, reset.unit), ("position", "m"));
+    assert!((reset.by - 10.0).abs() < 1e-6);
+}
+
+#[test]
+fn gaps_and_receivers() {
+    // A gap that the estimator bridges, and one after which it starts again.
+    let (_, replayed) = replay("gap.ulg", &log(&Kind { gap_s: (8.0, 8.2), ..Kind::default() }));
+    assert_eq!(replayed.resets.restarts, 0);
+    agrees(&replayed, "gap of 0.2 s");
+    let kind = Kind { gap_s: (6.0, 9.0), duration_s: 40.0, ..Kind::default() };
+    let (recording, _) = replay("long-gap.ulg", &log(&kind));
+    let replayed = fly(&recording, Some(25.0)).unwrap();
+    assert_eq!(replayed.resets.restarts, 1);
+    assert!(replayed.figures.position.rms() < Some(0.5) && replayed.figures.attitude.rms() < Some(3.0));
+    // The first of two receivers has no fix.
+    let (recording, replayed) = replay("two.ulg", &log(&Kind { receivers: 2, ..Kind::default() }));
+    agrees(&replayed, "two receivers");
+    assert!(recording.notes.iter().any(|note| note.contains("receivers")), "{:?}", recording.notes);
+}
+
+/// What is cut off is told; the rest flies.
+#[test]
+fn a_cut_log_is_flown_as_far_as_it_goes() {
+    let whole = log(&Kind::default());
+    for share in [0.6, 0.9, 0.9999] {
+        let cut = &whole[..(share * whole.len() as f64) as usize];
+        let (recording, replayed) = replay("cut.ulg", cut);
+        assert!(recording.notes.iter().any(|note| note.contains("cut")), "{:?}", recording.notes);
+        agrees(&replayed, "cut");
+    }
+    for length in (0..600).step_by(7) {
+        let error = read(&file("stub.ulg", &whole[..length])).unwrap_err().to_string();
+        assert!(error.contains("stub.ulg: ") && error.contains(';') && error.lines().count() == 1, "{error}");
+    }
+}
+
+/// Damage costs what it hits.
+#[test]
+fn a_damaged_log_is_flown_around_the_damage() {
+    let whole = log(&Kind::default());
+    for share in [0.3, 0.5, 0.8] {
+        let mut damaged = whole.clone();
+        let at = (share * whole.len() as f64) as usize;
+        damaged[at..at + 300].fill(0xa5);
+        let (recording, replayed) = replay("damaged.ulg", &damaged);
+        assert!(recording.notes.iter().any(|note| note.contains("skipped")), "{:?}", recording.notes);
+        let imu = recording.sources.iter().find(|source| source.sensor == Sensor::Imu).unwrap();
+        assert!(imu.used > 25 * 250 - 15, "{imu:?}");
+        agrees(&replayed, "damaged");
+    }
+}
+
+/// Whatever is in a file: an error of one line, or an estimate that is finite.
+#[test]
+fn no_file_panics() {
+    let whole = log(&Kind { duration_s: 3.0, rate_hz: 100, ..Kind::default() });
+    let mut seed = 12_345_u64;
+    let mut random = |below: usize| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 33) as usize % below
+    };
+    let mut read_ones = 0;
+    for case in 0..400 {
+        let mut bytes = whole.clone();
+        // Most of the cases in the definitions, where the parser believes most.
+        let within = if case % 3 == 0 { bytes.len() } else { 2500 };
+        for _ in 0..=random(8) {
+            match random(4) {
+                0 => bytes[random(within)] = random(256) as u8,
+                1 => bytes[random(within)] ^= 1 << random(8),
+                2 => drop(bytes.remove(random(within))),
+                _ => bytes.insert(random(within), random(256) as u8),
+            }
+        }
+        if case % 5 == 0 {
+            bytes.truncate(random(bytes.len()));
+        }
+        if let Ok(recording) = read(&file("random.ulg", &bytes)) {
+            read_ones += 1;
+            let replayed = fly(&recording, Some(0.0)).unwrap();
+            for ours in replayed.rows.iter().filter_map(|row| row.ours) {
+                assert!(ours.state.is_plausible());
+            }
+        }
+    }
+    assert!(read_ones > 100, "{read_ones}");
+}

@@ -1,0 +1,135 @@
+//! A replayed log: both estimates, and their difference.
+
+use super::canvas::Ink;
+use super::marks::moments;
+use super::picture::Picture;
+use super::plotted::{LINE_PX, REFERENCE};
+use super::time_chart::{COLUMNS, Chart, Line, PLOT_PX, Panel};
+use super::{palette, reduce};
+use crate::replay::Replay;
+use afbc_estimator::Estimate;
+use afbc_replay::{LoggedState, Row};
+use afbc_types::State;
+use nalgebra::{Quaternion, Vector3};
+use std::io;
+
+/// Largest number of resets that are marked.
+const MARKS_MAX: usize = 10;
+
+/// A panel's label, our value and the log's.
+type Pair = (&'static str, fn(&Estimate) -> f32, fn(&LoggedState) -> Option<f32>);
+
+const ATTITUDE: [Pair; 3] = [
+    ("φ [°]", |e| e.state.attitude_rad.x.to_degrees(), |l| angle(l, |a| a.x)),
+    ("θ [°]", |e| e.state.attitude_rad.y.to_degrees(), |l| angle(l, |a| a.y)),
+    ("ψ [°]", |e| e.state.attitude_rad.z.to_degrees(), |l| angle(l, |a| a.z)),
+];
+const VELOCITY: [Pair; 3] = [
+    ("v⟨x⟩ [m/s]", |e| e.state.velocity_m_s.x, |l| l.velocity_m_s.map(|v| v.x)),
+    ("v⟨y⟩ [m/s]", |e| e.state.velocity_m_s.y, |l| l.velocity_m_s.map(|v| v.y)),
+    ("v⟨z⟩ [m/s]", |e| e.state.velocity_m_s.z, |l| l.velocity_m_s.map(|v| v.z)),
+];
+const POSITION: [Pair; 3] = [
+    ("x [m]", |e| e.state.position_m.x, |l| l.position_m.map(|p| p.x)),
+    ("y [m]", |e| e.state.position_m.y, |l| l.position_m.map(|p| p.y)),
+    ("z [m]", |e| e.state.position_m.z, |l| l.position_m.map(|p| p.z)),
+];
+
+/// A panel's label, the log's value less ours, our standard deviation, and whether our value is valid.
+type Difference = (&'static str, fn(&Row, &Estimate) -> Option<f64>, fn(&Estimate) -> f32, fn(&Estimate) -> bool);
+
+const DIFFERENCE: [Difference; 9] = [
+    ("x [m]", |r, e| position(r, e).map(|d| d.x), |e| e.sigmas.position_m.x, |e| e.validity.position),
+    ("y [m]", |r, e| position(r, e).map(|d| d.y), |e| e.sigmas.position_m.y, |e| e.validity.position),
+    ("z [m]", |r, e| position(r, e).map(|d| d.z), |e| e.sigmas.position_m.z, |e| e.validity.height),
+    ("v⟨x⟩ [m/s]", |r, e| velocity(r, e).map(|d| d.x), |e| e.sigmas.velocity_m_s.x, |e| e.validity.velocity),
+    ("v⟨y⟩ [m/s]", |r, e| velocity(r, e).map(|d| d.y), |e| e.sigmas.velocity_m_s.y, |e| e.validity.velocity),
+    ("v⟨z⟩ [m/s]", |r, e| velocity(r, e).map(|d| d.z), |e| e.sigmas.velocity_m_s.z, |e| e.validity.velocity),
+    ("about x [°]", |r, _| turn(r, |t| t.x), |e| e.sigmas.attitude_rad.x.to_degrees(), |e| e.validity.attitude),
+    ("about y [°]", |r, _| turn(r, |t| t.y), |e| e.sigmas.attitude_rad.y.to_degrees(), |e| e.validity.attitude),
+    ("about z [°]", |r, _| turn(r, |t| t.z), |e| e.sigmas.attitude_rad.z.to_degrees(), |e| e.validity.heading),
+];
+
+fn angle(logged: &LoggedState, of: fn(&Vector3<f32>) -> f32) -> Option<f32> {
+    let ([w, x, y, z], zero) = (logged.attitude?, Vector3::zeros());
+    let state = State::from_quaternion(zero, zero, &Quaternion::new(w, x, y, z), zero)?;
+    Some(of(&state.attitude_rad).to_degrees())
+}
+
+fn position(row: &Row, ours: &Estimate) -> Option<Vector3<f64>> {
+    row.logged.position_m.map(|position| (position - ours.state.position_m).cast())
+}
+
+fn velocity(row: &Row, ours: &Estimate) -> Option<Vector3<f64>> {
+    row.logged.velocity_m_s.map(|velocity| (velocity - ours.state.velocity_m_s).cast())
+}
+
+fn turn(row: &Row, of: fn(&Vector3<f64>) -> f64) -> Option<f64> {
+    row.turn_rad().map(|turn| of(&turn).to_degrees())
+}
+
+/// Draws every figure that has something to show.
+pub(crate) fn draw(replay: &Replay<'_>) -> io::Result<Vec<Picture>> {
+    let rows = &replay.replayed.rows;
+    let end_s = rows.last().map_or(0.0, |row| row.time_s);
+    let own = Ink::new(palette::color("afbc"), LINE_PX);
+    let band = Ink { opacity: 1.0 / 3.0, ..Ink::new(palette::color("afbc"), REFERENCE.width_px) };
+    let line = |ink: Ink, is_reference: bool, value: &dyn Fn(&Row) -> Option<f64>| {
+        let points = rows.iter().filter_map(|row| Some((row.time_s, value(row)?)));
+        Line { ink, points: reduce::envelope(points, end_s, COLUMNS), lost_s: None, is_reference }
+    };
+    let both = |(label, ours, theirs): Pair| Panel {
+        label,
+        zero: false,
+        lines: vec![
+            line(REFERENCE, true, &|row| theirs(&row.logged).map(f64::from)),
+            line(own, false, &|row| row.ours.as_ref().map(|e| ours(e).into())),
+        ],
+    };
+    let difference = |(label, value, sigma, valid): Difference| {
+        let edge = |sign: f32| {
+            line(band, true, &|row| {
+                let ours = row.ours.as_ref().filter(|e| valid(e))?;
+                value(row, ours).map(|_| f64::from(sign * 3.0 * sigma(ours)))
+            })
+        };
+        let inner = line(own, false, &|row| value(row, row.ours.as_ref().filter(|e| valid(e))?));
+        Panel { label, zero: true, lines: vec![edge(1.0), edge(-1.0), inner] }
+    };
+    let conditions = replay.recording.format;
+    let chart = |name, caption: &str, title, legend: &[(&str, Ink)], panels: Vec<Panel>| {
+        let first_us = replay.recording.imu.first().map_or(0, |sample| sample.at_us);
+        let reset =
+            |reset: &afbc_replay::LoggedReset| (reset.what.to_owned(), (reset.at_us as f64 - first_us as f64) * 1e-6);
+        let resets = replay.recording.resets.iter().map(reset).filter(|(_, at_s)| *at_s >= 0.0).take(MARKS_MAX);
+        let marks = moments(resets, end_s, PLOT_PX, " Thin line: reset of the log's own estimate.");
+        let legend = legend.iter().map(|(name, ink)| ((*name).to_owned(), *ink)).collect();
+        let (svg, seen) = Chart { title, conditions, marks, end_s, legend, panels }.draw()?;
+        Ok::<_, io::Error>(Picture { name, caption: format!("{caption}{seen}"), svg })
+    };
+    let both_legend = [("log", REFERENCE), ("estimate", own)];
+    let lines_drawn = |panels: &[Panel]| {
+        end_s > 0.0 && panels.iter().any(|panel| panel.lines.iter().any(|line| line.points.len() > 1))
+    };
+    let mut pictures = Vec::new();
+    for (name, title, caption, pairs) in [
+        ("attitude", "Attitude", "Roll, pitch and yaw.", ATTITUDE),
+        ("velocity", "Velocity", "Velocity: x north, y west, z up.", VELOCITY),
+        ("position", "Position", "Position: x north, y west, z up.", POSITION),
+    ] {
+        let panels: Vec<Panel> = pairs.into_iter().map(both).collect();
+        if lines_drawn(&panels) {
+            pictures.push(chart(name, caption, title, &both_legend, panels)?);
+        }
+    }
+    let panels: Vec<Panel> = DIFFERENCE.into_iter().map(difference).collect();
+    let panels: Vec<Panel> =
+        panels.into_iter().filter(|panel| panel.lines.iter().any(|line| line.points.len() > 1)).collect();
+    if lines_drawn(&panels) {
+        let caption = "Log less estimate where both are valid, and three times the estimate's standard deviation \
+                       (pale); rotations are about the axes of the earth frame.";
+        let legend = [("log less estimate", own), ("3σ", band)];
+        pictures.push(chart("difference", caption, "Difference", &legend, panels)?);
+    }
+    Ok(pictures)
+}

@@ -1,0 +1,124 @@
+//! Numbers and words about a replay, for page and terminal.
+
+use super::Replay;
+use afbc_estimator::{Aid, Resets};
+use afbc_replay::{Figure, Start};
+
+/// Heads of the columns.
+pub(super) const HEADS: [&str; 4] = ["RMS", "largest", "within 3σ", "valid"];
+/// Largest number of the log's resets that are spelt out.
+const RESETS_MAX: usize = 12;
+
+/// A quantity's differences.
+pub(super) struct Row {
+    pub(super) name: &'static str,
+    pub(super) cells: [String; 4],
+}
+
+/// Returns the differences; "-" where nothing could be compared.
+pub(super) fn rows(replay: &Replay<'_>) -> Vec<Row> {
+    let f = &replay.replayed.figures;
+    let number = |value: Option<f64>, unit: &str| value.map_or("-".into(), |value| format!("{value:.3} {unit}"));
+    let percent = |share: Option<f64>| share.map_or("-".into(), |share| format!("{:.1} %", 100.0 * share));
+    let row = |name, figure: &Figure, unit: &str| Row {
+        name,
+        cells: [
+            number(figure.rms(), unit),
+            number(figure.rms().map(|_| figure.largest), unit),
+            percent(figure.within_ratio()),
+            percent(figure.valid_ratio()),
+        ],
+    };
+    vec![
+        row("attitude", &f.attitude, "°"),
+        row("  tilt", &f.tilt, "°"),
+        row("  heading", &f.heading, "°"),
+        row("velocity", &f.velocity, "m/s"),
+        row("position", &f.position, "m"),
+        row("  horizontal", &f.horizontal, "m"),
+        row("  height", &f.height, "m"),
+    ]
+}
+
+/// Summarises the log: "PX4 ULog, 31.1 s, inertial sensor at 250 Hz".
+pub(super) fn conditions(replay: &Replay<'_>) -> String {
+    let recording = replay.recording;
+    let (length_s, rate_hz) = (recording.duration_s(), recording.imu_rate_hz());
+    format!("{}, {length_s:.1} s, inertial sensor at {rate_hz:.0} Hz", recording.format)
+}
+
+/// Says what was used and what happened, a sentence each.
+pub(super) fn sentences(replay: &Replay<'_>) -> Vec<String> {
+    let (recording, replayed) = (replay.recording, replay.replayed);
+    let used = recording.sources.iter().filter(|source| source.used > 0).map(|source| {
+        let skipped = if source.skipped > 0 { format!(", {} not used", source.skipped) } else { String::new() };
+        format!("{} {} ({}{skipped})", source.used, source.sensor.title(), source.topic)
+    });
+    let mut said = vec![format!("Used: {}.", used.collect::<Vec<_>>().join("; "))];
+    let missing: Vec<_> =
+        recording.missing().map(|source| format!("{} ({})", source.sensor.title(), source.topic)).collect();
+    if !missing.is_empty() {
+        said.push(format!("Missing: {}.", missing.join("; ")));
+    }
+    said.extend(recording.notes.iter().cloned());
+    let rate_hz = recording.imu_rate_hz();
+    if rate_hz < 90.0 {
+        said.push(format!(
+            "The inertial sensor was logged at {rate_hz:.0} Hz; the estimator needs 100 Hz, so take these figures for \
+             what the log lost."
+        ));
+    }
+    said.push(start(replay));
+    let Resets { position, velocity, heading, height, tilt, restarts } = replayed.resets;
+    said.push(format!(
+        "Set anew by the estimator: position {position}, velocity {velocity}, heading {heading}, barometer's offset \
+         {height}, tilt doubted {tilt}, restarts {restarts} times."
+    ));
+    let rejected = AIDS.iter().filter_map(|(name, aid)| {
+        let record = replayed.aids.of(*aid);
+        (record.rejected > 0).then(|| format!("{name} {} of {}", record.rejected, record.rejected + record.accepted))
+    });
+    let rejected: Vec<_> = rejected.collect();
+    if !rejected.is_empty() {
+        said.push(format!("Rejected by the gates: {}.", rejected.join(", ")));
+    }
+    let dropped = &replayed.dropped;
+    if dropped.disturbed > 0 {
+        said.push(format!("{} magnetic fields were not those of the start, and not used.", dropped.disturbed));
+    }
+    if !recording.resets.is_empty() {
+        let first_us = recording.imu.first().map_or(0, |sample| sample.at_us);
+        let one = |reset: &afbc_replay::LoggedReset| {
+            let by = if reset.by.is_finite() { format!(" by {:.3} {}", reset.by, reset.unit) } else { String::new() };
+            format!("{}{by} at {:.1} s", reset.what, (reset.at_us as f64 - first_us as f64) * 1e-6)
+        };
+        let all: Vec<_> = recording.resets.iter().take(RESETS_MAX).map(one).collect();
+        let more = recording.resets.len() - all.len();
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        said.push(format!("The log's own estimate was reset: {}{more}. The differences contain that.", all.join(", ")));
+    }
+    said
+}
+
+/// The names of what is measured.
+pub(super) const AIDS: [(&str, Aid); 4] = [
+    ("gnss-position", Aid::GnssPosition),
+    ("gnss-velocity", Aid::GnssVelocity),
+    ("height", Aid::Height),
+    ("heading", Aid::Heading),
+];
+
+fn start(replay: &Replay<'_>) -> String {
+    let from_s = replay.replayed.from_s;
+    match replay.replayed.start {
+        Start::AtRest(at_s) => format!("Started at rest after {at_s:.1} s; compared from {from_s:.1} s on."),
+        Start::FromLog(at_s, None) => format!(
+            "The vehicle was in the air: started at {at_s:.1} s in the log's own state; compared from {from_s:.1} s on."
+        ),
+        Start::FromLog(at_s, Some(why)) => format!(
+            "Did not start by itself ({why}): started at {at_s:.1} s in the log's own state; compared from \
+             {from_s:.1} s on."
+        ),
+        Start::Never(why) => format!("Never started: {why}; and the log has no attitude to start from."),
+    }
+}

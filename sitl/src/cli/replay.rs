@@ -1,0 +1,64 @@
+//! `sitl replay`.
+
+use super::interrupt;
+use super::json::{self, Json};
+use super::place::Place;
+use super::terminal::{Failure, print};
+use afbc_reader::FileError;
+use afbc_replay::Start;
+use afbc_report::replay as report;
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Run a recorded flight through the estimator, and compare with the estimate in the log
+///
+/// The log is a PX4 ULog, or the CSV of PX4-ECL's replay tests with its estimate beside it in <name>_ekf2.csv. What it
+/// lacks is told; only the inertial sensor's samples must be there.
+#[derive(Args, Debug)]
+pub(crate) struct Replay {
+    /// Path of the log
+    log: PathBuf,
+
+    /// Compare from this time of the log on [default: 10 s after the estimator has started]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    from: Option<f64>,
+
+    #[command(flatten)]
+    place: Place,
+
+    #[command(flatten)]
+    json: Json,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds: Option<f64> = text.parse().ok().filter(|seconds: &f64| *seconds >= 0.0 && seconds.is_finite());
+    seconds.ok_or_else(|| "it must be a number of seconds, 0 or more".to_owned())
+}
+
+impl Replay {
+    /// Reads, runs, writes, prints.
+    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        interrupt::ends_it()?;
+        let shown = self.log.display().to_string();
+        let recording = afbc_replay::read(&self.log)?;
+        let replayed = afbc_replay::fly(&recording, self.from)?;
+        if let Start::Never(why) = replayed.start {
+            let problem = format!("the estimator never started ({why}), and the log has no attitude to start from");
+            return Err(FileError::whole(&shown, format!("{problem}; record from rest on")).into());
+        }
+        let name = self.log.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
+        let folder = self.place.open("replay", &report::folder_name(&name))?;
+        interrupt::is_too_late();
+        let replay = report::Replay { name: &name, recording: &recording, replayed: &replayed };
+        let written = report::write(&folder, &replay)?;
+        if self.json.json {
+            json::print_written(|out| report::json(out, &replay))?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        let (table, out) = (report::table(&replay), folder.path());
+        let (count, page) = (written.len(), out.join("report.html"));
+        print(&format!("{}\n\n{count} files in {}; open {}\n", table.trim_end(), out.display(), page.display()))?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
