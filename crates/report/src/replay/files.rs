@@ -84,6 +84,7 @@ struct Summary<'a> {
     format: &'a str,
     duration_s: f64,
     imu_rate_hz: f64,
+    declination_deg: f64,
     sources: Vec<Source<'a>>,
     missing: Vec<&'a str>,
     notes: &'a [String],
@@ -171,6 +172,7 @@ pub fn json(out: &mut dyn Write, replay: &Replay<'_>) -> io::Result<()> {
         format: recording.format,
         duration_s: recording.duration_s(),
         imu_rate_hz: recording.imu_rate_hz(),
+        declination_deg: f64::from(recording.declination_rad).to_degrees(),
         sources: recording
             .sources
             .iter()
