@@ -128,7 +128,12 @@ impl Recording {
 
     /// Parts that the log lacks.
     pub fn missing(&self) -> impl Iterator<Item = &Source> {
-        self.sources.iter().filter(|source| source.used == 0)
+        self.sources.iter().filter(|source| source.used + source.skipped == 0)
+    }
+
+    /// Parts that are in the log, but of which nothing can be used.
+    pub fn unusable(&self) -> impl Iterator<Item = &Source> {
+        self.sources.iter().filter(|source| source.used == 0 && source.skipped > 0)
     }
 }
 

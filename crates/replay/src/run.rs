@@ -14,8 +14,8 @@ const WAIT_US: u64 = 400_000;
 const GAP_US: u64 = 50_000;
 /// Time between two rows if the log has no estimate \[us\].
 const GRID_US: u64 = 20_000;
-/// Time after the start from which on estimates are compared \[us\].
-const SETTLED_US: u64 = 10_000_000;
+/// Time after the start from which on estimates are compared, unless half of what is left is less \[s\].
+const SETTLED_S: f64 = 10.0;
 /// Time at rest after which the start is taken from the log \[us\].
 const PATIENT_US: u64 = 5_000_000;
 /// Speed at which a vehicle flies, if the log does not tell when it has landed \[m/s\].
@@ -61,7 +61,7 @@ pub struct Replayed {
     pub rows: Vec<Row>,
     /// Their differences from [`from_s`](Self::from_s) on.
     pub figures: Figures,
-    /// Ten seconds after the start, or as asked for \[s\].
+    /// Ten seconds after the start, or half of what is left then if that is less, or as asked for \[s\].
     pub from_s: f64,
     /// How it started.
     pub start: Start,
@@ -75,8 +75,8 @@ pub struct Replayed {
     pub imu: ImuHealth,
 }
 
-/// Runs the estimator over a recording; figures are of the time from `from_s` on, by default ten seconds after the
-/// start.
+/// Runs the estimator over a recording; figures are of the time from `from_s` on, by default
+/// [that](Replayed::from_s) after the start.
 ///
 /// # Errors
 /// A setting out of range.
@@ -91,6 +91,8 @@ pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOf
         arrived: 0,
         start: Start::Never(Unready::NoImu),
     };
+    let duration_s = recording.duration_s();
+    let settled_s = |began_s: f64| began_s + SETTLED_S.min(0.5 * (duration_s - began_s));
     let grid;
     let states = if recording.states.is_empty() {
         let last_us = recording.imu.last().map_or(0, |sample| sample.at_us);
@@ -113,7 +115,7 @@ pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOf
         while let Some(logged) = states.next_if(|state| state.at_us <= now_us) {
             let time_s = (logged.at_us - first_us) as f64 * 1e-6;
             let ours = between(&before, &now, logged.at_us);
-            let from_s = from_s.or(run.began_s().map(|began_s| began_s + SETTLED_US as f64 * 1e-6));
+            let from_s = from_s.or(run.began_s().map(settled_s));
             if let (Some(ours), true) = (&ours, from_s.is_some_and(|from_s| time_s >= from_s)) {
                 figures.add(logged, ours);
             }
@@ -125,7 +127,7 @@ pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOf
     Ok(Replayed {
         rows,
         figures,
-        from_s: from_s.unwrap_or(began_s + SETTLED_US as f64 * 1e-6),
+        from_s: from_s.unwrap_or(settled_s(began_s)),
         start: run.start,
         aids: *run.memory.aids(),
         dropped: *run.memory.dropped(),

@@ -76,10 +76,41 @@ fn a_log_that_lacks_a_topic_flies_on_the_rest() {
     let (recording, replayed) = replay("alone.ulg", &log(&kind));
     assert_eq!(missing(&recording), [Sensor::Attitude, Sensor::Motion]);
     assert!(replayed.rows.iter().any(|row| row.ours.is_some_and(|ours| ours.validity.position)));
+    // A receiver that never has a fix is there, but of no use.
+    let mut bytes = log(&Kind::default());
+    let (recording, _) = replay("fix.ulg", &bytes);
+    assert_eq!(recording.unusable().count(), 0);
+    without_fixes(&mut bytes);
+    let (recording, Replayed { figures, .. }) = replay("no-fix.ulg", &bytes);
+    assert_eq!(missing(&recording), []);
+    assert_eq!(recording.unusable().map(|source| source.sensor).collect::<Vec<_>>(), [Sensor::Gnss]);
+    assert!(figures.velocity.rms().is_none() && figures.attitude.rms() < Some(6.0));
     // Nothing to fly on.
     let kind = Kind { without: vec!["sensor_combined"], ..Kind::default() };
     let error = read(&file("imu.ulg", &log(&kind))).unwrap_err().to_string();
     assert!(error.contains("imu.ulg") && error.contains("sensor_combined") && error.contains("SDLOG"), "{error}");
+}
+
+/// Sets the kind of fix of every message of a receiver to none: the last byte but one of its records.
+fn without_fixes(bytes: &mut [u8]) {
+    let mut at = 16;
+    while at + 3 < bytes.len() {
+        let length = usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
+        let end = at + 3 + length;
+        // The second topic of the log, in the new layout.
+        if bytes[at + 2] == b'D' && bytes[at + 3..at + 5] == [1, 0] {
+            bytes[end - 2] = 0;
+        }
+        at = end;
+    }
+}
+
+/// Of a log of 8 s the second half of what follows the start is compared.
+#[test]
+fn a_short_log_is_compared_from_its_middle_on() {
+    let (_, replayed) = replay("eight.ulg", &log(&Kind { duration_s: 8.0, ..Kind::default() }));
+    assert!((4.4..4.7).contains(&replayed.from_s), "{}", replayed.from_s);
+    agrees(&replayed, "8 s");
 }
 
 #[test]
@@ -123,6 +154,15 @@ fn gaps_and_receivers() {
     let (recording, replayed) = replay("two.ulg", &log(&Kind { receivers: 2, ..Kind::default() }));
     agrees(&replayed, "two receivers");
     assert!(recording.notes.iter().any(|note| note.contains("receivers")), "{:?}", recording.notes);
+}
+
+/// A field of 0.05 gauss that turns with the vehicle would be 13 degrees of heading.
+#[test]
+fn what_ekf2_knows_of_the_magnetometer_counts() {
+    for old in [false, true] {
+        let (_, replayed) = replay("iron.ulg", &log(&Kind { iron: 0.05, old, ..Kind::default() }));
+        agrees(&replayed, "iron");
+    }
 }
 
 /// What is cut off is told; the rest flies.

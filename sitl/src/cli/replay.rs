@@ -20,7 +20,7 @@ pub(crate) struct Replay {
     /// Path of the log
     log: PathBuf,
 
-    /// Compare from this time of the log on [default: 10 s after the estimator has started]
+    /// Compare from this time of the log on [default: 10 s after the estimator has started, or half of a shorter rest]
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     from: Option<f64>,
 

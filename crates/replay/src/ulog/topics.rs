@@ -191,16 +191,23 @@ fn barometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> Source {
     first_usable(&mut candidates, all, Sensor::Barometer)
 }
 
-/// Fields, from the first topic that has any.
+/// Fields, from the first topic that has any, less what EKF2 had learned of them before, where the log has it.
 fn magnetometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> Source {
     const GAUSS: [&str; 3] = ["magnetometer_ga[0]", "magnetometer_ga[1]", "magnetometer_ga[2]"];
+    let learned = tables.parameter("EKF2_MAGBIAS_ID").is_some_and(|id| id != 0.0);
+    let bias = ["EKF2_MAGBIAS_X", "EKF2_MAGBIAS_Y", "EKF2_MAGBIAS_Z"]
+        .map(|name| tables.parameter(name).filter(|_| learned).unwrap_or_default());
+    let gauss = |row: &Row, names: [&str; 3]| {
+        let ([x, y, z], [dx, dy, dz]) = (row.vector(names), bias);
+        [x - dx, y - dy, z - dz]
+    };
     let own = |names: [&str; 3], topic: Topic| -> Vec<Aiding> {
         let rows = tables.first(topic).iter();
-        rows.map(|row| aids::field(row.timestamp_us(), row.sampled_us(), row.vector(names), delay_us)).collect()
+        rows.map(|row| aids::field(row.timestamp_us(), row.sampled_us(), gauss(row, names), delay_us)).collect()
     };
     let combined = |row: &Row| {
         let at_us = relative(row, "magnetometer_timestamp_relative")?;
-        Some(aids::field(row.timestamp_us(), at_us, row.vector(GAUSS), delay_us))
+        Some(aids::field(row.timestamp_us(), at_us, gauss(row, GAUSS), delay_us))
     };
     let mut candidates = vec![
         (VEHICLE_MAGNETOMETER, own(GAUSS, VEHICLE_MAGNETOMETER)),

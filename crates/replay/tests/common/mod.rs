@@ -28,6 +28,8 @@ pub(crate) struct Kind {
     pub(crate) gap_s: (f64, f64),
     /// Reset of the log's position, and change of its reference, at this time \[s\].
     pub(crate) reset_s: f64,
+    /// What EKF2 has learned of the magnetometer's y axis \[gauss\].
+    pub(crate) iron: f64,
     /// Another receiver, first in the log, without a fix.
     pub(crate) receivers: u8,
 }
@@ -42,6 +44,7 @@ impl Default for Kind {
             begins_s: -3.0,
             gap_s: (0.0, 0.0),
             reset_s: f64::INFINITY,
+            iron: 0.0,
             receivers: 1,
         }
     }
@@ -185,6 +188,8 @@ pub(crate) fn log(kind: &Kind) -> Vec<u8> {
         }
     }
     log.parameter("EKF2_GPS_DELAY", 120.0);
+    log.parameter("EKF2_MAGBIAS_ID", 590.0);
+    log.parameter("EKF2_MAGBIAS_Y", kind.iron as f32);
     let wanted = |name: &str| !kind.without.contains(&name);
     let mut id = |name: &str, instance: u8| wanted(name).then(|| log.subscribe(name, instance));
     let imu = id("sensor_combined", 0);
@@ -215,7 +220,7 @@ pub(crate) fn log(kind: &Kind) -> Vec<u8> {
         let exact = truth(time_s);
         let (s, c) = DECLINATION_RAD.sin_cos();
         let [bx, by, bz] = body(exact.yaw.0, [0.21 * c, 0.21 * s, 0.43]);
-        let field = [shaken(bx, 1e-3), shaken(by, 1e-3), shaken(bz, 1e-3)];
+        let field = [shaken(bx, 1e-3), shaken(by + kind.iron, 1e-3), shaken(bz, 1e-3)];
         let height = shaken(HOME[2] + 3.0 - exact.position[2], 0.2);
         if !(kind.gap_s.0..kind.gap_s.1).contains(&log_s) {
             let mut values: Vec<Value> = gyro.into();

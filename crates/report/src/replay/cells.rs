@@ -2,7 +2,7 @@
 
 use super::Replay;
 use afbc_estimator::{Aid, Resets};
-use afbc_replay::{Figure, Start};
+use afbc_replay::{Figure, Source, Start};
 
 /// Heads of the columns.
 pub(super) const HEADS: [&str; 4] = ["RMS", "largest", "within 3σ", "valid"];
@@ -55,10 +55,16 @@ pub(super) fn sentences(replay: &Replay<'_>) -> Vec<String> {
         format!("{} {} ({}{skipped})", source.used, source.sensor.title(), source.topic)
     });
     let mut said = vec![format!("Used: {}.", used.collect::<Vec<_>>().join("; "))];
-    let missing: Vec<_> =
-        recording.missing().map(|source| format!("{} ({})", source.sensor.title(), source.topic)).collect();
+    let listed = |sources: Vec<&Source>| {
+        let words = sources.iter().map(|source| format!("{} ({})", source.sensor.title(), source.topic));
+        words.collect::<Vec<_>>().join("; ")
+    };
+    let (missing, unusable) = (recording.missing().collect::<Vec<_>>(), recording.unusable().collect::<Vec<_>>());
     if !missing.is_empty() {
-        said.push(format!("Missing: {}.", missing.join("; ")));
+        said.push(format!("Missing: {}.", listed(missing)));
+    }
+    if !unusable.is_empty() {
+        said.push(format!("In the log, but never valid: {}.", listed(unusable)));
     }
     said.extend(recording.notes.iter().cloned());
     let rate_hz = recording.imu_rate_hz();

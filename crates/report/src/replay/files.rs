@@ -87,6 +87,7 @@ struct Summary<'a> {
     declination_deg: f64,
     sources: Vec<Source<'a>>,
     missing: Vec<&'a str>,
+    unusable: Vec<&'a str>,
     notes: &'a [String],
     start: &'static str,
     started_at_s: Option<f64>,
@@ -179,6 +180,7 @@ pub fn json(out: &mut dyn Write, replay: &Replay<'_>) -> io::Result<()> {
             .map(|it| Source { sensor: it.sensor.title(), topic: &it.topic, used: it.used, skipped: it.skipped })
             .collect(),
         missing: recording.missing().map(|source| source.topic.as_str()).collect(),
+        unusable: recording.unusable().map(|source| source.topic.as_str()).collect(),
         notes: &recording.notes,
         start,
         started_at_s,
