@@ -63,10 +63,18 @@ pub(crate) fn read(bytes: &[u8], path: &Path) -> Result<Recording, String> {
         };
         fix.is_place().then_some(fix)
     };
-    let fixes: Vec<Fix> = gps.iter().filter_map(fix).collect();
+    let mut fixes: Vec<Fix> = gps.iter().filter_map(fix).collect();
+    // That of the place as written, as EKF2 had it.
+    let written = aids::begin(&fixes).copied();
+    if are_exchanged(&fixes) {
+        fixes.iter_mut().for_each(|Fix { place: [latitude, longitude, _], .. }| std::mem::swap(latitude, longitude));
+        recording.notes.push("Latitude and longitude are exchanged: only so they agree with the velocity.".into());
+    }
     let first = aids::begin(&fixes).copied();
     if let Some(Fix { place: [latitude, longitude, altitude], .. }) = first {
         recording.origin = Origin::new(latitude, longitude, altitude);
+    }
+    if let Some(Fix { place: [latitude, longitude, altitude], .. }) = written {
         recording.declination_rad = declination::at(latitude, longitude, altitude, None).unwrap_or_default();
     }
     let gnss = recording.origin.map_or(Vec::new(), |origin| aids::gnss(&fixes, &origin, GNSS_DELAY_US));
@@ -87,6 +95,31 @@ pub(crate) fn read(bytes: &[u8], path: &Path) -> Result<Recording, String> {
     }
     beside(path, &mut recording);
     Ok(recording)
+}
+
+/// True if the way of a vehicle is that of its velocity only with latitude and longitude exchanged, as in those of
+/// PX4-ECL's logs that were written in the other order.
+fn are_exchanged(fixes: &[Fix]) -> bool {
+    let (mut way, mut straight, mut exchanged) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let mut flown = [0.0; 2];
+    let Some(first) = fixes.first() else { return false };
+    let local = |order: fn(&[f64; 3]) -> (f64, f64), fix: &Fix| {
+        let (from, to) = (order(&first.place), order(&fix.place));
+        let origin = Origin::new(from.0, from.1, 0.0)?;
+        let place = origin.local(to.0, to.1, 0.0);
+        Some([f64::from(place.x), f64::from(-place.y)])
+    };
+    for (fix, next) in fixes.iter().zip(fixes.iter().skip(1)) {
+        let (Some([north, east, _]), true) = (fix.velocity_m_s, next.arrived_us > fix.arrived_us) else { continue };
+        let dt_s = ((next.arrived_us - fix.arrived_us) as f64 * 1e-6).min(2.0);
+        flown = [flown[0] + north * dt_s, flown[1] + east * dt_s];
+        let off =
+            |place: Option<[f64; 2]>| place.map_or(f64::INFINITY, |[x, y]| libm::hypot(x - flown[0], y - flown[1]));
+        way = way.max(libm::hypot(flown[0], flown[1]));
+        straight = straight.max(off(local(|place| (place[0], place[1]), next)));
+        exchanged = exchanged.max(off(local(|place| (place[1], place[0]), next)));
+    }
+    way > 5.0 && exchanged < 0.3 * way && straight > 0.3 * way && exchanged < 0.5 * straight
 }
 
 /// A file's lines by kind.

@@ -100,6 +100,8 @@ pub struct Recording {
     pub landed: Vec<(u64, bool)>,
     /// Origin of all positions, if there is one.
     pub origin: Option<Origin>,
+    /// Whether the log's own positions are from there, or from an origin that it does not tell.
+    pub knows_origin: bool,
     /// Direction of magnetic north, positive to the east \[rad\].
     pub declination_rad: f32,
     /// Where everything comes from.

@@ -20,6 +20,8 @@ const SETTLED_S: f64 = 10.0;
 const PATIENT_US: u64 = 5_000_000;
 /// Speed at which a vehicle flies, if the log does not tell when it has landed \[m/s\].
 const FLIES_M_S: f32 = 1.0;
+/// Distance at which an origin that is not told must be another than the first fix \[m\].
+const ELSEWHERE_M: f32 = 10.0;
 /// Age of a state in the log from which a start is taken \[us\].
 const FRESH_US: u64 = 200_000;
 
@@ -63,6 +65,8 @@ pub struct Replayed {
     pub figures: Figures,
     /// Ten seconds after the start, or half of what is left then if that is less, or as asked for \[s\].
     pub from_s: f64,
+    /// By how much the log's positions were moved, which do not tell their origin, to agree at that time \[m\].
+    pub moved_m: Option<Vector3<f32>>,
     /// How it started.
     pub start: Start,
     /// What was fused.
@@ -103,7 +107,7 @@ pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOf
         &recording.states
     };
     let mut states = states.iter().skip_while(|state| state.at_us < first_us).peekable();
-    let (mut rows, mut figures) = (Vec::new(), Figures::default());
+    let mut rows = Vec::new();
     let (mut before, mut now_us, mut sampled_us) = (Estimate::default(), first_us, first_us);
     for sample in &recording.imu {
         while now_us + STEP_US < sample.at_us && now_us < sampled_us + WAIT_US {
@@ -114,26 +118,41 @@ pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOf
         let now = run.step(now_us, Some(sample));
         while let Some(logged) = states.next_if(|state| state.at_us <= now_us) {
             let time_s = (logged.at_us - first_us) as f64 * 1e-6;
-            let ours = between(&before, &now, logged.at_us);
-            let from_s = from_s.or(run.began_s().map(settled_s));
-            if let (Some(ours), true) = (&ours, from_s.is_some_and(|from_s| time_s >= from_s)) {
-                figures.add(logged, ours);
-            }
-            rows.push(Row { time_s, ours, logged: *logged });
+            rows.push(Row { time_s, ours: between(&before, &now, logged.at_us), logged: *logged });
         }
         before = now;
     }
-    let began_s = run.began_s().unwrap_or_default();
+    let from_s = from_s.unwrap_or(settled_s(run.began_s().unwrap_or_default()));
+    let moved_m = if recording.knows_origin { None } else { moved(&mut rows, from_s) };
+    let mut figures = Figures::default();
+    for row in rows.iter().filter(|row| row.time_s >= from_s) {
+        if let Some(ours) = &row.ours {
+            figures.add(&row.logged, ours);
+        }
+    }
     Ok(Replayed {
         rows,
         figures,
-        from_s: from_s.unwrap_or(settled_s(began_s)),
+        from_s,
+        moved_m,
         start: run.start,
         aids: *run.memory.aids(),
         dropped: *run.memory.dropped(),
         resets: before.resets,
         imu: before.imu,
     })
+}
+
+/// Moves the log's positions so that they agree with the estimate at the first time that is compared, if they are so
+/// far away then that their origin must be another.
+fn moved(rows: &mut [Row], from_s: f64) -> Option<Vector3<f32>> {
+    let both = |row: &Row| {
+        let ours = row.ours.filter(|ours| ours.validity.position)?;
+        Some(ours.state.position_m - row.logged.position_m?)
+    };
+    let by = rows.iter().filter(|row| row.time_s >= from_s).find_map(both).filter(|by| by.norm() > ELSEWHERE_M)?;
+    rows.iter_mut().filter_map(|row| row.logged.position_m.as_mut()).for_each(|position| *position += by);
+    Some(by)
 }
 
 /// The estimator in the middle of a recording.

@@ -20,7 +20,8 @@ const NOTHING: f64 = i32::MAX as f64;
 /// # Errors
 /// If there is no inertial sensor.
 pub(super) fn recording(tables: &Tables) -> Result<Recording, String> {
-    let mut recording = Recording { format: "PX4 ULog", notes: tables.notes.clone(), ..Recording::default() };
+    let mut recording =
+        Recording { format: "PX4 ULog", notes: tables.notes.clone(), knows_origin: true, ..Recording::default() };
     recording.sources.push(imu(tables, &mut recording.imu)?);
     let fixes = Fixes::read(tables, &mut recording.notes);
     let first = aids::begin(&fixes.fixes).copied();

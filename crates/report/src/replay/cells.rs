@@ -75,6 +75,13 @@ pub(super) fn sentences(replay: &Replay<'_>) -> Vec<String> {
         ));
     }
     said.push(start(replay));
+    if let Some(by) = replayed.moved_m {
+        said.push(format!(
+            "The log does not tell the origin of its positions: they were moved by ({:.1}, {:.1}, {:.1}) m to agree at \
+             the first time compared.",
+            by.x, by.y, by.z
+        ));
+    }
     let Resets { position, velocity, heading, height, tilt, restarts } = replayed.resets;
     said.push(format!(
         "Set anew by the estimator: position {position}, velocity {velocity}, heading {heading}, barometer's offset \
