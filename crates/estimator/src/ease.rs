@@ -1,7 +1,7 @@
 //! Corrections that a controller shall not feel as a jump.
 
 use crate::estimate::Estimate;
-use afbc_control::math::min;
+use afbc_control::math::{max, min, sqrt};
 use afbc_types::State;
 use nalgebra::Vector3;
 
@@ -9,9 +9,12 @@ use nalgebra::Vector3;
 const FALLS: f32 = 0.9;
 /// Time in which what was hidden decays to 1/e \[s\].
 const DECAY_S: f32 = 0.3;
+/// Fastest approach of position \[m/s\] and velocity \[m/s2\]: a receiver that jumps by metres must not look like a gale.
+const MOST_M_S: f32 = 1.0;
+const MOST_M_S2: f32 = 3.0;
 
 /// Hides the jumps of position and velocity when an aid comes back: the state begins where it was, and approaches the
-/// estimate within a second. Corrections of usual size pass as they are, and so do attitude and rates.
+/// estimate within a second, or at 1 m/s and 3 m/s2 from further away. Corrections of usual size pass as they are, and so do attitude and rates.
 ///
 /// The default is that before the first estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -62,8 +65,9 @@ impl Easing {
             return state;
         };
         let dt_s = min(seen.at_us.saturating_sub(last.at_us) as f32 * 1e-6, DECAY_S);
-        let stays = 1.0 - dt_s / DECAY_S;
-        (self.position_m, self.velocity_m_s) = (self.position_m * stays, self.velocity_m_s * stays);
+        let stays = |hidden: &Vector3<f32>, most: f32| 1.0 - dt_s / max(DECAY_S, sqrt(hidden.norm_squared()) / most);
+        self.position_m *= stays(&self.position_m, MOST_M_S);
+        self.velocity_m_s *= stays(&self.velocity_m_s, MOST_M_S2);
         if found(&last, seen) {
             self.position_m += state.position_m - last.position_m - last.velocity_m_s * dt_s;
             self.velocity_m_s += state.velocity_m_s - last.velocity_m_s;
