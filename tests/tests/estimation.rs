@@ -321,7 +321,7 @@ fn consistent_outdoors() {
         assert!((0.981..1.019).contains(&found.nis(Aid::GnssPosition)), "{name}: {}", found.nis(Aid::GnssPosition));
         assert!((0.9..1.019).contains(&found.nis(Aid::GnssVelocity)), "{name}: {}", found.nis(Aid::GnssVelocity));
         assert!((0.98..height).contains(&found.nis(Aid::Height)), "{name}: {}", found.nis(Aid::Height));
-        assert!(found.nis(Aid::Heading) < 0.02, "{name}: {}", found.nis(Aid::Heading));
+        assert!((0.7..1.019).contains(&found.nis(Aid::Heading)), "{name}: {}", found.nis(Aid::Heading));
     }
 }
 
@@ -330,7 +330,7 @@ fn consistent_outdoors() {
 #[test]
 fn hours_of_flight() {
     let hours: f64 = std::env::var("HOURS").map_or(0.1, |hours| hours.parse().unwrap());
-    for (name, sigma_m, degrees) in [("mocap", 0.01, 10.0), ("outdoor", 3.0, f64::INFINITY)] {
+    for (name, sigma_m, nees_max) in [("mocap", 0.01, 10.0), ("outdoor", 3.0, 12.0)] {
         let scenario = Scenario { duration_s: 3600.0 * hours, ..scenario(name) };
         let (mut checks, mut far, mut nees, mut sigmas) = (0.0, Vec::from([0.0; 9]), 0.0, [0.0_f32; 3]);
         let mut turned = Vector3::<f32>::zeros();
@@ -347,11 +347,8 @@ fn hours_of_flight() {
                 (e.position_error_m, e.position_sigma_m),
             ];
             let ratios = pairs.iter().flat_map(|(error, sigma)| error.component_div(sigma).data.0[0]);
-            // The magnetometer's constant error is averaged: the heading is too sure after a minute, and the tilt after
-            // hours. Their errors are bounded.
-            let by_field = name == "outdoor";
             turned = turned.sup(&e.attitude_error_rad.abs());
-            for (i, ratio) in ratios.enumerate().filter(|(i, _)| !(by_field && *i < 3)) {
+            for (i, ratio) in ratios.enumerate() {
                 assert!(ratio.abs() < 6.0, "{name}, {} s, state {i}: {ratio} sigma", sample.time_s);
                 far[i] += f64::from(u8::from(ratio.abs() > 3.0));
             }
@@ -365,6 +362,6 @@ fn hours_of_flight() {
         // One in 370 by chance; errors last for minutes outdoors.
         assert!(far.iter().all(|far| *far <= 10.0 + 0.01 * checks), "{name}: {far:?} of {checks}");
         assert!(sigmas[0] < 0.05 && sigmas[1] < 0.1 && sigmas[2] < sigma_m, "{name}: {sigmas:?}");
-        assert!(nees < degrees && turned.xy().max() < 0.02 && turned.z < 0.12, "{name}: {nees}, {turned} rad");
+        assert!(nees < nees_max && turned.xy().max() < 0.02 && turned.z < 0.12, "{name}: {nees}, {turned} rad");
     }
 }

@@ -85,6 +85,8 @@ pub(crate) struct Aligned {
     pub(crate) heading_variance: Option<f32>,
     /// Heading per rotation about the earth's x and y, if a field told it: its dip makes of a tilt a heading.
     pub(crate) dip: (f32, f32),
+    /// Whether a field told the heading.
+    pub(crate) by_field: bool,
     /// Mean field in the earth frame, if there was one.
     pub(crate) field: Option<Vector3<f32>>,
     /// Variances of the means of rates and specific force, per axis.
@@ -191,6 +193,7 @@ impl Align {
             gyro_bias: self.rates.mean,
             heading_variance: turn.map(|(_, variance, _)| variance),
             dip,
+            by_field: turn.is_some_and(|(_, _, by_field)| by_field),
             field,
             rates_variance: of_mean(&self.rates),
             force_variance: of_mean(&self.force),

@@ -23,7 +23,7 @@
 //! PX4's EKF2. The 16th state, the barometer's offset, is one column more; without it, a filter that averages a
 //! barometer is sure of a height that it cannot know.
 
-use crate::errors::{Block, Coordinate, Errors, Interval, Row, minus_cross, subtract_outer};
+use crate::errors::{Block, Coordinate, Errors, Interval, Row, Slows, minus_cross, subtract_outer};
 use crate::slow::Slow;
 use afbc_control::math::{max, min, sqrt};
 use nalgebra::Vector3;
@@ -245,7 +245,7 @@ impl Covariance {
         };
         let (t, v, p) = (of(&self.tt, THETA), of(&self.vv, VELOCITY), of(&self.pp, POSITION));
         let (g, a, b) = (of(&self.gg, GYRO), of(&self.aa, ACCEL), factor(self.bb, &BARO));
-        self.scale(&Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b, slow: Vector3::zeros() });
+        self.scale(&Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b, slow: Slows::zeros() });
     }
 
     /// Multiplies each error, and with it its row and its column.
@@ -291,7 +291,7 @@ impl Covariance {
             gyro: self.tg.tr_mul(&row.theta),
             accel: self.ta.tr_mul(&row.theta),
             baro: self.tb.dot(&row.theta),
-            slow: Vector3::zeros(),
+            slow: Slows::zeros(),
         };
         if row.velocity != 0.0 {
             let h = row.velocity;

@@ -1,9 +1,13 @@
 //! Errors, the rows that measure them, and the block algebra of their covariances.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3, Vector5};
 
 /// A covariance of two errors of three coordinates.
 pub(crate) type Block = Matrix3<f32>;
+
+/// One number per slow error: of a GNSS receiver's position along x, y, z, of a magnetometer's heading by fields along
+/// body x, y.
+pub(crate) type Slows = Vector5<f32>;
 
 /// One coordinate of a vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,8 +74,8 @@ pub(crate) struct Row {
     pub(crate) accel: Option<Vector3<f32>>,
     /// By the barometer's offset.
     pub(crate) baro: f32,
-    /// Whether the GNSS receiver's slow error at this coordinate comes on top.
-    pub(crate) slow: bool,
+    /// By the slow errors, where they come on top.
+    pub(crate) slow: Option<Slows>,
 }
 
 /// One number per error.
@@ -83,8 +87,8 @@ pub(crate) struct Errors {
     pub(crate) gyro: Vector3<f32>,
     pub(crate) accel: Vector3<f32>,
     pub(crate) baro: f32,
-    /// Of the GNSS receiver's slow error, where it is considered; no gain corrects it.
-    pub(crate) slow: Vector3<f32>,
+    /// Of the slow errors, where they are considered; no gain corrects them.
+    pub(crate) slow: Slows,
 }
 
 impl Errors {
@@ -111,7 +115,7 @@ impl Row {
             + self.gyro.map_or(0.0, |gyro| gyro.dot(&errors.gyro))
             + self.accel.map_or(0.0, |accel| accel.dot(&errors.accel))
             + self.baro * errors.baro
-            + if self.slow { self.coordinate.of(&errors.slow) } else { 0.0 }
+            + self.slow.map_or(0.0, |slow| slow.dot(&errors.slow))
     }
 }
 

@@ -43,6 +43,8 @@ pub struct Estimator {
     /// Its cosine and sine.
     pub(crate) magnetic_north: (f32, f32),
     pub(crate) inclination_error_max: f32,
+    /// Variance of the heading by the vehicle's own field along a body axis.
+    pub(crate) magnetic_variance: f32,
 }
 
 impl Estimator {
@@ -71,6 +73,7 @@ impl Estimator {
             magnetic_north_rad: wrap_angle(-settings.declination_rad),
             magnetic_north: (libm::cosf(settings.declination_rad), -libm::sinf(settings.declination_rad)),
             inclination_error_max: settings.inclination_error_max_rad,
+            magnetic_variance: square(settings.mag_slow_rad),
             settings,
         })
     }
@@ -196,7 +199,7 @@ impl Estimator {
     /// Waits for rest.
     fn align(&self, memory: &mut Memory, sample: &ImuSample) {
         if let Some(aligned) = memory.align.advance(sample, &self.settings) {
-            memory.begin(sample.at_us, &aligned, &self.settings);
+            memory.begin(sample.at_us, &aligned, self);
             memory.nominal.begin(sample);
         }
     }

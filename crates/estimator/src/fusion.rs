@@ -5,7 +5,7 @@
 //! up to the normalised innovation squared of the whole fix.
 
 use crate::aid::{Aid, passes};
-use crate::errors::{Coordinate, Errors};
+use crate::errors::{Coordinate, Errors, Slows};
 use crate::estimator::Estimator;
 use crate::horizon::{Expected, Horizon, Target};
 use crate::measurement::Measurement;
@@ -99,6 +99,9 @@ impl Estimator {
             (Measurement::Gnss { .. }, [Some(part), _]) => {
                 self.divide(memory, part, at_us.saturating_sub(fix_us.unwrap_or(0)));
             }
+            (Measurement::MagneticField { .. }, [Some(_), _]) => {
+                memory.covariance.slow.magnetize(self.magnetic_variance);
+            }
             (Measurement::Pose { position_m, attitude, .. }, [Some(_), _])
                 if self.is_frozen(memory, position_m, attitude, at_us) =>
             {
@@ -181,7 +184,10 @@ impl Estimator {
         let Some((innovation, mut row)) = horizon.row(&part.target, coordinate, &expected) else {
             return false;
         };
-        row.slow = part.is_slow();
+        if part.is_slow() {
+            let unit = coordinate.unit();
+            row.slow = Some(Slows::new(unit.x, unit.y, unit.z, 0.0, 0.0));
+        }
         let y = memory.covariance.times(&row);
         let hph = max(row.dot(&y), 0.0);
         let r = match &part.target {
@@ -207,7 +213,7 @@ impl Estimator {
                     gyro: y.gyro,
                     accel: zero,
                     baro: 0.0,
-                    slow: zero,
+                    slow: Slows::zeros(),
                 };
                 let k = k.scaled(1.0 / s);
                 memory.covariance.fuse_with(&k, &y, s);
@@ -273,7 +279,7 @@ impl Estimator {
                 if !memory.knows.heading {
                     // As good as roll and pitch are: they mix with it.
                     let variance = part.variance.z + max(variances.theta.x, variances.theta.y);
-                    memory.reset_heading(twist(attitude, &past.attitude), variance);
+                    memory.reset_heading(twist(attitude, &past.attitude), variance, None);
                     self.accept(memory, at_us, part);
                     return false;
                 }
@@ -303,7 +309,7 @@ impl Estimator {
                     let slope = field.z * field.z / max(field.x * field.x + field.y * field.y, 1e-3 * strength);
                     let variance = field_variance(&field, part.variance.x)
                         + min(slope, 100.0) * max(variances.theta.x, variances.theta.y);
-                    memory.reset_heading(turn, variance);
+                    memory.reset_heading(turn, variance, Some(self.magnetic_north));
                     self.accept(memory, at_us, part);
                     return false;
                 }
@@ -311,7 +317,7 @@ impl Estimator {
             }
             Target::Heading(heading) => {
                 if !memory.knows.heading {
-                    memory.reset_heading(wrap_angle(heading - horizon.heading()), part.variance.x);
+                    memory.reset_heading(wrap_angle(heading - horizon.heading()), part.variance.x, None);
                     self.accept(memory, at_us, part);
                     return false;
                 }
@@ -377,16 +383,16 @@ impl Estimator {
                     return;
                 }
                 let tilt = memory.covariance.tt;
-                memory.reset_heading(turn, part.variance.z + max(tilt.m11, tilt.m22));
+                memory.reset_heading(turn, part.variance.z + max(tilt.m11, tilt.m22), None);
             }
             Target::Height(height) => memory.reset_height_offset(height - past.position.z, part.variance.x),
             Target::Field(field) => {
                 let direction = horizon.field(field);
                 let turn = wrap_angle(self.magnetic_north_rad - atan2(direction.y, direction.x));
-                memory.reset_heading(turn, field_variance(&direction, part.variance.x));
+                memory.reset_heading(turn, field_variance(&direction, part.variance.x), Some(self.magnetic_north));
             }
             Target::Heading(heading) => {
-                memory.reset_heading(wrap_angle(heading - horizon.heading()), part.variance.x);
+                memory.reset_heading(wrap_angle(heading - horizon.heading()), part.variance.x, None);
             }
         }
         self.accept(memory, at_us, part);

@@ -14,10 +14,10 @@
 //! the noise of the inertial sensors in between. Left out are the terms of the gyroscope's bias in v and p, 5e-5 m/s
 //! for 1e-3 rad/s and 100 ms, and that of the accelerometer's in p, 1e-4 m for 0.02 m/s2 and 100 ms.
 
-use crate::errors::{Coordinate, Row};
+use crate::errors::{Coordinate, Row, Slows};
 use crate::history::{Past, way};
 use crate::rotation::{atan2, difference, matrix};
-use afbc_control::math::wrap_angle;
+use afbc_control::math::{max, sqrt, wrap_angle};
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
 /// What a scalar measures.
@@ -99,7 +99,7 @@ impl Horizon {
             gyro: None,
             accel: None,
             baro: 0.0,
-            slow: false,
+            slow: None,
         };
         // An angle: the error's product with `theta`.
         let angle = |innovation: f32, theta: Vector3<f32>| {
@@ -127,7 +127,8 @@ impl Horizon {
                 // The Jacobian of the expected field: that of the measured one has its noise, which would tell a tilt.
                 let theta = upright(&expected.field)?;
                 let north = atan2(expected.field.y, expected.field.x);
-                Some(angle(wrap_angle(north - atan2(field.y, field.x)), theta))
+                let (innovation, row) = angle(wrap_angle(north - atan2(field.y, field.x)), theta);
+                Some((innovation, Row { slow: Some(magnetic(&self.rotation, &expected.field)), ..row }))
             }
             Target::Heading(heading) => {
                 let nose = Vector3::new(self.rotation.m11, self.rotation.m21, self.rotation.m31);
@@ -141,6 +142,13 @@ impl Horizon {
         let unit = at.unit();
         Row { theta: self.distance.cross(&unit), velocity: -self.tau_s, position: 1.0, ..none }
     }
+}
+
+/// What fields along body x and y, in shares of the earth's horizontal field, make of the direction of `north`.
+pub(crate) fn magnetic(rotation: &Matrix3<f32>, north: &Vector3<f32>) -> Slows {
+    let across = Vector3::new(north.y, -north.x, 0.0) * (1.0 / sqrt(max(north.x * north.x + north.y * north.y, 1e-12)));
+    let body = rotation.tr_mul(&across);
+    Slows::new(0.0, 0.0, 0.0, body.x, body.y)
 }
 
 /// Change of the direction of a vector's horizontal part by a rotation of the earth frame; `None` within 10 degrees of

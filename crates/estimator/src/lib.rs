@@ -32,8 +32,8 @@
 //! 2017; PX4's EKF2; Mueller, Hamer, D'Andrea, *Fusing ultra-wideband range measurements with accelerometers and rate
 //! gyroscopes for quadrocopter state estimation*, ICRA 2015, which the Crazyflie flies). The [nominal state](nominal)
 //! follows every sample of the inertial sensors. Its error is small, so it is estimated linearly: 15 errors (rotation,
-//! velocity, position, biases of gyroscope and accelerometer) and a 16th, the barometer's offset; three more, a GNSS
-//! receiver's [slow error](slow), are considered without being estimated. [Their
+//! velocity, position, biases of gyroscope and accelerometer) and a 16th, the barometer's offset; five more, the
+//! [slow errors](slow) of a GNSS receiver and of a magnetometer, are considered without being estimated. [Their
 //! covariance](covariance) is predicted every 4 ms from what the samples since then add up to, block by block, since
 //! most of the transition matrix is zeros and ones.
 //!
@@ -70,7 +70,9 @@
 //!   corrects the offset's drift and the barometer the receiver's noise; without either of these two, the barometer
 //!   holds the height, and the standard deviation grows with the offset's random walk.
 //! * The **magnetometer** corrects the heading and the gyroscope's bias, nothing else: a disturbed field cannot tilt
-//!   the vehicle. A field whose strength or inclination is not that of the start is not used.
+//!   the vehicle. What iron and currents of the vehicle add to the field, [`Settings::mag_slow_rad`], is a slow error
+//!   too: further fields do not average it, and the heading is as good as that. A field whose strength or inclination
+//!   is not that of the start is not used.
 //! * A **heading** that neither tracker nor magnetometer tells follows from the motion once the vehicle accelerates,
 //!   but never counts as valid: an error of nearly half a turn may stay, with a small standard deviation.
 //! * **At rest on the ground** ([`Memory::set_on_ground`]) the velocity is held at zero. In the air without any aid for

@@ -2,14 +2,17 @@
 
 use crate::align::Aligned;
 use crate::covariance::{Covariance, angle_variance};
-use crate::errors::{Coordinate, Errors};
+use crate::errors::{Errors, Slows};
 use crate::estimate::Sigmas;
+use crate::estimator::Estimator;
 use crate::history::Past;
+use crate::horizon::magnetic;
 use crate::memory::{Known, Memory, NO_INTERVAL};
 use crate::nominal::Nominal;
 use crate::queue::Part;
 use crate::rotation::{about_z, identity, matrix, normalized};
 use crate::settings::Settings;
+use crate::slow::of_gnss;
 use afbc_control::math::{abs_max, max};
 use afbc_types::State;
 use nalgebra::{Matrix3, Quaternion, Vector3};
@@ -30,7 +33,15 @@ const DOUBT_M_S2: f32 = 0.2;
 /// Keeps all errors.
 const KEEP: Errors = {
     const ONES: Vector3<f32> = Vector3::new(1.0, 1.0, 1.0);
-    Errors { theta: ONES, velocity: ONES, position: ONES, gyro: ONES, accel: ONES, baro: 1.0, slow: NONE }
+    Errors {
+        theta: ONES,
+        velocity: ONES,
+        position: ONES,
+        gyro: ONES,
+        accel: ONES,
+        baro: 1.0,
+        slow: Slows::new(1.0, 1.0, 1.0, 1.0, 1.0),
+    }
 };
 const NONE: Vector3<f32> = Vector3::new(0.0, 0.0, 0.0);
 
@@ -49,7 +60,8 @@ fn count(number: &mut u32) {
 
 impl Memory {
     /// Starts at rest.
-    pub(crate) fn begin(&mut self, now_us: u64, aligned: &Aligned, settings: &Settings) {
+    pub(crate) fn begin(&mut self, now_us: u64, aligned: &Aligned, estimator: &Estimator) {
+        let settings = &estimator.settings;
         let Settings { gravity_m_s2: gravity, accel_bias_m_s2: bias, .. } = *settings;
         let mut nominal = Nominal::new(aligned.attitude);
         nominal.gyro_bias = aligned.gyro_bias;
@@ -61,8 +73,10 @@ impl Memory {
         let by_bias = Matrix3::from_rows(&[x, y, -(x * dip_x + y * dip_y)]);
         // What is of the second order: the bias along z changes the divisor, the heading's error the direction.
         let share = bias * bias / (gravity * gravity);
+        let own = if aligned.by_field { estimator.magnetic_variance } else { 0.0 };
+        let turned = aligned.heading_variance.unwrap_or(0.0) + own;
         let dips = 1.0 + dip_x * dip_x + dip_y * dip_y;
-        let second = share * (share + aligned.heading_variance.unwrap_or(0.0) + dips * share) + LEVEL;
+        let second = share * (share + turned + dips * share) + LEVEL;
         let of_mean = |noise: f32, seen: f32| max(noise * noise / aligned.time_s, seen);
         let tilt = of_mean(settings.accel_noise_m_s2_rthz, aligned.force_variance) / (gravity * gravity) + second;
         let heading = aligned.heading_variance.unwrap_or(ANY_ANGLE) + second * dips;
@@ -80,6 +94,10 @@ impl Memory {
         self.knows = Known { heading: aligned.heading_variance.is_some(), ..Known::default() };
         self.field = aligned.field.and_then(|field| reference(&field));
         self.run(now_us, nominal);
+        if aligned.by_field {
+            self.covariance.slow.magnetize(estimator.magnetic_variance);
+            self.point(estimator.magnetic_north);
+        }
     }
 
     /// Starts in the state `state`, known as well as `sigmas` say, which are limited to what is possible.
@@ -171,13 +189,17 @@ impl Memory {
         (c.tp, c.vp, c.pg, c.pa) = (c.tv * tau_s, c.vv * tau_s, c.vg * tau_s, c.va * tau_s);
         c.slow.position = c.slow.velocity * tau_s;
         if part.is_slow() {
-            c.pp += diagonal(&c.slow.variance);
-            c.slow.position -= diagonal(&c.slow.variance);
-            c.pp -= (c.slow.velocity + c.slow.velocity.transpose()) * tau_s;
-            c.tp -= c.slow.theta;
-            c.vp -= c.slow.velocity;
-            c.pg -= c.slow.gyro.transpose();
-            c.pa -= c.slow.accel.transpose();
+            let variance = c.slow.gnss_variance();
+            c.pp += diagonal(&variance);
+            c.slow.position.m11 -= variance.x;
+            c.slow.position.m22 -= variance.y;
+            c.slow.position.m33 -= variance.z;
+            let velocity = of_gnss(&c.slow.velocity);
+            c.pp -= (velocity + velocity.transpose()) * tau_s;
+            c.tp -= of_gnss(&c.slow.theta);
+            c.vp -= velocity;
+            c.pg -= of_gnss(&c.slow.gyro).transpose();
+            c.pa -= of_gnss(&c.slow.accel).transpose();
         }
         c.hold();
         self.knows.position = true;
@@ -195,8 +217,9 @@ impl Memory {
         self.covariance.hold();
     }
 
-    /// Turns the heading by `by`, and takes `variance` for it.
-    pub(crate) fn reset_heading(&mut self, by: f32, variance: f32) {
+    /// Turns the heading by `by`, and takes `variance` for it; if a field told it, whose north is told here, the
+    /// vehicle's own field comes on top.
+    pub(crate) fn reset_heading(&mut self, by: f32, variance: f32, north: Option<(f32, f32)>) {
         count(&mut self.resets.heading);
         let turn = about_z(by);
         self.nominal.turn_to(normalized(&(turn * self.nominal.attitude)));
@@ -205,6 +228,9 @@ impl Memory {
         self.covariance.turn(&matrix(&turn));
         self.covariance.forget(&Errors { theta: Vector3::new(1.0, 1.0, 0.0), ..KEEP });
         self.covariance.tt.m33 = variance;
+        if let Some(north) = north {
+            self.point(north);
+        }
         self.knows.heading = true;
         self.covariance.hold();
     }
@@ -220,8 +246,15 @@ impl Memory {
         (c.tb, c.vb, c.pb) = (of_z(&c.tp), of_z(&c.vp), of_z(&c.pp));
         (c.gb, c.ab) = (of_z(&c.pg.transpose()), of_z(&c.pa.transpose()));
         c.bb = c.pp.m33 + variance;
-        c.slow.baro = -Coordinate::Z.row(&c.slow.position);
+        c.slow.baro = -c.slow.position.row(2).transpose();
         c.hold();
+    }
+
+    /// Adds to the heading, which a field has told, the error of the vehicle's own.
+    fn point(&mut self, (x, y): (f32, f32)) {
+        let row = magnetic(&self.nominal.rotation, &Vector3::new(x, y, 0.0));
+        self.covariance.tt.m33 += self.covariance.slow.of_row(&row);
+        self.covariance.slow.point(&row);
     }
 
     /// Doubts roll and pitch, after the second reset in a row.

@@ -45,6 +45,11 @@ parameters! {
         /// Correlation time of that slow error.
         #[parameter(GNSS_SLOW, "s", 1.0..=1e5)]
         pub gnss_slow_s: f32 = 120.0,
+        /// Heading error by what iron, magnets and currents of the vehicle add to the field, standard deviation along
+        /// each of body x and y. It stays, and is not averaged; the standard deviation that a magnetometer tells is
+        /// its noise alone.
+        #[parameter(MAG_SLOW, "rad", 0.0..=1.0)]
+        pub mag_slow_rad: f32 = 0.05,
         /// Time of identical poses or positions after which a tracker counts as frozen, and is not believed; 0 for
         /// never.
         #[parameter(FROZEN, "s", 0.0..=10.0)]

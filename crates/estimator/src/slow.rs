@@ -1,51 +1,106 @@
-//! The slow error of a GNSS receiver: considered, not estimated.
+//! Slow errors of sensors: considered, not estimated.
 //!
-//! A receiver's position is off by noise and by an error d that stays from fix to fix and changes within minutes. A
-//! filter that takes d for noise averages it, and is soon sure of a position that it does not know. Here d is a
-//! consider state (Schmidt; Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, section 8.4): a first-order
-//! Gauss-Markov process per coordinate, whose variance D is the receiver's and stays, and whose estimate is zero. What
-//! is kept is the covariance X of the filter's errors with d. A fix then measures p + d + noise with what is known of
-//! both; the position's variance never falls to that of an average, and its innovations have the noise alone.
+//! A GNSS receiver's position is off by noise and by an error d that stays from fix to fix and changes within minutes.
+//! A magnetometer's heading is off by noise and by what iron, magnets and currents of the vehicle add to the field, two
+//! numbers f along body x and y, in shares of the earth's horizontal field, which stay. A filter that takes d or f for
+//! noise averages it, and is soon sure of what it does not know. Here both are consider states (Schmidt; Jazwinski,
+//! *Stochastic Processes and Filtering Theory*, 1970, section 8.4): d a first-order Gauss-Markov process per
+//! coordinate, f constant, of a variance D which is told and stays, and with zero for an estimate. What is kept is the
+//! covariance X of the filter's errors with them. A fix then measures p + d + noise, a field the heading, f's share
+//! across it and noise, with what is known of both; a variance never falls to that of an average, and innovations have
+//! the noise alone, and what the slow error has changed by: for the heading, since the vehicle has turned.
 
-use crate::errors::{Block, Errors, Interval, Row, minus_cross, subtract_outer};
-use nalgebra::Vector3;
+use crate::errors::{Block, Errors, Interval, Row, Slows};
+use nalgebra::{Matrix3x5, Vector3};
 
-/// Variances of the slow error and its covariances with the errors; each column belongs to a coordinate of d.
+/// Covariances of an error of three coordinates with the slow errors.
+pub(crate) type Columns = Matrix3x5<f32>;
+
+/// Variances of the slow errors, x, y, z of d and x, y of f, and their covariances with the errors, a column each.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Slow {
-    /// Diagonal of D; zero as long as no receiver has such an error, and then all else is zero too.
-    pub(crate) variance: Vector3<f32>,
-    pub(crate) theta: Block,
-    pub(crate) velocity: Block,
-    pub(crate) position: Block,
-    pub(crate) gyro: Block,
-    pub(crate) accel: Block,
-    pub(crate) baro: Vector3<f32>,
+    /// Diagonal of D; zero as long as no sensor has such an error, and then all else is zero too.
+    pub(crate) variance: Slows,
+    pub(crate) theta: Columns,
+    pub(crate) velocity: Columns,
+    pub(crate) position: Columns,
+    pub(crate) gyro: Columns,
+    pub(crate) accel: Columns,
+    pub(crate) baro: Slows,
 }
 
-const ONES: Vector3<f32> = Vector3::new(1.0, 1.0, 1.0);
+/// Multiplies rows.
+fn scale(m: &mut Columns, by: &Vector3<f32>) {
+    m.column_iter_mut().for_each(|mut column| column.component_mul_assign(by));
+}
 
-/// Multiplies rows by `x` and columns by `y`.
-fn scale(m: &mut Block, x: &Vector3<f32>, y: &Vector3<f32>) {
-    m.component_mul_assign(&(x * y.transpose()));
+/// -s x, column by column.
+#[inline]
+fn minus_cross(s: &Vector3<f32>, m: &Columns) -> Columns {
+    Columns::new(
+        s.z * m.m21 - s.y * m.m31,
+        s.z * m.m22 - s.y * m.m32,
+        s.z * m.m23 - s.y * m.m33,
+        s.z * m.m24 - s.y * m.m34,
+        s.z * m.m25 - s.y * m.m35,
+        s.x * m.m31 - s.z * m.m11,
+        s.x * m.m32 - s.z * m.m12,
+        s.x * m.m33 - s.z * m.m13,
+        s.x * m.m34 - s.z * m.m14,
+        s.x * m.m35 - s.z * m.m15,
+        s.y * m.m11 - s.x * m.m21,
+        s.y * m.m12 - s.x * m.m22,
+        s.y * m.m13 - s.x * m.m23,
+        s.y * m.m14 - s.x * m.m24,
+        s.y * m.m15 - s.x * m.m25,
+    )
+}
+
+/// The columns of d.
+pub(crate) fn of_gnss(m: &Columns) -> Block {
+    Block::new(m.m11, m.m12, m.m13, m.m21, m.m22, m.m23, m.m31, m.m32, m.m33)
 }
 
 impl Slow {
     /// True if there is none.
     #[inline]
     pub(crate) fn is_none(&self) -> bool {
-        self.variance == Vector3::zeros()
+        self.variance == Slows::zeros()
     }
 
     /// Takes the variances of a new fix, since the last of which d has kept `share` of itself. A smaller variance than
     /// before is that of an error which is partly another one.
     pub(crate) fn follow(&mut self, variance: &Vector3<f32>, share: f32) {
-        let kept = variance.zip_map(&self.variance, |new, old| if new < old { share * (new / old) } else { share });
-        for block in [&mut self.theta, &mut self.velocity, &mut self.position, &mut self.gyro, &mut self.accel] {
-            scale(block, &ONES, &kept);
+        let kept =
+            variance.zip_map(&self.gnss_variance(), |new, old| if new < old { share * (new / old) } else { share });
+        for m in [&mut self.theta, &mut self.velocity, &mut self.position, &mut self.gyro, &mut self.accel] {
+            for (mut column, kept) in m.column_iter_mut().zip(&kept) {
+                column *= *kept;
+            }
         }
-        self.baro.component_mul_assign(&kept);
-        self.variance = *variance;
+        self.baro.iter_mut().zip(&kept).for_each(|(baro, kept)| *baro *= kept);
+        self.variance.iter_mut().zip(variance).for_each(|(old, new)| *old = *new);
+    }
+
+    /// Variances of d.
+    pub(crate) fn gnss_variance(&self) -> Vector3<f32> {
+        self.variance.fixed_rows::<3>(0).into_owned()
+    }
+
+    /// Takes the variance of each coordinate of f.
+    pub(crate) fn magnetize(&mut self, variance: f32) {
+        (self.variance.w, self.variance.a) = (variance, variance);
+    }
+
+    /// Takes the heading from a field that measures f by `row`: its error is what f makes of it.
+    pub(crate) fn point(&mut self, row: &Slows) {
+        let by = -row.component_mul(&self.variance);
+        self.theta.row_mut(2).copy_from(&by.transpose());
+    }
+
+    /// Variance that the slow errors add to what measures them by `row`, by itself.
+    pub(crate) fn of_row(&self, row: &Slows) -> f32 {
+        row.component_mul(&self.variance).dot(row)
     }
 
     /// X = F X, as the covariance's own prediction.
@@ -70,27 +125,28 @@ impl Slow {
 
     /// Multiplies each error.
     pub(crate) fn scale(&mut self, by: &Errors) {
-        scale(&mut self.theta, &by.theta, &ONES);
-        scale(&mut self.velocity, &by.velocity, &ONES);
-        scale(&mut self.position, &by.position, &ONES);
-        scale(&mut self.gyro, &by.gyro, &ONES);
-        scale(&mut self.accel, &by.accel, &ONES);
+        scale(&mut self.theta, &by.theta);
+        scale(&mut self.velocity, &by.velocity);
+        scale(&mut self.position, &by.position);
+        scale(&mut self.gyro, &by.gyro);
+        scale(&mut self.accel, &by.accel);
         self.baro *= by.baro;
     }
 
-    /// Completes `y` = P h by X h of d and, if the row measures d, by the errors' covariances with it.
+    /// Completes `y` = P h by X h of the slow errors and, if the row measures them, by the errors' covariances with
+    /// them.
     #[inline]
     pub(crate) fn complete(&self, row: &Row, y: &mut Errors) {
         if self.is_none() {
             return;
         }
-        let at = row.coordinate;
+        let at = row.coordinate.unit();
         y.slow = self.theta.tr_mul(&row.theta);
         if row.velocity != 0.0 {
-            y.slow += at.row(&self.velocity) * row.velocity;
+            y.slow += self.velocity.tr_mul(&at) * row.velocity;
         }
         if row.position != 0.0 {
-            y.slow += at.row(&self.position) * row.position;
+            y.slow += self.position.tr_mul(&at) * row.position;
         }
         if let Some(h) = &row.gyro {
             y.slow += self.gyro.tr_mul(h);
@@ -101,33 +157,39 @@ impl Slow {
         if row.baro != 0.0 {
             y.slow += self.baro * row.baro;
         }
-        if row.slow {
-            y.theta += at.column(&self.theta);
-            y.velocity += at.column(&self.velocity);
-            y.position += at.column(&self.position);
-            y.gyro += at.column(&self.gyro);
-            y.accel += at.column(&self.accel);
-            y.baro += at.of(&self.baro);
-            y.slow += at.unit() * at.of(&self.variance);
+        if let Some(h) = &row.slow {
+            y.theta += self.theta * h;
+            y.velocity += self.velocity * h;
+            y.position += self.position * h;
+            y.gyro += self.gyro * h;
+            y.accel += self.accel * h;
+            y.baro += self.baro.dot(h);
+            y.slow += self.variance.component_mul(h);
         }
     }
 
-    /// Subtracts k y' of d: a gain that leaves d as it is.
+    /// Subtracts k y' of the slow errors: a gain that leaves them as they are.
     #[inline]
     pub(crate) fn subtract(&mut self, k: &Errors, y: &Errors) {
         if self.is_none() {
             return;
         }
-        subtract_outer(&mut self.theta, &k.theta, &y.slow);
-        subtract_outer(&mut self.velocity, &k.velocity, &y.slow);
-        subtract_outer(&mut self.position, &k.position, &y.slow);
-        subtract_outer(&mut self.gyro, &k.gyro, &y.slow);
-        subtract_outer(&mut self.accel, &k.accel, &y.slow);
+        let outer = |m: &mut Columns, x: &Vector3<f32>| {
+            for (mut column, y) in m.column_iter_mut().zip(&y.slow) {
+                column -= x * *y;
+            }
+        };
+        outer(&mut self.theta, &k.theta);
+        outer(&mut self.velocity, &k.velocity);
+        outer(&mut self.position, &k.position);
+        outer(&mut self.gyro, &k.gyro);
+        outer(&mut self.accel, &k.accel);
         self.baro -= y.slow * k.baro;
     }
 
     /// Variance that d adds to a position of `tau_s` ago, its covariance with it included.
     pub(crate) fn of_position(&self, tau_s: f32) -> Vector3<f32> {
-        self.variance + (self.position.diagonal() - self.velocity.diagonal() * tau_s) * 2.0
+        let along = |m: &Columns| Vector3::new(m.m11, m.m22, m.m33);
+        self.gnss_variance() + (along(&self.position) - along(&self.velocity) * tau_s) * 2.0
     }
 }

@@ -4,34 +4,36 @@
 extern crate std;
 
 use crate::covariance::{Covariance, Growth};
-use crate::errors::{Coordinate, Errors, Interval, Row};
+use crate::errors::{Coordinate, Errors, Interval, Row, Slows};
 use crate::history::{History, Past};
-use crate::horizon::{Expected, Horizon, Target};
+use crate::horizon::{Expected, Horizon, Target, magnetic};
+use crate::memory::Memory;
 use crate::slow::Slow;
 use nalgebra::{Matrix3, Quaternion, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use std::vec::Vec;
 
-/// The filter's 16 errors, and a receiver's slow error.
-type M19 = SMatrix<f64, 19, 19>;
-type V19 = SVector<f64, 19>;
+/// The filter's 16 errors, the slow ones of a receiver and of a magnetometer.
+type M21 = SMatrix<f64, 21, 21>;
+type V21 = SVector<f64, 21>;
 type V3 = Vector3<f64>;
 
-/// Typical sizes of the errors, by three; the last are the barometer's offset and the slow error.
+/// Typical sizes of the errors, by three; then the barometer's offset, and the slow errors.
 const SIZES: [f64; 5] = [0.02, 0.3, 0.5, 0.003, 0.08];
 
 fn size(i: usize) -> f64 {
     match i {
         0..15 => SIZES[i / 3],
         15 => 0.4,
-        _ => 1.2,
+        16..19 => 1.2,
+        _ => 0.05,
     }
 }
 
 /// Blocks of a matrix.
-fn blocks(p: &M19) -> Covariance {
+fn blocks(p: &M21) -> Covariance {
     let block = |i: usize, j: usize| p.fixed_view::<3, 3>(3 * i, 3 * j).map(|x| x as f32).into_owned();
-    let slow = |i: usize| p.fixed_view::<3, 3>(3 * i, 16).map(|x| x as f32).into_owned();
+    let slow = |i: usize| p.fixed_view::<3, 5>(3 * i, 16).map(|x| x as f32).into_owned();
     let column = |i: usize| p.fixed_view::<3, 1>(3 * i, 15).map(|x| x as f32).into_owned();
     Covariance {
         tt: block(0, 0),
@@ -56,18 +58,18 @@ fn blocks(p: &M19) -> Covariance {
         ab: column(4),
         bb: p[(15, 15)] as f32,
         slow: Slow {
-            variance: Vector3::from_fn(|i, _| p[(16 + i, 16 + i)] as f32),
+            variance: Slows::from_fn(|i, _| p[(16 + i, 16 + i)] as f32),
             theta: slow(0),
             velocity: slow(1),
             position: slow(2),
             gyro: slow(3),
             accel: slow(4),
-            baro: Vector3::from_fn(|i, _| p[(15, 16 + i)] as f32),
+            baro: Slows::from_fn(|i, _| p[(15, 16 + i)] as f32),
         },
     }
 }
 
-fn dense(p: &Covariance) -> M19 {
+fn dense(p: &Covariance) -> M21 {
     let rows = p.rows();
     let slow = [&p.slow.theta, &p.slow.velocity, &p.slow.position, &p.slow.gyro, &p.slow.accel];
     let with_slow = |i: usize, j: usize| match i {
@@ -76,15 +78,15 @@ fn dense(p: &Covariance) -> M19 {
         _ if i == 16 + j => p.slow.variance[j],
         _ => 0.0,
     };
-    M19::from_fn(|i, j| {
+    M21::from_fn(|i, j| {
         let (i, j) = (i.min(j), i.max(j));
         f64::from(if j < 16 { rows[i][j] } else { with_slow(i, j - 16) })
     })
 }
 
-fn dense_errors(e: &Errors) -> V19 {
+fn dense_errors(e: &Errors) -> V21 {
     let parts = [e.theta, e.velocity, e.position, e.gyro, e.accel];
-    V19::from_fn(|i, _| {
+    V21::from_fn(|i, _| {
         f64::from(match i {
             0..15 => parts[i / 3][i % 3],
             15 => e.baro,
@@ -93,7 +95,7 @@ fn dense_errors(e: &Errors) -> V19 {
     })
 }
 
-fn dense_row(row: &Row) -> V19 {
+fn dense_row(row: &Row) -> V21 {
     let none = Vector3::zeros();
     let at = row.coordinate.unit();
     dense_errors(&Errors {
@@ -103,14 +105,14 @@ fn dense_row(row: &Row) -> V19 {
         gyro: row.gyro.unwrap_or(none),
         accel: row.accel.unwrap_or(none),
         baro: row.baro,
-        slow: if row.slow { at } else { none },
+        slow: row.slow.unwrap_or_default(),
     })
 }
 
 /// Largest difference, element by element, in shares of the product of both standard deviations.
-fn difference(ours: &M19, theirs: &M19) -> f64 {
+fn difference(ours: &M21, theirs: &M21) -> f64 {
     let of = |i, j| (ours[(i, j)] - theirs[(i, j)]).abs() / (theirs[(i, i)] * theirs[(j, j)]).sqrt();
-    (0..19).flat_map(|i| (0..19).map(move |j| (i, j))).map(|(i, j)| of(i, j)).fold(0.0, f64::max)
+    (0..21).flat_map(|i| (0..21).map(move |j| (i, j))).map(|(i, j)| of(i, j)).fold(0.0, f64::max)
 }
 
 fn numbers<const N: usize>() -> impl Strategy<Value = [f64; N]> {
@@ -118,15 +120,15 @@ fn numbers<const N: usize>() -> impl Strategy<Value = [f64; N]> {
 }
 
 /// A positive matrix of errors of the usual sizes, rounded to what the filter can hold.
-fn covariance() -> impl Strategy<Value = M19> {
-    proptest::collection::vec(-1.0..1.0_f64, 19 * 19).prop_map(|x| {
-        // The slow error's coordinates are independent of each other.
-        let mut a = M19::from_iterator(x) + M19::identity();
-        a.fixed_rows_mut::<3>(16).fill(0.0);
-        (16..19).for_each(|i| a[(i, i)] = 1.5);
+fn covariance() -> impl Strategy<Value = M21> {
+    proptest::collection::vec(-1.0..1.0_f64, 21 * 21).prop_map(|x| {
+        // The slow errors are independent of each other.
+        let mut a = M21::from_iterator(x) + M21::identity();
+        a.fixed_rows_mut::<5>(16).fill(0.0);
+        (16..21).for_each(|i| a[(i, i)] = 1.5);
         let b = a * a.transpose() / 6.0;
-        let floor = V19::from_fn(|i, _| if i < 16 { 0.03 } else { 0.0 });
-        let p = M19::from_fn(|i, j| size(i) * size(j) * (b[(i, j)] + if i == j { floor[i] } else { 0.0 }));
+        let floor = V21::from_fn(|i, _| if i < 16 { 0.03 } else { 0.0 });
+        let p = M21::from_fn(|i, j| size(i) * size(j) * (b[(i, j)] + if i == j { floor[i] } else { 0.0 }));
         dense(&blocks(&p))
     })
 }
@@ -136,8 +138,9 @@ fn vector([x, y, z]: [f64; 3]) -> V3 {
 }
 
 fn row() -> impl Strategy<Value = Row> {
-    (numbers::<3>(), numbers::<3>(), numbers::<3>(), numbers::<3>(), 0..3_usize, any::<[bool; 6]>()).prop_map(
-        |(theta, gyro, accel, [v, p, b], coordinate, on)| {
+    let slow = numbers::<5>();
+    (numbers::<3>(), numbers::<3>(), numbers::<3>(), numbers::<3>(), slow, 0..3_usize, any::<[bool; 6]>()).prop_map(
+        |(theta, gyro, accel, [v, p, b], slow, coordinate, on)| {
             let single = |x: [f64; 3]| vector(x).map(|x| x as f32);
             let number = |x: f64, on: bool| if on { x as f32 } else { 0.0 };
             Row {
@@ -148,15 +151,15 @@ fn row() -> impl Strategy<Value = Row> {
                 gyro: on[2].then(|| single(gyro)),
                 accel: on[3].then(|| single(accel)),
                 baro: number(b, on[4]),
-                slow: on[5],
+                slow: on[5].then(|| Slows::from_fn(|i, _| slow[i] as f32)),
             }
         },
     )
 }
 
 /// The transition as a dense matrix.
-fn transition(interval: &Interval) -> M19 {
-    let mut f = M19::identity();
+fn transition(interval: &Interval) -> M21 {
+    let mut f = M21::identity();
     let t = f64::from(interval.time_s);
     let c = interval.turn.map(f64::from);
     let s = interval.thrust.map(f64::from).cross_matrix();
@@ -182,7 +185,7 @@ proptest! {
         };
         let f = transition(&interval);
         let growth = [GROWTH.theta, GROWTH.velocity, 0.0, GROWTH.gyro, GROWTH.accel, GROWTH.baro];
-        let q = M19::from_diagonal(&V19::from_fn(|i, _| if i < 16 { f64::from(growth[i / 3]) * t } else { 0.0 }));
+        let q = M21::from_diagonal(&V21::from_fn(|i, _| if i < 16 { f64::from(growth[i / 3]) * t } else { 0.0 }));
         let mut ours = blocks(&p);
         ours.predict(&interval, &GROWTH);
         let theirs = f * p * f.transpose() + q;
@@ -196,26 +199,26 @@ proptest! {
         let s = h.dot(&(p * h)) + variance;
         let ours = blocks(&p);
         let y = ours.times(&row);
-        let scale = V19::from_fn(|i, _| p[(i, i)].sqrt());
+        let scale = V21::from_fn(|i, _| p[(i, i)].sqrt());
         let off = (dense_errors(&y) - p * h).component_div(&scale).norm();
         prop_assert!(off < 1e-5 * s.sqrt(), "P h: {off}");
         prop_assert!((f64::from(row.dot(&y)) + variance - s).abs() < 1e-5 * s, "h P h");
-        let joseph = |k: &V19| {
-            let i = M19::identity() - k * h.transpose();
+        let joseph = |k: &V21| {
+            let i = M21::identity() - k * h.transpose();
             i * p * i.transpose() + k * k.transpose() * variance
         };
         // The optimal gain.
         let mut optimal = ours;
         optimal.fuse(&y, s as f32);
-        let considered = |k: V19| V19::from_fn(|i, _| if i < 16 { k[i] } else { 0.0 });
+        let considered = |k: V21| V21::from_fn(|i, _| if i < 16 { k[i] } else { 0.0 });
         let theirs = joseph(&considered(p * h / s));
         prop_assert!(difference(&dense(&optimal), &theirs) < 1e-4, "{}", difference(&dense(&optimal), &theirs));
         // Any other.
-        let k = V19::from_fn(|i, _| if i < 16 { any_gain[i] * size(i) / s.sqrt() } else { 0.0 });
+        let k = V21::from_fn(|i, _| if i < 16 { any_gain[i] * size(i) / s.sqrt() } else { 0.0 });
         let part = |i: usize| k.fixed_rows::<3>(3 * i).map(|x| x as f32).into_owned();
         let gain = Errors {
             theta: part(0), velocity: part(1), position: part(2), gyro: part(3), accel: part(4), baro: k[15] as f32,
-            slow: Vector3::zeros(),
+            slow: Slows::zeros(),
         };
         let mut other = ours;
         other.fuse_with(&gain, &y, s as f32);
@@ -233,21 +236,44 @@ proptest! {
         ours.slow.follow(&variance, share as f32);
         let theirs = dense(&ours);
         prop_assert_eq!(theirs.fixed_view::<16, 16>(0, 0), p.fixed_view::<16, 16>(0, 0));
-        let sigma = V19::from_fn(|i, _| theirs[(i, i)].sqrt());
-        let correlation = M19::from_fn(|i, j| theirs[(i, j)] / (sigma[i] * sigma[j]));
+        let sigma = V21::from_fn(|i, _| theirs[(i, i)].sqrt());
+        let correlation = M21::from_fn(|i, j| theirs[(i, j)] / (sigma[i] * sigma[j]));
         prop_assert!(correlation.symmetric_eigenvalues().min() > -1e-6);
+    }
+
+    /// A heading just taken from a field is as wrong as the vehicle's own field makes it, so the next field agrees.
+    #[test]
+    fn a_field_agrees_with_its_heading(turn in numbers::<3>(), by in -3.0..3.0_f32, own in 0.01..0.3_f32) {
+        let mut memory = Memory::default();
+        let q = UnitQuaternion::new(vector(turn) * 0.3).into_inner().coords.map(|x| x as f32);
+        memory.nominal.turn_to(Quaternion::from(q));
+        memory.covariance.slow.magnetize(own * own);
+        memory.reset_heading(by, 1e-4, Some((0.8, -0.6)));
+        let slow = magnetic(&memory.nominal.rotation, &Vector3::new(0.8, -0.6, 0.0));
+        let row = Row {
+            coordinate: Coordinate::X, theta: Vector3::z(), velocity: 0.0, position: 0.0, gyro: None, accel: None,
+            baro: 0.0, slow: Some(slow),
+        };
+        let variance = row.dot(&memory.covariance.times(&row));
+        prop_assert!((variance - 1e-4).abs() < 1e-6 + 1e-6 * own, "{variance}");
+        let level = slow.norm_squared();
+        prop_assert!((memory.covariance.tt.m33 - own * own * level - 1e-4).abs() < 1e-6 && level > 0.7);
+        // After half a turn it is wrong to the other side.
+        let other = Row { slow: Some(-slow), ..row };
+        let variance = other.dot(&memory.covariance.times(&other));
+        prop_assert!((variance / (4.0 * own * own * level) - 1.0).abs() < 0.02 + 1e-4 / (own * own), "{variance}");
     }
 
     /// Too large a variance is cut with all its covariances, so the matrix stays positive.
     #[test]
     fn bounds_leave_it_positive(p in covariance(), which in 0..16_usize, factor in 1e3..1e8_f64) {
-        let scale = M19::from_diagonal(&V19::from_fn(|i, _| if i == which { factor } else { 1.0 }));
+        let scale = M21::from_diagonal(&V21::from_fn(|i, _| if i == which { factor } else { 1.0 }));
         let mut ours = blocks(&(scale * p * scale));
         ours.hold();
         let held = dense(&ours);
         prop_assert!(held.iter().all(|x| x.is_finite()) && held[(which, which)] < 1.001e8);
-        let sigma = V19::from_fn(|i, _| held[(i, i)].sqrt());
-        let correlation = M19::from_fn(|i, j| held[(i, j)] / (sigma[i] * sigma[j]));
+        let sigma = V21::from_fn(|i, _| held[(i, i)].sqrt());
+        let correlation = M21::from_fn(|i, j| held[(i, j)] / (sigma[i] * sigma[j]));
         prop_assert!(correlation.cholesky().is_some());
     }
 }
@@ -288,7 +314,7 @@ fn back(mut x: True, tau: f64, a: &[f64; 6]) -> True {
 }
 
 /// Adds an error.
-fn moved(x: &True, e: &V19) -> True {
+fn moved(x: &True, e: &V21) -> True {
     let part = |i: usize| e.fixed_rows::<3>(3 * i).into_owned();
     True { r: Rotation3::new(part(0)) * x.r, v: x.v + part(1), p: x.p + part(2), g: x.g + part(3), a: x.a + part(4) }
 }
@@ -326,12 +352,24 @@ proptest! {
         // The measured field in the body.
         let body = (then.r.inverse() * field).map(|x| x as f32);
         let expected = Expected { height_offset: 0.0, field: field.map(|x| x as f32) };
+        // Fields of the vehicle, in shares of the horizontal one.
+        let level = field.xy().norm();
+        let own = |axis: V3| {
+            let seen = |share: f64| angle(&(then.r * axis * (level * share) + field));
+            (seen(1e-4) - seen(-1e-4)) / 2e-4
+        };
         let nose = |x: &True| angle(&(x.r * V3::x()));
         let upright = (then.r * V3::x()).z.abs() > 0.8 || field.z.abs() > 0.9 * field.norm();
 
+        if !upright {
+            let row = horizon.row(&Target::Field(body), Coordinate::X, &expected).unwrap().1.slow.unwrap();
+            for (ours, theirs) in row.iter().zip([0.0, 0.0, 0.0, -own(V3::x()), -own(V3::y())]) {
+                prop_assert!((f64::from(*ours) - theirs).abs() < 1e-3, "{row}, not {theirs}");
+            }
+        }
         for i in 0..15 {
             let step = 1e-5 * size(i) / size(0);
-            let error = V19::from_fn(|j, _| if i == j { step } else { 0.0 });
+            let error = V21::from_fn(|j, _| if i == j { step } else { 0.0 });
             let (plus, minus) = (back(moved(&now, &error), tau, &motion), back(moved(&now, &-error), tau, &motion));
             let slope = |of: &dyn Fn(&True) -> f64| (of(&plus) - of(&minus)) / (2.0 * step);
             for (c, coordinate) in Coordinate::ALL.into_iter().enumerate() {
@@ -408,7 +446,7 @@ proptest! {
         let (turn, theta_f) = (crate::rotation::small(&single(&theta)), single(&theta));
         history.correct(&turn, &theta_f, &single(&v), &single(&p));
         let corrected = history.corrected(&history.at(at_us).unwrap(), g).unwrap();
-        let error = V19::from_iterator(theta.iter().chain(&v).chain(&p).copied().chain([0.0; 10]));
+        let error = V21::from_iterator(theta.iter().chain(&v).chain(&p).copied().chain([0.0; 12]));
         let y = back(moved(&now, &error), f64::from(back_us) * 1e-6, &motion.map(|x| x * 0.3));
         prop_assert!((corrected.velocity.map(f64::from) - y.v).norm() < 4e-3);
         prop_assert!((corrected.position.map(f64::from) - y.p).norm() < 1e-3);

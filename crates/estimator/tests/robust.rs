@@ -196,7 +196,7 @@ fn at_rest(ms: usize, sensors: Sensors, change: impl Fn(usize, &mut ImuSample)) 
     (last, flight.memory)
 }
 
-const NOTHING: Sensors = Sensors { tracker: None, gnss: None, slow: None, baro: None, mag: None };
+const NOTHING: Sensors = Sensors { tracker: None, gnss: None, slow: None, iron: None, baro: None, mag: None };
 
 #[test]
 fn starts_at_rest_level_and_unbiased() {

@@ -175,6 +175,7 @@ pub fn settings(imu: &Imu) -> Settings {
         baro_walk_m_rts: 0.02,
         // All of it.
         gnss_noise_m: 100.0,
+        mag_slow_rad: 0.0,
         ..Settings::DEFAULT
     }
 }
@@ -188,15 +189,18 @@ pub struct Sensors {
     pub gnss: Option<(f64, f64, f64)>,
     /// Slow error of its position, per coordinate [m] with a correlation time [s].
     pub slow: Option<(f64, f64)>,
+    /// Field of the vehicle itself along body x and y, in shares of the earth's horizontal one.
+    pub iron: Option<f64>,
     /// At 50 Hz, 20 ms late [m].
     pub baro: Option<f64>,
     /// At 50 Hz, 10 ms late, of a field of 1 at an inclination of 63 degrees.
     pub mag: Option<f64>,
 }
 
-pub const MOCAP: Sensors = Sensors { tracker: Some((1e-3, 3.5e-3)), gnss: None, slow: None, baro: None, mag: None };
+pub const MOCAP: Sensors =
+    Sensors { tracker: Some((1e-3, 3.5e-3)), gnss: None, slow: None, iron: None, baro: None, mag: None };
 pub const OUTDOOR: Sensors =
-    Sensors { tracker: None, gnss: Some((0.8, 1.2, 0.1)), slow: None, baro: Some(0.15), mag: Some(0.01) };
+    Sensors { tracker: None, gnss: Some((0.8, 1.2, 0.1)), slow: None, iron: None, baro: Some(0.15), mag: Some(0.01) };
 
 /// Magnetic field in the earth frame: north and down.
 pub fn field() -> V3 {
@@ -216,6 +220,8 @@ pub struct Flight<'a> {
     pub baro_offset: f64,
     /// The receiver's slow error; drawn with the first fix.
     pub slow: Option<V3>,
+    /// Field of the vehicle itself.
+    pub iron: V3,
     /// Delay of all sensors besides their own [ms].
     pub late_ms: f64,
     /// Index of the next moment.
@@ -234,6 +240,7 @@ impl<'a> Flight<'a> {
     pub fn with(truth: &'a [Moment], imu: Imu, sensors: Sensors, seed: u64, settings: Settings) -> Self {
         let mut noise = Noise::new(seed);
         let (gyro_bias, accel_bias) = (noise.vector(imu.gyro_bias), noise.vector(imu.accel_bias));
+        let iron = sensors.iron.map_or(V3::zeros(), |iron| noise.vector(iron * field().xy().norm()));
         Flight {
             truth,
             estimator: Estimator::new(settings).unwrap(),
@@ -245,6 +252,7 @@ impl<'a> Flight<'a> {
             accel_bias,
             baro_offset: 37.0,
             slow: None,
+            iron: V3::new(iron.x, iron.y, 0.0),
             late_ms: 0.0,
             now: 0,
             under_way: Vec::new(),
@@ -307,7 +315,7 @@ impl<'a> Flight<'a> {
             send(20.0, Measurement::Height { height_m, sigma_m: sigma as f32 });
         }
         if let Some(sigma) = self.sensors.mag.filter(|_| self.now % 20 == 11) {
-            let field = single(&(moment.r.transpose() * field() + self.noise.vector(sigma)));
+            let field = single(&(moment.r.transpose() * field() + self.iron + self.noise.vector(sigma)));
             send(10.0, Measurement::MagneticField { field, sigma: sigma as f32 });
         }
     }

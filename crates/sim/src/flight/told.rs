@@ -15,10 +15,10 @@ const TURNING_RAD_S: f64 = 0.2;
 const SPEEDING_M_S2: f64 = 1.0;
 /// Share of the vibration that counts as white noise: what the errors of a hundred flights ask for.
 const SHAKEN: f64 = 0.6;
+/// Time for which a tilt by the gyroscope's misalignment counts as the same \[s\]: what hours of flight ask for.
+const LEANING_S: f64 = 100.0;
 /// Speed at which the noise of a tracker's stamps counts \[m/s\].
 const STAMPED_M_S: f64 = 1.0;
-/// Time for which an error of a magnetometer that turns with the vehicle counts as the same \[s\].
-const IRON_S: f64 = 10.0;
 /// Smallest standard deviation that is told, in the unit of each.
 const SIGMA_MIN: f64 = 1e-4;
 
@@ -35,6 +35,12 @@ fn step(lsb: f64) -> f64 {
 /// Vibration of `rotors` in hover that counts, root mean square, if the first harmonic of one has this amplitude.
 fn vibration(amplitude: f64, imu: &Imu, rotors: usize) -> f64 {
     SHAKEN * amplitude * libm::sqrt(0.5 * rotors as f64) * imu.harmonics.norm()
+}
+
+/// Error of the heading by hard and soft iron and the motors' field.
+fn iron(part: &Magnetometer) -> f64 {
+    let field = root(&[part.hard_iron_ut, part.soft_iron * part.strength_ut, part.motor_ut.xy().amax()]);
+    field / (part.strength_ut * libm::cos(part.inclination_rad))
 }
 
 /// Returns the settings for these instruments on a vehicle of so many rotors, if their samples are `step_s` apart.
@@ -59,7 +65,11 @@ pub(super) fn settings(suite: &Suite, imu: &Imu, rotors: usize, gravity_m_s2: f6
     // What a Gauss-Markov process adds per root of a second.
     let markov = |sigma: f64, time_s: f64| sigma * libm::sqrt(2.0 / time_s);
     let gyro_walk = root(&[gyro.walk_rad_s2_rthz, markov(gyro.instability_rad_s, gyro.instability_time_s)]);
-    let accel_walk = root(&[accel.walk_m_s3_rthz, markov(accel.instability_m_s2, accel.instability_time_s)]);
+    // Misaligned axes make of a turn about the vertical a tilt, the same at each turn, which is not to be told from a
+    // bias of the accelerometer.
+    let leaning = markov(gyro.misalignment_rad * gravity_m_s2, LEANING_S);
+    let accel_walk = markov(accel.instability_m_s2, accel.instability_time_s);
+    let accel_walk = root(&[accel.walk_m_s3_rthz, accel_walk, leaning]);
     let accel_bias = root(&[accel.bias_m_s2, accel.instability_m_s2, accel.scale * gravity_m_s2]);
     let accel_bias = root(&[accel_bias, accel.misalignment_rad * gravity_m_s2]);
     let drift = suite.barometer.map_or(0.0, |it| markov(it.drift_m, it.drift_time_s));
@@ -80,6 +90,7 @@ pub(super) fn settings(suite: &Suite, imu: &Imu, rotors: usize, gravity_m_s2: f6
         baro_walk_m_rts: most(drift, 1e-4, 1.0),
         gnss_noise_m: suite.gnss.map_or(Settings::DEFAULT.gnss_noise_m, |it| most(it.noise_m, 0.01, 1000.0)),
         gnss_slow_s: suite.gnss.map_or(Settings::DEFAULT.gnss_slow_s, |it| most(it.correlation_time_s, 1.0, 1e5)),
+        mag_slow_rad: suite.magnetometer.map_or(Settings::DEFAULT.mag_slow_rad, |it| most(iron(&it), 0.0, 1.0)),
         declination_rad: suite.magnetometer.map_or(0.0, |it| it.declination_rad.clamp(-3.2, 3.2)) as f32,
         gyro_range_rad_s: range(gyro.range_rad_s, 100.0),
         accel_range_m_s2: range(accel.range_m_s2, 1000.0),
@@ -157,12 +168,9 @@ pub(super) fn height(fix: &HeightFix, barometer: &Barometer, at_us: impl Fn(f64)
     timed(Measurement::Height { height_m: fix.height_m as f32, sigma_m }, fix.true_at_s, at_us)
 }
 
-/// Tells a field. Hard and soft iron and the motors' field are the same from one measurement to the next, so that they
-/// count as the noise that averages to as much over [`IRON_S`].
+/// Tells a field: its noise; what hard and soft iron and the motors add is told by the settings.
 pub(super) fn field(fix: &FieldFix, part: &Magnetometer, at_us: impl Fn(f64) -> u64) -> Timed<Measurement> {
-    let iron = root(&[part.hard_iron_ut, part.soft_iron * part.strength_ut, part.motor_ut.amax()]);
-    let repeated = libm::sqrt((part.rate_hz * IRON_S).max(1.0));
-    let sigma = sigma(&[part.noise_ut, step(part.lsb_ut), iron * repeated]);
+    let sigma = sigma(&[part.noise_ut, step(part.lsb_ut)]);
     timed(Measurement::MagneticField { field: fix.field_ut.cast(), sigma }, fix.true_at_s, at_us)
 }
 
