@@ -7,6 +7,8 @@ use nalgebra::Vector3;
 
 /// Share of a standard deviation below which it falls in a step only if something was found again.
 const FALLS: f32 = 0.9;
+/// Jump of the position that is hidden in any case \[m\].
+const JUMP_M: f32 = 0.05;
 /// Time in which what was hidden decays to 1/e \[s\].
 const DECAY_S: f32 = 0.3;
 /// Fastest approach of position \[m/s\] and velocity \[m/s2\]: a receiver that jumps by metres must not look like a gale.
@@ -68,8 +70,9 @@ impl Easing {
         let stays = |hidden: &Vector3<f32>, most: f32| 1.0 - dt_s / max(DECAY_S, sqrt(hidden.norm_squared()) / most);
         self.position_m *= stays(&self.position_m, MOST_M_S);
         self.velocity_m_s *= stays(&self.velocity_m_s, MOST_M_S2);
-        if found(&last, seen) {
-            self.position_m += state.position_m - last.position_m - last.velocity_m_s * dt_s;
+        let jump_m = state.position_m - last.position_m - last.velocity_m_s * dt_s;
+        if jump_m.norm_squared() > JUMP_M * JUMP_M || found(&last, seen) {
+            self.position_m += jump_m;
             self.velocity_m_s += state.velocity_m_s - last.velocity_m_s;
         }
         state.position_m -= self.position_m;

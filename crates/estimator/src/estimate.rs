@@ -70,7 +70,7 @@ pub struct Dropped {
     pub crowded: u32,
     /// A magnetic field of another strength or inclination than at the start.
     pub disturbed: u32,
-    /// The pose of a tracker that has repeated it for too long.
+    /// The pose of a tracker, or the field of a magnetometer, that has repeated it for too long.
     pub frozen: u32,
 }
 

@@ -99,6 +99,12 @@ impl Estimator {
             (Measurement::Gnss { .. }, [Some(part), _]) => {
                 self.divide(memory, part, at_us.saturating_sub(fix_us.unwrap_or(0)));
             }
+            (Measurement::MagneticField { field, .. }, _)
+                if memory.repeated_field.lasts_us(field, &[0.0; 4], at_us) > self.frozen_us =>
+            {
+                count(&mut memory.dropped.frozen);
+                return false;
+            }
             (Measurement::MagneticField { .. }, [Some(_), _]) => {
                 memory.covariance.slow.magnetize(self.magnetic_variance);
             }

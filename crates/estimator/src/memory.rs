@@ -47,6 +47,7 @@ pub struct Memory {
     pub(crate) field: Option<(f32, f32)>,
     pub(crate) aids: Aids,
     pub(crate) repeated: Repeated,
+    pub(crate) repeated_field: Repeated,
     /// Time of the last pseudo-measurement \[us\].
     pub(crate) still_us: u64,
     /// Time of the last reset that a rejection caused \[us\].
@@ -97,6 +98,7 @@ impl Default for Memory {
             field: None,
             aids: Aids::default(),
             repeated: Repeated::default(),
+            repeated_field: Repeated::default(),
             still_us: 0,
             reset_us: None,
             resets: Resets::default(),

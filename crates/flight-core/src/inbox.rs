@@ -37,6 +37,8 @@ pub const REQUESTS_MAX: usize = 4;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inbox {
     state: Option<Stamped<State>>,
+    /// True if the state is the vehicle's own estimate.
+    own: bool,
     adrift: Option<Stamped<State>>,
     missing: Option<Refusal>,
     setpoint: Option<Stamped<Setpoint>>,
@@ -47,19 +49,19 @@ pub struct Inbox {
 impl Inbox {
     /// An empty inbox.
     pub const EMPTY: Self =
-        Inbox { state: None, adrift: None, missing: None, setpoint: None, requests: [None; REQUESTS_MAX] };
+        Inbox { state: None, own: false, adrift: None, missing: None, setpoint: None, requests: [None; REQUESTS_MAX] };
 
     /// Stores a measured state, stamped by a [`Tracker`](crate::Tracker), if it is [plausible](State::is_plausible).
     pub fn put_state(&mut self, state: Stamped<State>) {
         if state.value.is_plausible() {
-            self.state = Some(state);
+            (self.state, self.own) = (Some(state), false);
         }
     }
 
     /// Stores a state of the vehicle's own estimate, which is always [plausible](State::is_plausible), in place of any
     /// other.
     pub fn locate(&mut self, state: Stamped<State>) {
-        (self.state, self.adrift, self.missing) = (Some(state), None, None);
+        (self.state, self.own, self.adrift, self.missing) = (Some(state), true, None, None);
     }
 
     /// Stores a state of the vehicle's own estimate, which `missing` something and does not know where it is: attitude,
@@ -83,6 +85,11 @@ impl Inbox {
     /// Returns the newest plausible state.
     pub fn state(&self) -> Option<&Stamped<State>> {
         self.state.as_ref()
+    }
+
+    /// True if [the state](Self::state) is the vehicle's own estimate.
+    pub fn is_own(&self) -> bool {
+        self.own
     }
 
     /// Returns the newest state of a vehicle that [does not know where it is](Self::put_adrift).
@@ -145,7 +152,7 @@ impl Inbox {
     /// Does as [`take`](Self::take), in place of the copy for the last tick.
     #[inline]
     pub fn take_into(&mut self, taken: &mut Inbox) {
-        taken.state = self.state;
+        (taken.state, taken.own) = (self.state, self.own);
         // Hardly ever there: only the mark is copied.
         match &self.adrift {
             Some(adrift) => taken.adrift = Some(*adrift),

@@ -297,7 +297,9 @@ impl<M> VehicleMemory<M> {
         };
         let Some(state) = inbox.state().filter(newer) else { return false };
         let armed = self.mode.armed();
-        if let Some(flight) = self.flight.as_mut().filter(|flight| armed && flight.landing.airborne()) {
+        // An estimate watches its trackers itself, and may approach what they say faster than it moves.
+        let watched = armed && !inbox.is_own();
+        if let Some(flight) = self.flight.as_mut().filter(|flight| watched && flight.landing.airborne()) {
             let repeated = self.state.is_some_and(|held| held.value == state.value);
             flight.distrusts |= flight.witness.contradicts(&state.value, state.at_us);
             if repeated || flight.distrusts {

@@ -77,7 +77,8 @@ pub(super) fn settings(suite: &Suite, imu: &Imu, rotors: usize, gravity_m_s2: f6
     // A perfect sensor at rest says the same again and again.
     let is_noisy = |noise: f64, lsb: f64| noise > 0.0 && noise / per_root_s > lsb;
     let moves = is_noisy(gyro.noise_rad_s_rthz, gyro.lsb_rad_s) || is_noisy(accel.noise_m_s2_rthz, accel.lsb_m_s2);
-    let differs = suite.tracker.is_some_and(|it| it.position_m > 0.0 || it.attitude_rad > 0.0);
+    let differs = suite.tracker.is_none_or(|it| it.position_m > 0.0 || it.attitude_rad > 0.0)
+        && suite.magnetometer.is_none_or(|it| it.noise_ut > it.lsb_ut / 4.0);
     let most = |value: f64, low: f64, high: f64| value.clamp(low, high) as f32;
     Settings {
         gravity_m_s2: gravity_m_s2 as f32,
