@@ -27,7 +27,8 @@ const SEEDS: u64 = 4;
 /// Without an inertial sensor there is no attitude: blind descent, whose end is a fall.
 const BLIND: [&str; 5] =
     ["imu-stuck-indoors", "imu-dead-indoors", "imu-stuck-outdoors", "imu-dead-outdoors", "tracker-and-imu-lost"];
-/// Two degrees per second of error that come at once: the filter may take longer to find the bias than it takes to fall.
+/// Two degrees per second of error that come at once: the filter may take longer to find the bias than it takes to
+/// fall.
 const TOO_MUCH: [&str; 1] = ["gyro-biased-outdoors"];
 
 /// What became of a vehicle, from the onset on.

@@ -11,12 +11,14 @@ const FALLS: f32 = 0.9;
 const JUMP_M: f32 = 0.05;
 /// Time in which what was hidden decays to 1/e \[s\].
 const DECAY_S: f32 = 0.3;
-/// Fastest approach of position \[m/s\] and velocity \[m/s2\]: a receiver that jumps by metres must not look like a gale.
+/// Fastest approach of position \[m/s\] and velocity \[m/s2\]: a receiver that jumps by metres must not look like a
+/// gale.
 const MOST_M_S: f32 = 1.0;
 const MOST_M_S2: f32 = 3.0;
 
 /// Hides the jumps of position and velocity when an aid comes back: the state begins where it was, and approaches the
-/// estimate within a second, or at 1 m/s and 3 m/s2 from further away. Corrections of usual size pass as they are, and so do attitude and rates.
+/// estimate within a second, or at 1 m/s and 3 m/s2 from further away. Corrections of usual size pass as they are, and
+/// so do attitude and rates.
 ///
 /// The default is that before the first estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

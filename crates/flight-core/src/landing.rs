@@ -93,8 +93,8 @@ impl LandDetector {
         }
     }
 
-    /// Processes a tick of a descending vehicle that does not know how fast it moves: it has landed once its rotors have
-    /// not carried it for long enough.
+    /// Processes a tick of a descending vehicle that does not know how fast it moves: it has landed once its rotors
+    /// have not carried it for long enough.
     pub fn advance_adrift(&mut self, state: &State, thrust_n: f32, gap_us: u32, dt_s: f32) {
         self.sank = true;
         self.advance(&State { velocity_m_s: Vector3::zeros(), ..*state }, thrust_n, gap_us, dt_s);

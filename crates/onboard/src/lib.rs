@@ -1,7 +1,8 @@
 //! The firmware without its hardware: the vehicle that it flies, and the services between [`afbc_link`] and the flight
 //! core.
 //!
-//! A vehicle with an inertial sensor flies on [its own estimate](Navigation), another on the states that the link brings.
+//! A vehicle with an inertial sensor flies on [its own estimate](Navigation), another on the states that the link
+//! brings.
 //!
 //! There are two parts, because on the board the control tick interrupts everything else: [`Flight`] runs the control
 //! tick every millisecond; [`Comms`] receives and sends messages in the remaining time. A host that runs both in turn

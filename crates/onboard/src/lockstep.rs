@@ -1,7 +1,8 @@
 //! The wire between the emulated board and the host, which stand still for each other.
 //!
 //! Two streams of bytes, little-endian. To the firmware: [`Readings`](crate::Readings) of the sensors for the next
-//! control tick, a `u32` length and that many bytes, which reach the link before it. From the firmware, for each of these: a [`ReplyHead`] and as many bytes as it says.
+//! control tick, a `u32` length and that many bytes, which reach the link before it. From the firmware, for each of
+//! these: a [`ReplyHead`] and as many bytes as it says.
 
 use afbc_types::ROTORS_MAX;
 

@@ -8,8 +8,8 @@ use afbc_types::{OutOfRange, State};
 /// Standard deviations of a tracker's pose that does not say how good it is: a motion-capture system's \[m, rad\].
 const TRACKER: (f32, f32) = (0.003, 0.01);
 
-/// Estimator and memory of a vehicle. Until its first sample of an inertial sensor, the vehicle flies on the states that
-/// come over the link; from then on those are measurements like others.
+/// Estimator and memory of a vehicle. Until its first sample of an inertial sensor, the vehicle flies on the states
+/// that come over the link; from then on those are measurements like others.
 #[derive(Clone, Debug)]
 pub struct Navigation {
     estimator: Estimator,

@@ -435,7 +435,7 @@ fn l1_starts_its_prediction_again_after_an_outage() {
 #[test]
 fn demanded_accelerations_are_those_of_the_formulas() {
     let effectiveness = Vector3::new(65.789_47, 65.789_47, 1.425_1);
-    let limits = Limits::new(&vehicle(), 12.0, 0.7);
+    let limits = Limits::new(&vehicle(), 12.0, 1.0);
     let mut random = Random(5);
     for _ in 0..500 {
         let attitude = Rotation3::from_scaled_axis(vector(&mut random, 0.3));

@@ -148,7 +148,8 @@ impl EmulatedFlight {
         Ok((reply.throttles.iter().any(|throttle| *throttle != 0)).then_some(reply.instructions))
     }
 
-    /// Returns a sample, and measurements of a vehicle in this state, of any age; on the ground those of a tracker alone.
+    /// Returns a sample, and measurements of a vehicle in this state, of any age; on the ground those of a tracker
+    /// alone.
     fn readings(&mut self, state: &State) -> Readings {
         let [noise, other] = [1e-3 * self.number(), 1e-3 * self.number()];
         let force_m_s2 = Vector3::new(noise, other, 9.81) + 0.1 * state.velocity_m_s;
