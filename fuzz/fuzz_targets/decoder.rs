@@ -56,7 +56,7 @@ fn check_against_reference(stream: &[u8]) {
 /// Returns a stream of frames with the right checksums made of `bytes`: kind, flags, length, use, payload. A frame is
 /// sent, sent without its last byte, or becomes the beginning of the next one's payload.
 fn nested(mut bytes: &[u8]) -> Vec<u8> {
-    const IDS: [u32; 10] = [0, 76, 84, 331, 385, 110, 120, 395, 42_000, 0xFF_FFFF];
+    const IDS: [u32; 12] = [0, 76, 84, 102, 138, 331, 385, 110, 120, 395, 42_000, 0xFF_FFFF];
     let (mut stream, mut carried) = (Vec::new(), Vec::new());
     while let [kind, flags, length, purpose, rest @ ..] = bytes {
         let (payload, rest) = rest.split_at(usize::from(*length).min(rest.len()));
@@ -92,6 +92,7 @@ fuzz_target!(|bytes: &[u8]| {
     let payload = &bytes[..bytes.len().min(255)];
     check_payload(payload, |message: &Uplink| match message {
         Uplink::State { state, .. } => state.is_plausible(),
+        Uplink::Pose { pose, .. } => pose.is_plausible(),
         Uplink::Setpoint(setpoint) => setpoint.is_plausible(),
         Uplink::Heartbeat | Uplink::Command(_) => true,
     });

@@ -1,7 +1,7 @@
-//! Inputs of a tick: the newest state and setpoint, with their times, and requests.
+//! Inputs of a tick: the newest state, pose and setpoint, with their times, and requests.
 
 use crate::supervisor::{Refusal, Request};
-use afbc_types::{Setpoint, State};
+use afbc_types::{Pose, Setpoint, State};
 
 /// A value with its time on the vehicle's clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -41,6 +41,7 @@ pub struct Inbox {
     own: bool,
     adrift: Option<Stamped<State>>,
     missing: Option<Refusal>,
+    pose: Option<Stamped<Pose>>,
     setpoint: Option<Stamped<Setpoint>>,
     /// Requests in the order of arrival, without gaps.
     requests: [Option<Asked>; REQUESTS_MAX],
@@ -48,8 +49,15 @@ pub struct Inbox {
 
 impl Inbox {
     /// An empty inbox.
-    pub const EMPTY: Self =
-        Inbox { state: None, own: false, adrift: None, missing: None, setpoint: None, requests: [None; REQUESTS_MAX] };
+    pub const EMPTY: Self = Inbox {
+        state: None,
+        own: false,
+        adrift: None,
+        missing: None,
+        pose: None,
+        setpoint: None,
+        requests: [None; REQUESTS_MAX],
+    };
 
     /// Stores a measured state, stamped by a [`Tracker`](crate::Tracker), if it is [plausible](State::is_plausible).
     pub fn put_state(&mut self, state: Stamped<State>) {
@@ -73,6 +81,14 @@ impl Inbox {
             self.state = None;
         }
         self.missing = Some(missing);
+    }
+
+    /// Stores a tracker's pose for the vehicle's own estimate, stamped by a [`Tracker`](crate::Tracker), if it is
+    /// [plausible](Pose::is_plausible). The flight core itself does not use it.
+    pub fn put_pose(&mut self, pose: Stamped<Pose>) {
+        if pose.value.is_plausible() {
+            self.pose = Some(pose);
+        }
     }
 
     /// Stores a setpoint, stamped on arrival, if it is [plausible](Setpoint::is_plausible).
@@ -102,6 +118,11 @@ impl Inbox {
         self.missing
     }
 
+    /// Returns the newest plausible pose, if it has not been [taken](Self::take) before.
+    pub fn pose(&self) -> Option<&Stamped<Pose>> {
+        self.pose.as_ref()
+    }
+
     /// Returns the newest plausible setpoint.
     pub fn setpoint(&self) -> Option<&Stamped<Setpoint>> {
         self.setpoint.as_ref()
@@ -122,6 +143,9 @@ impl Inbox {
         self.state = news.state.or(self.state);
         self.adrift = news.adrift.or(self.adrift);
         self.missing = news.missing.or(self.missing);
+        if let Some(pose) = &news.pose {
+            self.pose = Some(*pose);
+        }
         self.setpoint = news.setpoint.or(self.setpoint);
         for asked in news.requests.iter().flatten() {
             self.request(*asked);
@@ -142,7 +166,7 @@ impl Inbox {
         }
     }
 
-    /// Returns a copy for the next tick, and removes the oldest request.
+    /// Returns a copy for the next tick, and removes the pose and the oldest request.
     pub fn take(&mut self) -> Inbox {
         let mut taken = Inbox::EMPTY;
         self.take_into(&mut taken);
@@ -159,6 +183,14 @@ impl Inbox {
             None => taken.adrift = None,
         }
         taken.missing = self.missing;
+        // Rarely there, and only once.
+        match &self.pose {
+            Some(pose) => {
+                taken.pose = Some(*pose);
+                self.pose = None;
+            }
+            None => taken.pose = None,
+        }
         match (&self.setpoint, &mut taken.setpoint) {
             (Some(new), Some(old)) => {
                 copy(&new.value, &mut old.value);

@@ -1,30 +1,43 @@
-//! Selection of the tracker, and of its states. Not in the paper.
+//! Selection of the tracker, and of its states and poses. Not in the paper.
 //!
 //! Each sender has its own [`SourceClock`]. One sender is used at a time: the first one heard, until it has sent
-//! nothing new for [`SILENT_US`]. Two trackers need not have the same origin.
+//! nothing new for [`SILENT_US`], or for as long as what it sends may be old. Two trackers need not have the same
+//! origin.
 
 use crate::clock::SourceClock;
 use crate::inbox::Stamped;
 use crate::supervisor::COAST_US;
-use afbc_types::State;
+use afbc_types::{Pose, State};
+use core::mem::discriminant;
 
 /// Number of senders whose clocks are tracked; a further one replaces the one that has been silent longest.
 pub const SENDERS_MAX: usize = 4;
 /// Silence of the sender in use after which another one replaces it \[us\].
 pub const SILENT_US: u64 = 50_000;
+/// Largest age on arrival of what a vehicle's own estimate takes \[us\]: how far back it can fuse a measurement.
+pub const POSE_AGE_MAX_US: u64 = 250_000;
 
-/// States that were not used, since power-up. Each count stops at `u32::MAX`.
+/// What a tracker sends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sighting {
+    /// A state.
+    State(State),
+    /// A pose.
+    Pose(Pose),
+}
+
+/// States and poses that were not used, since power-up. Each count stops at `u32::MAX`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Refused {
     /// Out of order or duplicate.
     pub overtaken: u32,
-    /// Older than 20 ms on arrival.
+    /// Older than 20 ms on arrival, or than [`POSE_AGE_MAX_US`] if they are for the vehicle's own estimate.
     pub late: u32,
     /// From another sender than the one in use.
     pub elsewhere: u32,
 }
 
-/// Selects and stamps states.
+/// Selects and stamps states and poses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tracker {
     senders: [Option<Sender>; SENDERS_MAX],
@@ -37,7 +50,7 @@ pub struct Tracker {
 struct Sender {
     id: u16,
     clock: SourceClock,
-    last: State,
+    last: Sighting,
     heard_us: u64,
 }
 
@@ -45,34 +58,50 @@ impl Tracker {
     /// Returns the state that `sender` measured at `sent_us` of its own clock and that arrived at `arrived_us`, stamped
     /// with the vehicle's clock; none if it must not be used.
     pub fn stamp(&mut self, sender: u16, sent_us: u64, arrived_us: u64, state: State) -> Option<Stamped<State>> {
-        let known = self.sender(sender, arrived_us, &state);
-        let differs = known.last != state;
-        let at_us = known.clock.stamp(sent_us, arrived_us, differs);
-        (known.last, known.heard_us) = (state, arrived_us);
+        let at_us = self.sight(sender, sent_us, arrived_us, Sighting::State(state), COAST_US.into())?;
+        Some(Stamped { value: state, at_us })
+    }
+
+    /// Like [`stamp`](Self::stamp), for a state or a pose that may be up to `age_max_us` old; returns its time.
+    pub fn sight(
+        &mut self,
+        sender: u16,
+        sent_us: u64,
+        arrived_us: u64,
+        sighting: Sighting,
+        age_max_us: u64,
+    ) -> Option<u64> {
+        let known = self.sender(sender, arrived_us, &sighting);
+        let differs = known.last != sighting;
+        // A state and a pose with the same stamp are one measurement, sent twice.
+        let is_kind = discriminant(&known.last) == discriminant(&sighting);
+        let at_us = known.clock.stamp(sent_us, arrived_us, differs && is_kind);
+        (known.last, known.heard_us) = (sighting, arrived_us);
+        let silent_us = SILENT_US.max(age_max_us);
         let Refused { overtaken, late, elsewhere } = &mut self.refused;
         let refused = match (at_us, self.in_use) {
             (None, _) => overtaken,
-            (Some(at_us), _) if arrived_us - at_us > COAST_US.into() => late,
-            (_, Some((id, news_us))) if id != sender && arrived_us.saturating_sub(news_us) <= SILENT_US => elsewhere,
+            (Some(at_us), _) if arrived_us - at_us > age_max_us => late,
+            (_, Some((id, news_us))) if id != sender && arrived_us.saturating_sub(news_us) <= silent_us => elsewhere,
             (Some(at_us), in_use) => {
                 if differs || in_use.is_none_or(|(id, _)| id != sender) {
                     self.in_use = Some((sender, arrived_us));
                 }
-                return Some(Stamped { value: state, at_us });
+                return Some(at_us);
             }
         };
         *refused = refused.saturating_add(1);
         None
     }
 
-    /// Returns the counts of refused states.
+    /// Returns the counts of refused states and poses.
     pub fn refused(&self) -> &Refused {
         &self.refused
     }
 
     /// Returns the record of a sender, a new one if it is unknown.
-    fn sender(&mut self, id: u16, now_us: u64, state: &State) -> &mut Sender {
-        let new = Sender { id, clock: SourceClock::default(), last: *state, heard_us: now_us };
+    fn sender(&mut self, id: u16, now_us: u64, sighting: &Sighting) -> &mut Sender {
+        let new = Sender { id, clock: SourceClock::default(), last: *sighting, heard_us: now_us };
         let place = |place: &Option<Sender>| match place {
             Some(sender) if sender.id == id => (0, 0),
             None => (1, 0),

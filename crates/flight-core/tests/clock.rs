@@ -3,11 +3,12 @@
 
 use afbc::{Adaptive, Controller, Profile};
 use afbc_flight_core::clock::SILENCE_US;
-use afbc_flight_core::tracker::{Refused, SILENT_US};
+use afbc_flight_core::supervisor::COAST_US;
+use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, SILENT_US, Sighting};
 use afbc_flight_core::{
     ArmingLimits, Asked, Inbox, Mode, Request, SourceClock, Stamped, Tracker, Vehicle, VehicleMemory,
 };
-use afbc_types::{Parameters, Setpoint, State};
+use afbc_types::{Parameters, Pose, PoseSigmas, Setpoint, State};
 use proptest::prelude::*;
 
 /// Times of arming, of the clock's fault, and of the end \[us since power-up\].
@@ -223,6 +224,57 @@ fn another_sender_takes_over_after_a_silence_only() {
     assert!(!says(1, 2 * SILENT_US), "then the other one is in use");
     assert!((3..9).all(|sender| !says(sender, 2 * SILENT_US)), "however many there are");
     assert!(says(2, 2 * SILENT_US + 1));
+}
+
+/// A pose may be up to 250 ms old, a state 20 ms.
+#[test]
+fn a_pose_may_be_older_than_a_state() {
+    for (late_us, as_state, as_pose) in
+        [(19_000, true, true), (21_000, false, true), (250_000, false, true), (250_001, false, false)]
+    {
+        let send = |sighting: fn(u64) -> Sighting, age_max_us| {
+            let mut tracker = Tracker::default();
+            let mut says = |sent_us, arrived_us| tracker.sight(1, sent_us, arrived_us, sighting(sent_us), age_max_us);
+            assert_eq!((says(0, 1_000_000), says(10_000, 1_010_000)), (Some(1_000_000), Some(1_010_000)));
+            let late = says(20_000, 1_020_000 + late_us);
+            assert!(late.is_none_or(|at_us| at_us == 1_020_000), "{late:?}");
+            assert_eq!(tracker.refused().late, u32::from(late.is_none()));
+            late.is_some()
+        };
+        assert_eq!(send(|us| Sighting::State(hovering(us)), COAST_US.into()), as_state, "{late_us}");
+        assert_eq!(send(posed, POSE_AGE_MAX_US), as_pose, "{late_us}");
+    }
+}
+
+fn posed(measured_us: u64) -> Sighting {
+    Sighting::Pose(Pose::of(&hovering(measured_us), PoseSigmas::UNKNOWN))
+}
+
+/// A tracker that sends each measurement twice, as state and as pose, is used once, and its clock is not taken for a
+/// coarse one: a late measurement is known to be late.
+#[test]
+fn a_state_and_a_pose_of_one_moment_are_one() {
+    let mut tracker = Tracker::default();
+    for us in (0..1_000_000).step_by(10_000) {
+        let state = Sighting::State(hovering(us));
+        assert_eq!(tracker.sight(1, us, us, state, POSE_AGE_MAX_US), Some(us));
+        assert_eq!(tracker.sight(1, us, us, posed(us), POSE_AGE_MAX_US), None);
+    }
+    assert_eq!(tracker.refused().overtaken, 100);
+    assert_eq!(tracker.sight(1, 1_000_000, 1_030_000, posed(1_000_000), POSE_AGE_MAX_US), Some(1_000_000));
+}
+
+/// Slow trackers do not take turns: as long as a pose may be old, its sender stays in use.
+#[test]
+fn a_slow_tracker_stays_in_use() {
+    let mut tracker = Tracker::default();
+    let mut says = |sender, now_us| tracker.sight(sender, now_us, now_us, posed(now_us), POSE_AGE_MAX_US).is_some();
+    for round in 0..10 {
+        assert!(says(1, round * 200_000));
+        assert!(!says(2, round * 200_000 + 100_000));
+    }
+    assert!(!says(2, 1_800_000 + POSE_AGE_MAX_US));
+    assert!(says(2, 1_800_001 + POSE_AGE_MAX_US));
 }
 
 /// A sender that repeats the same state counts as silent.

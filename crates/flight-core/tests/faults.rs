@@ -7,7 +7,7 @@ use afbc_flight_core::{
     Answer, ArmingLimits, Asked, Inbox, Mode, Refusal, Request, Stamped, Tracker, Vehicle, VehicleMemory,
 };
 use afbc_link::{Address, Command, Counters, Decoder, FRAME_MAX, Sender, Uplink};
-use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
+use afbc_types::{Parameters, PoseSigmas, RotorSpeeds, Setpoint, State};
 
 const STATION: Address = Address { system: 255, component: 190 };
 const VEHICLE: Address = Address { system: 1, component: 1 };
@@ -46,7 +46,10 @@ fn flight() -> Vec<Frame> {
             push(Kind::Setpoint, Uplink::Setpoint(Setpoint::default()));
         }
         // With a clock that is 7 s ahead.
-        push(Kind::State, Uplink::State { sent_us: 7_000_000 + ms * 1000, state: standing(ms) });
+        push(
+            Kind::State,
+            Uplink::State { sent_us: 7_000_000 + ms * 1000, state: standing(ms), sigmas: PoseSigmas::UNKNOWN },
+        );
         if ms == ARM_MS {
             push(Kind::Command, Uplink::Command(Command::Arm));
         }
@@ -95,7 +98,7 @@ fn play(mut frames: Vec<Frame>) -> Seen {
         while let Some(frame) = frames.next_if(|frame| frame.at_ms <= since_ms) {
             let ask = |inbox: &mut Inbox, request| assert!(inbox.request(Asked { request, ticket: 0 }));
             decoder.feed(&frame.bytes, |_, message| match message {
-                Uplink::State { sent_us, state } => {
+                Uplink::State { sent_us, state, .. } => {
                     if let Some(state) = tracker.stamp(1, sent_us, now_us, state) {
                         inbox.put_state(state);
                     }
@@ -105,7 +108,7 @@ fn play(mut frames: Vec<Frame>) -> Seen {
                 Uplink::Command(Command::Engage) => ask(&mut inbox, Request::Engage),
                 Uplink::Command(Command::Disarm) => ask(&mut inbox, Request::Disarm),
                 Uplink::Command(Command::Kill) => ask(&mut inbox, Request::Kill),
-                Uplink::Command(Command::Other(_) | Command::Denied(_)) | Uplink::Heartbeat => {}
+                Uplink::Command(Command::Other(_) | Command::Denied(_)) | Uplink::Heartbeat | Uplink::Pose { .. } => {}
             });
         }
         let outcome = vehicle.tick(&mut memory, now_us, &inbox.take());

@@ -2,7 +2,7 @@
 
 use afbc_flight_core::inbox::REQUESTS_MAX;
 use afbc_flight_core::{Asked, Inbox, Request, Stamped};
-use afbc_types::{Setpoint, State};
+use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use nalgebra::Vector3;
 
 fn asked(request: Request, ticket: usize) -> Asked {
@@ -55,6 +55,33 @@ fn implausible_values_do_not_enter_the_inbox() {
         inbox.post(&news);
     }
     assert_eq!((inbox.state(), inbox.setpoint()), (Some(&good.0), Some(&good.1)), "the last good ones stay");
+}
+
+/// Each pose is seen by one tick, the newest one first, and an implausible one by none.
+#[test]
+fn a_pose_is_taken_once() {
+    let at = |x, at_us| Stamped { value: Pose { position_m: Vector3::new(x, 0.0, 0.0), ..Pose::default() }, at_us };
+    let (mut inbox, mut taken) = (Inbox::EMPTY, Inbox::EMPTY);
+    for (number, at_us) in [(1.0, 10), (2.0, 20)] {
+        let mut news = Inbox::EMPTY;
+        news.put_pose(at(number, at_us));
+        inbox.post(&news);
+    }
+    inbox.post(&Inbox::EMPTY);
+    inbox.take_into(&mut taken);
+    assert_eq!(taken.pose(), Some(&at(2.0, 20)));
+    inbox.take_into(&mut taken);
+    assert_eq!(taken.pose(), None);
+
+    let no_rotation = Pose { attitude: [0.5, 0.0, 0.0, 0.0], ..Pose::default() };
+    let unsure = |sigma| Pose { sigmas: PoseSigmas { position_m: Some(sigma), attitude_rad: None }, ..Pose::default() };
+    let turned = |sigma| Pose { sigmas: PoseSigmas { position_m: None, attitude_rad: Some(sigma) }, ..Pose::default() };
+    for bad in [f32::NAN, f32::INFINITY, 0.0, -1.0] {
+        for value in [unsure(bad), turned(bad), no_rotation, at(2e5, 0).value, at(f32::NAN, 0).value] {
+            inbox.put_pose(Stamped { value, at_us: 30 });
+            assert_eq!(inbox, Inbox::EMPTY, "{value:?}");
+        }
+    }
 }
 
 #[test]

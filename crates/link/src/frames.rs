@@ -15,6 +15,11 @@ pub fn flip(vector: Vector3<f32>) -> Vector3<f32> {
     Vector3::new(vector.x, -vector.y, -vector.z)
 }
 
+/// Converts the quaternion w, x, y, z of an attitude from either side to the other.
+pub fn flip_turn([w, x, y, z]: [f32; 4]) -> [f32; 4] {
+    [w, x, -y, -z]
+}
+
 /// Content of ODOMETRY: position in the wire's earth frame, the rest of the motion in its body frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Odometry {

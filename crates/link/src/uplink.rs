@@ -1,13 +1,14 @@
 //! Messages to the vehicle.
 
 use crate::address::Address;
-use crate::frames::{Odometry, flip};
-use crate::message::{Fault, Format, Message, PAYLOAD_MAX, extension, field, parse, put, put_fields};
-use afbc_types::{Setpoint, State};
+use crate::frames::{Odometry, flip, flip_turn};
+use crate::message::{Fault, Format, Message, PAYLOAD_MAX, extension, field, parse, put, put_extended, put_fields};
+use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
-    COMMAND_INT_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavFrame, MavModeFlag, MavState,
-    MavType, ODOMETRY_DATA, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
+    ATT_POS_MOCAP_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavFrame,
+    MavModeFlag, MavState, MavType, ODOMETRY_DATA, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
+    VISION_POSITION_ESTIMATE_DATA,
 };
 use nalgebra::Vector3;
 
@@ -19,12 +20,27 @@ pub enum Uplink {
     /// ODOMETRY (331): the full state, from motion capture, a companion computer or the simulator.
     ///
     /// Supported in frame MAV_FRAME_LOCAL_NED or MAV_FRAME_LOCAL_FRD with child frame MAV_FRAME_BODY_FRD, otherwise
-    /// [`Fault::Unsupported`]; so is a quality of -1, "odometry has failed". Covariances are ignored.
+    /// [`Fault::Unsupported`]; so is a quality of -1, "odometry has failed". The covariance of the
+    /// velocity is ignored.
     State {
         /// Time of the measurement on the sender's clock \[us\].
         sent_us: u64,
         /// Plausible state in the frames of [`afbc_types`].
         state: State,
+        /// Standard deviations of its pose, from the covariance as for [`Uplink::Pose`].
+        sigmas: PoseSigmas,
+    },
+    /// VISION_POSITION_ESTIMATE (102) or ATT_POS_MOCAP (138): a pose, for vehicles with an estimate of their own.
+    /// Written as ATT_POS_MOCAP.
+    ///
+    /// Standard deviations are the square roots of the covariance's largest variance of x, y, z, and of roll, pitch,
+    /// yaw. Both are unknown if the covariance is missing or begins with NaN; each is if its variances are all zero or
+    /// one of them is negative or not finite. The reset counter is ignored.
+    Pose {
+        /// Time of the measurement on the sender's clock \[us\].
+        sent_us: u64,
+        /// Plausible pose in the frames of [`afbc_types`].
+        pose: Pose,
     },
     /// SET_POSITION_TARGET_LOCAL_NED (84) in MAV_FRAME_LOCAL_NED. The vehicle needs a position and a heading: if
     /// `type_mask` ignores one of x, y, z or yaw, or selects forces, the message is [`Fault::Unsupported`]. Ignored
@@ -70,6 +86,8 @@ impl Message for Uplink {
         match id {
             HEARTBEAT_DATA::ID => Some(Format::of::<HEARTBEAT_DATA>(0)),
             ODOMETRY_DATA::ID => Some(Format::of::<ODOMETRY_DATA>(ODOMETRY_EXTENSION)),
+            VISION_POSITION_ESTIMATE_DATA::ID => Some(Format::of::<VISION_POSITION_ESTIMATE_DATA>(POSE_EXTENSION)),
+            ATT_POS_MOCAP_DATA::ID => Some(Format::of::<ATT_POS_MOCAP_DATA>(COVARIANCE)),
             SET_POSITION_TARGET_LOCAL_NED_DATA::ID => Some(Format::of::<SET_POSITION_TARGET_LOCAL_NED_DATA>(0)),
             COMMAND_LONG_DATA::ID => Some(Format::of::<COMMAND_LONG_DATA>(0)),
             COMMAND_INT_DATA::ID => Some(Format::of::<COMMAND_INT_DATA>(0)),
@@ -81,6 +99,8 @@ impl Message for Uplink {
         match id {
             HEARTBEAT_DATA::ID => Ok(Uplink::Heartbeat),
             ODOMETRY_DATA::ID => read_odometry(&parse(payload)?, extension::<ODOMETRY_DATA, _>(payload)),
+            VISION_POSITION_ESTIMATE_DATA::ID => read_vision(&parse(payload)?, payload),
+            ATT_POS_MOCAP_DATA::ID => read_mocap(&parse(payload)?, payload),
             SET_POSITION_TARGET_LOCAL_NED_DATA::ID => read_setpoint(&parse(payload)?, receiver),
             COMMAND_LONG_DATA::ID | COMMAND_INT_DATA::ID => read_command(payload, receiver),
             _ => Err(Fault::Unknown),
@@ -100,7 +120,11 @@ impl Message for Uplink {
                 },
                 payload,
             ),
-            Uplink::State { sent_us, state } => put(&write_odometry(*sent_us, state), payload),
+            Uplink::State { sent_us, state, sigmas } => put(&write_odometry(*sent_us, state, sigmas), payload),
+            Uplink::Pose { sent_us, pose } => {
+                let covariance = covariance(&pose.sigmas).into_iter().flat_map(f32::to_le_bytes);
+                put_extended(&write_mocap(*sent_us, pose), covariance, payload)
+            }
             Uplink::Setpoint(setpoint) => put(&write_setpoint(setpoint), payload),
             Uplink::Command(command) => put_fields(COMMAND_LONG_DATA::ID, write_command(*command), payload),
         }
@@ -129,22 +153,74 @@ fn read_odometry(data: &ODOMETRY_DATA, extension: [u8; ODOMETRY_EXTENSION]) -> R
         rates_rad_s: Vector3::new(data.rollspeed, data.pitchspeed, data.yawspeed),
     };
     let state = odometry.to_state().ok_or(Fault::Implausible)?;
-    Ok(Uplink::State { sent_us: data.time_usec, state })
+    Ok(Uplink::State { sent_us: data.time_usec, state, sigmas: sigmas(&data.pose_covariance) })
 }
 
-fn write_odometry(sent_us: u64, state: &State) -> ODOMETRY_DATA {
+fn write_odometry(sent_us: u64, state: &State, sigmas: &PoseSigmas) -> ODOMETRY_DATA {
     let odometry = Odometry::from_state(state);
     let mut data = ODOMETRY_DATA {
         time_usec: sent_us,
         frame_id: MavFrame::MAV_FRAME_LOCAL_NED,
         child_frame_id: MavFrame::MAV_FRAME_BODY_FRD,
         q: odometry.attitude,
+        pose_covariance: covariance(sigmas),
         ..ODOMETRY_DATA::DEFAULT
     };
     [data.x, data.y, data.z] = odometry.position_m.into();
     [data.vx, data.vy, data.vz] = odometry.velocity_m_s.into();
     [data.rollspeed, data.pitchspeed, data.yawspeed] = odometry.rates_rad_s.into();
     data
+}
+
+/// Bytes of the covariance of a pose: the upper triangle of six by six numbers, row by row.
+const COVARIANCE: usize = 4 * 21;
+/// Extension fields of VISION_POSITION_ESTIMATE: covariance, reset counter.
+const POSE_EXTENSION: usize = COVARIANCE + 1;
+
+fn read_vision(data: &VISION_POSITION_ESTIMATE_DATA, payload: &[u8]) -> Result<Uplink, Fault> {
+    let level = State { attitude_rad: Vector3::new(data.roll, -data.pitch, -data.yaw), ..State::default() };
+    if !level.is_plausible() {
+        return Err(Fault::Implausible);
+    }
+    let position_m = flip(Vector3::new(data.x, data.y, data.z));
+    let sigmas = extended_sigmas::<VISION_POSITION_ESTIMATE_DATA>(payload);
+    plausible(data.usec, Pose { position_m, ..Pose::of(&level, sigmas) })
+}
+
+fn read_mocap(data: &ATT_POS_MOCAP_DATA, payload: &[u8]) -> Result<Uplink, Fault> {
+    let position_m = flip(Vector3::new(data.x, data.y, data.z));
+    let sigmas = extended_sigmas::<ATT_POS_MOCAP_DATA>(payload);
+    plausible(data.time_usec, Pose { position_m, attitude: flip_turn(data.q), sigmas })
+}
+
+fn plausible(sent_us: u64, pose: Pose) -> Result<Uplink, Fault> {
+    if pose.is_plausible() { Ok(Uplink::Pose { sent_us, pose }) } else { Err(Fault::Implausible) }
+}
+
+fn write_mocap(sent_us: u64, pose: &Pose) -> ATT_POS_MOCAP_DATA {
+    let [x, y, z] = flip(pose.position_m).into();
+    ATT_POS_MOCAP_DATA { time_usec: sent_us, q: flip_turn(pose.attitude), x, y, z }
+}
+
+/// Returns the standard deviations in the covariance with which the extension fields of `D` begin.
+fn extended_sigmas<D: MessageData>(payload: &[u8]) -> PoseSigmas {
+    let number = |place| f32::from_le_bytes(field(payload, D::ENCODED_LEN + 4 * place));
+    sigmas(&core::array::from_fn(number))
+}
+
+fn sigmas(covariance: &[f32; 21]) -> PoseSigmas {
+    let [x, _, _, _, _, _, y, _, _, _, _, z, _, _, _, roll, _, _, pitch, _, yaw] = *covariance;
+    if x.is_nan() { PoseSigmas::UNKNOWN } else { PoseSigmas::from_variances([x, y, z], [roll, pitch, yaw]) }
+}
+
+/// Returns a diagonal covariance; zeros stand for what is unknown.
+fn covariance(sigmas: &PoseSigmas) -> [f32; 21] {
+    let [position, attitude] = [sigmas.position_m, sigmas.attitude_rad].map(|sigma| sigma.map_or(0.0, |it| it * it));
+    core::array::from_fn(|place| match place {
+        0 | 6 | 11 => position,
+        15 | 18 | 20 => attitude,
+        _ => 0.0,
+    })
 }
 
 fn read_setpoint(data: &SET_POSITION_TARGET_LOCAL_NED_DATA, receiver: Address) -> Result<Uplink, Fault> {

@@ -9,7 +9,7 @@
 mod reference;
 
 use afbc_link::{Address, Command, Counters, Decoder, FRAME_MAX, Message as _, Sender, Uplink};
-use afbc_types::{Setpoint, State};
+use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use mavlink::Message as _;
 use mavlink::dialects::common::MavMessage;
 use nalgebra::Vector3;
@@ -27,7 +27,12 @@ fn messages() -> impl Strategy<Value = Uplink> {
         Just(Uplink::Command(Command::Disarm)),
         (any::<u64>(), number.clone()).prop_map(|(sent_us, x)| {
             let state = State { position_m: Vector3::new(x, 2.0 * x, 3.0 * x), ..State::default() };
-            Uplink::State { sent_us, state }
+            Uplink::State { sent_us, state, sigmas: PoseSigmas::UNKNOWN }
+        }),
+        (any::<u64>(), number.clone()).prop_map(|(sent_us, x)| {
+            let sigmas = PoseSigmas { position_m: Some(1.0 + x.abs()), attitude_rad: Some(0.5) };
+            let pose = Pose { position_m: Vector3::new(x, 2.0 * x, 3.0 * x), sigmas, ..Pose::default() };
+            Uplink::Pose { sent_us, pose }
         }),
         number.prop_map(|x| Uplink::Setpoint(Setpoint { position_m: Vector3::new(x, -x, x), ..Setpoint::default() })),
     ]
@@ -73,6 +78,8 @@ fn expected(stream: &[u8]) -> Vec<Uplink> {
         76 => length <= 33,
         75 => length <= 35,
         84 => length <= 53,
+        102 => length <= 117,
+        138 => length <= 120,
         331 => length <= 233,
         _ => false,
     };
@@ -287,7 +294,8 @@ fn a_truncated_frame_may_be_completed_by_the_start_of_the_next() {
 /// completed by bytes of the next frame to a valid one, which is delivered.
 #[test]
 fn a_truncated_frame_may_become_another_by_chance() {
-    let state = Uplink::State { sent_us: 14_286_421_826_361_620_939, state: State::default() };
+    let state =
+        Uplink::State { sent_us: 14_286_421_826_361_620_939, state: State::default(), sigmas: PoseSigmas::UNKNOWN };
     let sent = frames(&[Uplink::Heartbeat, Uplink::Command(Command::Disarm), state]);
     let part = (1..sent[1].len()).map(|length| &sent[1][..length]).find(|part| {
         let stream = [sent[0].as_slice(), part, &sent[2], &FLUSH].concat();
@@ -308,7 +316,8 @@ fn a_corrupted_frame_is_dropped() {
         Uplink::Heartbeat,
         Uplink::Command(Command::Arm),
         Uplink::Setpoint(setpoint),
-        Uplink::State { sent_us: 1, state },
+        Uplink::Pose { sent_us: 1, pose: Pose { position_m: Vector3::new(1.0, 2.0, 3.0), ..Pose::default() } },
+        Uplink::State { sent_us: 1, state, sigmas: PoseSigmas::UNKNOWN },
     ] {
         let sent = frames(&[neighbour, hit, neighbour]);
         for place in 0..sent[1].len() {

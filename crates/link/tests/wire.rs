@@ -11,7 +11,7 @@ use afbc_link::{
     Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, Health, MavCmd, MavSeverity, Message, Sender,
     StatesRefused, Uplink,
 };
-use afbc_types::{Axis, PerAxis, RotorSpeeds, Setpoint, State};
+use afbc_types::{Axis, PerAxis, PoseSigmas, RotorSpeeds, Setpoint, State};
 use mavlink::dialects::common::{
     ATTITUDE_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, HIL_ACTUATOR_CONTROLS_DATA, MavFrame, ODOMETRY_DATA,
     PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
@@ -89,7 +89,7 @@ fn bytes_are_the_mavlink_crates() {
     (expected.rollspeed, expected.pitchspeed, expected.yawspeed) = (0.1, -0.2, -0.3);
     (expected.q[2], expected.q[3]) = (-0.0, -0.0);
     (expected.vy, expected.vz) = (-0.0, -0.0);
-    assert_eq!(bytes(&Uplink::State { sent_us: 99, state }), theirs(&expected));
+    assert_eq!(bytes(&Uplink::State { sent_us: 99, state, sigmas: PoseSigmas::UNKNOWN }), theirs(&expected));
 
     let command =
         COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, param1: 1.0, ..COMMAND_LONG_DATA::DEFAULT };

@@ -6,10 +6,11 @@ use crate::flight::Report;
 use afbc::monitor::Norm;
 use afbc_control::Trip;
 use afbc_flight_core::rate;
-use afbc_flight_core::tracker::Refused;
+use afbc_flight_core::supervisor::COAST_US;
+use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, Sighting};
 use afbc_flight_core::{Inbox, Mode, Stamped, Tracker};
 use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, Sender, StatesRefused, Text, Uplink};
-use afbc_types::{PerAxis, State};
+use afbc_types::{PerAxis, Pose, State};
 
 /// Address of the vehicle: system 1, component 1 (autopilot).
 pub const ADDRESS: Address = Address { system: 1, component: 1 };
@@ -49,6 +50,8 @@ pub struct Comms {
     decoder: Decoder<Uplink>,
     sender: Sender,
     tracker: Tracker,
+    /// True if the vehicle has an estimate of its own: then the tracker's poses are for it.
+    estimates: bool,
     /// Start of the last tick \[us\], the time stamp of everything that arrives before the next one.
     now_us: u64,
     tick: u64,
@@ -76,6 +79,7 @@ impl Comms {
             decoder: Decoder::new(ADDRESS),
             sender: Sender::new(ADDRESS),
             tracker: Tracker::default(),
+            estimates: false,
             now_us: 0,
             tick: 0,
             tick_us_max: 0.0,
@@ -90,18 +94,33 @@ impl Comms {
     }
 
     /// Processes the next bytes of the stream; returns new inputs for the control tick, to be [posted](Inbox::post).
+    ///
+    /// A vehicle without an estimate of its own ignores poses, since a law needs velocities and rates.
     pub fn receive(&mut self, bytes: &[u8]) -> Inbox {
         let mut news = Inbox::default();
-        let Comms { decoder, tracker, now_us, state, state_is_news, answers, .. } = self;
+        let Comms { decoder, tracker, estimates, now_us, state, state_is_news, answers, .. } = self;
         decoder.feed(bytes, |from, message| match message {
             Uplink::Heartbeat => (),
-            Uplink::State { sent_us, state: value } => {
-                let sender = u16::from_be_bytes([from.system, from.component]);
-                if let Some(measured) = tracker.stamp(sender, sent_us, *now_us, value) {
-                    news.put_state(measured);
+            Uplink::State { sent_us, state: value, sigmas } => {
+                let age_max_us = if *estimates { POSE_AGE_MAX_US } else { COAST_US.into() };
+                let sighting = Sighting::State(value);
+                if let Some(at_us) = tracker.sight(number(from), sent_us, *now_us, sighting, age_max_us) {
+                    if *now_us - at_us <= COAST_US.into() {
+                        news.put_state(Stamped { value, at_us });
+                    }
+                    if *estimates {
+                        news.put_pose(Stamped { value: Pose::of(&value, sigmas), at_us });
+                    }
                     (*state, *state_is_news) = (Some(value), true);
                 }
             }
+            Uplink::Pose { sent_us, pose: value } if *estimates => {
+                let sighting = Sighting::Pose(value);
+                if let Some(at_us) = tracker.sight(number(from), sent_us, *now_us, sighting, POSE_AGE_MAX_US) {
+                    news.put_pose(Stamped { value, at_us });
+                }
+            }
+            Uplink::Pose { .. } => (),
             Uplink::Setpoint(value) => news.put_setpoint(Stamped { value, at_us: *now_us }),
             Uplink::Command(command) => answers.hear(command, from, *now_us, &mut news),
         });
@@ -128,6 +147,7 @@ impl Comms {
         self.tick_us_max = self.tick_us_max.max(tick_us);
 
         let armed = report.mode.armed();
+        self.estimates = report.estimate.is_some();
         if let Some(estimate) = report.estimate {
             (self.state, self.state_is_news) = (Some(estimate), true);
         }
@@ -199,4 +219,9 @@ impl Comms {
             }));
         }
     }
+}
+
+/// Returns a sender's number for the [`Tracker`].
+fn number(from: Address) -> u16 {
+    u16::from_be_bytes([from.system, from.component])
 }

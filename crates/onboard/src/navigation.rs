@@ -3,13 +3,13 @@
 use crate::readings::{Aged, Readings};
 use afbc_estimator::{Easing, Estimate, Estimator, Measurement, Memory, Settings, Timed};
 use afbc_flight_core::{Inbox, Refusal, Stamped};
-use afbc_types::{OutOfRange, State};
+use afbc_types::{OutOfRange, Pose, State};
 
 /// Standard deviations of a tracker's pose that does not say how good it is: a motion-capture system's \[m, rad\].
 const TRACKER: (f32, f32) = (0.003, 0.01);
 
 /// Estimator and memory of a vehicle. Until its first sample of an inertial sensor, the vehicle flies on the states
-/// that come over the link; from then on those are measurements like others.
+/// that come over the link; from then on their poses, and poses that come alone, are measurements like others.
 #[derive(Clone, Debug)]
 pub struct Navigation {
     estimator: Estimator,
@@ -17,8 +17,6 @@ pub struct Navigation {
     easing: Easing,
     /// True if there has been a sample.
     senses: bool,
-    /// Time of the tracker's last state that was taken as a measurement \[us\].
-    tracked_us: Option<u64>,
 }
 
 impl Navigation {
@@ -32,7 +30,6 @@ impl Navigation {
             memory: Memory::default(),
             easing: Easing::default(),
             senses: false,
-            tracked_us: None,
         })
     }
 
@@ -48,9 +45,8 @@ impl Navigation {
         for aid in readings.aids.iter().flatten() {
             self.memory.offer(&Aged::timed(*aid, now_us));
         }
-        if let Some(state) = inbox.state().filter(|state| self.tracked_us.is_none_or(|last| state.at_us > last)) {
-            self.tracked_us = Some(state.at_us);
-            self.memory.offer(&Timed { value: pose(&state.value), at_us: state.at_us });
+        if let Some(Stamped { value, at_us }) = inbox.pose() {
+            self.memory.offer(&Timed { value: measurement(value), at_us: *at_us });
         }
         let estimate = self.estimator.step(&mut self.memory, now_us, sample.as_ref());
         tell(&estimate, self.easing.step(&estimate), now_us, inbox);
@@ -76,14 +72,12 @@ pub fn tell(estimate: &Estimate, state: State, now_us: u64, inbox: &mut Inbox) {
     }
 }
 
-/// Returns a tracker's state as a measurement: its pose.
-fn pose(state: &State) -> Measurement {
+fn measurement(pose: &Pose) -> Measurement {
     let (position_sigma_m, attitude_sigma_rad) = TRACKER;
-    let q = state.quaternion().coords;
     Measurement::Pose {
-        position_m: state.position_m,
-        attitude: [q.w, q.x, q.y, q.z],
-        position_sigma_m,
-        attitude_sigma_rad,
+        position_m: pose.position_m,
+        attitude: pose.attitude,
+        position_sigma_m: pose.sigmas.position_m.unwrap_or(position_sigma_m),
+        attitude_sigma_rad: pose.sigmas.attitude_rad.unwrap_or(attitude_sigma_rad),
     }
 }

@@ -4,7 +4,7 @@
 use afbc_flight_core::{Inbox, Mode, Refusal};
 use afbc_link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
 use afbc_onboard::{CLOCK_FAILED, Comms, Configuration, Flight, TICK_OFF};
-use afbc_types::{Setpoint, State};
+use afbc_types::{PoseSigmas, Setpoint, State};
 
 const STATION: Address = Address { system: 255, component: 190 };
 
@@ -49,7 +49,7 @@ impl Bench {
             // Never twice the same, like measurements.
             let mut state = State::default();
             state.position_m.z = 1e-6 * (self.now_us % 11) as f32;
-            self.hear(Uplink::State { sent_us: self.now_us, state });
+            self.hear(Uplink::State { sent_us: self.now_us, state, sigmas: PoseSigmas::UNKNOWN });
             self.hear(Uplink::Setpoint(Setpoint::default()));
             let report = self.flight.tick(self.now_us, &mut self.inbox.take(), &afbc_onboard::Readings::NONE);
             self.mode = report.mode;

@@ -3,7 +3,6 @@
 use crate::budget::Linked;
 use crate::exercise::motion;
 use crate::{Board, Error};
-use afbc_link::Uplink;
 use afbc_sim::in_the_loop::Station;
 use std::path::Path;
 use std::time::Duration;
@@ -44,7 +43,7 @@ impl Beside {
         let mut station = Station::default();
         for count in 1..=50_u32 {
             let (state, _) = motion(count as f32);
-            station.say(&Uplink::State { sent_us: u64::from(count), state });
+            station.track(u64::from(count), state);
         }
         board.send(&station.take())?;
         let gdb = board.halt()?;

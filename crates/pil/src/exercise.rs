@@ -18,7 +18,7 @@ pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
     // Two gaps: one that is coasted through, one that ends in a descent.
     let tracked = !(2_500..2_600).contains(&tick) && !(4_000..5_000).contains(&tick);
     if tracked {
-        station.say(&Uplink::State { sent_us: tick * 1000, state });
+        station.track(tick * 1000, state);
     }
     if tick.is_multiple_of(10) {
         station.say(&Uplink::Setpoint(setpoint));

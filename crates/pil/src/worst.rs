@@ -137,7 +137,7 @@ impl EmulatedFlight {
     fn fly(&mut self, state: State, setpoint: Setpoint) -> Result<Option<u32>, Error> {
         self.tick += 1;
         match self.source {
-            Source::Link => self.station.say(&Uplink::State { sent_us: self.tick * 1000, state }),
+            Source::Link => self.station.track(self.tick * 1000, state),
             Source::Estimate => {
                 let readings = self.readings(&state);
                 self.emulator.sense(&readings);

@@ -71,7 +71,7 @@ impl Talk {
             if heard.time_us >= spoke_us + EVERY_US {
                 let (state, setpoint) = motion(0.0);
                 self.station.say(&Uplink::Setpoint(setpoint));
-                self.station.say(&Uplink::State { sent_us: heard.time_us, state });
+                self.station.track(heard.time_us, state);
                 command.iter().for_each(|command| self.station.say(&Uplink::Command(*command)));
                 self.spoke_us = heard.time_us;
                 self.board.send(&self.station.take()).unwrap();

@@ -28,10 +28,8 @@ impl State {
         attitude: &Quaternion<f32>,
         rates_rad_s: Vector3<f32>,
     ) -> Option<Self> {
-        // False of a NaN.
-        let is_rotation = (attitude.norm_squared() - 1.0).abs() <= NORM_SQUARED_ERROR_MAX;
         let state = State { position_m, velocity_m_s, attitude_rad: euler(attitude), rates_rad_s };
-        (is_rotation && state.is_plausible()).then_some(state)
+        (is_rotation(attitude) && state.is_plausible()).then_some(state)
     }
 
     /// Returns the attitude as a unit quaternion from body to earth coordinates, of either sign.
@@ -45,6 +43,12 @@ impl State {
             cx * cy * sz - sx * sy * cz,
         ))
     }
+}
+
+/// True if a quaternion's squared norm is within 0.9 to 1.1.
+pub(crate) fn is_rotation(attitude: &Quaternion<f32>) -> bool {
+    // False of a NaN.
+    (attitude.norm_squared() - 1.0).abs() <= NORM_SQUARED_ERROR_MAX
 }
 
 /// Returns roll, pitch and yaw \[rad\] of the z-y-x sequence for a quaternion of any norm but zero. Roll and yaw are

@@ -33,6 +33,7 @@ mod declared;
 mod frame;
 mod motion;
 mod parameters;
+mod pose;
 mod range;
 
 pub use actuation::{Inputs, RotorForces, RotorSpeeds};
@@ -42,4 +43,5 @@ pub use frame::{Airframe, PLUS, ROTOR_POSITION, ROTORS, ROTORS_MAX, Rotor};
 pub use motion::{Setpoint, State};
 pub use nalgebra;
 pub use parameters::Parameters;
+pub use pose::{Pose, PoseSigmas};
 pub use range::{OutOfRange, Range};

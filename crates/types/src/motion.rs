@@ -19,8 +19,8 @@ pub struct State {
     pub rates_rad_s: Vector3<f32>,
 }
 
-/// Largest position that a state or setpoint may hold, per coordinate \[m\].
-const POSITION_MAX_M: f32 = 1e5;
+/// Largest position that a state, pose or setpoint may hold, per coordinate \[m\].
+pub(crate) const POSITION_MAX_M: f32 = 1e5;
 /// Largest speed, per coordinate \[m/s\].
 const VELOCITY_MAX_M_S: f32 = 1e3;
 /// Largest acceleration of a setpoint, per coordinate \[m/s2\].
@@ -35,7 +35,7 @@ const ANGLE_MAX_RAD: f32 = 1e3;
 const RATE_MAX_RAD_S: f32 = 1e3;
 
 /// True if all coordinates are finite and at most `max` in size.
-fn within(vector: &Vector3<f32>, max: f32) -> bool {
+pub(crate) fn within(vector: &Vector3<f32>, max: f32) -> bool {
     // False of NaN.
     vector.x.abs() <= max && vector.y.abs() <= max && vector.z.abs() <= max
 }

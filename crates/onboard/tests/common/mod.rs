@@ -3,8 +3,8 @@
 
 use afbc_flight_core::Inbox;
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
-use afbc_onboard::{Comms, Configuration, Flight, REPORT_MAX, Report};
-use afbc_types::{Setpoint, State};
+use afbc_onboard::{Comms, Configuration, Flight, REPORT_MAX, Readings, Report};
+use afbc_types::{PoseSigmas, Setpoint, State};
 
 pub const STATION: Address = Address { system: 255, component: 190 };
 
@@ -58,13 +58,18 @@ impl Bench {
         // A tracker never repeats a state exactly.
         let mut state = *state;
         state.position_m.z += (self.now_us % 1_000_000) as f32 * 1e-12;
-        self.hear(Uplink::State { sent_us: self.now_us, state });
+        self.hear(Uplink::State { sent_us: self.now_us, state, sigmas: PoseSigmas::UNKNOWN });
     }
 
     /// Runs a tick with what was received; returns its report and all messages.
     pub fn step(&mut self) -> (Report, Vec<Downlink>) {
+        self.sense(&Readings::NONE)
+    }
+
+    /// Runs a tick with what was received and these readings; returns its report and all messages.
+    pub fn sense(&mut self, readings: &Readings) -> (Report, Vec<Downlink>) {
         self.now_us += 1000;
-        let report = self.flight.tick(self.now_us, &mut self.inbox.take(), &afbc_onboard::Readings::NONE);
+        let report = self.flight.tick(self.now_us, &mut self.inbox.take(), readings);
         (report, self.said(&report))
     }
 

@@ -70,12 +70,15 @@ fn least_baud() -> u32 {
 mod tests {
     use super::*;
     use afbc_link::{Address, Command, FRAME_MAX, MavCmd, Sender, Uplink};
-    use afbc_types::{Setpoint, State};
+    use afbc_types::{PoseSigmas, Setpoint, State};
 
     #[test]
     fn frames_are_as_long_as_said() {
         let length = |message: Uplink| Sender::new(Address::default()).send(&message, &mut [0; FRAME_MAX]).len() as u64;
-        assert_eq!(length(Uplink::State { sent_us: 0, state: State::default() }), STATE_BYTES);
+        assert_eq!(
+            length(Uplink::State { sent_us: 0, state: State::default(), sigmas: PoseSigmas::UNKNOWN }),
+            STATE_BYTES
+        );
         assert!(length(Uplink::Setpoint(Setpoint::default())) <= SETPOINT_BYTES);
         assert!(length(Uplink::Command(Command::Other(MavCmd::MAV_CMD_REQUEST_MESSAGE as u16))) <= PING_BYTES);
     }

@@ -6,7 +6,7 @@ use afbc_link::{
     Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, Health, MavCmd, Sender, Text, Uplink,
 };
 use afbc_onboard::BUSY;
-use afbc_types::{ROTORS_MAX, RotorSpeeds, Setpoint, State};
+use afbc_types::{PoseSigmas, ROTORS_MAX, RotorSpeeds, Setpoint, State};
 use std::time::Instant;
 
 /// Usual address of a ground station.
@@ -71,7 +71,7 @@ impl Station {
 
     /// Queues a measured state with the time `sent_us` on this side's clock, which must increase.
     pub fn track(&mut self, sent_us: u64, state: State) {
-        self.say(&Uplink::State { sent_us, state });
+        self.say(&Uplink::State { sent_us, state, sigmas: PoseSigmas::UNKNOWN });
     }
 
     /// Queues a setpoint.

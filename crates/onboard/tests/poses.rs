@@ -1,0 +1,185 @@
+//! Poses over the link to a vehicle with an inertial sensor, and to one without.
+#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
+
+mod common;
+
+use afbc_flight_core::Refusal;
+use afbc_link::{Answer, Command, Downlink, Uplink};
+use afbc_onboard::{Aged, Readings};
+use afbc_types::{Pose, PoseSigmas, Setpoint, State};
+use common::Bench;
+use nalgebra::Vector3;
+
+/// Where the vehicle is, and its heading.
+const PLACE_M: Vector3<f32> = Vector3::new(3.0, -2.0, 0.5);
+const YAW_RAD: f32 = 0.7;
+/// Time in which the estimator starts \[ms\].
+const START_MS: u64 = 4_000;
+
+/// Pseudo-random numbers in -1..1, different for each time.
+fn noise(ms: u64) -> Vector3<f32> {
+    let number = |k: u64| ((ms * 3 + k).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as f32 / (1 << 23) as f32 - 1.0;
+    Vector3::new(number(0), number(1), number(2))
+}
+
+/// The motion: at rest, then to and fro along x; offset \[m\] and acceleration \[m/s2\].
+fn swing(ms: u64) -> (f32, f32) {
+    const RATE_RAD_S: f32 = 2.0;
+    let phase = RATE_RAD_S * (ms.saturating_sub(START_MS) as f32 * 1e-3);
+    let begun = if ms > START_MS { 1.0 } else { 0.0 };
+    (0.5 * (1.0 - phase.cos()), begun * 0.5 * RATE_RAD_S * RATE_RAD_S * phase.cos())
+}
+
+fn state(offset_m: f32) -> State {
+    let position_m = PLACE_M + Vector3::new(offset_m, 0.0, 0.0);
+    State { position_m, attitude_rad: Vector3::new(0.0, 0.0, YAW_RAD), ..State::default() }
+}
+
+/// A sample of a level vehicle with this acceleration along the earth's x.
+fn sample(ms: u64, acceleration_m_s2: f32) -> Readings {
+    let force = Vector3::new(YAW_RAD.cos() * acceleration_m_s2, -YAW_RAD.sin() * acceleration_m_s2, 9.81);
+    let value = [noise(ms) * 1e-3, force + noise(ms + 1_000_000) * 0.02];
+    Readings { imu: Some(Aged { value, age_us: 0 }), ..Readings::NONE }
+}
+
+/// How poses are sent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum By {
+    /// As poses.
+    Pose,
+    /// As whole states, whose velocities and rates are wrong: only the pose is used.
+    State,
+}
+
+fn message(by: By, sent_us: u64, state: State, sigmas: PoseSigmas) -> Uplink {
+    match by {
+        By::Pose => Uplink::Pose { sent_us, pose: Pose::of(&state, sigmas) },
+        By::State => {
+            let velocity_m_s = Vector3::new(5.0, 5.0, 5.0);
+            Uplink::State { sent_us, state: State { velocity_m_s, ..state }, sigmas }
+        }
+    }
+}
+
+/// The answer to a request to arm in the next ticks, with a setpoint at the place.
+fn arm(bench: &mut Bench, from_ms: u64) -> Option<Answer> {
+    let setpoint = Setpoint { position_m: PLACE_M, yaw_rad: YAW_RAD, ..Setpoint::default() };
+    bench.hear(Uplink::Setpoint(setpoint));
+    bench.hear(Uplink::Command(Command::Arm));
+    (from_ms..from_ms + 3).find_map(|ms| {
+        let (_, said) = bench.sense(&sample(ms, 0.0));
+        said.into_iter().find_map(|message| match message {
+            Downlink::Answer { answer, .. } => Some(answer),
+            _ => None,
+        })
+    })
+}
+
+/// Poses alone, 50 times per second, tell the vehicle where it is and how it is headed. It can be
+/// armed.
+#[test]
+fn a_vehicle_knows_where_it_is() {
+    for by in [By::Pose, By::State] {
+        let (mut bench, mut told) = (Bench::new(), None);
+        for ms in 0..START_MS {
+            // The sender's clock is not the vehicle's.
+            if ms % 20 == 0 {
+                let mut measured = state(0.0);
+                measured.position_m += noise(ms) * 1e-3;
+                bench.hear(message(by, 1_700_000_000_000_000 + ms * 1000, measured, PoseSigmas::UNKNOWN));
+            }
+            told = bench.sense(&sample(ms, 0.0)).0.estimate;
+        }
+        let told = told.expect("an estimate");
+        assert!((told.position_m - PLACE_M).amax() < 0.005, "{by:?}: {told:?}");
+        assert!((told.attitude_rad - Vector3::new(0.0, 0.0, YAW_RAD)).amax() < 0.02, "{by:?}: {told:?}");
+        assert!(told.velocity_m_s.amax() < 0.05, "{by:?}: {told:?}");
+        assert_eq!(arm(&mut bench, START_MS), Some(Answer::Accepted), "{by:?}");
+    }
+}
+
+/// Without poses it knows neither heading nor position, and says so.
+#[test]
+fn without_poses_it_does_not() {
+    let mut bench = Bench::new();
+    for ms in 0..START_MS {
+        bench.sense(&sample(ms, 0.0));
+    }
+    assert_eq!(arm(&mut bench, START_MS), Some(Answer::Refused(Refusal::HeadingUnknown as i32)));
+}
+
+/// A vehicle without an inertial sensor ignores them, even plausible ones from a tracker in use.
+#[test]
+fn without_an_inertial_sensor_poses_are_ignored() {
+    let mut bench = Bench::new();
+    let mut other = Bench::new();
+    for ms in 0..3_000 {
+        bench.hear(message(By::Pose, ms * 1000 + 500, state(noise(ms).x), PoseSigmas::UNKNOWN));
+        assert_eq!(bench.inbox.pose(), None);
+        for bench in [&mut bench, &mut other] {
+            bench.measure(&State::default());
+        }
+        let reports = [bench.step().0, other.step().0];
+        assert_eq!(reports[0], reports[1]);
+        assert_eq!((reports[0].estimate, reports[0].health.frozen_states), (None, 0));
+    }
+}
+
+/// Poses between 5 and 155 ms late, the vehicle moving at up to 1 m/s: each counts for its own time. The 5 ms of the
+/// fastest cannot be known, and are 5 mm.
+#[test]
+fn late_poses_count_for_their_own_time() {
+    for by in [By::Pose, By::State] {
+        let (mut bench, mut waiting, mut late) = (Bench::new(), std::collections::VecDeque::new(), 0);
+        for ms in 0..12_000 {
+            if ms % 10 == 0 {
+                let delay_ms = 5 + (ms % 400).min(400 - ms % 400) * 3 / 4;
+                let mut measured = state(swing(ms).0);
+                measured.position_m += noise(ms) * 1e-3;
+                waiting.push_back((ms + delay_ms, message(by, ms * 1000, measured, PoseSigmas::UNKNOWN)));
+            }
+            while let Some((_, message)) = waiting.pop_front_if(|(arrives_ms, _)| *arrives_ms <= ms) {
+                let before = bench.inbox.state().copied();
+                bench.hear(message);
+                let state = bench.inbox.state().filter(|state| Some(**state) != before);
+                assert!(state.is_none_or(|state| state.age_us(bench.now_us) <= 20_000), "too old to fly on");
+            }
+            let (offset_m, acceleration_m_s2) = swing(ms);
+            let (report, said) = bench.sense(&sample(ms, acceleration_m_s2));
+            if ms > START_MS + 1_000 {
+                let told = report.estimate.expect("an estimate");
+                let error_m = told.position_m - state(offset_m).position_m;
+                assert!(error_m.amax() < 0.03, "{by:?}, {ms} ms: {error_m}");
+            }
+            for message in said {
+                if let Downlink::Health(health) = message {
+                    late = health.states_refused.late;
+                }
+            }
+        }
+        // Before the vehicle estimates, late states are of no use.
+        assert!(late < 10, "{by:?}: {late}");
+    }
+}
+
+/// A tracker that is off by 0.2 m to and fro is smoothed if it says so.
+#[test]
+fn standard_deviations_count() {
+    let wander = |position_m| {
+        let sigmas = PoseSigmas { position_m, attitude_rad: Some(0.01) };
+        let (mut bench, mut largest) = (Bench::new(), 0.0_f32);
+        for ms in 0..20_000 {
+            if ms % 20 == 0 {
+                let measured = state(if ms % 40 == 0 { 0.2 } else { -0.2 } + 1e-3 * noise(ms).x);
+                bench.hear(message(By::Pose, ms * 1000, measured, sigmas));
+            }
+            let (report, _) = bench.sense(&sample(ms, 0.0));
+            if ms > 15_000 {
+                largest = largest.max((report.estimate.expect("an estimate").position_m - PLACE_M).x.abs());
+            }
+        }
+        largest
+    };
+    let (unsure, sure) = (wander(Some(0.5)), wander(None));
+    assert!(unsure < 0.1 && sure > 0.15, "{unsure} m, {sure} m");
+}
