@@ -85,7 +85,13 @@ pub struct Replayed {
 /// # Errors
 /// A setting out of range.
 pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOfRange> {
-    let settings = Settings { declination_rad: recording.declination_rad, ..Settings::DEFAULT };
+    // White noise is all that EKF2 knows of a receiver and a magnetometer.
+    let settings = Settings {
+        declination_rad: recording.declination_rad,
+        gnss_noise_m: Settings::GNSS_NOISE.range.max as f32,
+        mag_slow_rad: 0.0,
+        ..Settings::DEFAULT
+    };
     let first_us = recording.imu.first().map_or(0, |sample| sample.at_us);
     let mut run = Run {
         estimator: Estimator::new(settings)?,
