@@ -49,9 +49,10 @@ impl Twins {
 }
 
 impl Autopilot for Twins {
-    fn sense(&mut self, readings: &Readings) {
+    fn sense(&mut self, readings: &Readings) -> bool {
         self.emulator.sense(readings);
         self.host.sense(readings);
+        true
     }
 
     fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error> {

@@ -5,9 +5,11 @@ use afbc_onboard::Readings;
 
 /// Receives the link's bytes and answers with bytes.
 pub trait Autopilot {
-    /// Sets what the vehicle's own sensors read for the next [`exchange`](Self::exchange). An autopilot with sensors of
-    /// its own, or without any, ignores it.
-    fn sense(&mut self, _readings: &Readings) {}
+    /// Sets what the vehicle's own sensors read for the next [`exchange`](Self::exchange). False if these readings cannot
+    /// reach it.
+    fn sense(&mut self, _readings: &Readings) -> bool {
+        false
+    }
 
     /// Runs one millisecond of the loop: sends `uplink`, and passes the bytes received to `hear`, in pieces of any
     /// size.

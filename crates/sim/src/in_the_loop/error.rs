@@ -8,6 +8,8 @@ use std::fmt;
 pub enum Error {
     /// The scenario needs a setting that the firmware does not have.
     Mismatch(&'static str),
+    /// The scenario has instruments, whose readings do not reach the vehicle.
+    Unread,
     /// The baud rate is too low for states that are fresh enough.
     Baud {
         /// Baud rate given \[baud\].
@@ -34,6 +36,11 @@ impl fmt::Display for Error {
                 f,
                 "the firmware holds the paper's vehicle and AFBC in the profile flight, but the scenario has {what}; \
                  fly it by `sitl fly`, or change it"
+            ),
+            Error::Unread => write!(
+                f,
+                "the readings of the scenario's [instruments] cannot reach this board; leave them out, or fly it by \
+                 `sitl pil`"
             ),
             Error::Baud { given, least } => {
                 write!(f, "{given} baud is too slow for a state every 10 ms; take at least {least}")

@@ -137,7 +137,9 @@ impl<A: Autopilot> Line<'_, A> {
         let Line { station, autopilot, pace, now_ms, silent_ms, .. } = self;
         let view = world.look();
         if let Some(readings) = world.readings() {
-            autopilot.sense(readings);
+            if !autopilot.sense(readings) {
+                return Err(Error::Unread);
+            }
         } else if let Some(state) = view.state.filter(|_| now_ms.is_multiple_of(pace.state_ms)) {
             station.track(*now_ms * 1000, state);
         }

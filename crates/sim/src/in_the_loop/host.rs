@@ -86,8 +86,9 @@ impl Host {
 }
 
 impl Autopilot for Host {
-    fn sense(&mut self, readings: &Readings) {
+    fn sense(&mut self, readings: &Readings) -> bool {
         Host::sense(self, readings);
+        true
     }
 
     fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error> {

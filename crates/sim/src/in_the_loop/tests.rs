@@ -82,6 +82,38 @@ fn a_dead_line_is_noticed() {
     assert!(matches!(error, Err(Error::Silent)));
 }
 
+/// Samples and fixes have to reach the vehicle; the station's states would be another vehicle's.
+#[test]
+fn instruments_that_nobody_reads_are_refused() {
+    struct Elsewhere;
+    impl Autopilot for Elsewhere {
+        fn exchange(&mut self, _: &[u8], _: &mut dyn FnMut(&[u8])) -> Result<(), Error> {
+            Ok(())
+        }
+    }
+    let scenario = scenario("mocap", 1.0);
+    let error = fly(&scenario, &mut Station::new(), &mut Elsewhere, Pace::LOCKSTEP, |_| ControlFlow::Continue(()));
+    assert!(error.unwrap_err().to_string().contains("[instruments]"));
+}
+
+/// The firmware's own estimate in the loop; without a tracker it says what it misses, and does not arm.
+#[test]
+fn the_firmware_flies_on_its_own_estimate() {
+    let mut scenario = scenario("mocap", 8.0);
+    let mut off_m: f64 = 0.0;
+    let end = fly(&scenario, &mut Station::new(), &mut Host::new().unwrap(), Pace::LOCKSTEP, |sample| {
+        let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
+        off_m = if sample.time_s < 5.0 { 0.0 } else { off_m.max(distance_m) };
+        ControlFlow::Continue(())
+    });
+    assert_eq!(end.unwrap(), LoopEnd { lost: None, interrupted: false, disarmed: true });
+    assert!(off_m > 0.0 && off_m < 0.01, "{off_m} m");
+    scenario.outages = vec![crate::scenario::Outage { start_s: -10.0, end_s: 20.0 }];
+    let error =
+        fly(&scenario, &mut Station::new(), &mut Host::new().unwrap(), Pace::LOCKSTEP, |_| ControlFlow::Continue(()));
+    assert_eq!(error.unwrap_err().to_string(), "the vehicle did not arm: arming refused: estimator has no heading");
+}
+
 #[test]
 fn the_observer_can_break_off() {
     let scenario = scenario("hover", 5.0);
