@@ -5,8 +5,8 @@ use afbc_onboard::Readings;
 
 /// Receives the link's bytes and answers with bytes.
 pub trait Autopilot {
-    /// Sets what the vehicle's own sensors read for the next [`exchange`](Self::exchange). False if these readings cannot
-    /// reach it.
+    /// Sets what the vehicle's own sensors read for the next [`exchange`](Self::exchange). False if these readings
+    /// cannot reach it.
     fn sense(&mut self, _readings: &Readings) -> bool {
         false
     }
