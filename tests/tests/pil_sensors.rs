@@ -2,7 +2,7 @@
 //! preset of an instrument: no bit of estimate and rotor commands differs from the same code on the host.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
-use afbc_plant::instruments::{Barometer, Imu, Magnetometer};
+use afbc_plant::instruments::{Barometer, Failure, Imu, InstrumentFault, Magnetometer};
 use afbc_sim::in_the_loop::{Host, LoopEnd, Pace, Station, fly};
 use afbc_sim::scenario::{Scenario, built_in};
 use core::ops::ControlFlow;
@@ -35,18 +35,22 @@ fn flights() -> Vec<Scenario> {
     indoors.into_iter().chain(outdoors).collect()
 }
 
-/// Flies one. Skipped, with a line, without the emulator or its image; never under CI.
-fn compare(scenario: &Scenario) {
-    let emulator = match Image::Pil.find().and_then(|image| Emulator::start(&image)) {
-        Ok(emulator) => emulator,
+/// Returns board and host, or none, with a line, without the emulator or its image; never under CI.
+fn twins_or_skip() -> Option<Twins> {
+    match Image::Pil.find().and_then(|image| Emulator::start(&image)) {
+        Ok(emulator) => Some(Twins::new(emulator, Host::new().expect("in range"))),
         Err(error) if error.is_missing() && std::env::var_os("CI").is_none() => {
             // Not println!, which the test harness would hide.
             let _ = writeln!(std::io::stderr(), "SKIPPED, nothing was tested: {error}");
-            return;
+            None
         }
         Err(error) => panic!("{error}"),
-    };
-    let mut twins = Twins::new(emulator, Host::new().expect("in range"));
+    }
+}
+
+/// Flies one.
+fn compare(scenario: &Scenario) {
+    let Some(mut twins) = twins_or_skip() else { return };
     let mut off_m: f64 = 0.0;
     let end = fly(scenario, &mut Station::new(), &mut twins, Pace::LOCKSTEP, |sample| {
         // It starts away from the reference.
@@ -69,6 +73,20 @@ fn compare(scenario: &Scenario) {
     // Indoors it flies as well as on the states of a tracker; outdoors the receiver's error is its own.
     let allowed_m = if scenario.instruments.tracker.is_some() { 0.02 } else { 6.0 };
     assert!(off_m < allowed_m, "{}: {off_m} m", scenario.name);
+}
+
+/// An inertial sensor that dies, while the others go on: the host and the board give up in the same tick.
+#[test]
+fn what_is_left_of_the_sensors_is_the_hosts_bit_for_bit() {
+    let mut scenario = built_in("mocap").expect("built in").read().expect("valid");
+    scenario.duration_s = 6.0;
+    scenario.instrument_faults = vec![InstrumentFault { failure: Failure::ImuDead, start_s: 3.0, end_s: 6.0 }];
+    let Some(mut twins) = twins_or_skip() else { return };
+    let end = fly(&scenario, &mut Station::new(), &mut twins, Pace::LOCKSTEP, |_| ControlFlow::Continue(()));
+    let lost = end.expect("flown").lost.expect("nobody knows the attitude");
+    let comparison = twins.comparison();
+    assert!(lost.time_s > 5.0 && comparison.armed_ticks > 5_000, "{lost:?}, {comparison:?}");
+    assert_eq!((comparison.first_difference, comparison.differing_bits), (None, 0), "{comparison:?}");
 }
 
 #[test]

@@ -64,7 +64,7 @@ impl Board for Emulated {
     /// Takes what the host has sent.
     fn sense(&mut self, readings: &mut Readings) {
         READINGS.lock(|cell| match &mut *cell.borrow_mut() {
-            Some(sent) if sent.imu.is_some() => {
+            Some(sent) if !sent.is_empty() => {
                 readings.clone_from(sent);
                 sent.clear();
             }

@@ -44,6 +44,12 @@ impl Readings {
     /// Length on the [wire](crate::ReplyHead) \[bytes\].
     pub const LEN: usize = IMU_LEN + AIDS_MAX * AID_LEN;
 
+    /// True if no sensor has read anything.
+    pub fn is_empty(&self) -> bool {
+        // Without gaps: the first is there if any is.
+        self.imu.is_none() && matches!(self.aids, [None, ..])
+    }
+
     /// Forgets all readings.
     pub fn clear(&mut self) {
         self.imu = None;

@@ -3,7 +3,7 @@
 
 mod common;
 
-use afbc_flight_core::Refusal;
+use afbc_flight_core::{Mode, Refusal};
 use afbc_link::{Answer, Command, Downlink, Uplink};
 use afbc_onboard::{Aged, Readings};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
@@ -182,4 +182,34 @@ fn standard_deviations_count() {
     };
     let (unsure, sure) = (wander(Some(0.5)), wander(None));
     assert!(unsure < 0.1 && sure > 0.15, "{unsure} m, {sure} m");
+}
+
+/// Once the inertial sensor is silent for good, whole states of the link stand in, and the flight goes on; poses alone
+/// have no rates, and do not.
+#[test]
+fn states_of_the_link_stand_in_for_a_dead_sensor() {
+    for by in [By::State, By::Pose] {
+        let mut bench = Bench::new();
+        let place = state(0.0);
+        let mut modes = Vec::new();
+        for ms in 1..START_MS + 4_000 {
+            // A tracker never repeats a state exactly.
+            let position_m = place.position_m + noise(ms) * 1e-4;
+            let told = State { position_m, ..place };
+            bench.hear(match by {
+                By::Pose => Uplink::Pose { sent_us: bench.now_us, pose: Pose::of(&told, PoseSigmas::UNKNOWN) },
+                By::State => Uplink::State { sent_us: bench.now_us, state: told, sigmas: PoseSigmas::UNKNOWN },
+            });
+            bench.hear(Uplink::Setpoint(Setpoint { position_m: PLACE_M, yaw_rad: YAW_RAD, ..Setpoint::default() }));
+            if ms == START_MS {
+                bench.hear(Uplink::Command(Command::Arm));
+            }
+            let dies = ms > START_MS + 1_000;
+            let readings = if dies { Readings::NONE } else { sample(ms, 0.0) };
+            modes.push(bench.sense(&readings).0.mode);
+        }
+        let at = |ms: u64| modes.get(ms as usize).copied();
+        assert_eq!(at(START_MS + 900), Some(Mode::Flying), "{by:?}");
+        assert_eq!(modes.last() == Some(&Mode::Flying), by == By::State, "{by:?}: {:?}", modes.last());
+    }
 }
