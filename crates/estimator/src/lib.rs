@@ -58,10 +58,10 @@
 //!
 //! # Sensors
 //!
-//! * A **tracker** and a **GNSS receiver** both tell the position in the earth frame. Their origins must be the same;
-//!   whichever comes first sets the position, and one that contradicts the other is rejected as long as the other is
-//!   there. The receiver's antenna is taken to be at the centre of mass, as is the IMU: who mounts them elsewhere
-//!   corrects the measurements.
+//! * A **tracker** and a **GNSS receiver** both tell the position in the earth frame. Their origins must be the same
+//!   (on board `afbc_onboard::Navigation` sees to that); whichever comes first sets the position, and one that
+//!   contradicts the other is rejected as long as the other is there. The receiver's antenna is taken to be at the
+//!   centre of mass, as is the IMU: who mounts them elsewhere corrects the measurements.
 //! * Of the standard deviation that a receiver reports, [`Settings::gnss_noise_m`] is noise, and the rest an
 //!   [error that stays for minutes](slow), which further fixes do not average: the position is as good as the receiver.
 //! * A tracker that repeats its pose in every bit for [`Settings::frozen_s`] is frozen, and not believed.

@@ -4,12 +4,17 @@ use crate::readings::{Aged, Readings};
 use afbc_estimator::{Easing, Estimate, Estimator, Measurement, Memory, Settings, Timed};
 use afbc_flight_core::{Inbox, Refusal, Stamped};
 use afbc_types::{OutOfRange, Pose, State};
+use nalgebra::Vector3;
 
 /// Standard deviations of a tracker's pose that does not say how good it is: a motion-capture system's \[m, rad\].
 const TRACKER: (f32, f32) = (0.003, 0.01);
 
 /// Estimator and memory of a vehicle. Until its first sample of an inertial sensor, the vehicle flies on the states
 /// that come over the link; from then on their poses, and poses that come alone, are measurements like others.
+///
+/// The local frame is that of the tracker's poses. Where there is none, its origin is where the vehicle stands at the
+/// first usable fix of its GNSS receiver: one that comes when the estimator runs, and is good enough for a valid
+/// position. All fixes are told in that frame; with a tracker, so that the first one agrees with the estimate.
 #[derive(Clone, Debug)]
 pub struct Navigation {
     estimator: Estimator,
@@ -17,6 +22,10 @@ pub struct Navigation {
     easing: Easing,
     /// True if there has been a sample.
     senses: bool,
+    /// The local frame's origin in the receiver's frame, from the first usable fix on \[m\].
+    origin_m: Option<Vector3<f32>>,
+    /// Estimated position and velocity until then, zero as long as nobody has told a position \[m, m/s\].
+    told: [Vector3<f32>; 2],
 }
 
 impl Navigation {
@@ -30,6 +39,8 @@ impl Navigation {
             memory: Memory::default(),
             easing: Easing::default(),
             senses: false,
+            origin_m: None,
+            told: [Vector3::zeros(); 2],
         })
     }
 
@@ -43,14 +54,40 @@ impl Navigation {
             return None;
         }
         for aid in readings.aids.iter().flatten() {
-            self.memory.offer(&Aged::timed(*aid, now_us));
+            if let Some(aid) = self.localized(*aid) {
+                self.memory.offer(&aid.timed(now_us));
+            }
         }
         if let Some(Stamped { value, at_us }) = inbox.pose() {
             self.memory.offer(&Timed { value: measurement(value), at_us: *at_us });
         }
         let estimate = self.estimator.step(&mut self.memory, now_us, sample.as_ref());
+        if self.origin_m.is_none() && estimate.resets.position > 0 {
+            self.told = [estimate.state.position_m, estimate.state.velocity_m_s];
+        }
         tell(&estimate, self.easing.step(&estimate), now_us, inbox);
         Some(estimate.state)
+    }
+
+    /// Returns a measurement in the local frame; none for a fix before a usable one.
+    #[inline(always)]
+    fn localized(&mut self, mut aid: Aged<Measurement>) -> Option<Aged<Measurement>> {
+        self.origin_m = self.origin_m.or_else(|| self.origin(&aid));
+        if let Measurement::Gnss { position_m, .. } = &mut aid.value {
+            *position_m -= self.origin_m?;
+        }
+        Some(aid)
+    }
+
+    /// Returns the local frame's origin, if this is a usable fix.
+    #[inline(never)]
+    fn origin(&self, aid: &Aged<Measurement>) -> Option<Vector3<f32>> {
+        let Measurement::Gnss { position_m, horizontal_sigma_m, vertical_sigma_m, .. } = aid.value else { return None };
+        let sigma_max_m = self.estimator.settings().position_sigma_max_m;
+        let is_good = horizontal_sigma_m <= sigma_max_m && vertical_sigma_m <= sigma_max_m;
+        let [here_m, velocity_m_s] = self.told;
+        let there_m = here_m - velocity_m_s * (aid.age_us as f32 * 1e-6);
+        (self.memory.runs() && is_good && aid.value.is_plausible()).then(|| position_m - there_m)
     }
 }
 

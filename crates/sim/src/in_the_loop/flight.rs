@@ -8,8 +8,9 @@ use afbc::Profile;
 use afbc_control::{Action, Trace};
 use afbc_link::{Answer, Command};
 use afbc_reader::FileError;
-use afbc_types::{Inputs, Parameters, PerAxis, Rotor, RotorForces};
+use afbc_types::{Inputs, Parameters, PerAxis, Rotor, RotorForces, Setpoint};
 use core::ops::ControlFlow;
+use nalgebra::Vector3;
 
 /// Time between control ticks, and one step of the plant \[s\].
 const STEP_S: f64 = 0.001;
@@ -75,6 +76,9 @@ pub fn check(scenario: &Scenario) -> Result<(), Error> {
 /// forces, and the estimates are unknown. A vehicle that disarms in flight is lost. It is disarmed at the end in any
 /// case; after an error, the autopilot has to do so itself.
 ///
+/// A vehicle with instruments and no tracker has a local frame of its own, and flies the reference from where it says
+/// that it stands. What is observed, motion and reference, is in the scenario's frame.
+///
 /// # Errors
 /// If the firmware cannot fly the scenario, the vehicle does not arm, or the autopilot fails.
 pub fn fly(
@@ -95,6 +99,8 @@ pub fn fly(
         now_ms: 0,
         silent_ms: 0,
         has_armed: false,
+        is_placed: scenario.instruments.tracker.is_some() || world.readings().is_none(),
+        shift_m: Vector3::zeros(),
     };
     let flight = lockstep(&mut world, &mut line, scenario.duration_s, observe)?;
     let disarmed = line.disarm(&mut world)?;
@@ -112,6 +118,10 @@ struct Line<'a, A> {
     /// Time since the last rotor command.
     silent_ms: u64,
     has_armed: bool,
+    /// True if a tracker tells the vehicle its place in the scenario's frame.
+    is_placed: bool,
+    /// What the setpoints are shifted by \[m\].
+    shift_m: Vector3<f32>,
 }
 
 impl<A: Autopilot> Pilot for Line<'_, A> {
@@ -134,7 +144,7 @@ impl<A: Autopilot> Pilot for Line<'_, A> {
 impl<A: Autopilot> Line<'_, A> {
     /// Runs one millisecond: sends what is due, and receives.
     fn turn(&mut self, world: &mut World) -> Result<View, Error> {
-        let Line { station, autopilot, pace, now_ms, silent_ms, .. } = self;
+        let Line { station, autopilot, pace, now_ms, silent_ms, has_armed, is_placed, shift_m, .. } = self;
         let view = world.look();
         if let Some(readings) = world.readings() {
             if !autopilot.sense(readings) {
@@ -143,8 +153,13 @@ impl<A: Autopilot> Line<'_, A> {
         } else if let Some(state) = view.state.filter(|_| now_ms.is_multiple_of(pace.state_ms)) {
             station.track(*now_ms * 1000, state);
         }
+        // In a frame of its own it starts where it says that it stands, as for a pilot who reads its position.
+        if let Some(position_m) = station.heard().position_m.filter(|_| !*is_placed && !*has_armed) {
+            *shift_m = position_m - view.motion.position_m.cast::<f32>();
+        }
         if now_ms.is_multiple_of(pace.setpoint_ms) {
-            station.lead(view.reference.setpoint());
+            let setpoint = view.reference.setpoint();
+            station.lead(Setpoint { position_m: setpoint.position_m + *shift_m, ..setpoint });
         }
         if pace.ping_ms.is_some_and(|ping_ms| now_ms.is_multiple_of(ping_ms)) {
             station.ping();

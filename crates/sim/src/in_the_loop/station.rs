@@ -7,6 +7,7 @@ use afbc_link::{
 };
 use afbc_onboard::BUSY;
 use afbc_types::{PoseSigmas, ROTORS_MAX, RotorSpeeds, Setpoint, State};
+use nalgebra::Vector3;
 use std::time::Instant;
 
 /// Usual address of a ground station.
@@ -34,6 +35,8 @@ pub struct Heard {
     pub armed: bool,
     /// Number of rotor commands.
     pub rotor_commands: u64,
+    /// Last position, in the vehicle's local frame \[m\].
+    pub position_m: Option<Vector3<f32>>,
     /// Last health message.
     pub health: Option<Health>,
     /// Largest age of the state that it has reported while armed \[us\].
@@ -110,6 +113,7 @@ impl Station {
                     round_trip_ms.add(pinged.elapsed().as_secs_f64() * 1e3);
                 }
             }
+            Downlink::Position { position_m, .. } => heard.position_m = Some(position_m),
             Downlink::Answer { answer, .. } => heard.answer = Some(answer),
             Downlink::Health(health) => {
                 if heard.armed {
@@ -118,7 +122,7 @@ impl Station {
                 heard.health = Some(health);
             }
             Downlink::Text { text, .. } => heard.text = Some(text),
-            // Heartbeats, attitudes and positions are not used.
+            // Heartbeats and attitudes are not used.
             _ => {}
         });
     }
