@@ -46,11 +46,13 @@ fn source(vehicle: &Vehicle) -> String {
          /// What the firmware is told of it.\n\
          pub const CONFIGURATION: Configuration<ROTORS> = Configuration {{\n\
          airframe: {airframe},\nsettings: {settings},\ngains: {gains},\ncurve: {curve},\n\
-         estimation: afbc_onboard::Estimation::DEFAULT,\n}};\n",
+         estimation: {estimation},\n}};\n",
         name = vehicle.name,
         settings = literal(&settings),
         gains = literal(&gains),
         curve = literal(&vehicle.curve),
+        // Its name here and there.
+        estimation = literal(&vehicle.estimation).replace("Settings", "Estimation"),
     )
 }
 

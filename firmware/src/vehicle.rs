@@ -8,7 +8,7 @@ use afbc::reference::ReferenceModel;
 use afbc::{Limits, Safeguards, Settings, backstepping};
 use afbc_control::Smoothing;
 use afbc_flight_core::motor::Curve;
-use afbc_onboard::Configuration;
+use afbc_onboard::{Configuration, Estimation};
 use afbc_types::{Airframe, Parameters, PerAxis, Rotor};
 use nalgebra::Vector3;
 

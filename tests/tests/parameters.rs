@@ -111,7 +111,7 @@ fn groups() -> Vec<Group> {
         group("Motors: `[motor]` of a vehicle file", "MOT_", Curve::DEFAULT),
         group("Inertial sensor: `[imu]` of a vehicle file", "IMU_", Mounting::DEFAULT),
         group("Arming", "ARM_", ArmingLimits::DEFAULT),
-        group("Estimator", "EST_", afbc_estimator::Settings::DEFAULT),
+        group("Estimator: `[estimator]` of a vehicle file", "EST_", afbc_estimator::Settings::DEFAULT),
         profiles("Control: `[settings]`, `[limits]`", "C_", Profile::settings),
         profiles("AFBC's monitor", "M_", bounds),
     ];

@@ -4,6 +4,7 @@ use crate::parts::{self, Conditions, FORCE_MAX};
 use crate::vehicle::{CASCADE, Vehicle};
 use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
+use afbc_estimator::Settings as Estimation;
 use afbc_flight_core::motor::Curve;
 use afbc_plant::instruments::Mounting;
 use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, Realism, Rotors};
@@ -75,6 +76,7 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
         realism: Realism { rotors: actuators, ..Realism::default() },
         curve,
         imu: Mounting::DEFAULT,
+        estimation: estimation(&mut root, &parameters)?,
         flight_gains,
         flight_settings,
         text: text.into(),
@@ -174,6 +176,19 @@ fn motor(mut table: Table<'_>) -> Result<Curve, FileError> {
     curve.visit(&mut |declaration, _| table.require(&declaration.range))?;
     table.finish()?;
     Ok(curve)
+}
+
+/// Reads `[estimator]`. Gravity is that of the vehicle, or the nearest at which the estimator starts.
+fn estimation(root: &mut Table<'_>, parameters: &Parameters<f64>) -> Result<Estimation, FileError> {
+    let gravity = Estimation::GRAVITY.range;
+    let gravity_m_s2 = parameters.gravity_m_s2.clamp(gravity.min, gravity.max) as f32;
+    let mut estimation = Estimation { gravity_m_s2, ..Estimation::DEFAULT };
+    if let Some(mut table) = root.table("estimator")? {
+        table.forbid(gravity.name, "gravity is that of [vehicle]; take it out")?;
+        table.declared(&mut estimation)?;
+        table.finish()?;
+    }
+    Ok(estimation)
 }
 
 /// Reads `[gains.flight.afbc.AXIS]` and `[gains.flight.cascade]`; the gains of other laws are read where the laws are

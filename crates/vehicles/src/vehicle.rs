@@ -4,6 +4,7 @@ use afbc::adaptive::Gains;
 use afbc::guarded::Guarded;
 use afbc::monitor::Bounds;
 use afbc::{Profile, Settings};
+use afbc_estimator::Settings as Estimation;
 use afbc_flight_core::motor::Curve;
 use afbc_plant::Realism;
 use afbc_plant::instruments::Mounting;
@@ -33,6 +34,8 @@ pub struct Vehicle {
     pub curve: Curve,
     /// Mounting of the inertial sensor.
     pub imu: Mounting,
+    /// Settings of the firmware's estimator.
+    pub estimation: Estimation,
     /// Gains of AFBC in the profile `flight`: by rule ([`Profile::gains_for`]), or as the file says.
     pub flight_gains: PerAxis<Gains>,
     /// Settings of AFBC's cascade in the profile `flight`: by rule ([`Profile::settings_for`]), or as the file says.

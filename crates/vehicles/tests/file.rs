@@ -2,6 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)]
 
 use afbc::Profile;
+use afbc_estimator::Settings as Estimation;
+use afbc_types::{Declared, Value};
 use afbc_vehicles::{BUILT_IN, Vehicle, built_in, parse};
 
 fn text(name: &str) -> &'static str {
@@ -26,6 +28,7 @@ fn every_built_in_vehicle_is_valid_and_named_after_its_file() {
         let vehicle = known.read().unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(vehicle.name, known.name);
         assert!(!vehicle.description.is_empty());
+        assert_eq!(vehicle.estimation, Estimation::DEFAULT);
         let arm = vehicle.rotors.iter().map(|rotor| rotor.x.hypot(rotor.y)).sum::<f64>() / vehicle.rotors.len() as f64;
         assert!((arm - 1.0).abs() < 0.01, "{}: {arm}", known.name);
     }
@@ -124,4 +127,67 @@ fn damaged_files_get_one_line() {
         }
     }
     assert!(refusals > 2500 && accepted > 100, "{refusals} refused, {accepted} accepted");
+}
+
+/// Every setting of an estimator, by key.
+fn settings(estimation: &Estimation) -> Vec<(&'static str, f32)> {
+    let mut settings = Vec::new();
+    let Ok(()) = estimation.visit(&mut |declaration, value| {
+        let Value::Single([number]) = value else { panic!("{} is not a number", declaration.range.name) };
+        settings.push((declaration.range.name, *number));
+        Ok::<(), core::convert::Infallible>(())
+    });
+    settings
+}
+
+/// Each setting of the estimator can be given alone, up to the ends of its range, and beyond them is refused. Gravity
+/// is the vehicle's.
+#[test]
+fn the_estimators_settings_are_the_files() {
+    let without = parse("my.toml", text("iris"), "my").unwrap().estimation;
+    assert_eq!(without, Estimation::DEFAULT);
+    let gravity = Estimation::GRAVITY.range.name;
+    let mut ranges = Vec::new();
+    let Ok(()) = without.visit(&mut |declaration, _| {
+        ranges.push(declaration.range);
+        Ok::<(), core::convert::Infallible>(())
+    });
+    for range in ranges {
+        let written = |value: f64| format!("{}\n[estimator]\n{} = {value:?}\n", text("iris"), range.name);
+        if range.name == gravity {
+            let error = refused(&written(9.8));
+            assert!(error.contains("estimator.gravity_m_s2") && error.contains("[vehicle]"), "{error}");
+            continue;
+        }
+        for value in [range.min, range.max, 0.3 * range.min + 0.7 * range.max] {
+            let read = parse("my.toml", &written(value), "my").unwrap().estimation;
+            for ((key, read), (_, usual)) in settings(&read).into_iter().zip(settings(&without)) {
+                assert_eq!(read, if key == range.name { value as f32 } else { usual }, "{key} with {}", range.name);
+            }
+            afbc_estimator::Estimator::new(read).unwrap();
+        }
+        for value in [range.min - 0.1 * (range.max - range.min), 1.1 * range.max - 0.1 * range.min] {
+            let error = refused(&written(value));
+            assert!(error.contains(&format!("estimator.{}", range.name)), "{error}");
+        }
+    }
+    for (line, told) in [
+        ("gyro_noise = 1e-3", "did you mean gyro_noise_rad_s_rthz"),
+        ("coast_s = \"5\"", "estimator.coast_s"),
+        ("gate_sigmas = nan", "estimator.gate_sigmas"),
+    ] {
+        let error = refused(&format!("{}\n[estimator]\n{line}\n", text("iris")));
+        assert!(error.contains(told), "{error}");
+    }
+    for (vehicle_m_s2, estimator_m_s2) in [("9.79", 9.79), ("6.0", 9.7), ("11.0", 9.9)] {
+        let there = changed("racer", "[vehicle]", &format!("[vehicle]\ngravity_m_s2 = {vehicle_m_s2}"));
+        assert_eq!(parse("my.toml", &there, "my").unwrap().estimation.gravity_m_s2, estimator_m_s2);
+    }
+    // The example in docs/estimation.md.
+    let page = include_str!("../../../docs/estimation.md");
+    let example = page.split("```toml\n").find(|block| block.starts_with("[estimator]")).unwrap();
+    let example = example.split("```").next().unwrap();
+    let read = parse("my.toml", &format!("{}\n{example}", text("iris")), "my").unwrap().estimation;
+    let differing = settings(&read).into_iter().zip(settings(&without)).filter(|(read, usual)| read != usual);
+    assert_eq!(differing.count(), example.lines().count() - 1);
 }

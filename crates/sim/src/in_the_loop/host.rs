@@ -4,7 +4,7 @@ use super::{Autopilot, Error};
 use afbc::Profile;
 use afbc_flight_core::Inbox;
 use afbc_flight_core::rate::PERIOD_US;
-use afbc_onboard::{Comms, Configuration, Estimation, Flight, Readings, Report};
+use afbc_onboard::{Comms, Configuration, Flight, Readings, Report};
 use afbc_types::{Airframe, OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_vehicles::Vehicle;
 
@@ -52,7 +52,7 @@ impl Host {
     /// The first parameter out of range; none in fact, for a vehicle is checked when its file is read.
     pub fn for_vehicle(vehicle: &Vehicle) -> Result<Self, OutOfRange> {
         let (settings, gains) = (vehicle.settings(Profile::Flight), vehicle.gains(Profile::Flight));
-        let (curve, estimation) = (vehicle.curve, Estimation::DEFAULT);
+        let (curve, estimation) = (vehicle.curve, vehicle.estimation);
         with_rotors!(vehicle.rotors.len(), N => {
             let airframe = Airframe::<N>::new(&vehicle.parameters, &vehicle.rotors)?;
             Ok(Self::of(Box::new(Flight::new(&Configuration { airframe, settings, gains, curve, estimation })?)))

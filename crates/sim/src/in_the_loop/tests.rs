@@ -146,6 +146,24 @@ fn a_receiver_that_is_off_at_the_start_is_no_obstacle() {
     }
 }
 
+/// The firmware's estimator has the settings of the vehicle's file; what a scenario's is told stays.
+#[test]
+fn the_firmwares_estimator_is_the_vehicle_files() {
+    let paper = afbc_vehicles::built_in("paper").unwrap();
+    let flown = |table: &str| {
+        let vehicle = afbc_vehicles::parse("my.toml", &format!("{}\n{table}", paper.text), "my").unwrap();
+        let scenario = scenario("mocap", 2.0).on(&vehicle, afbc::Profile::Flight).unwrap();
+        let (mut station, mut host) = (Station::new(), Host::for_vehicle(&vehicle).unwrap());
+        let end = fly(&scenario, &mut station, &mut host, Pace::LOCKSTEP, |_| ControlFlow::Continue(()));
+        let without = Run::fly(&scenario, &firmware(&scenario).unwrap(), u64::MAX).unwrap().metrics;
+        (end.map(|end| end.lost).map_err(|error| error.to_string()), without)
+    };
+    let ((usual, without), (unstarted, same)) = (flown(""), flown("[estimator]\nalign_s = 30.0"));
+    assert_eq!(usual, Ok(None));
+    assert_eq!(unstarted.unwrap_err(), "the vehicle did not arm: arming refused: estimator has no attitude yet");
+    assert_eq!(without, same);
+}
+
 #[test]
 fn the_observer_can_break_off() {
     let scenario = scenario("hover", 5.0);
