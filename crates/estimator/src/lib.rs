@@ -51,7 +51,7 @@
 //! looks like a manoeuvre, and after hours at rest the filter is sure of a bias that it has never seen. A little of
 //! this remains if the settings are those of the bare part: in ten hours at rest outdoors the standard deviation of a
 //! horizontal bias falls from 0.1 to 0.05 m/s2, where it should stay, and errors reach three of it. With the default
-//! settings they do not reach two (`tests/robust.rs`).
+//! settings they do not reach two (`tests/soundness.rs`).
 //!
 //! **Scalars are fused one by one**, [one per step](fusion), two if measurements pile up, none in a step that predicts:
 //! that bounds the worst step.

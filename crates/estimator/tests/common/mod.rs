@@ -1,6 +1,8 @@
 //! A synthetic flight in `f64`: truth, inertial samples that fit it exactly, and noisy sensors.
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part")]
 
+pub mod checks;
+
 use afbc_estimator::{Estimate, Estimator, ImuSample, Measurement, Memory, Settings, Timed};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -197,6 +199,7 @@ pub struct Sensors {
     pub mag: Option<f64>,
 }
 
+pub const NOTHING: Sensors = Sensors { tracker: None, gnss: None, slow: None, iron: None, baro: None, mag: None };
 pub const MOCAP: Sensors =
     Sensors { tracker: Some((1e-3, 3.5e-3)), gnss: None, slow: None, iron: None, baro: None, mag: None };
 pub const OUTDOOR: Sensors =

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test file uses a part")]
 
+pub(crate) mod steps;
+
 use afbc_control::{Action, FlightController, Screened, Settings};
 use afbc_plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Plant, Quantity};
 use afbc_types::{Axis, Parameters, RotorSpeeds, Setpoint, State};

@@ -1,0 +1,335 @@
+//! Faults of the sensors are refused, told and recovered from.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
+
+mod common;
+
+use afbc_estimator::{Estimator, ImuSample, Measurement, Memory, Settings, Timed};
+use common::checks::{at_rest, flown, position_error};
+use common::{ICM, MOCAP, NOTHING, Noise, OUTDOOR, V3, double, eight, hover, settings, single};
+use nalgebra::Vector3;
+
+#[test]
+fn outliers_are_rejected() {
+    let mut worst: f64 = 0.0;
+    let mut rejected = 0;
+    flown(
+        eight,
+        MOCAP,
+        15,
+        |_, _| true,
+        |ms, measurement| {
+            // One pose in ten is elsewhere, half of those turned over instead.
+            if let Measurement::Pose { position_m, attitude, .. } = &mut measurement.value {
+                let number = measurement.at_us / 10_000;
+                if ms > 4000 && number % 20 == 0 {
+                    position_m.x += 0.4;
+                } else if ms > 4000 && number % 20 == 10 {
+                    *attitude = [0.0, 1.0, 0.0, 0.0];
+                }
+            }
+            true
+        },
+        |ms, estimate, flight| {
+            if ms > 5000 {
+                worst = worst.max(position_error(estimate, flight));
+            }
+            rejected = flight.memory.aids().tracker_position.rejected + flight.memory.aids().tracker_attitude.rejected;
+            assert_eq!((estimate.resets.heading, estimate.resets.velocity), (0, 0));
+        },
+    );
+    assert!(worst < 0.003, "{worst} m");
+    assert!((105..=115).contains(&rejected), "{rejected}");
+}
+
+#[test]
+fn a_moved_tracker_is_believed_after_a_while() {
+    // The tracker's origin moves at 6 s.
+    let offset = V3::new(3.0, -1.0, 0.5);
+    let mut reset_ms = None;
+    flown(
+        eight,
+        MOCAP,
+        12,
+        |_, _| true,
+        |ms, measurement| {
+            if let Measurement::Pose { position_m, .. } = &mut measurement.value {
+                *position_m += if ms > 6000 { single(&offset) } else { Vector3::zeros() };
+            }
+            true
+        },
+        |ms, estimate, flight| {
+            assert!(estimate.resets.position <= 2);
+            if estimate.resets.position == 2 {
+                let reset_ms = *reset_ms.get_or_insert(ms);
+                if ms > reset_ms + 500 {
+                    let error = (double(&estimate.state.position_m) - flight.moment().p - offset).norm();
+                    assert!(error < 0.005, "{ms} ms: {error} m");
+                    let speed = (double(&estimate.state.velocity_m_s) - flight.moment().v).norm();
+                    assert!(speed < 0.05, "{ms} ms: {speed} m/s");
+                }
+            } else if ms > 3000 && ms < 7000 {
+                assert!(position_error(estimate, flight) < 0.05, "{ms} ms");
+            }
+        },
+    );
+    let reset_ms = reset_ms.unwrap();
+    assert!((7000..7200).contains(&reset_ms), "{reset_ms} ms");
+}
+
+/// A tracker that repeats its pose under new times, as a hovering vehicle's would hardly differ from it.
+#[test]
+fn a_frozen_tracker_is_not_believed() {
+    let held = core::cell::RefCell::new(None);
+    let mut frozen = 0;
+    flown(
+        hover,
+        MOCAP,
+        20,
+        |_, _| true,
+        |ms, measurement| {
+            if (6000..14_000).contains(&ms) {
+                measurement.value = *held.borrow_mut().get_or_insert(measurement.value);
+            }
+            true
+        },
+        |ms, estimate, flight| {
+            let error = position_error(estimate, flight);
+            assert!(!(3000..=8000).contains(&ms) || error < 0.1, "{ms} ms: {error} m");
+            // Lost within the time of coasting, and found again.
+            let lost = (11_300..14_000).contains(&ms);
+            let turns = ms < 1100 || (11_100..11_300).contains(&ms) || (14_000..14_100).contains(&ms);
+            assert!(turns || estimate.validity.position != lost, "{ms} ms");
+            assert!(ms < 15_000 || error < 0.005, "{ms} ms: {error} m");
+            frozen = flight.memory.dropped().frozen;
+        },
+    );
+    assert!((770..=790).contains(&frozen), "{frozen}");
+    // By default only: a tracker without noise repeats itself.
+    let estimator = |frozen_s| Estimator::new(Settings { frozen_s, ..settings(&ICM) }).unwrap();
+    for (frozen_s, all) in [(0.0, true), (Settings::DEFAULT.frozen_s, false)] {
+        let (estimate, mut memory) = at_rest(1500, NOTHING, |_, _| ());
+        for ms in 1..1000 {
+            let at_us = estimate.at_us + 1000 * ms;
+            let rates_rad_s = Vector3::new(1e-4 * (ms % 3) as f32, 0.0, 0.0);
+            let sample = ImuSample { at_us, rates_rad_s, specific_force_m_s2: Vector3::new(0.0, 0.0, 9.81) };
+            if ms % 10 == 0 {
+                let value = Measurement::Position { position_m: Vector3::zeros(), sigma_m: 0.01 };
+                memory.offer(&Timed { value, at_us: at_us - 5000 });
+            }
+            let _ = estimator(frozen_s).step(&mut memory, at_us, Some(&sample));
+        }
+        assert_eq!(memory.dropped().frozen == 0, all, "{frozen_s} s");
+    }
+}
+
+#[test]
+fn a_disturbed_field_turns_nothing() {
+    let mut disturbed = 0;
+    flown(
+        eight,
+        OUTDOOR,
+        20,
+        |_, _| true,
+        |ms, measurement| {
+            if let Measurement::MagneticField { field, .. } = &mut measurement.value {
+                // As strong currents make it.
+                if (8000..16_000).contains(&ms) {
+                    *field += Vector3::new(0.3, 0.5, 0.2);
+                }
+            }
+            true
+        },
+        |ms, estimate, flight| {
+            let heading = flight.errors(estimate)[2].abs().to_degrees();
+            assert!(ms < 3000 || heading < 2.0, "{ms} ms: {heading} deg");
+            disturbed = flight.memory.dropped().disturbed + flight.memory.aids().heading.rejected;
+            assert_eq!(estimate.resets.heading, 0);
+        },
+    );
+    assert!(disturbed > 350, "{disturbed}");
+}
+
+#[test]
+fn a_receiver_that_jumps_keeps_its_velocity() {
+    flown(
+        eight,
+        OUTDOOR,
+        16,
+        |_, _| true,
+        |ms, measurement| {
+            if let (Measurement::Gnss { position_m, .. }, 8000..8800) = (&mut measurement.value, ms) {
+                position_m.y += 30.0;
+            }
+            true
+        },
+        |ms, estimate, flight| {
+            assert!(ms < 4000 || position_error(estimate, flight) < 1.0, "{ms} ms");
+            assert_eq!(flight.memory.aids().gnss_velocity.rejected, 0);
+            assert_eq!(estimate.resets.velocity, 0);
+            assert!(ms < 9000 || flight.memory.aids().gnss_position.rejected >= 7);
+            assert!(ms < 9500 || (estimate.resets.position == 1 && estimate.validity.position));
+        },
+    );
+}
+
+#[test]
+fn without_aid_it_stays_level_and_says_what_is_lost() {
+    flown(
+        eight,
+        OUTDOOR,
+        60,
+        |_, _| true,
+        |ms, measurement| ms < 10_000 || matches!(measurement.value, Measurement::Height { .. }),
+        |ms, estimate, flight| {
+            let e = flight.errors(estimate);
+            let v = estimate.validity;
+            if ms > 15_500 {
+                assert!(!v.position && !v.velocity && v.attitude && v.height, "{ms} ms: {v:?}");
+            }
+            if ms > 3000 {
+                let tilt = e.fixed_rows::<2>(0).norm().to_degrees();
+                assert!(tilt < 8.0, "{ms} ms: {tilt} deg");
+                assert!(e[8].abs() < 1.5, "{ms} ms: {} m", e[8]);
+            }
+        },
+    );
+}
+
+#[test]
+fn faults_of_the_imu_are_told() {
+    // Stuck in flight.
+    let mut stuck_ms = None;
+    flown(
+        hover,
+        MOCAP,
+        3,
+        |ms, sample| {
+            if ms > 2000 {
+                (sample.rates_rad_s, sample.specific_force_m_s2) = (Vector3::repeat(0.1), Vector3::repeat(5.0));
+            }
+            true
+        },
+        |_, _| true,
+        |ms, estimate, _| {
+            if estimate.imu.stuck {
+                stuck_ms.get_or_insert(ms);
+                assert!(!estimate.validity.attitude && !estimate.validity.position);
+            }
+        },
+    );
+    assert!((2015..2025).contains(&stuck_ms.unwrap()), "{stuck_ms:?}");
+    // Dead.
+    flown(
+        hover,
+        MOCAP,
+        3,
+        |ms, _| ms < 2000,
+        |_, _| true,
+        |ms, estimate, _| {
+            assert_eq!(estimate.imu.missing, ms > 2019, "{ms}");
+            assert!(ms < 2020 || !estimate.validity.attitude);
+        },
+    );
+    // Clipped for a while: told, and back afterwards.
+    flown(
+        eight,
+        MOCAP,
+        9,
+        |ms, sample| {
+            if (6000..6030).contains(&ms) {
+                sample.rates_rad_s.x = 34.9;
+            }
+            true
+        },
+        |_, _| true,
+        |ms, estimate, flight| {
+            assert_eq!(estimate.imu.clipped, (6000..6229).contains(&ms), "{ms} ms");
+            assert!(ms < 7000 || (position_error(estimate, flight) < 0.005 && estimate.validity.position), "{ms} ms");
+        },
+    );
+    // Noisy.
+    let noise = core::cell::RefCell::new(Noise::new(4));
+    flown(
+        eight,
+        MOCAP,
+        6,
+        |ms, sample| {
+            if ms > 3000 {
+                sample.specific_force_m_s2 += single(&noise.borrow_mut().vector(40.0));
+            }
+            true
+        },
+        |_, _| true,
+        |ms, estimate, _| {
+            let settling = (3000..3500).contains(&ms);
+            assert!(settling || estimate.imu.noisy == (ms >= 3500), "{ms} ms: {:?}", estimate.imu);
+        },
+    );
+}
+
+#[test]
+fn a_gap_in_the_samples_is_survived() {
+    for gap_ms in [15, 100, 240, 600] {
+        flown(
+            eight,
+            MOCAP,
+            14,
+            |ms, _| !(8000..8000 + gap_ms).contains(&ms),
+            |_, _| true,
+            |ms, estimate, flight| {
+                let error = position_error(estimate, flight);
+                assert!(!(3000..8000).contains(&ms) || error < 0.005, "{gap_ms}, {ms} ms");
+                assert!(ms < 12_000 || error < 0.005, "gap of {gap_ms}, {ms} ms: {error} m, {estimate:#?}");
+                assert_eq!(estimate.resets.restarts, u32::from(gap_ms > 250 && ms >= 8000 + gap_ms), "{gap_ms}");
+            },
+        );
+    }
+}
+
+#[test]
+fn bad_measurements_are_counted() {
+    let good = Measurement::Position { position_m: Vector3::zeros(), sigma_m: 0.01 };
+    let (estimate, mut memory) = at_rest(2000, NOTHING, |_, _| ());
+    let estimator = Estimator::new(settings(&ICM)).unwrap();
+    let now_us = estimate.at_us;
+    let step = |memory: &mut Memory, ms: u64| {
+        let sample = ImuSample {
+            at_us: now_us + 1000 * ms,
+            rates_rad_s: Vector3::new(1e-4 * ms as f32, 0.0, 0.0),
+            specific_force_m_s2: Vector3::new(0.0, 0.0, 9.81),
+        };
+        estimator.step(memory, now_us + 1000 * ms, Some(&sample))
+    };
+    for value in [
+        Measurement::Position { position_m: Vector3::new(f32::NAN, 0.0, 0.0), sigma_m: 0.01 },
+        Measurement::Position { position_m: Vector3::new(1e6, 0.0, 0.0), sigma_m: 0.01 },
+        Measurement::Position { position_m: Vector3::zeros(), sigma_m: 0.0 },
+        Measurement::Height { height_m: 1.0, sigma_m: f32::NAN },
+        Measurement::MagneticField { field: Vector3::zeros(), sigma: 0.1 },
+        Measurement::Heading { heading_rad: f32::INFINITY, sigma_rad: 0.1 },
+        Measurement::Pose {
+            position_m: Vector3::zeros(),
+            attitude: [0.2, 0.0, 0.0, 0.0],
+            position_sigma_m: 0.1,
+            attitude_sigma_rad: 0.1,
+        },
+    ] {
+        memory.offer(&Timed { value, at_us: now_us });
+    }
+    let _ = step(&mut memory, 1);
+    assert_eq!(memory.dropped().implausible, 7);
+    // Too old, far in the future, twice the same, and older than the last one.
+    for at_us in [now_us - 300_000, now_us + 500_000, now_us - 20_000, now_us - 20_000, now_us - 40_000] {
+        memory.offer(&Timed { value: good, at_us });
+    }
+    for ms in 2..20 {
+        let _ = step(&mut memory, ms);
+    }
+    let dropped = memory.dropped();
+    assert_eq!((dropped.late, dropped.early, dropped.overtaken), (1, 1, 2), "{dropped:?}");
+    assert_eq!(memory.aids().tracker_position.accepted, 1);
+    for i in 0..10 {
+        memory.offer(&Timed { value: good, at_us: now_us + 20_000 + i });
+    }
+    assert_eq!(memory.dropped().crowded, 2);
+}

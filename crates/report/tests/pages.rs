@@ -1,0 +1,202 @@
+//! Words and layout of pages: labels with units, captions that fit the figure, small and dark screens.
+#![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
+
+mod common;
+
+use afbc_campaign::{QUANTITIES, compare};
+use afbc_plant::{Environment, ParameterChange, Quantity, RotorFault};
+use afbc_report::{self as report, flights};
+use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_sim::flown::Flown;
+use afbc_sim::run::Run;
+use afbc_sim::scenario::{Scenario, built_in};
+use common::{OWN, captions, eventful, flown, folder, gone_alike, hover, labels, named, open, page, svgs, words};
+use roxmltree::Document;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+#[test]
+fn panels_of_a_campaign_have_words_with_units() {
+    let keys: Vec<&str> = QUANTITIES.iter().map(|quantity| quantity.range.name).collect();
+    let out = folder("words");
+    report::campaign::write(&open(&out), &gone_alike(&["afbc", "pid"], &keys, 30, |_, _| false)).unwrap();
+    let svgs = svgs(&out);
+    let success = Document::parse(&svgs["success.svg"]).unwrap();
+    let labels: Vec<String> = labels(&success).into_iter().map(|(text, ..)| text).collect();
+    let (_, drawn) = page(&out).split_once("<h3>Drawn").map(|(a, b)| (a.to_owned(), b.to_owned())).unwrap();
+    let units = [
+        ("_m_s", "[m/s]"),
+        ("_below_m", "[m]"),
+        ("_x_m", "[m]"),
+        ("_y_m", "[m]"),
+        ("_z_m", "[m]"),
+        ("_kg", "[kg]"),
+        ("_rad", "[rad]"),
+        ("_hz", "[Hz]"),
+        ("_s", "[s]"),
+    ];
+    assert!(labels.iter().all(|label| !label.contains('_')), "{labels:?}");
+    let rows: Vec<&str> = drawn.split("<tr>").skip(2).collect();
+    assert_eq!(rows.len(), keys.len());
+    let mut seen = BTreeSet::new();
+    for (key, row) in keys.iter().zip(rows) {
+        let row = row.replace("&lt;", "<");
+        let label = row.split_once("scope=\"row\">").unwrap().1.split('<').next().unwrap();
+        assert!(label.contains(' ') && labels.iter().any(|other| other == label), "{key}: {label}");
+        if let Some((_, unit)) = units.iter().find(|(ending, _)| key.ends_with(ending)) {
+            assert!(label.ends_with(unit), "{key}: {label}");
+        }
+        assert!(seen.insert(label.to_owned()), "{label} twice");
+    }
+    for svg in svgs.values() {
+        assert!(!svg.contains("rmse_") && !svg.contains("mean_abs"));
+    }
+}
+
+#[test]
+fn captions_explain_exactly_what_the_figure_shows() {
+    let mentions = |folder: &Path, word: &str| captions(folder).iter().filter(|text| text.contains(word)).count();
+    let calm = folder("captions-calm");
+    flights::write(&open(&calm), &flown(&hover(6.0), &["afbc", "pid"]), &[]).unwrap();
+    assert_eq!(captions(&calm).len(), 5);
+    for word in ["gust", "Dots", "Cross", "Arrow", "Shaded", "chatter", "lost"] {
+        assert_eq!(mentions(&calm, word), 0, "{word}: {:?}", captions(&calm));
+    }
+
+    let events = folder("captions-events");
+    flights::write(&open(&events), &flown(&eventful(), &["afbc"]), &[]).unwrap();
+    assert_eq!((mentions(&events, "gust"), mentions(&events, "Shaded")), (5, 5), "{:?}", captions(&events));
+    assert_eq!(mentions(&events, "Cross"), 0);
+
+    // Only a change, without a gust.
+    let mut changed = eventful();
+    changed.environment = Environment::new(
+        changed.vehicle,
+        vec![ParameterChange { quantity: Quantity::Mass, factor: 1.1, start_s: 1.0, end_s: 8.0 }],
+        Vec::new(),
+    )
+    .unwrap();
+    changed.realism.wind.gusts.clear();
+    let only = folder("captions-change");
+    flights::write(&open(&only), &flown(&changed, &["afbc"]), &[]).unwrap();
+    assert_eq!((mentions(&only, "gust"), mentions(&only, "Shaded")), (0, 5), "{:?}", captions(&only));
+
+    // A vehicle whose rotors fail.
+    let mut falling = hover(8.0);
+    falling.realism.rotors.faults = vec![RotorFault { rotor: 1, efficiency: 0.0, start_s: 1.0 }];
+    let lost = flown(&falling, &["afbc"]);
+    assert!(lost[0].run.lost.is_some());
+    let fallen = folder("captions-lost");
+    flights::write(&open(&fallen), &lost, &[]).unwrap();
+    // A cross at the loss, or an arrow if it lies beyond the panel.
+    assert_eq!(mentions(&fallen, "lost"), 5, "{:?}", captions(&fallen));
+    let marked = |text: &String| text.contains("Cross:") || text.contains("Arrow:");
+    assert!(captions(&fallen).iter().all(marked), "{:?}", captions(&fallen));
+
+    // The printed law chatters on the paper's vehicle.
+    let paper = Scenario { duration_s: 30.0, ..built_in("paper").unwrap().read().unwrap() };
+    let chatter = folder("captions-chatter");
+    let contender = paper.contenders.iter().find(|contender| contender.name == "afbc").unwrap().clone();
+    let run = Run::fly(&paper, &contender, 10).unwrap();
+    flights::write(&open(&chatter), &[Flown { scenario: paper, run }], &[]).unwrap();
+    let said = captions(&chatter);
+    assert_eq!(said.iter().filter(|text| text.contains("chatter")).count(), 1, "{said:?}");
+
+    // Comparisons: seeds are mentioned only if there are several, losses only if there are some.
+    for (seeds, loses) in [(1, false), (3, false), (1, true)] {
+        let scenario = if loses { falling.clone() } else { hover(6.0) };
+        let scenario = Scenario { contenders: vec![named("afbc")], ..scenario };
+        let out = folder(&format!("captions-compare-{seeds}-{loses}"));
+        report::compare::write(&open(&out), &compare::fly(vec![scenario], seeds, 10, &|| ()).unwrap()).unwrap();
+        let said = format!("{:?} {}", captions(&out)[0], page(&out));
+        assert_eq!(said.contains("over all seeds"), seeds > 1, "{said}");
+        assert_eq!(said.contains("lost a vehicle"), loses, "{said}");
+        // All fly backstepping.
+        assert_eq!(said.contains("Ratio"), !loses, "{said}");
+    }
+    let scenario =
+        Scenario { contenders: vec![Contender::of(ControllerKind::Pid, afbc::Profile::Paper)], ..hover(6.0) };
+    let out = folder("captions-no-ratio");
+    report::compare::write(&open(&out), &compare::fly(vec![scenario], 1, 10, &|| ()).unwrap()).unwrap();
+    assert!(!page(&out).contains("atio"), "no backstepping flew");
+
+    // Campaigns.
+    for loses in [false, true] {
+        let out = folder(&format!("captions-campaign-{loses}"));
+        let summary =
+            gone_alike(&["afbc", "pid"], &["mass_ratio"], 20, |name, flight| loses && name == "pid" && flight < 5);
+        report::campaign::write(&open(&out), &summary).unwrap();
+        let said = captions(&out);
+        assert_eq!(said.len(), 3);
+        assert_eq!(said[0].contains("lost"), loses, "{said:?}");
+        assert_eq!(said[1].contains("lost"), loses, "{said:?}");
+        assert_eq!(page(&out).contains("A lost flight ranks last"), loses);
+        assert!(said[0].contains("95 %") && said[1].contains("95 %") && said[2].contains("95 %"), "{said:?}");
+    }
+    // Without drawn quantities, or without measurements: no figure rather than an empty one.
+    let out = folder("captions-none");
+    report::campaign::write(&open(&out), &gone_alike(&["afbc"], &[], 3, |_, _| true)).unwrap();
+    assert_eq!(captions(&out).len(), 0, "{:?}", captions(&out));
+    assert!(!page(&out).contains("Drawn"));
+}
+
+/// Returns the names of a page's elements that are not within a scrolling one.
+fn unscrolled(page: &str) -> Vec<String> {
+    let mut open: Vec<(String, bool)> = Vec::new();
+    let mut found = Vec::new();
+    for tag in page.split('<').skip(1) {
+        let Some((tag, _)) = tag.split_once('>') else { continue };
+        let name: String = tag.trim_start_matches('/').chars().take_while(|c| c.is_ascii_alphanumeric()).collect();
+        if tag.starts_with('/') {
+            while open.pop().is_some_and(|(other, _)| other != name) {}
+            continue;
+        }
+        if !open.iter().any(|(_, scrolls)| *scrolls) {
+            found.push(name.clone());
+        }
+        let is_void = ["meta", "br", "!DOCTYPE"].contains(&name.as_str()) || tag.ends_with('/');
+        if !is_void && !name.is_empty() {
+            open.push((name, tag.contains("class=\"scroll\"")));
+        }
+    }
+    found
+}
+
+#[test]
+fn pages_fit_a_phone_and_have_a_dark_mode() {
+    let (fly, compared, whole) = (folder("phone-fly"), folder("phone-compare"), folder("phone-campaign"));
+    flights::write(&open(&fly), &flown(&eventful(), &["afbc", "soft"]), &[]).unwrap();
+    let scenario = Scenario { contenders: OWN.iter().map(|name| named(name)).collect(), ..eventful() };
+    report::compare::write(&open(&compared), &compare::fly(vec![scenario], 2, 10, &|| ()).unwrap()).unwrap();
+    report::campaign::write(&open(&whole), &gone_alike(&OWN, &["wind_m_s"], 20, |_, flight| flight == 3)).unwrap();
+    for folder in [fly, compared, whole] {
+        let page = page(&folder);
+        assert!(page.contains("name=\"viewport\" content=\"width=device-width, initial-scale=1\""));
+        assert!(page.contains(".scroll { overflow-x: auto; max-width: 100%; }"));
+        let free = unscrolled(&page);
+        assert!(free.contains(&"h1".to_owned()) && free.contains(&"div".to_owned()), "{free:?}");
+        for wide in ["table", "svg", "pre", "img"] {
+            assert!(!free.contains(&wide.to_owned()), "{}: a {wide} that does not scroll", folder.display());
+        }
+        let scheme = "prefers-color-scheme: dark";
+        assert!(page.contains(scheme) && page.contains("color-scheme: light dark"), "{}", folder.display());
+        assert!(!page.contains("http") && !page.contains("<script") && !page.contains("@import"));
+
+        for (name, text) in svgs(&folder) {
+            let svg = Document::parse(&text).unwrap();
+            let style = svg.root_element().children().find(|node| node.has_tag_name("style"));
+            let style = words(style.unwrap_or_else(|| panic!("{name} has no style")));
+            assert!(style.starts_with("@media screen and (prefers-color-scheme:dark){"), "{name}: {style}");
+            for node in svg.descendants() {
+                for part in ["fill", "stroke"] {
+                    let Some(color) = node.attribute(part).filter(|color| *color != "none") else { continue };
+                    let rule = format!("svg [{part}=\"{color}\"]{{{part}:#");
+                    assert!(style.contains(&rule), "{name}: {part} {color} of {:?} stays", node.tag_name());
+                }
+            }
+            // The page has the file's figure, on its own background.
+            let ground = svg.descendants().find(|node| node.has_tag_name("rect")).unwrap();
+            assert_eq!(ground.attribute("fill"), Some("#FFFFFF"), "{name}");
+        }
+    }
+}
