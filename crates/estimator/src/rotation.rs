@@ -103,24 +103,7 @@ pub(crate) fn atan2(y: f32, x: f32) -> f32 {
     if x > 0.0 { angle } else { angle + PI.copysign(y) }
 }
 
-/// Roll, pitch and yaw of a unit quaternion \[rad\]; see `afbc_types::State::from_quaternion`, whose formulas these
-/// are.
+/// Roll, pitch and yaw of a unit quaternion \[rad\], by this crate's arctangent, which is quicker than libm's.
 pub(crate) fn euler(q: &Quaternion<f32>) -> Vector3<f32> {
-    let (a, b, c, d) = (q.w - q.j, q.i + q.k, q.w + q.j, q.i - q.k);
-    let (sum, remainder) = (atan2(b, a), atan2(d, c));
-    let length = |x: f32, y: f32| sqrt(x * x + y * y);
-    let pitch = 2.0 * atan2(length(c, d), length(a, b)) - core::f32::consts::FRAC_PI_2;
-    Vector3::new(wrap(sum + remainder), pitch, wrap(sum - remainder))
-}
-
-/// Wraps an angle within two turns of zero to within half a turn.
-fn wrap(angle: f32) -> f32 {
-    use core::f32::consts::{PI, TAU};
-    if angle > PI {
-        angle - TAU
-    } else if angle < -PI {
-        angle + TAU
-    } else {
-        angle
-    }
+    afbc_types::euler_angles(q, atan2, sqrt)
 }

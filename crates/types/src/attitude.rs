@@ -28,7 +28,8 @@ impl State {
         attitude: &Quaternion<f32>,
         rates_rad_s: Vector3<f32>,
     ) -> Option<Self> {
-        let state = State { position_m, velocity_m_s, attitude_rad: euler(attitude), rates_rad_s };
+        let attitude_rad = euler_angles(attitude, libm::atan2f, libm::sqrtf);
+        let state = State { position_m, velocity_m_s, attitude_rad, rates_rad_s };
         (is_rotation(attitude) && state.is_plausible()).then_some(state)
     }
 
@@ -52,7 +53,7 @@ pub(crate) fn is_rotation(attitude: &Quaternion<f32>) -> bool {
 }
 
 /// Returns roll, pitch and yaw \[rad\] of the z-y-x sequence for a quaternion of any norm but zero. Roll and yaw are
-/// within \[-pi, pi\], pitch within \[-pi/2, pi/2\].
+/// within \[-pi, pi\], pitch within \[-pi/2, pi/2\]. The arctangent (of y, x) and the square root are the caller's.
 ///
 /// In half angles, with c and s the cosine and sine of half the pitch,
 ///
@@ -63,13 +64,18 @@ pub(crate) fn is_rotation(attitude: &Quaternion<f32>) -> bool {
 ///
 /// so accuracy does not depend on pitch; at +-90 degrees, where only a sum of roll and yaw is defined, the result is
 /// still a valid decomposition. Bernardes and Viollet, *Quaternion to Euler angles conversion*, PLoS ONE 17(11), 2022.
-fn euler(attitude: &Quaternion<f32>) -> Vector3<f32> {
+#[inline]
+pub fn euler_angles(
+    attitude: &Quaternion<f32>,
+    atan2: impl Fn(f32, f32) -> f32,
+    sqrt: impl Fn(f32) -> f32,
+) -> Vector3<f32> {
     use core::f32::consts::FRAC_PI_2;
     let (w, x, y, z) = (attitude.w, attitude.i, attitude.j, attitude.k);
-    let half_sum = libm::atan2f(x + z, w - y);
-    let half_difference = libm::atan2f(x - z, w + y);
-    let length = |a: f32, b: f32| libm::sqrtf(a * a + b * b);
-    let pitch = 2.0 * libm::atan2f(length(w + y, x - z), length(w - y, x + z)) - FRAC_PI_2;
+    let half_sum = atan2(x + z, w - y);
+    let half_difference = atan2(x - z, w + y);
+    let length = |a: f32, b: f32| sqrt(a * a + b * b);
+    let pitch = 2.0 * atan2(length(w + y, x - z), length(w - y, x + z)) - FRAC_PI_2;
     Vector3::new(wrap(half_sum + half_difference), pitch, wrap(half_sum - half_difference))
 }
 

@@ -37,6 +37,7 @@ mod pose;
 mod range;
 
 pub use actuation::{Inputs, RotorForces, RotorSpeeds};
+pub use attitude::euler_angles;
 pub use axes::{Axis, PerAxis};
 pub use declared::{Declaration, Declared, Field, Name, Number, Value, Visit};
 pub use frame::{Airframe, PLUS, ROTOR_POSITION, ROTORS, ROTORS_MAX, Rotor};
