@@ -46,37 +46,37 @@ parameters! {
     pub struct Gains {
         /// k_x along x and y.
         #[parameter(POS_P, "1/s2", 0.5..=100.0, tuned)]
-        pub position_p_1_s2: f32 = 29.63,
+        pub position_p_1_s2: f32 = 32.37,
         /// k_v along x and y.
         #[parameter(POS_D, "1/s", 0.5..=20.0, tuned)]
-        pub position_d_1_s: f32 = 11.49,
+        pub position_d_1_s: f32 = 12.51,
         /// k_i along x and y.
         #[parameter(POS_I, "1/s3", 0.0..=200.0, tuned)]
-        pub position_i_1_s3: f32 = 97.35,
+        pub position_i_1_s3: f32 = 112.3,
         /// k_x along z.
         #[parameter(HEIGHT_P, "1/s2", 0.5..=200.0, tuned)]
-        pub height_p_1_s2: f32 = 80.15,
+        pub height_p_1_s2: f32 = 126.4,
         /// k_v along z.
         #[parameter(HEIGHT_D, "1/s", 0.5..=60.0, tuned)]
-        pub height_d_1_s: f32 = 35.46,
+        pub height_d_1_s: f32 = 31.7,
         /// k_i along z.
         #[parameter(HEIGHT_I, "1/s3", 0.0..=300.0, tuned)]
-        pub height_i_1_s3: f32 = 80.74,
+        pub height_i_1_s3: f32 = 32.45,
         /// k_R of roll and pitch.
         #[parameter(TILT_P, "1/s2", 10.0..=1000.0, tuned)]
-        pub tilt_p_1_s2: f32 = 308.4,
+        pub tilt_p_1_s2: f32 = 446.0,
         /// k_Omega of roll and pitch.
         #[parameter(TILT_D, "1/s", 2.0..=100.0, tuned)]
-        pub tilt_d_1_s: f32 = 30.35,
+        pub tilt_d_1_s: f32 = 39.85,
         /// k_R of yaw.
         #[parameter(YAW_P, "1/s2", 0.5..=200.0, tuned)]
-        pub yaw_p_1_s2: f32 = 80.07,
+        pub yaw_p_1_s2: f32 = 56.57,
         /// k_Omega of yaw.
         #[parameter(YAW_D, "1/s", 0.5..=40.0, tuned)]
-        pub yaw_d_1_s: f32 = 15.04,
+        pub yaw_d_1_s: f32 = 11.51,
         /// w: bandwidth of the filter on rates and U1..U3.
         #[parameter(ATT_FILTER, "rad/s", 10.0..=500.0, tuned)]
-        pub attitude_filter_rad_s: f32 = 78.07,
+        pub attitude_filter_rad_s: f32 = 10.18,
         /// tau: time constant of the rotor model.
         #[parameter(ROT_LAG, "s", 0.0..=0.5)]
         pub rotor_time_constant_s: f32 = 0.02,
@@ -89,10 +89,10 @@ parameters! {
         /// Filters on U1..U4.
         #[group("")]
         pub smoothing: Smoothing = Smoothing {
-            smooth_tilt_rad_s: 165.9,
-            smooth_yaw_rad_s: 77.37,
-            smooth_lift_rad_s: 118.2,
-            lead_s: 0.02233,
+            smooth_tilt_rad_s: 155.8,
+            smooth_yaw_rad_s: 91.32,
+            smooth_lift_rad_s: 82.5,
+            lead_s: 0.0229,
         },
     }
 }

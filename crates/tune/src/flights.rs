@@ -1,10 +1,13 @@
 //! Flights in which gains are evaluated.
 //!
 //! Every flight is based on the built-in scenario `hardware`: rotors with a lag of 20 ms, a delay of 1 ms and at most 3
-//! N each, and a noisy state. The first is that scenario itself; each of the others adds one disturbance.
+//! N each, and a noisy state. The first is that scenario itself; each of the others adds one disturbance. The last two
+//! are flown on an estimate, with the sensors of the built-in scenarios `mocap` and `outdoor`.
 
+use afbc_plant::instruments::{Barometer, Gnss, Imu, Magnetometer, Tracker};
 use afbc_plant::{
-    Contact, Drag, Environment, GroundEffect, Gust, GustKind, Motion, ParameterChange, Quantity, Turbulence,
+    Contact, Drag, Environment, GroundEffect, Gust, GustKind, Motion, ParameterChange, Quantity, Sensing, Suite,
+    Turbulence,
 };
 use afbc_reader::FileError;
 use afbc_sim::scenario::{Outage, Scenario, built_in};
@@ -55,6 +58,8 @@ pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
         Hardware { rotor_lag_s: 0.04, ..Hardware::default() }.flight("slow", eight("", None))?,
         Hardware { rate_noise_rad_s: 0.05, ..Hardware::default() }.flight("noisy", eight("", None))?,
         Hardware { tracker: true, state_delay_s: 0.02, ..Hardware::default() }.flight("tracker", eight("", None))?,
+        sensed("mocap", eight("", None), |_| {})?,
+        sensed("outdoor", eight("", None), |_| {})?,
     ])
 }
 
@@ -91,6 +96,13 @@ pub fn held_out() -> Result<Vec<Scenario>, Box<dyn Error>> {
             .flight("noisy", fast("", None))?,
         Hardware { tracker: true, state_delay_s: 0.01, rate_noise_rad_s: 0.02, ..Hardware::default() }
             .flight("tracker", fast("", None))?,
+        sensed("mocap", fast("", None), |suite| {
+            suite.imu = suite.imu.map(|imu| Imu { gyro: Imu::MPU_6000.gyro, ..imu });
+            suite.tracker = Some(Tracker { delay_s: 0.03, ..Tracker::MOCAP_100 });
+        })?,
+        sensed("outdoor", fast("", None), |suite| {
+            (suite.barometer, suite.magnetometer) = (Some(Barometer::BMP388), Some(Magnetometer::QMC5883L));
+        })?,
     ])
 }
 
@@ -154,7 +166,12 @@ fn landing(name: &'static str, length_s: f64) -> Result<Scenario, Box<dyn Error>
 }
 
 fn hardware() -> Result<Scenario, FileError> {
-    built_in("hardware").ok_or_else(|| FileError::whole("hardware", "no such scenario"))?.read()
+    read("hardware")
+}
+
+/// Returns a built-in scenario.
+fn read(name: &str) -> Result<Scenario, FileError> {
+    built_in(name).ok_or_else(|| FileError::whole(name, "no such scenario"))?.read()
 }
 
 /// Returns `flight` in moderate turbulence.
@@ -195,6 +212,22 @@ impl Hardware {
         scenario.realism.rotors.time_constant_s = self.rotor_lag_s;
         Ok(scenario)
     }
+}
+
+/// Returns `flight` in moderate turbulence on an estimate, with the instruments of the built-in scenario `name` changed
+/// by `change`. The slow error of a receiver, which no law can know, is left out: it would hide what a law does.
+fn sensed(
+    name: &'static str,
+    flight: TrainingFlight,
+    change: impl FnOnce(&mut Suite),
+) -> Result<Scenario, Box<dyn Error>> {
+    let mut scenario = windy(TrainingFlight { name, ..flight })?;
+    scenario.sensing = Sensing::default();
+    scenario.instruments = read(name)?.instruments;
+    change(&mut scenario.instruments);
+    let steady = |gnss| Gnss { horizontal_m: 0.0, vertical_m: 0.0, ..gnss };
+    scenario.instruments.gnss = scenario.instruments.gnss.map(steady);
+    Ok(scenario)
 }
 
 /// A flight of `hardware` without gusts.
