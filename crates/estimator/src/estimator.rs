@@ -127,6 +127,9 @@ impl Estimator {
             memory.monitor.refuse();
             return false;
         }
+        if memory.monitor.repeats(sample, &self.settings) {
+            return false;
+        }
         let clipped = memory.monitor.take(sample, &self.settings);
         let rates = sample.rates_rad_s - memory.nominal.gyro_bias;
         self.low_pass.advance(&mut memory.smoothed, &rates);

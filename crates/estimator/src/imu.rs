@@ -74,7 +74,17 @@ impl Monitor {
         self.in_a_row >= 500
     }
 
-    /// Takes a sample that is not refused. True if it is clipped.
+    /// True if a sample only repeats those of a stuck sensor, and counts as missing.
+    pub(crate) fn repeats(&self, sample: &ImuSample, settings: &Settings) -> bool {
+        let Some(last) = &self.last else { return false };
+        // The first number usually differs.
+        last.rates_rad_s == sample.rates_rad_s
+            && last.specific_force_m_s2 == sample.specific_force_m_s2
+            && settings.stuck_s > 0.0
+            && last.at_us.saturating_sub(self.same_us) > stuck_us(settings).into()
+    }
+
+    /// Takes a sample that is not refused, nor repeats those of a stuck sensor. True if it is clipped.
     pub(crate) fn take(&mut self, sample: &ImuSample, settings: &Settings) -> bool {
         self.in_a_row = 0;
         if let Some(last) = &self.last {
@@ -105,7 +115,7 @@ impl Monitor {
             |from_us: u64| at_us.map_or(0, |at_us| u32::try_from(at_us.saturating_sub(from_us)).unwrap_or(u32::MAX));
         ImuHealth {
             missing: at_us.is_none_or(|at_us| now_us.saturating_sub(at_us) > MISSING_US),
-            stuck: settings.stuck_s > 0.0 && since(self.same_us) > (settings.stuck_s * 1e6) as u32,
+            stuck: settings.stuck_s > 0.0 && since(self.same_us) > stuck_us(settings),
             clipped: self.clipped_us.is_some_and(|clipped_us| since(clipped_us) < CLIPPED_US),
             noisy: self.rates_change > squared(settings.gyro_noisy_rad_s)
                 || self.force_change > squared(settings.accel_noisy_m_s2),
@@ -150,4 +160,9 @@ impl LowPass {
         memory.sums = Some((input * (2.0 * b0) - output * a1 + second, input * b0 - output * a2));
         memory.output = output;
     }
+}
+
+/// Time after which numbers that stay the same are those of a stuck sensor \[us\].
+fn stuck_us(settings: &Settings) -> u32 {
+    (settings.stuck_s * 1e6) as u32
 }

@@ -195,6 +195,48 @@ fn without_aid_it_stays_level_and_says_what_is_lost() {
     );
 }
 
+/// What a stuck sensor repeats does not turn the estimate: when it comes back, after a short or a long time, the tilt
+/// is off by what it would be off after a silence and by five sigma more, but for what 0.5 rad/s make of it in the
+/// 16 ms in which nobody can tell.
+#[test]
+fn a_sensor_that_was_stuck_is_like_one_that_was_silent() {
+    for fails_ms in [100, 200, 400, 3000] {
+        let fails = |ms: usize| (6000..6000 + fails_ms).contains(&ms);
+        let mut silent_rad = Vec::new();
+        for is_stuck in [false, true] {
+            let held = core::cell::Cell::new(None);
+            flown(
+                hover,
+                MOCAP,
+                12,
+                |ms, sample| {
+                    if is_stuck && fails(ms) {
+                        let (rates, force) = held.get().unwrap_or((sample.rates_rad_s, sample.specific_force_m_s2));
+                        held.set(Some((rates, force)));
+                        (sample.rates_rad_s, sample.specific_force_m_s2) = (rates + Vector3::repeat(0.5), force);
+                    }
+                    is_stuck || !fails(ms)
+                },
+                |_, _| true,
+                |ms, estimate, flight| {
+                    let tilt_rad = flight.errors(estimate).fixed_rows::<2>(0).amax();
+                    let known = ms >= 6020 && fails(ms);
+                    assert!(!(known && estimate.validity.attitude), "{fails_ms} ms, {ms} ms");
+                    if !is_stuck {
+                        silent_rad.push(tilt_rad);
+                    } else if ms >= 6000 + fails_ms && estimate.validity.attitude {
+                        let sigma_rad = f64::from(estimate.sigmas.attitude_rad.xy().max());
+                        let most_rad = silent_rad[ms] + 5.0 * sigma_rad + 0.008;
+                        assert!(tilt_rad < most_rad, "{fails_ms} ms, {ms} ms: {tilt_rad}, not {most_rad}");
+                    }
+                    let found = estimate.validity.position && position_error(estimate, flight) < 0.02;
+                    assert!(ms < 7500 + fails_ms || found, "{fails_ms} ms, {ms} ms");
+                },
+            );
+        }
+    }
+}
+
 #[test]
 fn faults_of_the_imu_are_told() {
     // Stuck in flight.

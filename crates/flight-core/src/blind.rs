@@ -44,9 +44,12 @@ pub struct Blind {
     authority: Vector2<f32>,
     /// Ix/l, Iy/l
     inverse_authority: Vector2<f32>,
+    /// (d/b)/Iz \[rad/s2 per N\].
+    pub(crate) yaw_authority: f32,
     /// m g \[N\].
-    weight_n: f32,
-    dt_s: f32,
+    pub(crate) weight_n: f32,
+    pub(crate) gravity_m_s2: f32,
+    pub(crate) dt_s: f32,
 }
 
 /// Dead-reckoned attitude and trim.
@@ -85,6 +88,8 @@ impl Blind {
         Blind {
             authority: vehicle.effectiveness().xy(),
             inverse_authority: vehicle.inertia_kg_m2.xy() / vehicle.arm_m,
+            yaw_authority: vehicle.effectiveness().z,
+            gravity_m_s2: vehicle.gravity_m_s2,
             weight_n: vehicle.weight_n(),
             dt_s,
         }

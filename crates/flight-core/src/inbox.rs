@@ -84,7 +84,8 @@ impl Inbox {
     }
 
     /// Stores a tracker's pose for the vehicle's own estimate, stamped by a [`Tracker`](crate::Tracker), if it is
-    /// [plausible](Pose::is_plausible). The flight core itself does not use it.
+    /// [plausible](Pose::is_plausible). The flight core uses one that the estimate [leaves](Self::clear_pose), which it
+    /// does without an inertial sensor ([`crate::observer`]).
     pub fn put_pose(&mut self, pose: Stamped<Pose>) {
         if pose.value.is_plausible() {
             self.pose = Some(pose);
@@ -121,6 +122,11 @@ impl Inbox {
     /// Returns the newest plausible pose, if it has not been [taken](Self::take) before.
     pub fn pose(&self) -> Option<&Stamped<Pose>> {
         self.pose.as_ref()
+    }
+
+    /// Removes the pose: an estimator has taken it.
+    pub fn clear_pose(&mut self) {
+        self.pose = None;
     }
 
     /// Returns the newest plausible setpoint.

@@ -11,7 +11,8 @@
 //! 3. [`inbox`]: the inputs of a tick and their ages; [`tracker`], [`clock`]: selection of states, and the time of
 //!    their measurement.
 //! 4. [`landing`], [`tumble`], [`witness`]: detection of landing, tumbling and frozen trackers.
-//! 5. [`blind`]: flight without measurements; [`descent`]: descent with measurements.
+//! 5. [`blind`]: flight without measurements; [`observer`]: flight on poses alone; [`descent`]: descent with
+//!    measurements.
 //! 6. [`rate`]: supervision of the tick rate.
 //! 7. [`motor`], [`dshot`]: throttle curve, and the waveform to the motor controllers.
 #![no_std]
@@ -23,6 +24,7 @@ pub mod dshot;
 pub mod inbox;
 pub mod landing;
 pub mod motor;
+pub mod observer;
 pub mod rate;
 pub mod supervisor;
 pub mod tick;

@@ -4,12 +4,13 @@ use crate::blind::{Blind, Reckoning};
 use crate::descent::Descent;
 use crate::inbox::{Inbox, Stamped};
 use crate::landing::LandDetector;
+use crate::observer::{HOLD_US, Observer};
 use crate::rate;
 use crate::supervisor::{ArmingLimits, COAST_US, End, Mode, Observed, Refusal, Request, SETPOINT_STALE_US, Standing};
 use crate::tumble::Tumble;
 use crate::witness::Witness;
 use afbc_control::{Action, FlightController, Trace};
-use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds, Setpoint, State};
+use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Pose, Range, RotorForces, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 
 /// Accepted time step of a law: the tick's \[s\].
@@ -47,6 +48,8 @@ pub struct VehicleMemory<M> {
 struct Armed<M> {
     control: M,
     reckoning: Reckoning,
+    /// Motion observed from a tracker's poses, without an inertial sensor.
+    observer: Option<Observer>,
     /// Inputs last applied to the rotors.
     applied: Inputs,
     /// Inputs of the last tick, if it had no step of the law.
@@ -73,6 +76,11 @@ impl<M> VehicleMemory<M> {
     /// Returns the flight mode.
     pub fn mode(&self) -> Mode {
         self.mode
+    }
+
+    /// Returns the newest plausible state.
+    pub fn state(&self) -> Option<&State> {
+        self.state.as_ref().map(|state| &state.value)
     }
 
     /// Records that the clock has failed and another has taken over: the vehicle is not armed again.
@@ -110,6 +118,8 @@ pub struct Health {
     pub state_age_us: u32,
     /// True if there is no plausible setpoint younger than 500 ms; an armed vehicle then holds its position.
     pub setpoint_stale: bool,
+    /// True if the state is [observed](crate::observer) from a tracker's poses, since the inertial sensor has failed.
+    pub observed: bool,
     /// States since power-up refused as frozen ([`crate::witness`]), up to `u32::MAX`.
     pub frozen_states: u32,
 }
@@ -167,7 +177,9 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         let dt_s = self.controller.dt_s();
         // Takes the newest inputs.
         let rate = memory.rate.tick(now_us);
-        let measured = memory.take_state(inbox, now_us);
+        let told = memory.take_state(inbox, now_us);
+        let observing = memory.observe(&self.blind, inbox, now_us, told);
+        let measured = told || observing;
         let state_age_us = memory.state.map_or(u32::MAX, |state| state.age_us(now_us));
         let fresh =
             memory.state.filter(|_| state_age_us <= COAST_US).map(|state| extrapolated(&state.value, state_age_us));
@@ -253,8 +265,14 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         // Gates the motors.
         let (motors, forces) = if mode.armed() { (action.speeds, action.forces) } else { Default::default() };
         let setpoint_stale = setpoint.is_none();
-        let health =
-            Health { control: action.health, rate, state_age_us, setpoint_stale, frozen_states: *frozen_states };
+        let health = Health {
+            control: action.health,
+            rate,
+            state_age_us,
+            setpoint_stale,
+            observed: observing,
+            frozen_states: *frozen_states,
+        };
         Outcome { motors, forces, mode, health, answer, ended }
     }
 
@@ -292,8 +310,10 @@ impl<M> VehicleMemory<M> {
     /// Stores the inbox's state if it is newer than the present one, not already stale (states that are always late do
     /// not count as states), and not from a frozen tracker. True if it was stored.
     fn take_state(&mut self, inbox: &Inbox, now_us: u64) -> bool {
+        // What is observed is stamped now, and gives way to the link's states, which are always a little older.
+        let gives_way = self.is_observing() && !inbox.is_own();
         let newer = |state: &&Stamped<State>| {
-            state.age_us(now_us) <= COAST_US && self.state.is_none_or(|held| state.at_us > held.at_us)
+            state.age_us(now_us) <= COAST_US && (gives_way || self.state.is_none_or(|held| state.at_us > held.at_us))
         };
         let Some(state) = inbox.state().filter(newer) else { return false };
         let armed = self.mode.armed();
@@ -309,6 +329,59 @@ impl<M> VehicleMemory<M> {
         }
         self.state = Some(*state);
         true
+    }
+
+    /// True if an armed vehicle has an observer.
+    fn is_observing(&self) -> bool {
+        self.mode.armed() && self.flight.as_ref().is_some_and(|flight| flight.observer.is_some())
+    }
+
+    /// Stores the state that is observed from poses which no estimator has taken; `told` if there is another. True if
+    /// there is one.
+    #[inline]
+    fn observe(&mut self, blind: &Blind, inbox: &Inbox, now_us: u64, told: bool) -> bool {
+        // As long as an estimator works, it takes all poses.
+        (inbox.pose().is_some() || self.is_observing()) && self.observe_pose(blind, inbox, now_us, told)
+    }
+
+    /// The same, if there is a pose or an observer.
+    #[cold]
+    #[inline(never)]
+    fn observe_pose(&mut self, blind: &Blind, inbox: &Inbox, now_us: u64, told: bool) -> bool {
+        let armed = self.mode.armed();
+        let (Some(flight), Some(held)) = (self.flight.as_mut().filter(|_| armed), self.state) else { return false };
+        let age_us = held.age_us(now_us);
+        let is_linked = told || flight.observer.is_none() && !inbox.is_own() && age_us <= COAST_US;
+        if is_linked || flight.distrusts {
+            flight.observer = None;
+            return false;
+        }
+        let Armed { observer, reckoning, applied, .. } = flight;
+        let news = |pose: &&Stamped<Pose>| {
+            Observer::takes(pose, now_us) && observer.as_ref().is_none_or(|observer| observer.is_news(pose))
+        };
+        let pose = inbox.pose().filter(news);
+        let observer = match (observer.as_mut().filter(|observer| observer.age_us(now_us) <= HOLD_US), pose) {
+            (Some(running), pose) => {
+                running.advance(blind, reckoning, applied);
+                if let Some(pose) = pose {
+                    running.correct(pose, now_us);
+                }
+                running
+            }
+            (None, Some(pose)) => {
+                let state = reckoning.between(&extrapolated(&held.value, age_us));
+                let new = observer.insert(Observer::new(&state, applied, held.at_us));
+                new.correct(pose, now_us);
+                new
+            }
+            (None, None) => return false,
+        };
+        let state = observer.state();
+        if let Some(value) = state {
+            self.state = Some(Stamped { value, at_us: now_us });
+        }
+        state.is_some()
     }
 
     /// Notes the time of the newest attitude.
@@ -352,6 +425,7 @@ impl<M: Default> Armed<M> {
         *flight = Some(Armed {
             control: M::default(),
             reckoning: blind.start(state),
+            observer: None,
             applied: Inputs::default(),
             lawless: None,
             guide: Guide::default(),

@@ -30,7 +30,8 @@ pub struct Report<const N: usize = 4> {
     pub motors: RotorSpeeds<N>,
     /// Throttles for the motors: 0 if disarmed, otherwise 48 to 2047.
     pub throttles: [u16; N],
-    /// The vehicle's own estimate of its state; none without an inertial sensor.
+    /// The vehicle's own estimate of its state, or what is observed of it in place of that
+    /// ([`Health::observed`]); none without an inertial sensor.
     pub estimate: Option<State>,
     /// Health of the flight core.
     pub health: Health,
@@ -90,12 +91,13 @@ impl<const N: usize> Flight<N> {
         if outcome.health.control.saturated {
             self.saturated_ticks = self.saturated_ticks.saturating_add(1);
         }
+        let observed = if outcome.health.observed { self.memory.state().copied() } else { None };
         Report {
             time_us: now_us,
             mode: outcome.mode,
             motors: outcome.motors,
             throttles: self.motor.throttles(outcome.mode.armed(), &outcome.motors),
-            estimate,
+            estimate: observed.or(estimate),
             health: outcome.health,
             saturated_ticks: self.saturated_ticks,
             learnt: self.memory.control().map(|control| control.figures().latest()),

@@ -37,5 +37,5 @@ pub use comms::{ADDRESS, CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
 pub use configuration::Configuration;
 pub use flight::{Flight, Report};
 pub use lockstep::ReplyHead;
-pub use navigation::{Navigation, tell};
+pub use navigation::{Navigation, pose, tell};
 pub use readings::{AIDS_MAX, Aged, Readings};

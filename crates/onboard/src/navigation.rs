@@ -3,14 +3,15 @@
 use crate::readings::{Aged, Readings};
 use afbc_estimator::{Easing, Estimate, Estimator, Measurement, Memory, Settings, Timed};
 use afbc_flight_core::{Inbox, Refusal, Stamped};
-use afbc_types::{OutOfRange, Pose, State};
+use afbc_types::{OutOfRange, Pose, PoseSigmas, State};
 use nalgebra::Vector3;
 
 /// Standard deviations of a tracker's pose that does not say how good it is: a motion-capture system's \[m, rad\].
 const TRACKER: (f32, f32) = (0.003, 0.01);
 
 /// Estimator and memory of a vehicle. Until its first sample of an inertial sensor, the vehicle flies on the states
-/// that come over the link; from then on their poses, and poses that come alone, are measurements like others.
+/// that come over the link; from then on their poses, and poses that come alone, are measurements like others. While
+/// the inertial sensor has failed, poses are left to the flight core ([`afbc_flight_core::observer`]).
 ///
 /// The local frame is that of the tracker's poses. Where there is none, its origin is where the vehicle stands at the
 /// first usable fix of its GNSS receiver: one that comes when the estimator runs, and is good enough for a valid
@@ -22,6 +23,8 @@ pub struct Navigation {
     easing: Easing,
     /// True if there has been a sample.
     senses: bool,
+    /// True if the inertial sensor worked in the last tick.
+    works: bool,
     /// The local frame's origin in the receiver's frame, from the first usable fix on \[m\].
     origin_m: Option<Vector3<f32>>,
     /// Estimated position and velocity until then, zero as long as nobody has told a position \[m, m/s\].
@@ -39,6 +42,7 @@ impl Navigation {
             memory: Memory::default(),
             easing: Easing::default(),
             senses: false,
+            works: true,
             origin_m: None,
             told: [Vector3::zeros(); 2],
         })
@@ -54,14 +58,20 @@ impl Navigation {
             return None;
         }
         for aid in readings.aids.iter().flatten() {
-            if let Some(aid) = self.localized(*aid) {
-                self.memory.offer(&aid.timed(now_us));
+            let Some(aid) = self.localized(*aid) else { continue };
+            let timed = aid.timed(now_us);
+            if self.works {
+                self.memory.offer(&timed);
+            } else {
+                leave(&timed, inbox);
             }
         }
-        if let Some(Stamped { value, at_us }) = inbox.pose() {
+        if let Some(Stamped { value, at_us }) = inbox.pose().filter(|_| self.works) {
             self.memory.offer(&Timed { value: measurement(value), at_us: *at_us });
+            inbox.clear_pose();
         }
         let estimate = self.estimator.step(&mut self.memory, now_us, sample.as_ref());
+        self.works = estimate.imu.is_usable();
         if self.origin_m.is_none() && estimate.resets.position > 0 {
             self.told = [estimate.state.position_m, estimate.state.velocity_m_s];
         }
@@ -91,6 +101,15 @@ impl Navigation {
     }
 }
 
+/// Leaves a tracker's pose to the flight core.
+#[cold]
+#[inline(never)]
+fn leave(timed: &Timed<Measurement>, inbox: &mut Inbox) {
+    if let Some(value) = pose(&timed.value) {
+        inbox.put_pose(Stamped { value, at_us: timed.at_us });
+    }
+}
+
 /// Tells `inbox` the eased `state` of an `estimate` as far as it is valid. What the link says of the state stands only
 /// while the estimate has no attitude: after the inertial sensor has failed.
 #[inline(always)]
@@ -107,6 +126,16 @@ pub fn tell(estimate: &Estimate, state: State, now_us: u64, inbox: &mut Inbox) {
         None => inbox.locate(stamped),
         Some(missing) => inbox.put_adrift(Some(stamped).filter(|_| validity.attitude), missing),
     }
+}
+
+/// Returns the pose that a measurement tells, if it does.
+#[must_use]
+pub fn pose(measurement: &Measurement) -> Option<Pose> {
+    let Measurement::Pose { position_m, attitude, position_sigma_m, attitude_sigma_rad } = *measurement else {
+        return None;
+    };
+    let sigmas = PoseSigmas { position_m: Some(position_sigma_m), attitude_rad: Some(attitude_sigma_rad) };
+    Some(Pose { position_m, attitude, sigmas })
 }
 
 fn measurement(pose: &Pose) -> Measurement {

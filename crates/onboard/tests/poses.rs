@@ -3,9 +3,10 @@
 
 mod common;
 
+use afbc_estimator::Measurement;
 use afbc_flight_core::{Mode, Refusal};
 use afbc_link::{Answer, Command, Downlink, Uplink};
-use afbc_onboard::{Aged, Readings};
+use afbc_onboard::{Aged, Readings, Report};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use common::Bench;
 use nalgebra::Vector3;
@@ -184,32 +185,114 @@ fn standard_deviations_count() {
     assert!(unsure < 0.1 && sure > 0.15, "{unsure} m, {sure} m");
 }
 
-/// Once the inertial sensor is silent for good, whole states of the link stand in, and the flight goes on; poses alone
-/// have no rates, and do not.
-#[test]
-fn states_of_the_link_stand_in_for_a_dead_sensor() {
-    for by in [By::State, By::Pose] {
-        let mut bench = Bench::new();
-        let place = state(0.0);
-        let mut modes = Vec::new();
-        for ms in 1..START_MS + 4_000 {
-            // A tracker never repeats a state exactly.
-            let position_m = place.position_m + noise(ms) * 1e-4;
-            let told = State { position_m, ..place };
-            bench.hear(match by {
-                By::Pose => Uplink::Pose { sent_us: bench.now_us, pose: Pose::of(&told, PoseSigmas::UNKNOWN) },
-                By::State => Uplink::State { sent_us: bench.now_us, state: told, sigmas: PoseSigmas::UNKNOWN },
-            });
-            bench.hear(Uplink::Setpoint(Setpoint { position_m: PLACE_M, yaw_rad: YAW_RAD, ..Setpoint::default() }));
-            if ms == START_MS {
-                bench.hear(Uplink::Command(Command::Arm));
-            }
-            let dies = ms > START_MS + 1_000;
-            let readings = if dies { Readings::NONE } else { sample(ms, 0.0) };
-            modes.push(bench.sense(&readings).0.mode);
+/// What a tracker sends to a vehicle whose inertial sensor has died.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Left {
+    States,
+    Poses,
+    /// The same pose again and again.
+    Frozen,
+    /// Poses that call themselves bad.
+    Unsure,
+    /// Poses that arrive too late to be flown on.
+    Late,
+    /// Positions, as the vehicle's own sensors read them.
+    Positions,
+    Nothing,
+}
+
+/// The vehicle hovers at its place, armed at 4 s; its inertial sensor dies a second later. Returns the modes, the texts
+/// since then, and the last report.
+fn outlives(left: Left) -> (Vec<Mode>, Vec<String>, Report) {
+    let (mut bench, place) = (Bench::new(), state(0.0));
+    let (mut modes, mut texts, mut last) = (Vec::new(), Vec::new(), None);
+    let dies_ms = START_MS + 1_000;
+    for ms in 1..START_MS + 4_000 {
+        let dead = ms > dies_ms;
+        // A tracker never repeats a state exactly.
+        let noise_ms = if dead && left == Left::Frozen { dies_ms } else { ms };
+        let told = State { position_m: place.position_m + noise(noise_ms) * 1e-4, ..place };
+        let bad = PoseSigmas { position_m: Some(0.2), attitude_rad: Some(0.01) };
+        let sigmas = if dead && left == Left::Unsure { bad } else { PoseSigmas::UNKNOWN };
+        let sent_us = bench.now_us;
+        let mut readings = if dead { Readings::NONE } else { sample(ms, 0.0) };
+        match left {
+            Left::States => bench.hear(Uplink::State { sent_us, state: told, sigmas }),
+            Left::Nothing | Left::Positions | Left::Late if dead => (),
+            _ => bench.hear(Uplink::Pose { sent_us, pose: Pose::of(&told, sigmas) }),
         }
-        let at = |ms: u64| modes.get(ms as usize).copied();
-        assert_eq!(at(START_MS + 900), Some(Mode::Flying), "{by:?}");
-        assert_eq!(modes.last() == Some(&Mode::Flying), by == By::State, "{by:?}: {:?}", modes.last());
+        if dead && left == Left::Late {
+            // Read by the vehicle: the link's clock would learn a lateness that stays.
+            let Pose { position_m, attitude, .. } = Pose::of(&told, sigmas);
+            let value = Measurement::Pose { position_m, attitude, position_sigma_m: 0.003, attitude_sigma_rad: 0.01 };
+            readings.aids = [Some(Aged { value, age_us: 60_000 }), None];
+        }
+        if dead && left == Left::Positions {
+            let value = Measurement::Position { position_m: told.position_m, sigma_m: 0.003 };
+            readings.aids = [Some(Aged { value, age_us: 1_000 }), None];
+        }
+        bench.hear(Uplink::Setpoint(Setpoint { position_m: PLACE_M, yaw_rad: YAW_RAD, ..Setpoint::default() }));
+        if ms == START_MS {
+            bench.hear(Uplink::Command(Command::Arm));
+        }
+        let (report, said) = bench.sense(&readings);
+        modes.push(report.mode);
+        last = Some(report);
+        texts.extend(said.into_iter().filter_map(|message| match message {
+            Downlink::Text { text, .. } if dead => Some(text.to_str().expect("words").to_owned()),
+            _ => None,
+        }));
     }
+    (modes, texts, last.expect("flown"))
+}
+
+/// Once the inertial sensor is silent for good, whole states of the link stand in, or else what is observed from poses,
+/// which is told once; the flight goes on. Nothing else saves the vehicle.
+#[test]
+fn a_tracker_stands_in_for_a_dead_sensor() {
+    use Left::{Frozen, Late, Nothing, Poses, Positions, States, Unsure};
+    for left in [States, Poses, Frozen, Unsure, Late, Positions, Nothing] {
+        let (modes, texts, last) = outlives(left);
+        let at = |ms: u64| modes.get(ms as usize).copied();
+        assert_eq!(at(START_MS + 900), Some(Mode::Flying), "{left:?}");
+        let flies = matches!(left, States | Poses);
+        assert_eq!(modes.last() == Some(&Mode::Flying), flies, "{left:?}: {:?}, {texts:?}", modes.last());
+        assert_eq!(last.health.observed, left == Poses, "{left:?}");
+        let told = texts.iter().filter(|text| text.contains("inertial sensor failed")).count();
+        // That a tracker is frozen shows only after a moment.
+        assert_eq!(told, usize::from(matches!(left, Poses | Frozen)), "{left:?}: {texts:?}");
+        if left == Poses {
+            // Not even a moment without a state.
+            assert_eq!(texts.len(), 1, "{texts:?}");
+            // The telemetry has what is observed.
+            let seen = last.estimate.expect("observed");
+            assert!((seen.position_m - PLACE_M).amax() < 1e-3 && seen.velocity_m_s.amax() < 0.02, "{seen:?}");
+            assert!((seen.attitude_rad - Vector3::new(0.0, 0.0, YAW_RAD)).amax() < 0.01, "{seen:?}");
+        }
+    }
+}
+
+/// A sensor that comes back is believed again, and so is a tracker.
+#[test]
+fn the_sensor_comes_back() {
+    let (mut bench, place) = (Bench::new(), state(0.0));
+    let (mut observed, mut modes) = (0, Vec::new());
+    for ms in 1..START_MS + 6_000 {
+        let told = State { position_m: place.position_m + noise(ms) * 1e-4, ..place };
+        bench.hear(Uplink::Pose { sent_us: bench.now_us, pose: Pose::of(&told, PoseSigmas::UNKNOWN) });
+        bench.hear(Uplink::Setpoint(Setpoint { position_m: PLACE_M, yaw_rad: YAW_RAD, ..Setpoint::default() }));
+        if ms == START_MS {
+            bench.hear(Uplink::Command(Command::Arm));
+        }
+        let dead = (START_MS + 1_000..START_MS + 3_000).contains(&ms);
+        let (report, _) = bench.sense(&if dead { Readings::NONE } else { sample(ms, 0.0) });
+        observed += u32::from(report.health.observed);
+        modes.push(report.mode);
+        if ms > START_MS + 4_000 {
+            assert!(!report.health.observed, "{ms} ms");
+        }
+    }
+    assert!((1_950..2_200).contains(&observed), "{observed} ms");
+    let armed = modes.iter().skip(START_MS as usize + 10).all(|mode| matches!(mode, Mode::Flying | Mode::Coasting));
+    assert!(armed && modes.last() == Some(&Mode::Flying));
 }

@@ -6,7 +6,8 @@ use super::world::World;
 use afbc_control::{Action, FlightController, Mixer};
 use afbc_flight_core::rate::{PERIOD_US, WINDOW_US};
 use afbc_flight_core::{ArmingLimits, Asked, Inbox, Refusal, Request, Stamped, Vehicle, VehicleMemory};
-use afbc_types::{OutOfRange, Parameters, Setpoint, State};
+use afbc_onboard::Aged;
+use afbc_types::{OutOfRange, Parameters, Pose, Setpoint, State};
 use core::convert::Infallible;
 
 /// Ticks before the first step: the flight core arms after it has measured its rate.
@@ -34,10 +35,19 @@ impl<C: FlightController<N>, const N: usize> Aboard<C, N> {
     }
 
     /// Runs one tick with these inputs.
-    fn tick(&mut self, state: Option<State>, adrift: Option<State>, setpoint: Setpoint) -> Action<N> {
+    fn tick(
+        &mut self,
+        state: Option<State>,
+        adrift: Option<State>,
+        pose: Option<Aged<Pose>>,
+        setpoint: Setpoint,
+    ) -> Action<N> {
         self.now_us += PERIOD_US;
         let at_us = self.now_us;
         let stamped = |value| Stamped { value, at_us };
+        if let Some(Aged { value, age_us }) = pose {
+            self.inbox.put_pose(Stamped { value, at_us: at_us.saturating_sub(age_us.into()) });
+        }
         match (state, adrift) {
             (Some(state), _) => self.inbox.locate(stamped(state)),
             (None, Some(_)) => self.inbox.put_adrift(adrift.map(stamped), Refusal::PositionUnknown),
@@ -55,10 +65,10 @@ impl<C: FlightController<N>, const N: usize> Aboard<C, N> {
     /// Powers up and arms a vehicle that is held in this `state`.
     fn arm(&mut self, state: State, setpoint: Setpoint) {
         for _ in 0..TICKS_HELD {
-            let _ = self.tick(Some(state), None, setpoint);
+            let _ = self.tick(Some(state), None, None, setpoint);
         }
         self.inbox.request(Asked { request: Request::Arm, ticket: 0 });
-        let _ = self.tick(Some(state), None, setpoint);
+        let _ = self.tick(Some(state), None, None, setpoint);
     }
 }
 
@@ -73,7 +83,7 @@ impl<C: FlightController<N>, const N: usize> Pilot for Aboard<C, N> {
             self.arm(state, setpoint);
         }
         let mut action = if self.now_us > 0 {
-            self.tick(state.filter(|_| view.new), view.adrift, setpoint)
+            self.tick(state.filter(|_| view.new), view.adrift, view.pose, setpoint)
         } else {
             Action::default()
         };

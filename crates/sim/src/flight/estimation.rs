@@ -4,9 +4,10 @@ use super::sensing::{Sensing, still};
 use super::told;
 use crate::scenario::Scenario;
 use afbc_estimator::{Aid, Easing, Estimate, Estimator, Memory};
+use afbc_onboard::{Aged, pose};
 use afbc_plant::Truth;
 use afbc_plant::instruments::Imu;
-use afbc_types::{OutOfRange, State};
+use afbc_types::{OutOfRange, Pose, State};
 use nalgebra::{Quaternion, SMatrix, SVector, Vector3};
 
 /// Time before t = 0 for which a vehicle stands at rest in the attitude of its start, its rotors still, while the
@@ -68,6 +69,10 @@ pub(super) struct Navigator {
     /// Steps since the beginning of settling, and how many of these there are before t = 0.
     steps: u64,
     settling: u64,
+    /// True if the inertial sensor worked in the last step.
+    works: bool,
+    /// Pose that the estimator has left to the flight core.
+    pose: Option<Aged<Pose>>,
     /// Time and result of the last look \[s\].
     last: Option<(f64, Look)>,
 }
@@ -79,6 +84,8 @@ pub(super) struct Look {
     pub(super) state: Option<State>,
     /// The state of a vehicle that knows its attitude, but not all of the rest.
     pub(super) adrift: Option<State>,
+    /// A tracker's pose, once the inertial sensor has failed.
+    pub(super) pose: Option<Aged<Pose>>,
     pub(super) estimated: Estimated,
 }
 
@@ -113,6 +120,8 @@ impl Navigator {
             step_s,
             steps: 0,
             settling: ((REST_S + waits_s + CARRIED_S) / step_s).round() as u64,
+            works: true,
+            pose: None,
             last: None,
         })))
     }
@@ -169,7 +178,7 @@ impl Navigator {
         };
         let state = Some(self.easing.step(&estimate));
         let adrift = state.filter(|_| !valid && estimate.validity.attitude);
-        let look = Look { state: state.filter(|_| valid), adrift, estimated };
+        let look = Look { state: state.filter(|_| valid), adrift, pose: self.pose, estimated };
         self.last = Some((truth.time_s, look));
         look
     }
@@ -196,10 +205,21 @@ impl Navigator {
         let (settling, step_s) = (self.settling as f64, self.step_s);
         // The estimator's clock begins a step before settling: no time of it is zero.
         let at_us = |time_s: f64| ((time_s + (settling + 1.0) * step_s) * 1e6).round().max(0.0) as u64;
-        let Navigator { sensing, memory, .. } = self;
-        let sample = sensing.read(truth, at_us, |measurement| memory.offer(measurement));
+        let now_us = at_us(truth.time_s);
+        let Navigator { sensing, memory, works, pose: left, .. } = self;
+        *left = None;
+        let sample = sensing.read(truth, at_us, |measurement| {
+            if *works {
+                memory.offer(measurement);
+            } else if let Some(value) = pose(&measurement.value) {
+                let age_us = u32::try_from(now_us.saturating_sub(measurement.at_us)).unwrap_or(u32::MAX);
+                *left = Some(Aged { value, age_us });
+            }
+        });
         self.steps += 1;
-        self.estimator.step(&mut self.memory, at_us(truth.time_s), sample.as_ref())
+        let estimate = self.estimator.step(&mut self.memory, now_us, sample.as_ref());
+        self.works = estimate.imu.is_usable();
+        estimate
     }
 
     /// Returns the normalised estimation error squared of rotation, velocity and position; not a number if the

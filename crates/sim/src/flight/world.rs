@@ -6,9 +6,9 @@ use super::sensing::Wired;
 use crate::scenario::{Outage, Scenario};
 use crate::trajectory::{Reference, Trajectory};
 use afbc_control::{Action, Estimate, Trace};
-use afbc_onboard::Readings;
+use afbc_onboard::{Aged, Readings};
 use afbc_plant::{Measurement, Motion, Plant, SensorFaults, Sensors, Suite, Telemetry};
-use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX, RotorSpeeds, State};
+use afbc_types::{OutOfRange, PerAxis, Pose, ROTORS_MAX, RotorSpeeds, State};
 
 /// Plant, sensors, link and reference of a scenario.
 pub struct World {
@@ -43,6 +43,8 @@ pub struct View {
     pub state: Option<State>,
     /// Estimate of a vehicle that knows its attitude, but not where it is.
     pub adrift: Option<State>,
+    /// Pose of a tracker in front of a vehicle whose inertial sensor has failed.
+    pub pose: Option<Aged<Pose>>,
     /// Whether it has just arrived.
     pub new: bool,
 }
@@ -112,7 +114,18 @@ impl World {
         let telemetry = self.plant.telemetry();
         let new = measurement.is_none_or(|measurement| measurement.new);
         let state = state.filter(|_| !lost);
-        View { time_s, motion, measurement, estimated: None, telemetry, reference, state, adrift: None, new }
+        View {
+            time_s,
+            motion,
+            measurement,
+            estimated: None,
+            telemetry,
+            reference,
+            state,
+            adrift: None,
+            pose: None,
+            new,
+        }
     }
 
     /// Moves the vehicle by one step with commanded rotor speeds `speeds`.
@@ -137,7 +150,7 @@ impl View {
 #[inline(never)]
 fn navigated(navigator: &mut Navigator, plant: &Plant, reference: Reference) -> View {
     let (time_s, motion, telemetry) = (plant.time_s(), plant.motion(), plant.telemetry());
-    let Look { state, adrift, estimated } = navigator.look(&plant.truth());
+    let Look { state, adrift, pose, estimated } = navigator.look(&plant.truth());
     View {
         time_s,
         motion,
@@ -147,6 +160,7 @@ fn navigated(navigator: &mut Navigator, plant: &Plant, reference: Reference) -> 
         reference,
         state,
         adrift,
+        pose,
         new: true,
     }
 }
