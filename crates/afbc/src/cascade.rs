@@ -3,7 +3,7 @@
 
 use crate::law::{Context, Law, Tracking};
 use crate::limits::Limits;
-use crate::model::{Model, euler_rates};
+use crate::model::{Model, RollPitch, euler_rates};
 use crate::reference::{Detours, Reference, ReferenceModel};
 use crate::standstill::Standstill;
 use afbc_control::command_filter::{BANDWIDTH, CommandFilter, Filtered};
@@ -140,6 +140,8 @@ pub struct Cascade<E> {
     unallocated: PerAxis<f32>,
     standstill: Standstill,
     rotor_residual_rad_s: f32,
+    /// eta and d eta/dt in the last step: the body's rates as in (6), or with feed-forward what follows from them.
+    pub(crate) turning: [Vector3<f32>; 2],
     /// See [`Reference`]; none before the first step.
     detours: Option<Detours>,
     /// See [`Smoother`].
@@ -149,8 +151,8 @@ pub struct Cascade<E> {
 impl<E> Cascade<E> {
     /// Returns the memory with the estimates of another law, which starts with this rotor residual.
     pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>, rotor_residual_rad_s: f32) -> Cascade<F> {
-        let Cascade { errors, distances, inputs, asked, desired, unallocated, standstill, detours, smoothed, .. } =
-            *self;
+        let Cascade { errors, distances, inputs, asked, desired, unallocated, standstill, .. } = *self;
+        let Cascade { turning, detours, smoothed, .. } = *self;
         Cascade {
             estimates,
             errors,
@@ -161,6 +163,7 @@ impl<E> Cascade<E> {
             unallocated,
             standstill,
             rotor_residual_rad_s,
+            turning,
             detours,
             smoothed,
         }
@@ -281,12 +284,6 @@ impl<L: Law, const N: usize> Controller<L, N> {
         self.settings.feed_forward
     }
 
-    /// Returns d eta/dt: the body's rates as in (6), or with feed-forward what follows from them.
-    #[inline(always)]
-    pub(crate) fn turning(&self, state: &State) -> Vector3<f32> {
-        if self.settings.feed_forward { euler_rates(state) } else { state.rates_rad_s }
-    }
-
     /// Returns the law in the cascade.
     pub(crate) fn law(&self) -> &L {
         &self.law
@@ -326,7 +323,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
     }
 
     /// Computes (7)-(40) in their order; `fresh` as in [`FlightController::decide`].
-    #[inline(always)]
+    #[inline(never)]
     pub(crate) fn cascade(
         &self,
         memory: &mut Cascade<L::Estimate>,
@@ -345,32 +342,35 @@ impl<L: Law, const N: usize> Controller<L, N> {
             None => *setpoint,
         };
         let stands = self.stands(memory);
+        let roll_pitch = RollPitch::new(state);
+        let hover_n = self.hover_thrust_n(memory);
+        let Cascade { estimates, errors, unallocated, .. } = memory;
         let context = Context {
             state,
+            roll_pitch,
             rotor_residual_rad_s: memory.rotor_residual_rad_s,
             dt_s: self.settings.common.dt_s,
             adapt: fresh && !stands,
-            unallocated: memory.unallocated,
+            unallocated,
             known: self.settings.feed_forward.then_some(&self.model),
         };
-        let hover_n = self.hover_thrust_n(memory);
-        let Cascade { estimates, errors, .. } = memory;
-
-        let eta = state.attitude_rad;
-        let eta_dot = self.turning(state);
-        let tilt_cosine = math::tilt_cosine(eta.x, eta.y);
+        // References, so that no copy is spilled while a subsystem computes.
+        let eta = &state.attitude_rad;
+        let eta_dot =
+            if self.settings.feed_forward { euler_rates(&state.rates_rad_s, &roll_pitch) } else { state.rates_rad_s };
+        memory.turning = [*eta, eta_dot];
 
         // Position: subsystems 4, 5, 6.
-        let (p, v, a) = (reference.position_m, reference.velocity_m_s, reference.acceleration_m_s2);
-        let (xi, xi_dot) = (state.position_m, state.velocity_m_s);
+        let (p, v, a) = (&reference.position_m, &reference.velocity_m_s, &reference.acceleration_m_s2);
+        let (xi, xi_dot) = (&state.position_m, &state.velocity_m_s);
         let track = |x1, x2, e1, x1d_dot, x1d_ddot| Tracking { x1, x2, e1, x1d_dot, x1d_ddot, approach_1_s: None };
-        let approach = |x1: f32, x2, x1d: f32, x1d_dot, x1d_ddot, (max_m, approach): (f32, f32)| {
+        let approach = |x1: f32, x2, x1d: f32, x1d_dot, x1d_ddot, &(max_m, approach): &(f32, f32)| {
             let distance = x1d - x1;
             let (e1, approach_1_s) =
                 if distance.abs() > max_m { (max_m.copysign(distance), Some(approach)) } else { (distance, None) };
             Tracking { x1, x2, e1, x1d_dot, x1d_ddot, approach_1_s }
         };
-        let [x_max, y_max, z_max] = self.approach;
+        let [x_max, y_max, z_max] = &self.approach;
         let z = approach(xi.z, xi_dot.z, p.z, v.z, a.z, z_max);
         let u4 = self.input(Axis::Z, z, &context, &mut estimates.z, &mut errors.z);
         let x = approach(xi.x, xi_dot.x, p.x, v.x, a.x, x_max);
@@ -380,7 +380,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
 
         // Desired attitude, with the derivatives for (12) and (16).
         let (vertical, inverse_vertical) = if self.settings.tilt_by_thrust {
-            let upward_n = math::min(u4, self.thrust_max_n) * tilt_cosine;
+            let upward_n = math::min(u4, self.thrust_max_n) * roll_pitch.tilt_cosine();
             let share = math::max(upward_n / hover_n, VERTICAL_MIN);
             (self.gravity_m_s2 * share, self.inverse_gravity / share)
         } else {
@@ -428,9 +428,9 @@ impl<L: Law, const N: usize> Controller<L, N> {
 
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3, thrust_n: u4 };
         let inputs = self.smoother.advance(&mut memory.smoothed, &inputs);
-        memory.asked = inputs;
         // Moments would increase the thrust and tip over a standing vehicle.
         let asked = if stands { Inputs { thrust_n: inputs.thrust_n, ..Inputs::default() } } else { inputs };
+        memory.asked = asked;
         let allocation = self.mixer.allocate(&asked);
         let action = self.mixer.carry_out(&allocation);
 

@@ -9,7 +9,6 @@ use crate::monitor::{Bounds, Figures, Monitor};
 use crate::safeguards::Safeguards;
 use afbc_control::{Action, Errors, Estimate, FlightController, Mixer, Trace, Trip};
 use afbc_types::{Airframe, Axis, OutOfRange, PerAxis, Range, Setpoint, State};
-use nalgebra::Vector3;
 
 /// Smallest Theta_max of z, in weights. With feed-forward, rotors that produce 45 % of their thrust need 1.2 of it on
 /// the rule of hover. Without, nine rules that each hold the weight give |Theta_hat| = 3 weights, and rotors that
@@ -39,21 +38,12 @@ struct StandIn<const N: usize> {
     action: Action<N>,
 }
 
-/// Attitude and d eta/dt of the last step, from which the other law continues.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Last {
-    attitude_rad: Vector3<f32>,
-    turning_rad_s: Vector3<f32>,
-}
-
-/// Reason for the trip, and the last step.
+/// Reason for the trip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Tripped {
     trip: Trip,
     /// omega of (6) after AFBC's last step \[rad/s\].
     rotor_residual_rad_s: f32,
-    /// Record of the last step, under either law.
-    last: Last,
 }
 
 /// Memory of a flight.
@@ -118,7 +108,7 @@ impl<const N: usize> Guarded<N> {
     fn stand_in<'a>(
         &self,
         memory: &'a mut Option<StandIn<N>>,
-        (afbc, tripped): (&Cascade<Estimate>, &mut Tripped),
+        (afbc, tripped): (&Cascade<Estimate>, &Tripped),
         (state, setpoint): (&State, &Setpoint),
         fresh: bool,
     ) -> &'a Action<N> {
@@ -130,25 +120,17 @@ impl<const N: usize> Guarded<N> {
         });
         *action = self.fallback.cascade(cascade, state, setpoint, fresh);
         action.health.trip = Some(tripped.trip);
-        tripped.last = self.last(state);
         action
-    }
-
-    /// Returns the record of a step.
-    #[inline]
-    fn last(&self, state: &State) -> Last {
-        Last { attitude_rad: state.attitude_rad, turning_rad_s: self.adaptive.turning(state) }
     }
 
     /// Returns `cascade` with estimates for which AFBC continues with the last inputs. With feed-forward, u_a is what
     /// was learnt by either law, since both give the same known part.
     fn resumed<E>(
         &self,
-        last: &Last,
         cascade: &Cascade<E>,
         learnt: impl Fn(Axis, [f32; 2], &Errors, &E) -> f32,
     ) -> Cascade<Estimate> {
-        let (Last { attitude_rad: eta, turning_rad_s: eta_dot }, Cascade { inputs, errors, .. }) = (last, cascade);
+        let Cascade { inputs, errors, turning: [eta, eta_dot], .. } = cascade;
         let law = self.adaptive.law();
         let estimates = PerAxis::from_fn(|axis| {
             let x = match axis {
@@ -192,7 +174,7 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
             && let Some(trip) = self.monitor.watch(figures, afbc, action.health.saturated)
         {
             let rotor_residual_rad_s = self.adaptive.mixer().residual_rad_s(&action.speeds);
-            *tripped = Some(Tripped { trip, rotor_residual_rad_s, last: self.last(state) });
+            *tripped = Some(Tripped { trip, rotor_residual_rad_s });
         }
         action
     }
@@ -205,10 +187,10 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
     }
 
     fn engage(&self, memory: &mut Memory<N>) -> bool {
-        let Memory { afbc, tripped: Some(Tripped { last, .. }), stand_in, .. } = memory else { return false };
+        let Memory { afbc, tripped: Some(_), stand_in, .. } = memory else { return false };
         let afbc = match stand_in {
-            Some(StandIn { cascade, .. }) => self.resumed(last, cascade, |_, _, _, integral| integral.value),
-            None => self.resumed(last, afbc, |axis, x, errors, own| self.adaptive.law().fuzzy(axis, x, errors, own)),
+            Some(StandIn { cascade, .. }) => self.resumed(cascade, |_, _, _, integral| integral.value),
+            None => self.resumed(afbc, |axis, x, errors, own| self.adaptive.law().fuzzy(axis, x, errors, own)),
         };
         *memory = Memory { afbc, ..Memory::default() };
         true

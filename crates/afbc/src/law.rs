@@ -1,6 +1,6 @@
 //! Interface of a control law in the [cascade](crate::cascade).
 
-use crate::model::{Dynamics, Model};
+use crate::model::{Dynamics, Model, RollPitch};
 use afbc_control::{Errors, Estimate};
 use afbc_types::{Axis, PerAxis, State};
 
@@ -37,6 +37,8 @@ pub trait Law {
 pub struct Context<'a> {
     /// State used in the step.
     pub state: &'a State,
+    /// Its roll and pitch.
+    pub roll_pitch: RollPitch,
     /// omega of (6), as last commanded \[rad/s\].
     pub rotor_residual_rad_s: f32,
     /// Time step \[s\].
@@ -44,7 +46,7 @@ pub struct Context<'a> {
     /// False if estimates must not change.
     pub adapt: bool,
     /// Part of each subsystem's input that could not be allocated in the last step; zero without anti-windup.
-    pub unallocated: PerAxis<f32>,
+    pub unallocated: &'a PerAxis<f32>,
     /// Nominal model that the law may use; none for the law as printed.
     pub known: Option<&'a Model>,
 }
@@ -53,7 +55,7 @@ impl Context<'_> {
     /// Returns f, g and dg/dt of a subsystem by `model` in this step.
     #[inline]
     pub(crate) fn dynamics(&self, model: &Model, axis: Axis) -> Dynamics {
-        model.dynamics(axis, self.state, self.rotor_residual_rad_s)
+        model.dynamics_at(axis, &self.state.rates_rad_s, &self.roll_pitch, self.rotor_residual_rad_s)
     }
 }
 

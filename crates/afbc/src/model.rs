@@ -19,6 +19,35 @@ pub struct Dynamics {
 /// which assumes A3 instead.
 pub const TILT_COSINE_MIN: f32 = 0.1;
 
+/// Sines and cosines of roll and pitch, which a step computes once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RollPitch {
+    sin_phi: f32,
+    cos_phi: f32,
+    sin_theta: f32,
+    cos_theta: f32,
+}
+
+impl RollPitch {
+    /// Computes them for a state.
+    #[inline(always)]
+    pub fn new(state: &State) -> Self {
+        let (phi, theta) = (state.attitude_rad.x, state.attitude_rad.y);
+        RollPitch {
+            sin_phi: math::sin(phi),
+            cos_phi: math::cos(phi),
+            sin_theta: math::sin(theta),
+            cos_theta: math::cos(theta),
+        }
+    }
+
+    /// Returns the cosine of the tilt.
+    #[inline(always)]
+    pub fn tilt_cosine(&self) -> f32 {
+        self.cos_phi * self.cos_theta
+    }
+}
+
 /// Returns d eta/dt for the rates of the body, which (6) takes for equal:
 ///
 /// ```text
@@ -27,12 +56,11 @@ pub const TILT_COSINE_MIN: f32 = 0.1;
 /// d theta/dt = q cos phi - r sin phi
 /// ```
 #[inline(always)]
-pub(crate) fn euler_rates(state: &State) -> Vector3<f32> {
-    let (phi, theta) = (state.attitude_rad.x, state.attitude_rad.y);
-    let [p, q, r] = state.rates_rad_s.into();
-    let (sin_phi, cos_phi) = (math::sin(phi), math::cos(phi));
-    let psi_dot = (q * sin_phi + r * cos_phi) / math::max(math::cos(theta), TILT_COSINE_MIN);
-    Vector3::new(p + math::sin(theta) * psi_dot, q * cos_phi - r * sin_phi, psi_dot)
+pub(crate) fn euler_rates(rates_rad_s: &Vector3<f32>, at: &RollPitch) -> Vector3<f32> {
+    let [p, q, r] = (*rates_rad_s).into();
+    let RollPitch { sin_phi, cos_phi, sin_theta, cos_theta } = *at;
+    let psi_dot = (q * sin_phi + r * cos_phi) / math::max(cos_theta, TILT_COSINE_MIN);
+    Vector3::new(p + sin_theta * psi_dot, q * cos_phi - r * sin_phi, psi_dot)
 }
 
 /// Constants a_1..a_5, b_1..b_3, 1/m and g of (6).
@@ -82,21 +110,24 @@ impl Model {
     }
 
     /// Returns f_i, g_i and dg_i/dt of `axis`, with d eta/dt in place of Omega as in (6).
-    #[inline(always)]
     pub fn dynamics(&self, axis: Axis, state: &State, rotor_residual_rad_s: f32) -> Dynamics {
-        let (rates, omega) = (&state.rates_rad_s, rotor_residual_rad_s);
+        self.dynamics_at(axis, &state.rates_rad_s, &RollPitch::new(state), rotor_residual_rad_s)
+    }
+
+    /// The same, for given rates and angles.
+    #[inline(always)]
+    pub(crate) fn dynamics_at(&self, axis: Axis, rates: &Vector3<f32>, at: &RollPitch, omega: f32) -> Dynamics {
         let constant = |f, g| Dynamics { f, g, g_dot: 0.0 };
         match axis {
             Axis::Roll => constant(rates.y * rates.z * self.a1 + rates.y * self.a2 * omega, self.b1),
             Axis::Pitch => constant(rates.x * rates.z * self.a3 + rates.x * self.a4 * omega, self.b2),
             Axis::Yaw => constant(rates.x * rates.y * self.a5, self.b3),
             Axis::Z => {
-                let (phi, theta) = (state.attitude_rad.x, state.attitude_rad.y);
-                let (cos_phi, cos_theta) = (math::cos(phi), math::cos(theta));
-                let tilt_cosine_dot = -math::sin(phi) * cos_theta * rates.x - cos_phi * math::sin(theta) * rates.y;
+                let RollPitch { sin_phi, cos_phi, sin_theta, cos_theta } = *at;
+                let tilt_cosine_dot = -sin_phi * cos_theta * rates.x - cos_phi * sin_theta * rates.y;
                 Dynamics {
                     f: -self.gravity,
-                    g: math::max(cos_phi * cos_theta, TILT_COSINE_MIN) / self.mass,
+                    g: math::max(at.tilt_cosine(), TILT_COSINE_MIN) / self.mass,
                     g_dot: tilt_cosine_dot / self.mass,
                 }
             }

@@ -101,8 +101,14 @@ struct Point {
 /// The part of `jump` to take off `d`, so that it comes as near as possible to `vehicle`.
 #[inline]
 fn taken_up(d: f32, jump: f32, vehicle: f32) -> f32 {
-    let (low, high) = if jump > 0.0 { (d - jump, d) } else { (d, d - jump) };
-    math::min(math::max(vehicle, low), high)
+    let rest = d - jump;
+    if jump > 0.0 {
+        if vehicle >= d { d } else { math::max(vehicle, rest) }
+    } else if vehicle <= d {
+        d
+    } else {
+        math::min(vehicle, rest)
+    }
 }
 
 impl Coordinate {
@@ -121,7 +127,8 @@ impl Coordinate {
         } else {
             self.approach * distance
         };
-        -math::min(speed, self.speed_max).copysign(d)
+        let speed = math::min(speed, self.speed_max);
+        if d < 0.0 { speed } else { -speed }
     }
 
     /// Adds the detour to `point`, for a vehicle at `from` from it with velocity `rate` relative to it, and advances by
@@ -134,8 +141,11 @@ impl Coordinate {
         let a_max = self.acceleration_max;
         let a_c = math::min(math::max(self.bandwidth * (self.speed(*d) - *d_dot), -a_max), a_max);
         // The detour accelerates the reference as a whole no further than a_max.
-        let (lowest, highest) = (math::min(-a_max - point.a, 0.0), math::max(a_max - point.a, 0.0));
-        *d_ddot = math::min(math::max(*d_ddot, lowest), highest);
+        *d_ddot = if *d_ddot > 0.0 {
+            math::min(*d_ddot, math::max(a_max - point.a, 0.0))
+        } else {
+            math::max(*d_ddot, math::min(-a_max - point.a, 0.0))
+        };
         let d_dddot = 3.0 * self.bandwidth * (a_c - *d_ddot);
         let half = 0.5 * dt_s;
         *expected = [point.x + dt_s * (point.v + half * point.a), point.v + dt_s * (point.a + half * point.j)];

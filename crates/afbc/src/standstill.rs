@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 /// Share of the weight below which the demanded thrust does not carry the vehicle.
 pub const LIFT_SHARE: f32 = 0.4;
 /// Speed along each axis below which the vehicle is at rest \[m/s\].
-pub const STILL_M_S: f32 = 0.1;
+pub const STILL_M_S: f32 = 0.3;
 /// Speed along an axis at which a vehicle no longer stands \[m/s\]: more than rocking on its feet, and reached in 0.1 s
 /// of falling.
 pub const MOVING_M_S: f32 = 0.5;

@@ -6,7 +6,7 @@ use afbc::backstepping::{self, ideal, proportional};
 use afbc::fuzzy::{Basis, Membership};
 use afbc::law::Context;
 use afbc::law::Tracking;
-use afbc::model::Dynamics;
+use afbc::model::{Dynamics, RollPitch};
 use afbc::{Adaptive, Backstepping, Law, Profile, Safeguards};
 use afbc_control::Estimate;
 use afbc_types::{Axis, Declaration, Parameters, PerAxis, State};
@@ -105,10 +105,11 @@ proptest! {
         let law = Backstepping::new(&Parameters::PAPER.to_f32(), gains).unwrap();
         let context = Context {
             state: &State::default(),
+            roll_pitch: RollPitch::new(&State::default()),
             rotor_residual_rad_s: 0.0,
             dt_s: 0.001,
             adapt: true,
-            unallocated: PerAxis::default(),
+            unallocated: &PerAxis::default(),
             known: None,
         };
         let approach = law.approach(Axis::X, None);
@@ -219,10 +220,11 @@ proptest! {
             let mut frozen = before;
             let context = Context {
                 state: &state,
+                roll_pitch: RollPitch::new(&state),
                 rotor_residual_rad_s: 0.0,
                 dt_s,
                 adapt: false,
-                unallocated: PerAxis::default(),
+                unallocated: &PerAxis::default(),
                 known: None,
             };
             let (u, seen) = law.input(axis, &tracking, &context, &mut frozen);

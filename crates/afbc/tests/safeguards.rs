@@ -7,6 +7,7 @@ use afbc::adaptive::Gains;
 use afbc::fuzzy::{Basis, Firing};
 use afbc::law::Context;
 use afbc::law::Tracking;
+use afbc::model::RollPitch;
 use afbc::{Adaptive, Controller, Law, Profile, Safeguards, Settings};
 use afbc_control::{Estimate, FlightController, Screened};
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
@@ -24,10 +25,11 @@ fn step(gains: Gains, e2: f32, unallocated: f32, dt_s: f32, estimate: &mut Estim
     let law = Adaptive::new(PerAxis::from_fn(|_| gains)).unwrap();
     let context = Context {
         state: &State::default(),
+        roll_pitch: RollPitch::new(&State::default()),
         rotor_residual_rad_s: 0.0,
         dt_s,
         adapt: true,
-        unallocated: PerAxis { x: unallocated, ..PerAxis::default() },
+        unallocated: &PerAxis { x: unallocated, ..PerAxis::default() },
         known: None,
     };
     law.input(Axis::X, &tracking(e2), &context, estimate).0
@@ -258,10 +260,11 @@ fn noise_drives_the_printed_delta_hat_and_not_the_hardened() {
                 let tracking = Tracking { x1, x2, e1: -x1, ..Tracking::default() };
                 let context = Context {
                     state: &State::default(),
+                    roll_pitch: RollPitch::new(&State::default()),
                     rotor_residual_rad_s: 0.0,
                     dt_s: 0.001,
                     adapt: true,
-                    unallocated: PerAxis::default(),
+                    unallocated: &PerAxis::default(),
                     known: None,
                 };
                 let (u, _) = law.input(Axis::X, &tracking, &context, &mut estimate);

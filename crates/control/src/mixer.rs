@@ -54,6 +54,8 @@ pub struct Mixer<const N: usize = 4> {
     most: SVector<f32, N>,
     /// The same, if all rotors have the same share.
     common_most: Option<f32>,
+    /// True if every rotor has another whose loads by U1 and U2 are its own with the other sign.
+    balanced: bool,
     /// b
     thrust_factor: f32,
     /// 1/b
@@ -161,11 +163,13 @@ impl<const N: usize> Mixer<N> {
             let most = force_max_n / share;
             if share * most > force_max_n { most.next_down() } else { most }
         });
-        let (b, yaw) = (parameters.thrust_factor_n_s2, load(2));
+        let (b, [roll, pitch, yaw]) = (parameters.thrust_factor_n_s2, [0, 1, 2].map(load));
+        let tilts = || roll.iter().zip(pitch.iter());
         Ok(Mixer {
             effectiveness,
-            roll: load(0),
-            pitch: load(1),
+            balanced: tilts().all(|(roll, pitch)| tilts().any(|other| other == (&-roll, &-pitch))),
+            roll,
+            pitch,
             yaw,
             room: [YawRoom::new(&yaw, &most), YawRoom::new(&-yaw, &most)],
             share,
@@ -279,6 +283,7 @@ impl<const N: usize> Mixer<N> {
         // Thrusts at which the loads by roll and pitch are within limits; none if the first exceeds the second.
         let least = -lowest(&tilt);
         let most = match self.common_most {
+            Some(most) if self.balanced => most - least,
             Some(most) => most - highest(&tilt),
             None => lowest(&(self.most - tilt)),
         };

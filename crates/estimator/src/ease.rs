@@ -62,21 +62,27 @@ impl Easing {
     #[inline]
     pub fn step(&mut self, estimate: &Estimate) -> State {
         let mut state = estimate.state;
-        let seen = estimate.validity.position.then(|| Seen::of(estimate));
-        let last = core::mem::replace(&mut self.last, seen);
-        let (Some(last), Some(seen)) = (last, &seen) else {
-            (self.position_m, self.velocity_m_s) = Default::default();
+        if !estimate.validity.position {
+            *self = Easing::default();
+            return state;
+        }
+        let seen = Seen::of(estimate);
+        let Some(last) = &mut self.last else {
+            *self = Easing { last: Some(seen), ..Easing::default() };
             return state;
         };
-        let dt_s = min(seen.at_us.saturating_sub(last.at_us) as f32 * 1e-6, DECAY_S);
+        // 32 bits, which the processor converts by itself; longer times count as DECAY_S too.
+        let since_us = u32::try_from(seen.at_us.saturating_sub(last.at_us)).unwrap_or(u32::MAX);
+        let dt_s = min(since_us as f32 * 1e-6, DECAY_S);
         let stays = |hidden: &Vector3<f32>, most: f32| 1.0 - dt_s / max(DECAY_S, sqrt(hidden.norm_squared()) / most);
         self.position_m *= stays(&self.position_m, MOST_M_S);
         self.velocity_m_s *= stays(&self.velocity_m_s, MOST_M_S2);
         let jump_m = state.position_m - last.position_m - last.velocity_m_s * dt_s;
-        if jump_m.norm_squared() > JUMP_M * JUMP_M || found(&last, seen) {
+        if jump_m.norm_squared() > JUMP_M * JUMP_M || found(last, &seen) {
             self.position_m += jump_m;
             self.velocity_m_s += state.velocity_m_s - last.velocity_m_s;
         }
+        *last = seen;
         state.position_m -= self.position_m;
         state.velocity_m_s -= self.velocity_m_s;
         state

@@ -38,6 +38,7 @@ pub struct Estimator {
     pub(crate) reacquire_us: u64,
     pub(crate) coast_us: u64,
     pub(crate) frozen_us: u64,
+    stuck_us: u64,
     /// Direction of magnetic north in the earth frame, whose x is north and y west.
     pub(crate) magnetic_north_rad: f32,
     /// Its cosine and sine.
@@ -56,6 +57,8 @@ impl Estimator {
         settings.validate()?;
         let square = |x: f32| x * x;
         let microseconds = |time_s: f32| (time_s * 1e6) as u64;
+        // Never: longer than any time.
+        let or_never = |time_s: f32| if time_s > 0.0 { microseconds(time_s) } else { u64::MAX };
         Ok(Estimator {
             growth: Growth {
                 theta: square(settings.gyro_noise_rad_s_rthz),
@@ -68,8 +71,8 @@ impl Estimator {
             gate_squared: square(settings.gate_sigmas),
             reacquire_us: microseconds(settings.reacquire_s),
             coast_us: microseconds(settings.coast_s),
-            // Never: longer than any time.
-            frozen_us: if settings.frozen_s > 0.0 { microseconds(settings.frozen_s) } else { u64::MAX },
+            frozen_us: or_never(settings.frozen_s),
+            stuck_us: or_never(settings.stuck_s),
             magnetic_north_rad: wrap_angle(-settings.declination_rad),
             magnetic_north: (libm::cosf(settings.declination_rad), -libm::sinf(settings.declination_rad)),
             inclination_error_max: settings.inclination_error_max_rad,
@@ -102,20 +105,30 @@ impl Estimator {
     /// Runs one step, to be called every millisecond: takes the newest sample of the inertial sensors, if there is a
     /// new one, predicts or fuses, and returns the estimate at the time of that sample. `now_us` is the time since
     /// power-up. Cannot fail: whatever is given, the estimate is finite.
+    // Always: the caller computes only what it uses of the estimate, and copies none of it.
+    #[inline(always)]
     #[must_use = "the estimate is its only result"]
     pub fn step(&self, memory: &mut Memory, now_us: u64, imu: Option<&ImuSample>) -> Estimate {
+        self.advance(memory, now_us, imu);
+        self.report(memory, now_us)
+    }
+
+    /// Takes a sample, and predicts or fuses.
+    #[inline(never)]
+    fn advance(&self, memory: &mut Memory, now_us: u64, imu: Option<&ImuSample>) {
         let predicted = imu.is_some_and(|sample| self.take(memory, now_us, sample));
         if memory.runs {
             // Between fixes, since a fix holds a state of before.
-            if memory.history.is_unsettled() && memory.fix.is_none() && !predicted {
+            if predicted {
+                // Enough for a step.
+            } else if memory.fix.is_none() && memory.history.is_unsettled() {
                 memory.history.settle(self.settings.gravity_m_s2);
-            } else if !predicted {
+            } else {
                 self.fuse(memory, now_us);
             }
         } else {
             self.listen(memory, now_us);
         }
-        self.report(memory, now_us)
     }
 
     /// Takes a sample. True if the covariance was predicted.
@@ -127,7 +140,7 @@ impl Estimator {
             memory.monitor.refuse();
             return false;
         }
-        if memory.monitor.repeats(sample, &self.settings) {
+        if memory.monitor.repeats(sample, self.stuck_us) {
             return false;
         }
         let clipped = memory.monitor.take(sample, &self.settings);
@@ -209,7 +222,7 @@ impl Estimator {
 
     /// Before the start, hears who tells the heading.
     fn listen(&self, memory: &mut Memory, now_us: u64) {
-        if memory.monitor.health(now_us, &self.settings).missing {
+        if memory.monitor.health(now_us, &self.settings, self.stuck_us).missing {
             memory.align.again(Unready::NoImu);
         }
         let recent = now_us.saturating_sub(OLD_US);
@@ -221,8 +234,9 @@ impl Estimator {
     }
 
     /// Says what is known.
+    #[inline(always)]
     fn report(&self, memory: &Memory, now_us: u64) -> Estimate {
-        let imu = memory.monitor.health(now_us, &self.settings);
+        let imu = memory.monitor.health(now_us, &self.settings, self.stuck_us);
         let Memory { nominal, aids, resets, .. } = memory;
         let mut estimate = Estimate { imu, resets: *resets, ..Estimate::default() };
         estimate.at_us = memory.monitor.at_us().unwrap_or(now_us);

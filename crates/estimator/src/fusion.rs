@@ -172,10 +172,11 @@ impl Estimator {
     /// Fuses the next scalar; false if the part of the fix that it belongs to is done.
     #[inline(always)]
     fn fuse_scalar(&self, memory: &mut Memory) -> bool {
-        let Some(Fix { at_us, past, parts: [Some(mut part), _], next, .. }) = memory.fix else { return false };
+        let Some(Fix { at_us, past, parts: [Some(part), _], next, .. }) = &memory.fix else { return false };
         let Some(present) = memory.history.newest() else { return false };
         let gravity = self.settings.gravity_m_s2;
-        let Some(past) = memory.history.corrected(&past, gravity) else { return false };
+        let Some(past) = memory.history.corrected(past, gravity) else { return false };
+        let (at_us, mut part, next) = (*at_us, *part, *next);
         let horizon = Horizon::new(&present, &past, gravity);
         part.roughen(memory.roughened_since(at_us), horizon.tau_s());
         if next == 0 && !self.admits(memory, at_us, &part, &horizon) {

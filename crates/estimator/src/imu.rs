@@ -74,14 +74,19 @@ impl Monitor {
         self.in_a_row >= 500
     }
 
+    /// True if the numbers have been the same for longer than `stuck_us`.
+    #[inline]
+    fn is_stuck(&self, stuck_us: u64) -> bool {
+        self.last.as_ref().is_some_and(|last| last.at_us.saturating_sub(self.same_us) > stuck_us)
+    }
+
     /// True if a sample only repeats those of a stuck sensor, and counts as missing.
-    pub(crate) fn repeats(&self, sample: &ImuSample, settings: &Settings) -> bool {
-        let Some(last) = &self.last else { return false };
-        // The first number usually differs.
-        last.rates_rad_s == sample.rates_rad_s
-            && last.specific_force_m_s2 == sample.specific_force_m_s2
-            && settings.stuck_s > 0.0
-            && last.at_us.saturating_sub(self.same_us) > stuck_us(settings).into()
+    pub(crate) fn repeats(&self, sample: &ImuSample, stuck_us: u64) -> bool {
+        let same = |last: &ImuSample| {
+            last.rates_rad_s == sample.rates_rad_s && last.specific_force_m_s2 == sample.specific_force_m_s2
+        };
+        // The time first: six numbers take longer to compare.
+        self.is_stuck(stuck_us) && self.last.as_ref().is_some_and(same)
     }
 
     /// Takes a sample that is not refused, nor repeats those of a stuck sensor. True if it is clipped.
@@ -108,14 +113,14 @@ impl Monitor {
         clipped
     }
 
-    pub(crate) fn health(&self, now_us: u64, settings: &Settings) -> ImuHealth {
+    pub(crate) fn health(&self, now_us: u64, settings: &Settings, stuck_us: u64) -> ImuHealth {
         let at_us = self.at_us();
         let squared = |limit: f32| limit * limit;
         let since =
             |from_us: u64| at_us.map_or(0, |at_us| u32::try_from(at_us.saturating_sub(from_us)).unwrap_or(u32::MAX));
         ImuHealth {
             missing: at_us.is_none_or(|at_us| now_us.saturating_sub(at_us) > MISSING_US),
-            stuck: settings.stuck_s > 0.0 && since(self.same_us) > stuck_us(settings),
+            stuck: self.is_stuck(stuck_us),
             clipped: self.clipped_us.is_some_and(|clipped_us| since(clipped_us) < CLIPPED_US),
             noisy: self.rates_change > squared(settings.gyro_noisy_rad_s)
                 || self.force_change > squared(settings.accel_noisy_m_s2),
@@ -160,9 +165,4 @@ impl LowPass {
         memory.sums = Some((input * (2.0 * b0) - output * a1 + second, input * b0 - output * a2));
         memory.output = output;
     }
-}
-
-/// Time after which numbers that stay the same are those of a stuck sensor \[us\].
-fn stuck_us(settings: &Settings) -> u32 {
-    (settings.stuck_s * 1e6) as u32
 }

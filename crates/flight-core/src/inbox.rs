@@ -43,6 +43,9 @@ pub struct Inbox {
     missing: Option<Refusal>,
     pose: Option<Stamped<Pose>>,
     setpoint: Option<Stamped<Setpoint>>,
+    /// True if the vehicle rests on the ground.
+    rests: Option<bool>,
+    barred: Option<Refusal>,
     /// Requests in the order of arrival, without gaps.
     requests: [Option<Asked>; REQUESTS_MAX],
 }
@@ -56,6 +59,8 @@ impl Inbox {
         missing: None,
         pose: None,
         setpoint: None,
+        rests: None,
+        barred: None,
         requests: [None; REQUESTS_MAX],
     };
 
@@ -97,6 +102,27 @@ impl Inbox {
         if setpoint.value.is_plausible() {
             self.setpoint = Some(setpoint);
         }
+    }
+
+    /// Marks whether an armed vehicle on the ground rests there: its motors idle, and the law does not fly, until the
+    /// mark is taken away. It has no effect in the air.
+    pub fn rest(&mut self, rests: bool) {
+        self.rests = Some(rests);
+    }
+
+    /// True if an armed vehicle on the ground [rests](Self::rest) there.
+    pub fn rests(&self) -> bool {
+        self.rests == Some(true)
+    }
+
+    /// Sets what speaks against arming besides what the flight core checks itself.
+    pub fn bar(&mut self, refusal: Option<Refusal>) {
+        self.barred = refusal;
+    }
+
+    /// Returns what else [speaks against arming](Self::bar).
+    pub fn barred(&self) -> Option<Refusal> {
+        self.barred
     }
 
     /// Returns the newest plausible state.
@@ -153,6 +179,8 @@ impl Inbox {
             self.pose = Some(*pose);
         }
         self.setpoint = news.setpoint.or(self.setpoint);
+        self.rests = news.rests.or(self.rests);
+        self.barred = news.barred.or(self.barred);
         for asked in news.requests.iter().flatten() {
             self.request(*asked);
         }
@@ -204,10 +232,13 @@ impl Inbox {
             }
             (new, old) => *old = *new,
         }
+        (taken.rests, taken.barred) = (self.rests, self.barred);
         taken.requests = self.requests;
         // By hand, since rotating a slice costs a hundred instructions.
-        let [_, second, third, fourth] = self.requests;
-        self.requests = [second, third, fourth, None];
+        let [first, second, third, fourth] = self.requests;
+        if first.is_some() {
+            self.requests = [second, third, fourth, None];
+        }
     }
 }
 

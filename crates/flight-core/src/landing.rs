@@ -93,11 +93,30 @@ impl LandDetector {
         }
     }
 
+    /// Processes a tick of a vehicle that rests on the ground with idling rotors: it stands where it is, whatever its
+    /// tracker says.
+    pub fn rest(&mut self, state: Option<&State>) {
+        let stood_m = state.map_or(self.stood_m, |state| state.position_m);
+        *self = LandDetector {
+            airborne: false,
+            left: false,
+            sank: false,
+            stood_m,
+            usual_n: self.usual_n,
+            still_us: 0,
+            carried_us: 0,
+            uncarried_us: 0,
+        };
+    }
+
     /// Processes a tick of a descending vehicle that does not know how fast it moves: it has landed once its rotors
     /// have not carried it for long enough.
     pub fn advance_adrift(&mut self, state: &State, thrust_n: f32, gap_us: u32, dt_s: f32) {
         self.sank = true;
         self.advance(&State { velocity_m_s: Vector3::zeros(), ..*state }, thrust_n, gap_us, dt_s);
+        // Also for the states that come back, which may see no more of the descent than its end. Nor did it hover.
+        self.sank |= self.airborne;
+        self.still_us = self.still_us.min(STILL_US.saturating_add(1));
     }
 
     /// Processes a tick without a fresh state.

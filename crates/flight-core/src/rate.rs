@@ -78,8 +78,8 @@ impl Default for Counter {
 }
 
 impl Counter {
-    /// Processes a tick, with the time since power-up.
-    pub fn tick(&mut self, now_us: u64) -> Report {
+    /// Processes a tick, with the time since power-up, and returns the [result](Self::report).
+    pub fn tick(&mut self, now_us: u64) -> &Report {
         let report = &mut self.report;
         let first = self.last_us.is_none();
         let last_us = self.last_us.replace(now_us).unwrap_or(now_us);
@@ -100,7 +100,12 @@ impl Counter {
             (self.window_us, self.ticks) = (0, 0);
         }
         self.ticks = self.ticks.saturating_add(1);
-        *report
+        report
+    }
+
+    /// Returns the result as of the last tick.
+    pub fn report(&self) -> &Report {
+        &self.report
     }
 
     /// Returns the time between the last two ticks \[us\]; 0 before the second one.

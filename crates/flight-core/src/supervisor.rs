@@ -103,11 +103,19 @@ pub enum Refusal {
     HeadingUnknown = 12,
     /// The vehicle's own estimate has no position.
     PositionUnknown = 13,
+    /// The battery is low, or is to be watched and not known.
+    BatteryLow = 14,
+    /// A sensor has failed.
+    SensorFailed = 15,
+    /// The vehicle is outside its geofence.
+    OutsideFence = 16,
+    /// The flight mode is not one to start from.
+    WrongMode = 17,
 }
 
 impl Refusal {
     /// Every reason.
-    pub const ALL: [Refusal; 13] = [
+    pub const ALL: [Refusal; 17] = [
         Refusal::AlreadyArmed,
         Refusal::StateStale,
         Refusal::TiltTooLarge,
@@ -121,6 +129,10 @@ impl Refusal {
         Refusal::AttitudeUnknown,
         Refusal::HeadingUnknown,
         Refusal::PositionUnknown,
+        Refusal::BatteryLow,
+        Refusal::SensorFailed,
+        Refusal::OutsideFence,
+        Refusal::WrongMode,
     ];
 
     /// Returns the reason as text of at most 50 characters.
@@ -139,6 +151,10 @@ impl Refusal {
             Refusal::AttitudeUnknown => "arming refused: estimator has no attitude yet",
             Refusal::HeadingUnknown => "arming refused: estimator has no heading",
             Refusal::PositionUnknown => "arming refused: estimator has no position",
+            Refusal::BatteryLow => "arming refused: battery low or not known",
+            Refusal::SensorFailed => "arming refused: a sensor has failed",
+            Refusal::OutsideFence => "arming refused: outside the geofence",
+            Refusal::WrongMode => "arming refused: not in this flight mode",
         }
     }
 }
@@ -210,7 +226,10 @@ impl ArmingLimits {
         if !vehicle.healthy {
             return Err(Refusal::Unhealthy);
         }
-        if vehicle.rest_us >= REST_US { Ok(()) } else { Err(Refusal::NotAtRest) }
+        if vehicle.rest_us < REST_US {
+            return Err(Refusal::NotAtRest);
+        }
+        vehicle.barred.map_or(Ok(()), Err)
     }
 }
 
@@ -227,6 +246,8 @@ pub struct Standing<'a> {
     pub healthy: bool,
     /// Time for which it has been [at rest](ArmingLimits::at_rest) \[us\].
     pub rest_us: u32,
+    /// What else speaks against arming, by [`Inbox::bar`](crate::Inbox::bar).
+    pub barred: Option<Refusal>,
 }
 
 /// Inputs of the supervisor.

@@ -1,7 +1,7 @@
 //! The control tick: takes the newest inputs, supervises, controls, gates the motors, checks the rate.
 
 use crate::blind::{Blind, Reckoning};
-use crate::descent::Descent;
+use crate::descent::{Descent, Drift};
 use crate::inbox::{Inbox, Stamped};
 use crate::landing::LandDetector;
 use crate::observer::{HOLD_US, Observer};
@@ -54,6 +54,8 @@ struct Armed<M> {
     applied: Inputs,
     /// Inputs of the last tick, if it had no step of the law.
     lawless: Option<Inputs>,
+    /// True if it rests on the ground, and the controller's memory is as at take-off.
+    rests: bool,
     guide: Guide,
     landing: LandDetector,
     tumble: Tumble,
@@ -68,8 +70,8 @@ struct Guide {
     /// Setpoint to hold while there is no other.
     hold: Option<Setpoint>,
     descent: Option<Descent>,
-    /// Descent of a vehicle that does not know where it is.
-    adrift: Option<Descent>,
+    /// Motion and descent of a vehicle that does not know where it is.
+    adrift: Option<(Drift, Descent)>,
 }
 
 impl<M> VehicleMemory<M> {
@@ -81,6 +83,11 @@ impl<M> VehicleMemory<M> {
     /// Returns the newest plausible state.
     pub fn state(&self) -> Option<&State> {
         self.state.as_ref().map(|state| &state.value)
+    }
+
+    /// True if the vehicle is armed and in the air.
+    pub fn airborne(&self) -> bool {
+        self.mode.armed() && self.flight.as_ref().is_some_and(|flight| flight.landing.airborne())
     }
 
     /// Records that the clock has failed and another has taken over: the vehicle is not armed again.
@@ -176,7 +183,7 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
     pub fn tick(&self, memory: &mut VehicleMemory<C::Memory>, now_us: u64, inbox: &Inbox) -> Outcome<N> {
         let dt_s = self.controller.dt_s();
         // Takes the newest inputs.
-        let rate = memory.rate.tick(now_us);
+        memory.rate.tick(now_us);
         let told = memory.take_state(inbox, now_us);
         let observing = memory.observe(&self.blind, inbox, now_us, told);
         let measured = told || observing;
@@ -186,15 +193,17 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         let fresh = fresh.as_ref();
         let adrift = inbox.adrift().filter(|_| fresh.is_none()).and_then(|state| upright(state, now_us));
         memory.orient(inbox);
-        memory.watch(fresh, adrift.as_ref(), &self.limits, dt_s);
-        let VehicleMemory { mode, steady_us, rest_us, frozen_states, oriented_us, flight, .. } = memory;
+        memory.watch(fresh, adrift.as_ref(), inbox.rests(), &self.limits, dt_s);
+        let VehicleMemory { mode, rate, state: last, steady_us, rest_us, frozen_states, oriented_us, flight, .. } =
+            memory;
         let age_us = |at_us: Option<u64>| at_us.map_or(u32::MAX, |at_us| Stamped { value: (), at_us }.age_us(now_us));
         let setpoint = inbox.setpoint().filter(|s| s.age_us(now_us) <= SETPOINT_STALE_US).map(|s| &s.value);
 
         // Supervises.
         let ready = || {
-            let missing = inbox.missing();
-            let standing = Standing { state: fresh, missing, setpoint, healthy: rate.healthy(), rest_us: *rest_us };
+            let (missing, barred) = (inbox.missing(), inbox.barred());
+            let (healthy, rest_us) = (rate.report().healthy(), *rest_us);
+            let standing = Standing { state: fresh, missing, setpoint, healthy, rest_us, barred };
             self.limits.ready(&standing)
         };
         let asked = inbox.asked();
@@ -227,7 +236,12 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
 
         // Controls.
         let action = match flight {
+            Some(flight) if mode.armed() && !arms && inbox.rests() && !observed.airborne => {
+                flight.rest(&self.blind, fresh.or(adrift.as_ref()));
+                self.lawless(flight, Inputs::default())
+            }
             Some(flight) if mode.armed() && !arms => {
+                flight.rests = false;
                 flight.reckon(&self.blind, fresh.filter(|_| measured).or(adrift.as_ref()));
                 let engaged = done(Request::Engage) && self.controller.engage(&mut flight.control);
                 match (fresh, &adrift) {
@@ -245,8 +259,10 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
                         action
                     }
                     (None, Some(state)) => {
-                        let target = flight.guide.down(state, dt_s);
-                        let action = self.controller.decide(&mut flight.control, state, target, true);
+                        let state = inbox.adrift().map_or(state, |adrift| &adrift.value);
+                        let last = last.as_ref().map(|last| &last.value);
+                        let (state, target) = flight.guide.down(state, last, dt_s);
+                        let action = self.controller.decide(&mut flight.control, &state, target, true);
                         flight.lawless = None;
                         flight.applied = action.given;
                         self.blind.trim(&mut flight.reckoning, &flight.applied);
@@ -267,7 +283,7 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         let setpoint_stale = setpoint.is_none();
         let health = Health {
             control: action.health,
-            rate,
+            rate: *rate.report(),
             state_age_us,
             setpoint_stale,
             observed: observing,
@@ -298,6 +314,10 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
 /// Extrapolates the state by `age_us` with its velocities and rates; as in the paper's model, body rates replace the
 /// derivatives of the angles.
 fn extrapolated(state: &State, age_us: u32) -> State {
+    // As an estimate of its own always is.
+    if age_us == 0 {
+        return *state;
+    }
     let age_s = age_us as f32 * 1e-6;
     State {
         position_m: state.position_m + state.velocity_m_s * age_s,
@@ -390,14 +410,21 @@ impl<M> VehicleMemory<M> {
         self.oriented_us = self.oriented_us.max(newest);
     }
 
-    /// Updates the detectors with a fresh state, or with that of a vehicle adrift, or none.
-    fn watch(&mut self, fresh: Option<&State>, adrift: Option<&State>, limits: &ArmingLimits, dt_s: f32) {
+    /// Updates the detectors with a fresh state, or with that of a vehicle adrift, or none; `rests`: the inbox's mark.
+    fn watch(&mut self, fresh: Option<&State>, adrift: Option<&State>, rests: bool, limits: &ArmingLimits, dt_s: f32) {
         let gap_us = self.rate.gap_us();
         let longer = |time_us: u32, lasts| if lasts { time_us.saturating_add(gap_us) } else { 0 };
         self.steady_us = longer(self.steady_us, fresh.is_some());
         self.rest_us = longer(self.rest_us, fresh.is_some_and(|state| limits.at_rest(state)));
         let armed = self.mode.armed();
         let Some(flight) = self.flight.as_mut().filter(|_| armed) else { return };
+        if rests && !flight.landing.airborne() {
+            flight.landing.rest(fresh.or(adrift));
+            return match fresh.or(adrift) {
+                Some(state) => flight.tumble.advance(state, gap_us),
+                None => flight.tumble.advance_blind(gap_us),
+            };
+        }
         match (fresh, adrift) {
             (Some(state), _) => {
                 flight.tumble.advance(state, gap_us);
@@ -428,12 +455,33 @@ impl<M: Default> Armed<M> {
             observer: None,
             applied: Inputs::default(),
             lawless: None,
+            rests: true,
             guide: Guide::default(),
             landing: LandDetector::new(state, weight_n),
             tumble: Tumble::default(),
             witness: Witness::new(state, now_us),
             distrusts: false,
         });
+    }
+}
+
+impl<M: Default> Armed<M> {
+    /// Rests on the ground: the law begins afresh when it takes off, as after arming.
+    fn rest(&mut self, blind: &Blind, state: Option<&State>) {
+        if !self.rests {
+            self.forget();
+        }
+        (self.rests, self.applied) = (true, Inputs::default());
+        if let Some(state) = state {
+            self.reckoning = blind.start(state);
+        }
+    }
+
+    /// Clears the controller's memory.
+    #[cold]
+    #[inline(never)]
+    fn forget(&mut self) {
+        (self.control, self.guide) = (M::default(), Guide::default());
     }
 }
 
@@ -458,12 +506,16 @@ fn upright(state: &Stamped<State>, now_us: u64) -> Option<State> {
 }
 
 impl Guide {
-    /// Returns the setpoint for a vehicle that does not know where it is: downwards.
-    fn down(&mut self, state: &State, dt_s: f32) -> &Setpoint {
+    /// Returns state and setpoint of a vehicle that does not know where it is, since `last`: downwards.
+    fn down(&mut self, state: &State, last: Option<&State>, dt_s: f32) -> (State, &Setpoint) {
         (self.hold, self.descent) = (None, None);
-        let descent = self.adrift.get_or_insert_with(|| Descent::new(state));
+        let (drift, descent) = self.adrift.get_or_insert_with(|| {
+            let mut drift = Drift::new(last.unwrap_or(state).position_m.xy(), state);
+            let begin = drift.advance(state, 0.0);
+            (drift, Descent::new(&begin))
+        });
         descent.advance(dt_s);
-        descent.setpoint()
+        (drift.advance(state, dt_s), descent.setpoint())
     }
 
     /// Returns the setpoint for a fresh `state`: the descent's, the commander's, or a hold if there is none.

@@ -108,7 +108,7 @@ fn play(mut frames: Vec<Frame>) -> Seen {
                 Uplink::Command(Command::Engage) => ask(&mut inbox, Request::Engage),
                 Uplink::Command(Command::Disarm) => ask(&mut inbox, Request::Disarm),
                 Uplink::Command(Command::Kill) => ask(&mut inbox, Request::Kill),
-                Uplink::Command(Command::Other(_) | Command::Denied(_)) | Uplink::Heartbeat | Uplink::Pose { .. } => {}
+                _ => {}
             });
         }
         let outcome = vehicle.tick(&mut memory, now_us, &inbox.take());

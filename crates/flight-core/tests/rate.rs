@@ -8,16 +8,16 @@ use proptest::prelude::*;
 fn after(period_us: f64, seconds: f64) -> Report {
     let mut counter = Counter::default();
     let ticks = (seconds * 1e6 / period_us) as u64;
-    (0..=ticks).map(|tick| counter.tick((tick as f64 * period_us) as u64)).last().unwrap_or_default()
+    (0..=ticks).map(|tick| *counter.tick((tick as f64 * period_us) as u64)).last().unwrap_or_default()
 }
 
 /// Returns the reports for ticks with these gaps, the first at 0.
 fn reports(gaps_us: impl IntoIterator<Item = u64>) -> Vec<Report> {
     let (mut counter, mut now_us) = (Counter::default(), 0);
-    let first = counter.tick(now_us);
+    let first = *counter.tick(now_us);
     let rest = gaps_us.into_iter().map(|gap_us| {
         now_us += gap_us;
-        counter.tick(now_us)
+        *counter.tick(now_us)
     });
     std::iter::once(first).chain(rest).collect()
 }
@@ -53,7 +53,7 @@ fn recovers_with_the_next_good_second() {
     let mut run = |period_us, ticks| {
         (0..ticks).fold(Report::default(), |_, _| {
             now_us += period_us;
-            counter.tick(now_us)
+            *counter.tick(now_us)
         })
     };
     assert!(run(1000, 2002).healthy());
@@ -65,7 +65,7 @@ fn recovers_with_the_next_good_second() {
 fn ticks_at_the_wrong_time_are_counted_one_by_one() {
     let mut counter = Counter::default();
     let counts = [0, 1000, 2100, 3100, 4201, 5100, 6000, 6899, 9000, 9001].map(|now| {
-        let Report { late_ticks, early_ticks, .. } = counter.tick(now);
+        let Report { late_ticks, early_ticks, .. } = *counter.tick(now);
         [late_ticks, early_ticks]
     });
     let wanted = [[0, 0], [0, 0], [0, 0], [0, 0], [1, 0], [1, 1], [1, 1], [1, 2], [2, 2], [2, 3]];
@@ -83,7 +83,7 @@ fn ticks_in_pairs_are_not_healthy_though_1000_hz() {
 fn a_clock_that_has_failed_is_never_healthy_again() {
     let mut counter = Counter::default();
     let second = |counter: &mut Counter, from_s: u64| {
-        (0..=1000).fold(Report::default(), |_, ms| counter.tick(from_s * 1_000_000 + ms * 1000 + 1000))
+        (0..=1000).fold(Report::default(), |_, ms| *counter.tick(from_s * 1_000_000 + ms * 1000 + 1000))
     };
     second(&mut counter, 0);
     assert!(second(&mut counter, 1).healthy());
@@ -157,7 +157,7 @@ proptest! {
         let mut counter = Counter::default();
         let mut last = None;
         for now_us in times {
-            let report = counter.tick(now_us);
+            let report = *counter.tick(now_us);
             prop_assert!(!report.healthy());
             prop_assert_eq!(report.alive, last.is_none_or(|last| now_us > last));
             last = Some(now_us);

@@ -3,6 +3,7 @@
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
+use afbc_flight_core::landing::LandDetector;
 use afbc_flight_core::supervisor::REST_US;
 use afbc_flight_core::{
     Answer, ArmingLimits, Asked, End, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory,
@@ -315,4 +316,25 @@ proptest! {
             }
         }
     }
+}
+
+/// A position that comes back in the moment of the touch-down sees no descent any more: there was one.
+#[test]
+fn a_descent_without_a_position_counts_when_the_position_comes_back() {
+    let (weight_n, gap_us, dt_s) = (10.0, 1000, 1e-3);
+    let mut landing = LandDetector::new(&State::default(), weight_n);
+    let mut now = |state: &State, thrust_n: f32, adrift: bool, milliseconds: u32| {
+        for _ in 0..milliseconds {
+            if adrift {
+                landing.advance_adrift(state, thrust_n, gap_us, dt_s);
+            } else {
+                landing.advance(state, thrust_n, gap_us, dt_s);
+            }
+        }
+        landing.airborne()
+    };
+    assert!(now(&climbing(1.0), weight_n, false, 1000), "takes off");
+    assert!(now(&State::default(), weight_n, true, 5000), "descends");
+    assert!(now(&State::default(), weight_n, false, 300), "touches the ground");
+    assert!(!now(&State::default(), 0.0, false, 1200), "stands");
 }

@@ -161,8 +161,11 @@ fn readiness_names_the_first_reason_against_it() {
     ];
     for (state, setpoint, healthy, rest_us, expected) in cases {
         let (state, setpoint) = (state.as_ref(), setpoint.as_ref());
-        let standing = Standing { state, missing: None, setpoint, healthy, rest_us };
+        let standing = Standing { state, missing: None, setpoint, healthy, rest_us, barred: None };
         assert_eq!(limits.ready(&standing), expected, "{standing:?}");
+        // What others have against it comes last.
+        let barred = Standing { barred: Some(Refusal::OutsideFence), ..standing };
+        assert_eq!(limits.ready(&barred), expected.and(Err(Refusal::OutsideFence)));
         // An estimate of one's own says what it misses.
         let missing = Some(Refusal::HeadingUnknown);
         let unknown = Standing { state: None, missing, ..standing };

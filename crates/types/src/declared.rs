@@ -15,7 +15,7 @@ pub struct Declaration {
     pub group: &'static str,
     /// Key with unit, as in scenario files, and accepted range.
     pub range: Range,
-    /// Unit symbol such as `m/s2`; `1` for a plain number, empty for a switch.
+    /// Unit symbol such as `m/s2`; `1` for a plain number, `number` for a whole one, empty for a switch.
     pub unit: &'static str,
     /// True if the tuner may choose the value; otherwise the vehicle or its task determines it.
     pub tuned: bool,
@@ -28,6 +28,11 @@ impl Declaration {
     #[must_use]
     pub const fn in_group(self, group: &'static str) -> Self {
         if group.is_empty() { self } else { Declaration { group, ..self } }
+    }
+
+    /// True if the value is a whole number, such as that of an action.
+    pub const fn is_whole(&self) -> bool {
+        matches!(self.unit.as_bytes(), b"number")
     }
 
     /// Returns the name on a ground station and in flash, at most 16 characters: `prefix`, group, id and, for a vector,
@@ -46,15 +51,19 @@ pub struct Name {
     coordinate: Option<char>,
 }
 
+impl Name {
+    /// Returns the name's characters.
+    pub fn chars(&self) -> impl Iterator<Item = char> {
+        let group = self.group.chars().map(|c| c.to_ascii_uppercase());
+        let group = group.chain((!self.group.is_empty()).then_some('_'));
+        let coordinate = self.coordinate.into_iter().flat_map(|coordinate| ['_', coordinate]);
+        self.prefix.chars().chain(group).chain(self.id.chars()).chain(coordinate)
+    }
+}
+
 impl fmt::Display for Name {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.prefix)?;
-        if !self.group.is_empty() {
-            self.group.chars().try_for_each(|c| f.write_char(c.to_ascii_uppercase()))?;
-            f.write_char('_')?;
-        }
-        f.write_str(self.id)?;
-        self.coordinate.map_or(Ok(()), |coordinate| write!(f, "_{coordinate}"))
+        self.chars().try_for_each(|c| f.write_char(c))
     }
 }
 

@@ -1,0 +1,167 @@
+//! An armed vehicle that rests on the ground: its motors idle, it counts as on the ground, and the law begins afresh.
+#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
+
+use afbc::reference::ReferenceModel;
+use afbc::{Adaptive, Controller, Profile, Settings};
+use afbc_control::{FlightController, Screened};
+use afbc_flight_core::landing::CARRIED_US;
+use afbc_flight_core::supervisor::{COAST_US, DESCEND_US};
+use afbc_flight_core::tumble::LOST_US;
+use afbc_flight_core::{
+    ArmingLimits, Asked, End, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory,
+};
+use afbc_types::{Inputs, Parameters, RotorSpeeds, Setpoint, State};
+use nalgebra::Vector3;
+
+type Adapted = afbc::Cascade<afbc_control::Estimate>;
+
+fn controller() -> Controller<Adaptive> {
+    let settings = Settings { reference: ReferenceModel::DEFAULT, ..Profile::Flight.settings() };
+    let law = Adaptive::new(Profile::Flight.gains()).expect("valid");
+    Controller::new(Parameters::PAPER.to_f32(), settings, law).expect("valid")
+}
+
+struct Bench {
+    vehicle: Vehicle<Controller<Adaptive>>,
+    memory: VehicleMemory<Adapted>,
+    now_us: u64,
+    inbox: Inbox,
+    state: State,
+}
+
+impl Bench {
+    /// An armed vehicle, in the tick after that of arming.
+    fn armed(rests: bool) -> Self {
+        let limits = ArmingLimits::default();
+        let vehicle = Vehicle::new(Parameters::PAPER.to_f32(), limits, controller()).expect("valid");
+        let (memory, inbox, state) = (VehicleMemory::default(), Inbox::default(), State::default());
+        let mut bench = Bench { vehicle, memory, now_us: 0, inbox, state };
+        bench.inbox.rest(rests);
+        bench.run(1001);
+        assert_eq!(bench.ask(Request::Arm).answer.map(|answer| answer.result), Some(Ok(())));
+        bench
+    }
+
+    fn ask(&mut self, request: Request) -> Outcome {
+        assert!(self.inbox.request(Asked { request, ticket: 3 }));
+        self.tick(true)
+    }
+
+    fn tick(&mut self, seen: bool) -> Outcome {
+        self.now_us += 1000;
+        let at_us = self.now_us;
+        if seen {
+            self.inbox.put_state(Stamped { value: self.state, at_us });
+        }
+        let value = Setpoint { position_m: Vector3::new(0.3, -0.2, 0.5), ..Setpoint::default() };
+        self.inbox.put_setpoint(Stamped { value, at_us });
+        let inbox = self.inbox.take();
+        self.vehicle.tick(&mut self.memory, self.now_us, &inbox)
+    }
+
+    fn run(&mut self, ticks: u32) -> Outcome {
+        for _ in 1..ticks {
+            let _ = self.tick(true);
+        }
+        self.tick(true)
+    }
+}
+
+/// The estimate of a vehicle that stands may wander by metres; nothing takes off for that.
+#[test]
+fn motors_idle_and_it_stays_on_the_ground() {
+    let mut bench = Bench::armed(true);
+    let idle = controller().mixer().action(&Inputs::default());
+    for tick in 0..5000 {
+        bench.state.position_m += Vector3::new(0.7e-3, 0.3e-3, -0.2e-3);
+        bench.state.velocity_m_s.x = if tick % 2 == 0 { 0.7 } else { -0.6 };
+        let outcome = bench.tick(true);
+        assert_eq!((outcome.mode, outcome.ended, outcome.health.control.saturated), (Mode::Flying, None, false));
+        assert_eq!((outcome.motors, outcome.forces), (idle.speeds, idle.forces));
+        assert!(!bench.memory.airborne());
+        assert_eq!(bench.memory.trace::<Controller<Adaptive>, 4>().inputs, Inputs::default());
+    }
+    let outcome = bench.ask(Request::Disarm);
+    assert_eq!((outcome.mode, outcome.ended), (Mode::Disarmed, Some(End::Disarmed)));
+}
+
+/// Without the mark the first step is that of a law that was never stepped, bit for bit; so it is after a rest between
+/// two flights.
+#[test]
+fn the_law_begins_afresh_when_it_takes_off() {
+    for flown in [0, 300] {
+        let mut bench = Bench::armed(flown == 0);
+        bench.run(flown + 1);
+        bench.inbox.rest(true);
+        bench.state.position_m = Vector3::new(0.05, 0.0, 0.0);
+        bench.run(50);
+        bench.inbox.rest(false);
+        let (controller, mut memory) = (controller(), Screened::default());
+        let target = Setpoint { position_m: Vector3::new(0.3, -0.2, 0.5), ..Setpoint::default() };
+        for tick in 0..200 {
+            bench.state.attitude_rad.x = 0.02 * (tick as f32 * 0.1).sin();
+            bench.state.rates_rad_s.x = 0.002 * (tick as f32 * 0.1).cos();
+            let expected = controller.step(&mut memory, Some(&bench.state), &target);
+            let outcome = bench.tick(true);
+            assert_eq!(outcome.forces, expected.forces, "tick {tick} after {flown}");
+            assert_eq!(outcome.motors.0.map(f32::to_bits), expected.speeds.0.map(f32::to_bits));
+        }
+    }
+}
+
+#[test]
+fn in_the_air_the_mark_has_no_effect() {
+    let (mut plain, mut marked) = (Bench::armed(false), Bench::armed(false));
+    for tick in 0..3000 {
+        let airborne = tick > CARRIED_US / 1000;
+        marked.inbox.rest(airborne);
+        for bench in [&mut plain, &mut marked] {
+            let t = tick as f32 * 1e-3;
+            bench.state.position_m = Vector3::new(0.1 * t, 0.0, 0.5 + 1e-6 * (tick % 2) as f32);
+            bench.state.attitude_rad.y = 0.1 * (3.0 * t).sin();
+        }
+        let outcomes = (plain.tick(true), marked.tick(true));
+        assert_eq!(outcomes.0, outcomes.1, "tick {tick}");
+        assert!(!airborne || marked.memory.airborne() && outcomes.0.motors != RotorSpeeds::default());
+    }
+    let refused = marked.ask(Request::Disarm).answer.map(|answer| answer.result);
+    assert_eq!(refused, Some(Err(Refusal::InFlight)));
+}
+
+/// Supervision goes on: kills, tumbles and outages of the state end the rest.
+#[test]
+fn a_resting_vehicle_is_supervised() {
+    assert_eq!(Bench::armed(true).ask(Request::Kill).ended, Some(End::Killed));
+
+    let mut bench = Bench::armed(true);
+    bench.state.attitude_rad.x = 2.0;
+    assert_eq!(bench.run(LOST_US / 1000).ended, None);
+    assert!((0..3).any(|_| bench.tick(true).ended == Some(End::Tumbled)));
+
+    let mut bench = Bench::armed(true);
+    let idle = bench.run(10).motors;
+    for age_us in (1000..DESCEND_US).step_by(1000) {
+        let outcome = bench.tick(false);
+        assert_eq!(outcome.mode, if age_us > COAST_US { Mode::Coasting } else { Mode::Flying });
+        assert_eq!(outcome.motors, idle, "it does not coast on the ground");
+    }
+    assert!((0..5).any(|_| bench.tick(false).ended == Some(End::Landed)));
+    assert_eq!(bench.memory.mode(), Mode::Disarmed);
+    assert!(!bench.memory.airborne());
+}
+
+#[test]
+fn the_mark_stays_until_it_is_changed() {
+    let (mut inbox, mut news) = (Inbox::EMPTY, Inbox::EMPTY);
+    assert!(!inbox.rests());
+    inbox.rest(true);
+    inbox.post(&news);
+    assert!(inbox.rests() && inbox.take().rests() && inbox.rests(), "news without a mark change nothing");
+    news.rest(false);
+    inbox.post(&news);
+    assert!(!inbox.rests() && !inbox.take().rests());
+    let mut taken = Inbox::EMPTY;
+    taken.rest(true);
+    inbox.take_into(&mut taken);
+    assert!(!taken.rests(), "the copy of the last tick is replaced");
+}
