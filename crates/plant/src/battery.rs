@@ -1,6 +1,6 @@
 //! A battery whose voltage sags under load and falls with its charge.
 
-use afbc_types::{Range, parameters};
+use afbc_types::{OutOfRange, Range, parameters};
 use libm::sqrt;
 
 parameters! {
@@ -84,6 +84,16 @@ impl Discharge {
     fn open_circuit_v(&self) -> f64 {
         let Battery { full_v, empty_v, .. } = self.battery;
         if self.now.charge > 0.0 { empty_v + (full_v - empty_v) * self.now.charge } else { 0.0 }
+    }
+
+    /// Sets the remaining charge, as a share of the capacity; the voltage follows under the next load.
+    ///
+    /// # Errors
+    /// A share out of range.
+    pub(crate) fn charge(&mut self, share: f64) -> Result<(), OutOfRange> {
+        Battery::CHARGE.range.check(share)?;
+        self.now.charge = share;
+        Ok(())
     }
 
     /// Returns voltage over full voltage, which scales the rotors' speeds.

@@ -8,10 +8,11 @@ use crate::environment::{Environment, Segment};
 use crate::frame::{Frame, Lanes};
 use crate::ground_effect::GroundEffect;
 use crate::load::Load;
-use crate::rotors::{Rotors, Spin};
+use crate::rotors::{RotorFault, Rotors, Spin};
 use crate::surroundings::Surroundings;
 use crate::wind::{Weather, Wind};
 use afbc_types::{Declared, OutOfRange, Parameters, Range};
+use alloc::vec::Vec;
 use nalgebra::Vector3;
 
 /// Accepted range of a step \[s\].
@@ -184,6 +185,20 @@ impl Effects {
     #[inline]
     fn near(&self, height_m: f64, climb_m_s: f64) -> Option<&Ground> {
         self.ground.as_ref().filter(|ground| ground.is_near(height_m, climb_m_s))
+    }
+
+    /// # Errors
+    /// The first parameter out of range, here and below; nothing has changed then.
+    pub(crate) fn set_wind(&mut self, wind: &Wind) -> Result<(), OutOfRange> {
+        self.weather.change(wind)
+    }
+
+    pub(crate) fn set_rotor_faults(&mut self, faults: Vec<RotorFault>) -> Result<(), OutOfRange> {
+        self.spin.set_faults(&self.frame, faults)
+    }
+
+    pub(crate) fn set_charge(&mut self, share: f64) -> Result<bool, OutOfRange> {
+        self.spin.set_charge(share)
     }
 
     pub(crate) fn telemetry(&self) -> Telemetry {

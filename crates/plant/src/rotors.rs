@@ -107,6 +107,14 @@ pub(crate) struct Drive {
     pub(crate) squares: Lanes,
 }
 
+/// Checks faults of rotors of a vehicle with this frame.
+fn check(faults: &[RotorFault], frame: &Frame) -> Result<(), OutOfRange> {
+    faults.iter().try_for_each(|fault| {
+        fault.validate()?;
+        Range { max: frame.count() as f64, ..limits::ROTOR }.check(fault.rotor)
+    })
+}
+
 /// Rotors in simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct Spin {
@@ -133,10 +141,7 @@ impl Spin {
         step_s: f64,
     ) -> Result<Self, OutOfRange> {
         rotors.validate()?;
-        let count = frame.count() as f64;
-        for fault in &rotors.faults {
-            Range { max: count, ..limits::ROTOR }.check(fault.rotor)?;
-        }
+        check(&rotors.faults, frame)?;
         let start_rad_s = match rotors.start {
             Start::Hover => {
                 frame.masked(&frame.hover_rad_s(vehicle).map(|w| w.max(rotors.min_rad_s).min(rotors.max_rad_s)))
@@ -191,6 +196,25 @@ impl Spin {
     /// Returns the squares of the present speeds times each rotor's efficiency \[rad2/s2\].
     pub(crate) fn squares(&self) -> Lanes {
         self.speeds_rad_s.component_mul(&self.speeds_rad_s).component_mul(&self.efficiency)
+    }
+
+    /// Changes the faults.
+    ///
+    /// # Errors
+    /// The first number out of range; nothing has changed then.
+    pub(crate) fn set_faults(&mut self, frame: &Frame, faults: Vec<RotorFault>) -> Result<(), OutOfRange> {
+        check(&faults, frame)?;
+        self.rotors.faults = faults;
+        self.efficiency_until_s = f64::NEG_INFINITY;
+        Ok(())
+    }
+
+    /// Sets the battery's charge; false without a battery.
+    ///
+    /// # Errors
+    /// A share out of range.
+    pub(crate) fn set_charge(&mut self, share: f64) -> Result<bool, OutOfRange> {
+        self.battery.as_mut().map_or(Ok(false), |battery| battery.charge(share).map(|()| true))
     }
 
     pub(crate) fn charge(&self) -> Option<Charge> {

@@ -7,11 +7,14 @@ use crate::integrate::rk4;
 use crate::load::Load;
 use crate::motion::Motion;
 use crate::realism::{Effects, Realism, Telemetry};
+use crate::rotors::RotorFault;
 use crate::surroundings::Surroundings;
 use crate::truth::Truth;
+use crate::wind::Wind;
 use crate::{rigid_body, simplified};
 use afbc_types::{OutOfRange, RotorSpeeds};
 use alloc::boxed::Box;
+use alloc::vec::Vec;
 use nalgebra::{Quaternion, SVector, Vector3};
 
 /// Equations of motion.
@@ -237,6 +240,37 @@ impl Plant {
     /// Returns the time since the start \[s\].
     pub fn time_s(&self) -> f64 {
         self.time_s
+    }
+
+    /// Changes gusts, parameters and payloads from the next step on, each at its times. The frame stays.
+    pub fn set_environment(&mut self, environment: Environment) {
+        self.environment = environment.with_frame(*self.environment.frame());
+        self.segment = self.environment.segment(self.time_s);
+    }
+
+    /// Changes the wind from the next step on, also that of an air without drag, which has no effect. An ideal plant
+    /// has no air.
+    ///
+    /// # Errors
+    /// The first parameter out of range; nothing has changed then.
+    pub fn set_wind(&mut self, wind: &Wind) -> Result<(), OutOfRange> {
+        self.effects.as_mut().map_or(Ok(()), |effects| effects.set_wind(wind))
+    }
+
+    /// Changes the rotors' faults from the next step on. Those of an ideal plant do not fail.
+    ///
+    /// # Errors
+    /// The first number out of range; nothing has changed then.
+    pub fn set_rotor_faults(&mut self, faults: Vec<RotorFault>) -> Result<(), OutOfRange> {
+        self.effects.as_mut().map_or(Ok(()), |effects| effects.set_rotor_faults(faults))
+    }
+
+    /// Sets the battery's charge, as a share of its capacity; false without a battery.
+    ///
+    /// # Errors
+    /// A share out of range.
+    pub fn set_charge(&mut self, share: f64) -> Result<bool, OutOfRange> {
+        self.effects.as_mut().map_or(Ok(false), |effects| effects.set_charge(share))
     }
 
     /// Returns the environment.

@@ -87,6 +87,8 @@ pub(crate) struct Weather {
     /// Cosine and sine of the steady wind's direction.
     heading: (f64, f64),
     eddies: Option<Eddies>,
+    seed: u64,
+    step_s: f64,
 }
 
 impl Weather {
@@ -98,7 +100,20 @@ impl Weather {
         let speed = sqrt(x * x + y * y);
         let heading = if speed > 0.0 { (x / speed, y / speed) } else { (1.0, 0.0) };
         let eddies = wind.turbulence.map(|turbulence| Eddies::new(turbulence, Noise::new(seed, Stream::Wind), step_s));
-        Ok(Weather { wind, heading, eddies })
+        Ok(Weather { wind, heading, eddies, seed, step_s })
+    }
+
+    /// Changes the wind. Turbulence of the same settings goes on, another begins.
+    ///
+    /// # Errors
+    /// The first parameter out of range; nothing has changed then.
+    pub(crate) fn change(&mut self, wind: &Wind) -> Result<(), OutOfRange> {
+        let mut changed = Weather::new(wind.clone(), self.seed, self.step_s)?;
+        if wind.turbulence == self.wind.turbulence {
+            changed.eddies = self.eddies.take();
+        }
+        *self = changed;
+        Ok(())
     }
 
     /// Returns the velocity of the air at time `t` \[s\] at the vehicle, earth frame \[m/s\]. Every call advances one

@@ -1,9 +1,10 @@
-//! Reading of TOML files, with errors of one line.
+//! Reading of TOML files, and of files of parameters, with errors of one line.
 
 mod built_in;
 mod error;
 mod file;
 mod heirs;
+pub mod params;
 mod table;
 pub mod words;
 

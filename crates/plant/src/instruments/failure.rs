@@ -76,6 +76,29 @@ pub enum Failure {
 }
 
 impl Failure {
+    /// Each kind, its numbers zero.
+    pub const ALL: [Failure; 16] = {
+        let zero = Vector3::new(0.0, 0.0, 0.0);
+        [
+            Failure::ImuStuck,
+            Failure::ImuDead,
+            Failure::ImuNoisy { rates_rad_s: 0.0, specific_force_m_s2: 0.0 },
+            Failure::ImuClipped { rates_rad_s: 0.0, specific_force_m_s2: 0.0 },
+            Failure::ImuBiased { rates_bias_rad_s: zero, force_bias_m_s2: zero },
+            Failure::TrackerLost,
+            Failure::TrackerFrozen,
+            Failure::TrackerJumped { by_m: zero, yaw_rad: 0.0 },
+            Failure::GnssLost,
+            Failure::GnssJumped { by_m: zero },
+            Failure::BarometerLost,
+            Failure::BarometerStuck,
+            Failure::BarometerBlocked,
+            Failure::MagnetometerLost,
+            Failure::MagnetometerStuck,
+            Failure::MagnetometerDisturbed { field_ut: zero },
+        ]
+    };
+
     /// Returns the name, as in scenario files: the instrument, and what is wrong.
     pub const fn name(self) -> &'static str {
         match self {
@@ -177,6 +200,16 @@ impl Failures {
     pub(super) fn new(faults: &[InstrumentFault], seed: u64) -> Self {
         let faults = faults.iter().map(|fault| (*fault, Held::default())).collect();
         Failures { faults, last: Held::default(), random: Noise::new(seed, Stream::Failures) }
+    }
+
+    /// Adds one; forgets those that are over when it begins.
+    pub(super) fn add(&mut self, fault: InstrumentFault) {
+        self.faults.retain(|(earlier, _)| earlier.end_s > fault.start_s);
+        self.faults.push((fault, Held::default()));
+    }
+
+    pub(super) fn end(&mut self) {
+        self.faults.clear();
     }
 
     /// Returns the failures that act at `now_s`, each with what it holds.

@@ -149,6 +149,21 @@ impl Instruments {
         }
     }
 
+    /// Adds a failure to those that there are.
+    ///
+    /// # Errors
+    /// The first number out of range; nothing has changed then.
+    pub fn fail(&mut self, fault: InstrumentFault) -> Result<(), OutOfRange> {
+        fault.validate()?;
+        self.failures.add(fault);
+        Ok(())
+    }
+
+    /// Ends all failures, also those to come.
+    pub fn heal(&mut self) {
+        self.failures.end();
+    }
+
     /// Returns the true biases of the inertial sensor, if there is one, against which estimates of them are judged.
     pub fn imu_bias(&self) -> Option<ImuBias> {
         self.imu.as_ref().map(Inertial::bias)

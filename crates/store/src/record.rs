@@ -1,0 +1,121 @@
+//! Records: what one write leaves in flash.
+
+use core::fmt;
+use crc::{CRC_32_ISO_HDLC, Crc};
+
+/// Longest name, as in MAVLink.
+pub const NAME_MAX: usize = 16;
+/// Size of a record \[bytes\], a multiple of a word.
+pub(crate) const RECORD: usize = 28;
+
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// Returns the number by which a store recognises the owner of its values, such as a vehicle's name.
+pub fn hash(name: &[u8]) -> u32 {
+    CRC.checksum(name)
+}
+
+/// Name of a value: 1 to 16 printable ASCII characters.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Name([u8; NAME_MAX]);
+
+impl Name {
+    /// Name of records that are not about one value.
+    pub(crate) const NONE: Name = Name([0; NAME_MAX]);
+
+    /// Makes a name; none if `name` is empty, longer than 16 characters, or has other characters.
+    pub fn new(name: &str) -> Option<Self> {
+        Name::of(name.chars())
+    }
+
+    /// Makes a name of these characters, as [`Name::new`].
+    pub fn of(name: impl Iterator<Item = char>) -> Option<Self> {
+        let (mut bytes, mut length) = ([0; NAME_MAX], 0);
+        for c in name {
+            *bytes.get_mut(length)? = u8::try_from(c).ok().filter(u8::is_ascii_graphic)?;
+            length += 1;
+        }
+        (length > 0).then_some(Name(bytes))
+    }
+
+    /// Returns the name with zeros behind it.
+    pub const fn to_bytes(self) -> [u8; NAME_MAX] {
+        self.0
+    }
+
+    /// Returns the name as text.
+    pub fn as_str(&self) -> &str {
+        let end = self.0.iter().position(|byte| *byte == 0).unwrap_or(NAME_MAX);
+        self.0.get(..end).and_then(|bytes| str::from_utf8(bytes).ok()).unwrap_or_default()
+    }
+}
+
+impl fmt::Display for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.as_str())
+    }
+}
+
+impl fmt::Debug for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Debug::fmt(self.as_str(), f)
+    }
+}
+
+/// What a record says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Record {
+    /// First of a sector, written last: the sector with the largest `sequence` counts.
+    Header { sequence: u32 },
+    /// All values before this record are void; what follows belongs to `owner`.
+    Begin { owner: u32 },
+    /// The value of `name`, as its owner's `edition` understands it; none takes it back.
+    Value { name: Name, edition: u16, bits: Option<u32> },
+}
+
+/// Kinds of records. Neither 0 nor 0xFFFF, to which torn words tend.
+const HEADER: u16 = 0x4831;
+const BEGIN: u16 = 0x4232;
+const VALUE: u16 = 0x5633;
+const NOTHING: u16 = 0x4E34;
+
+impl Record {
+    /// Returns the record's bytes: name, value, edition, kind, checksum; little-endian.
+    pub(crate) fn to_bytes(self) -> [u8; RECORD] {
+        let (name, bits, edition, kind) = match self {
+            Record::Header { sequence } => (Name::NONE, sequence, 0, HEADER),
+            Record::Begin { owner } => (Name::NONE, owner, 0, BEGIN),
+            Record::Value { name, edition, bits: Some(bits) } => (name, bits, edition, VALUE),
+            Record::Value { name, edition, bits: None } => (name, 0, edition, NOTHING),
+        };
+        let fields = [bits.to_le_bytes(), (u32::from(edition) | u32::from(kind) << 16).to_le_bytes()];
+        let mut bytes = [0; RECORD];
+        let all = name.0.into_iter().chain(fields.into_iter().flatten());
+        bytes.iter_mut().zip(all).for_each(|(to, from)| *to = from);
+        if let Some((body, sum)) = bytes.split_last_chunk_mut::<4>() {
+            *sum = CRC.checksum(body).to_le_bytes();
+        }
+        bytes
+    }
+
+    /// Reads a record; none if it is blank, torn or no record at all.
+    pub(crate) fn from_bytes(bytes: &[u8; RECORD]) -> Option<Self> {
+        let (body, sum) = bytes.split_last_chunk::<4>()?;
+        if CRC.checksum(body) != u32::from_le_bytes(*sum) {
+            return None;
+        }
+        let (name, fields) = body.split_first_chunk::<NAME_MAX>()?;
+        let (bits, rest) = fields.split_first_chunk::<4>()?;
+        let (edition, kind) = rest.split_first_chunk::<2>()?;
+        let kind = u16::from_le_bytes(*kind.first_chunk()?);
+        let (name, bits, edition) = (Name(*name), u32::from_le_bytes(*bits), u16::from_le_bytes(*edition));
+        let is_name = Name::new(name.as_str()) == Some(name);
+        match kind {
+            HEADER => Some(Record::Header { sequence: bits }),
+            BEGIN => Some(Record::Begin { owner: bits }),
+            VALUE if is_name => Some(Record::Value { name, edition, bits: Some(bits) }),
+            NOTHING if is_name => Some(Record::Value { name, edition, bits: None }),
+            _ => None,
+        }
+    }
+}

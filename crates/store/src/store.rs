@@ -1,0 +1,406 @@
+//! The store: two sectors of records.
+
+use crate::record::{Name, RECORD, Record};
+use core::fmt;
+use embedded_storage::nor_flash::NorFlash;
+
+/// Sectors of a store.
+const SECTORS: u32 = 2;
+/// Share of a sector, in eighths, above which [`Store::make_room`] moves on to the other one.
+const FULL_EIGHTHS: u32 = 4;
+
+/// Why a value was not written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Error<E> {
+    /// The flash itself.
+    Flash(E),
+    /// The sector is full and the other one is not erased: [`Store::make_room`] at the next start.
+    NeedsErase,
+    /// There are more names than a sector has room for.
+    Full,
+}
+
+impl<E> From<E> for Error<E> {
+    fn from(error: E) -> Self {
+        Error::Flash(error)
+    }
+}
+
+impl<E> Error<E> {
+    /// Returns the reason as text of at most 50 characters.
+    pub const fn reason(&self) -> &'static str {
+        match self {
+            Error::Flash(_) => "not kept: the flash does not take it",
+            Error::NeedsErase => "not kept: store is full until the next start",
+            Error::Full => "not kept: store is full, restore defaults",
+        }
+    }
+}
+
+impl<E: fmt::Debug> fmt::Display for Error<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.reason())?;
+        if let Error::Flash(error) = self { write!(f, " ({error:?})") } else { Ok(()) }
+    }
+}
+
+impl<E: fmt::Debug> core::error::Error for Error<E> {}
+
+/// What was in the flash when the store was opened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Found {
+    /// Places that hold neither a record nor nothing: what cuts of power have left, or something else than a store.
+    pub damaged: u32,
+    /// True if there is no store, though the flash is not blank.
+    pub foreign: bool,
+    /// True if the values belong to another owner, so that none of them counts.
+    pub of_another: bool,
+}
+
+/// Sector with the records that count.
+#[derive(Clone, Copy, Debug)]
+struct Active {
+    sector: u32,
+    sequence: u32,
+    /// First place after the last one that is not blank.
+    next: u32,
+    /// First place whose values count: after the last [`Record::Begin`].
+    first: u32,
+    /// Owner of the values.
+    owner: Option<u32>,
+    /// True if a place is damaged.
+    is_damaged: bool,
+}
+
+/// Named values in two sectors of `flash`.
+#[derive(Debug)]
+pub struct Store<F> {
+    flash: F,
+    /// Offset of the first sector \[bytes\].
+    start: u32,
+    owner: u32,
+    active: Option<Active>,
+    found: Found,
+}
+
+/// A sector that is being filled.
+struct Filling {
+    sector: u32,
+    owner: u32,
+    /// As in [`Active`].
+    next: u32,
+    first: u32,
+}
+
+/// Name, edition and bits of a value.
+type Held = (Name, u16, u32);
+
+/// What a place of a sector holds.
+enum Place {
+    Blank,
+    Damaged,
+    Holds(Record),
+}
+
+impl<F: NorFlash> Store<F> {
+    /// Places of a sector, the header's among them.
+    const PLACES: u32 = {
+        assert!(
+            RECORD.is_multiple_of(F::WRITE_SIZE) && RECORD.is_multiple_of(F::READ_SIZE),
+            "words of 1, 2 or 4 bytes"
+        );
+        assert!(F::ERASE_SIZE >= 8 * RECORD && F::ERASE_SIZE <= 1 << 20, "sectors of some hundred bytes to 1 MiB");
+        (F::ERASE_SIZE / RECORD) as u32
+    };
+
+    /// Largest number of names.
+    pub const NAMES_MAX: u32 = Self::PLACES - 3;
+
+    /// Opens the store in the two sectors at `start`, for the values of `owner` ([`hash`](crate::hash)). Writes
+    /// nothing.
+    ///
+    /// # Errors
+    /// If the flash cannot be read.
+    pub fn open(flash: F, start: u32, owner: u32) -> Result<Self, Error<F::Error>> {
+        let mut store = Store { flash, start, owner, active: None, found: Found::default() };
+        store.find()?;
+        Ok(store)
+    }
+
+    /// Returns what was in the flash when the store was opened.
+    pub fn found(&self) -> Found {
+        self.found
+    }
+
+    /// Returns the flash.
+    pub fn into_flash(self) -> F {
+        self.flash
+    }
+
+    /// Erases what does not count, so that there is room for at least half a sector of further changes, and leaves out
+    /// what is damaged. To be called at start-up: on a processor that runs from the same flash, each erase stops
+    /// everything.
+    ///
+    /// # Errors
+    /// Of the flash.
+    pub fn make_room(&mut self) -> Result<(), Error<F::Error>> {
+        match self.active {
+            None => {
+                for sector in 0..SECTORS {
+                    self.clear(sector)?;
+                }
+                let filling = self.begin(0, self.owner)?;
+                self.finish(filling, 1)
+            }
+            Some(active) => {
+                self.clear(other(active.sector))?;
+                let fills = active.next > Self::PLACES * FULL_EIGHTHS / 8;
+                if active.is_damaged || fills && self.live()? < active.next.saturating_sub(2) {
+                    self.move_on(None)?;
+                    self.clear(active.sector)?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// Calls `visit` with the name, edition and bits of every value that counts.
+    ///
+    /// # Errors
+    /// Of the flash.
+    pub fn visit(&mut self, mut visit: impl FnMut(Name, u16, u32)) -> Result<(), Error<F::Error>> {
+        let Some(active) = self.active.filter(|active| active.owner == Some(self.owner)) else { return Ok(()) };
+        for place in active.first..active.next {
+            if let Some((name, edition, bits)) = self.counts(active, place)? {
+                visit(name, edition, bits);
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns edition and bits of the value of `name`, if it has one.
+    ///
+    /// # Errors
+    /// Of the flash.
+    pub fn get(&mut self, name: Name) -> Result<Option<(u16, u32)>, Error<F::Error>> {
+        let Some(active) = self.active.filter(|active| active.owner == Some(self.owner)) else { return Ok(None) };
+        for place in (active.first..active.next).rev() {
+            match self.read(active.sector, place)? {
+                Place::Holds(Record::Value { name: at, edition, bits }) if at == name => {
+                    return Ok(bits.map(|bits| (edition, bits)));
+                }
+                _ => (),
+            }
+        }
+        Ok(None)
+    }
+
+    /// Writes the value of `name`, or takes it back. Erases nothing, and writes nothing that is there already.
+    ///
+    /// # Errors
+    /// If it was not written; then what was there before still counts.
+    pub fn set(&mut self, name: Name, edition: u16, bits: Option<u32>) -> Result<(), Error<F::Error>> {
+        let held = self.get(name)?;
+        if held == bits.map(|bits| (edition, bits)) {
+            return Ok(());
+        }
+        if self.active.is_some_and(|active| active.owner != Some(self.owner)) {
+            self.reset()?;
+        }
+        // Counted only if that many have been written.
+        let might_be_full = self.active.is_some_and(|active| active.next > Self::NAMES_MAX);
+        if held.is_none() && might_be_full && self.live()? >= Self::NAMES_MAX {
+            return Err(Error::Full);
+        }
+        self.add(Record::Value { name, edition, bits })
+    }
+
+    /// Takes back all values, in one record.
+    ///
+    /// # Errors
+    /// If it was not written; then all values still count.
+    pub fn reset(&mut self) -> Result<(), Error<F::Error>> {
+        let is_empty = self.active.is_some_and(|it| it.first >= it.next && it.owner == Some(self.owner));
+        if is_empty { Ok(()) } else { self.add(Record::Begin { owner: self.owner }) }
+    }
+
+    /// Finds the active sector, and what is in it.
+    fn find(&mut self) -> Result<(), Error<F::Error>> {
+        let mut blank = true;
+        for sector in 0..SECTORS {
+            match self.read(sector, 0)? {
+                Place::Holds(Record::Header { sequence }) => {
+                    if self.active.is_none_or(|active| sequence > active.sequence) {
+                        self.active =
+                            Some(Active { sector, sequence, next: 1, first: 1, owner: None, is_damaged: false });
+                    }
+                }
+                _ => blank = blank && self.is_blank(sector)?,
+            }
+        }
+        let Some(mut active) = self.active else {
+            self.found.foreign = !blank;
+            return Ok(());
+        };
+        for place in 1..Self::PLACES {
+            let held = self.read(active.sector, place)?;
+            if !matches!(held, Place::Blank) {
+                active.next = place + 1;
+            }
+            match held {
+                Place::Damaged => self.found.damaged += 1,
+                Place::Holds(Record::Begin { owner }) => (active.first, active.owner) = (place + 1, Some(owner)),
+                _ => (),
+            }
+        }
+        active.is_damaged = self.found.damaged > 0;
+        self.active = Some(active);
+        self.found.of_another = active.owner.is_some_and(|owner| owner != self.owner);
+        Ok(())
+    }
+
+    /// Appends a record, in the other sector if this one is full.
+    fn add(&mut self, record: Record) -> Result<(), Error<F::Error>> {
+        let mut active = self.active.ok_or(Error::NeedsErase)?;
+        while active.next < Self::PLACES {
+            let place = active.next;
+            active.next += 1;
+            self.active = Some(active);
+            if self.write(active.sector, place, record)? {
+                if let Record::Begin { owner } = record {
+                    (active.first, active.owner) = (active.next, Some(owner));
+                    self.active = Some(active);
+                }
+                return Ok(());
+            }
+        }
+        self.move_on(Some(record))
+    }
+
+    /// Copies what counts to the other sector, with `record` in addition, and makes that one the active one.
+    fn move_on(&mut self, record: Option<Record>) -> Result<(), Error<F::Error>> {
+        let active = self.active.ok_or(Error::NeedsErase)?;
+        if !self.is_blank(other(active.sector))? {
+            return Err(Error::NeedsErase);
+        }
+        let sector = other(active.sector);
+        let filling = match record {
+            Some(Record::Begin { owner }) => self.begin(sector, owner)?,
+            _ => {
+                let mut filling = self.begin(sector, active.owner.unwrap_or(self.owner))?;
+                for place in active.first..active.next {
+                    let Some((name, edition, bits)) = self.counts(active, place)? else { continue };
+                    if !matches!(record, Some(Record::Value { name: new, .. }) if new == name) {
+                        self.append(&mut filling, Record::Value { name, edition, bits: Some(bits) })?;
+                    }
+                }
+                if let Some(record) = record {
+                    self.append(&mut filling, record)?;
+                }
+                filling
+            }
+        };
+        self.finish(filling, active.sequence.wrapping_add(1))
+    }
+
+    /// Begins to fill the blank `sector`.
+    fn begin(&mut self, sector: u32, owner: u32) -> Result<Filling, Error<F::Error>> {
+        let mut filling = Filling { sector, owner, next: 1, first: 1 };
+        self.append(&mut filling, Record::Begin { owner })?;
+        filling.first = filling.next;
+        Ok(filling)
+    }
+
+    /// Appends a record to a sector that does not count yet.
+    fn append(&mut self, filling: &mut Filling, record: Record) -> Result<(), Error<F::Error>> {
+        while filling.next < Self::PLACES {
+            filling.next += 1;
+            if self.write(filling.sector, filling.next - 1, record)? {
+                return Ok(());
+            }
+        }
+        Err(Error::Full)
+    }
+
+    /// Writes the header, which makes the sector the active one.
+    fn finish(&mut self, filling: Filling, sequence: u32) -> Result<(), Error<F::Error>> {
+        let Filling { sector, owner, next, first } = filling;
+        // A header that the flash does not take leaves the other sector the active one, and this one to be erased.
+        if !self.write(sector, 0, Record::Header { sequence })? {
+            return Err(Error::NeedsErase);
+        }
+        self.active = Some(Active { sector, sequence, next, first, owner: Some(owner), is_damaged: false });
+        Ok(())
+    }
+
+    /// Number of values that count.
+    fn live(&mut self) -> Result<u32, Error<F::Error>> {
+        let Some(active) = self.active else { return Ok(0) };
+        let mut live = 0;
+        for place in active.first..active.next {
+            live += u32::from(self.counts(active, place)?.is_some());
+        }
+        Ok(live)
+    }
+
+    /// Returns the value at `place`, if no later one has the same name.
+    fn counts(&mut self, active: Active, place: u32) -> Result<Option<Held>, Error<F::Error>> {
+        let Place::Holds(Record::Value { name, edition, bits: Some(bits) }) = self.read(active.sector, place)? else {
+            return Ok(None);
+        };
+        for later in place + 1..active.next {
+            match self.read(active.sector, later)? {
+                Place::Holds(Record::Value { name: again, .. }) if again == name => return Ok(None),
+                _ => (),
+            }
+        }
+        Ok(Some((name, edition, bits)))
+    }
+
+    fn address(&self, sector: u32, place: u32) -> u32 {
+        self.start + sector * F::ERASE_SIZE as u32 + place * RECORD as u32
+    }
+
+    fn read(&mut self, sector: u32, place: u32) -> Result<Place, Error<F::Error>> {
+        let mut bytes = [0; RECORD];
+        self.flash.read(self.address(sector, place), &mut bytes)?;
+        Ok(match Record::from_bytes(&bytes) {
+            Some(record) => Place::Holds(record),
+            None if bytes.iter().all(|byte| *byte == 0xFF) => Place::Blank,
+            None => Place::Damaged,
+        })
+    }
+
+    /// Writes a record; false if it does not read as written.
+    fn write(&mut self, sector: u32, place: u32, record: Record) -> Result<bool, Error<F::Error>> {
+        self.flash.write(self.address(sector, place), &record.to_bytes())?;
+        Ok(matches!(self.read(sector, place)?, Place::Holds(held) if held == record))
+    }
+
+    fn is_blank(&mut self, sector: u32) -> Result<bool, Error<F::Error>> {
+        let (mut at, end) = (self.address(sector, 0), self.address(sector + 1, 0));
+        let mut bytes = [0; 64];
+        while at < end {
+            let length = bytes.len().min((end - at) as usize);
+            let part = bytes.get_mut(..length).unwrap_or_default();
+            self.flash.read(at, part)?;
+            if part.iter().any(|byte| *byte != 0xFF) {
+                return Ok(false);
+            }
+            at += length as u32;
+        }
+        Ok(true)
+    }
+
+    /// Erases a sector, unless it is blank.
+    fn clear(&mut self, sector: u32) -> Result<(), Error<F::Error>> {
+        if !self.is_blank(sector)? {
+            self.flash.erase(self.address(sector, 0), self.address(sector + 1, 0))?;
+        }
+        Ok(())
+    }
+}
+
+const fn other(sector: u32) -> u32 {
+    1 - sector
+}
