@@ -136,6 +136,8 @@ pub struct Decoder<M> {
     receiver: Address,
     buffer: [u8; HELD_MAX],
     length: usize,
+    /// Number of bytes to be held before the next decision.
+    needed: usize,
     /// Number of bytes at the front of the buffer that belong to a frame whose contents are skipped (rule 2).
     sealed: usize,
     /// Sender and sequence number of the last frame.
@@ -149,8 +151,8 @@ const HELD_MAX: usize = SIGNED_MAX + 1;
 
 /// What the buffer begins with.
 enum Front<M> {
-    /// Nothing, or too little to decide.
-    Incomplete,
+    /// Too little to decide before so many bytes are held.
+    Incomplete(usize),
     /// No frame, or one to be skipped.
     Garbage(Option<Fault>),
     /// A frame of `length` bytes that is damaged or cannot be checked, followed by a start byte.
@@ -166,6 +168,7 @@ impl<M: Message> Decoder<M> {
             receiver,
             buffer: [0; HELD_MAX],
             length: 0,
+            needed: 1,
             sealed: 0,
             last: None,
             counters: Counters::default(),
@@ -181,7 +184,9 @@ impl<M: Message> Decoder<M> {
                 *next = byte;
                 self.length += 1;
             }
-            self.advance(&mut deliver);
+            if self.length >= self.needed {
+                self.advance(&mut deliver);
+            }
         }
     }
 
@@ -194,7 +199,10 @@ impl<M: Message> Decoder<M> {
     fn advance(&mut self, deliver: &mut impl FnMut(Address, M)) {
         loop {
             match self.front() {
-                Front::Incomplete => return,
+                Front::Incomplete(needed) => {
+                    self.needed = needed;
+                    return;
+                }
                 Front::Garbage(fault) => {
                     fault.into_iter().for_each(|fault| self.counters.count(fault));
                     self.skip_to_start();
@@ -223,16 +231,16 @@ impl<M: Message> Decoder<M> {
     fn front(&self) -> Front<M> {
         let held = self.buffer.get(..self.length).unwrap_or_default();
         match held.first() {
-            None => return Front::Incomplete,
+            None => return Front::Incomplete(1),
             Some(&START) => {}
             Some(_) => return Front::Garbage(None),
         }
-        let Some(header) = held.first_chunk().map(Header::read) else { return Front::Incomplete };
+        let Some(header) = held.first_chunk().map(Header::read) else { return Front::Incomplete(HEADER) };
         let length = header.frame_length();
         if length <= self.sealed {
             return Front::Garbage(None);
         }
-        let Some(frame) = held.get(..length) else { return self.behind_sealed(held) };
+        let Some(frame) = held.get(..length) else { return self.behind_sealed(held, length) };
         if let Some(message) = self.read(frame, &header) {
             return Front::Intact { skipped: 0, header, message };
         }
@@ -241,19 +249,24 @@ impl<M: Message> Decoder<M> {
         }
         let fault = if M::format(header.id).is_some() { Fault::BadChecksum } else { Fault::Unknown };
         match held.get(length) {
-            None => Front::Incomplete,
+            None => Front::Incomplete(length + 1),
             Some(&START) => Front::Opaque { length, fault },
             Some(_) => Front::Garbage(Some(fault)),
         }
     }
 
-    /// The held bytes begin within sealed bytes, with what may be an incomplete frame that reaches beyond them. If the
-    /// frame behind the sealed bytes is now complete and intact, there is no such frame.
-    fn behind_sealed(&self, held: &[u8]) -> Front<M> {
-        let behind = held.get(self.sealed..).filter(|_| self.sealed > 0).unwrap_or_default();
+    /// The held bytes begin with an incomplete frame of `length` bytes, or within sealed bytes with what may be one
+    /// that reaches beyond them. If the frame behind the sealed bytes is now complete and intact, there is no such
+    /// frame.
+    fn behind_sealed(&self, held: &[u8], length: usize) -> Front<M> {
+        if self.sealed == 0 {
+            return Front::Incomplete(length);
+        }
+        let behind = held.get(self.sealed..).unwrap_or_default();
         let header = behind.first_chunk().map(Header::read).filter(|header| header.frame_length() == behind.len());
         let read = header.and_then(|header| Some((header, self.read(behind, &header)?)));
-        read.map_or(Front::Incomplete, |(header, message)| Front::Intact { skipped: self.sealed, header, message })
+        let incomplete = Front::Incomplete(held.len() + 1);
+        read.map_or(incomplete, |(header, message)| Front::Intact { skipped: self.sealed, header, message })
     }
 
     /// Returns the message in `frame`, if the frame's checksum is known and right.

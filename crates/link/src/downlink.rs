@@ -1,15 +1,24 @@
 //! Messages from the vehicle.
 
 use crate::address::Address;
-use crate::decoder::Counters;
+use crate::answer::{self, Answer};
+use crate::clocks::Clock;
 use crate::frames::flip;
-use crate::message::{Fault, Format, Message, PAYLOAD_MAX, extension, field, parse, put, put_extended, put_fields};
-use afbc_types::{Axis, PerAxis, ROTORS_MAX, RotorSpeeds};
+use crate::health::{self, Health};
+use crate::interval::Interval;
+use crate::message::{Fault, Format, Message, PAYLOAD_MAX, parse, put};
+use crate::mission::Mission;
+use crate::modes::{AvailableMode, CurrentMode};
+use crate::operator::{ANSWER_ID, ControlAnswer};
+use crate::parameter::ParameterValue;
+use crate::target::{Motion, followed_format, read_followed, write_followed};
+use crate::telemetry::Telemetry;
+use afbc_types::{ROTORS_MAX, RotorSpeeds};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
-    ATTITUDE_DATA, COMMAND_ACK_DATA, DEBUG_FLOAT_ARRAY_DATA, HEARTBEAT_DATA, HIL_ACTUATOR_CONTROLS_DATA,
-    HilActuatorControlsFlags, LOCAL_POSITION_NED_DATA, MavAutopilot, MavModeFlag, MavResult, MavSeverity, MavState,
-    MavType, STATUSTEXT_DATA,
+    ATTITUDE_DATA, AVAILABLE_MODES_DATA, COMMAND_ACK_DATA, CURRENT_MODE_DATA, DEBUG_FLOAT_ARRAY_DATA, HEARTBEAT_DATA,
+    HIL_ACTUATOR_CONTROLS_DATA, HilActuatorControlsFlags, LOCAL_POSITION_NED_DATA, MESSAGE_INTERVAL_DATA, MavAutopilot,
+    MavModeFlag, MavSeverity, MavState, MavType, PARAM_VALUE_DATA, POSITION_TARGET_LOCAL_NED_DATA, STATUSTEXT_DATA,
 };
 use mavlink::types::CharArray;
 use nalgebra::{SVector, Vector3};
@@ -76,65 +85,29 @@ pub enum Downlink {
     },
     /// DEBUG_FLOAT_ARRAY (350) named "health".
     Health(Health),
-}
-
-/// An answer to a command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Answer {
-    /// Carried out.
-    Accepted,
-    /// Refused for now, with the number of the reason in `result_param2`.
-    Refused(i32),
-    /// Invalid parameters.
-    Denied,
-    /// Unknown command.
-    Unsupported,
-    /// Outcome unknown.
-    Failed,
-}
-
-/// State of the flight core and the link, in the order of the array's elements. Counts are sent as `f32`, exact up to
-/// 2^24.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Health {
-    /// Time since power-up \[us\].
-    pub time_us: u64,
-    /// Duration of the last control tick \[us\].
-    pub tick_us: f32,
-    /// Longest duration of a control tick so far \[us\].
-    pub tick_max_us: f32,
-    /// Ticks in the last second \[Hz\].
-    pub rate_hz: f32,
-    /// Ticks since power-up that came late or early.
-    pub late_ticks: u32,
-    /// Ticks in which a rotor was commanded a force outside its limits.
-    pub saturated_ticks: u32,
-    /// Age of the newest state \[us\].
-    pub state_age_us: f32,
-    /// Norm of each subsystem's Theta_hat.
-    pub theta_norm: PerAxis<f32>,
-    /// Each subsystem's delta_hat.
-    pub delta: PerAxis<f32>,
-    /// Reception counts of the link.
-    pub link: Counters,
-    /// Commands since power-up that were not answered, because more arrived at once than could be answered.
-    pub unanswered: u32,
-    /// States that were not used.
-    pub states_refused: StatesRefused,
-}
-
-/// States since power-up that were not used, by reason.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StatesRefused {
-    /// Out of order or duplicate.
-    pub overtaken: u32,
-    /// Too old on arrival.
-    pub late: u32,
-    /// From another sender than the one in use.
-    pub elsewhere: u32,
-    /// Repeating the last one in flight, or from a tracker that is no longer trusted.
-    pub frozen: u32,
+    /// What stations show.
+    Telemetry(Telemetry),
+    /// POSITION_TARGET_LOCAL_NED (85): what the vehicle follows, at a time since power-up \[ms\].
+    Followed(u32, Motion),
+    /// MISSION_* for `to`.
+    Mission {
+        /// The message.
+        message: Mission,
+        /// The station.
+        to: Address,
+    },
+    /// TIMESYNC, PING, SYSTEM_TIME.
+    Clock(Clock),
+    /// MESSAGE_INTERVAL (244).
+    Interval(Interval),
+    /// AVAILABLE_MODES (435).
+    AvailableMode(AvailableMode),
+    /// CURRENT_MODE (436).
+    CurrentMode(CurrentMode),
+    /// PARAM_VALUE (22).
+    Parameter(ParameterValue),
+    /// CHANGE_OPERATOR_CONTROL_ACK (6).
+    Control(ControlAnswer),
 }
 
 impl Downlink {
@@ -149,10 +122,16 @@ impl Message for Downlink {
             HIL_ACTUATOR_CONTROLS_DATA::ID => Some(Format::of::<HIL_ACTUATOR_CONTROLS_DATA>(0)),
             ATTITUDE_DATA::ID => Some(Format::of::<ATTITUDE_DATA>(0)),
             LOCAL_POSITION_NED_DATA::ID => Some(Format::of::<LOCAL_POSITION_NED_DATA>(0)),
-            COMMAND_ACK_DATA::ID => Some(Format::of::<COMMAND_ACK_DATA>(ANSWER_EXTENSION)),
+            COMMAND_ACK_DATA::ID => Some(answer::format()),
             STATUSTEXT_DATA::ID => Some(Format::of::<STATUSTEXT_DATA>(TEXT_EXTENSION)),
-            DEBUG_FLOAT_ARRAY_DATA::ID => Some(Format::of::<DEBUG_FLOAT_ARRAY_DATA>(4 * HEALTH_ELEMENTS)),
-            _ => None,
+            DEBUG_FLOAT_ARRAY_DATA::ID => Some(health::format()),
+            POSITION_TARGET_LOCAL_NED_DATA::ID => Some(followed_format()),
+            MESSAGE_INTERVAL_DATA::ID => Some(Interval::format()),
+            AVAILABLE_MODES_DATA::ID => Some(AvailableMode::format()),
+            CURRENT_MODE_DATA::ID => Some(CurrentMode::format()),
+            PARAM_VALUE_DATA::ID => Some(ParameterValue::format()),
+            ANSWER_ID => Some(ControlAnswer::format()),
+            _ => Telemetry::format(id).or_else(|| Mission::format(id)).or_else(|| Clock::format(id)),
         }
     }
 
@@ -162,15 +141,27 @@ impl Message for Downlink {
             HIL_ACTUATOR_CONTROLS_DATA::ID => read_rotors(&parse(payload)?),
             ATTITUDE_DATA::ID => parse(payload).map(read_attitude),
             LOCAL_POSITION_NED_DATA::ID => parse(payload).map(read_position),
-            COMMAND_ACK_DATA::ID => read_answer(payload),
+            COMMAND_ACK_DATA::ID => {
+                answer::read(payload).map(|(command, answer, to)| Downlink::Answer { command, answer, to })
+            }
             STATUSTEXT_DATA::ID => {
                 let STATUSTEXT_DATA { severity, text } = parse(payload)?;
                 Ok(Downlink::Text { severity, text })
             }
-            DEBUG_FLOAT_ARRAY_DATA::ID => {
-                read_health(&parse(payload)?, extension::<DEBUG_FLOAT_ARRAY_DATA, _>(payload))
+            DEBUG_FLOAT_ARRAY_DATA::ID => health::read(payload).map(Downlink::Health),
+            POSITION_TARGET_LOCAL_NED_DATA::ID => {
+                read_followed(payload).map(|(time_ms, motion)| Downlink::Followed(time_ms, motion))
             }
-            _ => Err(Fault::Unknown),
+            MESSAGE_INTERVAL_DATA::ID => Ok(Downlink::Interval(Interval::read(payload))),
+            AVAILABLE_MODES_DATA::ID => Ok(Downlink::AvailableMode(AvailableMode::read(payload))),
+            CURRENT_MODE_DATA::ID => Ok(Downlink::CurrentMode(CurrentMode::read(payload))),
+            PARAM_VALUE_DATA::ID => Ok(Downlink::Parameter(ParameterValue::read(payload))),
+            ANSWER_ID => ControlAnswer::read(payload).map(Downlink::Control),
+            _ if Mission::format(id).is_some() => {
+                Mission::read(id, payload).map(|(message, to)| Downlink::Mission { message, to })
+            }
+            _ if Clock::format(id).is_some() => Clock::read(id, payload).map(Downlink::Clock),
+            _ => Telemetry::read(id, payload).map(Downlink::Telemetry),
         }
     }
 
@@ -189,14 +180,18 @@ impl Message for Downlink {
                 let [vx, vy, vz] = flip(*velocity_m_s).into();
                 put(&LOCAL_POSITION_NED_DATA { time_boot_ms: *time_ms, x, y, z, vx, vy, vz }, payload)
             }
-            Downlink::Answer { command, answer, to } => {
-                put_fields(COMMAND_ACK_DATA::ID, write_answer(*command, *answer, *to), payload)
-            }
+            Downlink::Answer { command, answer, to } => answer::write(*command, *answer, *to, payload),
             Downlink::Text { severity, text } => put(&STATUSTEXT_DATA { severity: *severity, text: *text }, payload),
-            Downlink::Health(health) => {
-                let data = DEBUG_FLOAT_ARRAY_DATA { time_usec: health.time_us, array_id: 0, name: HEALTH.into() };
-                put_extended(&data, health.elements().flat_map(f32::to_le_bytes), payload)
-            }
+            Downlink::Health(health) => health.write(payload),
+            Downlink::Telemetry(telemetry) => telemetry.write(payload),
+            Downlink::Followed(time_ms, motion) => write_followed(*time_ms, motion, payload),
+            Downlink::Mission { message, to } => message.write(*to, payload),
+            Downlink::Clock(clock) => clock.write(payload),
+            Downlink::Interval(interval) => interval.write(payload),
+            Downlink::AvailableMode(mode) => mode.write(payload),
+            Downlink::CurrentMode(mode) => mode.write(payload),
+            Downlink::Parameter(value) => value.write(payload),
+            Downlink::Control(answer) => answer.write(payload),
         }
     }
 }
@@ -271,85 +266,5 @@ fn read_position(data: LOCAL_POSITION_NED_DATA) -> Downlink {
     }
 }
 
-/// Extension fields of COMMAND_ACK: progress, `result_param2` as `i32`, target system and component.
-const ANSWER_EXTENSION: usize = 7;
-const ANSWER_FIELDS: usize = COMMAND_ACK_DATA::ENCODED_LEN + ANSWER_EXTENSION;
 /// Extension fields of STATUSTEXT, which number the parts of longer texts.
 const TEXT_EXTENSION: usize = 3;
-/// Elements of DEBUG_FLOAT_ARRAY, its only extension field.
-const HEALTH_ELEMENTS: usize = 58;
-const HEALTH: &str = "health";
-
-/// Reads command, result, progress, `result_param2` and target. By hand, since the `mavlink` crate rejects commands
-/// that its dialect does not define.
-fn read_answer(payload: &[u8]) -> Result<Downlink, Fault> {
-    let [low, high, result, _, reason @ .., system, component]: [u8; ANSWER_FIELDS] = field(payload, 0);
-    let answer = match result {
-        ACCEPTED => Answer::Accepted,
-        REFUSED => Answer::Refused(i32::from_le_bytes(reason)),
-        DENIED => Answer::Denied,
-        UNSUPPORTED => Answer::Unsupported,
-        FAILED => Answer::Failed,
-        _ => return Err(Fault::Unsupported),
-    };
-    let command = u16::from_le_bytes([low, high]);
-    Ok(Downlink::Answer { command, answer, to: Address { system, component } })
-}
-
-fn write_answer(command: u16, answer: Answer, to: Address) -> [u8; ANSWER_FIELDS] {
-    let (result, reason) = match answer {
-        Answer::Accepted => (ACCEPTED, 0),
-        Answer::Refused(reason) => (REFUSED, reason),
-        Answer::Denied => (DENIED, 0),
-        Answer::Unsupported => (UNSUPPORTED, 0),
-        Answer::Failed => (FAILED, 0),
-    };
-    let ([low, high], [a, b, c, d]) = (command.to_le_bytes(), reason.to_le_bytes());
-    [low, high, result, 0, a, b, c, d, to.system, to.component]
-}
-
-const ACCEPTED: u8 = MavResult::MAV_RESULT_ACCEPTED as u8;
-const REFUSED: u8 = MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
-const DENIED: u8 = MavResult::MAV_RESULT_DENIED as u8;
-const UNSUPPORTED: u8 = MavResult::MAV_RESULT_UNSUPPORTED as u8;
-const FAILED: u8 = MavResult::MAV_RESULT_FAILED as u8;
-
-fn read_health(data: &DEBUG_FLOAT_ARRAY_DATA, extension: [u8; 4 * HEALTH_ELEMENTS]) -> Result<Downlink, Fault> {
-    if data.name.to_str() != Ok(HEALTH) {
-        return Err(Fault::Unsupported);
-    }
-    let (elements, _) = extension.as_chunks();
-    let mut elements = elements.iter().map(|bytes| f32::from_le_bytes(*bytes));
-    let mut next = || elements.next().unwrap_or_default();
-    Ok(Downlink::Health(Health {
-        time_us: data.time_usec,
-        tick_us: next(),
-        tick_max_us: next(),
-        rate_hz: next(),
-        late_ticks: next() as u32,
-        saturated_ticks: next() as u32,
-        state_age_us: next(),
-        theta_norm: PerAxis::from_fn(|_| next()),
-        delta: PerAxis::from_fn(|_| next()),
-        link: Counters::from_array(core::array::from_fn(|_| next() as u32)),
-        unanswered: next() as u32,
-        states_refused: StatesRefused {
-            overtaken: next() as u32,
-            late: next() as u32,
-            elsewhere: next() as u32,
-            frozen: next() as u32,
-        },
-    }))
-}
-
-impl Health {
-    /// Returns the array's elements.
-    fn elements(&self) -> impl Iterator<Item = f32> {
-        let Health { tick_us, tick_max_us, rate_hz, late_ticks, saturated_ticks, state_age_us, .. } = *self;
-        let ticks = [tick_us, tick_max_us, rate_hz, late_ticks as f32, saturated_ticks as f32, state_age_us];
-        let estimates = [self.theta_norm, self.delta].map(|estimate| Axis::ALL.map(|axis| estimate[axis]));
-        let StatesRefused { overtaken, late, elsewhere, frozen } = self.states_refused;
-        let counts = self.link.to_array().into_iter().chain([self.unanswered, overtaken, late, elsewhere, frozen]);
-        ticks.into_iter().chain(estimates.into_iter().flatten()).chain(counts.map(|count| count as f32))
-    }
-}

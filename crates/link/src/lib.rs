@@ -9,8 +9,7 @@
 //!    counts what it drops in [`Counters`].
 //!
 //! Layouts, checksum seeds and enumerations come from the `mavlink` crate's `common` dialect; only the messages named
-//! here reach the image. Parameter messages are not supported: gains are fixed and validated before flight. Signed
-//! frames are not supported and are dropped.
+//! here reach the image. Signed frames are not supported and are dropped.
 //!
 //! No input makes the crate panic or block; memory is one frame.
 //!
@@ -27,19 +26,46 @@
 //! assert_eq!(decoder.counters().received, 1);
 //! ```
 #![no_std]
+#![allow(deprecated, reason = "messages that stations still send")]
+#![allow(clippy::type_complexity, reason = "a message's layout is the tuple of its fields")]
 
 mod address;
+mod answer;
+mod clocks;
+mod command;
 mod decoder;
 mod downlink;
 pub mod frames;
 mod framing;
+mod health;
+mod interval;
 mod message;
+mod mission;
+mod modes;
+mod operator;
+mod parameter;
+mod place;
+mod target;
+pub mod telemetry;
 mod uplink;
+mod wire;
 
 pub use address::Address;
+pub use answer::Answer;
+pub use clocks::Clock;
+pub use command::{Command, Storage};
 pub use decoder::{Counters, Decoder};
-pub use downlink::{Answer, Downlink, Health, StatesRefused, Text};
+pub use downlink::{Downlink, Text};
 pub use framing::{FRAME_MAX, Sender};
+pub use health::{Health, StatesRefused};
+pub use interval::{DataStream, Interval};
 pub use mavlink::dialects::common::{MavCmd, MavSeverity};
 pub use message::{Fault, Format, Message};
-pub use uplink::{Command, Uplink};
+pub use mission::{Mission, MissionCurrent, MissionItem, MissionResult, Plan};
+pub use modes::{AvailableMode, CurrentMode};
+pub use operator::{Control, ControlAnswer};
+pub use parameter::{ParameterName, ParameterRequest, ParameterValue};
+pub use place::{Datum, Height, Place};
+pub use target::{AttitudeAndThrust, Axes, Motion, Sticks, Target};
+pub use telemetry::Telemetry;
+pub use uplink::Uplink;

@@ -89,19 +89,6 @@ pub(crate) fn put<D: MessageData>(data: &D, payload: &mut [u8; PAYLOAD_MAX]) -> 
     (D::ID, data.ser(MavlinkVersion::V2, payload) as u8)
 }
 
-/// Writes the consecutive fields of the message numbered `id`, without trailing zeros.
-pub(crate) fn put_fields(id: u32, fields: impl IntoIterator<Item = u8>, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
-    // At least one byte.
-    let mut length = 1;
-    for (place, (byte, sent)) in payload.iter_mut().zip(fields).enumerate() {
-        *byte = sent;
-        if sent != 0 {
-            length = (place + 1) as u8;
-        }
-    }
-    (id, length)
-}
-
 /// Writes the message `data` and its extension fields, without trailing zeros.
 pub(crate) fn put_extended<D: MessageData>(
     data: &D,

@@ -1,14 +1,20 @@
 //! Messages to the vehicle.
 
 use crate::address::Address;
+use crate::clocks::Clock;
+use crate::command::{self, Command};
 use crate::frames::{Odometry, flip, flip_turn};
-use crate::message::{Fault, Format, Message, PAYLOAD_MAX, extension, field, parse, put, put_extended, put_fields};
+use crate::interval::DataStream;
+use crate::message::{Fault, Format, Message, PAYLOAD_MAX, extension, field, parse, put, put_extended};
+use crate::mission::Mission;
+use crate::operator::{CHANGE_ID, Control};
+use crate::parameter::ParameterRequest;
+use crate::target::{Motion, Target, write_motion};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
-    ATT_POS_MOCAP_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavFrame,
-    MavModeFlag, MavState, MavType, ODOMETRY_DATA, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
-    VISION_POSITION_ESTIMATE_DATA,
+    ATT_POS_MOCAP_DATA, HEARTBEAT_DATA, MavAutopilot, MavFrame, MavModeFlag, MavState, MavType, ODOMETRY_DATA,
+    REQUEST_DATA_STREAM_DATA, VISION_POSITION_ESTIMATE_DATA,
 };
 use nalgebra::Vector3;
 
@@ -42,44 +48,24 @@ pub enum Uplink {
         /// Plausible pose in the frames of [`afbc_types`].
         pose: Pose,
     },
-    /// SET_POSITION_TARGET_LOCAL_NED (84) in MAV_FRAME_LOCAL_NED. The vehicle needs a position and a heading: if
-    /// `type_mask` ignores one of x, y, z or yaw, or selects forces, the message is [`Fault::Unsupported`]. Ignored
-    /// velocities, accelerations and yaw rate are zero, and so is the yaw acceleration, which the message lacks.
+    /// SET_POSITION_TARGET_LOCAL_NED (84) in MAV_FRAME_LOCAL_NED of which nothing is ignored. The yaw acceleration,
+    /// jerk and snap, which the message lacks, are zero.
     Setpoint(Setpoint),
-    /// COMMAND_LONG (76) or COMMAND_INT (75). Written as COMMAND_LONG.
+    /// Any other target, or a pilot's sticks.
+    Target(Target),
+    /// COMMAND_LONG (76), COMMAND_INT (75) or SET_MODE (11).
     Command(Command),
+    /// MISSION_*.
+    Mission(Mission),
+    /// PARAM_REQUEST_LIST, PARAM_REQUEST_READ, PARAM_SET.
+    Parameter(ParameterRequest),
+    /// TIMESYNC, PING, SYSTEM_TIME.
+    Clock(Clock),
+    /// REQUEST_DATA_STREAM (66).
+    Stream(DataStream),
+    /// CHANGE_OPERATOR_CONTROL (5).
+    Control(Control),
 }
-
-/// Request in COMMAND_LONG or COMMAND_INT, answered by [`Downlink::Answer`](crate::Downlink::Answer).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Command {
-    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 1. Forcing it (param2 = 21196) has no effect.
-    Arm,
-    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 0.
-    Disarm,
-    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 0, forced (param2 = 21196): also in flight.
-    Kill,
-    /// MAV_CMD_USER_1 (31010): engage AFBC again after its monitor has tripped.
-    Engage,
-    /// One of these commands, by number, with an invalid parameter: answered with "denied".
-    Denied(u16),
-    /// Any other command, by number, of any dialect: answered with "unsupported".
-    Other(u16),
-}
-
-impl Command {
-    /// Returns the MAVLink command's number, for its answer.
-    pub fn id(self) -> u16 {
-        match self {
-            Command::Arm | Command::Disarm | Command::Kill => ARM_DISARM,
-            Command::Engage => ENGAGE,
-            Command::Denied(id) | Command::Other(id) => id,
-        }
-    }
-}
-
-const ARM_DISARM: u16 = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16;
-const ENGAGE: u16 = MavCmd::MAV_CMD_USER_1 as u16;
 
 impl Message for Uplink {
     fn format(id: u32) -> Option<Format> {
@@ -88,10 +74,13 @@ impl Message for Uplink {
             ODOMETRY_DATA::ID => Some(Format::of::<ODOMETRY_DATA>(ODOMETRY_EXTENSION)),
             VISION_POSITION_ESTIMATE_DATA::ID => Some(Format::of::<VISION_POSITION_ESTIMATE_DATA>(POSE_EXTENSION)),
             ATT_POS_MOCAP_DATA::ID => Some(Format::of::<ATT_POS_MOCAP_DATA>(COVARIANCE)),
-            SET_POSITION_TARGET_LOCAL_NED_DATA::ID => Some(Format::of::<SET_POSITION_TARGET_LOCAL_NED_DATA>(0)),
-            COMMAND_LONG_DATA::ID => Some(Format::of::<COMMAND_LONG_DATA>(0)),
-            COMMAND_INT_DATA::ID => Some(Format::of::<COMMAND_INT_DATA>(0)),
-            _ => None,
+            REQUEST_DATA_STREAM_DATA::ID => Some(DataStream::format()),
+            CHANGE_ID => Some(Control::format()),
+            _ => Target::format(id)
+                .or_else(|| command::format(id))
+                .or_else(|| Mission::format(id))
+                .or_else(|| Clock::format(id))
+                .or_else(|| ParameterRequest::format(id)),
         }
     }
 
@@ -101,9 +90,34 @@ impl Message for Uplink {
             ODOMETRY_DATA::ID => read_odometry(&parse(payload)?, extension::<ODOMETRY_DATA, _>(payload)),
             VISION_POSITION_ESTIMATE_DATA::ID => read_vision(&parse(payload)?, payload),
             ATT_POS_MOCAP_DATA::ID => read_mocap(&parse(payload)?, payload),
-            SET_POSITION_TARGET_LOCAL_NED_DATA::ID => read_setpoint(&parse(payload)?, receiver),
-            COMMAND_LONG_DATA::ID | COMMAND_INT_DATA::ID => read_command(payload, receiver),
-            _ => Err(Fault::Unknown),
+            REQUEST_DATA_STREAM_DATA::ID => {
+                let (stream, to) = DataStream::read(payload);
+                meant_for(receiver, to).map(|()| Uplink::Stream(stream))
+            }
+            CHANGE_ID => {
+                let (control, system) = Control::read(payload)?;
+                meant_for(receiver, Address { system, component: 0 }).map(|()| Uplink::Control(control))
+            }
+            _ if Target::format(id).is_some() => match Target::read(id, payload, |to| receiver.is_meant_by(to))? {
+                Target::Motion(motion) => {
+                    Ok(motion.complete().map_or(Uplink::Target(Target::Motion(motion)), Uplink::Setpoint))
+                }
+                target => Ok(Uplink::Target(target)),
+            },
+            _ if command::format(id).is_some() => {
+                let (command, to) = command::read(id, payload)?;
+                meant_for(receiver, to).map(|()| Uplink::Command(command))
+            }
+            _ if Mission::format(id).is_some() => {
+                let (message, to) = Mission::read(id, payload)?;
+                meant_for(receiver, to).map(|()| Uplink::Mission(message))
+            }
+            // Questions are for everyone; answers are of use to the asker only, who decides.
+            _ if Clock::format(id).is_some() => Clock::read(id, payload).map(Uplink::Clock),
+            _ => {
+                let (request, to) = ParameterRequest::read(id, payload)?;
+                meant_for(receiver, to).map(|()| Uplink::Parameter(request))
+            }
         }
     }
 
@@ -125,15 +139,21 @@ impl Message for Uplink {
                 let covariance = covariance(&pose.sigmas).into_iter().flat_map(f32::to_le_bytes);
                 put_extended(&write_mocap(*sent_us, pose), covariance, payload)
             }
-            Uplink::Setpoint(setpoint) => put(&write_setpoint(setpoint), payload),
-            Uplink::Command(command) => put_fields(COMMAND_LONG_DATA::ID, write_command(*command), payload),
+            Uplink::Setpoint(setpoint) => write_motion(&Motion::from(setpoint), payload),
+            Uplink::Target(target) => target.write(payload),
+            Uplink::Command(command) => command::write(*command, payload),
+            Uplink::Mission(message) => message.write(Address::default(), payload),
+            Uplink::Parameter(request) => request.write(payload),
+            Uplink::Clock(clock) => clock.write(payload),
+            Uplink::Stream(stream) => stream.write(payload),
+            Uplink::Control(control) => control.write(payload),
         }
     }
 }
 
 /// Returns [`Fault::Elsewhere`] if the message's target is not `receiver`.
-fn meant_for(receiver: Address, system: u8, component: u8) -> Result<(), Fault> {
-    if receiver.is_meant_by(Address { system, component }) { Ok(()) } else { Err(Fault::Elsewhere) }
+fn meant_for(receiver: Address, target: Address) -> Result<(), Fault> {
+    if receiver.is_meant_by(target) { Ok(()) } else { Err(Fault::Elsewhere) }
 }
 
 /// Extension fields of ODOMETRY: reset counter, type of the estimator, quality as `i8`.
@@ -221,86 +241,4 @@ fn covariance(sigmas: &PoseSigmas) -> [f32; 21] {
         15 | 18 | 20 => attitude,
         _ => 0.0,
     })
-}
-
-fn read_setpoint(data: &SET_POSITION_TARGET_LOCAL_NED_DATA, receiver: Address) -> Result<Uplink, Fault> {
-    use PositionTargetTypemask as Mask;
-    meant_for(receiver, data.target_system, data.target_component)?;
-    let needed = Mask::POSITION_TARGET_TYPEMASK_X_IGNORE
-        | Mask::POSITION_TARGET_TYPEMASK_Y_IGNORE
-        | Mask::POSITION_TARGET_TYPEMASK_Z_IGNORE
-        | Mask::POSITION_TARGET_TYPEMASK_YAW_IGNORE
-        | Mask::POSITION_TARGET_TYPEMASK_FORCE_SET;
-    if data.coordinate_frame != MavFrame::MAV_FRAME_LOCAL_NED || data.type_mask.intersects(needed) {
-        return Err(Fault::Unsupported);
-    }
-    let unless = |ignored: Mask, value: f32| if data.type_mask.contains(ignored) { 0.0 } else { value };
-    let setpoint = Setpoint {
-        position_m: flip(Vector3::new(data.x, data.y, data.z)),
-        velocity_m_s: flip(Vector3::new(
-            unless(Mask::POSITION_TARGET_TYPEMASK_VX_IGNORE, data.vx),
-            unless(Mask::POSITION_TARGET_TYPEMASK_VY_IGNORE, data.vy),
-            unless(Mask::POSITION_TARGET_TYPEMASK_VZ_IGNORE, data.vz),
-        )),
-        acceleration_m_s2: flip(Vector3::new(
-            unless(Mask::POSITION_TARGET_TYPEMASK_AX_IGNORE, data.afx),
-            unless(Mask::POSITION_TARGET_TYPEMASK_AY_IGNORE, data.afy),
-            unless(Mask::POSITION_TARGET_TYPEMASK_AZ_IGNORE, data.afz),
-        )),
-        yaw_rad: -data.yaw,
-        yaw_rate_rad_s: -unless(Mask::POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE, data.yaw_rate),
-        // The message has no jerk, snap or angular acceleration.
-        ..Setpoint::default()
-    };
-    if setpoint.is_plausible() { Ok(Uplink::Setpoint(setpoint)) } else { Err(Fault::Implausible) }
-}
-
-fn write_setpoint(setpoint: &Setpoint) -> SET_POSITION_TARGET_LOCAL_NED_DATA {
-    let mut data = SET_POSITION_TARGET_LOCAL_NED_DATA {
-        yaw: -setpoint.yaw_rad,
-        yaw_rate: -setpoint.yaw_rate_rad_s,
-        type_mask: PositionTargetTypemask::empty(),
-        coordinate_frame: MavFrame::MAV_FRAME_LOCAL_NED,
-        ..SET_POSITION_TARGET_LOCAL_NED_DATA::DEFAULT
-    };
-    [data.x, data.y, data.z] = flip(setpoint.position_m).into();
-    [data.vx, data.vy, data.vz] = flip(setpoint.velocity_m_s).into();
-    [data.afx, data.afy, data.afz] = flip(setpoint.acceleration_m_s2).into();
-    data
-}
-
-/// Value of param2 of MAV_CMD_COMPONENT_ARM_DISARM that forces it.
-const FORCED: f32 = 21196.0;
-
-/// Offsets of the fields used, equal in COMMAND_LONG and COMMAND_INT: two parameters, number, target. By hand, since
-/// the `mavlink` crate rejects commands that its dialect does not define.
-const COMMAND_FIELDS: [usize; 4] = [0, 4, 28, 30];
-
-fn read_command(payload: &[u8], receiver: Address) -> Result<Uplink, Fault> {
-    let [param1_at, param2_at, id_at, target_at] = COMMAND_FIELDS;
-    let [system, component] = field(payload, target_at);
-    meant_for(receiver, system, component)?;
-    let param1 = f32::from_le_bytes(field(payload, param1_at));
-    let forced = f32::from_le_bytes(field(payload, param2_at)) == FORCED;
-    let command = match u16::from_le_bytes(field(payload, id_at)) {
-        ARM_DISARM if param1 == 1.0 => Command::Arm,
-        ARM_DISARM if param1 == 0.0 && forced => Command::Kill,
-        ARM_DISARM if param1 == 0.0 => Command::Disarm,
-        ARM_DISARM => Command::Denied(ARM_DISARM),
-        ENGAGE => Command::Engage,
-        other => Command::Other(other),
-    };
-    Ok(Uplink::Command(command))
-}
-
-/// Returns the fields of COMMAND_LONG: seven parameters, number, target (all) and confirmation.
-fn write_command(command: Command) -> impl Iterator<Item = u8> {
-    let [param1, param2] = match command {
-        Command::Arm => [1.0, 0.0],
-        Command::Kill => [0.0, FORCED],
-        Command::Denied(_) => [f32::NAN, 0.0],
-        Command::Disarm | Command::Engage | Command::Other(_) => [0.0; 2],
-    };
-    let parameters = [param1, param2, 0.0, 0.0, 0.0, 0.0, 0.0].into_iter().flat_map(f32::to_le_bytes);
-    parameters.chain(command.id().to_le_bytes())
 }

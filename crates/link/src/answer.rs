@@ -1,0 +1,67 @@
+//! Answers to commands: COMMAND_ACK.
+
+use crate::address::Address;
+use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::wire::Layout;
+use mavlink::dialects::common::{COMMAND_ACK_DATA, MavResult};
+
+/// An answer to a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Answer {
+    /// Carried out.
+    Accepted,
+    /// Refused for now, with the number of the reason in `result_param2`.
+    Refused(i32),
+    /// Invalid parameters.
+    Denied,
+    /// Unknown command.
+    Unsupported,
+    /// Outcome unknown.
+    Failed,
+    /// Another answer will follow.
+    InProgress,
+}
+
+/// Number, result, progress, `result_param2`, receiver.
+const ACK: Layout<COMMAND_ACK_DATA, (u16, u8, u8, i32, Address)> = Layout::NEW;
+
+const ACCEPTED: u8 = MavResult::MAV_RESULT_ACCEPTED as u8;
+const REFUSED: u8 = MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
+const DENIED: u8 = MavResult::MAV_RESULT_DENIED as u8;
+const UNSUPPORTED: u8 = MavResult::MAV_RESULT_UNSUPPORTED as u8;
+const FAILED: u8 = MavResult::MAV_RESULT_FAILED as u8;
+const IN_PROGRESS: u8 = MavResult::MAV_RESULT_IN_PROGRESS as u8;
+/// Progress that is not known.
+const SOME: u8 = u8::MAX;
+
+pub(crate) fn format() -> Format {
+    ACK.format()
+}
+
+/// Returns command, answer and receiver. Any command, of any dialect.
+pub(crate) fn read(payload: &[u8]) -> Result<(u16, Answer, Address), Fault> {
+    let (command, result, _, reason, to) = ACK.read(payload);
+    let answer = match result {
+        ACCEPTED => Answer::Accepted,
+        REFUSED => Answer::Refused(reason),
+        DENIED => Answer::Denied,
+        UNSUPPORTED => Answer::Unsupported,
+        FAILED => Answer::Failed,
+        IN_PROGRESS => Answer::InProgress,
+        _ => return Err(Fault::Unsupported),
+    };
+    Ok((command, answer, to))
+}
+
+pub(crate) fn write(command: u16, answer: Answer, to: Address, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+    let (result, progress, reason) = match answer {
+        Answer::Accepted => (ACCEPTED, 0, 0),
+        Answer::Refused(reason) => (REFUSED, 0, reason),
+        Answer::Denied => (DENIED, 0, 0),
+        Answer::Unsupported => (UNSUPPORTED, 0, 0),
+        Answer::Failed => (FAILED, 0, 0),
+        Answer::InProgress => (IN_PROGRESS, SOME, 0),
+    };
+    ACK.write(&(command, result, progress, reason, to), payload)
+}

@@ -1,0 +1,78 @@
+//! Clocks and round trips: TIMESYNC, PING and SYSTEM_TIME, in both directions.
+
+use crate::address::Address;
+use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::wire::Layout;
+use mavlink::MessageData;
+use mavlink::dialects::common::{PING_DATA, SYSTEM_TIME_DATA, TIMESYNC_DATA};
+
+/// A message about time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Clock {
+    /// TIMESYNC (111).
+    Sync {
+        /// Time of the answering clock, 0 in a question \[ns\].
+        answered_ns: i64,
+        /// Time of the asking clock \[ns\].
+        asked_ns: i64,
+        /// The receiver; all zeros from senders that do not name one.
+        to: Address,
+    },
+    /// PING (4).
+    Ping {
+        /// Time of the sender's clock \[us\].
+        time_us: u64,
+        /// Number of the ping.
+        number: u32,
+        /// All zeros in a question, the asker in an answer.
+        to: Address,
+    },
+    /// SYSTEM_TIME (2).
+    Time {
+        /// Time since 1970, 0 if unknown \[us\].
+        unix_us: u64,
+        /// Time since power-up \[ms\].
+        boot_ms: u32,
+    },
+}
+
+const SYNC: Layout<TIMESYNC_DATA, (i64, i64, Address)> = Layout::NEW;
+const PING: Layout<PING_DATA, (u64, u32, Address)> = Layout::NEW;
+const TIME: Layout<SYSTEM_TIME_DATA, (u64, u32)> = Layout::NEW;
+
+impl Clock {
+    pub(crate) fn format(id: u32) -> Option<Format> {
+        Some(match id {
+            TIMESYNC_DATA::ID => SYNC.format(),
+            PING_DATA::ID => PING.format(),
+            SYSTEM_TIME_DATA::ID => TIME.format(),
+            _ => return None,
+        })
+    }
+
+    pub(crate) fn read(id: u32, payload: &[u8]) -> Result<Self, Fault> {
+        Ok(match id {
+            TIMESYNC_DATA::ID => {
+                let (answered_ns, asked_ns, to) = SYNC.read(payload);
+                Clock::Sync { answered_ns, asked_ns, to }
+            }
+            PING_DATA::ID => {
+                let (time_us, number, to) = PING.read(payload);
+                Clock::Ping { time_us, number, to }
+            }
+            SYSTEM_TIME_DATA::ID => {
+                let (unix_us, boot_ms) = TIME.read(payload);
+                Clock::Time { unix_us, boot_ms }
+            }
+            _ => return Err(Fault::Unknown),
+        })
+    }
+
+    pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        match *self {
+            Clock::Sync { answered_ns, asked_ns, to } => SYNC.write(&(answered_ns, asked_ns, to), payload),
+            Clock::Ping { time_us, number, to } => PING.write(&(time_us, number, to), payload),
+            Clock::Time { unix_us, boot_ms } => TIME.write(&(unix_us, boot_ms), payload),
+        }
+    }
+}

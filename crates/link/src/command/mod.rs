@@ -1,0 +1,173 @@
+//! Commands, which are answered.
+
+mod read;
+mod write;
+
+use crate::place::{Height, Place};
+pub(crate) use read::{format, read};
+pub(crate) use write::write;
+
+/// Something asked for by COMMAND_LONG (76), COMMAND_INT (75) or SET_MODE (11), answered by
+/// [`Downlink::Answer`](crate::Downlink::Answer).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Command {
+    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 1. Forcing it (param2 = 21196) has no effect.
+    Arm,
+    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 0.
+    Disarm,
+    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 0, forced (param2 = 21196): also in flight.
+    Kill,
+    /// MAV_CMD_USER_1 (31010): engage AFBC again after its monitor has tripped.
+    Engage,
+    /// MAV_CMD_NAV_TAKEOFF (22). The height is above where the vehicle stands in COMMAND_LONG, which has no frame, and
+    /// NaN or 0 stand for that of the parameters; heading and place are ignored.
+    TakeOff(Height),
+    /// MAV_CMD_NAV_LAND (21), where the vehicle is; a place is ignored.
+    Land,
+    /// MAV_CMD_NAV_RETURN_TO_LAUNCH (20).
+    Return,
+    /// MAV_CMD_DO_SET_MODE (176) or SET_MODE, with a custom mode as in HEARTBEAT; the command's param2 and param3 are
+    /// its main and sub mode.
+    SelectMode(u32),
+    /// MAV_CMD_DO_SET_STANDARD_MODE (262).
+    SelectStandardMode(u8),
+    /// MAV_CMD_DO_REPOSITION (192).
+    Reposition {
+        /// Where to.
+        place: Place,
+        /// Heading; NaN keeps it \[rad\].
+        yaw_rad: f32,
+        /// Horizontal speed; none for the usual \[m/s\].
+        speed_m_s: Option<f32>,
+    },
+    /// MAV_CMD_DO_CHANGE_SPEED (178) of the horizontal speed \[m/s\].
+    Speed(f32),
+    /// MAV_CMD_DO_SET_HOME (179): here, or at a place.
+    Home(Option<Place>),
+    /// MAV_CMD_MISSION_START (300) with this item.
+    StartMission(u16),
+    /// MAV_CMD_DO_SET_MISSION_CURRENT (224).
+    SetCurrent(u16),
+    /// MAV_CMD_SET_MESSAGE_INTERVAL (511).
+    SetInterval {
+        /// Number of the message.
+        message: u32,
+        /// Time between two; 0: the default, -1: never \[us\].
+        interval_us: i32,
+    },
+    /// MAV_CMD_GET_MESSAGE_INTERVAL (510).
+    GetInterval(u32),
+    /// MAV_CMD_REQUEST_MESSAGE (512).
+    RequestMessage {
+        /// Number of the message.
+        message: u32,
+        /// Its second parameter, which some messages use.
+        index: u32,
+    },
+    /// MAV_CMD_REQUEST_PROTOCOL_VERSION (519).
+    RequestProtocol,
+    /// MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES (520).
+    RequestCapabilities,
+    /// MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN (246) with 1, or 3, which stays in the boot loader where there is one.
+    Reboot,
+    /// MAV_CMD_PREFLIGHT_STORAGE (245) of the parameters.
+    Storage(Storage),
+    /// MAV_CMD_RUN_PREARM_CHECKS (401).
+    CheckArming,
+    /// One of these commands, by number, with an invalid parameter: answered with "denied".
+    Denied(u16),
+    /// Any other command, by number, of any dialect: answered with "unsupported".
+    Other(u16),
+}
+
+/// What is done with the stored parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Storage {
+    /// Read them.
+    Load,
+    /// Write them.
+    Save,
+    /// Restore the defaults.
+    Reset,
+}
+
+pub(crate) const RETURN: u16 = 20;
+pub(crate) const LAND: u16 = 21;
+pub(crate) const TAKE_OFF: u16 = 22;
+pub(crate) const SELECT_MODE: u16 = 176;
+pub(crate) const SPEED: u16 = 178;
+pub(crate) const HOME: u16 = 179;
+pub(crate) const REPOSITION: u16 = 192;
+pub(crate) const SET_CURRENT: u16 = 224;
+pub(crate) const STORAGE: u16 = 245;
+pub(crate) const REBOOT: u16 = 246;
+pub(crate) const SELECT_STANDARD_MODE: u16 = 262;
+pub(crate) const START_MISSION: u16 = 300;
+pub(crate) const ARM_DISARM: u16 = 400;
+pub(crate) const CHECK_ARMING: u16 = 401;
+pub(crate) const GET_INTERVAL: u16 = 510;
+pub(crate) const SET_INTERVAL: u16 = 511;
+pub(crate) const REQUEST_MESSAGE: u16 = 512;
+pub(crate) const REQUEST_PROTOCOL: u16 = 519;
+pub(crate) const REQUEST_CAPABILITIES: u16 = 520;
+pub(crate) const ENGAGE: u16 = 31_010;
+
+/// Value of param2 of MAV_CMD_COMPONENT_ARM_DISARM that forces it.
+pub(crate) const FORCED: f32 = 21196.0;
+/// Bit of `base_mode` that makes the custom mode count.
+pub(crate) const CUSTOM_MODE: u32 = 1;
+/// MAV_DO_REPOSITION's and MAV_CMD_DO_CHANGE_SPEED's "as usual".
+pub(crate) const USUAL: f32 = -1.0;
+
+impl Command {
+    /// Numbers of the commands that are understood.
+    pub const KNOWN: [u16; 20] = [
+        RETURN,
+        LAND,
+        TAKE_OFF,
+        SELECT_MODE,
+        SPEED,
+        HOME,
+        REPOSITION,
+        SET_CURRENT,
+        STORAGE,
+        REBOOT,
+        SELECT_STANDARD_MODE,
+        START_MISSION,
+        ARM_DISARM,
+        CHECK_ARMING,
+        GET_INTERVAL,
+        SET_INTERVAL,
+        REQUEST_MESSAGE,
+        REQUEST_PROTOCOL,
+        REQUEST_CAPABILITIES,
+        ENGAGE,
+    ];
+
+    /// Returns the MAVLink command's number, for its answer.
+    pub fn id(self) -> u16 {
+        match self {
+            Command::Arm | Command::Disarm | Command::Kill => ARM_DISARM,
+            Command::Engage => ENGAGE,
+            Command::TakeOff(_) => TAKE_OFF,
+            Command::Land => LAND,
+            Command::Return => RETURN,
+            Command::SelectMode(_) => SELECT_MODE,
+            Command::SelectStandardMode(_) => SELECT_STANDARD_MODE,
+            Command::Reposition { .. } => REPOSITION,
+            Command::Speed(_) => SPEED,
+            Command::Home(_) => HOME,
+            Command::StartMission(_) => START_MISSION,
+            Command::SetCurrent(_) => SET_CURRENT,
+            Command::SetInterval { .. } => SET_INTERVAL,
+            Command::GetInterval(_) => GET_INTERVAL,
+            Command::RequestMessage { .. } => REQUEST_MESSAGE,
+            Command::RequestProtocol => REQUEST_PROTOCOL,
+            Command::RequestCapabilities => REQUEST_CAPABILITIES,
+            Command::Reboot => REBOOT,
+            Command::Storage(_) => STORAGE,
+            Command::CheckArming => CHECK_ARMING,
+            Command::Denied(id) | Command::Other(id) => id,
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Reading of commands.
+
+use super::{
+    ARM_DISARM, CHECK_ARMING, CUSTOM_MODE, Command, ENGAGE, FORCED, GET_INTERVAL, HOME, LAND, REBOOT, REPOSITION,
+    REQUEST_CAPABILITIES, REQUEST_MESSAGE, REQUEST_PROTOCOL, RETURN, SELECT_MODE, SELECT_STANDARD_MODE, SET_CURRENT,
+    SET_INTERVAL, SPEED, START_MISSION, STORAGE, Storage, TAKE_OFF, USUAL,
+};
+use crate::address::Address;
+use crate::message::{Fault, Format};
+use crate::place::{Datum, Height, Place, datum, e7};
+use crate::wire::Layout;
+use mavlink::MessageData;
+use mavlink::dialects::common::{COMMAND_INT_DATA, COMMAND_LONG_DATA, SET_MODE_DATA};
+
+/// Seven parameters, number, receiver, confirmation.
+pub(super) const LONG: Layout<COMMAND_LONG_DATA, ([f32; 7], u16, Address, u8)> = Layout::NEW;
+/// Four parameters, x, y, z, number, receiver, frame, current, autocontinue.
+pub(super) const INT: Layout<COMMAND_INT_DATA, ([f32; 4], [i32; 2], f32, u16, Address, u8, [u8; 2])> = Layout::NEW;
+/// Custom mode, system, base mode.
+const MODE: Layout<SET_MODE_DATA, (u32, u8, u8)> = Layout::NEW;
+
+pub(crate) fn format(id: u32) -> Option<Format> {
+    Some(match id {
+        COMMAND_LONG_DATA::ID => LONG.format(),
+        COMMAND_INT_DATA::ID => INT.format(),
+        SET_MODE_DATA::ID => MODE.format(),
+        _ => return None,
+    })
+}
+
+/// Returns the command and its receiver. None is dropped: all are answered.
+pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Command, Address), Fault> {
+    match id {
+        COMMAND_LONG_DATA::ID => {
+            let ([p1, p2, p3, p4, latitude, longitude, metres], id, to, _) = LONG.read(payload);
+            // It has no frame: stations send heights of places above the sea, and of a take-off above the ground.
+            let above = if id == TAKE_OFF { Datum::Here } else { Datum::Sea };
+            let place =
+                Place { latitude_e7: e7(latitude), longitude_e7: e7(longitude), height: Height { metres, above } };
+            Ok((command(id, [p1, p2, p3, p4], Some(place)), to))
+        }
+        COMMAND_INT_DATA::ID => {
+            let (parameters, [latitude_e7, longitude_e7], metres, id, to, frame, _) = INT.read(payload);
+            let place = datum(frame).map(|above| Place { latitude_e7, longitude_e7, height: Height { metres, above } });
+            Ok((command(id, parameters, place), to))
+        }
+        SET_MODE_DATA::ID => {
+            let (mode, system, base) = MODE.read(payload);
+            let is_custom = u32::from(base) & CUSTOM_MODE != 0 && mode & 0xFFFF == 0;
+            let command = if is_custom { Command::SelectMode(mode) } else { Command::Denied(SELECT_MODE) };
+            Ok((command, Address { system, component: 0 }))
+        }
+        _ => Err(Fault::Unknown),
+    }
+}
+
+fn command(id: u16, parameters: [f32; 4], place: Option<Place>) -> Command {
+    if Command::KNOWN.contains(&id) {
+        known(id, parameters, place).unwrap_or(Command::Denied(id))
+    } else {
+        Command::Other(id)
+    }
+}
+
+/// Returns the known command with these parameters, the last three of which are a place; none if one is invalid.
+fn known(id: u16, [p1, p2, p3, p4]: [f32; 4], place: Option<Place>) -> Option<Command> {
+    let forced = p2 == FORCED;
+    let plausible = place.filter(Place::is_plausible);
+    Some(match id {
+        ARM_DISARM if p1 == 1.0 => Command::Arm,
+        ARM_DISARM if p1 == 0.0 && forced => Command::Kill,
+        ARM_DISARM if p1 == 0.0 => Command::Disarm,
+        ENGAGE => Command::Engage,
+        TAKE_OFF => Command::TakeOff(take_off(place?.height)?),
+        LAND => Command::Land,
+        RETURN => Command::Return,
+        SELECT_MODE => {
+            let (base, sub) = (whole(p1)?, whole(or_zero(p3))?);
+            let mode = entire_mode(p2).filter(|_| sub == 0);
+            let in_parts = || Some(whole(p2).filter(|main| *main <= 0xFF && sub <= 0xFF)? << 16 | sub << 24);
+            Command::SelectMode(mode.or_else(in_parts).filter(|_| base & CUSTOM_MODE != 0)?)
+        }
+        SELECT_STANDARD_MODE => Command::SelectStandardMode(u8::try_from(whole(p1)?).ok()?),
+        REPOSITION => {
+            let is_usual = p1 == USUAL || p1 == 0.0 || p1.is_nan();
+            let speed_m_s = if is_usual { None } else { Some(speed(p1)?) };
+            let yaw_rad = if p4.is_nan() { p4 } else { Some(-p4).filter(|yaw| yaw.abs() <= 1e3)? };
+            Command::Reposition { place: plausible?, yaw_rad, speed_m_s }
+        }
+        // 0 and 1: through the air and above the ground; climb and descent have limits of their own.
+        SPEED if p1 == 0.0 || p1 == 1.0 => Command::Speed(speed(p2)?),
+        HOME if p1 == 1.0 => Command::Home(None),
+        HOME if p1 == 0.0 => Command::Home(Some(plausible.filter(is_whole)?)),
+        START_MISSION => Command::StartMission(u16::try_from(whole(or_zero(p1))?).ok()?),
+        SET_CURRENT => Command::SetCurrent(u16::try_from(whole(p1)?).ok()?),
+        SET_INTERVAL => Command::SetInterval { message: whole(p1)?, interval_us: interval(or_zero(p2))? },
+        GET_INTERVAL => Command::GetInterval(whole(p1)?),
+        REQUEST_MESSAGE => Command::RequestMessage { message: whole(p1)?, index: whole(p2).unwrap_or(0) },
+        REQUEST_PROTOCOL if p1 == 1.0 => Command::RequestProtocol,
+        REQUEST_CAPABILITIES if p1 == 1.0 => Command::RequestCapabilities,
+        REBOOT if p1 == 1.0 || p1 == 3.0 => Command::Reboot,
+        STORAGE if p1 == 0.0 => Command::Storage(Storage::Load),
+        STORAGE if p1 == 1.0 => Command::Storage(Storage::Save),
+        STORAGE if p1 == 2.0 => Command::Storage(Storage::Reset),
+        CHECK_ARMING => Command::CheckArming,
+        _ => return None,
+    })
+}
+
+fn or_zero(number: f32) -> f32 {
+    if number.is_nan() { 0.0 } else { number }
+}
+
+/// Returns a whole number up to 2^24.
+fn whole(number: f32) -> Option<u32> {
+    let whole = number as u32;
+    ((0.0..=16_777_216.0).contains(&number) && whole as f32 == number).then_some(whole)
+}
+
+/// Returns a whole `custom_mode`, as MAVProxy's and pymavlink's `mode NUMBER` send it: larger than any main mode, since
+/// its lower half is 0.
+fn entire_mode(number: f32) -> Option<u32> {
+    let mode = number as u32;
+    (mode as f32 == number && mode != 0 && mode & 0xFFFF == 0).then_some(mode)
+}
+
+/// Returns an interval \[us\]; all negative ones are "never".
+fn interval(number: f32) -> Option<i32> {
+    (number.abs() <= 2e9).then_some(if number < 0.0 { -1 } else { number as i32 })
+}
+
+fn speed(number: f32) -> Option<f32> {
+    (0.0..=1e3).contains(&number).then_some(number)
+}
+
+fn is_whole(place: &Place) -> bool {
+    let Place { latitude_e7, longitude_e7, height } = *place;
+    ![latitude_e7, longitude_e7].contains(&Place::AS_IT_IS) && height.metres.is_finite()
+}
+
+/// Returns the height of a take-off: NaN for that of the parameters.
+fn take_off(height: Height) -> Option<Height> {
+    let usual = height.metres.is_nan() || (height.metres == 0.0 && height.above == Datum::Here);
+    let metres = if usual { f32::NAN } else { height.metres };
+    (usual || metres.abs() <= 1e5).then_some(Height { metres, ..height })
+}

@@ -1,0 +1,53 @@
+//! Writing of commands, to everyone.
+
+use super::read::{INT, LONG};
+use super::{Command, FORCED, Storage, USUAL};
+use crate::address::Address;
+use crate::message::PAYLOAD_MAX;
+use crate::place::{Datum, Height, Place, frame};
+
+/// Writes COMMAND_LONG, or COMMAND_INT where there is a place or a height above the sea or home.
+pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+    let nowhere = |height| Place { latitude_e7: 0, longitude_e7: 0, height };
+    let (first, place) = match command {
+        Command::Arm | Command::CheckArming => ([1.0, 0.0, 0.0, 0.0], None),
+        Command::Kill => ([0.0, FORCED, 0.0, 0.0], None),
+        // No parameter of any command may be infinite.
+        Command::Denied(id) => return LONG.write(&([f32::INFINITY; 7], id, Address::default(), 0), payload),
+        Command::Disarm | Command::Engage | Command::Land | Command::Return | Command::Other(_) => ([0.0; 4], None),
+        Command::TakeOff(height) => ([0.0; 4], Some(nowhere(height))),
+        Command::SelectMode(mode) => {
+            let [_, _, main, sub] = mode.to_le_bytes();
+            ([1.0, f32::from(main), f32::from(sub), 0.0], None)
+        }
+        Command::SelectStandardMode(mode) => ([f32::from(mode), 0.0, 0.0, 0.0], None),
+        Command::Reposition { place, yaw_rad, speed_m_s } => {
+            ([speed_m_s.unwrap_or(USUAL), 1.0, 0.0, -yaw_rad], Some(place))
+        }
+        Command::Speed(speed_m_s) => ([1.0, speed_m_s, USUAL, 0.0], None),
+        Command::Home(place) => ([f32::from(u8::from(place.is_none())), 0.0, 0.0, 0.0], place),
+        Command::StartMission(number) | Command::SetCurrent(number) => ([f32::from(number), 0.0, 0.0, 0.0], None),
+        Command::SetInterval { message, interval_us } => ([message as f32, interval_us as f32, 0.0, 0.0], None),
+        Command::GetInterval(message) => ([message as f32, 0.0, 0.0, 0.0], None),
+        Command::RequestMessage { message, index } => ([message as f32, index as f32, 0.0, 0.0], None),
+        Command::RequestProtocol | Command::RequestCapabilities | Command::Reboot => ([1.0, 0.0, 0.0, 0.0], None),
+        Command::Storage(storage) => {
+            let action = match storage {
+                Storage::Load => 0.0,
+                Storage::Save => 1.0,
+                Storage::Reset => 2.0,
+            };
+            ([action, 0.0, 0.0, 0.0], None)
+        }
+    };
+    let to = Address::default();
+    match place {
+        Some(Place { latitude_e7, longitude_e7, height: Height { metres, above } }) if above != Datum::Here => {
+            INT.write(&(first, [latitude_e7, longitude_e7], metres, command.id(), to, frame(above), [0; 2]), payload)
+        }
+        _ => {
+            let ([p1, p2, p3, p4], metres) = (first, place.map_or(0.0, |place| place.height.metres));
+            LONG.write(&([p1, p2, p3, p4, 0.0, 0.0, metres], command.id(), to, 0), payload)
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! Rates of messages: MESSAGE_INTERVAL, and REQUEST_DATA_STREAM of older stations.
+
+use crate::address::Address;
+use crate::message::{Format, PAYLOAD_MAX};
+use crate::wire::Layout;
+use mavlink::dialects::common::{MESSAGE_INTERVAL_DATA, REQUEST_DATA_STREAM_DATA};
+
+/// MESSAGE_INTERVAL (244).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Interval {
+    /// Number of the message.
+    pub message: u32,
+    /// Time between two; -1: never, 0: not available \[us\].
+    pub interval_us: i32,
+}
+
+/// REQUEST_DATA_STREAM (66): all messages of a group.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DataStream {
+    /// `MAV_DATA_STREAM`.
+    pub group: u8,
+    /// Rate; 0 for none \[Hz\].
+    pub rate_hz: u16,
+}
+
+const INTERVAL: Layout<MESSAGE_INTERVAL_DATA, (i32, u16)> = Layout::NEW;
+/// Rate, receiver, group, start.
+const STREAM: Layout<REQUEST_DATA_STREAM_DATA, (u16, Address, u8, u8)> = Layout::NEW;
+
+impl Interval {
+    pub(crate) fn format() -> Format {
+        INTERVAL.format()
+    }
+
+    pub(crate) fn read(payload: &[u8]) -> Self {
+        let (interval_us, message) = INTERVAL.read(payload);
+        Interval { message: message.into(), interval_us }
+    }
+
+    pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        INTERVAL.write(&(self.interval_us, self.message as u16), payload)
+    }
+}
+
+impl DataStream {
+    pub(crate) fn format() -> Format {
+        STREAM.format()
+    }
+
+    /// Returns the message and its receiver.
+    pub(crate) fn read(payload: &[u8]) -> (Self, Address) {
+        let (rate_hz, to, group, start) = STREAM.read(payload);
+        (DataStream { group, rate_hz: if start == 0 { 0 } else { rate_hz } }, to)
+    }
+
+    pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        STREAM.write(&(self.rate_hz, Address::default(), self.group, u8::from(self.rate_hz > 0)), payload)
+    }
+}

@@ -1,0 +1,212 @@
+//! Missions, fences and rally points: the messages of MAVLink's mission protocol, in both directions.
+
+use crate::address::Address;
+use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::wire::Layout;
+use mavlink::MessageData;
+use mavlink::dialects::common::{
+    MISSION_ACK_DATA, MISSION_CLEAR_ALL_DATA, MISSION_COUNT_DATA, MISSION_CURRENT_DATA, MISSION_ITEM_INT_DATA,
+    MISSION_ITEM_REACHED_DATA, MISSION_REQUEST_DATA, MISSION_REQUEST_INT_DATA, MISSION_REQUEST_LIST_DATA,
+    MISSION_SET_CURRENT_DATA,
+};
+
+/// What a list of items is, `MAV_MISSION_TYPE`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Plan(pub u8);
+
+impl Plan {
+    /// A mission.
+    pub const MISSION: Plan = Plan(0);
+    /// A geofence.
+    pub const FENCE: Plan = Plan(1);
+    /// Rally points.
+    pub const RALLY: Plan = Plan(2);
+    /// All of these, to be cleared.
+    pub const ALL: Plan = Plan(255);
+}
+
+/// An item as it crosses the wire: MISSION_ITEM_INT (73) without its receiver.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MissionItem {
+    /// Its number, from 0 on.
+    pub number: u16,
+    /// `MAV_CMD`.
+    pub command: u16,
+    /// `MAV_FRAME` of the place.
+    pub frame: u8,
+    /// True if it is the one flown, or to be flown.
+    pub is_current: bool,
+    /// True if the next item follows by itself.
+    pub goes_on: bool,
+    /// The command's first four parameters; NaN: not given.
+    pub parameters: [f32; 4],
+    /// Latitude \[1e-7 deg\], or x \[1e-4 m\] in a local frame.
+    pub x: i32,
+    /// Longitude \[1e-7 deg\], or y \[1e-4 m\] in a local frame.
+    pub y: i32,
+    /// Altitude, or z in a local frame \[m\].
+    pub z: f32,
+}
+
+/// A message of the mission protocol.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mission {
+    /// MISSION_COUNT (44): so many items follow, or can be requested.
+    Count(u16, Plan),
+    /// MISSION_REQUEST_LIST (43): how many are there?
+    List(Plan),
+    /// MISSION_REQUEST_INT (51), or MISSION_REQUEST (40), which asks for the same: send this item.
+    Request(u16, Plan),
+    /// MISSION_ITEM_INT (73).
+    Item(MissionItem, Plan),
+    /// MISSION_ACK (47) with a `MAV_MISSION_RESULT`.
+    Ack(MissionResult, Plan),
+    /// MISSION_CLEAR_ALL (45).
+    Clear(Plan),
+    /// MISSION_SET_CURRENT (41).
+    SetCurrent(u16),
+    /// MISSION_CURRENT (42), for everyone.
+    Current(MissionCurrent),
+    /// MISSION_ITEM_REACHED (46), for everyone.
+    Reached(u16),
+}
+
+/// Content of MISSION_CURRENT.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MissionCurrent {
+    /// Number of the item flown, or to be flown.
+    pub number: u16,
+    /// Number of items.
+    pub total: u16,
+    /// `MISSION_STATE`: 1 no mission, 2 not started, 3 active, 4 paused, 5 complete.
+    pub state: u8,
+    /// `mission_mode`: 1 in mission mode, 2 suspended.
+    pub mode: u8,
+}
+
+/// Outcome of an upload, a download or a deletion: `MAV_MISSION_RESULT`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct MissionResult(pub u8);
+
+impl MissionResult {
+    /// Done.
+    pub const ACCEPTED: Self = MissionResult(0);
+    /// Generic error, not accepting mission commands at all right now.
+    pub const ERROR: Self = MissionResult(1);
+    /// The frame of an item is not supported.
+    pub const UNSUPPORTED_FRAME: Self = MissionResult(2);
+    /// The command of an item, or the kind of plan, is not supported.
+    pub const UNSUPPORTED: Self = MissionResult(3);
+    /// More items than there is room for.
+    pub const NO_SPACE: Self = MissionResult(4);
+    /// A number of an item is invalid: the first parameter; the following ones count on.
+    pub const INVALID_PARAM1: Self = MissionResult(6);
+    /// The latitude of an item is invalid.
+    pub const INVALID_X: Self = MissionResult(10);
+    /// The longitude of an item is invalid.
+    pub const INVALID_Y: Self = MissionResult(11);
+    /// The altitude of an item is invalid.
+    pub const INVALID_Z: Self = MissionResult(12);
+    /// An item that was not asked for.
+    pub const INVALID_SEQUENCE: Self = MissionResult(13);
+    /// Refused: another station is in control, or is uploading.
+    pub const DENIED: Self = MissionResult(14);
+    /// The transfer was given up.
+    pub const CANCELLED: Self = MissionResult(15);
+}
+
+type ToAddress<D, W> = Layout<D, (W, Address, u8)>;
+
+// Some messages end with identifiers of the plan, which are not used.
+const COUNT: Layout<MISSION_COUNT_DATA, (u16, Address, u8, u32)> = Layout::NEW;
+const LIST: Layout<MISSION_REQUEST_LIST_DATA, (Address, u8)> = Layout::NEW;
+const REQUEST_INT: ToAddress<MISSION_REQUEST_INT_DATA, u16> = Layout::NEW;
+const REQUEST: ToAddress<MISSION_REQUEST_DATA, u16> = Layout::NEW;
+const ACK: Layout<MISSION_ACK_DATA, (Address, u8, u8, u32)> = Layout::NEW;
+const CLEAR: Layout<MISSION_CLEAR_ALL_DATA, (Address, u8)> = Layout::NEW;
+const SET_CURRENT: Layout<MISSION_SET_CURRENT_DATA, (u16, Address)> = Layout::NEW;
+const CURRENT: Layout<MISSION_CURRENT_DATA, (u16, u16, u8, u8, [u32; 3])> = Layout::NEW;
+const REACHED: Layout<MISSION_ITEM_REACHED_DATA, (u16,)> = Layout::NEW;
+/// Parameters, x, y, z; number, command, receiver; frame, current, autocontinue, kind of plan.
+const ITEM: Layout<MISSION_ITEM_INT_DATA, ([f32; 4], [i32; 2], f32, u16, u16, Address, [u8; 3], u8)> = Layout::NEW;
+
+impl Mission {
+    pub(crate) fn format(id: u32) -> Option<Format> {
+        Some(match id {
+            MISSION_COUNT_DATA::ID => COUNT.format(),
+            MISSION_REQUEST_LIST_DATA::ID => LIST.format(),
+            MISSION_REQUEST_INT_DATA::ID => REQUEST_INT.format(),
+            MISSION_REQUEST_DATA::ID => REQUEST.format(),
+            MISSION_ITEM_INT_DATA::ID => ITEM.format(),
+            MISSION_ACK_DATA::ID => ACK.format(),
+            MISSION_CLEAR_ALL_DATA::ID => CLEAR.format(),
+            MISSION_SET_CURRENT_DATA::ID => SET_CURRENT.format(),
+            MISSION_CURRENT_DATA::ID => CURRENT.format(),
+            MISSION_ITEM_REACHED_DATA::ID => REACHED.format(),
+            _ => return None,
+        })
+    }
+
+    /// Returns the message and its receiver.
+    pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Self, Address), Fault> {
+        Ok(match id {
+            MISSION_COUNT_DATA::ID => {
+                let (count, to, plan, _) = COUNT.read(payload);
+                (Mission::Count(count, Plan(plan)), to)
+            }
+            MISSION_REQUEST_LIST_DATA::ID => {
+                let (to, plan) = LIST.read(payload);
+                (Mission::List(Plan(plan)), to)
+            }
+            MISSION_REQUEST_INT_DATA::ID | MISSION_REQUEST_DATA::ID => {
+                let (number, to, plan) = REQUEST_INT.read(payload);
+                (Mission::Request(number, Plan(plan)), to)
+            }
+            MISSION_ITEM_INT_DATA::ID => {
+                let (parameters, [x, y], z, number, command, to, [frame, current, goes_on], plan) = ITEM.read(payload);
+                let (is_current, goes_on) = (current != 0, goes_on != 0);
+                let item = MissionItem { number, command, frame, is_current, goes_on, parameters, x, y, z };
+                (Mission::Item(item, Plan(plan)), to)
+            }
+            MISSION_ACK_DATA::ID => {
+                let (to, result, plan, _) = ACK.read(payload);
+                (Mission::Ack(MissionResult(result), Plan(plan)), to)
+            }
+            MISSION_CLEAR_ALL_DATA::ID => {
+                let (to, plan) = CLEAR.read(payload);
+                (Mission::Clear(Plan(plan)), to)
+            }
+            MISSION_SET_CURRENT_DATA::ID => {
+                let (number, to) = SET_CURRENT.read(payload);
+                (Mission::SetCurrent(number), to)
+            }
+            MISSION_CURRENT_DATA::ID => {
+                let (number, total, state, mode, _) = CURRENT.read(payload);
+                (Mission::Current(MissionCurrent { number, total, state, mode }), Address::default())
+            }
+            MISSION_ITEM_REACHED_DATA::ID => (Mission::Reached(REACHED.read(payload).0), Address::default()),
+            _ => return Err(Fault::Unknown),
+        })
+    }
+
+    /// Writes the message for the receiver `to`, where it names one.
+    pub(crate) fn write(&self, to: Address, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        match *self {
+            Mission::Count(count, plan) => COUNT.write(&(count, to, plan.0, 0), payload),
+            Mission::List(plan) => LIST.write(&(to, plan.0), payload),
+            Mission::Request(number, plan) => REQUEST_INT.write(&(number, to, plan.0), payload),
+            Mission::Item(item, plan) => {
+                let MissionItem { number, command, frame, is_current, goes_on, parameters, x, y, z } = item;
+                let flags = [frame, u8::from(is_current), u8::from(goes_on)];
+                ITEM.write(&(parameters, [x, y], z, number, command, to, flags, plan.0), payload)
+            }
+            Mission::Ack(result, plan) => ACK.write(&(to, result.0, plan.0, 0), payload),
+            Mission::Clear(plan) => CLEAR.write(&(to, plan.0), payload),
+            Mission::SetCurrent(number) => SET_CURRENT.write(&(number, to), payload),
+            Mission::Current(MissionCurrent { number, total, state, mode }) => {
+                CURRENT.write(&(number, total, state, mode, [0; 3]), payload)
+            }
+            Mission::Reached(number) => REACHED.write(&(number,), payload),
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! Modes that the vehicle offers and has: AVAILABLE_MODES and CURRENT_MODE.
+
+use crate::message::{Format, PAYLOAD_MAX};
+use crate::wire::Layout;
+use mavlink::dialects::common::{AVAILABLE_MODES_DATA, CURRENT_MODE_DATA};
+
+/// AVAILABLE_MODES (435): one of the modes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AvailableMode {
+    /// Number of modes.
+    pub count: u8,
+    /// Its place among them, from 1 on.
+    pub place: u8,
+    /// `MAV_STANDARD_MODE`, 0 if it is none of these.
+    pub standard: u8,
+    /// Its `custom_mode` in HEARTBEAT.
+    pub custom: u32,
+    /// `MAV_MODE_PROPERTY`.
+    pub properties: u32,
+    /// Name, with zeros behind it.
+    pub name: [u8; 35],
+}
+
+/// CURRENT_MODE (436).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CurrentMode {
+    /// `MAV_STANDARD_MODE`, 0 if it is none of these.
+    pub standard: u8,
+    /// `custom_mode` in HEARTBEAT.
+    pub custom: u32,
+    /// The one that was asked for last.
+    pub intended: u32,
+}
+
+const AVAILABLE: Layout<AVAILABLE_MODES_DATA, ([u32; 2], [u8; 3], [u8; 35])> = Layout::NEW;
+const CURRENT: Layout<CURRENT_MODE_DATA, ([u32; 2], u8)> = Layout::NEW;
+
+impl AvailableMode {
+    pub(crate) fn format() -> Format {
+        AVAILABLE.format()
+    }
+
+    pub(crate) fn read(payload: &[u8]) -> Self {
+        let ([custom, properties], [count, place, standard], name) = AVAILABLE.read(payload);
+        AvailableMode { count, place, standard, custom, properties, name }
+    }
+
+    pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let AvailableMode { count, place, standard, custom, properties, name } = *self;
+        AVAILABLE.write(&([custom, properties], [count, place, standard], name), payload)
+    }
+}
+
+impl CurrentMode {
+    pub(crate) fn format() -> Format {
+        CURRENT.format()
+    }
+
+    pub(crate) fn read(payload: &[u8]) -> Self {
+        let ([custom, intended], standard) = CURRENT.read(payload);
+        CurrentMode { standard, custom, intended }
+    }
+
+    pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        CURRENT.write(&([self.custom, self.intended], self.standard), payload)
+    }
+}

@@ -1,0 +1,77 @@
+//! Who is in control: CHANGE_OPERATOR_CONTROL and its answer.
+
+use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::wire::Layout;
+use mavlink::MessageData;
+use mavlink::dialects::common::{CHANGE_OPERATOR_CONTROL_ACK_DATA, CHANGE_OPERATOR_CONTROL_DATA};
+
+/// What a station asks for by CHANGE_OPERATOR_CONTROL (5). Version and passkey are ignored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Control {
+    /// To be in control.
+    Take,
+    /// To be so no longer.
+    Release,
+}
+
+/// CHANGE_OPERATOR_CONTROL_ACK (6).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ControlAnswer {
+    /// System that asked.
+    pub station: u8,
+    /// What it asked for.
+    pub control: Control,
+    /// False if another station is in control.
+    pub granted: bool,
+}
+
+/// System, request, version, passkey.
+const CHANGE: Layout<CHANGE_OPERATOR_CONTROL_DATA, (u8, u8, u8, [u8; 25])> = Layout::NEW;
+const ANSWER: Layout<CHANGE_OPERATOR_CONTROL_ACK_DATA, (u8, u8, u8)> = Layout::NEW;
+/// "Already under control."
+const REFUSED: u8 = 3;
+
+impl Control {
+    pub(crate) fn format() -> Format {
+        CHANGE.format()
+    }
+
+    /// Returns the message and the system that it is for.
+    pub(crate) fn read(payload: &[u8]) -> Result<(Self, u8), Fault> {
+        let (system, control, ..) = CHANGE.read(payload);
+        Ok((Self::of(control)?, system))
+    }
+
+    pub(crate) fn write(self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        CHANGE.write(&(0, self as u8, 0, [0; 25]), payload)
+    }
+
+    fn of(control: u8) -> Result<Self, Fault> {
+        match control {
+            0 => Ok(Control::Take),
+            1 => Ok(Control::Release),
+            _ => Err(Fault::Malformed),
+        }
+    }
+}
+
+impl ControlAnswer {
+    pub(crate) fn format() -> Format {
+        ANSWER.format()
+    }
+
+    pub(crate) fn read(payload: &[u8]) -> Result<Self, Fault> {
+        let (station, control, answer) = ANSWER.read(payload);
+        Ok(ControlAnswer { station, control: Control::of(control)?, granted: answer == 0 })
+    }
+
+    pub(crate) fn write(self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let answer = if self.granted { 0 } else { REFUSED };
+        ANSWER.write(&(self.station, self.control as u8, answer), payload)
+    }
+}
+
+/// Number of CHANGE_OPERATOR_CONTROL.
+pub(crate) const CHANGE_ID: u32 = CHANGE_OPERATOR_CONTROL_DATA::ID;
+/// Number of CHANGE_OPERATOR_CONTROL_ACK.
+pub(crate) const ANSWER_ID: u32 = CHANGE_OPERATOR_CONTROL_ACK_DATA::ID;

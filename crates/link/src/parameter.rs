@@ -1,0 +1,107 @@
+//! Parameters, in both directions.
+
+use crate::address::Address;
+use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::wire::Layout;
+use mavlink::MessageData;
+use mavlink::dialects::common::{PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA};
+
+/// Name of a parameter, with zeros behind it; none at full length.
+pub type ParameterName = [u8; 16];
+
+/// A station's message about parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParameterRequest {
+    /// PARAM_REQUEST_LIST (21).
+    List,
+    /// PARAM_REQUEST_READ (20) by its place in the list.
+    ReadPlace(u16),
+    /// PARAM_REQUEST_READ (20) by name.
+    ReadName(ParameterName),
+    /// PARAM_SET (23).
+    Set {
+        /// Name.
+        name: ParameterName,
+        /// The four bytes of the value.
+        value: [u8; 4],
+        /// `MAV_PARAM_TYPE`.
+        kind: u8,
+    },
+}
+
+/// PARAM_VALUE (22).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ParameterValue {
+    /// Name.
+    pub name: ParameterName,
+    /// The four bytes of the value.
+    pub value: [u8; 4],
+    /// `MAV_PARAM_TYPE`.
+    pub kind: u8,
+    /// Number of parameters.
+    pub count: u16,
+    /// Place in the list; `u16::MAX` for none.
+    pub place: u16,
+}
+
+const LIST: Layout<PARAM_REQUEST_LIST_DATA, (Address,)> = Layout::NEW;
+const READ: Layout<PARAM_REQUEST_READ_DATA, (i16, Address, ParameterName)> = Layout::NEW;
+const SET: Layout<PARAM_SET_DATA, ([u8; 4], Address, ParameterName, u8)> = Layout::NEW;
+const VALUE: Layout<PARAM_VALUE_DATA, ([u8; 4], u16, u16, ParameterName, u8)> = Layout::NEW;
+
+impl ParameterRequest {
+    pub(crate) fn format(id: u32) -> Option<Format> {
+        Some(match id {
+            PARAM_REQUEST_LIST_DATA::ID => LIST.format(),
+            PARAM_REQUEST_READ_DATA::ID => READ.format(),
+            PARAM_SET_DATA::ID => SET.format(),
+            _ => return None,
+        })
+    }
+
+    /// Returns the message and its receiver.
+    pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Self, Address), Fault> {
+        Ok(match id {
+            PARAM_REQUEST_LIST_DATA::ID => (ParameterRequest::List, LIST.read(payload).0),
+            PARAM_REQUEST_READ_DATA::ID => {
+                let (place, to, name) = READ.read(payload);
+                // -1: by name.
+                let place = u16::try_from(place).map(ParameterRequest::ReadPlace);
+                (place.unwrap_or(ParameterRequest::ReadName(name)), to)
+            }
+            PARAM_SET_DATA::ID => {
+                let (value, to, name, kind) = SET.read(payload);
+                (ParameterRequest::Set { name, value, kind }, to)
+            }
+            _ => return Err(Fault::Unknown),
+        })
+    }
+
+    pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let to = Address::default();
+        match *self {
+            ParameterRequest::List => LIST.write(&(to,), payload),
+            ParameterRequest::ReadPlace(place) => {
+                READ.write(&(i16::try_from(place).unwrap_or(i16::MAX), to, [0; 16]), payload)
+            }
+            ParameterRequest::ReadName(name) => READ.write(&(-1, to, name), payload),
+            ParameterRequest::Set { name, value, kind } => SET.write(&(value, to, name, kind), payload),
+        }
+    }
+}
+
+impl ParameterValue {
+    pub(crate) fn format() -> Format {
+        VALUE.format()
+    }
+
+    pub(crate) fn read(payload: &[u8]) -> Self {
+        let (value, count, place, name, kind) = VALUE.read(payload);
+        ParameterValue { name, value, kind, count, place }
+    }
+
+    pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let ParameterValue { name, value, kind, count, place } = *self;
+        VALUE.write(&(value, count, place, name, kind), payload)
+    }
+}

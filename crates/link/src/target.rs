@@ -1,0 +1,342 @@
+//! Targets of a companion computer, and a pilot's sticks.
+
+use crate::address::Address;
+use crate::frames::{flip, flip_turn};
+use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::place::{Height, Place, datum, frame};
+use crate::wire::Layout;
+use afbc_types::Setpoint;
+use mavlink::MessageData;
+use mavlink::dialects::common::{
+    MANUAL_CONTROL_DATA, POSITION_TARGET_LOCAL_NED_DATA, SET_ATTITUDE_TARGET_DATA, SET_POSITION_TARGET_GLOBAL_INT_DATA,
+    SET_POSITION_TARGET_LOCAL_NED_DATA,
+};
+use nalgebra::Vector3;
+
+/// What a motion's coordinates refer to, by `MAV_FRAME`. Axes of the vehicle are level: forward, left, up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Axes {
+    /// MAV_FRAME_LOCAL_NED: place and axes of the local frame.
+    #[default]
+    Local,
+    /// MAV_FRAME_LOCAL_OFFSET_NED: places count from where the vehicle is, with the local frame's axes.
+    Offset,
+    /// MAV_FRAME_BODY_NED: places of the local frame; velocity and acceleration along the vehicle's axes.
+    Body,
+    /// MAV_FRAME_BODY_OFFSET_NED or MAV_FRAME_BODY_FRD: all along the vehicle's axes, places from where it is.
+    BodyOffset,
+}
+
+/// A target of motion; NaN where there is none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// What the coordinates refer to.
+    pub axes: Axes,
+    /// Position \[m\].
+    pub position_m: Vector3<f32>,
+    /// Velocity \[m/s\].
+    pub velocity_m_s: Vector3<f32>,
+    /// Acceleration \[m/s2\].
+    pub acceleration_m_s2: Vector3<f32>,
+    /// Heading, always that of the earth frame \[rad\].
+    pub yaw_rad: f32,
+    /// Rate of the heading \[rad/s\].
+    pub yaw_rate_rad_s: f32,
+}
+
+impl From<&Setpoint> for Motion {
+    fn from(setpoint: &Setpoint) -> Self {
+        Motion {
+            axes: Axes::Local,
+            position_m: setpoint.position_m,
+            velocity_m_s: setpoint.velocity_m_s,
+            acceleration_m_s2: setpoint.acceleration_m_s2,
+            yaw_rad: setpoint.yaw_rad,
+            yaw_rate_rad_s: setpoint.yaw_rate_rad_s,
+        }
+    }
+}
+
+impl Motion {
+    /// A target of nothing.
+    pub const NONE: Self = {
+        let none = Vector3::new(f32::NAN, f32::NAN, f32::NAN);
+        let (position_m, velocity_m_s, acceleration_m_s2) = (none, none, none);
+        let (yaw_rad, yaw_rate_rad_s) = (f32::NAN, f32::NAN);
+        Motion { axes: Axes::Local, position_m, velocity_m_s, acceleration_m_s2, yaw_rad, yaw_rate_rad_s }
+    };
+
+    /// Returns the setpoint of a target that names a position of the local frame and a heading: what else it does not
+    /// name is zero.
+    pub fn setpoint(&self) -> Option<Setpoint> {
+        let or_zero = |value: f32| if value.is_nan() { 0.0 } else { value };
+        let setpoint = Setpoint {
+            position_m: self.position_m,
+            velocity_m_s: self.velocity_m_s.map(or_zero),
+            acceleration_m_s2: self.acceleration_m_s2.map(or_zero),
+            yaw_rad: self.yaw_rad,
+            yaw_rate_rad_s: or_zero(self.yaw_rate_rad_s),
+            // The message has no jerk, snap or angular acceleration.
+            ..Setpoint::default()
+        };
+        // A velocity along the vehicle's axes is none of the local frame's.
+        let is_local = match self.axes {
+            Axes::Local => true,
+            Axes::Body => self.velocity_m_s.iter().chain(&self.acceleration_m_s2).all(|number| number.is_nan()),
+            Axes::Offset | Axes::BodyOffset => false,
+        };
+        (is_local && setpoint.is_plausible()).then_some(setpoint)
+    }
+
+    /// The setpoint of a target that names everything in the local frame.
+    pub(crate) fn complete(&self) -> Option<Setpoint> {
+        let numbers = [&self.position_m, &self.velocity_m_s, &self.acceleration_m_s2].into_iter().flatten();
+        let all = numbers.chain([&self.yaw_rad, &self.yaw_rate_rad_s]).all(|number| number.is_finite());
+        (all && self.axes == Axes::Local).then(|| self.setpoint()).flatten()
+    }
+
+    /// Returns the numbers of the message, and what is to be ignored.
+    fn fields(&self) -> ([Vector3<f32>; 3], [f32; 2], u16) {
+        let vectors = [self.position_m, self.velocity_m_s, self.acceleration_m_s2].map(flip);
+        let yaw = [-self.yaw_rad, -self.yaw_rate_rad_s];
+        let places = (0..9).zip(vectors.iter().flatten()).chain([(10, &yaw[0]), (11, &yaw[1])]);
+        let mask = places.fold(0, |mask, (bit, number)| mask | u16::from(number.is_nan()) << bit);
+        let or_zero = |number: f32| if number.is_nan() { 0.0 } else { number };
+        (vectors.map(|vector| vector.map(or_zero)), yaw.map(or_zero), mask)
+    }
+
+    /// Reads numbers of which `mask` ignores some. Neither forces nor a target of nothing are supported.
+    fn read(axes: Axes, vectors: [[f32; 3]; 3], yaw: [f32; 2], mask: u16) -> Result<Self, Fault> {
+        if mask & FORCE != 0 || mask & NOTHING == NOTHING {
+            return Err(Fault::Unsupported);
+        }
+        let bits = [[0, 1, 2], [3, 4, 5], [6, 7, 8]];
+        // Of what is not ignored, every number must be one; no NaN is taken for "none".
+        let unless = |bit: u16, value: f32| match mask & (1 << bit) {
+            0 if value.is_finite() => Ok(value),
+            0 => Err(Fault::Implausible),
+            _ => Ok(f32::NAN),
+        };
+        let mut read = Motion { axes, ..Motion::NONE };
+        let targets = [&mut read.position_m, &mut read.velocity_m_s, &mut read.acceleration_m_s2];
+        for ((target, bits), [x, y, z]) in targets.into_iter().zip(bits).zip(vectors) {
+            let [at_x, at_y, at_z] = bits;
+            *target = flip(Vector3::new(unless(at_x, x)?, unless(at_y, y)?, unless(at_z, z)?));
+        }
+        let [heading, rate] = yaw;
+        (read.yaw_rad, read.yaw_rate_rad_s) = (-unless(10, heading)?, -unless(11, rate)?);
+        let or_zero = |number: f32| if number.is_nan() { 0.0 } else { number };
+        let whole = Setpoint {
+            position_m: read.position_m.map(or_zero),
+            velocity_m_s: read.velocity_m_s.map(or_zero),
+            acceleration_m_s2: read.acceleration_m_s2.map(or_zero),
+            yaw_rad: or_zero(read.yaw_rad),
+            yaw_rate_rad_s: or_zero(read.yaw_rate_rad_s),
+            ..Setpoint::default()
+        };
+        if whole.is_plausible() { Ok(read) } else { Err(Fault::Implausible) }
+    }
+}
+
+/// Bit of the mask: forces instead of accelerations.
+const FORCE: u16 = 1 << 9;
+/// All bits of the mask that ignore something.
+const NOTHING: u16 = 0b1101_1111_1111;
+
+/// An attitude and a thrust.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AttitudeAndThrust {
+    /// Attitude: quaternion w, x, y, z from body to earth, a rotation of any norm but zero.
+    pub attitude: [f32; 4],
+    /// Rate of the heading; NaN where there is none \[rad/s\].
+    pub yaw_rate_rad_s: f32,
+    /// Thrust, 0 to 1.
+    pub thrust: f32,
+}
+
+/// MANUAL_CONTROL (69), -1 to 1. A throttle of 500 on the wire is 0, as stations send it; a positive yaw turns to the
+/// right, as they mean it, against the words of the specification.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sticks {
+    /// To the right.
+    pub roll: f32,
+    /// Forward.
+    pub pitch: f32,
+    /// Up.
+    pub throttle: f32,
+    /// Clockwise, seen from above.
+    pub yaw: f32,
+}
+
+/// A target or a pilot's sticks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// SET_POSITION_TARGET_LOCAL_NED (84) of which something is ignored, or in another frame than
+    /// MAV_FRAME_LOCAL_NED: else it is [`Uplink::Setpoint`](crate::Uplink::Setpoint).
+    Motion(Motion),
+    /// SET_POSITION_TARGET_GLOBAL_INT (86): a place instead of the position, each coordinate of which may be ignored.
+    Place(Place, Motion),
+    /// SET_ATTITUDE_TARGET (82) with attitude and thrust. Body rates without an attitude are unsupported.
+    Attitude(AttitudeAndThrust),
+    /// MANUAL_CONTROL (69).
+    Sticks(Sticks),
+}
+
+/// Time, nine numbers, heading and its rate, mask, receiver, frame.
+type MotionFields = (u32, [[f32; 3]; 3], [f32; 2], u16, Address, u8);
+const MOTION: Layout<SET_POSITION_TARGET_LOCAL_NED_DATA, MotionFields> = Layout::NEW;
+type PlaceFields = (u32, [i32; 2], f32, [[f32; 3]; 2], [f32; 2], u16, Address, u8);
+const PLACE: Layout<SET_POSITION_TARGET_GLOBAL_INT_DATA, PlaceFields> = Layout::NEW;
+/// Time, quaternion, rates, thrust, receiver, mask, thrust in three dimensions.
+type AttitudeFields = (u32, [f32; 4], [f32; 3], f32, Address, u8, [f32; 3]);
+const ATTITUDE: Layout<SET_ATTITUDE_TARGET_DATA, AttitudeFields> = Layout::NEW;
+/// x, y, z, r; buttons, receiver; further buttons and axes.
+const STICKS: Layout<MANUAL_CONTROL_DATA, ([i16; 4], u16, u8, u16, u8, [i16; 8])> = Layout::NEW;
+const TARGET: Layout<POSITION_TARGET_LOCAL_NED_DATA, (u32, [[f32; 3]; 3], [f32; 2], u16, u8)> = Layout::NEW;
+
+/// An axis of MANUAL_CONTROL that the sender does not have.
+const NO_AXIS: i16 = i16::MAX;
+/// MAV_FRAME_LOCAL_NED.
+const LOCAL_NED: u8 = 1;
+
+impl Target {
+    pub(crate) fn format(id: u32) -> Option<Format> {
+        Some(match id {
+            SET_POSITION_TARGET_LOCAL_NED_DATA::ID => MOTION.format(),
+            SET_POSITION_TARGET_GLOBAL_INT_DATA::ID => PLACE.format(),
+            SET_ATTITUDE_TARGET_DATA::ID => ATTITUDE.format(),
+            MANUAL_CONTROL_DATA::ID => STICKS.format(),
+            _ => return None,
+        })
+    }
+
+    /// Returns the message for a vehicle that `is_meant`.
+    pub(crate) fn read(id: u32, payload: &[u8], is_meant: impl Fn(Address) -> bool) -> Result<Self, Fault> {
+        let mine = |to| if is_meant(to) { Ok(()) } else { Err(Fault::Elsewhere) };
+        match id {
+            SET_POSITION_TARGET_LOCAL_NED_DATA::ID => {
+                let (_, vectors, yaw, mask, to, frame) = MOTION.read(payload);
+                mine(to)?;
+                let axes = match frame {
+                    LOCAL_NED => Axes::Local,
+                    7 => Axes::Offset,
+                    8 => Axes::Body,
+                    9 | 12 => Axes::BodyOffset,
+                    _ => return Err(Fault::Unsupported),
+                };
+                let motion = Motion::read(axes, vectors, yaw, mask)?;
+                // Not both in one: the place would be the earth's, the velocity the vehicle's.
+                let moves = motion.velocity_m_s.iter().chain(&motion.acceleration_m_s2).any(|it| it.is_finite());
+                if axes == Axes::Body && moves && motion.position_m.iter().any(|it| it.is_finite()) {
+                    return Err(Fault::Unsupported);
+                }
+                Ok(Target::Motion(motion))
+            }
+            SET_POSITION_TARGET_GLOBAL_INT_DATA::ID => {
+                let (_, [latitude, longitude], altitude_m, [velocity, acceleration], yaw, mask, to, frame) =
+                    PLACE.read(payload);
+                mine(to)?;
+                let above = datum(frame).ok_or(Fault::Unsupported)?;
+                // Finite, to be checked below.
+                let motion = Motion::read(Axes::Local, [[0.0; 3], velocity, acceleration], yaw, mask)?;
+                let unless = |bit: u16, value: i32| if mask & (1 << bit) == 0 { value } else { Place::AS_IT_IS };
+                let metres = if mask & 4 == 0 { altitude_m } else { f32::NAN };
+                let height = Height { metres, above };
+                let place = Place { latitude_e7: unless(0, latitude), longitude_e7: unless(1, longitude), height };
+                let is_whole = mask & 4 != 0 || altitude_m.is_finite();
+                let motion = Motion { position_m: Motion::NONE.position_m, ..motion };
+                if is_whole && place.is_plausible() {
+                    Ok(Target::Place(place, motion))
+                } else {
+                    Err(Fault::Implausible)
+                }
+            }
+            SET_ATTITUDE_TARGET_DATA::ID => {
+                let (_, attitude, [_, _, yaw_rate], thrust, to, mask, _) = ATTITUDE.read(payload);
+                mine(to)?;
+                // Throttle or attitude ignored, or thrust in three dimensions.
+                if mask & 0b1110_0000 != 0 {
+                    return Err(Fault::Unsupported);
+                }
+                let yaw_rate_rad_s = if mask & 4 == 0 { -yaw_rate } else { f32::NAN };
+                let norm = attitude.iter().map(|number| number * number).sum::<f32>();
+                let is_rate = mask & 4 != 0 || yaw_rate.abs() <= 1e3;
+                if !(is_rate && (0.25..=4.0).contains(&norm) && (0.0..=1.0).contains(&thrust)) {
+                    return Err(Fault::Implausible);
+                }
+                let attitude = flip_turn(attitude);
+                Ok(Target::Attitude(AttitudeAndThrust { attitude, yaw_rate_rad_s, thrust }))
+            }
+            MANUAL_CONTROL_DATA::ID => {
+                let (axes, _, system, ..) = STICKS.read(payload);
+                mine(Address { system, component: 0 })?;
+                if axes.contains(&NO_AXIS) {
+                    return Err(Fault::Unsupported);
+                }
+                let [pitch, roll, up, yaw] = axes.map(|axis| (f32::from(axis) / 1000.0).clamp(-1.0, 1.0));
+                Ok(Target::Sticks(Sticks { roll, pitch, throttle: 2.0 * up.max(0.0) - 1.0, yaw }))
+            }
+            _ => Err(Fault::Unknown),
+        }
+    }
+
+    pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let to = Address::default();
+        match self {
+            Target::Motion(motion) => write_motion(motion, payload),
+            Target::Place(place, motion) => {
+                let ([_, velocity, acceleration], yaw, mask) = motion.fields();
+                let given = |value: i32| if value == Place::AS_IT_IS { 0 } else { value };
+                let height_m = place.height.metres;
+                let ignored = u16::from(place.latitude_e7 == Place::AS_IT_IS)
+                    | u16::from(place.longitude_e7 == Place::AS_IT_IS) << 1
+                    | u16::from(height_m.is_nan()) << 2;
+                let vectors = [velocity.into(), acceleration.into()];
+                let xy = [given(place.latitude_e7), given(place.longitude_e7)];
+                let z = if height_m.is_nan() { 0.0 } else { height_m };
+                PLACE.write(&(0, xy, z, vectors, yaw, mask & !7 | ignored, to, frame(place.height.above)), payload)
+            }
+            Target::Attitude(AttitudeAndThrust { attitude, yaw_rate_rad_s, thrust }) => {
+                let (rate, mask) = if yaw_rate_rad_s.is_nan() { (0.0, 7) } else { (-yaw_rate_rad_s, 3) };
+                let rates = [0.0, 0.0, rate];
+                ATTITUDE.write(&(0, flip_turn(*attitude), rates, *thrust, to, mask, [0.0; 3]), payload)
+            }
+            Target::Sticks(Sticks { roll, pitch, throttle, yaw }) => {
+                let up = (throttle + 1.0) / 2.0;
+                // To the nearest, without the platform's rounding.
+                let axis = |value: f32| (value * 1000.0 + if value < 0.0 { -0.5 } else { 0.5 }) as i16;
+                STICKS.write(&([*pitch, *roll, up, *yaw].map(axis), 0, 0, 0, 0, [0; 8]), payload)
+            }
+        }
+    }
+}
+
+/// Writes SET_POSITION_TARGET_LOCAL_NED.
+pub(crate) fn write_motion(motion: &Motion, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+    let (vectors, yaw, mask) = motion.fields();
+    let frame = match motion.axes {
+        Axes::Local => LOCAL_NED,
+        Axes::Offset => 7,
+        Axes::Body => 8,
+        Axes::BodyOffset => 9,
+    };
+    MOTION.write(&(0, vectors.map(Into::into), yaw, mask, Address::default(), frame), payload)
+}
+
+/// Format of POSITION_TARGET_LOCAL_NED (85), which tells what the vehicle follows.
+pub(crate) fn followed_format() -> Format {
+    TARGET.format()
+}
+
+pub(crate) fn read_followed(payload: &[u8]) -> Result<(u32, Motion), Fault> {
+    let (time_ms, vectors, yaw, mask, frame) = TARGET.read(payload);
+    if frame != LOCAL_NED {
+        return Err(Fault::Unsupported);
+    }
+    Ok((time_ms, Motion::read(Axes::Local, vectors, yaw, mask)?))
+}
+
+pub(crate) fn write_followed(time_ms: u32, motion: &Motion, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+    let (vectors, yaw, mask) = motion.fields();
+    TARGET.write(&(time_ms, vectors.map(Into::into), yaw, mask, LOCAL_NED), payload)
+}

@@ -1,0 +1,71 @@
+//! What a station shows of the vehicle, in the frames of [`afbc_types`] unless a field says otherwise.
+
+mod motion;
+mod place;
+mod system;
+
+use crate::message::{Fault, Format, PAYLOAD_MAX};
+pub use motion::{AttitudeQuaternion, Summary};
+pub use place::{Fix, GlobalPosition, Home, Origin};
+pub use system::{ActuatorOutputs, Battery, EstimatorStatus, SystemStatus, Version};
+
+/// A message of telemetry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Telemetry {
+    /// ATTITUDE_QUATERNION (31).
+    Attitude(AttitudeQuaternion),
+    /// VFR_HUD (74).
+    Summary(Summary),
+    /// GLOBAL_POSITION_INT (33).
+    Global(GlobalPosition),
+    /// GPS_RAW_INT (24).
+    Fix(Fix),
+    /// HOME_POSITION (242).
+    Home(Home),
+    /// GPS_GLOBAL_ORIGIN (49).
+    Origin(Origin),
+    /// SYS_STATUS (1).
+    System(SystemStatus),
+    /// BATTERY_STATUS (147).
+    Battery(Battery),
+    /// EXTENDED_SYS_STATE (245): `MAV_LANDED_STATE`.
+    Landed(u8),
+    /// ESTIMATOR_STATUS (230).
+    Estimator(EstimatorStatus),
+    /// ACTUATOR_OUTPUT_STATUS (375).
+    Outputs(ActuatorOutputs),
+    /// AUTOPILOT_VERSION (148).
+    Version(Version),
+    /// PROTOCOL_VERSION (300): MAVLink 2 alone.
+    Protocol,
+}
+
+impl Telemetry {
+    pub(crate) fn format(id: u32) -> Option<Format> {
+        motion::format(id).or_else(|| place::format(id)).or_else(|| system::format(id))
+    }
+
+    pub(crate) fn read(id: u32, payload: &[u8]) -> Result<Self, Fault> {
+        let read = motion::read(id, payload).or_else(|| place::read(id, payload));
+        read.or_else(|| system::read(id, payload)).ok_or(Fault::Unknown)
+    }
+
+    pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        match self {
+            Telemetry::Attitude(attitude) => attitude.write(payload),
+            Telemetry::Summary(summary) => summary.write(payload),
+            Telemetry::Global(position) => position.write(payload),
+            Telemetry::Fix(fix) => fix.write(payload),
+            Telemetry::Home(home) => home.write(payload),
+            Telemetry::Origin(origin) => origin.write(payload),
+            Telemetry::System(status) => status.write(payload),
+            Telemetry::Battery(battery) => battery.write(payload),
+            Telemetry::Landed(state) => system::write_landed(*state, payload),
+            Telemetry::Estimator(status) => status.write(payload),
+            Telemetry::Outputs(outputs) => outputs.write(payload),
+            Telemetry::Version(version) => version.write(payload),
+            Telemetry::Protocol => system::write_protocol(payload),
+        }
+    }
+}

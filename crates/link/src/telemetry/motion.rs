@@ -1,0 +1,76 @@
+//! Attitude, and a pilot's summary.
+
+use super::Telemetry;
+use crate::frames::{flip, flip_turn};
+use crate::message::{Format, PAYLOAD_MAX};
+use crate::wire::Layout;
+use mavlink::MessageData;
+use mavlink::dialects::common::{ATTITUDE_QUATERNION_DATA, VFR_HUD_DATA};
+use nalgebra::Vector3;
+
+/// ATTITUDE_QUATERNION (31).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AttitudeQuaternion {
+    /// Time since power-up \[ms\].
+    pub time_ms: u32,
+    /// Quaternion w, x, y, z from body to earth.
+    pub attitude: [f32; 4],
+    /// p, q, r \[rad/s\].
+    pub rates_rad_s: Vector3<f32>,
+}
+
+/// VFR_HUD (74).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// Horizontal speed above the ground \[m/s\]; sent as airspeed, too.
+    pub speed_m_s: f32,
+    /// Altitude above the sea, or in the local frame if that is unknown \[m\].
+    pub altitude_m: f32,
+    /// Climb rate \[m/s\].
+    pub climb_m_s: f32,
+    /// Compass heading, 0 to 359 \[deg\].
+    pub heading_deg: i16,
+    /// Throttle, 0 to 100 \[%\].
+    pub throttle_percent: u16,
+}
+
+const ATTITUDE: Layout<ATTITUDE_QUATERNION_DATA, (u32, [f32; 4], [f32; 3], [f32; 4])> = Layout::NEW;
+/// Airspeed, ground speed, altitude, climb rate; heading, throttle.
+const SUMMARY: Layout<VFR_HUD_DATA, ([f32; 4], i16, u16)> = Layout::NEW;
+
+pub(super) fn format(id: u32) -> Option<Format> {
+    match id {
+        ATTITUDE_QUATERNION_DATA::ID => Some(ATTITUDE.format()),
+        VFR_HUD_DATA::ID => Some(SUMMARY.format()),
+        _ => None,
+    }
+}
+
+pub(super) fn read(id: u32, payload: &[u8]) -> Option<Telemetry> {
+    Some(match id {
+        ATTITUDE_QUATERNION_DATA::ID => {
+            let (time_ms, attitude, rates, _) = ATTITUDE.read(payload);
+            let (attitude, rates_rad_s) = (flip_turn(attitude), flip(rates.into()));
+            Telemetry::Attitude(AttitudeQuaternion { time_ms, attitude, rates_rad_s })
+        }
+        VFR_HUD_DATA::ID => {
+            let ([_, speed_m_s, altitude_m, climb_m_s], heading_deg, throttle_percent) = SUMMARY.read(payload);
+            Telemetry::Summary(Summary { speed_m_s, altitude_m, climb_m_s, heading_deg, throttle_percent })
+        }
+        _ => return None,
+    })
+}
+
+impl AttitudeQuaternion {
+    pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let rates = flip(self.rates_rad_s).into();
+        ATTITUDE.write(&(self.time_ms, flip_turn(self.attitude), rates, [0.0; 4]), payload)
+    }
+}
+
+impl Summary {
+    pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let Summary { speed_m_s, altitude_m, climb_m_s, heading_deg, throttle_percent } = *self;
+        SUMMARY.write(&([speed_m_s, speed_m_s, altitude_m, climb_m_s], heading_deg, throttle_percent), payload)
+    }
+}

@@ -1,0 +1,204 @@
+//! Health, battery, outputs and versions.
+
+use super::Telemetry;
+use crate::message::{Format, PAYLOAD_MAX};
+use crate::wire::Layout;
+use mavlink::MessageData;
+use mavlink::dialects::common::{
+    ACTUATOR_OUTPUT_STATUS_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA, ESTIMATOR_STATUS_DATA,
+    EXTENDED_SYS_STATE_DATA, PROTOCOL_VERSION_DATA, SYS_STATUS_DATA,
+};
+
+/// SYS_STATUS (1).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SystemStatus {
+    /// What is there, what is used and what is well, as `MAV_SYS_STATUS_SENSOR`.
+    pub present: u32,
+    /// What is used.
+    pub enabled: u32,
+    /// What is well.
+    pub healthy: u32,
+    /// Load of the processor by the control tick \[0.1 %\].
+    pub load_permille: u16,
+    /// Voltage of the battery \[mV\]; `u16::MAX` if unknown.
+    pub voltage_mv: u16,
+    /// Current of the battery \[0.01 A\]; -1 if unknown.
+    pub current_ca: i16,
+    /// Charge that is left \[%\]; -1 if unknown.
+    pub remaining_percent: i8,
+    /// Frames dropped since power-up.
+    pub dropped_frames: u16,
+}
+
+/// BATTERY_STATUS (147) of one battery.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Battery {
+    /// Voltage \[mV\], below 65,534.
+    pub voltage_mv: u16,
+    /// Current \[0.01 A\]; -1 if unknown.
+    pub current_ca: i16,
+    /// Charge drawn so far \[mA h\]; -1 if unknown.
+    pub consumed_mah: i32,
+    /// Charge that is left \[%\]; -1 if unknown.
+    pub remaining_percent: i8,
+    /// `MAV_BATTERY_CHARGE_STATE`: 0 unknown, 1 ok, 2 low, 3 critical.
+    pub charge: u8,
+}
+
+/// ESTIMATOR_STATUS (230), without the ratios of the innovations, which are sent as 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EstimatorStatus {
+    /// Time since power-up \[us\].
+    pub time_us: u64,
+    /// `ESTIMATOR_STATUS_FLAGS`.
+    pub flags: u16,
+    /// Horizontal and vertical uncertainty of the position; NaN if unknown \[m\].
+    pub sigma_m: [f32; 2],
+}
+
+/// ACTUATOR_OUTPUT_STATUS (375).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ActuatorOutputs {
+    /// Time since power-up \[us\].
+    pub time_us: u64,
+    /// Number of outputs in use.
+    pub active: u32,
+    /// Throttles, 0 to 1, of as many.
+    pub throttles: [f32; 8],
+}
+
+/// AUTOPILOT_VERSION (148).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Version {
+    /// `MAV_PROTOCOL_CAPABILITY`.
+    pub capabilities: u64,
+    /// Number of the board, 0 if unknown.
+    pub uid: u64,
+    /// Version of the software: major, minor, patch, and 255 for a release.
+    pub software: [u8; 4],
+    /// First bytes of the commit it was built from; zeros if unknown.
+    pub commit: [u8; 8],
+}
+
+/// Three sets of sensors; load, voltage; current; six counts; charge; three sets of further sensors.
+const SYSTEM: Layout<SYS_STATUS_DATA, ([u32; 3], [u16; 2], i16, [u16; 6], i8, [u32; 3])> = Layout::NEW;
+/// Charge and energy used; temperature; cells; current; number, function, type; charge left; time left; state; further
+/// cells; mode; faults.
+type BatteryFields = (([i32; 2], i16, [u16; 10], i16), [u8; 3], i8, i32, u8, [u16; 4], u8, u32);
+const BATTERY: Layout<BATTERY_STATUS_DATA, BatteryFields> = Layout::NEW;
+const LANDED: Layout<EXTENDED_SYS_STATE_DATA, (u8, u8)> = Layout::NEW;
+/// Time, six ratios, two uncertainties, flags.
+const ESTIMATOR: Layout<ESTIMATOR_STATUS_DATA, (u64, [f32; 6], [f32; 2], u16)> = Layout::NEW;
+const OUTPUTS: Layout<ACTUATOR_OUTPUT_STATUS_DATA, (u64, u32, [f32; 8], [f32; 24])> = Layout::NEW;
+/// Capabilities, number; software; versions of middleware, system, board; vendor, product; commits; long number.
+type VersionFields = ([u64; 2], [u8; 4], [u32; 3], [u16; 2], [u8; 8], [u8; 16], [u8; 18]);
+const VERSION: Layout<AUTOPILOT_VERSION_DATA, VersionFields> = Layout::NEW;
+/// Version, lowest, highest; hashes of specification and library.
+const PROTOCOL: Layout<PROTOCOL_VERSION_DATA, ([u16; 3], [u8; 16])> = Layout::NEW;
+
+/// A cell that is not there, and a temperature that is unknown.
+const NO_CELL: u16 = u16::MAX;
+const NO_TEMPERATURE: i16 = i16::MAX;
+
+pub(super) fn format(id: u32) -> Option<Format> {
+    Some(match id {
+        SYS_STATUS_DATA::ID => SYSTEM.format(),
+        BATTERY_STATUS_DATA::ID => BATTERY.format(),
+        EXTENDED_SYS_STATE_DATA::ID => LANDED.format(),
+        ESTIMATOR_STATUS_DATA::ID => ESTIMATOR.format(),
+        ACTUATOR_OUTPUT_STATUS_DATA::ID => OUTPUTS.format(),
+        AUTOPILOT_VERSION_DATA::ID => VERSION.format(),
+        PROTOCOL_VERSION_DATA::ID => PROTOCOL.format(),
+        _ => return None,
+    })
+}
+
+pub(super) fn read(id: u32, payload: &[u8]) -> Option<Telemetry> {
+    Some(match id {
+        SYS_STATUS_DATA::ID => {
+            let ([present, enabled, healthy], [load_permille, voltage_mv], current_ca, counts, remaining_percent, _) =
+                SYSTEM.read(payload);
+            let [_, dropped_frames, ..] = counts;
+            Telemetry::System(SystemStatus {
+                present,
+                enabled,
+                healthy,
+                load_permille,
+                voltage_mv,
+                current_ca,
+                remaining_percent,
+                dropped_frames,
+            })
+        }
+        BATTERY_STATUS_DATA::ID => {
+            let (([consumed_mah, _], _, [voltage_mv, ..], current_ca), _, remaining_percent, _, charge, ..) =
+                BATTERY.read(payload);
+            Telemetry::Battery(Battery { voltage_mv, current_ca, consumed_mah, remaining_percent, charge })
+        }
+        EXTENDED_SYS_STATE_DATA::ID => Telemetry::Landed(LANDED.read(payload).1),
+        ESTIMATOR_STATUS_DATA::ID => {
+            let (time_us, _, sigma_m, flags) = ESTIMATOR.read(payload);
+            Telemetry::Estimator(EstimatorStatus { time_us, flags, sigma_m })
+        }
+        ACTUATOR_OUTPUT_STATUS_DATA::ID => {
+            let (time_us, active, throttles, _) = OUTPUTS.read(payload);
+            Telemetry::Outputs(ActuatorOutputs { time_us, active, throttles })
+        }
+        AUTOPILOT_VERSION_DATA::ID => {
+            let ([capabilities, uid], [rest @ .., major], _, _, commit, ..) = VERSION.read(payload);
+            let [kind, patch, minor] = rest;
+            Telemetry::Version(Version { capabilities, uid, software: [major, minor, patch, kind], commit })
+        }
+        PROTOCOL_VERSION_DATA::ID => Telemetry::Protocol,
+        _ => return None,
+    })
+}
+
+impl SystemStatus {
+    pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let numbers = [self.load_permille, self.voltage_mv];
+        let sets = [self.present, self.enabled, self.healthy];
+        let counts = [0, self.dropped_frames, 0, 0, 0, 0];
+        SYSTEM.write(&(sets, numbers, self.current_ca, counts, self.remaining_percent, [0; 3]), payload)
+    }
+}
+
+impl Battery {
+    pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let Battery { voltage_mv, current_ca, consumed_mah, remaining_percent, charge } = *self;
+        // All cells as one.
+        let mut cells = [NO_CELL; 10];
+        cells.iter_mut().take(1).for_each(|cell| *cell = voltage_mv);
+        let numbers = ([consumed_mah, -1], NO_TEMPERATURE, cells, current_ca);
+        BATTERY.write(&(numbers, [0; 3], remaining_percent, 0, charge, [0; 4], 0, 0), payload)
+    }
+}
+
+impl EstimatorStatus {
+    pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        ESTIMATOR.write(&(self.time_us, [0.0; 6], self.sigma_m, self.flags), payload)
+    }
+}
+
+impl ActuatorOutputs {
+    pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        OUTPUTS.write(&(self.time_us, self.active, self.throttles, [0.0; 24]), payload)
+    }
+}
+
+impl Version {
+    pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let Version { capabilities, uid, software: [major, minor, patch, kind], commit } = *self;
+        let software = [kind, patch, minor, major];
+        VERSION.write(&([capabilities, uid], software, [0; 3], [0; 2], commit, [0; 16], [0; 18]), payload)
+    }
+}
+
+/// Writes EXTENDED_SYS_STATE of a vehicle that does not change its kind.
+pub(super) fn write_landed(state: u8, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+    LANDED.write(&(0, state), payload)
+}
+
+pub(super) fn write_protocol(payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+    PROTOCOL.write(&([200, 200, 200], [0; 16]), payload)
+}

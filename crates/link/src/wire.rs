@@ -1,0 +1,141 @@
+//! Fields as they cross the wire: little-endian, without gaps, in the order of MAVLink's serialisation.
+//!
+//! Messages that the `mavlink` crate cannot carry in full are described by a tuple of their fields, extension fields
+//! last. Only number and checksum seed are the crate's.
+
+use crate::address::Address;
+use crate::message::{Format, PAYLOAD_MAX};
+use core::marker::PhantomData;
+use mavlink::MessageData;
+
+/// Bytes of a payload, followed by zeros.
+pub(crate) struct Source<'a>(core::slice::Iter<'a, u8>);
+
+/// A payload that is being written.
+pub(crate) struct Sink<'a> {
+    rest: core::iter::Enumerate<core::slice::IterMut<'a, u8>>,
+    /// Length without trailing zeros.
+    length: u8,
+}
+
+impl Sink<'_> {
+    fn put(&mut self, byte: u8) {
+        if let Some((place, to)) = self.rest.next() {
+            *to = byte;
+            if byte != 0 {
+                self.length = (place + 1) as u8;
+            }
+        }
+    }
+}
+
+/// A value of fixed size.
+pub(crate) trait Wire: Sized {
+    /// Size \[bytes\].
+    const LEN: usize;
+    /// Reads it; what the payload lacks is zero.
+    fn take(source: &mut Source<'_>) -> Self;
+    /// Writes it.
+    fn give(&self, sink: &mut Sink<'_>);
+}
+
+macro_rules! numbers {
+    ($($number:ty),*) => {$(
+        impl Wire for $number {
+            const LEN: usize = size_of::<$number>();
+
+            fn take(source: &mut Source<'_>) -> Self {
+                <$number>::from_le_bytes([(); size_of::<$number>()].map(|()| source.0.next().copied().unwrap_or(0)))
+            }
+
+            fn give(&self, sink: &mut Sink<'_>) {
+                self.to_le_bytes().into_iter().for_each(|byte| sink.put(byte));
+            }
+        }
+    )*};
+}
+
+numbers!(u8, i8, u16, i16, u32, i32, u64, i64, f32);
+
+impl<T: Wire, const N: usize> Wire for [T; N] {
+    const LEN: usize = N * T::LEN;
+
+    fn take(source: &mut Source<'_>) -> Self {
+        core::array::from_fn(|_| T::take(source))
+    }
+
+    fn give(&self, sink: &mut Sink<'_>) {
+        self.iter().for_each(|element| element.give(sink));
+    }
+}
+
+impl Wire for Address {
+    const LEN: usize = 2;
+
+    fn take(source: &mut Source<'_>) -> Self {
+        let [system, component] = Wire::take(source);
+        Address { system, component }
+    }
+
+    fn give(&self, sink: &mut Sink<'_>) {
+        [self.system, self.component].give(sink);
+    }
+}
+
+macro_rules! tuples {
+    ($($(($field:ident $name:ident))+;)*) => {$(
+        impl<$($name: Wire),+> Wire for ($($name,)+) {
+            const LEN: usize = 0 $(+ $name::LEN)+;
+
+            fn take(source: &mut Source<'_>) -> Self {
+                $(let $field = $name::take(source);)+
+                ($($field,)+)
+            }
+
+            fn give(&self, sink: &mut Sink<'_>) {
+                let ($($field,)+) = self;
+                $($field.give(sink);)+
+            }
+        }
+    )*};
+}
+
+tuples! {
+    (a A);
+    (a A) (b B);
+    (a A) (b B) (c C);
+    (a A) (b B) (c C) (d D);
+    (a A) (b B) (c C) (d D) (e E);
+    (a A) (b B) (c C) (d D) (e E) (f F);
+    (a A) (b B) (c C) (d D) (e E) (f F) (g G);
+    (a A) (b B) (c C) (d D) (e E) (f F) (g G) (h H);
+    (a A) (b B) (c C) (d D) (e E) (f F) (g G) (h H) (i I);
+    (a A) (b B) (c C) (d D) (e E) (f F) (g G) (h H) (i I) (j J);
+}
+
+/// Layout of the message that the `mavlink` crate calls `D`.
+pub(crate) struct Layout<D, W>(PhantomData<fn() -> (D, W)>);
+
+impl<D: MessageData, W: Wire> Layout<D, W> {
+    /// The layout. Compiles only if the fields are at least those that the `mavlink` crate knows.
+    pub(crate) const NEW: Self = {
+        assert!(D::ENCODED_LEN <= W::LEN && W::LEN <= PAYLOAD_MAX);
+        Layout(PhantomData)
+    };
+
+    pub(crate) const fn format(&self) -> Format {
+        Format { extra_crc: D::EXTRA_CRC, length_max: W::LEN }
+    }
+
+    pub(crate) fn read(&self, payload: &[u8]) -> W {
+        W::take(&mut Source(payload.iter()))
+    }
+
+    /// Writes the fields without trailing zeros; returns number and length, at least one byte.
+    pub(crate) fn write(&self, fields: &W, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let mut sink = Sink { rest: payload.iter_mut().enumerate(), length: 1 };
+        fields.give(&mut sink);
+        let length = sink.length;
+        (D::ID, length)
+    }
+}
