@@ -1,0 +1,42 @@
+//! Charge of the battery, from its voltage without load: the voltage that it would have without the current through its
+//! resistance.
+
+use afbc_control::math::{max, min};
+
+/// Time constant of the charge \[s\].
+const SMOOTH_S: f32 = 2.0;
+
+/// A battery's measurements.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// Voltage \[V\].
+    pub voltage_v: f32,
+    /// Current; 0 if it is not measured \[A\].
+    pub current_a: f32,
+}
+
+/// What is known of a battery's cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Cells {
+    pub(crate) number: f32,
+    pub(crate) empty_v: f32,
+    pub(crate) full_v: f32,
+    pub(crate) resistance_ohm: f32,
+}
+
+impl Cells {
+    /// Returns the charge, 0 to 1, by a plausible reading.
+    fn charge(&self, reading: &Reading) -> Option<f32> {
+        let Reading { voltage_v, current_a } = *reading;
+        let plausible = voltage_v > 0.0 && voltage_v < 1e3 && current_a.abs() < 1e4;
+        let cell_v = voltage_v / self.number + current_a * self.resistance_ohm;
+        plausible.then(|| max(min((cell_v - self.empty_v) / (self.full_v - self.empty_v), 1.0), 0.0))
+    }
+
+    /// Updates a filtered charge; `None` stays so until the first plausible reading.
+    pub(crate) fn update(&self, charge: &mut Option<f32>, reading: Option<&Reading>, dt_s: f32) {
+        let Some(now) = reading.filter(|_| self.number >= 1.0).and_then(|reading| self.charge(reading)) else { return };
+        let before = charge.unwrap_or(now);
+        *charge = Some(before + (now - before) * (dt_s / SMOOTH_S));
+    }
+}

@@ -1,0 +1,129 @@
+//! Hold, take-off, landing and return.
+
+use crate::limiter::Aim;
+use crate::scene::{Scene, Wish};
+use afbc_control::math::{max, min};
+use nalgebra::Vector3;
+
+/// Distance from home at which it descends \[m\].
+const OVER_HOME_M: f32 = 1.0;
+/// Height to go at which a climb is over \[m\].
+const CLIMBED_M: f32 = 0.3;
+/// Shares of the height, by which the vehicle may be below the end of a take-off.
+const TAKEN_OFF_SHARE: f32 = 0.1;
+
+/// Holds a place: where the vehicle stops, or one that was ordered.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Hold {
+    pub(crate) at_m: Option<Vector3<f32>>,
+    /// Heading; none for the present one \[rad\].
+    pub(crate) yaw_rad: Option<f32>,
+    pub(crate) speed_m_s: Option<f32>,
+}
+
+impl Hold {
+    /// Holds where the vehicle stops.
+    pub(crate) fn fly(&mut self, scene: &Scene<'_>) -> Aim {
+        if self.at_m.is_none() && scene.stands() {
+            self.at_m = Some(scene.present.position_m);
+        }
+        let aim = self.at_m.map_or(scene.stop(), |at_m| scene.to(at_m));
+        let speed_m_s = min(self.speed_m_s.unwrap_or(aim.speed_m_s), scene.speed_m_s);
+        Aim { yaw_rad: self.yaw_rad.unwrap_or(f32::NAN), speed_m_s, ..aim }
+    }
+}
+
+/// Climbs to a place above.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Takeoff {
+    pub(crate) to_m: Vector3<f32>,
+    from_m: f32,
+}
+
+impl Takeoff {
+    /// Begins where the setpoint is.
+    pub(crate) fn new(scene: &Scene<'_>, height_m: f32) -> Self {
+        Takeoff::above(scene.present.position_m, height_m)
+    }
+
+    /// Begins at `from_m`.
+    pub(crate) fn above(from_m: Vector3<f32>, height_m: f32) -> Self {
+        Takeoff { to_m: from_m + Vector3::new(0.0, 0.0, height_m), from_m: from_m.z }
+    }
+
+    pub(crate) fn fly(&self, scene: &Scene<'_>) -> Wish {
+        let aim = Aim { up_m_s: scene.flying.takeoff_m_s, ..scene.to(self.to_m) };
+        let short_m = max(TAKEN_OFF_SHARE * (self.to_m.z - self.from_m), CLIMBED_M);
+        let there = (self.to_m.z - scene.present.position_m.z).abs() < 0.05 && scene.stands();
+        let done = scene.airborne && there && self.to_m.z - scene.state.position_m.z < short_m;
+        Wish { lifts: true, done, ..Wish::fly(aim) }
+    }
+}
+
+/// Descends where the vehicle is, or over a place.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Land {
+    pub(crate) over_m: Option<Vector3<f32>>,
+}
+
+impl Land {
+    pub(crate) fn fly(&mut self, scene: &Scene<'_>) -> Wish {
+        if self.over_m.is_none() {
+            let speed_m_s = scene.present.velocity_m_s.xy().norm_squared();
+            self.over_m = (speed_m_s < 0.05 * 0.05).then_some(scene.present.position_m);
+        }
+        Wish { lands: true, ..Wish::fly(scene.down(self.over_m.unwrap_or(Vector3::repeat(f32::NAN)))) }
+    }
+}
+
+/// Climbs, flies home and lands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Return {
+    height_m: f32,
+    /// Where it climbs; none while it stops.
+    hold: Hold,
+    stage: Stage,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    Climbs,
+    /// Towards home, with this heading.
+    Flies(f32),
+    Descends,
+}
+
+impl Return {
+    pub(crate) fn new(scene: &Scene<'_>) -> Self {
+        let position_m = scene.present.position_m;
+        let off_m = (scene.home_m - position_m).xy();
+        let near = off_m.norm_squared() <= scene.flying.near_home_m * scene.flying.near_home_m;
+        let safe_m = scene.home_m.z + scene.flying.return_height_m;
+        let height_m = if near { position_m.z } else { min(max(position_m.z, safe_m), scene.ceiling_m) };
+        Return { height_m, hold: Hold::default(), stage: Stage::Climbs }
+    }
+
+    pub(crate) fn fly(&mut self, scene: &Scene<'_>) -> Wish {
+        let home_m = Vector3::new(scene.home_m.x, scene.home_m.y, self.height_m);
+        match self.stage {
+            Stage::Climbs => {
+                let aim = self.hold.fly(scene);
+                let short_m = |z: f32| self.height_m - z;
+                if short_m(scene.present.position_m.z) < CLIMBED_M && short_m(scene.state.position_m.z) < 1.0 {
+                    self.stage = Stage::Flies(scene.towards(&home_m));
+                }
+                // It climbs while it stops.
+                let (mut position_m, velocity_m_s) = (aim.position_m, aim.velocity_m_s);
+                position_m.z = self.height_m;
+                Wish::fly(Aim { position_m, velocity_m_s, ..aim })
+            }
+            Stage::Flies(yaw_rad) => {
+                if scene.is_at(&home_m, OVER_HOME_M) && scene.present.velocity_m_s.norm_squared() < 0.3 * 0.3 {
+                    self.stage = Stage::Descends;
+                }
+                Wish::fly(Aim { yaw_rad, ..scene.to(home_m) })
+            }
+            Stage::Descends => Wish { lands: true, ..Wish::fly(scene.down(home_m)) },
+        }
+    }
+}

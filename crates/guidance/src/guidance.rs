@@ -1,0 +1,410 @@
+//! The tick of the guidance: watches, answers, decides the mode, and flies it.
+
+mod flying;
+mod orders;
+
+use crate::battery::Reading;
+use crate::checks::{Check, Checks};
+use crate::course::{Hold, Land, Return, Takeoff};
+use crate::lift::{Lift, Trim};
+use crate::limiter::{Aim, Limiter};
+use crate::mission::Mission;
+use crate::mode::FlightMode;
+use crate::net::{self, Findings, Sensors, Watch};
+use crate::notice::{Cause, Notice, Notices, Reason};
+use crate::order::{Declined, Given, Orders};
+use crate::settings::Settings;
+use crate::sticks;
+use crate::table::{self, Action, Conditions};
+use crate::targets::{self, Targets};
+use afbc_control::math::{max, min};
+use afbc_flight_core::{ArmingLimits, Mode, Refusal, Request, Stamped};
+use afbc_types::{Declared, OutOfRange, Setpoint, State};
+use nalgebra::Vector3;
+
+/// Time for which a vehicle must have been at rest to be armed \[s\].
+const REST_S: f32 = 1.0;
+/// Time between two requests to disarm \[s\].
+const REQUEST_S: f32 = 0.1;
+
+/// What the guidance sees of the vehicle in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sight<'a> {
+    /// Time since power-up \[us\].
+    pub now_us: u64,
+    /// Time since the last tick \[s\].
+    pub dt_s: f32,
+    /// Fresh state; none if there is none, or the vehicle does not know where it is.
+    pub state: Option<&'a State>,
+    /// What the vehicle's own estimate misses.
+    pub missing: Option<Refusal>,
+    /// Mode of the flight core.
+    pub core: Mode,
+    /// True if the vehicle is in the air, by the flight core.
+    pub airborne: bool,
+    /// True if the control tick's rate is healthy.
+    pub tick_healthy: bool,
+    /// The battery's measurements.
+    pub battery: Option<Reading>,
+    /// Sensors that have failed.
+    pub sensors: Sensors,
+    /// What the rotors give.
+    pub lift: Lift,
+}
+
+/// What the guidance wants in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Guided {
+    /// Setpoint for the flight core; none without a state.
+    pub setpoint: Option<Setpoint>,
+    /// True if the vehicle is armed and stays on the ground: its motors idle.
+    pub rests: bool,
+    /// A request to the flight core, repeated until it is granted.
+    pub request: Option<Request>,
+    /// Ticket and answer of the first of [`Orders::given`].
+    pub answer: Option<(u8, Result<(), Declined>)>,
+    /// Flight mode.
+    pub mode: FlightMode,
+    /// Announcements of this tick.
+    pub notices: Notices,
+    /// Number of the mission's item that is wanted in [`Orders::leg`]: until it is done, also while the mode flies that
+    /// ends it.
+    pub wanted: u16,
+    /// Number of an item that is done in this tick.
+    pub reached: Option<u16>,
+    /// Home \[m\].
+    pub home_m: Option<Vector3<f32>>,
+    /// What made the safety net act; none once a pilot or a station has selected another mode.
+    pub failsafe: Option<Cause>,
+    /// Checks before arming, as they were while the vehicle was disarmed.
+    pub checks: Checks,
+    /// Charge of the battery, 0 to 1.
+    pub charge: Option<f32>,
+}
+
+/// The guidance of one vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Guidance {
+    settings: Settings,
+    memory: Memory,
+}
+
+/// What changes from tick to tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Memory {
+    limiter: Limiter,
+    mode: FlightMode,
+    plan: Plan,
+    mission: Mission,
+    watch: Watch,
+    home_m: Option<Vector3<f32>>,
+    /// True if home was ordered, and arming does not change it.
+    home_ordered: bool,
+    /// Ordered speed; infinite for none \[m/s\].
+    speed_m_s: f32,
+    /// Aim of the last tick, which goes on through a gap of the state.
+    aim: Aim,
+    /// Correction of attitude and thrust while these are flown.
+    trim: Trim,
+    was_armed: bool,
+    /// True if there was a state in the last tick.
+    was_seen: bool,
+    /// True if the mode has changed since the last tick.
+    enters: bool,
+    /// True if it has been in the air since it was armed.
+    flown: bool,
+    failsafe: Option<Cause>,
+    /// Item of the mission that is done once the vehicle has landed.
+    lands_item: Option<u16>,
+    /// Time at rest, on the ground with the motors idling, waiting to leave the ground, since the last request \[s\].
+    rest_s: f32,
+    ground_s: f32,
+    /// Time for which a landing vehicle has not sunk to its setpoint \[s\].
+    touch_s: f32,
+    lift_s: f32,
+    request_s: f32,
+    /// Where it stood, and true if it has left that place since \[m\].
+    stood_m: Vector3<f32>,
+    left: bool,
+    /// True if it has announced that it stops the motors.
+    disarms: bool,
+    checks: Checks,
+}
+
+/// What a mode remembers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Plan {
+    /// Not begun.
+    New,
+    Hold(Hold),
+    Takeoff(Takeoff),
+    Land(Land),
+    Return(Return),
+    Targets(Targets),
+}
+
+impl Guidance {
+    /// Makes the guidance of a vehicle that is disarmed.
+    ///
+    /// # Errors
+    /// The first parameter out of range.
+    pub fn new(settings: Settings) -> Result<Self, OutOfRange> {
+        settings.validate()?;
+        let memory = Memory {
+            limiter: Limiter::new(settings.limits)?,
+            mode: FlightMode::Hold,
+            plan: Plan::New,
+            mission: Mission::default(),
+            watch: Watch::default(),
+            home_m: None,
+            home_ordered: false,
+            speed_m_s: f32::INFINITY,
+            aim: Aim::stop(1.0, 1.0, 1.0),
+            trim: Trim::default(),
+            was_armed: false,
+            was_seen: false,
+            enters: false,
+            flown: false,
+            failsafe: None,
+            lands_item: None,
+            rest_s: 0.0,
+            ground_s: 0.0,
+            touch_s: 0.0,
+            lift_s: 0.0,
+            request_s: REQUEST_S,
+            stood_m: Vector3::zeros(),
+            left: false,
+            disarms: false,
+            checks: Checks::default(),
+        };
+        Ok(Guidance { settings, memory })
+    }
+
+    /// Changes the parameters; those of the limiter apply from the next tick on.
+    ///
+    /// # Errors
+    /// The first parameter out of range; then nothing changes.
+    pub fn set(&mut self, settings: Settings) -> Result<(), OutOfRange> {
+        settings.validate()?;
+        self.memory.limiter.set(settings.limits);
+        self.settings = settings;
+        Ok(())
+    }
+
+    /// Returns the parameters.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Returns the flight mode.
+    pub fn mode(&self) -> FlightMode {
+        self.memory.mode
+    }
+
+    /// Runs one tick, to be called every millisecond. Cannot fail.
+    #[must_use = "the vehicle flies by it"]
+    #[inline]
+    pub fn tick(&mut self, sight: &Sight<'_>, orders: &Orders) -> Guided {
+        self.memory.tick(&self.settings, sight, orders)
+    }
+}
+
+impl Memory {
+    #[inline]
+    fn tick(&mut self, settings: &Settings, sight: &Sight<'_>, orders: &Orders) -> Guided {
+        // False of NaN.
+        let dt_s = if sight.dt_s > 0.0 { min(max(sight.dt_s, 1e-4), 0.02) } else { 0.001 };
+        let state = sight.state.filter(|state| state.is_plausible());
+        let armed = sight.core.armed();
+        let airborne = armed && sight.airborne;
+        let mut notices = Notices::default();
+        self.time(state, airborne, dt_s);
+        self.find_home(state, armed);
+
+        // Watches.
+        let flying = &settings.flying;
+        let fresh = |at_us: u64, lost_s: f32| {
+            let age_us = Stamped { value: (), at_us }.age_us(sight.now_us);
+            age_us as f32 * 1e-6 <= lost_s
+        };
+        let target = orders.target.as_ref().filter(|target| fresh(target.at_us, flying.targets_lost_s));
+        let target = target.filter(|target| targets::is_plausible(&target.value));
+        let sticks = orders.sticks.filter(|sticks| fresh(sticks.at_us, flying.sticks_lost_s));
+        let sticks = sticks.map(|sticks| sticks.value).filter(sticks::is_plausible);
+        let findings = Findings {
+            mode: self.mode,
+            armed,
+            descends: sight.core == Mode::Descending,
+            position_m: state.map(|state| state.position_m),
+            home_m: self.home_m,
+            battery: sight.battery.as_ref(),
+            sensors: sight.sensors,
+            silent_us: orders
+                .heard_us
+                .map(|heard_us| u32::try_from(sight.now_us.saturating_sub(heard_us)).unwrap_or(u32::MAX)),
+            targets: target.is_some(),
+            sticks: sticks.is_some(),
+            dt_s,
+        };
+        let (held, cause, new) = self.watch.look(&settings.net, &findings, &mut notices);
+        let seen = Conditions {
+            armed,
+            airborne,
+            positioned: state.is_some(),
+            descends: findings.descends,
+            mission: orders.leg.is_some(),
+            targets: target.is_some(),
+            sticks: sticks.is_some(),
+            held,
+        };
+
+        // Decides the mode.
+        if self.was_armed && !armed {
+            self.disarmed(&mut notices);
+        }
+        self.was_armed = armed;
+        let mut told = None;
+        if let Some(next) = table::forced(self.mode, &seen) {
+            self.change(next, Reason::Failsafe(cause), &mut notices);
+            (self.failsafe, told) = (Some(cause), Some(cause));
+        }
+        if new != 0 {
+            net::announce(&settings.net, new, told, &mut notices);
+        }
+        let [first, ..] = &orders.given;
+        let answer =
+            first.map(|Given { order, ticket }| (ticket, self.order(settings, &order, state, &seen, &mut notices)));
+
+        // Flies it.
+        let mut reached = None;
+        let flight = match state {
+            Some(state) => {
+                self.fly(settings, sight, state, dt_s, orders, target, sticks.as_ref(), &mut reached, &mut notices)
+            }
+            None => {
+                if armed && airborne {
+                    self.limiter.advance(&self.aim, dt_s);
+                }
+                self.was_seen = false;
+                None
+            }
+        };
+        let (setpoint, rests) = flight.map_or((None, armed && !airborne), |(setpoint, rests)| (setpoint, rests));
+        if !armed {
+            self.checks = self.check(settings, sight, state);
+        }
+        let request = self.disarms(settings, armed, airborne, rests, held, dt_s, &mut reached, &mut notices);
+        Guided {
+            setpoint,
+            rests,
+            request,
+            answer,
+            mode: self.mode,
+            notices,
+            wanted: self.lands_item.unwrap_or(self.mission.wanted),
+            reached,
+            home_m: self.home_m,
+            failsafe: self.failsafe,
+            checks: self.checks,
+            charge: self.watch.charge(),
+        }
+    }
+
+    /// Home is where the vehicle has first been at rest for as long as arming wants it, since stations arm as soon as
+    /// there is a home; and where it is armed.
+    fn find_home(&mut self, state: Option<&State>, armed: bool) {
+        let Some(state) = state else { return };
+        if self.home_m.is_none() && self.rest_s >= REST_S || armed && !self.was_armed && !self.home_ordered {
+            self.home_m = Some(state.position_m);
+        }
+    }
+
+    /// Counts the times.
+    fn time(&mut self, state: Option<&State>, airborne: bool, dt_s: f32) {
+        let at_rest = state.is_some_and(|state| ArmingLimits::DEFAULT.at_rest(state));
+        self.rest_s = if at_rest { min(self.rest_s + dt_s, 2.0 * REST_S) } else { 0.0 };
+        self.flown |= airborne;
+        self.request_s = min(self.request_s + dt_s, REQUEST_S);
+    }
+
+    /// Begins on the ground again.
+    fn disarmed(&mut self, notices: &mut Notices) {
+        (self.flown, self.failsafe, self.speed_m_s) = (false, None, f32::INFINITY);
+        (self.ground_s, self.lift_s) = (0.0, 0.0);
+        self.mission.resume(0);
+        if !self.mode.is_manual() && self.mode != FlightMode::Hold {
+            self.change(FlightMode::Hold, Reason::Disarmed, notices);
+        }
+    }
+
+    fn change(&mut self, next: FlightMode, reason: Reason, notices: &mut Notices) {
+        if next != self.mode {
+            notices.push(Notice::Mode(next, reason));
+        }
+        self.speed_m_s = f32::INFINITY;
+        self.mission.pause();
+        (self.mode, self.plan, self.enters, self.lift_s) = (next, Plan::New, true, 0.0);
+        self.trim = Trim::default();
+        self.lands_item = None;
+    }
+
+    /// Returns the request that stops the motors of a vehicle on the ground.
+    #[allow(clippy::too_many_arguments, reason = "parts of the tick")]
+    fn disarms(
+        &mut self,
+        settings: &Settings,
+        armed: bool,
+        airborne: bool,
+        rests: bool,
+        held: Action,
+        dt_s: f32,
+        reached: &mut Option<u16>,
+        notices: &mut Notices,
+    ) -> Option<Request> {
+        if !armed || airborne || !rests {
+            (self.ground_s, self.disarms) = (0.0, false);
+            return None;
+        }
+        self.ground_s += dt_s;
+        let lands = matches!(self.mode, FlightMode::Land | FlightMode::Return);
+        if lands && let Some(number) = self.lands_item.take() {
+            *reached = Some(number);
+        }
+        let flying = &settings.flying;
+        let wait_s = if self.flown { flying.disarm_after_s } else { flying.disarm_before_s };
+        let waited = wait_s > 0.0 && self.ground_s >= wait_s;
+        if !(lands || held >= Action::Return || waited) {
+            return None;
+        }
+        if !self.disarms {
+            self.disarms = true;
+            notices.push(Notice::Disarms);
+        }
+        if self.request_s < REQUEST_S {
+            return None;
+        }
+        self.request_s = 0.0;
+        Some(Request::Disarm)
+    }
+
+    /// Checks what must hold before arming.
+    fn check(&self, settings: &Settings, sight: &Sight<'_>, state: Option<&State>) -> Checks {
+        let mut checks = Checks::default();
+        let missing = sight.missing;
+        checks.note(Check::Attitude, missing != Some(Refusal::AttitudeUnknown));
+        checks.note(Check::Heading, !matches!(missing, Some(Refusal::AttitudeUnknown | Refusal::HeadingUnknown)));
+        checks.note(Check::Position, missing.is_none() && state.is_some());
+        let most_rad = ArmingLimits::DEFAULT.tilt_max_rad;
+        let is_level = |state: &State| state.attitude_rad.x.abs() <= most_rad && state.attitude_rad.y.abs() <= most_rad;
+        checks.note(Check::Level, state.is_some_and(is_level));
+        checks.note(Check::AtRest, self.rest_s >= REST_S);
+        checks.note(Check::TickRate, sight.tick_healthy);
+        checks.note(Check::Sensors, !sight.sensors.any());
+        let watched = settings.net.cells >= 1.0;
+        let known = sight.battery.is_some() && self.watch.charge().is_some();
+        checks.note(Check::Battery, !watched || known && !self.watch.holds(Cause::BatteryLow));
+        checks.note(Check::Fence, state.is_none_or(|state| self.is_inside(settings, &state.position_m)));
+        checks.note(Check::Mode, !matches!(self.mode, FlightMode::Land | FlightMode::Return));
+        checks
+    }
+}

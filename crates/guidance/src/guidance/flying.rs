@@ -1,0 +1,276 @@
+//! Flies the mode: what it wants, limited, as a setpoint.
+
+use super::{Memory, Plan, Sight};
+use crate::course::{Hold, Land, Return, Takeoff};
+use crate::lift::{Lift, Trim};
+use crate::mode::FlightMode;
+use crate::notice::{Notice, Notices, Reason};
+use crate::order::{Orders, Sticks, Target};
+use crate::scene::{Scene, Way, Wish};
+use crate::settings::Settings;
+use crate::sticks;
+use crate::targets::Targets;
+use afbc_control::math::{abs_max, max};
+use afbc_flight_core::Stamped;
+use afbc_flight_core::landing::LEFT_M;
+use afbc_types::{Setpoint, State};
+use nalgebra::Vector3;
+
+/// Time after which a take-off that has not left the ground is given up \[s\].
+const NO_LIFT_S: f32 = 10.0;
+/// Distance \[m\] from the vehicle, and time at its speed \[s\], at which the setpoint begins anew at the vehicle.
+const LEASH_M: f32 = 5.0;
+const LEASH_S: f32 = 1.0;
+/// Likewise after an outage of the state, and when the mode changes \[m, m/s\].
+const ANEW_M: f32 = 1.0;
+const ANEW_M_S: f32 = 1.5;
+/// A landing vehicle touches the ground once it has been above its setpoint by this much \[m\], for this long \[s\],
+/// and does not sink faster than this \[m/s\]. Then the rotors give this share of gravity less, for so long \[s\]: by
+/// then it has been found on the ground, or its velocity is not what it seems.
+const TOUCHES_M: f32 = 0.1;
+const TOUCHES_S: f32 = 0.1;
+const TOUCHES_M_S: f32 = 0.25;
+const SETTLES_S: f32 = 3.0;
+const SETTLES_SHARE: f32 = 0.7;
+
+impl Memory {
+    /// Flies the mode; returns the setpoint, and whether the vehicle rests on the ground.
+    #[allow(clippy::too_many_arguments, reason = "parts of the tick")]
+    pub(super) fn fly(
+        &mut self,
+        settings: &Settings,
+        sight: &Sight<'_>,
+        state: &State,
+        dt_s: f32,
+        orders: &Orders,
+        target: Option<&Stamped<Target>>,
+        sticks: Option<&Sticks>,
+        reached: &mut Option<u16>,
+        notices: &mut Notices,
+    ) -> Option<(Option<Setpoint>, bool)> {
+        let armed = sight.core.armed();
+        let airborne = armed && sight.airborne;
+        if !armed {
+            // It would hold what it has, and can be armed.
+            self.limiter.rest(state);
+            (self.enters, self.was_seen) = (false, true);
+            (self.left, self.stood_m) = (false, state.position_m);
+            self.plan = Plan::New;
+            return Some((self.limiter.setpoint(), false));
+        }
+        self.follow_vehicle(state);
+        let present = self.limiter.setpoint()?;
+        let home_m = self.home_m.unwrap_or(state.position_m);
+        let scene = Scene {
+            flying: &settings.flying,
+            limits: &settings.limits,
+            dt_s,
+            state,
+            present: &present,
+            airborne,
+            home_m,
+            speed_m_s: self.speed_m_s,
+            ceiling_m: home_m.z + settings.net.ceiling_m(),
+        };
+        let wish = self.wish(settings, &scene, orders, target, sticks, &sight.lift, reached, notices);
+        if wish.done {
+            // What it has reached, it holds.
+            let at_m = match (&self.plan, &wish.way) {
+                (Plan::Takeoff(takeoff), _) => Some(takeoff.to_m),
+                (_, Way::Limited(aim)) if is_finite(&aim.position_m) => Some(aim.position_m),
+                _ => None,
+            };
+            self.change(FlightMode::Hold, Reason::Done, notices);
+            (self.plan, self.enters) = (Plan::Hold(Hold { at_m, ..Hold::default() }), false);
+        }
+        let rests = !airborne && !wish.lifts;
+        if rests {
+            self.limiter.rest(state);
+            (self.lift_s, self.left, self.stood_m) = (0.0, false, state.position_m);
+            return Some((self.limiter.setpoint(), true));
+        }
+        // Rotors that carry a share of it make the flight core believe that it flies: without more to give, it does
+        // not.
+        let off_m = abs_max(&(state.position_m - self.stood_m));
+        self.left |= airborne && off_m > LEFT_M;
+        let lifts = !self.left && (!airborne || sight.lift.is_exhausted());
+        self.lift_s = if lifts { self.lift_s + dt_s } else { 0.0 };
+        if self.lift_s > NO_LIFT_S {
+            self.left = true;
+            let next = if airborne { FlightMode::Land } else { FlightMode::Hold };
+            self.change(next, Reason::NoLift, notices);
+            if !airborne {
+                self.limiter.rest(state);
+                return Some((self.limiter.setpoint(), true));
+            }
+        }
+        // What is observed without an inertial sensor follows from the thrust, so that it would fall.
+        if wish.lands && !sight.sensors.inertial && self.touches(state, &present, dt_s) {
+            return Some((Some(settled(state, sight.lift.gravity_m_s2)).filter(Setpoint::is_plausible), false));
+        }
+        let setpoint = match wish.way {
+            Way::Limited(aim) => {
+                (self.aim, self.trim) = (aim, Trim::default());
+                self.limiter.advance(&aim, dt_s);
+                self.limiter.setpoint().filter(|setpoint| abs_max(&setpoint.position_m) <= 1e5)
+            }
+            Way::Leaning(aim, [x, y]) => {
+                self.aim = aim;
+                self.limiter.advance(&aim, dt_s);
+                self.limiter.follow(state);
+                // The height is held by feedback.
+                let lift = Lift { given_m_s2: None, ..sight.lift };
+                let leaning = self.limiter.setpoint().map(|setpoint| Setpoint {
+                    position_m: Vector3::new(state.position_m.x, state.position_m.y, setpoint.position_m.z),
+                    velocity_m_s: Vector3::new(state.velocity_m_s.x, state.velocity_m_s.y, setpoint.velocity_m_s.z),
+                    acceleration_m_s2: Vector3::new(x, y, setpoint.acceleration_m_s2.z),
+                    ..setpoint
+                });
+                leaning.map(|setpoint| self.trim.advance(&lift, state, &setpoint, dt_s)).filter(Setpoint::is_plausible)
+            }
+            Way::Direct(setpoint) => {
+                self.limiter.anchor(state);
+                self.aim = scene.stop();
+                let setpoint = sight.lift.limited(&setpoint, state, &settings.limits);
+                let setpoint = self.trim.advance(&sight.lift, state, &setpoint, dt_s);
+                Some(setpoint).filter(Setpoint::is_plausible)
+            }
+        };
+        Some((setpoint, false))
+    }
+
+    /// True if a landing vehicle stands on the ground. In the air it would sink, and this would end.
+    fn touches(&mut self, state: &State, present: &Setpoint, dt_s: f32) -> bool {
+        let sinks = state.velocity_m_s.z < -TOUCHES_M_S;
+        let presses = state.position_m.z - present.position_m.z > TOUCHES_M;
+        self.touch_s = if presses && !sinks { self.touch_s + dt_s } else { 0.0 };
+        (TOUCHES_S..TOUCHES_S + SETTLES_S).contains(&self.touch_s)
+    }
+
+    /// Lets the limiter begin at the vehicle, if it is far from it.
+    fn follow_vehicle(&mut self, state: &State) {
+        let (enters, returns) = (self.enters, !self.was_seen);
+        (self.enters, self.was_seen) = (false, true);
+        let Some(present) = self.limiter.setpoint() else { return self.limiter.anchor(state) };
+        let off_m = present.position_m - state.position_m;
+        // Below the ground it presses the vehicle onto it.
+        let lands = matches!(self.mode, FlightMode::Land | FlightMode::Return) && off_m.z < 0.0;
+        let off_m = if lands { Vector3::new(off_m.x, off_m.y, 0.0) } else { off_m };
+        let off_m_s = present.velocity_m_s - state.velocity_m_s;
+        let anew = enters || returns;
+        let most_m = if anew { ANEW_M } else { LEASH_M }
+            + LEASH_S * max(present.velocity_m_s.x.abs(), present.velocity_m_s.y.abs());
+        let far = off_m.norm_squared() > most_m * most_m && !self.limiter.passes();
+        let fast = anew && off_m_s.norm_squared() > ANEW_M_S * ANEW_M_S;
+        if far || fast {
+            self.limiter.anchor(state);
+        }
+    }
+
+    /// Returns what the mode wants.
+    #[allow(clippy::too_many_arguments, reason = "parts of the tick")]
+    fn wish(
+        &mut self,
+        settings: &Settings,
+        scene: &Scene<'_>,
+        orders: &Orders,
+        target: Option<&Stamped<Target>>,
+        sticks: Option<&Sticks>,
+        lift: &Lift,
+        reached: &mut Option<u16>,
+        notices: &mut Notices,
+    ) -> Wish {
+        match self.mode {
+            FlightMode::Hold => {
+                if !matches!(self.plan, Plan::Hold(_)) || !scene.airborne {
+                    self.plan = Plan::Hold(Hold::default());
+                }
+                match &mut self.plan {
+                    Plan::Hold(hold) => Wish::fly(hold.fly(scene)),
+                    _ => Wish::fly(scene.stop()),
+                }
+            }
+            FlightMode::Takeoff => {
+                if !matches!(self.plan, Plan::Takeoff(_)) {
+                    self.plan = Plan::Takeoff(Takeoff::new(scene, scene.flying.takeoff_height_m));
+                }
+                match &self.plan {
+                    Plan::Takeoff(takeoff) => takeoff.fly(scene),
+                    _ => Wish::fly(scene.stop()),
+                }
+            }
+            FlightMode::Land => {
+                if !matches!(self.plan, Plan::Land(_)) {
+                    self.plan = Plan::Land(Land::default());
+                }
+                match &mut self.plan {
+                    Plan::Land(land) => land.fly(scene),
+                    _ => Wish::fly(scene.stop()),
+                }
+            }
+            FlightMode::Return => {
+                if !matches!(self.plan, Plan::Return(_)) {
+                    self.plan = Plan::Return(Return::new(scene));
+                }
+                match &mut self.plan {
+                    Plan::Return(home) => home.fly(scene),
+                    _ => Wish::fly(scene.stop()),
+                }
+            }
+            FlightMode::Mission => self.fly_mission(settings, scene, orders, reached, notices),
+            FlightMode::Offboard => {
+                if !matches!(self.plan, Plan::Targets(_)) {
+                    self.plan = Plan::Targets(Targets::default());
+                }
+                match (&mut self.plan, target) {
+                    (Plan::Targets(targets), Some(target)) => targets.fly(target, scene, lift),
+                    _ => Wish::fly(scene.stop()),
+                }
+            }
+            FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised => {
+                let sticks = sticks.copied().unwrap_or_default();
+                sticks::fly(self.mode, &sticks, scene, lift)
+            }
+        }
+    }
+
+    fn fly_mission(
+        &mut self,
+        settings: &Settings,
+        scene: &Scene<'_>,
+        orders: &Orders,
+        reached: &mut Option<u16>,
+        notices: &mut Notices,
+    ) -> Wish {
+        let (net, home_m) = (&settings.net, scene.home_m);
+        let progress = self.mission.fly(orders.leg.as_ref(), scene, |place_m| net.encloses(&home_m, place_m, 0.0));
+        *reached = progress.reached;
+        if progress.refused {
+            notices.push(Notice::ItemRefused);
+            return Wish { done: true, ..Wish::fly(scene.stop()) };
+        }
+        if let Some((mode, number)) = progress.then {
+            self.change(mode, Reason::Mission, notices);
+            self.mission.resume(0);
+            (self.lands_item, self.enters) = (Some(number), false);
+            return Wish { lifts: scene.airborne, ..Wish::fly(scene.stop()) };
+        }
+        progress.wish
+    }
+}
+
+/// Returns the setpoint of a vehicle that has touched the ground: as it stands, so that no law pushes it about, and
+/// with little thrust.
+fn settled(state: &State, gravity_m_s2: f32) -> Setpoint {
+    Setpoint {
+        position_m: state.position_m,
+        velocity_m_s: state.velocity_m_s,
+        acceleration_m_s2: Vector3::new(0.0, 0.0, -SETTLES_SHARE * gravity_m_s2),
+        yaw_rad: state.attitude_rad.z,
+        ..Setpoint::default()
+    }
+}
+
+fn is_finite(place_m: &Vector3<f32>) -> bool {
+    place_m.iter().all(|value| value.is_finite())
+}

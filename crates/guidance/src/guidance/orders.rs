@@ -1,0 +1,126 @@
+//! Carries out orders, or says why not.
+
+use super::{Memory, Plan};
+use crate::course::{Hold, Takeoff};
+use crate::mode::FlightMode;
+use crate::notice::{Notices, Reason};
+use crate::order::{Declined, Order};
+use crate::settings::Settings;
+use crate::table::{self, Conditions};
+use afbc_types::State;
+use nalgebra::Vector3;
+
+/// Largest coordinate of a place that is flown to \[m\].
+const PLACE_MAX_M: f32 = 9e4;
+
+impl Memory {
+    /// Carries out an order, or says why not.
+    pub(super) fn order(
+        &mut self,
+        settings: &Settings,
+        order: &Order,
+        state: Option<&State>,
+        seen: &Conditions,
+        notices: &mut Notices,
+    ) -> Result<(), Declined> {
+        let select = |mode: FlightMode| table::select(mode, seen);
+        match *order {
+            Order::Select(mode) => {
+                select(mode)?;
+                let height_m = Vector3::new(0.0, 0.0, settings.flying.takeoff_height_m);
+                let climbs = state.filter(|_| mode == FlightMode::Takeoff);
+                if climbs.is_some_and(|state| !self.is_inside(settings, &(state.position_m + height_m))) {
+                    return Err(Declined::OutsideFence);
+                }
+                if mode != self.mode || mode == FlightMode::Hold {
+                    self.ordered(mode, notices);
+                }
+                Ok(())
+            }
+            Order::TakeOff(height_m) => {
+                let height_m = height_m.unwrap_or(settings.flying.takeoff_height_m);
+                if !(height_m > 0.0 && height_m <= 1000.0) {
+                    return Err(Declined::OutOfRange);
+                }
+                if !seen.armed {
+                    return Err(Declined::NotArmed);
+                }
+                select(FlightMode::Takeoff)?;
+                let state = state.ok_or(Declined::NoPosition)?;
+                let to_m = state.position_m + Vector3::new(0.0, 0.0, height_m);
+                if !self.is_inside(settings, &to_m) {
+                    return Err(Declined::OutsideFence);
+                }
+                self.ordered(FlightMode::Takeoff, notices);
+                self.limiter.rest(state);
+                self.plan = Plan::Takeoff(Takeoff::above(state.position_m, height_m));
+                Ok(())
+            }
+            Order::GoTo { position_m, yaw_rad, speed_m_s } => {
+                let speed_ok = speed_m_s.is_none_or(|speed_m_s| speed_m_s > 0.0 && speed_m_s <= 1e3);
+                if !speed_ok || !is_place(&position_m) || yaw_rad.abs() > 1e3 {
+                    return Err(Declined::OutOfRange);
+                }
+                if !seen.armed {
+                    return Err(Declined::NotArmed);
+                }
+                if !seen.airborne {
+                    return Err(Declined::OnGround);
+                }
+                select(FlightMode::Hold)?;
+                let present = self.limiter.setpoint().ok_or(Declined::NoPosition)?;
+                let kept = match &self.plan {
+                    Plan::Hold(Hold { at_m: Some(at_m), .. }) if self.mode == FlightMode::Hold => *at_m,
+                    _ => present.position_m,
+                };
+                let to_m = position_m.zip_map(&kept, |new, old| if new.is_nan() { old } else { new });
+                if !self.is_inside(settings, &to_m) {
+                    return Err(Declined::OutsideFence);
+                }
+                self.ordered(FlightMode::Hold, notices);
+                let yaw_rad = (!yaw_rad.is_nan()).then_some(yaw_rad);
+                self.plan = Plan::Hold(Hold { at_m: Some(to_m), yaw_rad, speed_m_s });
+                Ok(())
+            }
+            Order::Speed(speed_m_s) => {
+                if !(speed_m_s > 0.0 && speed_m_s <= 1e3) {
+                    return Err(Declined::OutOfRange);
+                }
+                self.speed_m_s = speed_m_s;
+                Ok(())
+            }
+            Order::Home(place_m) => {
+                let place_m = match (place_m, state) {
+                    (Some(place_m), _) if place_m.iter().all(|value| value.abs() <= PLACE_MAX_M) => place_m,
+                    (Some(_), _) => return Err(Declined::OutOfRange),
+                    (None, Some(state)) => state.position_m,
+                    (None, None) => return Err(Declined::NoPosition),
+                };
+                (self.home_m, self.home_ordered) = (Some(place_m), true);
+                Ok(())
+            }
+            Order::Resume(number) => {
+                if !seen.mission {
+                    return Err(Declined::NoMission);
+                }
+                self.mission.resume(number);
+                self.lands_item = None;
+                Ok(())
+            }
+        }
+    }
+
+    fn ordered(&mut self, mode: FlightMode, notices: &mut Notices) {
+        self.change(mode, Reason::Ordered, notices);
+        self.failsafe = None;
+    }
+
+    pub(super) fn is_inside(&self, settings: &Settings, place_m: &Vector3<f32>) -> bool {
+        self.home_m.is_none_or(|home_m| settings.net.encloses(&home_m, place_m, 0.0))
+    }
+}
+
+/// True if every coordinate is a number that is flown to, or NaN.
+fn is_place(place_m: &Vector3<f32>) -> bool {
+    place_m.iter().all(|value| value.is_nan() || value.abs() <= PLACE_MAX_M)
+}

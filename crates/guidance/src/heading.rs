@@ -1,0 +1,77 @@
+//! Motion of the heading, within rate and acceleration.
+
+use afbc_control::math::{max, min, sqrt, wrap_angle};
+
+/// Rate of decay of a small error \[1/s\].
+const APPROACH_1_S: f32 = 2.0;
+/// Rate of decay of a small error of the rate \[1/s\].
+const SETTLE_1_S: f32 = 8.0;
+/// Share of the largest acceleration with which it brakes.
+const BRAKING: f32 = 0.7;
+/// Share of the largest rate that is aimed at.
+const AIM: f32 = 0.99;
+/// Errors of angle, and of its rate, at which a heading counts as reached and is the wanted one to the bit
+/// \[rad, rad/s\].
+const REACHED_RAD: f32 = 1e-3;
+const REACHED_RAD_S: f32 = 5e-3;
+
+/// What the heading tends to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Turn {
+    /// A heading, which turns at a rate \[rad, rad/s\].
+    To(f32, f32),
+    /// A rate \[rad/s\].
+    By(f32),
+}
+
+/// Heading and two derivatives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Heading {
+    pub(crate) yaw_rad: f32,
+    pub(crate) rate_rad_s: f32,
+    pub(crate) acceleration_rad_s2: f32,
+}
+
+/// Limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Turning {
+    pub(crate) rate_rad_s: f32,
+    pub(crate) acceleration_rad_s2: f32,
+}
+
+impl Heading {
+    /// A heading at rest.
+    pub(crate) fn new(yaw_rad: f32) -> Self {
+        Heading { yaw_rad, rate_rad_s: 0.0, acceleration_rad_s2: 0.0 }
+    }
+
+    /// Advances it by a step.
+    pub(crate) fn advance(&mut self, turn: &Turn, limits: &Turning, dt_s: f32) {
+        let most = AIM * limits.rate_rad_s;
+        let bounded = |value: f32, most: f32| max(min(value, most), -most);
+        let (wanted, change) = match *turn {
+            Turn::By(rate) => (bounded(rate, most), 0.0),
+            Turn::To(yaw, rate) => {
+                let error = wrap_angle(yaw - self.yaw_rad);
+                let off = rate - self.rate_rad_s;
+                // The remaining step is smaller than what the law sees.
+                let near = error.abs() <= REACHED_RAD + off.abs() * dt_s && off.abs() <= REACHED_RAD_S;
+                if near && rate.abs() <= limits.rate_rad_s {
+                    *self = Heading { yaw_rad: yaw, rate_rad_s: rate, acceleration_rad_s2: 0.0 };
+                    return;
+                }
+                let braking = BRAKING * limits.acceleration_rad_s2;
+                let c = braking / APPROACH_1_S;
+                let root = sqrt(c * c + 2.0 * braking * error.abs());
+                let approach = error * (2.0 * braking / (root + c));
+                let wanted = rate + approach;
+                if wanted.abs() <= most { (wanted, off * (braking / root)) } else { (bounded(wanted, most), 0.0) }
+            }
+        };
+        let acceleration = change + (wanted - self.rate_rad_s) * SETTLE_1_S;
+        let acceleration = bounded(acceleration, limits.acceleration_rad_s2);
+        self.yaw_rad = wrap_angle(self.yaw_rad + (self.rate_rad_s + 0.5 * acceleration * dt_s) * dt_s);
+        self.rate_rad_s += acceleration * dt_s;
+        self.acceleration_rad_s2 = acceleration;
+    }
+}

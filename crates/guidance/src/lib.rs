@@ -1,0 +1,45 @@
+//! Guidance: what the vehicle shall do next, as a setpoint for the law.
+//!
+//! A station, a companion computer or a pilot selects a [flight mode](FlightMode) and gives [orders](Order), targets
+//! and sticks. Frames and units are those of [`afbc_types`]. Every mode, transition and failsafe is described in
+//! docs/modes.md.
+//!
+//! # Reading order
+//!
+//! 1. [`guidance`]: the tick.
+//! 2. [`mode`], [`order`]: what may be asked for; [`table`]: the transitions between modes.
+//! 3. [`limiter`]: how any target becomes a smooth flight.
+//! 4. [`net`], [`battery`], [`checks`], [`notice`]: what is watched and announced.
+//! 5. [`settings`]: the parameters.
+#![no_std]
+
+pub mod battery;
+pub mod checks;
+mod course;
+pub mod guidance;
+mod heading;
+pub mod lift;
+pub mod limiter;
+mod mission;
+pub mod mode;
+pub mod net;
+pub mod notice;
+pub mod order;
+mod scene;
+pub mod settings;
+mod shaper;
+mod sticks;
+pub mod table;
+mod targets;
+
+pub use battery::Reading;
+pub use checks::{Check, Checks};
+pub use guidance::{Guidance, Guided, Sight};
+pub use lift::Lift;
+pub use limiter::{Aim, Limiter};
+pub use mode::FlightMode;
+pub use net::{Net, Sensors};
+pub use notice::{Cause, Notice, Notices, Reason, Severity};
+pub use order::{AttitudeTarget, Declined, Given, Item, Leg, MotionTarget, Order, Orders, Sticks, Target};
+pub use settings::{Flying, Limits, Settings};
+pub use table::{Action, Conditions};

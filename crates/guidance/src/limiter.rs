@@ -1,0 +1,407 @@
+//! Trajectory limiter: makes a smooth flight of any target, within limits of speed, acceleration and jerk.
+//!
+//! Targets that are a flight themselves, whose position, velocity and acceleration fit one another and the limits, pass
+//! unchanged to the bit, once the limiter has caught up. Between two messages of such a stream it goes on with their
+//! velocity, acceleration, and the jerk between the last two.
+
+use crate::heading::{Heading, Turn, Turning};
+use crate::settings::Limits;
+use crate::shaper::{Goal, Motion, Reach, Shape, capped};
+use afbc_control::math::{max, min, sqrt};
+use afbc_types::{Declared, OutOfRange, Setpoint, State};
+use nalgebra::{Vector1, Vector2, Vector3};
+
+/// Time constant over which a passing stream's misfits add up \[s\].
+const MISFIT_S: f32 = 0.5;
+/// Misfits up to which it passes: of the position \[m\], also as a time at its speed \[s\], and of the velocity
+/// \[m/s\].
+const MISFIT_M: f32 = 0.03;
+const MISFIT_TIME_S: f32 = 0.02;
+const MISFIT_M_S: f32 = 0.15;
+/// Difference of the acceleration that is not a matter of jerk \[m/s2\].
+const MISFIT_M_S2: f32 = 0.1;
+/// Distance and speed at which a moving stream is caught up with \[m, m/s\], also as a time at its speed and
+/// acceleration \[s\].
+const CAUGHT_M: f32 = 5e-3;
+const CAUGHT_M_S: f32 = 0.02;
+const CAUGHT_TIME_S: f32 = 2e-3;
+/// Likewise, acceleration \[m/s2\], for a target at rest.
+const STANDS_M: f32 = 1e-4;
+const STANDS_M_S: f32 = 1e-3;
+const STANDS_M_S2: f32 = 0.01;
+/// Longest time between two messages of one stream \[s\].
+const INTERVAL_MAX_S: f32 = 0.5;
+
+/// A target; NaN where nothing is given. Without position and velocity the acceleration counts; with nothing at all it
+/// stops.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aim {
+    /// Position \[m\].
+    pub position_m: Vector3<f32>,
+    /// Velocity, with a position that of the target \[m/s\].
+    pub velocity_m_s: Vector3<f32>,
+    /// Acceleration, likewise \[m/s2\].
+    pub acceleration_m_s2: Vector3<f32>,
+    /// Heading \[rad\].
+    pub yaw_rad: f32,
+    /// Rate of the heading \[rad/s\].
+    pub yaw_rate_rad_s: f32,
+    /// Largest horizontal speed of approach \[m/s\].
+    pub speed_m_s: f32,
+    /// Likewise upwards and downwards \[m/s\].
+    pub up_m_s: f32,
+    /// See [`up_m_s`](Self::up_m_s).
+    pub down_m_s: f32,
+    /// Time of the message, if it is one of a stream \[us\].
+    pub sent_us: Option<u64>,
+}
+
+impl Aim {
+    /// A target without anything given: stop.
+    pub fn stop(speed_m_s: f32, up_m_s: f32, down_m_s: f32) -> Self {
+        let none = Vector3::repeat(f32::NAN);
+        Aim {
+            position_m: none,
+            velocity_m_s: none,
+            acceleration_m_s2: none,
+            yaw_rad: f32::NAN,
+            yaw_rate_rad_s: f32::NAN,
+            speed_m_s,
+            up_m_s,
+            down_m_s,
+            sent_us: None,
+        }
+    }
+}
+
+/// The limiter, and what it has made so far.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limiter {
+    limits: Limits,
+    horizontal: Shape,
+    vertical: Shape,
+    now: Option<Now>,
+    stream: Option<Stream>,
+}
+
+/// The limited motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Now {
+    horizontal: Motion<2>,
+    vertical: Motion<1>,
+    heading: Heading,
+    /// Sums of the misfits of a stream that passes; none if none does.
+    misfit: Option<Misfit>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Misfit {
+    position_m: Vector3<f32>,
+    velocity_m_s: Vector3<f32>,
+}
+
+/// A target with all its parts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Complete {
+    position_m: Vector3<f32>,
+    velocity_m_s: Vector3<f32>,
+    acceleration_m_s2: Vector3<f32>,
+}
+
+/// A stream of targets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stream {
+    sent_us: u64,
+    /// The newest, and where it has got to since.
+    last: Complete,
+    present: Complete,
+    /// Time since the newest, and between it and the one before \[s\].
+    since_s: f32,
+    interval_s: f32,
+    /// Jerk between these two.
+    jerk_m_s3: Vector3<f32>,
+    /// True if position and velocity of the last two fit each other.
+    fits: bool,
+}
+
+impl Limiter {
+    /// Makes it for these limits.
+    ///
+    /// # Errors
+    /// The first limit out of range.
+    pub fn new(limits: Limits) -> Result<Self, OutOfRange> {
+        limits.validate()?;
+        Ok(Limiter::of(limits))
+    }
+
+    fn of(limits: Limits) -> Self {
+        Limiter {
+            horizontal: Shape::new(limits.acceleration_m_s2, limits.jerk_m_s3),
+            vertical: Shape::new(limits.vertical_acceleration_m_s2, limits.jerk_m_s3),
+            limits,
+            now: None,
+            stream: None,
+        }
+    }
+
+    /// Changes the limits, which must be valid; the motion goes on.
+    pub(crate) fn set(&mut self, limits: Limits) {
+        *self = Limiter { now: self.now, stream: self.stream, ..Limiter::of(limits) };
+    }
+
+    /// Begins at the vehicle's state, with its velocity as far as the limits allow.
+    pub fn anchor(&mut self, state: &State) {
+        let (position, velocity) = (state.position_m, state.velocity_m_s);
+        let Limits { speed_m_s, up_m_s, down_m_s, .. } = self.limits;
+        let climb = min(max(velocity.z, -down_m_s), up_m_s);
+        self.now = Some(Now {
+            horizontal: Motion::new(position.xy(), capped(velocity.xy(), speed_m_s)),
+            vertical: Motion::new(Vector1::new(position.z), Vector1::new(climb)),
+            heading: Heading::new(state.attitude_rad.z),
+            misfit: None,
+        });
+        self.stream = None;
+    }
+
+    /// Begins at the vehicle's state at rest.
+    pub fn rest(&mut self, state: &State) {
+        self.anchor(&State { velocity_m_s: Vector3::zeros(), ..*state });
+    }
+
+    /// Keeps the horizontal motion and the heading with the vehicle, which flies these without a setpoint.
+    pub fn follow(&mut self, state: &State) {
+        let capped_m_s = capped(state.velocity_m_s.xy(), self.limits.speed_m_s);
+        if let Some(now) = &mut self.now {
+            now.horizontal = Motion::new(state.position_m.xy(), capped_m_s);
+        }
+    }
+
+    /// Returns the present setpoint; none before the first [`anchor`](Self::anchor).
+    pub fn setpoint(&self) -> Option<Setpoint> {
+        let Now { horizontal: h, vertical: v, heading, .. } = self.now.as_ref()?;
+        let joined = |h: Vector2<f32>, v: Vector1<f32>| Vector3::new(h.x, h.y, v.x);
+        Some(Setpoint {
+            position_m: joined(h.position, v.position),
+            velocity_m_s: joined(h.velocity, v.velocity),
+            acceleration_m_s2: joined(h.acceleration, v.acceleration),
+            jerk_m_s3: joined(h.jerk, v.jerk),
+            yaw_rad: heading.yaw_rad,
+            yaw_rate_rad_s: heading.rate_rad_s,
+            yaw_acceleration_rad_s2: heading.acceleration_rad_s2,
+            ..Setpoint::default()
+        })
+    }
+
+    /// True while the targets pass unchanged.
+    pub fn passes(&self) -> bool {
+        self.now.as_ref().is_some_and(|now| now.misfit.is_some())
+    }
+
+    /// Advances by one step towards `aim`, whose given values are plausible; nothing before the first
+    /// [`anchor`](Self::anchor).
+    pub fn advance(&mut self, aim: &Aim, dt_s: f32) {
+        let complete = complete(aim);
+        let (target, jerk_m_s3, interval_s, fits) = match (&complete, aim.sent_us) {
+            (Some(complete), Some(sent_us)) => {
+                let stream = Stream::next(self.stream, complete, sent_us, dt_s, self.limits.jerk_max_m_s3);
+                let told = (Some(stream.present), stream.jerk_m_s3, stream.interval_s, stream.fits);
+                self.stream = Some(stream);
+                told
+            }
+            _ => {
+                self.stream = None;
+                (complete, Vector3::zeros(), 0.0, false)
+            }
+        };
+        let limits = &self.limits;
+        let Some(now) = &mut self.now else { return };
+        let turn = match (aim.yaw_rad.is_nan(), aim.yaw_rate_rad_s.is_nan()) {
+            (true, true) => Turn::By(0.0),
+            (true, false) => Turn::By(aim.yaw_rate_rad_s),
+            (false, true) => Turn::To(aim.yaw_rad, 0.0),
+            (false, false) => Turn::To(aim.yaw_rad, aim.yaw_rate_rad_s),
+        };
+        let Limits { yaw_rate_rad_s, yaw_acceleration_rad_s2, .. } = *limits;
+        let turning = Turning { rate_rad_s: yaw_rate_rad_s, acceleration_rad_s2: yaw_acceleration_rad_s2 };
+        now.heading.advance(&turn, &turning, dt_s);
+        if let Some(target) = &target
+            && now.pass(target, jerk_m_s3, limits, interval_s, dt_s)
+        {
+            return;
+        }
+        let (p, v, a) = match target {
+            // An acceleration that does not belong to a flight would only drive it away.
+            Some(target) if !fits => (target.position_m, target.velocity_m_s, Vector3::zeros()),
+            Some(target) => (target.position_m, target.velocity_m_s, target.acceleration_m_s2),
+            None => (aim.position_m, aim.velocity_m_s, aim.acceleration_m_s2),
+        };
+        let goal = goal(p.xy(), v.xy(), a.xy(), jerk_m_s3.xy());
+        let (speed_m_s, approach_m_s) = (limits.speed_m_s, min(aim.speed_m_s, limits.speed_m_s));
+        let reach = Reach {
+            approach: (approach_m_s, approach_m_s),
+            speed: (speed_m_s, speed_m_s),
+            acceleration: limits.acceleration_max_m_s2,
+            jerk: limits.jerk_max_m_s3,
+        };
+        self.horizontal.advance(&mut now.horizontal, &goal, &reach, dt_s);
+        let one = |vector: Vector3<f32>| Vector1::new(vector.z);
+        let goal = self::goal(one(p), one(v), one(a), one(jerk_m_s3));
+        let reach = Reach {
+            approach: (min(aim.up_m_s, limits.up_m_s), min(aim.down_m_s, limits.down_m_s)),
+            speed: (limits.up_m_s, limits.down_m_s),
+            acceleration: limits.vertical_acceleration_m_s2,
+            jerk: limits.jerk_max_m_s3,
+        };
+        self.vertical.advance(&mut now.vertical, &goal, &reach, dt_s);
+    }
+}
+
+/// Returns a target that has a position, with zeros for what is not given of the rest.
+fn complete(aim: &Aim) -> Option<Complete> {
+    let or_zero = |vector: Vector3<f32>| vector.map(|value| if value.is_nan() { 0.0 } else { value });
+    let Aim { position_m, velocity_m_s, acceleration_m_s2, .. } = *aim;
+    let given = !position_m.iter().any(|value| value.is_nan());
+    given.then(|| Complete {
+        position_m,
+        velocity_m_s: or_zero(velocity_m_s),
+        acceleration_m_s2: or_zero(acceleration_m_s2),
+    })
+}
+
+/// Returns the goal of one or two coordinates, any of which may be NaN.
+fn goal<const D: usize>(
+    position: nalgebra::SVector<f32, D>,
+    velocity: nalgebra::SVector<f32, D>,
+    acceleration: nalgebra::SVector<f32, D>,
+    jerk: nalgebra::SVector<f32, D>,
+) -> Goal<D> {
+    let given = |vector: nalgebra::SVector<f32, D>| (!vector.iter().any(|value| value.is_nan())).then_some(vector);
+    let zero = nalgebra::SVector::zeros();
+    let (position, velocity, acceleration) = (given(position), given(velocity), given(acceleration));
+    match (position, velocity, acceleration) {
+        (None, None, Some(acceleration)) => Goal { position: None, velocity: None, acceleration, jerk: zero },
+        _ => Goal {
+            position,
+            velocity: Some(velocity.unwrap_or(zero)),
+            acceleration: acceleration.unwrap_or(zero),
+            jerk,
+        },
+    }
+}
+
+impl Complete {
+    fn advance(&mut self, jerk_m_s3: Vector3<f32>, dt_s: f32) {
+        let Complete { velocity_m_s, acceleration_m_s2, .. } = *self;
+        self.position_m += (velocity_m_s + acceleration_m_s2 * (0.5 * dt_s)) * dt_s;
+        self.velocity_m_s += (acceleration_m_s2 + jerk_m_s3 * (0.5 * dt_s)) * dt_s;
+        self.acceleration_m_s2 += jerk_m_s3 * dt_s;
+    }
+}
+
+impl Stream {
+    /// Returns the stream one step later, with a message if `sent_us` is news.
+    fn next(stream: Option<Stream>, target: &Complete, sent_us: u64, dt_s: f32, jerk_max_m_s3: f32) -> Self {
+        let zero = Vector3::zeros();
+        let first = Stream {
+            sent_us,
+            last: *target,
+            present: *target,
+            since_s: 0.0,
+            interval_s: 0.0,
+            jerk_m_s3: zero,
+            fits: false,
+        };
+        let Some(mut stream) = stream else { return first };
+        stream.since_s += dt_s;
+        if stream.sent_us == sent_us {
+            if stream.fits {
+                stream.present.advance(stream.jerk_m_s3, dt_s);
+            }
+            return stream;
+        }
+        let interval_s = stream.since_s;
+        if interval_s > INTERVAL_MAX_S {
+            return first;
+        }
+        let mean_m_s = (stream.last.velocity_m_s + target.velocity_m_s) * 0.5;
+        let misfit_m = target.position_m - stream.last.position_m - mean_m_s * interval_s;
+        let misfit_m_s = {
+            let mean_m_s2 = (stream.last.acceleration_m_s2 + target.acceleration_m_s2) * 0.5;
+            target.velocity_m_s - stream.last.velocity_m_s - mean_m_s2 * interval_s
+        };
+        let allowed_m = MISFIT_M * 0.5 + MISFIT_TIME_S * 0.5 * sqrt(mean_m_s.norm_squared());
+        let fits =
+            misfit_m.norm_squared() <= allowed_m * allowed_m && misfit_m_s.norm_squared() <= MISFIT_M_S * MISFIT_M_S;
+        let change_m_s2 = target.acceleration_m_s2 - stream.last.acceleration_m_s2;
+        let jerk_m_s3 = if fits { capped(change_m_s2 / interval_s, jerk_max_m_s3) } else { zero };
+        Stream { interval_s, jerk_m_s3, fits, ..first }
+    }
+}
+
+impl Now {
+    /// True if `target` passes unchanged: then it is the present motion.
+    fn pass(
+        &mut self,
+        target: &Complete,
+        jerk_m_s3: Vector3<f32>,
+        limits: &Limits,
+        interval_s: f32,
+        dt_s: f32,
+    ) -> bool {
+        let (h, v) = (&self.horizontal, &self.vertical);
+        let joined = |h: Vector2<f32>, v: Vector1<f32>| Vector3::new(h.x, h.y, v.x);
+        let acceleration_m_s2 = joined(h.acceleration, v.acceleration);
+        let velocity_m_s = joined(h.velocity, v.velocity);
+        let place = |v: Vector3<f32>| (v.xy(), Vector1::new(v.z));
+        let (place_h, place_v) = place(target.position_m);
+        let step_m = (velocity_m_s + acceleration_m_s2 * (0.5 * dt_s)) * dt_s;
+        let off_m = joined(h.to(&place_h), v.to(&place_v)) - step_m;
+        let off_m_s = target.velocity_m_s - velocity_m_s - acceleration_m_s2 * dt_s;
+        let off_m_s2 = target.acceleration_m_s2 - acceleration_m_s2;
+        let within = |vector: &Vector3<f32>, most: f32| vector.norm_squared() <= most * most;
+        let jerk_m_s2 = 1.25 * limits.jerk_max_m_s3 * max(interval_s, dt_s);
+        let stands = target.velocity_m_s == Vector3::zeros() && target.acceleration_m_s2 == Vector3::zeros();
+        let misfit = match self.misfit {
+            Some(Misfit { position_m, velocity_m_s }) => {
+                let left = 1.0 - dt_s / MISFIT_S;
+                let misfit =
+                    Misfit { position_m: position_m * left + off_m, velocity_m_s: velocity_m_s * left + off_m_s };
+                let most_m = MISFIT_M + MISFIT_TIME_S * sqrt(target.velocity_m_s.norm_squared());
+                let fits = within(&misfit.position_m, most_m)
+                    && within(&misfit.velocity_m_s, MISFIT_M_S)
+                    && within(&off_m_s2, MISFIT_M_S2 + jerk_m_s2);
+                fits.then_some(misfit)
+            }
+            None => {
+                let caught = if stands {
+                    within(&off_m, STANDS_M) && within(&off_m_s, STANDS_M_S) && within(&off_m_s2, STANDS_M_S2)
+                } else {
+                    let size = |vector: &Vector3<f32>| sqrt(vector.norm_squared());
+                    within(&off_m, CAUGHT_M + CAUGHT_TIME_S * size(&target.velocity_m_s))
+                        && within(&off_m_s, CAUGHT_M_S + CAUGHT_TIME_S * size(&target.acceleration_m_s2))
+                        && within(&off_m_s2, MISFIT_M_S2 + jerk_m_s2)
+                };
+                caught.then_some(Misfit { position_m: off_m, velocity_m_s: off_m_s })
+            }
+        };
+        self.misfit = misfit.filter(|_| allowed(target, limits));
+        if self.misfit.is_none() {
+            return false;
+        }
+        let ((vh, vv), (ah, av)) = (place(target.velocity_m_s), place(target.acceleration_m_s2));
+        let (jh, jv) = place(jerk_m_s3);
+        self.horizontal = Motion::moving(place_h, vh, ah, jh);
+        self.vertical = Motion::moving(place_v, vv, av, jv);
+        true
+    }
+}
+
+/// True if speed and acceleration of a target are within the limits.
+fn allowed(target: &Complete, limits: &Limits) -> bool {
+    let Complete { velocity_m_s: v, acceleration_m_s2: a, .. } = target;
+    let within = |vector: Vector2<f32>, most: f32| vector.norm_squared() <= most * most;
+    within(v.xy(), limits.speed_m_s)
+        && (-limits.down_m_s..=limits.up_m_s).contains(&v.z)
+        && within(a.xy(), limits.acceleration_max_m_s2)
+        && a.z.abs() <= limits.vertical_acceleration_m_s2
+}

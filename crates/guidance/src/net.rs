@@ -1,0 +1,254 @@
+//! The safety net: what it watches, and which action each finding has.
+//!
+//! The strongest action of all findings counts; of several findings with the same action the first in the order of
+//! [`Cause::ALL`] is named.
+
+use crate::battery::{Cells, Reading};
+use crate::mode::FlightMode;
+use crate::notice::{Cause, Notice, Notices};
+use crate::table::Action;
+use afbc_types::{Declaration, OutOfRange, Range, parameters};
+use nalgebra::Vector3;
+
+/// Distance inside the geofence at which it no longer counts as left \[m\].
+const FENCE_MARGIN_M: f32 = 1.0;
+
+parameters! {
+    /// Parameters of the safety net.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Net {
+        /// Largest horizontal distance from home; 0 for none.
+        #[parameter(GF_MAX_HOR_DIST, "m", 0.0..=10000.0)]
+        pub fence_radius_m: f32 = 0.0,
+        /// Largest height above home; 0 for none.
+        #[parameter(GF_MAX_VER_DIST, "m", 0.0..=10000.0)]
+        pub fence_height_m: f32 = 0.0,
+        /// Outside the geofence: 0 nothing, 1 warn, 2 hold, 3 return, 4 and 5 land.
+        #[parameter(GF_ACTION, "number", 0.0..=5.0)]
+        pub fence_action: f32 = 2.0,
+        /// Time after which a silent station counts as lost.
+        #[parameter(COM_DL_LOSS_T, "s", 1.0..=300.0)]
+        pub station_lost_s: f32 = 10.0,
+        /// Station lost: 0 nothing, 1 hold, 2 return, 3 land.
+        #[parameter(NAV_DLL_ACT, "number", 0.0..=3.0)]
+        pub station_action: f32 = 2.0,
+        /// Targets lost in offboard mode: 0 land, 1 hold, 2 return.
+        #[parameter(COM_OBL_ACT, "number", 0.0..=2.0)]
+        pub targets_action: f32 = 1.0,
+        /// Sticks lost in a mode that they fly: 1 hold, 2 return, 3 land.
+        #[parameter(NAV_RCL_ACT, "number", 1.0..=3.0)]
+        pub sticks_action: f32 = 1.0,
+        /// A sensor has failed: 0 nothing, 1 warn, 2 hold, 3 return, 4 land.
+        #[parameter(COM_SENS_ACT, "number", 0.0..=4.0)]
+        pub sensors_action: f32 = 1.0,
+        /// Number of the battery's cells; 0 if it is not to be watched.
+        #[parameter(BAT1_N_CELLS, "number", 0.0..=24.0)]
+        pub cells: f32 = 0.0,
+        /// Voltage of an empty cell without load.
+        #[parameter(BAT1_V_EMPTY, "V", 1.0..=10.0)]
+        pub empty_v: f32 = 3.6,
+        /// Voltage of a full cell without load, more than of an empty one.
+        #[parameter(BAT1_V_CHARGED, "V", 1.0..=10.0)]
+        pub full_v: f32 = 4.05,
+        /// Resistance of a cell.
+        #[parameter(BAT1_R_INTERNAL, "ohm", 0.0..=1.0)]
+        pub resistance_ohm: f32 = 0.005,
+        /// Charge below which the battery is low, which is announced.
+        #[parameter(BAT_LOW_THR, "1", 0.0..=1.0)]
+        pub low: f32 = 0.15,
+        /// Charge below which it is critical, at most that of a low one.
+        #[parameter(BAT_CRIT_THR, "1", 0.0..=1.0)]
+        pub critical: f32 = 0.07,
+        /// Charge below which it is almost empty, at most the critical one.
+        #[parameter(BAT_EMERGEN_THR, "1", 0.0..=1.0)]
+        pub emergency: f32 = 0.05,
+        /// Battery: 0 warn, 1 return if critical, 2 land if critical, 3 return if critical and land if almost empty.
+        #[parameter(COM_LOW_BAT_ACT, "number", 0.0..=3.0)]
+        pub battery_action: f32 = 3.0,
+    }
+    together(net) {
+        for (declaration, value) in [
+            (Net::GF_ACTION, net.fence_action),
+            (Net::NAV_DLL_ACT, net.station_action),
+            (Net::COM_OBL_ACT, net.targets_action),
+            (Net::NAV_RCL_ACT, net.sticks_action),
+            (Net::COM_SENS_ACT, net.sensors_action),
+            (Net::BAT1_N_CELLS, net.cells),
+            (Net::COM_LOW_BAT_ACT, net.battery_action),
+        ] {
+            whole(&declaration, value)?;
+        }
+        let most = |range: Range, most: f32| Range { max: most.into(), ..range };
+        most(Net::BAT1_V_EMPTY.range, net.full_v - 0.05).check(net.empty_v)?;
+        most(Net::BAT_CRIT_THR.range, net.low).check(net.critical)?;
+        most(Net::BAT_EMERGEN_THR.range, net.critical).check(net.emergency)
+    }
+}
+
+/// Checks that a number in its range is a whole one.
+fn whole(declaration: &Declaration, value: f32) -> Result<(), OutOfRange> {
+    let whole = f64::from(value as i32);
+    Range { min: whole, max: whole, ..declaration.range }.check(value)
+}
+
+/// Sensors that have failed, one bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sensors {
+    /// Gyroscope or accelerometer.
+    pub inertial: bool,
+    /// Barometer.
+    pub barometer: bool,
+    /// Magnetometer.
+    pub magnetometer: bool,
+    /// Receiver of satellite navigation.
+    pub gnss: bool,
+    /// Tracker.
+    pub tracker: bool,
+}
+
+impl Sensors {
+    /// True if one has failed.
+    pub const fn any(self) -> bool {
+        self.inertial || self.barometer || self.magnetometer || self.gnss || self.tracker
+    }
+}
+
+/// What the net looks at in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Findings<'a> {
+    pub(crate) mode: FlightMode,
+    pub(crate) armed: bool,
+    pub(crate) descends: bool,
+    pub(crate) position_m: Option<Vector3<f32>>,
+    pub(crate) home_m: Option<Vector3<f32>>,
+    pub(crate) battery: Option<&'a Reading>,
+    pub(crate) sensors: Sensors,
+    /// Time since the station in control was heard \[us\]; none if it never was.
+    pub(crate) silent_us: Option<u32>,
+    pub(crate) targets: bool,
+    pub(crate) sticks: bool,
+    pub(crate) dt_s: f32,
+}
+
+/// What the net has found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Watch {
+    charge: Option<f32>,
+    /// Set of causes that hold, a bit each.
+    holds: u16,
+}
+
+fn bit(cause: Cause) -> u16 {
+    1 << cause as u16
+}
+
+impl Watch {
+    /// Returns the filtered charge of the battery, 0 to 1.
+    pub(crate) fn charge(&self) -> Option<f32> {
+        self.charge
+    }
+
+    /// True if the cause holds.
+    pub(crate) fn holds(&self, cause: Cause) -> bool {
+        self.holds & bit(cause) != 0
+    }
+
+    /// Looks, and returns the strongest action with its cause, and the set of causes that are new.
+    pub(crate) fn look(&mut self, net: &Net, seen: &Findings<'_>, notices: &mut Notices) -> (Action, Cause, u16) {
+        let cells =
+            Cells { number: net.cells, empty_v: net.empty_v, full_v: net.full_v, resistance_ohm: net.resistance_ohm };
+        cells.update(&mut self.charge, seen.battery, seen.dt_s);
+        let before = self.holds;
+        self.holds = 0;
+        let mut note = |cause: Cause, holds: bool| self.holds |= if holds { bit(cause) } else { 0 };
+        note(Cause::Descent, seen.armed && seen.descends);
+        // A battery does not recover in flight.
+        let below = |threshold: f32| self.charge.is_some_and(|charge| charge < threshold);
+        let was = |cause: Cause| seen.armed && before & bit(cause) != 0;
+        note(Cause::BatteryEmergency, below(net.emergency) || was(Cause::BatteryEmergency));
+        note(Cause::BatteryCritical, below(net.critical) || was(Cause::BatteryCritical));
+        note(Cause::BatteryLow, below(net.low) || was(Cause::BatteryLow));
+        note(Cause::Fence, seen.armed && net.is_outside(seen, was(Cause::Fence)));
+        note(Cause::Sensors, seen.sensors.any());
+        let lost = |silent_us: u32| silent_us as f32 * 1e-6 > net.station_lost_s;
+        note(Cause::Station, seen.armed && seen.silent_us.is_some_and(lost));
+        note(Cause::Targets, seen.armed && seen.mode == FlightMode::Offboard && !seen.targets);
+        note(Cause::Sticks, seen.armed && seen.mode.is_manual() && !seen.sticks);
+        let new = self.holds & !before;
+        let over = before & !self.holds;
+        if over != 0 && seen.armed {
+            for cause in [Cause::Fence, Cause::Sensors, Cause::Station] {
+                if over & bit(cause) != 0 {
+                    notices.push(Notice::Over(cause));
+                }
+            }
+        }
+        if self.holds == 0 {
+            return (Action::None, Cause::Descent, 0);
+        }
+        let (action, cause) = self.strongest(net);
+        (if seen.armed { action } else { Action::None }, cause, new)
+    }
+
+    fn strongest(&self, net: &Net) -> (Action, Cause) {
+        let found = Cause::ALL.into_iter().filter(|cause| self.holds(*cause));
+        found.fold((Action::None, Cause::Descent), |(strongest, of), cause| {
+            let action = net.action(cause);
+            if action > strongest { (action, cause) } else { (strongest, of) }
+        })
+    }
+}
+
+/// Announces the causes in the set `new` that have an action, but one.
+pub(crate) fn announce(net: &Net, new: u16, but: Option<Cause>, notices: &mut Notices) {
+    for cause in Cause::ALL {
+        if new & bit(cause) != 0 && Some(cause) != but && net.action(cause) > Action::None {
+            notices.push(Notice::Found(cause));
+        }
+    }
+}
+
+impl Net {
+    /// Returns the action of a cause.
+    pub fn action(&self, cause: Cause) -> Action {
+        use Action::{Hold, Land, None, Return, Warn};
+        let of = |number: f32, actions: &[Action]| actions.get(number as usize).copied().unwrap_or(Land);
+        match cause {
+            Cause::Descent => Land,
+            Cause::BatteryLow => Warn,
+            Cause::BatteryCritical => of(self.battery_action, &[Warn, Return, Land, Return]),
+            Cause::BatteryEmergency => of(self.battery_action, &[Warn, Return, Land, Land]),
+            Cause::Fence => of(self.fence_action, &[None, Warn, Hold, Return, Land, Land]),
+            Cause::Sensors => of(self.sensors_action, &[None, Warn, Hold, Return, Land]),
+            Cause::Station => of(self.station_action, &[None, Hold, Return, Land]),
+            Cause::Targets => of(self.targets_action, &[Land, Hold, Return]),
+            Cause::Sticks => of(self.sticks_action, &[Hold, Hold, Return, Land]),
+        }
+    }
+
+    /// True if the vehicle is outside the geofence, or was and is hardly inside.
+    fn is_outside(&self, seen: &Findings<'_>, was: bool) -> bool {
+        let (Some(position_m), Some(home_m)) = (seen.position_m, seen.home_m) else { return was };
+        let margin = if was { FENCE_MARGIN_M } else { 0.0 };
+        !self.encloses(&home_m, &position_m, margin)
+    }
+
+    /// Returns the height above home up to which a vehicle is well inside the geofence; infinite without one \[m\].
+    pub(crate) fn ceiling_m(&self) -> f32 {
+        if self.fence_height_m > 0.0 { inner(self.fence_height_m, FENCE_MARGIN_M) } else { f32::INFINITY }
+    }
+
+    /// True if a place lies inside the geofence, by at least `margin_m` of a fence that is larger than that.
+    pub(crate) fn encloses(&self, home_m: &Vector3<f32>, place_m: &Vector3<f32>, margin_m: f32) -> bool {
+        let off_m = place_m - home_m;
+        let (radius_m, height_m) = (inner(self.fence_radius_m, margin_m), inner(self.fence_height_m, margin_m));
+        let beyond_radius = self.fence_radius_m > 0.0 && off_m.xy().norm_squared() > radius_m * radius_m;
+        let beyond_height = self.fence_height_m > 0.0 && off_m.z > height_m;
+        !(beyond_radius || beyond_height)
+    }
+}
+
+/// Returns the size of a fence less a margin, at least half of it.
+fn inner(size_m: f32, margin_m: f32) -> f32 {
+    if size_m > 2.0 * margin_m { size_m - margin_m } else { 0.5 * size_m }
+}

@@ -1,0 +1,199 @@
+//! What a station, a companion computer or a pilot may ask for.
+
+use crate::mode::FlightMode;
+use afbc_flight_core::Stamped;
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Something to be done, answered once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Order {
+    /// Fly in this mode.
+    Select(FlightMode),
+    /// Take off to this height above where it stands, or to that of the parameters \[m\].
+    TakeOff(Option<f32>),
+    /// Fly to this place and hold there; NaN keeps a coordinate \[m\].
+    GoTo {
+        /// Place in the local frame \[m\].
+        position_m: Vector3<f32>,
+        /// Heading; NaN keeps it \[rad\].
+        yaw_rad: f32,
+        /// Horizontal speed; none for that of the parameters \[m/s\].
+        speed_m_s: Option<f32>,
+    },
+    /// Fly at most at this horizontal speed, until the mode changes \[m/s\].
+    Speed(f32),
+    /// Home is here, or at this place of the local frame \[m\].
+    Home(Option<Vector3<f32>>),
+    /// Go on with the mission at this item.
+    Resume(u16),
+}
+
+/// An order, with a ticket that identifies its answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Given {
+    /// The order.
+    pub order: Order,
+    /// Returned with the answer, and not used otherwise.
+    pub ticket: u8,
+}
+
+/// Why an order is not carried out. The numbers are part of the link's protocol, beside those of
+/// [`Refusal`](afbc_flight_core::Refusal).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Declined {
+    /// The vehicle does not know where it is.
+    NoPosition = 32,
+    /// The mode needs an armed vehicle.
+    NotArmed = 33,
+    /// The vehicle is on the ground.
+    OnGround = 34,
+    /// The vehicle flies already.
+    InFlight = 35,
+    /// No fresh targets of a companion computer.
+    NoTargets = 36,
+    /// No fresh sticks of a pilot.
+    NoSticks = 37,
+    /// No mission, or no such item.
+    NoMission = 38,
+    /// The place is outside the geofence.
+    OutsideFence = 39,
+    /// A number is out of range.
+    OutOfRange = 40,
+    /// A failsafe has the vehicle, and this mode is not above it.
+    Failsafe = 41,
+}
+
+/// A companion computer's target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// A motion.
+    Motion(MotionTarget),
+    /// An attitude and a thrust.
+    Attitude(AttitudeTarget),
+}
+
+/// A target of position, velocity or acceleration: NaN where there is none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionTarget {
+    /// Position \[m\].
+    pub position_m: Vector3<f32>,
+    /// Velocity \[m/s\].
+    pub velocity_m_s: Vector3<f32>,
+    /// Acceleration \[m/s2\].
+    pub acceleration_m_s2: Vector3<f32>,
+    /// Heading \[rad\].
+    pub yaw_rad: f32,
+    /// Rate of the heading \[rad/s\].
+    pub yaw_rate_rad_s: f32,
+    /// True if position and axes are those of the vehicle, level: forward, left, up.
+    pub body: bool,
+}
+
+/// A target of attitude and thrust.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AttitudeTarget {
+    /// Attitude.
+    pub attitude: UnitQuaternion<f32>,
+    /// Rate of the heading, NaN if the heading is the attitude's \[rad/s\].
+    pub yaw_rate_rad_s: f32,
+    /// Thrust, 0 to 1 of the most that the rotors give.
+    pub thrust: f32,
+}
+
+/// A pilot's sticks, -1 to 1: to the right, forward, up, to the right.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sticks {
+    /// Roll: positive to the right.
+    pub roll: f32,
+    /// Pitch: positive forward.
+    pub pitch: f32,
+    /// Throttle: 0 holds the height.
+    pub throttle: f32,
+    /// Yaw: positive clockwise, seen from above.
+    pub yaw: f32,
+}
+
+/// An item of a mission, in the local frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Item {
+    /// Take off to this height \[m\], local frame.
+    TakeOff {
+        /// Height in the local frame \[m\].
+        height_m: f32,
+    },
+    /// Fly to a place.
+    Waypoint {
+        /// Place in the local frame \[m\].
+        position_m: Vector3<f32>,
+        /// Heading; NaN: towards the place \[rad\].
+        yaw_rad: f32,
+        /// Time to stay there \[s\].
+        hold_s: f32,
+        /// Distance at which it counts as reached; 0 for that of the parameters \[m\].
+        within_m: f32,
+        /// True if the vehicle need not stop there.
+        fly_through: bool,
+    },
+    /// Land at a place; NaN: where it is.
+    Land {
+        /// Place in the local frame \[m\].
+        position_m: Vector3<f32>,
+    },
+    /// Return home and land.
+    Return,
+    /// Change the horizontal speed \[m/s\].
+    Speed(f32),
+}
+
+/// The item of a mission that the guidance [wants](crate::Order::Resume), and what follows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leg {
+    /// Number of the item.
+    pub number: u16,
+    /// Which upload of the mission it belongs to.
+    pub upload: u16,
+    /// The item.
+    pub item: Item,
+    /// True if none follows.
+    pub is_last: bool,
+}
+
+/// Largest number of queued orders.
+pub const ORDERS_MAX: usize = 4;
+
+/// What the link brings for the guidance.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Orders {
+    /// Newest target.
+    pub target: Option<Stamped<Target>>,
+    /// Newest sticks.
+    pub sticks: Option<Stamped<Sticks>>,
+    /// Item of the mission that was wanted last.
+    pub leg: Option<Leg>,
+    /// Time at which the station in control was last heard; none before \[us\].
+    pub heard_us: Option<u64>,
+    /// Orders, oldest first, without gaps; a tick of the guidance answers the first.
+    pub given: [Option<Given>; ORDERS_MAX],
+}
+
+impl Orders {
+    /// Queues an order; false if [`ORDERS_MAX`] are queued already, and it is dropped.
+    pub fn give(&mut self, given: Given) -> bool {
+        match self.given.iter_mut().find(|place| place.is_none()) {
+            Some(place) => {
+                *place = Some(given);
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// Returns a copy for the next tick, and removes the oldest order.
+    pub fn take(&mut self) -> Orders {
+        let taken = *self;
+        let [_, second, third, fourth] = self.given;
+        self.given = [second, third, fourth, None];
+        taken
+    }
+}

@@ -1,0 +1,229 @@
+//! Third-order motion towards a goal that may move, within speed, acceleration and jerk of its own.
+//!
+//! The distance e to the goal gives the speed of approach f, its error x the acceleration g:
+//!
+//! ```text
+//! f(e) = sqrt(c^2 + 2 B e) - c     c = 2 B^2/J'     stopping from it takes e, and at most B
+//! g(x) = sqrt(d^2 + 2 J" x) - d    d = J"/k2        likewise, with at most J"
+//! ```
+//!
+//! B, J' and J" are shares of the largest acceleration A and jerk J, so that there is something left to correct with.
+//! Near the goal this is a linear system with the rates k1 = B/c, k2 = 4 k1 and k3 = 5 k2, which does not
+//! overshoot. The speed of approach by the stopping distance is that of PX4's `computeMaxSpeedFromDistance`; the
+//! cascade of two such functions is ArduPilot's (`shape_pos_vel_accel`), in vectors, so that a flight from rest is
+//! straight.
+
+use afbc_control::math::{max, min, sqrt};
+use nalgebra::SVector;
+
+/// B as a share of A.
+const BRAKING: f32 = 0.7;
+/// J' as a share of J.
+const EASING: f32 = 0.9;
+/// J" as a share of J.
+const SETTLING: f32 = 0.55;
+/// Largest k1 \[1/s\]: a step of a millisecond must be short to the fastest of the three.
+const APPROACH_MAX_1_S: f32 = 12.0;
+/// Share of a speed limit that is aimed at, since the speed settles to it from both sides.
+const AIM: f32 = 0.98;
+
+/// Position and three derivatives. The position is kept in two parts, since a step far from the origin is smaller than
+/// what a single number resolves there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Motion<const D: usize> {
+    pub(crate) position: SVector<f32, D>,
+    below: SVector<f32, D>,
+    pub(crate) velocity: SVector<f32, D>,
+    pub(crate) acceleration: SVector<f32, D>,
+    pub(crate) jerk: SVector<f32, D>,
+}
+
+impl<const D: usize> Motion<D> {
+    /// Makes a motion without acceleration.
+    pub(crate) fn new(position: SVector<f32, D>, velocity: SVector<f32, D>) -> Self {
+        let zero = SVector::zeros();
+        Motion { position, below: zero, velocity, acceleration: zero, jerk: zero }
+    }
+
+    /// Makes a motion with all its parts.
+    pub(crate) fn moving(
+        position: SVector<f32, D>,
+        velocity: SVector<f32, D>,
+        acceleration: SVector<f32, D>,
+        jerk: SVector<f32, D>,
+    ) -> Self {
+        Motion { acceleration, jerk, ..Motion::new(position, velocity) }
+    }
+
+    /// Returns the distance to `position`.
+    pub(crate) fn to(&self, position: &SVector<f32, D>) -> SVector<f32, D> {
+        (position - self.position) - self.below
+    }
+
+    /// Advances it by a step at constant `jerk`.
+    pub(crate) fn advance(&mut self, jerk: SVector<f32, D>, dt_s: f32) {
+        let Motion { velocity, acceleration, .. } = *self;
+        self.below += (velocity + (acceleration * 0.5 + jerk * (dt_s / 6.0)) * dt_s) * dt_s;
+        let position = self.position + self.below;
+        self.below -= position - self.position;
+        self.position = position;
+        self.velocity += (acceleration + jerk * (0.5 * dt_s)) * dt_s;
+        self.acceleration += jerk * dt_s;
+        self.jerk = jerk;
+    }
+}
+
+/// What a motion tends to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Goal<const D: usize> {
+    /// None if the velocity is wanted only.
+    pub(crate) position: Option<SVector<f32, D>>,
+    /// None if the acceleration is wanted only.
+    pub(crate) velocity: Option<SVector<f32, D>>,
+    pub(crate) acceleration: SVector<f32, D>,
+    pub(crate) jerk: SVector<f32, D>,
+}
+
+/// Limits that may change from tick to tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Reach {
+    /// Largest speed of approach, in positive and in negative direction, for one coordinate; for two the first counts.
+    pub(crate) approach: (f32, f32),
+    /// Largest speed, likewise.
+    pub(crate) speed: (f32, f32),
+    /// Largest acceleration and jerk together with those of the goal.
+    pub(crate) acceleration: f32,
+    pub(crate) jerk: f32,
+}
+
+/// Constants of the shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Shape {
+    acceleration: f32,
+    jerk: f32,
+    /// B, c, J", d, 1/k2, k3
+    braking: f32,
+    c: f32,
+    settling: f32,
+    d: f32,
+    inverse_k2: f32,
+    k3: f32,
+}
+
+impl Shape {
+    /// Makes it for this acceleration and jerk, both positive.
+    pub(crate) fn new(acceleration: f32, jerk: f32) -> Self {
+        let braking = BRAKING * acceleration;
+        let k1 = min(EASING * jerk / (2.0 * braking), APPROACH_MAX_1_S);
+        let k2 = 4.0 * k1;
+        let settling = SETTLING * jerk;
+        Shape {
+            acceleration,
+            jerk,
+            braking,
+            c: braking / k1,
+            settling,
+            d: settling / k2,
+            inverse_k2: 1.0 / k2,
+            k3: 5.0 * k2,
+        }
+    }
+
+    /// Advances `motion` by one step towards `goal`.
+    pub(crate) fn advance<const D: usize>(&self, motion: &mut Motion<D>, goal: &Goal<D>, reach: &Reach, dt_s: f32) {
+        let (wanted, change) = self.wanted(motion, goal, reach);
+        let x = wanted - motion.velocity;
+        // g(x)/x and g'
+        let root = sqrt(self.d * self.d + 2.0 * self.settling * sqrt(x.norm_squared()));
+        let (gain, slope) = (2.0 * self.settling / (self.d + root), self.settling / root);
+        let told = if goal.velocity.is_some() { goal.acceleration } else { SVector::zeros() };
+        let own = change + x * gain;
+        let (own, rise) = if own.norm_squared() <= self.acceleration * self.acceleration {
+            (own, (change - (motion.acceleration - told)) * slope)
+        } else {
+            (capped(own, self.acceleration), SVector::zeros())
+        };
+        let wanted = capped(told + own, reach.acceleration);
+        let jerk = match self.guarded(wanted, motion, reach) {
+            // What the goal says does not fit the limit of speed.
+            Some((wanted, rise)) => rise + (wanted - motion.acceleration) * self.k3,
+            None => goal.jerk + capped(rise + (wanted - motion.acceleration) * self.k3, self.jerk),
+        };
+        let jerk = capped(jerk, reach.jerk);
+        let next = capped(motion.acceleration + jerk * dt_s, reach.acceleration);
+        // A motion whose acceleration is larger than now allowed gives way at the rate of the jerk.
+        let jerk = capped((next - motion.acceleration) / dt_s, reach.jerk);
+        motion.advance(jerk, dt_s);
+    }
+
+    /// Returns an acceleration that lets the speed stay within its limit, if `wanted` does not, and how it changes.
+    fn guarded<const D: usize>(
+        &self,
+        wanted: SVector<f32, D>,
+        motion: &Motion<D>,
+        reach: &Reach,
+    ) -> Option<(SVector<f32, D>, SVector<f32, D>)> {
+        let size_squared = wanted.norm_squared();
+        if size_squared <= 0.0 {
+            return None;
+        }
+        // How far the velocity is from the limit, in the direction of the acceleration.
+        let size = sqrt(size_squared);
+        let along = motion.velocity.dot(&wanted) / size;
+        let most = AIM * side(&wanted, reach.speed);
+        let across_squared = motion.velocity.norm_squared() - along * along;
+        let room = max(sqrt(max(most * most - across_squared, 0.0)) - along, 0.0);
+        // As g, with the largest jerk.
+        let settling = SETTLING * reach.jerk;
+        let d = settling * self.inverse_k2;
+        let root = sqrt(d * d + 2.0 * settling * room);
+        let most = root - d;
+        (size > most).then(|| (wanted * (most / size), motion.acceleration * (-settling / root)))
+    }
+
+    /// Returns the wanted velocity, and how it changes beside the goal's acceleration.
+    fn wanted<const D: usize>(
+        &self,
+        motion: &Motion<D>,
+        goal: &Goal<D>,
+        reach: &Reach,
+    ) -> (SVector<f32, D>, SVector<f32, D>) {
+        let zero = SVector::zeros();
+        let Some(velocity) = goal.velocity else {
+            // The velocity for which g is this acceleration, up to the limit.
+            let size = sqrt(goal.acceleration.norm_squared());
+            let ahead = motion.velocity + goal.acceleration * ((2.0 * self.d + size) / (2.0 * self.settling));
+            return (capped(ahead, AIM * side(&ahead, reach.approach)), zero);
+        };
+        let Some(position) = goal.position else {
+            return (capped(velocity, AIM * side(&velocity, reach.approach)), zero);
+        };
+        let e = motion.to(&position);
+        let distance_squared = e.norm_squared();
+        let root = sqrt(self.c * self.c + 2.0 * self.braking * sqrt(distance_squared));
+        // f/e and f'
+        let (share, slope) = (2.0 * self.braking / (root + self.c), self.braking / root);
+        let approach = e * share;
+        let most = AIM * side(&e, reach.approach);
+        let (approach, change) = if share * share * distance_squared <= most * most {
+            let closing = motion.velocity - velocity;
+            let along = if distance_squared > 0.0 { e * (e.dot(&closing) / distance_squared) } else { zero };
+            (approach, along * (share - slope) - closing * share)
+        } else {
+            (capped(approach, most), zero)
+        };
+        let wanted = velocity + approach;
+        (capped(wanted, AIM * side(&wanted, reach.speed)), change)
+    }
+}
+
+/// Returns the first of two limits for a vector in positive direction, the second for one in negative direction.
+fn side<const D: usize>(vector: &SVector<f32, D>, (up, down): (f32, f32)) -> f32 {
+    if vector.iter().all(|coordinate| *coordinate < 0.0) && D == 1 { down } else { up }
+}
+
+/// Returns a vector shortened to the length `most`, if it is longer.
+pub(crate) fn capped<const D: usize>(vector: SVector<f32, D>, most: f32) -> SVector<f32, D> {
+    let squared = vector.norm_squared();
+    if squared <= most * most { vector } else { vector * (most / sqrt(max(squared, f32::MIN_POSITIVE))) }
+}

@@ -1,0 +1,99 @@
+//! Transitions of the flight mode: what may be selected, and what is forced. Pure functions; the table is in
+//! docs/modes.md.
+
+use crate::mode::FlightMode;
+use crate::order::Declined;
+
+/// What the safety net does, from the weakest to the strongest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Action {
+    /// Nothing.
+    #[default]
+    None,
+    /// An announcement.
+    Warn,
+    /// [`FlightMode::Hold`].
+    Hold,
+    /// [`FlightMode::Return`]; on the ground it disarms.
+    Return,
+    /// [`FlightMode::Land`]; on the ground it disarms.
+    Land,
+}
+
+impl Action {
+    /// Returns the mode that it forces.
+    pub const fn mode(self) -> Option<FlightMode> {
+        match self {
+            Action::None | Action::Warn => None,
+            Action::Hold => Some(FlightMode::Hold),
+            Action::Return => Some(FlightMode::Return),
+            Action::Land => Some(FlightMode::Land),
+        }
+    }
+
+    /// True if `mode` does at least as much.
+    pub const fn is_done_by(self, mode: FlightMode) -> bool {
+        let does = match mode {
+            FlightMode::Land => Action::Land,
+            FlightMode::Return => Action::Return,
+            FlightMode::Hold => Action::Hold,
+            _ => Action::Warn,
+        };
+        does as u8 >= self as u8
+    }
+}
+
+/// What the transitions depend on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Conditions {
+    /// The flight core is armed.
+    pub armed: bool,
+    /// The vehicle is in the air.
+    pub airborne: bool,
+    /// The vehicle knows where it is.
+    pub positioned: bool,
+    /// The flight core descends.
+    pub descends: bool,
+    /// There is an item of a mission.
+    pub mission: bool,
+    /// There are fresh targets of a companion computer.
+    pub targets: bool,
+    /// There are fresh sticks of a pilot.
+    pub sticks: bool,
+    /// What the safety net demands.
+    pub held: Action,
+}
+
+impl Conditions {
+    /// Returns what flight core and safety net demand together.
+    fn demanded(&self) -> Action {
+        if self.armed && self.descends { Action::Land } else { self.held }
+    }
+}
+
+/// Returns whether `mode` may be selected.
+///
+/// # Errors
+/// The first reason against it.
+pub fn select(mode: FlightMode, seen: &Conditions) -> Result<(), Declined> {
+    use FlightMode::{Altitude, Hold, Land, Mission, Offboard, Position, Return, Stabilised, Takeoff};
+    let unless = |holds: bool, declined: Declined| if holds { Err(declined) } else { Ok(()) };
+    unless(!seen.demanded().is_done_by(mode), Declined::Failsafe)?;
+    unless(mode != Land && !seen.positioned, Declined::NoPosition)?;
+    match mode {
+        Hold | Land => Ok(()),
+        Takeoff => unless(seen.airborne, Declined::InFlight),
+        Return => unless(seen.armed && !seen.airborne, Declined::OnGround),
+        Mission => unless(!seen.mission, Declined::NoMission),
+        Offboard => unless(!seen.targets, Declined::NoTargets),
+        Position | Altitude | Stabilised => unless(!seen.sticks, Declined::NoSticks),
+    }
+}
+
+/// Returns the mode that is forced on an armed vehicle in `mode`, if another one is.
+pub fn forced(mode: FlightMode, seen: &Conditions) -> Option<FlightMode> {
+    let demanded = seen.demanded();
+    // On the ground it stays there.
+    let demanded = if seen.airborne || seen.descends { demanded } else { demanded.min(Action::Hold) };
+    demanded.mode().filter(|_| seen.armed && !demanded.is_done_by(mode))
+}

@@ -1,0 +1,209 @@
+//! A point mass on flat ground that follows setpoints, with the flight core's land detector.
+#![allow(dead_code, clippy::unwrap_used, clippy::panic, reason = "each test uses a part; a test may stop")]
+
+use afbc_flight_core::landing::LandDetector;
+use afbc_flight_core::{Mode, Request, Stamped};
+use afbc_guidance::*;
+use afbc_types::{Setpoint, State};
+use nalgebra::Vector3;
+
+pub(crate) const DT_S: f32 = 1e-3;
+const G_M_S2: f32 = 9.81;
+
+pub(crate) struct Bench {
+    pub(crate) guidance: Guidance,
+    pub(crate) orders: Orders,
+    pub(crate) state: State,
+    pub(crate) core: Mode,
+    pub(crate) landing: LandDetector,
+    pub(crate) now_us: u64,
+    pub(crate) battery: Option<Reading>,
+    pub(crate) sensors: Sensors,
+    /// Whether the station is heard, and the state is seen.
+    pub(crate) heard: bool,
+    pub(crate) sees: bool,
+    /// Acceleration by the wind \[m/s2\].
+    pub wind_m_s2: Vector3<f32>,
+    /// The mission.
+    pub(crate) items: Vec<Item>,
+    pub(crate) said: Vec<Notice>,
+    pub(crate) reached: Vec<u16>,
+    pub(crate) answers: Vec<(u8, Result<(), Declined>)>,
+    pub(crate) last: Option<Guided>,
+    /// Highest and farthest place of the flight \[m\].
+    pub(crate) highest_m: f32,
+    thrust_m_s2: f32,
+}
+
+pub(crate) fn settings() -> Settings {
+    Settings::DEFAULT
+}
+
+impl Bench {
+    pub(crate) fn new(settings: Settings) -> Self {
+        let state = State::default();
+        Bench {
+            guidance: Guidance::new(settings).unwrap(),
+            orders: Orders::default(),
+            state,
+            core: Mode::Disarmed,
+            landing: LandDetector::new(&state, G_M_S2),
+            now_us: 1_000_000,
+            battery: None,
+            sensors: Sensors::default(),
+            heard: true,
+            sees: true,
+            wind_m_s2: Vector3::zeros(),
+            items: Vec::new(),
+            said: Vec::new(),
+            reached: Vec::new(),
+            answers: Vec::new(),
+            last: None,
+            highest_m: 0.0,
+            thrust_m_s2: 0.0,
+        }
+    }
+
+    /// A bench that hovers in hold, at the take-off height.
+    pub(crate) fn hovering(settings: Settings) -> Self {
+        let mut bench = Bench::new(settings);
+        bench.run(1.5);
+        bench.arm();
+        bench.order(Order::TakeOff(None)).unwrap();
+        bench.run_until(20.0, |guided| guided.mode == FlightMode::Hold);
+        bench.run(1.0);
+        bench.said.clear();
+        bench
+    }
+
+    pub(crate) fn arm(&mut self) {
+        self.core = Mode::Flying;
+        self.landing = LandDetector::new(&self.state, G_M_S2);
+        self.run(0.1);
+    }
+
+    pub(crate) fn airborne(&self) -> bool {
+        self.core.armed() && self.landing.airborne()
+    }
+
+    pub(crate) fn order(&mut self, order: Order) -> Result<(), Declined> {
+        assert!(self.orders.give(Given { order, ticket: 7 }));
+        let guided = self.tick();
+        let (ticket, answer) = guided.answer.unwrap();
+        assert_eq!(ticket, 7);
+        answer
+    }
+
+    pub(crate) fn select(&mut self, mode: FlightMode) -> Result<(), Declined> {
+        self.order(Order::Select(mode))
+    }
+
+    pub(crate) fn aim(&mut self, target: Target) {
+        self.orders.target = Some(Stamped { value: target, at_us: self.now_us });
+    }
+
+    pub(crate) fn run(&mut self, time_s: f32) {
+        for _ in 0..(time_s / DT_S) as u32 {
+            self.tick();
+        }
+    }
+
+    /// Runs until `ends`; the time that it takes.
+    pub(crate) fn run_until(&mut self, most_s: f32, ends: impl Fn(&Guided) -> bool) -> f32 {
+        for tick in 0..(most_s / DT_S) as u32 {
+            if ends(&self.tick()) {
+                return tick as f32 * DT_S;
+            }
+        }
+        panic!("not within {most_s} s: {:?} at {:?}, said {:?}", self.last, self.state, self.said)
+    }
+
+    pub(crate) fn tick(&mut self) -> Guided {
+        self.now_us += 1000;
+        if self.heard {
+            self.orders.heard_us = Some(self.now_us);
+        }
+        let wanted = self.last.map_or(0, |guided| guided.wanted);
+        self.orders.leg = self.items.get(usize::from(wanted)).map(|item| Leg {
+            number: wanted,
+            upload: 1,
+            item: *item,
+            is_last: usize::from(wanted) + 1 == self.items.len(),
+        });
+        let sight = Sight {
+            now_us: self.now_us,
+            dt_s: DT_S,
+            state: self.sees.then_some(&self.state),
+            missing: None,
+            core: self.core,
+            airborne: self.airborne(),
+            tick_healthy: true,
+            battery: self.battery,
+            sensors: self.sensors,
+            lift: Lift { most_m_s2: 2.0 * G_M_S2, gravity_m_s2: G_M_S2, given_m_s2: None },
+        };
+        let guided = self.guidance.tick(&sight, &self.orders.take());
+        self.said.extend(guided.notices.iter());
+        self.reached.extend(guided.reached);
+        self.answers.extend(guided.answer);
+        self.fly(&guided);
+        if guided.request == Some(Request::Disarm) && !self.airborne() {
+            self.core = Mode::Disarmed;
+        }
+        self.last = Some(guided);
+        guided
+    }
+
+    fn fly(&mut self, guided: &Guided) {
+        let State { position_m, velocity_m_s, .. } = self.state;
+        let idles = !self.core.armed() || guided.rests && !self.landing.airborne();
+        let wanted_m_s2 = match &guided.setpoint {
+            _ if idles => Vector3::new(0.0, 0.0, -G_M_S2),
+            None => Vector3::zeros(),
+            Some(setpoint) => {
+                (setpoint.position_m - position_m) * 9.0
+                    + (setpoint.velocity_m_s - velocity_m_s) * 6.0
+                    + setpoint.acceleration_m_s2
+            }
+        };
+        self.thrust_m_s2 = if idles { 0.0 } else { (wanted_m_s2.z + G_M_S2).clamp(0.0, 2.0 * G_M_S2) };
+        let mut acceleration_m_s2 =
+            Vector3::new(wanted_m_s2.x, wanted_m_s2.y, self.thrust_m_s2 - G_M_S2) + self.wind_m_s2;
+        let on_ground = position_m.z <= 0.0 && acceleration_m_s2.z <= 0.0;
+        if on_ground {
+            acceleration_m_s2 = Vector3::zeros();
+            self.state.velocity_m_s = Vector3::zeros();
+        }
+        self.state.velocity_m_s += acceleration_m_s2 * DT_S;
+        self.state.position_m += self.state.velocity_m_s * DT_S;
+        if self.state.position_m.z < 0.0 {
+            self.state.position_m.z = 0.0;
+            self.state.velocity_m_s = Vector3::zeros();
+        }
+        if let Some(Setpoint { yaw_rad, .. }) = guided.setpoint.filter(|_| !idles) {
+            self.state.attitude_rad.z = yaw_rad;
+        }
+        self.highest_m = self.highest_m.max(self.state.position_m.z);
+        if !self.core.armed() {
+            return;
+        }
+        if guided.rests && !self.landing.airborne() {
+            self.landing.rest(Some(&self.state));
+        } else {
+            self.landing.advance(&self.state, self.thrust_m_s2, 1000, DT_S);
+        }
+    }
+}
+
+/// A target of position alone, or with velocity and so on by update syntax.
+pub(crate) fn motion(position_m: Vector3<f32>) -> MotionTarget {
+    let none = Vector3::repeat(f32::NAN);
+    MotionTarget {
+        position_m,
+        velocity_m_s: none,
+        acceleration_m_s2: none,
+        yaw_rad: f32::NAN,
+        yaw_rate_rad_s: f32::NAN,
+        body: false,
+    }
+}

@@ -1,0 +1,191 @@
+//! Whatever comes in, setpoints are finite and within the limits.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use afbc_flight_core::{Mode, Refusal, Stamped};
+use afbc_guidance::*;
+use afbc_types::{Setpoint, State};
+use nalgebra::{Quaternion, Unit, Vector3};
+use proptest::prelude::*;
+
+/// Any number, often one that is no good.
+fn any_number() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        6 => -20.0_f32..20.0,
+        2 => Just(f32::NAN),
+        1 => proptest::sample::select(vec![f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, f32::MAX, f32::MIN_POSITIVE]),
+        1 => any::<u32>().prop_map(f32::from_bits),
+        1 => -1e5_f32..1e5,
+    ]
+}
+
+fn vector() -> impl Strategy<Value = Vector3<f32>> {
+    [any_number(), any_number(), any_number()].prop_map(Vector3::from)
+}
+
+/// A state that is usually near the last one.
+fn state() -> impl Strategy<Value = Option<State>> {
+    let sane = ([-50.0_f32..50.0, -50.0_f32..50.0, 0.0_f32..50.0], [-9.0_f32..9.0, -9.0_f32..9.0, -3.0_f32..3.0])
+        .prop_map(|(p, v)| State { position_m: p.into(), velocity_m_s: v.into(), ..State::default() });
+    let wild = (vector(), vector(), vector(), vector()).prop_map(|(p, v, attitude_rad, rates_rad_s)| State {
+        position_m: p,
+        velocity_m_s: v,
+        attitude_rad,
+        rates_rad_s,
+    });
+    prop_oneof![1 => Just(None), 5 => sane.prop_map(Some), 2 => wild.prop_map(Some)]
+}
+
+fn order() -> impl Strategy<Value = Order> {
+    prop_oneof![
+        4 => proptest::sample::select(FlightMode::ALL.to_vec()).prop_map(Order::Select),
+        2 => proptest::option::of(any_number()).prop_map(Order::TakeOff),
+        2 => (vector(), any_number(), proptest::option::of(any_number()))
+            .prop_map(|(position_m, yaw_rad, speed_m_s)| Order::GoTo { position_m, yaw_rad, speed_m_s }),
+        1 => any_number().prop_map(Order::Speed),
+        1 => proptest::option::of(vector()).prop_map(Order::Home),
+        1 => any::<u16>().prop_map(Order::Resume),
+    ]
+}
+
+fn target() -> impl Strategy<Value = Target> {
+    let motion = (vector(), vector(), vector(), any_number(), any_number(), any::<bool>()).prop_map(
+        |(position_m, velocity_m_s, acceleration_m_s2, yaw_rad, yaw_rate_rad_s, body)| {
+            Target::Motion(MotionTarget { position_m, velocity_m_s, acceleration_m_s2, yaw_rad, yaw_rate_rad_s, body })
+        },
+    );
+    let attitude = ([any_number(), any_number(), any_number(), any_number()], any_number(), any_number()).prop_map(
+        |([w, x, y, z], yaw_rate_rad_s, thrust)| {
+            let attitude = Unit::new_unchecked(Quaternion::new(w, x, y, z));
+            Target::Attitude(AttitudeTarget { attitude, yaw_rate_rad_s, thrust })
+        },
+    );
+    prop_oneof![3 => motion, 1 => attitude]
+}
+
+fn item() -> impl Strategy<Value = Item> {
+    prop_oneof![
+        any_number().prop_map(|height_m| Item::TakeOff { height_m }),
+        (vector(), any_number(), any_number(), any_number(), any::<bool>()).prop_map(
+            |(position_m, yaw_rad, hold_s, within_m, fly_through)| Item::Waypoint {
+                position_m,
+                yaw_rad,
+                hold_s,
+                within_m,
+                fly_through
+            }
+        ),
+        vector().prop_map(|position_m| Item::Land { position_m }),
+        Just(Item::Return),
+        any_number().prop_map(Item::Speed),
+    ]
+}
+
+/// Some ticks with the same input.
+#[derive(Clone, Debug)]
+struct Spell {
+    ticks: u16,
+    step_us: i64,
+    dt_s: f32,
+    state: Option<State>,
+    core: Mode,
+    airborne: bool,
+    battery: Option<(f32, f32)>,
+    order: Option<Order>,
+    target: Option<Target>,
+    sticks: Option<[f32; 4]>,
+    item: Option<(u16, u16, Item, bool)>,
+    lift: (f32, f32),
+    fresh: bool,
+}
+
+fn spell() -> impl Strategy<Value = Spell> {
+    let modes = vec![Mode::Disarmed, Mode::Flying, Mode::Flying, Mode::Flying, Mode::Coasting, Mode::Descending];
+    let clock = (
+        1_u16..400,
+        prop_oneof![6 => Just(1000_i64), 1 => Just(0), 1 => any::<i64>(), 1 => -5000_i64..50_000],
+        prop_oneof![4 => Just(0.001_f32), 1 => any_number()],
+    );
+    let seen = (
+        state(),
+        proptest::sample::select(modes),
+        any::<bool>(),
+        proptest::option::of((any_number(), any_number())),
+        prop_oneof![4 => Just((19.6_f32, 9.81_f32)), 1 => (any_number(), any_number())],
+    );
+    let asked = (
+        proptest::option::of(order()),
+        proptest::option::of(target()),
+        proptest::option::of([any_number(), any_number(), any_number(), any_number()]),
+        proptest::option::of((0_u16..3, 0_u16..2, item(), any::<bool>())),
+        any::<bool>(),
+    );
+    (clock, seen, asked).prop_map(
+        |((ticks, step_us, dt_s), (state, core, airborne, battery, lift), (order, target, sticks, item, fresh))| {
+            Spell { ticks, step_us, dt_s, state, core, airborne, battery, order, target, sticks, item, lift, fresh }
+        },
+    )
+}
+
+fn check(settings: &Settings, sight: &Sight<'_>, orders: &Orders, guided: &Guided) -> Result<(), TestCaseError> {
+    prop_assert_eq!(guided.answer.is_some(), orders.given[0].is_some());
+    prop_assert!(guided.notices.iter().all(|notice| notice.to_string().len() <= 50));
+    prop_assert!(guided.charge.is_none_or(|charge| (0.0..=1.0).contains(&charge)));
+    prop_assert!(!guided.rests || sight.core.armed());
+    prop_assert!(guided.home_m.is_none_or(|home_m| home_m.iter().all(|value| value.is_finite())));
+    let Some(setpoint) = &guided.setpoint else { return Ok(()) };
+    prop_assert!(setpoint.is_plausible(), "{:?}", setpoint);
+    let direct = matches!(guided.mode, FlightMode::Altitude | FlightMode::Stabilised | FlightMode::Offboard);
+    if direct || !sight.core.armed() {
+        return Ok(());
+    }
+    let (limits, hair) = (&settings.limits, 1.0 + 1e-3);
+    let Setpoint { velocity_m_s: v, acceleration_m_s2: a, .. } = setpoint;
+    prop_assert!(v.xy().norm() <= limits.speed_m_s * hair, "{:?}", setpoint);
+    prop_assert!(v.z <= limits.up_m_s * hair && -v.z <= limits.down_m_s * hair, "{:?}", setpoint);
+    prop_assert!(a.xy().norm() <= limits.acceleration_max_m_s2 * hair, "{:?}", setpoint);
+    // On the ground a landing vehicle is asked for little thrust.
+    let lands = matches!(guided.mode, FlightMode::Land | FlightMode::Return);
+    let settles = lands && *a == Vector3::new(0.0, 0.0, -0.7 * sight.lift.gravity_m_s2);
+    prop_assert!(settles || a.z.abs() <= limits.vertical_acceleration_m_s2 * hair, "{:?}", setpoint);
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
+
+    #[test]
+    fn nothing_absurd_comes_out(spells in proptest::collection::vec(spell(), 1..40)) {
+        let settings = Settings { net: Net { cells: 3.0, ..Net::DEFAULT }, ..Settings::DEFAULT };
+        let mut guidance = Guidance::new(settings).unwrap();
+        let mut now_us = 5_000_000_u64;
+        for spell in spells {
+            for tick in 0..spell.ticks {
+                now_us = now_us.wrapping_add_signed(spell.step_us);
+                let at_us = if spell.fresh { now_us } else { now_us.wrapping_sub(u64::from(tick) * 1000) };
+                let sticks = spell.sticks.map(|[roll, pitch, throttle, yaw]| Sticks { roll, pitch, throttle, yaw });
+                let given = spell.order.filter(|_| tick == 0).map(|order| Given { order, ticket: 1 });
+                let orders = Orders {
+                    target: spell.target.map(|value| Stamped { value, at_us }),
+                    sticks: sticks.map(|value| Stamped { value, at_us }),
+                    leg: spell.item.map(|(number, upload, item, is_last)| Leg { number, upload, item, is_last }),
+                    heard_us: Some(at_us),
+                    given: [given, None, None, None],
+                };
+                let sight = Sight {
+                    now_us,
+                    dt_s: spell.dt_s,
+                    state: spell.state.as_ref(),
+                    missing: spell.fresh.then_some(Refusal::PositionUnknown),
+                    core: spell.core,
+                    airborne: spell.airborne,
+                    tick_healthy: spell.fresh,
+                    battery: spell.battery.map(|(voltage_v, current_a)| Reading { voltage_v, current_a }),
+                    sensors: Sensors { gnss: !spell.fresh, ..Sensors::default() },
+                    lift: Lift { most_m_s2: spell.lift.0, gravity_m_s2: spell.lift.1, given_m_s2: Some(spell.lift.0) },
+                };
+                let guided = guidance.tick(&sight, &orders);
+                check(&settings, &sight, &orders, &guided)?;
+            }
+        }
+    }
+}

@@ -1,0 +1,393 @@
+//! The safety net: every cause with every action, alone and in pairs; announcements; checks before arming.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
+
+mod bench;
+
+use afbc_flight_core::{Mode, Refusal};
+use afbc_guidance::*;
+use afbc_types::Declared;
+use bench::{Bench, motion, settings};
+use nalgebra::Vector3;
+
+/// Causes that a test can bring about in flight, with the numbers of their parameter and the mode of each.
+fn causes() -> Vec<(Cause, Vec<(f32, Action)>)> {
+    use Action::{Hold, Land, None, Return, Warn};
+    vec![
+        (Cause::Fence, vec![(0.0, None), (1.0, Warn), (2.0, Hold), (3.0, Return), (4.0, Land), (5.0, Land)]),
+        (Cause::Station, vec![(0.0, None), (1.0, Hold), (2.0, Return), (3.0, Land)]),
+        (Cause::Targets, vec![(0.0, Land), (1.0, Hold), (2.0, Return)]),
+        (Cause::Sensors, vec![(0.0, None), (1.0, Warn), (2.0, Hold), (3.0, Return), (4.0, Land)]),
+        (Cause::BatteryCritical, vec![(0.0, Warn), (1.0, Return), (2.0, Land), (3.0, Return)]),
+        (Cause::BatteryEmergency, vec![(0.0, Warn), (1.0, Return), (2.0, Land), (3.0, Land)]),
+    ]
+}
+
+fn with(mut settings: Settings, cause: Cause, number: f32) -> Settings {
+    let net = &mut settings.net;
+    match cause {
+        Cause::Fence => net.fence_action = number,
+        Cause::Station => net.station_action = number,
+        Cause::Targets => net.targets_action = number,
+        Cause::Sensors => net.sensors_action = number,
+        _ => net.battery_action = number,
+    }
+    settings
+}
+
+fn quiet() -> Settings {
+    let mut settings = settings();
+    settings.net = Net { cells: 3.0, fence_radius_m: 30.0, station_lost_s: 1.0, ..settings.net };
+    settings
+}
+
+fn charge(charge: f32) -> Option<Reading> {
+    Some(Reading { voltage_v: 3.0 * (3.6 + 0.45 * charge), current_a: 0.0 })
+}
+
+/// A vehicle in offboard mode, far from the fence, with everything as it should be.
+fn offboard(settings: Settings) -> Bench {
+    let mut bench = Bench::hovering(settings);
+    bench.battery = charge(0.8);
+    bench.aim(Target::Motion(motion(Vector3::new(10.0, 0.0, 8.0))));
+    bench.select(FlightMode::Offboard).unwrap();
+    stream(&mut bench, 8.0);
+    bench.said.clear();
+    bench
+}
+
+/// Flies on, with targets that come.
+fn stream(bench: &mut Bench, time_s: f32) {
+    for tick in 0..(time_s * 1000.0) as u32 {
+        if let (0, Some(target)) = (tick % 100, bench.orders.target) {
+            bench.aim(target.value);
+        }
+        bench.tick();
+    }
+}
+
+fn bring_about(bench: &mut Bench, cause: Cause) {
+    match cause {
+        Cause::Fence => bench.state.position_m.x = 31.0,
+        Cause::Station => bench.heard = false,
+        Cause::Targets => bench.orders.target = None,
+        Cause::Sensors => bench.sensors.magnetometer = true,
+        Cause::BatteryCritical => bench.battery = charge(0.06),
+        _ => bench.battery = charge(0.01),
+    }
+}
+
+/// Flies for a time in which every cause is found, without what it does about the fence.
+fn find(bench: &mut Bench) {
+    let outside = bench.state.position_m.x > 30.5;
+    for tick in 0..14_000 {
+        if outside {
+            bench.state.position_m.x = 31.0;
+        }
+        if let (0, Some(target)) = (tick % 100, bench.orders.target) {
+            bench.aim(target.value);
+        }
+        bench.tick();
+        if !bench.core.armed() {
+            return;
+        }
+    }
+}
+
+fn announced(bench: &Bench, cause: Cause) -> usize {
+    let of = |notice: &&Notice| match notice {
+        Notice::Mode(_, Reason::Failsafe(found)) | Notice::Found(found) => *found == cause,
+        _ => false,
+    };
+    bench.said.iter().filter(of).count()
+}
+
+#[test]
+fn every_cause_does_what_its_parameter_says_and_is_announced_once() {
+    for (cause, actions) in causes() {
+        for (number, action) in actions {
+            let mut bench = offboard(with(quiet(), cause, number));
+            bring_about(&mut bench, cause);
+            find(&mut bench);
+            let what = format!("{cause:?} {number}: {:?} {:?}", bench.guidance.mode(), bench.said);
+            let expected = action.mode().unwrap_or(FlightMode::Offboard);
+            let landed = !bench.core.armed() && action >= Action::Return;
+            assert!(bench.guidance.mode() == expected || landed, "{what}");
+            assert_eq!(announced(&bench, cause), usize::from(action > Action::None), "{what}");
+            if !landed && action >= Action::Hold {
+                assert!(bench.last.unwrap().failsafe.is_some(), "{what}");
+            }
+        }
+    }
+}
+
+/// Of two causes the stronger action counts, whichever comes first.
+#[test]
+fn of_every_pair_the_stronger_action_counts() {
+    for (first, of_first) in causes() {
+        for (second, of_second) in causes() {
+            let one_parameter = |cause| matches!(cause, Cause::BatteryCritical | Cause::BatteryEmergency);
+            // Targets are lost in offboard mode only, which another cause may have ended.
+            if first == second || one_parameter(first) && one_parameter(second) || second == Cause::Targets {
+                continue;
+            }
+            for (number, action) in [of_first[1], of_first[of_first.len() - 1]] {
+                for (other, stronger) in [of_second[1], of_second[of_second.len() - 1]] {
+                    let mut bench = offboard(with(with(quiet(), first, number), second, other));
+                    bring_about(&mut bench, first);
+                    bench.tick();
+                    bring_about(&mut bench, second);
+                    find(&mut bench);
+                    let expected = action.max(stronger).mode().unwrap_or(FlightMode::Offboard);
+                    let landed = !bench.core.armed() && action.max(stronger) >= Action::Return;
+                    assert!(
+                        bench.guidance.mode() == expected || landed,
+                        "{first:?} {number}, {second:?} {other}: {:?} {:?}",
+                        bench.guidance.mode(),
+                        bench.said
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_failsafe_yields_to_stronger_modes_only_until_its_cause_is_over() {
+    let mut bench = offboard(with(quiet(), Cause::Station, 2.0));
+    bring_about(&mut bench, Cause::Station);
+    stream(&mut bench, 2.0);
+    assert_eq!(bench.guidance.mode(), FlightMode::Return);
+    assert_eq!(bench.select(FlightMode::Hold), Err(Declined::Failsafe));
+    assert_eq!(bench.select(FlightMode::Offboard), Err(Declined::Failsafe));
+    assert_eq!(bench.last.unwrap().failsafe, Some(Cause::Station));
+    bench.heard = true;
+    bench.run(0.1);
+    assert_eq!(bench.guidance.mode(), FlightMode::Return, "the mode stays");
+    assert!(bench.said.contains(&Notice::Over(Cause::Station)));
+    assert_eq!(bench.select(FlightMode::Hold), Ok(()));
+    assert_eq!(bench.last.unwrap().failsafe, None);
+    bring_about(&mut bench, Cause::Station);
+    bench.run(2.0);
+    assert_eq!(bench.select(FlightMode::Land), Ok(()), "a stronger one may be selected");
+}
+
+#[test]
+fn on_the_ground_a_failsafe_disarms() {
+    for (number, disarms) in [(1.0, false), (2.0, true), (3.0, true)] {
+        let mut bench = Bench::new(with(quiet(), Cause::Station, number));
+        bench.battery = charge(0.8);
+        bench.run(1.5);
+        bench.arm();
+        bench.heard = false;
+        bench.run(2.0);
+        assert_eq!(bench.core == Mode::Disarmed, disarms);
+        assert_eq!(bench.highest_m, 0.0);
+    }
+}
+
+/// Also of a vehicle that has stood armed for a while.
+#[test]
+fn a_disarming_is_announced_once_however_long_it_has_stood() {
+    for waits_s in [0.05, 3.0] {
+        let mut bench = Bench::new(quiet());
+        bench.run(1.5);
+        bench.arm();
+        bench.run(waits_s);
+        bench.heard = false;
+        bench.run_until(3.0, |guided| guided.request.is_some());
+        bench.run(1.0);
+        let told = bench.said.iter().filter(|notice| **notice == Notice::Disarms).count();
+        assert_eq!((told, bench.core), (1, Mode::Disarmed), "{:?}", bench.said);
+    }
+}
+
+/// Neither a take-off, nor the climb of a mission or a return, leads out of the fence.
+#[test]
+fn climbs_stay_below_the_fence() {
+    let mut settings = quiet();
+    (settings.net.fence_height_m, settings.flying.takeoff_height_m) = (6.0, 9.0);
+    settings.flying.return_height_m = 15.0;
+    let mut bench = Bench::new(settings);
+    bench.run(1.5);
+    assert_eq!(bench.select(FlightMode::Takeoff), Err(Declined::OutsideFence));
+    bench.arm();
+    assert_eq!(bench.order(Order::TakeOff(None)), Err(Declined::OutsideFence));
+    bench.items = vec![Item::TakeOff { height_m: 9.0 }];
+    bench.run(0.01);
+    bench.select(FlightMode::Mission).unwrap();
+    bench.run(0.1);
+    assert!(bench.said.contains(&Notice::ItemRefused) && !bench.airborne());
+    let away = |x: f32| Item::Waypoint {
+        position_m: Vector3::new(x, 0.0, 4.0),
+        yaw_rad: f32::NAN,
+        hold_s: 0.0,
+        within_m: 0.0,
+        fly_through: false,
+    };
+    bench.items = vec![away(12.0), Item::Return];
+    bench.select(FlightMode::Mission).unwrap();
+    bench.run_until(60.0, |guided| guided.mode == FlightMode::Return);
+    bench.run_until(60.0, |guided| guided.request.is_some());
+    assert!(bench.highest_m > 4.5 && bench.highest_m < 5.5, "{}", bench.highest_m);
+}
+
+/// A station that was never heard is not lost: a vehicle may fly by sticks or by its companion alone.
+#[test]
+fn a_station_that_never_was_is_not_lost() {
+    let mut bench = Bench::new(quiet());
+    bench.heard = false;
+    bench.run(1.5);
+    bench.arm();
+    bench.order(Order::TakeOff(None)).unwrap();
+    bench.run(12.0);
+    assert!(bench.core.armed() && bench.guidance.mode() == FlightMode::Hold);
+}
+
+/// The voltage of a loaded battery sags by what its resistance takes; it is not empty for that.
+#[test]
+fn the_charge_is_that_without_load() {
+    let settings = quiet();
+    for current_a in [0.0, 10.0, 30.0] {
+        let mut bench = offboard(settings);
+        let sag_v = 3.0 * settings.net.resistance_ohm * current_a;
+        let voltage_v = 3.0 * (3.6 + 0.45 * 0.3) - sag_v;
+        bench.battery = Some(Reading { voltage_v, current_a });
+        stream(&mut bench, 15.0);
+        let charge = bench.last.unwrap().charge.unwrap();
+        assert!((charge - 0.3).abs() < 0.01, "{charge}");
+        assert!(bench.said.is_empty(), "{:?}", bench.said);
+    }
+    // A gust of current is not an empty battery, nor is a reading of nonsense.
+    let mut bench = offboard(settings);
+    bench.battery = Some(Reading { voltage_v: f32::NAN, current_a: 0.0 });
+    stream(&mut bench, 2.0);
+    bench.battery = charge(0.0);
+    stream(&mut bench, 0.3);
+    bench.battery = charge(0.5);
+    stream(&mut bench, 10.0);
+    assert!(bench.said.is_empty(), "{:?}", bench.said);
+}
+
+#[test]
+fn a_battery_does_not_recover_in_flight() {
+    let mut bench = offboard(with(quiet(), Cause::BatteryCritical, 0.0));
+    bench.battery = charge(0.06);
+    stream(&mut bench, 15.0);
+    bench.battery = charge(0.9);
+    stream(&mut bench, 15.0);
+    assert_eq!(bench.said, [Notice::Found(Cause::BatteryLow), Notice::Found(Cause::BatteryCritical)]);
+}
+
+#[test]
+fn places_outside_the_fence_are_declined_and_missions_to_them_end() {
+    let mut settings = quiet();
+    settings.net.fence_height_m = 20.0;
+    let mut bench = Bench::hovering(settings);
+    bench.battery = charge(0.8);
+    let go = |x, z| Order::GoTo { position_m: Vector3::new(x, 0.0, z), yaw_rad: f32::NAN, speed_m_s: None };
+    assert_eq!(bench.order(go(30.5, 5.0)), Err(Declined::OutsideFence));
+    assert_eq!(bench.order(go(0.0, 20.5)), Err(Declined::OutsideFence));
+    assert_eq!(bench.order(go(29.0, 19.0)), Ok(()));
+    bench.items = vec![Item::Waypoint {
+        position_m: Vector3::new(40.0, 0.0, 5.0),
+        yaw_rad: f32::NAN,
+        hold_s: 0.0,
+        within_m: 0.0,
+        fly_through: false,
+    }];
+    bench.tick();
+    bench.select(FlightMode::Mission).unwrap();
+    bench.run(0.1);
+    assert_eq!(bench.guidance.mode(), FlightMode::Hold);
+    assert!(bench.said.contains(&Notice::ItemRefused));
+}
+
+#[test]
+fn the_flight_cores_descent_is_a_landing_that_no_order_ends() {
+    let mut bench = offboard(quiet());
+    (bench.core, bench.sees) = (Mode::Descending, false);
+    let guided = bench.tick();
+    assert_eq!((guided.mode, guided.setpoint, guided.failsafe), (FlightMode::Land, None, Some(Cause::Descent)));
+    assert_eq!(bench.said, [Notice::Mode(FlightMode::Land, Reason::Failsafe(Cause::Descent))]);
+    for mode in FlightMode::ALL {
+        let expected = if mode == FlightMode::Land { Ok(()) } else { Err(Declined::Failsafe) };
+        assert_eq!(bench.select(mode), expected);
+    }
+}
+
+/// After an outage it goes on from where the vehicle is, not from where the setpoint was.
+#[test]
+fn after_an_outage_the_setpoint_begins_at_the_vehicle() {
+    let mut bench = offboard(quiet());
+    bench.sees = false;
+    bench.run(0.2);
+    bench.state.position_m = Vector3::new(-3.0, 4.0, 6.0);
+    bench.sees = true;
+    let setpoint = bench.tick().setpoint.unwrap();
+    assert!((setpoint.position_m - Vector3::new(-3.0, 4.0, 6.0)).norm() < 0.05, "{setpoint:?}");
+}
+
+#[test]
+fn every_check_has_its_reason() {
+    let sight = |bench: &Bench| Sight {
+        now_us: bench.now_us,
+        dt_s: 1e-3,
+        state: None,
+        missing: None,
+        core: Mode::Disarmed,
+        airborne: false,
+        tick_healthy: true,
+        battery: charge(0.8),
+        sensors: Sensors::default(),
+        lift: Lift { most_m_s2: 20.0, gravity_m_s2: 9.81, given_m_s2: None },
+    };
+    let mut bench = Bench::new(quiet());
+    bench.battery = charge(0.8);
+    bench.run(1.5);
+    assert!(bench.last.unwrap().checks.all_ok(), "{}", bench.last.unwrap().checks);
+    let state = bench.state;
+    let failing = |change: &dyn Fn(&mut Sight<'_>)| {
+        let mut sight = Sight { state: Some(&state), ..sight(&bench) };
+        change(&mut sight);
+        let mut guidance = bench.guidance;
+        guidance.tick(&sight, &Orders::default()).checks.to_string()
+    };
+    assert_eq!(failing(&|_| ()), "");
+    assert_eq!(failing(&|sight| sight.missing = Some(Refusal::AttitudeUnknown)), "attitude, heading, position");
+    assert_eq!(failing(&|sight| sight.missing = Some(Refusal::HeadingUnknown)), "heading, position");
+    assert_eq!(failing(&|sight| sight.missing = Some(Refusal::PositionUnknown)), "position");
+    assert_eq!(failing(&|sight| sight.state = None), "position, level, at rest");
+    assert_eq!(failing(&|sight| sight.tick_healthy = false), "tick rate");
+    assert_eq!(failing(&|sight| sight.sensors.gnss = true), "sensors");
+    assert_eq!(failing(&|sight| sight.battery = None), "battery");
+    let mut tilted = state;
+    tilted.attitude_rad.y = 0.3;
+    let mut guidance = bench.guidance;
+    let guided = guidance.tick(&Sight { state: Some(&tilted), ..sight(&bench) }, &Orders::default());
+    assert_eq!(guided.checks.to_string(), "level");
+    bench.select(FlightMode::Land).unwrap();
+    assert_eq!(bench.last.unwrap().checks.to_string(), "mode");
+    assert_eq!(bench.last.unwrap().checks.refusal(), Some(Refusal::WrongMode));
+    assert_eq!(bench.last.unwrap().checks.failing(), 1 << Check::Mode as u16);
+}
+
+#[test]
+fn parameters_are_validated_by_name() {
+    assert_eq!(Settings::DEFAULT.validate(), Ok(()));
+    let net = Net::DEFAULT;
+    for (net, name) in [
+        (Net { fence_action: 6.0, ..net }, "fence_action"),
+        (Net { station_action: 1.5, ..net }, "station_action"),
+        (Net { targets_action: f32::NAN, ..net }, "targets_action"),
+        (Net { cells: 2.5, ..net }, "cells"),
+        (Net { empty_v: 4.05, ..net }, "empty_v"),
+        (Net { critical: 0.2, ..net }, "critical"),
+        (Net { emergency: 0.08, ..net }, "emergency"),
+    ] {
+        let error = Guidance::new(Settings { net, ..Settings::DEFAULT }).unwrap_err();
+        assert_eq!(error.range.name, name);
+        let mut guidance = Guidance::new(Settings::DEFAULT).unwrap();
+        assert!(guidance.set(Settings { net, ..Settings::DEFAULT }).is_err());
+        assert_eq!(guidance.settings(), &Settings::DEFAULT, "what is refused changes nothing");
+    }
+}

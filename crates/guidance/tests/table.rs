@@ -1,0 +1,287 @@
+//! The table of docs/modes.md, written out once more, for every mode and all conditions; and random walks of a whole
+//! vehicle, whose every change of mode must be one of the table's and be announced.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
+
+mod bench;
+
+use afbc_flight_core::{Mode, Stamped};
+use afbc_guidance::table::{forced, select};
+use afbc_guidance::*;
+use bench::{Bench, motion, settings};
+use nalgebra::{UnitQuaternion, Vector3};
+use proptest::prelude::*;
+use std::collections::BTreeSet;
+
+const ACTIONS: [Action; 5] = [Action::None, Action::Warn, Action::Hold, Action::Return, Action::Land];
+
+/// Returns all combinations of conditions.
+fn all() -> impl Iterator<Item = Conditions> {
+    (0..128_u32).flat_map(|bits| {
+        let bit = move |n: u32| bits >> n & 1 == 1;
+        ACTIONS.into_iter().map(move |held| Conditions {
+            armed: bit(0),
+            airborne: bit(1),
+            positioned: bit(2),
+            descends: bit(3),
+            mission: bit(4),
+            targets: bit(5),
+            sticks: bit(6),
+            held,
+        })
+    })
+}
+
+/// The rows of the table: what a mode needs, with the answer if it is missing, in this order.
+fn needs(mode: FlightMode, seen: &Conditions) -> Vec<(bool, Declined)> {
+    let position = (seen.positioned, Declined::NoPosition);
+    match mode {
+        FlightMode::Land => vec![],
+        FlightMode::Hold => vec![position],
+        FlightMode::Takeoff => vec![position, (!seen.airborne, Declined::InFlight)],
+        FlightMode::Return => vec![position, (!seen.armed || seen.airborne, Declined::OnGround)],
+        FlightMode::Mission => vec![position, (seen.mission, Declined::NoMission)],
+        FlightMode::Offboard => vec![position, (seen.targets, Declined::NoTargets)],
+        FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised => {
+            vec![position, (seen.sticks, Declined::NoSticks)]
+        }
+    }
+}
+
+/// Strength of what a mode does about a failure.
+fn strength(mode: FlightMode) -> usize {
+    match mode {
+        FlightMode::Land => 4,
+        FlightMode::Return => 3,
+        FlightMode::Hold => 2,
+        _ => 1,
+    }
+}
+
+#[test]
+fn a_mode_may_be_selected_by_the_table() {
+    for seen in all() {
+        let strongest = if seen.armed && seen.descends { 4 } else { seen.held as usize };
+        for mode in FlightMode::ALL {
+            let mut expected = Ok(());
+            if strength(mode) < strongest {
+                expected = Err(Declined::Failsafe);
+            } else if let Some((_, declined)) = needs(mode, &seen).into_iter().find(|(met, _)| !met) {
+                expected = Err(declined);
+            }
+            assert_eq!(select(mode, &seen), expected, "{mode:?} {seen:?}");
+        }
+    }
+}
+
+#[test]
+fn a_failure_forces_its_mode_and_nothing_weaker() {
+    use FlightMode::{Hold, Land, Return};
+    for seen in all() {
+        for mode in FlightMode::ALL {
+            let expected = match (seen.armed, seen.descends, seen.airborne, seen.held) {
+                (false, ..) => None,
+                (true, true, ..) => (mode != Land).then_some(Land),
+                (true, false, _, Action::None | Action::Warn) => None,
+                (true, false, false, _) | (true, false, true, Action::Hold) => {
+                    (![Hold, Return, Land].contains(&mode)).then_some(Hold)
+                }
+                (true, false, true, Action::Return) => (![Return, Land].contains(&mode)).then_some(Return),
+                (true, false, true, Action::Land) => (mode != Land).then_some(Land),
+            };
+            assert_eq!(forced(mode, &seen), expected, "{mode:?} {seen:?}");
+        }
+    }
+}
+
+#[test]
+fn every_text_is_short_and_every_severity_one_of_mavlinks() {
+    let reasons = [Reason::Ordered, Reason::Done, Reason::Mission, Reason::NoLift, Reason::Disarmed];
+    let reasons = reasons.into_iter().chain(Cause::ALL.map(Reason::Failsafe));
+    let modes = reasons.flat_map(|reason| FlightMode::ALL.map(|mode| Notice::Mode(mode, reason)));
+    let causes = Cause::ALL.into_iter().flat_map(|cause| [Notice::Found(cause), Notice::Over(cause)]);
+    let mut texts = BTreeSet::new();
+    for notice in modes.chain(causes).chain([Notice::Disarms, Notice::ItemRefused]) {
+        let text = notice.to_string();
+        assert!(text.len() <= 50, "{text}");
+        assert!((2..=6).contains(&(notice.severity() as u8)));
+        assert!(texts.insert(text), "{notice:?}");
+    }
+}
+
+/// A step of a random walk.
+#[derive(Clone, Copy, Debug)]
+enum Step {
+    Arm,
+    Kill,
+    Order(Order),
+    Target(Target),
+    Sticks(Sticks),
+    Heard(bool),
+    Sees(bool),
+    Battery(f32),
+    Sensor(bool),
+    Descends,
+    Mission(u8),
+    Wind(f32),
+    Wait(u16),
+}
+
+fn steps() -> impl Strategy<Value = Vec<Step>> {
+    let place = || [-40.0_f32..40.0, -40.0_f32..40.0, -2.0_f32..30.0].prop_map(Vector3::from);
+    let mode = proptest::sample::select(FlightMode::ALL.to_vec());
+    let step = prop_oneof![
+        2 => Just(Step::Arm),
+        1 => Just(Step::Kill),
+        8 => mode.prop_map(|mode| Step::Order(Order::Select(mode))),
+        4 => (0.5_f32..8.0).prop_map(|height_m| Step::Order(Order::TakeOff(Some(height_m)))),
+        3 => place().prop_map(|position_m| {
+            Step::Order(Order::GoTo { position_m, yaw_rad: f32::NAN, speed_m_s: None })
+        }),
+        1 => (0_u16..6).prop_map(|number| Step::Order(Order::Resume(number))),
+        1 => (-1.0_f32..5.0).prop_map(|speed_m_s| Step::Order(Order::Speed(speed_m_s))),
+        4 => place().prop_map(|position_m| Step::Target(Target::Motion(motion(position_m)))),
+        1 => (0.0_f32..1.0).prop_map(|thrust| Step::Target(Target::Attitude(AttitudeTarget {
+            attitude: UnitQuaternion::identity(),
+            yaw_rate_rad_s: 0.0,
+            thrust,
+        }))),
+        2 => (-1.0_f32..1.0, -1.0_f32..1.0).prop_map(|(pitch, throttle)| {
+            Step::Sticks(Sticks { pitch, throttle, ..Sticks::default() })
+        }),
+        2 => any::<bool>().prop_map(Step::Heard),
+        1 => any::<bool>().prop_map(Step::Sees),
+        1 => (3.3_f32..4.2).prop_map(Step::Battery),
+        1 => any::<bool>().prop_map(Step::Sensor),
+        1 => Just(Step::Descends),
+        2 => (0_u8..3).prop_map(Step::Mission),
+        1 => (-2.0_f32..2.0).prop_map(Step::Wind),
+        12 => (1_u16..6000).prop_map(Step::Wait),
+    ];
+    proptest::collection::vec(step, 1..60)
+}
+
+fn mission(kind: u8) -> Vec<Item> {
+    let waypoint = |x: f32, fly_through| Item::Waypoint {
+        position_m: Vector3::new(x, 3.0, 5.0),
+        yaw_rad: f32::NAN,
+        hold_s: 0.5,
+        within_m: 0.5,
+        fly_through,
+    };
+    match kind {
+        0 => vec![],
+        1 => vec![Item::TakeOff { height_m: 3.0 }, waypoint(5.0, true), waypoint(8.0, false), Item::Return],
+        _ => vec![waypoint(3.0, false), Item::Speed(2.0), Item::Land { position_m: Vector3::repeat(f32::NAN) }],
+    }
+}
+
+/// A tick, and what may have changed the mode in it, by a model that knows the vehicle from outside.
+fn follow(bench: &mut Bench, asked: Option<Order>) -> Result<(), TestCaseError> {
+    let (before, was_armed) = (bench.guidance.mode(), bench.core.armed());
+    let said = bench.said.len();
+    let guided = bench.tick();
+    let new = &bench.said[said..];
+    let changes: Vec<_> = new
+        .iter()
+        .filter_map(|notice| match notice {
+            Notice::Mode(mode, reason) => Some((*mode, *reason)),
+            _ => None,
+        })
+        .collect();
+    // Every transition is announced, and what is announced is a transition.
+    let mut mode = before;
+    for (next, reason) in &changes {
+        prop_assert!(*next != mode, "{:?} announced twice", next);
+        let fits = match reason {
+            Reason::Ordered => match asked {
+                Some(Order::Select(wanted)) => *next == wanted,
+                Some(Order::TakeOff(_)) => *next == FlightMode::Takeoff,
+                Some(Order::GoTo { .. }) => *next == FlightMode::Hold,
+                _ => false,
+            },
+            Reason::Done => [FlightMode::Takeoff, FlightMode::Mission].contains(&mode) && *next == FlightMode::Hold,
+            Reason::Mission => mode == FlightMode::Mission && [FlightMode::Land, FlightMode::Return].contains(next),
+            Reason::NoLift => [FlightMode::Hold, FlightMode::Land].contains(next),
+            Reason::Disarmed => *next == FlightMode::Hold,
+            Reason::Failsafe(_) => strength(*next) > strength(mode) && was_armed,
+        };
+        prop_assert!(fits, "{:?} to {:?} by {:?}, asked {:?}", mode, next, reason, asked);
+        mode = *next;
+    }
+    prop_assert_eq!(mode, guided.mode, "announced {:?}", changes);
+    prop_assert_eq!(asked.is_some(), guided.answer.is_some());
+    // An order that is declined has no effect.
+    if let Some((_, Err(_))) = guided.answer {
+        prop_assert!(changes.iter().all(|(_, reason)| *reason != Reason::Ordered));
+    }
+    if let (Some(Order::Select(wanted)), Some((_, Ok(())))) = (asked, guided.answer) {
+        let ended = changes.iter().any(|(_, reason)| *reason != Reason::Ordered);
+        prop_assert!(guided.mode == wanted || ended);
+    }
+    // It rests only where it stands, and asks to stop the motors only there.
+    prop_assert!(!guided.rests || was_armed);
+    if bench.airborne() {
+        prop_assert!(guided.request.is_none());
+        prop_assert!(!guided.rests, "{:?}", bench.state);
+    }
+    if let Some(setpoint) = guided.setpoint {
+        prop_assert!(setpoint.is_plausible());
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
+
+    /// Random orders and failures, then quiet: it is disarmed on the ground, or flies where it should.
+    #[test]
+    fn random_walks_follow_the_table(steps in steps()) {
+        let mut settings = settings();
+        (settings.net.cells, settings.net.fence_radius_m, settings.net.fence_height_m) = (1.0, 35.0, 25.0);
+        let mut bench = Bench::new(settings);
+        bench.battery = Some(Reading { voltage_v: 4.0, current_a: 0.0 });
+        bench.run(1.5);
+        for step in steps {
+            let mut asked = None;
+            match step {
+                Step::Arm => {
+                    if bench.core == Mode::Disarmed && bench.last.unwrap().checks.all_ok() {
+                        bench.core = Mode::Flying;
+                        bench.landing = afbc_flight_core::landing::LandDetector::new(&bench.state, 9.81);
+                    }
+                }
+                Step::Kill => bench.core = Mode::Disarmed,
+                Step::Order(order) => {
+                    let queued = bench.orders.give(Given { order, ticket: 9 });
+                    prop_assert!(queued);
+                    asked = Some(order);
+                }
+                Step::Target(target) => bench.aim(target),
+                Step::Sticks(value) => bench.orders.sticks = Some(Stamped { value, at_us: bench.now_us }),
+                Step::Heard(heard) => bench.heard = heard,
+                Step::Sees(sees) => bench.sees = sees || bench.core.armed(),
+                Step::Battery(voltage_v) => bench.battery = Some(Reading { voltage_v, current_a: 0.0 }),
+                Step::Sensor(inertial) => bench.sensors.inertial = inertial,
+                Step::Descends => {
+                    if bench.core == Mode::Flying {
+                        bench.core = Mode::Descending;
+                    }
+                }
+                Step::Mission(kind) => bench.items = mission(kind),
+                Step::Wind(wind_m_s2) => bench.wind_m_s2.x = wind_m_s2,
+                Step::Wait(ticks) => {
+                    for _ in 0..ticks {
+                        follow(&mut bench, None)?;
+                    }
+                }
+            }
+            follow(&mut bench, asked)?;
+        }
+        for _ in 0..60_000 {
+            follow(&mut bench, None)?;
+        }
+        let hovers = bench.state.velocity_m_s.norm() < 0.3;
+        let flies = bench.airborne() && (hovers || bench.guidance.mode() != FlightMode::Hold);
+        prop_assert!(!bench.core.armed() || flies, "{:?} {:?}", bench.state, bench.last);
+    }
+}
