@@ -1,69 +1,65 @@
 //! Communication: receives and sends messages.
 
-use crate::answers::{ANSWERS_PER_TICK, Answers};
+use crate::desk::Desk;
 use crate::failsafes::Failsafes;
 use crate::flight::Report;
+use crate::mail::Mail;
+use crate::parameters::{Change, Table, VALUE_BYTES};
+use crate::services::commands::ANSWERS_PER_TICK;
+use crate::services::modes;
+use crate::services::picture::Surroundings;
+use crate::services::streams::{Requested, id};
+use crate::services::telemetry::compose;
+use crate::services::texts::{Words, reason, urgency};
+use crate::setup::Setup;
 use afbc::monitor::Norm;
 use afbc_control::Trip;
 use afbc_flight_core::rate;
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, Sighting};
-use afbc_flight_core::{Inbox, Mode, Stamped, Tracker};
-use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, Sender, StatesRefused, Text, Uplink};
-use afbc_types::{PerAxis, Pose, State};
+use afbc_flight_core::{Mode, Stamped, Tracker};
+use afbc_guidance::{Cause, Notice, Reading, Reason};
+use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, Motion, Sender, StatesRefused, Uplink};
+use afbc_types::{PerAxis, Pose, Setpoint};
 
-/// Address of the vehicle: system 1, component 1 (autopilot).
-pub const ADDRESS: Address = Address { system: 1, component: 1 };
+/// Component of the vehicle: autopilot.
+const AUTOPILOT: u8 = 1;
 /// Largest size of all messages after one tick \[bytes\].
 pub const REPORT_MAX: usize = 768;
+/// Longest frame of a text \[bytes\].
+const TEXT_MAX: usize = 12 + 54;
+/// Replies sent per tick.
+const REPLIES_PER_TICK: usize = 2;
 
 /// Text to the pilot when the clock has failed.
 pub const CLOCK_FAILED: &str = "clock failed, using the internal one: land";
 /// Text to the pilot when the control tick's rate or timing is wrong.
 pub const TICK_OFF: &str = "control tick rate is wrong: land";
 
-/// A message sent every `period` ticks, in the ticks given by `phase`.
-struct Schedule {
-    period: u64,
-    phase: u64,
-}
-
-impl Schedule {
-    fn is_due(&self, tick: u64) -> bool {
-        tick % self.period == self.phase
-    }
-}
-
-/// 1 Hz.
-const HEARTBEAT: Schedule = Schedule { period: 1000, phase: 3 };
-/// 50 Hz.
-const ATTITUDE: Schedule = Schedule { period: 20, phase: 1 };
-/// 50 Hz.
-const POSITION: Schedule = Schedule { period: 20, phase: 11 };
-/// 10 Hz.
-const HEALTH: Schedule = Schedule { period: 100, phase: 7 };
-/// 100 Hz, and after every tick with a new state, the link's or the vehicle's own.
-const ROTORS: Schedule = Schedule { period: 10, phase: 0 };
+/// Ticks between heartbeats, and the first.
+const HEARTBEAT: (u64, u64) = (1000, 3);
+/// Longest time between rotor commands, where they are sent \[ticks\]: else they follow each new state.
+const ROTORS: u64 = 10;
 
 /// Receives and sends messages.
 pub struct Comms {
     decoder: Decoder<Uplink>,
     sender: Sender,
+    desk: Desk,
     tracker: Tracker,
-    /// True if the vehicle has an estimate of its own: then the tracker's poses are for it.
-    estimates: bool,
-    /// Start of the last tick \[us\], the time stamp of everything that arrives before the next one.
-    now_us: u64,
     tick: u64,
     tick_us_max: f32,
-    state: Option<State>,
+    saturated_ticks: u32,
     /// True if a state has arrived since the last rotor command.
     state_is_news: bool,
-    answers: Answers,
+    /// The setpoint that came last.
+    followed: Option<Setpoint>,
     failsafes: Failsafes,
     norms: PerAxis<Norm>,
     trip: Option<Trip>,
     rate: rate::Report,
+    /// Bytes that may still be sent after this tick.
+    left: usize,
 }
 
 impl Default for Comms {
@@ -73,58 +69,97 @@ impl Default for Comms {
 }
 
 impl Comms {
-    /// Creates it with nothing received.
+    /// Creates it with nothing received, in the default setup.
     pub fn new() -> Self {
+        Self::with(Setup::default())
+    }
+
+    /// Creates it with nothing received.
+    pub fn with(setup: Setup) -> Self {
+        let me = Address { system: setup.system, component: AUTOPILOT };
         Comms {
-            decoder: Decoder::new(ADDRESS),
-            sender: Sender::new(ADDRESS),
+            decoder: Decoder::new(me),
+            sender: Sender::new(me),
+            desk: Desk::new(me, &setup),
             tracker: Tracker::default(),
-            estimates: false,
-            now_us: 0,
             tick: 0,
             tick_us_max: 0.0,
-            state: None,
+            saturated_ticks: 0,
             state_is_news: false,
-            answers: Answers::default(),
+            followed: None,
             failsafes: Failsafes::default(),
             norms: PerAxis::default(),
             trip: None,
             rate: rate::Report::default(),
+            left: 0,
         }
     }
 
-    /// Processes the next bytes of the stream; returns new inputs for the control tick, to be [posted](Inbox::post).
+    /// Tells what the control tick does not know: origin, satellite receiver, battery, time of day.
+    pub fn surround(&mut self, surroundings: Surroundings) {
+        self.desk.picture.surroundings = surroundings;
+    }
+
+    /// Tells everyone what a shell has to say about the parameters.
+    pub fn warn(&mut self, text: &str) {
+        self.desk.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
+    }
+
+    /// True if a station has asked the disarmed vehicle to reboot: what has been sent should leave first.
+    pub fn wants_reboot(&self) -> bool {
+        self.desk.reboot
+    }
+
+    /// True if [`receive`](Self::receive) has something for the next tick even without bytes.
+    pub fn has_mail(&self) -> bool {
+        self.desk.wanted_leg().is_some()
+    }
+
+    /// Processes the next bytes of the stream; returns new inputs for the control tick, to be [posted](Mail::post).
     ///
     /// A vehicle without an estimate of its own ignores poses, since a law needs velocities and rates.
-    pub fn receive(&mut self, bytes: &[u8]) -> Inbox {
-        let mut news = Inbox::default();
-        let Comms { decoder, tracker, estimates, now_us, state, state_is_news, answers, .. } = self;
+    pub fn receive(&mut self, bytes: &[u8]) -> Mail {
+        let mut news = Mail::EMPTY;
+        let Comms { decoder, desk, tracker, state_is_news, followed, .. } = self;
+        let estimates = desk.picture.senses;
         decoder.feed(bytes, |from, message| match message {
-            Uplink::Heartbeat => (),
             Uplink::State { sent_us, state: value, sigmas } => {
-                let age_max_us = if *estimates { POSE_AGE_MAX_US } else { COAST_US.into() };
+                let age_max_us = if estimates { POSE_AGE_MAX_US } else { COAST_US.into() };
                 let sighting = Sighting::State(value);
-                if let Some(at_us) = tracker.sight(number(from), sent_us, *now_us, sighting, age_max_us) {
-                    if *now_us - at_us <= COAST_US.into() {
-                        news.put_state(Stamped { value, at_us });
+                if let Some(at_us) = tracker.sight(number(from), sent_us, desk.now_us, sighting, age_max_us) {
+                    if desk.now_us - at_us <= COAST_US.into() {
+                        news.inbox.put_state(Stamped { value, at_us });
                     }
-                    if *estimates {
-                        news.put_pose(Stamped { value: Pose::of(&value, sigmas), at_us });
+                    if estimates {
+                        news.inbox.put_pose(Stamped { value: Pose::of(&value, sigmas), at_us });
                     }
-                    (*state, *state_is_news) = (Some(value), true);
+                    (desk.picture.state, *state_is_news) = (Some(value), true);
                 }
             }
-            Uplink::Pose { sent_us, pose: value } if *estimates => {
+            Uplink::Pose { sent_us, pose: value } if estimates => {
                 let sighting = Sighting::Pose(value);
-                if let Some(at_us) = tracker.sight(number(from), sent_us, *now_us, sighting, POSE_AGE_MAX_US) {
-                    news.put_pose(Stamped { value, at_us });
+                if let Some(at_us) = tracker.sight(number(from), sent_us, desk.now_us, sighting, POSE_AGE_MAX_US) {
+                    news.inbox.put_pose(Stamped { value, at_us });
                 }
             }
-            Uplink::Pose { .. } => (),
-            Uplink::Setpoint(value) => news.put_setpoint(Stamped { value, at_us: *now_us }),
-            Uplink::Command(command) => answers.hear(command, from, *now_us, &mut news),
+            other => desk.hear(from, other, &mut news),
+        });
+        if let Some(setpoint) = news.inbox.setpoint() {
+            *followed = Some(setpoint.value);
+        }
+        desk.hand_over(&mut news);
+        news.battery = desk.picture.surroundings.battery.map(|battery| Reading {
+            voltage_v: f32::from(battery.voltage_mv) * 1e-3,
+            // Negative: not measured.
+            current_a: f32::from(battery.current_ca.max(0)) * 1e-2,
         });
         news
+    }
+
+    /// Exchanges the decoder. Where there are several streams of bytes, each has one of its own, which is put in before
+    /// its bytes are received and taken out after them: a frame may end in later bytes of its own stream only.
+    pub fn exchange(&mut self, decoder: &mut Decoder<Uplink>) {
+        core::mem::swap(&mut self.decoder, decoder);
     }
 
     /// Returns the number of frames dropped since power-up, for any reason.
@@ -135,89 +170,197 @@ impl Comms {
             .fold(0, u32::saturating_add)
     }
 
-    /// Sends all messages due after a tick, frame by frame, through `send`. `tick_cycles` is the duration of the tick
-    /// in cycles of 168 MHz.
-    pub fn report<const N: usize>(&mut self, report: &Report<N>, tick_cycles: u32, mut send: impl FnMut(&[u8])) {
-        let mut buffer = [0; FRAME_MAX];
-        let mut say = |message: Downlink| send(self.sender.send(&message, &mut buffer));
-
-        self.now_us = report.time_us;
+    /// Sends all messages due after a tick, frame by frame, through `send`: at most [`REPORT_MAX`] bytes. `tick_cycles`
+    /// is the duration of the tick in cycles of 168 MHz.
+    pub fn report<const N: usize>(&mut self, report: &Report<N>, tick_cycles: u32, send: impl FnMut(&[u8])) {
         self.tick += 1;
         let tick_us = tick_cycles as f32 / 168.0;
         self.tick_us_max = self.tick_us_max.max(tick_us);
-
-        let armed = report.mode.armed();
-        self.estimates = report.estimate.is_some();
+        let dropped_frames = self.bad_frames();
+        let desk = &mut self.desk;
+        desk.now_us = report.time_us;
+        desk.picture.update(report, tick_us);
+        desk.picture.dropped_frames = dropped_frames;
         if let Some(estimate) = report.estimate {
-            (self.state, self.state_is_news) = (Some(estimate), true);
+            (desk.picture.state, self.state_is_news) = (Some(estimate), true);
         }
-        if self.state_is_news || ROTORS.is_due(self.tick) {
+        desk.tick();
+        if let Some((axis, norm)) = report.learnt {
+            self.norms[axis] = norm;
+        }
+        self.saturated_ticks = report.saturated_ticks;
+        self.watch(report);
+
+        let mut outlet = Outlet { sender: self.sender, buffer: [0; FRAME_MAX], left: REPORT_MAX, send };
+        let (now_us, armed) = (report.time_us, report.mode.armed());
+        if self.desk.streams.rotors() && (self.state_is_news || self.tick.is_multiple_of(ROTORS)) {
             self.state_is_news = false;
-            say(Downlink::Rotors { time_us: report.time_us, armed, speeds: report.motors.padded() });
+            // Not from the budget: whoever asks for them leaves room.
+            outlet.say(&Downlink::Rotors { time_us: now_us, armed, speeds: report.motors.padded() });
         }
-        if let Some(answer) = report.answer.and_then(|answer| self.answers.settle(answer)) {
-            say(answer);
+        let Desk { commands, streams, texts, .. } = &mut self.desk;
+        let settled = report.answer.and_then(|answer| commands.settle(answer));
+        let ordered = report.guided.answer.and_then(|(ticket, result)| commands.settle_order(ticket, result));
+        for answer in settled.into_iter().chain(ordered) {
+            streams.spend(outlet.say(&answer));
         }
-        for answer in core::iter::from_fn(|| self.answers.next(report.time_us)).take(ANSWERS_PER_TICK) {
-            say(answer);
+        for answer in core::iter::from_fn(|| commands.next(now_us)).take(ANSWERS_PER_TICK) {
+            streams.spend(outlet.say(&answer));
         }
-        let mut text = |severity, text: &str| say(Downlink::Text { severity, text: Text::from(text) });
+        while streams.has_room()
+            && outlet.left >= TEXT_MAX
+            && let Some(text) = texts.next()
+        {
+            streams.spend(outlet.say(&text));
+        }
+        let (period, phase) = HEARTBEAT;
+        if self.tick % period == phase && outlet.left >= TEXT_MAX {
+            let heartbeat = self.heartbeat();
+            self.desk.streams.spend(outlet.say(&heartbeat));
+        }
+        for _ in 0..REPLIES_PER_TICK {
+            if self.desk.streams.has_room()
+                && outlet.left >= TEXT_MAX
+                && let Some(reply) = self.desk.next_reply()
+            {
+                self.desk.streams.spend(outlet.say(&reply));
+            }
+        }
+        while outlet.left >= FRAME_MAX
+            && let Some(requested) = self.desk.streams.next(now_us)
+        {
+            if let Some(message) = self.compose(requested) {
+                self.desk.streams.spend(outlet.say(&message));
+            }
+        }
+        (self.sender, self.left) = (outlet.sender, outlet.left);
+    }
+
+    /// Does what stations want of the parameters, to be called after each [`report`](Self::report): sends values, frame
+    /// by frame, through `send`, together with the report at most [`REPORT_MAX`] bytes. Returns what has changed in
+    /// `table`, which is to be flown ([`Flight::adopt`](crate::Flight::adopt)) and kept
+    /// ([`Kept::keep`](crate::parameters::Kept::keep)). Nothing changes while the vehicle is armed.
+    pub fn parameters<const N: usize>(&mut self, table: &mut Table<N>, send: impl FnMut(&[u8])) -> Option<Change> {
+        let change = self.desk.grant(table);
+        // COM_DL_LOSS_T, which is in range.
+        let silent_us = (table.configuration().guidance.net.station_lost_s * 1e6) as u64;
+        self.desk.control.set_silence(silent_us);
+        let mut outlet = Outlet { sender: self.sender, buffer: [0; FRAME_MAX], left: self.left, send };
+        let Desk { parameters, streams, now_us, .. } = &mut self.desk;
+        while outlet.left >= VALUE_BYTES as usize
+            && let Some(value) = parameters.tell(*now_us, streams.bytes_per_s(), table)
+        {
+            streams.spend(outlet.say(&Downlink::Parameter(value)));
+        }
+        (self.sender, self.left) = (outlet.sender, outlet.left);
+        change
+    }
+
+    /// Notes what the pilot is to be told of a tick.
+    fn watch<const N: usize>(&mut self, report: &Report<N>) {
+        let Comms { desk, failsafes, tick, .. } = self;
+        let warning = MavSeverity::MAV_SEVERITY_WARNING;
         if let Some(Err(refusal)) = report.answer.map(|answer| answer.result) {
-            text(MavSeverity::MAV_SEVERITY_WARNING, refusal.reason());
+            desk.texts.put(warning, refusal.reason());
         }
-        for (severity, notice) in self.failsafes.watch(report, self.tick) {
-            text(severity, notice);
+        if let Some((_, Err(declined))) = report.guided.answer {
+            desk.texts.put(warning, reason(declined));
+        }
+        // The flight core's failsafes are announced below.
+        let descends = |notice: &Notice| matches!(notice, Notice::Mode(_, Reason::Failsafe(Cause::Descent)));
+        for notice in report.guided.notices.iter().filter(|notice| !descends(notice)) {
+            let [first, second, third] = notice.parts();
+            desk.texts.say(urgency(notice.severity()), &Words::of(first).and(second).and(third));
+        }
+        for (severity, notice) in failsafes.watch(report, *tick) {
+            desk.texts.put(severity, notice);
         }
         let trip = report.health.control.trip;
         if let (Some(trip), None) = (trip, self.trip) {
-            text(MavSeverity::MAV_SEVERITY_WARNING, trip.reason());
+            desk.texts.put(warning, trip.reason());
         }
         let (rate, before) = (report.health.rate, self.rate);
         self.rate = rate;
         if rate.clock_failed && !before.clock_failed {
-            text(MavSeverity::MAV_SEVERITY_CRITICAL, CLOCK_FAILED);
+            desk.texts.put(MavSeverity::MAV_SEVERITY_CRITICAL, CLOCK_FAILED);
         } else if before.healthy() && !rate.healthy() {
-            text(MavSeverity::MAV_SEVERITY_CRITICAL, TICK_OFF);
+            desk.texts.put(MavSeverity::MAV_SEVERITY_CRITICAL, TICK_OFF);
         }
         // While the vehicle flies blind there is no report of a law.
         if report.mode != Mode::Coasting {
             self.trip = trip;
         }
-        if let Some((axis, norm)) = report.learnt {
-            self.norms[axis] = norm;
-        }
-        if HEARTBEAT.is_due(self.tick) {
-            let failsafe = self.failsafes.within(HEARTBEAT.period, self.tick);
-            say(Downlink::Heartbeat { armed, failsafe, mode: report.mode as u32 });
-        }
-        let time_ms = (report.time_us / 1000) as u32;
-        if let Some(State { position_m, velocity_m_s, attitude_rad, rates_rad_s }) = self.state {
-            if ATTITUDE.is_due(self.tick) {
-                say(Downlink::Attitude { time_ms, attitude_rad, rates_rad_s });
+    }
+
+    /// Returns a message of telemetry.
+    fn compose(&mut self, requested: Requested) -> Option<Downlink> {
+        let picture = &self.desk.picture;
+        match requested.message {
+            id::HEARTBEAT => Some(self.heartbeat()),
+            id::MISSION_CURRENT => Some(self.desk.mission_current()),
+            id::POSITION_TARGET_LOCAL_NED => {
+                let setpoint = self.followed.filter(|_| picture.mode.armed())?;
+                Some(Downlink::Followed(picture.time_ms(), Motion::from(&setpoint)))
             }
-            if POSITION.is_due(self.tick) {
-                say(Downlink::Position { time_ms, position_m, velocity_m_s });
+            id::AVAILABLE_MODES => {
+                // 0 asks for all: one after the other.
+                let (place, all) = modes::place(requested.index);
+                if all && place < modes::COUNT {
+                    let next = Requested { index: modes::all_from(place + 1), ..requested };
+                    self.desk.streams.request_first(next);
+                }
+                modes::available(place).map(Downlink::AvailableMode)
             }
+            id::DEBUG_FLOAT_ARRAY => Some(Downlink::Health(self.health())),
+            message => compose(message, picture),
         }
-        if HEALTH.is_due(self.tick) {
-            let Report { health, .. } = report;
-            let norm = |norm: &Norm| libm::sqrtf(norm.theta_squared);
-            let Refused { overtaken, late, elsewhere } = *self.tracker.refused();
-            say(Downlink::Health(afbc_link::Health {
-                time_us: report.time_us,
-                tick_us,
-                tick_max_us: self.tick_us_max,
-                rate_hz: health.rate.rate_hz.unwrap_or(0) as f32,
-                late_ticks: health.rate.off_ticks(),
-                saturated_ticks: report.saturated_ticks,
-                state_age_us: health.state_age_us as f32,
-                theta_norm: PerAxis::from_fn(|axis| norm(&self.norms[axis])),
-                delta: PerAxis::from_fn(|axis| self.norms[axis].delta),
-                link: *self.decoder.counters(),
-                unanswered: self.answers.unanswered(),
-                states_refused: StatesRefused { overtaken, late, elsewhere, frozen: health.frozen_states },
-            }));
+    }
+
+    fn heartbeat(&self) -> Downlink {
+        let picture = &self.desk.picture;
+        let (period, _) = HEARTBEAT;
+        let failsafe = self.failsafes.within(period, self.tick);
+        Downlink::Heartbeat { armed: picture.mode.armed(), failsafe, mode: modes::custom(picture.flight_mode()) }
+    }
+
+    fn health(&self) -> afbc_link::Health {
+        let picture = &self.desk.picture;
+        let norm = |norm: &Norm| libm::sqrtf(norm.theta_squared);
+        let Refused { overtaken, late, elsewhere } = *self.tracker.refused();
+        let health = &picture.health;
+        afbc_link::Health {
+            time_us: picture.time_us,
+            tick_us: picture.tick_us,
+            tick_max_us: self.tick_us_max,
+            rate_hz: health.rate.rate_hz.unwrap_or(0) as f32,
+            late_ticks: health.rate.off_ticks(),
+            saturated_ticks: self.saturated_ticks,
+            state_age_us: health.state_age_us as f32,
+            theta_norm: PerAxis::from_fn(|axis| norm(&self.norms[axis])),
+            delta: PerAxis::from_fn(|axis| self.norms[axis].delta),
+            link: *self.decoder.counters(),
+            unanswered: self.desk.commands.unanswered(),
+            states_refused: StatesRefused { overtaken, late, elsewhere, frozen: health.frozen_states },
         }
+    }
+}
+
+/// What is sent after a tick.
+struct Outlet<F> {
+    sender: Sender,
+    buffer: [u8; FRAME_MAX],
+    /// Bytes that may still be sent.
+    left: usize,
+    send: F,
+}
+
+impl<F: FnMut(&[u8])> Outlet<F> {
+    /// Sends a message; returns its length.
+    fn say(&mut self, message: &Downlink) -> usize {
+        let frame = self.sender.send(message, &mut self.buffer);
+        (self.send)(frame);
+        self.left = self.left.saturating_sub(frame.len());
+        frame.len()
     }
 }
 

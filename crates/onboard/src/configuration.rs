@@ -1,8 +1,10 @@
 //! What makes the firmware that of one vehicle.
 
+use crate::setup::Link;
 use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
 use afbc_estimator::Settings as Estimation;
+use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Curve;
 use afbc_types::{Airframe, Parameters, PerAxis};
 
@@ -19,6 +21,12 @@ pub struct Configuration<const N: usize = 4> {
     pub curve: Curve,
     /// Settings of the estimator.
     pub estimation: Estimation,
+    /// Limits for arming.
+    pub arming: ArmingLimits,
+    /// Settings of modes, limits and safety net.
+    pub guidance: afbc_guidance::Settings,
+    /// Parameters of the link.
+    pub link: Link,
 }
 
 impl Default for Configuration {
@@ -30,6 +38,9 @@ impl Default for Configuration {
             gains: Profile::Flight.gains(),
             curve: Curve::DEFAULT,
             estimation: Estimation::DEFAULT,
+            arming: ArmingLimits::DEFAULT,
+            guidance: afbc_guidance::Settings::DEFAULT,
+            link: Link::DEFAULT,
         }
     }
 }

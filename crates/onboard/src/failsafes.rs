@@ -12,14 +12,12 @@ const DESCENDING: Notice = (MavSeverity::MAV_SEVERITY_CRITICAL, "no state for 0.
 const STATE_LOST: Notice = (MavSeverity::MAV_SEVERITY_EMERGENCY, "no state for 2.25 s: motors stopped");
 const TUMBLED: Notice = (MavSeverity::MAV_SEVERITY_EMERGENCY, "tumbled: motors stopped");
 const OBSERVED: Notice = (MavSeverity::MAV_SEVERITY_CRITICAL, "inertial sensor failed: flying on tracker's poses");
-const SETPOINT_LOST: Notice = (MavSeverity::MAV_SEVERITY_WARNING, "no setpoint for 0.5 s: holding the position");
 
 /// Failsafes of the last tick.
 #[derive(Default)]
 pub(crate) struct Failsafes {
     mode: Mode,
     observed: bool,
-    setpoint_lost: bool,
     /// Number of the last tick with a failsafe.
     last: Option<u64>,
 }
@@ -34,20 +32,18 @@ impl Failsafes {
         let Report { mode, ended, health, .. } = report;
         let entered = (*mode != self.mode).then_some(*mode);
         let given_up = matches!(ended, Some(End::StateLost | End::Tumbled));
-        // A descending vehicle needs no setpoint.
-        let setpoint_lost = matches!(mode, Mode::Flying | Mode::Coasting) && health.setpoint_stale;
         let notices = [
             (entered == Some(Mode::Coasting)).then_some(COASTING),
             (entered == Some(Mode::Descending)).then_some(DESCENDING),
             (health.observed && !self.observed).then_some(OBSERVED),
             (*ended == Some(End::StateLost)).then_some(STATE_LOST),
             (*ended == Some(End::Tumbled)).then_some(TUMBLED),
-            (setpoint_lost && !self.setpoint_lost).then_some(SETPOINT_LOST),
         ];
-        if matches!(mode, Mode::Coasting | Mode::Descending) || health.observed || given_up || setpoint_lost {
+        let failsafe = given_up || health.observed || report.guided.failsafe;
+        if matches!(mode, Mode::Coasting | Mode::Descending) || failsafe {
             self.last = Some(tick);
         }
-        (self.mode, self.observed, self.setpoint_lost) = (*mode, health.observed, setpoint_lost);
+        (self.mode, self.observed) = (*mode, health.observed);
         notices.into_iter().flatten()
     }
 

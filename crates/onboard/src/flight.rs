@@ -1,12 +1,16 @@
 //! The vehicle with its flight core and motors.
 
 use crate::configuration::Configuration;
+use crate::guided::{Core, Guide, Guided};
+use crate::mail::Mail;
 use crate::navigation::Navigation;
 use crate::readings::Readings;
+use crate::silence::Silence;
 use afbc::monitor::{Bounds, Norm};
 use afbc::{Guarded, guarded};
-use afbc_flight_core::{Answer, ArmingLimits, End, Health, Inbox, Mode, Motor, Vehicle, VehicleMemory};
-use afbc_types::{Axis, OutOfRange, ROTORS_MAX, RotorSpeeds, State};
+use afbc_estimator::Estimator;
+use afbc_flight_core::{Answer, End, Health, Mode, Motor, Vehicle, VehicleMemory};
+use afbc_types::{Axis, Declared, OutOfRange, ROTORS_MAX, RotorSpeeds, State};
 use core::array;
 
 /// A vehicle under AFBC with its monitor.
@@ -16,7 +20,46 @@ pub struct Flight<const N: usize = 4> {
     memory: VehicleMemory<guarded::Memory<N>>,
     navigation: Navigation,
     motor: Motor,
+    guide: Guide,
+    silence: Silence,
+    /// True if the last tick was on time.
+    tick_healthy: bool,
+    /// True if the state of the last tick was observed.
+    observes: bool,
     saturated_ticks: u32,
+}
+
+/// All that follows from a [`Configuration`], so that [`Flight::adopt`] takes a copy's time.
+#[derive(Clone, Debug)]
+pub struct Prepared<const N: usize = 4> {
+    vehicle: Vehicle<Guarded<N>, N>,
+    estimator: Estimator,
+    motor: Motor,
+    guide: Guide,
+}
+
+impl<const N: usize> Prepared<N> {
+    /// Prepares a flight.
+    ///
+    /// # Errors
+    /// The first parameter, setting or gain out of range, or the first that leaves the vehicle without a margin to
+    /// hover.
+    pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
+        let Configuration { airframe, settings, gains, curve, estimation, arming, guidance: _, link: _ } =
+            configuration;
+        // The controller checks what follows from these and assumes that each is in its range.
+        airframe.parameters.validate()?;
+        settings.validate()?;
+        gains.validate()?;
+        let bounds = Bounds::new(gains, &airframe.parameters, settings);
+        let controller = Guarded::new(*airframe, *settings, *gains, bounds)?;
+        Ok(Prepared {
+            vehicle: Vehicle::new(airframe.parameters, *arming, controller)?,
+            estimator: Estimator::new(*estimation)?,
+            motor: Motor::new(*curve)?,
+            guide: Guide::new(configuration)?,
+        })
+    }
 }
 
 /// Result of a control tick.
@@ -43,17 +86,19 @@ pub struct Report<const N: usize = 4> {
     pub answer: Option<Answer>,
     /// Why the flight ended, if it did in this tick.
     pub ended: Option<End>,
+    /// What the guidance decided.
+    pub guided: Guided,
 }
 
 impl<const N: usize> Report<N> {
     /// Returns the report extended with zeros to the largest number of rotors.
     #[must_use]
     pub fn padded(&self) -> Report<ROTORS_MAX> {
-        let Report { time_us, mode, motors, throttles, estimate, health, saturated_ticks, learnt, answer, ended } =
-            *self;
+        let Report { time_us, mode, motors, throttles, estimate, health, saturated_ticks, learnt, answer, .. } = *self;
         let throttles = array::from_fn(|i| throttles.get(i).copied().unwrap_or_default());
         let motors = motors.padded();
-        Report { time_us, mode, motors, throttles, estimate, health, saturated_ticks, learnt, answer, ended }
+        let (ended, guided) = (self.ended, self.guided);
+        Report { time_us, mode, motors, throttles, estimate, health, saturated_ticks, learnt, answer, ended, guided }
     }
 }
 
@@ -61,19 +106,35 @@ impl<const N: usize> Flight<N> {
     /// Creates the vehicle, disarmed.
     ///
     /// # Errors
-    /// The first parameter, setting or gain out of range, or the first that leaves the vehicle without a margin to
-    /// hover.
+    /// Those of [`Prepared::new`].
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
-        let Configuration { airframe, settings, gains, curve, estimation } = configuration;
-        let bounds = Bounds::new(gains, &airframe.parameters, settings);
-        let controller = Guarded::new(*airframe, *settings, *gains, bounds)?;
+        let Prepared { vehicle, estimator, motor, guide } = Prepared::new(configuration)?;
         Ok(Flight {
-            vehicle: Vehicle::new(airframe.parameters, ArmingLimits::default(), controller)?,
+            vehicle,
             memory: VehicleMemory::default(),
-            navigation: Navigation::new(*estimation)?,
-            motor: Motor::new(*curve)?,
+            navigation: Navigation::new(estimator),
+            motor,
+            guide,
+            silence: Silence::default(),
+            tick_healthy: false,
+            observes: false,
             saturated_ticks: 0,
         })
+    }
+
+    /// Flies with another configuration from the next tick on; what the estimator knows stays. False, and without
+    /// effect, while armed.
+    #[must_use = "an armed vehicle keeps its configuration"]
+    pub fn adopt(&mut self, prepared: &Prepared<N>) -> bool {
+        let disarmed = !self.memory.mode().armed();
+        if disarmed {
+            let Prepared { vehicle, estimator, motor, guide } = prepared;
+            self.vehicle.clone_from(vehicle);
+            self.navigation.adopt(estimator);
+            self.motor = *motor;
+            self.guide.adopt(guide);
+        }
+        disarmed
     }
 
     /// Records that the clock has failed and another has taken over: the vehicle is not armed again.
@@ -85,9 +146,19 @@ impl<const N: usize> Flight<N> {
     /// read; `now_us` is the time since power-up. Cannot fail.
     // Always: copying the report out of a call costs a hundred instructions.
     #[inline(always)]
-    pub fn tick(&mut self, now_us: u64, inbox: &mut Inbox, readings: &Readings) -> Report<N> {
-        let estimate = self.navigation.tick(now_us, readings, inbox);
-        let outcome = self.vehicle.tick(&mut self.memory, now_us, inbox);
+    pub fn tick(&mut self, now_us: u64, mail: &mut Mail, readings: &Readings) -> Report<N> {
+        let mut sensors = self.silence.tick(now_us, readings, mail.inbox.pose().is_some());
+        // One that repeats itself has failed, too.
+        sensors.inertial |= self.observes;
+        let estimate = self.navigation.tick(now_us, readings, &mut mail.inbox);
+        let (mode, airborne, tick_healthy) = (self.memory.mode(), self.memory.airborne(), self.tick_healthy);
+        let observed = if self.observes { self.memory.state().copied() } else { None };
+        let core = Core { mode, airborne, tick_healthy, sensors, observed };
+        let guided = self.guide.tick(now_us, mail, &core);
+        let outcome = self.vehicle.tick(&mut self.memory, now_us, &mail.inbox);
+        self.guide.gave(outcome.forces.0.iter().sum());
+        self.tick_healthy = outcome.health.rate.healthy();
+        self.observes = outcome.health.observed;
         if outcome.health.control.saturated {
             self.saturated_ticks = self.saturated_ticks.saturating_add(1);
         }
@@ -103,6 +174,7 @@ impl<const N: usize> Flight<N> {
             learnt: self.memory.control().map(|control| control.figures().latest()),
             answer: outcome.answer,
             ended: outcome.ended,
+            guided,
         }
     }
 }

@@ -9,33 +9,44 @@
 //! with the same bytes and times gets the same bytes as the processor.
 //!
 //! ```
-//! use afbc_onboard::{Comms, Configuration, Flight, Readings};
-//! use afbc_flight_core::Inbox;
+//! use afbc_onboard::{Comms, Configuration, Flight, Mail, Readings};
 //!
 //! let mut flight = Flight::new(&Configuration::default())?;
-//! let (mut comms, mut inbox) = (Comms::new(), Inbox::default());
-//! inbox.post(&comms.receive(b"MAVLink, or noise"));
-//! let report = flight.tick(1_000, &mut inbox.take(), &Readings::NONE);
+//! let (mut comms, mut mail, mut taken) = (Comms::new(), Mail::EMPTY, Mail::EMPTY);
+//! mail.post(&comms.receive(b"MAVLink, or noise"));
+//! mail.take_into(&mut taken);
+//! let report = flight.tick(1_000, &mut taken, &Readings::NONE);
 //! assert_eq!(report.throttles, [0; 4]); // disarmed
 //! comms.report(&report, 0, |_bytes| ());
 //! # Ok::<(), afbc_types::OutOfRange>(())
 //! ```
 #![no_std]
 
-mod answers;
 mod comms;
 mod configuration;
+mod desk;
 mod failsafes;
 mod flight;
+mod guided;
 mod lockstep;
+mod mail;
 mod navigation;
+pub mod parameters;
 mod readings;
+pub mod services;
+mod setup;
+mod silence;
 
 pub use afbc_estimator::Settings as Estimation;
-pub use answers::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, FORGOTTEN_US};
-pub use comms::{ADDRESS, CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
+pub use afbc_flight_core::ArmingLimits;
+pub use comms::{CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
 pub use configuration::Configuration;
-pub use flight::{Flight, Report};
+pub use flight::{Flight, Prepared, Report};
+pub use guided::Guided;
 pub use lockstep::ReplyHead;
+pub use mail::Mail;
 pub use navigation::{Navigation, pose, tell};
 pub use readings::{AIDS_MAX, Aged, Readings};
+pub use services::commands::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, FORGOTTEN_US, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN};
+pub use services::picture::Surroundings;
+pub use setup::{Link, Setup};

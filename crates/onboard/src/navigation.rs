@@ -1,9 +1,9 @@
 //! The vehicle's own estimate, and what of it the flight core is told.
 
 use crate::readings::{Aged, Readings};
-use afbc_estimator::{Easing, Estimate, Estimator, Measurement, Memory, Settings, Timed};
+use afbc_estimator::{Easing, Estimate, Estimator, Measurement, Memory, Timed};
 use afbc_flight_core::{Inbox, Refusal, Stamped};
-use afbc_types::{OutOfRange, Pose, PoseSigmas, State};
+use afbc_types::{Pose, PoseSigmas, State};
 use nalgebra::Vector3;
 
 /// Standard deviations of a tracker's pose that does not say how good it is: a motion-capture system's \[m, rad\].
@@ -33,19 +33,21 @@ pub struct Navigation {
 
 impl Navigation {
     /// Creates it with nothing read.
-    ///
-    /// # Errors
-    /// The first setting out of range.
-    pub fn new(settings: Settings) -> Result<Self, OutOfRange> {
-        Ok(Navigation {
-            estimator: Estimator::new(settings)?,
+    pub fn new(estimator: Estimator) -> Self {
+        Navigation {
+            estimator,
             memory: Memory::default(),
             easing: Easing::default(),
             senses: false,
             works: true,
             origin_m: None,
             told: [Vector3::zeros(); 2],
-        })
+        }
+    }
+
+    /// Goes on with another estimator.
+    pub(crate) fn adopt(&mut self, estimator: &Estimator) {
+        self.estimator = *estimator;
     }
 
     /// Takes the readings of a tick at `now_us`, tells `inbox` what the vehicle knows, and returns the estimated state;

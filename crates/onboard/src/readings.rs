@@ -58,6 +58,20 @@ impl Readings {
         }
     }
 
+    /// Moves all readings of `other` here. Copies only those that are there.
+    pub fn take_from(&mut self, other: &mut Readings) {
+        self.imu = other.imu.take();
+        for (to, from) in self.aids.iter_mut().zip(&mut other.aids) {
+            match from {
+                Some(aid) => {
+                    *to = Some(*aid);
+                    *from = None;
+                }
+                None => *to = None,
+            }
+        }
+    }
+
     /// Returns the sample with its time, for a tick at `now_us`.
     pub(crate) fn sample(&self, now_us: u64) -> Option<ImuSample> {
         let Timed { value: [rates_rad_s, specific_force_m_s2], at_us } = self.imu?.timed(now_us);

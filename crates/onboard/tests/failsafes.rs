@@ -11,6 +11,7 @@ use common::Bench;
 use proptest::prelude::*;
 
 const WARNING: MavSeverity = MavSeverity::MAV_SEVERITY_WARNING;
+const INFO: MavSeverity = MavSeverity::MAV_SEVERITY_INFO;
 const CRITICAL: MavSeverity = MavSeverity::MAV_SEVERITY_CRITICAL;
 const EMERGENCY: MavSeverity = MavSeverity::MAV_SEVERITY_EMERGENCY;
 
@@ -53,9 +54,10 @@ fn losing_the_state_is_reported_step_by_step() {
     let mut bench = Bench::flying();
     let (told, heartbeats) = fly(&mut bench, 5000, false, true);
     let severities: Vec<_> = told.iter().map(|(severity, _)| *severity).collect();
-    assert_eq!(severities, [WARNING, CRITICAL, EMERGENCY], "{told:?}");
-    for ((_, text), word) in told.iter().zip(["coasting", "descending", "motors stopped"]) {
-        assert!(text.contains(word) && text.contains("state"), "{text}");
+    assert_eq!(severities, [WARNING, CRITICAL, EMERGENCY, INFO], "{told:?}");
+    let words = ["state for 20 ms: coasting", "state for 0.25 s: descending", "motors stopped", "hold: disarmed"];
+    for ((_, text), words) in told.iter().zip(words) {
+        assert!(text.contains(words), "{text}");
     }
     // Until 2.25 s, and for one more second.
     assert_eq!(heartbeats.iter().filter(|critical| **critical).count(), 3, "{heartbeats:?}");
@@ -84,9 +86,13 @@ fn losing_the_setpoint_is_reported_each_time() {
     let mut bench = Bench::flying();
     for _ in 0..3 {
         let (told, _) = fly(&mut bench, 2000, true, false);
-        assert!(matches!(told.as_slice(), [(WARNING, text)] if text.contains("setpoint")), "{told:?}");
+        assert!(matches!(told.as_slice(), [(WARNING, text)] if text.contains("no targets")), "{told:?}");
+        // It holds until it is told to follow again.
+        let (_, heartbeats) = fly(&mut bench, 1000, true, true);
+        assert_eq!(heartbeats, [true]);
+        bench.follow();
         let (told, heartbeats) = fly(&mut bench, 3000, true, true);
-        assert_eq!(told, []);
+        assert!(matches!(told.as_slice(), [(INFO, text)] if text.contains("offboard")), "{told:?}");
         assert_eq!(heartbeats, [true, false, false]);
     }
 }

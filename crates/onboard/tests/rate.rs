@@ -1,9 +1,9 @@
 //! Wrong rate or timing of the control tick, and a failing clock: the pilot is told once, and arming is refused.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use afbc_flight_core::{Inbox, Mode, Refusal};
+use afbc_flight_core::{Mode, Refusal};
 use afbc_link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
-use afbc_onboard::{CLOCK_FAILED, Comms, Configuration, Flight, TICK_OFF};
+use afbc_onboard::{CLOCK_FAILED, Comms, Configuration, Flight, Mail, TICK_OFF};
 use afbc_types::{PoseSigmas, Setpoint, State};
 
 const STATION: Address = Address { system: 255, component: 190 };
@@ -12,7 +12,8 @@ const STATION: Address = Address { system: 255, component: 190 };
 struct Bench {
     flight: Flight,
     comms: Comms,
-    inbox: Inbox,
+    mail: Mail,
+    taken: Mail,
     sender: Sender,
     decoder: Decoder<Downlink>,
     now_us: u64,
@@ -27,7 +28,8 @@ impl Bench {
         Bench {
             flight: Flight::new(&Configuration::default()).expect("valid"),
             comms: Comms::new(),
-            inbox: Inbox::default(),
+            mail: Mail::EMPTY,
+            taken: Mail::EMPTY,
             sender: Sender::new(STATION),
             decoder: Decoder::new(STATION),
             now_us: 0,
@@ -39,7 +41,7 @@ impl Bench {
 
     fn hear(&mut self, message: Uplink) {
         let news = self.comms.receive(self.sender.send(&message, &mut [0; FRAME_MAX]));
-        self.inbox.post(&news);
+        self.mail.post(&news);
     }
 
     /// Runs ticks with this period.
@@ -51,7 +53,8 @@ impl Bench {
             state.position_m.z = 1e-6 * (self.now_us % 11) as f32;
             self.hear(Uplink::State { sent_us: self.now_us, state, sigmas: PoseSigmas::UNKNOWN });
             self.hear(Uplink::Setpoint(Setpoint::default()));
-            let report = self.flight.tick(self.now_us, &mut self.inbox.take(), &afbc_onboard::Readings::NONE);
+            self.mail.take_into(&mut self.taken);
+            let report = self.flight.tick(self.now_us, &mut self.taken, &afbc_onboard::Readings::NONE);
             self.mode = report.mode;
             let Bench { comms, decoder, texts, answers, .. } = self;
             let mut hear = |_: Address, message: Downlink| match message {

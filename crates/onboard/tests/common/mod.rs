@@ -1,9 +1,11 @@
 //! The firmware without its hardware, and stations that communicate with it.
 #![allow(dead_code, unreachable_pub, clippy::expect_used, reason = "shared by tests")]
 
-use afbc_flight_core::Inbox;
+use afbc_guidance::FlightMode;
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
-use afbc_onboard::{Comms, Configuration, Flight, REPORT_MAX, Readings, Report};
+use afbc_onboard::parameters::{Change, Table};
+use afbc_onboard::services::modes;
+use afbc_onboard::{Comms, Configuration, Flight, Mail, Prepared, REPORT_MAX, Readings, Report};
 use afbc_types::{PoseSigmas, Setpoint, State};
 
 pub const STATION: Address = Address { system: 255, component: 190 };
@@ -11,7 +13,11 @@ pub const STATION: Address = Address { system: 255, component: 190 };
 pub struct Bench {
     pub flight: Flight,
     pub comms: Comms,
-    pub inbox: Inbox,
+    pub table: Table,
+    /// What has changed in the table.
+    pub changes: Vec<Change>,
+    pub mail: Mail,
+    pub taken: Mail,
     decoder: Decoder<Downlink>,
     pub now_us: u64,
 }
@@ -21,7 +27,10 @@ impl Bench {
         Bench {
             flight: Flight::new(&Configuration::default()).expect("valid"),
             comms: Comms::new(),
-            inbox: Inbox::default(),
+            table: Table::new(Configuration::default()),
+            changes: Vec::new(),
+            mail: Mail::EMPTY,
+            taken: Mail::EMPTY,
             decoder: Decoder::new(STATION),
             now_us: 0,
         }
@@ -32,11 +41,17 @@ impl Bench {
         let mut bench = Bench::new();
         for tick in 0..2000 {
             if tick == 1100 {
+                bench.follow();
                 bench.hear(Uplink::Command(Command::Arm));
             }
             assert_eq!(bench.tick(&State::default()).0.mode.armed(), tick >= 1100);
         }
         bench
+    }
+
+    /// Orders it to follow setpoints.
+    pub fn follow(&mut self) {
+        self.hear(Uplink::Command(Command::SelectMode(modes::custom(FlightMode::Offboard))));
     }
 
     /// Receives `message` from `from`.
@@ -46,7 +61,7 @@ impl Bench {
 
     pub fn hear_bytes(&mut self, bytes: &[u8]) {
         let news = self.comms.receive(bytes);
-        self.inbox.post(&news);
+        self.mail.post(&news);
     }
 
     pub fn hear(&mut self, message: Uplink) {
@@ -69,7 +84,8 @@ impl Bench {
     /// Runs a tick with what was received and these readings; returns its report and all messages.
     pub fn sense(&mut self, readings: &Readings) -> (Report, Vec<Downlink>) {
         self.now_us += 1000;
-        let report = self.flight.tick(self.now_us, &mut self.inbox.take(), readings);
+        self.mail.take_into(&mut self.taken);
+        let report = self.flight.tick(self.now_us, &mut self.taken, readings);
         (report, self.said(&report))
     }
 
@@ -85,11 +101,16 @@ impl Bench {
     /// Returns the messages after a tick with this report; checks that they fit the firmware's buffer and are decoded.
     pub fn said(&mut self, report: &Report) -> Vec<Downlink> {
         let (mut messages, mut length, mut frames) = (Vec::new(), 0, 0);
-        let Bench { comms, decoder, .. } = self;
-        comms.report(report, 0, |bytes| {
+        let Bench { flight, comms, table, changes, decoder, .. } = self;
+        let mut send = |bytes: &[u8]| {
             (length, frames) = (length + bytes.len(), frames + 1);
             decoder.feed(bytes, |_, message| messages.push(message));
-        });
+        };
+        comms.report(report, 0, &mut send);
+        if let Some(change) = comms.parameters(table, &mut send) {
+            assert!(flight.adopt(&Prepared::new(table.configuration()).expect("checked")), "changed while armed");
+            changes.push(change);
+        }
         assert!(length <= REPORT_MAX, "{length} bytes");
         assert_eq!(messages.len(), frames);
         messages

@@ -1,0 +1,215 @@
+//! Hands each message to its service.
+
+mod commands;
+mod parameters;
+mod targets;
+
+use crate::mail::Mail;
+use crate::parameters::Service;
+use crate::services::commands::Commands;
+use crate::services::control::{Claim, Control};
+use crate::services::mission::Missions;
+use crate::services::picture::Picture;
+use crate::services::streams::Streams;
+use crate::services::texts::{Texts, Words};
+use crate::services::timesync;
+use crate::setup::Setup;
+use afbc_guidance::Order;
+use afbc_link::{Address, Clock, ControlAnswer, Downlink, Interval, MavSeverity, Mission, ParameterRequest, Uplink};
+use heapless::Deque;
+
+/// Most replies that wait, besides answers to commands. Further ones are dropped: askers repeat.
+const REPLIES_MAX: usize = 16;
+/// Most wishes about parameters that wait for the end of the tick. Further ones are dropped: askers repeat.
+const WISHES_MAX: usize = 32;
+/// Shortest time between reports of the station in control to the guidance \[us\].
+const HEARD_EVERY_US: u64 = 50_000;
+
+/// A reply to a message that is no command.
+#[derive(Clone, Copy, Debug)]
+enum Reply {
+    Clock(Clock),
+    Control(ControlAnswer),
+    Interval(Interval),
+    Reached(u16),
+}
+
+/// What a station wants of the parameters.
+#[derive(Clone, Copy, Debug)]
+enum Wish {
+    Ask(ParameterRequest),
+    Restore,
+}
+
+/// All services, and what they know.
+pub(crate) struct Desk {
+    me: Address,
+    /// Start of the last tick \[us\], the time stamp of everything that arrives before the next one.
+    pub(crate) now_us: u64,
+    pub(crate) picture: Picture,
+    pub(crate) commands: Commands,
+    pub(crate) control: Control,
+    pub(crate) missions: Missions,
+    pub(crate) streams: Streams,
+    pub(crate) texts: Texts,
+    replies: Deque<Reply, REPLIES_MAX>,
+    /// What stations want of the parameters.
+    wishes: Deque<Wish, WISHES_MAX>,
+    pub(crate) parameters: Service,
+    /// The item and upload that the guidance has been given last.
+    given: Option<(u16, u16)>,
+    /// The item that was reached last.
+    reached: Option<u16>,
+    /// When the guidance was last told that the station in control is there \[us\].
+    heard_us: Option<u64>,
+    /// True if the shell can reboot.
+    reboots: bool,
+    /// True if a station has asked for a reboot.
+    pub(crate) reboot: bool,
+}
+
+impl Desk {
+    pub(crate) fn new(me: Address, setup: &Setup) -> Self {
+        Desk {
+            me,
+            now_us: 0,
+            picture: Picture::default(),
+            commands: Commands::default(),
+            control: Control::default(),
+            missions: Missions::default(),
+            streams: Streams::new(setup.bytes_per_s),
+            texts: Texts::default(),
+            replies: Deque::new(),
+            wishes: Deque::new(),
+            parameters: Service::default(),
+            given: None,
+            reached: None,
+            heard_us: None,
+            reboots: setup.reboots,
+            reboot: false,
+        }
+    }
+
+    /// Handles a message, except states and poses.
+    pub(crate) fn hear(&mut self, from: Address, message: Uplink, mail: &mut Mail) {
+        if from == self.me {
+            // Its own, sent back.
+            return;
+        }
+        if self.control.hear(from, self.now_us) {
+            self.tell_heard(mail);
+        }
+        match message {
+            Uplink::Command(command) => self.command(command, from, mail),
+            Uplink::Setpoint(setpoint) => self.setpoint(setpoint, from, mail),
+            Uplink::Target(target) => self.target(target, from, mail),
+            Uplink::Mission(message) => self.mission(message, from, mail),
+            Uplink::Parameter(request) => self.parameter(request, from, mail),
+            Uplink::Stream(request) => self.streams.set_group(request, self.now_us),
+            Uplink::Clock(clock) => {
+                let answer = timesync::answer(clock, from, self.me, self.now_us);
+                answer.into_iter().for_each(|answer| self.reply(Reply::Clock(answer)));
+            }
+            Uplink::Control(wish) => {
+                let (answer, claim) = self.control.change(wish, from, self.now_us);
+                self.reply(Reply::Control(answer));
+                self.tell(from, claim);
+            }
+            Uplink::Heartbeat | Uplink::State { .. } | Uplink::Pose { .. } => (),
+        }
+    }
+
+    /// Hands the guidance the item of the mission that it wants, if it does not have it.
+    pub(crate) fn hand_over(&mut self, mail: &mut Mail) {
+        if let Some(leg) = self.wanted_leg() {
+            self.given = Some((leg.number, leg.upload));
+            mail.order().leg = Some(leg);
+        }
+    }
+
+    /// Returns the item of the mission that the guidance wants and does not have.
+    pub(crate) fn wanted_leg(&self) -> Option<afbc_guidance::Leg> {
+        let wanted = self.picture.guided.wanted;
+        let home_m = self.picture.guided.home_m.map_or(0.0, |home| home.z);
+        let leg = self.missions.leg(wanted, self.picture.surroundings.origin.as_ref(), home_m)?;
+        (self.given != Some((leg.number, leg.upload))).then_some(leg)
+    }
+
+    /// Does what is due after a tick.
+    pub(crate) fn tick(&mut self) {
+        self.streams.tick();
+        if let Some(words) = self.missions.tick(self.now_us) {
+            self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &words);
+        }
+        if let Some(reached) = self.picture.guided.reached {
+            self.reached = Some(reached);
+            self.reply(Reply::Reached(reached));
+        }
+    }
+
+    /// Returns the next reply.
+    pub(crate) fn next_reply(&mut self) -> Option<Downlink> {
+        let everyone = Address::default();
+        Some(match self.replies.pop_front() {
+            Some(Reply::Clock(clock)) => Downlink::Clock(clock),
+            Some(Reply::Control(answer)) => Downlink::Control(answer),
+            Some(Reply::Interval(interval)) => Downlink::Interval(interval),
+            Some(Reply::Reached(number)) => Downlink::Mission { message: Mission::Reached(number), to: everyone },
+            None => {
+                let (message, to) = self.missions.next_message()?;
+                Downlink::Mission { message, to }
+            }
+        })
+    }
+
+    /// Returns MISSION_CURRENT.
+    pub(crate) fn mission_current(&self) -> Downlink {
+        let guided = &self.picture.guided;
+        let flies = guided.mode == afbc_guidance::FlightMode::Mission && self.picture.mode.armed();
+        let current = self.missions.current(Some(guided.wanted), self.reached, flies);
+        Downlink::Mission { message: Mission::Current(current), to: Address::default() }
+    }
+
+    /// True if `from` is in control, from now on if nobody was. Another one is told.
+    fn may(&mut self, from: Address, mail: &mut Mail) -> bool {
+        let claim = self.control.claim(from, self.now_us);
+        self.tell(from, claim);
+        let granted = claim == Claim::Granted;
+        if granted {
+            self.tell_heard(mail);
+        }
+        granted
+    }
+
+    /// Tells a station once that another is in control.
+    fn tell(&mut self, from: Address, claim: Claim) {
+        if let Claim::Refused { holder, first_time: true } = claim {
+            let words = Words::default().station(from).and(" ignored: ").station(holder).and(" is in control");
+            self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &words);
+        }
+    }
+
+    /// Tells the guidance that the station in control is there.
+    fn tell_heard(&mut self, mail: &mut Mail) {
+        if self.heard_us.is_none_or(|heard_us| self.now_us.saturating_sub(heard_us) >= HEARD_EVERY_US) {
+            self.heard_us = Some(self.now_us);
+            mail.order().heard_us = Some(self.now_us);
+        }
+    }
+
+    fn reply(&mut self, reply: Reply) {
+        self.replies.push_back(reply).ok();
+    }
+
+    fn mission(&mut self, message: Mission, from: Address, mail: &mut Mail) {
+        let changes = matches!(message, Mission::Count(..) | Mission::Clear(_) | Mission::SetCurrent(_));
+        let in_control = changes && self.may(from, mail);
+        let heard = self.missions.hear(message, from, in_control, self.now_us);
+        if let Some(words) = heard.text {
+            self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &words);
+        }
+        if let Some(number) = heard.resume {
+            self.order(Order::Resume(number), None, from, mail);
+        }
+    }
+}

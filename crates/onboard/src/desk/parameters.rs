@@ -1,0 +1,54 @@
+//! What stations want of the parameters, and who may want it.
+
+use super::{Desk, Wish};
+use crate::mail::Mail;
+use crate::parameters::{Change, Table};
+use crate::services::commands::BUSY;
+use crate::services::texts::Words;
+use afbc_flight_core::Refusal;
+use afbc_link::{Address, Answer, MavSeverity, ParameterRequest, Storage};
+
+impl Desk {
+    /// Notes a message about parameters. A station that is not in control is told the value that it has not set.
+    pub(super) fn parameter(&mut self, request: ParameterRequest, from: Address, mail: &mut Mail) {
+        let request = match request {
+            ParameterRequest::Set { name, .. } if !self.may(from, mail) => ParameterRequest::ReadName(name),
+            request => request,
+        };
+        self.wishes.push_back(Wish::Ask(request)).ok();
+    }
+
+    /// Answers MAV_CMD_PREFLIGHT_STORAGE. What is set is stored already, and what is stored is what is flown.
+    pub(super) fn storage(&mut self, storage: Storage) -> Answer {
+        match storage {
+            Storage::Load | Storage::Save => Answer::Accepted,
+            Storage::Reset if self.picture.mode.armed() => Answer::Refused(Refusal::AlreadyArmed as i32),
+            Storage::Reset if self.wishes.push_back(Wish::Restore).is_err() => Answer::Refused(BUSY),
+            Storage::Reset => Answer::Accepted,
+        }
+    }
+
+    /// Does what stations want, up to the first change of `table`, which it returns.
+    pub(crate) fn grant<const N: usize>(&mut self, table: &mut Table<N>) -> Option<Change> {
+        let disarmed = !self.picture.mode.armed();
+        while let Some(wish) = self.wishes.pop_front() {
+            let (change, refused) = match wish {
+                Wish::Ask(request) => {
+                    let heard = self.parameters.hear(request, table, disarmed);
+                    (heard.change, heard.refused)
+                }
+                Wish::Restore => match self.parameters.restore(table, disarmed) {
+                    Ok(change) => (Some(change), None),
+                    Err(reason) => (None, Some(reason)),
+                },
+            };
+            if let Some(reason) = refused {
+                self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &Words::of(reason.as_str()));
+            }
+            if change.is_some() {
+                return change;
+            }
+        }
+        None
+    }
+}

@@ -1,0 +1,138 @@
+//! The guidance's place in the tick.
+
+use crate::configuration::Configuration;
+use crate::mail::Mail;
+use afbc_flight_core::supervisor::COAST_US;
+use afbc_flight_core::{Asked, Mode, Stamped};
+use afbc_guidance::net::Sensors;
+use afbc_guidance::notice::Notices;
+use afbc_guidance::{Checks, Declined, FlightMode, Guidance, Lift, Sight};
+use afbc_types::{OutOfRange, State};
+use nalgebra::Vector3;
+
+/// Ticket of the guidance's own requests, whose answers nobody waits for.
+const OWN: u8 = u8::MAX;
+
+/// Result of the guidance in a tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Guided {
+    /// The flight mode.
+    pub mode: FlightMode,
+    /// Ticket of an order and the answer to it.
+    pub answer: Option<(u8, Result<(), Declined>)>,
+    /// Number of the mission's item that it wants, and flies in mode [`FlightMode::Mission`].
+    pub wanted: u16,
+    /// Number of the mission's item that was reached in this tick.
+    pub reached: Option<u16>,
+    /// Home in the local frame, once there is one \[m\].
+    pub home_m: Option<Vector3<f32>>,
+    /// True if the vehicle is armed and in the air.
+    pub airborne: bool,
+    /// True if the safety net has taken over.
+    pub failsafe: bool,
+    /// Checks before arming.
+    pub checks: Checks,
+    /// Announcements of this tick.
+    pub notices: Notices,
+    /// Charge of the battery, 0 to 1.
+    pub charge: Option<f32>,
+}
+
+/// The guidance of a vehicle, and what it is told of it.
+#[derive(Clone, Debug)]
+pub(crate) struct Guide {
+    guidance: Guidance,
+    lift: Lift,
+    mass_kg: f32,
+    last_us: u64,
+}
+
+/// What the guidance sees of the flight core and the sensors.
+pub(crate) struct Core {
+    pub(crate) mode: Mode,
+    pub(crate) airborne: bool,
+    pub(crate) tick_healthy: bool,
+    pub(crate) sensors: Sensors,
+    /// What is observed of the state in place of an estimate, in the last tick.
+    pub(crate) observed: Option<State>,
+}
+
+impl Guide {
+    /// Creates it for a vehicle.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub(crate) fn new<const N: usize>(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
+        let Configuration { airframe, settings, guidance, .. } = configuration;
+        let parameters = &airframe.parameters;
+        let most_m_s2 = N as f32 * settings.common.rotor_force_max_n / parameters.mass_kg;
+        Ok(Guide {
+            guidance: Guidance::new(*guidance)?,
+            lift: Lift { most_m_s2, gravity_m_s2: parameters.gravity_m_s2, given_m_s2: None },
+            mass_kg: parameters.mass_kg,
+            last_us: 0,
+        })
+    }
+
+    /// Goes on with the settings of another one for the same number of rotors: mode, mission and home stay.
+    pub(crate) fn adopt(&mut self, prepared: &Guide) {
+        // Valid: a guidance has been made of them.
+        let _ = self.guidance.set(*prepared.guidance.settings());
+        (self.lift, self.mass_kg) = (prepared.lift, prepared.mass_kg);
+    }
+
+    /// Notes the thrust of all rotors that the flight core has commanded.
+    #[inline]
+    pub(crate) fn gave(&mut self, thrust_n: f32) {
+        self.lift.given_m_s2 = (thrust_n > 0.0).then_some(thrust_n / self.mass_kg);
+    }
+
+    /// Runs a tick: takes the oldest order, and puts setpoint and requests into the flight core's inbox.
+    #[inline(always)]
+    pub(crate) fn tick(&mut self, now_us: u64, mail: &mut Mail, core: &Core) -> Guided {
+        let Mail { inbox, orders, battery, .. } = mail;
+        let told = inbox.state().filter(|state| state.age_us(now_us) <= COAST_US);
+        let state = told.map(|state| &state.value).or(core.observed.as_ref());
+        let dt_s = now_us.saturating_sub(self.last_us) as f32 * 1e-6;
+        self.last_us = now_us;
+        let sight = Sight {
+            now_us,
+            dt_s,
+            state,
+            missing: inbox.missing(),
+            core: core.mode,
+            airborne: core.airborne,
+            tick_healthy: core.tick_healthy,
+            battery: *battery,
+            sensors: core.sensors,
+            lift: self.lift,
+        };
+        let guided = self.guidance.tick(&sight, orders);
+        if let Some(value) = guided.setpoint {
+            inbox.put_setpoint(Stamped { value, at_us: now_us });
+        }
+        inbox.rest(guided.rests);
+        inbox.bar(guided.checks.refusal());
+        if let Some(request) = guided.request {
+            // Not in the way of a station's.
+            if inbox.asked().is_none() {
+                inbox.request(Asked { request, ticket: OWN });
+            }
+        }
+        if guided.answer.is_some() {
+            mail.next_order();
+        }
+        Guided {
+            mode: guided.mode,
+            answer: guided.answer,
+            wanted: guided.wanted,
+            reached: guided.reached,
+            home_m: guided.home_m,
+            airborne: core.airborne,
+            failsafe: guided.failsafe.is_some(),
+            checks: guided.checks,
+            notices: guided.notices,
+            charge: guided.charge,
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! MAVLink's parameter protocol.
+
+use super::encoding::decode;
+use super::groups::Parameter;
+use super::kept::Change;
+use super::reason::Reason;
+use super::table::Table;
+use afbc_link::{ParameterName, ParameterRequest, ParameterValue};
+use afbc_store::Name;
+use heapless::Deque;
+
+/// Largest size of a PARAM_VALUE on the link \[bytes\].
+pub const VALUE_BYTES: u32 = 37;
+/// Share of the link that lists and reads may take \[%\].
+pub const LINK_SHARE: u32 = 40;
+/// Values that may be sent at once after a pause.
+const BURST: u64 = 4;
+/// Answers that can wait. A station asks again for what it misses.
+const WAITING_MAX: usize = 32;
+
+/// What follows from a station's message.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Heard {
+    /// The table has changed: to be flown, and to be written.
+    pub change: Option<Change>,
+    /// Line to the station: why nothing has changed.
+    pub refused: Option<Reason>,
+}
+
+impl Heard {
+    fn refused(reason: Reason) -> Self {
+        Heard { change: None, refused: Some(reason) }
+    }
+}
+
+/// Answers to stations about the parameters of a [`Table`].
+#[derive(Clone, Debug, Default)]
+pub struct Service {
+    /// Answers to PARAM_SET: the values are those at the time of sending.
+    set: Deque<Name, WAITING_MAX>,
+    /// Places asked for.
+    read: Deque<u16, WAITING_MAX>,
+    /// Next place of the list, and how many are left of it.
+    next: u16,
+    left: u16,
+    /// Time of the last call, and what may be sent \[bytes x 100,000,000\].
+    at_us: u64,
+    budget: u64,
+    dropped: u32,
+}
+
+impl Service {
+    /// Takes a station's message. The table is changed only while `disarmed`.
+    pub fn hear<const N: usize>(&mut self, ask: ParameterRequest, table: &mut Table<N>, disarmed: bool) -> Heard {
+        match ask {
+            // A list under way continues to its end and then from its beginning: every station hears all of it.
+            ParameterRequest::List => self.left = table.count(),
+            ParameterRequest::ReadPlace(place) if table.at(place).is_some() => {
+                self.dropped += count(self.read.push_back(place))
+            }
+            ParameterRequest::ReadPlace(_) => (),
+            ParameterRequest::ReadName(name) => {
+                // Nothing can be said of a name that there is not.
+                if let Some(parameter) = named(name).and_then(|name| table.get(name)) {
+                    self.dropped += count(self.read.push_back(parameter.place));
+                }
+            }
+            ParameterRequest::Set { name, value, kind } => {
+                return self.set(named(name), decode(kind, value), table, disarmed);
+            }
+        }
+        Heard::default()
+    }
+
+    /// Restores all values (MAV_CMD_PREFLIGHT_STORAGE with `param1` = 2) and lists them again.
+    ///
+    /// # Errors
+    /// The reason while armed.
+    pub fn restore<const N: usize>(&mut self, table: &mut Table<N>, disarmed: bool) -> Result<Change, Reason> {
+        if !disarmed {
+            return Err(Reason::new("parameters", "not while armed"));
+        }
+        table.restore();
+        self.left = table.count();
+        Ok(Change::Restored)
+    }
+
+    /// Returns the next value to be sent at `now_us` over a link of `link_bytes_s` bytes per second; to be called until
+    /// there is none. Answers to PARAM_SET come at once, everything else at [`LINK_SHARE`] of the link.
+    pub fn tell<const N: usize>(&mut self, now_us: u64, link_bytes_s: u32, table: &Table<N>) -> Option<ParameterValue> {
+        const COST: u64 = VALUE_BYTES as u64 * 100_000_000;
+        let elapsed_us = now_us.saturating_sub(self.at_us).min(1_000_000);
+        self.at_us = now_us;
+        let earned = elapsed_us * u64::from(link_bytes_s) * u64::from(LINK_SHARE);
+        self.budget = self.budget.saturating_add(earned).min(BURST * COST);
+        if let Some(name) = self.set.pop_front() {
+            self.budget = self.budget.saturating_sub(COST);
+            return table.get(name).map(|parameter| told(&parameter, table.count()));
+        }
+        let rest = self.budget.checked_sub(COST)?;
+        let place = self.read.pop_front().or_else(|| {
+            self.left = self.left.checked_sub(1)?;
+            let place = self.next;
+            self.next = if place + 1 < table.count() { place + 1 } else { 0 };
+            Some(place)
+        })?;
+        self.budget = rest;
+        table.at(place).map(|parameter| told(&parameter, table.count()))
+    }
+
+    /// Returns the number of messages that were not answered, since too many were waiting.
+    pub fn dropped(&self) -> u32 {
+        self.dropped
+    }
+
+    fn set<const N: usize>(
+        &mut self,
+        name: Option<Name>,
+        value: Option<f32>,
+        table: &mut Table<N>,
+        disarmed: bool,
+    ) -> Heard {
+        let Some(before) = name.and_then(|name| table.get(name)) else {
+            return match name {
+                Some(name) => Heard::refused(Reason::on(name, "no such parameter")),
+                None => Heard::refused(Reason::new("parameters", "no such name")),
+            };
+        };
+        let name = before.name;
+        self.dropped += count(self.set.push_back(name));
+        let Some(value) = value else { return Heard::refused(Reason::on(name, "value or type not understood")) };
+        if !disarmed {
+            let is_news = before.value != value;
+            return if is_news { Heard::refused(Reason::on(name, "not while armed")) } else { Heard::default() };
+        }
+        // Also what it is already, which may not have been kept: a store writes it only then.
+        match table.set(name, value) {
+            Ok(Parameter { value, .. }) => {
+                let is_default = table.default_of(name).is_some_and(|image| image.value.to_bits() == value.to_bits());
+                Heard { change: Some(Change::Set(name, (!is_default).then_some(value))), refused: None }
+            }
+            Err(reason) => Heard::refused(reason),
+        }
+    }
+}
+
+fn count<T>(pushed: Result<(), T>) -> u32 {
+    u32::from(pushed.is_err())
+}
+
+fn named(bytes: ParameterName) -> Option<Name> {
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+    Name::new(str::from_utf8(bytes.get(..end)?).ok()?)
+}
+
+fn told(parameter: &Parameter, count: u16) -> ParameterValue {
+    let Parameter { name, place, kind, value, .. } = *parameter;
+    ParameterValue { name: name.to_bytes(), value: kind.encode(value), kind: kind.number(), count, place }
+}

@@ -1,0 +1,91 @@
+//! The parameters by name and by place.
+
+use super::groups::{Key, Parameter};
+use super::reason::Reason;
+use crate::configuration::Configuration;
+use crate::flight::Prepared;
+use afbc_store::Name;
+use afbc_types::OutOfRange;
+
+/// The parameters of a vehicle: as its image has them, and as they are now.
+///
+/// A value is an `f32`. Parameters of the configuration that are `f32` are what was set, to the bit; one in `f64` is
+/// the exact value of the `f32`, and read as the nearest; a switch is 0 or 1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table<const N: usize = 4> {
+    image: Configuration<N>,
+    now: Configuration<N>,
+    count: u16,
+}
+
+impl<const N: usize> Table<N> {
+    /// Makes a table in which every parameter is as in the image.
+    pub fn new(image: Configuration<N>) -> Self {
+        let mut now = image.clone();
+        Table { count: now.parameters(), now, image }
+    }
+
+    /// Returns the configuration to be flown, which makes a [`Flight`](crate::Flight) if the image's does.
+    pub fn configuration(&self) -> &Configuration<N> {
+        &self.now
+    }
+
+    /// Returns the number of parameters, which never changes.
+    pub fn count(&self) -> u16 {
+        self.count
+    }
+
+    /// Returns every parameter, in order.
+    pub fn iter(&self) -> impl Iterator<Item = Parameter> {
+        (0..self.count).filter_map(|place| self.at(place))
+    }
+
+    /// Returns the parameter called `name`.
+    pub fn get(&self, name: Name) -> Option<Parameter> {
+        self.now.clone().parameter(Key::Name(name))
+    }
+
+    /// Returns the parameter at `place`.
+    pub fn at(&self, place: u16) -> Option<Parameter> {
+        self.now.clone().parameter(Key::Place(place))
+    }
+
+    /// Returns the parameter called `name` as the image has it.
+    pub fn default_of(&self, name: Name) -> Option<Parameter> {
+        self.image.clone().parameter(Key::Name(name))
+    }
+
+    /// Changes a parameter; returns it as it is then.
+    ///
+    /// # Errors
+    /// The reason, and nothing has changed: no such parameter, a value out of its range, or one with which the vehicle
+    /// could not fly ([`Prepared::new`]).
+    pub fn set(&mut self, name: Name, value: f32) -> Result<Parameter, Reason> {
+        let mut candidate = self.now.clone();
+        let parameter = candidate.put(name, value)?;
+        Prepared::new(&candidate).map_err(|error| Reason::together(name, &error))?;
+        self.now = candidate;
+        Ok(parameter)
+    }
+
+    /// Changes one of several values, whatever the others are; to be followed by [`Table::check`].
+    ///
+    /// # Errors
+    /// The reason, and nothing has changed: no such parameter, or a value out of its range.
+    pub fn put(&mut self, name: Name, value: f32) -> Result<Parameter, Reason> {
+        self.now.put(name, value)
+    }
+
+    /// Checks that the vehicle could fly.
+    ///
+    /// # Errors
+    /// Those of [`Prepared::new`].
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        Prepared::new(&self.now).map(drop)
+    }
+
+    /// Makes every parameter as in the image.
+    pub fn restore(&mut self) {
+        self.now.clone_from(&self.image);
+    }
+}

@@ -1,0 +1,219 @@
+//! Answers to commands: each exactly once, to its sender.
+
+use afbc_flight_core::inbox::REQUESTS_MAX;
+use afbc_flight_core::{Asked, Request};
+use afbc_guidance::order::ORDERS_MAX;
+use afbc_guidance::{Declined, Given, Order};
+use afbc_link::{Address, Answer, Downlink};
+use heapless::Deque;
+
+/// Largest number of queued answers, besides those of flight core and guidance. Further commands are not answered, but
+/// counted.
+pub const ANSWERS_MAX: usize = 32;
+/// Answers sent per tick, more than commands can arrive in a millisecond at 921,600 baud.
+pub const ANSWERS_PER_TICK: usize = 3;
+/// Time after which a request without an answer counts as handled in a tick whose report was lost \[us\].
+pub const FORGOTTEN_US: u64 = 100_000;
+/// Time between messages that a command is in progress \[us\]: stations give up after half a second without any.
+pub const IN_PROGRESS_US: u64 = 250_000;
+/// Number of the reason "too many requests are queued", for requests that do not reach the flight core.
+pub const BUSY: i32 = 0;
+/// Number of the reason "another station is in control".
+pub const NOT_IN_CONTROL: i32 = 64;
+/// Number of the reason "it is not known where the local frame is on the earth".
+pub const NO_ORIGIN: i32 = 65;
+/// Number of the reason "the message cannot be sent now: what it tells is not known".
+pub const NOT_KNOWN: i32 = 66;
+
+/// Keeps track of the answers.
+#[derive(Default)]
+pub struct Commands {
+    /// Requests that the flight core has not answered, indexed by ticket. The first place is reserved for
+    /// [`Request::Kill`], so that it is always accepted. The flight core's inbox never overflows.
+    asked: [Option<Open>; REQUESTS_MAX],
+    /// Orders that the guidance has not answered, indexed by ticket; neither does its queue overflow.
+    ordered: [Option<Open>; ORDERS_MAX],
+    /// A command that takes its time, and when that was last told \[us\].
+    lasting: Option<(Open, u64)>,
+    waiting: Deque<Told, ANSWERS_MAX>,
+    unanswered: u32,
+}
+
+/// A queued answer.
+struct Told {
+    command: u16,
+    answer: Answer,
+    to: Address,
+}
+
+/// A command that is not answered yet.
+#[derive(Clone, Copy)]
+struct Open {
+    /// Its number; none for a message that is not answered.
+    command: Option<u16>,
+    from: Address,
+    at_us: u64,
+}
+
+impl Commands {
+    /// Gives the flight core's request for a command; none if too many are open, which is answered.
+    pub fn ask(&mut self, request: Request, command: u16, from: Address, at_us: u64) -> Option<Asked> {
+        let kills = request == Request::Kill;
+        let mut places = self.asked.iter_mut().zip(0..).filter(|(_, ticket)| (*ticket == 0) == kills);
+        match places.find(|(place, _)| place.is_none()) {
+            Some((place, ticket)) => {
+                *place = Some(Open { command: Some(command), from, at_us });
+                Some(Asked { request, ticket })
+            }
+            None => {
+                // The motors are about to be stopped already.
+                self.answer(command, if kills { Answer::Accepted } else { Answer::Refused(BUSY) }, from);
+                None
+            }
+        }
+    }
+
+    /// Gives the guidance's order for a command, or for a message without an answer; none if too many are open, which
+    /// is answered.
+    pub fn order(&mut self, order: Order, command: Option<u16>, from: Address, at_us: u64) -> Option<Given> {
+        match self.ordered.iter_mut().zip(0..).find(|(place, _)| place.is_none()) {
+            Some((place, ticket)) => {
+                *place = Some(Open { command, from, at_us });
+                Some(Given { order, ticket })
+            }
+            None => {
+                command.into_iter().for_each(|command| self.answer(command, Answer::Refused(BUSY), from));
+                None
+            }
+        }
+    }
+
+    /// Begins a command that lasts: "in progress" is sent until it is [ended](Self::end). False if there is one
+    /// already; then this one is answered.
+    pub fn begin(&mut self, command: u16, from: Address, at_us: u64) -> bool {
+        let is_free = self.lasting.is_none();
+        if is_free {
+            self.answer(command, Answer::InProgress, from);
+            self.lasting = Some((Open { command: Some(command), from, at_us }, at_us));
+        } else {
+            self.answer(command, Answer::Refused(BUSY), from);
+        }
+        is_free
+    }
+
+    /// Ends the command that lasts.
+    pub fn end(&mut self, answer: Answer) {
+        if let Some((Open { command: Some(command), from, .. }, _)) = self.lasting.take() {
+            self.answer(command, answer, from);
+        }
+    }
+
+    /// Queues the answer to a command.
+    pub fn answer(&mut self, command: u16, answer: Answer, to: Address) {
+        if self.waiting.push_back(Told { command, answer, to }).is_err() {
+            self.unanswered = self.unanswered.saturating_add(1);
+        }
+    }
+
+    /// Converts the flight core's answer to a message, to its sender.
+    pub fn settle(&mut self, answer: afbc_flight_core::Answer) -> Option<Downlink> {
+        let open = self.asked.get_mut(usize::from(answer.ticket))?.take()?;
+        open.told(answer.result.map_or_else(|refusal| Answer::Refused(refusal as i32), |()| Answer::Accepted))
+    }
+
+    /// Converts the guidance's answer to a message, to its sender.
+    pub fn settle_order(&mut self, ticket: u8, result: Result<(), Declined>) -> Option<Downlink> {
+        let open = self.ordered.get_mut(usize::from(ticket))?.take()?;
+        open.told(result.map_or_else(|declined| Answer::Refused(declined as i32), |()| Answer::Accepted))
+    }
+
+    /// Returns the next answer to be sent at `now_us`.
+    pub fn next(&mut self, now_us: u64) -> Option<Downlink> {
+        if let Some(Told { command, answer, to }) = self.waiting.pop_front() {
+            return Some(Downlink::Answer { command, answer, to });
+        }
+        let forgotten = |open: &mut Open| now_us.saturating_sub(open.at_us) > FORGOTTEN_US;
+        let mut open = self.asked.iter_mut().chain(&mut self.ordered);
+        // A message without an answer is forgotten without one.
+        while let Some(lost) = open.find_map(|place| place.take_if(forgotten)) {
+            if let Some(told) = lost.told(Answer::Failed) {
+                return Some(told);
+            }
+        }
+        match &mut self.lasting {
+            Some((open, told_us)) if now_us.saturating_sub(*told_us) >= IN_PROGRESS_US => {
+                *told_us = now_us;
+                open.told(Answer::InProgress)
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns the number of commands that were not answered.
+    pub fn unanswered(&self) -> u32 {
+        self.unanswered
+    }
+}
+
+impl Open {
+    fn told(self, answer: Answer) -> Option<Downlink> {
+        self.command.map(|command| Downlink::Answer { command, answer, to: self.from })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use afbc_guidance::FlightMode;
+
+    const A: Address = Address { system: 255, component: 190 };
+    const B: Address = Address { system: 245, component: 190 };
+
+    fn told(command: u16, answer: Answer, to: Address) -> Option<Downlink> {
+        Some(Downlink::Answer { command, answer, to })
+    }
+
+    #[test]
+    fn orders_are_answered_to_their_senders() {
+        let mut commands = Commands::default();
+        let order = Order::Select(FlightMode::Land);
+        let give = |commands: &mut Commands, from| commands.order(order, Some(21), from, 0).map(|it| it.ticket);
+        assert_eq!([A, B, A, B].map(|from| give(&mut commands, from)), [Some(0), Some(1), Some(2), Some(3)]);
+        assert_eq!(give(&mut commands, A), None);
+        assert_eq!(commands.next(0), told(21, Answer::Refused(BUSY), A));
+        assert_eq!(commands.settle_order(1, Ok(())), told(21, Answer::Accepted, B));
+        assert_eq!(commands.settle_order(1, Ok(())), None, "once");
+        let declined = Declined::NotArmed;
+        assert_eq!(commands.settle_order(0, Err(declined)), told(21, Answer::Refused(declined as i32), A));
+        assert_eq!(commands.settle_order(77, Ok(())), None);
+        assert_eq!(commands.next(FORGOTTEN_US), None);
+        assert_eq!(commands.next(FORGOTTEN_US + 1), told(21, Answer::Failed, A));
+        assert_eq!(commands.next(FORGOTTEN_US + 1), told(21, Answer::Failed, B));
+        assert_eq!(commands.next(FORGOTTEN_US + 1), None);
+    }
+
+    #[test]
+    fn a_message_that_is_no_command_is_not_answered() {
+        let mut commands = Commands::default();
+        assert!(commands.order(Order::Resume(1), None, A, 0).is_some());
+        assert!(commands.order(Order::Resume(2), None, A, 0).is_some());
+        assert_eq!(commands.settle_order(0, Ok(())), None);
+        assert_eq!(commands.next(FORGOTTEN_US + 1), None);
+    }
+
+    #[test]
+    fn a_command_that_lasts_is_in_progress_until_it_ends() {
+        let mut commands = Commands::default();
+        assert!(commands.begin(245, A, 0));
+        assert!(!commands.begin(245, B, 10));
+        assert_eq!(commands.next(20), told(245, Answer::InProgress, A));
+        assert_eq!(commands.next(20), told(245, Answer::Refused(BUSY), B));
+        assert_eq!(commands.next(IN_PROGRESS_US - 1), None);
+        assert_eq!(commands.next(IN_PROGRESS_US), told(245, Answer::InProgress, A));
+        assert_eq!(commands.next(IN_PROGRESS_US), None);
+        commands.end(Answer::Accepted);
+        commands.end(Answer::Accepted);
+        assert_eq!(commands.next(3 * IN_PROGRESS_US), told(245, Answer::Accepted, A));
+        assert_eq!(commands.next(9 * IN_PROGRESS_US), None);
+    }
+}

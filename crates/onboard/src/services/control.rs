@@ -1,0 +1,175 @@
+//! Who may command.
+//!
+//! The first station that commands is in control, until it has been silent for a time or hands over. A station is its
+//! system and component: the link has no other proof of who it is (`docs/security.md`).
+
+use afbc_link::{Address, Command, Control as Wish, ControlAnswer};
+
+/// Silence after which a station is no longer in control \[us\].
+pub const SILENT_US: u64 = 10_000_000;
+/// Stations that are told who is in control.
+const TOLD_MAX: usize = 4;
+
+/// Who is in control.
+#[derive(Clone, Copy, Debug)]
+pub struct Control {
+    silent_us: u64,
+    /// The station in control, and when it was last heard \[us\].
+    holder: Option<(Address, u64)>,
+    /// Stations that were told that another is in control. The oldest is overwritten.
+    told: [Option<Address>; TOLD_MAX],
+    /// Place in `told` to be written next.
+    next: usize,
+}
+
+/// The answer to a station that wants to command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Claim {
+    /// It is in control.
+    Granted,
+    /// This one is.
+    Refused {
+        /// Who is in control.
+        holder: Address,
+        /// True if the station has not been told yet.
+        first_time: bool,
+    },
+}
+
+impl Default for Control {
+    fn default() -> Self {
+        Control { silent_us: SILENT_US, holder: None, told: [None; TOLD_MAX], next: 0 }
+    }
+}
+
+impl Control {
+    /// Sets the silence after which a station is no longer in control \[us\].
+    pub fn set_silence(&mut self, silent_us: u64) {
+        self.silent_us = silent_us;
+    }
+
+    /// Returns the station in control at `now_us`.
+    pub fn holder(&self, now_us: u64) -> Option<Address> {
+        let heard = |(_, heard_us): &(Address, u64)| now_us.saturating_sub(*heard_us) <= self.silent_us;
+        self.holder.filter(heard).map(|(holder, _)| holder)
+    }
+
+    /// Notes that any message of a station has arrived; true if it is in control. One that is back before another has
+    /// taken over is so again.
+    pub fn hear(&mut self, from: Address, now_us: u64) -> bool {
+        let is_holder = self.holder.is_some_and(|(holder, _)| holder == from);
+        if is_holder {
+            self.holder = Some((from, now_us));
+        }
+        is_holder
+    }
+
+    /// Answers a station that wants to command: it is in control from now on if nobody else is.
+    pub fn claim(&mut self, from: Address, now_us: u64) -> Claim {
+        match self.holder(now_us) {
+            Some(holder) if holder != from => Claim::Refused { holder, first_time: self.tell(from) },
+            Some(_) => Claim::Granted,
+            None => {
+                (self.holder, self.told, self.next) = (Some((from, now_us)), [None; TOLD_MAX], 0);
+                Claim::Granted
+            }
+        }
+    }
+
+    /// Answers CHANGE_OPERATOR_CONTROL.
+    pub fn change(&mut self, wish: Wish, from: Address, now_us: u64) -> (ControlAnswer, Claim) {
+        let claim = match (wish, self.holder(now_us)) {
+            (Wish::Release, None) => Claim::Granted,
+            (Wish::Release, Some(holder)) if holder == from => {
+                self.holder = None;
+                Claim::Granted
+            }
+            _ => self.claim(from, now_us),
+        };
+        let granted = claim == Claim::Granted;
+        (ControlAnswer { station: from.system, control: wish, granted }, claim)
+    }
+
+    /// Returns whether a station is told for the first time.
+    fn tell(&mut self, from: Address) -> bool {
+        let first_time = !self.told.contains(&Some(from));
+        if first_time {
+            if let Some(place) = self.told.get_mut(self.next) {
+                *place = Some(from);
+            }
+            self.next = (self.next + 1) % TOLD_MAX;
+        }
+        first_time
+    }
+}
+
+/// True if only the station in control may give this command. Anyone may stop the motors: [`Command::Kill`] also in
+/// flight, [`Command::Disarm`] on the ground; and anyone may ask.
+pub fn is_needed_for(command: Command) -> bool {
+    match command {
+        Command::Arm
+        | Command::Engage
+        | Command::TakeOff(_)
+        | Command::Land
+        | Command::Return
+        | Command::SelectMode(_)
+        | Command::SelectStandardMode(_)
+        | Command::Reposition { .. }
+        | Command::Speed(_)
+        | Command::Home(_)
+        | Command::StartMission(_)
+        | Command::SetCurrent(_)
+        | Command::Reboot
+        | Command::Storage(_) => true,
+        Command::Disarm
+        | Command::Kill
+        | Command::SetInterval { .. }
+        | Command::GetInterval(_)
+        | Command::RequestMessage { .. }
+        | Command::RequestProtocol
+        | Command::RequestCapabilities
+        | Command::CheckArming
+        | Command::Denied(_)
+        | Command::Other(_) => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const A: Address = Address { system: 255, component: 190 };
+    const B: Address = Address { system: 245, component: 190 };
+
+    #[test]
+    fn the_first_one_is_in_control_until_it_is_silent() {
+        let mut control = Control::default();
+        assert_eq!(control.holder(0), None);
+        assert_eq!(control.claim(A, 0), Claim::Granted);
+        assert_eq!(control.claim(B, 1), Claim::Refused { holder: A, first_time: true });
+        assert_eq!(control.claim(B, 2), Claim::Refused { holder: A, first_time: false });
+        assert!(control.hear(A, SILENT_US));
+        assert!(!control.hear(B, SILENT_US));
+        assert_eq!(control.claim(B, 2 * SILENT_US), Claim::Refused { holder: A, first_time: false });
+        let mut back = control;
+        assert!(back.hear(A, 2 * SILENT_US + 1));
+        assert!(matches!(back.claim(B, 2 * SILENT_US + 2), Claim::Refused { holder: A, .. }));
+        assert_eq!(control.claim(B, 2 * SILENT_US + 1), Claim::Granted);
+        assert!(!control.hear(A, 2 * SILENT_US + 2));
+        assert_eq!(control.claim(A, 2 * SILENT_US + 2), Claim::Refused { holder: B, first_time: true });
+    }
+
+    #[test]
+    fn control_is_handed_over_by_its_holder_alone() {
+        let mut control = Control::default();
+        let granted = |wish, from: Address| ControlAnswer { station: from.system, control: wish, granted: true };
+        assert_eq!(control.change(Wish::Take, A, 0).0, granted(Wish::Take, A));
+        assert!(!control.change(Wish::Take, B, 1).0.granted);
+        assert!(!control.change(Wish::Release, B, 2).0.granted);
+        assert_eq!(control.holder(3), Some(A));
+        assert_eq!(control.change(Wish::Release, A, 4).0, granted(Wish::Release, A));
+        assert_eq!(control.holder(5), None);
+        assert_eq!(control.change(Wish::Take, B, 6).0, granted(Wish::Take, B));
+        assert_eq!(control.holder(7), Some(B));
+    }
+}

@@ -1,0 +1,182 @@
+//! The vehicle's health as stations read it, and what speaks against arming.
+
+use crate::services::picture::Picture;
+use afbc_flight_core::{ArmingLimits, Mode, Refusal};
+use afbc_guidance::{Check, FlightMode};
+use afbc_link::telemetry::{EstimatorStatus, SystemStatus};
+
+/// `MAV_SYS_STATUS_SENSOR`.
+pub mod sensor {
+    #![allow(missing_docs, reason = "MAVLink's names")]
+    pub const GYROSCOPE: u32 = 1;
+    pub const ACCELEROMETER: u32 = 2;
+    pub const MAGNETOMETER: u32 = 4;
+    pub const BAROMETER: u32 = 8;
+    pub const SATELLITES: u32 = 0x20;
+    pub const TRACKER: u32 = 0x80;
+    pub const MOTORS: u32 = 0x8000;
+    pub const ATTITUDE: u32 = 0x20_0000;
+    pub const BATTERY: u32 = 0x0200_0000;
+    pub const ARMING: u32 = 0x1000_0000;
+}
+
+/// `MAV_LANDED_STATE`.
+const ON_GROUND: u8 = 1;
+const IN_AIR: u8 = 2;
+const TAKING_OFF: u8 = 3;
+const LANDING: u8 = 4;
+
+/// Returns what speaks against arming, by the flight core's reasons and in its order. The flight core has the last
+/// word.
+pub fn against_arming(picture: &Picture) -> impl Iterator<Item = Refusal> + use<> {
+    let limits = ArmingLimits::default();
+    let tilt = picture.state.is_some_and(|state| {
+        let eta = state.attitude_rad;
+        eta.x.abs() > limits.tilt_max_rad || eta.y.abs() > limits.tilt_max_rad
+    });
+    let checks = picture.guided.checks;
+    [
+        (picture.mode.armed()).then_some(Refusal::AlreadyArmed),
+        (!picture.is_located()).then_some(Refusal::StateStale),
+        tilt.then_some(Refusal::TiltTooLarge),
+        picture.health.setpoint_stale.then_some(Refusal::SetpointMissing),
+        (!picture.health.rate.healthy()).then_some(Refusal::Unhealthy),
+        (!checks.is_ok(Check::AtRest)).then_some(Refusal::NotAtRest),
+        checks.refusal(),
+    ]
+    .into_iter()
+    .flatten()
+}
+
+/// Returns SYS_STATUS.
+pub fn system(picture: &Picture) -> SystemStatus {
+    let surroundings = &picture.surroundings;
+    let inertial = sensor::GYROSCOPE | sensor::ACCELEROMETER | sensor::ATTITUDE;
+    let located = picture.is_located();
+    let fixed = surroundings.receiver.is_some_and(|receiver| receiver.kind >= 3);
+    let armable = picture.mode.armed() || against_arming(picture).next().is_none();
+    let sets = [
+        (picture.senses, true, inertial),
+        (!picture.senses, located, sensor::TRACKER),
+        (surroundings.receiver.is_some(), fixed && located, sensor::SATELLITES),
+        (surroundings.battery.is_some(), true, sensor::BATTERY),
+        (true, true, sensor::MOTORS),
+        (true, armable, sensor::ARMING),
+    ];
+    let told = surroundings.sensors;
+    let present = sets.iter().filter(|(present, ..)| *present).fold(told.present, |all, (_, _, bits)| all | bits);
+    let well = sets.iter().filter(|(present, healthy, _)| *present && *healthy);
+    let healthy = well.fold(told.present & told.healthy, |all, (_, _, bits)| all | bits);
+    let battery = surroundings.battery;
+    SystemStatus {
+        present,
+        enabled: present,
+        healthy,
+        // Of a tick's millisecond.
+        load_permille: picture.tick_us.clamp(0.0, 1000.0) as u16,
+        voltage_mv: battery.map_or(u16::MAX, |battery| battery.voltage_mv),
+        current_ca: battery.map_or(-1, |battery| battery.current_ca),
+        remaining_percent: battery.map_or(-1, |battery| battery.remaining_percent),
+        dropped_frames: u16::try_from(picture.dropped_frames).unwrap_or(u16::MAX),
+    }
+}
+
+/// Returns ESTIMATOR_STATUS. Uncertainties are those of the satellite receiver, where there is one.
+pub fn estimator(picture: &Picture) -> EstimatorStatus {
+    /// ATTITUDE, VELOCITY_HORIZ, VELOCITY_VERT, POS_HORIZ_REL, POS_VERT_ABS.
+    const MOTION: u16 = 1 | 2 | 4 | 8 | 32;
+    /// POS_HORIZ_ABS.
+    const ABSOLUTE: u16 = 16;
+    let located = picture.is_located();
+    let absolute = located && picture.surroundings.origin.is_some();
+    let attitude = u16::from(picture.senses);
+    let flags = if located { MOTION } else { attitude } | if absolute { ABSOLUTE } else { 0 };
+    let sigma_m = picture.surroundings.receiver.map_or([f32::NAN; 2], |receiver| {
+        receiver.sigma_mm.map(|sigma_mm| if sigma_mm == 0 { f32::NAN } else { sigma_mm as f32 * 1e-3 })
+    });
+    EstimatorStatus { time_us: picture.time_us, flags, sigma_m }
+}
+
+/// Returns the `MAV_LANDED_STATE`.
+pub fn landed(picture: &Picture) -> u8 {
+    match (picture.mode, picture.guided.mode) {
+        (Mode::Disarmed, _) => ON_GROUND,
+        _ if !picture.is_airborne() => ON_GROUND,
+        (Mode::Descending, _) | (_, FlightMode::Land) => LANDING,
+        (_, FlightMode::Takeoff) => TAKING_OFF,
+        _ => IN_AIR,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::services::picture::{Receiver, Sensors};
+    use afbc_flight_core::rate;
+    use afbc_types::State;
+
+    fn well() -> Picture {
+        let mut picture = Picture { state: Some(State::default()), senses: true, ..Picture::default() };
+        picture.health.rate = rate::Report { rate_hz: Some(1000), steady: true, alive: true, ..Default::default() };
+        picture.surroundings.receiver = Some(Receiver { kind: 3, satellites: 12, sigma_mm: [500, 800] });
+        let sensors = sensor::MAGNETOMETER | sensor::BAROMETER;
+        picture.surroundings.sensors = Sensors { present: sensors, healthy: sensors };
+        picture
+    }
+
+    /// What MAVSDK's `health` reads: gyroscope, accelerometer, magnetometer, position, arming.
+    #[test]
+    fn a_vehicle_outdoors_is_all_well() {
+        let SystemStatus { present, enabled, healthy, .. } = system(&well());
+        assert_eq!((present, enabled), (healthy, healthy));
+        for bit in [sensor::GYROSCOPE, sensor::ACCELEROMETER, sensor::MAGNETOMETER, sensor::SATELLITES, sensor::ARMING]
+        {
+            assert_ne!(healthy & bit, 0, "{bit:#x}");
+        }
+        assert_eq!(estimator(&well()).flags & 1, 1);
+    }
+
+    #[test]
+    fn each_fault_takes_its_bit() {
+        type Case = (fn(&mut Picture), u32);
+        let cases: [Case; 4] = [
+            (|picture| picture.surroundings.sensors.healthy = sensor::BAROMETER, sensor::MAGNETOMETER),
+            (|picture| picture.surroundings.receiver = Some(Receiver::default()), sensor::SATELLITES),
+            (|picture| picture.health.rate.steady = false, sensor::ARMING),
+            (|picture| picture.health.setpoint_stale = true, sensor::ARMING),
+        ];
+        let all = system(&well()).healthy;
+        for (spoil, bit) in cases {
+            let mut picture = well();
+            spoil(&mut picture);
+            assert_eq!(system(&picture).healthy, all & !bit, "{bit:#x}");
+        }
+    }
+
+    #[test]
+    fn what_speaks_against_arming_is_named() {
+        assert_eq!(against_arming(&well()).next(), None);
+        let mut picture = well();
+        picture.health.state_age_us = u32::MAX;
+        picture.state = Some(State { attitude_rad: nalgebra::Vector3::new(0.0, 0.5, 0.0), ..State::default() });
+        let mut told = against_arming(&picture);
+        assert_eq!(
+            [told.next(), told.next(), told.next()],
+            [Some(Refusal::StateStale), Some(Refusal::TiltTooLarge), None]
+        );
+    }
+
+    #[test]
+    fn the_landed_state_follows_modes() {
+        let mut picture = well();
+        assert_eq!(landed(&picture), ON_GROUND);
+        picture.mode = Mode::Flying;
+        assert_eq!(landed(&picture), ON_GROUND);
+        picture.guided.airborne = true;
+        assert_eq!(landed(&picture), IN_AIR);
+        picture.guided.mode = FlightMode::Takeoff;
+        assert_eq!(landed(&picture), TAKING_OFF);
+        picture.mode = Mode::Descending;
+        assert_eq!(landed(&picture), LANDING);
+    }
+}

@@ -1,0 +1,58 @@
+//! An upload in progress.
+
+use super::items::ITEMS_MAX;
+use afbc_link::{Address, MissionItem};
+use heapless::Vec;
+
+/// Time after which an item is asked for again \[us\].
+pub(super) const PATIENCE_US: u64 = 400_000;
+/// How often an item is asked for.
+pub(super) const TRIES: u8 = 6;
+
+#[derive(Clone, Debug)]
+pub(super) struct Upload {
+    pub(super) from: Address,
+    pub(super) items: Vec<MissionItem, ITEMS_MAX>,
+    count: u16,
+    asked_us: u64,
+    tries: u8,
+}
+
+/// What is due.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reminder {
+    None,
+    Ask(u16),
+    GiveUp,
+}
+
+impl Upload {
+    /// An upload of `count` items, the first of which is asked for now.
+    pub(super) fn new(count: u16, from: Address, now_us: u64) -> Self {
+        Upload { from, items: Vec::new(), count, asked_us: now_us, tries: 1 }
+    }
+
+    /// Returns the number of the item that is wanted.
+    pub(super) fn wanted(&self) -> u16 {
+        self.items.len() as u16
+    }
+
+    /// Takes the item that is wanted; returns the number of the next one, if there is one.
+    pub(super) fn put(&mut self, item: MissionItem, now_us: u64) -> Option<u16> {
+        self.items.push(item).ok();
+        (self.asked_us, self.tries) = (now_us, 1);
+        Some(self.wanted()).filter(|wanted| *wanted < self.count)
+    }
+
+    /// Returns what is due at `now_us`.
+    pub(super) fn remind(&mut self, now_us: u64) -> Reminder {
+        if now_us.saturating_sub(self.asked_us) < PATIENCE_US {
+            return Reminder::None;
+        }
+        if self.tries >= TRIES {
+            return Reminder::GiveUp;
+        }
+        (self.asked_us, self.tries) = (now_us, self.tries + 1);
+        Reminder::Ask(self.wanted())
+    }
+}

@@ -1,0 +1,128 @@
+//! Flight modes as stations know them: custom modes in PX4's encoding, and MAVLink's standard modes.
+
+use afbc_guidance::FlightMode;
+use afbc_link::{AvailableMode, CurrentMode};
+
+/// Main mode in bits 16 to 23 of `custom_mode`, sub mode in bits 24 to 31.
+const fn custom_of(main: u8, sub: u8) -> u32 {
+    u32::from_le_bytes([0, 0, main, sub])
+}
+
+/// PX4's main mode "auto".
+const AUTO: u8 = 4;
+
+/// Returns the `custom_mode` of a mode in HEARTBEAT.
+pub const fn custom(mode: FlightMode) -> u32 {
+    match mode {
+        FlightMode::Altitude => custom_of(2, 0),
+        FlightMode::Position => custom_of(3, 0),
+        FlightMode::Takeoff => custom_of(AUTO, 2),
+        FlightMode::Hold => custom_of(AUTO, 3),
+        FlightMode::Mission => custom_of(AUTO, 4),
+        FlightMode::Return => custom_of(AUTO, 5),
+        FlightMode::Land => custom_of(AUTO, 6),
+        FlightMode::Offboard => custom_of(6, 0),
+        FlightMode::Stabilised => custom_of(7, 0),
+    }
+}
+
+/// Returns the mode with this `custom_mode`.
+pub fn of_custom(custom_mode: u32) -> Option<FlightMode> {
+    FlightMode::ALL.into_iter().find(|mode| custom(*mode) == custom_mode)
+}
+
+/// Returns the `MAV_STANDARD_MODE`, 0 if the mode is none of these.
+pub const fn standard(mode: FlightMode) -> u8 {
+    match mode {
+        FlightMode::Position => 1,
+        FlightMode::Altitude => 4,
+        FlightMode::Return => 5,
+        FlightMode::Mission => 6,
+        FlightMode::Land => 7,
+        FlightMode::Takeoff => 8,
+        FlightMode::Hold | FlightMode::Offboard | FlightMode::Stabilised => 0,
+    }
+}
+
+/// Returns the mode with this `MAV_STANDARD_MODE`.
+pub fn of_standard(standard_mode: u8) -> Option<FlightMode> {
+    FlightMode::ALL.into_iter().find(|mode| standard_mode != 0 && standard(*mode) == standard_mode)
+}
+
+/// `MAV_MODE_PROPERTY`: flies by itself.
+const AUTOMATIC: u32 = 4;
+/// `MAV_MODE_PROPERTY`: not for beginners.
+const ADVANCED: u32 = 1;
+
+/// Number of modes.
+pub const COUNT: u8 = FlightMode::ALL.len() as u8;
+
+/// Returns AVAILABLE_MODES of the mode at a place from 1 on.
+pub fn available(place: u8) -> Option<AvailableMode> {
+    let mode = *FlightMode::ALL.get(usize::from(place.checked_sub(1)?))?;
+    let properties = match mode {
+        FlightMode::Offboard => AUTOMATIC | ADVANCED,
+        _ if mode.is_manual() => 0,
+        _ => AUTOMATIC,
+    };
+    let mut name = [0; 35];
+    name.iter_mut().zip(mode.name().bytes()).for_each(|(to, from)| *to = from);
+    Some(AvailableMode { count: COUNT, place, standard: standard(mode), custom: custom(mode), properties, name })
+}
+
+/// Bit of a request's index that asks for the modes that follow, too.
+const ALL: u32 = 1 << 31;
+
+/// Returns the index of a request for all modes from a place on.
+pub(crate) fn all_from(place: u8) -> u32 {
+    ALL | u32::from(place)
+}
+
+/// Returns the place that a request's index asks for, and whether also for all that follow. 0 asks for all.
+pub(crate) fn place(index: u32) -> (u8, bool) {
+    let place = u8::try_from(index & !ALL).unwrap_or(0);
+    if index == 0 { (1, true) } else { (place, index & ALL != 0) }
+}
+
+/// Returns CURRENT_MODE.
+pub fn current(mode: FlightMode, intended: FlightMode) -> CurrentMode {
+    CurrentMode { standard: standard(mode), custom: custom(mode), intended: custom(intended) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The numbers that MAVSDK and QGroundControl read as PX4's.
+    #[test]
+    fn custom_modes_are_px4s() {
+        let expected = [
+            (FlightMode::Hold, 0x0304_0000),
+            (FlightMode::Takeoff, 0x0204_0000),
+            (FlightMode::Mission, 0x0404_0000),
+            (FlightMode::Return, 0x0504_0000),
+            (FlightMode::Land, 0x0604_0000),
+            (FlightMode::Offboard, 0x0006_0000),
+            (FlightMode::Position, 0x0003_0000),
+            (FlightMode::Altitude, 0x0002_0000),
+            (FlightMode::Stabilised, 0x0007_0000),
+        ];
+        assert_eq!(expected.len(), FlightMode::ALL.len());
+        for (mode, number) in expected {
+            assert_eq!((custom(mode), of_custom(number)), (number, Some(mode)));
+        }
+        assert_eq!([of_custom(0), of_custom(0x0004_0000), of_custom(u32::MAX)], [None; 3]);
+    }
+
+    #[test]
+    fn every_mode_is_offered_once() {
+        let offered = (0..=u8::MAX).filter_map(available).collect::<heapless::Vec<_, 16>>();
+        assert_eq!(offered.len(), FlightMode::ALL.len());
+        for (mode, place) in FlightMode::ALL.into_iter().zip(1..) {
+            let told = offered.iter().find(|told| told.custom == custom(mode));
+            assert_eq!(told.map(|told| (told.place, told.count, told.standard)), Some((place, COUNT, standard(mode))));
+            assert!(standard(mode) == 0 || of_standard(standard(mode)) == Some(mode));
+        }
+        assert_eq!(of_standard(0), None);
+    }
+}

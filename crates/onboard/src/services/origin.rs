@@ -1,0 +1,180 @@
+//! Local and global coordinates.
+//!
+//! The local frame is tangent to the WGS 84 ellipsoid at its origin, x to the north, y to the west; z is the difference
+//! in altitude, along the curvature of the earth. Exact but for rounding, in either direction.
+
+use afbc_link::Place;
+use nalgebra::Vector3;
+
+/// Semi-major axis \[m\] and square of the eccentricity of WGS 84.
+const AXIS_M: f64 = 6_378_137.0;
+const ECCENTRICITY_2: f64 = 6.694_379_990_141_33e-3;
+const DEG: f64 = core::f64::consts::PI / 180.0;
+
+/// A place on the earth in degrees and metres above the sea.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Global {
+    /// Latitude \[deg\].
+    pub latitude_deg: f64,
+    /// Longitude \[deg\].
+    pub longitude_deg: f64,
+    /// Altitude above the sea \[m\].
+    pub altitude_m: f64,
+}
+
+/// Origin of the local frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Origin {
+    at: Global,
+    sine: f64,
+    cosine: f64,
+    /// Distance from the axis of the earth, and from the plane of the equator \[m\].
+    from_axis_m: f64,
+    from_equator_m: f64,
+}
+
+impl Origin {
+    /// Of simulators: PX4's usual place near Zurich.
+    pub const SIMULATED: Global = Global { latitude_deg: 47.397_742, longitude_deg: 8.545_594, altitude_m: 488.0 };
+
+    /// Creates the origin at a place, none within a kilometre of a pole.
+    pub fn new(at: Global) -> Option<Self> {
+        let Global { latitude_deg, longitude_deg, altitude_m } = at;
+        let possible = latitude_deg.abs() < 89.99 && longitude_deg.abs() <= 180.0 && altitude_m.abs() <= 1e5;
+        let (sine, cosine) = libm::sincos(latitude_deg * DEG);
+        let [from_axis_m, from_equator_m] = meridian(sine, cosine, altitude_m);
+        possible.then_some(Origin { at, sine, cosine, from_axis_m, from_equator_m })
+    }
+
+    /// Returns where it is.
+    pub fn at(&self) -> Global {
+        self.at
+    }
+
+    /// Returns the place in the local frame \[m\].
+    pub fn local(&self, place: &Global) -> Vector3<f32> {
+        let [north, east] = self.tangent(place);
+        Vector3::new(north as f32, -east as f32, (place.altitude_m - self.at.altitude_m) as f32)
+    }
+
+    /// Returns the place on the earth of a position in the local frame \[m\].
+    pub fn global(&self, position_m: &Vector3<f32>) -> Global {
+        let [x, y, z] = [position_m.x, position_m.y, position_m.z].map(f64::from);
+        let mut place = Global { altitude_m: self.at.altitude_m + z, ..self.at };
+        // Newton's method with the metric of a sphere; four steps reach 0.1 mm at 10 km.
+        for _ in 0..4 {
+            let [north, east] = self.tangent(&place);
+            place.latitude_deg += (x - north) / (AXIS_M * DEG);
+            place.longitude_deg += (-y - east) / (AXIS_M * DEG * self.cosine);
+        }
+        place
+    }
+
+    /// Returns the distances to the north and to the east in the tangent plane at the origin's altitude \[m\].
+    fn tangent(&self, place: &Global) -> [f64; 2] {
+        let (sine, cosine) = libm::sincos(place.latitude_deg * DEG);
+        // Altitudes are along the vertical of the place: only directions count.
+        let [from_axis_m, from_equator_m] = meridian(sine, cosine, self.at.altitude_m);
+        let degrees = place.longitude_deg - self.at.longitude_deg;
+        let turn = if degrees > 180.0 {
+            degrees - 360.0
+        } else if degrees < -180.0 {
+            degrees + 360.0
+        } else {
+            degrees
+        };
+        let (turn_sine, turn_cosine) = libm::sincos(turn * DEG);
+        let north = self.cosine * (from_equator_m - self.from_equator_m)
+            - self.sine * (from_axis_m * turn_cosine - self.from_axis_m);
+        [north, from_axis_m * turn_sine]
+    }
+}
+
+/// Returns the distances of a place from the axis of the earth and from the plane of the equator \[m\].
+fn meridian(sine: f64, cosine: f64, altitude_m: f64) -> [f64; 2] {
+    let normal_m = AXIS_M / libm::sqrt(1.0 - ECCENTRICITY_2 * sine * sine);
+    [(normal_m + altitude_m) * cosine, (normal_m * (1.0 - ECCENTRICITY_2) + altitude_m) * sine]
+}
+
+impl Global {
+    /// Returns latitude and longitude \[1e-7 deg\].
+    pub fn e7(&self) -> [i32; 2] {
+        [self.latitude_deg, self.longitude_deg].map(|degrees| libm::round(degrees * 1e7) as i32)
+    }
+
+    /// Returns the altitude \[mm\].
+    pub fn altitude_mm(&self) -> i32 {
+        libm::round(self.altitude_m * 1e3) as i32
+    }
+
+    /// Returns a place with coordinates in 1e-7 degrees.
+    pub fn of_e7([latitude, longitude]: [i32; 2], altitude_m: f64) -> Self {
+        let [latitude_deg, longitude_deg] = [latitude, longitude].map(|e7| f64::from(e7) * 1e-7);
+        Global { latitude_deg, longitude_deg, altitude_m }
+    }
+}
+
+/// Returns a place of a station in the local frame \[m\], NaN where it is not given. Altitudes count from `home_m` or
+/// from `here_m`, if they are said to. A horizontal coordinate alone is not given.
+pub fn resolve(origin: &Origin, place: &Place, home_m: f32, here_m: f32) -> Vector3<f32> {
+    use afbc_link::Datum;
+    let height = f64::from(place.height.metres);
+    let z = match place.height.above {
+        Datum::Sea => (height - origin.at.altitude_m) as f32,
+        Datum::Home => place.height.metres + home_m,
+        Datum::Here => place.height.metres + here_m,
+    };
+    let given = [place.latitude_e7, place.longitude_e7];
+    if given.contains(&Place::AS_IT_IS) {
+        return Vector3::new(f32::NAN, f32::NAN, z);
+    }
+    let local = origin.local(&Global::of_e7(given, origin.at.altitude_m));
+    Vector3::new(local.x, local.y, z)
+}
+
+#[cfg(test)]
+#[allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
+mod tests {
+    use super::*;
+    use afbc_link::{Datum, Height};
+
+    /// Axes: north is x, west is y.
+    #[test]
+    fn axes_point_north_and_west() {
+        let origin = Origin::new(Origin::SIMULATED).expect("possible");
+        let north = Global { latitude_deg: Origin::SIMULATED.latitude_deg + 0.001, ..Origin::SIMULATED };
+        let east = Global { longitude_deg: Origin::SIMULATED.longitude_deg + 0.001, ..Origin::SIMULATED };
+        // A thousandth of a degree at 47.4 degrees: 111.178 m and 75.46 m (Bureau international de l'heure).
+        let [n, e] = [north, east].map(|place| origin.local(&place));
+        assert!((n.x - 111.18).abs() < 0.05 && n.y.abs() < 1e-2, "{n}");
+        assert!((e.y + 75.46).abs() < 0.05 && e.x.abs() < 1e-2, "{e}");
+    }
+
+    #[test]
+    fn the_date_line_is_crossed() {
+        let origin = Origin::new(Global { latitude_deg: 0.0, longitude_deg: 179.9999, altitude_m: 0.0 });
+        let east = Global { latitude_deg: 0.0, longitude_deg: -179.9999, altitude_m: 0.0 };
+        let local = origin.expect("possible").local(&east);
+        assert!((local.y + 22.26).abs() < 0.05, "{local}");
+    }
+
+    #[test]
+    fn poles_and_nonsense_are_no_origins() {
+        for (latitude_deg, longitude_deg) in [(90.0, 0.0), (f64::NAN, 0.0), (0.0, f64::INFINITY), (0.0, 181.0)] {
+            assert_eq!(Origin::new(Global { latitude_deg, longitude_deg, altitude_m: 0.0 }), None);
+        }
+    }
+
+    #[test]
+    fn heights_count_from_what_they_say() {
+        let origin = Origin::new(Origin::SIMULATED).expect("possible");
+        let z = |above| {
+            let height = Height { metres: 490.0, above };
+            let place = Place { latitude_e7: Place::AS_IT_IS, longitude_e7: 0, height };
+            let resolved = resolve(&origin, &place, 5.0, 7.0);
+            assert!(resolved.x.is_nan() && resolved.y.is_nan());
+            resolved.z
+        };
+        assert_eq!([Datum::Sea, Datum::Home, Datum::Here].map(z), [2.0, 495.0, 497.0]);
+    }
+}

@@ -1,0 +1,103 @@
+//! What the services know of the vehicle.
+
+use crate::flight::Report;
+use crate::guided::Guided;
+use crate::services::origin::Origin;
+use afbc_flight_core::supervisor::COAST_US;
+use afbc_flight_core::{Health, Mode};
+use afbc_guidance::FlightMode;
+use afbc_link::telemetry::Battery;
+use afbc_types::{ROTORS_MAX, State};
+
+/// What the shell tells, since the control tick does not know it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Surroundings {
+    /// Where the local frame's origin is on the earth.
+    pub origin: Option<Origin>,
+    /// The satellite receiver's newest fix, if there is a receiver.
+    pub receiver: Option<Receiver>,
+    /// The battery, if it is measured.
+    pub battery: Option<Battery>,
+    /// Further sensors: magnetometer, barometer and the like, as `MAV_SYS_STATUS_SENSOR`.
+    pub sensors: Sensors,
+    /// Time since 1970 at power-up, 0 if unknown \[us\].
+    pub powered_up_us: u64,
+}
+
+/// A satellite receiver.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Receiver {
+    /// `GPS_FIX_TYPE`: 1 no fix, 3 in three dimensions.
+    pub kind: u8,
+    /// Number of satellites; 255 if unknown.
+    pub satellites: u8,
+    /// Horizontal and vertical uncertainty; 0 if unknown \[mm\].
+    pub sigma_mm: [u32; 2],
+}
+
+/// Sets of sensors, as `MAV_SYS_STATUS_SENSOR`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sensors {
+    /// What is there.
+    pub present: u32,
+    /// What of it is well.
+    pub healthy: u32,
+}
+
+/// The vehicle after a tick.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Picture {
+    /// Start of the tick, since power-up \[us\].
+    pub time_us: u64,
+    /// Mode of the flight core.
+    pub mode: Mode,
+    /// What the guidance decided.
+    pub guided: Guided,
+    /// The newest state, its own or the link's.
+    pub state: Option<State>,
+    /// True if the vehicle has an inertial sensor.
+    pub senses: bool,
+    /// Health of the flight core.
+    pub health: Health,
+    /// Throttles: 0, or 48 to 2047.
+    pub throttles: [u16; ROTORS_MAX],
+    /// Number of rotors.
+    pub rotors: u8,
+    /// Duration of the tick \[us\].
+    pub tick_us: f32,
+    /// Frames dropped since power-up.
+    pub dropped_frames: u32,
+    /// What the shell has told.
+    pub surroundings: Surroundings,
+}
+
+impl Picture {
+    /// Updates it by a tick's report, except for the state.
+    pub(crate) fn update<const N: usize>(&mut self, report: &Report<N>, tick_us: f32) {
+        self.time_us = report.time_us;
+        (self.mode, self.guided, self.health) = (report.mode, report.guided, report.health);
+        self.senses = report.estimate.is_some();
+        self.throttles.iter_mut().zip(report.throttles).for_each(|(to, from)| *to = from);
+        (self.rotors, self.tick_us) = (N as u8, tick_us);
+    }
+
+    /// Returns the time since power-up \[ms\].
+    pub fn time_ms(&self) -> u32 {
+        (self.time_us / 1000) as u32
+    }
+
+    /// Returns the flight mode that stations are told.
+    pub fn flight_mode(&self) -> FlightMode {
+        if self.mode == Mode::Descending { FlightMode::Land } else { self.guided.mode }
+    }
+
+    /// True if the vehicle knows where it is.
+    pub fn is_located(&self) -> bool {
+        self.state.is_some() && self.health.state_age_us <= COAST_US
+    }
+
+    /// True in the air, as far as is known.
+    pub fn is_airborne(&self) -> bool {
+        self.guided.airborne
+    }
+}

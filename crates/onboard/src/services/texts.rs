@@ -1,0 +1,116 @@
+//! Texts to be sent.
+
+use afbc_guidance::Declined;
+use afbc_guidance::notice::Severity;
+use afbc_link::{Address, Downlink, MavSeverity, Text};
+use heapless::{Deque, String};
+
+/// Most texts that wait; further ones are dropped.
+const TEXTS_MAX: usize = 12;
+/// Longest text.
+const LENGTH_MAX: usize = 50;
+
+/// A text of at most 50 characters; what is longer is cut off.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Words(String<LENGTH_MAX>);
+
+impl Words {
+    /// A text.
+    pub fn of(text: &str) -> Self {
+        Words::default().and(text)
+    }
+
+    /// Appends a text.
+    pub fn and(mut self, text: &str) -> Self {
+        for letter in text.chars() {
+            self.0.push(letter).ok();
+        }
+        self
+    }
+
+    /// Appends a number. Without the library's formatting, which takes 10 kB of flash.
+    pub fn number(self, number: u32) -> Self {
+        let higher = if number > 9 { self.number(number / 10) } else { self };
+        let digit = char::from_digit(number % 10, 10).unwrap_or('0');
+        higher.and(digit.encode_utf8(&mut [0; 4]))
+    }
+
+    /// Appends a station.
+    pub fn station(self, station: Address) -> Self {
+        self.number(station.system.into()).and("/").number(station.component.into())
+    }
+
+    fn text(&self) -> Text {
+        Text::from(self.0.as_str())
+    }
+}
+
+/// Texts in the order in which they came up.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Texts(Deque<(MavSeverity, Text), TEXTS_MAX>);
+
+impl Texts {
+    /// Queues a text.
+    pub(crate) fn put(&mut self, severity: MavSeverity, text: &str) {
+        self.0.push_back((severity, Text::from(text))).ok();
+    }
+
+    /// Queues words.
+    pub(crate) fn say(&mut self, severity: MavSeverity, words: &Words) {
+        self.0.push_back((severity, words.text())).ok();
+    }
+
+    /// Returns the oldest text.
+    pub(crate) fn next(&mut self) -> Option<Downlink> {
+        let (severity, text) = self.0.pop_front()?;
+        Some(Downlink::Text { severity, text })
+    }
+}
+
+/// Returns the severity of an announcement.
+pub(crate) fn urgency(severity: Severity) -> MavSeverity {
+    match severity {
+        Severity::Critical => MavSeverity::MAV_SEVERITY_CRITICAL,
+        Severity::Error => MavSeverity::MAV_SEVERITY_ERROR,
+        Severity::Warning => MavSeverity::MAV_SEVERITY_WARNING,
+        Severity::Notice => MavSeverity::MAV_SEVERITY_NOTICE,
+        Severity::Info => MavSeverity::MAV_SEVERITY_INFO,
+    }
+}
+
+/// Returns why an order is declined, in words.
+pub(crate) fn reason(declined: Declined) -> &'static str {
+    match declined {
+        Declined::NoPosition => "refused: position unknown",
+        Declined::NotArmed => "refused: not armed",
+        Declined::OnGround => "refused: on the ground",
+        Declined::InFlight => "refused: in flight",
+        Declined::NoTargets => "refused: no fresh targets",
+        Declined::NoSticks => "refused: no fresh sticks",
+        Declined::NoMission => "refused: no mission, or no such item",
+        Declined::OutsideFence => "refused: outside the geofence",
+        Declined::OutOfRange => "refused: out of range",
+        Declined::Failsafe => "refused: a failsafe is active",
+        _ => "refused",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_written() {
+        for (number, text) in [(0, "0"), (7, "7"), (10, "10"), (u32::MAX, "4294967295")] {
+            assert_eq!(Words::default().number(number), Words::of(text));
+        }
+        let station = Address { system: 255, component: 190 };
+        assert_eq!(Words::of("by ").station(station).and("!"), Words::of("by 255/190!"));
+    }
+
+    #[test]
+    fn longer_texts_are_cut_off() {
+        let long = Words::of("0123456789012345678901234567890123456789").and("01234567890123456789");
+        assert_eq!(long, Words::of("01234567890123456789012345678901234567890123456789"));
+    }
+}

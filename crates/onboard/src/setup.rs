@@ -1,0 +1,44 @@
+//! What shell and parameters decide about the link.
+
+use afbc_types::parameters;
+
+parameters! {
+    /// Parameters of the link. A change counts from the next start on.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Link {
+        /// MAVLink system id, from the next start on.
+        #[parameter(MAV_SYS_ID, "number", 1.0..=250.0)]
+        pub system: f32 = 1.0,
+        /// Baud rate of the serial line, and so what telemetry may take of it, from the next start on.
+        #[parameter(SER_TEL1_BAUD, "number", 9600.0..=921600.0)]
+        pub baud: f32 = 921_600.0,
+    }
+}
+
+/// What shell and parameters decide about the link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Setup {
+    /// MAVLink system id, 1 to 255.
+    pub system: u8,
+    /// What everything but rotor commands for a simulator may take of the link: while these are sent, 5/9 of it
+    /// \[bytes/s\].
+    pub bytes_per_s: u32,
+    /// True if the shell reboots when it is [asked to](crate::Comms::wants_reboot).
+    pub reboots: bool,
+}
+
+impl Setup {
+    /// What the parameters make of it: nine tenths of the line, whose bytes have ten bits; no reboot.
+    pub fn of(link: &Link) -> Self {
+        // In range: a whole number each.
+        let (system, baud) = (link.system as u8, link.baud as u32);
+        Setup { system, bytes_per_s: baud / 100 * 9, reboots: false }
+    }
+}
+
+impl Default for Setup {
+    /// That of the parameters' defaults.
+    fn default() -> Self {
+        Self::of(&Link::DEFAULT)
+    }
+}

@@ -1,0 +1,246 @@
+//! Very many random frames of several stations, nested and damaged, through all services: `FRAMES` of them, as many as
+//! `scripts/flood` says. No panic, every command answered exactly once to its sender, no order of a station that is not
+//! in control. The flight core and the guidance are played: they answer at random.
+#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
+
+use afbc_flight_core::{Refusal, Request};
+use afbc_guidance::{Declined, FlightMode, Given};
+use afbc_link::{
+    Address, Answer, Command, Control, Counters, Decoder, Downlink, Message, Mission, ParameterRequest, Target, Uplink,
+};
+use afbc_onboard::parameters::Table;
+use afbc_onboard::services::control::{SILENT_US, is_needed_for};
+use afbc_onboard::services::origin::Origin;
+use afbc_onboard::{Comms, Configuration, Flight, Guided, Mail, REPORT_MAX, Readings, Report, Surroundings};
+use afbc_types::State;
+use std::collections::{BTreeMap, VecDeque};
+
+const STATIONS: [Address; 4] = [
+    Address { system: 255, component: 190 },
+    Address { system: 245, component: 190 },
+    Address { system: 42, component: 1 },
+    Address { system: 1, component: 191 },
+];
+const VEHICLE: Address = Address { system: 1, component: 1 };
+/// What may contain other frames: TUNNEL and FILE_TRANSFER_PROTOCOL, with their checksums' seeds.
+const CARRIERS: [(u32, u8); 2] = [(385, 147), (110, 84)];
+/// Frames in a usual run.
+const FRAMES: u64 = 200_000;
+
+/// SplitMix64.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        (self.next() % count as u64) as usize
+    }
+
+    fn of<T: Copy>(&mut self, choices: &[T]) -> T {
+        choices[self.below(choices.len())]
+    }
+
+    fn word(&mut self) -> [u8; 4] {
+        match self.below(4) {
+            0 => (self.next() as u32).to_le_bytes(),
+            1 => self.of(&[0.0_f32, 1.0, 2.0, 3.0, 4.0, 6.0, -1.0, 21196.0, 511.0, f32::NAN]).to_le_bytes(),
+            2 => (self.below(500) as f32).to_le_bytes(),
+            _ => (self.below(4) as u32).to_le_bytes(),
+        }
+    }
+}
+
+/// CRC-16/MCRF4XX.
+fn crc(bytes: &[u8], extra: u8) -> u16 {
+    bytes.iter().chain([&extra]).fold(0xFFFF, |crc: u16, byte| {
+        let low = byte ^ crc as u8;
+        let low = low ^ (low << 4);
+        let wide = u16::from(low);
+        (crc >> 8) ^ (wide << 8) ^ (wide << 3) ^ (wide >> 4)
+    })
+}
+
+fn frame(from: Address, sequence: u8, id: u32, payload: &[u8], seed: u8) -> Vec<u8> {
+    let [a, b, c, _] = id.to_le_bytes();
+    let mut frame = vec![0xFD, payload.len() as u8, 0, 0, sequence, from.system, from.component, a, b, c];
+    frame.extend_from_slice(payload);
+    let sum = crc(&frame[1..], seed);
+    frame.extend_from_slice(&sum.to_le_bytes());
+    frame
+}
+
+/// Who should be in control.
+#[derive(Default)]
+struct Model(Option<(Address, u64)>);
+
+impl Model {
+    fn holder(&self, now_us: u64) -> Option<Address> {
+        self.0.filter(|(_, heard_us)| now_us - heard_us <= SILENT_US).map(|(holder, _)| holder)
+    }
+
+    /// Follows a message; true if its sender may change something by it.
+    fn hear(&mut self, from: Address, message: &Uplink, now_us: u64) -> bool {
+        if matches!(message, Uplink::State { .. } | Uplink::Pose { .. }) {
+            return false;
+        }
+        // One that was silent is in control again, unless another has taken over.
+        if self.0.is_some_and(|(holder, _)| holder == from) {
+            self.0 = Some((from, now_us));
+        }
+        let holder = self.holder(now_us);
+        let needs = match message {
+            Uplink::Command(command) => is_needed_for(*command),
+            Uplink::Setpoint(_) | Uplink::Target(_) | Uplink::Control(Control::Take) => true,
+            Uplink::Mission(message) => {
+                matches!(message, Mission::Count(..) | Mission::Clear(_) | Mission::SetCurrent(_))
+            }
+            Uplink::Parameter(message) => matches!(message, ParameterRequest::Set { .. }),
+            _ => false,
+        };
+        match (message, holder) {
+            (Uplink::Control(Control::Release), Some(holder)) if holder == from => self.0 = None,
+            (_, None) if needs => self.0 = Some((from, now_us)),
+            _ => (),
+        }
+        holder == Some(from) || (needs && holder.is_none())
+    }
+}
+
+#[test]
+fn every_command_is_answered_once_to_its_sender() {
+    let frames = std::env::var("FRAMES").map_or(FRAMES, |number| number.parse().expect("FRAMES: a number"));
+    let seed = std::env::var("SEED").map_or(7, |number| number.parse().expect("SEED: a number"));
+    let mut random = Random(seed);
+    let ids: Vec<(u32, u8, usize)> =
+        (0..500).filter_map(|id| Uplink::format(id).map(|format| (id, format.extra_crc, format.length_max))).collect();
+    let (mut mail, mut taken) = (Mail::EMPTY, Mail::EMPTY);
+    let mut flight: Flight = Flight::new(&Configuration::default()).expect("valid");
+    let mut idle = flight.tick(1_000, &mut taken, &Readings::NONE);
+    let mut comms = Comms::new();
+    let mut table: Table = Table::new(Configuration::default());
+    comms.surround(Surroundings { origin: Origin::new(Origin::SIMULATED), ..Surroundings::default() });
+    let mut orders: VecDeque<Given> = VecDeque::new();
+    let mut model = Model::default();
+    // Answers that are due to a command of a station, less those that came.
+    let mut due: BTreeMap<(u16, (u8, u8)), i64> = BTreeMap::new();
+    let mut listener = Decoder::<Uplink>::new(VEHICLE);
+    let mut station = Decoder::<Downlink>::new(STATIONS[0]);
+    let (mut commands, mut answers, mut given, mut sent) = (0_u64, 0_u64, 0_u64, 0);
+
+    while sent < frames || due.values().any(|count| *count != 0) {
+        assert!(sent < frames + 1_000_000, "unanswered: {:?}", due.iter().find(|(_, count)| **count != 0));
+        // What arrives before a tick has the time of the last one.
+        let before_us = if idle.time_us == 1_000 { 0 } else { idle.time_us };
+        idle.time_us += 1000;
+        // Now and then for longer than a station may be silent.
+        let burst = if sent >= frames { 0 } else { random.below(3) };
+        if random.below(5_000) == 0 {
+            idle.time_us += 2 * SILENT_US;
+        }
+        let mut stream = Vec::new();
+        for _ in 0..burst {
+            let from = random.of(&STATIONS);
+            let is_command = random.below(2) == 0;
+            let (id, seed, length) = if is_command { (76 - random.below(2) as u32, 0, 33) } else { random.of(&ids) };
+            let seed = if is_command { Uplink::format(id).expect("known").extra_crc } else { seed };
+            let mut payload: Vec<u8> = (0..length.div_ceil(4)).flat_map(|_| random.word()).collect();
+            payload.truncate(length);
+            if is_command {
+                let number = if random.below(8) == 0 { random.next() as u16 } else { random.of(&Command::KNOWN) };
+                payload[28..30].copy_from_slice(&number.to_le_bytes());
+                payload[30..32].copy_from_slice(&random.of(&[[1, 1], [1, 0], [0, 0], [2, 1]]));
+            }
+            let whole = frame(from, random.next() as u8, id, &payload, seed);
+            match random.below(12) {
+                0 => {
+                    let (carrier, seed) = random.of(&CARRIERS);
+                    stream.extend(frame(from, 0, carrier, &whole[..whole.len().min(200)], seed));
+                }
+                1 => stream.extend(&whole[..random.below(whole.len())]),
+                2 => {
+                    let mut damaged = whole;
+                    let place = random.below(damaged.len());
+                    damaged[place] ^= 1 << random.below(8);
+                    stream.extend(damaged);
+                }
+                _ => stream.extend(whole),
+            }
+            sent += 1;
+        }
+        // What the vehicle's decoder, which has tests of its own, finds in the stream.
+        let mut may = false;
+        listener.feed(&stream, |from, message| {
+            may |= model.hear(from, &message, before_us);
+            if let Uplink::Command(command) = message {
+                commands += 1;
+                *due.entry((command.id(), (from.system, from.component))).or_default() += 1;
+            }
+            // Values that reached the guidance are numbers.
+            if let Uplink::Target(Target::Sticks(sticks)) = message {
+                assert!([sticks.roll, sticks.pitch, sticks.throttle, sticks.yaw].iter().all(|it| it.abs() <= 1.0));
+            }
+        });
+        let news = comms.receive(&stream);
+        if !may {
+            let heard_only = afbc_guidance::Orders { heard_us: news.orders.heard_us, ..Default::default() };
+            assert_eq!(news.orders, heard_only, "after {sent} frames");
+            assert_eq!(news.inbox.setpoint(), None);
+            let stops = |request| matches!(request, Request::Disarm | Request::Kill);
+            assert!(news.inbox.asked().is_none_or(|asked| stops(asked.request)), "after {sent} frames");
+        }
+        mail.post(&news);
+        mail.take_into(&mut taken);
+        orders.extend(taken.orders.given.iter_mut().filter_map(Option::take));
+        assert!(orders.len() <= afbc_guidance::order::ORDERS_MAX);
+
+        // Flight core and guidance.
+        let answer = taken.inbox.asked().map(|asked| {
+            let result = if random.below(2) == 0 { Ok(()) } else { Err(random.of(&Refusal::ALL)) };
+            afbc_flight_core::Answer { ticket: asked.ticket, request: asked.request, result }
+        });
+        let ordered = orders.pop_front().map(|order| {
+            given += 1;
+            let declined = random.of(&[Declined::NotArmed, Declined::NoTargets, Declined::OutOfRange]);
+            (order.ticket, if random.below(2) == 0 { Ok(()) } else { Err(declined) })
+        });
+        let guided = Guided {
+            mode: random.of(&FlightMode::ALL),
+            answer: ordered,
+            wanted: random.below(4) as u16,
+            reached: (random.below(50) == 0).then(|| random.below(4) as u16),
+            ..Guided::default()
+        };
+        let estimate = (random.below(2) == 0).then(State::default);
+        let report = Report { answer, guided, estimate, ..idle };
+        let mut bytes = 0;
+        let mut send = |frame: &[u8]| {
+            bytes += frame.len();
+            station.feed(frame, |_, message| match message {
+                Downlink::Answer { answer: Answer::InProgress, .. } => (),
+                Downlink::Answer { command, to, .. } => {
+                    answers += 1;
+                    let count = due.entry((command, (to.system, to.component))).or_default();
+                    *count -= 1;
+                    assert!(*count >= 0, "command {command} answered more often than it was given");
+                }
+                Downlink::Health(health) => assert_eq!(health.unanswered, 0),
+                _ => (),
+            });
+        };
+        comms.report(&report, 0, &mut send);
+        let change = comms.parameters(&mut table, &mut send);
+        assert!(change.is_none() || !report.mode.armed());
+        assert!(bytes <= REPORT_MAX, "{bytes} bytes");
+    }
+    println!("{sent} frames: {commands} commands, {answers} answers, {given} orders");
+    assert_eq!(commands, answers);
+    let counters = *station.counters();
+    assert_eq!(counters, Counters { received: counters.received, ..Counters::default() }, "all can be read");
+    assert!(given > 0 && commands > frames / 8);
+}

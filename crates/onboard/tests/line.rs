@@ -1,0 +1,135 @@
+//! The serial line: what everything at full rate leaves of it.
+#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
+
+mod common;
+
+use afbc_link::{Address, Command, Downlink, FRAME_MAX, ParameterRequest, Sender, Uplink};
+use afbc_onboard::parameters::Table;
+use afbc_onboard::services::streams::{DEFAULTS, id};
+use afbc_onboard::{Comms, Configuration, Link, Setup};
+use afbc_types::State;
+use common::Bench;
+use std::collections::BTreeMap;
+
+/// Bytes that the board's line has room for, `TX` in `boards/stm32f405/src/board.rs`; a tick's bytes for which there is
+/// none are lost.
+const RING: usize = 1024;
+
+/// The vehicle on a line of so many baud.
+fn on(baud: f32) -> Bench {
+    let mut bench = Bench::new();
+    bench.table = Table::new(Configuration { link: Link { baud, ..Link::DEFAULT }, ..Configuration::default() });
+    bench.comms = Comms::with(Setup::of(&bench.table.configuration().link));
+    bench
+}
+
+/// What leaves in some seconds with every stream requested each millisecond, while stations ask.
+struct Load {
+    bytes: usize,
+    /// Commands asked and answered.
+    asked: usize,
+    answered: usize,
+    /// Largest time that an answer waited, in the vehicle and on the line \[ms\].
+    waited_ms: usize,
+    /// How often each stream was sent.
+    streams: BTreeMap<u32, usize>,
+    parameters: usize,
+}
+
+fn load(baud: usize, seconds: usize) -> Load {
+    let mut bench = on(baud as f32);
+    let line_per_ms = baud as f64 / 10_000.0;
+    for (message, _) in DEFAULTS {
+        bench.hear(Uplink::Command(Command::SetInterval { message, interval_us: 1_000 }));
+        bench.step();
+    }
+    bench.hear(Uplink::Parameter(ParameterRequest::List));
+    let mut load = Load { bytes: 0, asked: 0, answered: 0, waited_ms: 0, streams: BTreeMap::new(), parameters: 0 };
+    let (mut ring, mut asked_ms) = (0.0_f64, BTreeMap::new());
+    for tick in 0..1000 * seconds {
+        // A state every 10 ms and a target every 20 ms come too, a command every 50 ms, from one of two stations.
+        if tick.is_multiple_of(10) {
+            bench.measure(&State::default());
+        }
+        if tick.is_multiple_of(50) {
+            let (number, from) =
+                (20_000 + tick as u16 % 10_000, Address { system: 250 + (tick / 50 % 2) as u8, component: 1 });
+            bench.hear_from(from, Uplink::Command(Command::Other(number)));
+            asked_ms.insert(number, (from, tick));
+            load.asked += 1;
+        }
+        // And texts, often and many at once: what speaks against arming.
+        if tick % 500 < 200 && tick.is_multiple_of(10) {
+            bench.hear(Uplink::Command(Command::CheckArming));
+        }
+        let (_, said) = bench.step();
+        let mut length = 0;
+        let mut out = [0; FRAME_MAX];
+        for message in &said {
+            length += Sender::new(common::STATION).send(message, &mut out).len();
+            let sent_ms = ((ring + length as f64) / line_per_ms) as usize;
+            match message {
+                Downlink::Answer { command, to, .. } => {
+                    if let Some((from, asked)) = asked_ms.remove(command) {
+                        assert_eq!(from, *to);
+                        load.answered += 1;
+                        load.waited_ms = load.waited_ms.max(tick - asked + sent_ms);
+                    }
+                }
+                Downlink::Parameter(_) => load.parameters += 1,
+                _ => {}
+            }
+            *load.streams.entry(u32::from(out[7]) | u32::from(out[8]) << 8).or_default() += 1;
+        }
+        assert!(ring + length as f64 <= RING as f64, "{baud} baud, {tick} ms: {length} bytes on top of {ring:.0}");
+        ring = (ring + length as f64 - line_per_ms).max(0.0);
+        load.bytes += length;
+    }
+    load
+}
+
+/// At any baud rate everything at full rate fits the line, the board's buffer never overflows, every command is
+/// answered soon, and no stream starves.
+#[test]
+fn everything_at_full_rate_fits_the_line() {
+    for baud in [57_600, 115_200, 921_600] {
+        let seconds = 10;
+        let load = load(baud, seconds);
+        let (line, share) = (baud / 10 * seconds, load.bytes as f64 / (baud / 10 * seconds) as f64);
+        assert!(load.bytes <= line, "{baud} baud: {} bytes of {line}", load.bytes);
+        // And it is used: else the streams would be slower than need be.
+        assert!(share > 0.85, "{baud} baud: {share:.2} of the line");
+        assert_eq!(load.answered, load.asked, "{baud} baud");
+        assert!(load.waited_ms <= 200, "{baud} baud: {} ms", load.waited_ms);
+        assert_eq!(load.streams[&id::HEARTBEAT], seconds, "{baud} baud");
+        let count = Table::new(Configuration::default()).count();
+        assert_eq!(load.parameters, usize::from(count), "{baud} baud");
+        for message in [id::ATTITUDE, id::LOCAL_POSITION_NED, id::SYS_STATUS, id::DEBUG_FLOAT_ARRAY] {
+            let sent = load.streams.get(&message).copied().unwrap_or(0);
+            assert!(sent >= 2 * seconds, "{baud} baud: message {message} {sent} times");
+        }
+    }
+}
+
+/// The rest of the line is for rotor commands, while they are sent.
+#[test]
+fn rotor_commands_have_the_rest_of_a_fast_line() {
+    let mut bench = on(921_600.0);
+    let wanted = DEFAULTS.iter().map(|(message, _)| *message).chain([id::HIL_ACTUATOR_CONTROLS]);
+    for message in wanted {
+        bench.hear(Uplink::Command(Command::SetInterval { message, interval_us: 1_000 }));
+        bench.step();
+    }
+    let (mut bytes, mut rotors) = (0, 0);
+    for tick in 0..10_000 {
+        if tick % 10 == 0 {
+            bench.measure(&State::default());
+        }
+        for message in bench.step().1 {
+            bytes += Sender::new(common::STATION).send(&message, &mut [0; FRAME_MAX]).len();
+            rotors += usize::from(matches!(message, Downlink::Rotors { .. }));
+        }
+    }
+    assert!(bytes <= 921_600, "{bytes} bytes");
+    assert!(rotors >= 1000, "{rotors}");
+}

@@ -1,0 +1,50 @@
+//! Local and global coordinates, compared with the definition of geodetic coordinates.
+#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
+
+use afbc_onboard::services::origin::{Global, Origin};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+/// Semi-major axis \[m\] and square of the eccentricity of WGS 84.
+const AXIS_M: f64 = 6_378_137.0;
+const ECCENTRICITY_2: f64 = 6.694_379_990_141_33e-3;
+
+/// A place in the earth's own frame, from the definition of geodetic coordinates.
+fn earth(place: &Global) -> nalgebra::Vector3<f64> {
+    let (phi, lambda) = (place.latitude_deg.to_radians(), place.longitude_deg.to_radians());
+    let normal = AXIS_M / (1.0 - ECCENTRICITY_2 * phi.sin().powi(2)).sqrt();
+    let axis = (normal + place.altitude_m) * phi.cos();
+    let equator = (normal * (1.0 - ECCENTRICITY_2) + place.altitude_m) * phi.sin();
+    nalgebra::Vector3::new(axis * lambda.cos(), axis * lambda.sin(), equator)
+}
+
+fn places() -> impl Strategy<Value = Global> {
+    (-80.0..80.0f64, -180.0..180.0f64, -100.0..4000.0f64).prop_map(|(latitude_deg, longitude_deg, altitude_m)| Global {
+        latitude_deg,
+        longitude_deg,
+        altitude_m,
+    })
+}
+
+proptest! {
+    /// Within a kilometre, distances are those of the earth, to a centimetre: the error is 2 mm of rounding of
+    /// `f32`, and the sagitta.
+    #[test]
+    fn distances_are_true(at in places(), x in -707.0..707.0f32, y in -707.0..707.0f32) {
+        let origin = Origin::new(at).expect("possible");
+        let place = origin.global(&Vector3::new(x, y, 0.0));
+        let true_m = (earth(&place) - earth(&at)).norm();
+        let local_m = f64::from(x).hypot(f64::from(y));
+        // Along the tangent; the arc is lower by its sagitta.
+        let sagitta_m = local_m * local_m / 2.0 / 6.37e6;
+        prop_assert!((true_m.hypot(0.0) - local_m).abs() < 0.01 + sagitta_m * sagitta_m, "{true_m} {local_m}");
+    }
+
+    #[test]
+    fn the_way_back_is_the_way(at in places(), x in -5e3..5e3f32, y in -5e3..5e3f32, z in -500.0..500.0f32) {
+        let origin = Origin::new(at).expect("possible");
+        let there = Vector3::new(x, y, z);
+        let back = origin.local(&origin.global(&there));
+        prop_assert!((back - there).norm() < 2e-3, "{there} {back}");
+    }
+}
