@@ -26,7 +26,7 @@ pub(crate) struct Hitl {
     #[arg(long, value_name = "DEVICE", required_unless_present = "list")]
     port: Option<String>,
 
-    /// Baud rate of the port; the firmware's is 921600
+    /// Baud rate of the port; the firmware's is 921600, unless its parameter SER_TEL1_BAUD says another
     #[arg(long, value_name = "N", default_value_t = 921_600)]
     baud: u32,
 

@@ -11,12 +11,14 @@ mod json;
 mod log_rate;
 mod page;
 mod paper;
+mod params;
 mod pil;
 mod place;
 mod progress;
 mod replay;
 mod results;
 mod scenarios;
+mod serve;
 mod subject;
 mod suite;
 mod target;
@@ -58,8 +60,10 @@ enum Command {
     Campaigns(campaign::Campaigns),
     Suites(suite::Suites),
     Vehicles(vehicle::Vehicles),
+    Params(params::Params),
     Results(results::Results),
     Replay(replay::Replay),
+    Serve(serve::Serve),
     Pil(pil::Pil),
     Hitl(hitl::Hitl),
 }
@@ -79,8 +83,10 @@ impl Cli {
             Command::Campaigns(campaigns) => campaigns.run(),
             Command::Suites(suites) => suites.run(),
             Command::Vehicles(vehicles) => vehicles.run(),
+            Command::Params(params) => params.run(),
             Command::Results(results) => results.run(),
             Command::Replay(replay) => replay.run(),
+            Command::Serve(serve) => serve.run(),
             Command::Pil(pil) => pil.run(),
             Command::Hitl(hitl) => hitl.run(),
         }

@@ -60,7 +60,7 @@ impl OnVehicle {
 }
 
 /// The vehicle that `path` stands for, checked: a plain name is a built-in one first, then a file.
-fn named(path: &Path) -> Result<Vehicle, FileError> {
+pub(super) fn named(path: &Path) -> Result<Vehicle, FileError> {
     let plain = path.to_str().filter(|text| !text.contains(['/', '\\', '.']));
     let vehicle = match plain {
         Some(name) => match built_in(name) {

@@ -37,6 +37,10 @@ impl Sensing {
         }))
     }
 
+    pub(super) fn instruments_mut(&mut self) -> &mut Instruments {
+        &mut self.instruments
+    }
+
     /// Reads the instruments, and passes what arrives from the aiding ones to `offer`. `at_us` is the vehicle's clock.
     pub(super) fn read(
         &mut self,
@@ -76,6 +80,11 @@ pub(super) fn still(start: &Truth, time_s: f64) -> Truth {
     }
 }
 
+/// Returns the number of steps for which a vehicle stands.
+fn steps(step_s: f64) -> u64 {
+    (STANDS_S / step_s).round() as u64
+}
+
 /// Sensors wired to a vehicle that runs its own estimator.
 pub(super) struct Wired {
     sensing: Sensing,
@@ -98,9 +107,19 @@ impl Wired {
         Ok(Sensing::new(scenario, step_s)?.map(wired))
     }
 
+    /// The sensors of a vehicle that does not stand still before t = 0.
+    pub(super) fn at_once(mut self: Box<Self>) -> Box<Self> {
+        self.looks = steps(self.step_s);
+        self
+    }
+
+    pub(super) fn instruments_mut(&mut self) -> &mut Instruments {
+        self.sensing.instruments_mut()
+    }
+
     /// True if the vehicle still stands before t = 0.
     pub(super) fn stands(&self) -> bool {
-        self.looks < (STANDS_S / self.step_s).round() as u64
+        self.looks < steps(self.step_s)
     }
 
     /// Returns what was read in the last look.

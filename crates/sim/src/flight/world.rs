@@ -7,7 +7,7 @@ use crate::scenario::{Outage, Scenario};
 use crate::trajectory::{Reference, Trajectory};
 use afbc_control::{Action, Estimate, Trace};
 use afbc_onboard::{Aged, Readings};
-use afbc_plant::{Measurement, Motion, Plant, SensorFaults, Sensors, Suite, Telemetry};
+use afbc_plant::{Instruments, Measurement, Motion, Plant, SensorFaults, Sensors, Suite, Telemetry};
 use afbc_types::{OutOfRange, PerAxis, Pose, ROTORS_MAX, RotorSpeeds, State};
 
 /// Plant, sensors, link and reference of a scenario.
@@ -76,6 +76,31 @@ impl World {
     pub fn wired(scenario: &Scenario, dt_s: f64) -> Result<Self, OutOfRange> {
         let wired = Wired::new(scenario, dt_s)?;
         Ok(World { wired, ..World::new(&Scenario { instruments: Suite::default(), ..scenario.clone() }, dt_s)? })
+    }
+
+    /// Creates the [wired](Self::wired) world of a vehicle that is released at once, and stands on the ground by its
+    /// own weight if the scenario has one.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn released(scenario: &Scenario, dt_s: f64) -> Result<Self, OutOfRange> {
+        let world = World::wired(scenario, dt_s)?;
+        Ok(World { wired: world.wired.map(Wired::at_once), ..world })
+    }
+
+    /// Returns the plant.
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// Returns the plant, to change its weather and faults.
+    pub fn plant_mut(&mut self) -> &mut Plant {
+        &mut self.plant
+    }
+
+    /// Returns the instruments of a [wired](Self::wired) world, to let them fail.
+    pub fn instruments_mut(&mut self) -> Option<&mut Instruments> {
+        self.wired.as_deref_mut().map(Wired::instruments_mut)
     }
 
     /// Returns what the instruments of a [wired](Self::wired) world read in the last look.

@@ -161,6 +161,10 @@ impl<A: Autopilot> Line<'_, A> {
             let setpoint = view.reference.setpoint();
             station.lead(Setpoint { position_m: setpoint.position_m + *shift_m, ..setpoint });
         }
+        // Its answer, or the question, may be lost.
+        if *silent_ms > 0 && silent_ms.is_multiple_of(ASK_EVERY_MS) {
+            station.ask_for_rotors();
+        }
         if pace.ping_ms.is_some_and(|ping_ms| now_ms.is_multiple_of(ping_ms)) {
             station.ping();
         }
@@ -182,6 +186,10 @@ impl<A: Autopilot> Line<'_, A> {
     ) -> Result<Option<View>, Error> {
         for waited_ms in 0..within_ms {
             if waited_ms.is_multiple_of(ASK_EVERY_MS) {
+                if command == Command::Arm {
+                    // It follows the setpoints as soon as it is armed.
+                    self.station.follow();
+                }
                 self.station.command(command);
             }
             let view = self.turn(world)?;

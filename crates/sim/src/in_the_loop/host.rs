@@ -2,29 +2,56 @@
 
 use super::{Autopilot, Error};
 use afbc::Profile;
-use afbc_flight_core::Inbox;
 use afbc_flight_core::rate::PERIOD_US;
-use afbc_onboard::{Comms, Configuration, Flight, Readings, Report};
+use afbc_link::{Decoder, Uplink};
+use afbc_onboard::parameters::{Change, Kept, Reason, Table};
+use afbc_onboard::{ArmingLimits, Comms, Configuration, Flight, Link, Mail, Prepared, Readings, Report, Setup};
+use afbc_store::Store;
 use afbc_types::{Airframe, OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_vehicles::Vehicle;
+use embedded_storage::nor_flash::NorFlash;
 
 /// The firmware without its hardware, ticked in lockstep.
 pub struct Host {
     flight: Box<dyn Core>,
+    setup: Setup,
     comms: Comms,
-    inbox: Inbox,
+    mail: Mail,
+    /// What the last tick took of it.
+    taken: Mail,
     readings: Readings,
     time_us: u64,
 }
 
-/// The half that decides, of a vehicle with any number of rotors.
+/// The half that decides, of a vehicle with any number of rotors, and its parameters.
 trait Core {
-    fn tick(&mut self, now_us: u64, inbox: &mut Inbox, readings: &Readings) -> Report<ROTORS_MAX>;
+    fn tick(&mut self, now_us: u64, mail: &mut Mail, readings: &Readings, tell: Tell<'_>) -> Report<ROTORS_MAX>;
+
+    /// Does what stations want of the parameters, and flies what has changed.
+    fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<Change>;
 }
 
-impl<const N: usize> Core for Flight<N> {
-    fn tick(&mut self, now_us: u64, inbox: &mut Inbox, readings: &Readings) -> Report<ROTORS_MAX> {
-        Flight::tick(self, now_us, inbox, readings).padded()
+/// What reports a tick that took so many cycles.
+struct Tell<'a> {
+    comms: &'a mut Comms,
+    cycles: u32,
+    send: &'a mut dyn FnMut(&[u8]),
+}
+
+impl<const N: usize> Core for (Flight<N>, Table<N>) {
+    fn tick(&mut self, now_us: u64, mail: &mut Mail, readings: &Readings, tell: Tell<'_>) -> Report<ROTORS_MAX> {
+        let report = self.0.tick(now_us, mail, readings);
+        tell.comms.report(&report, tell.cycles, tell.send);
+        report.padded()
+    }
+
+    fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<Change> {
+        let (flight, table) = self;
+        let change = comms.parameters(table, send)?;
+        // Disarmed, and each change has been checked.
+        let adopted = Prepared::new(table.configuration()).is_ok_and(|prepared| flight.adopt(&prepared));
+        debug_assert!(adopted, "a change that is not flown");
+        Some(change)
     }
 }
 
@@ -35,6 +62,25 @@ pub struct Tick {
     pub report: Report<ROTORS_MAX>,
     /// Bytes sent over the link.
     pub bytes: Vec<u8>,
+    /// A parameter that has changed, to be kept.
+    pub change: Option<Change>,
+}
+
+/// What the firmware's image for `vehicle` is told of it (`firmware/build.rs`).
+///
+/// # Errors
+/// If it does not have `N` rotors.
+pub fn configuration<const N: usize>(vehicle: &Vehicle) -> Result<Configuration<N>, OutOfRange> {
+    Ok(Configuration {
+        airframe: Airframe::new(&vehicle.parameters, &vehicle.rotors)?,
+        settings: vehicle.settings(Profile::Flight),
+        gains: vehicle.gains(Profile::Flight),
+        curve: vehicle.curve,
+        estimation: vehicle.estimation,
+        arming: ArmingLimits::DEFAULT,
+        guidance: afbc_guidance::Settings::DEFAULT,
+        link: Link::DEFAULT,
+    })
 }
 
 impl Host {
@@ -43,7 +89,7 @@ impl Host {
     /// # Errors
     /// The first parameter out of range; does not occur.
     pub fn new() -> Result<Self, OutOfRange> {
-        Ok(Self::of(Box::new(Flight::new(&Configuration::default())?)))
+        Self::linked(None, Link::DEFAULT)
     }
 
     /// The firmware of this vehicle, powered up, disarmed.
@@ -51,16 +97,76 @@ impl Host {
     /// # Errors
     /// The first parameter out of range; none in fact, for a vehicle is checked when its file is read.
     pub fn for_vehicle(vehicle: &Vehicle) -> Result<Self, OutOfRange> {
-        let (settings, gains) = (vehicle.settings(Profile::Flight), vehicle.gains(Profile::Flight));
-        let (curve, estimation) = (vehicle.curve, vehicle.estimation);
+        Self::linked(Some(vehicle), Link::DEFAULT)
+    }
+
+    /// The firmware of this vehicle, or of the paper's, powered up, with these defaults of the link's parameters.
+    ///
+    /// # Errors
+    /// As of [`for_vehicle`](Self::for_vehicle).
+    pub fn linked(vehicle: Option<&Vehicle>, link: Link) -> Result<Self, OutOfRange> {
+        let Some(vehicle) = vehicle else {
+            return Self::of(Table::new(Configuration { link, ..Configuration::default() }));
+        };
         with_rotors!(vehicle.rotors.len(), N => {
-            let airframe = Airframe::<N>::new(&vehicle.parameters, &vehicle.rotors)?;
-            Ok(Self::of(Box::new(Flight::new(&Configuration { airframe, settings, gains, curve, estimation })?)))
+            Self::of(Table::<N>::new(Configuration { link, ..configuration(vehicle)? }))
         })
     }
 
-    fn of(flight: Box<dyn Core>) -> Self {
-        Host { flight, comms: Comms::new(), inbox: Inbox::default(), readings: Readings::NONE, time_us: 0 }
+    /// The same with the parameters that are in `store`; `notice` is called with a line on each that is not used.
+    /// Without a store that can be read, they are at their defaults.
+    ///
+    /// # Errors
+    /// As of [`for_vehicle`](Self::for_vehicle).
+    pub fn stored<F: NorFlash>(
+        vehicle: Option<&Vehicle>,
+        link: Link,
+        store: &mut Store<F>,
+        mut notice: impl FnMut(&str),
+    ) -> Result<Self, OutOfRange> {
+        let Some(vehicle) = vehicle else {
+            return Self::of(loaded(Configuration { link, ..Configuration::default() }, store, &mut notice));
+        };
+        with_rotors!(vehicle.rotors.len(), N => {
+            Self::of(loaded::<F, N>(Configuration { link, ..configuration(vehicle)? }, store, &mut notice))
+        })
+    }
+
+    fn of<const N: usize>(table: Table<N>) -> Result<Self, OutOfRange> {
+        let setup = Setup::of(&table.configuration().link);
+        let flight = Flight::new(table.configuration())?;
+        Ok(Host {
+            flight: Box::new((flight, table)),
+            setup,
+            comms: Comms::with(setup),
+            mail: Mail::EMPTY,
+            taken: Mail::EMPTY,
+            readings: Readings::NONE,
+            time_us: 0,
+        })
+    }
+
+    /// Returns how its link is set up: at first, by the parameters.
+    pub fn setup(&self) -> Setup {
+        self.setup
+    }
+
+    /// The same firmware, freshly powered up, with this setup of its link.
+    #[must_use]
+    pub fn with(self, setup: Setup) -> Self {
+        Host { setup, comms: Comms::with(setup), ..self }
+    }
+
+    /// Returns the half that communicates.
+    pub fn comms(&mut self) -> &mut Comms {
+        &mut self.comms
+    }
+
+    /// Receives, for the next tick, the next bytes of one of several streams, each with a decoder of its own.
+    pub fn hear(&mut self, decoder: &mut Decoder<Uplink>, bytes: &[u8]) {
+        self.comms.exchange(decoder);
+        self.mail.post(&self.comms.receive(bytes));
+        self.comms.exchange(decoder);
     }
 
     /// Sets what the vehicle's own sensors read for the next tick alone.
@@ -71,18 +177,34 @@ impl Host {
     /// Runs one control tick at `time_us` since power-up, after `uplink` has reached the link. The tick reports a
     /// duration of `cycles` cycles of 168 MHz.
     pub fn tick(&mut self, uplink: &[u8], time_us: u64, cycles: u32) -> Tick {
-        self.inbox.post(&self.comms.receive(uplink));
-        let report = self.flight.tick(time_us, &mut self.inbox.take(), &core::mem::take(&mut self.readings));
+        self.mail.post(&self.comms.receive(uplink));
+        self.mail.take_into(&mut self.taken);
+        let readings = core::mem::take(&mut self.readings);
         let mut bytes = Vec::new();
-        self.comms.report(&report, cycles, |frame| bytes.extend_from_slice(frame));
+        let mut send = |frame: &[u8]| bytes.extend_from_slice(frame);
+        let tell = Tell { comms: &mut self.comms, cycles, send: &mut send };
+        let report = self.flight.tick(time_us, &mut self.taken, &readings, tell);
+        let change = self.flight.parameters(&mut self.comms, &mut send);
         self.time_us = time_us;
-        Tick { report, bytes }
+        Tick { report, bytes, change }
     }
 
     /// Runs the tick a millisecond after the previous one, with a duration of zero.
     pub fn next_tick(&mut self, uplink: &[u8]) -> Tick {
         self.tick(uplink, self.time_us + PERIOD_US, 0)
     }
+}
+
+/// Returns the parameters with what is in `store`.
+fn loaded<F: NorFlash, const N: usize>(
+    image: Configuration<N>,
+    store: &mut Store<F>,
+    notice: &mut impl FnMut(&str),
+) -> Table<N> {
+    let mut table = Table::new(image);
+    let loaded = Kept::NOW.load(&mut table, store, |unused: Reason| notice(unused.as_str()));
+    loaded.unwrap_or_else(|error| notice(error.reason()));
+    table
 }
 
 impl Autopilot for Host {

@@ -29,7 +29,7 @@ pub use autopilot::Autopilot;
 pub use error::Error;
 pub use extremes::Extremes;
 pub use flight::{LoopEnd, check, firmware, fly};
-pub use host::{Host, Tick};
+pub use host::{Host, Tick, configuration};
 pub use log::Log;
 pub use pace::Pace;
 pub use report::tracking;

@@ -80,7 +80,7 @@ mod tests {
             STATE_BYTES
         );
         assert!(length(Uplink::Setpoint(Setpoint::default())) <= SETPOINT_BYTES);
-        assert!(length(Uplink::Command(Command::Other(MavCmd::MAV_CMD_REQUEST_MESSAGE as u16))) <= PING_BYTES);
+        assert!(length(Uplink::Command(Command::Other(MavCmd::MAV_CMD_USER_5 as u16))) <= PING_BYTES);
     }
 
     #[test]

@@ -2,10 +2,12 @@
 
 use super::Extremes;
 use afbc_flight_core::Refusal;
+use afbc_guidance::FlightMode;
 use afbc_link::{
     Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, Health, MavCmd, Sender, Text, Uplink,
 };
 use afbc_onboard::BUSY;
+use afbc_onboard::services::modes;
 use afbc_types::{PoseSigmas, ROTORS_MAX, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 use std::time::Instant;
@@ -13,7 +15,12 @@ use std::time::Instant;
 /// Usual address of a ground station.
 const ADDRESS: Address = Address { system: 255, component: 190 };
 /// An unsupported command, whose answer measures the round trip.
-const PING: u16 = MavCmd::MAV_CMD_REQUEST_MESSAGE as u16;
+const PING: u16 = MavCmd::MAV_CMD_USER_5 as u16;
+
+/// The command whose answer counts.
+const ARM_DISARM: u16 = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16;
+/// HIL_ACTUATOR_CONTROLS, and the time between two, which is that of a tick.
+const ROTORS: Command = Command::SetInterval { message: 93, interval_us: 1_000 };
 
 /// Tracker, commander and ground station.
 pub struct Station {
@@ -54,9 +61,9 @@ impl Default for Station {
 }
 
 impl Station {
-    /// Creates a station that has sent and received nothing.
+    /// Creates a station that has received nothing, and asks for rotor commands.
     pub fn new() -> Self {
-        Station {
+        let mut station = Station {
             sender: Sender::new(ADDRESS),
             uplink: Vec::new(),
             decoder: Decoder::new(ADDRESS),
@@ -64,7 +71,14 @@ impl Station {
             pinged: None,
             pings: 0,
             round_trip_ms: Extremes::default(),
-        }
+        };
+        station.ask_for_rotors();
+        station
+    }
+
+    /// Queues the question for a rotor command after each tick, which the vehicle does not send by itself.
+    pub fn ask_for_rotors(&mut self) {
+        self.say(&Uplink::Command(ROTORS));
     }
 
     /// Queues a message.
@@ -80,6 +94,16 @@ impl Station {
     /// Queues a setpoint.
     pub fn lead(&mut self, setpoint: Setpoint) {
         self.say(&Uplink::Setpoint(setpoint));
+    }
+
+    /// Queues a heartbeat, which tells the vehicle that the station is there.
+    pub fn beat(&mut self) {
+        self.say(&Uplink::Heartbeat);
+    }
+
+    /// Queues the order to follow setpoints, in mode offboard.
+    pub fn follow(&mut self) {
+        self.say(&Uplink::Command(Command::SelectMode(modes::custom(FlightMode::Offboard))));
     }
 
     /// Queues a command, and forgets the previous answer.
@@ -114,7 +138,7 @@ impl Station {
                 }
             }
             Downlink::Position { position_m, .. } => heard.position_m = Some(position_m),
-            Downlink::Answer { answer, .. } => heard.answer = Some(answer),
+            Downlink::Answer { command: ARM_DISARM, answer, .. } => heard.answer = Some(answer),
             Downlink::Health(health) => {
                 if heard.armed {
                     heard.state_age_max_us = heard.state_age_max_us.max(health.state_age_us);

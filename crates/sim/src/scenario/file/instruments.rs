@@ -5,30 +5,6 @@ use afbc_plant::Suite;
 use afbc_plant::instruments::{Barometer, Failure, Gnss, Imu, InstrumentFault, Magnetometer, Preset, Tracker, limits};
 use afbc_reader::{FileError, Table};
 use afbc_types::Declared;
-use nalgebra::Vector3;
-
-/// Every kind of failure; the numbers are read.
-const FAILURES: [Failure; 16] = {
-    let zero = Vector3::new(0.0, 0.0, 0.0);
-    [
-        Failure::ImuStuck,
-        Failure::ImuDead,
-        Failure::ImuNoisy { rates_rad_s: 0.0, specific_force_m_s2: 0.0 },
-        Failure::ImuClipped { rates_rad_s: 0.0, specific_force_m_s2: 0.0 },
-        Failure::ImuBiased { rates_bias_rad_s: zero, force_bias_m_s2: zero },
-        Failure::TrackerLost,
-        Failure::TrackerFrozen,
-        Failure::TrackerJumped { by_m: zero, yaw_rad: 0.0 },
-        Failure::GnssLost,
-        Failure::GnssJumped { by_m: zero },
-        Failure::BarometerLost,
-        Failure::BarometerStuck,
-        Failure::BarometerBlocked,
-        Failure::MagnetometerLost,
-        Failure::MagnetometerStuck,
-        Failure::MagnetometerDisturbed { field_ut: zero },
-    ]
-};
 
 /// Reads the instruments of `table`; none without it.
 pub(super) fn read(table: Option<Table<'_>>) -> Result<Suite, FileError> {
@@ -75,7 +51,7 @@ pub(super) fn faults(root: &mut Table<'_>, suite: &Suite) -> Result<Vec<Instrume
 }
 
 fn fault(mut table: Table<'_>, suite: &Suite) -> Result<InstrumentFault, FileError> {
-    let kind = table.need_choice("failure", &FAILURES, Failure::name)?;
+    let kind = table.need_choice("failure", &Failure::ALL, Failure::name)?;
     let failure = match kind {
         Failure::ImuNoisy { .. } => Failure::ImuNoisy {
             rates_rad_s: table.need_number(&limits::RATES)?,

@@ -1,0 +1,337 @@
+//! Commands in text, one a line, that change weather and faults while vehicles fly.
+
+use afbc_plant::instruments::{Failure, limits as failure};
+use afbc_plant::rotors::limits as rotor;
+use afbc_plant::wind::limits as gust;
+use afbc_plant::{Battery, GUST_SIZE, PAYLOAD_BELOW, PAYLOAD_MASS, Quantity, Turbulence, Wind};
+use afbc_reader::words::{nearest, out_of_range};
+use afbc_types::Range;
+use nalgebra::Vector3;
+use std::str::SplitWhitespace;
+
+/// A line, understood.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// When it is carried out, by the vehicles' clock \[s\]; none: at once.
+    pub at_s: Option<f64>,
+    /// System id of the vehicle that it is for; none: all.
+    pub vehicle: Option<u8>,
+    /// What is to be done.
+    pub command: Command,
+}
+
+/// What is to be done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Command {
+    /// Change weather or faults.
+    Deed(Deed),
+    /// Say how it is.
+    Status,
+    /// Go on by so many milliseconds, where time stands still otherwise.
+    Step(u32),
+    /// Run at so many times real time; 0: as fast as possible.
+    Speed(f64),
+    /// Say what commands there are.
+    Help,
+    /// End.
+    Quit,
+}
+
+/// A change of weather or faults, from now on. Axes are those of the earth frame: north, west, up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Deed {
+    /// Steady wind \[m/s\].
+    Wind(Vector3<f64>),
+    /// Turbulence, or none.
+    Turbulence(Option<Turbulence>),
+    /// A gust that rises, holds and falls.
+    Gust {
+        /// Peak \[m/s\].
+        velocity_m_s: Vector3<f64>,
+        /// Time to the peak \[s\].
+        rise_s: f64,
+        /// Time at the peak \[s\].
+        hold_s: f64,
+    },
+    /// A force on the vehicle.
+    Push {
+        /// Force \[N\].
+        force_n: Vector3<f64>,
+        /// For how long; none: it stays \[s\].
+        seconds: Option<f64>,
+    },
+    /// A parameter of the vehicle changes.
+    Change {
+        /// The parameter.
+        quantity: Quantity,
+        /// Factor on what it was.
+        factor: f64,
+        /// For how long; none: it stays \[s\].
+        seconds: Option<f64>,
+    },
+    /// What it carries now; a mass of 0 drops it.
+    Payload {
+        /// Mass \[kg\].
+        mass_kg: f64,
+        /// Distance below the centre of mass \[m\].
+        below_m: f64,
+    },
+    /// An instrument fails.
+    Fault {
+        /// How.
+        failure: Failure,
+        /// For how long; none: it stays \[s\].
+        seconds: Option<f64>,
+    },
+    /// A rotor has this share of its thrust left.
+    Rotor {
+        /// Its number, from 1.
+        rotor: u8,
+        /// Share of the thrust; 1 repairs it.
+        efficiency: f64,
+    },
+    /// The battery has this share of its charge.
+    Battery(f64),
+    /// No faults; weather and load are the scenario's.
+    Clear,
+}
+
+/// What each command is called, what follows it, and what it does.
+pub const COMMANDS: [[&str; 3]; 16] = [
+    ["wind", "X Y Z", "steady wind [m/s], towards north, west, up"],
+    ["turbulence", "none|light|moderate|severe", "turbulence of the wind"],
+    ["gust", "X Y Z [RISE [HOLD]]", "a gust with this peak [m/s], rising for 1 s, there for 2 s"],
+    ["push", "X Y Z [SECONDS]", "a force on the vehicle [N]"],
+    ["payload", "KG [BELOW]", "what it carries now; 0 drops it; metres below its centre of mass"],
+    ["change", "QUANTITY FACTOR [SECONDS]", "mass, inertia, thrust-factor, drag-factor, roll-moment, ..."],
+    [
+        "fault",
+        "INSTRUMENT FAILURE [NUMBERS] [SECONDS]",
+        "gnss lost, imu dead, tracker frozen 3, gnss jumped 5 0 0, ...",
+    ],
+    ["rotor", "NUMBER SHARE", "share of the thrust that a rotor has left; 1 repairs it"],
+    ["battery", "SHARE", "charge of the battery, 0 to 1"],
+    ["clear", "", "no faults; weather and load as the scenario has them"],
+    ["status", "", "where each vehicle is and what it suffers"],
+    ["speed", "FACTOR", "times real time; 0: as fast as possible"],
+    ["step", "MILLISECONDS", "go on by so much, if started with --lockstep"],
+    ["help", "", "this"],
+    ["quit", "", "end"],
+    ["at", "SECONDS COMMAND", "a command later, by the vehicles' clock; `vehicle N COMMAND`: for one of them"],
+];
+
+/// Accepted times \[s\].
+const AT: Range = Range::new("at", 0.0, 1e6);
+const SECONDS: Range = Range::new("seconds", 0.0, 1e6);
+/// Accepted factor on time.
+const SPEED: Range = Range::new("speed", 0.0, 1000.0);
+/// Accepted factors on a parameter and on a moment.
+const FACTOR: Range = Range::new("factor", 0.01, 100.0);
+const MOMENT_FACTOR: Range = Range::new("factor", -10.0, 10.0);
+/// Most milliseconds of one command: an hour.
+const STEP_MAX: u32 = 3_600_000;
+/// A gust, unless said otherwise \[s\].
+const RISE_S: f64 = 1.0;
+const HOLD_S: f64 = 2.0;
+
+const QUANTITIES: [(&str, Quantity); 7] = [
+    ("mass", Quantity::Mass),
+    ("inertia", Quantity::Inertia),
+    ("thrust-factor", Quantity::ThrustFactor),
+    ("drag-factor", Quantity::DragFactor),
+    ("roll-moment", Quantity::RollMoment),
+    ("pitch-moment", Quantity::PitchMoment),
+    ("yaw-moment", Quantity::YawMoment),
+];
+
+const TURBULENCE: [(&str, Option<Turbulence>); 4] = [
+    ("none", None),
+    ("light", Some(Turbulence::LIGHT)),
+    ("moderate", Some(Turbulence::MODERATE)),
+    ("severe", Some(Turbulence::SEVERE)),
+];
+
+/// Reads a line; none if it is empty or a comment.
+///
+/// # Errors
+/// One line on what is wrong with it.
+pub fn parse(text: &str) -> Result<Option<Line>, String> {
+    let text = text.split('#').next().unwrap_or_default();
+    let mut words = Words { command: "", rest: text.split_whitespace() };
+    let (mut at_s, mut vehicle) = (None, None);
+    loop {
+        let Some(word) = words.rest.next() else {
+            return if at_s.is_none() && vehicle.is_none() { Ok(None) } else { Err("a command is missing".into()) };
+        };
+        words.command = word;
+        match word {
+            "at" if at_s.is_some() => return Err("at: a second time".into()),
+            "vehicle" if vehicle.is_some() => return Err("vehicle: a second one".into()),
+            "at" => at_s = Some(words.number(&AT)?),
+            "vehicle" => vehicle = Some(words.whole("a system id", u8::MAX.into())? as u8),
+            _ => {
+                let command = command(word, &mut words)?;
+                words.finish()?;
+                return Ok(Some(Line { at_s, vehicle, command }));
+            }
+        }
+    }
+}
+
+fn command(word: &str, words: &mut Words<'_>) -> Result<Command, String> {
+    Ok(match word {
+        "status" => Command::Status,
+        "help" => Command::Help,
+        "quit" => Command::Quit,
+        "step" => Command::Step(words.whole("milliseconds", STEP_MAX)?),
+        "speed" => Command::Speed(words.number(&SPEED)?),
+        _ => Command::Deed(deed(word, words)?),
+    })
+}
+
+fn deed(word: &str, words: &mut Words<'_>) -> Result<Deed, String> {
+    Ok(match word {
+        "wind" => Deed::Wind(words.vector(&Wind::STEADY.range)?),
+        "turbulence" => Deed::Turbulence(words.choice(&TURBULENCE)?),
+        "gust" => Deed::Gust {
+            velocity_m_s: words.vector(&gust::GUST)?,
+            rise_s: words.optional(&gust::RISE)?.unwrap_or(RISE_S),
+            hold_s: words.optional(&Range { max: SECONDS.max, ..gust::HOLD })?.unwrap_or(HOLD_S),
+        },
+        "push" => Deed::Push {
+            force_n: words.vector(&Range { name: "push", ..GUST_SIZE })?,
+            seconds: words.optional(&SECONDS)?,
+        },
+        "payload" => Deed::Payload {
+            mass_kg: words.number(&PAYLOAD_MASS)?,
+            below_m: words.optional(&PAYLOAD_BELOW)?.unwrap_or(0.0),
+        },
+        "change" => {
+            let quantity = words.choice(&QUANTITIES)?;
+            let is_moment = matches!(quantity, Quantity::RollMoment | Quantity::PitchMoment | Quantity::YawMoment);
+            let factor = words.number(if is_moment { &MOMENT_FACTOR } else { &FACTOR })?;
+            Deed::Change { quantity, factor, seconds: words.optional(&SECONDS)? }
+        }
+        "fault" => Deed::Fault { failure: fault(words)?, seconds: words.optional(&SECONDS)? },
+        "rotor" => Deed::Rotor {
+            rotor: words.whole("the number of a rotor", rotor::ROTOR.max as u32)? as u8,
+            efficiency: words.number(&rotor::EFFICIENCY)?,
+        },
+        "battery" => Deed::Battery(words.number(&Battery::CHARGE.range)?),
+        "clear" => Deed::Clear,
+        _ => {
+            let cure = match nearest(word, COMMANDS.iter().map(|[name, ..]| *name)) {
+                Some(known) => format!("did you mean {known}?"),
+                None => "help lists the commands".into(),
+            };
+            return Err(format!("{}: no such command; {cure}", shown(word)));
+        }
+    })
+}
+
+/// Reads how an instrument fails, as `gnss jumped 5 0 0`.
+fn fault(words: &mut Words<'_>) -> Result<Failure, String> {
+    let instrument = words.word("an instrument, as in: fault gnss lost")?;
+    let of = |failure: &&Failure| failure.name().split_once('-').is_some_and(|(of, _)| of == instrument);
+    let known: Vec<Failure> = Failure::ALL.iter().filter(of).copied().collect();
+    if known.is_empty() {
+        let wanted = "it must be imu, tracker, gnss, barometer or magnetometer";
+        return Err(format!("fault: {} is no instrument; {wanted}", shown(instrument)));
+    }
+    let kind = |failure: Failure| failure.name().split_once('-').map_or("", |(_, kind)| kind);
+    let kinds = known.iter().map(|failure| kind(*failure)).collect::<Vec<_>>().join(", ");
+    let how = words.word(&format!("what is wrong with the {instrument}: {kinds}"))?;
+    let Some(failure) = known.iter().find(|failure| kind(**failure) == how) else {
+        return Err(format!("fault {instrument}: {} is none of {kinds}", shown(how)));
+    };
+    Ok(match failure {
+        Failure::ImuNoisy { .. } => Failure::ImuNoisy {
+            rates_rad_s: words.number(&failure::RATES)?,
+            specific_force_m_s2: words.number(&failure::FORCE)?,
+        },
+        Failure::ImuClipped { .. } => Failure::ImuClipped {
+            rates_rad_s: words.number(&failure::RATES)?,
+            specific_force_m_s2: words.number(&failure::FORCE)?,
+        },
+        Failure::ImuBiased { .. } => Failure::ImuBiased {
+            rates_bias_rad_s: words.vector(&failure::RATES_BIAS)?,
+            force_bias_m_s2: words.vector(&failure::FORCE_BIAS)?,
+        },
+        Failure::TrackerJumped { .. } => {
+            Failure::TrackerJumped { by_m: words.vector(&failure::JUMP)?, yaw_rad: words.number(&failure::YAW)? }
+        }
+        Failure::GnssJumped { .. } => Failure::GnssJumped { by_m: words.vector(&failure::JUMP)? },
+        Failure::MagnetometerDisturbed { .. } => {
+            Failure::MagnetometerDisturbed { field_ut: words.vector(&failure::FIELD)? }
+        }
+        plain => *plain,
+    })
+}
+
+/// What follows the name of a command.
+struct Words<'a> {
+    command: &'a str,
+    rest: SplitWhitespace<'a>,
+}
+
+impl<'a> Words<'a> {
+    fn word(&mut self, wanted: &str) -> Result<&'a str, String> {
+        self.rest.next().ok_or_else(|| format!("{}: it needs {wanted}", self.usage()))
+    }
+
+    fn number(&mut self, range: &Range) -> Result<f64, String> {
+        match self.optional(range)? {
+            Some(number) => Ok(number),
+            None => Err(format!("{}: {} is missing", self.usage(), range.name)),
+        }
+    }
+
+    fn optional(&mut self, range: &Range) -> Result<Option<f64>, String> {
+        let Some(word) = self.rest.next() else { return Ok(None) };
+        let number = word.parse().map_err(|_| format!("{}: {} is no number", self.usage(), shown(word)))?;
+        range.check(number).map_err(|error| format!("{}: {}", self.command, out_of_range(&error)))?;
+        Ok(Some(number))
+    }
+
+    fn vector(&mut self, range: &Range) -> Result<Vector3<f64>, String> {
+        let mut next = || match self.optional(range)? {
+            Some(number) => Ok(number),
+            None => Err(format!("{}: it needs three numbers", self.usage())),
+        };
+        Ok(Vector3::new(next()?, next()?, next()?))
+    }
+
+    fn whole(&mut self, wanted: &str, max: u32) -> Result<u32, String> {
+        let word = self.word(wanted)?;
+        let number = word.parse().ok().filter(|number| (1..=max).contains(number));
+        number.ok_or_else(|| format!("{}: {} is not {wanted}, 1 to {max}", self.command, shown(word)))
+    }
+
+    fn choice<T: Copy>(&mut self, options: &[(&'static str, T)]) -> Result<T, String> {
+        let names: Vec<&str> = options.iter().map(|(name, _)| *name).collect();
+        let wanted = format!("one of {}", names.join(", "));
+        let word = self.word(&wanted)?;
+        let found = options.iter().find(|(name, _)| *name == word);
+        found.map(|(_, option)| *option).ok_or_else(|| format!("{}: {} is not {wanted}", self.command, shown(word)))
+    }
+
+    fn finish(&mut self) -> Result<(), String> {
+        match self.rest.next() {
+            Some(word) => Err(format!("{}: {} is too much", self.usage(), shown(word))),
+            None => Ok(()),
+        }
+    }
+
+    /// Returns the command as it is to be written.
+    fn usage(&self) -> String {
+        let known = COMMANDS.iter().find(|[name, ..]| *name == self.command);
+        known.map_or(self.command.into(), |[name, arguments, _]| format!("{name} {arguments}").trim_end().into())
+    }
+}
+
+/// Returns a word as an error shows it: short, without control characters.
+fn shown(word: &str) -> String {
+    const LONGEST: usize = 40;
+    let start: String = word.chars().take(LONGEST).flat_map(char::escape_default).collect();
+    if word.chars().count() > LONGEST { format!("\"{start}...\"") } else { format!("\"{start}\"") }
+}

@@ -1,0 +1,39 @@
+//! What a newcomer is told: how to connect.
+
+use crate::ports::Addresses;
+use crate::systems::listed;
+use std::net::SocketAddr;
+
+/// Returns how to connect each client to the first of the vehicles with these system ids, whose ports are `open`.
+pub fn guide(addresses: &Addresses, open: &[(SocketAddr, Option<SocketAddr>)], systems: &[u8]) -> String {
+    let count = systems.len();
+    let what = if count > 1 { "vehicles, system ids" } else { "vehicle, system id" };
+    let mut text = format!("{count} {what} {}. Connect by\n", listed(systems));
+    let mut add = |client: &str, how: String| text += &format!("  {client:<16}{how}\n");
+    if let Some(companion) = addresses.companions.first() {
+        let port = companion.port();
+        add("MAVSDK-Python", format!("await System().connect(\"udpin://0.0.0.0:{port}\")"));
+    }
+    if let Some(station) = addresses.stations.first() {
+        let port = station.port();
+        add("QGroundControl", format!("connects by itself (UDP port {port})"));
+        add("MAVProxy", format!("mavproxy.py --master=udpin:0.0.0.0:{port}"));
+        add("pymavlink", format!("mavutil.mavlink_connection(\"udpin:0.0.0.0:{port}\")"));
+    }
+    if let Some((udp, tcp)) = open.first() {
+        add("any, by UDP", format!("send to udpout:{}:{}, the vehicle's own port", reachable(udp), udp.port()));
+        if let Some(tcp) = tcp {
+            add("any, by TCP", format!("tcp:{}:{}", reachable(tcp), tcp.port()));
+        }
+    }
+    if count > 1 {
+        text += "Each further vehicle: MAVSDK's port and its own UDP port 1 higher, its TCP port 10 higher.\n";
+    }
+    text += "Lines typed here change weather and faults: wind 5 0 0, fault gnss lost, status, help, quit.\n";
+    text
+}
+
+/// Returns an address that a client on this machine can reach.
+fn reachable(address: &SocketAddr) -> String {
+    if address.ip().is_unspecified() { "127.0.0.1".into() } else { address.ip().to_string() }
+}

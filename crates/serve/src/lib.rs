@@ -1,0 +1,37 @@
+//! The vehicle as a server: the firmware's code on the simulated plant and its instruments, for the ground stations and
+//! companion computers of other projects.
+//!
+//! # Reading order
+//!
+//! 1. [`Vehicle`]: one vehicle in its world, which stands on the ground until somebody flies it by MAVLink. Bytes in,
+//!    bytes out, a millisecond at a time.
+//! 2. [`Server`]: several vehicles, and [commands](command) that change weather and faults while they fly. Neither has
+//!    a clock or a socket: the same lines and bytes at the same milliseconds give the same bytes.
+//! 3. [`Ports`]: their UDP and TCP ports. [`Pace`]: real time. [`run`]: all of it together.
+#![forbid(unsafe_code)]
+
+pub mod command;
+mod frames;
+mod guide;
+mod kept;
+mod outside;
+mod pace;
+mod peer;
+mod ports;
+mod run;
+mod scene;
+mod server;
+mod stand;
+mod systems;
+mod tcp;
+mod udp;
+mod vehicle;
+
+pub use guide::guide;
+pub use kept::Keeper;
+pub use pace::{BEHIND_MAX, Pace, Wait};
+pub use ports::{Addresses, Ports};
+pub use run::{End, Lines, Rate, run};
+pub use server::{Reply, Server, Then};
+pub use stand::{VEHICLES_MAX, fleet};
+pub use vehicle::Vehicle;

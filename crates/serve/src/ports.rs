@@ -1,0 +1,143 @@
+//! UDP and TCP ports of all vehicles.
+
+use crate::peer::Event;
+use crate::server::Server;
+use crate::tcp::Tcp;
+use crate::udp::Udp;
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::time::Duration;
+
+/// Distance between the TCP ports of two vehicles, as ArduPilot's.
+const TCP_STEP: u16 = 10;
+
+/// Where vehicles are found. Ports are those of the first vehicle.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Addresses {
+    /// Address of this machine that the ports belong to.
+    pub bind: IpAddr,
+    /// UDP port of the vehicle, counted up; 0: any free one.
+    pub udp: u16,
+    /// Where stations listen, the same for all vehicles.
+    pub stations: Vec<SocketAddr>,
+    /// Where companion computers listen, ports counted up.
+    pub companions: Vec<SocketAddr>,
+    /// TCP port of the vehicle, if any, counted up by 10; 0: any free one.
+    pub tcp: Option<u16>,
+}
+
+impl Default for Addresses {
+    /// Loopback, at the ports of PX4's simulation.
+    fn default() -> Self {
+        let loopback = IpAddr::V4(Ipv4Addr::LOCALHOST);
+        Addresses {
+            bind: loopback,
+            udp: 18_570,
+            stations: vec![(loopback, 14_550).into()],
+            companions: vec![(loopback, 14_540).into()],
+            tcp: None,
+        }
+    }
+}
+
+/// The ports of all vehicles.
+pub struct Ports {
+    vehicles: Vec<(Udp, Option<Tcp>)>,
+    /// Number of the next peer.
+    next: u32,
+}
+
+impl Ports {
+    /// Opens the ports of so many vehicles.
+    ///
+    /// # Errors
+    /// One line that names the port and the cure.
+    pub fn open(addresses: &Addresses, vehicles: usize) -> Result<Self, String> {
+        let Addresses { bind, stations, companions, .. } = addresses;
+        let open = |place: usize| {
+            let udp = counted(addresses.udp, place, 1)?;
+            let companions = companions
+                .iter()
+                .map(|companion| Ok(SocketAddr::new(companion.ip(), counted(companion.port(), place, 1)?)));
+            let companions = companions.collect::<Result<Vec<_>, String>>()?;
+            let standing = stations.iter().copied().chain(companions).collect();
+            let udp = Udp::open(*bind, udp, standing).map_err(|error| taken("UDP", *bind, udp, "--port", &error))?;
+            let tcp = match addresses.tcp {
+                Some(tcp) => {
+                    let port = counted(tcp, place, TCP_STEP)?;
+                    Some(Tcp::open(*bind, port).map_err(|error| taken("TCP", *bind, port, "--tcp", &error))?)
+                }
+                None => None,
+            };
+            Ok((udp, tcp))
+        };
+        Ok(Ports { vehicles: (0..vehicles).map(open).collect::<Result<_, String>>()?, next: 0 })
+    }
+
+    /// Returns the UDP address of each vehicle, and the TCP address if it has one.
+    ///
+    /// # Errors
+    /// The system's; none in fact.
+    pub fn addresses(&self) -> io::Result<Vec<(SocketAddr, Option<SocketAddr>)>> {
+        let of = |(udp, tcp): &(Udp, Option<Tcp>)| Ok((udp.address()?, tcp.as_ref().map(Tcp::address).transpose()?));
+        self.vehicles.iter().map(of).collect()
+    }
+
+    /// Hands to `server` what has arrived by `now`, and tells of peers that come and go.
+    pub fn receive(&mut self, server: &mut Server, now: Duration, mut tell: impl FnMut(&str)) {
+        let Ports { vehicles, next } = self;
+        let mut number = || {
+            *next = next.wrapping_add(1);
+            *next
+        };
+        for (place, (udp, tcp)) in vehicles.iter_mut().enumerate() {
+            let system = server.vehicles().get(place).map_or(0, |vehicle| vehicle.system());
+            let now_s = server.now_s();
+            let mut on = |event: Event<'_>, wire: &str| match event {
+                Event::New(from) => tell(&format!("{now_s:.3} vehicle {system}: {wire} {from} connected")),
+                Event::Sent(peer, bytes) => server.hear(place, peer, bytes),
+                Event::Gone(from, peer) => {
+                    tell(&format!("{now_s:.3} vehicle {system}: {wire} {from} gone"));
+                    server.forget(place, peer);
+                }
+            };
+            udp.receive(now, &mut number, |event| on(event, "udp"));
+            if let Some(tcp) = tcp {
+                tcp.receive(&mut number, |event| on(event, "tcp"));
+            }
+        }
+    }
+
+    /// Sends `bytes` of the vehicle at this place to all its peers.
+    pub fn send(&mut self, vehicle: usize, bytes: &[u8]) {
+        if let Some((udp, tcp)) = self.vehicles.get_mut(vehicle) {
+            udp.send(bytes);
+            tcp.iter_mut().for_each(|tcp| tcp.send(bytes));
+        }
+    }
+}
+
+/// Returns the port of the vehicle at this place; any free one stays so.
+fn counted(first: u16, place: usize, step: u16) -> Result<u16, String> {
+    let port = u16::try_from(place).ok().and_then(|place| place.checked_mul(step)?.checked_add(first));
+    match port {
+        _ if first == 0 => Ok(0),
+        Some(port) => Ok(port),
+        None => Err(format!("ports from {first} on are not enough for {} vehicles; begin lower", place + 1)),
+    }
+}
+
+/// Tells why a port cannot be opened.
+fn taken(protocol: &str, address: IpAddr, port: u16, option: &str, error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::AddrInUse => format!(
+            "{protocol} port {port} of {address} is taken, perhaps by another sitl serve; end that, or choose another \
+             by {option}, as in {option} {}, or {option} 0 for any free one",
+            port.saturating_add(100)
+        ),
+        io::ErrorKind::AddrNotAvailable => {
+            format!("{address} is no address of this machine; take one that `ip address` lists, or --bind 0.0.0.0")
+        }
+        _ => format!("{protocol} port {port} of {address} cannot be opened ({error}); choose another by {option}"),
+    }
+}

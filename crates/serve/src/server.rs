@@ -1,0 +1,203 @@
+//! Several vehicles, and commands for them.
+
+use crate::Keeper;
+use crate::command::{COMMANDS, Command, Deed, Line, parse};
+use crate::systems::listed;
+use crate::vehicle::Vehicle;
+use afbc_sim::scenario::Scenario;
+use afbc_types::OutOfRange;
+
+/// The vehicles, on one clock, which begins when they are powered up.
+pub struct Server {
+    vehicles: Vec<Vehicle>,
+    /// Milliseconds since the start.
+    now_ms: u64,
+    /// Lines to come, in the order of their times, then of their arrival.
+    agenda: Vec<(u64, Line, String)>,
+}
+
+/// Answer to a line.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Reply {
+    /// Lines; the last one begins with `ok` or `error`. None for an empty line.
+    pub lines: Vec<String>,
+    /// What is left to do by whoever runs the server.
+    pub then: Then,
+}
+
+/// What is left to do by whoever runs the server.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Then {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// So many steps, and then the answer.
+    Step(u32),
+    /// To run at this speed.
+    Speed(f64),
+    /// To end.
+    Quit,
+}
+
+impl Server {
+    /// Powers up a vehicle for each of `scenarios`, with system ids counted up from `first`, unless parameters say
+    /// others.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub fn new(scenarios: &[Scenario], first: u8) -> Result<Self, OutOfRange> {
+        let vehicles = scenarios.iter().zip(first..).map(|(scenario, system)| Vehicle::new(scenario, system, None));
+        Ok(Server { vehicles: vehicles.collect::<Result<_, _>>()?, now_ms: 0, agenda: Vec::new() })
+    }
+
+    /// As [`new`](Self::new), with a store for the parameters of each vehicle.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub fn kept(scenarios: &[Scenario], first: u8, keepers: Vec<Keeper>) -> Result<Self, OutOfRange> {
+        let vehicles = scenarios.iter().zip(first..).zip(keepers);
+        let vehicles = vehicles.map(|((scenario, system), keeper)| Vehicle::new(scenario, system, Some(keeper)));
+        Ok(Server { vehicles: vehicles.collect::<Result<_, _>>()?, now_ms: 0, agenda: Vec::new() })
+    }
+
+    /// Returns the time since the start \[s\].
+    pub fn now_s(&self) -> f64 {
+        self.now_ms as f64 / 1e3
+    }
+
+    /// Returns the vehicles' system ids.
+    pub fn systems(&self) -> Vec<u8> {
+        self.vehicles.iter().map(Vehicle::system).collect()
+    }
+
+    /// Returns a system id that several vehicles have: no station can tell them apart.
+    pub fn ambiguous(&self) -> Option<u8> {
+        let mut systems = self.systems();
+        systems.sort_unstable();
+        systems.windows(2).find_map(|pair| (pair.first() == pair.last()).then(|| pair.first().copied())?)
+    }
+
+    /// Returns the vehicles.
+    pub fn vehicles(&self) -> &[Vehicle] {
+        &self.vehicles
+    }
+
+    /// Receives, for the next step, what `peer` of the vehicle at this place has sent.
+    pub fn hear(&mut self, vehicle: usize, peer: u32, bytes: &[u8]) {
+        self.vehicles.get_mut(vehicle).into_iter().for_each(|it| it.hear(peer, bytes));
+    }
+
+    /// Forgets what is left of a peer that is gone.
+    pub fn forget(&mut self, vehicle: usize, peer: u32) {
+        self.vehicles.get_mut(vehicle).into_iter().for_each(|it| it.forget(peer));
+    }
+
+    /// Runs a millisecond. Passes to `send` what each vehicle has sent, whole frames, by its place, and to `tell` what
+    /// is worth telling, a line each.
+    pub fn step(&mut self, mut send: impl FnMut(usize, &[u8]), mut tell: impl FnMut(&str)) -> Then {
+        let then = self.turn_to_agenda(&mut tell);
+        let (now_s, mut changed) = (self.now_s(), false);
+        for (place, vehicle) in self.vehicles.iter_mut().enumerate() {
+            let system = vehicle.system();
+            let bytes = vehicle.step(|text| tell(&format!("{now_s:.3} vehicle {system}: {text}")));
+            send(place, &bytes);
+            changed |= vehicle.system() != system;
+        }
+        if let Some(system) = self.ambiguous().filter(|_| changed) {
+            tell(&format!("{now_s:.3} several vehicles have the system id {system}: set MAV_SYS_ID of one of them"));
+        }
+        self.now_ms += 1;
+        then
+    }
+
+    /// Carries out what is due.
+    fn turn_to_agenda(&mut self, tell: &mut impl FnMut(&str)) -> Then {
+        let mut then = Then::Nothing;
+        let due = self.agenda.partition_point(|(at_ms, ..)| *at_ms <= self.now_ms);
+        for (_, line, text) in self.agenda.drain(..due).collect::<Vec<_>>() {
+            let reply = self.carry_out(&line, &text);
+            let now_s = self.now_s();
+            reply.lines.iter().for_each(|text| tell(&format!("{now_s:.3} {text}")));
+            if reply.then != Then::Nothing {
+                then = reply.then;
+            }
+        }
+        then
+    }
+
+    /// Takes a line of the [text protocol](crate::command); returns its answer.
+    pub fn line(&mut self, text: &str) -> Reply {
+        let line = match parse(text) {
+            Ok(None) => return Reply::default(),
+            Ok(Some(line)) => line,
+            Err(problem) => return Reply::refused(&problem),
+        };
+        if let Some(refused) = self.refused(&line) {
+            return Reply::refused(&refused);
+        }
+        let Some(at_s) = line.at_s else { return self.carry_out(&line, text.trim()) };
+        let at_ms = (at_s * 1e3).round() as u64;
+        let place = self.agenda.partition_point(|(earlier_ms, ..)| *earlier_ms <= at_ms);
+        self.agenda.insert(place, (at_ms, line, text.trim().into()));
+        Reply::accepted(text.trim())
+    }
+
+    /// Returns why a line cannot be carried out at any time, if so.
+    fn refused(&self, line: &Line) -> Option<String> {
+        let known = |system: u8| self.vehicles.iter().any(|vehicle| vehicle.system() == system);
+        match line {
+            Line { vehicle: Some(system), .. } if !known(*system) => {
+                Some(format!("there is no vehicle {system}; they are {}", listed(&self.systems())))
+            }
+            Line { at_s: Some(_), command: Command::Step(_), .. } => Some("step cannot be put off".into()),
+            Line { at_s: Some(at_s), .. } if *at_s < self.now_s() => {
+                Some(format!("{at_s} s are over; it is {:.3} s", self.now_s()))
+            }
+            _ => None,
+        }
+    }
+
+    fn carry_out(&mut self, line: &Line, text: &str) -> Reply {
+        match &line.command {
+            Command::Deed(deed) => match self.suffer(line.vehicle, deed) {
+                Ok(()) => Reply::accepted(text),
+                Err(problem) => Reply::refused(&problem),
+            },
+            Command::Status => {
+                let wanted = |vehicle: &&Vehicle| line.vehicle.is_none_or(|system| vehicle.system() == system);
+                let lines = self.vehicles.iter().filter(wanted).map(Vehicle::status);
+                Reply::told(lines.collect(), &format!("{text}, {:.3} s", self.now_s()))
+            }
+            Command::Help => {
+                let lines = COMMANDS
+                    .iter()
+                    .map(|[name, arguments, meaning]| format!("{:<46} {meaning}", format!("{name} {arguments}")));
+                Reply::told(lines.collect(), text)
+            }
+            Command::Step(steps) => Reply { then: Then::Step(*steps), ..Reply::accepted(text) },
+            Command::Speed(speed) => Reply { then: Then::Speed(*speed), ..Reply::accepted(text) },
+            Command::Quit => Reply { then: Then::Quit, ..Reply::accepted(text) },
+        }
+    }
+
+    /// Changes weather or faults of one vehicle or all.
+    fn suffer(&mut self, system: Option<u8>, deed: &Deed) -> Result<(), String> {
+        let mut wanted = self.vehicles.iter_mut().filter(|vehicle| system.is_none_or(|it| vehicle.system() == it));
+        wanted.try_for_each(|vehicle| vehicle.suffer(deed))
+    }
+}
+
+impl Reply {
+    fn accepted(what: &str) -> Self {
+        Self::told(Vec::new(), what)
+    }
+
+    fn told(mut lines: Vec<String>, what: &str) -> Self {
+        lines.push(format!("ok {what}"));
+        Reply { lines, then: Then::Nothing }
+    }
+
+    fn refused(problem: &str) -> Self {
+        Reply { lines: vec![format!("error {problem}")], then: Then::Nothing }
+    }
+}

@@ -1,0 +1,62 @@
+//! Scenarios made fit for a vehicle that stands on the ground until it is flown.
+
+use afbc_plant::{Motion, Realism, Rotors, Start};
+use afbc_reader::FileError;
+use afbc_reader::words::out_of_range;
+use afbc_sim::in_the_loop;
+use afbc_sim::scenario::Scenario;
+use nalgebra::Vector3;
+
+/// Largest number of vehicles: MAVLink has 255 system ids, of which stations take those at the end.
+pub const VEHICLES_MAX: u8 = 100;
+/// Distance between two vehicles at the start, to the east \[m\].
+const APART_M: f64 = 3.0;
+/// Name of the vehicle whose ground, air and battery fill what a scenario leaves out.
+const PAPER: &str = "paper";
+
+/// Returns the scenarios of so many vehicles, side by side on the ground. Trajectory, duration and initial motion of
+/// `scenario` have no effect, except place and heading.
+///
+/// # Errors
+/// One line on what the firmware cannot fly, or what is out of range.
+pub fn fleet(scenario: &Scenario, vehicles: u8) -> Result<Vec<Scenario>, FileError> {
+    let refused = |problem: String| FileError::whole(&scenario.name, problem);
+    in_the_loop::check(scenario).map_err(|error| refused(error.to_string()))?;
+    if scenario.instruments.imu.is_none() {
+        let cure = "add [instruments] with an imu, or take the scenarios outdoor or mocap";
+        return Err(refused(format!("the vehicle has no sensors to fly on; {cure}")));
+    }
+    let standing = standing(scenario)?;
+    let all = (0..vehicles.min(VEHICLES_MAX)).map(|number| {
+        let mut scenario = standing.clone();
+        scenario.initial.position_m.y -= APART_M * f64::from(number);
+        scenario.seed += u64::from(number);
+        scenario
+    });
+    let all: Vec<Scenario> = all.collect();
+    all.iter().try_for_each(Scenario::check).map_err(|error| refused(out_of_range(&error)))?;
+    Ok(all)
+}
+
+/// Puts the vehicle of `scenario` on the ground, with air and a battery.
+fn standing(scenario: &Scenario) -> Result<Scenario, FileError> {
+    let mut scenario = scenario.clone();
+    let paper = match afbc_vehicles::built_in(PAPER) {
+        Some(paper) => paper.read()?.realism,
+        None => Realism::default(),
+    };
+    let Realism { rotors, drag, contact, ground_effect, .. } = scenario.realism;
+    // Motors that are off stand still, also those that idle quicker in flight.
+    let rotors =
+        Rotors { start: Start::Idle, min_rad_s: 0.0, battery: rotors.battery.or(paper.rotors.battery), ..rotors };
+    let contact = contact.or(paper.contact);
+    scenario.realism = Realism { rotors, drag: drag.or(paper.drag), contact, ground_effect, ..scenario.realism };
+    let height_m = contact.map_or(0.0, |contact| contact.foot_depth_m - contact.sink_m);
+    let Motion { position_m, attitude_rad, .. } = scenario.initial;
+    scenario.initial = Motion {
+        position_m: Vector3::new(position_m.x, position_m.y, height_m),
+        attitude_rad: Vector3::new(0.0, 0.0, attitude_rad.z),
+        ..Motion::default()
+    };
+    Ok(scenario)
+}

@@ -1,0 +1,11 @@
+//! System ids in words.
+
+/// Returns system ids in words: the first and the last if they are counted up.
+pub(crate) fn listed(systems: &[u8]) -> String {
+    match systems {
+        [first, .., last] if systems.is_sorted_by(|one, next| u16::from(*one) + 1 == u16::from(*next)) => {
+            format!("{first} to {last}")
+        }
+        _ => systems.iter().map(u8::to_string).collect::<Vec<_>>().join(", "),
+    }
+}

@@ -1,0 +1,204 @@
+//! One vehicle in its world.
+
+use crate::Keeper;
+use crate::command::Deed;
+use crate::frames::frames;
+use crate::outside::Outside;
+use crate::scene::Scene;
+use afbc_flight_core::Mode;
+use afbc_link::{Address, Decoder, Uplink};
+use afbc_onboard::{Link, Setup};
+use afbc_reader::words::out_of_range;
+use afbc_sim::flight::World;
+use afbc_sim::in_the_loop::{Host, Tick};
+use afbc_sim::scenario::Scenario;
+use afbc_types::OutOfRange;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// Component of the vehicle: autopilot.
+const AUTOPILOT: u8 = 1;
+/// What its link carries: loopback has no limit, clients have.
+const BYTES_PER_S: u32 = 100_000;
+/// Time of a step \[s\].
+const STEP_S: f64 = 0.001;
+
+/// The firmware's code on the plant, with its instruments.
+pub struct Vehicle {
+    /// Defaults of the link's parameters.
+    link: Link,
+    address: Address,
+    host: Host,
+    world: World,
+    scene: Scene,
+    /// A decoder for each peer: no stream's bytes complete a frame of another's.
+    peers: BTreeMap<u32, Decoder<Uplink>>,
+    mode: Mode,
+    outside: Outside,
+    scenario: Scenario,
+    keeper: Option<Keeper>,
+    /// What is to be told of the parameters that were stored.
+    notices: Vec<String>,
+}
+
+impl Vehicle {
+    /// Creates the vehicle of `scenario`, powered up where it starts, with parameters that `keeper` keeps, if there is
+    /// one. Its system id is `system`, unless they say another (MAV_SYS_ID).
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub fn new(scenario: &Scenario, system: u8, mut keeper: Option<Keeper>) -> Result<Self, OutOfRange> {
+        let link = Link { system: system.into(), ..Link::DEFAULT };
+        let mut notices = Vec::new();
+        let host = power_up(scenario, link, keeper.as_mut(), &mut notices)?;
+        Ok(Vehicle {
+            link,
+            address: address(&host),
+            host,
+            world: World::released(scenario, STEP_S)?,
+            scene: Scene::new(scenario),
+            peers: BTreeMap::new(),
+            mode: Mode::Disarmed,
+            outside: Outside::new(scenario),
+            scenario: scenario.clone(),
+            keeper,
+            notices,
+        })
+    }
+
+    /// Returns its MAVLink system id.
+    pub fn system(&self) -> u8 {
+        self.address.system
+    }
+
+    /// Returns its world.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// Receives, for the next step, what `peer` has sent.
+    pub fn hear(&mut self, peer: u32, bytes: &[u8]) {
+        let decoder = self.peers.entry(peer).or_insert_with(|| Decoder::new(self.address));
+        self.host.hear(decoder, bytes);
+    }
+
+    /// Forgets what is left of a peer that is gone.
+    pub fn forget(&mut self, peer: u32) {
+        self.peers.remove(&peer);
+    }
+
+    /// Runs a millisecond; returns the bytes that it has sent, whole frames. What is worth telling goes to `tell`.
+    pub fn step(&mut self, mut tell: impl FnMut(&str)) -> Vec<u8> {
+        self.notices.drain(..).for_each(|notice| tell(&notice));
+        self.world.look();
+        if let Some(readings) = self.world.readings() {
+            self.host.sense(readings);
+        }
+        let readings = self.world.readings().copied().unwrap_or_default();
+        self.host.comms().surround(self.outside.look(&self.world, &readings));
+        let Tick { report, bytes, change } = self.host.next_tick(&[]);
+        self.world.advance(&report.motors);
+        if report.mode.armed() != self.mode.armed() {
+            tell(if report.mode.armed() { "armed" } else { "disarmed" });
+        }
+        self.mode = report.mode;
+        frames(&bytes).filter_map(|frame| frame.text()).for_each(|text| tell(&text));
+        if let (Some(keeper), Some(change)) = (&mut self.keeper, change)
+            && let Err(error) = keeper.keep(change)
+        {
+            // The reason is a text to the stations, and told with it.
+            self.host.comms().warn(error.reason());
+        }
+        // What was sent before has left.
+        if self.host.comms().wants_reboot() {
+            self.restart();
+        }
+        bytes
+    }
+
+    /// Powers the firmware down and up again; the world goes on.
+    fn restart(&mut self) {
+        self.notices.push("restarted".into());
+        let host = power_up(&self.scenario, self.link, self.keeper.as_mut(), &mut self.notices);
+        match host {
+            Ok(host) => {
+                self.address = address(&host);
+                self.host = host;
+                // Nothing of a frame outlasts it.
+                self.peers.values_mut().for_each(|peer| *peer = Decoder::new(self.address));
+            }
+            Err(error) => self.notices.push(out_of_range(&error)),
+        }
+    }
+
+    /// Changes weather or faults.
+    ///
+    /// # Errors
+    /// One line on why it does not.
+    pub fn suffer(&mut self, deed: &Deed) -> Result<(), String> {
+        self.scene.apply(deed, &mut self.world)
+    }
+
+    /// Returns its state in one line.
+    pub fn status(&self) -> String {
+        let (plant, mode) = (self.world.plant(), self.mode);
+        let motion = plant.motion();
+        let [[x, y, z]] = motion.position_m.data.0;
+        let [[u, v, w]] = motion.velocity_m_s.data.0;
+        let yaw_deg = motion.attitude_rad.z.to_degrees();
+        let mut line = format!(
+            "vehicle {}: {:.3} s, {}, position {x:.2} {y:.2} {z:.2} m, velocity {u:.2} {v:.2} {w:.2} m/s, \
+             heading {yaw_deg:.0} deg",
+            self.system(),
+            plant.time_s(),
+            mode_name(mode),
+        );
+        if let Some(telemetry) = plant.telemetry() {
+            let [[x, y, z]] = telemetry.wind_m_s.data.0;
+            // Writing to a string cannot fail.
+            let _ = write!(line, ", wind {x:.1} {y:.1} {z:.1} m/s");
+            if telemetry.on_ground {
+                line += ", on the ground";
+            }
+            if let Some(battery) = telemetry.battery {
+                let _ = write!(line, ", battery {:.1} V {:.0} %", battery.voltage_v, battery.charge * 100.0);
+            }
+        }
+        let bad = self.peers.values().map(|peer| u64::from(peer.counters().bad_checksum)).sum::<u64>();
+        let _ = write!(line, ", {} peers, {bad} bad frames", self.peers.len());
+        let troubles = self.scene.troubles(plant.time_s());
+        if !troubles.is_empty() {
+            let _ = write!(line, ", {}", troubles.join(", "));
+        }
+        line
+    }
+}
+
+/// Powers up the firmware of a scenario's vehicle.
+fn power_up(
+    scenario: &Scenario,
+    link: Link,
+    keeper: Option<&mut Keeper>,
+    notices: &mut Vec<String>,
+) -> Result<Host, OutOfRange> {
+    let host = match keeper {
+        Some(keeper) => keeper.power_up(scenario, link, |notice| notices.push(notice.into()))?,
+        None => Host::linked(scenario.vehicle_file.as_ref(), link)?,
+    };
+    let setup = Setup { bytes_per_s: BYTES_PER_S, reboots: true, ..host.setup() };
+    Ok(host.with(setup))
+}
+
+fn address(host: &Host) -> Address {
+    Address { system: host.setup().system, component: AUTOPILOT }
+}
+
+fn mode_name(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Disarmed => "disarmed",
+        Mode::Flying => "flying",
+        Mode::Coasting => "coasting",
+        Mode::Descending => "descending",
+        _ => "in another mode",
+    }
+}

@@ -1,0 +1,157 @@
+//! Parameters in a file: over restarts of the server and of a vehicle.
+#![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
+
+use afbc_link::{
+    Address, Command, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Sender, Storage, Uplink,
+};
+use afbc_serve::{Keeper, Server, fleet};
+use afbc_sim::scenario::built_in;
+use std::path::{Path, PathBuf};
+
+const STATION: Address = Address { system: 255, component: 190 };
+
+fn name(text: &str) -> ParameterName {
+    std::array::from_fn(|i| text.as_bytes().get(i).copied().unwrap_or(0))
+}
+
+/// A file that there is not.
+fn fresh(test: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{test}.store"));
+    let _ = std::fs::remove_file(&path);
+    path
+}
+
+fn served(file: &Path) -> Server {
+    let scenarios = fleet(&built_in("outdoor").unwrap().read().unwrap(), 1).unwrap();
+    let keeper = Keeper::open(file, scenarios.first().unwrap()).unwrap();
+    Server::kept(&scenarios, 1, vec![keeper]).unwrap()
+}
+
+/// Sends a message and returns what is heard in a tenth of a second, and the lines.
+fn exchange(server: &mut Server, message: Uplink) -> (Vec<Downlink>, Vec<String>) {
+    server.hear(0, 1, Sender::new(STATION).send(&message, &mut [0; FRAME_MAX]));
+    let (mut messages, mut lines) = (Vec::new(), Vec::new());
+    let mut decoder = Decoder::<Downlink>::new(STATION);
+    for _ in 0..100 {
+        let hear = |_, bytes: &[u8]| decoder.feed(bytes, |_, message| messages.push(message));
+        let _ = server.step(hear, |line| lines.push(line.to_owned()));
+    }
+    (messages, lines)
+}
+
+fn set(server: &mut Server, text: &str, value: f32) {
+    let request = ParameterRequest::Set { name: name(text), value: value.to_le_bytes(), kind: 9 };
+    exchange(server, Uplink::Parameter(request));
+}
+
+fn bytes(server: &mut Server, text: &str) -> [u8; 4] {
+    let request = Uplink::Parameter(ParameterRequest::ReadName(name(text)));
+    let value = exchange(server, request).0.into_iter().find_map(|message| match message {
+        Downlink::Parameter(value) if value.name == name(text) => Some(value.value),
+        _ => None,
+    });
+    value.unwrap()
+}
+
+fn get(server: &mut Server, text: &str) -> f32 {
+    f32::from_le_bytes(bytes(server, text))
+}
+
+/// A whole number, which crosses the link as one.
+fn whole(server: &mut Server, text: &str) -> i32 {
+    i32::from_le_bytes(bytes(server, text))
+}
+
+#[test]
+fn what_is_set_is_there_after_a_restart() {
+    let file = fresh("restart");
+    let mut server = served(&file);
+    let default = get(&mut server, "MIS_TAKEOFF_ALT");
+    set(&mut server, "MIS_TAKEOFF_ALT", 4.0);
+    set(&mut server, "RTL_RETURN_ALT", 20.0);
+    set(&mut server, "RTL_RETURN_ALT", 22.0);
+    // Only one program at a time writes it.
+    let scenario = built_in("outdoor").unwrap().read().unwrap();
+    assert!(Keeper::open(&file, &scenario).err().unwrap().contains("in use"));
+    drop(server);
+
+    let mut server = served(&file);
+    assert_eq!(["MIS_TAKEOFF_ALT", "RTL_RETURN_ALT"].map(|text| get(&mut server, text)), [4.0, 22.0]);
+    exchange(&mut server, Uplink::Command(Command::Storage(Storage::Reset)));
+    drop(server);
+    assert_eq!(get(&mut served(&file), "MIS_TAKEOFF_ALT"), default);
+}
+
+/// A reboot powers the vehicle up again, with what was set, and answers before.
+#[test]
+fn a_reboot_restarts_the_vehicle() {
+    let mut server = served(&fresh("reboot"));
+    set(&mut server, "MIS_TAKEOFF_ALT", 4.0);
+    let (messages, lines) = exchange(&mut server, Uplink::Command(Command::Reboot));
+    assert!(messages.iter().any(|message| matches!(message, Downlink::Answer { command: 246, .. })));
+    assert!(lines.iter().any(|line| line.ends_with("vehicle 1: restarted")), "{lines:?}");
+    assert_eq!(get(&mut server, "MIS_TAKEOFF_ALT"), 4.0);
+    // Once, and not again and again.
+    let (_, lines) = exchange(&mut server, Uplink::Heartbeat);
+    assert!(!lines.iter().any(|line| line.contains("restarted")), "{lines:?}");
+
+    // Without a file, it comes back as it was made.
+    let scenarios = fleet(&built_in("outdoor").unwrap().read().unwrap(), 1).unwrap();
+    let mut server = Server::new(&scenarios, 1).unwrap();
+    let default = get(&mut server, "MIS_TAKEOFF_ALT");
+    set(&mut server, "MIS_TAKEOFF_ALT", 4.0);
+    assert_eq!(get(&mut server, "MIS_TAKEOFF_ALT"), 4.0);
+    exchange(&mut server, Uplink::Command(Command::Reboot));
+    assert_eq!(get(&mut server, "MIS_TAKEOFF_ALT"), default);
+}
+
+/// The system id that the vehicle's heartbeats carry.
+fn heartbeat_of(server: &mut Server, vehicle: usize) -> u8 {
+    let mut decoder = Decoder::<Downlink>::new(STATION);
+    let mut system = None;
+    for _ in 0..1100 {
+        let hear = |place, bytes: &[u8]| {
+            decoder.feed(if place == vehicle { bytes } else { &[] }, |from, message| {
+                if matches!(message, Downlink::Heartbeat { .. }) {
+                    system = Some(from.system);
+                }
+            });
+        };
+        let _ = server.step(hear, |_| ());
+    }
+    system.unwrap()
+}
+
+/// A vehicle has another system id from the restart on after it was set, with a file and without; it counts up from the
+/// first one's. Two with the same id are told of.
+#[test]
+fn the_system_id_is_a_parameter() {
+    let mut server = served(&fresh("system"));
+    set(&mut server, "MAV_SYS_ID", 0.0);
+    set(&mut server, "MAV_SYS_ID", 251.0);
+    set(&mut server, "MAV_SYS_ID", 7.5);
+    assert_eq!(whole(&mut server, "MAV_SYS_ID"), 1);
+    set(&mut server, "MAV_SYS_ID", 42.0);
+    assert_eq!((heartbeat_of(&mut server, 0), server.systems()), (1, vec![1]));
+    exchange(&mut server, Uplink::Command(Command::Reboot));
+    assert_eq!((heartbeat_of(&mut server, 0), server.systems()), (42, vec![42]));
+    // It answers to its new name, and is known by it.
+    assert_eq!(whole(&mut server, "MAV_SYS_ID"), 42);
+    assert!(server.line("vehicle 1 status").lines.join("").contains("no vehicle 1"));
+    assert!(server.line("vehicle 42 status").lines.join("").contains("ok"));
+    drop(server);
+    let mut server = served(&Path::new(env!("CARGO_TARGET_TMPDIR")).join("system.store"));
+    assert_eq!((heartbeat_of(&mut server, 0), server.systems()), (42, vec![42]));
+
+    let scenarios = fleet(&built_in("outdoor").unwrap().read().unwrap(), 3).unwrap();
+    let files = ["system1", "system2", "system3"].map(fresh);
+    let keepers = || files.iter().zip(&scenarios).map(|(file, it)| Keeper::open(file, it).unwrap()).collect();
+    let mut server = Server::kept(&scenarios, 5, keepers()).unwrap();
+    assert_eq!((server.systems(), server.ambiguous()), (vec![5, 6, 7], None));
+    set(&mut server, "MAV_SYS_ID", 7.0);
+    let (_, lines) = exchange(&mut server, Uplink::Command(Command::Reboot));
+    assert!(lines.iter().any(|line| line.contains("several vehicles have the system id 7")), "{lines:?}");
+    assert_eq!((server.systems(), server.ambiguous()), (vec![7, 6, 7], Some(7)));
+    drop(server);
+    assert_eq!(Server::kept(&scenarios, 5, keepers()).unwrap().systems(), [7, 6, 7]);
+}

@@ -1,0 +1,42 @@
+//! When stations take the vehicle for ready.
+#![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
+
+use afbc_link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Telemetry, Uplink};
+use afbc_serve::{Server, fleet};
+use afbc_sim::scenario::built_in;
+
+const STATION: Address = Address { system: 255, component: 190 };
+const ARM: u16 = 400;
+const HOME_POSITION: u32 = 242;
+
+/// Clients arm as soon as position and home are told, as MAVSDK's examples do; they look at nothing else. The vehicle
+/// arms then.
+#[test]
+fn whoever_arms_once_home_is_known_is_not_refused() {
+    for (scenario, seed) in [("outdoor", 1), ("outdoor", 2), ("outdoor", 3), ("outdoor", 4)] {
+        let mut scenario = built_in(scenario).unwrap().read().unwrap();
+        scenario.seed = seed;
+        let mut server = Server::new(&fleet(&scenario, 1).unwrap(), 1).unwrap();
+        let (mut decoder, mut said) = (Decoder::<Downlink>::new(STATION), Vec::new());
+        let say = |server: &mut Server, command| {
+            server.hear(0, 1, Sender::new(STATION).send(&Uplink::Command(command), &mut [0; FRAME_MAX]));
+        };
+        // As often as possible: no later message hides that it is too early.
+        say(&mut server, Command::SetInterval { message: HOME_POSITION, interval_us: 1_000 });
+        let (mut asked, mut answer) = (false, None);
+        for _ in 0..20_000 {
+            let _ = server.step(|_, bytes| decoder.feed(bytes, |_, message| said.push(message)), |_| ());
+            for message in said.drain(..) {
+                match message {
+                    Downlink::Telemetry(Telemetry::Home(_)) if !asked => {
+                        asked = true;
+                        say(&mut server, Command::Arm);
+                    }
+                    Downlink::Answer { command: ARM, answer: told, .. } => answer = Some(told),
+                    _ => {}
+                }
+            }
+        }
+        assert_eq!(answer, Some(Answer::Accepted), "{}, seed {seed}", scenario.name);
+    }
+}

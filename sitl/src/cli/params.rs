@@ -1,0 +1,187 @@
+//! `sitl params`: the parameters of a vehicle, as ground stations' files.
+
+use super::terminal::{Failure, print, say};
+use super::vehicle::named;
+use afbc_files::{Flash, place};
+use afbc_onboard::parameters::{Change, Kept, Parameter, Table};
+use afbc_reader::params::{Entry, Format, read, written};
+use afbc_reader::words::out_of_range;
+use afbc_reader::{FileError, Source};
+use afbc_sim::in_the_loop::configuration;
+use afbc_store::{Error, Name, Store, hash};
+use afbc_types::with_rotors;
+use afbc_vehicles::Vehicle;
+use clap::{Args, Subcommand, ValueEnum};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Export, import or compare the parameters of a vehicle, as files of QGroundControl (.params) and MAVProxy (.parm)
+///
+/// See docs/storage.md.
+#[derive(Args, Debug)]
+pub(crate) struct Params {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Print all parameters, or write them to a file
+    Export {
+        #[command(flatten)]
+        of: Of,
+        /// File to write; by its name .parm is MAVProxy's, anything else QGroundControl's [default: standard output]
+        #[arg(long, short, value_name = "FILE")]
+        out: Option<PathBuf>,
+        /// Format, whatever the file's name
+        #[arg(long, value_enum)]
+        format: Option<Style>,
+    },
+    /// Put the values of a file into a store, which is made if there is none; all of them, or none if one is refused
+    Import {
+        /// File of parameters, in either format
+        file: PathBuf,
+        #[command(flatten)]
+        of: Of,
+    },
+    /// Print what differs from the vehicle's defaults: in a file of parameters, or in the store
+    Diff {
+        /// File of parameters, in either format
+        file: Option<PathBuf>,
+        #[command(flatten)]
+        of: Of,
+    },
+}
+
+/// Whose parameters.
+#[derive(Args, Clone, Debug)]
+struct Of {
+    /// Vehicle: name of a built-in one, or path of a file
+    #[arg(long, value_name = "VEHICLE", default_value = "paper")]
+    vehicle: PathBuf,
+    /// Store of the vehicle's parameters, a file
+    #[arg(long, value_name = "FILE")]
+    store: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Style {
+    Qgc,
+    Mavproxy,
+}
+
+impl Params {
+    /// Does what was asked.
+    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        let (Action::Export { of, .. } | Action::Import { of, .. } | Action::Diff { of, .. }) = &self.action;
+        let vehicle = named(&of.vehicle)?;
+        with_rotors!(vehicle.rotors.len(), N => act::<N>(&self.action, &vehicle))?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+fn act<const N: usize>(action: &Action, vehicle: &Vehicle) -> Result<(), Failure> {
+    let mut table = Table::<N>::new(configuration(vehicle)?);
+    match action {
+        Action::Export { of, out, format } => {
+            if let Some(path) = &of.store {
+                load(&mut table, &mut open(path, vehicle, Flash::known)?, path)?;
+            }
+            let mavproxy = out.as_ref().and_then(|out| out.extension()).is_some_and(|extension| extension == "parm");
+            let format = match format {
+                Some(Style::Qgc) => Format::Qgc,
+                Some(Style::Mavproxy) => Format::Mavproxy,
+                None if mavproxy => Format::Mavproxy,
+                None => Format::Qgc,
+            };
+            let entries = table.iter().map(|it| (it.name, it.value, it.kind.number()));
+            let text = written(format, &vehicle.name, entries);
+            match out {
+                Some(out) => place(out, |to| to.write_all(text.as_bytes()))
+                    .map_err(|error| format!("{}: cannot be written ({error})", out.display()))?,
+                None => print(&text)?,
+            }
+        }
+        Action::Import { file, of } => {
+            let Some(path) = &of.store else { return Err("--store: missing; name the file to import into".into()) };
+            let changes = take(&mut table.clone(), file)?;
+            let mut store = open(path, vehicle, Flash::open)?;
+            store.make_room().map_err(|error| failed(path, &error))?;
+            load(&mut table, &mut store, path)?;
+            // Once more, on what is stored already.
+            take(&mut table, file)?;
+            for name in &changes {
+                keep(&table, &mut store, *name).map_err(|error| failed(path, &error))?;
+            }
+            print(&format!("{}: {} parameters, {}\n", path.display(), changes.len(), differing(&table).len()))?;
+        }
+        Action::Diff { file, of } => {
+            if let Some(path) = &of.store {
+                load(&mut table, &mut open(path, vehicle, Flash::known)?, path)?;
+            }
+            if let Some(file) = file {
+                take(&mut table, file)?;
+            }
+            let line = |(now, image): &(Parameter, f32)| format!("{:<16} {image} -> {}\n", now.name, now.value);
+            print(&differing(&table).iter().map(line).collect::<String>())?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes the present value of a parameter.
+fn keep<const N: usize>(table: &Table<N>, store: &mut Store<Flash>, name: Name) -> Result<(), Unkept> {
+    let (Some(now), Some(image)) = (table.get(name), table.default_of(name)) else { return Ok(()) };
+    let change = Change::Set(name, (now.value.to_bits() != image.value.to_bits()).then_some(now.value));
+    match Kept::NOW.keep(store, change) {
+        Err(Error::NeedsErase) => {
+            store.make_room()?;
+            Kept::NOW.keep(store, change)
+        }
+        done => done,
+    }
+}
+
+/// Why a value was not written to a file.
+type Unkept = Error<afbc_files::FlashError>;
+
+fn failed(path: &Path, error: &Unkept) -> String {
+    format!("{}: {error}", path.display())
+}
+
+fn open(path: &Path, vehicle: &Vehicle, flash: fn(&Path) -> std::io::Result<Flash>) -> Result<Store<Flash>, Failure> {
+    let flash = flash(path).map_err(|error| format!("{}: {error}", path.display()))?;
+    Ok(Store::open(flash, 0, hash(vehicle.name.as_bytes())).map_err(|error| failed(path, &error))?)
+}
+
+/// Sets `table` to what is stored; says what is not used.
+fn load<const N: usize>(table: &mut Table<N>, store: &mut Store<Flash>, path: &Path) -> Result<(), Failure> {
+    let notice = |notice| say(&format!("{}: {notice}", path.display()));
+    Ok(Kept::NOW.load(table, store, notice).map_err(|error| failed(path, &error))?)
+}
+
+/// Sets `table` to the values of a file; returns their names.
+fn take<const N: usize>(table: &mut Table<N>, file: &Path) -> Result<Vec<Name>, Failure> {
+    let shown = file.display().to_string();
+    let text = fs::read_to_string(file).map_err(|error| format!("{shown}: cannot be read ({error})"))?;
+    let source = Source { file: &shown, text: &text };
+    let mut names = Vec::new();
+    for Entry { name, value, at } in read(&shown, &text)? {
+        let unknown = || FileError::at(source, at, &name, "no such parameter; `sitl params export` lists them");
+        let known = Name::new(&name).ok_or_else(unknown)?;
+        table.get(known).ok_or_else(unknown)?;
+        // The reason begins with the name.
+        table.put(known, value).map_err(|reason| FileError::at(source, at, "", reason.as_str()))?;
+        names.push(known);
+    }
+    table.check().map_err(|error| FileError::whole(&shown, format!("{}; it could not fly", out_of_range(&error))))?;
+    Ok(names)
+}
+
+/// Parameters that are not as in the image, and what they are there.
+fn differing<const N: usize>(table: &Table<N>) -> Vec<(Parameter, f32)> {
+    let image = |parameter: &Parameter| table.default_of(parameter.name).map_or(f32::NAN, |image| image.value);
+    let both = table.iter().map(|parameter| (parameter, image(&parameter)));
+    both.filter(|(now, image)| now.value.to_bits() != image.to_bits()).collect()
+}

@@ -1,0 +1,182 @@
+//! `sitl serve`.
+
+use super::target::Target;
+use super::terminal::{Failure, INTERRUPTED, print};
+use super::vehicle::OnVehicle;
+use afbc_serve::{Addresses, End, Keeper, Lines, Ports, Rate, Server, Then, VEHICLES_MAX, fleet, guide, run};
+use clap::{Args, value_parser};
+use std::io::{BufReader, Write, stdin, stdout};
+use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Most vehicles.
+const MOST: i64 = VEHICLES_MAX as i64;
+
+/// Serve a simulated vehicle to ground stations and companion computers, by MAVLink
+///
+/// It stands on the ground, outdoors in a breeze, until somebody arms and flies it. The firmware's own code flies it,
+/// on its own sensors. Lines on stdin change weather and faults; `help` lists them. See docs/serve.md.
+#[derive(Args, Debug)]
+pub(crate) struct Serve {
+    /// Name of a built-in scenario, or path of a scenario file: place, weather, instruments and faults come from it
+    #[arg(long, value_name = "SCENARIO", default_value = "outdoor")]
+    scenario: Target,
+
+    /// Indoors, with a motion-capture system: --scenario mocap
+    #[arg(long, conflicts_with = "scenario")]
+    indoors: bool,
+
+    #[command(flatten)]
+    on: OnVehicle,
+
+    /// Number of vehicles, side by side
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u8).range(1..=MOST))]
+    vehicles: u8,
+
+    /// MAVLink system id of the first vehicle, unless its parameters say another (MAV_SYS_ID); the others count up
+    #[arg(long, value_name = "ID", default_value_t = 1, value_parser = value_parser!(u8).range(1..=150))]
+    system: u8,
+
+    /// Seed of weather and sensors, instead of the scenario's
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(0..=1_000_000_000))]
+    seed: Option<u64>,
+
+    /// Address of this machine to serve at; 0.0.0.0 for whoever reaches it, without any protection
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
+    bind: IpAddr,
+
+    /// UDP port of the first vehicle; the others count up; 0 for any free one
+    #[arg(long, value_name = "PORT", default_value_t = Addresses::default().udp)]
+    port: u16,
+
+    /// Serve by TCP too, at 5760 for the first vehicle and every tenth port after it, or from this port on
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "5760")]
+    tcp: Option<u16>,
+
+    /// Where ground stations listen: gets heartbeats unasked; `none` for nobody; may be repeated
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:14550")]
+    station: Vec<String>,
+
+    /// Where the first vehicle's companion computer listens; the others' ports count up; `none` for nobody; may be
+    /// repeated
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:14540")]
+    companion: Vec<String>,
+
+    /// Keep the parameters in this file, which is made if there is none; of several vehicles each has its own, which
+    /// ends in its system id
+    #[arg(long, value_name = "FILE")]
+    parameters: Option<PathBuf>,
+
+    /// Times real time; 0 for as fast as possible
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed, allow_negative_numbers = true)]
+    speed: f64,
+
+    /// As fast as possible: --speed 0
+    #[arg(long, conflicts_with = "speed")]
+    fast: bool,
+
+    /// Time stands still; `step N` on stdin lets N milliseconds go by, after what has arrived until then, and answers
+    /// when they are over
+    #[arg(long, conflicts_with_all = ["speed", "fast"])]
+    lockstep: bool,
+
+    /// A line as on stdin, before it starts, as in --do 'at 20 wind 5 0 0'; may be repeated
+    #[arg(long = "do", value_name = "LINE")]
+    lines: Vec<String>,
+}
+
+impl Serve {
+    /// Serves until it is told to end.
+    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        let target = if self.indoors { Target::from("mocap") } else { self.scenario.clone() };
+        let mut scenario = self.on.put(target.scenario()?)?;
+        scenario.seed = self.seed.unwrap_or(scenario.seed);
+        let scenarios = fleet(&scenario, self.vehicles)?;
+        let mut server = match &self.parameters {
+            Some(path) => {
+                let files = (self.system..).map(|system| file(path, system, self.vehicles));
+                let keepers = files.zip(&scenarios).map(|(file, scenario)| Keeper::open(&file, scenario));
+                Server::kept(&scenarios, self.system, keepers.collect::<Result<_, _>>()?)?
+            }
+            None => Server::new(&scenarios, self.system)?,
+        };
+        if let Some(system) = server.ambiguous() {
+            return Err(format!(
+                "several vehicles have the system id {system}; change MAV_SYS_ID in one of the files of --parameters"
+            )
+            .into());
+        }
+        for line in &self.lines {
+            let reply = server.line(line);
+            let answer = reply.lines.last().map_or("ok", String::as_str);
+            if let Some(problem) = answer.strip_prefix("error ") {
+                return Err(format!("--do '{line}': {problem}").into());
+            }
+            if reply.then != Then::Nothing {
+                return Err(
+                    format!("--do '{line}': it has no effect before the start; add a time, as in 'at 60 ...'").into()
+                );
+            }
+        }
+        let addresses = self.addresses()?;
+        let mut ports = Ports::open(&addresses, server.vehicles().len())?;
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopper = Arc::clone(&stop);
+        ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
+        print(&format!("{}: {}", scenario.name, guide(&addresses, &ports.addresses()?, &server.systems())))?;
+
+        let rate = match self {
+            Serve { lockstep: true, .. } => Rate::Lockstep,
+            Serve { fast: true, .. } => Rate::Times(0.0),
+            Serve { speed, .. } => Rate::Times(speed),
+        };
+        let mut lines = Lines::of(BufReader::new(stdin()));
+        let end = run(&mut server, &mut ports, rate, &mut lines, &stop, |line| {
+            // Whoever has closed the pipe reads nothing.
+            let mut out = stdout().lock();
+            let _ = writeln!(out, "{line}").and_then(|()| out.flush());
+        });
+        Ok(ExitCode::from(if end == End::Stopped { INTERRUPTED } else { 0 }))
+    }
+
+    fn addresses(&self) -> Result<Addresses, Failure> {
+        let all = |texts: &[String], option: &str| {
+            let wanted = texts.iter().filter(|text| *text != "none");
+            wanted.map(|text| address(text, option, self.bind)).collect::<Result<Vec<_>, _>>()
+        };
+        Ok(Addresses {
+            bind: self.bind,
+            udp: self.port,
+            stations: all(&self.station, "--station")?,
+            companions: all(&self.companion, "--companion")?,
+            tcp: self.tcp,
+        })
+    }
+}
+
+/// Returns the file of the parameters of one of so many vehicles.
+fn file(path: &Path, system: u8, vehicles: u8) -> PathBuf {
+    if vehicles == 1 {
+        return path.into();
+    }
+    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    name.push(format!(".{system}"));
+    path.with_file_name(name)
+}
+
+/// Finds the address of a peer, of the same family as the one to serve at.
+fn address(text: &str, option: &str, bind: IpAddr) -> Result<SocketAddr, Failure> {
+    let found = text.to_socket_addrs().map_err(|error| {
+        format!("{option} {text}: no such address ({error}); write HOST:PORT, as in 127.0.0.1:14550, or none")
+    })?;
+    let same = found.into_iter().find(|address| address.is_ipv4() == bind.is_ipv4());
+    Ok(same.ok_or_else(|| format!("{option} {text}: it cannot be reached from {bind}; choose another --bind"))?)
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    let speed: f64 = text.parse().map_err(|_| "it must be a number".to_owned())?;
+    if (0.0..=1000.0).contains(&speed) { Ok(speed) } else { Err("it must lie within 0 to 1000".into()) }
+}
