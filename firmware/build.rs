@@ -46,7 +46,8 @@ fn source(vehicle: &Vehicle) -> String {
          /// What the firmware is told of it.\n\
          pub const CONFIGURATION: Configuration<ROTORS> = Configuration {{\n\
          airframe: {airframe},\nsettings: {settings},\ngains: {gains},\ncurve: {curve},\n\
-         estimation: {estimation},\n}};\n",
+         estimation: {estimation},\n    arming: afbc_onboard::ArmingLimits::DEFAULT,\n\
+         guidance: afbc_guidance::Settings::DEFAULT,\n    link: afbc_onboard::Link::DEFAULT,\n}};\n",
         name = vehicle.name,
         settings = literal(&settings),
         gains = literal(&gains),

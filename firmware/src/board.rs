@@ -5,6 +5,7 @@ use crate::control::Tick;
 use crate::vehicle::ROTORS;
 use afbc_onboard::Readings;
 use embassy_executor::SendSpawner;
+use embedded_storage::nor_flash::NorFlash;
 
 /// A board: motors, watchdog and health.
 pub trait Board: Sized + 'static {
@@ -12,12 +13,19 @@ pub trait Board: Sized + 'static {
     type Receiver: Receiver + 'static;
     /// Sending side of the link.
     type Transmitter: Transmitter + 'static;
+    /// Flash with two sectors for the parameters, from [`STORE`](Self::STORE) on.
+    type Memory: NorFlash + Send + 'static;
+    /// Offset of these sectors \[bytes\].
+    const STORE: u32;
     /// Most motors that it drives.
     const OUTPUTS: usize;
 
     /// Brings up clocks and peripherals; the core runs at [`CORE_HZ`](crate::time::CORE_HZ) from then on. To be called
     /// once. A board's task spawned on `control` runs right after the control tick.
-    fn start(control: SendSpawner) -> (Self, Self::Receiver, Self::Transmitter);
+    fn start(control: SendSpawner) -> (Self, Self::Receiver, Self::Transmitter, Self::Memory);
+
+    /// Starts the watchdog, if there is one; nothing is erased from now on.
+    fn unleash_watchdog(&mut self);
 
     /// Waits for the next interrupt, or a part of that time.
     fn idle();
@@ -48,6 +56,9 @@ pub trait Receiver {
 
 /// Sending side of the link.
 pub trait Transmitter {
+    /// Sets the baud rate of the line in both directions, before anything is sent; nothing if there is no such line.
+    fn set_baud(&mut self, _baud: u32) {}
+
     /// Sends the messages after `tick`, without waiting for the line.
     fn transmit(&mut self, tick: &Tick, bytes: &[u8]);
 }
@@ -63,37 +74,56 @@ macro_rules! image {
         );
 
         #[embassy_executor::task]
-        async fn control(mut flight: $crate::control::Flight, mut board: $board) -> ! {
-            $crate::control::run(&mut flight, &mut board).await
+        async fn control(flight: &'static mut $crate::control::Flight, mut board: $board) -> ! {
+            $crate::control::run(flight, &mut board).await
         }
 
         #[embassy_executor::task]
         async fn comms(
-            mut comms: $crate::comms::Comms,
+            desk: &'static mut $crate::comms::Desk,
             mut receiver: <$board as $crate::board::Board>::Receiver,
             mut transmitter: <$board as $crate::board::Board>::Transmitter,
         ) -> ! {
-            $crate::comms::run(&mut comms, &mut receiver, &mut transmitter).await
+            $crate::comms::run(desk, &mut receiver, &mut transmitter).await
+        }
+
+        #[embassy_executor::task]
+        async fn parameters(mut keeper: $crate::parameters::Keeper<<$board as $crate::board::Board>::Memory>) -> ! {
+            $crate::parameters::run(&mut keeper).await
         }
 
         // Out of line, so that their stacks are not used at the same time.
         #[inline(never)]
-        fn spawn_control(spawner: embassy_executor::SendSpawner, board: $board) {
-            spawner.spawn(control($crate::control::flight(), board).expect("spawned once"));
+        fn spawn_control(
+            spawner: embassy_executor::SendSpawner,
+            flight: &'static mut $crate::control::Flight,
+            board: $board,
+        ) {
+            spawner.spawn(control(flight, board).expect("spawned once"));
         }
 
         #[inline(never)]
         fn spawn_comms(
             spawner: embassy_executor::SendSpawner,
+            desk: &'static mut $crate::comms::Desk,
             receiver: <$board as $crate::board::Board>::Receiver,
             transmitter: <$board as $crate::board::Board>::Transmitter,
         ) {
-            spawner.spawn(comms($crate::comms::Comms::new(), receiver, transmitter).expect("spawned once"));
+            spawner.spawn(comms(desk, receiver, transmitter).expect("spawned once"));
+        }
+
+        #[inline(never)]
+        fn spawn_parameters(
+            spawner: embassy_executor::SendSpawner,
+            keeper: $crate::parameters::Keeper<<$board as $crate::board::Board>::Memory>,
+        ) {
+            spawner.spawn(parameters(keeper).expect("spawned once"));
         }
 
         #[cortex_m_rt::entry]
         fn main() -> ! {
-            $crate::run(cortex_m::Peripherals::take().expect("taken once"), spawn_control, spawn_comms)
+            let core = cortex_m::Peripherals::take().expect("taken once");
+            $crate::run(core, spawn_control, spawn_comms, spawn_parameters)
         }
     };
 }

@@ -1,20 +1,21 @@
 //! The control tick, 1000 times per second.
 
 use crate::board::Board;
+use crate::parameters::{Configuration, Prepared};
 use crate::time::{self, Stopwatch};
-use crate::vehicle::{CONFIGURATION, ROTORS};
-use afbc_flight_core::Inbox;
-use afbc_onboard::Readings;
+use crate::vehicle::ROTORS;
+use afbc_onboard::{Mail, Readings};
 use core::cell::RefCell;
 use core::future::poll_fn;
 use core::pin::pin;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use core::task::Poll;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Instant, Timer};
 use heapless::Deque;
+use static_cell::StaticCell;
 
 /// The vehicle under its law.
 pub type Flight = afbc_onboard::Flight<ROTORS>;
@@ -22,7 +23,7 @@ pub type Flight = afbc_onboard::Flight<ROTORS>;
 pub type Report = afbc_onboard::Report<ROTORS>;
 
 /// Newest inputs, written by [`crate::comms`].
-static INBOX: Mutex<CriticalSectionRawMutex, RefCell<Inbox>> = Mutex::new(RefCell::new(Inbox::EMPTY));
+static MAIL: Mutex<CriticalSectionRawMutex, RefCell<Mail>> = Mutex::new(RefCell::new(Mail::EMPTY));
 
 /// Results of the last ticks, and a signal that there are some. Not a channel, which panics when it is re-entered.
 static TICKS: Mutex<CriticalSectionRawMutex, RefCell<Deque<Tick, 8>>> = Mutex::new(RefCell::new(Deque::new()));
@@ -50,6 +51,21 @@ pub fn cycles() -> [u32; 2] {
     [&CYCLES, &CYCLES_MAX].map(|cycles| cycles.load(Ordering::Relaxed))
 }
 
+/// Configuration to be flown from the next disarmed tick on.
+static NEXT: Mutex<CriticalSectionRawMutex, RefCell<Option<Prepared>>> = Mutex::new(RefCell::new(None));
+/// True if the vehicle was armed in the last tick.
+static ARMED: AtomicBool = AtomicBool::new(false);
+
+/// Flies another configuration from the next disarmed tick on.
+pub fn fly(prepared: Prepared) {
+    NEXT.lock(|next| next.try_borrow_mut().ok().map(|mut next| *next = Some(prepared)));
+}
+
+/// True if the vehicle is armed.
+pub fn armed() -> bool {
+    ARMED.load(Ordering::Relaxed)
+}
+
 /// Result of one control tick.
 #[derive(Clone, Copy)]
 pub struct Tick {
@@ -60,29 +76,38 @@ pub struct Tick {
 }
 
 /// Changes the inputs of the next tick.
-pub fn with_inbox(change: impl FnOnce(&mut Inbox)) {
+pub fn with_mail(change: impl FnOnce(&mut Mail)) {
     // Not borrowed elsewhere while it is locked; no panic in any case.
-    INBOX.lock(|inbox| inbox.try_borrow_mut().ok().map(|mut inbox| change(&mut inbox)));
+    MAIL.lock(|mail| mail.try_borrow_mut().ok().map(|mut mail| change(&mut mail)));
 }
 
-/// Creates the vehicle, disarmed.
+/// Creates the vehicle, disarmed, to be called once: in place, since a task would store a value twice and take the
+/// stack for it.
 ///
 /// # Panics
 /// If one of its parameters is out of range.
-pub fn flight() -> Flight {
-    let Ok(flight) = Flight::new(&CONFIGURATION) else { panic!("a parameter of the vehicle is out of range") };
-    flight
+#[inline(never)]
+pub fn make(configuration: &Configuration) -> &'static mut Flight {
+    static FLIGHT: StaticCell<Flight> = StaticCell::new();
+    FLIGHT.init_with(|| {
+        let Ok(flight) = Flight::new(configuration) else { panic!("a parameter of the vehicle is out of range") };
+        flight
+    })
 }
 
-/// Runs the ticks. `flight` is a reference, since a task would store a value twice.
+/// Runs the ticks.
 pub async fn run(flight: &mut Flight, board: &mut impl Board) -> ! {
-    let (mut inbox, mut readings) = (Inbox::EMPTY, Readings::NONE);
+    let (mut mail, mut readings) = (Mail::EMPTY, Readings::NONE);
     loop {
         // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
         // are due, it would tick twice in every second period.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
-        let report = tick(flight, &mut inbox, &mut readings, board);
+        let report = tick(flight, &mut mail, &mut readings, board);
+        ARMED.store(report.mode.armed(), Ordering::Relaxed);
+        if !report.mode.armed() {
+            adopt(flight);
+        }
         let cycles = stopwatch.cycles();
         CYCLES.store(cycles, Ordering::Relaxed);
         CYCLES_MAX.fetch_max(cycles, Ordering::Relaxed);
@@ -94,20 +119,31 @@ pub async fn run(flight: &mut Flight, board: &mut impl Board) -> ! {
     }
 }
 
+/// Takes over a configuration, if there is one. Out of line, since it is rare.
+#[inline(never)]
+fn adopt(flight: &mut Flight) {
+    NEXT.lock(|next| {
+        if let Some(prepared) = next.try_borrow_mut().ok().and_then(|mut next| next.take()) {
+            // Disarmed: the caller has looked.
+            let _ = flight.adopt(&prepared);
+        }
+    });
+}
+
 /// The top loop: takes the newest inputs; supervises, controls and gates the motors ([`afbc_flight_core::tick`]);
 /// drives them; checks the rate. Out of line, so that its stack and its instructions can be counted
 /// (`docs/budgets.md`).
 #[inline(never)]
-fn tick<B: Board>(flight: &mut Flight, inbox: &mut Inbox, readings: &mut Readings, board: &mut B) -> Report {
+fn tick<B: Board>(flight: &mut Flight, mail: &mut Mail, readings: &mut Readings, board: &mut B) -> Report {
     let now_us = Instant::now().as_micros();
     // Not borrowed elsewhere while it is locked; the tick has no panic.
-    INBOX.lock(|shared| shared.try_borrow_mut().ok().map(|mut shared| shared.take_into(inbox)));
+    MAIL.lock(|shared| shared.try_borrow_mut().ok().map(|mut shared| shared.take_into(mail)));
 
     if board.clock_has_failed() {
         flight.distrust_clock();
     }
     board.sense(readings);
-    let report = flight.tick(now_us, inbox, readings);
+    let report = flight.tick(now_us, mail, readings);
 
     board.drive(report.throttles);
     // A reset restarts a failed task, once it does not end a flight.

@@ -20,7 +20,7 @@
 //! | 4 | [`control`]: the control tick, then the motors' waveform | 50 us per millisecond |
 //! | 6 | end of the motors' DMA | 1 us per millisecond |
 //! | 8 | [`comms`]: the link's messages | |
-//! | 12 | [`housekeeping`]: logging, stack monitoring | |
+//! | 12 | [`housekeeping`]: logging, stack monitoring; [`parameters`]: writing to flash | |
 //!
 //! USART1 precedes the control tick because it buffers one byte, and the next comes within 11 us.
 #![no_std]
@@ -30,24 +30,33 @@ pub mod comms;
 pub mod control;
 pub mod executors;
 pub mod housekeeping;
+pub mod parameters;
 pub mod time;
 pub mod vehicle;
 
-use board::Board;
+use board::{Board, Transmitter as _};
 use embassy_executor::SendSpawner;
 
-/// Starts everything; the core then idles between interrupts. `control` and `comms` start the tasks that use the board;
-/// [`image!`] defines them.
+/// Starts everything; the core then idles between interrupts. `control`, `comms` and `keeper` start the tasks that use
+/// the board; [`image!`] defines them.
 pub fn run<B: Board>(
     mut core: cortex_m::Peripherals,
-    control: impl FnOnce(SendSpawner, B),
-    comms: impl FnOnce(SendSpawner, B::Receiver, B::Transmitter),
+    control: impl FnOnce(SendSpawner, &'static mut control::Flight, B),
+    comms: impl FnOnce(SendSpawner, &'static mut comms::Desk, B::Receiver, B::Transmitter),
+    keeper: impl FnOnce(SendSpawner, parameters::Keeper<B::Memory>),
 ) -> ! {
     let executors = executors::start(&mut core);
-    let (board, receiver, transmitter) = B::start(executors.control);
+    let (mut board, receiver, mut transmitter, memory) = B::start(executors.control);
+    let (kept, table) = parameters::read(memory, B::STORE);
+    // In range: a whole number.
+    transmitter.set_baud(table.configuration().link.baud as u32);
+    let flight = control::make(table.configuration());
+    let desk = comms::make(table);
+    board.unleash_watchdog();
     time::start(core.SYST);
-    comms(executors.comms, receiver, transmitter);
-    control(executors.control, board);
+    comms(executors.comms, desk, receiver, transmitter);
+    control(executors.control, flight, board);
+    keeper(executors.housekeeping, kept);
     housekeeping::spawn(executors.housekeeping);
     loop {
         B::idle();

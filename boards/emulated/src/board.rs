@@ -4,6 +4,7 @@
 //! Two FIFOs, `to_firmware` and `from_firmware`, carry the wire of [`afbc_onboard::ReplyHead`].
 
 use afbc_onboard::{Readings, ReplyHead};
+use afbc_store::Ram;
 use afbc_types::ROTORS_MAX;
 use core::cell::{Cell, RefCell};
 use embassy_executor::SendSpawner;
@@ -33,17 +34,23 @@ pub(crate) struct Emulated;
 impl Board for Emulated {
     type Receiver = Receiver;
     type Transmitter = Transmitter;
+    /// In RAM: QEMU's flash cannot be written, and every flight begins with the image's parameters.
+    type Memory = Ram<1024>;
+    const STORE: u32 = 0;
     const OUTPUTS: usize = ROTORS_MAX;
 
     /// Opens the FIFOs and waits for the first tick's bytes.
-    fn start(_control: SendSpawner) -> (Self, Receiver, Transmitter) {
+    fn start(_control: SendSpawner) -> (Self, Receiver, Transmitter, Self::Memory) {
         let mut transmitter = Transmitter {
             to_firmware: File::open(c"to_firmware").expect("the host made the FIFO"),
             from_firmware: File::create(c"from_firmware").expect("the host made the FIFO"),
         };
         transmitter.take_bytes();
-        (Emulated, Receiver, transmitter)
+        (Emulated, Receiver, transmitter, Ram::BLANK)
     }
+
+    /// There is no watchdog.
+    fn unleash_watchdog(&mut self) {}
 
     /// Spins. While a processor sleeps, QEMU advances its clock from another thread, and sometimes counts the same time
     /// twice, so time would depend on the host's load.
@@ -64,10 +71,7 @@ impl Board for Emulated {
     /// Takes what the host has sent.
     fn sense(&mut self, readings: &mut Readings) {
         READINGS.lock(|cell| match &mut *cell.borrow_mut() {
-            Some(sent) if !sent.is_empty() => {
-                readings.clone_from(sent);
-                sent.clear();
-            }
+            Some(sent) if !sent.is_empty() => readings.take_from(sent),
             _ => readings.clear(),
         });
     }

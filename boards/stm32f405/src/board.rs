@@ -6,6 +6,7 @@
 //! | link | USART1: TX on PA9, RX on PA10 |
 //! | motors 1 to 4 | TIM8, channels 1 to 4: PC6, PC7, PC8, PC9; driven by DMA2's stream 1 |
 //! | memory | `memory.x` at the workspace's root |
+//! | parameters | sectors 1 and 2 of the flash |
 //! | sensors | none yet, so no alignment: the state comes over the link |
 
 use crate::{clocks, reset};
@@ -16,6 +17,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use core::task::{Poll, ready};
 use embassy_executor::SendSpawner;
 use embassy_futures::poll_once;
+use embassy_stm32::flash::{Bank1Region1, Blocking, Flash};
 use embassy_stm32::gpio::OutputType;
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::peripherals::{DMA2_CH1, IWDG, TIM8, USART1};
@@ -36,10 +38,10 @@ use firmware::executors::priority;
 use firmware::vehicle::ROTORS;
 use static_cell::StaticCell;
 
+/// Parameters: sectors 1 and 2 of the flash, of 16 KiB each (`memory.x`).
+const STORE: u32 = 16 * 1024;
 /// Motors: the channels of one timer.
 const OUTPUTS: usize = 4;
-/// Bits per second of the link.
-const BAUD: u32 = 921_600;
 /// Bytes that wake the reader \[0.35 ms of a busy line\]. Fewer wake it when the line becomes idle, as after a message,
 /// and it also runs after every control tick. Waking it for every byte would take most of the processor's time.
 const READ_MIN: usize = 32;
@@ -72,14 +74,15 @@ pub(crate) struct Stm32f405 {
 impl Board for Stm32f405 {
     type Receiver = Receiver;
     type Transmitter = Transmitter;
+    type Memory = Bank1Region1<'static, Blocking>;
+    const STORE: u32 = STORE;
     const OUTPUTS: usize = OUTPUTS;
 
-    fn start(control: SendSpawner) -> (Self, Receiver, Transmitter) {
+    fn start(control: SendSpawner) -> (Self, Receiver, Transmitter, Self::Memory) {
         let p = clocks::start();
         reset::log();
 
         let mut config = usart::Config::default();
-        config.baudrate = BAUD;
         config.eager_reads = Some(READ_MIN);
         let uart = BufferedUart::new(p.USART1, p.PA10, p.PA9, TX.init([0; 1024]), RX.init([0; 1024]), Irqs, config);
         let (transmitter, receiver) = uart.expect("the baud rate divides the clock").split();
@@ -106,10 +109,14 @@ impl Board for Stm32f405 {
 
         // A debugger that halts the core halts the watchdog.
         pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
-        let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
-        watchdog.unleash();
+        let watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
+        let memory = Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1;
 
-        (Stm32f405 { watchdog }, Receiver(receiver), Transmitter(transmitter))
+        (Stm32f405 { watchdog }, Receiver(receiver), Transmitter(transmitter), memory)
+    }
+
+    fn unleash_watchdog(&mut self) {
+        self.watchdog.unleash();
     }
 
     /// Sleeps until the next interrupt.
@@ -226,6 +233,12 @@ impl board::Receiver for Receiver {
 pub(crate) struct Transmitter(BufferedUartTx<'static>);
 
 impl board::Transmitter for Transmitter {
+    fn set_baud(&mut self, baud: u32) {
+        if self.0.set_baudrate(baud).is_err() {
+            defmt::warn!("{=u32} baud do not divide the clock", baud);
+        }
+    }
+
     /// Drops the bytes if the line is too far behind.
     fn transmit(&mut self, _tick: &Tick, bytes: &[u8]) {
         // Accepts all bytes or, if the ring is full, none; the driver does not wake those who wait for room.

@@ -9,10 +9,6 @@ use std::time::Duration;
 
 /// Longest wait for each function to run.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// Bytes per control period on a line of 921,600 baud.
-const BYTES_PER_PERIOD: f64 = 92.16;
-/// Bytes that wake the link's task (`boards/stm32f405/src/board.rs`).
-const BYTES_PER_WAKE: f64 = 32.0;
 
 /// Instruction counts, each the largest of a few samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -59,12 +55,5 @@ impl Beside {
             Ok(most)
         };
         Ok(Beside { dshot, systick: most(systick, 4)?, byte: most(byte, 12)?, wake: most(wake, 4)? })
-    }
-
-    /// Returns the link's share of a control period with both directions of the line at full rate: an interrupt for
-    /// every byte, a wake for every 32 bytes and one for the tick.
-    pub fn link_per_period(&self) -> u32 {
-        let wakes = BYTES_PER_PERIOD / BYTES_PER_WAKE + 1.0;
-        (2.0 * BYTES_PER_PERIOD * f64::from(self.byte) + wakes * f64::from(self.wake)) as u32
     }
 }

@@ -23,6 +23,10 @@ pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
     if tick.is_multiple_of(10) {
         station.say(&Uplink::Setpoint(setpoint));
     }
+    // Again after the gaps, which end the mode.
+    if tick > 100 && tick.is_multiple_of(250) {
+        station.follow();
+    }
     match tick {
         // The first is refused, since the tick rate is not known yet.
         100 | ARMED => station.say(&Uplink::Command(Command::Arm)),

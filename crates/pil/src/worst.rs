@@ -64,9 +64,10 @@ pub fn search(emulator: Emulator, source: Source, seed: u64, candidates: u64) ->
         let numbers = if candidate < candidates / 2 { flight.anywhere() } else { flight.near(&summit) };
         let mut instructions = 0;
         for tick in 0..2 * HOLD {
-            // The monitor trips repeatedly.
+            // The monitor trips repeatedly, and the safety net leaves the mode.
             if tick == 0 {
                 flight.station.say(&Uplink::Command(Command::Engage));
+                flight.station.follow();
             }
             let (state, setpoint) = flight.inputs(&numbers, tick >= HOLD);
             match flight.fly(state, setpoint)? {
@@ -148,8 +149,8 @@ impl EmulatedFlight {
         Ok((reply.throttles.iter().any(|throttle| *throttle != 0)).then_some(reply.instructions))
     }
 
-    /// Returns a sample, and measurements of a vehicle in this state, of any age; on the ground those of a tracker
-    /// alone.
+    /// Returns a sample, and measurements of a vehicle in this state, of any age; on the ground mostly those of a
+    /// tracker.
     fn readings(&mut self, state: &State) -> Readings {
         let [noise, other] = [1e-3 * self.number(), 1e-3 * self.number()];
         let force_m_s2 = Vector3::new(noise, other, 9.81) + 0.1 * state.velocity_m_s;
@@ -161,9 +162,6 @@ impl EmulatedFlight {
             position_sigma_m: 0.01,
             attitude_sigma_rad: 0.02,
         };
-        if *state == State::default() {
-            return Readings { imu, aids: [Some(Aged { value: pose, age_us: 2_000 }), None] };
-        }
         let kinds = [
             pose,
             Measurement::Gnss {
@@ -177,6 +175,12 @@ impl EmulatedFlight {
             Measurement::MagneticField { field: Vector3::new(20.0, other, -40.0), sigma: 0.5 },
             Measurement::Heading { heading_rad: state.attitude_rad.z, sigma_rad: 0.1 },
         ];
+        if *state == State::default() {
+            // The others now and then, for a silent sensor forbids arming.
+            let other = kinds.get(self.tick as usize / 100 % kinds.len()).filter(|_| self.tick.is_multiple_of(100));
+            let aids = [Some(pose), other.copied()].map(|value| Some(Aged { value: value?, age_us: 2_000 }));
+            return Readings { imu, aids };
+        }
         let mut aid = |_| {
             let random = self.random.next_u64();
             let value = kinds.get(random as usize % (kinds.len() + 1)).copied()?;

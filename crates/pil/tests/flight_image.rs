@@ -22,6 +22,8 @@ const PATIENCE: Duration = Duration::from_secs(120);
 const EVERY_US: u64 = 30_000;
 /// Accepted as 1 kHz; QEMU's USART delivers bytes faster than any line and may delay a tick.
 const RATE_HZ: std::ops::RangeInclusive<f32> = 997.0..=1003.0;
+/// MAV_CMD_COMPONENT_ARM_DISARM.
+const ARM_DISARM: u16 = 400;
 /// SysTick's reload value register.
 const SYST_RVR: u32 = 0xE000_E014;
 
@@ -39,7 +41,7 @@ struct Talk {
 #[derive(Debug, Default)]
 struct Heard {
     heartbeats: u32,
-    /// Time of the newest rotor command \[us since power-up\].
+    /// Time of the newest rotor command, or health \[us since power-up\].
     time_us: u64,
     health: Health,
     answers: HashSet<Answer>,
@@ -60,8 +62,12 @@ impl Talk {
             let (spoke_us, heard) = (self.spoke_us, &mut self.heard);
             self.decoder.feed(&self.board.receive().unwrap(), |_, message| match message {
                 Downlink::Heartbeat { .. } => heard.heartbeats += 1,
-                Downlink::Health(health) => heard.health = health,
-                Downlink::Answer { answer, .. } => drop(heard.answers.insert(answer)),
+                // The station's first words ask for rotor commands: until then the time is that of the health.
+                Downlink::Health(health) => {
+                    heard.time_us = heard.time_us.max(health.time_us);
+                    heard.health = health;
+                }
+                Downlink::Answer { command: ARM_DISARM, answer, .. } => drop(heard.answers.insert(answer)),
                 Downlink::Text { text, .. } => drop(heard.texts.insert(text.to_str().unwrap().to_owned())),
                 Downlink::Rotors { time_us, .. } => heard.time_us = time_us,
                 _ => (),
@@ -217,7 +223,7 @@ fn the_flight_image_has_a_log() {
 }
 
 /// Address range of the stack, at the bottom of the RAM (`memory.x`).
-const STACK: std::ops::Range<u32> = 0x2000_0000..0x2000_C000;
+const STACK: std::ops::Range<u32> = 0x2000_0000..0x2000_E000;
 const HARD_FAULT: u32 = 3;
 
 #[test]

@@ -4,6 +4,8 @@
 mod common;
 
 use afbc_flight_core::Mode;
+use afbc_link::{Command, Uplink};
+use afbc_onboard::services::streams::DEFAULTS;
 use afbc_sim::in_the_loop::{Host, Station, Tick};
 use common::start_or_skip;
 use pil::exercise::{TICKS, bytes_of_tick};
@@ -23,7 +25,8 @@ fn every_bit_is_the_hosts() {
     let (mut host, mut station) = (Host::new().unwrap(), Station::default());
     let mut modes = Vec::new();
     for (tick, reply) in replies.iter().enumerate() {
-        let Tick { report, bytes } = host.tick(&bytes_of_tick(&mut station, tick as u64), reply.time_us, reply.cycles);
+        let Tick { report, bytes, .. } =
+            host.tick(&bytes_of_tick(&mut station, tick as u64), reply.time_us, reply.cycles);
         assert_eq!(report.throttles, reply.throttles, "throttles of tick {tick}");
         assert_eq!(bytes, reply.bytes, "bytes of tick {tick}");
         assert_eq!(report.health.rate.off_ticks(), 0, "tick {tick} came at the wrong time");
@@ -44,6 +47,38 @@ fn every_run_is_the_same() {
     let second = fly(start_or_skip(Image::Pil, |elf| Emulator::start(&elf)).unwrap());
     let differs = first.iter().zip(&second).position(|(a, b)| a != b);
     assert_eq!(differs, None, "index of the first tick that differs");
+}
+
+/// Every stream at its highest rate, states, targets and questions in every tick, on a processor of half the
+/// speed: what the link does never delays a tick, and every tick is reported.
+#[test]
+fn no_tick_is_late_while_every_stream_runs_at_full_rate() {
+    for slower in [0, 1] {
+        let start = |elf: std::path::PathBuf| Emulator::start_slower(&elf, slower);
+        let Some(mut emulator) = start_or_skip(Image::Pil, start) else { return };
+        let (mut station, mut sent) = (Station::default(), 0);
+        for (place, (message, _)) in DEFAULTS.iter().enumerate() {
+            let command = Command::SetInterval { message: *message, interval_us: 1_000 };
+            station.say(&Uplink::Command(command));
+            if place % 4 == 3 {
+                emulator.exchange(&station.take()).unwrap();
+            }
+        }
+        let mut last_us: Option<u64> = None;
+        for tick in 0..3_000 {
+            station.say(&Uplink::Command(Command::RequestMessage { message: 148, index: 0 }));
+            let reply = emulator.exchange(&[station.take(), bytes_of_tick(&mut station, tick)].concat()).unwrap();
+            let gap_us = last_us.map_or(1_000, |last_us| reply.time_us - last_us);
+            assert!(
+                gap_us.abs_diff(1000) <= 10 << slower,
+                "{slower}: {gap_us} us between ticks, at {} us",
+                reply.time_us
+            );
+            last_us = Some(reply.time_us);
+            sent += reply.bytes.len();
+        }
+        println!("{slower}: {sent} bytes in 3 s");
+    }
 }
 
 /// The control tick comes exactly once per control period, at its start, whatever the processor's speed: a faster or

@@ -1,0 +1,156 @@
+//! The vehicle's parameters: read from the board's flash at the start, written to it while disarmed.
+//!
+//! Sectors are erased at the start only, before the watchdog and the control tick run: while a sector of the chip's own
+//! flash is erased, up to half a second, every access to the flash stops the core. Writing stops it for 16 us a word,
+//! 100
+//! us at most, with the tick's interrupt served in between: a tick comes up to 0.1 ms late, which is within its
+//! tolerance. No word is written while armed ([`Gate`]).
+
+use crate::control;
+use crate::vehicle::{CONFIGURATION, NAME, ROTORS};
+use afbc_onboard::parameters::{Change, Kept};
+use afbc_store::{Error, Store, hash};
+use core::cell::RefCell;
+use core::future::poll_fn;
+use core::pin::pin;
+use core::task::Poll;
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use embassy_time::{Instant, Timer};
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use heapless::Deque;
+
+/// Parameters of this vehicle.
+pub type Table = afbc_onboard::parameters::Table<ROTORS>;
+/// What they make of it.
+pub type Configuration = afbc_onboard::Configuration<ROTORS>;
+/// A configuration ready to be flown.
+pub type Prepared = afbc_onboard::Prepared<ROTORS>;
+
+/// Changes to be written, and a signal that there are some.
+static CHANGES: Mutex<CriticalSectionRawMutex, RefCell<Deque<Change, 8>>> = Mutex::new(RefCell::new(Deque::new()));
+static CHANGED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+/// Time between two looks at whether the vehicle is still armed \[us\].
+const PATIENCE_US: u64 = 100_000;
+
+/// Flash that is written word by word, and not while the vehicle is armed.
+pub struct Gate<M>(M);
+
+/// Why a [`Gate`] does nothing.
+#[derive(Clone, Copy, Debug)]
+pub enum Shut {
+    /// The vehicle is armed.
+    Armed,
+    /// The flash itself.
+    Flash(NorFlashErrorKind),
+}
+
+impl NorFlashError for Shut {
+    fn kind(&self) -> NorFlashErrorKind {
+        match *self {
+            Shut::Armed => NorFlashErrorKind::Other,
+            Shut::Flash(kind) => kind,
+        }
+    }
+}
+
+impl<M: NorFlash> ErrorType for Gate<M> {
+    type Error = Shut;
+}
+
+impl<M: NorFlash> ReadNorFlash for Gate<M> {
+    const READ_SIZE: usize = M::READ_SIZE;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Shut> {
+        self.0.read(offset, bytes).map_err(|error| Shut::Flash(error.kind()))
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.capacity()
+    }
+}
+
+impl<M: NorFlash> NorFlash for Gate<M> {
+    const WRITE_SIZE: usize = M::WRITE_SIZE;
+    const ERASE_SIZE: usize = M::ERASE_SIZE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Shut> {
+        self.0.erase(from, to).map_err(|error| Shut::Flash(error.kind()))
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Shut> {
+        (offset..).step_by(M::WRITE_SIZE).zip(bytes.chunks(M::WRITE_SIZE)).try_for_each(|(at, word)| {
+            if control::armed() {
+                return Err(Shut::Armed);
+            }
+            self.0.write(at, word).map_err(|error| Shut::Flash(error.kind()))
+        })
+    }
+}
+
+/// Writes the changes; none without a store.
+pub struct Keeper<M>(Option<Store<Gate<M>>>);
+
+/// Reads the parameters from `memory`, whose sectors begin at `start`, and makes room for changes. Without a store that
+/// can be read, the parameters are the image's.
+pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, Table) {
+    let mut table = Table::new(CONFIGURATION);
+    let Ok(mut store) = Store::open(Gate(memory), start, hash(NAME.as_bytes())) else { return (Keeper(None), table) };
+    if store.make_room().is_err() {
+        defmt::warn!("the parameters' flash cannot be erased");
+    }
+    let notice = |notice: afbc_onboard::parameters::Reason| defmt::warn!("{=str}", notice.as_str());
+    if Kept::NOW.load(&mut table, &mut store, notice).is_err() {
+        defmt::warn!("the parameters' flash cannot be read");
+    }
+    (Keeper(Some(store)), table)
+}
+
+/// Takes a change over to flight and flash: the next tick of the disarmed vehicle flies `table`. False if too many
+/// changes are waiting to be written; this one will be forgotten at the next start.
+#[must_use = "the station is to be told"]
+pub fn change(table: &Table, change: Change) -> bool {
+    if let Ok(prepared) = Prepared::new(table.configuration()) {
+        control::fly(prepared);
+    }
+    let queued = CHANGES.lock(|changes| changes.try_borrow_mut().ok()?.push_back(change).ok()).is_some();
+    CHANGED.signal(());
+    queued
+}
+
+/// Writes changes while the vehicle is disarmed.
+pub async fn run<M: NorFlash>(keeper: &mut Keeper<M>) -> ! {
+    loop {
+        let change = next().await;
+        let Keeper(Some(store)) = keeper else { continue };
+        loop {
+            match keep(store, change) {
+                // Cut off by arming, if not by the flash: once more when the vehicle is disarmed.
+                Err(Error::Flash(Shut::Armed)) => {
+                    Timer::at(Instant::from_micros(Instant::now().as_micros().wrapping_add(PATIENCE_US))).await;
+                }
+                Err(error) => break defmt::warn!("{=str}", error.reason()),
+                Ok(()) => break,
+            }
+        }
+    }
+}
+
+/// Writes a change. Out of line, to be identified in the image.
+#[inline(never)]
+fn keep<M: NorFlash>(store: &mut Store<Gate<M>>, change: Change) -> Result<(), Error<Shut>> {
+    Kept::NOW.keep(store, change)
+}
+
+/// Waits for a change.
+fn next() -> impl Future<Output = Change> {
+    poll_fn(|context| {
+        // Registered before looking, so that no change is missed.
+        let _ = pin!(CHANGED.wait()).poll(context);
+        match CHANGES.lock(|changes| changes.try_borrow_mut().ok()?.pop_front()) {
+            Some(change) => Poll::Ready(change),
+            None => Poll::Pending,
+        }
+    })
+}
