@@ -65,11 +65,12 @@ fn fly(height_m: f64, speed_m_s: f64, frozen: Frozen) -> Seen {
             station.track(now_ms * 1000, state);
         }
         let mut setpoint = afbc_types::Setpoint::default();
-        setpoint.position_m.z = (t.min(height_m) + 0.02) as f32;
+        setpoint.position_m.z = height_m as f32;
         setpoint.position_m.x = ((t - 2.0).max(0.0) * speed_m_s) as f32;
         setpoint.velocity_m_s.x = if t > 2.0 { speed_m_s as f32 } else { 0.0 };
         station.lead(setpoint);
         if now_ms == ARM_MS {
+            station.follow();
             station.command(Command::Arm);
         }
         let tick = host.next_tick(&station.take());

@@ -8,6 +8,8 @@ use afbc::Profile;
 use afbc::monitor::Bounds;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Curve;
+use afbc_onboard::parameters::Table;
+use afbc_onboard::{Configuration, Link};
 use afbc_plant::instruments::{Accelerometer, Barometer, Gnss, Gyroscope, Imu, Magnetometer, Mounting, Tracker};
 use afbc_plant::{Battery, Contact, Deviations, Drag, Dropouts, GroundEffect, Rotors, Sensing, Turbulence, Wind};
 use afbc_reader::words::number;
@@ -112,6 +114,8 @@ fn groups() -> Vec<Group> {
         group("Inertial sensor: `[imu]` of a vehicle file", "IMU_", Mounting::DEFAULT),
         group("Arming", "ARM_", ArmingLimits::DEFAULT),
         group("Estimator: `[estimator]` of a vehicle file", "EST_", afbc_estimator::Settings::DEFAULT),
+        group("Guidance", "", afbc_guidance::Settings::DEFAULT),
+        group("Link", "", Link::DEFAULT),
         profiles("Control: `[settings]`, `[limits]`", "C_", Profile::settings),
         profiles("AFBC's monitor", "M_", bounds),
     ];
@@ -147,15 +151,17 @@ WRITE=1 cargo test -p flight-tests --test parameters
 
 **Name** is a parameter's name on a ground station and in flash: the prefix of its group, an axis or a part of the
 group, its id, and X, Y or Z of a vector. A name has at most 16 characters, MAVLink's limit, and never changes. **Key**
-is the name in [scenario files](scenarios.md). **Tuned** marks the parameters that `sitl tune` searches; the others
-belong to the vehicle and its task. Where there are two profiles, the firmware flies `flight`, and scenario files start
-from `paper`.
+is the name in [scenario files](scenarios.md). The groups `V_`, `MOT_`, `ARM_`, `EST_`, `C_`, `A_` and those without a
+prefix can be set while the vehicle runs ([storage.md](storage.md)). **Tuned** marks the parameters that `sitl tune`
+searches; the others belong to the vehicle and its task. Where there are two profiles, the firmware flies `flight`, and
+scenario files start from `paper`.
 ";
 
 fn page() -> String {
     let mut page = HEAD.to_owned();
     for Group { title, prefix, columns, rows, .. } in groups() {
-        write!(page, "\n## {title}\n\nPrefix `{prefix}`.\n\n").unwrap();
+        let prefix = if prefix.is_empty() { "No prefix".to_owned() } else { format!("Prefix `{prefix}`") };
+        write!(page, "\n## {title}\n\n{prefix}.\n\n").unwrap();
         writeln!(page, "| name | key | unit | range | {} | tuned | meaning |", columns.join(" | ")).unwrap();
         writeln!(page, "|---|---|---|---|{}---|---|", "---|".repeat(columns.len())).unwrap();
         for Row { name, values, declaration: Declaration { group, range, unit, tuned, meaning, .. } } in rows {
@@ -290,11 +296,26 @@ fn names_are_unique_and_fit_mavlink() {
     assert!(names.len() > 150, "{}", names.len());
 }
 
+/// What a station sees of the firmware's vehicle is on the page, with the same range.
+#[test]
+fn what_a_station_may_set_is_declared_here() {
+    let rows: BTreeMap<String, Declaration> =
+        groups().into_iter().flat_map(|group| group.rows).map(|row| (row.name, row.declaration)).collect();
+    let table = Table::new(Configuration::default());
+    for parameter in table.iter() {
+        assert_eq!(rows[parameter.name.as_str()].range, parameter.range, "{}", parameter.name);
+    }
+    let settable = ["", "V_", "MOT_", "ARM_", "EST_", "C_", "A_"];
+    let expected: usize =
+        groups().iter().filter(|group| settable.contains(&group.prefix)).map(|group| group.rows.len()).sum();
+    assert_eq!(usize::from(table.count()), expected);
+}
+
 /// True if a parameter has no unit, or its key ends in it.
 fn is_in_key(Declaration { range, unit, .. }: &Declaration) -> bool {
     let ending: String = unit.to_lowercase().replace([' ', '/'], "_");
-    // "1/s" is "_1_s"; a plain number "1" has no ending.
-    ["1", ""].contains(unit) || range.name.ends_with(&format!("_{ending}"))
+    // "1/s" is "_1_s"; a plain or whole number has no ending.
+    ["1", "number", ""].contains(unit) || range.name.ends_with(&format!("_{ending}"))
 }
 
 /// A key ends in its unit, unless it is one of the paper's letters.
