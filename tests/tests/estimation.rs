@@ -133,8 +133,8 @@ fn the_tracker_is_gone_in_hover() {
         );
         assert!(far_m <= most_m, "{gap_s} s: {far_m} m");
         // A frozen pose is believed for 0.2 s, against what the inertial sensor says.
-        let most = if matches!(failure, Failure::TrackerFrozen) { 1.5 } else { 1.2 };
-        assert!(after <= most * before, "{gap_s} s: {after} N after {before} N");
+        let most = if matches!(failure, Failure::TrackerFrozen) { 0.19 } else { 1.2 * before };
+        assert!(after <= most, "{gap_s} s: {after} N after {before} N");
     }
 }
 
@@ -215,6 +215,30 @@ fn every_law_flies_on_it() {
             let mut estimates = 0;
             let lost = fly(&scenario, contender, |sample| estimates += u32::from(sample.estimated.is_some()));
             assert_eq!((lost.unwrap(), estimates), (None, 15_001), "{name}, {}", contender.name);
+        }
+    }
+}
+
+/// Neither rotors that shake the inertial sensor twice as much nor fixes reach the inputs, and the monitor finds no
+/// limit cycle. Without the notch roll and pitch change by 50 mN a step.
+#[test]
+fn shaken_twice_as_much() {
+    for name in ["mocap", "outdoor"] {
+        let mut scenario = Scenario { duration_s: 20.0, ..scenario(name) };
+        let imu = scenario.instruments.imu.as_mut().unwrap();
+        (imu.gyro.vibration_rad_s, imu.accel.vibration_m_s2) = (0.04, 2.0);
+        let contender = afbc(&scenario).clone().monitored();
+        for seed in 1..=4 {
+            let mut metrics = Accumulator::default();
+            let mut trips = false;
+            let lost = fly(&Scenario { seed, ..scenario.clone() }, &contender, |sample| {
+                metrics.add(sample);
+                trips |= sample.action.health.trip.is_some();
+            });
+            let [roll, pitch, yaw, thrust] = metrics.finish().mean_abs_delta_u.map(|change_n| 1e3 * change_n).into();
+            println!("{name}, seed {seed}: {roll:.1}, {pitch:.1}, {yaw:.1}, {thrust:.1} mN a step");
+            assert_eq!((lost.unwrap(), trips), (None, false), "{name}, seed {seed}");
+            assert!(roll.max(pitch) <= 25.0 && thrust <= 10.0, "{name}, seed {seed}: {roll}, {pitch}, {thrust} mN");
         }
     }
 }

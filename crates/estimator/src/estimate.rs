@@ -101,4 +101,8 @@ pub struct Estimate {
     pub imu: ImuHealth,
     /// Resets since the memory's beginning.
     pub resets: Resets,
+    /// What measurements have changed in this step: position \[m\].
+    pub moved_m: Vector3<f32>,
+    /// And velocity \[m/s\].
+    pub moved_m_s: Vector3<f32>,
 }

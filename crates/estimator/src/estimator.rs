@@ -6,6 +6,7 @@ use crate::estimate::{Estimate, Sigmas, Validity};
 use crate::imu::LowPass;
 use crate::measurement::ImuSample;
 use crate::memory::{Memory, NO_INTERVAL};
+use crate::nominal::Nominal;
 use crate::rotation::{euler, identity, matrix, renormalized};
 use crate::settings::Settings;
 use afbc_control::math::{max, min, sqrt, wrap_angle};
@@ -117,6 +118,7 @@ impl Estimator {
     #[inline(never)]
     fn advance(&self, memory: &mut Memory, now_us: u64, imu: Option<&ImuSample>) {
         let predicted = imu.is_some_and(|sample| self.take(memory, now_us, sample));
+        memory.moved = (Vector3::zeros(), Vector3::zeros());
         if memory.runs {
             // Between fixes, since a fix holds a state of before.
             if predicted {
@@ -124,7 +126,9 @@ impl Estimator {
             } else if memory.fix.is_none() && memory.history.is_unsettled() {
                 memory.history.settle(self.settings.gravity_m_s2);
             } else {
+                let Nominal { position, velocity, .. } = memory.nominal;
                 self.fuse(memory, now_us);
+                memory.moved = (memory.nominal.position - position, memory.nominal.velocity - velocity);
             }
         } else {
             self.listen(memory, now_us);
@@ -254,6 +258,7 @@ impl Estimator {
         estimate.gyro_bias_rad_s = nominal.gyro_bias;
         estimate.accel_bias_m_s2 = nominal.accel_bias;
         estimate.height_offset_m = memory.height_offset;
+        (estimate.moved_m, estimate.moved_m_s) = memory.moved;
         let variances = memory.covariance.variances();
         let root = |v: &Vector3<f32>| v.map(sqrt);
         estimate.sigmas = Sigmas {

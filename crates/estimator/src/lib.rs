@@ -80,8 +80,8 @@
 //!
 //! # For a controller
 //!
-//! When an aid comes back after seconds without, position and velocity jump to where they are. [`Easing`] tells a
-//! controller the same state without the jump.
+//! Each fix makes position and velocity jump, those of an aid that comes back most, and the rotors shake the velocity.
+//! [`Easing`] tells a controller the same state without either.
 //!
 //! # When something is wrong
 //!

@@ -37,6 +37,8 @@ pub struct Memory {
     /// The same, summed up to now, and the time of the last such sample \[us\].
     pub(crate) lately: ((f32, f32), u64),
     pub(crate) history: History,
+    /// What measurements have changed in the last step: position \[m\] and velocity \[m/s\].
+    pub(crate) moved: (Vector3<f32>, Vector3<f32>),
     pub(crate) queue: Queue,
     /// The fix that is being fused.
     pub(crate) fix: Option<Fix>,
@@ -91,6 +93,7 @@ impl Default for Memory {
             rough: (0.0, 0.0),
             lately: ((0.0, 0.0), 0),
             history: History::default(),
+            moved: (Vector3::zeros(), Vector3::zeros()),
             queue: Queue::default(),
             fix: None,
             height_offset: 0.0,

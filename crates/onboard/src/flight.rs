@@ -8,6 +8,7 @@ use crate::readings::Readings;
 use crate::silence::Silence;
 use afbc::monitor::{Bounds, Norm};
 use afbc::{Guarded, guarded};
+use afbc_control::math;
 use afbc_estimator::Estimator;
 use afbc_flight_core::{Answer, End, Health, Mode, Motor, Vehicle, VehicleMemory};
 use afbc_types::{Axis, Declared, OutOfRange, ROTORS_MAX, RotorSpeeds, State};
@@ -34,6 +35,8 @@ pub struct Flight<const N: usize = 4> {
 pub struct Prepared<const N: usize = 4> {
     vehicle: Vehicle<Guarded<N>, N>,
     estimator: Estimator,
+    /// Speed of the rotors in hover \[rad/s\].
+    hover_rad_s: f32,
     motor: Motor,
     guide: Guide,
 }
@@ -48,14 +51,16 @@ impl<const N: usize> Prepared<N> {
         let Configuration { airframe, settings, gains, curve, estimation, arming, guidance: _, link: _ } =
             configuration;
         // The controller checks what follows from these and assumes that each is in its range.
-        airframe.parameters.validate()?;
+        let parameters = &airframe.parameters;
+        parameters.validate()?;
         settings.validate()?;
         gains.validate()?;
-        let bounds = Bounds::new(gains, &airframe.parameters, settings);
+        let bounds = Bounds::new(gains, parameters, settings);
         let controller = Guarded::new(*airframe, *settings, *gains, bounds)?;
         Ok(Prepared {
-            vehicle: Vehicle::new(airframe.parameters, *arming, controller)?,
+            vehicle: Vehicle::new(*parameters, *arming, controller)?,
             estimator: Estimator::new(*estimation)?,
+            hover_rad_s: math::sqrt(parameters.weight_n() / (N as f32 * parameters.thrust_factor_n_s2)),
             motor: Motor::new(*curve)?,
             guide: Guide::new(configuration)?,
         })
@@ -108,11 +113,11 @@ impl<const N: usize> Flight<N> {
     /// # Errors
     /// Those of [`Prepared::new`].
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
-        let Prepared { vehicle, estimator, motor, guide } = Prepared::new(configuration)?;
+        let Prepared { vehicle, estimator, hover_rad_s, motor, guide } = Prepared::new(configuration)?;
         Ok(Flight {
             vehicle,
             memory: VehicleMemory::default(),
-            navigation: Navigation::new(estimator),
+            navigation: Navigation::new(estimator, hover_rad_s),
             motor,
             guide,
             silence: Silence::default(),
@@ -128,9 +133,9 @@ impl<const N: usize> Flight<N> {
     pub fn adopt(&mut self, prepared: &Prepared<N>) -> bool {
         let disarmed = !self.memory.mode().armed();
         if disarmed {
-            let Prepared { vehicle, estimator, motor, guide } = prepared;
+            let Prepared { vehicle, estimator, hover_rad_s, motor, guide } = prepared;
             self.vehicle.clone_from(vehicle);
-            self.navigation.adopt(estimator);
+            self.navigation.adopt(estimator, *hover_rad_s);
             self.motor = *motor;
             self.guide.adopt(guide);
         }

@@ -32,12 +32,12 @@ pub struct Navigation {
 }
 
 impl Navigation {
-    /// Creates it with nothing read.
-    pub fn new(estimator: Estimator) -> Self {
+    /// Creates it with nothing read, for a vehicle whose rotors turn at this speed in hover \[rad/s\].
+    pub fn new(estimator: Estimator, hover_rad_s: f32) -> Self {
         Navigation {
             estimator,
             memory: Memory::default(),
-            easing: Easing::default(),
+            easing: Easing::new(hover_rad_s),
             senses: false,
             works: true,
             origin_m: None,
@@ -46,8 +46,8 @@ impl Navigation {
     }
 
     /// Goes on with another estimator.
-    pub(crate) fn adopt(&mut self, estimator: &Estimator) {
-        self.estimator = *estimator;
+    pub(crate) fn adopt(&mut self, estimator: &Estimator, hover_rad_s: f32) {
+        (self.estimator, self.easing) = (*estimator, Easing::new(hover_rad_s));
     }
 
     /// Takes the readings of a tick at `now_us`, tells `inbox` what the vehicle knows, and returns the estimated state;

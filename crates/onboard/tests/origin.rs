@@ -38,7 +38,8 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let navigation = Estimator::new(Settings::DEFAULT).map(Navigation::new).expect("valid");
+        let navigation =
+            Estimator::new(Settings::DEFAULT).map(|estimator| Navigation::new(estimator, 0.0)).expect("valid");
         Bench { navigation, inbox: Inbox::default(), missing: None, ms: 0 }
     }
 
