@@ -2,7 +2,7 @@
 
 use crate::estimate::Estimate;
 use afbc_control::math::{max, min, sqrt, tan};
-use afbc_types::State;
+use afbc_types::{Parameters, State};
 use core::f32::consts::TAU;
 use nalgebra::Vector3;
 
@@ -21,9 +21,9 @@ const NOTCH_MIN_RAD_S: f32 = 10.0 * TAU;
 const NOTCH_MAX_RAD_S: f32 = 100.0 * TAU;
 
 /// Hides the jumps of position and velocity that measurements make: the state goes on as the inertial sensor says, and
-/// approaches the estimate within 0.2 s, or at 1 m/s and 3 m/s2 from further away, as when an aid comes
-/// back. A law would answer each fix with a kick. From the velocity a notch takes what the rotors' vibration makes of
-/// it, which a law would make an attitude of, and a body rate of that. Attitude and rates pass as they are.
+/// approaches the estimate within 0.2 s, or at 1 m/s and 3 m/s2 from further away, as when an aid comes back. A law
+/// would answer each fix with a kick. From the velocity a notch takes what the rotors' vibration makes of it, which a
+/// law would make an attitude of, and a body rate of that. Attitude and rates pass as they are.
 ///
 /// The default has no notch, and is that before the first estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -67,9 +67,14 @@ impl Notch {
 }
 
 impl Easing {
-    /// Creates the one for a vehicle whose rotors turn at this speed in hover \[rad/s\]; 0 for no notch.
+    /// Creates the one for a vehicle with these nominal parameters and this number of rotors.
     #[must_use]
-    pub fn new(hover_rad_s: f32) -> Self {
+    pub fn of(vehicle: &Parameters<f32>, rotors: usize) -> Self {
+        Self::new(sqrt(vehicle.weight_n() / (rotors as f32 * vehicle.thrust_factor_n_s2)))
+    }
+
+    /// Creates the one for rotors that turn at this speed in hover \[rad/s\].
+    fn new(hover_rad_s: f32) -> Self {
         let has_notch = (NOTCH_MIN_RAD_S..=NOTCH_MAX_RAD_S).contains(&hover_rad_s);
         Easing { notch: has_notch.then(|| Notch::new(hover_rad_s)), ..Easing::default() }
     }
@@ -107,6 +112,7 @@ impl Easing {
 mod tests {
     use super::{Easing, NOTCH_MAX_RAD_S};
     use crate::estimate::{Estimate, Validity};
+    use afbc_types::Parameters;
 
     /// An estimate of a vehicle at 1 m/s whose position is off by `error_m`, and was moved by `moved_m`.
     fn estimate(ms: u64, error_m: f32, moved_m: f32) -> Estimate {
@@ -193,6 +199,10 @@ mod tests {
                 assert!((gain - expected).abs() < 0.02, "{hover_rad_s} rad/s, {ratio}: {gain}, not {expected}");
             }
         }
+        assert_eq!(
+            Easing::of(&Parameters::PAPER.to_f32(), 4),
+            Easing::new((0.486 * 9.81 / (4.0 * 2.984e-5_f32)).sqrt())
+        );
         for hover_rad_s in [0.0, 30.0, NOTCH_MAX_RAD_S + 1.0, f32::NAN] {
             assert_eq!(Easing::new(hover_rad_s), Easing::default());
         }

@@ -8,8 +8,7 @@ use crate::readings::Readings;
 use crate::silence::Silence;
 use afbc::monitor::{Bounds, Norm};
 use afbc::{Guarded, guarded};
-use afbc_control::math;
-use afbc_estimator::Estimator;
+use afbc_estimator::{Easing, Estimator};
 use afbc_flight_core::{Answer, End, Health, Mode, Motor, Vehicle, VehicleMemory};
 use afbc_types::{Axis, Declared, OutOfRange, ROTORS_MAX, RotorSpeeds, State};
 use core::array;
@@ -35,8 +34,7 @@ pub struct Flight<const N: usize = 4> {
 pub struct Prepared<const N: usize = 4> {
     vehicle: Vehicle<Guarded<N>, N>,
     estimator: Estimator,
-    /// Speed of the rotors in hover \[rad/s\].
-    hover_rad_s: f32,
+    easing: Easing,
     motor: Motor,
     guide: Guide,
 }
@@ -60,7 +58,7 @@ impl<const N: usize> Prepared<N> {
         Ok(Prepared {
             vehicle: Vehicle::new(*parameters, *arming, controller)?,
             estimator: Estimator::new(*estimation)?,
-            hover_rad_s: math::sqrt(parameters.weight_n() / (N as f32 * parameters.thrust_factor_n_s2)),
+            easing: Easing::of(parameters, N),
             motor: Motor::new(*curve)?,
             guide: Guide::new(configuration)?,
         })
@@ -113,11 +111,11 @@ impl<const N: usize> Flight<N> {
     /// # Errors
     /// Those of [`Prepared::new`].
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
-        let Prepared { vehicle, estimator, hover_rad_s, motor, guide } = Prepared::new(configuration)?;
+        let Prepared { vehicle, estimator, easing, motor, guide } = Prepared::new(configuration)?;
         Ok(Flight {
             vehicle,
             memory: VehicleMemory::default(),
-            navigation: Navigation::new(estimator, hover_rad_s),
+            navigation: Navigation::new(estimator, easing),
             motor,
             guide,
             silence: Silence::default(),
@@ -133,9 +131,9 @@ impl<const N: usize> Flight<N> {
     pub fn adopt(&mut self, prepared: &Prepared<N>) -> bool {
         let disarmed = !self.memory.mode().armed();
         if disarmed {
-            let Prepared { vehicle, estimator, hover_rad_s, motor, guide } = prepared;
+            let Prepared { vehicle, estimator, easing, motor, guide } = prepared;
             self.vehicle.clone_from(vehicle);
-            self.navigation.adopt(estimator, *hover_rad_s);
+            self.navigation.adopt(estimator, easing);
             self.motor = *motor;
             self.guide.adopt(guide);
         }

@@ -32,12 +32,12 @@ pub struct Navigation {
 }
 
 impl Navigation {
-    /// Creates it with nothing read, for a vehicle whose rotors turn at this speed in hover \[rad/s\].
-    pub fn new(estimator: Estimator, hover_rad_s: f32) -> Self {
+    /// Creates it with nothing read.
+    pub fn new(estimator: Estimator, easing: Easing) -> Self {
         Navigation {
             estimator,
             memory: Memory::default(),
-            easing: Easing::new(hover_rad_s),
+            easing,
             senses: false,
             works: true,
             origin_m: None,
@@ -46,8 +46,8 @@ impl Navigation {
     }
 
     /// Goes on with another estimator.
-    pub(crate) fn adopt(&mut self, estimator: &Estimator, hover_rad_s: f32) {
-        (self.estimator, self.easing) = (*estimator, Easing::new(hover_rad_s));
+    pub(crate) fn adopt(&mut self, estimator: &Estimator, easing: &Easing) {
+        (self.estimator, self.easing) = (*estimator, *easing);
     }
 
     /// Takes the readings of a tick at `now_us`, tells `inbox` what the vehicle knows, and returns the estimated state;

@@ -1,7 +1,7 @@
 //! The local frame of a vehicle with a GNSS receiver.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use afbc_estimator::{Estimator, Measurement, Settings};
+use afbc_estimator::{Easing, Estimator, Measurement, Settings};
 use afbc_flight_core::{Inbox, Refusal, Stamped};
 use afbc_onboard::{Aged, Navigation, Readings};
 use afbc_types::{Pose, PoseSigmas, State};
@@ -38,8 +38,9 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let navigation =
-            Estimator::new(Settings::DEFAULT).map(|estimator| Navigation::new(estimator, 0.0)).expect("valid");
+        let navigation = Estimator::new(Settings::DEFAULT)
+            .map(|estimator| Navigation::new(estimator, Easing::default()))
+            .expect("valid");
         Bench { navigation, inbox: Inbox::default(), missing: None, ms: 0 }
     }
 

@@ -3,7 +3,6 @@
 use super::sensing::{Sensing, still};
 use super::told;
 use crate::scenario::Scenario;
-use afbc_control::math;
 use afbc_estimator::{Aid, Easing, Estimate, Estimator, Memory};
 use afbc_onboard::{Aged, pose};
 use afbc_plant::Truth;
@@ -117,7 +116,7 @@ impl Navigator {
             sensing,
             estimator: estimator(scenario, &imu, step_s)?,
             memory: Memory::default(),
-            easing: Easing::new(hover_rad_s(scenario)),
+            easing: Easing::of(&scenario.vehicle.to_f32(), scenario.rotors.len()),
             step_s,
             steps: 0,
             settling: ((REST_S + waits_s + CARRIED_S) / step_s).round() as u64,
@@ -250,12 +249,6 @@ fn is_valid(estimate: &Estimate) -> bool {
 pub(super) fn estimator(scenario: &Scenario, imu: &Imu, step_s: f64) -> Result<Estimator, OutOfRange> {
     let gravity_m_s2 = scenario.vehicle.gravity_m_s2;
     Estimator::new(told::settings(&scenario.instruments, imu, scenario.rotors.len(), gravity_m_s2, step_s))
-}
-
-/// Returns the speed at which the rotors carry the vehicle \[rad/s\], by its nominal parameters.
-fn hover_rad_s(scenario: &Scenario) -> f32 {
-    let vehicle = scenario.vehicle.to_f32();
-    math::sqrt(vehicle.weight_n() / (scenario.rotors.len() as f32 * vehicle.thrust_factor_n_s2))
 }
 
 /// Truth less estimate, in the order of the covariance: rotation about the axes of the earth frame \[rad\], velocity
