@@ -3,6 +3,7 @@
 //! Which one it is, is decided when the image is built, and everything about it is checked there.
 
 use afbc::adaptive::Gains;
+use afbc::disturbance::DisturbanceObserver;
 use afbc::fuzzy::Membership;
 use afbc::reference::ReferenceModel;
 use afbc::{Limits, Safeguards, Settings, backstepping};

@@ -22,7 +22,7 @@ impl Bounds {
     /// motors lose thrust with the battery's voltage.
     fn of(kind: ControllerKind) -> Self {
         match kind {
-            ControllerKind::Backstepping => Bounds { rms_m: 4.5, end_m: 0.6 },
+            ControllerKind::Backstepping => Bounds { rms_m: 7.5, end_m: 0.6 },
             _ => Bounds { rms_m: 1.3, end_m: 0.05 },
         }
     }

@@ -52,6 +52,22 @@ fn a_fast_curve_is_no_disturbance() {
     assert!(rms_m < 0.002, "{rms_m} m");
 }
 
+/// In turbulence the disturbance observer keeps the vehicle nearer to its reference by a third at least.
+#[test]
+fn wind_is_observed_not_learnt() {
+    for seed in 1..=3 {
+        let mut without = flown(ControllerKind::Afbc);
+        without.settings.disturbance.disturbance_rad_s = 0.0;
+        let rms_m = |contender: &Contender| {
+            let run = Run::fly(&turbulent(seed), contender, u64::MAX).unwrap();
+            assert!(run.lost.is_none() && run.tripped.is_none(), "{:?} {:?}", run.lost, run.tripped);
+            run.metrics.rmse.xy().norm()
+        };
+        let [with_m, without_m] = [rms_m(&flown(ControllerKind::Afbc)), rms_m(&without)];
+        assert!(with_m < 0.67 * without_m, "seed {seed}: {with_m} m, {without_m} m without");
+    }
+}
+
 /// A state that is 20 ms old is flown on without chatter, which would be 100 mN and more.
 #[test]
 fn delay_of_20_ms_does_not_chatter() {
@@ -74,15 +90,15 @@ fn a_slow_tracker_with_a_gyroscope_suffices() {
     }
 }
 
-/// Noise of 0.05 rad/s on the rates costs at most a tenth more than under PID with its filters (5 % with seed 1).
+/// Noise of 0.05 rad/s on the rates costs less than under PID with its filters (0.8 of it).
 #[test]
-fn noisy_rates_cost_hardly_more_than_under_pid() {
+fn noisy_rates_cost_less_than_under_pid() {
     for seed in 1..=3 {
         let mut scenario = turbulent(seed);
         scenario.sensing.noise.rates_rad_s = 0.05;
         let [afbc, pid] = [ControllerKind::Afbc, ControllerKind::Pid]
             .map(|kind| afbc_tune::cost(&scenario, &Run::fly(&scenario, &flown(kind), u64::MAX).unwrap()));
-        assert!(afbc <= 1.1 * pid, "seed {seed}: {afbc}, PID {pid}");
+        assert!(afbc <= 0.9 * pid, "seed {seed}: {afbc}, PID {pid}");
     }
 }
 

@@ -155,6 +155,8 @@ fn the_flight_core_extrapolates_between_the_samples_of_a_scenario() {
     assert_eq!(flown(Pid, 0.06, false), None);
     for (kind, period_s, core) in [(Pid, 0.06, true), (Afbc, 0.04, true), (Afbc, 0.04, false)] {
         let rms_m = flown(kind, period_s, core);
-        assert!(rms_m.is_some_and(|rms_m| rms_m < 0.015), "{}: {rms_m:?} m", kind.name());
+        // AFBC's observer takes some of 25 states per second for wind.
+        let most_m = if kind == Afbc { 0.04 } else { 0.015 };
+        assert!(rms_m.is_some_and(|rms_m| rms_m < most_m), "{}: {rms_m:?} m", kind.name());
     }
 }

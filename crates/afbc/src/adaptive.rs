@@ -263,6 +263,8 @@ impl Law for Adaptive {
     /// What rotors do to a body that turns is part of what is learnt.
     const USES_ROTOR_RESIDUAL: bool = false;
 
+    const OBSERVES: bool = true;
+
     type Estimate = Estimate;
 
     #[inline(always)]
@@ -270,9 +272,13 @@ impl Law for Adaptive {
         let subsystem = &self.subsystems[axis];
         let errors = tracking.errors(subsystem.gains.backstepping.alpha1);
         let inputs = fuzzy_inputs(axis, [tracking.x1, tracking.x2], &errors);
-        let known = context.known.map_or(0.0, |model| {
-            backstepping::known(&subsystem.gains.backstepping, tracking, &errors, &context.dynamics(model, axis))
-        });
+        let known = match context.known {
+            Some(model) => {
+                let dynamics = context.observed(model, axis);
+                backstepping::known(&subsystem.gains.backstepping, tracking, &errors, &dynamics)
+            }
+            None => 0.0,
+        };
         (known + subsystem.step(&errors, inputs, context.unallocated[axis], context, estimate), errors)
     }
 

@@ -1,6 +1,7 @@
 //! Six subsystems in one cascade: position gives thrust and desired attitude, attitude gives U1..U3, and all give rotor
 //! speeds. Section III-D, Fig. 2.
 
+use crate::disturbance::{DisturbanceObserver, Observed, Observer};
 use crate::law::{Context, Law, Tracking};
 use crate::limits::Limits;
 use crate::model::{Model, RollPitch, euler_rates};
@@ -47,6 +48,9 @@ parameters! {
         /// filter's second derivative, which is mostly noise.
         #[switch(FEED_FORWARD)]
         pub feed_forward: bool = false,
+        /// Observer of the horizontal acceleration that the model does not know, for a law that is given what is known.
+        #[group("")]
+        pub disturbance: DisturbanceObserver = DisturbanceObserver::DEFAULT,
         /// Reference model between setpoint and law.
         #[group("")]
         pub reference: ReferenceModel = ReferenceModel::DEFAULT,
@@ -69,10 +73,11 @@ impl Settings {
     /// the paper.
     #[must_use]
     pub fn slowed(self, slowness: f32) -> Self {
-        let Settings { command_filter_rad_s, limits, reference, smoothing, .. } = self;
+        let Settings { command_filter_rad_s, limits, disturbance, reference, smoothing, .. } = self;
         Settings {
             command_filter_rad_s: command_filter_rad_s / slowness,
             limits: Limits { tilt_rate_max_rad_s: limits.tilt_rate_max_rad_s / slowness, ..limits },
+            disturbance: disturbance.slowed(slowness),
             reference: reference.slowed(slowness),
             smoothing: smoothing.slowed(slowness),
             ..self
@@ -93,6 +98,7 @@ pub struct Controller<L, const N: usize = 4> {
     law: L,
     /// Nominal model for the feed-forward.
     model: Model,
+    observer: Option<Observer>,
     reference: Option<Reference>,
     smoother: Smoother,
     mixer: Mixer<N>,
@@ -142,6 +148,8 @@ pub struct Cascade<E> {
     rotor_residual_rad_s: f32,
     /// eta and d eta/dt in the last step: the body's rates as in (6), or with feed-forward what follows from them.
     pub(crate) turning: [Vector3<f32>; 2],
+    /// See [`Observer`]; none before the first step.
+    pub(crate) observed: Option<Observed>,
     /// See [`Reference`]; none before the first step.
     detours: Option<Detours>,
     /// See [`Smoother`].
@@ -152,7 +160,7 @@ impl<E> Cascade<E> {
     /// Returns the memory with the estimates of another law, which starts with this rotor residual.
     pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>, rotor_residual_rad_s: f32) -> Cascade<F> {
         let Cascade { errors, distances, inputs, asked, desired, unallocated, standstill, .. } = *self;
-        let Cascade { turning, detours, smoothed, .. } = *self;
+        let Cascade { turning, observed, detours, smoothed, .. } = *self;
         Cascade {
             estimates,
             errors,
@@ -164,6 +172,7 @@ impl<E> Cascade<E> {
             standstill,
             rotor_residual_rad_s,
             turning,
+            observed,
             detours,
             smoothed,
         }
@@ -186,7 +195,7 @@ impl<E> Cascade<E> {
 /// Returns desired roll and pitch (40) \[rad\] for the horizontal accelerations u5, u6 \[m/s2\] at yaw psi \[rad\].
 /// `inverse_vertical` is mass over vertical thrust: 1/g in hover, as in (39).
 pub fn desired_attitude(u5: f32, u6: f32, yaw_rad: f32, inverse_vertical: f32) -> [f32; 2] {
-    Tilt::new(u5, u6, yaw_rad, inverse_vertical).rad
+    Tilt::new(u5, u6, [math::sin(yaw_rad), math::cos(yaw_rad)], inverse_vertical).rad
 }
 
 /// Returns a vector reduced to a norm of `max` in the same direction.
@@ -210,8 +219,7 @@ struct Tilt {
 
 impl Tilt {
     #[inline(always)]
-    fn new(u5: f32, u6: f32, yaw_rad: f32, inverse_vertical: f32) -> Self {
-        let (sin_psi, cos_psi) = (math::sin(yaw_rad), math::cos(yaw_rad));
+    fn new(u5: f32, u6: f32, [sin_psi, cos_psi]: [f32; 2], inverse_vertical: f32) -> Self {
         let tan_theta = (u5 * cos_psi + u6 * sin_psi) * inverse_vertical;
         // cos(atan t) = 1 / sqrt(1 + t^2)
         let cos_theta = 1.0 / math::sqrt(1.0 + tan_theta * tan_theta);
@@ -258,6 +266,10 @@ impl<L: Law, const N: usize> Controller<L, N> {
             ],
             law,
             model,
+            // Of a law that is not given what is known, it would be no use.
+            observer: (settings.feed_forward && L::OBSERVES)
+                .then(|| Observer::new(&settings.disturbance, &vehicle.parameters, settings.common.dt_s))
+                .flatten(),
             reference: Reference::new(&settings.reference, &settings.limits, settings.common.dt_s),
             smoother: Smoother::new(&settings.smoothing, settings.common.dt_s)?,
             filter: CommandFilter::new(settings.command_filter_rad_s, settings.common.dt_s)?
@@ -344,6 +356,16 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let stands = self.stands(memory);
         let roll_pitch = RollPitch::new(state);
         let hover_n = self.hover_thrust_n(memory);
+        let heading = [math::sin(state.attitude_rad.z), math::cos(state.attitude_rad.z)];
+        let observed_m_s2 = match &self.observer {
+            Some(observer) => {
+                observer.advance(&mut memory.observed, state, (&roll_pitch, heading), hover_n, [fresh, stands])
+            }
+            None => {
+                memory.observed = None;
+                [0.0; 2]
+            }
+        };
         let Cascade { estimates, errors, unallocated, .. } = memory;
         let context = Context {
             state,
@@ -352,6 +374,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
             dt_s: self.settings.common.dt_s,
             adapt: fresh && !stands,
             unallocated,
+            observed_m_s2,
             known: self.settings.feed_forward.then_some(&self.model),
         };
         // References, so that no copy is spilled while a subsystem computes.
@@ -387,7 +410,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
             (self.gravity_m_s2, self.inverse_gravity)
         };
         let [a5, a6] = self.limited(u5, u6, vertical);
-        let tilt = Tilt::new(a5, a6, eta.z, inverse_vertical);
+        let tilt = Tilt::new(a5, a6, heading, inverse_vertical);
         let (mut commanded, mut forward_rad_s2) = (tilt.rad, [0.0; 2]);
         if self.settings.feed_forward {
             let (j, s) = (&reference.jerk_m_s3, &reference.snap_m_s4);
@@ -433,6 +456,9 @@ impl<L: Law, const N: usize> Controller<L, N> {
         memory.asked = asked;
         let allocation = self.mixer.allocate(&asked);
         let action = self.mixer.carry_out(&allocation);
+        if let Some(observer) = &self.observer {
+            observer.give(&mut memory.observed, action.given.thrust_n);
+        }
 
         let distance_m = p - xi;
         memory.distances = PerAxis {
@@ -478,6 +504,12 @@ impl<L: Law, const N: usize> FlightController<N> for Controller<L, N> {
     #[inline(always)]
     fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
         self.cascade(memory, state, setpoint, fresh)
+    }
+
+    fn adrift(&self, memory: &mut Self::Memory) {
+        if let Some(observed) = &mut memory.observed {
+            observed.hold();
+        }
     }
 
     fn trace(memory: &Self::Memory) -> Trace {

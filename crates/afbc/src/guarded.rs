@@ -179,6 +179,10 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
         action
     }
 
+    fn adrift(&self, memory: &mut Memory<N>) {
+        self.adaptive.adrift(&mut memory.afbc);
+    }
+
     fn trace(memory: &Memory<N>) -> Trace {
         match &memory.stand_in {
             Some(stand_in) => stand_in.cascade.trace(),

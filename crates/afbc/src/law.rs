@@ -9,6 +9,9 @@ pub trait Law {
     /// True if the law uses [`Context::rotor_residual_rad_s`].
     const USES_ROTOR_RESIDUAL: bool = true;
 
+    /// True if the law uses [`Context::observed_m_s2`].
+    const OBSERVES: bool = false;
+
     /// Memory of the law for one subsystem.
     type Estimate: Copy + Default + core::fmt::Debug;
 
@@ -47,6 +50,8 @@ pub struct Context<'a> {
     pub adapt: bool,
     /// Part of each subsystem's input that could not be allocated in the last step; zero without anti-windup.
     pub unallocated: &'a PerAxis<f32>,
+    /// f of x and y as observed, by [`crate::disturbance`] \[m/s2\]; zero without an observer.
+    pub observed_m_s2: [f32; 2],
     /// Nominal model that the law may use; none for the law as printed.
     pub known: Option<&'a Model>,
 }
@@ -56,6 +61,18 @@ impl Context<'_> {
     #[inline]
     pub(crate) fn dynamics(&self, model: &Model, axis: Axis) -> Dynamics {
         model.dynamics_at(axis, &self.state.rates_rad_s, &self.roll_pitch, self.rotor_residual_rad_s)
+    }
+
+    /// Returns the same, with the observed f of x and y, which the model takes for zero.
+    #[inline(always)]
+    pub(crate) fn observed(&self, model: &Model, axis: Axis) -> Dynamics {
+        let dynamics = self.dynamics(model, axis);
+        let [x, y] = self.observed_m_s2;
+        match axis {
+            Axis::X => Dynamics { f: x, ..dynamics },
+            Axis::Y => Dynamics { f: y, ..dynamics },
+            Axis::Roll | Axis::Pitch | Axis::Yaw | Axis::Z => dynamics,
+        }
     }
 }
 

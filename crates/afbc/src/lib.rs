@@ -39,6 +39,7 @@
 pub mod adaptive;
 pub mod backstepping;
 pub mod cascade;
+pub mod disturbance;
 pub mod fuzzy;
 pub mod guarded;
 pub mod integral;

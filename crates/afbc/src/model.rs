@@ -41,6 +41,12 @@ impl RollPitch {
         }
     }
 
+    /// Returns the horizontal part of R e_z of a vehicle that heads along x, towards x and towards -y.
+    #[inline(always)]
+    pub(crate) fn leaning(&self) -> [f32; 2] {
+        [self.cos_phi * self.sin_theta, self.sin_phi]
+    }
+
     /// Returns the cosine of the tilt.
     #[inline(always)]
     pub fn tilt_cosine(&self) -> f32 {

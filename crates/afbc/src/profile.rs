@@ -1,5 +1,6 @@
 //! Named sets of gains and settings.
 
+use crate::disturbance::DisturbanceObserver;
 use crate::fuzzy::Membership;
 use crate::model::Model;
 use crate::reference::ReferenceModel;
@@ -107,25 +108,26 @@ impl Profile {
                     speed_max_m_s: 5.0,
                     climb_max_m_s: 3.0,
                 },
-                command_filter_rad_s: 71.38,
+                command_filter_rad_s: 74.36,
                 tilt_by_thrust: true,
                 anti_windup: true,
                 freeze_on_ground: true,
                 bumpless: true,
                 feed_forward: true,
+                disturbance: DisturbanceObserver { disturbance_rad_s: 28.7, disturbance_lag_s: LAG_S },
                 reference: ReferenceModel {
-                    reference_xy_rad_s: 3.998,
-                    reference_z_rad_s: 6.555,
-                    reference_yaw_rad_s: 17.24,
+                    reference_xy_rad_s: 3.903,
+                    reference_z_rad_s: 11.43,
+                    reference_yaw_rad_s: 28.04,
                     reference_acceleration_m_s2: 8.0,
-                    reference_turn_rad_s2: 15.45,
+                    reference_turn_rad_s2: 15.76,
                     reference_yaw_rate_rad_s: 3.0,
                 },
                 smoothing: Smoothing {
-                    smooth_tilt_rad_s: 148.5,
-                    smooth_yaw_rad_s: 103.4,
-                    smooth_lift_rad_s: 116.9,
-                    lead_s: 0.02174,
+                    smooth_tilt_rad_s: 133.8,
+                    smooth_yaw_rad_s: 163.0,
+                    smooth_lift_rad_s: 101.0,
+                    lead_s: 0.0324,
                 },
             },
         }
@@ -154,10 +156,10 @@ pub fn slowness(lag_s: f32) -> f32 {
 /// Returns the bounded law's gains, as found by `sitl tune afbc`. `docs/flight.md` explains each.
 fn flight(axis: Axis, paper: adaptive::Gains) -> adaptive::Gains {
     let (alpha1, alpha2, stiffness, gamma, eta, theta_max, delta_max) = match axis {
-        Axis::Roll | Axis::Pitch => (1.354, 0.6903, 86.34, 0.5007, 0.3118, 4.0, 0.0253),
-        Axis::Yaw => (4.118, 7.51, 30.91, 42.36, 0.008247, 12.0, 0.3347),
-        Axis::Z => (1.757, 9.294, 18.25, 186.0, 0.2582, 10.0, 3.19),
-        Axis::X | Axis::Y => (2.243, 7.891, 1.005, 52.67, 0.04455, 25.0, 0.7606),
+        Axis::Roll | Axis::Pitch => (1.552, 0.5023, 82.15, 0.5261, 0.4464, 4.0, 0.02298),
+        Axis::Yaw => (3.352, 9.711, 30.88, 40.52, 0.01181, 12.0, 0.3712),
+        Axis::Z => (2.458, 7.139, 17.24, 185.0, 0.2366, 10.0, 2.1),
+        Axis::X | Axis::Y => (1.336, 7.187, 1.139, 35.48, 0.06443, 25.0, 1.231),
     };
     let membership = match axis {
         Axis::Roll | Axis::Pitch | Axis::Yaw => Membership { centre: 3.0, width: 1.2 },

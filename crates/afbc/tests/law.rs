@@ -110,6 +110,7 @@ proptest! {
             dt_s: 0.001,
             adapt: true,
             unallocated: &PerAxis::default(),
+            observed_m_s2: [0.0; 2],
             known: None,
         };
         let approach = law.approach(Axis::X, None);
@@ -225,6 +226,7 @@ proptest! {
                 dt_s,
                 adapt: false,
                 unallocated: &PerAxis::default(),
+                observed_m_s2: [0.0; 2],
                 known: None,
             };
             let (u, seen) = law.input(axis, &tracking, &context, &mut frozen);

@@ -4,6 +4,7 @@
 mod common;
 
 use afbc::adaptive::Gains;
+use afbc::disturbance::DisturbanceObserver;
 use afbc::fuzzy::{Basis, Firing};
 use afbc::law::Context;
 use afbc::law::Tracking;
@@ -30,6 +31,7 @@ fn step(gains: Gains, e2: f32, unallocated: f32, dt_s: f32, estimate: &mut Estim
         dt_s,
         adapt: true,
         unallocated: &PerAxis { x: unallocated, ..PerAxis::default() },
+        observed_m_s2: [0.0; 2],
         known: None,
     };
     law.input(Axis::X, &tracking(e2), &context, estimate).0
@@ -188,7 +190,9 @@ proptest! {
         let fly = |anti_windup, rotor_force_max_n| {
             let settings =
                 Settings { anti_windup, ..Profile::Flight.settings().with_rotor_force_max_n(rotor_force_max_n) };
-            let settings = Settings { tilt_by_thrust: false, ..settings };
+            // The observer is told what the rotors gave.
+            let disturbance = DisturbanceObserver::DEFAULT;
+            let settings = Settings { tilt_by_thrust: false, disturbance, ..settings };
             let law = Adaptive::new(Profile::Flight.gains()).unwrap();
             let controller = Controller::new(Parameters::PAPER.to_f32(), settings, law).unwrap();
             let mut memory = Screened::default();
@@ -265,6 +269,7 @@ fn noise_drives_the_printed_delta_hat_and_not_the_hardened() {
                     dt_s: 0.001,
                     adapt: true,
                     unallocated: &PerAxis::default(),
+                    observed_m_s2: [0.0; 2],
                     known: None,
                 };
                 let (u, _) = law.input(Axis::X, &tracking, &context, &mut estimate);

@@ -57,6 +57,10 @@ pub trait FlightController<const N: usize = 4> {
     /// measurements is updated. Does not fail or panic; the rotor speeds are finite and within their limits.
     fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N>;
 
+    /// Announces that the horizontal motion of the next state is not measured: a vehicle that does not know where it is
+    /// reckons it. Nothing may be observed from it.
+    fn adrift(&self, _memory: &mut Self::Memory) {}
+
     /// Performs one step from a measurement that may be missing, implausible or not finite:
     /// [`FlightController::decide`] behind a [`Screen`](crate::Screen). [`Action::health`] reports rejected input.
     // Inlined always: copying the action out of a call costs a tenth of a closed-loop step.

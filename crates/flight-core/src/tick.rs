@@ -262,6 +262,7 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
                         let state = inbox.adrift().map_or(state, |adrift| &adrift.value);
                         let last = last.as_ref().map(|last| &last.value);
                         let (state, target) = flight.guide.down(state, last, dt_s);
+                        self.controller.adrift(&mut flight.control);
                         let action = self.controller.decide(&mut flight.control, &state, target, true);
                         flight.lawless = None;
                         flight.applied = action.given;

@@ -7,7 +7,7 @@ use crate::{reality, table, words};
 use afbc::reference::ReferenceModel;
 use afbc::{Limits, Settings};
 use afbc_control::Smoothing;
-use afbc_sim::contender::{Contender, Law};
+use afbc_sim::contender::{Contender, ControllerKind, Law};
 use afbc_sim::scenario::Scenario;
 use afbc_sim::trajectory::Trajectory;
 use afbc_types::{Axis, Declared, PerAxis, Value};
@@ -243,6 +243,7 @@ fn gains(contender: &Contender) -> Markup {
         bumpless,
         anti_windup,
         feed_forward,
+        disturbance,
         reference,
         smoothing,
     } = contender.settings;
@@ -270,6 +271,9 @@ fn gains(contender: &Contender) -> Markup {
                 limits.speed_max_m_s,
                 limits.climb_max_m_s
             );
+        }
+        if contender.kind() == ControllerKind::Afbc && disturbance.disturbance_rad_s > 0.0 {
+            settings += &format!(", disturbance observer {} rad/s", disturbance.disturbance_rad_s);
         }
         if reference != ReferenceModel::DEFAULT {
             settings += &format!(

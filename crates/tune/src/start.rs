@@ -1,5 +1,6 @@
 //! Starting points of the search: hand-tuned gains, so that the same command finds the same gains again.
 
+use afbc::disturbance::DisturbanceObserver;
 use afbc::reference::ReferenceModel;
 use afbc::{Profile, Settings};
 use afbc_control::Smoothing;
@@ -16,7 +17,8 @@ pub fn by_hand(kind: ControllerKind) -> Contender {
         reference_turn_rad_s2: 15.0,
         ..contender.settings.reference
     };
-    let settings =
-        Settings { command_filter_rad_s: 75.0, reference, smoothing: Smoothing::BY_HAND, ..contender.settings };
+    let disturbance = DisturbanceObserver { disturbance_rad_s: 10.0, ..contender.settings.disturbance };
+    let smoothing = Smoothing::BY_HAND;
+    let settings = Settings { command_filter_rad_s: 75.0, disturbance, reference, smoothing, ..contender.settings };
     Contender { settings, ..contender }.monitored()
 }

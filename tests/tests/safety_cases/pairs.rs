@@ -33,6 +33,7 @@ pub(super) fn cases() -> Vec<Case> {
             .at(6.0, line("fault gnss lost"))
             .lasts(36.0)
             .hears(&["sensor fault", DESCENDS])
+            .bound(|bounds| bounds.tilt_rad = 0.95)
             .lands(),
         case("targets-lost-battery", "targets lost; then the battery becomes critical")
             .watched()

@@ -422,7 +422,9 @@ fn airframe() -> Vec<Case> {
         suffers("payload", "a payload of a third of the weight, and without it", "payload 0.16 0.05")
             .at(3.0, Do::Line("payload 0"))
             .near(0.0, 0.0, 0.4),
-        suffers("push", "a push of 2 N for 1 s", "push 2 0 0 1").near(0.0, 0.0, 0.4),
+        suffers("push", "a push of 2 N for 1 s", "push 2 0 0 1")
+            .near(0.0, 0.0, 0.4)
+            .bound(|bounds| bounds.tilt_rad = 0.75),
         suffers("weak", "rotors of 70 % of their thrust", "change thrust-factor 0.7").near(0.0, 0.0, 0.4),
         suffers("tumble", "a push of its moments tips it over", "change roll-moment -3")
             .falls(CUTS[0])

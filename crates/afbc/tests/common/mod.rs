@@ -6,6 +6,7 @@
 )]
 
 use afbc::adaptive::Gains;
+use afbc::disturbance::DisturbanceObserver;
 use afbc::fuzzy::Membership;
 use afbc::reference::ReferenceModel;
 use afbc::{Limits, Profile, Safeguards, Settings, backstepping};
@@ -160,8 +161,16 @@ pub(crate) fn settings() -> impl Strategy<Value = Settings> {
             smooth_lift_rad_s,
             lead_s,
         });
-    let added = (prop_oneof![Just(ReferenceModel::DEFAULT), model], prop_oneof![Just(Smoothing::DEFAULT), smoothing]);
-    let any = (numbers, any::<[bool; 5]>(), added).prop_map(|(numbers, switches, (reference, smoothing))| {
+    let observer = (within(DisturbanceObserver::DIST_XY), within(DisturbanceObserver::DIST_LAG)).prop_map(
+        |(disturbance_rad_s, disturbance_lag_s)| DisturbanceObserver { disturbance_rad_s, disturbance_lag_s },
+    );
+    let added = (
+        prop_oneof![Just(DisturbanceObserver::DEFAULT), observer],
+        prop_oneof![Just(ReferenceModel::DEFAULT), model],
+        prop_oneof![Just(Smoothing::DEFAULT), smoothing],
+    );
+    let any = (numbers, any::<[bool; 5]>(), added).prop_map(|(numbers, switches, added)| {
+        let (disturbance, reference, smoothing) = added;
         let ((dt_s, rotor_force_max_n, raised_thrust_max), command_filter_rad_s, limits) = numbers;
         let [tilt_by_thrust, anti_windup, freeze_on_ground, bumpless, feed_forward] = switches;
         Settings {
@@ -173,6 +182,7 @@ pub(crate) fn settings() -> impl Strategy<Value = Settings> {
             freeze_on_ground,
             bumpless,
             feed_forward,
+            disturbance,
             reference,
             smoothing,
         }

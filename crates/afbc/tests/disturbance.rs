@@ -1,0 +1,168 @@
+//! The disturbance observer against its closed solution, and what it must not take for a disturbance.
+#![allow(clippy::unwrap_used, missing_docs, reason = "an observer that cannot be made must fail the test")]
+
+use afbc::disturbance::{ACCELERATION_MAX_M_S2, DisturbanceObserver, JUMP_M_S, Observed, Observer};
+use afbc::model::RollPitch;
+use afbc_types::{Parameters, State};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+const DT_S: f32 = 0.001;
+
+fn observer(disturbance_rad_s: f32) -> Observer {
+    let settings = DisturbanceObserver { disturbance_rad_s, ..DisturbanceObserver::DEFAULT };
+    Observer::new(&settings, &Parameters::PAPER.to_f32(), DT_S).unwrap()
+}
+
+fn weight_n() -> f32 {
+    Parameters::PAPER.to_f32().weight_n()
+}
+
+/// A vehicle in flight at this attitude, whose thrust would hold it in hover.
+struct Body {
+    state: State,
+    memory: Option<Observed>,
+    /// Learnt hover thrust, which is what is commanded \[N\].
+    hover_n: f32,
+}
+
+impl Body {
+    fn new(attitude_rad: Vector3<f32>, hover_n: f32) -> Self {
+        Body { state: State { attitude_rad, ..State::default() }, memory: None, hover_n }
+    }
+
+    /// R e_z from the attitude, by the textbook.
+    fn up(&self) -> Vector3<f32> {
+        let [phi, theta, psi] = self.state.attitude_rad.map(f64::from).into();
+        let (sin_phi, cos_phi, sin_theta, cos_theta) = (phi.sin(), phi.cos(), theta.sin(), theta.cos());
+        let x = psi.cos() * sin_theta * cos_phi + psi.sin() * sin_phi;
+        let y = psi.sin() * sin_theta * cos_phi - psi.cos() * sin_phi;
+        Vector3::new(x, y, cos_theta * cos_phi).cast()
+    }
+
+    /// Flies a step under the hover thrust and this disturbance, and returns what is observed.
+    fn step(&mut self, observer: &Observer, f_m_s2: [f32; 2]) -> [f32; 2] {
+        let heading = [self.state.attitude_rad.z.sin(), self.state.attitude_rad.z.cos()];
+        let at = RollPitch::new(&self.state);
+        let seen = observer.advance(&mut self.memory, &self.state, (&at, heading), self.hover_n, [true, false]);
+        observer.give(&mut self.memory, self.hover_n);
+        let up = self.up() * 9.81;
+        self.state.velocity_m_s += Vector3::new(up.x + f_m_s2[0], up.y + f_m_s2[1], 0.0) * DT_S;
+        seen
+    }
+}
+
+/// f_hat of a constant f is f behind two poles at w.
+#[test]
+fn a_constant_disturbance_is_found_as_two_poles_say() {
+    for w in [5.0, 28.7, 60.0] {
+        // Small enough for v - v_hat to be no jump: at most f/(e w).
+        let (observer, f) = (observer(w), [0.1 * w, -0.03 * w]);
+        let mut body = Body::new(Vector3::zeros(), weight_n());
+        for step in 0..2000_u16 {
+            let seen = body.step(&observer, f);
+            let wt = w * f32::from(step) * DT_S;
+            let expected = 1.0 - (1.0 + wt) * (-wt).exp();
+            for (seen, f) in seen.into_iter().zip(f) {
+                assert!((seen - f * expected).abs() < 0.04 * f.abs(), "{w} rad/s, step {step}: {seen}");
+            }
+        }
+    }
+}
+
+/// Neither tilt nor weak rotors are a disturbance: the acceleration by tilt is known at any heading, and what rotors
+/// lack is in the learnt hover thrust.
+#[test]
+fn what_the_rotors_do_is_no_disturbance() {
+    let observer = observer(28.7);
+    for (phi, theta, psi) in [(0.3, 0.0, 0.0), (0.0, -0.4, 1.0), (0.2, 0.3, -2.5), (-0.5, 0.1, 3.0)] {
+        for hover in [1.0, 1.67] {
+            let mut body = Body::new(Vector3::new(phi, theta, psi), hover * weight_n());
+            // The thrust starts at the weight.
+            for _ in 0..600 {
+                body.step(&observer, [0.0; 2]);
+            }
+            for _ in 0..300 {
+                let seen = body.step(&observer, [0.0; 2]);
+                assert!(seen.iter().all(|f| f.abs() < 0.02), "{phi} {theta} {psi}, {hover}: {seen:?}");
+            }
+        }
+    }
+}
+
+/// A jump of the state, as after an outage, changes nothing.
+#[test]
+fn a_jump_is_no_disturbance() {
+    let observer = observer(28.7);
+    let mut body = Body::new(Vector3::zeros(), weight_n());
+    for _ in 0..1000 {
+        body.step(&observer, [1.0, 0.0]);
+    }
+    let before = body.step(&observer, [1.0, 0.0]);
+    body.state.velocity_m_s += Vector3::new(-5.0 * JUMP_M_S, 2.0 * JUMP_M_S, 0.0);
+    for _ in 0..100 {
+        let seen = body.step(&observer, [1.0, 0.0]);
+        let off = seen.into_iter().zip(before).map(|(seen, before)| (seen - before).abs()).fold(0.0, f32::max);
+        assert!(off < 0.02, "{seen:?}, {before:?} before");
+    }
+}
+
+/// A repeated state teaches nothing, and on the ground there is no disturbance.
+#[test]
+fn it_waits_for_states_and_forgets_on_the_ground() {
+    let observer = observer(28.7);
+    let mut body = Body::new(Vector3::zeros(), weight_n());
+    for _ in 0..500 {
+        body.step(&observer, [1.0, 0.0]);
+    }
+    let at = RollPitch::new(&body.state);
+    let mut look =
+        |fresh, stands| observer.advance(&mut body.memory, &body.state, (&at, [0.0, 1.0]), weight_n(), [fresh, stands]);
+    let held = look(false, false);
+    assert!(held[0] > 0.9);
+    assert_eq!(look(false, false), held);
+    assert_eq!(look(true, true), [0.0; 2]);
+    assert!(look(true, false)[0].abs() < 0.01);
+}
+
+/// What a vehicle that does not know where it is makes of its motion shows no wind: that of before stays.
+#[test]
+fn what_is_not_measured_is_not_observed() {
+    let observer = observer(28.7);
+    let mut body = Body::new(Vector3::new(0.1, -0.2, 0.5), weight_n());
+    for _ in 0..1000 {
+        body.step(&observer, [1.0, 0.5]);
+    }
+    let before = body.step(&observer, [1.0, 0.5]);
+    for step in 0..500_u16 {
+        body.memory.as_mut().unwrap().hold();
+        body.state.velocity_m_s *= 0.99 + f32::from(step % 2) * 0.02;
+        assert_eq!(body.step(&observer, [1.0, 0.5]), before);
+    }
+    let after = body.step(&observer, [1.0, 0.5]);
+    assert!(after.into_iter().zip(before).all(|(after, before)| (after - before).abs() < 0.02), "{after:?}");
+}
+
+proptest! {
+    /// Whatever the states say, f_hat stays finite and within its bound.
+    #[test]
+    fn it_is_bounded(
+        w in 0.1_f32..200.0,
+        hover in 0.3_f32..5.0,
+        states in prop::collection::vec((-1e3_f32..1e3, -1e3_f32..1e3, -1e3_f32..1e3, 0.0_f32..50.0), 1..200),
+    ) {
+        let observer = observer(w);
+        let mut memory = None;
+        for (velocity, angle, yaw, thrust_n) in states {
+            let state = State {
+                velocity_m_s: Vector3::new(velocity, -velocity, 0.0),
+                attitude_rad: Vector3::new(angle, -angle, yaw),
+                ..State::default()
+            };
+            let at = RollPitch::new(&state);
+            let seen = observer.advance(&mut memory, &state, (&at, [yaw.sin(), yaw.cos()]), hover, [true, false]);
+            prop_assert!(seen.iter().all(|f| f.abs() <= ACCELERATION_MAX_M_S2), "{seen:?}");
+            observer.give(&mut memory, thrust_n);
+        }
+    }
+}
