@@ -82,9 +82,9 @@ const BAD_TABLES: [(&str, &str); 69] = [
         "[settings]\nrate_hz = 500",
         ":5: settings.rate_hz: unknown key; \
          known here: dt_s, rotor_force_max_n, raised_thrust_max, command_filter_rad_s, tilt_by_thrust, anti_windup, \
-         freeze_on_ground, bumpless, feed_forward, reference_xy_rad_s, reference_z_rad_s, reference_yaw_rad_s, \
-         reference_acceleration_m_s2, reference_turn_rad_s2, reference_yaw_rate_rad_s, smooth_tilt_rad_s, \
-         smooth_yaw_rad_s, smooth_lift_rad_s, lead_s",
+         freeze_on_ground, bumpless, feed_forward, disturbance_rad_s, disturbance_lag_s, reference_xy_rad_s, \
+         reference_z_rad_s, reference_yaw_rad_s, reference_acceleration_m_s2, reference_turn_rad_s2, \
+         reference_yaw_rate_rad_s, smooth_tilt_rad_s, smooth_yaw_rad_s, smooth_lift_rad_s, lead_s",
     ),
     (
         "[initial]\nattitude_rad = [1.6, 0, 0]",
