@@ -58,5 +58,5 @@ pub use cascade::{Cascade, Controller, Settings};
 pub use guarded::Guarded;
 pub use law::Law;
 pub use limits::Limits;
-pub use profile::{LAG_S, Profile, slowness};
+pub use profile::{LAG_S, Profile, by_rule, slowness};
 pub use safeguards::Safeguards;

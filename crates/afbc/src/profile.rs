@@ -32,23 +32,10 @@ impl Profile {
     }
 
     /// Returns AFBC's gains for a vehicle with these nominal parameters, which must be valid, and a rotor lag of
-    /// `lag_s`: [`Profile::gains`], scaled so that the vehicle behaves as the paper's does. Not in the paper.
-    ///
-    /// * **Mass and inertia**: with the hover value of g_i of (6), alpha_2, gamma, eta, Theta_max and delta_max are
-    ///   multiplied by g_i of the paper's vehicle over g_i of this one: by mass for z, by inertia over arm for roll and
-    ///   pitch, by inertia over d/b for yaw. alpha_1, epsilon, the leakage and the membership functions are in rad and
-    ///   m, and are not scaled.
-    /// * **Rotor lag**, `flight` only: see [`slowness`] and [`adaptive::Gains::slowed`].
+    /// `lag_s`: [`Profile::gains`] [by rule](by_rule). The profile `paper` knows no lag. Not in the paper.
     pub fn gains_for(self, vehicle: &Parameters, lag_s: f32) -> PerAxis<adaptive::Gains> {
-        let (paper, own) = (Model::new(&Parameters::PAPER.to_f32()), Model::new(vehicle));
-        let gains = self.gains();
-        PerAxis::from_fn(|axis| {
-            let scaled = gains[axis].scaled(paper.hover_gain(axis) / own.hover_gain(axis));
-            match self {
-                Profile::Paper => scaled,
-                Profile::Flight => scaled.slowed(slowness(lag_s)),
-            }
-        })
+        let lag_s = if self == Profile::Paper { LAG_S } else { lag_s };
+        by_rule(&self.gains(), vehicle, lag_s)
     }
 
     /// Returns the cascade's settings for rotors that give `force_max_n` each with a lag of `lag_s`. In the profile
@@ -145,6 +132,20 @@ const fn answer_s(axis: Axis) -> f32 {
         Axis::Roll | Axis::Pitch => 0.08,
         Axis::X | Axis::Y => 0.12,
     }
+}
+
+/// Returns gains for the paper's vehicle with a rotor lag of [`LAG_S`], scaled so that a vehicle with these nominal
+/// parameters, which must be valid, and a lag of `lag_s` behaves as it does. Not in the paper.
+///
+/// * **Mass and inertia**: with the hover value of g_i of (6), alpha_2, gamma, eta, Theta_max and delta_max are
+///   multiplied by g_i of the paper's vehicle over g_i of this one: by mass for z, by inertia over arm for roll and
+///   pitch, by inertia over d/b for yaw. alpha_1, epsilon, the leakage and the membership functions are in rad and m,
+///   and are not scaled.
+/// * **Rotor lag**: see [`slowness`] and [`adaptive::Gains::slowed`].
+pub fn by_rule(gains: &PerAxis<adaptive::Gains>, vehicle: &Parameters, lag_s: f32) -> PerAxis<adaptive::Gains> {
+    let (paper, own) = (Model::new(&Parameters::PAPER.to_f32()), Model::new(vehicle));
+    let scale = |axis| paper.hover_gain(axis) / own.hover_gain(axis);
+    PerAxis::from_fn(|axis| gains[axis].scaled(scale(axis)).slowed(slowness(lag_s)))
 }
 
 /// Returns the factor by which a vehicle with a rotor lag of `lag_s` \[s\] is slower than the paper's; at least 1,

@@ -4,7 +4,7 @@ pub use crate::laws::{ControllerKind, Law};
 
 use crate::laws::law_gains;
 use afbc::monitor::Bounds;
-use afbc::{Guarded, LAG_S, Profile, Settings, adaptive, slowness};
+use afbc::{Guarded, LAG_S, Profile, Settings, adaptive, by_rule, slowness};
 use afbc_control::FlightController;
 use afbc_peers::slowed;
 use afbc_reader::FileError;
@@ -130,6 +130,25 @@ impl Contender {
         let law = Law::on(self.kind(), vehicle, profile)?;
         let settings = vehicle.settings(profile).with_dt_s(self.settings.common.dt_s);
         Ok(Contender { law, settings, ..self })
+    }
+
+    /// Returns the contender on another vehicle, its own gains and settings, for the paper's vehicle, scaled [by
+    /// rule](by_rule).
+    #[must_use]
+    pub fn by_rule(self, vehicle: &Vehicle) -> Self {
+        let slowness = slowness(vehicle.lag_s());
+        let by_rule = |gains| by_rule(&gains, &vehicle.parameters.to_f32(), vehicle.lag_s());
+        let law = match self.law {
+            Law::Afbc(gains) => Law::Afbc(by_rule(gains)),
+            Law::Backstepping(own) => {
+                let gains = Profile::Flight.gains();
+                let gains = PerAxis::from_fn(|axis| adaptive::Gains { backstepping: own[axis], ..gains[axis] });
+                Law::Backstepping(by_rule(gains).map(|gains| gains.backstepping))
+            }
+            law => slowed(law, slowness),
+        };
+        let settings = self.settings.slowed(slowness).with_rotor_force_max_n(vehicle.force_max_n as f32);
+        Contender { law, settings, ..self }
     }
 
     /// Runs `task` with the controller of a vehicle with these nominal parameters and rotors.

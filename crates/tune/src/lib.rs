@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 mod cma_es;
+mod conditions;
 mod cost;
 mod flights;
 mod gains;
@@ -11,9 +12,10 @@ mod report;
 mod search;
 mod start;
 
+pub use conditions::{Condition, conditions, factor};
 pub use cost::{JUMP_N, LOST, POSITION_M, WORST_M, YAW_RAD, cost, costs, mean};
 pub use flights::{held_out, training};
 pub use gains::{Change, fragment};
 pub use report::report;
-pub use search::{Found, search};
+pub use search::{Course, Found, STEP, search};
 pub use start::by_hand;

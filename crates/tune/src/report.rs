@@ -1,15 +1,18 @@
 //! The result of a search as a piece of a scenario file.
 
+use crate::conditions::Condition;
 use crate::cost::{costs, mean};
 use crate::gains::{fragment, vehicle_fragment};
 use crate::search::Found;
 use afbc_sim::contender::Contender;
 use afbc_sim::scenario::Scenario;
+use afbc_types::OutOfRange;
 use core::fmt::Write;
 use std::error::Error;
 
 /// Formats the contender found as `[[contender]]` of a scenario file or, if the flights are on a vehicle of a file, as
-/// `[gains]` of that file, preceded by comments with its cost in each flight and the change of each gain from `start`.
+/// `[gains]` of that file, preceded by comments with its cost in each flight, the conditions that it meets, and the
+/// change of each gain from `start`.
 ///
 /// # Errors
 /// None occurs: both have flown before.
@@ -17,6 +20,7 @@ pub fn report(
     start: &Contender,
     found: &Found,
     [training, held_out]: [&[Scenario]; 2],
+    conditions: &[Condition],
     seed: u64,
 ) -> Result<String, Box<dyn Error>> {
     let Found { contender, before, after, evaluations, changes } = found;
@@ -33,6 +37,13 @@ pub fn report(
         }
         let (before, after) = (mean(&before), mean(&after));
         let _ = writeln!(text, "# {title:<16}{before:>10.4}{after:>10.4}  mean\n#");
+    }
+    for condition in conditions {
+        let met = |contender| Ok::<_, OutOfRange>(if condition.factor(contender)? > 1.0 { "not met" } else { "met" });
+        let _ = writeln!(text, "# {:<16}{:>10}{:>10}", condition.scenario.name, met(start)?, met(contender)?);
+    }
+    if !conditions.is_empty() {
+        text.push_str("#\n");
     }
     let width = changes.iter().map(|change| change.name.len()).max().unwrap_or(0);
     for change in changes {

@@ -10,7 +10,7 @@ use afbc::Profile;
 use afbc_files::Error;
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::scenario::Scenario;
-use afbc_tune::{self as tune, Found};
+use afbc_tune::{self as tune, Course, Found};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -23,7 +23,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// and after as comments. Ctrl-C ends the search early and keeps the best gains so far. See docs/tuning.md.
 #[derive(Args, Debug)]
 pub(crate) struct Tune {
-    /// A law, to start from hand-tuned gains, or a contender of the first --scenario, to start from its gains
+    /// A law, to start from hand-tuned gains, or a contender of --from or the first --scenario, to start from its gains
     #[arg(value_name = "CONTROLLER")]
     contender: String,
 
@@ -31,12 +31,20 @@ pub(crate) struct Tune {
     #[arg(long = "scenario", value_name = "SCENARIO")]
     scenarios: Vec<Target>,
 
+    /// Start from a contender of this scenario, on the training flights, as to continue a search
+    #[arg(long, value_name = "SCENARIO", conflicts_with = "scenarios")]
+    from: Option<Target>,
+
     #[command(flatten)]
     on: OnVehicle,
 
     /// Number of sets of gains to try
     #[arg(long, value_name = "N", default_value = "1000", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     budget: u32,
+
+    /// Initial step size, in the natural logarithm of every gain; a tenth or so to improve gains that are good already
+    #[arg(long, value_name = "SIZE", default_value_t = tune::STEP, value_parser = step)]
+    step: f64,
 
     /// Seed of the search; the same seed finds the same gains
     #[arg(long, default_value = "1")]
@@ -54,13 +62,21 @@ impl Tune {
     /// Searches, then prints or writes.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let scenarios = self.scenarios.iter().map(Target::scenario).collect::<Result<Vec<_>, _>>()?;
-        let mut start = start(&self.contender, scenarios.first())?;
-        if let Some(vehicle) = self.on.vehicle()? {
-            start = start.on(&vehicle, Profile::Flight)?;
+        let from = self.from.as_ref().map(Target::scenario).transpose()?;
+        let mut start = start(&self.contender, from.as_ref().or(scenarios.first()))?;
+        let vehicle = self.on.vehicle()?;
+        if let Some(vehicle) = &vehicle {
+            start = start.on(vehicle, Profile::Flight)?;
         }
         let put = |scenarios: Vec<Scenario>| {
             scenarios.into_iter().map(|scenario| self.on.put(scenario)).collect::<Result<Vec<_>, _>>()
         };
+        // They are of the same task as the training flights.
+        let alike = scenarios.is_empty() && vehicle.is_none();
+        let conditions = if alike { tune::conditions()? } else { Vec::new() };
+        if alike {
+            start = start.monitored();
+        }
         let training = put(if scenarios.is_empty() { tune::training()? } else { scenarios })?;
         let held_out = put(tune::held_out()?)?;
         if let Some(out) = &self.out {
@@ -72,7 +88,8 @@ impl Tune {
         ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
         let progress = Progress::new(&format!("tune {}", self.contender), "tried", u64::from(self.budget), 0);
         let mut before = 0;
-        let found = tune::search(&start, &training, self.budget as usize, self.seed, |tried, cost| {
+        let course = Course { budget: self.budget as usize, step: self.step, seed: self.seed };
+        let found = tune::search(&start, &training, &conditions, course, |tried, cost| {
             progress.note(format!(", least cost {cost:.4}"));
             progress.add((tried - before) as u64);
             before = tried;
@@ -80,7 +97,7 @@ impl Tune {
         })?;
         drop(progress);
 
-        let report = || tune::report(&start, &found, [&training, &held_out], self.seed);
+        let report = || tune::report(&start, &found, [&training, &held_out], &conditions, self.seed);
         if let Some(out) = &self.out {
             std::fs::write(out, report()?).map_err(|source| Error::Write { path: out.clone(), source })?;
         }
@@ -109,6 +126,12 @@ fn start(name: &str, scenario: Option<&Scenario>) -> Result<Contender, Failure> 
             if own.is_empty() { String::new() } else { format!("; the scenario's contenders {}", own.join(", ")) };
         format!("{}: no such controller; the laws are {laws}{own}", name.escape_debug()).into()
     })
+}
+
+/// Reads a step size.
+fn step(text: &str) -> Result<f64, String> {
+    let step = text.parse().ok().filter(|step| (0.001..=1.0).contains(step));
+    step.ok_or_else(|| "a number from 0.001 to 1".into())
 }
 
 /// Checks that `path` can be a file, before a long search.

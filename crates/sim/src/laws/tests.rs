@@ -38,3 +38,16 @@ fn each_law_has_gains_that_fly_the_papers_vehicle() {
         }
     }
 }
+
+/// A contender's own gains by rule are those that a built-in vehicle, without gains of its own, flies with.
+#[test]
+fn gains_by_rule_are_those_that_fly() {
+    for vehicle in &afbc_vehicles::BUILT_IN {
+        let vehicle = vehicle.read().unwrap();
+        for kind in ControllerKind::ALL {
+            let contender = Contender::of(kind, Profile::Flight);
+            let flies = contender.clone().on(&vehicle, Profile::Flight).unwrap();
+            assert_eq!(contender.by_rule(&vehicle), flies, "{} on {}", kind.name(), vehicle.name);
+        }
+    }
+}
