@@ -95,26 +95,26 @@ impl Profile {
                     speed_max_m_s: 5.0,
                     climb_max_m_s: 3.0,
                 },
-                command_filter_rad_s: 74.36,
+                command_filter_rad_s: 64.73,
                 tilt_by_thrust: true,
                 anti_windup: true,
                 freeze_on_ground: true,
                 bumpless: true,
                 feed_forward: true,
-                disturbance: DisturbanceObserver { disturbance_rad_s: 28.7, disturbance_lag_s: LAG_S },
+                disturbance: DisturbanceObserver { disturbance_rad_s: 26.78, disturbance_lag_s: LAG_S },
                 reference: ReferenceModel {
-                    reference_xy_rad_s: 3.903,
-                    reference_z_rad_s: 11.43,
-                    reference_yaw_rad_s: 28.04,
+                    reference_xy_rad_s: 4.346,
+                    reference_z_rad_s: 11.71,
+                    reference_yaw_rad_s: 31.78,
                     reference_acceleration_m_s2: 8.0,
-                    reference_turn_rad_s2: 15.76,
+                    reference_turn_rad_s2: 11.82,
                     reference_yaw_rate_rad_s: 3.0,
                 },
                 smoothing: Smoothing {
-                    smooth_tilt_rad_s: 133.8,
-                    smooth_yaw_rad_s: 163.0,
-                    smooth_lift_rad_s: 101.0,
-                    lead_s: 0.0324,
+                    smooth_tilt_rad_s: 133.3,
+                    smooth_yaw_rad_s: 156.4,
+                    smooth_lift_rad_s: 101.5,
+                    lead_s: 0.03024,
                 },
             },
         }
@@ -157,10 +157,10 @@ pub fn slowness(lag_s: f32) -> f32 {
 /// Returns the bounded law's gains, as found by `sitl tune afbc`. `docs/flight.md` explains each.
 fn flight(axis: Axis, paper: adaptive::Gains) -> adaptive::Gains {
     let (alpha1, alpha2, stiffness, gamma, eta, theta_max, delta_max) = match axis {
-        Axis::Roll | Axis::Pitch => (1.552, 0.5023, 82.15, 0.5261, 0.4464, 4.0, 0.02298),
-        Axis::Yaw => (3.352, 9.711, 30.88, 40.52, 0.01181, 12.0, 0.3712),
-        Axis::Z => (2.458, 7.139, 17.24, 185.0, 0.2366, 10.0, 2.1),
-        Axis::X | Axis::Y => (1.336, 7.187, 1.139, 35.48, 0.06443, 25.0, 1.231),
+        Axis::Roll | Axis::Pitch => (1.586, 0.5083, 89.14, 0.8365, 0.7295, 4.0, 0.03328),
+        Axis::Yaw => (3.399, 10.83, 18.77, 37.3, 0.01261, 12.0, 0.4613),
+        Axis::Z => (1.957, 7.984, 16.15, 195.5, 0.1971, 10.0, 2.626),
+        Axis::X | Axis::Y => (1.2, 7.355, 1.265, 30.76, 0.06439, 25.0, 1.403),
     };
     let membership = match axis {
         Axis::Roll | Axis::Pitch | Axis::Yaw => Membership { centre: 3.0, width: 1.2 },

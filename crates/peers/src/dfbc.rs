@@ -46,37 +46,37 @@ parameters! {
     pub struct Gains {
         /// k_x along x and y.
         #[parameter(POS_P, "1/s2", 0.5..=100.0, tuned)]
-        pub position_p_1_s2: f32 = 32.37,
+        pub position_p_1_s2: f32 = 36.92,
         /// k_v along x and y.
         #[parameter(POS_D, "1/s", 0.5..=20.0, tuned)]
-        pub position_d_1_s: f32 = 12.51,
+        pub position_d_1_s: f32 = 12.22,
         /// k_i along x and y.
         #[parameter(POS_I, "1/s3", 0.0..=200.0, tuned)]
-        pub position_i_1_s3: f32 = 112.3,
+        pub position_i_1_s3: f32 = 161.5,
         /// k_x along z.
         #[parameter(HEIGHT_P, "1/s2", 0.5..=200.0, tuned)]
-        pub height_p_1_s2: f32 = 126.4,
+        pub height_p_1_s2: f32 = 92.6,
         /// k_v along z.
         #[parameter(HEIGHT_D, "1/s", 0.5..=60.0, tuned)]
-        pub height_d_1_s: f32 = 31.7,
+        pub height_d_1_s: f32 = 35.33,
         /// k_i along z.
         #[parameter(HEIGHT_I, "1/s3", 0.0..=300.0, tuned)]
-        pub height_i_1_s3: f32 = 32.45,
+        pub height_i_1_s3: f32 = 47.74,
         /// k_R of roll and pitch.
         #[parameter(TILT_P, "1/s2", 10.0..=1000.0, tuned)]
-        pub tilt_p_1_s2: f32 = 446.0,
+        pub tilt_p_1_s2: f32 = 410.0,
         /// k_Omega of roll and pitch.
         #[parameter(TILT_D, "1/s", 2.0..=100.0, tuned)]
-        pub tilt_d_1_s: f32 = 39.85,
+        pub tilt_d_1_s: f32 = 39.24,
         /// k_R of yaw.
         #[parameter(YAW_P, "1/s2", 0.5..=200.0, tuned)]
-        pub yaw_p_1_s2: f32 = 56.57,
+        pub yaw_p_1_s2: f32 = 128.2,
         /// k_Omega of yaw.
         #[parameter(YAW_D, "1/s", 0.5..=40.0, tuned)]
-        pub yaw_d_1_s: f32 = 11.51,
+        pub yaw_d_1_s: f32 = 21.2,
         /// w: bandwidth of the filter on rates and U1..U3.
         #[parameter(ATT_FILTER, "rad/s", 10.0..=500.0, tuned)]
-        pub attitude_filter_rad_s: f32 = 10.18,
+        pub attitude_filter_rad_s: f32 = 10.05,
         /// tau: time constant of the rotor model.
         #[parameter(ROT_LAG, "s", 0.0..=0.5)]
         pub rotor_time_constant_s: f32 = 0.02,
@@ -89,10 +89,10 @@ parameters! {
         /// Filters on U1..U4.
         #[group("")]
         pub smoothing: Smoothing = Smoothing {
-            smooth_tilt_rad_s: 155.8,
-            smooth_yaw_rad_s: 91.32,
-            smooth_lift_rad_s: 82.5,
-            lead_s: 0.0229,
+            smooth_tilt_rad_s: 140.8,
+            smooth_yaw_rad_s: 103.0,
+            smooth_lift_rad_s: 80.49,
+            lead_s: 0.02281,
         },
     }
 }

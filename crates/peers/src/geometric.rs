@@ -50,43 +50,43 @@ parameters! {
     pub struct Gains {
         /// k_x along x and y.
         #[parameter(POS_P, "1/s2", 0.5..=100.0, tuned)]
-        pub position_p_1_s2: f32 = 40.04,
+        pub position_p_1_s2: f32 = 43.59,
         /// k_v along x and y.
         #[parameter(POS_D, "1/s", 0.5..=20.0, tuned)]
-        pub position_d_1_s: f32 = 13.28,
+        pub position_d_1_s: f32 = 13.18,
         /// k_i along x and y.
         #[parameter(POS_I, "1/s3", 0.0..=200.0, tuned)]
-        pub position_i_1_s3: f32 = 121.5,
+        pub position_i_1_s3: f32 = 179.6,
         /// k_x along z.
         #[parameter(HEIGHT_P, "1/s2", 0.5..=200.0, tuned)]
-        pub height_p_1_s2: f32 = 77.3,
+        pub height_p_1_s2: f32 = 72.05,
         /// k_v along z.
         #[parameter(HEIGHT_D, "1/s", 0.5..=60.0, tuned)]
-        pub height_d_1_s: f32 = 35.27,
+        pub height_d_1_s: f32 = 35.56,
         /// k_i along z.
         #[parameter(HEIGHT_I, "1/s3", 0.0..=300.0, tuned)]
-        pub height_i_1_s3: f32 = 103.0,
+        pub height_i_1_s3: f32 = 47.22,
         /// k_R of roll and pitch.
         #[parameter(TILT_P, "1/s2", 10.0..=1000.0, tuned)]
-        pub tilt_p_1_s2: f32 = 186.0,
+        pub tilt_p_1_s2: f32 = 191.2,
         /// k_Omega of roll and pitch.
         #[parameter(TILT_D, "1/s", 2.0..=100.0, tuned)]
-        pub tilt_d_1_s: f32 = 35.59,
+        pub tilt_d_1_s: f32 = 35.66,
         /// k_I of roll and pitch.
         #[parameter(TILT_I, "1/s2", 0.0..=500.0, tuned)]
-        pub tilt_i_1_s2: f32 = 36.35,
+        pub tilt_i_1_s2: f32 = 43.27,
         /// k_R of yaw.
         #[parameter(YAW_P, "1/s2", 0.5..=200.0, tuned)]
-        pub yaw_p_1_s2: f32 = 78.08,
+        pub yaw_p_1_s2: f32 = 80.45,
         /// k_Omega of yaw.
         #[parameter(YAW_D, "1/s", 0.5..=40.0, tuned)]
-        pub yaw_d_1_s: f32 = 17.88,
+        pub yaw_d_1_s: f32 = 16.45,
         /// k_I of yaw.
         #[parameter(YAW_I, "1/s2", 0.0..=100.0, tuned)]
-        pub yaw_i_1_s2: f32 = 24.38,
+        pub yaw_i_1_s2: f32 = 26.96,
         /// w: bandwidth of the filter on the specific force.
         #[parameter(FILTER, "rad/s", 10.0..=500.0, tuned)]
-        pub filter_rad_s: f32 = 26.57,
+        pub filter_rad_s: f32 = 26.5,
         /// Largest position integral, per coordinate.
         #[parameter(POS_INT_MAX, "m/s2", 0.0..=50.0)]
         pub position_integral_max_m_s2: f32 = 10.0,
@@ -96,10 +96,10 @@ parameters! {
         /// Filters on U1..U4.
         #[group("")]
         pub smoothing: Smoothing = Smoothing {
-            smooth_tilt_rad_s: 95.14,
-            smooth_yaw_rad_s: 130.3,
-            smooth_lift_rad_s: 78.81,
-            lead_s: 0.02341,
+            smooth_tilt_rad_s: 92.94,
+            smooth_yaw_rad_s: 116.5,
+            smooth_lift_rad_s: 77.0,
+            lead_s: 0.02306,
         },
     }
 }

@@ -58,34 +58,34 @@ parameters! {
     pub struct Gains {
         /// k_p along x and y.
         #[parameter(POS_P, "1/s", 0.2..=10.0, tuned)]
-        pub position_p_1_s: f32 = 2.98,
+        pub position_p_1_s: f32 = 3.451,
         /// k_v along x and y.
         #[parameter(VEL_P, "1/s", 0.5..=20.0, tuned)]
-        pub velocity_p_1_s: f32 = 6.464,
+        pub velocity_p_1_s: f32 = 6.291,
         /// k_p along z.
         #[parameter(HEIGHT_P, "1/s", 0.2..=20.0, tuned)]
-        pub height_p_1_s: f32 = 2.595,
+        pub height_p_1_s: f32 = 2.657,
         /// k_v along z.
         #[parameter(CLIMB_P, "1/s", 0.5..=40.0, tuned)]
-        pub climb_p_1_s: f32 = 12.75,
+        pub climb_p_1_s: f32 = 13.2,
         /// k_a of roll and pitch.
         #[parameter(TILT_P, "1/s", 1.0..=30.0, tuned)]
-        pub tilt_p_1_s: f32 = 13.02,
+        pub tilt_p_1_s: f32 = 13.39,
         /// k_w of roll and pitch.
         #[parameter(TILTRATE_P, "1/s", 2.0..=100.0, tuned)]
-        pub tilt_rate_p_1_s: f32 = 16.83,
+        pub tilt_rate_p_1_s: f32 = 16.84,
         /// k_a of yaw for small errors; not reduced by `yaw_weight`.
         #[parameter(YAW_P, "1/s", 0.2..=15.0, tuned)]
-        pub yaw_p_1_s: f32 = 9.716,
+        pub yaw_p_1_s: f32 = 8.166,
         /// k_w of yaw.
         #[parameter(YAWRATE_P, "1/s", 0.5..=40.0, tuned)]
-        pub yaw_rate_p_1_s: f32 = 13.95,
+        pub yaw_rate_p_1_s: f32 = 14.89,
         /// w: bandwidth of the filter on velocity and thrust.
         #[parameter(POS_FILTER, "rad/s", 5.0..=300.0, tuned)]
-        pub position_filter_rad_s: f32 = 146.5,
+        pub position_filter_rad_s: f32 = 138.6,
         /// w: bandwidth of the filter on rates and U1..U3.
         #[parameter(ATT_FILTER, "rad/s", 10.0..=500.0, tuned)]
-        pub attitude_filter_rad_s: f32 = 110.0,
+        pub attitude_filter_rad_s: f32 = 115.7,
         /// tau: time constant of the rotor model.
         #[parameter(ROT_LAG, "s", 0.0..=0.5)]
         pub rotor_time_constant_s: f32 = 0.02,
@@ -101,10 +101,10 @@ parameters! {
         /// Filters on U1..U4.
         #[group("")]
         pub smoothing: Smoothing = Smoothing {
-            smooth_tilt_rad_s: 192.4,
-            smooth_yaw_rad_s: 126.8,
-            smooth_lift_rad_s: 123.8,
-            lead_s: 0.01395,
+            smooth_tilt_rad_s: 182.2,
+            smooth_yaw_rad_s: 91.73,
+            smooth_lift_rad_s: 111.9,
+            lead_s: 0.01342,
         },
     }
 }
