@@ -18,6 +18,8 @@ const END: &str = "<!-- end -->\n";
 
 /// Onset of every fault \[s\].
 const ONSET_S: f64 = 10.0;
+/// Height of a vehicle that is about to touch the ground, of the 15 m from which it descends \[m\].
+const NEARLY_DOWN_M: f64 = 0.5;
 /// Height of the centre of mass below which a vehicle touches the ground \[m\].
 const GROUND_M: f64 = 0.15;
 /// Fastest touch-down of a vehicle that knows its attitude, and of one without a height \[m/s\].
@@ -32,8 +34,8 @@ const BLIND: [&str; 4] = ["imu-stuck-outdoors", "imu-dead-outdoors", "tracker-an
 /// Two degrees per second of error that come at once: the filter may take longer to find the bias than it takes to
 /// fall.
 const TOO_MUCH: [&str; 1] = ["gyro-biased-outdoors"];
-/// Without a position outdoors it drifts, touches the ground at up to 4 m/s along it, and may tip over there; or, still
-/// upright, the wind carries it further than a flight goes.
+/// Without a position outdoors it drifts, touches the ground at up to 4 m/s along it, and may tip over there; or the
+/// flight ends, too far away, when it has nearly come down.
 const ADRIFT: [&str; 2] = ["gnss-lost", "magnetometer-and-gnss-lost"];
 
 /// What became of a vehicle, from the onset on.
@@ -48,6 +50,8 @@ struct Outcome {
     /// Height at which the motors stopped \[m\].
     stopped_m: Option<f64>,
     tumbled: bool,
+    /// Height where the flight ends \[m\].
+    end_m: f64,
     /// Fastest touch-down that counts as a landing \[m/s\].
     gentle_m_s: f64,
 }
@@ -63,6 +67,7 @@ impl Outcome {
                 return;
             }
             let (p, eta) = (&sample.motion.position_m, &sample.motion.attitude_rad);
+            outcome.end_m = p.z;
             if p.z < GROUND_M {
                 outcome.touched_m_s.get_or_insert(sample.motion.velocity_m_s.z.abs());
             }
@@ -94,9 +99,9 @@ impl Outcome {
         self.tumbled && self.tilt_rad < 0.5 && self.touched_m_s.is_some_and(|speed| speed < self.gentle_m_s)
     }
 
-    /// True if it was still upright in the air where the flight ends, far away.
+    /// True if the flight ends, far away, with the vehicle upright and nearly down.
     fn drifts_off(&self) -> bool {
-        self.off_m > LOST_DISTANCE_M && self.tilt_rad < 0.5 && self.touched_m_s.is_none() && self.stopped_m.is_none()
+        self.off_m > LOST_DISTANCE_M && self.tilt_rad < 0.5 && self.end_m < NEARLY_DOWN_M && self.stopped_m.is_none()
     }
 
     fn words(&self) -> String {
@@ -105,7 +110,7 @@ impl Outcome {
         match (self.flies_on(), self.lands(), self.tumbled, stopped) {
             (true, ..) => "flies on".into(),
             (_, true, ..) => format!("lands{}", touched.unwrap_or_default()),
-            _ if self.drifts_off() => "drifts off, upright".into(),
+            _ if self.drifts_off() => "drifts off, nearly down where the flight ends".into(),
             _ if self.tips_over() => format!("lands{}, tips over", touched.unwrap_or_default()),
             (_, _, true, _) => "descends blind, tumbles".into(),
             (.., Some(height)) => {

@@ -85,12 +85,17 @@ fn hardware() -> Result<Condition, Box<dyn Error>> {
 }
 
 impl Condition {
+    /// Returns whether it is asked of this law.
+    pub fn is_asked_of(&self, kind: ControllerKind) -> bool {
+        !self.of_afbc || kind == ControllerKind::Afbc
+    }
+
     /// Returns by what this flight multiplies the cost of a contender: 1 if it is survived, and at most 2.
     ///
     /// # Errors
     /// The first parameter, gain or setting out of range.
     pub fn factor(&self, contender: &Contender) -> Result<f64, OutOfRange> {
-        if self.of_afbc && contender.kind() != ControllerKind::Afbc {
+        if !self.is_asked_of(contender.kind()) {
             return Ok(1.0);
         }
         let contender = match &self.scenario.vehicle_file {

@@ -38,7 +38,7 @@ pub fn report(
         let (before, after) = (mean(&before), mean(&after));
         let _ = writeln!(text, "# {title:<16}{before:>10.4}{after:>10.4}  mean\n#");
     }
-    for condition in conditions {
+    for condition in conditions.iter().filter(|condition| condition.is_asked_of(contender.kind())) {
         let met = |contender| Ok::<_, OutOfRange>(if condition.factor(contender)? > 1.0 { "not met" } else { "met" });
         let _ = writeln!(text, "# {:<16}{:>10}{:>10}", condition.scenario.name, met(start)?, met(contender)?);
     }
