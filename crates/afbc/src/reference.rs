@@ -150,9 +150,9 @@ impl Coordinate {
         let half = 0.5 * dt_s;
         *expected = [point.x + dt_s * (point.v + half * point.a), point.v + dt_s * (point.a + half * point.j)];
         let reference = Point { x: point.x + *d, v: point.v + *d_dot, a: point.a + *d_ddot, j: point.j + d_dddot };
-        *d += dt_s * (*d_dot + half * *d_ddot);
-        *d_dot += dt_s * *d_ddot;
-        *d_ddot += dt_s * d_dddot;
+        *d = math::settled(*d + dt_s * (*d_dot + half * *d_ddot));
+        *d_dot = math::settled(*d_dot + dt_s * *d_ddot);
+        *d_ddot = math::settled(*d_ddot + dt_s * d_dddot);
         reference
     }
 }

@@ -73,8 +73,8 @@ impl CommandFilter {
     pub fn advance(&self, state: &Filtered, command: f32) -> Filtered {
         let offset = state.angle - command;
         let slope = state.rate + self.bandwidth * offset;
-        let angle = command + (offset + slope * self.dt) * self.decay;
-        let rate = (state.rate - self.bandwidth * slope * self.dt) * self.decay;
+        let angle = math::settled(command + (offset + slope * self.dt) * self.decay);
+        let rate = math::settled((state.rate - self.bandwidth * slope * self.dt) * self.decay);
         // Within one step, a fast filter reaches its command and comes to rest.
         let travel = angle - state.angle;
         let fastest = if rate.abs() > self.rate_max { rate } else { travel };

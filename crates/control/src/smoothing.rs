@@ -84,7 +84,7 @@ impl Smoother {
     #[inline]
     pub fn advance(&self, last: &mut Option<Smoothed>, inputs: &Inputs) -> Inputs {
         let Some([tilt, yaw, lift]) = self.shares else { return *inputs };
-        let towards = |from: f32, to: f32, share: f32| from + (to - from) * share;
+        let towards = |from: f32, to: f32, share: f32| math::settled(from + (to - from) * share);
         let filtered = |from: &Inputs, to: &Inputs| Inputs {
             roll_n: towards(from.roll_n, to.roll_n, tilt),
             pitch_n: towards(from.pitch_n, to.pitch_n, tilt),

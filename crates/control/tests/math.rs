@@ -166,3 +166,15 @@ proptest! {
         prop_assert_eq!(math::wrap_angle(x).to_bits(), x.to_bits());
     }
 }
+
+#[test]
+fn what_has_settled_is_zero_or_normal_and_else_as_it_was() {
+    for x in bit_sweep(997) {
+        let settled = math::settled(x);
+        assert!(settled == 0.0 || settled.is_normal(), "{x:e}: {settled:e}");
+        assert!(x.abs() >= 3e-33 || settled == 0.0, "{x:e}: {settled:e}");
+        assert!(x.abs() < 4e-18 || settled == x, "{x:e}: {settled:e}");
+        let (error, x) = ((f64::from(settled) - f64::from(x)).abs(), f64::from(x).abs());
+        assert!(error <= 6e-33 + 1.2e-7 * x, "{x:e}: {error:e}");
+    }
+}
