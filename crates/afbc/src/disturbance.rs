@@ -127,12 +127,13 @@ impl Observer {
         {
             let off = v - *v_hat;
             if off.abs() <= JUMP_M_S {
-                *f_hat = min(max(*f_hat + self.acceleration * off, -ACCELERATION_MAX_M_S2), ACCELERATION_MAX_M_S2);
+                let f = math::settled(*f_hat + self.acceleration * off);
+                *f_hat = min(max(f, -ACCELERATION_MAX_M_S2), ACCELERATION_MAX_M_S2);
                 *v_hat += self.velocity * off;
             } else {
                 *v_hat = v;
             }
-            *v_hat += (a + *f_hat) * self.dt_s;
+            *v_hat = math::settled(*v_hat + (a + *f_hat) * self.dt_s);
         }
         *acceleration_m_s2
     }
@@ -141,7 +142,7 @@ impl Observer {
     #[inline]
     pub fn give(&self, observed: &mut Option<Observed>, thrust_n: f32) {
         if let Some(observed) = observed {
-            observed.thrust_n += (thrust_n - observed.thrust_n) * self.lag;
+            observed.thrust_n = math::settled(observed.thrust_n + (thrust_n - observed.thrust_n) * self.lag);
         }
     }
 }

@@ -103,7 +103,7 @@ impl Default for Swing {
 impl Swing {
     #[inline]
     fn advance(&mut self, input: f32, least: f32, forget: f32) {
-        self.rate_hz -= forget * self.rate_hz;
+        self.rate_hz = math::settled(self.rate_hz - forget * self.rate_hz);
         let onward = (input - self.extreme) * self.direction;
         if onward > 0.0 {
             self.extreme = input;
@@ -190,10 +190,10 @@ impl Monitor {
 
         let error = &mut figures.error[axis];
         // Each subsystem is updated every sixth step.
-        *error += 6.0 * self.forget * (cascade.distances[axis].abs() - *error);
+        *error = math::settled(*error + 6.0 * self.forget * (cascade.distances[axis].abs() - *error));
 
-        let saturated = if saturated { 1.0 } else { 0.0 };
-        figures.saturation_share += self.forget * (saturated - figures.saturation_share);
+        let (saturated, share) = (if saturated { 1.0 } else { 0.0 }, figures.saturation_share);
+        figures.saturation_share = math::settled(share + self.forget * (saturated - share));
 
         let [roll, pitch, yaw, thrust] = &mut figures.swings;
         let Bounds { swing_n, swings_hz, .. } = self.bounds;

@@ -3,7 +3,7 @@
 use crate::attitude::roll_pitch;
 use afbc_control::command_filter::Filtered;
 use afbc_control::mixer::{Allocation, Mixer};
-use afbc_control::{Action, Errors, Settings, Smoothed, Smoother, Smoothing, Trace};
+use afbc_control::{Action, Errors, Settings, Smoothed, Smoother, Smoothing, Trace, math};
 use afbc_types::{Airframe, Declared, Inputs, OutOfRange, PerAxis, RotorSpeeds};
 use nalgebra::{Matrix3, Vector3};
 
@@ -77,7 +77,8 @@ impl<const N: usize> Body<N> {
         let [roll, pitch] = desired_rad;
         let [p, q] = [demand.desired_rates_rad_s.x, demand.desired_rates_rad_s.y];
         let [position, velocity, attitude, rates] = demand.errors;
-        let errors = |e1, e1_dot| Errors { e1, e1_dot, e2: 0.0 };
+        // Products of numbers that decay.
+        let errors = |e1, e1_dot| Errors { e1: math::settled(e1), e1_dot: math::settled(e1_dot), e2: 0.0 };
         let action = self.mixer.carry_out(&allocation);
         let mut trace = Trace::default();
         trace.inputs = inputs;

@@ -39,6 +39,6 @@ impl<const N: usize> RotorModel<N> {
     #[inline]
     pub(crate) fn advance(&self, spin: &mut Spin<N>, commanded: &RotorSpeeds<N>) {
         let rotors = spin.0.unwrap_or(self.hover);
-        spin.0 = Some(RotorSpeeds(rotors.0 + (commanded.0 - rotors.0) * self.gain));
+        spin.0 = Some(RotorSpeeds((rotors.0 + (commanded.0 - rotors.0) * self.gain).map(math::settled)));
     }
 }
