@@ -1,0 +1,122 @@
+//! Minutes at rest after a manoeuvre, for any controller. What decays in its memory has to end at zero: a number
+//! below 1.2e-38 is subnormal, and many processors take a hundred times as long to compute with it.
+
+use afbc_control::{FlightController, Screened, Trace};
+use afbc_types::{Setpoint, State};
+use core::fmt::Debug;
+use nalgebra::Vector3;
+
+/// Step in which the setpoint moves by 1 m along each axis and by 1 rad.
+const BEGIN: usize = 1_000;
+/// Steps of the vehicle's motion, after which it is at rest on its setpoint.
+const MOTION: usize = 2_000;
+const TEN_MINUTES: usize = 600_000;
+/// The slowest averages, over a second, decay from 1 to 1e-38 in 87 s.
+const TWO_MINUTES: usize = 120_000;
+/// Steps in which what decays within a second is looked at often.
+const EARLY: usize = 40_000;
+
+/// State and setpoint of a step, from its number, the last state and the last step's trace.
+type Motion = fn(usize, &State, &Trace) -> (State, Setpoint);
+
+const MOTIONS: [(&str, Motion, usize); 5] = [
+    ("smooth", smooth, TEN_MINUTES),
+    ("late, at once", late, TWO_MINUTES),
+    ("on the reference", follows, TWO_MINUTES),
+    ("landed", landed, TWO_MINUTES),
+    ("nothing at all", |_, _, _| (State::default(), Setpoint::default()), TWO_MINUTES),
+];
+
+fn setpoint(step: usize) -> Setpoint {
+    let size = if step < BEGIN { 0.0 } else { 1.0 };
+    Setpoint { position_m: Vector3::repeat(size), yaw_rad: size, ..Setpoint::default() }
+}
+
+/// Moves smoothly, and leans as its acceleration needs.
+fn smooth(step: usize, _: &State, _: &Trace) -> (State, Setpoint) {
+    let seconds = MOTION as f32 * 1e-3;
+    let t = (step.saturating_sub(BEGIN) as f32 / MOTION as f32).min(1.0);
+    let x = t * t * t * (10.0 + t * (6.0 * t - 15.0));
+    let v = 30.0 * t * t * (1.0 - t) * (1.0 - t) / seconds;
+    let a = 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t) / (seconds * seconds);
+    let state = State {
+        position_m: Vector3::repeat(x),
+        velocity_m_s: Vector3::repeat(v),
+        attitude_rad: Vector3::new(-0.1 * a, 0.1 * a, x),
+        rates_rad_s: Vector3::new(0.0, 0.0, v),
+    };
+    (state, setpoint(step))
+}
+
+/// Stays where it was, then is at the setpoint.
+fn late(step: usize, _: &State, _: &Trace) -> (State, Setpoint) {
+    let Setpoint { position_m, yaw_rad, .. } = setpoint(if step < BEGIN + MOTION { 0 } else { step });
+    let state = State { position_m, attitude_rad: Vector3::new(0.0, 0.0, yaw_rad), ..State::default() };
+    (state, setpoint(step))
+}
+
+/// Follows what the law tracks, a step later.
+fn follows(step: usize, last: &State, trace: &Trace) -> (State, Setpoint) {
+    let (mut state, errors) = (*last, &trace.errors);
+    state.position_m += Vector3::new(errors.x.e1, errors.y.e1, errors.z.e1);
+    state.velocity_m_s += Vector3::new(errors.x.e1_dot, errors.y.e1_dot, errors.z.e1_dot);
+    state.attitude_rad.z += errors.yaw.e1;
+    state.rates_rad_s.z += errors.yaw.e1_dot;
+    (state, setpoint(step))
+}
+
+/// Moves smoothly on the ground, with a setpoint below it at the end.
+fn landed(step: usize, last: &State, trace: &Trace) -> (State, Setpoint) {
+    let (mut state, mut setpoint) = smooth(step, last, trace);
+    (state.position_m.z, state.velocity_m_s.z) = (0.0, 0.0);
+    setpoint.position_m.z = if step < BEGIN + MOTION { setpoint.position_m.z } else { -1.0 };
+    (state, setpoint)
+}
+
+/// True if a number in this text is subnormal; one that is has been printed with an exponent, and exactly.
+fn found(text: &str) -> bool {
+    text.split(|c: char| !c.is_ascii_alphanumeric() && !"+-.".contains(c))
+        .any(|word| word.contains("e-") && word.parse::<f32>().is_ok_and(f32::is_subnormal))
+}
+
+/// Returns the places of subnormal numbers in what the memory prints, which is every field: the names that lead to it.
+fn subnormals(memory: &impl Debug) -> Vec<String> {
+    if !found(&format!("{memory:?}")) {
+        return Vec::new();
+    }
+    let (text, mut path, mut places) = (format!("{memory:#?}"), Vec::new(), Vec::new());
+    for line in text.lines() {
+        path.truncate((line.len() - line.trim_start().len()) / 4);
+        path.push(line.trim());
+        if found(line) {
+            places.push(path.join(" "));
+        }
+    }
+    places
+}
+
+/// Flies every motion, and finds no subnormal number in the controller's memory.
+pub(crate) fn leaves_nothing_subnormal<C: FlightController>(name: &str, controller: &C)
+where
+    C::Memory: PartialEq,
+{
+    for (motion_name, motion, steps) in MOTIONS {
+        let (mut memory, mut trace) = (Screened::<C::Memory>::default(), Trace::default());
+        let (mut state, mut setpoint) = (State::default(), Setpoint::default());
+        for step in 0..steps {
+            let before = (memory, state, setpoint);
+            (state, setpoint) = motion(step, &state, &trace);
+            let _ = controller.step(&mut memory, Some(&state), &setpoint);
+            trace = C::trace(&memory.control);
+            // What decays in less than a tenth of a second decays before the rest has come to rest.
+            if step % if step < EARLY { 7 } else { 97 } == 0 {
+                let places = subnormals(&memory.control);
+                assert!(places.is_empty(), "{name}, {motion_name}, step {step}:\n{}", places.join("\n"));
+            }
+            // Nothing moves any more.
+            if step > BEGIN + MOTION && (memory, state, setpoint) == before {
+                break;
+            }
+        }
+    }
+}
