@@ -46,6 +46,7 @@ pub(crate) fn classical(gains: &Gains, tracking: &Tracking, dynamics: &Dynamics)
 parameters! {
     /// The gains of one backstepping subsystem. The defaults are those of Section IV for attitude, x and y.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Gains {
         /// alpha_1 (12).
         #[parameter(ALPHA1, "1/s", 1e-2..=100.0, tuned)]

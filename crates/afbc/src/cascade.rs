@@ -20,6 +20,7 @@ pub const VERTICAL_MIN: f32 = 0.3;
 parameters! {
     /// Settings of the cascade around the law. The defaults are the paper's.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Settings {
         /// Settings that every controller needs.
         #[group("")]

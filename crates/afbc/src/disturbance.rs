@@ -27,6 +27,7 @@ pub const JUMP_M_S: f32 = 0.1;
 parameters! {
     /// The observer. The default is none.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct DisturbanceObserver {
         /// w of the disturbance observer; 0 for none.
         #[parameter(DIST_XY, "rad/s", 0.0..=200.0, tuned)]

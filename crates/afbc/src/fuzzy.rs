@@ -24,6 +24,7 @@ parameters! {
     /// Three Gaussians of one width over one input: exp(-1/2 ((x - c_j)/s)^2), c_j in {-c, 0, c}. The defaults are
     /// those of Section IV for attitude.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Membership {
         /// c: distance of the outer Gaussians from zero, in the fuzzy inputs' unit.
         #[parameter(CENTRE, "fuzzy input", 1e-3..=1e3)]

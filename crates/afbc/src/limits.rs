@@ -7,6 +7,7 @@ parameters! {
     /// Limits on the demands of position control. The default is no limit but that of (40) itself, a tilt below 90
     /// degrees.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Limits {
         /// Largest angle between thrust and vertical.
         #[parameter(TILT, "rad", 0.05..=1.57)]

@@ -23,6 +23,7 @@ use afbc_types::{Setpoint, State, parameters};
 parameters! {
     /// The reference model. The default is none.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct ReferenceModel {
         /// w of x and y; 0 for none.
         #[parameter(REF_XY, "rad/s", 0.0..=50.0, tuned)]

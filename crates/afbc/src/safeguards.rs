@@ -22,6 +22,7 @@ use afbc_types::parameters;
 parameters! {
     /// Safeguards of one subsystem's adaptation; each off by default.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Safeguards {
         /// sigma: leakage of both estimates.
         #[parameter(SIGMA, "1/s", 0.0..=10.0)]

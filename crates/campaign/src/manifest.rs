@@ -6,6 +6,7 @@ use crate::row::{Column, FIGURES, Row};
 use core::hash::Hasher;
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::io;
 use std::str::FromStr;
 use twox_hash::XxHash64;
 
@@ -140,10 +141,28 @@ impl Manifest {
 
 /// Returns a fingerprint that differs between campaigns and between versions of this program.
 fn fingerprint(campaign: &Campaign) -> String {
-    // Names and descriptions are left out; the debug form contains everything that decides a flight, to the last bit.
-    let Campaign { flights, seed, scenario, courses, spreads, .. } = campaign;
-    let text = format!("{} {:?}", env!("CARGO_PKG_VERSION"), (flights, seed, scenario, courses, spreads));
-    let mut hasher = XxHash64::with_seed(0);
-    hasher.write(text.as_bytes());
-    format!("{:016x}", hasher.finish())
+    let Campaign { name: _, description: _, flights, seed, scenario, courses, spreads } = campaign;
+    // By name, since a quantity's place may change.
+    let spreads: Vec<_> =
+        spreads.iter().map(|spread| (spread.quantity().map(|quantity| quantity.range.name), spread.ends)).collect();
+    let mut hasher = Hashed(XxHash64::with_seed(0));
+    // Numbers are written to the last bit; infinity, of an event without end, as null, which no other number is.
+    let decides = (env!("CARGO_PKG_VERSION"), flights, seed, scenario, courses, spreads);
+    let written = serde_json::to_writer(&mut hasher, &decides);
+    debug_assert!(written.is_ok(), "nothing in it cannot be written");
+    format!("{:016x}", hasher.0.finish())
+}
+
+/// A hash of what is written.
+struct Hashed(XxHash64);
+
+impl io::Write for Hashed {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.write(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }

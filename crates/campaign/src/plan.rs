@@ -3,6 +3,7 @@
 use afbc_plant::Motion;
 use afbc_sim::scenario::Scenario;
 use afbc_sim::trajectory::Trajectory;
+use serde::Serialize;
 
 /// A quantity and the interval from which it is drawn uniformly; a single value if both ends are equal.
 #[derive(Clone, Copy, Debug)]
@@ -14,7 +15,7 @@ pub struct Spread {
 }
 
 /// A reference, and the initial state of flights along it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Course {
     /// Name of the scenario it is from.
     pub name: String,

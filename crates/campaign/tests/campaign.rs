@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
 
+use afbc::Profile;
 use afbc_campaign::{self as campaign, Campaign, Folder, Manifest, Row, Shard};
 use afbc_sim::run::Run;
 use std::collections::BTreeMap;
@@ -170,6 +171,33 @@ fn a_folder_belongs_to_one_campaign_and_one_program() {
     let renamed = campaign::parse("/elsewhere/small.toml", SMALL, "small", Path::new("")).unwrap();
     Folder::open(&folder, Manifest::new(&renamed, Shard::WHOLE), false).unwrap();
     Folder::open(&folder, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
+}
+
+/// Two vehicles that differ in one number, and in nothing that the laws are told, have results of their own.
+#[test]
+fn a_folder_belongs_to_one_vehicle() {
+    let folder = folder("vehicles");
+    let iris = afbc_vehicles::built_in("iris").unwrap().text;
+    let moved = iris.replace("[imu]\nposition_m = [0.0,", "[imu]\nposition_m = [0.03,");
+    assert_ne!(iris, moved);
+    let short = parse(&SMALL.replace("flights = 150", "flights = 2").replace("= 6.0", "= 0.2"));
+    let on = |file: &str, text: &str| {
+        let vehicle = afbc_vehicles::parse(file, text, "iris").unwrap();
+        Campaign { scenario: short.scenario.clone().on(&vehicle, Profile::Flight).unwrap(), ..short.clone() }
+    };
+    let (a, b) = (on("a.toml", iris), on("b.toml", &moved));
+    let one = Shard { index: 1, of: 2 };
+    fly(&a, &folder.join("a"), one, 1);
+    let refused = Folder::open(&folder.join("a"), Manifest::new(&b, one), false).map(|_| ()).unwrap_err().to_string();
+    assert!(refused.contains("not this one") && refused.contains("--out") && !refused.contains('\n'), "{refused}");
+    fly(&b, &folder.join("b"), Shard { index: 2, of: 2 }, 1);
+    let parts = ["a", "b"].map(|part| folder.join(part));
+    let refused = campaign::merge(&parts, &folder.join("merged"), false).map(|_| ()).unwrap_err().to_string();
+    assert!(refused.contains("parts of different campaigns") && !refused.contains('\n'), "{refused}");
+    // The same vehicle from elsewhere, with another comment, is the same.
+    let copied = on("/elsewhere/mine.toml", &format!("# mine\n{iris}"));
+    fly(&copied, &folder.join("b2"), Shard { index: 2, of: 2 }, 1);
+    campaign::merge(&["a", "b2"].map(|part| folder.join(part)), &folder.join("merged"), false).unwrap();
 }
 
 #[test]

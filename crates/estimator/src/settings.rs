@@ -7,6 +7,7 @@ parameters! {
     ///
     /// The noise of the other sensors comes with each measurement.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Settings {
         /// Acceleration of free fall.
         #[parameter(GRAVITY, "m/s2", 9.7..=9.9)]

@@ -20,6 +20,7 @@ parameters! {
     /// default full throttle gives 1000 rad/s, of which the paper's vehicle needs 200 to hover; to be measured for a
     /// real vehicle. Not in the paper.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Curve {
         /// omega_max: speed at full throttle.
         #[parameter(SPEED_MAX, "rad/s", 1.0..=32_768.0)]

@@ -47,6 +47,7 @@ parameters! {
     ///
     /// For the law of 2010, leave the four integrals (names with `_i_`) at 0.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Gains {
         /// k_x along x and y.
         #[parameter(POS_P, "1/s2", 0.5..=100.0, tuned)]

@@ -46,6 +46,7 @@ parameters! {
     /// Gains and limits. Defaults are the result of `sitl tune` for the paper's vehicle with a rotor lag of 20 ms
     /// (`docs/tuning.md`).
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Gains {
         /// Gains of the geometric controller. Its attitude integrals are 0: moments are left to the adaptation.
         #[group("")]

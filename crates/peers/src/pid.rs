@@ -46,6 +46,7 @@ parameters! {
     /// Gains and limits. Defaults are the result of `sitl tune` for the paper's vehicle with a rotor lag of 20 ms
     /// (`docs/tuning.md`).
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Gains {
         /// k_p along x and y.
         #[parameter(POS_P, "1/s", 0.2..=10.0, tuned)]

@@ -8,6 +8,7 @@ parameters! {
     /// battery equivalent circuit models for state of charge estimation by an experimental approach*, Energies 4), with
     /// an open-circuit voltage that falls linearly with the charge drawn.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Battery {
         /// Open-circuit voltage when full, at which the rotors reach their largest speed.
         #[parameter(FULL, "V", 1.0..=1000.0)]
@@ -40,6 +41,7 @@ parameters! {
 
 /// Effect of a low voltage on the rotors, in proportion to voltage over full voltage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Sag {
     /// Reduces the largest speed: speed controllers hold the commanded speed as long as they can.
     Ceiling,

@@ -17,6 +17,7 @@ parameters! {
     /// The smallest sink and the largest damping also depend on the vehicle and the step, so that the integration is
     /// stable ([`Contact::validate_for`]).
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Contact {
         /// Compression of the feet's springs by the vehicle at rest; determines k.
         #[parameter(SINK, "m", 1e-5..=0.5)]

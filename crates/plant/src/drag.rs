@@ -22,6 +22,7 @@ parameters! {
     /// Wind acts through drag only. The largest blade factor and area also depend on the vehicle and the step, so that
     /// the integration is stable up to [`AIRSPEED_M_S`] ([`Drag::validate_for`]).
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Drag {
         /// rho: density of the air.
         #[parameter(DENSITY, "kg/m3", 0.0..=5.0)]

@@ -8,6 +8,7 @@ parameters! {
     /// Intervals without measurements, as a two-state Markov chain (E. N. Gilbert 1960, *Capacity of a burst-noise
     /// channel*).
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Dropouts {
         /// Rate at which dropouts begin while there is none.
         #[parameter(RATE, "Hz", 0.0..=1000.0)]

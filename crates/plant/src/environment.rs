@@ -8,6 +8,7 @@ use nalgebra::{Vector2, Vector3};
 /// Meaning of a gust's size. In both cases it is part of the paper's A_F = -\[A_x, A_y, A_z\] and A_T = -\[A_phi,
 /// A_theta, A_psi\]: a positive gust pushes in the negative direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum GustKind {
     /// The paper's A_i: m/s2 in the earth frame for x, y, z; rad/s2 in the body frame for roll, pitch, yaw.
     Acceleration,
@@ -18,6 +19,7 @@ pub enum GustKind {
 
 /// A constant push on one axis from `start_s` to `end_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Gust {
     /// One of A_phi, A_theta, A_psi, A_z, A_x, A_y.
     pub axis: Axis,
@@ -33,6 +35,7 @@ pub struct Gust {
 
 /// A physical parameter that may change in flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Quantity {
     /// m: mass.
     Mass,
@@ -52,6 +55,7 @@ pub enum Quantity {
 
 /// Multiplies one parameter by `factor` from `start_s` to `end_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ParameterChange {
     /// The parameter.
     pub quantity: Quantity,
@@ -67,6 +71,7 @@ pub struct ParameterChange {
 /// velocity are those of the common centre of mass, and do not jump. Beside the body's z axis it moves that centre away
 /// from the thrust, whose moment follows; products of inertia, and the same shift for drag and ground, are left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Payload {
     /// Mass \[kg\].
     pub mass_kg: f64,
@@ -109,6 +114,7 @@ impl Payload {
 
 /// The vehicle's true parameters with their changes, gusts and payloads.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Environment {
     nominal: Parameters<f64>,
     frame: Frame,

@@ -11,6 +11,7 @@ pub type Lanes = SVector<f64, ROTORS_MAX>;
 
 /// The rotors of a vehicle. The default is the paper's frame, [`PLUS`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Frame {
     count: usize,
     /// 1 for each rotor.

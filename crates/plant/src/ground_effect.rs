@@ -9,6 +9,7 @@ parameters! {
     /// 3021, in hover: one rotor of radius R at height z, its source and its image. Valid from z = R/2 up; below, the
     /// ratio stays at its value there, 4/3. The level rotor plane represents all rotors; drag moments are not changed.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct GroundEffect {
         /// R: radius of a rotor.
         #[parameter(ROT_RADIUS, "m", 0.001..=10.0)]

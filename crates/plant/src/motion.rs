@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 
 /// True motion in `f64`, with the quantities and frames of [`afbc_types::State`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Motion {
     /// xi, earth frame \[m\].
     pub position_m: Vector3<f64>,

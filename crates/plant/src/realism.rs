@@ -52,6 +52,7 @@ pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
 /// # Ok::<(), afbc_types::OutOfRange>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Realism {
     /// Rotor lag, limits, delay, faults and battery.
     pub rotors: Rotors,

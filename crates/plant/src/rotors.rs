@@ -14,6 +14,7 @@ parameters! {
     /// The order is that of the hardware: a command is delayed, scaled by the battery's voltage, limited, and followed
     /// with a lag.
     #[derive(Clone, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Rotors {
         /// Time constant of d omega/dt = (commanded - omega)/tau; 0 for no lag.
         #[parameter(LAG, "s", 0.0..=1.0)]
@@ -43,6 +44,7 @@ parameters! {
 
 /// Speeds of the rotors, actual and commanded, before the first command arrives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Start {
     /// Hover speed, for a flight that begins in the air without a transient.
     Hover,
@@ -52,6 +54,7 @@ pub enum Start {
 
 /// A worn or broken rotor, whose thrust and drag moment are multiplied by `efficiency`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct RotorFault {
     /// Number of the rotor, from 1, in the order of the frame.
     pub rotor: u8,

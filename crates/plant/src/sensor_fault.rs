@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 
 /// What is wrong with a measured coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Misreading {
     /// Coordinate and rate are multiplied; below 0 is the wrong sign.
     Factor(f64),
@@ -17,6 +18,7 @@ pub enum Misreading {
 
 /// A fault from `start_s` to `end_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SensorFault {
     /// x, y, z: that coordinate and its velocity; roll, pitch, yaw: that angle and the rate about the same body axis.
     /// None for the whole state.

@@ -10,6 +10,7 @@ use nalgebra::Vector3;
 parameters! {
     /// One number for each group of the state's coordinates, the same for its three coordinates.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Deviations {
         /// Standard deviation of the position, per coordinate.
         #[parameter(POS, "m", 0.0..=100.0)]
@@ -48,6 +49,7 @@ impl Deviations {
 parameters! {
     /// Properties of the measurement. The default is perfect.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Sensing {
         /// Standard deviation of white noise, drawn in every step.
         #[group("noise")]

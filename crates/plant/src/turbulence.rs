@@ -14,6 +14,7 @@ parameters! {
     /// it. In wind, a hovering vehicle's airspeed is the wind speed. The rotational gusts (p, q, r) are left out, since
     /// they act on wings, not rotors.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Turbulence {
         /// W20: wind at 20 ft (6 m).
         #[parameter(WIND_20FT, "m/s", 0.0..=50.0)]

@@ -19,6 +19,7 @@ use nalgebra::{Quaternion, SVector, Vector3};
 
 /// Equations of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Model {
     /// (6), the paper's own simulation model.
     Simplified,

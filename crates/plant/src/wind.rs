@@ -14,6 +14,7 @@ parameters! {
     ///
     /// Constant during a step, at its value at the start.
     #[derive(Clone, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Wind {
         /// Velocity of the steady wind, earth frame.
         #[parameter(STEADY, "m/s", -50.0..=50.0)]
@@ -34,6 +35,7 @@ parameters! {
 /// MIL-F-8785C's discrete gust rises over a distance d_m, which a vehicle at airspeed V crosses in T = d_m/V, and
 /// persists: infinite `hold_s`. With a `hold_s` of zero it is the full 1-cosine of CS-25.341.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CosineGust {
     /// V_m: peak velocity, earth frame \[m/s\].
     pub velocity_m_s: Vector3<f64>,

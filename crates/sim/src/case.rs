@@ -1,7 +1,7 @@
 //! Readings of the paper's description of its experiment.
 
 /// Reading of the paper's "1.2 N" and "1.2 N m" (decision 3 in `docs/paper.md`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub enum Reading {
     /// Accelerations of 1.2 m/s2 and 1.2 rad/s2 that persist from their onset: the paper's claims hold.
     Persistent,
@@ -26,7 +26,7 @@ impl Reading {
 }
 
 /// Sign of an uncertainty of which only the size is printed (decision 4 in `docs/paper.md`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub enum Sign {
     /// More than nominal.
     Plus,
@@ -53,7 +53,7 @@ impl Sign {
 }
 
 /// Signs of the parameter uncertainty.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Uncertainty {
     /// Inertia +-75 %.
     pub inertia: Sign,
@@ -75,7 +75,7 @@ impl Uncertainty {
 }
 
 /// One variant of the experiment; `None` leaves out gusts or uncertainty.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Case {
     /// Reading of the gusts.
     pub reading: Option<Reading>,

@@ -37,7 +37,7 @@ impl Law {
 }
 
 /// A named controller with its law, gains and settings.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Contender {
     /// Name in logs and files; unique within a scenario.
     pub name: String,

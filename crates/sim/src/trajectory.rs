@@ -51,7 +51,7 @@ impl Reference {
 }
 
 /// A position in which to be at rest at a given time.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Waypoint {
     /// Time \[s\].
     pub time_s: f64,
@@ -62,7 +62,7 @@ pub struct Waypoint {
 }
 
 /// A sine along one axis: amplitude sin(2 pi t / period + phase).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Sine {
     /// Amplitude \[m\].
     pub amplitude_m: f64,
@@ -85,7 +85,7 @@ impl Sine {
 }
 
 /// A reference trajectory.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub enum Trajectory {
     /// Section IV: a tilted ellipse from 2 m to 8 m height with a period of 60 s.
     Paper,

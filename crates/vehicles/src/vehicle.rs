@@ -10,17 +10,19 @@ use afbc_plant::Realism;
 use afbc_plant::instruments::Mounting;
 use afbc_reader::{FileError, Table};
 use afbc_types::{Airframe, OutOfRange, Parameters, PerAxis, Rotor, with_rotors};
-use core::fmt;
 
 /// Table of the settings of AFBC's cascade, beside those of the laws' gains.
 pub const CASCADE: &str = "cascade";
 
-/// A vehicle as its file describes it.
-#[derive(Clone, PartialEq)]
+/// A vehicle as its file describes it. Written by serde, it is what the vehicle is, wherever its file lies, whatever
+/// that is called and whatever comments it has.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Vehicle {
     /// Short name.
+    #[serde(skip)]
     pub name: String,
     /// One-line description.
+    #[serde(skip)]
     pub description: String,
     /// Masses, arm and rotor factors.
     pub parameters: Parameters<f64>,
@@ -40,17 +42,12 @@ pub struct Vehicle {
     pub flight_gains: PerAxis<Gains>,
     /// Settings of AFBC's cascade in the profile `flight`: by rule ([`Profile::settings_for`]), or as the file says.
     pub flight_settings: Settings,
-    /// Text and name of the file, from which the gains of other laws are read.
+    /// Text and name of the file, from which the gains of other laws are read: into the laws that fly it, with which
+    /// they are written.
+    #[serde(skip)]
     pub(crate) text: String,
+    #[serde(skip)]
     pub(crate) file: String,
-}
-
-/// Without contents: what decides a flight stands in the scenario, and campaigns are recognised by its debug form,
-/// whatever the path and the comments of the vehicle's file.
-impl fmt::Debug for Vehicle {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Vehicle").finish_non_exhaustive()
-    }
 }
 
 impl Vehicle {

@@ -13,6 +13,7 @@ parameters! {
     /// Properties of a barometer, in metres of height: 1 Pa is 0.083 m near sea level. The default is perfect and
     /// immediate.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Barometer {
         /// Measurements per second.
         #[parameter(RATE, "Hz", 0.1..=1000.0)]

@@ -14,6 +14,7 @@ use nalgebra::{Quaternion, Vector3};
 
 /// What is wrong with an instrument.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Failure {
     /// The inertial sensor repeats the sample before the onset.
     ImuStuck,
@@ -124,6 +125,7 @@ impl Failure {
 
 /// A failure from `start_s` to `end_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct InstrumentFault {
     /// What is wrong.
     pub failure: Failure,

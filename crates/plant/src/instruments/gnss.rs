@@ -13,6 +13,7 @@ use nalgebra::Vector3;
 parameters! {
     /// Properties of a GNSS receiver, which measures in the earth frame. The default is perfect and immediate.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Gnss {
         /// Fixes per second.
         #[parameter(RATE, "Hz", 0.1..=1000.0)]

@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 parameters! {
     /// Properties of a gyroscope. The default is perfect.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Gyroscope {
         /// One-sided density of white noise, as in data sheets: its standard deviation in a sample is this times the
         /// root of half the sampling rate, before the filter.
@@ -53,6 +54,7 @@ parameters! {
 parameters! {
     /// Properties of an accelerometer. The default is perfect.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Accelerometer {
         /// One-sided density of white noise, as in data sheets: its standard deviation in a sample is this times the
         /// root of half the sampling rate, before the filter.
@@ -95,6 +97,7 @@ parameters! {
 parameters! {
     /// Properties of an inertial measurement unit, which is read in every step. The default is perfect.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Imu {
         /// Gyroscope.
         #[group("gyro")]

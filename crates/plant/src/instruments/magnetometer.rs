@@ -14,6 +14,7 @@ parameters! {
     /// Properties of a magnetometer, and the field around it. Magnetic north is along earth x, but for the declination.
     /// The default is perfect and immediate, in a field as in central Europe.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Magnetometer {
         /// Measurements per second.
         #[parameter(RATE, "Hz", 0.1..=1000.0)]

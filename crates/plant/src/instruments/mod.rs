@@ -60,6 +60,7 @@ use tracker::Tracking;
 
 /// The instruments that a vehicle has. The default is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Suite {
     /// Inertial sensor.
     pub imu: Option<Imu>,

@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 parameters! {
     /// Mounting of the inertial sensor.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Mounting {
         /// Position of the sensor, from the centre of mass, body frame.
         #[parameter(POS, "m", -10.0..=10.0)]

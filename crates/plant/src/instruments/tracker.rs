@@ -13,6 +13,7 @@ use nalgebra::{Quaternion, Vector3};
 parameters! {
     /// Properties of a tracker. The default is perfect and immediate.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Tracker {
         /// Fixes per second.
         #[parameter(RATE, "Hz", 0.1..=1000.0)]

@@ -26,7 +26,7 @@ const TILT_MAX: f64 = ArmingLimits::TILT_MAX.range.max;
 const LEVEL: Range = Range::new("attitude_rad", -0.8, 0.8);
 
 /// An interval in which no state arrives, since the link is down.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Outage {
     /// Start \[s\].
     pub start_s: f64,
@@ -34,12 +34,15 @@ pub struct Outage {
     pub end_s: f64,
 }
 
-/// Everything that determines a flight.
-#[derive(Clone, Debug, PartialEq)]
+/// Everything that determines a flight. Written by serde, it is what decides one, without names of files and their
+/// descriptions: campaigns are recognised by that.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Scenario {
     /// Short name, used in file names.
+    #[serde(skip)]
     pub name: String,
     /// Description in one line.
+    #[serde(skip)]
     pub description: String,
     /// Variant of the paper's experiment, if it is one.
     pub case: Option<Case>,
