@@ -200,6 +200,22 @@ fn a_folder_belongs_to_one_vehicle() {
     campaign::merge(&["a", "b2"].map(|part| folder.join(part)), &folder.join("merged"), false).unwrap();
 }
 
+/// An inertial sensor alone tells no place: with its motors off from the start the vehicle falls, and is not kept,
+/// whatever law it has, with and without the flight core.
+#[test]
+fn a_vehicle_that_never_flies_is_not_kept() {
+    let text = "flights = 2\nduration_s = 5.0\n[scenario]\nvehicle = { name = \"iris\" }\n\
+                controllers = [\"afbc\", \"pid\", \"geometric\", \"indi\", \"l1\", \"dfbc\"]\n\
+                trajectory = { kind = \"hover\", position_m = [0, 0, 1] }\n\
+                instruments = { imu = \"icm-42688-p\" }\n";
+    let reasons = |text: &str| -> Vec<_> { rows(&parse(text), 2).into_iter().map(|row| row.lost_reason).collect() };
+    let placed = text.replace("imu =", "tracker = \"mocap-100\", imu =");
+    for core in ["", "flight_core = true\n"] {
+        assert_eq!(reasons(&format!("{text}{core}")), vec![Some("never armed".to_owned()); 12]);
+        assert_eq!(reasons(&format!("{placed}{core}")), vec![None; 12]);
+    }
+}
+
 #[test]
 fn a_flight_flown_again_gives_the_figures_of_its_row() {
     let campaign = small();

@@ -5,7 +5,7 @@ use super::sample::Sample;
 use super::world::World;
 use afbc_control::{Action, FlightController, Mixer};
 use afbc_flight_core::rate::{PERIOD_US, WINDOW_US};
-use afbc_flight_core::{ArmingLimits, Asked, Inbox, Refusal, Request, Stamped, Vehicle, VehicleMemory};
+use afbc_flight_core::{ArmingLimits, Asked, Inbox, Mode, Refusal, Request, Stamped, Vehicle, VehicleMemory};
 use afbc_onboard::Aged;
 use afbc_types::{OutOfRange, Parameters, Pose, Setpoint, State};
 use core::convert::Infallible;
@@ -91,5 +91,9 @@ impl<C: FlightController<N>, const N: usize> Pilot for Aboard<C, N> {
         action.health.setpoint_rejected = !setpoint.is_plausible();
         let estimates = self.memory.control().map(C::learnt).unwrap_or_default();
         Ok(view.sample(action, self.memory.trace::<C, N>(), estimates))
+    }
+
+    fn descends(&self) -> bool {
+        self.memory.mode() == Mode::Descending
     }
 }

@@ -1,13 +1,10 @@
 //! The simulation loop.
 
+use super::loss::Watch;
 use super::pilot::Pilot;
 use super::sample::Sample;
 use super::world::World;
-use core::f64::consts::FRAC_PI_2;
 use core::ops::ControlFlow;
-
-/// Distance from the reference beyond which a vehicle counts as lost \[m\].
-pub const LOST_DISTANCE_M: f64 = 50.0;
 
 /// Time and reason of the loss of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,10 +38,12 @@ pub fn lockstep<P: Pilot>(
     mut observe: impl FnMut(&Sample) -> ControlFlow<()>,
 ) -> Result<End, P::Error> {
     let steps = (duration_s / world.dt_s()).round() as u64;
+    let mut watch = Watch::new(world.faulty_from_s());
     for step in 0..=steps {
         let sample = pilot.step(world)?;
         let interrupted = observe(&sample).is_break();
-        let lost = lost(&sample).or_else(|| pilot.gave_up()).map(|reason| Lost { time_s: sample.time_s, reason });
+        let reason = watch.lost(&sample, pilot.descends()).or_else(|| pilot.gave_up());
+        let lost = reason.map(|reason| Lost { time_s: sample.time_s, reason });
         if interrupted || lost.is_some() {
             return Ok(End { lost, interrupted });
         }
@@ -53,18 +52,4 @@ pub fn lockstep<P: Pilot>(
         }
     }
     Ok(End::default())
-}
-
-/// Returns why the vehicle counts as lost, if it does. Assumption A3 excludes a tilt of 90 degrees; a vehicle that has
-/// landed on its feet is not lost.
-fn lost(sample: &Sample) -> Option<&'static str> {
-    let eta = &sample.motion.attitude_rad;
-    let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
-    let (upright, near) = (eta.x.abs() < FRAC_PI_2 && eta.y.abs() < FRAC_PI_2, distance_m < LOST_DISTANCE_M);
-    // A NaN is neither upright nor near.
-    match (upright, near) {
-        (true, true) => None,
-        (false, _) => Some("tilted beyond 90 degrees"),
-        (_, false) => Some("more than 50 m from the reference"),
-    }
 }

@@ -15,6 +15,11 @@ pub trait Pilot {
     /// If the pilot has failed, or does not start.
     fn step(&mut self, world: &mut World) -> Result<Sample, Self::Error>;
 
+    /// True if a failsafe brings the vehicle down.
+    fn descends(&self) -> bool {
+        false
+    }
+
     /// Returns why it has given up, if it has.
     fn gave_up(&self) -> Option<&'static str> {
         None

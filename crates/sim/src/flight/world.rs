@@ -21,6 +21,7 @@ pub struct World {
     faults: SensorFaults,
     outages: Vec<Outage>,
     trajectory: Trajectory,
+    faulty_from_s: f64,
     dt_s: f64,
 }
 
@@ -64,6 +65,7 @@ impl World {
             faults: SensorFaults::new(&scenario.sensor_faults),
             outages: scenario.outages.clone(),
             trajectory: scenario.trajectory.clone(),
+            faulty_from_s: scenario.faulty_from_s(),
             dt_s,
         })
     }
@@ -111,6 +113,11 @@ impl World {
     /// True if the vehicle of a [wired](Self::wired) world still stands before t = 0.
     pub fn stands(&self) -> bool {
         self.wired.as_deref().is_some_and(Wired::stands)
+    }
+
+    /// Returns the time from which on the vehicle may lack measurements \[s\].
+    pub(super) fn faulty_from_s(&self) -> f64 {
+        self.faulty_from_s
     }
 
     /// Returns the time step \[s\].

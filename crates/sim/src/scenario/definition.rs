@@ -161,6 +161,21 @@ impl Scenario {
             .try_for_each(|contender| afbc_flight_core::tick::DT.check(contender.settings.common.dt_s))
     }
 
+    /// Returns the time from which on the scenario may take measurements away: by the first fault of a sensor or an
+    /// instrument, the first outage, or from the start if any fail at random. Infinite if it takes none away \[s\].
+    pub fn faulty_from_s(&self) -> f64 {
+        let Suite { imu: _, tracker, gnss, barometer: _, magnetometer: _ } = &self.instruments;
+        let lost =
+            tracker.iter().flat_map(|tracker| [tracker.loss, tracker.freeze]).chain(gnss.iter().map(|it| it.loss));
+        if lost.chain(self.sensing.dropouts).any(|dropouts| dropouts.rate_hz > 0.0) {
+            return 0.0;
+        }
+        let sensors = self.sensor_faults.iter().map(|fault| fault.start_s);
+        let instruments = self.instrument_faults.iter().map(|fault| fault.start_s);
+        let outages = self.outages.iter().map(|outage| outage.start_s);
+        sensors.chain(instruments).chain(outages).fold(f64::INFINITY, f64::min)
+    }
+
     /// True if rotors, air and ground are those of the paper's equations.
     pub fn is_ideal(&self) -> bool {
         self.realism == Realism { seed: self.realism.seed, ..Realism::default() }
