@@ -1,6 +1,7 @@
 //! A contender: a named control law with its gains and settings.
 
 pub use crate::laws::{ControllerKind, Law};
+pub use crate::task::Task;
 
 use crate::laws::law_gains;
 use afbc::monitor::Bounds;
@@ -186,18 +187,6 @@ impl Contender {
 /// Returns a time step rounded to remove the error of `f32` decimals \[s\].
 pub fn decimal(dt_s: f32) -> f64 {
     (f64::from(dt_s) * 1e7).round() / 1e7
-}
-
-/// A task that can be run with a controller of any type.
-pub trait Task {
-    /// Result of the task.
-    type Output;
-
-    /// Runs the task.
-    ///
-    /// # Errors
-    /// A further value out of range.
-    fn with<C: FlightController<N>, const N: usize>(self, controller: C) -> Result<Self::Output, OutOfRange>;
 }
 
 /// A task that checks only: the controller can be built, and its rotors lift the vehicle.

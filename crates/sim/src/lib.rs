@@ -13,4 +13,5 @@ pub mod metrics;
 pub mod paper;
 pub mod run;
 pub mod scenario;
+mod task;
 pub mod trajectory;

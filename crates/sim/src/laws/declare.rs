@@ -88,7 +88,7 @@ macro_rules! laws {
             ///
             /// # Errors
             /// The first parameter, gain or setting out of range, or the error of `task`.
-            pub fn build<T: crate::contender::Task, const N: usize>(
+            pub fn build<T: crate::task::Task, const N: usize>(
                 &self,
                 vehicle: afbc_types::Airframe<N>,
                 settings: afbc::Settings,
