@@ -5,6 +5,12 @@ mod place;
 mod system;
 
 use crate::message::{Fault, Format, PAYLOAD_MAX};
+use mavlink::MessageData;
+use mavlink::dialects::common::{
+    ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA,
+    ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA, GPS_RAW_INT_DATA,
+    HOME_POSITION_DATA, PROTOCOL_VERSION_DATA, SYS_STATUS_DATA, VFR_HUD_DATA,
+};
 pub use motion::{AttitudeQuaternion, Summary};
 pub use place::{Fix, GlobalPosition, Home, Origin};
 pub use system::{ActuatorOutputs, Battery, EstimatorStatus, SystemStatus, Version};
@@ -47,8 +53,22 @@ impl Telemetry {
     }
 
     pub(crate) fn read(id: u32, payload: &[u8]) -> Result<Self, Fault> {
-        let read = motion::read(id, payload).or_else(|| place::read(id, payload));
-        read.or_else(|| system::read(id, payload)).ok_or(Fault::Unknown)
+        Ok(match id {
+            ATTITUDE_QUATERNION_DATA::ID => Telemetry::Attitude(AttitudeQuaternion::read(payload)),
+            VFR_HUD_DATA::ID => Telemetry::Summary(Summary::read(payload)),
+            GLOBAL_POSITION_INT_DATA::ID => Telemetry::Global(GlobalPosition::read(payload)),
+            GPS_RAW_INT_DATA::ID => Telemetry::Fix(Fix::read(payload)),
+            HOME_POSITION_DATA::ID => Telemetry::Home(Home::read(payload)),
+            GPS_GLOBAL_ORIGIN_DATA::ID => Telemetry::Origin(Origin::read(payload)),
+            SYS_STATUS_DATA::ID => Telemetry::System(SystemStatus::read(payload)),
+            BATTERY_STATUS_DATA::ID => Telemetry::Battery(Battery::read(payload)),
+            EXTENDED_SYS_STATE_DATA::ID => Telemetry::Landed(system::read_landed(payload)),
+            ESTIMATOR_STATUS_DATA::ID => Telemetry::Estimator(EstimatorStatus::read(payload)),
+            ACTUATOR_OUTPUT_STATUS_DATA::ID => Telemetry::Outputs(ActuatorOutputs::read(payload)),
+            AUTOPILOT_VERSION_DATA::ID => Telemetry::Version(Version::read(payload)),
+            PROTOCOL_VERSION_DATA::ID => Telemetry::Protocol,
+            _ => return Err(Fault::Unknown),
+        })
     }
 
     pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {

@@ -1,6 +1,5 @@
 //! Attitude, and a pilot's summary.
 
-use super::Telemetry;
 use crate::frames::{flip, flip_turn};
 use crate::message::{Format, PAYLOAD_MAX};
 use crate::wire::Layout;
@@ -46,22 +45,13 @@ pub(super) fn format(id: u32) -> Option<Format> {
     }
 }
 
-pub(super) fn read(id: u32, payload: &[u8]) -> Option<Telemetry> {
-    Some(match id {
-        ATTITUDE_QUATERNION_DATA::ID => {
-            let (time_ms, attitude, rates, _) = ATTITUDE.read(payload);
-            let (attitude, rates_rad_s) = (flip_turn(attitude), flip(rates.into()));
-            Telemetry::Attitude(AttitudeQuaternion { time_ms, attitude, rates_rad_s })
-        }
-        VFR_HUD_DATA::ID => {
-            let ([_, speed_m_s, altitude_m, climb_m_s], heading_deg, throttle_percent) = SUMMARY.read(payload);
-            Telemetry::Summary(Summary { speed_m_s, altitude_m, climb_m_s, heading_deg, throttle_percent })
-        }
-        _ => return None,
-    })
-}
-
 impl AttitudeQuaternion {
+    pub(super) fn read(payload: &[u8]) -> Self {
+        let (time_ms, attitude, rates, _) = ATTITUDE.read(payload);
+        let (attitude, rates_rad_s) = (flip_turn(attitude), flip(rates.into()));
+        AttitudeQuaternion { time_ms, attitude, rates_rad_s }
+    }
+
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         let rates = flip(self.rates_rad_s).into();
         ATTITUDE.write(&(self.time_ms, flip_turn(self.attitude), rates, [0.0; 4]), payload)
@@ -69,6 +59,11 @@ impl AttitudeQuaternion {
 }
 
 impl Summary {
+    pub(super) fn read(payload: &[u8]) -> Self {
+        let ([_, speed_m_s, altitude_m, climb_m_s], heading_deg, throttle_percent) = SUMMARY.read(payload);
+        Summary { speed_m_s, altitude_m, climb_m_s, heading_deg, throttle_percent }
+    }
+
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         let Summary { speed_m_s, altitude_m, climb_m_s, heading_deg, throttle_percent } = *self;
         SUMMARY.write(&([speed_m_s, speed_m_s, altitude_m, climb_m_s], heading_deg, throttle_percent), payload)

@@ -1,6 +1,5 @@
 //! Where the vehicle is on the earth.
 
-use super::Telemetry;
 use crate::frames::{flip, flip_turn};
 use crate::message::{Format, PAYLOAD_MAX};
 use crate::wire::Layout;
@@ -93,40 +92,12 @@ pub(super) fn format(id: u32) -> Option<Format> {
     }
 }
 
-pub(super) fn read(id: u32, payload: &[u8]) -> Option<Telemetry> {
-    Some(match id {
-        GLOBAL_POSITION_INT_DATA::ID => {
-            let (time_ms, place_e7, [altitude_mm, relative_mm], velocity_ned_cm_s, heading_cdeg) = GLOBAL.read(payload);
-            Telemetry::Global(GlobalPosition {
-                time_ms,
-                place_e7,
-                altitude_mm,
-                relative_mm,
-                velocity_ned_cm_s,
-                heading_cdeg,
-            })
-        }
-        GPS_RAW_INT_DATA::ID => {
-            let (time_us, place_e7, altitude_mm, [_, _, speed_cm_s, course_cdeg], [kind, satellites], _, sigma, _) =
-                FIX.read(payload);
-            let [horizontal, vertical, _, _] = sigma;
-            let sigma_mm = [horizontal, vertical];
-            Telemetry::Fix(Fix { time_us, place_e7, altitude_mm, kind, satellites, sigma_mm, speed_cm_s, course_cdeg })
-        }
-        HOME_POSITION_DATA::ID => {
-            let (place_e7, altitude_mm, position, attitude, _, time_us) = HOME.read(payload);
-            let (position_m, attitude) = (flip(position.into()), flip_turn(attitude));
-            Telemetry::Home(Home { place_e7, altitude_mm, position_m, attitude, time_us })
-        }
-        GPS_GLOBAL_ORIGIN_DATA::ID => {
-            let (place_e7, altitude_mm, time_us) = ORIGIN.read(payload);
-            Telemetry::Origin(Origin { place_e7, altitude_mm, time_us })
-        }
-        _ => return None,
-    })
-}
-
 impl GlobalPosition {
+    pub(super) fn read(payload: &[u8]) -> Self {
+        let (time_ms, place_e7, [altitude_mm, relative_mm], velocity_ned_cm_s, heading_cdeg) = GLOBAL.read(payload);
+        GlobalPosition { time_ms, place_e7, altitude_mm, relative_mm, velocity_ned_cm_s, heading_cdeg }
+    }
+
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         let heights = [self.altitude_mm, self.relative_mm];
         GLOBAL.write(&(self.time_ms, self.place_e7, heights, self.velocity_ned_cm_s, self.heading_cdeg), payload)
@@ -134,6 +105,14 @@ impl GlobalPosition {
 }
 
 impl Fix {
+    pub(super) fn read(payload: &[u8]) -> Self {
+        let (time_us, place_e7, altitude_mm, [_, _, speed_cm_s, course_cdeg], [kind, satellites], _, sigma, _) =
+            FIX.read(payload);
+        let [horizontal, vertical, _, _] = sigma;
+        let sigma_mm = [horizontal, vertical];
+        Fix { time_us, place_e7, altitude_mm, kind, satellites, sigma_mm, speed_cm_s, course_cdeg }
+    }
+
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         let Fix { time_us, place_e7, altitude_mm, kind, satellites, sigma_mm, speed_cm_s, course_cdeg } = *self;
         // Dilutions are unknown.
@@ -145,6 +124,12 @@ impl Fix {
 }
 
 impl Home {
+    pub(super) fn read(payload: &[u8]) -> Self {
+        let (place_e7, altitude_mm, position, attitude, _, time_us) = HOME.read(payload);
+        let (position_m, attitude) = (flip(position.into()), flip_turn(attitude));
+        Home { place_e7, altitude_mm, position_m, attitude, time_us }
+    }
+
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         let Home { place_e7, altitude_mm, position_m, attitude, time_us } = *self;
         let (position, attitude) = (flip(position_m).into(), flip_turn(attitude));
@@ -153,6 +138,11 @@ impl Home {
 }
 
 impl Origin {
+    pub(super) fn read(payload: &[u8]) -> Self {
+        let (place_e7, altitude_mm, time_us) = ORIGIN.read(payload);
+        Origin { place_e7, altitude_mm, time_us }
+    }
+
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         ORIGIN.write(&(self.place_e7, self.altitude_mm, self.time_us), payload)
     }

@@ -1,6 +1,5 @@
 //! Health, battery, outputs and versions.
 
-use super::Telemetry;
 use crate::message::{Format, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::MessageData;
@@ -113,48 +112,23 @@ pub(super) fn format(id: u32) -> Option<Format> {
     })
 }
 
-pub(super) fn read(id: u32, payload: &[u8]) -> Option<Telemetry> {
-    Some(match id {
-        SYS_STATUS_DATA::ID => {
-            let ([present, enabled, healthy], [load_permille, voltage_mv], current_ca, counts, remaining_percent, _) =
-                SYSTEM.read(payload);
-            let [_, dropped_frames, ..] = counts;
-            Telemetry::System(SystemStatus {
-                present,
-                enabled,
-                healthy,
-                load_permille,
-                voltage_mv,
-                current_ca,
-                remaining_percent,
-                dropped_frames,
-            })
-        }
-        BATTERY_STATUS_DATA::ID => {
-            let (([consumed_mah, _], _, [voltage_mv, ..], current_ca), _, remaining_percent, _, charge, ..) =
-                BATTERY.read(payload);
-            Telemetry::Battery(Battery { voltage_mv, current_ca, consumed_mah, remaining_percent, charge })
-        }
-        EXTENDED_SYS_STATE_DATA::ID => Telemetry::Landed(LANDED.read(payload).1),
-        ESTIMATOR_STATUS_DATA::ID => {
-            let (time_us, _, sigma_m, flags) = ESTIMATOR.read(payload);
-            Telemetry::Estimator(EstimatorStatus { time_us, flags, sigma_m })
-        }
-        ACTUATOR_OUTPUT_STATUS_DATA::ID => {
-            let (time_us, active, throttles, _) = OUTPUTS.read(payload);
-            Telemetry::Outputs(ActuatorOutputs { time_us, active, throttles })
-        }
-        AUTOPILOT_VERSION_DATA::ID => {
-            let ([capabilities, uid], [rest @ .., major], _, _, commit, ..) = VERSION.read(payload);
-            let [kind, patch, minor] = rest;
-            Telemetry::Version(Version { capabilities, uid, software: [major, minor, patch, kind], commit })
-        }
-        PROTOCOL_VERSION_DATA::ID => Telemetry::Protocol,
-        _ => return None,
-    })
-}
-
 impl SystemStatus {
+    pub(super) fn read(payload: &[u8]) -> Self {
+        let ([present, enabled, healthy], [load_permille, voltage_mv], current_ca, counts, remaining_percent, _) =
+            SYSTEM.read(payload);
+        let [_, dropped_frames, ..] = counts;
+        SystemStatus {
+            present,
+            enabled,
+            healthy,
+            load_permille,
+            voltage_mv,
+            current_ca,
+            remaining_percent,
+            dropped_frames,
+        }
+    }
+
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         let numbers = [self.load_permille, self.voltage_mv];
         let sets = [self.present, self.enabled, self.healthy];
@@ -164,6 +138,12 @@ impl SystemStatus {
 }
 
 impl Battery {
+    pub(super) fn read(payload: &[u8]) -> Self {
+        let (([consumed_mah, _], _, [voltage_mv, ..], current_ca), _, remaining_percent, _, charge, ..) =
+            BATTERY.read(payload);
+        Battery { voltage_mv, current_ca, consumed_mah, remaining_percent, charge }
+    }
+
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         let Battery { voltage_mv, current_ca, consumed_mah, remaining_percent, charge } = *self;
         // All cells as one.
@@ -175,23 +155,44 @@ impl Battery {
 }
 
 impl EstimatorStatus {
+    pub(super) fn read(payload: &[u8]) -> Self {
+        let (time_us, _, sigma_m, flags) = ESTIMATOR.read(payload);
+        EstimatorStatus { time_us, flags, sigma_m }
+    }
+
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         ESTIMATOR.write(&(self.time_us, [0.0; 6], self.sigma_m, self.flags), payload)
     }
 }
 
 impl ActuatorOutputs {
+    pub(super) fn read(payload: &[u8]) -> Self {
+        let (time_us, active, throttles, _) = OUTPUTS.read(payload);
+        ActuatorOutputs { time_us, active, throttles }
+    }
+
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         OUTPUTS.write(&(self.time_us, self.active, self.throttles, [0.0; 24]), payload)
     }
 }
 
 impl Version {
+    pub(super) fn read(payload: &[u8]) -> Self {
+        let ([capabilities, uid], [rest @ .., major], _, _, commit, ..) = VERSION.read(payload);
+        let [kind, patch, minor] = rest;
+        Version { capabilities, uid, software: [major, minor, patch, kind], commit }
+    }
+
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         let Version { capabilities, uid, software: [major, minor, patch, kind], commit } = *self;
         let software = [kind, patch, minor, major];
         VERSION.write(&([capabilities, uid], software, [0; 3], [0; 2], commit, [0; 16], [0; 18]), payload)
     }
+}
+
+/// Reads the state from EXTENDED_SYS_STATE.
+pub(super) fn read_landed(payload: &[u8]) -> u8 {
+    LANDED.read(payload).1
 }
 
 /// Writes EXTENDED_SYS_STATE of a vehicle that does not change its kind.
