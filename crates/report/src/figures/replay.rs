@@ -6,9 +6,8 @@ use super::picture::Picture;
 use super::plotted::{LINE_PX, REFERENCE};
 use super::time_chart::{COLUMNS, Chart, Line, PLOT_PX, Panel};
 use super::{palette, reduce};
-use crate::replay::Replay;
 use afbc_estimator::Estimate;
-use afbc_replay::{LoggedState, Row};
+use afbc_replay::{LoggedState, Recording, Replayed, Row};
 use afbc_types::State;
 use nalgebra::{Quaternion, Vector3};
 use std::io;
@@ -69,8 +68,8 @@ fn turn(row: &Row, of: fn(&Vector3<f64>) -> f64) -> Option<f64> {
 }
 
 /// Draws every figure that has something to show.
-pub(crate) fn draw(replay: &Replay<'_>) -> io::Result<Vec<Picture>> {
-    let rows = &replay.replayed.rows;
+pub(crate) fn draw(recording: &Recording, replayed: &Replayed) -> io::Result<Vec<Picture>> {
+    let rows = &replayed.rows;
     let end_s = rows.last().map_or(0.0, |row| row.time_s);
     let own = Ink::new(palette::color("afbc"), LINE_PX);
     let band = Ink { opacity: 1.0 / 3.0, ..Ink::new(palette::color("afbc"), REFERENCE.width_px) };
@@ -96,12 +95,12 @@ pub(crate) fn draw(replay: &Replay<'_>) -> io::Result<Vec<Picture>> {
         let inner = line(own, false, &|row| value(row, row.ours.as_ref().filter(|e| valid(e))?));
         Panel { label, zero: true, lines: vec![edge(1.0), edge(-1.0), inner] }
     };
-    let conditions = replay.recording.format;
+    let conditions = recording.format;
     let chart = |name, caption: &str, title, legend: &[(&str, Ink)], panels: Vec<Panel>| {
-        let first_us = replay.recording.imu.first().map_or(0, |sample| sample.at_us);
+        let first_us = recording.imu.first().map_or(0, |sample| sample.at_us);
         let reset =
             |reset: &afbc_replay::LoggedReset| (reset.what.to_owned(), (reset.at_us as f64 - first_us as f64) * 1e-6);
-        let resets = replay.recording.resets.iter().map(reset).filter(|(_, at_s)| *at_s >= 0.0).take(MARKS_MAX);
+        let resets = recording.resets.iter().map(reset).filter(|(_, at_s)| *at_s >= 0.0).take(MARKS_MAX);
         let marks = moments(resets, end_s, PLOT_PX, " Thin line: reset of the log's own estimate.");
         let legend = legend.iter().map(|(name, ink)| ((*name).to_owned(), *ink)).collect();
         let (svg, seen) = Chart { title, conditions, marks, end_s, legend, panels }.draw()?;

@@ -2,27 +2,17 @@
 
 mod cells;
 mod files;
+mod log;
 mod page;
 
 pub use files::json;
+pub use log::Replay;
 
 use crate::figures;
 use crate::table::wrap;
 use crate::words::slug;
 use afbc_files::{Error, Folder};
-use afbc_replay::{Recording, Replayed};
 use std::path::PathBuf;
-
-/// A log and what the estimator made of it.
-#[derive(Clone, Copy, Debug)]
-pub struct Replay<'a> {
-    /// Name of the log.
-    pub name: &'a str,
-    /// What it holds.
-    pub recording: &'a Recording,
-    /// Our estimate beside its own.
-    pub replayed: &'a Replayed,
-}
 
 /// Returns the name of a log as that of a folder.
 #[must_use]
@@ -41,7 +31,8 @@ pub fn folder_name(name: &str) -> String {
 /// # Errors
 /// The first file that could not be written, or is not the command's.
 pub fn write(folder: &Folder, replay: &Replay<'_>) -> Result<Vec<PathBuf>, Error> {
-    let pictures = figures::replay::draw(replay).map_err(|source| folder.error("figures", source))?;
+    let drawn = figures::replay::draw(replay.recording, replay.replayed);
+    let pictures = drawn.map_err(|source| folder.error("figures", source))?;
     let svgs: Vec<_> = pictures.iter().map(|picture| format!("{}.svg", picture.name)).collect();
     let names = ["replay.csv", "summary.json", "report.html"].into_iter();
     folder.only(&names.chain(svgs.iter().map(String::as_str)).collect::<Vec<_>>())?;

@@ -2,36 +2,21 @@
 
 mod cells;
 mod files;
+mod flown;
 mod markdown;
 mod page;
 mod table;
 
 pub use files::json;
+pub use flown::Flown;
 pub use markdown::{markdown, markers};
 pub use table::table;
 
 use crate::figures::{self, Picture};
 use afbc_campaign::compare::Comparison;
-use afbc_campaign::suite::{Flight, Suite};
 use afbc_files::{Error, Folder};
 use std::io;
 use std::path::PathBuf;
-
-/// A suite that was flown.
-#[derive(Clone, Copy, Debug)]
-pub struct Flown<'a> {
-    /// What was flown.
-    pub suite: &'a Suite,
-    /// Its flights under every contender, in the suite's order.
-    pub comparisons: &'a [Comparison],
-}
-
-impl<'a> Flown<'a> {
-    /// Returns each flight with its results.
-    pub(crate) fn rows(self) -> impl Iterator<Item = (&'a Flight, &'a Comparison)> {
-        self.suite.flights.iter().zip(self.comparisons)
-    }
-}
 
 /// Writes everything about a suite into `folder`, replacing all earlier files of its command, and returns the paths
 /// written:
