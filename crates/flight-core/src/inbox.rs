@@ -1,5 +1,6 @@
 //! Inputs of a tick: the newest state, pose and setpoint, with their times, and requests.
 
+use crate::reasons::Reasons;
 use crate::supervisor::{Refusal, Request};
 use afbc_types::{Pose, Setpoint, State};
 
@@ -45,7 +46,7 @@ pub struct Inbox {
     setpoint: Option<Stamped<Setpoint>>,
     /// True if the vehicle rests on the ground.
     rests: Option<bool>,
-    barred: Option<Refusal>,
+    barred: Reasons,
     /// Requests in the order of arrival, without gaps.
     requests: [Option<Asked>; REQUESTS_MAX],
 }
@@ -60,7 +61,7 @@ impl Inbox {
         pose: None,
         setpoint: None,
         rests: None,
-        barred: None,
+        barred: Reasons::NONE,
         requests: [None; REQUESTS_MAX],
     };
 
@@ -116,12 +117,12 @@ impl Inbox {
     }
 
     /// Sets what speaks against arming besides what the flight core checks itself.
-    pub fn bar(&mut self, refusal: Option<Refusal>) {
-        self.barred = refusal;
+    pub fn bar(&mut self, reasons: Reasons) {
+        self.barred = reasons;
     }
 
     /// Returns what else [speaks against arming](Self::bar).
-    pub fn barred(&self) -> Option<Refusal> {
+    pub fn barred(&self) -> Reasons {
         self.barred
     }
 
@@ -180,7 +181,7 @@ impl Inbox {
         }
         self.setpoint = news.setpoint.or(self.setpoint);
         self.rests = news.rests.or(self.rests);
-        self.barred = news.barred.or(self.barred);
+        self.barred = if news.barred.is_empty() { self.barred } else { news.barred };
         for asked in news.requests.iter().flatten() {
             self.request(*asked);
         }

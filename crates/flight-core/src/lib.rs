@@ -7,7 +7,7 @@
 //! # Reading order
 //!
 //! 1. [`tick`]: the control tick.
-//! 2. [`supervisor`]: the four modes and their transitions.
+//! 2. [`supervisor`]: the four modes and their transitions; [`reasons`]: what speaks against arming.
 //! 3. [`inbox`]: the inputs of a tick and their ages; [`tracker`], [`clock`]: selection of states, and the time of
 //!    their measurement.
 //! 4. [`landing`], [`tumble`], [`witness`]: detection of landing, tumbling and frozen trackers.
@@ -26,6 +26,7 @@ pub mod landing;
 pub mod motor;
 pub mod observer;
 pub mod rate;
+pub mod reasons;
 pub mod supervisor;
 pub mod tick;
 pub mod tracker;
@@ -35,6 +36,7 @@ pub mod witness;
 pub use clock::SourceClock;
 pub use inbox::{Asked, Inbox, Stamped};
 pub use motor::Motor;
+pub use reasons::Reasons;
 pub use supervisor::{ArmingLimits, End, Mode, Refusal, Request};
 pub use tick::{Answer, Health, Outcome, Vehicle, VehicleMemory};
 pub use tracker::Tracker;

@@ -1,5 +1,6 @@
 //! Arming and failsafes: requests, the four modes, and their transitions.
 
+use crate::reasons::Reasons;
 use afbc_control::math::abs_max;
 use afbc_types::{Setpoint, State, parameters};
 
@@ -71,8 +72,8 @@ pub enum Request {
     Engage,
 }
 
-/// Why a request is refused; for arming, the first reason that applies, in this order. The numbers are part of the
-/// link's protocol.
+/// Why a request is refused; for arming, the first reason that applies, in the order of [`Refusal::ARMING`]. The
+/// numbers are part of the link's protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Refusal {
@@ -129,6 +130,25 @@ impl Refusal {
         Refusal::AttitudeUnknown,
         Refusal::HeadingUnknown,
         Refusal::PositionUnknown,
+        Refusal::BatteryLow,
+        Refusal::SensorFailed,
+        Refusal::OutsideFence,
+        Refusal::WrongMode,
+    ];
+
+    /// The reasons against arming, the first ones first: what is not known, what the flight core sees, what
+    /// [others](crate::Inbox::bar) have against it.
+    pub const ARMING: [Refusal; 14] = [
+        Refusal::AlreadyArmed,
+        Refusal::AttitudeUnknown,
+        Refusal::HeadingUnknown,
+        Refusal::PositionUnknown,
+        Refusal::StateStale,
+        Refusal::TiltTooLarge,
+        Refusal::SetpointMissing,
+        Refusal::SetpointTooFar,
+        Refusal::Unhealthy,
+        Refusal::NotAtRest,
         Refusal::BatteryLow,
         Refusal::SensorFailed,
         Refusal::OutsideFence,
@@ -209,27 +229,26 @@ impl ArmingLimits {
             && abs_max(&state.rates_rad_s) <= self.rate_max_rad_s
     }
 
-    /// Checks whether a disarmed vehicle may be armed.
-    ///
-    /// # Errors
-    /// The first reason against arming.
-    pub fn ready(&self, vehicle: &Standing) -> Result<(), Refusal> {
-        let state = vehicle.state.ok_or(vehicle.missing.unwrap_or(Refusal::StateStale))?;
-        if state.attitude_rad.x.abs() > self.tilt_max_rad || state.attitude_rad.y.abs() > self.tilt_max_rad {
-            return Err(Refusal::TiltTooLarge);
+    /// Returns everything that speaks against arming a disarmed vehicle. What depends on an unknown state is left out.
+    pub fn against(&self, vehicle: &Standing<'_>) -> Reasons {
+        let mut reasons = vehicle.barred;
+        match vehicle.state {
+            Some(state) => {
+                let tilt =
+                    state.attitude_rad.x.abs() > self.tilt_max_rad || state.attitude_rad.y.abs() > self.tilt_max_rad;
+                reasons.note(tilt, Refusal::TiltTooLarge);
+                let distance_max = self.setpoint_distance_max_m;
+                let far = vehicle.setpoint.is_some_and(|setpoint| {
+                    (setpoint.position_m - state.position_m).norm_squared() > distance_max * distance_max
+                });
+                reasons.note(far, Refusal::SetpointTooFar);
+            }
+            None => reasons.note(true, vehicle.missing.unwrap_or(Refusal::StateStale)),
         }
-        let setpoint = vehicle.setpoint.ok_or(Refusal::SetpointMissing)?;
-        let distance_max = self.setpoint_distance_max_m;
-        if (setpoint.position_m - state.position_m).norm_squared() > distance_max * distance_max {
-            return Err(Refusal::SetpointTooFar);
-        }
-        if !vehicle.healthy {
-            return Err(Refusal::Unhealthy);
-        }
-        if vehicle.rest_us < REST_US {
-            return Err(Refusal::NotAtRest);
-        }
-        vehicle.barred.map_or(Ok(()), Err)
+        reasons.note(vehicle.setpoint.is_none(), Refusal::SetpointMissing);
+        reasons.note(!vehicle.healthy, Refusal::Unhealthy);
+        reasons.note(vehicle.rest_us < REST_US, Refusal::NotAtRest);
+        reasons
     }
 }
 
@@ -247,7 +266,7 @@ pub struct Standing<'a> {
     /// Time for which it has been [at rest](ArmingLimits::at_rest) \[us\].
     pub rest_us: u32,
     /// What else speaks against arming, by [`Inbox::bar`](crate::Inbox::bar).
-    pub barred: Option<Refusal>,
+    pub barred: Reasons,
 }
 
 /// Inputs of the supervisor.
@@ -257,7 +276,7 @@ pub struct Observed {
     pub request: Option<Request>,
     /// True if a queued request is [`Request::Kill`].
     pub kill: bool,
-    /// Result of [`ArmingLimits::ready`].
+    /// Verdict on [`ArmingLimits::against`].
     pub ready: Result<(), Refusal>,
     /// Age of the newest plausible state \[us\]; `u32::MAX` if there is none.
     pub state_age_us: u32,

@@ -6,7 +6,10 @@ use crate::inbox::{Inbox, Stamped};
 use crate::landing::LandDetector;
 use crate::observer::{HOLD_US, Observer};
 use crate::rate;
-use crate::supervisor::{ArmingLimits, COAST_US, End, Mode, Observed, Refusal, Request, SETPOINT_STALE_US, Standing};
+use crate::reasons::Reasons;
+use crate::supervisor::{
+    ArmingLimits, COAST_US, End, Mode, Observed, REST_US, Refusal, Request, SETPOINT_STALE_US, Standing,
+};
 use crate::tumble::Tumble;
 use crate::witness::Witness;
 use afbc_control::{Action, FlightController, Trace};
@@ -90,6 +93,11 @@ impl<M> VehicleMemory<M> {
         self.mode.armed() && self.flight.as_ref().is_some_and(|flight| flight.landing.airborne())
     }
 
+    /// True if the vehicle has been at rest for as long as arming wants it.
+    pub fn rested(&self) -> bool {
+        self.rest_us >= REST_US
+    }
+
     /// Records that the clock has failed and another has taken over: the vehicle is not armed again.
     pub fn distrust_clock(&mut self) {
         self.rate.distrust();
@@ -158,6 +166,8 @@ pub struct Outcome<const N: usize = 4> {
     pub answer: Option<Answer>,
     /// Why the flight ended, if it did in this tick.
     pub ended: Option<End>,
+    /// What spoke against arming in this tick, by which [`Request::Arm`] was or would have been answered.
+    pub against: Reasons,
 }
 
 impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
@@ -200,17 +210,18 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         let setpoint = inbox.setpoint().filter(|s| s.age_us(now_us) <= SETPOINT_STALE_US).map(|s| &s.value);
 
         // Supervises.
-        let ready = || {
+        let against = if mode.armed() {
+            Reasons::from(Refusal::AlreadyArmed)
+        } else {
             let (missing, barred) = (inbox.missing(), inbox.barred());
             let (healthy, rest_us) = (rate.report().healthy(), *rest_us);
-            let standing = Standing { state: fresh, missing, setpoint, healthy, rest_us, barred };
-            self.limits.ready(&standing)
+            self.limits.against(&Standing { state: fresh, missing, setpoint, healthy, rest_us, barred })
         };
         let asked = inbox.asked();
         let observed = Observed {
             request: asked.map(|asked| asked.request),
             kill: asked.is_some() && inbox.kills(),
-            ready: if mode.armed() { Err(Refusal::AlreadyArmed) } else { ready() },
+            ready: against.verdict(),
             state_age_us,
             attitude_age_us: age_us(*oriented_us),
             steady_us: *steady_us,
@@ -290,7 +301,7 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
             observed: observing,
             frozen_states: *frozen_states,
         };
-        Outcome { motors, forces, mode, health, answer, ended }
+        Outcome { motors, forces, mode, health, answer, ended, against }
     }
 
     /// Returns the action without a state.

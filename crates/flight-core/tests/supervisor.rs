@@ -1,7 +1,7 @@
 //! Every transition of the mode, every answer, and every reason against arming.
 
 use afbc_flight_core::supervisor::{COAST_US, DESCEND_US, GIVE_UP_US, Observed, REST_US, STEADY_US, Standing};
-use afbc_flight_core::{ArmingLimits, End, Mode, Refusal, Request};
+use afbc_flight_core::{ArmingLimits, End, Mode, Reasons, Refusal, Request};
 use afbc_types::{Declared, Setpoint, State};
 use nalgebra::Vector3;
 
@@ -161,16 +161,35 @@ fn readiness_names_the_first_reason_against_it() {
     ];
     for (state, setpoint, healthy, rest_us, expected) in cases {
         let (state, setpoint) = (state.as_ref(), setpoint.as_ref());
-        let standing = Standing { state, missing: None, setpoint, healthy, rest_us, barred: None };
-        assert_eq!(limits.ready(&standing), expected, "{standing:?}");
+        let standing = Standing { state, missing: None, setpoint, healthy, rest_us, barred: Reasons::NONE };
+        assert_eq!(limits.against(&standing).verdict(), expected, "{standing:?}");
         // What others have against it comes last.
-        let barred = Standing { barred: Some(Refusal::OutsideFence), ..standing };
-        assert_eq!(limits.ready(&barred), expected.and(Err(Refusal::OutsideFence)));
+        let barred = Standing { barred: Refusal::OutsideFence.into(), ..standing };
+        assert_eq!(limits.against(&barred).verdict(), expected.and(Err(Refusal::OutsideFence)));
         // An estimate of one's own says what it misses.
         let missing = Some(Refusal::HeadingUnknown);
         let unknown = Standing { state: None, missing, ..standing };
-        assert_eq!(limits.ready(&unknown), Err(Refusal::HeadingUnknown));
+        assert_eq!(limits.against(&unknown).verdict(), Err(Refusal::HeadingUnknown));
     }
+    // All of them are told, in order.
+    let (state, setpoint) = (tilted(1.0, 0.0, 0.0), at(9.0, 0.0, 0.0));
+    let standing = Standing {
+        state: state.as_ref(),
+        missing: None,
+        setpoint: setpoint.as_ref(),
+        healthy: false,
+        rest_us: 0,
+        barred: Reasons::from(Refusal::WrongMode).and(Refusal::BatteryLow.into()),
+    };
+    let all = [
+        Refusal::TiltTooLarge,
+        Refusal::SetpointTooFar,
+        Refusal::Unhealthy,
+        Refusal::NotAtRest,
+        Refusal::BatteryLow,
+        Refusal::WrongMode,
+    ];
+    assert!(limits.against(&standing).iter().eq(all));
 }
 
 #[test]
@@ -210,5 +229,24 @@ fn limits_are_validated_by_name() {
         (ArmingLimits { rate_max_rad_s: -1.0, ..limits }, "rate_max_rad_s"),
     ] {
         assert_eq!(limits.validate().map_err(|error| error.range.name), Err(name));
+    }
+}
+
+#[test]
+fn reasons_are_a_set_in_the_order_of_arming() {
+    assert_eq!((Reasons::NONE.verdict(), Reasons::NONE.is_empty()), (Ok(()), true));
+    for (place, reason) in Refusal::ARMING.into_iter().enumerate() {
+        let one = Reasons::from(reason);
+        assert_eq!((one.verdict(), one.is_empty()), (Err(reason), false));
+        for (other_place, other) in Refusal::ARMING.into_iter().enumerate() {
+            assert_eq!(one.contains(other), reason == other);
+            let mut both = one;
+            both.note(false, other);
+            assert_eq!(both, one);
+            both.note(true, other);
+            assert_eq!(both, one.and(other.into()));
+            assert_eq!(both.verdict(), Err(if place < other_place { reason } else { other }));
+            assert_eq!(both.iter().count(), if reason == other { 1 } else { 2 });
+        }
     }
 }

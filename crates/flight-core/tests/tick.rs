@@ -355,3 +355,36 @@ proptest! {
         }
     }
 }
+
+/// What speaks against arming in a tick is what the wish to arm is answered, whether there is one or not; and at rest
+/// is what arming takes for it.
+#[test]
+fn the_reasons_of_a_tick_are_its_answer() {
+    let mut bench = Bench::new();
+    let moves = State { velocity_m_s: Vector3::new(0.0, 0.6, 0.0), ..State::default() };
+    let tilts = State { attitude_rad: Vector3::new(0.3, 0.0, 0.0), ..moves };
+    let far = Setpoint { position_m: Vector3::new(9.0, 0.0, 0.0), ..Setpoint::default() };
+    let here = Some(State::default());
+    for (ticks, state, setpoint) in [
+        (500, Some(tilts), None),
+        (600, Some(moves), Some(far)),
+        (990, here, Some(far)),
+        (30, here, Some(near())),
+        (40, None, Some(near())),
+        (1010, here, Some(near())),
+    ] {
+        for _ in 0..ticks {
+            let mut twin = Bench { memory: bench.memory, inbox: bench.inbox, ..Bench::new() };
+            (twin.now_us, twin.noise_m) = (bench.now_us, bench.noise_m);
+            twin.ask(Request::Arm);
+            let told = bench.tick(state, setpoint).against;
+            let asked = twin.tick(state, setpoint);
+            assert_eq!((asked.answer, asked.against), (answer(Request::Arm, told.verdict()), told));
+            assert_eq!(told.contains(Refusal::NotAtRest), !bench.memory.rested());
+        }
+    }
+    bench.ask(Request::Arm);
+    assert!(bench.tick(here, Some(near())).against.is_empty());
+    let armed = bench.tick(here, Some(near())).against;
+    assert!(armed.iter().eq([Refusal::AlreadyArmed]));
+}

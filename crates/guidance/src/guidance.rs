@@ -4,7 +4,6 @@ mod flying;
 mod orders;
 
 use crate::battery::Reading;
-use crate::checks::{Check, Checks};
 use crate::course::{Hold, Land, Return, Takeoff};
 use crate::lift::{Lift, Trim};
 use crate::limiter::{Aim, Limiter};
@@ -18,12 +17,10 @@ use crate::sticks;
 use crate::table::{self, Action, Conditions};
 use crate::targets::{self, Targets};
 use afbc_control::math::{max, min};
-use afbc_flight_core::{ArmingLimits, Mode, Refusal, Request, Stamped};
+use afbc_flight_core::{Mode, Reasons, Refusal, Request, Stamped};
 use afbc_types::{Declared, OutOfRange, Setpoint, State};
 use nalgebra::Vector3;
 
-/// Time for which a vehicle must have been at rest to be armed \[s\].
-const REST_S: f32 = 1.0;
 /// Time between two requests to disarm \[s\].
 const REQUEST_S: f32 = 0.1;
 
@@ -36,14 +33,12 @@ pub struct Sight<'a> {
     pub dt_s: f32,
     /// Fresh state; none if there is none, or the vehicle does not know where it is.
     pub state: Option<&'a State>,
-    /// What the vehicle's own estimate misses.
-    pub missing: Option<Refusal>,
     /// Mode of the flight core.
     pub core: Mode,
     /// True if the vehicle is in the air, by the flight core.
     pub airborne: bool,
-    /// True if the control tick's rate is healthy.
-    pub tick_healthy: bool,
+    /// True if it has been at rest for as long as arming wants it, by the flight core.
+    pub rested: bool,
     /// The battery's measurements.
     pub battery: Option<Reading>,
     /// Sensors that have failed.
@@ -76,8 +71,8 @@ pub struct Guided {
     pub home_m: Option<Vector3<f32>>,
     /// What made the safety net act; none once a pilot or a station has selected another mode.
     pub failsafe: Option<Cause>,
-    /// Checks before arming, as they were while the vehicle was disarmed.
-    pub checks: Checks,
+    /// What the guidance has against arming, as it was while the vehicle was disarmed.
+    pub against: Reasons,
     /// Charge of the battery, 0 to 1.
     pub charge: Option<f32>,
 }
@@ -116,8 +111,7 @@ struct Memory {
     failsafe: Option<Cause>,
     /// Item of the mission that is done once the vehicle has landed.
     lands_item: Option<u16>,
-    /// Time at rest, on the ground with the motors idling, waiting to leave the ground, since the last request \[s\].
-    rest_s: f32,
+    /// Time on the ground with the motors idling, waiting to leave the ground, since the last request \[s\].
     ground_s: f32,
     /// Time for which a landing vehicle has not sunk to its setpoint \[s\].
     touch_s: f32,
@@ -128,7 +122,7 @@ struct Memory {
     left: bool,
     /// True if it has announced that it stops the motors.
     disarms: bool,
-    checks: Checks,
+    against: Reasons,
 }
 
 /// What a mode remembers.
@@ -167,7 +161,6 @@ impl Guidance {
             flown: false,
             failsafe: None,
             lands_item: None,
-            rest_s: 0.0,
             ground_s: 0.0,
             touch_s: 0.0,
             lift_s: 0.0,
@@ -175,7 +168,7 @@ impl Guidance {
             stood_m: Vector3::zeros(),
             left: false,
             disarms: false,
-            checks: Checks::default(),
+            against: Reasons::NONE,
         };
         Ok(Guidance { settings, memory })
     }
@@ -218,8 +211,8 @@ impl Memory {
         let armed = sight.core.armed();
         let airborne = armed && sight.airborne;
         let mut notices = Notices::default();
-        self.time(state, airborne, dt_s);
-        self.find_home(state, armed);
+        self.time(airborne, dt_s);
+        self.find_home(state, sight.rested, armed);
 
         // Watches.
         let flying = &settings.flying;
@@ -291,7 +284,7 @@ impl Memory {
         };
         let (setpoint, rests) = flight.map_or((None, armed && !airborne), |(setpoint, rests)| (setpoint, rests));
         if !armed {
-            self.checks = self.check(settings, sight, state);
+            self.against = self.against(settings, sight, state);
         }
         let request = self.disarms(settings, armed, airborne, rests, held, dt_s, &mut reached, &mut notices);
         Guided {
@@ -305,24 +298,22 @@ impl Memory {
             reached,
             home_m: self.home_m,
             failsafe: self.failsafe,
-            checks: self.checks,
+            against: self.against,
             charge: self.watch.charge(),
         }
     }
 
     /// Home is where the vehicle has first been at rest for as long as arming wants it, since stations arm as soon as
     /// there is a home; and where it is armed.
-    fn find_home(&mut self, state: Option<&State>, armed: bool) {
+    fn find_home(&mut self, state: Option<&State>, rested: bool, armed: bool) {
         let Some(state) = state else { return };
-        if self.home_m.is_none() && self.rest_s >= REST_S || armed && !self.was_armed && !self.home_ordered {
+        if self.home_m.is_none() && rested || armed && !self.was_armed && !self.home_ordered {
             self.home_m = Some(state.position_m);
         }
     }
 
     /// Counts the times.
-    fn time(&mut self, state: Option<&State>, airborne: bool, dt_s: f32) {
-        let at_rest = state.is_some_and(|state| ArmingLimits::DEFAULT.at_rest(state));
-        self.rest_s = if at_rest { min(self.rest_s + dt_s, 2.0 * REST_S) } else { 0.0 };
+    fn time(&mut self, airborne: bool, dt_s: f32) {
         self.flown |= airborne;
         self.request_s = min(self.request_s + dt_s, REQUEST_S);
     }
@@ -387,24 +378,17 @@ impl Memory {
         Some(Request::Disarm)
     }
 
-    /// Checks what must hold before arming.
-    fn check(&self, settings: &Settings, sight: &Sight<'_>, state: Option<&State>) -> Checks {
-        let mut checks = Checks::default();
-        let missing = sight.missing;
-        checks.note(Check::Attitude, missing != Some(Refusal::AttitudeUnknown));
-        checks.note(Check::Heading, !matches!(missing, Some(Refusal::AttitudeUnknown | Refusal::HeadingUnknown)));
-        checks.note(Check::Position, missing.is_none() && state.is_some());
-        let most_rad = ArmingLimits::DEFAULT.tilt_max_rad;
-        let is_level = |state: &State| state.attitude_rad.x.abs() <= most_rad && state.attitude_rad.y.abs() <= most_rad;
-        checks.note(Check::Level, state.is_some_and(is_level));
-        checks.note(Check::AtRest, self.rest_s >= REST_S);
-        checks.note(Check::TickRate, sight.tick_healthy);
-        checks.note(Check::Sensors, !sight.sensors.any());
+    /// Returns what speaks against arming that the flight core does not see itself.
+    fn against(&self, settings: &Settings, sight: &Sight<'_>, state: Option<&State>) -> Reasons {
+        let mut reasons = Reasons::NONE;
+        // Without a number of cells the battery is not watched.
         let watched = settings.net.cells >= 1.0;
         let known = sight.battery.is_some() && self.watch.charge().is_some();
-        checks.note(Check::Battery, !watched || known && !self.watch.holds(Cause::BatteryLow));
-        checks.note(Check::Fence, state.is_none_or(|state| self.is_inside(settings, &state.position_m)));
-        checks.note(Check::Mode, !matches!(self.mode, FlightMode::Land | FlightMode::Return));
-        checks
+        reasons.note(watched && (!known || self.watch.holds(Cause::BatteryLow)), Refusal::BatteryLow);
+        reasons.note(sight.sensors.any(), Refusal::SensorFailed);
+        let outside = state.is_some_and(|state| !self.is_inside(settings, &state.position_m));
+        reasons.note(outside, Refusal::OutsideFence);
+        reasons.note(matches!(self.mode, FlightMode::Land | FlightMode::Return), Refusal::WrongMode);
+        reasons
     }
 }

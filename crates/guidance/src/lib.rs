@@ -9,12 +9,11 @@
 //! 1. [`guidance`]: the tick.
 //! 2. [`mode`], [`order`]: what may be asked for; [`table`]: the transitions between modes.
 //! 3. [`limiter`]: how any target becomes a smooth flight.
-//! 4. [`net`], [`battery`], [`checks`], [`notice`]: what is watched and announced.
+//! 4. [`net`], [`battery`], [`notice`]: what is watched and announced.
 //! 5. [`settings`]: the parameters.
 #![no_std]
 
 pub mod battery;
-pub mod checks;
 mod course;
 pub mod guidance;
 mod heading;
@@ -33,7 +32,6 @@ pub mod table;
 mod targets;
 
 pub use battery::Reading;
-pub use checks::{Check, Checks};
 pub use guidance::{Guidance, Guided, Sight};
 pub use lift::Lift;
 pub use limiter::{Aim, Limiter};

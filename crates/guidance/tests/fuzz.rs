@@ -1,7 +1,7 @@
 //! Whatever comes in, setpoints are finite and within the limits.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use afbc_flight_core::{Mode, Refusal, Stamped};
+use afbc_flight_core::{Mode, Stamped};
 use afbc_guidance::*;
 use afbc_types::{Setpoint, State};
 use nalgebra::{Quaternion, Unit, Vector3};
@@ -175,10 +175,9 @@ proptest! {
                     now_us,
                     dt_s: spell.dt_s,
                     state: spell.state.as_ref(),
-                    missing: spell.fresh.then_some(Refusal::PositionUnknown),
                     core: spell.core,
                     airborne: spell.airborne,
-                    tick_healthy: spell.fresh,
+                    rested: spell.fresh,
                     battery: spell.battery.map(|(voltage_v, current_a)| Reading { voltage_v, current_a }),
                     sensors: Sensors { gnss: !spell.fresh, ..Sensors::default() },
                     lift: Lift { most_m_s2: spell.lift.0, gravity_m_s2: spell.lift.1, given_m_s2: Some(spell.lift.0) },

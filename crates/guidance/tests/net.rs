@@ -5,7 +5,7 @@ mod bench;
 
 use afbc_flight_core::{Mode, Refusal};
 use afbc_guidance::*;
-use afbc_types::Declared;
+use afbc_types::{Declared, State};
 use bench::{Bench, motion, settings};
 use nalgebra::Vector3;
 
@@ -327,16 +327,17 @@ fn after_an_outage_the_setpoint_begins_at_the_vehicle() {
     assert!((setpoint.position_m - Vector3::new(-3.0, 4.0, 6.0)).norm() < 0.05, "{setpoint:?}");
 }
 
+/// What the flight core sees itself is not the guidance's business.
 #[test]
-fn every_check_has_its_reason() {
-    let sight = |bench: &Bench| Sight {
-        now_us: bench.now_us,
+fn the_guidance_bars_arming_for_its_own_reasons_only() {
+    let here = State::default();
+    let well = Sight {
+        now_us: 2_000_000,
         dt_s: 1e-3,
-        state: None,
-        missing: None,
+        state: Some(&here),
         core: Mode::Disarmed,
         airborne: false,
-        tick_healthy: true,
+        rested: true,
         battery: charge(0.8),
         sensors: Sensors::default(),
         lift: Lift { most_m_s2: 20.0, gravity_m_s2: 9.81, given_m_s2: None },
@@ -344,31 +345,57 @@ fn every_check_has_its_reason() {
     let mut bench = Bench::new(quiet());
     bench.battery = charge(0.8);
     bench.run(1.5);
-    assert!(bench.last.unwrap().checks.all_ok(), "{}", bench.last.unwrap().checks);
-    let state = bench.state;
-    let failing = |change: &dyn Fn(&mut Sight<'_>)| {
-        let mut sight = Sight { state: Some(&state), ..sight(&bench) };
-        change(&mut sight);
+    let against = |bench: &Bench, sight: &Sight<'_>| {
         let mut guidance = bench.guidance;
-        guidance.tick(&sight, &Orders::default()).checks.to_string()
+        guidance.tick(sight, &Orders::default()).against.iter().collect::<Vec<_>>()
     };
-    assert_eq!(failing(&|_| ()), "");
-    assert_eq!(failing(&|sight| sight.missing = Some(Refusal::AttitudeUnknown)), "attitude, heading, position");
-    assert_eq!(failing(&|sight| sight.missing = Some(Refusal::HeadingUnknown)), "heading, position");
-    assert_eq!(failing(&|sight| sight.missing = Some(Refusal::PositionUnknown)), "position");
-    assert_eq!(failing(&|sight| sight.state = None), "position, level, at rest");
-    assert_eq!(failing(&|sight| sight.tick_healthy = false), "tick rate");
-    assert_eq!(failing(&|sight| sight.sensors.gnss = true), "sensors");
-    assert_eq!(failing(&|sight| sight.battery = None), "battery");
-    let mut tilted = state;
-    tilted.attitude_rad.y = 0.3;
-    let mut guidance = bench.guidance;
-    let guided = guidance.tick(&Sight { state: Some(&tilted), ..sight(&bench) }, &Orders::default());
-    assert_eq!(guided.checks.to_string(), "level");
+    let far = State { position_m: Vector3::new(1e3, 0.0, 0.0), ..here };
+    let tilted = State { attitude_rad: Vector3::new(0.0, 0.8, 0.0), velocity_m_s: Vector3::new(9.0, 0.0, 0.0), ..here };
+    let gnss = Sensors { gnss: true, ..Sensors::default() };
+    for (sight, expected) in [
+        (well, vec![]),
+        (Sight { state: None, rested: false, ..well }, vec![]),
+        (Sight { state: Some(&tilted), rested: false, ..well }, vec![]),
+        (Sight { battery: None, ..well }, vec![Refusal::BatteryLow]),
+        (Sight { sensors: gnss, ..well }, vec![Refusal::SensorFailed]),
+        (Sight { state: Some(&far), ..well }, vec![Refusal::OutsideFence]),
+        (
+            Sight { state: Some(&far), sensors: gnss, battery: None, ..well },
+            vec![Refusal::BatteryLow, Refusal::SensorFailed, Refusal::OutsideFence],
+        ),
+    ] {
+        assert_eq!(against(&bench, &sight), expected, "{sight:?}");
+    }
     bench.select(FlightMode::Land).unwrap();
-    assert_eq!(bench.last.unwrap().checks.to_string(), "mode");
-    assert_eq!(bench.last.unwrap().checks.refusal(), Some(Refusal::WrongMode));
-    assert_eq!(bench.last.unwrap().checks.failing(), 1 << Check::Mode as u16);
+    assert_eq!(against(&bench, &well), [Refusal::WrongMode]);
+    // Armed, it stays as it was.
+    let armed = Sight { core: Mode::Flying, sensors: gnss, ..well };
+    assert_eq!(against(&bench, &armed), [Refusal::WrongMode]);
+}
+
+/// Home is found where the flight core says that the vehicle has been at rest, and not before.
+#[test]
+fn home_is_where_the_vehicle_has_rested() {
+    let mut guidance = Guidance::new(quiet()).unwrap();
+    let at = |x: f32| State { position_m: Vector3::new(x, 0.0, 0.0), ..State::default() };
+    for (tick, x, rested, home) in
+        [(1, 1.0, false, None), (2, 2.0, false, None), (3, 3.0, true, Some(3.0)), (4, 4.0, true, Some(3.0))]
+    {
+        let state = at(x);
+        let sight = Sight {
+            now_us: tick * 1000,
+            dt_s: 1e-3,
+            state: Some(&state),
+            core: Mode::Disarmed,
+            airborne: false,
+            rested,
+            battery: None,
+            sensors: Sensors::default(),
+            lift: Lift { most_m_s2: 20.0, gravity_m_s2: 9.81, given_m_s2: None },
+        };
+        let guided = guidance.tick(&sight, &Orders::default());
+        assert_eq!(guided.home_m.map(|home| home.x), home);
+    }
 }
 
 #[test]

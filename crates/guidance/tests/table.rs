@@ -245,7 +245,7 @@ proptest! {
             let mut asked = None;
             match step {
                 Step::Arm => {
-                    if bench.core == Mode::Disarmed && bench.last.unwrap().checks.all_ok() {
+                    if bench.core == Mode::Disarmed && bench.rested() && bench.last.unwrap().against.is_empty() {
                         bench.core = Mode::Flying;
                         bench.landing = afbc_flight_core::landing::LandDetector::new(&bench.state, 9.81);
                     }

@@ -62,6 +62,8 @@ pub(crate) struct Desk {
     reached: Option<u16>,
     /// When the guidance was last told that the station in control is there \[us\].
     heard_us: Option<u64>,
+    /// Wish to be told what speaks against arming, and whether one of the stations that have it may arm.
+    checks: Option<bool>,
     /// True if the shell can reboot.
     reboots: bool,
     /// True if a station has asked for a reboot.
@@ -85,6 +87,7 @@ impl Desk {
             given: None,
             reached: None,
             heard_us: None,
+            checks: None,
             reboots: setup.reboots,
             reboot: false,
         }
@@ -138,6 +141,7 @@ impl Desk {
     /// Does what is due after a tick.
     pub(crate) fn tick(&mut self) {
         self.streams.tick();
+        self.tell_checks();
         if let Some(words) = self.missions.tick(self.now_us) {
             self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &words);
         }

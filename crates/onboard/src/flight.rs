@@ -9,7 +9,7 @@ use crate::silence::Silence;
 use afbc::monitor::{Bounds, Norm};
 use afbc::{Guarded, guarded};
 use afbc_estimator::{Easing, Estimator};
-use afbc_flight_core::{Answer, End, Health, Mode, Motor, Vehicle, VehicleMemory};
+use afbc_flight_core::{Answer, End, Health, Mode, Motor, Reasons, Vehicle, VehicleMemory};
 use afbc_types::{Axis, Declared, OutOfRange, ROTORS_MAX, RotorSpeeds, State};
 use core::array;
 
@@ -22,8 +22,6 @@ pub struct Flight<const N: usize = 4> {
     motor: Motor,
     guide: Guide,
     silence: Silence,
-    /// True if the last tick was on time.
-    tick_healthy: bool,
     /// True if the state of the last tick was observed.
     observes: bool,
     saturated_ticks: u32,
@@ -89,6 +87,8 @@ pub struct Report<const N: usize = 4> {
     pub answer: Option<Answer>,
     /// Why the flight ended, if it did in this tick.
     pub ended: Option<End>,
+    /// What spoke against arming in this tick, by which a request to arm was or would have been answered.
+    pub against: Reasons,
     /// What the guidance decided.
     pub guided: Guided,
 }
@@ -100,8 +100,21 @@ impl<const N: usize> Report<N> {
         let Report { time_us, mode, motors, throttles, estimate, health, saturated_ticks, learnt, answer, .. } = *self;
         let throttles = array::from_fn(|i| throttles.get(i).copied().unwrap_or_default());
         let motors = motors.padded();
-        let (ended, guided) = (self.ended, self.guided);
-        Report { time_us, mode, motors, throttles, estimate, health, saturated_ticks, learnt, answer, ended, guided }
+        let (ended, against, guided) = (self.ended, self.against, self.guided);
+        Report {
+            time_us,
+            mode,
+            motors,
+            throttles,
+            estimate,
+            health,
+            saturated_ticks,
+            learnt,
+            answer,
+            ended,
+            against,
+            guided,
+        }
     }
 }
 
@@ -119,7 +132,6 @@ impl<const N: usize> Flight<N> {
             motor,
             guide,
             silence: Silence::default(),
-            tick_healthy: false,
             observes: false,
             saturated_ticks: 0,
         })
@@ -154,13 +166,12 @@ impl<const N: usize> Flight<N> {
         // One that repeats itself has failed, too.
         sensors.inertial |= self.observes;
         let estimate = self.navigation.tick(now_us, readings, &mut mail.inbox);
-        let (mode, airborne, tick_healthy) = (self.memory.mode(), self.memory.airborne(), self.tick_healthy);
+        let (mode, airborne, rested) = (self.memory.mode(), self.memory.airborne(), self.memory.rested());
         let observed = if self.observes { self.memory.state().copied() } else { None };
-        let core = Core { mode, airborne, tick_healthy, sensors, observed };
+        let core = Core { mode, airborne, rested, sensors, observed };
         let guided = self.guide.tick(now_us, mail, &core);
         let outcome = self.vehicle.tick(&mut self.memory, now_us, &mail.inbox);
         self.guide.gave(outcome.forces.0.iter().sum());
-        self.tick_healthy = outcome.health.rate.healthy();
         self.observes = outcome.health.observed;
         if outcome.health.control.saturated {
             self.saturated_ticks = self.saturated_ticks.saturating_add(1);
@@ -177,6 +188,7 @@ impl<const N: usize> Flight<N> {
             learnt: self.memory.control().map(|control| control.figures().latest()),
             answer: outcome.answer,
             ended: outcome.ended,
+            against: outcome.against,
             guided,
         }
     }

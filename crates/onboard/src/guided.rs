@@ -6,7 +6,7 @@ use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::{Asked, Mode, Stamped};
 use afbc_guidance::net::Sensors;
 use afbc_guidance::notice::Notices;
-use afbc_guidance::{Checks, Declined, FlightMode, Guidance, Lift, Sight};
+use afbc_guidance::{Declined, FlightMode, Guidance, Lift, Sight};
 use afbc_types::{OutOfRange, State};
 use nalgebra::Vector3;
 
@@ -30,8 +30,6 @@ pub struct Guided {
     pub airborne: bool,
     /// True if the safety net has taken over.
     pub failsafe: bool,
-    /// Checks before arming.
-    pub checks: Checks,
     /// Announcements of this tick.
     pub notices: Notices,
     /// Charge of the battery, 0 to 1.
@@ -51,7 +49,8 @@ pub(crate) struct Guide {
 pub(crate) struct Core {
     pub(crate) mode: Mode,
     pub(crate) airborne: bool,
-    pub(crate) tick_healthy: bool,
+    /// True if it has been at rest for as long as arming wants it.
+    pub(crate) rested: bool,
     pub(crate) sensors: Sensors,
     /// What is observed of the state in place of an estimate, in the last tick.
     pub(crate) observed: Option<State>,
@@ -99,10 +98,9 @@ impl Guide {
             now_us,
             dt_s,
             state,
-            missing: inbox.missing(),
             core: core.mode,
             airborne: core.airborne,
-            tick_healthy: core.tick_healthy,
+            rested: core.rested,
             battery: *battery,
             sensors: core.sensors,
             lift: self.lift,
@@ -112,7 +110,7 @@ impl Guide {
             inbox.put_setpoint(Stamped { value, at_us: now_us });
         }
         inbox.rest(guided.rests);
-        inbox.bar(guided.checks.refusal());
+        inbox.bar(guided.against);
         if let Some(request) = guided.request {
             // Not in the way of a station's.
             if inbox.asked().is_none() {
@@ -130,7 +128,6 @@ impl Guide {
             home_m: guided.home_m,
             airborne: core.airborne,
             failsafe: guided.failsafe.is_some(),
-            checks: guided.checks,
             notices: guided.notices,
             charge: guided.charge,
         }

@@ -7,12 +7,13 @@ use afbc_estimator::Measurement;
 use afbc_flight_core::Refusal;
 use afbc_guidance::{FlightMode, Net, Settings};
 use afbc_link::telemetry::Battery;
-use afbc_link::{Answer, Command, Downlink, Telemetry, Uplink};
+use afbc_link::{Address, Answer, Command, Downlink, ParameterRequest, Telemetry, Text, Uplink};
 use afbc_onboard::services::{health::sensor, modes};
-use afbc_onboard::{Aged, Configuration, Flight, Readings, Surroundings};
+use afbc_onboard::{Aged, Comms, Configuration, Flight, Readings, Setup, Surroundings};
 use afbc_types::State;
-use common::Bench;
+use common::{Bench, STATION};
 use nalgebra::Vector3;
+use proptest::prelude::*;
 
 const ARM_DISARM: u16 = 400;
 
@@ -111,4 +112,228 @@ fn what_is_told_agrees_with_the_answer() {
     }
     assert_eq!((armable.first(), armable.last()), (Some(&false), Some(&true)));
     assert!(armable.iter().skip_while(|told| !**told).all(|told| *told));
+}
+
+/// What a station is told that asks for everything at once: the answer to its wish to arm, the texts of the checks in
+/// their order, and whether SYS_STATUS says that the vehicle can be armed.
+struct Told {
+    answer: Answer,
+    checks: Vec<Text>,
+    armable: bool,
+}
+
+/// Asks in one tick for the checks, the system's status and the motors, and stops them again.
+fn ask(bench: &mut Bench, from: Address, stands: &Stands) -> Told {
+    bench.hear_from(from, Uplink::Command(Command::CheckArming));
+    bench.hear_from(from, Uplink::Command(Command::RequestMessage { message: 1, index: 0 }));
+    bench.hear_from(from, Uplink::Command(Command::Arm));
+    let mut said = stands.tick(bench).1;
+    for _ in 0..4 {
+        bench.hear_from(from, Uplink::Command(Command::Kill));
+        said.extend(stands.tick(bench).1);
+    }
+    let answer = said.iter().find_map(|message| match message {
+        Downlink::Answer { command: ARM_DISARM, answer, .. } => Some(*answer),
+        _ => None,
+    });
+    let armable = said.iter().find_map(|message| match message {
+        Downlink::Telemetry(Telemetry::System(system)) => Some(system.healthy & sensor::ARMING != 0),
+        _ => None,
+    });
+    let texts = said.iter().filter_map(|message| match message {
+        Downlink::Text { text, .. } => Some(*text),
+        _ => None,
+    });
+    Told { answer: answer.expect("answered"), checks: texts.collect(), armable: armable.expect("sent") }
+}
+
+/// How a vehicle stands, for a while.
+#[derive(Clone, Debug)]
+struct Stands {
+    ticks: u32,
+    state: State,
+    /// False if its tracker is silent.
+    seen: bool,
+    /// True if its inertial sensor is read.
+    sensed: bool,
+    voltage_mv: u16,
+    mode: Option<FlightMode>,
+    /// A limit that is set at the beginning.
+    limit: Option<(&'static str, f32)>,
+}
+
+impl Stands {
+    fn tick(&self, bench: &mut Bench) -> (afbc_onboard::Report, Vec<Downlink>) {
+        if self.seen {
+            bench.measure(&self.state);
+        }
+        let sample = [Vector3::zeros(), Vector3::new(0.0, 0.0, 9.81)];
+        let imu = self.sensed.then_some(Aged { value: sample, age_us: 0 });
+        bench.sense(&Readings { imu, ..Readings::NONE })
+    }
+
+    fn begin(&self, bench: &mut Bench) {
+        charge(bench, self.voltage_mv);
+        if let Some(mode) = self.mode {
+            bench.hear(Uplink::Command(Command::SelectMode(modes::custom(mode))));
+        }
+        if let Some((name, value)) = self.limit {
+            let mut padded = [0; 16];
+            padded.iter_mut().zip(name.bytes()).for_each(|(to, from)| *to = from);
+            let (name, value) = (padded, value.to_le_bytes());
+            bench.hear(Uplink::Parameter(ParameterRequest::Set { name, value, kind: 9 }));
+        }
+    }
+}
+
+/// A size from the smallest limit to beyond the largest motion, none of them more likely.
+fn size(most: f32) -> impl Strategy<Value = f32> {
+    (0.005_f32.ln()..most.ln()).prop_map(f32::exp)
+}
+
+/// Limits near the motions that are drawn, within their ranges.
+fn limit() -> impl Strategy<Value = (&'static str, f32)> {
+    let name = prop::sample::select(vec!["ARM_SPEED_MAX", "ARM_RATE_MAX", "ARM_TILT_MAX", "ARM_DIST_MAX"]);
+    (name, size(4.0))
+        .prop_map(|(name, value)| (name, value.clamp(0.01, if name == "ARM_TILT_MAX" { 0.8 } else { 4.0 })))
+}
+
+fn vector(most: f32) -> impl Strategy<Value = Vector3<f32>> {
+    let along = || prop_oneof![2 => Just(0.0), 1 => size(most), 1 => size(most).prop_map(|x| -x)];
+    // Mostly zero: else it is hardly ever ready.
+    prop_oneof![2 => Just(Vector3::zeros()), 1 => prop::array::uniform3(along()).prop_map(Vector3::from)]
+}
+
+fn stands() -> impl Strategy<Value = Stands> {
+    let state = (vector(20.0), vector(3.0), vector(0.9), vector(3.0)).prop_map(|(position, velocity, tilt, rates)| {
+        State { position_m: position, velocity_m_s: velocity, attitude_rad: tilt, rates_rad_s: rates }
+    });
+    let mode = prop::option::weighted(0.2, prop::sample::select(FlightMode::ALL.to_vec()));
+    let voltage = prop_oneof![6 => Just(12_000_u16), 1 => Just(10_000)];
+    let ticks = prop_oneof![1 => 1_u32..900, 2 => 980_u32..1100];
+    let flags = (prop::bool::weighted(0.9), prop::bool::weighted(0.05));
+    (ticks, state, flags, voltage, mode, prop::option::of(limit())).prop_map(
+        |(ticks, state, (seen, sensed), voltage_mv, mode, limit)| Stands {
+            ticks,
+            state,
+            seen,
+            sensed,
+            voltage_mv,
+            mode,
+            limit,
+        },
+    )
+}
+
+/// One of random limits, whose link is wide enough for every text.
+fn limited(limits: &[f32; 4]) -> Bench {
+    let net = Net { cells: 3.0, fence_radius_m: 10.0, ..Net::DEFAULT };
+    let [speed_max_m_s, rate_max_rad_s, tilt_max_rad, setpoint_distance_max_m] = *limits;
+    let arming = afbc_onboard::ArmingLimits {
+        tilt_max_rad: tilt_max_rad.clamp(0.01, 0.8),
+        setpoint_distance_max_m: setpoint_distance_max_m.max(0.01),
+        speed_max_m_s: speed_max_m_s.max(0.01),
+        rate_max_rad_s: rate_max_rad_s.max(0.01),
+    };
+    let configuration =
+        Configuration { guidance: Settings { net, ..Settings::DEFAULT }, arming, ..Configuration::default() };
+    let mut bench = Bench::new();
+    bench.flight = Flight::new(&configuration).expect("valid");
+    bench.table = afbc_onboard::parameters::Table::new(configuration);
+    bench.comms = Comms::with(Setup { bytes_per_s: 1_000_000, ..Setup::default() });
+    bench
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(150))]
+
+    /// Under any limits, also such as are set while it runs, and however the vehicle stands: the checks say "ready to
+    /// arm", and SYS_STATUS that it can be armed, exactly when it is armed in that tick; else the checks begin with the
+    /// reason of the refusal.
+    #[test]
+    fn the_report_is_what_the_flight_core_decides(
+        limits in prop::array::uniform4(size(4.0)),
+        spells in prop::collection::vec(stands(), 1..6),
+    ) {
+        let mut bench = limited(&limits);
+        for spell in &spells {
+            spell.begin(&mut bench);
+            for _ in 0..spell.ticks {
+                spell.tick(&mut bench);
+            }
+            let Told { answer, checks, armable } = ask(&mut bench, STATION, spell);
+            let first = checks.first().copied();
+            let expected = match answer {
+                Answer::Accepted => Text::from("ready to arm"),
+                Answer::Refused(number) => {
+                    let refusal = Refusal::ALL.into_iter().find(|refusal| *refusal as i32 == number);
+                    Text::from(refusal.expect("the flight core's").reason())
+                }
+                answer => return Err(TestCaseError::fail(format!("{answer:?}"))),
+            };
+            prop_assert_eq!(first, Some(expected), "{:?}, {:?}", answer, checks);
+            prop_assert_eq!(armable, answer == Answer::Accepted);
+            prop_assert_eq!(checks.contains(&Text::from("ready to arm")), answer == Answer::Accepted);
+        }
+    }
+}
+
+/// The report of old: by the default limits, while those of the parameters count.
+#[test]
+fn the_limits_of_the_parameters_count() {
+    let creeps = |speed_m_s: f32| State { velocity_m_s: Vector3::new(speed_m_s, 0.0, 0.0), ..State::default() };
+    for (limit, speed_m_s, ready) in [(0.01, 0.1, false), (0.5, 0.1, true), (0.5, 0.6, false), (2.0, 0.6, true)] {
+        let mut bench = limited(&[limit, 0.5, 0.26, 2.0]);
+        let spell = Stands {
+            ticks: 1100,
+            state: creeps(speed_m_s),
+            seen: true,
+            sensed: false,
+            voltage_mv: 12_000,
+            mode: None,
+            limit: None,
+        };
+        spell.begin(&mut bench);
+        for _ in 0..spell.ticks {
+            spell.tick(&mut bench);
+        }
+        let told = ask(&mut bench, STATION, &spell);
+        let (answer, text) = if ready {
+            (Answer::Accepted, "ready to arm")
+        } else {
+            (Answer::Refused(Refusal::NotAtRest as i32), Refusal::NotAtRest.reason())
+        };
+        assert_eq!((told.answer, told.armable), (answer, ready));
+        assert_eq!(told.checks.first(), Some(&Text::from(text)));
+    }
+}
+
+/// A station that is not in control is told so: it would be refused.
+#[test]
+fn a_station_that_may_not_arm_is_not_told_that_it_may() {
+    const OTHER: Address = Address { system: 245, component: 190 };
+    let mut bench = limited(&[0.5, 0.5, 0.26, 2.0]);
+    let spell = Stands {
+        ticks: 1100,
+        state: State::default(),
+        seen: true,
+        sensed: false,
+        voltage_mv: 12_000,
+        mode: Some(FlightMode::Hold),
+        limit: None,
+    };
+    spell.begin(&mut bench);
+    for _ in 0..spell.ticks {
+        spell.tick(&mut bench);
+    }
+    let mine = Text::from("ready to arm");
+    let theirs = Text::from("245/190 may not arm: 255/190 is in control");
+    let told = ask(&mut bench, OTHER, &spell);
+    assert_eq!(told.answer, Answer::Refused(afbc_onboard::NOT_IN_CONTROL));
+    assert!(told.checks.contains(&theirs) && !told.checks.contains(&mine), "{:?}", told.checks);
+    // Both at once: each is told.
+    bench.hear_from(OTHER, Uplink::Command(Command::CheckArming));
+    let told = ask(&mut bench, STATION, &spell);
+    assert_eq!(told.answer, Answer::Accepted);
+    assert!(told.checks.contains(&theirs) && told.checks.contains(&mine), "{:?}", told.checks);
 }

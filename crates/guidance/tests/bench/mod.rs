@@ -2,7 +2,8 @@
 #![allow(dead_code, clippy::unwrap_used, clippy::panic, reason = "each test uses a part; a test may stop")]
 
 use afbc_flight_core::landing::LandDetector;
-use afbc_flight_core::{Mode, Request, Stamped};
+use afbc_flight_core::supervisor::REST_US;
+use afbc_flight_core::{ArmingLimits, Mode, Request, Stamped};
 use afbc_guidance::*;
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
@@ -33,6 +34,8 @@ pub(crate) struct Bench {
     /// Highest and farthest place of the flight \[m\].
     pub(crate) highest_m: f32,
     thrust_m_s2: f32,
+    /// Time at rest, as the flight core counts it \[us\].
+    rest_us: u32,
 }
 
 pub(crate) fn settings() -> Settings {
@@ -61,6 +64,7 @@ impl Bench {
             last: None,
             highest_m: 0.0,
             thrust_m_s2: 0.0,
+            rest_us: 0,
         }
     }
 
@@ -84,6 +88,11 @@ impl Bench {
 
     pub(crate) fn airborne(&self) -> bool {
         self.core.armed() && self.landing.airborne()
+    }
+
+    /// True if it has been at rest for as long as arming wants it.
+    pub(crate) fn rested(&self) -> bool {
+        self.rest_us >= REST_US
     }
 
     pub(crate) fn order(&mut self, order: Order) -> Result<(), Declined> {
@@ -120,6 +129,8 @@ impl Bench {
 
     pub(crate) fn tick(&mut self) -> Guided {
         self.now_us += 1000;
+        let rests = self.sees && ArmingLimits::DEFAULT.at_rest(&self.state);
+        self.rest_us = if rests { self.rest_us + 1000 } else { 0 };
         if self.heard {
             self.orders.heard_us = Some(self.now_us);
         }
@@ -134,10 +145,9 @@ impl Bench {
             now_us: self.now_us,
             dt_s: DT_S,
             state: self.sees.then_some(&self.state),
-            missing: None,
             core: self.core,
             airborne: self.airborne(),
-            tick_healthy: true,
+            rested: self.rested(),
             battery: self.battery,
             sensors: self.sensors,
             lift: Lift { most_m_s2: 2.0 * G_M_S2, gravity_m_s2: G_M_S2, given_m_s2: None },

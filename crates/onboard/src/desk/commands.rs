@@ -6,7 +6,8 @@ use crate::services::commands::{BUSY, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN};
 use crate::services::origin::resolve;
 use crate::services::streams::{Requested, Streams, id};
 use crate::services::telemetry::compose;
-use crate::services::{control, health, modes};
+use crate::services::texts::Words;
+use crate::services::{control, modes};
 use afbc_flight_core::{Refusal, Request};
 use afbc_guidance::{Declined, FlightMode, Order};
 use afbc_link::{Address, Answer, Command, Height, Interval, MavSeverity, Place};
@@ -48,7 +49,7 @@ impl Desk {
             }
             Command::Storage(storage) => self.storage(storage),
             Command::CheckArming => {
-                self.tell_checks();
+                self.check_arming(from);
                 Answer::Accepted
             }
             _ => match self.order_of(command) {
@@ -149,12 +150,23 @@ impl Desk {
         }
     }
 
-    fn tell_checks(&mut self) {
-        let mut reasons = health::against_arming(&self.picture).peekable();
-        if reasons.peek().is_none() {
+    /// Notes that a station wants to know what speaks against arming, and tells whether another is in control.
+    fn check_arming(&mut self, from: Address) {
+        let holder = self.control.holder(self.now_us).filter(|holder| *holder != from);
+        if let Some(holder) = holder {
+            let words = Words::default().station(from).and(" may not arm: ").station(holder).and(" is in control");
+            self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &words);
+        }
+        self.checks = Some(self.checks == Some(true) || holder.is_none());
+    }
+
+    /// Tells what spoke against arming in the tick before, as the flight core sees it: what it would have answered.
+    pub(super) fn tell_checks(&mut self) {
+        let (Some(may), Some(against)) = (self.checks.take(), self.picture.against) else { return };
+        if may && against.is_empty() {
             self.texts.put(MavSeverity::MAV_SEVERITY_INFO, "ready to arm");
         }
-        for reason in reasons {
+        for reason in against.iter() {
             self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, reason.reason());
         }
     }

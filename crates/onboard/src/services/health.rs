@@ -1,8 +1,8 @@
-//! The vehicle's health as stations read it, and what speaks against arming.
+//! The vehicle's health as stations read it.
 
 use crate::services::picture::Picture;
-use afbc_flight_core::{ArmingLimits, Mode, Refusal};
-use afbc_guidance::{Check, FlightMode};
+use afbc_flight_core::{Mode, Reasons};
+use afbc_guidance::FlightMode;
 use afbc_link::telemetry::{EstimatorStatus, SystemStatus};
 
 /// `MAV_SYS_STATUS_SENSOR`.
@@ -26,35 +26,13 @@ const IN_AIR: u8 = 2;
 const TAKING_OFF: u8 = 3;
 const LANDING: u8 = 4;
 
-/// Returns what speaks against arming, by the flight core's reasons and in its order. The flight core has the last
-/// word.
-pub fn against_arming(picture: &Picture) -> impl Iterator<Item = Refusal> + use<> {
-    let limits = ArmingLimits::default();
-    let tilt = picture.state.is_some_and(|state| {
-        let eta = state.attitude_rad;
-        eta.x.abs() > limits.tilt_max_rad || eta.y.abs() > limits.tilt_max_rad
-    });
-    let checks = picture.guided.checks;
-    [
-        (picture.mode.armed()).then_some(Refusal::AlreadyArmed),
-        (!picture.is_located()).then_some(Refusal::StateStale),
-        tilt.then_some(Refusal::TiltTooLarge),
-        picture.health.setpoint_stale.then_some(Refusal::SetpointMissing),
-        (!picture.health.rate.healthy()).then_some(Refusal::Unhealthy),
-        (!checks.is_ok(Check::AtRest)).then_some(Refusal::NotAtRest),
-        checks.refusal(),
-    ]
-    .into_iter()
-    .flatten()
-}
-
 /// Returns SYS_STATUS.
 pub fn system(picture: &Picture) -> SystemStatus {
     let surroundings = &picture.surroundings;
     let inertial = sensor::GYROSCOPE | sensor::ACCELEROMETER | sensor::ATTITUDE;
     let located = picture.is_located();
     let fixed = surroundings.receiver.is_some_and(|receiver| receiver.kind >= 3);
-    let armable = picture.mode.armed() || against_arming(picture).next().is_none();
+    let armable = picture.mode.armed() || picture.against.is_some_and(Reasons::is_empty);
     let sets = [
         (picture.senses, true, inertial),
         (!picture.senses, located, sensor::TRACKER),
@@ -112,12 +90,12 @@ pub fn landed(picture: &Picture) -> u8 {
 mod tests {
     use super::*;
     use crate::services::picture::{Receiver, Sensors};
-    use afbc_flight_core::rate;
+    use afbc_flight_core::Refusal;
     use afbc_types::State;
 
     fn well() -> Picture {
         let mut picture = Picture { state: Some(State::default()), senses: true, ..Picture::default() };
-        picture.health.rate = rate::Report { rate_hz: Some(1000), steady: true, alive: true, ..Default::default() };
+        picture.against = Some(Reasons::NONE);
         picture.surroundings.receiver = Some(Receiver { kind: 3, satellites: 12, sigma_mm: [500, 800] });
         let sensors = sensor::MAGNETOMETER | sensor::BAROMETER;
         picture.surroundings.sensors = Sensors { present: sensors, healthy: sensors };
@@ -142,8 +120,8 @@ mod tests {
         let cases: [Case; 4] = [
             (|picture| picture.surroundings.sensors.healthy = sensor::BAROMETER, sensor::MAGNETOMETER),
             (|picture| picture.surroundings.receiver = Some(Receiver::default()), sensor::SATELLITES),
-            (|picture| picture.health.rate.steady = false, sensor::ARMING),
-            (|picture| picture.health.setpoint_stale = true, sensor::ARMING),
+            (|picture| picture.against = Some(Refusal::NotAtRest.into()), sensor::ARMING),
+            (|picture| picture.against = None, sensor::ARMING),
         ];
         let all = system(&well()).healthy;
         for (spoil, bit) in cases {
@@ -151,19 +129,6 @@ mod tests {
             spoil(&mut picture);
             assert_eq!(system(&picture).healthy, all & !bit, "{bit:#x}");
         }
-    }
-
-    #[test]
-    fn what_speaks_against_arming_is_named() {
-        assert_eq!(against_arming(&well()).next(), None);
-        let mut picture = well();
-        picture.health.state_age_us = u32::MAX;
-        picture.state = Some(State { attitude_rad: nalgebra::Vector3::new(0.0, 0.5, 0.0), ..State::default() });
-        let mut told = against_arming(&picture);
-        assert_eq!(
-            [told.next(), told.next(), told.next()],
-            [Some(Refusal::StateStale), Some(Refusal::TiltTooLarge), None]
-        );
     }
 
     #[test]

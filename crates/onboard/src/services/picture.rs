@@ -4,7 +4,7 @@ use crate::flight::Report;
 use crate::guided::Guided;
 use crate::services::origin::Origin;
 use afbc_flight_core::supervisor::COAST_US;
-use afbc_flight_core::{Health, Mode};
+use afbc_flight_core::{Health, Mode, Reasons};
 use afbc_guidance::FlightMode;
 use afbc_link::telemetry::Battery;
 use afbc_types::{ROTORS_MAX, State};
@@ -59,6 +59,8 @@ pub struct Picture {
     pub senses: bool,
     /// Health of the flight core.
     pub health: Health,
+    /// What spoke against arming in the tick; none before the first.
+    pub against: Option<Reasons>,
     /// Throttles: 0, or 48 to 2047.
     pub throttles: [u16; ROTORS_MAX],
     /// Number of rotors.
@@ -76,6 +78,7 @@ impl Picture {
     pub(crate) fn update<const N: usize>(&mut self, report: &Report<N>, tick_us: f32) {
         self.time_us = report.time_us;
         (self.mode, self.guided, self.health) = (report.mode, report.guided, report.health);
+        self.against = Some(report.against);
         self.senses = report.estimate.is_some();
         self.throttles.iter_mut().zip(report.throttles).for_each(|(to, from)| *to = from);
         (self.rotors, self.tick_us) = (N as u8, tick_us);

@@ -1,0 +1,59 @@
+//! Everything that speaks against arming, as a set.
+
+use crate::supervisor::Refusal;
+
+/// Reasons against arming, in the order of [`Refusal::ARMING`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Reasons(u32);
+
+impl Reasons {
+    /// Nothing.
+    pub const NONE: Self = Reasons(0);
+
+    /// Adds a reason, if it applies.
+    pub const fn note(&mut self, applies: bool, reason: Refusal) {
+        if applies {
+            self.0 |= 1 << reason as u32;
+        }
+    }
+
+    /// Returns these reasons and `others`.
+    #[must_use]
+    pub const fn and(self, others: Reasons) -> Self {
+        Reasons(self.0 | others.0)
+    }
+
+    /// True if nothing speaks against it.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// True if this one is among them.
+    pub const fn contains(self, reason: Refusal) -> bool {
+        self.0 & (1 << reason as u32) != 0
+    }
+
+    /// Returns them in order.
+    pub fn iter(self) -> impl Iterator<Item = Refusal> {
+        Refusal::ARMING.into_iter().filter(move |reason| self.contains(*reason))
+    }
+
+    /// Returns the answer to [`Request::Arm`](crate::Request::Arm).
+    ///
+    /// # Errors
+    /// The first of them.
+    pub fn verdict(self) -> Result<(), Refusal> {
+        if self.is_empty() {
+            return Ok(());
+        }
+        self.iter().next().map_or(Ok(()), Err)
+    }
+}
+
+impl From<Refusal> for Reasons {
+    fn from(reason: Refusal) -> Self {
+        let mut reasons = Reasons::NONE;
+        reasons.note(true, reason);
+        reasons
+    }
+}
