@@ -81,6 +81,8 @@ pub(crate) struct Align {
 pub(crate) struct Aligned {
     pub(crate) attitude: Quaternion<f32>,
     pub(crate) gyro_bias: Vector3<f32>,
+    /// Mean specific force, body frame \[m/s2\].
+    pub(crate) force: Vector3<f32>,
     /// Variance of the heading at the right tilt; none if nobody told it.
     pub(crate) heading_variance: Option<f32>,
     /// Heading per rotation about the earth's x and y, if a field told it: its dip makes of a tilt a heading.
@@ -191,6 +193,7 @@ impl Align {
         Some(Aligned {
             attitude: normalized(&(about_z * level)),
             gyro_bias: self.rates.mean,
+            force: self.force.mean,
             heading_variance: turn.map(|(_, variance, _)| variance),
             dip,
             by_field: turn.is_some_and(|(_, _, by_field)| by_field),

@@ -95,6 +95,8 @@ pub struct Estimate {
     pub sigmas: Sigmas,
     /// Which parts may be used.
     pub validity: Validity,
+    /// True if the vehicle is held at rest ([`Memory::set_on_ground`](crate::Memory::set_on_ground)).
+    pub at_rest: bool,
     /// Why the filter has not started; `None` once it runs.
     pub unready: Option<Unready>,
     /// Health of the inertial sensors.

@@ -26,6 +26,8 @@ const GAP_RAD_S: f32 = 0.5;
 const GAP_M_S2: f32 = 3.0;
 /// Time for which an error of the second order lasts \[s\].
 const BENT_S: f32 = 0.7;
+/// Time for which a vehicle that is held at rest counts as such \[us\].
+const HELD_US: u64 = 500_000;
 /// Variances per second that a clipped sample adds, attitude and velocity: 0.8 rad and 2.4 m/s for 30 ms of them.
 const CLIPPED: (f32, f32) = (20.0, 200.0);
 
@@ -175,6 +177,7 @@ impl Estimator {
         if clipped {
             memory.roughen(sample.at_us, CLIPPED.0 * dt_s, CLIPPED.1 * dt_s);
         }
+        memory.rest.advance(sample, dt_s, &self.settings);
         memory.interval.thrust += memory.nominal.advance(sample, dt_s, self.settings.gravity_m_s2);
         memory.interval.time_s += dt_s;
         let due = sample.at_us.saturating_sub(memory.covariance_us) >= PREDICT_US;
@@ -274,7 +277,9 @@ impl Estimator {
         let tilt = estimate.sigmas.attitude_rad.xy().max();
         let attitude = imu.is_usable() && tilt <= s.tilt_sigma_max_rad;
         let heading = attitude && memory.knows.heading && estimate.sigmas.attitude_rad.z <= s.heading_sigma_max_rad;
-        let held = memory.on_ground || aids.holds_velocity(at_us, self.coast_us);
+        let held_us = memory.held_us.map(|held_us| at_us.saturating_sub(held_us));
+        estimate.at_rest = memory.stands() && held_us.is_some_and(|held_us| held_us < HELD_US);
+        let held = held_us.is_some_and(|held_us| held_us <= self.coast_us) || aids.holds_velocity(at_us, self.coast_us);
         let (fast, far) = (largest_sigma(&variances.velocity), largest_sigma(&variances.position));
         let velocity = attitude && held && fast <= s.velocity_sigma_max_m_s;
         let placed = aids.holds_position(at_us, self.coast_us);

@@ -34,6 +34,9 @@ const PRESENT_US: u64 = 1_000_000;
 const STILL_US: u64 = 200_000;
 const STILL_M_S: f32 = 0.05;
 const ALOFT_M_S: f32 = 3.0;
+/// Largest velocity that may be that of a vehicle at rest, in standard deviations: less than the gate of a measurement,
+/// since one that is driven straight on looks the same to the inertial sensor.
+const STILL_SIGMAS: f32 = 3.0;
 /// Time within which a second reset doubts the attitude \[us\].
 const AGAIN_US: u64 = 10_000_000;
 /// Variance of the velocity after a tracker's jump, which tells none; two more positions do \[m2/s2\].
@@ -152,16 +155,26 @@ impl Estimator {
         part.variance = white;
     }
 
-    /// Begins a pseudo-measurement of rest if one is due: on the ground; or in the air without any aid, where it keeps
-    /// roll and pitch level in the long run.
+    /// Begins a pseudo-measurement of rest if one is due: of a vehicle that stands; or in the air without any aid,
+    /// where it keeps roll and pitch level in the long run.
     fn rest(&self, memory: &mut Memory) -> bool {
         let at_us = memory.covariance_us;
-        let unaided = !memory.aids.holds_velocity(at_us, self.coast_us);
-        let sigma = if memory.on_ground { STILL_M_S } else { ALOFT_M_S };
-        if !(memory.on_ground || unaided) || at_us.saturating_sub(memory.still_us) < STILL_US {
+        if at_us.saturating_sub(memory.still_us) < STILL_US {
             return false;
         }
+        let still = |memory: &Memory| {
+            let variance = memory.covariance.variances().velocity.map(|variance| variance + STILL_M_S * STILL_M_S);
+            passes(&memory.nominal.velocity, &variance, STILL_SIGMAS * STILL_SIGMAS)
+        };
+        let held = memory.stands() && still(memory);
+        if !held && memory.aids.holds_velocity(at_us, self.coast_us) {
+            return false;
+        }
+        let sigma = if held { STILL_M_S } else { ALOFT_M_S };
         memory.still_us = at_us;
+        if held {
+            memory.held_us = Some(at_us);
+        }
         let Some(past) = memory.history.newest_raw() else { return false };
         let variance = Vector3::repeat(sigma * sigma);
         let part = Part { aid: None, target: Target::Velocity(Vector3::zeros()), variance, rough: 0.0 };

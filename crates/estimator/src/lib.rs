@@ -75,8 +75,10 @@
 //!   is not that of the start is not used.
 //! * A **heading** that neither tracker nor magnetometer tells follows from the motion once the vehicle accelerates,
 //!   but never counts as valid: an error of nearly half a turn may stay, with a small standard deviation.
-//! * **At rest on the ground** ([`Memory::set_on_ground`]) the velocity is held at zero. In the air without any aid for
-//!   [`Settings::coast_s`] a weak zero (3 m/s) keeps roll and pitch level; velocity and position are then invalid.
+//! * **At rest on the ground** the velocity is held at zero, as long as [the inertial sensor shows rest](rest) and the
+//!   motors are known not to carry the vehicle ([`Memory::set_on_ground`]), or nobody has told and it has not moved
+//!   since the alignment. A vehicle carried by hand is followed. In the air without any aid for [`Settings::coast_s`] a
+//!   weak zero (3 m/s) keeps roll and pitch level; velocity and position are then invalid.
 //!
 //! # For a controller
 //!
@@ -93,7 +95,7 @@
 //!
 //! # Reading order
 //!
-//! [`measurement`], [`settings`], [`estimate`]: in and out. [`estimator`]: a step. [`align`]: the start. [`nominal`],
+//! [`measurement`], [`settings`], [`estimate`]: in and out. [`estimator`]: a step. [`align`], [`rest`]: at rest. [`nominal`],
 //! [`errors`], [`covariance`]: prediction. [`history`], [`horizon`], [`queue`], [`fusion`], [`slow`]: measurements.
 //! [`aid`], [`restart`], [`imu`]: gates, resets, health. [`rotation`], [`geodetic`]: small mathematics.
 #![no_std]
@@ -115,6 +117,7 @@ mod measurement;
 mod memory;
 mod nominal;
 mod queue;
+mod rest;
 mod restart;
 mod rotation;
 mod settings;

@@ -10,6 +10,7 @@ use crate::imu::{Monitor, Smoothed};
 use crate::measurement::{Measurement, Timed};
 use crate::nominal::Nominal;
 use crate::queue::{Fix, Queue};
+use crate::rest::Rest;
 use crate::rotation::identity;
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
@@ -18,7 +19,9 @@ use nalgebra::{Matrix3, Quaternion, Vector3};
 pub struct Memory {
     /// True once the filter runs.
     pub(crate) runs: bool,
-    pub(crate) on_ground: bool,
+    /// Whether the motors cannot carry the vehicle, if anyone has told.
+    pub(crate) on_ground: Option<bool>,
+    pub(crate) rest: Rest,
     pub(crate) align: Align,
     pub(crate) monitor: Monitor,
     pub(crate) smoothed: Smoothed,
@@ -52,6 +55,8 @@ pub struct Memory {
     pub(crate) repeated_field: Repeated,
     /// Time of the last pseudo-measurement \[us\].
     pub(crate) still_us: u64,
+    /// Time at which the vehicle was last held at rest \[us\].
+    pub(crate) held_us: Option<u64>,
     /// Time of the last reset that a rejection caused \[us\].
     pub(crate) reset_us: Option<u64>,
     pub(crate) resets: Resets,
@@ -80,7 +85,8 @@ impl Default for Memory {
     fn default() -> Self {
         Memory {
             runs: false,
-            on_ground: false,
+            on_ground: None,
+            rest: Rest::default(),
             align: Align::default(),
             monitor: Monitor::default(),
             smoothed: Smoothed::default(),
@@ -103,6 +109,7 @@ impl Default for Memory {
             repeated: Repeated::default(),
             repeated_field: Repeated::default(),
             still_us: 0,
+            held_us: None,
             reset_us: None,
             resets: Resets::default(),
             dropped: Dropped::default(),
@@ -121,10 +128,17 @@ impl Memory {
         }
     }
 
-    /// Tells whether the vehicle stands on the ground with its motors off. Its velocity is then held at zero, which
-    /// holds the biases before take-off. False at the beginning.
+    /// Tells whether the motors cannot carry the vehicle: they are off, or idle on the ground. While they cannot, the
+    /// velocity is held at zero whenever the inertial sensor shows rest, which holds attitude, position and biases too;
+    /// a vehicle that is moved by hand is not held. As long as nobody has told, it is held from the alignment until it
+    /// first moves: later, rest may be a hover in calm air.
     pub fn set_on_ground(&mut self, on_ground: bool) {
-        self.on_ground = on_ground;
+        self.on_ground = Some(on_ground);
+    }
+
+    /// True if the vehicle stands, as far as motors and inertial sensor tell.
+    pub(crate) fn stands(&self) -> bool {
+        self.rest.is_still() && self.on_ground.unwrap_or(self.rest.unmoved)
     }
 
     /// Adds variances of attitude and velocity for a sample at `at_us` that tells less than usual.

@@ -10,6 +10,7 @@ use crate::horizon::magnetic;
 use crate::memory::{Known, Memory, NO_INTERVAL};
 use crate::nominal::Nominal;
 use crate::queue::Part;
+use crate::rest::Rest;
 use crate::rotation::{about_z, identity, matrix, normalized};
 use crate::settings::Settings;
 use crate::slow::of_gnss;
@@ -94,6 +95,7 @@ impl Memory {
         self.knows = Known { heading: aligned.heading_variance.is_some(), ..Known::default() };
         self.field = aligned.field.and_then(|field| reference(&field));
         self.run(now_us, nominal);
+        self.rest = Rest::aligned(aligned.gyro_bias, aligned.force);
         if aligned.by_field {
             self.covariance.slow.magnetize(estimator.magnetic_variance);
             self.point(estimator.magnetic_north);
@@ -161,6 +163,8 @@ impl Memory {
         self.fix = None;
         self.height_offset = 0.0;
         self.still_us = now_us;
+        self.held_us = None;
+        self.rest = Rest::default();
         self.covariance.hold();
         self.history.clear();
         self.remember(now_us);

@@ -24,6 +24,8 @@ pub struct Flight<const N: usize = 4> {
     silence: Silence,
     /// True if the state of the last tick was observed.
     observes: bool,
+    /// True if an armed vehicle was to rest on the ground in the last tick.
+    rests: bool,
     saturated_ticks: u32,
 }
 
@@ -133,6 +135,7 @@ impl<const N: usize> Flight<N> {
             guide,
             silence: Silence::default(),
             observes: false,
+            rests: false,
             saturated_ticks: 0,
         })
     }
@@ -165,11 +168,13 @@ impl<const N: usize> Flight<N> {
         let mut sensors = self.silence.tick(now_us, readings, mail.inbox.pose().is_some());
         // One that repeats itself has failed, too.
         sensors.inertial |= self.observes;
-        let estimate = self.navigation.tick(now_us, readings, &mut mail.inbox);
         let (mode, airborne, rested) = (self.memory.mode(), self.memory.airborne(), self.memory.rested());
+        self.navigation.set_on_ground(!mode.armed() || self.rests && !airborne);
+        let estimate = self.navigation.tick(now_us, readings, &mut mail.inbox);
         let observed = if self.observes { self.memory.state().copied() } else { None };
         let core = Core { mode, airborne, rested, sensors, observed };
         let guided = self.guide.tick(now_us, mail, &core);
+        self.rests = mail.inbox.rests();
         let outcome = self.vehicle.tick(&mut self.memory, now_us, &mail.inbox);
         self.guide.gave(outcome.forces.0.iter().sum());
         self.observes = outcome.health.observed;

@@ -1,11 +1,14 @@
 //! The vehicle's own estimate, and what of it the flight core is told.
 
 use crate::readings::{Aged, Readings};
+use afbc_control::math::{max, min};
 use afbc_estimator::{Easing, Estimate, Estimator, Measurement, Memory, Timed};
 use afbc_flight_core::{Inbox, Refusal, Stamped};
 use afbc_types::{Pose, PoseSigmas, State};
 use nalgebra::Vector3;
 
+/// Number of fixes whose mean the local frame's origin is, at rest.
+const FIXES: f32 = 10.0;
 /// Standard deviations of a tracker's pose that does not say how good it is: a motion-capture system's \[m, rad\].
 const TRACKER: (f32, f32) = (0.003, 0.01);
 
@@ -15,7 +18,9 @@ const TRACKER: (f32, f32) = (0.003, 0.01);
 ///
 /// The local frame is that of the tracker's poses. Where there is none, its origin is where the vehicle stands at the
 /// first usable fix of its GNSS receiver: one that comes when the estimator runs, and is good enough for a valid
-/// position. All fixes are told in that frame; with a tracker, so that the first one agrees with the estimate.
+/// position. All fixes are told in that frame; with a tracker, so that the first one agrees with the estimate. While the
+/// vehicle is at rest, further fixes tell where the origin is, not where the vehicle is: their error wanders by metres
+/// within minutes, which would be a motion of a vehicle that stands.
 #[derive(Clone, Debug)]
 pub struct Navigation {
     estimator: Estimator,
@@ -27,8 +32,12 @@ pub struct Navigation {
     works: bool,
     /// The local frame's origin in the receiver's frame, from the first usable fix on \[m\].
     origin_m: Option<Vector3<f32>>,
+    /// Number of fixes that have told it, up to [`FIXES`].
+    fixes: f32,
     /// Estimated position and velocity until then, zero as long as nobody has told a position \[m, m/s\].
     told: [Vector3<f32>; 2],
+    /// Estimated position of a vehicle at rest \[m\].
+    stands_m: Option<Vector3<f32>>,
 }
 
 impl Navigation {
@@ -41,8 +50,15 @@ impl Navigation {
             senses: false,
             works: true,
             origin_m: None,
+            fixes: 0.0,
             told: [Vector3::zeros(); 2],
+            stands_m: None,
         }
+    }
+
+    /// Tells whether the motors cannot carry the vehicle ([`Memory::set_on_ground`]).
+    pub fn set_on_ground(&mut self, on_ground: bool) {
+        self.memory.set_on_ground(on_ground);
     }
 
     /// Goes on with another estimator.
@@ -77,29 +93,48 @@ impl Navigation {
         if self.origin_m.is_none() && estimate.resets.position > 0 {
             self.told = [estimate.state.position_m, estimate.state.velocity_m_s];
         }
+        self.stands_m = estimate.at_rest.then_some(estimate.state.position_m);
         tell(&estimate, self.easing.step(&estimate), now_us, inbox);
         Some(estimate.state)
     }
 
     /// Returns a measurement in the local frame; none for a fix before a usable one.
     #[inline(always)]
-    fn localized(&mut self, mut aid: Aged<Measurement>) -> Option<Aged<Measurement>> {
-        self.origin_m = self.origin_m.or_else(|| self.origin(&aid));
-        if let Measurement::Gnss { position_m, .. } = &mut aid.value {
-            *position_m -= self.origin_m?;
+    fn localized(&mut self, aid: Aged<Measurement>) -> Option<Aged<Measurement>> {
+        if !matches!(aid.value, Measurement::Gnss { .. }) {
+            return Some(aid);
+        }
+        self.located(aid)
+    }
+
+    #[inline(never)]
+    fn located(&mut self, mut aid: Aged<Measurement>) -> Option<Aged<Measurement>> {
+        let sigmas_m = self.usable(&aid.value);
+        let Measurement::Gnss { position_m, .. } = &mut aid.value else { return Some(aid) };
+        if self.origin_m.is_none() {
+            let [here_m, velocity_m_s] = self.told;
+            let there_m = here_m - velocity_m_s * (aid.age_us as f32 * 1e-6);
+            self.origin_m = sigmas_m.map(|_| *position_m - there_m);
+        }
+        let origin_m = self.origin_m.as_mut()?;
+        *position_m -= *origin_m;
+        if let (Some(sigmas_m), Some(stands_m)) = (sigmas_m, self.stands_m) {
+            // A wild one moves it no more than others.
+            let by_m = (*position_m - stands_m).zip_map(&sigmas_m, |by_m, sigma_m| max(-sigma_m, min(by_m, sigma_m)));
+            self.fixes = (self.fixes + 1.0).min(FIXES);
+            *origin_m += by_m / self.fixes;
+            *position_m = stands_m;
         }
         Some(aid)
     }
 
-    /// Returns the local frame's origin, if this is a usable fix.
-    #[inline(never)]
-    fn origin(&self, aid: &Aged<Measurement>) -> Option<Vector3<f32>> {
-        let Measurement::Gnss { position_m, horizontal_sigma_m, vertical_sigma_m, .. } = aid.value else { return None };
+    /// Returns the standard deviations of a usable fix \[m\].
+    fn usable(&self, fix: &Measurement) -> Option<Vector3<f32>> {
+        let Measurement::Gnss { horizontal_sigma_m, vertical_sigma_m, .. } = *fix else { return None };
         let sigma_max_m = self.estimator.settings().position_sigma_max_m;
         let is_good = horizontal_sigma_m <= sigma_max_m && vertical_sigma_m <= sigma_max_m;
-        let [here_m, velocity_m_s] = self.told;
-        let there_m = here_m - velocity_m_s * (aid.age_us as f32 * 1e-6);
-        (self.memory.runs() && is_good && aid.value.is_plausible()).then(|| position_m - there_m)
+        let sigmas_m = Vector3::new(horizontal_sigma_m, horizontal_sigma_m, vertical_sigma_m);
+        (self.memory.runs() && is_good && fix.is_plausible()).then_some(sigmas_m)
     }
 }
 

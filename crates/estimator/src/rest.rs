@@ -1,0 +1,105 @@
+//! Rest: whether the vehicle stands still, by its inertial sensor.
+//!
+//! Rates and specific force are compared with their means since the vehicle came to rest, in blocks of half a second.
+//! The integral of the difference, which is what has turned and moved the vehicle meanwhile, must stay small, as must
+//! its square and each sample. A vehicle that hovers in calm air, or is driven straight on, looks the same: whether rest
+//! counts, [`Memory::stands`](crate::memory::Memory::stands) decides.
+
+use crate::measurement::ImuSample;
+use crate::settings::Settings;
+use afbc_control::math::{abs_max, max};
+use nalgebra::Vector3;
+
+/// Length of a block \[s\].
+const BLOCK_S: f32 = 0.5;
+/// Number of blocks from which on a vehicle is at rest; the mean of the first one is what the next is compared with.
+const ENOUGH: u8 = 2;
+/// Number of blocks whose mean is remembered: bias and temperature change.
+const REMEMBERED: u8 = 8;
+/// Largest deviation of a sample, and of the mean over a block, in shares of the standard deviation allowed at rest:
+/// those of the alignment.
+const FAR: f32 = 6.0;
+const SLOW: f32 = 0.25;
+
+/// One of the two sensors.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Watch {
+    /// Mean since the vehicle came to rest; before, the first sample.
+    usual: Vector3<f32>,
+    /// Integrals of the deviation and of its square over the block so far.
+    moved: Vector3<f32>,
+    squares: Vector3<f32>,
+}
+
+impl Watch {
+    /// Begins with this mean.
+    fn new(usual: Vector3<f32>) -> Self {
+        Watch { usual, ..Watch::default() }
+    }
+
+    /// Takes a sample; true if a vehicle at rest, whose standard deviation is `limit` at most, does not show this.
+    #[inline]
+    fn advance(&mut self, value: &Vector3<f32>, dt_s: f32, limit: f32, compares: bool) -> bool {
+        let deviation = value - self.usual;
+        self.moved += deviation * dt_s;
+        self.squares += deviation.component_mul(&deviation) * dt_s;
+        let differs = abs_max(&self.moved) > SLOW * limit * BLOCK_S || abs_max(&self.squares) > limit * limit * BLOCK_S;
+        abs_max(&deviation) > FAR * limit || compares && differs
+    }
+
+    /// Ends a block of `time_s`, the mean of which counts as `share` of all; true if it spreads by more than `limit`.
+    fn end(&mut self, time_s: f32, limit: f32, share: f32) -> bool {
+        let mean = self.moved * (1.0 / time_s);
+        let variance = self.squares * (1.0 / time_s) - mean.component_mul(&mean);
+        *self = Watch::new(self.usual + mean * share);
+        max(max(variance.x, variance.y), variance.z) > limit * limit
+    }
+}
+
+/// What has been seen since the vehicle came to rest.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Rest {
+    rates: Watch,
+    force: Watch,
+    /// Length of the block so far \[s\].
+    time_s: f32,
+    /// Number of blocks at rest, as far as it matters.
+    blocks: u8,
+    /// True if it has been at rest since the alignment.
+    pub(crate) unmoved: bool,
+}
+
+impl Rest {
+    /// Goes on after an alignment at rest, with the means of rates and specific force there.
+    pub(crate) fn aligned(rates: Vector3<f32>, force: Vector3<f32>) -> Self {
+        let (rates, force) = (Watch::new(rates), Watch::new(force));
+        Rest { rates, force, time_s: 0.0, blocks: ENOUGH, unmoved: true }
+    }
+
+    /// True if the vehicle has been at rest for long enough.
+    pub(crate) fn is_still(&self) -> bool {
+        self.blocks >= ENOUGH
+    }
+
+    /// Takes a sample, `dt_s` after the last one.
+    #[inline]
+    pub(crate) fn advance(&mut self, sample: &ImuSample, dt_s: f32, settings: &Settings) {
+        let ImuSample { rates_rad_s, specific_force_m_s2, .. } = sample;
+        let (rate, force) = (settings.still_rate_rad_s, settings.still_accel_m_s2);
+        let compares = self.blocks > 0;
+        self.time_s += dt_s;
+        let turns = self.rates.advance(rates_rad_s, dt_s, rate, compares);
+        let mut moves = self.force.advance(specific_force_m_s2, dt_s, force, compares) || turns;
+        if self.time_s >= BLOCK_S && !moves {
+            let share = 1.0 / (f32::from(self.blocks) + 1.0);
+            let spreads = self.rates.end(self.time_s, rate, share);
+            moves = self.force.end(self.time_s, force, share) || spreads;
+            self.blocks = REMEMBERED.min(self.blocks + 1);
+            self.time_s = 0.0;
+        }
+        if moves {
+            let (rates, force) = (Watch::new(*rates_rad_s), Watch::new(*specific_force_m_s2));
+            *self = Rest { rates, force, time_s: 0.0, blocks: 0, unmoved: false };
+        }
+    }
+}
