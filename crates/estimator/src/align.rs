@@ -7,6 +7,9 @@ use afbc_control::math::{abs_max, sqrt, tilt_cosine};
 use core::fmt;
 use nalgebra::{Quaternion, Vector3};
 
+/// Variance of a heading from which on it counts as not told \[rad2\].
+pub(crate) const VAGUE: f32 = 0.25;
+
 /// Why the estimator has not started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Unready {
@@ -182,7 +185,8 @@ impl Align {
             (-settings.declination_rad - atan2(field.y, field.x), variance / (count * horizontal), true)
         });
         let pose = self.pose.map(|(attitude, sigma)| (twist(&attitude, &level), sigma * sigma, false));
-        let turn = pose.or(told).or(by_field).filter(|(turn, variance, _)| turn.is_finite() && *variance < 0.25);
+        let by_field = by_field.filter(|_| settings.mag_slow_rad * settings.mag_slow_rad < VAGUE);
+        let turn = pose.or(told).or(by_field).filter(|(turn, variance, _)| turn.is_finite() && *variance < VAGUE);
         let about_z = crate::rotation::about_z(turn.map_or(0.0, |(turn, ..)| turn));
         let field = field.map(|field| matrix(&about_z) * field);
         let dip = field.filter(|_| turn.is_some_and(|(_, _, by_field)| by_field)).map_or((0.0, 0.0), |field| {

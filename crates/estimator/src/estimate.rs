@@ -68,7 +68,8 @@ pub struct Dropped {
     pub overtaken: u32,
     /// Pushed out of the full queue.
     pub crowded: u32,
-    /// A magnetic field of another strength or inclination than at the start.
+    /// A magnetic field of another strength or inclination than at the start, or any where the vehicle's own may be as
+    /// large as the earth's.
     pub disturbed: u32,
     /// The pose of a tracker, or the field of a magnetometer, that has repeated it for too long.
     pub frozen: u32,

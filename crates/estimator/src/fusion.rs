@@ -5,6 +5,7 @@
 //! up to the normalised innovation squared of the whole fix.
 
 use crate::aid::{Aid, passes};
+use crate::align::VAGUE;
 use crate::errors::{Coordinate, Errors, Slows};
 use crate::estimator::Estimator;
 use crate::horizon::{Expected, Horizon, Target};
@@ -101,6 +102,11 @@ impl Estimator {
         match (&measurement.value, &mut parts) {
             (Measurement::Gnss { .. }, [Some(part), _]) => {
                 self.divide(memory, part, at_us.saturating_sub(fix_us.unwrap_or(0)));
+            }
+            // A field of which the vehicle's own may be as large as the earth's tells no heading.
+            (Measurement::MagneticField { .. }, _) if self.magnetic_variance >= VAGUE => {
+                count(&mut memory.dropped.disturbed);
+                return false;
             }
             (Measurement::MagneticField { field, .. }, _)
                 if memory.repeated_field.lasts_us(field, &[0.0; 4], at_us) > self.frozen_us =>

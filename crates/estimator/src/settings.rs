@@ -48,9 +48,10 @@ parameters! {
         pub gnss_slow_s: f32 = 120.0,
         /// Heading error by what iron, magnets and currents of the vehicle add to the field, standard deviation along
         /// each of body x and y. It stays, and is not averaged; the standard deviation that a magnetometer tells is
-        /// its noise alone.
+        /// its noise alone. The default is for any that was calibrated once: 0.04 gauss, of 0.2 gauss. From
+        /// 0.5 rad on it tells no heading.
         #[parameter(MAG_SLOW, "rad", 0.0..=1.0)]
-        pub mag_slow_rad: f32 = 0.05,
+        pub mag_slow_rad: f32 = 0.2,
         /// Time of identical poses or positions after which a tracker counts as frozen, and is not believed; 0 for
         /// never.
         #[parameter(FROZEN, "s", 0.0..=10.0)]

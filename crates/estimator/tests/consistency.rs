@@ -4,7 +4,7 @@
 mod common;
 
 use afbc_estimator::{Aid, Settings};
-use common::{Flight, ICM, MOCAP, OUTDOOR, Sensors, eight, fly, settings};
+use common::{Flight, ICM, MOCAP, OUTDOOR, Path, Sensors, eight, fly, rest, settings};
 
 const RUNS: usize = 100;
 /// What the outdoor sensors tell.
@@ -121,4 +121,36 @@ fn outdoor_with_iron() {
     let sensors = Sensors { iron: Some(0.03), ..OUTDOOR };
     let settings = Settings { mag_slow_rad: 0.03, ..settings(&ICM) };
     check::<16>("outdoor with iron", 2000, sensors, settings, &OUTDOOR_AIDS);
+}
+
+/// A compass that was calibrated once, somewhere else: nobody knows its hard iron, 0.04 gauss of 0.2 gauss along each
+/// axis. By default the heading is as uncertain as that makes it, at rest, where nothing else tells it, and in flight.
+#[test]
+fn a_heading_by_a_compass_is_as_good_as_compasses_are() {
+    let sensors = Sensors { iron: Some(0.2), ..OUTDOOR };
+    for (name, path, flights, time_ms, from_ms) in
+        [("at rest", rest as Path, 150, 5000, 1500), ("in flight", eight as Path, 60, 20_000, 1500)]
+    {
+        let truth = fly(path, time_ms as f64 * 1e-3);
+        let (mut beyond, mut all, mut squares) = (0, 0, 0.0);
+        for seed in 0..flights {
+            let mut flight = Flight::with(&truth, ICM, sensors, 7000 + seed, Settings::DEFAULT);
+            for ms in 0..time_ms {
+                let estimate = flight.step();
+                if ms >= from_ms && ms % 100 == 0 {
+                    let sigmas = flight.errors(&estimate)[2] / f64::from(estimate.sigmas.attitude_rad.z);
+                    beyond += u32::from(sigmas.abs() > 3.0);
+                    all += 1;
+                    squares += sigmas * sigmas;
+                    assert!(estimate.validity.heading, "{name}, seed {seed}, {ms} ms");
+                }
+            }
+        }
+        let mean = squares / f64::from(all);
+        println!("{name}: {beyond} of {all} beyond three sigma, mean square {mean:.2}");
+        assert!(100 * beyond <= all, "{name}: {beyond} of {all}");
+        // Nor is it a bound that is never reached: the mean square of as many flights, four sigma.
+        let half = 4.0 * (2.0 / flights as f64).sqrt();
+        assert!((mean - 1.0).abs() < half, "{name}: {mean}");
+    }
 }

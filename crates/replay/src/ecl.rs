@@ -3,7 +3,7 @@
 use crate::aids::{self, Fix};
 use crate::order::rising;
 use crate::recording::{LoggedState, Recording, Sensor, Source, flip, flip_rotation};
-use crate::{declination, states};
+use crate::{earth, states};
 use afbc_estimator::{ImuSample, Origin};
 use std::collections::HashMap;
 use std::ffi::OsString;
@@ -75,7 +75,8 @@ pub(crate) fn read(bytes: &[u8], path: &Path) -> Result<Recording, String> {
         recording.origin = Origin::new(latitude, longitude, altitude);
     }
     if let Some(Fix { place: [latitude, longitude, altitude], .. }) = written {
-        recording.declination_rad = declination::at(latitude, longitude, altitude, None).unwrap_or_default();
+        let field = earth::at(latitude, longitude, altitude, None);
+        recording.declination_rad = field.map_or(0.0, |field| field.declination_rad);
     }
     let gnss = recording.origin.map_or(Vec::new(), |origin| aids::gnss(&fixes, &origin, GNSS_DELAY_US));
     let first_of = |values: &[f64]| values.first().copied().unwrap_or(f64::NAN);

@@ -7,7 +7,8 @@
 
 mod aids;
 mod compare;
-mod declination;
+mod compass;
+mod earth;
 mod ecl;
 mod order;
 mod recording;

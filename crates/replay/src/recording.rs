@@ -98,12 +98,17 @@ pub struct Recording {
     pub resets: Vec<LoggedReset>,
     /// From when on the log says that the vehicle is on the ground, or not \[us\].
     pub landed: Vec<(u64, bool)>,
+    /// From when on the log says that the motors are off, or not \[us\].
+    pub disarmed: Vec<(u64, bool)>,
     /// Origin of all positions, if there is one.
     pub origin: Option<Origin>,
     /// Whether the log's own positions are from there, or from an origin that it does not tell.
     pub knows_origin: bool,
     /// Direction of magnetic north, positive to the east \[rad\].
     pub declination_rad: f32,
+    /// What the vehicle's own field makes of the heading, where it is told: standard deviation along each of body x and
+    /// y \[rad\].
+    pub mag_slow_rad: Option<f32>,
     /// Where everything comes from.
     pub sources: Vec<Source>,
     /// What else is to be told, a sentence each.

@@ -85,11 +85,11 @@ pub struct Replayed {
 /// # Errors
 /// A setting out of range.
 pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOfRange> {
-    // White noise is all that EKF2 knows of a receiver and a magnetometer.
+    // White noise is all that EKF2 knows of a receiver.
     let settings = Settings {
         declination_rad: recording.declination_rad,
         gnss_noise_m: Settings::GNSS_NOISE.range.max as f32,
-        mag_slow_rad: 0.0,
+        mag_slow_rad: recording.mag_slow_rad.unwrap_or(Settings::DEFAULT.mag_slow_rad),
         ..Settings::DEFAULT
     };
     let first_us = recording.imu.first().map_or(0, |sample| sample.at_us);
@@ -161,6 +161,12 @@ fn moved(rows: &mut [Row], from_s: f64) -> Option<Vector3<f32>> {
     Some(by)
 }
 
+/// Returns what was told last.
+fn last(told: &[(u64, bool)], now_us: u64) -> Option<bool> {
+    let until = told.partition_point(|(at_us, _)| *at_us <= now_us);
+    told.get(until.checked_sub(1)?).map(|(_, is)| *is)
+}
+
 /// The estimator in the middle of a recording.
 struct Run<'a> {
     estimator: Estimator,
@@ -178,6 +184,9 @@ impl Run<'_> {
             self.memory.offer(&aiding.measurement);
             self.arrived += 1;
         }
+        if let Some(stands) = self.stands(now_us) {
+            self.memory.set_on_ground(stands);
+        }
         let began = self.memory.runs();
         let estimate = self.estimator.step(&mut self.memory, now_us, sample);
         if let Some(why) = estimate.unready {
@@ -187,6 +196,13 @@ impl Run<'_> {
             self.start = Start::AtRest(self.time_s(now_us));
         }
         estimate
+    }
+
+    /// Whether the log says that the vehicle is on the ground or else, where it says nothing of that, disarmed.
+    fn stands(&self, now_us: u64) -> Option<bool> {
+        let Recording { landed, disarmed, .. } = self.recording;
+        let told = if landed.is_empty() { disarmed } else { landed };
+        last(told, now_us)
     }
 
     fn time_s(&self, now_us: u64) -> f64 {
@@ -207,8 +223,7 @@ impl Run<'_> {
         let until = states.partition_point(|state| state.at_us <= now_us);
         let lately = || states.iter().take(until).rev().take_while(fresh);
         let velocity = lately().find_map(|state| state.velocity_m_s);
-        let landed = self.recording.landed.iter().rfind(|(at_us, _)| *at_us <= now_us).map(|(_, landed)| *landed);
-        let flies = match landed {
+        let flies = match last(&self.recording.landed, now_us) {
             Some(landed) => !landed,
             None => velocity.is_some_and(|velocity| velocity.norm() > FLIES_M_S),
         };

@@ -1,20 +1,24 @@
 //! Recorded flights against PX4's EKF2 over them. Skipped where the data are absent.
-#![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs, reason = "tests")]
 
-use afbc_replay::{Start, fly, read};
+use afbc_replay::{Recording, Start, fly, read};
 use std::path::Path;
+
+/// Reads a log of the shared data; none, and a line, where it is absent.
+fn shared(name: &str) -> Option<Recording> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(name);
+    if !path.exists() {
+        println!("skipped: no {}", path.display());
+        return None;
+    }
+    Some(read(&path).unwrap())
+}
 
 /// The bounds that the documentation states.
 #[test]
 fn agrees_with_ekf2_on_recorded_flights() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     for (name, compared) in [("ecl_iris_gps.csv", 200), ("px4_sitl_hover.ulg", 150)] {
-        let path = folder.join(name);
-        if !path.exists() {
-            println!("skipped: no {}", path.display());
-            continue;
-        }
-        let recording = read(&path).unwrap();
+        let Some(recording) = shared(name) else { continue };
         let replayed = fly(&recording, Some(10.0)).unwrap();
         let f = &replayed.figures;
         let [attitude, velocity, position] = [f.attitude, f.velocity, f.position].map(|figure| {
@@ -29,5 +33,53 @@ fn agrees_with_ekf2_on_recorded_flights() {
         let aids = &replayed.aids;
         assert_eq!(aids.gnss_position.rejected + aids.height.rejected + aids.heading.rejected, 0);
         assert_eq!(recording.missing().count(), 0);
+    }
+}
+
+/// The vehicle stands for nine seconds, and has no fix at first: the estimate stays where it is.
+#[test]
+fn rest_before_the_first_fix_is_rest() {
+    for name in ["px4_sitl_hover.ulg", "ecl_iris_gps.csv"] {
+        let Some(mut recording) = shared(name) else { continue };
+        // Where nobody tells that it stands, too; and where no fix ever comes.
+        for (told, fixes) in [(true, true), (false, true), (true, false)] {
+            if !told {
+                recording.landed.clear();
+                recording.disarmed.clear();
+            }
+            if !fixes {
+                recording.aiding.clear();
+            }
+            let replayed = fly(&recording, Some(10.0)).unwrap();
+            let Start::AtRest(began_s) = replayed.start else { panic!("{:?}", replayed.start) };
+            let mut first = None;
+            for row in replayed.rows.iter().filter(|row| row.time_s < 8.5) {
+                let Some(ours) = row.ours.filter(|_| row.time_s > began_s + 0.5) else { continue };
+                let state = &ours.state;
+                let (place, attitude) = *first.get_or_insert((state.position_m, state.attitude_rad));
+                let speed = state.velocity_m_s.norm();
+                let tilt = (state.attitude_rad - attitude).xy().norm().to_degrees();
+                assert!(speed < 0.05 && tilt < 0.3, "{name}, {} s: {speed} m/s, {tilt} degrees", row.time_s);
+                let away = (state.position_m - place).norm();
+                assert!(fixes || away < 0.1, "{name}, {} s: {away} m", row.time_s);
+                assert!(ours.at_rest && ours.validity.velocity, "{name}, {} s", row.time_s);
+            }
+            assert!(first.is_some());
+        }
+    }
+}
+
+/// A magnetometer in a field that is not the earth's, which lies level instead of dipping by 74 degrees: its heading
+/// counts as unknown. That of the log's own estimate turns by 12 degrees meanwhile, though the vehicle stands.
+#[test]
+fn a_field_that_is_not_the_earths_tells_no_heading() {
+    let Some(recording) = shared("sample_log_small.ulg") else { return };
+    let replayed = fly(&recording, None).unwrap();
+    let told = recording.notes.iter().any(|note| note.contains("magnetometer") && note.contains("calibrate"));
+    assert!(told, "{:?}", recording.notes);
+    for row in &replayed.rows {
+        let Some((ours, turn)) = row.ours.zip(row.turn_rad()) else { continue };
+        let sigma = f64::from(ours.sigmas.attitude_rad.z);
+        assert!(!ours.validity.heading && turn.z.abs() < 3.0 * sigma, "{} s: {} of {sigma} rad", row.time_s, turn.z);
     }
 }

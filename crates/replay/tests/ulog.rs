@@ -232,3 +232,29 @@ fn no_file_panics() {
     }
     assert!(read_ones > 100, "{read_ones}");
 }
+
+/// Iron that nobody knows of turns the heading: the less the field is the earth's, the less the heading counts, and it is
+/// as wrong as is said. A field that is quite another tells none.
+#[test]
+fn a_heading_is_as_good_as_the_field() {
+    let (mut inside, mut all) = (0, 0);
+    for (index, gauss) in [0.0, 0.01, 0.03, 0.05, 0.05, 0.08, 0.1, 0.1, 0.6, 0.6].into_iter().enumerate() {
+        // Directions all around, some of them steep.
+        let angle = 2.4 * index as f64;
+        let stray = [angle.cos(), angle.sin(), 0.8 - 0.3 * (index % 6) as f64].map(|part| part * gauss);
+        let kind = Kind { stray, ..Kind::default() };
+        let (recording, replayed) = replay(&format!("stray-{index}.ulg"), &log(&kind));
+        let strange = recording.notes.iter().any(|note| note.contains("magnetometer") && note.contains("calibrate"));
+        let valid = replayed.figures.heading.valid_ratio().unwrap();
+        assert!(if gauss > 0.5 { strange } else { !strange || gauss > 0.04 }, "{stray:?}: {:?}", recording.notes);
+        assert!(gauss > 0.04 || valid > 0.95, "{stray:?}: heading valid {valid}");
+        for (ours, turn) in replayed.rows.iter().filter_map(|row| row.ours.zip(row.turn_rad())) {
+            let sigma = f64::from(ours.sigmas.attitude_rad.z);
+            inside += usize::from(turn.z.abs() < 3.0 * sigma);
+            all += 1;
+            // Until the vehicle flies, which tells a heading too.
+            assert!(gauss < 0.5 || ours.at_us > 53_000_000 || !ours.validity.heading, "{stray:?}: {sigma} rad");
+        }
+    }
+    assert!(100 * inside >= 99 * all, "{inside} of {all}");
+}

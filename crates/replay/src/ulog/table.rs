@@ -94,7 +94,9 @@ pub(super) const VEHICLE_LOCAL_POSITION: Topic = (
 );
 pub(super) const VEHICLE_LAND_DETECTED: Topic = ("vehicle_land_detected", &["timestamp", "landed"]);
 
-const TOPICS: [Topic; 10] = [
+pub(super) const ACTUATOR_ARMED: Topic = ("actuator_armed", &["timestamp", "armed"]);
+
+const TOPICS: [Topic; 11] = [
     SENSOR_COMBINED,
     VEHICLE_GPS_POSITION,
     SENSOR_GPS,
@@ -105,6 +107,7 @@ const TOPICS: [Topic; 10] = [
     VEHICLE_ATTITUDE,
     VEHICLE_LOCAL_POSITION,
     VEHICLE_LAND_DETECTED,
+    ACTUATOR_ARMED,
 ];
 
 /// A message: its fields in the order of its [`Topic`]; not a number where its layout lacks one.

@@ -1,13 +1,14 @@
 //! What PX4's topics mean, in their old and new layouts.
 
 use super::table::{
-    Row, SENSOR_BARO, SENSOR_COMBINED, SENSOR_GPS, SENSOR_MAG, Tables, Topic, VEHICLE_AIR_DATA, VEHICLE_ATTITUDE,
-    VEHICLE_GPS_POSITION, VEHICLE_LAND_DETECTED, VEHICLE_LOCAL_POSITION, VEHICLE_MAGNETOMETER,
+    ACTUATOR_ARMED, Row, SENSOR_BARO, SENSOR_COMBINED, SENSOR_GPS, SENSOR_MAG, Tables, Topic, VEHICLE_AIR_DATA,
+    VEHICLE_ATTITUDE, VEHICLE_GPS_POSITION, VEHICLE_LAND_DETECTED, VEHICLE_LOCAL_POSITION, VEHICLE_MAGNETOMETER,
 };
 use crate::aids::{self, Fix};
+use crate::earth::Field;
 use crate::order::rising;
 use crate::recording::{Aiding, LoggedReset, LoggedState, Recording, Sensor, Source, flip, flip_rotation};
-use crate::{declination, states};
+use crate::{compass, earth, states};
 use afbc_estimator::{ImuSample, Origin};
 
 /// Delay of a receiver if the log does not say \[ms\]: PX4's default.
@@ -41,16 +42,22 @@ pub(super) fn recording(tables: &Tables) -> Result<Recording, String> {
     recording.sources.push(magnetometer(tables, &mut aiding, delay_us("EKF2_MAG_DELAY", 0.0)));
     aiding.sort_by_key(|aiding| aiding.arrived_us);
     recording.aiding = aiding;
-    recording.declination_rad = declination(tables, first.as_ref(), fixes.utc_us, &mut recording.notes);
+    let earth = first.and_then(|fix| earth::at(fix.place[0], fix.place[1], fix.place[2], fixes.utc_us));
+    recording.declination_rad = declination(tables, earth.as_ref(), &mut recording.notes);
 
     let (attitudes, source) = attitudes(tables);
     recording.sources.push(source);
     let (motions, source) = motions(tables, recording.origin.as_ref());
     recording.sources.push(source);
     recording.states = states::merged(attitudes, motions);
+    compass::doubt(&mut recording, earth.as_ref());
     recording.resets = resets(tables);
-    let landed = |row: &Row| (row.timestamp_us(), row.get("landed") > 0.0);
-    recording.landed = rising(tables.first(VEHICLE_LAND_DETECTED).iter().map(landed).collect(), |(at, _)| *at).0;
+    let told = |topic: Topic, of: &dyn Fn(&Row) -> bool| {
+        let told = tables.first(topic).iter().map(|row| (row.timestamp_us(), of(row))).collect();
+        rising(told, |(at_us, _)| *at_us).0
+    };
+    recording.landed = told(VEHICLE_LAND_DETECTED, &|row| row.get("landed") > 0.0);
+    recording.disarmed = told(ACTUATOR_ARMED, &|row| row.get("armed") == 0.0);
     Ok(recording)
 }
 
@@ -241,9 +248,9 @@ fn height_of(pressure_pa: f64) -> f64 {
 }
 
 /// Returns the declination at the first fix; without one, that which the vehicle has stored.
-fn declination(tables: &Tables, first: Option<&Fix>, utc_us: Option<f64>, notes: &mut Vec<String>) -> f32 {
+fn declination(tables: &Tables, earth: Option<&Field>, notes: &mut Vec<String>) -> f32 {
     let stored = tables.parameter("EKF2_MAG_DECL").map(|degrees| degrees.to_radians() as f32);
-    let modelled = first.and_then(|fix| declination::at(fix.place[0], fix.place[1], fix.place[2], utc_us));
+    let modelled = earth.map(|field| field.declination_rad);
     modelled.or(stored.filter(|angle| angle.abs() <= core::f32::consts::PI)).unwrap_or_else(|| {
         notes.push("Nobody tells the declination: the heading is magnetic.".into());
         0.0

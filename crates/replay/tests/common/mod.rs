@@ -30,6 +30,8 @@ pub(crate) struct Kind {
     pub(crate) reset_s: f64,
     /// What EKF2 has learned of the magnetometer's y axis \[gauss\].
     pub(crate) iron: f64,
+    /// What nobody knows of the magnetometer, in its axes \[gauss\].
+    pub(crate) stray: [f64; 3],
     /// Another receiver, first in the log, without a fix.
     pub(crate) receivers: u8,
 }
@@ -45,6 +47,7 @@ impl Default for Kind {
             gap_s: (0.0, 0.0),
             reset_s: f64::INFINITY,
             iron: 0.0,
+            stray: [0.0; 3],
             receivers: 1,
         }
     }
@@ -220,7 +223,8 @@ pub(crate) fn log(kind: &Kind) -> Vec<u8> {
         let exact = truth(time_s);
         let (s, c) = DECLINATION_RAD.sin_cos();
         let [bx, by, bz] = body(exact.yaw.0, [0.21 * c, 0.21 * s, 0.43]);
-        let field = [shaken(bx, 1e-3), shaken(by + kind.iron, 1e-3), shaken(bz, 1e-3)];
+        let [sx, sy, sz] = kind.stray;
+        let field = [shaken(bx + sx, 1e-3), shaken(by + kind.iron + sy, 1e-3), shaken(bz + sz, 1e-3)];
         let height = shaken(HOME[2] + 3.0 - exact.position[2], 0.2);
         if !(kind.gap_s.0..kind.gap_s.1).contains(&log_s) {
             let mut values: Vec<Value> = gyro.into();
