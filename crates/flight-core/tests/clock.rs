@@ -2,7 +2,7 @@
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc::{Adaptive, Controller, Profile};
-use afbc_flight_core::clock::SILENCE_US;
+use afbc_flight_core::clock::{BACK_SPREAD_US, BACK_US, NEW_COUNT, SILENCE_US};
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, SILENT_US, Sighting};
 use afbc_flight_core::{
@@ -321,6 +321,115 @@ fn after_a_long_silence_a_clock_is_new() {
     assert_eq!(clock.stamp(5, 1_000 + SILENCE_US, true), None, "might be an old one");
     assert_eq!(clock.stamp(6, 1_001 + SILENCE_US, true), Some(1_001 + SILENCE_US));
     assert_eq!(clock.stamp(7, 1_002 + SILENCE_US, true), Some(1_002 + SILENCE_US));
+}
+
+/// A clock that has been heard for long, of which each message takes a millisecond; returns it with its next stamp.
+fn steady() -> (SourceClock, u64) {
+    let mut clock = SourceClock::default();
+    for us in (0..1_000_000).step_by(10_000) {
+        assert_eq!(clock.stamp(us, us, true), Some(us));
+    }
+    (clock, 1_000_000)
+}
+
+/// Five in a row are a step ahead, in the order of their stamps; a stamp that goes back among them makes the counting
+/// begin anew. Then the slowest of them counts, so that none of them has been late, and the next step takes five again.
+#[test]
+fn a_step_ahead_takes_five_stamps_in_a_row() {
+    let ahead = |offs_us: &[u64]| {
+        let (mut clock, now_us) = steady();
+        for (index, off_us) in offs_us.iter().enumerate() {
+            let arrived_us = now_us + index as u64 * 10_000;
+            assert_eq!(clock.stamp(HOUR_US + off_us, arrived_us, true), Some(arrived_us), "taken as sent on arrival");
+        }
+        // Stamps of the old clock are out of order once it has been stepped.
+        let next_us = now_us + offs_us.len() as u64 * 10_000;
+        let mut old = clock;
+        let stepped = old.stamp(next_us, next_us, true).is_none();
+        (clock, next_us, stepped)
+    };
+    assert!(!ahead(&[0, 10_000, 20_000, 30_000]).2);
+    assert!(ahead(&[0, 10_000, 20_000, 30_000, 40_000]).2);
+    assert!(!ahead(&[0, 30_000, 20_000, 40_000, 50_000]).2, "back in between");
+    assert!(ahead(&[0, 30_000, 20_000, 40_000, 50_000, 60_000, 70_000]).2);
+    assert!(ahead(&[0, 0, 0, 0, 0]).2, "the same again is not back");
+
+    // The third was 8 ms slower: so may the next one be, to the same effect.
+    let (mut clock, next_us, stepped) = ahead(&[0, 10_000, 12_000, 30_000, 40_000]);
+    assert!(stepped);
+    let said = clock.stamp(HOUR_US + 50_000 - 8_000, next_us, true);
+    assert_eq!(said, Some(next_us), "as slow as the slowest");
+    // Nor are two of the next ones enough for another step, since the sender is not new.
+    for index in 1..=2 {
+        assert!(clock.stamp(3 * HOUR_US, next_us + index * 10_000, true).is_some());
+    }
+    let later_us = next_us + 30_000;
+    assert!(clock.stamp(HOUR_US + 80_000 - 8_000, later_us, true).is_some(), "not stepped");
+}
+
+/// Among the first ten messages of a sender two are enough, and from the eleventh on they are not.
+#[test]
+fn a_new_sender_steps_ahead_with_two() {
+    for heard in 1..=14_u64 {
+        let mut clock = SourceClock::default();
+        for index in 0..heard {
+            assert!(clock.stamp(index * 10_000, index * 10_000, true).is_some());
+        }
+        let now_us = heard * 10_000;
+        for index in 0..2 {
+            assert!(clock.stamp(HOUR_US + index * 10_000, now_us + index * 10_000, true).is_some());
+        }
+        let stepped = clock.stamp(now_us + 20_000, now_us + 20_000, true).is_none();
+        assert_eq!(stepped, heard < u64::from(NEW_COUNT), "after {heard}");
+    }
+}
+
+/// Three stamps back that increase and fit each other, over 15 ms, are a step; others are out of order.
+#[test]
+fn a_step_back_takes_three_that_increase() {
+    let back = |messages: &[(u64, u64)]| {
+        let (mut clock, now_us) = steady();
+        messages.iter().any(|(sent_us, after_us)| clock.stamp(500_000 + sent_us, now_us + after_us, true).is_some())
+    };
+    assert!(back(&[(0, 0), (8_000, 8_000), (BACK_US, BACK_US)]));
+    assert!(!back(&[(0, 0), (8_000, 8_000), (BACK_US - 1, BACK_US - 1)]), "too short");
+    assert!(!back(&[(0, 0), (BACK_US, BACK_US)]), "two");
+    assert!(!back(&[(0, 0), (16_000, 16_000), (15_500, 18_000)]), "back among them");
+    assert!(!back(&[(0, 0), (8_000, 8_000), (8_000, 16_000)]), "the same again");
+    // Offsets within 3 ms of the first one's.
+    assert!(back(&[(0, 0), (8_000, 8_000), (16_000, 16_000 + BACK_SPREAD_US)]));
+    assert!(!back(&[(0, 0), (8_000, 8_000), (16_000, 16_001 + BACK_SPREAD_US)]));
+    assert!(back(&[(0, 0), (8_000, 8_000), (16_000 + BACK_SPREAD_US, 16_000)]));
+    assert!(!back(&[(0, 0), (8_000, 8_000), (16_001 + BACK_SPREAD_US, 16_000)]));
+}
+
+/// The clocks of four senders are tracked; a fifth one replaces the one that has been silent longest.
+#[test]
+fn the_sender_that_is_silent_longest_is_forgotten() {
+    for silent in 1..=4_u16 {
+        let mut tracker = Tracker::default();
+        let says = |tracker: &mut Tracker, sender: u16, sent_us: u64, arrived_us: u64| {
+            // Whether it is late is told by the count, since another one is in use.
+            let late = tracker.refused().late;
+            let _ = tracker.stamp(sender, sent_us, arrived_us, hovering(sent_us));
+            tracker.refused().late > late
+        };
+        let order = [1, 2, 3, 4].into_iter().cycle().skip(silent.into()).take(4);
+        for (index, sender) in [1_u16, 2, 3, 4].into_iter().enumerate() {
+            says(&mut tracker, sender, index as u64 * 1_000, index as u64 * 1_000);
+        }
+        // Heard once more, the first of them last.
+        for (index, sender) in order.enumerate() {
+            let now_us = 20_000 + index as u64 * 1_000;
+            says(&mut tracker, if sender == silent { 1 + silent % 4 } else { sender }, now_us, now_us);
+        }
+        says(&mut tracker, 5, 30_000, 30_000);
+        for sender in 1..=5 {
+            // Sent 30 ms ago: late of a sender whose clock is known.
+            let late = says(&mut tracker.clone(), sender, 40_000, 70_000);
+            assert_eq!(late, sender != silent, "sender {sender}, silent {silent}");
+        }
+    }
 }
 
 proptest! {

@@ -1,7 +1,7 @@
 //! Order of requests, rejection of implausible values, and ages.
 
 use afbc_flight_core::inbox::REQUESTS_MAX;
-use afbc_flight_core::{Asked, Inbox, Request, Stamped};
+use afbc_flight_core::{Asked, Inbox, Refusal, Request, Stamped};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use nalgebra::Vector3;
 
@@ -90,4 +90,78 @@ fn a_stamp_from_the_future_is_infinitely_old() {
     assert_eq!(stamped.age_us(1000), 0);
     assert_eq!(stamped.age_us(4000), 3000);
     assert_eq!(stamped.age_us(999), u32::MAX);
+}
+
+/// Every value of a setpoint reaches the tick, also in place of the last one.
+#[test]
+fn a_setpoint_is_taken_whole() {
+    let vector = |first: f32| Vector3::new(first, first + 0.1, first + 0.2);
+    let value = Setpoint {
+        position_m: vector(1.0),
+        velocity_m_s: vector(2.0),
+        acceleration_m_s2: vector(3.0),
+        jerk_m_s3: vector(4.0),
+        snap_m_s4: vector(5.0),
+        yaw_rad: 0.6,
+        yaw_rate_rad_s: 0.7,
+        yaw_acceleration_rad_s2: 0.8,
+    };
+    let (mut inbox, mut taken) = (Inbox::EMPTY, Inbox::EMPTY);
+    for at_us in [7, 9] {
+        inbox.put_setpoint(Stamped { value, at_us });
+        inbox.take_into(&mut taken);
+        assert_eq!(taken.setpoint(), Some(&Stamped { value, at_us }));
+        inbox.put_setpoint(Stamped { value: Setpoint::default(), at_us: at_us + 1 });
+        inbox.take_into(&mut taken);
+        assert_eq!(taken.setpoint(), Some(&Stamped { value: Setpoint::default(), at_us: at_us + 1 }));
+    }
+}
+
+/// The vehicle's own estimate, one that does not know where it is, and the link's state: each replaces the others.
+#[test]
+fn one_state_stands_at_a_time() {
+    let at = |at_us| Stamped { value: State::default(), at_us };
+    let mut inbox = Inbox::EMPTY;
+    inbox.put_state(at(1));
+    assert!(!inbox.is_own() && inbox.missing().is_none());
+    inbox.locate(at(2));
+    assert_eq!((inbox.state(), inbox.is_own()), (Some(&at(2)), true));
+    assert!(inbox.take().is_own());
+    inbox.put_adrift(Some(at(3)), Refusal::PositionUnknown);
+    assert_eq!((inbox.state(), inbox.adrift(), inbox.missing()), (None, Some(&at(3)), Some(Refusal::PositionUnknown)));
+    let taken = inbox.take();
+    assert_eq!((taken.state(), taken.adrift(), taken.missing()), (None, Some(&at(3)), inbox.missing()));
+    inbox.locate(at(4));
+    assert_eq!((inbox.adrift(), inbox.missing()), (None, None));
+    inbox.put_state(at(5));
+    assert!(!inbox.is_own());
+    // An estimate with nothing at all leaves what the link says.
+    inbox.put_adrift(None, Refusal::AttitudeUnknown);
+    assert_eq!((inbox.state(), inbox.adrift(), inbox.missing()), (Some(&at(5)), None, Some(Refusal::AttitudeUnknown)));
+}
+
+/// News replace what they bring, and leave the rest.
+#[test]
+fn news_are_merged() {
+    let at = |at_us| Stamped { value: State::default(), at_us };
+    let mut inbox = Inbox::EMPTY;
+    inbox.put_state(at(1));
+    inbox.put_adrift(None, Refusal::HeadingUnknown);
+    inbox.put_setpoint(Stamped { value: Setpoint::default(), at_us: 1 });
+    inbox.bar(Some(Refusal::BatteryLow));
+    let before = inbox;
+    inbox.post(&Inbox::EMPTY);
+    assert_eq!(inbox, before);
+    let mut news = Inbox::EMPTY;
+    news.put_adrift(Some(at(2)), Refusal::PositionUnknown);
+    news.bar(Some(Refusal::SensorFailed));
+    inbox.post(&news);
+    assert_eq!((inbox.adrift(), inbox.missing()), (Some(&at(2)), Some(Refusal::PositionUnknown)));
+    assert_eq!((inbox.state(), inbox.barred()), (Some(&at(1)), Some(Refusal::SensorFailed)));
+    assert_eq!(inbox.take().barred(), Some(Refusal::SensorFailed));
+    inbox.bar(None);
+    assert_eq!(inbox.barred(), None);
+    inbox.put_pose(Stamped { value: Pose::default(), at_us: 3 });
+    inbox.clear_pose();
+    assert_eq!(inbox.take().pose(), None);
 }

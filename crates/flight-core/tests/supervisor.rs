@@ -211,7 +211,9 @@ fn at_rest_is_neither_moving_nor_turning() {
 fn every_refusal_has_a_number_of_its_own_and_fits_a_status_text() {
     for (index, refusal) in Refusal::ALL.into_iter().enumerate() {
         assert_eq!(refusal as usize, index + 1);
-        assert!(refusal.reason().len() <= 50);
+        let reason = refusal.reason();
+        assert!(reason.len() <= 50 && reason.contains("refused: "), "{reason}");
+        assert_eq!(Refusal::ALL.iter().filter(|other| other.reason() == reason).count(), 1, "{reason}");
     }
 }
 

@@ -1,0 +1,437 @@
+//! The detectors of tumbling, frozen trackers and landing, each by itself: their thresholds, on both sides, and their
+//! times, to the tick.
+#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
+
+use afbc_flight_core::landing::{
+    CARRIED_US, CARRY_SHARE, FROZEN_US, HOVER_US, LEFT_M, LEFT_M_S, LandDetector, SINKS_M_S, STILL_M_S, STILL_US,
+    USUAL_S,
+};
+use afbc_flight_core::tumble::{LOST_US, SPIN_RAD_S, TILT_COSINE_MIN, Tumble, UPRIGHT_US};
+use afbc_flight_core::witness::{STANDS_SHARE, TRAVEL_M, TURN_RAD, WINDOW_US, Witness};
+use afbc_types::State;
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+const GAP_US: u32 = 1000;
+
+fn along(axis: usize, size: f32) -> Vector3<f32> {
+    Vector3::from_fn(|row, _| if row == axis { size } else { 0.0 })
+}
+
+// --- Tumbling. ---
+
+fn tilted(roll: f32, pitch: f32) -> State {
+    State { attitude_rad: Vector3::new(roll, pitch, 1.0), ..State::default() }
+}
+
+/// Rolled so that the cosine of the tilt is this.
+fn cosine(cosine: f32) -> State {
+    tilted(cosine.acos(), 0.0)
+}
+
+/// Processes this state for so many ticks.
+fn last(tumble: &mut Tumble, state: &State, ticks: u32) -> bool {
+    for _ in 0..ticks {
+        tumble.advance(state, GAP_US);
+    }
+    tumble.is_lost()
+}
+
+/// Ticks until it is lost: the first one begins.
+const LOST: u32 = LOST_US / GAP_US + 2;
+
+proptest! {
+    /// Lost are exactly those that are on their side or back for a second, whatever roll and pitch make of it.
+    #[test]
+    fn the_tilt_decides(roll in -3.1..3.1f32, pitch in -3.1..3.1f32) {
+        let upright = roll.cos() * pitch.cos() - TILT_COSINE_MIN;
+        prop_assume!(upright.abs() > 1e-4);
+        let mut tumble = Tumble::default();
+        prop_assert!(!last(&mut tumble, &tilted(roll, pitch), LOST - 1));
+        prop_assert_eq!(last(&mut tumble, &tilted(roll, pitch), 1), upright < 0.0);
+    }
+
+    /// So are those that spin about body x and y together, at any attitude; the rate about z does not count.
+    #[test]
+    fn the_spin_decides(rate in 0.0..20.0f32, about in -3.1..3.1f32, z in -50.0..50.0f32, roll in -1.0..1.0f32) {
+        prop_assume!((rate - SPIN_RAD_S).abs() > 1e-3);
+        let rates_rad_s = Vector3::new(rate * about.cos(), rate * about.sin(), z);
+        let state = State { rates_rad_s, ..tilted(roll, 0.0) };
+        prop_assert_eq!(last(&mut Tumble::default(), &state, LOST), rate > SPIN_RAD_S);
+        prop_assert!(!last(&mut Tumble::default(), &state, LOST - 1));
+    }
+}
+
+#[test]
+fn it_is_recovered_once_it_has_been_upright_long_enough() {
+    for (upright, recovered) in [(UPRIGHT_US / GAP_US, false), (UPRIGHT_US / GAP_US + 1, true)] {
+        let mut tumble = Tumble::default();
+        last(&mut tumble, &cosine(0.0), 400);
+        assert!(!last(&mut tumble, &State::default(), upright), "not while it is upright");
+        // Tips over again: its second is long over, or begins anew.
+        assert_eq!(last(&mut tumble, &cosine(0.0), 1), !recovered);
+        assert_eq!(last(&mut tumble, &cosine(0.0), LOST - 2), !recovered);
+        assert!(last(&mut tumble, &cosine(0.0), 1));
+    }
+}
+
+/// A vehicle that comes up from its lowest tilt begins anew, as long as it neither spins nor has tipped over again.
+#[test]
+fn coming_up_gives_another_second() {
+    let spinning = State { rates_rad_s: Vector3::new(0.0, SPIN_RAD_S + 1.0, 0.0), ..cosine(-0.5) };
+    // The lowest cosine, that which it comes up to, and whether this counts.
+    for (lowest, state, counts) in [
+        (-1.0, cosine(-0.79), true),
+        (-1.0, cosine(-0.81), false),
+        (-0.5, cosine(-0.29), true),
+        (-0.5, cosine(-0.31), false),
+        (-1.0, spinning, false),
+    ] {
+        let mut tumble = Tumble::default();
+        // On the way down, too.
+        last(&mut tumble, &cosine(0.0), 100);
+        last(&mut tumble, &cosine(lowest), LOST - 200);
+        last(&mut tumble, &state, 99);
+        assert!(!tumble.is_lost());
+        assert_eq!(last(&mut tumble, &state, 1), !counts, "from {lowest} to {:?}", state.attitude_rad);
+        // It counts from there on, once.
+        assert!(!counts || !last(&mut tumble, &state, LOST - 101), "from {lowest}");
+        assert!(last(&mut tumble, &state, 1));
+    }
+    // After it was upright for a moment it does not count.
+    let mut tumble = Tumble::default();
+    last(&mut tumble, &cosine(-1.0), 300);
+    last(&mut tumble, &State::default(), 100);
+    last(&mut tumble, &cosine(-1.0), 300);
+    assert!(!last(&mut tumble, &cosine(0.0), LOST - 701));
+    assert!(last(&mut tumble, &cosine(0.0), 1));
+}
+
+/// Ticks without a state count as the last state, and find nothing.
+#[test]
+fn a_blind_tumble_goes_on() {
+    let mut tumble = Tumble::default();
+    (0..5000).for_each(|_| tumble.advance_blind(GAP_US));
+    assert!(!last(&mut tumble, &State::default(), 1));
+    last(&mut tumble, &cosine(-1.0), 1);
+    (0..LOST_US / GAP_US).for_each(|_| tumble.advance_blind(GAP_US));
+    assert!(!tumble.is_lost());
+    tumble.advance_blind(GAP_US);
+    assert!(tumble.is_lost());
+    // Upright again, and blind for the rest of the time that this takes.
+    last(&mut tumble, &State::default(), 2);
+    (0..UPRIGHT_US / GAP_US).for_each(|_| tumble.advance_blind(GAP_US));
+    last(&mut tumble, &State::default(), 1);
+    assert!(!last(&mut tumble, &cosine(-1.0), LOST - 1), "it has recovered");
+    assert!(last(&mut tumble, &cosine(-1.0), 1));
+}
+
+// --- Frozen trackers. ---
+
+/// Somewhere, so that the pose at the beginning of a window is not zero.
+fn somewhere() -> State {
+    State {
+        position_m: Vector3::new(3.0, -2.0, 1.0),
+        attitude_rad: Vector3::new(0.1, -0.2, 2.0),
+        velocity_m_s: Vector3::zeros(),
+        rates_rad_s: Vector3::zeros(),
+    }
+}
+
+/// Sends states for `windows` windows, in which the pose moves by these shares of what the twist says; true if they
+/// contradict.
+fn contradicts(twist: &State, moves: f32, turns: f32, period_us: u32, windows: u32) -> bool {
+    let (begin, begin_us) = (somewhere(), 7_000_000_u64);
+    let mut witness = Witness::new(&begin, begin_us);
+    (1..=windows * WINDOW_US / period_us).any(|index| {
+        let after_us = index * period_us;
+        let s = after_us as f32 * 1e-6;
+        let state = State {
+            position_m: begin.position_m + twist.velocity_m_s * (s * moves),
+            attitude_rad: begin.attitude_rad + twist.rates_rad_s * (s * turns),
+            ..*twist
+        };
+        let found = witness.contradicts(&state, begin_us + u64::from(after_us));
+        assert!(!found || after_us.is_multiple_of(WINDOW_US), "only at the end of a window");
+        found
+    })
+}
+
+/// Velocity or rate by which the twist moves this far in a window.
+fn per_window(size: f32) -> f32 {
+    size / (WINDOW_US as f32 * 1e-6)
+}
+
+#[test]
+fn a_pose_must_follow_the_twist() {
+    for period_us in [1000, 10_000, 50_000, WINDOW_US] {
+        for axis in 0..3 {
+            for sign in [1.0, -1.0] {
+                let moves = |size: f32, share: f32| {
+                    let velocity_m_s = along(axis, sign * per_window(size));
+                    contradicts(&State { velocity_m_s, ..somewhere() }, share, 1.0, period_us, 4)
+                };
+                assert!(moves(1.02 * TRAVEL_M, 0.0) && !moves(0.98 * TRAVEL_M, 0.0), "axis {axis}, {period_us} us");
+                let (below, above) = (STANDS_SHARE - 0.02, STANDS_SHARE + 0.02);
+                assert!(moves(1.0, below) && !moves(1.0, above), "axis {axis}, {period_us} us");
+                assert!(moves(1.0, -below) && !moves(1.0, -above) && !moves(3.0, 1.0), "axis {axis}, {period_us} us");
+
+                let turns = |size: f32, share: f32, yaws: f32| {
+                    let mut rates_rad_s = along(axis, sign * per_window(size));
+                    rates_rad_s.z += per_window(yaws);
+                    contradicts(&State { rates_rad_s, ..somewhere() }, 1.0, share, period_us, 4)
+                };
+                let tilts = axis < 2;
+                assert_eq!(turns(1.02 * TURN_RAD, 0.0, 0.0), tilts, "axis {axis}, {period_us} us");
+                assert!(!turns(0.98 * TURN_RAD, 0.0, 0.0), "axis {axis}, {period_us} us");
+                assert_eq!(turns(1.0, below, 0.0), tilts, "axis {axis}, {period_us} us");
+                assert!(!turns(1.0, above, 0.0), "axis {axis}, {period_us} us");
+                // A rotation about its own z turns roll and pitch into each other.
+                if tilts {
+                    assert!(turns(1.0, 0.0, 0.9 * TURN_RAD) && turns(1.0, 0.0, -0.9 * TURN_RAD));
+                    assert!(!turns(1.0, 0.0, 1.1 * TURN_RAD) && !turns(1.0, 0.0, -1.1 * TURN_RAD));
+                }
+            }
+        }
+    }
+}
+
+/// A heading that changes does not make up for roll and pitch that stand.
+#[test]
+fn only_roll_and_pitch_are_compared() {
+    let mut witness = Witness::new(&somewhere(), 0);
+    let found = (1..=250_u64).any(|ms| {
+        let mut state = State { rates_rad_s: Vector3::new(1.0, 0.0, 0.0), ..somewhere() };
+        state.attitude_rad.z += ms as f32 * 1e-3;
+        witness.contradicts(&state, ms * 1000)
+    });
+    assert!(found);
+}
+
+/// After a gap longer than a window nothing is compared with what was before it.
+#[test]
+fn a_gap_begins_a_window() {
+    let fast = State { velocity_m_s: Vector3::new(2.0, 0.0, 0.0), ..somewhere() };
+    let window_us = u64::from(WINDOW_US);
+    assert!(Witness::new(&fast, 5).contradicts(&fast, 5 + window_us));
+    let mut witness = Witness::new(&fast, 5);
+    assert!(!witness.contradicts(&fast, 6 + window_us), "a gap");
+    assert!(!witness.contradicts(&fast, 5 + 2 * window_us), "not yet a window since");
+    assert!(witness.contradicts(&fast, 6 + 2 * window_us));
+    // What has stood in one window may move in the next.
+    let mut witness = Witness::new(&somewhere(), 0);
+    assert!(witness.contradicts(&fast, window_us));
+    let moved = State { position_m: somewhere().position_m + Vector3::new(0.5, 0.0, 0.0), ..fast };
+    assert!(!witness.contradicts(&moved, 2 * window_us));
+    assert!(witness.contradicts(&moved, 3 * window_us));
+}
+
+// --- Landing. ---
+
+const WEIGHT_N: f32 = 10.0;
+const DT_S: f32 = 1e-3;
+
+fn moving(velocity_m_s: Vector3<f32>) -> State {
+    State { velocity_m_s, ..somewhere() }
+}
+
+struct Land(LandDetector);
+
+impl Land {
+    fn new() -> Self {
+        Land(LandDetector::new(&somewhere(), WEIGHT_N))
+    }
+
+    /// A detector of a vehicle that hovers where its climb has taken it.
+    fn hovering() -> Self {
+        let mut land = Land::new();
+        land.run(10, &moving(along(2, 1.0)), WEIGHT_N);
+        land.run(HOVER_US / GAP_US + 100, &somewhere(), WEIGHT_N);
+        assert!(land.0.airborne() && !land.0.contradicts());
+        land
+    }
+
+    /// Runs so many ticks; true if the vehicle is in the air then.
+    fn run(&mut self, ticks: u32, state: &State, thrust_n: f32) -> bool {
+        for _ in 0..ticks {
+            self.0.advance(state, thrust_n, GAP_US, DT_S);
+        }
+        self.0.airborne()
+    }
+
+    /// Returns the number of the tick after which it is on the ground.
+    fn lands(&mut self, state: &State, thrust_n: f32) -> Option<u32> {
+        (1..=5000).find(|_| !self.run(1, state, thrust_n))
+    }
+}
+
+#[test]
+fn it_is_in_the_air_once_it_has_been_carried() {
+    let (enough_n, ticks) = (CARRY_SHARE * WEIGHT_N * 1.001, CARRIED_US / GAP_US);
+    let mut land = Land::new();
+    assert!(!land.run(ticks - 1, &somewhere(), enough_n));
+    assert!(land.run(1, &somewhere(), enough_n));
+    // Without interruption.
+    let mut land = Land::new();
+    land.run(ticks - 1, &somewhere(), enough_n);
+    land.run(1, &somewhere(), CARRY_SHARE * WEIGHT_N);
+    assert!(!land.run(ticks - 1, &somewhere(), enough_n) && land.run(1, &somewhere(), enough_n));
+    assert!(!Land::new().run(5000, &somewhere(), CARRY_SHARE * WEIGHT_N), "too little");
+    // Blind ticks count as those before.
+    let mut land = Land::new();
+    land.run(1, &somewhere(), enough_n);
+    (2..ticks).for_each(|_| land.0.advance_blind(GAP_US));
+    assert!(!land.0.airborne() && land.run(1, &somewhere(), enough_n));
+}
+
+#[test]
+fn it_is_in_the_air_once_it_has_left() {
+    for axis in 0..3 {
+        for sign in [1.0, -1.0] {
+            let at = |size: f32| State { position_m: somewhere().position_m + along(axis, sign * size), ..somewhere() };
+            assert!(Land::new().run(1, &at(1.01 * LEFT_M), 0.0) && !Land::new().run(5000, &at(0.99 * LEFT_M), 0.0));
+            let fast = |size: f32| moving(along(axis, sign * size));
+            assert!(Land::new().run(1, &fast(1.01 * LEFT_M_S), 0.0));
+            assert!(!Land::new().run(5000, &fast(0.99 * LEFT_M_S), 0.0));
+        }
+    }
+}
+
+/// It has landed after a second at rest without being carried, if it was seen to sink before.
+#[test]
+fn it_has_landed_after_a_second_at_rest() {
+    for sinks in [1.01 * SINKS_M_S, 0.99 * SINKS_M_S] {
+        let mut land = Land::hovering();
+        land.run(1, &moving(along(2, -sinks)), WEIGHT_N);
+        let landed = land.lands(&somewhere(), 0.1 * WEIGHT_N);
+        assert_eq!(landed, (sinks > SINKS_M_S).then_some(STILL_US / GAP_US + 1), "{sinks} m/s");
+    }
+    // Neither sideways nor upwards is a descent.
+    for up in [along(0, -1.0), along(1, -1.0), along(2, 1.0)] {
+        let mut land = Land::hovering();
+        land.run(1, &moving(up), WEIGHT_N);
+        assert_eq!(land.lands(&somewhere(), 0.1 * WEIGHT_N), None);
+    }
+    // A motion along any axis, thrust, or a tick without a state in between begins the second anew.
+    let disturb: [&dyn Fn(&mut Land); 5] = [
+        &|land| assert!(land.run(1, &moving(along(0, 1.01 * STILL_M_S)), 0.0)),
+        &|land| assert!(land.run(1, &moving(along(1, -1.01 * STILL_M_S)), 0.0)),
+        &|land| assert!(land.run(1, &moving(along(2, 1.01 * STILL_M_S)), 0.0)),
+        &|land| assert!(land.run(1, &somewhere(), 0.7 * WEIGHT_N)),
+        &|land| land.0.advance_blind(GAP_US),
+    ];
+    for (index, disturb) in disturb.into_iter().enumerate() {
+        let mut land = Land::hovering();
+        land.run(1, &moving(along(2, -1.0)), WEIGHT_N);
+        assert!(land.run(STILL_US / GAP_US - 300, &moving(Vector3::repeat(0.99 * STILL_M_S)), 0.1 * WEIGHT_N));
+        disturb(&mut land);
+        let ticks = land.lands(&somewhere(), 0.1 * WEIGHT_N).expect("landed");
+        assert!((STILL_US / GAP_US..=STILL_US / GAP_US + 1).contains(&ticks), "{index}: {ticks} ticks");
+    }
+}
+
+/// A vehicle that has not left the place where it stood lands without a descent, and may take off again from there.
+#[test]
+fn what_was_carried_only_lands_where_it_stood() {
+    let mut land = Land::new();
+    land.run(CARRIED_US / GAP_US, &somewhere(), WEIGHT_N);
+    let here = State { position_m: somewhere().position_m + along(0, 0.9 * LEFT_M), ..somewhere() };
+    assert_eq!(land.lands(&here, 0.1 * WEIGHT_N), Some(STILL_US / GAP_US + 1));
+    let next = State { position_m: here.position_m + along(0, 0.9 * LEFT_M), ..here };
+    assert!(!land.run(100, &next, 0.0), "it stands where it has landed");
+    let far = State { position_m: here.position_m + along(0, 1.1 * LEFT_M), ..here };
+    assert!(land.run(1, &far, 0.0));
+}
+
+/// The usual thrust is the mean in the air: what carries a heavy vehicle is more.
+#[test]
+fn the_usual_thrust_is_learnt_in_the_air() {
+    let mut land = Land::new();
+    land.run(5000, &somewhere(), 0.5 * WEIGHT_N);
+    land.run(1, &moving(along(2, 1.0)), WEIGHT_N);
+    let seconds = 3.0;
+    land.run((seconds / DT_S) as u32, &somewhere(), 2.0 * WEIGHT_N);
+    land.run(1, &moving(along(2, -1.0)), 2.0 * WEIGHT_N);
+    let usual_n = WEIGHT_N * (2.0 - (-seconds / USUAL_S).exp());
+    let carries = |thrust_n: f32| {
+        let mut land = Land(land.0);
+        // For a moment: it is a mean.
+        land.run(STILL_US / GAP_US - 5, &somewhere(), 0.0);
+        let thrust_n = thrust_n * (-(STILL_US as f32) * 1e-6 / USUAL_S).exp();
+        land.run(1, &somewhere(), thrust_n);
+        land.lands(&somewhere(), 0.0).expect("landed") > 100
+    };
+    assert!(carries(1.01 * CARRY_SHARE * usual_n) && !carries(0.99 * CARRY_SHARE * usual_n), "{usual_n} N");
+}
+
+/// At rest in the air without thrust, without a descent before, is what a frozen tracker says; a descent counts until
+/// the vehicle has hovered after it.
+#[test]
+fn rest_in_the_air_without_thrust_contradicts() {
+    let mut land = Land::hovering();
+    land.run(FROZEN_US / GAP_US, &somewhere(), 0.1 * WEIGHT_N);
+    assert!(!land.0.contradicts());
+    land.run(1, &somewhere(), 0.1 * WEIGHT_N);
+    assert!(land.0.contradicts());
+    assert!(land.run(5000, &somewhere(), 0.1 * WEIGHT_N), "that is no landing");
+
+    for (hovers, forgotten) in [(HOVER_US / GAP_US - 1, false), (HOVER_US / GAP_US, true)] {
+        let mut land = Land::hovering();
+        land.run(1, &moving(along(2, -1.0)), WEIGHT_N);
+        land.run(hovers, &somewhere(), WEIGHT_N);
+        // What follows is carried no more; one tick in motion begins its times.
+        land.run(1, &moving(along(0, 2.0 * STILL_M_S)), 0.1 * WEIGHT_N);
+        land.run(FROZEN_US / GAP_US + 1, &somewhere(), 0.1 * WEIGHT_N);
+        assert_eq!(land.0.contradicts(), forgotten, "{hovers} ms");
+        assert_eq!(land.lands(&somewhere(), 0.1 * WEIGHT_N).is_none(), forgotten, "{hovers} ms");
+    }
+    // One that has not left is none.
+    let mut land = Land::new();
+    land.run(CARRIED_US / GAP_US, &somewhere(), WEIGHT_N);
+    land.run(FROZEN_US / GAP_US + 100, &somewhere(), 0.0);
+    assert!(!land.0.contradicts());
+}
+
+/// At rest by the mark it stands where it is, if that is known, as if it had never flown but for its usual thrust.
+#[test]
+fn a_resting_vehicle_stands_where_it_is() {
+    let there = State { position_m: somewhere().position_m + along(1, 20.0), ..somewhere() };
+    for state in [Some(&there), None] {
+        let mut land = Land::hovering();
+        land.run(100, &moving(along(2, -1.0)), 0.1 * WEIGHT_N);
+        land.0.rest(state);
+        assert!(!land.0.airborne());
+        let stands = *state.unwrap_or(&somewhere());
+        let mut same = land.0;
+        same.advance(&stands, 0.0, GAP_US, DT_S);
+        assert!(!same.airborne());
+        let left = State { position_m: stands.position_m + along(1, 1.1 * LEFT_M), ..stands };
+        let mut gone = land.0;
+        gone.advance(&left, 0.0, GAP_US, DT_S);
+        assert!(gone.airborne());
+        // All times begin anew.
+        assert!(!land.run(CARRIED_US / GAP_US - 1, &stands, WEIGHT_N) && land.run(1, &stands, WEIGHT_N));
+    }
+}
+
+/// Without a velocity the thrust alone decides, and the descent counts for the states that come back.
+#[test]
+fn a_vehicle_adrift_lands_by_its_thrust() {
+    let mut land = Land::hovering();
+    let runs = |land: &mut Land, ticks: u32, thrust_n: f32| {
+        (1..=ticks).find(|_| {
+            land.0.advance_adrift(&moving(Vector3::new(3.0, -4.0, -5.0)), thrust_n, GAP_US, DT_S);
+            !land.0.airborne()
+        })
+    };
+    assert_eq!(runs(&mut land, 4000, WEIGHT_N), None, "carried");
+    let mut back = Land(land.0);
+    assert_eq!(runs(&mut land, 4000, 0.1 * WEIGHT_N), Some(STILL_US / GAP_US + 1));
+    // It did not hover meanwhile: the descent counts.
+    assert!(back.run(1, &somewhere(), WEIGHT_N));
+    assert_eq!(back.lands(&somewhere(), 0.1 * WEIGHT_N), Some(STILL_US / GAP_US + 1));
+    // On the ground it stays there.
+    let mut land = Land::new();
+    land.0.advance_adrift(&moving(Vector3::new(3.0, -4.0, -5.0)), 0.1 * WEIGHT_N, GAP_US, DT_S);
+    assert!(!land.0.airborne());
+}

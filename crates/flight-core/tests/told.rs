@@ -1,0 +1,495 @@
+//! What the tick tells the law, by a law that notes it: the state and setpoint of every tick, for late, missing and lost
+//! states, and for poses instead of states.
+#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
+
+use afbc_control::{Action, FlightController, Mixer, Trace};
+use afbc_flight_core::blind::{Blind, DESCENT_THRUST};
+use afbc_flight_core::descent::SINK_M_S;
+use afbc_flight_core::landing::{STILL_US, USUAL_S};
+use afbc_flight_core::supervisor::{COAST_US, DESCEND_US, GIVE_UP_US};
+use afbc_flight_core::{
+    ArmingLimits, Asked, End, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory,
+};
+use afbc_types::{Inputs, Parameters, Pose, PoseSigmas, RotorForces, RotorSpeeds, Setpoint, State};
+use nalgebra::Vector3;
+
+const WEIGHT_N: f32 = 0.486 * 9.81;
+
+/// A law that notes what it is told, and asks for the same inputs always.
+struct Notes {
+    mixer: Mixer,
+    asks: Inputs,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Noted {
+    told: Option<(State, Setpoint)>,
+    steps: u32,
+    /// Steps that were announced to be adrift, and true if the next one is.
+    adrift: u32,
+    announced: bool,
+}
+
+impl FlightController for Notes {
+    type Memory = Noted;
+
+    fn dt_s(&self) -> f32 {
+        0.001
+    }
+
+    fn mixer(&self) -> &Mixer {
+        &self.mixer
+    }
+
+    fn trace(noted: &Noted) -> Trace {
+        let mut trace = Trace::default();
+        trace.inputs.thrust_n = noted.steps as f32;
+        trace
+    }
+
+    fn adrift(&self, noted: &mut Noted) {
+        noted.announced = true;
+    }
+
+    fn decide(&self, noted: &mut Noted, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
+        assert!(fresh && state.is_plausible() && setpoint.is_plausible());
+        noted.adrift += u32::from(noted.announced);
+        (noted.told, noted.steps, noted.announced) = (Some((*state, *setpoint)), noted.steps + 1, false);
+        Action::new(RotorSpeeds([300.0; 4].into()), RotorForces([1.0; 4].into()), self.asks, false)
+    }
+}
+
+struct Bench {
+    vehicle: Vehicle<Notes>,
+    memory: VehicleMemory<Noted>,
+    inbox: Inbox,
+    now_us: u64,
+}
+
+fn asks(thrust: f32) -> Inputs {
+    Inputs { thrust_n: thrust * WEIGHT_N, roll_n: 0.01, pitch_n: -0.02, yaw_n: 0.0 }
+}
+
+/// The vehicle's motion: constant velocity and rates.
+fn at(us: u64) -> State {
+    let s = us as f32 * 1e-6;
+    State {
+        position_m: Vector3::new(1.0, -0.5, 2.0) + Vector3::new(0.3, -0.2, 0.05) * s,
+        velocity_m_s: Vector3::new(0.3, -0.2, 0.05),
+        attitude_rad: Vector3::new(0.05, -0.1, 0.4) + Vector3::new(0.01, -0.02, 0.03) * s,
+        rates_rad_s: Vector3::new(0.01, -0.02, 0.03),
+    }
+}
+
+fn target() -> Setpoint {
+    Setpoint { position_m: Vector3::new(1.5, 0.0, 2.5), ..Setpoint::default() }
+}
+
+impl Bench {
+    fn new(asks: Inputs) -> Self {
+        let parameters = Parameters::PAPER.to_f32();
+        let law = Notes { mixer: Mixer::new(parameters, 3.0).expect("valid"), asks };
+        let limits = ArmingLimits { setpoint_distance_max_m: 100.0, ..ArmingLimits::default() };
+        let vehicle = Vehicle::new(parameters, limits, law).expect("valid");
+        Bench { vehicle, memory: VehicleMemory::default(), inbox: Inbox::EMPTY, now_us: 0 }
+    }
+
+    fn tick(&mut self, put: impl FnOnce(&mut Inbox, u64)) -> Outcome {
+        self.now_us += 1000;
+        put(&mut self.inbox, self.now_us);
+        self.inbox.put_setpoint(Stamped { value: target(), at_us: self.now_us });
+        self.vehicle.tick(&mut self.memory, self.now_us, &self.inbox.take())
+    }
+
+    /// Runs a tick in which the link brings the state of so long ago.
+    fn linked(&mut self, age_us: u64) -> Outcome {
+        self.tick(|inbox, now_us| put_linked(inbox, now_us - age_us))
+    }
+
+    /// Runs a tick with an estimate of the vehicle's own.
+    fn own(&mut self) -> Outcome {
+        self.tick(|inbox, now_us| inbox.locate(Stamped { value: at(now_us), at_us: now_us }))
+    }
+
+    /// Runs a tick with an estimate that does not know where it is.
+    fn adrift(&mut self, value: State) -> Outcome {
+        self.tick(|inbox, at_us| inbox.put_adrift(Some(Stamped { value, at_us }), Refusal::PositionUnknown))
+    }
+
+    /// Runs a tick with the pose of so long ago.
+    fn posed(&mut self, age_us: u64) -> Outcome {
+        self.tick(|inbox, now_us| {
+            let at_us = now_us - age_us;
+            inbox.put_pose(Stamped { value: Pose::of(&at(at_us), PoseSigmas::UNKNOWN), at_us });
+        })
+    }
+
+    fn nothing(&mut self) -> Outcome {
+        self.tick(|_, _| {})
+    }
+
+    /// A bench in the air, flown on states of the link or on an estimate of its own.
+    fn flying(asks: Inputs, own: bool) -> Self {
+        let mut bench = Bench::new(asks);
+        let mut run = |ticks: u32| {
+            for _ in 0..ticks {
+                let _ = if own { bench.own() } else { bench.linked(0) };
+            }
+        };
+        run(1500);
+        assert!(bench.inbox.request(Asked { request: Request::Arm, ticket: 0 }));
+        for _ in 0..1500 {
+            let _ = if own { bench.own() } else { bench.linked(0) };
+        }
+        assert!(bench.memory.airborne() && bench.memory.mode() == Mode::Flying);
+        bench
+    }
+
+    fn noted(&self) -> Noted {
+        *self.memory.control().expect("armed")
+    }
+
+    fn told(&self) -> (State, Setpoint) {
+        self.noted().told.expect("stepped")
+    }
+
+    fn steps(&self) -> u32 {
+        self.noted().steps
+    }
+}
+
+fn put_linked(inbox: &mut Inbox, at_us: u64) {
+    inbox.put_state(Stamped { value: at(at_us), at_us });
+}
+
+fn off(seen: &State, expected: &State) -> f32 {
+    let offs = [
+        seen.position_m - expected.position_m,
+        seen.velocity_m_s - expected.velocity_m_s,
+        seen.attitude_rad - expected.attitude_rad,
+        seen.rates_rad_s - expected.rates_rad_s,
+    ];
+    offs.iter().map(Vector3::amax).fold(0.0, f32::max)
+}
+
+/// A late state is carried on to the present by its velocity and rates; so a vehicle that moves steadily is told where
+/// it is, however late its states are.
+#[test]
+fn late_states_are_carried_on_to_the_present() {
+    for late_us in [0, 1000, 7000, 13_500, u64::from(COAST_US)] {
+        let mut bench = Bench::flying(asks(1.0), false);
+        for tick in 0..50 {
+            let outcome = bench.linked(late_us);
+            // From the first one on that is newer than the last before.
+            if tick > late_us / 1000 {
+                assert_eq!(u64::from(outcome.health.state_age_us), late_us);
+                let (state, setpoint) = bench.told();
+                assert!(off(&state, &at(bench.now_us)) < 1e-5, "{late_us} us: {state:?}");
+                assert_eq!(setpoint, target());
+                assert_eq!(bench.memory.state(), Some(&at(bench.now_us - late_us)));
+            }
+        }
+    }
+    let mut bench = Bench::flying(asks(1.0), false);
+    let _ = bench.linked(0);
+    assert_eq!(bench.told().0, at(bench.now_us), "as it is, to the bit");
+}
+
+/// Between two states roll and pitch are reckoned from the inputs, all else is carried on; when the state is stale the
+/// law is told nothing.
+#[test]
+fn between_states_roll_and_pitch_are_reckoned() {
+    for own in [false, true] {
+        let mut bench = Bench::flying(asks(1.0), own);
+        let (blind, given) = (Blind::new(&Parameters::PAPER.to_f32(), 1e-3), asks(1.0));
+        let last = at(bench.now_us);
+        // Inputs constant for long: the rotors give them, and the trim has learnt what the constant rates say.
+        let mut reckoning = blind.start(&last);
+        reckoning.acting_n = nalgebra::Vector2::new(given.roll_n, given.pitch_n);
+        let steps = bench.steps();
+        for age_ms in 1..=COAST_US / 1000 {
+            let outcome = bench.nothing();
+            assert_eq!((outcome.mode, outcome.health.state_age_us), (Mode::Flying, age_ms * 1000));
+            blind.advance(&mut reckoning, &given);
+            let (state, _) = bench.told();
+            let there = at(bench.now_us);
+            let expected = State {
+                attitude_rad: Vector3::new(state.attitude_rad.x, state.attitude_rad.y, there.attitude_rad.z),
+                rates_rad_s: Vector3::new(state.rates_rad_s.x, state.rates_rad_s.y, there.rates_rad_s.z),
+                ..there
+            };
+            assert!(off(&state, &expected) < 1e-5, "{age_ms} ms: {state:?}, not {expected:?}");
+            // With a trim that is 78 % learnt after 1.5 s.
+            let learnt = 1.0 - (-1.5_f32).exp();
+            let t = age_ms as f32 * 1e-3;
+            for (axis, input, authority) in [(0, given.roll_n, 0.25 / 0.0038), (1, given.pitch_n, 0.25 / 0.0038)] {
+                let rate = last.rates_rad_s.iter().nth(axis).expect("three") + authority * input * (1.0 - learnt) * t;
+                let told = state.rates_rad_s.iter().nth(axis).expect("three");
+                assert!((told - rate).abs() < 2e-3 + 0.3 * (rate - last.rates_rad_s[axis]).abs(), "{told}, not {rate}");
+            }
+        }
+        assert_eq!(bench.steps() - steps, COAST_US / 1000);
+        let _ = bench.nothing();
+        assert_eq!(bench.steps() - steps, COAST_US / 1000, "no step of the law on a stale state");
+        let inputs = bench.memory.trace::<Notes, 4>().inputs;
+        assert!((inputs.thrust_n / WEIGHT_N - 1.0).abs() < 0.01 && inputs != given, "{inputs:?}");
+        let _ = if own { bench.own() } else { bench.linked(0) };
+        assert_eq!(bench.memory.trace::<Notes, 4>().inputs.thrust_n, bench.steps() as f32, "the law's own again");
+    }
+}
+
+/// Only newer states count, of those that are no older than 20 ms on arrival.
+#[test]
+fn an_older_state_does_not_replace_a_newer_one() {
+    let mut bench = Bench::flying(asks(1.0), false);
+    let _ = bench.linked(2000);
+    let last_us = bench.now_us;
+    let newest = *bench.memory.state().expect("seen");
+    for _ in 0..3 {
+        let _ = bench.tick(|inbox, _| put_linked(inbox, last_us - 5000));
+        assert_eq!(bench.memory.state(), Some(&newest));
+    }
+    let late = |bench: &mut Bench, late_us: u64| {
+        for _ in 0..25 {
+            let _ = bench.nothing();
+        }
+        let age_us = bench.linked(late_us).health.state_age_us;
+        u64::from(age_us) == late_us
+    };
+    assert!(late(&mut bench, u64::from(COAST_US)) && !late(&mut bench, u64::from(COAST_US) + 1));
+}
+
+/// Coasting holds the thrust, and descending blind gives less; forces are those of these inputs.
+#[test]
+fn blind_inputs_reach_the_motors() {
+    let mut bench = Bench::flying(asks(1.1), false);
+    let mut trims = Vec::new();
+    for age_us in (1000..=DESCEND_US + 50_000).step_by(1000) {
+        let outcome = bench.nothing();
+        if age_us > COAST_US {
+            let inputs = bench.memory.trace::<Notes, 4>().inputs;
+            let action = bench.vehicle_action(&inputs);
+            assert_eq!((outcome.motors, outcome.forces), (action.speeds, action.forces), "{age_us} us");
+            let share = if age_us > DESCEND_US { DESCENT_THRUST } else { 1.0 };
+            trims.push(inputs.thrust_n / share);
+        }
+    }
+    // A mean of 1 s over the 1.5 s of flight, from the weight on.
+    let trim_n = WEIGHT_N * (1.1 - 0.1 * (-1.5_f32).exp());
+    assert!(trims.iter().all(|thrust_n| (thrust_n - trim_n).abs() < 0.01 * WEIGHT_N), "{trims:?}");
+}
+
+impl Bench {
+    fn vehicle_action(&self, inputs: &Inputs) -> Action {
+        Mixer::<4>::new(Parameters::PAPER.to_f32(), 3.0).expect("valid").action(inputs)
+    }
+}
+
+/// A vehicle that does not know where it is: the law is told the last place and the fading estimated motion, and a
+/// setpoint that sinks there; height, vertical velocity and attitude as they are.
+#[test]
+fn a_vehicle_adrift_is_told_a_fading_motion_and_sinks() {
+    let mut bench = Bench::flying(asks(1.0), true);
+    for flight in 0..2 {
+        let seen = *bench.memory.state().expect("seen");
+        let began_us = bench.now_us;
+        let noted = bench.noted();
+        // While the state is fresh it counts; the estimate's position and velocity are those of nowhere.
+        let wrong = |now_us: u64| State {
+            position_m: Vector3::new(500.0, -700.0, at(now_us).position_m.z),
+            velocity_m_s: Vector3::new(1.0, -2.0, -0.05),
+            ..at(now_us)
+        };
+        let mut first = None;
+        for ms in 1..=400_u64 {
+            let now_us = bench.now_us + 1000;
+            let outcome = bench.adrift(wrong(now_us));
+            if ms <= u64::from(COAST_US) / 1000 {
+                assert_eq!(bench.noted().adrift, noted.adrift, "{ms} ms");
+                continue;
+            }
+            let begin = *first.get_or_insert(ms);
+            let (state, setpoint) = bench.told();
+            let t = (ms - begin + 1) as f32 * 1e-3;
+            let fade = (-0.5 * t).exp();
+            let way = 2.0 * (fade - (-t).exp());
+            let expected = State {
+                position_m: Vector3::new(
+                    seen.position_m.x + way,
+                    seen.position_m.y - 2.0 * way,
+                    wrong(now_us).position_m.z,
+                ),
+                velocity_m_s: Vector3::new(fade, -2.0 * fade, -0.05),
+                ..wrong(now_us)
+            };
+            assert!(off(&state, &expected) < 3e-3, "{ms} ms: {state:?}, not {expected:?}");
+            let place = Vector3::new(seen.position_m.x, seen.position_m.y, 0.0);
+            let sunk = setpoint.position_m - place;
+            let from_m = wrong(began_us + begin * 1000).position_m.z;
+            assert!((sunk - Vector3::new(0.0, 0.0, from_m - SINK_M_S * t)).amax() < 2e-3, "{ms} ms: {setpoint:?}");
+            assert_eq!(setpoint.velocity_m_s, Vector3::new(0.0, 0.0, -SINK_M_S));
+            assert_eq!(bench.noted().adrift - noted.adrift, (ms - begin + 1) as u32, "announced");
+            let descends = ms * 1000 > u64::from(DESCEND_US);
+            assert_eq!(outcome.mode, if descends { Mode::Descending } else { Mode::Coasting });
+            // The second time the vehicle finds itself before it descends.
+            if flight == 0 && ms == 150 {
+                break;
+            }
+        }
+        if flight == 0 {
+            for _ in 0..300 {
+                let _ = bench.own();
+            }
+            assert_eq!((bench.memory.mode(), bench.told().1), (Mode::Flying, target()));
+        }
+    }
+    // What comes back during the descent is descended on from where the vehicle is.
+    let _ = bench.own();
+    let here = at(bench.now_us);
+    assert_eq!(bench.told().0, here);
+    let sinks = here.position_m - Vector3::new(0.0, 0.0, SINK_M_S * 1e-3);
+    assert!((bench.told().1.position_m - sinks).amax() < 1e-5, "{:?}", bench.told().1);
+}
+
+/// As long as the attitude is known the descent goes on, and with a stale one it ends. The thrust decides the landing,
+/// whatever the estimate says of speed and place.
+#[test]
+fn a_vehicle_adrift_lands_by_its_thrust_or_gives_up() {
+    let fast =
+        State { position_m: Vector3::new(9e3, 0.0, 2.0), velocity_m_s: Vector3::repeat(-9.0), ..State::default() };
+    let mut bench = Bench::flying(asks(1.0), true);
+    for _ in 0..3 * GIVE_UP_US / 1000 {
+        assert_eq!(bench.adrift(fast).ended, None, "carried");
+    }
+    let ended = (1..5000).find_map(|ms| bench.nothing().ended.map(|end| (ms, end)));
+    assert_eq!(ended, Some((GIVE_UP_US / 1000 + 1, End::StateLost)));
+
+    let mut bench = Bench::flying(asks(0.2), true);
+    let (mut ms, ended) = (
+        0,
+        loop {
+            if let Some(ended) = bench.adrift(fast).ended {
+                break ended;
+            }
+            assert!(bench.now_us < 20_000_000, "not landed");
+        },
+    );
+    ms += bench.now_us / 1000 - 3000;
+    assert_eq!(ended, End::Landed);
+    // A second without thrust, at the latest when it descends; the usual thrust is that of the weight.
+    assert!(ms <= u64::from(DESCEND_US + STILL_US) / 1000 + 30 && USUAL_S > 1.0, "{ms} ms");
+    // On its side it is lost.
+    let mut bench = Bench::flying(asks(1.0), true);
+    let over = State { attitude_rad: Vector3::new(2.0, 0.0, 0.0), ..State::default() };
+    let ended = (0..3000).find_map(|_| bench.adrift(over).ended);
+    assert_eq!(ended, Some(End::Tumbled));
+}
+
+/// Poses count once states are stale, and only then; the motion that is observed begins as the last state said, and a
+/// state of the link replaces it.
+#[test]
+fn poses_replace_states_that_are_missing_and_give_way_to_them() {
+    let mut bench = Bench::flying(Inputs { thrust_n: WEIGHT_N, ..Inputs::default() }, false);
+    // The link's states with poses beside them: the states count.
+    for ms in 0..200 {
+        let outcome = bench.tick(|inbox, now_us| {
+            if ms % 10 == 0 {
+                put_linked(inbox, now_us);
+            }
+            inbox.put_pose(Stamped { value: Pose::of(&at(now_us), PoseSigmas::UNKNOWN), at_us: now_us });
+        });
+        assert_eq!((outcome.health.observed, outcome.health.state_age_us), (false, ms % 10 * 1000));
+    }
+    let age_ms = u64::from(bench.nothing().health.state_age_us) / 1000;
+    for ms in 1..=500 {
+        let health = bench.posed(4000).health;
+        let stale = age_ms + ms > u64::from(COAST_US) / 1000;
+        assert_eq!(health.observed, stale, "{ms} ms");
+        assert_eq!(health.state_age_us, if stale { 0 } else { ((age_ms + ms) * 1000) as u32 });
+        if stale {
+            // Until the push of its tilt is known, a tenth of gravity.
+            let state = bench.told().0;
+            assert!(off(&state, &at(bench.now_us)) < 0.4, "{ms} ms: {state:?}, not {:?}", at(bench.now_us));
+        }
+    }
+    // A state of the link, older than what is observed now.
+    let outcome = bench.linked(3000);
+    assert_eq!((outcome.health.observed, outcome.health.state_age_us), (false, 3000));
+    assert_eq!(bench.memory.state(), Some(&at(bench.now_us - 3000)));
+    assert!(!bench.posed(1000).health.observed, "as long as it is fresh");
+}
+
+/// An estimate of the vehicle's own that fails is replaced at once, since it would have taken the pose; it takes over
+/// again with its next state.
+#[test]
+fn poses_replace_an_estimate_at_once() {
+    let mut bench = Bench::flying(Inputs { thrust_n: WEIGHT_N, ..Inputs::default() }, true);
+    for ms in 1..=300 {
+        let outcome = bench.posed(4000);
+        assert_eq!((outcome.health.observed, outcome.health.state_age_us), (true, 0), "{ms} ms");
+        assert!(off(&bench.told().0, &at(bench.now_us)) < 0.4, "{:?}", bench.told().0);
+        assert_eq!(outcome.mode, Mode::Flying);
+    }
+    // Poses that are too old or unsure are as good as none.
+    for ms in 1..=120 {
+        let outcome = bench.posed(60_000);
+        assert_eq!(outcome.health.observed, ms <= 96, "{ms} ms");
+    }
+    assert!(bench.posed(4000).health.observed);
+    assert!(!bench.own().health.observed);
+    assert_eq!(bench.memory.state(), Some(&at(bench.now_us)));
+    assert!(!bench.nothing().health.observed, "it was replaced");
+
+    // A disarmed vehicle observes nothing.
+    assert!(bench.inbox.request(Asked { request: Request::Kill, ticket: 0 }));
+    let _ = bench.own();
+    (0..50).for_each(|_| assert!(!bench.posed(4000).health.observed));
+}
+
+/// The estimate's states are not watched for frozen ones, as those of a link are.
+#[test]
+fn an_estimate_may_repeat_itself() {
+    for own in [false, true] {
+        let mut bench = Bench::flying(asks(1.0), own);
+        let value = at(bench.now_us);
+        for _ in 0..10 {
+            let _ = bench.tick(|inbox, at_us| {
+                let state = Stamped { value, at_us };
+                if own { inbox.locate(state) } else { inbox.put_state(state) }
+            });
+        }
+        let health = bench.nothing().health;
+        // The link's last one is still there to be refused once more.
+        let expected = if own { (0, 1000) } else { (11, 11_000) };
+        assert_eq!((health.frozen_states, health.state_age_us), expected, "own: {own}");
+    }
+}
+
+/// Disarmed, nothing is traced, nothing is in the air, and the last flight's memory remains; a clock that has failed is
+/// reported.
+#[test]
+fn after_a_flight_its_memory_remains_and_no_trace() {
+    let mut bench = Bench::flying(asks(1.0), false);
+    let _ = bench.nothing();
+    let trace = bench.memory.trace::<Notes, 4>();
+    assert_eq!(trace.inputs.thrust_n, bench.steps() as f32);
+    assert!(bench.inbox.request(Asked { request: Request::Kill, ticket: 0 }));
+    assert_eq!(bench.linked(0).ended, Some(End::Killed));
+    assert!(!bench.memory.airborne() && bench.steps() > 1000);
+    assert_eq!(bench.memory.trace::<Notes, 4>(), Trace::default());
+    assert!(!bench.linked(0).health.rate.clock_failed);
+    bench.memory.distrust_clock();
+    assert!(bench.linked(0).health.rate.clock_failed);
+    assert_eq!(VehicleMemory::<Noted>::default().control(), None);
+    assert_eq!(VehicleMemory::<Noted>::default().state(), None);
+
+    // Killed while blind: no trace either.
+    let mut bench = Bench::flying(asks(1.0), false);
+    for _ in 0..50 {
+        let _ = bench.nothing();
+    }
+    assert_ne!(bench.memory.trace::<Notes, 4>(), Trace::default());
+    assert!(bench.inbox.request(Asked { request: Request::Kill, ticket: 0 }));
+    let _ = bench.nothing();
+    assert_eq!(bench.memory.trace::<Notes, 4>(), Trace::default());
+}
