@@ -75,3 +75,6 @@ impl Heading {
         self.acceleration_rad_s2 = acceleration;
     }
 }
+
+#[cfg(test)]
+mod tests;

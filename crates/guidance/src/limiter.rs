@@ -405,3 +405,6 @@ fn allowed(target: &Complete, limits: &Limits) -> bool {
         && within(a.xy(), limits.acceleration_max_m_s2)
         && a.z.abs() <= limits.vertical_acceleration_m_s2
 }
+
+#[cfg(test)]
+mod tests;

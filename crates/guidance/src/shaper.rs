@@ -227,3 +227,6 @@ pub(crate) fn capped<const D: usize>(vector: SVector<f32, D>, most: f32) -> SVec
     let squared = vector.norm_squared();
     if squared <= most * most { vector } else { vector * (most / sqrt(max(squared, f32::MIN_POSITIVE))) }
 }
+
+#[cfg(test)]
+mod tests;

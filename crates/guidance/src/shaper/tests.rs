@@ -1,0 +1,231 @@
+//! The shape compared with its page, in double precision and by the formulas as they stand there, derivatives taken
+//! numerically.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use super::*;
+use nalgebra::{Vector1, Vector2};
+use proptest::prelude::*;
+
+const DT_S: f32 = 1e-3;
+
+/// The constants of the page.
+struct Page {
+    a: f64,
+    j: f64,
+    b: f64,
+    c: f64,
+    settling: f64,
+    d: f64,
+    k2: f64,
+    k3: f64,
+}
+
+type Vec64<const D: usize> = SVector<f64, D>;
+
+fn wide<const D: usize>(v: &SVector<f32, D>) -> Vec64<D> {
+    v.map(f64::from)
+}
+
+fn shortened<const D: usize>(v: Vec64<D>, most: f64) -> Vec64<D> {
+    if v.norm() > most { v.normalize() * most } else { v }
+}
+
+/// Limit in the direction of a vector: of one coordinate, by its sign.
+fn limit<const D: usize>(v: &Vec64<D>, (up, down): (f32, f32)) -> f64 {
+    let down_counts = D == 1 && v.iter().all(|x| *x < 0.0);
+    f64::from(if down_counts { down } else { up })
+}
+
+impl Page {
+    fn new(a: f32, j: f32) -> Self {
+        let (a, j) = (f64::from(a), f64::from(j));
+        let (b, eased) = (0.7 * a, 0.9 * j);
+        // c = 2 B^2/J', unless k1 = B/c is too large.
+        let c = (2.0 * b * b / eased).max(b / 12.0);
+        let k2 = 4.0 * b / c;
+        let settling = 0.55 * j;
+        Page { a, j, b, c, settling, d: settling / k2, k2, k3: 5.0 * k2 }
+    }
+
+    /// f(e), along e.
+    fn f<const D: usize>(&self, e: &Vec64<D>) -> Vec64<D> {
+        let size = e.norm();
+        if size == 0.0 { *e } else { e * (((self.c * self.c + 2.0 * self.b * size).sqrt() - self.c) / size) }
+    }
+
+    /// g(x), along x, and g'.
+    fn g<const D: usize>(&self, x: &Vec64<D>) -> (Vec64<D>, f64) {
+        let size = x.norm();
+        let root = (self.d * self.d + 2.0 * self.settling * size).sqrt();
+        let along = if size == 0.0 { *x } else { x * ((root - self.d) / size) };
+        (along, self.settling / root)
+    }
+
+    /// The wanted velocity, and how it changes beside the goal's acceleration: the derivative of the approach as long as
+    /// it is not limited.
+    fn wanted<const D: usize>(&self, motion: &Motion<D>, goal: &Goal<D>, reach: &Reach) -> (Vec64<D>, Vec64<D>) {
+        let zero = Vec64::<D>::zeros();
+        let v = wide(&motion.velocity);
+        let Some(told) = goal.velocity.as_ref().map(wide) else {
+            // x with g(x) as the acceleration.
+            let a = wide(&goal.acceleration);
+            let size = ((a.norm() + self.d).powi(2) - self.d * self.d) / (2.0 * self.settling);
+            let ahead = if a.norm() > 0.0 { v + a.normalize() * size } else { v };
+            return (shortened(ahead, 0.98 * limit(&ahead, reach.approach)), zero);
+        };
+        let Some(position) = goal.position.as_ref().map(wide) else {
+            return (shortened(told, 0.98 * limit(&told, reach.approach)), zero);
+        };
+        let e = position - wide(&motion.position) - wide(&motion.below);
+        let most = 0.98 * limit(&e, reach.approach);
+        let approach = self.f(&e);
+        let change = if approach.norm() <= most {
+            let h = 1e-6;
+            let way = (told - v) * h;
+            (self.f(&(e + way)) - self.f(&(e - way))) / (2.0 * h)
+        } else {
+            zero
+        };
+        let wanted = told + shortened(approach, most);
+        (shortened(wanted, 0.98 * limit(&wanted, reach.speed)), change)
+    }
+
+    /// The jerk of a step.
+    fn jerk<const D: usize>(&self, motion: &Motion<D>, goal: &Goal<D>, reach: &Reach) -> Vec64<D> {
+        let (v, a) = (wide(&motion.velocity), wide(&motion.acceleration));
+        let (wanted, change) = self.wanted(motion, goal, reach);
+        let x = wanted - v;
+        let told = if goal.velocity.is_some() { wide(&goal.acceleration) } else { Vec64::<D>::zeros() };
+        let (own, slope) = self.g(&x);
+        let own = change + own;
+        let rise = if own.norm() <= self.a { (change + told - a) * slope } else { Vec64::<D>::zeros() };
+        let wanted = shortened(told + shortened(own, self.a), f64::from(reach.acceleration));
+        // The acceleration from which the speed settles to its limit in time.
+        let size = wanted.norm();
+        let jerk = if size > 0.0 {
+            let along = v.dot(&wanted) / size;
+            let speed = 0.98 * limit(&wanted, reach.speed);
+            let across = (v.norm_squared() - along * along).max(0.0);
+            let room = ((speed * speed - across).max(0.0).sqrt() - along).max(0.0);
+            let settling = 0.55 * f64::from(reach.jerk);
+            let d = settling / self.k2;
+            let root = (d * d + 2.0 * settling * room).sqrt();
+            if size > root - d {
+                let least = wanted * ((root - d) / size);
+                a * (-settling / root) + (least - a) * self.k3
+            } else {
+                wide(&goal.jerk) + shortened(rise + (wanted - a) * self.k3, self.j)
+            }
+        } else {
+            wide(&goal.jerk) + shortened(rise + (wanted - a) * self.k3, self.j)
+        };
+        let dt = f64::from(DT_S);
+        let most = f64::from(reach.jerk);
+        let next = shortened(a + shortened(jerk, most) * dt, f64::from(reach.acceleration));
+        shortened((next - a) / dt, most)
+    }
+}
+
+fn pair(most: f32) -> impl Strategy<Value = Vector2<f32>> {
+    (-most..most, -most..most).prop_map(|(x, y)| Vector2::new(x, y))
+}
+
+/// A vector of small or large numbers.
+fn vector(most: f32) -> impl Strategy<Value = Vector2<f32>> {
+    prop_oneof![pair(most), pair(0.1 * most), pair(0.003 * most), Just(Vector2::zeros())]
+}
+
+fn any_motion() -> impl Strategy<Value = Motion<2>> {
+    (vector(50.0), vector(12.0), vector(6.0)).prop_map(|(p, v, a)| Motion::moving(p, v, a, Vector2::zeros()))
+}
+
+fn any_goal() -> impl Strategy<Value = Goal<2>> {
+    (0..6u8, vector(50.0), vector(6.0), vector(4.0), vector(20.0)).prop_map(|(kind, p, v, acceleration, jerk)| Goal {
+        position: (kind > 1).then_some(p),
+        velocity: (kind > 0).then_some(if kind > 4 { Vector2::zeros() } else { v }),
+        acceleration,
+        jerk,
+    })
+}
+
+fn any_reach() -> impl Strategy<Value = Reach> {
+    (0.5..8.0f32, 0.5..8.0f32, 0.0..8.0f32, 0.0..8.0f32, 1.0..9.0f32, 3.0..200.0f32).prop_map(
+        |(a, b, more_a, more_b, acceleration, jerk)| Reach {
+            approach: (a, b),
+            speed: (a + more_a, b + more_b),
+            acceleration,
+            jerk,
+        },
+    )
+}
+
+fn of_one(v: &Vector2<f32>) -> Vector1<f32> {
+    Vector1::new(v.x)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 3000, ..ProptestConfig::default() })]
+
+    /// A step's jerk is that of the page, for two coordinates and for one with limits of its own in each direction.
+    #[test]
+    fn a_step_is_that_of_the_page(
+        motion in any_motion(), goal in any_goal(), reach in any_reach(), a in 0.5..8.0f32, jerk_s in 0.5..60.0f32,
+    ) {
+        let j = a * jerk_s;
+        let (shape, page) = (Shape::new(a, j), Page::new(a, j));
+        let mut moved = motion;
+        shape.advance(&mut moved, &goal, &reach, DT_S);
+        let expected = page.jerk(&motion, &goal, &reach);
+        // Single precision, 60 times per second times a resolution of 1e-6 of the velocities, and that over a step.
+        let hair = 2e-3 * (1.0 + expected.norm()) + 1e-3 * page.k3;
+        prop_assert!((wide(&moved.jerk) - expected).norm() < hair, "{:?}, not {expected:?}", moved.jerk);
+
+        let motion = Motion { below: Vector1::new(1e-4), ..Motion::moving(
+            of_one(&motion.position), of_one(&motion.velocity), of_one(&motion.acceleration), Vector1::zeros(),
+        ) };
+        let goal = Goal {
+            position: goal.position.as_ref().map(of_one),
+            velocity: goal.velocity.as_ref().map(of_one),
+            acceleration: of_one(&goal.acceleration),
+            jerk: of_one(&goal.jerk),
+        };
+        let mut moved = motion;
+        shape.advance(&mut moved, &goal, &reach, DT_S);
+        let expected = page.jerk(&motion, &goal, &reach);
+        prop_assert!((wide(&moved.jerk) - expected).norm() < hair + 2e-3 * expected.norm(), "{:?}, not {expected:?}", moved.jerk);
+    }
+
+    /// A step is the integral of its jerk, also far from the origin, where the two parts of the position count together.
+    #[test]
+    fn a_step_integrates_its_jerk(motion in any_motion(), jerk in pair(100.0), far in -9e4..9e4f32) {
+        let mut moved = Motion { position: motion.position.map(|x| x + far), ..motion };
+        let begin = wide(&moved.position);
+        // Long steps, so that every term is seen.
+        let dt = 0.05_f32;
+        for _ in 0..20 {
+            moved.advance(jerk, dt);
+        }
+        let (v, a, j, t) = (wide(&motion.velocity), wide(&motion.acceleration), wide(&jerk), 1.0);
+        let position = v * t + a * (t * t / 2.0) + j * (t * t * t / 6.0);
+        let there = wide(&moved.position) + wide(&moved.below) - begin;
+        prop_assert!((there - position).norm() < 1e-3, "{there:?}, not {position:?}");
+        prop_assert!(moved.below.amax() <= 0.004);
+        prop_assert!((wide(&moved.velocity) - v - a * t - j * (t * t / 2.0)).norm() < 1e-3);
+        prop_assert!((wide(&moved.acceleration) - a - j * t).norm() < 1e-3);
+        prop_assert_eq!(moved.jerk, jerk);
+        let to = moved.to(&moved.position);
+        prop_assert_eq!(to, -moved.below);
+    }
+}
+
+#[test]
+fn a_vector_is_shortened_and_never_lengthened() {
+    for (vector, most, expected) in [
+        ([3.0, 4.0], 5.0, [3.0, 4.0]),
+        ([3.0, 4.0], 2.5, [1.5, 2.0]),
+        ([-3.0, 4.0], 0.0, [0.0, 0.0]),
+        ([0.0, 0.0], 0.0, [0.0, 0.0]),
+    ] {
+        assert!((capped(Vector2::from(vector), most) - Vector2::from(expected)).norm() < 1e-6, "{vector:?}, {most}");
+    }
+}
