@@ -109,3 +109,6 @@ fn tilt(attitude_rad: &Vector3<f32>) -> Vector2<f32> {
     let (s, c) = (sin(yaw), cos(yaw));
     Vector2::new(c * forward - s * left, s * forward + c * left) / max(cos(roll) * cos(pitch), VERTICAL_MIN)
 }
+
+#[cfg(test)]
+mod tests;

@@ -95,3 +95,6 @@ impl Wish {
         Wish { way: Way::Limited(aim), lifts: false, lands: false, done: false }
     }
 }
+
+#[cfg(test)]
+mod tests;
