@@ -252,3 +252,6 @@ impl Net {
 fn inner(size_m: f32, margin_m: f32) -> f32 {
     if size_m > 2.0 * margin_m { size_m - margin_m } else { 0.5 * size_m }
 }
+
+#[cfg(test)]
+mod tests;

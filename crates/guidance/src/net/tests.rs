@@ -1,0 +1,265 @@
+//! The net's findings: thresholds on both sides, each cause by itself.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use super::*;
+use proptest::prelude::*;
+
+/// Everything as it should be, in flight.
+fn calm() -> Findings<'static> {
+    Findings {
+        mode: FlightMode::Hold,
+        armed: true,
+        descends: false,
+        position_m: Some(Vector3::new(1.0, 2.0, 3.0)),
+        home_m: Some(Vector3::new(1.0, 2.0, 3.0)),
+        battery: None,
+        sensors: Sensors::default(),
+        silent_us: Some(0),
+        targets: true,
+        sticks: true,
+        dt_s: 1e-3,
+    }
+}
+
+/// Returns the causes that hold after a look, with the announcements of what is over.
+fn look(watch: &mut Watch, net: &Net, seen: &Findings<'_>) -> (std::vec::Vec<Cause>, Notices) {
+    let mut notices = Notices::default();
+    let before = watch.holds;
+    let (action, cause, new) = watch.look(net, seen, &mut notices);
+    let holding: std::vec::Vec<Cause> = Cause::ALL.into_iter().filter(|cause| watch.holds(*cause)).collect();
+    // The strongest action, and the first cause that has it; nothing is done to a disarmed vehicle.
+    let strongest = holding.iter().map(|cause| net.action(*cause)).max().unwrap_or(Action::None);
+    assert_eq!(action, if seen.armed { strongest } else { Action::None });
+    let first = holding.iter().find(|cause| net.action(**cause) == strongest && strongest > Action::None);
+    assert_eq!(cause, first.copied().unwrap_or(Cause::Descent), "{holding:?}");
+    let news = holding.iter().filter(|cause| before & bit(**cause) == 0).fold(0, |set, cause| set | bit(*cause));
+    assert_eq!(new, news);
+    (holding, notices)
+}
+
+fn found(net: &Net, seen: &Findings<'_>) -> std::vec::Vec<Cause> {
+    look(&mut Watch::default(), net, seen).0
+}
+
+extern crate std;
+
+#[test]
+fn each_cause_is_found_by_itself_in_flight() {
+    let net = Net { fence_radius_m: 10.0, station_lost_s: 1.0, ..Net::DEFAULT };
+    assert_eq!(found(&net, &calm()), []);
+    let descends = Findings { descends: true, ..calm() };
+    assert_eq!(found(&net, &descends), [Cause::Descent]);
+    assert_eq!(found(&net, &Findings { silent_us: Some(1_000_000), ..calm() }), []);
+    let silent = Findings { silent_us: Some(1_001_000), ..calm() };
+    assert_eq!(found(&net, &silent), [Cause::Station]);
+    assert_eq!(found(&net, &Findings { silent_us: None, ..calm() }), [], "never heard");
+    for mode in FlightMode::ALL {
+        let blind = Findings { mode, targets: false, sticks: false, ..calm() };
+        let expected: &[Cause] = match mode {
+            FlightMode::Offboard => &[Cause::Targets],
+            FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised => &[Cause::Sticks],
+            _ => &[],
+        };
+        assert_eq!(found(&net, &blind), expected);
+        assert_eq!(found(&net, &Findings { mode, ..calm() }), []);
+        assert_eq!(found(&net, &Findings { armed: false, ..blind }), []);
+    }
+    let outside = Findings { position_m: Some(Vector3::new(20.0, 0.0, 0.0)), ..calm() };
+    assert_eq!(found(&net, &outside), [Cause::Fence]);
+    let sensors = |sensors: Sensors| Findings { sensors, ..calm() };
+    let none = Sensors::default();
+    for failed in [
+        Sensors { inertial: true, ..none },
+        Sensors { barometer: true, ..none },
+        Sensors { magnetometer: true, ..none },
+        Sensors { gnss: true, ..none },
+        Sensors { tracker: true, ..none },
+    ] {
+        assert!(failed.any() && !none.any());
+        assert_eq!(found(&net, &sensors(failed)), [Cause::Sensors]);
+        assert_eq!(found(&net, &Findings { armed: false, ..sensors(failed) }), [Cause::Sensors]);
+    }
+    for seen in [descends, silent, outside] {
+        assert_eq!(found(&net, &Findings { armed: false, ..seen }), [], "on the ground");
+    }
+}
+
+/// What is over is announced in flight, of those causes that may be over.
+#[test]
+fn the_end_of_a_cause_is_announced_in_flight() {
+    let net = Net { fence_radius_m: 10.0, station_lost_s: 1.0, ..Net::DEFAULT };
+    let all = Findings {
+        mode: FlightMode::Offboard,
+        position_m: Some(Vector3::new(20.0, 0.0, 0.0)),
+        sensors: Sensors { gnss: true, ..Sensors::default() },
+        silent_us: Some(u32::MAX),
+        targets: false,
+        ..calm()
+    };
+    let mut watch = Watch::default();
+    let (holding, notices) = look(&mut watch, &net, &all);
+    assert_eq!(holding, [Cause::Fence, Cause::Sensors, Cause::Station, Cause::Targets]);
+    assert_eq!(notices.iter().count(), 0);
+    let mut landed = watch;
+    let (holding, notices) = look(&mut watch, &net, &Findings { silent_us: Some(u32::MAX), ..calm() });
+    assert_eq!(holding, [Cause::Station]);
+    assert!(notices.iter().eq([Notice::Over(Cause::Fence), Notice::Over(Cause::Sensors)]));
+    let (_, notices) = look(&mut watch, &net, &calm());
+    assert!(notices.iter().eq([Notice::Over(Cause::Station)]));
+    let (_, notices) = look(&mut watch, &net, &calm());
+    assert_eq!(notices.iter().count(), 0);
+    let (_, notices) = look(&mut landed, &net, &Findings { armed: false, ..calm() });
+    assert_eq!(notices.iter().count(), 0, "on the ground");
+}
+
+/// What is new and has an action is announced, but for what has been told already.
+#[test]
+fn what_is_new_is_announced() {
+    let net = Net { fence_action: 0.0, ..Net::DEFAULT };
+    let new = bit(Cause::Fence) | bit(Cause::BatteryLow) | bit(Cause::Station);
+    for (but, expected) in [
+        (None, &[Cause::BatteryLow, Cause::Station][..]),
+        (Some(Cause::Station), &[Cause::BatteryLow][..]),
+        (Some(Cause::Sensors), &[Cause::BatteryLow, Cause::Station][..]),
+    ] {
+        let mut notices = Notices::default();
+        announce(&net, new, but, &mut notices);
+        assert!(notices.iter().eq(expected.iter().map(|cause| Notice::Found(*cause))), "{notices:?}");
+    }
+}
+
+/// Hysteresis: outside until it is inside by a margin, and unknown places change nothing.
+#[test]
+fn a_fence_is_left_and_entered_with_a_margin() {
+    let net = Net { fence_radius_m: 10.0, fence_height_m: 20.0, ..Net::DEFAULT };
+    let home = Vector3::new(5.0, -5.0, 2.0);
+    let at = |x: f32, y: f32, z: f32| Findings {
+        position_m: Some(home + Vector3::new(x, y, z)),
+        home_m: Some(home),
+        ..calm()
+    };
+    let mut watch = Watch::default();
+    let mut outside = |seen: &Findings<'_>| !look(&mut watch, &net, seen).0.is_empty();
+    let unknown = Findings { position_m: None, ..at(0.0, 0.0, 0.0) };
+    assert!(!outside(&unknown));
+    for (seen, expected) in [
+        (at(6.0, 7.9, 0.0), false),
+        (at(6.0, -8.1, 0.0), true),
+        (at(6.0, 7.9, 0.0), true),
+        (at(0.0, 9.01, 0.0), true),
+        (unknown, true),
+        (Findings { home_m: None, ..at(0.0, 0.0, 0.0) }, true),
+        (at(0.0, -8.99, 0.0), false),
+        (at(0.0, 0.0, 19.99), false),
+        (at(0.0, 0.0, 20.01), true),
+        (at(0.0, 0.0, 19.01), true),
+        (at(0.0, 0.0, 18.99), false),
+        (at(0.0, 0.0, -500.0), false),
+        (unknown, false),
+    ] {
+        assert_eq!(outside(&seen), expected, "{seen:?}");
+    }
+}
+
+proptest! {
+    /// A place is inside a cylinder about home, less the margin, of which a small fence keeps half its size; a size of 0
+    /// is no fence.
+    #[test]
+    fn a_fence_is_a_cylinder(
+        radius in prop_oneof![Just(0.0f32), 0.5..30.0f32], height in prop_oneof![Just(0.0f32), 0.5..30.0f32],
+        margin in 0.0..4.0f32, x in -30.0..30.0f32, y in -30.0..30.0f32, z in -30.0..30.0f32,
+    ) {
+        let net = Net { fence_radius_m: radius, fence_height_m: height, ..Net::DEFAULT };
+        let home = Vector3::new(100.0, -50.0, 7.0);
+        let size = |size: f32| if size > 2.0 * margin { size - margin } else { size / 2.0 };
+        let beyond = f32::hypot(x, y) - size(radius);
+        let above = z - size(height);
+        prop_assume!(beyond.abs() > 1e-3 && above.abs() > 1e-3);
+        let inside = (radius == 0.0 || beyond < 0.0) && (height == 0.0 || above < 0.0);
+        prop_assert_eq!(net.encloses(&home, &(home + Vector3::new(x, y, z)), margin), inside);
+        let ceiling = if height == 0.0 { f32::INFINITY } else if height > 2.0 { height - 1.0 } else { height / 2.0 };
+        prop_assert_eq!(net.ceiling_m(), ceiling);
+    }
+
+    /// The charge is that of the voltage without load, between empty and full.
+    #[test]
+    fn the_charge_follows_the_voltage_without_load(
+        voltage_v in 5.0..20.0f32, current_a in -20.0..60.0f32, cells in 1..5u8, resistance_ohm in 0.0..0.05f32,
+    ) {
+        let number = f32::from(cells);
+        let battery = Cells { number, empty_v: 3.4, full_v: 4.2, resistance_ohm };
+        let mut charge = None;
+        battery.update(&mut charge, Some(&Reading { voltage_v, current_a }), 0.01);
+        let cell = f64::from(voltage_v) / f64::from(number) + f64::from(current_a) * f64::from(resistance_ohm);
+        let expected = ((cell - 3.4) / 0.8).clamp(0.0, 1.0);
+        prop_assert!((f64::from(charge.unwrap()) - expected).abs() < 1e-4, "{charge:?}, not {expected}");
+    }
+}
+
+/// The first plausible reading counts as it is, and what follows with a time constant of 2 s.
+#[test]
+fn the_charge_is_filtered() {
+    let battery = Cells { number: 1.0, empty_v: 3.0, full_v: 4.0, resistance_ohm: 0.0 };
+    let reading = |voltage_v: f32, current_a: f32| Reading { voltage_v, current_a };
+    let mut charge = None;
+    let nonsense = [
+        reading(0.0, 0.0),
+        reading(-3.5, 0.0),
+        reading(1e3, 0.0),
+        reading(2e3, 0.0),
+        reading(f32::NAN, 0.0),
+        reading(3.5, 1e4),
+        reading(3.5, -2e4),
+        reading(3.5, f32::NAN),
+    ];
+    for reading in &nonsense {
+        battery.update(&mut charge, Some(reading), 0.01);
+        assert_eq!(charge, None, "{reading:?}");
+    }
+    battery.update(&mut charge, None, 0.01);
+    Cells { number: 0.0, ..battery }.update(&mut charge, Some(&reading(3.5, 0.0)), 0.01);
+    assert_eq!(charge, None, "not watched");
+    battery.update(&mut charge, Some(&reading(3.9, 0.0)), 0.01);
+    assert!((charge.unwrap() - 0.9).abs() < 1e-5);
+    for _ in 0..100 {
+        battery.update(&mut charge, Some(&reading(3.2, 9e3)), 0.01);
+    }
+    let expected = 0.2 + 0.7 * f32::exp(-0.5);
+    assert!((charge.unwrap() - expected).abs() < 2e-3, "{charge:?}, not {expected}");
+    let before = charge;
+    battery.update(&mut charge, Some(&nonsense[0]), 0.01);
+    assert_eq!(charge, before);
+}
+
+/// A charge below a threshold is found, one at it is not; a battery does not recover in flight, but may be replaced on
+/// the ground.
+#[test]
+fn low_batteries_are_found_by_their_thresholds() {
+    let net = Net { cells: 1.0, low: 0.5, critical: 0.25, emergency: 0.0, empty_v: 3.0, full_v: 4.0, ..Net::DEFAULT };
+    let with = |armed: bool, charge: f32, watch: &mut Watch| {
+        let reading = Reading { voltage_v: 3.0 + charge, current_a: 0.0 };
+        look(watch, &net, &Findings { battery: Some(&reading), armed, dt_s: 2.0, ..calm() }).0
+    };
+    use Cause::{BatteryCritical, BatteryEmergency, BatteryLow};
+    let fresh = |charge: f32| with(true, charge, &mut Watch::default());
+    assert_eq!(fresh(0.5), []);
+    assert_eq!(fresh(0.49), [BatteryLow]);
+    assert_eq!(fresh(0.25), [BatteryLow]);
+    assert_eq!(fresh(0.0), [BatteryCritical, BatteryLow], "not below nothing");
+    let eager = Net { emergency: 0.1, ..net };
+    let reading = Reading { voltage_v: 3.05, current_a: 0.0 };
+    let mut watch = Watch::default();
+    let empty = Findings { battery: Some(&reading), dt_s: 2.0, ..calm() };
+    assert_eq!(look(&mut watch, &eager, &empty).0, [BatteryEmergency, BatteryCritical, BatteryLow]);
+    assert_eq!(with(true, 0.9, &mut watch), [BatteryEmergency, BatteryCritical, BatteryLow], "in flight");
+    assert!((watch.charge().unwrap() - 0.9).abs() < 1e-3);
+    assert_eq!(with(false, 0.9, &mut watch), []);
+}
+
+/// A number of an action is whole; the answer names the next one.
+#[test]
+fn numbers_of_actions_are_whole() {
+    let error = whole(&Net::BAT1_N_CELLS, 2.5).unwrap_err();
+    assert_eq!((error.range.min, error.range.max), (2.0, 2.0));
+    assert!(whole(&Net::BAT1_N_CELLS, 3.0).is_ok());
+}
