@@ -363,6 +363,30 @@ fn engaging_does_not_trip_by_itself() {
     }
 }
 
+/// Large learnt inputs fit the bounds only if they are spread by the weights of the present rules, which are those of
+/// each attitude's own angle and rate: the inputs do not change.
+#[test]
+fn engaging_is_bumpless_where_no_even_estimate_fits() {
+    let (bounds, (_, mut memory)) = (bounds(), tripped(0, 0.0));
+    let controller = guarded(bounds);
+    // At rest, where AFBC does not miss the rotors' moments on a body that turns, which only the other law knows.
+    let state = State { attitude_rad: Vector3::new(-0.16, 0.15, 0.9), ..State::default() };
+    let setpoint = Setpoint { yaw_rad: 0.9, ..Setpoint::default() };
+    let mut before = Stepped::default();
+    for _ in 0..7000 {
+        before = step(&controller, &mut memory, &state, &setpoint);
+    }
+    assert!(before.action.health.trip.is_some() && !before.action.health.saturated, "{before:?}");
+    assert!(controller.engage(&mut memory.control));
+    let after = step(&controller, &mut memory, &state, &setpoint);
+    same(&before, &after).unwrap();
+    let learnt = Guarded::learnt(&memory.control);
+    for axis in [Axis::Roll, Axis::Pitch] {
+        let theta = learnt[axis].theta;
+        assert!(theta.max() - theta.min() > 0.1 && theta.norm() < bounds.theta[axis], "{axis:?}: {theta}");
+    }
+}
+
 /// The fallback law keeps AFBC's learnt hover thrust: the tilt for an acceleration does not change.
 #[test]
 fn the_tilt_does_not_step_at_a_trip() {

@@ -6,7 +6,7 @@ use afbc::backstepping::{self, ideal, proportional};
 use afbc::fuzzy::{Basis, Membership};
 use afbc::law::Context;
 use afbc::law::Tracking;
-use afbc::model::{Dynamics, RollPitch};
+use afbc::model::{Dynamics, Model, RollPitch};
 use afbc::{Adaptive, Backstepping, Law, Profile, Safeguards};
 use afbc_control::Estimate;
 use afbc_types::{Axis, Declaration, Parameters, PerAxis, State};
@@ -127,6 +127,61 @@ proptest! {
         let terms = (a1 + a2) * size + (f64::from(stiffness) + a1 * a2 + a1 * a1) * e1.abs();
         let allowed = 24.0 * U * (terms + f64::from(tracking.x1d_ddot).abs());
         prop_assert!((f64::from(unlimited) - f64::from(u)).abs() <= allowed, "{unlimited} and {u}");
+    }
+
+    /// What the law is told of the model is (16) by that model, in this state, besides what it learns and adds: AFBC
+    /// with the observed acceleration for f of x and y, the baseline with the rotors' residual.
+    #[test]
+    fn what_is_known_is_the_ideal_law_of_the_model(
+        tracking in tracking(),
+        gains in gains(),
+        stiffness in 0.0_f32..50.0,
+        (angles, rates) in (prop::array::uniform3(-1.0_f32..1.0), prop::array::uniform3(-3.0_f32..3.0)),
+        observed_m_s2 in prop::array::uniform2(-5.0_f32..5.0),
+        rotor_residual_rad_s in -500.0_f32..500.0,
+        before in estimate(),
+    ) {
+        let vehicle = Parameters::PAPER.to_f32();
+        let backstepping = backstepping::Gains { stiffness, ..gains.backstepping };
+        let gains = Gains { backstepping, ..gains };
+        let state = State { attitude_rad: angles.into(), rates_rad_s: rates.into(), ..State::default() };
+        let model = Model::new(&vehicle);
+        let context = Context {
+            state: &state,
+            roll_pitch: RollPitch::new(&state),
+            rotor_residual_rad_s,
+            dt_s: 0.001,
+            adapt: false,
+            unallocated: &PerAxis::default(),
+            observed_m_s2,
+            known: None,
+        };
+        let adaptive = Adaptive::new(PerAxis::from_fn(|_| gains)).unwrap();
+        let fixed = Backstepping::new(&vehicle, PerAxis::from_fn(|_| backstepping)).unwrap();
+        for axis in Axis::ALL {
+            let errors = tracking.errors(backstepping.alpha1);
+            let nominal = model.dynamics(axis, &state, rotor_residual_rad_s);
+            let f = match axis {
+                Axis::X => observed_m_s2[0],
+                Axis::Y => observed_m_s2[1],
+                _ => nominal.f,
+            };
+            let known = ideal(&backstepping, &errors, tracking.x1d_ddot, &Dynamics { f, ..nominal });
+            let mut estimate = before;
+            let (alone, _) = adaptive.input(axis, &tracking, &context, &mut estimate);
+            let told = Context { known: Some(&model), ..context };
+            let (whole, seen) = adaptive.input(axis, &tracking, &told, &mut estimate);
+            let allowed = 4.0 * U * (f64::from(alone.abs()) + f64::from(known.abs()));
+            prop_assert_eq!(seen, errors);
+            prop_assert!(
+                (f64::from(whole) - f64::from(alone) - f64::from(known)).abs() <= allowed,
+                "{axis:?}: {whole} is not {alone} and {known}"
+            );
+
+            let (u, seen) = fixed.input(axis, &tracking, &context, &mut ());
+            let known = ideal(&backstepping, &errors, tracking.x1d_ddot, &nominal);
+            prop_assert_eq!((u, seen), (known + proportional(backstepping.alpha2, &errors), errors));
+        }
     }
 
     /// (12), (13): e_2 is what remains of e_1's dynamics.

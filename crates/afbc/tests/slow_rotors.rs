@@ -1,8 +1,9 @@
 //! Gains and settings for rotors that lag more than those of the paper's vehicle.
 #![allow(missing_docs)]
 
-use afbc::{LAG_S, Profile, slowness};
-use afbc_types::{Axis, Parameters};
+use afbc::{LAG_S, Profile, Settings, slowness};
+use afbc_types::{Axis, Declared, Parameters};
+use core::convert::Infallible;
 
 fn close(a: f32, b: f32) -> bool {
     (a - b).abs() <= 1e-6 * b.abs()
@@ -40,6 +41,34 @@ fn quick_rotors_change_nothing_and_slow_ones_change_every_gain_by_its_power_of_t
         assert_eq!(slow.common.rotor_force_max_n, 2.0);
         assert_eq!(slow.limits.speed_max_m_s, settings.limits.speed_max_m_s);
     }
+}
+
+/// Settings slow down by the power of time in their unit, told from the key; but the step, and what the task asks for,
+/// stay: limits of speed, acceleration and turning.
+#[test]
+fn every_setting_slows_down_by_its_power_of_time() {
+    let numbers = |settings: &Settings| {
+        let mut numbers = Vec::new();
+        let Ok(()) = settings.visit(&mut |declaration, value| {
+            numbers.extend(value.numbers().map(|number| (declaration.range.name, number)));
+            Ok::<(), Infallible>(())
+        });
+        numbers
+    };
+    let power = |key: &str| match key {
+        "dt_s" | "reference_yaw_rate_rad_s" => 0,
+        key if key.ends_with("_rad_s") => -1,
+        key if key.ends_with("_lag_s") || key == "lead_s" => 1,
+        _ => 0,
+    };
+    let settings = Profile::Flight.settings();
+    for slowness in [1.0_f32, 1.65, 3.6] {
+        for ((key, before), (_, after)) in numbers(&settings).into_iter().zip(numbers(&settings.slowed(slowness))) {
+            let expected = before * f64::from(slowness).powi(power(key));
+            assert!((after - expected).abs() <= 1e-6 * expected.abs(), "{key}: {after} of {before}, not {expected}");
+        }
+    }
+    assert!(numbers(&settings).iter().filter(|(key, before)| power(key) != 0 && *before > 0.0).count() >= 10);
 }
 
 /// The printed law is for rotors without lag, whatever the vehicle's are.

@@ -160,6 +160,11 @@ proptest! {
         let unlimited = free.advance(&state, command);
         if unlimited.rate.abs() <= limit && (unlimited.angle - state.angle).abs() <= limit * dt {
             prop_assert_eq!(next, unlimited);
+        } else {
+            // It goes where the free filter would: with its rate, or to where that has come to rest.
+            let onward = if unlimited.rate.abs() > limit { unlimited.rate } else { unlimited.angle - state.angle };
+            prop_assert_eq!(next.rate, limit.copysign(onward));
+            prop_assert!((f64::from(next.angle) - f64::from(state.angle)) * f64::from(onward) >= 0.0);
         }
         // At the limit with the command beyond it, the rate is constant.
         let pressed = Filtered { angle: command - limit - 1.0, rate: limit };

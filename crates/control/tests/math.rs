@@ -3,6 +3,7 @@
 #![allow(missing_docs)]
 
 use afbc_control::math;
+use afbc_control::nalgebra::Vector3;
 use core::f32::consts::{FRAC_PI_2, PI};
 use proptest::prelude::*;
 
@@ -132,9 +133,27 @@ fn sine_and_cosine_are_as_exact_as_documented() {
     assert_figure("cos", worst(points(), absolute(math::cos, f64::cos)), 1.7e-4);
 }
 
+/// The smaller and the larger of two, and of a number and NaN the number, if it comes second.
+#[test]
+fn min_and_max_choose_one_of_both() {
+    for (a, b) in [(-2.0, 3.0), (3.0, -2.0), (-1.0, -0.5), (0.25, 7.0), (5.0, 5.0), (f32::NEG_INFINITY, 1e-45)] {
+        assert_eq!((math::min(a, b), math::max(a, b)), (f32::min(a, b), f32::max(a, b)), "{a} and {b}");
+    }
+    for b in [-3.0, 0.0, 2.0] {
+        assert_eq!((math::min(f32::NAN, b), math::max(f32::NAN, b)), (b, b));
+    }
+}
+
 proptest! {
     // Points between those of the sweeps.
     #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// The largest coordinate of either sign, wherever it is.
+    #[test]
+    fn the_largest_coordinate_is_that_of_amax(v in prop::array::uniform3(-1e3_f32..1e3)) {
+        let v = Vector3::from(v);
+        prop_assert_eq!(math::abs_max(&v), v.amax());
+    }
 
     #[test]
     fn no_random_point_is_worse_than_documented(

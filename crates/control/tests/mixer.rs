@@ -6,8 +6,8 @@
 #![allow(clippy::unwrap_used, missing_docs)] // a mixer that cannot be built must stop the test
 
 use afbc_control::Settings;
-use afbc_control::mixer::{AUTHORITY, Allocation, Mixer, THRUST_SHARE};
-use afbc_types::{Airframe, Inputs, PLUS, Parameters, ROTOR_POSITION, Rotor, RotorForces};
+use afbc_control::mixer::{AUTHORITY, Allocation, HOVER_MARGIN, Mixer, THRUST_SHARE};
+use afbc_types::{Airframe, Inputs, PLUS, Parameters, ROTOR_POSITION, Rotor, RotorForces, RotorSpeeds};
 use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 use nalgebra::{Matrix4, SVector, Vector4};
 use proptest::prelude::*;
@@ -392,6 +392,68 @@ fn nan_becomes_no_force_and_infinity_the_largest() {
     // Thrust has priority over yaw.
     let opposed = mixer.allocate(&inputs([0.0, 0.0, f32::NEG_INFINITY, f32::INFINITY]));
     assert_eq!(opposed.forces.0, Vector4::repeat(10.0));
+}
+
+proptest! {
+    /// The largest U1 and the largest U2 at hover are given in full, alone and in both directions, and a little more of
+    /// either saturates in one of them; a vehicle that the rotors do not lift has none.
+    #[test]
+    fn tilt_authority_is_the_largest_tilt_input_at_hover(
+        frame in prop_oneof![Just(PLUS), Just(cross()), uneven()], weight_n in 0.5_f32..30.0,
+    ) {
+        let mixer = Mixer::new(airframe(frame), 3.0);
+        prop_assume!(mixer.is_ok());
+        let mixer = mixer.unwrap();
+        let authority = mixer.tilt_authority_n(weight_n);
+        for (index, most_n) in authority.into_iter().enumerate() {
+            let saturates = |share: f32| [1.0, -1.0].map(|sign| {
+                let mut asked = [0.0, 0.0, 0.0, weight_n];
+                asked[index] = sign * share * most_n;
+                mixer.allocate(&inputs(asked)).saturated
+            });
+            if mixer.allocate(&inputs([0.0, 0.0, 0.0, weight_n])).saturated {
+                prop_assert!(most_n < 1e-4, "{most_n} N of a vehicle that does not hover");
+            } else {
+                prop_assert_eq!(saturates(0.999), [false; 2], "{} N are not given", most_n);
+                prop_assert!(most_n < 1e-3 || saturates(1.001).contains(&true), "more than {most_n} N is given");
+            }
+        }
+    }
+
+    /// Rotors must give 1.3 times what carries the vehicle; the refusal names the force that would do, rounded up.
+    #[test]
+    fn hover_takes_rotors_with_a_margin(
+        frame in prop_oneof![Just(PLUS), Just(cross()), uneven()], weight_n in 0.5_f32..30.0, limit in 0.1_f32..12.0,
+    ) {
+        let mixer = Mixer::new(airframe(frame), limit);
+        prop_assume!(mixer.is_ok());
+        let mixer = mixer.unwrap();
+        prop_assert_eq!(mixer.thrust_max_n(), 4.0 * limit);
+        // Each rotor's share of a pure thrust that none limits.
+        let free = Mixer::new(airframe(frame), 1e4).unwrap();
+        let share = free.allocate(&inputs([0.0, 0.0, 0.0, 1.0])).forces.0.max();
+        let needed_n = HOVER_MARGIN * weight_n * share;
+        prop_assume!((needed_n / limit - 1.0).abs() > 1e-3);
+        match mixer.check_hover(weight_n) {
+            Ok(()) => prop_assert!(needed_n < limit),
+            Err(error) => {
+                prop_assert!(needed_n > limit);
+                prop_assert_eq!((error.range.name, error.value), ("rotor_force_max_n", f64::from(limit)));
+                let least = error.range.min as f32;
+                prop_assert!((-1e-5..1.1e-4).contains(&(least - needed_n)), "{least} N for {needed_n} N");
+                let able = Mixer::new(airframe(frame), least.next_up()).unwrap();
+                prop_assert!(able.check_hover(weight_n).is_ok());
+            }
+        }
+    }
+
+    /// omega of (6): the rotors that push to positive yaw less the others.
+    #[test]
+    fn the_residual_is_that_of_6(speeds in prop::array::uniform4(0.0_f32..1e3)) {
+        let [w1, w2, w3, w4] = speeds;
+        let residual = mixer(3.0).residual_rad_s(&RotorSpeeds(speeds.into()));
+        prop_assert!((residual - (w1 - w2 + w3 - w4)).abs() <= 8.0 * U * 1e3, "{residual}");
+    }
 }
 
 /// The setting is a share of the weight, without effect by default.

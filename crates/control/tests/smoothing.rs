@@ -59,6 +59,28 @@ proptest! {
         }
     }
 
+    /// A vehicle that is k times slower has the same filters on a clock that is k times slower.
+    #[test]
+    fn slower_filters_are_the_same_on_a_slower_clock(
+        tilt in 1.0_f32..500.0, yaw in 1.0_f32..500.0, lift in 1.0_f32..500.0, lead_s in 0.0_f32..0.1,
+        slowness in 1.0_f32..4.0, inputs in prop::collection::vec(inputs(), 1..50),
+    ) {
+        let smoothing =
+            Smoothing { smooth_tilt_rad_s: tilt, smooth_yaw_rad_s: yaw, smooth_lift_rad_s: lift, lead_s };
+        let quick = Smoother::new(&smoothing, 0.001).unwrap();
+        let slow = Smoother::new(&smoothing.slowed(slowness), 0.001 * slowness).unwrap();
+        let (mut before, mut after) = (None, None);
+        for inputs in inputs {
+            let (a, b) = (quick.advance(&mut before, &inputs), slow.advance(&mut after, &inputs));
+            let allowed = 1e-2 * (1.0 + lead_s * tilt.max(lift));
+            for (a, b) in [(a.roll_n, b.roll_n), (a.pitch_n, b.pitch_n), (a.yaw_n, b.yaw_n), (a.thrust_n, b.thrust_n)] {
+                prop_assert!((a - b).abs() <= allowed, "{a} became {b}");
+            }
+        }
+        // A tuned number of each kind, and no filter stays none.
+        prop_assert_eq!(Smoothing::DEFAULT.slowed(slowness), Smoothing::DEFAULT);
+    }
+
     /// White noise of the inputs changes them from step to step as the impulse response k^2 (n + 1) q^n does.
     #[test]
     fn noise_becomes_as_much_less_as_the_filter_says(w in prop_oneof![Just(300.0_f32), 100.0_f32..500.0], seed: u64) {
