@@ -170,14 +170,21 @@ proptest! {
     }
 
     /// Bumpless engagement for attitude, whose reference changes from step to step: held constant by a filter at rest.
+    /// With a law that is given what is known, and with one that learns the weight, too.
     #[test]
-    fn hand_over_at_rest_is_bumpless_in_all_axes(height in -0.2_f32..0.2, yaw in -0.2_f32..0.2) {
+    fn hand_over_at_rest_is_bumpless_in_all_axes(
+        height in -0.2_f32..0.2, yaw in -0.2_f32..0.2, feed_forward: bool,
+    ) {
         let state = State {
             position_m: Vector3::new(0.0, 0.0, height),
             attitude_rad: Vector3::new(0.0, 0.0, yaw),
             ..State::default()
         };
-        let controller = guarded(Bounds { error: PerAxis { z: 0.0, ..bounds().error }, ..bounds() });
+        let (settings, mut gains) = (Settings { feed_forward, ..direct() }, Profile::Flight.gains());
+        gains.z.safeguards.theta_max = 8.0 * WEIGHT_N;
+        let bounds = Bounds::new(&gains, &Parameters::PAPER.to_f32(), &settings);
+        let hasty = Bounds { error: PerAxis { z: 0.0, ..bounds.error }, ..bounds };
+        let controller = Guarded::new(Parameters::PAPER.to_f32(), settings, gains, hasty).unwrap();
         let mut memory = Flight::default();
         let mut commands = Vec::new();
         while memory.control.trip().is_none() && commands.len() < 12 {
@@ -361,6 +368,39 @@ fn engaging_does_not_trip_by_itself() {
             assert!(learnt.norm() < bounds.theta.yaw && (yaw_n.abs() > 0.7 || learnt.max() - learnt.min() < 1e-2));
         }
     }
+}
+
+/// A vehicle that does not know where it is tells its law so: the disturbance that it knew stays, whatever the
+/// reckoned motion looks like, with the monitor and without.
+#[test]
+fn a_reckoned_motion_shows_no_disturbance() {
+    fn push<C: FlightController>(controller: &C, adrift: bool) -> [f32; 2] {
+        let (mut memory, mut state) = (Screened::<C::Memory>::default(), State::default());
+        // On its setpoint throughout, so that nothing is learnt from errors.
+        let mut fly = |accelerates_m_s2: f32, adrift| {
+            let mut asked = 0.0;
+            for _ in 0..1000 {
+                if adrift {
+                    controller.adrift(&mut memory.control);
+                }
+                let (position_m, velocity_m_s) = (state.position_m, state.velocity_m_s);
+                let setpoint = Setpoint { position_m, velocity_m_s, ..Setpoint::default() };
+                [asked, _] = step(controller, &mut memory, &state, &setpoint).trace.virtual_m_s2;
+                state.velocity_m_s.x += 1e-3 * accelerates_m_s2;
+            }
+            asked
+        };
+        [fly(1.0, false), fly(0.0, adrift)]
+    }
+    fn check<C: FlightController>(controller: &C) {
+        let [pushed, calm] = push(controller, false);
+        assert!((pushed + 1.0).abs() < 0.02 && calm.abs() < 0.02, "{pushed}, then {calm} m/s2");
+        let [pushed, adrift] = push(controller, true);
+        assert!((adrift - pushed).abs() < 0.02, "{pushed}, then {adrift} m/s2");
+    }
+    check(&guarded(bounds()));
+    let law = Adaptive::new(Profile::Flight.gains()).unwrap();
+    check(&Controller::new(Parameters::PAPER.to_f32(), direct(), law).unwrap());
 }
 
 /// Large learnt inputs fit the bounds only if they are spread by the weights of the present rules, which are those of
