@@ -66,6 +66,58 @@ fn on(setpoint: &Setpoint) -> State {
     state
 }
 
+/// A setpoint that is not far from others, all of its derivatives included.
+fn setpoint_near() -> impl Strategy<Value = Setpoint> {
+    let vector = |size: f32| prop::array::uniform3(-size..size).prop_map(Vector3::from);
+    (vector(0.3), vector(0.5), vector(1.0), vector(5.0), prop::array::uniform3(-0.5_f32..0.5)).prop_map(
+        |(
+            position_m,
+            velocity_m_s,
+            acceleration_m_s2,
+            jerk_m_s3,
+            [yaw_rad, yaw_rate_rad_s, yaw_acceleration_rad_s2],
+        )| {
+            Setpoint {
+                position_m,
+                velocity_m_s,
+                acceleration_m_s2,
+                jerk_m_s3,
+                yaw_rad,
+                yaw_rate_rad_s,
+                yaw_acceleration_rad_s2,
+                ..Setpoint::default()
+            }
+        },
+    )
+}
+
+/// The equations at the head of the model's file for one coordinate: d with two derivatives.
+#[derive(Clone, Copy, Debug)]
+struct Documented {
+    w: f64,
+    a_max: f64,
+    v_max: f64,
+    d: [f64; 3],
+}
+
+impl Documented {
+    fn advance(&mut self, dt_s: f64) {
+        let [d, d_dot, d_ddot] = self.d;
+        let approach = self.w / 3.0;
+        // Beyond it, v_c^2/2 falls by half of a_max per metre.
+        let far = 0.5 * self.a_max / approach.powi(2);
+        let beyond = (d.abs() - far).max(0.0);
+        let speed = ((approach * (d.abs() - beyond)).powi(2) + self.a_max * beyond).sqrt().min(self.v_max);
+        let v_c = -speed.copysign(d);
+        let a_c = (self.w * (v_c - d_dot)).clamp(-self.a_max, self.a_max);
+        self.d = [
+            d + dt_s * (d_dot + 0.5 * dt_s * d_ddot),
+            d_dot + dt_s * d_ddot,
+            d_ddot + dt_s * 3.0 * self.w * (a_c - d_ddot),
+        ];
+    }
+}
+
 /// Largest differences of position, velocity, acceleration and yaw.
 fn apart(a: &Setpoint, b: &Setpoint) -> [f32; 4] {
     [
@@ -115,6 +167,8 @@ proptest! {
             prop_assert!(moved.amax() < 1e-5, "jumped by {moved} in step {step}");
             let gained = next.velocity_m_s - last.velocity_m_s - last.acceleration_m_s2 * DT_S;
             prop_assert!(gained.amax() < 1e-4, "accelerated by {gained} in step {step}");
+            let pushed = next.acceleration_m_s2 - last.acceleration_m_s2 - last.jerk_m_s3 * DT_S;
+            prop_assert!(pushed.amax() < 1e-4, "jerked by {pushed} in step {step}");
             prop_assert!(next.acceleration_m_s2.amax() <= 1.0001 * model.reference_acceleration_m_s2);
             let [across, up] = [next.velocity_m_s.xy().amax(), next.velocity_m_s.z.abs()];
             prop_assert!(across <= 1.2 * SPEED_M_S && up <= 1.2 * CLIMB_M_S, "{across} and {up} m/s");
@@ -127,6 +181,116 @@ proptest! {
         }
         let [x, v, a, yaw] = apart(&last, &to);
         prop_assert!(x < 1e-2 && v < 1e-2 && a < 1e-1 && yaw < 1e-2, "still away by {x} {v} {a} {yaw}");
+    }
+
+    /// From any state the reference starts at the vehicle. Then it goes on as its derivatives say, and follows of each
+    /// jump of the setpoint, in position and in velocity, what brings it nearest to the vehicle.
+    #[test]
+    fn of_a_jump_it_follows_what_brings_it_nearer_to_the_vehicle(
+        model in any_model(), near in prop::collection::vec((setpoint_near(), setpoint_near()), 2..30),
+    ) {
+        let reference = Reference::new(&model, &limits(), DT_S).unwrap();
+        let list = |s: &Setpoint| [s.position_m.x, s.position_m.y, s.position_m.z, s.yaw_rad].map(f64::from);
+        let speeds = |s: &Setpoint| [s.velocity_m_s.x, s.velocity_m_s.y, s.velocity_m_s.z, s.yaw_rate_rad_s].map(f64::from);
+        let pushes = |s: &Setpoint| {
+            let a = &s.acceleration_m_s2;
+            [a.x, a.y, a.z, s.yaw_acceleration_rad_s2].map(f64::from)
+        };
+        let jerks = |s: &Setpoint| [s.jerk_m_s3.x, s.jerk_m_s3.y, s.jerk_m_s3.z, 0.0].map(f64::from);
+        let dt = f64::from(DT_S);
+        let mut detours = reference.start(&on(&near[0].1), &near[0].0);
+        let mut last: Option<(Setpoint, Setpoint)> = None;
+        for (setpoint, vehicle) in &near {
+            let tracked = reference.advance(&mut detours, &on(vehicle), setpoint);
+            for i in 0..4 {
+                let (x, v) = (list(&tracked)[i], speeds(&tracked)[i]);
+                let (at, speed) = (list(vehicle)[i], speeds(vehicle)[i]);
+                let Some((setpoint_then, then)) = &last else {
+                    prop_assert!((x - at).abs() < 1e-6 && (v - speed).abs() < 1e-6, "starts at {x} with {v}");
+                    continue;
+                };
+                let on_x = |s: &Setpoint| list(s)[i] + dt * (speeds(s)[i] + 0.5 * dt * pushes(s)[i]);
+                let on_v = |s: &Setpoint, j: f64| speeds(s)[i] + dt * (pushes(s)[i] + 0.5 * dt * j);
+                let nearest = |goes_on: f64, jump: f64, vehicle: f64| {
+                    vehicle.clamp(goes_on.min(goes_on + jump), goes_on.max(goes_on + jump))
+                };
+                let wanted = nearest(on_x(then), list(setpoint)[i] - on_x(setpoint_then), at);
+                prop_assert!((x - wanted).abs() < 1e-5, "{i}: at {x} instead of {wanted}");
+                let jump = speeds(setpoint)[i] - on_v(setpoint_then, jerks(setpoint_then)[i]);
+                // The setpoint's own jerk is in its next velocity; the detour's is not in the detour's.
+                let own = 0.5 * dt * dt * jerks(setpoint_then)[i];
+                let wanted = nearest(on_v(then, 0.0) + own, jump, speed);
+                prop_assert!((v - wanted).abs() < 1e-5, "{i}: {v} m/s instead of {wanted}");
+            }
+            last = Some((*setpoint, tracked));
+        }
+    }
+
+    /// With a setpoint that accelerates itself, the reference accelerates no more than the model may or the setpoint
+    /// does.
+    #[test]
+    fn it_accelerates_no_more_than_it_may_or_the_setpoint_does(
+        model in any_model(), sines in sines(), by in -20.0_f32..20.0,
+    ) {
+        let reference = Reference::new(&model, &Limits::NONE, DT_S).unwrap();
+        let first = on_sines(&sines, 0.0);
+        let mut detours = reference.start(&on(&first), &first);
+        let mut last = first;
+        for step in 0..6000 {
+            let mut setpoint = on_sines(&sines, f64::from(step) * f64::from(DT_S));
+            if step > 500 {
+                setpoint.position_m += Vector3::new(by, -by, by);
+            }
+            last = reference.advance(&mut detours, &on(&last), &setpoint);
+            for (own, all) in setpoint.acceleration_m_s2.iter().zip(last.acceleration_m_s2.iter()) {
+                let most = own.abs().max(model.reference_acceleration_m_s2) * 1.0001;
+                prop_assert!(all.abs() <= most, "{all} m/s2 with {own} m/s2 of the setpoint in step {step}");
+            }
+        }
+    }
+
+    /// A jump far beyond the limits takes the course of the documented equations, integrated in `f64` with a tenth of
+    /// the step.
+    #[test]
+    fn a_large_jump_takes_the_documented_course(
+        model in any_model(), by in prop_oneof![0.1_f32..1.0, 1.0_f32..60.0], turn in 0.1_f32..3.0, back: bool,
+    ) {
+        let reference = Reference::new(&model, &limits(), DT_S).unwrap();
+        let sign = if back { -1.0 } else { 1.0 };
+        let from = Setpoint::default();
+        let to = Setpoint { position_m: Vector3::repeat(sign * by), yaw_rad: sign * turn, ..from };
+        let mut detours = reference.start(&on(&from), &from);
+        let mut last = reference.advance(&mut detours, &on(&from), &from);
+        let (a, yaw_a) = (model.reference_acceleration_m_s2, model.reference_turn_rad_s2);
+        let coordinate = |w: f32, a: f32, v: f32, d: f32| Documented {
+            w: f64::from(w),
+            a_max: f64::from(a),
+            v_max: f64::from(v),
+            d: [-f64::from(sign * d), 0.0, 0.0],
+        };
+        let mut exact = [
+            coordinate(model.reference_xy_rad_s, a, SPEED_M_S, by),
+            coordinate(model.reference_z_rad_s, a, CLIMB_M_S, by),
+            coordinate(model.reference_yaw_rad_s, yaw_a, model.reference_yaw_rate_rad_s, turn),
+        ];
+        for step in 0..8000 {
+            last = reference.advance(&mut detours, &on(&last), &to);
+            let got = [
+                (last.position_m.x - to.position_m.x, last.velocity_m_s.x),
+                (last.position_m.z - to.position_m.z, last.velocity_m_s.z),
+                (last.yaw_rad - to.yaw_rad, last.yaw_rate_rad_s),
+            ];
+            for ((d, v), exact) in got.into_iter().zip(&mut exact) {
+                let [exact_d, exact_v, _] = exact.d;
+                // A step late by its half, at the speed and the acceleration of the moment.
+                let (off_d, off_v) = ((f64::from(d) - exact_d).abs(), (f64::from(v) - exact_v).abs());
+                let size = exact.v_max.min(f64::from(by.max(turn)) * exact.w);
+                prop_assert!(off_d < 4e-3 * size && off_v < 0.02 * size, "{d} {v} for {exact:?} in step {step}");
+                for _ in 0..10 {
+                    exact.advance(1e-4);
+                }
+            }
+        }
     }
 
     /// Setpoint and vehicle go on while no step is made: so does the reference. A vehicle that stood still meanwhile is
@@ -189,6 +353,19 @@ fn a_small_jump_decays_as_the_model_says() {
         assert!((f64::from(tracked.position_m.x) - exact).abs() < 3e-3, "{} instead of {exact}", tracked.position_m.x);
     }
     assert_eq!((tracked.position_m.y, tracked.yaw_rad), (0.0, 0.0));
+}
+
+/// One bandwidth is enough for a model.
+#[test]
+fn each_bandwidth_makes_a_model() {
+    let none = ReferenceModel::DEFAULT;
+    for model in [
+        ReferenceModel { reference_xy_rad_s: 1.0, ..none },
+        ReferenceModel { reference_z_rad_s: 1.0, ..none },
+        ReferenceModel { reference_yaw_rad_s: 1.0, ..none },
+    ] {
+        assert!(Reference::new(&model, &Limits::NONE, DT_S).is_some(), "{model:?}");
+    }
 }
 
 /// Without bandwidths there is no model; a coordinate without one is tracked to the bit.
