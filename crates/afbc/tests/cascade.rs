@@ -1,0 +1,288 @@
+//! The cascade as a composition: what each subsystem is told, what becomes of its input, and what is carried over to
+//! the next step. The laws themselves are compared with their equations in `law.rs` and `integral.rs`.
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
+
+mod common;
+
+use afbc::integral::IntegralBackstepping;
+use afbc::law::{Context, Tracking};
+use afbc::model::{Model, RollPitch};
+use afbc::{Adaptive, Backstepping, Controller, Law, Limits, Profile, Settings};
+use afbc_control::Screened;
+use afbc_control::command_filter::Filtered;
+use afbc_types::{Axis, Inputs, Parameters, PerAxis, Setpoint, State};
+use common::step;
+use nalgebra::{Rotation3, Vector3};
+use proptest::prelude::*;
+
+const GRAVITY_M_S2: f64 = 9.81;
+const WEIGHT_N: f64 = 0.486 * 9.81;
+
+/// Error of a rotation by the yaw angle: sine and cosine are off by up to 1.7e-4.
+const ROTATION: f64 = 4e-4;
+
+fn vector(size: f32) -> impl Strategy<Value = Vector3<f32>> {
+    prop::array::uniform3(-size..size).prop_map(Vector3::from)
+}
+
+fn near() -> impl Strategy<Value = (State, Setpoint)> {
+    let state = (vector(0.5), vector(0.5), vector(0.4), vector(1.0), -3.0_f32..3.0).prop_map(
+        |(position_m, velocity_m_s, lean, rates_rad_s, yaw)| State {
+            position_m,
+            velocity_m_s,
+            attitude_rad: Vector3::new(lean.x, lean.y, yaw),
+            rates_rad_s,
+        },
+    );
+    let setpoint = (vector(0.5), vector(0.5), vector(1.0), (vector(3.0), vector(10.0)), vector(1.0)).prop_map(
+        |(position_m, velocity_m_s, acceleration_m_s2, (jerk_m_s3, snap_m_s4), yaw)| Setpoint {
+            position_m,
+            velocity_m_s,
+            acceleration_m_s2,
+            jerk_m_s3,
+            snap_m_s4,
+            yaw_rad: 3.0 * yaw.x,
+            yaw_rate_rad_s: yaw.y,
+            yaw_acceleration_rad_s2: yaw.z,
+        },
+    );
+    (state, setpoint)
+}
+
+/// The paper's settings with these switches, and limits that may act on the desired attitude.
+fn settings() -> impl Strategy<Value = Settings> {
+    let limits = (0.3_f32..1.5, 1.0_f32..20.0).prop_map(|(tilt_max_rad, acceleration_max_m_s2)| Limits {
+        tilt_max_rad,
+        acceleration_max_m_s2,
+        ..Limits::NONE
+    });
+    (limits, any::<[bool; 4]>(), 10.0_f32..100.0, prop_oneof![Just(3.0_f32), Just(1.5)]).prop_map(
+        |(limits, [tilt_by_thrust, anti_windup, bumpless, feed_forward], command_filter_rad_s, force_n)| {
+            let settings =
+                Settings { limits, tilt_by_thrust, anti_windup, bumpless, feed_forward, ..Settings::DEFAULT };
+            Settings { command_filter_rad_s, ..settings.with_rotor_force_max_n(force_n) }
+        },
+    )
+}
+
+/// Roll and pitch of a thrust along this acceleration \[m/s2\] in the earth frame, at this yaw.
+fn leaning(ahead: [f64; 2], vertical: f64, yaw_rad: f64) -> [f64; 2] {
+    let thrust = Rotation3::from_euler_angles(0.0, 0.0, -yaw_rad) * Vector3::new(ahead[0], ahead[1], vertical);
+    [(-thrust.y / thrust.norm()).asin(), thrust.x.atan2(thrust.z)]
+}
+
+/// A filter step of the equation d^2 x/dt^2 = w^2 (command - x) - 2 w dx/dt in `f64`, in hundred small steps.
+fn filtered(from: &Filtered, command: f64, w: f64) -> [f64; 2] {
+    let (mut x, mut v, h) = (f64::from(from.angle), f64::from(from.rate), 1e-5);
+    for _ in 0..100 {
+        let a = w * w * (command - x) - 2.0 * w * v;
+        let jerk = -w * w * v - 2.0 * w * a;
+        x += h * (v + 0.5 * h * a);
+        v += h * (a + 0.5 * h * jerk);
+    }
+    [x, v]
+}
+
+/// d eta/dt of a body that turns at these rates.
+fn eta_dot(state: &State) -> Vector3<f64> {
+    let (eta, rates) = (state.attitude_rad.cast::<f64>(), state.rates_rad_s.cast::<f64>());
+    let yaw = (rates.y * eta.x.sin() + rates.z * eta.x.cos()) / eta.y.cos();
+    Vector3::new(rates.x + eta.y.sin() * yaw, rates.y * eta.x.cos() - rates.z * eta.x.sin(), yaw)
+}
+
+/// What the cascade carries from one step to the next.
+#[derive(Clone, Copy, Default)]
+struct Carried {
+    /// Angles that the filter is told.
+    commanded: [f64; 2],
+    filtered: Option<[Filtered; 2]>,
+    unallocated: PerAxis<f32>,
+    rotor_residual_rad_s: f32,
+}
+
+/// Flies `law` in its cascade, and compares each subsystem's errors and input with those of the law alone.
+fn compose<L: Law + Copy>(law: L, settings: Settings, inputs: &[(State, Setpoint)]) -> Result<(), TestCaseError>
+where
+    L::Estimate: PartialEq,
+{
+    let vehicle = Parameters::PAPER.to_f32();
+    let controller: Controller<L> = Controller::new(vehicle, settings, law).unwrap();
+    let model = Model::new(&vehicle);
+    let (mut memory, mut carried) = (Screened::default(), Carried::default());
+    let mut estimates = PerAxis::default();
+    let known_n = if settings.feed_forward { WEIGHT_N as f32 } else { 0.0 };
+    if settings.bumpless {
+        law.start(&mut estimates, WEIGHT_N as f32 - known_n);
+    }
+    for (state, setpoint) in inputs {
+        let hover_n = law.hover_thrust_n(&estimates.z, WEIGHT_N as f32, known_n);
+        let command = step(&controller, &mut memory, state, setpoint);
+        let (trace, action) = (&command.trace, &command.action);
+        let context = Context {
+            state,
+            roll_pitch: RollPitch::new(state),
+            rotor_residual_rad_s: carried.rotor_residual_rad_s,
+            dt_s: settings.common.dt_s,
+            adapt: true,
+            unallocated: &carried.unallocated,
+            observed_m_s2: [0.0; 2],
+            known: settings.feed_forward.then_some(&model),
+        };
+        let seen = command.per_axis();
+        let mut check = |axis: Axis, tracking: Tracking, [error_slack, input_slack]: [f64; 2]| {
+            let (u, errors) = law.input(axis, &tracking, &context, &mut estimates[axis]);
+            let got = trace.errors[axis];
+            for (got, wanted) in [(got.e1, errors.e1), (got.e1_dot, errors.e1_dot), (got.e2, errors.e2)] {
+                prop_assert!(f64::from(got - wanted).abs() <= 1e-6 + error_slack, "{axis:?}: {got} for {wanted}");
+            }
+            let (got, scale) = (f64::from(seen[axis]), f64::from(u).abs() + 1.0);
+            prop_assert!((got - f64::from(u)).abs() <= 1e-6 * scale + input_slack, "{axis:?}: {got} for {u}");
+            // What is learnt from slightly other errors is slightly other.
+            estimates[axis] = memory.control.estimates[axis];
+            Ok(())
+        };
+
+        // Position: straight from state and setpoint.
+        for (index, axis) in [(2, Axis::Z), (0, Axis::X), (1, Axis::Y)] {
+            let tracking = Tracking {
+                x1: state.position_m[index],
+                x2: state.velocity_m_s[index],
+                e1: setpoint.position_m[index] - state.position_m[index],
+                x1d_dot: setpoint.velocity_m_s[index],
+                x1d_ddot: setpoint.acceleration_m_s2[index],
+                approach_1_s: None,
+            };
+            check(axis, tracking, [0.0; 2])?;
+        }
+
+        // Desired attitude (39), (40), within the limits.
+        let eta = state.attitude_rad.cast::<f64>();
+        let thrust_max_n = 4.0 * f64::from(settings.common.rotor_force_max_n);
+        let vertical = if settings.tilt_by_thrust {
+            let upward = f64::from(seen.z).min(thrust_max_n) * eta.x.cos() * eta.y.cos();
+            GRAVITY_M_S2 * (upward / f64::from(hover_n).min(thrust_max_n)).max(0.3)
+        } else {
+            GRAVITY_M_S2
+        };
+        let tilt_max = f64::from(settings.limits.tilt_max_rad);
+        let most = (vertical * tilt_max.tan()).min(f64::from(settings.limits.acceleration_max_m_s2));
+        let asked = [f64::from(seen.x), f64::from(seen.y)];
+        let scale = (most / asked[0].hypot(asked[1])).min(1.0);
+        let ahead = asked.map(|u| u * scale);
+        let angles = leaning(ahead, vertical, eta.z);
+        for (got, wanted) in trace.desired_rad.iter().zip(angles) {
+            prop_assert!((f64::from(*got) - wanted).abs() <= 2.0 * ROTATION, "{got} for {wanted}");
+        }
+        let angles = trace.desired_rad.map(f64::from);
+
+        // Ahead of the filter by its lag, with the derivatives that follow from jerk and snap.
+        let w = f64::from(settings.command_filter_rad_s);
+        // (40) differentiated with yaw, thrust and, for roll, pitch held.
+        let slope = |rate: &Vector3<f32>| {
+            let along =
+                Rotation3::from_euler_angles(0.0, 0.0, -eta.z) * Vector3::new(rate.x, rate.y, 0.0).cast::<f64>();
+            let [roll, pitch] = angles.map(f64::cos);
+            [-along.y * pitch * roll * roll / vertical, along.x * pitch * pitch / vertical]
+        };
+        let forward = if settings.feed_forward { slope(&setpoint.snap_m_s4) } else { [0.0; 2] };
+        let mut commanded = angles;
+        if settings.feed_forward {
+            let rates = slope(&setpoint.jerk_m_s3);
+            commanded = [0, 1].map(|i| angles[i] + 2.0 * rates[i] / w + forward[i] / (w * w));
+            let size = commanded[0].hypot(commanded[1]);
+            commanded = commanded.map(|angle| angle * (tilt_max / size).min(1.0));
+        }
+        for i in 0..2 {
+            let (angle, rate) = (f64::from(trace.filtered[i].angle), f64::from(trace.filtered[i].rate));
+            let start = if settings.bumpless { eta[i] } else { angles[i] };
+            let [wanted, wanted_rate] =
+                carried.filtered.map_or([start, 0.0], |then| filtered(&then[i], carried.commanded[i], w));
+            // With feed-forward the commanded angle is known up to the rotation of jerk and snap.
+            let slack = 3e-6 + if settings.feed_forward { ROTATION * w * 1e-3 } else { 0.0 };
+            prop_assert!((angle - wanted).abs() <= slack, "{angle} for {wanted}");
+            prop_assert!((rate - wanted_rate).abs() <= slack * 4.0 * w, "{rate} for {wanted_rate} rad/s");
+        }
+
+        // Attitude: from the filter, and from d eta/dt, which is Omega in (6).
+        let turning = if settings.feed_forward { eta_dot(state) } else { state.rates_rad_s.cast() };
+        // Over g of roll and pitch, the rounding of the filter's acceleration, and the rotation of the snap.
+        let slack = match settings.feed_forward {
+            true => [2.0 * ROTATION, 2.0 * ROTATION * 12.0],
+            false => [0.0, 4e-7 * w * w / 65.0],
+        };
+        for (i, axis) in [Axis::Roll, Axis::Pitch].into_iter().enumerate() {
+            let Filtered { angle, rate } = trace.filtered[i];
+            let filter = w * w * (commanded[i] - f64::from(angle)) - 2.0 * w * f64::from(rate);
+            let tracking = Tracking {
+                x1: state.attitude_rad[i],
+                x2: turning[i] as f32,
+                e1: angle - state.attitude_rad[i],
+                x1d_dot: rate,
+                x1d_ddot: if settings.feed_forward { forward[i] } else { filter } as f32,
+                approach_1_s: None,
+            };
+            check(axis, tracking, slack)?;
+        }
+        let turn = f64::from(setpoint.yaw_rad) - eta.z;
+        let tracking = Tracking {
+            x1: state.attitude_rad.z,
+            x2: turning.z as f32,
+            e1: (turn - core::f64::consts::TAU * (turn / core::f64::consts::TAU).round()) as f32,
+            x1d_dot: setpoint.yaw_rate_rad_s,
+            x1d_ddot: setpoint.yaw_acceleration_rad_s2,
+            approach_1_s: None,
+        };
+        check(Axis::Yaw, tracking, slack)?;
+
+        // What is carried over.
+        let missing = |asked: f32, given: f32| if action.health.saturated { asked - given } else { 0.0 };
+        let (Inputs { roll_n, pitch_n, yaw_n, thrust_n }, given) = (trace.inputs, &action.given);
+        if settings.anti_windup {
+            carried.unallocated = PerAxis {
+                roll: missing(roll_n, given.roll_n),
+                pitch: missing(pitch_n, given.pitch_n),
+                yaw: missing(yaw_n, given.yaw_n),
+                z: missing(thrust_n, given.thrust_n),
+                x: if scale < 1.0 { seen.x } else { 0.0 },
+                y: if scale < 1.0 { seen.y } else { 0.0 },
+            };
+        }
+        if L::USES_ROTOR_RESIDUAL {
+            let [w1, w2, w3, w4] = action.speeds.0.into();
+            carried.rotor_residual_rad_s = w1 - w2 + w3 - w4;
+        }
+        carried.filtered = Some(trace.filtered);
+        carried.commanded = commanded;
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 1_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn afbc_is_told_what_its_subsystems_must_know(
+        settings in settings(), inputs in prop::collection::vec(near(), 1..12),
+    ) {
+        let gains = Profile::Paper.gains().map(|gains| afbc::adaptive::Gains { epsilon: 0.5, ..*gains });
+        compose(Adaptive::new(gains).unwrap(), settings, &inputs)?;
+    }
+
+    #[test]
+    fn backstepping_is_told_what_its_subsystems_must_know(
+        settings in settings(), inputs in prop::collection::vec(near(), 1..12),
+    ) {
+        let vehicle = Parameters::PAPER.to_f32();
+        let gains = Profile::Paper.gains().map(|gains| gains.backstepping);
+        compose(Backstepping::new(&vehicle, gains).unwrap(), settings, &inputs)?;
+    }
+
+    #[test]
+    fn the_fallback_is_told_what_its_subsystems_must_know(
+        settings in settings(), inputs in prop::collection::vec(near(), 1..12),
+    ) {
+        let vehicle = Parameters::PAPER.to_f32();
+        let gains = Profile::Paper.gains().map(|gains| gains.into());
+        compose(IntegralBackstepping::new(&vehicle, gains).unwrap(), settings, &inputs)?;
+    }
+}
