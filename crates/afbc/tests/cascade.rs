@@ -4,12 +4,13 @@
 
 mod common;
 
+use afbc::cascade::desired_attitude;
 use afbc::integral::IntegralBackstepping;
 use afbc::law::{Context, Tracking};
 use afbc::model::{Model, RollPitch};
 use afbc::{Adaptive, Backstepping, Controller, Law, Limits, Profile, Settings};
-use afbc_control::Screened;
 use afbc_control::command_filter::Filtered;
+use afbc_control::{FlightController, Screened};
 use afbc_types::{Axis, Inputs, Parameters, PerAxis, Setpoint, State};
 use common::step;
 use nalgebra::{Rotation3, Vector3};
@@ -101,10 +102,12 @@ struct Carried {
 }
 
 /// Flies `law` in its cascade, and compares each subsystem's errors and input with those of the law alone.
-fn compose<L: Law + Copy>(law: L, settings: Settings, inputs: &[(State, Setpoint)]) -> Result<(), TestCaseError>
-where
-    L::Estimate: PartialEq,
-{
+fn compose<L: Law + Copy>(
+    law: L,
+    settings: Settings,
+    inputs: &[(State, Setpoint)],
+    apart: fn(&L::Estimate, &L::Estimate) -> f32,
+) -> Result<(), TestCaseError> {
     let vehicle = Parameters::PAPER.to_f32();
     let controller: Controller<L> = Controller::new(vehicle, settings, law).unwrap();
     let model = Model::new(&vehicle);
@@ -137,8 +140,11 @@ where
             }
             let (got, scale) = (f64::from(seen[axis]), f64::from(u).abs() + 1.0);
             prop_assert!((got - f64::from(u)).abs() <= 1e-6 * scale + input_slack, "{axis:?}: {got} for {u}");
-            // What is learnt from slightly other errors is slightly other.
-            estimates[axis] = memory.control.estimates[axis];
+            // What is learnt in a step from slightly other errors is slightly other.
+            let learnt = &memory.control.estimates[axis];
+            let off = f64::from(apart(&estimates[axis], learnt));
+            prop_assert!(off <= 2e-6 + 1e-2 * error_slack, "{axis:?}: {learnt:?} for {:?}", estimates[axis]);
+            estimates[axis] = *learnt;
             Ok(())
         };
 
@@ -234,6 +240,15 @@ where
         };
         check(Axis::Yaw, tracking, slack)?;
 
+        // Distances are those from the setpoint, and errors of the attitude.
+        let (distances, errors) = (&memory.control.distances, &trace.errors);
+        let away = setpoint.position_m - state.position_m;
+        prop_assert_eq!([distances.x, distances.y, distances.z], [away.x, away.y, away.z]);
+        prop_assert_eq!(
+            [distances.roll, distances.pitch, distances.yaw],
+            [errors.roll.e1, errors.pitch.e1, errors.yaw.e1]
+        );
+
         // What is carried over.
         let missing = |asked: f32, given: f32| if action.health.saturated { asked - given } else { 0.0 };
         let (Inputs { roll_n, pitch_n, yaw_n, thrust_n }, given) = (trace.inputs, &action.given);
@@ -265,7 +280,9 @@ proptest! {
         settings in settings(), inputs in prop::collection::vec(near(), 1..12),
     ) {
         let gains = Profile::Paper.gains().map(|gains| afbc::adaptive::Gains { epsilon: 0.5, ..*gains });
-        compose(Adaptive::new(gains).unwrap(), settings, &inputs)?;
+        compose(Adaptive::new(gains).unwrap(), settings, &inputs, |a, b| {
+            (a.theta - b.theta).amax().max((a.delta - b.delta).abs())
+        })?;
     }
 
     #[test]
@@ -274,7 +291,7 @@ proptest! {
     ) {
         let vehicle = Parameters::PAPER.to_f32();
         let gains = Profile::Paper.gains().map(|gains| gains.backstepping);
-        compose(Backstepping::new(&vehicle, gains).unwrap(), settings, &inputs)?;
+        compose(Backstepping::new(&vehicle, gains).unwrap(), settings, &inputs, |(), ()| 0.0)?;
     }
 
     #[test]
@@ -283,6 +300,39 @@ proptest! {
     ) {
         let vehicle = Parameters::PAPER.to_f32();
         let gains = Profile::Paper.gains().map(|gains| gains.into());
-        compose(IntegralBackstepping::new(&vehicle, gains).unwrap(), settings, &inputs)?;
+        let law = IntegralBackstepping::new(&vehicle, gains).unwrap();
+        compose(law, settings, &inputs, |a, b| (a.value - b.value).abs())?;
     }
+
+    /// (40): the thrust of these angles is along the wanted acceleration, with the vertical one given.
+    #[test]
+    fn the_desired_attitude_leans_along_the_acceleration(
+        u5 in -20.0_f32..20.0, u6 in -20.0_f32..20.0, yaw_rad in -9.0_f32..9.0, vertical in 2.0_f32..20.0,
+    ) {
+        let got = desired_attitude(u5, u6, yaw_rad, 1.0 / vertical);
+        let wanted = leaning([u5, u6].map(f64::from), f64::from(vertical), f64::from(yaw_rad));
+        for (got, wanted) in got.into_iter().zip(wanted) {
+            prop_assert!((f64::from(got) - wanted).abs() <= 2.0 * ROTATION, "{got} for {wanted}");
+        }
+    }
+}
+
+/// The speed limit shortens the error, not the distance that a monitor looks at; and a controller tells its time step,
+/// its mixer and what its law has learnt.
+#[test]
+fn a_controller_tells_what_others_need() {
+    let (vehicle, settings) = (Parameters::PAPER.to_f32(), Profile::Paper.settings().with_dt_s(0.004));
+    let limits = Limits { speed_max_m_s: 1.0, climb_max_m_s: 1.0, ..Limits::NONE };
+    let law = Adaptive::new(Profile::Paper.gains()).unwrap();
+    let controller: Controller<Adaptive> = Controller::new(vehicle, Settings { limits, ..settings }, law).unwrap();
+    assert_eq!(controller.dt_s(), 0.004);
+    assert_eq!(controller.mixer(), &settings.common.mixer(vehicle).unwrap());
+    let mut memory = Screened::default();
+    let setpoint = Setpoint { position_m: Vector3::new(30.0, -20.0, 10.0), ..Setpoint::default() };
+    let trace = step(&controller, &mut memory, &State::default(), &setpoint).trace;
+    let distances = memory.control.distances;
+    assert_eq!([distances.x, distances.y, distances.z], [30.0, -20.0, 10.0]);
+    assert!(trace.errors.x.e1 < 2.0 && trace.errors.y.e1 > -2.0 && trace.errors.z.e1 < 2.0);
+    let learnt = Controller::<Adaptive>::learnt(&memory.control);
+    assert!(learnt == memory.control.estimates && Axis::ALL.iter().any(|axis| learnt[*axis].delta > 0.0));
 }
