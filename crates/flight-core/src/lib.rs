@@ -40,3 +40,6 @@ pub use reasons::Reasons;
 pub use supervisor::{ArmingLimits, End, Mode, Refusal, Request};
 pub use tick::{Answer, Health, Outcome, Vehicle, VehicleMemory};
 pub use tracker::Tracker;
+
+#[cfg(test)]
+mod tests;

@@ -2,10 +2,11 @@
 //! its page, solved in closed form or in double precision and by other means.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use afbc_flight_core::Stamped;
-use afbc_flight_core::blind::{Blind, DESCENT_THRUST, HOLD_RAD_S, INNOVATION_MAX_RAD_S, LAG_S, Reckoning, TRIM_S};
-use afbc_flight_core::descent::{Descent, Drift, SINK_M_S};
-use afbc_flight_core::observer::{
+use super::std::vec;
+use crate::Stamped;
+use crate::blind::{Blind, DESCENT_THRUST, HOLD_RAD_S, INNOVATION_MAX_RAD_S, LAG_S, Reckoning, TRIM_S};
+use crate::descent::{Descent, Drift, SINK_M_S};
+use crate::observer::{
     ATTITUDE_RAD_S, LATE_US, OUTLIER, OUTLIERS_MAX, Observer, POSITION_RAD_S, PUSH_MAX_M_S2, SIGMAS_MAX, TRIM_SHARE,
 };
 use afbc_types::{Inputs, Parameters, Pose, PoseSigmas, State};

@@ -2,14 +2,13 @@
 //! states, and for poses instead of states.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
+use super::std::vec::Vec;
+use crate::blind::{Blind, DESCENT_THRUST};
+use crate::descent::SINK_M_S;
+use crate::landing::{STILL_US, USUAL_S};
+use crate::supervisor::{COAST_US, DESCEND_US, GIVE_UP_US};
+use crate::{ArmingLimits, Asked, End, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory};
 use afbc_control::{Action, FlightController, Mixer, Trace};
-use afbc_flight_core::blind::{Blind, DESCENT_THRUST};
-use afbc_flight_core::descent::SINK_M_S;
-use afbc_flight_core::landing::{STILL_US, USUAL_S};
-use afbc_flight_core::supervisor::{COAST_US, DESCEND_US, GIVE_UP_US};
-use afbc_flight_core::{
-    ArmingLimits, Asked, End, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory,
-};
 use afbc_types::{Inputs, Parameters, Pose, PoseSigmas, RotorForces, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 

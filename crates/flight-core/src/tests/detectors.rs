@@ -2,12 +2,12 @@
 //! times, to the tick.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use afbc_flight_core::landing::{
+use crate::landing::{
     CARRIED_US, CARRY_SHARE, FROZEN_US, HOVER_US, LEFT_M, LEFT_M_S, LandDetector, SINKS_M_S, STILL_M_S, STILL_US,
     USUAL_S,
 };
-use afbc_flight_core::tumble::{LOST_US, SPIN_RAD_S, TILT_COSINE_MIN, Tumble, UPRIGHT_US};
-use afbc_flight_core::witness::{STANDS_SHARE, TRAVEL_M, TURN_RAD, WINDOW_US, Witness};
+use crate::tumble::{LOST_US, SPIN_RAD_S, TILT_COSINE_MIN, Tumble, UPRIGHT_US};
+use crate::witness::{STANDS_SHARE, TRAVEL_M, TURN_RAD, WINDOW_US, Witness};
 use afbc_types::State;
 use nalgebra::Vector3;
 use proptest::prelude::*;

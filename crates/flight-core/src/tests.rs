@@ -1,0 +1,7 @@
+//! Tests of single parts, in the crate itself so that they are built once for all.
+
+extern crate std;
+
+mod detectors;
+mod reckoning;
+mod told;
