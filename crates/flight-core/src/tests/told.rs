@@ -1,6 +1,6 @@
 //! What the tick tells the law, by a law that notes it: the state and setpoint of every tick, for late, missing and lost
 //! states, and for poses instead of states.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
+#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use super::std::vec::Vec;
 use crate::blind::{Blind, DESCENT_THRUST};
@@ -222,8 +222,8 @@ fn between_states_roll_and_pitch_are_reckoned() {
             let learnt = 1.0 - (-1.5_f32).exp();
             let t = age_ms as f32 * 1e-3;
             for (axis, input, authority) in [(0, given.roll_n, 0.25 / 0.0038), (1, given.pitch_n, 0.25 / 0.0038)] {
-                let rate = last.rates_rad_s.iter().nth(axis).expect("three") + authority * input * (1.0 - learnt) * t;
-                let told = state.rates_rad_s.iter().nth(axis).expect("three");
+                let rate = last.rates_rad_s[axis] + authority * input * (1.0 - learnt) * t;
+                let told = state.rates_rad_s[axis];
                 assert!((told - rate).abs() < 2e-3 + 0.3 * (rate - last.rates_rad_s[axis]).abs(), "{told}, not {rate}");
             }
         }

@@ -172,7 +172,7 @@ fn at_a_place_are_vehicle_and_setpoint() {
 fn sticks_are_between_their_ends() {
     let set = |index: usize, value: f32| {
         let mut all = [0.5; 4];
-        all.iter_mut().nth(index).into_iter().for_each(|stick| *stick = value);
+        all.get_mut(index).into_iter().for_each(|stick| *stick = value);
         let [roll, pitch, throttle, yaw] = all;
         sticks::is_plausible(&Sticks { roll, pitch, throttle, yaw })
     };
