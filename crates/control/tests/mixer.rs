@@ -9,7 +9,7 @@ use afbc_control::Settings;
 use afbc_control::mixer::{AUTHORITY, Allocation, HOVER_MARGIN, Mixer, THRUST_SHARE};
 use afbc_types::{Airframe, Inputs, PLUS, Parameters, ROTOR_POSITION, Rotor, RotorForces, RotorSpeeds};
 use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
-use nalgebra::{Matrix4, SVector, Vector4};
+use nalgebra::{SMatrix, SVector, Vector4};
 use proptest::prelude::*;
 
 /// Rounding error of one `f32` operation, relative.
@@ -50,6 +50,16 @@ const UNEVEN: [Rotor; 4] = [
     Rotor { x: 0.6, y: -0.9, pushes_left: false },
     Rotor { x: -0.9, y: -0.6, pushes_left: true },
     Rotor { x: -0.9, y: 0.6, pushes_left: false },
+];
+
+/// Two triangles, a quarter turn apart: equal shares of a pure thrust, but no rotor opposite another.
+const TRIANGLES: [Rotor; 6] = [
+    Rotor { x: 1.0, y: 0.0, pushes_left: true },
+    Rotor { x: 0.0, y: 1.0, pushes_left: false },
+    Rotor { x: -0.5, y: 0.866_025_4, pushes_left: true },
+    Rotor { x: -0.866_025_4, y: -0.5, pushes_left: false },
+    Rotor { x: -0.5, y: -0.866_025_4, pushes_left: true },
+    Rotor { x: 0.866_025_4, y: -0.5, pushes_left: false },
 ];
 
 /// Properties of every allocation on every frame: forces within limits, nothing missing of an input that was not
@@ -112,6 +122,57 @@ fn six(forces: &RotorForces) -> Inputs {
 
 fn anything() -> impl Strategy<Value = Inputs> {
     prop::array::uniform4(prop_oneof![prop::num::f32::ANY, -100.0_f32..100.0]).prop_map(inputs)
+}
+
+/// Checks forces against the order of priority, with expected ones found by bisection in `f64`: as much roll and pitch,
+/// in their proportion, as fits at any thrust, but needs none above the demand and the largest raised thrust; of those
+/// thrusts the closest to the demand; then as much yaw as fits.
+fn serves_in_order<const N: usize>(
+    frame: [Rotor; N],
+    asked: [f32; 4],
+    limit: f32,
+    raised: f32,
+) -> Result<(), TestCaseError> {
+    let columns = frame.map(|r| [f64::from(r.y), -f64::from(r.x), if r.pushes_left { 1.0 } else { -1.0 }, 1.0]);
+    let effectiveness = SMatrix::<f64, 4, N>::from_columns(&columns.map(Vector4::from));
+    let inverse = effectiveness.transpose() * (effectiveness * effectiveness.transpose()).try_inverse().unwrap();
+    let share: SVector<f64, N> = inverse.column(3).into();
+    // Frames with a tiny share of a rotor, or with nearly dependent inputs, round more than the tolerance below.
+    prop_assume!(share.min() > 0.05 && inverse.abs().max() < 3.0);
+    let (wanted, limit_n) = (Vector4::from(asked.map(f64::from)), f64::from(limit));
+    // Where all four inputs fit, they are given in full, which other tests check; at the boundary either is right.
+    let exact = inverse * wanted;
+    prop_assume!(exact.min() < -1e-4 || exact.max() > limit_n + 1e-4);
+    let tilt = inverse.column(0) * wanted.x + inverse.column(1) * wanted.y;
+    // Range of thrusts at which no force of `tilt` violates its limits; empty if the first exceeds the second.
+    let thrusts = |tilt: &SVector<f64, N>| {
+        (-tilt.component_div(&share).min(), (tilt.map(|force| limit_n - force)).component_div(&share).min())
+    };
+    let raised_n = wanted.w.max(f64::from(raised));
+    let scaled = largest(|scale| {
+        let (least, most) = thrusts(&(tilt * scale));
+        least <= most && least <= raised_n
+    });
+    let tilt = tilt * scaled;
+    let (least, most) = thrusts(&tilt);
+    let upright = tilt + share * wanted.w.min(most).max(least);
+    let yaw = inverse.column(2) * wanted.z;
+    let slack = 1e-9 * limit_n;
+    let fits = |part: f64| (upright + yaw * part).iter().all(|force| (-slack..=limit_n + slack).contains(force));
+    let forces = upright + yaw * largest(fits);
+
+    let mixer = mixer_of(frame, limit).with_raised_thrust_max_n(raised);
+    let got = mixer.allocate(&inputs(asked));
+    check(&mixer, limit, &inputs(asked), &got)?;
+    // Forces are rounded at the scale of the largest intermediate value, at most 8 N times four entries of the
+    // inverse; yaw's share by that over the yaw forces.
+    for (got, wanted) in got.forces.0.iter().zip(&forces) {
+        prop_assert!(
+            (f64::from(*got) - wanted).abs() <= 1e-4 * (1.0 + limit_n),
+            "{got} for {wanted} of {forces} for {asked:?}"
+        );
+    }
+    Ok(())
 }
 
 /// Feasible demands are given exactly, infeasible ones within the limits.
@@ -262,9 +323,7 @@ proptest! {
         prop_assert!(near(yaw.abs(), asked[2].abs().min(4.0 * room)), "{yaw} with {room} for {asked:?}");
     }
 
-    /// The same order on frames without symmetry, with expected forces found by bisection: as much roll and pitch, in
-    /// their proportion, as fits at any thrust, but needs none above the demand and the largest raised thrust; of those
-    /// thrusts the closest to the demand; then as much yaw as fits.
+    /// The same order on frames without symmetry, and on one whose rotors have equal shares but no opposite ones.
     #[test]
     fn uneven_frames_serve_in_the_same_order(
         frame in uneven(),
@@ -274,44 +333,8 @@ proptest! {
         raised in prop_oneof![Just(f32::MAX), 0.1_f32..10.0],
     ) {
         let asked = if no_yaw { [asked[0], asked[1], 0.0, asked[3]] } else { asked };
-        let columns = frame.map(|r| [f64::from(r.y), -f64::from(r.x), if r.pushes_left { 1.0 } else { -1.0 }, 1.0]);
-        let inverse = Matrix4::from_columns(&columns.map(Vector4::from)).try_inverse().unwrap();
-        let share: Vector4<f64> = inverse.column(3).into();
-        // Frames with a tiny share of a rotor, or with nearly dependent inputs, round more than the tolerance below.
-        prop_assume!(share.min() > 0.05 && inverse.abs().max() < 3.0);
-        let (wanted, limit_n) = (Vector4::from(asked.map(f64::from)), f64::from(limit));
-        // Where all four inputs fit, they are given in full, which other tests check; at the boundary either is right.
-        let exact = inverse * wanted;
-        prop_assume!(exact.min() < -1e-4 || exact.max() > limit_n + 1e-4);
-        let tilt = inverse.column(0) * wanted.x + inverse.column(1) * wanted.y;
-        // Range of thrusts at which no force of `tilt` violates its limits; empty if the first exceeds the second.
-        let thrusts = |tilt: &Vector4<f64>| {
-            (-tilt.component_div(&share).min(), (tilt.map(|force| limit_n - force)).component_div(&share).min())
-        };
-        let raised_n = wanted.w.max(f64::from(raised));
-        let scaled = largest(|scale| {
-            let (least, most) = thrusts(&(tilt * scale));
-            least <= most && least <= raised_n
-        });
-        let tilt = tilt * scaled;
-        let (least, most) = thrusts(&tilt);
-        let upright = tilt + share * wanted.w.min(most).max(least);
-        let yaw = inverse.column(2) * wanted.z;
-        let slack = 1e-9 * limit_n;
-        let fits = |part: f64| (upright + yaw * part).iter().all(|force| (-slack..=limit_n + slack).contains(force));
-        let forces = upright + yaw * largest(fits);
-
-        let mixer = mixer_of(frame, limit).with_raised_thrust_max_n(raised);
-        let got = mixer.allocate(&inputs(asked));
-        check(&mixer, limit, &inputs(asked), &got)?;
-        // Forces are rounded at the scale of the largest intermediate value, at most 8 N times four entries of the
-        // inverse; yaw's share by that over the yaw forces.
-        for (got, wanted) in got.forces.0.iter().zip(&forces) {
-            prop_assert!(
-                (f64::from(*got) - wanted).abs() <= 1e-4 * (1.0 + limit_n),
-                "{got} for {wanted} of {forces} for {asked:?}"
-            );
-        }
+        serves_in_order(frame, asked, limit, raised)?;
+        serves_in_order(TRIANGLES, asked, limit, raised)?;
     }
 
     /// Roll and pitch raise no thrust above the limit and the demand, keep their proportion, and are given as without
@@ -444,6 +467,26 @@ proptest! {
                 let able = Mixer::new(airframe(frame), least.next_up()).unwrap();
                 prop_assert!(able.check_hover(weight_n).is_ok());
             }
+        }
+    }
+
+    /// Of NaN nothing is given, in any input; of what is larger than any rotor gives, the same as of 1e9 N.
+    #[test]
+    fn what_is_too_large_to_matter_is_no_more(asked in prop::array::uniform4(-8.0_f32..8.0), index in 0..4_usize) {
+        let mixer = mixer_of(UNEVEN, 3.0);
+        let with = |value: f32| {
+            let mut asked = asked;
+            asked[index] = value;
+            mixer.allocate(&inputs(asked))
+        };
+        let none = with(f32::NAN);
+        prop_assert!(none.saturated);
+        for (forces, wanted) in none.forces.0.iter().zip(with(0.0).forces.0.iter()) {
+            prop_assert!((forces - wanted).abs() <= 1e-5, "{none:?}");
+        }
+        for sign in [1.0, -1.0] {
+            prop_assert_eq!(with(sign * 1e30), with(sign * 1e9));
+            prop_assert_eq!(with(sign * f32::INFINITY), with(sign * 1e9));
         }
     }
 

@@ -106,6 +106,28 @@ proptest! {
         prop_assert!((w - 300.0).abs() > 1.0 || (0.055..0.06).contains(&wanted), "{wanted}");
     }
 
+    /// Twice the inputs are twice the filtered inputs, however large; and one input has no effect on another.
+    #[test]
+    fn the_filters_are_linear_and_apart(
+        w in 1.0_f32..500.0, lead_s in 0.0_f32..0.02, inputs in prop::collection::vec(inputs(), 2..20),
+    ) {
+        let smoother = Smoother::new(&smoothing(w, lead_s), 0.001).unwrap();
+        let size = 2.0_f32.powi(90);
+        let times = |of: &Inputs, size: f32| Inputs {
+            roll_n: size * of.roll_n,
+            pitch_n: size * of.pitch_n,
+            yaw_n: size * of.yaw_n,
+            thrust_n: size * of.thrust_n,
+        };
+        let (mut plain, mut large, mut alone) = (None, None, None);
+        for inputs in &inputs {
+            let wanted = smoother.advance(&mut plain, inputs);
+            prop_assert_eq!(smoother.advance(&mut large, &times(inputs, size)), times(&wanted, size));
+            let only = smoother.advance(&mut alone, &Inputs { thrust_n: 0.0, roll_n: 0.0, ..*inputs });
+            prop_assert_eq!(only, Inputs { thrust_n: 0.0, roll_n: 0.0, ..wanted });
+        }
+    }
+
     /// An input that is not finite passes, and leaves nothing behind.
     #[test]
     fn nothing_stays_of_an_input_that_is_not_finite(
