@@ -1,6 +1,7 @@
 //! The disturbance observer against its closed solution, and what it must not take for a disturbance.
 #![allow(clippy::unwrap_used, missing_docs, reason = "an observer that cannot be made must fail the test")]
 
+use afbc::Settings;
 use afbc::disturbance::{ACCELERATION_MAX_M_S2, DisturbanceObserver, JUMP_M_S, Observed, Observer};
 use afbc::model::RollPitch;
 use afbc_types::{Parameters, State};
@@ -141,6 +142,55 @@ fn what_is_not_measured_is_not_observed() {
     }
     let after = body.step(&observer, [1.0, 0.5]);
     assert!(after.into_iter().zip(before).all(|(after, before)| (after - before).abs() < 0.02), "{after:?}");
+}
+
+/// After an announced gap it goes on from the velocity that it finds: a difference that has come about meanwhile is no
+/// disturbance, and a new disturbance is found as ever.
+#[test]
+fn it_observes_again_after_a_gap() {
+    let observer = observer(28.7);
+    for drift_m_s in [0.8 * JUMP_M_S, -0.8 * JUMP_M_S, 50.0 * JUMP_M_S] {
+        let mut body = Body::new(Vector3::zeros(), weight_n());
+        for _ in 0..1000 {
+            body.step(&observer, [1.0, 0.0]);
+        }
+        let before = body.step(&observer, [1.0, 0.0]);
+        body.memory.as_mut().unwrap().hold();
+        body.state.velocity_m_s.x += drift_m_s;
+        assert_eq!(body.step(&observer, [1.0, 0.0]), before);
+        let after = body.step(&observer, [1.0, 0.0]);
+        assert!((after[0] - before[0]).abs() < 5e-3, "{after:?}, {before:?} before");
+        let mut found = after;
+        for _ in 0..1000 {
+            found = body.step(&observer, [-2.0, 0.5]);
+        }
+        assert!((found[0] + 2.0).abs() < 0.05 && (found[1] - 0.5).abs() < 0.05, "{found:?}");
+    }
+}
+
+/// A vehicle that is k times slower is observed k times slower: the same course on a clock k times slower.
+#[test]
+fn a_slower_observer_is_the_same_on_a_slower_clock() {
+    let settings = DisturbanceObserver { disturbance_rad_s: 20.0, disturbance_lag_s: 0.05 };
+    let vehicle = Parameters::PAPER.to_f32();
+    let slow = Settings { disturbance: settings, ..Settings::DEFAULT }.slowed(4.0).disturbance;
+    let [quick, slow] = [(&settings, DT_S), (&slow, 4.0 * DT_S)].map(|(settings, dt_s)| {
+        let observer = Observer::new(settings, &vehicle, dt_s).unwrap();
+        let (mut memory, mut state, mut seen) = (None, State::default(), [0.0; 2]);
+        state.attitude_rad.y = 0.05;
+        (0..100_u16)
+            .map(|_| {
+                let at = RollPitch::new(&state);
+                seen = observer.advance(&mut memory, &state, (&at, [0.0, 1.0]), weight_n(), [true, false]);
+                // Half of the thrust, to whose effect the rotors' lag matters, and no motion.
+                observer.give(&mut memory, 0.5 * weight_n());
+                seen[0]
+            })
+            .collect::<Vec<_>>()
+    });
+    for (quick, slow) in quick.into_iter().zip(slow) {
+        assert!((quick - slow).abs() < 1e-4, "{quick} became {slow}");
+    }
 }
 
 proptest! {

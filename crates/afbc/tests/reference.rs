@@ -69,7 +69,7 @@ fn on(setpoint: &Setpoint) -> State {
 /// A setpoint that is not far from others, all of its derivatives included.
 fn setpoint_near() -> impl Strategy<Value = Setpoint> {
     let vector = |size: f32| prop::array::uniform3(-size..size).prop_map(Vector3::from);
-    (vector(0.3), vector(0.5), vector(1.0), vector(5.0), prop::array::uniform3(-0.5_f32..0.5)).prop_map(
+    (vector(0.3), vector(0.5), vector(1.0), vector(100.0), prop::array::uniform3(-0.5_f32..0.5)).prop_map(
         |(
             position_m,
             velocity_m_s,
