@@ -301,3 +301,39 @@ impl Law for Adaptive {
         *estimate
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// u_a of the estimate for these weights.
+    fn fuzzy(estimate: &Estimate, weights: &Matrix3<f32>) -> f32 {
+        weights.dot(&estimate.theta)
+    }
+
+    /// An estimate that resumes an input gives exactly that input; it is even where that fits into the bound, otherwise
+    /// as even as fits, and never larger than the least one that gives it.
+    #[test]
+    fn an_input_is_spread_as_evenly_as_fits() {
+        let basis = Basis::new(Membership { centre: 3.0, width: 1.2 }).unwrap_or_else(|error| panic!("{error}"));
+        for inputs in [[0.0, 0.0], [0.4, -0.9], [2.0, 1.0], [-1.5, 4.0], [-6.0, 0.1]] {
+            let weights = basis.weights(inputs);
+            let least_norm = |input: f32| input.abs() / weights.norm();
+            for input in [-8.0_f32, -1.0, 0.0, 0.3, 2.5, 12.0] {
+                for norm_max in [0.0_f32, 1.0, 3.0, 10.0, 40.0] {
+                    let estimate = spread(input, &weights, norm_max);
+                    let (theta, size) = (estimate.theta, input.abs() + 1.0);
+                    assert!((fuzzy(&estimate, &weights) - input).abs() < 1e-5 * size, "{input} N by {theta}");
+                    assert!(theta.norm() <= norm_max.max(least_norm(input)) * 1.0001 + 1e-6, "{input}: {theta}");
+                    assert!(estimate.delta == 0.0);
+                    if 3.0 * input.abs() <= norm_max {
+                        assert!((theta - even(input).theta).norm() < 1e-5 * size, "{input} N by {theta}");
+                    } else if least_norm(input) < norm_max {
+                        // The bound is used up: evener would be larger.
+                        assert!(theta.norm() > 0.999 * norm_max, "{input} N by {theta} with {norm_max}");
+                    }
+                }
+            }
+        }
+    }
+}

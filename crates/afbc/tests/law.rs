@@ -4,11 +4,12 @@
 use afbc::adaptive::{Gains, Subsystem};
 use afbc::backstepping::{self, ideal, proportional};
 use afbc::fuzzy::{Basis, Membership};
+use afbc::integral::IntegralBackstepping;
 use afbc::law::Context;
 use afbc::law::Tracking;
 use afbc::model::{Dynamics, Model, RollPitch};
 use afbc::{Adaptive, Backstepping, Law, Profile, Safeguards};
-use afbc_control::Estimate;
+use afbc_control::{Errors, Estimate};
 use afbc_types::{Axis, Declaration, Parameters, PerAxis, State};
 use nalgebra::Matrix3;
 use proptest::prelude::*;
@@ -249,6 +250,7 @@ proptest! {
         let total: f64 = rate.theta().iter().copied().map(f64::from).sum();
         prop_assert!((total - f64::from(gains.gamma) * e2).abs() <= 20.0 * U * f64::from(gains.gamma) * e2.abs());
 
+        prop_assert_eq!(rate.leakage(), 0.0);
         prop_assert!(rate.delta() >= 0.0);
         let wanted = f64::from(gains.eta) * e2 * (e2 / f64::from(gains.epsilon)).tanh();
         prop_assert!((f64::from(rate.delta()) - wanted).abs() <= f64::from(gains.eta) * e2.abs() * (1.4e-7 + 5.0 * U));
@@ -298,6 +300,59 @@ proptest! {
             }
             prop_assert_eq!(moved.delta, before.delta + rate.delta() * dt_s);
             prop_assert_eq!(Adaptive::learnt(&moved), moved);
+        }
+    }
+}
+
+/// Hover thrust: what is known of the weight and what the rule of zero error has learnt, but at least 0.3 of the weight;
+/// for a law that learns nothing the weight. A start in flight knows the weight.
+#[test]
+fn the_hover_thrust_is_what_carries_the_vehicle() {
+    let gains = Profile::Paper.gains();
+    let (adaptive, fixed) = (
+        Adaptive::new(gains).unwrap(),
+        Backstepping::new(&Parameters::PAPER.to_f32(), gains.map(|gains| gains.backstepping)).unwrap(),
+    );
+    let weight_n = 4.8;
+    let mut learnt = Estimate { theta: Matrix3::repeat(-50.0), delta: 3.0 };
+    for (rule, known, wanted) in [(5.0, 0.0, 5.0), (0.6, weight_n, 5.4), (-1.5, weight_n, 3.3), (1.0, 0.0, 1.44)] {
+        learnt.theta.m22 = rule;
+        let got = adaptive.hover_thrust_n(&learnt, weight_n, known);
+        assert!((got - wanted).abs() < 1e-6, "{got} instead of {wanted}");
+    }
+    assert_eq!(fixed.hover_thrust_n(&(), weight_n, 0.0), weight_n);
+
+    let mut started = PerAxis::<Estimate>::default();
+    adaptive.start(&mut started, weight_n);
+    assert_eq!(adaptive.hover_thrust_n(&started.z, weight_n, 0.0), weight_n);
+    for inputs in [[0.0, 0.0], [3.0, -20.0], [-9.0, 1.0]] {
+        let (terms, _) = Subsystem::new(gains.z).unwrap().law(&Errors::default(), inputs, &started.z, 0.0);
+        assert!((terms.sum() - weight_n).abs() < 1e-5, "{terms:?}");
+    }
+    assert_eq!(PerAxis { z: Estimate::default(), ..started }, PerAxis::default());
+}
+
+/// The speed at which an error is approached: where what is known and what is added cancel, for the g of each input;
+/// where nothing is known alpha_1.
+#[test]
+fn an_error_is_approached_at_the_speed_that_the_law_holds() {
+    let (vehicle, gains) = (Parameters::PAPER.to_f32(), Profile::Flight.gains());
+    let (model, adaptive) = (Model::new(&vehicle), Adaptive::new(gains).unwrap());
+    let fixed = Backstepping::new(&vehicle, gains.map(|gains| gains.backstepping)).unwrap();
+    let integral = IntegralBackstepping::new(&vehicle, gains.map(|gains| gains.into())).unwrap();
+    for axis in Axis::ALL {
+        let of = gains[axis].backstepping;
+        assert_eq!(adaptive.approach(axis, None), of.alpha1);
+        let dynamics = model.dynamics(axis, &State::default(), 0.0);
+        for approach in
+            [adaptive.approach(axis, Some(&model)), fixed.approach(axis, None), integral.approach(axis, None)]
+        {
+            // e_1 = 1 m, and the vehicle approaches at that speed: no input but that against f.
+            let tracking = Tracking { x2: approach, e1: 1.0, ..Tracking::default() };
+            let errors = tracking.errors(of.alpha1);
+            let u = ideal(&of, &errors, 0.0, &dynamics) + proportional(of.alpha2, &errors);
+            let held = -dynamics.f / dynamics.g;
+            assert!((u - held).abs() < 1e-4 * (1.0 + of.stiffness / dynamics.g), "{axis:?}: {u} instead of {held}");
         }
     }
 }
