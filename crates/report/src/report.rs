@@ -14,32 +14,35 @@ use afbc_types::{Axis, Declared, PerAxis, Value};
 use core::convert::Infallible;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-/// Style: one column, dark on white, or light on dark for readers who prefer it, except on paper. Elements wider than
-/// the screen scroll by themselves.
+/// Style: one column, dark on white, or light on dark for readers who prefer it, except on paper. A table is as wide as
+/// it needs, beyond the column up to the screen. What is wider still scrolls by itself, under a bar and, on the side
+/// where it goes on, a shadow; a table's first column stays. On paper, where nothing scrolls, the cells of a wide table
+/// wrap, and its type is smaller.
 const STYLE: &str = "
 :root { color-scheme: light dark; --paper: #fff; --ink: #1a1a1a; --quiet: #555; --rule: #888; --faint: #ccc;
-  --good: #146c2e; --bad: #a12; }
+  --good: #146c2e; --bad: #a12; --shade: #0003; }
 @media screen and (prefers-color-scheme: dark) {
   :root { --paper: #16181d; --ink: #e8e8e8; --quiet: #a8acb3; --rule: #737983; --faint: #3a3f48;
-    --good: #6fcf8a; --bad: #ff8f85; }
+    --good: #6fcf8a; --bad: #ff8f85; --shade: #fff3; }
 }
 body { font: 15px/1.5 system-ui, -apple-system, 'Segoe UI', Helvetica, Arial, sans-serif; color: var(--ink);
-  background: var(--paper); max-width: 900px; margin: 2.5rem auto; padding: 0 1rem; -webkit-text-size-adjust: 100%; }
+  background: var(--paper); margin: 2.5rem 0; padding: 0 1rem; -webkit-text-size-adjust: 100%; }
 h1 { font-size: 1.7rem; margin: 0 0 .25rem; }
 h2 { font-size: 1.3rem; margin: 2.5rem 0 .25rem; }
 h3 { font-size: 1.05rem; margin: 1.8rem 0 .4rem; }
 p { margin: .3rem 0; }
 h1, h2, h3, p, dd, figcaption { overflow-wrap: anywhere; }
 .quiet { color: var(--quiet); }
-table { border-collapse: collapse; margin: .6rem 0; font-variant-numeric: tabular-nums; }
+table { border-collapse: separate; border-spacing: 0; margin: .6rem 0; font-variant-numeric: tabular-nums; }
 th, td { padding: .16rem .65rem; text-align: right; white-space: nowrap; }
 th { font-weight: 600; }
 th:first-child, td:first-child, .name, .prose { text-align: left; }
 .prose { white-space: normal; min-width: 14rem; }
 .prose code { overflow-wrap: anywhere; }
-th[scope=row] { position: sticky; left: 0; background: var(--paper); }
-thead th, thead td { border-bottom: 1px solid var(--rule); }
-tbody { border-bottom: 1px solid var(--faint); }
+tr > :first-child { position: sticky; left: 0; background: var(--paper); }
+table:has(tr > :nth-child(8)) :is(th, td) { padding: .16rem .4rem; }
+tr:last-child > * { border-bottom: 1px solid var(--faint); }
+thead tr:last-child > * { border-color: var(--rule); }
 .lost { color: var(--bad); text-align: left; }
 dl { margin: .4rem 0; }
 dl > div { display: grid; grid-template-columns: 8.5rem 1fr; margin: .7rem 0; }
@@ -51,7 +54,15 @@ figure { margin: 1.6rem 0; }
 figure svg { display: block; width: 100%; min-width: 40rem; height: auto; }
 figure .scroll { border: 1px solid var(--faint); }
 figcaption { color: var(--quiet); font-size: .9rem; }
-.scroll { overflow-x: auto; max-width: 100%; }
+.scroll { overflow-x: auto; max-width: 100%; background:
+  linear-gradient(to left, var(--paper) 40%, transparent) right / 3rem 100% no-repeat local,
+  linear-gradient(to left, var(--shade), transparent) right / 1rem 100% no-repeat scroll; }
+.scroll::-webkit-scrollbar { height: .6rem; }
+.scroll::-webkit-scrollbar-track { background: var(--faint); }
+.scroll::-webkit-scrollbar-thumb { background: var(--rule); border-radius: .3rem; }
+body > * { max-width: 900px; margin-inline: auto; }
+body > .scroll { width: fit-content; min-width: min(100%, 900px); max-width: 100%; }
+body > .scroll:has(.prose) { max-width: 900px; }
 @media (max-width: 34rem) {
   body { margin: 1.2rem auto; }
   dl > div { display: block; }
@@ -59,7 +70,15 @@ figcaption { color: var(--quiet); font-size: .9rem; }
 }
 @page { margin: 15mm; }
 @media print {
-  body { font-size: 10.5pt; margin: 0; padding: 0; max-width: none; }
+  body { font-size: 10.5pt; margin: 0; padding: 0; }
+  body > *, body > .scroll { max-width: none; width: auto; min-width: 0; }
+  .scroll { overflow: visible; background: none; }
+  .scroll table { max-width: 100%; }
+  th, td { white-space: normal; }
+  tr > :first-child { position: static; }
+  table:has(tr > :nth-child(8)) { font-size: 7pt; }
+  table:has(tr > :nth-child(8)) :is(th, td) { padding: .16rem .2rem; }
+  table:has(tr > :nth-child(12)) { font-size: 6pt; overflow-wrap: anywhere; }
   figure, tbody, dl > div, tr { break-inside: avoid; }
   h2, h3 { break-after: avoid; }
   figure svg { min-width: 0; max-height: 110mm; }

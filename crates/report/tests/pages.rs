@@ -3,6 +3,8 @@
 
 mod common;
 
+use afbc_campaign::compare::Comparison;
+use afbc_campaign::suite::{SUITES, Suite};
 use afbc_campaign::{QUANTITIES, compare};
 use afbc_plant::{Environment, ParameterChange, Quantity, RotorFault};
 use afbc_report::{self as report, flights};
@@ -162,17 +164,84 @@ fn unscrolled(page: &str) -> Vec<String> {
     found
 }
 
+/// A suite of one short flight, as flown.
+struct Suited(Suite, Vec<Comparison>);
+
+impl Suited {
+    fn fly(names: &[&str]) -> Self {
+        let mut suite = SUITES[0].read().unwrap();
+        suite.flights.truncate(1);
+        suite.flights[0].scenario = hover(6.0);
+        let contenders: Vec<_> = names.iter().map(|name| named(name)).collect();
+        let comparisons = compare::fly(suite.under(&contenders).unwrap(), 1, 10, &|| ()).unwrap();
+        Suited(suite, comparisons)
+    }
+
+    fn flown(&self) -> report::suite::Flown<'_> {
+        report::suite::Flown { suite: &self.0, comparisons: &self.1 }
+    }
+}
+
+/// Returns the declarations of a part of a style for exactly this selector.
+fn declared(style: &str, selector: &str) -> String {
+    let rules = style.split('}').filter_map(|rule| rule.rsplit_once('{'));
+    let is_it = |names: &str| names.rsplit('{').next().unwrap().split(',').any(|name| name.trim() == selector);
+    rules.filter(|(names, _)| is_it(names)).map(|(_, declarations)| declarations).collect()
+}
+
+/// A table is as wide as it needs up to the screen, then scrolls beside its first column, visibly; on paper, where
+/// nothing scrolls, its cells wrap.
+#[test]
+fn wide_tables_are_seen_whole() {
+    let out = folder("wide-suite");
+    report::suite::write(&open(&out), Suited::fly(&OWN).flown()).unwrap();
+    let page = page(&out);
+    let style = page.split_once("<style>").unwrap().1.split_once("</style>").unwrap().0;
+    let (_, body) = page.split_once("<body>").unwrap();
+    let columns = |table: &str| table.split("</tr>").next().unwrap().matches("<th").count();
+    let mut wide = 0;
+    for (before, table) in body.match_indices("<table").map(|(at, _)| body.split_at(at)) {
+        let table = table.split("</table>").next().unwrap();
+        // A child of the body, so that it may be wider than the text.
+        assert!(before.ends_with("<div class=\"scroll\">"), "{table}");
+        assert_eq!(before.matches("<div").count() - before.matches("</div>").count(), 1, "{table}");
+        wide += usize::from(columns(table) >= OWN.len());
+    }
+    assert!(wide >= 3, "{wide} wide tables");
+
+    let (screen, print) = style.split_once("@media print {").unwrap();
+    for (part, selector, wanted) in [
+        (screen, "body > *", &["max-width: 900px;"][..]),
+        (screen, "body > .scroll", &["width: fit-content;", "max-width: 100%;"]),
+        (screen, ".scroll", &["overflow-x: auto;", "linear-gradient"]),
+        (screen, ".scroll::-webkit-scrollbar", &["height:"]),
+        (screen, "tr > :first-child", &["position: sticky;", "left: 0;", "background: var(--paper);"]),
+        (print, ".scroll", &["overflow: visible;"]),
+        (print, "body > .scroll", &["max-width: none;"]),
+        (print, "td", &["white-space: normal;"]),
+        (print, "tr > :first-child", &["position: static;"]),
+        (print, "table:has(tr > :nth-child(8))", &["font-size:"]),
+    ] {
+        let declared = declared(part, selector);
+        for wanted in wanted {
+            assert!(declared.contains(wanted), "{selector}: {wanted} is not in {declared:?}");
+        }
+    }
+    assert!(!declared(screen, "body").contains("max-width"), "the text is narrow, not the page");
+}
+
 #[test]
 fn pages_fit_a_phone_and_have_a_dark_mode() {
     let (fly, compared, whole) = (folder("phone-fly"), folder("phone-compare"), folder("phone-campaign"));
+    let suite = folder("phone-suite");
     flights::write(&open(&fly), &flown(&eventful(), &["afbc", "soft"]), &[]).unwrap();
     let scenario = Scenario { contenders: OWN.iter().map(|name| named(name)).collect(), ..eventful() };
     report::compare::write(&open(&compared), &compare::fly(vec![scenario], 2, 10, &|| ()).unwrap()).unwrap();
     report::campaign::write(&open(&whole), &gone_alike(&OWN, &["wind_m_s"], 20, |_, flight| flight == 3)).unwrap();
-    for folder in [fly, compared, whole] {
+    report::suite::write(&open(&suite), Suited::fly(&OWN).flown()).unwrap();
+    for folder in [fly, compared, whole, suite] {
         let page = page(&folder);
         assert!(page.contains("name=\"viewport\" content=\"width=device-width, initial-scale=1\""));
-        assert!(page.contains(".scroll { overflow-x: auto; max-width: 100%; }"));
         let free = unscrolled(&page);
         assert!(free.contains(&"h1".to_owned()) && free.contains(&"div".to_owned()), "{free:?}");
         for wide in ["table", "svg", "pre", "img"] {
