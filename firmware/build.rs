@@ -43,8 +43,8 @@ fn source(vehicle: &Vehicle) -> String {
          pub const NAME: &str = {name:?};\n\
          /// Number of its rotors.\n\
          pub const ROTORS: usize = {count};\n\
-         /// What the firmware is told of it.\n\
-         pub const CONFIGURATION: Configuration<ROTORS> = Configuration {{\n\
+         /// What its file says.\n\
+         pub const CONFIGURATION: Configuration = afbc_onboard::Configuration {{\n\
          airframe: {airframe},\nsettings: {settings},\ngains: {gains},\ncurve: {curve},\n\
          estimation: {estimation},\n    arming: afbc_onboard::ArmingLimits::DEFAULT,\n\
          guidance: afbc_guidance::Settings::DEFAULT,\n    link: afbc_onboard::Link::DEFAULT,\n}};\n",

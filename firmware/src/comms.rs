@@ -1,8 +1,10 @@
 //! The link: receives and sends messages, at a lower priority than the control tick.
 
 use crate::board::{Receiver, Transmitter};
-use crate::control::{self, Tick};
-use crate::parameters::{self, Table};
+use crate::control;
+use crate::parameters;
+use crate::ticks::{self, Tick};
+use crate::vehicle::Table;
 pub use afbc_onboard::Comms;
 use afbc_onboard::{REPORT_MAX, Setup};
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -45,7 +47,7 @@ pub async fn run((comms, table): &mut Desk, receiver: &mut impl Receiver, transm
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     let mut leaving = 0;
     loop {
-        match select(receiver.receive(&mut incoming), control::next_tick()).await {
+        match select(receiver.receive(&mut incoming), ticks::next()).await {
             Either::First(length) => {
                 let news = comms.receive(incoming.get(..length).unwrap_or_default());
                 control::with_mail(|mail| mail.post(&news));

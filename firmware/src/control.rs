@@ -1,46 +1,19 @@
 //! The control tick, 1000 times per second.
 
 use crate::board::Board;
-use crate::parameters::{Configuration, Prepared};
+use crate::ticks::{self, Tick};
 use crate::time::{self, Stopwatch};
-use crate::vehicle::ROTORS;
+use crate::vehicle::{Configuration, Flight, Prepared, Report};
 use afbc_onboard::{Mail, Readings};
 use core::cell::RefCell;
-use core::future::poll_fn;
-use core::pin::pin;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use core::task::Poll;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::signal::Signal;
 use embassy_time::{Instant, Timer};
-use heapless::Deque;
 use static_cell::StaticCell;
-
-/// The vehicle under its law.
-pub type Flight = afbc_onboard::Flight<ROTORS>;
-/// What one of its ticks decided.
-pub type Report = afbc_onboard::Report<ROTORS>;
 
 /// Newest inputs, written by [`crate::comms`].
 static MAIL: Mutex<CriticalSectionRawMutex, RefCell<Mail>> = Mutex::new(RefCell::new(Mail::EMPTY));
-
-/// Results of the last ticks, and a signal that there are some. Not a channel, which panics when it is re-entered.
-static TICKS: Mutex<CriticalSectionRawMutex, RefCell<Deque<Tick, 8>>> = Mutex::new(RefCell::new(Deque::new()));
-static TICKED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-
-/// Waits for the result of the oldest tick not yet returned. A tick never waits: while eight results are queued,
-/// further ones are dropped.
-pub fn next_tick() -> impl Future<Output = Tick> {
-    poll_fn(|context| {
-        // Registered before looking, so that no tick is missed.
-        let _ = pin!(TICKED.wait()).poll(context);
-        match TICKS.lock(|ticks| ticks.try_borrow_mut().ok()?.pop_front()) {
-            Some(tick) => Poll::Ready(tick),
-            None => Poll::Pending,
-        }
-    })
-}
 
 /// Cycles of the last control tick and of the longest, for [`crate::housekeeping`].
 static CYCLES: AtomicU32 = AtomicU32::new(0);
@@ -64,15 +37,6 @@ pub fn fly(prepared: Prepared) {
 /// True if the vehicle is armed.
 pub fn armed() -> bool {
     ARMED.load(Ordering::Relaxed)
-}
-
-/// Result of one control tick.
-#[derive(Clone, Copy)]
-pub struct Tick {
-    /// Report of the flight core.
-    pub report: Report,
-    /// Duration, interrupts included \[core cycles\].
-    pub cycles: u32,
 }
 
 /// Changes the inputs of the next tick.
@@ -111,11 +75,7 @@ pub async fn run(flight: &mut Flight, board: &mut impl Board) -> ! {
         let cycles = stopwatch.cycles();
         CYCLES.store(cycles, Ordering::Relaxed);
         CYCLES_MAX.fetch_max(cycles, Ordering::Relaxed);
-        // Full if the link's task falls behind: then this tick is not reported.
-        let push = |ticks: &RefCell<Deque<_, _>>| ticks.try_borrow_mut().ok()?.push_back(Tick { report, cycles }).ok();
-        if TICKS.lock(push).is_some() {
-            TICKED.signal(());
-        }
+        ticks::push(Tick { report, cycles });
     }
 }
 

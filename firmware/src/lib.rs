@@ -30,7 +30,9 @@ pub mod comms;
 pub mod control;
 pub mod executors;
 pub mod housekeeping;
+mod image;
 pub mod parameters;
+pub mod ticks;
 pub mod time;
 pub mod vehicle;
 
@@ -41,7 +43,7 @@ use embassy_executor::SendSpawner;
 /// the board; [`image!`] defines them.
 pub fn run<B: Board>(
     mut core: cortex_m::Peripherals,
-    control: impl FnOnce(SendSpawner, &'static mut control::Flight, B),
+    control: impl FnOnce(SendSpawner, &'static mut vehicle::Flight, B),
     comms: impl FnOnce(SendSpawner, &'static mut comms::Desk, B::Receiver, B::Transmitter),
     keeper: impl FnOnce(SendSpawner, parameters::Keeper<B::Memory>),
 ) -> ! {

@@ -7,7 +7,7 @@
 //! tolerance. No word is written while armed ([`Gate`]).
 
 use crate::control;
-use crate::vehicle::{CONFIGURATION, NAME, ROTORS};
+use crate::vehicle::{CONFIGURATION, NAME, Prepared, Table};
 use afbc_onboard::parameters::{Change, Kept};
 use afbc_store::{Error, Store, hash};
 use core::cell::RefCell;
@@ -20,13 +20,6 @@ use embassy_sync::signal::Signal;
 use embassy_time::{Instant, Timer};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use heapless::Deque;
-
-/// Parameters of this vehicle.
-pub type Table = afbc_onboard::parameters::Table<ROTORS>;
-/// What they make of it.
-pub type Configuration = afbc_onboard::Configuration<ROTORS>;
-/// A configuration ready to be flown.
-pub type Prepared = afbc_onboard::Prepared<ROTORS>;
 
 /// Changes to be written, and a signal that there are some.
 static CHANGES: Mutex<CriticalSectionRawMutex, RefCell<Deque<Change, 8>>> = Mutex::new(RefCell::new(Deque::new()));

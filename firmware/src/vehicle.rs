@@ -9,8 +9,19 @@ use afbc::reference::ReferenceModel;
 use afbc::{Limits, Safeguards, Settings, backstepping};
 use afbc_control::Smoothing;
 use afbc_flight_core::motor::Curve;
-use afbc_onboard::{Configuration, Estimation};
+use afbc_onboard::Estimation;
 use afbc_types::{Airframe, Parameters, PerAxis, Rotor};
 use nalgebra::Vector3;
+
+/// What the firmware is told of it.
+pub type Configuration = afbc_onboard::Configuration<ROTORS>;
+/// Its parameters, from which the configuration is made.
+pub type Table = afbc_onboard::parameters::Table<ROTORS>;
+/// A configuration ready to be flown.
+pub type Prepared = afbc_onboard::Prepared<ROTORS>;
+/// The vehicle under its law.
+pub type Flight = afbc_onboard::Flight<ROTORS>;
+/// What one of its ticks decided.
+pub type Report = afbc_onboard::Report<ROTORS>;
 
 include!(concat!(env!("OUT_DIR"), "/vehicle.rs"));

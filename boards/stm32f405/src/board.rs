@@ -33,8 +33,8 @@ use embassy_sync::signal::Signal;
 use embassy_time::{Instant, with_deadline};
 use embedded_io_async::{BufRead, Write};
 use firmware::board::{self, Board};
-use firmware::control::Tick;
 use firmware::executors::priority;
+use firmware::ticks::Tick;
 use firmware::vehicle::ROTORS;
 use static_cell::StaticCell;
 
