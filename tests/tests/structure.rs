@@ -1,16 +1,16 @@
 //! Structure of the code: no circular imports between modules, no crate larger than a fifth of the whole, no overlong
 //! lines.
-#![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be read must stop the test")]
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
-use std::collections::{BTreeMap, BTreeSet};
+mod imports;
+
+use imports::{Crate, circles, within};
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Largest width of a line, as `max_width` in `rustfmt.toml`.
 const WIDTH: usize = 120;
-
-/// Path of a module within its crate; empty for the crate itself.
-type Module = Vec<String>;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
@@ -50,149 +50,166 @@ fn overlong(path: &Path, text: &str) -> Vec<usize> {
 
 /// Returns the folders of all crates.
 fn crates() -> Vec<PathBuf> {
-    let inner = fs::read_dir(root().join("crates")).unwrap().map(|entry| entry.unwrap().path());
-    inner.chain(["sitl", "tests", "firmware"].map(|name| root().join(name))).collect()
+    let manifests = all_files(root()).into_iter().filter(|path| path.ends_with("Cargo.toml"));
+    manifests.filter_map(|path| path.parent().map(Path::to_owned)).filter(|folder| folder != root()).collect()
 }
 
-/// Returns the code of one crate's files by module, without comments and tests.
-fn modules(src: &Path) -> BTreeMap<Module, String> {
-    let mut modules = BTreeMap::new();
-    for path in files(src) {
-        let within = path.strip_prefix(src).unwrap().with_extension("");
-        let mut module: Module = within.iter().map(|part| part.to_str().unwrap().to_owned()).collect();
-        if module.first().is_some_and(|first| first == "bin") || module.last().is_some_and(|last| last == "tests") {
-            continue;
-        }
-        if module.last().is_some_and(|last| ["mod", "lib", "main"].contains(&last.as_str())) {
-            module.pop();
-        }
-        let text = fs::read_to_string(&path).unwrap();
-        let text = text.split("\nmod tests {").next().unwrap();
-        let lines = text.lines().map(|line| line.split("//").next().unwrap());
-        modules.insert(module, lines.collect::<Vec<_>>().join(" "));
+/// Returns the root file of every program, library and test of a package.
+fn targets(package: &Path) -> Vec<PathBuf> {
+    let manifest = fs::read_to_string(package.join("Cargo.toml")).unwrap();
+    let named = manifest.split('"').filter(|word| word.ends_with(".rs")).map(PathBuf::from);
+    let usual = ["src/lib.rs", "src/main.rs", "build.rs"].map(PathBuf::from);
+    let mut found: Vec<_> = named.chain(usual).map(|path| package.join(path)).filter(|path| path.is_file()).collect();
+    for folder in ["src/bin", "tests", "benches", "examples"] {
+        let within = fs::read_dir(package.join(folder)).into_iter().flatten().map(|entry| entry.unwrap().path());
+        found.extend(within.filter(|path| path.extension().is_some_and(|extension| extension == "rs")));
     }
-    modules
-}
-
-/// Returns the paths of a `use` tree: a::b and a::c::d for `a::{b, c::d}`. Names after `as` are left out.
-fn paths(tree: &str) -> Vec<Vec<String>> {
-    let tree = tree.trim();
-    if let Some(inner) = tree.strip_prefix('{').and_then(|tree| tree.strip_suffix('}')) {
-        let (mut depth, mut parts) = (0, vec![String::new()]);
-        for c in inner.chars() {
-            depth += i32::from(c == '{') - i32::from(c == '}');
-            match c {
-                ',' if depth == 0 => parts.push(String::new()),
-                _ => parts.last_mut().unwrap().push(c),
-            }
-        }
-        return parts.iter().filter(|part| !part.trim().is_empty()).flat_map(|part| paths(part)).collect();
-    }
-    match tree.split_once("::") {
-        Some((first, rest)) => {
-            paths(rest).into_iter().map(|path| [vec![first.trim().to_owned()], path].concat()).collect()
-        }
-        None => vec![vec![tree.split(" as ").next().unwrap().trim().to_owned()]],
-    }
-}
-
-/// Returns a path as written in `module`, from the crate's root; none if it leads elsewhere.
-fn absolute(module: &Module, path: &[String], all: &BTreeMap<Module, String>) -> Option<Vec<String>> {
-    let ups = path.iter().take_while(|part| *part == "super").count();
-    let (base, rest) = match path.first()?.as_str() {
-        "crate" => (&[][..], path.get(1..)?),
-        "self" => (module.as_slice(), path.get(1..)?),
-        "super" => (module.get(..module.len().checked_sub(ups)?)?, path.get(ups..)?),
-        first if all.contains_key(&[module.as_slice(), &[first.to_owned()]].concat()) => (module.as_slice(), path),
-        _ => return None,
-    };
-    Some([base, rest].concat())
-}
-
-/// Returns the imports of each module. A path to something re-exported by `pub use` leads to where that is defined.
-fn imports(all: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Module>> {
-    // The module that a path leads into, and the name taken from it.
-    let target = |path: &[String]| {
-        let length = (0..=path.len()).rev().find(|&length| path.get(..length).is_some_and(|p| all.contains_key(p)));
-        let (module, rest) = path.split_at(length.unwrap_or(0));
-        (module.to_vec(), rest.first().cloned())
-    };
-    let (mut imports, mut handed_on) = (BTreeMap::<Module, Vec<Vec<String>>>::new(), BTreeMap::new());
-    for (module, code) in all {
-        // Only whole words: `use ` at the beginning of a statement.
-        for statement in code.split(';') {
-            let Some((before, tree)) = statement.rsplit_once("use ") else { continue };
-            let is_public = before.trim_end().ends_with("pub") || before.trim_end().ends_with(')');
-            for path in paths(tree).iter().filter_map(|path| absolute(module, path, all)) {
-                if is_public {
-                    handed_on.insert((module.clone(), path.last().cloned().unwrap()), path);
-                } else {
-                    imports.entry(module.clone()).or_default().push(path);
-                }
-            }
-        }
-        // Paths in the code itself, except of macros, which belong to the crate's root wherever they are defined.
-        let words = code.split_inclusive(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
-        for word in words.filter(|word| word.starts_with("crate::") || word.starts_with("super::")) {
-            let Some(word) = (!word.ends_with('!')).then(|| word.trim_end_matches(|c: char| !c.is_alphanumeric()))
-            else {
-                continue;
-            };
-            let path: Vec<String> = word.split("::").map(str::to_owned).collect();
-            imports.entry(module.clone()).or_default().extend(absolute(module, &path, all));
-        }
-    }
-    let resolve = |path: &Vec<String>| {
-        let (mut module, mut name) = target(path);
-        while let Some(path) = name.as_ref().and_then(|name| handed_on.get(&(module.clone(), name.clone()))) {
-            (module, name) = target(path);
-        }
-        module
-    };
-    let of = |(module, paths): (&Module, &Vec<Vec<String>>)| {
-        (module.clone(), paths.iter().map(resolve).filter(|target| target != module).collect())
-    };
-    imports.iter().map(of).collect()
-}
-
-/// Returns the modules of circular imports, if any: modules without remaining imports are removed repeatedly.
-fn circle(mut imports: BTreeMap<Module, BTreeSet<Module>>) -> Vec<Module> {
-    loop {
-        let left: BTreeSet<Module> = imports.keys().cloned().collect();
-        let before = imports.len();
-        imports.retain(|_, targets| targets.iter().any(|target| left.contains(target)));
-        if imports.len() == before {
-            return imports.into_keys().collect();
-        }
-    }
+    found.sort();
+    found.dedup();
+    found
 }
 
 #[test]
 fn no_module_imports_one_that_imports_it() {
-    // The firmware's board is one of several files under one name.
-    for folder in crates().iter().filter(|folder| !folder.ends_with("firmware")) {
-        let modules = modules(&folder.join("src"));
-        assert!(!modules.is_empty(), "{}", folder.display());
-        let circle = circle(imports(&modules));
-        assert!(circle.is_empty(), "{}: among these, or in what they need: {circle:?}", folder.display());
+    let mut seen = BTreeSet::new();
+    for target in crates().iter().flat_map(|package| targets(package)) {
+        let read = Crate::read(&target, &|path| fs::read_to_string(path).ok());
+        seen.extend(read.files().map(|file| file.canonicalize().unwrap()));
+        let imports = read.imports();
+        let circles: Vec<_> = circles(&imports).iter().map(|circle| within(&imports, circle)).collect();
+        assert!(circles.is_empty(), "circles of imports: {}", circles.join("\n"));
+    }
+    let all: BTreeSet<_> = files(root()).iter().map(|file| file.canonicalize().unwrap()).collect();
+    assert_eq!(all.difference(&seen).collect::<Vec<_>>(), Vec::<&PathBuf>::new(), "belong to no crate");
+}
+
+/// Returns the circles of a crate whose files, but for a root file that only declares them, are given with their text.
+fn found(files: &[(&str, &str)]) -> Vec<Vec<String>> {
+    let declared = files.iter().filter_map(|(name, _)| name.strip_suffix(".rs").filter(|name| !name.contains('/')));
+    let root: String = declared.map(|name| format!("mod {name};\n")).collect();
+    let text = |path: &Path| {
+        let given = files.iter().find(|(name, _)| Path::new(name) == path).map(|(_, text)| (*text).to_owned());
+        given.or_else(|| (path == Path::new("lib.rs")).then(|| root.clone()))
+    };
+    let imports = Crate::read(Path::new("lib.rs"), &text).imports();
+    let name = |path: &PathBuf| path.display().to_string();
+    circles(&imports).iter().map(|circle| circle.iter().map(name).collect()).collect()
+}
+
+/// Every form in which `a` may name something of `b`, which imports `a`.
+#[test]
+fn a_circle_is_found() {
+    let forms = [
+        "use crate::b::B;",
+        "use crate::b::B as Other;",
+        "use crate::b::*;",
+        "use crate::{b::{self, B}};",
+        "use super::b;",
+        "pub use crate::b::B;",
+        "fn f() { use crate::b; b::g() }",
+        "use crate::b as other; fn f() { other::g() }",
+        "use crate::c; fn f() { c::g() }",
+        "use crate::c::*; fn f() -> B { loop {} }",
+        "use crate::c::inner; fn f() { inner::deep::g() }",
+        "use crate::*; fn f() { b::g() }",
+        "extern crate self as own; use own::b::B;",
+        "fn f() { crate::b::g() }",
+        "fn f() { super::b::g() }",
+        "fn f(_: &dyn Into<crate::b::B>) {}",
+        "fn f() -> u8 { <crate::b::B as Into<u8>>::into(crate::b::B) }",
+        "use crate::b::Kind::{One, Two};",
+        "fn f(kind: u8) -> bool { matches!(kind, crate::b::Kind::One) }",
+        "const N: usize = crate::b::N;",
+        "impl crate::b::Trait for u8 {}",
+        "struct S<T: crate::b::Trait>(T);",
+        "mod inner { use super::super::b::B; }",
+        "mod inner { pub mod deep { fn f() { crate::b::g() } } }",
+        "macro_rules! m { () => { crate::b::g() } }",
+        "macro_rules! m { () => { $crate::b::g() } }",
+        "macro_rules! m { () => { $crate::b::{self, B} } }",
+        "macro_rules! m { () => { super::b::g() } } fn f() { m!() }",
+        "use crate::b; macro_rules! m { () => { b::g() } } fn f() { m!() }",
+        "fn f() { println!(\"{}\", crate::b::N) }",
+        "use crate::b; fn f() { println!(\"{}\", [0; 2][..b::N].len()) }",
+        "fn f() { vec![super::b::g()]; }",
+        "thread_local! { static T: crate::b::B = crate::b::B; }",
+        "fn f() { crate::made!() }",
+        "fn f() { crate::b::local!() }",
+        "fn f() { in_text!() }",
+        "#[derive(crate::b::Derived)] struct S;",
+        "#[serde(with = \"crate::b\")] struct S;",
+    ];
+    let b = "use crate::a::A; pub struct B; pub enum Kind { One, Two } pub const N: usize = 1; pub trait Trait {}
+        pub fn g() {} #[macro_export] macro_rules! made { () => {} } macro_rules! local { () => {} }
+        pub(crate) use local; macro_rules! in_text { () => {} }";
+    let c = "pub use crate::b::*; pub use crate::b::g; pub mod inner { pub use crate::b as deep; }";
+    for form in forms {
+        let a = format!("pub struct A; {form}");
+        let circles = found(&[("b.rs", b), ("c.rs", c), ("a.rs", &a)]);
+        // What hands a name on is a part of the circle only if it is imported whole.
+        let is_found = circles.iter().any(|circle| circle.contains(&"a.rs".into()) && circle.contains(&"b.rs".into()));
+        assert!(is_found, "{form}: {circles:?}");
     }
 }
 
 #[test]
-fn a_circle_is_found() {
-    let module = |name: &str| name.split("::").filter(|part| !part.is_empty()).map(str::to_owned).collect::<Module>();
-    let find = |files: &[(&str, &str)]| {
-        circle(imports(&files.iter().map(|(name, code)| (module(name), (*code).to_owned())).collect()))
-    };
-    assert!(find(&[("", "mod a; mod b;"), ("a", "use crate::b::B;"), ("b", "fn f() {}")]).is_empty());
-    assert_eq!(find(&[("a", "use crate::b::B;"), ("b", "use super::a::{self, A};")]).len(), 2);
-    assert_eq!(find(&[("a", "fn f() { crate::b::g() }"), ("b", "use crate::a::A;")]).len(), 2);
-    // Through a parent that re-exports its children's items.
-    let parent = ("p", "mod a; mod b; pub use a::A; pub use b::{B, C};");
-    assert!(find(&[parent, ("p::a", "use super::B;"), ("p::b", "fn f() {}")]).is_empty());
-    assert_eq!(find(&[parent, ("p::a", "use super::B;"), ("p::b", "use crate::p::A;")]).len(), 2);
-    // A parent that uses its child, which uses the parent.
-    assert_eq!(find(&[("p", "mod a; use a::f; struct P;"), ("p::a", "use super::P;")]).len(), 2);
+fn what_is_no_circle_is_not_found() {
+    let b = "use crate::a::A; pub struct B; pub fn g() {}";
+    for form in [
+        "use std::fmt; fn f() { fmt::format(format_args!(\"crate::b\")); }",
+        "use ::b::B;",
+        "// use crate::b::B;\n/// [`B`](crate::b::B)\nfn f() { \"crate::b::B\"; }",
+        "#[cfg(test)] mod tests { use crate::b::B; }",
+        "#[cfg(test)] use crate::b::B;",
+        "pub(in crate::b) fn f() {}",
+        "fn f(b: u8) -> u8 { b }",
+        "fn f() { let b = S { g: 1 }; b.g; }",
+        "fn g() {} fn f() { g() }",
+        "mod b { pub fn g() {} } fn f() { b::g() }",
+    ] {
+        let circles = found(&[("a.rs", &format!("pub struct A; {form}")), ("b.rs", b)]);
+        assert!(circles.is_empty(), "{form}: {circles:?}");
+    }
+    // A module and a function, or a macro, of the same name.
+    let twice = [("a.rs", "mod f; pub use f::f; pub struct A;"), ("a/f.rs", "pub fn f() {}"), ("b.rs", b)];
+    assert!(found(&twice).is_empty());
+    let twice =
+        [("m.rs", "fn f() { crate::m!() }"), ("n.rs", "use crate::m; #[macro_export] macro_rules! m { () => {} }")];
+    assert_eq!(found(&twice), [["m.rs", "n.rs"]]);
+    let twice = [
+        ("m.rs", "use crate::n::N;"),
+        ("n.rs", "pub struct N; #[macro_export] macro_rules! m { () => {} } crate::m!();"),
+    ];
+    assert!(found(&twice).is_empty());
+}
+
+/// A parent that only declares its children and hands on their items is in no circle; one that uses them may be.
+#[test]
+fn parents_are_told_from_their_children() {
+    let parent = ("p.rs", "mod a; mod b; pub use a::A; pub use b::{B, C};");
+    let a = ("p/a.rs", "use super::B; pub struct A;");
+    assert!(found(&[parent, a, ("p/b.rs", "pub struct B; pub struct C;")]).is_empty());
+    assert!(found(&[parent, a, ("p/b.rs", "use crate::p; pub struct B; pub struct C;")]).is_empty());
+    assert_eq!(found(&[parent, a, ("p/b.rs", "use crate::p::A; pub struct B;")]), [["p/a.rs", "p/b.rs"]]);
+    for parent in [
+        "mod a; use a::f; pub struct P;",
+        "mod a; pub use a::f; pub struct P; fn g() { f() }",
+        "mod a; pub struct P; fn g() { a::f() }",
+        "mod a; pub struct P; fn g() { vec![a::f()]; }",
+    ] {
+        let child = ("p/a.rs", "use super::P; pub fn f() {}");
+        assert_eq!(found(&[("p.rs", parent), child]), [["p/a.rs", "p.rs"]], "{parent}");
+    }
+    // What a parent imports for itself, a child imports from it.
+    let parent = "mod a; mod b; use a::A; use b::f;";
+    assert_eq!(
+        found(&[("p.rs", parent), ("p/a.rs", "pub struct A;"), ("p/b.rs", "use super::A; pub fn f() {}")]),
+        [["p/b.rs", "p.rs"]]
+    );
+    // Circles apart are told apart.
+    let pairs =
+        [("a.rs", "use crate::b::B;"), ("b.rs", "use crate::a::A; use crate::c::C;"), ("c.rs", "use crate::d::D;")];
+    assert_eq!(found(&[&pairs[..], &[("d.rs", "use crate::c::C;")]].concat()), [["a.rs", "b.rs"], ["c.rs", "d.rs"]]);
 }
 
 /// Metadata and files that a registry requires or shows; `scripts/check-packages` packs and compiles each crate.
@@ -203,8 +220,8 @@ fn crates_to_be_published_have_complete_metadata() {
         let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
         let has = |start: &str| manifest.lines().any(|line| line.starts_with(start));
         if has("publish") {
-            // Inherited from the workspace: false.
-            assert!(has("publish.workspace = true"), "{}", folder.display());
+            // Inherited from the workspace, where it is false, too.
+            assert!(has("publish.workspace = true") || has("publish = false"), "{}", folder.display());
             continue;
         }
         let name = folder.file_name().unwrap().to_str().unwrap().to_owned();

@@ -1,6 +1,9 @@
 //! Faults that meet.
 
-use super::*;
+use super::case::*;
+use crate::aloft::{COMPANION, STATION, velocity};
+use afbc_guidance::FlightMode;
+use afbc_link::{Command, Uplink};
 
 /// Every case of several faults.
 pub(super) fn cases() -> Vec<Case> {

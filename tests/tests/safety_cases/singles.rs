@@ -1,6 +1,11 @@
 //! One fault at a time.
 
-use super::*;
+use super::case::*;
+use crate::aloft::checker::CUTS;
+use crate::aloft::session::item;
+use crate::aloft::{COMPANION, STATION, place, velocity};
+use afbc_guidance::FlightMode;
+use afbc_link::{Command, Uplink};
 
 /// Every case of one fault.
 pub(super) fn cases() -> Vec<Case> {

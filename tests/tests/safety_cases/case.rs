@@ -1,0 +1,199 @@
+//! A case: what happens, and what is expected.
+
+use crate::aloft::STATION;
+use crate::aloft::checker::{Bounds, End};
+use crate::aloft::session::{global, item};
+use afbc_guidance::FlightMode;
+use afbc_link::{Address, AttitudeAndThrust, Command, Datum, Height, MissionItem, Sticks, Target, Uplink};
+use afbc_onboard::services::modes;
+
+/// What happens.
+#[derive(Clone, Debug)]
+pub(crate) enum Do {
+    Say(Address, Uplink),
+    /// Weather or a fault, as the server's line.
+    Line(&'static str),
+    Silent(Address),
+    Back(Address),
+    /// The station sends this target again and again.
+    Stream(Option<Uplink>),
+    /// One of so many frames of the station is broken.
+    Breaks(u32),
+    Upload(Vec<MissionItem>),
+    /// So many bytes that are no frames.
+    Noise(usize),
+}
+
+/// Where a case begins.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Start {
+    /// Disarmed, 12 s after power-up.
+    PowerUp,
+    /// Just armed.
+    Ground,
+    /// In hold, this high \[m\].
+    Air(f32),
+}
+
+/// A fault or several, and what is expected.
+#[derive(Clone, Debug)]
+pub(crate) struct Case {
+    pub(crate) name: &'static str,
+    pub(crate) what: &'static str,
+    pub(crate) indoors: bool,
+    pub(crate) set: Vec<(&'static str, f32)>,
+    pub(crate) start: Start,
+    /// What happens at power-up.
+    pub(crate) before: Vec<Do>,
+    /// What happens, by the time since the case began \[s\].
+    pub(crate) steps: Vec<(f64, Do)>,
+    pub(crate) lasts_s: f64,
+    /// Texts that are heard in this order, and that are not.
+    pub(crate) heard: Vec<&'static str>,
+    pub(crate) never: Vec<&'static str>,
+    pub(crate) bounds: Bounds,
+    pub(crate) end: End,
+    /// Where it ends, and within which distance \[m\].
+    pub(crate) near: Option<([f64; 2], f64)>,
+}
+
+/// A case in hold 3 m above the ground, indoors, that ends there: all else is said.
+pub(crate) fn case(name: &'static str, what: &'static str) -> Case {
+    let bounds = Bounds { height_m: 6.0, radius_m: 25.0, ..Bounds::DEFAULT };
+    Case {
+        name,
+        what,
+        indoors: true,
+        set: Vec::new(),
+        start: Start::Air(3.0),
+        before: Vec::new(),
+        steps: Vec::new(),
+        lasts_s: 6.0,
+        heard: Vec::new(),
+        never: Vec::new(),
+        bounds,
+        end: End::Holds,
+        near: None,
+    }
+}
+
+impl Case {
+    pub(crate) fn outdoors(self) -> Self {
+        // The receiver's error.
+        let bounds = Bounds { radius_m: 30.0, height_m: self.bounds.height_m + 4.0, ..self.bounds };
+        Case { indoors: false, bounds, ..self }
+    }
+
+    pub(crate) fn on(self, start: Start) -> Self {
+        Case { start, ..self }
+    }
+
+    pub(crate) fn set(mut self, name: &'static str, value: f32) -> Self {
+        self.set.push((name, value));
+        self
+    }
+
+    pub(crate) fn before(mut self, it: Do) -> Self {
+        self.before.push(it);
+        self
+    }
+
+    pub(crate) fn at(mut self, at_s: f64, it: Do) -> Self {
+        self.steps.push((at_s, it));
+        self
+    }
+
+    pub(crate) fn lasts(self, lasts_s: f64) -> Self {
+        Case { lasts_s, ..self }
+    }
+
+    pub(crate) fn hears(mut self, texts: &[&'static str]) -> Self {
+        self.heard.extend(texts);
+        self
+    }
+
+    pub(crate) fn never(mut self, texts: &[&'static str]) -> Self {
+        self.never.extend(texts);
+        self
+    }
+
+    pub(crate) fn bound(mut self, change: fn(&mut Bounds)) -> Self {
+        change(&mut self.bounds);
+        self
+    }
+
+    /// Ends disarmed on the ground.
+    pub(crate) fn lands(self) -> Self {
+        Case { end: End::Disarmed, ..self }
+    }
+
+    pub(crate) fn flies(self) -> Self {
+        Case { end: End::Flies, ..self }
+    }
+
+    pub(crate) fn near(self, x: f64, y: f64, within_m: f64) -> Self {
+        Case { near: Some(([x, y], within_m)), ..self }
+    }
+
+    /// The flight core stops the motors in the air, announced.
+    pub(crate) fn falls(self, text: &'static str) -> Self {
+        let bounds = Bounds { cut: true, tilt_rad: 4.0, speed_m_s: 20.0, touch_m_s: 12.0, ..self.bounds };
+        Case { bounds, end: End::Disarmed, ..self }.hears(&[text])
+    }
+
+    /// Follows a stream of targets from 0.1 s on.
+    pub(crate) fn offboard(self, target: Uplink) -> Self {
+        self.at(0.0, Do::Stream(Some(target))).at(0.2, say(select(FlightMode::Offboard)))
+    }
+
+    /// Flies a mission from the beginning on.
+    pub(crate) fn mission(self, places: &[[f32; 3]]) -> Self {
+        let items = (0..).zip(places).map(|(number, at)| item(number, WAYPOINT, *at)).collect();
+        self.before(Do::Upload(items)).at(0.1, say(Command::StartMission(0)))
+    }
+
+    /// Watches the battery, whose cells are known.
+    pub(crate) fn watched(self) -> Self {
+        let cells = [("BAT1_N_CELLS", 3.0), ("BAT1_V_EMPTY", 3.3), ("BAT1_V_CHARGED", 4.2), ("BAT1_R_INTERNAL", 0.02)];
+        let charges = [("BAT_CRIT_THR", 0.1), ("BAT_EMERGEN_THR", 0.03)];
+        cells.into_iter().chain(charges).fold(self, |case, (name, value)| case.set(name, value))
+    }
+
+    /// A fence of 10 m by 8 m.
+    pub(crate) fn fenced(self, action: f32) -> Self {
+        self.set("GF_MAX_HOR_DIST", 10.0).set("GF_MAX_VER_DIST", 8.0).set("GF_ACTION", action)
+    }
+}
+
+pub(crate) const WAYPOINT: u16 = 16;
+pub(crate) const TAKE_OFF: u16 = 22;
+
+pub(crate) fn say(command: Command) -> Do {
+    Do::Say(STATION, Uplink::Command(command))
+}
+
+pub(crate) fn select(mode: FlightMode) -> Command {
+    Command::SelectMode(modes::custom(mode))
+}
+
+pub(crate) fn take_off(metres: f32) -> Command {
+    Command::TakeOff(Height { metres, above: Datum::Here })
+}
+
+pub(crate) fn go_to(x: f32, y: f32, z: f32) -> Command {
+    Command::Reposition { place: global(x, y, z), yaw_rad: f32::NAN, speed_m_s: None }
+}
+
+/// Leans towards the north and climbs a little.
+pub(crate) fn leaning() -> Uplink {
+    let q = nalgebra::UnitQuaternion::from_euler_angles(0.0_f32, 0.15, 0.0);
+    let attitude = [q.w, q.i, q.j, q.k];
+    Uplink::Target(Target::Attitude(AttitudeAndThrust { attitude, yaw_rate_rad_s: 0.0, thrust: 0.41 }))
+}
+
+pub(crate) fn sticks(pitch: f32, throttle: f32) -> Uplink {
+    Uplink::Target(Target::Sticks(Sticks { roll: 0.0, pitch, throttle, yaw: 0.0 }))
+}
+
+pub(crate) const AWAY: [[f32; 3]; 2] = [[9.0, 0.0, 3.0], [9.0, 9.0, 3.0]];
+pub(crate) const DESCENDS: &str = "no state for 0.25 s: descending";
