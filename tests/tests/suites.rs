@@ -54,6 +54,66 @@ fn the_page_of_the_field_is_what_flies() {
     compared("field", include_str!("../../docs/suites.md"));
 }
 
+/// What the pages say about AFBC and INDI is what the field's table says. First is who has the least root mean square
+/// distance of the tuned laws.
+#[test]
+fn pages_say_where_afbc_leads() {
+    let [begin, end] = suite::markers("field");
+    let (_, table, _) = markers::parts(include_str!("../../docs/suites.md"), [&begin, &end]).unwrap();
+    let cells = |line: &str| line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect::<Vec<_>>();
+    let mut lines = table.lines().take_while(|line| line.starts_with('|'));
+    let heads = cells(lines.next().unwrap());
+    let tuned = ["AFBC", "PID", "geometric", "INDI", "L1", "DFBC"];
+    let columns = tuned.map(|law| heads.iter().position(|head| head == law).unwrap());
+    // A cell ends with both distances, or with the time of the loss.
+    let distance = |cell: &str| cell.rsplit_once(" / ").map(|(start, _)| start.rsplit(' ').next().unwrap().to_owned());
+    let flights: Vec<(String, [Option<String>; 6])> = lines
+        .skip(1)
+        .map(cells)
+        .map(|cells| (cells[0].split('`').nth(1).unwrap().to_owned(), columns.map(|column| distance(&cells[column]))))
+        .collect();
+    let is_first = |law: usize, distances: &[Option<String>; 6]| {
+        let number = |text: &Option<String>| text.as_ref().map_or(f64::INFINITY, |text| text.parse().unwrap());
+        distances.iter().all(|other| number(&distances[law]) <= number(other))
+    };
+    let (afbc, indi) = (0, 3);
+    let survived = || flights.iter().filter(|(_, distances)| distances.iter().any(Option::is_some));
+    let raced = || survived().filter(|(name, _)| ["lemniscate-", "circle-"].iter().any(|kind| name.starts_with(kind)));
+    let first = |law| survived().filter(|(_, distances)| is_first(law, distances)).count();
+    let first_raced = |law| raced().filter(|(_, distances)| is_first(law, distances)).count();
+    let said = format!(
+        "AFBC is first, alone or level, in {} of the {} flights of the suite `field` that a law survives, INDI in {}; \
+         of the racer's {} flights AFBC is first in {}, INDI in {}",
+        first(afbc),
+        survived().count(),
+        first(indi),
+        raced().count(),
+        first_raced(afbc),
+        first_raced(indi)
+    );
+    let plain = |page: &str| page.split_whitespace().collect::<Vec<_>>().join(" ");
+    let results = plain(include_str!("../../docs/results.md"));
+    for (name, page) in [
+        ("README.md", plain(include_str!("../../README.md"))),
+        ("docs/results.md", results.clone()),
+        ("docs/flight.md", plain(include_str!("../../docs/flight.md"))),
+        ("docs/suites.md", plain(include_str!("../../docs/suites.md"))),
+        ("docs/tuning.md", plain(include_str!("../../docs/tuning.md"))),
+    ] {
+        assert!(page.contains(&said), "{name} lacks: {said}");
+    }
+    let section = results.split("## On other vehicles").nth(1).unwrap().split(" ## ").next().unwrap();
+    let mut quoted = 0;
+    for (name, distances) in &flights {
+        let Some((_, after)) = section.split_once(&format!("`{name}`")) else { continue };
+        let figures =
+            format!("AFBC {} m, INDI {} m", distances[afbc].as_ref().unwrap(), distances[indi].as_ref().unwrap());
+        assert!(after.trim_start_matches([',', ' ']).starts_with(&figures), "docs/results.md, `{name}`: {figures}");
+        quoted += 1;
+    }
+    assert!(quoted >= 4, "{quoted} flights are quoted");
+}
+
 #[test]
 fn the_page_of_faults_is_what_flies() {
     compared("faults", include_str!("../../docs/faults.md"));
