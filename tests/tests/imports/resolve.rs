@@ -3,7 +3,7 @@
 use super::Imports;
 use super::paths::{Named, Path, Use};
 use super::read::Crate;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 /// Imports that are being followed, each a module and its index there: none helps to find what it imports itself.
 type Seen = BTreeSet<(usize, usize)>;
@@ -14,7 +14,7 @@ impl Crate {
         let mut imports = Imports::new();
         for module in 0..self.modules.len() {
             let file = &self.modules[module].file;
-            let imported = imports.entry(file.clone()).or_insert_with(BTreeMap::new);
+            let imported = imports.entry(file.clone()).or_default();
             for (target, path) in self.of_module(module) {
                 let target = &self.modules[target].file;
                 if target != file {
