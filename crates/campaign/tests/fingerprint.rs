@@ -1,7 +1,7 @@
 //! The fingerprint of a campaign: every key of its files changes it, and nothing else does. Keys come from the examples
 //! of the documents and from the declarations; the readers' own lists of keys say whether any is missing.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 use afbc::Profile;
 use afbc_campaign::{self as campaign, Campaign, Course, Manifest, Shard, Spread};

@@ -1,7 +1,7 @@
 //! Order of requests, rejection of implausible values, and ages.
 
 use afbc_flight_core::inbox::REQUESTS_MAX;
-use afbc_flight_core::{Asked, Inbox, Refusal, Request, Stamped};
+use afbc_flight_core::{Asked, Inbox, Reasons, Refusal, Request, Stamped};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use nalgebra::Vector3;
 
@@ -148,19 +148,19 @@ fn news_are_merged() {
     inbox.put_state(at(1));
     inbox.put_adrift(None, Refusal::HeadingUnknown);
     inbox.put_setpoint(Stamped { value: Setpoint::default(), at_us: 1 });
-    inbox.bar(Some(Refusal::BatteryLow));
+    inbox.bar(Refusal::BatteryLow.into());
     let before = inbox;
     inbox.post(&Inbox::EMPTY);
     assert_eq!(inbox, before);
     let mut news = Inbox::EMPTY;
     news.put_adrift(Some(at(2)), Refusal::PositionUnknown);
-    news.bar(Some(Refusal::SensorFailed));
+    news.bar(Refusal::SensorFailed.into());
     inbox.post(&news);
     assert_eq!((inbox.adrift(), inbox.missing()), (Some(&at(2)), Some(Refusal::PositionUnknown)));
-    assert_eq!((inbox.state(), inbox.barred()), (Some(&at(1)), Some(Refusal::SensorFailed)));
-    assert_eq!(inbox.take().barred(), Some(Refusal::SensorFailed));
-    inbox.bar(None);
-    assert_eq!(inbox.barred(), None);
+    assert_eq!((inbox.state(), inbox.barred()), (Some(&at(1)), Refusal::SensorFailed.into()));
+    assert_eq!(inbox.take().barred(), Refusal::SensorFailed.into());
+    inbox.bar(Reasons::NONE);
+    assert_eq!(inbox.barred(), Reasons::NONE);
     inbox.put_pose(Stamped { value: Pose::default(), at_us: 3 });
     inbox.clear_pose();
     assert_eq!(inbox.take().pose(), None);

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use afbc_flight_core::landing::LEFT_M;
-use afbc_flight_core::{Mode, Refusal, Request, Stamped};
+use afbc_flight_core::{ArmingLimits, Mode, Refusal, Request, Stamped};
 use afbc_guidance::*;
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
@@ -22,7 +22,8 @@ struct Desk {
     follows: bool,
     now_us: u64,
     dt_s: f32,
-    missing: Option<Refusal>,
+    /// Time at rest, as the flight core counts it \[s\].
+    rest_s: f32,
     battery: Option<Reading>,
     sensors: Sensors,
     lift: Lift,
@@ -49,7 +50,7 @@ impl Desk {
             follows: true,
             now_us: 5_000_000,
             dt_s: 1e-3,
-            missing: None,
+            rest_s: 0.0,
             battery: None,
             sensors: Sensors::default(),
             lift: Lift { most_m_s2: 2.0 * G, gravity_m_s2: G, given_m_s2: Some(G) },
@@ -73,14 +74,15 @@ impl Desk {
 
     fn tick(&mut self) -> Guided {
         self.now_us += 1000;
+        let rests = self.state.as_ref().is_some_and(|state| ArmingLimits::DEFAULT.at_rest(state));
+        self.rest_s = if rests { self.rest_s + 1e-3 } else { 0.0 };
         let sight = Sight {
             now_us: self.now_us,
             dt_s: self.dt_s,
             state: self.state.as_ref(),
-            missing: self.missing,
             core: self.core,
             airborne: self.airborne,
-            tick_healthy: true,
+            rested: self.rest_s >= 1.0,
             battery: self.battery,
             sensors: self.sensors,
             lift: self.lift,
@@ -288,14 +290,16 @@ fn home_is_where_it_rests_and_is_armed() {
 /// Time steps that make no sense count as a millisecond, and long ones are cut.
 #[test]
 fn strange_time_steps_are_replaced() {
-    let rests_after = |dt_s: f32| {
-        let mut desk = Desk { dt_s, ..Desk::new(Settings::DEFAULT) };
-        (1..20_000_i32).find(|_| desk.tick().checks.is_ok(Check::AtRest)).unwrap()
+    let asks_after = |dt_s: f32| {
+        let flying = Flying { disarm_before_s: 1.0, ..Flying::DEFAULT };
+        let mut desk = Desk { dt_s, ..Desk::new(Settings { flying, ..Settings::DEFAULT }) };
+        desk.core = Mode::Flying;
+        (1..20_000_i32).find(|_| desk.tick().request == Some(Request::Disarm)).unwrap()
     };
     for (dt_s, ticks) in
         [(1e-3, 1000), (0.01, 100), (0.02, 50), (5.0, 50), (1e-6, 10_000), (0.0, 1000), (-0.01, 1000), (NAN, 1000)]
     {
-        let found = rests_after(dt_s);
+        let found = asks_after(dt_s);
         assert!((found - ticks).abs() <= 1 + ticks / 500, "{dt_s} s: {found} ticks");
     }
 }
@@ -438,56 +442,38 @@ fn it_asks_to_disarm_on_the_ground() {
     assert_eq!(asks(&mut desk, 2000), []);
 }
 
-/// Checks before arming: level about both axes, at rest, with a battery that is known and not low.
+/// What speaks against arming besides what the flight core sees: a battery that is not known or low, sensors, the fence.
 #[test]
-fn checks_have_their_limits() {
-    let fails = |change: &dyn Fn(&mut Desk)| {
+fn what_bars_arming_has_its_limits() {
+    let bars = |change: &dyn Fn(&mut Desk)| {
         let net = Net { cells: 3.0, fence_radius_m: 10.0, ..Net::DEFAULT };
         let mut desk = Desk::new(Settings { net, ..Settings::DEFAULT });
         desk.battery = Some(Reading { voltage_v: 11.7, current_a: 0.0 });
         desk.run(1100);
         change(&mut desk);
-        desk.tick().checks
+        desk.tick().against.iter().collect::<Vec<_>>()
     };
-    let tilted = |roll: f32, pitch: f32| {
-        let text =
-            fails(&|desk| desk.state.as_mut().unwrap().attitude_rad = Vector3::new(roll, pitch, 2.0)).to_string();
-        assert!(text.is_empty() || text == "level", "{text}");
-        text.is_empty()
-    };
-    assert!(
-        tilted(0.25, -0.25) && tilted(-0.25, 0.25) && !tilted(0.27, 0.0) && !tilted(0.0, -0.27) && !tilted(-0.27, 0.0)
-    );
-    assert!(!tilted(0.0, 0.27));
-    let text = |change: &dyn Fn(&mut Desk)| fails(change).to_string();
-    assert_eq!(text(&|desk| desk.state.as_mut().unwrap().velocity_m_s.x = 0.6), "at rest");
-    assert_eq!(text(&|desk| desk.state.as_mut().unwrap().position_m.x = 12.0), "geofence");
-    assert_eq!(text(&|desk| desk.battery = None), "battery");
-    let mut low = fails(&|desk| {
+    assert_eq!(bars(&|_| ()), []);
+    assert_eq!(bars(&|desk| desk.state.as_mut().unwrap().position_m.x = 10.9), [], "10 m from home, at x = 1 m");
+    assert_eq!(bars(&|desk| desk.state.as_mut().unwrap().position_m.x = 11.1), [Refusal::OutsideFence]);
+    assert_eq!(bars(&|desk| desk.battery = None), [Refusal::BatteryLow]);
+    assert_eq!(bars(&|desk| desk.sensors.tracker = true), [Refusal::SensorFailed]);
+    let low = bars(&|desk| {
         desk.battery = Some(Reading { voltage_v: 10.8, current_a: 0.0 });
         desk.run(9000);
     });
-    assert_eq!((low.to_string(), low.refusal()), ("battery".to_owned(), Some(Refusal::BatteryLow)));
-    low = fails(&|desk| {
-        desk.missing = Some(Refusal::HeadingUnknown);
+    assert_eq!(low, [Refusal::BatteryLow]);
+    let both = bars(&|desk| {
         desk.sensors.tracker = true;
         desk.state.as_mut().unwrap().position_m.y = 15.0;
     });
-    assert_eq!(low.to_string(), "heading, position, sensors, geofence");
-    assert_eq!((low.refusal(), low.all_ok()), (Some(Refusal::SensorFailed), false));
-    for (check, ok) in low.iter() {
-        let fails = [Check::Heading, Check::Position, Check::Sensors, Check::Fence].contains(&check);
-        assert_eq!((ok, low.is_ok(check)), (!fails, !fails), "{check:?}");
-        assert_eq!(low.failing() & 1 << check as u16 != 0, fails);
-    }
-    assert_eq!(low.iter().count(), Check::ALL.len());
+    assert_eq!(both, [Refusal::SensorFailed, Refusal::OutsideFence]);
     // Not watched without cells, and never known before the first reading.
-    let unwatched = Desk::new(Settings::DEFAULT).run(1100).checks;
-    assert!(unwatched.all_ok(), "{unwatched}");
+    assert!(Desk::new(Settings::DEFAULT).run(1100).against.is_empty());
     let net = Net { cells: 3.0, ..Net::DEFAULT };
     let mut desk = Desk::new(Settings { net, ..Settings::DEFAULT });
     desk.battery = Some(Reading { voltage_v: NAN, current_a: 0.0 });
-    assert_eq!(desk.run(1100).checks.to_string(), "battery");
+    assert!(desk.run(1100).against.iter().eq([Refusal::BatteryLow]));
 }
 
 /// The setpoint begins anew at a vehicle that is farther from it than its leash, or than a short one when the mode changes

@@ -1,5 +1,5 @@
 //! Flights that count as lost because the vehicle does not fly although it should, and those that do not.
-#![allow(clippy::unwrap_used, missing_docs)] // tests
+#![allow(clippy::panic, clippy::unwrap_used, missing_docs)] // tests
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_sim::contender::{Contender, ControllerKind};
