@@ -69,8 +69,8 @@ impl fmt::Display for Error {
             }
             Error::Changed(path) => write!(
                 f,
-                "{}: holds results of a campaign, vehicle, shard or program that is not this one; choose another folder \
-                 with --out, or replace them with --force",
+                "{}: holds results of a campaign, vehicle, shard or program that is not this one; choose another \
+                 folder with --out, or replace them with --force",
                 path.display()
             ),
             Error::Busy(path) => {
