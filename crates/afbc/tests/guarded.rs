@@ -122,6 +122,8 @@ proptest! {
             Adaptive::new(Profile::Flight.gains()).unwrap(),
         )
         .unwrap();
+        prop_assert_eq!((controller.dt_s(), controller.mixer()), (law.dt_s(), law.mixer()));
+        prop_assert_eq!(law.dt_s(), settings.common.dt_s);
         let (mut memory, mut other) = (Flight::default(), Screened::default());
         for (state, setpoint) in inputs {
             controller.engage(&mut memory.control);

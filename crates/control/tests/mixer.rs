@@ -434,12 +434,16 @@ proptest! {
                 asked[index] = sign * share * most_n;
                 mixer.allocate(&inputs(asked)).saturated
             });
-            if mixer.allocate(&inputs([0.0, 0.0, 0.0, weight_n])).saturated {
+            let hover = mixer.allocate(&inputs([0.0, 0.0, 0.0, weight_n]));
+            if hover.saturated {
                 prop_assert!(most_n < 1e-4, "{most_n} N of a vehicle that does not hover");
-            } else {
-                prop_assert_eq!(saturates(0.999), [false; 2], "{} N are not given", most_n);
-                prop_assert!(most_n < 1e-3 || saturates(1.001).contains(&true), "more than {most_n} N is given");
+                continue;
             }
+            prop_assert_eq!(saturates(0.999), [false; 2], "{} N are not given", most_n);
+            // What saturates without any more has no room.
+            let room = hover.forces.0.min().min(3.0 - hover.forces.0.max());
+            prop_assert!(room < 1e-3 || most_n > 1e-4, "{most_n} N with {room} N of room");
+            prop_assert!(room < 1e-3 || saturates(1.001).contains(&true), "more than {most_n} N is given");
         }
     }
 
