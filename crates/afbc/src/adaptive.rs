@@ -15,7 +15,6 @@ const HOVER_SHARE_MIN: f32 = 0.3;
 parameters! {
     /// Gains of one AFBC subsystem. The defaults are those of Section IV for attitude.
     #[derive(Clone, Copy, Debug, PartialEq)]
-    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Gains {
         /// alpha_1, alpha_2.
         #[group("")]
@@ -303,7 +302,7 @@ impl Law for Adaptive {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a basis that cannot be built must stop the test")]
+#[allow(clippy::unwrap_used, reason = "what cannot be built must stop the test")]
 mod tests {
     use super::*;
 

@@ -1,5 +1,5 @@
 //! The nominal model (7) compared with rigid-body mechanics in `f64`, and d eta/dt with the rotation that it describes.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 mod common;
 

@@ -1,5 +1,5 @@
 //! The profiles: the paper's numbers, the rules behind those of `flight`, and that every one is valid.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 use afbc::adaptive::Gains;
 use afbc::fuzzy::Membership;
