@@ -203,8 +203,8 @@ impl Covariance {
 
     /// True if every variance is finite.
     pub(crate) fn is_sound(&self) -> bool {
-        let sum = self.tt.trace() + self.vv.trace() + self.pp.trace() + self.gg.trace() + self.aa.trace() + self.bb;
-        sum.is_finite()
+        [&self.tt, &self.vv, &self.pp, &self.gg, &self.aa].into_iter().all(|block| block.trace().is_finite())
+            && self.bb.is_finite()
     }
 
     /// Raises every variance to the least.

@@ -95,9 +95,10 @@
 //!
 //! # Reading order
 //!
-//! [`measurement`], [`settings`], [`estimate`]: in and out. [`estimator`]: a step. [`align`]: the start. [`rest`]: rest.
-//! [`nominal`], [`errors`], [`covariance`]: prediction. [`history`], [`horizon`], [`queue`], [`fusion`], [`slow`]:
-//! measurements. [`aid`], [`restart`], [`imu`]: gates, resets, health. [`rotation`], [`geodetic`]: small mathematics.
+//! [`measurement`], [`settings`], [`estimate`]: in and out. [`estimator`]: a step. [`align`]: the start. [`rest`]:
+//! rest. [`nominal`], [`errors`], [`covariance`]: prediction. [`history`], [`horizon`], [`queue`], [`fusion`],
+//! [`slow`]: measurements. [`aid`], [`restart`], [`imu`]: gates, resets, health. [`rotation`], [`geodetic`]: small
+//! mathematics.
 #![no_std]
 #![allow(rustdoc::private_intra_doc_links, reason = "the modules' documentation is for their reader")]
 

@@ -3,6 +3,10 @@
 
 extern crate std;
 
+mod fused;
+mod parts;
+mod resets;
+
 use crate::covariance::{Covariance, Growth};
 use crate::errors::{Coordinate, Errors, Interval, Row, Slows};
 use crate::history::{History, Past};
