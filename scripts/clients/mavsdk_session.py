@@ -7,6 +7,8 @@ import subprocess
 import tempfile
 
 from mavsdk_grpc import System
+from mavsdk_grpc.ftp import FtpError
+from mavsdk_grpc.log_files import LogFilesError
 from mavsdk_grpc.mission import MissionItem, MissionPlan
 from mavsdk_grpc.offboard import Attitude, PositionNedYaw, VelocityBodyYawspeed, VelocityNedYaw
 from mavsdk_grpc.telemetry import LandedState
@@ -92,6 +94,17 @@ async def set_one(drone, name, value):
     return f"{name} = {got}"
 
 
+async def refused(doing):
+    """The answer to a question about what the vehicle does not have: no silence, which MAVSDK calls a timeout."""
+    try:
+        return f"answered: {await doing}"
+    except (FtpError, LogFilesError) as error:
+        name = error._result.result.name
+        if name == "TIMEOUT":
+            raise
+        return f"refused, {name}"
+
+
 async def offboard_position(drone, place):
     def target(north):
         return PositionNedYaw(place.north_m + north, place.east_m, place.down_m, 90.0)
@@ -173,6 +186,9 @@ async def run():
     await session.step("info", versions(drone), 20)
     await session.step("health all ok", first(drone.telemetry.health_all_ok(), lambda ok: ok), 60)
     await session.step("parameters", read_all(drone), 30)
+    await session.step("logs", refused(drone.log_files.get_entries()), 2)
+    await session.step("files", refused(drone.ftp.list_directory("/")), 2)
+    await session.step("a file", refused(drone.ftp.are_files_identical(__file__, "/none")), 2)
     await session.step("set a parameter", set_one(drone, "MIS_TAKEOFF_ALT", 4.0))
     served.quit()
     served = Served(*store, *OPTIONS)

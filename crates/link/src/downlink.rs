@@ -5,20 +5,22 @@ use crate::answer::{self, Answer};
 use crate::clocks::Clock;
 use crate::frames::flip;
 use crate::health::{self, Health};
-use crate::interval::Interval;
+use crate::interval::{DataStream, Interval};
 use crate::message::{Fault, Format, Message, PAYLOAD_MAX, parse, put};
 use crate::mission::Mission;
 use crate::modes::{AvailableMode, CurrentMode};
 use crate::operator::{ANSWER_ID, ControlAnswer};
-use crate::parameter::ParameterValue;
+use crate::parameter::{ParameterError, ParameterValue};
+use crate::question::Refusal;
 use crate::target::{Motion, followed_format, read_followed, write_followed};
 use crate::telemetry::Telemetry;
 use afbc_types::{ROTORS_MAX, RotorSpeeds};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
-    ATTITUDE_DATA, AVAILABLE_MODES_DATA, COMMAND_ACK_DATA, CURRENT_MODE_DATA, DEBUG_FLOAT_ARRAY_DATA, HEARTBEAT_DATA,
-    HIL_ACTUATOR_CONTROLS_DATA, HilActuatorControlsFlags, LOCAL_POSITION_NED_DATA, MESSAGE_INTERVAL_DATA, MavAutopilot,
-    MavModeFlag, MavSeverity, MavState, MavType, PARAM_VALUE_DATA, POSITION_TARGET_LOCAL_NED_DATA, STATUSTEXT_DATA,
+    ATTITUDE_DATA, AVAILABLE_MODES_DATA, COMMAND_ACK_DATA, CURRENT_MODE_DATA, DATA_STREAM_DATA, DEBUG_FLOAT_ARRAY_DATA,
+    HEARTBEAT_DATA, HIL_ACTUATOR_CONTROLS_DATA, HilActuatorControlsFlags, LOCAL_POSITION_NED_DATA,
+    MESSAGE_INTERVAL_DATA, MavAutopilot, MavModeFlag, MavSeverity, MavState, MavType, PARAM_ERROR_DATA,
+    PARAM_VALUE_DATA, POSITION_TARGET_LOCAL_NED_DATA, STATUSTEXT_DATA,
 };
 use mavlink::types::CharArray;
 use nalgebra::{SVector, Vector3};
@@ -108,6 +110,22 @@ pub enum Downlink {
     Parameter(ParameterValue),
     /// CHANGE_OPERATOR_CONTROL_ACK (6).
     Control(ControlAnswer),
+    /// DATA_STREAM (67).
+    Stream(DataStream),
+    /// PARAM_ERROR (345).
+    ParameterError {
+        /// The error.
+        error: ParameterError,
+        /// Who asked.
+        to: Address,
+    },
+    /// The answer to a question about what the vehicle does not have.
+    Refusal {
+        /// The answer.
+        refusal: Refusal,
+        /// Who asked, if the message names it.
+        to: Address,
+    },
 }
 
 impl Downlink {
@@ -131,7 +149,12 @@ impl Message for Downlink {
             CURRENT_MODE_DATA::ID => Some(CurrentMode::format()),
             PARAM_VALUE_DATA::ID => Some(ParameterValue::format()),
             ANSWER_ID => Some(ControlAnswer::format()),
-            _ => Telemetry::format(id).or_else(|| Mission::format(id)).or_else(|| Clock::format(id)),
+            DATA_STREAM_DATA::ID => Some(DataStream::answer_format()),
+            PARAM_ERROR_DATA::ID => Some(ParameterError::format()),
+            _ => Telemetry::format(id)
+                .or_else(|| Mission::format(id))
+                .or_else(|| Clock::format(id))
+                .or_else(|| Refusal::format(id)),
         }
     }
 
@@ -157,6 +180,14 @@ impl Message for Downlink {
             CURRENT_MODE_DATA::ID => Ok(Downlink::CurrentMode(CurrentMode::read(payload))),
             PARAM_VALUE_DATA::ID => Ok(Downlink::Parameter(ParameterValue::read(payload))),
             ANSWER_ID => ControlAnswer::read(payload).map(Downlink::Control),
+            DATA_STREAM_DATA::ID => Ok(Downlink::Stream(DataStream::read_answer(payload))),
+            PARAM_ERROR_DATA::ID => {
+                let (error, to) = ParameterError::read(payload);
+                Ok(Downlink::ParameterError { error, to })
+            }
+            _ if Refusal::format(id).is_some() => {
+                Refusal::read(id, payload).map(|(refusal, to)| Downlink::Refusal { refusal, to })
+            }
             _ if Mission::format(id).is_some() => {
                 Mission::read(id, payload).map(|(message, to)| Downlink::Mission { message, to })
             }
@@ -192,6 +223,9 @@ impl Message for Downlink {
             Downlink::CurrentMode(mode) => mode.write(payload),
             Downlink::Parameter(value) => value.write(payload),
             Downlink::Control(answer) => answer.write(payload),
+            Downlink::Stream(stream) => stream.write_answer(payload),
+            Downlink::ParameterError { error, to } => error.write(*to, payload),
+            Downlink::Refusal { refusal, to } => refusal.write(*to, payload),
         }
     }
 }

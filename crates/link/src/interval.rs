@@ -1,9 +1,9 @@
-//! Rates of messages: MESSAGE_INTERVAL, and REQUEST_DATA_STREAM of older stations.
+//! Rates of messages: MESSAGE_INTERVAL, and REQUEST_DATA_STREAM of older stations with DATA_STREAM.
 
 use crate::address::Address;
 use crate::message::{Format, PAYLOAD_MAX};
 use crate::wire::Layout;
-use mavlink::dialects::common::{MESSAGE_INTERVAL_DATA, REQUEST_DATA_STREAM_DATA};
+use mavlink::dialects::common::{DATA_STREAM_DATA, MESSAGE_INTERVAL_DATA, REQUEST_DATA_STREAM_DATA};
 
 /// MESSAGE_INTERVAL (244).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,7 +14,7 @@ pub struct Interval {
     pub interval_us: i32,
 }
 
-/// REQUEST_DATA_STREAM (66): all messages of a group.
+/// REQUEST_DATA_STREAM (66), or its answer, DATA_STREAM (67): all messages of a group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DataStream {
     /// `MAV_DATA_STREAM`.
@@ -26,6 +26,9 @@ pub struct DataStream {
 const INTERVAL: Layout<MESSAGE_INTERVAL_DATA, (i32, u16)> = Layout::NEW;
 /// Rate, receiver, group, start.
 const STREAM: Layout<REQUEST_DATA_STREAM_DATA, (u16, Address, u8, u8)> = Layout::NEW;
+
+/// Rate, group, on.
+const GROUP: Layout<DATA_STREAM_DATA, (u16, u8, u8)> = Layout::NEW;
 
 impl Interval {
     pub(crate) fn format() -> Format {
@@ -55,5 +58,18 @@ impl DataStream {
 
     pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         STREAM.write(&(self.rate_hz, Address::default(), self.group, u8::from(self.rate_hz > 0)), payload)
+    }
+
+    pub(crate) fn answer_format() -> Format {
+        GROUP.format()
+    }
+
+    pub(crate) fn read_answer(payload: &[u8]) -> Self {
+        let (rate_hz, group, on) = GROUP.read(payload);
+        DataStream { group, rate_hz: if on == 0 { 0 } else { rate_hz } }
+    }
+
+    pub(crate) fn write_answer(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        GROUP.write(&(self.rate_hz, self.group, u8::from(self.rate_hz > 0)), payload)
     }
 }

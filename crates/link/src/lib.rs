@@ -45,6 +45,7 @@ mod modes;
 mod operator;
 mod parameter;
 mod place;
+mod question;
 mod target;
 pub mod telemetry;
 mod uplink;
@@ -61,11 +62,15 @@ pub use health::{Health, StatesRefused};
 pub use interval::{DataStream, Interval};
 pub use mavlink::dialects::common::{MavCmd, MavSeverity};
 pub use message::{Fault, Format, Message};
-pub use mission::{Mission, MissionCurrent, MissionItem, MissionResult, Plan};
+pub use mission::{Mission, MissionCurrent, MissionItem, MissionResult, Part, Plan};
 pub use modes::{AvailableMode, CurrentMode};
 pub use operator::{Control, ControlAnswer};
-pub use parameter::{ParameterName, ParameterRequest, ParameterValue};
+pub use parameter::{ParameterError, ParameterName, ParameterRequest, ParameterValue};
 pub use place::{Datum, Height, Place};
+pub use question::{
+    EventError, EventRequest, ExtendedAnswer, ExtendedName, ExtendedRequest, FileError, FileOperation, FileRefusal,
+    LogAnswer, LogRequest, Question, Refusal, Serial, Terrain,
+};
 pub use target::{AttitudeAndThrust, Axes, Motion, Sticks, Target};
 pub use telemetry::Telemetry;
 pub use uplink::Uplink;

@@ -5,9 +5,10 @@ use crate::message::{Fault, Format, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
-    MISSION_ACK_DATA, MISSION_CLEAR_ALL_DATA, MISSION_COUNT_DATA, MISSION_CURRENT_DATA, MISSION_ITEM_INT_DATA,
-    MISSION_ITEM_REACHED_DATA, MISSION_REQUEST_DATA, MISSION_REQUEST_INT_DATA, MISSION_REQUEST_LIST_DATA,
-    MISSION_SET_CURRENT_DATA,
+    MISSION_ACK_DATA, MISSION_CLEAR_ALL_DATA, MISSION_COUNT_DATA, MISSION_CURRENT_DATA, MISSION_ITEM_DATA,
+    MISSION_ITEM_INT_DATA, MISSION_ITEM_REACHED_DATA, MISSION_REQUEST_DATA, MISSION_REQUEST_INT_DATA,
+    MISSION_REQUEST_LIST_DATA, MISSION_REQUEST_PARTIAL_LIST_DATA, MISSION_SET_CURRENT_DATA,
+    MISSION_WRITE_PARTIAL_LIST_DATA,
 };
 
 /// What a list of items is, `MAV_MISSION_TYPE`.
@@ -25,7 +26,8 @@ impl Plan {
     pub const ALL: Plan = Plan(255);
 }
 
-/// An item as it crosses the wire: MISSION_ITEM_INT (73) without its receiver.
+/// An item as it crosses the wire: MISSION_ITEM_INT (73) without its receiver, or MISSION_ITEM (39), whose degrees and
+/// metres are rounded to the same units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MissionItem {
     /// Its number, from 0 on.
@@ -57,8 +59,10 @@ pub enum Mission {
     List(Plan),
     /// MISSION_REQUEST_INT (51), or MISSION_REQUEST (40), which asks for the same: send this item.
     Request(u16, Plan),
-    /// MISSION_ITEM_INT (73).
+    /// MISSION_ITEM_INT (73), or MISSION_ITEM (39), which says the same.
     Item(MissionItem, Plan),
+    /// MISSION_REQUEST_PARTIAL_LIST (37), or MISSION_WRITE_PARTIAL_LIST (38): a part of a list.
+    Part(Part, Plan),
     /// MISSION_ACK (47) with a `MAV_MISSION_RESULT`.
     Ack(MissionResult, Plan),
     /// MISSION_CLEAR_ALL (45).
@@ -69,6 +73,15 @@ pub enum Mission {
     Current(MissionCurrent),
     /// MISSION_ITEM_REACHED (46), for everyone.
     Reached(u16),
+}
+
+/// A part of a list of items.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// True if it is to be written, and not read.
+    pub writes: bool,
+    /// First and last number.
+    pub numbers: [i16; 2],
 }
 
 /// Content of MISSION_CURRENT.
@@ -119,6 +132,8 @@ type ToAddress<D, W> = Layout<D, (W, Address, u8)>;
 
 // Some messages end with identifiers of the plan, which are not used.
 const COUNT: Layout<MISSION_COUNT_DATA, (u16, Address, u8, u32)> = Layout::NEW;
+const READ_PART: ToAddress<MISSION_REQUEST_PARTIAL_LIST_DATA, [i16; 2]> = Layout::NEW;
+const WRITE_PART: ToAddress<MISSION_WRITE_PARTIAL_LIST_DATA, [i16; 2]> = Layout::NEW;
 const LIST: Layout<MISSION_REQUEST_LIST_DATA, (Address, u8)> = Layout::NEW;
 const REQUEST_INT: ToAddress<MISSION_REQUEST_INT_DATA, u16> = Layout::NEW;
 const REQUEST: ToAddress<MISSION_REQUEST_DATA, u16> = Layout::NEW;
@@ -129,6 +144,8 @@ const CURRENT: Layout<MISSION_CURRENT_DATA, (u16, u16, u8, u8, [u32; 3])> = Layo
 const REACHED: Layout<MISSION_ITEM_REACHED_DATA, (u16,)> = Layout::NEW;
 /// Parameters, x, y, z; number, command, receiver; frame, current, autocontinue, kind of plan.
 const ITEM: Layout<MISSION_ITEM_INT_DATA, ([f32; 4], [i32; 2], f32, u16, u16, Address, [u8; 3], u8)> = Layout::NEW;
+/// The same, with x and y as numbers.
+const FLOAT_ITEM: Layout<MISSION_ITEM_DATA, ([f32; 4], [f32; 2], f32, u16, u16, Address, [u8; 3], u8)> = Layout::NEW;
 
 impl Mission {
     pub(crate) fn format(id: u32) -> Option<Format> {
@@ -138,6 +155,9 @@ impl Mission {
             MISSION_REQUEST_INT_DATA::ID => REQUEST_INT.format(),
             MISSION_REQUEST_DATA::ID => REQUEST.format(),
             MISSION_ITEM_INT_DATA::ID => ITEM.format(),
+            MISSION_ITEM_DATA::ID => FLOAT_ITEM.format(),
+            MISSION_REQUEST_PARTIAL_LIST_DATA::ID => READ_PART.format(),
+            MISSION_WRITE_PARTIAL_LIST_DATA::ID => WRITE_PART.format(),
             MISSION_ACK_DATA::ID => ACK.format(),
             MISSION_CLEAR_ALL_DATA::ID => CLEAR.format(),
             MISSION_SET_CURRENT_DATA::ID => SET_CURRENT.format(),
@@ -167,6 +187,22 @@ impl Mission {
                 let (is_current, goes_on) = (current != 0, goes_on != 0);
                 let item = MissionItem { number, command, frame, is_current, goes_on, parameters, x, y, z };
                 (Mission::Item(item, Plan(plan)), to)
+            }
+            MISSION_ITEM_DATA::ID => {
+                let (parameters, place, z, number, command, to, [frame, current, goes_on], plan) =
+                    FLOAT_ITEM.read(payload);
+                let (is_current, goes_on) = (current != 0, goes_on != 0);
+                let [x, y] = place.map(|number| in_units(number, frame));
+                let item = MissionItem { number, command, frame, is_current, goes_on, parameters, x, y, z };
+                (Mission::Item(item, Plan(plan)), to)
+            }
+            MISSION_REQUEST_PARTIAL_LIST_DATA::ID => {
+                let (numbers, to, plan) = READ_PART.read(payload);
+                (Mission::Part(Part { writes: false, numbers }, Plan(plan)), to)
+            }
+            MISSION_WRITE_PARTIAL_LIST_DATA::ID => {
+                let (numbers, to, plan) = WRITE_PART.read(payload);
+                (Mission::Part(Part { writes: true, numbers }, Plan(plan)), to)
             }
             MISSION_ACK_DATA::ID => {
                 let (to, result, plan, _) = ACK.read(payload);
@@ -200,6 +236,8 @@ impl Mission {
                 let flags = [frame, u8::from(is_current), u8::from(goes_on)];
                 ITEM.write(&(parameters, [x, y], z, number, command, to, flags, plan.0), payload)
             }
+            Mission::Part(Part { writes: true, numbers }, plan) => WRITE_PART.write(&(numbers, to, plan.0), payload),
+            Mission::Part(Part { numbers, .. }, plan) => READ_PART.write(&(numbers, to, plan.0), payload),
             Mission::Ack(result, plan) => ACK.write(&(to, result.0, plan.0, 0), payload),
             Mission::Clear(plan) => CLEAR.write(&(to, plan.0), payload),
             Mission::SetCurrent(number) => SET_CURRENT.write(&(number, to), payload),
@@ -210,3 +248,14 @@ impl Mission {
         }
     }
 }
+
+/// Returns degrees, or metres in one of the local frames, in the units of MISSION_ITEM_INT.
+fn in_units(number: f32, frame: u8) -> i32 {
+    let units = if LOCAL_FRAMES.contains(&frame) { 1e4 } else { 1e7 };
+    // Saturates, so that what is out of range remains so.
+    let scaled = f64::from(number) * units;
+    (scaled + if scaled < 0.0 { -0.5 } else { 0.5 }) as i32
+}
+
+/// MAV_FRAME_LOCAL_NED, LOCAL_ENU, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED, BODY_FRD, LOCAL_FRD, LOCAL_FLU.
+const LOCAL_FRAMES: [u8; 8] = [1, 4, 7, 8, 9, 12, 20, 21];

@@ -4,7 +4,9 @@ use crate::address::Address;
 use crate::message::{Fault, Format, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::MessageData;
-use mavlink::dialects::common::{PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA};
+use mavlink::dialects::common::{
+    PARAM_ERROR_DATA, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
+};
 
 /// Name of a parameter, with zeros behind it; none at full length.
 pub type ParameterName = [u8; 16];
@@ -44,6 +46,18 @@ pub struct ParameterValue {
     pub place: u16,
 }
 
+/// PARAM_ERROR (345).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ParameterError {
+    /// Name asked for, or zeros.
+    pub name: ParameterName,
+    /// Place asked for; -1 for none.
+    pub place: i16,
+    /// `MAV_PARAM_ERROR`.
+    pub error: u8,
+}
+
+const ERROR: Layout<PARAM_ERROR_DATA, (i16, Address, ParameterName, u8)> = Layout::NEW;
 const LIST: Layout<PARAM_REQUEST_LIST_DATA, (Address,)> = Layout::NEW;
 const READ: Layout<PARAM_REQUEST_READ_DATA, (i16, Address, ParameterName)> = Layout::NEW;
 const SET: Layout<PARAM_SET_DATA, ([u8; 4], Address, ParameterName, u8)> = Layout::NEW;
@@ -87,6 +101,26 @@ impl ParameterRequest {
             ParameterRequest::ReadName(name) => READ.write(&(-1, to, name), payload),
             ParameterRequest::Set { name, value, kind } => SET.write(&(value, to, name, kind), payload),
         }
+    }
+}
+
+impl ParameterError {
+    /// There is no such parameter.
+    pub const DOES_NOT_EXIST: u8 = 1;
+
+    pub(crate) fn format() -> Format {
+        ERROR.format()
+    }
+
+    /// Returns the message and its receiver.
+    pub(crate) fn read(payload: &[u8]) -> (Self, Address) {
+        let (place, to, name, error) = ERROR.read(payload);
+        (ParameterError { name, place, error }, to)
+    }
+
+    pub(crate) fn write(&self, to: Address, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let ParameterError { name, place, error } = *self;
+        ERROR.write(&(place, to, name, error), payload)
     }
 }
 

@@ -9,6 +9,7 @@ use crate::message::{Fault, Format, Message, PAYLOAD_MAX, extension, field, pars
 use crate::mission::Mission;
 use crate::operator::{CHANGE_ID, Control};
 use crate::parameter::ParameterRequest;
+use crate::question::Question;
 use crate::target::{Motion, Target, write_motion};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use mavlink::MessageData;
@@ -53,7 +54,7 @@ pub enum Uplink {
     Setpoint(Setpoint),
     /// Any other target, or a pilot's sticks.
     Target(Target),
-    /// COMMAND_LONG (76), COMMAND_INT (75) or SET_MODE (11).
+    /// COMMAND_LONG (76), COMMAND_INT (75), SET_MODE (11) or SET_HOME_POSITION (243).
     Command(Command),
     /// MISSION_*.
     Mission(Mission),
@@ -65,6 +66,8 @@ pub enum Uplink {
     Stream(DataStream),
     /// CHANGE_OPERATOR_CONTROL (5).
     Control(Control),
+    /// A question about what the vehicle may not have.
+    Question(Question),
 }
 
 impl Message for Uplink {
@@ -80,7 +83,8 @@ impl Message for Uplink {
                 .or_else(|| command::format(id))
                 .or_else(|| Mission::format(id))
                 .or_else(|| Clock::format(id))
-                .or_else(|| ParameterRequest::format(id)),
+                .or_else(|| ParameterRequest::format(id))
+                .or_else(|| Question::format(id)),
         }
     }
 
@@ -114,6 +118,10 @@ impl Message for Uplink {
             }
             // Questions are for everyone; answers are of use to the asker only, who decides.
             _ if Clock::format(id).is_some() => Clock::read(id, payload).map(Uplink::Clock),
+            _ if Question::format(id).is_some() => {
+                let (question, to) = Question::read(id, payload)?;
+                meant_for(receiver, to).map(|()| Uplink::Question(question))
+            }
             _ => {
                 let (request, to) = ParameterRequest::read(id, payload)?;
                 meant_for(receiver, to).map(|()| Uplink::Parameter(request))
@@ -147,6 +155,7 @@ impl Message for Uplink {
             Uplink::Clock(clock) => clock.write(payload),
             Uplink::Stream(stream) => stream.write(payload),
             Uplink::Control(control) => control.write(payload),
+            Uplink::Question(question) => question.write(payload),
         }
     }
 }

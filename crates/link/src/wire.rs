@@ -82,6 +82,24 @@ impl Wire for Address {
     }
 }
 
+/// Bytes that are not read, and zero where they are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Unused<const N: usize>;
+
+impl<const N: usize> Wire for Unused<N> {
+    const LEN: usize = N;
+
+    fn take(source: &mut Source<'_>) -> Self {
+        // By one at least, which no message needs.
+        source.0.nth(N.saturating_sub(1));
+        Unused
+    }
+
+    fn give(&self, sink: &mut Sink<'_>) {
+        (0..N).for_each(|_| sink.put(0));
+    }
+}
+
 macro_rules! tuples {
     ($($(($field:ident $name:ident))+;)*) => {$(
         impl<$($name: Wire),+> Wire for ($($name,)+) {

@@ -79,6 +79,7 @@ fn expected(stream: &[u8]) -> Vec<Uplink> {
         75 => length <= 35,
         84 => length <= 53,
         102 => length <= 117,
+        110 => length <= 254,
         138 => length <= 120,
         331 => length <= 233,
         _ => false,
@@ -106,8 +107,8 @@ fn nesting_payloads() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
-/// A frame, and its message if it must be delivered: carried messages; others, from TUNNEL, FILE_TRANSFER_PROTOCOL and
-/// LOG_DATA to ones of no dialect, signed and unsigned; carried ones that are signed or too long; any of these damaged
+/// A frame, and its message if it must be delivered: carried messages, FILE_TRANSFER_PROTOCOL among them; others, from
+/// TUNNEL and LOG_DATA to ones of no dialect, signed and unsigned; carried ones that are signed or too long; any of these damaged
 /// behind the header.
 fn top_level() -> impl Strategy<Value = (Vec<u8>, Option<Uplink>)> {
     let carried = messages().prop_map(|message| (frames(&[message]).concat(), Some(message))).boxed();
@@ -128,8 +129,11 @@ fn top_level() -> impl Strategy<Value = (Vec<u8>, Option<Uplink>)> {
             *flags != 0 || !matches!(id, 0 | 75 | 76) || payload.len() > 35
         })
         .prop_map(|(id, flags, payload, sequence)| {
+            // A file operation is delivered itself, and nothing from within it.
+            let is_file = id == 110 && flags == 0 && payload.len() <= 254;
+            let message = is_file.then(|| Uplink::read(id, &payload, VEHICLE).ok()).flatten();
             let frame = Frame { flags, sequence, system: 255, component: 190, id, payload };
-            (frame.bytes(seed(id)), None)
+            (frame.bytes(seed(id)), message)
         })
         .boxed();
     let damaged = prop_oneof![carried.clone(), other.clone()]

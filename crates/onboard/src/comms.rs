@@ -20,14 +20,15 @@ use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, Sighting};
 use afbc_flight_core::{Mode, Stamped, Tracker};
 use afbc_guidance::{Cause, Notice, Reading, Reason};
 use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, Motion, Sender, StatesRefused, Uplink};
-use afbc_types::{PerAxis, Pose, Setpoint};
+use afbc_types::{PerAxis, Pose};
 
 /// Component of the vehicle: autopilot.
 const AUTOPILOT: u8 = 1;
 /// Largest size of all messages after one tick \[bytes\].
 pub const REPORT_MAX: usize = 768;
-/// Longest frame of a text \[bytes\].
+/// Longest frame of a text, and of a reply: a value of an extended parameter \[bytes\].
 const TEXT_MAX: usize = 12 + 54;
+const REPLY_MAX: usize = 12 + 149;
 /// Replies sent per tick.
 const REPLIES_PER_TICK: usize = 2;
 
@@ -52,8 +53,6 @@ pub struct Comms {
     saturated_ticks: u32,
     /// True if a state has arrived since the last rotor command.
     state_is_news: bool,
-    /// The setpoint that came last.
-    followed: Option<Setpoint>,
     failsafes: Failsafes,
     norms: PerAxis<Norm>,
     trip: Option<Trip>,
@@ -86,7 +85,6 @@ impl Comms {
             tick_us_max: 0.0,
             saturated_ticks: 0,
             state_is_news: false,
-            followed: None,
             failsafes: Failsafes::default(),
             norms: PerAxis::default(),
             trip: None,
@@ -120,7 +118,7 @@ impl Comms {
     /// A vehicle without an estimate of its own ignores poses, since a law needs velocities and rates.
     pub fn receive(&mut self, bytes: &[u8]) -> Mail {
         let mut news = Mail::EMPTY;
-        let Comms { decoder, desk, tracker, state_is_news, followed, .. } = self;
+        let Comms { decoder, desk, tracker, state_is_news, .. } = self;
         let estimates = desk.picture.senses;
         decoder.feed(bytes, |from, message| match message {
             Uplink::State { sent_us, state: value, sigmas } => {
@@ -144,9 +142,6 @@ impl Comms {
             }
             other => desk.hear(from, other, &mut news),
         });
-        if let Some(setpoint) = news.inbox.setpoint() {
-            *followed = Some(setpoint.value);
-        }
         desk.hand_over(&mut news);
         news.battery = desk.picture.surroundings.battery.map(|battery| Reading {
             voltage_v: f32::from(battery.voltage_mv) * 1e-3,
@@ -220,7 +215,7 @@ impl Comms {
         }
         for _ in 0..REPLIES_PER_TICK {
             if self.desk.streams.has_room()
-                && outlet.left >= TEXT_MAX
+                && outlet.left >= REPLY_MAX
                 && let Some(reply) = self.desk.next_reply()
             {
                 self.desk.streams.spend(outlet.say(&reply));
@@ -299,8 +294,8 @@ impl Comms {
             id::HEARTBEAT => Some(self.heartbeat()),
             id::MISSION_CURRENT => Some(self.desk.mission_current()),
             id::POSITION_TARGET_LOCAL_NED => {
-                let setpoint = self.followed.filter(|_| picture.mode.armed())?;
-                Some(Downlink::Followed(picture.time_ms(), Motion::from(&setpoint)))
+                let setpoint = self.desk.followed()?;
+                Some(Downlink::Followed(picture.time_ms(), Motion::from(setpoint)))
             }
             id::AVAILABLE_MODES => {
                 // 0 asks for all: one after the other.

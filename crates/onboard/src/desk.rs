@@ -10,12 +10,16 @@ use crate::services::commands::Commands;
 use crate::services::control::{Claim, Control};
 use crate::services::mission::Missions;
 use crate::services::picture::Picture;
-use crate::services::streams::Streams;
+use crate::services::streams::{Requested, Streams, id};
 use crate::services::texts::{Texts, Words};
-use crate::services::timesync;
+use crate::services::{events, extended, files, logs, serial, timesync};
 use crate::setup::Setup;
 use afbc_guidance::Order;
-use afbc_link::{Address, Clock, ControlAnswer, Downlink, Interval, MavSeverity, Mission, ParameterRequest, Uplink};
+use afbc_link::{
+    Address, Clock, ControlAnswer, DataStream, Downlink, Interval, MavSeverity, Mission, ParameterError,
+    ParameterRequest, Question, Refusal, Uplink,
+};
+use afbc_types::Setpoint;
 use heapless::Deque;
 
 /// Most replies that wait, besides answers to commands. Further ones are dropped: askers repeat.
@@ -31,13 +35,16 @@ enum Reply {
     Clock(Clock),
     Control(ControlAnswer),
     Interval(Interval),
+    Stream(DataStream),
     Reached(u16),
+    ParameterError(ParameterError, Address),
+    Refusal(Refusal, Address),
 }
 
 /// What a station wants of the parameters.
 #[derive(Clone, Copy, Debug)]
 enum Wish {
-    Ask(ParameterRequest),
+    Ask(ParameterRequest, Address),
     Restore,
 }
 
@@ -108,7 +115,11 @@ impl Desk {
             Uplink::Target(target) => self.target(target, from, mail),
             Uplink::Mission(message) => self.mission(message, from, mail),
             Uplink::Parameter(request) => self.parameter(request, from, mail),
-            Uplink::Stream(request) => self.streams.set_group(request, self.now_us),
+            Uplink::Stream(request) => {
+                let stream = self.streams.set_group(request, self.now_us);
+                self.reply(Reply::Stream(stream));
+            }
+            Uplink::Question(question) => self.question(question, from),
             Uplink::Clock(clock) => {
                 let answer = timesync::answer(clock, from, self.me, self.now_us);
                 answer.into_iter().for_each(|answer| self.reply(Reply::Clock(answer)));
@@ -158,12 +169,20 @@ impl Desk {
             Some(Reply::Clock(clock)) => Downlink::Clock(clock),
             Some(Reply::Control(answer)) => Downlink::Control(answer),
             Some(Reply::Interval(interval)) => Downlink::Interval(interval),
+            Some(Reply::Stream(stream)) => Downlink::Stream(stream),
+            Some(Reply::ParameterError(error, to)) => Downlink::ParameterError { error, to },
+            Some(Reply::Refusal(refusal, to)) => Downlink::Refusal { refusal, to },
             Some(Reply::Reached(number)) => Downlink::Mission { message: Mission::Reached(number), to: everyone },
             None => {
                 let (message, to) = self.missions.next_message()?;
                 Downlink::Mission { message, to }
             }
         })
+    }
+
+    /// Returns the setpoint that an armed vehicle follows.
+    pub(crate) fn followed(&self) -> Option<&Setpoint> {
+        self.picture.guided.setpoint.as_ref().filter(|_| self.picture.mode.armed())
     }
 
     /// Returns MISSION_CURRENT.
@@ -205,10 +224,34 @@ impl Desk {
         self.replies.push_back(reply).ok();
     }
 
+    /// Answers a question about what the vehicle does not have.
+    fn question(&mut self, question: Question, from: Address) {
+        let refusal = match question {
+            Question::Log(request) => Refusal::Log(logs::answer(request)),
+            Question::File(operation) => Refusal::File(files::answer(operation)),
+            Question::Extended(request) => Refusal::Extended(extended::answer(request)),
+            Question::Event(request) => Refusal::Event(events::answer(request)),
+            Question::Serial(asked) => Refusal::Serial(serial::answer(asked)),
+            // The same place, with nothing known of it.
+            Question::Terrain(place) => Refusal::Terrain(place),
+            Question::Origin => {
+                // It is where the shell has it, or nowhere.
+                self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, "the origin is not set by stations");
+                self.streams.request(Requested { message: id::GPS_GLOBAL_ORIGIN, index: 0 });
+                return;
+            }
+        };
+        self.reply(Reply::Refusal(refusal, from));
+    }
+
     fn mission(&mut self, message: Mission, from: Address, mail: &mut Mail) {
         let changes = matches!(message, Mission::Count(..) | Mission::Clear(_) | Mission::SetCurrent(_));
         let in_control = changes && self.may(from, mail);
         let heard = self.missions.hear(message, from, in_control, self.now_us);
+        if matches!(message, Mission::SetCurrent(_)) {
+            // After the tick in which the guidance takes it up.
+            self.streams.request(Requested { message: id::MISSION_CURRENT, index: 0 });
+        }
         if let Some(words) = heard.text {
             self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &words);
         }

@@ -7,7 +7,7 @@ use afbc_flight_core::{Asked, Mode, Stamped};
 use afbc_guidance::net::Sensors;
 use afbc_guidance::notice::Notices;
 use afbc_guidance::{Declined, FlightMode, Guidance, Lift, Sight};
-use afbc_types::{OutOfRange, State};
+use afbc_types::{OutOfRange, Setpoint, State};
 use nalgebra::Vector3;
 
 /// Ticket of the guidance's own requests, whose answers nobody waits for.
@@ -18,6 +18,8 @@ const OWN: u8 = u8::MAX;
 pub struct Guided {
     /// The flight mode.
     pub mode: FlightMode,
+    /// Setpoint for the flight core; none without a state.
+    pub setpoint: Option<Setpoint>,
     /// Ticket of an order and the answer to it.
     pub answer: Option<(u8, Result<(), Declined>)>,
     /// Number of the mission's item that it wants, and flies in mode [`FlightMode::Mission`].
@@ -122,6 +124,7 @@ impl Guide {
         }
         Guided {
             mode: guided.mode,
+            setpoint: guided.setpoint,
             answer: guided.answer,
             wanted: guided.wanted,
             reached: guided.reached,

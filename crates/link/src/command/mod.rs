@@ -7,7 +7,7 @@ use crate::place::{Height, Place};
 pub(crate) use read::{format, read};
 pub(crate) use write::write;
 
-/// Something asked for by COMMAND_LONG (76), COMMAND_INT (75) or SET_MODE (11), answered by
+/// Something asked for by COMMAND_LONG (76), COMMAND_INT (75), SET_MODE (11) or SET_HOME_POSITION (243), answered by
 /// [`Downlink::Answer`](crate::Downlink::Answer).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
@@ -42,7 +42,7 @@ pub enum Command {
     },
     /// MAV_CMD_DO_CHANGE_SPEED (178) of the horizontal speed \[m/s\].
     Speed(f32),
-    /// MAV_CMD_DO_SET_HOME (179): here, or at a place.
+    /// MAV_CMD_DO_SET_HOME (179): here, or at a place; or SET_HOME_POSITION.
     Home(Option<Place>),
     /// MAV_CMD_MISSION_START (300) with this item.
     StartMission(u16),

@@ -8,9 +8,9 @@ use super::{
 use crate::address::Address;
 use crate::message::{Fault, Format};
 use crate::place::{Datum, Height, Place, datum, e7};
-use crate::wire::Layout;
+use crate::wire::{Layout, Unused};
 use mavlink::MessageData;
-use mavlink::dialects::common::{COMMAND_INT_DATA, COMMAND_LONG_DATA, SET_MODE_DATA};
+use mavlink::dialects::common::{COMMAND_INT_DATA, COMMAND_LONG_DATA, SET_HOME_POSITION_DATA, SET_MODE_DATA};
 
 /// Seven parameters, number, receiver, confirmation.
 pub(super) const LONG: Layout<COMMAND_LONG_DATA, ([f32; 7], u16, Address, u8)> = Layout::NEW;
@@ -18,12 +18,15 @@ pub(super) const LONG: Layout<COMMAND_LONG_DATA, ([f32; 7], u16, Address, u8)> =
 pub(super) const INT: Layout<COMMAND_INT_DATA, ([f32; 4], [i32; 2], f32, u16, Address, u8, [u8; 2])> = Layout::NEW;
 /// Custom mode, system, base mode.
 const MODE: Layout<SET_MODE_DATA, (u32, u8, u8)> = Layout::NEW;
+/// Latitude, longitude, altitude \[mm\]; attitude and approach; system, time.
+const PLACE: Layout<SET_HOME_POSITION_DATA, ([i32; 3], Unused<40>, u8, Unused<8>)> = Layout::NEW;
 
 pub(crate) fn format(id: u32) -> Option<Format> {
     Some(match id {
         COMMAND_LONG_DATA::ID => LONG.format(),
         COMMAND_INT_DATA::ID => INT.format(),
         SET_MODE_DATA::ID => MODE.format(),
+        SET_HOME_POSITION_DATA::ID => PLACE.format(),
         _ => return None,
     })
 }
@@ -48,6 +51,12 @@ pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Command, Address), Fault>
             let (mode, system, base) = MODE.read(payload);
             let is_custom = u32::from(base) & CUSTOM_MODE != 0 && mode & 0xFFFF == 0;
             let command = if is_custom { Command::SelectMode(mode) } else { Command::Denied(SELECT_MODE) };
+            Ok((command, Address { system, component: 0 }))
+        }
+        SET_HOME_POSITION_DATA::ID => {
+            let ([latitude_e7, longitude_e7, altitude_mm], _, system, _) = PLACE.read(payload);
+            let height = Height { metres: altitude_mm as f32 * 1e-3, above: Datum::Sea };
+            let command = command(HOME, [0.0; 4], Some(Place { latitude_e7, longitude_e7, height }));
             Ok((command, Address { system, component: 0 }))
         }
         _ => Err(Fault::Unknown),

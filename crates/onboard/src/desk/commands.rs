@@ -54,6 +54,10 @@ impl Desk {
             }
             _ => match self.order_of(command) {
                 Ok(order) => {
+                    if let Command::Home(_) = command {
+                        // MAVLink wants it told whether it has changed or not.
+                        self.streams.request(Requested { message: id::HOME_POSITION, index: 0 });
+                    }
                     if let Command::StartMission(number @ 1..) = command {
                         self.order(Order::Resume(number), None, from, mail);
                     }
@@ -137,7 +141,8 @@ impl Desk {
     /// Queues a message on request.
     fn request(&mut self, message: u32, index: u32) -> Answer {
         let known = match message {
-            id::HEARTBEAT | id::DEBUG_FLOAT_ARRAY | id::MISSION_CURRENT | id::POSITION_TARGET_LOCAL_NED => true,
+            id::HEARTBEAT | id::DEBUG_FLOAT_ARRAY | id::MISSION_CURRENT => true,
+            id::POSITION_TARGET_LOCAL_NED => self.followed().is_some(),
             id::AVAILABLE_MODES => index <= modes::COUNT.into(),
             _ => compose(message, &self.picture).is_some(),
         };

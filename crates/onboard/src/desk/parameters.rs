@@ -1,6 +1,6 @@
 //! What stations want of the parameters, and who may want it.
 
-use super::{Desk, Wish};
+use super::{Desk, Reply, Wish};
 use crate::mail::Mail;
 use crate::parameters::{Change, Table};
 use crate::services::commands::BUSY;
@@ -15,7 +15,7 @@ impl Desk {
             ParameterRequest::Set { name, .. } if !self.may(from, mail) => ParameterRequest::ReadName(name),
             request => request,
         };
-        self.wishes.push_back(Wish::Ask(request)).ok();
+        self.wishes.push_back(Wish::Ask(request, from)).ok();
     }
 
     /// Answers MAV_CMD_PREFLIGHT_STORAGE. What is set is stored already, and what is stored is what is flown.
@@ -33,8 +33,11 @@ impl Desk {
         let disarmed = !self.picture.mode.armed();
         while let Some(wish) = self.wishes.pop_front() {
             let (change, refused) = match wish {
-                Wish::Ask(request) => {
+                Wish::Ask(request, from) => {
                     let heard = self.parameters.hear(request, table, disarmed);
+                    if let Some(error) = heard.error {
+                        self.reply(Reply::ParameterError(error, from));
+                    }
                     (heard.change, heard.refused)
                 }
                 Wish::Restore => match self.parameters.restore(table, disarmed) {

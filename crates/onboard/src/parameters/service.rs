@@ -5,7 +5,7 @@ use super::groups::Parameter;
 use super::kept::Change;
 use super::reason::Reason;
 use super::table::Table;
-use afbc_link::{ParameterName, ParameterRequest, ParameterValue};
+use afbc_link::{ParameterError, ParameterName, ParameterRequest, ParameterValue};
 use afbc_store::Name;
 use heapless::Deque;
 
@@ -25,11 +25,19 @@ pub struct Heard {
     pub change: Option<Change>,
     /// Line to the station: why nothing has changed.
     pub refused: Option<Reason>,
+    /// What the station is told that has named what there is not.
+    pub error: Option<ParameterError>,
 }
 
 impl Heard {
     fn refused(reason: Reason) -> Self {
-        Heard { change: None, refused: Some(reason) }
+        Heard { refused: Some(reason), ..Heard::default() }
+    }
+
+    /// There is no such parameter.
+    fn unknown(name: ParameterName, place: i16) -> Self {
+        let error = ParameterError { name, place, error: ParameterError::DOES_NOT_EXIST };
+        Heard { error: Some(error), ..Heard::default() }
     }
 }
 
@@ -58,15 +66,14 @@ impl Service {
             ParameterRequest::ReadPlace(place) if table.at(place).is_some() => {
                 self.dropped += count(self.read.push_back(place))
             }
-            ParameterRequest::ReadPlace(_) => (),
-            ParameterRequest::ReadName(name) => {
-                // Nothing can be said of a name that there is not.
-                if let Some(parameter) = named(name).and_then(|name| table.get(name)) {
-                    self.dropped += count(self.read.push_back(parameter.place));
-                }
-            }
+            // Places are 15 bits long on the wire.
+            ParameterRequest::ReadPlace(place) => return Heard::unknown([0; 16], place as i16),
+            ParameterRequest::ReadName(name) => match named(name).and_then(|name| table.get(name)) {
+                Some(parameter) => self.dropped += count(self.read.push_back(parameter.place)),
+                None => return Heard::unknown(name, -1),
+            },
             ParameterRequest::Set { name, value, kind } => {
-                return self.set(named(name), decode(kind, value), table, disarmed);
+                return self.set(name, decode(kind, value), table, disarmed);
             }
         }
         Heard::default()
@@ -115,16 +122,18 @@ impl Service {
 
     fn set<const N: usize>(
         &mut self,
-        name: Option<Name>,
+        asked: ParameterName,
         value: Option<f32>,
         table: &mut Table<N>,
         disarmed: bool,
     ) -> Heard {
+        let name = named(asked);
         let Some(before) = name.and_then(|name| table.get(name)) else {
-            return match name {
-                Some(name) => Heard::refused(Reason::on(name, "no such parameter")),
-                None => Heard::refused(Reason::new("parameters", "no such name")),
+            let reason = match name {
+                Some(name) => Reason::on(name, "no such parameter"),
+                None => Reason::new("parameters", "no such name"),
             };
+            return Heard { refused: Some(reason), ..Heard::unknown(asked, -1) };
         };
         let name = before.name;
         self.dropped += count(self.set.push_back(name));
@@ -137,7 +146,7 @@ impl Service {
         match table.set(name, value) {
             Ok(Parameter { value, .. }) => {
                 let is_default = table.default_of(name).is_some_and(|image| image.value.to_bits() == value.to_bits());
-                Heard { change: Some(Change::Set(name, (!is_default).then_some(value))), refused: None }
+                Heard { change: Some(Change::Set(name, (!is_default).then_some(value))), ..Heard::default() }
             }
             Err(reason) => Heard::refused(reason),
         }

@@ -1,12 +1,18 @@
-//! What the vehicle does for stations: each service a state machine without input and output of its own.
+//! What the vehicle does for stations: each service a state machine without input and output of its own. Those that it
+//! does not have answer every question with a refusal, so that nobody waits.
 
 pub mod commands;
 pub mod control;
+pub mod events;
+pub mod extended;
+pub mod files;
 pub mod health;
+pub mod logs;
 pub mod mission;
 pub mod modes;
 pub mod origin;
 pub mod picture;
+pub mod serial;
 pub mod streams;
 pub mod telemetry;
 pub(crate) mod texts;

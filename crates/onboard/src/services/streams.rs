@@ -146,8 +146,9 @@ impl Streams {
         }
     }
 
-    /// Carries out REQUEST_DATA_STREAM of older stations: rates of a `MAV_DATA_STREAM`.
-    pub fn set_group(&mut self, request: DataStream, now_us: u64) {
+    /// Carries out REQUEST_DATA_STREAM of older stations: rates of a `MAV_DATA_STREAM`. Returns what it is then: without
+    /// a rate if there is no such group.
+    pub fn set_group(&mut self, request: DataStream, now_us: u64) -> DataStream {
         let interval_us = 1_000_000_i32.checked_div(request.rate_hz.into()).unwrap_or(-1);
         let group: &[u32] = match request.group {
             2 => &[id::SYS_STATUS, id::BATTERY_STATUS, id::GPS_RAW_INT, id::MISSION_CURRENT],
@@ -169,6 +170,7 @@ impl Streams {
         for message in group {
             self.set(*message, interval_us, now_us);
         }
+        DataStream { rate_hz: if group.is_empty() { 0 } else { request.rate_hz }, ..request }
     }
 
     /// True if a message can be requested.
@@ -319,9 +321,10 @@ mod tests {
     #[test]
     fn older_stations_set_rates_of_groups() {
         let mut streams = Streams::new(1_000_000);
-        streams.set_group(DataStream { group: 10, rate_hz: 4 }, 0);
-        streams.set_group(DataStream { group: 6, rate_hz: 0 }, 0);
-        streams.set_group(DataStream { group: 200, rate_hz: 9 }, 0);
+        for (group, rate_hz, told_hz) in [(10, 4, 4), (6, 0, 0), (200, 9, 0)] {
+            let told = streams.set_group(DataStream { group, rate_hz }, 0);
+            assert_eq!(told, DataStream { group, rate_hz: told_hz });
+        }
         assert_eq!(streams.interval_us(id::ATTITUDE), 250_000);
         assert_eq!(streams.interval_us(id::GLOBAL_POSITION_INT), -1);
         assert_eq!(streams.interval_us(id::VFR_HUD), 250_000);

@@ -54,6 +54,8 @@ impl Missions {
             }
             Mission::Count(count, plan) => heard.text = self.begin(count, plan, from, now_us),
             Mission::Item(item, plan) => heard.text = self.take(item, plan, from, now_us),
+            // A part of a list, which hardly any station wants any more.
+            Mission::Part(_, plan) => self.acknowledge(MissionResult::UNSUPPORTED, plan, from),
             Mission::Clear(plan) => {
                 if plan == Plan::MISSION || plan == Plan::ALL {
                     self.clear();

@@ -1,0 +1,133 @@
+//! Extended parameters, those of cameras: PARAM_EXT_REQUEST_READ, PARAM_EXT_REQUEST_LIST and PARAM_EXT_SET, with
+//! PARAM_EXT_VALUE and PARAM_EXT_ACK, without their values.
+
+use crate::address::Address;
+use crate::message::{Format, PAYLOAD_MAX};
+use crate::wire::{Layout, Unused};
+use mavlink::MessageData;
+use mavlink::dialects::common::{
+    PARAM_EXT_ACK_DATA, PARAM_EXT_REQUEST_LIST_DATA, PARAM_EXT_REQUEST_READ_DATA, PARAM_EXT_SET_DATA,
+    PARAM_EXT_VALUE_DATA,
+};
+
+/// Name of an extended parameter, with zeros behind it; none at full length.
+pub type ExtendedName = [u8; 16];
+
+/// What is asked of extended parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExtendedRequest {
+    /// PARAM_EXT_REQUEST_LIST (321).
+    List,
+    /// PARAM_EXT_REQUEST_READ (320).
+    Read {
+        /// Name.
+        name: ExtendedName,
+        /// Place in the list; -1: by name.
+        place: i16,
+    },
+    /// PARAM_EXT_SET (323).
+    Set {
+        /// Name.
+        name: ExtendedName,
+        /// `MAV_PARAM_EXT_TYPE`.
+        kind: u8,
+    },
+}
+
+/// What is told of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExtendedAnswer {
+    /// PARAM_EXT_VALUE (322).
+    Value {
+        /// Name.
+        name: ExtendedName,
+        /// `MAV_PARAM_EXT_TYPE`.
+        kind: u8,
+        /// Number of parameters.
+        count: u16,
+        /// Place in the list; `u16::MAX` for none.
+        place: u16,
+    },
+    /// PARAM_EXT_ACK (324).
+    Ack {
+        /// Name.
+        name: ExtendedName,
+        /// `MAV_PARAM_EXT_TYPE`.
+        kind: u8,
+        /// `PARAM_ACK`: 0 set, 1 unsupported, 2 failed, 3 in progress.
+        result: u8,
+    },
+}
+
+pub(super) const READ_ID: u32 = PARAM_EXT_REQUEST_READ_DATA::ID;
+pub(super) const LIST_ID: u32 = PARAM_EXT_REQUEST_LIST_DATA::ID;
+pub(super) const SET_ID: u32 = PARAM_EXT_SET_DATA::ID;
+pub(super) const VALUE_ID: u32 = PARAM_EXT_VALUE_DATA::ID;
+pub(super) const ACK_ID: u32 = PARAM_EXT_ACK_DATA::ID;
+
+/// A value.
+type Text = Unused<128>;
+
+const READ: Layout<PARAM_EXT_REQUEST_READ_DATA, (i16, Address, ExtendedName)> = Layout::NEW;
+const LIST: Layout<PARAM_EXT_REQUEST_LIST_DATA, (Address,)> = Layout::NEW;
+const SET: Layout<PARAM_EXT_SET_DATA, (Address, ExtendedName, Text, u8)> = Layout::NEW;
+const VALUE: Layout<PARAM_EXT_VALUE_DATA, (u16, u16, ExtendedName, Text, u8)> = Layout::NEW;
+const ACK: Layout<PARAM_EXT_ACK_DATA, (ExtendedName, Text, u8, u8)> = Layout::NEW;
+
+impl ExtendedRequest {
+    pub(super) fn format(id: u32) -> Option<Format> {
+        Some(match id {
+            READ_ID => READ.format(),
+            LIST_ID => LIST.format(),
+            _ => SET.format(),
+        })
+    }
+
+    pub(super) fn read(id: u32, payload: &[u8]) -> (Self, Address) {
+        match id {
+            READ_ID => {
+                let (place, to, name) = READ.read(payload);
+                (ExtendedRequest::Read { name, place }, to)
+            }
+            LIST_ID => (ExtendedRequest::List, LIST.read(payload).0),
+            _ => {
+                let (to, name, _, kind) = SET.read(payload);
+                (ExtendedRequest::Set { name, kind }, to)
+            }
+        }
+    }
+
+    pub(super) fn write(self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let to = Address::default();
+        match self {
+            ExtendedRequest::List => LIST.write(&(to,), payload),
+            ExtendedRequest::Read { name, place } => READ.write(&(place, to, name), payload),
+            ExtendedRequest::Set { name, kind } => SET.write(&(to, name, Unused, kind), payload),
+        }
+    }
+}
+
+impl ExtendedAnswer {
+    pub(super) fn format(id: u32) -> Option<Format> {
+        Some(if id == VALUE_ID { VALUE.format() } else { ACK.format() })
+    }
+
+    pub(super) fn read(id: u32, payload: &[u8]) -> Self {
+        if id == VALUE_ID {
+            let (count, place, name, _, kind) = VALUE.read(payload);
+            ExtendedAnswer::Value { name, kind, count, place }
+        } else {
+            let (name, _, kind, result) = ACK.read(payload);
+            ExtendedAnswer::Ack { name, kind, result }
+        }
+    }
+
+    pub(super) fn write(self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        match self {
+            ExtendedAnswer::Value { name, kind, count, place } => {
+                VALUE.write(&(count, place, name, Unused, kind), payload)
+            }
+            ExtendedAnswer::Ack { name, kind, result } => ACK.write(&(name, Unused, kind, result), payload),
+        }
+    }
+}

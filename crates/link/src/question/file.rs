@@ -1,0 +1,94 @@
+//! Files: FILE_TRANSFER_PROTOCOL, whose payload is a protocol of its own.
+
+use crate::address::Address;
+use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::wire::{Layout, Unused};
+use mavlink::MessageData;
+use mavlink::dialects::common::FILE_TRANSFER_PROTOCOL_DATA;
+
+/// A request: what is to be done, without the data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FileOperation {
+    /// Number of the request.
+    pub sequence: u16,
+    /// Number of the session.
+    pub session: u8,
+    /// `MAV_FTP_OPCODE`, below 128.
+    pub operation: u8,
+    /// First byte.
+    pub offset: u32,
+}
+
+/// A response that refuses an operation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FileRefusal {
+    /// Number of the request, plus one.
+    pub sequence: u16,
+    /// Number of the session.
+    pub session: u8,
+    /// The operation that is refused.
+    pub operation: u8,
+    /// First byte.
+    pub offset: u32,
+    /// Why.
+    pub error: FileError,
+}
+
+/// `MAV_FTP_ERR`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FileError(pub u8);
+
+impl FileError {
+    /// The operation is not known.
+    pub const UNKNOWN_COMMAND: Self = FileError(7);
+}
+
+impl FileOperation {
+    /// First of the operations that are answers.
+    const ANSWERS: u8 = 128;
+}
+
+/// Operation of an answer that refuses, followed by one byte that says why.
+const NAK: u8 = 129;
+pub(super) const ID: u32 = FILE_TRANSFER_PROTOCOL_DATA::ID;
+
+/// Network, receiver, number, session, operation, size of the data, operation that is answered, "burst complete",
+/// padding; offset; data.
+const FILE: Layout<FILE_TRANSFER_PROTOCOL_DATA, (u8, Address, u16, [u8; 6], u32, u8, Unused<238>)> = Layout::NEW;
+
+pub(super) fn format() -> Format {
+    FILE.format()
+}
+
+impl FileOperation {
+    /// Reads a request; an answer is none, and is not answered.
+    pub(super) fn read(payload: &[u8]) -> Result<(Self, Address), Fault> {
+        let (_, to, sequence, [session, operation, ..], offset, ..) = FILE.read(payload);
+        if operation >= Self::ANSWERS {
+            return Err(Fault::Unsupported);
+        }
+        Ok((FileOperation { sequence, session, operation, offset }, to))
+    }
+
+    pub(super) fn write(self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let FileOperation { sequence, session, operation, offset } = self;
+        let head = [session, operation, 0, 0, 0, 0];
+        FILE.write(&(0, Address::default(), sequence, head, offset, 0, Unused), payload)
+    }
+}
+
+impl FileRefusal {
+    pub(super) fn read(payload: &[u8]) -> Result<(Self, Address), Fault> {
+        let (_, to, sequence, [session, kind, _, operation, ..], offset, error, _) = FILE.read(payload);
+        if kind != NAK {
+            return Err(Fault::Unsupported);
+        }
+        Ok((FileRefusal { sequence, session, operation, offset, error: FileError(error) }, to))
+    }
+
+    pub(super) fn write(self, to: Address, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let FileRefusal { sequence, session, operation, offset, error: FileError(error) } = self;
+        let head = [session, NAK, 1, operation, 0, 0];
+        FILE.write(&(0, to, sequence, head, offset, error, Unused), payload)
+    }
+}

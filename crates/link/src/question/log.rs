@@ -1,0 +1,107 @@
+//! Logs: LOG_REQUEST_LIST and LOG_REQUEST_DATA, with LOG_ENTRY and LOG_DATA.
+
+use crate::address::Address;
+use crate::message::{Format, PAYLOAD_MAX};
+use crate::wire::{Layout, Unused};
+use mavlink::MessageData;
+use mavlink::dialects::common::{LOG_DATA_DATA, LOG_ENTRY_DATA, LOG_REQUEST_DATA_DATA, LOG_REQUEST_LIST_DATA};
+
+/// What is asked of the logs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LogRequest {
+    /// LOG_REQUEST_LIST (117).
+    List {
+        /// First number.
+        first: u16,
+        /// Last number.
+        last: u16,
+    },
+    /// LOG_REQUEST_DATA (119).
+    Data {
+        /// Number of the log.
+        log: u16,
+        /// First byte.
+        offset: u32,
+        /// Number of bytes.
+        bytes: u32,
+    },
+}
+
+/// What is told of the logs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LogAnswer {
+    /// LOG_ENTRY (118).
+    Entry {
+        /// Number of the log.
+        log: u16,
+        /// How many there are, and the last number.
+        logs: [u16; 2],
+    },
+    /// LOG_DATA (120), without the data.
+    Data {
+        /// Number of the log.
+        log: u16,
+        /// First byte.
+        offset: u32,
+        /// Number of bytes; 0 at the end of the log.
+        bytes: u8,
+    },
+}
+
+pub(super) const LIST_ID: u32 = LOG_REQUEST_LIST_DATA::ID;
+pub(super) const DATA_REQUEST_ID: u32 = LOG_REQUEST_DATA_DATA::ID;
+pub(super) const ENTRY_ID: u32 = LOG_ENTRY_DATA::ID;
+pub(super) const DATA_ID: u32 = LOG_DATA_DATA::ID;
+
+const LIST: Layout<LOG_REQUEST_LIST_DATA, (u16, u16, Address)> = Layout::NEW;
+const DATA_REQUEST: Layout<LOG_REQUEST_DATA_DATA, (u32, u32, u16, Address)> = Layout::NEW;
+/// Time, size; number of the log, number of logs, last number.
+const ENTRY: Layout<LOG_ENTRY_DATA, (Unused<8>, u16, [u16; 2])> = Layout::NEW;
+const DATA: Layout<LOG_DATA_DATA, (u32, u16, u8, Unused<90>)> = Layout::NEW;
+
+impl LogRequest {
+    pub(super) fn format(id: u32) -> Option<Format> {
+        Some(if id == LIST_ID { LIST.format() } else { DATA_REQUEST.format() })
+    }
+
+    pub(super) fn read(id: u32, payload: &[u8]) -> (Self, Address) {
+        if id == LIST_ID {
+            let (first, last, to) = LIST.read(payload);
+            (LogRequest::List { first, last }, to)
+        } else {
+            let (offset, bytes, log, to) = DATA_REQUEST.read(payload);
+            (LogRequest::Data { log, offset, bytes }, to)
+        }
+    }
+
+    pub(super) fn write(self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        let to = Address::default();
+        match self {
+            LogRequest::List { first, last } => LIST.write(&(first, last, to), payload),
+            LogRequest::Data { log, offset, bytes } => DATA_REQUEST.write(&(offset, bytes, log, to), payload),
+        }
+    }
+}
+
+impl LogAnswer {
+    pub(super) fn format(id: u32) -> Option<Format> {
+        Some(if id == ENTRY_ID { ENTRY.format() } else { DATA.format() })
+    }
+
+    pub(super) fn read(id: u32, payload: &[u8]) -> Self {
+        if id == ENTRY_ID {
+            let (_, log, logs) = ENTRY.read(payload);
+            LogAnswer::Entry { log, logs }
+        } else {
+            let (offset, log, bytes, _) = DATA.read(payload);
+            LogAnswer::Data { log, offset, bytes }
+        }
+    }
+
+    pub(super) fn write(self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        match self {
+            LogAnswer::Entry { log, logs } => ENTRY.write(&(Unused, log, logs), payload),
+            LogAnswer::Data { log, offset, bytes } => DATA.write(&(offset, log, bytes, Unused), payload),
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! Serial ports and shells: SERIAL_CONTROL, in both directions.
+
+use crate::address::Address;
+use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::wire::{Layout, Unused};
+use mavlink::MessageData;
+use mavlink::dialects::common::SERIAL_CONTROL_DATA;
+
+/// SERIAL_CONTROL (126), without its data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Serial {
+    /// `SERIAL_CONTROL_DEV`.
+    pub device: u8,
+    /// Number of bytes.
+    pub bytes: u8,
+}
+
+/// `SERIAL_CONTROL_FLAG`: a reply.
+pub(super) const REPLY: u8 = 1;
+/// `SERIAL_CONTROL_FLAG`: a reply is wanted.
+pub(super) const RESPOND: u8 = 2;
+pub(super) const ID: u32 = SERIAL_CONTROL_DATA::ID;
+
+/// Baud rate, time limit, device, flags, number of bytes, data, receiver.
+const SERIAL: Layout<SERIAL_CONTROL_DATA, (u32, u16, u8, u8, u8, Unused<70>, Address)> = Layout::NEW;
+
+pub(super) fn format() -> Format {
+    SERIAL.format()
+}
+
+impl Serial {
+    /// Reads one with this of the two flags, and without the other.
+    pub(super) fn read(payload: &[u8], flag: u8) -> Result<(Self, Address), Fault> {
+        let (_, _, device, flags, bytes, _, to) = SERIAL.read(payload);
+        if flags & (REPLY | RESPOND) != flag {
+            return Err(Fault::Unsupported);
+        }
+        Ok((Serial { device, bytes }, to))
+    }
+
+    pub(super) fn write(self, flag: u8, to: Address, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        SERIAL.write(&(0, 0, self.device, flag, self.bytes, Unused, to), payload)
+    }
+}

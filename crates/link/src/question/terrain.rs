@@ -1,0 +1,46 @@
+//! Heights of the terrain: TERRAIN_CHECK and TERRAIN_REPORT.
+
+use crate::message::{Format, PAYLOAD_MAX};
+use crate::wire::{Layout, Unused};
+use mavlink::MessageData;
+use mavlink::dialects::common::{TERRAIN_CHECK_DATA, TERRAIN_REPORT_DATA};
+
+/// TERRAIN_CHECK (135), or TERRAIN_REPORT (136) of a place whose height is not known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Terrain {
+    /// Latitude and longitude \[1e-7 degrees\].
+    pub place_e7: [i32; 2],
+}
+
+pub(super) const CHECK_ID: u32 = TERRAIN_CHECK_DATA::ID;
+pub(super) const REPORT_ID: u32 = TERRAIN_REPORT_DATA::ID;
+
+const CHECK: Layout<TERRAIN_CHECK_DATA, ([i32; 2],)> = Layout::NEW;
+/// Place; heights, spacing of the grid (0: none), blocks pending and loaded.
+const REPORT: Layout<TERRAIN_REPORT_DATA, ([i32; 2], Unused<14>)> = Layout::NEW;
+
+pub(super) fn check_format() -> Format {
+    CHECK.format()
+}
+
+pub(super) fn report_format() -> Format {
+    REPORT.format()
+}
+
+impl Terrain {
+    pub(super) fn read_check(payload: &[u8]) -> Self {
+        Terrain { place_e7: CHECK.read(payload).0 }
+    }
+
+    pub(super) fn read_report(payload: &[u8]) -> Self {
+        Terrain { place_e7: REPORT.read(payload).0 }
+    }
+
+    pub(super) fn write_check(self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        CHECK.write(&(self.place_e7,), payload)
+    }
+
+    pub(super) fn write_report(self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        REPORT.write(&(self.place_e7, Unused), payload)
+    }
+}

@@ -1,0 +1,665 @@
+//! Every message of MAVLink's common dialect that expects an answer gets one, on a full and narrow line too, and no
+//! other one does.
+#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
+#![allow(deprecated, reason = "messages that stations still send")]
+
+mod common;
+
+use afbc_link::{Address, Command, Uplink};
+use afbc_onboard::services::origin::{Global, Origin};
+use afbc_onboard::services::streams::{DEFAULTS, id};
+use afbc_onboard::{Comms, Configuration, Link, Readings, Setup, Surroundings, parameters::Table};
+use afbc_types::State;
+use common::{Bench, STATION};
+use mavlink::dialects::common::*;
+use mavlink::{MavlinkVersion, Message as _, MessageData};
+use std::collections::BTreeSet;
+
+const OTHER: Address = Address { system: 245, component: 191 };
+const VEHICLE: Address = Address { system: 1, component: 1 };
+/// Time within which an answer leaves \[ticks\].
+const WITHIN: usize = 250;
+
+/// What is expected of whoever receives a message.
+enum Expected {
+    /// One of these messages.
+    Answer(&'static [u32]),
+    /// Nothing.
+    None,
+}
+
+/// Returns what the dialect's definitions (`common.xml`, and the pages of mavlink.io on each service) expect. Without a
+/// default: a message that is new in the dialect has to be put somewhere.
+fn expected(message: &MavMessage) -> Expected {
+    use Expected::{Answer, None};
+    use MavMessage as M;
+    match message {
+        // Ping protocol, time synchronisation: the same message comes back.
+        M::PING(_) => Answer(&[4]),
+        M::TIMESYNC(_) => Answer(&[111]),
+        // Commands: COMMAND_ACK. SET_MODE and SET_HOME_POSITION are commands of old, the latter answered with
+        // HOME_POSITION, too: "vehicle should emit ... irrespective of whether it has changed".
+        M::COMMAND_LONG(_) | M::COMMAND_INT(_) | M::SET_MODE(_) => Answer(&[77]),
+        M::SET_HOME_POSITION(_) => Answer(&[77, 242]),
+        M::SET_GPS_GLOBAL_ORIGIN(_) => Answer(&[49]),
+        M::CHANGE_OPERATOR_CONTROL(_) => Answer(&[6]),
+        // Parameters: PARAM_VALUE, or PARAM_ERROR.
+        M::PARAM_REQUEST_LIST(_) => Answer(&[22]),
+        M::PARAM_REQUEST_READ(_) | M::PARAM_SET(_) => Answer(&[22, 345]),
+        M::PARAM_EXT_REQUEST_READ(_) | M::PARAM_EXT_REQUEST_LIST(_) => Answer(&[322]),
+        M::PARAM_EXT_SET(_) => Answer(&[324]),
+        // Missions: the count, the item, the next request, or MISSION_ACK.
+        M::MISSION_REQUEST_LIST(_) => Answer(&[44, 47]),
+        M::MISSION_REQUEST(_) | M::MISSION_REQUEST_INT(_) => Answer(&[39, 73, 47]),
+        M::MISSION_REQUEST_PARTIAL_LIST(_) => Answer(&[44, 73, 47]),
+        M::MISSION_WRITE_PARTIAL_LIST(_) | M::MISSION_COUNT(_) => Answer(&[40, 51, 47]),
+        M::MISSION_ITEM(_) | M::MISSION_ITEM_INT(_) => Answer(&[40, 51, 47]),
+        M::MISSION_CLEAR_ALL(_) => Answer(&[47]),
+        M::MISSION_SET_CURRENT(_) => Answer(&[42]),
+        // "Response: DATA_STREAM", whose streams are the answer proper.
+        M::REQUEST_DATA_STREAM(_) => Answer(&[67]),
+        // Logs, files, events, shells (with the flag "respond"), heights of the terrain.
+        M::LOG_REQUEST_LIST(_) => Answer(&[118]),
+        M::LOG_REQUEST_DATA(_) => Answer(&[120]),
+        M::FILE_TRANSFER_PROTOCOL(_) => Answer(&[110]),
+        M::REQUEST_EVENT(_) => Answer(&[412, 413]),
+        M::SERIAL_CONTROL(_) => Answer(&[126]),
+        M::TERRAIN_CHECK(_) => Answer(&[136]),
+
+        // Answers, and what belongs to a transfer that the receiver has begun.
+        M::AUTOPILOT_VERSION(_)
+        | M::AVAILABLE_MODES(_)
+        | M::CHANGE_OPERATOR_CONTROL_ACK(_)
+        | M::COMMAND_ACK(_)
+        | M::COMPONENT_INFORMATION(_)
+        | M::COMPONENT_INFORMATION_BASIC(_)
+        | M::COMPONENT_METADATA(_)
+        | M::DATA_STREAM(_)
+        | M::ENCAPSULATED_DATA(_)
+        | M::LOGGING_ACK(_)
+        | M::LOGGING_DATA(_)
+        | M::LOGGING_DATA_ACKED(_)
+        | M::LOG_DATA(_)
+        | M::LOG_ENTRY(_)
+        | M::MESSAGE_INTERVAL(_)
+        | M::MISSION_ACK(_)
+        | M::MISSION_CURRENT(_)
+        | M::MISSION_ITEM_REACHED(_)
+        | M::PARAM_ERROR(_)
+        | M::PARAM_EXT_ACK(_)
+        | M::PARAM_EXT_VALUE(_)
+        | M::PARAM_VALUE(_)
+        | M::PROTOCOL_VERSION(_)
+        | M::RESPONSE_EVENT_ERROR(_)
+        | M::SAFETY_ALLOWED_AREA(_)
+        | M::SUPPORTED_TUNES(_)
+        | M::TERRAIN_DATA(_)
+        | M::TERRAIN_REPORT(_) => None,
+
+        // Requests without a receiver for whoever has what they ask for: cameras, modems, access points, stations with
+        // maps. Those answer, and a refusal by anybody else would be in their way.
+        M::CELLULAR_CONFIG(_)
+        | M::DATA_TRANSMISSION_HANDSHAKE(_)
+        | M::RESOURCE_REQUEST(_)
+        | M::TERRAIN_REQUEST(_)
+        | M::WIFI_CONFIG_AP(_) => None,
+
+        // Orders that nothing answers: their effect is seen in telemetry.
+        M::ACTUATOR_CONTROL_TARGET(_)
+        | M::AUTH_KEY(_)
+        | M::CAN_FILTER_MODIFY(_)
+        | M::COMMAND_CANCEL(_)
+        | M::FOLLOW_TARGET(_)
+        | M::GIMBAL_DEVICE_SET_ATTITUDE(_)
+        | M::GIMBAL_MANAGER_SET_ATTITUDE(_)
+        | M::GIMBAL_MANAGER_SET_MANUAL_CONTROL(_)
+        | M::GIMBAL_MANAGER_SET_PITCHYAW(_)
+        | M::LOG_ERASE(_)
+        | M::LOG_REQUEST_END(_)
+        | M::MANUAL_CONTROL(_)
+        | M::MANUAL_SETPOINT(_)
+        | M::PARAM_MAP_RC(_)
+        | M::PLAY_TUNE(_)
+        | M::PLAY_TUNE_V2(_)
+        | M::RC_CHANNELS_OVERRIDE(_)
+        | M::SAFETY_SET_ALLOWED_AREA(_)
+        | M::SETUP_SIGNING(_)
+        | M::SET_ACTUATOR_CONTROL_TARGET(_)
+        | M::SET_ATTITUDE_TARGET(_)
+        | M::SET_POSITION_TARGET_GLOBAL_INT(_)
+        | M::SET_POSITION_TARGET_LOCAL_NED(_)
+        | M::TRAJECTORY_REPRESENTATION_BEZIER(_)
+        | M::TRAJECTORY_REPRESENTATION_WAYPOINTS(_) => None,
+
+        // Data for the receiver.
+        M::ATT_POS_MOCAP(_)
+        | M::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE(_)
+        | M::CANFD_FRAME(_)
+        | M::CAN_FRAME(_)
+        | M::GLOBAL_VISION_POSITION_ESTIMATE(_)
+        | M::GPS_INJECT_DATA(_)
+        | M::GPS_INPUT(_)
+        | M::GPS_RTCM_DATA(_)
+        | M::HIL_CONTROLS(_)
+        | M::HIL_GPS(_)
+        | M::HIL_OPTICAL_FLOW(_)
+        | M::HIL_RC_INPUTS_RAW(_)
+        | M::HIL_SENSOR(_)
+        | M::HIL_STATE(_)
+        | M::HIL_STATE_QUATERNION(_)
+        | M::LANDING_TARGET(_)
+        | M::OBSTACLE_DISTANCE(_)
+        | M::ODOMETRY(_)
+        | M::OPTICAL_FLOW(_)
+        | M::OPTICAL_FLOW_RAD(_)
+        | M::TUNNEL(_)
+        | M::V2_EXTENSION(_)
+        | M::VICON_POSITION_ESTIMATE(_)
+        | M::VISION_POSITION_ESTIMATE(_)
+        | M::VISION_SPEED_ESTIMATE(_) => None,
+
+        // Identification of other aircraft, broadcast by them.
+        M::ADSB_VEHICLE(_)
+        | M::AIS_VESSEL(_)
+        | M::COLLISION(_)
+        | M::OPEN_DRONE_ID_ARM_STATUS(_)
+        | M::OPEN_DRONE_ID_AUTHENTICATION(_)
+        | M::OPEN_DRONE_ID_BASIC_ID(_)
+        | M::OPEN_DRONE_ID_LOCATION(_)
+        | M::OPEN_DRONE_ID_MESSAGE_PACK(_)
+        | M::OPEN_DRONE_ID_OPERATOR_ID(_)
+        | M::OPEN_DRONE_ID_SELF_ID(_)
+        | M::OPEN_DRONE_ID_SYSTEM(_)
+        | M::OPEN_DRONE_ID_SYSTEM_UPDATE(_)
+        | M::UTM_GLOBAL_POSITION(_) => None,
+
+        // Telemetry.
+        M::ACTUATOR_OUTPUT_STATUS(_)
+        | M::AIRSPEED(_)
+        | M::ALTITUDE(_)
+        | M::ATTITUDE(_)
+        | M::ATTITUDE_QUATERNION(_)
+        | M::ATTITUDE_QUATERNION_COV(_)
+        | M::ATTITUDE_TARGET(_)
+        | M::AVAILABLE_MODES_MONITOR(_)
+        | M::BATTERY_INFO(_)
+        | M::BATTERY_STATUS(_)
+        | M::BUTTON_CHANGE(_)
+        | M::CAMERA_CAPTURE_STATUS(_)
+        | M::CAMERA_FOV_STATUS(_)
+        | M::CAMERA_IMAGE_CAPTURED(_)
+        | M::CAMERA_INFORMATION(_)
+        | M::CAMERA_SETTINGS(_)
+        | M::CAMERA_THERMAL_RANGE(_)
+        | M::CAMERA_TRACKING_GEO_STATUS(_)
+        | M::CAMERA_TRACKING_IMAGE_STATUS(_)
+        | M::CAMERA_TRIGGER(_)
+        | M::CELLULAR_STATUS(_)
+        | M::CONTROL_SYSTEM_STATE(_)
+        | M::CURRENT_EVENT_SEQUENCE(_)
+        | M::CURRENT_MODE(_)
+        | M::DEBUG(_)
+        | M::DEBUG_FLOAT_ARRAY(_)
+        | M::DEBUG_VECT(_)
+        | M::DISTANCE_SENSOR(_)
+        | M::EFI_STATUS(_)
+        | M::ESC_INFO(_)
+        | M::ESC_STATUS(_)
+        | M::ESTIMATOR_STATUS(_)
+        | M::EVENT(_)
+        | M::EXTENDED_SYS_STATE(_)
+        | M::FENCE_STATUS(_)
+        | M::FIGURE_EIGHT_EXECUTION_STATUS(_)
+        | M::FLIGHT_INFORMATION(_)
+        | M::FUEL_STATUS(_)
+        | M::GENERATOR_STATUS(_)
+        | M::GIMBAL_DEVICE_ATTITUDE_STATUS(_)
+        | M::GIMBAL_DEVICE_INFORMATION(_)
+        | M::GIMBAL_MANAGER_INFORMATION(_)
+        | M::GIMBAL_MANAGER_STATUS(_)
+        | M::GLOBAL_POSITION_INT(_)
+        | M::GLOBAL_POSITION_INT_COV(_)
+        | M::GLOBAL_POSITION_SENSOR(_)
+        | M::GPS2_RAW(_)
+        | M::GPS2_RTK(_)
+        | M::GPS_GLOBAL_ORIGIN(_)
+        | M::GPS_RAW_INT(_)
+        | M::GPS_RTK(_)
+        | M::GPS_STATUS(_)
+        | M::HEARTBEAT(_)
+        | M::HIGHRES_IMU(_)
+        | M::HIGH_LATENCY(_)
+        | M::HIGH_LATENCY2(_)
+        | M::HIL_ACTUATOR_CONTROLS(_)
+        | M::HOME_POSITION(_)
+        | M::HYGROMETER_SENSOR(_)
+        | M::ILLUMINATOR_STATUS(_)
+        | M::ISBD_LINK_STATUS(_)
+        | M::LINK_NODE_STATUS(_)
+        | M::LOCAL_POSITION_NED(_)
+        | M::LOCAL_POSITION_NED_COV(_)
+        | M::LOCAL_POSITION_NED_SYSTEM_GLOBAL_OFFSET(_)
+        | M::MAG_CAL_REPORT(_)
+        | M::MEMORY_VECT(_)
+        | M::MOUNT_ORIENTATION(_)
+        | M::NAMED_VALUE_FLOAT(_)
+        | M::NAMED_VALUE_INT(_)
+        | M::NAV_CONTROLLER_OUTPUT(_)
+        | M::ONBOARD_COMPUTER_STATUS(_)
+        | M::ORBIT_EXECUTION_STATUS(_)
+        | M::POSITION_TARGET_GLOBAL_INT(_)
+        | M::POSITION_TARGET_LOCAL_NED(_)
+        | M::POWER_STATUS(_)
+        | M::RADIO_STATUS(_)
+        | M::RAW_IMU(_)
+        | M::RAW_PRESSURE(_)
+        | M::RAW_RPM(_)
+        | M::RC_CHANNELS(_)
+        | M::RC_CHANNELS_RAW(_)
+        | M::RC_CHANNELS_SCALED(_)
+        | M::RELAY_STATUS(_)
+        | M::SCALED_IMU(_)
+        | M::SCALED_IMU2(_)
+        | M::SCALED_IMU3(_)
+        | M::SCALED_PRESSURE(_)
+        | M::SCALED_PRESSURE2(_)
+        | M::SCALED_PRESSURE3(_)
+        | M::SERVO_OUTPUT_RAW(_)
+        | M::SIM_STATE(_)
+        | M::SMART_BATTERY_INFO(_)
+        | M::STATUSTEXT(_)
+        | M::STORAGE_INFORMATION(_)
+        | M::SYSTEM_TIME(_)
+        | M::SYS_STATUS(_)
+        | M::TIME_ESTIMATE_TO_TARGET(_)
+        | M::UAVCAN_NODE_INFO(_)
+        | M::UAVCAN_NODE_STATUS(_)
+        | M::VFR_HUD(_)
+        | M::VIBRATION(_)
+        | M::VIDEO_STREAM_INFORMATION(_)
+        | M::VIDEO_STREAM_STATUS(_)
+        | M::WHEEL_DISTANCE(_)
+        | M::WINCH_STATUS(_)
+        | M::WIND_COV(_) => None,
+    }
+}
+
+/// A message as it is sent.
+#[derive(Clone, Debug)]
+struct Sample {
+    id: u32,
+    payload: Vec<u8>,
+}
+
+/// A message with these bytes of extension fields.
+fn extended<D: MessageData>(data: &D, extension: &[u8]) -> Sample {
+    let mut payload = vec![0; 255];
+    data.ser(MavlinkVersion::V2, &mut payload);
+    payload.truncate(D::ENCODED_LEN);
+    payload.extend_from_slice(extension);
+    Sample { id: D::ID, payload }
+}
+
+/// A message with the vehicle in these bytes.
+fn at<D: MessageData>(data: &D, system: usize, extension: &[u8]) -> Sample {
+    let mut sample = extended(data, extension);
+    sample.payload[system..system + 2].copy_from_slice(&[VEHICLE.system, VEHICLE.component]);
+    sample
+}
+
+/// The requests of the dialect, each in its varieties, to the vehicle by its address. The offsets are those of the
+/// target in MAVLink's order of fields.
+fn requests() -> Vec<Sample> {
+    let name = |text: &str| {
+        let mut bytes = [0; 16];
+        bytes[..text.len()].copy_from_slice(text.as_bytes());
+        bytes
+    };
+    let mut samples = vec![
+        extended(&PING_DATA { time_usec: 7, seq: 3, ..PING_DATA::DEFAULT }, &[]),
+        extended(&TIMESYNC_DATA { tc1: 0, ts1: 77 }, &[1, 1]),
+        extended(&TIMESYNC_DATA { tc1: 0, ts1: 77 }, &[]),
+        extended(&SET_MODE_DATA { target_system: 1, ..SET_MODE_DATA::DEFAULT }, &[]),
+        extended(&SET_HOME_POSITION_DATA { target_system: 1, ..SET_HOME_POSITION_DATA::DEFAULT }, &[]),
+        extended(&SET_GPS_GLOBAL_ORIGIN_DATA { target_system: 1, ..SET_GPS_GLOBAL_ORIGIN_DATA::DEFAULT }, &[]),
+        at(&PARAM_REQUEST_LIST_DATA::DEFAULT, 0, &[]),
+        at(&PARAM_EXT_REQUEST_LIST_DATA::DEFAULT, 0, &[]),
+        at(&LOG_REQUEST_LIST_DATA { start: 0, end: 0xFFFF, ..LOG_REQUEST_LIST_DATA::DEFAULT }, 4, &[]),
+        at(&LOG_REQUEST_DATA_DATA { ofs: 90, count: 900, id: 5, ..LOG_REQUEST_DATA_DATA::DEFAULT }, 10, &[]),
+        at(&REQUEST_EVENT_DATA { first_sequence: 5, last_sequence: 9, ..REQUEST_EVENT_DATA::DEFAULT }, 4, &[]),
+        extended(
+            &SERIAL_CONTROL_DATA {
+                flags: SerialControlFlag::SERIAL_CONTROL_FLAG_RESPOND,
+                device: SerialControlDev::SERIAL_CONTROL_DEV_SHELL,
+                ..SERIAL_CONTROL_DATA::DEFAULT
+            },
+            &[1, 1],
+        ),
+        extended(&TERRAIN_CHECK_DATA { lat: 470_000_000, lon: 80_000_000 }, &[]),
+        at(&MISSION_SET_CURRENT_DATA::DEFAULT, 2, &[]),
+        at(&MISSION_SET_CURRENT_DATA { seq: 7, ..MISSION_SET_CURRENT_DATA::DEFAULT }, 2, &[]),
+    ];
+    for control in [0, 1] {
+        let data = CHANGE_OPERATOR_CONTROL_DATA { target_system: 1, control_request: control, ..Default::default() };
+        samples.push(extended(&data, &[]));
+    }
+    // Known and unknown, by name and by place.
+    for (place, text) in [(-1, "V_MASS"), (-1, "NO_SUCH_NAME"), (0, ""), (9_999, ""), (-7, ""), (i16::MAX, "V_MASS")] {
+        let param_id = name(text).into();
+        samples.push(at(&PARAM_REQUEST_READ_DATA { param_index: place, param_id, ..Default::default() }, 2, &[]));
+        samples.push(at(&PARAM_EXT_REQUEST_READ_DATA { param_index: place, param_id, ..Default::default() }, 2, &[]));
+    }
+    for (text, value) in [("V_MASS", 0.5), ("V_MASS", f32::NAN), ("V_MASS", 1e9), ("NO_SUCH_NAME", 1.0), ("", 0.0)] {
+        let param_id = name(text).into();
+        samples.push(at(&PARAM_SET_DATA { param_value: value, param_id, ..Default::default() }, 4, &[]));
+        samples.push(at(&PARAM_EXT_SET_DATA { param_id, ..Default::default() }, 0, &[]));
+    }
+    // Missions, fences, rally points, all of them, and what there is not.
+    for plan in [0, 1, 2, 255, 99] {
+        for count in [0, 1, 65] {
+            samples.push(at(&MISSION_COUNT_DATA { count, ..Default::default() }, 2, &[plan]));
+            samples.push(at(&MISSION_REQUEST_DATA { seq: count, ..Default::default() }, 2, &[plan]));
+            samples.push(at(&MISSION_REQUEST_INT_DATA { seq: count, ..Default::default() }, 2, &[plan]));
+            samples.push(at(&MISSION_ITEM_DATA { seq: count, ..Default::default() }, 32, &[plan]));
+            samples.push(at(&MISSION_ITEM_INT_DATA { seq: count, ..Default::default() }, 32, &[plan]));
+        }
+        samples.push(at(&MISSION_REQUEST_LIST_DATA::DEFAULT, 0, &[plan]));
+        samples.push(at(&MISSION_CLEAR_ALL_DATA::DEFAULT, 0, &[plan]));
+        samples.push(at(&MISSION_REQUEST_PARTIAL_LIST_DATA::DEFAULT, 4, &[plan]));
+        samples.push(at(&MISSION_WRITE_PARTIAL_LIST_DATA::DEFAULT, 4, &[plan]));
+    }
+    for group in 0..16 {
+        let mut sample =
+            at(&REQUEST_DATA_STREAM_DATA { req_message_rate: 3, start_stop: 1, ..Default::default() }, 2, &[]);
+        sample.payload[4] = group;
+        samples.push(sample);
+    }
+    // Of the vehicle, of a camera, of a gimbal; and of nobody.
+    for command in [20_u16, 176, 246, 400, 401, 510, 511, 512, 521, 527, 1000, 2000, 2500, 31_010, 60_000] {
+        for mut sample in [at(&COMMAND_LONG_DATA::DEFAULT, 30, &[]), at(&COMMAND_INT_DATA::DEFAULT, 30, &[])] {
+            sample.payload[28..30].copy_from_slice(&command.to_le_bytes());
+            samples.push(sample);
+        }
+    }
+    for operation in (0..20).chain([100, 127]) {
+        samples.push(file(9, 3, operation));
+    }
+    samples
+}
+
+/// A request of the file protocol.
+fn file(sequence: u16, session: u8, operation: u8) -> Sample {
+    let mut sample = at(&FILE_TRANSFER_PROTOCOL_DATA::DEFAULT, 1, &[]);
+    sample.payload[3..5].copy_from_slice(&sequence.to_le_bytes());
+    sample.payload[5..7].copy_from_slice(&[session, operation]);
+    sample.payload[7] = 1;
+    sample.payload[15] = b'/';
+    sample
+}
+
+/// CRC-16/MCRF4XX.
+fn crc(bytes: &[u8], extra: u8) -> u16 {
+    bytes.iter().chain([&extra]).fold(0xFFFF, |crc, byte| {
+        (0..8).fold(crc ^ u16::from(*byte), |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0x8408 } else { crc >> 1 })
+    })
+}
+
+fn frame(from: Address, sample: &Sample) -> Vec<u8> {
+    let [low, mid, high, _] = sample.id.to_le_bytes();
+    let head = [0xFD, sample.payload.len() as u8, 0, 0, 0, from.system, from.component, low, mid, high];
+    let mut frame = [head.as_slice(), &sample.payload].concat();
+    let sum = crc(&frame[1..], MavMessage::extra_crc(sample.id));
+    frame.extend_from_slice(&sum.to_le_bytes());
+    frame
+}
+
+/// Returns the receiver that a message from the vehicle names, by MAVLink's order of fields; none if it has no such
+/// field.
+fn receiver(sample: &Sample) -> Option<Address> {
+    let byte = |at: usize| sample.payload.get(at).copied().unwrap_or(0);
+    let at = match sample.id {
+        // Of the station's component nothing is said.
+        6 => return Some(Address { system: byte(0), component: 0 }),
+        4 => 12,
+        77 => 8,
+        111 => 16,
+        126 => 79,
+        110 => 1,
+        47 => 0,
+        40 | 44 | 51 | 345 => 2,
+        413 => 4,
+        39 | 73 => 32,
+        _ => return None,
+    };
+    Some(Address { system: byte(at), component: byte(at + 1) })
+}
+
+/// A vehicle at rest that knows where it is, on a line of so many baud, which is full: every stream but the answers
+/// among them is asked for each millisecond.
+fn on(baud: f32) -> Bench {
+    let mut bench = Bench::new();
+    bench.table = Table::new(Configuration { link: Link { baud, ..Link::DEFAULT }, ..Configuration::default() });
+    bench.comms = Comms::with(Setup::of(&bench.table.configuration().link));
+    let origin = Origin::new(Global { altitude_m: 400.0, ..Origin::SIMULATED });
+    bench.comms.surround(Surroundings { origin, ..Surroundings::default() });
+    for (message, _) in DEFAULTS {
+        let answers = [id::MISSION_CURRENT, id::GPS_GLOBAL_ORIGIN, id::HOME_POSITION].contains(&message);
+        let interval_us = if answers { -1 } else { 1_000 };
+        bench.hear(Uplink::Command(Command::SetInterval { message, interval_us }));
+        step(&mut bench);
+    }
+    for _ in 0..100 {
+        step(&mut bench);
+    }
+    bench
+}
+
+/// Runs a tick; returns what was sent.
+fn step(bench: &mut Bench) -> Vec<Sample> {
+    if bench.now_us.is_multiple_of(10_000) {
+        bench.measure(&State::default());
+    }
+    bench.now_us += 1000;
+    let Bench { flight, comms, table, mail, taken, now_us, .. } = bench;
+    mail.take_into(taken);
+    let report = flight.tick(*now_us, taken, &Readings::NONE);
+    let (mut sent, mut bytes) = (Vec::new(), 0);
+    let mut send = |frame: &[u8]| {
+        bytes += frame.len();
+        let id = u32::from_le_bytes([frame[7], frame[8], frame[9], 0]);
+        sent.push(Sample { id, payload: frame[10..frame.len() - 2].to_vec() });
+    };
+    comms.report(&report, 0, &mut send);
+    comms.parameters(table, &mut send);
+    assert!(bytes <= afbc_onboard::REPORT_MAX, "{bytes} bytes");
+    sent
+}
+
+/// Returns the answers to the same request of these stations, in the ticks after it, until each has one; as many as
+/// there are if they do not come.
+fn ask(bench: &mut Bench, stations: &[Address], sample: &Sample, answers: &[u32]) -> Vec<Sample> {
+    for station in stations {
+        bench.hear_bytes(&frame(*station, sample));
+    }
+    let mut told: Vec<Sample> = Vec::new();
+    let mut waiting: BTreeSet<(u8, u8)> = stations.iter().map(|it| (it.system, it.component)).collect();
+    for _ in 0..WITHIN {
+        for answer in step(bench).into_iter().filter(|sent| answers.contains(&sent.id)) {
+            match receiver(&answer) {
+                Some(to) => {
+                    let named = |station: &(u8, u8)| station.0 == to.system && [0, station.1].contains(&to.component);
+                    waiting.retain(|station| !named(station));
+                }
+                None => waiting.clear(),
+            }
+            told.push(answer);
+        }
+        if waiting.is_empty() {
+            return told;
+        }
+    }
+    panic!("no answer to {waiting:?}: {sample:?}, but {told:?}");
+}
+
+#[test]
+fn every_request_of_the_dialect_is_answered() {
+    let mut asked = BTreeSet::new();
+    for sample in requests() {
+        let message = MavMessage::default_message_from_id(sample.id).expect("of the dialect");
+        let Expected::Answer(answers) = expected(&message) else { panic!("no request: {message:?}") };
+        asked.insert(sample.id);
+        for baud in [57_600.0, 921_600.0] {
+            for stations in [&[STATION][..], &[STATION, OTHER]] {
+                ask(&mut on(baud), stations, &sample, answers);
+            }
+        }
+    }
+    for id in MavMessage::all_ids() {
+        let message = MavMessage::default_message_from_id(*id).expect("of the dialect");
+        let is_request = matches!(expected(&message), Expected::Answer(_));
+        assert_eq!(asked.contains(id), is_request, "{}", message.message_name());
+    }
+}
+
+/// Else two vehicles would answer one another for ever.
+#[test]
+fn nothing_else_is_answered() {
+    let quiet = |bench: &mut Bench, sample: &Sample| {
+        bench.hear_bytes(&frame(STATION, sample));
+        let sent: Vec<_> = (0..5).flat_map(|_| step(bench)).collect();
+        let answers = sent.iter().filter(|sent| receiver(sent).is_some());
+        assert_eq!(answers.count(), 0, "{sample:?}: {sent:?}");
+    };
+    let mut bench = on(921_600.0);
+    for id in MavMessage::all_ids() {
+        let message = MavMessage::default_message_from_id(*id).expect("of the dialect");
+        if let Expected::None = expected(&message) {
+            let mut payload = vec![0; 255];
+            let length = message.ser(MavlinkVersion::V2, &mut payload);
+            payload.truncate(length.max(1));
+            quiet(&mut bench, &Sample { id: *id, payload });
+        }
+    }
+    // Answers of the same message, and a shell that wants no response.
+    for operation in [128, 129, 255] {
+        quiet(&mut bench, &file(9, 3, operation));
+    }
+    quiet(&mut bench, &extended(&PING_DATA { target_system: 1, target_component: 1, ..PING_DATA::DEFAULT }, &[]));
+    quiet(&mut bench, &extended(&TIMESYNC_DATA { tc1: 5, ts1: 77 }, &[1, 1]));
+    for flags in [SerialControlFlag::empty(), SerialControlFlag::SERIAL_CONTROL_FLAG_REPLY] {
+        quiet(&mut bench, &extended(&SERIAL_CONTROL_DATA { flags, ..SERIAL_CONTROL_DATA::DEFAULT }, &[1, 1]));
+    }
+    // And requests to somebody else.
+    for mut sample in requests() {
+        let to = match sample.id {
+            110 => 1,
+            117 | 412 => 4,
+            119 => 10,
+            320 => 2,
+            321 | 323 => 0,
+            _ => continue,
+        };
+        sample.payload[to] = 7;
+        quiet(&mut bench, &sample);
+    }
+}
+
+/// Whoever asks for logs is told that there are none, of data that it ends.
+#[test]
+fn there_are_no_logs() {
+    let mut bench = on(921_600.0);
+    let list = at(&LOG_REQUEST_LIST_DATA { start: 0, end: 0xFFFF, ..LOG_REQUEST_LIST_DATA::DEFAULT }, 4, &[]);
+    let told = ask(&mut bench, &[STATION], &list, &[118]);
+    let entry = MavMessage::parse(MavlinkVersion::V2, 118, &told[0].payload).expect("an entry");
+    assert_eq!(entry, MavMessage::LOG_ENTRY(LOG_ENTRY_DATA::DEFAULT));
+    let data = at(&LOG_REQUEST_DATA_DATA { ofs: 90, count: 900, id: 5, ..LOG_REQUEST_DATA_DATA::DEFAULT }, 10, &[]);
+    let told = ask(&mut bench, &[STATION], &data, &[120]);
+    let none = MavMessage::parse(MavlinkVersion::V2, 120, &told[0].payload).expect("data");
+    assert_eq!(none, MavMessage::LOG_DATA(LOG_DATA_DATA { ofs: 90, id: 5, ..LOG_DATA_DATA::DEFAULT }));
+}
+
+/// Every operation is refused with the next number, for the same session, with an error.
+#[test]
+fn every_file_operation_is_refused() {
+    let mut bench = on(921_600.0);
+    for operation in 0..128 {
+        for (sequence, next) in [(0, 1), (777, 778), (u16::MAX, 0)] {
+            let told = ask(&mut bench, &[OTHER], &file(sequence, operation, operation), &[110]);
+            assert_eq!(told.len(), 1);
+            let payload = &told[0].payload;
+            assert_eq!(u16::from_le_bytes([payload[3], payload[4]]), next);
+            // Session, NAK, one byte of data, which operation; UnknownCommand.
+            assert_eq!(payload[5..9], [operation, 129, 1, operation]);
+            assert_eq!(payload[15], 7);
+        }
+    }
+}
+
+/// A name that there is not is an error that names it.
+#[test]
+fn what_there_is_not_is_named() {
+    let mut bench = on(921_600.0);
+    let mut name = [0; 16];
+    name[..4].copy_from_slice(b"NONE");
+    let read = at(&PARAM_REQUEST_READ_DATA { param_index: -1, param_id: name.into(), ..Default::default() }, 2, &[]);
+    let place = at(&PARAM_REQUEST_READ_DATA { param_index: 9_999, ..Default::default() }, 2, &[]);
+    let set = at(&PARAM_SET_DATA { param_id: name.into(), ..Default::default() }, 4, &[]);
+    for (sample, index, name) in [(read, -1_i16, name), (place, 9_999, [0; 16]), (set, -1, name)] {
+        let told = ask(&mut bench, &[OTHER], &sample, &[22, 345]);
+        let mut payload = told[0].payload.clone();
+        payload.resize(21, 0);
+        assert_eq!((told[0].id, &payload[..2]), (345, index.to_le_bytes().as_slice()));
+        // Does not exist.
+        assert_eq!((&payload[4..20], payload[20]), (name.as_slice(), 1));
+    }
+    let read =
+        at(&PARAM_EXT_REQUEST_READ_DATA { param_index: -1, param_id: name.into(), ..Default::default() }, 2, &[]);
+    let told = ask(&mut bench, &[OTHER], &read, &[322]);
+    assert_eq!((&told[0].payload[..4], &told[0].payload[4..20]), ([0, 0, 255, 255].as_slice(), name.as_slice()));
+    let set = at(&PARAM_EXT_SET_DATA { param_id: name.into(), ..Default::default() }, 0, &[]);
+    let told = ask(&mut bench, &[OTHER], &set, &[324]);
+    assert_eq!((&told[0].payload[..16], told[0].payload[145]), (name.as_slice(), 1));
+}
+
+/// MAV_CMD_REQUEST_MESSAGE of any message of the dialect: it is sent, or refused.
+#[test]
+fn any_message_can_be_requested() {
+    for message in MavMessage::all_ids() {
+        let mut bench = on(921_600.0);
+        bench.hear(Uplink::Command(Command::RequestMessage { message: *message, index: 0 }));
+        let sent: Vec<_> = (0..WITHIN).flat_map(|_| step(&mut bench)).collect();
+        let answer = sent.iter().find(|sent| sent.id == 77).expect("answered");
+        assert_eq!(receiver(answer), Some(STATION));
+        let accepted = answer.payload.get(2).copied().unwrap_or(0) == 0;
+        assert!(!accepted || sent.iter().any(|sent| sent.id == *message), "message {message}");
+    }
+}
+
+/// An upload by the messages of old, with numbers for places.
+#[test]
+fn a_mission_is_uploaded_by_messages_of_old() {
+    let mut bench = on(921_600.0);
+    let next = |told: &[Sample], number: u16| {
+        let bytes = told[0].payload.clone();
+        assert_eq!((told[0].id, bytes.first().copied()), (51, Some(number as u8)), "{told:?}");
+    };
+    let count = at(&MISSION_COUNT_DATA { count: 2, ..Default::default() }, 2, &[0]);
+    next(&ask(&mut bench, &[STATION], &count, &[51, 47]), 0);
+    let item = |seq: u16, frame: MavFrame, [x, y, z]: [f32; 3]| {
+        let command = MavCmd::MAV_CMD_NAV_WAYPOINT;
+        let data = MISSION_ITEM_DATA { seq, x, y, z, frame, command, ..MISSION_ITEM_DATA::DEFAULT };
+        at(&data, 32, &[0])
+    };
+    let first = item(0, MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT, [-47.5, 8.25, 10.0]);
+    next(&ask(&mut bench, &[STATION], &first, &[51, 47]), 1);
+    let second = item(1, MavFrame::MAV_FRAME_LOCAL_NED, [12.5, -3.25, -4.0]);
+    let told = ask(&mut bench, &[STATION], &second, &[51, 47]);
+    assert_eq!((told[0].id, told[0].payload.get(2).copied().unwrap_or(0)), (47, 0), "{told:?}");
+    for (number, x, y) in [(0, -475_000_000, 82_500_000), (1, 125_000, -32_500)] {
+        let request = at(&MISSION_REQUEST_INT_DATA { seq: number, ..Default::default() }, 2, &[0]);
+        let told = ask(&mut bench, &[OTHER], &request, &[73, 47]);
+        let read = MavMessage::parse(MavlinkVersion::V2, told[0].id, &told[0].payload);
+        let Ok(MavMessage::MISSION_ITEM_INT(item)) = read else { panic!("{read:?}") };
+        assert_eq!((item.x, item.y), (x, y));
+    }
+}

@@ -1,0 +1,48 @@
+//! Telemetry of a vehicle that flies: what is told is what it does.
+#![allow(clippy::expect_used, missing_docs, reason = "tests")]
+
+mod common;
+
+use afbc_link::{Command, Downlink, Motion, Uplink};
+use afbc_onboard::services::streams::id;
+use afbc_types::{Setpoint, State};
+use common::Bench;
+use nalgebra::Vector3;
+
+/// POSITION_TARGET_LOCAL_NED tells four times per second what the law is given, while the vehicle is armed.
+#[test]
+fn the_setpoint_that_is_followed_is_told() {
+    let mut bench = Bench::new();
+    let mut told = Vec::new();
+    for tick in 0..4000_u32 {
+        match tick {
+            1100 => bench.follow(),
+            1200 => bench.hear(Uplink::Command(Command::Arm)),
+            3200 => bench.hear(Uplink::Command(Command::Kill)),
+            _ => (),
+        }
+        bench.measure(&State::default());
+        let position_m = Vector3::new(0.5, -0.25, 0.5);
+        bench.hear(Uplink::Setpoint(Setpoint { position_m, ..Setpoint::default() }));
+        let (report, said) = bench.step();
+        for message in said {
+            if let Downlink::Followed(time_ms, motion) = message {
+                assert!(report.mode.armed());
+                assert_eq!(u64::from(time_ms), report.time_us / 1000);
+                let followed = report.guided.setpoint.expect("it has a state");
+                assert_eq!(format!("{motion:?}"), format!("{:?}", Motion::from(&followed)));
+                told.push((tick, motion.position_m));
+            }
+        }
+    }
+    assert!((7..=9).contains(&told.len()), "{told:?}");
+    let (_, last) = told.last().expect("some");
+    assert!((last - Vector3::new(0.5, -0.25, 0.5)).norm() < 0.2, "{last}");
+    // And nothing that is not: a request is refused once it is disarmed.
+    bench.hear(Uplink::Command(Command::RequestMessage { message: id::POSITION_TARGET_LOCAL_NED, index: 0 }));
+    let refused = bench.step().1.iter().any(|it| {
+        matches!(it, Downlink::Answer { command: 512, answer, .. }
+        if *answer == afbc_link::Answer::Refused(afbc_onboard::NOT_KNOWN))
+    });
+    assert!(refused);
+}
