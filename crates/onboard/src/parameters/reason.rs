@@ -130,3 +130,93 @@ impl Line {
         self.char(char::from_digit(digit.min(9), 10).unwrap_or('9'));
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
+mod tests {
+    extern crate std;
+    use super::*;
+    use afbc_types::Range;
+    use proptest::prelude::*;
+    use std::string::{String as Text, ToString};
+
+    fn written(number: f64) -> Text {
+        let mut line = Line::default();
+        line.number(number);
+        line.text.to_string()
+    }
+
+    proptest! {
+        /// What is written is the number, to four digits; to one where it is very small or large. It is as short as it
+        /// can be: no zeros at the end of a fraction, and none before the number.
+        #[test]
+        fn numbers_are_written_as_they_are(mantissa in 1.0..10.0_f64, exponent in -12..13_i32, negative: bool) {
+            let size = mantissa * 10.0_f64.powi(exponent);
+            let number = if negative { -size } else { size };
+            let text = written(number);
+            let read: f64 = text.parse().expect("a number");
+            let is_power = size >= 1e5 || size < 1e-3;
+            prop_assert_eq!(text.contains('e'), is_power, "{} {}", number, text);
+            let unit = match size {
+                _ if is_power => 0.51 * 10.0_f64.powi(size.log10().floor() as i32),
+                _ if size >= 100.0 => 0.051,
+                _ if size >= 10.0 => 0.0051,
+                _ => 0.00051,
+            };
+            prop_assert!((read - number).abs() <= unit, "{} {}", number, text);
+            prop_assert_eq!(text.starts_with('-'), negative);
+            let digits = text.trim_start_matches('-');
+            prop_assert!(!digits.starts_with('.') && !digits.ends_with('.'), "{}", text);
+            prop_assert!(!digits.contains('.') || !digits.ends_with('0'), "{}", text);
+            prop_assert!(!digits.starts_with('0') || digits.starts_with("0.") || digits == "0", "{}", text);
+            prop_assert!(!is_power || digits.split('e').next().map(str::len) == Some(1), "{}", text);
+        }
+    }
+
+    #[test]
+    fn numbers_at_the_ends_of_their_forms() {
+        for (number, text) in [
+            (0.0, "0"),
+            (1e-3, "0.001"),
+            (9e-4, "9e-4"),
+            (0.05, "0.05"),
+            (9.5e-7, "1e-6"),
+            (9.4e-7, "9e-7"),
+            (1.0, "1"),
+            (-1.5, "-1.5"),
+            (9.999, "9.999"),
+            (10.0, "10"),
+            (12.34, "12.34"),
+            (12.04, "12.04"),
+            (99.99, "99.99"),
+            (100.0, "100"),
+            (123.4, "123.4"),
+            (99_999.0, "99999"),
+            (1e5, "1e5"),
+            (9.4e5, "9e5"),
+            (9.5e5, "1e6"),
+            (1e30, "1e30"),
+            (1e-30, "1e-30"),
+        ] {
+            assert_eq!(written(number), text);
+        }
+    }
+
+    #[test]
+    fn lines_say_what_is_wrong_and_are_cut() {
+        let name = Name::new("V_MASS").expect("short");
+        assert_eq!(Reason::on(name, "why").to_string(), "V_MASS: why");
+        assert_eq!(Reason::new("subject", "text").as_str(), "subject: text");
+        let range = Range::new("mass_kg", 0.5, 20.0);
+        let error = |value| OutOfRange { value, range };
+        assert_eq!(Reason::range(name, &error(0.0)).as_str(), "V_MASS: must be 0.5 to 20");
+        assert_eq!(Reason::together(name, &error(0.0)).as_str(), "V_MASS: mass_kg below 0.5");
+        assert_eq!(Reason::together(name, &error(21.0)).as_str(), "V_MASS: mass_kg above 20");
+        assert_eq!(Reason::together(name, &error(f64::NAN)).as_str(), "V_MASS: mass_kg below 0.5");
+        let long = Range::new("a_name_of_thirty_five_letters_in_all", 0.5, 20.0);
+        let error = OutOfRange { value: 0.0, range: long };
+        assert_eq!(Reason::together(name, &error).as_str(), "V_MASS: a_name_of_thirty_five_letters_in_all below");
+        let words = "0123456789".repeat(9);
+        assert_eq!(Reason::new("s", &words).as_str().len(), REASON_MAX);
+    }
+}

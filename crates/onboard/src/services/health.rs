@@ -87,6 +87,7 @@ pub fn landed(picture: &Picture) -> u8 {
 }
 
 #[cfg(test)]
+#[allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 mod tests {
     use super::*;
     use crate::services::picture::{Receiver, Sensors};
@@ -143,5 +144,81 @@ mod tests {
         assert_eq!(landed(&picture), TAKING_OFF);
         picture.mode = Mode::Descending;
         assert_eq!(landed(&picture), LANDING);
+    }
+
+    /// Every set of what there is and what is well, by the definition of each bit.
+    #[test]
+    fn every_bit_is_there_and_well_by_what_it_means() {
+        for case in 0..128_u32 {
+            let has = |bit: u32| case >> bit & 1 == 1;
+            let mut picture = well();
+            picture.senses = has(0);
+            if !has(1) {
+                picture.health.state_age_us = u32::MAX;
+            }
+            picture.surroundings.receiver =
+                has(2).then_some(Receiver { kind: if has(3) { 3 } else { 2 }, satellites: 9, sigma_mm: [0; 2] });
+            let battery = afbc_link::telemetry::Battery {
+                voltage_mv: 11_100,
+                current_ca: 250,
+                remaining_percent: 66,
+                consumed_mah: 5,
+                charge: 1,
+            };
+            picture.surroundings.battery = has(4).then_some(battery);
+            picture.mode = if has(5) { Mode::Flying } else { Mode::Disarmed };
+            picture.against = Some(if has(6) { Refusal::NotAtRest.into() } else { Reasons::NONE });
+            (picture.tick_us, picture.dropped_frames) = (123.9, 77);
+            let inertial = sensor::GYROSCOPE | sensor::ACCELEROMETER | sensor::ATTITUDE;
+            let others = sensor::MAGNETOMETER | sensor::BAROMETER | sensor::MOTORS;
+            let present = others
+                + sensor::ARMING
+                + if has(0) { inertial } else { sensor::TRACKER }
+                + if has(2) { sensor::SATELLITES } else { 0 }
+                + if has(4) { sensor::BATTERY } else { 0 };
+            let ill = if !has(0) && !has(1) { sensor::TRACKER } else { 0 }
+                + if has(2) && !(has(1) && has(3)) { sensor::SATELLITES } else { 0 }
+                + if has(6) && !has(5) { sensor::ARMING } else { 0 };
+            let told = system(&picture);
+            assert_eq!((told.present, told.enabled, told.healthy), (present, present, present - ill), "{case:#b}");
+            assert_eq!((told.load_permille, told.dropped_frames), (123, 77));
+            let battery = if has(4) { (11_100, 250, 66) } else { (u16::MAX, -1, -1) };
+            assert_eq!((told.voltage_mv, told.current_ca, told.remaining_percent), battery);
+
+            picture.surroundings.origin = has(6).then(|| {
+                let at = crate::services::origin::Origin::SIMULATED;
+                crate::services::origin::Origin::new(at).expect("possible")
+            });
+            let motion = if has(1) { 1 + 2 + 4 + 8 + 32 } else { u16::from(has(0)) };
+            let absolute = if has(1) && has(6) { 16 } else { 0 };
+            assert_eq!(estimator(&picture).flags, motion + absolute, "{case:#b}");
+            assert!(estimator(&picture).sigma_m.iter().all(|sigma| sigma.is_nan()));
+        }
+        let mut picture = well();
+        picture.time_us = 42;
+        assert_eq!((estimator(&picture).time_us, estimator(&picture).sigma_m), (42, [0.5, 0.8]));
+        // What the shell says is ill is ill, and what is not there is not well.
+        let sensors = Sensors { present: sensor::BAROMETER, healthy: sensor::MAGNETOMETER };
+        picture.surroundings.sensors = sensors;
+        let told = system(&picture);
+        assert_eq!((told.present & 12, told.healthy & 12), (sensor::BAROMETER, 0));
+        (picture.tick_us, picture.dropped_frames) = (5e3, 70_000);
+        assert_eq!((system(&picture).load_permille, system(&picture).dropped_frames), (1000, u16::MAX));
+    }
+
+    #[test]
+    fn landings_are_told_in_the_air_only() {
+        let mut picture = well();
+        for (mode, flight_mode, airborne, expected) in [
+            (Mode::Flying, FlightMode::Land, true, LANDING),
+            (Mode::Flying, FlightMode::Land, false, ON_GROUND),
+            (Mode::Descending, FlightMode::Hold, false, ON_GROUND),
+            (Mode::Disarmed, FlightMode::Takeoff, true, ON_GROUND),
+            (Mode::Coasting, FlightMode::Hold, true, IN_AIR),
+            (Mode::Coasting, FlightMode::Takeoff, true, TAKING_OFF),
+        ] {
+            (picture.mode, picture.guided.mode, picture.guided.airborne) = (mode, flight_mode, airborne);
+            assert_eq!(landed(&picture), expected, "{mode:?} {flight_mode:?} {airborne}");
+        }
     }
 }

@@ -90,6 +90,7 @@ pub fn current(mode: FlightMode, intended: FlightMode) -> CurrentMode {
 }
 
 #[cfg(test)]
+#[allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 mod tests {
     use super::*;
 
@@ -124,5 +125,47 @@ mod tests {
             assert!(standard(mode) == 0 || of_standard(standard(mode)) == Some(mode));
         }
         assert_eq!(of_standard(0), None);
+    }
+
+    /// MAV_MODE_PROPERTY: what a pilot flies has none, offboard is for the advanced, and flies by itself like all others.
+    #[test]
+    fn properties_and_names_are_the_modes() {
+        for (mode, place) in FlightMode::ALL.into_iter().zip(1..) {
+            let told = available(place).expect("offered");
+            let properties = match mode {
+                FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised => 0,
+                FlightMode::Offboard => 5,
+                _ => 4,
+            };
+            assert_eq!((told.place, told.properties), (place, properties), "{mode:?}");
+            let end = told.name.iter().position(|byte| *byte == 0).expect("short");
+            assert_eq!(core::str::from_utf8(told.name.get(..end).expect("within")), Ok(mode.name()));
+            let now = current(mode, FlightMode::Hold);
+            assert_eq!((now.standard, now.custom, now.intended), (standard(mode), custom(mode), 0x0304_0000));
+        }
+        for (mode, number) in [
+            (FlightMode::Position, 1),
+            (FlightMode::Altitude, 4),
+            (FlightMode::Return, 5),
+            (FlightMode::Mission, 6),
+            (FlightMode::Land, 7),
+            (FlightMode::Takeoff, 8),
+        ] {
+            assert_eq!((standard(mode), of_standard(number)), (number, Some(mode)));
+        }
+        assert_eq!([2, 3, 9, 255].map(of_standard), [None; 4]);
+    }
+
+    /// 0 asks for all modes; what follows a mode of those asks for the next, and a number for that one alone.
+    #[test]
+    fn an_index_asks_for_one_mode_or_for_all_that_follow() {
+        assert_eq!(place(0), (1, true));
+        for number in 1..=u8::MAX {
+            assert_eq!(place(number.into()), (number, false));
+            assert_eq!(all_from(number), 0x8000_0000 + u32::from(number));
+            assert_eq!(place(all_from(number)), (number, true));
+        }
+        assert_eq!(place(256), (0, false));
+        assert_eq!(available(0), None);
     }
 }

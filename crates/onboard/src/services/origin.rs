@@ -177,4 +177,62 @@ mod tests {
         };
         assert_eq!([Datum::Sea, Datum::Home, Datum::Here].map(z), [2.0, 495.0, 497.0]);
     }
+
+    #[test]
+    fn origins_reach_up_to_their_limits() {
+        let at = |latitude_deg, longitude_deg, altitude_m| Global { latitude_deg, longitude_deg, altitude_m };
+        for good in [at(89.98, 180.0, 1e5), at(-89.98, -180.0, -1e5), at(0.0, 0.0, 0.0)] {
+            assert_eq!(Origin::new(good).map(|origin| origin.at()), Some(good));
+        }
+        for bad in [
+            at(89.99, 0.0, 0.0),
+            at(-89.99, 0.0, 0.0),
+            at(0.0, -180.1, 0.0),
+            at(0.0, 0.0, 100_001.0),
+            at(0.0, 0.0, -1e6),
+        ] {
+            assert_eq!(Origin::new(bad), None, "{bad:?}");
+        }
+    }
+
+    /// The units of the wire, rounded, and back.
+    #[test]
+    fn units_are_those_of_the_wire() {
+        for (altitude_m, mm) in [(488.0, 488_000), (-12.3456, -12_346), (0.0006, 1), (0.0004, 0)] {
+            assert_eq!(Global { altitude_m, ..Origin::SIMULATED }.altitude_mm(), mm);
+        }
+        let place = Global { latitude_deg: -12.345_678_94, longitude_deg: 123.456_789_06, altitude_m: 3.0 };
+        assert_eq!(place.e7(), [-123_456_789, 1_234_567_891]);
+        let back = Global::of_e7([-123_456_789, 1_234_567_891], 7.5);
+        assert!((back.latitude_deg + 12.345_678_9).abs() < 1e-9 && (back.longitude_deg - 123.456_789_1).abs() < 1e-9);
+        assert_eq!(back.altitude_m, 7.5);
+    }
+
+    /// Heights above the origin, in both directions, and across the date line to the west too.
+    #[test]
+    fn heights_and_the_date_line_have_two_sides() {
+        let origin = Origin::new(Origin::SIMULATED).expect("possible");
+        let above = origin.global(&Vector3::new(0.0, 0.0, 12.5));
+        assert_eq!(above.altitude_m, 500.5);
+        assert_eq!(origin.local(&above).z, 12.5);
+        let east = Global { latitude_deg: 0.0, longitude_deg: -179.9999, altitude_m: 0.0 };
+        let west = Global { longitude_deg: 179.9999, ..east };
+        let local = Origin::new(east).expect("possible").local(&west);
+        assert!((local.y - 22.26).abs() < 0.05, "{local}");
+    }
+
+    /// A place with both coordinates is where it is, at the height that it says; with one alone it is nowhere.
+    #[test]
+    fn a_place_of_a_station_is_resolved() {
+        let origin = Origin::new(Origin::SIMULATED).expect("possible");
+        let there = Vector3::new(300.0, -200.0, 0.0);
+        let [latitude_e7, longitude_e7] = origin.global(&there).e7();
+        for (above, z) in [(Datum::Sea, 12.0), (Datum::Home, 505.0), (Datum::Here, 507.0)] {
+            let place = Place { latitude_e7, longitude_e7, height: Height { metres: 500.0, above } };
+            let local = resolve(&origin, &place, 5.0, 7.0);
+            assert!((local - Vector3::new(300.0, -200.0, z)).norm() < 0.02, "{local}");
+            let half = resolve(&origin, &Place { longitude_e7: Place::AS_IT_IS, ..place }, 5.0, 7.0);
+            assert!(half.x.is_nan() && half.y.is_nan() && half.z == z);
+        }
+    }
 }

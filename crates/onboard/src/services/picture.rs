@@ -104,3 +104,34 @@ impl Picture {
         self.guided.airborne
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_knows_where_it_is_while_the_state_is_fresh() {
+        let mut picture = Picture { time_us: 1_234_567, ..Picture::default() };
+        assert_eq!((picture.time_ms(), picture.is_located()), (1_234, false));
+        picture.state = Some(State::default());
+        for (age_us, located) in [(0, true), (COAST_US, true), (COAST_US + 1, false), (u32::MAX, false)] {
+            picture.health.state_age_us = age_us;
+            assert_eq!(picture.is_located(), located, "{age_us} us");
+        }
+    }
+
+    #[test]
+    fn a_descent_of_the_flight_core_reads_as_land() {
+        let mut picture = Picture::default();
+        picture.guided.mode = FlightMode::Mission;
+        for mode in [Mode::Disarmed, Mode::Flying, Mode::Coasting, Mode::Descending] {
+            picture.mode = mode;
+            let told = if mode == Mode::Descending { FlightMode::Land } else { FlightMode::Mission };
+            assert_eq!(picture.flight_mode(), told);
+        }
+        for airborne in [true, false] {
+            picture.guided.airborne = airborne;
+            assert_eq!(picture.is_airborne(), airborne);
+        }
+    }
+}

@@ -150,6 +150,7 @@ fn summary(picture: &Picture) -> Option<Summary> {
 }
 
 #[cfg(test)]
+#[allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 mod tests {
     use super::*;
 
@@ -185,5 +186,138 @@ mod tests {
         for message in [id::SYS_STATUS, id::ESTIMATOR_STATUS, id::EXTENDED_SYS_STATE, id::AUTOPILOT_VERSION] {
             assert!(compose(message, &picture).is_some(), "message {message}");
         }
+    }
+
+    /// A vehicle that flies, of which everything is known.
+    fn flying() -> Picture {
+        let state = afbc_types::State {
+            position_m: Vector3::new(30.0, -20.0, 12.5),
+            velocity_m_s: Vector3::new(3.0, -4.0, 1.25),
+            attitude_rad: Vector3::new(0.1, -0.2, -0.5),
+            rates_rad_s: Vector3::new(0.3, 0.4, -0.6),
+        };
+        let mut picture = Picture { state: Some(state), time_us: 5_000_123, rotors: 4, ..Picture::default() };
+        picture.guided.home_m = Some(Vector3::new(1.0, 2.0, 2.5));
+        picture.throttles = [47, 1047, 2047, 1047, 0, 0, 0, 0];
+        picture.surroundings.origin = Origin::new(Origin::SIMULATED);
+        picture.surroundings.receiver =
+            Some(crate::services::picture::Receiver { kind: 3, satellites: 11, sigma_mm: [700, 900] });
+        picture.surroundings.powered_up_us = 1_700_000_000_000_000;
+        picture
+    }
+
+    fn told(message: u32, picture: &Picture) -> Telemetry {
+        match compose(message, picture) {
+            Some(Downlink::Telemetry(telemetry)) => telemetry,
+            other => panic!("message {message}: {other:?}"),
+        }
+    }
+
+    /// The messages of the state, each number by its meaning: z up and y to the left here, down and to the right there.
+    #[test]
+    fn a_flying_vehicle_tells_its_state() {
+        let picture = flying();
+        let (origin, state) = (picture.surroundings.origin.expect("known"), picture.state.expect("known"));
+        let here = origin.global(&state.position_m);
+        let Telemetry::Global(global) = told(id::GLOBAL_POSITION_INT, &picture) else { panic!("another") };
+        assert_eq!((global.time_ms, global.place_e7, global.altitude_mm), (5_000, here.e7(), 500_500));
+        assert_eq!((global.relative_mm, global.velocity_ned_cm_s), (10_000, [300, 400, -125]));
+        // Half a radian to the right.
+        assert_eq!(global.heading_cdeg, 2864);
+        let Telemetry::Fix(fix) = told(id::GPS_RAW_INT, &picture) else { panic!("another") };
+        assert_eq!((fix.time_us, fix.place_e7, fix.altitude_mm), (5_000_123, here.e7(), 500_500));
+        assert_eq!((fix.kind, fix.satellites, fix.sigma_mm), (3, 11, [700, 900]));
+        // 3 m/s north, 4 m/s east: 53.13 degrees.
+        assert_eq!((fix.speed_cm_s, fix.course_cdeg), (500, 5313));
+        let Telemetry::Summary(summary) = told(id::VFR_HUD, &picture) else { panic!("another") };
+        assert_eq!((summary.speed_m_s, summary.altitude_m, summary.climb_m_s), (5.0, 500.5, 1.25));
+        // Nothing, half, full, half.
+        assert_eq!((summary.heading_deg, summary.throttle_percent), (28, 50));
+        let Telemetry::Attitude(attitude) = told(id::ATTITUDE_QUATERNION, &picture) else { panic!("another") };
+        let q = state.quaternion().coords;
+        assert_eq!((attitude.time_ms, attitude.rates_rad_s), (5_000, state.rates_rad_s));
+        assert_eq!(attitude.attitude, [q.w, q.x, q.y, q.z]);
+        let (attitude_rad, rates_rad_s) = (state.attitude_rad, state.rates_rad_s);
+        assert_eq!(
+            compose(id::ATTITUDE, &picture),
+            Some(Downlink::Attitude { time_ms: 5_000, attitude_rad, rates_rad_s })
+        );
+        let (position_m, velocity_m_s) = (state.position_m, state.velocity_m_s);
+        let position = Downlink::Position { time_ms: 5_000, position_m, velocity_m_s };
+        assert_eq!(compose(id::LOCAL_POSITION_NED, &picture), Some(position));
+        let Telemetry::Home(home) = told(id::HOME_POSITION, &picture) else { panic!("another") };
+        let at = origin.global(&Vector3::new(1.0, 2.0, 2.5));
+        assert_eq!((home.place_e7, home.altitude_mm, home.time_us), (at.e7(), 490_500, 5_000_123));
+        assert_eq!((home.position_m, home.attitude), (Vector3::new(1.0, 2.0, 2.5), [1.0, 0.0, 0.0, 0.0]));
+        let Telemetry::Origin(place) = told(id::GPS_GLOBAL_ORIGIN, &picture) else { panic!("another") };
+        assert_eq!((place.place_e7, place.altitude_mm, place.time_us), (Origin::SIMULATED.e7(), 488_000, 5_000_123));
+        let Telemetry::Outputs(outputs) = told(id::ACTUATOR_OUTPUT_STATUS, &picture) else { panic!("another") };
+        assert_eq!((outputs.time_us, outputs.active), (5_000_123, 4));
+        assert_eq!(outputs.throttles, [0.0, 0.5, 1.0, 0.5, 0.0, 0.0, 0.0, 0.0]);
+    }
+
+    /// Without a place on the earth, or a position, only what is known is told.
+    #[test]
+    fn what_is_half_known_is_told_by_halves() {
+        let mut picture = flying();
+        picture.health.state_age_us = u32::MAX;
+        assert_eq!(compose(id::GLOBAL_POSITION_INT, &picture), None);
+        let Telemetry::Fix(fix) = told(id::GPS_RAW_INT, &picture) else { panic!("another") };
+        assert_eq!((fix.place_e7, fix.altitude_mm, fix.speed_cm_s, fix.course_cdeg), ([0; 2], 0, 65_535, 65_535));
+        let mut picture = flying();
+        picture.surroundings.origin = None;
+        let Telemetry::Summary(summary) = told(id::VFR_HUD, &picture) else { panic!("another") };
+        assert_eq!(summary.altitude_m, 12.5);
+        assert_eq!([id::HOME_POSITION, id::GPS_GLOBAL_ORIGIN].map(|it| compose(it, &picture)), [None, None]);
+        // While there is no home, heights count from the origin.
+        let mut picture = flying();
+        picture.guided.home_m = None;
+        let Telemetry::Global(global) = told(id::GLOBAL_POSITION_INT, &picture) else { panic!("another") };
+        assert_eq!((global.relative_mm, compose(id::HOME_POSITION, &picture)), (12_500, None));
+    }
+
+    #[test]
+    fn clocks_versions_and_modes_are_told() {
+        let mut picture = flying();
+        let time = |unix_us| Some(Downlink::Clock(Clock::Time { unix_us, boot_ms: 5_000 }));
+        assert_eq!(compose(id::SYSTEM_TIME, &picture), time(1_700_000_005_000_123));
+        picture.surroundings.powered_up_us = 0;
+        assert_eq!(compose(id::SYSTEM_TIME, &picture), time(0));
+        let Telemetry::Version(version) = told(id::AUTOPILOT_VERSION, &picture) else { panic!("another") };
+        // MISSION_INT, COMMAND_INT, PARAM_ENCODE_BYTEWISE; SET_ATTITUDE_TARGET, both SET_POSITION_TARGET; MAVLINK2; and
+        // neither FTP nor logs.
+        let bits = [2, 3, 4, 6, 7, 8, 13];
+        assert_eq!(version.capabilities, bits.into_iter().map(|bit| 1 << bit).sum::<u64>());
+        let text = |part: u8| crate::services::texts::Words::default().number(part.into());
+        let parts = [env!("CARGO_PKG_VERSION_MAJOR"), env!("CARGO_PKG_VERSION_MINOR"), env!("CARGO_PKG_VERSION_PATCH")];
+        for (part, digits) in version.software.into_iter().zip(parts) {
+            assert_eq!(text(part), crate::services::texts::Words::of(digits));
+        }
+        assert_eq!(version.software[3], 255);
+        assert_eq!(told(id::PROTOCOL_VERSION, &picture), Telemetry::Protocol);
+        let mode = afbc_guidance::FlightMode::Hold;
+        assert_eq!(compose(id::CURRENT_MODE, &picture), Some(Downlink::CurrentMode(modes::current(mode, mode))));
+        for message in [id::SYS_STATUS, id::ESTIMATOR_STATUS, id::EXTENDED_SYS_STATE] {
+            let expected = match message {
+                id::SYS_STATUS => Telemetry::System(health::system(&picture)),
+                id::ESTIMATOR_STATUS => Telemetry::Estimator(health::estimator(&picture)),
+                _ => Telemetry::Landed(health::landed(&picture)),
+            };
+            assert_eq!(told(message, &picture), expected);
+        }
+        assert_eq!(compose(9_999, &picture), None);
+    }
+
+    #[test]
+    fn a_heading_is_never_360_degrees() {
+        // The largest yaw to the left whose heading is below a whole turn.
+        for yaw in [1e-9, 1e-7, f32::MIN_POSITIVE, 0.0] {
+            assert!((0.0..360.0).contains(&heading_deg(yaw)), "{yaw}");
+        }
+        let mut picture = flying();
+        let state = picture.state.as_mut().expect("known");
+        state.attitude_rad.z = 1e-5;
+        let Telemetry::Global(global) = told(id::GLOBAL_POSITION_INT, &picture) else { panic!("another") };
+        assert!(global.heading_cdeg <= 35_999);
     }
 }
