@@ -3,7 +3,7 @@
 
 mod common;
 
-use afbc_link::{ParameterName, ParameterRequest, ParameterValue};
+use afbc_link::{ParameterError, ParameterName, ParameterRequest, ParameterValue};
 use afbc_onboard::parameters::{Change, Kept, Kind, LINK_SHARE, Parameter, REASON_MAX, Service, Table, VALUE_BYTES};
 use afbc_onboard::{Configuration, Flight, Prepared};
 use afbc_store::{Name, Ram, Store, hash};
@@ -11,6 +11,7 @@ use afbc_types::State;
 use common::Bench;
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::LazyLock;
 
 type Sectors = Ram<2048>;
 
@@ -30,6 +31,9 @@ fn all(table: &Table) -> Vec<Parameter> {
 fn bits(table: &Table) -> BTreeMap<Name, u32> {
     all(table).iter().map(|parameter| (parameter.name, parameter.value.to_bits())).collect()
 }
+
+/// The parameters as they are at first, and their bits: each takes a walk over all of them.
+static FIRST: LazyLock<(Vec<Parameter>, BTreeMap<Name, u32>)> = LazyLock::new(|| (all(&table()), bits(&table())));
 
 fn blank() -> Store<Sectors> {
     let mut store = Store::open(Sectors::BLANK, 0, hash(b"paper")).unwrap();
@@ -87,9 +91,9 @@ proptest! {
         place in any::<prop::sample::Index>(), way: u8, share in 0.0..1.0_f32,
     ) {
         let mut table = table();
-        let all = all(&table);
+        let (all, before) = &*FIRST;
         let parameter = all[place.index(all.len())];
-        let (before, value) = (bits(&table), value(&parameter, way, share));
+        let value = value(&parameter, way, share);
         match table.set(parameter.name, value) {
             Ok(set) => {
                 prop_assert!(parameter.range.check(value).is_ok());
@@ -104,7 +108,7 @@ proptest! {
                 prop_assert!(Flight::new(table.configuration()).is_ok());
             }
             Err(reason) => {
-                prop_assert_eq!(bits(&table), before);
+                prop_assert_eq!(&bits(&table), before);
                 let text = reason.as_str();
                 prop_assert!(text.starts_with(&format!("{}: ", parameter.name)), "{text}");
                 // Not cut: it ends in a limit or in a whole word.
@@ -254,12 +258,20 @@ fn gaps_are_filled_by_place_and_by_name() {
         ParameterRequest::ReadPlace(3),
         ParameterRequest::ReadName(padded("V_MASS")),
         ParameterRequest::ReadPlace(table.count() - 1),
-        ParameterRequest::ReadPlace(u16::MAX),
-        ParameterRequest::ReadName(padded("NOTHING")),
-        ParameterRequest::ReadName([0xFF; 16]),
-        ParameterRequest::ReadName([0; 16]),
     ] {
         assert_eq!(service.hear(ask, &mut table, false), Default::default());
+    }
+    // What there is not is named.
+    for (ask, name, place) in [
+        (ParameterRequest::ReadPlace(table.count()), [0; 16], table.count() as i16),
+        (ParameterRequest::ReadPlace(u16::MAX), [0; 16], -1),
+        (ParameterRequest::ReadName(padded("NOTHING")), padded("NOTHING"), -1),
+        (ParameterRequest::ReadName([0xFF; 16]), [0xFF; 16], -1),
+        (ParameterRequest::ReadName([0; 16]), [0; 16], -1),
+    ] {
+        let heard = service.hear(ask, &mut table, false);
+        let error = ParameterError { name, place, error: ParameterError::DOES_NOT_EXIST };
+        assert_eq!((heard.error, heard.change, heard.refused), (Some(error), None, None));
     }
     let said = told(&mut service, &mut now_us, 1000, 5760, &table);
     assert_eq!(said.iter().map(|told| told.place).collect::<Vec<_>>(), [3, 0, table.count() - 1]);

@@ -1,0 +1,594 @@
+//! What each command, target and mission leads to: orders of the guidance by their values, answers by their reasons.
+#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
+
+mod common;
+
+use afbc_flight_core::Refusal;
+use afbc_guidance::{Declined, FlightMode, Order};
+use afbc_link::telemetry::Battery;
+use afbc_link::{
+    Address, Answer, AttitudeAndThrust, Axes, Command, Datum, Downlink, FRAME_MAX, Height, Mission, MissionItem,
+    MissionResult, Motion, Place, Plan, Sender, Sticks, Storage, Target, Telemetry, Uplink,
+};
+use afbc_onboard::parameters::Change;
+use afbc_onboard::services::modes;
+use afbc_onboard::services::origin::{Global, Origin};
+use afbc_onboard::services::streams::id;
+use afbc_onboard::{BUSY, Comms, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN, Report, Setup, Surroundings};
+use afbc_types::{Setpoint, State};
+use common::{Bench, STATION};
+use nalgebra::Vector3;
+
+const OTHER: Address = Address { system: 245, component: 190 };
+const VEHICLE: Address = Address { system: 1, component: 1 };
+const HOME: [f32; 3] = [1.0, 2.0, 0.5];
+const HERE: [f32; 3] = [10.0, -5.0, 3.0];
+
+fn at(place: [f32; 3]) -> State {
+    State { position_m: place.into(), ..State::default() }
+}
+
+fn origin() -> Origin {
+    Origin::new(Origin::SIMULATED).expect("possible")
+}
+
+/// One that knows where it is, on the earth too or not; its home is elsewhere.
+fn bench(located: bool) -> Bench {
+    let mut bench = Bench::new();
+    bench.comms = Comms::with(Setup { bytes_per_s: 1_000_000, ..Setup::default() });
+    let origin = located.then(origin);
+    bench.comms.surround(Surroundings { origin, ..Surroundings::default() });
+    for tick in 0..1200 {
+        bench.measure(&at(if tick < 1100 { HOME } else { HERE }));
+        bench.step();
+    }
+    bench
+}
+
+/// Runs a tick where it is; returns what was said.
+fn step(bench: &mut Bench) -> Vec<Downlink> {
+    bench.measure(&at(HERE));
+    bench.step().1
+}
+
+/// Returns the orders to which a command leads, and the answer, if it comes without the guidance.
+fn orders(bench: &mut Bench, command: Command) -> (Vec<Order>, Option<Answer>) {
+    // Whatever was before is done.
+    (0..5).for_each(|_| drop(step(bench)));
+    bench.hear(Uplink::Command(command));
+    let orders = bench.mail.orders.given.iter().flatten().map(|given| given.order).collect::<Vec<_>>();
+    let said = step(bench);
+    let answer = said.iter().find_map(|message| match message {
+        Downlink::Answer { answer, to: STATION, .. } => Some(*answer),
+        _ => None,
+    });
+    (orders, answer.filter(|_| bench.mail.orders.given == [None; 4]))
+}
+
+fn leads_to(bench: &mut Bench, command: Command, expected: &[Order]) {
+    let (found, _) = orders(bench, command);
+    // As text, since NaN differs from itself; places to a centimetre, which is what the wire has of degrees.
+    let rounded = |orders: &[Order]| {
+        let orders: Vec<_> = orders
+            .iter()
+            .map(|order| {
+                let to_cm = |place: Vector3<f32>| place.map(|x| (x * 50.0).round() / 50.0 + 0.0);
+                match *order {
+                    Order::GoTo { position_m, yaw_rad, speed_m_s } => {
+                        Order::GoTo { position_m: to_cm(position_m), yaw_rad, speed_m_s }
+                    }
+                    Order::Home(Some(place)) => Order::Home(Some(to_cm(place))),
+                    Order::TakeOff(Some(height)) => Order::TakeOff(Some((height * 50.0).round() / 50.0)),
+                    order => order,
+                }
+            })
+            .collect();
+        format!("{orders:?}")
+    };
+    assert_eq!(rounded(&found), rounded(expected), "{command:?}");
+}
+
+fn refused(bench: &mut Bench, command: Command, expected: Answer) {
+    assert_eq!(orders(bench, command), (vec![], Some(expected)), "{command:?}");
+}
+
+fn place(local: [f32; 3], above: Datum, metres: f32) -> Place {
+    let [latitude_e7, longitude_e7] = origin().global(&local.into()).e7();
+    Place { latitude_e7, longitude_e7, height: Height { metres, above } }
+}
+
+fn height(metres: f32, above: Datum) -> Place {
+    Place { latitude_e7: Place::AS_IT_IS, longitude_e7: Place::AS_IT_IS, height: Height { metres, above } }
+}
+
+#[test]
+fn each_command_is_its_order() {
+    let mut bench = bench(true);
+    for (metres, above, height) in [
+        (f32::NAN, Datum::Here, None),
+        (2.5, Datum::Here, Some(2.5)),
+        (4.0, Datum::Home, Some(4.0 + HOME[2] - HERE[2])),
+        (500.0, Datum::Sea, Some(500.0 - 488.0 - HERE[2])),
+    ] {
+        leads_to(&mut bench, Command::TakeOff(Height { metres, above }), &[Order::TakeOff(height)]);
+    }
+    leads_to(&mut bench, Command::Land, &[Order::Select(FlightMode::Land)]);
+    leads_to(&mut bench, Command::Return, &[Order::Select(FlightMode::Return)]);
+    for mode in FlightMode::ALL {
+        leads_to(&mut bench, Command::SelectMode(modes::custom(mode)), &[Order::Select(mode)]);
+        match modes::standard(mode) {
+            0 => refused(&mut bench, Command::SelectStandardMode(0), Answer::Denied),
+            number => leads_to(&mut bench, Command::SelectStandardMode(number), &[Order::Select(mode)]),
+        }
+    }
+    refused(&mut bench, Command::SelectMode(0x0909_0000), Answer::Denied);
+    refused(&mut bench, Command::SelectStandardMode(99), Answer::Denied);
+    leads_to(&mut bench, Command::Speed(3.5), &[Order::Speed(3.5)]);
+    leads_to(&mut bench, Command::Home(None), &[Order::Home(None)]);
+    let there = place([40.0, -30.0, 0.0], Datum::Sea, 495.0);
+    leads_to(&mut bench, Command::Home(Some(there)), &[Order::Home(Some(Vector3::new(40.0, -30.0, 7.0)))]);
+    // Home is where it was ordered from here on: 7 m high.
+    for (above, metres, z) in [(Datum::Sea, 500.0, 12.0), (Datum::Home, 5.0, 12.0)] {
+        let go =
+            Command::Reposition { place: place([40.0, -30.0, 0.0], above, metres), yaw_rad: 0.5, speed_m_s: Some(2.0) };
+        let position_m = Vector3::new(40.0, -30.0, z);
+        leads_to(&mut bench, go, &[Order::GoTo { position_m, yaw_rad: 0.5, speed_m_s: Some(2.0) }]);
+    }
+}
+
+/// Without a place on the earth only heights above what is known are known.
+#[test]
+fn without_an_origin_there_are_heights_only() {
+    let mut bench = bench(false);
+    let go = |place| Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None };
+    let unknown = Answer::Refused(NO_ORIGIN);
+    for above in [Datum::Sea, Datum::Home] {
+        refused(&mut bench, go(place([4.0, 3.0, 0.0], above, 5.0)), unknown);
+    }
+    refused(&mut bench, go(height(500.0, Datum::Sea)), unknown);
+    refused(&mut bench, Command::TakeOff(Height { metres: 500.0, above: Datum::Sea }), unknown);
+    refused(&mut bench, Command::Home(Some(place([4.0, 3.0, 0.0], Datum::Sea, 500.0))), unknown);
+    let position_m = Vector3::new(f32::NAN, f32::NAN, 5.0 + HOME[2]);
+    let order = Order::GoTo { position_m, yaw_rad: f32::NAN, speed_m_s: None };
+    leads_to(&mut bench, go(height(5.0, Datum::Home)), &[order]);
+    leads_to(&mut bench, Command::TakeOff(Height { metres: 4.0, above: Datum::Here }), &[Order::TakeOff(Some(4.0))]);
+    let order = Order::TakeOff(Some(4.0 + HOME[2] - HERE[2]));
+    leads_to(&mut bench, Command::TakeOff(Height { metres: 4.0, above: Datum::Home }), &[order]);
+}
+
+fn item(number: u16, command: u16) -> MissionItem {
+    let place = place([20.0, 10.0, 0.0], Datum::Home, 5.0);
+    let (x, y) = (place.latitude_e7, place.longitude_e7);
+    let parameters = [0.0, 0.0, 0.0, f32::NAN];
+    MissionItem { number, command, frame: 6, is_current: false, goes_on: true, parameters, x, y, z: 5.0 }
+}
+
+/// Uploads these items; returns the last acknowledgement.
+fn upload(bench: &mut Bench, items: &[MissionItem]) -> Option<MissionResult> {
+    bench.hear(Uplink::Mission(Mission::Count(items.len() as u16, Plan::MISSION)));
+    let mut result = None;
+    for _ in 0..10 * (items.len() + 1) {
+        for message in step(bench) {
+            match message {
+                Downlink::Mission { message: Mission::Request(number, _), to: STATION } => {
+                    bench.hear(Uplink::Mission(Mission::Item(items[usize::from(number)], Plan::MISSION)));
+                }
+                Downlink::Mission { message: Mission::Ack(told, _), to: STATION } => result = Some(told),
+                _ => (),
+            }
+        }
+    }
+    result
+}
+
+#[test]
+fn missions_begin_and_go_on_at_items_that_there_are() {
+    let mut bench = bench(true);
+    let none = Answer::Refused(Declined::NoMission as i32);
+    refused(&mut bench, Command::StartMission(0), none);
+    refused(&mut bench, Command::SetCurrent(0), none);
+    assert!(!bench.comms.has_mail());
+    assert_eq!(upload(&mut bench, &[item(0, 16), item(1, 16)]), Some(MissionResult::ACCEPTED));
+    let select = Order::Select(FlightMode::Mission);
+    leads_to(&mut bench, Command::StartMission(0), &[select]);
+    leads_to(&mut bench, Command::StartMission(1), &[Order::Resume(1), select]);
+    leads_to(&mut bench, Command::SetCurrent(1), &[Order::Resume(1)]);
+    leads_to(&mut bench, Command::SetCurrent(0), &[Order::Resume(0)]);
+    refused(&mut bench, Command::StartMission(2), none);
+    refused(&mut bench, Command::SetCurrent(2), none);
+}
+
+/// The guidance is handed the item that it wants, once; then there is no mail without bytes.
+#[test]
+fn the_wanted_item_is_handed_over_once() {
+    let mut bench = bench(true);
+    assert_eq!((bench.comms.has_mail(), bench.mail.orders.leg), (false, None));
+    assert_eq!(upload(&mut bench, &[item(0, 22), item(1, 21)]), Some(MissionResult::ACCEPTED));
+    let legs = |bench: &mut Bench| {
+        let mail = bench.comms.receive(&[]);
+        bench.mail.post(&mail);
+        mail.orders.leg
+    };
+    // Handed over with the state that came after the upload.
+    assert_eq!((bench.comms.has_mail(), legs(&mut bench)), (false, None));
+    bench.hear(Uplink::Command(Command::SetCurrent(1)));
+    bench.step();
+    assert!(bench.comms.has_mail(), "it wants the other one");
+    let leg = legs(&mut bench).expect("handed over");
+    assert_eq!((leg.number, leg.is_last), (1, true));
+    assert_eq!((bench.comms.has_mail(), legs(&mut bench)), (false, None));
+    let current = bench.comms_current();
+    assert_eq!((current.number, current.total, current.state, current.mode), (1, 2, 4, 2));
+}
+
+trait Current {
+    fn comms_current(&mut self) -> afbc_link::MissionCurrent;
+}
+
+impl Current for Bench {
+    /// MISSION_CURRENT, on request.
+    fn comms_current(&mut self) -> afbc_link::MissionCurrent {
+        self.hear(Uplink::Command(Command::RequestMessage { message: id::MISSION_CURRENT, index: 0 }));
+        let said = step(self);
+        let current = said.iter().find_map(|message| match message {
+            Downlink::Mission { message: Mission::Current(current), .. } => Some(*current),
+            _ => None,
+        });
+        current.expect("sent")
+    }
+}
+
+/// Only the station in control orders; anyone asks, and stops the motors.
+#[test]
+fn orders_are_for_the_station_in_control() {
+    let mut bench = bench(true);
+    leads_to(&mut bench, Command::Speed(2.0), &[Order::Speed(2.0)]);
+    let mut told = |command| {
+        bench.hear_from(OTHER, Uplink::Command(command));
+        assert_eq!(bench.mail.orders.given, [None; 4]);
+        let said = step(&mut bench);
+        said.into_iter().find_map(|message| match message {
+            Downlink::Answer { answer, to: OTHER, .. } => Some(answer),
+            _ => None,
+        })
+    };
+    for command in [
+        Command::Land,
+        Command::Return,
+        Command::Speed(1.0),
+        Command::Home(None),
+        Command::SelectMode(0x0304_0000),
+        Command::SelectStandardMode(7),
+        Command::StartMission(0),
+        Command::SetCurrent(0),
+        Command::Reboot,
+        Command::Arm,
+        Command::Engage,
+        Command::Storage(Storage::Reset),
+        Command::TakeOff(Height { metres: 2.0, above: Datum::Here }),
+    ] {
+        assert_eq!(told(command), Some(Answer::Refused(NOT_IN_CONTROL)), "{command:?}");
+    }
+    for command in [Command::Disarm, Command::Kill, Command::CheckArming, Command::RequestProtocol] {
+        assert_eq!(told(command), Some(Answer::Accepted), "{command:?}");
+    }
+    assert_eq!([Command::Denied(178), Command::Other(9)].map(told), [Some(Answer::Denied), Some(Answer::Unsupported)]);
+}
+
+/// What comes back of its own is not heard.
+#[test]
+fn its_own_messages_are_not_heard() {
+    let mut bench = bench(true);
+    bench.hear_from(VEHICLE, Uplink::Command(Command::Other(60_000)));
+    let said = step(&mut bench);
+    assert!(!said.iter().any(|message| matches!(message, Downlink::Answer { .. })), "{said:?}");
+}
+
+#[test]
+fn messages_on_request_are_sent_or_refused_with_the_reason() {
+    let mut bench = bench(true);
+    let ask = |bench: &mut Bench, message, index| {
+        let (none, answer) = orders(bench, Command::RequestMessage { message, index });
+        assert_eq!(none, []);
+        answer.expect("answered")
+    };
+    for index in 0..=u32::from(modes::COUNT) {
+        assert_eq!(ask(&mut bench, id::AVAILABLE_MODES, index), Answer::Accepted);
+    }
+    assert_eq!(ask(&mut bench, id::AVAILABLE_MODES, u32::from(modes::COUNT) + 1), Answer::Denied);
+    assert_eq!(ask(&mut bench, 9_999, 0), Answer::Unsupported);
+    assert_eq!(ask(&mut bench, id::BATTERY_STATUS, 0), Answer::Refused(NOT_KNOWN));
+    let battery = Battery { voltage_mv: 11_100, current_ca: -1, remaining_percent: -1, consumed_mah: -1, charge: 0 };
+    bench.comms.surround(Surroundings { battery: Some(battery), origin: Some(origin()), ..Surroundings::default() });
+    assert_eq!(ask(&mut bench, id::BATTERY_STATUS, 0), Answer::Accepted);
+    // Each mode, in its place, when all are asked for.
+    (0..20).for_each(|_| drop(step(&mut bench)));
+    bench.hear(Uplink::Command(Command::RequestMessage { message: id::AVAILABLE_MODES, index: 0 }));
+    let places: Vec<_> = (0..20)
+        .flat_map(|_| step(&mut bench))
+        .filter_map(|message| match message {
+            Downlink::AvailableMode(mode) => Some(mode.place),
+            _ => None,
+        })
+        .collect();
+    assert!(places.iter().copied().eq(1..=modes::COUNT), "{places:?}");
+    // Both commands of their own.
+    for (command, is_it) in [
+        (Command::RequestProtocol, (|it| *it == Telemetry::Protocol) as fn(&Telemetry) -> bool),
+        (Command::RequestCapabilities, |it| matches!(it, Telemetry::Version(_))),
+    ] {
+        bench.hear(Uplink::Command(command));
+        let said: Vec<_> = (0..5).flat_map(|_| step(&mut bench)).collect();
+        let sent = said.iter().any(|message| matches!(message, Downlink::Telemetry(it) if is_it(it)));
+        assert!(sent, "{command:?}: {said:?}");
+    }
+    // More than there is room for.
+    for _ in 0..40 {
+        bench.hear(Uplink::Command(Command::RequestProtocol));
+    }
+    let said: Vec<_> = (0..30).flat_map(|_| step(&mut bench)).collect();
+    let count = |wanted: Answer| {
+        said.iter()
+            .filter(|it| matches!(it, Downlink::Answer { command: 519, answer, .. } if *answer == wanted))
+            .count()
+    };
+    assert_eq!((count(Answer::Accepted), count(Answer::Refused(BUSY))), (16, 16));
+}
+
+#[test]
+fn intervals_are_set_and_told_on_the_wire() {
+    let mut bench = bench(true);
+    let set = |message, interval_us| Command::SetInterval { message, interval_us };
+    refused(&mut bench, set(id::ATTITUDE, 5_000), Answer::Accepted);
+    refused(&mut bench, set(9_999, 5_000), Answer::Unsupported);
+    for (message, expected) in [(id::ATTITUDE, 5_000), (9_999, 0), (id::GPS_GLOBAL_ORIGIN, -1)] {
+        bench.hear(Uplink::Command(Command::GetInterval(message)));
+        let said: Vec<_> = (0..3).flat_map(|_| step(&mut bench)).collect();
+        let interval = said.iter().find_map(|it| match it {
+            Downlink::Interval(interval) => Some((interval.message, interval.interval_us)),
+            _ => None,
+        });
+        assert_eq!(interval, Some((message, expected)));
+    }
+}
+
+#[test]
+fn it_reboots_where_it_can_and_disarmed_only() {
+    let mut plain = bench(true);
+    refused(&mut plain, Command::Reboot, Answer::Unsupported);
+    assert!(!plain.comms.wants_reboot());
+    for armed in [false, true] {
+        let mut bench = if armed { Bench::flying() } else { Bench::new() };
+        bench.comms = Comms::with(Setup { reboots: true, ..Setup::default() });
+        bench.step();
+        bench.hear(Uplink::Command(Command::Reboot));
+        let said = bench.step().1;
+        let expected = if armed { Answer::Refused(Refusal::AlreadyArmed as i32) } else { Answer::Accepted };
+        let told = said.iter().any(|it| matches!(it, Downlink::Answer { answer, .. } if *answer == expected));
+        assert!(told && bench.comms.wants_reboot() != armed, "{said:?}");
+    }
+}
+
+#[test]
+fn stored_parameters_are_restored_disarmed_only() {
+    let mut disarmed = bench(true);
+    for (storage, changes) in [(Storage::Load, 0), (Storage::Save, 0), (Storage::Reset, 1)] {
+        refused(&mut disarmed, Command::Storage(storage), Answer::Accepted);
+        assert_eq!(disarmed.changes.len(), changes);
+    }
+    assert_eq!(disarmed.changes, [Change::Restored]);
+    let mut armed = Bench::flying();
+    armed.hear(Uplink::Command(Command::Storage(Storage::Reset)));
+    let said = armed.tick(&State::default()).1;
+    let refusal = Answer::Refused(Refusal::AlreadyArmed as i32);
+    assert!(said.iter().any(|it| matches!(it, Downlink::Answer { answer, .. } if *answer == refusal)), "{said:?}");
+    assert_eq!(armed.changes, []);
+}
+
+/// Targets in every frame, and sticks; from the station in control alone.
+#[test]
+fn targets_and_sticks_reach_the_guidance() {
+    let nan = Vector3::from_element(f32::NAN);
+    let motion = |axes, position_m: Vector3<f32>, velocity_m_s: Vector3<f32>| Motion {
+        axes,
+        position_m,
+        velocity_m_s,
+        acceleration_m_s2: nan,
+        yaw_rad: 0.25,
+        yaw_rate_rad_s: f32::NAN,
+    };
+    let (step_m, fast) = (Vector3::new(2.0, -3.0, 1.0), Vector3::new(0.5, 0.25, -0.125));
+    let mut bench = bench(true);
+    let mut told = |from: Address, message: Uplink| {
+        bench.hear_from(from, message);
+        let target = bench.mail.orders.target.map(|target| target.value);
+        let sticks = bench.mail.orders.sticks.map(|sticks| sticks.value);
+        step(&mut bench);
+        (target, sticks)
+    };
+    for (axes, position_m, velocity_m_s, flown_m, body) in [
+        (Axes::Local, step_m, fast, step_m, false),
+        (Axes::Offset, step_m, fast, Vector3::from(HERE) + step_m, false),
+        (Axes::Body, nan, fast, nan, true),
+        (Axes::Body, step_m, nan, step_m, false),
+        (Axes::BodyOffset, step_m, nan, step_m, true),
+    ] {
+        let (target, _) = told(STATION, Uplink::Target(Target::Motion(motion(axes, position_m, velocity_m_s))));
+        let Some(afbc_guidance::Target::Motion(target)) = target else { panic!("{axes:?}: {target:?}") };
+        let found = (target.position_m, target.velocity_m_s, target.yaw_rad, target.body);
+        assert_eq!(format!("{found:?}"), format!("{:?}", (flown_m, velocity_m_s, 0.25, body)), "{axes:?}");
+    }
+    let there = place([40.0, -30.0, 0.0], Datum::Sea, 500.0);
+    let (target, _) = told(STATION, Uplink::Target(Target::Place(there, motion(Axes::Local, nan, fast))));
+    let Some(afbc_guidance::Target::Motion(target)) = target else { panic!("{target:?}") };
+    assert!((target.position_m - Vector3::new(40.0, -30.0, 12.0)).norm() < 0.02, "{target:?}");
+    assert_eq!((target.velocity_m_s, target.body), (fast, false));
+    let attitude = AttitudeAndThrust { attitude: [0.6, 0.8, 0.0, 0.0], yaw_rate_rad_s: 0.5, thrust: 0.25 };
+    let (target, _) = told(STATION, Uplink::Target(Target::Attitude(attitude)));
+    let Some(afbc_guidance::Target::Attitude(target)) = target else { panic!("{target:?}") };
+    assert_eq!((target.yaw_rate_rad_s, target.thrust), (0.5, 0.25));
+    assert!((target.attitude.w - 0.6).abs() < 1e-6 && (target.attitude.i.abs() - 0.8).abs() < 1e-6);
+    let sticks = Sticks { roll: 0.1, pitch: -0.2, throttle: 0.3, yaw: -0.4 };
+    let (target, told_sticks) = told(STATION, Uplink::Target(Target::Sticks(sticks)));
+    assert_eq!(target, None);
+    let found = told_sticks.expect("sticks");
+    for (found, sent) in [(found.roll, 0.1), (found.pitch, -0.2), (found.throttle, 0.3), (found.yaw, -0.4)] {
+        assert!((found - sent).abs() < 1e-2, "{found} {sent}");
+    }
+    // Another one's are not.
+    assert_eq!(told(OTHER, Uplink::Target(Target::Sticks(sticks))), (None, None));
+    assert_eq!(told(OTHER, Uplink::Setpoint(Setpoint::default())), (None, None));
+}
+
+/// An offset from where the vehicle is needs to know where it is.
+#[test]
+fn an_offset_from_nowhere_is_no_target() {
+    let mut bench = Bench::new();
+    bench.step();
+    let nan = Vector3::from_element(f32::NAN);
+    for (axes, taken) in [(Axes::Offset, false), (Axes::Local, true)] {
+        let motion = Motion {
+            axes,
+            position_m: Vector3::new(1.0, 2.0, 3.0),
+            velocity_m_s: nan,
+            acceleration_m_s2: nan,
+            yaw_rad: f32::NAN,
+            yaw_rate_rad_s: f32::NAN,
+        };
+        bench.hear(Uplink::Target(Target::Motion(motion)));
+        assert_eq!(bench.mail.orders.target.is_some(), taken, "{axes:?}");
+    }
+}
+
+/// The guidance hears twenty times per second that the station in control is there, and of no other.
+#[test]
+fn the_guidance_hears_of_the_station_in_control() {
+    let mut bench = bench(true);
+    leads_to(&mut bench, Command::Speed(2.0), &[Order::Speed(2.0)]);
+    let mut heard = |from: Address| {
+        let mut times = Vec::new();
+        for _ in 0..1000 {
+            bench.hear_from(from, Uplink::Heartbeat);
+            times.extend(bench.mail.orders.heard_us);
+            step(&mut bench);
+        }
+        times
+    };
+    let times = heard(STATION);
+    assert!((18..=20).contains(&times.len()), "{times:?}");
+    assert!(times.windows(2).all(|pair| pair[1] - pair[0] >= 50_000), "{times:?}");
+    assert_eq!(heard(OTHER), [0; 0]);
+}
+
+/// HEARTBEAT comes once per second, also over many seconds.
+#[test]
+fn heartbeats_come_once_per_second() {
+    let mut bench = Bench::new();
+    let beats: Vec<_> = (1..=3500_u32)
+        .filter(|_| bench.step().1.iter().any(|message| matches!(message, Downlink::Heartbeat { .. })))
+        .collect();
+    assert_eq!(beats, [3, 1003, 2003, 3003]);
+}
+
+/// DEBUG_FLOAT_ARRAY "health" tells what the tick took at most, what was dropped, and what was not answered.
+#[test]
+fn health_tells_counts_and_times() {
+    let mut bench = Bench::new();
+    let health = |bench: &mut Bench, cycles: u32| {
+        let mut decoder = afbc_link::Decoder::<Downlink>::new(STATION);
+        bench.hear(Uplink::Command(Command::RequestMessage { message: id::DEBUG_FLOAT_ARRAY, index: 0 }));
+        bench.now_us += 1000;
+        bench.mail.take_into(&mut bench.taken);
+        let report: Report = bench.flight.tick(bench.now_us, &mut bench.taken, &afbc_onboard::Readings::NONE);
+        let mut told = None;
+        bench.comms.report(&report, cycles, |bytes| {
+            decoder.feed(bytes, |_, message| {
+                if let Downlink::Health(health) = message {
+                    told = Some(health);
+                }
+            });
+        });
+        told.expect("sent")
+    };
+    let first = health(&mut bench, 168_000);
+    assert_eq!((first.tick_us, first.tick_max_us, bench.comms.bad_frames()), (1000.0, 1000.0, 0));
+    let second = health(&mut bench, 16_800);
+    assert_eq!((second.tick_us, second.tick_max_us), (100.0, 1000.0));
+    // A frame that is damaged, and one of an unknown message.
+    let mut frame = [0; FRAME_MAX];
+    let mut bytes = Sender::new(STATION).send(&Uplink::Heartbeat, &mut frame).to_vec();
+    bytes[12] ^= 1;
+    bench.hear_bytes(&bytes);
+    bench.hear_bytes(&[0; 300]);
+    assert_eq!(bench.comms.bad_frames(), 1);
+    bench.step();
+    bench.hear(Uplink::Command(Command::RequestMessage { message: id::SYS_STATUS, index: 0 }));
+    let said = bench.step().1;
+    let dropped = said.iter().find_map(|it| match it {
+        Downlink::Telemetry(Telemetry::System(system)) => Some(system.dropped_frames),
+        _ => None,
+    });
+    assert_eq!(dropped, Some(1));
+}
+
+/// What a shell says is told, and the battery that it measures reaches the guidance in volts and amperes.
+#[test]
+fn what_the_shell_says_is_told() {
+    let mut bench = bench(true);
+    bench.comms.warn("flash is worn");
+    let said = step(&mut bench);
+    let told = |it: &Downlink| matches!(it, Downlink::Text { text, .. } if text.to_str() == Ok("flash is worn"));
+    assert!(said.iter().any(told), "{said:?}");
+    for (current_ca, current_a) in [(1250, 12.5), (-1, 0.0)] {
+        let battery = Battery { voltage_mv: 11_100, current_ca, remaining_percent: -1, consumed_mah: -1, charge: 0 };
+        bench.comms.surround(Surroundings { battery: Some(battery), ..Surroundings::default() });
+        let reading = bench.comms.receive(&[]).battery.expect("measured");
+        assert!((reading.voltage_v - 11.1).abs() < 1e-5 && (reading.current_a - current_a).abs() < 1e-5, "{reading:?}");
+    }
+}
+
+/// An item that is reached is announced to everyone, and MISSION_CURRENT tells how far the mission is.
+#[test]
+fn a_mission_tells_how_far_it_is() {
+    let mut bench = bench(true);
+    let state = |bench: &mut Bench| {
+        let current = bench.comms_current();
+        (current.total, current.state, current.mode)
+    };
+    assert_eq!(state(&mut bench), (0, 1, 2), "no mission");
+    assert_eq!(upload(&mut bench, &[item(0, 16), item(1, 16)]), Some(MissionResult::ACCEPTED));
+    assert_eq!(state(&mut bench), (2, 4, 2), "it waits");
+    let (mut report, _) = bench.step();
+    (report.guided.mode, report.guided.wanted, report.mode) = (FlightMode::Mission, 1, afbc_flight_core::Mode::Flying);
+    report.guided.reached = Some(0);
+    let said = bench.said(&report);
+    let reached = |said: &[Downlink], number| {
+        said.iter().any(|it| matches!(it, Downlink::Mission { message: Mission::Reached(told), .. } if *told == number))
+    };
+    assert!(reached(&said, 0), "{said:?}");
+    let current = |bench: &mut Bench, report: &Report| {
+        bench.hear(Uplink::Command(Command::RequestMessage { message: id::MISSION_CURRENT, index: 0 }));
+        let said = bench.said(report);
+        let current = said.iter().find_map(|it| match it {
+            Downlink::Mission { message: Mission::Current(it), .. } => Some((it.number, it.state, it.mode)),
+            _ => None,
+        });
+        current.expect("sent")
+    };
+    report.guided.reached = None;
+    assert_eq!(current(&mut bench, &report), (1, 3, 1), "it flies");
+    report.guided.reached = Some(1);
+    assert!(reached(&bench.said(&report), 1));
+    (report.guided.reached, report.guided.mode) = (None, FlightMode::Hold);
+    assert_eq!(current(&mut bench, &report), (1, 5, 2), "it is done");
+    (report.guided.mode, report.mode) = (FlightMode::Mission, afbc_flight_core::Mode::Disarmed);
+    assert_eq!(current(&mut bench, &report), (1, 5, 2), "on the ground it does not fly");
+}
+
+/// A place of the wire is nowhere else than where it is: as a check of the test itself.
+#[test]
+fn places_of_the_test_are_where_they_say() {
+    let Place { latitude_e7, longitude_e7, .. } = place([40.0, -30.0, 0.0], Datum::Sea, 0.0);
+    let back = origin().local(&Global::of_e7([latitude_e7, longitude_e7], 488.0));
+    assert!((back - Vector3::new(40.0, -30.0, 0.0)).norm() < 0.02, "{back}");
+}
