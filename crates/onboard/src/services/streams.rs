@@ -329,4 +329,100 @@ mod tests {
         assert_eq!(streams.interval_us(id::GLOBAL_POSITION_INT), -1);
         assert_eq!(streams.interval_us(id::VFR_HUD), 250_000);
     }
+
+    /// Each group sets its own messages and no other, to the rate that is asked for.
+    #[test]
+    fn each_group_has_its_messages() {
+        use id::*;
+        let groups: [(u8, &[u32]); 6] = [
+            (
+                0,
+                &[
+                    SYS_STATUS,
+                    GPS_RAW_INT,
+                    ATTITUDE,
+                    LOCAL_POSITION_NED,
+                    GLOBAL_POSITION_INT,
+                    VFR_HUD,
+                    EXTENDED_SYS_STATE,
+                ],
+            ),
+            (2, &[SYS_STATUS, BATTERY_STATUS, GPS_RAW_INT, MISSION_CURRENT]),
+            (6, &[LOCAL_POSITION_NED, GLOBAL_POSITION_INT]),
+            (10, &[ATTITUDE, ATTITUDE_QUATERNION]),
+            (11, &[VFR_HUD]),
+            (12, &[EXTENDED_SYS_STATE, ESTIMATOR_STATUS, ACTUATOR_OUTPUT_STATUS]),
+        ];
+        for group in 0..=20 {
+            let messages = groups.iter().find(|(other, _)| *other == group).map_or(&[][..], |(_, messages)| messages);
+            let mut streams = Streams::new(1_000_000);
+            let told = streams.set_group(DataStream { group, rate_hz: 7 }, 0);
+            assert_eq!(told.rate_hz, if messages.is_empty() { 0 } else { 7 });
+            for (message, default_us) in DEFAULTS {
+                let expected = if messages.contains(&message) { 142_857 } else { default_us as i32 };
+                let expected = if expected == 0 { -1 } else { expected };
+                assert_eq!(streams.interval_us(message), expected, "group {group}, message {message}");
+            }
+        }
+    }
+
+    /// What is sent is taken from the budget, which grows with the time up to its burst; 5/9 remain beside rotors.
+    #[test]
+    fn the_budget_is_what_the_link_carries() {
+        let mut streams = Streams::new(9_000);
+        assert!(streams.set(id::HIL_ACTUATOR_CONTROLS, 1000, 0));
+        assert_eq!((streams.bytes_per_s(), streams.interval_us(id::HIL_ACTUATOR_CONTROLS)), (5_000, 1_000));
+        assert!(streams.set(id::HIL_ACTUATOR_CONTROLS, 0, 0) && !streams.rotors());
+        assert_eq!(streams.bytes_per_s(), 9_000);
+        for spent in [0, 299, 300, 301, 599, 600, 601] {
+            let mut streams = Streams::new(9_000);
+            streams.spend(spent);
+            assert_eq!(streams.has_room(), spent < 600, "{spent}");
+            assert_eq!(streams.next(1_000_000).is_some(), spent < 300, "{spent}");
+        }
+        // 9 bytes come back per tick, and never more than 300 are there.
+        let mut streams = Streams::new(9_000);
+        streams.spend(300);
+        (0..10).for_each(|_| streams.tick());
+        streams.spend(89);
+        assert!(streams.next(1_000_000).is_some());
+        streams.spend(1);
+        assert!(streams.next(1_000_000).is_none());
+        (0..1000).for_each(|_| streams.tick());
+        streams.spend(300);
+        assert!(streams.next(1_000_000).is_none());
+    }
+
+    /// A stream that is late keeps no more than one message waiting, and one on time keeps its phase.
+    #[test]
+    fn phases_are_kept_and_gaps_are_not_made_up_for() {
+        let mut streams = Streams::new(1_000_000);
+        for (message, _) in DEFAULTS {
+            assert!(streams.set(message, if message == id::ATTITUDE { 10_000 } else { -1 }, 0));
+        }
+        let mut sent = std::vec::Vec::new();
+        for now_us in (0..60_000).step_by(1_000).filter(|now_us| !(25_000..47_000).contains(now_us)) {
+            while streams.next(now_us).is_some() {
+                sent.push(now_us);
+            }
+        }
+        assert_eq!(sent, [4_000, 14_000, 24_000, 47_000, 57_000]);
+        // A shorter interval counts at once, a longer one from the next message on.
+        assert!(streams.set(id::ATTITUDE, 2_000, 57_000));
+        assert_eq!([58_000, 59_000, 60_000].map(|now_us| streams.next(now_us).is_some()), [false, true, false]);
+    }
+
+    /// A message may be known and yet not be streamed; the first request goes before all others.
+    #[test]
+    fn what_can_be_requested_is_known() {
+        for message in 0..500 {
+            let known = DEFAULTS.iter().any(|(other, _)| *other == message) || [0, 148, 300, 435].contains(&message);
+            assert_eq!(Streams::knows(message), known, "{message}");
+        }
+        let mut streams = Streams::new(1_000_000);
+        let [first, second] = [0, 1].map(|index| Requested { message: id::AVAILABLE_MODES, index });
+        assert!(streams.request(first));
+        streams.request_first(second);
+        assert_eq!([streams.next(0), streams.next(0)], [Some(second), Some(first)]);
+    }
 }

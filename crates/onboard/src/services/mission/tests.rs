@@ -188,3 +188,236 @@ fn the_guidance_gets_items_in_the_local_frame() {
     assert!(matches!(leg(3, None), Some((Item::Land { position_m }, true)) if position_m.x.is_nan()));
     assert_eq!((leg(1, None), leg(4, Some(&origin))), (None, None));
 }
+
+/// What is just within each limit is taken, and what is just beyond it is not, with the number that is wrong.
+#[test]
+fn items_reach_up_to_their_limits() {
+    const OK: Option<MissionResult> = None;
+    let (x, y, z) = (Some(MissionResult::INVALID_X), Some(MissionResult::INVALID_Y), Some(MissionResult::INVALID_Z));
+    let (first, second, fourth) = (Some(MissionResult(6)), Some(MissionResult(7)), Some(MissionResult(9)));
+    let good = waypoint(0);
+    let with = |first, second, fourth| MissionItem { parameters: [first, second, 0.0, fourth], ..good };
+    let (loiter, land, take_off) = (19, 21, 22);
+    let speed = |kind, speed| MissionItem { command: 178, frame: 99, parameters: [kind, speed, 0.0, 0.0], ..good };
+    for (item, expected) in [
+        (MissionItem { x: 900_000_000, y: -1_800_000_000, z: 1e5, ..good }, OK),
+        (MissionItem { x: -900_000_000, y: 1_800_000_000, z: -1e5, ..good }, OK),
+        (MissionItem { x: -900_000_001, ..good }, x),
+        (MissionItem { y: 1_800_000_001, ..good }, y),
+        (MissionItem { z: 100_001.0, ..good }, z),
+        (MissionItem { z: -100_001.0, ..good }, z),
+        (with(3600.0, 1000.0, 3600.0), OK),
+        (with(0.0, 0.0, -3600.0), OK),
+        (with(f32::NAN, f32::NAN, f32::NAN), OK),
+        (with(3600.5, 0.0, 0.0), first),
+        (with(-0.5, 0.0, 0.0), first),
+        (with(0.0, 1000.5, 0.0), second),
+        (with(0.0, -0.5, 0.0), second),
+        (with(0.0, 0.0, 3600.5), fourth),
+        (with(0.0, 0.0, -3600.5), fourth),
+        // The second one of a stay is no radius; its time and heading count.
+        (MissionItem { command: loiter, ..with(0.0, -7.0, 0.0) }, OK),
+        (MissionItem { command: loiter, ..with(3601.0, 0.0, 0.0) }, first),
+        (MissionItem { command: loiter, ..with(0.0, 0.0, 1e9) }, fourth),
+        // A landing is where the vehicle is, or somewhere; its height does not matter, nor do its numbers.
+        (MissionItem { command: land, x: 0, y: 0, z: f32::NAN, ..with(-1.0, -1.0, 1e9) }, OK),
+        (MissionItem { command: land, z: f32::NAN, ..good }, OK),
+        (MissionItem { command: land, z: 2e5, ..good }, z),
+        (MissionItem { command: land, x: i32::MAX, ..good }, x),
+        (MissionItem { command: land, x: 0, y: i32::MAX, ..good }, y),
+        (MissionItem { command: land, x: i32::MAX, y: 0, ..good }, x),
+        // A take-off is here: its place does not count, its height does.
+        (MissionItem { command: take_off, x: i32::MAX, y: i32::MIN, ..with(-1.0, -1.0, 1e9) }, OK),
+        (MissionItem { command: take_off, z: f32::NAN, ..good }, z),
+        (MissionItem { command: 20, frame: 99, x: i32::MAX, z: f32::NAN, ..good }, OK),
+        (speed(0.0, 1000.0), OK),
+        (speed(1.0, 0.5), OK),
+        (speed(1.0, -1.0), OK),
+        (speed(1.0, -2.0), second),
+        (speed(0.0, 0.0), second),
+        (speed(0.0, 1000.5), second),
+        (speed(0.0, f32::NAN), second),
+        (speed(2.0, 5.0), first),
+    ] {
+        assert_eq!(check(&item).err().map(|invalid| invalid.result), expected, "{item:?}");
+    }
+    for frame in 0..=u8::MAX {
+        let known = [0, 1, 3, 5, 6].contains(&frame);
+        for command in [16, 19, 21, 22] {
+            let result = check(&MissionItem { frame, command, ..good }).map_err(|invalid| invalid.result);
+            assert_eq!(result, if known { Ok(()) } else { Err(MissionResult::UNSUPPORTED_FRAME) }, "{frame}");
+        }
+    }
+    for command in 0..1000 {
+        let known = [16, 19, 20, 21, 22, 178].contains(&command);
+        let item = MissionItem { command, parameters: [1.0, 1.0, 0.0, 0.0], ..good };
+        assert_eq!(check(&item).is_ok(), known, "{command}");
+    }
+}
+
+/// Each command is an item of the guidance, with its numbers; what is not given is zero, a heading is to the right.
+#[test]
+fn each_item_is_one_of_the_guidance() {
+    let origin = Origin::new(Origin::SIMULATED).expect("possible");
+    let place = |x: f32, y: f32| {
+        let [x, y] = origin.global(&nalgebra::Vector3::new(x, y, 0.0)).e7();
+        MissionItem { x, y, z: 7.0, frame: 3, ..waypoint(0) }
+    };
+    let there = |item: &MissionItem| to_guidance(item, Some(&origin), 2.0);
+    let near = |found: nalgebra::Vector3<f32>, x: f32, y: f32, z: f32| {
+        assert!((found - nalgebra::Vector3::new(x, y, z)).norm() < 0.02, "{found}");
+    };
+    let full = MissionItem { parameters: [12.0, 3.0, 0.0, 90.0], ..place(30.0, -20.0) };
+    let Some(Item::Waypoint { position_m, yaw_rad, hold_s, within_m, fly_through }) = there(&full) else {
+        panic!("no waypoint")
+    };
+    near(position_m, 30.0, -20.0, 9.0);
+    assert!((yaw_rad + core::f32::consts::FRAC_PI_2).abs() < 1e-6, "{yaw_rad}");
+    assert_eq!((hold_s, within_m, fly_through), (12.0, 3.0, false));
+    let bare = MissionItem { parameters: [f32::NAN; 4], ..place(30.0, -20.0) };
+    let Some(Item::Waypoint { yaw_rad, hold_s, within_m, .. }) = there(&bare) else { panic!("no waypoint") };
+    assert!(yaw_rad.is_nan() && hold_s == 0.0 && within_m == 0.0);
+    let Some(Item::Waypoint { position_m, yaw_rad, hold_s, within_m, fly_through }) =
+        there(&MissionItem { command: 19, ..full })
+    else {
+        panic!("no stay")
+    };
+    near(position_m, 30.0, -20.0, 9.0);
+    assert!(yaw_rad.is_nan());
+    assert_eq!((hold_s, within_m, fly_through), (12.0, 0.0, false));
+    let Some(Item::Land { position_m }) = there(&MissionItem { command: 21, ..full }) else { panic!("no landing") };
+    near(position_m, 30.0, -20.0, 9.0);
+    for (x, y, here) in [(0, 0, true), (0, full.y, false), (full.x, 0, false)] {
+        let Some(Item::Land { position_m }) = there(&MissionItem { command: 21, x, y, ..full }) else {
+            panic!("no landing")
+        };
+        assert_eq!(position_m.x.is_nan(), here, "{x} {y}");
+    }
+    let Some(Item::TakeOff { height_m }) = there(&MissionItem { command: 22, ..full }) else { panic!("no take-off") };
+    assert!((height_m - 9.0).abs() < 1e-3);
+    // Above the sea: the origin is at 488 m.
+    let above = MissionItem { command: 22, frame: 5, z: 500.0, ..full };
+    assert_eq!(there(&above), Some(Item::TakeOff { height_m: 12.0 }));
+    assert_eq!(there(&MissionItem { command: 20, ..full }), Some(Item::Return));
+    let speed = MissionItem { command: 178, parameters: [1.0, 4.5, 0.0, 0.0], ..full };
+    assert_eq!(there(&speed), Some(Item::Speed(4.5)));
+    assert_eq!(there(&MissionItem { command: 205, ..full }), None);
+    assert_eq!(there(&MissionItem { frame: 99, ..full }), None);
+    // Without an origin there are no places on the earth, but a landing here, a return and a speed.
+    for (command, known) in [(16, false), (19, false), (21, false), (22, false), (20, true), (178, true)] {
+        assert_eq!(to_guidance(&MissionItem { command, ..full }, None, 0.0).is_some(), known, "{command}");
+    }
+}
+
+/// MISSION_STATE: 1 no mission, 2 not begun, 3 flies, 4 paused, 5 done.
+#[test]
+fn the_state_of_a_mission_is_told() {
+    let mut missions = Missions::default();
+    let state = |missions: &Missions, item, reached, flies| {
+        let MissionCurrent { number, total, state, mode } = missions.current(item, reached, flies);
+        (number, total, state, mode)
+    };
+    assert_eq!(state(&missions, Some(0), None, false), (0, 0, 1, 2));
+    assert_eq!(state(&missions, Some(3), Some(2), true), (3, 0, 1, 1));
+    upload(&mut missions, &[waypoint(0), waypoint(1), waypoint(2)]);
+    assert_eq!(state(&missions, None, None, false), (0, 3, 2, 2));
+    assert_eq!(state(&missions, Some(1), Some(0), true), (1, 3, 3, 1));
+    assert_eq!(state(&missions, Some(1), Some(0), false), (1, 3, 4, 2));
+    assert_eq!(state(&missions, Some(2), Some(2), false), (2, 3, 5, 2));
+    assert_eq!(state(&missions, Some(2), Some(2), true), (2, 3, 3, 1));
+    // Each upload has a number of its own, and so has each item: the guidance takes a new one for another.
+    let leg = missions.leg(1, None, 0.0);
+    assert_eq!(leg, None, "its place is not known");
+    let local = MissionItem { frame: 1, x: 10_000, y: 20_000, z: -3.0, ..waypoint(0) };
+    upload(&mut missions, &[local, MissionItem { number: 1, ..local }]);
+    let legs = [0, 1, 2].map(|number| missions.leg(number, None, 0.0).map(|leg| (leg.number, leg.upload, leg.is_last)));
+    assert_eq!(legs, [Some((0, 2, false)), Some((1, 2, true)), None]);
+}
+
+/// Each kind of plan, from who may and who may not: what is asked, begun, cleared and chosen.
+#[test]
+fn every_message_is_answered_by_what_it_is_about() {
+    for plan in [0, 1, 2, 3, 99, 255].map(Plan) {
+        let mut missions = Missions::default();
+        upload(&mut missions, &[waypoint(0), waypoint(1)]);
+        let mut ask = |message, may| {
+            let heard = missions.hear(message, A, may, 0);
+            (said(&mut missions), heard, missions.items().len())
+        };
+        let ack = |result| std::vec![(Mission::Ack(result, plan), A)];
+        let is_mission = plan == Plan::MISSION;
+        let (told, heard, _) = ask(Mission::List(plan), false);
+        assert_eq!(
+            (told, heard),
+            (std::vec![(Mission::Count(if is_mission { 2 } else { 0 }, plan), A)], Heard::default())
+        );
+        let (told, ..) = ask(Mission::Request(1, plan), false);
+        let is_item = matches!(told[..], [(Mission::Item(MissionItem { number: 1, .. }, told), A)] if told == plan);
+        assert!(is_item == is_mission && (is_mission || told == ack(MissionResult::INVALID_SEQUENCE)), "{told:?}");
+        assert_eq!(
+            ask(Mission::Part(afbc_link::Part { writes: true, numbers: [0, 1] }, plan), true).0,
+            ack(MissionResult::UNSUPPORTED)
+        );
+        for message in [Mission::Count(1, plan), Mission::Count(0, plan), Mission::Clear(plan)] {
+            assert_eq!(ask(message, false), (ack(MissionResult::DENIED), Heard::default(), 2));
+        }
+        let known = plan.0 <= 2 || plan == Plan::ALL;
+        let (told, _, left) = ask(Mission::Clear(plan), true);
+        assert_eq!(told, ack(if known { MissionResult::ACCEPTED } else { MissionResult::UNSUPPORTED }));
+        assert_eq!(left, if is_mission || plan == Plan::ALL { 0 } else { 2 });
+        let (told, ..) = ask(Mission::Count(0, plan), true);
+        assert_eq!(told, ack(if plan.0 <= 2 { MissionResult::ACCEPTED } else { MissionResult::UNSUPPORTED }));
+        let (told, ..) = ask(Mission::Count(ITEMS_MAX as u16, plan), true);
+        assert_eq!(told == [(Mission::Request(0, plan), A)], is_mission, "{told:?}");
+    }
+}
+
+#[test]
+fn an_item_is_chosen_that_there_is() {
+    let mut missions = Missions::default();
+    upload(&mut missions, &[waypoint(0), waypoint(1)]);
+    for (number, may, resume, text) in [
+        (0, true, Some(0), None),
+        (1, true, Some(1), None),
+        (2, true, None, Some(Words::of("no mission item 2"))),
+        (1, false, None, None),
+    ] {
+        assert_eq!(missions.hear(Mission::SetCurrent(number), A, may, 0), Heard { text, resume });
+    }
+}
+
+/// The station that uploads may give up, and no other; while it does not, no other may upload.
+#[test]
+fn an_upload_is_its_stations_own() {
+    let mut missions = Missions::default();
+    missions.hear(Mission::Count(2, PLAN), A, true, 0);
+    said(&mut missions);
+    missions.hear(Mission::Count(1, PLAN), B, true, 0);
+    assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::DENIED, PLAN), B)]);
+    missions.hear(Mission::Ack(MissionResult::CANCELLED, PLAN), B, true, 0);
+    assert!(missions.upload.is_some());
+    // Items too early, twice or of another plan are not taken.
+    for item in [waypoint(1), waypoint(5)] {
+        missions.hear(Mission::Item(item, PLAN), A, true, 0);
+        assert_eq!(said(&mut missions), []);
+    }
+    missions.hear(Mission::Item(waypoint(0), Plan::FENCE), A, true, 0);
+    assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::INVALID_SEQUENCE, Plan::FENCE), A)]);
+    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0);
+    assert_eq!(said(&mut missions), [(Mission::Request(1, PLAN), A)]);
+    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0);
+    assert_eq!(said(&mut missions), []);
+    missions.hear(Mission::Ack(MissionResult::CANCELLED, PLAN), A, true, 0);
+    assert!(missions.upload.is_none());
+    // It may begin anew, and only its last item may come twice.
+    upload(&mut missions, &[waypoint(0), waypoint(1)]);
+    for (item, from, plan, result) in [
+        (waypoint(1), A, PLAN, MissionResult::ACCEPTED),
+        (waypoint(0), A, PLAN, MissionResult::INVALID_SEQUENCE),
+        (waypoint(1), B, PLAN, MissionResult::INVALID_SEQUENCE),
+        (waypoint(1), A, Plan::RALLY, MissionResult::INVALID_SEQUENCE),
+    ] {
+        missions.hear(Mission::Item(item, plan), from, true, 0);
+        assert_eq!(said(&mut missions), [(Mission::Ack(result, plan), from)]);
+    }
+}
