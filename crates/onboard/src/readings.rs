@@ -163,3 +163,81 @@ fn measurement(kind: u8, [a, b, c, d, e, f, g, h, i]: [f32; NUMBERS]) -> Option<
         _ => return None,
     })
 }
+
+#[cfg(test)]
+#[allow(clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
+mod tests {
+    use super::*;
+
+    fn aids() -> [Measurement; 6] {
+        let (first, second) = (Vector3::new(1.0, -2.0, 3.5), Vector3::new(-4.0, 5.0, -6.5));
+        [
+            Measurement::Pose {
+                position_m: first,
+                attitude: [0.1, 0.2, -0.3, 0.4],
+                position_sigma_m: 7.0,
+                attitude_sigma_rad: 8.0,
+            },
+            Measurement::Position { position_m: first, sigma_m: 7.0 },
+            Measurement::Gnss {
+                position_m: first,
+                velocity_m_s: second,
+                horizontal_sigma_m: 7.0,
+                vertical_sigma_m: 8.0,
+                speed_sigma_m_s: 9.0,
+            },
+            Measurement::Height { height_m: 3.0, sigma_m: 7.0 },
+            Measurement::MagneticField { field: second, sigma: 7.0 },
+            Measurement::Heading { heading_rad: 3.0, sigma_rad: 7.0 },
+        ]
+    }
+
+    /// Every pair of measurements, with and without a sample, crosses the wire and is moved whole.
+    #[test]
+    fn what_is_read_crosses_the_wire() {
+        let imu = Aged { value: [Vector3::new(0.5, -1.5, 2.5), Vector3::new(9.0, 8.0, -7.0)], age_us: 0x0102_0304 };
+        let none = core::iter::once(None);
+        for first in none.clone().chain(aids().map(Some)) {
+            for second in none.clone().chain(aids().map(Some)).filter(|second| first.is_some() || second.is_none()) {
+                for imu in [None, Some(imu)] {
+                    let aid = |aid: Option<Measurement>, age_us| aid.map(|value| Aged { value, age_us });
+                    let readings = Readings { imu, aids: [aid(first, 77), aid(second, u32::MAX)] };
+                    assert_eq!(Readings::from_bytes(&readings.to_bytes()), readings);
+                    assert_eq!(readings.is_empty(), readings == Readings::NONE);
+                    let (mut from, mut to) = (readings, Readings { imu: None, aids: [aid(Some(aids()[0]), 1); 2] });
+                    to.take_from(&mut from);
+                    assert_eq!((to, from), (readings, Readings::NONE));
+                    to.clear();
+                    assert_eq!(to, Readings::NONE);
+                }
+            }
+        }
+    }
+
+    /// An unknown kind is left out, and what follows moves up.
+    #[test]
+    fn unknown_kinds_leave_no_gap() {
+        let height = Some(Aged { value: Measurement::Height { height_m: 3.0, sigma_m: 7.0 }, age_us: 5 });
+        let mut bytes = Readings { imu: None, aids: [height; 2] }.to_bytes();
+        for kind in [0, 7, 255] {
+            bytes[IMU_LEN] = kind;
+            assert_eq!(Readings::from_bytes(&bytes), Readings { imu: None, aids: [height, None] });
+        }
+    }
+
+    /// The time of a reading is that of the tick less its age, and never before power-up.
+    #[test]
+    fn ages_become_times() {
+        let sample = |age_us, now_us| {
+            let imu = Some(Aged { value: [Vector3::new(1.0, 2.0, 3.0), Vector3::new(4.0, 5.0, 6.0)], age_us });
+            Readings { imu, ..Readings::NONE }.sample(now_us)
+        };
+        for (age_us, now_us, at_us) in [(0, 900, 900), (250, 900, 650), (950, 900, 0)] {
+            let sample = sample(age_us, now_us);
+            assert_eq!(sample.map(|sample| sample.at_us), Some(at_us));
+            assert_eq!(sample.map(|sample| sample.rates_rad_s), Some(Vector3::new(1.0, 2.0, 3.0)));
+            assert_eq!(sample.map(|sample| sample.specific_force_m_s2), Some(Vector3::new(4.0, 5.0, 6.0)));
+        }
+        assert_eq!(Readings::NONE.sample(5), None);
+    }
+}

@@ -475,3 +475,31 @@ fn values_with_which_the_vehicle_could_not_fly_are_left_out() {
     assert_eq!(value("V_MASS"), 0.7);
     assert!(table().set(name("V_MASS"), 0.7).is_err());
 }
+
+/// What does not fit the queues is counted, each message once; what is answered is not.
+#[test]
+fn what_is_dropped_is_counted() {
+    for ask in [ParameterRequest::ReadPlace(3), ParameterRequest::ReadName(padded("V_MASS")), real("V_MASS", 0.486)] {
+        let (mut table, mut service) = (table(), Service::default());
+        for number in 0..40 {
+            service.hear(ask, &mut table, true);
+            assert_eq!(service.dropped(), u32::max(number, 31) - 31);
+        }
+        let mut now_us = 0;
+        assert_eq!(told(&mut service, &mut now_us, 10_000, 5760, &table).len(), 32);
+    }
+}
+
+/// Reads take their share of the link, whatever it carries, and after a pause no more than a burst.
+#[test]
+fn reads_take_their_share() {
+    for link_bytes_s in [5_184, 10_000, 82_944] {
+        let (mut table, mut service, mut now_us) = (table(), Service::default(), 0);
+        service.hear(ParameterRequest::List, &mut table, true);
+        let first = told(&mut service, &mut now_us, 1, link_bytes_s, &table).len();
+        assert!(first <= 4, "{first} at once");
+        let count = told(&mut service, &mut now_us, 500, link_bytes_s, &table).len();
+        let share = link_bytes_s as usize / 2 * LINK_SHARE as usize / 100 / VALUE_BYTES as usize;
+        assert!(count.abs_diff(share.min(all(&table).len() - first)) <= 5, "{count} of {share}");
+    }
+}

@@ -172,4 +172,58 @@ mod tests {
         assert_eq!(control.change(Wish::Take, B, 6).0, granted(Wish::Take, B));
         assert_eq!(control.holder(7), Some(B));
     }
+
+    /// Who lets go of what nobody holds does not take it.
+    #[test]
+    fn a_release_takes_nothing() {
+        let mut control = Control::default();
+        let (answer, claim) = control.change(Wish::Release, B, 0);
+        assert_eq!((answer.granted, answer.station, claim), (true, B.system, Claim::Granted));
+        assert_eq!(control.holder(0), None);
+        assert_eq!(control.claim(A, 1), Claim::Granted);
+        // Nor does one of another station.
+        let (answer, claim) = control.change(Wish::Release, B, 2);
+        assert_eq!((answer.granted, claim), (false, Claim::Refused { holder: A, first_time: true }));
+        assert_eq!(control.holder(2), Some(A));
+    }
+
+    /// Each station is told once, as long as no more than so many others have been told since; another holder is told
+    /// of anew.
+    #[test]
+    fn stations_are_told_once() {
+        let mut control = Control::default();
+        control.claim(A, 0);
+        let station = |system| Address { system, component: 1 };
+        let told = |control: &mut Control, system| match control.claim(station(system), 1) {
+            Claim::Refused { holder, first_time } => (holder, first_time),
+            Claim::Granted => (station(system), false),
+        };
+        for system in 1..=TOLD_MAX as u8 {
+            assert_eq!(told(&mut control, system), (A, true));
+        }
+        for system in 1..=TOLD_MAX as u8 {
+            assert_eq!(told(&mut control, system), (A, false));
+        }
+        // One more takes the place of the first, which takes that of the second.
+        for system in [9, 1] {
+            assert_eq!(told(&mut control, system), (A, true));
+        }
+        assert_eq!([told(&mut control, 3), told(&mut control, 9)], [(A, false); 2]);
+        assert_eq!(told(&mut control, 2), (A, true));
+        control.change(Wish::Release, A, 2);
+        control.claim(B, 3);
+        assert_eq!(told(&mut control, 9), (B, true));
+    }
+
+    #[test]
+    fn silence_is_as_long_as_it_is_set() {
+        let mut control = Control::default();
+        control.set_silence(500);
+        assert_eq!(control.claim(A, 1000), Claim::Granted);
+        for (now_us, holder) in [(1000, Some(A)), (1500, Some(A)), (1501, None)] {
+            assert_eq!(control.holder(now_us), holder);
+        }
+        assert!(!control.hear(B, 1200) && control.hear(A, 1400));
+        assert_eq!([1900, 1901].map(|now_us| control.holder(now_us)), [Some(A), None]);
+    }
 }

@@ -113,4 +113,48 @@ mod tests {
         let long = Words::of("0123456789012345678901234567890123456789").and("01234567890123456789");
         assert_eq!(long, Words::of("01234567890123456789012345678901234567890123456789"));
     }
+
+    #[test]
+    fn every_reason_is_told_in_other_words() {
+        let all = [
+            (Declined::NoPosition, "position"),
+            (Declined::NotArmed, "not armed"),
+            (Declined::OnGround, "on the ground"),
+            (Declined::InFlight, "in flight"),
+            (Declined::NoTargets, "targets"),
+            (Declined::NoSticks, "sticks"),
+            (Declined::NoMission, "mission"),
+            (Declined::OutsideFence, "geofence"),
+            (Declined::OutOfRange, "out of range"),
+            (Declined::Failsafe, "failsafe"),
+        ];
+        for (declined, word) in all {
+            let text = reason(declined);
+            assert!(text.starts_with("refused: ") && text.contains(word) && text.len() <= LENGTH_MAX, "{text}");
+        }
+    }
+
+    #[test]
+    fn severities_are_those_of_mavlink() {
+        use Severity::{Critical, Error, Info, Notice, Warning};
+        let numbers = [Critical, Error, Warning, Notice, Info].map(|severity| urgency(severity) as u8);
+        assert_eq!(numbers, [2, 3, 4, 5, 6]);
+    }
+
+    /// Texts leave in the order in which they came; what does not fit is dropped.
+    #[test]
+    fn texts_wait_in_order() {
+        let mut texts = Texts::default();
+        let info = MavSeverity::MAV_SEVERITY_INFO;
+        texts.put(info, "first");
+        for number in 0..20 {
+            texts.say(MavSeverity::MAV_SEVERITY_ERROR, &Words::default().number(number));
+        }
+        assert_eq!(texts.next(), Some(Downlink::Text { severity: info, text: Text::from("first") }));
+        for number in 0..TEXTS_MAX as u32 - 1 {
+            let text = Words::default().number(number).text();
+            assert_eq!(texts.next(), Some(Downlink::Text { severity: MavSeverity::MAV_SEVERITY_ERROR, text }));
+        }
+        assert_eq!(texts.next(), None);
+    }
 }
