@@ -108,8 +108,8 @@ fn nesting_payloads() -> impl Strategy<Value = Vec<u8>> {
 }
 
 /// A frame, and its message if it must be delivered: carried messages, FILE_TRANSFER_PROTOCOL among them; others, from
-/// TUNNEL and LOG_DATA to ones of no dialect, signed and unsigned; carried ones that are signed or too long; any of these damaged
-/// behind the header.
+/// TUNNEL and LOG_DATA to ones of no dialect, signed and unsigned; carried ones that are signed or too long; any of
+/// these damaged behind the header.
 fn top_level() -> impl Strategy<Value = (Vec<u8>, Option<Uplink>)> {
     let carried = messages().prop_map(|message| (frames(&[message]).concat(), Some(message))).boxed();
     let id = prop_oneof![

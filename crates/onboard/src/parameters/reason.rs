@@ -155,7 +155,7 @@ mod tests {
             let number = if negative { -size } else { size };
             let text = written(number);
             let read: f64 = text.parse().expect("a number");
-            let is_power = size >= 1e5 || size < 1e-3;
+            let is_power = !(1e-3..1e5).contains(&size);
             prop_assert_eq!(text.contains('e'), is_power, "{} {}", number, text);
             let unit = match size {
                 _ if is_power => 0.51 * 10.0_f64.powi(size.log10().floor() as i32),

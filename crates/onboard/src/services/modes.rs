@@ -127,7 +127,7 @@ mod tests {
         assert_eq!(of_standard(0), None);
     }
 
-    /// MAV_MODE_PROPERTY: what a pilot flies has none, offboard is for the advanced, and flies by itself like all others.
+    /// MAV_MODE_PROPERTY: what a pilot flies has none, offboard is for the advanced, all others fly by themselves.
     #[test]
     fn properties_and_names_are_the_modes() {
         for (mode, place) in FlightMode::ALL.into_iter().zip(1..) {

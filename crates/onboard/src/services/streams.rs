@@ -146,8 +146,8 @@ impl Streams {
         }
     }
 
-    /// Carries out REQUEST_DATA_STREAM of older stations: rates of a `MAV_DATA_STREAM`. Returns what it is then: without
-    /// a rate if there is no such group.
+    /// Carries out REQUEST_DATA_STREAM of older stations: rates of a `MAV_DATA_STREAM`. Returns what it is then, with
+    /// no rate if there is no such group.
     pub fn set_group(&mut self, request: DataStream, now_us: u64) -> DataStream {
         let interval_us = 1_000_000_i32.checked_div(request.rate_hz.into()).unwrap_or(-1);
         let group: &[u32] = match request.group {
