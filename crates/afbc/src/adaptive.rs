@@ -15,6 +15,7 @@ const HOVER_SHARE_MIN: f32 = 0.3;
 parameters! {
     /// Gains of one AFBC subsystem. The defaults are those of Section IV for attitude.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Gains {
         /// alpha_1, alpha_2.
         #[group("")]

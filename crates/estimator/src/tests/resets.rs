@@ -351,7 +351,7 @@ fn an_alignment_has_limits() {
         Some(align.why)
     };
     let (rate, force) = (settings.still_rate_rad_s, settings.still_accel_m_s2);
-    let shake = |ms: u64, size: f32| if ms % 2 == 0 { size } else { -size };
+    let shake = |ms: u64, size: f32| if ms.is_multiple_of(2) { size } else { -size };
     for (k, sign) in [(0, 1.0_f32), (1, -1.0), (2, 1.0)] {
         let moving = Some(Unready::Moving);
         for (share, why) in [(0.9, None), (1.1, moving)] {
