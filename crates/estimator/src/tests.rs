@@ -6,6 +6,7 @@ extern crate std;
 mod fused;
 mod parts;
 mod resets;
+mod steps;
 
 use crate::covariance::{Covariance, Growth};
 use crate::errors::{Coordinate, Errors, Interval, Row, Slows};

@@ -336,7 +336,7 @@ fn the_monitor_tells_what_it_sees() {
     for (rate, force, noisy) in [(1.9, 0.0, false), (2.1, 0.0, true), (0.0, 39.0, false), (0.0, 41.0, true)] {
         let mut monitor = Monitor::default();
         for ms in 0..2000_u64 {
-            let sign = if ms % 2 == 0 { 0.5 } else { -0.5 };
+            let sign = if ms.is_multiple_of(2) { 0.5 } else { -0.5 };
             let _ = monitor.take(&sample(1000 * ms, sign * rate, sign * force), &settings);
         }
         let health = monitor.health(2_000_000, &settings, stuck_us);
