@@ -304,8 +304,8 @@ proptest! {
     }
 }
 
-/// Hover thrust: what is known of the weight and what the rule of zero error has learnt, but at least 0.3 of the weight;
-/// for a law that learns nothing the weight. A start in flight knows the weight.
+/// Hover thrust: what is known of the weight and what the rule of zero error has learnt, but at least 0.3 of the
+/// weight; for a law that learns nothing the weight. A start in flight knows the weight.
 #[test]
 fn the_hover_thrust_is_what_carries_the_vehicle() {
     let gains = Profile::Paper.gains();

@@ -88,8 +88,8 @@ proptest! {
         }
     }
 
-    /// z: thrust along body z against gravity, with g_4 from the rotation matrix and its derivative along (6)'s d eta/dt
-    /// = Omega; x and y: u5 and u6 are the accelerations.
+    /// z: thrust along body z against gravity, with g_4 from the rotation matrix and its derivative along d eta/dt =
+    /// Omega of (6); x and y: u5 and u6 are the accelerations.
     #[test]
     fn position_is_that_of_a_thrust_along_body_z(vehicle in vehicle(), eta in attitude(1.0), rates in rates()) {
         let (model, mass) = (Model::new(&vehicle), f64::from(vehicle.mass_kg));

@@ -83,7 +83,7 @@ proptest! {
         for (profile, k) in [(Profile::Flight, k), (Profile::Paper, 1.0)] {
             let (base, gains) = (profile.gains(), profile.gains_for(&vehicle, lag_s));
             prop_assert_eq!(by_rule(&base, &vehicle, if k > 1.0 { lag_s } else { 0.0 }), gains);
-            for (index, axis) in [Axis::Roll, Axis::Pitch, Axis::Yaw, Axis::Z, Axis::X, Axis::Y].into_iter().enumerate() {
+            for (index, axis) in Axis::ALL.into_iter().enumerate() {
                 let g = |of: &Parameters| match axis {
                     Axis::Roll | Axis::Pitch => of.arm_m / of.inertia_kg_m2.as_slice()[index],
                     Axis::Yaw => of.drag_factor_n_m_s2 / of.thrust_factor_n_s2 / of.inertia_kg_m2.z,

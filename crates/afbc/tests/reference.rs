@@ -191,7 +191,10 @@ proptest! {
     ) {
         let reference = Reference::new(&model, &limits(), DT_S).unwrap();
         let list = |s: &Setpoint| [s.position_m.x, s.position_m.y, s.position_m.z, s.yaw_rad].map(f64::from);
-        let speeds = |s: &Setpoint| [s.velocity_m_s.x, s.velocity_m_s.y, s.velocity_m_s.z, s.yaw_rate_rad_s].map(f64::from);
+        let speeds = |s: &Setpoint| {
+            let v = &s.velocity_m_s;
+            [v.x, v.y, v.z, s.yaw_rate_rad_s].map(f64::from)
+        };
         let pushes = |s: &Setpoint| {
             let a = &s.acceleration_m_s2;
             [a.x, a.y, a.z, s.yaw_acceleration_rad_s2].map(f64::from)
