@@ -1,10 +1,18 @@
-//! Minutes at rest after a manoeuvre, for any controller. What decays in its memory has to end at zero: a number
-//! below 1.2e-38 is subnormal, and many processors take a hundred times as long to compute with it.
+//! Minutes at rest after a manoeuvre, under every law. What decays in a law's memory has to end at zero: a number below
+//! 1.2e-38 is subnormal, and many processors take a hundred times as long to compute with it.
+#![allow(clippy::unwrap_used, missing_docs, reason = "a controller that cannot be built must stop the test")]
 
-use afbc_control::{FlightController, Screened, Trace};
-use afbc_types::{Setpoint, State};
+use afbc::integral::IntegralBackstepping;
+use afbc::monitor::Bounds;
+use afbc::{Adaptive, Backstepping, Controller, Guarded, Profile};
+use afbc_control::{FlightController, Screened, Settings, Trace};
+use afbc_peers::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
+use afbc_types::{Parameters, PerAxis, Setpoint, State};
 use core::fmt::Debug;
 use nalgebra::Vector3;
+
+/// Settings of the peers.
+const SETTINGS: Settings = Profile::Flight.settings().common;
 
 /// Step in which the setpoint moves by 1 m along each axis and by 1 rad.
 const BEGIN: usize = 1_000;
@@ -96,7 +104,7 @@ fn subnormals(memory: &impl Debug) -> Vec<String> {
 }
 
 /// Flies every motion, and finds no subnormal number in the controller's memory.
-pub(crate) fn leaves_nothing_subnormal<C: FlightController>(name: &str, controller: &C)
+fn leaves_nothing_subnormal<C: FlightController>(name: &str, controller: &C)
 where
     C::Memory: PartialEq,
 {
@@ -118,5 +126,85 @@ where
                 break;
             }
         }
+    }
+}
+
+#[test]
+fn afbc() {
+    for profile in Profile::ALL {
+        let law = Adaptive::new(profile.gains()).unwrap();
+        let controller = Controller::new(Parameters::PAPER.to_f32(), profile.settings(), law).unwrap();
+        leaves_nothing_subnormal(&format!("AFBC, {}", profile.name()), &controller);
+    }
+}
+
+#[test]
+fn backstepping() {
+    let vehicle = Parameters::PAPER.to_f32();
+    for profile in Profile::ALL {
+        let gains = profile.gains();
+        let law = Backstepping::new(&vehicle, PerAxis::from_fn(|axis| gains[axis].backstepping)).unwrap();
+        let controller = Controller::new(vehicle, profile.settings(), law).unwrap();
+        leaves_nothing_subnormal(&format!("backstepping, {}", profile.name()), &controller);
+    }
+}
+
+#[test]
+fn integral_backstepping() {
+    let vehicle = Parameters::PAPER.to_f32();
+    for profile in Profile::ALL {
+        let law = IntegralBackstepping::new(&vehicle, profile.gains().map(|gains| gains.into())).unwrap();
+        let controller = Controller::new(vehicle, profile.settings(), law).unwrap();
+        leaves_nothing_subnormal(&format!("integral backstepping, {}", profile.name()), &controller);
+    }
+}
+
+#[test]
+fn monitor() {
+    let (vehicle, gains, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.gains(), Profile::Flight.settings());
+    let guarded = |bounds| Guarded::new(vehicle, settings, gains, bounds).unwrap();
+    let bounds = Bounds::new(&gains, &vehicle, &settings);
+    leaves_nothing_subnormal("under its monitor", &guarded(bounds));
+    let hasty = Bounds { error: PerAxis { z: 0.01, ..bounds.error }, ..bounds };
+    leaves_nothing_subnormal("under a hasty monitor", &guarded(hasty));
+    let lax = Bounds { error: PerAxis::from_fn(|_| 1e9), ..bounds };
+    leaves_nothing_subnormal("under a lax monitor", &guarded(lax));
+}
+
+#[test]
+fn pid() {
+    for (name, gains) in [("PID by hand", pid::Gains::PAPER_VEHICLE), ("PID, tuned", pid::Gains::TUNED)] {
+        leaves_nothing_subnormal(name, &Pid::new(Parameters::PAPER.to_f32(), SETTINGS, gains).unwrap());
+    }
+}
+
+#[test]
+fn geometric() {
+    use geometric::Gains;
+    for (name, gains) in
+        [("Lee", Gains::LEE_2010), ("Goodarzi", Gains::GOODARZI_2013), ("geometric, tuned", Gains::TUNED)]
+    {
+        leaves_nothing_subnormal(name, &Geometric::new(Parameters::PAPER.to_f32(), SETTINGS, gains).unwrap());
+    }
+}
+
+#[test]
+fn indi() {
+    for (name, gains) in [("INDI by hand", indi::Gains::PAPER_VEHICLE), ("INDI, tuned", indi::Gains::TUNED)] {
+        leaves_nothing_subnormal(name, &Indi::new(Parameters::PAPER.to_f32(), SETTINGS, gains).unwrap());
+    }
+}
+
+#[test]
+fn l1() {
+    for (name, gains) in [("L1 by hand", l1::Gains::BY_HAND), ("L1, tuned", l1::Gains::TUNED)] {
+        leaves_nothing_subnormal(name, &L1::new(Parameters::PAPER.to_f32(), SETTINGS, gains).unwrap());
+    }
+}
+
+#[test]
+fn dfbc() {
+    for (name, gains) in [("DFBC by hand", dfbc::Gains::PAPER_VEHICLE), ("DFBC, tuned", dfbc::Gains::TUNED)] {
+        leaves_nothing_subnormal(name, &Dfbc::new(Parameters::PAPER.to_f32(), SETTINGS, gains).unwrap());
     }
 }
