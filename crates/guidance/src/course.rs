@@ -107,15 +107,14 @@ impl Return {
         let home_m = Vector3::new(scene.home_m.x, scene.home_m.y, self.height_m);
         match self.stage {
             Stage::Climbs => {
-                let aim = self.hold.fly(scene);
+                let mut aim = self.hold.fly(scene);
                 let short_m = |z: f32| self.height_m - z;
                 if short_m(scene.present.position_m.z) < CLIMBED_M && short_m(scene.state.position_m.z) < 1.0 {
                     self.stage = Stage::Flies(scene.towards(&home_m));
                 }
                 // It climbs while it stops.
-                let (mut position_m, velocity_m_s) = (aim.position_m, aim.velocity_m_s);
-                position_m.z = self.height_m;
-                Wish::fly(Aim { position_m, velocity_m_s, ..aim })
+                aim.position_m.z = self.height_m;
+                Wish::fly(aim)
             }
             Stage::Flies(yaw_rad) => {
                 if scene.is_at(&home_m, OVER_HOME_M) && scene.present.velocity_m_s.norm_squared() < 0.3 * 0.3 {
