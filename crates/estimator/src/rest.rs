@@ -2,8 +2,8 @@
 //!
 //! Rates and specific force are compared with their means since the vehicle came to rest, in blocks of half a second.
 //! The integral of the difference, which is what has turned and moved the vehicle meanwhile, must stay small, as must
-//! its square and each sample. A vehicle that hovers in calm air, or is driven straight on, looks the same: whether rest
-//! counts, [`Memory::stands`](crate::memory::Memory::stands) decides.
+//! its square and each sample. A vehicle that hovers in calm air, or is driven straight on, looks the same: whether
+//! rest counts, [`Memory::stands`](crate::memory::Memory::stands) decides.
 
 use crate::measurement::ImuSample;
 use crate::settings::Settings;

@@ -134,8 +134,8 @@ fn a_cart_moves_it() {
     }
 }
 
-/// A vehicle that hovers, or flies straight on in calm air, looks like one at rest: it is not held once it has moved, if
-/// nobody tells, and never if its motors turn.
+/// A vehicle that hovers, or flies straight on in calm air, looks like one at rest: it is not held once it has moved,
+/// if nobody tells, and never if its motors turn.
 #[test]
 fn a_hover_is_no_rest() {
     fn cruise(t: f64) -> (V3, f64) {

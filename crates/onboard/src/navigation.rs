@@ -18,9 +18,9 @@ const TRACKER: (f32, f32) = (0.003, 0.01);
 ///
 /// The local frame is that of the tracker's poses. Where there is none, its origin is where the vehicle stands at the
 /// first usable fix of its GNSS receiver: one that comes when the estimator runs, and is good enough for a valid
-/// position. All fixes are told in that frame; with a tracker, so that the first one agrees with the estimate. While the
-/// vehicle is at rest, further fixes tell where the origin is, not where the vehicle is: their error wanders by metres
-/// within minutes, which would be a motion of a vehicle that stands.
+/// position. All fixes are told in that frame; with a tracker, so that the first one agrees with the estimate. While
+/// the vehicle is at rest, further fixes tell where the origin is, not where the vehicle is: their error wanders by
+/// metres within minutes, which would be a motion of a vehicle that stands.
 #[derive(Clone, Debug)]
 pub struct Navigation {
     estimator: Estimator,

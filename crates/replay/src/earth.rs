@@ -43,7 +43,8 @@ pub(crate) fn at(latitude_deg: f64, longitude_deg: f64, altitude_m: f64, utc_us:
 mod tests {
     use super::at;
 
-    /// The strength is 0.48 gauss in Zurich, of which 0.21 level. The declination is within 0.3 degrees of what two vehicles had stored in their logs: 3.32 in Zurich, 3.99 in Trondheim.
+    /// The strength is 0.48 gauss in Zurich, of which 0.21 level. The declination is within 0.3 degrees of what two
+    /// vehicles had stored in their logs: 3.32 in Zurich, 3.99 in Trondheim.
     #[test]
     fn is_that_of_the_place() {
         let zurich = at(47.3977, 8.5456, 488.0, Some(1.7107e15)).map(|field| field.declination_rad.to_degrees());

@@ -233,8 +233,8 @@ fn no_file_panics() {
     assert!(read_ones > 100, "{read_ones}");
 }
 
-/// Iron that nobody knows of turns the heading: the less the field is the earth's, the less the heading counts, and it is
-/// as wrong as is said. A field that is quite another tells none.
+/// Iron that nobody knows of turns the heading: the less the field is the earth's, the less the heading counts, and it
+/// is as wrong as is said. A field that is quite another tells none.
 #[test]
 fn a_heading_is_as_good_as_the_field() {
     let (mut inside, mut all) = (0, 0);
