@@ -384,3 +384,22 @@ fn an_alignment_has_limits() {
         assert_eq!(runs(&|_, s| s.specific_force_m_s2 = Vector3::new(0.0, -9.81 * sine, 9.81 * cosine)), why);
     }
 }
+
+/// The variance of a mean is that of a sample over their number.
+#[test]
+fn a_mean_is_as_good_as_its_samples() {
+    let mut align = Align::default();
+    let mut found = None;
+    for ms in 0..=1000_u64 {
+        let sign = if ms.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let sample = ImuSample {
+            at_us: 1_000_000 + 1000 * ms,
+            rates_rad_s: Vector3::new(0.0, 0.01 * sign, 0.0),
+            specific_force_m_s2: Vector3::new(0.2 * sign, 0.0, 9.81),
+        };
+        found = align.advance(&sample, &Settings::DEFAULT);
+    }
+    let found = found.unwrap();
+    let near = |ours: f32, theirs: f32| (ours / theirs - 1.0).abs() < 0.01;
+    assert!(near(found.rates_variance, 1e-7) && near(found.force_variance, 4e-5), "{found:?}");
+}
