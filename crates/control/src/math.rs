@@ -89,8 +89,8 @@ pub fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// Returns `x` as it is left by adding 1e-25 and taking it away again: zero for |x| < 3e-33, and never subnormal. For the
-/// memory of filters, whose decay would otherwise end in subnormal numbers and stay there, each of which takes some
+/// Returns `x` as it is left by adding 1e-25 and taking it away again: zero for |x| < 3e-33, and never subnormal. For
+/// the memory of filters, whose decay would otherwise end in subnormal numbers and stay there, each of which takes some
 /// processors a hundred times as long as another. Error at most 6e-33, and 1.2e-7 relative; none for |x| >= 4e-18.
 #[inline]
 pub fn settled(x: f32) -> f32 {

@@ -21,7 +21,7 @@
 //! Errors of the trim make the true attitude diverge from the reckoned one as t^2, so this works for fractions of a
 //! second, and for the two seconds of the descent that follows.
 
-use afbc_control::math::{max, min};
+use afbc_control::math::{max, min, settled};
 use afbc_types::{Inputs, Parameters, State};
 use nalgebra::{Vector2, Vector3};
 
@@ -106,7 +106,8 @@ impl Blind {
     /// Advances the dead reckoning by one step with the inputs asked of the rotors.
     pub fn advance(&self, reckoning: &mut Reckoning, applied: &Inputs) {
         let asked_n = Vector2::new(applied.roll_n, applied.pitch_n);
-        reckoning.acting_n += (asked_n - reckoning.acting_n) * (self.dt_s / LAG_S);
+        let acting_n = reckoning.acting_n;
+        reckoning.acting_n = (acting_n + (asked_n - acting_n) * (self.dt_s / LAG_S)).map(settled);
         let excess = reckoning.acting_n - Vector2::new(reckoning.trim.roll_n, reckoning.trim.pitch_n);
         reckoning.rate_rad_s += self.authority.component_mul(&excess) * self.dt_s;
         reckoning.angle_rad += reckoning.rate_rad_s * self.dt_s;

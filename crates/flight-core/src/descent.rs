@@ -1,6 +1,7 @@
 //! Descent with states that have returned, or without a position: straight down from where the vehicle was seen, until
 //! landing is detected ([`crate::landing`]). Not in the paper.
 
+use afbc_control::math::settled;
 use afbc_types::{Setpoint, State};
 use nalgebra::{Vector2, Vector3};
 
@@ -70,9 +71,9 @@ impl Drift {
         if change_m_s.norm_squared() <= STEP_MAX_M_S * STEP_MAX_M_S {
             self.velocity_m_s += change_m_s * self.trust;
         }
-        self.trust -= self.trust * (dt_s / TRUST_S);
-        self.velocity_m_s -= self.velocity_m_s * (dt_s / VELOCITY_S);
-        self.way_m += (self.velocity_m_s - self.way_m / WAY_S) * dt_s;
+        self.trust = settled(self.trust - self.trust * (dt_s / TRUST_S));
+        self.velocity_m_s = (self.velocity_m_s - self.velocity_m_s * (dt_s / VELOCITY_S)).map(settled);
+        self.way_m = (self.way_m + (self.velocity_m_s - self.way_m / WAY_S) * dt_s).map(settled);
         let (p, v) = (self.place_m + self.way_m, &self.velocity_m_s);
         State {
             position_m: Vector3::new(p.x, p.y, state.position_m.z),

@@ -7,7 +7,8 @@
 //! # Reading order
 //!
 //! 1. [`tick`]: the control tick.
-//! 2. [`supervisor`]: the four modes and their transitions; [`reasons`]: what speaks against arming.
+//! 2. [`supervisor`]: the four modes and their transitions; [`refusal`], [`reasons`]: what speaks
+//!    against a request, and against arming.
 //! 3. [`inbox`]: the inputs of a tick and their ages; [`tracker`], [`clock`]: selection of states, and the time of
 //!    their measurement.
 //! 4. [`landing`], [`tumble`], [`witness`]: detection of landing, tumbling and frozen trackers.
@@ -27,6 +28,7 @@ pub mod motor;
 pub mod observer;
 pub mod rate;
 pub mod reasons;
+pub mod refusal;
 pub mod supervisor;
 pub mod tick;
 pub mod tracker;

@@ -23,7 +23,7 @@
 
 use crate::blind::{Blind, LAG_S, Reckoning};
 use crate::inbox::Stamped;
-use afbc_control::math::{abs_max, max, min, sqrt};
+use afbc_control::math::{abs_max, max, min, settled, sqrt};
 use afbc_types::{Inputs, Pose, State};
 use nalgebra::{Quaternion, Vector3};
 
@@ -118,8 +118,8 @@ impl Observer {
         let dt_s = blind.dt_s;
         let (least, most) = (TRIM_SHARE.0 * blind.weight_n, TRIM_SHARE.1 * blind.weight_n);
         let trim_n = min(max(reckoning.trim.thrust_n, least), most);
-        self.thrust_n += (applied.thrust_n - self.thrust_n) * (dt_s / LAG_S);
-        self.yaw_n += (applied.yaw_n - self.yaw_n) * (dt_s / LAG_S);
+        self.thrust_n = settled(self.thrust_n + (applied.thrust_n - self.thrust_n) * (dt_s / LAG_S));
+        self.yaw_n = settled(self.yaw_n + (applied.yaw_n - self.yaw_n) * (dt_s / LAG_S));
 
         let mut ahead = *reckoning;
         blind.advance(&mut ahead, applied);

@@ -1,6 +1,6 @@
 //! Everything that speaks against arming, as a set.
 
-use crate::supervisor::Refusal;
+use crate::refusal::Refusal;
 
 /// Reasons against arming, in the order of [`Refusal::ARMING`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,5 +1,5 @@
-//! The tick of the guidance with a vehicle that is where the test puts it: orders with their bounds, times, home, checks,
-//! and where the setpoint begins.
+//! The tick of the guidance with a vehicle that is where the test puts it: orders with their bounds, times, home,
+//! checks, and where the setpoint begins.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use afbc_flight_core::landing::LEFT_M;
@@ -392,8 +392,8 @@ fn after_a_flight_it_holds() {
     }
 }
 
-/// On the ground it asks for the motors to stop: at once when it lands, after a while otherwise, and ten times per second
-/// until they do; never in the air, nor if the time is zero.
+/// On the ground it asks for the motors to stop: at once when it lands, after a while otherwise, and ten times per
+/// second until they do; never in the air, nor if the time is zero.
 #[test]
 fn it_asks_to_disarm_on_the_ground() {
     let asks = |desk: &mut Desk, ticks: u32| -> Vec<u32> {
@@ -442,7 +442,8 @@ fn it_asks_to_disarm_on_the_ground() {
     assert_eq!(asks(&mut desk, 2000), []);
 }
 
-/// What speaks against arming besides what the flight core sees: a battery that is not known or low, sensors, the fence.
+/// What speaks against arming besides what the flight core sees: a battery that is not known or low, sensors, the
+/// fence.
 #[test]
 fn what_bars_arming_has_its_limits() {
     let bars = |change: &dyn Fn(&mut Desk)| {
@@ -476,9 +477,9 @@ fn what_bars_arming_has_its_limits() {
     assert!(desk.run(1100).against.iter().eq([Refusal::BatteryLow]));
 }
 
-/// The setpoint begins anew at a vehicle that is farther from it than its leash, or than a short one when the mode changes
-/// or the state returns, both longer by a second's way; likewise at one that then moves otherwise. One that passes
-/// unchanged, as a place that is held, does not.
+/// The setpoint begins anew at a vehicle that is farther from it than its leash, or than a short one when the mode
+/// changes or the state returns, both longer by a second's way; likewise at one that then moves otherwise. One that
+/// passes unchanged, as a place that is held, does not.
 #[test]
 fn the_setpoint_keeps_to_the_vehicle() {
     // A vehicle beside its setpoint by this and a second's way, times a share, at another velocity by this.
@@ -568,7 +569,8 @@ fn a_takeoff_without_lift_is_given_up() {
 /// stands. Without an inertial sensor its motion follows from its thrust, and this is left out.
 #[test]
 fn a_touch_settles_a_landing_vehicle() {
-    // Ticks after which it settles and after which this ends, of a vehicle that stops sinking and then has this velocity.
+    // Ticks after which it settles and after which this ends, of a vehicle that stops sinking and then has this
+    // velocity.
     let settles = |inertial: bool, velocity_z: f32, mode: FlightMode| {
         let mut desk = Desk::flying(Settings::DEFAULT);
         desk.sensors.inertial = inertial;

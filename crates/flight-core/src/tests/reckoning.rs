@@ -94,13 +94,14 @@ proptest! {
         let rates = start.rates_rad_s.xy();
         prop_assert!((reckoning.rate_rad_s - rates - rate).amax() < step);
         let expected = start.attitude_rad.xy() + rates * t + angle;
-        prop_assert!((reckoning.angle_rad - expected).amax() < 1.5 * step * t + 1e-4, "{reckoning:?}, not {expected:?}");
+        let allowed = 1.5 * step * t + 1e-4;
+        prop_assert!((reckoning.angle_rad - expected).amax() < allowed, "{reckoning:?}, not {expected:?}");
         prop_assert_eq!(reckoning.held_rad, start.attitude_rad.xy());
         prop_assert!((reckoning.acting_n - asked_n * lost).amax() < 0.03);
     }
 
-    /// A measurement is believed, and the trim takes the inputs that explain what the reckoning has missed, of each axis
-    /// for itself, but no jump.
+    /// A measurement is believed, and the trim takes the inputs that explain what the reckoning has missed, of each
+    /// axis for itself, but no jump.
     #[test]
     fn a_measurement_corrects_the_trim_by_what_was_missed(
         start in any_state(), measured in any_state(), trim_n in pair(0.3), missed in pair(0.3),
@@ -197,7 +198,8 @@ proptest! {
     /// estimate counts the less, the later it comes; a jump is none. The rest of the state is told as it is.
     #[test]
     fn the_motion_of_a_vehicle_adrift_fades(
-        state in any_state(), place_m in pair(50.0), change in 0.0..0.19f32, towards in -3.1..3.1f32, jumps in any::<bool>(),
+        state in any_state(), place_m in pair(50.0), change in 0.0..0.19f32, towards in -3.1..3.1f32,
+        jumps in any::<bool>(),
         first in 1..3000u32, then in 1..3000u32,
     ) {
         let mut drift = Drift::new(place_m, &state);
@@ -225,7 +227,8 @@ proptest! {
         let position = place_m + begin * way(t1 + t2) + changed * way(t2);
         prop_assert!((told.position_m.xy() - position).amax() < 0.01, "{told:?}, not {position:?}");
         prop_assert!((before.velocity_m_s.xy() - begin * fade(t1)).amax() < 0.01);
-        let vertical = |state: &State| (state.position_m.z, state.velocity_m_s.z, state.attitude_rad, state.rates_rad_s);
+        let vertical =
+            |state: &State| (state.position_m.z, state.velocity_m_s.z, state.attitude_rad, state.rates_rad_s);
         prop_assert_eq!(vertical(&told), vertical(&later));
     }
 }
@@ -397,7 +400,8 @@ proptest! {
         let beta = 1.0 / (1.0 + POSITION_RAD_S * t);
         let velocity = off_m * (1.5 * (1.0 - beta).powi(2) * (1.0 + beta) / t);
         let position = start.position_m + off_m * (1.0 - beta.powi(3)) + velocity * late_s;
-        prop_assert!((seen.velocity_m_s - velocity).amax() < 1e-5 + 1e-3 * velocity.amax(), "{seen:?}, not {velocity:?}");
+        let allowed = 1e-5 + 1e-3 * velocity.amax();
+        prop_assert!((seen.velocity_m_s - velocity).amax() < allowed, "{seen:?}, not {velocity:?}");
         prop_assert!((seen.position_m - position).amax() < 5e-6, "{seen:?}, not {position:?}");
         let beta = 1.0 / (1.0 + ATTITUDE_RAD_S * t);
         let rates = turn_rad * ((1.0 - beta).powi(2) / t);

@@ -1,5 +1,5 @@
-//! What the tick tells the law, by a law that notes it: the state and setpoint of every tick, for late, missing and lost
-//! states, and for poses instead of states.
+//! What the tick tells the law, by a law that notes it: the state and setpoint of every tick, for late, missing and
+//! lost states, and for poses instead of states.
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use super::std::vec::Vec;

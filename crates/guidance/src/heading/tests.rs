@@ -4,8 +4,8 @@ use super::*;
 use core::f64::consts::{PI, TAU};
 use proptest::prelude::*;
 
-/// The wanted acceleration: the rate settles to that of the approach, whose derivative is known in advance; the approach
-/// is the speed from which it stops in time, f(e) = sqrt(c^2 + 2 B |e|) - c, within 99 % of the largest rate.
+/// The wanted acceleration: the rate settles to that of the approach, whose derivative is known in advance; the
+/// approach is the speed from which it stops in time, f(e) = sqrt(c^2 + 2 B |e|) - c, within 99 % of the largest rate.
 fn acceleration(heading: &Heading, turn: &Turn, limits: &Turning) -> f64 {
     let (rate, most) = (f64::from(heading.rate_rad_s), 0.99 * f64::from(limits.rate_rad_s));
     let largest = f64::from(limits.acceleration_rad_s2);

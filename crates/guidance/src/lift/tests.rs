@@ -28,7 +28,8 @@ proptest! {
     /// Thrust along a direction, less gravity, within what the rotors give; the rest is the vehicle's own.
     #[test]
     fn a_setpoint_is_thrust_less_gravity(
-        position_m in vector(9.0), velocity_m_s in vector(3.0), yaw in -3.0..3.0f32, up in vector(1.0), thrust in -5.0..30.0f32,
+        position_m in vector(9.0), velocity_m_s in vector(3.0), yaw in -3.0..3.0f32, up in vector(1.0),
+        thrust in -5.0..30.0f32,
         most in -1.0..25.0f32,
     ) {
         prop_assume!(up.norm() > 0.1);
@@ -49,7 +50,8 @@ proptest! {
     /// most; the tilt stays unless there is too little thrust to compute it by, and no lean grows.
     #[test]
     fn climb_and_sink_rate_are_limited(
-        acceleration in vector(15.0), climb in -6.0..6.0f32, up in 0.5..4.0f32, down in 0.5..4.0f32, most in 1.0..30.0f32,
+        acceleration in vector(15.0), climb in -6.0..6.0f32, up in 0.5..4.0f32, down in 0.5..4.0f32,
+        most in 1.0..30.0f32,
     ) {
         let limits = Limits { up_m_s: up, down_m_s: down, ..Limits::DEFAULT };
         let state = State { velocity_m_s: Vector3::new(1.0, 2.0, climb), ..State::default() };

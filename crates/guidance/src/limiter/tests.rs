@@ -1,4 +1,5 @@
-//! Which targets pass unchanged: streams with an independent account of their misfits, and every tolerance on both sides.
+//! Which targets pass unchanged: streams with an independent account of their misfits, and every tolerance on both
+//! sides.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use super::*;
@@ -65,8 +66,8 @@ proptest! {
         prop_assert_eq!(still.present, begin);
     }
 
-    /// Two messages fit each other if the second's position and velocity are those to which the first's motion leads with
-    /// a steady change, within half of what passes later; then the jerk is that between them.
+    /// Two messages fit each other if the second's position and velocity are those to which the first's motion leads
+    /// with a steady change, within half of what passes later; then the jerk is that between them.
     #[test]
     fn two_messages_fit_by_the_trapezium_rule(
         first in any_complete(), speed in vector(3.0), change in vector(1.0), interval_s in 0.005..0.49f32,
@@ -74,7 +75,8 @@ proptest! {
     ) {
         let acceleration_m_s2 = first.acceleration_m_s2 + change;
         let off_m_s = oblique(off_speed * MISFIT_M_S);
-        let velocity_m_s = first.velocity_m_s + (first.acceleration_m_s2 + acceleration_m_s2) * 0.5 * interval_s + off_m_s;
+        let mean_m_s2 = (first.acceleration_m_s2 + acceleration_m_s2) * 0.5;
+        let velocity_m_s = first.velocity_m_s + mean_m_s2 * interval_s + off_m_s;
         let mean = (first.velocity_m_s + velocity_m_s) * 0.5;
         let allowed_m = 0.5 * (MISFIT_M + MISFIT_TIME_S * size(mean));
         let position_m = first.position_m + mean * interval_s + oblique(off_share * allowed_m);
@@ -89,7 +91,8 @@ proptest! {
         let jerk = change / interval_s;
         let capped = if size(jerk) > 7.0 { jerk.normalize() * 7.0 } else { jerk };
         let expected = if fits { capped } else { Vector3::zeros() };
-        prop_assert!(size(stream.jerk_m_s3 - expected) < 1e-2 + 1e-3 * size(jerk), "{:?}, not {expected:?}", stream.jerk_m_s3);
+        let found = stream.jerk_m_s3;
+        prop_assert!(size(found - expected) < 1e-2 + 1e-3 * size(jerk), "{found:?}, not {expected:?}");
     }
 }
 
@@ -267,8 +270,8 @@ fn a_goal_is_what_is_given() {
     }
 }
 
-/// It begins at the vehicle with its velocity within the limits, or at rest there; follows it horizontally only; and goes
-/// on when the limits change.
+/// It begins at the vehicle with its velocity within the limits, or at rest there; follows it horizontally only; and
+/// goes on when the limits change.
 #[test]
 fn it_begins_and_goes_on_at_the_vehicle() {
     let limits = Limits { speed_m_s: 5.0, up_m_s: 2.0, down_m_s: 1.0, ..Limits::DEFAULT };

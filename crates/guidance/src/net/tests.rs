@@ -162,8 +162,8 @@ fn a_fence_is_left_and_entered_with_a_margin() {
 }
 
 proptest! {
-    /// A place is inside a cylinder about home, less the margin, of which a small fence keeps half its size; a size of 0
-    /// is no fence.
+    /// A place is inside a cylinder about home, less the margin, of which a small fence keeps half its size; a size of
+    /// 0 is no fence.
     #[test]
     fn a_fence_is_a_cylinder(
         radius in prop_oneof![Just(0.0f32), 0.5..30.0f32], height in prop_oneof![Just(0.0f32), 0.5..30.0f32],

@@ -1,5 +1,5 @@
-//! What the modes want in a given scene: sticks, targets, take-off, landing, return and missions, with thresholds on both
-//! sides. Their flights are in the crate's `tests`.
+//! What the modes want in a given scene: sticks, targets, take-off, landing, return and missions, with thresholds on
+//! both sides. Their flights are in the crate's `tests`.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 use super::*;
@@ -189,8 +189,8 @@ fn stick() -> impl Strategy<Value = f32> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 500, ..ProptestConfig::default() })]
 
-    /// Forward and right as seen from the vehicle, clockwise as seen from above; small deflections are none; throttle up
-    /// and down by the limits of each.
+    /// Forward and right as seen from the vehicle, clockwise as seen from above; small deflections are none; throttle
+    /// up and down by the limits of each.
     #[test]
     fn sticks_mean_directions_of_the_vehicle(
         roll in stick(), pitch in stick(), throttle in stick(), yaw in stick(), heading in -3.1..3.1f32,
@@ -534,8 +534,8 @@ fn wanting(number: u16) -> Mission {
     mission
 }
 
-/// A waypoint is reached within its distance or that of the parameters, slowly unless it is flown through, and left after
-/// its time.
+/// A waypoint is reached within its distance or that of the parameters, slowly unless it is flown through, and left
+/// after its time.
 #[test]
 fn waypoints_are_reached_within_their_distance() {
     let place = here();

@@ -61,8 +61,8 @@ impl Page {
         (along, self.settling / root)
     }
 
-    /// The wanted velocity, and how it changes beside the goal's acceleration: the derivative of the approach as long as
-    /// it is not limited.
+    /// The wanted velocity, and how it changes beside the goal's acceleration: the derivative of the approach as long
+    /// as it is not limited.
     fn wanted<const D: usize>(&self, motion: &Motion<D>, goal: &Goal<D>, reach: &Reach) -> (Vec64<D>, Vec64<D>) {
         let zero = Vec64::<D>::zeros();
         let v = wide(&motion.velocity);
@@ -192,10 +192,12 @@ proptest! {
         let mut moved = motion;
         shape.advance(&mut moved, &goal, &reach, DT_S);
         let expected = page.jerk(&motion, &goal, &reach);
-        prop_assert!((wide(&moved.jerk) - expected).norm() < hair + 2e-3 * expected.norm(), "{:?}, not {expected:?}", moved.jerk);
+        let found = wide(&moved.jerk);
+        prop_assert!((found - expected).norm() < hair + 2e-3 * expected.norm(), "{found:?}, not {expected:?}");
     }
 
-    /// A step is the integral of its jerk, also far from the origin, where the two parts of the position count together.
+    /// A step is the integral of its jerk, also far from the origin, where the two parts of the position count
+    /// together.
     #[test]
     fn a_step_integrates_its_jerk(motion in any_motion(), jerk in pair(100.0), far in -9e4..9e4f32) {
         let mut moved = Motion { position: motion.position.map(|x| x + far), ..motion };

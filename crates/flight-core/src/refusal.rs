@@ -1,0 +1,108 @@
+//! Why a request is refused.
+
+/// Why a request is refused; for arming, the first reason that applies, in the order of [`Refusal::ARMING`]. The
+/// numbers are part of the link's protocol.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// The vehicle is armed.
+    AlreadyArmed = 1,
+    /// No plausible state within 20 ms.
+    StateStale = 2,
+    /// Roll or pitch above [`ArmingLimits::tilt_max_rad`](crate::ArmingLimits::tilt_max_rad).
+    TiltTooLarge = 3,
+    /// No plausible setpoint within 500 ms.
+    SetpointMissing = 4,
+    /// The distance to the setpoint exceeds [`ArmingLimits::setpoint_distance_max_m`](crate::ArmingLimits::setpoint_distance_max_m).
+    SetpointTooFar = 5,
+    /// Rate or timing of the control tick is wrong or unknown ([`crate::rate`]), or its clock has failed.
+    Unhealthy = 6,
+    /// Within the last second, speed or rate exceeded [`ArmingLimits::speed_max_m_s`](crate::ArmingLimits::speed_max_m_s) or
+    /// [`ArmingLimits::rate_max_rad_s`](crate::ArmingLimits::rate_max_rad_s), or there was no state.
+    NotAtRest = 7,
+    /// The vehicle is in flight, where only [`Request::Kill`](crate::Request::Kill) stops the motors.
+    InFlight = 8,
+    /// The vehicle is not armed.
+    NotArmed = 9,
+    /// A later request has stopped the motors.
+    Overtaken = 10,
+    /// The vehicle's own estimate has not found its level: no samples, or it is moved.
+    AttitudeUnknown = 11,
+    /// The vehicle's own estimate has no heading.
+    HeadingUnknown = 12,
+    /// The vehicle's own estimate has no position.
+    PositionUnknown = 13,
+    /// The battery is low, or is to be watched and not known.
+    BatteryLow = 14,
+    /// A sensor has failed.
+    SensorFailed = 15,
+    /// The vehicle is outside its geofence.
+    OutsideFence = 16,
+    /// The flight mode is not one to start from.
+    WrongMode = 17,
+}
+
+impl Refusal {
+    /// Every reason.
+    pub const ALL: [Refusal; 17] = [
+        Refusal::AlreadyArmed,
+        Refusal::StateStale,
+        Refusal::TiltTooLarge,
+        Refusal::SetpointMissing,
+        Refusal::SetpointTooFar,
+        Refusal::Unhealthy,
+        Refusal::NotAtRest,
+        Refusal::InFlight,
+        Refusal::NotArmed,
+        Refusal::Overtaken,
+        Refusal::AttitudeUnknown,
+        Refusal::HeadingUnknown,
+        Refusal::PositionUnknown,
+        Refusal::BatteryLow,
+        Refusal::SensorFailed,
+        Refusal::OutsideFence,
+        Refusal::WrongMode,
+    ];
+
+    /// The reasons against arming, the first ones first: what is not known, what the flight core sees, what
+    /// [others](crate::Inbox::bar) have against it.
+    pub const ARMING: [Refusal; 14] = [
+        Refusal::AlreadyArmed,
+        Refusal::AttitudeUnknown,
+        Refusal::HeadingUnknown,
+        Refusal::PositionUnknown,
+        Refusal::StateStale,
+        Refusal::TiltTooLarge,
+        Refusal::SetpointMissing,
+        Refusal::SetpointTooFar,
+        Refusal::Unhealthy,
+        Refusal::NotAtRest,
+        Refusal::BatteryLow,
+        Refusal::SensorFailed,
+        Refusal::OutsideFence,
+        Refusal::WrongMode,
+    ];
+
+    /// Returns the reason as text of at most 50 characters.
+    pub const fn reason(self) -> &'static str {
+        match self {
+            Refusal::AlreadyArmed => "arming refused: already armed",
+            Refusal::StateStale => "arming refused: no fresh state",
+            Refusal::TiltTooLarge => "arming refused: tilt too large",
+            Refusal::SetpointMissing => "arming refused: no fresh setpoint",
+            Refusal::SetpointTooFar => "arming refused: setpoint too far away",
+            Refusal::Unhealthy => "arming refused: tick rate or clock is wrong",
+            Refusal::NotAtRest => "arming refused: not at rest for a second",
+            Refusal::InFlight => "disarming refused: in flight; force it to stop",
+            Refusal::NotArmed => "refused: not armed",
+            Refusal::Overtaken => "refused: motors were stopped by a later request",
+            Refusal::AttitudeUnknown => "arming refused: estimator has no attitude yet",
+            Refusal::HeadingUnknown => "arming refused: estimator has no heading",
+            Refusal::PositionUnknown => "arming refused: estimator has no position",
+            Refusal::BatteryLow => "arming refused: battery low or not known",
+            Refusal::SensorFailed => "arming refused: a sensor has failed",
+            Refusal::OutsideFence => "arming refused: outside the geofence",
+            Refusal::WrongMode => "arming refused: not in this flight mode",
+        }
+    }
+}
