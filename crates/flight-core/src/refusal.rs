@@ -13,11 +13,13 @@ pub enum Refusal {
     TiltTooLarge = 3,
     /// No plausible setpoint within 500 ms.
     SetpointMissing = 4,
-    /// The distance to the setpoint exceeds [`ArmingLimits::setpoint_distance_max_m`](crate::ArmingLimits::setpoint_distance_max_m).
+    /// The distance to the setpoint exceeds
+    /// [`ArmingLimits::setpoint_distance_max_m`](crate::ArmingLimits::setpoint_distance_max_m).
     SetpointTooFar = 5,
     /// Rate or timing of the control tick is wrong or unknown ([`crate::rate`]), or its clock has failed.
     Unhealthy = 6,
-    /// Within the last second, speed or rate exceeded [`ArmingLimits::speed_max_m_s`](crate::ArmingLimits::speed_max_m_s) or
+    /// Within the last second, speed or rate exceeded
+    /// [`ArmingLimits::speed_max_m_s`](crate::ArmingLimits::speed_max_m_s) or
     /// [`ArmingLimits::rate_max_rad_s`](crate::ArmingLimits::rate_max_rad_s), or there was no state.
     NotAtRest = 7,
     /// The vehicle is in flight, where only [`Request::Kill`](crate::Request::Kill) stops the motors.
