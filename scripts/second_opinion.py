@@ -264,7 +264,8 @@ def main():
         rng = np.random.default_rng(seed)
         with tempfile.TemporaryDirectory() as folder:
             folder = pathlib.Path(folder)
-            command = [sitl, "replay", folder / "log.csv", "--out", folder / "out", "--force"]
+            # The field is the earth's alone, and both know it.
+            command = [sitl, "replay", folder / "log.csv", "--compass-error", "0", "--out", folder / "out", "--force"]
             lines, *samples = record(rng, DECLINATION)
             (folder / "log.csv").write_text("".join(",".join(map(str, line)) + "\n" for line in lines))
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)

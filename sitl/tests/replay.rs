@@ -44,6 +44,28 @@ fn says_how_far_the_estimates_are_apart() {
     assert_eq!(summary(&folder, "replay-rest")["measured_from_s"], 14.0);
 }
 
+/// What is told of the compass decides how sure the heading is.
+#[test]
+fn the_error_of_the_compass_can_be_told() {
+    let folder = folder("compass");
+    log_at_rest(&folder, 14);
+    let sigma = |error: &str| {
+        succeeds(&sitl(&folder, &["replay", "rest.csv", "--compass-error", error, "--force"]));
+        let csv = fs::read_to_string(folder.join("out/replay-rest/replay.csv")).unwrap();
+        let mut lines = csv.lines();
+        let column = lines.next().unwrap().split(',').position(|name| name == "rz_sigma_rad").unwrap();
+        lines.next_back().unwrap().split(',').nth(column).unwrap().parse::<f64>().unwrap()
+    };
+    let [sure, usual, unsure] = ["0", "0.1", "0.4"].map(sigma);
+    assert!(sure < 0.05 && (0.09..0.2).contains(&usual) && unsure > 0.3, "{sure} {usual} {unsure}");
+    for wrong in ["-0.1", "much", "nan"] {
+        let output = sitl(&folder, &["replay", "rest.csv", &format!("--compass-error={wrong}")]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success());
+        assert!(said.contains("--compass-error") && said.contains("number of rad"), "{said}");
+    }
+}
+
 /// Without the estimate beside it there is nothing to compare with, and that is told; without other lines it flies too.
 #[test]
 fn says_what_is_missing() {

@@ -4,6 +4,7 @@ use super::interrupt;
 use super::json::{self, Json};
 use super::place::Place;
 use super::terminal::{Failure, print};
+use afbc_estimator::Settings;
 use afbc_reader::FileError;
 use afbc_replay::Start;
 use afbc_report::replay as report;
@@ -24,6 +25,11 @@ pub(crate) struct Replay {
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     from: Option<f64>,
 
+    /// Error of the heading that the vehicle's own field makes, as a standard deviation; 0 for a magnetometer that is
+    /// calibrated perfectly [default: what the log's field tells]
+    #[arg(long, value_name = "RAD", value_parser = compass_error)]
+    compass_error: Option<f32>,
+
     #[command(flatten)]
     place: Place,
 
@@ -36,12 +42,19 @@ fn seconds(text: &str) -> Result<f64, String> {
     seconds.ok_or_else(|| "it must be a number of seconds, 0 or more".to_owned())
 }
 
+fn compass_error(text: &str) -> Result<f32, String> {
+    let range = Settings::MAG_SLOW.range;
+    let error = text.parse().ok().filter(|error: &f32| (range.min..=range.max).contains(&f64::from(*error)));
+    error.ok_or_else(|| format!("it must be a number of rad, {} to {}", range.min, range.max))
+}
+
 impl Replay {
     /// Reads, runs, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         interrupt::ends_it()?;
         let shown = self.log.display().to_string();
-        let recording = afbc_replay::read(&self.log)?;
+        let mut recording = afbc_replay::read(&self.log)?;
+        recording.mag_slow_rad = self.compass_error.or(recording.mag_slow_rad);
         let replayed = afbc_replay::fly(&recording, self.from)?;
         if let Start::Never(why) = replayed.start {
             let problem = format!("the estimator never started ({why}), and the log has no attitude to start from");
