@@ -20,10 +20,10 @@ pub struct Tick {
 }
 
 /// Results of the last ticks, and a signal that there are some. Not a channel, which panics when it is re-entered.
-static TICKS: Mutex<CriticalSectionRawMutex, RefCell<Deque<Tick, 8>>> = Mutex::new(RefCell::new(Deque::new()));
+static TICKS: Mutex<CriticalSectionRawMutex, RefCell<Deque<Tick, 24>>> = Mutex::new(RefCell::new(Deque::new()));
 static TICKED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
-/// Waits for the result of the oldest tick not yet returned. A tick never waits: while eight results are queued,
+/// Waits for the result of the oldest tick not yet returned. A tick never waits: while twenty-four results are queued,
 /// further ones are dropped.
 pub fn next() -> impl Future<Output = Tick> {
     poll_fn(|context| {
