@@ -1,9 +1,9 @@
 //! A vehicle with its sensors in still air, and the flights drawn from that.
 
 use super::change::Change;
-use super::path::Path;
-use super::power::Power;
-use super::{DURATION_S, Flight, Seen};
+use super::flight::{Flight, Seen};
+use super::path::{DURATION_S, Path};
+use super::power::{HEIGHT_M, Power};
 use crate::draw::mix;
 use afbc::Profile;
 use afbc_plant::noise::{Noise, Stream};
@@ -14,13 +14,15 @@ use afbc_sim::scenario::{Scenario, built_in};
 use afbc_sim::trajectory::Trajectory;
 use afbc_types::OutOfRange;
 use afbc_vehicles::Vehicle;
-use libm::{asin, atan2, sincos};
+use libm::{atan2, hypot, sincos, tan};
 use nalgebra::Vector3;
 
 /// Share of its accelerations that a path asks for at least.
 const BOLDNESS_MIN: f64 = 0.2;
-/// Largest roll and pitch at the start of a flight on the estimate \[rad\].
-const LEVEL_RAD: f64 = 0.7;
+/// Height of the paths outdoors, where the estimate of it is metres off \[m\].
+const HIGH_M: f64 = 10.0;
+/// Largest tilt at the start of a flight on the estimate \[rad\].
+const LEVEL_RAD: f64 = 0.6;
 
 /// A vehicle with its sensors in still air.
 pub(super) struct Base<'a> {
@@ -55,10 +57,12 @@ impl<'a> Base<'a> {
         let bits = mix(of_vehicle.wrapping_add(number)) >> 11;
         let mut noise = Noise::new(bits, Stream::Scenario);
         let boldness = BOLDNESS_MIN + (1.0 - BOLDNESS_MIN) * noise.uniform();
-        let change = Change::draw(&mut noise, vehicle, &self.power);
-        let ground = vehicle.realism.contact.filter(|_| self.seen != Seen::Truth);
+        let change = self.power.fitted(&Change::draw(&mut noise, vehicle));
+        // Outdoors the estimate is metres off: a vehicle that stands on the ground where it is not would tip over.
+        let ground = vehicle.realism.contact.filter(|_| self.seen == Seen::Mocap);
         let stands_m = ground.map(|ground| ground.foot_depth_m - ground.sink_m);
-        let path = Path::draw(&mut noise, vehicle.parameters.arm_m, stands_m);
+        let height_m = if self.seen == Seen::Outdoor { HIGH_M } else { HEIGHT_M };
+        let path = Path::draw(&mut noise, vehicle.parameters.arm_m, height_m, stands_m);
         let (kind, stands) = (path.kind(), path.stands());
         let trajectory = path.flown(&self.power.under(&change), boldness);
         let [speed_m_s, acceleration_m_s2] = peaks(&trajectory);
@@ -90,18 +94,18 @@ impl<'a> Base<'a> {
 fn start(trajectory: &Trajectory, gravity_m_s2: f64, seen: Seen) -> Motion {
     let reference = trajectory.at(0.0);
     let force = reference.acceleration_m_s2 + Vector3::z() * gravity_m_s2;
+    // A vehicle that has to find its attitude first begins more level.
+    let level_m_s2 = force.xy().norm();
+    let most_m_s2 = if seen == Seen::Truth { f64::INFINITY } else { force.z * tan(LEVEL_RAD) };
+    let share = if level_m_s2 > most_m_s2 { most_m_s2 / level_m_s2 } else { 1.0 };
+    let (x, y) = (share * force.x, share * force.y);
     let (s, c) = sincos(reference.yaw_rad);
-    let (ahead, left) = (c * force.x + s * force.y, c * force.y - s * force.x);
-    let level_rad = if seen == Seen::Truth { f64::INFINITY } else { LEVEL_RAD };
-    let [roll, pitch] = [-asin(left / force.norm()), atan2(ahead, force.z)];
+    let (ahead, left) = (c * x + s * y, c * y - s * x);
+    let roll = -atan2(left, hypot(ahead, force.z));
     Motion {
         position_m: reference.position_m,
         velocity_m_s: reference.velocity_m_s,
-        attitude_rad: Vector3::new(
-            roll.clamp(-level_rad, level_rad),
-            pitch.clamp(-level_rad, level_rad),
-            reference.yaw_rad,
-        ),
+        attitude_rad: Vector3::new(roll, atan2(ahead, force.z), reference.yaw_rad),
         ..Motion::default()
     }
 }

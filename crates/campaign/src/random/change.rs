@@ -1,6 +1,6 @@
 //! What a vehicle's file does not tell: wind, a payload, a fault.
 
-use super::power::{Power, largest};
+use super::bisection::largest;
 use afbc_plant::noise::Noise;
 use afbc_plant::{Drag, Environment, Frame, ParameterChange, Payload, Quantity, RotorFault, Turbulence};
 use afbc_sim::scenario::Scenario;
@@ -70,14 +70,14 @@ impl Change {
         }
     }
 
-    /// Draws one that leaves the vehicle a reserve: less of it where the whole would not.
-    pub(super) fn draw(noise: &mut Noise, vehicle: &Vehicle, power: &Power) -> Self {
+    /// Draws one.
+    pub(super) fn draw(noise: &mut Noise, vehicle: &Vehicle) -> Self {
         let kind = whole(noise, Self::KINDS.len());
         // As many numbers whatever the kind.
         let [a, b, c, d] = [(); 4].map(|()| noise.uniform());
         let between = |low: f64, high: f64, at: f64| low + (high - low) * at;
         let arm_m = vehicle.parameters.arm_m;
-        let change = match kind {
+        match kind {
             0 => Change::Nothing,
             1 => Change::Wind(Vector3::new(between(-WIND_M_S, WIND_M_S, a), between(-WIND_M_S, WIND_M_S, b), 0.0)),
             2 => Change::Turbulence(Turbulence::LIGHT),
@@ -94,12 +94,11 @@ impl Change {
             }
             6 => Change::Drag(if a < 0.5 { 0.5 } else { doubled(vehicle) }),
             _ => Change::Older(AGE_S * a),
-        };
-        change.scaled(largest(1.0, |share| power.under(&change.scaled(share)).hovers()))
+        }
     }
 
     /// Returns this share of it: 0 is no change.
-    fn scaled(self, share: f64) -> Self {
+    pub(super) fn scaled(self, share: f64) -> Self {
         let factor = |factor: f64| 1.0 + share * (factor - 1.0);
         match self {
             Change::Wind(wind_m_s) => Change::Wind(wind_m_s * share),

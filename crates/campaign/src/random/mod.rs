@@ -4,12 +4,15 @@
 //! A flight is a function of seed, vehicle and number alone: it is the same on every machine, beside whatever others.
 
 mod base;
+mod bisection;
 mod change;
+mod flight;
 mod path;
 mod power;
 mod standing;
 
 pub use change::Change;
+pub use flight::{Flight, Seen};
 pub use standing::{Difference, RESAMPLES, Score, Standing, is_level, standings};
 
 use crate::compare::{self, Outcome};
@@ -29,33 +32,6 @@ pub const NAME: &str = "random";
 pub const FLIGHTS: u64 = 12;
 /// Tilt that every contender is allowed \[rad\].
 pub const TILT_MAX_RAD: f64 = 1.2;
-/// Length of a flight \[s\].
-const DURATION_S: f64 = 20.0;
-/// Time by which the last waypoint is reached \[s\].
-const LAST_S: f64 = 18.0;
-
-/// What the controllers see.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Seen {
-    /// The truth with the noise of the built-in scenario `hardware`.
-    Truth,
-    /// The vehicle's own estimate, by the instruments of the built-in scenario `mocap`.
-    Mocap,
-    /// Likewise `outdoor`.
-    Outdoor,
-}
-
-impl Seen {
-    /// Name of the built-in scenario whose sensors it is.
-    pub const fn scenario(self) -> &'static str {
-        match self {
-            Seen::Truth => "hardware",
-            Seen::Mocap => "mocap",
-            Seen::Outdoor => "outdoor",
-        }
-    }
-}
-
 /// What to draw.
 #[derive(Clone, Debug)]
 pub struct Random {
@@ -67,29 +43,6 @@ pub struct Random {
     pub seen: Seen,
     /// Who flies.
     pub vehicles: Vec<Vehicle>,
-}
-
-/// A drawn flight.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Flight {
-    /// Seed that it was drawn from.
-    pub seed: u64,
-    /// Name of the vehicle.
-    pub vehicle: String,
-    /// Number among the seed's flights of the vehicle, from 1.
-    pub number: u64,
-    /// Kind of path.
-    pub path: &'static str,
-    /// Whether it begins on the ground.
-    pub stands: bool,
-    /// Largest speed of the reference \[m/s\].
-    pub speed_m_s: f64,
-    /// Largest acceleration of the reference \[m/s2\].
-    pub acceleration_m_s2: f64,
-    /// What the vehicle's file does not tell.
-    pub change: Change,
-    /// The flight.
-    pub scenario: Scenario,
 }
 
 /// A flight that was flown.

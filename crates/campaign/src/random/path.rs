@@ -1,14 +1,18 @@
 //! Paths at a size that suits the vehicle, and up to the speed that it can do.
 
+use super::bisection::largest;
 use super::change::whole;
-use super::power::{HEIGHT_M, Power, largest};
-use super::{DURATION_S, LAST_S};
+use super::power::Power;
 use afbc_plant::noise::Noise;
 use afbc_sim::trajectory::{Sine, Trajectory, Waypoint};
 use core::f64::consts::TAU;
 use libm::sqrt;
 use nalgebra::Vector3;
 
+/// Length of a flight \[s\].
+pub(super) const DURATION_S: f64 = 20.0;
+/// Time by which the last waypoint is reached \[s\].
+const LAST_S: f64 = 18.0;
 /// Largest number of waypoints.
 const WAYPOINTS: usize = 32;
 /// Slowest rate of a path that is flown \[rad/s\]; a vehicle that cannot do it hovers.
@@ -21,6 +25,8 @@ const RATE_MAX: f64 = 50.0;
 pub(super) struct Path {
     shape: Shape,
     yaw_rad: f64,
+    /// Height of its centre \[m\].
+    height_m: f64,
     /// Height of the vehicle that stands on the ground, if it begins there \[m\].
     stands_m: Option<f64>,
 }
@@ -39,8 +45,9 @@ impl Path {
     /// Names of the kinds.
     pub(super) const KINDS: [&str; 4] = ["lemniscate", "circle", "waypoints", "hover"];
 
-    /// Draws a path for a vehicle with this arm. One whose centre is at `stands_m` may begin on the ground.
-    pub(super) fn draw(noise: &mut Noise, arm_m: f64, stands_m: Option<f64>) -> Self {
+    /// Draws a path at this height for a vehicle with this arm. One whose centre of mass is at `stands_m` on the ground
+    /// may begin there.
+    pub(super) fn draw(noise: &mut Noise, arm_m: f64, height_m: f64, stands_m: Option<f64>) -> Self {
         let kind = whole(noise, Self::KINDS.len());
         let mut between = |low: f64, high: f64| low + (high - low) * noise.uniform();
         let half_m = between(0.6, 4.0) * (arm_m / 0.2).clamp(0.4, 1.6);
@@ -62,7 +69,7 @@ impl Path {
             _ => Shape::Hover,
         };
         let stands_m = stands_m.filter(|_| matches!(shape, Shape::Waypoints(_) | Shape::Hover));
-        Path { shape, yaw_rad, stands_m }
+        Path { shape, yaw_rad, height_m, stands_m }
     }
 
     /// Returns the name of its kind.
@@ -92,7 +99,7 @@ impl Path {
 
     /// Returns the path at this rate \[rad/s\].
     fn at(&self, rate: f64) -> Trajectory {
-        let centre_m = Vector3::new(0.0, 0.0, HEIGHT_M);
+        let centre_m = Vector3::new(0.0, 0.0, self.height_m);
         let (yaw_rad, period_s) = (self.yaw_rad, TAU / rate);
         match &self.shape {
             _ if rate < RATE_MIN => self.rest(centre_m),

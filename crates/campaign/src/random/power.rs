@@ -1,5 +1,6 @@
 //! What a vehicle can do, and what a reference asks of it. `docs/suites.md` has the formulas.
 
+use super::bisection::largest;
 use super::change::Change;
 use afbc_plant::Battery;
 use afbc_sim::trajectory::{Reference, Trajectory};
@@ -20,7 +21,7 @@ const TURN_SHARE: f64 = 0.5;
 const LAW_S: f64 = 0.01;
 /// Fastest frequency of a path, times lag and the time of a law.
 const FREQUENCY_SHARE: f64 = 1.0 / 3.0;
-/// Height of the paths, for turbulence \[m\].
+/// Height of the paths; turbulence is no stronger above \[m\].
 pub(super) const HEIGHT_M: f64 = 3.0;
 
 /// What a vehicle can do, as long as nothing holds it up but its rotors.
@@ -92,8 +93,13 @@ impl Power {
         self
     }
 
+    /// Returns as much of `change` as leaves a reserve.
+    pub(super) fn fitted(&self, change: &Change) -> Change {
+        change.scaled(largest(1.0, |share| self.under(&change.scaled(share)).hovers()))
+    }
+
     /// True if it hovers with a reserve.
-    pub(super) fn hovers(&self) -> bool {
+    fn hovers(&self) -> bool {
         let gravity_m_s2 = self.gravity_m_s2;
         self.thrust_m_s2 >= RESERVE * gravity_m_s2 && self.asked(&Reference::default()) <= 1.0
     }
@@ -155,17 +161,4 @@ fn fastest_rad_s(trajectory: &Trajectory) -> f64 {
         }
         Trajectory::Paper | Trajectory::Hover { .. } | Trajectory::Step { .. } => 0.0,
     }
-}
-
-/// Returns the largest number up to `most` that `fits`, if smaller ones fit whenever larger ones do; 0 if none does.
-pub(super) fn largest(most: f64, fits: impl Fn(f64) -> bool) -> f64 {
-    if fits(most) {
-        return most;
-    }
-    let (mut low, mut high) = (0.0, most);
-    for _ in 0..40 {
-        let middle = 0.5 * (low + high);
-        if fits(middle) { low = middle } else { high = middle }
-    }
-    low
 }
