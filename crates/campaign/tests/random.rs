@@ -16,22 +16,23 @@ fn paper(name: &str, change: impl Fn(String) -> String) -> Vehicle {
     parse("mine.toml", &change(built_in("paper").unwrap().text.into()), name).unwrap()
 }
 
-/// Vehicles of one's own: bare and without lag, too weak for most, in much drag, six times as large.
+/// Vehicles of one's own: bare with little lag, weak, in much drag, three times as large.
 fn own() -> Vec<Vehicle> {
     let bare = |text: String| {
         let (before, after) = text.split_once("[battery]").unwrap();
         let imu = after.split_once("[imu]").unwrap().1;
-        format!("{before}[imu]{imu}").replace("time_constant_s = 0.02 ", "time_constant_s = 0.0 ")
+        format!("{before}[imu]{imu}").replace("time_constant_s = 0.02 ", "time_constant_s = 0.01 ")
     };
     let weak = |text: String| text.replace("force_max_n = 3.0 ", "force_max_n = 1.85 ");
     let dragged = |text: String| text.replace("area_m2 = [0.01, 0.01, 0.02]", "area_m2 = [0.9, 0.9, 1.9]");
     let large = |text: String| {
         ["mass_kg = 0.486 ", "arm_m = 0.25 ", "-0.25,", " 0.25,", "[0.25,", "[-0.25,"]
             .into_iter()
-            .zip(["mass_kg = 10.0 ", "arm_m = 1.5 ", "-1.5,", " 1.5,", "[1.5,", "[-1.5,"])
+            .zip(["mass_kg = 3.0 ", "arm_m = 0.75 ", "-0.75,", " 0.75,", "[0.75,", "[-0.75,"])
             .fold(text, |text, (from, to)| text.replace(from, to))
-            .replace("inertia_kg_m2 = [0.0038, 0.0038, 0.0076]", "inertia_kg_m2 = [0.5, 0.5, 1.0]")
-            .replace("force_max_n = 3.0 ", "force_max_n = 50.0 ")
+            .replace("inertia_kg_m2 = [0.0038, 0.0038, 0.0076]", "inertia_kg_m2 = [0.06, 0.06, 0.12]")
+            .replace("force_max_n = 3.0 ", "force_max_n = 15.0 ")
+            .replace("[ground]", "[ground]\ndamping_ratio = 0.3")
     };
     vec![paper("bare", bare), paper("weak", weak), paper("dragged", dragged), paper("large", large)]
 }
@@ -155,7 +156,7 @@ fn no_flight_asks_for_more_than_the_vehicle_can_do() {
                     _ => 1.0,
                 };
             let what = format!("{}: {}", scenario.name, scenario.description);
-            assert!(thrust_m_s2 > 1.15 * g || thrust_m_s2 == intact_m_s2 || vehicle.name == "weak", "{what}");
+            assert!(thrust_m_s2 > 1.15 * g || thrust_m_s2 == intact_m_s2, "{what}");
             let drag = scenario.realism.drag;
             for ms in 0..20_000 {
                 let reference = scenario.trajectory.at(1e-3 * f64::from(ms));
@@ -176,12 +177,10 @@ fn no_flight_asks_for_more_than_the_vehicle_can_do() {
             );
             boldest = boldest.max(*acceleration_m_s2);
         }
-        // And not for much less: the largest of 36 is most of what fits.
+        // And not for much less, though batteries sag and small paths are limited by the rotors' lag.
         let most_m_s2 = ((g + 0.6 * (intact_m_s2 - g)).powi(2) - g * g).sqrt().min(1.56 * g);
-        assert!(
-            vehicle.name == "weak" || vehicle.name == "dragged" || boldest > 0.5 * most_m_s2,
-            "{boldest} {most_m_s2}"
-        );
+        let known = built_in(&vehicle.name).is_some();
+        assert!(!known || boldest > 0.4 * most_m_s2, "{}: {boldest} of {most_m_s2} m/s2", vehicle.name);
     }
 }
 
