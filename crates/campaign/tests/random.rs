@@ -200,7 +200,8 @@ fn fastest_rad_s(trajectory: &Trajectory) -> f64 {
     }
 }
 
-/// Waypoints and hovers on the estimate indoors begin on the ground, in the flight core, rotors idle; the others in the air.
+/// Waypoints and hovers on the estimate indoors begin on the ground, in the flight core, rotors idle; the others in the
+/// air.
 #[test]
 fn flights_on_the_estimate_begin_on_the_ground_where_they_can() {
     for (vehicle, flights) in everywhere(Seen::Mocap) {
