@@ -224,6 +224,62 @@ fn a_suite_that_cannot_be_flown_is_refused_in_one_line() {
     fs::write(folder.join("copy.toml"), succeeds(&sitl(&folder, &["suites", "faults"]))).unwrap();
 }
 
+#[test]
+fn random_flights_are_alike_on_any_number_of_threads() {
+    let folder = folder("random");
+    let fly = |threads, out| {
+        let drawn = ["compare", "--suite", "random", "--seed", "2", "--flights", "2", "--controllers", "pid,indi"];
+        succeeds(&sitl_on(threads, &folder, &[&drawn[..], &["--out", out]].concat()))
+    };
+    let table = fly("1", "one");
+    fly("3", "three");
+    for file in ["flights.csv", "random.json", "report.html"] {
+        let [one, three] = ["one", "three"].map(|out| fs::read(folder.join(out).join(file)).unwrap());
+        assert!(one == three, "{file}");
+    }
+    assert!(table.starts_with("Suite random: seed 2, 2 flights of each vehicle and seed, on the truth"), "{table}");
+    assert!(table.contains("all vehicles, 12 flights") && table.contains("over PID [95 %]"), "{table}");
+    let rows = fs::read_to_string(folder.join("one/flights.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 1 + 6 * 2 * 2);
+    let page = fs::read_to_string(folder.join("one/report.html")).unwrap();
+    for word in ["racer", "all vehicles", "best or level", "resamples"] {
+        assert!(page.contains(word), "no {word}");
+    }
+    // A vehicle of one's own flies what is drawn for it, on its estimate too; the page's table is of the same flights.
+    let mine = succeeds(&sitl(&folder, &["vehicles", "iris"]));
+    fs::write(folder.join("mine.toml"), mine).unwrap();
+    let own = ["compare", "--suite", "random", "--vehicle", "mine.toml", "--flights", "2", "--controllers", "pid"];
+    let own = [&own[..], &["--on-estimate"]].concat();
+    let table = succeeds(&sitl(&folder, &own));
+    assert!(table.contains("the instruments of the scenario mocap") && table.contains("mine, 2 flights"), "{table}");
+    fs::write(folder.join("page.md"), "<!-- suite random: begin -->\n<!-- suite random: end -->\n").unwrap();
+    succeeds(&sitl(&folder, &[&own[..], &["--write", "page.md"]].concat()));
+    let page = fs::read_to_string(folder.join("page.md")).unwrap();
+    assert!(page.contains("| mine, 2 flights | best or level |") && page.contains("\n| PID | 2 (100 %) | "), "{page}");
+}
+
+#[test]
+fn random_flights_that_cannot_be_drawn_are_refused_in_one_line() {
+    let folder = folder("random-refused");
+    let own = "drawn from a seed, not a file; fly it with `sitl compare --suite random --seed N`";
+    for (arguments, expected) in [
+        (&["suites", "random"][..], &*format!("random: {own}")),
+        (&["compare", "--suite", "random", "--vehicle", "raser"], "--vehicle: \"raser\" is no built-in vehicle"),
+        (&["compare", "--suite", "random", "--vehicle", "./no.toml"], "./no.toml: no such file"),
+        (&["compare", "--suite", "random", "--against", "sof"], "--against sof: does not fly; name one of afbc, "),
+        (&["compare", "--suite", "field", "--seed", "2"], "--seed: only --suite random takes it"),
+        (&["compare", "--suite", "field", "--vehicle", "racer"], "--vehicle: only --suite random takes it"),
+    ] {
+        let line = refused(&sitl(&folder, arguments));
+        assert!(line.starts_with(expected) && line.lines().count() == 1, "{line}");
+    }
+    refused(&sitl(&folder, &["compare", "--suite", "random", "--flights", "0"]));
+    refused(&sitl(&folder, &["compare", "--suite", "random", "--on-estimate", "nothing"]));
+    refused(&sitl(&folder, &["compare", "hover", "--seed", "2"]));
+    assert!(!folder.join("out").exists());
+    assert!(succeeds(&sitl(&folder, &["suites"])).contains("random        72 flights  drawn from --seed"));
+}
+
 /// The two costs in the first line of the output of `sitl tune`.
 fn costs(fragment: &str) -> [f64; 2] {
     let line = fragment.lines().next().unwrap();

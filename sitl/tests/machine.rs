@@ -156,6 +156,22 @@ fn suites() {
 }
 
 #[test]
+fn random_flights() {
+    let folder = small("random");
+    let fly = ["compare", "--suite", "random", "--flights", "2", "--controllers", "pid,indi"];
+    let one = [&fly[..], &["--vehicle", "iris", "--seeds", "2", "--seed", "3", "--against", "pid"]].concat();
+    let flown = prints(&folder, "Random flights", &[&one]);
+    let file = fs::read(folder.join("out/random/random.json")).unwrap();
+    assert_eq!(flown, serde_json::from_slice::<Value>(&file).unwrap());
+    assert_eq!((&flown["first_seed"], &flown["seeds"], &flown["against"]), (&3.into(), &2.into(), &"pid".into()));
+    let groups = flown["groups"].as_array().unwrap();
+    assert_eq!((groups.len(), &groups[0]["vehicle"], &groups[0]["flights"]), (1, &"iris".into(), &4.into()));
+    assert_eq!(groups[0]["contenders"][0]["log_difference"]["mean"], 0.0);
+    let wins = |who: usize| groups[0]["contenders"][who]["best_or_level"].as_u64().unwrap();
+    assert!(wins(0) + wins(1) >= 4);
+}
+
+#[test]
 fn comparisons_and_gains() {
     let folder = small("comparisons");
     let compared = prints(&folder, "Comparisons", &[&["compare", "flight.toml", "--seeds", "2"]]);

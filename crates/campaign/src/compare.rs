@@ -39,6 +39,12 @@ pub fn fly_under(scenario: &mut Scenario, contenders: &[Contender]) -> Result<()
     scenario.check().map_err(|error| FileError::whole(&scenario.name, error.to_string()))
 }
 
+/// Allows every contender of `scenario` this tilt, if it is limited more \[rad\].
+pub(crate) fn free_to_tilt(scenario: &mut Scenario, tilt_max_rad: f64) {
+    let contenders = std::mem::take(&mut scenario.contenders).into_iter();
+    scenario.contenders = contenders.map(|contender| contender.free_to_tilt(tilt_max_rad as f32)).collect();
+}
+
 /// Returns all contenders of `scenarios`; of two different ones with the same name, the second gets its scenario's name
 /// too.
 pub fn contenders(scenarios: &[Scenario]) -> Vec<Contender> {
@@ -128,6 +134,13 @@ pub const MEASURES: [Measure; 6] = [
     },
 ];
 
+impl Outcome {
+    /// Returns the result of a flight of `scenario`.
+    pub(crate) fn of(scenario: &Scenario, run: &Run) -> Self {
+        Outcome { seed: scenario.seed, lost: run.lost, tripped: run.tripped, metrics: run.metrics }
+    }
+}
+
 impl Entry {
     /// Returns the contender.
     pub fn contender(&self) -> &Contender {
@@ -191,7 +204,7 @@ pub fn fly(
         let scenario = Scenario { seed: scenario.seed + number, ..scenario.clone() };
         let run = Run::fly(&scenario, contender, if number == 0 { log_every } else { u64::MAX })?;
         progress();
-        Ok((Outcome { seed: scenario.seed, lost: run.lost, tripped: run.tripped, metrics: run.metrics }, run))
+        Ok((Outcome::of(&scenario, &run), run))
     };
     let entry = |scenario: &Scenario, contender: &Contender| {
         let flown: Vec<(Outcome, Run)> = (0..seeds.max(1))

@@ -2,7 +2,7 @@
 //!
 //! Flight `i` is drawn from the campaign's seed and `i` alone, so it can be flown again by itself on any machine. All
 //! contenders fly the same draws. `docs/campaigns.md` describes the format of campaign files. [`compare`] flies
-//! unmodified scenarios under every contender, [`suite`] lists of them.
+//! unmodified scenarios under every contender, [`suite`] lists of them; [`random`] draws flights over vehicles.
 #![forbid(unsafe_code)]
 
 mod built_in;
@@ -16,6 +16,7 @@ mod manifest;
 mod parquet;
 mod plan;
 mod quantity;
+pub mod random;
 mod row;
 pub mod statistics;
 pub mod suite;

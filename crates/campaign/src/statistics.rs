@@ -1,5 +1,6 @@
 //! Statistics of many flights.
 
+use afbc_plant::noise::{Noise, Stream};
 use libm::sqrt;
 
 /// 97.5 % quantile of the standard normal distribution: two-sided 95 %.
@@ -38,6 +39,25 @@ impl Share {
 pub fn percentile(sorted: &[f64], percent: f64) -> Option<f64> {
     let rank = (percent / 100.0 * sorted.len() as f64).ceil().max(1.0) as usize;
     sorted.get(rank - 1).copied()
+}
+
+/// Returns the 95 % interval of the mean of all values in `clusters`, each of which is drawn or not as a whole: the
+/// percentile bootstrap with this many resamples (Davison, Hinkley 1997, *Bootstrap methods and their application*,
+/// sections 3.8 and 5.3). The same values give the same interval. None for fewer than two clusters.
+pub fn clustered(clusters: &[Vec<f64>], resamples: usize) -> Option<[f64; 2]> {
+    if clusters.len() < 2 {
+        return None;
+    }
+    let sums: Vec<(f64, usize)> = clusters.iter().map(|values| (values.iter().sum(), values.len())).collect();
+    let mut noise = Noise::new(0, Stream::Scenario);
+    let mut mean = |_| {
+        let drawn = sums.iter().filter_map(|_| sums.get((noise.uniform() * sums.len() as f64) as usize));
+        let (sum, count) = drawn.fold((0.0, 0), |(sum, count), (more, others)| (sum + more, count + others));
+        sum / count as f64
+    };
+    let mut means: Vec<f64> = (0..resamples).map(&mut mean).collect();
+    means.sort_by(f64::total_cmp);
+    Some([percentile(&means, 2.5)?, percentile(&means, 97.5)?])
 }
 
 #[cfg(test)]
@@ -84,5 +104,29 @@ mod tests {
         assert_eq!(percentile(&[], 50.0), None);
         // A lost flight ranks last.
         assert_eq!(percentile(&[0.1, 0.2, f64::INFINITY], 99.0).unwrap(), f64::INFINITY);
+    }
+
+    /// Of 0 and 1, a quarter of the resamples are 0, a quarter are 1. Of many values, the interval is that of the
+    /// normal distribution. Clusters count by their size.
+    #[test]
+    fn the_bootstrap_interval_is_the_known_one() {
+        assert_eq!(clustered(&[vec![0.0], vec![1.0]], 1000), Some([0.0, 1.0]));
+        assert_eq!(clustered(&[vec![3.0, 4.0]], 1000), None);
+        let mut noise = Noise::new(1, Stream::Scenario);
+        let values: Vec<f64> = (0..400).map(|_| noise.normal()).collect();
+        let mean = values.iter().sum::<f64>() / 400.0;
+        let variance = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / 400.0;
+        let half = Z * sqrt(variance / 400.0);
+        let single: Vec<Vec<f64>> = values.iter().map(|value| vec![*value]).collect();
+        let [low, high] = clustered(&single, 4000).unwrap();
+        assert!((low - (mean - half)).abs() < 0.1 * half && (high - (mean + half)).abs() < 0.1 * half);
+        assert_eq!(clustered(&single, 4000), Some([low, high]));
+        // Ten equal copies of 40 values know no more than the 40: the interval is the wider by the root of 10.
+        let copies: Vec<Vec<f64>> = values.iter().take(40).map(|value| vec![*value; 10]).collect();
+        let [low, high] = clustered(&copies, 4000).unwrap();
+        assert!((high - low) / (2.0 * half) > 2.2, "{low} to {high}");
+        // Two seeds of 9 and 1 flights: the mean of both is 0.9.
+        let [low, high] = clustered(&[vec![1.0; 9], vec![0.0]], 20).unwrap();
+        assert_eq!((low, high), (0.0, 1.0));
     }
 }

@@ -78,8 +78,7 @@ impl Suite {
             let mut scenario = flight.scenario.clone();
             compare::fly_under(&mut scenario, contenders)?;
             if let Some(tilt_max_rad) = flight.tilt_max_rad {
-                let free = |contender: Contender| contender.free_to_tilt(tilt_max_rad as f32);
-                scenario.contenders = scenario.contenders.into_iter().map(free).collect();
+                compare::free_to_tilt(&mut scenario, tilt_max_rad);
             }
             Ok(scenario)
         };

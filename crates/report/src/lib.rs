@@ -12,6 +12,7 @@ mod figures;
 pub mod flights;
 mod groups;
 pub mod markers;
+pub mod random;
 mod reality;
 pub mod replay;
 mod report;

@@ -7,7 +7,7 @@ use super::progress::Progress;
 use super::target::Target;
 use super::terminal::{Failure, print};
 use super::vehicle::OnVehicle;
-use super::{interrupt, json, suite};
+use super::{interrupt, json, random, suite};
 use afbc_campaign::compare::{self, standard};
 use afbc_report::compare as report;
 use afbc_sim::contender::Contender;
@@ -19,7 +19,8 @@ use std::process::ExitCode;
 ///
 /// Without arguments: AFBC, AFBC as printed, and every other law in the built-in scenario `hardware`. With `--suite`:
 /// these, and AFBC under its monitor, in every flight of a suite, each on that flight's vehicle; one report, in
-/// out/suite. A lost vehicle is part of the comparison and does not change the exit code.
+/// out/suite. With `--suite random`: flights drawn from --seed, on all built-in vehicles or one; how the contenders
+/// stand is in out/random. A lost vehicle is part of the comparison and does not change the exit code.
 #[derive(Args, Debug)]
 pub(crate) struct Compare {
     /// Built-in scenarios or scenario files; the contenders of all of them fly each one
@@ -27,7 +28,7 @@ pub(crate) struct Compare {
     scenarios: Vec<Target>,
 
     /// Fly this suite instead: name of a built-in one (`sitl suites`), or path of a file
-    #[arg(long, value_name = "SUITE", conflicts_with_all = ["scenarios", "vehicle"])]
+    #[arg(long, value_name = "SUITE", conflicts_with = "scenarios")]
     suite: Option<PathBuf>,
 
     /// Write the suite's table into this page, between its two markers, and nothing else
@@ -39,7 +40,8 @@ pub(crate) struct Compare {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     controllers: Vec<String>,
 
-    /// Fly each scenario with this many consecutive seeds, from its own on, and compare means
+    /// Fly each scenario with this many consecutive seeds, from its own on, and compare means; with `--suite random`,
+    /// draw flights from this many
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: u64,
 
@@ -51,16 +53,27 @@ pub(crate) struct Compare {
 
     #[command(flatten)]
     json: Json,
+
+    #[command(flatten)]
+    random: random::Options,
 }
 
 impl Compare {
     /// Flies, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         if let Some(path) = &self.suite {
-            let suite = suite::named(path)?;
             let own = compare::standard_and_monitored();
             let contenders = if self.controllers.is_empty() { own } else { choose(&own, &self.controllers)? };
-            return suite::run(&suite, &contenders, self.seeds, self.write, &self.place, &self.json);
+            let Compare { random, seeds, write, place, json, .. } = self;
+            if random::is_named(path) {
+                return random.run(self.on.vehicle()?, &contenders, seeds, write, &place, &json);
+            }
+            let suite = suite::named(path)?;
+            if let Some(option) = self.on.vehicle()?.map(|_| "--vehicle").or_else(|| random.given()) {
+                let cure = "only --suite random takes it, this suite's flights are in its file; leave it out";
+                return Err(format!("{option}: {cure}").into());
+            }
+            return suite::run(&suite, &contenders, seeds, write, &place, &json);
         }
         let named = if self.scenarios.is_empty() { &[Target::from("hardware")][..] } else { &self.scenarios };
         let mut scenarios = named.iter().map(Target::scenario).collect::<Result<Vec<_>, _>>()?;

@@ -15,6 +15,7 @@ mod params;
 mod pil;
 mod place;
 mod progress;
+mod random;
 mod replay;
 mod results;
 mod scenarios;

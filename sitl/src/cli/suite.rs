@@ -5,8 +5,9 @@ use super::log_rate::LogRate;
 use super::place::Place;
 use super::progress::Progress;
 use super::terminal::{Failure, print};
-use super::{interrupt, json, page};
+use super::{interrupt, json, page, random};
 use afbc_campaign::compare::{self, Comparison};
+use afbc_campaign::random::NAME;
 use afbc_campaign::suite::{SUITES, Suite, parse};
 use afbc_reader::{BuiltIn, FileError};
 use afbc_report::suite::{self as report, Flown};
@@ -29,18 +30,25 @@ impl Suites {
     /// Prints the list or the file.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         match self.name {
+            Some(name) if name == NAME => {
+                let cure = "fly it with `sitl compare --suite random --seed N`; docs/suites.md says what is drawn";
+                return Err(FileError::whole(&name, format!("drawn from a seed, not a file; {cure}")).into());
+            }
             Some(name) => print(BuiltIn::named(&SUITES, &name).ok_or_else(|| unknown(&name))?.text)?,
             None => {
                 let all = SUITES.iter().map(BuiltIn::read).collect::<Result<Vec<_>, _>>()?;
-                print(&all.iter().map(line).collect::<String>())?;
+                let mut lines: String =
+                    all.iter().map(|suite| line(&suite.name, suite.flights.len(), &suite.description)).collect();
+                lines += &line(NAME, random::flights(), random::DESCRIPTION);
+                print(&lines)?;
             }
         }
         Ok(ExitCode::SUCCESS)
     }
 }
 
-fn line(Suite { name, description, flights, .. }: &Suite) -> String {
-    format!("{name:<12}{:>4} flights  {description}\n", flights.len())
+fn line(name: &str, flights: usize, description: &str) -> String {
+    format!("{name:<12}{flights:>4} flights  {description}\n")
 }
 
 fn unknown(name: &str) -> FileError {

@@ -1,0 +1,120 @@
+//! A vehicle with its sensors in still air, and the flights drawn from that.
+
+use super::change::Change;
+use super::flight::{Flight, Seen};
+use super::path::{DURATION_S, Path};
+use super::power::{HEIGHT_M, Power};
+use crate::draw::mix;
+use afbc::Profile;
+use afbc_plant::noise::{Noise, Stream};
+use afbc_plant::{Environment, Motion, Start, Wind};
+use afbc_reader::FileError;
+use afbc_reader::words::out_of_range;
+use afbc_sim::scenario::{Scenario, built_in};
+use afbc_sim::trajectory::Trajectory;
+use afbc_types::OutOfRange;
+use afbc_vehicles::Vehicle;
+use libm::{atan2, hypot, sincos, tan};
+use nalgebra::Vector3;
+
+/// Share of its accelerations that a path asks for at least.
+const BOLDNESS_MIN: f64 = 0.2;
+/// Height of the paths outdoors, where the estimate of it is metres off \[m\].
+const HIGH_M: f64 = 10.0;
+/// Largest tilt at the start of a flight on the estimate \[rad\].
+const LEVEL_RAD: f64 = 0.6;
+
+/// A vehicle with its sensors in still air.
+pub(super) struct Base<'a> {
+    vehicle: &'a Vehicle,
+    seen: Seen,
+    power: Power,
+    /// Without contenders.
+    scenario: Scenario,
+}
+
+impl<'a> Base<'a> {
+    /// Puts the sensors on `vehicle`.
+    ///
+    /// # Errors
+    /// One line on what the vehicle cannot fly.
+    pub(super) fn new(vehicle: &'a Vehicle, seen: Seen) -> Result<Self, FileError> {
+        let name = seen.scenario();
+        let known = built_in(name).ok_or_else(|| FileError::whole(name, "no such scenario"))?.read()?;
+        let calm = Environment::calm(known.vehicle).map_err(|error| FileError::whole(name, out_of_range(&error)))?;
+        let mut still = Scenario { duration_s: DURATION_S, environment: calm, contenders: Vec::new(), ..known };
+        still.realism.wind = Wind::default();
+        Ok(Base { vehicle, seen, power: Power::of(vehicle), scenario: still.on(vehicle, Profile::Flight)? })
+    }
+
+    /// Draws the flight of this seed and number.
+    ///
+    /// # Errors
+    /// One line on what the vehicle cannot fly.
+    pub(super) fn flight(&self, seed: u64, number: u64) -> Result<Flight, FileError> {
+        let vehicle = self.vehicle;
+        let of_vehicle = vehicle.name.bytes().fold(mix(seed), |hash, byte| mix(hash ^ u64::from(byte)));
+        let bits = mix(of_vehicle.wrapping_add(number)) >> 11;
+        let mut noise = Noise::new(bits, Stream::Scenario);
+        let boldness = BOLDNESS_MIN + (1.0 - BOLDNESS_MIN) * noise.uniform();
+        let change = self.power.fitted(&Change::draw(&mut noise, vehicle));
+        // Outdoors the estimate is metres off: a vehicle that stands on the ground where it is not would tip over.
+        let ground = vehicle.realism.contact.filter(|_| self.seen == Seen::Mocap);
+        let stands_m = ground.map(|ground| ground.foot_depth_m - ground.sink_m);
+        let height_m = if self.seen == Seen::Outdoor { HIGH_M } else { HEIGHT_M };
+        let path = Path::draw(&mut noise, vehicle.parameters.arm_m, height_m, stands_m);
+        let (kind, stands) = (path.kind(), path.stands());
+        let trajectory = path.flown(&self.power.under(&change), boldness);
+        let [speed_m_s, acceleration_m_s2] = peaks(&trajectory);
+
+        let speed = if speed_m_s > 0.0 { format!(" up to {speed_m_s:.1} m/s") } else { String::new() };
+        let from = if stands { ", from the ground" } else { "" };
+        let mut scenario = Scenario {
+            name: format!("{}-{seed}-{number}", vehicle.name),
+            description: format!("{kind}{speed}{from}, {change}"),
+            seed: bits,
+            initial: start(&trajectory, vehicle.parameters.gravity_m_s2, self.seen),
+            trajectory,
+            flight_core: stands,
+            ..self.scenario.clone()
+        };
+        if stands {
+            scenario.realism.rotors.start = Start::Idle;
+        }
+        change.put(&mut scenario).map_err(|error: OutOfRange| {
+            let problem = format!("it cannot fly with {}; fly it with other seeds", out_of_range(&error));
+            FileError::whole(&vehicle.name, problem)
+        })?;
+        let vehicle = vehicle.name.clone();
+        Ok(Flight { seed, vehicle, number, path: kind, stands, speed_m_s, acceleration_m_s2, change, scenario })
+    }
+}
+
+/// Returns the motion at the start of `trajectory`, banked as its acceleration asks for.
+fn start(trajectory: &Trajectory, gravity_m_s2: f64, seen: Seen) -> Motion {
+    let reference = trajectory.at(0.0);
+    let force = reference.acceleration_m_s2 + Vector3::z() * gravity_m_s2;
+    // A vehicle that has to find its attitude first begins more level.
+    let level_m_s2 = force.xy().norm();
+    let most_m_s2 = if seen == Seen::Truth { f64::INFINITY } else { force.z * tan(LEVEL_RAD) };
+    let share = if level_m_s2 > most_m_s2 { most_m_s2 / level_m_s2 } else { 1.0 };
+    let (x, y) = (share * force.x, share * force.y);
+    let (s, c) = sincos(reference.yaw_rad);
+    let (ahead, left) = (c * x + s * y, c * y - s * x);
+    let roll = -atan2(left, hypot(ahead, force.z));
+    Motion {
+        position_m: reference.position_m,
+        velocity_m_s: reference.velocity_m_s,
+        attitude_rad: Vector3::new(roll, atan2(ahead, force.z), reference.yaw_rad),
+        ..Motion::default()
+    }
+}
+
+/// Returns the largest speed and acceleration of a reference \[m/s, m/s2\].
+fn peaks(trajectory: &Trajectory) -> [f64; 2] {
+    let times_s = (0..2000).map(|k| DURATION_S * f64::from(k) / 2000.0);
+    times_s.fold([0.0_f64; 2], |[speed, acceleration], time_s| {
+        let reference = trajectory.at(time_s);
+        [speed.max(reference.velocity_m_s.norm()), acceleration.max(reference.acceleration_m_s2.norm())]
+    })
+}

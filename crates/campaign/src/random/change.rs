@@ -1,0 +1,183 @@
+//! What a vehicle's file does not tell: wind, a payload, a fault.
+
+use super::bisection::largest;
+use afbc_plant::noise::Noise;
+use afbc_plant::{Drag, Environment, Frame, ParameterChange, Payload, Quantity, RotorFault, Turbulence};
+use afbc_sim::scenario::Scenario;
+use afbc_types::OutOfRange;
+use afbc_vehicles::Vehicle;
+use core::fmt;
+use nalgebra::Vector3;
+
+/// Time from which on masses and rotors are changed \[s\].
+const START_S: f64 = 3.0;
+/// Largest speed of the wind along x and y \[m/s\].
+const WIND_M_S: f64 = 4.0;
+/// Largest additional age of the state \[s\].
+const AGE_S: f64 = 0.012;
+
+/// A difference between what flies and what the controllers are told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Change {
+    /// None.
+    Nothing,
+    /// Steady wind \[m/s\].
+    Wind(Vector3<f64>),
+    /// Turbulence.
+    Turbulence(Turbulence),
+    /// A payload from 3 s on.
+    Payload {
+        /// Its mass over the vehicle's.
+        share: f64,
+        /// Distance below the centre of mass \[m\].
+        below_m: f64,
+        /// Distance ahead of it \[m\].
+        ahead_m: f64,
+        /// Distance to the left of it \[m\].
+        left_m: f64,
+    },
+    /// Another mass from 3 s on: the factor.
+    Mass(f64),
+    /// A weak rotor from 3 s on.
+    Rotor {
+        /// Number of the rotor, from 1.
+        rotor: u8,
+        /// Remaining share of its thrust.
+        efficiency: f64,
+    },
+    /// Another drag: the factor.
+    Drag(f64),
+    /// A state that is older by this time \[s\].
+    Older(f64),
+}
+
+impl Change {
+    /// Names of the kinds, in the order of the variants.
+    pub const KINDS: [&str; 8] = ["nothing", "wind", "turbulence", "payload", "mass", "rotor", "drag", "age"];
+
+    /// Returns the name of its kind.
+    pub const fn kind(&self) -> &'static str {
+        let [nothing, wind, turbulence, payload, mass, rotor, drag, age] = Self::KINDS;
+        match self {
+            Change::Nothing => nothing,
+            Change::Wind(_) => wind,
+            Change::Turbulence(_) => turbulence,
+            Change::Payload { .. } => payload,
+            Change::Mass(_) => mass,
+            Change::Rotor { .. } => rotor,
+            Change::Drag(_) => drag,
+            Change::Older(_) => age,
+        }
+    }
+
+    /// Draws one.
+    pub(super) fn draw(noise: &mut Noise, vehicle: &Vehicle) -> Self {
+        let kind = whole(noise, Self::KINDS.len());
+        // As many numbers whatever the kind.
+        let [a, b, c, d] = [(); 4].map(|()| noise.uniform());
+        let between = |low: f64, high: f64, at: f64| low + (high - low) * at;
+        let arm_m = vehicle.parameters.arm_m;
+        match kind {
+            0 => Change::Nothing,
+            1 => Change::Wind(Vector3::new(between(-WIND_M_S, WIND_M_S, a), between(-WIND_M_S, WIND_M_S, b), 0.0)),
+            2 => Change::Turbulence(Turbulence::LIGHT),
+            3 => Change::Payload {
+                share: between(0.05, 0.25, a),
+                below_m: between(0.1, 0.4, d) * arm_m,
+                ahead_m: between(-0.3, 0.3, b) * arm_m,
+                left_m: between(-0.3, 0.3, c) * arm_m,
+            },
+            4 => Change::Mass(between(0.85, 1.2, a)),
+            5 => {
+                let rotor = 1 + (b * vehicle.rotors.len() as f64) as u8;
+                Change::Rotor { rotor, efficiency: between(0.65, 0.95, a) }
+            }
+            6 => Change::Drag(if a < 0.5 { 0.5 } else { doubled(vehicle) }),
+            _ => Change::Older(AGE_S * a),
+        }
+    }
+
+    /// Returns this share of it: 0 is no change.
+    pub(super) fn scaled(self, share: f64) -> Self {
+        let factor = |factor: f64| 1.0 + share * (factor - 1.0);
+        match self {
+            Change::Wind(wind_m_s) => Change::Wind(wind_m_s * share),
+            Change::Turbulence(turbulence) => {
+                Change::Turbulence(Turbulence { wind_20ft_m_s: turbulence.wind_20ft_m_s * share, ..turbulence })
+            }
+            Change::Payload { share: all, below_m, ahead_m, left_m } => {
+                Change::Payload { share: all * share, below_m, ahead_m, left_m }
+            }
+            Change::Mass(mass) => Change::Mass(factor(mass)),
+            Change::Rotor { rotor, efficiency } => Change::Rotor { rotor, efficiency: factor(efficiency) },
+            Change::Drag(drag) => Change::Drag(factor(drag)),
+            Change::Nothing | Change::Older(_) => self,
+        }
+    }
+
+    /// Puts it into a flight.
+    ///
+    /// # Errors
+    /// The first parameter that it puts out of range.
+    pub(super) fn put(&self, scenario: &mut Scenario) -> Result<(), OutOfRange> {
+        let vehicle = scenario.vehicle;
+        let (start_s, end_s) = (START_S, f64::INFINITY);
+        match *self {
+            Change::Nothing => {}
+            Change::Wind(wind_m_s) => scenario.realism.wind.steady_m_s = wind_m_s,
+            Change::Turbulence(turbulence) => scenario.realism.wind.turbulence = Some(turbulence),
+            Change::Payload { share, below_m, ahead_m, left_m } => {
+                let mass_kg = share * vehicle.mass_kg;
+                let payload = Payload { mass_kg, below_m, ahead_m, left_m, start_s, end_s };
+                scenario.environment = Environment::calm(vehicle)?.with_payloads(vec![payload])?;
+            }
+            Change::Mass(factor) => {
+                let change = ParameterChange { quantity: Quantity::Mass, factor, start_s, end_s };
+                scenario.environment = Environment::new(vehicle, vec![change], Vec::new())?;
+            }
+            Change::Rotor { rotor, efficiency } => {
+                scenario.realism.rotors.faults = vec![RotorFault { rotor, efficiency, start_s }];
+            }
+            // The vehicle's file, by which controllers know its drag, stays.
+            Change::Drag(factor) => scenario.realism.drag = scenario.realism.drag.map(|drag| times(drag, factor)),
+            Change::Older(age_s) => {
+                scenario.sensing.delay_s += age_s;
+                scenario.instruments.tracker.iter_mut().for_each(|tracker| tracker.delay_s += age_s);
+                scenario.instruments.gnss.iter_mut().for_each(|gnss| gnss.delay_s += age_s);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Change {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Change::Nothing => f.write_str("as its file says"),
+            Change::Wind(wind_m_s) => write!(f, "in a wind of {:.1} m/s", wind_m_s.norm()),
+            Change::Turbulence(_) => f.write_str("in light turbulence"),
+            Change::Payload { share, .. } => write!(f, "with a payload of {:.0} %", 100.0 * share),
+            Change::Mass(factor) => write!(f, "mass {:+.0} %", 100.0 * (factor - 1.0)),
+            Change::Rotor { rotor, efficiency } => write!(f, "rotor {rotor} at {:.0} %", 100.0 * efficiency),
+            Change::Drag(factor) => write!(f, "drag times {factor:.2}"),
+            Change::Older(age_s) => write!(f, "its state {:.0} ms older", 1e3 * age_s),
+        }
+    }
+}
+
+/// Draws a whole number below `count`.
+pub(super) fn whole(noise: &mut Noise, count: usize) -> usize {
+    (noise.uniform() * count as f64) as usize
+}
+
+fn times(drag: Drag, factor: f64) -> Drag {
+    Drag { blade_n_s2_m: drag.blade_n_s2_m * factor, area_m2: drag.area_m2 * factor, ..drag }
+}
+
+/// Returns the factor 2, or the smaller one up to which the plant takes this vehicle's drag.
+fn doubled(vehicle: &Vehicle) -> f64 {
+    let (Some(drag), Ok(frame)) = (vehicle.realism.drag, Frame::new(&vehicle.rotors)) else { return 1.0 };
+    let max_rad_s = vehicle.realism.rotors.max_rad_s;
+    let fits = |more: f64| times(drag, 1.0 + more).validate_for(&vehicle.parameters, &frame, max_rad_s, 0.001).is_ok();
+    1.0 + largest(1.0, fits)
+}

@@ -1,0 +1,158 @@
+//! Paths at a size that suits the vehicle, and up to the speed that it can do.
+
+use super::bisection::largest;
+use super::change::whole;
+use super::power::Power;
+use afbc_plant::noise::Noise;
+use afbc_sim::trajectory::{Sine, Trajectory, Waypoint};
+use core::f64::consts::TAU;
+use libm::sqrt;
+use nalgebra::Vector3;
+
+/// Length of a flight \[s\].
+pub(super) const DURATION_S: f64 = 20.0;
+/// Time by which the last waypoint is reached \[s\].
+const LAST_S: f64 = 18.0;
+/// Largest number of waypoints.
+const WAYPOINTS: usize = 32;
+/// Slowest rate of a path that is flown \[rad/s\]; a vehicle that cannot do it hovers.
+const RATE_MIN: f64 = 0.02;
+/// Fastest rate of a path \[rad/s\].
+const RATE_MAX: f64 = 50.0;
+
+/// A path, without its speed.
+#[derive(Clone, Debug)]
+pub(super) struct Path {
+    shape: Shape,
+    yaw_rad: f64,
+    /// Height of its centre \[m\].
+    height_m: f64,
+    /// Height of the vehicle that stands on the ground, if it begins there \[m\].
+    stands_m: Option<f64>,
+}
+
+#[derive(Clone, Debug)]
+enum Shape {
+    /// x = a sin(w t), y = a/2 sin(2 w t).
+    Lemniscate(f64),
+    Circle(f64),
+    /// Corners, each with the length of the leg to it, in periods.
+    Waypoints(Vec<(Vector3<f64>, f64, f64)>),
+    Hover,
+}
+
+impl Path {
+    /// Names of the kinds.
+    pub(super) const KINDS: [&str; 4] = ["lemniscate", "circle", "waypoints", "hover"];
+
+    /// Draws a path at this height for a vehicle with this arm. One whose centre of mass is at `stands_m` on the ground
+    /// may begin there.
+    pub(super) fn draw(noise: &mut Noise, arm_m: f64, height_m: f64, stands_m: Option<f64>) -> Self {
+        let kind = whole(noise, Self::KINDS.len());
+        let mut between = |low: f64, high: f64| low + (high - low) * noise.uniform();
+        let half_m = between(0.6, 4.0) * (arm_m / 0.2).clamp(0.4, 1.6);
+        let yaw_rad = between(-1.0, 1.0);
+        let shape = match kind {
+            0 => Shape::Lemniscate(half_m),
+            1 => Shape::Circle(half_m),
+            2 => {
+                let mut last_m = Vector3::zeros();
+                let mut corner = |()| {
+                    let [x, y, z] = [half_m, half_m, 0.5 * half_m.min(2.0)].map(|most_m| between(-most_m, most_m));
+                    let place_m = Vector3::new(x, y, z);
+                    let far = (place_m - last_m).norm() / (2.0 * half_m);
+                    last_m = place_m;
+                    (place_m, between(-1.0, 1.0), sqrt(far.max(0.1)) * between(1.0, 2.0))
+                };
+                Shape::Waypoints((0..WAYPOINTS).map(|_| corner(())).collect())
+            }
+            _ => Shape::Hover,
+        };
+        let stands_m = stands_m.filter(|_| matches!(shape, Shape::Waypoints(_) | Shape::Hover));
+        Path { shape, yaw_rad, height_m, stands_m }
+    }
+
+    /// Returns the name of its kind.
+    pub(super) const fn kind(&self) -> &'static str {
+        let [lemniscate, circle, waypoints, hover] = Self::KINDS;
+        match self.shape {
+            Shape::Lemniscate(_) => lemniscate,
+            Shape::Circle(_) => circle,
+            Shape::Waypoints(_) => waypoints,
+            Shape::Hover => hover,
+        }
+    }
+
+    /// True if it begins on the ground.
+    pub(super) const fn stands(&self) -> bool {
+        self.stands_m.is_some()
+    }
+
+    /// Returns the path at `boldness`, from 0 to 1, of the accelerations that the vehicle can do.
+    pub(super) fn flown(&self, power: &Power, boldness: f64) -> Trajectory {
+        let fits = |rate: f64| {
+            let trajectory = self.at(rate);
+            power.asked_by(&trajectory, &self.times_s(&trajectory)) <= 1.0
+        };
+        self.at(sqrt(boldness) * largest(RATE_MAX, fits))
+    }
+
+    /// Returns the path at this rate \[rad/s\].
+    fn at(&self, rate: f64) -> Trajectory {
+        let centre_m = Vector3::new(0.0, 0.0, self.height_m);
+        let (yaw_rad, period_s) = (self.yaw_rad, TAU / rate);
+        match &self.shape {
+            _ if rate < RATE_MIN => self.rest(centre_m),
+            Shape::Lemniscate(half_m) => {
+                let sine = |amplitude_m, period_s| Sine { amplitude_m, period_s, phase_rad: 0.0 };
+                let sines = [sine(*half_m, period_s), sine(0.5 * half_m, 0.5 * period_s), sine(0.0, period_s)];
+                Trajectory::Lissajous { centre_m, sines, yaw_rad }
+            }
+            Shape::Circle(radius_m) => Trajectory::Circle { centre_m, radius_m: *radius_m, period_s, yaw_rad },
+            Shape::Waypoints(corners) => {
+                let mut waypoints = self.before(centre_m);
+                let mut time_s = waypoints.last().map_or(0.0, |last| last.time_s);
+                for (place_m, yaw_rad, periods) in corners {
+                    time_s += periods * period_s;
+                    if time_s > LAST_S {
+                        break;
+                    }
+                    waypoints.push(Waypoint { time_s, position_m: centre_m + place_m, yaw_rad: *yaw_rad });
+                }
+                Trajectory::Waypoints(waypoints)
+            }
+            Shape::Hover => self.rest(centre_m),
+        }
+    }
+
+    /// Returns a hover, after the climb to it if it begins on the ground.
+    fn rest(&self, centre_m: Vector3<f64>) -> Trajectory {
+        match self.stands() {
+            true => Trajectory::Waypoints(self.before(centre_m)),
+            false => Trajectory::Hover { position_m: centre_m, yaw_rad: self.yaw_rad },
+        }
+    }
+
+    /// Returns the waypoints before the first corner: at the centre, or on the ground and above it.
+    fn before(&self, centre_m: Vector3<f64>) -> Vec<Waypoint> {
+        let at = |time_s, position_m| Waypoint { time_s, position_m, yaw_rad: self.yaw_rad };
+        match self.stands_m {
+            Some(height_m) => vec![at(1.0, Vector3::new(0.0, 0.0, height_m)), at(5.0, centre_m)],
+            None => vec![at(3.0, centre_m)],
+        }
+    }
+
+    /// Returns times at which to look at a trajectory: 64 in a period, or in each leg after the climb.
+    fn times_s(&self, trajectory: &Trajectory) -> Vec<f64> {
+        let within = |from_s: f64, to_s: f64| (0..64).map(move |k| from_s + (to_s - from_s) * f64::from(k) / 64.0);
+        match trajectory {
+            Trajectory::Lissajous { sines: [sine, ..], .. } => within(0.0, sine.period_s.min(DURATION_S)).collect(),
+            Trajectory::Circle { .. } => vec![0.0],
+            Trajectory::Waypoints(waypoints) => {
+                let legs = waypoints.iter().zip(waypoints.iter().skip(1)).skip(usize::from(self.stands()));
+                legs.flat_map(|(from, to)| within(from.time_s, to.time_s)).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+}

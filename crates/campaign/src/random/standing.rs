@@ -1,0 +1,184 @@
+//! How the contenders stand: who is best, who loses what others keep, and paired differences with intervals.
+
+use crate::statistics::{clustered, percentile};
+use libm::{exp, log};
+use std::collections::BTreeMap;
+
+/// Factor on the least distance up to which another is level with it.
+const LEVEL_FACTOR: f64 = 1.05;
+/// Difference from the least distance up to which another is level with it \[m\].
+const LEVEL_M: f64 = 2e-4;
+/// Smallest distance, so that it has a logarithm \[m\].
+const DISTANCE_MIN_M: f64 = 1e-9;
+/// Number of resamples behind an interval.
+pub const RESAMPLES: usize = 4000;
+
+/// What the contenders of a flight are judged by.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Score {
+    /// Seed that the flight was drawn from.
+    pub seed: u64,
+    /// Root mean square distance of each contender from the reference \[m\]; none if it lost the vehicle.
+    pub rms_m: Vec<Option<f64>>,
+}
+
+/// How a contender stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Standing {
+    /// Number of flights in which it is best, or level with the best.
+    pub wins: usize,
+    /// Number of vehicles lost.
+    pub lost: usize,
+    /// Number of those that some other contender kept.
+    pub lost_alone: usize,
+    /// Median distance over all flights; none if that is a lost one \[m\].
+    pub median_m: Option<f64>,
+    /// Geometric mean of the distances in the flights that it kept; none if there are none \[m\].
+    pub geometric_m: Option<f64>,
+    /// Difference from the contender that all are compared with; none if there is no flight that both kept.
+    pub difference: Option<Difference>,
+}
+
+/// Mean difference of the logarithms of two contenders' distances, in the flights that both kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Difference {
+    /// Number of those flights.
+    pub flights: usize,
+    /// The mean.
+    pub mean: f64,
+    /// Ends of its 95 % interval; none for a single cluster.
+    pub interval: Option<[f64; 2]>,
+}
+
+/// True if a contender with distance `own_m` is best, or level with the `best_m`.
+pub fn is_level(own_m: f64, best_m: f64) -> bool {
+    own_m <= (LEVEL_FACTOR * best_m).max(best_m + LEVEL_M)
+}
+
+impl Score {
+    /// Returns the least distance; none if every contender lost the vehicle \[m\].
+    pub fn best_m(&self) -> Option<f64> {
+        self.rms_m.iter().flatten().copied().reduce(f64::min)
+    }
+
+    /// Returns the distance of a contender; none if it lost the vehicle \[m\].
+    pub fn of(&self, contender: usize) -> Option<f64> {
+        self.rms_m.get(contender).copied().flatten()
+    }
+}
+
+/// Returns how each contender of `results` stands, compared with the one at place `against`.
+pub fn standings(results: &[Score], against: usize) -> Vec<Standing> {
+    let contenders = results.first().map_or(0, |result| result.rms_m.len());
+    (0..contenders).map(|contender| standing(results, contender, against)).collect()
+}
+
+fn standing(results: &[Score], contender: usize, against: usize) -> Standing {
+    let level =
+        |result: &&Score| result.of(contender).zip(result.best_m()).is_some_and(|(own, best)| is_level(own, best));
+    let lost = || results.iter().filter(|result| result.of(contender).is_none());
+    let kept: Vec<f64> = results.iter().filter_map(|result| result.of(contender)).collect();
+    let mut all = kept.clone();
+    all.resize(results.len(), f64::INFINITY);
+    all.sort_by(f64::total_cmp);
+    let logs = kept.iter().map(|distance_m| logarithm(*distance_m)).sum::<f64>();
+    Standing {
+        wins: results.iter().filter(level).count(),
+        lost: lost().count(),
+        lost_alone: lost().filter(|result| result.best_m().is_some()).count(),
+        median_m: percentile(&all, 50.0).filter(|median_m| median_m.is_finite()),
+        geometric_m: (!kept.is_empty()).then(|| exp(logs / kept.len() as f64)),
+        difference: difference(results, contender, against),
+    }
+}
+
+fn difference(results: &[Score], contender: usize, against: usize) -> Option<Difference> {
+    // Sum and number of the differences of each seed.
+    let mut seeds: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
+    for result in results {
+        if let (Some(own_m), Some(other_m)) = (result.of(contender), result.of(against)) {
+            seeds.entry(result.seed).or_default().push(logarithm(own_m) - logarithm(other_m));
+        }
+    }
+    let clusters: Vec<Vec<f64>> = match seeds.len() {
+        1 => seeds.into_values().flatten().map(|difference| vec![difference]).collect(),
+        _ => seeds.into_values().collect(),
+    };
+    let flights = clusters.iter().map(Vec::len).sum();
+    let mean = clusters.iter().flatten().sum::<f64>() / flights as f64;
+    (flights > 0).then(|| Difference { flights, mean, interval: clustered(&clusters, RESAMPLES) })
+}
+
+fn logarithm(distance_m: f64) -> f64 {
+    log(distance_m.max(DISTANCE_MIN_M))
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
+    use super::*;
+
+    fn result(seed: u64, rms_m: [Option<f64>; 3]) -> Score {
+        Score { seed, rms_m: rms_m.to_vec() }
+    }
+
+    fn close(a: f64, b: f64) {
+        assert!((a - b).abs() < 1e-12, "{a} != {b}");
+    }
+
+    /// Counted by hand: a flight that all lose is nobody's, and 5 % or 0.2 mm is level.
+    #[test]
+    fn the_figures_are_those_counted_by_hand() {
+        let results = [
+            result(1, [Some(0.01), Some(0.04), Some(0.0102)]),
+            result(1, [None, Some(0.09), None]),
+            result(2, [Some(0.0003), Some(0.0001), Some(0.00031)]),
+            result(2, [None, None, None]),
+            result(3, [Some(0.04), None, Some(0.05)]),
+        ];
+        let [a, b, c] = standings(&results, 0).try_into().unwrap();
+        assert_eq!((a.wins, a.lost, a.lost_alone), (3, 2, 1));
+        assert_eq!((b.wins, b.lost, b.lost_alone), (2, 2, 1));
+        assert_eq!((c.wins, c.lost, c.lost_alone), (1, 2, 1));
+        // The third of five; three of b's are kept.
+        assert_eq!((a.median_m, b.median_m, c.median_m), (Some(0.04), Some(0.09), Some(0.05)));
+        close(a.geometric_m.unwrap(), (0.01_f64 * 0.0003 * 0.04).cbrt());
+        close(b.geometric_m.unwrap(), (0.04_f64 * 0.09 * 0.0001).cbrt());
+        let own = Difference { flights: 3, mean: 0.0, interval: Some([0.0; 2]) };
+        assert_eq!(a.difference, Some(own));
+        // b and a both kept the first and the third.
+        let b = b.difference.unwrap();
+        assert_eq!(b.flights, 2);
+        close(b.mean, 0.5 * (4.0_f64.ln() - 3.0_f64.ln()));
+        let [low, high] = b.interval.unwrap();
+        close(low, -(3.0_f64.ln()));
+        close(high, 4.0_f64.ln());
+        assert_eq!(c.difference.unwrap().flights, 3);
+    }
+
+    #[test]
+    fn a_median_that_is_lost_is_none_and_so_is_the_mean_of_nothing() {
+        let lost = result(1, [None, Some(0.1), None]);
+        let standings = standings(&[lost.clone(), lost, result(1, [Some(0.2), Some(0.1), None])], 1);
+        assert_eq!((standings[0].median_m, standings[0].geometric_m), (None, Some(exp(log(0.2)))));
+        assert_eq!((standings[2].median_m, standings[2].geometric_m, standings[2].difference), (None, None, None));
+    }
+
+    /// All flights of a seed are drawn together: with equal ones, the interval is that of one flight per seed. A single
+    /// seed's flights are drawn one by one.
+    #[test]
+    fn flights_are_clustered_by_seed() {
+        let at = |seed, factor: f64| result(seed, [Some(0.1), Some(0.1 * factor), Some(0.1)]);
+        let factors = [1.5, 0.8, 1.2, 1.1, 0.9];
+        let interval = |copies: usize| {
+            let seeds = factors.iter().zip(1..).flat_map(|(factor, seed)| vec![at(seed, *factor); copies]);
+            standings(&seeds.collect::<Vec<_>>(), 0)[1].difference.unwrap().interval.unwrap()
+        };
+        let ([low, high], [one_low, one_high]) = (interval(7), interval(1));
+        close(low, one_low);
+        close(high, one_high);
+        let single: Vec<_> = factors.iter().map(|factor| at(9, *factor)).collect();
+        assert_eq!(standings(&single, 0)[1].difference.unwrap().interval, Some([one_low, one_high]));
+        assert_eq!(standings(&single[..1], 0)[1].difference.unwrap().interval, None);
+    }
+}

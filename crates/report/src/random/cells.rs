@@ -1,0 +1,70 @@
+//! Contents of the tables, and what they mean.
+
+use super::judged::{Group, Judged};
+use afbc_campaign::random::{Difference, RESAMPLES, Standing};
+use afbc_sim::metrics::SETTLED_S;
+
+/// Heads of the columns beside the contender's, the last for what the others are compared with.
+pub(super) const HEADS: [&str; 6] = ["best or level", "lost", "alone", "median [m]", "geometric [m]", "over"];
+
+/// Returns the heads.
+pub(super) fn heads(judged: &Judged<'_>) -> [String; HEADS.len()] {
+    let mut heads = HEADS.map(String::from);
+    if let Some(last) = heads.last_mut() {
+        *last = format!("{last} {} [95 %]", judged.against());
+    }
+    heads
+}
+
+/// Returns a contender's cells.
+pub(super) fn cells(group: &Group<'_>, standing: &Standing) -> [String; HEADS.len()] {
+    let Standing { wins, lost, lost_alone, median_m, geometric_m, difference } = standing;
+    let percent = 100.0 * *wins as f64 / group.kept().max(1) as f64;
+    let metres = |distance_m: &Option<f64>| distance_m.map_or("lost".into(), |distance_m| format!("{distance_m:.5}"));
+    [
+        format!("{wins} ({percent:.0} %)"),
+        lost.to_string(),
+        lost_alone.to_string(),
+        metres(median_m),
+        metres(geometric_m),
+        difference.as_ref().map_or(String::new(), ratio),
+    ]
+}
+
+/// Formats a difference of logarithms as a ratio with its interval: "1.12 [1.05, 1.20]".
+fn ratio(difference: &Difference) -> String {
+    let of = |log: f64| format!("{:.2}", libm::exp(log));
+    let interval = difference.interval.map_or(String::new(), |[low, high]| format!(" [{}, {}]", of(low), of(high)));
+    of(difference.mean) + &interval
+}
+
+/// Says what the columns are.
+pub(super) fn legend(judged: &Judged<'_>) -> String {
+    let against = judged.against();
+    format!(
+        "Of the root mean square distance from the reference, from {SETTLED_S} s to the end. best or level: flights in \
+         which a law is best, or within 5 % or 0.2 mm of the best, and their share of those that a law keeps. lost: \
+         vehicles lost. alone: those that another law keeps. median: over all flights, lost ones last. geometric: \
+         geometric mean over the flights that the law keeps. over {against}: geometric mean of the law's distance over \
+         that of {against} in the flights that both keep, above 1 where {against} is nearer, with its 95 % interval \
+         ({RESAMPLES} resamples, clustered by seed)."
+    )
+}
+
+/// Returns what is said below a group: which flights nobody kept, and which the law compared with should have.
+pub(super) fn notes(judged: &Judged<'_>, group: &Group<'_>) -> Vec<String> {
+    let against = judged.against();
+    [(&group.lost_by_all, "Every law loses".into()), (&group.lost_alone, format!("{against} loses, another law keeps"))]
+        .into_iter()
+        .filter(|(flights, _)| !flights.is_empty())
+        .map(|(flights, what): (_, String)| format!("{what}: {}.", named(flights)))
+        .collect()
+}
+
+/// Names flights, up to twenty.
+fn named(flights: &[&str]) -> String {
+    const SOME: usize = 20;
+    let names = flights.iter().take(SOME).copied().collect::<Vec<_>>().join(", ");
+    let more = flights.len().saturating_sub(SOME);
+    if more > 0 { format!("{names} and {more} more") } else { names }
+}

@@ -1,0 +1,101 @@
+//! Flights that were drawn and flown, and how the contenders stand.
+
+use afbc_campaign::random::{Flown, Random, Score, Seen, Standing, standings};
+use afbc_sim::contender::Contender;
+
+/// Flights that were drawn and flown, and how the contenders stand in them.
+#[derive(Clone, Debug)]
+pub struct Judged<'a> {
+    /// What was drawn.
+    pub random: &'a Random,
+    /// The flights.
+    pub flown: &'a [Flown],
+    /// Place of the contender that the others are compared with.
+    against: usize,
+    /// Each vehicle's flights and, if there are several vehicles, all.
+    pub(super) groups: Vec<Group<'a>>,
+}
+
+/// The flights of one vehicle, or all.
+#[derive(Clone, Debug)]
+pub(super) struct Group<'a> {
+    /// The vehicle; none for all.
+    pub(super) vehicle: Option<&'a str>,
+    pub(super) flights: usize,
+    /// Names of the flights that every contender lost.
+    pub(super) lost_by_all: Vec<&'a str>,
+    /// Names of the flights that the contender with which the others are compared lost, and another kept.
+    pub(super) lost_alone: Vec<&'a str>,
+    /// One for each contender.
+    pub(super) standings: Vec<Standing>,
+}
+
+impl<'a> Judged<'a> {
+    /// Judges the flights; the contenders are compared with the one called `against`, or the first.
+    pub fn new(random: &'a Random, flown: &'a [Flown], against: &str) -> Self {
+        let mut judged = Judged { random, flown, against: 0, groups: Vec::new() };
+        let contenders = judged.contenders();
+        let against = contenders.iter().position(|contender| contender.name == against).unwrap_or_default();
+        let vehicles = random.vehicles.iter().map(|vehicle| Some(vehicle.name.as_str()));
+        let all = (random.vehicles.len() > 1).then_some(None);
+        let groups = vehicles.chain(all).map(|vehicle| group(flown, vehicle, against)).collect();
+        judged.against = against;
+        judged.groups = groups;
+        judged
+    }
+
+    /// Returns the contenders.
+    pub(super) fn contenders(&self) -> &'a [Contender] {
+        self.flown.first().map_or(&[], |first| first.flight.scenario.contenders.as_slice())
+    }
+
+    /// Returns the title of the contender that the others are compared with.
+    pub(super) fn against(&self) -> &'a str {
+        self.contenders().get(self.against).map_or("", Contender::title)
+    }
+
+    /// Returns its name.
+    pub(super) fn against_name(&self) -> &'a str {
+        self.contenders().get(self.against).map_or("", |contender| contender.name.as_str())
+    }
+
+    /// Says what was flown: "seeds 1 to 20, 12 flights of each vehicle and seed, on the truth".
+    pub(super) fn words(&self) -> String {
+        let (first, last) = (self.random.seeds.start, self.random.seeds.end.saturating_sub(1));
+        let seeds = if first == last { format!("seed {first}") } else { format!("seeds {first} to {last}") };
+        let seen = match self.random.seen {
+            Seen::Truth => "on the truth with the noise of the scenario hardware".into(),
+            seen => format!("on the vehicle's own estimate by the instruments of the scenario {}", seen.scenario()),
+        };
+        format!("{seeds}, {} flights of each vehicle and seed, {seen}", self.random.flights)
+    }
+}
+
+impl Group<'_> {
+    /// Name of the group.
+    pub(super) fn name(&self) -> &str {
+        self.vehicle.unwrap_or("all vehicles")
+    }
+
+    /// Number of flights that some contender kept.
+    pub(super) fn kept(&self) -> usize {
+        self.flights - self.lost_by_all.len()
+    }
+}
+
+fn group<'a>(flown: &'a [Flown], vehicle: Option<&'a str>, against: usize) -> Group<'a> {
+    let of_group = |flown: &&Flown| vehicle.is_none_or(|vehicle| flown.flight.vehicle == vehicle);
+    let (names, scores): (Vec<&str>, Vec<Score>) =
+        flown.iter().filter(of_group).map(|flown| (flown.flight.scenario.name.as_str(), flown.score())).unzip();
+    let named = |is: fn(&Score, usize) -> bool| {
+        let those = names.iter().zip(&scores).filter(|(_, score)| is(score, against));
+        those.map(|(name, _)| *name).collect()
+    };
+    Group {
+        vehicle,
+        flights: scores.len(),
+        lost_by_all: named(|score, _| score.best_m().is_none()),
+        lost_alone: named(|score, against| score.best_m().is_some() && score.of(against).is_none()),
+        standings: standings(&scores, against),
+    }
+}

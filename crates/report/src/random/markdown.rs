@@ -1,0 +1,31 @@
+//! How the contenders stand, for a document.
+
+use super::Judged;
+use super::cells::{cells, heads, legend, notes};
+use crate::table::wrap;
+use core::fmt::Write;
+
+/// Formats as Markdown: what was flown, a table for each vehicle and one for all, what the columns are.
+pub fn markdown(judged: &Judged<'_>) -> String {
+    let mut page = paragraph(&format!("{}.", judged.words()));
+    let escaped = |cell: &str| cell.replace('[', "\\[").replace(']', "\\]");
+    for group in &judged.groups {
+        let heads = heads(judged).map(|head| escaped(&head));
+        let rule = "--:|".repeat(heads.len());
+        // Writing to a String cannot fail.
+        let _ = writeln!(page, "\n| {}, {} flights | {} |", group.name(), group.flights, heads.join(" | "));
+        let _ = writeln!(page, "|---|{rule}");
+        for (contender, standing) in judged.contenders().iter().zip(&group.standings) {
+            let cells = cells(group, standing).map(|cell| escaped(&cell));
+            let _ = writeln!(page, "| {} | {} |", contender.title(), cells.join(" | "));
+        }
+        notes(judged, group).iter().for_each(|note| page += &format!("\n{}", paragraph(note)));
+    }
+    page + "\n" + &paragraph(&legend(judged))
+}
+
+fn paragraph(text: &str) -> String {
+    let mut lines = Vec::new();
+    wrap(&mut lines, "", text);
+    lines.join("\n") + "\n"
+}

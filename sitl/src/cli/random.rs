@@ -1,0 +1,143 @@
+//! `sitl compare --suite random`: flights drawn over vehicles.
+
+use super::json::Json;
+use super::place::Place;
+use super::progress::Progress;
+use super::terminal::{Failure, print};
+use super::{interrupt, json, page};
+use afbc_campaign::random::{self, FLIGHTS, Flown, NAME, Random, Seen};
+use afbc_reader::BuiltIn;
+use afbc_report::random::{self as report, Judged};
+use afbc_report::suite::markers;
+use afbc_sim::contender::Contender;
+use afbc_vehicles::{BUILT_IN, Vehicle};
+use clap::{Args, ValueEnum};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// One line on the suite.
+pub(super) const DESCRIPTION: &str = "drawn from --seed: paths, speeds, wind, payloads, faults, on every vehicle";
+
+/// Options of the suite.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Options of `--suite random`")]
+pub(super) struct Options {
+    /// First seed that flights are drawn from; --seeds takes those after it, too [default: 1]
+    #[arg(long, value_name = "N", requires = "suite", value_parser = clap::value_parser!(u64).range(..1 << 53))]
+    seed: Option<u64>,
+
+    /// Number of flights of each vehicle and seed [default: 12]
+    #[arg(long, value_name = "K", requires = "suite", value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    flights: Option<u64>,
+
+    /// Fly on the vehicle's own estimate, by the instruments of this built-in scenario, instead of the truth
+    #[arg(long, value_name = "SCENARIO", requires = "suite", num_args = 0..=1, default_missing_value = "mocap")]
+    on_estimate: Option<Instruments>,
+
+    /// Contender that the others are compared with [default: afbc, or else the first]
+    #[arg(long, value_name = "NAME", requires = "suite")]
+    against: Option<String>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Instruments {
+    /// Inertial sensor and motion capture
+    Mocap,
+    /// Inertial sensor, GNSS, barometer, magnetometer
+    Outdoor,
+}
+
+/// True if `path` names this suite.
+pub(super) fn is_named(path: &Path) -> bool {
+    path == Path::new(NAME)
+}
+
+/// Number of flights of a seed.
+pub(super) const fn flights() -> usize {
+    BUILT_IN.len() * FLIGHTS as usize
+}
+
+impl Options {
+    /// The first option that was given, by name.
+    pub(super) fn given(&self) -> Option<&'static str> {
+        let Options { seed, flights, on_estimate, against } = self;
+        let all = [
+            (seed.is_some(), "--seed"),
+            (flights.is_some(), "--flights"),
+            (on_estimate.is_some(), "--on-estimate"),
+            (against.is_some(), "--against"),
+        ];
+        all.into_iter().find_map(|(given, name)| given.then_some(name))
+    }
+
+    /// Draws and flies; then writes the folder and prints, or writes the tables into a page.
+    pub(super) fn run(
+        &self,
+        vehicle: Option<Vehicle>,
+        contenders: &[Contender],
+        seeds: u64,
+        write: Option<PathBuf>,
+        place: &Place,
+        json: &Json,
+    ) -> Result<ExitCode, Failure> {
+        let against = self.against.as_deref().unwrap_or("afbc");
+        if self.against.is_some() && contenders.iter().all(|contender| contender.name != against) {
+            let names: Vec<_> = contenders.iter().map(|contender| contender.name.as_str()).collect();
+            return Err(format!("--against {against}: does not fly; name one of {}", names.join(", ")).into());
+        }
+        let seed = self.seed.unwrap_or(1);
+        let random = Random {
+            seeds: seed..seed + seeds,
+            flights: self.flights.unwrap_or(FLIGHTS),
+            seen: match self.on_estimate {
+                None => Seen::Truth,
+                Some(Instruments::Mocap) => Seen::Mocap,
+                Some(Instruments::Outdoor) => Seen::Outdoor,
+            },
+            vehicles: match vehicle {
+                Some(vehicle) => vec![vehicle],
+                None => BUILT_IN.iter().map(BuiltIn::read).collect::<Result<_, _>>()?,
+            },
+        };
+        if let Some(path) = write {
+            let [begin, end] = markers(NAME);
+            page::write(&path, [&begin, &end], || {
+                let flown = fly(&random, contenders, || Ok(()))?;
+                Ok(report::markdown(&Judged::new(&random, &flown, against)))
+            })?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        let mut folder = None;
+        let flown = fly(&random, contenders, || {
+            folder = Some(place.open(NAME, NAME)?);
+            Ok(())
+        })?;
+        let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };
+        let judged = Judged::new(&random, &flown, against);
+        let written = report::write(&folder, &judged)?;
+        if json.json {
+            json::print_written(|out| report::json(out, &judged))?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        let (table, folder) = (report::table(&judged), folder.path());
+        let (count, page) = (written.len(), folder.join("report.html"));
+        print(&format!("{table}\n{count} files in {}; open {}\n", folder.display(), page.display()))?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Flies after `ready`, when all flights are known to be right.
+fn fly(
+    random: &Random,
+    contenders: &[Contender],
+    ready: impl FnOnce() -> Result<(), Failure>,
+) -> Result<Vec<Flown>, Failure> {
+    let drawn = random.under(contenders)?;
+    interrupt::ends_it()?;
+    ready()?;
+    let progress = Progress::new("compare", "flights", (drawn.len() * contenders.len()) as u64, 0);
+    let flown = random::fly(drawn, &|| progress.add(1))?;
+    drop(progress);
+    interrupt::is_too_late();
+    Ok(flown)
+}
