@@ -418,6 +418,20 @@ impl Covariance {
         }
     }
 
+    /// Returns the rows and columns of theta, v, p.
+    pub(crate) fn of_motion(&self) -> [[f32; 9]; 9] {
+        let (vt, pt, pv) = (self.tv.transpose(), self.tp.transpose(), self.vp.transpose());
+        let blocks = [[&self.tt, &self.tv, &self.tp], [&vt, &self.vv, &self.vp], [&pt, &pv, &self.pp]];
+        let mut rows = [[0.0; 9]; 9];
+        for (three, [a, b, c]) in rows.chunks_exact_mut(3).zip(blocks) {
+            for (to, at) in three.iter_mut().zip(Coordinate::ALL) {
+                let [a, b, c] = [at.row(a), at.row(b), at.row(c)];
+                *to = [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z];
+            }
+        }
+        rows
+    }
+
     /// Returns the matrix as rows, in the order theta, v, p, g, a, b.
     pub(crate) fn rows(&self) -> [[f32; 16]; 16] {
         let c = self;

@@ -181,4 +181,10 @@ impl Memory {
     pub fn covariance(&self) -> [[f32; 16]; 16] {
         self.covariance.rows()
     }
+
+    /// Returns the first nine rows and columns of [`Self::covariance`]: rotation, velocity, position.
+    #[must_use]
+    pub fn covariance_of_motion(&self) -> [[f32; 9]; 9] {
+        self.covariance.of_motion()
+    }
 }

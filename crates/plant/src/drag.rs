@@ -1,6 +1,6 @@
 //! Aerodynamic drag: a concrete form of the paper's A_i = 1/2 rho C_i W^2.
 
-use crate::frame::{Frame, Lanes, Sums};
+use crate::frame::{Frame, Sums};
 use afbc_types::{Declared, OutOfRange, Parameters, Range, parameters};
 use libm::sqrt;
 use nalgebra::Vector3;
@@ -75,10 +75,10 @@ impl Drag {
         Range { max: rate_max * mass_kg / per_area, ..Self::AREA.range }.check(self.area_m2.max())
     }
 
-    /// Returns the drag over one step of a vehicle with arms of `arm_m` and rotors at `speeds_rad_s`.
+    /// Returns the drag over one step of a vehicle with arms of `arm_m` and rotors of these speeds \[rad/s\].
     #[inline]
-    pub(crate) fn held(&self, frame: &Frame, speeds_rad_s: &Lanes, arm_m: f64) -> HeldDrag {
-        let Sums { all, x, y, square, .. } = frame.sums(speeds_rad_s);
+    pub(crate) fn held(&self, speeds: &Sums, arm_m: f64) -> HeldDrag {
+        let Sums { all, x, y, square, .. } = *speeds;
         let lever = self.blade_n_s2_m * arm_m;
         HeldDrag {
             blade_n_s_m: self.blade_n_s2_m * all,

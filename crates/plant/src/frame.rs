@@ -23,7 +23,13 @@ pub struct Frame {
     square: Lanes,
     /// 1 for a rotor that pushes the body to positive yaw, -1 for the others.
     spin: Lanes,
+    /// The same by rotor, as [`Frame::sums`] reads them: 1, yaw direction, x, y, x^2 + y^2, and 0 to fill a pair.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    weights: [[f64; 6]; ROTORS_MAX],
 }
+
+/// Fewest rotors of a vehicle, and by far the most common number: loops over eight take twice as long.
+pub(crate) const FEW: usize = 4;
 
 /// Sums over the rotors, weighted by position and direction.
 #[derive(Clone, Copy, Debug)]
@@ -37,12 +43,6 @@ pub(crate) struct Sums {
     pub(crate) square: f64,
     /// Sum weighted by the yaw direction, 1 or -1.
     pub(crate) spin: f64,
-}
-
-/// Returns the sum of products, in the order of the rotors.
-#[inline]
-fn dot(weights: &Lanes, values: &Lanes) -> f64 {
-    weights.iter().zip(values.iter()).fold(0.0, |sum, (weight, value)| sum + weight * value)
 }
 
 /// Returns the sum of squares times speeds, even and odd rotors apart: results of four rotors depend on this order.
@@ -75,6 +75,8 @@ impl Frame {
 
     fn of(rotors: &[Rotor<f64>]) -> Self {
         let lanes = |of: fn(&Rotor<f64>) -> f64| Lanes::from_fn(|i, _| rotors.get(i).map_or(0.0, of));
+        let square = |rotor: &Rotor<f64>| rotor.x * rotor.x + rotor.y * rotor.y;
+        let weights = |rotor: &Rotor<f64>| [1.0, rotor.spin(), rotor.x, rotor.y, square(rotor), 0.0];
         Frame {
             count: rotors.len(),
             present: lanes(|_| 1.0),
@@ -82,6 +84,7 @@ impl Frame {
             y: lanes(|rotor| rotor.y),
             square: lanes(|rotor| rotor.x * rotor.x + rotor.y * rotor.y),
             spin: lanes(Rotor::spin),
+            weights: core::array::from_fn(|i| rotors.get(i).map_or([0.0; 6], weights)),
         }
     }
 
@@ -93,6 +96,12 @@ impl Frame {
     /// Square of the distance of the outermost rotor from body z, in arm lengths.
     pub(crate) fn square_max(&self) -> f64 {
         self.square.max()
+    }
+
+    /// 1 for each rotor.
+    #[inline]
+    pub(crate) fn present(&self) -> &Lanes {
+        &self.present
     }
 
     /// Returns `values` with 0 beyond the number of rotors.
@@ -139,16 +148,21 @@ impl Frame {
         lanes
     }
 
-    /// Sums `values`, which must be 0 beyond the number of rotors.
+    /// Sums `values`, which must be 0 beyond the number of rotors, in the order of the rotors.
     #[inline]
     pub(crate) fn sums(&self, values: &Lanes) -> Sums {
-        Sums {
-            all: dot(&self.present, values),
-            x: dot(&self.x, values),
-            y: dot(&self.y, values),
-            square: dot(&self.square, values),
-            spin: dot(&self.spin, values),
+        if self.count == FEW { self.sums_of::<FEW>(values) } else { self.sums_of::<ROTORS_MAX>(values) }
+    }
+
+    /// Sums the first `N` of `values`; the others are 0.
+    #[inline]
+    fn sums_of<const N: usize>(&self, values: &Lanes) -> Sums {
+        let mut sums = [0.0; 6];
+        for (weights, value) in self.weights.iter().zip(values.as_slice()).take(N) {
+            sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += weight * value);
         }
+        let [all, spin, x, y, square, _] = sums;
+        Sums { all, x, y, square, spin }
     }
 }
 

@@ -49,26 +49,27 @@ impl Load {
         a_moment: Vector3<f64>,
     ) -> Self {
         let squares = speeds_rad_s.map(|w| w * w);
-        Self::of_rotors(parameters, rig, frame, [speeds_rad_s, &squares], 1.0, a_force, a_moment)
+        let [speeds, squares] = [speeds_rad_s, &squares].map(|values| frame.sums(values));
+        Self::of_rotors(parameters, rig, [&speeds, &squares], 1.0, a_force, a_moment)
     }
 
-    /// Computes the load of rotors whose drag moments follow from the `squares` of their speeds \[rad2/s2\], already
-    /// multiplied by their efficiency, and whose thrusts are also multiplied by `thrust_ratio`.
+    /// Computes the load of rotors from sums over their `speeds` \[rad/s\] and over the `squares` of these \[rad2/s2\],
+    /// already multiplied by their efficiency, from which drag moments and thrusts follow; thrusts are also multiplied by
+    /// `thrust_ratio`.
     #[inline]
     pub(crate) fn of_rotors(
         parameters: &Parameters<f64>,
         rig: &Rig,
-        frame: &Frame,
-        [speeds_rad_s, squares]: [&Lanes; 2],
+        [speeds, squares]: [&Sums; 2],
         thrust_ratio: f64,
         a_force: Vector3<f64>,
         a_moment: Vector3<f64>,
     ) -> Self {
         let Parameters { mass_kg, arm_m, inertia_kg_m2: i, rotor_inertia_kg_m2, .. } = *parameters;
-        let Sums { all, x, y, spin, .. } = frame.sums(squares);
+        let Sums { all, x, y, spin, .. } = *squares;
         let (b, d) = (thrust_ratio * parameters.thrust_factor_n_s2, parameters.drag_factor_n_m_s2);
         let (thrust_n, Rig { moments, lever_m }) = (b * all, rig);
-        let momentum = rotor_inertia_kg_m2 * frame.sums(speeds_rad_s).spin;
+        let momentum = rotor_inertia_kg_m2 * speeds.spin;
         Load {
             thrust_m_s2: thrust_n / mass_kg,
             gravity_m_s2: parameters.gravity_m_s2,

@@ -146,34 +146,19 @@ impl Effects {
         if let Some(effect) = &self.ground_effect {
             self.thrust_ratio = effect.thrust_ratio(position_m.z);
         }
-        self.held = self.drag.as_ref().map(|drag| drag.held(&self.frame, &drive.speeds_rad_s, parameters.arm_m));
+        let [speeds, squares] = [&drive.speeds_rad_s, &drive.squares].map(|values| self.frame.sums(values));
+        self.held = self.drag.as_ref().map(|drag| drag.held(&speeds, parameters.arm_m));
         let ground = self.near(position_m.z, velocity_m_s.z);
         self.on_ground = ground.is_some_and(|ground| ground.touches(position_m.z, &axes()));
-        let load = Load::of_rotors(
-            parameters,
-            rig,
-            &self.frame,
-            [&drive.speeds_rad_s, &drive.squares],
-            self.thrust_ratio,
-            *a_force,
-            *a_moment,
-        );
+        let load = Load::of_rotors(parameters, rig, [&speeds, &squares], self.thrust_ratio, *a_force, *a_moment);
         (load, self.surroundings(parameters, position_m.z, velocity_m_s.z))
     }
 
     /// Returns the load of the rotors at their present speeds, before the first step.
     pub(crate) fn start(&self, segment: &Segment) -> Load {
         let Segment { parameters, rig, a_force, a_moment, .. } = segment;
-        let speeds = &self.spin.speeds_rad_s;
-        Load::of_rotors(
-            parameters,
-            rig,
-            &self.frame,
-            [speeds, &self.spin.squares()],
-            self.thrust_ratio,
-            *a_force,
-            *a_moment,
-        )
+        let [speeds, squares] = [self.spin.speeds_rad_s, self.spin.squares()].map(|values| self.frame.sums(&values));
+        Load::of_rotors(parameters, rig, [&speeds, &squares], self.thrust_ratio, *a_force, *a_moment)
     }
 
     /// Returns air and ground for a vehicle at this height and climb rate, with the wind and rotors of the last step.

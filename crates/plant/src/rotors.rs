@@ -4,7 +4,7 @@ use crate::battery::{Battery, Charge, Discharge, Sag};
 use crate::delay::{DelayLine, whole_steps};
 use crate::frame;
 use crate::frame::{Frame, Lanes};
-use afbc_types::{Declared, OutOfRange, Parameters, Range, parameters};
+use afbc_types::{Declared, OutOfRange, Parameters, ROTORS_MAX, Range, parameters};
 use alloc::vec::Vec;
 use libm::exp;
 
@@ -184,16 +184,33 @@ impl Spin {
         // max first, so that it replaces NaN.
         let floor = self.rotors.min_rad_s;
         let command = self.commands.pass(*command_rad_s);
-        let target = frame.masked(&command.map(|w| (w * scale).max(floor).min(ceiling)));
-        let middle = target + (self.speeds_rad_s - target) * self.half_step;
-        self.speeds_rad_s = target + (middle - target) * self.half_step;
-
-        let squares = middle.component_mul(&middle).component_mul(&self.efficiency);
+        let target = |w: f64| (w * scale).max(floor).min(ceiling);
+        let drive = if frame.count() == frame::FEW {
+            self.follow::<{ frame::FEW }>(frame, &command, target)
+        } else {
+            self.follow::<ROTORS_MAX>(frame, &command, target)
+        };
         if let Some(battery) = &mut self.battery {
             // Drag moment times speed; the energy that accelerates the rotors is returned when they slow down.
-            battery.supply(drag_factor_n_m_s2 * frame::power(&squares, &middle));
+            battery.supply(drag_factor_n_m_s2 * frame::power(&drive.squares, &drive.speeds_rad_s));
         }
-        Drive { speeds_rad_s: middle, squares }
+        drive
+    }
+
+    /// Advances the speeds of the first `N` rotors toward `target` of their commands; there are no others.
+    #[inline]
+    fn follow<const N: usize>(&mut self, frame: &Frame, command: &Lanes, target: impl Fn(f64) -> f64) -> Drive {
+        let mut drive = Drive { speeds_rad_s: Lanes::zeros(), squares: Lanes::zeros() };
+        let present = command.as_slice().iter().zip(frame.present().as_slice());
+        let speeds = self.speeds_rad_s.as_mut_slice().iter_mut().zip(self.efficiency.as_slice());
+        let driven = drive.speeds_rad_s.as_mut_slice().iter_mut().zip(drive.squares.as_mut_slice());
+        for (((command, present), (speed, efficiency)), (middle, square)) in present.zip(speeds).zip(driven).take(N) {
+            let target = present * target(*command);
+            *middle = target + (*speed - target) * self.half_step;
+            *speed = target + (*middle - target) * self.half_step;
+            *square = *middle * *middle * efficiency;
+        }
+        drive
     }
 
     /// Returns the squares of the present speeds times each rotor's efficiency \[rad2/s2\].

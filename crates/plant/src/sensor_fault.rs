@@ -47,6 +47,12 @@ impl SensorFaults {
         SensorFaults { faults: faults.iter().map(|fault| (*fault, None)).collect() }
     }
 
+    /// True if no sensor ever fails.
+    #[inline]
+    pub fn are_none(&self) -> bool {
+        self.faults.is_empty()
+    }
+
     /// Returns `motion` at `time_s` as faulty sensors see it. To be called in every step.
     pub fn seen(&mut self, motion: &Motion, time_s: f64) -> Motion {
         let mut seen = *motion;

@@ -36,12 +36,12 @@ impl Deviations {
     /// Draws normal numbers of these standard deviations.
     #[inline]
     fn draw(&self, noise: &mut Noise) -> Motion {
-        let mut three = |size: f64| Vector3::new(noise.normal(), noise.normal(), noise.normal()) * size;
+        let [x, y, z, u, v, w, phi, theta, psi, p, q, r] = noise.normals();
         Motion {
-            position_m: three(self.position_m),
-            velocity_m_s: three(self.velocity_m_s),
-            attitude_rad: three(self.attitude_rad),
-            rates_rad_s: three(self.rates_rad_s),
+            position_m: Vector3::new(x, y, z) * self.position_m,
+            velocity_m_s: Vector3::new(u, v, w) * self.velocity_m_s,
+            attitude_rad: Vector3::new(phi, theta, psi) * self.attitude_rad,
+            rates_rad_s: Vector3::new(p, q, r) * self.rates_rad_s,
         }
     }
 }

@@ -45,13 +45,14 @@ impl<'a> Surroundings<'a> {
         axes: &BodyAxes,
         rates_rad_s: &Vector3<f64>,
     ) -> (Vector3<f64>, Vector3<f64>) {
-        let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
-        if let Some(drag) = &self.drag {
-            let airspeed = axes.to_body(&(velocity_m_s - self.wind_m_s));
-            let (drag_force, drag_moment) = drag.wrench(&airspeed, rates_rad_s);
-            force += axes.to_earth(&drag_force);
-            moment += drag_moment;
-        }
+        let (mut force, mut moment) = match &self.drag {
+            Some(drag) => {
+                let airspeed = axes.to_body(&(velocity_m_s - self.wind_m_s));
+                let (force, moment) = drag.wrench(&airspeed, rates_rad_s);
+                (axes.to_earth(&force), moment)
+            }
+            None => (Vector3::zeros(), Vector3::zeros()),
+        };
         if let Some(ground) = self.ground {
             let (ground_force, ground_moment) = ground.wrench(height_m, velocity_m_s, axes, rates_rad_s);
             force += ground_force;

@@ -194,10 +194,10 @@ impl Eddies {
             self.refresh(height_m, airspeed_m_s());
         }
         self.remaining -= 1;
-        let noise = &mut self.noise;
-        self.along.step(&mut self.u, noise.normal());
-        self.lateral.step(&mut self.v, [noise.normal(), noise.normal()]);
-        self.vertical.step(&mut self.w, [noise.normal(), noise.normal()]);
+        let [along, lateral, lateral_dot, vertical, vertical_dot] = self.noise.normals();
+        self.along.step(&mut self.u, along);
+        self.lateral.step(&mut self.v, [lateral, lateral_dot]);
+        self.vertical.step(&mut self.w, [vertical, vertical_dot]);
         let Intensity { horizontal_m_s, vertical_m_s, .. } = self.intensity;
         Vector3::new(horizontal_m_s * self.u, horizontal_m_s * self.v.velocity(), vertical_m_s * self.w.velocity())
     }

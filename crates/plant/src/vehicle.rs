@@ -194,24 +194,24 @@ impl Plant {
 
     /// Returns what instruments feel now: the motion with its accelerations under the forces of the last step.
     pub fn truth(&self) -> Truth {
-        let (parameters, motion) = (&self.segment.parameters, self.motion());
-        let surroundings = self.effects.as_ref().map(|effects| {
-            let (height_m, climb_m_s) = (motion.position_m.z, motion.velocity_m_s.z);
-            effects.surroundings(parameters, height_m, climb_m_s)
-        });
+        let parameters = &self.segment.parameters;
+        let (position_m, velocity_m_s) = self.body.place();
+        let surroundings =
+            self.effects.as_ref().map(|effects| effects.surroundings(parameters, position_m.z, velocity_m_s.z));
         let (acceleration_m_s2, angular) = self.body.accelerations(&self.load, surroundings.as_ref());
         let (attitude, rates_rad_s, angular_acceleration_rad_s2) = match &self.body {
-            Body::RigidBody(x) => ([x[6], x[7], x[8], x[9]], motion.rates_rad_s, angular),
-            Body::Simplified(_) => {
-                let (rates, angular) = simplified::body_rates(&motion.attitude_rad, &motion.rates_rad_s, &angular);
-                (rigid_body::quaternion(&motion.attitude_rad), rates, angular)
+            Body::RigidBody(x) => ([x[6], x[7], x[8], x[9]], Vector3::new(x[10], x[11], x[12]), angular),
+            Body::Simplified(x) => {
+                let Motion { attitude_rad, rates_rad_s, .. } = simplified::motion(x);
+                let (rates, angular) = simplified::body_rates(&attitude_rad, &rates_rad_s, &angular);
+                (rigid_body::quaternion(&attitude_rad), rates, angular)
             }
         };
         let [w, x, y, z] = attitude;
         Truth {
             time_s: self.time_s,
-            position_m: motion.position_m,
-            velocity_m_s: motion.velocity_m_s,
+            position_m,
+            velocity_m_s,
             attitude: Quaternion::new(w, x, y, z),
             rates_rad_s,
             acceleration_m_s2,

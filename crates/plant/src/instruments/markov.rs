@@ -31,6 +31,7 @@ impl Markov {
 }
 
 /// Draws three normal numbers.
+#[inline]
 pub(super) fn draw(random: &mut Noise) -> Vector3<f64> {
-    Vector3::new(random.normal(), random.normal(), random.normal())
+    Vector3::from(random.normals())
 }

@@ -5,7 +5,7 @@ use crate::frame::Lanes;
 use crate::noise::{Noise, Stream};
 use crate::truth::Truth;
 use core::f64::consts::TAU;
-use libm::{cos, floor, sin};
+use libm::{cos, floor, sin, sincos};
 use nalgebra::Vector3;
 
 /// Harmonics of each rotor's frequency that the body vibrates at.
@@ -53,14 +53,15 @@ impl Vibration {
         let now = truth.rotor_speeds_rad_s;
         let mean = (self.speeds_rad_s.unwrap_or(now) + now) * 0.5;
         self.speeds_rad_s = Some(now);
-        let rotors = self.angle.iter_mut().zip(mean.iter()).zip(now.iter()).zip(&self.phases);
+        let turning = self.angle.as_mut_slice().iter_mut().zip(mean.as_slice()).zip(now.as_slice());
+        let rotors = turning.zip(&self.phases);
         for (((angle, mean), speed), phases) in rotors {
             if *speed == 0.0 && *mean == 0.0 {
                 continue;
             }
             let turned = *angle + mean * self.step_s;
             *angle = turned - TAU * floor(turned / TAU);
-            let (c, s) = (cos(*angle), sin(*angle));
+            let (s, c) = sincos(*angle);
             let growth = (speed / truth.hover_rad_s) * (speed / truth.hover_rad_s);
             // Cosine and sine of k theta.
             let (mut ck, mut sk, mut k) = (1.0, 0.0, 0.0);

@@ -225,7 +225,7 @@ impl Navigator {
     /// Returns the normalised estimation error squared of rotation, velocity and position; not a number if the
     /// covariance is not positive.
     fn nees(&self, estimate: &Estimate, truth: &Truth) -> f64 {
-        let rows = self.memory.covariance();
+        let rows = self.memory.covariance_of_motion();
         let at = |i: usize, j: usize| rows.get(i).and_then(|row| row.get(j)).map_or(f64::NAN, |&cell| f64::from(cell));
         // Scaled, so that units do not matter.
         let covariance = SMatrix::<f64, 9, 9>::from_fn(at);

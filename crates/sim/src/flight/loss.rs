@@ -67,7 +67,7 @@ impl Watch {
         let height_m = motion.position_m.z;
         let below_m = reference.position_m.z - height_m;
         let touches = sample.telemetry.is_some_and(|telemetry| telemetry.on_ground);
-        let off = sample.action.speeds.0.max() == 0.0;
+        let off = !sample.action.speeds.0.as_slice().iter().any(|speed| *speed > 0.0);
         self.started |= !off;
         self.highest_m = self.highest_m.max(height_m);
         self.excused |= descends && time_s >= self.faulty_from_s;

@@ -135,10 +135,11 @@ impl World {
             wired.look(&self.plant.truth());
         }
         if let Some(navigator) = &mut self.navigator {
-            return navigated(navigator, &self.plant, self.trajectory.at(time_s));
+            return navigated(navigator, &self.plant, motion, self.trajectory.at(time_s));
         }
         let (state, measurement) = match &mut self.sensors {
             None => (Some(motion.measure()), None),
+            Some(sensors) if self.faults.are_none() => measure(sensors, &motion),
             Some(sensors) => measure(sensors, &self.faults.seen(&motion, time_s)),
         };
         let reference = self.trajectory.at(time_s);
@@ -180,8 +181,8 @@ impl View {
 /// Looks at the world with the vehicle's own instruments.
 // Not inlined, so that the step of an ideal flight stays short.
 #[inline(never)]
-fn navigated(navigator: &mut Navigator, plant: &Plant, reference: Reference) -> View {
-    let (time_s, motion, telemetry) = (plant.time_s(), plant.motion(), plant.telemetry());
+fn navigated(navigator: &mut Navigator, plant: &Plant, motion: Motion, reference: Reference) -> View {
+    let (time_s, telemetry) = (plant.time_s(), plant.telemetry());
     let Look { state, adrift, pose, estimated } = navigator.look(&plant.truth());
     View {
         time_s,
