@@ -54,8 +54,8 @@ impl Load {
     }
 
     /// Computes the load of rotors from sums over their `speeds` \[rad/s\] and over the `squares` of these \[rad2/s2\],
-    /// already multiplied by their efficiency, from which drag moments and thrusts follow; thrusts are also multiplied by
-    /// `thrust_ratio`.
+    /// already multiplied by their efficiency, from which drag moments and thrusts follow; thrusts are also multiplied
+    /// by `thrust_ratio`.
     #[inline]
     pub(crate) fn of_rotors(
         parameters: &Parameters<f64>,
