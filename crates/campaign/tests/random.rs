@@ -1,5 +1,5 @@
 //! The suite `random`: the same flights everywhere, fit for any vehicle, within its power.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)]
 
 use afbc_campaign::compare::standard_and_monitored;
 use afbc_campaign::random::{self, Change, Flight, Random, Seen};
