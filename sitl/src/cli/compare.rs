@@ -75,6 +75,9 @@ impl Compare {
             }
             return suite::run(&suite, &contenders, seeds, write, &place, &json);
         }
+        if let Some(option) = self.random.given() {
+            return Err(format!("{option}: only --suite random takes it; leave it out").into());
+        }
         let named = if self.scenarios.is_empty() { &[Target::from("hardware")][..] } else { &self.scenarios };
         let mut scenarios = named.iter().map(Target::scenario).collect::<Result<Vec<_>, _>>()?;
         let own = if self.scenarios.is_empty() { standard() } else { compare::contenders(&scenarios) };
