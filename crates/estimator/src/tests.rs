@@ -178,6 +178,16 @@ fn transition(interval: &Interval) -> M21 {
 const GROWTH: Growth = Growth { theta: 1e-6, velocity: 4e-4, gyro: 1e-9, accel: 1e-7, baro: 4e-4 };
 
 proptest! {
+    /// What errors are judged by is the corner of the whole matrix.
+    #[test]
+    fn the_motions_part_is_the_corner_of_the_whole(p in covariance()) {
+        let ours = blocks(&p);
+        let whole = ours.rows();
+        for (part, row) in ours.of_motion().iter().zip(&whole) {
+            prop_assert_eq!(&part[..], &row[..9]);
+        }
+    }
+
     #[test]
     fn prediction_is_f_p_f_plus_q(
         p in covariance(), turn in numbers::<3>(), thrust in numbers::<3>(), t in 1e-3..0.02_f64,

@@ -41,12 +41,14 @@ impl Reasons {
     /// Returns the answer to [`Request::Arm`](crate::Request::Arm).
     ///
     /// # Errors
-    /// The first of them.
+    /// The first of them in the order of [`Refusal::ARMING`], or else any.
     pub fn verdict(self) -> Result<(), Refusal> {
         if self.is_empty() {
             return Ok(());
         }
-        self.iter().next().map_or(Ok(()), Err)
+        // What is not in the order is a reason all the same.
+        let any = || Refusal::ALL.into_iter().find(|reason| self.contains(*reason));
+        Err(self.iter().next().or_else(any).unwrap_or(Refusal::Unhealthy))
     }
 }
 

@@ -252,3 +252,11 @@ fn reasons_are_a_set_in_the_order_of_arming() {
         }
     }
 }
+
+/// Whatever reason is noted speaks against arming, in the order or not.
+#[test]
+fn any_reason_speaks_against_arming() {
+    for reason in Refusal::ALL {
+        assert_eq!(Reasons::from(reason).verdict(), Err(reason));
+    }
+}

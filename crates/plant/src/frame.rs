@@ -16,15 +16,8 @@ pub struct Frame {
     count: usize,
     /// 1 for each rotor.
     present: Lanes,
-    /// Positions, in arm lengths.
-    x: Lanes,
-    y: Lanes,
-    /// x^2 + y^2
-    square: Lanes,
-    /// 1 for a rotor that pushes the body to positive yaw, -1 for the others.
-    spin: Lanes,
-    /// The same by rotor, as [`Frame::sums`] reads them: 1, yaw direction, x, y, x^2 + y^2, and 0 to fill a pair.
-    #[cfg_attr(feature = "serde", serde(skip))]
+    /// Of each rotor, as [`Frame::sums`] reads them: 1; 1 if it pushes the body to positive yaw, else -1; its position
+    /// x, y in arm lengths; x^2 + y^2; and 0 to fill a pair.
     weights: [[f64; 6]; ROTORS_MAX],
 }
 
@@ -74,16 +67,11 @@ impl Frame {
     }
 
     fn of(rotors: &[Rotor<f64>]) -> Self {
-        let lanes = |of: fn(&Rotor<f64>) -> f64| Lanes::from_fn(|i, _| rotors.get(i).map_or(0.0, of));
         let square = |rotor: &Rotor<f64>| rotor.x * rotor.x + rotor.y * rotor.y;
         let weights = |rotor: &Rotor<f64>| [1.0, rotor.spin(), rotor.x, rotor.y, square(rotor), 0.0];
         Frame {
             count: rotors.len(),
-            present: lanes(|_| 1.0),
-            x: lanes(|rotor| rotor.x),
-            y: lanes(|rotor| rotor.y),
-            square: lanes(|rotor| rotor.x * rotor.x + rotor.y * rotor.y),
-            spin: lanes(Rotor::spin),
+            present: Lanes::from_fn(|i, _| if i < rotors.len() { 1.0 } else { 0.0 }),
             weights: core::array::from_fn(|i| rotors.get(i).map_or([0.0; 6], weights)),
         }
     }
@@ -95,7 +83,7 @@ impl Frame {
 
     /// Square of the distance of the outermost rotor from body z, in arm lengths.
     pub(crate) fn square_max(&self) -> f64 {
-        self.square.max()
+        self.weights.iter().fold(0.0, |most, [.., square, _]| square.max(most))
     }
 
     /// 1 for each rotor.
@@ -118,12 +106,8 @@ impl Frame {
         if x == 0.0 && y == 0.0 && spin == 0.0 {
             return equal;
         }
-        let b = Matrix4xX8::from_rows(&[
-            self.y.transpose(),
-            -self.x.transpose(),
-            self.spin.transpose(),
-            self.present.transpose(),
-        ]);
+        let columns = self.weights.map(|[one, spin, x, y, ..]| Vector4::new(y, -x, spin, one));
+        let b = Matrix4xX8::from_columns(&columns);
         let shares = (b * b.transpose()).try_inverse().map(|inverse| b.transpose() * inverse * Vector4::w());
         // Rotors only push.
         shares.filter(|shares| shares.min() >= 0.0).unwrap_or(equal)

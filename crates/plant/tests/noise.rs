@@ -61,6 +61,17 @@ fn streams_and_seeds_are_independent_and_reproducible() {
     }
 }
 
+#[test]
+fn several_at_once_are_those_one_by_one() {
+    let (mut at_once, mut one_by_one) = (Noise::new(7, Stream::Imu), Noise::new(7, Stream::Imu));
+    // Long enough for tails and edges of layers.
+    for _ in 0..100_000 {
+        let five: [f64; 5] = at_once.normals();
+        assert_eq!(five, [(); 5].map(|()| one_by_one.normal()));
+    }
+    assert_eq!(at_once, one_by_one);
+}
+
 /// Flights are reproduced by seed, also by later versions: these bits must never change.
 #[test]
 fn random_numbers_never_change() {

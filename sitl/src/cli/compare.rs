@@ -1,13 +1,12 @@
 //! `sitl compare`.
 
-use super::json::Json;
 use super::log_rate::LogRate;
-use super::place::Place;
 use super::progress::Progress;
 use super::target::Target;
-use super::terminal::{Failure, print};
+use super::terminal::Failure;
 use super::vehicle::OnVehicle;
-use super::{interrupt, json, random, suite};
+use super::written::{Output, show};
+use super::{interrupt, random, suite};
 use afbc_campaign::compare::{self, standard};
 use afbc_report::compare as report;
 use afbc_sim::contender::Contender;
@@ -31,10 +30,6 @@ pub(crate) struct Compare {
     #[arg(long, value_name = "SUITE", conflicts_with = "scenarios")]
     suite: Option<PathBuf>,
 
-    /// Write the suite's table into this page, between its two markers, and nothing else
-    #[arg(long, value_name = "PAGE", requires = "suite", conflicts_with_all = ["json", "out", "force"])]
-    write: Option<PathBuf>,
-
     /// Contenders to fly instead, by name: those of the scenarios, any law (afbc, pid...), afbc-as-printed; with
     /// `--suite` also afbc-monitored
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
@@ -49,10 +44,7 @@ pub(crate) struct Compare {
     on: OnVehicle,
 
     #[command(flatten)]
-    place: Place,
-
-    #[command(flatten)]
-    json: Json,
+    output: Output,
 
     #[command(flatten)]
     random: random::Options,
@@ -64,16 +56,16 @@ impl Compare {
         if let Some(path) = &self.suite {
             let own = compare::standard_and_monitored();
             let contenders = if self.controllers.is_empty() { own } else { choose(&own, &self.controllers)? };
-            let Compare { random, seeds, write, place, json, .. } = self;
+            let Compare { random, seeds, output, .. } = self;
             if random::is_named(path) {
-                return random.run(self.on.vehicle()?, &contenders, seeds, write, &place, &json);
+                return random.run(self.on.vehicle()?, &contenders, seeds, &output);
             }
             let suite = suite::named(path)?;
             if let Some(option) = self.on.vehicle()?.map(|_| "--vehicle").or_else(|| random.given()) {
                 let cure = "only --suite random takes it, this suite's flights are in its file; leave it out";
                 return Err(format!("{option}: {cure}").into());
             }
-            return suite::run(&suite, &contenders, seeds, write, &place, &json);
+            return suite::run(&suite, &contenders, seeds, &output);
         }
         if let Some(option) = self.random.given() {
             return Err(format!("{option}: only --suite random takes it; leave it out").into());
@@ -88,7 +80,8 @@ impl Compare {
         }
         let log_every = LogRate::common(&scenarios)?;
         interrupt::ends_it()?;
-        let folder = self.place.open("compare", "compare")?;
+        let Output { place, json, .. } = self.output;
+        let folder = place.open("compare", "compare")?;
         let flights: u64 = scenarios.iter().map(|scenario| scenario.contenders.len() as u64 * self.seeds).sum();
         let progress = Progress::new("compare", "flights", flights, 0);
         let comparisons = compare::fly(scenarios, self.seeds, log_every, &|| progress.add(1))?;
@@ -96,18 +89,8 @@ impl Compare {
 
         interrupt::is_too_late();
         let written = report::write(&folder, &comparisons)?;
-        if self.json.json {
-            json::print_written(|out| report::json(out, &comparisons))?;
-            return Ok(ExitCode::SUCCESS);
-        }
-        let (table, page) = (report::table(&comparisons), folder.path().join("report.html"));
-        print(&format!(
-            "{}\n\n{} files in {}; open {}\n",
-            table.trim_end(),
-            written.len(),
-            folder.path().display(),
-            page.display()
-        ))?;
+        let object = |out: &mut Vec<u8>| report::json(out, &comparisons);
+        show(&folder, written.len(), json, object, || report::table(&comparisons))?;
         Ok(ExitCode::SUCCESS)
     }
 }

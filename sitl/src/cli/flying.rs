@@ -1,10 +1,11 @@
 //! Options, flights and output shared by `paper` and `fly`.
 
+use super::interrupt;
 use super::json::Json;
 use super::log_rate::LogRate;
 use super::progress::Progress;
-use super::terminal::{Failure, print, say};
-use super::{interrupt, json};
+use super::terminal::{Failure, say};
+use super::written::show;
 use afbc_files::Folder;
 use afbc_report::claims::Claim;
 use afbc_report::flights;
@@ -85,10 +86,5 @@ fn progress(scenarios: &[Scenario]) -> Progress {
 pub(crate) fn report(folder: &Folder, flown: &[Flown], claims: &[Claim], json: Json) -> Result<(), Failure> {
     interrupt::is_too_late();
     let written = flights::write(folder, flown, claims)?;
-    if json.json {
-        return json::print_written(|out| flights::json(out, flown));
-    }
-    let (table, out) = (flights::table(flown, claims), folder.path());
-    let (count, page) = (written.len(), out.join("report.html"));
-    print(&format!("{}\n\n{count} files in {}; open {}\n", table.trim_end(), out.display(), page.display()))
+    show(folder, written.len(), json, |out| flights::json(out, flown), || flights::table(flown, claims))
 }

@@ -26,6 +26,7 @@ mod target;
 mod terminal;
 mod tune;
 mod vehicle;
+mod written;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

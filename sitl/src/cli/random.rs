@@ -1,10 +1,9 @@
 //! `sitl compare --suite random`: flights drawn over vehicles.
 
-use super::json::Json;
-use super::place::Place;
 use super::progress::Progress;
-use super::terminal::{Failure, print};
-use super::{interrupt, json, page};
+use super::terminal::Failure;
+use super::written::{Output, show};
+use super::{interrupt, page};
 use afbc_campaign::random::{self, FLIGHTS, Flown, NAME, Random, Seen};
 use afbc_reader::BuiltIn;
 use afbc_report::random::{self as report, Judged};
@@ -12,7 +11,7 @@ use afbc_report::suite::markers;
 use afbc_sim::contender::Contender;
 use afbc_vehicles::{BUILT_IN, Vehicle};
 use clap::{Args, ValueEnum};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// One line on the suite.
@@ -76,9 +75,7 @@ impl Options {
         vehicle: Option<Vehicle>,
         contenders: &[Contender],
         seeds: u64,
-        write: Option<PathBuf>,
-        place: &Place,
-        json: &Json,
+        Output { write, place, json }: &Output,
     ) -> Result<ExitCode, Failure> {
         let against = self.against.as_deref().unwrap_or("afbc");
         if self.against.is_some() && contenders.iter().all(|contender| contender.name != against) {
@@ -101,7 +98,7 @@ impl Options {
         };
         if let Some(path) = write {
             let [begin, end] = markers(NAME);
-            page::write(&path, [&begin, &end], || {
+            page::write(path, [&begin, &end], || {
                 let flown = fly(&random, contenders, || Ok(()))?;
                 Ok(report::markdown(&Judged::new(&random, &flown, against)))
             })?;
@@ -115,13 +112,7 @@ impl Options {
         let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };
         let judged = Judged::new(&random, &flown, against);
         let written = report::write(&folder, &judged)?;
-        if json.json {
-            json::print_written(|out| report::json(out, &judged))?;
-            return Ok(ExitCode::SUCCESS);
-        }
-        let (table, folder) = (report::table(&judged), folder.path());
-        let (count, page) = (written.len(), folder.join("report.html"));
-        print(&format!("{table}\n{count} files in {}; open {}\n", folder.display(), page.display()))?;
+        show(&folder, written.len(), *json, |out| report::json(out, &judged), || report::table(&judged))?;
         Ok(ExitCode::SUCCESS)
     }
 }

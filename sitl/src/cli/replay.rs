@@ -1,9 +1,10 @@
 //! `sitl replay`.
 
 use super::interrupt;
-use super::json::{self, Json};
+use super::json::Json;
 use super::place::Place;
-use super::terminal::{Failure, print};
+use super::terminal::Failure;
+use super::written::show;
 use afbc_estimator::Settings;
 use afbc_reader::FileError;
 use afbc_replay::Start;
@@ -65,13 +66,7 @@ impl Replay {
         interrupt::is_too_late();
         let replay = report::Replay { name: &name, recording: &recording, replayed: &replayed };
         let written = report::write(&folder, &replay)?;
-        if self.json.json {
-            json::print_written(|out| report::json(out, &replay))?;
-            return Ok(ExitCode::SUCCESS);
-        }
-        let (table, out) = (report::table(&replay), folder.path());
-        let (count, page) = (written.len(), out.join("report.html"));
-        print(&format!("{}\n\n{count} files in {}; open {}\n", table.trim_end(), out.display(), page.display()))?;
+        show(&folder, written.len(), self.json, |out| report::json(out, &replay), || report::table(&replay))?;
         Ok(ExitCode::SUCCESS)
     }
 }

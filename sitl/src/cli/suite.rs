@@ -1,11 +1,10 @@
 //! `sitl compare --suite` and `sitl suites`: named lists of flights.
 
-use super::json::Json;
 use super::log_rate::LogRate;
-use super::place::Place;
 use super::progress::Progress;
 use super::terminal::{Failure, print};
-use super::{interrupt, json, page, random};
+use super::written::{Output, show};
+use super::{interrupt, page, random};
 use afbc_campaign::compare::{self, Comparison};
 use afbc_campaign::random::NAME;
 use afbc_campaign::suite::{SUITES, Suite, parse};
@@ -14,7 +13,7 @@ use afbc_report::suite::{self as report, Flown};
 use afbc_sim::contender::Contender;
 use clap::Args;
 use std::ffi::OsStr;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// List the built-in suites of flights, or print one of them to start from
@@ -79,13 +78,11 @@ pub(super) fn run(
     suite: &Suite,
     contenders: &[Contender],
     seeds: u64,
-    write: Option<PathBuf>,
-    place: &Place,
-    json: &Json,
+    Output { write, place, json }: &Output,
 ) -> Result<ExitCode, Failure> {
     if let Some(path) = write {
         let [begin, end] = report::markers(&suite.name);
-        page::write(&path, [&begin, &end], || {
+        page::write(path, [&begin, &end], || {
             let comparisons = fly(suite, contenders, seeds, || Ok(()))?;
             Ok(report::markdown(Flown { suite, comparisons: &comparisons }))
         })?;
@@ -99,14 +96,7 @@ pub(super) fn run(
     let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };
     let flown = Flown { suite, comparisons: &comparisons };
     let written = report::write(&folder, flown)?;
-    if json.json {
-        json::print_written(|out| report::json(out, flown))?;
-        return Ok(ExitCode::SUCCESS);
-    }
-    let (table, folder) = (report::table(flown), folder.path());
-    let page = folder.join("report.html");
-    let (count, folder) = (written.len(), folder.display());
-    print(&format!("{}\n\n{count} files in {folder}; open {}\n", table.trim_end(), page.display()))?;
+    show(&folder, written.len(), *json, |out| report::json(out, flown), || report::table(flown))?;
     Ok(ExitCode::SUCCESS)
 }
 
