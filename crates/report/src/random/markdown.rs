@@ -5,9 +5,9 @@ use super::cells::{cells, heads, legend, notes};
 use crate::table::wrap;
 use core::fmt::Write;
 
-/// Formats as Markdown: what was flown, a table for each vehicle and one for all, what the columns are.
+/// Formats as Markdown: what was drawn, a table for each vehicle and one for all, what the columns are.
 pub fn markdown(judged: &Judged<'_>) -> String {
-    let mut page = paragraph(&format!("{}.", judged.words()));
+    let mut page = paragraph(&format!("Drawn from {}.", judged.words()));
     let escaped = |cell: &str| cell.replace('[', "\\[").replace(']', "\\]");
     for group in &judged.groups {
         let heads = heads(judged).map(|head| escaped(&head));
