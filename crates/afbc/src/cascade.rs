@@ -1,12 +1,14 @@
 //! Six subsystems in one cascade: position gives thrust and desired attitude, attitude gives U1..U3, and all give rotor
 //! speeds. Section III-D, Fig. 2.
 
-use crate::disturbance::{DisturbanceObserver, Observed, Observer};
+use crate::disturbance::{DisturbanceObserver, MomentObserver, Observed, Observer, Turning};
 use crate::law::{Context, Law, Tracking};
 use crate::limits::Limits;
 use crate::model::{Model, RollPitch, euler_rates};
 use crate::reference::{Detours, Reference, ReferenceModel};
+use crate::rotation::Turn;
 use crate::standstill::Standstill;
+use crate::tilt::Tilt;
 use afbc_control::command_filter::{BANDWIDTH, CommandFilter, Filtered};
 use afbc_control::mixer::{Allocation, Mixer};
 use afbc_control::{Action, Errors, Estimate, FlightController, Smoothed, Smoother, Smoothing, Trace, math};
@@ -16,6 +18,15 @@ use nalgebra::Vector3;
 /// Smallest vertical thrust over weight that the tilt is computed with, since a sinking vehicle must not tilt further.
 /// Not in the paper.
 pub const VERTICAL_MIN: f32 = 0.3;
+
+/// Smallest and largest factor of U1..U3 for rotors that are weaker or stronger than the model's, as far as the learnt
+/// hover thrust over the weight tells: a heavier vehicle, which may be no harder to turn, takes more thrust as well.
+/// Not in the paper.
+pub const EFFORT_MIN: f32 = 0.7;
+/// See [`EFFORT_MIN`].
+pub const EFFORT_MAX: f32 = 1.8;
+/// Bandwidth with which the factor follows the learnt hover thrust \[rad/s\]: no hand-over between laws makes it jump.
+const EFFORT_RAD_S: f32 = 5.0;
 
 parameters! {
     /// Settings of the cascade around the law. The defaults are the paper's.
@@ -49,6 +60,10 @@ parameters! {
         /// filter's second derivative, which is mostly noise.
         #[switch(FEED_FORWARD)]
         pub feed_forward: bool = false,
+        /// Whether errors of the attitude are those of the rotation to the desired one, tilt before yaw, and rates
+        /// those of the body, instead of differences and derivatives of Euler angles.
+        #[switch(ROTATION)]
+        pub by_rotation: bool = false,
         /// Observer of the horizontal acceleration that the model does not know, for a law that is given what is known.
         #[group("")]
         pub disturbance: DisturbanceObserver = DisturbanceObserver::DEFAULT,
@@ -73,16 +88,23 @@ impl Settings {
     /// and filters of the inputs follow. Limits of speed and acceleration stay, since they belong to the task. Not in
     /// the paper.
     #[must_use]
-    pub fn slowed(self, slowness: f32) -> Self {
+    pub fn slowed(self, slowness: f32, lag_s: f32) -> Self {
         let Settings { command_filter_rad_s, limits, disturbance, reference, smoothing, .. } = self;
         Settings {
             command_filter_rad_s: command_filter_rad_s / slowness,
             limits: Limits { tilt_rate_max_rad_s: limits.tilt_rate_max_rad_s / slowness, ..limits },
-            disturbance: disturbance.slowed(slowness),
+            disturbance: disturbance.slowed(slowness, lag_s),
             reference: reference.slowed(slowness),
             smoothing: smoothing.slowed(slowness),
             ..self
         }
+    }
+
+    /// Returns the settings with this known drag.
+    #[must_use]
+    pub const fn with_drag(mut self, drag: afbc_control::drag::KnownDrag) -> Self {
+        self.common.drag = drag;
+        self
     }
 
     /// Returns the settings with another largest rotor force.
@@ -100,12 +122,16 @@ pub struct Controller<L, const N: usize = 4> {
     /// Nominal model for the feed-forward.
     model: Model,
     observer: Option<Observer>,
+    moments: Option<MomentObserver>,
     reference: Option<Reference>,
     smoother: Smoother,
     mixer: Mixer<N>,
     filter: CommandFilter,
     settings: Settings,
     weight_n: f32,
+    inverse_weight: f32,
+    /// Share of the effort that is replaced per step.
+    effort_share: f32,
     gravity_m_s2: f32,
     inverse_gravity: f32,
     /// Lag 1/w of the command filter \[s\].
@@ -151,6 +177,10 @@ pub struct Cascade<E> {
     pub(crate) turning: [Vector3<f32>; 2],
     /// See [`Observer`]; none before the first step.
     pub(crate) observed: Option<Observed>,
+    /// See [`MomentObserver`]; none before the first step.
+    turned: Option<Turning>,
+    /// Factor of U1..U3 for weak rotors, less one: see [`EFFORT_MIN`].
+    more_effort: f32,
     /// See [`Reference`]; none before the first step.
     detours: Option<Detours>,
     /// See [`Smoother`].
@@ -161,7 +191,7 @@ impl<E> Cascade<E> {
     /// Returns the memory with the estimates of another law, which starts with this rotor residual.
     pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>, rotor_residual_rad_s: f32) -> Cascade<F> {
         let Cascade { errors, distances, inputs, asked, desired, unallocated, standstill, .. } = *self;
-        let Cascade { turning, observed, detours, smoothed, .. } = *self;
+        let Cascade { turning, observed, turned, more_effort, detours, smoothed, .. } = *self;
         Cascade {
             estimates,
             errors,
@@ -174,6 +204,8 @@ impl<E> Cascade<E> {
             rotor_residual_rad_s,
             turning,
             observed,
+            turned,
+            more_effort,
             detours,
             smoothed,
         }
@@ -207,41 +239,6 @@ fn within([x, y]: [f32; 2], max: f32) -> [f32; 2] {
     [x * scale, y * scale]
 }
 
-/// Desired roll and pitch, and how they turn with the horizontal acceleration.
-struct Tilt {
-    sin_psi: f32,
-    cos_psi: f32,
-    /// phi_d, theta_d of (40) \[rad\].
-    rad: [f32; 2],
-    /// Derivatives of (40) with yaw and thrust held: d phi/d tan phi cos theta and d theta/d tan theta, over the
-    /// vertical acceleration.
-    gains: [f32; 2],
-}
-
-impl Tilt {
-    #[inline(always)]
-    fn new(u5: f32, u6: f32, [sin_psi, cos_psi]: [f32; 2], inverse_vertical: f32) -> Self {
-        let tan_theta = (u5 * cos_psi + u6 * sin_psi) * inverse_vertical;
-        // cos(atan t) = 1 / sqrt(1 + t^2)
-        let cos_theta = 1.0 / math::sqrt(1.0 + tan_theta * tan_theta);
-        let tan_phi = (u5 * sin_psi - u6 * cos_psi) * inverse_vertical * cos_theta;
-        let roll = cos_theta * inverse_vertical / (1.0 + tan_phi * tan_phi);
-        Tilt {
-            sin_psi,
-            cos_psi,
-            rad: [math::atan(tan_phi), math::atan(tan_theta)],
-            gains: [roll, cos_theta * cos_theta * inverse_vertical],
-        }
-    }
-
-    /// Returns the derivatives of roll and pitch for that of the acceleration, along x and y.
-    #[inline]
-    fn turned(&self, x: f32, y: f32) -> [f32; 2] {
-        let [roll, pitch] = self.gains;
-        [(x * self.sin_psi - y * self.cos_psi) * roll, (x * self.cos_psi + y * self.sin_psi) * pitch]
-    }
-}
-
 impl<L: Law, const N: usize> Controller<L, N> {
     /// Creates a controller for a vehicle with these nominal parameters.
     ///
@@ -269,7 +266,14 @@ impl<L: Law, const N: usize> Controller<L, N> {
             model,
             // Of a law that is not given what is known, it would be no use.
             observer: (settings.feed_forward && L::OBSERVES)
-                .then(|| Observer::new(&settings.disturbance, &vehicle.parameters, settings.common.dt_s))
+                .then(|| Observer::new(&settings.disturbance, &settings.common, &vehicle.parameters))
+                .transpose()?
+                .flatten(),
+            moments: (settings.feed_forward && L::OBSERVES)
+                .then(|| {
+                    let (dt_s, thrust_max_n) = (settings.common.dt_s, mixer.thrust_max_n());
+                    MomentObserver::new(&settings.disturbance, &vehicle.parameters, thrust_max_n, dt_s)
+                })
                 .flatten(),
             reference: Reference::new(&settings.reference, &settings.limits, settings.common.dt_s),
             smoother: Smoother::new(&settings.smoothing, settings.common.dt_s)?,
@@ -277,6 +281,8 @@ impl<L: Law, const N: usize> Controller<L, N> {
                 .limited(settings.limits.tilt_rate_max_rad_s)?,
             settings,
             weight_n: vehicle.parameters.weight_n(),
+            inverse_weight: 1.0 / vehicle.parameters.weight_n(),
+            effort_share: 1.0 - math::exp(-EFFORT_RAD_S * settings.common.dt_s),
             gravity_m_s2,
             inverse_gravity: 1.0 / gravity_m_s2,
             command_lag_s: 1.0 / settings.command_filter_rad_s,
@@ -358,13 +364,25 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let roll_pitch = RollPitch::new(state);
         let hover_n = self.hover_thrust_n(memory);
         let heading = [math::sin(state.attitude_rad.z), math::cos(state.attitude_rad.z)];
+        let r = roll_pitch.r_earth_body(heading);
+        let up: Vector3<f32> = r.column(2).into();
         let observed_m_s2 = match &self.observer {
-            Some(observer) => {
-                observer.advance(&mut memory.observed, state, (&roll_pitch, heading), hover_n, [fresh, stands])
-            }
+            Some(observer) => observer.advance(&mut memory.observed, state, &up, hover_n, [fresh, stands]),
             None => {
                 memory.observed = None;
-                [0.0; 2]
+                Vector3::zeros()
+            }
+        };
+        let drag = &self.settings.common.drag;
+        let share = math::max(memory.asked.thrust_n, 0.0) / hover_n;
+        let observed_rad_s2 = match &self.moments {
+            Some(moments) => {
+                let known = drag.moment(&r.tr_mul(&state.velocity_m_s), share);
+                moments.advance(&mut memory.turned, &state.rates_rad_s, &known, [fresh, stands])
+            }
+            None => {
+                memory.turned = None;
+                Vector3::zeros()
             }
         };
         let Cascade { estimates, errors, unallocated, .. } = memory;
@@ -376,12 +394,17 @@ impl<L: Law, const N: usize> Controller<L, N> {
             adapt: fresh && !stands,
             unallocated,
             observed_m_s2,
+            turns_observed: self.moments.is_some(),
             known: self.settings.feed_forward.then_some(&self.model),
         };
         // References, so that no copy is spilled while a subsystem computes.
         let eta = &state.attitude_rad;
-        let eta_dot =
-            if self.settings.feed_forward { euler_rates(&state.rates_rad_s, &roll_pitch) } else { state.rates_rad_s };
+        let by_rotation = self.settings.by_rotation;
+        let eta_dot = if self.settings.feed_forward && !by_rotation {
+            euler_rates(&state.rates_rad_s, &roll_pitch)
+        } else {
+            state.rates_rad_s
+        };
         memory.turning = [*eta, eta_dot];
 
         // Position: subsystems 4, 5, 6.
@@ -411,12 +434,21 @@ impl<L: Law, const N: usize> Controller<L, N> {
             (self.gravity_m_s2, self.inverse_gravity)
         };
         let [a5, a6] = self.limited(u5, u6, vertical);
-        let tilt = Tilt::new(a5, a6, heading, inverse_vertical);
+        let heading_d = if self.settings.by_rotation {
+            [math::sin(reference.yaw_rad), math::cos(reference.yaw_rad)]
+        } else {
+            heading
+        };
+        let tilt = Tilt::new(a5, a6, heading_d, inverse_vertical);
         let (mut commanded, mut forward_rad_s2) = (tilt.rad, [0.0; 2]);
         if self.settings.feed_forward {
-            let (j, s) = (&reference.jerk_m_s3, &reference.snap_m_s4);
-            let rates = tilt.turned(j.x, j.y);
-            forward_rad_s2 = tilt.turned(s.x, s.y);
+            // Drag turns the thrust as it changes with the velocity.
+            let thrust = math::min(u4, self.thrust_max_n) / hover_n;
+            let j = reference.jerk_m_s3 - drag.change(v, &up, thrust, a);
+            let s = reference.snap_m_s4 - drag.change(v, &up, thrust, &reference.jerk_m_s3);
+            let turn = [reference.yaw_rate_rad_s, reference.yaw_acceleration_rad_s2];
+            let [rates, accelerations] = tilt.turned(&j, &s, turn);
+            forward_rad_s2 = accelerations;
             // Ahead of the filter by its lag: its output is then the angle that was meant.
             let lag_s = self.command_lag_s;
             for ((angle, rate), acceleration) in commanded.iter_mut().zip(rates).zip(forward_rad_s2) {
@@ -442,16 +474,48 @@ impl<L: Law, const N: usize> Controller<L, N> {
         } else {
             [self.filter.acceleration(&roll_d, phi_d), self.filter.acceleration(&pitch_d, theta_d)]
         };
-        let roll = track(eta.x, eta_dot.x, roll_d.angle - eta.x, roll_d.rate, roll_d_ddot);
+        let rates_d = Vector3::new(roll_d.rate, pitch_d.rate, reference.yaw_rate_rad_s);
+        let accelerations_d = Vector3::new(roll_d_ddot, pitch_d_ddot, reference.yaw_acceleration_rad_s2);
+        let Turn { error, rates, accelerations } = if by_rotation {
+            let desired = RollPitch::of(roll_d.angle, pitch_d.angle);
+            let towards = [&rates_d, &accelerations_d];
+            Turn::new(&r, &desired, heading_d, &state.rates_rad_s, towards)
+        } else {
+            let turn = math::wrap_angle(reference.yaw_rad - eta.z);
+            let error = Vector3::new(roll_d.angle - eta.x, pitch_d.angle - eta.y, turn);
+            Turn { error, rates: rates_d, accelerations: accelerations_d }
+        };
+        let roll = track(eta.x, eta_dot.x, error.x, rates.x, accelerations.x);
         let u1 = self.input(Axis::Roll, roll, &context, &mut estimates.roll, &mut errors.roll);
-        let pitch = track(eta.y, eta_dot.y, pitch_d.angle - eta.y, pitch_d.rate, pitch_d_ddot);
+        let pitch = track(eta.y, eta_dot.y, error.y, rates.y, accelerations.y);
         let u2 = self.input(Axis::Pitch, pitch, &context, &mut estimates.pitch, &mut errors.pitch);
-        let turn = math::wrap_angle(reference.yaw_rad - eta.z);
-        let yaw = track(eta.z, eta_dot.z, turn, reference.yaw_rate_rad_s, reference.yaw_acceleration_rad_s2);
+        let yaw = track(eta.z, eta_dot.z, error.z, rates.z, accelerations.z);
         let u3 = self.input(Axis::Yaw, yaw, &context, &mut estimates.yaw, &mut errors.yaw);
 
-        let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3, thrust_n: u4 };
-        let inputs = self.smoother.advance(&mut memory.smoothed, &inputs);
+        // f_hat of roll and pitch behind the filters: it is smooth already, and the observer would feed back their
+        // lead.
+        let [roll_n, pitch_n, yaw_n] = match &self.moments {
+            Some(moments) => {
+                // Known is what it will be when the rotors have followed.
+                let ahead_m_s = state.velocity_m_s + a * self.settings.disturbance.disturbance_lag_s;
+                let known = if stands { Vector3::zeros() } else { drag.moment(&r.tr_mul(&ahead_m_s), share) };
+                moments.against(&observed_rad_s2, &known)
+            }
+            None => [0.0; 3],
+        };
+        let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3 + yaw_n, thrust_n: u4 };
+        let mut inputs = self.smoother.advance(&mut memory.smoothed, &inputs);
+        let mut effort = 1.0;
+        if self.moments.is_some() {
+            // Rotors that give less thrust than they should turn the vehicle by less, too.
+            let more = &mut memory.more_effort;
+            let share = math::min(math::max(hover_n * self.inverse_weight, EFFORT_MIN), EFFORT_MAX);
+            *more = math::settled(*more + (share - 1.0 - *more) * self.effort_share);
+            effort += *more;
+            inputs.roll_n = (inputs.roll_n + roll_n) * effort;
+            inputs.pitch_n = (inputs.pitch_n + pitch_n) * effort;
+            inputs.yaw_n *= effort;
+        }
         // Moments would increase the thrust and tip over a standing vehicle.
         let asked = if stands { Inputs { thrust_n: inputs.thrust_n, ..Inputs::default() } } else { inputs };
         memory.asked = asked;
@@ -459,6 +523,10 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let action = self.mixer.carry_out(&allocation);
         if let Some(observer) = &self.observer {
             observer.give(&mut memory.observed, action.given.thrust_n);
+        }
+
+        if let Some(moments) = &self.moments {
+            moments.give(&mut memory.turned, &action.given, effort);
         }
 
         let distance_m = p - xi;

@@ -1,10 +1,11 @@
-//! Observer of the horizontal acceleration that the model does not know, mostly wind. Not in the paper.
+//! Observers of what the model does not know: the horizontal acceleration, mostly wind, and moments of weak rotors or
+//! of a payload off the centre. Not in the paper.
 //!
 //! (16) wants f of x and y, which the model takes for zero: without more, all of it has to be learnt from the error
 //! that it makes. But the vehicle measures its velocity v, and knows what its rotors do:
 //!
 //! ```text
-//! dv_hat/dt = T/T_h g (R e_z) + f_hat + 2w (v - v_hat)      T: commanded thrust behind the rotors' lag
+//! dv_hat/dt = T/T_h g (R e_z) + a + f_hat + 2w (v - v_hat)  a: known drag; T: thrust behind the rotors' lag
 //! df_hat/dt = w^2 (v - v_hat)                               T_h: learnt hover thrust
 //! ```
 //!
@@ -14,12 +15,20 @@
 //! with both poles at one place, by Gao, *Scaling and bandwidth-parameterization based controller tuning*, ACC 2003, in
 //! the exact discrete form.
 
-use crate::model::RollPitch;
+use crate::memory::{Memory, Remembered};
+use afbc_control::Settings;
+use afbc_control::drag::KnownDrag;
 use afbc_control::math::{self, max, min};
-use afbc_types::{Parameters, State, parameters};
+use afbc_types::{Inputs, OutOfRange, Parameters, State, parameters};
+use nalgebra::Vector3;
 
 /// Largest f_hat \[m/s2\]: a wind of some 20 m/s.
 pub const ACCELERATION_MAX_M_S2: f32 = 10.0;
+/// Age of the rates that the observer of moments reckons with, beside the rotors' lag \[s\]: they may be new or 20 ms
+/// old.
+pub const AGE_S: f32 = 0.01;
+/// Bandwidth below which what is a jump of the rates does not depend on it \[rad/s\].
+const W_MIN_RAD_S: f32 = 1.0;
 /// Largest v - v_hat that is an effect of f, which makes f/(e w) of it at most \[m/s\]; a larger one is a jump of the
 /// state, as after an outage.
 pub const JUMP_M_S: f32 = 0.1;
@@ -32,7 +41,19 @@ parameters! {
         /// w of the disturbance observer; 0 for none.
         #[parameter(DIST_XY, "rad/s", 0.0..=200.0, tuned)]
         pub disturbance_rad_s: f32 = 0.0,
-        /// Lag of the rotors that the disturbance observer reckons with.
+        /// w of the observer of moments about x and y; 0 for none.
+        #[parameter(DIST_TILT, "rad/s", 0.0..=500.0, tuned)]
+        pub disturbance_tilt_rad_s: f32 = 0.0,
+        /// w of the observer of moments about z; 0 for none.
+        #[parameter(DIST_YAW, "rad/s", 0.0..=500.0, tuned)]
+        pub disturbance_yaw_rad_s: f32 = 0.0,
+        /// gamma: rate at which the memory learns what the disturbance observer finds; 0 for none.
+        #[parameter(MEM_RATE, "1/s", 0.0..=10.0)]
+        pub memory_1_s: f32 = 0.0,
+        /// Speed of the outer rules of the memory.
+        #[parameter(MEM_SPEED, "m/s", 0.1..=50.0)]
+        pub memory_speed_m_s: f32 = 4.0,
+        /// Lag of the rotors that both observers reckon with.
         #[parameter(DIST_LAG, "s", 0.0..=0.5)]
         pub disturbance_lag_s: f32 = 0.02,
     }
@@ -41,10 +62,13 @@ parameters! {
 impl DisturbanceObserver {
     /// Returns the observer of a vehicle that is `slowness` times slower.
     #[must_use]
-    pub(crate) fn slowed(self, slowness: f32) -> Self {
+    pub(crate) fn slowed(self, slowness: f32, lag_s: f32) -> Self {
         DisturbanceObserver {
             disturbance_rad_s: self.disturbance_rad_s / slowness,
-            disturbance_lag_s: self.disturbance_lag_s * slowness,
+            disturbance_tilt_rad_s: self.disturbance_tilt_rad_s / slowness,
+            disturbance_yaw_rad_s: self.disturbance_yaw_rad_s / slowness,
+            disturbance_lag_s: lag_s,
+            ..self
         }
     }
 }
@@ -58,6 +82,8 @@ pub struct Observer {
     /// Share of the thrust that is replaced per step.
     lag: f32,
     dt_s: f32,
+    drag: KnownDrag,
+    memory: Option<Memory>,
     gravity_m_s2: f32,
     weight_n: f32,
 }
@@ -68,6 +94,8 @@ pub struct Observed {
     velocity_m_s: [f32; 2],
     acceleration_m_s2: [f32; 2],
     thrust_n: f32,
+    /// What has been learnt of the air.
+    pub remembered: Remembered,
     /// True if the next velocity is not measured.
     held: bool,
 }
@@ -80,63 +108,88 @@ impl Observed {
 }
 
 impl Observer {
-    /// Makes the observer from valid settings for a vehicle, advanced every `dt_s` seconds; none without a bandwidth.
-    pub fn new(settings: &DisturbanceObserver, vehicle: &Parameters, dt_s: f32) -> Option<Self> {
-        let DisturbanceObserver { disturbance_rad_s: bandwidth, disturbance_lag_s: lag_s } = *settings;
+    /// Makes the observer from valid settings for a vehicle; none without a bandwidth.
+    ///
+    /// # Errors
+    /// A speed of the memory out of range.
+    pub fn new(
+        settings: &DisturbanceObserver,
+        common: &Settings,
+        vehicle: &Parameters,
+    ) -> Result<Option<Self>, OutOfRange> {
+        let DisturbanceObserver { disturbance_rad_s: bandwidth, disturbance_lag_s: lag_s, .. } = *settings;
+        let Settings { dt_s, drag, .. } = *common;
         // Two poles at exp(-w dt).
         let rest = 1.0 - math::exp(-bandwidth * dt_s);
-        (bandwidth > 0.0).then(|| Observer {
+        let memory = Memory::new(settings.memory_1_s, settings.memory_speed_m_s, dt_s)?;
+        Ok((bandwidth > 0.0).then(|| Observer {
             velocity: 2.0 * rest,
             acceleration: rest * rest / dt_s,
             lag: if lag_s > 0.0 { 1.0 - math::exp(-dt_s / lag_s) } else { 1.0 },
             dt_s,
+            drag,
+            memory,
             gravity_m_s2: vehicle.gravity_m_s2,
             weight_n: vehicle.weight_n(),
-        })
+        }))
     }
 
-    /// Returns f_hat along x and y \[m/s2\] for a vehicle in this state, and advances it by one step if the state is
-    /// `fresh`; zero of one that `stands` on the ground. `heading` is the sine and cosine of yaw.
+    /// Returns f \[m/s2\] of a vehicle in this state with its thrust along `up`: known drag and, along x and y, f_hat,
+    /// which is advanced by one step if the state is `fresh`, and zero of one that `stands` on the ground.
     #[inline]
     pub fn advance(
         &self,
         observed: &mut Option<Observed>,
         state: &State,
-        (at, [sin_psi, cos_psi]): (&RollPitch, [f32; 2]),
+        up: &Vector3<f32>,
         hover_n: f32,
         [fresh, stands]: [bool; 2],
-    ) -> [f32; 2] {
+    ) -> Vector3<f32> {
         let measured = [state.velocity_m_s.x, state.velocity_m_s.y];
-        let start = |thrust_n| Observed { velocity_m_s: measured, acceleration_m_s2: [0.0; 2], thrust_n, held: false };
-        let observed = observed.get_or_insert_with(|| start(self.weight_n));
+        let start = |thrust_n, remembered| Observed {
+            velocity_m_s: measured,
+            acceleration_m_s2: [0.0; 2],
+            thrust_n,
+            remembered,
+            held: false,
+        };
+        let observed = observed.get_or_insert_with(|| start(self.weight_n, Remembered::default()));
         if stands {
-            *observed = start(observed.thrust_n);
+            *observed = start(observed.thrust_n, observed.remembered);
+            return Vector3::zeros();
         }
-        if observed.held {
-            *observed = Observed { velocity_m_s: measured, held: false, ..*observed };
-            return observed.acceleration_m_s2;
-        }
-        if !fresh {
-            return observed.acceleration_m_s2;
-        }
-        let Observed { velocity_m_s, acceleration_m_s2, thrust_n, .. } = observed;
-        let [ahead, aside] = at.leaning();
-        let lift = *thrust_n / hover_n * self.gravity_m_s2;
-        let leaning = [(cos_psi * ahead + sin_psi * aside) * lift, (sin_psi * ahead - cos_psi * aside) * lift];
-        for (((v_hat, f_hat), v), a) in
-            velocity_m_s.iter_mut().zip(acceleration_m_s2.iter_mut()).zip(measured).zip(leaning)
-        {
-            let off = v - *v_hat;
-            if off.abs() <= JUMP_M_S {
-                let f = math::settled(*f_hat + self.acceleration * off);
-                *f_hat = min(max(f, -ACCELERATION_MAX_M_S2), ACCELERATION_MAX_M_S2);
-                *v_hat += self.velocity * off;
-            } else {
-                *v_hat = v;
+        let share = observed.thrust_n / hover_n;
+        let mut drag = self.drag.acceleration(&state.velocity_m_s, up, share);
+        let Observed { velocity_m_s, acceleration_m_s2, remembered, held, .. } = observed;
+        if let Some(memory) = &self.memory {
+            let weights = memory.weights(measured);
+            if fresh && !*held {
+                memory.learn(remembered, &weights, *acceleration_m_s2);
             }
-            *v_hat = math::settled(*v_hat + (a + *f_hat) * self.dt_s);
+            let [x, y] = remembered.recall(&weights);
+            (drag.x, drag.y) = (drag.x + x, drag.y + y);
         }
-        *acceleration_m_s2
+        let known = [drag.x + up.x * share * self.gravity_m_s2, drag.y + up.y * share * self.gravity_m_s2];
+        for (((v_hat, f_hat), v), a) in
+            velocity_m_s.iter_mut().zip(acceleration_m_s2.iter_mut()).zip(measured).zip(known)
+        {
+            if *held {
+                *v_hat = v;
+            } else if fresh {
+                let off = v - *v_hat;
+                if off.abs() <= JUMP_M_S {
+                    let f = math::settled(*f_hat + self.acceleration * off);
+                    *f_hat = min(max(f, -ACCELERATION_MAX_M_S2), ACCELERATION_MAX_M_S2);
+                    *v_hat += self.velocity * off;
+                } else {
+                    *v_hat = v;
+                }
+                *v_hat = math::settled(*v_hat + (a + *f_hat) * self.dt_s);
+            }
+        }
+        *held = false;
+        let [x, y] = *acceleration_m_s2;
+        drag + Vector3::new(x, y, 0.0)
     }
 
     /// Notes the thrust of all rotors that is commanded in this step \[N\].
@@ -144,6 +197,122 @@ impl Observer {
     pub fn give(&self, observed: &mut Option<Observed>, thrust_n: f32) {
         if let Some(observed) = observed {
             observed.thrust_n = math::settled(observed.thrust_n + (thrust_n - observed.thrust_n) * self.lag);
+        }
+    }
+}
+
+/// The same observer of the body's rates: what turns the vehicle beside its rotors, with g_i of (6).
+///
+/// ```text
+/// dOmega_hat/dt = g U + d + f_hat + 2w (Omega - Omega_hat)      U: U1..U3 as carried out, behind the rotors' lag
+/// df_hat/dt     = w^2 (Omega - Omega_hat)
+/// ```
+///
+/// With f_hat in the place of f, (16) commands what INDI does: the input that was given, and what the acceleration
+/// lacks, each behind the same two poles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MomentObserver {
+    /// Corrections of Omega_hat \[1\] and f_hat \[1/s\] per step.
+    rate: Vector3<f32>,
+    acceleration: Vector3<f32>,
+    /// Share of the inputs that is replaced per step.
+    lag: f32,
+    dt_s: f32,
+    /// g of roll, pitch and yaw.
+    effectiveness: Vector3<f32>,
+    /// Angular acceleration by a moment per mass \[1/m2\].
+    per_moment: Vector3<f32>,
+    /// -1/g of the same.
+    ineffectiveness: Vector3<f32>,
+    /// Largest f_hat \[rad/s2\], and largest Omega - Omega_hat that is an effect of it \[rad/s\].
+    acceleration_max: Vector3<f32>,
+    jump: Vector3<f32>,
+}
+
+/// Memory of the observer of moments.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turning {
+    rates_rad_s: Vector3<f32>,
+    acceleration_rad_s2: Vector3<f32>,
+    /// g U \[rad/s2\]
+    given_rad_s2: Vector3<f32>,
+}
+
+impl MomentObserver {
+    /// Makes the observer from valid settings for a vehicle whose rotors give at most `thrust_max_n` together, advanced
+    /// every `dt_s` seconds; none without a bandwidth.
+    pub fn new(settings: &DisturbanceObserver, vehicle: &Parameters, thrust_max_n: f32, dt_s: f32) -> Option<Self> {
+        let DisturbanceObserver { disturbance_tilt_rad_s: tilt, disturbance_yaw_rad_s: yaw, .. } = *settings;
+        let bandwidth = Vector3::new(tilt, tilt, yaw);
+        let rest = bandwidth.map(|w| 1.0 - math::exp(-w * dt_s));
+        let lag_s = settings.disturbance_lag_s + AGE_S;
+        let effectiveness = vehicle.effectiveness();
+        // As much as the rotors can make up for.
+        let acceleration_max = effectiveness * (0.5 * thrust_max_n);
+        (tilt + yaw > 0.0).then(|| MomentObserver {
+            rate: rest * 2.0,
+            acceleration: rest.map(|rest| rest * rest / dt_s),
+            lag: 1.0 - math::exp(-dt_s / lag_s),
+            dt_s,
+            effectiveness,
+            per_moment: vehicle.inertia_kg_m2.map(|inertia| vehicle.mass_kg / inertia),
+            ineffectiveness: effectiveness.map(|g| -1.0 / g),
+            acceleration_max,
+            jump: acceleration_max
+                .zip_map(&bandwidth, |most, w| max(most / (core::f32::consts::E * max(w, W_MIN_RAD_S)), 1.0)),
+        })
+    }
+
+    /// Returns f_hat of roll, pitch and yaw \[rad/s2\] for these rates, beside a `known` moment per mass \[m2/s2\], and
+    /// advances it by one step if they are `fresh`; zero of a vehicle that `stands` on the ground.
+    #[inline]
+    pub fn advance(
+        &self,
+        turning: &mut Option<Turning>,
+        rates_rad_s: &Vector3<f32>,
+        known: &Vector3<f32>,
+        [fresh, stands]: [bool; 2],
+    ) -> Vector3<f32> {
+        let zero = Vector3::zeros();
+        let start = Turning { rates_rad_s: *rates_rad_s, acceleration_rad_s2: zero, given_rad_s2: zero };
+        let turning = turning.get_or_insert(start);
+        if stands {
+            *turning = start;
+            return zero;
+        }
+        if !fresh {
+            return turning.acceleration_rad_s2;
+        }
+        let known = known.component_mul(&self.per_moment);
+        let Turning { rates_rad_s: omega_hat, acceleration_rad_s2: f_hat, given_rad_s2: given } = turning;
+        let off = rates_rad_s - *omega_hat;
+        let found =
+            f_hat.zip_zip_map(&self.acceleration.component_mul(&off), &self.acceleration_max, |f, more, most| {
+                math::settled(min(max(f + more, -most), most))
+            });
+        let within = off.zip_map(&self.jump, |off, jump| off.abs() <= jump);
+        *f_hat = within.zip_zip_map(f_hat, &found, |within, before, found| if within { found } else { before });
+        let corrected = *omega_hat + self.rate.component_mul(&off);
+        let start = within.zip_zip_map(&corrected, rates_rad_s, |within, to, jumped| if within { to } else { jumped });
+        *omega_hat = (start + (*given + known + *f_hat) * self.dt_s).map(math::settled);
+        *f_hat
+    }
+
+    /// Returns U1..U3 \[N\] that make up for f_hat and a known moment per mass.
+    #[inline]
+    pub fn against(&self, f_hat_rad_s2: &Vector3<f32>, known: &Vector3<f32>) -> [f32; 3] {
+        (f_hat_rad_s2 + known.component_mul(&self.per_moment)).component_mul(&self.ineffectiveness).into()
+    }
+
+    /// Notes U1..U3 that the rotors are commanded to give in this step \[N\], `effort` times as large as for the
+    /// model's rotors.
+    #[inline]
+    pub fn give(&self, turning: &mut Option<Turning>, given: &Inputs, effort: f32) {
+        if let Some(turning) = turning {
+            let given = Vector3::new(given.roll_n, given.pitch_n, given.yaw_n);
+            let given = given.component_mul(&self.effectiveness) * (1.0 / effort);
+            turning.given_rad_s2 =
+                (turning.given_rad_s2 + (given - turning.given_rad_s2) * self.lag).map(math::settled);
         }
     }
 }

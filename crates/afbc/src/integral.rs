@@ -71,12 +71,14 @@ impl IntegralBackstepping {
 }
 
 impl Law for IntegralBackstepping {
+    const OBSERVES: bool = true;
+
     type Estimate = Integral;
 
     #[inline]
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, integral: &mut Integral) -> (f32, Errors) {
         let Gains { backstepping, integral: kappa, integral_max } = &self.gains[axis];
-        let (fixed, errors) = classical(backstepping, tracking, &context.dynamics(&self.model, axis));
+        let (fixed, errors) = classical(backstepping, tracking, &context.observed(&self.model, axis));
         if let Some(input) = integral.resume.take() {
             integral.value = input - fixed;
         }

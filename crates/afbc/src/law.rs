@@ -3,6 +3,7 @@
 use crate::model::{Dynamics, Model, RollPitch};
 use afbc_control::{Errors, Estimate};
 use afbc_types::{Axis, PerAxis, State};
+use nalgebra::Vector3;
 
 /// Computes a subsystem's input from its errors. AFBC and the baseline differ in this only.
 pub trait Law {
@@ -50,8 +51,11 @@ pub struct Context<'a> {
     pub adapt: bool,
     /// Part of each subsystem's input that could not be allocated in the last step; zero without anti-windup.
     pub unallocated: &'a PerAxis<f32>,
-    /// f of x and y as observed, by [`crate::disturbance`] \[m/s2\]; zero without an observer.
-    pub observed_m_s2: [f32; 2],
+    /// f of x, y and z by drag and, of x and y, as observed by [`crate::disturbance`] \[m/s2\]; zero without an
+    /// observer.
+    pub observed_m_s2: Vector3<f32>,
+    /// True if f of roll, pitch and yaw is observed, and made up for behind the law.
+    pub turns_observed: bool,
     /// Nominal model that the law may use; none for the law as printed.
     pub known: Option<&'a Model>,
 }
@@ -63,15 +67,18 @@ impl Context<'_> {
         model.dynamics_at(axis, &self.state.rates_rad_s, &self.roll_pitch, self.rotor_residual_rad_s)
     }
 
-    /// Returns the same, with the observed f of x and y, which the model takes for zero.
+    /// Returns the same, with f as observed: of x and y, which the model takes for zero; that of roll, pitch and yaw is
+    /// left to the observer of moments.
     #[inline(always)]
     pub(crate) fn observed(&self, model: &Model, axis: Axis) -> Dynamics {
         let dynamics = self.dynamics(model, axis);
-        let [x, y] = self.observed_m_s2;
+        let [x, y, z] = self.observed_m_s2.into();
         match axis {
             Axis::X => Dynamics { f: x, ..dynamics },
             Axis::Y => Dynamics { f: y, ..dynamics },
-            Axis::Roll | Axis::Pitch | Axis::Yaw | Axis::Z => dynamics,
+            Axis::Roll | Axis::Pitch | Axis::Yaw if self.turns_observed => Dynamics { f: 0.0, ..dynamics },
+            Axis::Roll | Axis::Pitch | Axis::Yaw => dynamics,
+            Axis::Z => Dynamics { f: dynamics.f + z, ..dynamics },
         }
     }
 }

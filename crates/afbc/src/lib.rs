@@ -45,12 +45,15 @@ pub mod guarded;
 pub mod integral;
 pub mod law;
 pub mod limits;
+pub mod memory;
 pub mod model;
 pub mod monitor;
 mod profile;
 pub mod reference;
+pub mod rotation;
 pub mod safeguards;
 pub mod standstill;
+pub mod tilt;
 
 pub use adaptive::Adaptive;
 pub use backstepping::Backstepping;

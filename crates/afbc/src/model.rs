@@ -2,7 +2,7 @@
 
 use afbc_control::math;
 use afbc_types::{Axis, Parameters, State};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// d x_2/dt = f + g u of one subsystem, and dg/dt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +32,18 @@ impl RollPitch {
     /// Computes them for a state.
     #[inline(always)]
     pub fn new(state: &State) -> Self {
-        let (phi, theta) = (state.attitude_rad.x, state.attitude_rad.y);
+        RollPitch::of(state.attitude_rad.x, state.attitude_rad.y)
+    }
+
+    /// Returns the cosine of the tilt.
+    #[inline(always)]
+    pub fn tilt_cosine(&self) -> f32 {
+        self.cos_phi * self.cos_theta
+    }
+
+    /// Computes them for these angles.
+    #[inline(always)]
+    pub(crate) fn of(phi: f32, theta: f32) -> Self {
         RollPitch {
             sin_phi: math::sin(phi),
             cos_phi: math::cos(phi),
@@ -41,16 +52,50 @@ impl RollPitch {
         }
     }
 
-    /// Returns the horizontal part of R e_z of a vehicle that heads along x, towards x and towards -y.
+    /// Returns R = Rz(psi) Ry(theta) Rx(phi), from the body to the earth.
     #[inline(always)]
-    pub(crate) fn leaning(&self) -> [f32; 2] {
-        [self.cos_phi * self.sin_theta, self.sin_phi]
+    pub(crate) fn r_earth_body(&self, [sin_psi, cos_psi]: [f32; 2]) -> Matrix3<f32> {
+        let RollPitch { sin_phi, cos_phi, sin_theta, cos_theta } = *self;
+        Matrix3::new(
+            cos_psi * cos_theta,
+            cos_psi * sin_theta * sin_phi - sin_psi * cos_phi,
+            cos_psi * sin_theta * cos_phi + sin_psi * sin_phi,
+            sin_psi * cos_theta,
+            sin_psi * sin_theta * sin_phi + cos_psi * cos_phi,
+            sin_psi * sin_theta * cos_phi - cos_psi * sin_phi,
+            -sin_theta,
+            cos_theta * sin_phi,
+            cos_theta * cos_phi,
+        )
     }
 
-    /// Returns the cosine of the tilt.
+    /// Returns Omega for d eta/dt.
     #[inline(always)]
-    pub fn tilt_cosine(&self) -> f32 {
-        self.cos_phi * self.cos_theta
+    pub(crate) fn body_rates(&self, eta_dot: &Vector3<f32>) -> Vector3<f32> {
+        let RollPitch { sin_phi, cos_phi, sin_theta, cos_theta } = *self;
+        let [phi, theta, psi] = (*eta_dot).into();
+        let level = cos_theta * psi;
+        Vector3::new(phi - sin_theta * psi, cos_phi * theta + sin_phi * level, cos_phi * level - sin_phi * theta)
+    }
+
+    /// Returns d Omega/dt for Omega of [`RollPitch::body_rates`], d eta/dt and d^2 eta/dt^2.
+    #[inline(always)]
+    pub(crate) fn body_accelerations(
+        &self,
+        omega: &Vector3<f32>,
+        eta_dot: &Vector3<f32>,
+        eta_ddot: &Vector3<f32>,
+    ) -> Vector3<f32> {
+        // The body turns by d phi/dt about its own x, and y and z turn with it; d theta/dt turns psi's axis.
+        let RollPitch { sin_phi, cos_phi, sin_theta, cos_theta } = *self;
+        let [phi, theta, psi] = (*eta_dot).into();
+        let turned = theta * psi;
+        self.body_rates(eta_ddot)
+            + Vector3::new(
+                -cos_theta * turned,
+                phi * omega.z - sin_phi * sin_theta * turned,
+                -phi * omega.y - cos_phi * sin_theta * turned,
+            )
     }
 }
 

@@ -5,6 +5,7 @@ use crate::fuzzy::Membership;
 use crate::model::Model;
 use crate::reference::ReferenceModel;
 use crate::{Limits, Safeguards, Settings, adaptive, backstepping};
+use afbc_control::drag::KnownDrag;
 use afbc_control::{Smoothing, math};
 use afbc_types::{Axis, Parameters, PerAxis};
 
@@ -44,7 +45,7 @@ impl Profile {
         let settings = self.settings();
         match self {
             Profile::Paper => settings,
-            Profile::Flight => settings.slowed(slowness(lag_s)).with_rotor_force_max_n(force_max_n),
+            Profile::Flight => settings.slowed(slowness(lag_s), lag_s).with_rotor_force_max_n(force_max_n),
         }
     }
 
@@ -87,7 +88,12 @@ impl Profile {
         match self {
             Profile::Paper => Settings::DEFAULT,
             Profile::Flight => Settings {
-                common: afbc_control::Settings { dt_s: 0.001, rotor_force_max_n: 3.0, raised_thrust_max: 0.8 },
+                common: afbc_control::Settings {
+                    dt_s: 0.001,
+                    rotor_force_max_n: 3.0,
+                    raised_thrust_max: 0.8,
+                    drag: KnownDrag::NONE,
+                },
                 limits: Limits {
                     tilt_max_rad: 1.0,
                     tilt_rate_max_rad_s: 6.0,
@@ -95,26 +101,34 @@ impl Profile {
                     speed_max_m_s: 5.0,
                     climb_max_m_s: 3.0,
                 },
-                command_filter_rad_s: 64.73,
+                command_filter_rad_s: 65.69,
                 tilt_by_thrust: true,
                 anti_windup: true,
                 freeze_on_ground: true,
                 bumpless: true,
                 feed_forward: true,
-                disturbance: DisturbanceObserver { disturbance_rad_s: 26.78, disturbance_lag_s: LAG_S },
+                by_rotation: true,
+                disturbance: DisturbanceObserver {
+                    disturbance_rad_s: 39.49,
+                    disturbance_tilt_rad_s: 60.0,
+                    disturbance_yaw_rad_s: 31.39,
+                    memory_1_s: 2.0,
+                    memory_speed_m_s: 4.0,
+                    disturbance_lag_s: LAG_S,
+                },
                 reference: ReferenceModel {
-                    reference_xy_rad_s: 4.346,
-                    reference_z_rad_s: 11.71,
-                    reference_yaw_rad_s: 31.78,
+                    reference_xy_rad_s: 4.398,
+                    reference_z_rad_s: 11.7,
+                    reference_yaw_rad_s: 19.76,
                     reference_acceleration_m_s2: 8.0,
-                    reference_turn_rad_s2: 11.82,
+                    reference_turn_rad_s2: 10.1,
                     reference_yaw_rate_rad_s: 3.0,
                 },
                 smoothing: Smoothing {
-                    smooth_tilt_rad_s: 133.3,
-                    smooth_yaw_rad_s: 156.4,
-                    smooth_lift_rad_s: 101.5,
-                    lead_s: 0.03024,
+                    smooth_tilt_rad_s: 156.7,
+                    smooth_yaw_rad_s: 228.1,
+                    smooth_lift_rad_s: 102.1,
+                    lead_s: 0.02292,
                 },
             },
         }
@@ -123,6 +137,10 @@ impl Profile {
 
 /// Lag of the rotors that the profile `flight` is tuned for \[s\].
 pub const LAG_S: f32 = 0.02;
+
+/// Delay of the loop on the paper's vehicle beside the rotors' lag: a step, the filters of the inputs, and states that
+/// are up to 20 ms old \[s\].
+const REST_S: f32 = 0.03;
 
 /// Response time of a subsystem on the paper's vehicle with states that are 20 ms old: step, rotors' lag and age,
 /// behind the filters of roll and pitch, behind the attitude for x and y \[s\].
@@ -151,16 +169,16 @@ pub fn by_rule(gains: &PerAxis<adaptive::Gains>, vehicle: &Parameters, lag_s: f3
 /// Returns the factor by which a vehicle with a rotor lag of `lag_s` \[s\] is slower than the paper's; at least 1,
 /// since quicker rotors change neither noise nor command filter. Not in the paper.
 pub fn slowness(lag_s: f32) -> f32 {
-    math::max(lag_s / LAG_S, 1.0)
+    math::max((lag_s + REST_S) / (LAG_S + REST_S), 1.0)
 }
 
 /// Returns the bounded law's gains, as found by `sitl tune afbc`. `docs/flight.md` explains each.
 fn flight(axis: Axis, paper: adaptive::Gains) -> adaptive::Gains {
     let (alpha1, alpha2, stiffness, gamma, eta, theta_max, delta_max) = match axis {
-        Axis::Roll | Axis::Pitch => (1.586, 0.5083, 89.14, 0.8365, 0.7295, 4.0, 0.03328),
-        Axis::Yaw => (3.399, 10.83, 18.77, 37.3, 0.01261, 12.0, 0.4613),
-        Axis::Z => (1.957, 7.984, 16.15, 195.5, 0.1971, 10.0, 2.626),
-        Axis::X | Axis::Y => (1.2, 7.355, 1.265, 30.76, 0.06439, 25.0, 1.403),
+        Axis::Roll | Axis::Pitch => (2.792, 0.3081, 95.92, 0.6876, 0.5622, 4.0, 0.003794),
+        Axis::Yaw => (2.334, 6.326, 8.959, 37.43, 0.01825, 12.0, 0.2665),
+        Axis::Z => (2.467, 9.638, 11.81, 167.3, 0.1351, 10.0, 7.364),
+        Axis::X | Axis::Y => (0.659, 5.432, 2.771, 23.0, 0.07809, 25.0, 1.267),
     };
     let membership = match axis {
         Axis::Roll | Axis::Pitch | Axis::Yaw => Membership { centre: 3.0, width: 1.2 },

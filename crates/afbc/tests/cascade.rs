@@ -16,6 +16,8 @@ use common::step;
 use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
 
+/// Time over which the path of the acceleration is differentiated \[s\].
+const STEP_S: f64 = 1e-4;
 const GRAVITY_M_S2: f64 = 9.81;
 const WEIGHT_N: f64 = 0.486 * 9.81;
 
@@ -128,7 +130,8 @@ fn compose<L: Law + Copy>(
             dt_s: settings.common.dt_s,
             adapt: true,
             unallocated: &carried.unallocated,
-            observed_m_s2: [0.0; 2],
+            observed_m_s2: Vector3::zeros(),
+            turns_observed: false,
             known: settings.feed_forward.then_some(&model),
         };
         let seen = command.per_axis();
@@ -183,17 +186,21 @@ fn compose<L: Law + Copy>(
 
         // Ahead of the filter by its lag, with the derivatives that follow from jerk and snap.
         let w = f64::from(settings.command_filter_rad_s);
-        // (40) differentiated with yaw, thrust and, for roll, pitch held.
-        let slope = |rate: &Vector3<f32>| {
-            let along =
-                Rotation3::from_euler_angles(0.0, 0.0, -eta.z) * Vector3::new(rate.x, rate.y, 0.0).cast::<f64>();
-            let [roll, pitch] = angles.map(f64::cos);
-            [-along.y * pitch * roll * roll / vertical, along.x * pitch * pitch / vertical]
+        // (40) differentiated with the thrust held, along a path through jerk and snap, while yaw turns.
+        let along = |t: f64| {
+            let by = |i: usize| f64::from(setpoint.jerk_m_s3[i]) * t + f64::from(setpoint.snap_m_s4[i]) * (0.5 * t * t);
+            let turn =
+                f64::from(setpoint.yaw_rate_rad_s) * t + f64::from(setpoint.yaw_acceleration_rad_s2) * (0.5 * t * t);
+            leaning([ahead[0] + by(0), ahead[1] + by(1)], vertical, eta.z + turn)
         };
-        let forward = if settings.feed_forward { slope(&setpoint.snap_m_s4) } else { [0.0; 2] };
+        let (before, now, after) = (along(-STEP_S), along(0.0), along(STEP_S));
+        let forward = match settings.feed_forward {
+            true => [0, 1].map(|i| (after[i] - 2.0 * now[i] + before[i]) / (STEP_S * STEP_S)),
+            false => [0.0; 2],
+        };
         let mut commanded = angles;
         if settings.feed_forward {
-            let rates = slope(&setpoint.jerk_m_s3);
+            let rates = [0, 1].map(|i| (after[i] - before[i]) / (2.0 * STEP_S));
             commanded = [0, 1].map(|i| angles[i] + 2.0 * rates[i] / w + forward[i] / (w * w));
             let size = commanded[0].hypot(commanded[1]);
             commanded = commanded.map(|angle| angle * (tilt_max / size).min(1.0));

@@ -7,6 +7,7 @@ use afbc::model::RollPitch;
 use afbc::{Backstepping, Law, Profile, adaptive, backstepping};
 use afbc_control::Estimate;
 use afbc_types::{Axis, Parameters, PerAxis, State};
+use nalgebra::Vector3;
 use proptest::prelude::*;
 
 /// Rounding error of one `f32` operation, relative.
@@ -46,7 +47,8 @@ fn step(gains: Gains, tracking: &Tracking, unallocated: f32, adapt: bool, integr
         dt_s: DT_S,
         adapt,
         unallocated: &PerAxis { x: unallocated, ..PerAxis::default() },
-        observed_m_s2: [0.0; 2],
+        observed_m_s2: Vector3::zeros(),
+        turns_observed: false,
         known: None,
     };
     let (u, errors) = law.input(Axis::X, tracking, &context, integral);

@@ -11,7 +11,7 @@ use afbc::model::{Dynamics, Model, RollPitch};
 use afbc::{Adaptive, Backstepping, Law, Profile, Safeguards};
 use afbc_control::{Errors, Estimate};
 use afbc_types::{Axis, Declaration, Parameters, PerAxis, State};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 
 /// Rounding error of one `f32` operation, relative.
@@ -111,7 +111,8 @@ proptest! {
             dt_s: 0.001,
             adapt: true,
             unallocated: &PerAxis::default(),
-            observed_m_s2: [0.0; 2],
+            observed_m_s2: Vector3::zeros(),
+            turns_observed: false,
             known: None,
         };
         let approach = law.approach(Axis::X, None);
@@ -131,14 +132,16 @@ proptest! {
     }
 
     /// What the law is told of the model is (16) by that model, in this state, besides what it learns and adds: AFBC
-    /// with the observed acceleration for f of x and y, the baseline with the rotors' residual.
+    /// with drag and what is observed for f of x, y and z, and none of roll, pitch and yaw if that is observed, the
+    /// baseline with the rotors' residual.
     #[test]
     fn what_is_known_is_the_ideal_law_of_the_model(
         tracking in tracking(),
         gains in gains(),
         stiffness in 0.0_f32..50.0,
         (angles, rates) in (prop::array::uniform3(-1.0_f32..1.0), prop::array::uniform3(-3.0_f32..3.0)),
-        observed_m_s2 in prop::array::uniform2(-5.0_f32..5.0),
+        observed_m_s2 in prop::array::uniform3(-5.0_f32..5.0).prop_map(Vector3::from),
+        turns_observed in any::<bool>(),
         rotor_residual_rad_s in -500.0_f32..500.0,
         before in estimate(),
     ) {
@@ -155,6 +158,7 @@ proptest! {
             adapt: false,
             unallocated: &PerAxis::default(),
             observed_m_s2,
+            turns_observed,
             known: None,
         };
         let adaptive = Adaptive::new(PerAxis::from_fn(|_| gains)).unwrap();
@@ -163,9 +167,12 @@ proptest! {
             let errors = tracking.errors(backstepping.alpha1);
             let nominal = model.dynamics(axis, &state, rotor_residual_rad_s);
             let f = match axis {
-                Axis::X => observed_m_s2[0],
-                Axis::Y => observed_m_s2[1],
-                _ => nominal.f,
+                Axis::X => observed_m_s2.x,
+                Axis::Y => observed_m_s2.y,
+                Axis::Z => nominal.f + observed_m_s2.z,
+                // Made up for behind the law.
+                Axis::Roll | Axis::Pitch | Axis::Yaw if turns_observed => 0.0,
+                Axis::Roll | Axis::Pitch | Axis::Yaw => nominal.f,
             };
             let known = ideal(&backstepping, &errors, tracking.x1d_ddot, &Dynamics { f, ..nominal });
             let mut estimate = before;
@@ -283,7 +290,8 @@ proptest! {
                 dt_s,
                 adapt: false,
                 unallocated: &PerAxis::default(),
-                observed_m_s2: [0.0; 2],
+                observed_m_s2: Vector3::zeros(),
+                turns_observed: false,
                 known: None,
             };
             let (u, seen) = law.input(axis, &tracking, &context, &mut frozen);

@@ -98,7 +98,8 @@ proptest! {
 
         let [phi, theta] = command.trace.desired_rad.map(f64::from);
         let (forward, left) = (vertical * theta.tan(), -vertical * phi.tan() / theta.cos());
-        let (sin, cos) = f64::from(yaw_rad).sin_cos();
+        // By rotation, roll and pitch are those of an attitude with the setpoint's yaw.
+        let (sin, cos) = f64::from(if settings.by_rotation { setpoint.yaw_rad } else { yaw_rad }).sin_cos();
         let got = [forward * cos - left * sin, forward * sin + left * cos];
         // Rotation, and the rounding of angles near 90 degrees, amplified by their tangent.
         let steep = (scale * size / vertical).powi(2) + 1.0;
@@ -159,7 +160,8 @@ proptest! {
         prop_assert!(short.abs() <= core::f32::consts::PI);
         prop_assume!(short.abs() < 3.1);
         for other in [error(yaw, wanted + turn), error(yaw + turn, wanted)] {
-            prop_assert!((other - short).abs() < 5e-5, "{other} for {short}");
+            // Sine and cosine of many turns are off by up to 1.7e-4.
+            prop_assert!((other - short).abs() < 4e-4, "{other} for {short}");
         }
     }
 }

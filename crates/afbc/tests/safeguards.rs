@@ -31,7 +31,8 @@ fn step(gains: Gains, e2: f32, unallocated: f32, dt_s: f32, estimate: &mut Estim
         dt_s,
         adapt: true,
         unallocated: &PerAxis { x: unallocated, ..PerAxis::default() },
-        observed_m_s2: [0.0; 2],
+        observed_m_s2: Vector3::zeros(),
+        turns_observed: false,
         known: None,
     };
     law.input(Axis::X, &tracking(e2), &context, estimate).0
@@ -269,7 +270,8 @@ fn noise_drives_the_printed_delta_hat_and_not_the_hardened() {
                     dt_s: 0.001,
                     adapt: true,
                     unallocated: &PerAxis::default(),
-                    observed_m_s2: [0.0; 2],
+                    observed_m_s2: Vector3::zeros(),
+                    turns_observed: false,
                     known: None,
                 };
                 let (u, _) = law.input(Axis::X, &tracking, &context, &mut estimate);

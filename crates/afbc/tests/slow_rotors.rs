@@ -1,6 +1,7 @@
 //! Gains and settings for rotors that lag more than those of the paper's vehicle.
 #![allow(missing_docs)]
 
+use afbc::disturbance::DisturbanceObserver;
 use afbc::{LAG_S, Profile, Settings, slowness};
 use afbc_types::{Axis, Declared, Parameters};
 use core::convert::Infallible;
@@ -16,11 +17,18 @@ fn quick_rotors_change_nothing_and_slow_ones_change_every_gain_by_its_power_of_t
     for quick in [0.0, 0.5 * LAG_S, LAG_S] {
         assert_eq!(slowness(quick), 1.0);
         assert_eq!(Profile::Flight.gains_for(&paper, quick), base);
-        assert_eq!(Profile::Flight.settings_for(3.0, quick), settings);
+        // The observers reckon with the rotors' own lag.
+        let disturbance = DisturbanceObserver { disturbance_lag_s: quick, ..settings.disturbance };
+        assert_eq!(Profile::Flight.settings_for(3.0, quick), Settings { disturbance, ..settings });
     }
-    for k in [1.5_f32, 4.0] {
-        let (gains, slow) =
-            (Profile::Flight.gains_for(&paper, k * LAG_S), Profile::Flight.settings_for(2.0, k * LAG_S));
+    for lag_s in [0.033_f32, 0.072, 0.2] {
+        let k = slowness(lag_s);
+        // Of the 50 ms that a loop of the paper's vehicle takes, 20 are its rotors'.
+        assert!(close(k, (lag_s + 0.03) / 0.05), "{k}");
+        let (gains, slow) = (Profile::Flight.gains_for(&paper, lag_s), Profile::Flight.settings_for(2.0, lag_s));
+        assert_eq!(slow.disturbance.disturbance_lag_s, lag_s);
+        assert!(close(slow.disturbance.disturbance_rad_s, settings.disturbance.disturbance_rad_s / k));
+        assert!(close(slow.disturbance.disturbance_tilt_rad_s, settings.disturbance.disturbance_tilt_rad_s / k));
         for axis in Axis::ALL {
             let (g, b) = (&gains[axis], &base[axis]);
             assert!(close(g.backstepping.alpha1, b.backstepping.alpha1 / k), "{}", axis.name());
@@ -63,8 +71,11 @@ fn every_setting_slows_down_by_its_power_of_time() {
     };
     let settings = Profile::Flight.settings();
     for slowness in [1.0_f32, 1.65, 3.6] {
-        for ((key, before), (_, after)) in numbers(&settings).into_iter().zip(numbers(&settings.slowed(slowness))) {
-            let expected = before * f64::from(slowness).powi(power(key));
+        let lag_s = 0.05 * slowness - 0.03;
+        let slow = numbers(&settings.slowed(slowness, lag_s));
+        for ((key, before), (_, after)) in numbers(&settings).into_iter().zip(slow) {
+            let slower = before * f64::from(slowness).powi(power(key));
+            let expected = if key == "disturbance_lag_s" { f64::from(lag_s) } else { slower };
             assert!((after - expected).abs() <= 1e-6 * expected.abs(), "{key}: {after} of {before}, not {expected}");
         }
     }

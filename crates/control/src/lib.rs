@@ -8,6 +8,7 @@
 //! * [`Screened`]: a controller's memory behind a screen that rejects implausible input.
 //! * [`mixer`]: control allocation, from U1..U4 to rotor forces and speeds, and back.
 //! * [`command_filter`]: a smooth reference with two derivatives.
+//! * [`drag`]: what is known of drag, for laws that make up for it.
 //! * [`smoothing`]: low-pass filters on the inputs.
 //! * [`math`]: all transcendental functions, with bit-identical results on host and target.
 //!
@@ -18,6 +19,7 @@
 mod action;
 pub mod command_filter;
 mod controller;
+pub mod drag;
 pub mod math;
 pub mod mixer;
 mod screen;

@@ -1,5 +1,6 @@
 //! Settings of every controller besides vehicle parameters and gains.
 
+use crate::drag::KnownDrag;
 use afbc_types::parameters;
 
 parameters! {
@@ -18,5 +19,8 @@ parameters! {
         /// limit but the rotors'.
         #[parameter(RAISE_MAX, "1", 0.1..=1e6)]
         pub raised_thrust_max: f32 = 1e6,
+        /// Drag that a law may make up for.
+        #[group("")]
+        pub drag: KnownDrag = KnownDrag::NONE,
     }
 }

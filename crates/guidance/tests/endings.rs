@@ -198,9 +198,13 @@ fn a_takeoff_without_lift_is_given_up() {
     assert!(after.is_some_and(|ticks| (9_990..10_010).contains(&ticks)), "{after:?}");
     assert_eq!((mode, rests), (FlightMode::Land, false));
     assert_eq!(said, [Notice::Mode(FlightMode::Land, Reason::NoLift)]);
-    // With thrust to spare, or off the ground, it flies.
-    assert_eq!(takes_off(true, Some(1.7 * G), 0.0).0, None);
-    assert_eq!(takes_off(true, None, 0.0).0, None);
+    // With thrust to spare it flies, unless it does not follow: the setpoint is a metre away a second later.
+    for given_m_s2 in [Some(1.7 * G), None] {
+        let (after, mode, ..) = takes_off(true, given_m_s2, 0.0);
+        assert!(after.is_some_and(|ticks| (10_500..12_000).contains(&ticks)), "{after:?}");
+        assert_eq!(mode, FlightMode::Land);
+    }
+    // Off the ground it flies.
     assert_eq!(takes_off(true, exhausted, 1.1 * LEFT_M).0, None);
     // Not in the air it has not left, wherever its tracker says that it is.
     assert!(takes_off(false, None, 1.1 * LEFT_M).0.is_some());

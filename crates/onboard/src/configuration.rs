@@ -3,6 +3,7 @@
 use crate::setup::Link;
 use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
+use afbc_control::drag::KnownDrag;
 use afbc_estimator::Settings as Estimation;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Curve;
@@ -34,7 +35,7 @@ impl Default for Configuration {
     fn default() -> Self {
         Configuration {
             airframe: Parameters::PAPER.to_f32().into(),
-            settings: Profile::Flight.settings(),
+            settings: Profile::Flight.settings().with_drag(KnownDrag::PAPER),
             gains: Profile::Flight.gains(),
             curve: Curve::DEFAULT,
             estimation: Estimation::DEFAULT,

@@ -22,7 +22,7 @@
 //! * **Integral**, 0 in the source: its PD law keeps an error under every steady force. As in [`crate::geometric`].
 //! * **Desaturation**: the source allocates by a quadratic program that gives up thrust first, then yaw, then roll and
 //!   pitch. The mixer that all controllers share gives up yaw first, in closed form.
-//! * **Drag**: the source's model of the rotors' drag is left out; the integral and the increments cover it.
+//! * **Drag**: the source's model of the rotors' drag is [`KnownDrag`], as far as the vehicle's file tells it.
 //! * **What it is told of the rotors**: the time constant [`Gains::rotor_time_constant_s`], like INDI.
 
 use crate::attitude::{facing, r_earth_body, tilt_and_yaw_error, unit};
@@ -33,9 +33,13 @@ use crate::increment::{Increment, Reaction};
 use crate::limits::Limits;
 use crate::loops::{TrackingLoop, xy_and_z};
 use crate::rotor_model::{RotorModel, Spin};
+use afbc_control::drag::KnownDrag;
 use afbc_control::{Action, FlightController, Mixer, Settings, Smoothed, Smoothing, Trace};
 use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
 use nalgebra::Vector3;
+
+/// Smallest cosine of the tilt that drag reckons with.
+const SHARE_MIN: f32 = 0.25;
 
 parameters! {
     /// Gains and limits. Defaults are for the paper's vehicle with a rotor lag of 20 ms: a short search of `sitl tune`,
@@ -130,6 +134,7 @@ impl Gains {
 pub struct Dfbc<const N: usize = 4> {
     body: Body<N>,
     dt_s: f32,
+    drag: KnownDrag,
     position: TrackingLoop,
     increment: Increment,
     rotors: RotorModel<N>,
@@ -162,6 +167,7 @@ impl<const N: usize> Dfbc<N> {
         Ok(Dfbc {
             body,
             dt_s: settings.dt_s,
+            drag: settings.drag,
             position: TrackingLoop {
                 position_p: xy_and_z(gains.position_p_1_s2, gains.height_p_1_s2),
                 position_d: xy_and_z(gains.position_d_1_s, gains.height_d_1_s),
@@ -202,7 +208,17 @@ impl<const N: usize> FlightController<N> for Dfbc<N> {
             self.increment.measure(&mut memory.reaction, &self.body.angular_acceleration(&now), &omega);
         }
 
-        // Position.
+        // Position. Drag asks for thrust, and turns it as the velocity changes.
+        let up = unit(&r.column(2).into());
+        let (v, a, j) = (&setpoint.velocity_m_s, &setpoint.acceleration_m_s2, &setpoint.jerk_m_s3);
+        // Level flight at this tilt takes this thrust over that of hover.
+        let share = 1.0 / up.z.max(SHARE_MIN);
+        let setpoint = &Setpoint {
+            acceleration_m_s2: a - self.drag.acceleration(&state.velocity_m_s, &up, share),
+            jerk_m_s3: j - self.drag.change(v, &up, share, a),
+            snap_m_s4: setpoint.snap_m_s4 - self.drag.change(v, &up, share, j),
+            ..*setpoint
+        };
         let position = self.position.output(state, setpoint, &memory.position_integral);
         let specific_force = position.specific_force_m_s2;
         let desired = facing(&specific_force, setpoint.yaw_rad);
@@ -221,7 +237,7 @@ impl<const N: usize> FlightController<N> for Dfbc<N> {
             - omega.cross(&omega_r);
 
         let demand = Demand {
-            thrust_n: self.body.mass_kg * specific_force.dot(&unit(&r.column(2).into())).max(0.0),
+            thrust_n: self.body.mass_kg * specific_force.dot(&up).max(0.0),
             angular_acceleration_rad_s2: self.increment.invert(&memory.reaction, &nu),
             acceleration_m_s2: position.acceleration_m_s2,
             desired,

@@ -50,58 +50,58 @@ parameters! {
     pub struct Gains {
         /// k_p along x and y.
         #[parameter(POS_P, "1/s", 0.2..=10.0, tuned)]
-        pub position_p_1_s: f32 = 1.446,
+        pub position_p_1_s: f32 = 1.384,
         /// k_v along x and y.
         #[parameter(VEL_P, "1/s", 0.5..=20.0, tuned)]
-        pub velocity_p_1_s: f32 = 5.845,
+        pub velocity_p_1_s: f32 = 7.14,
         /// k_i along x and y.
         #[parameter(VEL_I, "1/s2", 0.0..=200.0, tuned)]
-        pub velocity_i_1_s2: f32 = 63.76,
+        pub velocity_i_1_s2: f32 = 72.11,
         /// d_v along x and y.
         #[parameter(VEL_D, "1", 0.0..=2.0, tuned)]
-        pub velocity_d: f32 = 0.2255,
+        pub velocity_d: f32 = 0.1796,
         /// k_p along z.
         #[parameter(HEIGHT_P, "1/s", 0.2..=20.0, tuned)]
-        pub height_p_1_s: f32 = 1.954,
+        pub height_p_1_s: f32 = 1.94,
         /// k_v along z.
         #[parameter(CLIMB_P, "1/s", 0.5..=40.0, tuned)]
-        pub climb_p_1_s: f32 = 22.97,
+        pub climb_p_1_s: f32 = 18.72,
         /// k_i along z.
         #[parameter(CLIMB_I, "1/s2", 0.0..=200.0, tuned)]
-        pub climb_i_1_s2: f32 = 194.9,
+        pub climb_i_1_s2: f32 = 179.6,
         /// d_v along z.
         #[parameter(CLIMB_D, "1", 0.0..=2.0, tuned)]
         pub climb_d: f32 = 0.0,
         /// w: bandwidth of the estimate of the hover thrust; 0 for none.
         #[parameter(HOVER, "1/s", 0.0..=2.0, tuned)]
-        pub hover_thrust_1_s: f32 = 0.1246,
+        pub hover_thrust_1_s: f32 = 0.1255,
         /// k_a of roll and pitch.
         #[parameter(TILT_P, "1/s", 1.0..=30.0, tuned)]
-        pub tilt_p_1_s: f32 = 25.1,
+        pub tilt_p_1_s: f32 = 25.42,
         /// k_a of yaw for small errors; not reduced by `yaw_weight`.
         #[parameter(YAW_P, "1/s", 0.2..=15.0, tuned)]
-        pub yaw_p_1_s: f32 = 5.561,
+        pub yaw_p_1_s: f32 = 7.178,
         /// k_w of roll and pitch.
         #[parameter(TILTRATE_P, "1/s", 2.0..=100.0, tuned)]
-        pub tilt_rate_p_1_s: f32 = 24.56,
+        pub tilt_rate_p_1_s: f32 = 28.75,
         /// k_iw of roll and pitch.
         #[parameter(TILTRATE_I, "1/s2", 0.0..=500.0, tuned)]
-        pub tilt_rate_i_1_s2: f32 = 20.23,
+        pub tilt_rate_i_1_s2: f32 = 24.44,
         /// d_w of roll and pitch.
         #[parameter(TILTRATE_D, "1", 0.0..=3.0, tuned)]
-        pub tilt_rate_d: f32 = 0.2492,
+        pub tilt_rate_d: f32 = 0.2859,
         /// k_w of yaw.
         #[parameter(YAWRATE_P, "1/s", 0.5..=40.0, tuned)]
-        pub yaw_rate_p_1_s: f32 = 17.71,
+        pub yaw_rate_p_1_s: f32 = 16.93,
         /// k_iw of yaw.
         #[parameter(YAWRATE_I, "1/s2", 0.0..=100.0, tuned)]
-        pub yaw_rate_i_1_s2: f32 = 94.47,
+        pub yaw_rate_i_1_s2: f32 = 82.47,
         /// f: feed-forward of the rate setpoint.
         #[parameter(RATE_FF, "1/s", 0.0..=20.0, tuned)]
         pub rate_feed_forward_1_s: f32 = 0.0,
         /// Bandwidth of the filters behind both derivatives.
         #[parameter(FILTER, "rad/s", 10.0..=500.0, tuned)]
-        pub filter_rad_s: f32 = 134.3,
+        pub filter_rad_s: f32 = 138.3,
         /// Share of a large yaw error that is corrected together with the tilt, 0 to 1.
         #[parameter(YAW_WEIGHT, "1", 0.05..=1.0)]
         pub yaw_weight: f32 = 0.4,
@@ -114,10 +114,10 @@ parameters! {
         /// Filters on U1..U4.
         #[group("")]
         pub smoothing: Smoothing = Smoothing {
-            smooth_tilt_rad_s: 101.6,
-            smooth_yaw_rad_s: 117.0,
-            smooth_lift_rad_s: 87.32,
-            lead_s: 0.04933,
+            smooth_tilt_rad_s: 105.9,
+            smooth_yaw_rad_s: 111.9,
+            smooth_lift_rad_s: 84.68,
+            lead_s: 0.05431,
         },
     }
 }

@@ -14,17 +14,25 @@ fn time_power(unit: &str) -> i32 {
     }
 }
 
-/// Returns the gains of a vehicle that is `slowness` times slower: each is scaled by its power of time, within its
-/// range, so that errors take the same course, only slower. Limits in m/s, m/s2 and rad stay.
+/// Id of the time constant of a law's model of the rotors.
+const ROTOR_LAG: &str = "ROT_LAG";
+
+/// Returns the gains of a vehicle that is `slowness` times slower, with rotors that lag by `lag_s`: each is scaled by
+/// its power of time, within its range, so that errors take the same course, only slower; models of the rotors have
+/// their lag. Limits in m/s, m/s2 and rad stay.
 #[must_use]
-pub fn slowed<G: Declared>(mut gains: G, slowness: f32) -> G {
-    let scale = |Declaration { unit, range, .. }: &Declaration, value: Value<'_>| {
+pub fn slowed<G: Declared>(mut gains: G, slowness: f32, lag_s: f32) -> G {
+    let scale = |Declaration { id, unit, range, .. }: &Declaration, value: Value<'_>| {
         let factor = (0..time_power(unit).abs()).fold(1.0, |factor, _| factor * slowness);
         let factor = if time_power(unit) < 0 { 1.0 / factor } else { factor };
         if let Value::Single(numbers) = value {
-            // Unchanged to the bit for the lag that the gains were tuned for.
-            let scaled = numbers.iter_mut().filter(|_| factor != 1.0);
-            scaled.for_each(|number| *number = (*number * factor).max(range.min as f32).min(range.max as f32));
+            let within = |number: f32| number.max(range.min as f32).min(range.max as f32);
+            if *id == ROTOR_LAG {
+                numbers.iter_mut().for_each(|number| *number = within(lag_s));
+            } else if factor != 1.0 {
+                // Unchanged to the bit for the lag that the gains were tuned for.
+                numbers.iter_mut().for_each(|number| *number = within(*number * factor));
+            }
         }
         Ok::<(), Infallible>(())
     };

@@ -223,7 +223,7 @@ fn the_flight_image_has_a_log() {
 }
 
 /// Address range of the stack, at the bottom of the RAM (`memory.x`).
-const STACK: std::ops::Range<u32> = 0x2000_0000..0x2000_E000;
+const STACK: std::ops::Range<u32> = 0x2000_0000..0x2001_0000;
 const HARD_FAULT: u32 = 3;
 
 #[test]

@@ -254,7 +254,7 @@ pub(super) fn parameters(scenario: &Scenario) -> Markup {
 /// Returns settings and gains of a contender.
 fn gains(contender: &Contender) -> Markup {
     let Settings {
-        common: afbc_control::Settings { dt_s, rotor_force_max_n, raised_thrust_max },
+        common: afbc_control::Settings { dt_s, rotor_force_max_n, raised_thrust_max, drag: _ },
         command_filter_rad_s,
         limits,
         tilt_by_thrust,
@@ -262,6 +262,7 @@ fn gains(contender: &Contender) -> Markup {
         bumpless,
         anti_windup,
         feed_forward,
+        by_rotation,
         disturbance,
         reference,
         smoothing,
@@ -278,6 +279,7 @@ fn gains(contender: &Contender) -> Markup {
             (bumpless, "bumpless"),
             (anti_windup, "anti-windup"),
             (feed_forward, "feed-forward"),
+            (by_rotation, "errors of the attitude by rotation"),
             (contender.monitored, "monitored"),
         ];
         settings.extend(also.into_iter().filter(|(on, _)| *on).map(|(_, word)| format!(", {word}")));

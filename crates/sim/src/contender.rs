@@ -32,7 +32,7 @@ impl Law {
     pub fn on(kind: ControllerKind, vehicle: &Vehicle, profile: Profile) -> Result<Self, FileError> {
         let law = Law::beside(kind, &vehicle.gains(profile));
         // Those of the cascade are slowed already.
-        let law = if kind.in_cascade() { law } else { slowed(law, slowness(vehicle.lag_s())) };
+        let law = if kind.in_cascade() { law } else { slowed(law, slowness(vehicle.lag_s()), vehicle.lag_s()) };
         if profile == Profile::Flight { law_gains(vehicle, law) } else { Ok(law) }
     }
 }
@@ -146,9 +146,11 @@ impl Contender {
                 let gains = PerAxis::from_fn(|axis| adaptive::Gains { backstepping: own[axis], ..gains[axis] });
                 Law::Backstepping(by_rule(gains).map(|gains| gains.backstepping))
             }
-            law => slowed(law, slowness),
+            law => slowed(law, slowness, vehicle.lag_s()),
         };
-        let settings = self.settings.slowed(slowness).with_rotor_force_max_n(vehicle.force_max_n as f32);
+        let settings =
+            self.settings.slowed(slowness, vehicle.lag_s()).with_rotor_force_max_n(vehicle.force_max_n as f32);
+        let settings = settings.with_drag(vehicle.flight_settings.common.drag);
         Contender { law, settings, ..self }
     }
 

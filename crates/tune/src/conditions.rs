@@ -1,13 +1,19 @@
 //! Flights that gains have to survive, whatever they cost: what the training flights, all on the vehicle that the law
 //! was told of, do not show.
 
+use crate::fast;
+use crate::maker::{self, Maker, TrainingFlight};
+use crate::scale::Scale;
 use afbc::Profile;
-use afbc_plant::Sensing;
+use afbc_plant::noise::{Noise, Stream};
+use afbc_plant::{Drag, Environment, ParameterChange, Quantity, Sensing, Turbulence};
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::run::Run;
 use afbc_sim::scenario::{Scenario, built_in};
+use afbc_sim::trajectory::{Sine, Trajectory};
 use afbc_types::OutOfRange;
-use nalgebra::Vector4;
+use afbc_vehicles::Vehicle;
+use nalgebra::{Vector3, Vector4};
 use rayon::prelude::*;
 use std::error::Error;
 
@@ -16,11 +22,18 @@ const HARD: [u64; 9] = [156, 176, 211, 275, 696, 800, 901, 8555, 9540];
 /// What of such a flight is flown \[s\].
 const HARD_S: f64 = 10.0;
 /// Largest factor of a condition, that of a flight which is lost or in which the monitor trips.
-const FAILED: f64 = 2.0;
+pub(crate) const FAILED: f64 = 2.0;
 /// Largest root mean square error of x, y, z \[m\] and yaw \[rad\] of a vehicle that is in control of itself.
 const IN_CONTROL: [f64; 4] = [1.3, 1.3, 1.3, 1.3];
 
-/// A flight that gains have to survive. No other vehicle's gains but those [by rule](Contender::by_rule) are meant.
+/// Any change of the inputs.
+const ANY: Vector4<f64> = Vector4::new(f64::INFINITY, f64::INFINITY, f64::INFINITY, f64::INFINITY);
+
+/// Random flights on another vehicle than the paper's, and the seed of the first.
+const DRAWN: u64 = 6;
+const SEED: u64 = 2700;
+
+/// A flight that gains have to survive.
 #[derive(Clone, Debug)]
 pub struct Condition {
     /// The flight.
@@ -29,11 +42,15 @@ pub struct Condition {
     pub rmse: Vector4<f64>,
     /// Largest distance at the end \[m\].
     pub end_m: f64,
+    /// Largest mean |change per step| of U1..U4 \[N\].
+    pub jumps_n: Vector4<f64>,
     /// Whether it is asked of AFBC only.
     pub of_afbc: bool,
+    /// Whether the gains are those of the paper's vehicle, flown [by rule](Contender::by_rule) on another one.
+    pub by_rule: bool,
 }
 
-/// Returns the flights that gains have to survive.
+/// Returns the flights that gains of the paper's vehicle have to survive.
 ///
 /// # Errors
 /// None occurs: a test flies them.
@@ -45,14 +62,102 @@ pub fn conditions() -> Result<Vec<Condition>, Box<dyn Error>> {
         vehicle("racer", "step", 1.5)?,
         sampled()?,
         hardware()?,
+        tracked("tracker", [0.012, 0.012, 0.012, 0.008], |s| (s.period_s, s.delay_s, s.gyro) = (0.01, 0.02, true))?,
+        tracked("noisy", [0.012, 0.012, 0.022, 0.006], |s| s.noise.rates_rad_s = 0.05)?,
+        shaken()?,
     ];
     let campaign = afbc_campaign::built_in("robustness").ok_or("no campaign")?.read()?;
     for flight in HARD {
         let name = format!("robustness-{flight}");
         let scenario = Scenario { name, duration_s: HARD_S, ..campaign.flight(flight)? };
-        conditions.push(Condition { scenario, rmse: IN_CONTROL.into(), end_m: 1.0, of_afbc: false });
+        conditions.push(Condition {
+            scenario,
+            rmse: IN_CONTROL.into(),
+            end_m: 1.0,
+            jumps_n: ANY,
+            of_afbc: false,
+            by_rule: false,
+        });
     }
     Ok(conditions)
+}
+
+/// Returns the flights that gains of `vehicle` have to survive; of the paper's, those of [`conditions`].
+///
+/// # Errors
+/// What the vehicle cannot fly: the first number out of range.
+pub fn conditions_on(vehicle: &Vehicle) -> Result<Vec<Condition>, Box<dyn Error>> {
+    if maker::is_paper(vehicle) {
+        return conditions();
+    }
+    let maker = Maker::new(Some(vehicle));
+    let Scale { length, time, wind, .. } = maker.scale;
+    let condition = |scenario, end_m| Condition {
+        scenario,
+        rmse: Vector4::from(IN_CONTROL) * length.max(1.0),
+        end_m,
+        jumps_n: ANY,
+        of_afbc: false,
+        by_rule: false,
+    };
+    let built = |name| maker::read(name)?.on(vehicle, Profile::Flight);
+    let mut breeze = built("wind")?;
+    let air = &mut breeze.realism.wind;
+    air.steady_m_s *= wind;
+    air.gusts.iter_mut().for_each(|gust| gust.velocity_m_s *= wind);
+    air.turbulence = Some(maker.turbulence(Turbulence::LIGHT));
+    let mut step = built("step")?;
+    step.realism.rotors.time_constant_s *= 1.5;
+    (step.realism.rotors.delay_s, step.sensing.delay_s) = (0.004, 0.004);
+    let mut sampled = maker.hardware()?;
+    sampled.sensing = Sensing { period_s: 0.01, delay_s: 0.01, ..Sensing::DEFAULT };
+    (sampled.name, sampled.duration_s, sampled.flight_core) = ("sampled".into(), 12.0, true);
+    let near_m = 0.05 * length.max(1.0);
+    let mut conditions = vec![
+        condition(built("hover")?, near_m),
+        condition(breeze, 1.3 * length.max(1.0)),
+        condition(step, near_m),
+        Condition { rmse: Vector4::repeat(near_m), ..condition(sampled, 2.0 * near_m) },
+        condition(fast::lemniscate(&maker, "lemniscate-hard", 2.5, 0.8)?, 1.3 * length.max(1.0)),
+    ];
+    for index in 0..DRAWN {
+        conditions.push(condition(drawn(&maker, index, time)?, length.max(1.0)));
+    }
+    Ok(conditions)
+}
+
+/// A random flight in turbulence on a vehicle that differs from what its law is told: as the campaign `robustness`
+/// draws them on the paper's, but never beyond what the rotors carry.
+fn drawn(maker: &Maker<'_>, index: u64, time: f64) -> Result<Scenario, Box<dyn Error>> {
+    let mut noise = Noise::new(SEED + index, Stream::Scenario);
+    let mut between = |low: f64, high: f64| low + (high - low) * noise.uniform();
+    let scale = &maker.scale;
+    // One of the two may be at its worst.
+    let thrust = between(scale.thrust(0.6), 1.2);
+    let mass = between(0.7, scale.mass(1.3)).min((thrust / scale.thrust(0.6)).max(0.7));
+    let changes = [(Quantity::Mass, mass), (Quantity::ThrustFactor, thrust), (Quantity::Inertia, between(0.7, 1.3))];
+    let change = |(quantity, factor)| ParameterChange { quantity, factor, start_s: 0.0, end_s: f64::INFINITY };
+    let from_m = Vector3::new(0.0, 0.0, 3.0);
+    let by_m = Vector3::new(between(-1.0, 1.0), between(-1.0, 1.0), between(-0.5, 0.5)) * scale.length;
+    let trajectory = match index % 3 {
+        0 => Trajectory::Step { from_m, to_m: from_m + by_m, at_s: 4.0, yaw_rad: 0.0, turn_rad: between(-1.0, 1.0) },
+        1 => Trajectory::Circle {
+            centre_m: from_m,
+            radius_m: 2.0 * scale.length,
+            period_s: between(5.0, 10.0) * time,
+            yaw_rad: between(-1.0, 1.0),
+        },
+        _ => Trajectory::Hover { position_m: from_m, yaw_rad: between(-1.0, 1.0) },
+    };
+    let mut scenario = maker.scenario(TrainingFlight { trajectory, ..TrainingFlight::new("drawn", HARD_S) })?;
+    scenario.name = format!("drawn-{index}");
+    scenario.seed = SEED + index;
+    let changes = changes.into_iter().map(change).collect();
+    scenario.environment = Environment::new(*scenario.environment.nominal(), changes, Vec::new())?;
+    scenario.realism.wind.turbulence = Some(maker.turbulence(Turbulence::MODERATE));
+    scenario.realism.rotors.time_constant_s *= between(0.5, 1.5);
+    scenario.sensing.delay_s = between(0.0, 0.004 * time);
+    Ok(scenario)
 }
 
 /// A built-in scenario on another built-in vehicle, whose rotors lag `slower` times as much as its law is told; if they
@@ -67,7 +172,7 @@ fn vehicle(vehicle: &str, name: &str, slower: f64) -> Result<Condition, Box<dyn 
     scenario.name = format!("{}-{name}", vehicle.name);
     // Wind keeps a vehicle off.
     let end_m = if name == "wind" { 1.3 } else { 0.05 };
-    Ok(Condition { scenario, rmse: IN_CONTROL.into(), end_m, of_afbc: false })
+    Ok(Condition { scenario, rmse: IN_CONTROL.into(), end_m, jumps_n: ANY, of_afbc: false, by_rule: true })
 }
 
 /// `hardware` on 100 states per second that are 10 ms late, without a gyroscope, through the flight core.
@@ -75,13 +180,63 @@ fn sampled() -> Result<Condition, Box<dyn Error>> {
     let mut scenario = built_in("hardware").ok_or("no scenario")?.read()?;
     scenario.sensing = Sensing { period_s: 0.01, delay_s: 0.01, ..Sensing::DEFAULT };
     (scenario.name, scenario.duration_s, scenario.flight_core) = ("sampled".into(), 12.0, true);
-    Ok(Condition { scenario, rmse: Vector4::new(0.05, 0.05, 0.05, 0.05), end_m: 0.1, of_afbc: false })
+    Ok(Condition {
+        scenario,
+        rmse: Vector4::new(0.05, 0.05, 0.05, 0.05),
+        end_m: 0.1,
+        jumps_n: ANY,
+        of_afbc: false,
+        by_rule: false,
+    })
+}
+
+/// An eight of 3 m in light turbulence, as sensed; inputs may change by `jumps_n` a step.
+fn tracked(name: &str, jumps_n: [f64; 4], sense: impl Fn(&mut Sensing)) -> Result<Condition, Box<dyn Error>> {
+    let mut scenario = built_in("hardware").ok_or("no scenario")?.read()?;
+    let sine = |amplitude_m, period_s| Sine { amplitude_m, period_s, phase_rad: 0.0 };
+    scenario.environment = Environment::calm(*scenario.environment.nominal())?;
+    scenario.trajectory = Trajectory::Lissajous {
+        centre_m: Vector3::new(0.0, 0.0, 3.0),
+        sines: [sine(1.5, 8.0), sine(0.75, 4.0), sine(0.3, 8.0)],
+        yaw_rad: 0.0,
+    };
+    let begin = scenario.trajectory.at(0.0);
+    (scenario.initial.position_m, scenario.initial.velocity_m_s) = (begin.position_m, begin.velocity_m_s);
+    scenario.realism.drag = Some(Drag::PAPER);
+    scenario.realism.wind.turbulence = Some(Turbulence::LIGHT);
+    (scenario.name, scenario.duration_s, scenario.seed) = (name.into(), 20.0, SEED);
+    sense(&mut scenario.sensing);
+    let rmse = Vector4::new(0.023, 0.023, 0.02, 0.05);
+    Ok(Condition { scenario, rmse, end_m: 0.1, jumps_n: jumps_n.into(), of_afbc: true, by_rule: false })
+}
+
+/// `mocap` with rotors that shake the inertial sensor twice as much, on the estimate.
+fn shaken() -> Result<Condition, Box<dyn Error>> {
+    let mut scenario = built_in("mocap").ok_or("no scenario")?.read()?;
+    let imu = scenario.instruments.imu.as_mut().ok_or("no inertial sensor")?;
+    (imu.gyro.vibration_rad_s, imu.accel.vibration_m_s2) = (0.04, 2.0);
+    (scenario.name, scenario.duration_s, scenario.seed) = ("shaken".into(), 12.0, SEED);
+    Ok(Condition {
+        scenario,
+        rmse: IN_CONTROL.into(),
+        end_m: 1.0,
+        jumps_n: Vector4::new(0.02, 0.02, 0.1, 0.008),
+        of_afbc: true,
+        by_rule: false,
+    })
 }
 
 /// `hardware` within the bounds that its test sets for AFBC, less what noise makes of them.
 fn hardware() -> Result<Condition, Box<dyn Error>> {
     let scenario = built_in("hardware").ok_or("no scenario")?.read()?;
-    Ok(Condition { scenario, rmse: Vector4::new(0.00243, 0.00243, 0.00243, 0.00146), end_m: 0.1, of_afbc: true })
+    Ok(Condition {
+        scenario,
+        rmse: Vector4::new(0.00243, 0.00243, 0.00243, 0.00146),
+        end_m: 0.1,
+        jumps_n: ANY,
+        of_afbc: true,
+        by_rule: false,
+    })
 }
 
 impl Condition {
@@ -99,15 +254,16 @@ impl Condition {
             return Ok(1.0);
         }
         let contender = match &self.scenario.vehicle_file {
-            Some(vehicle) => contender.clone().by_rule(vehicle),
-            None => contender.clone(),
+            Some(vehicle) if self.by_rule => contender.clone().by_rule(vehicle),
+            _ => contender.clone(),
         };
-        let run = Run::fly(&self.scenario, &contender, u64::MAX)?;
+        let run = Run::fly(&self.scenario, &fast::free(&self.scenario, &contender), u64::MAX)?;
         if run.lost.is_some() || run.tripped.is_some() {
             return Ok(FAILED);
         }
         let errors = run.metrics.rmse.component_div(&self.rmse).max();
-        let excess = errors.max(run.metrics.final_error.xyz().norm() / self.end_m).max(1.0);
+        let jumps = run.metrics.mean_abs_delta_u.component_div(&self.jumps_n).max();
+        let excess = errors.max(run.metrics.final_error.xyz().norm() / self.end_m).max(jumps).max(1.0);
         Ok((excess * excess * excess).min(FAILED))
     }
 }

@@ -1,5 +1,7 @@
 //! The cost of a contender's flights.
 
+use crate::fast;
+use crate::scale::Scale;
 use afbc_sim::contender::Contender;
 use afbc_sim::metrics::Metrics;
 use afbc_sim::run::Run;
@@ -7,35 +9,44 @@ use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 use rayon::prelude::*;
 
-/// Root mean square distance from the reference with a cost of 1 \[m\].
+/// Root mean square distance from the reference with a cost of 1 \[m\], of the paper's vehicle.
 pub const POSITION_M: f64 = 0.1;
-/// Combined largest error along x, y and z with a cost of 1 \[m\].
+/// Combined largest error along x, y and z with a cost of 1 \[m\], of the same.
 pub const WORST_M: f64 = 0.3;
 /// Root mean square error of yaw with a cost of 1 \[rad\].
 pub const YAW_RAD: f64 = 0.05;
-/// Sum over U1..U4 of the mean |change per step| with a cost of 1 \[N\].
+/// Sum over U1..U4 of the mean |change per step| with a cost of 1 \[N\], of the same.
 pub const JUMP_N: f64 = 0.5;
 /// Cost of a flight that is lost, or in which the monitor trips, at its end; up to twice as much if earlier.
 pub const LOST: f64 = 1000.0;
 
-/// Returns the cost of one flight.
+/// Returns the cost of one flight. On a vehicle of a file, distances count by what lengths of its flights are scaled
+/// by, and inputs by its weight.
 pub fn cost(scenario: &Scenario, run: &Run) -> f64 {
     let tripped_s = run.tripped.map(|tripped| tripped.time_s);
     if let Some(end_s) = run.lost.map(|lost| lost.time_s).or(tripped_s) {
         return LOST * (2.0 - end_s / scenario.duration_s);
     }
     let Metrics { rmse, max_abs, mean_abs_delta_u: jumps, .. } = &run.metrics;
-    let errors = rmse.xyz().norm() / POSITION_M + rmse.w / YAW_RAD;
-    0.03 + errors + max_abs.xyz().norm() / WORST_M + jumps.sum() / JUMP_N
+    let Scale { length, weight, .. } = Scale::of(scenario.vehicle_file.as_ref());
+    let errors = rmse.xyz().norm() / (POSITION_M * length) + rmse.w / YAW_RAD;
+    0.03 + errors + max_abs.xyz().norm() / (WORST_M * length) + jumps.sum() / (JUMP_N * weight)
 }
 
-/// Returns the cost of each of `scenarios` under `contender`.
+/// Returns the cost of one of `scenarios` under `contender`.
+///
+/// # Errors
+/// The first parameter, gain or setting out of range.
+pub(crate) fn flown(scenario: &Scenario, contender: &Contender) -> Result<f64, OutOfRange> {
+    Ok(cost(scenario, &Run::fly(scenario, &fast::free(scenario, contender), u64::MAX)?))
+}
+
+/// Returns the cost of each of `scenarios` under `contender`, which may tilt by 1.2 rad in fast ones.
 ///
 /// # Errors
 /// The first parameter, gain or setting out of range.
 pub fn costs(scenarios: &[Scenario], contender: &Contender) -> Result<Vec<f64>, OutOfRange> {
-    let fly = |scenario| Run::fly(scenario, contender, u64::MAX).map(|run| cost(scenario, &run));
-    scenarios.par_iter().map(fly).collect()
+    scenarios.par_iter().map(|scenario| flown(scenario, contender)).collect()
 }
 
 /// Returns the geometric mean over flights, the cost of a contender: each flight counts by what part of its cost is

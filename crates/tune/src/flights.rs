@@ -1,109 +1,328 @@
-//! Flights in which gains are evaluated.
+//! Flights in which gains are evaluated, made from a vehicle's own data.
 //!
 //! Every flight is based on the built-in scenario `hardware`: rotors with a lag of 20 ms, a delay of 1 ms and at most 3
-//! N each, and a noisy state. The first is that scenario itself; each of the others adds one disturbance. The last two
-//! are flown on an estimate, with the sensors of the built-in scenarios `mocap` and `outdoor`.
+//! N each, and a noisy state. The first is that scenario itself; each of the others adds one disturbance. Two are flown
+//! on an estimate, with the sensors of the built-in scenarios `mocap` and `outdoor`; the last two are fast.
+//!
+//! On another vehicle rotors, battery, drag and ground are its own, and what happens is scaled by [`Scale`]: times by
+//! how slow it is, lengths and accelerations by what its rotors leave, wind by its drag, losses of thrust and loads so
+//! that the same share of its reserve is left.
 
+use crate::fast;
+use crate::maker::{Maker, ONSET_S, TrainingFlight, read};
+use crate::scale::Scale;
 use afbc_plant::instruments::{Barometer, Gnss, Imu, Magnetometer, Tracker};
 use afbc_plant::{
-    Contact, Drag, Environment, GroundEffect, Gust, GustKind, Motion, ParameterChange, Quantity, Sensing, Suite,
+    Battery, Contact, Environment, GroundEffect, Gust, GustKind, Payload, Quantity, RotorFault, Sensing, Suite,
     Turbulence,
 };
-use afbc_reader::FileError;
-use afbc_sim::scenario::{Outage, Scenario, built_in};
+use afbc_sim::scenario::{Outage, Scenario};
 use afbc_sim::trajectory::{Sine, Trajectory, Waypoint};
 use afbc_types::Axis;
+use afbc_vehicles::Vehicle;
 use nalgebra::Vector3;
 use std::error::Error;
 
-/// Onset of disturbances \[s\], when errors already count.
-const ONSET_S: f64 = 6.0;
-/// Time of the reference's step \[s\]: half a second before errors count, so that mainly the settling counts.
-const STEP_S: f64 = 4.5;
+/// Half of this before errors count a reference steps, so that mainly the settling counts, on the paper's vehicle
+/// \[s\].
+const SETTLING_S: f64 = 0.5;
 
-/// Returns the flights used in the search for gains.
+/// Returns the flights used in the search for gains, on the paper's vehicle.
 ///
 /// # Errors
 /// None occurs: a test flies them.
 pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
-    let to = Vector3::new(0.6, -0.4, 1.0);
-    let eight = |name, change| TrainingFlight { trajectory: eight(8.0), change, ..TrainingFlight::new(name, 15.0) };
-    let mut late = windy(eight("late", None))?;
-    late.realism.rotors.delay_s = 0.004;
-    let mut turbulent = TrainingFlight::new("turbulence", 20.0).scenario()?;
-    turbulent.realism.drag = Some(Drag::PAPER);
-    turbulent.realism.wind.turbulence = Some(Turbulence::MODERATE);
-    Ok(vec![
-        hardware()?,
-        TrainingFlight { trajectory: step(to, 1.0), ..TrainingFlight::new("step", 12.0) }.scenario()?,
-        turbulent,
-        TrainingFlight { change: Some((Quantity::ThrustFactor, 0.6)), ..TrainingFlight::new("weak", 8.0) }
-            .scenario()?,
-        windy(eight("heavy", Some((Quantity::Mass, 1.3))))?,
-        late,
-        // An outage at the onset of each gust and parameter change, and during a step.
-        Scenario {
-            name: "outages".into(),
-            duration_s: 45.0,
-            ..blind(hardware()?, &[7.45, 14.95, 19.9, 22.45, 29.95, 37.45])
-        },
-        blind(
-            TrainingFlight { trajectory: step(-to, -1.0), ..TrainingFlight::new("blind-step", 12.0) }.scenario()?,
-            &[STEP_S + 0.5],
-        ),
-        landing("landing", 2.0)?,
-        upset("upset", 1.0)?,
-        course("course", 1.5)?,
-        Hardware { state_delay_s: 0.02, ..Hardware::default() }.flight("old", eight("", None))?,
-        Hardware { rotor_lag_s: 0.04, ..Hardware::default() }.flight("slow", eight("", None))?,
-        Hardware { rate_noise_rad_s: 0.05, ..Hardware::default() }.flight("noisy", eight("", None))?,
-        Hardware { tracker: true, state_delay_s: 0.02, ..Hardware::default() }.flight("tracker", eight("", None))?,
-        sensed("mocap", eight("", None), |_| {})?,
-        sensed("outdoor", eight("", None), |_| {})?,
-    ])
+    Maker::new(None).training()
 }
 
-/// Returns the held-out flights, which are not used in the search, to detect overfitting.
+/// Returns the flights used in the search for gains of `vehicle`. For the paper's vehicle, whatever gains its file has,
+/// they are those of [`training`].
+///
+/// # Errors
+/// What the vehicle cannot fly: the first number out of range.
+pub fn training_on(vehicle: &Vehicle) -> Result<Vec<Scenario>, Box<dyn Error>> {
+    Maker::new(Some(vehicle)).training()
+}
+
+/// Returns the held-out flights of the paper's vehicle, which are not used in the search, to detect overfitting.
 ///
 /// # Errors
 /// None occurs: a test flies them.
 pub fn held_out() -> Result<Vec<Scenario>, Box<dyn Error>> {
-    let fast = |name, change| TrainingFlight { trajectory: eight(6.0), change, ..TrainingFlight::new(name, 20.0) };
-    let mut delayed = windy(fast("delayed", None))?;
-    delayed.sensing.delay_s = 0.003;
-    let mut wind = fast("wind", None).scenario()?;
-    wind.realism.drag = Some(Drag::PAPER);
-    wind.realism.wind.steady_m_s = Vector3::new(4.0, 2.0, 0.0);
-    wind.realism.wind.turbulence = Some(Turbulence::LIGHT);
-    Ok(vec![
-        Scenario { seed: 1001, ..hardware()? },
-        TrainingFlight {
-            trajectory: step(Vector3::new(-0.4, 0.8, -0.3), 1.5),
-            ..TrainingFlight::new("step-back", 12.0)
+    Maker::new(None).held_out()
+}
+
+/// Returns the held-out flights of `vehicle`, as [`training_on`].
+///
+/// # Errors
+/// As [`training_on`].
+pub fn held_out_on(vehicle: &Vehicle) -> Result<Vec<Scenario>, Box<dyn Error>> {
+    Maker::new(Some(vehicle)).held_out()
+}
+impl Maker<'_> {
+    fn training(&self) -> Result<Vec<Scenario>, Box<dyn Error>> {
+        let Scale { length, time, .. } = self.scale;
+        let to = Vector3::new(0.6, -0.4, 1.0) * length;
+        let eight =
+            |name, change| TrainingFlight { trajectory: self.eight(8.0), change, ..TrainingFlight::new(name, 15.0) };
+        let mut late = self.windy(eight("late", None))?;
+        late.realism.rotors.delay_s = 0.004 * time;
+        let mut turbulent = self.scenario(TrainingFlight::new("turbulence", 20.0))?;
+        self.drag(&mut turbulent);
+        turbulent.realism.wind.turbulence = Some(self.turbulence(Turbulence::MODERATE));
+        let weak = Some((Quantity::ThrustFactor, self.scale.thrust(0.6)));
+        let heavy = Some((Quantity::Mass, self.scale.mass(1.3)));
+        let old_s = 0.02 * time;
+        let [lemniscate, circle] = fast::training(self)?;
+        Ok(vec![
+            self.hardware()?,
+            self.scenario(TrainingFlight { trajectory: self.step(to, 1.0), ..TrainingFlight::new("step", 12.0) })?,
+            turbulent,
+            self.scenario(TrainingFlight { change: weak, ..TrainingFlight::new("weak", 8.0) })?,
+            self.windy(eight("heavy", heavy))?,
+            late,
+            // An outage at the onset of each gust and parameter change, and during a step.
+            Scenario {
+                name: "outages".into(),
+                duration_s: 45.0,
+                ..blind(self.hardware()?, &[7.45, 14.95, 19.9, 22.45, 29.95, 37.45])
+            },
+            blind(
+                self.scenario(TrainingFlight {
+                    trajectory: self.step(-to, -1.0),
+                    ..TrainingFlight::new("blind-step", 12.0)
+                })?,
+                &[self.step_s() + 0.5],
+            ),
+            self.landing("landing", 2.0)?,
+            self.upset("upset", 1.0)?,
+            self.course("course", 1.5)?,
+            self.flight(Hardware { state_delay_s: old_s, ..Hardware::default() }, "old", eight("", None))?,
+            self.flight(Hardware { lag: 1.0 + 1.0 / time, ..Hardware::default() }, "slow", eight("", None))?,
+            self.flight(Hardware { rate_noise_rad_s: 0.05, ..Hardware::default() }, "noisy", eight("", None))?,
+            self.flight(
+                Hardware { tracker: true, state_delay_s: old_s, ..Hardware::default() },
+                "tracker",
+                eight("", None),
+            )?,
+            self.rotor("rotor", eight("", None), 0.65)?,
+            self.payload("payload", eight("", None), 0.1)?,
+            self.sensed("mocap", eight("", None), |_| {})?,
+            self.sensed("outdoor", eight("", None), |_| {})?,
+            lemniscate,
+            circle,
+        ])
+    }
+
+    fn held_out(&self) -> Result<Vec<Scenario>, Box<dyn Error>> {
+        let Scale { length, time, wind: air, .. } = self.scale;
+        let fast =
+            |name, change| TrainingFlight { trajectory: self.eight(6.0), change, ..TrainingFlight::new(name, 20.0) };
+        let mut delayed = self.windy(fast("delayed", None))?;
+        delayed.sensing.delay_s = 0.003 * time;
+        let mut wind = self.scenario(fast("wind", None))?;
+        self.drag(&mut wind);
+        wind.realism.wind.steady_m_s = Vector3::new(4.0, 2.0, 0.0) * air;
+        wind.realism.wind.turbulence = Some(self.turbulence(Turbulence::LIGHT));
+        let heavy = Some((Quantity::Mass, self.scale.mass(1.15)));
+        let [lemniscate, circle] = fast::held_out(self)?;
+        let mut flights = vec![
+            Scenario { seed: 1001, ..self.hardware()? },
+            self.scenario(TrainingFlight {
+                trajectory: self.step(Vector3::new(-0.4, 0.8, -0.3) * length, 1.5),
+                ..TrainingFlight::new("step-back", 12.0)
+            })?,
+            wind,
+            self.windy(fast("light", Some((Quantity::Mass, 0.8))))?,
+            self.windy(fast("inert", Some((Quantity::Inertia, 1.75))))?,
+            delayed,
+            blind(self.scenario(fast("outages", heavy))?, &[ONSET_S - 0.05, 8.3, 11.0, 13.7, 16.4]),
+            self.landing("landing-fast", 1.2)?,
+            self.upset("upset-back", -0.8)?,
+            self.course("course-back", -1.2)?,
+            self.flight(Hardware { state_delay_s: 0.012 * time, ..Hardware::default() }, "old", fast("", None))?,
+            self.flight(Hardware { lag: 0.5, ..Hardware::default() }, "quick", fast("", None))?,
+            self.flight(Hardware { lag: 1.5, rate_noise_rad_s: 0.02, ..Hardware::default() }, "noisy", fast("", None))?,
+            self.flight(
+                Hardware { tracker: true, state_delay_s: 0.01 * time, rate_noise_rad_s: 0.02, ..Hardware::default() },
+                "tracker",
+                fast("", None),
+            )?,
+            self.rotor("rotor", fast("", None), 0.8)?,
+            self.payload("payload", fast("", None), -0.06)?,
+            self.sensed("mocap", fast("", None), |suite| {
+                suite.imu = suite.imu.map(|imu| Imu { gyro: Imu::MPU_6000.gyro, ..imu });
+                suite.tracker = Some(Tracker { delay_s: 0.03, ..Tracker::MOCAP_100 });
+            })?,
+            self.sensed("outdoor", fast("", None), |suite| {
+                (suite.barometer, suite.magnetometer) = (Some(Barometer::BMP388), Some(Magnetometer::QMC5883L));
+            })?,
+            lemniscate,
+            circle,
+        ];
+        // The rotors of `hardware` have no battery.
+        let battery = self.vehicle.and_then(|vehicle| vehicle.realism.rotors.battery);
+        if let Some(battery) = battery {
+            let mut low = self.windy(fast("battery", None))?;
+            low.realism.rotors.battery = Some(low_battery(battery, self.scale.thrust(0.75)));
+            flights.push(low);
         }
-        .scenario()?,
-        wind,
-        windy(fast("light", Some((Quantity::Mass, 0.8))))?,
-        windy(fast("inert", Some((Quantity::Inertia, 1.75))))?,
-        delayed,
-        blind(fast("outages", Some((Quantity::Mass, 1.15))).scenario()?, &[ONSET_S - 0.05, 8.3, 11.0, 13.7, 16.4]),
-        landing("landing-fast", 1.2)?,
-        upset("upset-back", -0.8)?,
-        course("course-back", -1.2)?,
-        Hardware { state_delay_s: 0.012, ..Hardware::default() }.flight("old", fast("", None))?,
-        Hardware { rotor_lag_s: 0.01, ..Hardware::default() }.flight("quick", fast("", None))?,
-        Hardware { rotor_lag_s: 0.03, rate_noise_rad_s: 0.02, ..Hardware::default() }
-            .flight("noisy", fast("", None))?,
-        Hardware { tracker: true, state_delay_s: 0.01, rate_noise_rad_s: 0.02, ..Hardware::default() }
-            .flight("tracker", fast("", None))?,
-        sensed("mocap", fast("", None), |suite| {
-            suite.imu = suite.imu.map(|imu| Imu { gyro: Imu::MPU_6000.gyro, ..imu });
-            suite.tracker = Some(Tracker { delay_s: 0.03, ..Tracker::MOCAP_100 });
-        })?,
-        sensed("outdoor", fast("", None), |suite| {
-            (suite.barometer, suite.magnetometer) = (Some(Barometer::BMP388), Some(Magnetometer::QMC5883L));
-        })?,
-    ])
+        Ok(flights)
+    }
+
+    /// Time of the reference's step \[s\].
+    fn step_s(&self) -> f64 {
+        5.0 - SETTLING_S * self.scale.time
+    }
+
+    /// Returns a flight with pushes of at most a tenth of a second, of about `strength` times 2 m/s or 2 rad/s.
+    fn upset(&self, name: &'static str, strength: f64) -> Result<Scenario, Box<dyn Error>> {
+        let Scale { length, time, .. } = self.scale;
+        let (speed, rate) = (length / time, 1.0 / time);
+        let pushes = [
+            (Axis::Roll, 60.0 * rate, 0.03),
+            (Axis::X, 20.0 * speed, 0.1),
+            (Axis::Pitch, 60.0 * rate, 0.03),
+            (Axis::Z, 20.0 * speed, 0.1),
+            (Axis::Yaw, 20.0 * rate, 0.1),
+        ];
+        let push = |((axis, size, length_s), k): ((Axis, f64, f64), u32)| {
+            let start_s = ONSET_S + 3.0 * time * f64::from(k);
+            Gust { axis, kind: GustKind::Acceleration, size: size * strength, start_s, end_s: start_s + length_s }
+        };
+        let pushes = pushes.into_iter().zip(0..).map(push).collect();
+        let scenario = self.scenario(TrainingFlight::new(name, ONSET_S + 14.0 * time))?;
+        let environment = Environment::new(*scenario.environment.nominal(), Vec::new(), pushes)?;
+        Ok(Scenario { environment, ..scenario })
+    }
+
+    /// Returns a course with corners in wind, from each to the next in one second.
+    fn course(&self, name: &'static str, leg_m: f64) -> Result<Scenario, Box<dyn Error>> {
+        let Scale { length, time, wind, .. } = self.scale;
+        let leg_m = leg_m * length;
+        let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)];
+        let corner = |(k, (x, y)): (u32, (f64, f64))| {
+            let (position_m, yaw_rad) = (Vector3::new(x * leg_m, y * leg_m, 3.0), f64::from(k));
+            let arrived_s = ONSET_S + 3.0 * time * f64::from(k);
+            [arrived_s, arrived_s + 2.0 * time].map(|time_s| Waypoint { time_s, position_m, yaw_rad })
+        };
+        let waypoints = (0..).zip(corners).flat_map(corner).collect();
+        let mut scenario = self.scenario(TrainingFlight {
+            trajectory: Trajectory::Waypoints(waypoints),
+            ..TrainingFlight::new(name, ONSET_S + 16.0 * time)
+        })?;
+        self.drag(&mut scenario);
+        scenario.realism.wind.steady_m_s = Vector3::new(4.0, -2.0, 0.0) * wind;
+        scenario.realism.wind.turbulence = Some(self.turbulence(Turbulence::LIGHT));
+        Ok(scenario)
+    }
+
+    /// Returns a flight in light wind that lands within `length_s`, stays on the ground for 3 s with the reference
+    /// slightly below it, and takes off again.
+    fn landing(&self, name: &'static str, length_s: f64) -> Result<Scenario, Box<dyn Error>> {
+        let time = self.scale.time;
+        let contact = self.vehicle.and_then(|vehicle| vehicle.realism.contact).unwrap_or(Contact::PAPER);
+        let depth_m = contact.foot_depth_m;
+        let low_m = depth_m - (0.375 * depth_m).min(0.03);
+        let at = |time_s, height_m| Waypoint { time_s, position_m: Vector3::new(0.0, 0.0, height_m), yaw_rad: 0.0 };
+        let down_s = ONSET_S + length_s * time;
+        let up_s = down_s + 3.0;
+        let waypoints = vec![at(ONSET_S, 1.0), at(down_s, low_m), at(up_s, low_m), at(up_s + 2.0 * time, 1.0)];
+        let mut scenario = self.scenario(TrainingFlight {
+            trajectory: Trajectory::Waypoints(waypoints),
+            ..TrainingFlight::new(name, 9.0 + 7.0 * time)
+        })?;
+        scenario.realism.contact = Some(contact);
+        if self.vehicle.is_none_or(|vehicle| vehicle.realism.contact.is_none()) {
+            scenario.realism.ground_effect = Some(GroundEffect::PAPER);
+        }
+        self.drag(&mut scenario);
+        scenario.realism.wind.turbulence = Some(self.turbulence(Turbulence::LIGHT));
+        Ok(scenario)
+    }
+
+    /// Returns `flight` in moderate turbulence with a rotor that gives only this share of its thrust from the onset on.
+    fn rotor(&self, name: &'static str, flight: TrainingFlight, efficiency: f64) -> Result<Scenario, Box<dyn Error>> {
+        let mut scenario = self.windy(TrainingFlight { name, ..flight })?;
+        let efficiency = self.scale.thrust(efficiency);
+        scenario.realism.rotors.faults = vec![RotorFault { rotor: 2, efficiency, start_s: ONSET_S }];
+        Ok(scenario)
+    }
+
+    /// Returns `flight` in moderate turbulence with a fifth of the mass as a payload, this far ahead, from the onset
+    /// on.
+    fn payload(&self, name: &'static str, flight: TrainingFlight, ahead_m: f64) -> Result<Scenario, Box<dyn Error>> {
+        let scenario = self.windy(TrainingFlight { name, ..flight })?;
+        let Scale { arm, .. } = self.scale;
+        let share = 0.2 * ((self.scale.mass(1.2) - 1.0) / (1.2 - 1.0));
+        let payload = Payload {
+            mass_kg: share * scenario.vehicle.mass_kg,
+            below_m: 0.05 * arm,
+            ahead_m: ahead_m * arm,
+            left_m: 0.5 * ahead_m * arm,
+            start_s: ONSET_S,
+            end_s: f64::INFINITY,
+        };
+        let environment = scenario.environment.clone().with_payloads(vec![payload])?;
+        Ok(Scenario { environment, ..scenario })
+    }
+
+    /// Returns `flight` in moderate turbulence.
+    fn windy(&self, flight: TrainingFlight) -> Result<Scenario, Box<dyn Error>> {
+        let mut scenario = self.scenario(flight)?;
+        self.drag(&mut scenario);
+        scenario.realism.wind.turbulence = Some(self.turbulence(Turbulence::MODERATE));
+        Ok(scenario)
+    }
+
+    /// Returns `flight` in moderate turbulence with these sensors and rotors.
+    fn flight(
+        &self,
+        hardware: Hardware,
+        name: &'static str,
+        flight: TrainingFlight,
+    ) -> Result<Scenario, Box<dyn Error>> {
+        let mut scenario = self.windy(TrainingFlight { name, ..flight })?;
+        scenario.sensing.delay_s = hardware.state_delay_s;
+        if hardware.tracker {
+            (scenario.sensing.period_s, scenario.sensing.gyro) = (0.01, true);
+        }
+        scenario.sensing.noise.rates_rad_s = hardware.rate_noise_rad_s;
+        scenario.realism.rotors.time_constant_s *= hardware.lag;
+        Ok(scenario)
+    }
+
+    /// Returns `flight` in moderate turbulence on an estimate, with the instruments of the built-in scenario `name`
+    /// changed by `change`. The slow error of a receiver, which no law can know, is left out: it would hide what a law
+    /// does.
+    fn sensed(
+        &self,
+        name: &'static str,
+        flight: TrainingFlight,
+        change: impl FnOnce(&mut Suite),
+    ) -> Result<Scenario, Box<dyn Error>> {
+        let mut scenario = self.windy(TrainingFlight { name, ..flight })?;
+        scenario.sensing = Sensing::default();
+        scenario.instruments = read(name)?.instruments;
+        change(&mut scenario.instruments);
+        let steady = |gnss| Gnss { horizontal_m: 0.0, vertical_m: 0.0, ..gnss };
+        scenario.instruments.gnss = scenario.instruments.gnss.map(steady);
+        Ok(scenario)
+    }
+
+    fn step(&self, by_m: Vector3<f64>, turn_rad: f64) -> Trajectory {
+        let from_m = Vector3::new(0.0, 0.0, 3.0);
+        Trajectory::Step { from_m, to_m: from_m + by_m, at_s: self.step_s(), yaw_rad: 0.5, turn_rad }
+    }
+
+    /// Returns a horizontal figure of eight with the given period.
+    fn eight(&self, period_s: f64) -> Trajectory {
+        let Scale { length, time, .. } = self.scale;
+        let period_s = period_s * time;
+        let sine = |amplitude_m, period_s| Sine { amplitude_m: amplitude_m * length, period_s, phase_rad: 0.0 };
+        let sines = [sine(1.5, period_s), sine(0.75, 0.5 * period_s), sine(0.3, period_s)];
+        Trajectory::Lissajous { centre_m: Vector3::new(0.0, 0.0, 3.0), sines, yaw_rad: 0.0 }
+    }
 }
 
 /// Returns `scenario` with an outage of the link of 240 ms at each of these times; the flight core coasts through them.
@@ -112,74 +331,11 @@ fn blind(scenario: Scenario, starts_s: &[f64]) -> Scenario {
     Scenario { outages, flight_core: true, ..scenario }
 }
 
-/// Returns a flight with pushes of at most a tenth of a second, of about `strength` times 2 m/s or 2 rad/s.
-fn upset(name: &'static str, strength: f64) -> Result<Scenario, Box<dyn Error>> {
-    let pushes = [
-        (Axis::Roll, 60.0, 0.03),
-        (Axis::X, 20.0, 0.1),
-        (Axis::Pitch, 60.0, 0.03),
-        (Axis::Z, 20.0, 0.1),
-        (Axis::Yaw, 20.0, 0.1),
-    ];
-    let push = |((axis, size, length_s), k): ((Axis, f64, f64), u32)| {
-        let start_s = ONSET_S + 3.0 * f64::from(k);
-        Gust { axis, kind: GustKind::Acceleration, size: size * strength, start_s, end_s: start_s + length_s }
-    };
-    let pushes = pushes.into_iter().zip(0..).map(push).collect();
-    let scenario = TrainingFlight::new(name, 20.0).scenario()?;
-    let environment = Environment::new(*scenario.environment.nominal(), Vec::new(), pushes)?;
-    Ok(Scenario { environment, ..scenario })
-}
-
-/// Returns a course with corners in wind, from each to the next in one second.
-fn course(name: &'static str, leg_m: f64) -> Result<Scenario, Box<dyn Error>> {
-    let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)];
-    let corner = |(k, (x, y)): (u32, (f64, f64))| {
-        let (position_m, yaw_rad) = (Vector3::new(x * leg_m, y * leg_m, 3.0), f64::from(k));
-        let arrived_s = ONSET_S + 3.0 * f64::from(k);
-        [arrived_s, arrived_s + 2.0].map(|time_s| Waypoint { time_s, position_m, yaw_rad })
-    };
-    let waypoints = (0..).zip(corners).flat_map(corner).collect();
-    let mut scenario =
-        TrainingFlight { trajectory: Trajectory::Waypoints(waypoints), ..TrainingFlight::new(name, 22.0) }
-            .scenario()?;
-    scenario.realism.drag = Some(Drag::PAPER);
-    scenario.realism.wind.steady_m_s = Vector3::new(4.0, -2.0, 0.0);
-    scenario.realism.wind.turbulence = Some(Turbulence::LIGHT);
-    Ok(scenario)
-}
-
-/// Returns a flight in light wind that lands within `length_s`, stays on the ground for 3 s with the reference slightly
-/// below it, and takes off again.
-fn landing(name: &'static str, length_s: f64) -> Result<Scenario, Box<dyn Error>> {
-    let at = |time_s, height_m| Waypoint { time_s, position_m: Vector3::new(0.0, 0.0, height_m), yaw_rad: 0.0 };
-    let down_s = ONSET_S + length_s;
-    let waypoints = vec![at(ONSET_S, 1.0), at(down_s, 0.05), at(down_s + 3.0, 0.05), at(down_s + 5.0, 1.0)];
-    let mut scenario =
-        TrainingFlight { trajectory: Trajectory::Waypoints(waypoints), ..TrainingFlight::new(name, 16.0) }
-            .scenario()?;
-    scenario.realism.contact = Some(Contact::PAPER);
-    scenario.realism.ground_effect = Some(GroundEffect::PAPER);
-    scenario.realism.drag = Some(Drag::PAPER);
-    scenario.realism.wind.turbulence = Some(Turbulence::LIGHT);
-    Ok(scenario)
-}
-
-fn hardware() -> Result<Scenario, FileError> {
-    read("hardware")
-}
-
-/// Returns a built-in scenario.
-fn read(name: &str) -> Result<Scenario, FileError> {
-    built_in(name).ok_or_else(|| FileError::whole(name, "no such scenario"))?.read()
-}
-
-/// Returns `flight` in moderate turbulence.
-fn windy(flight: TrainingFlight) -> Result<Scenario, Box<dyn Error>> {
-    let mut scenario = flight.scenario()?;
-    scenario.realism.drag = Some(Drag::PAPER);
-    scenario.realism.wind.turbulence = Some(Turbulence::MODERATE);
-    Ok(scenario)
+/// Returns the battery at the voltage at which the rotors, if it slows them, give this share of their thrust.
+fn low_battery(battery: Battery, thrust: f64) -> Battery {
+    let voltage_v = battery.full_v * libm::sqrt(thrust);
+    let charge = (voltage_v - battery.empty_v) / (battery.full_v - battery.empty_v).max(1e-9);
+    Battery { initial_charge: charge.clamp(0.05, 1.0), ..battery }
 }
 
 /// What differs from the sensors and rotors of `hardware`.
@@ -190,95 +346,12 @@ struct Hardware {
     state_delay_s: f64,
     /// Standard deviation of the noise of the rates, rad/s.
     rate_noise_rad_s: f64,
-    /// Time constant of the rotors \[s\].
-    rotor_lag_s: f64,
+    /// Factor of the time constant of the rotors.
+    lag: f64,
 }
 
 impl Default for Hardware {
     fn default() -> Self {
-        Hardware { tracker: false, state_delay_s: 0.0, rate_noise_rad_s: 0.001, rotor_lag_s: 0.02 }
+        Hardware { tracker: false, state_delay_s: 0.0, rate_noise_rad_s: 0.001, lag: 1.0 }
     }
-}
-
-impl Hardware {
-    /// Returns `flight` in moderate turbulence with these sensors and rotors.
-    fn flight(self, name: &'static str, flight: TrainingFlight) -> Result<Scenario, Box<dyn Error>> {
-        let mut scenario = windy(TrainingFlight { name, ..flight })?;
-        scenario.sensing.delay_s = self.state_delay_s;
-        if self.tracker {
-            (scenario.sensing.period_s, scenario.sensing.gyro) = (0.01, true);
-        }
-        scenario.sensing.noise.rates_rad_s = self.rate_noise_rad_s;
-        scenario.realism.rotors.time_constant_s = self.rotor_lag_s;
-        Ok(scenario)
-    }
-}
-
-/// Returns `flight` in moderate turbulence on an estimate, with the instruments of the built-in scenario `name` changed
-/// by `change`. The slow error of a receiver, which no law can know, is left out: it would hide what a law does.
-fn sensed(
-    name: &'static str,
-    flight: TrainingFlight,
-    change: impl FnOnce(&mut Suite),
-) -> Result<Scenario, Box<dyn Error>> {
-    let mut scenario = windy(TrainingFlight { name, ..flight })?;
-    scenario.sensing = Sensing::default();
-    scenario.instruments = read(name)?.instruments;
-    change(&mut scenario.instruments);
-    let steady = |gnss| Gnss { horizontal_m: 0.0, vertical_m: 0.0, ..gnss };
-    scenario.instruments.gnss = scenario.instruments.gnss.map(steady);
-    Ok(scenario)
-}
-
-/// A flight of `hardware` without gusts.
-struct TrainingFlight {
-    name: &'static str,
-    duration_s: f64,
-    trajectory: Trajectory,
-    /// Quantity that changes at the onset for half of the remaining flight, and its factor.
-    change: Option<(Quantity, f64)>,
-}
-
-impl TrainingFlight {
-    fn new(name: &'static str, duration_s: f64) -> Self {
-        let trajectory = Trajectory::Hover { position_m: Vector3::new(0.0, 0.0, 3.0), yaw_rad: 0.0 };
-        TrainingFlight { name, duration_s, trajectory, change: None }
-    }
-
-    fn scenario(self) -> Result<Scenario, Box<dyn Error>> {
-        let hardware = hardware()?;
-        let change = |(quantity, factor)| ParameterChange {
-            quantity,
-            factor,
-            start_s: ONSET_S,
-            end_s: 0.5 * (ONSET_S + self.duration_s),
-        };
-        let changes = self.change.into_iter().map(change).collect();
-        let environment = Environment::new(*hardware.environment.nominal(), changes, Vec::new())?;
-        let start = self.trajectory.at(0.0);
-        let mut initial =
-            Motion { position_m: start.position_m, velocity_m_s: start.velocity_m_s, ..Motion::default() };
-        initial.attitude_rad.z = start.yaw_rad;
-        Ok(Scenario {
-            name: self.name.into(),
-            description: String::new(),
-            duration_s: self.duration_s,
-            trajectory: self.trajectory,
-            environment,
-            initial,
-            ..hardware
-        })
-    }
-}
-
-fn step(by_m: Vector3<f64>, turn_rad: f64) -> Trajectory {
-    let from_m = Vector3::new(0.0, 0.0, 3.0);
-    Trajectory::Step { from_m, to_m: from_m + by_m, at_s: STEP_S, yaw_rad: 0.5, turn_rad }
-}
-
-/// Returns a horizontal figure of eight with the given period.
-fn eight(period_s: f64) -> Trajectory {
-    let sine = |amplitude_m, period_s| Sine { amplitude_m, period_s, phase_rad: 0.0 };
-    let sines = [sine(1.5, period_s), sine(0.75, 0.5 * period_s), sine(0.3, period_s)];
-    Trajectory::Lissajous { centre_m: Vector3::new(0.0, 0.0, 3.0), sines, yaw_rad: 0.0 }
 }

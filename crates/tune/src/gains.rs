@@ -1,7 +1,6 @@
 //! A contender's gains as coordinates of a search, and as text for a scenario file.
 
 use afbc::Profile;
-use afbc_reader::FileError;
 use afbc_sim::contender::{Contender, ControllerKind, Law};
 use afbc_types::{Axis, Declaration, Declared, Range, Value};
 use afbc_vehicles::{CASCADE, Vehicle};
@@ -125,6 +124,8 @@ struct Key {
     table: String,
     key: &'static str,
     value: String,
+    /// Whether a search may change it.
+    tuned: bool,
 }
 
 /// Formats `contender` as `[[contender]]` of a scenario file, without keys that its profile implies.
@@ -160,26 +161,27 @@ pub fn fragment(contender: &Contender) -> String {
     text
 }
 
-/// Gains of `contender` as `[gains.flight]` of the file of `vehicle`: what is not by rule.
-///
-/// # Errors
-/// None in fact: the vehicle's gains have been read before.
-pub(super) fn vehicle_fragment(contender: &Contender, vehicle: &Vehicle) -> Result<String, FileError> {
-    let law = contender.kind().name();
-    let base = keys(&contender.clone().on(vehicle, Profile::Flight)?);
+/// Gains of `contender` as `[gains.flight]` of the file of `vehicle`: every gain that a search may change, so that they
+/// stay what was found when the rule changes, and what else is not by rule.
+pub(super) fn vehicle_fragment(contender: &Contender, vehicle: &Vehicle) -> String {
+    let kind = contender.kind();
+    let rule = Contender::of(kind, Profile::Flight).by_rule(vehicle);
+    let base = keys(&rule);
     let (mut text, mut table) = (String::new(), String::new());
-    for Key { table: own, key, value } in keys(contender).iter().filter(|key| !base.contains(key)) {
-        let place = match own.strip_prefix("gains") {
-            Some(axis) => format!("gains.flight.{law}{axis}"),
-            None => format!("gains.flight.{CASCADE}"),
+    for key in keys(contender).iter().filter(|key| key.tuned || !base.contains(key)) {
+        let place = match key.table.strip_prefix("gains") {
+            Some(axis) => format!("gains.flight.{}{axis}", kind.name()),
+            // The cascade is that of AFBC.
+            None if kind == ControllerKind::Afbc => format!("gains.flight.{CASCADE}"),
+            None => continue,
         };
         if table != place {
             let _ = writeln!(text, "{}[{place}]", if table.is_empty() { "" } else { "\n" });
             table = place;
         }
-        let _ = writeln!(text, "{key} = {value}");
+        let _ = writeln!(text, "{} = {}", key.key, key.value);
     }
-    Ok(text)
+    text
 }
 
 /// Formats a TOML string; names have no control characters.
@@ -191,24 +193,24 @@ fn quoted(name: &str) -> String {
 fn keys(contender: &Contender) -> Vec<Key> {
     let mut keys = Vec::new();
     // Groups of a law's gains are tables within its own; the settings are a table next to them.
-    let mut put = |table: String, key, value: Value<'_>| {
+    let mut put = |table: String, key, value: Value<'_>, tuned| {
         let value = match value {
             Value::Single([number]) => number.to_string(),
             Value::Switch(on) => on.to_string(),
             _ => return Ok(()),
         };
-        keys.push(Key { table, key, value });
+        keys.push(Key { table, key, value, tuned });
         Ok::<(), Infallible>(())
     };
-    let Ok(()) = contender.law.visit(&mut |Declaration { group, range, .. }, value| {
-        put(if group.is_empty() { "gains".into() } else { format!("gains.{group}") }, range.name, value)
+    let Ok(()) = contender.law.visit(&mut |Declaration { group, range, tuned, .. }, value| {
+        put(if group.is_empty() { "gains".into() } else { format!("gains.{group}") }, range.name, value, *tuned)
     });
     let Ok(()) = contender.settings.visit(&mut |declaration, value| {
-        let Declaration { group, range, .. } = declaration;
+        let Declaration { group, range, tuned, .. } = declaration;
         if range.name == afbc_control::Settings::DT.range.name {
             return Ok(());
         }
-        put(if group.is_empty() { "settings" } else { group }.into(), range.name, value)
+        put(if group.is_empty() { "settings" } else { group }.into(), range.name, value, *tuned)
     });
     keys
 }

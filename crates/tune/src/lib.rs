@@ -6,16 +6,21 @@
 mod cma_es;
 mod conditions;
 mod cost;
+mod fast;
+pub mod fleet;
 mod flights;
 mod gains;
+mod maker;
 mod report;
+mod scale;
 mod search;
 mod start;
 
-pub use conditions::{Condition, conditions, factor};
+pub use conditions::{Condition, conditions, conditions_on, factor};
 pub use cost::{JUMP_N, LOST, POSITION_M, WORST_M, YAW_RAD, cost, costs, mean};
-pub use flights::{held_out, training};
+pub use flights::{held_out, held_out_on, training, training_on};
 pub use gains::{Change, fragment};
+pub use maker::is_paper;
 pub use report::report;
 pub use search::{Course, Found, STEP, search};
-pub use start::by_hand;
+pub use start::{by_hand, by_hand_on};

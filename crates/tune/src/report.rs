@@ -51,7 +51,7 @@ pub fn report(
     }
     text.push('\n');
     text += &match training.first().and_then(|scenario| scenario.vehicle_file.as_ref()) {
-        Some(vehicle) => vehicle_fragment(contender, vehicle)?,
+        Some(vehicle) => vehicle_fragment(contender, vehicle),
         None => fragment(&Contender { name: format!("{}-tuned", start.name), ..contender.clone() }),
     };
     Ok(text)

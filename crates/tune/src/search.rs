@@ -1,8 +1,8 @@
 //! Search for the best gains.
 
 use crate::cma_es::Search;
-use crate::conditions::{Condition, factor};
-use crate::cost::{LOST, costs, mean};
+use crate::conditions::{Condition, FAILED, factor};
+use crate::cost::{LOST, costs, flown, mean};
 use crate::gains::{self, Change};
 use afbc_sim::contender::Contender;
 use afbc_sim::scenario::Scenario;
@@ -42,6 +42,9 @@ pub struct Found {
 /// with the number of tries and the lowest cost so far, and ends the search by returning false. The result does not
 /// depend on the number of threads.
 ///
+/// A contender that loses more flights than the best one so far is given up: the flights not flown count as lost at
+/// their start, and no condition as met. So that this comes early, those flights come first that cost `start` most.
+///
 /// # Errors
 /// If `start` cannot fly.
 pub fn search(
@@ -51,8 +54,12 @@ pub fn search(
     Course { budget, step, seed }: Course,
     mut progress: impl FnMut(usize, f64) -> bool,
 ) -> Result<Found, OutOfRange> {
-    let rate = |contender: &Contender| Ok(mean(&costs(flights, contender)?) * factor(conditions, contender)?);
-    let before = rate(start)?;
+    let rate =
+        |contender: &Contender| Ok::<_, OutOfRange>((costs(flights, contender)?, factor(conditions, contender)?));
+    let of = |(costs, factor): &(Vec<f64>, f64)| mean(costs) * factor;
+    let first = rate(start)?;
+    let before = of(&first);
+    let mut trial = Trial { flights, conditions, order: order(&first.0), bearable: lost(&first.0) };
     let (mut best, mut after, mut evaluations) = (start.clone(), before, 1);
     let mut search = Search::new(&gains::point(start), step, seed);
     // The mean of the search is often better than any point around it: the last try is reserved for it, once it has
@@ -63,22 +70,25 @@ pub fn search(
         let mut points = search.ask();
         points.truncate(budget - kept - evaluations);
         let is_whole = points.len() == search.population();
-        let generation = rated(start, rate, points);
+        let generation = rated(start, &trial, points);
         evaluations += generation.len();
-        if let Some((cost, contender, _)) = generation.first().filter(|(cost, ..)| *cost < after) {
-            (best, after) = (contender.clone(), *cost);
+        if let Some(Rated { costs, contender, cost, .. }) =
+            generation.first().filter(|rated| !rated.given_up && rated.cost < after)
+        {
+            (best, after, trial.bearable) = (contender.clone(), *cost, lost(costs));
         }
-        let points: Vec<_> = generation.into_iter().map(|(_, _, point)| point).collect();
+        let points: Vec<_> = generation.into_iter().map(|rated| rated.point).collect();
         if is_whole {
             search.tell(&points);
             kept = 1;
         }
     }
     if evaluations + kept <= budget && kept > 0 {
-        let last = rated(start, rate, vec![search.mean()]);
-        evaluations += last.len();
-        if let Some((cost, contender, _)) = last.into_iter().find(|(cost, ..)| *cost < after) {
-            (best, after) = (contender, cost);
+        let last = gains::contender(start, &mut search.mean());
+        evaluations += 1;
+        // An invalid combination of gains is no result.
+        if let Some(cost) = rate(&last).ok().map(|rated| of(&rated)).filter(|cost| *cost < after) {
+            (best, after) = (last, cost);
         }
     }
     progress(evaluations, after);
@@ -86,18 +96,66 @@ pub fn search(
     Ok(Found { contender: best, before, after, evaluations, changes })
 }
 
-/// Returns contenders with the gains of `points` and their costs by `rate`, best first.
-fn rated(
-    start: &Contender,
-    rate: impl Fn(&Contender) -> Result<f64, OutOfRange> + Sync,
-    points: Vec<Vec<f64>>,
-) -> Vec<(f64, Contender, Vec<f64>)> {
+/// Returns the indices of flights with these costs, the dearest first.
+fn order(costs: &[f64]) -> Vec<usize> {
+    let mut order: Vec<_> = (0..costs.len()).collect();
+    let cost = |index: &usize| costs.get(*index).copied().unwrap_or(0.0);
+    order.sort_by(|a, b| cost(b).total_cmp(&cost(a)));
+    order
+}
+
+/// Returns how many flights with these costs are lost.
+fn lost(costs: &[f64]) -> usize {
+    costs.iter().filter(|cost| **cost >= LOST).count()
+}
+
+/// What each contender has to fly.
+struct Trial<'a> {
+    flights: &'a [Scenario],
+    conditions: &'a [Condition],
+    /// Indices of the flights, as they are flown.
+    order: Vec<usize>,
+    /// Number of flights that may be lost.
+    bearable: usize,
+}
+
+/// A contender with its costs.
+struct Rated {
+    cost: f64,
+    costs: Vec<f64>,
+    given_up: bool,
+    contender: Contender,
+    point: Vec<f64>,
+}
+
+impl Trial<'_> {
+    /// Returns the cost of `contender`, that of each flight, and whether it was given up.
+    fn rate(&self, contender: &Contender) -> Result<(f64, Vec<f64>, bool), OutOfRange> {
+        let mut costs = vec![2.0 * LOST; self.flights.len()];
+        let mut losses = 0;
+        for &index in &self.order {
+            let (Some(scenario), Some(cost)) = (self.flights.get(index), costs.get_mut(index)) else { continue };
+            *cost = flown(scenario, contender)?;
+            losses += usize::from(*cost >= LOST);
+            if losses > self.bearable {
+                let asked = self.conditions.iter().filter(|condition| condition.is_asked_of(contender.kind())).count();
+                let factor: f64 = std::iter::repeat_n(FAILED, asked).product();
+                return Ok((mean(&costs) * factor, costs, true));
+            }
+        }
+        Ok((mean(&costs) * factor(self.conditions, contender)?, costs, false))
+    }
+}
+
+/// Returns contenders with the gains of `points` and their costs, best first.
+fn rated(start: &Contender, trial: &Trial<'_>, points: Vec<Vec<f64>>) -> Vec<Rated> {
     let rated = |mut point: Vec<f64>| {
         let contender = gains::contender(start, &mut point);
-        // Invalid combinations of gains cost as much as a flight lost at its start.
-        (rate(&contender).unwrap_or(2.0 * LOST), contender, point)
+        // Invalid combinations of gains cost more than any other.
+        let (cost, costs, given_up) = trial.rate(&contender).unwrap_or((f64::MAX, Vec::new(), true));
+        Rated { cost, costs, given_up, contender, point }
     };
     let mut rated: Vec<_> = points.into_par_iter().map(rated).collect();
-    rated.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
+    rated.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     rated
 }

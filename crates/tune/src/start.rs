@@ -1,10 +1,12 @@
 //! Starting points of the search: hand-tuned gains, so that the same command finds the same gains again.
 
+use crate::maker::is_paper;
 use afbc::disturbance::DisturbanceObserver;
 use afbc::reference::ReferenceModel;
 use afbc::{Profile, Settings};
 use afbc_control::Smoothing;
 use afbc_sim::contender::{Contender, ControllerKind, Law};
+use afbc_vehicles::Vehicle;
 
 /// Returns the law of this kind with hand-tuned gains, limits of the profile `flight` and a hand-tuned cascade; AFBC
 /// under its monitor, as on board.
@@ -21,4 +23,9 @@ pub fn by_hand(kind: ControllerKind) -> Contender {
     let smoothing = Smoothing::BY_HAND;
     let settings = Settings { command_filter_rad_s: 75.0, disturbance, reference, smoothing, ..contender.settings };
     Contender { settings, ..contender }.monitored()
+}
+
+/// Returns the same on `vehicle`, [by rule](Contender::by_rule).
+pub fn by_hand_on(kind: ControllerKind, vehicle: &Vehicle) -> Contender {
+    if is_paper(vehicle) { by_hand(kind) } else { by_hand(kind).by_rule(vehicle) }
 }

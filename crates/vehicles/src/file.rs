@@ -4,6 +4,7 @@ use crate::parts::{self, Conditions, FORCE_MAX};
 use crate::vehicle::{CASCADE, Vehicle};
 use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
+use afbc_control::drag::KnownDrag;
 use afbc_estimator::Settings as Estimation;
 use afbc_flight_core::motor::Curve;
 use afbc_plant::instruments::Mounting;
@@ -20,6 +21,8 @@ const POSITION: Range = Range::new("position_m", -100.0, 100.0);
 const ARM_TOLERANCE: f64 = 0.01;
 /// Time step for which drag and ground are checked \[s\]; a scenario checks them again for its own.
 const STEP_S: f64 = 0.001;
+/// Cure for drag that no law makes up for.
+const CHECK: &str = "check mass_kg, thrust_factor_n_s2 and what is in [drag]";
 /// Cure for a vehicle that does not hover with a margin.
 const UNFIT: &str = "AFBC would not fly it with a margin: stronger or quicker rotors, less mass, or gains of its own";
 
@@ -86,12 +89,29 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
     let unfit = |error: OutOfRange| root.fault(error.range.name, format!("{}; {UNFIT}", out_of_range(&error)));
     vehicle.check().map_err(unfit)?;
     surroundings(&mut root, &mut vehicle, rotor_height_m)?;
+    let known = &mut vehicle.flight_settings.common.drag;
+    if let (Some(drag), &KnownDrag::NONE) = (vehicle.realism.drag, &*known) {
+        *known = known_drag(&drag, &vehicle.parameters, vehicle.rotors.len());
+        let beyond = |error: OutOfRange| root.fault("drag", format!("per mass, {}; {CHECK}", out_of_range(&error)));
+        known.validate().map_err(beyond)?;
+    }
     if let Some(mut table) = root.table("imu")? {
         table.declared(&mut vehicle.imu)?;
         table.finish()?;
     }
     root.finish()?;
     Ok(vehicle)
+}
+
+/// Returns what laws are told of the drag of a vehicle with `count` rotors.
+fn known_drag(drag: &Drag, vehicle: &Parameters<f64>, count: usize) -> KnownDrag {
+    let Parameters { mass_kg, gravity_m_s2, thrust_factor_n_s2, .. } = *vehicle;
+    let all_rad_s = libm::sqrt(count as f64 * mass_kg * gravity_m_s2 / thrust_factor_n_s2);
+    KnownDrag {
+        rotor_drag_1_s: (drag.blade_n_s2_m * all_rad_s / mass_kg) as f32,
+        rotor_height_m: drag.rotor_height_m as f32,
+        body_drag_1_m: (0.25 * drag.air_density_kg_m3 * (drag.area_m2.x + drag.area_m2.y) / mass_kg) as f32,
+    }
 }
 
 /// Reads `[drag]` and `[ground]`.

@@ -39,11 +39,31 @@ fn every_built_in_vehicle_is_valid_and_named_after_its_file() {
 fn the_papers_vehicle_has_the_profiles_gains() {
     let paper = built_in("paper").unwrap().read().unwrap();
     assert_eq!(paper.gains(Profile::Flight), Profile::Flight.gains());
-    assert_eq!(paper.settings(Profile::Flight), Profile::Flight.settings());
+    let settings = Profile::Flight.settings().with_drag(afbc_control::drag::KnownDrag::PAPER);
+    assert_eq!(paper.settings(Profile::Flight), settings);
     assert_eq!(paper.gains(Profile::Paper), Profile::Paper.gains());
     assert_eq!(paper.settings(Profile::Paper), Profile::Paper.settings());
     assert_eq!(paper.curve, afbc_flight_core::motor::Curve::DEFAULT);
     assert_eq!(paper.rotors, afbc_types::PLUS.map(|rotor| rotor.to_f64()).to_vec());
+}
+
+/// What laws are told of drag is what the plant's drag does to the vehicle in hover.
+#[test]
+fn drag_of_the_file_is_known_per_mass() {
+    for known in &BUILT_IN {
+        let vehicle = known.read().unwrap();
+        let (told, drag) = (vehicle.settings(Profile::Flight).common.drag, vehicle.realism.drag.unwrap());
+        let p = &vehicle.parameters;
+        // Blades drag in proportion to the speeds of all rotors: each has a share of the weight.
+        let count = vehicle.rotors.len() as f64;
+        let each_rad_s = (p.mass_kg * p.gravity_m_s2 / count / p.thrust_factor_n_s2).sqrt();
+        let blades = drag.blade_n_s2_m * each_rad_s * count / p.mass_kg;
+        let body = 0.5 * drag.air_density_kg_m3 * 0.5 * (drag.area_m2.x + drag.area_m2.y) / p.mass_kg;
+        let near = |told: f32, is: f64| (f64::from(told) - is).abs() < 1e-5 * (1.0 + is);
+        assert!(near(told.rotor_drag_1_s, blades), "{}: {told:?}, {blades}", known.name);
+        assert!(near(told.body_drag_1_m, body), "{}: {told:?}, {body}", known.name);
+        assert!(near(told.rotor_height_m, drag.rotor_height_m), "{}: {told:?}", known.name);
+    }
 }
 
 #[test]

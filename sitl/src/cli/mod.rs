@@ -2,6 +2,7 @@
 
 mod campaign;
 mod compare;
+mod fleet;
 mod fly;
 mod flying;
 mod hitl;

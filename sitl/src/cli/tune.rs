@@ -1,16 +1,18 @@
 //! `sitl tune`.
 
+use super::fleet::Fleet;
 use super::json;
 use super::json::Json;
 use super::progress::Progress;
 use super::target::Target;
 use super::terminal::{Failure, print};
-use super::vehicle::OnVehicle;
+use super::vehicle::named;
 use afbc::Profile;
 use afbc_files::Error;
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::scenario::Scenario;
 use afbc_tune::{self as tune, Course, Found};
+use afbc_vehicles::Vehicle;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -20,12 +22,24 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Search for gains, with the same flights, cost, search and number of tries for every law
 ///
 /// Prints a [[contender]] for a scenario file or, with --vehicle, [gains] for that vehicle's file, with the cost before
-/// and after as comments. Ctrl-C ends the search early and keeps the best gains so far. See docs/tuning.md.
+/// and after as comments. Ctrl-C ends the search early and keeps the best gains so far. With --fleet, every law on
+/// every vehicle: after Ctrl-C finished searches are kept, and the same command does what is missing. See
+/// docs/tuning.md.
 #[derive(Args, Debug)]
 pub(crate) struct Tune {
     /// A law, to start from hand-tuned gains, or a contender of --from or the first --scenario, to start from its gains
-    #[arg(value_name = "CONTROLLER")]
-    contender: String,
+    ///
+    /// With --fleet, any number of laws; all but backstepping, which flies with AFBC's gains, if none is given.
+    #[arg(value_name = "CONTROLLER", required_unless_present = "fleet")]
+    contenders: Vec<String>,
+
+    /// Search for the gains of every law on every vehicle, and keep the results in this folder
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["scenarios", "from", "out", "json"])]
+    fleet: Option<PathBuf>,
+
+    /// Write the gains found into the vehicles' files in this folder, between two lines of comments
+    #[arg(long, value_name = "FOLDER", requires = "fleet")]
+    write: Option<PathBuf>,
 
     /// Fly this built-in scenario or scenario file instead of the training flights; may be given more than once
     #[arg(long = "scenario", value_name = "SCENARIO")]
@@ -35,8 +49,14 @@ pub(crate) struct Tune {
     #[arg(long, value_name = "SCENARIO", conflicts_with = "scenarios")]
     from: Option<Target>,
 
-    #[command(flatten)]
-    on: OnVehicle,
+    /// Start from the gains that fly: the profile's or, with --vehicle, those in its file
+    #[arg(long, conflicts_with_all = ["scenarios", "from"])]
+    flying: bool,
+
+    /// Fly this vehicle: name of a built-in one, or path of a vehicle file; with --fleet, may be given more than once,
+    /// and is every built-in one otherwise
+    #[arg(long = "vehicle", value_name = "VEHICLE")]
+    vehicles: Vec<PathBuf>,
 
     /// Number of sets of gains to try
     #[arg(long, value_name = "N", default_value = "1000", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -63,22 +83,38 @@ impl Tune {
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let scenarios = self.scenarios.iter().map(Target::scenario).collect::<Result<Vec<_>, _>>()?;
         let from = self.from.as_ref().map(Target::scenario).transpose()?;
-        let mut start = start(&self.contender, from.as_ref().or(scenarios.first()))?;
-        let vehicle = self.on.vehicle()?;
-        if let Some(vehicle) = &vehicle {
-            start = start.on(vehicle, Profile::Flight)?;
+        let mut vehicles = self.vehicles.iter().map(|path| named(path)).collect::<Result<Vec<_>, _>>()?;
+        let course = Course { budget: self.budget as usize, step: self.step, seed: self.seed };
+        if let Some(folder) = &self.fleet {
+            let (laws, write) = (&self.contenders, self.write.as_deref());
+            return Fleet { folder, laws, vehicles, course, flying: self.flying, write }.run();
         }
-        let put = |scenarios: Vec<Scenario>| {
-            scenarios.into_iter().map(|scenario| self.on.put(scenario)).collect::<Result<Vec<_>, _>>()
+        let [contender] = self.contenders.as_slice() else {
+            return Err("more than one controller; name one, or a folder with --fleet".into());
         };
-        // They are of the same task as the training flights.
-        let alike = scenarios.is_empty() && vehicle.is_none();
-        let conditions = if alike { tune::conditions()? } else { Vec::new() };
+        let vehicle = vehicles.pop();
+        if !vehicles.is_empty() {
+            return Err("more than one --vehicle; name one, or a folder with --fleet".into());
+        }
+        let mut start = start(contender, from.as_ref().or(scenarios.first()), vehicle.as_ref())?;
+        if self.flying {
+            start = flying(start.kind(), vehicle.as_ref())?;
+        }
+        // The conditions are of the same task as the training flights.
+        let alike = scenarios.is_empty();
         if alike {
             start = start.monitored();
         }
-        let training = put(if scenarios.is_empty() { tune::training()? } else { scenarios })?;
-        let held_out = put(tune::held_out()?)?;
+        let (training, held_out, conditions) = match &vehicle {
+            Some(vehicle) if !alike => {
+                let put = |scenario: Scenario| scenario.on(vehicle, Profile::Flight);
+                let training = scenarios.into_iter().map(put).collect::<Result<_, _>>()?;
+                (training, tune::held_out_on(vehicle)?, Vec::new())
+            }
+            None if !alike => (scenarios, tune::held_out()?, Vec::new()),
+            Some(vehicle) => (tune::training_on(vehicle)?, tune::held_out_on(vehicle)?, tune::conditions_on(vehicle)?),
+            None => (tune::training()?, tune::held_out()?, tune::conditions()?),
+        };
         if let Some(out) = &self.out {
             writable(out)?;
         }
@@ -86,9 +122,8 @@ impl Tune {
         let stop = Arc::new(AtomicBool::new(false));
         let stopper = Arc::clone(&stop);
         ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
-        let progress = Progress::new(&format!("tune {}", self.contender), "tried", u64::from(self.budget), 0);
+        let progress = Progress::new(&format!("tune {}", contender), "tried", u64::from(self.budget), 0);
         let mut before = 0;
-        let course = Course { budget: self.budget as usize, step: self.step, seed: self.seed };
         let found = tune::search(&start, &training, &conditions, course, |tried, cost| {
             progress.note(format!(", least cost {cost:.4}"));
             progress.add((tried - before) as u64);
@@ -114,17 +149,33 @@ impl Tune {
     }
 }
 
-/// Returns the contender `name`: of `scenario`, or a law with hand-tuned gains.
-fn start(name: &str, scenario: Option<&Scenario>) -> Result<Contender, Failure> {
+/// Returns the contender `name`: of `scenario`, with the gains that fly on `vehicle` if there is one; or a law with
+/// hand-tuned gains.
+fn start(name: &str, scenario: Option<&Scenario>, vehicle: Option<&Vehicle>) -> Result<Contender, Failure> {
     let own = scenario.map_or(&[][..], |scenario| &scenario.contenders);
-    let law = || ControllerKind::ALL.into_iter().find(|kind| kind.name() == name);
-    let contender = own.iter().find(|contender| contender.name == name).cloned();
-    contender.or_else(|| law().map(tune::by_hand)).ok_or_else(|| {
+    if let Some(contender) = own.iter().find(|contender| contender.name == name).cloned() {
+        return Ok(match vehicle {
+            Some(vehicle) => contender.on(vehicle, Profile::Flight)?,
+            None => contender,
+        });
+    }
+    let law = ControllerKind::ALL.into_iter().find(|kind| kind.name() == name);
+    let by_hand = |kind| vehicle.map_or_else(|| tune::by_hand(kind), |vehicle| tune::by_hand_on(kind, vehicle));
+    law.map(by_hand).ok_or_else(|| {
         let laws = ControllerKind::ALL.map(ControllerKind::name).join(", ");
         let own: Vec<_> = own.iter().map(|contender| contender.name.as_str()).collect();
         let own =
             if own.is_empty() { String::new() } else { format!("; the scenario's contenders {}", own.join(", ")) };
         format!("{}: no such controller; the laws are {laws}{own}", name.escape_debug()).into()
+    })
+}
+
+/// Returns the law with the gains that fly.
+fn flying(kind: ControllerKind, vehicle: Option<&Vehicle>) -> Result<Contender, Failure> {
+    let contender = Contender::of(kind, Profile::Flight);
+    Ok(match vehicle {
+        Some(vehicle) => contender.on(vehicle, Profile::Flight)?,
+        None => contender,
     })
 }
 

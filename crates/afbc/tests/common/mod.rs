@@ -161,20 +161,31 @@ pub(crate) fn settings() -> impl Strategy<Value = Settings> {
             smooth_lift_rad_s,
             lead_s,
         });
-    let observer = (within(DisturbanceObserver::DIST_XY), within(DisturbanceObserver::DIST_LAG)).prop_map(
-        |(disturbance_rad_s, disturbance_lag_s)| DisturbanceObserver { disturbance_rad_s, disturbance_lag_s },
-    );
+    let observer = (
+        within(DisturbanceObserver::DIST_XY),
+        within(DisturbanceObserver::DIST_TILT),
+        within(DisturbanceObserver::DIST_LAG),
+        within(DisturbanceObserver::MEM_RATE),
+    )
+        .prop_map(|(disturbance_rad_s, rad_s, disturbance_lag_s, memory_1_s)| DisturbanceObserver {
+            disturbance_rad_s,
+            disturbance_tilt_rad_s: rad_s,
+            disturbance_yaw_rad_s: rad_s,
+            disturbance_lag_s,
+            memory_1_s,
+            ..DisturbanceObserver::DEFAULT
+        });
     let added = (
         prop_oneof![Just(DisturbanceObserver::DEFAULT), observer],
         prop_oneof![Just(ReferenceModel::DEFAULT), model],
         prop_oneof![Just(Smoothing::DEFAULT), smoothing],
     );
-    let any = (numbers, any::<[bool; 5]>(), added).prop_map(|(numbers, switches, added)| {
+    let any = (numbers, any::<[bool; 6]>(), added).prop_map(|(numbers, switches, added)| {
         let (disturbance, reference, smoothing) = added;
         let ((dt_s, rotor_force_max_n, raised_thrust_max), command_filter_rad_s, limits) = numbers;
-        let [tilt_by_thrust, anti_windup, freeze_on_ground, bumpless, feed_forward] = switches;
+        let [tilt_by_thrust, anti_windup, freeze_on_ground, bumpless, feed_forward, by_rotation] = switches;
         Settings {
-            common: Common { dt_s, rotor_force_max_n, raised_thrust_max },
+            common: Common { dt_s, rotor_force_max_n, raised_thrust_max, ..Common::DEFAULT },
             command_filter_rad_s,
             limits,
             tilt_by_thrust,
@@ -182,6 +193,7 @@ pub(crate) fn settings() -> impl Strategy<Value = Settings> {
             freeze_on_ground,
             bumpless,
             feed_forward,
+            by_rotation,
             disturbance,
             reference,
             smoothing,

@@ -89,11 +89,13 @@ impl Memory {
             (self.lift_s, self.left, self.stood_m) = (0.0, false, state.position_m);
             return Some((self.limiter.setpoint(), true));
         }
-        // Rotors that carry a share of it make the flight core believe that it flies: without more to give, it does
-        // not.
+        // Rotors that carry a share of it make the flight core believe that it flies: without more to give, or if it
+        // does not follow its setpoint, it does not.
         let off_m = abs_max(&(state.position_m - self.stood_m));
+        let behind = |to: Setpoint| abs_max(&(to.position_m - state.position_m)) > ANEW_M;
         self.left |= airborne && off_m > LEFT_M;
-        let lifts = !self.left && (!airborne || sight.lift.is_exhausted());
+        let lifts =
+            !self.left && (!airborne || sight.lift.is_exhausted() || self.limiter.setpoint().is_some_and(behind));
         self.lift_s = if lifts { self.lift_s + dt_s } else { 0.0 };
         if self.lift_s > NO_LIFT_S {
             self.left = true;

@@ -1,0 +1,76 @@
+//! Memory of the air: a fuzzy system over the velocity, which keeps what the observer has found for the next time the
+//! vehicle flies as fast. Not in the paper, whose fuzzy systems over errors forget when the error does.
+//!
+//! ```text
+//! f = Theta' w(v_x, v_y) + f_hat        dTheta/dt = gamma f_hat w(v_x, v_y),  |Theta_j| <= Theta_max
+//! ```
+//!
+//! of x and of y, nine rules each, as (22) and (34) with the prediction's error in the place of e_2: f_hat is what the
+//! observer, which is told of the memory, still lacks. With f = Theta*' w and f_hat behind the observer's poles, which
+//! are far faster than gamma, V = |Theta* - Theta|^2/2 gamma falls by (Theta* - Theta)' w f_hat, about f_hat^2. The
+//! part of composite adaptation that learns from prediction: Slotine and Li, *Composite adaptive control of robot
+//! manipulators*, Automatica 25(4), 1989; used so by O'Connell et al., *Neural-Fly*, Science Robotics 7(66), 2022. The
+//! other part, from e_2, stays with the fuzzy systems over the errors: the observer would undo it here.
+
+use crate::fuzzy::{Basis, Firing, Membership};
+use afbc_control::math;
+use afbc_types::OutOfRange;
+use nalgebra::Matrix3;
+
+/// Largest |Theta_j| \[m/s2\].
+pub const THETA_MAX_M_S2: f32 = 10.0;
+/// Width of the Gaussians over their distance.
+const WIDTH: f32 = 0.6;
+
+/// The memory with its constants; what it has learnt is [`Remembered`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Memory {
+    basis: Basis,
+    /// gamma times the step.
+    share: f32,
+}
+
+/// Theta of x and of y \[m/s2\].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Remembered {
+    /// Theta.
+    pub theta: [Matrix3<f32>; 2],
+}
+
+impl Memory {
+    /// Makes the memory that learns with `gamma_1_s`, valid, in steps of `dt_s`, with rules for a speed of `speed_m_s`
+    /// along each axis; none without gamma.
+    ///
+    /// # Errors
+    /// A speed out of range.
+    pub fn new(gamma_1_s: f32, speed_m_s: f32, dt_s: f32) -> Result<Option<Self>, OutOfRange> {
+        let basis = Basis::new(Membership { centre: speed_m_s, width: WIDTH * speed_m_s })?;
+        Ok((gamma_1_s > 0.0).then_some(Memory { basis, share: gamma_1_s * dt_s }))
+    }
+
+    /// Returns the weights of the rules at a velocity \[m/s\].
+    #[inline]
+    pub fn weights(&self, velocity_m_s: [f32; 2]) -> Matrix3<f32> {
+        let Firing { first, second, share } = self.basis.fire(velocity_m_s);
+        first * (second * share).transpose()
+    }
+
+    /// Learns f_hat \[m/s2\] at these weights.
+    #[inline]
+    pub fn learn(&self, remembered: &mut Remembered, weights: &Matrix3<f32>, f_hat_m_s2: [f32; 2]) {
+        for (theta, f_hat) in remembered.theta.iter_mut().zip(f_hat_m_s2) {
+            let by = self.share * f_hat;
+            theta.zip_apply(weights, |theta, w| {
+                *theta = math::settled(math::min(math::max(*theta + by * w, -THETA_MAX_M_S2), THETA_MAX_M_S2));
+            });
+        }
+    }
+}
+
+impl Remembered {
+    /// Returns Theta' w of x and y \[m/s2\].
+    #[inline]
+    pub fn recall(&self, weights: &Matrix3<f32>) -> [f32; 2] {
+        self.theta.map(|theta| theta.dot(weights))
+    }
+}

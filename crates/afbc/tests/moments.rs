@@ -1,0 +1,146 @@
+//! The observer of moments against its closed solution, and what it must not take for a moment.
+#![allow(clippy::unwrap_used, missing_docs, reason = "an observer that cannot be made must fail the test")]
+
+use afbc::disturbance::{AGE_S, DisturbanceObserver, MomentObserver, Turning};
+use afbc_types::{Inputs, Parameters};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+const DT_S: f32 = 0.001;
+const THRUST_MAX_N: f32 = 12.0;
+
+fn observer(rad_s: f32, disturbance_lag_s: f32) -> MomentObserver {
+    let settings = DisturbanceObserver {
+        disturbance_tilt_rad_s: rad_s,
+        disturbance_yaw_rad_s: rad_s,
+        disturbance_lag_s,
+        ..DisturbanceObserver::DEFAULT
+    };
+    MomentObserver::new(&settings, &Parameters::PAPER.to_f32(), THRUST_MAX_N, DT_S).unwrap()
+}
+
+fn effectiveness() -> Vector3<f32> {
+    Parameters::PAPER.to_f32().effectiveness()
+}
+
+/// A body whose rotors lag by `lag_s` and give `share` of what they should, under a moment.
+struct Body {
+    rates: Vector3<f32>,
+    input: Vector3<f32>,
+    lag_s: f32,
+    share: f32,
+    memory: Option<Turning>,
+}
+
+impl Body {
+    fn new(lag_s: f32, share: f32) -> Self {
+        Body { rates: Vector3::zeros(), input: Vector3::zeros(), lag_s: lag_s + AGE_S, share, memory: None }
+    }
+
+    /// Turns for a step under these inputs and moment \[rad/s2\]; returns what is observed.
+    fn step(&mut self, observer: &MomentObserver, u: &Vector3<f32>, f: &Vector3<f32>, effort: f32) -> Vector3<f32> {
+        let seen = observer.advance(&mut self.memory, &self.rates, &Vector3::zeros(), [true, false]);
+        observer.give(&mut self.memory, &Inputs { roll_n: u.x, pitch_n: u.y, yaw_n: u.z, thrust_n: 5.0 }, effort);
+        self.rates += (self.input.component_mul(&effectiveness()) * self.share + f) * DT_S;
+        self.input += (u - self.input) * (1.0 - (-DT_S / self.lag_s).exp());
+        seen
+    }
+}
+
+#[test]
+fn without_a_bandwidth_there_is_none() {
+    let none = DisturbanceObserver::DEFAULT;
+    assert!(MomentObserver::new(&none, &Parameters::PAPER.to_f32(), THRUST_MAX_N, DT_S).is_none());
+}
+
+/// f_hat of a constant moment is f behind two poles at w, whatever the rotors do.
+#[test]
+fn a_constant_moment_is_found_as_two_poles_say() {
+    for w in [15.0, 40.0, 100.0] {
+        let (observer, f) = (observer(w, 0.02), Vector3::new(0.2 * w, -0.1 * w, 0.03 * w));
+        let mut body = Body::new(0.02, 1.0);
+        for step in 0..1500_u16 {
+            let t = f32::from(step) * DT_S;
+            let u = Vector3::new((9.0 * t).sin(), 0.5 * (5.0 * t).cos(), -0.3 * (7.0 * t).sin()) * 0.2;
+            let seen = body.step(&observer, &u, &f, 1.0);
+            let expected = f * (1.0 - (1.0 + w * t) * (-w * t).exp());
+            let off = (seen - expected).component_div(&f).abs().max();
+            assert!(off < 0.05, "{w} rad/s, step {step}: {seen:?}, not {expected:?}");
+        }
+    }
+}
+
+/// Rotors that are known to be weak, and rotors of another lag that is known, are no moment.
+#[test]
+fn what_the_rotors_do_is_no_moment() {
+    for lag_s in [0.01, 0.02, 0.07] {
+        for share in [0.6, 1.0, 1.25] {
+            let observer = observer(40.0, lag_s);
+            let mut body = Body::new(lag_s, share);
+            for step in 0..3000_u16 {
+                let t = f32::from(step) * DT_S;
+                let u = Vector3::new((9.0 * t).sin(), (6.0 * t).cos(), (4.0 * t).sin()) * 0.3;
+                let seen = body.step(&observer, &u, &Vector3::zeros(), 1.0 / share);
+                let largest = effectiveness() * 0.3 * share;
+                let off = seen.component_div(&largest).abs().max();
+                assert!(step < 300 || off < 0.03, "{lag_s} s, {share}, step {step}: {seen:?}");
+            }
+        }
+    }
+}
+
+/// A jump of the rates, as after an outage, changes nothing; a repeated state teaches nothing; on the ground there is
+/// no moment.
+#[test]
+fn jumps_and_old_states_teach_nothing() {
+    let observer = observer(40.0, 0.02);
+    let (mut body, f, zero) = (Body::new(0.02, 1.0), Vector3::new(8.0, -5.0, 1.0), Vector3::zeros());
+    for _ in 0..1000 {
+        body.step(&observer, &zero, &f, 1.0);
+    }
+    let before = body.step(&observer, &zero, &f, 1.0);
+    body.rates += Vector3::new(20.0, -20.0, 3.0);
+    for _ in 0..100 {
+        let seen = body.step(&observer, &zero, &f, 1.0);
+        assert!((seen - before).abs().max() < 0.05, "{seen:?}, {before:?} before");
+    }
+    let held = observer.advance(&mut body.memory, &(body.rates * 2.0), &Vector3::zeros(), [false, false]);
+    assert_eq!(observer.advance(&mut body.memory, &(body.rates * -3.0), &Vector3::zeros(), [false, false]), held);
+    assert_eq!(observer.advance(&mut body.memory, &body.rates, &Vector3::zeros(), [true, true]), zero);
+    assert!(observer.advance(&mut body.memory, &body.rates, &Vector3::zeros(), [true, false]).abs().max() < 0.5);
+}
+
+proptest! {
+    /// Whatever the rates say, f_hat stays finite and within what the rotors can make up for.
+    #[test]
+    fn it_is_bounded(
+        w in 0.1_f32..500.0,
+        lag_s in 0.0_f32..0.5,
+        steps in prop::collection::vec((-1e3_f32..1e3, -1e3_f32..1e3, -50.0_f32..50.0, 0.7_f32..1.8), 1..200),
+    ) {
+        let (observer, mut memory) = (observer(w, lag_s), None);
+        let most = effectiveness() * (0.5 * THRUST_MAX_N * 1.0001);
+        for (p, r, u, effort) in steps {
+            let seen = observer.advance(&mut memory, &Vector3::new(p, -p, r), &Vector3::zeros(), [true, false]);
+            prop_assert!(seen.iter().zip(most.iter()).all(|(f, most)| f.abs() <= *most), "{seen:?}");
+            observer.give(&mut memory, &Inputs { roll_n: u, pitch_n: -u, yaw_n: u, thrust_n: 5.0 }, effort);
+        }
+    }
+}
+
+/// A known moment is none to find, and is made up for beside what is found.
+#[test]
+fn a_known_moment_is_not_observed() {
+    let (observer, vehicle) = (observer(60.0, 0.02), Parameters::PAPER.to_f32());
+    let known = Vector3::new(0.02, -0.01, 0.005);
+    let per_moment = vehicle.inertia_kg_m2.map(|inertia| vehicle.mass_kg / inertia);
+    let (mut memory, mut rates): (Option<Turning>, _) = (None, Vector3::zeros());
+    for _ in 0..2_000 {
+        let seen = observer.advance(&mut memory, &rates, &known, [true, false]);
+        assert!(seen.abs().max() < 1e-3, "{seen}");
+        rates += known.component_mul(&per_moment) * DT_S;
+    }
+    let found = Vector3::new(1.0, 2.0, -3.0);
+    let against = Vector3::from(observer.against(&found, &known)).component_mul(&effectiveness());
+    assert!((against + found + known.component_mul(&per_moment)).norm() < 1e-4, "{against}");
+}

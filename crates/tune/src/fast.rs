@@ -1,0 +1,74 @@
+//! Fast flights, near what a vehicle can do: lemniscates and circles.
+
+use crate::maker::{Maker, TrainingFlight};
+use crate::scale::Scale;
+use afbc_sim::contender::Contender;
+use afbc_sim::scenario::Scenario;
+use afbc_sim::trajectory::{Sine, Trajectory};
+use core::f64::consts::TAU;
+use libm::sqrt;
+use nalgebra::Vector3;
+use std::borrow::Cow;
+use std::error::Error;
+
+/// Names of fast flights begin with one of these.
+const NAMES: [&str; 2] = ["lemniscate", "circle"];
+/// Tilt that each law may use in them \[rad\], as in the suite `field`.
+const TILT_MAX_RAD: f32 = 1.2;
+/// Largest acceleration of Gerono's lemniscate over half its length and the square of its rate.
+const LEMNISCATE: f64 = 2.125;
+/// Largest rate of a fast path, times how slow the vehicle is \[rad/s\]. The paper's lemniscate has 1.3.
+const RATE_RAD_S: f64 = 2.5;
+
+/// Returns the contender as it flies `scenario`: free to tilt, if that is a fast flight.
+pub(crate) fn free<'a>(scenario: &Scenario, contender: &'a Contender) -> Cow<'a, Contender> {
+    if NAMES.iter().any(|name| scenario.name.starts_with(name)) {
+        Cow::Owned(contender.clone().free_to_tilt(TILT_MAX_RAD))
+    } else {
+        Cow::Borrowed(contender)
+    }
+}
+
+/// A lemniscate at three fifths, and a circle at half of the largest horizontal acceleration.
+pub(crate) fn training(maker: &Maker<'_>) -> Result<[Scenario; 2], Box<dyn Error>> {
+    Ok([lemniscate(maker, "lemniscate", 3.0, 0.6)?, circle(maker, "circle", 2.0, 0.5)?])
+}
+
+/// Another lemniscate and circle.
+pub(crate) fn held_out(maker: &Maker<'_>) -> Result<[Scenario; 2], Box<dyn Error>> {
+    Ok([lemniscate(maker, "lemniscate-short", 2.0, 0.5)?, circle(maker, "circle-wide", 3.0, 0.6)?])
+}
+
+/// Returns a lemniscate of this half length, on the paper's vehicle, at `share` of the largest horizontal acceleration.
+pub(crate) fn lemniscate(
+    maker: &Maker<'_>,
+    name: &'static str,
+    half_m: f64,
+    share: f64,
+) -> Result<Scenario, Box<dyn Error>> {
+    let Scale { length, time, .. } = maker.scale;
+    let half_m = half_m * length;
+    let rate = sqrt(share * maker.scale.horizontal_m_s2() / (LEMNISCATE * half_m)).min(RATE_RAD_S / time);
+    let sine = |amplitude_m, rate| Sine { amplitude_m, period_s: TAU / rate, phase_rad: 0.0 };
+    let trajectory = Trajectory::Lissajous {
+        centre_m: Vector3::new(0.0, 0.0, 3.0),
+        sines: [sine(half_m, rate), sine(0.5 * half_m, 2.0 * rate), sine(0.0, rate)],
+        yaw_rad: 0.0,
+    };
+    // A period after errors count, at least.
+    let duration_s = libm::ceil((5.0 + TAU / rate).max(12.0));
+    maker.scenario(TrainingFlight { trajectory, ..TrainingFlight::new(name, duration_s) })
+}
+
+/// Returns a circle of this radius, on the paper's vehicle, at `share` of the largest horizontal acceleration, from a
+/// banked start.
+fn circle(maker: &Maker<'_>, name: &'static str, radius_m: f64, share: f64) -> Result<Scenario, Box<dyn Error>> {
+    let Scale { length, time, .. } = maker.scale;
+    let radius_m = radius_m * length;
+    let rate = sqrt(share * maker.scale.horizontal_m_s2() / radius_m).min(RATE_RAD_S / time);
+    let trajectory =
+        Trajectory::Circle { centre_m: Vector3::new(0.0, 0.0, 3.0), radius_m, period_s: TAU / rate, yaw_rad: 0.0 };
+    let mut scenario = maker.scenario(TrainingFlight { trajectory, ..TrainingFlight::new(name, 12.0) })?;
+    scenario.initial.attitude_rad.y = -maker.scale.tilt_rad(radius_m * rate * rate);
+    Ok(scenario)
+}

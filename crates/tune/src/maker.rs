@@ -1,0 +1,126 @@
+//! Scenarios on a vehicle, out of which flights are made: `hardware` with its data.
+
+use crate::scale::Scale;
+use afbc::Profile;
+use afbc_plant::{Drag, Environment, Gust, Motion, ParameterChange, Quantity, Turbulence};
+use afbc_reader::FileError;
+use afbc_sim::scenario::{Scenario, built_in};
+use afbc_sim::trajectory::Trajectory;
+use afbc_types::Axis;
+use afbc_vehicles::Vehicle;
+use nalgebra::Vector3;
+use std::error::Error;
+
+/// Onset of disturbances \[s\], when errors already count.
+pub(crate) const ONSET_S: f64 = 6.0;
+
+/// True if `vehicle` is the paper's, whatever gains its file has: its flights are those without a vehicle's file.
+pub fn is_paper(vehicle: &Vehicle) -> bool {
+    let paper = afbc_vehicles::built_in("paper").and_then(|paper| paper.read().ok());
+    paper.is_some_and(|paper| {
+        let of = |of: &Vehicle| (of.parameters, of.rotors.clone(), of.force_max_n, of.realism.clone());
+        of(&paper) == of(vehicle)
+    })
+}
+
+/// Makes flights of one vehicle.
+pub(crate) struct Maker<'a> {
+    /// None is the paper's vehicle on the rotors of `hardware`.
+    pub(crate) vehicle: Option<&'a Vehicle>,
+    pub(crate) scale: Scale,
+}
+
+impl<'a> Maker<'a> {
+    pub(crate) fn new(vehicle: Option<&'a Vehicle>) -> Self {
+        let vehicle = vehicle.filter(|vehicle| !is_paper(vehicle));
+        Maker { vehicle, scale: Scale::of(vehicle) }
+    }
+
+    /// Returns `hardware`, whose gusts and weakness are what the vehicle bears.
+    pub(crate) fn hardware(&self) -> Result<Scenario, Box<dyn Error>> {
+        let scenario = self.base()?;
+        if self.vehicle.is_none() {
+            return Ok(scenario);
+        }
+        let Scale { acceleration, time, .. } = self.scale;
+        let gust = |gust: &Gust| {
+            let turns = matches!(gust.axis, Axis::Roll | Axis::Pitch | Axis::Yaw);
+            Gust { size: gust.size * if turns { 1.0 / (time * time) } else { acceleration }, ..*gust }
+        };
+        let gusts = scenario.environment.gusts().iter().map(gust).collect();
+        let change = |change: &ParameterChange| match change.quantity {
+            Quantity::ThrustFactor => ParameterChange { factor: self.scale.thrust(change.factor), ..*change },
+            _ => *change,
+        };
+        let changes = scenario.environment.changes().iter().map(change).collect();
+        let environment = Environment::new(*scenario.environment.nominal(), changes, gusts)?;
+        Ok(Scenario { environment, ..scenario })
+    }
+
+    /// Returns `hardware` on the vehicle, with its delay of the rotors.
+    fn base(&self) -> Result<Scenario, FileError> {
+        let scenario = read("hardware")?;
+        let Some(vehicle) = self.vehicle else { return Ok(scenario) };
+        let delay_s = scenario.realism.rotors.delay_s;
+        let mut scenario = scenario.on(vehicle, Profile::Flight)?;
+        scenario.realism.rotors.delay_s = scenario.realism.rotors.delay_s.max(delay_s);
+        Ok(scenario)
+    }
+
+    /// Gives the paper's vehicle the drag that every other one has already.
+    pub(crate) fn drag(&self, scenario: &mut Scenario) {
+        if self.vehicle.is_none() {
+            scenario.realism.drag = Some(Drag::PAPER);
+        }
+    }
+
+    pub(crate) fn turbulence(&self, of: Turbulence) -> Turbulence {
+        Turbulence { wind_20ft_m_s: of.wind_20ft_m_s * self.scale.wind, ..of }
+    }
+
+    pub(crate) fn scenario(&self, flight: TrainingFlight) -> Result<Scenario, Box<dyn Error>> {
+        let base = self.base()?;
+        let change = |(quantity, factor)| ParameterChange {
+            quantity,
+            factor,
+            start_s: ONSET_S,
+            end_s: 0.5 * (ONSET_S + flight.duration_s),
+        };
+        let changes = flight.change.into_iter().map(change).collect();
+        let environment = Environment::new(*base.environment.nominal(), changes, Vec::new())?;
+        let start = flight.trajectory.at(0.0);
+        let mut initial =
+            Motion { position_m: start.position_m, velocity_m_s: start.velocity_m_s, ..Motion::default() };
+        initial.attitude_rad.z = start.yaw_rad;
+        Ok(Scenario {
+            name: flight.name.into(),
+            description: String::new(),
+            duration_s: flight.duration_s,
+            trajectory: flight.trajectory,
+            environment,
+            initial,
+            ..base
+        })
+    }
+}
+
+/// Returns a built-in scenario.
+pub(crate) fn read(name: &str) -> Result<Scenario, FileError> {
+    built_in(name).ok_or_else(|| FileError::whole(name, "no such scenario"))?.read()
+}
+
+/// A flight of `hardware` without gusts.
+pub(crate) struct TrainingFlight {
+    pub(crate) name: &'static str,
+    pub(crate) duration_s: f64,
+    pub(crate) trajectory: Trajectory,
+    /// Quantity that changes at the onset for half of the remaining flight, and its factor.
+    pub(crate) change: Option<(Quantity, f64)>,
+}
+
+impl TrainingFlight {
+    pub(crate) fn new(name: &'static str, duration_s: f64) -> Self {
+        let trajectory = Trajectory::Hover { position_m: Vector3::new(0.0, 0.0, 3.0), yaw_rad: 0.0 };
+        TrainingFlight { name, duration_s, trajectory, change: None }
+    }
+}

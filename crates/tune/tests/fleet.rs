@@ -1,0 +1,142 @@
+//! Flights made from a vehicle's own data, searches that do not depend on threads, and a folder that resumes.
+#![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be flown must stop the test")]
+
+use afbc_sim::contender::ControllerKind;
+use afbc_sim::scenario::Scenario;
+use afbc_tune::fleet::{Results, Search};
+use afbc_tune::{Course, LOST, by_hand_on, conditions_on, costs, held_out, held_out_on, search, training, training_on};
+use afbc_vehicles::{BUILT_IN, Vehicle, built_in};
+use core::hash::Hasher;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+fn vehicle(name: &str) -> Vehicle {
+    built_in(name).unwrap().read().unwrap()
+}
+
+/// What a flight is, whatever the gains of its contenders.
+fn print(flights: &[Scenario]) -> String {
+    let mut hash = twox_hash::XxHash64::with_seed(0);
+    for flight in flights {
+        let bare = Scenario { contenders: Vec::new(), ..flight.clone() };
+        hash.write(&serde_json::to_vec(&bare).unwrap());
+    }
+    format!("{:016x}", hash.finish())
+}
+
+/// The first 19 and 18 are the flights from before there were others, to the bit; those of its file are the same.
+#[test]
+fn the_papers_flights_stay_what_they_were() {
+    let [train, held] = [training().unwrap(), held_out().unwrap()];
+    let pinned = [print(train.get(..19).unwrap()), print(held.get(..18).unwrap())];
+    assert_eq!(pinned, ["cc633aa7b9d7ec73", "0feaca013c344f06"]);
+    let paper = vehicle("paper");
+    assert_eq!(training_on(&paper).unwrap(), train);
+    assert_eq!(held_out_on(&paper).unwrap(), held);
+}
+
+/// Every flight can be flown by every law; at most 22 are for training, of a minute at most.
+#[test]
+fn every_flight_is_valid_on_every_vehicle() {
+    for known in &BUILT_IN {
+        let vehicle = known.read().unwrap();
+        let mut flights = training_on(&vehicle).unwrap();
+        assert!(flights.len() <= 22 && flights.iter().all(|flight| flight.duration_s <= 60.0), "{}", known.name);
+        flights.extend(held_out_on(&vehicle).unwrap());
+        // The paper's vehicle's gains fly on other vehicles by rule.
+        let conditions = conditions_on(&vehicle).unwrap().into_iter().filter(|condition| !condition.by_rule);
+        flights.extend(conditions.map(|condition| condition.scenario));
+        for flight in flights {
+            let contenders = ControllerKind::ALL.map(|kind| by_hand_on(kind, &vehicle)).to_vec();
+            let name = format!("{} {}", known.name, flight.name);
+            let checked = Scenario { contenders, ..flight }.check();
+            assert!(checked.is_ok(), "{name}: {checked:?}");
+        }
+    }
+}
+
+/// INDI by hand and by rule, from which its search starts, flies all but these.
+#[test]
+fn the_start_survives_most_flights() {
+    let mut lost = Vec::new();
+    for known in &BUILT_IN {
+        let vehicle = known.read().unwrap();
+        let flights = training_on(&vehicle).unwrap();
+        let costs = costs(&flights, &by_hand_on(ControllerKind::Indi, &vehicle)).unwrap();
+        let names = flights.iter().zip(costs).filter(|(_, cost)| *cost >= LOST);
+        lost.extend(names.map(|(flight, _)| format!("{} {}", known.name, flight.name)));
+    }
+    assert_eq!(lost, ["crazyflie old"]);
+}
+
+#[test]
+fn a_search_does_not_depend_on_the_number_of_threads() {
+    let vehicle = vehicle("racer");
+    let named = |name: &&Scenario| ["weak", "step", "lemniscate", "old"].contains(&name.name.as_str());
+    let flights: Vec<_> = training_on(&vehicle).unwrap().iter().filter(named).cloned().collect();
+    let start = by_hand_on(ControllerKind::Indi, &vehicle);
+    // Large steps, so that some contenders are given up.
+    let course = Course { budget: 24, step: 0.8, seed: 3 };
+    let found = [1, 3].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| search(&start, &flights, &[], course, |_, _| true).unwrap())
+    });
+    let [one, three] = found;
+    assert_eq!((one.after.to_bits(), &one.contender), (three.after.to_bits(), &three.contender));
+    assert!(one.after < one.before);
+    let flown = costs(&flights, &one.contender).unwrap();
+    assert_eq!(afbc_tune::mean(&flown).to_bits(), one.after.to_bits());
+}
+
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries
+        .filter(|path| path.is_file())
+        .map(|path| {
+            let bytes = std::fs::read(&path).unwrap();
+            (path.file_name().unwrap().into(), bytes)
+        })
+        .collect()
+}
+
+/// A folder whose searches were ended half-way and begun again holds the same bytes as one that was not; and it takes
+/// no other searches.
+#[test]
+fn an_interrupted_fleet_resumes_to_the_same_bytes() {
+    let base = std::env::temp_dir().join(format!("afbc-tune-fleet-{}", std::process::id()));
+    let course = Course { budget: 2, step: 0.3, seed: 1 };
+    let kinds = [ControllerKind::Pid, ControllerKind::Indi];
+    let searches: Vec<_> = kinds.into_iter().map(|kind| Search::new(kind, &vehicle("racer"), false).unwrap()).collect();
+    let run = |folder: &Path, stops: bool| {
+        let results = Results::open(folder, &searches, course, false).unwrap();
+        let stop = AtomicBool::new(false);
+        let ended = results.complete(&searches, &stop, |tries| {
+            if stops && tries > 0 {
+                stop.store(true, Ordering::Relaxed);
+            }
+        });
+        let outcomes = ended.unwrap();
+        assert_eq!(outcomes.is_none(), stops);
+        outcomes.map(|outcomes| results.gains_of("racer", &outcomes))
+    };
+    let (whole, parts) = (base.join("whole"), base.join("parts"));
+    let gains = run(&whole, false).unwrap();
+    run(&parts, true);
+    assert_eq!(run(&parts, false).unwrap(), gains);
+    assert_eq!(files(&whole), files(&parts));
+
+    let text = format!("{}\n{gains}", built_in("racer").unwrap().text);
+    let read = afbc_vehicles::parse("racer.toml", &text, "racer").unwrap();
+    afbc_sim::contender::Law::on(ControllerKind::Indi, &read, afbc::Profile::Flight).unwrap();
+
+    let refused = |course, searches: &[Search]| {
+        Results::open(&whole, searches, course, false).err().map(|error| error.to_string()).unwrap()
+    };
+    assert!(refused(Course { seed: 2, ..course }, &searches).contains("with seed 1, not 2"));
+    assert!(refused(course, searches.get(..1).unwrap()).contains("other laws or vehicles"));
+    std::fs::write(whole.join("racer.pid.json"), "{}").unwrap();
+    let results = Results::open(&whole, &searches, course, false).unwrap();
+    assert!(results.outcome(searches.first().unwrap()).unwrap_err().to_string().contains("damaged"));
+    std::fs::remove_dir_all(base).unwrap();
+}

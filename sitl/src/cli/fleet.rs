@@ -1,0 +1,177 @@
+//! `sitl tune --fleet`.
+
+use super::progress::Progress;
+use super::terminal::{Failure, INTERRUPTED, print, say};
+use afbc_sim::contender::{ControllerKind, Law};
+use afbc_tune::fleet::{GAINS, Outcome, Results, Search};
+use afbc_tune::{Course, is_paper};
+use afbc_vehicles::Vehicle;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Lines of a vehicle's file between which its gains stand.
+const BEGIN: &str = "# Gains found by `sitl tune --fleet`, up to the line of the same form.";
+const END: &str = "# End of the gains found by `sitl tune --fleet`.";
+
+/// What to search, and where to.
+pub(super) struct Fleet<'a> {
+    pub(super) folder: &'a Path,
+    /// Names of laws; all if there are none.
+    pub(super) laws: &'a [String],
+    /// Vehicles; all built-in ones if there are none.
+    pub(super) vehicles: Vec<Vehicle>,
+    pub(super) course: Course,
+    /// Whether to start from the gains that fly.
+    pub(super) flying: bool,
+    /// Folder of vehicle files to write the gains into.
+    pub(super) write: Option<&'a Path>,
+}
+
+impl Fleet<'_> {
+    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        let laws = laws(self.laws)?;
+        let vehicles = if self.vehicles.is_empty() {
+            afbc_vehicles::BUILT_IN.iter().map(afbc_reader::BuiltIn::read).collect::<Result<_, _>>()?
+        } else {
+            self.vehicles
+        };
+        for (index, vehicle) in vehicles.iter().enumerate() {
+            if vehicles.iter().take(index).any(|other| other.name == vehicle.name) {
+                return Err(format!("--vehicle {}: named twice; name it once", vehicle.name.escape_debug()).into());
+            }
+            if vehicle.name.contains(['/', '\\']) || vehicle.name.starts_with('.') {
+                return Err(format!("{}: no name for a file; change it", vehicle.name.escape_debug()).into());
+            }
+        }
+        // A file that cannot be written into must not be found after hours.
+        if let Some(folder) = self.write {
+            written(&vehicles).try_for_each(|vehicle| with_gains(folder, &vehicle.name, "").map(drop))?;
+        }
+        let mut searches = Vec::new();
+        for vehicle in &vehicles {
+            for kind in &laws {
+                searches.push(Search::new(*kind, vehicle, self.flying)?);
+            }
+        }
+        let results = Results::open(self.folder, &searches, self.course, self.flying)?;
+        let mut done = 0;
+        for search in &searches {
+            done += u64::from(results.outcome(search)?.is_some());
+        }
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopper = Arc::clone(&stop);
+        ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
+        let (each, all) = (self.course.budget as u64, searches.len() as u64);
+        let progress = Progress::new("tune --fleet", "tried", each * all, each * done);
+        let outcomes = results.complete(&searches, &stop, |tries| progress.add(tries as u64))?;
+        drop(progress);
+        let Some(outcomes) = outcomes else {
+            say(&format!("stopped; finished searches are kept in {}, the same command goes on", self.folder.display()));
+            return Ok(ExitCode::from(INTERRUPTED));
+        };
+        results.write_gains(&outcomes)?;
+        let mut text = table(&outcomes);
+        let _ = writeln!(text, "\ngains of each vehicle in {}", self.folder.join(GAINS).display());
+        if let Some(folder) = self.write {
+            for vehicle in &vehicles {
+                if is_paper(vehicle) {
+                    let _ = writeln!(text, "{}: not written, its gains are those of the profile", vehicle.name);
+                    continue;
+                }
+                let (path, whole) = with_gains(folder, &vehicle.name, &results.gains_of(&vehicle.name, &outcomes))?;
+                let read = afbc_vehicles::parse(&path.display().to_string(), &whole, &vehicle.name)?;
+                Law::on(ControllerKind::Afbc, &read, afbc::Profile::Flight)?;
+                afbc_files::place(&path, |out| out.write_all(whole.as_bytes()))
+                    .map_err(|source| format!("{}: cannot be written ({source}); make it writable", path.display()))?;
+                let _ = writeln!(text, "{}: written", path.display());
+            }
+        }
+        print(&text)?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// The vehicles whose gains their files hold.
+fn written(vehicles: &[Vehicle]) -> impl Iterator<Item = &Vehicle> {
+    vehicles.iter().filter(|vehicle| !is_paper(vehicle))
+}
+
+/// Returns the laws of these names; without names all but backstepping, which flies with AFBC's gains.
+fn laws(names: &[String]) -> Result<Vec<ControllerKind>, Failure> {
+    let all = ControllerKind::ALL.into_iter();
+    if names.is_empty() {
+        return Ok(all.filter(|kind| *kind != ControllerKind::Backstepping).collect());
+    }
+    if let Some(unknown) = names.iter().find(|name| !ControllerKind::ALL.iter().any(|kind| kind.name() == **name)) {
+        let laws = ControllerKind::ALL.map(ControllerKind::name).join(", ");
+        return Err(format!("{}: no such law; the laws are {laws}", unknown.escape_debug()).into());
+    }
+    Ok(all.filter(|kind| names.iter().any(|name| kind.name() == name)).collect())
+}
+
+/// Returns the path of the file of `vehicle` in `folder`, and its text with `gains` between the two lines, which are
+/// put at its end if there are none.
+fn with_gains(folder: &Path, vehicle: &str, gains: &str) -> Result<(PathBuf, String), Failure> {
+    let path = folder.join(format!("{vehicle}.toml"));
+    let text = std::fs::read_to_string(&path).map_err(|error| {
+        format!("{}: cannot be read ({error}); --write takes the folder of the vehicles' files", path.display())
+    })?;
+    let whole = replaced(&text, gains).map_err(|problem| format!("{}: {problem}", path.display()))?;
+    Ok((path, whole))
+}
+
+/// Returns `text` with `gains` between the two lines.
+fn replaced(text: &str, gains: &str) -> Result<String, String> {
+    let (before, after) = match (text.split_once(BEGIN), text.contains(END)) {
+        (None, false) => (text, ""),
+        (Some((before, rest)), true) => match rest.split_once(END) {
+            Some((_, after)) => (before, after.trim_start_matches('\n')),
+            None => return Err("the line that ends the gains stands before the one that begins them".into()),
+        },
+        _ => return Err("only one of the two lines between which the gains stand; delete it with them".into()),
+    };
+    if [before, after].iter().any(|text| text.lines().any(|line| line.trim_start().starts_with("[gains"))) {
+        return Err("[gains] of its own beside those of `sitl tune --fleet`; delete them".into());
+    }
+    let after = if after.is_empty() { String::new() } else { format!("\n{after}") };
+    Ok(format!("{}\n\n{BEGIN}\n{}\n{END}\n{after}", before.trim_end(), gains.trim_end()))
+}
+
+/// Returns a line for each search.
+fn table(outcomes: &[Outcome]) -> String {
+    let mut text = format!(
+        "{:<14}{:<14}{:>10}{:>10}{:>12}{:>10}  {}\n",
+        "vehicle", "law", "before", "after", "held out", "after", "conditions not met"
+    );
+    for Outcome { planned, cost: [before, after], held_out: [old, new], unmet, .. } in outcomes {
+        let unmet = if unmet.is_empty() { "-".into() } else { unmet.join(", ") };
+        let _ = writeln!(
+            text,
+            "{:<14}{:<14}{before:>10.4}{after:>10.4}{old:>12.4}{new:>10.4}  {unmet}",
+            planned.vehicle, planned.law
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests")]
+    use super::*;
+
+    #[test]
+    fn gains_replace_those_written_before() {
+        let file = "[vehicle]\nmass_kg = 1.0\n";
+        let once = replaced(file, "[gains.flight.pid]\na = 1\n").unwrap();
+        let twice = replaced(&once, "[gains.flight.pid]\na = 2\n").unwrap();
+        assert!(once.starts_with(file) && once.contains("a = 1"), "{once}");
+        assert_eq!(twice, once.replace("a = 1", "a = 2"));
+        let followed = format!("{once}# more\n");
+        assert_eq!(replaced(&followed, "x").unwrap().matches("# more").count(), 1);
+        assert!(replaced(&format!("{file}[gains.flight.pid]\n"), "x").is_err());
+        assert!(replaced(&format!("{file}{BEGIN}\n"), "x").is_err());
+    }
+}
