@@ -28,7 +28,7 @@ pub use error::Error;
 pub use file::parse;
 pub use fly::{fly, merge};
 pub use folder::Folder;
-pub use manifest::{Drawn, Manifest, Shard};
+pub use manifest::{Drawn, Manifest, Shard, hash_of};
 pub use plan::{Campaign, Course, Spread};
 pub use quantity::{QUANTITIES, Quantity};
 pub use row::{Column, FIGURES, Figure, Row};

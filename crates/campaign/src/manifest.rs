@@ -145,10 +145,14 @@ fn fingerprint(campaign: &Campaign) -> String {
     // By name, since a quantity's place may change.
     let spreads: Vec<_> =
         spreads.iter().map(|spread| (spread.quantity().map(|quantity| quantity.range.name), spread.ends)).collect();
+    hash_of(&(env!("CARGO_PKG_VERSION"), flights, seed, scenario, courses, spreads))
+}
+
+/// Returns a hash of what decides a result, as it is written. Numbers are written to the last bit; infinity, of an
+/// event without end, as null, which no other number is.
+pub fn hash_of(decides: &impl serde::Serialize) -> String {
     let mut hasher = Hashed(XxHash64::with_seed(0));
-    // Numbers are written to the last bit; infinity, of an event without end, as null, which no other number is.
-    let decides = (env!("CARGO_PKG_VERSION"), flights, seed, scenario, courses, spreads);
-    let written = serde_json::to_writer(&mut hasher, &decides);
+    let written = serde_json::to_writer(&mut hasher, decides);
     debug_assert!(written.is_ok(), "nothing in it cannot be written");
     format!("{:016x}", hasher.0.finish())
 }

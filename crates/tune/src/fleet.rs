@@ -15,7 +15,6 @@ use afbc_files::{self as files, Folder};
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::scenario::Scenario;
 use afbc_vehicles::Vehicle;
-use core::hash::Hasher;
 use serde::{Deserialize, Serialize};
 use std::error::Error;
 use std::fs;
@@ -23,7 +22,6 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
-use twox_hash::XxHash64;
 
 /// File of the manifest, present from the beginning.
 const MANIFEST: &str = "manifest.json";
@@ -136,16 +134,14 @@ impl Search {
         let conditions: Vec<_> = self
             .conditions
             .iter()
-            .map(|condition| (&condition.scenario, condition.rmse, condition.end_m, condition.of_afbc))
+            .map(|Condition { scenario, rmse, end_m, jumps_n, of_afbc, by_rule }| {
+                (scenario, rmse, end_m, jumps_n, of_afbc, by_rule)
+            })
             .collect();
-        let mut hash = Hashed(XxHash64::with_seed(0));
-        let decides = (&self.training, &self.held_out, conditions, &self.start);
-        let written = serde_json::to_writer(&mut hash, &decides);
-        debug_assert!(written.is_ok(), "nothing in it cannot be written");
         Planned {
             vehicle: self.vehicle.name.clone(),
             law: self.start.kind().name().into(),
-            fingerprint: format!("{:016x}", hash.0.finish()),
+            fingerprint: afbc_campaign::hash_of(&(&self.training, &self.held_out, conditions, &self.start)),
         }
     }
 
@@ -396,18 +392,4 @@ fn read<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<Option<T>, Box<dyn Er
     seal::verify(&mut io::Cursor::new(&bytes)).map_err(|error| damaged(error.to_string()))?;
     let page: Page<T> = serde_json::from_slice(&bytes).map_err(|error| damaged(error.to_string()))?;
     Ok(Some(page.page))
-}
-
-/// A hash of what is written.
-struct Hashed(XxHash64);
-
-impl io::Write for Hashed {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.write(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
 }
