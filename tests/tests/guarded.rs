@@ -126,7 +126,7 @@ fn a_flight_goes_on_across_a_trip_and_back() {
     let setpoint = above(0.0);
     let wind = Wind { steady_m_s: Vector3::new(3.0, 0.0, 0.0), ..Wind::default() };
     let realism = Realism { drag: Some(Drag::PAPER), wind, ..Realism::default() };
-    let mut bench = Bench::real(flight(|bounds| bounds.theta.x = 0.2), realism, Deviations::default());
+    let mut bench = Bench::real(flight(|bounds| bounds.theta.x = 0.05), realism, Deviations::default());
 
     // At the switch, filtered inputs go on changing as in the step before, within 5 mN; virtual ones, which are not
     // filtered, change by at most 5 mm/s2.

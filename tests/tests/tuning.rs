@@ -8,7 +8,8 @@
 
 use afbc::Profile;
 use afbc_sim::contender::{Contender, ControllerKind};
-use afbc_tune::{LOST, by_hand, conditions, costs, held_out, mean, training};
+use afbc_tune::{LOST, by_hand, conditions, conditions_on, costs, held_out, held_out_on, mean, training, training_on};
+use afbc_vehicles::BUILT_IN;
 
 /// Returns the law with the gains found by `sitl tune`; AFBC under its monitor, as in the search.
 fn found(kind: ControllerKind) -> Contender {
@@ -67,4 +68,33 @@ fn the_gains_that_fly_meet_every_condition() {
     }
     let by_hand = unmet(&by_hand(ControllerKind::Afbc));
     assert!(by_hand.iter().any(|name| name.starts_with("robustness")), "{by_hand:?}");
+}
+
+/// The gains in the vehicles' files, found by `sitl tune --fleet`, survive every flight and meet every condition there,
+/// at the documented cost; beside it that of the paper's vehicle's gains, by rule.
+#[test]
+fn every_vehicles_gains_cost_what_is_documented() {
+    let page = include_str!("../../docs/tuning.md");
+    let mut missing = Vec::new();
+    for vehicle in BUILT_IN.iter().filter(|known| known.name != "paper").map(|known| known.read().unwrap()) {
+        let flights = [training_on(&vehicle).unwrap(), held_out_on(&vehicle).unwrap()];
+        let conditions = conditions_on(&vehicle).unwrap();
+        for kind in ControllerKind::ALL.into_iter().filter(|kind| *kind != ControllerKind::Backstepping) {
+            let (by_rule, own) = (found(kind).by_rule(&vehicle), found(kind).on(&vehicle, Profile::Flight).unwrap());
+            let of = |contender: &Contender| flights.each_ref().map(|flights| costs(flights, contender).unwrap());
+            let [before, after] = [of(&by_rule), of(&own)];
+            let name = format!("{}, {}", vehicle.name, kind.title());
+            assert!(after.iter().flatten().all(|cost| *cost < LOST), "{name}: lost or tripped");
+            let unmet = conditions.iter().filter(|condition| condition.factor(&own).unwrap() > 1.0);
+            let unmet: Vec<_> = unmet.map(|condition| condition.scenario.name.clone()).collect();
+            assert_eq!(unmet, [""; 0], "{name}");
+            let [[train_before, held_before], [train, held]] =
+                [before, after].map(|[train, held]| [mean(&train), mean(&held)]);
+            let row = format!("| {name} | {train_before:.3} | {train:.3} | {held_before:.3} | {held:.3} |");
+            if !page.lines().any(|line| line == row) {
+                missing.push(row);
+            }
+        }
+    }
+    assert!(missing.is_empty(), "docs/tuning.md lacks these rows:\n{}", missing.join("\n"));
 }

@@ -200,7 +200,9 @@ fn each_says_where_its_parameters_come_from() {
             !cited.is_empty() || words.iter().any(|word| comment.contains(word))
         };
         let mut values = 0;
-        for paragraph in vehicle.text.split("\n\n").filter(|paragraph| !paragraph.contains("description = ")) {
+        // Gains that a search has found come last, and say so themselves.
+        let text = vehicle.text.split("# Gains found by").next().unwrap();
+        for paragraph in text.split("\n\n").filter(|paragraph| !paragraph.contains("description = ")) {
             // The sources of the rotors are above the first one.
             let mut above = paragraph.starts_with("[[rotor]]");
             for line in paragraph.lines() {

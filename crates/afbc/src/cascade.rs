@@ -1,18 +1,20 @@
 //! Six subsystems in one cascade: position gives thrust and desired attitude, attitude gives U1..U3, and all give rotor
 //! speeds. Section III-D, Fig. 2.
 
-use crate::disturbance::{DisturbanceObserver, MomentObserver, Observed, Observer, Turning};
+use crate::disturbance::{MomentObserver, Observed, Observer, Turning};
+use crate::forward::{Followed, Forward};
 use crate::law::{Context, Law, Tracking};
 use crate::limits::Limits;
 use crate::model::{Model, RollPitch, euler_rates};
-use crate::reference::{Detours, Reference, ReferenceModel};
+use crate::reference::{Detours, Reference};
 use crate::rotation::Turn;
+pub use crate::settings::Settings;
 use crate::standstill::Standstill;
 use crate::tilt::Tilt;
-use afbc_control::command_filter::{BANDWIDTH, CommandFilter, Filtered};
+use afbc_control::command_filter::{CommandFilter, Filtered};
 use afbc_control::mixer::{Allocation, Mixer};
-use afbc_control::{Action, Errors, Estimate, FlightController, Smoothed, Smoother, Smoothing, Trace, math};
-use afbc_types::{Airframe, Axis, Declared, Inputs, OutOfRange, Parameters, PerAxis, Setpoint, State, parameters};
+use afbc_control::{Action, Errors, Estimate, FlightController, Smoothed, Smoother, Trace, math};
+use afbc_types::{Airframe, Axis, Declared, Inputs, OutOfRange, Parameters, PerAxis, Setpoint, State};
 use nalgebra::Vector3;
 
 /// Smallest vertical thrust over weight that the tilt is computed with, since a sinking vehicle must not tilt further.
@@ -28,93 +30,6 @@ pub const EFFORT_MAX: f32 = 1.8;
 /// Bandwidth with which the factor follows the learnt hover thrust \[rad/s\]: no hand-over between laws makes it jump.
 const EFFORT_RAD_S: f32 = 5.0;
 
-parameters! {
-    /// Settings of the cascade around the law. The defaults are the paper's.
-    #[derive(Clone, Copy, Debug, PartialEq)]
-    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    pub struct Settings {
-        /// Settings that every controller needs.
-        #[group("")]
-        pub common: afbc_control::Settings = afbc_control::Settings::DEFAULT,
-        /// Bandwidth of the filter on phi_d and theta_d.
-        #[parameter(FILTER, "rad/s", BANDWIDTH.min..=BANDWIDTH.max, tuned)]
-        pub command_filter_rad_s: f32 = 40.0,
-        /// Limits on the demands of position control.
-        #[group("limits")]
-        pub limits: Limits = Limits::NONE,
-        /// Whether the desired attitude is computed with the commanded thrust, instead of the hover thrust (39).
-        #[switch(TILT_THRUST)]
-        pub tilt_by_thrust: bool = false,
-        /// Whether an estimate stops growing in the direction in which rotors, tilt or acceleration are at a limit.
-        #[switch(ANTI_WINDUP)]
-        pub anti_windup: bool = false,
-        /// Whether adaptation stops, and rotors give thrust only, while the vehicle stands on the ground.
-        #[switch(FREEZE)]
-        pub freeze_on_ground: bool = false,
-        /// Whether estimates start with the weight, and the command filter at the attitude, so that a vehicle in flight
-        /// is taken over without a jump. The paper starts with zero estimates and at its first command.
-        #[switch(BUMPLESS)]
-        pub bumpless: bool = false,
-        /// Whether the law is given the known part of (16) by the nominal model, so that only the rest is learnt, and
-        /// roll and pitch the derivatives that follow from jerk and snap of the setpoint, instead of the command
-        /// filter's second derivative, which is mostly noise.
-        #[switch(FEED_FORWARD)]
-        pub feed_forward: bool = false,
-        /// Whether errors of the attitude are those of the rotation to the desired one, tilt before yaw, and rates
-        /// those of the body, instead of differences and derivatives of Euler angles.
-        #[switch(ROTATION)]
-        pub by_rotation: bool = false,
-        /// Observer of the horizontal acceleration that the model does not know, for a law that is given what is known.
-        #[group("")]
-        pub disturbance: DisturbanceObserver = DisturbanceObserver::DEFAULT,
-        /// Reference model between setpoint and law.
-        #[group("")]
-        pub reference: ReferenceModel = ReferenceModel::DEFAULT,
-        /// Low-pass filters on U1..U4.
-        #[group("")]
-        pub smoothing: Smoothing = Smoothing::DEFAULT,
-    }
-}
-
-impl Settings {
-    /// Returns the settings with another time step.
-    #[must_use]
-    pub const fn with_dt_s(mut self, dt_s: f32) -> Self {
-        self.common.dt_s = dt_s;
-        self
-    }
-
-    /// Returns the settings of a vehicle that is `slowness` times slower: command filter, tilt rate, reference model
-    /// and filters of the inputs follow. Limits of speed and acceleration stay, since they belong to the task. Not in
-    /// the paper.
-    #[must_use]
-    pub fn slowed(self, slowness: f32, lag_s: f32) -> Self {
-        let Settings { command_filter_rad_s, limits, disturbance, reference, smoothing, .. } = self;
-        Settings {
-            command_filter_rad_s: command_filter_rad_s / slowness,
-            limits: Limits { tilt_rate_max_rad_s: limits.tilt_rate_max_rad_s / slowness, ..limits },
-            disturbance: disturbance.slowed(slowness, lag_s),
-            reference: reference.slowed(slowness),
-            smoothing: smoothing.slowed(slowness),
-            ..self
-        }
-    }
-
-    /// Returns the settings with this known drag.
-    #[must_use]
-    pub const fn with_drag(mut self, drag: afbc_control::drag::KnownDrag) -> Self {
-        self.common.drag = drag;
-        self
-    }
-
-    /// Returns the settings with another largest rotor force.
-    #[must_use]
-    pub const fn with_rotor_force_max_n(mut self, force_n: f32) -> Self {
-        self.common.rotor_force_max_n = force_n;
-        self
-    }
-}
-
 /// A controller. Constant; everything that changes in flight is in [`Cascade`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controller<L, const N: usize = 4> {
@@ -127,6 +42,7 @@ pub struct Controller<L, const N: usize = 4> {
     smoother: Smoother,
     mixer: Mixer<N>,
     filter: CommandFilter,
+    forward: Forward,
     settings: Settings,
     weight_n: f32,
     inverse_weight: f32,
@@ -169,6 +85,8 @@ pub struct Cascade<E> {
     pub asked: Inputs,
     /// Desired roll and pitch in the last step; none before the first.
     desired: Option<Desired>,
+    /// See [`Forward`]; none before the first step.
+    followed: Option<Followed>,
     /// See [`Context::unallocated`].
     unallocated: PerAxis<f32>,
     standstill: Standstill,
@@ -190,7 +108,7 @@ pub struct Cascade<E> {
 impl<E> Cascade<E> {
     /// Returns the memory with the estimates of another law, which starts with this rotor residual.
     pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>, rotor_residual_rad_s: f32) -> Cascade<F> {
-        let Cascade { errors, distances, inputs, asked, desired, unallocated, standstill, .. } = *self;
+        let Cascade { errors, distances, inputs, asked, desired, followed, unallocated, standstill, .. } = *self;
         let Cascade { turning, observed, turned, more_effort, detours, smoothed, .. } = *self;
         Cascade {
             estimates,
@@ -199,6 +117,7 @@ impl<E> Cascade<E> {
             inputs,
             asked,
             desired,
+            followed,
             unallocated,
             standstill,
             rotor_residual_rad_s,
@@ -277,6 +196,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
                 .flatten(),
             reference: Reference::new(&settings.reference, &settings.limits, settings.common.dt_s),
             smoother: Smoother::new(&settings.smoothing, settings.common.dt_s)?,
+            forward: Forward::new(settings.forward_rad_s, settings.common.dt_s)?,
             filter: CommandFilter::new(settings.command_filter_rad_s, settings.common.dt_s)?
                 .limited(settings.limits.tilt_rate_max_rad_s)?,
             settings,
@@ -440,15 +360,20 @@ impl<L: Law, const N: usize> Controller<L, N> {
             heading
         };
         let tilt = Tilt::new(a5, a6, heading_d, inverse_vertical);
+        let at_rest = |angle| Filtered { angle, rate: 0.0 };
         let (mut commanded, mut forward_rad_s2) = (tilt.rad, [0.0; 2]);
         if self.settings.feed_forward {
             // Drag turns the thrust as it changes with the velocity.
             let thrust = math::min(u4, self.thrust_max_n) / hover_n;
-            let j = reference.jerk_m_s3 - drag.change(v, &up, thrust, a);
-            let s = reference.snap_m_s4 - drag.change(v, &up, thrust, &reference.jerk_m_s3);
+            let jerk = &reference.jerk_m_s3;
+            let [by_drag, by_drag_dot] = [drag.change(v, &up, thrust, a), drag.change(v, &up, thrust, jerk)];
             let turn = [reference.yaw_rate_rad_s, reference.yaw_acceleration_rad_s2];
-            let [rates, accelerations] = tilt.turned(&j, &s, turn);
-            forward_rad_s2 = accelerations;
+            // Corners of the setpoint are turned gradually; the reference model has none.
+            let [followed, snap] = self.forward.advance(&mut memory.followed, setpoint);
+            let gradual = followed + (jerk - setpoint.jerk_m_s3);
+            let snap = snap - by_drag_dot;
+            let [rates, _] = tilt.turned(&(jerk - by_drag), &snap, turn);
+            [_, forward_rad_s2] = tilt.turned(&(gradual - by_drag), &snap, turn);
             // Ahead of the filter by its lag: its output is then the angle that was meant.
             let lag_s = self.command_lag_s;
             for ((angle, rate), acceleration) in commanded.iter_mut().zip(rates).zip(forward_rad_s2) {
@@ -458,7 +383,6 @@ impl<L: Law, const N: usize> Controller<L, N> {
             commanded = within(commanded, self.settings.limits.tilt_max_rad);
         }
         let [phi_d, theta_d] = commanded;
-        let at_rest = |angle| Filtered { angle, rate: 0.0 };
         let start = if self.settings.bumpless { [eta.x, eta.y] } else { tilt.rad };
         let filtered = match &memory.desired {
             None => start.map(at_rest),

@@ -40,6 +40,7 @@ pub mod adaptive;
 pub mod backstepping;
 pub mod cascade;
 pub mod disturbance;
+pub mod forward;
 pub mod fuzzy;
 pub mod guarded;
 pub mod integral;
@@ -52,6 +53,7 @@ mod profile;
 pub mod reference;
 pub mod rotation;
 pub mod safeguards;
+mod settings;
 pub mod standstill;
 pub mod tilt;
 

@@ -59,11 +59,12 @@ fn settings() -> impl Strategy<Value = Settings> {
         acceleration_max_m_s2,
         ..Limits::NONE
     });
-    (limits, any::<[bool; 4]>(), 10.0_f32..100.0, prop_oneof![Just(3.0_f32), Just(1.5)]).prop_map(
-        |(limits, [tilt_by_thrust, anti_windup, bumpless, feed_forward], command_filter_rad_s, force_n)| {
+    (limits, any::<[bool; 4]>(), [10.0_f32..100.0, 5.0_f32..50.0], prop_oneof![Just(3.0_f32), Just(1.5)]).prop_map(
+        |(limits, switches, [command_filter_rad_s, forward_rad_s], force_n)| {
+            let [tilt_by_thrust, anti_windup, bumpless, feed_forward] = switches;
             let settings =
                 Settings { limits, tilt_by_thrust, anti_windup, bumpless, feed_forward, ..Settings::DEFAULT };
-            Settings { command_filter_rad_s, ..settings.with_rotor_force_max_n(force_n) }
+            Settings { command_filter_rad_s, forward_rad_s, ..settings.with_rotor_force_max_n(force_n) }
         },
     )
 }
@@ -75,8 +76,8 @@ fn leaning(ahead: [f64; 2], vertical: f64, yaw_rad: f64) -> [f64; 2] {
 }
 
 /// A filter step of the equation d^2 x/dt^2 = w^2 (command - x) - 2 w dx/dt in `f64`, in hundred small steps.
-fn filtered(from: &Filtered, command: f64, w: f64) -> [f64; 2] {
-    let (mut x, mut v, h) = (f64::from(from.angle), f64::from(from.rate), 1e-5);
+fn filtered([mut x, mut v]: [f64; 2], command: f64, w: f64) -> [f64; 2] {
+    let h = 1e-5;
     for _ in 0..100 {
         let a = w * w * (command - x) - 2.0 * w * v;
         let jerk = -w * w * v - 2.0 * w * a;
@@ -99,6 +100,8 @@ struct Carried {
     /// Angles that the filter is told.
     commanded: [f64; 2],
     filtered: Option<[Filtered; 2]>,
+    /// What is taken up of jumps of the jerk, along x and y, with its rate; and the jerk expected next.
+    followed: Option<([[f64; 2]; 2], [f64; 2])>,
     unallocated: PerAxis<f32>,
     rotor_residual_rad_s: f32,
 }
@@ -187,17 +190,29 @@ fn compose<L: Law + Copy>(
         // Ahead of the filter by its lag, with the derivatives that follow from jerk and snap.
         let w = f64::from(settings.command_filter_rad_s);
         // (40) differentiated with the thrust held, along a path through jerk and snap, while yaw turns.
-        let along = |t: f64| {
-            let by = |i: usize| f64::from(setpoint.jerk_m_s3[i]) * t + f64::from(setpoint.snap_m_s4[i]) * (0.5 * t * t);
+        let along = |t: f64, [jerk, snap]: [[f64; 2]; 2]| {
+            let by = |i: usize| jerk[i] * t + snap[i] * (0.5 * t * t);
             let turn =
                 f64::from(setpoint.yaw_rate_rad_s) * t + f64::from(setpoint.yaw_acceleration_rad_s2) * (0.5 * t * t);
             leaning([ahead[0] + by(0), ahead[1] + by(1)], vertical, eta.z + turn)
         };
-        let (before, now, after) = (along(-STEP_S), along(0.0), along(STEP_S));
+        let of = |v: &Vector3<f32>| [0, 1].map(|i| f64::from(v[i]));
+        let (j, s) = (of(&setpoint.jerk_m_s3), of(&setpoint.snap_m_s4));
+        // A jump of the jerk is taken up, and decays by the filter's equation.
+        let w_f = f64::from(settings.forward_rad_s);
+        let (then, expected) = carried.followed.unwrap_or(([[0.0; 2]; 2], j));
+        let late = [0, 1].map(|i| [then[i][0], then[i][1] + j[i] - expected[i]]);
+        let next = late.map(|late| filtered(late, 0.0, w_f));
+        carried.followed = Some((next, [0, 1].map(|i| j[i] + 1e-3 * s[i])));
+        let gradual = [[0, 1].map(|i| j[i] - late[i][1]), [0, 1].map(|i| s[i] + (late[i][1] - next[i][1]) / 1e-3)];
         let forward = match settings.feed_forward {
-            true => [0, 1].map(|i| (after[i] - 2.0 * now[i] + before[i]) / (STEP_S * STEP_S)),
+            true => {
+                let (before, now, after) = (along(-STEP_S, gradual), along(0.0, gradual), along(STEP_S, gradual));
+                [0, 1].map(|i| (after[i] - 2.0 * now[i] + before[i]) / (STEP_S * STEP_S))
+            }
             false => [0.0; 2],
         };
+        let (before, after) = (along(-STEP_S, [j, s]), along(STEP_S, [j, s]));
         let mut commanded = angles;
         if settings.feed_forward {
             let rates = [0, 1].map(|i| (after[i] - before[i]) / (2.0 * STEP_S));
@@ -208,8 +223,10 @@ fn compose<L: Law + Copy>(
         for i in 0..2 {
             let (angle, rate) = (f64::from(trace.filtered[i].angle), f64::from(trace.filtered[i].rate));
             let start = if settings.bumpless { eta[i] } else { angles[i] };
-            let [wanted, wanted_rate] =
-                carried.filtered.map_or([start, 0.0], |then| filtered(&then[i], carried.commanded[i], w));
+            let [wanted, wanted_rate] = carried.filtered.map_or([start, 0.0], |then| {
+                let Filtered { angle, rate } = then[i];
+                filtered([angle.into(), rate.into()], carried.commanded[i], w)
+            });
             // With feed-forward the commanded angle is known up to the rotation of jerk and snap.
             let slack = 3e-6 + if settings.feed_forward { ROTATION * w * 1e-3 } else { 0.0 };
             prop_assert!((angle - wanted).abs() <= slack, "{angle} for {wanted}");

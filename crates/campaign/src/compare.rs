@@ -39,6 +39,17 @@ pub fn fly_under(scenario: &mut Scenario, contenders: &[Contender]) -> Result<()
     scenario.check().map_err(|error| FileError::whole(&scenario.name, error.to_string()))
 }
 
+/// Adds these contenders to those of `scenario`, their gains scaled by rule to the scenario's vehicle, and checks them.
+///
+/// # Errors
+/// The first gain or setting out of range.
+pub(crate) fn fly_by_rule(scenario: &mut Scenario, own: &[Contender]) -> Result<(), FileError> {
+    let vehicle = scenario.vehicle_file.as_ref();
+    let scaled = own.iter().map(|own| vehicle.map_or_else(|| own.clone(), |vehicle| own.clone().by_rule(vehicle)));
+    scenario.contenders.extend(scaled);
+    scenario.check().map_err(|error| FileError::whole(&scenario.name, error.to_string()))
+}
+
 /// Allows every contender of `scenario` this tilt, if it is limited more \[rad\].
 pub(crate) fn free_to_tilt(scenario: &mut Scenario, tilt_max_rad: f64) {
     let contenders = std::mem::take(&mut scenario.contenders).into_iter();

@@ -70,7 +70,8 @@ fn every_flight_is_valid_on_every_vehicle() {
     for seen in [Seen::Truth, Seen::Mocap, Seen::Outdoor] {
         for vehicle in fleet().into_iter().chain(own()) {
             let name = vehicle.name.clone();
-            for flight in random(seen, vec![vehicle]).under(&contenders).unwrap_or_else(|error| panic!("{error}")) {
+            for flight in random(seen, vec![vehicle]).under(&contenders, &[]).unwrap_or_else(|error| panic!("{error}"))
+            {
                 let Flight { scenario, speed_m_s, .. } = &flight;
                 assert_eq!(scenario.check(), Ok(()), "{}: {}", scenario.name, scenario.description);
                 assert_eq!(scenario.contenders.len(), contenders.len());
@@ -226,7 +227,7 @@ fn flights_on_the_estimate_begin_on_the_ground_where_they_can() {
 fn flights_are_flown_and_judged() {
     let afbc = standard_and_monitored().remove(0);
     let random = Random { flights: 6, seeds: 1..2, ..random(Seen::Truth, vec![fleet().remove(0)]) };
-    let flown = random::fly(random.under(&[afbc]).unwrap(), &|| ()).unwrap();
+    let flown = random::fly(random.under(&[afbc], &[]).unwrap(), &|| ()).unwrap();
     assert_eq!(flown.len(), 6);
     for flown in &flown {
         let [outcome] = flown.outcomes.as_slice() else { panic!("one contender") };

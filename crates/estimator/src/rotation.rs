@@ -27,15 +27,14 @@ pub(crate) fn small(turn_rad: &Vector3<f32>) -> Quaternion<f32> {
 #[inline(never)]
 fn large(turn_rad: &Vector3<f32>, square: f32) -> Quaternion<f32> {
     let half = sqrt(square);
-    // Wrapped, since sines of large numbers are costly.
-    let (sine, cosine) = libm::sincosf(afbc_control::math::wrap_angle(half));
+    let (sine, cosine) = afbc_types::sin_cos(afbc_control::math::wrap_angle(half));
     let scale = 0.5 * sine / half;
     Quaternion::new(cosine, scale * turn_rad.x, scale * turn_rad.y, scale * turn_rad.z)
 }
 
 /// Rotation by an angle about the earth's z, of the right norm to `f32` precision.
 pub(crate) fn about_z(angle_rad: f32) -> Quaternion<f32> {
-    let (sine, cosine) = libm::sincosf(0.5 * angle_rad);
+    let (sine, cosine) = afbc_types::sin_cos(0.5 * angle_rad);
     Quaternion::new(cosine, 0.0, 0.0, sine)
 }
 

@@ -25,11 +25,10 @@
 //! * **Drag**: the source's model of the rotors' drag is [`KnownDrag`], as far as the vehicle's file tells it.
 //! * **What it is told of the rotors**: the time constant [`Gains::rotor_time_constant_s`], like INDI.
 
-use crate::attitude::{facing, r_earth_body, tilt_and_yaw_error, unit};
+use crate::attitude::{r_earth_body, unit};
 use crate::body::{Body, Demand};
-use crate::differentiator::Differentiator;
-use crate::flatness::flat;
-use crate::increment::{Increment, Reaction};
+use crate::flat_attitude::{Attitude, FlatAttitude, Inner, dragged};
+use crate::increment::Reaction;
 use crate::limits::Limits;
 use crate::loops::{TrackingLoop, xy_and_z};
 use crate::rotor_model::{RotorModel, Spin};
@@ -136,10 +135,8 @@ pub struct Dfbc<const N: usize = 4> {
     dt_s: f32,
     drag: KnownDrag,
     position: TrackingLoop,
-    increment: Increment,
     rotors: RotorModel<N>,
-    k_r: Vector3<f32>,
-    k_omega: Vector3<f32>,
+    attitude: FlatAttitude,
 }
 
 /// State of the controller between steps.
@@ -164,6 +161,11 @@ impl<const N: usize> Dfbc<N> {
         let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
         let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
         gains.validate()?;
+        let inner = Inner {
+            tilt: [gains.tilt_p_1_s2, gains.tilt_d_1_s],
+            yaw: [gains.yaw_p_1_s2, gains.yaw_d_1_s],
+            filter_rad_s: gains.attitude_filter_rad_s,
+        };
         Ok(Dfbc {
             body,
             dt_s: settings.dt_s,
@@ -176,10 +178,8 @@ impl<const N: usize> Dfbc<N> {
                 limits: Limits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
                 dt_s: settings.dt_s,
             },
-            increment: Increment(Differentiator::new(gains.attitude_filter_rad_s, settings.dt_s)?),
             rotors: RotorModel::new(&body, vehicle.weight_n(), gains.rotor_time_constant_s, settings.dt_s),
-            k_r: xy_and_z(gains.tilt_p_1_s2, gains.yaw_p_1_s2),
-            k_omega: xy_and_z(gains.tilt_d_1_s, gains.yaw_d_1_s),
+            attitude: FlatAttitude::new(&inner, settings.dt_s)?,
         })
     }
 }
@@ -202,46 +202,34 @@ impl<const N: usize> FlightController<N> for Dfbc<N> {
     #[inline]
     fn decide(&self, memory: &mut Memory<N>, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
         let r = r_earth_body(&state.attitude_rad);
-        let omega = state.rates_rad_s;
         if fresh {
             let now = self.rotors.inputs(&self.body, &memory.rotors);
-            self.increment.measure(&mut memory.reaction, &self.body.angular_acceleration(&now), &omega);
+            self.attitude.measure(&mut memory.reaction, &self.body.angular_acceleration(&now), &state.rates_rad_s);
         }
 
         // Position. Drag asks for thrust, and turns it as the velocity changes.
         let up = unit(&r.column(2).into());
-        let (v, a, j) = (&setpoint.velocity_m_s, &setpoint.acceleration_m_s2, &setpoint.jerk_m_s3);
         // Level flight at this tilt takes this thrust over that of hover.
         let share = 1.0 / up.z.max(SHARE_MIN);
         let setpoint = &Setpoint {
-            acceleration_m_s2: a - self.drag.acceleration(&state.velocity_m_s, &up, share),
-            jerk_m_s3: j - self.drag.change(v, &up, share, a),
-            snap_m_s4: setpoint.snap_m_s4 - self.drag.change(v, &up, share, j),
-            ..*setpoint
+            acceleration_m_s2: setpoint.acceleration_m_s2 - self.drag.acceleration(&state.velocity_m_s, &up, share),
+            ..dragged(&self.drag, setpoint, &up, share)
         };
         let position = self.position.output(state, setpoint, &memory.position_integral);
         let specific_force = position.specific_force_m_s2;
-        let desired = facing(&specific_force, setpoint.yaw_rad);
 
         // Attitude.
         let limits = &self.position.limits;
         let flying = limits.apply(&(setpoint.acceleration_m_s2 + limits.gravity()));
-        let reference = flat([flying, setpoint.jerk_m_s3, setpoint.snap_m_s4], setpoint);
-        let to_body = r.transpose() * reference.r_earth_desired;
-        let omega_r = to_body * reference.rates_rad_s;
-        let attitude_error = tilt_and_yaw_error(&r, &desired);
-        let rate_error = omega_r - omega;
-        let nu = self.k_r.component_mul(&attitude_error)
-            + self.k_omega.component_mul(&rate_error)
-            + to_body * reference.rates_dot_rad_s2
-            - omega.cross(&omega_r);
+        let Attitude { desired, rates_rad_s, angular_acceleration_rad_s2, attitude_error, rate_error } =
+            self.attitude.output(&memory.reaction, &r, state, [&specific_force, &flying], setpoint);
 
         let demand = Demand {
             thrust_n: self.body.mass_kg * specific_force.dot(&up).max(0.0),
-            angular_acceleration_rad_s2: self.increment.invert(&memory.reaction, &nu),
+            angular_acceleration_rad_s2,
             acceleration_m_s2: position.acceleration_m_s2,
             desired,
-            desired_rates_rad_s: reference.rates_rad_s,
+            desired_rates_rad_s: rates_rad_s,
             errors: [position.position_error_m, position.velocity_error_m_s, attitude_error, rate_error],
         };
         let (action, trace, _) = self.body.act(&demand, &mut memory.smoothed);

@@ -8,6 +8,7 @@
 //! | [`indi`] | incremental dynamic inversion of attitude and position | Smeur et al. 2016, 2018; Tal, Karaman 2021 |
 //! | [`l1`] | geometric, with L1-adaptive compensation of thrust and moments | Wu et al. 2022, 2025 |
 //! | [`dfbc`] | differential flatness, incremental inversion of the moments | Sun et al. 2022 |
+//! | [`mpc`] | linear model-predictive control, by ADMM | Kamel et al. 2017; TinyMPC, 2024 |
 //!
 //! The head of each file gives the equations, the sources and the decisions made where a source leaves something open.
 //! Frames and units are defined in [`afbc_types`].
@@ -51,6 +52,7 @@ pub mod attitude;
 mod body;
 pub mod dfbc;
 pub mod differentiator;
+mod flat_attitude;
 pub mod flatness;
 pub mod geometric;
 mod hover_thrust;
@@ -60,6 +62,7 @@ mod integral;
 pub mod l1;
 pub mod limits;
 mod loops;
+pub mod mpc;
 pub mod pid;
 mod rotor_model;
 mod slowed;
@@ -68,5 +71,6 @@ pub use dfbc::Dfbc;
 pub use geometric::Geometric;
 pub use indi::Indi;
 pub use l1::L1;
+pub use mpc::Mpc;
 pub use pid::Pid;
 pub use slowed::slowed;

@@ -9,7 +9,7 @@ use afbc_peers::flatness::flat;
 use afbc_peers::limits::Limits;
 use afbc_peers::{dfbc, indi};
 use afbc_types::{Setpoint, State};
-use harness::steps::{WEIGHT_N, after, dfbc, euler, goodarzi, indi, l1, lee, pid, vector};
+use harness::steps::{WEIGHT_N, after, dfbc, euler, goodarzi, indi, l1, lee, mpc, pid, vector};
 use harness::{Random, vehicle};
 use nalgebra::{Rotation3, Vector3};
 
@@ -22,6 +22,7 @@ fn of_each(state: &State, setpoint: &Setpoint, check: impl Fn(&str, (Action, Tra
         check("indi", after(&indi(), steps, state, setpoint));
         check("l1", after(&l1(), steps, state, setpoint));
         check("dfbc", after(&dfbc(), steps, state, setpoint));
+        check("mpc", after(&mpc(), steps, state, setpoint));
     }
 }
 
@@ -66,8 +67,10 @@ fn every_error_is_answered_in_the_right_direction() {
         assert!(c.desired_rad[0] < 0.0 && c.desired_rad[1] == 0.0 && c.inputs.roll_n <= 0.0, "{name}: {c:?}");
     });
     of_each(&moved(|s| s.velocity_m_s.x = 0.1), &hold, |name, (_, c)| assert!(c.desired_rad[1] < 0.0, "{name}: {c:?}"));
-    // A positive angle or rate is reduced; but to INDI, a tilt without acceleration is leaning into a wind.
-    let tilted = |name: &str, u: f32| assert!(if name == "indi" { u.abs() < 1e-3 } else { u < -1e-2 }, "{name}: {u}");
+    // A positive angle or rate is reduced; but to INDI and MPC, a tilt without acceleration is leaning into a wind.
+    let tilted = |name: &str, u: f32| {
+        assert!(if ["indi", "mpc"].contains(&name) { u.abs() < 1e-3 } else { u < -1e-2 }, "{name}: {u}")
+    };
     of_each(&moved(|s| s.attitude_rad.x = 0.1), &hold, |name, (_, c)| tilted(name, c.inputs.roll_n));
     of_each(&moved(|s| s.attitude_rad.y = 0.1), &hold, |name, (_, c)| tilted(name, c.inputs.pitch_n));
     of_each(&moved(|s| s.attitude_rad.z = 0.1), &hold, |name, (_, c)| assert!(c.inputs.yaw_n < -1e-3, "{name}"));
@@ -136,6 +139,7 @@ fn turning_the_scene_about_the_vertical_changes_nothing_for_the_body() {
                 after(&dfbc(), steps, &turned_state, &turned_setpoint),
                 "dfbc",
             );
+            same(after(&mpc(), steps, &state, &setpoint), after(&mpc(), steps, &turned_state, &turned_setpoint), "mpc");
         }
     }
 }

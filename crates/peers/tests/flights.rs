@@ -6,7 +6,7 @@
 mod harness;
 
 use afbc_control::FlightController;
-use afbc_peers::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
+use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
 use afbc_plant::{Environment, Gust, GustKind, Motion, ParameterChange, Quantity};
 use afbc_types::{Axis, Parameters, Setpoint};
 use core::f64::consts::FRAC_PI_2;
@@ -39,6 +39,10 @@ fn dfbc() -> Dfbc {
     Dfbc::new(vehicle(), SETTINGS, dfbc::Gains::PAPER_VEHICLE).unwrap()
 }
 
+fn mpc() -> Mpc {
+    Mpc::new(vehicle(), SETTINGS, mpc::Gains::PAPER_VEHICLE).unwrap()
+}
+
 /// Asserts root mean square errors of x, y, z \[m\] and psi \[rad\] within `bounds`.
 #[track_caller]
 fn within(name: &str, figures: &Figures, bounds: [f64; 4]) {
@@ -67,6 +71,7 @@ fn all_hover() {
     hovers("indi", &indi());
     hovers("l1", &l1());
     hovers("dfbc", &dfbc());
+    hovers("mpc", &mpc());
 }
 
 /// Arrives, and is at rest after 6 s, for a small step and for one that reaches every limit.
@@ -86,6 +91,7 @@ fn all_follow_a_step() {
     steps("indi", &indi());
     steps("l1", &l1());
     steps("dfbc", &dfbc());
+    steps("mpc", &mpc());
 }
 
 /// 2 m of radius in 6 s, the nose along the velocity: 2.1 m/s, 2.2 m/s2.
@@ -101,6 +107,7 @@ fn all_fly_a_circle() {
     within("indi", &figures(&indi(), start), [0.001, 0.001, 0.001, 0.001]);
     within("l1", &figures(&l1(), start), [0.0075, 0.0075, 0.001, 0.004]);
     within("dfbc", &figures(&dfbc(), start), [0.001, 0.001, 0.001, 0.001]);
+    within("mpc", &figures(&mpc(), start), [0.001, 0.001, 0.001, 0.001]);
 }
 
 /// The paper's flight with its gusts and uncertainties of all four sign combinations, with lag, delay and noise, from
@@ -121,6 +128,7 @@ fn all_fly_the_papers_flight() {
         within("indi", &figures(&indi(), environment()), [0.005, 0.008, 0.007, 0.002]);
         within("l1", &figures(&l1(), environment()), [0.0126, 0.0126, 0.0085, 0.0026]);
         within("dfbc", &figures(&dfbc(), environment()), [0.018, 0.025, 0.042, 0.0012]);
+        within("mpc", &figures(&mpc(), environment()), [0.02, 0.025, 0.03, 0.003]);
     }
 }
 
@@ -134,6 +142,7 @@ fn integrals_remove_the_steady_state_error() {
     assert!(left(&indi()) < 0.002);
     assert!(left(&l1()) < 0.001);
     assert!(left(&dfbc()) < 0.001);
+    assert!(left(&mpc()) < 0.002);
     assert!(left(&lee()) > 0.05);
     assert!(left(&Dfbc::new(vehicle(), SETTINGS, dfbc::Gains::SUN_2022).unwrap()) > 0.05);
 }
@@ -154,6 +163,7 @@ fn all_catch_a_vehicle_that_was_thrown() {
     within("indi", &figures(&indi()), [3e-4; 4]);
     within("l1", &figures(&l1()), [3e-4; 4]);
     within("dfbc", &figures(&dfbc()), [3e-4; 4]);
+    within("mpc", &figures(&mpc()), [3e-4; 4]);
 }
 
 /// With rotors of any strength, upright or leaning against a push, PID's estimate of the hover thrust takes over what
@@ -311,6 +321,7 @@ fn strangers_come_to_rest_where_they_should() {
         lands("goodarzi", &goodarzi(), &stranger);
         lands("indi", &indi(), &stranger);
         lands("dfbc", &dfbc(), &stranger);
+        lands("mpc", &mpc(), &stranger);
 
         // What L1 estimates is what its model lacks: at rest, the force that the modelled thrust is short of.
         let estimate = lands("l1", &l1(), &stranger);

@@ -3,7 +3,7 @@
 
 mod harness;
 
-use afbc_peers::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
+use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
 use afbc_types::{Declaration, Declared, OutOfRange, Range, Value};
 use core::convert::Infallible;
 use harness::{SETTINGS, vehicle};
@@ -27,6 +27,7 @@ fn gains_of_one_key_are_declared_alike() {
     let Ok(()) = indi::Gains::DEFAULT.visit(&mut visit);
     let Ok(()) = l1::Gains::DEFAULT.visit(&mut visit);
     let Ok(()) = dfbc::Gains::DEFAULT.visit(&mut visit);
+    let Ok(()) = mpc::Gains::DEFAULT.visit(&mut visit);
     assert!(shared > 35, "{shared}");
 }
 
@@ -55,6 +56,7 @@ fn gains_out_of_range_are_refused_by_name() {
     refused(indi::Gains::PAPER_VEHICLE, 18, |gains| Indi::new(vehicle(), SETTINGS, gains).map(drop));
     refused(l1::Gains::BY_HAND, 23, |gains| L1::new(vehicle(), SETTINGS, gains).map(drop));
     refused(dfbc::Gains::PAPER_VEHICLE, 18, |gains| Dfbc::new(vehicle(), SETTINGS, gains).map(drop));
+    refused(mpc::Gains::PAPER_VEHICLE, 19, |gains| Mpc::new(vehicle(), SETTINGS, gains).map(drop));
     let gains = pid::Gains { tilt_max_rad: 1.5, ..pid::Gains::PAPER_VEHICLE };
     assert_eq!(gains.validate().unwrap_err().range.name, "tilt_max_rad");
     let gains = indi::Gains { rotor_time_constant_s: -0.1, ..indi::Gains::PAPER_VEHICLE };

@@ -4,7 +4,7 @@
 mod harness;
 
 use afbc_control::{FlightController, Screened, Settings};
-use afbc_peers::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
+use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
 use afbc_types::{Declared, Range, Setpoint, State, Value};
 use core::convert::Infallible;
 use harness::{SETTINGS, vehicle};
@@ -110,6 +110,11 @@ proptest! {
         harmless(&Dfbc::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
         anywhere(&mut gains, &shares);
         harmless(&Dfbc::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
+
+        let mut gains = mpc::Gains::PAPER_VEHICLE;
+        harmless(&Mpc::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
+        anywhere(&mut gains, &shares);
+        harmless(&Mpc::new(vehicle(), settings, gains).unwrap(), &settings, &inputs);
     }
 }
 
@@ -126,4 +131,5 @@ fn the_same_input_gives_the_same_bits() {
     twice(&Indi::new(vehicle(), SETTINGS, indi::Gains::PAPER_VEHICLE).unwrap());
     twice(&L1::new(vehicle(), SETTINGS, l1::Gains::BY_HAND).unwrap());
     twice(&Dfbc::new(vehicle(), SETTINGS, dfbc::Gains::PAPER_VEHICLE).unwrap());
+    twice(&Mpc::new(vehicle(), SETTINGS, mpc::Gains::PAPER_VEHICLE).unwrap());
 }

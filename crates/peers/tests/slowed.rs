@@ -1,7 +1,7 @@
 //! Gains for slower rotors: every gain by its power of time, told from its key rather than from its unit.
 #![allow(missing_docs)]
 
-use afbc_peers::{dfbc, geometric, indi, l1, pid, slowed};
+use afbc_peers::{dfbc, geometric, indi, l1, mpc, pid, slowed};
 use afbc_types::Declared;
 use core::convert::Infallible;
 
@@ -22,9 +22,11 @@ fn power(key: &str) -> i32 {
         -3
     } else if key.ends_with("_1_s2") {
         -2
+    } else if key.ends_with("_1_s4") {
+        -4
     } else if key.ends_with("_1_s") || key.ends_with("_rad_s") {
         -1
-    } else if key == "lead_s" {
+    } else if ["lead_s", "tilt_lag_s", "lift_lag_s", "plan_step_s"].contains(&key) {
         1
     } else {
         0
@@ -53,4 +55,5 @@ fn every_gain_slows_down_by_its_power_of_time() {
     check(&indi::Gains::TUNED);
     check(&l1::Gains::TUNED);
     check(&dfbc::Gains::TUNED);
+    check(&mpc::Gains::TUNED);
 }

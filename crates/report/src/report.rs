@@ -256,6 +256,7 @@ fn gains(contender: &Contender) -> Markup {
     let Settings {
         common: afbc_control::Settings { dt_s, rotor_force_max_n, raised_thrust_max, drag: _ },
         command_filter_rad_s,
+        forward_rad_s,
         limits,
         tilt_by_thrust,
         freeze_on_ground,
@@ -283,6 +284,9 @@ fn gains(contender: &Contender) -> Markup {
             (contender.monitored, "monitored"),
         ];
         settings.extend(also.into_iter().filter(|(on, _)| *on).map(|(_, word)| format!(", {word}")));
+        if feed_forward {
+            settings += &format!(", corners fed forward at {forward_rad_s} rad/s");
+        }
         if limits != Limits::NONE {
             settings += &format!(
                 ", limits: tilt {} rad at {} rad/s, {} m/s², {} m/s, climb {} m/s",

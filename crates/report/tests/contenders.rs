@@ -35,7 +35,8 @@ fn points(node: Node<'_, '_>) -> Vec<(f64, f64)> {
 
 #[test]
 fn a_contender_has_one_color_in_every_report() {
-    let known = ["afbc", "backstepping", "pid", "geometric", "indi", "l1", "dfbc", "afbc-as-printed", "afbc-monitored"];
+    let known =
+        ["afbc", "backstepping", "pid", "geometric", "indi", "l1", "dfbc", "mpc", "afbc-as-printed", "afbc-monitored"];
     let names: Vec<&str> = known.into_iter().chain(OWN).collect();
     let backwards: Vec<&str> = names.iter().rev().copied().collect();
     let mut colors: HashMap<String, BTreeSet<String>> = HashMap::new();
@@ -87,7 +88,7 @@ fn a_contender_has_one_color_in_every_report() {
         assert_eq!(colors.len(), 1, "{name}: {colors:?}");
     }
     let known: BTreeSet<_> = known.iter().map(|name| &colors[*name]).collect();
-    assert_eq!(known.len(), 9, "{known:?}");
+    assert_eq!(known.len(), 10, "{known:?}");
 }
 
 /// Returns the position of 100 % in each panel of a figure of shares, top to bottom.

@@ -62,7 +62,12 @@ pub(crate) fn lemniscate(
 
 /// Returns a circle of this radius, on the paper's vehicle, at `share` of the largest horizontal acceleration, from a
 /// banked start.
-fn circle(maker: &Maker<'_>, name: &'static str, radius_m: f64, share: f64) -> Result<Scenario, Box<dyn Error>> {
+pub(crate) fn circle(
+    maker: &Maker<'_>,
+    name: &'static str,
+    radius_m: f64,
+    share: f64,
+) -> Result<Scenario, Box<dyn Error>> {
     let Scale { length, time, .. } = maker.scale;
     let radius_m = radius_m * length;
     let rate = sqrt(share * maker.scale.horizontal_m_s2() / radius_m).min(RATE_RAD_S / time);

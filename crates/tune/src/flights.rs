@@ -1,8 +1,9 @@
 //! Flights in which gains are evaluated, made from a vehicle's own data.
 //!
 //! Every flight is based on the built-in scenario `hardware`: rotors with a lag of 20 ms, a delay of 1 ms and at most 3
-//! N each, and a noisy state. The first is that scenario itself; each of the others adds one disturbance. Two are flown
-//! on an estimate, with the sensors of the built-in scenarios `mocap` and `outdoor`; the last two are fast.
+//! N each, and a noisy state. The first is that scenario itself; each of the others adds one disturbance. Three are
+//! flown on an estimate, with the sensors of the built-in scenarios `mocap` and `outdoor`; three are fast, and one
+//! turns corners.
 //!
 //! On another vehicle rotors, battery, drag and ground are its own, and what happens is scaled by [`Scale`]: times by
 //! how slow it is, lengths and accelerations by what its rotors leave, wind by its drag, losses of thrust and loads so
@@ -111,6 +112,8 @@ impl Maker<'_> {
             self.sensed("outdoor", eight("", None), |_| {})?,
             lemniscate,
             circle,
+            self.legs("legs", 2.5)?,
+            tracked(fast::circle(self, "circle-mocap", 2.0, 0.3)?)?,
         ])
     }
 
@@ -159,6 +162,8 @@ impl Maker<'_> {
             })?,
             lemniscate,
             circle,
+            self.legs("legs-back", -1.8)?,
+            tracked(fast::circle(self, "circle-mocap-wide", 3.0, 0.25)?)?,
         ];
         // The rotors of `hardware` have no battery.
         let battery = self.vehicle.and_then(|vehicle| vehicle.realism.rotors.battery);
@@ -215,6 +220,20 @@ impl Maker<'_> {
         scenario.realism.wind.steady_m_s = Vector3::new(4.0, -2.0, 0.0) * wind;
         scenario.realism.wind.turbulence = Some(self.turbulence(Turbulence::LIGHT));
         Ok(scenario)
+    }
+
+    /// Returns a tour of five corners in still air, from each straight to the next in two seconds.
+    fn legs(&self, name: &'static str, leg_m: f64) -> Result<Scenario, Box<dyn Error>> {
+        let Scale { length, time, .. } = self.scale;
+        let corners = [(0.0, 0.0, 0.0), (1.0, 0.2, 0.2), (0.3, -0.8, 0.0), (-0.5, 0.3, -0.2), (0.4, 0.6, 0.1)];
+        let corner = |(k, (x, y, z)): (u32, (f64, f64, f64))| Waypoint {
+            time_s: 4.0 + 2.0 * time * f64::from(k),
+            position_m: Vector3::new(x, y, z) * (leg_m * length) + Vector3::new(0.0, 0.0, 3.0),
+            yaw_rad: 0.3 * f64::from(k),
+        };
+        let waypoints = (0..).zip(corners.into_iter().chain([(0.0, 0.0, 0.0)])).map(corner).collect();
+        let trajectory = Trajectory::Waypoints(waypoints);
+        self.scenario(TrainingFlight { trajectory, ..TrainingFlight::new(name, 4.0 + 12.0 * time) })
     }
 
     /// Returns a flight in light wind that lands within `length_s`, stays on the ground for 3 s with the reference
@@ -292,22 +311,15 @@ impl Maker<'_> {
         Ok(scenario)
     }
 
-    /// Returns `flight` in moderate turbulence on an estimate, with the instruments of the built-in scenario `name`
-    /// changed by `change`. The slow error of a receiver, which no law can know, is left out: it would hide what a law
-    /// does.
+    /// Returns `flight` in moderate turbulence on an estimate, with the [`instruments`] of the scenario `name`.
     fn sensed(
         &self,
         name: &'static str,
         flight: TrainingFlight,
         change: impl FnOnce(&mut Suite),
     ) -> Result<Scenario, Box<dyn Error>> {
-        let mut scenario = self.windy(TrainingFlight { name, ..flight })?;
-        scenario.sensing = Sensing::default();
-        scenario.instruments = read(name)?.instruments;
-        change(&mut scenario.instruments);
-        let steady = |gnss| Gnss { horizontal_m: 0.0, vertical_m: 0.0, ..gnss };
-        scenario.instruments.gnss = scenario.instruments.gnss.map(steady);
-        Ok(scenario)
+        let scenario = self.windy(TrainingFlight { name, ..flight })?;
+        Ok(Scenario { instruments: instruments(name, change)?, sensing: Sensing::default(), ..scenario })
     }
 
     fn step(&self, by_m: Vector3<f64>, turn_rad: f64) -> Trajectory {
@@ -323,6 +335,21 @@ impl Maker<'_> {
         let sines = [sine(1.5, period_s), sine(0.75, 0.5 * period_s), sine(0.3, period_s)];
         Trajectory::Lissajous { centre_m: Vector3::new(0.0, 0.0, 3.0), sines, yaw_rad: 0.0 }
     }
+}
+
+/// Returns the instruments of the built-in scenario `name`, changed by `change`. The slow error of a receiver, which no
+/// law can know, is left out: it would hide what a law does.
+fn instruments(name: &str, change: impl FnOnce(&mut Suite)) -> Result<Suite, Box<dyn Error>> {
+    let mut suite = read(name)?.instruments;
+    change(&mut suite);
+    let steady = |gnss| Gnss { horizontal_m: 0.0, vertical_m: 0.0, ..gnss };
+    suite.gnss = suite.gnss.map(steady);
+    Ok(suite)
+}
+
+/// Returns `scenario` on an estimate, with the instruments of the scenario `mocap`.
+fn tracked(scenario: Scenario) -> Result<Scenario, Box<dyn Error>> {
+    Ok(Scenario { instruments: instruments("mocap", |_| {})?, sensing: Sensing::default(), ..scenario })
 }
 
 /// Returns `scenario` with an outage of the link of 240 ms at each of these times; the flight core coasts through them.

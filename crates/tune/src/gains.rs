@@ -195,7 +195,7 @@ fn keys(contender: &Contender) -> Vec<Key> {
     // Groups of a law's gains are tables within its own; the settings are a table next to them.
     let mut put = |table: String, key, value: Value<'_>, tuned| {
         let value = match value {
-            Value::Single([number]) => number.to_string(),
+            Value::Single([number]) => format!("{number:?}"),
             Value::Switch(on) => on.to_string(),
             _ => return Ok(()),
         };

@@ -36,13 +36,13 @@ fn the_papers_flights_stay_what_they_were() {
     assert_eq!(held_out_on(&paper).unwrap(), held);
 }
 
-/// Every flight can be flown by every law; at most 22 are for training, of a minute at most.
+/// Every flight can be flown by every law; at most 23 are for training, of a minute at most.
 #[test]
 fn every_flight_is_valid_on_every_vehicle() {
     for known in &BUILT_IN {
         let vehicle = known.read().unwrap();
         let mut flights = training_on(&vehicle).unwrap();
-        assert!(flights.len() <= 22 && flights.iter().all(|flight| flight.duration_s <= 60.0), "{}", known.name);
+        assert!(flights.len() <= 23 && flights.iter().all(|flight| flight.duration_s <= 60.0), "{}", known.name);
         flights.extend(held_out_on(&vehicle).unwrap());
         // The paper's vehicle's gains fly on other vehicles by rule.
         let conditions = conditions_on(&vehicle).unwrap().into_iter().filter(|condition| !condition.by_rule);
@@ -126,7 +126,8 @@ fn an_interrupted_fleet_resumes_to_the_same_bytes() {
     assert_eq!(run(&parts, false).unwrap(), gains);
     assert_eq!(files(&whole), files(&parts));
 
-    let text = format!("{}\n{gains}", built_in("racer").unwrap().text);
+    let bare = built_in("racer").unwrap().text.split("# Gains found by").next().unwrap();
+    let text = format!("{bare}\n{gains}");
     let read = afbc_vehicles::parse("racer.toml", &text, "racer").unwrap();
     afbc_sim::contender::Law::on(ControllerKind::Indi, &read, afbc::Profile::Flight).unwrap();
 

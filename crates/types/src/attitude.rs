@@ -1,6 +1,6 @@
 //! Attitudes as quaternions and as Euler angles. An attitude turns body coordinates into earth coordinates.
 
-use crate::State;
+use crate::{State, sin_cos};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// Accepted deviation of a quaternion's squared norm from 1.
@@ -35,7 +35,7 @@ impl State {
 
     /// Returns the attitude as a unit quaternion from body to earth coordinates, of either sign.
     pub fn quaternion(&self) -> UnitQuaternion<f32> {
-        let half = self.attitude_rad.map(|angle| libm::sincosf(0.5 * angle));
+        let half = self.attitude_rad.map(|angle| sin_cos(0.5 * angle));
         let ((sx, cx), (sy, cy), (sz, cz)) = (half.x, half.y, half.z);
         UnitQuaternion::new_normalize(Quaternion::new(
             cx * cy * cz + sx * sy * sz,

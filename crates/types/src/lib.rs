@@ -35,6 +35,7 @@ mod motion;
 mod parameters;
 mod pose;
 mod range;
+mod trigonometry;
 
 pub use actuation::{Inputs, RotorForces, RotorSpeeds};
 pub use attitude::euler_angles;
@@ -46,3 +47,4 @@ pub use nalgebra;
 pub use parameters::Parameters;
 pub use pose::{Pose, PoseSigmas};
 pub use range::{OutOfRange, Range};
+pub use trigonometry::sin_cos;

@@ -6,8 +6,9 @@ use afbc_estimator::Settings as Estimation;
 use afbc_types::{Declared, Value};
 use afbc_vehicles::{BUILT_IN, Vehicle, built_in, parse};
 
+/// The file without the gains found for the vehicle.
 fn text(name: &str) -> &'static str {
-    built_in(name).unwrap().text
+    built_in(name).unwrap().text.split("# Gains found by").next().unwrap()
 }
 
 fn changed(name: &str, from: &str, to: &str) -> String {
@@ -111,7 +112,7 @@ fn one_line_names_file_place_and_cure() {
 fn gains_of_the_file_replace_those_of_the_rule() {
     let gains = "[gains.flight.afbc.z]\nalpha1 = 1.25\n[gains.flight.cascade]\ncommand_filter_rad_s = 33.0\n";
     let own: Vehicle = parse("my.toml", &(text("racer").to_owned() + gains), "my").unwrap();
-    let rule = built_in("racer").unwrap().read().unwrap();
+    let rule: Vehicle = parse("racer", text("racer"), "racer").unwrap();
     let mut expected = rule.gains(Profile::Flight);
     expected.z.backstepping.alpha1 = 1.25;
     assert_eq!(own.gains(Profile::Flight), expected);

@@ -54,11 +54,19 @@ impl Compare {
     /// Flies, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         if let Some(path) = &self.suite {
-            let own = compare::standard_and_monitored();
-            let contenders = if self.controllers.is_empty() { own } else { choose(&own, &self.controllers)? };
+            let own = self.random.own()?;
+            let known = compare::standard_and_monitored();
+            let contenders = match self.controllers.as_slice() {
+                [] if own.is_empty() => known,
+                names => choose(&known, names)?,
+            };
             let Compare { random, seeds, output, .. } = self;
             if random::is_named(path) {
-                return random.run(self.on.vehicle()?, &contenders, seeds, &output);
+                if let Some(twice) = own.iter().find(|own| contenders.iter().any(|other| other.name == own.name)) {
+                    let name = &twice.name;
+                    return Err(format!("--controllers {name}: --from has a contender of this name; rename it").into());
+                }
+                return random.run(self.on.vehicle()?, [&contenders, &own], seeds, &output);
             }
             let suite = suite::named(path)?;
             if let Some(option) = self.on.vehicle()?.map(|_| "--vehicle").or_else(|| random.given()) {

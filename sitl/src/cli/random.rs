@@ -1,6 +1,7 @@
 //! `sitl compare --suite random`: flights drawn over vehicles.
 
 use super::progress::Progress;
+use super::target::Target;
 use super::terminal::Failure;
 use super::written::{Output, show};
 use super::{interrupt, page};
@@ -33,6 +34,11 @@ pub(super) struct Options {
     #[arg(long, value_name = "SCENARIO", requires = "suite", num_args = 0..=1, default_missing_value = "mocap")]
     on_estimate: Option<Instruments>,
 
+    /// Fly the contenders of this scenario, with their own gains scaled by rule to each vehicle; laws only if named by
+    /// --controllers
+    #[arg(long, value_name = "SCENARIO", requires = "suite")]
+    from: Option<Target>,
+
     /// Contender that the others are compared with [default: afbc, or else the first]
     #[arg(long, value_name = "NAME", requires = "suite")]
     against: Option<String>,
@@ -59,27 +65,33 @@ pub(super) const fn flights() -> usize {
 impl Options {
     /// The first option that was given, by name.
     pub(super) fn given(&self) -> Option<&'static str> {
-        let Options { seed, flights, on_estimate, against } = self;
+        let Options { seed, flights, on_estimate, from, against } = self;
         let all = [
             (seed.is_some(), "--seed"),
             (flights.is_some(), "--flights"),
             (on_estimate.is_some(), "--on-estimate"),
+            (from.is_some(), "--from"),
             (against.is_some(), "--against"),
         ];
         all.into_iter().find_map(|(given, name)| given.then_some(name))
+    }
+
+    /// The contenders of `--from`.
+    pub(super) fn own(&self) -> Result<Vec<Contender>, Failure> {
+        Ok(self.from.as_ref().map(Target::scenario).transpose()?.map_or_else(Vec::new, |scenario| scenario.contenders))
     }
 
     /// Draws and flies; then writes the folder and prints, or writes the tables into a page.
     pub(super) fn run(
         &self,
         vehicle: Option<Vehicle>,
-        contenders: &[Contender],
+        contenders: [&[Contender]; 2],
         seeds: u64,
         Output { write, place, json }: &Output,
     ) -> Result<ExitCode, Failure> {
         let against = self.against.as_deref().unwrap_or("afbc");
-        if self.against.is_some() && contenders.iter().all(|contender| contender.name != against) {
-            let names: Vec<_> = contenders.iter().map(|contender| contender.name.as_str()).collect();
+        let names: Vec<_> = contenders.into_iter().flatten().map(|contender| contender.name.as_str()).collect();
+        if self.against.is_some() && !names.contains(&against) {
             return Err(format!("--against {against}: does not fly; name one of {}", names.join(", ")).into());
         }
         let seed = self.seed.unwrap_or(1);
@@ -120,13 +132,13 @@ impl Options {
 /// Flies after `ready`, when all flights are known to be right.
 fn fly(
     random: &Random,
-    contenders: &[Contender],
+    [contenders, own]: [&[Contender]; 2],
     ready: impl FnOnce() -> Result<(), Failure>,
 ) -> Result<Vec<Flown>, Failure> {
-    let drawn = random.under(contenders)?;
+    let drawn = random.under(contenders, own)?;
     interrupt::ends_it()?;
     ready()?;
-    let progress = Progress::new("compare", "flights", (drawn.len() * contenders.len()) as u64, 0);
+    let progress = Progress::new("compare", "flights", (drawn.len() * (contenders.len() + own.len())) as u64, 0);
     let flown = random::fly(drawn, &|| progress.add(1))?;
     drop(progress);
     interrupt::is_too_late();

@@ -130,7 +130,7 @@ pub(crate) fn safeguards() -> impl Strategy<Value = Safeguards> {
 pub(crate) fn settings() -> impl Strategy<Value = Settings> {
     use afbc_control::Settings as Common;
     let common = (within(Common::DT), within(Common::FORCE_MAX), within(Common::RAISE_MAX));
-    let numbers = (common, within(Settings::FILTER), limits());
+    let numbers = (common, within(Settings::FILTER), within(Settings::FORWARD), limits());
     let model = (
         within(ReferenceModel::REF_XY),
         within(ReferenceModel::REF_Z),
@@ -182,11 +182,12 @@ pub(crate) fn settings() -> impl Strategy<Value = Settings> {
     );
     let any = (numbers, any::<[bool; 6]>(), added).prop_map(|(numbers, switches, added)| {
         let (disturbance, reference, smoothing) = added;
-        let ((dt_s, rotor_force_max_n, raised_thrust_max), command_filter_rad_s, limits) = numbers;
+        let ((dt_s, rotor_force_max_n, raised_thrust_max), command_filter_rad_s, forward_rad_s, limits) = numbers;
         let [tilt_by_thrust, anti_windup, freeze_on_ground, bumpless, feed_forward, by_rotation] = switches;
         Settings {
             common: Common { dt_s, rotor_force_max_n, raised_thrust_max, ..Common::DEFAULT },
             command_filter_rad_s,
+            forward_rad_s,
             limits,
             tilt_by_thrust,
             anti_windup,

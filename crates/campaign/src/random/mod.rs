@@ -68,14 +68,16 @@ impl Random {
         all.into_par_iter().map(|(base, seed, number)| base.flight(seed, number)).collect()
     }
 
-    /// Draws every flight, flown by `contenders`, each with its gains for the vehicle.
+    /// Draws every flight, flown by `contenders`, each with its gains for the vehicle, and then by `own`, whose own
+    /// gains and settings, for the paper's vehicle, are scaled [by rule](Contender::by_rule).
     ///
     /// # Errors
     /// As [`Random::draw`]; or one line on a gain or setting out of range.
-    pub fn under(&self, contenders: &[Contender]) -> Result<Vec<Flight>, FileError> {
+    pub fn under(&self, contenders: &[Contender], own: &[Contender]) -> Result<Vec<Flight>, FileError> {
         let mut flights = self.draw()?;
         flights.par_iter_mut().try_for_each(|flight| {
             compare::fly_under(&mut flight.scenario, contenders)?;
+            compare::fly_by_rule(&mut flight.scenario, own)?;
             compare::free_to_tilt(&mut flight.scenario, TILT_MAX_RAD);
             Ok::<(), FileError>(())
         })?;

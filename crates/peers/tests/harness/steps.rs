@@ -2,7 +2,7 @@
 
 use super::{Random, SETTINGS, vehicle};
 use afbc_control::{Action, FlightController, Screened, Trace};
-use afbc_peers::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
+use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
 use afbc_types::{Setpoint, State};
 use nalgebra::{Rotation3, Vector3};
 
@@ -30,6 +30,10 @@ pub(crate) fn l1() -> L1 {
 
 pub(crate) fn dfbc() -> Dfbc {
     Dfbc::new(vehicle(), SETTINGS, dfbc::Gains::PAPER_VEHICLE).unwrap()
+}
+
+pub(crate) fn mpc() -> Mpc {
+    Mpc::new(vehicle(), SETTINGS, mpc::Gains::PAPER_VEHICLE).unwrap()
 }
 
 /// Returns action and trace after `steps` steps with constant input.

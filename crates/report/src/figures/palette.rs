@@ -46,7 +46,7 @@ const ROLES: [Shades; 12] = [
 
 /// Colours of the built-in contenders. Any two can be told apart also by the colour-blind, on white (contrast 3 : 1 or
 /// more) and in the dark (4 : 1 or more).
-const KNOWN: [(&str, Shades); 9] = [
+const KNOWN: [(&str, Shades); 10] = [
     ("afbc", shades(0x0072B2, 0x7FA8ED)),
     ("backstepping", shades(0xD55E00, 0xC7613D)),
     ("pid", shades(0x189E8C, 0x39F3FC)),
@@ -54,6 +54,7 @@ const KNOWN: [(&str, Shades); 9] = [
     ("indi", shades(0x681053, 0xED7FA4)),
     ("l1", shades(0x7800E6, 0x8C82CD)),
     ("dfbc", shades(0x322300, 0xB9AA37)),
+    ("mpc", shades(0x825267, 0xCCFD0C)),
     ("afbc-as-printed", shades(0x26349E, 0x2773EE)),
     ("afbc-monitored", shades(0x923002, 0xF5C299)),
 ];

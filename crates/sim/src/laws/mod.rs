@@ -9,7 +9,7 @@ pub(crate) use gains::{law_gains, per_axis, whole};
 
 use afbc::{Adaptive, Backstepping, Controller, Profile, Safeguards, adaptive, backstepping};
 use afbc_control::Smoothing;
-use afbc_peers::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
+use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
 use afbc_types::{Axis, PerAxis};
 
 declare::laws! {
@@ -94,6 +94,17 @@ declare::laws! {
         tuned: |_| dfbc::Gains::TUNED,
         by_hand: dfbc::Gains { smoothing: Smoothing::BY_HAND, ..dfbc::Gains::PAPER_VEHICLE },
         controller: |vehicle, settings, gains| Dfbc::new(vehicle, settings.common, gains),
+    }
+    /// Linear model-predictive control of the position, incremental inversion of the moments.
+    Mpc {
+        name: "mpc",
+        title: "MPC",
+        prefix: "LMPC_",
+        in_cascade: false,
+        gains: mpc::Gains,
+        tuned: |_| mpc::Gains::TUNED,
+        by_hand: mpc::Gains { smoothing: Smoothing::BY_HAND, ..mpc::Gains::PAPER_VEHICLE },
+        controller: |vehicle, settings, gains| Mpc::new(vehicle, settings.common, gains),
     }
 }
 

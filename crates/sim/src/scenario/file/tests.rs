@@ -69,7 +69,7 @@ fn with_line(text: &str, key: &str, line: &str) -> String {
 #[test]
 fn documented_examples_are_valid_and_complete() {
     let sections = sections();
-    assert_eq!(sections.len(), 44);
+    assert_eq!(sections.len(), 45);
     for Section { example: text, rows } in sections {
         example(&text).unwrap_or_else(|error| panic!("{error} in\n{text}"));
         for line in text.lines().filter(|line| line.contains(" = ")) {

@@ -1,0 +1,96 @@
+//! Attitude control along a specific force with the reference's own rates and angular accelerations, and incremental
+//! inversion of the moments: shared by DFBC and MPC. The equations are in the head of [`crate::dfbc`].
+
+use crate::attitude::{facing, tilt_and_yaw_error};
+use crate::differentiator::Differentiator;
+use crate::flatness::flat;
+use crate::increment::{Increment, Reaction};
+use crate::loops::xy_and_z;
+use afbc_control::drag::KnownDrag;
+use afbc_types::{OutOfRange, Setpoint, State};
+use nalgebra::{Matrix3, Vector3};
+
+/// Gains: k_R and k_Omega of tilt and of yaw \[1/s2, 1/s\], and the filter \[rad/s\].
+pub(crate) struct Inner {
+    pub(crate) tilt: [f32; 2],
+    pub(crate) yaw: [f32; 2],
+    pub(crate) filter_rad_s: f32,
+}
+
+/// The loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FlatAttitude {
+    increment: Increment,
+    k_r: Vector3<f32>,
+    k_omega: Vector3<f32>,
+}
+
+/// What it asks for.
+pub(crate) struct Attitude {
+    pub(crate) desired: Matrix3<f32>,
+    /// Of the reference, in its frame.
+    pub(crate) rates_rad_s: Vector3<f32>,
+    pub(crate) angular_acceleration_rad_s2: Vector3<f32>,
+    pub(crate) attitude_error: Vector3<f32>,
+    pub(crate) rate_error: Vector3<f32>,
+}
+
+impl FlatAttitude {
+    /// Makes the loop.
+    ///
+    /// # Errors
+    /// If the filter is out of range.
+    pub(crate) fn new(gains: &Inner, dt_s: f32) -> Result<Self, OutOfRange> {
+        let ([tilt_p, tilt_d], [yaw_p, yaw_d]) = (gains.tilt, gains.yaw);
+        Ok(FlatAttitude {
+            increment: Increment(Differentiator::new(gains.filter_rad_s, dt_s)?),
+            k_r: xy_and_z(tilt_p, yaw_p),
+            k_omega: xy_and_z(tilt_d, yaw_d),
+        })
+    }
+
+    /// As [`Increment::measure`].
+    #[inline]
+    pub(crate) fn measure(&self, reaction: &mut Reaction, given_rad_s2: &Vector3<f32>, rates_rad_s: &Vector3<f32>) {
+        self.increment.measure(reaction, given_rad_s2, rates_rad_s);
+    }
+
+    /// Turns the attitude `r` along the first specific force, with the rates that follow from the second, the
+    /// reference's, and the setpoint's jerk, snap and heading.
+    #[inline]
+    pub(crate) fn output(
+        &self,
+        reaction: &Reaction,
+        r: &Matrix3<f32>,
+        state: &State,
+        [along, reference]: [&Vector3<f32>; 2],
+        setpoint: &Setpoint,
+    ) -> Attitude {
+        let omega = state.rates_rad_s;
+        let desired = facing(along, setpoint.yaw_rad);
+        let reference = flat([*reference, setpoint.jerk_m_s3, setpoint.snap_m_s4], setpoint);
+        let to_body = r.transpose() * reference.r_earth_desired;
+        let omega_r = to_body * reference.rates_rad_s;
+        let attitude_error = tilt_and_yaw_error(r, &desired);
+        let rate_error = omega_r - omega;
+        let nu = self.k_r.component_mul(&attitude_error)
+            + self.k_omega.component_mul(&rate_error)
+            + to_body * reference.rates_dot_rad_s2
+            - omega.cross(&omega_r);
+        Attitude {
+            desired,
+            rates_rad_s: reference.rates_rad_s,
+            angular_acceleration_rad_s2: self.increment.invert(reaction, &nu),
+            attitude_error,
+            rate_error,
+        }
+    }
+}
+
+/// Returns the setpoint with jerk and snap of the thrust, over that of hover as `share`, along `up`: drag turns it as
+/// the velocity changes.
+#[inline]
+pub(crate) fn dragged(drag: &KnownDrag, setpoint: &Setpoint, up: &Vector3<f32>, share: f32) -> Setpoint {
+    let Setpoint { velocity_m_s: v, acceleration_m_s2: a, jerk_m_s3: j, snap_m_s4: s, .. } = setpoint;
+    Setpoint { jerk_m_s3: j - drag.change(v, up, share, a), snap_m_s4: s - drag.change(v, up, share, j), ..*setpoint }
+}
