@@ -52,7 +52,7 @@ fn source(vehicle: &Vehicle) -> String {
         settings = literal(&settings),
         gains = literal(&gains),
         curve = literal(&vehicle.curve),
-        // Its name here and there.
+        // The estimator calls its settings `Settings`; the image imports them as `Estimation`.
         estimation = literal(&vehicle.estimation).replace("Settings", "Estimation"),
     )
 }

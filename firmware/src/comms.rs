@@ -4,7 +4,7 @@ use crate::board::{Receiver, Transmitter};
 use crate::control;
 use crate::parameters;
 use crate::ticks::{self, Tick};
-use crate::vehicle::Table;
+use crate::vehicle::ParameterTable;
 pub use afbc_onboard::Comms;
 use afbc_onboard::{REPORT_MAX, Setup};
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -28,12 +28,12 @@ const FAREWELL: u32 = 100;
 const NOT_KEPT: &str = "parameter not kept: set it again";
 
 /// What the link's task has: the services for stations, and the parameters.
-pub type Desk = (Comms, Table);
+pub type Desk = (Comms, ParameterTable);
 
 /// Creates it, with nothing received, to be called once: in place, since a task would store a value twice and take the
 /// stack for it.
 #[inline(never)]
-pub fn make(table: Table) -> &'static mut Desk {
+pub fn make(table: ParameterTable) -> &'static mut Desk {
     static DESK: StaticCell<Desk> = StaticCell::new();
     DESK.init_with(|| {
         let setup = Setup { reboots: true, ..Setup::of(&table.configuration().link) };
@@ -50,7 +50,7 @@ pub async fn run((comms, table): &mut Desk, receiver: &mut impl Receiver, transm
         match select(receiver.receive(&mut incoming), ticks::next()).await {
             Either::First(length) => {
                 let news = comms.receive(incoming.get(..length).unwrap_or_default());
-                control::with_mail(|mail| mail.post(&news));
+                control::with_mail(|mail| mail.merge(&news));
                 BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
             }
             Either::Second(tick) => {
@@ -59,7 +59,7 @@ pub async fn run((comms, table): &mut Desk, receiver: &mut impl Receiver, transm
                 transmitter.transmit(&tick, &outgoing);
                 if comms.has_mail() {
                     let news = comms.receive(&[]);
-                    control::with_mail(|mail| mail.post(&news));
+                    control::with_mail(|mail| mail.merge(&news));
                 }
                 leaving += u32::from(comms.wants_reboot());
                 if leaving >= FAREWELL && !control::armed() {
@@ -80,7 +80,7 @@ fn report(comms: &mut Comms, tick: &Tick, outgoing: &mut Vec<u8, REPORT_MAX>) {
 
 /// Sends values of parameters, and passes on what has changed. Out of line like the report.
 #[inline(never)]
-fn serve(comms: &mut Comms, table: &mut Table, outgoing: &mut Vec<u8, REPORT_MAX>) {
+fn serve(comms: &mut Comms, table: &mut ParameterTable, outgoing: &mut Vec<u8, REPORT_MAX>) {
     let change = comms.parameters(table, |frame| drop(outgoing.extend_from_slice(frame)));
     if let Some(change) = change
         && !parameters::change(table, change)

@@ -4,7 +4,7 @@ use crate::board::Board;
 use crate::ticks::{self, Tick};
 use crate::time::{self, Stopwatch};
 use crate::vehicle::{Configuration, Flight, Prepared, Report};
-use afbc_onboard::{Mail, Readings};
+use afbc_onboard::{ControlInputs, Readings};
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
@@ -13,7 +13,7 @@ use embassy_time::{Instant, Timer};
 use static_cell::StaticCell;
 
 /// Newest inputs, written by [`crate::comms`].
-static MAIL: Mutex<CriticalSectionRawMutex, RefCell<Mail>> = Mutex::new(RefCell::new(Mail::EMPTY));
+static MAIL: Mutex<CriticalSectionRawMutex, RefCell<ControlInputs>> = Mutex::new(RefCell::new(ControlInputs::EMPTY));
 
 /// Cycles of the last control tick and of the longest, for [`crate::housekeeping`].
 static CYCLES: AtomicU32 = AtomicU32::new(0);
@@ -40,7 +40,7 @@ pub fn armed() -> bool {
 }
 
 /// Changes the inputs of the next tick.
-pub fn with_mail(change: impl FnOnce(&mut Mail)) {
+pub fn with_mail(change: impl FnOnce(&mut ControlInputs)) {
     // Not borrowed elsewhere while it is locked; no panic in any case.
     MAIL.lock(|mail| mail.try_borrow_mut().ok().map(|mut mail| change(&mut mail)));
 }
@@ -61,7 +61,7 @@ pub fn make(configuration: &Configuration) -> &'static mut Flight {
 
 /// Runs the ticks.
 pub async fn run(flight: &mut Flight, board: &mut impl Board) -> ! {
-    let (mut mail, mut readings) = (Mail::EMPTY, Readings::NONE);
+    let (mut mail, mut readings) = (ControlInputs::EMPTY, Readings::NONE);
     loop {
         // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
         // are due, it would tick twice in every second period.
@@ -94,7 +94,7 @@ fn adopt(flight: &mut Flight) {
 /// drives them; checks the rate. Out of line, so that its stack and its instructions can be counted
 /// (`docs/budgets.md`).
 #[inline(never)]
-fn tick<B: Board>(flight: &mut Flight, mail: &mut Mail, readings: &mut Readings, board: &mut B) -> Report {
+fn tick<B: Board>(flight: &mut Flight, mail: &mut ControlInputs, readings: &mut Readings, board: &mut B) -> Report {
     let now_us = Instant::now().as_micros();
     // Not borrowed elsewhere while it is locked; the tick has no panic.
     MAIL.lock(|shared| shared.try_borrow_mut().ok().map(|mut shared| shared.take_into(mail)));

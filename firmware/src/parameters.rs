@@ -7,8 +7,8 @@
 //! tolerance. No word is written while armed ([`Gate`]).
 
 use crate::control;
-use crate::vehicle::{CONFIGURATION, NAME, Prepared, Table};
-use afbc_onboard::parameters::{Change, Kept};
+use crate::vehicle::{CONFIGURATION, NAME, ParameterTable, Prepared};
+use afbc_onboard::parameters::{Kept, RecordChange};
 use afbc_store::{Error, Store, hash};
 use core::cell::RefCell;
 use core::future::poll_fn;
@@ -22,7 +22,8 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashEr
 use heapless::Deque;
 
 /// Changes to be written, and a signal that there are some.
-static CHANGES: Mutex<CriticalSectionRawMutex, RefCell<Deque<Change, 8>>> = Mutex::new(RefCell::new(Deque::new()));
+static CHANGES: Mutex<CriticalSectionRawMutex, RefCell<Deque<RecordChange, 8>>> =
+    Mutex::new(RefCell::new(Deque::new()));
 static CHANGED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 /// Time between two looks at whether the vehicle is still armed \[us\].
 const PATIENCE_US: u64 = 100_000;
@@ -87,8 +88,8 @@ pub struct Keeper<M>(Option<Store<Gate<M>>>);
 
 /// Reads the parameters from `memory`, whose sectors begin at `start`, and makes room for changes. Without a store that
 /// can be read, the parameters are the image's.
-pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, Table) {
-    let mut table = Table::new(CONFIGURATION);
+pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, ParameterTable) {
+    let mut table = ParameterTable::new(CONFIGURATION);
     let Ok(mut store) = Store::open(Gate(memory), start, hash(NAME.as_bytes())) else { return (Keeper(None), table) };
     if store.make_room().is_err() {
         defmt::warn!("the parameters' flash cannot be erased");
@@ -103,7 +104,7 @@ pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, Table) {
 /// Takes a change over to flight and flash: the next tick of the disarmed vehicle flies `table`. False if too many
 /// changes are waiting to be written; this one will be forgotten at the next start.
 #[must_use = "the station is to be told"]
-pub fn change(table: &Table, change: Change) -> bool {
+pub fn change(table: &ParameterTable, change: RecordChange) -> bool {
     if let Ok(prepared) = Prepared::new(table.configuration()) {
         control::fly(prepared);
     }
@@ -132,12 +133,12 @@ pub async fn run<M: NorFlash>(keeper: &mut Keeper<M>) -> ! {
 
 /// Writes a change. Out of line, to be identified in the image.
 #[inline(never)]
-fn keep<M: NorFlash>(store: &mut Store<Gate<M>>, change: Change) -> Result<(), Error<Shut>> {
+fn keep<M: NorFlash>(store: &mut Store<Gate<M>>, change: RecordChange) -> Result<(), Error<Shut>> {
     Kept::NOW.keep(store, change)
 }
 
 /// Waits for a change.
-fn next() -> impl Future<Output = Change> {
+fn next() -> impl Future<Output = RecordChange> {
     poll_fn(|context| {
         // Registered before looking, so that no change is missed.
         let _ = pin!(CHANGED.wait()).poll(context);

@@ -17,7 +17,7 @@ use nalgebra::Vector3;
 /// What the firmware is told of it.
 pub type Configuration = afbc_onboard::Configuration<ROTORS>;
 /// Its parameters, from which the configuration is made.
-pub type Table = afbc_onboard::parameters::Table<ROTORS>;
+pub type ParameterTable = afbc_onboard::parameters::ParameterTable<ROTORS>;
 /// A configuration ready to be flown.
 pub type Prepared = afbc_onboard::Prepared<ROTORS>;
 /// The vehicle under its law.

@@ -6,11 +6,11 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a failed scenario must stop it
 
 use afbc::{Adaptive, Backstepping, Controller, Profile};
-use afbc_control::{FlightController, Screened};
-use afbc_plant::{Deviations, Drag, Model, Plant, Realism, Rotors, Sensing, Turbulence, Wind};
+use afbc_control::{FlightController, Validated};
+use afbc_plant::{Deviations, Drag, Plant, PlantModel, Realism, Rotors, Sensing, Turbulence, Wind};
 use afbc_sim::case::Case;
 use afbc_sim::contender::{Contender, ControllerKind};
-use afbc_sim::flight::{Alone, Pilot, World, fly};
+use afbc_sim::flight::{LawOnly, Pilot, World, fly};
 use afbc_sim::paper::scenario;
 use afbc_sim::scenario::Scenario;
 use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
@@ -25,12 +25,12 @@ fn main() {
 /// Steps of one whole flight.
 const STEPS: usize = 60_000;
 
-fn paper(model: Model) -> Scenario {
+fn paper(model: PlantModel) -> Scenario {
     scenario(model, Case::DEFAULT).unwrap()
 }
 
 /// Inputs and outputs of a controller at every 60th step of the paper's flight.
-fn recorded(model: Model, kind: ControllerKind) -> Vec<(State, Setpoint, RotorSpeeds<8>)> {
+fn recorded(model: PlantModel, kind: ControllerKind) -> Vec<(State, Setpoint, RotorSpeeds<8>)> {
     let (mut steps, mut index) = (Vec::new(), 0_usize);
     fly(&paper(model), &Contender::of(kind, Profile::Paper), |sample| {
         if index.is_multiple_of(60) {
@@ -53,8 +53,8 @@ fn backstepping(profile: Profile) -> Controller<Backstepping> {
 }
 
 fn control_step(bencher: Bencher, kind: ControllerKind, controller: impl FlightController) {
-    let steps = recorded(Model::RigidBody, kind);
-    let mut memory = Screened::default();
+    let steps = recorded(PlantModel::RigidBody, kind);
+    let mut memory = Validated::default();
     let mut at = 0;
     bencher.counter(ItemsCount::new(1_usize)).bench_local(|| {
         let (state, setpoint, _) = &steps[at];
@@ -73,7 +73,7 @@ fn control_step_backstepping(bencher: Bencher) {
     control_step(bencher, ControllerKind::Backstepping, backstepping(Profile::Paper));
 }
 
-fn plant_step(bencher: Bencher, model: Model) {
+fn plant_step(bencher: Bencher, model: PlantModel) {
     let scenario = paper(model);
     let steps = recorded(model, ControllerKind::Afbc);
     let mut plant = Plant::new(model, scenario.initial, scenario.environment);
@@ -88,18 +88,18 @@ fn plant_step(bencher: Bencher, model: Model) {
 
 #[divan::bench]
 fn plant_step_rigid_body(bencher: Bencher) {
-    plant_step(bencher, Model::RigidBody);
+    plant_step(bencher, PlantModel::RigidBody);
 }
 
 #[divan::bench]
 fn plant_step_simplified(bencher: Bencher) {
-    plant_step(bencher, Model::Simplified);
+    plant_step(bencher, PlantModel::Simplified);
 }
 
 fn closed_loop(bencher: Bencher, scenario: &Scenario, controller: impl FlightController + Copy) {
     bencher
         .counter(ItemsCount::new(STEPS))
-        .with_inputs(|| (World::new(scenario, 0.001).unwrap(), Alone::new(controller)))
+        .with_inputs(|| (World::new(scenario, 0.001).unwrap(), LawOnly::new(controller)))
         .bench_local_refs(|(world, pilot)| {
             for _ in 0..STEPS {
                 let Ok(sample) = pilot.step(world);
@@ -111,17 +111,17 @@ fn closed_loop(bencher: Bencher, scenario: &Scenario, controller: impl FlightCon
 
 #[divan::bench]
 fn closed_loop_afbc_rigid_body(bencher: Bencher) {
-    closed_loop(bencher, &paper(Model::RigidBody), afbc(Profile::Paper));
+    closed_loop(bencher, &paper(PlantModel::RigidBody), afbc(Profile::Paper));
 }
 
 #[divan::bench]
 fn closed_loop_backstepping_rigid_body(bencher: Bencher) {
-    closed_loop(bencher, &paper(Model::RigidBody), backstepping(Profile::Paper));
+    closed_loop(bencher, &paper(PlantModel::RigidBody), backstepping(Profile::Paper));
 }
 
 #[divan::bench]
 fn closed_loop_afbc_simplified(bencher: Bencher) {
-    closed_loop(bencher, &paper(Model::Simplified), afbc(Profile::Paper));
+    closed_loop(bencher, &paper(PlantModel::Simplified), afbc(Profile::Paper));
 }
 
 /// The paper's flight with everything that a campaign adds: rotor lag, limits and delay, drag, wind, turbulence,
@@ -134,7 +134,7 @@ fn real() -> Scenario {
     Scenario {
         realism: Realism { rotors, wind, drag: Some(Drag::PAPER), ..Realism::default() },
         sensing: Sensing { noise, bias, delay_s: 0.002, ..Sensing::DEFAULT },
-        ..paper(Model::RigidBody)
+        ..paper(PlantModel::RigidBody)
     }
 }
 

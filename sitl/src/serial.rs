@@ -104,7 +104,7 @@ fn failed(error: io::Error) -> Error {
 #[allow(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use super::*;
-    use afbc_sim::in_the_loop::{Host, LoopEnd, Pace, fly};
+    use afbc_sim::in_the_loop::{Host, LoopEnd, MessagePeriods, fly};
     use afbc_sim::scenario::{Scenario, built_in};
     use core::ops::ControlFlow;
     use serialport::TTYPort;
@@ -163,7 +163,7 @@ mod tests {
         let (mut station, mut furthest_m) = (Station::new(), 0.0_f64);
         let scenario = scenario("hover", 2.0);
         let start = std::time::Instant::now();
-        let end = fly(&scenario, &mut station, &mut wired, Pace::at(921_600).unwrap(), |sample| {
+        let end = fly(&scenario, &mut station, &mut wired, MessagePeriods::at(921_600).unwrap(), |sample| {
             furthest_m = furthest_m.max((sample.motion.position_m - sample.reference.position_m).norm());
             ControlFlow::Continue(())
         });
@@ -187,7 +187,7 @@ mod tests {
         let mut wired = Wired { serial, board: &mut board };
         let flight = std::panic::AssertUnwindSafe(|| {
             let mut steps = 0;
-            fly(&scenario("hover", 2.0), &mut Station::new(), &mut wired, Pace::at(921_600).unwrap(), |_| {
+            fly(&scenario("hover", 2.0), &mut Station::new(), &mut wired, MessagePeriods::at(921_600).unwrap(), |_| {
                 steps += 1;
                 assert!(steps < 200, "on purpose: a bug in flight");
                 ControlFlow::Continue(())

@@ -5,7 +5,7 @@
 use afbc::integral::IntegralBackstepping;
 use afbc::monitor::Bounds;
 use afbc::{Adaptive, Backstepping, Controller, Guarded, Profile};
-use afbc_control::{FlightController, Screened, Settings, Trace};
+use afbc_control::{FlightController, Settings, Trace, Validated};
 use afbc_peers::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
 use afbc_types::{Parameters, PerAxis, Setpoint, State};
 use core::fmt::Debug;
@@ -109,7 +109,7 @@ where
     C::Memory: PartialEq,
 {
     for (motion_name, motion, steps) in MOTIONS {
-        let (mut memory, mut trace) = (Screened::<C::Memory>::default(), Trace::default());
+        let (mut memory, mut trace) = (Validated::<C::Memory>::default(), Trace::default());
         let (mut state, mut setpoint) = (State::default(), Setpoint::default());
         for step in 0..steps {
             let before = (memory, state, setpoint);

@@ -6,7 +6,7 @@
     reason = "a scenario that cannot be flown must stop the test"
 )]
 
-use afbc_plant::{Environment, Gust, GustKind, Model, Motion};
+use afbc_plant::{Environment, Gust, GustKind, Motion, PlantModel};
 use afbc_report::claims::VANISHED;
 use afbc_report::claims::claims;
 use afbc_sim::case::{Case, Reading, Uncertainty};
@@ -28,7 +28,7 @@ fn fly_both(scenario: &Scenario) -> Vec<Flown> {
 /// Returns every default reading: four signs, two models.
 fn readings() -> impl Iterator<Item = Scenario> {
     Uncertainty::ALL.into_iter().flat_map(|uncertainty| {
-        [Model::Simplified, Model::RigidBody].map(move |model| {
+        [PlantModel::Simplified, PlantModel::RigidBody].map(move |model| {
             scenario(model, Case { reading: Some(Reading::Persistent), uncertainty: Some(uncertainty) }).unwrap()
         })
     })
@@ -99,7 +99,7 @@ fn the_claims_as_reported_hold() {
 /// A claim without support fails: making each figure worse in turn makes exactly its own claim fail.
 #[test]
 fn a_claim_falls_with_its_figures() {
-    let honest = fly_both(&scenario(Model::Simplified, Case::DEFAULT).unwrap());
+    let honest = fly_both(&scenario(PlantModel::Simplified, Case::DEFAULT).unwrap());
     let holds = |change: &dyn Fn(&mut Run, &Run)| {
         let mut flown = honest.clone();
         change(&mut flown[0].run, &honest[1].run);
@@ -140,7 +140,7 @@ fn a_claim_falls_with_its_figures() {
 #[test]
 fn no_claim_holds_if_a_vehicle_is_lost() {
     let forces = Case { reading: Some(Reading::Forces), ..Case::DEFAULT };
-    let flown = fly_both(&scenario(Model::Simplified, forces).unwrap());
+    let flown = fly_both(&scenario(PlantModel::Simplified, forces).unwrap());
     assert!(flown.iter().all(|flown| flown.run.lost.is_some()));
     assert!(claims(&flown).iter().all(|claim| !claim.holds));
 }
@@ -150,7 +150,7 @@ fn no_claim_holds_if_a_vehicle_is_lost() {
 #[test]
 fn backstepping_keeps_an_offset_of_the_gust_over_one_plus_both_gains() {
     for size in [0.3, 1.2, -0.9] {
-        let mut scenario = scenario(Model::Simplified, Case { reading: None, uncertainty: None }).unwrap();
+        let mut scenario = scenario(PlantModel::Simplified, Case { reading: None, uncertainty: None }).unwrap();
         let position_m = Vector3::new(1.0, -2.0, 3.0);
         scenario.trajectory = Trajectory::Hover { position_m, yaw_rad: 0.0 };
         scenario.initial = Motion { position_m, ..Motion::default() };

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
 
 use afbc::Profile;
-use afbc_plant::Model;
+use afbc_plant::PlantModel;
 use afbc_sim::case::Case;
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::flight::{Sample, fly};
@@ -64,7 +64,7 @@ fn digest(scenario: &Scenario, contender: &Contender) -> (u64, usize) {
 
 #[test]
 fn two_flights_are_the_same_to_the_bit() {
-    for model in [Model::Simplified, Model::RigidBody] {
+    for model in [PlantModel::Simplified, PlantModel::RigidBody] {
         for kind in ControllerKind::ALL {
             let contender = &Contender::of(kind, Profile::Paper);
             let mut scenario = scenario(model, Case::DEFAULT).unwrap();

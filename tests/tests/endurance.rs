@@ -2,10 +2,10 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
 use afbc::{Adaptive, Cascade, Controller, Profile};
-use afbc_control::Estimate;
-use afbc_control::{FlightController, Screened};
+use afbc_control::AdaptiveEstimate;
+use afbc_control::{FlightController, Validated};
 use afbc_plant::sensors::Deviations;
-use afbc_plant::{Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors};
+use afbc_plant::{Environment, Motion, Plant, PlantModel, Realism, Rotors, Sensing, StateSensor};
 use afbc_sim::contender::ControllerKind;
 use afbc_sim::flight::Sample;
 use afbc_sim::run::Run;
@@ -19,9 +19,9 @@ const HOUR: u64 = 3_600_000;
 /// A hover at 2 m with rotors of 20 ms and 3 N and noise of 0.001 on every state.
 struct Hover {
     controller: Controller<Adaptive>,
-    memory: Screened<Cascade<Estimate>>,
+    memory: Validated<Cascade<AdaptiveEstimate>>,
     plant: Plant,
-    sensors: Sensors,
+    sensors: StateSensor,
     setpoint: Setpoint,
 }
 
@@ -35,11 +35,11 @@ impl Hover {
         let realism = Realism { rotors, seed: 11, ..Realism::default() };
         let start = Motion { position_m: Vector3::new(0.0, 0.0, 2.0), ..Motion::default() };
         let environment = Environment::calm(vehicle).unwrap();
-        let plant = Plant::with_realism(Model::RigidBody, start, environment, &realism, STEP_S).unwrap();
+        let plant = Plant::with_realism(PlantModel::RigidBody, start, environment, &realism, STEP_S).unwrap();
         let sensors =
-            Sensors::new(&Sensing { noise: Deviations::all(0.001), ..Sensing::default() }, 11, STEP_S).unwrap();
+            StateSensor::new(&Sensing { noise: Deviations::all(0.001), ..Sensing::default() }, 11, STEP_S).unwrap();
         let setpoint = Setpoint { position_m: Vector3::new(0.0, 0.0, 2.0), ..Setpoint::default() };
-        Hover { controller, memory: Screened::default(), plant, sensors, setpoint }
+        Hover { controller, memory: Validated::default(), plant, sensors, setpoint }
     }
 
     /// Flies `steps`; returns the largest distance from the setpoint \[m\].

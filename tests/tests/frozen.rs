@@ -2,9 +2,9 @@
 //! MAVLink frames.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
-use afbc_flight_core::{End, Mode};
+use afbc_flight_core::{EndReason, Mode};
 use afbc_link::Command;
-use afbc_plant::{Contact, Environment, Model, Motion, Plant, Realism};
+use afbc_plant::{Contact, Environment, Motion, Plant, PlantModel, Realism};
 use afbc_sim::in_the_loop::{Host, Station};
 use afbc_types::{Parameters, State};
 use nalgebra::Vector3;
@@ -27,7 +27,7 @@ enum Frozen {
 #[derive(Debug, Default)]
 struct Seen {
     modes: Vec<(u64, Mode)>,
-    ended: Option<End>,
+    ended: Option<EndReason>,
     /// Height at the end of the flight \[m\], and largest tilt from the freeze on \[rad\].
     ended_m: f64,
     tilt_rad: f64,
@@ -40,7 +40,7 @@ fn fly(height_m: f64, speed_m_s: f64, frozen: Frozen) -> Seen {
     let ground = Realism { contact: Some(Contact::PAPER), ..Realism::default() };
     let start = Motion { position_m: Vector3::new(0.0, 0.0, 0.02), ..Motion::default() };
     let environment = Environment::calm(Parameters::PAPER).unwrap();
-    let mut plant = Plant::with_realism(Model::RigidBody, start, environment, &ground, 0.001).unwrap();
+    let mut plant = Plant::with_realism(PlantModel::RigidBody, start, environment, &ground, 0.001).unwrap();
     let (mut station, mut host) = (Station::new(), Host::new().unwrap());
     let (mut seen, mut last) = (Seen::default(), State::default());
     for now_ms in 0..20_000_u64 {
@@ -109,7 +109,7 @@ fn a_repeated_state_is_coasted_through_and_ends_in_a_descent() {
         assert_eq!(modes, [Mode::Disarmed, Mode::Flying, Mode::Coasting, Mode::Descending, Mode::Disarmed]);
         let coasting_ms = seen.modes.get(2).unwrap().0 - FREEZES_MS;
         assert!(coasting_ms <= 25, "{coasting_ms} ms");
-        assert_eq!(seen.ended, Some(End::StateLost));
+        assert_eq!(seen.ended, Some(EndReason::StateLost));
         assert!(seen.tilt_rad < 0.6, "{} rad", seen.tilt_rad);
         assert!(seen.touchdown_m_s.unwrap() < 3.5, "{seen:?}");
     }
@@ -122,7 +122,7 @@ fn a_noisy_constant_pose_with_a_moving_twist_is_distrusted() {
     for speed_m_s in [1.0, 2.0] {
         let seen = fly(3.0, speed_m_s, Frozen::Noisy);
         println!("{speed_m_s} m/s: {seen:?}");
-        assert_eq!(seen.ended, Some(End::StateLost));
+        assert_eq!(seen.ended, Some(EndReason::StateLost));
         let not_flying = seen.modes.iter().find(|(at, mode)| *at > FREEZES_MS && *mode != Mode::Flying).unwrap();
         assert!(not_flying.0 - FREEZES_MS <= 525, "{seen:?}");
     }
@@ -135,7 +135,7 @@ fn a_frozen_pose_after_an_outage_is_no_landing() {
         for noise in [false, true] {
             let seen = fly(5.0, 0.0, Frozen::After(gap_ms, noise));
             println!("{gap_ms} ms, noise {noise}: {seen:?}");
-            assert_eq!(seen.ended, Some(End::StateLost), "{seen:?}");
+            assert_eq!(seen.ended, Some(EndReason::StateLost), "{seen:?}");
         }
     }
 }

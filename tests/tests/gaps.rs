@@ -6,11 +6,11 @@ use afbc::fuzzy::{Basis, Membership};
 use afbc::law::Context;
 use afbc::law::Tracking;
 use afbc::{Adaptive, Backstepping, Cascade, Controller, Law, Profile, Settings};
-use afbc_control::{Errors, Estimate, FlightController, Screened};
-use afbc_plant::{Environment, Model, Motion, Plant};
+use afbc_control::{AdaptiveEstimate, Errors, FlightController, Validated};
+use afbc_plant::{Environment, Motion, Plant, PlantModel};
 use afbc_sim::case::{Case, Reading};
 use afbc_sim::contender::{self, Contender, ControllerKind};
-use afbc_sim::flight::{Alone, End, Sample, World, lockstep};
+use afbc_sim::flight::{FlightEnd, LawOnly, Sample, World, lockstep};
 use afbc_sim::paper::scenario;
 use afbc_sim::run::Run;
 use afbc_sim::scenario::Scenario;
@@ -22,7 +22,7 @@ const CALM: Case = Case { reading: None, uncertainty: None };
 const GUSTS: Case = Case { reading: Some(Reading::Persistent), uncertainty: None };
 
 fn paper(case: Case) -> Scenario {
-    scenario(Model::Simplified, case).unwrap()
+    scenario(PlantModel::Simplified, case).unwrap()
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
@@ -45,11 +45,11 @@ impl<L: Law> Law for Rateless<L> {
         }
     }
 
-    fn approach(&self, axis: Axis, known: Option<&afbc::model::Model>) -> f32 {
+    fn approach(&self, axis: Axis, known: Option<&afbc::model::ModelConstants>) -> f32 {
         self.0.approach(axis, known)
     }
 
-    fn learnt(estimate: &L::Estimate) -> Estimate {
+    fn learnt(estimate: &L::Estimate) -> AdaptiveEstimate {
         L::learnt(estimate)
     }
 }
@@ -62,8 +62,8 @@ fn flies<L: Law>(scenario: &Scenario, settings: Settings, law: L) -> bool {
         let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
         if sample.time_s < 5.0 || distance_m < 1.0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     };
-    let Ok(end) = lockstep(&mut world, &mut Alone::new(controller), scenario.duration_s, near);
-    end == End::default()
+    let Ok(end) = lockstep(&mut world, &mut LawOnly::new(controller), scenario.duration_s, near);
+    end == FlightEnd::default()
 }
 
 /// The paper's settings with another command filter.
@@ -168,7 +168,7 @@ fn a_fast_roll_leaves_the_estimates_finite() {
         Adaptive::new(Profile::Paper.gains()).unwrap(),
     )
     .unwrap();
-    let mut memory = Screened::default();
+    let mut memory = Validated::default();
     for rate in [2.0, 10.0, 100.0, 1000.0] {
         let state = State { rates_rad_s: Vector3::new(rate, rate, rate), ..State::default() };
         let command = controller.step(&mut memory, Some(&state), &Setpoint::default());
@@ -197,12 +197,12 @@ fn chatter_mn(delta: f32, epsilon: f32) -> f64 {
     let law = Adaptive::new(gains).unwrap();
     let vehicle = Parameters::PAPER;
     let controller = Controller::new(vehicle.to_f32(), Profile::Paper.settings(), law).unwrap();
-    let mut memory: Screened<Cascade<Estimate>> = Screened::default();
+    let mut memory: Validated<Cascade<AdaptiveEstimate>> = Validated::default();
     memory.control.estimates.roll.delta = delta;
     // The estimates of z carry the weight.
     memory.control.estimates.z.theta.fill((vehicle.mass_kg * vehicle.gravity_m_s2) as f32);
     let start = Motion { attitude_rad: Vector3::new(0.01, 0.0, 0.0), ..Motion::default() };
-    let mut plant = Plant::new(Model::Simplified, start, Environment::calm(vehicle).unwrap());
+    let mut plant = Plant::new(PlantModel::Simplified, start, Environment::calm(vehicle).unwrap());
     let (mut last, mut sum) = (0.0, 0.0);
     for step in 0..5000 {
         let command = controller.step(&mut memory, Some(&plant.motion().measure()), &Setpoint::default());
@@ -289,14 +289,14 @@ fn a_hundred_times_the_epsilon_is_as_accurate_without_chatter() {
 // ---------------------------------------------------------------------------------------------------------------------
 // Decision 3: what "1.2 N" and "1.2 N m" mean.
 
-fn both(reading: Reading, model: Model) -> [Run; 2] {
+fn both(reading: Reading, model: PlantModel) -> [Run; 2] {
     let scenario = scenario(model, Case { reading: Some(reading), uncertainty: None }).unwrap();
     ControllerKind::PAPER.map(|kind| Run::fly(&scenario, scenario.contender(kind).unwrap(), u64::MAX).unwrap())
 }
 
 #[test]
 fn as_persistent_accelerations_backstepping_keeps_an_error_and_afbc_does_not() {
-    for model in [Model::Simplified, Model::RigidBody] {
+    for model in [PlantModel::Simplified, PlantModel::RigidBody] {
         let [afbc, baseline] = both(Reading::Persistent, model);
         assert_eq!((afbc.lost, baseline.lost), (None, None));
         // A / (1 + alpha_1 alpha_2) in x, y and psi: 1.2 / 3, and psi through g_3 = d / (b Iz) = 1.43.
@@ -309,7 +309,7 @@ fn as_persistent_accelerations_backstepping_keeps_an_error_and_afbc_does_not() {
 
 #[test]
 fn after_pulses_of_1_s_both_recover() {
-    for model in [Model::Simplified, Model::RigidBody] {
+    for model in [PlantModel::Simplified, PlantModel::RigidBody] {
         for run in both(Reading::Pulses, model) {
             assert_eq!(run.lost, None);
             let left = run.metrics.final_error.abs();
@@ -320,7 +320,7 @@ fn after_pulses_of_1_s_both_recover() {
 
 #[test]
 fn as_forces_and_moments_both_lose_the_vehicle_to_the_moment_on_roll() {
-    for model in [Model::Simplified, Model::RigidBody] {
+    for model in [PlantModel::Simplified, PlantModel::RigidBody] {
         for run in both(Reading::Forces, model) {
             // 1.2 N on 0.486 kg from 7.5 s on is survived. 1.2 N m on 0.0038 kg m2 from 15 s on is 316 rad/s2: holding
             // it takes a difference of 4.8 N between opposed rotors, more than the weight. Either roll is lost (rigid

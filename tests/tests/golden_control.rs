@@ -14,7 +14,7 @@ use afbc::cascade::desired_attitude;
 use afbc::fuzzy::{Basis, Membership};
 use afbc::law::Tracking;
 use afbc::model::Dynamics;
-use afbc_control::Estimate;
+use afbc_control::AdaptiveEstimate;
 use afbc_control::mixer::Mixer;
 use afbc_types::{Inputs, Parameters, RotorSpeeds};
 use flight_tests::{ROWS, Row, golden};
@@ -91,7 +91,8 @@ fn afbc_subsystem_agrees_in_every_row() {
         let inputs_are_state = row.get("inputs_are_state") == 1.0;
         kinds[usize::from(inputs_are_state)] += 1;
         let inputs = if inputs_are_state { [tracking.x1, tracking.x2] } else { [errors.e1, errors.e1_dot] };
-        let estimate = Estimate { theta: Matrix3::from_row_slice(&theta.map(|t| t as f32)), delta: delta as f32 };
+        let estimate =
+            AdaptiveEstimate { theta: Matrix3::from_row_slice(&theta.map(|t| t as f32)), delta: delta as f32 };
         let (terms, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
 
         // Errors: each input is rounded once, each difference and product once more.

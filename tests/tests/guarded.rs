@@ -4,9 +4,9 @@
 
 use afbc::monitor::Bounds;
 use afbc::{Guarded, Profile, Settings, guarded};
-use afbc_control::{Action, FlightController, Screened, Trace, Trip};
+use afbc_control::{Action, FlightController, Trace, Trip, Validated};
 use afbc_plant::{
-    Deviations, Drag, Environment, Model, Motion, Plant, Realism, Rotors, Sensing, Sensors, Turbulence, Wind,
+    Deviations, Drag, Environment, Motion, Plant, PlantModel, Realism, Rotors, Sensing, StateSensor, Turbulence, Wind,
 };
 use afbc_sim::case::Case;
 use afbc_sim::paper;
@@ -34,9 +34,9 @@ fn above(height_m: f32) -> Setpoint {
 /// One vehicle with its sensors, its controller and the controller's memory.
 struct Bench {
     controller: Guarded,
-    memory: Screened<guarded::Memory>,
+    memory: Validated<guarded::Memory>,
     plant: Plant,
-    sensors: Sensors,
+    sensors: StateSensor,
 }
 
 impl Bench {
@@ -45,9 +45,10 @@ impl Bench {
         let rotors = Rotors { time_constant_s: 0.02, max_rad_s: 317.0, ..Rotors::default() };
         let environment = Environment::calm(Parameters::PAPER).unwrap();
         let realism = Realism { rotors, ..realism };
-        let plant = Plant::with_realism(Model::RigidBody, Motion::default(), environment, &realism, STEP_S).unwrap();
-        let sensors = Sensors::new(&Sensing { noise, ..Sensing::default() }, 1, STEP_S).unwrap();
-        Bench { controller, memory: Screened::default(), plant, sensors }
+        let plant =
+            Plant::with_realism(PlantModel::RigidBody, Motion::default(), environment, &realism, STEP_S).unwrap();
+        let sensors = StateSensor::new(&Sensing { noise, ..Sensing::default() }, 1, STEP_S).unwrap();
+        Bench { controller, memory: Validated::default(), plant, sensors }
     }
 
     /// Returns the trace of the last step.
@@ -85,14 +86,14 @@ const NOISE: Deviations = Deviations { position_m: 0.002, velocity_m_s: 0.01, at
 /// they have grown, after more than half of it, and the detector trips. Without the detector nothing trips.
 #[test]
 fn the_printed_laws_chatter_is_a_limit_cycle() {
-    let paper = paper::scenario(Model::Simplified, Case::DEFAULT).unwrap();
+    let paper = paper::scenario(PlantModel::Simplified, Case::DEFAULT).unwrap();
     let bounds = Bounds::new(&Profile::Paper.gains(), &Parameters::PAPER.to_f32(), &Profile::Paper.settings());
     let fly = |bounds| {
         let mut bench = Bench {
             controller: guarded(Profile::Paper, Profile::Paper.settings(), bounds),
-            memory: Screened::default(),
-            plant: Plant::new(Model::Simplified, paper.initial, paper.environment.clone()),
-            sensors: Sensors::new(&Sensing::default(), 0, STEP_S).unwrap(),
+            memory: Validated::default(),
+            plant: Plant::new(PlantModel::Simplified, paper.initial, paper.environment.clone()),
+            sensors: StateSensor::new(&Sensing::default(), 0, STEP_S).unwrap(),
         };
         (0..60 * SECOND).find_map(|step| {
             let reference = paper.trajectory.at(step as f64 * STEP_S);

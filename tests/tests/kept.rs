@@ -3,11 +3,11 @@
 #![allow(clippy::unwrap_used, missing_docs)] // tests
 
 use afbc_files::Flash;
-use afbc_onboard::parameters::{Change, Kept, Table};
+use afbc_onboard::parameters::{Kept, ParameterTable, RecordChange};
 use afbc_onboard::{Configuration, Prepared};
 use afbc_reader::params::{Format, read, written};
 use afbc_sim::in_the_loop::configuration;
-use afbc_store::{Name, Store, hash};
+use afbc_store::{RecordName, Store, hash};
 use afbc_types::with_rotors;
 use afbc_vehicles::{BUILT_IN, Vehicle};
 use std::fs;
@@ -15,22 +15,22 @@ use std::path::Path;
 
 fn kept<const N: usize>(vehicle: &Vehicle, rotors: Configuration<N>, format: Format) {
     let original: Configuration<N> = configuration(vehicle).unwrap();
-    let all = Table::new(original.clone());
+    let all = ParameterTable::new(original.clone());
     let text = written(format, &vehicle.name, all.iter().map(|it| (it.name, it.value, it.kind.number())));
     // Into the store of an image with other values: all that the file says has to be kept.
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{}-{format:?}.store", vehicle.name));
     let _ = fs::remove_file(&path);
-    let mut table = Table::new(rotors.clone());
+    let mut table = ParameterTable::new(rotors.clone());
     let mut store = Store::open(Flash::open(&path).unwrap(), 0, hash(b"image")).unwrap();
     store.make_room().unwrap();
     for entry in read("a.params", &text).unwrap() {
-        let name = Name::new(&entry.name).unwrap();
+        let name = RecordName::new(&entry.name).unwrap();
         table.put(name, entry.value).unwrap();
-        Kept::NOW.keep(&mut store, Change::Set(name, Some(entry.value))).unwrap();
+        Kept::NOW.keep(&mut store, RecordChange::Set(name, Some(entry.value))).unwrap();
     }
     assert_eq!(table.check(), Ok(()));
     drop(store);
-    let (mut found, mut notices) = (Table::new(rotors), Vec::new());
+    let (mut found, mut notices) = (ParameterTable::new(rotors), Vec::new());
     let mut store = Store::open(Flash::known(&path).unwrap(), 0, hash(b"image")).unwrap();
     Kept::NOW.load(&mut found, &mut store, |notice| notices.push(notice)).unwrap();
     assert_eq!(notices, []);
@@ -64,7 +64,7 @@ fn a_store_in_a_file_is_whole_and_belongs_to_one_program() {
     let _ = fs::remove_file(&path);
     let mut store = Store::open(Flash::open(&path).unwrap(), 0, 1).unwrap();
     store.make_room().unwrap();
-    store.set(Name::new("A").unwrap(), 0, Some(7)).unwrap();
+    store.set(RecordName::new("A").unwrap(), 0, Some(7)).unwrap();
     assert_eq!(Flash::known(&path).unwrap_err().to_string(), "in use by another program");
     drop(store);
     // A write cut in the middle: the second half of the record is missing.
@@ -76,10 +76,10 @@ fn a_store_in_a_file_is_whole_and_belongs_to_one_program() {
     fs::write(&path, bytes).unwrap();
     let mut store = Store::open(Flash::known(&path).unwrap(), 0, 1).unwrap();
     assert_eq!(store.found().damaged, 1);
-    assert_eq!(store.get(Name::new("A").unwrap()).unwrap(), Some((0, 7)));
+    assert_eq!(store.get(RecordName::new("A").unwrap()).unwrap(), Some((0, 7)));
     store.make_room().unwrap();
-    store.set(Name::new("A").unwrap(), 0, Some(8)).unwrap();
+    store.set(RecordName::new("A").unwrap(), 0, Some(8)).unwrap();
     drop(store);
     let mut store = Store::open(Flash::known(&path).unwrap(), 0, 1).unwrap();
-    assert_eq!((store.found().damaged, store.get(Name::new("A").unwrap()).unwrap()), (0, Some((0, 8))));
+    assert_eq!((store.found().damaged, store.get(RecordName::new("A").unwrap()).unwrap()), (0, Some((0, 8))));
 }

@@ -7,7 +7,7 @@
 
 use afbc_flight_core::{Mode, Refusal, Request};
 use afbc_link::Command;
-use afbc_plant::{Contact, Environment, Model, Motion, Plant, Realism};
+use afbc_plant::{Contact, Environment, Motion, Plant, PlantModel, Realism};
 use afbc_sim::in_the_loop::{Host, Station};
 use afbc_sim::paper;
 use afbc_sim::scenario::Scenario;
@@ -39,7 +39,7 @@ enum Flight {
 
 impl Flight {
     fn scenario(self) -> Scenario {
-        let paper = paper::scenario(Model::RigidBody, afbc_sim::case::Case::DEFAULT).expect("in range");
+        let paper = paper::scenario(PlantModel::RigidBody, afbc_sim::case::Case::DEFAULT).expect("in range");
         let hover = |height_m: f64| Scenario {
             environment: Environment::calm(Parameters::PAPER).expect("in range"),
             initial: Motion { position_m: Vector3::new(0.0, 0.0, height_m), ..Motion::default() },

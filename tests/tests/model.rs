@@ -53,7 +53,7 @@ proptest! {
         let [f1, f2, f3, f4] = speeds.map(|w| p.thrust_factor_n_s2 * w * w);
         let state: State = motion.measure();
         let residual = w1 - w2 + w3 - w4;
-        let model = model::Model::new(&p.to_f32());
+        let model = model::ModelConstants::new(&p.to_f32());
 
         let (q, r) = (rates_rad_s.abs(), residual.abs());
         let i = p.inertia_kg_m2;
@@ -112,7 +112,7 @@ proptest! {
     #[test]
     fn the_derivative_of_g_4_is_that_of_g_4(attitude_rad in vector(1.2), rates_rad_s in vector(5.0)) {
         let p = Parameters::PAPER;
-        let model = model::Model::new(&p.to_f32());
+        let model = model::ModelConstants::new(&p.to_f32());
         let state: State = Motion { attitude_rad, rates_rad_s, ..Motion::default() }.measure();
         let dynamics = model.dynamics(Axis::Z, &state, 0.0);
         let g = |t: f64| {
@@ -132,7 +132,7 @@ proptest! {
 /// Beyond a tilt of 84 degrees g_4 no longer falls: it stays positive, as assumption A4 requires, at any attitude.
 #[test]
 fn g_4_stays_positive_at_any_tilt() {
-    let model = model::Model::new(&Parameters::PAPER.to_f32());
+    let model = model::ModelConstants::new(&Parameters::PAPER.to_f32());
     for step in -2000..=2000_i16 {
         let tilt = f32::from(step) / 100.0;
         let state = State { attitude_rad: Vector3::new(tilt, 0.3 * tilt, 0.0), ..State::default() };

@@ -4,7 +4,7 @@
 use afbc::Profile;
 use afbc_campaign::suite::{SUITES, Suite};
 use afbc_control::Trip;
-use afbc_plant::{Drag, Environment, ParameterChange, Quantity, Turbulence};
+use afbc_plant::{Drag, Environment, ParameterChange, PlantParameter, Turbulence};
 use afbc_reader::BuiltIn;
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::flight::fly;
@@ -62,7 +62,7 @@ fn hard_flights_do_not_trip() {
         for step_m in [[0.0, 0.0, 2.0], [0.0, 0.0, -2.0], [4.0, 0.0, 0.0], [-3.0, 3.0, 0.5]] {
             let mut scenario = Scenario { duration_s: 15.0, ..hardware.clone() };
             let change = |quantity, factor| ParameterChange { quantity, factor, start_s: 1.0, end_s: f64::INFINITY };
-            let changes = vec![change(Quantity::Mass, mass), change(Quantity::ThrustFactor, thrust)];
+            let changes = vec![change(PlantParameter::Mass, mass), change(PlantParameter::ThrustFactor, thrust)];
             scenario.environment = Environment::new(*hardware.environment.nominal(), changes, Vec::new()).unwrap();
             scenario.initial.position_m = from_m;
             let to_m = from_m + Vector3::from(step_m);

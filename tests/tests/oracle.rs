@@ -2,7 +2,7 @@
 //! printed, errors over 5 s to 60 s.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)] // a table that cannot be flown must stop the test
 
-use afbc_plant::Model;
+use afbc_plant::PlantModel;
 use afbc_sim::case::{Case, Reading, Sign, Uncertainty};
 use afbc_sim::contender::ControllerKind;
 use afbc_sim::metrics::Metrics;
@@ -55,7 +55,7 @@ static FLOWN: LazyLock<Vec<(Case, ControllerKind, Metrics)>> = LazyLock::new(|| 
                 scope.spawn(move || {
                     half.iter()
                         .map(|&(case, kind)| {
-                            let scenario = scenario(Model::Simplified, case).unwrap();
+                            let scenario = scenario(PlantModel::Simplified, case).unwrap();
                             let run = Run::fly(&scenario, scenario.contender(kind).unwrap(), u64::MAX).unwrap();
                             assert_eq!(run.lost, None, "{} under {}", case.name(), kind.name());
                             (case, kind, run.metrics)

@@ -8,9 +8,9 @@ use afbc::Profile;
 use afbc::monitor::Bounds;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Curve;
-use afbc_onboard::parameters::Table;
+use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::{Configuration, Link};
-use afbc_plant::instruments::{Accelerometer, Barometer, Gnss, Gyroscope, Imu, Magnetometer, Mounting, Tracker};
+use afbc_plant::instruments::{Accelerometer, Barometer, Gnss, Gyroscope, Imu, Magnetometer, Mounting, TrackerModel};
 use afbc_plant::{Battery, Contact, Deviations, Drag, Dropouts, GroundEffect, Rotors, Sensing, Turbulence, Wind};
 use afbc_reader::words::number;
 use afbc_sim::contender::{ControllerKind, Law};
@@ -131,7 +131,7 @@ fn groups() -> Vec<Group> {
         group("Simulated sensors: `[sensors]`", "SENS_", Sensing::DEFAULT),
         group("Simulated dropouts: `[sensors.dropouts]`", "DROP_", Dropouts::DEFAULT),
         group("Simulated inertial sensor: `[instruments.imu]`", "I_", Imu::DEFAULT),
-        group("Simulated tracker: `[instruments.tracker]`", "TRK_", Tracker::DEFAULT),
+        group("Simulated tracker: `[instruments.tracker]`", "TRK_", TrackerModel::DEFAULT),
         group("Simulated GNSS receiver: `[instruments.gnss]`", "GNSS_", Gnss::DEFAULT),
         group("Simulated barometer: `[instruments.barometer]`", "BARO_", Barometer::DEFAULT),
         group("Simulated magnetometer: `[instruments.magnetometer]`", "MAG_", Magnetometer::DEFAULT),
@@ -224,7 +224,7 @@ fn sections() -> BTreeMap<String, Vec<(&'static str, [String; 4])>> {
         ("Inertial sensor", keys(Imu::DEFAULT)),
         ("Gyroscope", keys(Gyroscope::DEFAULT)),
         ("Accelerometer", keys(Accelerometer::DEFAULT)),
-        ("Tracker", keys(Tracker::DEFAULT)),
+        ("Tracker", keys(TrackerModel::DEFAULT)),
         ("Losses and freezes", keys(Dropouts::DEFAULT)),
         ("GNSS receiver", keys(Gnss::DEFAULT)),
         ("Barometer", keys(Barometer::DEFAULT)),
@@ -301,7 +301,7 @@ fn names_are_unique_and_fit_mavlink() {
 fn what_a_station_may_set_is_declared_here() {
     let rows: BTreeMap<String, Declaration> =
         groups().into_iter().flat_map(|group| group.rows).map(|row| (row.name, row.declaration)).collect();
-    let table = Table::new(Configuration::default());
+    let table = ParameterTable::new(Configuration::default());
     for parameter in table.iter() {
         assert_eq!(rows[parameter.name.as_str()].range, parameter.range, "{}", parameter.name);
     }

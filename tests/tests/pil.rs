@@ -2,9 +2,9 @@
 //! 60,000 control ticks no bit differs from the same code on the host.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
-use afbc_plant::Model;
+use afbc_plant::PlantModel;
 use afbc_sim::case::Case;
-use afbc_sim::in_the_loop::{Host, LoopEnd, Pace, Station, fly};
+use afbc_sim::in_the_loop::{Host, LoopEnd, MessagePeriods, Station, fly};
 use afbc_sim::paper::scenario;
 use core::ops::ControlFlow;
 use pil::budget::TICK_INSTRUCTIONS_MAX;
@@ -29,8 +29,8 @@ fn emulator_or_skip() -> Option<Emulator> {
 fn the_papers_flight_is_the_hosts_bit_for_bit() {
     let Some(emulator) = emulator_or_skip() else { return };
     let mut twins = Twins::new(emulator, Host::new().expect("in range"));
-    let paper = scenario(Model::Simplified, Case::DEFAULT).expect("in range");
-    let end = fly(&paper, &mut Station::new(), &mut twins, Pace::LOCKSTEP, |_| ControlFlow::Continue(()));
+    let paper = scenario(PlantModel::Simplified, Case::DEFAULT).expect("in range");
+    let end = fly(&paper, &mut Station::new(), &mut twins, MessagePeriods::LOCKSTEP, |_| ControlFlow::Continue(()));
     assert_eq!(end.expect("flown"), LoopEnd { lost: None, interrupted: false, disarmed: true });
 
     let comparison = twins.comparison();

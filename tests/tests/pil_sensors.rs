@@ -3,7 +3,7 @@
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
 use afbc_plant::instruments::{Barometer, Failure, Imu, InstrumentFault, Magnetometer};
-use afbc_sim::in_the_loop::{Host, LoopEnd, Pace, Station, fly};
+use afbc_sim::in_the_loop::{Host, LoopEnd, MessagePeriods, Station, fly};
 use afbc_sim::scenario::{Scenario, built_in};
 use core::ops::ControlFlow;
 use pil::budget::{ESTIMATING_INSTRUCTIONS_MAX, ESTIMATING_INSTRUCTIONS_MEAN};
@@ -51,7 +51,7 @@ fn twins_or_skip() -> Option<Twins> {
 fn compare(scenario: &Scenario) {
     let Some(mut twins) = twins_or_skip() else { return };
     let mut off_m: f64 = 0.0;
-    let end = fly(scenario, &mut Station::new(), &mut twins, Pace::LOCKSTEP, |sample| {
+    let end = fly(scenario, &mut Station::new(), &mut twins, MessagePeriods::LOCKSTEP, |sample| {
         // It starts away from the reference.
         let distance_m =
             if sample.time_s < 5.0 { 0.0 } else { (sample.motion.position_m - sample.reference.position_m).norm() };
@@ -83,7 +83,7 @@ fn what_is_left_of_the_sensors_is_the_hosts_bit_for_bit() {
     let fault = |failure, start_s| InstrumentFault { failure, start_s, end_s: 9.0 };
     scenario.instrument_faults = vec![fault(Failure::ImuDead, 3.0), fault(Failure::TrackerLost, 6.0)];
     let Some(mut twins) = twins_or_skip() else { return };
-    let end = fly(&scenario, &mut Station::new(), &mut twins, Pace::LOCKSTEP, |_| ControlFlow::Continue(()));
+    let end = fly(&scenario, &mut Station::new(), &mut twins, MessagePeriods::LOCKSTEP, |_| ControlFlow::Continue(()));
     let lost = end.expect("flown").lost.expect("nobody knows the attitude");
     let comparison = twins.comparison();
     assert!(lost.time_s > 8.0 && comparison.armed_ticks > 8_000, "{lost:?}, {comparison:?}");

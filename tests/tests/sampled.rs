@@ -9,7 +9,7 @@
 
 use afbc::Profile;
 use afbc_control::FlightController;
-use afbc_flight_core::{ArmingLimits, Asked, Inbox, Mode, Request, Stamped, Vehicle, VehicleMemory};
+use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, Stamped, TicketedRequest};
 use afbc_plant::Sensing;
 use afbc_sim::contender::{Contender, ControllerKind, Task};
 use afbc_sim::scenario::{Scenario, built_in};
@@ -61,8 +61,8 @@ fn fly<C: FlightController<N>, const N: usize>(
     controller: C,
     mut tracker: Tracker,
 ) -> (f64, bool) {
-    let vehicle = Vehicle::new(scenario.vehicle.to_f32(), ArmingLimits::NONE, controller).unwrap();
-    let (mut memory, mut inbox) = (VehicleMemory::default(), Inbox::default());
+    let vehicle = FlightCore::new(scenario.vehicle.to_f32(), ArmingLimits::NONE, controller).unwrap();
+    let (mut memory, mut inbox) = (FlightCoreMemory::default(), Inbox::default());
     let mut plant = scenario.plant(0.001).unwrap();
     let (mut squares, mut count) = (0.0, 0);
     let mut outcome = None;
@@ -73,7 +73,7 @@ fn fly<C: FlightController<N>, const N: usize>(
         }
         inbox.put_setpoint(Stamped { value: reference.setpoint(), at_us: now_ms * 1000 });
         if now_ms == ARMED_MS {
-            inbox.request(Asked { request: Request::Arm, ticket: 0 });
+            inbox.request(TicketedRequest { request: Request::Arm, ticket: 0 });
         }
         let tick = vehicle.tick(&mut memory, now_ms * 1000, &inbox.take());
         if now_ms >= ARMED_MS {

@@ -4,8 +4,8 @@
 
 use afbc::Profile;
 use afbc_campaign::suite::SUITES;
-use afbc_plant::instruments::{Failure, InstrumentFault, Tracker};
-use afbc_plant::{Environment, ParameterChange, Quantity};
+use afbc_plant::instruments::{Failure, InstrumentFault, TrackerModel};
+use afbc_plant::{Environment, ParameterChange, PlantParameter};
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::flight::{LOST_DISTANCE_M, fly};
 use afbc_sim::scenario::Scenario;
@@ -172,7 +172,7 @@ fn the_model_that_stands_in_for_the_inertial_sensor_need_not_be_right() {
         scenario.environment = Environment::new(scenario.vehicle, vec![change], Vec::new()).unwrap();
         scenario
     };
-    let tracked = |name: &str, change: &dyn Fn(&mut Tracker)| {
+    let tracked = |name: &str, change: &dyn Fn(&mut TrackerModel)| {
         let mut scenario = Scenario { name: name.into(), ..base.clone() };
         scenario.instruments.tracker.iter_mut().for_each(change);
         scenario
@@ -181,11 +181,11 @@ fn the_model_that_stands_in_for_the_inertial_sensor_need_not_be_right() {
     let failure = Failure::TrackerJumped { by_m: Vector3::new(0.5, 0.0, 0.0), yaw_rad: 0.3 };
     jumped.instrument_faults.push(InstrumentFault { failure, start_s: 15.0, end_s: jumped.duration_s });
     let scenarios = [
-        changed(Quantity::ThrustFactor, 0.5),
-        changed(Quantity::ThrustFactor, 2.0),
-        changed(Quantity::Inertia, 0.6),
-        changed(Quantity::Inertia, 1.5),
-        changed(Quantity::Mass, 1.4),
+        changed(PlantParameter::ThrustFactor, 0.5),
+        changed(PlantParameter::ThrustFactor, 2.0),
+        changed(PlantParameter::Inertia, 0.6),
+        changed(PlantParameter::Inertia, 1.5),
+        changed(PlantParameter::Mass, 1.4),
         tracked("slow", &|tracker| tracker.rate_hz = 30.0),
         tracked("late", &|tracker| tracker.delay_s = 0.04),
         tracked("noisy", &|tracker| (tracker.position_m, tracker.attitude_rad) = (0.005, 0.01)),

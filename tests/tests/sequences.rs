@@ -1,18 +1,18 @@
-//! Random sequences of modes, links, weather and faults in closed loop: what [`aloft::checker`] demands holds at every
-//! tick, and afterwards the vehicle stands disarmed or flies where it should.
+//! Random sequences of modes, links, weather and faults in closed loop: what [`airborne::checker`] demands holds at
+//! every tick, and afterwards the vehicle stands disarmed or flies where it should.
 //!
 //! `SEQUENCES=1000 cargo test --release -p flight-tests --test sequences` flies a thousand; `FIRST=17 SEQUENCES=1` the
 //! seventeenth alone.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)] // what cannot fly stops the test
 
-mod aloft;
+mod airborne;
 
 use afbc_guidance::FlightMode;
-use afbc_link::{Address, Answer, Command, Control, Datum, Downlink, Height, Mission, Plan, Storage, Uplink};
+use afbc_link::{Address, Answer, Command, ControlRequest, Datum, Downlink, Height, Mission, Plan, Storage, Uplink};
 use afbc_onboard::services::modes;
-use aloft::checker::{Bounds, End};
-use aloft::session::{global, item};
-use aloft::{COMPANION, Checker, STATION, Session, Tick, on_all_cores, place, velocity};
+use airborne::checker::{Bounds, End};
+use airborne::session::{global, item};
+use airborne::{COMPANION, Checker, STATION, Session, Tick, on_all_cores, place, velocity};
 use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::strategy::ValueTree;
@@ -79,7 +79,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
         (-20.0_f32..20.0, -20.0_f32..20.0, 0.5_f32..10.0).prop_map(|(x, y, z)| place(x, y, z)),
         (-5.0_f32..5.0, -5.0_f32..5.0, -1.5_f32..3.0).prop_map(|(x, y, z)| velocity(x, y, z)),
     ];
-    let control = select(vec![Control::Take, Control::Release]);
+    let control = select(vec![ControlRequest::Take, ControlRequest::Release]);
     let line = prop_oneof![
         (-4.0_f64..4.0, -4.0_f64..4.0).prop_map(|(x, y)| format!("wind {x:.1} {y:.1} 0")),
         (-4.0_f64..4.0, -4.0_f64..4.0).prop_map(|(x, y)| format!("gust {x:.1} {y:.1} 0 0.5 1")),

@@ -3,11 +3,11 @@
 
 use afbc::Profile;
 use afbc_campaign::compare::{self, standard_and_monitored};
-use afbc_campaign::suite::{Flight, SUITES, Suite};
-use afbc_plant::{Misreading, Quantity};
+use afbc_campaign::suite::{SUITES, Suite, SuiteFlight};
+use afbc_plant::{Misreading, PlantParameter};
 use afbc_reader::BuiltIn;
 use afbc_report::markers;
-use afbc_report::suite::{self, Flown};
+use afbc_report::suite::{self, FlownSuite};
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::flight::fly;
 use afbc_types::{Axis, Declared, Value};
@@ -35,7 +35,7 @@ fn compared(name: &str, page: &str) {
     let suite = built_in(name);
     let scenarios = suite.under(&standard_and_monitored()).unwrap();
     let comparisons = compare::fly(scenarios, 1, u64::MAX, &|| ()).unwrap();
-    let code = suite::markdown(Flown { suite: &suite, comparisons: &comparisons });
+    let code = suite::markdown(FlownSuite { suite: &suite, comparisons: &comparisons });
     let [begin, end] = suite::markers(name);
     let (_, page, _) = markers::parts(page, [&begin, &end]).expect("both markers");
     let lines = || page.lines().zip(code.lines());
@@ -153,11 +153,11 @@ fn a_suites_figures_are_those_of_the_flight() {
 #[test]
 fn the_flights_of_the_field_are_those_it_names() {
     let suite = built_in("field");
-    let peak = |flight: &Flight, derivative: fn(&afbc_sim::trajectory::Reference) -> f64| {
+    let peak = |flight: &SuiteFlight, derivative: fn(&afbc_sim::trajectory::Reference) -> f64| {
         let times = (0..(flight.scenario.duration_s * 1e3) as u32).map(|k| 1e-3 * f64::from(k));
         times.map(|t| derivative(&flight.scenario.trajectory.at(t))).fold(0.0, f64::max)
     };
-    let vehicle = |flight: &Flight| flight.scenario.vehicle_file.as_ref().map(|vehicle| vehicle.name.clone());
+    let vehicle = |flight: &SuiteFlight| flight.scenario.vehicle_file.as_ref().map(|vehicle| vehicle.name.clone());
     let mut found = BTreeSet::new();
     for flight in &suite.flights {
         let name = flight.scenario.name.as_str();
@@ -227,7 +227,7 @@ fn the_flights_of_the_field_are_those_it_names() {
 fn the_faults_are_complete() {
     let suite = built_in("faults");
     let mut found = BTreeSet::new();
-    for Flight { scenario, .. } in &suite.flights {
+    for SuiteFlight { scenario, .. } in &suite.flights {
         let percent = |share: f64| (100.0 * share).round();
         let faults = scenario.realism.rotors.faults.iter();
         found.extend(faults.map(|fault| format!("rotor {} {}", fault.rotor, percent(fault.efficiency))));
@@ -243,9 +243,10 @@ fn the_faults_are_complete() {
         }));
     }
     let rotors = (1..5).flat_map(|rotor| [0, 20, 40, 60, 80].map(|share| format!("rotor {rotor} {share}")));
-    let models = [Quantity::ThrustFactor, Quantity::Inertia, Quantity::Mass];
+    let models = [PlantParameter::ThrustFactor, PlantParameter::Inertia, PlantParameter::Mass];
     let models = models.iter().flat_map(|quantity| ["2", "0.5"].map(|factor| format!("{quantity:?} {factor}")));
-    let moments = [Quantity::RollMoment, Quantity::PitchMoment, Quantity::YawMoment].map(|m| format!("{m:?} -1"));
+    let moments = [PlantParameter::RollMoment, PlantParameter::PitchMoment, PlantParameter::YawMoment]
+        .map(|m| format!("{m:?} -1"));
     let signs = Axis::ALL.map(|axis| format!("{} times -1", axis.name()));
     let offsets = Axis::ALL.map(|axis| format!("{} off", axis.name()));
     let others = ["all frozen", "x frozen", "payload true", "payload false"].map(String::from);

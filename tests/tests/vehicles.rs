@@ -114,7 +114,7 @@ fn a_perfect_hover_does_not_trip() {
         let gains = Profile::Flight.gains_for(&vehicle, afbc::LAG_S);
         let guarded =
             Guarded::new(vehicle, settings, gains, afbc::monitor::Bounds::new(&gains, &vehicle, &settings)).unwrap();
-        let mut memory = afbc_control::Screened::default();
+        let mut memory = afbc_control::Validated::default();
         for _ in 0..5_000 {
             let command =
                 guarded.step(&mut memory, Some(&afbc_types::State::default()), &afbc_types::Setpoint::default());

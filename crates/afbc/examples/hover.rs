@@ -1,14 +1,14 @@
 //! One step of AFBC, one metre below its setpoint: `cargo run -p afbc --example hover`.
 
 use afbc::{Adaptive, Controller, Profile};
-use afbc_control::{FlightController, Screened};
+use afbc_control::{FlightController, Validated};
 use afbc_types::{OutOfRange, Parameters, Setpoint, State};
 
 fn main() -> Result<(), OutOfRange> {
     let vehicle = Parameters::PAPER.to_f32();
     let law = Adaptive::new(Profile::Flight.gains_for(&vehicle, afbc::LAG_S))?;
     let controller = Controller::new(vehicle, Profile::Flight.settings(), law)?;
-    let mut memory = Screened::default();
+    let mut memory = Validated::default();
     let mut setpoint = Setpoint::default();
     setpoint.position_m.z = 1.0;
     let action = controller.step(&mut memory, Some(&State::default()), &setpoint);

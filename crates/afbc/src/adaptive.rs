@@ -3,9 +3,9 @@
 use crate::backstepping::{self, proportional};
 use crate::fuzzy::{Basis, Firing, Membership};
 use crate::law::{Context, Law, Tracking};
-use crate::model::Model;
+use crate::model::ModelConstants;
 use crate::safeguards::Safeguards;
-use afbc_control::{Errors, Estimate, math};
+use afbc_control::{AdaptiveEstimate, Errors, math};
 use afbc_types::{Axis, Declared, OutOfRange, PerAxis, parameters};
 use nalgebra::{Matrix3, Vector3};
 
@@ -79,7 +79,7 @@ impl Gains {
     }
 }
 
-/// Derivatives of an [`Estimate`]; that of Theta_hat, gamma e_2 w(x), in factors ([`Firing`]).
+/// Derivatives of an [`AdaptiveEstimate`]; that of Theta_hat, gamma e_2 w(x), in factors ([`Firing`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rate {
     first: Vector3<f32>,
@@ -108,25 +108,25 @@ impl Rate {
 }
 
 /// Returns the estimate with u_a = `input` for any errors, since the weights of the rules sum to one.
-pub fn even(input: f32) -> Estimate {
-    Estimate { theta: Matrix3::repeat(input), delta: 0.0 }
+pub fn even(input: f32) -> AdaptiveEstimate {
+    AdaptiveEstimate { theta: Matrix3::repeat(input), delta: 0.0 }
 }
 
 /// Returns the estimate with u_a = `input` for these weights of the rules: as even over the rules as |Theta_hat| <=
 /// `norm_max` allows, but at least as large as the input requires.
-fn spread(input: f32, weights: &Matrix3<f32>, norm_max: f32) -> Estimate {
+fn spread(input: f32, weights: &Matrix3<f32>, norm_max: f32) -> AdaptiveEstimate {
     // The smallest such Theta_hat; the rest of an even one is orthogonal to the weights.
     let least = weights * (input / weights.norm_squared());
     let rest = Matrix3::repeat(input) - least;
     let room = math::max(norm_max * norm_max - least.norm_squared(), 0.0);
     let square = rest.norm_squared();
     let share = if square > room { math::sqrt(room / square) } else { 1.0 };
-    Estimate { theta: least + rest * share, delta: 0.0 }
+    AdaptiveEstimate { theta: least + rest * share, delta: 0.0 }
 }
 
 /// Advances the estimate by one step of explicit Euler, with projection into the bounds.
 #[inline]
-fn advance(estimate: &mut Estimate, rate: &Rate, safeguards: &Safeguards, dt_s: f32) {
+fn advance(estimate: &mut AdaptiveEstimate, rate: &Rate, safeguards: &Safeguards, dt_s: f32) {
     let Safeguards { theta_max, delta_max, .. } = *safeguards;
     // If the leakage is faster than the step, the estimate becomes zero instead of changing its sign.
     let keep = math::max(1.0 - rate.leakage * dt_s, 0.0);
@@ -176,7 +176,13 @@ impl Subsystem {
     /// Returns (20), and the derivatives of the estimate by (33), (34) with their [`Safeguards`], both from the present
     /// estimate. `unallocated` is the part of the input that could not be allocated in the last step.
     #[inline]
-    pub fn law(&self, errors: &Errors, inputs: [f32; 2], estimate: &Estimate, unallocated: f32) -> (Terms, Rate) {
+    pub fn law(
+        &self,
+        errors: &Errors,
+        inputs: [f32; 2],
+        estimate: &AdaptiveEstimate,
+        unallocated: f32,
+    ) -> (Terms, Rate) {
         let Gains { gamma, eta, safeguards, .. } = &self.gains;
         let e2 = errors.e2;
         let Firing { first, second, share } = self.basis.fire(inputs);
@@ -199,7 +205,7 @@ impl Subsystem {
         [x1, x2]: [f32; 2],
         unallocated: f32,
         context: &Context,
-        estimate: &mut Estimate,
+        estimate: &mut AdaptiveEstimate,
     ) -> f32 {
         let (terms, rate) = self.law(errors, [x1, x2], estimate, unallocated);
         if context.adapt {
@@ -249,13 +255,20 @@ impl Adaptive {
     }
 
     /// Returns u_a (22) of the subsystem; `x` is x_1, x_2 of an attitude.
-    pub(crate) fn fuzzy(&self, axis: Axis, x: [f32; 2], errors: &Errors, estimate: &Estimate) -> f32 {
+    pub(crate) fn fuzzy(&self, axis: Axis, x: [f32; 2], errors: &Errors, estimate: &AdaptiveEstimate) -> f32 {
         self.subsystems[axis].basis.weights(fuzzy_inputs(axis, x, errors)).dot(&estimate.theta)
     }
 
     /// Returns the estimate for which u_a is `fuzzy` with these errors, spread over the rules; `x` is x_1, x_2 of an
     /// attitude.
-    pub(crate) fn resumed(&self, axis: Axis, fuzzy: f32, x: [f32; 2], errors: &Errors, norm_max: f32) -> Estimate {
+    pub(crate) fn resumed(
+        &self,
+        axis: Axis,
+        fuzzy: f32,
+        x: [f32; 2],
+        errors: &Errors,
+        norm_max: f32,
+    ) -> AdaptiveEstimate {
         spread(fuzzy, &self.subsystems[axis].basis.weights(fuzzy_inputs(axis, x, errors)), norm_max)
     }
 }
@@ -266,10 +279,16 @@ impl Law for Adaptive {
 
     const OBSERVES: bool = true;
 
-    type Estimate = Estimate;
+    type Estimate = AdaptiveEstimate;
 
     #[inline(always)]
-    fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Estimate) -> (f32, Errors) {
+    fn input(
+        &self,
+        axis: Axis,
+        tracking: &Tracking,
+        context: &Context,
+        estimate: &mut AdaptiveEstimate,
+    ) -> (f32, Errors) {
         let subsystem = &self.subsystems[axis];
         let errors = tracking.errors(subsystem.gains.backstepping.alpha1);
         let inputs = fuzzy_inputs(axis, [tracking.x1, tracking.x2], &errors);
@@ -283,21 +302,21 @@ impl Law for Adaptive {
         (known + subsystem.step(&errors, inputs, context.unallocated[axis], context, estimate), errors)
     }
 
-    fn approach(&self, axis: Axis, known: Option<&Model>) -> f32 {
+    fn approach(&self, axis: Axis, known: Option<&ModelConstants>) -> f32 {
         let gains = &self.subsystems[axis].gains.backstepping;
         known.map_or(gains.alpha1, |model| gains.approach(model.hover_gain(axis)))
     }
 
-    fn start(&self, estimates: &mut PerAxis<Estimate>, weight_n: f32) {
+    fn start(&self, estimates: &mut PerAxis<AdaptiveEstimate>, weight_n: f32) {
         estimates.z = even(weight_n);
     }
 
-    fn hover_thrust_n(&self, z: &Estimate, weight_n: f32, known_n: f32) -> f32 {
+    fn hover_thrust_n(&self, z: &AdaptiveEstimate, weight_n: f32, known_n: f32) -> f32 {
         // The rule for zero error and zero speed.
         math::max(known_n + z.theta.m22, HOVER_SHARE_MIN * weight_n)
     }
 
-    fn learnt(estimate: &Estimate) -> Estimate {
+    fn learnt(estimate: &AdaptiveEstimate) -> AdaptiveEstimate {
         *estimate
     }
 }
@@ -308,7 +327,7 @@ mod tests {
     use super::*;
 
     /// u_a of the estimate for these weights.
-    fn fuzzy(estimate: &Estimate, weights: &Matrix3<f32>) -> f32 {
+    fn fuzzy(estimate: &AdaptiveEstimate, weights: &Matrix3<f32>) -> f32 {
         weights.dot(&estimate.theta)
     }
 

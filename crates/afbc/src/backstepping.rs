@@ -1,8 +1,8 @@
 //! Backstepping of one second-order subsystem (7), and the classical controller that is the paper's baseline.
 
 use crate::law::{Context, Law, Tracking};
-use crate::model::{Dynamics, Model};
-use afbc_control::{Errors, Estimate};
+use crate::model::{Dynamics, ModelConstants};
+use afbc_control::{AdaptiveEstimate, Errors};
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
 
 /// Returns the ideal law u*_eq (16) for known f, g and dg/dt, with c e_1 for e_1.
@@ -73,7 +73,7 @@ impl Gains {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Backstepping {
     gains: PerAxis<Gains>,
-    model: Model,
+    model: ModelConstants,
 }
 
 impl Backstepping {
@@ -86,7 +86,7 @@ impl Backstepping {
         for axis in Axis::ALL {
             gains[axis].validate()?;
         }
-        Ok(Backstepping { gains, model: Model::new(vehicle) })
+        Ok(Backstepping { gains, model: ModelConstants::new(vehicle) })
     }
 }
 
@@ -99,11 +99,11 @@ impl Law for Backstepping {
         classical(&self.gains[axis], tracking, &context.dynamics(&self.model, axis))
     }
 
-    fn approach(&self, axis: Axis, _known: Option<&Model>) -> f32 {
+    fn approach(&self, axis: Axis, _known: Option<&ModelConstants>) -> f32 {
         self.gains[axis].approach(self.model.hover_gain(axis))
     }
 
-    fn learnt((): &()) -> Estimate {
-        Estimate::default()
+    fn learnt((): &()) -> AdaptiveEstimate {
+        AdaptiveEstimate::default()
     }
 }

@@ -1,19 +1,19 @@
 //! Six subsystems in one cascade: position gives thrust and desired attitude, attitude gives U1..U3, and all give rotor
 //! speeds. Section III-D, Fig. 2.
 
-use crate::disturbance::{MomentObserver, Observed, Observer, Turning};
+use crate::disturbance::{ForceObserver, ForceObserverMemory, MomentObserver, Turning};
 use crate::forward::{Followed, Forward};
 use crate::law::{Context, Law, Tracking};
 use crate::limits::Limits;
-use crate::model::{Model, RollPitch, euler_rates};
-use crate::reference::{Detours, Reference};
+use crate::model::{ModelConstants, RollPitch, euler_rates};
+use crate::reference::{Detours, ReferenceFilter};
 use crate::rotation::Turn;
 pub use crate::settings::Settings;
 use crate::standstill::Standstill;
 use crate::tilt::Tilt;
 use afbc_control::command_filter::{CommandFilter, Filtered};
 use afbc_control::mixer::{Allocation, Mixer};
-use afbc_control::{Action, Errors, Estimate, FlightController, Smoothed, Smoother, Trace, math};
+use afbc_control::{Action, AdaptiveEstimate, Errors, FlightController, Smoothed, Smoother, Trace, math};
 use afbc_types::{Airframe, Axis, Declared, Inputs, OutOfRange, Parameters, PerAxis, Setpoint, State};
 use nalgebra::Vector3;
 
@@ -35,10 +35,10 @@ const EFFORT_RAD_S: f32 = 5.0;
 pub struct Controller<L, const N: usize = 4> {
     law: L,
     /// Nominal model for the feed-forward.
-    model: Model,
-    observer: Option<Observer>,
+    model: ModelConstants,
+    observer: Option<ForceObserver>,
     moments: Option<MomentObserver>,
-    reference: Option<Reference>,
+    reference: Option<ReferenceFilter>,
     smoother: Smoother,
     mixer: Mixer<N>,
     filter: CommandFilter,
@@ -93,13 +93,13 @@ pub struct Cascade<E> {
     rotor_residual_rad_s: f32,
     /// eta and d eta/dt in the last step: the body's rates as in (6), or with feed-forward what follows from them.
     pub(crate) turning: [Vector3<f32>; 2],
-    /// See [`Observer`]; none before the first step.
-    pub(crate) observed: Option<Observed>,
+    /// See [`ForceObserver`]; none before the first step.
+    pub(crate) observed: Option<ForceObserverMemory>,
     /// See [`MomentObserver`]; none before the first step.
     turned: Option<Turning>,
     /// Factor of U1..U3 for weak rotors, less one: see [`EFFORT_MIN`].
     more_effort: f32,
-    /// See [`Reference`]; none before the first step.
+    /// See [`ReferenceFilter`]; none before the first step.
     detours: Option<Detours>,
     /// See [`Smoother`].
     smoothed: Option<Smoothed>,
@@ -169,7 +169,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let mixer = settings.common.mixer(vehicle)?;
         let Parameters { gravity_m_s2, .. } = vehicle.parameters;
         let Limits { speed_max_m_s, climb_max_m_s, .. } = settings.limits;
-        let model = Model::new(&vehicle.parameters);
+        let model = ModelConstants::new(&vehicle.parameters);
         let known = settings.feed_forward.then_some(&model);
         let approach = |axis, speed| {
             let approach_1_s = law.approach(axis, known);
@@ -183,9 +183,9 @@ impl<L: Law, const N: usize> Controller<L, N> {
             ],
             law,
             model,
-            // Of a law that is not given what is known, it would be no use.
+            // Without feed-forward, or in a law that does not use them, the observers would have no effect.
             observer: (settings.feed_forward && L::OBSERVES)
-                .then(|| Observer::new(&settings.disturbance, &settings.common, &vehicle.parameters))
+                .then(|| ForceObserver::new(&settings.disturbance, &settings.common, &vehicle.parameters))
                 .transpose()?
                 .flatten(),
             moments: (settings.feed_forward && L::OBSERVES)
@@ -194,7 +194,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
                     MomentObserver::new(&settings.disturbance, &vehicle.parameters, thrust_max_n, dt_s)
                 })
                 .flatten(),
-            reference: Reference::new(&settings.reference, &settings.limits, settings.common.dt_s),
+            reference: ReferenceFilter::new(&settings.reference, &settings.limits, settings.common.dt_s),
             smoother: Smoother::new(&settings.smoothing, settings.common.dt_s)?,
             forward: Forward::new(settings.forward_rad_s, settings.common.dt_s)?,
             filter: CommandFilter::new(settings.command_filter_rad_s, settings.common.dt_s)?
@@ -509,7 +509,7 @@ impl<L: Law, const N: usize> FlightController<N> for Controller<L, N> {
         memory.trace()
     }
 
-    fn learnt(memory: &Self::Memory) -> PerAxis<Estimate> {
+    fn learnt(memory: &Self::Memory) -> PerAxis<AdaptiveEstimate> {
         PerAxis::from_fn(|axis| L::learnt(&memory.estimates[axis]))
     }
 }

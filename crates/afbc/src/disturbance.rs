@@ -73,9 +73,9 @@ impl DisturbanceObserver {
     }
 }
 
-/// The observer with its constants; everything that changes in flight is in [`Observed`].
+/// The observer with its constants; everything that changes in flight is in [`ForceObserverMemory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Observer {
+pub struct ForceObserver {
     /// Corrections of v_hat \[1\] and f_hat \[1/s\] per step.
     velocity: f32,
     acceleration: f32,
@@ -90,7 +90,7 @@ pub struct Observer {
 
 /// Memory of the observer: v_hat, f_hat along x and y, and T.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Observed {
+pub struct ForceObserverMemory {
     velocity_m_s: [f32; 2],
     acceleration_m_s2: [f32; 2],
     thrust_n: f32,
@@ -100,14 +100,14 @@ pub struct Observed {
     held: bool,
 }
 
-impl Observed {
+impl ForceObserverMemory {
     /// Keeps f_hat as it is in the next step.
     pub fn hold(&mut self) {
         self.held = true;
     }
 }
 
-impl Observer {
+impl ForceObserver {
     /// Makes the observer from valid settings for a vehicle; none without a bandwidth.
     ///
     /// # Errors
@@ -122,7 +122,7 @@ impl Observer {
         // Two poles at exp(-w dt).
         let rest = 1.0 - math::exp(-bandwidth * dt_s);
         let memory = Memory::new(settings.memory_1_s, settings.memory_speed_m_s, dt_s)?;
-        Ok((bandwidth > 0.0).then(|| Observer {
+        Ok((bandwidth > 0.0).then(|| ForceObserver {
             velocity: 2.0 * rest,
             acceleration: rest * rest / dt_s,
             lag: if lag_s > 0.0 { 1.0 - math::exp(-dt_s / lag_s) } else { 1.0 },
@@ -139,14 +139,14 @@ impl Observer {
     #[inline]
     pub fn advance(
         &self,
-        observed: &mut Option<Observed>,
+        observed: &mut Option<ForceObserverMemory>,
         state: &State,
         up: &Vector3<f32>,
         hover_n: f32,
         [fresh, stands]: [bool; 2],
     ) -> Vector3<f32> {
         let measured = [state.velocity_m_s.x, state.velocity_m_s.y];
-        let start = |thrust_n, remembered| Observed {
+        let start = |thrust_n, remembered| ForceObserverMemory {
             velocity_m_s: measured,
             acceleration_m_s2: [0.0; 2],
             thrust_n,
@@ -160,7 +160,7 @@ impl Observer {
         }
         let share = observed.thrust_n / hover_n;
         let mut drag = self.drag.acceleration(&state.velocity_m_s, up, share);
-        let Observed { velocity_m_s, acceleration_m_s2, remembered, held, .. } = observed;
+        let ForceObserverMemory { velocity_m_s, acceleration_m_s2, remembered, held, .. } = observed;
         if let Some(memory) = &self.memory {
             let weights = memory.weights(measured);
             if fresh && !*held {
@@ -194,7 +194,7 @@ impl Observer {
 
     /// Notes the thrust of all rotors that is commanded in this step \[N\].
     #[inline]
-    pub fn give(&self, observed: &mut Option<Observed>, thrust_n: f32) {
+    pub fn give(&self, observed: &mut Option<ForceObserverMemory>, thrust_n: f32) {
         if let Some(observed) = observed {
             observed.thrust_n = math::settled(observed.thrust_n + (thrust_n - observed.thrust_n) * self.lag);
         }

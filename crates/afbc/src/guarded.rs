@@ -4,10 +4,10 @@
 use crate::adaptive::{self, Adaptive};
 use crate::cascade::{Cascade, Controller, Settings};
 use crate::integral::{Integral, IntegralBackstepping};
-use crate::model::Model;
-use crate::monitor::{Bounds, Figures, Monitor};
+use crate::model::ModelConstants;
+use crate::monitor::{Bounds, Monitor, MonitorFigures};
 use crate::safeguards::Safeguards;
-use afbc_control::{Action, Errors, Estimate, FlightController, Mixer, Trace, Trip};
+use afbc_control::{Action, AdaptiveEstimate, Errors, FlightController, Mixer, Trace, Trip};
 use afbc_types::{Airframe, Axis, OutOfRange, PerAxis, Range, Setpoint, State};
 
 /// Smallest Theta_max of z, in weights. With feed-forward, rotors that produce 45 % of their thrust need 1.2 of it on
@@ -49,8 +49,8 @@ struct Tripped {
 /// Memory of a flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory<const N: usize = 4> {
-    afbc: Cascade<Estimate>,
-    figures: Figures,
+    afbc: Cascade<AdaptiveEstimate>,
+    figures: MonitorFigures,
     tripped: Option<Tripped>,
     /// The fallback law's memory, from its first step on.
     stand_in: Option<StandIn<N>>,
@@ -58,7 +58,7 @@ pub struct Memory<const N: usize = 4> {
 
 impl<const N: usize> Memory<N> {
     /// Returns the monitor's last figures of AFBC.
-    pub fn figures(&self) -> &Figures {
+    pub fn figures(&self) -> &MonitorFigures {
         &self.figures
     }
 
@@ -91,7 +91,7 @@ impl<const N: usize> Guarded<N> {
             ..Safeguards::THETAMAX.range
         };
         hover.check(gains.z.safeguards.theta_max)?;
-        let ([roll_n, pitch_n], model) = (mixer.tilt_authority_n(weight_n), Model::new(&parameters));
+        let ([roll_n, pitch_n], model) = (mixer.tilt_authority_n(weight_n), ModelConstants::new(&parameters));
         HOVER_AUTHORITY.check(roll_n * model.hover_gain(Axis::Roll))?;
         HOVER_AUTHORITY.check(pitch_n * model.hover_gain(Axis::Pitch))?;
         let fixed = gains.map(|gains| gains.into());
@@ -108,7 +108,7 @@ impl<const N: usize> Guarded<N> {
     fn stand_in<'a>(
         &self,
         memory: &'a mut Option<StandIn<N>>,
-        (afbc, tripped): (&Cascade<Estimate>, &Tripped),
+        (afbc, tripped): (&Cascade<AdaptiveEstimate>, &Tripped),
         (state, setpoint): (&State, &Setpoint),
         fresh: bool,
     ) -> &'a Action<N> {
@@ -129,7 +129,7 @@ impl<const N: usize> Guarded<N> {
         &self,
         cascade: &Cascade<E>,
         learnt: impl Fn(Axis, [f32; 2], &Errors, &E) -> f32,
-    ) -> Cascade<Estimate> {
+    ) -> Cascade<AdaptiveEstimate> {
         let Cascade { inputs, errors, turning: [eta, eta_dot], .. } = cascade;
         let law = self.adaptive.law();
         let estimates = PerAxis::from_fn(|axis| {
@@ -201,7 +201,7 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
     }
 
     /// Zero while the fallback law flies.
-    fn learnt(memory: &Memory<N>) -> PerAxis<Estimate> {
+    fn learnt(memory: &Memory<N>) -> PerAxis<AdaptiveEstimate> {
         if memory.tripped.is_some() { PerAxis::default() } else { memory.afbc.estimates }
     }
 }

@@ -12,9 +12,9 @@
 use crate::adaptive;
 use crate::backstepping::{self, classical};
 use crate::law::{Context, Law, Tracking};
-use crate::model::Model;
+use crate::model::ModelConstants;
 use crate::safeguards::Safeguards;
-use afbc_control::{Errors, Estimate, math};
+use afbc_control::{AdaptiveEstimate, Errors, math};
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis};
 
 /// Gains of one subsystem.
@@ -50,7 +50,7 @@ pub struct Integral {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IntegralBackstepping {
     gains: PerAxis<Gains>,
-    model: Model,
+    model: ModelConstants,
 }
 
 impl IntegralBackstepping {
@@ -66,7 +66,7 @@ impl IntegralBackstepping {
             adaptive::Gains::GAMMA.range.check(*integral)?;
             Safeguards::THETAMAX.range.check(*integral_max)?;
         }
-        Ok(IntegralBackstepping { gains, model: Model::new(vehicle) })
+        Ok(IntegralBackstepping { gains, model: ModelConstants::new(vehicle) })
     }
 }
 
@@ -88,7 +88,7 @@ impl Law for IntegralBackstepping {
         (fixed + i, errors)
     }
 
-    fn approach(&self, axis: Axis, _: Option<&Model>) -> f32 {
+    fn approach(&self, axis: Axis, _: Option<&ModelConstants>) -> f32 {
         self.gains[axis].backstepping.approach(self.model.hover_gain(axis))
     }
 
@@ -97,7 +97,7 @@ impl Law for IntegralBackstepping {
         z.hover_thrust_n.unwrap_or(weight_n)
     }
 
-    fn learnt(_: &Integral) -> Estimate {
-        Estimate::default()
+    fn learnt(_: &Integral) -> AdaptiveEstimate {
+        AdaptiveEstimate::default()
     }
 }

@@ -1,7 +1,7 @@
 //! Interface of a control law in the [cascade](crate::cascade).
 
-use crate::model::{Dynamics, Model, RollPitch};
-use afbc_control::{Errors, Estimate};
+use crate::model::{Dynamics, ModelConstants, RollPitch};
+use afbc_control::{AdaptiveEstimate, Errors};
 use afbc_types::{Axis, PerAxis, State};
 use nalgebra::Vector3;
 
@@ -22,7 +22,7 @@ pub trait Law {
     -> (f32, Errors);
 
     /// Returns the speed of approach per error e_1 \[1/s\] at which the law holds a constant error.
-    fn approach(&self, axis: Axis, known: Option<&Model>) -> f32;
+    fn approach(&self, axis: Axis, known: Option<&ModelConstants>) -> f32;
 
     /// Initialises the estimates for a start in flight, for a vehicle of this weight.
     fn start(&self, _estimates: &mut PerAxis<Self::Estimate>, _weight_n: f32) {}
@@ -33,7 +33,7 @@ pub trait Law {
     }
 
     /// Returns `estimate` in AFBC's terms, for logs and monitors; zero for a law without adaptation.
-    fn learnt(estimate: &Self::Estimate) -> Estimate;
+    fn learnt(estimate: &Self::Estimate) -> AdaptiveEstimate;
 }
 
 /// Data shared by all six subsystems in one step.
@@ -57,20 +57,20 @@ pub struct Context<'a> {
     /// True if f of roll, pitch and yaw is observed, and made up for behind the law.
     pub turns_observed: bool,
     /// Nominal model that the law may use; none for the law as printed.
-    pub known: Option<&'a Model>,
+    pub known: Option<&'a ModelConstants>,
 }
 
 impl Context<'_> {
     /// Returns f, g and dg/dt of a subsystem by `model` in this step.
     #[inline]
-    pub(crate) fn dynamics(&self, model: &Model, axis: Axis) -> Dynamics {
+    pub(crate) fn dynamics(&self, model: &ModelConstants, axis: Axis) -> Dynamics {
         model.dynamics_at(axis, &self.state.rates_rad_s, &self.roll_pitch, self.rotor_residual_rad_s)
     }
 
     /// Returns the same, with f as observed: of x and y, which the model takes for zero; that of roll, pitch and yaw is
     /// left to the observer of moments.
     #[inline(always)]
-    pub(crate) fn observed(&self, model: &Model, axis: Axis) -> Dynamics {
+    pub(crate) fn observed(&self, model: &ModelConstants, axis: Axis) -> Dynamics {
         let dynamics = self.dynamics(model, axis);
         let [x, y, z] = self.observed_m_s2.into();
         match axis {

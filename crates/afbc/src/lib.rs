@@ -22,12 +22,12 @@
 //!
 //! ```
 //! use afbc::{Adaptive, Controller, Profile};
-//! use afbc_control::{FlightController, Screened};
+//! use afbc_control::{FlightController, Validated};
 //! use afbc_types::{Parameters, Setpoint, State};
 //!
 //! let vehicle = Parameters::PAPER.to_f32();
 //! let controller = Controller::new(vehicle, Profile::Paper.settings(), Adaptive::new(Profile::Paper.gains())?)?;
-//! let mut memory = Screened::default();
+//! let mut memory = Validated::default();
 //! let mut above = Setpoint::default();
 //! above.position_m.z = 1.0;
 //! let action = controller.step(&mut memory, Some(&State::default()), &above);

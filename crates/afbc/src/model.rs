@@ -116,7 +116,7 @@ pub(crate) fn euler_rates(rates_rad_s: &Vector3<f32>, at: &RollPitch) -> Vector3
 
 /// Constants a_1..a_5, b_1..b_3, 1/m and g of (6).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Model {
+pub struct ModelConstants {
     a1: f32,
     a2: f32,
     a3: f32,
@@ -129,13 +129,13 @@ pub struct Model {
     gravity: f32,
 }
 
-impl Model {
+impl ModelConstants {
     /// Computes the constants of (6) for a vehicle with valid parameters.
     pub fn new(vehicle: &Parameters) -> Self {
         let Parameters { mass_kg, rotor_inertia_kg_m2, gravity_m_s2, .. } = *vehicle;
         let (ix, iy, iz) = (vehicle.inertia_kg_m2.x, vehicle.inertia_kg_m2.y, vehicle.inertia_kg_m2.z);
         let effectiveness = vehicle.effectiveness();
-        Model {
+        ModelConstants {
             a1: (iy - iz) / ix,
             a2: rotor_inertia_kg_m2 / ix,
             a3: (iz - ix) / iy,

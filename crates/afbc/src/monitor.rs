@@ -14,7 +14,7 @@
 
 use crate::adaptive;
 use crate::cascade::{Cascade, Settings};
-use afbc_control::{Estimate, Trip, math};
+use afbc_control::{AdaptiveEstimate, Trip, math};
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
 
 /// Time over which figures are averaged \[s\].
@@ -117,7 +117,7 @@ impl Swing {
 
 /// Present figures of the monitor.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Figures {
+pub struct MonitorFigures {
     /// Norms of the estimates.
     pub norms: PerAxis<Norm>,
     /// Mean of |e_1| \[m or rad\].
@@ -130,9 +130,9 @@ pub struct Figures {
     axis: Axis,
 }
 
-impl Default for Figures {
+impl Default for MonitorFigures {
     fn default() -> Self {
-        Figures {
+        MonitorFigures {
             norms: PerAxis::default(),
             error: PerAxis::default(),
             saturation_share: 0.0,
@@ -142,7 +142,7 @@ impl Default for Figures {
     }
 }
 
-impl Figures {
+impl MonitorFigures {
     /// Returns the subsystem updated last, and its norms.
     #[inline]
     pub fn latest(&self) -> (Axis, Norm) {
@@ -150,7 +150,7 @@ impl Figures {
     }
 }
 
-/// A monitor. Constant; everything that changes in flight is in [`Figures`].
+/// A monitor. Constant; everything that changes in flight is in [`MonitorFigures`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Monitor {
     bounds: Bounds,
@@ -180,7 +180,12 @@ impl Monitor {
 
     /// Processes one step; returns why the monitor trips, if it does.
     #[inline]
-    pub fn watch(&self, figures: &mut Figures, cascade: &Cascade<Estimate>, saturated: bool) -> Option<Trip> {
+    pub fn watch(
+        &self,
+        figures: &mut MonitorFigures,
+        cascade: &Cascade<AdaptiveEstimate>,
+        saturated: bool,
+    ) -> Option<Trip> {
         let axis = figures.axis.next();
         figures.axis = axis;
 

@@ -2,7 +2,7 @@
 
 use crate::disturbance::DisturbanceObserver;
 use crate::fuzzy::Membership;
-use crate::model::Model;
+use crate::model::ModelConstants;
 use crate::reference::ReferenceModel;
 use crate::{Limits, Safeguards, Settings, adaptive, backstepping};
 use afbc_control::drag::KnownDrag;
@@ -80,7 +80,7 @@ impl Profile {
     /// Near zero the robust term is a gain of delta_hat/epsilon: the rule keeps it, times g of the paper's vehicle,
     /// below half of the limit for the subsystem's response time (`docs/flight.md`).
     pub fn flight_epsilon(axis: Axis, delta_max: f32) -> f32 {
-        2.0 * Model::new(&Parameters::PAPER.to_f32()).hover_gain(axis) * answer_s(axis) * delta_max
+        2.0 * ModelConstants::new(&Parameters::PAPER.to_f32()).hover_gain(axis) * answer_s(axis) * delta_max
     }
 
     /// Returns the settings of the cascade.
@@ -162,7 +162,7 @@ const fn answer_s(axis: Axis) -> f32 {
 ///   and are not scaled.
 /// * **Rotor lag**: see [`slowness`] and [`adaptive::Gains::slowed`].
 pub fn by_rule(gains: &PerAxis<adaptive::Gains>, vehicle: &Parameters, lag_s: f32) -> PerAxis<adaptive::Gains> {
-    let (paper, own) = (Model::new(&Parameters::PAPER.to_f32()), Model::new(vehicle));
+    let (paper, own) = (ModelConstants::new(&Parameters::PAPER.to_f32()), ModelConstants::new(vehicle));
     let scale = |axis| paper.hover_gain(axis) / own.hover_gain(axis);
     PerAxis::from_fn(|axis| gains[axis].scaled(scale(axis)).slowed(slowness(lag_s)))
 }

@@ -160,23 +160,25 @@ impl Coordinate {
 
 /// The reference model with its constants; everything that changes in flight is in [`Detours`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reference {
+pub struct ReferenceFilter {
     xy: Coordinate,
     z: Coordinate,
     yaw: Coordinate,
     dt_s: f32,
 }
 
-impl Reference {
+impl ReferenceFilter {
     /// Makes the model from valid settings, advanced every `dt_s` seconds; none if every bandwidth is 0.
     pub fn new(model: &ReferenceModel, limits: &Limits, dt_s: f32) -> Option<Self> {
         let ReferenceModel { reference_acceleration_m_s2: acceleration, .. } = *model;
         let (turn, yaw_rate) = (model.reference_turn_rad_s2, model.reference_yaw_rate_rad_s);
-        (model.reference_xy_rad_s + model.reference_z_rad_s + model.reference_yaw_rad_s > 0.0).then(|| Reference {
-            xy: Coordinate::new(model.reference_xy_rad_s, acceleration, limits.speed_max_m_s),
-            z: Coordinate::new(model.reference_z_rad_s, acceleration, limits.climb_max_m_s),
-            yaw: Coordinate::new(model.reference_yaw_rad_s, turn, yaw_rate),
-            dt_s,
+        (model.reference_xy_rad_s + model.reference_z_rad_s + model.reference_yaw_rad_s > 0.0).then(|| {
+            ReferenceFilter {
+                xy: Coordinate::new(model.reference_xy_rad_s, acceleration, limits.speed_max_m_s),
+                z: Coordinate::new(model.reference_z_rad_s, acceleration, limits.climb_max_m_s),
+                yaw: Coordinate::new(model.reference_yaw_rad_s, turn, yaw_rate),
+                dt_s,
+            }
         })
     }
 

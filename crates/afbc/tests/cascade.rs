@@ -7,10 +7,10 @@ mod common;
 use afbc::cascade::desired_attitude;
 use afbc::integral::IntegralBackstepping;
 use afbc::law::{Context, Tracking};
-use afbc::model::{Model, RollPitch};
+use afbc::model::{ModelConstants, RollPitch};
 use afbc::{Adaptive, Backstepping, Controller, Law, Limits, Profile, Settings};
 use afbc_control::command_filter::Filtered;
-use afbc_control::{FlightController, Screened};
+use afbc_control::{FlightController, Validated};
 use afbc_types::{Axis, Inputs, Parameters, PerAxis, Setpoint, State};
 use common::step;
 use nalgebra::{Rotation3, Vector3};
@@ -115,8 +115,8 @@ fn compose<L: Law + Copy>(
 ) -> Result<(), TestCaseError> {
     let vehicle = Parameters::PAPER.to_f32();
     let controller: Controller<L> = Controller::new(vehicle, settings, law).unwrap();
-    let model = Model::new(&vehicle);
-    let (mut memory, mut carried) = (Screened::default(), Carried::default());
+    let model = ModelConstants::new(&vehicle);
+    let (mut memory, mut carried) = (Validated::default(), Carried::default());
     let mut estimates = PerAxis::default();
     let known_n = if settings.feed_forward { WEIGHT_N as f32 } else { 0.0 };
     if settings.bumpless {
@@ -351,7 +351,7 @@ fn a_controller_tells_what_others_need() {
     let controller: Controller<Adaptive> = Controller::new(vehicle, Settings { limits, ..settings }, law).unwrap();
     assert_eq!(controller.dt_s(), 0.004);
     assert_eq!(controller.mixer(), &settings.common.mixer(vehicle).unwrap());
-    let mut memory = Screened::default();
+    let mut memory = Validated::default();
     let setpoint = Setpoint { position_m: Vector3::new(30.0, -20.0, 10.0), ..Setpoint::default() };
     let trace = step(&controller, &mut memory, &State::default(), &setpoint).trace;
     let distances = memory.control.distances;

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "an observer that cannot be made must fail the test")]
 
 use afbc::Settings;
-use afbc::disturbance::{ACCELERATION_MAX_M_S2, DisturbanceObserver, JUMP_M_S, Observed, Observer};
+use afbc::disturbance::{ACCELERATION_MAX_M_S2, DisturbanceObserver, ForceObserver, ForceObserverMemory, JUMP_M_S};
 use afbc_control::Settings as Common;
 use afbc_control::drag::KnownDrag;
 use afbc_types::{Parameters, State};
@@ -11,9 +11,9 @@ use proptest::prelude::*;
 
 const DT_S: f32 = 0.001;
 
-fn observer(disturbance_rad_s: f32) -> Observer {
+fn observer(disturbance_rad_s: f32) -> ForceObserver {
     let settings = DisturbanceObserver { disturbance_rad_s, ..DisturbanceObserver::DEFAULT };
-    Observer::new(&settings, &Common::DEFAULT, &Parameters::PAPER.to_f32()).unwrap().unwrap()
+    ForceObserver::new(&settings, &Common::DEFAULT, &Parameters::PAPER.to_f32()).unwrap().unwrap()
 }
 
 fn weight_n() -> f32 {
@@ -23,7 +23,7 @@ fn weight_n() -> f32 {
 /// A vehicle in flight at this attitude, whose thrust would hold it in hover.
 struct Body {
     state: State,
-    memory: Option<Observed>,
+    memory: Option<ForceObserverMemory>,
     /// Learnt hover thrust, which is what is commanded \[N\].
     hover_n: f32,
 }
@@ -43,7 +43,7 @@ impl Body {
     }
 
     /// Flies a step under the hover thrust and this disturbance, and returns what is observed.
-    fn step(&mut self, observer: &Observer, f_m_s2: [f32; 2]) -> Vector3<f32> {
+    fn step(&mut self, observer: &ForceObserver, f_m_s2: [f32; 2]) -> Vector3<f32> {
         let up = self.up();
         let seen = observer.advance(&mut self.memory, &self.state, &up, self.hover_n, [true, false]);
         observer.give(&mut self.memory, self.hover_n);
@@ -175,7 +175,7 @@ fn a_slower_observer_is_the_same_on_a_slower_clock() {
     let vehicle = Parameters::PAPER.to_f32();
     let slow = Settings { disturbance: settings, ..Settings::DEFAULT }.slowed(4.0, 0.2).disturbance;
     let [quick, slow] = [(&settings, DT_S), (&slow, 4.0 * DT_S)].map(|(settings, dt_s)| {
-        let observer = Observer::new(settings, &Common { dt_s, ..Common::DEFAULT }, &vehicle).unwrap().unwrap();
+        let observer = ForceObserver::new(settings, &Common { dt_s, ..Common::DEFAULT }, &vehicle).unwrap().unwrap();
         let (mut memory, state, up) = (None, State::default(), Vector3::new(0.05_f32.sin(), 0.0, 0.05_f32.cos()));
         (0..100_u16)
             .map(|_| {
@@ -220,7 +220,7 @@ proptest! {
 fn known_drag_is_f_from_the_start() {
     let drag = KnownDrag { rotor_drag_1_s: 0.4, body_drag_1_m: 0.02, rotor_height_m: 0.0 };
     let settings = DisturbanceObserver { disturbance_rad_s: 30.0, ..DisturbanceObserver::DEFAULT };
-    let observer = Observer::new(&settings, &Common { drag, ..Common::DEFAULT }, &Parameters::PAPER.to_f32());
+    let observer = ForceObserver::new(&settings, &Common { drag, ..Common::DEFAULT }, &Parameters::PAPER.to_f32());
     let observer = observer.unwrap().unwrap();
     let mut body = Body::new(Vector3::zeros(), weight_n());
     body.state.velocity_m_s = Vector3::new(3.0, -4.0, 0.0);
@@ -237,8 +237,8 @@ fn known_drag_is_f_from_the_start() {
 #[test]
 fn what_was_learnt_at_a_velocity_is_remembered() {
     let settings = DisturbanceObserver { disturbance_rad_s: 30.0, memory_1_s: 2.0, ..DisturbanceObserver::DEFAULT };
-    let with = Observer::new(&settings, &Common::DEFAULT, &Parameters::PAPER.to_f32()).unwrap().unwrap();
-    let without = Observer::new(
+    let with = ForceObserver::new(&settings, &Common::DEFAULT, &Parameters::PAPER.to_f32()).unwrap().unwrap();
+    let without = ForceObserver::new(
         &DisturbanceObserver { memory_1_s: 0.0, ..settings },
         &Common::DEFAULT,
         &Parameters::PAPER.to_f32(),

@@ -11,14 +11,14 @@ use afbc::reference::ReferenceModel;
 use afbc::standstill::LIFT_SHARE;
 use afbc::{Adaptive, Controller, Guarded, Profile, Settings, guarded};
 use afbc_control::mixer::HOVER_MARGIN;
-use afbc_control::{Estimate, FlightController, Health, Screened, Smoothing, Trip};
+use afbc_control::{AdaptiveEstimate, FlightController, Health, Smoothing, Trip, Validated};
 use afbc_types::{Axis, Inputs, Parameters, PerAxis, Setpoint, State};
 use common::{Stepped, U, check_step, gains, plausible, setpoint, settings, state, step, value};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
 /// Memory of a flight.
-type Flight = Screened<guarded::Memory>;
+type Flight = Validated<guarded::Memory>;
 
 const WEIGHT_N: f32 = 0.486 * 9.81;
 
@@ -136,7 +136,7 @@ proptest! {
         .unwrap();
         prop_assert_eq!((controller.dt_s(), controller.mixer()), (law.dt_s(), law.mixer()));
         prop_assert_eq!(law.dt_s(), settings.common.dt_s);
-        let (mut memory, mut other) = (Flight::default(), Screened::default());
+        let (mut memory, mut other) = (Flight::default(), Validated::default());
         for (state, setpoint) in inputs {
             controller.engage(&mut memory.control);
             let command = step(&controller, &mut memory, &state, &setpoint);
@@ -286,7 +286,7 @@ fn a_tripped_controller_learns_nothing_and_says_why() {
         assert_eq!(health, expected);
     }
     assert_eq!(*memory.control.figures(), seen);
-    assert_eq!(Guarded::learnt(&memory.control), PerAxis::<Estimate>::default(), "the other law flies");
+    assert_eq!(Guarded::learnt(&memory.control), PerAxis::<AdaptiveEstimate>::default(), "the other law flies");
 }
 
 #[test]
@@ -390,7 +390,7 @@ fn engaging_does_not_trip_by_itself() {
 #[test]
 fn a_reckoned_motion_shows_no_disturbance() {
     fn push<C: FlightController>(controller: &C, adrift: bool) -> [f32; 2] {
-        let (mut memory, mut state) = (Screened::<C::Memory>::default(), State::default());
+        let (mut memory, mut state) = (Validated::<C::Memory>::default(), State::default());
         // On its setpoint throughout, so that nothing is learnt from errors.
         let mut fly = |accelerates_m_s2: f32, adrift| {
             let mut asked = 0.0;

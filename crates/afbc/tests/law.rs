@@ -7,9 +7,9 @@ use afbc::fuzzy::{Basis, Membership};
 use afbc::integral::IntegralBackstepping;
 use afbc::law::Context;
 use afbc::law::Tracking;
-use afbc::model::{Dynamics, Model, RollPitch};
+use afbc::model::{Dynamics, ModelConstants, RollPitch};
 use afbc::{Adaptive, Backstepping, Law, Profile, Safeguards};
-use afbc_control::{Errors, Estimate};
+use afbc_control::{AdaptiveEstimate, Errors};
 use afbc_types::{Axis, Declaration, Parameters, PerAxis, State};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
@@ -42,9 +42,9 @@ fn gains() -> impl Strategy<Value = Gains> {
         })
 }
 
-fn estimate() -> impl Strategy<Value = Estimate> {
+fn estimate() -> impl Strategy<Value = AdaptiveEstimate> {
     (prop::array::uniform9(-5.0_f32..5.0), 0.0_f32..5.0)
-        .prop_map(|(theta, delta)| Estimate { theta: Matrix3::from_row_slice(&theta), delta })
+        .prop_map(|(theta, delta)| AdaptiveEstimate { theta: Matrix3::from_row_slice(&theta), delta })
 }
 
 proptest! {
@@ -149,7 +149,7 @@ proptest! {
         let backstepping = backstepping::Gains { stiffness, ..gains.backstepping };
         let gains = Gains { backstepping, ..gains };
         let state = State { attitude_rad: angles.into(), rates_rad_s: rates.into(), ..State::default() };
-        let model = Model::new(&vehicle);
+        let model = ModelConstants::new(&vehicle);
         let context = Context {
             state: &state,
             roll_pitch: RollPitch::new(&state),
@@ -322,7 +322,7 @@ fn the_hover_thrust_is_what_carries_the_vehicle() {
         Backstepping::new(&Parameters::PAPER.to_f32(), gains.map(|gains| gains.backstepping)).unwrap(),
     );
     let weight_n = 4.8;
-    let mut learnt = Estimate { theta: Matrix3::repeat(-50.0), delta: 3.0 };
+    let mut learnt = AdaptiveEstimate { theta: Matrix3::repeat(-50.0), delta: 3.0 };
     for (rule, known, wanted) in [(5.0, 0.0, 5.0), (0.6, weight_n, 5.4), (-1.5, weight_n, 3.3), (1.0, 0.0, 1.44)] {
         learnt.theta.m22 = rule;
         let got = adaptive.hover_thrust_n(&learnt, weight_n, known);
@@ -330,14 +330,14 @@ fn the_hover_thrust_is_what_carries_the_vehicle() {
     }
     assert_eq!(fixed.hover_thrust_n(&(), weight_n, 0.0), weight_n);
 
-    let mut started = PerAxis::<Estimate>::default();
+    let mut started = PerAxis::<AdaptiveEstimate>::default();
     adaptive.start(&mut started, weight_n);
     assert_eq!(adaptive.hover_thrust_n(&started.z, weight_n, 0.0), weight_n);
     for inputs in [[0.0, 0.0], [3.0, -20.0], [-9.0, 1.0]] {
         let (terms, _) = Subsystem::new(gains.z).unwrap().law(&Errors::default(), inputs, &started.z, 0.0);
         assert!((terms.sum() - weight_n).abs() < 1e-5, "{terms:?}");
     }
-    assert_eq!(PerAxis { z: Estimate::default(), ..started }, PerAxis::default());
+    assert_eq!(PerAxis { z: AdaptiveEstimate::default(), ..started }, PerAxis::default());
 }
 
 /// The speed at which an error is approached: where what is known and what is added cancel, for the g of each input;
@@ -345,7 +345,7 @@ fn the_hover_thrust_is_what_carries_the_vehicle() {
 #[test]
 fn an_error_is_approached_at_the_speed_that_the_law_holds() {
     let (vehicle, gains) = (Parameters::PAPER.to_f32(), Profile::Flight.gains());
-    let (model, adaptive) = (Model::new(&vehicle), Adaptive::new(gains).unwrap());
+    let (model, adaptive) = (ModelConstants::new(&vehicle), Adaptive::new(gains).unwrap());
     let fixed = Backstepping::new(&vehicle, gains.map(|gains| gains.backstepping)).unwrap();
     let integral = IntegralBackstepping::new(&vehicle, gains.map(|gains| gains.into())).unwrap();
     for axis in Axis::ALL {

@@ -6,7 +6,7 @@ mod common;
 use afbc::integral::IntegralBackstepping;
 use afbc::reference::ReferenceModel;
 use afbc::{Adaptive, Backstepping, Controller, Limits, Profile, Settings, backstepping};
-use afbc_control::{Errors, FlightController, Screened, Smoothing};
+use afbc_control::{Errors, FlightController, Smoothing, Validated};
 use afbc_types::{Axis, Declaration, Declared, Parameters, PerAxis, Setpoint, State};
 use common::{Stepped, U, gains, limits, plausible, setpoint, settings, state, step};
 use nalgebra::Vector3;
@@ -49,7 +49,7 @@ proptest! {
         inputs in prop::collection::vec((state(plausible), setpoint(plausible)), 20),
     ) {
         let controller = adaptive(gains, settings);
-        let mut memory = Screened::default();
+        let mut memory = Validated::default();
         let Limits { tilt_max_rad, tilt_rate_max_rad_s, .. } = settings.limits;
         let tangent_max = f64::from(tilt_max_rad).tan() * (1.0 + ROTATION);
         let rate_max = f64::from(tilt_rate_max_rad_s);
@@ -85,7 +85,7 @@ proptest! {
         let attitude_rad = Vector3::new(state.attitude_rad.x, state.attitude_rad.y, yaw_rad);
         let state = State { attitude_rad, ..state };
         let settings = Settings { limits, tilt_by_thrust: by_thrust, ..direct() };
-        let command = step(&adaptive(Profile::Flight.gains(), settings), &mut Screened::default(), &state, &setpoint);
+        let command = step(&adaptive(Profile::Flight.gains(), settings), &mut Validated::default(), &state, &setpoint);
 
         let [u5, u6] = command.trace.virtual_m_s2.map(f64::from);
         let cosine = f64::from(afbc_control::math::tilt_cosine(attitude_rad.x, attitude_rad.y));
@@ -122,7 +122,7 @@ proptest! {
         feed_forward: bool,
     ) {
         let settings = Settings { limits, feed_forward, ..direct() };
-        let command = step(&adaptive(gains, settings), &mut Screened::default(), &state, &setpoint);
+        let command = step(&adaptive(gains, settings), &mut Validated::default(), &state, &setpoint);
         let Limits { speed_max_m_s, climb_max_m_s, .. } = limits;
         for (i, axis, max) in [(0, Axis::X, speed_max_m_s), (1, Axis::Y, speed_max_m_s), (2, Axis::Z, climb_max_m_s)] {
             let backstepping::Gains { alpha1, alpha2, stiffness } = gains[axis].backstepping;
@@ -153,7 +153,7 @@ proptest! {
         let error = |yaw_rad: f32, wanted_rad: f32| {
             let state = State { attitude_rad: Vector3::new(0.0, 0.0, yaw_rad), ..State::default() };
             let setpoint = Setpoint { yaw_rad: wanted_rad, ..Setpoint::default() };
-            step(&flight(Limits::NONE), &mut Screened::default(), &state, &setpoint).trace.errors.yaw.e1
+            step(&flight(Limits::NONE), &mut Validated::default(), &state, &setpoint).trace.errors.yaw.e1
         };
         let turn = core::f32::consts::TAU * turns as f32;
         let short = error(yaw, wanted);
@@ -173,7 +173,7 @@ fn a_distant_setpoint_is_approached_at_the_speed_limit() {
     fn thrust<C: FlightController>(controller: &C, up_m: f32, climb_m_s: f32) -> f32 {
         let setpoint = Setpoint { position_m: Vector3::new(0.0, 0.0, up_m), ..Setpoint::default() };
         let state = State { velocity_m_s: Vector3::new(0.0, 0.0, climb_m_s), ..State::default() };
-        step(controller, &mut Screened::default(), &state, &setpoint).trace.inputs.thrust_n
+        step(controller, &mut Validated::default(), &state, &setpoint).trace.inputs.thrust_n
     }
     fn check<C: FlightController>(controller: &C) {
         for up_m in [0.3, 1.5, 5.0, 10.0, 100.0, 1e4] {
@@ -206,7 +206,7 @@ fn no_attitude_is_singular() {
         for pitch in -36..=36 {
             let angle = |step: i32| step as f32 * core::f32::consts::PI / 36.0;
             let state = State { attitude_rad: Vector3::new(angle(roll), angle(pitch), 0.0), ..State::default() };
-            let command = step(&controller, &mut Screened::default(), &state, &setpoint);
+            let command = step(&controller, &mut Validated::default(), &state, &setpoint);
             common::check_step(&command, &Profile::Flight.settings()).unwrap();
             assert!(tilt_tangent(&command) <= tangent_max, "{command:?}");
         }

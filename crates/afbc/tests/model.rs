@@ -3,9 +3,9 @@
 
 mod common;
 
-use afbc::model::{Model, RollPitch, TILT_COSINE_MIN};
+use afbc::model::{ModelConstants, RollPitch, TILT_COSINE_MIN};
 use afbc::{Adaptive, Controller, Profile, Settings};
-use afbc_control::Screened;
+use afbc_control::Validated;
 use afbc_types::{Axis, Declaration, Parameters, Setpoint, State};
 use common::{U, spread, step};
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -54,7 +54,7 @@ fn eta_dot(settings: Settings, attitude_rad: Vector3<f32>, rates_rad_s: Vector3<
     let controller = Controller::new(Parameters::PAPER.to_f32(), settings, law).unwrap();
     let state = State { attitude_rad, rates_rad_s, ..State::default() };
     let setpoint = Setpoint { yaw_rad: attitude_rad.z, ..Setpoint::default() };
-    let trace = step(&controller, &mut Screened::default(), &state, &setpoint).trace;
+    let trace = step(&controller, &mut Validated::default(), &state, &setpoint).trace;
     let [roll, pitch] = trace.filtered.map(|filtered| filtered.rate);
     let errors = trace.errors;
     Vector3::new(roll - errors.roll.e1_dot, pitch - errors.pitch.e1_dot, -errors.yaw.e1_dot).cast()
@@ -78,7 +78,7 @@ proptest! {
         let largest = turning.abs().max() * (inertia.max() * turning.abs().max() + spin.norm());
         let arm_m = f64::from(vehicle.arm_m);
         let per_newton = [arm_m, arm_m, f64::from(vehicle.drag_factor_n_m_s2) / f64::from(vehicle.thrust_factor_n_s2)];
-        let (model, state) = (Model::new(&vehicle), State { rates_rad_s: rates, ..State::default() });
+        let (model, state) = (ModelConstants::new(&vehicle), State { rates_rad_s: rates, ..State::default() });
         for (index, axis) in [Axis::Roll, Axis::Pitch, Axis::Yaw].into_iter().enumerate() {
             let (about, got) = (inertia.as_slice()[index], model.dynamics(axis, &state, omega));
             let (f, g) = (moment.as_slice()[index] / about, per_newton[index] / about);
@@ -92,7 +92,7 @@ proptest! {
     /// Omega of (6); x and y: u5 and u6 are the accelerations.
     #[test]
     fn position_is_that_of_a_thrust_along_body_z(vehicle in vehicle(), eta in attitude(1.0), rates in rates()) {
-        let (model, mass) = (Model::new(&vehicle), f64::from(vehicle.mass_kg));
+        let (model, mass) = (ModelConstants::new(&vehicle), f64::from(vehicle.mass_kg));
         let state = State { attitude_rad: eta, rates_rad_s: rates, ..State::default() };
         let upward = |time_s: f64| {
             let eta = eta.cast::<f64>() + rates.cast::<f64>() * time_s;
@@ -149,7 +149,7 @@ proptest! {
 /// R e_z points where roll and pitch say: the cosine of the tilt, and where (6) counts no less than 0.1 of it.
 #[test]
 fn the_tilt_is_the_angle_of_body_z() {
-    let model = Model::new(&Parameters::PAPER.to_f32());
+    let model = ModelConstants::new(&Parameters::PAPER.to_f32());
     for (roll, pitch) in (-31..=31).flat_map(|roll| (-31..=31).map(move |pitch| (roll, pitch))) {
         let attitude_rad = Vector3::new(0.1 * roll as f32, 0.1 * pitch as f32, 0.4);
         let state = State { attitude_rad, ..State::default() };

@@ -1,9 +1,9 @@
 //! Every figure of the monitor compared with its definition, and every trip, which a healthy flight does not cause.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
-use afbc::monitor::{Bounds, Figures, Monitor, TRIM_SHARE};
+use afbc::monitor::{Bounds, Monitor, MonitorFigures, TRIM_SHARE};
 use afbc::{Cascade, Profile, Settings};
-use afbc_control::{Estimate, Trip};
+use afbc_control::{AdaptiveEstimate, Trip};
 use afbc_types::{Axis, Inputs, Parameters, PerAxis};
 use nalgebra::Matrix3;
 use proptest::prelude::*;
@@ -34,7 +34,12 @@ fn hover() -> Seen {
 }
 
 /// Processes one step with these estimates and inputs.
-fn look(monitor: &Monitor, figures: &mut Figures, estimates: PerAxis<Estimate>, seen: &Seen) -> Option<Trip> {
+fn look(
+    monitor: &Monitor,
+    figures: &mut MonitorFigures,
+    estimates: PerAxis<AdaptiveEstimate>,
+    seen: &Seen,
+) -> Option<Trip> {
     let mut cascade = Cascade::default();
     let PerAxis { roll, pitch, yaw, z, .. } = seen.inputs;
     cascade.asked = Inputs { roll_n: roll, pitch_n: pitch, yaw_n: yaw, thrust_n: z };
@@ -46,9 +51,9 @@ fn look(monitor: &Monitor, figures: &mut Figures, estimates: PerAxis<Estimate>, 
 fn watch(
     monitor: &Monitor,
     steps: usize,
-    mut step: impl FnMut(usize) -> (PerAxis<Estimate>, Seen),
-) -> (Figures, Option<(usize, Trip)>) {
-    let mut figures = Figures::default();
+    mut step: impl FnMut(usize) -> (PerAxis<AdaptiveEstimate>, Seen),
+) -> (MonitorFigures, Option<(usize, Trip)>) {
+    let mut figures = MonitorFigures::default();
     for i in 0..steps {
         let (estimates, seen) = step(i);
         if let Some(trip) = look(monitor, &mut figures, estimates, &seen) {
@@ -58,7 +63,7 @@ fn watch(
     (figures, None)
 }
 
-fn estimates(axis: Axis, estimate: Estimate) -> PerAxis<Estimate> {
+fn estimates(axis: Axis, estimate: AdaptiveEstimate) -> PerAxis<AdaptiveEstimate> {
     let mut estimates = PerAxis::default();
     estimates[axis] = estimate;
     estimates
@@ -81,7 +86,7 @@ fn an_estimate_out_of_bounds_trips_within_six_steps() {
         assert!(theta < Profile::Flight.gains()[axis].safeguards.theta_max);
         let with = |theta: f32, delta: f32| {
             // |Theta_hat| of nine equal entries is three times each.
-            let estimate = Estimate { theta: Matrix3::repeat(-theta / 3.0), delta };
+            let estimate = AdaptiveEstimate { theta: Matrix3::repeat(-theta / 3.0), delta };
             watch(&monitor, 60, |_| (estimates(axis, estimate), hover())).1
         };
         assert_eq!(with(0.999 * theta, 0.999 * delta), None, "{axis:?}");
@@ -187,7 +192,7 @@ proptest! {
             (random >> 8) as f32 / (1 << 23) as f32 - 1.0
         };
         let (_, trip) = watch(&monitor(bounds), 3000, |i| {
-            let estimates = PerAxis::from_fn(|axis| Estimate {
+            let estimates = PerAxis::from_fn(|axis| AdaptiveEstimate {
                 theta: Matrix3::repeat(share * bounds.theta[axis] / 3.0 * noise()),
                 delta: share * bounds.delta[axis],
             });
@@ -206,9 +211,9 @@ proptest! {
     /// Updated one subsystem per step, the norms are those of the estimates.
     #[test]
     fn norms_are_those_of_the_estimates(theta in prop::array::uniform9(-0.1_f32..0.1), delta in 0.0_f32..0.05) {
-        let estimate = Estimate { theta: Matrix3::from_row_slice(&theta), delta };
+        let estimate = AdaptiveEstimate { theta: Matrix3::from_row_slice(&theta), delta };
         let monitor = monitor(bounds());
-        let mut figures = Figures::default();
+        let mut figures = MonitorFigures::default();
         for axis in Axis::ALL.into_iter().chain(Axis::ALL) {
             look(&monitor, &mut figures, PerAxis::from_fn(|_| estimate), &hover());
             let (looked_at, norm) = figures.latest();

@@ -7,7 +7,7 @@
 )]
 
 use afbc::limits::Limits;
-use afbc::reference::{Detours, Reference, ReferenceModel};
+use afbc::reference::{Detours, ReferenceFilter, ReferenceModel};
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -134,7 +134,7 @@ proptest! {
     /// A smooth setpoint is the reference, wherever the vehicle is, also one that accelerates more than the model may.
     #[test]
     fn a_smooth_setpoint_is_tracked_as_it_is(model in any_model(), sines in sines(), away in -2.0_f32..2.0) {
-        let reference = Reference::new(&model, &limits(), DT_S).unwrap();
+        let reference = ReferenceFilter::new(&model, &limits(), DT_S).unwrap();
         let first = on_sines(&sines, 0.0);
         let mut detours = reference.start(&on(&first), &first);
         for step in 0..4000 {
@@ -153,7 +153,7 @@ proptest! {
     fn a_jump_becomes_motion_within_the_limits(
         model in any_model(), by in [-20.0_f32..20.0, -20.0_f32..20.0, -20.0_f32..20.0], turn in -3.0_f32..3.0,
     ) {
-        let reference = Reference::new(&model, &limits(), DT_S).unwrap();
+        let reference = ReferenceFilter::new(&model, &limits(), DT_S).unwrap();
         let from = Setpoint::default();
         let by = Vector3::from(by);
         let to = Setpoint { position_m: by, yaw_rad: turn, ..from };
@@ -189,7 +189,7 @@ proptest! {
     fn of_a_jump_it_follows_what_brings_it_nearer_to_the_vehicle(
         model in any_model(), near in prop::collection::vec((setpoint_near(), setpoint_near()), 2..30),
     ) {
-        let reference = Reference::new(&model, &limits(), DT_S).unwrap();
+        let reference = ReferenceFilter::new(&model, &limits(), DT_S).unwrap();
         let list = |s: &Setpoint| [s.position_m.x, s.position_m.y, s.position_m.z, s.yaw_rad].map(f64::from);
         let speeds = |s: &Setpoint| {
             let v = &s.velocity_m_s;
@@ -235,7 +235,7 @@ proptest! {
     fn it_accelerates_no_more_than_it_may_or_the_setpoint_does(
         model in any_model(), sines in sines(), by in -20.0_f32..20.0,
     ) {
-        let reference = Reference::new(&model, &Limits::NONE, DT_S).unwrap();
+        let reference = ReferenceFilter::new(&model, &Limits::NONE, DT_S).unwrap();
         let first = on_sines(&sines, 0.0);
         let mut detours = reference.start(&on(&first), &first);
         let mut last = first;
@@ -258,7 +258,7 @@ proptest! {
     fn a_large_jump_takes_the_documented_course(
         model in any_model(), by in prop_oneof![0.1_f32..1.0, 1.0_f32..60.0], turn in 0.1_f32..3.0, back: bool,
     ) {
-        let reference = Reference::new(&model, &limits(), DT_S).unwrap();
+        let reference = ReferenceFilter::new(&model, &limits(), DT_S).unwrap();
         let sign = if back { -1.0 } else { 1.0 };
         let from = Setpoint::default();
         let to = Setpoint { position_m: Vector3::repeat(sign * by), yaw_rad: sign * turn, ..from };
@@ -302,7 +302,7 @@ proptest! {
     fn after_an_interruption_the_reference_is_near_the_vehicle(
         model in any_model(), sines in sines(), begin in 0.0..3.0, length in 0.1..0.6, stands in any::<bool>(),
     ) {
-        let reference = Reference::new(&model, &limits(), DT_S).unwrap();
+        let reference = ReferenceFilter::new(&model, &limits(), DT_S).unwrap();
         let first = on_sines(&sines, begin);
         let mut detours = reference.start(&on(&first), &first);
         let _ = reference.advance(&mut detours, &on(&first), &first);
@@ -321,7 +321,7 @@ proptest! {
         positions in proptest::collection::vec(-1e5_f32..1e5, 40),
         speeds in proptest::collection::vec(-1e3_f32..1e3, 40),
     ) {
-        let reference = Reference::new(&model, &limits(), DT_S).unwrap();
+        let reference = ReferenceFilter::new(&model, &limits(), DT_S).unwrap();
         let mut detours: Option<Detours> = None;
         for (&x, &v) in positions.iter().zip(&speeds) {
             let mut setpoint = Setpoint::default();
@@ -344,7 +344,7 @@ proptest! {
 fn a_small_jump_decays_as_the_model_says() {
     let w = 6.0_f64;
     let model = ReferenceModel { reference_xy_rad_s: w as f32, ..ReferenceModel::DEFAULT };
-    let reference = Reference::new(&model, &Limits::NONE, DT_S).unwrap();
+    let reference = ReferenceFilter::new(&model, &Limits::NONE, DT_S).unwrap();
     let (from, mut to) = (Setpoint::default(), Setpoint::default());
     to.position_m.x = 0.5;
     let mut detours = reference.start(&on(&from), &from);
@@ -367,16 +367,16 @@ fn each_bandwidth_makes_a_model() {
         ReferenceModel { reference_z_rad_s: 1.0, ..none },
         ReferenceModel { reference_yaw_rad_s: 1.0, ..none },
     ] {
-        assert!(Reference::new(&model, &Limits::NONE, DT_S).is_some(), "{model:?}");
+        assert!(ReferenceFilter::new(&model, &Limits::NONE, DT_S).is_some(), "{model:?}");
     }
 }
 
 /// Without bandwidths there is no model; a coordinate without one is tracked to the bit.
 #[test]
 fn no_bandwidth_is_no_model() {
-    assert!(Reference::new(&ReferenceModel::DEFAULT, &Limits::NONE, DT_S).is_none());
+    assert!(ReferenceFilter::new(&ReferenceModel::DEFAULT, &Limits::NONE, DT_S).is_none());
     let only_yaw = ReferenceModel { reference_yaw_rad_s: 5.0, ..ReferenceModel::DEFAULT };
-    let reference = Reference::new(&only_yaw, &Limits::NONE, DT_S).unwrap();
+    let reference = ReferenceFilter::new(&only_yaw, &Limits::NONE, DT_S).unwrap();
     let mut detours = reference.start(&State::default(), &Setpoint::default());
     let far = Setpoint { position_m: Vector3::new(1.0, -2.0, 3.0), yaw_rad: 1.0, ..Setpoint::default() };
     let tracked = reference.advance(&mut detours, &State::default(), &far);

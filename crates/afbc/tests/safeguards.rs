@@ -10,7 +10,7 @@ use afbc::law::Context;
 use afbc::law::Tracking;
 use afbc::model::RollPitch;
 use afbc::{Adaptive, Controller, Law, Profile, Safeguards, Settings};
-use afbc_control::{Estimate, FlightController, Screened};
+use afbc_control::{AdaptiveEstimate, FlightController, Validated};
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
 use common::{U, gains_of_one};
 use nalgebra::{Matrix3, Vector3};
@@ -22,7 +22,7 @@ fn tracking(e2: f32) -> Tracking {
 }
 
 /// Runs one step of the x subsystem; returns its u.
-fn step(gains: Gains, e2: f32, unallocated: f32, dt_s: f32, estimate: &mut Estimate) -> f32 {
+fn step(gains: Gains, e2: f32, unallocated: f32, dt_s: f32, estimate: &mut AdaptiveEstimate) -> f32 {
     let law = Adaptive::new(PerAxis::from_fn(|_| gains)).unwrap();
     let context = Context {
         state: &State::default(),
@@ -39,7 +39,7 @@ fn step(gains: Gains, e2: f32, unallocated: f32, dt_s: f32, estimate: &mut Estim
 }
 
 /// The adaptation step in `f64`, as documented.
-fn reference(gains: &Gains, e2: f32, unallocated: f32, dt_s: f32, before: &Estimate) -> (Matrix3<f64>, f64) {
+fn reference(gains: &Gains, e2: f32, unallocated: f32, dt_s: f32, before: &AdaptiveEstimate) -> (Matrix3<f64>, f64) {
     let Safeguards { sigma, kappa, theta_max, delta_max, dead_zone } = gains.safeguards;
     let [sigma, kappa, theta_max, delta_max, dead_zone] =
         [sigma, kappa, theta_max, delta_max, dead_zone].map(f64::from);
@@ -67,14 +67,14 @@ fn unallocated() -> impl Strategy<Value = f32> {
 }
 
 /// An estimate within the safeguards' bounds.
-fn estimate(safeguards: Safeguards) -> impl Strategy<Value = Estimate> {
-    (prop::array::uniform9(-1.0_f32..1.0), 0.0_f32..=1.0).prop_map(move |(theta, delta)| Estimate {
+fn estimate(safeguards: Safeguards) -> impl Strategy<Value = AdaptiveEstimate> {
+    (prop::array::uniform9(-1.0_f32..1.0), 0.0_f32..=1.0).prop_map(move |(theta, delta)| AdaptiveEstimate {
         theta: Matrix3::from_row_slice(&theta) * (safeguards.theta_max / 3.0),
         delta: delta * safeguards.delta_max,
     })
 }
 
-fn gains_and_estimate() -> impl Strategy<Value = (Gains, Estimate)> {
+fn gains_and_estimate() -> impl Strategy<Value = (Gains, AdaptiveEstimate)> {
     gains_of_one().prop_flat_map(|gains| (Just(gains), estimate(gains.safeguards)))
 }
 
@@ -108,7 +108,7 @@ proptest! {
         inputs in prop::collection::vec((error(), unallocated()), 1..100),
         dt_s in 1e-4_f32..=0.02,
     ) {
-        let mut estimate = Estimate::default();
+        let mut estimate = AdaptiveEstimate::default();
         let (theta_max, delta_max) = (f64::from(gains.safeguards.theta_max), gains.safeguards.delta_max);
         for (e2, unallocated) in inputs {
             let u = step(gains, e2, unallocated, dt_s, &mut estimate);
@@ -130,10 +130,10 @@ proptest! {
         delta in 0.0_f32..5.0,
     ) {
         let gains = Gains { safeguards: Safeguards::NONE, ..gains };
-        let before = Estimate { theta: Matrix3::from_row_slice(&theta), delta };
+        let before = AdaptiveEstimate { theta: Matrix3::from_row_slice(&theta), delta };
         let Firing { first, second, share } = Basis::new(gains.membership).unwrap().fire([0.0, e2]);
         let s = afbc_control::math::tanh(e2 * (1.0 / gains.epsilon));
-        let printed = Estimate {
+        let printed = AdaptiveEstimate {
             theta: before.theta + first * (gains.gamma * e2 * share * dt_s) * second.transpose(),
             delta: before.delta + gains.eta * e2 * s * dt_s,
         };
@@ -157,7 +157,7 @@ proptest! {
         step(Gains { safeguards, ..gains }, share * dead_zone, 0.0, 0.001, &mut after);
         prop_assert_eq!(after, before);
         // Beyond it, there is.
-        let mut after = Estimate::default();
+        let mut after = AdaptiveEstimate::default();
         let able = Gains { gamma: 1.0, eta: 1.0, safeguards: Safeguards { delta_max: 1.0, ..safeguards }, ..gains };
         step(able, 1.1 * dead_zone, 0.0, 0.02, &mut after);
         prop_assert!(after.theta.min() >= 0.0 && after.theta.max() > 0.0 && after.delta > 0.0);
@@ -196,7 +196,7 @@ proptest! {
             let settings = Settings { tilt_by_thrust: false, disturbance, ..settings };
             let law = Adaptive::new(Profile::Flight.gains()).unwrap();
             let controller = Controller::new(Parameters::PAPER.to_f32(), settings, law).unwrap();
-            let mut memory = Screened::default();
+            let mut memory = Validated::default();
             for _ in 0..20 {
                 let _ = controller.step(&mut memory, Some(&state), &setpoint);
             }
@@ -217,7 +217,7 @@ fn leakage_forgets_at_its_rate() {
     for sigma in [0.01_f32, 0.5, 10.0] {
         let safeguards = Safeguards { sigma, ..Safeguards::NONE };
         let gains = Gains { safeguards, ..Profile::Paper.gains().x };
-        let mut estimate = Estimate { theta: Matrix3::repeat(2.0), delta: 3.0 };
+        let mut estimate = AdaptiveEstimate { theta: Matrix3::repeat(2.0), delta: 3.0 };
         for _ in 0..1000 {
             step(gains, 0.0, 0.0, dt_s, &mut estimate);
         }
@@ -233,7 +233,7 @@ fn leakage_forgets_at_its_rate() {
     let (sigma, kappa, e2) = (0.2, 3.0, 0.4);
     let safeguards = Safeguards { sigma, kappa, ..Safeguards::NONE };
     let gains = Gains { eta: 2.0, epsilon: 0.1, safeguards, ..Profile::Paper.gains().x };
-    let mut estimate = Estimate::default();
+    let mut estimate = AdaptiveEstimate::default();
     for _ in 0..20_000 {
         step(gains, e2, 0.0, dt_s, &mut estimate);
     }
@@ -254,7 +254,7 @@ fn noise_drives_the_printed_delta_hat_and_not_the_hardened() {
     let fly = |profile: Profile| {
         let gains = profile.gains();
         let law = Adaptive::new(gains).unwrap();
-        let (mut estimate, mut x, mut v, mut random) = (Estimate::default(), 0.0_f32, 0.0_f32, 1_u32);
+        let (mut estimate, mut x, mut v, mut random) = (AdaptiveEstimate::default(), 0.0_f32, 0.0_f32, 1_u32);
         let mut noise = || {
             random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (random >> 8) as f32 / (1 << 23) as f32 - 1.0

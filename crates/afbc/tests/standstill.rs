@@ -5,7 +5,7 @@ use afbc::reference::ReferenceModel;
 use afbc::standstill::{LIFT_SHARE, STILL_M_S, STILL_S, Standstill};
 use afbc::{Adaptive, Controller, Profile, Settings};
 use afbc_control::Smoothing;
-use afbc_control::{FlightController, Screened};
+use afbc_control::{FlightController, Validated};
 use afbc_types::{Parameters, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
@@ -64,7 +64,7 @@ fn estimates_freeze_on_the_ground_and_thaw_on_lift() {
         (settings.reference, settings.smoothing) = (ReferenceModel::DEFAULT, Smoothing::DEFAULT);
         let law = Adaptive::new(Profile::Flight.gains()).unwrap();
         let controller = Controller::new(Parameters::PAPER.to_f32(), settings, law).unwrap();
-        let mut memory = Screened::default();
+        let mut memory = Validated::default();
         [(-1.0, 300), (-1.0, 3000), (1.0, 1), (1.0, 100)].map(|(z, steps)| {
             for _ in 0..steps {
                 let _ = controller.step(&mut memory, Some(&State::default()), &setpoint(z));
@@ -87,7 +87,7 @@ fn a_standing_vehicle_is_not_tipped_over() {
     let law = Adaptive::new(Profile::Flight.gains()).unwrap();
     let controller = Controller::new(Parameters::PAPER.to_f32(), Profile::Flight.settings(), law).unwrap();
     let state = State { attitude_rad: Vector3::new(0.1, -0.05, 0.3), ..State::default() };
-    let mut memory = Screened::default();
+    let mut memory = Validated::default();
     let mut forces = |z, steps| {
         let setpoint = Setpoint { position_m: Vector3::new(2.0, -1.0, z), ..Setpoint::default() };
         let mut forces = Vector4::zeros();

@@ -5,7 +5,7 @@ mod common;
 
 use afbc::adaptive::Gains;
 use afbc::{Adaptive, Backstepping, Cascade, Controller, Law, Profile, Settings};
-use afbc_control::{Estimate, Health, Screened};
+use afbc_control::{AdaptiveEstimate, Health, Validated};
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
 use common::{check_step, gains, plausible, setpoint, settings, state, step, value};
 use proptest::prelude::*;
@@ -24,11 +24,11 @@ fn backstepping(gains: PerAxis<Gains>, settings: Settings) -> Controller<Backste
     Controller::new(vehicle, settings, Backstepping::new(&vehicle, gains).unwrap()).unwrap()
 }
 
-fn estimates<L: Law>(memory: &Screened<Cascade<L::Estimate>>) -> PerAxis<Estimate> {
+fn estimates<L: Law>(memory: &Validated<Cascade<L::Estimate>>) -> PerAxis<AdaptiveEstimate> {
     PerAxis::from_fn(|axis| L::learnt(&memory.control.estimates[axis]))
 }
 
-fn check_estimates(estimates: &PerAxis<Estimate>) -> Result<(), TestCaseError> {
+fn check_estimates(estimates: &PerAxis<AdaptiveEstimate>) -> Result<(), TestCaseError> {
     for axis in Axis::ALL {
         let estimate = &estimates[axis];
         prop_assert!(
@@ -45,7 +45,7 @@ fn fly_anything<L: Law>(
     settings: &Settings,
     inputs: &[(State, Setpoint)],
 ) -> Result<(), TestCaseError> {
-    let mut memory = Screened::default();
+    let mut memory = Validated::default();
     let mut seen_state = false;
     for (state, setpoint) in inputs {
         let before = estimates::<L>(&memory);
@@ -91,7 +91,7 @@ proptest! {
     fn the_same_inputs_give_the_same_bits(gains in gains(), settings in settings(), inputs in sequence(value)) {
         let controller = adaptive(gains, settings);
         let fly = || {
-            let mut memory = Screened::default();
+            let mut memory = Validated::default();
             inputs
                 .iter()
                 .map(|(state, setpoint)| {
@@ -115,7 +115,7 @@ proptest! {
     ) {
         prop_assume!(!bad.is_plausible());
         let controller = adaptive(Profile::Paper.gains(), Profile::Paper.settings());
-        let mut memory = Screened::default();
+        let mut memory = Validated::default();
         step(&controller, &mut memory, &good, &setpoint);
         let mut other = memory;
 
@@ -141,7 +141,7 @@ proptest! {
         prop_assume!(!bad.is_plausible());
         let controller = adaptive(Profile::Paper.gains(), Profile::Paper.settings());
         for first in [Some(good), None] {
-            let (mut memory, mut other) = (Screened::default(), Screened::default());
+            let (mut memory, mut other) = (Validated::default(), Validated::default());
             let substitute = first.unwrap_or(Setpoint::hold(&state));
             let started = step(&controller, &mut memory, &state, &first.unwrap_or(bad));
             let wanted = step(&controller, &mut other, &state, &substitute);
@@ -197,7 +197,7 @@ fn every_field_is_checked_for_plausibility() {
         (|s, v| s.yaw_acceleration_rad_s2 = v, 1e3),
     ];
     let controller = adaptive(Profile::Paper.gains(), Profile::Paper.settings());
-    let health = |state, setpoint| step(&controller, &mut Screened::default(), &state, &setpoint).action.health;
+    let health = |state, setpoint| step(&controller, &mut Validated::default(), &state, &setpoint).action.health;
     let bad = |max: f32| [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, max.next_up(), -max.next_up()];
     for (index, (set, max)) in states.into_iter().enumerate() {
         let with = |value| {

@@ -2,7 +2,7 @@
 
 use crate::plan::{Campaign, Course, Spread};
 use crate::quantity::{QUANTITIES, Quantity};
-use afbc_plant::Suite;
+use afbc_plant::InstrumentSuite;
 use afbc_reader::FileError;
 use afbc_reader::Table;
 use afbc_reader::words::out_of_range;
@@ -116,7 +116,7 @@ fn spreads(mut table: Table<'_>, scenario: &Scenario) -> Result<Vec<Spread>, Fil
 /// Returns why drawing this quantity would have no effect, if so.
 fn idle(name: &str, scenario: &Scenario) -> Option<&'static str> {
     let still = afbc_plant::Deviations::default();
-    let Suite { imu, tracker, gnss, barometer, magnetometer } = &scenario.instruments;
+    let InstrumentSuite { imu, tracker, gnss, barometer, magnetometer } = &scenario.instruments;
     let lacks = |there: bool, cure| (!there).then_some(cure);
     match name {
         "imu_part" => lacks(imu.is_some(), "the scenario has no inertial sensor; add imu to its [instruments]"),

@@ -1,7 +1,7 @@
 //! Flying a campaign on many cores, and merging its shards.
 
 use crate::error::Error;
-use crate::folder::{Folder, Rows, finished};
+use crate::folder::{CampaignFolder, Rows, finished};
 use crate::manifest::{Manifest, Shard};
 use crate::plan::Campaign;
 use crate::row::Row;
@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// A flight that cannot be flown, or results that cannot be written or are damaged.
 pub fn fly(
     campaign: &Campaign,
-    folder: &Folder,
+    folder: &CampaignFolder,
     stop: &AtomicBool,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Option<Summary>, Error> {
@@ -33,7 +33,7 @@ pub fn fly(
 /// Returns the results of all flights; flies the missing ones first.
 fn flown(
     campaign: &Campaign,
-    folder: &Folder,
+    folder: &CampaignFolder,
     stop: &AtomicBool,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Summary, Error> {
@@ -52,7 +52,7 @@ fn flown(
 /// Flies the missing chunks in order, flight by flight.
 fn fly_missing(
     campaign: &Campaign,
-    folder: &Folder,
+    folder: &CampaignFolder,
     stop: &AtomicBool,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<(), Error> {
@@ -101,7 +101,7 @@ fn fly_missing(
 ///
 /// # Errors
 /// Shards of different campaigns, a missing, unfinished or duplicate shard, and files that cannot be read or written.
-pub fn merge(shards: &[PathBuf], out: &Path, force: bool) -> Result<(Folder, Summary), Error> {
+pub fn merge(shards: &[PathBuf], out: &Path, force: bool) -> Result<(CampaignFolder, Summary), Error> {
     let is_out =
         |shard: &&PathBuf| shard.canonicalize().is_ok_and(|shard| out.canonicalize().is_ok_and(|out| out == shard));
     if let Some(part) = shards.iter().find(is_out) {
@@ -131,7 +131,7 @@ pub fn merge(shards: &[PathBuf], out: &Path, force: bool) -> Result<(Folder, Sum
 
     let whole = Manifest { shard: Shard::WHOLE, ..manifest };
     let contenders = whole.contenders.len();
-    let folder = Folder::open(out, whole, force)?;
+    let folder = CampaignFolder::open(out, whole, force)?;
     let mut summary = Summary::new(folder.manifest());
     // Flight i is in shard i modulo the number of shards.
     let flights = (0..folder.manifest().flights).flat_map(|flight| core::iter::repeat_n(flight, contenders));

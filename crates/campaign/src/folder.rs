@@ -34,7 +34,7 @@ const LOCK: &str = ".sitl.lock";
 const COMMAND: &str = "campaign";
 
 /// The folder of the results of one campaign or shard. It is locked against other programs.
-pub struct Folder {
+pub struct CampaignFolder {
     place: Place,
     manifest: Manifest,
     /// Holds the lock until it is closed.
@@ -49,7 +49,7 @@ struct Page<M> {
     checksum: String,
 }
 
-impl Folder {
+impl CampaignFolder {
     /// Opens the folder at `path`, created if needed, for the results of `manifest`. With `force`, files of the same
     /// names are replaced.
     ///
@@ -76,7 +76,7 @@ impl Folder {
             Err(TryLockError::Error(_)) | Ok(()) => {}
         }
         place.add(&[MANIFEST, RESULTS, CHUNKS, "summary.json", "report.html"])?;
-        let folder = Folder { place, manifest, _lock: lock };
+        let folder = CampaignFolder { place, manifest, _lock: lock };
         if force && folder.results().is_err() {
             // Results of another campaign, or damaged.
             fs::remove_file(path.join(RESULTS)).map_err(|source| folder.place.error(RESULTS, source))?;

@@ -27,7 +27,7 @@ pub use draw::Draw;
 pub use error::Error;
 pub use file::parse;
 pub use fly::{fly, merge};
-pub use folder::Folder;
+pub use folder::CampaignFolder;
 pub use manifest::{Drawn, Manifest, Shard, hash_of};
 pub use plan::{Campaign, Course, Spread};
 pub use quantity::{QUANTITIES, Quantity};

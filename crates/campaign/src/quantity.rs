@@ -1,7 +1,7 @@
 //! Quantities that a campaign can draw.
 
 use afbc_plant::instruments::{Accelerometer, Barometer, Gyroscope, Imu, Magnetometer, Preset};
-use afbc_plant::{Deviations, Dropouts, Environment, Payload, RotorFault, Suite, Turbulence};
+use afbc_plant::{Deviations, Dropouts, Environment, InstrumentSuite, Payload, RotorFault, Turbulence};
 use afbc_sim::scenario::Scenario;
 use afbc_types::{OutOfRange, Parameters, Range};
 use core::f64::consts::TAU;
@@ -232,9 +232,9 @@ pub static QUANTITIES: [Quantity; 35] = [
         |f, x| {
             let suite = &mut f.scenario.instruments;
             *suite = if x < 1.5 {
-                Suite { imu: suite.imu, tracker: suite.tracker, ..Suite::default() }
+                InstrumentSuite { imu: suite.imu, tracker: suite.tracker, ..InstrumentSuite::default() }
             } else {
-                Suite { tracker: None, ..*suite }
+                InstrumentSuite { tracker: None, ..*suite }
             };
         },
     )),

@@ -16,14 +16,14 @@ pub struct Suite {
     /// Description in one line.
     pub description: String,
     /// Where published figures come from.
-    pub sources: Vec<Source>,
+    pub sources: Vec<Citation>,
     /// The flights, in order; each scenario's contenders are replaced by those who fly the suite.
-    pub flights: Vec<Flight>,
+    pub flights: Vec<SuiteFlight>,
 }
 
 /// Where published figures come from.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Source {
+pub struct Citation {
     /// Short name.
     pub name: String,
     /// What it is, and where in it the figures are.
@@ -34,7 +34,7 @@ pub struct Source {
 
 /// A flight of a suite.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Flight {
+pub struct SuiteFlight {
     /// What is flown.
     pub scenario: Scenario,
     /// Tilt that every contender is allowed, if it is limited more \[rad\].
@@ -74,7 +74,7 @@ impl Suite {
     /// # Errors
     /// One line on a gain or setting out of range.
     pub fn under(&self, contenders: &[Contender]) -> Result<Vec<Scenario>, FileError> {
-        let put = |flight: &Flight| {
+        let put = |flight: &SuiteFlight| {
             let mut scenario = flight.scenario.clone();
             compare::fly_under(&mut scenario, contenders)?;
             if let Some(tilt_max_rad) = flight.tilt_max_rad {
@@ -94,8 +94,8 @@ impl Suite {
 pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Suite, FileError> {
     afbc_reader::document_with_heirs(file, text, "suites field", ("flight", &OWN), |mut root| {
         let [name, description] = afbc_reader::title(&mut root, name)?;
-        let sources: Vec<Source> = root.few_tables("source")?.into_iter().map(source).collect::<Result<_, _>>()?;
-        let mut flights: Vec<Flight> = Vec::new();
+        let sources: Vec<Citation> = root.few_tables("source")?.into_iter().map(source).collect::<Result<_, _>>()?;
+        let mut flights: Vec<SuiteFlight> = Vec::new();
         for table in root.few_tables("flight")? {
             flights.push(flight(table, &sources, &flights, folder)?);
         }
@@ -112,16 +112,21 @@ fn read(file: &str, text: &str, name: &str) -> Result<Suite, FileError> {
     parse(file, text, name, Path::new(""))
 }
 
-fn source(mut table: Table<'_>) -> Result<Source, FileError> {
+fn source(mut table: Table<'_>) -> Result<Citation, FileError> {
     let mut text = |key, cure| table.need_text(key, cure).map(str::to_owned);
     let name = text("name", "give it one, to which published figures refer")?;
     let citation = text("citation", "say who published what, and where")?;
     let differs = text("differs", "say how those flights differ from these")?;
     table.finish()?;
-    Ok(Source { name, citation, differs })
+    Ok(Citation { name, citation, differs })
 }
 
-fn flight(mut table: Table<'_>, sources: &[Source], earlier: &[Flight], folder: &Path) -> Result<Flight, FileError> {
+fn flight(
+    mut table: Table<'_>,
+    sources: &[Citation],
+    earlier: &[SuiteFlight],
+    folder: &Path,
+) -> Result<SuiteFlight, FileError> {
     let names = || earlier.iter().map(|flight| flight.scenario.name.as_str());
     let name = table.need_text("name", "give the flight one")?;
     if names().any(|other| other == name) {
@@ -145,10 +150,10 @@ fn flight(mut table: Table<'_>, sources: &[Source], earlier: &[Flight], folder: 
         }
         None => scenario::read(table, name, None)?,
     };
-    Ok(Flight { scenario, tilt_max_rad, published })
+    Ok(SuiteFlight { scenario, tilt_max_rad, published })
 }
 
-fn figure(mut table: Table<'_>, sources: &[Source]) -> Result<Published, FileError> {
+fn figure(mut table: Table<'_>, sources: &[Citation]) -> Result<Published, FileError> {
     let law = table.need_text("law", "say who flew")?.to_owned();
     let rms_m = table.need_number(&RMS)?;
     let name = table.need_text("source", "name one of the [[source]]")?;

@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
 
 use afbc::Profile;
-use afbc_campaign::{self as campaign, Campaign, Folder, Manifest, Row, Shard};
+use afbc_campaign::{self as campaign, Campaign, CampaignFolder, Manifest, Row, Shard};
 use afbc_sim::run::Run;
 use std::collections::BTreeMap;
 use std::fs;
@@ -33,7 +33,7 @@ fn small() -> Campaign {
 
 /// Flies everything missing in `folder` on `threads` cores.
 fn fly(campaign: &Campaign, path: &Path, shard: Shard, threads: usize) {
-    let folder = Folder::open(path, Manifest::new(campaign, shard), false).unwrap();
+    let folder = CampaignFolder::open(path, Manifest::new(campaign, shard), false).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let flown = pool.install(|| campaign::fly(campaign, &folder, &AtomicBool::new(false), &|_| ())).unwrap();
     assert!(flown.is_some());
@@ -71,7 +71,7 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
     // Stopped after 100 of 150 flights by one thread: six chunks of 16 are complete, the seventh was begun.
     {
         let (stop, done) = (AtomicBool::new(false), AtomicU64::new(0));
-        let place = Folder::open(&path, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
+        let place = CampaignFolder::open(&path, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let progress = |flights| {
             if done.fetch_add(flights, Ordering::Relaxed) + flights >= 100 {
@@ -98,7 +98,7 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
 
     let resumed = AtomicU64::new(u64::MAX);
     {
-        let place = Folder::open(&path, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
+        let place = CampaignFolder::open(&path, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
         assert!(!unfinished.exists());
         let first = |flights| {
             let _ = resumed.compare_exchange(u64::MAX, flights, Ordering::Relaxed, Ordering::Relaxed);
@@ -156,10 +156,10 @@ fn shards_come_together_to_what_one_machine_gives() {
 fn a_folder_belongs_to_one_campaign_and_one_program() {
     let (folder, campaign) = (folder("changed"), small());
     let refused = |campaign: &Campaign, shard| {
-        Folder::open(&folder, Manifest::new(campaign, shard), false).map(|_| ()).unwrap_err().to_string()
+        CampaignFolder::open(&folder, Manifest::new(campaign, shard), false).map(|_| ()).unwrap_err().to_string()
     };
     {
-        let _held = Folder::open(&folder, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
+        let _held = CampaignFolder::open(&folder, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
         assert!(refused(&campaign, Shard::WHOLE).contains("is being flown into it"));
     }
     for (from, to) in [("seed = 7", "seed = 8"), ("\"circle\"", "\"step\""), ("0.02", "0.03"), ("= 150", "= 151")] {
@@ -169,8 +169,8 @@ fn a_folder_belongs_to_one_campaign_and_one_program() {
     assert!(refused(&campaign, Shard { index: 1, of: 2 }).contains("not this one"));
     // Names, descriptions and the file's path do not matter.
     let renamed = campaign::parse("/elsewhere/small.toml", SMALL, "small", Path::new("")).unwrap();
-    Folder::open(&folder, Manifest::new(&renamed, Shard::WHOLE), false).unwrap();
-    Folder::open(&folder, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
+    CampaignFolder::open(&folder, Manifest::new(&renamed, Shard::WHOLE), false).unwrap();
+    CampaignFolder::open(&folder, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
 }
 
 /// Two vehicles that differ in one number, and in nothing that the laws are told, have results of their own.
@@ -188,7 +188,8 @@ fn a_folder_belongs_to_one_vehicle() {
     let (a, b) = (on("a.toml", iris), on("b.toml", &moved));
     let one = Shard { index: 1, of: 2 };
     fly(&a, &folder.join("a"), one, 1);
-    let refused = Folder::open(&folder.join("a"), Manifest::new(&b, one), false).map(|_| ()).unwrap_err().to_string();
+    let refused =
+        CampaignFolder::open(&folder.join("a"), Manifest::new(&b, one), false).map(|_| ()).unwrap_err().to_string();
     assert!(refused.contains("not this one") && refused.contains("--out") && !refused.contains('\n'), "{refused}");
     fly(&b, &folder.join("b"), Shard { index: 2, of: 2 }, 1);
     let parts = ["a", "b"].map(|part| folder.join(part));
@@ -321,7 +322,7 @@ fn damaged_files_are_refused() {
     fs::rename(begun.join("results.parquet"), begun.join("chunks/000000.parquet")).unwrap();
 
     let never = AtomicBool::new(false);
-    let open = |path: &Path| Folder::open(path, Manifest::new(&campaign, Shard::WHOLE), false);
+    let open = |path: &Path| CampaignFolder::open(path, Manifest::new(&campaign, Shard::WHOLE), false);
     let (results, chunks) = (open(&whole).unwrap(), open(&begun).unwrap());
     let again = || campaign::fly(&campaign, &results, &never, &|_| panic!("it is finished")).map(|_| ());
     let merged = || campaign::merge(&parts, &folder.join("merged"), false).map(|_| ());
@@ -394,7 +395,7 @@ fn a_damaged_folder_is_mended_by_what_its_error_says() {
         fs::write(path.join(file), bytes).unwrap();
         let manifest = || Manifest::new(&campaign, Shard::WHOLE);
         let fly_on = |force| {
-            let place = Folder::open(&path, manifest(), force)?;
+            let place = CampaignFolder::open(&path, manifest(), force)?;
             campaign::fly(&campaign, &place, &AtomicBool::new(false), &|_| ())
         };
         let error = fly_on(false).map(|_| ()).unwrap_err().to_string();
@@ -415,7 +416,7 @@ fn ten_million_flights_start_with_the_first() {
     let campaign = parse(&SMALL.replace("flights = 150", "flights = 10000000").replace("= 6.0", "= 0.2"));
     for shard in [Shard::WHOLE, Shard { index: 3, of: 16 }, Shard { index: 100_000, of: 100_000 }] {
         let path = folder.join(format!("of-{}", shard.of));
-        let place = Folder::open(&path, Manifest::new(&campaign, shard), false).unwrap();
+        let place = CampaignFolder::open(&path, Manifest::new(&campaign, shard), false).unwrap();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let chunks = || fs::read_dir(path.join("chunks")).map_or(0, |entries| entries.count());
         let flown = |most: u64, stop: bool| {
@@ -442,7 +443,7 @@ fn what_cannot_be_read_is_not_called_damaged() {
         fly(&campaign, &path, Shard::WHOLE, 1);
         fs::remove_file(path.join(file)).unwrap();
         fs::create_dir(path.join(file)).unwrap();
-        let place = Folder::open(&path, Manifest::new(&campaign, Shard::WHOLE), false);
+        let place = CampaignFolder::open(&path, Manifest::new(&campaign, Shard::WHOLE), false);
         let flown = place.and_then(|place| campaign::fly(&campaign, &place, &AtomicBool::new(false), &|_| ()));
         let error = flown.map(|_| ()).unwrap_err().to_string();
         assert!(error.starts_with(&format!("{}: cannot be read (", path.join(file).display())), "{error}");

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)]
 
 use afbc_campaign::compare::standard_and_monitored;
-use afbc_campaign::random::{self, Change, Flight, Random, Seen};
+use afbc_campaign::random::{self, Change, DrawnFlight, Random, Seen};
 use afbc_reader::BuiltIn;
 use afbc_sim::trajectory::{Reference, Trajectory};
 use afbc_vehicles::{BUILT_IN, Vehicle, built_in, parse};
@@ -41,7 +41,7 @@ fn random(seen: Seen, vehicles: Vec<Vehicle>) -> Random {
     Random { seeds: 1..4, flights: 12, seen, vehicles }
 }
 
-fn everywhere(seen: Seen) -> Vec<(Vehicle, Vec<Flight>)> {
+fn everywhere(seen: Seen) -> Vec<(Vehicle, Vec<DrawnFlight>)> {
     let vehicles = fleet().into_iter().chain(own());
     vehicles.map(|vehicle| (vehicle.clone(), random(seen, vec![vehicle]).draw().unwrap())).collect()
 }
@@ -72,7 +72,7 @@ fn every_flight_is_valid_on_every_vehicle() {
             let name = vehicle.name.clone();
             for flight in random(seen, vec![vehicle]).under(&contenders, &[]).unwrap_or_else(|error| panic!("{error}"))
             {
-                let Flight { scenario, speed_m_s, .. } = &flight;
+                let DrawnFlight { scenario, speed_m_s, .. } = &flight;
                 assert_eq!(scenario.check(), Ok(()), "{}: {}", scenario.name, scenario.description);
                 assert_eq!(scenario.contenders.len(), contenders.len());
                 assert!(speed_m_s.is_finite() && scenario.name.starts_with(&name));
@@ -89,7 +89,7 @@ fn every_flight_is_valid_on_every_vehicle() {
 fn what_is_drawn_is_what_flies() {
     let (mut paths, mut changes) = (BTreeSet::new(), BTreeSet::new());
     for (vehicle, flights) in everywhere(Seen::Truth) {
-        for Flight { path, change, scenario, .. } in flights {
+        for DrawnFlight { path, change, scenario, .. } in flights {
             paths.insert(path);
             changes.insert(change.kind());
             let calm = scenario.realism.wind == Default::default();
@@ -148,7 +148,7 @@ fn no_flight_asks_for_more_than_the_vehicle_can_do() {
         let g = vehicle.parameters.gravity_m_s2;
         let intact_m_s2 = count * vehicle.force_max_n / vehicle.parameters.mass_kg;
         let mut boldest = 0.0_f64;
-        for Flight { change, scenario, acceleration_m_s2, .. } in &flights {
+        for DrawnFlight { change, scenario, acceleration_m_s2, .. } in &flights {
             let thrust_m_s2 = intact_m_s2
                 * match change {
                     Change::Payload { share, .. } => 1.0 / (1.0 + share),
@@ -206,7 +206,7 @@ fn fastest_rad_s(trajectory: &Trajectory) -> f64 {
 #[test]
 fn flights_on_the_estimate_begin_on_the_ground_where_they_can() {
     for (vehicle, flights) in everywhere(Seen::Mocap) {
-        for Flight { path, stands, scenario, .. } in flights {
+        for DrawnFlight { path, stands, scenario, .. } in flights {
             assert_eq!(stands, vehicle.realism.contact.is_some() && ["waypoints", "hover"].contains(&path));
             assert_eq!(scenario.flight_core, stands);
             let height_m = scenario.initial.position_m.z;

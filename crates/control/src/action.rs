@@ -7,7 +7,7 @@ use afbc_types::{Inputs, ROTORS_MAX, RotorForces, RotorSpeeds};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[must_use = "the rotors turn by it"]
+#[must_use = "the motors need its rotor speeds"]
 #[non_exhaustive]
 pub struct Action<const N: usize = 4> {
     /// Rotor speeds omega_i, always finite and never negative.

@@ -1,7 +1,7 @@
 //! Interface of all controllers: one test harness, tuner and campaign fly any of them.
 
-use crate::screen::Screened;
-use crate::{Action, Estimate, Health, Mixer, Trace};
+use crate::screen::Validated;
+use crate::{Action, AdaptiveEstimate, Health, Mixer, Trace};
 use afbc_types::{PerAxis, Setpoint, State};
 
 /// A controller: computes the speeds of `N` rotors from the measured state and the setpoint.
@@ -10,7 +10,7 @@ use afbc_types::{PerAxis, Setpoint, State};
 /// memory. [`step`](FlightController::step) must be called every [`dt_s`](FlightController::dt_s) seconds.
 ///
 /// ```
-/// use afbc_control::{Action, FlightController, Mixer, Screened, Trace};
+/// use afbc_control::{Action, FlightController, Mixer, Validated, Trace};
 /// use afbc_types::{Inputs, OutOfRange, Parameters, Setpoint, State};
 ///
 /// /// Carries the weight and does nothing else.
@@ -37,7 +37,7 @@ use afbc_types::{PerAxis, Setpoint, State};
 /// }
 ///
 /// let float = Float(Mixer::new(Parameters::PAPER.to_f32(), 3.0)?);
-/// let mut memory = Screened::default();
+/// let mut memory = Validated::default();
 /// let action = float.step(&mut memory, Some(&State::default()), &Setpoint::default());
 /// assert!((action.forces.0.sum() - 0.486 * 9.81).abs() < 1e-5);
 /// # Ok::<(), OutOfRange>(())
@@ -65,7 +65,7 @@ pub trait FlightController<const N: usize = 4> {
     /// [`FlightController::decide`] behind a [`Screen`](crate::Screen). [`Action::health`] reports rejected input.
     // Inlined always: copying the action out of a call costs a tenth of a closed-loop step.
     #[inline(always)]
-    fn step(&self, memory: &mut Screened<Self::Memory>, measured: Option<&State>, setpoint: &Setpoint) -> Action<N> {
+    fn step(&self, memory: &mut Validated<Self::Memory>, measured: Option<&State>, setpoint: &Setpoint) -> Action<N> {
         let mut screened = Health::default();
         let (screen, control) = memory.parts();
         let Some((state, setpoint)) = screen.pass(measured, setpoint, &mut screened) else {
@@ -81,7 +81,7 @@ pub trait FlightController<const N: usize = 4> {
     fn trace(memory: &Self::Memory) -> Trace;
 
     /// Returns the estimates of an adaptive law, in AFBC's terms; zero for a law without any.
-    fn learnt(_memory: &Self::Memory) -> PerAxis<Estimate> {
+    fn learnt(_memory: &Self::Memory) -> PerAxis<AdaptiveEstimate> {
         PerAxis::default()
     }
 

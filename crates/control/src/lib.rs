@@ -5,7 +5,7 @@
 //!
 //! * [`FlightController`]: a step from state and setpoint to an [`Action`], and a [`Trace`] of its internal signals.
 //!   Control laws are in the crates `afbc` and `afbc-peers`; a new law needs this crate only.
-//! * [`Screened`]: a controller's memory behind a screen that rejects implausible input.
+//! * [`Validated`]: a controller's memory behind a screen that rejects implausible input.
 //! * [`mixer`]: control allocation, from U1..U4 to rotor forces and speeds, and back.
 //! * [`command_filter`]: a smooth reference with two derivatives.
 //! * [`drag`]: what is known of drag, for laws that make up for it.
@@ -32,8 +32,8 @@ pub use action::{Action, Health};
 pub use controller::FlightController;
 pub use mixer::Mixer;
 pub use nalgebra;
-pub use screen::{Screen, Screened};
+pub use screen::{Screen, Validated};
 pub use settings::Settings;
 pub use smoothing::{Smoothed, Smoother, Smoothing};
-pub use trace::{Errors, Estimate, Trace};
+pub use trace::{AdaptiveEstimate, Errors, Trace};
 pub use trip::Trip;

@@ -7,13 +7,13 @@ use afbc_types::{Setpoint, State};
 ///
 /// The default is the memory before the first step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Screened<M> {
+pub struct Validated<M> {
     screen: Screen,
     /// Memory of the controller behind the screen.
     pub control: M,
 }
 
-impl<M> Screened<M> {
+impl<M> Validated<M> {
     /// Returns the screen and the memory behind it.
     #[inline]
     pub(crate) fn parts(&mut self) -> (&mut Screen, &mut M) {

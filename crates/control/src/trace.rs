@@ -39,7 +39,7 @@ pub struct Errors {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Estimate {
+pub struct AdaptiveEstimate {
     /// Theta_hat: one consequent parameter per fuzzy rule, rows by the Gaussians of the first input, columns by those
     /// of the second; in the unit of the subsystem's input.
     pub theta: Matrix3<f32>,

@@ -2,7 +2,7 @@
 //! and without a fallback.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
-use afbc_control::{Action, Estimate, FlightController, Health, Mixer, Screened, Trace};
+use afbc_control::{Action, AdaptiveEstimate, FlightController, Health, Mixer, Trace, Validated};
 use afbc_types::{Axis, Inputs, PLUS, Parameters, ROTORS_MAX, Setpoint, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -74,7 +74,7 @@ proptest! {
     /// is told nothing and the rotors stand still; before there is a setpoint, it holds where it is.
     #[test]
     fn a_law_is_told_what_is_plausible(steps in prop::collection::vec((state(), setpoint()), 1..40)) {
-        let (listener, mut memory) = (listener(), Screened::default());
+        let (listener, mut memory) = (listener(), Validated::default());
         let (mut last_state, mut last_setpoint, mut told) = (None, None, Told::default());
         for (measured, setpoint) in steps {
             let fresh = measured.is_some_and(|state| state.is_plausible());
@@ -106,14 +106,14 @@ proptest! {
 /// A law without estimates and without a fallback need not say so.
 #[test]
 fn a_plain_law_learns_nothing_and_has_no_fallback() {
-    let (listener, mut memory) = (listener(), Screened::default());
+    let (listener, mut memory) = (listener(), Validated::default());
     let _ = listener.step(&mut memory, Some(&State::default()), &Setpoint::default());
     let before = memory;
     assert!(!listener.engage(&mut memory.control));
     listener.adrift(&mut memory.control);
     assert_eq!(memory, before);
     let learnt = Listener::learnt(&memory.control);
-    assert!(Axis::ALL.iter().all(|axis| learnt[*axis] == Estimate::default()));
+    assert!(Axis::ALL.iter().all(|axis| learnt[*axis] == AdaptiveEstimate::default()));
 }
 
 /// Faults come from the rotors that saturate, and from nothing else.

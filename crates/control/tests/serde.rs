@@ -1,7 +1,7 @@
 //! Feature `serde`: values survive a round trip, and their format is what files and other programs rely on.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
-use afbc_control::{Action, Errors, Estimate, Health, Mixer, Settings, Trace, Trip};
+use afbc_control::{Action, AdaptiveEstimate, Errors, Health, Mixer, Settings, Trace, Trip};
 use afbc_types::{Axis, Inputs, Parameters, PerAxis, Setpoint, State};
 use core::fmt::Debug;
 use nalgebra::{Matrix3, Vector3};
@@ -56,7 +56,7 @@ proptest! {
         let mut trace = Trace::default();
         (trace.inputs, trace.errors, trace.virtual_m_s2) = (inputs, errors, [yaw_rad, roll_n]);
         round_trip(&trace);
-        let mut estimate = Estimate::default();
+        let mut estimate = AdaptiveEstimate::default();
         (estimate.theta, estimate.delta) = (Matrix3::from_columns(&[position_m, velocity_m_s, attitude_rad]), yaw_rad);
         round_trip(&estimate);
     }

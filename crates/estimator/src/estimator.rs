@@ -124,7 +124,7 @@ impl Estimator {
         if memory.runs {
             // Between fixes, since a fix holds a state of before.
             if predicted {
-                // Enough for a step.
+                // The prediction took this step's share of time; the history settles in another.
             } else if memory.fix.is_none() && memory.history.is_unsettled() {
                 memory.history.settle(self.settings.gravity_m_s2);
             } else {

@@ -40,7 +40,7 @@ const ALOFT_M_S: f32 = 3.0;
 const STILL_SIGMAS: f32 = 3.0;
 /// Time within which a second reset doubts the attitude \[us\].
 const AGAIN_US: u64 = 10_000_000;
-/// Variance of the velocity after a tracker's jump, which tells none; two more positions do \[m2/s2\].
+/// Variance of the velocity after a tracker's jump: one position says nothing of it, the next two do \[m2/s2\].
 const JUMP_VARIANCE: f32 = 100.0;
 /// Variance of the velocity after a freeze, which has told for a while that the vehicle stands still: (0.1 m/s)^2,
 /// since faster ones contradict it \[m2/s2\].

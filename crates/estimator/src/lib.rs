@@ -1,7 +1,7 @@
 //! State estimator of a multirotor: position, velocity, attitude and biases from an IMU and whatever aids it.
 //!
 //! ```
-//! use afbc_estimator::{Estimator, ImuSample, Measurement, Memory, Settings, Timed};
+//! use afbc_estimator::{Estimator, ImuSample, Measurement, Memory, Settings, Stamped};
 //! use nalgebra::Vector3;
 //!
 //! let estimator = Estimator::new(Settings::DEFAULT).unwrap();
@@ -15,7 +15,7 @@
 //!     let position_m = Vector3::new(1.0, 2.0, 0.0);
 //!     if ms % 10 == 0 {
 //!         // It took 8 ms to arrive.
-//!         memory.offer(&Timed { value: Measurement::Position { position_m, sigma_m: 0.001 }, at_us: at_us - 8000 });
+//!         memory.offer(&Stamped { value: Measurement::Position { position_m, sigma_m: 0.001 }, at_us: at_us - 8000 });
 //!     }
 //!     let estimate = estimator.step(&mut memory, at_us, Some(&sample));
 //!     assert_eq!(estimate.validity.attitude, ms > 1000);
@@ -59,9 +59,9 @@
 //! # Sensors
 //!
 //! * A **tracker** and a **GNSS receiver** both tell the position in the earth frame. Their origins must be the same
-//!   (on board `afbc_onboard::Navigation` sees to that); whichever comes first sets the position, and one that
+//!   (on board `afbc_onboard::EstimatorFrontEnd` sees to that); whichever comes first sets the position, and one that
 //!   contradicts the other is rejected as long as the other is there. The receiver's antenna is taken to be at the
-//!   centre of mass, as is the IMU: who mounts them elsewhere corrects the measurements.
+//!   centre of mass, as is the IMU; measurements of sensors mounted elsewhere must be corrected before.
 //! * Of the standard deviation that a receiver reports, [`Settings::gnss_noise_m`] is noise, and the rest an
 //!   [error that stays for minutes](slow), which further fixes do not average: the position is as good as the receiver.
 //! * A tracker that repeats its pose in every bit for [`Settings::frozen_s`] is frozen, and not believed.
@@ -83,7 +83,7 @@
 //! # For a controller
 //!
 //! Each fix makes position and velocity jump, those of an aid that comes back most, and the rotors shake the velocity.
-//! [`Easing`] tells a controller the same state without either.
+//! [`OutputFilter`] tells a controller the same state without either.
 //!
 //! # When something is wrong
 //!
@@ -105,7 +105,6 @@
 mod aid;
 mod align;
 mod covariance;
-mod ease;
 mod errors;
 mod estimate;
 mod estimator;
@@ -117,6 +116,7 @@ mod imu;
 mod measurement;
 mod memory;
 mod nominal;
+mod output_filter;
 mod queue;
 mod rest;
 mod restart;
@@ -124,15 +124,16 @@ mod rotation;
 mod settings;
 mod slow;
 
+pub use afbc_types::Stamped;
 pub use aid::{Aid, AidRecord, Aids};
 pub use align::Unready;
-pub use ease::Easing;
 pub use estimate::{Dropped, Estimate, Resets, Sigmas, Validity};
 pub use estimator::Estimator;
 pub use geodetic::Origin;
 pub use imu::{ImuHealth, MISSING_US};
-pub use measurement::{ImuSample, Measurement, Timed};
+pub use measurement::{ImuSample, Measurement};
 pub use memory::Memory;
+pub use output_filter::OutputFilter;
 pub use settings::Settings;
 
 #[cfg(test)]

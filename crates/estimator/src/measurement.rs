@@ -13,15 +13,6 @@ pub struct ImuSample {
     pub specific_force_m_s2: Vector3<f32>,
 }
 
-/// A value with the time at which it was true.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Timed<T> {
-    /// The value.
-    pub value: T,
-    /// Time on the clock of `now_us` \[us\].
-    pub at_us: u64,
-}
-
 /// What an aiding sensor measured, in the earth and body frames of [`afbc_types`].
 ///
 /// Standard deviations are positive; those below a tenth of a millimetre, of a milliradian or a millimetre per second

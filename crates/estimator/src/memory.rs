@@ -7,11 +7,12 @@ use crate::errors::Interval;
 use crate::estimate::{Dropped, Resets};
 use crate::history::History;
 use crate::imu::{Monitor, Smoothed};
-use crate::measurement::{Measurement, Timed};
+use crate::measurement::Measurement;
 use crate::nominal::Nominal;
 use crate::queue::{Fix, Queue};
 use crate::rest::Rest;
 use crate::rotation::identity;
+use afbc_types::Stamped;
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
 /// Memory of an estimator. The default is that before the first sample.
@@ -120,7 +121,7 @@ impl Default for Memory {
 impl Memory {
     /// Hands over a measurement, to be fused by one of the next steps. An implausible one
     /// ([`Measurement::is_plausible`]) is refused; if eight are waiting, the oldest gives way. Both are counted.
-    pub fn offer(&mut self, measurement: &Timed<Measurement>) {
+    pub fn offer(&mut self, measurement: &Stamped<Measurement>) {
         if !measurement.value.is_plausible() {
             self.dropped.implausible = self.dropped.implausible.saturating_add(1);
         } else if self.queue.push(measurement) {

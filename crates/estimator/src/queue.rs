@@ -3,9 +3,10 @@
 use crate::aid::Aid;
 use crate::history::Past;
 use crate::horizon::Target;
-use crate::measurement::{Measurement, Timed};
+use crate::measurement::Measurement;
 use crate::rotation::normalized;
 use afbc_control::math::max;
+use afbc_types::Stamped;
 use nalgebra::{Quaternion, Vector3};
 
 /// Number of measurements that may wait.
@@ -14,7 +15,7 @@ const WAITING_MAX: usize = 8;
 /// Measurements, each with the number of its arrival.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Queue {
-    waiting: [Option<(u32, Timed<Measurement>)>; WAITING_MAX],
+    waiting: [Option<(u32, Stamped<Measurement>)>; WAITING_MAX],
     arrived: u32,
     count: u8,
 }
@@ -26,11 +27,11 @@ impl Queue {
     }
 
     /// Appends; true if the oldest one had to give way.
-    pub(crate) fn push(&mut self, measurement: &Timed<Measurement>) -> bool {
+    pub(crate) fn push(&mut self, measurement: &Stamped<Measurement>) -> bool {
         let arrived = self.arrived;
         self.arrived = arrived.wrapping_add(1);
         // A free place, or else the oldest one's.
-        let age = |place: &Option<(u32, Timed<Measurement>)>| {
+        let age = |place: &Option<(u32, Stamped<Measurement>)>| {
             place.as_ref().map_or(u32::MAX, |(number, _)| arrived.wrapping_sub(*number))
         };
         let Some(place) = self.waiting.iter_mut().max_by_key(|place| age(place)) else { return false };
@@ -41,12 +42,12 @@ impl Queue {
     }
 
     /// Removes and returns the oldest measurement whose time is `due`.
-    pub(crate) fn take(&mut self, due: impl Fn(u64) -> bool) -> Option<Timed<Measurement>> {
+    pub(crate) fn take(&mut self, due: impl Fn(u64) -> bool) -> Option<Stamped<Measurement>> {
         if self.count == 0 {
             return None;
         }
         let age = |number: u32| self.arrived.wrapping_sub(number);
-        let due = |(place, waiting): (usize, &Option<(u32, Timed<Measurement>)>)| {
+        let due = |(place, waiting): (usize, &Option<(u32, Stamped<Measurement>)>)| {
             waiting.as_ref().filter(|(_, waiting)| due(waiting.at_us)).map(|(number, _)| (age(*number), place))
         };
         let (_, oldest) = self.waiting.iter().enumerate().filter_map(due).max()?;

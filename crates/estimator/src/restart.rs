@@ -221,8 +221,8 @@ impl Memory {
         self.covariance.hold();
     }
 
-    /// Turns the heading by `by`, and takes `variance` for it; if a field told it, whose north is told here, the
-    /// vehicle's own field comes on top.
+    /// Turns the heading by `by`, and sets its variance to `variance`. If the heading comes from the magnetic field,
+    /// with its `north`, the variance of the vehicle's own field is added.
     pub(crate) fn reset_heading(&mut self, by: f32, variance: f32, north: Option<(f32, f32)>) {
         count(&mut self.resets.heading);
         let turn = about_z(by);

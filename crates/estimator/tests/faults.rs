@@ -3,7 +3,7 @@
 
 mod common;
 
-use afbc_estimator::{Estimator, ImuSample, Measurement, Memory, Settings, Timed};
+use afbc_estimator::{Estimator, ImuSample, Measurement, Memory, Settings, Stamped};
 use common::checks::{at_rest, flown, position_error};
 use common::{ICM, MOCAP, NOTHING, Noise, OUTDOOR, V3, double, eight, hover, settings, single};
 use nalgebra::Vector3;
@@ -114,7 +114,7 @@ fn a_frozen_tracker_is_not_believed() {
             let sample = ImuSample { at_us, rates_rad_s, specific_force_m_s2: Vector3::new(0.0, 0.0, 9.81) };
             if ms % 10 == 0 {
                 let value = Measurement::Position { position_m: Vector3::zeros(), sigma_m: 0.01 };
-                memory.offer(&Timed { value, at_us: at_us - 5000 });
+                memory.offer(&Stamped { value, at_us: at_us - 5000 });
             }
             let _ = estimator(frozen_s).step(&mut memory, at_us, Some(&sample));
         }
@@ -356,13 +356,13 @@ fn bad_measurements_are_counted() {
             attitude_sigma_rad: 0.1,
         },
     ] {
-        memory.offer(&Timed { value, at_us: now_us });
+        memory.offer(&Stamped { value, at_us: now_us });
     }
     let _ = step(&mut memory, 1);
     assert_eq!(memory.dropped().implausible, 7);
     // Too old, far in the future, twice the same, and older than the last one.
     for at_us in [now_us - 300_000, now_us + 500_000, now_us - 20_000, now_us - 20_000, now_us - 40_000] {
-        memory.offer(&Timed { value: good, at_us });
+        memory.offer(&Stamped { value: good, at_us });
     }
     for ms in 2..20 {
         let _ = step(&mut memory, ms);
@@ -371,7 +371,7 @@ fn bad_measurements_are_counted() {
     assert_eq!((dropped.late, dropped.early, dropped.overtaken), (1, 1, 2), "{dropped:?}");
     assert_eq!(memory.aids().tracker_position.accepted, 1);
     for i in 0..10 {
-        memory.offer(&Timed { value: good, at_us: now_us + 20_000 + i });
+        memory.offer(&Stamped { value: good, at_us: now_us + 20_000 + i });
     }
     assert_eq!(memory.dropped().crowded, 2);
 }

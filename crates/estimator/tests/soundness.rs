@@ -3,7 +3,7 @@
 
 mod common;
 
-use afbc_estimator::{Estimate, Estimator, ImuSample, Measurement, Memory, Settings, Sigmas, Timed};
+use afbc_estimator::{Estimate, Estimator, ImuSample, Measurement, Memory, Settings, Sigmas, Stamped};
 use afbc_types::State;
 use common::checks::{positive, sound};
 use common::{ICM, MOCAP, Noise, OUTDOOR, V3, settings, single};
@@ -114,7 +114,7 @@ proptest! {
                     sound(&estimator.step(&mut memory, now_us, Some(&sample)), &memory);
                 }
                 Event::Measure(value, off) => {
-                    memory.offer(&Timed { value, at_us: now_us.saturating_add_signed(off) });
+                    memory.offer(&Stamped { value, at_us: now_us.saturating_add_signed(off) });
                     sound(&estimator.step(&mut memory, now_us, None), &memory);
                 }
                 Event::Gap(ms) => {
@@ -181,7 +181,7 @@ fn hours_leave_it_sound() {
                 let position_m = single(&noise.vector(1e-3));
                 let value =
                     Measurement::Pose { position_m, attitude, position_sigma_m: 1e-3, attitude_sigma_rad: 3.5e-3 };
-                memory.offer(&Timed { value, at_us: at_us - 8000 });
+                memory.offer(&Stamped { value, at_us: at_us - 8000 });
             }
             if sensors.gnss.is_some() && i % 50 == 0 {
                 let value = Measurement::Gnss {
@@ -191,14 +191,17 @@ fn hours_leave_it_sound() {
                     vertical_sigma_m: 1.0,
                     speed_sigma_m_s: 0.1,
                 };
-                memory.offer(&Timed { value, at_us: at_us - 100_000 });
+                memory.offer(&Stamped { value, at_us: at_us - 100_000 });
             }
             if sensors.baro.is_some() && i % 10 == 0 {
                 let height_m = (offset + 0.15 * noise.normal()) as f32;
-                memory.offer(&Timed { value: Measurement::Height { height_m, sigma_m: 0.15 }, at_us: at_us - 20_000 });
-                let field = single(&(common::field() + noise.vector(0.01)));
                 memory
-                    .offer(&Timed { value: Measurement::MagneticField { field, sigma: 0.01 }, at_us: at_us - 12_000 });
+                    .offer(&Stamped { value: Measurement::Height { height_m, sigma_m: 0.15 }, at_us: at_us - 20_000 });
+                let field = single(&(common::field() + noise.vector(0.01)));
+                memory.offer(&Stamped {
+                    value: Measurement::MagneticField { field, sigma: 0.01 },
+                    at_us: at_us - 12_000,
+                });
             }
             let _ = estimator.step(&mut memory, at_us, Some(&sample));
             let _ = estimator.step(&mut memory, at_us + 1000, None);

@@ -13,9 +13,9 @@ pub const TIMER_CLOCK: Range = Range::new("timer_hz", 8e6, 500e6);
 
 /// A frame: 11 bits of throttle, the telemetry request (always off), 4 bits of checksum; sent from the highest bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Frame(u16);
+pub struct DshotFrame(u16);
 
-impl Frame {
+impl DshotFrame {
     /// Creates the frame for a throttle of 0 (stop) or 48 to 2047. Other values stop the motor: 1 to 47 are commands to
     /// the motor controller, which are not used.
     pub const fn new(throttle: u16) -> Self {
@@ -25,7 +25,7 @@ impl Frame {
         };
         let data = throttle << 1;
         let checksum = (data ^ (data >> 4) ^ (data >> 8)) & 0xF;
-        Frame(data << 4 | checksum)
+        DshotFrame(data << 4 | checksum)
     }
 
     /// Returns the sixteen bits.
@@ -67,7 +67,7 @@ impl Timing {
     /// Computes the compare values of several motors: a row for each bit, a column for each motor, each column a
     /// [waveform](Self::waveform).
     pub fn rows<const N: usize>(&self, throttles: [u16; N], rows: &mut [[u16; N]; 17]) {
-        let mut frames = throttles.map(|throttle| Frame::new(throttle).bits());
+        let mut frames = throttles.map(|throttle| DshotFrame::new(throttle).bits());
         let [bits @ .., last] = rows;
         for row in bits {
             *row = frames.map(|bits| self.pulse(bits & 0x8000 != 0));
@@ -82,7 +82,7 @@ impl Timing {
     }
 
     /// Returns the compare values of `frame`.
-    pub fn waveform(&self, frame: Frame) -> Waveform {
+    pub fn waveform(&self, frame: DshotFrame) -> Waveform {
         let mut bits = frame.bits();
         let mut waveform = [0; 17];
         for pulse in waveform.iter_mut().take(16) {

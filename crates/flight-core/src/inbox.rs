@@ -2,28 +2,11 @@
 
 use crate::reasons::Reasons;
 use crate::supervisor::{Refusal, Request};
-use afbc_types::{Pose, Setpoint, State};
-
-/// A value with its time on the vehicle's clock.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Stamped<T> {
-    /// The value.
-    pub value: T,
-    /// Time since power-up \[us\].
-    pub at_us: u64,
-}
-
-impl<T> Stamped<T> {
-    /// Returns its age at `now_us`, at most `u32::MAX` (71 minutes). A stamp in the future is invalid and counts as
-    /// that old.
-    pub fn age_us(&self, now_us: u64) -> u32 {
-        u32::try_from(now_us.wrapping_sub(self.at_us)).unwrap_or(u32::MAX)
-    }
-}
+use afbc_types::{Pose, Setpoint, Stamped, State};
 
 /// A request, with a ticket that identifies its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Asked {
+pub struct TicketedRequest {
     /// The request.
     pub request: Request,
     /// Returned with the answer, and not used otherwise.
@@ -46,9 +29,9 @@ pub struct Inbox {
     setpoint: Option<Stamped<Setpoint>>,
     /// True if the vehicle rests on the ground.
     rests: Option<bool>,
-    barred: Reasons,
+    inhibited: Reasons,
     /// Requests in the order of arrival, without gaps.
-    requests: [Option<Asked>; REQUESTS_MAX],
+    requests: [Option<TicketedRequest>; REQUESTS_MAX],
 }
 
 impl Inbox {
@@ -61,7 +44,7 @@ impl Inbox {
         pose: None,
         setpoint: None,
         rests: None,
-        barred: Reasons::NONE,
+        inhibited: Reasons::NONE,
         requests: [None; REQUESTS_MAX],
     };
 
@@ -117,13 +100,13 @@ impl Inbox {
     }
 
     /// Sets what speaks against arming besides what the flight core checks itself.
-    pub fn bar(&mut self, reasons: Reasons) {
-        self.barred = reasons;
+    pub fn inhibit(&mut self, reasons: Reasons) {
+        self.inhibited = reasons;
     }
 
-    /// Returns what else [speaks against arming](Self::bar).
-    pub fn barred(&self) -> Reasons {
-        self.barred
+    /// Returns what else [speaks against arming](Self::inhibit).
+    pub fn inhibited(&self) -> Reasons {
+        self.inhibited
     }
 
     /// Returns the newest plausible state.
@@ -162,7 +145,7 @@ impl Inbox {
     }
 
     /// Returns the oldest request, which the next tick answers.
-    pub fn asked(&self) -> Option<Asked> {
+    pub fn asked(&self) -> Option<TicketedRequest> {
         self.requests.first().copied().flatten()
     }
 
@@ -172,7 +155,7 @@ impl Inbox {
     }
 
     /// Merges `news` into this inbox.
-    pub fn post(&mut self, news: &Inbox) {
+    pub fn merge(&mut self, news: &Inbox) {
         self.state = news.state.or(self.state);
         self.adrift = news.adrift.or(self.adrift);
         self.missing = news.missing.or(self.missing);
@@ -181,7 +164,7 @@ impl Inbox {
         }
         self.setpoint = news.setpoint.or(self.setpoint);
         self.rests = news.rests.or(self.rests);
-        self.barred = if news.barred.is_empty() { self.barred } else { news.barred };
+        self.inhibited = if news.inhibited.is_empty() { self.inhibited } else { news.inhibited };
         for asked in news.requests.iter().flatten() {
             self.request(*asked);
         }
@@ -189,7 +172,7 @@ impl Inbox {
 
     /// Queues a request; each tick answers one. False if [`REQUESTS_MAX`] are queued already: then it is dropped,
     /// unless it is [`Request::Kill`], which replaces the newest one.
-    pub fn request(&mut self, asked: Asked) -> bool {
+    pub fn request(&mut self, asked: TicketedRequest) -> bool {
         let free = self.requests.iter().position(Option::is_none);
         let newest = (asked.request == Request::Kill).then_some(REQUESTS_MAX - 1);
         match free.or(newest).and_then(|place| self.requests.get_mut(place)) {
@@ -233,7 +216,7 @@ impl Inbox {
             }
             (new, old) => *old = *new,
         }
-        (taken.rests, taken.barred) = (self.rests, self.barred);
+        (taken.rests, taken.inhibited) = (self.rests, self.inhibited);
         taken.requests = self.requests;
         // By hand, since rotating a slice costs a hundred instructions.
         let [first, second, third, fourth] = self.requests;

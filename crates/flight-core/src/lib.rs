@@ -1,8 +1,8 @@
 //! The flight core around a control law: arming, failsafes, and motor gating.
 //!
 //! [`afbc_types`] defines frames and units. All decisions in flight are made here, and run on the host too; firmware
-//! and simulator are shells that fill an [`Inbox`], call [`Vehicle::tick`] every millisecond and output its
-//! [`Outcome`].
+//! and simulator are shells that fill an [`Inbox`], call [`FlightCore::tick`] every millisecond and output its
+//! [`TickOutcome`].
 //!
 //! # Reading order
 //!
@@ -11,17 +11,18 @@
 //!    against a request, and against arming.
 //! 3. [`inbox`]: the inputs of a tick and their ages; [`tracker`], [`clock`]: selection of states, and the time of
 //!    their measurement.
-//! 4. [`landing`], [`tumble`], [`witness`]: detection of landing, tumbling and frozen trackers.
-//! 5. [`blind`]: flight without measurements; [`observer`]: flight on poses alone; [`descent`]: descent with
+//! 4. [`landing`], [`tumble`], [`frozen_tracker`]: detection of landing, tumbling and frozen trackers.
+//! 5. [`dead_reckoning`]: flight without measurements; [`observer`]: flight on poses alone; [`descent`]: descent with
 //!    measurements.
 //! 6. [`rate`]: supervision of the tick rate.
 //! 7. [`motor`], [`dshot`]: throttle curve, and the waveform to the motor controllers.
 #![no_std]
 
-pub mod blind;
 pub mod clock;
+pub mod dead_reckoning;
 pub mod descent;
 pub mod dshot;
+pub mod frozen_tracker;
 pub mod inbox;
 pub mod landing;
 pub mod motor;
@@ -33,14 +34,14 @@ pub mod supervisor;
 pub mod tick;
 pub mod tracker;
 pub mod tumble;
-pub mod witness;
 
+pub use afbc_types::Stamped;
 pub use clock::SourceClock;
-pub use inbox::{Asked, Inbox, Stamped};
+pub use inbox::{Inbox, TicketedRequest};
 pub use motor::Motor;
 pub use reasons::Reasons;
-pub use supervisor::{ArmingLimits, End, Mode, Refusal, Request};
-pub use tick::{Answer, Health, Outcome, Vehicle, VehicleMemory};
+pub use supervisor::{ArmingLimits, EndReason, Mode, Refusal, Request};
+pub use tick::{FlightCore, FlightCoreMemory, RequestAnswer, TickHealth, TickOutcome};
 pub use tracker::Tracker;
 
 #[cfg(test)]

@@ -8,9 +8,9 @@
 //! dR/dt = R Omega^,   d Omega/dt = (m g/T_trim) (l/I) (U_a - U_trim)
 //! ```
 //!
-//! where T_a and U_a lag behind the inputs and are trimmed as in [`crate::blind`], d is whatever pushes the vehicle,
-//! and rotors that need more than m g to hover count as weaker in their moments too. Each pose is compared with the
-//! prediction for its own time. With w the bandwidth, T the time between two poses and beta = 1/(1 + w T), the
+//! where T_a and U_a lag behind the inputs and are trimmed as in [`crate::dead_reckoning`], d is whatever pushes the
+//! vehicle, and rotors that need more than m g to hover count as weaker in their moments too. Each pose is compared
+//! with the prediction for its own time. With w the bandwidth, T the time between two poses and beta = 1/(1 + w T), the
 //! difference corrects
 //!
 //! ```text
@@ -21,10 +21,9 @@
 //! of it: filters of the second and third order with a fading memory, all poles of which are at beta, whatever T.
 //! A single outlier counts little, and a tracker whose frame has jumped is followed.
 
-use crate::blind::{Blind, LAG_S, Reckoning};
-use crate::inbox::Stamped;
+use crate::dead_reckoning::{DeadReckoning, LAG_S, Reckoning};
 use afbc_control::math::{abs_max, max, min, settled, sqrt};
-use afbc_types::{Inputs, Pose, State};
+use afbc_types::{Inputs, Pose, Stamped, State};
 use nalgebra::{Quaternion, Vector3};
 
 /// w of the attitude \[rad/s\]: as fast as the noise of trackers allows, since the law, which is fast too, must not act
@@ -50,7 +49,7 @@ pub const PUSH_MAX_M_S2: f32 = 10.0;
 
 /// Observed motion, at the time of the last step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Observer {
+pub struct PoseObserver {
     position_m: Vector3<f32>,
     velocity_m_s: Vector3<f32>,
     /// From body to earth.
@@ -70,7 +69,7 @@ pub struct Observer {
     pose: Stamped<Pose>,
 }
 
-impl Observer {
+impl PoseObserver {
     /// True if `pose` may be used at `now_us`: it is not too late, and states no large standard deviation.
     #[must_use]
     pub fn takes(pose: &Stamped<Pose>, now_us: u64) -> bool {
@@ -85,7 +84,7 @@ impl Observer {
     #[must_use]
     pub fn new(state: &State, applied: &Inputs, at_us: u64) -> Self {
         let zero = Vector3::zeros();
-        Observer {
+        PoseObserver {
             position_m: state.position_m,
             velocity_m_s: state.velocity_m_s,
             attitude: state.quaternion().into_inner(),
@@ -113,25 +112,25 @@ impl Observer {
     }
 
     /// Predicts over one step with the inputs asked of the rotors. `reckoning` is that of the last step, which has
-    /// [measured](Blind::measure) this observer's state.
-    pub fn advance(&mut self, blind: &Blind, reckoning: &Reckoning, applied: &Inputs) {
-        let dt_s = blind.dt_s;
-        let (least, most) = (TRIM_SHARE.0 * blind.weight_n, TRIM_SHARE.1 * blind.weight_n);
+    /// [measured](DeadReckoning::measure) this observer's state.
+    pub fn advance(&mut self, dead_reckoning: &DeadReckoning, reckoning: &Reckoning, applied: &Inputs) {
+        let dt_s = dead_reckoning.dt_s;
+        let (least, most) = (TRIM_SHARE.0 * dead_reckoning.weight_n, TRIM_SHARE.1 * dead_reckoning.weight_n);
         let trim_n = min(max(reckoning.trim.thrust_n, least), most);
         self.thrust_n = settled(self.thrust_n + (applied.thrust_n - self.thrust_n) * (dt_s / LAG_S));
         self.yaw_n = settled(self.yaw_n + (applied.yaw_n - self.yaw_n) * (dt_s / LAG_S));
 
         let mut ahead = *reckoning;
-        blind.advance(&mut ahead, applied);
+        dead_reckoning.advance(&mut ahead, applied);
         let tipping = (ahead.rate_rad_s - reckoning.rate_rad_s) / dt_s;
-        let yawing = blind.yaw_authority * (self.yaw_n - reckoning.trim.yaw_n);
-        self.angular_rad_s2 = Vector3::new(tipping.x, tipping.y, yawing) * (blind.weight_n / trim_n);
+        let yawing = dead_reckoning.yaw_authority * (self.yaw_n - reckoning.trim.yaw_n);
+        self.angular_rad_s2 = Vector3::new(tipping.x, tipping.y, yawing) * (dead_reckoning.weight_n / trim_n);
         self.rates_rad_s += self.angular_rad_s2 * dt_s;
         self.attitude = turned(&self.attitude, &(self.rates_rad_s * dt_s));
 
         let q = &self.attitude;
         let up = Vector3::new(q.i * q.k + q.w * q.j, q.j * q.k - q.w * q.i, 0.5 - q.i * q.i - q.j * q.j) * 2.0;
-        let gravity_m_s2 = blind.gravity_m_s2;
+        let gravity_m_s2 = dead_reckoning.gravity_m_s2;
         self.acceleration_m_s2 = up * (gravity_m_s2 * self.thrust_n / trim_n) + self.push_m_s2;
         self.acceleration_m_s2.z -= gravity_m_s2;
         self.velocity_m_s += self.acceleration_m_s2 * dt_s;

@@ -5,7 +5,7 @@
 //!
 //! There are three grades, best first:
 //!
-//! | | [`Report::healthy`] | [`Report::alive`] | the vehicle |
+//! | | [`RateReport::healthy`] | [`RateReport::alive`] | the vehicle |
 //! |---|---|---|---|
 //! | 997 to 1003 Hz, and no late or early tick for a second | yes | yes | may be armed |
 //! | any other rate, a tick at the wrong time, a failed clock | no | yes | continues flying, but is not armed again |
@@ -26,7 +26,7 @@ pub const EARLY_US: u32 = 900;
 
 /// Result of the supervision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Report {
+pub struct RateReport {
     /// Ticks in the last full second \[Hz\]; none during the first.
     pub rate_hz: Option<u32>,
     /// Ticks that came late since power-up, up to `u32::MAX`.
@@ -41,7 +41,7 @@ pub struct Report {
     pub clock_failed: bool,
 }
 
-impl Report {
+impl RateReport {
     /// True if the rate was measured and within 997 to 1003 Hz, no tick of the last second was late or early, and the
     /// clock has not failed: the condition for arming.
     pub fn healthy(&self) -> bool {
@@ -67,19 +67,19 @@ pub struct Counter {
     ticks: u32,
     /// Time since the last late or early tick \[us\].
     right_us: u32,
-    report: Report,
+    report: RateReport,
 }
 
 impl Default for Counter {
     /// Starts without any fault.
     fn default() -> Self {
-        Counter { last_us: None, gap_us: 0, window_us: 0, ticks: 0, right_us: WINDOW_US, report: Report::default() }
+        Counter { last_us: None, gap_us: 0, window_us: 0, ticks: 0, right_us: WINDOW_US, report: RateReport::default() }
     }
 }
 
 impl Counter {
     /// Processes a tick, with the time since power-up, and returns the [result](Self::report).
-    pub fn tick(&mut self, now_us: u64) -> &Report {
+    pub fn tick(&mut self, now_us: u64) -> &RateReport {
         let report = &mut self.report;
         let first = self.last_us.is_none();
         let last_us = self.last_us.replace(now_us).unwrap_or(now_us);
@@ -104,7 +104,7 @@ impl Counter {
     }
 
     /// Returns the result as of the last tick.
-    pub fn report(&self) -> &Report {
+    pub fn report(&self) -> &RateReport {
         &self.report
     }
 

@@ -67,7 +67,7 @@ impl Refusal {
     ];
 
     /// The reasons against arming, the first ones first: what is not known, what the flight core sees, what
-    /// [others](crate::Inbox::bar) have against it.
+    /// [others](crate::Inbox::inhibit) have against it.
     pub const ARMING: [Refusal; 14] = [
         Refusal::AlreadyArmed,
         Refusal::AttitudeUnknown,

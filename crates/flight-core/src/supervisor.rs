@@ -39,7 +39,7 @@ pub const REST_US: u32 = 1_000_000;
 /// `age` is that of the newest plausible state. The mode at power-up is Disarmed. In Coasting and Descending the law
 /// flies while the state is fresh. A vehicle that knows its attitude but not where it is, is held level and descends
 /// without drifting away on purpose ([`crate::descent`]), for as long as it takes; otherwise it is flown blind
-/// ([`crate::blind`]).
+/// ([`crate::dead_reckoning`]).
 ///
 /// Descending does not return to Flying. The attitude has been unknown for a quarter of a second, and a tracker that
 /// recovers only for moments would make the vehicle descend and climb repeatedly. States that return are used to
@@ -77,7 +77,7 @@ pub enum Request {
 /// Why a flight ended. The numbers are part of the link's protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum End {
+pub enum EndReason {
     /// [`Request::Disarm`] on the ground.
     Disarmed = 1,
     /// [`Request::Kill`].
@@ -125,8 +125,8 @@ impl ArmingLimits {
     }
 
     /// Returns everything that speaks against arming a disarmed vehicle. What depends on an unknown state is left out.
-    pub fn against(&self, vehicle: &Standing<'_>) -> Reasons {
-        let mut reasons = vehicle.barred;
+    pub fn against(&self, vehicle: &ArmingInputs<'_>) -> Reasons {
+        let mut reasons = vehicle.inhibited;
         match vehicle.state {
             Some(state) => {
                 let tilt =
@@ -149,7 +149,7 @@ impl ArmingLimits {
 
 /// State of a vehicle to be armed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Standing<'a> {
+pub struct ArmingInputs<'a> {
     /// State, if plausible and fresh.
     pub state: Option<&'a State>,
     /// What the vehicle's own estimate misses, if it has one and misses something.
@@ -160,13 +160,13 @@ pub struct Standing<'a> {
     pub healthy: bool,
     /// Time for which it has been [at rest](ArmingLimits::at_rest) \[us\].
     pub rest_us: u32,
-    /// What else speaks against arming, by [`Inbox::bar`](crate::Inbox::bar).
-    pub barred: Reasons,
+    /// What else speaks against arming, by [`Inbox::inhibit`](crate::Inbox::inhibit).
+    pub inhibited: Reasons,
 }
 
 /// Inputs of the supervisor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Observed {
+pub struct SupervisorInputs {
     /// The request to be answered in this tick.
     pub request: Option<Request>,
     /// True if a queued request is [`Request::Kill`].
@@ -193,26 +193,26 @@ impl Mode {
     }
 
     /// Returns why the flight ends, if it does, by the diagram of [`Mode`].
-    pub fn end(self, observed: &Observed) -> Option<End> {
+    pub fn end(self, observed: &SupervisorInputs) -> Option<EndReason> {
         match self {
             Mode::Disarmed => None,
-            _ if observed.kill => Some(End::Killed),
-            _ if observed.request == Some(Request::Disarm) && !observed.airborne => Some(End::Disarmed),
-            _ if observed.tumbled => Some(End::Tumbled),
-            _ if observed.attitude_age_us > GIVE_UP_US => Some(End::StateLost),
-            Mode::Descending if !observed.airborne => Some(End::Landed),
+            _ if observed.kill => Some(EndReason::Killed),
+            _ if observed.request == Some(Request::Disarm) && !observed.airborne => Some(EndReason::Disarmed),
+            _ if observed.tumbled => Some(EndReason::Tumbled),
+            _ if observed.attitude_age_us > GIVE_UP_US => Some(EndReason::StateLost),
+            Mode::Descending if !observed.airborne => Some(EndReason::Landed),
             _ => None,
         }
     }
 
     /// Returns the next mode, by the diagram of [`Mode`].
     #[must_use]
-    pub fn next(self, observed: &Observed) -> Mode {
+    pub fn next(self, observed: &SupervisorInputs) -> Mode {
         if self.end(observed).is_some() { Mode::Disarmed } else { self.onward(observed) }
     }
 
     /// Returns the next mode, if no flight ends.
-    pub(crate) fn onward(self, observed: &Observed) -> Mode {
+    pub(crate) fn onward(self, observed: &SupervisorInputs) -> Mode {
         let age_us = observed.state_age_us;
         match self {
             Mode::Disarmed if observed.request == Some(Request::Arm) && self.answer(Request::Arm, observed).is_ok() => {
@@ -231,7 +231,7 @@ impl Mode {
     ///
     /// # Errors
     /// The reason for refusing it.
-    pub fn answer(self, request: Request, observed: &Observed) -> Result<(), Refusal> {
+    pub fn answer(self, request: Request, observed: &SupervisorInputs) -> Result<(), Refusal> {
         match request {
             Request::Kill => Ok(()),
             _ if observed.kill => Err(Refusal::Overtaken),

@@ -1,36 +1,39 @@
 //! The control tick: takes the newest inputs, supervises, controls, gates the motors, checks the rate.
 
-use crate::blind::{Blind, Reckoning};
+use crate::dead_reckoning::{DeadReckoning, Reckoning};
 use crate::descent::{Descent, Drift};
-use crate::inbox::{Inbox, Stamped};
+use crate::frozen_tracker::FrozenTrackerCheck;
+use crate::inbox::Inbox;
 use crate::landing::LandDetector;
-use crate::observer::{HOLD_US, Observer};
+use crate::observer::{HOLD_US, PoseObserver};
 use crate::rate;
 use crate::reasons::Reasons;
 use crate::supervisor::{
-    ArmingLimits, COAST_US, End, Mode, Observed, REST_US, Refusal, Request, SETPOINT_STALE_US, Standing,
+    ArmingInputs, ArmingLimits, COAST_US, EndReason, Mode, REST_US, Refusal, Request, SETPOINT_STALE_US,
+    SupervisorInputs,
 };
 use crate::tumble::Tumble;
-use crate::witness::Witness;
 use afbc_control::{Action, FlightController, Trace};
-use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Pose, Range, RotorForces, RotorSpeeds, Setpoint, State};
+use afbc_types::{
+    Declared, Inputs, OutOfRange, Parameters, Pose, Range, RotorForces, RotorSpeeds, Setpoint, Stamped, State,
+};
 use nalgebra::Vector3;
 
 /// Accepted time step of a law: the tick's \[s\].
 pub const DT: Range = Range::new("dt_s", 0.001, 0.001);
 
-/// A vehicle with its controller. Constant; everything that changes in flight is in [`VehicleMemory`].
+/// A vehicle with its controller. Constant; everything that changes in flight is in [`FlightCoreMemory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Vehicle<C, const N: usize = 4> {
+pub struct FlightCore<C, const N: usize = 4> {
     controller: C,
-    blind: Blind,
+    dead_reckoning: DeadReckoning,
     limits: ArmingLimits,
     weight_n: f32,
 }
 
 /// State of a vehicle that persists between ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct VehicleMemory<M> {
+pub struct FlightCoreMemory<M> {
     mode: Mode,
     rate: rate::Counter,
     /// The newest plausible state.
@@ -52,17 +55,17 @@ struct Armed<M> {
     control: M,
     reckoning: Reckoning,
     /// Motion observed from a tracker's poses, without an inertial sensor.
-    observer: Option<Observer>,
+    observer: Option<PoseObserver>,
     /// Inputs last applied to the rotors.
     applied: Inputs,
     /// Inputs of the last tick, if it had no step of the law.
-    lawless: Option<Inputs>,
+    open_loop: Option<Inputs>,
     /// True if it rests on the ground, and the controller's memory is as at take-off.
     rests: bool,
     guide: Guide,
     landing: LandDetector,
     tumble: Tumble,
-    witness: Witness,
+    witness: FrozenTrackerCheck,
     /// True if the tracker contradicted itself or the thrust: its states are ignored for the rest of the flight.
     distrusts: bool,
 }
@@ -77,7 +80,7 @@ struct Guide {
     adrift: Option<(Drift, Descent)>,
 }
 
-impl<M> VehicleMemory<M> {
+impl<M> FlightCoreMemory<M> {
     /// Returns the flight mode.
     pub fn mode(&self) -> Mode {
         self.mode
@@ -111,7 +114,7 @@ impl<M> VehicleMemory<M> {
     /// Returns the trace of the last tick with the controller `C`: only inputs while blind, zeros while disarmed.
     pub fn trace<C: FlightController<N, Memory = M>, const N: usize>(&self) -> Trace {
         match &self.flight {
-            Some(Armed { lawless: Some(inputs), .. }) if self.mode.armed() => {
+            Some(Armed { open_loop: Some(inputs), .. }) if self.mode.armed() => {
                 let mut trace = Trace::default();
                 trace.inputs = *inputs;
                 trace
@@ -124,24 +127,24 @@ impl<M> VehicleMemory<M> {
 
 /// Health of the flight core in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Health {
+pub struct TickHealth {
     /// Health of the law's step.
     pub control: afbc_control::Health,
     /// Rate and timing of the ticks.
-    pub rate: rate::Report,
+    pub rate: rate::RateReport,
     /// Age of the newest plausible state \[us\]; `u32::MAX` if there is none.
     pub state_age_us: u32,
     /// True if there is no plausible setpoint younger than 500 ms; an armed vehicle then holds its position.
     pub setpoint_stale: bool,
     /// True if the state is [observed](crate::observer) from a tracker's poses, since the inertial sensor has failed.
     pub observed: bool,
-    /// States since power-up refused as frozen ([`crate::witness`]), up to `u32::MAX`.
+    /// States since power-up refused as frozen ([`crate::frozen_tracker`]), up to `u32::MAX`.
     pub frozen_states: u32,
 }
 
 /// The answer to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Answer {
+pub struct RequestAnswer {
     /// Ticket of the request.
     pub ticket: u8,
     /// The request.
@@ -153,7 +156,7 @@ pub struct Answer {
 /// Result of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Outcome<const N: usize = 4> {
+pub struct TickOutcome<const N: usize = 4> {
     /// Rotor speeds for the motors: zero if disarmed.
     pub motors: RotorSpeeds<N>,
     /// Force of each rotor \[N\].
@@ -161,16 +164,16 @@ pub struct Outcome<const N: usize = 4> {
     /// Flight mode.
     pub mode: Mode,
     /// Health of the flight core.
-    pub health: Health,
+    pub health: TickHealth,
     /// Answer to this tick's request.
-    pub answer: Option<Answer>,
+    pub answer: Option<RequestAnswer>,
     /// Why the flight ended, if it did in this tick.
-    pub ended: Option<End>,
+    pub ended: Option<EndReason>,
     /// What spoke against arming in this tick, by which [`Request::Arm`] was or would have been answered.
     pub against: Reasons,
 }
 
-impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
+impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
     /// Creates a vehicle with these nominal parameters and `controller`, which must be built for them.
     ///
     /// # Errors
@@ -182,7 +185,12 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         DT.check(controller.dt_s())?;
         let weight_n = parameters.weight_n();
         controller.mixer().check_hover(weight_n)?;
-        Ok(Vehicle { blind: Blind::new(&parameters, controller.dt_s()), controller, limits, weight_n })
+        Ok(FlightCore {
+            dead_reckoning: DeadReckoning::new(&parameters, controller.dt_s()),
+            controller,
+            limits,
+            weight_n,
+        })
     }
 
     /// Runs one tick, to be called every millisecond. `now_us` is the time since power-up, which never goes back.
@@ -190,12 +198,12 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
     // Always: copying the outcome out of a call costs a hundred instructions.
     #[inline(always)]
     #[must_use = "the motors need its speeds"]
-    pub fn tick(&self, memory: &mut VehicleMemory<C::Memory>, now_us: u64, inbox: &Inbox) -> Outcome<N> {
+    pub fn tick(&self, memory: &mut FlightCoreMemory<C::Memory>, now_us: u64, inbox: &Inbox) -> TickOutcome<N> {
         let dt_s = self.controller.dt_s();
         // Takes the newest inputs.
         memory.rate.tick(now_us);
         let told = memory.take_state(inbox, now_us);
-        let observing = memory.observe(&self.blind, inbox, now_us, told);
+        let observing = memory.observe(&self.dead_reckoning, inbox, now_us, told);
         let measured = told || observing;
         let state_age_us = memory.state.map_or(u32::MAX, |state| state.age_us(now_us));
         let fresh =
@@ -204,8 +212,9 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         let adrift = inbox.adrift().filter(|_| fresh.is_none()).and_then(|state| upright(state, now_us));
         memory.orient(inbox);
         memory.watch(fresh, adrift.as_ref(), inbox.rests(), &self.limits, dt_s);
-        let VehicleMemory { mode, rate, state: last, steady_us, rest_us, frozen_states, oriented_us, flight, .. } =
-            memory;
+        let FlightCoreMemory {
+            mode, rate, state: last, steady_us, rest_us, frozen_states, oriented_us, flight, ..
+        } = memory;
         let age_us = |at_us: Option<u64>| at_us.map_or(u32::MAX, |at_us| Stamped { value: (), at_us }.age_us(now_us));
         let setpoint = inbox.setpoint().filter(|s| s.age_us(now_us) <= SETPOINT_STALE_US).map(|s| &s.value);
 
@@ -213,12 +222,12 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         let against = if mode.armed() {
             Reasons::from(Refusal::AlreadyArmed)
         } else {
-            let (missing, barred) = (inbox.missing(), inbox.barred());
+            let (missing, inhibited) = (inbox.missing(), inbox.inhibited());
             let (healthy, rest_us) = (rate.report().healthy(), *rest_us);
-            self.limits.against(&Standing { state: fresh, missing, setpoint, healthy, rest_us, barred })
+            self.limits.against(&ArmingInputs { state: fresh, missing, setpoint, healthy, rest_us, inhibited })
         };
         let asked = inbox.asked();
-        let observed = Observed {
+        let observed = SupervisorInputs {
             request: asked.map(|asked| asked.request),
             kill: asked.is_some() && inbox.kills(),
             ready: against.verdict(),
@@ -230,7 +239,7 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         };
         let answer = asked.map(|asked| {
             let result = mode.answer(asked.request, &observed);
-            Answer { ticket: asked.ticket, request: asked.request, result }
+            RequestAnswer { ticket: asked.ticket, request: asked.request, result }
         });
         let done = |request| answer.is_some_and(|answer| answer.request == request && answer.result.is_ok());
         let ended = mode.end(&observed);
@@ -242,31 +251,31 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         // The tick of arming only sets up the flight, and the motors idle: a step would take too long.
         let arms = done(Request::Arm);
         if let (true, Some(state)) = (arms, fresh) {
-            Armed::begin(flight, &self.blind, self.weight_n, state, now_us);
+            Armed::begin(flight, &self.dead_reckoning, self.weight_n, state, now_us);
         }
 
         // Controls.
         let action = match flight {
             Some(flight) if mode.armed() && !arms && inbox.rests() && !observed.airborne => {
-                flight.rest(&self.blind, fresh.or(adrift.as_ref()));
-                self.lawless(flight, Inputs::default())
+                flight.rest(&self.dead_reckoning, fresh.or(adrift.as_ref()));
+                self.open_loop(flight, Inputs::default())
             }
             Some(flight) if mode.armed() && !arms => {
                 flight.rests = false;
-                flight.reckon(&self.blind, fresh.filter(|_| measured).or(adrift.as_ref()));
+                flight.reckon(&self.dead_reckoning, fresh.filter(|_| measured).or(adrift.as_ref()));
                 let engaged = done(Request::Engage) && self.controller.engage(&mut flight.control);
                 match (fresh, &adrift) {
                     // Likewise, the tick of engaging has no step: the rotors keep their inputs.
-                    _ if engaged => self.lawless(flight, flight.applied),
+                    _ if engaged => self.open_loop(flight, flight.applied),
                     (Some(state), _) => {
                         let between = (!measured).then(|| flight.reckoning.between(state));
                         let state = between.as_ref().unwrap_or(state);
                         let target = flight.guide.target(mode, state, setpoint, dt_s);
                         // The inbox only holds plausible values.
                         let action = self.controller.decide(&mut flight.control, state, target, true);
-                        flight.lawless = None;
+                        flight.open_loop = None;
                         flight.applied = action.given;
-                        self.blind.trim(&mut flight.reckoning, &flight.applied);
+                        self.dead_reckoning.trim(&mut flight.reckoning, &flight.applied);
                         action
                     }
                     (None, Some(state)) => {
@@ -275,9 +284,9 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
                         let (state, target) = flight.guide.down(state, last, dt_s);
                         self.controller.adrift(&mut flight.control);
                         let action = self.controller.decide(&mut flight.control, &state, target, true);
-                        flight.lawless = None;
+                        flight.open_loop = None;
                         flight.applied = action.given;
-                        self.blind.trim(&mut flight.reckoning, &flight.applied);
+                        self.dead_reckoning.trim(&mut flight.reckoning, &flight.applied);
                         action
                     }
                     (None, None) => {
@@ -293,7 +302,7 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
         // Gates the motors.
         let (motors, forces) = if mode.armed() { (action.speeds, action.forces) } else { Default::default() };
         let setpoint_stale = setpoint.is_none();
-        let health = Health {
+        let health = TickHealth {
             control: action.health,
             rate: *rate.report(),
             state_age_us,
@@ -301,7 +310,7 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
             observed: observing,
             frozen_states: *frozen_states,
         };
-        Outcome { motors, forces, mode, health, answer, ended, against }
+        TickOutcome { motors, forces, mode, health, answer, ended, against }
     }
 
     /// Returns the action without a state.
@@ -309,16 +318,16 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
     fn blind_action<M>(&self, flight: &mut Armed<M>, mode: Mode) -> Action<N> {
         (flight.guide.descent, flight.guide.adrift) = (None, None);
         let inputs = match mode {
-            Mode::Descending => self.blind.descend(&flight.reckoning),
-            _ => self.blind.coast(&flight.reckoning),
+            Mode::Descending => self.dead_reckoning.descend(&flight.reckoning),
+            _ => self.dead_reckoning.coast(&flight.reckoning),
         };
-        self.lawless(flight, inputs)
+        self.open_loop(flight, inputs)
     }
 
     /// Returns the action for inputs that do not come from the law.
     #[inline(always)]
-    fn lawless<M>(&self, flight: &mut Armed<M>, inputs: Inputs) -> Action<N> {
-        flight.lawless = Some(inputs);
+    fn open_loop<M>(&self, flight: &mut Armed<M>, inputs: Inputs) -> Action<N> {
+        flight.open_loop = Some(inputs);
         self.controller.mixer().action(&inputs)
     }
 }
@@ -326,7 +335,7 @@ impl<C: FlightController<N>, const N: usize> Vehicle<C, N> {
 /// Extrapolates the state by `age_us` with its velocities and rates; as in the paper's model, body rates replace the
 /// derivatives of the angles.
 fn extrapolated(state: &State, age_us: u32) -> State {
-    // As an estimate of its own always is.
+    // The vehicle's own estimate always has age 0.
     if age_us == 0 {
         return *state;
     }
@@ -338,7 +347,7 @@ fn extrapolated(state: &State, age_us: u32) -> State {
     }
 }
 
-impl<M> VehicleMemory<M> {
+impl<M> FlightCoreMemory<M> {
     /// Stores the inbox's state if it is newer than the present one, not already stale (states that are always late do
     /// not count as states), and not from a frozen tracker. True if it was stored.
     fn take_state(&mut self, inbox: &Inbox, now_us: u64) -> bool {
@@ -371,15 +380,15 @@ impl<M> VehicleMemory<M> {
     /// Stores the state that is observed from poses which no estimator has taken; `told` if there is another. True if
     /// there is one.
     #[inline]
-    fn observe(&mut self, blind: &Blind, inbox: &Inbox, now_us: u64, told: bool) -> bool {
+    fn observe(&mut self, dead_reckoning: &DeadReckoning, inbox: &Inbox, now_us: u64, told: bool) -> bool {
         // As long as an estimator works, it takes all poses.
-        (inbox.pose().is_some() || self.is_observing()) && self.observe_pose(blind, inbox, now_us, told)
+        (inbox.pose().is_some() || self.is_observing()) && self.observe_pose(dead_reckoning, inbox, now_us, told)
     }
 
     /// The same, if there is a pose or an observer.
     #[cold]
     #[inline(never)]
-    fn observe_pose(&mut self, blind: &Blind, inbox: &Inbox, now_us: u64, told: bool) -> bool {
+    fn observe_pose(&mut self, dead_reckoning: &DeadReckoning, inbox: &Inbox, now_us: u64, told: bool) -> bool {
         let armed = self.mode.armed();
         let (Some(flight), Some(held)) = (self.flight.as_mut().filter(|_| armed), self.state) else { return false };
         let age_us = held.age_us(now_us);
@@ -390,12 +399,12 @@ impl<M> VehicleMemory<M> {
         }
         let Armed { observer, reckoning, applied, .. } = flight;
         let news = |pose: &&Stamped<Pose>| {
-            Observer::takes(pose, now_us) && observer.as_ref().is_none_or(|observer| observer.is_news(pose))
+            PoseObserver::takes(pose, now_us) && observer.as_ref().is_none_or(|observer| observer.is_news(pose))
         };
         let pose = inbox.pose().filter(news);
         let observer = match (observer.as_mut().filter(|observer| observer.age_us(now_us) <= HOLD_US), pose) {
             (Some(running), pose) => {
-                running.advance(blind, reckoning, applied);
+                running.advance(dead_reckoning, reckoning, applied);
                 if let Some(pose) = pose {
                     running.correct(pose, now_us);
                 }
@@ -403,7 +412,7 @@ impl<M> VehicleMemory<M> {
             }
             (None, Some(pose)) => {
                 let state = reckoning.between(&extrapolated(&held.value, age_us));
-                let new = observer.insert(Observer::new(&state, applied, held.at_us));
+                let new = observer.insert(PoseObserver::new(&state, applied, held.at_us));
                 new.correct(pose, now_us);
                 new
             }
@@ -460,18 +469,18 @@ impl<M: Default> Armed<M> {
     // Out of line, so that the new memory is not built on the tick's stack and copied.
     #[cold]
     #[inline(never)]
-    fn begin(flight: &mut Option<Self>, blind: &Blind, weight_n: f32, state: &State, now_us: u64) {
+    fn begin(flight: &mut Option<Self>, dead_reckoning: &DeadReckoning, weight_n: f32, state: &State, now_us: u64) {
         *flight = Some(Armed {
             control: M::default(),
-            reckoning: blind.start(state),
+            reckoning: dead_reckoning.start(state),
             observer: None,
             applied: Inputs::default(),
-            lawless: None,
+            open_loop: None,
             rests: true,
             guide: Guide::default(),
             landing: LandDetector::new(state, weight_n),
             tumble: Tumble::default(),
-            witness: Witness::new(state, now_us),
+            witness: FrozenTrackerCheck::new(state, now_us),
             distrusts: false,
         });
     }
@@ -479,13 +488,13 @@ impl<M: Default> Armed<M> {
 
 impl<M: Default> Armed<M> {
     /// Rests on the ground: the law begins afresh when it takes off, as after arming.
-    fn rest(&mut self, blind: &Blind, state: Option<&State>) {
+    fn rest(&mut self, dead_reckoning: &DeadReckoning, state: Option<&State>) {
         if !self.rests {
             self.forget();
         }
         (self.rests, self.applied) = (true, Inputs::default());
         if let Some(state) = state {
-            self.reckoning = blind.start(state);
+            self.reckoning = dead_reckoning.start(state);
         }
     }
 
@@ -499,10 +508,10 @@ impl<M: Default> Armed<M> {
 
 impl<M> Armed<M> {
     /// Advances the dead reckoning over the last period, corrected by a measurement if there is one.
-    fn reckon(&mut self, blind: &Blind, measured: Option<&State>) {
-        blind.advance(&mut self.reckoning, &self.applied);
+    fn reckon(&mut self, dead_reckoning: &DeadReckoning, measured: Option<&State>) {
+        dead_reckoning.advance(&mut self.reckoning, &self.applied);
         if let Some(state) = measured {
-            blind.measure(&mut self.reckoning, state);
+            dead_reckoning.measure(&mut self.reckoning, state);
         }
     }
 }

@@ -5,9 +5,8 @@
 //! origin.
 
 use crate::clock::SourceClock;
-use crate::inbox::Stamped;
 use crate::supervisor::COAST_US;
-use afbc_types::{Pose, State};
+use afbc_types::{Pose, Stamped, State};
 use core::mem::discriminant;
 
 /// Number of senders whose clocks are tracked; a further one replaces the one that has been silent longest.

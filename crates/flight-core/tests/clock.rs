@@ -6,7 +6,7 @@ use afbc_flight_core::clock::{BACK_SPREAD_US, BACK_US, NEW_COUNT, SILENCE_US};
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, SILENT_US, Sighting};
 use afbc_flight_core::{
-    ArmingLimits, Asked, Inbox, Mode, Request, SourceClock, Stamped, Tracker, Vehicle, VehicleMemory,
+    ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, SourceClock, Stamped, TicketedRequest, Tracker,
 };
 use afbc_types::{Parameters, Pose, PoseSigmas, Setpoint, State};
 use proptest::prelude::*;
@@ -49,8 +49,8 @@ fn play(mut sent: Vec<Sent>) -> Seen {
     let (parameters, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
     let law = Adaptive::new(Profile::Flight.gains()).expect("valid");
     let controller = Controller::new(parameters, settings, law).expect("valid");
-    let vehicle = Vehicle::new(parameters, ArmingLimits::default(), controller).expect("valid");
-    let (mut memory, mut inbox, mut tracker) = (VehicleMemory::default(), Inbox::default(), Tracker::default());
+    let vehicle = FlightCore::new(parameters, ArmingLimits::default(), controller).expect("valid");
+    let (mut memory, mut inbox, mut tracker) = (FlightCoreMemory::default(), Inbox::default(), Tracker::default());
     let mut sent = sent.iter().peekable();
     let mut seen = Seen::default();
     for now_us in (1000..END_US).step_by(1000) {
@@ -65,7 +65,7 @@ fn play(mut sent: Vec<Sent>) -> Seen {
         }
         inbox.put_setpoint(Stamped { value: Setpoint::default(), at_us: now_us });
         if now_us == ARM_US {
-            assert!(inbox.request(Asked { request: Request::Arm, ticket: 0 }));
+            assert!(inbox.request(TicketedRequest { request: Request::Arm, ticket: 0 }));
         }
         let mode = vehicle.tick(&mut memory, now_us, &inbox.take()).mode;
         if now_us >= ARM_US && seen.modes.last() != Some(&mode) {

@@ -2,7 +2,9 @@
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
-use afbc_flight_core::{ArmingLimits, Asked, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory};
+use afbc_flight_core::{
+    ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TickOutcome, TicketedRequest,
+};
 use afbc_types::{Inputs, Parameters, RotorForces, RotorSpeeds, Setpoint, State};
 
 /// A controller that counts how often it is engaged, and gives the weight as thrust.
@@ -35,8 +37,8 @@ impl FlightController for Counter {
 }
 
 struct Bench {
-    vehicle: Vehicle<Counter>,
-    memory: VehicleMemory<u32>,
+    vehicle: FlightCore<Counter>,
+    memory: FlightCoreMemory<u32>,
     now_us: u64,
 }
 
@@ -44,11 +46,11 @@ impl Bench {
     fn new() -> Self {
         let parameters = Parameters::PAPER.to_f32();
         let counter = Counter(Mixer::new(parameters, 3.0).expect("valid"));
-        let vehicle = Vehicle::new(parameters, ArmingLimits::default(), counter).expect("valid");
-        Bench { vehicle, memory: VehicleMemory::default(), now_us: 0 }
+        let vehicle = FlightCore::new(parameters, ArmingLimits::default(), counter).expect("valid");
+        Bench { vehicle, memory: FlightCoreMemory::default(), now_us: 0 }
     }
 
-    fn tick(&mut self, tracked: bool, request: Option<Request>) -> Outcome {
+    fn tick(&mut self, tracked: bool, request: Option<Request>) -> TickOutcome {
         self.now_us += 1000;
         let at_us = self.now_us;
         let mut inbox = Inbox::EMPTY;
@@ -59,7 +61,7 @@ impl Bench {
         }
         inbox.put_setpoint(Stamped { value: Setpoint::default(), at_us });
         if let Some(request) = request {
-            assert!(inbox.request(Asked { request, ticket: 7 }));
+            assert!(inbox.request(TicketedRequest { request, ticket: 7 }));
         }
         self.vehicle.tick(&mut self.memory, at_us, &inbox)
     }

@@ -4,7 +4,8 @@
 
 use afbc::{Adaptive, Controller, Profile};
 use afbc_flight_core::{
-    Answer, ArmingLimits, Asked, Inbox, Mode, Refusal, Request, Stamped, Tracker, Vehicle, VehicleMemory,
+    ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, RequestAnswer, Stamped, TicketedRequest,
+    Tracker,
 };
 use afbc_link::{Address, Command, Counters, Decoder, FRAME_MAX, Sender, Uplink};
 use afbc_types::{Parameters, PoseSigmas, RotorSpeeds, Setpoint, State};
@@ -86,8 +87,8 @@ fn play(mut frames: Vec<Frame>) -> Seen {
     let (parameters, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
     let law = Adaptive::new(Profile::Flight.gains()).expect("valid");
     let controller = Controller::new(parameters, settings, law).expect("valid");
-    let vehicle = Vehicle::new(parameters, ArmingLimits::default(), controller).expect("valid");
-    let (mut memory, mut inbox, mut tracker) = (VehicleMemory::default(), Inbox::default(), Tracker::default());
+    let vehicle = FlightCore::new(parameters, ArmingLimits::default(), controller).expect("valid");
+    let (mut memory, mut inbox, mut tracker) = (FlightCoreMemory::default(), Inbox::default(), Tracker::default());
     let mut decoder = Decoder::<Uplink>::new(VEHICLE);
     let mut seen = Seen::default();
     let mut frames = frames.iter().peekable();
@@ -96,7 +97,7 @@ fn play(mut frames: Vec<Frame>) -> Seen {
     for ms in 0..END_MS {
         let (now_us, since_ms) = (ms * 1000, ms as i64 - FAULT_MS as i64);
         while let Some(frame) = frames.next_if(|frame| frame.at_ms <= since_ms) {
-            let ask = |inbox: &mut Inbox, request| assert!(inbox.request(Asked { request, ticket: 0 }));
+            let ask = |inbox: &mut Inbox, request| assert!(inbox.request(TicketedRequest { request, ticket: 0 }));
             decoder.feed(&frame.bytes, |_, message| match message {
                 Uplink::State { sent_us, state, .. } => {
                     if let Some(state) = tracker.stamp(1, sent_us, now_us, state) {
@@ -122,7 +123,7 @@ fn play(mut frames: Vec<Frame>) -> Seen {
             before = *decoder.counters();
             continue;
         }
-        seen.answers.extend(outcome.answer.map(|Answer { request, result, .. }| result.map(|()| request)));
+        seen.answers.extend(outcome.answer.map(|RequestAnswer { request, result, .. }| result.map(|()| request)));
         seen.setpoint_stale |= outcome.health.setpoint_stale;
         if seen.modes.last().is_none_or(|(_, mode)| *mode != outcome.mode) {
             seen.modes.push((since_ms, outcome.mode));

@@ -1,12 +1,12 @@
 //! Order of requests, rejection of implausible values, and ages.
 
 use afbc_flight_core::inbox::REQUESTS_MAX;
-use afbc_flight_core::{Asked, Inbox, Reasons, Refusal, Request, Stamped};
+use afbc_flight_core::{Inbox, Reasons, Refusal, Request, Stamped, TicketedRequest};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use nalgebra::Vector3;
 
-fn asked(request: Request, ticket: usize) -> Asked {
-    Asked { request, ticket: ticket as u8 }
+fn asked(request: Request, ticket: usize) -> TicketedRequest {
+    TicketedRequest { request, ticket: ticket as u8 }
 }
 
 /// One per tick, in order, whether requested directly or posted.
@@ -18,7 +18,7 @@ fn requests_wait_for_their_turn() {
         let to = if ticket < 2 { &mut inbox } else { &mut news };
         assert!(to.request(asked(request, ticket)));
     }
-    inbox.post(&news);
+    inbox.merge(&news);
     for (ticket, request) in all.into_iter().enumerate() {
         assert!(inbox.kills(), "it is among those that wait");
         assert_eq!(inbox.take().asked(), Some(asked(request, ticket)));
@@ -52,7 +52,7 @@ fn implausible_values_do_not_enter_the_inbox() {
         news.put_state(Stamped { value: State { position_m, ..State::default() }, at_us: 2 });
         news.put_setpoint(Stamped { value: Setpoint { position_m, ..Setpoint::default() }, at_us: 2 });
         assert_eq!(news, Inbox::EMPTY, "{bad}");
-        inbox.post(&news);
+        inbox.merge(&news);
     }
     assert_eq!((inbox.state(), inbox.setpoint()), (Some(&good.0), Some(&good.1)), "the last good ones stay");
 }
@@ -65,9 +65,9 @@ fn a_pose_is_taken_once() {
     for (number, at_us) in [(1.0, 10), (2.0, 20)] {
         let mut news = Inbox::EMPTY;
         news.put_pose(at(number, at_us));
-        inbox.post(&news);
+        inbox.merge(&news);
     }
-    inbox.post(&Inbox::EMPTY);
+    inbox.merge(&Inbox::EMPTY);
     inbox.take_into(&mut taken);
     assert_eq!(taken.pose(), Some(&at(2.0, 20)));
     inbox.take_into(&mut taken);
@@ -148,19 +148,19 @@ fn news_are_merged() {
     inbox.put_state(at(1));
     inbox.put_adrift(None, Refusal::HeadingUnknown);
     inbox.put_setpoint(Stamped { value: Setpoint::default(), at_us: 1 });
-    inbox.bar(Refusal::BatteryLow.into());
+    inbox.inhibit(Refusal::BatteryLow.into());
     let before = inbox;
-    inbox.post(&Inbox::EMPTY);
+    inbox.merge(&Inbox::EMPTY);
     assert_eq!(inbox, before);
     let mut news = Inbox::EMPTY;
     news.put_adrift(Some(at(2)), Refusal::PositionUnknown);
-    news.bar(Refusal::SensorFailed.into());
-    inbox.post(&news);
+    news.inhibit(Refusal::SensorFailed.into());
+    inbox.merge(&news);
     assert_eq!((inbox.adrift(), inbox.missing()), (Some(&at(2)), Some(Refusal::PositionUnknown)));
-    assert_eq!((inbox.state(), inbox.barred()), (Some(&at(1)), Refusal::SensorFailed.into()));
-    assert_eq!(inbox.take().barred(), Refusal::SensorFailed.into());
-    inbox.bar(Reasons::NONE);
-    assert_eq!(inbox.barred(), Reasons::NONE);
+    assert_eq!((inbox.state(), inbox.inhibited()), (Some(&at(1)), Refusal::SensorFailed.into()));
+    assert_eq!(inbox.take().inhibited(), Refusal::SensorFailed.into());
+    inbox.inhibit(Reasons::NONE);
+    assert_eq!(inbox.inhibited(), Reasons::NONE);
     inbox.put_pose(Stamped { value: Pose::default(), at_us: 3 });
     inbox.clear_pose();
     assert_eq!(inbox.take().pose(), None);

@@ -1,7 +1,7 @@
 //! Rotor speed to throttle, frame and waveform.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use afbc_flight_core::dshot::{Frame, Timing};
+use afbc_flight_core::dshot::{DshotFrame, Timing};
 use afbc_flight_core::motor::{Curve, Motor};
 use afbc_types::RotorSpeeds;
 use nalgebra::Vector4;
@@ -70,7 +70,7 @@ fn frames_by_hand() {
         (2048, 0x0000),
         (u16::MAX, 0x0000),
     ] {
-        assert_eq!(Frame::new(throttle).bits(), bits, "{throttle}");
+        assert_eq!(DshotFrame::new(throttle).bits(), bits, "{throttle}");
     }
 }
 
@@ -80,7 +80,7 @@ fn the_waveform_of_a_frame() {
     let timing = Timing::new(84_000_000).expect("valid");
     assert_eq!(timing.period(), 140);
     let (one, zero) = (105, 53);
-    let waveform = timing.waveform(Frame::new(1046)); // 1000 0010 1100 0110
+    let waveform = timing.waveform(DshotFrame::new(1046)); // 1000 0010 1100 0110
     assert_eq!(
         waveform,
         [
@@ -95,7 +95,7 @@ fn pulses_last_as_long_as_they_should_at_every_usual_clock() {
     for timer_hz in [8_000_000, 72_000_000, 84_000_000, 168_000_000, 480_000_000] {
         let timing = Timing::new(timer_hz).expect("valid");
         let count_ns = 1e9 / f64::from(timer_hz);
-        let [one, .., zero, low] = timing.waveform(Frame::new(1046));
+        let [one, .., zero, low] = timing.waveform(DshotFrame::new(1046));
         let long = |counts: u16| f64::from(counts) * count_ns;
         assert!((long(timing.period()) - 1666.7).abs() <= 0.51 * count_ns, "{timer_hz}");
         assert!((long(one) - 1250.0).abs() <= 0.51 * count_ns, "{timer_hz}");
@@ -131,7 +131,7 @@ proptest! {
     #[test]
     fn waveforms_decode(throttle in 48u16..=2047) {
         let timing = Timing::new(84_000_000).expect("valid");
-        let pulses = timing.waveform(Frame::new(throttle));
+        let pulses = timing.waveform(DshotFrame::new(throttle));
         let bits = pulses.iter().take(16).fold(0u16, |bits, &pulse| bits << 1 | u16::from(pulse > 79));
         prop_assert_eq!(bits >> 5, throttle);
         prop_assert_eq!((bits ^ bits >> 4 ^ bits >> 8 ^ bits >> 12) & 0xF, 0);
@@ -143,7 +143,7 @@ proptest! {
         let timing = Timing::new(168_000_000).expect("valid");
         let mut rows = [[before; 4]; 17];
         timing.rows(throttles, &mut rows);
-        let waveforms = throttles.map(|throttle| timing.waveform(Frame::new(throttle)));
+        let waveforms = throttles.map(|throttle| timing.waveform(DshotFrame::new(throttle)));
         for (column, waveform) in waveforms.iter().enumerate() {
             let played = rows.map(|row| row.get(column).copied().unwrap_or_default());
             prop_assert_eq!(&played, waveform);

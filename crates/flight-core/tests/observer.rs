@@ -4,9 +4,11 @@
 
 use afbc::monitor::Bounds;
 use afbc::{Guarded, Profile, guarded};
-use afbc_flight_core::blind::{Blind, Reckoning};
-use afbc_flight_core::observer::{HOLD_US, LATE_US, Observer};
-use afbc_flight_core::{ArmingLimits, Asked, Inbox, Mode, Refusal, Request, Stamped, Vehicle, VehicleMemory};
+use afbc_flight_core::dead_reckoning::{DeadReckoning, Reckoning};
+use afbc_flight_core::observer::{HOLD_US, LATE_US, PoseObserver};
+use afbc_flight_core::{
+    ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TicketedRequest,
+};
 use afbc_types::{Inputs, Parameters, Pose, PoseSigmas, Setpoint, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -14,18 +16,24 @@ use proptest::prelude::*;
 const WEIGHT_N: f32 = 0.486 * 9.81;
 const HOVER: Inputs = Inputs { thrust_n: WEIGHT_N, roll_n: 0.0, pitch_n: 0.0, yaw_n: 0.0 };
 
-fn blind() -> Blind {
-    Blind::new(&Parameters::PAPER.to_f32(), 0.001)
+fn dead_reckoning() -> DeadReckoning {
+    DeadReckoning::new(&Parameters::PAPER.to_f32(), 0.001)
 }
 
 /// Does as a control tick.
-fn tick(observer: &mut Observer, blind: &Blind, reckoning: &mut Reckoning, pose: Option<&Stamped<Pose>>, now_us: u64) {
-    observer.advance(blind, reckoning, &HOVER);
+fn tick(
+    observer: &mut PoseObserver,
+    dead_reckoning: &DeadReckoning,
+    reckoning: &mut Reckoning,
+    pose: Option<&Stamped<Pose>>,
+    now_us: u64,
+) {
+    observer.advance(dead_reckoning, reckoning, &HOVER);
     if let Some(pose) = pose {
         observer.correct(pose, now_us);
     }
-    blind.advance(reckoning, &HOVER);
-    blind.measure(reckoning, &observer.state().expect("plausible"));
+    dead_reckoning.advance(reckoning, &HOVER);
+    dead_reckoning.measure(reckoning, &observer.state().expect("plausible"));
 }
 
 proptest! {
@@ -53,18 +61,18 @@ proptest! {
                 rates_rad_s: Vector3::new(0.0, 0.0, yaw_rate_rad_s),
             }
         };
-        let blind = blind();
+        let dead_reckoning = dead_reckoning();
         let mut start = State { position_m: Vector3::new(off_m, off_m, 1.0 - off_m), ..State::default() };
         start.attitude_rad = Vector3::new(off_rad, -off_rad, off_rad);
-        let mut reckoning = blind.start(&start);
-        let mut observer = Observer::new(&start, &HOVER, 0);
+        let mut reckoning = dead_reckoning.start(&start);
+        let mut observer = PoseObserver::new(&start, &HOVER, 0);
         let end_us = 6_000_000_u64;
         for now_us in (1_000..=end_us).step_by(1_000) {
             let at_us = now_us.saturating_sub(late_us);
             let pose = Stamped { value: Pose::of(&truth(at_us), PoseSigmas::UNKNOWN), at_us };
             let pose = Some(&pose).filter(|_| (now_us / 1_000).is_multiple_of(period_ms) && at_us > 0);
-            prop_assert!(pose.is_none_or(|pose| Observer::takes(pose, now_us)));
-            tick(&mut observer, &blind, &mut reckoning, pose, now_us);
+            prop_assert!(pose.is_none_or(|pose| PoseObserver::takes(pose, now_us)));
+            tick(&mut observer, &dead_reckoning, &mut reckoning, pose, now_us);
         }
         let (seen, truth) = (observer.state().expect("plausible"), truth(end_us));
         // Rounding of positions up to 30 m is 2e-6 m, of a velocity from them 1e-4 m/s.
@@ -123,22 +131,22 @@ fn event() -> impl Strategy<Value = Event> {
     ]
 }
 
-type Memory = VehicleMemory<guarded::Memory<4>>;
+type Memory = FlightCoreMemory<guarded::Memory<4>>;
 
 /// A vehicle that flies on its own estimate, at rest.
-fn flying() -> (Vehicle<Guarded>, Memory, Inbox, u64) {
+fn flying() -> (FlightCore<Guarded>, Memory, Inbox, u64) {
     let (vehicle, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
     let gains = Profile::Flight.gains();
     let bounds = Bounds::new(&gains, &vehicle, &settings);
     let law = Guarded::new(vehicle, settings, gains, bounds).expect("valid");
-    let vehicle = Vehicle::new(vehicle, ArmingLimits::default(), law).expect("valid");
+    let vehicle = FlightCore::new(vehicle, ArmingLimits::default(), law).expect("valid");
     let (mut memory, mut inbox, mut now_us) = (Memory::default(), Inbox::EMPTY, 0);
     for ms in 0..2_000 {
         now_us += 1_000;
         inbox.locate(Stamped { value: State::default(), at_us: now_us });
         inbox.put_setpoint(Stamped { value: Setpoint::default(), at_us: now_us });
         if ms == 1_200 {
-            inbox.request(Asked { request: Request::Arm, ticket: 0 });
+            inbox.request(TicketedRequest { request: Request::Arm, ticket: 0 });
         }
         let _ = vehicle.tick(&mut memory, now_us, &inbox.take());
     }

@@ -1,18 +1,18 @@
 //! Limits of the rate, and ticks at wrong times.
 #![allow(clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
-use afbc_flight_core::rate::{Counter, EARLY_US, LATE_US, Report, TICKS_MAX, TICKS_MIN, WINDOW_US};
+use afbc_flight_core::rate::{Counter, EARLY_US, LATE_US, RateReport, TICKS_MAX, TICKS_MIN, WINDOW_US};
 use proptest::prelude::*;
 
 /// Returns the report after ticks every `period_us` for `seconds`.
-fn after(period_us: f64, seconds: f64) -> Report {
+fn after(period_us: f64, seconds: f64) -> RateReport {
     let mut counter = Counter::default();
     let ticks = (seconds * 1e6 / period_us) as u64;
     (0..=ticks).map(|tick| *counter.tick((tick as f64 * period_us) as u64)).last().unwrap_or_default()
 }
 
 /// Returns the reports for ticks with these gaps, the first at 0.
-fn reports(gaps_us: impl IntoIterator<Item = u64>) -> Vec<Report> {
+fn reports(gaps_us: impl IntoIterator<Item = u64>) -> Vec<RateReport> {
     let (mut counter, mut now_us) = (Counter::default(), 0);
     let first = *counter.tick(now_us);
     let rest = gaps_us.into_iter().map(|gap_us| {
@@ -25,14 +25,14 @@ fn reports(gaps_us: impl IntoIterator<Item = u64>) -> Vec<Report> {
 #[test]
 fn unknown_until_a_second_has_passed() {
     let report = after(1000.0, 0.999);
-    assert_eq!(report, Report { steady: true, alive: true, ..Report::default() });
+    assert_eq!(report, RateReport { steady: true, alive: true, ..RateReport::default() });
     assert!(!report.healthy(), "no arming yet");
 }
 
 #[test]
 fn lockstep_time_is_1000_hz() {
     let report = after(1000.0, 5.0);
-    assert_eq!(report, Report { rate_hz: Some(1000), steady: true, alive: true, ..Report::default() });
+    assert_eq!(report, RateReport { rate_hz: Some(1000), steady: true, alive: true, ..RateReport::default() });
     assert!(report.healthy());
 }
 
@@ -51,7 +51,7 @@ fn recovers_with_the_next_good_second() {
     let mut counter = Counter::default();
     let mut now_us = 0;
     let mut run = |period_us, ticks| {
-        (0..ticks).fold(Report::default(), |_, _| {
+        (0..ticks).fold(RateReport::default(), |_, _| {
             now_us += period_us;
             *counter.tick(now_us)
         })
@@ -65,7 +65,7 @@ fn recovers_with_the_next_good_second() {
 fn ticks_at_the_wrong_time_are_counted_one_by_one() {
     let mut counter = Counter::default();
     let counts = [0, 1000, 2100, 3100, 4201, 5100, 6000, 6899, 9000, 9001].map(|now| {
-        let Report { late_ticks, early_ticks, .. } = *counter.tick(now);
+        let RateReport { late_ticks, early_ticks, .. } = *counter.tick(now);
         [late_ticks, early_ticks]
     });
     let wanted = [[0, 0], [0, 0], [0, 0], [0, 0], [1, 0], [1, 1], [1, 1], [1, 2], [2, 2], [2, 3]];
@@ -83,7 +83,7 @@ fn ticks_in_pairs_are_not_healthy_though_1000_hz() {
 fn a_clock_that_has_failed_is_never_healthy_again() {
     let mut counter = Counter::default();
     let second = |counter: &mut Counter, from_s: u64| {
-        (0..=1000).fold(Report::default(), |_, ms| *counter.tick(from_s * 1_000_000 + ms * 1000 + 1000))
+        (0..=1000).fold(RateReport::default(), |_, ms| *counter.tick(from_s * 1_000_000 + ms * 1000 + 1000))
     };
     second(&mut counter, 0);
     assert!(second(&mut counter, 1).healthy());
@@ -142,7 +142,7 @@ proptest! {
         let (before, after) = (&reports[at + 500], &reports[at + 501..at + 1501]);
         prop_assert_eq!(before.off_ticks(), 0);
         prop_assert!(after.iter().all(|report| !report.healthy() && report.off_ticks() == 1));
-        prop_assert!(reports.last().is_some_and(Report::healthy));
+        prop_assert!(reports.last().is_some_and(RateReport::healthy));
     }
 
     /// A tick is alive as long as the clock advances, whatever its rate.

@@ -3,17 +3,18 @@
 
 use afbc::reference::ReferenceModel;
 use afbc::{Adaptive, Controller, Profile, Settings};
-use afbc_control::{FlightController, Screened};
+use afbc_control::{FlightController, Validated};
 use afbc_flight_core::landing::CARRIED_US;
 use afbc_flight_core::supervisor::{COAST_US, DESCEND_US};
 use afbc_flight_core::tumble::LOST_US;
 use afbc_flight_core::{
-    ArmingLimits, Asked, End, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory,
+    ArmingLimits, EndReason, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TickOutcome,
+    TicketedRequest,
 };
 use afbc_types::{Inputs, Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 
-type Adapted = afbc::Cascade<afbc_control::Estimate>;
+type Adapted = afbc::Cascade<afbc_control::AdaptiveEstimate>;
 
 fn controller() -> Controller<Adaptive> {
     let settings = Settings { reference: ReferenceModel::DEFAULT, ..Profile::Flight.settings() };
@@ -22,8 +23,8 @@ fn controller() -> Controller<Adaptive> {
 }
 
 struct Bench {
-    vehicle: Vehicle<Controller<Adaptive>>,
-    memory: VehicleMemory<Adapted>,
+    vehicle: FlightCore<Controller<Adaptive>>,
+    memory: FlightCoreMemory<Adapted>,
     now_us: u64,
     inbox: Inbox,
     state: State,
@@ -33,8 +34,8 @@ impl Bench {
     /// An armed vehicle, in the tick after that of arming.
     fn armed(rests: bool) -> Self {
         let limits = ArmingLimits::default();
-        let vehicle = Vehicle::new(Parameters::PAPER.to_f32(), limits, controller()).expect("valid");
-        let (memory, inbox, state) = (VehicleMemory::default(), Inbox::default(), State::default());
+        let vehicle = FlightCore::new(Parameters::PAPER.to_f32(), limits, controller()).expect("valid");
+        let (memory, inbox, state) = (FlightCoreMemory::default(), Inbox::default(), State::default());
         let mut bench = Bench { vehicle, memory, now_us: 0, inbox, state };
         bench.inbox.rest(rests);
         bench.run(1001);
@@ -42,12 +43,12 @@ impl Bench {
         bench
     }
 
-    fn ask(&mut self, request: Request) -> Outcome {
-        assert!(self.inbox.request(Asked { request, ticket: 3 }));
+    fn ask(&mut self, request: Request) -> TickOutcome {
+        assert!(self.inbox.request(TicketedRequest { request, ticket: 3 }));
         self.tick(true)
     }
 
-    fn tick(&mut self, seen: bool) -> Outcome {
+    fn tick(&mut self, seen: bool) -> TickOutcome {
         self.now_us += 1000;
         let at_us = self.now_us;
         if seen {
@@ -59,7 +60,7 @@ impl Bench {
         self.vehicle.tick(&mut self.memory, self.now_us, &inbox)
     }
 
-    fn run(&mut self, ticks: u32) -> Outcome {
+    fn run(&mut self, ticks: u32) -> TickOutcome {
         for _ in 1..ticks {
             let _ = self.tick(true);
         }
@@ -82,7 +83,7 @@ fn motors_idle_and_it_stays_on_the_ground() {
         assert_eq!(bench.memory.trace::<Controller<Adaptive>, 4>().inputs, Inputs::default());
     }
     let outcome = bench.ask(Request::Disarm);
-    assert_eq!((outcome.mode, outcome.ended), (Mode::Disarmed, Some(End::Disarmed)));
+    assert_eq!((outcome.mode, outcome.ended), (Mode::Disarmed, Some(EndReason::Disarmed)));
 }
 
 /// Without the mark the first step is that of a law that was never stepped, bit for bit; so it is after a rest between
@@ -96,7 +97,7 @@ fn the_law_begins_afresh_when_it_takes_off() {
         bench.state.position_m = Vector3::new(0.05, 0.0, 0.0);
         bench.run(50);
         bench.inbox.rest(false);
-        let (controller, mut memory) = (controller(), Screened::default());
+        let (controller, mut memory) = (controller(), Validated::default());
         let target = Setpoint { position_m: Vector3::new(0.3, -0.2, 0.5), ..Setpoint::default() };
         for tick in 0..200 {
             bench.state.attitude_rad.x = 0.02 * (tick as f32 * 0.1).sin();
@@ -131,12 +132,12 @@ fn in_the_air_the_mark_has_no_effect() {
 /// Supervision goes on: kills, tumbles and outages of the state end the rest.
 #[test]
 fn a_resting_vehicle_is_supervised() {
-    assert_eq!(Bench::armed(true).ask(Request::Kill).ended, Some(End::Killed));
+    assert_eq!(Bench::armed(true).ask(Request::Kill).ended, Some(EndReason::Killed));
 
     let mut bench = Bench::armed(true);
     bench.state.attitude_rad.x = 2.0;
     assert_eq!(bench.run(LOST_US / 1000).ended, None);
-    assert!((0..3).any(|_| bench.tick(true).ended == Some(End::Tumbled)));
+    assert!((0..3).any(|_| bench.tick(true).ended == Some(EndReason::Tumbled)));
 
     let mut bench = Bench::armed(true);
     let idle = bench.run(10).motors;
@@ -145,7 +146,7 @@ fn a_resting_vehicle_is_supervised() {
         assert_eq!(outcome.mode, if age_us > COAST_US { Mode::Coasting } else { Mode::Flying });
         assert_eq!(outcome.motors, idle, "it does not coast on the ground");
     }
-    assert!((0..5).any(|_| bench.tick(false).ended == Some(End::Landed)));
+    assert!((0..5).any(|_| bench.tick(false).ended == Some(EndReason::Landed)));
     assert_eq!(bench.memory.mode(), Mode::Disarmed);
     assert!(!bench.memory.airborne());
 }
@@ -155,10 +156,10 @@ fn the_mark_stays_until_it_is_changed() {
     let (mut inbox, mut news) = (Inbox::EMPTY, Inbox::EMPTY);
     assert!(!inbox.rests());
     inbox.rest(true);
-    inbox.post(&news);
+    inbox.merge(&news);
     assert!(inbox.rests() && inbox.take().rests() && inbox.rests(), "news without a mark change nothing");
     news.rest(false);
-    inbox.post(&news);
+    inbox.merge(&news);
     assert!(!inbox.rests() && !inbox.take().rests());
     let mut taken = Inbox::EMPTY;
     taken.rest(true);

@@ -6,7 +6,8 @@ use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_flight_core::landing::LandDetector;
 use afbc_flight_core::supervisor::REST_US;
 use afbc_flight_core::{
-    Answer, ArmingLimits, Asked, End, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory,
+    ArmingLimits, EndReason, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, RequestAnswer, Stamped,
+    TickOutcome, TicketedRequest,
 };
 use afbc_types::{Inputs, Parameters, RotorForces, RotorSpeeds, Setpoint, State};
 use core::f32::consts::{PI, TAU};
@@ -41,8 +42,8 @@ impl FlightController for Lift {
 }
 
 struct Bench {
-    vehicle: Vehicle<Lift>,
-    memory: VehicleMemory<()>,
+    vehicle: FlightCore<Lift>,
+    memory: FlightCoreMemory<()>,
     inbox: Inbox,
     now_us: u64,
     thrust_n: f32,
@@ -55,10 +56,10 @@ impl Bench {
         let limits = ArmingLimits { setpoint_distance_max_m: 100.0, ..ArmingLimits::default() };
         let parameters = Parameters::PAPER.to_f32();
         let lift = Lift(Mixer::new(parameters, 3.0).expect("valid"));
-        let vehicle = Vehicle::new(parameters, limits, lift).expect("valid");
+        let vehicle = FlightCore::new(parameters, limits, lift).expect("valid");
         Bench {
             vehicle,
-            memory: VehicleMemory::default(),
+            memory: FlightCoreMemory::default(),
             inbox: Inbox::EMPTY,
             now_us: 0,
             thrust_n: WEIGHT_N,
@@ -67,7 +68,7 @@ impl Bench {
     }
 
     /// Runs a tick in which this state is measured, with a tracker's noise.
-    fn tick(&mut self, state: State) -> Outcome {
+    fn tick(&mut self, state: State) -> TickOutcome {
         let mut value = state;
         self.travelled_m += state.velocity_m_s * 1e-3;
         value.position_m += self.travelled_m;
@@ -76,7 +77,7 @@ impl Bench {
     }
 
     /// Runs a tick in which exactly this state is measured.
-    fn exactly(&mut self, value: State) -> Outcome {
+    fn exactly(&mut self, value: State) -> TickOutcome {
         self.now_us += 1000;
         let at_us = self.now_us;
         self.inbox.put_state(Stamped { value, at_us });
@@ -86,17 +87,17 @@ impl Bench {
     }
 
     fn ask(&mut self, request: Request) {
-        assert!(self.inbox.request(Asked { request, ticket: 9 }));
+        assert!(self.inbox.request(TicketedRequest { request, ticket: 9 }));
     }
 
     /// Runs `ms` ticks in this state; returns when and why the flight ended, if it did.
-    fn wait(&mut self, ms: u64, state: State) -> Option<(u64, End)> {
+    fn wait(&mut self, ms: u64, state: State) -> Option<(u64, EndReason)> {
         (1..=ms).find_map(|ms| self.tick(state).ended.map(|end| (ms, end)))
     }
 
     fn answer(&mut self, request: Request, state: State) -> Result<(), Refusal> {
         self.ask(request);
-        let Answer { ticket, request: answered, result } = self.tick(state).answer.expect("answered");
+        let RequestAnswer { ticket, request: answered, result } = self.tick(state).answer.expect("answered");
         assert_eq!((ticket, answered), (9, request));
         result
     }
@@ -124,7 +125,7 @@ fn climbing(m_s: f32) -> State {
 fn a_vehicle_that_lies_is_disarmed() {
     for roll_rad in [1.45, 2.0, 3.1, -1.6, -3.1] {
         let mut bench = Bench::flying();
-        assert_eq!(bench.wait(20_000, rolled(roll_rad)), Some((1002, End::Tumbled)), "{roll_rad} rad");
+        assert_eq!(bench.wait(20_000, rolled(roll_rad)), Some((1002, EndReason::Tumbled)), "{roll_rad} rad");
         assert_eq!(bench.tick(rolled(roll_rad)).motors, RotorSpeeds::default());
         assert_eq!(bench.answer(Request::Arm, rolled(roll_rad)), Err(Refusal::TiltTooLarge));
     }
@@ -153,7 +154,7 @@ fn a_vehicle_that_spins_is_disarmed() {
             bench.tick(state).ended.map(|end| (ms, end))
         });
         let (ms, end) = ended.expect("over and over");
-        assert!(end == End::Tumbled && ms < 2_500, "{rate_rad_s} rad/s: {ms} ms");
+        assert!(end == EndReason::Tumbled && ms < 2_500, "{rate_rad_s} rad/s: {ms} ms");
     }
     // Rotation about its own z is allowed.
     let mut bench = Bench::flying();
@@ -184,7 +185,7 @@ fn nothing_that_moves_or_turns_is_armed() {
 fn a_late_arm_does_not_start_a_falling_vehicle() {
     let mut bench = Bench::flying();
     bench.ask(Request::Kill);
-    assert_eq!(bench.tick(State::default()).ended, Some(End::Killed));
+    assert_eq!(bench.tick(State::default()).ended, Some(EndReason::Killed));
     for ms in 0..500 {
         let falling = climbing(-9.81e-3 * ms as f32);
         assert_eq!(bench.answer(Request::Arm, falling), Err(Refusal::NotAtRest), "{ms} ms");
@@ -262,7 +263,7 @@ fn a_constant_pose_with_a_moving_twist_is_distrusted() {
         let seen = (1..5_000).find(|_| stands(&mut bench).mode != Mode::Flying).expect("seen");
         assert!(seen <= 521, "axis {axis}: {seen} ms");
         let ended = (1..5_000).find_map(|_| stands(&mut bench).ended).expect("and is not believed again");
-        assert_eq!(ended, End::StateLost);
+        assert_eq!(ended, EndReason::StateLost);
     }
 }
 
@@ -274,7 +275,7 @@ fn a_vehicle_that_hangs_without_thrust_has_not_landed() {
     bench.wait(3000, State::default());
     bench.thrust_n = 0.1;
     let (ms, end) = bench.wait(10_000, State::default()).expect("ended");
-    assert_eq!(end, End::StateLost);
+    assert_eq!(end, EndReason::StateLost);
     assert!((2_500..3_500).contains(&ms), "{ms} ms");
 }
 

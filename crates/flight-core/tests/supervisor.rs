@@ -1,7 +1,9 @@
 //! Every transition of the mode, every answer, and every reason against arming.
 
-use afbc_flight_core::supervisor::{COAST_US, DESCEND_US, GIVE_UP_US, Observed, REST_US, STEADY_US, Standing};
-use afbc_flight_core::{ArmingLimits, End, Mode, Reasons, Refusal, Request};
+use afbc_flight_core::supervisor::{
+    ArmingInputs, COAST_US, DESCEND_US, GIVE_UP_US, REST_US, STEADY_US, SupervisorInputs,
+};
+use afbc_flight_core::{ArmingLimits, EndReason, Mode, Reasons, Refusal, Request};
 use afbc_types::{Declared, Setpoint, State};
 use nalgebra::Vector3;
 
@@ -13,7 +15,7 @@ const REQUESTS: [Option<Request>; 5] =
 const AGES_US: [u32; 8] = [0, COAST_US, COAST_US + 1, DESCEND_US, DESCEND_US + 1, GIVE_UP_US, GIVE_UP_US + 1, u32::MAX];
 
 /// In the air with long fresh states and no request.
-const CALM: Observed = Observed {
+const CALM: SupervisorInputs = SupervisorInputs {
     request: None,
     kill: false,
     ready: Ok(()),
@@ -25,7 +27,7 @@ const CALM: Observed = Observed {
 };
 
 /// Returns all combinations of mode and observations.
-fn all() -> impl Iterator<Item = (Mode, Observed)> {
+fn all() -> impl Iterator<Item = (Mode, SupervisorInputs)> {
     let flags = |n: usize| (n & 1 == 1, n & 2 == 2, n & 4 == 4);
     let cases = MODES.into_iter().flat_map(|mode| REQUESTS.into_iter().map(move |request| (mode, request)));
     let cases = cases.flat_map(|case| AGES_US.into_iter().map(move |age| (case, age)));
@@ -36,7 +38,8 @@ fn all() -> impl Iterator<Item = (Mode, Observed)> {
             (0..8).map(move |n| {
                 let (waits, airborne, tumbled) = flags(n);
                 let kill = waits || request == Some(Request::Kill);
-                let seen = Observed { request, kill, ready, state_age_us, steady_us, airborne, tumbled, ..CALM };
+                let seen =
+                    SupervisorInputs { request, kill, ready, state_age_us, steady_us, airborne, tumbled, ..CALM };
                 (mode, seen)
             })
         })
@@ -45,7 +48,7 @@ fn all() -> impl Iterator<Item = (Mode, Observed)> {
             AGES_US
                 .into_iter()
                 .filter(move |age| *age <= seen.state_age_us)
-                .map(move |attitude_age_us| (mode, Observed { attitude_age_us, ..seen }))
+                .map(move |attitude_age_us| (mode, SupervisorInputs { attitude_age_us, ..seen }))
         })
 }
 
@@ -68,10 +71,10 @@ fn in_flight_the_age_decides() {
     for (mode, row) in table {
         for (state_age_us, expected) in AGES_US.into_iter().zip(row) {
             for ready in [Ok(()), Err(Refusal::TiltTooLarge)] {
-                let observed = Observed { ready, state_age_us, attitude_age_us: state_age_us, ..CALM };
+                let observed = SupervisorInputs { ready, state_age_us, attitude_age_us: state_age_us, ..CALM };
                 assert_eq!(mode.next(&observed), expected, "{mode:?}, {observed:?}");
                 // With an attitude the descent takes as long as it takes.
-                let adrift = Observed { attitude_age_us: GIVE_UP_US, ..observed };
+                let adrift = SupervisorInputs { attitude_age_us: GIVE_UP_US, ..observed };
                 let given_up = state_age_us > GIVE_UP_US && mode.armed();
                 let next = if given_up { Descending } else { expected };
                 assert_eq!(mode.next(&adrift), next, "{mode:?}, {adrift:?}");
@@ -83,8 +86,8 @@ fn in_flight_the_age_decides() {
 #[test]
 fn coasting_ends_once_states_have_been_fresh_for_a_while() {
     for (steady_us, expected) in [(0, Mode::Coasting), (STEADY_US - 1, Mode::Coasting), (STEADY_US, Mode::Flying)] {
-        assert_eq!(Mode::Coasting.next(&Observed { steady_us, ..CALM }), expected);
-        assert_eq!(Mode::Flying.next(&Observed { steady_us, ..CALM }), Mode::Flying);
+        assert_eq!(Mode::Coasting.next(&SupervisorInputs { steady_us, ..CALM }), expected);
+        assert_eq!(Mode::Flying.next(&SupervisorInputs { steady_us, ..CALM }), Mode::Flying);
     }
 }
 
@@ -93,11 +96,11 @@ fn coasting_ends_once_states_have_been_fresh_for_a_while() {
 fn a_flight_ends_for_the_reason_of_highest_precedence() {
     for (mode, seen) in all() {
         let reasons = [
-            (seen.kill, End::Killed),
-            (seen.request == Some(Request::Disarm) && !seen.airborne, End::Disarmed),
-            (seen.tumbled, End::Tumbled),
-            (seen.attitude_age_us > GIVE_UP_US, End::StateLost),
-            (mode == Mode::Descending && !seen.airborne, End::Landed),
+            (seen.kill, EndReason::Killed),
+            (seen.request == Some(Request::Disarm) && !seen.airborne, EndReason::Disarmed),
+            (seen.tumbled, EndReason::Tumbled),
+            (seen.attitude_age_us > GIVE_UP_US, EndReason::StateLost),
+            (mode == Mode::Descending && !seen.airborne, EndReason::Landed),
         ];
         let end = reasons.into_iter().find(|(holds, _)| *holds && mode.armed()).map(|(_, end)| end);
         assert_eq!(mode.end(&seen), end, "{mode:?}, {seen:?}");
@@ -110,7 +113,7 @@ fn a_flight_ends_for_the_reason_of_highest_precedence() {
 #[test]
 fn what_is_refused_changes_nothing() {
     for (mode, seen) in all() {
-        let without = mode.next(&Observed { request: None, ..seen });
+        let without = mode.next(&SupervisorInputs { request: None, ..seen });
         let granted = seen.request.is_some_and(|request| mode.answer(request, &seen).is_ok());
         if !granted {
             assert_eq!(mode.next(&seen), without, "{mode:?}, {seen:?}");
@@ -161,25 +164,25 @@ fn readiness_names_the_first_reason_against_it() {
     ];
     for (state, setpoint, healthy, rest_us, expected) in cases {
         let (state, setpoint) = (state.as_ref(), setpoint.as_ref());
-        let standing = Standing { state, missing: None, setpoint, healthy, rest_us, barred: Reasons::NONE };
+        let standing = ArmingInputs { state, missing: None, setpoint, healthy, rest_us, inhibited: Reasons::NONE };
         assert_eq!(limits.against(&standing).verdict(), expected, "{standing:?}");
         // What others have against it comes last.
-        let barred = Standing { barred: Refusal::OutsideFence.into(), ..standing };
-        assert_eq!(limits.against(&barred).verdict(), expected.and(Err(Refusal::OutsideFence)));
+        let inhibited = ArmingInputs { inhibited: Refusal::OutsideFence.into(), ..standing };
+        assert_eq!(limits.against(&inhibited).verdict(), expected.and(Err(Refusal::OutsideFence)));
         // An estimate of one's own says what it misses.
         let missing = Some(Refusal::HeadingUnknown);
-        let unknown = Standing { state: None, missing, ..standing };
+        let unknown = ArmingInputs { state: None, missing, ..standing };
         assert_eq!(limits.against(&unknown).verdict(), Err(Refusal::HeadingUnknown));
     }
     // All of them are told, in order.
     let (state, setpoint) = (tilted(1.0, 0.0, 0.0), at(9.0, 0.0, 0.0));
-    let standing = Standing {
+    let standing = ArmingInputs {
         state: state.as_ref(),
         missing: None,
         setpoint: setpoint.as_ref(),
         healthy: false,
         rest_us: 0,
-        barred: Reasons::from(Refusal::WrongMode).and(Refusal::BatteryLow.into()),
+        inhibited: Reasons::from(Refusal::WrongMode).and(Refusal::BatteryLow.into()),
     };
     let all = [
         Refusal::TiltTooLarge,

@@ -7,13 +7,14 @@ use afbc_control::{FlightController, Trace};
 use afbc_flight_core::descent::SINK_M_S;
 use afbc_flight_core::landing::{CARRIED_US, STILL_US};
 use afbc_flight_core::{
-    Answer, ArmingLimits, Asked, End, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory,
+    ArmingLimits, EndReason, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, RequestAnswer, Stamped,
+    TickOutcome, TicketedRequest,
 };
 use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
 
-type Adapted = afbc::Cascade<afbc_control::Estimate>;
+type Adapted = afbc::Cascade<afbc_control::AdaptiveEstimate>;
 
 /// Without a reference model, errors are distances from the setpoint.
 fn settings() -> Settings {
@@ -25,14 +26,14 @@ fn controller(settings: Settings) -> Controller<Adaptive> {
     Controller::new(Parameters::PAPER.to_f32(), settings, law).expect("valid")
 }
 
-fn vehicle() -> Vehicle<Controller<Adaptive>> {
-    Vehicle::new(Parameters::PAPER.to_f32(), ArmingLimits::default(), controller(settings())).expect("valid")
+fn vehicle() -> FlightCore<Controller<Adaptive>> {
+    FlightCore::new(Parameters::PAPER.to_f32(), ArmingLimits::default(), controller(settings())).expect("valid")
 }
 
 /// A vehicle, its memory and the time.
 struct Bench {
-    vehicle: Vehicle<Controller<Adaptive>>,
-    memory: VehicleMemory<Adapted>,
+    vehicle: FlightCore<Controller<Adaptive>>,
+    memory: FlightCoreMemory<Adapted>,
     now_us: u64,
     inbox: Inbox,
     /// Alternating noise of the measured height, since trackers never repeat a state \[m\].
@@ -41,7 +42,13 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        Bench { vehicle: vehicle(), memory: VehicleMemory::default(), now_us: 0, inbox: Inbox::default(), noise_m: 0.0 }
+        Bench {
+            vehicle: vehicle(),
+            memory: FlightCoreMemory::default(),
+            now_us: 0,
+            inbox: Inbox::default(),
+            noise_m: 0.0,
+        }
     }
 
     /// Returns the trace of the last tick.
@@ -50,7 +57,7 @@ impl Bench {
     }
 
     fn ask(&mut self, request: Request) {
-        assert!(self.inbox.request(Asked { request, ticket: 3 }));
+        assert!(self.inbox.request(TicketedRequest { request, ticket: 3 }));
     }
 
     /// A bench that has been flying at `state` towards `setpoint` for a tick.
@@ -75,7 +82,7 @@ impl Bench {
     }
 
     /// Runs a tick with this measurement and setpoint.
-    fn tick(&mut self, state: Option<State>, setpoint: Option<Setpoint>) -> Outcome {
+    fn tick(&mut self, state: Option<State>, setpoint: Option<Setpoint>) -> TickOutcome {
         self.now_us += 1000;
         let at_us = self.now_us;
         if let Some(mut value) = state {
@@ -91,8 +98,8 @@ impl Bench {
     }
 }
 
-fn answer(request: Request, result: Result<(), Refusal>) -> Option<Answer> {
-    Some(Answer { ticket: 3, request, result })
+fn answer(request: Request, result: Result<(), Refusal>) -> Option<RequestAnswer> {
+    Some(RequestAnswer { ticket: 3, request, result })
 }
 
 fn near() -> Setpoint {
@@ -120,7 +127,7 @@ fn disarmed_motors_are_off_and_arming_waits_for_the_rate() {
 fn flying_is_the_laws_step() {
     let mut bench = Bench::flying(State::default(), near());
     let controller = controller(settings());
-    let mut memory = afbc_control::Screened::default();
+    let mut memory = afbc_control::Validated::default();
     let _ = controller.step(&mut memory, Some(&State::default()), &near());
     for tick in 0..500 {
         let t = tick as f32 * 1e-3;
@@ -149,7 +156,7 @@ fn the_estimates_of_one_flight_are_not_those_of_the_next() {
     bench.ask(Request::Kill);
     let outcome = bench.tick(Some(State::default()), Some(near()));
     assert_eq!((outcome.mode, outcome.motors), (Mode::Disarmed, RotorSpeeds::default()));
-    assert_eq!(outcome.ended, Some(End::Killed));
+    assert_eq!(outcome.ended, Some(EndReason::Killed));
     assert_eq!(bench.memory.control().expect("flown").estimates, learnt, "still there to be reported");
     bench.ask(Request::Arm);
     bench.tick(Some(State::default()), Some(near()));
@@ -213,7 +220,7 @@ impl Roll {
         }
     }
 
-    fn advance(&mut self, outcome: &Outcome) {
+    fn advance(&mut self, outcome: &TickOutcome) {
         let [f1, _, f3, _] = outcome.forces.0.into();
         self.rate += 0.25 / 0.0038 * (f3 - f1 + self.outside_n) * 1e-3;
         self.angle += self.rate * 1e-3;
@@ -297,7 +304,7 @@ fn a_state_that_comes_back_leads_the_descent_to_the_ground() {
         assert!(outcome.mode == Mode::Descending || outcome.motors == RotorSpeeds::default());
         outcome.ended
     });
-    assert_eq!(ended, Some(End::Landed));
+    assert_eq!(ended, Some(EndReason::Landed));
     assert!((STILL_US / 1000..STILL_US / 1000 + 500).contains(&uncarried_ms), "{uncarried_ms} ms");
 }
 
@@ -317,7 +324,7 @@ fn states_that_arrive_stale_do_not_count() {
 #[test]
 fn only_a_law_at_the_ticks_rate_flies() {
     let settings = Profile::Flight.settings().with_dt_s(0.002);
-    let refused = Vehicle::new(Parameters::PAPER.to_f32(), ArmingLimits::default(), controller(settings));
+    let refused = FlightCore::new(Parameters::PAPER.to_f32(), ArmingLimits::default(), controller(settings));
     assert_eq!(refused.expect_err("2 ms").range.name, "dt_s");
 }
 

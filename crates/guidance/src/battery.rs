@@ -8,7 +8,7 @@ const SMOOTH_S: f32 = 2.0;
 
 /// A battery's measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reading {
+pub struct BatteryReading {
     /// Voltage \[V\].
     pub voltage_v: f32,
     /// Current; 0 if it is not measured \[A\].
@@ -26,15 +26,15 @@ pub(crate) struct Cells {
 
 impl Cells {
     /// Returns the charge, 0 to 1, by a plausible reading.
-    fn charge(&self, reading: &Reading) -> Option<f32> {
-        let Reading { voltage_v, current_a } = *reading;
+    fn charge(&self, reading: &BatteryReading) -> Option<f32> {
+        let BatteryReading { voltage_v, current_a } = *reading;
         let plausible = voltage_v > 0.0 && voltage_v < 1e3 && current_a.abs() < 1e4;
         let cell_v = voltage_v / self.number + current_a * self.resistance_ohm;
         plausible.then(|| max(min((cell_v - self.empty_v) / (self.full_v - self.empty_v), 1.0), 0.0))
     }
 
     /// Updates a filtered charge; `None` stays so until the first plausible reading.
-    pub(crate) fn update(&self, charge: &mut Option<f32>, reading: Option<&Reading>, dt_s: f32) {
+    pub(crate) fn update(&self, charge: &mut Option<f32>, reading: Option<&BatteryReading>, dt_s: f32) {
         let Some(now) = reading.filter(|_| self.number >= 1.0).and_then(|reading| self.charge(reading)) else { return };
         let before = charge.unwrap_or(now);
         *charge = Some(before + (now - before) * (dt_s / SMOOTH_S));

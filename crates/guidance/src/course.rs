@@ -1,7 +1,7 @@
 //! Hold, take-off, landing and return.
 
-use crate::limiter::Aim;
-use crate::scene::{Scene, Wish};
+use crate::limiter::LimiterTarget;
+use crate::mode_io::{ModeInputs, ModeOutput};
 use afbc_control::math::{max, min};
 use nalgebra::Vector3;
 
@@ -23,13 +23,13 @@ pub(crate) struct Hold {
 
 impl Hold {
     /// Holds where the vehicle stops.
-    pub(crate) fn fly(&mut self, scene: &Scene<'_>) -> Aim {
-        if self.at_m.is_none() && scene.stands() {
-            self.at_m = Some(scene.present.position_m);
+    pub(crate) fn fly(&mut self, inputs: &ModeInputs<'_>) -> LimiterTarget {
+        if self.at_m.is_none() && inputs.stands() {
+            self.at_m = Some(inputs.present.position_m);
         }
-        let aim = self.at_m.map_or(scene.stop(), |at_m| scene.to(at_m));
-        let speed_m_s = min(self.speed_m_s.unwrap_or(aim.speed_m_s), scene.speed_m_s);
-        Aim { yaw_rad: self.yaw_rad.unwrap_or(f32::NAN), speed_m_s, ..aim }
+        let aim = self.at_m.map_or(inputs.stop(), |at_m| inputs.to(at_m));
+        let speed_m_s = min(self.speed_m_s.unwrap_or(aim.speed_m_s), inputs.speed_m_s);
+        LimiterTarget { yaw_rad: self.yaw_rad.unwrap_or(f32::NAN), speed_m_s, ..aim }
     }
 }
 
@@ -42,8 +42,8 @@ pub(crate) struct Takeoff {
 
 impl Takeoff {
     /// Begins where the setpoint is.
-    pub(crate) fn new(scene: &Scene<'_>, height_m: f32) -> Self {
-        Takeoff::above(scene.present.position_m, height_m)
+    pub(crate) fn new(inputs: &ModeInputs<'_>, height_m: f32) -> Self {
+        Takeoff::above(inputs.present.position_m, height_m)
     }
 
     /// Begins at `from_m`.
@@ -51,12 +51,12 @@ impl Takeoff {
         Takeoff { to_m: from_m + Vector3::new(0.0, 0.0, height_m), from_m: from_m.z }
     }
 
-    pub(crate) fn fly(&self, scene: &Scene<'_>) -> Wish {
-        let aim = Aim { up_m_s: scene.flying.takeoff_m_s, ..scene.to(self.to_m) };
+    pub(crate) fn fly(&self, inputs: &ModeInputs<'_>) -> ModeOutput {
+        let aim = LimiterTarget { up_m_s: inputs.flying.takeoff_m_s, ..inputs.to(self.to_m) };
         let short_m = max(TAKEN_OFF_SHARE * (self.to_m.z - self.from_m), CLIMBED_M);
-        let there = (self.to_m.z - scene.present.position_m.z).abs() < 0.05 && scene.stands();
-        let done = scene.airborne && there && self.to_m.z - scene.state.position_m.z < short_m;
-        Wish { lifts: true, done, ..Wish::fly(aim) }
+        let there = (self.to_m.z - inputs.present.position_m.z).abs() < 0.05 && inputs.stands();
+        let done = inputs.airborne && there && self.to_m.z - inputs.state.position_m.z < short_m;
+        ModeOutput { lifts: true, done, ..ModeOutput::fly(aim) }
     }
 }
 
@@ -67,12 +67,12 @@ pub(crate) struct Land {
 }
 
 impl Land {
-    pub(crate) fn fly(&mut self, scene: &Scene<'_>) -> Wish {
+    pub(crate) fn fly(&mut self, inputs: &ModeInputs<'_>) -> ModeOutput {
         if self.over_m.is_none() {
-            let speed_m_s = scene.present.velocity_m_s.xy().norm_squared();
-            self.over_m = (speed_m_s < 0.05 * 0.05).then_some(scene.present.position_m);
+            let speed_m_s = inputs.present.velocity_m_s.xy().norm_squared();
+            self.over_m = (speed_m_s < 0.05 * 0.05).then_some(inputs.present.position_m);
         }
-        Wish { lands: true, ..Wish::fly(scene.down(self.over_m.unwrap_or(Vector3::repeat(f32::NAN)))) }
+        ModeOutput { lands: true, ..ModeOutput::fly(inputs.down(self.over_m.unwrap_or(Vector3::repeat(f32::NAN)))) }
     }
 }
 
@@ -94,35 +94,35 @@ enum Stage {
 }
 
 impl Return {
-    pub(crate) fn new(scene: &Scene<'_>) -> Self {
-        let position_m = scene.present.position_m;
-        let off_m = (scene.home_m - position_m).xy();
-        let near = off_m.norm_squared() <= scene.flying.near_home_m * scene.flying.near_home_m;
-        let safe_m = scene.home_m.z + scene.flying.return_height_m;
-        let height_m = if near { position_m.z } else { min(max(position_m.z, safe_m), scene.ceiling_m) };
+    pub(crate) fn new(inputs: &ModeInputs<'_>) -> Self {
+        let position_m = inputs.present.position_m;
+        let off_m = (inputs.home_m - position_m).xy();
+        let near = off_m.norm_squared() <= inputs.flying.near_home_m * inputs.flying.near_home_m;
+        let safe_m = inputs.home_m.z + inputs.flying.return_height_m;
+        let height_m = if near { position_m.z } else { min(max(position_m.z, safe_m), inputs.ceiling_m) };
         Return { height_m, hold: Hold::default(), stage: Stage::Climbs }
     }
 
-    pub(crate) fn fly(&mut self, scene: &Scene<'_>) -> Wish {
-        let home_m = Vector3::new(scene.home_m.x, scene.home_m.y, self.height_m);
+    pub(crate) fn fly(&mut self, inputs: &ModeInputs<'_>) -> ModeOutput {
+        let home_m = Vector3::new(inputs.home_m.x, inputs.home_m.y, self.height_m);
         match self.stage {
             Stage::Climbs => {
-                let mut aim = self.hold.fly(scene);
+                let mut aim = self.hold.fly(inputs);
                 let short_m = |z: f32| self.height_m - z;
-                if short_m(scene.present.position_m.z) < CLIMBED_M && short_m(scene.state.position_m.z) < 1.0 {
-                    self.stage = Stage::Flies(scene.towards(&home_m));
+                if short_m(inputs.present.position_m.z) < CLIMBED_M && short_m(inputs.state.position_m.z) < 1.0 {
+                    self.stage = Stage::Flies(inputs.towards(&home_m));
                 }
                 // It climbs while it stops.
                 aim.position_m.z = self.height_m;
-                Wish::fly(aim)
+                ModeOutput::fly(aim)
             }
             Stage::Flies(yaw_rad) => {
-                if scene.is_at(&home_m, OVER_HOME_M) && scene.present.velocity_m_s.norm_squared() < 0.3 * 0.3 {
+                if inputs.is_at(&home_m, OVER_HOME_M) && inputs.present.velocity_m_s.norm_squared() < 0.3 * 0.3 {
                     self.stage = Stage::Descends;
                 }
-                Wish::fly(Aim { yaw_rad, ..scene.to(home_m) })
+                ModeOutput::fly(LimiterTarget { yaw_rad, ..inputs.to(home_m) })
             }
-            Stage::Descends => Wish { lands: true, ..Wish::fly(scene.down(home_m)) },
+            Stage::Descends => ModeOutput { lands: true, ..ModeOutput::fly(inputs.down(home_m)) },
         }
     }
 }

@@ -3,18 +3,18 @@
 mod flying;
 mod orders;
 
-use crate::battery::Reading;
+use crate::battery::BatteryReading;
 use crate::course::{Hold, Land, Return, Takeoff};
 use crate::lift::{Lift, Trim};
-use crate::limiter::{Aim, Limiter};
+use crate::limiter::{Limiter, LimiterTarget};
 use crate::mission::Mission;
 use crate::mode::FlightMode;
-use crate::net::{self, Findings, Sensors, Watch};
-use crate::notice::{Cause, Notice, Notices, Reason};
-use crate::order::{Declined, Given, Orders};
+use crate::net::{self, FailedSensors, Findings, Watch};
+use crate::notice::{Cause, ModeReason, Notice, Notices};
+use crate::order::{OrderRefusal, Orders, TicketedOrder};
 use crate::settings::Settings;
 use crate::sticks;
-use crate::table::{self, Action, Conditions};
+use crate::table::{self, FailsafeAction, TransitionInputs};
 use crate::targets::{self, Targets};
 use afbc_control::math::{max, min};
 use afbc_flight_core::{Mode, Reasons, Refusal, Request, Stamped};
@@ -26,7 +26,7 @@ const REQUEST_S: f32 = 0.1;
 
 /// What the guidance sees of the vehicle in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sight<'a> {
+pub struct GuidanceInputs<'a> {
     /// Time since power-up \[us\].
     pub now_us: u64,
     /// Time since the last tick \[s\].
@@ -40,9 +40,9 @@ pub struct Sight<'a> {
     /// True if it has been at rest for as long as arming wants it, by the flight core.
     pub rested: bool,
     /// The battery's measurements.
-    pub battery: Option<Reading>,
+    pub battery: Option<BatteryReading>,
     /// Sensors that have failed.
-    pub sensors: Sensors,
+    pub sensors: FailedSensors,
     /// What the rotors give.
     pub lift: Lift,
 }
@@ -57,7 +57,7 @@ pub struct Guided {
     /// A request to the flight core, repeated until it is granted.
     pub request: Option<Request>,
     /// Ticket and answer of the first of [`Orders::given`].
-    pub answer: Option<(u8, Result<(), Declined>)>,
+    pub answer: Option<(u8, Result<(), OrderRefusal>)>,
     /// Flight mode.
     pub mode: FlightMode,
     /// Announcements of this tick.
@@ -98,7 +98,7 @@ struct Memory {
     /// Ordered speed; infinite for none \[m/s\].
     speed_m_s: f32,
     /// Aim of the last tick, which goes on through a gap of the state.
-    aim: Aim,
+    aim: LimiterTarget,
     /// Correction of attitude and thrust while these are flown.
     trim: Trim,
     was_armed: bool,
@@ -153,7 +153,7 @@ impl Guidance {
             home_m: None,
             home_ordered: false,
             speed_m_s: f32::INFINITY,
-            aim: Aim::stop(1.0, 1.0, 1.0),
+            aim: LimiterTarget::stop(1.0, 1.0, 1.0),
             trim: Trim::default(),
             was_armed: false,
             was_seen: false,
@@ -197,27 +197,27 @@ impl Guidance {
     /// Runs one tick, to be called every millisecond. Cannot fail.
     #[must_use = "the vehicle flies by it"]
     #[inline]
-    pub fn tick(&mut self, sight: &Sight<'_>, orders: &Orders) -> Guided {
-        self.memory.tick(&self.settings, sight, orders)
+    pub fn tick(&mut self, given: &GuidanceInputs<'_>, orders: &Orders) -> Guided {
+        self.memory.tick(&self.settings, given, orders)
     }
 }
 
 impl Memory {
     #[inline]
-    fn tick(&mut self, settings: &Settings, sight: &Sight<'_>, orders: &Orders) -> Guided {
+    fn tick(&mut self, settings: &Settings, given: &GuidanceInputs<'_>, orders: &Orders) -> Guided {
         // False of NaN.
-        let dt_s = if sight.dt_s > 0.0 { min(max(sight.dt_s, 1e-4), 0.02) } else { 0.001 };
-        let state = sight.state.filter(|state| state.is_plausible());
-        let armed = sight.core.armed();
-        let airborne = armed && sight.airborne;
+        let dt_s = if given.dt_s > 0.0 { min(max(given.dt_s, 1e-4), 0.02) } else { 0.001 };
+        let state = given.state.filter(|state| state.is_plausible());
+        let armed = given.core.armed();
+        let airborne = armed && given.airborne;
         let mut notices = Notices::default();
         self.time(airborne, dt_s);
-        self.find_home(state, sight.rested, armed);
+        self.find_home(state, given.rested, armed);
 
         // Watches.
         let flying = &settings.flying;
         let fresh = |at_us: u64, lost_s: f32| {
-            let age_us = Stamped { value: (), at_us }.age_us(sight.now_us);
+            let age_us = Stamped { value: (), at_us }.age_us(given.now_us);
             age_us as f32 * 1e-6 <= lost_s
         };
         let target = orders.target.as_ref().filter(|target| fresh(target.at_us, flying.targets_lost_s));
@@ -227,20 +227,20 @@ impl Memory {
         let findings = Findings {
             mode: self.mode,
             armed,
-            descends: sight.core == Mode::Descending,
+            descends: given.core == Mode::Descending,
             position_m: state.map(|state| state.position_m),
             home_m: self.home_m,
-            battery: sight.battery.as_ref(),
-            sensors: sight.sensors,
+            battery: given.battery.as_ref(),
+            sensors: given.sensors,
             silent_us: orders
                 .heard_us
-                .map(|heard_us| u32::try_from(sight.now_us.saturating_sub(heard_us)).unwrap_or(u32::MAX)),
+                .map(|heard_us| u32::try_from(given.now_us.saturating_sub(heard_us)).unwrap_or(u32::MAX)),
             targets: target.is_some(),
             sticks: sticks.is_some(),
             dt_s,
         };
         let (held, cause, new) = self.watch.look(&settings.net, &findings, &mut notices);
-        let seen = Conditions {
+        let seen = TransitionInputs {
             armed,
             airborne,
             positioned: state.is_some(),
@@ -258,21 +258,21 @@ impl Memory {
         self.was_armed = armed;
         let mut told = None;
         if let Some(next) = table::forced(self.mode, &seen) {
-            self.change(next, Reason::Failsafe(cause), &mut notices);
+            self.change(next, ModeReason::Failsafe(cause), &mut notices);
             (self.failsafe, told) = (Some(cause), Some(cause));
         }
         if new != 0 {
             net::announce(&settings.net, new, told, &mut notices);
         }
         let [first, ..] = &orders.given;
-        let answer =
-            first.map(|Given { order, ticket }| (ticket, self.order(settings, &order, state, &seen, &mut notices)));
+        let answer = first
+            .map(|TicketedOrder { order, ticket }| (ticket, self.order(settings, &order, state, &seen, &mut notices)));
 
         // Flies it.
         let mut reached = None;
         let flight = match state {
             Some(state) => {
-                self.fly(settings, sight, state, dt_s, orders, target, sticks.as_ref(), &mut reached, &mut notices)
+                self.fly(settings, given, state, dt_s, orders, target, sticks.as_ref(), &mut reached, &mut notices)
             }
             None => {
                 if armed && airborne {
@@ -284,7 +284,7 @@ impl Memory {
         };
         let (setpoint, rests) = flight.map_or((None, armed && !airborne), |(setpoint, rests)| (setpoint, rests));
         if !armed {
-            self.against = self.against(settings, sight, state);
+            self.against = self.against(settings, given, state);
         }
         let request = self.disarms(settings, armed, airborne, rests, held, dt_s, &mut reached, &mut notices);
         Guided {
@@ -324,11 +324,11 @@ impl Memory {
         (self.ground_s, self.lift_s) = (0.0, 0.0);
         self.mission.resume(0);
         if !self.mode.is_manual() && self.mode != FlightMode::Hold {
-            self.change(FlightMode::Hold, Reason::Disarmed, notices);
+            self.change(FlightMode::Hold, ModeReason::Disarmed, notices);
         }
     }
 
-    fn change(&mut self, next: FlightMode, reason: Reason, notices: &mut Notices) {
+    fn change(&mut self, next: FlightMode, reason: ModeReason, notices: &mut Notices) {
         if next != self.mode {
             notices.push(Notice::Mode(next, reason));
         }
@@ -347,7 +347,7 @@ impl Memory {
         armed: bool,
         airborne: bool,
         rests: bool,
-        held: Action,
+        held: FailsafeAction,
         dt_s: f32,
         reached: &mut Option<u16>,
         notices: &mut Notices,
@@ -364,7 +364,7 @@ impl Memory {
         let flying = &settings.flying;
         let wait_s = if self.flown { flying.disarm_after_s } else { flying.disarm_before_s };
         let waited = wait_s > 0.0 && self.ground_s >= wait_s;
-        if !(lands || held >= Action::Return || waited) {
+        if !(lands || held >= FailsafeAction::Return || waited) {
             return None;
         }
         if !self.disarms {
@@ -379,13 +379,13 @@ impl Memory {
     }
 
     /// Returns what speaks against arming that the flight core does not see itself.
-    fn against(&self, settings: &Settings, sight: &Sight<'_>, state: Option<&State>) -> Reasons {
+    fn against(&self, settings: &Settings, given: &GuidanceInputs<'_>, state: Option<&State>) -> Reasons {
         let mut reasons = Reasons::NONE;
         // Without a number of cells the battery is not watched.
         let watched = settings.net.cells >= 1.0;
-        let known = sight.battery.is_some() && self.watch.charge().is_some();
+        let known = given.battery.is_some() && self.watch.charge().is_some();
         reasons.note(watched && (!known || self.watch.holds(Cause::BatteryLow)), Refusal::BatteryLow);
-        reasons.note(sight.sensors.any(), Refusal::SensorFailed);
+        reasons.note(given.sensors.any(), Refusal::SensorFailed);
         let outside = state.is_some_and(|state| !self.is_inside(settings, &state.position_m));
         reasons.note(outside, Refusal::OutsideFence);
         reasons.note(matches!(self.mode, FlightMode::Land | FlightMode::Return), Refusal::WrongMode);

@@ -21,23 +21,25 @@ pub mod lift;
 pub mod limiter;
 mod mission;
 pub mod mode;
+mod mode_io;
 pub mod net;
 pub mod notice;
 pub mod order;
-mod scene;
 pub mod settings;
 mod shaper;
 mod sticks;
 pub mod table;
 mod targets;
 
-pub use battery::Reading;
-pub use guidance::{Guidance, Guided, Sight};
+pub use battery::BatteryReading;
+pub use guidance::{Guidance, GuidanceInputs, Guided};
 pub use lift::Lift;
-pub use limiter::{Aim, Limiter};
+pub use limiter::{Limiter, LimiterTarget};
 pub use mode::FlightMode;
-pub use net::{Net, Sensors};
-pub use notice::{Cause, Notice, Notices, Reason, Severity};
-pub use order::{AttitudeTarget, Declined, Given, Item, Leg, MotionTarget, Order, Orders, Sticks, Target};
+pub use net::{FailedSensors, Net};
+pub use notice::{Cause, ModeReason, Notice, Notices, Severity};
+pub use order::{
+    AttitudeTarget, Item, Leg, MotionTarget, OffboardTarget, Order, OrderRefusal, Orders, Sticks, TicketedOrder,
+};
 pub use settings::{Flying, Limits, Settings};
-pub use table::{Action, Conditions};
+pub use table::{FailsafeAction, TransitionInputs};

@@ -5,8 +5,8 @@
 //! a = R e3 T/m - g e3
 //! ```
 //!
-//! so that a law needs no second entrance. What it has learnt, of wind for instance, it adds to them: a `Trim` takes
-//! that away.
+//! so that a law needs no input besides the setpoint. The law adds what it has learnt, of wind for instance; a `Trim`
+//! subtracts that.
 
 use crate::settings::Limits;
 use afbc_control::math::{cos, max, min, sin, sqrt};

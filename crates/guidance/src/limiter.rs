@@ -35,7 +35,7 @@ const INTERVAL_MAX_S: f32 = 0.5;
 /// A target; NaN where nothing is given. Without position and velocity the acceleration counts; with nothing at all it
 /// stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Aim {
+pub struct LimiterTarget {
     /// Position \[m\].
     pub position_m: Vector3<f32>,
     /// Velocity, with a position that of the target \[m/s\].
@@ -56,11 +56,11 @@ pub struct Aim {
     pub sent_us: Option<u64>,
 }
 
-impl Aim {
+impl LimiterTarget {
     /// A target without anything given: stop.
     pub fn stop(speed_m_s: f32, up_m_s: f32, down_m_s: f32) -> Self {
         let none = Vector3::repeat(f32::NAN);
-        Aim {
+        LimiterTarget {
             position_m: none,
             velocity_m_s: none,
             acceleration_m_s2: none,
@@ -199,7 +199,7 @@ impl Limiter {
 
     /// Advances by one step towards `aim`, whose given values are plausible; nothing before the first
     /// [`anchor`](Self::anchor).
-    pub fn advance(&mut self, aim: &Aim, dt_s: f32) {
+    pub fn advance(&mut self, aim: &LimiterTarget, dt_s: f32) {
         let complete = complete(aim);
         let (target, jerk_m_s3, interval_s, fits) = match (&complete, aim.sent_us) {
             (Some(complete), Some(sent_us)) => {
@@ -257,9 +257,9 @@ impl Limiter {
 }
 
 /// Returns a target that has a position, with zeros for what is not given of the rest.
-fn complete(aim: &Aim) -> Option<Complete> {
+fn complete(aim: &LimiterTarget) -> Option<Complete> {
     let or_zero = |vector: Vector3<f32>| vector.map(|value| if value.is_nan() { 0.0 } else { value });
-    let Aim { position_m, velocity_m_s, acceleration_m_s2, .. } = *aim;
+    let LimiterTarget { position_m, velocity_m_s, acceleration_m_s2, .. } = *aim;
     let given = !position_m.iter().any(|value| value.is_nan());
     given.then(|| Complete {
         position_m,

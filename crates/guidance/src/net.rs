@@ -3,10 +3,10 @@
 //! The strongest action of all findings counts; of several findings with the same action the first in the order of
 //! [`Cause::ALL`] is named.
 
-use crate::battery::{Cells, Reading};
+use crate::battery::{BatteryReading, Cells};
 use crate::mode::FlightMode;
 use crate::notice::{Cause, Notice, Notices};
-use crate::table::Action;
+use crate::table::FailsafeAction;
 use afbc_types::{Declaration, OutOfRange, Range, parameters};
 use nalgebra::Vector3;
 
@@ -93,7 +93,7 @@ fn whole(declaration: &Declaration, value: f32) -> Result<(), OutOfRange> {
 
 /// Sensors that have failed, one bit each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sensors {
+pub struct FailedSensors {
     /// Gyroscope or accelerometer.
     pub inertial: bool,
     /// Barometer.
@@ -106,7 +106,7 @@ pub struct Sensors {
     pub tracker: bool,
 }
 
-impl Sensors {
+impl FailedSensors {
     /// True if one has failed.
     pub const fn any(self) -> bool {
         self.inertial || self.barometer || self.magnetometer || self.gnss || self.tracker
@@ -121,8 +121,8 @@ pub(crate) struct Findings<'a> {
     pub(crate) descends: bool,
     pub(crate) position_m: Option<Vector3<f32>>,
     pub(crate) home_m: Option<Vector3<f32>>,
-    pub(crate) battery: Option<&'a Reading>,
-    pub(crate) sensors: Sensors,
+    pub(crate) battery: Option<&'a BatteryReading>,
+    pub(crate) sensors: FailedSensors,
     /// Time since the station in control was heard \[us\]; none if it never was.
     pub(crate) silent_us: Option<u32>,
     pub(crate) targets: bool,
@@ -154,7 +154,12 @@ impl Watch {
     }
 
     /// Looks, and returns the strongest action with its cause, and the set of causes that are new.
-    pub(crate) fn look(&mut self, net: &Net, seen: &Findings<'_>, notices: &mut Notices) -> (Action, Cause, u16) {
+    pub(crate) fn look(
+        &mut self,
+        net: &Net,
+        seen: &Findings<'_>,
+        notices: &mut Notices,
+    ) -> (FailsafeAction, Cause, u16) {
         let cells =
             Cells { number: net.cells, empty_v: net.empty_v, full_v: net.full_v, resistance_ohm: net.resistance_ohm };
         cells.update(&mut self.charge, seen.battery, seen.dt_s);
@@ -184,15 +189,15 @@ impl Watch {
             }
         }
         if self.holds == 0 {
-            return (Action::None, Cause::Descent, 0);
+            return (FailsafeAction::None, Cause::Descent, 0);
         }
         let (action, cause) = self.strongest(net);
-        (if seen.armed { action } else { Action::None }, cause, new)
+        (if seen.armed { action } else { FailsafeAction::None }, cause, new)
     }
 
-    fn strongest(&self, net: &Net) -> (Action, Cause) {
+    fn strongest(&self, net: &Net) -> (FailsafeAction, Cause) {
         let found = Cause::ALL.into_iter().filter(|cause| self.holds(*cause));
-        found.fold((Action::None, Cause::Descent), |(strongest, of), cause| {
+        found.fold((FailsafeAction::None, Cause::Descent), |(strongest, of), cause| {
             let action = net.action(cause);
             if action > strongest { (action, cause) } else { (strongest, of) }
         })
@@ -202,7 +207,7 @@ impl Watch {
 /// Announces the causes in the set `new` that have an action, but one.
 pub(crate) fn announce(net: &Net, new: u16, but: Option<Cause>, notices: &mut Notices) {
     for cause in Cause::ALL {
-        if new & bit(cause) != 0 && Some(cause) != but && net.action(cause) > Action::None {
+        if new & bit(cause) != 0 && Some(cause) != but && net.action(cause) > FailsafeAction::None {
             notices.push(Notice::Found(cause));
         }
     }
@@ -210,9 +215,9 @@ pub(crate) fn announce(net: &Net, new: u16, but: Option<Cause>, notices: &mut No
 
 impl Net {
     /// Returns the action of a cause.
-    pub fn action(&self, cause: Cause) -> Action {
-        use Action::{Hold, Land, None, Return, Warn};
-        let of = |number: f32, actions: &[Action]| actions.get(number as usize).copied().unwrap_or(Land);
+    pub fn action(&self, cause: Cause) -> FailsafeAction {
+        use FailsafeAction::{Hold, Land, None, Return, Warn};
+        let of = |number: f32, actions: &[FailsafeAction]| actions.get(number as usize).copied().unwrap_or(Land);
         match cause {
             Cause::Descent => Land,
             Cause::BatteryLow => Warn,

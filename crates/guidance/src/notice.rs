@@ -59,7 +59,7 @@ impl Cause {
 
 /// Why the mode changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Reason {
+pub enum ModeReason {
     /// It was ordered.
     Ordered,
     /// The last mode has done its work.
@@ -74,16 +74,16 @@ pub enum Reason {
     Failsafe(Cause),
 }
 
-impl Reason {
+impl ModeReason {
     /// Returns it in words.
     pub const fn name(self) -> &'static str {
         match self {
-            Reason::Ordered => "ordered",
-            Reason::Done => "done",
-            Reason::Mission => "by the mission",
-            Reason::NoLift => "has not left the ground",
-            Reason::Disarmed => "disarmed",
-            Reason::Failsafe(cause) => cause.name(),
+            ModeReason::Ordered => "ordered",
+            ModeReason::Done => "done",
+            ModeReason::Mission => "by the mission",
+            ModeReason::NoLift => "has not left the ground",
+            ModeReason::Disarmed => "disarmed",
+            ModeReason::Failsafe(cause) => cause.name(),
         }
     }
 }
@@ -108,7 +108,7 @@ pub enum Severity {
 #[non_exhaustive]
 pub enum Notice {
     /// The mode is another.
-    Mode(FlightMode, Reason),
+    Mode(FlightMode, ModeReason),
     /// The safety net has found something, which does not change the mode.
     Found(Cause),
     /// It is over.
@@ -123,12 +123,12 @@ impl Notice {
     /// Returns how urgent it is.
     pub const fn severity(self) -> Severity {
         match self {
-            Notice::Mode(_, Reason::Failsafe(cause)) | Notice::Found(cause) => match cause {
+            Notice::Mode(_, ModeReason::Failsafe(cause)) | Notice::Found(cause) => match cause {
                 Cause::Descent | Cause::BatteryEmergency | Cause::BatteryCritical => Severity::Critical,
                 Cause::Fence | Cause::Sensors | Cause::Station => Severity::Error,
                 Cause::BatteryLow | Cause::Targets | Cause::Sticks => Severity::Warning,
             },
-            Notice::Mode(_, Reason::NoLift) => Severity::Error,
+            Notice::Mode(_, ModeReason::NoLift) => Severity::Error,
             Notice::ItemRefused => Severity::Warning,
             Notice::Disarms | Notice::Over(_) => Severity::Notice,
             Notice::Mode(..) => Severity::Info,

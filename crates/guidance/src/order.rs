@@ -30,7 +30,7 @@ pub enum Order {
 
 /// An order, with a ticket that identifies its answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Given {
+pub struct TicketedOrder {
     /// The order.
     pub order: Order,
     /// Returned with the answer, and not used otherwise.
@@ -41,7 +41,7 @@ pub struct Given {
 /// [`Refusal`](afbc_flight_core::Refusal).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum Declined {
+pub enum OrderRefusal {
     /// The vehicle does not know where it is.
     NoPosition = 32,
     /// The mode needs an armed vehicle.
@@ -66,7 +66,7 @@ pub enum Declined {
 
 /// A companion computer's target.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Target {
+pub enum OffboardTarget {
     /// A motion.
     Motion(MotionTarget),
     /// An attitude and a thrust.
@@ -166,7 +166,7 @@ pub const ORDERS_MAX: usize = 4;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Orders {
     /// Newest target.
-    pub target: Option<Stamped<Target>>,
+    pub target: Option<Stamped<OffboardTarget>>,
     /// Newest sticks.
     pub sticks: Option<Stamped<Sticks>>,
     /// Item of the mission that was wanted last.
@@ -174,12 +174,12 @@ pub struct Orders {
     /// Time at which the station in control was last heard; none before \[us\].
     pub heard_us: Option<u64>,
     /// Orders, oldest first, without gaps; a tick of the guidance answers the first.
-    pub given: [Option<Given>; ORDERS_MAX],
+    pub given: [Option<TicketedOrder>; ORDERS_MAX],
 }
 
 impl Orders {
     /// Queues an order; false if [`ORDERS_MAX`] are queued already, and it is dropped.
-    pub fn give(&mut self, given: Given) -> bool {
+    pub fn give(&mut self, given: TicketedOrder) -> bool {
         match self.given.iter_mut().find(|place| place.is_none()) {
             Some(place) => {
                 *place = Some(given);

@@ -1,10 +1,10 @@
 //! Modes that a pilot's sticks fly.
 
 use crate::lift::Lift;
-use crate::limiter::Aim;
+use crate::limiter::LimiterTarget;
 use crate::mode::FlightMode;
+use crate::mode_io::{ModeInputs, ModeOutput, Shaping};
 use crate::order::Sticks;
-use crate::scene::{Scene, Way, Wish};
 use afbc_control::math::{cos, max, min, sin, tan};
 use afbc_types::Setpoint;
 use nalgebra::Vector3;
@@ -20,35 +20,35 @@ pub(crate) fn is_plausible(sticks: &Sticks) -> bool {
 }
 
 /// Returns what the sticks want in a mode that is [manual](FlightMode::is_manual).
-pub(crate) fn fly(mode: FlightMode, sticks: &Sticks, scene: &Scene<'_>, lift: &Lift) -> Wish {
+pub(crate) fn fly(mode: FlightMode, sticks: &Sticks, inputs: &ModeInputs<'_>, lift: &Lift) -> ModeOutput {
     let centred = |stick: f32| if stick.abs() <= CENTRE { 0.0 } else { stick };
     let (forward, left) = (centred(sticks.pitch), -centred(sticks.roll));
-    let (throttle, yaw_rate_rad_s) = (centred(sticks.throttle), -centred(sticks.yaw) * scene.limits.yaw_rate_rad_s);
-    let yaw_rad = if mode == FlightMode::Stabilised { scene.state.attitude_rad.z } else { scene.present.yaw_rad };
+    let (throttle, yaw_rate_rad_s) = (centred(sticks.throttle), -centred(sticks.yaw) * inputs.limits.yaw_rate_rad_s);
+    let yaw_rad = if mode == FlightMode::Stabilised { inputs.state.attitude_rad.z } else { inputs.present.yaw_rad };
     let (s, c) = (sin(yaw_rad), cos(yaw_rad));
     let turned = |forward: f32, left: f32| [c * forward - s * left, s * forward + c * left];
-    let most_m_s = if throttle > 0.0 { scene.limits.up_m_s } else { scene.limits.down_m_s };
+    let most_m_s = if throttle > 0.0 { inputs.limits.up_m_s } else { inputs.limits.down_m_s };
     let climb_m_s = throttle * most_m_s;
-    let aim = Aim { yaw_rate_rad_s, ..scene.stop() };
+    let aim = LimiterTarget { yaw_rate_rad_s, ..inputs.stop() };
     let lifts = throttle > LIFTS;
-    let tilt_m_s2 = |stick: f32| lift.gravity_m_s2 * tan(stick * scene.flying.stick_tilt_rad);
-    let way = match mode {
+    let tilt_m_s2 = |stick: f32| lift.gravity_m_s2 * tan(stick * inputs.flying.stick_tilt_rad);
+    let shaping = match mode {
         FlightMode::Position => {
             let [x, y] = turned(forward * aim.speed_m_s, left * aim.speed_m_s);
-            Way::Limited(Aim { velocity_m_s: Vector3::new(x, y, climb_m_s), ..aim })
+            Shaping::Limited(LimiterTarget { velocity_m_s: Vector3::new(x, y, climb_m_s), ..aim })
         }
         FlightMode::Altitude => {
             let velocity_m_s = Vector3::new(f32::NAN, f32::NAN, climb_m_s);
-            Way::Leaning(Aim { velocity_m_s, ..aim }, turned(tilt_m_s2(forward), tilt_m_s2(left)))
+            Shaping::Leaning(LimiterTarget { velocity_m_s, ..aim }, turned(tilt_m_s2(forward), tilt_m_s2(left)))
         }
         _ => {
-            let [x, y] = turned(tan(forward * scene.flying.stick_tilt_rad), tan(left * scene.flying.stick_tilt_rad));
+            let [x, y] = turned(tan(forward * inputs.flying.stick_tilt_rad), tan(left * inputs.flying.stick_tilt_rad));
             let up = Vector3::new(x, y, 1.0).normalize();
             let hover_m_s2 = lift.gravity_m_s2;
             let room_m_s2 = if throttle > 0.0 { max(lift.most_m_s2 - hover_m_s2, 0.0) } else { hover_m_s2 };
             let thrust_m_s2 = min(hover_m_s2 + throttle * room_m_s2, lift.most_m_s2);
-            Way::Direct(Setpoint { yaw_rate_rad_s, ..lift.setpoint(scene.state, up, thrust_m_s2) })
+            Shaping::Direct(Setpoint { yaw_rate_rad_s, ..lift.setpoint(inputs.state, up, thrust_m_s2) })
         }
     };
-    Wish { way, lifts, lands: false, done: false }
+    ModeOutput { shaping, lifts, lands: false, done: false }
 }

@@ -2,11 +2,11 @@
 //! docs/modes.md.
 
 use crate::mode::FlightMode;
-use crate::order::Declined;
+use crate::order::OrderRefusal;
 
 /// What the safety net does, from the weakest to the strongest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Action {
+pub enum FailsafeAction {
     /// Nothing.
     #[default]
     None,
@@ -20,24 +20,24 @@ pub enum Action {
     Land,
 }
 
-impl Action {
+impl FailsafeAction {
     /// Returns the mode that it forces.
     pub const fn mode(self) -> Option<FlightMode> {
         match self {
-            Action::None | Action::Warn => None,
-            Action::Hold => Some(FlightMode::Hold),
-            Action::Return => Some(FlightMode::Return),
-            Action::Land => Some(FlightMode::Land),
+            FailsafeAction::None | FailsafeAction::Warn => None,
+            FailsafeAction::Hold => Some(FlightMode::Hold),
+            FailsafeAction::Return => Some(FlightMode::Return),
+            FailsafeAction::Land => Some(FlightMode::Land),
         }
     }
 
     /// True if `mode` does at least as much.
     pub const fn is_done_by(self, mode: FlightMode) -> bool {
         let does = match mode {
-            FlightMode::Land => Action::Land,
-            FlightMode::Return => Action::Return,
-            FlightMode::Hold => Action::Hold,
-            _ => Action::Warn,
+            FlightMode::Land => FailsafeAction::Land,
+            FlightMode::Return => FailsafeAction::Return,
+            FlightMode::Hold => FailsafeAction::Hold,
+            _ => FailsafeAction::Warn,
         };
         does as u8 >= self as u8
     }
@@ -45,7 +45,7 @@ impl Action {
 
 /// What the transitions depend on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Conditions {
+pub struct TransitionInputs {
     /// The flight core is armed.
     pub armed: bool,
     /// The vehicle is in the air.
@@ -61,13 +61,13 @@ pub struct Conditions {
     /// There are fresh sticks of a pilot.
     pub sticks: bool,
     /// What the safety net demands.
-    pub held: Action,
+    pub held: FailsafeAction,
 }
 
-impl Conditions {
+impl TransitionInputs {
     /// Returns what flight core and safety net demand together.
-    fn demanded(&self) -> Action {
-        if self.armed && self.descends { Action::Land } else { self.held }
+    fn demanded(&self) -> FailsafeAction {
+        if self.armed && self.descends { FailsafeAction::Land } else { self.held }
     }
 }
 
@@ -75,25 +75,25 @@ impl Conditions {
 ///
 /// # Errors
 /// The first reason against it.
-pub fn select(mode: FlightMode, seen: &Conditions) -> Result<(), Declined> {
+pub fn select(mode: FlightMode, seen: &TransitionInputs) -> Result<(), OrderRefusal> {
     use FlightMode::{Altitude, Hold, Land, Mission, Offboard, Position, Return, Stabilised, Takeoff};
-    let unless = |holds: bool, declined: Declined| if holds { Err(declined) } else { Ok(()) };
-    unless(!seen.demanded().is_done_by(mode), Declined::Failsafe)?;
-    unless(mode != Land && !seen.positioned, Declined::NoPosition)?;
+    let unless = |holds: bool, declined: OrderRefusal| if holds { Err(declined) } else { Ok(()) };
+    unless(!seen.demanded().is_done_by(mode), OrderRefusal::Failsafe)?;
+    unless(mode != Land && !seen.positioned, OrderRefusal::NoPosition)?;
     match mode {
         Hold | Land => Ok(()),
-        Takeoff => unless(seen.airborne, Declined::InFlight),
-        Return => unless(seen.armed && !seen.airborne, Declined::OnGround),
-        Mission => unless(!seen.mission, Declined::NoMission),
-        Offboard => unless(!seen.targets, Declined::NoTargets),
-        Position | Altitude | Stabilised => unless(!seen.sticks, Declined::NoSticks),
+        Takeoff => unless(seen.airborne, OrderRefusal::InFlight),
+        Return => unless(seen.armed && !seen.airborne, OrderRefusal::OnGround),
+        Mission => unless(!seen.mission, OrderRefusal::NoMission),
+        Offboard => unless(!seen.targets, OrderRefusal::NoTargets),
+        Position | Altitude | Stabilised => unless(!seen.sticks, OrderRefusal::NoSticks),
     }
 }
 
 /// Returns the mode that is forced on an armed vehicle in `mode`, if another one is.
-pub fn forced(mode: FlightMode, seen: &Conditions) -> Option<FlightMode> {
+pub fn forced(mode: FlightMode, seen: &TransitionInputs) -> Option<FlightMode> {
     let demanded = seen.demanded();
     // On the ground it stays there.
-    let demanded = if seen.airborne || seen.descends { demanded } else { demanded.min(Action::Hold) };
+    let demanded = if seen.airborne || seen.descends { demanded } else { demanded.min(FailsafeAction::Hold) };
     demanded.mode().filter(|_| seen.armed && !demanded.is_done_by(mode))
 }

@@ -1,9 +1,9 @@
 //! Offboard: targets of a companion computer.
 
 use crate::lift::Lift;
-use crate::limiter::Aim;
-use crate::order::{AttitudeTarget, MotionTarget, Target};
-use crate::scene::{Scene, Way, Wish};
+use crate::limiter::LimiterTarget;
+use crate::mode_io::{ModeInputs, ModeOutput, Shaping};
+use crate::order::{AttitudeTarget, MotionTarget, OffboardTarget};
 use afbc_control::math::{cos, min, sin};
 use afbc_flight_core::Stamped;
 use afbc_types::Setpoint;
@@ -25,20 +25,20 @@ pub(crate) struct Targets {
 }
 
 /// True if every value of a target is plausible or NaN where that is allowed.
-pub(crate) fn is_plausible(target: &Target) -> bool {
+pub(crate) fn is_plausible(target: &OffboardTarget) -> bool {
     let [position, velocity, acceleration, angle, rate] = MOST;
     // False of infinite numbers, not of NaN.
     let within = |value: f32, most: f32| value.is_nan() || value.abs() <= most;
     let all = |vector: &Vector3<f32>, most: f32| vector.iter().all(|value| within(*value, most));
     match target {
-        Target::Motion(motion) => {
+        OffboardTarget::Motion(motion) => {
             all(&motion.position_m, position)
                 && all(&motion.velocity_m_s, velocity)
                 && all(&motion.acceleration_m_s2, acceleration)
                 && within(motion.yaw_rad, angle)
                 && within(motion.yaw_rate_rad_s, rate)
         }
-        Target::Attitude(target) => {
+        OffboardTarget::Attitude(target) => {
             (target.attitude.norm_squared() - 1.0).abs() <= 0.1
                 && (0.0..=1.0).contains(&target.thrust)
                 && within(target.yaw_rate_rad_s, rate)
@@ -47,31 +47,31 @@ pub(crate) fn is_plausible(target: &Target) -> bool {
 }
 
 impl Targets {
-    pub(crate) fn fly(&mut self, target: &Stamped<Target>, scene: &Scene<'_>, lift: &Lift) -> Wish {
+    pub(crate) fn fly(&mut self, target: &Stamped<OffboardTarget>, inputs: &ModeInputs<'_>, lift: &Lift) -> ModeOutput {
         match &target.value {
-            Target::Motion(motion) => self.motion(motion, target.at_us, scene),
-            Target::Attitude(target) => attitude(target, scene, lift),
+            OffboardTarget::Motion(motion) => self.motion(motion, target.at_us, inputs),
+            OffboardTarget::Attitude(target) => attitude(target, inputs, lift),
         }
     }
 
-    fn motion(&mut self, motion: &MotionTarget, at_us: u64, scene: &Scene<'_>) -> Wish {
+    fn motion(&mut self, motion: &MotionTarget, at_us: u64, inputs: &ModeInputs<'_>) -> ModeOutput {
         let MotionTarget { yaw_rad, yaw_rate_rad_s, .. } = *motion;
         let MotionTarget { mut position_m, mut velocity_m_s, mut acceleration_m_s2, .. } = *motion;
         let mut aim_yaw_rad = yaw_rad;
         if motion.body {
-            let (s, c) = (sin(scene.present.yaw_rad), cos(scene.present.yaw_rad));
+            let (s, c) = (sin(inputs.present.yaw_rad), cos(inputs.present.yaw_rad));
             let turned = |v: Vector3<f32>| Vector3::new(c * v.x - s * v.y, s * v.x + c * v.y, v.z);
             (velocity_m_s, acceleration_m_s2) = (turned(velocity_m_s), turned(acceleration_m_s2));
             // The place was meant from where the vehicle was.
             let (sent_us, place_m, place_yaw_rad) = self.body.filter(|(sent_us, ..)| *sent_us == at_us).unwrap_or((
                 at_us,
-                scene.state.position_m + turned(position_m),
-                scene.present.yaw_rad + yaw_rad,
+                inputs.state.position_m + turned(position_m),
+                inputs.present.yaw_rad + yaw_rad,
             ));
             self.body = Some((sent_us, place_m, place_yaw_rad));
             (position_m, aim_yaw_rad) = (place_m, place_yaw_rad);
         }
-        let up_m = position_m.z - scene.state.position_m.z;
+        let up_m = position_m.z - inputs.state.position_m.z;
         let lifts = if up_m.is_nan() {
             if velocity_m_s.z.is_nan() { acceleration_m_s2.z > LIFTS_M_S } else { velocity_m_s.z > LIFTS_M_S }
         } else {
@@ -80,32 +80,32 @@ impl Targets {
         // Who sends a whole trajectory has begun it.
         let complete = [position_m, velocity_m_s, acceleration_m_s2].iter().all(|v| v.iter().all(|n| n.is_finite()));
         let lifts = lifts || complete;
-        let aim = Aim {
+        let aim = LimiterTarget {
             position_m,
             velocity_m_s,
             acceleration_m_s2,
             yaw_rad: aim_yaw_rad,
             yaw_rate_rad_s,
             sent_us: (!motion.body).then_some(at_us),
-            ..scene.stop()
+            ..inputs.stop()
         };
         // A companion computer is not bound to the usual speed.
-        let aim = Aim { speed_m_s: min(scene.limits.speed_m_s, scene.speed_m_s), ..aim };
-        Wish { lifts, ..Wish::fly(aim) }
+        let aim = LimiterTarget { speed_m_s: min(inputs.limits.speed_m_s, inputs.speed_m_s), ..aim };
+        ModeOutput { lifts, ..ModeOutput::fly(aim) }
     }
 }
 
-fn attitude(target: &AttitudeTarget, scene: &Scene<'_>, lift: &Lift) -> Wish {
+fn attitude(target: &AttitudeTarget, inputs: &ModeInputs<'_>, lift: &Lift) -> ModeOutput {
     let q = target.attitude;
     let (w, x, y, z) = (q.w, q.i, q.j, q.k);
     let up = Vector3::new(2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
     let thrust_m_s2 = target.thrust * lift.most_m_s2;
-    let held = lift.setpoint(scene.state, up, thrust_m_s2);
+    let held = lift.setpoint(inputs.state, up, thrust_m_s2);
     let setpoint = if target.yaw_rate_rad_s.is_nan() {
         Setpoint { yaw_rad: libm::atan2f(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)), ..held }
     } else {
         Setpoint { yaw_rate_rad_s: target.yaw_rate_rad_s, ..held }
     };
     let lifts = thrust_m_s2 > LIFTS_SHARE * lift.gravity_m_s2;
-    Wish { way: Way::Direct(setpoint), lifts, lands: false, done: false }
+    ModeOutput { shaping: Shaping::Direct(setpoint), lifts, lands: false, done: false }
 }

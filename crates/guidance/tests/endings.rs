@@ -2,13 +2,13 @@
 //! test puts it.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod desk;
+mod fixture;
 
 use afbc_flight_core::landing::LEFT_M;
 use afbc_flight_core::{Mode, Refusal, Request, Stamped};
 use afbc_guidance::*;
 use afbc_types::{Setpoint, State};
-use desk::*;
+use fixture::*;
 use nalgebra::Vector3;
 
 /// When the motors stop, a mode that flies by itself becomes hold, and what was ordered is forgotten.
@@ -21,15 +21,16 @@ fn after_a_flight_it_holds() {
         (FlightMode::Position, FlightMode::Position),
         (FlightMode::Stabilised, FlightMode::Stabilised),
     ] {
-        let mut desk = Desk::flying(Settings::DEFAULT);
-        desk.orders.sticks = Some(Stamped { value: Sticks::default(), at_us: desk.now_us + 1000 });
-        desk.select(mode).unwrap();
-        desk.said.clear();
-        (desk.core, desk.airborne) = (Mode::Disarmed, false);
-        let guided = desk.tick();
+        let mut fixture = Fixture::flying(Settings::DEFAULT);
+        fixture.orders.sticks = Some(Stamped { value: Sticks::default(), at_us: fixture.now_us + 1000 });
+        fixture.select(mode).unwrap();
+        fixture.said.clear();
+        (fixture.core, fixture.airborne) = (Mode::Disarmed, false);
+        let guided = fixture.tick();
         assert_eq!((guided.mode, guided.request), (becomes, None));
-        let told: &[Notice] = if mode == becomes { &[] } else { &[Notice::Mode(FlightMode::Hold, Reason::Disarmed)] };
-        assert_eq!(desk.said, told, "{mode:?}");
+        let told: &[Notice] =
+            if mode == becomes { &[] } else { &[Notice::Mode(FlightMode::Hold, ModeReason::Disarmed)] };
+        assert_eq!(fixture.said, told, "{mode:?}");
     }
 }
 
@@ -37,85 +38,85 @@ fn after_a_flight_it_holds() {
 /// second until they do; never in the air, nor if the time is zero.
 #[test]
 fn it_asks_to_disarm_on_the_ground() {
-    let asks = |desk: &mut Desk, ticks: u32| -> Vec<u32> {
-        (1..=ticks).filter(|_| desk.tick().request == Some(Request::Disarm)).collect()
+    let asks = |fixture: &mut Fixture, ticks: u32| -> Vec<u32> {
+        (1..=ticks).filter(|_| fixture.tick().request == Some(Request::Disarm)).collect()
     };
     let armed = |settings: Settings| {
-        let mut desk = Desk::new(settings);
-        desk.run(1100);
-        desk.core = Mode::Flying;
-        desk
+        let mut fixture = Fixture::new(settings);
+        fixture.run(1100);
+        fixture.core = Mode::Flying;
+        fixture
     };
     let timed = |before: f32, after: f32| {
         let flying = Flying { disarm_before_s: before, disarm_after_s: after, ..Flying::DEFAULT };
         Settings { flying, ..Settings::DEFAULT }
     };
-    let mut desk = armed(timed(1.0, 0.5));
-    let times = asks(&mut desk, 1400);
+    let mut fixture = armed(timed(1.0, 0.5));
+    let times = asks(&mut fixture, 1400);
     assert!(times.len() == 4 && (998..=1002).contains(times.first().unwrap()), "{times:?}");
     assert!(times.iter().zip(times.iter().skip(1)).all(|(one, next)| (99..=101).contains(&(next - one))), "{times:?}");
-    assert_eq!(desk.said, [Notice::Disarms]);
+    assert_eq!(fixture.said, [Notice::Disarms]);
     // After a flight it is another time, from the touch-down on.
-    desk.airborne = true;
-    assert_eq!(asks(&mut desk, 3000), []);
-    desk.airborne = false;
-    let times = asks(&mut desk, 600);
+    fixture.airborne = true;
+    assert_eq!(asks(&mut fixture, 3000), []);
+    fixture.airborne = false;
+    let times = asks(&mut fixture, 600);
     assert!((498..=502).contains(times.first().unwrap()), "{times:?}");
-    assert_eq!(desk.said, [Notice::Disarms; 2]);
+    assert_eq!(fixture.said, [Notice::Disarms; 2]);
     assert_eq!(asks(&mut armed(timed(0.0, 0.0)), 5000), [], "never");
     // Disarmed in between, the time begins anew.
-    let mut desk = armed(timed(1.0, 0.5));
-    assert_eq!(asks(&mut desk, 900), []);
-    desk.core = Mode::Disarmed;
-    assert_eq!(asks(&mut desk, 2000), []);
-    desk.core = Mode::Flying;
-    assert_eq!(asks(&mut desk, 900), []);
+    let mut fixture = armed(timed(1.0, 0.5));
+    assert_eq!(asks(&mut fixture, 900), []);
+    fixture.core = Mode::Disarmed;
+    assert_eq!(asks(&mut fixture, 2000), []);
+    fixture.core = Mode::Flying;
+    assert_eq!(asks(&mut fixture, 900), []);
     // A landing vehicle disarms at once.
-    let mut desk = Desk::flying(timed(0.0, 0.0));
-    desk.select(FlightMode::Land).unwrap();
-    assert_eq!(asks(&mut desk, 500), []);
-    desk.airborne = false;
-    assert_eq!(asks(&mut desk, 150), [1, 101]);
+    let mut fixture = Fixture::flying(timed(0.0, 0.0));
+    fixture.select(FlightMode::Land).unwrap();
+    assert_eq!(asks(&mut fixture, 500), []);
+    fixture.airborne = false;
+    assert_eq!(asks(&mut fixture, 150), [1, 101]);
     // One that shall take off does not wait.
-    let mut desk = armed(timed(0.5, 0.5));
-    desk.run(10);
-    desk.order(Order::TakeOff(None)).unwrap();
-    assert_eq!(asks(&mut desk, 2000), []);
+    let mut fixture = armed(timed(0.5, 0.5));
+    fixture.run(10);
+    fixture.order(Order::TakeOff(None)).unwrap();
+    assert_eq!(asks(&mut fixture, 2000), []);
 }
 
 /// What speaks against arming besides what the flight core sees: a battery that is not known or low, sensors, the
 /// fence.
 #[test]
 fn what_bars_arming_has_its_limits() {
-    let bars = |change: &dyn Fn(&mut Desk)| {
+    let bars = |change: &dyn Fn(&mut Fixture)| {
         let net = Net { cells: 3.0, fence_radius_m: 10.0, ..Net::DEFAULT };
-        let mut desk = Desk::new(Settings { net, ..Settings::DEFAULT });
-        desk.battery = Some(Reading { voltage_v: 11.7, current_a: 0.0 });
-        desk.run(1100);
-        change(&mut desk);
-        desk.tick().against.iter().collect::<Vec<_>>()
+        let mut fixture = Fixture::new(Settings { net, ..Settings::DEFAULT });
+        fixture.battery = Some(BatteryReading { voltage_v: 11.7, current_a: 0.0 });
+        fixture.run(1100);
+        change(&mut fixture);
+        fixture.tick().against.iter().collect::<Vec<_>>()
     };
     assert_eq!(bars(&|_| ()), []);
-    assert_eq!(bars(&|desk| desk.state.as_mut().unwrap().position_m.x = 10.9), [], "10 m from home, at x = 1 m");
-    assert_eq!(bars(&|desk| desk.state.as_mut().unwrap().position_m.x = 11.1), [Refusal::OutsideFence]);
-    assert_eq!(bars(&|desk| desk.battery = None), [Refusal::BatteryLow]);
-    assert_eq!(bars(&|desk| desk.sensors.tracker = true), [Refusal::SensorFailed]);
-    let low = bars(&|desk| {
-        desk.battery = Some(Reading { voltage_v: 10.8, current_a: 0.0 });
-        desk.run(9000);
+    assert_eq!(bars(&|fixture| fixture.state.as_mut().unwrap().position_m.x = 10.9), [], "10 m from home, at x = 1 m");
+    assert_eq!(bars(&|fixture| fixture.state.as_mut().unwrap().position_m.x = 11.1), [Refusal::OutsideFence]);
+    assert_eq!(bars(&|fixture| fixture.battery = None), [Refusal::BatteryLow]);
+    assert_eq!(bars(&|fixture| fixture.sensors.tracker = true), [Refusal::SensorFailed]);
+    let low = bars(&|fixture| {
+        fixture.battery = Some(BatteryReading { voltage_v: 10.8, current_a: 0.0 });
+        fixture.run(9000);
     });
     assert_eq!(low, [Refusal::BatteryLow]);
-    let both = bars(&|desk| {
-        desk.sensors.tracker = true;
-        desk.state.as_mut().unwrap().position_m.y = 15.0;
+    let both = bars(&|fixture| {
+        fixture.sensors.tracker = true;
+        fixture.state.as_mut().unwrap().position_m.y = 15.0;
     });
     assert_eq!(both, [Refusal::SensorFailed, Refusal::OutsideFence]);
     // Not watched without cells, and never known before the first reading.
-    assert!(Desk::new(Settings::DEFAULT).run(1100).against.is_empty());
+    assert!(Fixture::new(Settings::DEFAULT).run(1100).against.is_empty());
     let net = Net { cells: 3.0, ..Net::DEFAULT };
-    let mut desk = Desk::new(Settings { net, ..Settings::DEFAULT });
-    desk.battery = Some(Reading { voltage_v: NAN, current_a: 0.0 });
-    assert!(desk.run(1100).against.iter().eq([Refusal::BatteryLow]));
+    let mut fixture = Fixture::new(Settings { net, ..Settings::DEFAULT });
+    fixture.battery = Some(BatteryReading { voltage_v: NAN, current_a: 0.0 });
+    assert!(fixture.run(1100).against.iter().eq([Refusal::BatteryLow]));
 }
 
 /// The setpoint begins anew at a vehicle that is farther from it than its leash, or than a short one when the mode
@@ -124,40 +125,40 @@ fn what_bars_arming_has_its_limits() {
 #[test]
 fn the_setpoint_keeps_to_the_vehicle() {
     // A vehicle beside its setpoint by this and a second's way, times a share, at another velocity by this.
-    let begins_anew = |off: Vector3<f32>, share: f32, other_m_s: Vector3<f32>, change: &dyn Fn(&mut Desk)| {
-        let mut desk = Desk::flying(Settings::DEFAULT);
+    let begins_anew = |off: Vector3<f32>, share: f32, other_m_s: Vector3<f32>, change: &dyn Fn(&mut Fixture)| {
+        let mut fixture = Fixture::flying(Settings::DEFAULT);
         let order = Order::GoTo { position_m: Vector3::new(1.0, 90.0, 8.0), yaw_rad: NAN, speed_m_s: Some(0.5) };
-        desk.order(order).unwrap();
-        desk.run(4000);
-        let Setpoint { position_m, velocity_m_s, .. } = desk.setpoint();
+        fixture.order(order).unwrap();
+        fixture.run(4000);
+        let Setpoint { position_m, velocity_m_s, .. } = fixture.setpoint();
         assert!((velocity_m_s.y - 0.49).abs() < 0.01 && velocity_m_s.x == 0.0);
-        desk.follows = false;
+        fixture.follows = false;
         let there = position_m + (off + off.normalize() * velocity_m_s.y) * share;
-        desk.state = Some(State { velocity_m_s: velocity_m_s + other_m_s, ..at(there.x, there.y, there.z) });
-        change(&mut desk);
-        let setpoint = desk.setpoint();
+        fixture.state = Some(State { velocity_m_s: velocity_m_s + other_m_s, ..at(there.x, there.y, there.z) });
+        change(&mut fixture);
+        let setpoint = fixture.setpoint();
         (setpoint.position_m - there).norm() < 0.01
     };
     let (x, y, z, none) = (Vector3::x(), Vector3::y(), Vector3::z(), Vector3::zeros());
-    let both = |off: Vector3<f32>, change: &dyn Fn(&mut Desk)| {
+    let both = |off: Vector3<f32>, change: &dyn Fn(&mut Fixture)| {
         let within = begins_anew(off, 0.99, none, change);
         let beyond = begins_anew(off, 1.01, none, change);
         assert!(!within && beyond, "{off:?}: {within}, {beyond}");
     };
-    let goes_on = |_: &mut Desk| ();
-    let gap = |desk: &mut Desk| {
-        let state = desk.state.take();
-        let _ = desk.tick();
-        desk.state = state;
+    let goes_on = |_: &mut Fixture| ();
+    let gap = |fixture: &mut Fixture| {
+        let state = fixture.state.take();
+        let _ = fixture.tick();
+        fixture.state = state;
     };
-    let lands = |desk: &mut Desk| {
-        desk.orders.give(Given { order: Order::Select(FlightMode::Land), ticket: 1 });
+    let lands = |fixture: &mut Fixture| {
+        fixture.orders.give(TicketedOrder { order: Order::Select(FlightMode::Land), ticket: 1 });
     };
     for axis in [x, -x, y, -y, z, -z] {
         both(axis * 5.0, &goes_on);
         both(axis, &gap);
         assert!(!begins_anew(x * 0.5, 1.0, axis * 9.0, &goes_on));
-        for change in [&gap as &dyn Fn(&mut Desk), &lands] {
+        for change in [&gap as &dyn Fn(&mut Fixture), &lands] {
             assert!(!begins_anew(x * 0.3, 1.0, axis * 1.49, change) && begins_anew(x * 0.3, 1.0, axis * 1.51, change));
         }
         if axis.z <= 0.0 {
@@ -167,10 +168,10 @@ fn the_setpoint_keeps_to_the_vehicle() {
             assert!(!begins_anew(axis * 4.0, 1.0, none, &lands));
         }
     }
-    let mut desk = Desk::flying(Settings::DEFAULT);
-    desk.run(3000);
-    (desk.follows, desk.state) = (false, Some(at(90.0, 2.0, 8.0)));
-    assert!((desk.setpoint().position_m - Vector3::new(1.0, 2.0, 8.0)).norm() < 0.01, "a place that is held");
+    let mut fixture = Fixture::flying(Settings::DEFAULT);
+    fixture.run(3000);
+    (fixture.follows, fixture.state) = (false, Some(at(90.0, 2.0, 8.0)));
+    assert!((fixture.setpoint().position_m - Vector3::new(1.0, 2.0, 8.0)).norm() < 0.01, "a place that is held");
 }
 
 /// A take-off that does not leave the ground is given up after ten seconds: on the ground it rests, and one that the
@@ -178,26 +179,26 @@ fn the_setpoint_keeps_to_the_vehicle() {
 #[test]
 fn a_takeoff_without_lift_is_given_up() {
     let takes_off = |airborne: bool, given_m_s2: Option<f32>, up_m: f32| {
-        let mut desk = Desk::new(Settings::DEFAULT);
-        (desk.follows, desk.lift.given_m_s2) = (false, given_m_s2);
-        desk.run(1100);
-        desk.core = Mode::Flying;
-        desk.run(10);
-        desk.order(Order::TakeOff(None)).unwrap();
-        (desk.airborne, desk.state) = (airborne, Some(at(1.0, 2.0, 3.0 + up_m)));
-        desk.said.clear();
-        let gives_up = (1..12_000).find(|_| desk.tick().notices.iter().next().is_some());
-        (gives_up, desk.guidance.mode(), desk.said.clone(), desk.tick().rests)
+        let mut fixture = Fixture::new(Settings::DEFAULT);
+        (fixture.follows, fixture.lift.given_m_s2) = (false, given_m_s2);
+        fixture.run(1100);
+        fixture.core = Mode::Flying;
+        fixture.run(10);
+        fixture.order(Order::TakeOff(None)).unwrap();
+        (fixture.airborne, fixture.state) = (airborne, Some(at(1.0, 2.0, 3.0 + up_m)));
+        fixture.said.clear();
+        let gives_up = (1..12_000).find(|_| fixture.tick().notices.iter().next().is_some());
+        (gives_up, fixture.guidance.mode(), fixture.said.clone(), fixture.tick().rests)
     };
     let exhausted = Some(2.0 * G);
     let (after, mode, said, rests) = takes_off(false, None, 0.0);
     assert!(after.is_some_and(|ticks| (9_990..10_010).contains(&ticks)), "{after:?}");
     assert_eq!((mode, rests), (FlightMode::Hold, true));
-    assert_eq!(said, [Notice::Mode(FlightMode::Hold, Reason::NoLift)]);
+    assert_eq!(said, [Notice::Mode(FlightMode::Hold, ModeReason::NoLift)]);
     let (after, mode, said, rests) = takes_off(true, exhausted, 0.9 * LEFT_M);
     assert!(after.is_some_and(|ticks| (9_990..10_010).contains(&ticks)), "{after:?}");
     assert_eq!((mode, rests), (FlightMode::Land, false));
-    assert_eq!(said, [Notice::Mode(FlightMode::Land, Reason::NoLift)]);
+    assert_eq!(said, [Notice::Mode(FlightMode::Land, ModeReason::NoLift)]);
     // With thrust to spare it flies, unless it does not follow: the setpoint is a metre away a second later.
     for given_m_s2 in [Some(1.7 * G), None] {
         let (after, mode, ..) = takes_off(true, given_m_s2, 0.0);
@@ -217,15 +218,15 @@ fn a_touch_settles_a_landing_vehicle() {
     // Ticks after which it settles and after which this ends, of a vehicle that stops sinking and then has this
     // velocity.
     let settles = |inertial: bool, velocity_z: f32, mode: FlightMode| {
-        let mut desk = Desk::flying(Settings::DEFAULT);
-        desk.sensors.inertial = inertial;
-        desk.select(mode).unwrap();
-        desk.run(4000);
-        desk.follows = false;
-        let mut state = desk.state.unwrap();
+        let mut fixture = Fixture::flying(Settings::DEFAULT);
+        fixture.sensors.inertial = inertial;
+        fixture.select(mode).unwrap();
+        fixture.run(4000);
+        fixture.follows = false;
+        let mut state = fixture.state.unwrap();
         state.velocity_m_s = Vector3::new(0.1, 0.2, velocity_z);
         state.attitude_rad.z = 0.3;
-        desk.state = Some(state);
+        fixture.state = Some(state);
         let settled = Setpoint {
             position_m: state.position_m,
             velocity_m_s: state.velocity_m_s,
@@ -235,7 +236,7 @@ fn a_touch_settles_a_landing_vehicle() {
         };
         let is_settled: Vec<bool> = (0..5000)
             .map(|_| {
-                let found = desk.setpoint();
+                let found = fixture.setpoint();
                 let off_m_s2 = (found.acceleration_m_s2 - settled.acceleration_m_s2).norm();
                 off_m_s2 < 1e-5 && Setpoint { acceleration_m_s2: settled.acceleration_m_s2, ..found } == settled
             })
@@ -256,50 +257,50 @@ fn a_touch_settles_a_landing_vehicle() {
 /// What a mode has reached, hold keeps: the end of a take-off, or the last waypoint.
 #[test]
 fn what_is_reached_is_held() {
-    let mut desk = Desk::new(Settings::DEFAULT);
-    desk.run(1100);
-    desk.core = Mode::Flying;
-    desk.run(10);
-    desk.order(Order::TakeOff(Some(4.0))).unwrap();
-    desk.airborne = true;
-    desk.run(15_000);
-    assert_eq!((desk.guidance.mode(), desk.place()), (FlightMode::Hold, Vector3::new(1.0, 2.0, 7.0)));
+    let mut fixture = Fixture::new(Settings::DEFAULT);
+    fixture.run(1100);
+    fixture.core = Mode::Flying;
+    fixture.run(10);
+    fixture.order(Order::TakeOff(Some(4.0))).unwrap();
+    fixture.airborne = true;
+    fixture.run(15_000);
+    assert_eq!((fixture.guidance.mode(), fixture.place()), (FlightMode::Hold, Vector3::new(1.0, 2.0, 7.0)));
     let end = Vector3::new(6.0, 2.0, 7.0);
     let item = Item::Waypoint { position_m: end, yaw_rad: NAN, hold_s: 0.0, within_m: 1.5, fly_through: true };
-    desk.orders.leg = Some(Leg { number: 0, upload: 1, item, is_last: true });
-    desk.select(FlightMode::Mission).unwrap();
-    desk.run(12_000);
-    assert_eq!((desk.guidance.mode(), desk.place()), (FlightMode::Hold, end), "not where it was within 1.5 m");
+    fixture.orders.leg = Some(Leg { number: 0, upload: 1, item, is_last: true });
+    fixture.select(FlightMode::Mission).unwrap();
+    fixture.run(12_000);
+    assert_eq!((fixture.guidance.mode(), fixture.place()), (FlightMode::Hold, end), "not where it was within 1.5 m");
     // An item that cannot be flown ends a mission where it is.
-    desk.orders.leg = Some(Leg { number: 0, upload: 2, item: Item::Speed(NAN), is_last: true });
-    desk.said.clear();
-    desk.select(FlightMode::Mission).unwrap();
-    desk.run(3000);
-    assert_eq!((desk.guidance.mode(), desk.place()), (FlightMode::Hold, end));
-    assert!(desk.said.contains(&Notice::ItemRefused), "{:?}", desk.said);
+    fixture.orders.leg = Some(Leg { number: 0, upload: 2, item: Item::Speed(NAN), is_last: true });
+    fixture.said.clear();
+    fixture.select(FlightMode::Mission).unwrap();
+    fixture.run(3000);
+    assert_eq!((fixture.guidance.mode(), fixture.place()), (FlightMode::Hold, end));
+    assert!(fixture.said.contains(&Notice::ItemRefused), "{:?}", fixture.said);
     // On the ground a hold is where the vehicle stands.
-    desk.airborne = false;
-    desk.state = Some(at(3.0, 3.0, 3.0));
-    desk.run(10);
-    desk.airborne = true;
-    desk.run(2000);
-    assert_eq!(desk.place(), Vector3::new(3.0, 3.0, 3.0));
+    fixture.airborne = false;
+    fixture.state = Some(at(3.0, 3.0, 3.0));
+    fixture.run(10);
+    fixture.airborne = true;
+    fixture.run(2000);
+    assert_eq!(fixture.place(), Vector3::new(3.0, 3.0, 3.0));
 }
 
 /// An ending of a mission in the air leaves the setpoint where it is; on the ground it stays there.
 #[test]
 fn a_mission_may_end_in_another_mode() {
     for airborne in [true, false] {
-        let mut desk = Desk::flying(Settings::DEFAULT);
-        desk.airborne = airborne;
-        desk.orders.leg = Some(Leg { number: 0, upload: 1, item: Item::Return, is_last: true });
-        desk.said.clear();
-        desk.select(FlightMode::Mission).unwrap();
-        assert_eq!(desk.guidance.mode(), FlightMode::Return);
+        let mut fixture = Fixture::flying(Settings::DEFAULT);
+        fixture.airborne = airborne;
+        fixture.orders.leg = Some(Leg { number: 0, upload: 1, item: Item::Return, is_last: true });
+        fixture.said.clear();
+        fixture.select(FlightMode::Mission).unwrap();
+        assert_eq!(fixture.guidance.mode(), FlightMode::Return);
         let modes = [FlightMode::Mission, FlightMode::Return];
-        let reasons = [Reason::Ordered, Reason::Mission];
+        let reasons = [ModeReason::Ordered, ModeReason::Mission];
         let expected = modes.into_iter().zip(reasons).map(|(mode, reason)| Notice::Mode(mode, reason));
-        let told: Vec<_> = desk.said.iter().filter(|notice| **notice != Notice::Disarms).copied().collect();
+        let told: Vec<_> = fixture.said.iter().filter(|notice| **notice != Notice::Disarms).copied().collect();
         assert_eq!(told, expected.collect::<Vec<_>>());
     }
 }
@@ -308,21 +309,21 @@ fn a_mission_may_end_in_another_mode() {
 /// lean is what the sticks say.
 #[test]
 fn leaning_keeps_to_the_vehicle_horizontally() {
-    let mut desk = Desk::flying(Settings::DEFAULT);
-    desk.follows = false;
+    let mut fixture = Fixture::flying(Settings::DEFAULT);
+    fixture.follows = false;
     let value = Sticks { pitch: 0.5, ..Sticks::default() };
     let mut found = None;
     for tick in 0..2000 {
-        desk.orders.sticks = Some(Stamped { value, at_us: desk.now_us });
+        fixture.orders.sticks = Some(Stamped { value, at_us: fixture.now_us });
         let x = 1.0 + tick as f32 * 2e-3;
         let mut state = State { velocity_m_s: Vector3::new(2.0, 0.1, 0.0), ..at(x, 2.0, 8.1) };
         // As the sticks want.
         state.attitude_rad.y = 0.3;
-        desk.state = Some(state);
+        fixture.state = Some(state);
         if tick == 0 {
-            desk.select(FlightMode::Altitude).unwrap();
+            fixture.select(FlightMode::Altitude).unwrap();
         }
-        found = desk.tick().setpoint.map(|setpoint| (setpoint, state));
+        found = fixture.tick().setpoint.map(|setpoint| (setpoint, state));
     }
     let (setpoint, state) = found.unwrap();
     assert_eq!(setpoint.position_m.xy(), state.position_m.xy());

@@ -47,16 +47,23 @@ fn order() -> impl Strategy<Value = Order> {
     ]
 }
 
-fn target() -> impl Strategy<Value = Target> {
+fn target() -> impl Strategy<Value = OffboardTarget> {
     let motion = (vector(), vector(), vector(), any_number(), any_number(), any::<bool>()).prop_map(
         |(position_m, velocity_m_s, acceleration_m_s2, yaw_rad, yaw_rate_rad_s, body)| {
-            Target::Motion(MotionTarget { position_m, velocity_m_s, acceleration_m_s2, yaw_rad, yaw_rate_rad_s, body })
+            OffboardTarget::Motion(MotionTarget {
+                position_m,
+                velocity_m_s,
+                acceleration_m_s2,
+                yaw_rad,
+                yaw_rate_rad_s,
+                body,
+            })
         },
     );
     let attitude = ([any_number(), any_number(), any_number(), any_number()], any_number(), any_number()).prop_map(
         |([w, x, y, z], yaw_rate_rad_s, thrust)| {
             let attitude = Unit::new_unchecked(Quaternion::new(w, x, y, z));
-            Target::Attitude(AttitudeTarget { attitude, yaw_rate_rad_s, thrust })
+            OffboardTarget::Attitude(AttitudeTarget { attitude, yaw_rate_rad_s, thrust })
         },
     );
     prop_oneof![3 => motion, 1 => attitude]
@@ -91,7 +98,7 @@ struct Spell {
     airborne: bool,
     battery: Option<(f32, f32)>,
     order: Option<Order>,
-    target: Option<Target>,
+    target: Option<OffboardTarget>,
     sticks: Option<[f32; 4]>,
     item: Option<(u16, u16, Item, bool)>,
     lift: (f32, f32),
@@ -126,7 +133,12 @@ fn spell() -> impl Strategy<Value = Spell> {
     )
 }
 
-fn check(settings: &Settings, sight: &Sight<'_>, orders: &Orders, guided: &Guided) -> Result<(), TestCaseError> {
+fn check(
+    settings: &Settings,
+    sight: &GuidanceInputs<'_>,
+    orders: &Orders,
+    guided: &Guided,
+) -> Result<(), TestCaseError> {
     prop_assert_eq!(guided.answer.is_some(), orders.given[0].is_some());
     prop_assert!(guided.notices.iter().all(|notice| notice.to_string().len() <= 50));
     prop_assert!(guided.charge.is_none_or(|charge| (0.0..=1.0).contains(&charge)));
@@ -163,7 +175,7 @@ proptest! {
                 now_us = now_us.wrapping_add_signed(spell.step_us);
                 let at_us = if spell.fresh { now_us } else { now_us.wrapping_sub(u64::from(tick) * 1000) };
                 let sticks = spell.sticks.map(|[roll, pitch, throttle, yaw]| Sticks { roll, pitch, throttle, yaw });
-                let given = spell.order.filter(|_| tick == 0).map(|order| Given { order, ticket: 1 });
+                let given = spell.order.filter(|_| tick == 0).map(|order| TicketedOrder { order, ticket: 1 });
                 let orders = Orders {
                     target: spell.target.map(|value| Stamped { value, at_us }),
                     sticks: sticks.map(|value| Stamped { value, at_us }),
@@ -171,15 +183,15 @@ proptest! {
                     heard_us: Some(at_us),
                     given: [given, None, None, None],
                 };
-                let sight = Sight {
+                let sight = GuidanceInputs {
                     now_us,
                     dt_s: spell.dt_s,
                     state: spell.state.as_ref(),
                     core: spell.core,
                     airborne: spell.airborne,
                     rested: spell.fresh,
-                    battery: spell.battery.map(|(voltage_v, current_a)| Reading { voltage_v, current_a }),
-                    sensors: Sensors { gnss: !spell.fresh, ..Sensors::default() },
+                    battery: spell.battery.map(|(voltage_v, current_a)| BatteryReading { voltage_v, current_a }),
+                    sensors: FailedSensors { gnss: !spell.fresh, ..FailedSensors::default() },
                     lift: Lift { most_m_s2: spell.lift.0, gravity_m_s2: spell.lift.1, given_m_s2: Some(spell.lift.0) },
                 };
                 let guided = guidance.tick(&sight, &orders);

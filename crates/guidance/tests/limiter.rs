@@ -2,7 +2,7 @@
 //! flight already passes unchanged.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use afbc_guidance::{Aim, Limiter, Limits};
+use afbc_guidance::{Limiter, LimiterTarget, Limits};
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -30,8 +30,8 @@ fn place(most_m: f32) -> impl Strategy<Value = Vector3<f32>> {
     [-most_m..most_m, -most_m..most_m, -most_m..most_m].prop_map(Vector3::from)
 }
 
-fn aim(limits: &Limits) -> Aim {
-    Aim::stop(limits.speed_m_s, limits.up_m_s, limits.down_m_s)
+fn aim(limits: &Limits) -> LimiterTarget {
+    LimiterTarget::stop(limits.speed_m_s, limits.up_m_s, limits.down_m_s)
 }
 
 fn anchored(limits: Limits, state: &State) -> Limiter {
@@ -81,7 +81,7 @@ proptest! {
     #[test]
     fn a_jump_is_a_flight(limits in limits(), from_m in place(100.0), to_m in place(100.0), yaw in -7.0_f32..7.0) {
         let mut limiter = anchored(limits, &State { position_m: from_m, ..State::default() });
-        let aim = Aim { position_m: to_m, yaw_rad: yaw, ..aim(&limits) };
+        let aim = LimiterTarget { position_m: to_m, yaw_rad: yaw, ..aim(&limits) };
         let (way_m, mut last) = (to_m - from_m, limiter.setpoint().unwrap());
         for _ in 0..(time_s(&limits, &from_m, &to_m) / DT_S) as u32 {
             limiter.advance(&aim, DT_S);
@@ -115,13 +115,14 @@ proptest! {
         let none = Vector3::repeat(f32::NAN);
         for (position_m, velocity_m_s, acceleration_m_s2, kind, ticks) in changes {
             let aim = aim(&limits);
+            let sent_us = Some(u64::from(ticks));
             let aim = match kind {
-                0 => Aim { position_m, ..aim },
-                1 => Aim { velocity_m_s, yaw_rate_rad_s: velocity_m_s.x, ..aim },
-                2 => Aim { acceleration_m_s2, ..aim },
-                3 => Aim { position_m: Vector3::new(f32::NAN, f32::NAN, position_m.z), velocity_m_s, ..aim },
-                4 => Aim { position_m, velocity_m_s, acceleration_m_s2, ..aim },
-                5 => Aim { position_m, velocity_m_s, acceleration_m_s2: none, sent_us: Some(u64::from(ticks)), ..aim },
+                0 => LimiterTarget { position_m, ..aim },
+                1 => LimiterTarget { velocity_m_s, yaw_rate_rad_s: velocity_m_s.x, ..aim },
+                2 => LimiterTarget { acceleration_m_s2, ..aim },
+                3 => LimiterTarget { position_m: Vector3::new(f32::NAN, f32::NAN, position_m.z), velocity_m_s, ..aim },
+                4 => LimiterTarget { position_m, velocity_m_s, acceleration_m_s2, ..aim },
+                5 => LimiterTarget { position_m, velocity_m_s, acceleration_m_s2: none, sent_us, ..aim },
                 _ => aim,
             };
             for _ in 0..ticks {
@@ -151,7 +152,7 @@ proptest! {
             let (s, c) = (w * t).sin_cos();
             let (s2, c2) = (0.5 * w * t).sin_cos();
             let r = radius_m;
-            Aim {
+            LimiterTarget {
                 position_m: centre_m + Vector3::new(r * c, r * s, climb_m * s2),
                 velocity_m_s: Vector3::new(-s * r, c * r, 0.5 * climb_m * c2) * w,
                 acceleration_m_s2: Vector3::new(-c * r, -s * r, -0.25 * climb_m * s2) * w * w,
@@ -202,7 +203,10 @@ fn a_stream_that_is_no_flight_does_not_pass() {
         // 1 cm per tick: 10 m/s, without saying so, and 40 m/s2.
         let position_m = Vector3::new(0.01 * tick as f32, 0.0, 0.0);
         let velocity_m_s = Vector3::zeros();
-        limiter.advance(&Aim { position_m, velocity_m_s, sent_us: Some(u64::from(tick) * 1000), ..aim(&limits) }, DT_S);
+        limiter.advance(
+            &LimiterTarget { position_m, velocity_m_s, sent_us: Some(u64::from(tick) * 1000), ..aim(&limits) },
+            DT_S,
+        );
     }
     let setpoint = limiter.setpoint().unwrap();
     assert!(!limiter.passes() && setpoint.acceleration_m_s2.norm() > 0.1, "{setpoint:?}");
@@ -215,7 +219,7 @@ fn it_arrives_far_from_the_origin() {
         let to_m = Vector3::new(far_m, -far_m, 50.0);
         let mut limiter = anchored(Limits::DEFAULT, &State { position_m: to_m.map(|x| x - 7.0), ..State::default() });
         for _ in 0..20_000 {
-            limiter.advance(&Aim { position_m: to_m, ..aim(&Limits::DEFAULT) }, DT_S);
+            limiter.advance(&LimiterTarget { position_m: to_m, ..aim(&Limits::DEFAULT) }, DT_S);
         }
         assert_eq!(limiter.setpoint().unwrap().position_m, to_m);
     }
@@ -228,7 +232,7 @@ fn it_turns_the_short_way() {
         let mut limiter = anchored(Limits::DEFAULT, &state);
         let mut sum = 0.0;
         for _ in 0..8000 {
-            limiter.advance(&Aim { yaw_rad: to, ..aim(&Limits::DEFAULT) }, DT_S);
+            limiter.advance(&LimiterTarget { yaw_rad: to, ..aim(&Limits::DEFAULT) }, DT_S);
             sum += limiter.setpoint().unwrap().yaw_rate_rad_s * DT_S;
         }
         assert!((sum - turned).abs() < 5e-3, "{from} to {to}: {sum}");

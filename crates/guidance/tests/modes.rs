@@ -34,7 +34,8 @@ fn takes_off_to_the_height_and_holds() {
         let expected_m = height_m.unwrap_or(settings().flying.takeoff_height_m);
         assert!((bench.state.position_m.z - expected_m).abs() < 0.05, "{:?}", bench.state);
         assert!(bench.highest_m < expected_m + 0.1);
-        let said = [Notice::Mode(FlightMode::Takeoff, Reason::Ordered), Notice::Mode(FlightMode::Hold, Reason::Done)];
+        let said =
+            [Notice::Mode(FlightMode::Takeoff, ModeReason::Ordered), Notice::Mode(FlightMode::Hold, ModeReason::Done)];
         assert_eq!(bench.said, said);
     }
 }
@@ -159,17 +160,17 @@ fn offboard_takes_off_follows_and_holds_when_targets_end() {
     let mut bench = Bench::new(settings());
     bench.run(1.5);
     bench.arm();
-    assert_eq!(bench.select(FlightMode::Offboard), Err(Declined::NoTargets));
+    assert_eq!(bench.select(FlightMode::Offboard), Err(OrderRefusal::NoTargets));
     let send = |bench: &mut Bench, target: MotionTarget, time_s: f32| {
         for tick in 0..(time_s * 1000.0) as u32 {
             if tick % 50 == 0 {
-                bench.aim(Target::Motion(target));
+                bench.aim(OffboardTarget::Motion(target));
             }
             bench.tick();
         }
     };
     let target = motion(Vector3::new(5.0, 5.0, 3.0));
-    bench.aim(Target::Motion(target));
+    bench.aim(OffboardTarget::Motion(target));
     assert_eq!(bench.select(FlightMode::Offboard), Ok(()));
     send(&mut bench, target, 15.0);
     assert!((bench.state.position_m - target.position_m).norm() < 0.01, "{:?}", bench.state);
@@ -181,7 +182,7 @@ fn offboard_takes_off_follows_and_holds_when_targets_end() {
     bench.said.clear();
     bench.run(5.0);
     assert_eq!(bench.guidance.mode(), FlightMode::Hold);
-    assert_eq!(bench.said, [Notice::Mode(FlightMode::Hold, Reason::Failsafe(Cause::Targets))]);
+    assert_eq!(bench.said, [Notice::Mode(FlightMode::Hold, ModeReason::Failsafe(Cause::Targets))]);
     assert!(bench.state.velocity_m_s.norm() < 0.01);
 }
 
@@ -190,7 +191,7 @@ fn attitude_and_thrust_become_an_acceleration() {
     let mut bench = Bench::hovering(settings());
     let attitude = UnitQuaternion::from_euler_angles(0.0, 0.2, 0.0);
     let thrust = 0.5 / 0.2_f32.cos();
-    bench.aim(Target::Attitude(AttitudeTarget { attitude, yaw_rate_rad_s: f32::NAN, thrust }));
+    bench.aim(OffboardTarget::Attitude(AttitudeTarget { attitude, yaw_rate_rad_s: f32::NAN, thrust }));
     assert_eq!(bench.select(FlightMode::Offboard), Ok(()));
     let setpoint = bench.tick().setpoint.unwrap();
     let expected = Vector3::new(9.81 * 0.2_f32.tan(), 0.0, 0.0);
@@ -207,7 +208,7 @@ fn attitude_and_thrust_become_an_acceleration() {
 fn sticks_fly_the_manual_modes() {
     for mode in [FlightMode::Position, FlightMode::Altitude, FlightMode::Stabilised] {
         let mut bench = Bench::hovering(settings());
-        assert_eq!(bench.select(mode), Err(Declined::NoSticks));
+        assert_eq!(bench.select(mode), Err(OrderRefusal::NoSticks));
         let mut sticks = Sticks { pitch: 0.3, roll: 0.0, throttle: 0.0, yaw: 0.0 };
         for tick in 0..2000 {
             if tick == 1 {

@@ -10,8 +10,8 @@ use bench::{Bench, motion, settings};
 use nalgebra::Vector3;
 
 /// Causes that a test can bring about in flight, with the numbers of their parameter and the mode of each.
-fn causes() -> Vec<(Cause, Vec<(f32, Action)>)> {
-    use Action::{Hold, Land, None, Return, Warn};
+fn causes() -> Vec<(Cause, Vec<(f32, FailsafeAction)>)> {
+    use FailsafeAction::{Hold, Land, None, Return, Warn};
     vec![
         (Cause::Fence, vec![(0.0, None), (1.0, Warn), (2.0, Hold), (3.0, Return), (4.0, Land), (5.0, Land)]),
         (Cause::Station, vec![(0.0, None), (1.0, Hold), (2.0, Return), (3.0, Land)]),
@@ -40,15 +40,15 @@ fn quiet() -> Settings {
     settings
 }
 
-fn charge(charge: f32) -> Option<Reading> {
-    Some(Reading { voltage_v: 3.0 * (3.6 + 0.45 * charge), current_a: 0.0 })
+fn charge(charge: f32) -> Option<BatteryReading> {
+    Some(BatteryReading { voltage_v: 3.0 * (3.6 + 0.45 * charge), current_a: 0.0 })
 }
 
 /// A vehicle in offboard mode, far from the fence, with everything as it should be.
 fn offboard(settings: Settings) -> Bench {
     let mut bench = Bench::hovering(settings);
     bench.battery = charge(0.8);
-    bench.aim(Target::Motion(motion(Vector3::new(10.0, 0.0, 8.0))));
+    bench.aim(OffboardTarget::Motion(motion(Vector3::new(10.0, 0.0, 8.0))));
     bench.select(FlightMode::Offboard).unwrap();
     stream(&mut bench, 8.0);
     bench.said.clear();
@@ -95,7 +95,7 @@ fn find(bench: &mut Bench) {
 
 fn announced(bench: &Bench, cause: Cause) -> usize {
     let of = |notice: &&Notice| match notice {
-        Notice::Mode(_, Reason::Failsafe(found)) | Notice::Found(found) => *found == cause,
+        Notice::Mode(_, ModeReason::Failsafe(found)) | Notice::Found(found) => *found == cause,
         _ => false,
     };
     bench.said.iter().filter(of).count()
@@ -110,10 +110,10 @@ fn every_cause_does_what_its_parameter_says_and_is_announced_once() {
             find(&mut bench);
             let what = format!("{cause:?} {number}: {:?} {:?}", bench.guidance.mode(), bench.said);
             let expected = action.mode().unwrap_or(FlightMode::Offboard);
-            let landed = !bench.core.armed() && action >= Action::Return;
+            let landed = !bench.core.armed() && action >= FailsafeAction::Return;
             assert!(bench.guidance.mode() == expected || landed, "{what}");
-            assert_eq!(announced(&bench, cause), usize::from(action > Action::None), "{what}");
-            if !landed && action >= Action::Hold {
+            assert_eq!(announced(&bench, cause), usize::from(action > FailsafeAction::None), "{what}");
+            if !landed && action >= FailsafeAction::Hold {
                 assert!(bench.last.unwrap().failsafe.is_some(), "{what}");
             }
         }
@@ -138,7 +138,7 @@ fn of_every_pair_the_stronger_action_counts() {
                     bring_about(&mut bench, second);
                     find(&mut bench);
                     let expected = action.max(stronger).mode().unwrap_or(FlightMode::Offboard);
-                    let landed = !bench.core.armed() && action.max(stronger) >= Action::Return;
+                    let landed = !bench.core.armed() && action.max(stronger) >= FailsafeAction::Return;
                     assert!(
                         bench.guidance.mode() == expected || landed,
                         "{first:?} {number}, {second:?} {other}: {:?} {:?}",
@@ -157,8 +157,8 @@ fn a_failsafe_yields_to_stronger_modes_only_until_its_cause_is_over() {
     bring_about(&mut bench, Cause::Station);
     stream(&mut bench, 2.0);
     assert_eq!(bench.guidance.mode(), FlightMode::Return);
-    assert_eq!(bench.select(FlightMode::Hold), Err(Declined::Failsafe));
-    assert_eq!(bench.select(FlightMode::Offboard), Err(Declined::Failsafe));
+    assert_eq!(bench.select(FlightMode::Hold), Err(OrderRefusal::Failsafe));
+    assert_eq!(bench.select(FlightMode::Offboard), Err(OrderRefusal::Failsafe));
     assert_eq!(bench.last.unwrap().failsafe, Some(Cause::Station));
     bench.heard = true;
     bench.run(0.1);
@@ -209,9 +209,9 @@ fn climbs_stay_below_the_fence() {
     settings.flying.return_height_m = 15.0;
     let mut bench = Bench::new(settings);
     bench.run(1.5);
-    assert_eq!(bench.select(FlightMode::Takeoff), Err(Declined::OutsideFence));
+    assert_eq!(bench.select(FlightMode::Takeoff), Err(OrderRefusal::OutsideFence));
     bench.arm();
-    assert_eq!(bench.order(Order::TakeOff(None)), Err(Declined::OutsideFence));
+    assert_eq!(bench.order(Order::TakeOff(None)), Err(OrderRefusal::OutsideFence));
     bench.items = vec![Item::TakeOff { height_m: 9.0 }];
     bench.run(0.01);
     bench.select(FlightMode::Mission).unwrap();
@@ -251,7 +251,7 @@ fn the_charge_is_that_without_load() {
         let mut bench = offboard(settings);
         let sag_v = 3.0 * settings.net.resistance_ohm * current_a;
         let voltage_v = 3.0 * (3.6 + 0.45 * 0.3) - sag_v;
-        bench.battery = Some(Reading { voltage_v, current_a });
+        bench.battery = Some(BatteryReading { voltage_v, current_a });
         stream(&mut bench, 15.0);
         let charge = bench.last.unwrap().charge.unwrap();
         assert!((charge - 0.3).abs() < 0.01, "{charge}");
@@ -259,7 +259,7 @@ fn the_charge_is_that_without_load() {
     }
     // A gust of current is not an empty battery, nor is a reading of nonsense.
     let mut bench = offboard(settings);
-    bench.battery = Some(Reading { voltage_v: f32::NAN, current_a: 0.0 });
+    bench.battery = Some(BatteryReading { voltage_v: f32::NAN, current_a: 0.0 });
     stream(&mut bench, 2.0);
     bench.battery = charge(0.0);
     stream(&mut bench, 0.3);
@@ -285,8 +285,8 @@ fn places_outside_the_fence_are_declined_and_missions_to_them_end() {
     let mut bench = Bench::hovering(settings);
     bench.battery = charge(0.8);
     let go = |x, z| Order::GoTo { position_m: Vector3::new(x, 0.0, z), yaw_rad: f32::NAN, speed_m_s: None };
-    assert_eq!(bench.order(go(30.5, 5.0)), Err(Declined::OutsideFence));
-    assert_eq!(bench.order(go(0.0, 20.5)), Err(Declined::OutsideFence));
+    assert_eq!(bench.order(go(30.5, 5.0)), Err(OrderRefusal::OutsideFence));
+    assert_eq!(bench.order(go(0.0, 20.5)), Err(OrderRefusal::OutsideFence));
     assert_eq!(bench.order(go(29.0, 19.0)), Ok(()));
     bench.items = vec![Item::Waypoint {
         position_m: Vector3::new(40.0, 0.0, 5.0),
@@ -308,9 +308,9 @@ fn the_flight_cores_descent_is_a_landing_that_no_order_ends() {
     (bench.core, bench.sees) = (Mode::Descending, false);
     let guided = bench.tick();
     assert_eq!((guided.mode, guided.setpoint, guided.failsafe), (FlightMode::Land, None, Some(Cause::Descent)));
-    assert_eq!(bench.said, [Notice::Mode(FlightMode::Land, Reason::Failsafe(Cause::Descent))]);
+    assert_eq!(bench.said, [Notice::Mode(FlightMode::Land, ModeReason::Failsafe(Cause::Descent))]);
     for mode in FlightMode::ALL {
-        let expected = if mode == FlightMode::Land { Ok(()) } else { Err(Declined::Failsafe) };
+        let expected = if mode == FlightMode::Land { Ok(()) } else { Err(OrderRefusal::Failsafe) };
         assert_eq!(bench.select(mode), expected);
     }
 }
@@ -331,7 +331,7 @@ fn after_an_outage_the_setpoint_begins_at_the_vehicle() {
 #[test]
 fn the_guidance_bars_arming_for_its_own_reasons_only() {
     let here = State::default();
-    let well = Sight {
+    let well = GuidanceInputs {
         now_us: 2_000_000,
         dt_s: 1e-3,
         state: Some(&here),
@@ -339,28 +339,28 @@ fn the_guidance_bars_arming_for_its_own_reasons_only() {
         airborne: false,
         rested: true,
         battery: charge(0.8),
-        sensors: Sensors::default(),
+        sensors: FailedSensors::default(),
         lift: Lift { most_m_s2: 20.0, gravity_m_s2: 9.81, given_m_s2: None },
     };
     let mut bench = Bench::new(quiet());
     bench.battery = charge(0.8);
     bench.run(1.5);
-    let against = |bench: &Bench, sight: &Sight<'_>| {
+    let against = |bench: &Bench, sight: &GuidanceInputs<'_>| {
         let mut guidance = bench.guidance;
         guidance.tick(sight, &Orders::default()).against.iter().collect::<Vec<_>>()
     };
     let far = State { position_m: Vector3::new(1e3, 0.0, 0.0), ..here };
     let tilted = State { attitude_rad: Vector3::new(0.0, 0.8, 0.0), velocity_m_s: Vector3::new(9.0, 0.0, 0.0), ..here };
-    let gnss = Sensors { gnss: true, ..Sensors::default() };
+    let gnss = FailedSensors { gnss: true, ..FailedSensors::default() };
     for (sight, expected) in [
         (well, vec![]),
-        (Sight { state: None, rested: false, ..well }, vec![]),
-        (Sight { state: Some(&tilted), rested: false, ..well }, vec![]),
-        (Sight { battery: None, ..well }, vec![Refusal::BatteryLow]),
-        (Sight { sensors: gnss, ..well }, vec![Refusal::SensorFailed]),
-        (Sight { state: Some(&far), ..well }, vec![Refusal::OutsideFence]),
+        (GuidanceInputs { state: None, rested: false, ..well }, vec![]),
+        (GuidanceInputs { state: Some(&tilted), rested: false, ..well }, vec![]),
+        (GuidanceInputs { battery: None, ..well }, vec![Refusal::BatteryLow]),
+        (GuidanceInputs { sensors: gnss, ..well }, vec![Refusal::SensorFailed]),
+        (GuidanceInputs { state: Some(&far), ..well }, vec![Refusal::OutsideFence]),
         (
-            Sight { state: Some(&far), sensors: gnss, battery: None, ..well },
+            GuidanceInputs { state: Some(&far), sensors: gnss, battery: None, ..well },
             vec![Refusal::BatteryLow, Refusal::SensorFailed, Refusal::OutsideFence],
         ),
     ] {
@@ -369,7 +369,7 @@ fn the_guidance_bars_arming_for_its_own_reasons_only() {
     bench.select(FlightMode::Land).unwrap();
     assert_eq!(against(&bench, &well), [Refusal::WrongMode]);
     // Armed, it stays as it was.
-    let armed = Sight { core: Mode::Flying, sensors: gnss, ..well };
+    let armed = GuidanceInputs { core: Mode::Flying, sensors: gnss, ..well };
     assert_eq!(against(&bench, &armed), [Refusal::WrongMode]);
 }
 
@@ -382,7 +382,7 @@ fn home_is_where_the_vehicle_has_rested() {
         [(1, 1.0, false, None), (2, 2.0, false, None), (3, 3.0, true, Some(3.0)), (4, 4.0, true, Some(3.0))]
     {
         let state = at(x);
-        let sight = Sight {
+        let sight = GuidanceInputs {
             now_us: tick * 1000,
             dt_s: 1e-3,
             state: Some(&state),
@@ -390,7 +390,7 @@ fn home_is_where_the_vehicle_has_rested() {
             airborne: false,
             rested,
             battery: None,
-            sensors: Sensors::default(),
+            sensors: FailedSensors::default(),
             lift: Lift { most_m_s2: 20.0, gravity_m_s2: 9.81, given_m_s2: None },
         };
         let guided = guidance.tick(&sight, &Orders::default());

@@ -12,13 +12,14 @@ use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 
-const ACTIONS: [Action; 5] = [Action::None, Action::Warn, Action::Hold, Action::Return, Action::Land];
+const ACTIONS: [FailsafeAction; 5] =
+    [FailsafeAction::None, FailsafeAction::Warn, FailsafeAction::Hold, FailsafeAction::Return, FailsafeAction::Land];
 
 /// Returns all combinations of conditions.
-fn all() -> impl Iterator<Item = Conditions> {
+fn all() -> impl Iterator<Item = TransitionInputs> {
     (0..128_u32).flat_map(|bits| {
         let bit = move |n: u32| bits >> n & 1 == 1;
-        ACTIONS.into_iter().map(move |held| Conditions {
+        ACTIONS.into_iter().map(move |held| TransitionInputs {
             armed: bit(0),
             airborne: bit(1),
             positioned: bit(2),
@@ -32,17 +33,17 @@ fn all() -> impl Iterator<Item = Conditions> {
 }
 
 /// The rows of the table: what a mode needs, with the answer if it is missing, in this order.
-fn needs(mode: FlightMode, seen: &Conditions) -> Vec<(bool, Declined)> {
-    let position = (seen.positioned, Declined::NoPosition);
+fn needs(mode: FlightMode, seen: &TransitionInputs) -> Vec<(bool, OrderRefusal)> {
+    let position = (seen.positioned, OrderRefusal::NoPosition);
     match mode {
         FlightMode::Land => vec![],
         FlightMode::Hold => vec![position],
-        FlightMode::Takeoff => vec![position, (!seen.airborne, Declined::InFlight)],
-        FlightMode::Return => vec![position, (!seen.armed || seen.airborne, Declined::OnGround)],
-        FlightMode::Mission => vec![position, (seen.mission, Declined::NoMission)],
-        FlightMode::Offboard => vec![position, (seen.targets, Declined::NoTargets)],
+        FlightMode::Takeoff => vec![position, (!seen.airborne, OrderRefusal::InFlight)],
+        FlightMode::Return => vec![position, (!seen.armed || seen.airborne, OrderRefusal::OnGround)],
+        FlightMode::Mission => vec![position, (seen.mission, OrderRefusal::NoMission)],
+        FlightMode::Offboard => vec![position, (seen.targets, OrderRefusal::NoTargets)],
         FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised => {
-            vec![position, (seen.sticks, Declined::NoSticks)]
+            vec![position, (seen.sticks, OrderRefusal::NoSticks)]
         }
     }
 }
@@ -64,7 +65,7 @@ fn a_mode_may_be_selected_by_the_table() {
         for mode in FlightMode::ALL {
             let mut expected = Ok(());
             if strength(mode) < strongest {
-                expected = Err(Declined::Failsafe);
+                expected = Err(OrderRefusal::Failsafe);
             } else if let Some((_, declined)) = needs(mode, &seen).into_iter().find(|(met, _)| !met) {
                 expected = Err(declined);
             }
@@ -81,12 +82,12 @@ fn a_failure_forces_its_mode_and_nothing_weaker() {
             let expected = match (seen.armed, seen.descends, seen.airborne, seen.held) {
                 (false, ..) => None,
                 (true, true, ..) => (mode != Land).then_some(Land),
-                (true, false, _, Action::None | Action::Warn) => None,
-                (true, false, false, _) | (true, false, true, Action::Hold) => {
+                (true, false, _, FailsafeAction::None | FailsafeAction::Warn) => None,
+                (true, false, false, _) | (true, false, true, FailsafeAction::Hold) => {
                     (![Hold, Return, Land].contains(&mode)).then_some(Hold)
                 }
-                (true, false, true, Action::Return) => (![Return, Land].contains(&mode)).then_some(Return),
-                (true, false, true, Action::Land) => (mode != Land).then_some(Land),
+                (true, false, true, FailsafeAction::Return) => (![Return, Land].contains(&mode)).then_some(Return),
+                (true, false, true, FailsafeAction::Land) => (mode != Land).then_some(Land),
             };
             assert_eq!(forced(mode, &seen), expected, "{mode:?} {seen:?}");
         }
@@ -95,8 +96,9 @@ fn a_failure_forces_its_mode_and_nothing_weaker() {
 
 #[test]
 fn every_text_is_short_and_every_severity_one_of_mavlinks() {
-    let reasons = [Reason::Ordered, Reason::Done, Reason::Mission, Reason::NoLift, Reason::Disarmed];
-    let reasons = reasons.into_iter().chain(Cause::ALL.map(Reason::Failsafe));
+    let reasons =
+        [ModeReason::Ordered, ModeReason::Done, ModeReason::Mission, ModeReason::NoLift, ModeReason::Disarmed];
+    let reasons = reasons.into_iter().chain(Cause::ALL.map(ModeReason::Failsafe));
     let modes = reasons.flat_map(|reason| FlightMode::ALL.map(|mode| Notice::Mode(mode, reason)));
     let causes = Cause::ALL.into_iter().flat_map(|cause| [Notice::Found(cause), Notice::Over(cause)]);
     let mut texts = BTreeSet::new();
@@ -114,7 +116,7 @@ enum Step {
     Arm,
     Kill,
     Order(Order),
-    Target(Target),
+    Target(OffboardTarget),
     Sticks(Sticks),
     Heard(bool),
     Sees(bool),
@@ -139,8 +141,8 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
         }),
         1 => (0_u16..6).prop_map(|number| Step::Order(Order::Resume(number))),
         1 => (-1.0_f32..5.0).prop_map(|speed_m_s| Step::Order(Order::Speed(speed_m_s))),
-        4 => place().prop_map(|position_m| Step::Target(Target::Motion(motion(position_m)))),
-        1 => (0.0_f32..1.0).prop_map(|thrust| Step::Target(Target::Attitude(AttitudeTarget {
+        4 => place().prop_map(|position_m| Step::Target(OffboardTarget::Motion(motion(position_m)))),
+        1 => (0.0_f32..1.0).prop_map(|thrust| Step::Target(OffboardTarget::Attitude(AttitudeTarget {
             attitude: UnitQuaternion::identity(),
             yaw_rate_rad_s: 0.0,
             thrust,
@@ -193,17 +195,17 @@ fn follow(bench: &mut Bench, asked: Option<Order>) -> Result<(), TestCaseError> 
     for (next, reason) in &changes {
         prop_assert!(*next != mode, "{:?} announced twice", next);
         let fits = match reason {
-            Reason::Ordered => match asked {
+            ModeReason::Ordered => match asked {
                 Some(Order::Select(wanted)) => *next == wanted,
                 Some(Order::TakeOff(_)) => *next == FlightMode::Takeoff,
                 Some(Order::GoTo { .. }) => *next == FlightMode::Hold,
                 _ => false,
             },
-            Reason::Done => [FlightMode::Takeoff, FlightMode::Mission].contains(&mode) && *next == FlightMode::Hold,
-            Reason::Mission => mode == FlightMode::Mission && [FlightMode::Land, FlightMode::Return].contains(next),
-            Reason::NoLift => [FlightMode::Hold, FlightMode::Land].contains(next),
-            Reason::Disarmed => *next == FlightMode::Hold,
-            Reason::Failsafe(_) => strength(*next) > strength(mode) && was_armed,
+            ModeReason::Done => [FlightMode::Takeoff, FlightMode::Mission].contains(&mode) && *next == FlightMode::Hold,
+            ModeReason::Mission => mode == FlightMode::Mission && [FlightMode::Land, FlightMode::Return].contains(next),
+            ModeReason::NoLift => [FlightMode::Hold, FlightMode::Land].contains(next),
+            ModeReason::Disarmed => *next == FlightMode::Hold,
+            ModeReason::Failsafe(_) => strength(*next) > strength(mode) && was_armed,
         };
         prop_assert!(fits, "{:?} to {:?} by {:?}, asked {:?}", mode, next, reason, asked);
         mode = *next;
@@ -212,10 +214,10 @@ fn follow(bench: &mut Bench, asked: Option<Order>) -> Result<(), TestCaseError> 
     prop_assert_eq!(asked.is_some(), guided.answer.is_some());
     // An order that is declined has no effect.
     if let Some((_, Err(_))) = guided.answer {
-        prop_assert!(changes.iter().all(|(_, reason)| *reason != Reason::Ordered));
+        prop_assert!(changes.iter().all(|(_, reason)| *reason != ModeReason::Ordered));
     }
     if let (Some(Order::Select(wanted)), Some((_, Ok(())))) = (asked, guided.answer) {
-        let ended = changes.iter().any(|(_, reason)| *reason != Reason::Ordered);
+        let ended = changes.iter().any(|(_, reason)| *reason != ModeReason::Ordered);
         prop_assert!(guided.mode == wanted || ended);
     }
     // It rests only where it stands, and asks to stop the motors only there.
@@ -239,7 +241,7 @@ proptest! {
         let mut settings = settings();
         (settings.net.cells, settings.net.fence_radius_m, settings.net.fence_height_m) = (1.0, 35.0, 25.0);
         let mut bench = Bench::new(settings);
-        bench.battery = Some(Reading { voltage_v: 4.0, current_a: 0.0 });
+        bench.battery = Some(BatteryReading { voltage_v: 4.0, current_a: 0.0 });
         bench.run(1.5);
         for step in steps {
             let mut asked = None;
@@ -252,7 +254,7 @@ proptest! {
                 }
                 Step::Kill => bench.core = Mode::Disarmed,
                 Step::Order(order) => {
-                    let queued = bench.orders.give(Given { order, ticket: 9 });
+                    let queued = bench.orders.give(TicketedOrder { order, ticket: 9 });
                     prop_assert!(queued);
                     asked = Some(order);
                 }
@@ -260,7 +262,7 @@ proptest! {
                 Step::Sticks(value) => bench.orders.sticks = Some(Stamped { value, at_us: bench.now_us }),
                 Step::Heard(heard) => bench.heard = heard,
                 Step::Sees(sees) => bench.sees = sees || bench.core.armed(),
-                Step::Battery(voltage_v) => bench.battery = Some(Reading { voltage_v, current_a: 0.0 }),
+                Step::Battery(voltage_v) => bench.battery = Some(BatteryReading { voltage_v, current_a: 0.0 }),
                 Step::Sensor(inertial) => bench.sensors.inertial = inertial,
                 Step::Descends => {
                     if bench.core == Mode::Flying {

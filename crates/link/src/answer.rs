@@ -1,7 +1,7 @@
 //! Answers to commands: COMMAND_ACK.
 
 use crate::address::Address;
-use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::dialects::common::{COMMAND_ACK_DATA, MavResult};
 
@@ -35,7 +35,7 @@ const IN_PROGRESS: u8 = MavResult::MAV_RESULT_IN_PROGRESS as u8;
 /// Progress that is not known.
 const SOME: u8 = u8::MAX;
 
-pub(crate) fn format() -> Format {
+pub(crate) fn format() -> MessageFormat {
     ACK.format()
 }
 

@@ -1,7 +1,7 @@
 //! Clocks and round trips: TIMESYNC, PING and SYSTEM_TIME, in both directions.
 
 use crate::address::Address;
-use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{PING_DATA, SYSTEM_TIME_DATA, TIMESYNC_DATA};
@@ -41,7 +41,7 @@ const PING: Layout<PING_DATA, (u64, u32, Address)> = Layout::NEW;
 const TIME: Layout<SYSTEM_TIME_DATA, (u64, u32)> = Layout::NEW;
 
 impl Clock {
-    pub(crate) fn format(id: u32) -> Option<Format> {
+    pub(crate) fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
             TIMESYNC_DATA::ID => SYNC.format(),
             PING_DATA::ID => PING.format(),

@@ -118,7 +118,7 @@ fn add(counter: &mut u32, count: u32) {
 /// A stray start byte holds back what follows until as many bytes as it announces, plus one, have arrived: at most 281
 /// bytes, 3.1 ms of a busy line at 921,600 baud. It costs frames only if the last of these bytes happens to be a start
 /// byte (rule 2), and then only those that lie wholly within the others: one that reaches beyond them is delivered. So
-/// every frame arrives that begins 280 bytes or more behind the last noise.
+/// every frame that begins at least 280 bytes after the last noise arrives.
 ///
 /// A truncated frame is noise, too. If its last byte is missing and was 0xFD, the first byte of the next frame
 /// completes it, and the rest of the next frame is noise.

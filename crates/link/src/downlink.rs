@@ -4,15 +4,15 @@ use crate::address::Address;
 use crate::answer::{self, Answer};
 use crate::clocks::Clock;
 use crate::frames::flip;
-use crate::health::{self, Health};
+use crate::health::{self, HealthArray};
 use crate::interval::{DataStream, Interval};
-use crate::message::{Fault, Format, Message, PAYLOAD_MAX, parse, put};
+use crate::message::{Fault, Message, MessageFormat, PAYLOAD_MAX, parse, put};
 use crate::mission::Mission;
 use crate::modes::{AvailableMode, CurrentMode};
 use crate::operator::{ANSWER_ID, ControlAnswer};
 use crate::parameter::{ParameterError, ParameterValue};
-use crate::question::Refusal;
-use crate::target::{Motion, followed_format, read_followed, write_followed};
+use crate::question::QuestionRefusal;
+use crate::target::{PositionTarget, followed_format, read_followed, write_followed};
 use crate::telemetry::Telemetry;
 use afbc_types::{ROTORS_MAX, RotorSpeeds};
 use mavlink::MessageData;
@@ -86,11 +86,11 @@ pub enum Downlink {
         text: Text,
     },
     /// DEBUG_FLOAT_ARRAY (350) named "health".
-    Health(Health),
+    Health(HealthArray),
     /// What stations show.
     Telemetry(Telemetry),
     /// POSITION_TARGET_LOCAL_NED (85): what the vehicle follows, at a time since power-up \[ms\].
-    Followed(u32, Motion),
+    Followed(u32, PositionTarget),
     /// MISSION_* for `to`.
     Mission {
         /// The message.
@@ -122,7 +122,7 @@ pub enum Downlink {
     /// The answer to a question about what the vehicle does not have.
     Refusal {
         /// The answer.
-        refusal: Refusal,
+        refusal: QuestionRefusal,
         /// Who asked, if the message names it.
         to: Address,
     },
@@ -134,14 +134,14 @@ impl Downlink {
 }
 
 impl Message for Downlink {
-    fn format(id: u32) -> Option<Format> {
+    fn format(id: u32) -> Option<MessageFormat> {
         match id {
-            HEARTBEAT_DATA::ID => Some(Format::of::<HEARTBEAT_DATA>(0)),
-            HIL_ACTUATOR_CONTROLS_DATA::ID => Some(Format::of::<HIL_ACTUATOR_CONTROLS_DATA>(0)),
-            ATTITUDE_DATA::ID => Some(Format::of::<ATTITUDE_DATA>(0)),
-            LOCAL_POSITION_NED_DATA::ID => Some(Format::of::<LOCAL_POSITION_NED_DATA>(0)),
+            HEARTBEAT_DATA::ID => Some(MessageFormat::of::<HEARTBEAT_DATA>(0)),
+            HIL_ACTUATOR_CONTROLS_DATA::ID => Some(MessageFormat::of::<HIL_ACTUATOR_CONTROLS_DATA>(0)),
+            ATTITUDE_DATA::ID => Some(MessageFormat::of::<ATTITUDE_DATA>(0)),
+            LOCAL_POSITION_NED_DATA::ID => Some(MessageFormat::of::<LOCAL_POSITION_NED_DATA>(0)),
             COMMAND_ACK_DATA::ID => Some(answer::format()),
-            STATUSTEXT_DATA::ID => Some(Format::of::<STATUSTEXT_DATA>(TEXT_EXTENSION)),
+            STATUSTEXT_DATA::ID => Some(MessageFormat::of::<STATUSTEXT_DATA>(TEXT_EXTENSION)),
             DEBUG_FLOAT_ARRAY_DATA::ID => Some(health::format()),
             POSITION_TARGET_LOCAL_NED_DATA::ID => Some(followed_format()),
             MESSAGE_INTERVAL_DATA::ID => Some(Interval::format()),
@@ -154,7 +154,7 @@ impl Message for Downlink {
             _ => Telemetry::format(id)
                 .or_else(|| Mission::format(id))
                 .or_else(|| Clock::format(id))
-                .or_else(|| Refusal::format(id)),
+                .or_else(|| QuestionRefusal::format(id)),
         }
     }
 
@@ -185,8 +185,8 @@ impl Message for Downlink {
                 let (error, to) = ParameterError::read(payload);
                 Ok(Downlink::ParameterError { error, to })
             }
-            _ if Refusal::format(id).is_some() => {
-                Refusal::read(id, payload).map(|(refusal, to)| Downlink::Refusal { refusal, to })
+            _ if QuestionRefusal::format(id).is_some() => {
+                QuestionRefusal::read(id, payload).map(|(refusal, to)| Downlink::Refusal { refusal, to })
             }
             _ if Mission::format(id).is_some() => {
                 Mission::read(id, payload).map(|(message, to)| Downlink::Mission { message, to })

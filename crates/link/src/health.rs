@@ -1,14 +1,14 @@
 //! Health of the flight core and the link: DEBUG_FLOAT_ARRAY named "health".
 
 use crate::decoder::Counters;
-use crate::message::{Fault, Format, PAYLOAD_MAX, extension, parse, put_extended};
+use crate::message::{Fault, MessageFormat, PAYLOAD_MAX, extension, parse, put_extended};
 use afbc_types::{Axis, PerAxis};
 use mavlink::dialects::common::DEBUG_FLOAT_ARRAY_DATA;
 
 /// State of the flight core and the link, in the order of the array's elements. Counts are sent as `f32`, exact up to
 /// 2^24.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Health {
+pub struct HealthArray {
     /// Time since power-up \[us\].
     pub time_us: u64,
     /// Duration of the last control tick \[us\].
@@ -52,11 +52,11 @@ pub struct StatesRefused {
 const ELEMENTS: usize = 58;
 const NAME: &str = "health";
 
-pub(crate) fn format() -> Format {
-    Format::of::<DEBUG_FLOAT_ARRAY_DATA>(4 * ELEMENTS)
+pub(crate) fn format() -> MessageFormat {
+    MessageFormat::of::<DEBUG_FLOAT_ARRAY_DATA>(4 * ELEMENTS)
 }
 
-pub(crate) fn read(payload: &[u8]) -> Result<Health, Fault> {
+pub(crate) fn read(payload: &[u8]) -> Result<HealthArray, Fault> {
     let (data, extension): (_, [u8; 4 * ELEMENTS]) = (parse(payload)?, extension::<DEBUG_FLOAT_ARRAY_DATA, _>(payload));
     let DEBUG_FLOAT_ARRAY_DATA { time_usec: time_us, name, .. } = data;
 
@@ -66,7 +66,7 @@ pub(crate) fn read(payload: &[u8]) -> Result<Health, Fault> {
     let (elements, _) = extension.as_chunks();
     let mut elements = elements.iter().map(|bytes| f32::from_le_bytes(*bytes));
     let mut next = || elements.next().unwrap_or_default();
-    Ok(Health {
+    Ok(HealthArray {
         time_us,
         tick_us: next(),
         tick_max_us: next(),
@@ -87,7 +87,7 @@ pub(crate) fn read(payload: &[u8]) -> Result<Health, Fault> {
     })
 }
 
-impl Health {
+impl HealthArray {
     pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         let data = DEBUG_FLOAT_ARRAY_DATA { time_usec: self.time_us, array_id: 0, name: NAME.into() };
         put_extended(&data, self.elements().flat_map(f32::to_le_bytes), payload)
@@ -95,7 +95,7 @@ impl Health {
 
     /// Returns the array's elements.
     fn elements(&self) -> impl Iterator<Item = f32> {
-        let Health { tick_us, tick_max_us, rate_hz, late_ticks, saturated_ticks, state_age_us, .. } = *self;
+        let HealthArray { tick_us, tick_max_us, rate_hz, late_ticks, saturated_ticks, state_age_us, .. } = *self;
         let ticks = [tick_us, tick_max_us, rate_hz, late_ticks as f32, saturated_ticks as f32, state_age_us];
         let estimates = [self.theta_norm, self.delta].map(|estimate| Axis::ALL.map(|axis| estimate[axis]));
         let StatesRefused { overtaken, late, elsewhere, frozen } = self.states_refused;

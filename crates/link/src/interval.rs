@@ -1,7 +1,7 @@
 //! Rates of messages: MESSAGE_INTERVAL, and REQUEST_DATA_STREAM of older stations with DATA_STREAM.
 
 use crate::address::Address;
-use crate::message::{Format, PAYLOAD_MAX};
+use crate::message::{MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::dialects::common::{DATA_STREAM_DATA, MESSAGE_INTERVAL_DATA, REQUEST_DATA_STREAM_DATA};
 
@@ -31,7 +31,7 @@ const STREAM: Layout<REQUEST_DATA_STREAM_DATA, (u16, Address, u8, u8)> = Layout:
 const GROUP: Layout<DATA_STREAM_DATA, (u16, u8, u8)> = Layout::NEW;
 
 impl Interval {
-    pub(crate) fn format() -> Format {
+    pub(crate) fn format() -> MessageFormat {
         INTERVAL.format()
     }
 
@@ -46,7 +46,7 @@ impl Interval {
 }
 
 impl DataStream {
-    pub(crate) fn format() -> Format {
+    pub(crate) fn format() -> MessageFormat {
         STREAM.format()
     }
 
@@ -60,7 +60,7 @@ impl DataStream {
         STREAM.write(&(self.rate_hz, Address::default(), self.group, u8::from(self.rate_hz > 0)), payload)
     }
 
-    pub(crate) fn answer_format() -> Format {
+    pub(crate) fn answer_format() -> MessageFormat {
         GROUP.format()
     }
 

@@ -58,19 +58,19 @@ pub use command::{Command, Storage};
 pub use decoder::{Counters, Decoder};
 pub use downlink::{Downlink, Text};
 pub use framing::{FRAME_MAX, Sender};
-pub use health::{Health, StatesRefused};
+pub use health::{HealthArray, StatesRefused};
 pub use interval::{DataStream, Interval};
 pub use mavlink::dialects::common::{MavCmd, MavSeverity};
-pub use message::{Fault, Format, Message};
+pub use message::{Fault, Message, MessageFormat};
 pub use mission::{Mission, MissionCurrent, MissionItem, MissionResult, Part, Plan};
 pub use modes::{AvailableMode, CurrentMode};
-pub use operator::{Control, ControlAnswer};
+pub use operator::{ControlAnswer, ControlRequest};
 pub use parameter::{ParameterError, ParameterName, ParameterRequest, ParameterValue};
 pub use place::{Datum, Height, Place};
 pub use question::{
-    EventError, EventRequest, ExtendedAnswer, ExtendedName, ExtendedRequest, FileError, FileOperation, FileRefusal,
-    LogAnswer, LogRequest, Question, Refusal, Serial, Terrain,
+    EventError, EventRequest, ExtendedAnswer, ExtendedName, ExtendedRequest, FileOperation, FileRefusal, FtpError,
+    LogAnswer, LogRequest, Question, QuestionRefusal, Serial, Terrain,
 };
-pub use target::{AttitudeAndThrust, Axes, Motion, Sticks, Target};
+pub use target::{AttitudeAndThrust, Axes, ExternalTarget, ManualControl, PositionTarget};
 pub use telemetry::Telemetry;
 pub use uplink::Uplink;

@@ -11,17 +11,17 @@ pub(crate) const PAYLOAD_MAX: usize = 255;
 
 /// Properties of a message needed before its payload is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Format {
+pub struct MessageFormat {
     /// Seed of the checksum, `CRC_EXTRA`.
     pub extra_crc: u8,
     /// Longest payload \[bytes\]. Shorter ones are padded with zeros, as MAVLink 2 requires.
     pub length_max: usize,
 }
 
-impl Format {
+impl MessageFormat {
     /// The format of `D`, with `extension` bytes of extension fields.
     pub(crate) const fn of<D: MessageData>(extension: usize) -> Self {
-        Format { extra_crc: D::EXTRA_CRC, length_max: D::ENCODED_LEN + extension }
+        MessageFormat { extra_crc: D::EXTRA_CRC, length_max: D::ENCODED_LEN + extension }
     }
 }
 
@@ -48,7 +48,7 @@ pub enum Fault {
 /// All messages of one direction.
 pub trait Message: Sized {
     /// Returns the format of the message numbered `id`, if this direction carries it.
-    fn format(id: u32) -> Option<Format>;
+    fn format(id: u32) -> Option<MessageFormat>;
 
     /// Reads a payload that arrived intact, for the address `receiver`.
     ///

@@ -1,7 +1,7 @@
 //! Missions, fences and rally points: the messages of MAVLink's mission protocol, in both directions.
 
 use crate::address::Address;
-use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
@@ -148,7 +148,7 @@ const ITEM: Layout<MISSION_ITEM_INT_DATA, ([f32; 4], [i32; 2], f32, u16, u16, Ad
 const FLOAT_ITEM: Layout<MISSION_ITEM_DATA, ([f32; 4], [f32; 2], f32, u16, u16, Address, [u8; 3], u8)> = Layout::NEW;
 
 impl Mission {
-    pub(crate) fn format(id: u32) -> Option<Format> {
+    pub(crate) fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
             MISSION_COUNT_DATA::ID => COUNT.format(),
             MISSION_REQUEST_LIST_DATA::ID => LIST.format(),

@@ -1,6 +1,6 @@
 //! Modes that the vehicle offers and has: AVAILABLE_MODES and CURRENT_MODE.
 
-use crate::message::{Format, PAYLOAD_MAX};
+use crate::message::{MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::dialects::common::{AVAILABLE_MODES_DATA, CURRENT_MODE_DATA};
 
@@ -36,7 +36,7 @@ const AVAILABLE: Layout<AVAILABLE_MODES_DATA, ([u32; 2], [u8; 3], [u8; 35])> = L
 const CURRENT: Layout<CURRENT_MODE_DATA, ([u32; 2], u8)> = Layout::NEW;
 
 impl AvailableMode {
-    pub(crate) fn format() -> Format {
+    pub(crate) fn format() -> MessageFormat {
         AVAILABLE.format()
     }
 
@@ -52,7 +52,7 @@ impl AvailableMode {
 }
 
 impl CurrentMode {
-    pub(crate) fn format() -> Format {
+    pub(crate) fn format() -> MessageFormat {
         CURRENT.format()
     }
 

@@ -1,13 +1,13 @@
 //! Who is in control: CHANGE_OPERATOR_CONTROL and its answer.
 
-use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{CHANGE_OPERATOR_CONTROL_ACK_DATA, CHANGE_OPERATOR_CONTROL_DATA};
 
 /// What a station asks for by CHANGE_OPERATOR_CONTROL (5). Version and passkey are ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Control {
+pub enum ControlRequest {
     /// To be in control.
     Take,
     /// To be so no longer.
@@ -20,7 +20,7 @@ pub struct ControlAnswer {
     /// System that asked.
     pub station: u8,
     /// What it asked for.
-    pub control: Control,
+    pub control: ControlRequest,
     /// False if another station is in control.
     pub granted: bool,
 }
@@ -31,8 +31,8 @@ const ANSWER: Layout<CHANGE_OPERATOR_CONTROL_ACK_DATA, (u8, u8, u8)> = Layout::N
 /// "Already under control."
 const REFUSED: u8 = 3;
 
-impl Control {
-    pub(crate) fn format() -> Format {
+impl ControlRequest {
+    pub(crate) fn format() -> MessageFormat {
         CHANGE.format()
     }
 
@@ -48,21 +48,21 @@ impl Control {
 
     fn of(control: u8) -> Result<Self, Fault> {
         match control {
-            0 => Ok(Control::Take),
-            1 => Ok(Control::Release),
+            0 => Ok(ControlRequest::Take),
+            1 => Ok(ControlRequest::Release),
             _ => Err(Fault::Malformed),
         }
     }
 }
 
 impl ControlAnswer {
-    pub(crate) fn format() -> Format {
+    pub(crate) fn format() -> MessageFormat {
         ANSWER.format()
     }
 
     pub(crate) fn read(payload: &[u8]) -> Result<Self, Fault> {
         let (station, control, answer) = ANSWER.read(payload);
-        Ok(ControlAnswer { station, control: Control::of(control)?, granted: answer == 0 })
+        Ok(ControlAnswer { station, control: ControlRequest::of(control)?, granted: answer == 0 })
     }
 
     pub(crate) fn write(self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {

@@ -1,7 +1,7 @@
 //! Parameters, in both directions.
 
 use crate::address::Address;
-use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
@@ -64,7 +64,7 @@ const SET: Layout<PARAM_SET_DATA, ([u8; 4], Address, ParameterName, u8)> = Layou
 const VALUE: Layout<PARAM_VALUE_DATA, ([u8; 4], u16, u16, ParameterName, u8)> = Layout::NEW;
 
 impl ParameterRequest {
-    pub(crate) fn format(id: u32) -> Option<Format> {
+    pub(crate) fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
             PARAM_REQUEST_LIST_DATA::ID => LIST.format(),
             PARAM_REQUEST_READ_DATA::ID => READ.format(),
@@ -108,7 +108,7 @@ impl ParameterError {
     /// There is no such parameter.
     pub const DOES_NOT_EXIST: u8 = 1;
 
-    pub(crate) fn format() -> Format {
+    pub(crate) fn format() -> MessageFormat {
         ERROR.format()
     }
 
@@ -125,7 +125,7 @@ impl ParameterError {
 }
 
 impl ParameterValue {
-    pub(crate) fn format() -> Format {
+    pub(crate) fn format() -> MessageFormat {
         VALUE.format()
     }
 

@@ -2,7 +2,7 @@
 
 use crate::address::Address;
 use crate::frames::{flip, flip_turn};
-use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
 use crate::place::{Height, Place, datum, frame};
 use crate::wire::Layout;
 use afbc_types::Setpoint;
@@ -29,7 +29,7 @@ pub enum Axes {
 
 /// A target of motion; NaN where there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
+pub struct PositionTarget {
     /// What the coordinates refer to.
     pub axes: Axes,
     /// Position \[m\].
@@ -44,9 +44,9 @@ pub struct Motion {
     pub yaw_rate_rad_s: f32,
 }
 
-impl From<&Setpoint> for Motion {
+impl From<&Setpoint> for PositionTarget {
     fn from(setpoint: &Setpoint) -> Self {
-        Motion {
+        PositionTarget {
             axes: Axes::Local,
             position_m: setpoint.position_m,
             velocity_m_s: setpoint.velocity_m_s,
@@ -57,13 +57,13 @@ impl From<&Setpoint> for Motion {
     }
 }
 
-impl Motion {
+impl PositionTarget {
     /// A target of nothing.
     pub const NONE: Self = {
         let none = Vector3::new(f32::NAN, f32::NAN, f32::NAN);
         let (position_m, velocity_m_s, acceleration_m_s2) = (none, none, none);
         let (yaw_rad, yaw_rate_rad_s) = (f32::NAN, f32::NAN);
-        Motion { axes: Axes::Local, position_m, velocity_m_s, acceleration_m_s2, yaw_rad, yaw_rate_rad_s }
+        PositionTarget { axes: Axes::Local, position_m, velocity_m_s, acceleration_m_s2, yaw_rad, yaw_rate_rad_s }
     };
 
     /// Returns the setpoint of a target that names a position of the local frame and a heading: what else it does not
@@ -117,7 +117,7 @@ impl Motion {
             0 => Err(Fault::Implausible),
             _ => Ok(f32::NAN),
         };
-        let mut read = Motion { axes, ..Motion::NONE };
+        let mut read = PositionTarget { axes, ..PositionTarget::NONE };
         let targets = [&mut read.position_m, &mut read.velocity_m_s, &mut read.acceleration_m_s2];
         for ((target, bits), [x, y, z]) in targets.into_iter().zip(bits).zip(vectors) {
             let [at_x, at_y, at_z] = bits;
@@ -157,7 +157,7 @@ pub struct AttitudeAndThrust {
 /// MANUAL_CONTROL (69), -1 to 1. A throttle of 500 on the wire is 0, as stations send it; a positive yaw turns to the
 /// right, as they mean it, against the words of the specification.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sticks {
+pub struct ManualControl {
     /// To the right.
     pub roll: f32,
     /// Forward.
@@ -170,16 +170,16 @@ pub struct Sticks {
 
 /// A target or a pilot's sticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Target {
+pub enum ExternalTarget {
     /// SET_POSITION_TARGET_LOCAL_NED (84) of which something is ignored, or in another frame than
     /// MAV_FRAME_LOCAL_NED: else it is [`Uplink::Setpoint`](crate::Uplink::Setpoint).
-    Motion(Motion),
+    Motion(PositionTarget),
     /// SET_POSITION_TARGET_GLOBAL_INT (86): a place instead of the position, each coordinate of which may be ignored.
-    Place(Place, Motion),
+    Place(Place, PositionTarget),
     /// SET_ATTITUDE_TARGET (82) with attitude and thrust. Body rates without an attitude are unsupported.
     Attitude(AttitudeAndThrust),
     /// MANUAL_CONTROL (69).
-    Sticks(Sticks),
+    Sticks(ManualControl),
 }
 
 /// Time, nine numbers, heading and its rate, mask, receiver, frame.
@@ -199,8 +199,8 @@ const NO_AXIS: i16 = i16::MAX;
 /// MAV_FRAME_LOCAL_NED.
 const LOCAL_NED: u8 = 1;
 
-impl Target {
-    pub(crate) fn format(id: u32) -> Option<Format> {
+impl ExternalTarget {
+    pub(crate) fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
             SET_POSITION_TARGET_LOCAL_NED_DATA::ID => MOTION.format(),
             SET_POSITION_TARGET_GLOBAL_INT_DATA::ID => PLACE.format(),
@@ -224,13 +224,13 @@ impl Target {
                     9 | 12 => Axes::BodyOffset,
                     _ => return Err(Fault::Unsupported),
                 };
-                let motion = Motion::read(axes, vectors, yaw, mask)?;
+                let motion = PositionTarget::read(axes, vectors, yaw, mask)?;
                 // Not both in one: the place would be the earth's, the velocity the vehicle's.
                 let moves = motion.velocity_m_s.iter().chain(&motion.acceleration_m_s2).any(|it| it.is_finite());
                 if axes == Axes::Body && moves && motion.position_m.iter().any(|it| it.is_finite()) {
                     return Err(Fault::Unsupported);
                 }
-                Ok(Target::Motion(motion))
+                Ok(ExternalTarget::Motion(motion))
             }
             SET_POSITION_TARGET_GLOBAL_INT_DATA::ID => {
                 let (_, [latitude, longitude], altitude_m, [velocity, acceleration], yaw, mask, to, frame) =
@@ -238,15 +238,15 @@ impl Target {
                 mine(to)?;
                 let above = datum(frame).ok_or(Fault::Unsupported)?;
                 // Finite, to be checked below.
-                let motion = Motion::read(Axes::Local, [[0.0; 3], velocity, acceleration], yaw, mask)?;
+                let motion = PositionTarget::read(Axes::Local, [[0.0; 3], velocity, acceleration], yaw, mask)?;
                 let unless = |bit: u16, value: i32| if mask & (1 << bit) == 0 { value } else { Place::AS_IT_IS };
                 let metres = if mask & 4 == 0 { altitude_m } else { f32::NAN };
                 let height = Height { metres, above };
                 let place = Place { latitude_e7: unless(0, latitude), longitude_e7: unless(1, longitude), height };
                 let is_whole = mask & 4 != 0 || altitude_m.is_finite();
-                let motion = Motion { position_m: Motion::NONE.position_m, ..motion };
+                let motion = PositionTarget { position_m: PositionTarget::NONE.position_m, ..motion };
                 if is_whole && place.is_plausible() {
-                    Ok(Target::Place(place, motion))
+                    Ok(ExternalTarget::Place(place, motion))
                 } else {
                     Err(Fault::Implausible)
                 }
@@ -265,7 +265,7 @@ impl Target {
                     return Err(Fault::Implausible);
                 }
                 let attitude = flip_turn(attitude);
-                Ok(Target::Attitude(AttitudeAndThrust { attitude, yaw_rate_rad_s, thrust }))
+                Ok(ExternalTarget::Attitude(AttitudeAndThrust { attitude, yaw_rate_rad_s, thrust }))
             }
             MANUAL_CONTROL_DATA::ID => {
                 let (axes, _, system, ..) = STICKS.read(payload);
@@ -274,7 +274,7 @@ impl Target {
                     return Err(Fault::Unsupported);
                 }
                 let [pitch, roll, up, yaw] = axes.map(|axis| (f32::from(axis) / 1000.0).clamp(-1.0, 1.0));
-                Ok(Target::Sticks(Sticks { roll, pitch, throttle: 2.0 * up.max(0.0) - 1.0, yaw }))
+                Ok(ExternalTarget::Sticks(ManualControl { roll, pitch, throttle: 2.0 * up.max(0.0) - 1.0, yaw }))
             }
             _ => Err(Fault::Unknown),
         }
@@ -283,8 +283,8 @@ impl Target {
     pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         let to = Address::default();
         match self {
-            Target::Motion(motion) => write_motion(motion, payload),
-            Target::Place(place, motion) => {
+            ExternalTarget::Motion(motion) => write_motion(motion, payload),
+            ExternalTarget::Place(place, motion) => {
                 let ([_, velocity, acceleration], yaw, mask) = motion.fields();
                 let given = |value: i32| if value == Place::AS_IT_IS { 0 } else { value };
                 let height_m = place.height.metres;
@@ -296,12 +296,12 @@ impl Target {
                 let z = if height_m.is_nan() { 0.0 } else { height_m };
                 PLACE.write(&(0, xy, z, vectors, yaw, mask & !7 | ignored, to, frame(place.height.above)), payload)
             }
-            Target::Attitude(AttitudeAndThrust { attitude, yaw_rate_rad_s, thrust }) => {
+            ExternalTarget::Attitude(AttitudeAndThrust { attitude, yaw_rate_rad_s, thrust }) => {
                 let (rate, mask) = if yaw_rate_rad_s.is_nan() { (0.0, 7) } else { (-yaw_rate_rad_s, 3) };
                 let rates = [0.0, 0.0, rate];
                 ATTITUDE.write(&(0, flip_turn(*attitude), rates, *thrust, to, mask, [0.0; 3]), payload)
             }
-            Target::Sticks(Sticks { roll, pitch, throttle, yaw }) => {
+            ExternalTarget::Sticks(ManualControl { roll, pitch, throttle, yaw }) => {
                 let up = (throttle + 1.0) / 2.0;
                 // To the nearest, without the platform's rounding.
                 let axis = |value: f32| (value * 1000.0 + if value < 0.0 { -0.5 } else { 0.5 }) as i16;
@@ -312,7 +312,7 @@ impl Target {
 }
 
 /// Writes SET_POSITION_TARGET_LOCAL_NED.
-pub(crate) fn write_motion(motion: &Motion, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+pub(crate) fn write_motion(motion: &PositionTarget, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
     let (vectors, yaw, mask) = motion.fields();
     let frame = match motion.axes {
         Axes::Local => LOCAL_NED,
@@ -324,19 +324,19 @@ pub(crate) fn write_motion(motion: &Motion, payload: &mut [u8; PAYLOAD_MAX]) -> 
 }
 
 /// Format of POSITION_TARGET_LOCAL_NED (85), which tells what the vehicle follows.
-pub(crate) fn followed_format() -> Format {
+pub(crate) fn followed_format() -> MessageFormat {
     TARGET.format()
 }
 
-pub(crate) fn read_followed(payload: &[u8]) -> Result<(u32, Motion), Fault> {
+pub(crate) fn read_followed(payload: &[u8]) -> Result<(u32, PositionTarget), Fault> {
     let (time_ms, vectors, yaw, mask, frame) = TARGET.read(payload);
     if frame != LOCAL_NED {
         return Err(Fault::Unsupported);
     }
-    Ok((time_ms, Motion::read(Axes::Local, vectors, yaw, mask)?))
+    Ok((time_ms, PositionTarget::read(Axes::Local, vectors, yaw, mask)?))
 }
 
-pub(crate) fn write_followed(time_ms: u32, motion: &Motion, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+pub(crate) fn write_followed(time_ms: u32, motion: &PositionTarget, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
     let (vectors, yaw, mask) = motion.fields();
     TARGET.write(&(time_ms, vectors.map(Into::into), yaw, mask, LOCAL_NED), payload)
 }

@@ -5,12 +5,12 @@ use crate::clocks::Clock;
 use crate::command::{self, Command};
 use crate::frames::{Odometry, flip, flip_turn};
 use crate::interval::DataStream;
-use crate::message::{Fault, Format, Message, PAYLOAD_MAX, extension, field, parse, put, put_extended};
+use crate::message::{Fault, Message, MessageFormat, PAYLOAD_MAX, extension, field, parse, put, put_extended};
 use crate::mission::Mission;
-use crate::operator::{CHANGE_ID, Control};
+use crate::operator::{CHANGE_ID, ControlRequest};
 use crate::parameter::ParameterRequest;
 use crate::question::Question;
-use crate::target::{Motion, Target, write_motion};
+use crate::target::{ExternalTarget, PositionTarget, write_motion};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
@@ -53,7 +53,7 @@ pub enum Uplink {
     /// jerk and snap, which the message lacks, are zero.
     Setpoint(Setpoint),
     /// Any other target, or a pilot's sticks.
-    Target(Target),
+    Target(ExternalTarget),
     /// COMMAND_LONG (76), COMMAND_INT (75), SET_MODE (11) or SET_HOME_POSITION (243).
     Command(Command),
     /// MISSION_*.
@@ -65,21 +65,23 @@ pub enum Uplink {
     /// REQUEST_DATA_STREAM (66).
     Stream(DataStream),
     /// CHANGE_OPERATOR_CONTROL (5).
-    Control(Control),
+    Control(ControlRequest),
     /// A question about what the vehicle may not have.
     Question(Question),
 }
 
 impl Message for Uplink {
-    fn format(id: u32) -> Option<Format> {
+    fn format(id: u32) -> Option<MessageFormat> {
         match id {
-            HEARTBEAT_DATA::ID => Some(Format::of::<HEARTBEAT_DATA>(0)),
-            ODOMETRY_DATA::ID => Some(Format::of::<ODOMETRY_DATA>(ODOMETRY_EXTENSION)),
-            VISION_POSITION_ESTIMATE_DATA::ID => Some(Format::of::<VISION_POSITION_ESTIMATE_DATA>(POSE_EXTENSION)),
-            ATT_POS_MOCAP_DATA::ID => Some(Format::of::<ATT_POS_MOCAP_DATA>(COVARIANCE)),
+            HEARTBEAT_DATA::ID => Some(MessageFormat::of::<HEARTBEAT_DATA>(0)),
+            ODOMETRY_DATA::ID => Some(MessageFormat::of::<ODOMETRY_DATA>(ODOMETRY_EXTENSION)),
+            VISION_POSITION_ESTIMATE_DATA::ID => {
+                Some(MessageFormat::of::<VISION_POSITION_ESTIMATE_DATA>(POSE_EXTENSION))
+            }
+            ATT_POS_MOCAP_DATA::ID => Some(MessageFormat::of::<ATT_POS_MOCAP_DATA>(COVARIANCE)),
             REQUEST_DATA_STREAM_DATA::ID => Some(DataStream::format()),
-            CHANGE_ID => Some(Control::format()),
-            _ => Target::format(id)
+            CHANGE_ID => Some(ControlRequest::format()),
+            _ => ExternalTarget::format(id)
                 .or_else(|| command::format(id))
                 .or_else(|| Mission::format(id))
                 .or_else(|| Clock::format(id))
@@ -99,15 +101,17 @@ impl Message for Uplink {
                 meant_for(receiver, to).map(|()| Uplink::Stream(stream))
             }
             CHANGE_ID => {
-                let (control, system) = Control::read(payload)?;
+                let (control, system) = ControlRequest::read(payload)?;
                 meant_for(receiver, Address { system, component: 0 }).map(|()| Uplink::Control(control))
             }
-            _ if Target::format(id).is_some() => match Target::read(id, payload, |to| receiver.is_meant_by(to))? {
-                Target::Motion(motion) => {
-                    Ok(motion.complete().map_or(Uplink::Target(Target::Motion(motion)), Uplink::Setpoint))
+            _ if ExternalTarget::format(id).is_some() => {
+                match ExternalTarget::read(id, payload, |to| receiver.is_meant_by(to))? {
+                    ExternalTarget::Motion(motion) => {
+                        Ok(motion.complete().map_or(Uplink::Target(ExternalTarget::Motion(motion)), Uplink::Setpoint))
+                    }
+                    target => Ok(Uplink::Target(target)),
                 }
-                target => Ok(Uplink::Target(target)),
-            },
+            }
             _ if command::format(id).is_some() => {
                 let (command, to) = command::read(id, payload)?;
                 meant_for(receiver, to).map(|()| Uplink::Command(command))
@@ -147,7 +151,7 @@ impl Message for Uplink {
                 let covariance = covariance(&pose.sigmas).into_iter().flat_map(f32::to_le_bytes);
                 put_extended(&write_mocap(*sent_us, pose), covariance, payload)
             }
-            Uplink::Setpoint(setpoint) => write_motion(&Motion::from(setpoint), payload),
+            Uplink::Setpoint(setpoint) => write_motion(&PositionTarget::from(setpoint), payload),
             Uplink::Target(target) => target.write(payload),
             Uplink::Command(command) => command::write(*command, payload),
             Uplink::Mission(message) => message.write(Address::default(), payload),

@@ -4,7 +4,7 @@
 //! last. Only number and checksum seed are the crate's.
 
 use crate::address::Address;
-use crate::message::{Format, PAYLOAD_MAX};
+use crate::message::{MessageFormat, PAYLOAD_MAX};
 use core::marker::PhantomData;
 use mavlink::MessageData;
 
@@ -141,8 +141,8 @@ impl<D: MessageData, W: Wire> Layout<D, W> {
         Layout(PhantomData)
     };
 
-    pub(crate) const fn format(&self) -> Format {
-        Format { extra_crc: D::EXTRA_CRC, length_max: W::LEN }
+    pub(crate) const fn format(&self) -> MessageFormat {
+        MessageFormat { extra_crc: D::EXTRA_CRC, length_max: W::LEN }
     }
 
     pub(crate) fn read(&self, payload: &[u8]) -> W {

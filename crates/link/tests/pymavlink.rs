@@ -3,14 +3,14 @@
 #![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "a test that cannot go on says why")]
 
 use afbc_link::telemetry::{
-    ActuatorOutputs, AttitudeQuaternion, Battery, EstimatorStatus, Fix, GlobalPosition, Home, Origin, Summary,
-    SystemStatus, Version,
+    ActuatorOutputs, AttitudeQuaternion, BatteryStatus, EstimatorStatus, Fix, GlobalOrigin, GlobalPosition, Home,
+    SystemStatus, Version, VfrHud,
 };
 use afbc_link::{
-    Address, Answer, AttitudeAndThrust, AvailableMode, Axes, Clock, Command, Control, ControlAnswer, CurrentMode,
-    DataStream, Datum, Decoder, Downlink, FRAME_MAX, Height, Interval, MavSeverity, Message, Mission, MissionCurrent,
-    MissionItem, MissionResult, Motion, ParameterRequest, ParameterValue, Place, Plan, Sender, Sticks, Target,
-    Telemetry, Uplink,
+    Address, Answer, AttitudeAndThrust, AvailableMode, Axes, Clock, Command, ControlAnswer, ControlRequest,
+    CurrentMode, DataStream, Datum, Decoder, Downlink, ExternalTarget, FRAME_MAX, Height, Interval, ManualControl,
+    MavSeverity, Message, Mission, MissionCurrent, MissionItem, MissionResult, ParameterRequest, ParameterValue, Place,
+    Plan, PositionTarget, Sender, Telemetry, Uplink,
 };
 use nalgebra::Vector3;
 
@@ -54,7 +54,7 @@ fn commands_are_read() {
     let place = Place { latitude_e7: 473_977_420, longitude_e7: 85_455_940, height };
     command("COMMAND_INT", Command::Reposition { place, yaw_rad: -0.5, speed_m_s: Some(2.5) });
     command("TAKEOFF", Command::TakeOff(Height { metres: 2.5, above: Datum::Here }));
-    check("CONTROL", &Uplink::Control(Control::Release));
+    check("CONTROL", &Uplink::Control(ControlRequest::Release));
     check("STREAM", &Uplink::Stream(DataStream { group: 10, rate_hz: 4 }));
 }
 
@@ -62,13 +62,24 @@ fn commands_are_read() {
 fn targets_are_read() {
     let target = |name, target| check(name, &Uplink::Target(target));
     let (velocity_m_s, yaw_rate_rad_s) = (Vector3::new(1.0, -2.0, -3.0), f32::NAN);
-    target("TARGET", Target::Motion(Motion { axes: Axes::Body, velocity_m_s, yaw_rate_rad_s, ..Motion::NONE }));
+    target(
+        "TARGET",
+        ExternalTarget::Motion(PositionTarget {
+            axes: Axes::Body,
+            velocity_m_s,
+            yaw_rate_rad_s,
+            ..PositionTarget::NONE
+        }),
+    );
     let height = Height { metres: 12.5, above: Datum::Home };
     let place = Place { latitude_e7: 473_977_420, longitude_e7: 85_455_940, height };
-    target("PLACE", Target::Place(place, Motion::NONE));
+    target("PLACE", ExternalTarget::Place(place, PositionTarget::NONE));
     let attitude = [0.5, 0.5, -0.5, -0.5];
-    target("ATTITUDE", Target::Attitude(AttitudeAndThrust { attitude, yaw_rate_rad_s: f32::NAN, thrust: 0.75 }));
-    target("STICKS", Target::Sticks(Sticks { roll: -0.25, pitch: 0.5, throttle: 0.5, yaw: 1.0 }));
+    target(
+        "ATTITUDE",
+        ExternalTarget::Attitude(AttitudeAndThrust { attitude, yaw_rate_rad_s: f32::NAN, thrust: 0.75 }),
+    );
+    target("STICKS", ExternalTarget::Sticks(ManualControl { roll: -0.25, pitch: 0.5, throttle: 0.5, yaw: 1.0 }));
 }
 
 #[test]
@@ -136,7 +147,7 @@ fn places_are_read_and_written() {
         }),
     );
     let (place_e7, altitude_mm, time_us) = ([1, 2], 3, 99);
-    told("<GPS_GLOBAL_ORIGIN", Telemetry::Origin(Origin { place_e7, altitude_mm, time_us }));
+    told("<GPS_GLOBAL_ORIGIN", Telemetry::Origin(GlobalOrigin { place_e7, altitude_mm, time_us }));
     let (position_m, attitude) = (Vector3::new(4.0, -5.0, -6.0), [1.0, 0.0, -0.0, -0.0]);
     // Read alone: zeros change their signs with the frames.
     check(
@@ -165,7 +176,7 @@ fn telemetry_is_read_and_written() {
     );
     told(
         "<BATTERY_STATUS",
-        Telemetry::Battery(Battery {
+        Telemetry::Battery(BatteryStatus {
             voltage_mv: 16_100,
             current_ca: 1234,
             consumed_mah: 250,
@@ -182,7 +193,7 @@ fn telemetry_is_read_and_written() {
     told("<AUTOPILOT_VERSION", Telemetry::Version(Version { capabilities: 8706, uid: 77, software, commit }));
     told(
         "<VFR_HUD",
-        Telemetry::Summary(Summary {
+        Telemetry::Summary(VfrHud {
             speed_m_s: 1.5,
             altitude_m: 490.0,
             climb_m_s: -0.5,
@@ -208,7 +219,7 @@ fn the_rest_is_read_and_written() {
     let value = 2.5_f32.to_le_bytes();
     let parameter = ParameterValue { name: name("GF_MAX_HOR_DIST"), value, kind: 9, count: 300, place: u16::MAX };
     check_both("<PARAM_VALUE", &Downlink::Parameter(parameter));
-    let followed = Motion {
+    let followed = PositionTarget {
         axes: Axes::Local,
         position_m: Vector3::new(1.0, -2.0, -3.0),
         velocity_m_s: Vector3::new(4.0, -5.0, -6.0),
@@ -217,7 +228,7 @@ fn the_rest_is_read_and_written() {
         yaw_rate_rad_s: -0.25,
     };
     check_both("<POSITION_TARGET", &Downlink::Followed(5, followed));
-    let refused = ControlAnswer { station: 245, control: Control::Take, granted: false };
+    let refused = ControlAnswer { station: 245, control: ControlRequest::Take, granted: false };
     check_both("<CONTROL", &Downlink::Control(refused));
     let (severity, text) = (MavSeverity::MAV_SEVERITY_WARNING, "refused: not armed".into());
     check_both("<TEXT", &Downlink::Text { severity, text });

@@ -9,8 +9,8 @@
 )]
 
 use afbc_link::{
-    Address, Answer, Axes, Command, Counters, Decoder, Downlink, FRAME_MAX, Health, MavCmd, MavSeverity, Message,
-    Motion, Sender, StatesRefused, Target, Uplink,
+    Address, Answer, Axes, Command, Counters, Decoder, Downlink, ExternalTarget, FRAME_MAX, HealthArray, MavCmd,
+    MavSeverity, Message, PositionTarget, Sender, StatesRefused, Uplink,
 };
 use afbc_types::{Axis, PerAxis, PoseSigmas, RotorSpeeds, Setpoint, State};
 use mavlink::dialects::common::{
@@ -132,7 +132,7 @@ fn health_is_an_array_of_29_floats() {
         number += 1.0;
         number
     };
-    let health = Health {
+    let health = HealthArray {
         time_us: 7,
         tick_us: next(),
         tick_max_us: next(),
@@ -251,7 +251,7 @@ fn every_type_mask_means_what_the_specification_says() {
             continue;
         }
         let unless = |ignored, value: f32| if ignored { f32::NAN } else { value };
-        let expected = Motion {
+        let expected = PositionTarget {
             axes: Axes::Local,
             position_m: Vector3::new(unless(bit(0), 1.0), unless(bit(1), -2.0), unless(bit(2), -3.0)),
             velocity_m_s: Vector3::new(unless(bit(3), 4.0), unless(bit(4), -5.0), unless(bit(5), -6.0)),
@@ -262,9 +262,9 @@ fn every_type_mask_means_what_the_specification_says() {
         let motion = match read {
             Ok(Uplink::Setpoint(setpoint)) => {
                 assert_eq!(mask, 0, "complete");
-                Motion::from(&setpoint)
+                PositionTarget::from(&setpoint)
             }
-            Ok(Uplink::Target(Target::Motion(motion))) => motion,
+            Ok(Uplink::Target(ExternalTarget::Motion(motion))) => motion,
             other => panic!("{mask:#b}: {other:?}"),
         };
         // As text, since NaN differs from itself.
@@ -302,7 +302,7 @@ fn targets_in_frames_of_the_vehicle_are_read() {
     let axes = |frame, mask| {
         let data = SET_POSITION_TARGET_LOCAL_NED_DATA { coordinate_frame: frame, ..target(mask) };
         match read::<Uplink>(&theirs(&data)) {
-            Ok(Uplink::Target(Target::Motion(motion))) => Ok(motion.axes),
+            Ok(Uplink::Target(ExternalTarget::Motion(motion))) => Ok(motion.axes),
             Err(counters) => Err(counters.unsupported),
             other => panic!("{other:?}"),
         }

@@ -1,13 +1,13 @@
 //! Communication: receives and sends messages.
 
-use crate::desk::Desk;
+use crate::control_inputs::ControlInputs;
+use crate::dispatcher::Dispatcher;
 use crate::failsafes::Failsafes;
 use crate::flight::Report;
-use crate::mail::Mail;
-use crate::parameters::{Change, Table, VALUE_BYTES};
+use crate::parameters::{ParameterTable, RecordChange, VALUE_BYTES};
 use crate::services::commands::ANSWERS_PER_TICK;
 use crate::services::modes;
-use crate::services::picture::Surroundings;
+use crate::services::status::AuxSensors;
 use crate::services::streams::{Requested, id};
 use crate::services::telemetry::compose;
 use crate::services::texts::{Words, reason, urgency};
@@ -18,8 +18,8 @@ use afbc_flight_core::rate;
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, Sighting};
 use afbc_flight_core::{Mode, Stamped, Tracker};
-use afbc_guidance::{Cause, Notice, Reading, Reason};
-use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, Motion, Sender, StatesRefused, Uplink};
+use afbc_guidance::{BatteryReading, Cause, ModeReason, Notice};
+use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, PositionTarget, Sender, StatesRefused, Uplink};
 use afbc_types::{PerAxis, Pose};
 
 /// Component of the vehicle: autopilot.
@@ -46,7 +46,7 @@ const ROTORS: u64 = 10;
 pub struct Comms {
     decoder: Decoder<Uplink>,
     sender: Sender,
-    desk: Desk,
+    dispatcher: Dispatcher,
     tracker: Tracker,
     tick: u64,
     tick_us_max: f32,
@@ -56,7 +56,7 @@ pub struct Comms {
     failsafes: Failsafes,
     norms: PerAxis<Norm>,
     trip: Option<Trip>,
-    rate: rate::Report,
+    rate: rate::RateReport,
     /// Bytes that may still be sent after this tick.
     left: usize,
 }
@@ -79,7 +79,7 @@ impl Comms {
         Comms {
             decoder: Decoder::new(me),
             sender: Sender::new(me),
-            desk: Desk::new(me, &setup),
+            dispatcher: Dispatcher::new(me, &setup),
             tracker: Tracker::default(),
             tick: 0,
             tick_us_max: 0.0,
@@ -88,67 +88,69 @@ impl Comms {
             failsafes: Failsafes::default(),
             norms: PerAxis::default(),
             trip: None,
-            rate: rate::Report::default(),
+            rate: rate::RateReport::default(),
             left: 0,
         }
     }
 
     /// Tells what the control tick does not know: origin, satellite receiver, battery, time of day.
-    pub fn surround(&mut self, surroundings: Surroundings) {
-        self.desk.picture.surroundings = surroundings;
+    pub fn set_aux_sensors(&mut self, aux: AuxSensors) {
+        self.dispatcher.status.aux = aux;
     }
 
     /// Tells everyone what a shell has to say about the parameters.
     pub fn warn(&mut self, text: &str) {
-        self.desk.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
+        self.dispatcher.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
     }
 
     /// True if a station has asked the disarmed vehicle to reboot: what has been sent should leave first.
     pub fn wants_reboot(&self) -> bool {
-        self.desk.reboot
+        self.dispatcher.reboot
     }
 
     /// True if [`receive`](Self::receive) has something for the next tick even without bytes.
     pub fn has_mail(&self) -> bool {
-        self.desk.wanted_leg().is_some()
+        self.dispatcher.wanted_leg().is_some()
     }
 
-    /// Processes the next bytes of the stream; returns new inputs for the control tick, to be [posted](Mail::post).
+    /// Processes the next bytes of the stream; returns new inputs for the control tick, to be
+    /// [merged](ControlInputs::merge).
     ///
     /// A vehicle without an estimate of its own ignores poses, since a law needs velocities and rates.
-    pub fn receive(&mut self, bytes: &[u8]) -> Mail {
-        let mut news = Mail::EMPTY;
-        let Comms { decoder, desk, tracker, state_is_news, .. } = self;
-        let estimates = desk.picture.senses;
+    pub fn receive(&mut self, bytes: &[u8]) -> ControlInputs {
+        let mut update = ControlInputs::EMPTY;
+        let Comms { decoder, dispatcher, tracker, state_is_news, .. } = self;
+        let estimates = dispatcher.status.senses;
         decoder.feed(bytes, |from, message| match message {
             Uplink::State { sent_us, state: value, sigmas } => {
                 let age_max_us = if estimates { POSE_AGE_MAX_US } else { COAST_US.into() };
                 let sighting = Sighting::State(value);
-                if let Some(at_us) = tracker.sight(number(from), sent_us, desk.now_us, sighting, age_max_us) {
-                    if desk.now_us - at_us <= COAST_US.into() {
-                        news.inbox.put_state(Stamped { value, at_us });
+                if let Some(at_us) = tracker.sight(number(from), sent_us, dispatcher.now_us, sighting, age_max_us) {
+                    if dispatcher.now_us - at_us <= COAST_US.into() {
+                        update.inbox.put_state(Stamped { value, at_us });
                     }
                     if estimates {
-                        news.inbox.put_pose(Stamped { value: Pose::of(&value, sigmas), at_us });
+                        update.inbox.put_pose(Stamped { value: Pose::of(&value, sigmas), at_us });
                     }
-                    (desk.picture.state, *state_is_news) = (Some(value), true);
+                    (dispatcher.status.state, *state_is_news) = (Some(value), true);
                 }
             }
             Uplink::Pose { sent_us, pose: value } if estimates => {
                 let sighting = Sighting::Pose(value);
-                if let Some(at_us) = tracker.sight(number(from), sent_us, desk.now_us, sighting, POSE_AGE_MAX_US) {
-                    news.inbox.put_pose(Stamped { value, at_us });
+                if let Some(at_us) = tracker.sight(number(from), sent_us, dispatcher.now_us, sighting, POSE_AGE_MAX_US)
+                {
+                    update.inbox.put_pose(Stamped { value, at_us });
                 }
             }
-            other => desk.hear(from, other, &mut news),
+            other => dispatcher.hear(from, other, &mut update),
         });
-        desk.hand_over(&mut news);
-        news.battery = desk.picture.surroundings.battery.map(|battery| Reading {
+        dispatcher.hand_over(&mut update);
+        update.battery = dispatcher.status.aux.battery.map(|battery| BatteryReading {
             voltage_v: f32::from(battery.voltage_mv) * 1e-3,
             // Negative: not measured.
             current_a: f32::from(battery.current_ca.max(0)) * 1e-2,
         });
-        news
+        update
     }
 
     /// Exchanges the decoder. Where there are several streams of bytes, each has one of its own, which is put in before
@@ -172,14 +174,14 @@ impl Comms {
         let tick_us = tick_cycles as f32 / 168.0;
         self.tick_us_max = self.tick_us_max.max(tick_us);
         let dropped_frames = self.bad_frames();
-        let desk = &mut self.desk;
-        desk.now_us = report.time_us;
-        desk.picture.update(report, tick_us);
-        desk.picture.dropped_frames = dropped_frames;
+        let dispatcher = &mut self.dispatcher;
+        dispatcher.now_us = report.time_us;
+        dispatcher.status.update(report, tick_us);
+        dispatcher.status.dropped_frames = dropped_frames;
         if let Some(estimate) = report.estimate {
-            (desk.picture.state, self.state_is_news) = (Some(estimate), true);
+            (dispatcher.status.state, self.state_is_news) = (Some(estimate), true);
         }
-        desk.tick();
+        dispatcher.tick();
         if let Some((axis, norm)) = report.learnt {
             self.norms[axis] = norm;
         }
@@ -188,12 +190,12 @@ impl Comms {
 
         let mut outlet = Outlet { sender: self.sender, buffer: [0; FRAME_MAX], left: REPORT_MAX, send };
         let (now_us, armed) = (report.time_us, report.mode.armed());
-        if self.desk.streams.rotors() && (self.state_is_news || self.tick.is_multiple_of(ROTORS)) {
+        if self.dispatcher.streams.rotors() && (self.state_is_news || self.tick.is_multiple_of(ROTORS)) {
             self.state_is_news = false;
             // Not from the budget: whoever asks for them leaves room.
             outlet.say(&Downlink::Rotors { time_us: now_us, armed, speeds: report.motors.padded() });
         }
-        let Desk { commands, streams, texts, .. } = &mut self.desk;
+        let Dispatcher { commands, streams, texts, .. } = &mut self.dispatcher;
         let settled = report.answer.and_then(|answer| commands.settle(answer));
         let ordered = report.guided.answer.and_then(|(ticket, result)| commands.settle_order(ticket, result));
         for answer in settled.into_iter().chain(ordered) {
@@ -211,21 +213,21 @@ impl Comms {
         let (period, phase) = HEARTBEAT;
         if self.tick % period == phase && outlet.left >= TEXT_MAX {
             let heartbeat = self.heartbeat();
-            self.desk.streams.spend(outlet.say(&heartbeat));
+            self.dispatcher.streams.spend(outlet.say(&heartbeat));
         }
         for _ in 0..REPLIES_PER_TICK {
-            if self.desk.streams.has_room()
+            if self.dispatcher.streams.has_room()
                 && outlet.left >= REPLY_MAX
-                && let Some(reply) = self.desk.next_reply()
+                && let Some(reply) = self.dispatcher.next_reply()
             {
-                self.desk.streams.spend(outlet.say(&reply));
+                self.dispatcher.streams.spend(outlet.say(&reply));
             }
         }
         while outlet.left >= FRAME_MAX
-            && let Some(requested) = self.desk.streams.next(now_us)
+            && let Some(requested) = self.dispatcher.streams.next(now_us)
         {
             if let Some(message) = self.compose(requested) {
-                self.desk.streams.spend(outlet.say(&message));
+                self.dispatcher.streams.spend(outlet.say(&message));
             }
         }
         (self.sender, self.left) = (outlet.sender, outlet.left);
@@ -235,15 +237,19 @@ impl Comms {
     /// by frame, through `send`, together with the report at most [`REPORT_MAX`] bytes. Returns what has changed in
     /// `table`, which is to be flown ([`Flight::adopt`](crate::Flight::adopt)) and kept
     /// ([`Kept::keep`](crate::parameters::Kept::keep)). Nothing changes while the vehicle is armed.
-    pub fn parameters<const N: usize>(&mut self, table: &mut Table<N>, send: impl FnMut(&[u8])) -> Option<Change> {
-        let change = self.desk.grant(table);
+    pub fn parameters<const N: usize>(
+        &mut self,
+        table: &mut ParameterTable<N>,
+        send: impl FnMut(&[u8]),
+    ) -> Option<RecordChange> {
+        let change = self.dispatcher.grant(table);
         // COM_DL_LOSS_T, which is in range.
         let silent_us = (table.configuration().guidance.net.station_lost_s * 1e6) as u64;
-        self.desk.control.set_silence(silent_us);
+        self.dispatcher.control.set_silence(silent_us);
         let mut outlet = Outlet { sender: self.sender, buffer: [0; FRAME_MAX], left: self.left, send };
-        let Desk { parameters, streams, now_us, .. } = &mut self.desk;
+        let Dispatcher { parameters, streams, now_us, .. } = &mut self.dispatcher;
         while outlet.left >= VALUE_BYTES as usize
-            && let Some(value) = parameters.tell(*now_us, streams.bytes_per_s(), table)
+            && let Some(value) = parameters.next_value(*now_us, streams.bytes_per_s(), table)
         {
             streams.spend(outlet.say(&Downlink::Parameter(value)));
         }
@@ -253,33 +259,33 @@ impl Comms {
 
     /// Notes what the pilot is to be told of a tick.
     fn watch<const N: usize>(&mut self, report: &Report<N>) {
-        let Comms { desk, failsafes, tick, .. } = self;
+        let Comms { dispatcher, failsafes, tick, .. } = self;
         let warning = MavSeverity::MAV_SEVERITY_WARNING;
         if let Some(Err(refusal)) = report.answer.map(|answer| answer.result) {
-            desk.texts.put(warning, refusal.reason());
+            dispatcher.texts.put(warning, refusal.reason());
         }
         if let Some((_, Err(declined))) = report.guided.answer {
-            desk.texts.put(warning, reason(declined));
+            dispatcher.texts.put(warning, reason(declined));
         }
         // The flight core's failsafes are announced below.
-        let descends = |notice: &Notice| matches!(notice, Notice::Mode(_, Reason::Failsafe(Cause::Descent)));
+        let descends = |notice: &Notice| matches!(notice, Notice::Mode(_, ModeReason::Failsafe(Cause::Descent)));
         for notice in report.guided.notices.iter().filter(|notice| !descends(notice)) {
             let [first, second, third] = notice.parts();
-            desk.texts.say(urgency(notice.severity()), &Words::of(first).and(second).and(third));
+            dispatcher.texts.say(urgency(notice.severity()), &Words::of(first).and(second).and(third));
         }
         for (severity, notice) in failsafes.watch(report, *tick) {
-            desk.texts.put(severity, notice);
+            dispatcher.texts.put(severity, notice);
         }
         let trip = report.health.control.trip;
         if let (Some(trip), None) = (trip, self.trip) {
-            desk.texts.put(warning, trip.reason());
+            dispatcher.texts.put(warning, trip.reason());
         }
         let (rate, before) = (report.health.rate, self.rate);
         self.rate = rate;
         if rate.clock_failed && !before.clock_failed {
-            desk.texts.put(MavSeverity::MAV_SEVERITY_CRITICAL, CLOCK_FAILED);
+            dispatcher.texts.put(MavSeverity::MAV_SEVERITY_CRITICAL, CLOCK_FAILED);
         } else if before.healthy() && !rate.healthy() {
-            desk.texts.put(MavSeverity::MAV_SEVERITY_CRITICAL, TICK_OFF);
+            dispatcher.texts.put(MavSeverity::MAV_SEVERITY_CRITICAL, TICK_OFF);
         }
         // While the vehicle flies blind there is no report of a law.
         if report.mode != Mode::Coasting {
@@ -289,43 +295,43 @@ impl Comms {
 
     /// Returns a message of telemetry.
     fn compose(&mut self, requested: Requested) -> Option<Downlink> {
-        let picture = &self.desk.picture;
+        let status = &self.dispatcher.status;
         match requested.message {
             id::HEARTBEAT => Some(self.heartbeat()),
-            id::MISSION_CURRENT => Some(self.desk.mission_current()),
+            id::MISSION_CURRENT => Some(self.dispatcher.mission_current()),
             id::POSITION_TARGET_LOCAL_NED => {
-                let setpoint = self.desk.followed()?;
-                Some(Downlink::Followed(picture.time_ms(), Motion::from(setpoint)))
+                let setpoint = self.dispatcher.followed()?;
+                Some(Downlink::Followed(status.time_ms(), PositionTarget::from(setpoint)))
             }
             id::AVAILABLE_MODES => {
                 // 0 asks for all: one after the other.
                 let (place, all) = modes::place(requested.index);
                 if all && place < modes::COUNT {
                     let next = Requested { index: modes::all_from(place + 1), ..requested };
-                    self.desk.streams.request_first(next);
+                    self.dispatcher.streams.request_first(next);
                 }
                 modes::available(place).map(Downlink::AvailableMode)
             }
             id::DEBUG_FLOAT_ARRAY => Some(Downlink::Health(self.health())),
-            message => compose(message, picture),
+            message => compose(message, status),
         }
     }
 
     fn heartbeat(&self) -> Downlink {
-        let picture = &self.desk.picture;
+        let status = &self.dispatcher.status;
         let (period, _) = HEARTBEAT;
         let failsafe = self.failsafes.within(period, self.tick);
-        Downlink::Heartbeat { armed: picture.mode.armed(), failsafe, mode: modes::custom(picture.flight_mode()) }
+        Downlink::Heartbeat { armed: status.mode.armed(), failsafe, mode: modes::custom(status.flight_mode()) }
     }
 
-    fn health(&self) -> afbc_link::Health {
-        let picture = &self.desk.picture;
+    fn health(&self) -> afbc_link::HealthArray {
+        let status = &self.dispatcher.status;
         let norm = |norm: &Norm| libm::sqrtf(norm.theta_squared);
         let Refused { overtaken, late, elsewhere } = *self.tracker.refused();
-        let health = &picture.health;
-        afbc_link::Health {
-            time_us: picture.time_us,
-            tick_us: picture.tick_us,
+        let health = &status.health;
+        afbc_link::HealthArray {
+            time_us: status.time_us,
+            tick_us: status.tick_us,
             tick_max_us: self.tick_us_max,
             rate_hz: health.rate.rate_hz.unwrap_or(0) as f32,
             late_ticks: health.rate.off_ticks(),
@@ -334,7 +340,7 @@ impl Comms {
             theta_norm: PerAxis::from_fn(|axis| norm(&self.norms[axis])),
             delta: PerAxis::from_fn(|axis| self.norms[axis].delta),
             link: *self.decoder.counters(),
-            unanswered: self.desk.commands.unanswered(),
+            unanswered: self.dispatcher.commands.unanswered(),
             states_refused: StatesRefused { overtaken, late, elsewhere, frozen: health.frozen_states },
         }
     }

@@ -1,7 +1,7 @@
 //! Reports of failsafes: each once as text, and all in the heartbeat, however short they are.
 
 use crate::flight::Report;
-use afbc_flight_core::{End, Mode};
+use afbc_flight_core::{EndReason, Mode};
 use afbc_link::MavSeverity;
 
 /// Severity and text of a report.
@@ -31,13 +31,13 @@ impl Failsafes {
     ) -> impl Iterator<Item = Notice> + use<N> {
         let Report { mode, ended, health, .. } = report;
         let entered = (*mode != self.mode).then_some(*mode);
-        let given_up = matches!(ended, Some(End::StateLost | End::Tumbled));
+        let given_up = matches!(ended, Some(EndReason::StateLost | EndReason::Tumbled));
         let notices = [
             (entered == Some(Mode::Coasting)).then_some(COASTING),
             (entered == Some(Mode::Descending)).then_some(DESCENDING),
             (health.observed && !self.observed).then_some(OBSERVED),
-            (*ended == Some(End::StateLost)).then_some(STATE_LOST),
-            (*ended == Some(End::Tumbled)).then_some(TUMBLED),
+            (*ended == Some(EndReason::StateLost)).then_some(STATE_LOST),
+            (*ended == Some(EndReason::Tumbled)).then_some(TUMBLED),
         ];
         let failsafe = given_up || health.observed || report.guided.failsafe;
         if matches!(mode, Mode::Coasting | Mode::Descending) || failsafe {

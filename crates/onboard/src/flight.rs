@@ -1,27 +1,27 @@
 //! The vehicle with its flight core and motors.
 
 use crate::configuration::Configuration;
-use crate::guided::{Core, Guide, Guided};
-use crate::mail::Mail;
-use crate::navigation::Navigation;
+use crate::control_inputs::ControlInputs;
+use crate::front_end::EstimatorFrontEnd;
+use crate::guided::{Core, GuidanceResult, Guide};
 use crate::readings::Readings;
-use crate::silence::Silence;
+use crate::sensor_timeouts::SensorTimeouts;
 use afbc::monitor::{Bounds, Norm};
 use afbc::{Guarded, guarded};
-use afbc_estimator::{Easing, Estimator};
-use afbc_flight_core::{Answer, End, Health, Mode, Motor, Reasons, Vehicle, VehicleMemory};
+use afbc_estimator::{Estimator, OutputFilter};
+use afbc_flight_core::{EndReason, FlightCore, FlightCoreMemory, Mode, Motor, Reasons, RequestAnswer, TickHealth};
 use afbc_types::{Axis, Declared, OutOfRange, ROTORS_MAX, RotorSpeeds, State};
 use core::array;
 
 /// A vehicle under AFBC with its monitor.
 #[derive(Clone, Debug)]
 pub struct Flight<const N: usize = 4> {
-    vehicle: Vehicle<Guarded<N>, N>,
-    memory: VehicleMemory<guarded::Memory<N>>,
-    navigation: Navigation,
+    vehicle: FlightCore<Guarded<N>, N>,
+    memory: FlightCoreMemory<guarded::Memory<N>>,
+    front_end: EstimatorFrontEnd,
     motor: Motor,
     guide: Guide,
-    silence: Silence,
+    timeouts: SensorTimeouts,
     /// True if the state of the last tick was observed.
     observes: bool,
     /// True if an armed vehicle was to rest on the ground in the last tick.
@@ -32,9 +32,9 @@ pub struct Flight<const N: usize = 4> {
 /// All that follows from a [`Configuration`], so that [`Flight::adopt`] takes a copy's time.
 #[derive(Clone, Debug)]
 pub struct Prepared<const N: usize = 4> {
-    vehicle: Vehicle<Guarded<N>, N>,
+    vehicle: FlightCore<Guarded<N>, N>,
     estimator: Estimator,
-    easing: Easing,
+    output_filter: OutputFilter,
     motor: Motor,
     guide: Guide,
 }
@@ -56,9 +56,9 @@ impl<const N: usize> Prepared<N> {
         let bounds = Bounds::new(gains, parameters, settings);
         let controller = Guarded::new(*airframe, *settings, *gains, bounds)?;
         Ok(Prepared {
-            vehicle: Vehicle::new(*parameters, *arming, controller)?,
+            vehicle: FlightCore::new(*parameters, *arming, controller)?,
             estimator: Estimator::new(*estimation)?,
-            easing: Easing::of(parameters, N),
+            output_filter: OutputFilter::of(parameters, N),
             motor: Motor::new(*curve)?,
             guide: Guide::new(configuration)?,
         })
@@ -76,23 +76,23 @@ pub struct Report<const N: usize = 4> {
     pub motors: RotorSpeeds<N>,
     /// Throttles for the motors: 0 if disarmed, otherwise 48 to 2047.
     pub throttles: [u16; N],
-    /// The vehicle's own estimate of its state, or what is observed of it in place of that
-    /// ([`Health::observed`]); none without an inertial sensor.
+    /// The vehicle's own estimate of its state, or that of the pose observer after the inertial sensor has failed
+    /// ([`TickHealth::observed`](afbc_flight_core::TickHealth::observed)); none without an inertial sensor.
     pub estimate: Option<State>,
     /// Health of the flight core.
-    pub health: Health,
+    pub health: TickHealth,
     /// Ticks since power-up in which a rotor was commanded a force outside its limits.
     pub saturated_ticks: u32,
     /// Norms of the estimates of one subsystem, all reported in turn; none before the first flight.
     pub learnt: Option<(Axis, Norm)>,
     /// Answer to a request.
-    pub answer: Option<Answer>,
+    pub answer: Option<RequestAnswer>,
     /// Why the flight ended, if it did in this tick.
-    pub ended: Option<End>,
+    pub ended: Option<EndReason>,
     /// What spoke against arming in this tick, by which a request to arm was or would have been answered.
     pub against: Reasons,
     /// What the guidance decided.
-    pub guided: Guided,
+    pub guided: GuidanceResult,
 }
 
 impl<const N: usize> Report<N> {
@@ -126,14 +126,14 @@ impl<const N: usize> Flight<N> {
     /// # Errors
     /// Those of [`Prepared::new`].
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
-        let Prepared { vehicle, estimator, easing, motor, guide } = Prepared::new(configuration)?;
+        let Prepared { vehicle, estimator, output_filter, motor, guide } = Prepared::new(configuration)?;
         Ok(Flight {
             vehicle,
-            memory: VehicleMemory::default(),
-            navigation: Navigation::new(estimator, easing),
+            memory: FlightCoreMemory::default(),
+            front_end: EstimatorFrontEnd::new(estimator, output_filter),
             motor,
             guide,
-            silence: Silence::default(),
+            timeouts: SensorTimeouts::default(),
             observes: false,
             rests: false,
             saturated_ticks: 0,
@@ -146,9 +146,9 @@ impl<const N: usize> Flight<N> {
     pub fn adopt(&mut self, prepared: &Prepared<N>) -> bool {
         let disarmed = !self.memory.mode().armed();
         if disarmed {
-            let Prepared { vehicle, estimator, easing, motor, guide } = prepared;
+            let Prepared { vehicle, estimator, output_filter, motor, guide } = prepared;
             self.vehicle.clone_from(vehicle);
-            self.navigation.adopt(estimator, easing);
+            self.front_end.adopt(estimator, output_filter);
             self.motor = *motor;
             self.guide.adopt(guide);
         }
@@ -164,18 +164,18 @@ impl<const N: usize> Flight<N> {
     /// read; `now_us` is the time since power-up. Cannot fail.
     // Always: copying the report out of a call costs a hundred instructions.
     #[inline(always)]
-    pub fn tick(&mut self, now_us: u64, mail: &mut Mail, readings: &Readings) -> Report<N> {
-        let mut sensors = self.silence.tick(now_us, readings, mail.inbox.pose().is_some());
+    pub fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, readings: &Readings) -> Report<N> {
+        let mut sensors = self.timeouts.tick(now_us, readings, inputs.inbox.pose().is_some());
         // One that repeats itself has failed, too.
         sensors.inertial |= self.observes;
         let (mode, airborne, rested) = (self.memory.mode(), self.memory.airborne(), self.memory.rested());
-        self.navigation.set_on_ground(!mode.armed() || self.rests && !airborne);
-        let estimate = self.navigation.tick(now_us, readings, &mut mail.inbox);
+        self.front_end.set_on_ground(!mode.armed() || self.rests && !airborne);
+        let estimate = self.front_end.tick(now_us, readings, &mut inputs.inbox);
         let observed = if self.observes { self.memory.state().copied() } else { None };
         let core = Core { mode, airborne, rested, sensors, observed };
-        let guided = self.guide.tick(now_us, mail, &core);
-        self.rests = mail.inbox.rests();
-        let outcome = self.vehicle.tick(&mut self.memory, now_us, &mail.inbox);
+        let guided = self.guide.tick(now_us, inputs, &core);
+        self.rests = inputs.inbox.rests();
+        let outcome = self.vehicle.tick(&mut self.memory, now_us, &inputs.inbox);
         self.guide.gave(outcome.forces.0.iter().sum());
         self.observes = outcome.health.observed;
         if outcome.health.control.saturated {

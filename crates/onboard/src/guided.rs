@@ -1,12 +1,12 @@
 //! The guidance's place in the tick.
 
 use crate::configuration::Configuration;
-use crate::mail::Mail;
+use crate::control_inputs::ControlInputs;
 use afbc_flight_core::supervisor::COAST_US;
-use afbc_flight_core::{Asked, Mode, Stamped};
-use afbc_guidance::net::Sensors;
+use afbc_flight_core::{Mode, Stamped, TicketedRequest};
+use afbc_guidance::net::FailedSensors;
 use afbc_guidance::notice::Notices;
-use afbc_guidance::{Declined, FlightMode, Guidance, Lift, Sight};
+use afbc_guidance::{FlightMode, Guidance, GuidanceInputs, Lift, OrderRefusal};
 use afbc_types::{OutOfRange, Setpoint, State};
 use nalgebra::Vector3;
 
@@ -15,13 +15,13 @@ const OWN: u8 = u8::MAX;
 
 /// Result of the guidance in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Guided {
+pub struct GuidanceResult {
     /// The flight mode.
     pub mode: FlightMode,
     /// Setpoint for the flight core; none without a state.
     pub setpoint: Option<Setpoint>,
     /// Ticket of an order and the answer to it.
-    pub answer: Option<(u8, Result<(), Declined>)>,
+    pub answer: Option<(u8, Result<(), OrderRefusal>)>,
     /// Number of the mission's item that it wants, and flies in mode [`FlightMode::Mission`].
     pub wanted: u16,
     /// Number of the mission's item that was reached in this tick.
@@ -53,7 +53,7 @@ pub(crate) struct Core {
     pub(crate) airborne: bool,
     /// True if it has been at rest for as long as arming wants it.
     pub(crate) rested: bool,
-    pub(crate) sensors: Sensors,
+    pub(crate) sensors: FailedSensors,
     /// What is observed of the state in place of an estimate, in the last tick.
     pub(crate) observed: Option<State>,
 }
@@ -90,13 +90,13 @@ impl Guide {
 
     /// Runs a tick: takes the oldest order, and puts setpoint and requests into the flight core's inbox.
     #[inline(always)]
-    pub(crate) fn tick(&mut self, now_us: u64, mail: &mut Mail, core: &Core) -> Guided {
-        let Mail { inbox, orders, battery, .. } = mail;
+    pub(crate) fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, core: &Core) -> GuidanceResult {
+        let ControlInputs { inbox, orders, battery, .. } = inputs;
         let told = inbox.state().filter(|state| state.age_us(now_us) <= COAST_US);
         let state = told.map(|state| &state.value).or(core.observed.as_ref());
         let dt_s = now_us.saturating_sub(self.last_us) as f32 * 1e-6;
         self.last_us = now_us;
-        let sight = Sight {
+        let sight = GuidanceInputs {
             now_us,
             dt_s,
             state,
@@ -112,17 +112,17 @@ impl Guide {
             inbox.put_setpoint(Stamped { value, at_us: now_us });
         }
         inbox.rest(guided.rests);
-        inbox.bar(guided.against);
+        inbox.inhibit(guided.against);
         if let Some(request) = guided.request {
-            // Not in the way of a station's.
+            // A station's request goes first.
             if inbox.asked().is_none() {
-                inbox.request(Asked { request, ticket: OWN });
+                inbox.request(TicketedRequest { request, ticket: OWN });
             }
         }
         if guided.answer.is_some() {
-            mail.next_order();
+            inputs.next_order();
         }
-        Guided {
+        GuidanceResult {
             mode: guided.mode,
             setpoint: guided.setpoint,
             answer: guided.answer,

@@ -1,20 +1,20 @@
 //! The firmware without its hardware: the vehicle that it flies, and the services between [`afbc_link`] and the flight
 //! core.
 //!
-//! A vehicle with an inertial sensor flies on [its own estimate](Navigation), another on the states that the link
-//! brings.
+//! A vehicle with an inertial sensor flies on [its own estimate](EstimatorFrontEnd), another on the states that the
+//! link brings.
 //!
 //! There are two parts, because on the board the control tick interrupts everything else: [`Flight`] runs the control
 //! tick every millisecond; [`Comms`] receives and sends messages in the remaining time. A host that runs both in turn
 //! with the same bytes and times gets the same bytes as the processor.
 //!
 //! ```
-//! use afbc_onboard::{Comms, Configuration, Flight, Mail, Readings};
+//! use afbc_onboard::{Comms, Configuration, ControlInputs, Flight, Readings};
 //!
 //! let mut flight = Flight::new(&Configuration::default())?;
-//! let (mut comms, mut mail, mut taken) = (Comms::new(), Mail::EMPTY, Mail::EMPTY);
-//! mail.post(&comms.receive(b"MAVLink, or noise"));
-//! mail.take_into(&mut taken);
+//! let (mut comms, mut inputs, mut taken) = (Comms::new(), ControlInputs::EMPTY, ControlInputs::EMPTY);
+//! inputs.merge(&comms.receive(b"MAVLink, or noise"));
+//! inputs.take_into(&mut taken);
 //! let report = flight.tick(1_000, &mut taken, &Readings::NONE);
 //! assert_eq!(report.throttles, [0; 4]); // disarmed
 //! comms.report(&report, 0, |_bytes| ());
@@ -24,29 +24,29 @@
 
 mod comms;
 mod configuration;
-mod desk;
+mod control_inputs;
+mod dispatcher;
 mod failsafes;
 mod flight;
+mod front_end;
 mod guided;
 mod lockstep;
-mod mail;
-mod navigation;
 pub mod parameters;
 mod readings;
+mod sensor_timeouts;
 pub mod services;
 mod setup;
-mod silence;
 
 pub use afbc_estimator::Settings as Estimation;
 pub use afbc_flight_core::ArmingLimits;
 pub use comms::{CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
 pub use configuration::Configuration;
+pub use control_inputs::ControlInputs;
 pub use flight::{Flight, Prepared, Report};
-pub use guided::Guided;
+pub use front_end::{EstimatorFrontEnd, pose, publish};
+pub use guided::GuidanceResult;
 pub use lockstep::ReplyHead;
-pub use mail::Mail;
-pub use navigation::{Navigation, pose, tell};
 pub use readings::{AIDS_MAX, Aged, Readings};
 pub use services::commands::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, FORGOTTEN_US, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN};
-pub use services::picture::Surroundings;
+pub use services::status::AuxSensors;
 pub use setup::{Link, Setup};

@@ -1,6 +1,6 @@
 //! What a vehicle's own sensors have read since the last tick.
 
-use afbc_estimator::{ImuSample, Measurement, Timed};
+use afbc_estimator::{ImuSample, Measurement, Stamped};
 use nalgebra::Vector3;
 
 /// Most measurements of aiding sensors that a tick takes; further ones wait for the next.
@@ -17,8 +17,8 @@ pub struct Aged<T> {
 
 impl<T> Aged<T> {
     /// Returns the value with its time on the vehicle's clock.
-    pub(crate) fn timed(self, now_us: u64) -> Timed<T> {
-        Timed { value: self.value, at_us: now_us.saturating_sub(self.age_us.into()) }
+    pub(crate) fn timed(self, now_us: u64) -> Stamped<T> {
+        Stamped { value: self.value, at_us: now_us.saturating_sub(self.age_us.into()) }
     }
 }
 
@@ -74,7 +74,7 @@ impl Readings {
 
     /// Returns the sample with its time, for a tick at `now_us`.
     pub(crate) fn sample(&self, now_us: u64) -> Option<ImuSample> {
-        let Timed { value: [rates_rad_s, specific_force_m_s2], at_us } = self.imu?.timed(now_us);
+        let Stamped { value: [rates_rad_s, specific_force_m_s2], at_us } = self.imu?.timed(now_us);
         Some(ImuSample { at_us, rates_rad_s, specific_force_m_s2 })
     }
 

@@ -5,7 +5,7 @@ mod common;
 
 use afbc_control::Trip;
 use afbc_flight_core::inbox::REQUESTS_MAX;
-use afbc_flight_core::{End, Mode, Refusal, Request};
+use afbc_flight_core::{EndReason, Mode, Refusal, Request};
 use afbc_link::{Address, Answer, Command, Downlink, FRAME_MAX, MavSeverity, Sender, Text, Uplink};
 use afbc_onboard::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, Comms, FORGOTTEN_US, NOT_IN_CONTROL, Report, Setup};
 use afbc_types::{Axis, State};
@@ -193,7 +193,7 @@ fn only_the_forced_one_disarms_in_flight() {
     assert_eq!(texts(&said), [Text::from(Refusal::InFlight.reason())]);
     bench.hear(Uplink::Command(Command::Kill));
     let (report, said) = bench.tick(&State::default());
-    assert_eq!((report.mode, report.ended), (Mode::Disarmed, Some(End::Killed)));
+    assert_eq!((report.mode, report.ended), (Mode::Disarmed, Some(EndReason::Killed)));
     assert_eq!(answers(&said), [(400, Answer::Accepted, STATION)]);
 }
 
@@ -210,10 +210,10 @@ fn every_refusal_is_told_with_its_reason() {
                 _ => (Command::Arm, 400),
             };
             bench.hear(Uplink::Command(command));
-            bench.mail.take_into(&mut bench.taken);
+            bench.inputs.take_into(&mut bench.taken);
             let asked = bench.taken.inbox.asked().expect("asked");
             assert_eq!(asked.request, request);
-            let answer = afbc_flight_core::Answer { ticket: asked.ticket, request, result: Err(refusal) };
+            let answer = afbc_flight_core::RequestAnswer { ticket: asked.ticket, request, result: Err(refusal) };
             let said = bench.said(&Report { answer: Some(answer), ..idle });
             assert_eq!(answers(&said), [(id, Answer::Refused(refusal as i32), STATION)]);
             assert_eq!(texts(&said), [Text::from(refusal.reason())]);
@@ -232,7 +232,7 @@ fn a_kill_is_always_accepted() {
     let [_, second, third] = STATIONS;
     bench.hear_from(second, Uplink::Command(Command::Kill));
     bench.hear_from(third, Uplink::Command(Command::Kill));
-    assert!(bench.mail.inbox.kills());
+    assert!(bench.inputs.inbox.kills());
     let told = listen(&mut bench, 30);
     assert_eq!(told.len(), 22);
     let of = |answer| told.iter().filter(|told| **told == (400, answer, STATION)).count();
@@ -255,7 +255,7 @@ fn requests_whose_tick_went_unreported_fail() {
         }
         for _ in 0..REQUESTS_MAX {
             bench.now_us += 1000;
-            bench.mail.take_into(&mut bench.taken);
+            bench.inputs.take_into(&mut bench.taken);
             bench.flight.tick(bench.now_us, &mut bench.taken, &afbc_onboard::Readings::NONE);
         }
         let told = listen(&mut bench, FORGOTTEN_US as usize / 1000 + 10);
@@ -272,7 +272,7 @@ fn the_largest_output_of_a_tick_is_sent_completely() {
     // On a narrower one, texts wait.
     bench.comms = Comms::with(Setup { bytes_per_s: 1_000_000, ..Setup::default() });
     let (idle, _) = bench.tick(&State::default());
-    let answer = afbc_flight_core::Answer { ticket: 1, request: Request::Arm, result: Err(Refusal::Unhealthy) };
+    let answer = afbc_flight_core::RequestAnswer { ticket: 1, request: Request::Arm, result: Err(Refusal::Unhealthy) };
     for round in 0..2000 {
         bench.now_us += 1000;
         bench.measure(&State::default());
@@ -282,7 +282,7 @@ fn the_largest_output_of_a_tick_is_sent_completely() {
         bench.hear(Uplink::Command(Command::Arm));
         let odd = round % 2 == 1;
         let mode = if odd { Mode::Coasting } else { Mode::Disarmed };
-        let ended = odd.then_some(End::StateLost);
+        let ended = odd.then_some(EndReason::StateLost);
         let mut report = Report { mode, ended, answer: Some(answer), time_us: bench.now_us, ..idle };
         report.health.control.trip = odd.then_some(Trip::Theta(Axis::Pitch));
         report.health.rate.clock_failed = odd;

@@ -6,10 +6,10 @@ mod common;
 use afbc_estimator::Measurement;
 use afbc_flight_core::Refusal;
 use afbc_guidance::{FlightMode, Net, Settings};
-use afbc_link::telemetry::Battery;
+use afbc_link::telemetry::BatteryStatus;
 use afbc_link::{Address, Answer, Command, Downlink, ParameterRequest, Telemetry, Text, Uplink};
 use afbc_onboard::services::{health::sensor, modes};
-use afbc_onboard::{Aged, Comms, Configuration, Flight, Readings, Setup, Surroundings};
+use afbc_onboard::{Aged, AuxSensors, Comms, Configuration, Flight, Readings, Setup};
 use afbc_types::State;
 use common::{Bench, STATION};
 use nalgebra::Vector3;
@@ -28,8 +28,8 @@ fn bench() -> Bench {
 }
 
 fn charge(bench: &mut Bench, voltage_mv: u16) {
-    let battery = Battery { voltage_mv, current_ca: -1, remaining_percent: -1, consumed_mah: -1, charge: 0 };
-    bench.comms.surround(Surroundings { battery: Some(battery), ..Surroundings::default() });
+    let battery = BatteryStatus { voltage_mv, current_ca: -1, remaining_percent: -1, consumed_mah: -1, charge: 0 };
+    bench.comms.set_aux_sensors(AuxSensors { battery: Some(battery), ..AuxSensors::default() });
 }
 
 fn stand(bench: &mut Bench, ticks: u32, state: &State, readings: &Readings) -> Vec<Downlink> {
@@ -239,7 +239,7 @@ fn limited(limits: &[f32; 4]) -> Bench {
         Configuration { guidance: Settings { net, ..Settings::DEFAULT }, arming, ..Configuration::default() };
     let mut bench = Bench::new();
     bench.flight = Flight::new(&configuration).expect("valid");
-    bench.table = afbc_onboard::parameters::Table::new(configuration);
+    bench.table = afbc_onboard::parameters::ParameterTable::new(configuration);
     bench.comms = Comms::with(Setup { bytes_per_s: 1_000_000, ..Setup::default() });
     bench
 }

@@ -4,17 +4,18 @@
 mod common;
 
 use afbc_flight_core::Refusal;
-use afbc_guidance::{Declined, FlightMode, Order};
-use afbc_link::telemetry::Battery;
+use afbc_guidance::{FlightMode, Order, OrderRefusal};
+use afbc_link::telemetry::BatteryStatus;
 use afbc_link::{
-    Address, Answer, AttitudeAndThrust, Axes, Command, Datum, Downlink, FRAME_MAX, Height, Mission, MissionItem,
-    MissionResult, Motion, Place, Plan, Sender, Sticks, Storage, Target, Telemetry, Uplink,
+    Address, Answer, AttitudeAndThrust, Axes, Command, Datum, Downlink, ExternalTarget, FRAME_MAX, Height,
+    ManualControl, Mission, MissionItem, MissionResult, Place, Plan, PositionTarget, Sender, Storage, Telemetry,
+    Uplink,
 };
-use afbc_onboard::parameters::Change;
+use afbc_onboard::parameters::RecordChange;
 use afbc_onboard::services::modes;
-use afbc_onboard::services::origin::{Global, Origin};
+use afbc_onboard::services::origin::{EarthOrigin, Global};
 use afbc_onboard::services::streams::id;
-use afbc_onboard::{BUSY, Comms, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN, Report, Setup, Surroundings};
+use afbc_onboard::{AuxSensors, BUSY, Comms, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN, Report, Setup};
 use afbc_types::{Setpoint, State};
 use common::{Bench, STATION};
 use nalgebra::Vector3;
@@ -28,8 +29,8 @@ fn at(place: [f32; 3]) -> State {
     State { position_m: place.into(), ..State::default() }
 }
 
-fn origin() -> Origin {
-    Origin::new(Origin::SIMULATED).expect("possible")
+fn origin() -> EarthOrigin {
+    EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible")
 }
 
 /// One that knows where it is, on the earth too or not; its home is elsewhere.
@@ -37,7 +38,7 @@ fn bench(located: bool) -> Bench {
     let mut bench = Bench::new();
     bench.comms = Comms::with(Setup { bytes_per_s: 1_000_000, ..Setup::default() });
     let origin = located.then(origin);
-    bench.comms.surround(Surroundings { origin, ..Surroundings::default() });
+    bench.comms.set_aux_sensors(AuxSensors { origin, ..AuxSensors::default() });
     for tick in 0..1200 {
         bench.measure(&at(if tick < 1100 { HOME } else { HERE }));
         bench.step();
@@ -56,13 +57,13 @@ fn orders(bench: &mut Bench, command: Command) -> (Vec<Order>, Option<Answer>) {
     // Whatever was before is done.
     (0..5).for_each(|_| drop(step(bench)));
     bench.hear(Uplink::Command(command));
-    let orders = bench.mail.orders.given.iter().flatten().map(|given| given.order).collect::<Vec<_>>();
+    let orders = bench.inputs.orders.given.iter().flatten().map(|given| given.order).collect::<Vec<_>>();
     let said = step(bench);
     let answer = said.iter().find_map(|message| match message {
         Downlink::Answer { answer, to: STATION, .. } => Some(*answer),
         _ => None,
     });
-    (orders, answer.filter(|_| bench.mail.orders.given == [None; 4]))
+    (orders, answer.filter(|_| bench.inputs.orders.given == [None; 4]))
 }
 
 fn leads_to(bench: &mut Bench, command: Command, expected: &[Order]) {
@@ -184,7 +185,7 @@ fn upload(bench: &mut Bench, items: &[MissionItem]) -> Option<MissionResult> {
 #[test]
 fn missions_begin_and_go_on_at_items_that_there_are() {
     let mut bench = bench(true);
-    let none = Answer::Refused(Declined::NoMission as i32);
+    let none = Answer::Refused(OrderRefusal::NoMission as i32);
     refused(&mut bench, Command::StartMission(0), none);
     refused(&mut bench, Command::SetCurrent(0), none);
     assert!(!bench.comms.has_mail());
@@ -202,12 +203,12 @@ fn missions_begin_and_go_on_at_items_that_there_are() {
 #[test]
 fn the_wanted_item_is_handed_over_once() {
     let mut bench = bench(true);
-    assert_eq!((bench.comms.has_mail(), bench.mail.orders.leg), (false, None));
+    assert_eq!((bench.comms.has_mail(), bench.inputs.orders.leg), (false, None));
     assert_eq!(upload(&mut bench, &[item(0, 22), item(1, 21)]), Some(MissionResult::ACCEPTED));
     let legs = |bench: &mut Bench| {
-        let mail = bench.comms.receive(&[]);
-        bench.mail.post(&mail);
-        mail.orders.leg
+        let inputs = bench.comms.receive(&[]);
+        bench.inputs.merge(&inputs);
+        inputs.orders.leg
     };
     // Handed over with the state that came after the upload.
     assert_eq!((bench.comms.has_mail(), legs(&mut bench)), (false, None));
@@ -245,7 +246,7 @@ fn orders_are_for_the_station_in_control() {
     leads_to(&mut bench, Command::Speed(2.0), &[Order::Speed(2.0)]);
     let mut told = |command| {
         bench.hear_from(OTHER, Uplink::Command(command));
-        assert_eq!(bench.mail.orders.given, [None; 4]);
+        assert_eq!(bench.inputs.orders.given, [None; 4]);
         let said = step(&mut bench);
         said.into_iter().find_map(|message| match message {
             Downlink::Answer { answer, to: OTHER, .. } => Some(answer),
@@ -298,8 +299,9 @@ fn messages_on_request_are_sent_or_refused_with_the_reason() {
     assert_eq!(ask(&mut bench, id::AVAILABLE_MODES, u32::from(modes::COUNT) + 1), Answer::Denied);
     assert_eq!(ask(&mut bench, 9_999, 0), Answer::Unsupported);
     assert_eq!(ask(&mut bench, id::BATTERY_STATUS, 0), Answer::Refused(NOT_KNOWN));
-    let battery = Battery { voltage_mv: 11_100, current_ca: -1, remaining_percent: -1, consumed_mah: -1, charge: 0 };
-    bench.comms.surround(Surroundings { battery: Some(battery), origin: Some(origin()), ..Surroundings::default() });
+    let battery =
+        BatteryStatus { voltage_mv: 11_100, current_ca: -1, remaining_percent: -1, consumed_mah: -1, charge: 0 };
+    bench.comms.set_aux_sensors(AuxSensors { battery: Some(battery), origin: Some(origin()), ..AuxSensors::default() });
     assert_eq!(ask(&mut bench, id::BATTERY_STATUS, 0), Answer::Accepted);
     // Each mode, in its place, when all are asked for.
     (0..20).for_each(|_| drop(step(&mut bench)));
@@ -376,7 +378,7 @@ fn stored_parameters_are_restored_disarmed_only() {
         refused(&mut disarmed, Command::Storage(storage), Answer::Accepted);
         assert_eq!(disarmed.changes.len(), changes);
     }
-    assert_eq!(disarmed.changes, [Change::Restored]);
+    assert_eq!(disarmed.changes, [RecordChange::Restored]);
     let mut armed = Bench::flying();
     armed.hear(Uplink::Command(Command::Storage(Storage::Reset)));
     let said = armed.tick(&State::default()).1;
@@ -389,7 +391,7 @@ fn stored_parameters_are_restored_disarmed_only() {
 #[test]
 fn targets_and_sticks_reach_the_guidance() {
     let nan = Vector3::from_element(f32::NAN);
-    let motion = |axes, position_m: Vector3<f32>, velocity_m_s: Vector3<f32>| Motion {
+    let motion = |axes, position_m: Vector3<f32>, velocity_m_s: Vector3<f32>| PositionTarget {
         axes,
         position_m,
         velocity_m_s,
@@ -401,8 +403,8 @@ fn targets_and_sticks_reach_the_guidance() {
     let mut bench = bench(true);
     let mut told = |from: Address, message: Uplink| {
         bench.hear_from(from, message);
-        let target = bench.mail.orders.target.map(|target| target.value);
-        let sticks = bench.mail.orders.sticks.map(|sticks| sticks.value);
+        let target = bench.inputs.orders.target.map(|target| target.value);
+        let sticks = bench.inputs.orders.sticks.map(|sticks| sticks.value);
         step(&mut bench);
         (target, sticks)
     };
@@ -413,30 +415,30 @@ fn targets_and_sticks_reach_the_guidance() {
         (Axes::Body, step_m, nan, step_m, false),
         (Axes::BodyOffset, step_m, nan, step_m, true),
     ] {
-        let (target, _) = told(STATION, Uplink::Target(Target::Motion(motion(axes, position_m, velocity_m_s))));
-        let Some(afbc_guidance::Target::Motion(target)) = target else { panic!("{axes:?}: {target:?}") };
+        let (target, _) = told(STATION, Uplink::Target(ExternalTarget::Motion(motion(axes, position_m, velocity_m_s))));
+        let Some(afbc_guidance::OffboardTarget::Motion(target)) = target else { panic!("{axes:?}: {target:?}") };
         let found = (target.position_m, target.velocity_m_s, target.yaw_rad, target.body);
         assert_eq!(format!("{found:?}"), format!("{:?}", (flown_m, velocity_m_s, 0.25, body)), "{axes:?}");
     }
     let there = place([40.0, -30.0, 0.0], Datum::Sea, 500.0);
-    let (target, _) = told(STATION, Uplink::Target(Target::Place(there, motion(Axes::Local, nan, fast))));
-    let Some(afbc_guidance::Target::Motion(target)) = target else { panic!("{target:?}") };
+    let (target, _) = told(STATION, Uplink::Target(ExternalTarget::Place(there, motion(Axes::Local, nan, fast))));
+    let Some(afbc_guidance::OffboardTarget::Motion(target)) = target else { panic!("{target:?}") };
     assert!((target.position_m - Vector3::new(40.0, -30.0, 12.0)).norm() < 0.02, "{target:?}");
     assert_eq!((target.velocity_m_s, target.body), (fast, false));
     let attitude = AttitudeAndThrust { attitude: [0.6, 0.8, 0.0, 0.0], yaw_rate_rad_s: 0.5, thrust: 0.25 };
-    let (target, _) = told(STATION, Uplink::Target(Target::Attitude(attitude)));
-    let Some(afbc_guidance::Target::Attitude(target)) = target else { panic!("{target:?}") };
+    let (target, _) = told(STATION, Uplink::Target(ExternalTarget::Attitude(attitude)));
+    let Some(afbc_guidance::OffboardTarget::Attitude(target)) = target else { panic!("{target:?}") };
     assert_eq!((target.yaw_rate_rad_s, target.thrust), (0.5, 0.25));
     assert!((target.attitude.w - 0.6).abs() < 1e-6 && (target.attitude.i.abs() - 0.8).abs() < 1e-6);
-    let sticks = Sticks { roll: 0.1, pitch: -0.2, throttle: 0.3, yaw: -0.4 };
-    let (target, told_sticks) = told(STATION, Uplink::Target(Target::Sticks(sticks)));
+    let sticks = ManualControl { roll: 0.1, pitch: -0.2, throttle: 0.3, yaw: -0.4 };
+    let (target, told_sticks) = told(STATION, Uplink::Target(ExternalTarget::Sticks(sticks)));
     assert_eq!(target, None);
     let found = told_sticks.expect("sticks");
     for (found, sent) in [(found.roll, 0.1), (found.pitch, -0.2), (found.throttle, 0.3), (found.yaw, -0.4)] {
         assert!((found - sent).abs() < 1e-2, "{found} {sent}");
     }
     // Another one's are not.
-    assert_eq!(told(OTHER, Uplink::Target(Target::Sticks(sticks))), (None, None));
+    assert_eq!(told(OTHER, Uplink::Target(ExternalTarget::Sticks(sticks))), (None, None));
     assert_eq!(told(OTHER, Uplink::Setpoint(Setpoint::default())), (None, None));
 }
 
@@ -447,7 +449,7 @@ fn an_offset_from_nowhere_is_no_target() {
     bench.step();
     let nan = Vector3::from_element(f32::NAN);
     for (axes, taken) in [(Axes::Offset, false), (Axes::Local, true)] {
-        let motion = Motion {
+        let motion = PositionTarget {
             axes,
             position_m: Vector3::new(1.0, 2.0, 3.0),
             velocity_m_s: nan,
@@ -455,8 +457,8 @@ fn an_offset_from_nowhere_is_no_target() {
             yaw_rad: f32::NAN,
             yaw_rate_rad_s: f32::NAN,
         };
-        bench.hear(Uplink::Target(Target::Motion(motion)));
-        assert_eq!(bench.mail.orders.target.is_some(), taken, "{axes:?}");
+        bench.hear(Uplink::Target(ExternalTarget::Motion(motion)));
+        assert_eq!(bench.inputs.orders.target.is_some(), taken, "{axes:?}");
     }
 }
 
@@ -469,7 +471,7 @@ fn the_guidance_hears_of_the_station_in_control() {
         let mut times = Vec::new();
         for _ in 0..1000 {
             bench.hear_from(from, Uplink::Heartbeat);
-            times.extend(bench.mail.orders.heard_us);
+            times.extend(bench.inputs.orders.heard_us);
             step(&mut bench);
         }
         times
@@ -498,7 +500,7 @@ fn health_tells_counts_and_times() {
         let mut decoder = afbc_link::Decoder::<Downlink>::new(STATION);
         bench.hear(Uplink::Command(Command::RequestMessage { message: id::DEBUG_FLOAT_ARRAY, index: 0 }));
         bench.now_us += 1000;
-        bench.mail.take_into(&mut bench.taken);
+        bench.inputs.take_into(&mut bench.taken);
         let report: Report = bench.flight.tick(bench.now_us, &mut bench.taken, &afbc_onboard::Readings::NONE);
         let mut told = None;
         bench.comms.report(&report, cycles, |bytes| {
@@ -540,8 +542,9 @@ fn what_the_shell_says_is_told() {
     let told = |it: &Downlink| matches!(it, Downlink::Text { text, .. } if text.to_str() == Ok("flash is worn"));
     assert!(said.iter().any(told), "{said:?}");
     for (current_ca, current_a) in [(1250, 12.5), (-1, 0.0)] {
-        let battery = Battery { voltage_mv: 11_100, current_ca, remaining_percent: -1, consumed_mah: -1, charge: 0 };
-        bench.comms.surround(Surroundings { battery: Some(battery), ..Surroundings::default() });
+        let battery =
+            BatteryStatus { voltage_mv: 11_100, current_ca, remaining_percent: -1, consumed_mah: -1, charge: 0 };
+        bench.comms.set_aux_sensors(AuxSensors { battery: Some(battery), ..AuxSensors::default() });
         let reading = bench.comms.receive(&[]).battery.expect("measured");
         assert!((reading.voltage_v - 11.1).abs() < 1e-5 && (reading.current_a - current_a).abs() < 1e-5, "{reading:?}");
     }

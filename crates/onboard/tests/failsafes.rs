@@ -3,7 +3,7 @@
 
 mod common;
 
-use afbc_flight_core::{End, Mode};
+use afbc_flight_core::{EndReason, Mode};
 use afbc_link::{Downlink, MavSeverity, Uplink};
 use afbc_onboard::Report;
 use afbc_types::{Setpoint, State};
@@ -122,7 +122,7 @@ proptest! {
             for tick in 0..ticks {
                 bench.now_us += 1000;
                 let given_up = last.armed() && !mode.armed();
-                let end = if tumbles { End::Tumbled } else { End::StateLost };
+                let end = if tumbles { EndReason::Tumbled } else { EndReason::StateLost };
                 let mut report = Report { mode, ended: given_up.then_some(end), time_us: bench.now_us, ..idle };
                 report.health.setpoint_stale = false;
                 let said = bench.said(&report);

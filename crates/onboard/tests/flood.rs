@@ -4,14 +4,17 @@
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc_flight_core::{Refusal, Request};
-use afbc_guidance::{Declined, FlightMode, Given};
+use afbc_guidance::{FlightMode, OrderRefusal, TicketedOrder};
 use afbc_link::{
-    Address, Answer, Command, Control, Counters, Decoder, Downlink, Message, Mission, ParameterRequest, Target, Uplink,
+    Address, Answer, Command, ControlRequest, Counters, Decoder, Downlink, ExternalTarget, Message, Mission,
+    ParameterRequest, Uplink,
 };
-use afbc_onboard::parameters::Table;
+use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::services::control::{SILENT_US, is_needed_for};
-use afbc_onboard::services::origin::Origin;
-use afbc_onboard::{Comms, Configuration, Flight, Guided, Mail, REPORT_MAX, Readings, Report, Surroundings};
+use afbc_onboard::services::origin::EarthOrigin;
+use afbc_onboard::{
+    AuxSensors, Comms, Configuration, ControlInputs, Flight, GuidanceResult, REPORT_MAX, Readings, Report,
+};
 use afbc_types::State;
 use std::collections::{BTreeMap, VecDeque};
 
@@ -96,7 +99,7 @@ impl Model {
         let holder = self.holder(now_us);
         let needs = match message {
             Uplink::Command(command) => is_needed_for(*command),
-            Uplink::Setpoint(_) | Uplink::Target(_) | Uplink::Control(Control::Take) => true,
+            Uplink::Setpoint(_) | Uplink::Target(_) | Uplink::Control(ControlRequest::Take) => true,
             Uplink::Mission(message) => {
                 matches!(message, Mission::Count(..) | Mission::Clear(_) | Mission::SetCurrent(_))
             }
@@ -104,7 +107,7 @@ impl Model {
             _ => false,
         };
         match (message, holder) {
-            (Uplink::Control(Control::Release), Some(holder)) if holder == from => self.0 = None,
+            (Uplink::Control(ControlRequest::Release), Some(holder)) if holder == from => self.0 = None,
             (_, None) if needs => self.0 = Some((from, now_us)),
             _ => (),
         }
@@ -119,13 +122,13 @@ fn every_command_is_answered_once_to_its_sender() {
     let mut random = Random(seed);
     let ids: Vec<(u32, u8, usize)> =
         (0..500).filter_map(|id| Uplink::format(id).map(|format| (id, format.extra_crc, format.length_max))).collect();
-    let (mut mail, mut taken) = (Mail::EMPTY, Mail::EMPTY);
+    let (mut inputs, mut taken) = (ControlInputs::EMPTY, ControlInputs::EMPTY);
     let mut flight: Flight = Flight::new(&Configuration::default()).expect("valid");
     let mut idle = flight.tick(1_000, &mut taken, &Readings::NONE);
     let mut comms = Comms::new();
-    let mut table: Table = Table::new(Configuration::default());
-    comms.surround(Surroundings { origin: Origin::new(Origin::SIMULATED), ..Surroundings::default() });
-    let mut orders: VecDeque<Given> = VecDeque::new();
+    let mut table: ParameterTable = ParameterTable::new(Configuration::default());
+    comms.set_aux_sensors(AuxSensors { origin: EarthOrigin::new(EarthOrigin::SIMULATED), ..AuxSensors::default() });
+    let mut orders: VecDeque<TicketedOrder> = VecDeque::new();
     let mut model = Model::default();
     // Answers that are due to a command of a station, less those that came.
     let mut due: BTreeMap<(u16, (u8, u8)), i64> = BTreeMap::new();
@@ -182,39 +185,39 @@ fn every_command_is_answered_once_to_its_sender() {
                 *due.entry((command.id(), (from.system, from.component))).or_default() += 1;
             }
             // Values that reached the guidance are numbers.
-            if let Uplink::Target(Target::Sticks(sticks)) = message {
+            if let Uplink::Target(ExternalTarget::Sticks(sticks)) = message {
                 assert!([sticks.roll, sticks.pitch, sticks.throttle, sticks.yaw].iter().all(|it| it.abs() <= 1.0));
             }
         });
-        let news = comms.receive(&stream);
+        let update = comms.receive(&stream);
         if !may {
-            let heard_only = afbc_guidance::Orders { heard_us: news.orders.heard_us, ..Default::default() };
-            assert_eq!(news.orders, heard_only, "after {sent} frames");
-            assert_eq!(news.inbox.setpoint(), None);
+            let heard_only = afbc_guidance::Orders { heard_us: update.orders.heard_us, ..Default::default() };
+            assert_eq!(update.orders, heard_only, "after {sent} frames");
+            assert_eq!(update.inbox.setpoint(), None);
             let stops = |request| matches!(request, Request::Disarm | Request::Kill);
-            assert!(news.inbox.asked().is_none_or(|asked| stops(asked.request)), "after {sent} frames");
+            assert!(update.inbox.asked().is_none_or(|asked| stops(asked.request)), "after {sent} frames");
         }
-        mail.post(&news);
-        mail.take_into(&mut taken);
+        inputs.merge(&update);
+        inputs.take_into(&mut taken);
         orders.extend(taken.orders.given.iter_mut().filter_map(Option::take));
         assert!(orders.len() <= afbc_guidance::order::ORDERS_MAX);
 
         // Flight core and guidance.
         let answer = taken.inbox.asked().map(|asked| {
             let result = if random.below(2) == 0 { Ok(()) } else { Err(random.of(&Refusal::ALL)) };
-            afbc_flight_core::Answer { ticket: asked.ticket, request: asked.request, result }
+            afbc_flight_core::RequestAnswer { ticket: asked.ticket, request: asked.request, result }
         });
         let ordered = orders.pop_front().map(|order| {
             given += 1;
-            let declined = random.of(&[Declined::NotArmed, Declined::NoTargets, Declined::OutOfRange]);
+            let declined = random.of(&[OrderRefusal::NotArmed, OrderRefusal::NoTargets, OrderRefusal::OutOfRange]);
             (order.ticket, if random.below(2) == 0 { Ok(()) } else { Err(declined) })
         });
-        let guided = Guided {
+        let guided = GuidanceResult {
             mode: random.of(&FlightMode::ALL),
             answer: ordered,
             wanted: random.below(4) as u16,
             reached: (random.below(50) == 0).then(|| random.below(4) as u16),
-            ..Guided::default()
+            ..GuidanceResult::default()
         };
         let estimate = (random.below(2) == 0).then(State::default);
         let report = Report { answer, guided, estimate, ..idle };

@@ -172,10 +172,10 @@ proptest! {
             if sent.from == STATION || [102, 138, 331].contains(&sent.id) {
                 continue;
             }
-            let news = bench.comms.receive(&frame(sent.from, sent.id, &sent.payload));
-            prop_assert_eq!(news.orders, Orders::default(), "{:?}", sent);
-            prop_assert_eq!(news.inbox.setpoint(), None);
-            if let Some(asked) = news.inbox.asked() {
+            let update = bench.comms.receive(&frame(sent.from, sent.id, &sent.payload));
+            prop_assert_eq!(update.orders, Orders::default(), "{:?}", sent);
+            prop_assert_eq!(update.inbox.setpoint(), None);
+            if let Some(asked) = update.inbox.asked() {
                 prop_assert!(matches!(asked.request, Request::Disarm | Request::Kill), "{:?}", sent);
             }
             prop_assert!(!bench.comms.wants_reboot());
@@ -232,7 +232,7 @@ fn a_second_station_is_told_once_and_follows() {
         assert_eq!(answers, [(Answer::Refused(afbc_onboard::NOT_IN_CONTROL), second)]);
         assert_eq!(texts.iter().filter(|text| *text == "245/190 ignored: 255/190 is in control").count(), 1 - times);
     }
-    bench.hear_from(first, Uplink::Control(afbc_link::Control::Release));
+    bench.hear_from(first, Uplink::Control(afbc_link::ControlRequest::Release));
     bench.hear_from(second, Uplink::Command(Command::Arm));
     let (answers, _) = heard(&mut bench);
     assert!(!answers.contains(&(Answer::Refused(afbc_onboard::NOT_IN_CONTROL), second)), "{answers:?}");

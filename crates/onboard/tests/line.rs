@@ -4,7 +4,7 @@
 mod common;
 
 use afbc_link::{Address, Command, Downlink, FRAME_MAX, ParameterRequest, Sender, Uplink};
-use afbc_onboard::parameters::Table;
+use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::services::streams::{DEFAULTS, id};
 use afbc_onboard::{Comms, Configuration, Link, Setup};
 use afbc_types::State;
@@ -18,7 +18,8 @@ const RING: usize = 1024;
 /// The vehicle on a line of so many baud.
 fn on(baud: f32) -> Bench {
     let mut bench = Bench::new();
-    bench.table = Table::new(Configuration { link: Link { baud, ..Link::DEFAULT }, ..Configuration::default() });
+    bench.table =
+        ParameterTable::new(Configuration { link: Link { baud, ..Link::DEFAULT }, ..Configuration::default() });
     bench.comms = Comms::with(Setup::of(&bench.table.configuration().link));
     bench
 }
@@ -102,7 +103,7 @@ fn everything_at_full_rate_fits_the_line() {
         assert_eq!(load.answered, load.asked, "{baud} baud");
         assert!(load.waited_ms <= 200, "{baud} baud: {} ms", load.waited_ms);
         assert_eq!(load.streams[&id::HEARTBEAT], seconds, "{baud} baud");
-        let count = Table::new(Configuration::default()).count();
+        let count = ParameterTable::new(Configuration::default()).count();
         assert_eq!(load.parameters, usize::from(count), "{baud} baud");
         for message in [id::ATTITUDE, id::LOCAL_POSITION_NED, id::SYS_STATUS, id::DEBUG_FLOAT_ARRAY] {
             let sent = load.streams.get(&message).copied().unwrap_or(0);

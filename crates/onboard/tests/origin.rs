@@ -1,9 +1,9 @@
 //! The local frame of a vehicle with a GNSS receiver.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use afbc_estimator::{Easing, Estimator, Measurement, Settings};
+use afbc_estimator::{Estimator, Measurement, OutputFilter, Settings};
 use afbc_flight_core::{Inbox, Refusal, Stamped};
-use afbc_onboard::{Aged, Navigation, Readings};
+use afbc_onboard::{Aged, EstimatorFrontEnd, Readings};
 use afbc_types::{Pose, PoseSigmas, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -29,7 +29,7 @@ fn fix(position_m: Vector3<f32>, velocity_m_s: Vector3<f32>, sigma_m: f32) -> Me
 
 /// A level vehicle that points north.
 struct Bench {
-    navigation: Navigation,
+    front_end: EstimatorFrontEnd,
     inbox: Inbox,
     /// What the estimate misses for flight.
     missing: Option<Refusal>,
@@ -38,10 +38,10 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let navigation = Estimator::new(Settings::DEFAULT)
-            .map(|estimator| Navigation::new(estimator, Easing::default()))
+        let front_end = Estimator::new(Settings::DEFAULT)
+            .map(|estimator| EstimatorFrontEnd::new(estimator, OutputFilter::default()))
             .expect("valid");
-        Bench { navigation, inbox: Inbox::default(), missing: None, ms: 0 }
+        Bench { front_end, inbox: Inbox::default(), missing: None, ms: 0 }
     }
 
     /// Runs a tick with this acceleration, and a fix that is true now.
@@ -54,7 +54,7 @@ impl Bench {
         let fix = fix.map(|value| Aged { value, age_us });
         let aids = if fix.is_some() { [fix, heading] } else { [heading, None] };
         let mut inbox = self.inbox.take();
-        let state = self.navigation.tick(self.ms * 1000, &Readings { imu, aids }, &mut inbox);
+        let state = self.front_end.tick(self.ms * 1000, &Readings { imu, aids }, &mut inbox);
         self.missing = inbox.missing();
         state.expect("it has a sample")
     }

@@ -4,9 +4,11 @@
 mod common;
 
 use afbc_link::{ParameterError, ParameterName, ParameterRequest, ParameterValue};
-use afbc_onboard::parameters::{Change, Kept, Kind, LINK_SHARE, Parameter, REASON_MAX, Service, Table, VALUE_BYTES};
+use afbc_onboard::parameters::{
+    Kept, Kind, LINK_SHARE, Parameter, ParameterTable, REASON_MAX, RecordChange, Service, VALUE_BYTES,
+};
 use afbc_onboard::{Configuration, Flight, Prepared};
-use afbc_store::{Name, Ram, Store, hash};
+use afbc_store::{Ram, RecordName, Store, hash};
 use afbc_types::State;
 use common::Bench;
 use proptest::prelude::*;
@@ -15,25 +17,25 @@ use std::sync::LazyLock;
 
 type Sectors = Ram<2048>;
 
-fn name(text: &str) -> Name {
-    Name::new(text).unwrap()
+fn name(text: &str) -> RecordName {
+    RecordName::new(text).unwrap()
 }
 
-fn table() -> Table {
-    Table::new(Configuration::default())
+fn table() -> ParameterTable {
+    ParameterTable::new(Configuration::default())
 }
 
-fn all(table: &Table) -> Vec<Parameter> {
+fn all(table: &ParameterTable) -> Vec<Parameter> {
     table.iter().collect()
 }
 
 /// Bits of every value, by name.
-fn bits(table: &Table) -> BTreeMap<Name, u32> {
+fn bits(table: &ParameterTable) -> BTreeMap<RecordName, u32> {
     all(table).iter().map(|parameter| (parameter.name, parameter.value.to_bits())).collect()
 }
 
 /// The parameters as they are at first, and their bits: each takes a walk over all of them.
-static FIRST: LazyLock<(Vec<Parameter>, BTreeMap<Name, u32>)> = LazyLock::new(|| (all(&table()), bits(&table())));
+static FIRST: LazyLock<(Vec<Parameter>, BTreeMap<RecordName, u32>)> = LazyLock::new(|| (all(&table()), bits(&table())));
 
 fn blank() -> Store<Sectors> {
     let mut store = Store::open(Sectors::BLANK, 0, hash(b"paper")).unwrap();
@@ -42,7 +44,7 @@ fn blank() -> Store<Sectors> {
 }
 
 /// What the next start reads, and its notices.
-fn restarted(store: Store<Sectors>, kept: &Kept) -> (Table, Store<Sectors>, Vec<String>) {
+fn restarted(store: Store<Sectors>, kept: &Kept) -> (ParameterTable, Store<Sectors>, Vec<String>) {
     let mut store = Store::open(store.into_flash(), 0, hash(b"paper")).unwrap();
     store.make_room().unwrap();
     let (mut table, mut notices) = (table(), Vec::new());
@@ -194,11 +196,17 @@ fn padded(text: &str) -> ParameterName {
 }
 
 /// Everything told in `ms` ticks of a millisecond.
-fn told(service: &mut Service, now_us: &mut u64, ms: u64, link_bytes_s: u32, table: &Table) -> Vec<ParameterValue> {
+fn told(
+    service: &mut Service,
+    now_us: &mut u64,
+    ms: u64,
+    link_bytes_s: u32,
+    table: &ParameterTable,
+) -> Vec<ParameterValue> {
     let mut said = Vec::new();
     for _ in 0..ms {
         *now_us += 1000;
-        said.extend(core::iter::from_fn(|| service.tell(*now_us, link_bytes_s, table)));
+        said.extend(core::iter::from_fn(|| service.next_value(*now_us, link_bytes_s, table)));
     }
     said
 }
@@ -289,7 +297,7 @@ fn every_set_is_answered_and_an_armed_vehicle_refuses() {
         (heard.change, heard.refused.map(|reason| reason.to_string()), value)
     };
     let refused = |text: &str| Some(text.to_owned());
-    let change = |text: &str, value| Some(Change::Set(name(text), value));
+    let change = |text: &str, value| Some(RecordChange::Set(name(text), value));
     assert_eq!(set(real("V_MASS", 0.5), true), (change("V_MASS", Some(0.5)), None, 0.5));
     assert_eq!(set(real("V_MASS", 0.5), false), (None, None, 0.5), "nothing changes");
     assert_eq!(set(real("V_MASS", 0.6), false), (None, refused("V_MASS: not while armed"), 0.5));
@@ -320,7 +328,7 @@ fn defaults_are_restored_and_listed() {
     service.hear(real("V_MASS", 0.5), &mut table, true);
     assert!(service.restore(&mut table, false).is_err());
     assert_ne!(table, image);
-    assert_eq!(service.restore(&mut table, true), Ok(Change::Restored));
+    assert_eq!(service.restore(&mut table, true), Ok(RecordChange::Restored));
     assert_eq!(table, image);
     assert_eq!(told(&mut service, &mut now_us, 10_000, 11_520, &table).len(), 1 + usize::from(table.count()));
 }
@@ -356,11 +364,12 @@ proptest! {
             sets += u32::from(way == 3);
             if kind.is_multiple_of(3) {
                 now_us = now_us.wrapping_add(u64::from(place));
-                answers += core::iter::from_fn(|| service.tell(now_us, link_bytes_s, &table)).take(3).count() as u32;
+                let values = core::iter::from_fn(|| service.next_value(now_us, link_bytes_s, &table));
+                answers += values.take(3).count() as u32;
             }
         }
         prop_assert!(Flight::new(table.configuration()).is_ok());
-        answers += core::iter::from_fn(|| service.tell(now_us, 0, &table)).count() as u32;
+        answers += core::iter::from_fn(|| service.next_value(now_us, 0, &table)).count() as u32;
         prop_assert!(answers + service.dropped() >= sets, "{answers} answers to {sets} sets");
     }
 
@@ -398,7 +407,7 @@ proptest! {
         // Only what differs from the image.
         let (image, mut kept) = (bits(&table()), BTreeMap::new());
         store.visit(|name, _, bits| _ = kept.insert(name, bits)).unwrap();
-        let differing: BTreeMap<Name, u32> =
+        let differing: BTreeMap<RecordName, u32> =
             bits(&now).into_iter().filter(|(name, bits)| image[name] != *bits).collect();
         prop_assert_eq!(kept, differing);
     }
@@ -429,7 +438,7 @@ fn a_later_image_reads_what_an_earlier_one_wrote() {
         ("C_LIMITS_CLIMB", 1e9),
         ("C_LIMITS_TILT", 0.9),
     ] {
-        earlier.keep(&mut store, Change::Set(name(text), Some(value))).unwrap();
+        earlier.keep(&mut store, RecordChange::Set(name(text), Some(value))).unwrap();
     }
     let later = Kept {
         edition: 4,
@@ -451,10 +460,10 @@ fn a_later_image_reads_what_an_earlier_one_wrote() {
     assert_eq!(reasons, BTreeSet::from(expected));
     // The new name takes over, and is restored without the old one's coming back.
     found.set(name("ARM_TILT_MAX"), 0.2).unwrap();
-    later.keep(&mut store, Change::Set(name("ARM_TILT_MAX"), Some(0.2))).unwrap();
+    later.keep(&mut store, RecordChange::Set(name("ARM_TILT_MAX"), Some(0.2))).unwrap();
     let (found, mut store, _) = restarted(store, &later);
     assert_eq!(found.get(name("ARM_TILT_MAX")).unwrap().value, 0.2);
-    later.keep(&mut store, Change::Set(name("ARM_TILT_MAX"), None)).unwrap();
+    later.keep(&mut store, RecordChange::Set(name("ARM_TILT_MAX"), None)).unwrap();
     let (found, ..) = restarted(store, &later);
     assert_eq!(found.get(name("ARM_TILT_MAX")), image.get(name("ARM_TILT_MAX")));
 }
@@ -463,7 +472,7 @@ fn a_later_image_reads_what_an_earlier_one_wrote() {
 #[test]
 fn values_with_which_the_vehicle_could_not_fly_are_left_out() {
     let (mut store, keep) = (blank(), |store: &mut Store<_>, text: &str, value| {
-        Kept::NOW.keep(store, Change::Set(name(text), Some(value))).unwrap();
+        Kept::NOW.keep(store, RecordChange::Set(name(text), Some(value))).unwrap();
     });
     // The mass needs the larger Theta_hat, which comes later.
     keep(&mut store, "V_MASS", 0.7);

@@ -1,7 +1,7 @@
 //! Local and global coordinates, compared with the definition of geodetic coordinates.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use afbc_onboard::services::origin::{Global, Origin};
+use afbc_onboard::services::origin::{EarthOrigin, Global};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
@@ -31,7 +31,7 @@ proptest! {
     /// `f32`, and the sagitta.
     #[test]
     fn distances_are_true(at in places(), x in -707.0..707.0f32, y in -707.0..707.0f32) {
-        let origin = Origin::new(at).expect("possible");
+        let origin = EarthOrigin::new(at).expect("possible");
         let place = origin.global(&Vector3::new(x, y, 0.0));
         let true_m = (earth(&place) - earth(&at)).norm();
         let local_m = f64::from(x).hypot(f64::from(y));
@@ -42,7 +42,7 @@ proptest! {
 
     #[test]
     fn the_way_back_is_the_way(at in places(), x in -5e3..5e3f32, y in -5e3..5e3f32, z in -500.0..500.0f32) {
-        let origin = Origin::new(at).expect("possible");
+        let origin = EarthOrigin::new(at).expect("possible");
         let there = Vector3::new(x, y, z);
         let back = origin.local(&origin.global(&there));
         prop_assert!((back - there).norm() < 2e-3, "{there} {back}");

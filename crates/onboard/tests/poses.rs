@@ -116,7 +116,7 @@ fn without_an_inertial_sensor_poses_are_ignored() {
     let mut other = Bench::new();
     for ms in 0..3_000 {
         bench.hear(message(By::Pose, ms * 1000 + 500, state(noise(ms).x), PoseSigmas::UNKNOWN));
-        assert_eq!(bench.mail.inbox.pose(), None);
+        assert_eq!(bench.inputs.inbox.pose(), None);
         for bench in [&mut bench, &mut other] {
             bench.measure(&State::default());
         }
@@ -140,9 +140,9 @@ fn late_poses_count_for_their_own_time() {
                 waiting.push_back((ms + delay_ms, message(by, ms * 1000, measured, PoseSigmas::UNKNOWN)));
             }
             while let Some((_, message)) = waiting.pop_front_if(|(arrives_ms, _)| *arrives_ms <= ms) {
-                let before = bench.mail.inbox.state().copied();
+                let before = bench.inputs.inbox.state().copied();
                 bench.hear(message);
-                let state = bench.mail.inbox.state().filter(|state| Some(**state) != before);
+                let state = bench.inputs.inbox.state().filter(|state| Some(**state) != before);
                 assert!(state.is_none_or(|state| state.age_us(bench.now_us) <= 20_000), "too old to fly on");
             }
             let (offset_m, acceleration_m_s2) = swing(ms);

@@ -3,7 +3,7 @@
 
 use afbc_flight_core::{Mode, Refusal};
 use afbc_link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
-use afbc_onboard::{CLOCK_FAILED, Comms, Configuration, Flight, Mail, TICK_OFF};
+use afbc_onboard::{CLOCK_FAILED, Comms, Configuration, ControlInputs, Flight, TICK_OFF};
 use afbc_types::{PoseSigmas, Setpoint, State};
 
 const STATION: Address = Address { system: 255, component: 190 };
@@ -12,8 +12,8 @@ const STATION: Address = Address { system: 255, component: 190 };
 struct Bench {
     flight: Flight,
     comms: Comms,
-    mail: Mail,
-    taken: Mail,
+    inputs: ControlInputs,
+    taken: ControlInputs,
     sender: Sender,
     decoder: Decoder<Downlink>,
     now_us: u64,
@@ -28,8 +28,8 @@ impl Bench {
         Bench {
             flight: Flight::new(&Configuration::default()).expect("valid"),
             comms: Comms::new(),
-            mail: Mail::EMPTY,
-            taken: Mail::EMPTY,
+            inputs: ControlInputs::EMPTY,
+            taken: ControlInputs::EMPTY,
             sender: Sender::new(STATION),
             decoder: Decoder::new(STATION),
             now_us: 0,
@@ -40,8 +40,8 @@ impl Bench {
     }
 
     fn hear(&mut self, message: Uplink) {
-        let news = self.comms.receive(self.sender.send(&message, &mut [0; FRAME_MAX]));
-        self.mail.post(&news);
+        let update = self.comms.receive(self.sender.send(&message, &mut [0; FRAME_MAX]));
+        self.inputs.merge(&update);
     }
 
     /// Runs ticks with this period.
@@ -53,7 +53,7 @@ impl Bench {
             state.position_m.z = 1e-6 * (self.now_us % 11) as f32;
             self.hear(Uplink::State { sent_us: self.now_us, state, sigmas: PoseSigmas::UNKNOWN });
             self.hear(Uplink::Setpoint(Setpoint::default()));
-            self.mail.take_into(&mut self.taken);
+            self.inputs.take_into(&mut self.taken);
             let report = self.flight.tick(self.now_us, &mut self.taken, &afbc_onboard::Readings::NONE);
             self.mode = report.mode;
             let Bench { comms, decoder, texts, answers, .. } = self;

@@ -7,9 +7,9 @@ mod common;
 mod dialect;
 
 use afbc_link::{Address, Command, Uplink};
-use afbc_onboard::services::origin::{Global, Origin};
+use afbc_onboard::services::origin::{EarthOrigin, Global};
 use afbc_onboard::services::streams::{DEFAULTS, id};
-use afbc_onboard::{Comms, Configuration, Link, Readings, Setup, Surroundings, parameters::Table};
+use afbc_onboard::{AuxSensors, Comms, Configuration, Link, Readings, Setup, parameters::ParameterTable};
 use afbc_types::State;
 use common::{Bench, STATION};
 use dialect::{Expected, expected};
@@ -176,10 +176,11 @@ fn receiver(sample: &Sample) -> Option<Address> {
 /// among them is asked for each millisecond.
 fn on(baud: f32) -> Bench {
     let mut bench = Bench::new();
-    bench.table = Table::new(Configuration { link: Link { baud, ..Link::DEFAULT }, ..Configuration::default() });
+    bench.table =
+        ParameterTable::new(Configuration { link: Link { baud, ..Link::DEFAULT }, ..Configuration::default() });
     bench.comms = Comms::with(Setup::of(&bench.table.configuration().link));
-    let origin = Origin::new(Global { altitude_m: 400.0, ..Origin::SIMULATED });
-    bench.comms.surround(Surroundings { origin, ..Surroundings::default() });
+    let origin = EarthOrigin::new(Global { altitude_m: 400.0, ..EarthOrigin::SIMULATED });
+    bench.comms.set_aux_sensors(AuxSensors { origin, ..AuxSensors::default() });
     for (message, _) in DEFAULTS {
         let answers = [id::MISSION_CURRENT, id::GPS_GLOBAL_ORIGIN, id::HOME_POSITION].contains(&message);
         let interval_us = if answers { -1 } else { 1_000 };
@@ -198,8 +199,8 @@ fn step(bench: &mut Bench) -> Vec<Sample> {
         bench.measure(&State::default());
     }
     bench.now_us += 1000;
-    let Bench { flight, comms, table, mail, taken, now_us, .. } = bench;
-    mail.take_into(taken);
+    let Bench { flight, comms, table, inputs, taken, now_us, .. } = bench;
+    inputs.take_into(taken);
     let report = flight.tick(*now_us, taken, &Readings::NONE);
     let (mut sent, mut bytes) = (Vec::new(), 0);
     let mut send = |frame: &[u8]| {

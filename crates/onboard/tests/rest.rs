@@ -1,9 +1,9 @@
 //! A vehicle that stands outdoors stays where it is, whatever its receiver's error does.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
-use afbc_estimator::{Easing, Estimator, Measurement, Settings};
+use afbc_estimator::{Estimator, Measurement, OutputFilter, Settings};
 use afbc_flight_core::Inbox;
-use afbc_onboard::{Aged, Configuration, Flight, Mail, Navigation, Readings};
+use afbc_onboard::{Aged, Configuration, ControlInputs, EstimatorFrontEnd, Flight, Readings};
 use afbc_types::State;
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -66,8 +66,8 @@ fn stands(
     (away_m, speed_m_s)
 }
 
-fn navigation() -> Navigation {
-    Navigation::new(Estimator::new(Settings::DEFAULT).expect("valid"), Easing::default())
+fn navigation() -> EstimatorFrontEnd {
+    EstimatorFrontEnd::new(Estimator::new(Settings::DEFAULT).expect("valid"), OutputFilter::default())
 }
 
 proptest! {
@@ -92,9 +92,9 @@ proptest! {
 #[test]
 fn a_disarmed_vehicle_stays_where_it_stands() {
     let mut flight: Flight = Flight::new(&Configuration::default()).expect("valid");
-    let mut mail = Mail::default();
+    let mut inputs = ControlInputs::default();
     let (away_m, speed_m_s) = stands(Vector3::new(30.0, -20.0, 10.0), Vector3::new(2.0, -2.0, 3.0), |ms, readings| {
-        flight.tick(ms * 1000, &mut mail, readings).estimate
+        flight.tick(ms * 1000, &mut inputs, readings).estimate
     });
     assert!(away_m < 0.15 && speed_m_s < 0.1, "{away_m} m, {speed_m_s} m/s");
 }

@@ -4,7 +4,7 @@
 mod common;
 
 use afbc_link::{Address, Answer, Command, Downlink, ParameterName, ParameterRequest, ParameterValue, Storage, Uplink};
-use afbc_onboard::parameters::{Change, LINK_SHARE, VALUE_BYTES};
+use afbc_onboard::parameters::{LINK_SHARE, RecordChange, VALUE_BYTES};
 use afbc_onboard::{Comms, Setup};
 use afbc_types::State;
 use common::Bench;
@@ -65,7 +65,7 @@ fn the_station_in_control_sets_and_everyone_hears_it() {
     let heard = listen(&mut bench, 20);
     assert_eq!(told(&heard, HEIGHT), Some(4.0));
     assert_eq!((height(&bench), bench.changes.len(), heard.texts.len()), (4.0, 1, 0), "{:?}", heard.texts);
-    assert!(matches!(bench.changes[..], [Change::Set(_, Some(4.0))]));
+    assert!(matches!(bench.changes[..], [RecordChange::Set(_, Some(4.0))]));
     // Another one is told who is in control, and the value that has not changed.
     bench.hear_from(SECOND, set(HEIGHT, 7.0));
     let heard = listen(&mut bench, 20);
@@ -123,7 +123,7 @@ fn defaults_are_restored_by_command() {
     assert_eq!(bench.changes.len(), 2);
     bench.hear(Uplink::Command(Command::Storage(Storage::Reset)));
     let heard = listen(&mut bench, 2000);
-    assert_eq!((bench.changes.last(), heard.answers), (Some(&Change::Restored), vec![Answer::Accepted]));
+    assert_eq!((bench.changes.last(), heard.answers), (Some(&RecordChange::Restored), vec![Answer::Accepted]));
     assert_eq!(bench.table, before);
     // The list follows, for every station.
     assert_eq!(heard.values.len(), usize::from(before.count()));

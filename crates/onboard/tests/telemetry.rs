@@ -3,7 +3,7 @@
 
 mod common;
 
-use afbc_link::{Command, Downlink, Motion, Uplink};
+use afbc_link::{Command, Downlink, PositionTarget, Uplink};
 use afbc_onboard::services::streams::id;
 use afbc_types::{Setpoint, State};
 use common::Bench;
@@ -30,7 +30,7 @@ fn the_setpoint_that_is_followed_is_told() {
                 assert!(report.mode.armed());
                 assert_eq!(u64::from(time_ms), report.time_us / 1000);
                 let followed = report.guided.setpoint.expect("it has a state");
-                assert_eq!(format!("{motion:?}"), format!("{:?}", Motion::from(&followed)));
+                assert_eq!(format!("{motion:?}"), format!("{:?}", PositionTarget::from(&followed)));
                 told.push((tick, motion.position_m));
             }
         }

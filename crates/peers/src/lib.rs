@@ -36,13 +36,13 @@
 //! `Gains::TUNED` are by `sitl tune` (`docs/tuning.md`).
 //!
 //! ```
-//! use afbc_control::{FlightController, Screened, Settings};
+//! use afbc_control::{FlightController, Validated, Settings};
 //! use afbc_types::{Parameters, Setpoint, State};
 //! use afbc_peers::pid::{Gains, Pid};
 //!
 //! let settings = Settings { rotor_force_max_n: 3.0, ..Settings::DEFAULT };
 //! let controller = Pid::new(Parameters::PAPER.to_f32(), settings, Gains::PAPER_VEHICLE)?;
-//! let action = controller.step(&mut Screened::default(), Some(&State::default()), &Setpoint::default());
+//! let action = controller.step(&mut Validated::default(), Some(&State::default()), &Setpoint::default());
 //! assert!((action.forces.0.sum() - 0.486 * 9.81).abs() < 1e-5); // nothing to correct: the weight
 //! # Ok::<(), afbc_types::OutOfRange>(())
 //! ```

@@ -7,7 +7,7 @@ mod harness;
 
 use afbc_control::FlightController;
 use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
-use afbc_plant::{Environment, Gust, GustKind, Motion, ParameterChange, Quantity};
+use afbc_plant::{Environment, Gust, GustKind, Motion, ParameterChange, PlantParameter};
 use afbc_types::{Axis, Parameters, Setpoint};
 use core::f64::consts::FRAC_PI_2;
 use harness::{
@@ -176,7 +176,7 @@ fn the_hover_thrust_takes_over_from_the_integral() {
         let (strength, mass) = (0.65 + 0.75 * random.uniform(), 0.8 + 0.4 * random.uniform());
         let push = 5.0 * (random.uniform() - 0.5);
         let environment = || {
-            let changes = [(Quantity::ThrustFactor, strength), (Quantity::Mass, mass)]
+            let changes = [(PlantParameter::ThrustFactor, strength), (PlantParameter::Mass, mass)]
                 .map(|(quantity, factor)| ParameterChange { quantity, factor, start_s: 2.0, end_s: f64::INFINITY });
             let gust =
                 Gust { axis: Axis::X, kind: GustKind::Acceleration, size: push, start_s: 0.0, end_s: f64::INFINITY };
@@ -277,7 +277,7 @@ fn indi_flies_rotors_of_half_to_twice_the_lag_it_is_told() {
 /// A vehicle whose mass, inertia and thrust factor differ at random from what the controllers know, pushed by a
 /// constant force and moment.
 struct Stranger {
-    factors: [(Quantity, f64); 3],
+    factors: [(PlantParameter, f64); 3],
     /// Against each axis: linear \[m/s2\], then angular \[rad/s2\].
     push: [f64; 6],
 }
@@ -286,9 +286,9 @@ impl Stranger {
     fn new(random: &mut Random) -> Self {
         let mut within = |low: f64, high: f64| low + (high - low) * random.uniform();
         let factors = [
-            (Quantity::Mass, within(0.8, 1.25)),
-            (Quantity::Inertia, within(0.7, 1.4)),
-            (Quantity::ThrustFactor, within(0.8, 1.2)),
+            (PlantParameter::Mass, within(0.8, 1.25)),
+            (PlantParameter::Inertia, within(0.7, 1.4)),
+            (PlantParameter::ThrustFactor, within(0.8, 1.2)),
         ];
         let push = [1.0, 1.0, 1.0, 2.0, 2.0, 0.5].map(|size| within(-size, size));
         Stranger { factors, push }
@@ -346,7 +346,7 @@ fn strangers_come_to_rest_where_they_should() {
 fn l1_rejects_what_is_matched() {
     let left = |push: [f64; 6], adapting: bool| {
         let stranger = Stranger {
-            factors: [(Quantity::Mass, 1.0), (Quantity::Inertia, 1.0), (Quantity::ThrustFactor, 1.0)],
+            factors: [(PlantParameter::Mass, 1.0), (PlantParameter::Inertia, 1.0), (PlantParameter::ThrustFactor, 1.0)],
             push,
         };
         let start = at([0.0, 0.0, 3.0], 0.0);

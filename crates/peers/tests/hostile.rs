@@ -3,7 +3,7 @@
 
 mod harness;
 
-use afbc_control::{FlightController, Screened, Settings};
+use afbc_control::{FlightController, Settings, Validated};
 use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
 use afbc_types::{Declared, Range, Setpoint, State, Value};
 use core::convert::Infallible;
@@ -59,7 +59,7 @@ fn anywhere(gains: &mut impl Declared, shares: &[f64]) {
 }
 
 fn harmless<C: FlightController>(controller: &C, settings: &Settings, inputs: &[(State, Setpoint)]) {
-    let mut memory = Screened::<C::Memory>::default();
+    let mut memory = Validated::<C::Memory>::default();
     let fastest = libm::sqrtf(settings.rotor_force_max_n / vehicle().thrust_factor_n_s2) * 1.000_001;
     for (state, setpoint) in inputs {
         let command = controller.step(&mut memory, Some(state), setpoint);
@@ -123,7 +123,7 @@ fn the_same_input_gives_the_same_bits() {
     fn twice<C: FlightController>(controller: &C) {
         let state = State { position_m: Vector3::new(0.1, 0.2, 0.3), ..State::default() };
         let run = || {
-            let mut memory = Screened::<C::Memory>::default();
+            let mut memory = Validated::<C::Memory>::default();
             (0..100).map(|_| controller.step(&mut memory, Some(&state), &Setpoint::default())).collect::<Vec<_>>()
         };
         assert_eq!(run(), run());

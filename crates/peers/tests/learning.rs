@@ -3,7 +3,7 @@
 
 mod harness;
 
-use afbc_control::{FlightController, Screened};
+use afbc_control::{FlightController, Validated};
 use afbc_peers::attitude::r_earth_body;
 use afbc_peers::{L1, geometric, indi, l1, pid};
 use afbc_types::{Setpoint, State};
@@ -16,13 +16,13 @@ fn an_integrator_does_not_wind_up_against_a_limit() {
     // Far away sideways and above for 20 s: tilt and thrust stay at their limits.
     let state = State { position_m: Vector3::new(-50.0, 0.0, 0.0), ..State::default() };
     let far = Setpoint { position_m: Vector3::new(0.0, 0.0, 500.0), ..Setpoint::default() };
-    let mut memory = Screened::<pid::Memory>::default();
+    let mut memory = Validated::<pid::Memory>::default();
     for _ in 0..20_000 {
         let _ = pid().step(&mut memory, Some(&state), &far);
     }
     // 20 s of 4 1/s2 times 3 m/s would be 240 m/s2, clipped to 9.81 m/s2.
     assert!(memory.control.velocity_integral.x < 4.0, "{:?}", memory.control.velocity_integral);
-    let mut memory = Screened::<geometric::Memory>::default();
+    let mut memory = Validated::<geometric::Memory>::default();
     for _ in 0..20_000 {
         let _ = goodarzi().step(&mut memory, Some(&state), &far);
     }
@@ -34,12 +34,12 @@ fn an_integrator_does_not_wind_up_against_a_limit() {
 
     // A yaw error beyond the rotors' authority: the rate integral does not move.
     let turned = Setpoint { yaw_rad: 2.5, ..Setpoint::default() };
-    let mut memory = Screened::<pid::Memory>::default();
+    let mut memory = Validated::<pid::Memory>::default();
     for _ in 0..5000 {
         let _ = pid().step(&mut memory, Some(&State::default()), &turned);
     }
     assert!(memory.control.rate_integral.z < 0.1, "{:?}", memory.control.rate_integral);
-    let mut memory = Screened::<geometric::Memory>::default();
+    let mut memory = Validated::<geometric::Memory>::default();
     for _ in 0..5000 {
         let _ = goodarzi().step(&mut memory, Some(&State::default()), &turned);
     }
@@ -52,7 +52,7 @@ fn nothing_is_learnt_from_a_stale_state() {
     fn learnt<C: FlightController, L: PartialEq + core::fmt::Debug>(controller: &C, of: fn(&C::Memory) -> L) -> [L; 3] {
         let state = State { position_m: Vector3::new(-0.1, 0.2, 0.3), ..State::default() };
         let lost = State { position_m: Vector3::new(f32::NAN, 0.0, 0.0), ..State::default() };
-        let mut memory = Screened::<C::Memory>::default();
+        let mut memory = Validated::<C::Memory>::default();
         let before = of(&memory.control);
         for _ in 0..100 {
             let _ = controller.step(&mut memory, Some(&state), &Setpoint::default());
@@ -75,7 +75,7 @@ fn nothing_is_learnt_from_a_stale_state() {
 /// After an outage in which the vehicle has moved, L1 does not take the jump of the state for a disturbance.
 #[test]
 fn l1_starts_its_prediction_again_after_an_outage() {
-    let mut memory = Screened::<l1::Memory>::default();
+    let mut memory = Validated::<l1::Memory>::default();
     let state = State::default();
     for _ in 0..100 {
         let _ = l1().step(&mut memory, Some(&state), &Setpoint::default());
@@ -100,7 +100,7 @@ fn l1_estimates_what_the_model_does_not_explain() {
     let effectiveness = Vector3::new(65.789_47, 65.789_47, 1.425_1);
     let mut random = Random(6);
     for _ in 0..100 {
-        let mut memory = Screened::<l1::Memory>::default();
+        let mut memory = Validated::<l1::Memory>::default();
         let (force, moment) = (vector(&mut random, 30.0), vector(&mut random, 150.0));
         let (mut velocity, mut rates) = (vector(&mut random, 1.0), vector(&mut random, 2.0));
         let attitude_rad = vector(&mut random, 0.4).cast::<f32>();
@@ -130,7 +130,7 @@ fn l1_estimates_what_the_model_does_not_explain() {
 fn increments_cancel_a_constant_moment() {
     let controller = indi();
     let mixer = afbc_control::mixer::Mixer::new(vehicle(), SETTINGS.rotor_force_max_n).unwrap();
-    let mut memory = Screened::<indi::Memory>::default();
+    let mut memory = Validated::<indi::Memory>::default();
     let mut rotors = nalgebra::Vector4::repeat(libm::sqrt(f64::from(WEIGHT_N) / 4.0 / 2.984e-5));
     let effectiveness = 3.232e-7 / 2.984e-5 / 0.0076;
     let (lag, dt_s) = (1.0 - libm::exp(-0.05), 1e-3);

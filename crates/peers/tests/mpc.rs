@@ -3,7 +3,7 @@
 
 mod harness;
 
-use afbc_control::{FlightController, Screened};
+use afbc_control::{FlightController, Validated};
 use afbc_peers::mpc::Gains;
 use afbc_peers::{Mpc, mpc};
 use afbc_types::{Setpoint, State};
@@ -74,7 +74,7 @@ impl Axis {
 
 fn first(gains: Gains, state: &State, setpoint: &Setpoint) -> Vector3<f64> {
     let mpc = Mpc::new(vehicle(), SETTINGS, gains).unwrap();
-    let mut memory = Screened::<mpc::Memory>::default();
+    let mut memory = Validated::<mpc::Memory>::default();
     let _ = mpc.step(&mut memory, Some(state), setpoint);
     let trace = Mpc::<4>::trace(&memory.control);
     let [x, y] = trace.virtual_m_s2;

@@ -2,7 +2,7 @@
 
 use crate::budget::Linked;
 use crate::exercise::motion;
-use crate::{Board, Error};
+use crate::{EmulatedBoard, Error};
 use afbc_sim::in_the_loop::Station;
 use std::path::Path;
 use std::time::Duration;
@@ -35,7 +35,7 @@ impl Beside {
         };
         let [encode, systick, byte, wake] =
             [address("flight::board::encode")?, address("SysTick")?, address("USART1")?, address("CAN2_RX0")?];
-        let mut board = Board::boot(elf)?;
+        let mut board = EmulatedBoard::boot(elf)?;
         let mut station = Station::default();
         for count in 1..=50_u32 {
             let (state, _) = motion(count as f32);

@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::Duration;
 
-/// Longest wait in [`Board::receive`].
+/// Longest wait in [`EmulatedBoard::receive`].
 const PATIENCE: Duration = Duration::from_millis(100);
 /// Time after which a board that accepts no bytes counts as stuck.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
@@ -28,7 +28,7 @@ const ICSR: u32 = 0xE000_ED04;
 /// Its clock counts instructions, so a busy host does not make it late. Its idle loop spins instead of sleeping, so
 /// that its time does not run ahead of the host.
 #[derive(Debug)]
-pub struct Board {
+pub struct EmulatedBoard {
     qemu: Qemu,
     gdb: Gdb,
     clock_tree: ClockTree,
@@ -37,21 +37,21 @@ pub struct Board {
     clock_accesses: usize,
 }
 
-impl Board {
+impl EmulatedBoard {
     /// Boots the image; returns when its clocks are set up and it runs.
     ///
     /// # Errors
     /// If QEMU or the image is missing, or the boot does not finish.
     pub fn boot(elf: &Path) -> Result<Self, Error> {
-        Board::boot_with(elf, true)
+        EmulatedBoard::boot_with(elf, true)
     }
 
     /// Boots the image on a board whose crystal does not start.
     ///
     /// # Errors
-    /// As for [`Board::boot`].
+    /// As for [`EmulatedBoard::boot`].
     pub fn boot_without_crystal(elf: &Path) -> Result<Self, Error> {
-        Board::boot_with(elf, false)
+        EmulatedBoard::boot_with(elf, false)
     }
 
     fn boot_with(elf: &Path, crystal: bool) -> Result<Self, Error> {
@@ -76,7 +76,7 @@ impl Board {
         let clock_accesses = clock_tree.boot(&mut gdb)?;
         clock_tree::skip_first_store(&mut gdb, USART1_SR)?;
         gdb.resume()?;
-        Ok(Board { qemu, gdb, clock_tree, usart1, received, clock_accesses })
+        Ok(EmulatedBoard { qemu, gdb, clock_tree, usart1, received, clock_accesses })
     }
 
     /// Returns how often the image accessed the clock tree while booting.

@@ -23,7 +23,7 @@ const REPLY_MAX: usize = 4096;
 
 /// Result of one control tick of the firmware.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Reply {
+pub struct TickReply {
     /// Start of the tick, since power-up \[us\].
     pub time_us: u64,
     /// Duration in cycles of 168 MHz, as measured by the firmware.
@@ -44,7 +44,7 @@ pub struct Emulator {
     qemu: Qemu,
     to_firmware: File,
     readings: Readings,
-    replies: Receiver<io::Result<Reply>>,
+    replies: Receiver<io::Result<TickReply>>,
     /// Writing end of the firmware's FIFO: while it is open, the reader waits for more.
     hold: Option<File>,
     reader: Option<JoinHandle<()>>,
@@ -103,7 +103,7 @@ impl Emulator {
     ///
     /// # Errors
     /// If the firmware panicked, faulted or hangs.
-    pub fn exchange(&mut self, to_firmware: &[u8]) -> Result<Reply, Error> {
+    pub fn exchange(&mut self, to_firmware: &[u8]) -> Result<TickReply, Error> {
         let mut frame = core::mem::take(&mut self.readings).to_bytes().to_vec();
         frame.extend_from_slice(&(to_firmware.len() as u32).to_le_bytes());
         frame.extend_from_slice(to_firmware);
@@ -135,7 +135,7 @@ impl Drop for Emulator {
     }
 }
 
-fn read_reply(from: &mut impl Read, shift: u32) -> io::Result<Reply> {
+fn read_reply(from: &mut impl Read, shift: u32) -> io::Result<TickReply> {
     let mut head = [0; ReplyHead::LEN];
     from.read_exact(&mut head)?;
     let ReplyHead { time_us, cycles, stack_bytes, length, throttles } = ReplyHead::from_bytes(&head);
@@ -144,5 +144,5 @@ fn read_reply(from: &mut impl Read, shift: u32) -> io::Result<Reply> {
     }
     let mut bytes = vec![0; length as usize];
     from.read_exact(&mut bytes)?;
-    Ok(Reply { time_us, cycles, instructions: qemu::instructions(cycles, shift), stack_bytes, throttles, bytes })
+    Ok(TickReply { time_us, cycles, instructions: qemu::instructions(cycles, shift), stack_bytes, throttles, bytes })
 }

@@ -9,8 +9,8 @@
 //!
 //! * [`Emulator`] flies the `pil` image in lockstep: one [exchange](Emulator::exchange) of bytes is one control tick.
 //!   Time stops while the host computes, so every run gives the same bytes. [`Twins`] compares them with the host's.
-//! * [`Board`] boots the unmodified `flight` image and talks to its USART1. A [debugger](gdb) supplies the status bits
-//!   of the clock tree, which the emulator lacks.
+//! * [`EmulatedBoard`] boots the unmodified `flight` image and talks to its USART1. A [debugger](gdb) supplies the
+//!   status bits of the clock tree, which the emulator lacks.
 //!
 //! ```no_run
 //! use pil::{Emulator, Image};
@@ -35,8 +35,8 @@ mod qemu;
 mod twins;
 pub mod worst;
 
-pub use board::Board;
-pub use emulator::{Emulator, Reply};
+pub use board::EmulatedBoard;
+pub use emulator::{Emulator, TickReply};
 pub use error::Error;
 pub use image::Image;
-pub use twins::{Comparison, Twins};
+pub use twins::{TwinComparison, Twins};

@@ -1,8 +1,8 @@
 //! Emulated processor and host, compared.
 
-use crate::emulator::{Emulator, Reply};
+use crate::emulator::{Emulator, TickReply};
 use afbc_onboard::Readings;
-use afbc_sim::in_the_loop::{Autopilot, Error, Extremes, Host, Tick};
+use afbc_sim::in_the_loop::{Autopilot, Error, Extremes, Host, HostTick};
 
 /// The emulated processor and the same code on the host. The host gets the same bytes at the same times, and every
 /// output of every tick is compared. The loop has no other input, so as long as none differs, the host alone would have
@@ -10,12 +10,12 @@ use afbc_sim::in_the_loop::{Autopilot, Error, Extremes, Host, Tick};
 pub struct Twins {
     emulator: Emulator,
     host: Host,
-    comparison: Comparison,
+    comparison: TwinComparison,
 }
 
 /// Result of the comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Comparison {
+pub struct TwinComparison {
     /// Control ticks compared.
     pub ticks: u64,
     /// Armed ticks among them.
@@ -39,11 +39,11 @@ pub struct Comparison {
 impl Twins {
     /// Creates both, disarmed; `host` must have the firmware of the vehicle that the image was built for.
     pub fn new(emulator: Emulator, host: Host) -> Self {
-        Twins { emulator, host, comparison: Comparison::default() }
+        Twins { emulator, host, comparison: TwinComparison::default() }
     }
 
     /// Returns the result so far.
-    pub fn comparison(&self) -> &Comparison {
+    pub fn comparison(&self) -> &TwinComparison {
         &self.comparison
     }
 }
@@ -65,8 +65,8 @@ impl Autopilot for Twins {
     }
 }
 
-impl Comparison {
-    fn add(&mut self, reply: &Reply, tick: &Tick) {
+impl TwinComparison {
+    fn add(&mut self, reply: &TickReply, tick: &HostTick) {
         let differing_bits = differing_bits(reply, tick);
         if differing_bits > 0 {
             self.differing_ticks += 1;
@@ -84,7 +84,7 @@ impl Comparison {
     }
 }
 
-fn differing_bits(reply: &Reply, tick: &Tick) -> u64 {
+fn differing_bits(reply: &TickReply, tick: &HostTick) -> u64 {
     let throttles = reply.throttles.iter().zip(tick.report.throttles).map(|(a, b)| (a ^ b).count_ones());
     let bytes = reply.bytes.iter().zip(&tick.bytes).map(|(a, b)| (a ^ b).count_ones());
     let unmatched = 8 * reply.bytes.len().abs_diff(tick.bytes.len()) as u64;

@@ -42,7 +42,7 @@ pub struct Worst {
 
 /// What the vehicle flies on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
+pub enum StateSource {
     /// States of the link.
     Link,
     /// Its own estimate, with more measurements than it can fuse, which agree neither with the samples nor with one
@@ -54,7 +54,7 @@ pub enum Source {
 ///
 /// # Errors
 /// If the emulator fails, or the vehicle does not arm.
-pub fn search(emulator: Emulator, source: Source, seed: u64, candidates: u64) -> Result<Worst, Error> {
+pub fn search(emulator: Emulator, source: StateSource, seed: u64, candidates: u64) -> Result<Worst, Error> {
     let random = SplitMix64::seed_from_u64(seed);
     let mut flight = EmulatedFlight { emulator, source, station: Station::default(), tick: 0, random };
     let mut worst = Worst { candidates, ..Worst::default() };
@@ -90,7 +90,7 @@ pub fn search(emulator: Emulator, source: Source, seed: u64, candidates: u64) ->
 
 struct EmulatedFlight {
     emulator: Emulator,
-    source: Source,
+    source: StateSource,
     station: Station,
     tick: u64,
     random: SplitMix64,
@@ -138,8 +138,8 @@ impl EmulatedFlight {
     fn fly(&mut self, state: State, setpoint: Setpoint) -> Result<Option<u32>, Error> {
         self.tick += 1;
         match self.source {
-            Source::Link => self.station.track(self.tick * 1000, state),
-            Source::Estimate => {
+            StateSource::Link => self.station.track(self.tick * 1000, state),
+            StateSource::Estimate => {
                 let readings = self.readings(&state);
                 self.emulator.sense(&readings);
             }

@@ -4,7 +4,7 @@
 mod common;
 
 use afbc_flight_core::Refusal;
-use afbc_link::{Address, Answer, Command, Decoder, Downlink, Health, Uplink};
+use afbc_link::{Address, Answer, Command, Decoder, Downlink, HealthArray, Uplink};
 use afbc_onboard::CLOCK_FAILED;
 use afbc_sim::in_the_loop::Station;
 use common::start_or_skip;
@@ -12,7 +12,7 @@ use pil::budget::Linked;
 use pil::clock_tree::{FLASH_ACR, RCC_CFGR, RCC_PLLCFGR};
 use pil::exercise::motion;
 use pil::gdb::{PC, SP, XPSR};
-use pil::{Board, Image};
+use pil::{EmulatedBoard, Image};
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
@@ -29,7 +29,7 @@ const SYST_RVR: u32 = 0xE000_E014;
 
 /// A tracker that keeps sending the same state, and collects the board's messages.
 struct Talk {
-    board: Board,
+    board: EmulatedBoard,
     station: Station,
     decoder: Decoder<Downlink>,
     heard: Heard,
@@ -43,13 +43,13 @@ struct Heard {
     heartbeats: u32,
     /// Time of the newest rotor command, or health \[us since power-up\].
     time_us: u64,
-    health: Health,
+    health: HealthArray,
     answers: HashSet<Answer>,
     texts: HashSet<String>,
 }
 
 impl Talk {
-    fn new(board: Board) -> Self {
+    fn new(board: EmulatedBoard) -> Self {
         let decoder = Decoder::new(Address { system: 255, component: 190 });
         Talk { board, station: Station::default(), decoder, heard: Heard::default(), spoke_us: 0 }
     }
@@ -103,7 +103,7 @@ const CORE_FROM_PLL: u32 = 0b10;
 #[test]
 fn it_boots_ticks_and_listens() {
     // Boot only returns if the image's clocks came up.
-    let Some(mut board) = start_or_skip(Image::Flight, |elf| Board::boot(&elf)) else { return };
+    let Some(mut board) = start_or_skip(Image::Flight, |elf| EmulatedBoard::boot(&elf)) else { return };
     assert!(board.clock_accesses() > 10, "the clock tree was set up");
     assert_eq!(board.clock_register(FLASH_ACR), FLASH_ON);
     assert_eq!(board.clock_register(RCC_PLLCFGR) & (PLL_FROM_CRYSTAL | PLL_DIVIDER), PLL_FROM_CRYSTAL | 4);
@@ -119,7 +119,7 @@ fn it_boots_ticks_and_listens() {
 
 #[test]
 fn without_a_crystal_it_runs_on_and_does_not_arm() {
-    let Some(board) = start_or_skip(Image::Flight, |elf| Board::boot_without_crystal(&elf)) else { return };
+    let Some(board) = start_or_skip(Image::Flight, |elf| EmulatedBoard::boot_without_crystal(&elf)) else { return };
     assert_eq!(board.clock_register(RCC_PLLCFGR) & (PLL_FROM_CRYSTAL | PLL_DIVIDER), 8, "16 MHz / 8, as 8 MHz / 4");
     assert_eq!(board.clock_register(RCC_CFGR) & 0b11, CORE_FROM_PLL);
     assert_eq!(board.clock_register(FLASH_ACR), FLASH_ON);
@@ -132,7 +132,7 @@ fn without_a_crystal_it_runs_on_and_does_not_arm() {
 
 #[test]
 fn a_crystal_that_fails_does_not_stop_it() {
-    let Some(board) = start_or_skip(Image::Flight, |elf| Board::boot(&elf)) else { return };
+    let Some(board) = start_or_skip(Image::Flight, |elf| EmulatedBoard::boot(&elf)) else { return };
     let mut talk = Talk::new(board);
     talk.until(None, |heard| heard.health.rate_hz > 0.0);
     talk.ask();
@@ -153,7 +153,8 @@ fn a_crystal_that_fails_does_not_stop_it() {
 
 #[test]
 fn a_panic_of_the_link_does_not_stop_the_tick() {
-    let Some((mut board, linked)) = start_or_skip(Image::Flight, |elf| Ok((Board::boot(&elf)?, Linked::read(&elf)?)))
+    let Some((mut board, linked)) =
+        start_or_skip(Image::Flight, |elf| Ok((EmulatedBoard::boot(&elf)?, Linked::read(&elf)?)))
     else {
         return;
     };
@@ -179,7 +180,8 @@ const USART1: u32 = 16 + 37;
 /// Waking the link's task for every byte would take most of the processor's time on a busy line.
 #[test]
 fn few_bytes_do_not_wake_the_link() {
-    let Some((mut board, linked)) = start_or_skip(Image::Flight, |elf| Ok((Board::boot(&elf)?, Linked::read(&elf)?)))
+    let Some((mut board, linked)) =
+        start_or_skip(Image::Flight, |elf| Ok((EmulatedBoard::boot(&elf)?, Linked::read(&elf)?)))
     else {
         return;
     };
@@ -197,7 +199,8 @@ fn few_bytes_do_not_wake_the_link() {
 
 #[test]
 fn the_flight_image_has_a_log() {
-    let Some((mut board, linked)) = start_or_skip(Image::Flight, |elf| Ok((Board::boot(&elf)?, Linked::read(&elf)?)))
+    let Some((mut board, linked)) =
+        start_or_skip(Image::Flight, |elf| Ok((EmulatedBoard::boot(&elf)?, Linked::read(&elf)?)))
     else {
         return;
     };
@@ -228,7 +231,7 @@ const HARD_FAULT: u32 = 3;
 
 #[test]
 fn a_stack_that_overflows_ends_in_the_fault_handler() {
-    let Some(mut board) = start_or_skip(Image::Flight, |elf| Board::boot(&elf)) else { return };
+    let Some(mut board) = start_or_skip(Image::Flight, |elf| EmulatedBoard::boot(&elf)) else { return };
     let start = Instant::now();
     while board.receive().unwrap().is_empty() {
         assert!(start.elapsed() < PATIENCE, "the image does not run");

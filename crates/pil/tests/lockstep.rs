@@ -6,13 +6,13 @@ mod common;
 use afbc_flight_core::Mode;
 use afbc_link::{Command, Uplink};
 use afbc_onboard::services::streams::DEFAULTS;
-use afbc_sim::in_the_loop::{Host, Station, Tick};
+use afbc_sim::in_the_loop::{Host, HostTick, Station};
 use common::start_or_skip;
 use pil::exercise::{TICKS, bytes_of_tick};
-use pil::{Emulator, Image, Reply};
+use pil::{Emulator, Image, TickReply};
 
 /// Returns all replies of one flight.
-fn fly(mut emulator: Emulator) -> Vec<Reply> {
+fn fly(mut emulator: Emulator) -> Vec<TickReply> {
     let mut station = Station::default();
     (0..TICKS).map(|tick| emulator.exchange(&bytes_of_tick(&mut station, tick)).unwrap()).collect()
 }
@@ -25,7 +25,7 @@ fn every_bit_is_the_hosts() {
     let (mut host, mut station) = (Host::new().unwrap(), Station::default());
     let mut modes = Vec::new();
     for (tick, reply) in replies.iter().enumerate() {
-        let Tick { report, bytes, .. } =
+        let HostTick { report, bytes, .. } =
             host.tick(&bytes_of_tick(&mut station, tick as u64), reply.time_us, reply.cycles);
         assert_eq!(report.throttles, reply.throttles, "throttles of tick {tick}");
         assert_eq!(bytes, reply.bytes, "bytes of tick {tick}");

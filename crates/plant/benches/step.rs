@@ -4,10 +4,10 @@
 //! time, with that of [`Plant::motion`], is part of every figure, and measured alone by `feedback_alone`.
 #![allow(clippy::unwrap_used, missing_docs)] // a plant that cannot be built must stop the bench
 
-use afbc_plant::instruments::{Barometer, Gnss, Imu, Magnetometer, Tracker};
+use afbc_plant::instruments::{Barometer, Gnss, Imu, Magnetometer, TrackerModel};
 use afbc_plant::{
-    Battery, Contact, CosineGust, Deviations, Drag, Dropouts, Environment, GroundEffect, Instruments, Model, Motion,
-    Plant, Realism, Rotors, Sensing, Sensors, Suite, Turbulence, Wind,
+    Battery, Contact, CosineGust, Deviations, Drag, Dropouts, Environment, GroundEffect, InstrumentSuite, Instruments,
+    Motion, Plant, PlantModel, Realism, Rotors, Sensing, StateSensor, Turbulence, Wind,
 };
 use afbc_types::{Parameters, RotorSpeeds};
 use divan::counter::ItemsCount;
@@ -19,7 +19,7 @@ fn main() {
 }
 
 const STEP_S: f64 = 0.001;
-const MODELS: [Model; 2] = [Model::Simplified, Model::RigidBody];
+const MODELS: [PlantModel; 2] = [PlantModel::Simplified, PlantModel::RigidBody];
 
 fn start() -> Motion {
     Motion { position_m: Vector3::new(0.0, 0.0, 2.0), ..Motion::default() }
@@ -76,33 +76,33 @@ fn fly(bencher: Bencher, mut plant: Plant) {
 
 #[divan::bench(sample_count = 200, sample_size = 2000)]
 fn feedback_alone(bencher: Bencher) {
-    let plant = Plant::new(Model::RigidBody, start(), environment());
+    let plant = Plant::new(PlantModel::RigidBody, start(), environment());
     bencher.bench_local(|| feedback(&black_box(&plant).motion()));
 }
 
 #[divan::bench(args = MODELS, sample_count = 200, sample_size = 2000)]
-fn ideal(bencher: Bencher, model: Model) {
+fn ideal(bencher: Bencher, model: PlantModel) {
     fly(bencher, Plant::new(model, start(), environment()));
 }
 
 #[divan::bench(args = MODELS, sample_count = 200, sample_size = 2000)]
-fn rotor_lag(bencher: Bencher, model: Model) {
+fn rotor_lag(bencher: Bencher, model: PlantModel) {
     let realism = Realism { rotors: lag(), ..Realism::default() };
     fly(bencher, Plant::with_realism(model, start(), environment(), &realism, STEP_S).unwrap());
 }
 
 #[divan::bench(args = MODELS, sample_count = 200, sample_size = 2000)]
-fn lag_drag_turbulence(bencher: Bencher, model: Model) {
+fn lag_drag_turbulence(bencher: Bencher, model: PlantModel) {
     fly(bencher, Plant::with_realism(model, start(), environment(), &usual(), STEP_S).unwrap());
 }
 
 #[divan::bench(args = MODELS, sample_count = 200, sample_size = 2000)]
-fn all(bencher: Bencher, model: Model) {
+fn all(bencher: Bencher, model: PlantModel) {
     fly(bencher, Plant::with_realism(model, start(), environment(), &everything(), STEP_S).unwrap());
 }
 
 #[divan::bench(args = MODELS, sample_count = 200, sample_size = 2000)]
-fn drag_in_still_air(bencher: Bencher, model: Model) {
+fn drag_in_still_air(bencher: Bencher, model: PlantModel) {
     let realism = Realism { drag: Some(Drag::PAPER), ..Realism::default() };
     fly(bencher, Plant::with_realism(model, start(), environment(), &realism, STEP_S).unwrap());
 }
@@ -110,7 +110,7 @@ fn drag_in_still_air(bencher: Bencher, model: Model) {
 /// As in a campaign: usual effects and sensors.
 #[divan::bench(sample_count = 200, sample_size = 2000)]
 fn lag_drag_turbulence_sensors(bencher: Bencher) {
-    let mut plant = Plant::with_realism(Model::RigidBody, start(), environment(), &usual(), STEP_S).unwrap();
+    let mut plant = Plant::with_realism(PlantModel::RigidBody, start(), environment(), &usual(), STEP_S).unwrap();
     let mut sensors = sensors();
     bencher.counter(ItemsCount::new(1_usize)).bench_local(|| {
         let motion = plant.motion();
@@ -120,7 +120,7 @@ fn lag_drag_turbulence_sensors(bencher: Bencher) {
     });
 }
 
-fn sensors() -> Sensors {
+fn sensors() -> StateSensor {
     let sensing = Sensing {
         noise: Deviations::all(0.001),
         bias: Deviations::all(0.001),
@@ -128,13 +128,13 @@ fn sensors() -> Sensors {
         dropouts: Some(Dropouts { rate_hz: 1.0, mean_s: 0.01 }),
         ..Sensing::DEFAULT
     };
-    Sensors::new(&sensing, 1, STEP_S).unwrap()
+    StateSensor::new(&sensing, 1, STEP_S).unwrap()
 }
 
 /// What instruments feel of a vehicle with all effects.
 #[divan::bench(sample_count = 200, sample_size = 2000)]
 fn truth(bencher: Bencher) {
-    let plant = Plant::with_realism(Model::RigidBody, start(), environment(), &everything(), STEP_S).unwrap();
+    let plant = Plant::with_realism(PlantModel::RigidBody, start(), environment(), &everything(), STEP_S).unwrap();
     bencher.counter(ItemsCount::new(1_usize)).bench_local(|| black_box(&plant).truth());
 }
 
@@ -145,14 +145,14 @@ fn instruments(bencher: Bencher, vibration: bool) {
     if vibration {
         (imu.gyro.vibration_rad_s, imu.accel.vibration_m_s2) = (0.02, 1.0);
     }
-    let suite = Suite {
+    let suite = InstrumentSuite {
         imu: Some(imu),
-        tracker: Some(Tracker::MOCAP_100),
+        tracker: Some(TrackerModel::MOCAP_100),
         gnss: Some(Gnss::M10),
         barometer: Some(Barometer::DPS310),
         magnetometer: Some(Magnetometer::IST8310),
     };
-    let mut truth = Plant::new(Model::RigidBody, start(), environment()).truth();
+    let mut truth = Plant::new(PlantModel::RigidBody, start(), environment()).truth();
     let mut instruments = Instruments::new(&suite, &[], 1, STEP_S).unwrap();
     bencher.counter(ItemsCount::new(1_usize)).bench_local(|| {
         truth.time_s += STEP_S;

@@ -36,7 +36,7 @@ pub struct Gust {
 /// A physical parameter that may change in flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub enum Quantity {
+pub enum PlantParameter {
     /// m: mass.
     Mass,
     /// Ix, Iy and Iz together.
@@ -58,7 +58,7 @@ pub enum Quantity {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ParameterChange {
     /// The parameter.
-    pub quantity: Quantity,
+    pub quantity: PlantParameter,
     /// Factor; 1 changes nothing.
     pub factor: f64,
     /// Start \[s\].
@@ -257,13 +257,13 @@ impl Environment {
         let (mut parameters, mut rig) = (self.nominal, Rig::intact());
         for change in self.changes.iter().filter(|c| active(c.start_s, c.end_s, t)) {
             match change.quantity {
-                Quantity::Mass => parameters.mass_kg *= change.factor,
-                Quantity::Inertia => parameters.inertia_kg_m2 *= change.factor,
-                Quantity::ThrustFactor => parameters.thrust_factor_n_s2 *= change.factor,
-                Quantity::DragFactor => parameters.drag_factor_n_m_s2 *= change.factor,
-                Quantity::RollMoment => rig.moments.x *= change.factor,
-                Quantity::PitchMoment => rig.moments.y *= change.factor,
-                Quantity::YawMoment => rig.moments.z *= change.factor,
+                PlantParameter::Mass => parameters.mass_kg *= change.factor,
+                PlantParameter::Inertia => parameters.inertia_kg_m2 *= change.factor,
+                PlantParameter::ThrustFactor => parameters.thrust_factor_n_s2 *= change.factor,
+                PlantParameter::DragFactor => parameters.drag_factor_n_m_s2 *= change.factor,
+                PlantParameter::RollMoment => rig.moments.x *= change.factor,
+                PlantParameter::PitchMoment => rig.moments.y *= change.factor,
+                PlantParameter::YawMoment => rig.moments.z *= change.factor,
             }
         }
         for payload in self.payloads.iter().filter(|p| active(p.start_s, p.end_s, t)) {

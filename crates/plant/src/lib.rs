@@ -5,19 +5,19 @@
 //! fourth-order Runge-Kutta method with constant rotor speeds during a step.
 //!
 //! This is the paper's plant. [`Realism`] adds optional effects: rotors with lag, limits, delay,
-//! faults and a battery, drag, wind with gusts and turbulence, ground. [`Sensors`] measure the motion for a controller,
-//! as a perfect tracker would; [`Instruments`] are the sensors of a real vehicle. Everything is reproducible from a
-//! seed.
+//! faults and a battery, drag, wind with gusts and turbulence, ground. A [`StateSensor`] measures the motion for a
+//! controller, as a perfect tracker would; [`Instruments`] are the sensors of a real vehicle. Everything is
+//! reproducible from a seed.
 //!
 //! [`afbc_types`] defines frames, units and the meaning of "(n)". Trigonometry comes from the `libm` crate, so a flight
 //! gives the same bits on every host.
 //!
 //! ```
 //! use afbc_types::{Parameters, RotorSpeeds};
-//! use afbc_plant::{Environment, Model, Motion, Plant};
+//! use afbc_plant::{Environment, Motion, Plant, PlantModel};
 //!
 //! let environment = Environment::calm(Parameters::PAPER)?;
-//! let mut plant = Plant::new(Model::RigidBody, Motion::default(), environment);
+//! let mut plant = Plant::new(PlantModel::RigidBody, Motion::default(), environment);
 //! for _ in 0..1000 {
 //!     plant.step(&RotorSpeeds::<4>::default(), 0.001);
 //! }
@@ -60,18 +60,18 @@ pub use drag::Drag;
 pub use dropouts::Dropouts;
 pub use environment::{
     Environment, GUST_SIZE, Gust, GustKind, PAYLOAD_AHEAD, PAYLOAD_BELOW, PAYLOAD_LEFT, PAYLOAD_MASS, ParameterChange,
-    Payload, Quantity, START,
+    Payload, PlantParameter, START,
 };
 pub use frame::{Frame, Lanes};
 pub use ground_effect::GroundEffect;
-pub use instruments::{Instruments, Readings, Suite};
+pub use instruments::{InstrumentReadings, InstrumentSuite, Instruments};
 pub use load::Load;
 pub use motion::Motion;
-pub use realism::{Realism, STEP, Telemetry};
+pub use realism::{EffectsState, Realism, STEP};
 pub use rotors::{RotorFault, Rotors, Start};
 pub use sensor_fault::{Misreading, SensorFault, SensorFaults};
-pub use sensors::{Deviations, Measurement, Sensing, Sensors};
+pub use sensors::{Deviations, Sensing, StateMeasurement, StateSensor};
 pub use truth::Truth;
 pub use turbulence::Turbulence;
-pub use vehicle::{Model, Plant};
+pub use vehicle::{Plant, PlantModel};
 pub use wind::{CosineGust, Wind};

@@ -21,7 +21,7 @@ pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
 /// Effects added by [`Plant::with_realism`](crate::Plant::with_realism). The default adds nothing: the paper's plant,
 /// bit for bit, as long as no rotor is commanded beyond 10,000 rad/s.
 ///
-/// Measurement is separate, in [`Sensors`](crate::Sensors), between the plant and its controller.
+/// Measurement is separate, in [`StateSensor`](crate::StateSensor), between the plant and its controller.
 ///
 /// During a step, commanded speeds, wind, ground effect and battery voltage are constant at their values at its start,
 /// rotor speeds at those in its middle. Drag and ground contact are evaluated at every stage of the Runge-Kutta method.
@@ -30,7 +30,7 @@ pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
 /// ```
 /// use afbc_types::{Parameters, RotorSpeeds};
 /// use nalgebra::{Vector3, Vector4};
-/// use afbc_plant::{Drag, Environment, Model, Motion, Plant, Realism, Rotors, Turbulence, Wind};
+/// use afbc_plant::{Drag, Environment, Motion, Plant, PlantModel, Realism, Rotors, Turbulence, Wind};
 ///
 /// let realism = Realism {
 ///     rotors: Rotors { time_constant_s: 0.02, max_rad_s: 317.0, delay_s: 0.001, ..Rotors::default() },
@@ -44,7 +44,7 @@ pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
 ///     ..Realism::default()
 /// };
 /// let environment = Environment::calm(Parameters::PAPER)?;
-/// let mut plant = Plant::with_realism(Model::RigidBody, Motion::default(), environment, &realism, 0.001)?;
+/// let mut plant = Plant::with_realism(PlantModel::RigidBody, Motion::default(), environment, &realism, 0.001)?;
 /// for _ in 0..100 {
 ///     plant.step(&RotorSpeeds(Vector4::repeat(199.9)), 0.001);
 /// }
@@ -70,7 +70,7 @@ pub struct Realism {
 
 /// State of rotors, air, ground and battery after one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Telemetry {
+pub struct EffectsState {
     /// Rotor speeds at the end of the step \[rad/s\]; 0 for rotors that the vehicle does not have.
     pub rotor_speeds_rad_s: Lanes,
     /// Velocity of the air, earth frame \[m/s\].
@@ -187,8 +187,8 @@ impl Effects {
         self.spin.set_charge(share)
     }
 
-    pub(crate) fn telemetry(&self) -> Telemetry {
-        Telemetry {
+    pub(crate) fn telemetry(&self) -> EffectsState {
+        EffectsState {
             rotor_speeds_rad_s: self.spin.speeds_rad_s,
             wind_m_s: self.wind_m_s,
             thrust_ratio: self.thrust_ratio,

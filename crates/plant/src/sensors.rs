@@ -77,7 +77,7 @@ parameters! {
 
 /// Measurement in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Measurement {
+pub struct StateMeasurement {
     /// The newest state that has arrived; with a gyro, its rates are those of this step.
     pub state: State,
     /// Age of that state, rates of a gyro apart \[s\]; the first state also stands for those before it.
@@ -90,7 +90,7 @@ pub struct Measurement {
 
 /// Sensors in simulation: noise and bias, then sampling and delay, then dropouts. The first measurement always arrives.
 #[derive(Clone, Debug)]
-pub struct Sensors {
+pub struct StateSensor {
     noise: Option<Deviations>,
     random: Noise,
     bias: Motion,
@@ -108,7 +108,7 @@ pub struct Sensors {
     since: u32,
 }
 
-impl Sensors {
+impl StateSensor {
     /// Creates sensors that are read every `step_s`. The seed may be the plant's, since the streams differ.
     ///
     /// # Errors
@@ -119,7 +119,7 @@ impl Sensors {
         let mut random = Noise::new(seed, Stream::Sensors);
         let steps = whole_steps(sensing.delay_s, step_s);
         let period = whole_steps(sensing.period_s, step_s).max(1);
-        Ok(Sensors {
+        Ok(StateSensor {
             noise: (sensing.noise != Deviations::default()).then_some(sensing.noise),
             bias: sensing.bias.draw(&mut random),
             random,
@@ -146,7 +146,7 @@ impl Sensors {
 
     /// Measures `motion`; to be called once per step.
     #[inline]
-    pub fn measure(&mut self, motion: &Motion) -> Measurement {
+    pub fn measure(&mut self, motion: &Motion) -> StateMeasurement {
         let mut measured = sum(motion, &self.bias);
         if let Some(spread) = &self.noise {
             measured = sum(&measured, &spread.draw(&mut self.random));
@@ -172,7 +172,7 @@ impl Sensors {
         }
         self.last = Some(newest);
         let age_s = self.delay_s + f64::from(self.since) * self.step_s;
-        Measurement { state: newest, age_s, fresh, new: fresh && (sampled || self.gyro) }
+        StateMeasurement { state: newest, age_s, fresh, new: fresh && (sampled || self.gyro) }
     }
 }
 

@@ -6,7 +6,7 @@ use crate::frame::Lanes;
 use crate::integrate::rk4;
 use crate::load::Load;
 use crate::motion::Motion;
-use crate::realism::{Effects, Realism, Telemetry};
+use crate::realism::{Effects, EffectsState, Realism};
 use crate::rotors::RotorFault;
 use crate::surroundings::Surroundings;
 use crate::truth::Truth;
@@ -20,19 +20,19 @@ use nalgebra::{Quaternion, SVector, Vector3};
 /// Equations of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub enum Model {
+pub enum PlantModel {
     /// (6), the paper's own simulation model.
     Simplified,
     /// (1)-(5) as corrected.
     RigidBody,
 }
 
-impl Model {
+impl PlantModel {
     /// Returns the lower-case name, as in scenario files and logs.
     pub const fn name(self) -> &'static str {
         match self {
-            Model::Simplified => "simplified",
-            Model::RigidBody => "rigid-body",
+            PlantModel::Simplified => "simplified",
+            PlantModel::RigidBody => "rigid-body",
         }
     }
 }
@@ -45,10 +45,10 @@ enum Body {
 }
 
 impl Body {
-    fn new(model: Model, initial: &Motion) -> Self {
+    fn new(model: PlantModel, initial: &Motion) -> Self {
         match model {
-            Model::Simplified => Body::Simplified(simplified::vector(initial)),
-            Model::RigidBody => Body::RigidBody(rigid_body::vector(initial)),
+            PlantModel::Simplified => Body::Simplified(simplified::vector(initial)),
+            PlantModel::RigidBody => Body::RigidBody(rigid_body::vector(initial)),
         }
     }
 
@@ -128,7 +128,7 @@ pub struct Plant {
 
 impl Plant {
     /// Creates a vehicle with the motion `initial` at t = 0, ideal rotors, and no forces but those of the environment.
-    pub fn new(model: Model, initial: Motion, environment: Environment) -> Self {
+    pub fn new(model: PlantModel, initial: Motion, environment: Environment) -> Self {
         let body = Body::new(model, &initial);
         let segment = environment.segment(0.0);
         let Segment { parameters, rig, a_force, a_moment, .. } = &segment;
@@ -143,7 +143,7 @@ impl Plant {
     /// # Errors
     /// The first setting out of range.
     pub fn with_realism(
-        model: Model,
+        model: PlantModel,
         initial: Motion,
         environment: Environment,
         realism: &Realism,
@@ -234,7 +234,7 @@ impl Plant {
 
     /// Returns the state of rotors, air and ground after the last step, or at rest before the first. `None` for an
     /// ideal plant.
-    pub fn telemetry(&self) -> Option<Telemetry> {
+    pub fn telemetry(&self) -> Option<EffectsState> {
         self.effects.as_ref().map(|effects| effects.telemetry())
     }
 

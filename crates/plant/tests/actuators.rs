@@ -1,7 +1,7 @@
 //! Rotors compared with closed forms, and the battery's energy balance.
 #![allow(clippy::unwrap_used, clippy::float_cmp, missing_docs)]
 
-use afbc_plant::{Battery, Charge, Environment, Model, Motion, Plant, Realism, RotorFault, Rotors, Sag, Start};
+use afbc_plant::{Battery, Charge, Environment, Motion, Plant, PlantModel, Realism, RotorFault, Rotors, Sag, Start};
 use afbc_types::{Parameters, RotorSpeeds};
 use nalgebra::{Vector3, Vector4};
 
@@ -11,7 +11,7 @@ const P: Parameters<f64> = Parameters::PAPER;
 fn plant_at(rotors: Rotors, step_s: f64) -> Plant {
     let realism = Realism { rotors, ..Realism::default() };
     let environment = Environment::calm(P).unwrap();
-    Plant::with_realism(Model::RigidBody, Motion::default(), environment, &realism, step_s).unwrap()
+    Plant::with_realism(PlantModel::RigidBody, Motion::default(), environment, &realism, step_s).unwrap()
 }
 
 fn plant(rotors: Rotors) -> Plant {
@@ -33,7 +33,7 @@ fn hover_rad_s() -> f64 {
 fn refused(rotors: Rotors) -> &'static str {
     let realism = Realism { rotors, ..Realism::default() };
     let environment = Environment::calm(P).unwrap();
-    let result = Plant::with_realism(Model::RigidBody, Motion::default(), environment, &realism, STEP_S);
+    let result = Plant::with_realism(PlantModel::RigidBody, Motion::default(), environment, &realism, STEP_S);
     result.unwrap_err().range.name
 }
 

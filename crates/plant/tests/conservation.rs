@@ -7,7 +7,7 @@
 )]
 
 use afbc_plant::integrate::rk4;
-use afbc_plant::{Environment, Load, Model, Motion, Plant, rigid_body, simplified};
+use afbc_plant::{Environment, Load, Motion, Plant, PlantModel, rigid_body, simplified};
 use afbc_types::{Parameters, RotorSpeeds};
 use nalgebra::{Matrix3, SVector, Vector3, Vector4};
 use proptest::prelude::*;
@@ -55,7 +55,7 @@ fn conserved(p: &Parameters<f64>, m: &Motion) -> (f64, f64, Vector3<f64>) {
 }
 
 fn fall(p: Parameters<f64>, start: Motion, steps: usize) -> Plant {
-    let mut plant = Plant::new(Model::RigidBody, start, Environment::calm(p).unwrap());
+    let mut plant = Plant::new(PlantModel::RigidBody, start, Environment::calm(p).unwrap());
     for _ in 0..steps {
         plant.step(&RotorSpeeds::<4>::default(), DT_S);
     }
@@ -193,7 +193,7 @@ proptest! {
                 (0..200).for_each(|_| plant.step(&speeds, DT_S));
                 plant.motion()
             };
-            let (a, b) = (fly(Model::Simplified), fly(Model::RigidBody));
+            let (a, b) = (fly(PlantModel::Simplified), fly(PlantModel::RigidBody));
             let of = |f: fn(&Motion) -> Vector3<f64>| (f(&a) - f(&b)).norm();
             of(|m| m.position_m) + of(|m| m.velocity_m_s) + of(|m| m.attitude_rad) + of(|m| m.rates_rad_s)
         };
@@ -228,7 +228,7 @@ proptest! {
 fn a_flat_spin_turns_evenly() {
     let rate = 2.0;
     let start = Motion { rates_rad_s: Vector3::new(0.0, 0.0, rate), ..Motion::default() };
-    let mut plant = Plant::new(Model::RigidBody, start, Environment::calm(Parameters::PAPER).unwrap());
+    let mut plant = Plant::new(PlantModel::RigidBody, start, Environment::calm(Parameters::PAPER).unwrap());
     for step in 1..=60_000_u32 {
         plant.step(&RotorSpeeds::<4>::default(), DT_S);
         if step % 1000 == 0 {
@@ -245,7 +245,7 @@ fn a_flat_spin_turns_evenly() {
 #[test]
 fn pitching_through_90_degrees_is_nothing_special() {
     let start = Motion { rates_rad_s: Vector3::new(0.0, 3.0, 0.0), ..Motion::default() };
-    let mut plant = Plant::new(Model::RigidBody, start, Environment::calm(Parameters::PAPER).unwrap());
+    let mut plant = Plant::new(PlantModel::RigidBody, start, Environment::calm(Parameters::PAPER).unwrap());
     for step in 1..=2000_u32 {
         plant.step(&RotorSpeeds::<4>::default(), DT_S);
         let angle = 3.0 * f64::from(step) * DT_S;
@@ -285,7 +285,7 @@ fn the_vehicle_is_integrated_to_fourth_order() {
         ..Motion::default()
     };
     let speeds = RotorSpeeds(Vector4::new(200.0, 202.0, 201.0, 199.0));
-    for model in [Model::Simplified, Model::RigidBody] {
+    for model in [PlantModel::Simplified, PlantModel::RigidBody] {
         let end = |steps: u32| {
             let mut plant = Plant::new(model, start, Environment::calm(Parameters::PAPER).unwrap());
             (0..steps).for_each(|_| plant.step(&speeds, 0.5 / f64::from(steps)));

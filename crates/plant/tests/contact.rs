@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
 
 use afbc_plant::{
-    Contact, Environment, GroundEffect, Model, Motion, ParameterChange, Payload, Plant, Quantity, Realism,
+    Contact, Environment, GroundEffect, Motion, ParameterChange, Payload, Plant, PlantModel, PlantParameter, Realism,
 };
 use afbc_types::{Parameters, RotorSpeeds};
 use nalgebra::{Rotation3, Vector3, Vector4};
@@ -11,9 +11,9 @@ use proptest::prelude::*;
 const STEP_S: f64 = 0.001;
 const P: Parameters<f64> = Parameters::PAPER;
 const C: Contact = Contact::PAPER;
-const MODELS: [Model; 2] = [Model::Simplified, Model::RigidBody];
+const MODELS: [PlantModel; 2] = [PlantModel::Simplified, PlantModel::RigidBody];
 
-fn plant(model: Model, initial: Motion) -> Plant {
+fn plant(model: PlantModel, initial: Motion) -> Plant {
     let realism = Realism { contact: Some(C), ..Realism::default() };
     Plant::with_realism(model, initial, Environment::calm(P).unwrap(), &realism, STEP_S).unwrap()
 }
@@ -69,7 +69,7 @@ fn a_vehicle_that_lands_comes_to_rest_on_its_feet() {
 #[test]
 fn a_vehicle_that_lands_upside_down_rests_on_its_rotors() {
     let initial = Motion { attitude_rad: Vector3::new(core::f64::consts::PI, 0.0, 0.0), ..at(0.5) };
-    let mut plant = plant(Model::RigidBody, initial);
+    let mut plant = plant(PlantModel::RigidBody, initial);
     run(&mut plant, 5.0);
     assert!((plant.motion().position_m.z - (C.rotor_height_m - C.sink_m)).abs() < 1e-6);
 }
@@ -78,7 +78,7 @@ fn a_vehicle_that_lands_upside_down_rests_on_its_rotors() {
 #[test]
 fn a_vehicle_that_slides_stops_after_the_distance_that_friction_gives() {
     let initial = Motion { velocity_m_s: Vector3::new(1.0, 0.0, 0.0), ..at(C.foot_depth_m - C.sink_m) };
-    let mut plant = plant(Model::RigidBody, initial);
+    let mut plant = plant(PlantModel::RigidBody, initial);
     run(&mut plant, 3.0);
     let expected = 1.0 / (2.0 * C.friction * P.gravity_m_s2);
     let motion = plant.motion();
@@ -88,7 +88,7 @@ fn a_vehicle_that_slides_stops_after_the_distance_that_friction_gives() {
 
 #[test]
 fn a_vehicle_lifts_off_the_ground() {
-    let mut plant = plant(Model::RigidBody, at(C.foot_depth_m - C.sink_m));
+    let mut plant = plant(PlantModel::RigidBody, at(C.foot_depth_m - C.sink_m));
     (0..1000).for_each(|_| plant.step(&RotorSpeeds(Vector4::repeat(230.0)), STEP_S));
     let lift = 4.0 * P.thrust_factor_n_s2 * 230.0_f64.powi(2) / P.mass_kg - P.gravity_m_s2;
     let telemetry = plant.telemetry().unwrap();
@@ -103,7 +103,10 @@ fn contact_that_the_step_cannot_follow_is_refused() {
     let refused = |contact: Contact, step_s| {
         let realism = Realism { contact: Some(contact), ..Realism::default() };
         let environment = Environment::calm(P).unwrap();
-        Plant::with_realism(Model::RigidBody, Motion::default(), environment, &realism, step_s).unwrap_err().range.name
+        Plant::with_realism(PlantModel::RigidBody, Motion::default(), environment, &realism, step_s)
+            .unwrap_err()
+            .range
+            .name
     };
     assert_eq!(refused(C, 0.01), "sink_m");
     assert_eq!(refused(Contact { sink_m: 1e-4, ..C }, STEP_S), "sink_m");
@@ -127,7 +130,7 @@ proptest! {
         rates in vector(8.0),
     ) {
         let mut plant = plant(
-            Model::RigidBody,
+            PlantModel::RigidBody,
             Motion { velocity_m_s: velocity, attitude_rad: attitude, rates_rad_s: rates, ..at(height) },
         );
         let start_j = energy_j(&plant.motion());
@@ -156,7 +159,7 @@ fn thrust_near_the_ground_follows_cheeseman_and_bennett() {
 
     let realism = Realism { ground_effect: Some(effect), ..Realism::default() };
     let environment = Environment::calm(P).unwrap();
-    let mut plant = Plant::with_realism(Model::RigidBody, at(0.2), environment, &realism, 1e-4).unwrap();
+    let mut plant = Plant::with_realism(PlantModel::RigidBody, at(0.2), environment, &realism, 1e-4).unwrap();
     plant.step(&RotorSpeeds(Vector4::repeat(200.0)), 1e-4);
     let lift = 16.0 / 15.0 * 4.0 * P.thrust_factor_n_s2 * 4e4 / P.mass_kg - P.gravity_m_s2;
     assert!((plant.motion().velocity_m_s.z - lift * 1e-4).abs() < 1e-12);
@@ -166,7 +169,7 @@ fn thrust_near_the_ground_follows_cheeseman_and_bennett() {
 fn a_payload_brings_its_mass_and_its_inertia() {
     let payload = Payload { mass_kg: 0.2, below_m: 0.1, ahead_m: 0.0, left_m: 0.0, start_s: 0.5, end_s: 1.0 };
     let environment = Environment::calm(P).unwrap().with_payloads(vec![payload]).unwrap();
-    let mut plant = Plant::new(Model::RigidBody, Motion::default(), environment);
+    let mut plant = Plant::new(PlantModel::RigidBody, Motion::default(), environment);
     let command = RotorSpeeds(Vector4::new(200.0, 200.0, 210.0, 200.0));
     let acceleration = |plant: &mut Plant| {
         let before = plant.motion();
@@ -205,7 +208,7 @@ fn a_payload_brings_its_mass_and_its_inertia() {
 /// Returns linear and angular acceleration, body frame, of a level vehicle in its first step.
 fn first_step(environment: Environment, speeds: [f32; 4]) -> (Vector3<f64>, Vector3<f64>) {
     const STEP_S: f64 = 1e-5;
-    let mut plant = Plant::new(Model::RigidBody, Motion::default(), environment);
+    let mut plant = Plant::new(PlantModel::RigidBody, Motion::default(), environment);
     plant.step(&RotorSpeeds(Vector4::from(speeds)), STEP_S);
     (plant.motion().velocity_m_s / STEP_S, plant.motion().rates_rad_s / STEP_S)
 }
@@ -255,7 +258,7 @@ fn a_wrong_sign_turns_one_moment_round() {
     let speeds = [205.0, 210.0, 190.0, 220.0];
     let (_, intact) = first_step(Environment::calm(P).unwrap(), speeds);
     assert!(intact.amin() > 0.1);
-    let moments = [Quantity::RollMoment, Quantity::PitchMoment, Quantity::YawMoment];
+    let moments = [PlantParameter::RollMoment, PlantParameter::PitchMoment, PlantParameter::YawMoment];
     for (index, quantity) in moments.into_iter().enumerate() {
         for factor in [-1.0, 0.5, 2.0] {
             let change = ParameterChange { quantity, factor, start_s: 0.0, end_s: f64::INFINITY };

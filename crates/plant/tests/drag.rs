@@ -1,14 +1,14 @@
 //! Drag compared with closed forms.
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use afbc_plant::{Drag, Environment, Gust, GustKind, Model, Motion, Plant, Realism, Wind};
+use afbc_plant::{Drag, Environment, Gust, GustKind, Motion, Plant, PlantModel, Realism, Wind};
 use afbc_types::{Axis, Parameters, RotorSpeeds};
 use nalgebra::{Matrix3, Rotation3, Vector3, Vector4};
 use proptest::prelude::*;
 
 const STEP_S: f64 = 0.001;
 const P: Parameters<f64> = Parameters::PAPER;
-const MODELS: [Model; 2] = [Model::Simplified, Model::RigidBody];
+const MODELS: [PlantModel; 2] = [PlantModel::Simplified, PlantModel::RigidBody];
 
 fn none() -> Drag {
     Drag {
@@ -20,7 +20,7 @@ fn none() -> Drag {
     }
 }
 
-fn plant(model: Model, initial: Motion, drag: Drag, steady_m_s: Vector3<f64>) -> Plant {
+fn plant(model: PlantModel, initial: Motion, drag: Drag, steady_m_s: Vector3<f64>) -> Plant {
     let wind = Wind { steady_m_s, ..Wind::default() };
     let realism = Realism { drag: Some(drag), wind, ..Realism::default() };
     Plant::with_realism(model, initial, Environment::calm(P).unwrap(), &realism, STEP_S).unwrap()
@@ -69,7 +69,7 @@ fn blades_slow_a_level_vehicle_exponentially_to_the_winds_speed() {
 fn drag_above_the_centre_of_mass_turns_the_vehicle_away_from_its_motion() {
     let initial = Motion { velocity_m_s: Vector3::new(2.0, 1.0, 0.0), ..Motion::default() };
     let drag = Drag { blade_n_s2_m: 2.4e-4, rotor_height_m: 0.05, ..none() };
-    let mut by_blades = plant(Model::RigidBody, initial, drag, Vector3::zeros());
+    let mut by_blades = plant(PlantModel::RigidBody, initial, drag, Vector3::zeros());
     by_blades.step(&hover(), STEP_S);
     let rates = by_blades.motion().rates_rad_s;
     let force = drag.blade_n_s2_m * hover().0.map(f64::from).sum() * 2.0;
@@ -77,7 +77,7 @@ fn drag_above_the_centre_of_mass_turns_the_vehicle_away_from_its_motion() {
 
     let centre_m = Vector3::new(0.0, 0.0, 0.05);
     let drag = Drag { area_m2: Vector3::new(0.02, 0.02, 0.0), centre_m, ..none() };
-    let mut by_body = plant(Model::RigidBody, initial, drag, Vector3::zeros());
+    let mut by_body = plant(PlantModel::RigidBody, initial, drag, Vector3::zeros());
     by_body.step(&hover(), STEP_S);
     let rates = by_body.motion().rates_rad_s;
     let force = 0.5 * 1.225 * 0.02 * 5.0_f64.sqrt() * 2.0;
@@ -116,7 +116,7 @@ fn unequal_rotors_in_wind_turn_the_vehicle_about_its_vertical_axis() {
     let side = ((front * front + rear * rear) / 2.0).sqrt();
     let speeds = RotorSpeeds(Vector4::new(side, front, side, rear));
     let yaw_rad_s2 = |wind| {
-        let mut plant = plant(Model::RigidBody, Motion::default(), drag, wind);
+        let mut plant = plant(PlantModel::RigidBody, Motion::default(), drag, wind);
         plant.step(&speeds, STEP_S);
         plant.motion().rates_rad_s.z / STEP_S
     };
@@ -131,7 +131,10 @@ fn drag_that_the_step_cannot_follow_is_refused() {
     let refused = |drag: Drag| {
         let realism = Realism { drag: Some(drag), ..Realism::default() };
         let environment = Environment::calm(P).unwrap();
-        Plant::with_realism(Model::RigidBody, Motion::default(), environment, &realism, 0.02).unwrap_err().range.name
+        Plant::with_realism(PlantModel::RigidBody, Motion::default(), environment, &realism, 0.02)
+            .unwrap_err()
+            .range
+            .name
     };
     assert_eq!(refused(Drag { blade_n_s2_m: 0.01, ..none() }), "blade_n_s2_m");
     // Stable for the mass, but not for the inertia that the hubs rotate.
@@ -262,7 +265,7 @@ proptest! {
     fn drag_never_pushes(velocity in vector(30.0), attitude in vector(1.0)) {
         let initial = Motion { velocity_m_s: velocity, attitude_rad: attitude, ..Motion::default() };
         let mut dragged = plant(
-            Model::RigidBody,
+            PlantModel::RigidBody,
             initial,
             Drag { rotor_height_m: 0.0, centre_m: Vector3::zeros(), ..Drag::PAPER },
             Vector3::zeros(),

@@ -6,7 +6,7 @@
     reason = "an environment that cannot be built must stop the test"
 )]
 
-use afbc_plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Plant, Quantity};
+use afbc_plant::{Environment, Gust, GustKind, Motion, ParameterChange, Plant, PlantModel, PlantParameter};
 use afbc_types::{Axis, Parameters, RotorSpeeds};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
@@ -17,13 +17,13 @@ fn gust(axis: Axis, kind: GustKind, size: f64, start_s: f64, end_s: f64) -> Gust
     Gust { axis, kind, size, start_s, end_s }
 }
 
-fn change(quantity: Quantity, factor: f64, start_s: f64, end_s: f64) -> ParameterChange {
+fn change(quantity: PlantParameter, factor: f64, start_s: f64, end_s: f64) -> ParameterChange {
     ParameterChange { quantity, factor, start_s, end_s }
 }
 
 /// Velocities and rates of a level vehicle, before the first step and after each.
 fn fly(environment: Environment, speeds: [f32; 4], dt_s: f64, steps: usize) -> Vec<(Vector3<f64>, Vector3<f64>)> {
-    let mut plant = Plant::new(Model::Simplified, Motion::default(), environment);
+    let mut plant = Plant::new(PlantModel::Simplified, Motion::default(), environment);
     let mut motion = vec![(Vector3::zeros(), Vector3::zeros())];
     for _ in 0..steps {
         plant.step(&RotorSpeeds(Vector4::from(speeds)), dt_s);
@@ -84,8 +84,8 @@ proptest! {
         let s = edges.map(|edge| f64::from(edge) / 1000.0);
         let span = |a: f64, b: f64| (a.min(b), a.max(b));
         let (m, g1, g2) = (span(s[0], s[1]), span(s[2], s[3]), span(s[4], s[5]));
-        let changes =
-            vec![change(Quantity::Mass, factors[0], m.0, m.1), change(Quantity::Mass, factors[1], g1.0, g1.1)];
+        let mass = PlantParameter::Mass;
+        let changes = vec![change(mass, factors[0], m.0, m.1), change(mass, factors[1], g1.0, g1.1)];
         let gusts = vec![
             gust(Axis::X, GustKind::Force, sizes[0], g1.0, g1.1),
             gust(Axis::X, GustKind::Acceleration, sizes[1], g2.0, g2.1),
@@ -120,7 +120,7 @@ fn a_gust_pushes_its_own_axis_against_its_sign() {
         (Axis::Pitch, 1, i.y),
         (Axis::Yaw, 2, i.z),
     ];
-    for model in [Model::Simplified, Model::RigidBody] {
+    for model in [PlantModel::Simplified, PlantModel::RigidBody] {
         for (axis, index, scale) in expected {
             for (kind, gain) in [(GustKind::Acceleration, 1.0), (GustKind::Force, 1.0 / scale)] {
                 let size = 0.02;
@@ -171,10 +171,10 @@ fn a_parameter_change_acts_while_it_lasts() {
         ]
     };
     let cases = [
-        (Quantity::Mass, wanted(1.4, 1.0, 1.0, 1.0)),
-        (Quantity::Inertia, wanted(1.0, 1.4, 1.0, 1.0)),
-        (Quantity::ThrustFactor, wanted(1.0, 1.0, 1.4, 1.0)),
-        (Quantity::DragFactor, wanted(1.0, 1.0, 1.0, 1.4)),
+        (PlantParameter::Mass, wanted(1.4, 1.0, 1.0, 1.0)),
+        (PlantParameter::Inertia, wanted(1.0, 1.4, 1.0, 1.0)),
+        (PlantParameter::ThrustFactor, wanted(1.0, 1.0, 1.4, 1.0)),
+        (PlantParameter::DragFactor, wanted(1.0, 1.0, 1.0, 1.4)),
     ];
     for (quantity, changed) in cases {
         for step in 0..3_usize {
@@ -201,28 +201,32 @@ fn a_parameter_change_acts_while_it_lasts() {
 fn a_change_that_leaves_the_range_is_refused_by_name() {
     let refused =
         |changes: Vec<ParameterChange>| Environment::new(P, changes, vec![]).map(|_| ()).map_err(|e| e.range.name);
-    assert_eq!(refused(vec![change(Quantity::Mass, 2.0, 1.0, 2.0)]), Ok(()));
+    assert_eq!(refused(vec![change(PlantParameter::Mass, 2.0, 1.0, 2.0)]), Ok(()));
     for factor in [0.0, -1.0, 1e9, f64::NAN, f64::INFINITY] {
-        assert_eq!(refused(vec![change(Quantity::Mass, factor, 1.0, 2.0)]), Err("mass_kg"), "factor {factor}");
-        assert_eq!(refused(vec![change(Quantity::Inertia, factor, 1.0, 2.0)]), Err("inertia_kg_m2"), "factor {factor}");
+        assert_eq!(refused(vec![change(PlantParameter::Mass, factor, 1.0, 2.0)]), Err("mass_kg"), "factor {factor}");
         assert_eq!(
-            refused(vec![change(Quantity::ThrustFactor, factor, 1.0, f64::INFINITY)]),
+            refused(vec![change(PlantParameter::Inertia, factor, 1.0, 2.0)]),
+            Err("inertia_kg_m2"),
+            "factor {factor}"
+        );
+        assert_eq!(
+            refused(vec![change(PlantParameter::ThrustFactor, factor, 1.0, f64::INFINITY)]),
             Err("thrust_factor_n_s2"),
             "factor {factor}"
         );
         // (a drag factor may be large)
         if factor != 1e9 {
             assert_eq!(
-                refused(vec![change(Quantity::DragFactor, factor, 0.0, 2.0)]),
+                refused(vec![change(PlantParameter::DragFactor, factor, 0.0, 2.0)]),
                 Err("drag_factor_n_m_s2"),
                 "factor {factor}"
             );
         }
     }
     // Each alone is valid, both together are not: 0.486 kg times 40 times 40.
-    let both = vec![change(Quantity::Mass, 40.0, 1.0, 3.0), change(Quantity::Mass, 40.0, 2.0, 4.0)];
+    let both = vec![change(PlantParameter::Mass, 40.0, 1.0, 3.0), change(PlantParameter::Mass, 40.0, 2.0, 4.0)];
     assert_eq!(refused(both.clone()), Err("mass_kg"));
-    let apart = vec![change(Quantity::Mass, 40.0, 1.0, 2.0), change(Quantity::Mass, 40.0, 2.0, 4.0)];
+    let apart = vec![change(PlantParameter::Mass, 40.0, 1.0, 2.0), change(PlantParameter::Mass, 40.0, 2.0, 4.0)];
     assert_eq!(refused(apart), Ok(()));
     let weightless = Parameters { mass_kg: 0.0, ..P };
     assert_eq!(Environment::calm(weightless).unwrap_err().range.name, "mass_kg");
@@ -231,7 +235,7 @@ fn a_change_that_leaves_the_range_is_refused_by_name() {
 /// The clock counts steps, and is exact after an hour.
 #[test]
 fn time_does_not_drift() {
-    let mut plant = Plant::new(Model::Simplified, Motion::default(), Environment::calm(P).unwrap());
+    let mut plant = Plant::new(PlantModel::Simplified, Motion::default(), Environment::calm(P).unwrap());
     for _ in 0..3_600_000_u32 {
         plant.step(&RotorSpeeds::<4>::default(), 0.001);
     }

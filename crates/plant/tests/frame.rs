@@ -2,7 +2,7 @@
 //! axis.
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use afbc_plant::{Drag, Environment, Frame, Model, Motion, Plant, Realism, RotorFault, Rotors};
+use afbc_plant::{Drag, Environment, Frame, Motion, Plant, PlantModel, Realism, RotorFault, Rotors};
 use afbc_types::{Parameters, Rotor, RotorSpeeds};
 use nalgebra::{SVector, Vector3};
 use proptest::prelude::*;
@@ -22,8 +22,8 @@ fn speeds(values: &[f64]) -> RotorSpeeds<8> {
 fn plant(rotors: &[Rotor<f64>], initial: Motion, realism: Option<&Realism>) -> Plant {
     let environment = Environment::calm(P).unwrap().with_frame(Frame::new(rotors).unwrap());
     match realism {
-        None => Plant::new(Model::RigidBody, initial, environment),
-        Some(realism) => Plant::with_realism(Model::RigidBody, initial, environment, realism, STEP_S).unwrap(),
+        None => Plant::new(PlantModel::RigidBody, initial, environment),
+        Some(realism) => Plant::with_realism(PlantModel::RigidBody, initial, environment, realism, STEP_S).unwrap(),
     }
 }
 
@@ -92,7 +92,7 @@ fn rotors_that_are_not_there_do_nothing() {
     let four = Frame::default();
     assert_eq!(four.count(), 4);
     let mut plant = plant(&afbc_types::PLUS.map(|rotor| rotor.to_f64()), Motion::default(), None);
-    let mut alike = Plant::new(Model::RigidBody, Motion::default(), Environment::calm(P).unwrap());
+    let mut alike = Plant::new(PlantModel::RigidBody, Motion::default(), Environment::calm(P).unwrap());
     plant.step(&speeds(&[200.0, 210.0, 190.0, 205.0, 300.0, 300.0, 300.0, 300.0]), STEP_S);
     alike.step(&RotorSpeeds(SVector::from([200.0, 210.0, 190.0, 205.0])), STEP_S);
     assert_eq!(plant.motion(), alike.motion());
@@ -110,7 +110,7 @@ fn too_few_too_many_and_too_far_are_refused() {
     let realism = Realism { rotors: Rotors { faults: vec![fault], ..Rotors::DEFAULT }, ..Realism::default() };
     let on = |count| {
         let environment = Environment::calm(P).unwrap().with_frame(Frame::new(&vec![rotor; count]).unwrap());
-        Plant::with_realism(Model::RigidBody, Motion::default(), environment, &realism, STEP_S)
+        Plant::with_realism(PlantModel::RigidBody, Motion::default(), environment, &realism, STEP_S)
     };
     assert_eq!(on(4).unwrap_err().range.name, "rotor");
     assert!(on(6).is_ok());

@@ -3,7 +3,8 @@
 
 use afbc_plant::integrate::rk4;
 use afbc_plant::{
-    Environment, Gust, GustKind, Load, Model, Motion, ParameterChange, Plant, Quantity, Realism, rigid_body, simplified,
+    Environment, Gust, GustKind, Load, Motion, ParameterChange, Plant, PlantModel, PlantParameter, Realism, rigid_body,
+    simplified,
 };
 use afbc_types::{Axis, Parameters, RotorSpeeds};
 use nalgebra::{Vector3, Vector4};
@@ -13,8 +14,10 @@ const STEPS: u16 = 2000;
 
 fn environment() -> Environment {
     let change = |quantity, factor, start_s, end_s| ParameterChange { quantity, factor, start_s, end_s };
-    let changes =
-        vec![change(Quantity::Inertia, 1.75, 0.5, 1.5), change(Quantity::ThrustFactor, 0.6, 0.7, f64::INFINITY)];
+    let changes = vec![
+        change(PlantParameter::Inertia, 1.75, 0.5, 1.5),
+        change(PlantParameter::ThrustFactor, 0.6, 0.7, f64::INFINITY),
+    ];
     let gusts = vec![
         Gust { axis: Axis::X, kind: GustKind::Acceleration, size: 1.2, start_s: 0.3, end_s: 1.3 },
         Gust { axis: Axis::Roll, kind: GustKind::Force, size: 0.01, start_s: 0.2, end_s: 0.4 },
@@ -54,13 +57,13 @@ fn hash(mut plant: Plant) -> u64 {
 /// Recorded before any effect was added.
 #[test]
 fn flights_of_the_ideal_plant_stay_what_they_were() {
-    assert_eq!(hash(Plant::new(Model::Simplified, start(), environment())), 0x0640_40e6_7508_8793);
-    assert_eq!(hash(Plant::new(Model::RigidBody, start(), environment())), 0x3c53_bd46_9a9b_57e6);
+    assert_eq!(hash(Plant::new(PlantModel::Simplified, start(), environment())), 0x0640_40e6_7508_8793);
+    assert_eq!(hash(Plant::new(PlantModel::RigidBody, start(), environment())), 0x3c53_bd46_9a9b_57e6);
 }
 
 #[test]
 fn realism_that_adds_nothing_changes_no_bit() {
-    for model in [Model::Simplified, Model::RigidBody] {
+    for model in [PlantModel::Simplified, PlantModel::RigidBody] {
         let real = Plant::with_realism(model, start(), environment(), &Realism::default(), STEP_S).unwrap();
         assert_eq!(hash(real), hash(Plant::new(model, start(), environment())));
     }
@@ -70,7 +73,7 @@ fn realism_that_adds_nothing_changes_no_bit() {
 fn a_step_is_one_runge_kutta_step_under_the_load() {
     let vehicle = Parameters::PAPER;
     let zero = Vector3::zeros();
-    let mut plant = Plant::new(Model::Simplified, start(), Environment::calm(vehicle).unwrap());
+    let mut plant = Plant::new(PlantModel::Simplified, start(), Environment::calm(vehicle).unwrap());
     let mut x = simplified::vector(&start());
     for k in 0..STEPS {
         let load = Load::new(&vehicle, speeds(k).0.map(f64::from).into(), zero, zero);
@@ -79,7 +82,7 @@ fn a_step_is_one_runge_kutta_step_under_the_load() {
         assert_eq!(bits(&plant.motion()), bits(&simplified::motion(&x)));
     }
 
-    let mut plant = Plant::new(Model::RigidBody, start(), Environment::calm(vehicle).unwrap());
+    let mut plant = Plant::new(PlantModel::RigidBody, start(), Environment::calm(vehicle).unwrap());
     let mut x = rigid_body::vector(&start());
     for k in 0..STEPS {
         let load = Load::new(&vehicle, speeds(k).0.map(f64::from).into(), zero, zero);

@@ -4,7 +4,9 @@
 mod common;
 
 use afbc_plant::instruments::{Accelerometer, Gyroscope, Imu, ImuReading, Mounting};
-use afbc_plant::{Drag, Environment, Model, Motion, Plant, Realism, Rotors, Suite, Truth, Turbulence, Wind};
+use afbc_plant::{
+    Drag, Environment, InstrumentSuite, Motion, Plant, PlantModel, Realism, Rotors, Truth, Turbulence, Wind,
+};
 use afbc_types::{Parameters, RotorSpeeds};
 use common::{STEP_S, assert_correlation, assert_sigma, assert_sigma_of, coordinates, instruments, mean, rest, run};
 use core::f64::consts::{PI, TAU};
@@ -12,15 +14,15 @@ use nalgebra::{UnitQuaternion, Vector3, Vector4};
 
 const G: f64 = 9.81;
 
-fn with(imu: Imu) -> Suite {
-    Suite { imu: Some(imu), ..Suite::default() }
+fn with(imu: Imu) -> InstrumentSuite {
+    InstrumentSuite { imu: Some(imu), ..InstrumentSuite::default() }
 }
 
-fn gyro(gyro: Gyroscope) -> Suite {
+fn gyro(gyro: Gyroscope) -> InstrumentSuite {
     with(Imu { gyro, ..Imu::DEFAULT })
 }
 
-fn samples(suite: Suite, seed: u64, steps: u32, truth: impl Fn(u32) -> Truth) -> Vec<ImuReading> {
+fn samples(suite: InstrumentSuite, seed: u64, steps: u32, truth: impl Fn(u32) -> Truth) -> Vec<ImuReading> {
     run(suite, seed, steps, truth).into_iter().map(|readings| readings.imu.unwrap()).collect()
 }
 
@@ -204,7 +206,7 @@ fn a_mounted_sensor_feels_its_own_place() {
     const DT_S: f64 = 1e-4;
     let mounting = Mounting { position_m: Vector3::new(0.05, -0.03, 0.02), attitude_rad: Vector3::new(0.3, -0.2, 2.5) };
     let initial = Motion { rates_rad_s: Vector3::new(4.0, -3.0, 6.0), ..Motion::default() };
-    let mut plant = Plant::new(Model::RigidBody, initial, Environment::calm(Parameters::PAPER).unwrap());
+    let mut plant = Plant::new(PlantModel::RigidBody, initial, Environment::calm(Parameters::PAPER).unwrap());
     let mut sensor = afbc_plant::Instruments::new(&with(Imu { mounting, ..Imu::DEFAULT }), &[], 1, DT_S).unwrap();
     let axes = {
         let a = mounting.attitude_rad;
@@ -247,7 +249,7 @@ fn feedback(motion: &Motion, time_s: f64) -> RotorSpeeds<4> {
 /// at most a step: 1 ms of 5 m/s2 is 5 mm/s.
 #[test]
 fn a_perfect_one_navigates() {
-    for model in [Model::RigidBody, Model::Simplified] {
+    for model in [PlantModel::RigidBody, PlantModel::Simplified] {
         let realism = Realism {
             rotors: Rotors { time_constant_s: 0.02, max_rad_s: 317.0, ..Rotors::default() },
             drag: Some(Drag::PAPER),

@@ -4,26 +4,26 @@
 mod common;
 
 use afbc_plant::instruments::{
-    Barometer, Failure, Gnss, Gyroscope, Imu, InstrumentFault, Magnetometer, Mounting, Preset, Tracker,
+    Barometer, Failure, Gnss, Gyroscope, Imu, InstrumentFault, Magnetometer, Mounting, Preset, TrackerModel,
 };
-use afbc_plant::{Dropouts, Instruments, Readings, Suite, Truth};
+use afbc_plant::{Dropouts, InstrumentReadings, InstrumentSuite, Instruments, Truth};
 use afbc_types::Declared;
 use common::{STEP_S, rest, run, run_with};
 use nalgebra::{Quaternion, Vector3};
 
 /// All of them, with every random property.
-fn all() -> Suite {
+fn all() -> InstrumentSuite {
     let often = Dropouts { rate_hz: 2.0, mean_s: 0.1 };
     let mut imu = Imu::MPU_6000;
     (imu.gyro.vibration_rad_s, imu.accel.vibration_m_s2) = (0.1, 2.0);
-    Suite {
+    InstrumentSuite {
         imu: Some(imu),
-        tracker: Some(Tracker {
+        tracker: Some(TrackerModel {
             outliers: 0.05,
             stamp_noise_s: 1e-4,
             loss: often,
             freeze: often,
-            ..Tracker::MOCAP_100
+            ..TrackerModel::MOCAP_100
         }),
         gnss: Some(Gnss { loss: often, ..Gnss::M10 }),
         barometer: Some(Barometer { offset_m: 1.0, ..Barometer::BMP388 }),
@@ -43,7 +43,7 @@ fn the_same_seed_measures_the_same() {
     let of = |seed| run(all(), seed, 2000, moving);
     assert_eq!(of(7), of(7));
     let (one, other) = (of(7), of(8));
-    let differ = |part: fn(&Readings) -> String| one.iter().map(part).ne(other.iter().map(part));
+    let differ = |part: fn(&InstrumentReadings) -> String| one.iter().map(part).ne(other.iter().map(part));
     assert!(differ(|r| format!("{:?}", r.imu)) && differ(|r| format!("{:?}", r.tracker)));
     assert!(differ(|r| format!("{:?}", r.gnss)) && differ(|r| format!("{:?}", r.barometer)));
     assert!(differ(|r| format!("{:?}", r.magnetometer)));
@@ -52,14 +52,14 @@ fn the_same_seed_measures_the_same() {
 /// An instrument reads the same alone, with all others, and while those fail.
 #[test]
 fn no_instrument_changes_another_ones_readings() {
-    let (suite, none) = (all(), Suite::default());
+    let (suite, none) = (all(), InstrumentSuite::default());
     let together = run(suite, 7, 3000, moving);
     let alone = [
-        run(Suite { imu: suite.imu, ..none }, 7, 3000, moving),
-        run(Suite { tracker: suite.tracker, ..none }, 7, 3000, moving),
-        run(Suite { gnss: suite.gnss, ..none }, 7, 3000, moving),
-        run(Suite { barometer: suite.barometer, ..none }, 7, 3000, moving),
-        run(Suite { magnetometer: suite.magnetometer, ..none }, 7, 3000, moving),
+        run(InstrumentSuite { imu: suite.imu, ..none }, 7, 3000, moving),
+        run(InstrumentSuite { tracker: suite.tracker, ..none }, 7, 3000, moving),
+        run(InstrumentSuite { gnss: suite.gnss, ..none }, 7, 3000, moving),
+        run(InstrumentSuite { barometer: suite.barometer, ..none }, 7, 3000, moving),
+        run(InstrumentSuite { magnetometer: suite.magnetometer, ..none }, 7, 3000, moving),
     ];
     for (k, all) in together.iter().enumerate() {
         let [imu, tracker, gnss, barometer, magnetometer] = alone.each_ref().map(|readings| &readings[k]);
@@ -105,7 +105,7 @@ fn presets_are_accepted() {
         presets.iter().map(|preset| preset.name).collect()
     }
     assert_eq!(check(&Imu::PRESETS), ["icm-42688-p", "bmi270", "mpu-6000"]);
-    assert_eq!(check(&Tracker::PRESETS), ["mocap-100"]);
+    assert_eq!(check(&TrackerModel::PRESETS), ["mocap-100"]);
     assert_eq!(check(&Gnss::PRESETS), ["m10"]);
     assert_eq!(check(&Barometer::PRESETS), ["dps310", "bmp388"]);
     assert_eq!(check(&Magnetometer::PRESETS), ["ist8310", "qmc5883l"]);
@@ -113,18 +113,24 @@ fn presets_are_accepted() {
 
 #[test]
 fn settings_out_of_range_are_refused_by_name() {
-    let refused = |suite: Suite| Instruments::new(&suite, &[], 1, STEP_S).unwrap_err().range.name;
-    let none = Suite::default();
-    let imu = |imu| refused(Suite { imu: Some(imu), ..none });
+    let refused = |suite: InstrumentSuite| Instruments::new(&suite, &[], 1, STEP_S).unwrap_err().range.name;
+    let none = InstrumentSuite::default();
+    let imu = |imu| refused(InstrumentSuite { imu: Some(imu), ..none });
     assert_eq!(imu(Imu { gyro: Gyroscope { scale: 0.2, ..Gyroscope::DEFAULT }, ..Imu::DEFAULT }), "scale");
     let far = Mounting { position_m: Vector3::repeat(20.0), ..Mounting::DEFAULT };
     assert_eq!(imu(Imu { mounting: far, ..Imu::DEFAULT }), "position_m");
-    assert_eq!(refused(Suite { tracker: Some(Tracker { rate_hz: 0.0, ..Tracker::DEFAULT }), ..none }), "rate_hz");
-    assert_eq!(refused(Suite { gnss: Some(Gnss { reported: f64::NAN, ..Gnss::DEFAULT }), ..none }), "reported");
+    assert_eq!(
+        refused(InstrumentSuite { tracker: Some(TrackerModel { rate_hz: 0.0, ..TrackerModel::DEFAULT }), ..none }),
+        "rate_hz"
+    );
+    assert_eq!(
+        refused(InstrumentSuite { gnss: Some(Gnss { reported: f64::NAN, ..Gnss::DEFAULT }), ..none }),
+        "reported"
+    );
     let washed = Barometer { wash_height_m: 0.0, ..Barometer::DEFAULT };
-    assert_eq!(refused(Suite { barometer: Some(washed), ..none }), "wash_height_m");
+    assert_eq!(refused(InstrumentSuite { barometer: Some(washed), ..none }), "wash_height_m");
     let steep = Magnetometer { inclination_rad: 2.0, ..Magnetometer::DEFAULT };
-    assert_eq!(refused(Suite { magnetometer: Some(steep), ..none }), "inclination_rad");
+    assert_eq!(refused(InstrumentSuite { magnetometer: Some(steep), ..none }), "inclination_rad");
     assert_eq!(Instruments::new(&none, &[], 1, 0.0).unwrap_err().range.name, "step_s");
     let bad = fault(Failure::ImuClipped { rates_rad_s: -1.0, specific_force_m_s2: 1.0 });
     assert_eq!(Instruments::new(&none, &[bad], 1, STEP_S).unwrap_err().range.name, "rates_rad_s");
@@ -143,10 +149,10 @@ fn acts(time_s: f64) -> bool {
 }
 
 /// Readings of perfect, immediate instruments without and with a failure, step by step.
-fn compare(failure: Failure, mut check: impl FnMut(u32, &Readings, &Readings)) {
-    let suite = Suite {
+fn compare(failure: Failure, mut check: impl FnMut(u32, &InstrumentReadings, &InstrumentReadings)) {
+    let suite = InstrumentSuite {
         imu: Some(Imu::DEFAULT),
-        tracker: Some(Tracker::DEFAULT),
+        tracker: Some(TrackerModel::DEFAULT),
         gnss: Some(Gnss::DEFAULT),
         barometer: Some(Barometer { noise_m: 0.1, ..Barometer::DEFAULT }),
         magnetometer: Some(Magnetometer::DEFAULT),

@@ -5,20 +5,20 @@
 mod common;
 
 use afbc_plant::instruments::{Barometer, Gnss, Magnetometer};
-use afbc_plant::{Dropouts, Suite, Truth};
+use afbc_plant::{Dropouts, InstrumentSuite, Truth};
 use common::{STEP_S, assert_correlation, assert_sigma, coordinates, mean, rest, run};
 use nalgebra::{UnitQuaternion, Vector3};
 
-fn gnss(gnss: Gnss) -> Suite {
-    Suite { gnss: Some(gnss), ..Suite::default() }
+fn gnss(gnss: Gnss) -> InstrumentSuite {
+    InstrumentSuite { gnss: Some(gnss), ..InstrumentSuite::default() }
 }
 
-fn barometer(barometer: Barometer) -> Suite {
-    Suite { barometer: Some(barometer), ..Suite::default() }
+fn barometer(barometer: Barometer) -> InstrumentSuite {
+    InstrumentSuite { barometer: Some(barometer), ..InstrumentSuite::default() }
 }
 
-fn magnetometer(magnetometer: Magnetometer) -> Suite {
-    Suite { magnetometer: Some(magnetometer), ..Suite::default() }
+fn magnetometer(magnetometer: Magnetometer) -> InstrumentSuite {
+    InstrumentSuite { magnetometer: Some(magnetometer), ..InstrumentSuite::default() }
 }
 
 fn moving(k: u32) -> Truth {
@@ -28,11 +28,11 @@ fn moving(k: u32) -> Truth {
 
 #[test]
 fn perfect_ones_read_the_truth() {
-    let suite = Suite {
+    let suite = InstrumentSuite {
         gnss: Some(Gnss::DEFAULT),
         barometer: Some(Barometer::DEFAULT),
         magnetometer: Some(Magnetometer::DEFAULT),
-        ..Suite::default()
+        ..InstrumentSuite::default()
     };
     let readings = run(suite, 1, 1000, moving);
     let (mut fixes, mut heights, mut fields) = (0, 0, 0);

@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use afbc_plant::{
-    Battery, Contact, CosineGust, Deviations, Drag, Dropouts, Environment, GroundEffect, Model, Motion, Plant, Realism,
-    RotorFault, Rotors, Sag, Sensing, Sensors, Start, Turbulence, Wind,
+    Battery, Contact, CosineGust, Deviations, Drag, Dropouts, Environment, GroundEffect, Motion, Plant, PlantModel,
+    Realism, RotorFault, Rotors, Sag, Sensing, Start, StateSensor, Turbulence, Wind,
 };
 use afbc_types::{Parameters, RotorSpeeds};
 use nalgebra::{Vector3, Vector4};
@@ -125,10 +125,10 @@ proptest! {
         commands in commands(),
         rigid in any::<bool>(),
     ) {
-        let model = if rigid { Model::RigidBody } else { Model::Simplified };
+        let model = if rigid { PlantModel::RigidBody } else { PlantModel::Simplified };
         let environment = Environment::calm(Parameters::PAPER).unwrap();
         let mut plant = Plant::with_realism(model, motion, environment, &realism, STEP_S).unwrap();
-        let mut sensors = Sensors::new(&sensing(), realism.seed, STEP_S).unwrap();
+        let mut sensors = StateSensor::new(&sensing(), realism.seed, STEP_S).unwrap();
         for command in commands.iter().cycle().take(2000) {
             plant.step(&RotorSpeeds(Vector4::from(*command)), STEP_S);
             prop_assert!(finite(&plant.motion()), "{:?}", plant.motion());
@@ -143,8 +143,8 @@ proptest! {
     fn the_same_seed_flies_the_same_flight_to_the_bit(realism in realism(), motion in motion()) {
         let fly = || {
             let environment = Environment::calm(Parameters::PAPER).unwrap();
-            let mut plant = Plant::with_realism(Model::RigidBody, motion, environment, &realism, STEP_S).unwrap();
-            let mut sensors = Sensors::new(&sensing(), realism.seed, STEP_S).unwrap();
+            let mut plant = Plant::with_realism(PlantModel::RigidBody, motion, environment, &realism, STEP_S).unwrap();
+            let mut sensors = StateSensor::new(&sensing(), realism.seed, STEP_S).unwrap();
             let mut seen = Vec::new();
             for _ in 0..200 {
                 seen.push(sensors.measure(&plant.motion()));
@@ -178,8 +178,8 @@ fn a_flight_with_everything_stays_what_it_is() {
     };
     let initial = Motion { position_m: Vector3::new(0.0, 0.0, 1.0), ..Motion::default() };
     let environment = Environment::calm(Parameters::PAPER).unwrap();
-    let mut plant = Plant::with_realism(Model::RigidBody, initial, environment, &realism, STEP_S).unwrap();
-    let mut sensors = Sensors::new(&sensing(), 11, STEP_S).unwrap();
+    let mut plant = Plant::with_realism(PlantModel::RigidBody, initial, environment, &realism, STEP_S).unwrap();
+    let mut sensors = StateSensor::new(&sensing(), 11, STEP_S).unwrap();
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     for _ in 0..3000 {
         let state = sensors.measure(&plant.motion()).state;

@@ -1,13 +1,13 @@
 //! Sensors compared with their settings.
 #![allow(clippy::unwrap_used, clippy::float_cmp, clippy::indexing_slicing, missing_docs)]
 
-use afbc_plant::{Deviations, Dropouts, Measurement, Motion, Sensing, Sensors};
+use afbc_plant::{Deviations, Dropouts, Motion, Sensing, StateMeasurement, StateSensor};
 use nalgebra::Vector3;
 
 const STEP_S: f64 = 0.001;
 
-fn sensors(sensing: Sensing, seed: u64) -> Sensors {
-    Sensors::new(&sensing, seed, STEP_S).unwrap()
+fn sensors(sensing: Sensing, seed: u64) -> StateSensor {
+    StateSensor::new(&sensing, seed, STEP_S).unwrap()
 }
 
 /// A different motion at every step, exact in f32.
@@ -17,7 +17,7 @@ fn motion(k: u16) -> Motion {
 }
 
 /// The twelve coordinates of a measurement at zero motion.
-fn numbers(measurement: &Measurement) -> Vec<f64> {
+fn numbers(measurement: &StateMeasurement) -> Vec<f64> {
     let s = &measurement.state;
     let groups = [&s.position_m, &s.velocity_m_s, &s.attitude_rad, &s.rates_rad_s];
     groups.iter().flat_map(|v| v.iter()).map(|&x| f64::from(x)).collect()
@@ -28,7 +28,7 @@ fn perfect_sensors_measure_the_motion() {
     let mut sensors = sensors(Sensing::default(), 1);
     for k in 0..100 {
         let measurement = sensors.measure(&motion(k));
-        assert_eq!(measurement, Measurement { state: motion(k).measure(), age_s: 0.0, fresh: true, new: true });
+        assert_eq!(measurement, StateMeasurement { state: motion(k).measure(), age_s: 0.0, fresh: true, new: true });
     }
 }
 
@@ -203,7 +203,7 @@ fn the_same_seed_measures_the_same_and_dropouts_do_not_change_the_noise() {
 
 #[test]
 fn settings_out_of_range_are_refused_by_name() {
-    let refused = |sensing: Sensing| Sensors::new(&sensing, 0, STEP_S).unwrap_err().range.name;
+    let refused = |sensing: Sensing| StateSensor::new(&sensing, 0, STEP_S).unwrap_err().range.name;
     let ok = Sensing::default;
     assert_eq!(
         refused(Sensing { noise: Deviations { position_m: -1.0, ..Deviations::default() }, ..ok() }),
@@ -216,5 +216,5 @@ fn settings_out_of_range_are_refused_by_name() {
     assert_eq!(refused(Sensing { delay_s: 1.0, ..ok() }), "delay_s");
     assert_eq!(refused(Sensing { period_s: 1.0, ..ok() }), "period_s");
     assert_eq!(refused(Sensing { dropouts: Some(Dropouts { rate_hz: -1.0, mean_s: 0.1 }), ..ok() }), "rate_hz");
-    assert_eq!(Sensors::new(&ok(), 0, 0.0).unwrap_err().range.name, "step_s");
+    assert_eq!(StateSensor::new(&ok(), 0, 0.0).unwrap_err().range.name, "step_s");
 }

@@ -3,13 +3,13 @@
 
 mod common;
 
-use afbc_plant::instruments::{Tracker, TrackerFix};
-use afbc_plant::{Dropouts, Suite, Truth};
+use afbc_plant::instruments::{TrackerFix, TrackerModel};
+use afbc_plant::{Dropouts, InstrumentSuite, Truth};
 use common::{STEP_S, assert_sigma, coordinates, mean, rest, rotation, run};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-fn with(tracker: Tracker) -> Suite {
-    Suite { tracker: Some(tracker), ..Suite::default() }
+fn with(tracker: TrackerModel) -> InstrumentSuite {
+    InstrumentSuite { tracker: Some(tracker), ..InstrumentSuite::default() }
 }
 
 /// A motion whose position tells its step: x is the number of milliseconds.
@@ -19,7 +19,7 @@ fn moving(k: u32) -> Truth {
 }
 
 /// Fixes, each with the step of its arrival.
-fn fixes(tracker: Tracker, seed: u64, steps: u32) -> Vec<(u32, TrackerFix)> {
+fn fixes(tracker: TrackerModel, seed: u64, steps: u32) -> Vec<(u32, TrackerFix)> {
     let readings = run(with(tracker), seed, steps, moving);
     (0..).zip(readings).flat_map(|(k, readings)| readings.tracker.into_iter().map(move |fix| (k, fix))).collect()
 }
@@ -32,7 +32,7 @@ fn taken(fix: &TrackerFix) -> u32 {
 #[test]
 fn a_perfect_one_sends_the_truth_at_once_at_its_rate() {
     for (rate_hz, steps) in [(100.0, 10.0), (240.0, 1000.0 / 240.0), (1000.0, 1.0), (7.0, 1000.0 / 7.0)] {
-        let fixes = fixes(Tracker { rate_hz, ..Tracker::DEFAULT }, 1, 5000);
+        let fixes = fixes(TrackerModel { rate_hz, ..TrackerModel::DEFAULT }, 1, 5000);
         let due = (0..).map(|n| (f64::from(n) * steps - 1e-6).ceil() as u32);
         let expected: Vec<u32> = due.take_while(|k| *k < 5000).collect();
         assert_eq!(fixes.iter().map(|(k, _)| *k).collect::<Vec<_>>(), expected, "{rate_hz} Hz");
@@ -48,7 +48,7 @@ fn a_perfect_one_sends_the_truth_at_once_at_its_rate() {
 /// its motion.
 #[test]
 fn delays_are_spread_as_declared_and_stamps_tell_them() {
-    let tracker = Tracker { delay_s: 0.0105, jitter_s: 0.004, rate_hz: 250.0, ..Tracker::DEFAULT };
+    let tracker = TrackerModel { delay_s: 0.0105, jitter_s: 0.004, rate_hz: 250.0, ..TrackerModel::DEFAULT };
     let fixes = fixes(tracker, 2, 200_000);
     let mut late = Vec::new();
     for (k, fix) in &fixes {
@@ -66,16 +66,16 @@ fn delays_are_spread_as_declared_and_stamps_tell_them() {
     // Those of one delay arrive in their order, some of these do not.
     assert!(fixes.windows(2).any(|w| w[1].1.true_at_s < w[0].1.true_at_s));
     // None arrives before its motion.
-    let early = self::fixes(Tracker { delay_s: 0.001, jitter_s: 0.1, ..tracker }, 2, 10_000);
+    let early = self::fixes(TrackerModel { delay_s: 0.001, jitter_s: 0.1, ..tracker }, 2, 10_000);
     assert!(early.iter().any(|(k, fix)| *k == taken(fix)) && early.iter().all(|(k, fix)| *k >= taken(fix)));
-    let preset = self::fixes(Tracker::MOCAP_100, 2, 100_000);
+    let preset = self::fixes(TrackerModel::MOCAP_100, 2, 100_000);
     assert!(preset.iter().all(|(k, fix)| (8..=12).contains(&(k - taken(fix)))));
     assert!(preset.windows(2).all(|w| w[1].1.true_at_s > w[0].1.true_at_s));
 }
 
 #[test]
 fn stamps_have_their_errors() {
-    let tracker = Tracker { stamp_s: 0.003, stamp_noise_s: 0.001, ..Tracker::DEFAULT };
+    let tracker = TrackerModel { stamp_s: 0.003, stamp_noise_s: 0.001, ..TrackerModel::DEFAULT };
     let errors: Vec<f64> =
         fixes(tracker, 3, 100_000).iter().map(|(k, fix)| fix.true_at_s - f64::from(*k) * STEP_S - 0.003).collect();
     assert_sigma(&errors, 0.001, "stamps");
@@ -91,14 +91,14 @@ fn errors(fixes: &[(u32, TrackerFix)]) -> (Vec<f64>, Vec<f64>) {
 
 #[test]
 fn noise_has_its_spread_and_outliers_their_share() {
-    let tracker = Tracker { position_m: 0.002, attitude_rad: 0.004, ..Tracker::DEFAULT };
+    let tracker = TrackerModel { position_m: 0.002, attitude_rad: 0.004, ..TrackerModel::DEFAULT };
     let clean = fixes(tracker, 4, 500_000);
     let (position, attitude) = errors(&clean);
     assert_sigma(&position, 0.002, "position");
     assert_sigma(&attitude, 0.004, "attitude");
     assert!(clean.iter().all(|(_, fix)| (fix.attitude.norm() - 1.0).abs() < 1e-12));
 
-    let dirty = fixes(Tracker { outliers: 0.02, outlier_m: 3.0, outlier_rad: 0.1, ..tracker }, 4, 500_000);
+    let dirty = fixes(TrackerModel { outliers: 0.02, outlier_m: 3.0, outlier_rad: 0.1, ..tracker }, 4, 500_000);
     let (mut far, mut turned) = (Vec::new(), Vec::new());
     for ((k, fix), (_, clean)) in dirty.iter().zip(&clean) {
         // An outlier changes its own fix and no other one's noise.
@@ -117,7 +117,7 @@ fn noise_has_its_spread_and_outliers_their_share() {
 fn the_frame_is_shifted_and_turned() {
     let (frame_m, frame_yaw_rad) = (Vector3::new(1.0, 2.0, -0.5), 0.7);
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.7);
-    for (k, fix) in fixes(Tracker { frame_m, frame_yaw_rad, ..Tracker::DEFAULT }, 5, 1000) {
+    for (k, fix) in fixes(TrackerModel { frame_m, frame_yaw_rad, ..TrackerModel::DEFAULT }, 5, 1000) {
         let truth = moving(k);
         assert!((fix.position_m - (turn * truth.position_m + frame_m)).norm() < 1e-9);
         let expected: Quaternion<f64> = turn.into_inner() * truth.attitude;
@@ -129,7 +129,7 @@ fn the_frame_is_shifted_and_turned() {
 /// neither changes the noise of the others.
 #[test]
 fn dropouts_lose_fixes_and_freezes_repeat_them() {
-    let noisy = Tracker { position_m: 0.001, ..Tracker::DEFAULT };
+    let noisy = TrackerModel { position_m: 0.001, ..TrackerModel::DEFAULT };
     let chain = Dropouts { rate_hz: 0.5, mean_s: 0.2 };
     let all = fixes(noisy, 6, 2_000_000);
     let share = |count: usize| {
@@ -139,12 +139,12 @@ fn dropouts_lose_fixes_and_freezes_repeat_them() {
         let bound = 5.0 * (p * (1.0 - p) / 2e6 * (1.0 + r) / (1.0 - r)).sqrt();
         assert!((found - p).abs() < bound, "{found}, not {p} within {bound}");
     };
-    let lossy = fixes(Tracker { loss: chain, ..noisy }, 6, 2_000_000);
+    let lossy = fixes(TrackerModel { loss: chain, ..noisy }, 6, 2_000_000);
     let mut kept = all.iter();
     assert!(lossy.iter().all(|fix| kept.any(|other| other == fix)), "what arrives is as without dropouts");
     share(all.len() - lossy.len());
 
-    let frozen = fixes(Tracker { freeze: chain, ..noisy }, 6, 2_000_000);
+    let frozen = fixes(TrackerModel { freeze: chain, ..noisy }, 6, 2_000_000);
     assert_eq!(frozen.len(), all.len());
     let mut count = 0;
     for i in 1..all.len() {

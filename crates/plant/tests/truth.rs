@@ -3,7 +3,7 @@
 
 use afbc_plant::noise::{Noise, Stream};
 use afbc_plant::{
-    Contact, Drag, Environment, GroundEffect, Gust, GustKind, Model, Motion, Plant, Realism, Rotors, Start, Truth,
+    Contact, Drag, Environment, GroundEffect, Gust, GustKind, Motion, Plant, PlantModel, Realism, Rotors, Start, Truth,
     Turbulence, Wind,
 };
 use afbc_types::{Axis, Parameters, RotorSpeeds};
@@ -40,7 +40,7 @@ fn calm() -> Environment {
 fn flights(mut visit: impl FnMut(&mut Plant, &mut Noise)) {
     let mut noise = Noise::new(11, Stream::Scenario);
     for seed in 0..20 {
-        for model in [Model::RigidBody, Model::Simplified] {
+        for model in [PlantModel::RigidBody, PlantModel::Simplified] {
             let initial = Motion {
                 position_m: Vector3::new(0.0, 0.0, 0.1 + 0.5 * noise.uniform()),
                 velocity_m_s: three(&mut noise, 1.0),
@@ -114,7 +114,7 @@ fn accelerations_and_rates_are_those_of_the_motion() {
 /// In free fall nothing is felt, whatever the attitude; thrust is felt along body z alone.
 #[test]
 fn free_fall_is_felt_as_nothing_and_thrust_along_body_z() {
-    for model in [Model::RigidBody, Model::Simplified] {
+    for model in [PlantModel::RigidBody, PlantModel::Simplified] {
         let attitude_rad = Vector3::new(0.5, -0.7, 2.0);
         let initial = Motion { attitude_rad, rates_rad_s: Vector3::new(0.1, 0.2, -0.3), ..Motion::default() };
         let mut plant = Plant::new(model, initial, calm());
@@ -144,7 +144,7 @@ fn rest_is_felt_as_gravity_upward() {
         contact: Some(Contact::PAPER),
         ..Realism::default()
     };
-    for model in [Model::RigidBody, Model::Simplified] {
+    for model in [PlantModel::RigidBody, PlantModel::Simplified] {
         let mut plant = Plant::with_realism(model, initial, calm(), &realism, 1e-3).unwrap();
         at_rest(&plant.truth(), 1e-9);
         for _ in 0..3000 {
@@ -162,7 +162,7 @@ fn rest_is_felt_as_gravity_upward() {
 fn drag_is_felt() {
     let initial = Motion { velocity_m_s: Vector3::new(4.0, 0.0, 0.0), ..Motion::default() };
     let realism = Realism { drag: Some(Drag::PAPER), ..Realism::default() };
-    let mut plant = Plant::with_realism(Model::RigidBody, initial, calm(), &realism, 1e-5).unwrap();
+    let mut plant = Plant::with_realism(PlantModel::RigidBody, initial, calm(), &realism, 1e-5).unwrap();
     plant.step(&RotorSpeeds(Vector4::repeat(HOVER_RAD_S)), 1e-5);
     let Drag { air_density_kg_m3, blade_n_s2_m, area_m2, .. } = Drag::PAPER;
     let newton = 4.0 * blade_n_s2_m * f64::from(HOVER_RAD_S) * 4.0 + 0.5 * air_density_kg_m3 * area_m2.x * 16.0;
@@ -174,7 +174,8 @@ fn drag_is_felt() {
 #[test]
 fn truth_is_only_read() {
     let fly = |ask: bool| {
-        let mut plant = Plant::with_realism(Model::RigidBody, Motion::default(), calm(), &stormy(3), 1e-3).unwrap();
+        let mut plant =
+            Plant::with_realism(PlantModel::RigidBody, Motion::default(), calm(), &stormy(3), 1e-3).unwrap();
         for _ in 0..500 {
             plant.step(&RotorSpeeds(Vector4::new(199.0, 200.0, 201.0, 199.5)), 1e-3);
             if ask {

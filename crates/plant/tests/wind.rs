@@ -6,7 +6,7 @@
 //! errors.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
 
-use afbc_plant::{CosineGust, Environment, Gust, GustKind, Model, Motion, Plant, Realism, Turbulence, Wind};
+use afbc_plant::{CosineGust, Environment, Gust, GustKind, Motion, Plant, PlantModel, Realism, Turbulence, Wind};
 use afbc_types::{Axis, Parameters, RotorSpeeds};
 use nalgebra::Vector3;
 
@@ -20,7 +20,7 @@ fn floating(height_m: f64, wind: Wind, seed: u64, step_s: f64) -> Plant {
     let environment = Environment::new(P, vec![], vec![lift]).unwrap();
     let initial = Motion { position_m: Vector3::new(0.0, 0.0, height_m), ..Motion::default() };
     let realism = Realism { wind, seed, ..Realism::default() };
-    Plant::with_realism(Model::Simplified, initial, environment, &realism, step_s).unwrap()
+    Plant::with_realism(PlantModel::Simplified, initial, environment, &realism, step_s).unwrap()
 }
 
 fn air(plant: &mut Plant, step_s: f64) -> Vector3<f64> {
@@ -189,7 +189,10 @@ fn wind_out_of_range_is_refused_by_name() {
     let refused = |wind: Wind| {
         let realism = Realism { wind, ..Realism::default() };
         let environment = Environment::calm(P).unwrap();
-        Plant::with_realism(Model::RigidBody, Motion::default(), environment, &realism, 0.001).unwrap_err().range.name
+        Plant::with_realism(PlantModel::RigidBody, Motion::default(), environment, &realism, 0.001)
+            .unwrap_err()
+            .range
+            .name
     };
     let gust = CosineGust { velocity_m_s: Vector3::x(), start_s: 0.0, rise_s: 1.0, hold_s: 0.0 };
     let gusts = |gust| Wind { gusts: vec![gust], ..Wind::default() };

@@ -8,7 +8,7 @@ use core::fmt::Write;
 
 /// One parameter of a file.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Entry {
+pub struct ParameterEntry {
     /// Name.
     pub name: String,
     /// Value.
@@ -30,8 +30,8 @@ pub enum Format {
 ///
 /// # Errors
 /// One line on the first line of the file that is wrong.
-pub fn read(file: &str, text: &str) -> Result<Vec<Entry>, FileError> {
-    let (mut entries, mut at) = (Vec::<Entry>::new(), 0);
+pub fn read(file: &str, text: &str) -> Result<Vec<ParameterEntry>, FileError> {
+    let (mut entries, mut at) = (Vec::<ParameterEntry>::new(), 0);
     for line in text.split_inclusive('\n') {
         let start = at;
         at += line.len();
@@ -52,7 +52,7 @@ pub fn read(file: &str, text: &str) -> Result<Vec<Entry>, FileError> {
         if entries.iter().any(|entry| entry.name == name) {
             return fault(name, "a second value; take one of them out".into());
         }
-        entries.push(Entry { name: name.into(), value: number, at: start });
+        entries.push(ParameterEntry { name: name.into(), value: number, at: start });
     }
     Ok(entries)
 }

@@ -1,7 +1,7 @@
 //! Measurements as a log tells them, and what the estimator is told of their errors.
 
-use crate::recording::{Aiding, Sensor, Source, flip};
-use afbc_estimator::{Measurement, Origin, Timed};
+use crate::recording::{Aiding, SampleSource, Sensor, flip};
+use afbc_estimator::{Measurement, Origin, Stamped};
 use nalgebra::Vector3;
 
 /// Smallest standard deviations of a receiver's position, height \[m\] and velocity \[m/s\], and the largest: receivers
@@ -85,12 +85,18 @@ pub(crate) fn field(arrived_us: u64, at_us: u64, gauss: [f64; 3], delay_us: u64)
 }
 
 fn aided(value: Measurement, arrived_us: u64, at_us: u64, delay_us: u64) -> Aiding {
-    Aiding { arrived_us, measurement: Timed { value, at_us: at_us.saturating_sub(delay_us) } }
+    Aiding { arrived_us, measurement: Stamped { value, at_us: at_us.saturating_sub(delay_us) } }
 }
 
 /// Keeps usable measurements in order, heights and fields no more often than they tell anything; appends them to `all`
 /// and says where they come from. `raw` is the number of samples in the log.
-pub(crate) fn collect(all: &mut Vec<Aiding>, sensor: Sensor, topic: &str, raw: usize, aiding: Vec<Aiding>) -> Source {
+pub(crate) fn collect(
+    all: &mut Vec<Aiding>,
+    sensor: Sensor,
+    topic: &str,
+    raw: usize,
+    aiding: Vec<Aiding>,
+) -> SampleSource {
     let usable: Vec<_> = aiding.into_iter().filter(|aiding| aiding.measurement.value.is_plausible()).collect();
     let (mut kept, _) = crate::order::rising(usable, |aiding| aiding.measurement.at_us);
     if sensor != Sensor::Gnss {
@@ -98,7 +104,7 @@ pub(crate) fn collect(all: &mut Vec<Aiding>, sensor: Sensor, topic: &str, raw: u
     }
     let used = kept.len();
     all.append(&mut kept);
-    Source { sensor, topic: topic.into(), used, skipped: raw.saturating_sub(used) }
+    SampleSource { sensor, topic: topic.into(), used, skipped: raw.saturating_sub(used) }
 }
 
 /// Keeps samples at least so far apart.

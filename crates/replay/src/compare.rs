@@ -6,7 +6,7 @@ use nalgebra::{Quaternion, Vector3};
 
 /// The differences of one quantity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Figure {
+pub struct ErrorFigure {
     /// Number of times at which both are valid.
     pub count: u64,
     /// Number of times at which the log's is, whatever ours.
@@ -18,7 +18,7 @@ pub struct Figure {
     within: (u64, u64),
 }
 
-impl Figure {
+impl ErrorFigure {
     /// Adds a vector of differences with standard deviations.
     fn add(&mut self, difference: &[f64], sigma: &[f64]) {
         let square: f64 = difference.iter().map(|part| part * part).sum();
@@ -53,19 +53,19 @@ impl Figure {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
     /// Angle between the attitudes \[degrees\].
-    pub attitude: Figure,
+    pub attitude: ErrorFigure,
     /// Its part about horizontal axes \[degrees\].
-    pub tilt: Figure,
+    pub tilt: ErrorFigure,
     /// Its part about the vertical axis \[degrees\].
-    pub heading: Figure,
+    pub heading: ErrorFigure,
     /// Velocity \[m/s\].
-    pub velocity: Figure,
+    pub velocity: ErrorFigure,
     /// Position \[m\].
-    pub position: Figure,
+    pub position: ErrorFigure,
     /// Its horizontal part \[m\].
-    pub horizontal: Figure,
+    pub horizontal: ErrorFigure,
     /// Its vertical part \[m\].
-    pub height: Figure,
+    pub height: ErrorFigure,
 }
 
 impl Figures {
@@ -102,7 +102,7 @@ impl Figures {
     }
 }
 
-fn compare(figure: &mut Figure, valid: bool, difference: &[f64], sigma: &[f64]) {
+fn compare(figure: &mut ErrorFigure, valid: bool, difference: &[f64], sigma: &[f64]) {
     figure.logged += 1;
     if valid {
         figure.add(difference, sigma);

@@ -1,7 +1,7 @@
 //! How far the magnetometer of a recording is from the earth's field.
 
 use crate::earth::Field;
-use crate::recording::{Recording, Sensor, Source};
+use crate::recording::{Recording, SampleSource, Sensor};
 use afbc_estimator::{Measurement, Settings};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -23,7 +23,7 @@ const TOLD_RAD: f32 = 0.35;
 pub(crate) fn doubt(recording: &mut Recording, earth: Option<&Field>) {
     let most_rad = Settings::MAG_SLOW.range.max as f32;
     let (Some([level, down]), Some(earth)) = (parts(recording), earth) else {
-        let is_raw = |source: &Source| source.sensor == Sensor::Magnetometer && source.topic == RAW;
+        let is_raw = |source: &SampleSource| source.sensor == Sensor::Magnetometer && source.topic == RAW;
         recording.mag_slow_rad = recording.sources.iter().any(is_raw).then_some(most_rad);
         return;
     };

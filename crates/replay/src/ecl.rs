@@ -2,7 +2,7 @@
 
 use crate::aids::{self, Fix};
 use crate::order::rising;
-use crate::recording::{LoggedState, Recording, Sensor, Source, flip, flip_rotation};
+use crate::recording::{LoggedState, Recording, SampleSource, Sensor, flip, flip_rotation};
 use crate::{earth, states};
 use afbc_estimator::{ImuSample, Origin};
 use std::collections::HashMap;
@@ -47,7 +47,7 @@ pub(crate) fn read(bytes: &[u8], path: &Path) -> Result<Recording, String> {
         return Err(format!("{what}; a line is time_us,imu, accelerometer and gyroscope: six numbers"));
     }
     let skipped = imu.len() - used;
-    recording.sources.push(Source { sensor: Sensor::Imu, topic: "imu".into(), used, skipped });
+    recording.sources.push(SampleSource { sensor: Sensor::Imu, topic: "imu".into(), used, skipped });
 
     let gps = of("gps");
     let fix = |(at_us, values): &(u64, Vec<f64>)| {

@@ -16,9 +16,9 @@ mod run;
 mod states;
 mod ulog;
 
-pub use compare::{Figure, Figures};
-pub use recording::{Aiding, LoggedReset, LoggedState, Recording, Sensor, Source};
-pub use run::{Replayed, Row, Start, fly};
+pub use compare::{ErrorFigure, Figures};
+pub use recording::{Aiding, LoggedReset, LoggedState, Recording, SampleSource, Sensor};
+pub use run::{EstimatorStart, ReplayRow, Replayed, fly};
 
 use afbc_reader::FileError;
 use std::fs;

@@ -1,6 +1,6 @@
 //! What a log tells, in this project's frames and units.
 
-use afbc_estimator::{ImuSample, Measurement, Origin, Timed};
+use afbc_estimator::{ImuSample, Measurement, Origin, Stamped};
 use nalgebra::Vector3;
 
 /// A sensor, or a part of the log's own estimate.
@@ -37,7 +37,7 @@ impl Sensor {
 
 /// Where a sensor's samples come from.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Source {
+pub struct SampleSource {
     /// Whose.
     pub sensor: Sensor,
     /// Topic or kind of line; that which is missing if there are no samples.
@@ -54,7 +54,7 @@ pub struct Aiding {
     /// Time of its arrival \[us\].
     pub arrived_us: u64,
     /// The measurement with the time at which it was true.
-    pub measurement: Timed<Measurement>,
+    pub measurement: Stamped<Measurement>,
 }
 
 /// The log's own estimate at one time.
@@ -110,7 +110,7 @@ pub struct Recording {
     /// y \[rad\].
     pub mag_slow_rad: Option<f32>,
     /// Where everything comes from.
-    pub sources: Vec<Source>,
+    pub sources: Vec<SampleSource>,
     /// What else is to be told, a sentence each.
     pub notes: Vec<String>,
 }
@@ -134,12 +134,12 @@ impl Recording {
     }
 
     /// Parts that the log lacks.
-    pub fn missing(&self) -> impl Iterator<Item = &Source> {
+    pub fn missing(&self) -> impl Iterator<Item = &SampleSource> {
         self.sources.iter().filter(|source| source.used + source.skipped == 0)
     }
 
     /// Parts that are in the log, but of which nothing can be used.
-    pub fn unusable(&self) -> impl Iterator<Item = &Source> {
+    pub fn unusable(&self) -> impl Iterator<Item = &SampleSource> {
         self.sources.iter().filter(|source| source.used == 0 && source.skipped > 0)
     }
 }

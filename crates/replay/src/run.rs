@@ -27,7 +27,7 @@ const FRESH_US: u64 = 200_000;
 
 /// How the estimator started.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Start {
+pub enum EstimatorStart {
     /// At rest, by itself, at this time of the recording \[s\].
     AtRest(f64),
     /// In the log's state at this time of the recording \[s\], since it would not start by itself, or the vehicle was
@@ -39,7 +39,7 @@ pub enum Start {
 
 /// Our estimate at one time, beside the log's.
 #[derive(Clone, Copy, Debug)]
-pub struct Row {
+pub struct ReplayRow {
     /// Time from the recording's first sample on \[s\].
     pub time_s: f64,
     /// This estimator's, interpolated between two samples; none before the start and in gaps.
@@ -48,7 +48,7 @@ pub struct Row {
     pub logged: LoggedState,
 }
 
-impl Row {
+impl ReplayRow {
     /// Returns the log's attitude less ours as a rotation about the axes of the earth frame \[rad\].
     #[must_use]
     pub fn turn_rad(&self) -> Option<Vector3<f64>> {
@@ -60,7 +60,7 @@ impl Row {
 #[derive(Clone, Debug)]
 pub struct Replayed {
     /// Our estimate and the log's over time.
-    pub rows: Vec<Row>,
+    pub rows: Vec<ReplayRow>,
     /// Their differences from [`from_s`](Self::from_s) on.
     pub figures: Figures,
     /// Ten seconds after the start, or half of what is left then if that is less, or as asked for \[s\].
@@ -68,7 +68,7 @@ pub struct Replayed {
     /// By how much the log's positions were moved, which do not tell their origin, to agree at that time \[m\].
     pub moved_m: Option<Vector3<f32>>,
     /// How it started.
-    pub start: Start,
+    pub start: EstimatorStart,
     /// What was fused.
     pub aids: Aids,
     /// What was not even looked at.
@@ -99,7 +99,7 @@ pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOf
         recording,
         first_us,
         arrived: 0,
-        start: Start::Never(Unready::NoImu),
+        start: EstimatorStart::Never(Unready::NoImu),
     };
     let duration_s = recording.duration_s();
     let settled_s = |began_s: f64| began_s + SETTLED_S.min(0.5 * (duration_s - began_s));
@@ -124,7 +124,7 @@ pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOf
         let now = run.step(now_us, Some(sample));
         while let Some(logged) = states.next_if(|state| state.at_us <= now_us) {
             let time_s = (logged.at_us - first_us) as f64 * 1e-6;
-            rows.push(Row { time_s, ours: between(&before, &now, logged.at_us), logged: *logged });
+            rows.push(ReplayRow { time_s, ours: between(&before, &now, logged.at_us), logged: *logged });
         }
         before = now;
     }
@@ -151,8 +151,8 @@ pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOf
 
 /// Moves the log's positions so that they agree with the estimate at the first time that is compared, if they are so
 /// far away then that their origin must be another.
-fn moved(rows: &mut [Row], from_s: f64) -> Option<Vector3<f32>> {
-    let both = |row: &Row| {
+fn moved(rows: &mut [ReplayRow], from_s: f64) -> Option<Vector3<f32>> {
+    let both = |row: &ReplayRow| {
         let ours = row.ours.filter(|ours| ours.validity.position)?;
         Some(ours.state.position_m - row.logged.position_m?)
     };
@@ -175,7 +175,7 @@ struct Run<'a> {
     first_us: u64,
     /// Number of measurements that have arrived.
     arrived: usize,
-    start: Start,
+    start: EstimatorStart,
 }
 
 impl Run<'_> {
@@ -190,10 +190,10 @@ impl Run<'_> {
         let began = self.memory.runs();
         let estimate = self.estimator.step(&mut self.memory, now_us, sample);
         if let Some(why) = estimate.unready {
-            self.start = Start::Never(why);
+            self.start = EstimatorStart::Never(why);
             self.start_from_log(now_us, why);
         } else if !began {
-            self.start = Start::AtRest(self.time_s(now_us));
+            self.start = EstimatorStart::AtRest(self.time_s(now_us));
         }
         estimate
     }
@@ -211,8 +211,8 @@ impl Run<'_> {
 
     fn began_s(&self) -> Option<f64> {
         match self.start {
-            Start::AtRest(time_s) | Start::FromLog(time_s, _) => Some(time_s),
-            Start::Never(_) => None,
+            EstimatorStart::AtRest(time_s) | EstimatorStart::FromLog(time_s, _) => Some(time_s),
+            EstimatorStart::Never(_) => None,
         }
     }
 
@@ -245,7 +245,7 @@ impl Run<'_> {
             height_offset_m: 0.0,
         };
         if self.estimator.start_at(&mut self.memory, now_us, &state, &sigmas) {
-            self.start = Start::FromLog(self.time_s(now_us), (!flies).then_some(why));
+            self.start = EstimatorStart::FromLog(self.time_s(now_us), (!flies).then_some(why));
         }
     }
 }

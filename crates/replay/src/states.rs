@@ -2,7 +2,7 @@
 
 use crate::aids::sparse;
 use crate::order::rising;
-use crate::recording::{LoggedState, Sensor, Source};
+use crate::recording::{LoggedState, SampleSource, Sensor};
 use nalgebra::Vector3;
 
 /// Least time between two states of a kind \[us\].
@@ -26,10 +26,15 @@ pub(crate) fn motion(
 }
 
 /// Keeps states in the order of time; `raw` is their number in the log.
-pub(crate) fn collect(states: Vec<LoggedState>, raw: usize, sensor: Sensor, topic: &str) -> (Vec<LoggedState>, Source) {
+pub(crate) fn collect(
+    states: Vec<LoggedState>,
+    raw: usize,
+    sensor: Sensor,
+    topic: &str,
+) -> (Vec<LoggedState>, SampleSource) {
     let states = sparse(rising(states, |state| state.at_us).0, SPARSE_US, |state| state.at_us);
     let (used, topic) = (states.len(), topic.to_owned());
-    (states, Source { sensor, topic, used, skipped: raw - used })
+    (states, SampleSource { sensor, topic, used, skipped: raw - used })
 }
 
 /// Merges both parts, those of the same time into one.

@@ -1,7 +1,7 @@
 //! Recorded flights against PX4's EKF2 over them. Skipped where the data are absent.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs, reason = "tests")]
 
-use afbc_replay::{Recording, Start, fly, read};
+use afbc_replay::{EstimatorStart, Recording, fly, read};
 use std::path::Path;
 
 /// Reads a log of the shared data; none, and a line, where it is absent.
@@ -27,7 +27,7 @@ fn agrees_with_ekf2_on_recorded_flights() {
         });
         println!("{name}: {attitude} deg, {velocity} m/s, {position} m");
         assert!(attitude < 2.0 && velocity < 0.3 && position < 1.0, "{name}: {attitude}, {velocity}, {position}");
-        assert!(matches!(replayed.start, Start::AtRest(at_s) if at_s < 2.0), "{:?}", replayed.start);
+        assert!(matches!(replayed.start, EstimatorStart::AtRest(at_s) if at_s < 2.0), "{:?}", replayed.start);
         let resets = replayed.resets;
         assert_eq!((resets.position, resets.velocity, resets.heading, resets.restarts), (1, 0, 0, 0));
         let aids = &replayed.aids;
@@ -51,7 +51,7 @@ fn rest_before_the_first_fix_is_rest() {
                 recording.aiding.clear();
             }
             let replayed = fly(&recording, Some(10.0)).unwrap();
-            let Start::AtRest(began_s) = replayed.start else { panic!("{:?}", replayed.start) };
+            let EstimatorStart::AtRest(began_s) = replayed.start else { panic!("{:?}", replayed.start) };
             let mut first = None;
             for row in replayed.rows.iter().filter(|row| row.time_s < 8.5) {
                 let Some(ours) = row.ours.filter(|_| row.time_s > began_s + 0.5) else { continue };

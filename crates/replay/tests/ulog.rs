@@ -3,7 +3,7 @@
 
 mod common;
 
-use afbc_replay::{Recording, Replayed, Sensor, Start, fly, read};
+use afbc_replay::{EstimatorStart, Recording, Replayed, Sensor, fly, read};
 use common::{Kind, file, log, replay};
 
 /// Checks that estimate and truth agree: attitude \[degrees\], velocity \[m/s\], position \[m\].
@@ -26,7 +26,7 @@ fn old_and_new_layouts_say_the_same() {
             let kind = Kind { old, rate_hz, ..Kind::default() };
             let (recording, replayed) = replay(&format!("layout-{old}-{rate_hz}.ulg"), &log(&kind));
             agrees(&replayed, &format!("old {old}, {rate_hz} Hz"));
-            assert!(matches!(replayed.start, Start::AtRest(at_s) if at_s < 1.5), "{:?}", replayed.start);
+            assert!(matches!(replayed.start, EstimatorStart::AtRest(at_s) if at_s < 1.5), "{:?}", replayed.start);
             assert_eq!(missing(&recording), []);
             assert!((recording.imu_rate_hz() - rate_hz as f64).abs() < 1.0);
             let resets = replayed.resets;
@@ -118,13 +118,13 @@ fn a_log_that_begins_in_the_air_starts_in_its_own_state() {
     for without in [vec![], vec!["vehicle_land_detected"]] {
         let kind = Kind { begins_s: 4.0, without, ..Kind::default() };
         let (_, replayed) = replay("air.ulg", &log(&kind));
-        assert!(matches!(replayed.start, Start::FromLog(at_s, None) if at_s < 0.5), "{:?}", replayed.start);
+        assert!(matches!(replayed.start, EstimatorStart::FromLog(at_s, None) if at_s < 0.5), "{:?}", replayed.start);
         agrees(&replayed, "in the air");
     }
     // Without an attitude in the log there is no start.
     let kind = Kind { begins_s: 4.0, without: vec!["vehicle_attitude"], ..Kind::default() };
     let (_, replayed) = replay("air-alone.ulg", &log(&kind));
-    assert!(matches!(replayed.start, Start::Never(_)), "{:?}", replayed.start);
+    assert!(matches!(replayed.start, EstimatorStart::Never(_)), "{:?}", replayed.start);
     assert!(replayed.rows.iter().all(|row| row.ours.is_none()));
 }
 

@@ -1,7 +1,7 @@
 //! One CSV file for each run, with every logged step and units in the header.
 
-use afbc::model::Model;
-use afbc_plant::{Sensing, Telemetry};
+use afbc::model::ModelConstants;
+use afbc_plant::{EffectsState, Sensing};
 use afbc_sim::columns::{ESTIMATE, MOTION};
 use afbc_sim::contender::Contender;
 use afbc_sim::flight::Sample;
@@ -41,7 +41,7 @@ struct Column {
 
 /// Returns the computable terms of the Lyapunov functions (14), (27): e_1^2 / 2 + e_2^2 / (2 g_i), with g_i of the
 /// nominal vehicle. The terms of the estimate errors are left out, since the optimal values are unknown.
-fn lyapunov(model: &Model, sample: &Sample) -> PerAxis<f32> {
+fn lyapunov(model: &ModelConstants, sample: &Sample) -> PerAxis<f32> {
     let state = sample.motion.measure();
     // With the paper's weight c = 1 of e_1. g_i does not depend on the rotors.
     PerAxis::from_fn(|axis| {
@@ -141,11 +141,11 @@ fn real(scenario: &Scenario) -> Vec<Column> {
     let mut columns = Vec::new();
     if !scenario.is_ideal() {
         for i in 0..scenario.rotors.len() {
-            let speed = move |t: &Telemetry| t.rotor_speeds_rad_s.get(i).copied().unwrap_or(f64::NAN);
+            let speed = move |t: &EffectsState| t.rotor_speeds_rad_s.get(i).copied().unwrap_or(f64::NAN);
             let value = move |row: &Row| Double(row.sample.telemetry.as_ref().map_or(f64::NAN, speed));
             columns.push(Column { name: format!("rotor{}_rad_s", i + 1), value: Box::new(value) });
         }
-        let mut add = |name: &str, value: fn(&Telemetry) -> f64| {
+        let mut add = |name: &str, value: fn(&EffectsState) -> f64| {
             let value = move |row: &Row| Double(row.sample.telemetry.as_ref().map_or(f64::NAN, value));
             columns.push(Column { name: name.into(), value: Box::new(value) });
         };
@@ -194,7 +194,7 @@ fn real(scenario: &Scenario) -> Vec<Column> {
 /// Writes the header and one line for each logged step.
 pub(super) fn write(out: &mut dyn Write, Flown { scenario, run }: &Flown) -> io::Result<()> {
     let vehicle: Parameters = scenario.vehicle.to_f32();
-    let model = Model::new(&vehicle);
+    let model = ModelConstants::new(&vehicle);
     let columns = columns(scenario, &run.contender);
     let mut writer = csv::Writer::from_writer(out);
     writer.write_record(columns.iter().map(|column| &column.name))?;

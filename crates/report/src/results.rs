@@ -1,7 +1,7 @@
 //! The results table of `docs/results.md`: the paper's flight in every reading, on both models, under both laws.
 
 use crate::markers;
-use afbc_plant::Model;
+use afbc_plant::PlantModel;
 use afbc_sim::case::{Case, Reading, Uncertainty};
 use afbc_sim::flown::Flown;
 use afbc_sim::metrics::Metrics;
@@ -44,7 +44,7 @@ pub fn parts(page: &str) -> Option<(&str, &str, &str)> {
 /// # Errors
 /// Does not occur: the paper's parameters are in range.
 pub fn scenarios() -> Result<Vec<(String, Scenario)>, OutOfRange> {
-    let models = [Model::Simplified, Model::RigidBody];
+    let models = [PlantModel::Simplified, PlantModel::RigidBody];
     let rows = cases().into_iter().flat_map(|(name, case)| models.map(|model| (name.clone(), model, case)));
     rows.map(|(name, model, case)| Ok((name, scenario(model, case)?))).collect()
 }

@@ -2,8 +2,8 @@
 
 use afbc::Profile;
 use afbc_plant::{
-    CosineGust, Gust, GustKind, Misreading, ParameterChange, Payload, Quantity, Realism, RotorFault, Rotors, Sensing,
-    SensorFault, Wind,
+    CosineGust, Gust, GustKind, Misreading, ParameterChange, Payload, PlantParameter, Realism, RotorFault, Rotors,
+    Sensing, SensorFault, Wind,
 };
 use afbc_sim::case::{Reading, Sign};
 use afbc_sim::contender::Contender;
@@ -102,15 +102,15 @@ pub(super) fn fault(fault: &RotorFault) -> String {
 /// Example: "inertia +75 %".
 pub(super) fn change(change: &ParameterChange) -> String {
     let quantity = match change.quantity {
-        Quantity::Mass => "mass",
-        Quantity::Inertia => "inertia",
-        Quantity::ThrustFactor => "thrust factor",
-        Quantity::DragFactor => "drag factor",
-        Quantity::RollMoment => "roll moment",
-        Quantity::PitchMoment => "pitch moment",
-        Quantity::YawMoment => "yaw moment",
+        PlantParameter::Mass => "mass",
+        PlantParameter::Inertia => "inertia",
+        PlantParameter::ThrustFactor => "thrust factor",
+        PlantParameter::DragFactor => "drag factor",
+        PlantParameter::RollMoment => "roll moment",
+        PlantParameter::PitchMoment => "pitch moment",
+        PlantParameter::YawMoment => "yaw moment",
     };
-    if matches!(change.quantity, Quantity::RollMoment | Quantity::PitchMoment | Quantity::YawMoment) {
+    if matches!(change.quantity, PlantParameter::RollMoment | PlantParameter::PitchMoment | PlantParameter::YawMoment) {
         return format!("{quantity} of the rotors times {}", change.factor);
     }
     // Rounded to tenths of a percent.

@@ -6,7 +6,7 @@ mod common;
 use afbc_campaign::compare::Comparison;
 use afbc_campaign::suite::{SUITES, Suite};
 use afbc_campaign::{QUANTITIES, compare};
-use afbc_plant::{Environment, ParameterChange, Quantity, RotorFault};
+use afbc_plant::{Environment, ParameterChange, PlantParameter, RotorFault};
 use afbc_report::{self as report, flights};
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::flown::Flown;
@@ -74,7 +74,7 @@ fn captions_explain_exactly_what_the_figure_shows() {
     let mut changed = eventful();
     changed.environment = Environment::new(
         changed.vehicle,
-        vec![ParameterChange { quantity: Quantity::Mass, factor: 1.1, start_s: 1.0, end_s: 8.0 }],
+        vec![ParameterChange { quantity: PlantParameter::Mass, factor: 1.1, start_s: 1.0, end_s: 8.0 }],
         Vec::new(),
     )
     .unwrap();
@@ -177,8 +177,8 @@ impl Suited {
         Suited(suite, comparisons)
     }
 
-    fn flown(&self) -> report::suite::Flown<'_> {
-        report::suite::Flown { suite: &self.0, comparisons: &self.1 }
+    fn flown(&self) -> report::suite::FlownSuite<'_> {
+        report::suite::FlownSuite { suite: &self.0, comparisons: &self.1 }
     }
 }
 

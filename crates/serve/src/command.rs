@@ -3,7 +3,7 @@
 use afbc_plant::instruments::{Failure, limits as failure};
 use afbc_plant::rotors::limits as rotor;
 use afbc_plant::wind::limits as gust;
-use afbc_plant::{Battery, GUST_SIZE, PAYLOAD_BELOW, PAYLOAD_MASS, Quantity, Turbulence, Wind};
+use afbc_plant::{Battery, GUST_SIZE, PAYLOAD_BELOW, PAYLOAD_MASS, PlantParameter, Turbulence, Wind};
 use afbc_reader::words::{nearest, out_of_range};
 use afbc_types::Range;
 use nalgebra::Vector3;
@@ -17,14 +17,14 @@ pub struct Line {
     /// System id of the vehicle that it is for; none: all.
     pub vehicle: Option<u8>,
     /// What is to be done.
-    pub command: Command,
+    pub command: ServerCommand,
 }
 
 /// What is to be done.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Command {
+pub enum ServerCommand {
     /// Change weather or faults.
-    Deed(Deed),
+    WorldChange(WorldChange),
     /// Say how it is.
     Status,
     /// Go on by so many milliseconds, where time stands still otherwise.
@@ -39,7 +39,7 @@ pub enum Command {
 
 /// A change of weather or faults, from now on. Axes are those of the earth frame: north, west, up.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Deed {
+pub enum WorldChange {
     /// Steady wind \[m/s\].
     Wind(Vector3<f64>),
     /// Turbulence, or none.
@@ -63,7 +63,7 @@ pub enum Deed {
     /// A parameter of the vehicle changes.
     Change {
         /// The parameter.
-        quantity: Quantity,
+        quantity: PlantParameter,
         /// Factor on what it was.
         factor: f64,
         /// For how long; none: it stays \[s\].
@@ -134,14 +134,14 @@ const STEP_MAX: u32 = 3_600_000;
 const RISE_S: f64 = 1.0;
 const HOLD_S: f64 = 2.0;
 
-const QUANTITIES: [(&str, Quantity); 7] = [
-    ("mass", Quantity::Mass),
-    ("inertia", Quantity::Inertia),
-    ("thrust-factor", Quantity::ThrustFactor),
-    ("drag-factor", Quantity::DragFactor),
-    ("roll-moment", Quantity::RollMoment),
-    ("pitch-moment", Quantity::PitchMoment),
-    ("yaw-moment", Quantity::YawMoment),
+const QUANTITIES: [(&str, PlantParameter); 7] = [
+    ("mass", PlantParameter::Mass),
+    ("inertia", PlantParameter::Inertia),
+    ("thrust-factor", PlantParameter::ThrustFactor),
+    ("drag-factor", PlantParameter::DragFactor),
+    ("roll-moment", PlantParameter::RollMoment),
+    ("pitch-moment", PlantParameter::PitchMoment),
+    ("yaw-moment", PlantParameter::YawMoment),
 ];
 
 const TURBULENCE: [(&str, Option<Turbulence>); 4] = [
@@ -178,47 +178,50 @@ pub fn parse(text: &str) -> Result<Option<Line>, String> {
     }
 }
 
-fn command(word: &str, words: &mut Words<'_>) -> Result<Command, String> {
+fn command(word: &str, words: &mut Words<'_>) -> Result<ServerCommand, String> {
     Ok(match word {
-        "status" => Command::Status,
-        "help" => Command::Help,
-        "quit" => Command::Quit,
-        "step" => Command::Step(words.whole("milliseconds", STEP_MAX)?),
-        "speed" => Command::Speed(words.number(&SPEED)?),
-        _ => Command::Deed(deed(word, words)?),
+        "status" => ServerCommand::Status,
+        "help" => ServerCommand::Help,
+        "quit" => ServerCommand::Quit,
+        "step" => ServerCommand::Step(words.whole("milliseconds", STEP_MAX)?),
+        "speed" => ServerCommand::Speed(words.number(&SPEED)?),
+        _ => ServerCommand::WorldChange(change(word, words)?),
     })
 }
 
-fn deed(word: &str, words: &mut Words<'_>) -> Result<Deed, String> {
+fn change(word: &str, words: &mut Words<'_>) -> Result<WorldChange, String> {
     Ok(match word {
-        "wind" => Deed::Wind(words.vector(&Wind::STEADY.range)?),
-        "turbulence" => Deed::Turbulence(words.choice(&TURBULENCE)?),
-        "gust" => Deed::Gust {
+        "wind" => WorldChange::Wind(words.vector(&Wind::STEADY.range)?),
+        "turbulence" => WorldChange::Turbulence(words.choice(&TURBULENCE)?),
+        "gust" => WorldChange::Gust {
             velocity_m_s: words.vector(&gust::GUST)?,
             rise_s: words.optional(&gust::RISE)?.unwrap_or(RISE_S),
             hold_s: words.optional(&Range { max: SECONDS.max, ..gust::HOLD })?.unwrap_or(HOLD_S),
         },
-        "push" => Deed::Push {
+        "push" => WorldChange::Push {
             force_n: words.vector(&Range { name: "push", ..GUST_SIZE })?,
             seconds: words.optional(&SECONDS)?,
         },
-        "payload" => Deed::Payload {
+        "payload" => WorldChange::Payload {
             mass_kg: words.number(&PAYLOAD_MASS)?,
             below_m: words.optional(&PAYLOAD_BELOW)?.unwrap_or(0.0),
         },
         "change" => {
             let quantity = words.choice(&QUANTITIES)?;
-            let is_moment = matches!(quantity, Quantity::RollMoment | Quantity::PitchMoment | Quantity::YawMoment);
+            let is_moment = matches!(
+                quantity,
+                PlantParameter::RollMoment | PlantParameter::PitchMoment | PlantParameter::YawMoment
+            );
             let factor = words.number(if is_moment { &MOMENT_FACTOR } else { &FACTOR })?;
-            Deed::Change { quantity, factor, seconds: words.optional(&SECONDS)? }
+            WorldChange::Change { quantity, factor, seconds: words.optional(&SECONDS)? }
         }
-        "fault" => Deed::Fault { failure: fault(words)?, seconds: words.optional(&SECONDS)? },
-        "rotor" => Deed::Rotor {
+        "fault" => WorldChange::Fault { failure: fault(words)?, seconds: words.optional(&SECONDS)? },
+        "rotor" => WorldChange::Rotor {
             rotor: words.whole("the number of a rotor", rotor::ROTOR.max as u32)? as u8,
             efficiency: words.number(&rotor::EFFICIENCY)?,
         },
-        "battery" => Deed::Battery(words.number(&Battery::CHARGE.range)?),
-        "clear" => Deed::Clear,
+        "battery" => WorldChange::Battery(words.number(&Battery::CHARGE.range)?),
+        "clear" => WorldChange::Clear,
         _ => {
             let cure = match nearest(word, COMMANDS.iter().map(|[name, ..]| *name)) {
                 Some(known) => format!("did you mean {known}?"),

@@ -3,8 +3,8 @@
 //!
 //! # Reading order
 //!
-//! 1. [`Vehicle`]: one vehicle in its world, which stands on the ground until somebody flies it by MAVLink. Bytes in,
-//!    bytes out, a millisecond at a time.
+//! 1. [`ServedVehicle`]: one vehicle in its world, which stands on the ground until somebody flies it by MAVLink. Bytes
+//!    in, bytes out, a millisecond at a time.
 //! 2. [`Server`]: several vehicles, and [commands](command) that change weather and faults while they fly. Neither has
 //!    a clock or a socket: the same lines and bytes at the same milliseconds give the same bytes.
 //! 3. [`Ports`]: their UDP and TCP ports. [`Pace`]: real time. [`run`]: all of it together.
@@ -13,25 +13,25 @@
 pub mod command;
 mod frames;
 mod guide;
-mod kept;
-mod outside;
 mod pace;
+mod parameter_file;
 mod peer;
 mod ports;
+mod reported_sensors;
 mod run;
-mod scene;
 mod server;
 mod stand;
 mod systems;
 mod tcp;
 mod udp;
 mod vehicle;
+mod world_changes;
 
 pub use guide::guide;
-pub use kept::Keeper;
 pub use pace::{BEHIND_MAX, Pace, Wait};
+pub use parameter_file::ParameterFile;
 pub use ports::{Addresses, Ports};
-pub use run::{End, Lines, Rate, run};
+pub use run::{Lines, RunEnd, TimeRate, run};
 pub use server::{Reply, Server, Then};
 pub use stand::{VEHICLES_MAX, fleet};
-pub use vehicle::Vehicle;
+pub use vehicle::ServedVehicle;

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 /// How time goes on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Rate {
+pub enum TimeRate {
     /// At so many times real time; 0: as fast as possible.
     Times(f64),
     /// By the command `step` alone.
@@ -20,7 +20,7 @@ pub enum Rate {
 
 /// Why a run has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
+pub enum RunEnd {
     /// Somebody has said so.
     Quit,
     /// The stop flag was set.
@@ -76,26 +76,26 @@ impl Lines {
 pub fn run(
     server: &mut Server,
     ports: &mut Ports,
-    mut rate: Rate,
+    mut rate: TimeRate,
     lines: &mut Lines,
     stop: &AtomicBool,
     mut tell: impl FnMut(&str),
-) -> End {
+) -> RunEnd {
     let began = Instant::now();
     let mut pace = Pace::new(factor(rate), began.elapsed());
     let mut told = None;
     loop {
         // Lines first: in lockstep there is nothing else to do.
         loop {
-            let line = if rate == Rate::Lockstep { lines.wait() } else { lines.next() };
+            let line = if rate == TimeRate::Lockstep { lines.wait() } else { lines.next() };
             if stop.load(Ordering::Relaxed) {
-                return End::Stopped;
+                return RunEnd::Stopped;
             }
             let Some(line) = line else {
                 match rate {
-                    Rate::Lockstep if lines.over => return End::Silent,
-                    Rate::Lockstep => continue,
-                    Rate::Times(_) => break,
+                    TimeRate::Lockstep if lines.over => return RunEnd::Silent,
+                    TimeRate::Lockstep => continue,
+                    TimeRate::Times(_) => break,
                 }
             };
             let mut reply = server.line(&line);
@@ -103,35 +103,35 @@ pub fn run(
                 (Then::Nothing, _) => {}
                 (Then::Quit, _) => {
                     reply.lines.iter().for_each(|line| tell(line));
-                    return End::Quit;
+                    return RunEnd::Quit;
                 }
-                (Then::Step(steps), Rate::Lockstep) => {
+                (Then::Step(steps), TimeRate::Lockstep) => {
                     for _ in 0..steps {
                         if stop.load(Ordering::Relaxed) {
-                            return End::Stopped;
+                            return RunEnd::Stopped;
                         }
                         if step(server, ports, began, &mut tell) == Then::Quit {
-                            return End::Quit;
+                            return RunEnd::Quit;
                         }
                     }
                 }
-                (Then::Step(_), Rate::Times(_)) => {
+                (Then::Step(_), TimeRate::Times(_)) => {
                     reply.lines = vec!["error step: time goes on by itself; start with --lockstep".into()];
                 }
-                (Then::Speed(_), Rate::Lockstep) => {
+                (Then::Speed(_), TimeRate::Lockstep) => {
                     reply.lines = vec!["error speed: time goes on by step alone; start without --lockstep".into()];
                 }
-                (Then::Speed(speed), Rate::Times(_)) => {
-                    rate = Rate::Times(speed);
+                (Then::Speed(speed), TimeRate::Times(_)) => {
+                    rate = TimeRate::Times(speed);
                     pace = Pace::new(speed, began.elapsed());
                 }
             }
             reply.lines.iter().for_each(|line| tell(line));
         }
         match step(server, ports, began, &mut tell) {
-            Then::Quit => return End::Quit,
+            Then::Quit => return RunEnd::Quit,
             Then::Speed(speed) => {
-                rate = Rate::Times(speed);
+                rate = TimeRate::Times(speed);
                 pace = Pace::new(speed, began.elapsed());
             }
             Then::Nothing | Then::Step(_) => {}
@@ -157,9 +157,9 @@ fn step(server: &mut Server, ports: &mut Ports, began: Instant, mut tell: impl F
     server.step(|vehicle, bytes| ports.send(vehicle, bytes), &mut tell)
 }
 
-fn factor(rate: Rate) -> f64 {
+fn factor(rate: TimeRate) -> f64 {
     match rate {
-        Rate::Times(speed) => speed,
-        Rate::Lockstep => 0.0,
+        TimeRate::Times(speed) => speed,
+        TimeRate::Lockstep => 0.0,
     }
 }

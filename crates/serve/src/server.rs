@@ -1,15 +1,15 @@
 //! Several vehicles, and commands for them.
 
-use crate::Keeper;
-use crate::command::{COMMANDS, Command, Deed, Line, parse};
+use crate::ParameterFile;
+use crate::command::{COMMANDS, Line, ServerCommand, WorldChange, parse};
 use crate::systems::listed;
-use crate::vehicle::Vehicle;
+use crate::vehicle::ServedVehicle;
 use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 
 /// The vehicles, on one clock, which begins when they are powered up.
 pub struct Server {
-    vehicles: Vec<Vehicle>,
+    vehicles: Vec<ServedVehicle>,
     /// Milliseconds since the start.
     now_ms: u64,
     /// Lines to come, in the order of their times, then of their arrival.
@@ -46,7 +46,8 @@ impl Server {
     /// # Errors
     /// The first setting out of range.
     pub fn new(scenarios: &[Scenario], first: u8) -> Result<Self, OutOfRange> {
-        let vehicles = scenarios.iter().zip(first..).map(|(scenario, system)| Vehicle::new(scenario, system, None));
+        let vehicles =
+            scenarios.iter().zip(first..).map(|(scenario, system)| ServedVehicle::new(scenario, system, None));
         Ok(Server { vehicles: vehicles.collect::<Result<_, _>>()?, now_ms: 0, agenda: Vec::new() })
     }
 
@@ -54,9 +55,9 @@ impl Server {
     ///
     /// # Errors
     /// The first setting out of range.
-    pub fn kept(scenarios: &[Scenario], first: u8, keepers: Vec<Keeper>) -> Result<Self, OutOfRange> {
+    pub fn kept(scenarios: &[Scenario], first: u8, keepers: Vec<ParameterFile>) -> Result<Self, OutOfRange> {
         let vehicles = scenarios.iter().zip(first..).zip(keepers);
-        let vehicles = vehicles.map(|((scenario, system), keeper)| Vehicle::new(scenario, system, Some(keeper)));
+        let vehicles = vehicles.map(|((scenario, system), keeper)| ServedVehicle::new(scenario, system, Some(keeper)));
         Ok(Server { vehicles: vehicles.collect::<Result<_, _>>()?, now_ms: 0, agenda: Vec::new() })
     }
 
@@ -67,7 +68,7 @@ impl Server {
 
     /// Returns the vehicles' system ids.
     pub fn systems(&self) -> Vec<u8> {
-        self.vehicles.iter().map(Vehicle::system).collect()
+        self.vehicles.iter().map(ServedVehicle::system).collect()
     }
 
     /// Returns a system id that several vehicles have: no station can tell them apart.
@@ -78,7 +79,7 @@ impl Server {
     }
 
     /// Returns the vehicles.
-    pub fn vehicles(&self) -> &[Vehicle] {
+    pub fn vehicles(&self) -> &[ServedVehicle] {
         &self.vehicles
     }
 
@@ -149,7 +150,7 @@ impl Server {
             Line { vehicle: Some(system), .. } if !known(*system) => {
                 Some(format!("there is no vehicle {system}; they are {}", listed(&self.systems())))
             }
-            Line { at_s: Some(_), command: Command::Step(_), .. } => Some("step cannot be put off".into()),
+            Line { at_s: Some(_), command: ServerCommand::Step(_), .. } => Some("step cannot be put off".into()),
             Line { at_s: Some(at_s), .. } if *at_s < self.now_s() => {
                 Some(format!("{at_s} s are over; it is {:.3} s", self.now_s()))
             }
@@ -159,31 +160,31 @@ impl Server {
 
     fn carry_out(&mut self, line: &Line, text: &str) -> Reply {
         match &line.command {
-            Command::Deed(deed) => match self.suffer(line.vehicle, deed) {
+            ServerCommand::WorldChange(change) => match self.apply(line.vehicle, change) {
                 Ok(()) => Reply::accepted(text),
                 Err(problem) => Reply::refused(&problem),
             },
-            Command::Status => {
-                let wanted = |vehicle: &&Vehicle| line.vehicle.is_none_or(|system| vehicle.system() == system);
-                let lines = self.vehicles.iter().filter(wanted).map(Vehicle::status);
+            ServerCommand::Status => {
+                let wanted = |vehicle: &&ServedVehicle| line.vehicle.is_none_or(|system| vehicle.system() == system);
+                let lines = self.vehicles.iter().filter(wanted).map(ServedVehicle::status);
                 Reply::told(lines.collect(), &format!("{text}, {:.3} s", self.now_s()))
             }
-            Command::Help => {
+            ServerCommand::Help => {
                 let lines = COMMANDS
                     .iter()
                     .map(|[name, arguments, meaning]| format!("{:<46} {meaning}", format!("{name} {arguments}")));
                 Reply::told(lines.collect(), text)
             }
-            Command::Step(steps) => Reply { then: Then::Step(*steps), ..Reply::accepted(text) },
-            Command::Speed(speed) => Reply { then: Then::Speed(*speed), ..Reply::accepted(text) },
-            Command::Quit => Reply { then: Then::Quit, ..Reply::accepted(text) },
+            ServerCommand::Step(steps) => Reply { then: Then::Step(*steps), ..Reply::accepted(text) },
+            ServerCommand::Speed(speed) => Reply { then: Then::Speed(*speed), ..Reply::accepted(text) },
+            ServerCommand::Quit => Reply { then: Then::Quit, ..Reply::accepted(text) },
         }
     }
 
     /// Changes weather or faults of one vehicle or all.
-    fn suffer(&mut self, system: Option<u8>, deed: &Deed) -> Result<(), String> {
+    fn apply(&mut self, system: Option<u8>, change: &WorldChange) -> Result<(), String> {
         let mut wanted = self.vehicles.iter_mut().filter(|vehicle| system.is_none_or(|it| vehicle.system() == it));
-        wanted.try_for_each(|vehicle| vehicle.suffer(deed))
+        wanted.try_for_each(|vehicle| vehicle.apply(change))
     }
 }
 

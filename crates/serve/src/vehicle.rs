@@ -1,16 +1,16 @@
 //! One vehicle in its world.
 
-use crate::Keeper;
-use crate::command::Deed;
+use crate::ParameterFile;
+use crate::command::WorldChange;
 use crate::frames::frames;
-use crate::outside::Outside;
-use crate::scene::Scene;
+use crate::reported_sensors::ReportedSensors;
+use crate::world_changes::WorldChanges;
 use afbc_flight_core::Mode;
 use afbc_link::{Address, Decoder, Uplink};
 use afbc_onboard::{Link, Setup};
 use afbc_reader::words::out_of_range;
 use afbc_sim::flight::World;
-use afbc_sim::in_the_loop::{Host, Tick};
+use afbc_sim::in_the_loop::{Host, HostTick};
 use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 use std::collections::BTreeMap;
@@ -24,42 +24,42 @@ const BYTES_PER_S: u32 = 100_000;
 const STEP_S: f64 = 0.001;
 
 /// The firmware's code on the plant, with its instruments.
-pub struct Vehicle {
+pub struct ServedVehicle {
     /// Defaults of the link's parameters.
     link: Link,
     address: Address,
     host: Host,
     world: World,
-    scene: Scene,
+    changes: WorldChanges,
     /// A decoder for each peer: no stream's bytes complete a frame of another's.
     peers: BTreeMap<u32, Decoder<Uplink>>,
     mode: Mode,
-    outside: Outside,
+    reported: ReportedSensors,
     scenario: Scenario,
-    keeper: Option<Keeper>,
+    keeper: Option<ParameterFile>,
     /// What is to be told of the parameters that were stored.
     notices: Vec<String>,
 }
 
-impl Vehicle {
+impl ServedVehicle {
     /// Creates the vehicle of `scenario`, powered up where it starts, with parameters that `keeper` keeps, if there is
     /// one. Its system id is `system`, unless they say another (MAV_SYS_ID).
     ///
     /// # Errors
     /// The first setting out of range.
-    pub fn new(scenario: &Scenario, system: u8, mut keeper: Option<Keeper>) -> Result<Self, OutOfRange> {
+    pub fn new(scenario: &Scenario, system: u8, mut keeper: Option<ParameterFile>) -> Result<Self, OutOfRange> {
         let link = Link { system: system.into(), ..Link::DEFAULT };
         let mut notices = Vec::new();
         let host = power_up(scenario, link, keeper.as_mut(), &mut notices)?;
-        Ok(Vehicle {
+        Ok(ServedVehicle {
             link,
             address: address(&host),
             host,
             world: World::released(scenario, STEP_S)?,
-            scene: Scene::new(scenario),
+            changes: WorldChanges::new(scenario),
             peers: BTreeMap::new(),
             mode: Mode::Disarmed,
-            outside: Outside::new(scenario),
+            reported: ReportedSensors::new(scenario),
             scenario: scenario.clone(),
             keeper,
             notices,
@@ -95,8 +95,8 @@ impl Vehicle {
             self.host.sense(readings);
         }
         let readings = self.world.readings().copied().unwrap_or_default();
-        self.host.comms().surround(self.outside.look(&self.world, &readings));
-        let Tick { report, bytes, change } = self.host.next_tick(&[]);
+        self.host.comms().set_aux_sensors(self.reported.look(&self.world, &readings));
+        let HostTick { report, bytes, change } = self.host.next_tick(&[]);
         self.world.advance(&report.motors);
         if report.mode.armed() != self.mode.armed() {
             tell(if report.mode.armed() { "armed" } else { "disarmed" });
@@ -135,8 +135,8 @@ impl Vehicle {
     ///
     /// # Errors
     /// One line on why it does not.
-    pub fn suffer(&mut self, deed: &Deed) -> Result<(), String> {
-        self.scene.apply(deed, &mut self.world)
+    pub fn apply(&mut self, change: &WorldChange) -> Result<(), String> {
+        self.changes.apply(change, &mut self.world)
     }
 
     /// Returns its state in one line.
@@ -166,9 +166,9 @@ impl Vehicle {
         }
         let bad = self.peers.values().map(|peer| u64::from(peer.counters().bad_checksum)).sum::<u64>();
         let _ = write!(line, ", {} peers, {bad} bad frames", self.peers.len());
-        let troubles = self.scene.troubles(plant.time_s());
-        if !troubles.is_empty() {
-            let _ = write!(line, ", {}", troubles.join(", "));
+        let active_faults = self.changes.active_faults(plant.time_s());
+        if !active_faults.is_empty() {
+            let _ = write!(line, ", {}", active_faults.join(", "));
         }
         line
     }
@@ -178,7 +178,7 @@ impl Vehicle {
 fn power_up(
     scenario: &Scenario,
     link: Link,
-    keeper: Option<&mut Keeper>,
+    keeper: Option<&mut ParameterFile>,
     notices: &mut Vec<String>,
 ) -> Result<Host, OutOfRange> {
     let host = match keeper {

@@ -3,7 +3,7 @@
 
 use afbc_control::Trip;
 use afbc_guidance::FlightMode;
-use afbc_link::{Address, AttitudeAndThrust, Command, FRAME_MAX, Sender, Target, Uplink};
+use afbc_link::{Address, AttitudeAndThrust, Command, ExternalTarget, FRAME_MAX, Sender, Uplink};
 use afbc_onboard::services::modes;
 use afbc_plant::Motion;
 use afbc_serve::{Server, fleet};
@@ -51,9 +51,9 @@ impl Flown {
         let velocity_m_s = Vector3::new(x, y, z);
         for time_ms in 0..milliseconds {
             if time_ms % 50 == 0 {
-                self.hear(Uplink::Target(Target::Motion(afbc_link::Motion {
+                self.hear(Uplink::Target(ExternalTarget::Motion(afbc_link::PositionTarget {
                     velocity_m_s,
-                    ..afbc_link::Motion::NONE
+                    ..afbc_link::PositionTarget::NONE
                 })));
             }
             if time_ms == 50 {
@@ -71,7 +71,7 @@ impl Flown {
         let mut motions = Vec::new();
         for time_ms in 0..milliseconds {
             if time_ms % 20 == 0 {
-                self.hear(Uplink::Target(Target::Attitude(target)));
+                self.hear(Uplink::Target(ExternalTarget::Attitude(target)));
             }
             if time_ms == 20 {
                 self.hear(Uplink::Command(Command::SelectMode(modes::custom(FlightMode::Offboard))));

@@ -4,7 +4,7 @@
 use afbc_link::{
     Address, Command, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Sender, Storage, Uplink,
 };
-use afbc_serve::{Keeper, Server, fleet};
+use afbc_serve::{ParameterFile, Server, fleet};
 use afbc_sim::scenario::built_in;
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,7 @@ fn fresh(test: &str) -> PathBuf {
 
 fn served(file: &Path) -> Server {
     let scenarios = fleet(&built_in("outdoor").unwrap().read().unwrap(), 1).unwrap();
-    let keeper = Keeper::open(file, scenarios.first().unwrap()).unwrap();
+    let keeper = ParameterFile::open(file, scenarios.first().unwrap()).unwrap();
     Server::kept(&scenarios, 1, vec![keeper]).unwrap()
 }
 
@@ -72,7 +72,7 @@ fn what_is_set_is_there_after_a_restart() {
     set(&mut server, "RTL_RETURN_ALT", 22.0);
     // Only one program at a time writes it.
     let scenario = built_in("outdoor").unwrap().read().unwrap();
-    assert!(Keeper::open(&file, &scenario).err().unwrap().contains("in use"));
+    assert!(ParameterFile::open(&file, &scenario).err().unwrap().contains("in use"));
     drop(server);
 
     let mut server = served(&file);
@@ -145,7 +145,7 @@ fn the_system_id_is_a_parameter() {
 
     let scenarios = fleet(&built_in("outdoor").unwrap().read().unwrap(), 3).unwrap();
     let files = ["system1", "system2", "system3"].map(fresh);
-    let keepers = || files.iter().zip(&scenarios).map(|(file, it)| Keeper::open(file, it).unwrap()).collect();
+    let keepers = || files.iter().zip(&scenarios).map(|(file, it)| ParameterFile::open(file, it).unwrap()).collect();
     let mut server = Server::kept(&scenarios, 5, keepers()).unwrap();
     assert_eq!((server.systems(), server.ambiguous()), (vec![5, 6, 7], None));
     set(&mut server, "MAV_SYS_ID", 7.0);

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
-use afbc_serve::{Addresses, End, Lines, Ports, Rate, Server, fleet, run};
+use afbc_serve::{Addresses, Lines, Ports, RunEnd, Server, TimeRate, fleet, run};
 use afbc_sim::scenario::built_in;
 use std::io::{Cursor, ErrorKind, Read, Write};
 use std::net::{TcpStream, UdpSocket};
@@ -179,11 +179,12 @@ fn in_lockstep_lines_drive_the_clock() {
         let (mut server, mut ports) = (served(1), Ports::open(&free(), 1).unwrap());
         let mut told = Vec::new();
         let (mut lines, stop) = (Lines::of(Cursor::new(text)), AtomicBool::new(false));
-        let end = run(&mut server, &mut ports, Rate::Lockstep, &mut lines, &stop, |line| told.push(line.to_owned()));
+        let end =
+            run(&mut server, &mut ports, TimeRate::Lockstep, &mut lines, &stop, |line| told.push(line.to_owned()));
         (end, server.now_s(), told)
     };
     let (end, now_s, told) = session("step 250\nspeed 2\nwind 1 0 0\nstep 50\nnonsense");
-    assert_eq!((end, now_s), (End::Silent, 0.3));
+    assert_eq!((end, now_s), (RunEnd::Silent, 0.3));
     let wanted = [
         "ok step 250",
         "error speed: time goes on by step alone; start without --lockstep",
@@ -192,9 +193,9 @@ fn in_lockstep_lines_drive_the_clock() {
         "error \"nonsense\": no such command; help lists the commands",
     ];
     assert_eq!(told, wanted);
-    assert_eq!(session("step 10\nquit\nstep 10"), (End::Quit, 0.01, vec!["ok step 10".into(), "ok quit".into()]));
+    assert_eq!(session("step 10\nquit\nstep 10"), (RunEnd::Quit, 0.01, vec!["ok step 10".into(), "ok quit".into()]));
     let (end, now_s, _) = session("at 0.1 quit\nstep 1000");
-    assert_eq!((end, now_s), (End::Quit, 0.101));
+    assert_eq!((end, now_s), (RunEnd::Quit, 0.101));
 }
 
 #[test]
@@ -203,11 +204,11 @@ fn as_fast_as_possible_it_ends_when_it_is_told() {
     assert_eq!(server.line("at 30 quit").lines, ["ok at 30 quit"]);
     let (mut lines, stop) = (Lines::of(Cursor::new("step 5")), AtomicBool::new(false));
     let mut told = Vec::new();
-    let end = run(&mut server, &mut ports, Rate::Times(0.0), &mut lines, &stop, |line| told.push(line.to_owned()));
-    assert_eq!(end, End::Quit);
+    let end = run(&mut server, &mut ports, TimeRate::Times(0.0), &mut lines, &stop, |line| told.push(line.to_owned()));
+    assert_eq!(end, RunEnd::Quit);
     assert!((server.now_s() - 30.001).abs() < 1e-9);
     assert!(told.contains(&"error step: time goes on by itself; start with --lockstep".into()), "{told:?}");
     stop.store(true, std::sync::atomic::Ordering::Relaxed);
-    let end = run(&mut server, &mut ports, Rate::Lockstep, &mut lines, &stop, |_| ());
-    assert_eq!(end, End::Stopped);
+    let end = run(&mut server, &mut ports, TimeRate::Lockstep, &mut lines, &stop, |_| ());
+    assert_eq!(end, RunEnd::Stopped);
 }

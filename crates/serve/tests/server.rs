@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
-use afbc_plant::Suite;
+use afbc_plant::InstrumentSuite;
 use afbc_serve::{Server, Then, fleet};
 use afbc_sim::scenario::{Scenario, built_in};
 
@@ -311,7 +311,7 @@ fn every_command_is_helped_with_and_every_failure_is_known() {
 
 #[test]
 fn what_the_firmware_cannot_fly_is_refused() {
-    let blind = Scenario { instruments: Suite::default(), ..scenario("outdoor") };
+    let blind = Scenario { instruments: InstrumentSuite::default(), ..scenario("outdoor") };
     let refused = fleet(&blind, 1).unwrap_err().to_string();
     assert!(refused.contains("outdoor: the vehicle has no sensors to fly on"), "{refused}");
     let mut heavy = scenario("outdoor");

@@ -3,8 +3,8 @@
 //! The vehicle is 30 % heavier than the law's model, its rotors lag by 20 ms, and it starts 1 m from its setpoint.
 
 use afbc::{Adaptive, Controller, Profile};
-use afbc_control::{FlightController, Screened};
-use afbc_plant::{Environment, Model, Motion, Plant, Realism, Rotors};
+use afbc_control::{FlightController, Validated};
+use afbc_plant::{Environment, Motion, Plant, PlantModel, Realism, Rotors};
 use afbc_types::{OutOfRange, Parameters, Setpoint};
 
 const DT_S: f64 = 0.001;
@@ -13,14 +13,14 @@ fn main() -> Result<(), OutOfRange> {
     let believed = Parameters::PAPER.to_f32();
     let law = Adaptive::new(Profile::Flight.gains_for(&believed, afbc::LAG_S))?;
     let controller = Controller::new(believed, Profile::Flight.settings(), law)?;
-    let mut memory = Screened::default();
+    let mut memory = Validated::default();
 
     let mut truth = Parameters::PAPER;
     truth.mass_kg *= 1.3;
     let rotors = Rotors { time_constant_s: 0.02, ..Rotors::default() };
     let realism = Realism { rotors, ..Realism::default() };
     let mut plant =
-        Plant::with_realism(Model::RigidBody, Motion::default(), Environment::calm(truth)?, &realism, DT_S)?;
+        Plant::with_realism(PlantModel::RigidBody, Motion::default(), Environment::calm(truth)?, &realism, DT_S)?;
 
     let mut setpoint = Setpoint::default();
     setpoint.position_m.x = 1.0;

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "an example whose parameters are not valid should say so")]
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
-use afbc_sim::flight::{Alone, World, lockstep};
+use afbc_sim::flight::{LawOnly, World, lockstep};
 use afbc_sim::scenario;
 use afbc_types::{Inputs, Parameters, Setpoint, State};
 use core::ops::ControlFlow;
@@ -51,7 +51,7 @@ fn main() {
     let vehicle = scenario.vehicle.to_f32();
     let law = OwnLaw { vehicle, mixer: Mixer::new(vehicle, 3.0).unwrap() };
     let (mut world, mut distance_m) = (World::new(&scenario, 0.001).unwrap(), 0.0);
-    let Ok(end) = lockstep(&mut world, &mut Alone::new(law), scenario.duration_s, |sample| {
+    let Ok(end) = lockstep(&mut world, &mut LawOnly::new(law), scenario.duration_s, |sample| {
         distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
         ControlFlow::Continue(())
     });

@@ -3,10 +3,10 @@
 use crate::flight::{Estimated, Sample};
 
 /// A column's name, which ends in its unit, and the value under it.
-pub type Column = (&'static str, fn(&Sample) -> f64);
+pub type SampleColumn = (&'static str, fn(&Sample) -> f64);
 
 /// Time, true motion and reference.
-pub const MOTION: [Column; 25] = [
+pub const MOTION: [SampleColumn; 25] = [
     ("time_s", |s| s.time_s),
     ("x_m", |s| s.motion.position_m.x),
     ("y_m", |s| s.motion.position_m.y),

@@ -5,7 +5,9 @@ use crate::contender::{Contender, ControllerKind};
 use crate::scenario::Scenario;
 use crate::trajectory::Trajectory;
 use afbc::Profile;
-use afbc_plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Quantity, Realism, Sensing, Suite};
+use afbc_plant::{
+    Environment, Gust, GustKind, InstrumentSuite, Motion, ParameterChange, PlantModel, PlantParameter, Realism, Sensing,
+};
 use afbc_types::{Axis, OutOfRange, PLUS, Parameters};
 use nalgebra::Vector3;
 
@@ -26,7 +28,7 @@ const GUST: f64 = 1.2;
 ///
 /// # Errors
 /// Does not occur: the paper's parameters are in range.
-pub fn scenario(model: Model, case: Case) -> Result<Scenario, OutOfRange> {
+pub fn scenario(model: PlantModel, case: Case) -> Result<Scenario, OutOfRange> {
     let gusts = case.reading.map_or(Vec::new(), |reading| {
         let (kind, length_s) = match reading {
             Reading::Persistent => (GustKind::Acceleration, f64::INFINITY),
@@ -38,7 +40,10 @@ pub fn scenario(model: Model, case: Case) -> Result<Scenario, OutOfRange> {
     let changes = case.uncertainty.map_or(Vec::new(), |Uncertainty { inertia, thrust }| {
         let [start_s, end_s] = UNCERTAIN_S;
         let change = |quantity, factor| ParameterChange { quantity, factor, start_s, end_s };
-        vec![change(Quantity::Inertia, inertia.factor(0.75)), change(Quantity::ThrustFactor, thrust.factor(0.4))]
+        vec![
+            change(PlantParameter::Inertia, inertia.factor(0.75)),
+            change(PlantParameter::ThrustFactor, thrust.factor(0.4)),
+        ]
     });
     Ok(Scenario {
         name: case.name().into(),
@@ -53,7 +58,7 @@ pub fn scenario(model: Model, case: Case) -> Result<Scenario, OutOfRange> {
         realism: Realism::default(),
         sensing: Sensing::default(),
         sensor_faults: Vec::new(),
-        instruments: Suite::default(),
+        instruments: InstrumentSuite::default(),
         instrument_faults: Vec::new(),
         outages: Vec::new(),
         flight_core: false,

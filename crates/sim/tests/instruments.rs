@@ -1,8 +1,8 @@
 //! The instruments in scenario files.
 #![allow(clippy::unwrap_used, missing_docs)] // tests
 
-use afbc_plant::instruments::{Barometer, Gnss, Imu, Tracker};
-use afbc_plant::{Dropouts, Suite, Truth};
+use afbc_plant::instruments::{Barometer, Gnss, Imu, TrackerModel};
+use afbc_plant::{Dropouts, InstrumentSuite, Truth};
 use afbc_reader::FileError;
 use afbc_sim::scenario::{Scenario, parse};
 use nalgebra::Vector3;
@@ -17,17 +17,20 @@ fn example(text: &str) -> Result<Scenario, FileError> {
 #[test]
 fn instruments_are_parts_or_tables() {
     let read = |text: &str| example(text).unwrap().instruments;
-    assert_eq!(read(""), Suite::default());
+    assert_eq!(read(""), InstrumentSuite::default());
     let named = read("[instruments]\nimu = \"bmi270\"\ntracker = \"mocap-100\"\nbarometer = \"bmp388\"");
-    let (imu, tracker) = (Some(Imu::BMI270), Some(Tracker::MOCAP_100));
-    assert_eq!(named, Suite { imu, tracker, barometer: Some(Barometer::BMP388), ..Suite::default() });
+    let (imu, tracker) = (Some(Imu::BMI270), Some(TrackerModel::MOCAP_100));
+    assert_eq!(
+        named,
+        InstrumentSuite { imu, tracker, barometer: Some(Barometer::BMP388), ..InstrumentSuite::default() }
+    );
     let changed = "[instruments.imu]\npart = \"mpu-6000\"\ngyro.bias_rad_s = 0.5\naccel = { vibration_m_s2 = 3 }\n\
                    [instruments.gnss]\nrate_hz = 5\nloss = { rate_hz = 0.1, mean_s = 2 }";
     let mut imu = Imu::MPU_6000;
     (imu.gyro.bias_rad_s, imu.accel.vibration_m_s2) = (0.5, 3.0);
     let loss = Dropouts { rate_hz: 0.1, mean_s: 2.0 };
     let gnss = Gnss { rate_hz: 5.0, loss, ..Gnss::DEFAULT };
-    assert_eq!(read(changed), Suite { imu: Some(imu), gnss: Some(gnss), ..Suite::default() });
+    assert_eq!(read(changed), InstrumentSuite { imu: Some(imu), gnss: Some(gnss), ..InstrumentSuite::default() });
 }
 
 #[test]

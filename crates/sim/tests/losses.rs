@@ -3,7 +3,7 @@
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_sim::contender::{Contender, ControllerKind};
-use afbc_sim::flight::{Alone, GROUNDED_S, Lost, OFF_S, World, fly, lockstep};
+use afbc_sim::flight::{GROUNDED_S, LawOnly, Lost, OFF_S, World, fly, lockstep};
 use afbc_sim::scenario::{Scenario, parse};
 use afbc_types::{Inputs, Parameters, Setpoint, State};
 use core::ops::{ControlFlow, Range};
@@ -128,7 +128,7 @@ fn motors_off_in_the_air() {
         let scenario = scenario(&text);
         let mixer = Mixer::new(scenario.vehicle.to_f32(), 3.0).unwrap();
         let mut world = World::new(&scenario, 0.001).unwrap();
-        let mut pilot = Alone::new(Floats { mixer, off: off_ms });
+        let mut pilot = LawOnly::new(Floats { mixer, off: off_ms });
         let Ok(end) = lockstep(&mut world, &mut pilot, scenario.duration_s, |_| ControlFlow::Continue(()));
         end.lost
     };

@@ -4,8 +4,8 @@
 
 use afbc_control::Mixer;
 use afbc_flight_core::Stamped;
-use afbc_flight_core::blind::Blind;
-use afbc_flight_core::observer::Observer;
+use afbc_flight_core::dead_reckoning::DeadReckoning;
+use afbc_flight_core::observer::PoseObserver;
 use afbc_sim::scenario::parse;
 use afbc_types::{Inputs, Parameters, Pose, PoseSigmas, State};
 use nalgebra::Vector3;
@@ -38,10 +38,10 @@ fn flown(scenario: &str, position_sigma_m: f32, attitude_sigma_rad: f32) -> Erro
     let mut plant = parse("observer", &text, "observer").unwrap().plant(1e-3).unwrap();
     let nominal = Parameters::PAPER.to_f32();
     let mixer = Mixer::<4>::new(nominal, 3.0).unwrap();
-    let blind = Blind::new(&nominal, 1e-3);
+    let blind = DeadReckoning::new(&nominal, 1e-3);
     let hover = Inputs { thrust_n: nominal.weight_n(), ..Inputs::default() };
     let start = State { position_m: Vector3::new(0.0, 0.0, 20.0), ..State::default() };
-    let (mut reckoning, mut observer) = (blind.start(&start), Observer::new(&start, &hover, 0));
+    let (mut reckoning, mut observer) = (blind.start(&start), PoseObserver::new(&start, &hover, 0));
     let (mut applied, mut waiting, mut seed) = (hover, VecDeque::new(), 1);
     let (mut sums, mut steps) = (Errors::default(), 0.0);
     for ms in 0..10_000_u64 {

@@ -13,9 +13,9 @@
 //! own, [`Ram`], or a file.
 //!
 //! ```
-//! use afbc_store::{Name, Ram, Store};
+//! use afbc_store::{Ram, RecordName, Store};
 //!
-//! let mass = Name::new("V_MASS").unwrap();
+//! let mass = RecordName::new("V_MASS").unwrap();
 //! let mut store = Store::open(Ram::<1024>::BLANK, 0, 42)?;
 //! store.make_room()?;
 //! store.set(mass, 0, Some(0.5_f32.to_bits()))?;
@@ -31,5 +31,5 @@ mod record;
 mod store;
 
 pub use ram::Ram;
-pub use record::{NAME_MAX, Name, hash};
+pub use record::{NAME_MAX, RecordName, hash};
 pub use store::{Error, Found, Store};

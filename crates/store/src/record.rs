@@ -17,25 +17,25 @@ pub fn hash(name: &[u8]) -> u32 {
 
 /// Name of a value: 1 to 16 printable ASCII characters.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Name([u8; NAME_MAX]);
+pub struct RecordName([u8; NAME_MAX]);
 
-impl Name {
+impl RecordName {
     /// Name of records that are not about one value.
-    pub(crate) const NONE: Name = Name([0; NAME_MAX]);
+    pub(crate) const NONE: RecordName = RecordName([0; NAME_MAX]);
 
     /// Makes a name; none if `name` is empty, longer than 16 characters, or has other characters.
     pub fn new(name: &str) -> Option<Self> {
-        Name::of(name.chars())
+        RecordName::of(name.chars())
     }
 
-    /// Makes a name of these characters, as [`Name::new`].
+    /// Makes a name of these characters, as [`RecordName::new`].
     pub fn of(name: impl Iterator<Item = char>) -> Option<Self> {
         let (mut bytes, mut length) = ([0; NAME_MAX], 0);
         for c in name {
             *bytes.get_mut(length)? = u8::try_from(c).ok().filter(u8::is_ascii_graphic)?;
             length += 1;
         }
-        (length > 0).then_some(Name(bytes))
+        (length > 0).then_some(RecordName(bytes))
     }
 
     /// Returns the name with zeros behind it.
@@ -50,13 +50,13 @@ impl Name {
     }
 }
 
-impl fmt::Display for Name {
+impl fmt::Display for RecordName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.as_str())
     }
 }
 
-impl fmt::Debug for Name {
+impl fmt::Debug for RecordName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Debug::fmt(self.as_str(), f)
     }
@@ -70,7 +70,7 @@ pub(crate) enum Record {
     /// All values before this record are void; what follows belongs to `owner`.
     Begin { owner: u32 },
     /// The value of `name`, as its owner's `edition` understands it; none takes it back.
-    Value { name: Name, edition: u16, bits: Option<u32> },
+    Value { name: RecordName, edition: u16, bits: Option<u32> },
 }
 
 /// Kinds of records. Neither 0 nor 0xFFFF, to which torn words tend.
@@ -83,8 +83,8 @@ impl Record {
     /// Returns the record's bytes: name, value, edition, kind, checksum; little-endian.
     pub(crate) fn to_bytes(self) -> [u8; RECORD] {
         let (name, bits, edition, kind) = match self {
-            Record::Header { sequence } => (Name::NONE, sequence, 0, HEADER),
-            Record::Begin { owner } => (Name::NONE, owner, 0, BEGIN),
+            Record::Header { sequence } => (RecordName::NONE, sequence, 0, HEADER),
+            Record::Begin { owner } => (RecordName::NONE, owner, 0, BEGIN),
             Record::Value { name, edition, bits: Some(bits) } => (name, bits, edition, VALUE),
             Record::Value { name, edition, bits: None } => (name, 0, edition, NOTHING),
         };
@@ -108,8 +108,8 @@ impl Record {
         let (bits, rest) = fields.split_first_chunk::<4>()?;
         let (edition, kind) = rest.split_first_chunk::<2>()?;
         let kind = u16::from_le_bytes(*kind.first_chunk()?);
-        let (name, bits, edition) = (Name(*name), u32::from_le_bytes(*bits), u16::from_le_bytes(*edition));
-        let is_name = Name::new(name.as_str()) == Some(name);
+        let (name, bits, edition) = (RecordName(*name), u32::from_le_bytes(*bits), u16::from_le_bytes(*edition));
+        let is_name = RecordName::new(name.as_str()) == Some(name);
         match kind {
             HEADER => Some(Record::Header { sequence: bits }),
             BEGIN => Some(Record::Begin { owner: bits }),

@@ -1,6 +1,6 @@
 //! The store: two sectors of records.
 
-use crate::record::{Name, RECORD, Record};
+use crate::record::{RECORD, Record, RecordName};
 use core::fmt;
 use embedded_storage::nor_flash::NorFlash;
 
@@ -93,7 +93,7 @@ struct Filling {
 }
 
 /// Name, edition and bits of a value.
-type Held = (Name, u16, u32);
+type Held = (RecordName, u16, u32);
 
 /// What a place of a sector holds.
 enum Place {
@@ -168,7 +168,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// Of the flash.
-    pub fn visit(&mut self, mut visit: impl FnMut(Name, u16, u32)) -> Result<(), Error<F::Error>> {
+    pub fn visit(&mut self, mut visit: impl FnMut(RecordName, u16, u32)) -> Result<(), Error<F::Error>> {
         let Some(active) = self.active.filter(|active| active.owner == Some(self.owner)) else { return Ok(()) };
         for place in active.first..active.next {
             if let Some((name, edition, bits)) = self.counts(active, place)? {
@@ -182,7 +182,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// Of the flash.
-    pub fn get(&mut self, name: Name) -> Result<Option<(u16, u32)>, Error<F::Error>> {
+    pub fn get(&mut self, name: RecordName) -> Result<Option<(u16, u32)>, Error<F::Error>> {
         let Some(active) = self.active.filter(|active| active.owner == Some(self.owner)) else { return Ok(None) };
         for place in (active.first..active.next).rev() {
             match self.read(active.sector, place)? {
@@ -199,7 +199,7 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// If it was not written; then what was there before still counts.
-    pub fn set(&mut self, name: Name, edition: u16, bits: Option<u32>) -> Result<(), Error<F::Error>> {
+    pub fn set(&mut self, name: RecordName, edition: u16, bits: Option<u32>) -> Result<(), Error<F::Error>> {
         let held = self.get(name)?;
         if held == bits.map(|bits| (edition, bits)) {
             return Ok(());

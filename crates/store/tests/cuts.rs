@@ -4,7 +4,7 @@
 
 mod common;
 
-use afbc_store::{Error, Name, Store};
+use afbc_store::{Error, RecordName, Store};
 use common::{Cuttable, Erasing, PowerCut};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 const SECTOR: usize = 480;
 const OWNER: u32 = 7;
 
-type Values = BTreeMap<Name, (u16, u32)>;
+type Values = BTreeMap<RecordName, (u16, u32)>;
 type Flash = Cuttable<SECTOR>;
 
 /// What a vehicle does with its store.
@@ -25,8 +25,8 @@ enum Act {
     Restart,
 }
 
-fn name(number: u8) -> Name {
-    Name::new(&format!("P_NUMBER_{number}")).unwrap()
+fn name(number: u8) -> RecordName {
+    RecordName::new(&format!("P_NUMBER_{number}")).unwrap()
 }
 
 fn values(store: &mut Store<Flash>) -> Values {

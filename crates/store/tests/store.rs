@@ -3,7 +3,7 @@
 
 mod common;
 
-use afbc_store::{Error, Found, Name, Ram, Store, hash};
+use afbc_store::{Error, Found, Ram, RecordName, Store, hash};
 use common::{Cuttable, Erasing};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 /// A sector of the STM32F405.
 const SECTOR: usize = 16 * 1024;
 
-fn name(number: u32) -> Name {
-    Name::new(&format!("P{number}")).unwrap()
+fn name(number: u32) -> RecordName {
+    RecordName::new(&format!("P{number}")).unwrap()
 }
 
 fn blank<const N: usize>() -> Cuttable<N> {
@@ -21,8 +21,8 @@ fn blank<const N: usize>() -> Cuttable<N> {
 
 #[test]
 fn names_are_short_and_printable() {
-    assert_eq!(Name::new("A_ROLL_CENTRE_16").unwrap().as_str(), "A_ROLL_CENTRE_16");
-    assert!(["", "SEVENTEEN_LETTERS", "WITH SPACE", "NÄH"].iter().all(|name| Name::new(name).is_none()));
+    assert_eq!(RecordName::new("A_ROLL_CENTRE_16").unwrap().as_str(), "A_ROLL_CENTRE_16");
+    assert!(["", "SEVENTEEN_LETTERS", "WITH SPACE", "NÄH"].iter().all(|name| RecordName::new(name).is_none()));
     assert_ne!(hash(b"paper"), hash(b"racer"));
 }
 
@@ -93,7 +93,7 @@ fn a_full_store_says_so_and_keeps_what_it_has() {
     }
     set(&mut store, 0, None).unwrap();
     set(&mut store, most, Some(1)).unwrap();
-    let expected: BTreeMap<Name, u32> = (1..=most)
+    let expected: BTreeMap<RecordName, u32> = (1..=most)
         .map(|number| {
             (name(number), if number == most { 1 } else { (0..40).rev().find(|i| i % most == number).unwrap() })
         })
@@ -129,7 +129,7 @@ fn values_of_another_vehicle_do_not_count_and_are_not_lost_by_reading() {
 }
 
 /// Opens a store in `bytes`, checks that it works, and returns what it held.
-fn works(bytes: Vec<u8>) -> (Found, Vec<(Name, u32)>) {
+fn works(bytes: Vec<u8>) -> (Found, Vec<(RecordName, u32)>) {
     let mut store = Store::open(Cuttable { bytes, ..blank::<480>() }, 0, 1).unwrap();
     let (found, mut held) = (store.found(), Vec::new());
     store.visit(|name, _, bits| held.push((name, bits))).unwrap();

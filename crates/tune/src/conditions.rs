@@ -6,7 +6,7 @@ use crate::maker::{self, Maker, TrainingFlight};
 use crate::scale::Scale;
 use afbc::Profile;
 use afbc_plant::noise::{Noise, Stream};
-use afbc_plant::{Drag, Environment, ParameterChange, Quantity, Sensing, Turbulence};
+use afbc_plant::{Drag, Environment, ParameterChange, PlantParameter, Sensing, Turbulence};
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::run::Run;
 use afbc_sim::scenario::{Scenario, built_in};
@@ -135,7 +135,11 @@ fn drawn(maker: &Maker<'_>, index: u64, time: f64) -> Result<Scenario, Box<dyn E
     // One of the two may be at its worst.
     let thrust = between(scale.thrust(0.6), 1.2);
     let mass = between(0.7, scale.mass(1.3)).min((thrust / scale.thrust(0.6)).max(0.7));
-    let changes = [(Quantity::Mass, mass), (Quantity::ThrustFactor, thrust), (Quantity::Inertia, between(0.7, 1.3))];
+    let changes = [
+        (PlantParameter::Mass, mass),
+        (PlantParameter::ThrustFactor, thrust),
+        (PlantParameter::Inertia, between(0.7, 1.3)),
+    ];
     let change = |(quantity, factor)| ParameterChange { quantity, factor, start_s: 0.0, end_s: f64::INFINITY };
     let from_m = Vector3::new(0.0, 0.0, 3.0);
     let by_m = Vector3::new(between(-1.0, 1.0), between(-1.0, 1.0), between(-0.5, 0.5)) * scale.length;

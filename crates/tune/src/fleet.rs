@@ -7,7 +7,7 @@ use crate::conditions::{Condition, conditions_on};
 use crate::cost::{costs, mean};
 use crate::flights::{held_out_on, training_on};
 use crate::gains::vehicle_fragment;
-use crate::search::{Course, search};
+use crate::search::{SearchOptions, search};
 use crate::start::by_hand_on;
 use afbc::Profile;
 use afbc_files::seal;
@@ -48,7 +48,7 @@ type Failure = Box<dyn Error + Send + Sync>;
 
 /// What decides the results in a folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Manifest {
+pub struct FleetManifest {
     /// Version of the program.
     pub program: String,
     /// Tries of each search.
@@ -63,7 +63,7 @@ pub struct Manifest {
     pub searches: Vec<Planned>,
 }
 
-/// One search of a [`Manifest`].
+/// One search of a [`FleetManifest`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Planned {
     /// Name of the vehicle.
@@ -76,7 +76,7 @@ pub struct Planned {
 
 /// Result of one search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Outcome {
+pub struct FleetOutcome {
     /// What was searched.
     #[serde(flatten)]
     pub planned: Planned,
@@ -147,7 +147,11 @@ impl Search {
 
     /// Searches. `tried` is called with the number of new tries, and ends the search by returning false: then there is
     /// no result.
-    fn run(&self, course: Course, tried: impl Fn(usize) -> bool) -> Result<Option<Outcome>, Box<dyn Error>> {
+    fn run(
+        &self,
+        course: SearchOptions,
+        tried: impl Fn(usize) -> bool,
+    ) -> Result<Option<FleetOutcome>, Box<dyn Error>> {
         let (mut before, mut goes_on) = (0, true);
         let found = search(&self.start, &self.training, &self.conditions, course, |tries, _| {
             goes_on = tried(tries - before);
@@ -173,7 +177,7 @@ impl Search {
                 unmet.push(condition.scenario.name.clone());
             }
         }
-        Ok(Some(Outcome {
+        Ok(Some(FleetOutcome {
             planned: self.planned(),
             tries: found.evaluations,
             cost: [found.before, found.after],
@@ -200,8 +204,8 @@ fn without_gains(mut scenario: Scenario, vehicle: &Vehicle) -> Scenario {
 /// A folder of results.
 pub struct Results {
     place: Folder,
-    course: Course,
-    manifest: Manifest,
+    course: SearchOptions,
+    manifest: FleetManifest,
 }
 
 impl Results {
@@ -209,8 +213,8 @@ impl Results {
     ///
     /// # Errors
     /// One line, if it cannot be written or holds anything else; nothing has been changed then.
-    pub fn open(path: &Path, searches: &[Search], course: Course, flying: bool) -> Result<Self, Box<dyn Error>> {
-        let manifest = Manifest {
+    pub fn open(path: &Path, searches: &[Search], course: SearchOptions, flying: bool) -> Result<Self, Box<dyn Error>> {
+        let manifest = FleetManifest {
             program: env!("CARGO_PKG_VERSION").into(),
             budget: course.budget,
             step: course.step,
@@ -224,7 +228,7 @@ impl Results {
             }
             error => error.to_string(),
         })?;
-        match read::<Manifest>(&path.join(MANIFEST))? {
+        match read::<FleetManifest>(&path.join(MANIFEST))? {
             Some(held) if held != manifest => {
                 let what = held.differs(&manifest);
                 return Err(
@@ -248,10 +252,10 @@ impl Results {
     ///
     /// # Errors
     /// One line, if its file cannot be read, is damaged or not of this search.
-    pub fn outcome(&self, search: &Search) -> Result<Option<Outcome>, Box<dyn Error>> {
+    pub fn outcome(&self, search: &Search) -> Result<Option<FleetOutcome>, Box<dyn Error>> {
         let planned = search.planned();
         let path = self.place.path().join(file_name(&planned));
-        match read::<Outcome>(&path)? {
+        match read::<FleetOutcome>(&path)? {
             Some(outcome) if outcome.planned != planned => {
                 Err(format!("{}: the result of another search; delete it, and start again", path.display()).into())
             }
@@ -269,7 +273,7 @@ impl Results {
         searches: &[Search],
         stop: &AtomicBool,
         tried: impl Fn(usize) + Sync,
-    ) -> Result<Option<Vec<Outcome>>, Box<dyn Error>> {
+    ) -> Result<Option<Vec<FleetOutcome>>, Box<dyn Error>> {
         let mut missing = Vec::new();
         for search in searches {
             if self.outcome(search)?.is_none() {
@@ -315,7 +319,7 @@ impl Results {
     ///
     /// # Errors
     /// If one cannot be written.
-    pub fn write_gains(&self, outcomes: &[Outcome]) -> Result<Vec<PathBuf>, Box<dyn Error>> {
+    pub fn write_gains(&self, outcomes: &[FleetOutcome]) -> Result<Vec<PathBuf>, Box<dyn Error>> {
         let folder = self.place.path().join(GAINS);
         fs::create_dir_all(&folder).map_err(|source| files::Error::Write { path: folder.clone(), source })?;
         let mut paths = Vec::new();
@@ -342,8 +346,8 @@ impl Results {
 
     /// Returns the gains of the laws on `vehicle`, as tables of its file. Those of backstepping are left out: it flies
     /// with AFBC's cascade.
-    pub fn gains_of(&self, vehicle: &str, outcomes: &[Outcome]) -> String {
-        let Manifest { budget, step, seed, start, program, .. } = &self.manifest;
+    pub fn gains_of(&self, vehicle: &str, outcomes: &[FleetOutcome]) -> String {
+        let FleetManifest { budget, step, seed, start, program, .. } = &self.manifest;
         let head =
             format!("# {program}: {budget} tries from gains {start}, step {step}, seed {seed} (docs/tuning.md).\n");
         let backstepping = ControllerKind::Backstepping.name();
@@ -353,9 +357,9 @@ impl Results {
     }
 }
 
-impl Manifest {
+impl FleetManifest {
     /// Says what differs.
-    fn differs(&self, wanted: &Manifest) -> String {
+    fn differs(&self, wanted: &FleetManifest) -> String {
         let pairs = [
             ("program", self.program.clone(), wanted.program.clone()),
             ("budget", self.budget.to_string(), wanted.budget.to_string()),

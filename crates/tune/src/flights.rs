@@ -12,10 +12,10 @@
 use crate::fast;
 use crate::maker::{Maker, ONSET_S, TrainingFlight, read};
 use crate::scale::Scale;
-use afbc_plant::instruments::{Barometer, Gnss, Imu, Magnetometer, Tracker};
+use afbc_plant::instruments::{Barometer, Gnss, Imu, Magnetometer, TrackerModel};
 use afbc_plant::{
-    Battery, Contact, Environment, GroundEffect, Gust, GustKind, Payload, Quantity, RotorFault, Sensing, Suite,
-    Turbulence,
+    Battery, Contact, Environment, GroundEffect, Gust, GustKind, InstrumentSuite, Payload, PlantParameter, RotorFault,
+    Sensing, Turbulence,
 };
 use afbc_sim::scenario::{Outage, Scenario};
 use afbc_sim::trajectory::{Sine, Trajectory, Waypoint};
@@ -71,8 +71,8 @@ impl Maker<'_> {
         let mut turbulent = self.scenario(TrainingFlight::new("turbulence", 20.0))?;
         self.drag(&mut turbulent);
         turbulent.realism.wind.turbulence = Some(self.turbulence(Turbulence::MODERATE));
-        let weak = Some((Quantity::ThrustFactor, self.scale.thrust(0.6)));
-        let heavy = Some((Quantity::Mass, self.scale.mass(1.3)));
+        let weak = Some((PlantParameter::ThrustFactor, self.scale.thrust(0.6)));
+        let heavy = Some((PlantParameter::Mass, self.scale.mass(1.3)));
         let old_s = 0.02 * time;
         let [lemniscate, circle] = fast::training(self)?;
         Ok(vec![
@@ -127,7 +127,7 @@ impl Maker<'_> {
         self.drag(&mut wind);
         wind.realism.wind.steady_m_s = Vector3::new(4.0, 2.0, 0.0) * air;
         wind.realism.wind.turbulence = Some(self.turbulence(Turbulence::LIGHT));
-        let heavy = Some((Quantity::Mass, self.scale.mass(1.15)));
+        let heavy = Some((PlantParameter::Mass, self.scale.mass(1.15)));
         let [lemniscate, circle] = fast::held_out(self)?;
         let mut flights = vec![
             Scenario { seed: 1001, ..self.hardware()? },
@@ -136,8 +136,8 @@ impl Maker<'_> {
                 ..TrainingFlight::new("step-back", 12.0)
             })?,
             wind,
-            self.windy(fast("light", Some((Quantity::Mass, 0.8))))?,
-            self.windy(fast("inert", Some((Quantity::Inertia, 1.75))))?,
+            self.windy(fast("light", Some((PlantParameter::Mass, 0.8))))?,
+            self.windy(fast("inert", Some((PlantParameter::Inertia, 1.75))))?,
             delayed,
             blind(self.scenario(fast("outages", heavy))?, &[ONSET_S - 0.05, 8.3, 11.0, 13.7, 16.4]),
             self.landing("landing-fast", 1.2)?,
@@ -155,7 +155,7 @@ impl Maker<'_> {
             self.payload("payload", fast("", None), -0.06)?,
             self.sensed("mocap", fast("", None), |suite| {
                 suite.imu = suite.imu.map(|imu| Imu { gyro: Imu::MPU_6000.gyro, ..imu });
-                suite.tracker = Some(Tracker { delay_s: 0.03, ..Tracker::MOCAP_100 });
+                suite.tracker = Some(TrackerModel { delay_s: 0.03, ..TrackerModel::MOCAP_100 });
             })?,
             self.sensed("outdoor", fast("", None), |suite| {
                 (suite.barometer, suite.magnetometer) = (Some(Barometer::BMP388), Some(Magnetometer::QMC5883L));
@@ -316,7 +316,7 @@ impl Maker<'_> {
         &self,
         name: &'static str,
         flight: TrainingFlight,
-        change: impl FnOnce(&mut Suite),
+        change: impl FnOnce(&mut InstrumentSuite),
     ) -> Result<Scenario, Box<dyn Error>> {
         let scenario = self.windy(TrainingFlight { name, ..flight })?;
         Ok(Scenario { instruments: instruments(name, change)?, sensing: Sensing::default(), ..scenario })
@@ -339,7 +339,7 @@ impl Maker<'_> {
 
 /// Returns the instruments of the built-in scenario `name`, changed by `change`. The slow error of a receiver, which no
 /// law can know, is left out: it would hide what a law does.
-fn instruments(name: &str, change: impl FnOnce(&mut Suite)) -> Result<Suite, Box<dyn Error>> {
+fn instruments(name: &str, change: impl FnOnce(&mut InstrumentSuite)) -> Result<InstrumentSuite, Box<dyn Error>> {
     let mut suite = read(name)?.instruments;
     change(&mut suite);
     let steady = |gnss| Gnss { horizontal_m: 0.0, vertical_m: 0.0, ..gnss };

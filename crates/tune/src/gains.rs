@@ -93,7 +93,7 @@ fn four_digits(value: f64) -> f32 {
 
 /// A gain before and after.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Change {
+pub struct GainChange {
     /// Axes and key: `x, y alpha1`; of a peer, the key alone.
     pub name: String,
     /// Value before the search.
@@ -103,11 +103,11 @@ pub struct Change {
 }
 
 /// Returns every gain searched, with its values in `start` and `found`.
-pub(super) fn changes(start: &Contender, found: &Contender) -> Vec<Change> {
+pub(super) fn changes(start: &Contender, found: &Contender) -> Vec<GainChange> {
     let mut changes = Vec::new();
     each_tunable(&mut start.clone(), &mut |place, range, gain| {
         let name = format!("{place} {}", range.name).trim_start().to_owned();
-        changes.push(Change { name, from: *gain, to: *gain });
+        changes.push(GainChange { name, from: *gain, to: *gain });
     });
     let mut to = changes.iter_mut();
     each_tunable(&mut found.clone(), &mut |_, _, gain| {

@@ -2,7 +2,7 @@
 
 use crate::scale::Scale;
 use afbc::Profile;
-use afbc_plant::{Drag, Environment, Gust, Motion, ParameterChange, Quantity, Turbulence};
+use afbc_plant::{Drag, Environment, Gust, Motion, ParameterChange, PlantParameter, Turbulence};
 use afbc_reader::FileError;
 use afbc_sim::scenario::{Scenario, built_in};
 use afbc_sim::trajectory::Trajectory;
@@ -49,7 +49,7 @@ impl<'a> Maker<'a> {
         };
         let gusts = scenario.environment.gusts().iter().map(gust).collect();
         let change = |change: &ParameterChange| match change.quantity {
-            Quantity::ThrustFactor => ParameterChange { factor: self.scale.thrust(change.factor), ..*change },
+            PlantParameter::ThrustFactor => ParameterChange { factor: self.scale.thrust(change.factor), ..*change },
             _ => *change,
         };
         let changes = scenario.environment.changes().iter().map(change).collect();
@@ -115,7 +115,7 @@ pub(crate) struct TrainingFlight {
     pub(crate) duration_s: f64,
     pub(crate) trajectory: Trajectory,
     /// Quantity that changes at the onset for half of the remaining flight, and its factor.
-    pub(crate) change: Option<(Quantity, f64)>,
+    pub(crate) change: Option<(PlantParameter, f64)>,
 }
 
 impl TrainingFlight {

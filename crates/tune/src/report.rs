@@ -3,7 +3,7 @@
 use crate::conditions::Condition;
 use crate::cost::{costs, mean};
 use crate::gains::{fragment, vehicle_fragment};
-use crate::search::Found;
+use crate::search::SearchResult;
 use afbc_sim::contender::Contender;
 use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
@@ -18,12 +18,12 @@ use std::error::Error;
 /// None occurs: both have flown before.
 pub fn report(
     start: &Contender,
-    found: &Found,
+    found: &SearchResult,
     [training, held_out]: [&[Scenario]; 2],
     conditions: &[Condition],
     seed: u64,
 ) -> Result<String, Box<dyn Error>> {
-    let Found { contender, before, after, evaluations, changes } = found;
+    let SearchResult { contender, before, after, evaluations, changes } = found;
     let mut text = format!(
         "# {} after {evaluations} tries with seed {seed}: cost {after:.4}, before {before:.4}\n#\n",
         contender.kind().title()

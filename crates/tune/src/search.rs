@@ -3,7 +3,7 @@
 use crate::cma_es::Search;
 use crate::conditions::{Condition, FAILED, factor};
 use crate::cost::{LOST, costs, flown, mean};
-use crate::gains::{self, Change};
+use crate::gains::{self, GainChange};
 use afbc_sim::contender::Contender;
 use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
@@ -14,7 +14,7 @@ pub const STEP: f64 = 0.3;
 
 /// How a search goes.
 #[derive(Clone, Copy, Debug)]
-pub struct Course {
+pub struct SearchOptions {
     /// Number of contenders to try, including the start.
     pub budget: usize,
     /// Initial step size in the logarithm of every gain, such as [`STEP`].
@@ -25,7 +25,7 @@ pub struct Course {
 
 /// Result of a search.
 #[derive(Clone, Debug)]
-pub struct Found {
+pub struct SearchResult {
     /// The best contender; the start, if none was better.
     pub contender: Contender,
     /// Cost of the start, times the factors of the conditions that it does not meet.
@@ -35,7 +35,7 @@ pub struct Found {
     /// Number of contenders tried.
     pub evaluations: usize,
     /// Every gain searched.
-    pub changes: Vec<Change>,
+    pub changes: Vec<GainChange>,
 }
 
 /// Searches for the gains of `start` with the lowest cost over `flights` that meet `conditions`. `progress` is called
@@ -51,9 +51,9 @@ pub fn search(
     start: &Contender,
     flights: &[Scenario],
     conditions: &[Condition],
-    Course { budget, step, seed }: Course,
+    SearchOptions { budget, step, seed }: SearchOptions,
     mut progress: impl FnMut(usize, f64) -> bool,
-) -> Result<Found, OutOfRange> {
+) -> Result<SearchResult, OutOfRange> {
     let rate =
         |contender: &Contender| Ok::<_, OutOfRange>((costs(flights, contender)?, factor(conditions, contender)?));
     let of = |(costs, factor): &(Vec<f64>, f64)| mean(costs) * factor;
@@ -93,7 +93,7 @@ pub fn search(
     }
     progress(evaluations, after);
     let changes = gains::changes(start, &best);
-    Ok(Found { contender: best, before, after, evaluations, changes })
+    Ok(SearchResult { contender: best, before, after, evaluations, changes })
 }
 
 /// Returns the indices of flights with these costs, the dearest first.

@@ -4,7 +4,9 @@
 use afbc_sim::contender::ControllerKind;
 use afbc_sim::scenario::Scenario;
 use afbc_tune::fleet::{Results, Search};
-use afbc_tune::{Course, LOST, by_hand_on, conditions_on, costs, held_out, held_out_on, search, training, training_on};
+use afbc_tune::{
+    LOST, SearchOptions, by_hand_on, conditions_on, costs, held_out, held_out_on, search, training, training_on,
+};
 use afbc_vehicles::{BUILT_IN, Vehicle, built_in};
 use core::hash::Hasher;
 use std::collections::BTreeMap;
@@ -77,7 +79,7 @@ fn a_search_does_not_depend_on_the_number_of_threads() {
     let flights: Vec<_> = training_on(&vehicle).unwrap().iter().filter(named).cloned().collect();
     let start = by_hand_on(ControllerKind::Indi, &vehicle);
     // Large steps, so that some contenders are given up.
-    let course = Course { budget: 24, step: 0.8, seed: 3 };
+    let course = SearchOptions { budget: 24, step: 0.8, seed: 3 };
     let found = [1, 3].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| search(&start, &flights, &[], course, |_, _| true).unwrap())
@@ -105,7 +107,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 #[test]
 fn an_interrupted_fleet_resumes_to_the_same_bytes() {
     let base = std::env::temp_dir().join(format!("afbc-tune-fleet-{}", std::process::id()));
-    let course = Course { budget: 2, step: 0.3, seed: 1 };
+    let course = SearchOptions { budget: 2, step: 0.3, seed: 1 };
     let kinds = [ControllerKind::Pid, ControllerKind::Indi];
     let searches: Vec<_> = kinds.into_iter().map(|kind| Search::new(kind, &vehicle("racer"), false).unwrap()).collect();
     let run = |folder: &Path, stops: bool| {
@@ -134,7 +136,7 @@ fn an_interrupted_fleet_resumes_to_the_same_bytes() {
     let refused = |course, searches: &[Search]| {
         Results::open(&whole, searches, course, false).err().map(|error| error.to_string()).unwrap()
     };
-    assert!(refused(Course { seed: 2, ..course }, &searches).contains("with seed 1, not 2"));
+    assert!(refused(SearchOptions { seed: 2, ..course }, &searches).contains("with seed 1, not 2"));
     assert!(refused(course, searches.get(..1).unwrap()).contains("other laws or vehicles"));
     std::fs::write(whole.join("racer.pid.json"), "{}").unwrap();
     let results = Results::open(&whole, &searches, course, false).unwrap();

@@ -35,6 +35,7 @@ mod motion;
 mod parameters;
 mod pose;
 mod range;
+mod stamped;
 mod trigonometry;
 
 pub use actuation::{Inputs, RotorForces, RotorSpeeds};
@@ -47,4 +48,5 @@ pub use nalgebra;
 pub use parameters::Parameters;
 pub use pose::{Pose, PoseSigmas};
 pub use range::{OutOfRange, Range};
+pub use stamped::Stamped;
 pub use trigonometry::sin_cos;

@@ -52,8 +52,8 @@ impl State {
 }
 
 /// Desired motion: \[x_d, y_d, z_d, psi_d\] with two derivatives (assumption A5), and two more of the position (not in
-/// the paper) for laws that feed them forward. Who does not know jerk and snap leaves them at zero, as the link does:
-/// no message carries them.
+/// the paper) for laws that feed them forward. Unknown jerk and snap are zero, as from the link, whose messages carry
+/// neither.
 ///
 /// Fields may be added: a literal ends in `..Setpoint::default()`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

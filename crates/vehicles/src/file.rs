@@ -1,6 +1,6 @@
 //! Vehicle files.
 
-use crate::parts::{self, Conditions, FORCE_MAX};
+use crate::parts::{self, DragConditions, FORCE_MAX};
 use crate::vehicle::{CASCADE, Vehicle};
 use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
@@ -121,7 +121,7 @@ fn surroundings(root: &mut Table<'_>, vehicle: &mut Vehicle, rotor_height_m: f64
     if let Some(table) = root.table("drag")? {
         let default = Drag { rotor_height_m, ..Drag::DEFAULT };
         let rotor_max_rad_s = realism.rotors.max_rad_s;
-        let conditions = Conditions { parameters, frame: &frame, rotor_max_rad_s, step_s: STEP_S };
+        let conditions = DragConditions { parameters, frame: &frame, rotor_max_rad_s, step_s: STEP_S };
         realism.drag = Some(parts::drag(table, default, Drag::ROT_HEIGHT.range.name, &conditions)?);
     }
     if let Some(table) = root.table("ground")? {

@@ -11,7 +11,7 @@ pub const FORCE_MAX: Range = Range::new("force_max_n", 0.001, 10_000.0);
 
 /// What drag depends on: the vehicle, its fastest rotor, and the step of the simulation.
 #[derive(Clone, Copy, Debug)]
-pub struct Conditions<'a> {
+pub struct DragConditions<'a> {
     /// True parameters.
     pub parameters: &'a Parameters<f64>,
     /// Where the rotors are.
@@ -73,7 +73,7 @@ fn max_by_force(table: &mut Table<'_>, rotors: &mut Rotors, truth: &Parameters<f
     max.check(rotors.max_rad_s).map_err(|error| table.fault_at(FORCE_MAX.name, problem(error)))
 }
 
-/// What the rotors hang on.
+/// The body that carries the rotors.
 ///
 /// # Errors
 /// As [`parameters`].
@@ -98,9 +98,9 @@ pub fn drag(
     mut table: Table<'_>,
     default: Drag,
     elsewhere: &str,
-    conditions: &Conditions<'_>,
+    conditions: &DragConditions<'_>,
 ) -> Result<Drag, FileError> {
-    let Conditions { parameters, frame, rotor_max_rad_s, step_s } = *conditions;
+    let DragConditions { parameters, frame, rotor_max_rad_s, step_s } = *conditions;
     let mut drag = default;
     table.declared_but(elsewhere, &mut drag)?;
     drag.validate_for(parameters, frame, rotor_max_rad_s, step_s).map_err(together(&table))?;

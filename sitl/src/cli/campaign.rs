@@ -10,7 +10,7 @@ use super::target::Target;
 use super::terminal::{Failure, print, say};
 use super::vehicle::OnVehicle;
 use super::{interrupt, json};
-use afbc_campaign::{self as campaign, BUILT_IN, Campaign as Plan, Folder, Manifest, Shard, Summary, built_in};
+use afbc_campaign::{self as campaign, BUILT_IN, Campaign as Plan, CampaignFolder, Manifest, Shard, Summary, built_in};
 use afbc_reader::BuiltIn;
 use afbc_report::campaign as report;
 use clap::Args;
@@ -79,7 +79,7 @@ impl Campaign {
             "stopped; finished flights are in {}, and the same command resumes",
             out.display()
         ))?;
-        let folder = Folder::open(&out, Manifest::new(&plan, shard), self.place.force)?;
+        let folder = CampaignFolder::open(&out, Manifest::new(&plan, shard), self.place.force)?;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         // Flights of earlier runs are reported first.
         let progress: OnceLock<Progress> = OnceLock::new();
@@ -141,7 +141,7 @@ fn useful(wanted: Option<u64>, flights: u64) -> usize {
 }
 
 /// Writes and prints the results of all flights.
-fn conclude(folder: &Folder, summary: &Summary, target: &str, json: Json) -> Result<ExitCode, Failure> {
+fn conclude(folder: &CampaignFolder, summary: &Summary, target: &str, json: Json) -> Result<ExitCode, Failure> {
     let out = folder.path();
     report::write(folder.place(), summary)?;
     if json.json {

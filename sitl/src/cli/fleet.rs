@@ -3,8 +3,8 @@
 use super::progress::Progress;
 use super::terminal::{Failure, INTERRUPTED, print, say};
 use afbc_sim::contender::{ControllerKind, Law};
-use afbc_tune::fleet::{GAINS, Outcome, Results, Search};
-use afbc_tune::{Course, is_paper};
+use afbc_tune::fleet::{FleetOutcome, GAINS, Results, Search};
+use afbc_tune::{SearchOptions, is_paper};
 use afbc_vehicles::Vehicle;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ pub(super) struct Fleet<'a> {
     pub(super) laws: &'a [String],
     /// Vehicles; all built-in ones if there are none.
     pub(super) vehicles: Vec<Vehicle>,
-    pub(super) course: Course,
+    pub(super) course: SearchOptions,
     /// Whether to start from the gains that fly.
     pub(super) flying: bool,
     /// Folder of vehicle files to write the gains into.
@@ -141,12 +141,12 @@ fn replaced(text: &str, gains: &str) -> Result<String, String> {
 }
 
 /// Returns a line for each search.
-fn table(outcomes: &[Outcome]) -> String {
+fn table(outcomes: &[FleetOutcome]) -> String {
     let mut text = format!(
         "{:<14}{:<14}{:>10}{:>10}{:>12}{:>10}  {}\n",
         "vehicle", "law", "before", "after", "held out", "after", "conditions not met"
     );
-    for Outcome { planned, cost: [before, after], held_out: [old, new], unmet, .. } in outcomes {
+    for FleetOutcome { planned, cost: [before, after], held_out: [old, new], unmet, .. } in outcomes {
         let unmet = if unmet.is_empty() { "-".into() } else { unmet.join(", ") };
         let _ = writeln!(
             text,

@@ -5,7 +5,7 @@ use super::target::Target;
 use super::terminal::{Failure, print};
 use crate::serial::{self, Serial};
 use afbc_sim::flight::Sample;
-use afbc_sim::in_the_loop::{self, LoopEnd, Pace, Station};
+use afbc_sim::in_the_loop::{self, LoopEnd, MessagePeriods, Station};
 use clap::Args;
 use std::ops::ControlFlow;
 use std::process::ExitCode;
@@ -47,7 +47,7 @@ impl Hitl {
             return Ok(ExitCode::SUCCESS);
         };
         let scenario = self.flying.scenario(&self.scenario)?;
-        let pace = Pace::at(self.baud)?;
+        let pace = MessagePeriods::at(self.baud)?;
         let mut recorder = Recorder::new(&scenario, &self.flying)?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopper = Arc::clone(&stop);

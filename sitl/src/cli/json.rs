@@ -5,7 +5,7 @@ use afbc::Profile;
 use afbc_campaign::Campaign;
 use afbc_sim::contender::Contender;
 use afbc_sim::scenario::Scenario;
-use afbc_tune::{Change, Found, fragment};
+use afbc_tune::{GainChange, SearchResult, fragment};
 use clap::Args;
 use serde::Serialize;
 use std::io;
@@ -132,9 +132,9 @@ struct Gain {
 }
 
 /// Returns the result of a search with this seed for the contender `name`.
-pub(crate) fn tuned(found: &Found, name: &str, seed: u64) -> impl Serialize {
-    let Found { contender, before, after, evaluations, changes } = found;
-    let gain = |Change { name, from, to }: &Change| Gain { name: name.clone(), before: *from, after: *to };
+pub(crate) fn tuned(found: &SearchResult, name: &str, seed: u64) -> impl Serialize {
+    let SearchResult { contender, before, after, evaluations, changes } = found;
+    let gain = |GainChange { name, from, to }: &GainChange| Gain { name: name.clone(), before: *from, after: *to };
     Tuned {
         controller: contender.kind().name(),
         seed,

@@ -4,7 +4,7 @@ use super::flying::{Flying, report};
 use super::json::Json;
 use super::place::Place;
 use super::terminal::Failure;
-use afbc_plant::Model;
+use afbc_plant::PlantModel;
 use afbc_report::claims::claims;
 use afbc_sim::case::{Case, Reading, Sign, Uncertainty};
 use afbc_sim::flown::Flown;
@@ -102,11 +102,11 @@ impl Signs {
 }
 
 impl Plants {
-    fn models(self) -> &'static [Model] {
+    fn models(self) -> &'static [PlantModel] {
         match self {
-            Plants::Simplified => &[Model::Simplified],
-            Plants::RigidBody => &[Model::RigidBody],
-            Plants::Both => &[Model::Simplified, Model::RigidBody],
+            Plants::Simplified => &[PlantModel::Simplified],
+            Plants::RigidBody => &[PlantModel::RigidBody],
+            Plants::Both => &[PlantModel::Simplified, PlantModel::RigidBody],
         }
     }
 }

@@ -3,12 +3,12 @@
 use super::terminal::{Failure, print, say};
 use super::vehicle::named;
 use afbc_files::{Flash, place};
-use afbc_onboard::parameters::{Change, Kept, Parameter, Table};
-use afbc_reader::params::{Entry, Format, read, written};
+use afbc_onboard::parameters::{Kept, Parameter, ParameterTable, RecordChange};
+use afbc_reader::params::{Format, ParameterEntry, read, written};
 use afbc_reader::words::out_of_range;
 use afbc_reader::{FileError, Source};
 use afbc_sim::in_the_loop::configuration;
-use afbc_store::{Error, Name, Store, hash};
+use afbc_store::{Error, RecordName, Store, hash};
 use afbc_types::with_rotors;
 use afbc_vehicles::Vehicle;
 use clap::{Args, Subcommand, ValueEnum};
@@ -82,7 +82,7 @@ impl Params {
 }
 
 fn act<const N: usize>(action: &Action, vehicle: &Vehicle) -> Result<(), Failure> {
-    let mut table = Table::<N>::new(configuration(vehicle)?);
+    let mut table = ParameterTable::<N>::new(configuration(vehicle)?);
     match action {
         Action::Export { of, out, format } => {
             if let Some(path) = &of.store {
@@ -131,9 +131,9 @@ fn act<const N: usize>(action: &Action, vehicle: &Vehicle) -> Result<(), Failure
 }
 
 /// Writes the present value of a parameter.
-fn keep<const N: usize>(table: &Table<N>, store: &mut Store<Flash>, name: Name) -> Result<(), Unkept> {
+fn keep<const N: usize>(table: &ParameterTable<N>, store: &mut Store<Flash>, name: RecordName) -> Result<(), Unkept> {
     let (Some(now), Some(image)) = (table.get(name), table.default_of(name)) else { return Ok(()) };
-    let change = Change::Set(name, (now.value.to_bits() != image.value.to_bits()).then_some(now.value));
+    let change = RecordChange::Set(name, (now.value.to_bits() != image.value.to_bits()).then_some(now.value));
     match Kept::NOW.keep(store, change) {
         Err(Error::NeedsErase) => {
             store.make_room()?;
@@ -156,20 +156,20 @@ fn open(path: &Path, vehicle: &Vehicle, flash: fn(&Path) -> std::io::Result<Flas
 }
 
 /// Sets `table` to what is stored; says what is not used.
-fn load<const N: usize>(table: &mut Table<N>, store: &mut Store<Flash>, path: &Path) -> Result<(), Failure> {
+fn load<const N: usize>(table: &mut ParameterTable<N>, store: &mut Store<Flash>, path: &Path) -> Result<(), Failure> {
     let notice = |notice| say(&format!("{}: {notice}", path.display()));
     Ok(Kept::NOW.load(table, store, notice).map_err(|error| failed(path, &error))?)
 }
 
 /// Sets `table` to the values of a file; returns their names.
-fn take<const N: usize>(table: &mut Table<N>, file: &Path) -> Result<Vec<Name>, Failure> {
+fn take<const N: usize>(table: &mut ParameterTable<N>, file: &Path) -> Result<Vec<RecordName>, Failure> {
     let shown = file.display().to_string();
     let text = fs::read_to_string(file).map_err(|error| format!("{shown}: cannot be read ({error})"))?;
     let source = Source { file: &shown, text: &text };
     let mut names = Vec::new();
-    for Entry { name, value, at } in read(&shown, &text)? {
+    for ParameterEntry { name, value, at } in read(&shown, &text)? {
         let unknown = || FileError::at(source, at, &name, "no such parameter; `sitl params export` lists them");
-        let known = Name::new(&name).ok_or_else(unknown)?;
+        let known = RecordName::new(&name).ok_or_else(unknown)?;
         table.get(known).ok_or_else(unknown)?;
         // The reason begins with the name.
         table.put(known, value).map_err(|reason| FileError::at(source, at, "", reason.as_str()))?;
@@ -180,7 +180,7 @@ fn take<const N: usize>(table: &mut Table<N>, file: &Path) -> Result<Vec<Name>, 
 }
 
 /// Parameters that are not as in the image, and what they are there.
-fn differing<const N: usize>(table: &Table<N>) -> Vec<(Parameter, f32)> {
+fn differing<const N: usize>(table: &ParameterTable<N>) -> Vec<(Parameter, f32)> {
     let image = |parameter: &Parameter| table.default_of(parameter.name).map_or(f32::NAN, |image| image.value);
     let both = table.iter().map(|parameter| (parameter, image(&parameter)));
     both.filter(|(now, image)| now.value.to_bits() != image.to_bits()).collect()

@@ -5,7 +5,7 @@ use super::target::Target;
 use super::terminal::Failure;
 use super::written::{Output, show};
 use super::{interrupt, page};
-use afbc_campaign::random::{self, FLIGHTS, Flown, NAME, Random, Seen};
+use afbc_campaign::random::{self, FLIGHTS, FlownDraw, NAME, Random, Seen};
 use afbc_reader::BuiltIn;
 use afbc_report::random::{self as report, Judged};
 use afbc_report::suite::markers;
@@ -134,7 +134,7 @@ fn fly(
     random: &Random,
     [contenders, own]: [&[Contender]; 2],
     ready: impl FnOnce() -> Result<(), Failure>,
-) -> Result<Vec<Flown>, Failure> {
+) -> Result<Vec<FlownDraw>, Failure> {
     let drawn = random.under(contenders, own)?;
     interrupt::ends_it()?;
     ready()?;

@@ -7,7 +7,7 @@ use super::terminal::Failure;
 use super::written::show;
 use afbc_estimator::Settings;
 use afbc_reader::FileError;
-use afbc_replay::Start;
+use afbc_replay::EstimatorStart;
 use afbc_report::replay as report;
 use clap::Args;
 use std::path::PathBuf;
@@ -57,7 +57,7 @@ impl Replay {
         let mut recording = afbc_replay::read(&self.log)?;
         recording.mag_slow_rad = self.compass_error.or(recording.mag_slow_rad);
         let replayed = afbc_replay::fly(&recording, self.from)?;
-        if let Start::Never(why) = replayed.start {
+        if let EstimatorStart::Never(why) = replayed.start {
             let problem = format!("the estimator never started ({why}), and the log has no attitude to start from");
             return Err(FileError::whole(&shown, format!("{problem}; record from rest on")).into());
         }

@@ -3,7 +3,9 @@
 use super::target::Target;
 use super::terminal::{Failure, INTERRUPTED, print};
 use super::vehicle::OnVehicle;
-use afbc_serve::{Addresses, End, Keeper, Lines, Ports, Rate, Server, Then, VEHICLES_MAX, fleet, guide, run};
+use afbc_serve::{
+    Addresses, Lines, ParameterFile, Ports, RunEnd, Server, Then, TimeRate, VEHICLES_MAX, fleet, guide, run,
+};
 use clap::{Args, value_parser};
 use std::io::{BufReader, Write, stdin, stdout};
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
@@ -98,7 +100,7 @@ impl Serve {
         let mut server = match &self.parameters {
             Some(path) => {
                 let files = (self.system..).map(|system| file(path, system, self.vehicles));
-                let keepers = files.zip(&scenarios).map(|(file, scenario)| Keeper::open(&file, scenario));
+                let keepers = files.zip(&scenarios).map(|(file, scenario)| ParameterFile::open(&file, scenario));
                 Server::kept(&scenarios, self.system, keepers.collect::<Result<_, _>>()?)?
             }
             None => Server::new(&scenarios, self.system)?,
@@ -129,9 +131,9 @@ impl Serve {
         print(&format!("{}: {}", scenario.name, guide(&addresses, &ports.addresses()?, &server.systems())))?;
 
         let rate = match self {
-            Serve { lockstep: true, .. } => Rate::Lockstep,
-            Serve { fast: true, .. } => Rate::Times(0.0),
-            Serve { speed, .. } => Rate::Times(speed),
+            Serve { lockstep: true, .. } => TimeRate::Lockstep,
+            Serve { fast: true, .. } => TimeRate::Times(0.0),
+            Serve { speed, .. } => TimeRate::Times(speed),
         };
         let mut lines = Lines::of(BufReader::new(stdin()));
         let end = run(&mut server, &mut ports, rate, &mut lines, &stop, |line| {
@@ -139,7 +141,7 @@ impl Serve {
             let mut out = stdout().lock();
             let _ = writeln!(out, "{line}").and_then(|()| out.flush());
         });
-        Ok(ExitCode::from(if end == End::Stopped { INTERRUPTED } else { 0 }))
+        Ok(ExitCode::from(if end == RunEnd::Stopped { INTERRUPTED } else { 0 }))
     }
 
     fn addresses(&self) -> Result<Addresses, Failure> {

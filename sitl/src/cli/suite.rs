@@ -9,7 +9,7 @@ use afbc_campaign::compare::{self, Comparison};
 use afbc_campaign::random::NAME;
 use afbc_campaign::suite::{SUITES, Suite, parse};
 use afbc_reader::{BuiltIn, FileError};
-use afbc_report::suite::{self as report, Flown};
+use afbc_report::suite::{self as report, FlownSuite};
 use afbc_sim::contender::Contender;
 use clap::Args;
 use std::ffi::OsStr;
@@ -84,7 +84,7 @@ pub(super) fn run(
         let [begin, end] = report::markers(&suite.name);
         page::write(path, [&begin, &end], || {
             let comparisons = fly(suite, contenders, seeds, || Ok(()))?;
-            Ok(report::markdown(Flown { suite, comparisons: &comparisons }))
+            Ok(report::markdown(FlownSuite { suite, comparisons: &comparisons }))
         })?;
         return Ok(ExitCode::SUCCESS);
     }
@@ -94,7 +94,7 @@ pub(super) fn run(
         Ok(())
     })?;
     let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };
-    let flown = Flown { suite, comparisons: &comparisons };
+    let flown = FlownSuite { suite, comparisons: &comparisons };
     let written = report::write(&folder, flown)?;
     show(&folder, written.len(), *json, |out| report::json(out, flown), || report::table(flown))?;
     Ok(ExitCode::SUCCESS)

@@ -11,7 +11,7 @@ use afbc::Profile;
 use afbc_files::Error;
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::scenario::Scenario;
-use afbc_tune::{self as tune, Course, Found};
+use afbc_tune::{self as tune, SearchOptions, SearchResult};
 use afbc_vehicles::Vehicle;
 use clap::Args;
 use std::path::PathBuf;
@@ -84,7 +84,7 @@ impl Tune {
         let scenarios = self.scenarios.iter().map(Target::scenario).collect::<Result<Vec<_>, _>>()?;
         let from = self.from.as_ref().map(Target::scenario).transpose()?;
         let mut vehicles = self.vehicles.iter().map(|path| named(path)).collect::<Result<Vec<_>, _>>()?;
-        let course = Course { budget: self.budget as usize, step: self.step, seed: self.seed };
+        let course = SearchOptions { budget: self.budget as usize, step: self.step, seed: self.seed };
         if let Some(folder) = &self.fleet {
             let (laws, write) = (&self.contenders, self.write.as_deref());
             return Fleet { folder, laws, vehicles, course, flying: self.flying, write }.run();
@@ -136,7 +136,7 @@ impl Tune {
         if let Some(out) = &self.out {
             std::fs::write(out, report()?).map_err(|source| Error::Write { path: out.clone(), source })?;
         }
-        let Found { before, after, evaluations, .. } = &found;
+        let SearchResult { before, after, evaluations, .. } = &found;
         match &self.out {
             _ if self.json.json => json::print_value(&json::tuned(&found, &start.name, self.seed))?,
             Some(out) => print(&format!(

@@ -1,10 +1,12 @@
 //! A case: what happens, and what is expected.
 
-use crate::aloft::STATION;
-use crate::aloft::checker::{Bounds, End};
-use crate::aloft::session::{global, item};
+use crate::airborne::STATION;
+use crate::airborne::checker::{Bounds, End};
+use crate::airborne::session::{global, item};
 use afbc_guidance::FlightMode;
-use afbc_link::{Address, AttitudeAndThrust, Command, Datum, Height, MissionItem, Sticks, Target, Uplink};
+use afbc_link::{
+    Address, AttitudeAndThrust, Command, Datum, ExternalTarget, Height, ManualControl, MissionItem, Uplink,
+};
 use afbc_onboard::services::modes;
 
 /// What happens.
@@ -188,11 +190,11 @@ pub(crate) fn go_to(x: f32, y: f32, z: f32) -> Command {
 pub(crate) fn leaning() -> Uplink {
     let q = nalgebra::UnitQuaternion::from_euler_angles(0.0_f32, 0.15, 0.0);
     let attitude = [q.w, q.i, q.j, q.k];
-    Uplink::Target(Target::Attitude(AttitudeAndThrust { attitude, yaw_rate_rad_s: 0.0, thrust: 0.41 }))
+    Uplink::Target(ExternalTarget::Attitude(AttitudeAndThrust { attitude, yaw_rate_rad_s: 0.0, thrust: 0.41 }))
 }
 
 pub(crate) fn sticks(pitch: f32, throttle: f32) -> Uplink {
-    Uplink::Target(Target::Sticks(Sticks { roll: 0.0, pitch, throttle, yaw: 0.0 }))
+    Uplink::Target(ExternalTarget::Sticks(ManualControl { roll: 0.0, pitch, throttle, yaw: 0.0 }))
 }
 
 pub(crate) const AWAY: [[f32; 3]; 2] = [[9.0, 0.0, 3.0], [9.0, 9.0, 3.0]];

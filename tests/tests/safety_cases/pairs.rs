@@ -1,7 +1,7 @@
 //! Faults that meet.
 
 use super::case::*;
-use crate::aloft::{COMPANION, STATION, velocity};
+use crate::airborne::{COMPANION, STATION, velocity};
 use afbc_guidance::FlightMode;
 use afbc_link::{Command, Uplink};
 

@@ -1,9 +1,9 @@
 //! One fault at a time.
 
 use super::case::*;
-use crate::aloft::checker::CUTS;
-use crate::aloft::session::item;
-use crate::aloft::{COMPANION, STATION, place, velocity};
+use crate::airborne::checker::CUTS;
+use crate::airborne::session::item;
+use crate::airborne::{COMPANION, STATION, place, velocity};
 use afbc_guidance::FlightMode;
 use afbc_link::{Command, Uplink};
 

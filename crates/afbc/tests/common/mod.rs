@@ -10,7 +10,7 @@ use afbc::disturbance::DisturbanceObserver;
 use afbc::fuzzy::Membership;
 use afbc::reference::ReferenceModel;
 use afbc::{Limits, Profile, Safeguards, Settings, backstepping};
-use afbc_control::{Action, FlightController, Screened, Smoothing, Trace};
+use afbc_control::{Action, FlightController, Smoothing, Trace, Validated};
 use afbc_types::{Axis, Declaration, Declared, Inputs, Parameters, PerAxis, Setpoint, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -248,7 +248,7 @@ impl Stepped {
 /// Runs one step with a measurement.
 pub(crate) fn step<C: FlightController>(
     controller: &C,
-    memory: &mut Screened<C::Memory>,
+    memory: &mut Validated<C::Memory>,
     state: &State,
     setpoint: &Setpoint,
 ) -> Stepped {

@@ -1,7 +1,7 @@
 //! A vehicle with its sensors in still air, and the flights drawn from that.
 
 use super::change::Change;
-use super::flight::{Flight, Seen};
+use super::flight::{DrawnFlight, Seen};
 use super::path::{DURATION_S, Path};
 use super::power::{HEIGHT_M, Power};
 use crate::draw::mix;
@@ -51,7 +51,7 @@ impl<'a> Base<'a> {
     ///
     /// # Errors
     /// One line on what the vehicle cannot fly.
-    pub(super) fn flight(&self, seed: u64, number: u64) -> Result<Flight, FileError> {
+    pub(super) fn flight(&self, seed: u64, number: u64) -> Result<DrawnFlight, FileError> {
         let vehicle = self.vehicle;
         let of_vehicle = vehicle.name.bytes().fold(mix(seed), |hash, byte| mix(hash ^ u64::from(byte)));
         let bits = mix(of_vehicle.wrapping_add(number)) >> 11;
@@ -86,7 +86,7 @@ impl<'a> Base<'a> {
             FileError::whole(&vehicle.name, problem)
         })?;
         let vehicle = vehicle.name.clone();
-        Ok(Flight { seed, vehicle, number, path: kind, stands, speed_m_s, acceleration_m_s2, change, scenario })
+        Ok(DrawnFlight { seed, vehicle, number, path: kind, stands, speed_m_s, acceleration_m_s2, change, scenario })
     }
 }
 

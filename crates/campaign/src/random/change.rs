@@ -2,7 +2,7 @@
 
 use super::bisection::largest;
 use afbc_plant::noise::Noise;
-use afbc_plant::{Drag, Environment, Frame, ParameterChange, Payload, Quantity, RotorFault, Turbulence};
+use afbc_plant::{Drag, Environment, Frame, ParameterChange, Payload, PlantParameter, RotorFault, Turbulence};
 use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 use afbc_vehicles::Vehicle;
@@ -132,7 +132,7 @@ impl Change {
                 scenario.environment = Environment::calm(vehicle)?.with_payloads(vec![payload])?;
             }
             Change::Mass(factor) => {
-                let change = ParameterChange { quantity: Quantity::Mass, factor, start_s, end_s };
+                let change = ParameterChange { quantity: PlantParameter::Mass, factor, start_s, end_s };
                 scenario.environment = Environment::new(vehicle, vec![change], Vec::new())?;
             }
             Change::Rotor { rotor, efficiency } => {

@@ -27,7 +27,7 @@ impl Seen {
 
 /// A drawn flight.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Flight {
+pub struct DrawnFlight {
     /// Seed that it was drawn from.
     pub seed: u64,
     /// Name of the vehicle.

@@ -12,7 +12,7 @@ mod power;
 mod standing;
 
 pub use change::Change;
-pub use flight::{Flight, Seen};
+pub use flight::{DrawnFlight, Seen};
 pub use standing::{Difference, RESAMPLES, Score, Standing, is_level, standings};
 
 use crate::compare::{self, Outcome};
@@ -47,9 +47,9 @@ pub struct Random {
 
 /// A flight that was flown.
 #[derive(Clone, Debug)]
-pub struct Flown {
+pub struct FlownDraw {
     /// The flight.
-    pub flight: Flight,
+    pub flight: DrawnFlight,
     /// What became of each of its scenario's contenders.
     pub outcomes: Vec<Outcome>,
 }
@@ -59,7 +59,7 @@ impl Random {
     ///
     /// # Errors
     /// One line on what a vehicle cannot fly.
-    pub fn draw(&self) -> Result<Vec<Flight>, FileError> {
+    pub fn draw(&self) -> Result<Vec<DrawnFlight>, FileError> {
         let bases = self.vehicles.iter().map(|vehicle| Base::new(vehicle, self.seen));
         let bases = bases.collect::<Result<Vec<_>, _>>()?;
         let (bases, flights) = (bases.as_slice(), self.flights);
@@ -73,7 +73,7 @@ impl Random {
     ///
     /// # Errors
     /// As [`Random::draw`]; or one line on a gain or setting out of range.
-    pub fn under(&self, contenders: &[Contender], own: &[Contender]) -> Result<Vec<Flight>, FileError> {
+    pub fn under(&self, contenders: &[Contender], own: &[Contender]) -> Result<Vec<DrawnFlight>, FileError> {
         let mut flights = self.draw()?;
         flights.par_iter_mut().try_for_each(|flight| {
             compare::fly_under(&mut flight.scenario, contenders)?;
@@ -90,21 +90,21 @@ impl Random {
 ///
 /// # Errors
 /// The first parameter, gain or setting out of range.
-pub fn fly(flights: Vec<Flight>, progress: &(dyn Fn() + Sync)) -> Result<Vec<Flown>, OutOfRange> {
+pub fn fly(flights: Vec<DrawnFlight>, progress: &(dyn Fn() + Sync)) -> Result<Vec<FlownDraw>, OutOfRange> {
     let outcome = |scenario: &Scenario, contender: &Contender| {
         let run = Run::fly(scenario, contender, u64::MAX)?;
         progress();
         Ok(Outcome::of(scenario, &run))
     };
-    let flown = |flight: Flight| {
+    let flown = |flight: DrawnFlight| {
         let contenders = flight.scenario.contenders.par_iter();
         let outcomes = contenders.map(|contender| outcome(&flight.scenario, contender)).collect::<Result<_, _>>()?;
-        Ok(Flown { flight, outcomes })
+        Ok(FlownDraw { flight, outcomes })
     };
     flights.into_par_iter().map(flown).collect()
 }
 
-impl Flown {
+impl FlownDraw {
     /// Returns what its contenders are judged by.
     pub fn score(&self) -> Score {
         let rms_m = |outcome: &Outcome| outcome.lost.is_none().then(|| outcome.metrics.rmse.xyz().norm());

@@ -7,9 +7,10 @@ use crate::aid::Aid;
 use crate::errors::Coordinate;
 use crate::estimator::Estimator;
 use crate::horizon::{Expected, Horizon, Target};
-use crate::measurement::{Measurement, Timed};
+use crate::measurement::Measurement;
 use crate::memory::Memory;
 use crate::settings::Settings;
+use afbc_types::Stamped;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -92,7 +93,7 @@ fn rows(aid: Aid, memory: &Memory) -> Vec<V21> {
 
 /// Fuses until nothing waits.
 fn fuse(memory: &mut Memory, value: Measurement) {
-    memory.offer(&Timed { value, at_us: NOW_US });
+    memory.offer(&Stamped { value, at_us: NOW_US });
     memory.still_us = NOW_US;
     for _ in 0..20 {
         estimator().fuse(memory, NOW_US);
@@ -209,7 +210,7 @@ proptest! {
             let mut memory = memory;
             let by = Vector3::from_fn(|k, _| if k == c { (sigmas * variance.sqrt()) as f32 } else { 0.0 });
             let value = Measurement::Position { position_m: place + by, sigma_m: SIGMA as f32 };
-            memory.offer(&Timed { value, at_us: NOW_US - u64::from(tau_ms) * 1000 });
+            memory.offer(&Stamped { value, at_us: NOW_US - u64::from(tau_ms) * 1000 });
             for _ in 0..6 {
                 estimator().fuse(&mut memory, NOW_US);
             }
@@ -224,7 +225,7 @@ fn a_receivers_variance_is_divided() {
     let settings = Settings { gnss_noise_m: 0.5, gnss_slow_s: 100.0, ..Settings::DEFAULT };
     let estimator = Estimator::new(settings).unwrap();
     let mut memory = memory(&linear(M21::identity() * 0.01), &V3::zeros());
-    let fix = |at_us, sigma: f32| Timed {
+    let fix = |at_us, sigma: f32| Stamped {
         value: Measurement::Gnss {
             position_m: Vector3::new(3.0, 4.0, 5.0),
             velocity_m_s: Vector3::new(1.0, -2.0, 0.5),

@@ -7,12 +7,13 @@ use crate::covariance::{Covariance, angle_variance, largest_sigma};
 use crate::geodetic::Origin;
 use crate::history::{History, Past};
 use crate::imu::{LowPass, MISSING_US, Monitor, Smoothed};
-use crate::measurement::{ImuSample, Measurement, Timed};
+use crate::measurement::{ImuSample, Measurement};
 use crate::memory::Memory;
 use crate::nominal::Nominal;
 use crate::queue::Queue;
 use crate::rotation::{about_z, difference, identity, levelling, matrix, normalized, renormalized, small, twist};
 use crate::settings::Settings;
+use afbc_types::Stamped;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -135,14 +136,14 @@ proptest! {
         for (pushes, at_us, limit_us) in events {
             if pushes {
                 let value = Measurement::Heading { heading_rad: model.len() as f32, sigma_rad: 0.1 };
-                let timed = Timed { value, at_us };
+                let timed = Stamped { value, at_us };
                 prop_assert_eq!(queue.push(&timed), model.len() == 8);
                 if model.len() == 8 {
                     model.remove(0);
                 }
                 model.push(timed);
             } else {
-                let due = model.iter().position(|timed: &Timed<Measurement>| timed.at_us <= limit_us);
+                let due = model.iter().position(|timed: &Stamped<Measurement>| timed.at_us <= limit_us);
                 let taken = queue.take(|at_us| at_us <= limit_us);
                 prop_assert_eq!(taken, due.map(|due| model.remove(due)));
             }
@@ -407,7 +408,7 @@ fn rough_samples_count_for_a_while() {
     assert_eq!((memory.rough, memory.roughened_since(1_600_000)), ((0.875, 3.5), (0.125, 0.5)));
     // An implausible one is counted, and a ninth pushes the first out.
     for heading_rad in [f32::NAN, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0] {
-        memory.offer(&Timed { value: Measurement::Heading { heading_rad, sigma_rad: 0.1 }, at_us: 5 });
+        memory.offer(&Stamped { value: Measurement::Heading { heading_rad, sigma_rad: 0.1 }, at_us: 5 });
     }
     assert_eq!((memory.dropped().implausible, memory.dropped().crowded, memory.queue.waiting()), (1, 1, 8));
     // Standing: as told, or unmoved.

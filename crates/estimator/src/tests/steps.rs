@@ -7,11 +7,12 @@ use crate::errors::Coordinate;
 use crate::estimate::{Resets, Validity};
 use crate::estimator::Estimator;
 use crate::horizon::{Expected, Horizon, Target};
-use crate::measurement::{ImuSample, Measurement, Timed};
+use crate::measurement::{ImuSample, Measurement};
 use crate::memory::Memory;
 use crate::queue::parts;
 use crate::rest::Rest;
 use crate::settings::Settings;
+use afbc_types::Stamped;
 use nalgebra::{Matrix3, Quaternion, Vector3};
 use proptest::prelude::*;
 
@@ -32,7 +33,7 @@ fn usual() -> M21 {
 
 /// Hands over at `at_us`, and fuses until nothing waits, at `now_us`.
 fn offer(estimator: &Estimator, memory: &mut Memory, value: Measurement, at_us: u64, now_us: u64) {
-    memory.offer(&Timed { value, at_us });
+    memory.offer(&Stamped { value, at_us });
     memory.still_us = now_us;
     for _ in 0..16 {
         estimator.fuse(memory, now_us);

@@ -1,7 +1,7 @@
 //! What every estimate must be, and flights of a path with something changed.
 
 use super::{Flight, ICM, Path, Sensors, double, fly, rest, settings};
-use afbc_estimator::{Estimate, ImuSample, Measurement, Memory, Timed};
+use afbc_estimator::{Estimate, ImuSample, Measurement, Memory, Stamped};
 use nalgebra::SMatrix;
 
 /// Panics unless everything said is finite and the covariance symmetric and positive.
@@ -64,7 +64,7 @@ pub fn flown(
     sensors: Sensors,
     seconds: usize,
     imu: impl Fn(usize, &mut ImuSample) -> bool,
-    deliver: impl Fn(usize, &mut Timed<Measurement>) -> bool,
+    deliver: impl Fn(usize, &mut Stamped<Measurement>) -> bool,
     mut check: impl FnMut(usize, &Estimate, &Flight<'_>),
 ) {
     let truth = fly(path, seconds as f64);

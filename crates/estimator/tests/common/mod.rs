@@ -3,7 +3,7 @@
 
 pub mod checks;
 
-use afbc_estimator::{Estimate, Estimator, ImuSample, Measurement, Memory, Settings, Timed};
+use afbc_estimator::{Estimate, Estimator, ImuSample, Measurement, Memory, Settings, Stamped};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -230,7 +230,7 @@ pub struct Flight<'a> {
     /// Index of the next moment.
     pub now: usize,
     /// Measurements under way, with the millisecond of their arrival.
-    under_way: Vec<(usize, Timed<Measurement>)>,
+    under_way: Vec<(usize, Stamped<Measurement>)>,
     /// The last sample.
     pub sample: ImuSample,
 }
@@ -277,7 +277,7 @@ impl<'a> Flight<'a> {
         let moment = self.truth[self.now];
         let late_ms = self.late_ms;
         let mut send = |delay_ms: f64, value| {
-            self.under_way.push((self.now + (delay_ms + late_ms).round() as usize, Timed { value, at_us }));
+            self.under_way.push((self.now + (delay_ms + late_ms).round() as usize, Stamped { value, at_us }));
         };
         if let Some((position, attitude)) = self.sensors.tracker.filter(|_| self.now % 10 == 3) {
             let r = exp(&self.noise.vector(attitude)) * moment.r;
@@ -327,7 +327,7 @@ impl<'a> Flight<'a> {
     pub fn step_with(
         &mut self,
         imu: impl FnOnce(&mut ImuSample) -> bool,
-        mut deliver: impl FnMut(&mut Timed<Measurement>) -> bool,
+        mut deliver: impl FnMut(&mut Stamped<Measurement>) -> bool,
     ) -> Estimate {
         self.sense();
         let now_us = self.now_us();

@@ -2,12 +2,12 @@
 //! times, to the tick.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
+use crate::frozen_tracker::{FrozenTrackerCheck, STANDS_SHARE, TRAVEL_M, TURN_RAD, WINDOW_US};
 use crate::landing::{
     CARRIED_US, CARRY_SHARE, FROZEN_US, HOVER_US, LEFT_M, LEFT_M_S, LandDetector, SINKS_M_S, STILL_M_S, STILL_US,
     USUAL_S,
 };
 use crate::tumble::{LOST_US, SPIN_RAD_S, TILT_COSINE_MIN, Tumble, UPRIGHT_US};
-use crate::witness::{STANDS_SHARE, TRAVEL_M, TURN_RAD, WINDOW_US, Witness};
 use afbc_types::State;
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -142,7 +142,7 @@ fn somewhere() -> State {
 /// contradict.
 fn contradicts(twist: &State, moves: f32, turns: f32, period_us: u32, windows: u32) -> bool {
     let (begin, begin_us) = (somewhere(), 7_000_000_u64);
-    let mut witness = Witness::new(&begin, begin_us);
+    let mut witness = FrozenTrackerCheck::new(&begin, begin_us);
     (1..=windows * WINDOW_US / period_us).any(|index| {
         let after_us = index * period_us;
         let s = after_us as f32 * 1e-6;
@@ -199,7 +199,7 @@ fn a_pose_must_follow_the_twist() {
 /// A heading that changes does not make up for roll and pitch that stand.
 #[test]
 fn only_roll_and_pitch_are_compared() {
-    let mut witness = Witness::new(&somewhere(), 0);
+    let mut witness = FrozenTrackerCheck::new(&somewhere(), 0);
     let found = (1..=250_u64).any(|ms| {
         let mut state = State { rates_rad_s: Vector3::new(1.0, 0.0, 0.0), ..somewhere() };
         state.attitude_rad.z += ms as f32 * 1e-3;
@@ -213,13 +213,13 @@ fn only_roll_and_pitch_are_compared() {
 fn a_gap_begins_a_window() {
     let fast = State { velocity_m_s: Vector3::new(2.0, 0.0, 0.0), ..somewhere() };
     let window_us = u64::from(WINDOW_US);
-    assert!(Witness::new(&fast, 5).contradicts(&fast, 5 + window_us));
-    let mut witness = Witness::new(&fast, 5);
+    assert!(FrozenTrackerCheck::new(&fast, 5).contradicts(&fast, 5 + window_us));
+    let mut witness = FrozenTrackerCheck::new(&fast, 5);
     assert!(!witness.contradicts(&fast, 6 + window_us), "a gap");
     assert!(!witness.contradicts(&fast, 5 + 2 * window_us), "not yet a window since");
     assert!(witness.contradicts(&fast, 6 + 2 * window_us));
     // What has stood in one window may move in the next.
-    let mut witness = Witness::new(&somewhere(), 0);
+    let mut witness = FrozenTrackerCheck::new(&somewhere(), 0);
     assert!(witness.contradicts(&fast, window_us));
     let moved = State { position_m: somewhere().position_m + Vector3::new(0.5, 0.0, 0.0), ..fast };
     assert!(!witness.contradicts(&moved, 2 * window_us));

@@ -4,10 +4,12 @@
 
 use super::std::vec;
 use crate::Stamped;
-use crate::blind::{Blind, DESCENT_THRUST, HOLD_RAD_S, INNOVATION_MAX_RAD_S, LAG_S, Reckoning, TRIM_S};
+use crate::dead_reckoning::{
+    DESCENT_THRUST, DeadReckoning, HOLD_RAD_S, INNOVATION_MAX_RAD_S, LAG_S, Reckoning, TRIM_S,
+};
 use crate::descent::{Descent, Drift, SINK_M_S};
 use crate::observer::{
-    ATTITUDE_RAD_S, LATE_US, OUTLIER, OUTLIERS_MAX, Observer, POSITION_RAD_S, PUSH_MAX_M_S2, SIGMAS_MAX, TRIM_SHARE,
+    ATTITUDE_RAD_S, LATE_US, OUTLIER, OUTLIERS_MAX, POSITION_RAD_S, PUSH_MAX_M_S2, PoseObserver, SIGMAS_MAX, TRIM_SHARE,
 };
 use afbc_types::{Inputs, Parameters, Pose, PoseSigmas, State};
 use nalgebra::{Rotation3, UnitQuaternion, Vector2, Vector3};
@@ -20,8 +22,8 @@ fn parameters() -> Parameters<f32> {
     Parameters { inertia_kg_m2: Vector3::new(0.004, 0.007, 0.012), arm_m: 0.2, ..Parameters::PAPER.to_f32() }
 }
 
-fn blind() -> Blind {
-    Blind::new(&parameters(), DT_S)
+fn dead_reckoning() -> DeadReckoning {
+    DeadReckoning::new(&parameters(), DT_S)
 }
 
 fn weight_n() -> f32 {
@@ -64,7 +66,7 @@ fn any_state() -> impl Strategy<Value = State> {
 fn a_reckoning_begins_as_measured_and_trimmed_for_the_weight() {
     let mut state = State { rates_rad_s: Vector3::new(0.3, -0.4, 0.5), ..State::default() };
     state.attitude_rad = Vector3::new(0.1, -0.2, 1.0);
-    let reckoning = blind().start(&state);
+    let reckoning = dead_reckoning().start(&state);
     let (angle_rad, rate_rad_s) = (Vector2::new(0.1, -0.2), Vector2::new(0.3, -0.4));
     let acting_n = Vector2::zeros();
     assert_eq!(reckoning, Reckoning { held_rad: angle_rad, angle_rad, rate_rad_s, acting_n, trim: hover() });
@@ -76,12 +78,12 @@ proptest! {
     fn dead_reckoning_solves_its_equation(
         start in any_state(), asked_n in pair(0.5), trim_n in pair(0.3), ticks in 1..300u32,
     ) {
-        let blind = blind();
-        let mut reckoning = blind.start(&start);
+        let dead_reckoning = dead_reckoning();
+        let mut reckoning = dead_reckoning.start(&start);
         (reckoning.trim.roll_n, reckoning.trim.pitch_n) = (trim_n.x, trim_n.y);
         let applied = Inputs { roll_n: asked_n.x, pitch_n: asked_n.y, yaw_n: 9.0, thrust_n: 7.0 };
         for _ in 0..ticks {
-            blind.advance(&mut reckoning, &applied);
+            dead_reckoning.advance(&mut reckoning, &applied);
         }
         let (t, lag) = (ticks as f32 * DT_S, LAG_S);
         let lost = 1.0 - (-t / lag).exp();
@@ -106,11 +108,11 @@ proptest! {
     fn a_measurement_corrects_the_trim_by_what_was_missed(
         start in any_state(), measured in any_state(), trim_n in pair(0.3), missed in pair(0.3),
     ) {
-        let blind = blind();
-        let mut reckoning = blind.start(&start);
+        let dead_reckoning = dead_reckoning();
+        let mut reckoning = dead_reckoning.start(&start);
         (reckoning.trim.roll_n, reckoning.trim.pitch_n, reckoning.trim.yaw_n) = (trim_n.x, trim_n.y, 0.02);
         reckoning.rate_rad_s = measured.rates_rad_s.xy() - missed;
-        blind.measure(&mut reckoning, &measured);
+        dead_reckoning.measure(&mut reckoning, &measured);
         let angles = measured.attitude_rad.xy();
         prop_assert_eq!((reckoning.angle_rad, reckoning.held_rad), (angles, angles));
         prop_assert_eq!(reckoning.rate_rad_s, measured.rates_rad_s.xy());
@@ -124,11 +126,11 @@ proptest! {
     /// Thrust and yaw of the trim tend to the inputs with a time constant of a second, within limits.
     #[test]
     fn thrust_and_yaw_of_the_trim_are_means(thrust in -1.0..4.0f32, yaw in -0.3..0.3f32, ticks in 1..3000u32) {
-        let (blind, weight_n) = (blind(), weight_n());
-        let mut reckoning = blind.start(&State::default());
+        let (dead_reckoning, weight_n) = (dead_reckoning(), weight_n());
+        let mut reckoning = dead_reckoning.start(&State::default());
         let applied = Inputs { thrust_n: thrust * weight_n, yaw_n: yaw * weight_n, roll_n: 0.4, pitch_n: -0.4 };
         for _ in 0..ticks {
-            blind.trim(&mut reckoning, &applied);
+            dead_reckoning.trim(&mut reckoning, &applied);
         }
         let share = 1.0 - (-(ticks as f32) * DT_S / TRIM_S).exp();
         let thrust_n = weight_n * (1.0 + (thrust.clamp(0.0, 2.0) - 1.0) * share);
@@ -144,8 +146,8 @@ proptest! {
     fn a_blind_vehicle_is_held_critically_damped(
         start in any_state(), trim_n in pair(0.3), yaw_n in -0.1..0.1f32, held in pair(0.3), descends in any::<bool>(),
     ) {
-        let blind = blind();
-        let mut reckoning = blind.start(&start);
+        let dead_reckoning = dead_reckoning();
+        let mut reckoning = dead_reckoning.start(&start);
         reckoning.trim = Inputs { thrust_n: 3.0, roll_n: trim_n.x, pitch_n: trim_n.y, yaw_n };
         reckoning.held_rad = held;
         let to = if descends { Vector2::zeros() } else { held };
@@ -153,7 +155,7 @@ proptest! {
         let (off, v, w) = (angle - to, rate, HOLD_RAD_S);
         for tick in 0..500 {
             (reckoning.angle_rad, reckoning.rate_rad_s) = (angle, rate);
-            let inputs = if descends { blind.descend(&reckoning) } else { blind.coast(&reckoning) };
+            let inputs = if descends { dead_reckoning.descend(&reckoning) } else { dead_reckoning.coast(&reckoning) };
             prop_assert_eq!(inputs.yaw_n, yaw_n);
             prop_assert_eq!(inputs.thrust_n, if descends { 3.0 * DESCENT_THRUST } else { 3.0 });
             let excess_n = Vector2::new(inputs.roll_n, inputs.pitch_n) - trim_n;
@@ -169,7 +171,7 @@ proptest! {
     /// Between two measurements only roll, pitch and their rates are reckoned.
     #[test]
     fn between_measurements_roll_and_pitch_are_reckoned(state in any_state(), other in any_state()) {
-        let between = blind().start(&other).between(&state);
+        let between = dead_reckoning().start(&other).between(&state);
         let mix = |first: Vector3<f32>, second: Vector3<f32>| Vector3::new(second.x, second.y, first.z);
         let attitude_rad = mix(state.attitude_rad, other.attitude_rad);
         let rates_rad_s = mix(state.rates_rad_s, other.rates_rad_s);
@@ -310,13 +312,13 @@ proptest! {
         trim_share in 0.2..3.0f32,
         trim in triple(0.03),
     ) {
-        let blind = blind();
+        let dead_reckoning = dead_reckoning();
         let start = State { attitude_rad: Vector3::new(start.attitude_rad.x, start.attitude_rad.y, yaw_rad), ..start };
         let weight_n = weight_n();
         let trim = Inputs { thrust_n: trim_share * weight_n, roll_n: trim.x, pitch_n: trim.y, yaw_n: trim.z };
         let first = Inputs { thrust_n: 1.1 * weight_n, yaw_n: 0.05, ..Inputs::default() };
-        let mut reckoning = Reckoning { trim, ..blind.start(&start) };
-        let mut observer = Observer::new(&start, &first, 0);
+        let mut reckoning = Reckoning { trim, ..dead_reckoning.start(&start) };
+        let mut observer = PoseObserver::new(&start, &first, 0);
         let mut truth = Truth {
             position_m: start.position_m.cast(),
             velocity_m_s: start.velocity_m_s.cast(),
@@ -329,8 +331,8 @@ proptest! {
             let [[roll_n, pitch_n, yaw_n]] = axes.data.0;
             let applied = Inputs { thrust_n: thrust * weight_n, roll_n, pitch_n, yaw_n: 3.0 * yaw_n };
             for _ in 0..40 {
-                observer.advance(&blind, &reckoning, &applied);
-                blind.advance(&mut reckoning, &applied);
+                observer.advance(&dead_reckoning, &reckoning, &applied);
+                dead_reckoning.advance(&mut reckoning, &applied);
                 truth.fly(&applied, &trim);
             }
         }
@@ -353,17 +355,17 @@ proptest! {
     fn a_late_pose_is_compared_with_the_prediction_for_its_time(
         start in any_state(), thrust in 0.6..1.5f32, late_ms in 0..=u64::from(LATE_US / 1000), axes in triple(0.05),
     ) {
-        let blind = blind();
+        let dead_reckoning = dead_reckoning();
         let trim = hover();
         let applied = Inputs { thrust_n: thrust * weight_n(), roll_n: axes.x, pitch_n: axes.y, yaw_n: axes.z };
-        let mut reckoning = Reckoning { trim, acting_n: axes.xy(), ..blind.start(&start) };
+        let mut reckoning = Reckoning { trim, acting_n: axes.xy(), ..dead_reckoning.start(&start) };
         // Rotors that give what is asked already: accelerations are constant but for the rotation.
-        let mut observer = Observer::new(&start, &applied, 0);
+        let mut observer = PoseObserver::new(&start, &applied, 0);
         let mut was = vec![start];
         let now_ms = 60;
         for _ in 0..now_ms {
-            observer.advance(&blind, &reckoning, &applied);
-            blind.advance(&mut reckoning, &applied);
+            observer.advance(&dead_reckoning, &reckoning, &applied);
+            dead_reckoning.advance(&mut reckoning, &applied);
             was.push(observer.state().expect("plausible"));
         }
         let before = observer.state().expect("plausible");
@@ -380,14 +382,14 @@ proptest! {
     /// What a pose corrects is the share of its difference that the page gives, for any time between two poses, and for
     /// a late one what the velocity's correction has meant since.
     #[test]
-    fn a_pose_corrects_by_the_fading_memorys_shares(
+    fn a_pose_corrects_by_the_shares_of_the_fading_memory(
         start in any_state(), off_m in triple(0.015), turn_rad in triple(0.015), flipped in any::<bool>(),
         since_us in 200..60_000u64, late_us in 0..=u64::from(LATE_US),
     ) {
-        let blind = blind();
+        let dead_reckoning = dead_reckoning();
         let mut start = State { rates_rad_s: Vector3::zeros(), velocity_m_s: Vector3::zeros(), ..start };
         start.attitude_rad = Vector3::new(0.0, 0.0, start.attitude_rad.z);
-        let mut observer = Observer::new(&start, &hover(), 100_000);
+        let mut observer = PoseObserver::new(&start, &hover(), 100_000);
         let at_us = 100_000 + since_us;
         let turn = UnitQuaternion::from_scaled_axis(turn_rad);
         let attitude = start.quaternion() * turn;
@@ -411,7 +413,7 @@ proptest! {
         prop_assert!(angle_between(&seen, &expected) < 2e-4, "{seen:?}, not {expected:?}");
         // d shows in the next step, beside what the small tilt does.
         let push = off_m * ((1.0 - 1.0 / (1.0 + POSITION_RAD_S * t)).powi(3) / (t * t));
-        observer.advance(&blind, &blind.start(&start), &hover());
+        observer.advance(&dead_reckoning, &dead_reckoning.start(&start), &hover());
         let tilt = observer.state().expect("plausible").quaternion() * Vector3::z() - Vector3::z();
         let change = (observer.state().expect("plausible").velocity_m_s - seen.velocity_m_s) / DT_S;
         let expected = push + tilt * parameters().gravity_m_s2;
@@ -426,7 +428,7 @@ fn an_outlier_counts_little_until_it_repeats() {
     let (period_us, hold) = (10_000_u64, State::default());
     let most = OUTLIER.0 + OUTLIER.1 * period_us as f32 * 1e-6;
     let after = |offs: &[State]| {
-        let mut observer = Observer::new(&hold, &hover(), 0);
+        let mut observer = PoseObserver::new(&hold, &hover(), 0);
         for (index, off) in offs.iter().enumerate() {
             let now_us = (index as u64 + 1) * period_us;
             observer.correct(&pose_of(off, now_us), now_us);
@@ -469,8 +471,8 @@ fn an_outlier_counts_little_until_it_repeats() {
 /// Whatever pushes the vehicle counts up to a limit, along each axis.
 #[test]
 fn the_push_is_limited() {
-    let (blind, hold) = (blind(), State::default());
-    let mut observer = Observer::new(&hold, &hover(), 0);
+    let (dead_reckoning, hold) = (dead_reckoning(), State::default());
+    let mut observer = PoseObserver::new(&hold, &hover(), 0);
     for index in 1..200u64 {
         // Always ahead of the vehicle by what is no outlier.
         let mut ahead = observer.state().expect("plausible");
@@ -478,7 +480,7 @@ fn the_push_is_limited() {
         observer.correct(&pose_of(&ahead, index * 10_000), index * 10_000);
     }
     let before = observer.state().expect("plausible").velocity_m_s;
-    observer.advance(&blind, &blind.start(&hold), &hover());
+    observer.advance(&dead_reckoning, &dead_reckoning.start(&hold), &hover());
     let change = (observer.state().expect("plausible").velocity_m_s - before) / DT_S;
     let limit = PUSH_MAX_M_S2;
     assert!((change - Vector3::new(limit, -limit, limit)).amax() < 0.05 * limit, "{change:?}");
@@ -489,15 +491,15 @@ fn poses_that_are_late_unsure_old_or_repeated_are_not_used() {
     let sigmas = |position_m, attitude_rad| PoseSigmas { position_m, attitude_rad };
     let at = |sigmas: PoseSigmas| Stamped { value: Pose { sigmas, ..Pose::default() }, at_us: 1_000_000 };
     let now_us = 1_000_000 + u64::from(LATE_US);
-    assert!(Observer::takes(&at(PoseSigmas::UNKNOWN), now_us));
-    assert!(!Observer::takes(&at(PoseSigmas::UNKNOWN), now_us + 1), "late");
-    assert!(!Observer::takes(&at(PoseSigmas::UNKNOWN), 999_999), "from the future");
+    assert!(PoseObserver::takes(&at(PoseSigmas::UNKNOWN), now_us));
+    assert!(!PoseObserver::takes(&at(PoseSigmas::UNKNOWN), now_us + 1), "late");
+    assert!(!PoseObserver::takes(&at(PoseSigmas::UNKNOWN), 999_999), "from the future");
     let (most_m, most_rad) = SIGMAS_MAX;
-    assert!(Observer::takes(&at(sigmas(Some(most_m), Some(most_rad))), now_us));
-    assert!(!Observer::takes(&at(sigmas(Some(most_m * 1.01), Some(most_rad))), now_us), "position");
-    assert!(!Observer::takes(&at(sigmas(None, Some(most_rad * 1.01))), now_us), "attitude");
+    assert!(PoseObserver::takes(&at(sigmas(Some(most_m), Some(most_rad))), now_us));
+    assert!(!PoseObserver::takes(&at(sigmas(Some(most_m * 1.01), Some(most_rad))), now_us), "position");
+    assert!(!PoseObserver::takes(&at(sigmas(None, Some(most_rad * 1.01))), now_us), "attitude");
 
-    let mut observer = Observer::new(&State::default(), &hover(), 500_000);
+    let mut observer = PoseObserver::new(&State::default(), &hover(), 500_000);
     let moved = Pose { position_m: Vector3::new(0.01, 0.0, 0.0), ..Pose::default() };
     let pose = |at_us| Stamped { value: moved, at_us };
     assert!(observer.is_news(&pose(500_001)) && !observer.is_news(&pose(500_000)) && !observer.is_news(&pose(1)));

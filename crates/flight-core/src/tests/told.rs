@@ -3,11 +3,14 @@
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use super::std::vec::Vec;
-use crate::blind::{Blind, DESCENT_THRUST};
+use crate::dead_reckoning::{DESCENT_THRUST, DeadReckoning};
 use crate::descent::SINK_M_S;
 use crate::landing::{STILL_US, USUAL_S};
 use crate::supervisor::{COAST_US, DESCEND_US, GIVE_UP_US};
-use crate::{ArmingLimits, Asked, End, Inbox, Mode, Outcome, Refusal, Request, Stamped, Vehicle, VehicleMemory};
+use crate::{
+    ArmingLimits, EndReason, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TickOutcome,
+    TicketedRequest,
+};
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_types::{Inputs, Parameters, Pose, PoseSigmas, RotorForces, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
@@ -59,8 +62,8 @@ impl FlightController for Notes {
 }
 
 struct Bench {
-    vehicle: Vehicle<Notes>,
-    memory: VehicleMemory<Noted>,
+    vehicle: FlightCore<Notes>,
+    memory: FlightCoreMemory<Noted>,
     inbox: Inbox,
     now_us: u64,
 }
@@ -89,11 +92,11 @@ impl Bench {
         let parameters = Parameters::PAPER.to_f32();
         let law = Notes { mixer: Mixer::new(parameters, 3.0).expect("valid"), asks };
         let limits = ArmingLimits { setpoint_distance_max_m: 100.0, ..ArmingLimits::default() };
-        let vehicle = Vehicle::new(parameters, limits, law).expect("valid");
-        Bench { vehicle, memory: VehicleMemory::default(), inbox: Inbox::EMPTY, now_us: 0 }
+        let vehicle = FlightCore::new(parameters, limits, law).expect("valid");
+        Bench { vehicle, memory: FlightCoreMemory::default(), inbox: Inbox::EMPTY, now_us: 0 }
     }
 
-    fn tick(&mut self, put: impl FnOnce(&mut Inbox, u64)) -> Outcome {
+    fn tick(&mut self, put: impl FnOnce(&mut Inbox, u64)) -> TickOutcome {
         self.now_us += 1000;
         put(&mut self.inbox, self.now_us);
         self.inbox.put_setpoint(Stamped { value: target(), at_us: self.now_us });
@@ -101,29 +104,29 @@ impl Bench {
     }
 
     /// Runs a tick in which the link brings the state of so long ago.
-    fn linked(&mut self, age_us: u64) -> Outcome {
+    fn linked(&mut self, age_us: u64) -> TickOutcome {
         self.tick(|inbox, now_us| put_linked(inbox, now_us - age_us))
     }
 
     /// Runs a tick with an estimate of the vehicle's own.
-    fn own(&mut self) -> Outcome {
+    fn own(&mut self) -> TickOutcome {
         self.tick(|inbox, now_us| inbox.locate(Stamped { value: at(now_us), at_us: now_us }))
     }
 
     /// Runs a tick with an estimate that does not know where it is.
-    fn adrift(&mut self, value: State) -> Outcome {
+    fn adrift(&mut self, value: State) -> TickOutcome {
         self.tick(|inbox, at_us| inbox.put_adrift(Some(Stamped { value, at_us }), Refusal::PositionUnknown))
     }
 
     /// Runs a tick with the pose of so long ago.
-    fn posed(&mut self, age_us: u64) -> Outcome {
+    fn posed(&mut self, age_us: u64) -> TickOutcome {
         self.tick(|inbox, now_us| {
             let at_us = now_us - age_us;
             inbox.put_pose(Stamped { value: Pose::of(&at(at_us), PoseSigmas::UNKNOWN), at_us });
         })
     }
 
-    fn nothing(&mut self) -> Outcome {
+    fn nothing(&mut self) -> TickOutcome {
         self.tick(|_, _| {})
     }
 
@@ -136,7 +139,7 @@ impl Bench {
             }
         };
         run(1500);
-        assert!(bench.inbox.request(Asked { request: Request::Arm, ticket: 0 }));
+        assert!(bench.inbox.request(TicketedRequest { request: Request::Arm, ticket: 0 }));
         for _ in 0..1500 {
             let _ = if own { bench.own() } else { bench.linked(0) };
         }
@@ -200,16 +203,16 @@ fn late_states_are_carried_on_to_the_present() {
 fn between_states_roll_and_pitch_are_reckoned() {
     for own in [false, true] {
         let mut bench = Bench::flying(asks(1.0), own);
-        let (blind, given) = (Blind::new(&Parameters::PAPER.to_f32(), 1e-3), asks(1.0));
+        let (dead_reckoning, given) = (DeadReckoning::new(&Parameters::PAPER.to_f32(), 1e-3), asks(1.0));
         let last = at(bench.now_us);
         // Inputs constant for long: the rotors give them, and the trim has learnt what the constant rates say.
-        let mut reckoning = blind.start(&last);
+        let mut reckoning = dead_reckoning.start(&last);
         reckoning.acting_n = nalgebra::Vector2::new(given.roll_n, given.pitch_n);
         let steps = bench.steps();
         for age_ms in 1..=COAST_US / 1000 {
             let outcome = bench.nothing();
             assert_eq!((outcome.mode, outcome.health.state_age_us), (Mode::Flying, age_ms * 1000));
-            blind.advance(&mut reckoning, &given);
+            dead_reckoning.advance(&mut reckoning, &given);
             let (state, _) = bench.told();
             let there = at(bench.now_us);
             let expected = State {
@@ -361,7 +364,7 @@ fn a_vehicle_adrift_lands_by_its_thrust_or_gives_up() {
         assert_eq!(bench.adrift(fast).ended, None, "carried");
     }
     let ended = (1..5000).find_map(|ms| bench.nothing().ended.map(|end| (ms, end)));
-    assert_eq!(ended, Some((GIVE_UP_US / 1000 + 1, End::StateLost)));
+    assert_eq!(ended, Some((GIVE_UP_US / 1000 + 1, EndReason::StateLost)));
 
     let mut bench = Bench::flying(asks(0.2), true);
     let (mut ms, ended) = (
@@ -374,14 +377,14 @@ fn a_vehicle_adrift_lands_by_its_thrust_or_gives_up() {
         },
     );
     ms += bench.now_us / 1000 - 3000;
-    assert_eq!(ended, End::Landed);
+    assert_eq!(ended, EndReason::Landed);
     // A second without thrust, at the latest when it descends; the usual thrust is that of the weight.
     assert!(ms <= u64::from(DESCEND_US + STILL_US) / 1000 + 30 && USUAL_S > 1.0, "{ms} ms");
     // On its side it is lost.
     let mut bench = Bench::flying(asks(1.0), true);
     let over = State { attitude_rad: Vector3::new(2.0, 0.0, 0.0), ..State::default() };
     let ended = (0..3000).find_map(|_| bench.adrift(over).ended);
-    assert_eq!(ended, Some(End::Tumbled));
+    assert_eq!(ended, Some(EndReason::Tumbled));
 }
 
 /// Poses count once states are stale, and only then; the motion that is observed begins as the last state said, and a
@@ -440,7 +443,7 @@ fn poses_replace_an_estimate_at_once() {
     assert!(!bench.nothing().health.observed, "it was replaced");
 
     // A disarmed vehicle observes nothing.
-    assert!(bench.inbox.request(Asked { request: Request::Kill, ticket: 0 }));
+    assert!(bench.inbox.request(TicketedRequest { request: Request::Kill, ticket: 0 }));
     let _ = bench.own();
     (0..50).for_each(|_| assert!(!bench.posed(4000).health.observed));
 }
@@ -472,15 +475,15 @@ fn after_a_flight_its_memory_remains_and_no_trace() {
     let _ = bench.nothing();
     let trace = bench.memory.trace::<Notes, 4>();
     assert_eq!(trace.inputs.thrust_n, bench.steps() as f32);
-    assert!(bench.inbox.request(Asked { request: Request::Kill, ticket: 0 }));
-    assert_eq!(bench.linked(0).ended, Some(End::Killed));
+    assert!(bench.inbox.request(TicketedRequest { request: Request::Kill, ticket: 0 }));
+    assert_eq!(bench.linked(0).ended, Some(EndReason::Killed));
     assert!(!bench.memory.airborne() && bench.steps() > 1000);
     assert_eq!(bench.memory.trace::<Notes, 4>(), Trace::default());
     assert!(!bench.linked(0).health.rate.clock_failed);
     bench.memory.distrust_clock();
     assert!(bench.linked(0).health.rate.clock_failed);
-    assert_eq!(VehicleMemory::<Noted>::default().control(), None);
-    assert_eq!(VehicleMemory::<Noted>::default().state(), None);
+    assert_eq!(FlightCoreMemory::<Noted>::default().control(), None);
+    assert_eq!(FlightCoreMemory::<Noted>::default().state(), None);
 
     // Killed while blind: no trace either.
     let mut bench = Bench::flying(asks(1.0), false);
@@ -488,7 +491,7 @@ fn after_a_flight_its_memory_remains_and_no_trace() {
         let _ = bench.nothing();
     }
     assert_ne!(bench.memory.trace::<Notes, 4>(), Trace::default());
-    assert!(bench.inbox.request(Asked { request: Request::Kill, ticket: 0 }));
+    assert!(bench.inbox.request(TicketedRequest { request: Request::Kill, ticket: 0 }));
     let _ = bench.nothing();
     assert_eq!(bench.memory.trace::<Notes, 4>(), Trace::default());
 }

@@ -1,12 +1,12 @@
 //! Flies the mode: what it wants, limited, as a setpoint.
 
-use super::{Memory, Plan, Sight};
+use super::{GuidanceInputs, Memory, Plan};
 use crate::course::{Hold, Land, Return, Takeoff};
 use crate::lift::{Lift, Trim};
 use crate::mode::FlightMode;
-use crate::notice::{Notice, Notices, Reason};
-use crate::order::{Orders, Sticks, Target};
-use crate::scene::{Scene, Way, Wish};
+use crate::mode_io::{ModeInputs, ModeOutput, Shaping};
+use crate::notice::{ModeReason, Notice, Notices};
+use crate::order::{OffboardTarget, Orders, Sticks};
 use crate::settings::Settings;
 use crate::sticks;
 use crate::targets::Targets;
@@ -39,19 +39,19 @@ impl Memory {
     pub(super) fn fly(
         &mut self,
         settings: &Settings,
-        sight: &Sight<'_>,
+        given: &GuidanceInputs<'_>,
         state: &State,
         dt_s: f32,
         orders: &Orders,
-        target: Option<&Stamped<Target>>,
+        target: Option<&Stamped<OffboardTarget>>,
         sticks: Option<&Sticks>,
         reached: &mut Option<u16>,
         notices: &mut Notices,
     ) -> Option<(Option<Setpoint>, bool)> {
-        let armed = sight.core.armed();
-        let airborne = armed && sight.airborne;
+        let armed = given.core.armed();
+        let airborne = armed && given.airborne;
         if !armed {
-            // It would hold what it has, and can be armed.
+            // A disarmed vehicle that is armed now would hold its present position.
             self.limiter.rest(state);
             (self.enters, self.was_seen) = (false, true);
             (self.left, self.stood_m) = (false, state.position_m);
@@ -61,7 +61,7 @@ impl Memory {
         self.follow_vehicle(state);
         let present = self.limiter.setpoint()?;
         let home_m = self.home_m.unwrap_or(state.position_m);
-        let scene = Scene {
+        let inputs = ModeInputs {
             flying: &settings.flying,
             limits: &settings.limits,
             dt_s,
@@ -72,56 +72,56 @@ impl Memory {
             speed_m_s: self.speed_m_s,
             ceiling_m: home_m.z + settings.net.ceiling_m(),
         };
-        let wish = self.wish(settings, &scene, orders, target, sticks, &sight.lift, reached, notices);
-        if wish.done {
+        let output = self.output(settings, &inputs, orders, target, sticks, &given.lift, reached, notices);
+        if output.done {
             // What it has reached, it holds.
-            let at_m = match (&self.plan, &wish.way) {
+            let at_m = match (&self.plan, &output.shaping) {
                 (Plan::Takeoff(takeoff), _) => Some(takeoff.to_m),
-                (_, Way::Limited(aim)) if is_finite(&aim.position_m) => Some(aim.position_m),
+                (_, Shaping::Limited(aim)) if is_finite(&aim.position_m) => Some(aim.position_m),
                 _ => None,
             };
-            self.change(FlightMode::Hold, Reason::Done, notices);
+            self.change(FlightMode::Hold, ModeReason::Done, notices);
             (self.plan, self.enters) = (Plan::Hold(Hold { at_m, ..Hold::default() }), false);
         }
-        let rests = !airborne && !wish.lifts;
+        let rests = !airborne && !output.lifts;
         if rests {
             self.limiter.rest(state);
             (self.lift_s, self.left, self.stood_m) = (0.0, false, state.position_m);
             return Some((self.limiter.setpoint(), true));
         }
-        // Rotors that carry a share of it make the flight core believe that it flies: without more to give, or if it
-        // does not follow its setpoint, it does not.
+        // Rotors that carry a share of the weight make the flight core report that the vehicle is airborne. It is not
+        // if the thrust is exhausted or it does not follow its setpoint.
         let off_m = abs_max(&(state.position_m - self.stood_m));
         let behind = |to: Setpoint| abs_max(&(to.position_m - state.position_m)) > ANEW_M;
         self.left |= airborne && off_m > LEFT_M;
         let lifts =
-            !self.left && (!airborne || sight.lift.is_exhausted() || self.limiter.setpoint().is_some_and(behind));
+            !self.left && (!airborne || given.lift.is_exhausted() || self.limiter.setpoint().is_some_and(behind));
         self.lift_s = if lifts { self.lift_s + dt_s } else { 0.0 };
         if self.lift_s > NO_LIFT_S {
             self.left = true;
             let next = if airborne { FlightMode::Land } else { FlightMode::Hold };
-            self.change(next, Reason::NoLift, notices);
+            self.change(next, ModeReason::NoLift, notices);
             if !airborne {
                 self.limiter.rest(state);
                 return Some((self.limiter.setpoint(), true));
             }
         }
         // What is observed without an inertial sensor follows from the thrust, so that it would fall.
-        if wish.lands && !sight.sensors.inertial && self.touches(state, &present, dt_s) {
-            return Some((Some(settled(state, sight.lift.gravity_m_s2)).filter(Setpoint::is_plausible), false));
+        if output.lands && !given.sensors.inertial && self.touches(state, &present, dt_s) {
+            return Some((Some(settled(state, given.lift.gravity_m_s2)).filter(Setpoint::is_plausible), false));
         }
-        let setpoint = match wish.way {
-            Way::Limited(aim) => {
+        let setpoint = match output.shaping {
+            Shaping::Limited(aim) => {
                 (self.aim, self.trim) = (aim, Trim::default());
                 self.limiter.advance(&aim, dt_s);
                 self.limiter.setpoint().filter(|setpoint| abs_max(&setpoint.position_m) <= 1e5)
             }
-            Way::Leaning(aim, [x, y]) => {
+            Shaping::Leaning(aim, [x, y]) => {
                 self.aim = aim;
                 self.limiter.advance(&aim, dt_s);
                 self.limiter.follow(state);
                 // The height is held by feedback.
-                let lift = Lift { given_m_s2: None, ..sight.lift };
+                let lift = Lift { given_m_s2: None, ..given.lift };
                 let leaning = self.limiter.setpoint().map(|setpoint| Setpoint {
                     position_m: Vector3::new(state.position_m.x, state.position_m.y, setpoint.position_m.z),
                     velocity_m_s: Vector3::new(state.velocity_m_s.x, state.velocity_m_s.y, setpoint.velocity_m_s.z),
@@ -130,11 +130,11 @@ impl Memory {
                 });
                 leaning.map(|setpoint| self.trim.advance(&lift, state, &setpoint, dt_s)).filter(Setpoint::is_plausible)
             }
-            Way::Direct(setpoint) => {
+            Shaping::Direct(setpoint) => {
                 self.limiter.anchor(state);
-                self.aim = scene.stop();
-                let setpoint = sight.lift.limited(&setpoint, state, &settings.limits);
-                let setpoint = self.trim.advance(&sight.lift, state, &setpoint, dt_s);
+                self.aim = inputs.stop();
+                let setpoint = given.lift.limited(&setpoint, state, &settings.limits);
+                let setpoint = self.trim.advance(&given.lift, state, &setpoint, dt_s);
                 Some(setpoint).filter(Setpoint::is_plausible)
             }
         };
@@ -171,34 +171,34 @@ impl Memory {
 
     /// Returns what the mode wants.
     #[allow(clippy::too_many_arguments, reason = "parts of the tick")]
-    fn wish(
+    fn output(
         &mut self,
         settings: &Settings,
-        scene: &Scene<'_>,
+        inputs: &ModeInputs<'_>,
         orders: &Orders,
-        target: Option<&Stamped<Target>>,
+        target: Option<&Stamped<OffboardTarget>>,
         sticks: Option<&Sticks>,
         lift: &Lift,
         reached: &mut Option<u16>,
         notices: &mut Notices,
-    ) -> Wish {
+    ) -> ModeOutput {
         match self.mode {
             FlightMode::Hold => {
-                if !matches!(self.plan, Plan::Hold(_)) || !scene.airborne {
+                if !matches!(self.plan, Plan::Hold(_)) || !inputs.airborne {
                     self.plan = Plan::Hold(Hold::default());
                 }
                 match &mut self.plan {
-                    Plan::Hold(hold) => Wish::fly(hold.fly(scene)),
-                    _ => Wish::fly(scene.stop()),
+                    Plan::Hold(hold) => ModeOutput::fly(hold.fly(inputs)),
+                    _ => ModeOutput::fly(inputs.stop()),
                 }
             }
             FlightMode::Takeoff => {
                 if !matches!(self.plan, Plan::Takeoff(_)) {
-                    self.plan = Plan::Takeoff(Takeoff::new(scene, scene.flying.takeoff_height_m));
+                    self.plan = Plan::Takeoff(Takeoff::new(inputs, inputs.flying.takeoff_height_m));
                 }
                 match &self.plan {
-                    Plan::Takeoff(takeoff) => takeoff.fly(scene),
-                    _ => Wish::fly(scene.stop()),
+                    Plan::Takeoff(takeoff) => takeoff.fly(inputs),
+                    _ => ModeOutput::fly(inputs.stop()),
                 }
             }
             FlightMode::Land => {
@@ -206,32 +206,32 @@ impl Memory {
                     self.plan = Plan::Land(Land::default());
                 }
                 match &mut self.plan {
-                    Plan::Land(land) => land.fly(scene),
-                    _ => Wish::fly(scene.stop()),
+                    Plan::Land(land) => land.fly(inputs),
+                    _ => ModeOutput::fly(inputs.stop()),
                 }
             }
             FlightMode::Return => {
                 if !matches!(self.plan, Plan::Return(_)) {
-                    self.plan = Plan::Return(Return::new(scene));
+                    self.plan = Plan::Return(Return::new(inputs));
                 }
                 match &mut self.plan {
-                    Plan::Return(home) => home.fly(scene),
-                    _ => Wish::fly(scene.stop()),
+                    Plan::Return(home) => home.fly(inputs),
+                    _ => ModeOutput::fly(inputs.stop()),
                 }
             }
-            FlightMode::Mission => self.fly_mission(settings, scene, orders, reached, notices),
+            FlightMode::Mission => self.fly_mission(settings, inputs, orders, reached, notices),
             FlightMode::Offboard => {
                 if !matches!(self.plan, Plan::Targets(_)) {
                     self.plan = Plan::Targets(Targets::default());
                 }
                 match (&mut self.plan, target) {
-                    (Plan::Targets(targets), Some(target)) => targets.fly(target, scene, lift),
-                    _ => Wish::fly(scene.stop()),
+                    (Plan::Targets(targets), Some(target)) => targets.fly(target, inputs, lift),
+                    _ => ModeOutput::fly(inputs.stop()),
                 }
             }
             FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised => {
                 let sticks = sticks.copied().unwrap_or_default();
-                sticks::fly(self.mode, &sticks, scene, lift)
+                sticks::fly(self.mode, &sticks, inputs, lift)
             }
         }
     }
@@ -239,25 +239,25 @@ impl Memory {
     fn fly_mission(
         &mut self,
         settings: &Settings,
-        scene: &Scene<'_>,
+        inputs: &ModeInputs<'_>,
         orders: &Orders,
         reached: &mut Option<u16>,
         notices: &mut Notices,
-    ) -> Wish {
-        let (net, home_m) = (&settings.net, scene.home_m);
-        let progress = self.mission.fly(orders.leg.as_ref(), scene, |place_m| net.encloses(&home_m, place_m, 0.0));
+    ) -> ModeOutput {
+        let (net, home_m) = (&settings.net, inputs.home_m);
+        let progress = self.mission.fly(orders.leg.as_ref(), inputs, |place_m| net.encloses(&home_m, place_m, 0.0));
         *reached = progress.reached;
         if progress.refused {
             notices.push(Notice::ItemRefused);
-            return Wish { done: true, ..Wish::fly(scene.stop()) };
+            return ModeOutput { done: true, ..ModeOutput::fly(inputs.stop()) };
         }
         if let Some((mode, number)) = progress.then {
-            self.change(mode, Reason::Mission, notices);
+            self.change(mode, ModeReason::Mission, notices);
             self.mission.resume(0);
             (self.lands_item, self.enters) = (Some(number), false);
-            return Wish { lifts: scene.airborne, ..Wish::fly(scene.stop()) };
+            return ModeOutput { lifts: inputs.airborne, ..ModeOutput::fly(inputs.stop()) };
         }
-        progress.wish
+        progress.output
     }
 }
 

@@ -3,10 +3,10 @@
 use super::{Memory, Plan};
 use crate::course::{Hold, Takeoff};
 use crate::mode::FlightMode;
-use crate::notice::{Notices, Reason};
-use crate::order::{Declined, Order};
+use crate::notice::{ModeReason, Notices};
+use crate::order::{Order, OrderRefusal};
 use crate::settings::Settings;
-use crate::table::{self, Conditions};
+use crate::table::{self, TransitionInputs};
 use afbc_types::State;
 use nalgebra::Vector3;
 
@@ -20,9 +20,9 @@ impl Memory {
         settings: &Settings,
         order: &Order,
         state: Option<&State>,
-        seen: &Conditions,
+        seen: &TransitionInputs,
         notices: &mut Notices,
-    ) -> Result<(), Declined> {
+    ) -> Result<(), OrderRefusal> {
         let select = |mode: FlightMode| table::select(mode, seen);
         match *order {
             Order::Select(mode) => {
@@ -30,7 +30,7 @@ impl Memory {
                 let height_m = Vector3::new(0.0, 0.0, settings.flying.takeoff_height_m);
                 let climbs = state.filter(|_| mode == FlightMode::Takeoff);
                 if climbs.is_some_and(|state| !self.is_inside(settings, &(state.position_m + height_m))) {
-                    return Err(Declined::OutsideFence);
+                    return Err(OrderRefusal::OutsideFence);
                 }
                 if mode != self.mode || mode == FlightMode::Hold {
                     self.ordered(mode, notices);
@@ -40,16 +40,16 @@ impl Memory {
             Order::TakeOff(height_m) => {
                 let height_m = height_m.unwrap_or(settings.flying.takeoff_height_m);
                 if !(height_m > 0.0 && height_m <= 1000.0) {
-                    return Err(Declined::OutOfRange);
+                    return Err(OrderRefusal::OutOfRange);
                 }
                 if !seen.armed {
-                    return Err(Declined::NotArmed);
+                    return Err(OrderRefusal::NotArmed);
                 }
                 select(FlightMode::Takeoff)?;
-                let state = state.ok_or(Declined::NoPosition)?;
+                let state = state.ok_or(OrderRefusal::NoPosition)?;
                 let to_m = state.position_m + Vector3::new(0.0, 0.0, height_m);
                 if !self.is_inside(settings, &to_m) {
-                    return Err(Declined::OutsideFence);
+                    return Err(OrderRefusal::OutsideFence);
                 }
                 self.ordered(FlightMode::Takeoff, notices);
                 self.limiter.rest(state);
@@ -59,23 +59,23 @@ impl Memory {
             Order::GoTo { position_m, yaw_rad, speed_m_s } => {
                 let speed_ok = speed_m_s.is_none_or(|speed_m_s| speed_m_s > 0.0 && speed_m_s <= 1e3);
                 if !speed_ok || !is_place(&position_m) || yaw_rad.abs() > 1e3 {
-                    return Err(Declined::OutOfRange);
+                    return Err(OrderRefusal::OutOfRange);
                 }
                 if !seen.armed {
-                    return Err(Declined::NotArmed);
+                    return Err(OrderRefusal::NotArmed);
                 }
                 if !seen.airborne {
-                    return Err(Declined::OnGround);
+                    return Err(OrderRefusal::OnGround);
                 }
                 select(FlightMode::Hold)?;
-                let present = self.limiter.setpoint().ok_or(Declined::NoPosition)?;
+                let present = self.limiter.setpoint().ok_or(OrderRefusal::NoPosition)?;
                 let kept = match &self.plan {
                     Plan::Hold(Hold { at_m: Some(at_m), .. }) if self.mode == FlightMode::Hold => *at_m,
                     _ => present.position_m,
                 };
                 let to_m = position_m.zip_map(&kept, |new, old| if new.is_nan() { old } else { new });
                 if !self.is_inside(settings, &to_m) {
-                    return Err(Declined::OutsideFence);
+                    return Err(OrderRefusal::OutsideFence);
                 }
                 self.ordered(FlightMode::Hold, notices);
                 let yaw_rad = (!yaw_rad.is_nan()).then_some(yaw_rad);
@@ -84,7 +84,7 @@ impl Memory {
             }
             Order::Speed(speed_m_s) => {
                 if !(speed_m_s > 0.0 && speed_m_s <= 1e3) {
-                    return Err(Declined::OutOfRange);
+                    return Err(OrderRefusal::OutOfRange);
                 }
                 self.speed_m_s = speed_m_s;
                 Ok(())
@@ -92,16 +92,16 @@ impl Memory {
             Order::Home(place_m) => {
                 let place_m = match (place_m, state) {
                     (Some(place_m), _) if place_m.iter().all(|value| value.abs() <= PLACE_MAX_M) => place_m,
-                    (Some(_), _) => return Err(Declined::OutOfRange),
+                    (Some(_), _) => return Err(OrderRefusal::OutOfRange),
                     (None, Some(state)) => state.position_m,
-                    (None, None) => return Err(Declined::NoPosition),
+                    (None, None) => return Err(OrderRefusal::NoPosition),
                 };
                 (self.home_m, self.home_ordered) = (Some(place_m), true);
                 Ok(())
             }
             Order::Resume(number) => {
                 if !seen.mission {
-                    return Err(Declined::NoMission);
+                    return Err(OrderRefusal::NoMission);
                 }
                 self.mission.resume(number);
                 self.lands_item = None;
@@ -111,7 +111,7 @@ impl Memory {
     }
 
     fn ordered(&mut self, mode: FlightMode, notices: &mut Notices) {
-        self.change(mode, Reason::Ordered, notices);
+        self.change(mode, ModeReason::Ordered, notices);
         self.failsafe = None;
     }
 

@@ -17,9 +17,9 @@ fn acceleration(heading: &Heading, turn: &Turn, limits: &Turning) -> f64 {
             let e = (f64::from(yaw) - f64::from(heading.yaw_rad) + PI).rem_euclid(TAU) - PI;
             let c = braking / 2.0;
             let f = |e: f64| ((c * c + 2.0 * braking * e.abs()).sqrt() - c) * e.signum();
-            let (h, way) = (1e-6, told - rate);
+            let (h, shaping) = (1e-6, told - rate);
             let wanted = told + f(e);
-            let change = (f(e + way * h) - f(e - way * h)) / (2.0 * h);
+            let change = (f(e + shaping * h) - f(e - shaping * h)) / (2.0 * h);
             if wanted.abs() <= most { (wanted, change) } else { (wanted.clamp(-most, most), 0.0) }
         }
     };
@@ -67,8 +67,8 @@ proptest! {
         prop_assert!((found - expected).abs() < 2e-3 * (1.0 + expected.abs()), "{found}, not {expected}");
         let dt = f64::from(dt_s);
         prop_assert!((f64::from(heading.rate_rad_s - rate) - found * dt).abs() < 1e-6);
-        let way = (f64::from(rate) + 0.5 * found * dt) * dt;
-        let moved = (f64::from(heading.yaw_rad) - f64::from(yaw_rad) - way + PI).rem_euclid(TAU) - PI;
+        let shaping = (f64::from(rate) + 0.5 * found * dt) * dt;
+        let moved = (f64::from(heading.yaw_rad) - f64::from(yaw_rad) - shaping + PI).rem_euclid(TAU) - PI;
         prop_assert!(moved.abs() < 1e-6, "{heading:?} from {before:?}");
         prop_assert!(heading.yaw_rad.abs() <= 3.15);
     }

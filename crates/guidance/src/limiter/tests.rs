@@ -238,16 +238,16 @@ fn what_passes_is_within_the_limits() {
 /// What is not given of a target with a position is zero; without one it is no flight.
 #[test]
 fn a_target_with_a_position_is_complete() {
-    let aim = Aim::stop(1.0, 1.0, 1.0);
+    let aim = LimiterTarget::stop(1.0, 1.0, 1.0);
     assert_eq!(complete(&aim), None);
     let place = Vector3::new(1.0, 2.0, 3.0);
     for missing in 0..3 {
         let mut position_m = place;
         position_m.iter_mut().nth(missing).into_iter().for_each(|value| *value = f32::NAN);
-        assert_eq!(complete(&Aim { position_m, velocity_m_s: place, ..aim }), None);
+        assert_eq!(complete(&LimiterTarget { position_m, velocity_m_s: place, ..aim }), None);
     }
     let half = Vector3::new(f32::NAN, 4.0, f32::NAN);
-    let whole = complete(&Aim { position_m: place, velocity_m_s: half, ..aim }).unwrap();
+    let whole = complete(&LimiterTarget { position_m: place, velocity_m_s: half, ..aim }).unwrap();
     let zero = Vector3::zeros();
     let expected = Complete { position_m: place, velocity_m_s: Vector3::new(0.0, 4.0, 0.0), acceleration_m_s2: zero };
     assert_eq!(whole, expected);
@@ -291,7 +291,11 @@ fn it_begins_and_goes_on_at_the_vehicle() {
         assert!((setpoint.velocity_m_s - Vector3::new(3.0, -4.0, expected)).norm() < 1e-5, "{setpoint:?}");
     }
     // A motion with all its parts.
-    let aim = Aim { velocity_m_s: Vector3::new(1.0, 2.0, 0.5), yaw_rate_rad_s: 0.4, ..Aim::stop(9.0, 9.0, 9.0) };
+    let aim = LimiterTarget {
+        velocity_m_s: Vector3::new(1.0, 2.0, 0.5),
+        yaw_rate_rad_s: 0.4,
+        ..LimiterTarget::stop(9.0, 9.0, 9.0)
+    };
     (0..300).for_each(|_| limiter.advance(&aim, DT_S));
     let before = limiter.setpoint().unwrap();
     assert!(before.jerk_m_s3.norm() > 0.1 && before.acceleration_m_s2.z != 0.0 && before.yaw_rate_rad_s > 0.1);
@@ -317,11 +321,11 @@ fn headings_and_rates_are_followed() {
     let turned = |yaw_rad: f32, yaw_rate_rad_s: f32| {
         let mut limiter = Limiter::new(Limits::DEFAULT).unwrap();
         limiter.anchor(&State::default());
-        let aim = Aim { yaw_rad: 0.0, yaw_rate_rad_s: 0.5, ..Aim::stop(1.0, 1.0, 1.0) };
+        let aim = LimiterTarget { yaw_rad: 0.0, yaw_rate_rad_s: 0.5, ..LimiterTarget::stop(1.0, 1.0, 1.0) };
         (0..1000).for_each(|_| limiter.advance(&aim, DT_S));
         for tick in 0..4000 {
             let yaw_rad = yaw_rad + if yaw_rate_rad_s.is_nan() { 0.0 } else { tick as f32 * DT_S * yaw_rate_rad_s };
-            limiter.advance(&Aim { yaw_rad, yaw_rate_rad_s, ..aim }, DT_S);
+            limiter.advance(&LimiterTarget { yaw_rad, yaw_rate_rad_s, ..aim }, DT_S);
         }
         let setpoint = limiter.setpoint().unwrap();
         (setpoint.yaw_rad, setpoint.yaw_rate_rad_s)
@@ -350,12 +354,12 @@ fn accelerations_of_what_is_no_flight_do_not_count() {
         limiter.anchor(&State::default());
         let mut farthest_m = 0.0_f32;
         for tick in 0..4000_u32 {
-            let aim = Aim {
+            let aim = LimiterTarget {
                 position_m: Vector3::new(1.0, 0.0, 0.0),
                 velocity_m_s: Vector3::zeros(),
                 acceleration_m_s2: Vector3::new(5.0, 0.0, 0.0),
                 sent_us: Some(u64::from(tick / interval)),
-                ..Aim::stop(9.0, 9.0, 9.0)
+                ..LimiterTarget::stop(9.0, 9.0, 9.0)
             };
             limiter.advance(&aim, DT_S);
             farthest_m = farthest_m.max(limiter.setpoint().unwrap().position_m.x);

@@ -81,8 +81,8 @@ impl Page {
         let approach = self.f(&e);
         let change = if approach.norm() <= most {
             let h = 1e-6;
-            let way = (told - v) * h;
-            (self.f(&(e + way)) - self.f(&(e - way))) / (2.0 * h)
+            let shaping = (told - v) * h;
+            (self.f(&(e + shaping)) - self.f(&(e - shaping))) / (2.0 * h)
         } else {
             zero
         };

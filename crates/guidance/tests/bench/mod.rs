@@ -18,8 +18,8 @@ pub(crate) struct Bench {
     pub(crate) core: Mode,
     pub(crate) landing: LandDetector,
     pub(crate) now_us: u64,
-    pub(crate) battery: Option<Reading>,
-    pub(crate) sensors: Sensors,
+    pub(crate) battery: Option<BatteryReading>,
+    pub(crate) sensors: FailedSensors,
     /// Whether the station is heard, and the state is seen.
     pub(crate) heard: bool,
     pub(crate) sees: bool,
@@ -29,7 +29,7 @@ pub(crate) struct Bench {
     pub(crate) items: Vec<Item>,
     pub(crate) said: Vec<Notice>,
     pub(crate) reached: Vec<u16>,
-    pub(crate) answers: Vec<(u8, Result<(), Declined>)>,
+    pub(crate) answers: Vec<(u8, Result<(), OrderRefusal>)>,
     pub(crate) last: Option<Guided>,
     /// Highest and farthest place of the flight \[m\].
     pub(crate) highest_m: f32,
@@ -53,7 +53,7 @@ impl Bench {
             landing: LandDetector::new(&state, G_M_S2),
             now_us: 1_000_000,
             battery: None,
-            sensors: Sensors::default(),
+            sensors: FailedSensors::default(),
             heard: true,
             sees: true,
             wind_m_s2: Vector3::zeros(),
@@ -95,19 +95,19 @@ impl Bench {
         self.rest_us >= REST_US
     }
 
-    pub(crate) fn order(&mut self, order: Order) -> Result<(), Declined> {
-        assert!(self.orders.give(Given { order, ticket: 7 }));
+    pub(crate) fn order(&mut self, order: Order) -> Result<(), OrderRefusal> {
+        assert!(self.orders.give(TicketedOrder { order, ticket: 7 }));
         let guided = self.tick();
         let (ticket, answer) = guided.answer.unwrap();
         assert_eq!(ticket, 7);
         answer
     }
 
-    pub(crate) fn select(&mut self, mode: FlightMode) -> Result<(), Declined> {
+    pub(crate) fn select(&mut self, mode: FlightMode) -> Result<(), OrderRefusal> {
         self.order(Order::Select(mode))
     }
 
-    pub(crate) fn aim(&mut self, target: Target) {
+    pub(crate) fn aim(&mut self, target: OffboardTarget) {
         self.orders.target = Some(Stamped { value: target, at_us: self.now_us });
     }
 
@@ -141,7 +141,7 @@ impl Bench {
             item: *item,
             is_last: usize::from(wanted) + 1 == self.items.len(),
         });
-        let sight = Sight {
+        let sight = GuidanceInputs {
             now_us: self.now_us,
             dt_s: DT_S,
             state: self.sees.then_some(&self.state),

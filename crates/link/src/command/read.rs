@@ -6,7 +6,7 @@ use super::{
     SET_INTERVAL, SPEED, START_MISSION, STORAGE, Storage, TAKE_OFF, USUAL,
 };
 use crate::address::Address;
-use crate::message::{Fault, Format};
+use crate::message::{Fault, MessageFormat};
 use crate::place::{Datum, Height, Place, datum, e7};
 use crate::wire::{Layout, Unused};
 use mavlink::MessageData;
@@ -21,7 +21,7 @@ const MODE: Layout<SET_MODE_DATA, (u32, u8, u8)> = Layout::NEW;
 /// Latitude, longitude, altitude \[mm\]; attitude and approach; system, time.
 const PLACE: Layout<SET_HOME_POSITION_DATA, ([i32; 3], Unused<40>, u8, Unused<8>)> = Layout::NEW;
 
-pub(crate) fn format(id: u32) -> Option<Format> {
+pub(crate) fn format(id: u32) -> Option<MessageFormat> {
     Some(match id {
         COMMAND_LONG_DATA::ID => LONG.format(),
         COMMAND_INT_DATA::ID => INT.format(),

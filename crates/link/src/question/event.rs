@@ -1,7 +1,7 @@
 //! Events: REQUEST_EVENT and RESPONSE_EVENT_ERROR.
 
 use crate::address::Address;
-use crate::message::{Format, PAYLOAD_MAX};
+use crate::message::{MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{REQUEST_EVENT_DATA, RESPONSE_EVENT_ERROR_DATA};
@@ -31,7 +31,7 @@ const REQUEST: Layout<REQUEST_EVENT_DATA, ([u16; 2], Address)> = Layout::NEW;
 const ERROR: Layout<RESPONSE_EVENT_ERROR_DATA, (u16, u16, Address, u8)> = Layout::NEW;
 
 impl EventRequest {
-    pub(super) fn format() -> Format {
+    pub(super) fn format() -> MessageFormat {
         REQUEST.format()
     }
 
@@ -46,7 +46,7 @@ impl EventRequest {
 }
 
 impl EventError {
-    pub(super) fn format() -> Format {
+    pub(super) fn format() -> MessageFormat {
         ERROR.format()
     }
 

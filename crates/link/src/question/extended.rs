@@ -2,7 +2,7 @@
 //! PARAM_EXT_VALUE and PARAM_EXT_ACK, without their values.
 
 use crate::address::Address;
-use crate::message::{Format, PAYLOAD_MAX};
+use crate::message::{MessageFormat, PAYLOAD_MAX};
 use crate::wire::{Layout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
@@ -75,7 +75,7 @@ const VALUE: Layout<PARAM_EXT_VALUE_DATA, (u16, u16, ExtendedName, Text, u8)> = 
 const ACK: Layout<PARAM_EXT_ACK_DATA, (ExtendedName, Text, u8, u8)> = Layout::NEW;
 
 impl ExtendedRequest {
-    pub(super) fn format(id: u32) -> Option<Format> {
+    pub(super) fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
             READ_ID => READ.format(),
             LIST_ID => LIST.format(),
@@ -108,7 +108,7 @@ impl ExtendedRequest {
 }
 
 impl ExtendedAnswer {
-    pub(super) fn format(id: u32) -> Option<Format> {
+    pub(super) fn format(id: u32) -> Option<MessageFormat> {
         Some(if id == VALUE_ID { VALUE.format() } else { ACK.format() })
     }
 

@@ -1,7 +1,7 @@
 //! Files: FILE_TRANSFER_PROTOCOL, whose payload is a protocol of its own.
 
 use crate::address::Address;
-use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
 use crate::wire::{Layout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::FILE_TRANSFER_PROTOCOL_DATA;
@@ -31,16 +31,16 @@ pub struct FileRefusal {
     /// First byte.
     pub offset: u32,
     /// Why.
-    pub error: FileError,
+    pub error: FtpError,
 }
 
 /// `MAV_FTP_ERR`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FileError(pub u8);
+pub struct FtpError(pub u8);
 
-impl FileError {
+impl FtpError {
     /// The operation is not known.
-    pub const UNKNOWN_COMMAND: Self = FileError(7);
+    pub const UNKNOWN_COMMAND: Self = FtpError(7);
 }
 
 impl FileOperation {
@@ -56,7 +56,7 @@ pub(super) const ID: u32 = FILE_TRANSFER_PROTOCOL_DATA::ID;
 /// padding; offset; data.
 const FILE: Layout<FILE_TRANSFER_PROTOCOL_DATA, (u8, Address, u16, [u8; 6], u32, u8, Unused<238>)> = Layout::NEW;
 
-pub(super) fn format() -> Format {
+pub(super) fn format() -> MessageFormat {
     FILE.format()
 }
 
@@ -83,11 +83,11 @@ impl FileRefusal {
         if kind != NAK {
             return Err(Fault::Unsupported);
         }
-        Ok((FileRefusal { sequence, session, operation, offset, error: FileError(error) }, to))
+        Ok((FileRefusal { sequence, session, operation, offset, error: FtpError(error) }, to))
     }
 
     pub(super) fn write(self, to: Address, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
-        let FileRefusal { sequence, session, operation, offset, error: FileError(error) } = self;
+        let FileRefusal { sequence, session, operation, offset, error: FtpError(error) } = self;
         let head = [session, NAK, 1, operation, 0, 0];
         FILE.write(&(0, to, sequence, head, offset, error, Unused), payload)
     }

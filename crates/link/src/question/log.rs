@@ -1,7 +1,7 @@
 //! Logs: LOG_REQUEST_LIST and LOG_REQUEST_DATA, with LOG_ENTRY and LOG_DATA.
 
 use crate::address::Address;
-use crate::message::{Format, PAYLOAD_MAX};
+use crate::message::{MessageFormat, PAYLOAD_MAX};
 use crate::wire::{Layout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::{LOG_DATA_DATA, LOG_ENTRY_DATA, LOG_REQUEST_DATA_DATA, LOG_REQUEST_LIST_DATA};
@@ -60,7 +60,7 @@ const ENTRY: Layout<LOG_ENTRY_DATA, (Unused<8>, u16, [u16; 2])> = Layout::NEW;
 const DATA: Layout<LOG_DATA_DATA, (u32, u16, u8, Unused<90>)> = Layout::NEW;
 
 impl LogRequest {
-    pub(super) fn format(id: u32) -> Option<Format> {
+    pub(super) fn format(id: u32) -> Option<MessageFormat> {
         Some(if id == LIST_ID { LIST.format() } else { DATA_REQUEST.format() })
     }
 
@@ -84,7 +84,7 @@ impl LogRequest {
 }
 
 impl LogAnswer {
-    pub(super) fn format(id: u32) -> Option<Format> {
+    pub(super) fn format(id: u32) -> Option<MessageFormat> {
         Some(if id == ENTRY_ID { ENTRY.format() } else { DATA.format() })
     }
 

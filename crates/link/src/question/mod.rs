@@ -10,11 +10,11 @@ mod serial;
 mod terrain;
 
 use crate::address::Address;
-use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
 use crate::wire::{Layout, Unused};
 pub use event::{EventError, EventRequest};
 pub use extended::{ExtendedAnswer, ExtendedName, ExtendedRequest};
-pub use file::{FileError, FileOperation, FileRefusal};
+pub use file::{FileOperation, FileRefusal, FtpError};
 pub use log::{LogAnswer, LogRequest};
 use mavlink::MessageData;
 use mavlink::dialects::common::SET_GPS_GLOBAL_ORIGIN_DATA;
@@ -42,7 +42,7 @@ pub enum Question {
 
 /// The answer to a [`Question`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
+pub enum QuestionRefusal {
     /// LOG_ENTRY (118), LOG_DATA (120), neither of which names a receiver.
     Log(LogAnswer),
     /// FILE_TRANSFER_PROTOCOL (110).
@@ -62,7 +62,7 @@ const ORIGIN_ID: u32 = SET_GPS_GLOBAL_ORIGIN_DATA::ID;
 const ORIGIN: Layout<SET_GPS_GLOBAL_ORIGIN_DATA, (Unused<12>, u8, Unused<8>)> = Layout::NEW;
 
 impl Question {
-    pub(crate) fn format(id: u32) -> Option<Format> {
+    pub(crate) fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
             log::LIST_ID | log::DATA_REQUEST_ID => return LogRequest::format(id),
             file::ID => file::format(),
@@ -120,8 +120,8 @@ impl Question {
     }
 }
 
-impl Refusal {
-    pub(crate) fn format(id: u32) -> Option<Format> {
+impl QuestionRefusal {
+    pub(crate) fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
             log::ENTRY_ID | log::DATA_ID => return LogAnswer::format(id),
             file::ID => file::format(),
@@ -136,35 +136,35 @@ impl Refusal {
     /// Returns the answer and its receiver.
     pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Self, Address), Fault> {
         Ok(match id {
-            log::ENTRY_ID | log::DATA_ID => (Refusal::Log(LogAnswer::read(id, payload)), Address::default()),
+            log::ENTRY_ID | log::DATA_ID => (QuestionRefusal::Log(LogAnswer::read(id, payload)), Address::default()),
             file::ID => {
                 let (refusal, to) = FileRefusal::read(payload)?;
-                (Refusal::File(refusal), to)
+                (QuestionRefusal::File(refusal), to)
             }
             extended::VALUE_ID | extended::ACK_ID => {
-                (Refusal::Extended(ExtendedAnswer::read(id, payload)), Address::default())
+                (QuestionRefusal::Extended(ExtendedAnswer::read(id, payload)), Address::default())
             }
             event::ERROR_ID => {
                 let (error, to) = EventError::read(payload);
-                (Refusal::Event(error), to)
+                (QuestionRefusal::Event(error), to)
             }
             serial::ID => {
                 let (serial, to) = Serial::read(payload, serial::REPLY)?;
-                (Refusal::Serial(serial), to)
+                (QuestionRefusal::Serial(serial), to)
             }
-            terrain::REPORT_ID => (Refusal::Terrain(Terrain::read_report(payload)), Address::default()),
+            terrain::REPORT_ID => (QuestionRefusal::Terrain(Terrain::read_report(payload)), Address::default()),
             _ => return Err(Fault::Unknown),
         })
     }
 
     pub(crate) fn write(&self, to: Address, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         match self {
-            Refusal::Log(answer) => answer.write(payload),
-            Refusal::File(refusal) => refusal.write(to, payload),
-            Refusal::Extended(answer) => answer.write(payload),
-            Refusal::Event(error) => error.write(to, payload),
-            Refusal::Serial(serial) => serial.write(serial::REPLY, to, payload),
-            Refusal::Terrain(terrain) => terrain.write_report(payload),
+            QuestionRefusal::Log(answer) => answer.write(payload),
+            QuestionRefusal::File(refusal) => refusal.write(to, payload),
+            QuestionRefusal::Extended(answer) => answer.write(payload),
+            QuestionRefusal::Event(error) => error.write(to, payload),
+            QuestionRefusal::Serial(serial) => serial.write(serial::REPLY, to, payload),
+            QuestionRefusal::Terrain(terrain) => terrain.write_report(payload),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Serial ports and shells: SERIAL_CONTROL, in both directions.
 
 use crate::address::Address;
-use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
 use crate::wire::{Layout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::SERIAL_CONTROL_DATA;
@@ -24,7 +24,7 @@ pub(super) const ID: u32 = SERIAL_CONTROL_DATA::ID;
 /// Baud rate, time limit, device, flags, number of bytes, data, receiver.
 const SERIAL: Layout<SERIAL_CONTROL_DATA, (u32, u16, u8, u8, u8, Unused<70>, Address)> = Layout::NEW;
 
-pub(super) fn format() -> Format {
+pub(super) fn format() -> MessageFormat {
     SERIAL.format()
 }
 

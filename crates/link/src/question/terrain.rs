@@ -1,6 +1,6 @@
 //! Heights of the terrain: TERRAIN_CHECK and TERRAIN_REPORT.
 
-use crate::message::{Format, PAYLOAD_MAX};
+use crate::message::{MessageFormat, PAYLOAD_MAX};
 use crate::wire::{Layout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::{TERRAIN_CHECK_DATA, TERRAIN_REPORT_DATA};
@@ -19,11 +19,11 @@ const CHECK: Layout<TERRAIN_CHECK_DATA, ([i32; 2],)> = Layout::NEW;
 /// Place; heights, spacing of the grid (0: none), blocks pending and loaded.
 const REPORT: Layout<TERRAIN_REPORT_DATA, ([i32; 2], Unused<14>)> = Layout::NEW;
 
-pub(super) fn check_format() -> Format {
+pub(super) fn check_format() -> MessageFormat {
     CHECK.format()
 }
 
-pub(super) fn report_format() -> Format {
+pub(super) fn report_format() -> MessageFormat {
     REPORT.format()
 }
 

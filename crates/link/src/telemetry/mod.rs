@@ -4,16 +4,16 @@ mod motion;
 mod place;
 mod system;
 
-use crate::message::{Fault, Format, PAYLOAD_MAX};
+use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA,
     ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA, GPS_RAW_INT_DATA,
     HOME_POSITION_DATA, PROTOCOL_VERSION_DATA, SYS_STATUS_DATA, VFR_HUD_DATA,
 };
-pub use motion::{AttitudeQuaternion, Summary};
-pub use place::{Fix, GlobalPosition, Home, Origin};
-pub use system::{ActuatorOutputs, Battery, EstimatorStatus, SystemStatus, Version};
+pub use motion::{AttitudeQuaternion, VfrHud};
+pub use place::{Fix, GlobalOrigin, GlobalPosition, Home};
+pub use system::{ActuatorOutputs, BatteryStatus, EstimatorStatus, SystemStatus, Version};
 
 /// A message of telemetry.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +22,7 @@ pub enum Telemetry {
     /// ATTITUDE_QUATERNION (31).
     Attitude(AttitudeQuaternion),
     /// VFR_HUD (74).
-    Summary(Summary),
+    Summary(VfrHud),
     /// GLOBAL_POSITION_INT (33).
     Global(GlobalPosition),
     /// GPS_RAW_INT (24).
@@ -30,11 +30,11 @@ pub enum Telemetry {
     /// HOME_POSITION (242).
     Home(Home),
     /// GPS_GLOBAL_ORIGIN (49).
-    Origin(Origin),
+    Origin(GlobalOrigin),
     /// SYS_STATUS (1).
     System(SystemStatus),
     /// BATTERY_STATUS (147).
-    Battery(Battery),
+    Battery(BatteryStatus),
     /// EXTENDED_SYS_STATE (245): `MAV_LANDED_STATE`.
     Landed(u8),
     /// ESTIMATOR_STATUS (230).
@@ -48,20 +48,20 @@ pub enum Telemetry {
 }
 
 impl Telemetry {
-    pub(crate) fn format(id: u32) -> Option<Format> {
+    pub(crate) fn format(id: u32) -> Option<MessageFormat> {
         motion::format(id).or_else(|| place::format(id)).or_else(|| system::format(id))
     }
 
     pub(crate) fn read(id: u32, payload: &[u8]) -> Result<Self, Fault> {
         Ok(match id {
             ATTITUDE_QUATERNION_DATA::ID => Telemetry::Attitude(AttitudeQuaternion::read(payload)),
-            VFR_HUD_DATA::ID => Telemetry::Summary(Summary::read(payload)),
+            VFR_HUD_DATA::ID => Telemetry::Summary(VfrHud::read(payload)),
             GLOBAL_POSITION_INT_DATA::ID => Telemetry::Global(GlobalPosition::read(payload)),
             GPS_RAW_INT_DATA::ID => Telemetry::Fix(Fix::read(payload)),
             HOME_POSITION_DATA::ID => Telemetry::Home(Home::read(payload)),
-            GPS_GLOBAL_ORIGIN_DATA::ID => Telemetry::Origin(Origin::read(payload)),
+            GPS_GLOBAL_ORIGIN_DATA::ID => Telemetry::Origin(GlobalOrigin::read(payload)),
             SYS_STATUS_DATA::ID => Telemetry::System(SystemStatus::read(payload)),
-            BATTERY_STATUS_DATA::ID => Telemetry::Battery(Battery::read(payload)),
+            BATTERY_STATUS_DATA::ID => Telemetry::Battery(BatteryStatus::read(payload)),
             EXTENDED_SYS_STATE_DATA::ID => Telemetry::Landed(system::read_landed(payload)),
             ESTIMATOR_STATUS_DATA::ID => Telemetry::Estimator(EstimatorStatus::read(payload)),
             ACTUATOR_OUTPUT_STATUS_DATA::ID => Telemetry::Outputs(ActuatorOutputs::read(payload)),

@@ -1,7 +1,7 @@
 //! Attitude, and a pilot's summary.
 
 use crate::frames::{flip, flip_turn};
-use crate::message::{Format, PAYLOAD_MAX};
+use crate::message::{MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{ATTITUDE_QUATERNION_DATA, VFR_HUD_DATA};
@@ -20,7 +20,7 @@ pub struct AttitudeQuaternion {
 
 /// VFR_HUD (74).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Summary {
+pub struct VfrHud {
     /// Horizontal speed above the ground \[m/s\]; sent as airspeed, too.
     pub speed_m_s: f32,
     /// Altitude above the sea, or in the local frame if that is unknown \[m\].
@@ -37,7 +37,7 @@ const ATTITUDE: Layout<ATTITUDE_QUATERNION_DATA, (u32, [f32; 4], [f32; 3], [f32;
 /// Airspeed, ground speed, altitude, climb rate; heading, throttle.
 const SUMMARY: Layout<VFR_HUD_DATA, ([f32; 4], i16, u16)> = Layout::NEW;
 
-pub(super) fn format(id: u32) -> Option<Format> {
+pub(super) fn format(id: u32) -> Option<MessageFormat> {
     match id {
         ATTITUDE_QUATERNION_DATA::ID => Some(ATTITUDE.format()),
         VFR_HUD_DATA::ID => Some(SUMMARY.format()),
@@ -58,14 +58,14 @@ impl AttitudeQuaternion {
     }
 }
 
-impl Summary {
+impl VfrHud {
     pub(super) fn read(payload: &[u8]) -> Self {
         let ([_, speed_m_s, altitude_m, climb_m_s], heading_deg, throttle_percent) = SUMMARY.read(payload);
-        Summary { speed_m_s, altitude_m, climb_m_s, heading_deg, throttle_percent }
+        VfrHud { speed_m_s, altitude_m, climb_m_s, heading_deg, throttle_percent }
     }
 
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
-        let Summary { speed_m_s, altitude_m, climb_m_s, heading_deg, throttle_percent } = *self;
+        let VfrHud { speed_m_s, altitude_m, climb_m_s, heading_deg, throttle_percent } = *self;
         SUMMARY.write(&([speed_m_s, speed_m_s, altitude_m, climb_m_s], heading_deg, throttle_percent), payload)
     }
 }

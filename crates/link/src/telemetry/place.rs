@@ -1,7 +1,7 @@
 //! Where the vehicle is on the earth.
 
 use crate::frames::{flip, flip_turn};
-use crate::message::{Format, PAYLOAD_MAX};
+use crate::message::{MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
@@ -64,7 +64,7 @@ pub struct Home {
 
 /// GPS_GLOBAL_ORIGIN (49): where the local frame's origin is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Origin {
+pub struct GlobalOrigin {
     /// Latitude and longitude \[1e-7 deg\].
     pub place_e7: [i32; 2],
     /// Altitude above the sea \[mm\].
@@ -82,7 +82,7 @@ const FIX: Layout<GPS_RAW_INT_DATA, (u64, [i32; 2], i32, [u16; 4], [u8; 2], i32,
 const HOME: Layout<HOME_POSITION_DATA, ([i32; 2], i32, [f32; 3], [f32; 4], [f32; 3], u64)> = Layout::NEW;
 const ORIGIN: Layout<GPS_GLOBAL_ORIGIN_DATA, ([i32; 2], i32, u64)> = Layout::NEW;
 
-pub(super) fn format(id: u32) -> Option<Format> {
+pub(super) fn format(id: u32) -> Option<MessageFormat> {
     match id {
         GLOBAL_POSITION_INT_DATA::ID => Some(GLOBAL.format()),
         GPS_RAW_INT_DATA::ID => Some(FIX.format()),
@@ -137,10 +137,10 @@ impl Home {
     }
 }
 
-impl Origin {
+impl GlobalOrigin {
     pub(super) fn read(payload: &[u8]) -> Self {
         let (place_e7, altitude_mm, time_us) = ORIGIN.read(payload);
-        Origin { place_e7, altitude_mm, time_us }
+        GlobalOrigin { place_e7, altitude_mm, time_us }
     }
 
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {

@@ -1,6 +1,6 @@
 //! Health, battery, outputs and versions.
 
-use crate::message::{Format, PAYLOAD_MAX};
+use crate::message::{MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
@@ -31,7 +31,7 @@ pub struct SystemStatus {
 
 /// BATTERY_STATUS (147) of one battery.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Battery {
+pub struct BatteryStatus {
     /// Voltage \[mV\], below 65,534.
     pub voltage_mv: u16,
     /// Current \[0.01 A\]; -1 if unknown.
@@ -99,7 +99,7 @@ const PROTOCOL: Layout<PROTOCOL_VERSION_DATA, ([u16; 3], [u8; 16])> = Layout::NE
 const NO_CELL: u16 = u16::MAX;
 const NO_TEMPERATURE: i16 = i16::MAX;
 
-pub(super) fn format(id: u32) -> Option<Format> {
+pub(super) fn format(id: u32) -> Option<MessageFormat> {
     Some(match id {
         SYS_STATUS_DATA::ID => SYSTEM.format(),
         BATTERY_STATUS_DATA::ID => BATTERY.format(),
@@ -137,15 +137,15 @@ impl SystemStatus {
     }
 }
 
-impl Battery {
+impl BatteryStatus {
     pub(super) fn read(payload: &[u8]) -> Self {
         let (([consumed_mah, _], _, [voltage_mv, ..], current_ca), _, remaining_percent, _, charge, ..) =
             BATTERY.read(payload);
-        Battery { voltage_mv, current_ca, consumed_mah, remaining_percent, charge }
+        BatteryStatus { voltage_mv, current_ca, consumed_mah, remaining_percent, charge }
     }
 
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
-        let Battery { voltage_mv, current_ca, consumed_mah, remaining_percent, charge } = *self;
+        let BatteryStatus { voltage_mv, current_ca, consumed_mah, remaining_percent, charge } = *self;
         // All cells as one.
         let mut cells = [NO_CELL; 10];
         cells.iter_mut().take(1).for_each(|cell| *cell = voltage_mv);

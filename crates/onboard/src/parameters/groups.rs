@@ -3,14 +3,14 @@
 use super::encoding::Kind;
 use super::reason::Reason;
 use crate::configuration::Configuration;
-use afbc_store::Name;
+use afbc_store::RecordName;
 use afbc_types::{Declaration, Declared, Range, Value};
 
 /// A parameter: one number of a configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
     /// Name, as in `docs/parameters.md`.
-    pub name: Name,
+    pub name: RecordName,
     /// Place in the list.
     pub place: u16,
     /// Type on the link.
@@ -24,7 +24,7 @@ pub struct Parameter {
 /// Which parameter is looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Key {
-    Name(Name),
+    Name(RecordName),
     Place(u16),
 }
 
@@ -74,7 +74,7 @@ impl<const N: usize> Configuration<N> {
     }
 
     /// Sets a parameter, if the value is in its range; returns what it is then.
-    pub(crate) fn put(&mut self, name: Name, value: f32) -> Result<Parameter, Reason> {
+    pub(crate) fn put(&mut self, name: RecordName, value: f32) -> Result<Parameter, Reason> {
         let mut walk = Walk { key: Key::Name(name), value: Some(value), passed: 0, found: None };
         let _ = self.walk(&mut walk);
         walk.found.unwrap_or_else(|| Err(Reason::on(name, "no such parameter")))
@@ -98,7 +98,7 @@ impl Walk {
         for (index, coordinate) in (0..length).zip(['X', 'Y', 'Z']) {
             let coordinate = (length > 1).then_some(coordinate);
             // Names fit: tests/tests/parameters.rs. One that did not would be left out of the list.
-            let Some(name) = Name::of(declaration.name(prefix, coordinate).chars()) else { continue };
+            let Some(name) = RecordName::of(declaration.name(prefix, coordinate).chars()) else { continue };
             let place = self.passed;
             self.passed += 1;
             if self.key == Key::Name(name) || self.key == Key::Place(place) {

@@ -1,15 +1,15 @@
 //! What of the parameters is in a store: the values that differ from the image's, over images to come.
 
 use super::reason::Reason;
-use super::table::Table;
-use afbc_store::{Error, Name, Store};
+use super::table::ParameterTable;
+use afbc_store::{Error, RecordName, Store};
 use embedded_storage::nor_flash::NorFlash;
 
 /// What is to be written after a change of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Change {
+pub enum RecordChange {
     /// This parameter has this value now; none: that of the image.
-    Set(Name, Option<f32>),
+    Set(RecordName, Option<f32>),
     /// All parameters are as in the image.
     Restored,
 }
@@ -44,7 +44,7 @@ impl Kept {
     /// Of the flash: then every parameter is as in the image.
     pub fn load<F: NorFlash, const N: usize>(
         &self,
-        table: &mut Table<N>,
+        table: &mut ParameterTable<N>,
         store: &mut Store<F>,
         mut notice: impl FnMut(Reason),
     ) -> Result<(), Error<F::Error>> {
@@ -72,7 +72,7 @@ impl Kept {
     /// Sets what can be set, until nothing more can; calls `notice` with a line on each of the rest.
     fn load_singly<F: NorFlash, const N: usize>(
         &self,
-        table: &mut Table<N>,
+        table: &mut ParameterTable<N>,
         store: &mut Store<F>,
         mut notice: impl FnMut(Reason),
     ) -> Result<(), Error<F::Error>> {
@@ -102,15 +102,15 @@ impl Kept {
     ///
     /// # Errors
     /// If it was not written, or in part: values of other names are not affected.
-    pub fn keep<F: NorFlash>(&self, store: &mut Store<F>, change: Change) -> Result<(), Error<F::Error>> {
+    pub fn keep<F: NorFlash>(&self, store: &mut Store<F>, change: RecordChange) -> Result<(), Error<F::Error>> {
         match change {
-            Change::Restored => store.reset(),
-            Change::Set(name, Some(value)) => {
+            RecordChange::Restored => store.reset(),
+            RecordChange::Set(name, Some(value)) => {
                 store.set(name, self.edition, Some(value.to_bits()))?;
                 self.forget(store, name)
             }
             // Former names first: at no point does one of them count again.
-            Change::Set(name, None) => {
+            RecordChange::Set(name, None) => {
                 self.forget(store, name)?;
                 store.set(name, self.edition, None)
             }
@@ -118,15 +118,17 @@ impl Kept {
     }
 
     /// Takes back what stands under former names of `name`.
-    fn forget<F: NorFlash>(&self, store: &mut Store<F>, name: Name) -> Result<(), Error<F::Error>> {
+    fn forget<F: NorFlash>(&self, store: &mut Store<F>, name: RecordName) -> Result<(), Error<F::Error>> {
         let former = self.renamed.iter().filter(|(_, now)| *now == name.as_str());
-        former.filter_map(|(former, _)| Name::new(former)).try_for_each(|former| store.set(former, self.edition, None))
+        former
+            .filter_map(|(former, _)| RecordName::new(former))
+            .try_for_each(|former| store.set(former, self.edition, None))
     }
 
     /// Returns the present name and value of what is stored.
-    fn read(&self, name: Name, edition: u16, bits: u32) -> Result<(Name, f32), Reason> {
+    fn read(&self, name: RecordName, edition: u16, bits: u32) -> Result<(RecordName, f32), Reason> {
         let renamed = self.renamed.iter().find(|(former, _)| *former == name.as_str());
-        let now = renamed.and_then(|(_, now)| Name::new(now)).unwrap_or(name);
+        let now = renamed.and_then(|(_, now)| RecordName::new(now)).unwrap_or(name);
         let is_changed = self.changed.iter().any(|(name, since)| *name == now.as_str() && edition < *since);
         if is_changed { Err(Reason::on(now, "has changed, set it again")) } else { Ok((now, f32::from_bits(bits))) }
     }

@@ -1,6 +1,7 @@
 //! Parameters of the vehicle while it runs: what stations read and set, and what is kept in flash.
 //!
-//! * [`Table`]: the parameters of a [`Configuration`](crate::Configuration) by name and by place, each change checked.
+//! * [`ParameterTable`]: the parameters of a [`Configuration`](crate::Configuration) by name and by place, each change
+//!   checked.
 //! * [`Service`]: MAVLink's parameter protocol; [`Comms::parameters`](crate::Comms::parameters) is its place.
 //! * [`Kept`]: what of it is in a [`Store`](afbc_store::Store), over new images and other vehicles.
 //!
@@ -15,7 +16,7 @@ mod table;
 
 pub use encoding::Kind;
 pub use groups::Parameter;
-pub use kept::{Change, Kept};
+pub use kept::{Kept, RecordChange};
 pub use reason::{REASON_MAX, Reason};
 pub use service::{Heard, LINK_SHARE, Service, VALUE_BYTES};
-pub use table::Table;
+pub use table::ParameterTable;

@@ -1,6 +1,6 @@
 //! Why a parameter is not what was asked for, in one line.
 
-use afbc_store::Name;
+use afbc_store::RecordName;
 use afbc_types::OutOfRange;
 use core::fmt;
 use heapless::String;
@@ -22,12 +22,12 @@ impl Reason {
     }
 
     /// Makes the line on a parameter.
-    pub(crate) fn on(name: Name, text: &str) -> Self {
+    pub(crate) fn on(name: RecordName, text: &str) -> Self {
         Reason::new(name.as_str(), text)
     }
 
     /// Makes the line on a value outside the range of its own.
-    pub(crate) fn range(name: Name, error: &OutOfRange) -> Self {
+    pub(crate) fn range(name: RecordName, error: &OutOfRange) -> Self {
         let mut line = Line::default();
         [name.as_str(), ": must be "].into_iter().for_each(|part| line.text(part));
         line.number(error.range.min);
@@ -37,7 +37,7 @@ impl Reason {
     }
 
     /// Makes the line on a value with which another one leaves its range; without the limit if that is too long.
-    pub(crate) fn together(name: Name, error: &OutOfRange) -> Self {
+    pub(crate) fn together(name: RecordName, error: &OutOfRange) -> Self {
         let OutOfRange { value, range } = error;
         let (side, limit) = if *value > range.max { (" above", range.max) } else { (" below", range.min) };
         let mut line = Line::default();
@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn lines_say_what_is_wrong_and_are_cut() {
-        let name = Name::new("V_MASS").expect("short");
+        let name = RecordName::new("V_MASS").expect("short");
         assert_eq!(Reason::on(name, "why").to_string(), "V_MASS: why");
         assert_eq!(Reason::new("subject", "text").as_str(), "subject: text");
         let range = Range::new("mass_kg", 0.5, 20.0);

@@ -2,11 +2,11 @@
 
 use super::encoding::decode;
 use super::groups::Parameter;
-use super::kept::Change;
+use super::kept::RecordChange;
 use super::reason::Reason;
-use super::table::Table;
+use super::table::ParameterTable;
 use afbc_link::{ParameterError, ParameterName, ParameterRequest, ParameterValue};
-use afbc_store::Name;
+use afbc_store::RecordName;
 use heapless::Deque;
 
 /// Largest size of a PARAM_VALUE on the link \[bytes\].
@@ -22,7 +22,7 @@ const WAITING_MAX: usize = 32;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Heard {
     /// The table has changed: to be flown, and to be written.
-    pub change: Option<Change>,
+    pub change: Option<RecordChange>,
     /// Line to the station: why nothing has changed.
     pub refused: Option<Reason>,
     /// What the station is told that has named what there is not.
@@ -41,11 +41,11 @@ impl Heard {
     }
 }
 
-/// Answers to stations about the parameters of a [`Table`].
+/// Answers to stations about the parameters of a [`ParameterTable`].
 #[derive(Clone, Debug, Default)]
 pub struct Service {
     /// Answers to PARAM_SET: the values are those at the time of sending.
-    set: Deque<Name, WAITING_MAX>,
+    set: Deque<RecordName, WAITING_MAX>,
     /// Places asked for.
     read: Deque<u16, WAITING_MAX>,
     /// Next place of the list, and how many are left of it.
@@ -59,7 +59,12 @@ pub struct Service {
 
 impl Service {
     /// Takes a station's message. The table is changed only while `disarmed`.
-    pub fn hear<const N: usize>(&mut self, ask: ParameterRequest, table: &mut Table<N>, disarmed: bool) -> Heard {
+    pub fn hear<const N: usize>(
+        &mut self,
+        ask: ParameterRequest,
+        table: &mut ParameterTable<N>,
+        disarmed: bool,
+    ) -> Heard {
         match ask {
             // A list under way continues to its end and then from its beginning: every station hears all of it.
             ParameterRequest::List => self.left = table.count(),
@@ -83,18 +88,27 @@ impl Service {
     ///
     /// # Errors
     /// The reason while armed.
-    pub fn restore<const N: usize>(&mut self, table: &mut Table<N>, disarmed: bool) -> Result<Change, Reason> {
+    pub fn restore<const N: usize>(
+        &mut self,
+        table: &mut ParameterTable<N>,
+        disarmed: bool,
+    ) -> Result<RecordChange, Reason> {
         if !disarmed {
             return Err(Reason::new("parameters", "not while armed"));
         }
         table.restore();
         self.left = table.count();
-        Ok(Change::Restored)
+        Ok(RecordChange::Restored)
     }
 
     /// Returns the next value to be sent at `now_us` over a link of `link_bytes_s` bytes per second; to be called until
     /// there is none. Answers to PARAM_SET come at once, everything else at [`LINK_SHARE`] of the link.
-    pub fn tell<const N: usize>(&mut self, now_us: u64, link_bytes_s: u32, table: &Table<N>) -> Option<ParameterValue> {
+    pub fn next_value<const N: usize>(
+        &mut self,
+        now_us: u64,
+        link_bytes_s: u32,
+        table: &ParameterTable<N>,
+    ) -> Option<ParameterValue> {
         const COST: u64 = VALUE_BYTES as u64 * 100_000_000;
         let elapsed_us = now_us.saturating_sub(self.at_us).min(1_000_000);
         self.at_us = now_us;
@@ -102,7 +116,7 @@ impl Service {
         self.budget = self.budget.saturating_add(earned).min(BURST * COST);
         if let Some(name) = self.set.pop_front() {
             self.budget = self.budget.saturating_sub(COST);
-            return table.get(name).map(|parameter| told(&parameter, table.count()));
+            return table.get(name).map(|parameter| value_message(&parameter, table.count()));
         }
         let rest = self.budget.checked_sub(COST)?;
         let place = self.read.pop_front().or_else(|| {
@@ -112,7 +126,7 @@ impl Service {
             Some(place)
         })?;
         self.budget = rest;
-        table.at(place).map(|parameter| told(&parameter, table.count()))
+        table.at(place).map(|parameter| value_message(&parameter, table.count()))
     }
 
     /// Returns the number of messages that were not answered, since too many were waiting.
@@ -124,7 +138,7 @@ impl Service {
         &mut self,
         asked: ParameterName,
         value: Option<f32>,
-        table: &mut Table<N>,
+        table: &mut ParameterTable<N>,
         disarmed: bool,
     ) -> Heard {
         let name = named(asked);
@@ -146,7 +160,7 @@ impl Service {
         match table.set(name, value) {
             Ok(Parameter { value, .. }) => {
                 let is_default = table.default_of(name).is_some_and(|image| image.value.to_bits() == value.to_bits());
-                Heard { change: Some(Change::Set(name, (!is_default).then_some(value))), ..Heard::default() }
+                Heard { change: Some(RecordChange::Set(name, (!is_default).then_some(value))), ..Heard::default() }
             }
             Err(reason) => Heard::refused(reason),
         }
@@ -157,12 +171,12 @@ fn count<T>(pushed: Result<(), T>) -> u32 {
     u32::from(pushed.is_err())
 }
 
-fn named(bytes: ParameterName) -> Option<Name> {
+fn named(bytes: ParameterName) -> Option<RecordName> {
     let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
-    Name::new(str::from_utf8(bytes.get(..end)?).ok()?)
+    RecordName::new(str::from_utf8(bytes.get(..end)?).ok()?)
 }
 
-fn told(parameter: &Parameter, count: u16) -> ParameterValue {
+fn value_message(parameter: &Parameter, count: u16) -> ParameterValue {
     let Parameter { name, place, kind, value, .. } = *parameter;
     ParameterValue { name: name.to_bytes(), value: kind.encode(value), kind: kind.number(), count, place }
 }

@@ -4,7 +4,7 @@ use super::groups::{Key, Parameter};
 use super::reason::Reason;
 use crate::configuration::Configuration;
 use crate::flight::Prepared;
-use afbc_store::Name;
+use afbc_store::RecordName;
 use afbc_types::OutOfRange;
 
 /// The parameters of a vehicle: as its image has them, and as they are now.
@@ -12,17 +12,17 @@ use afbc_types::OutOfRange;
 /// A value is an `f32`. Parameters of the configuration that are `f32` are what was set, to the bit; one in `f64` is
 /// the exact value of the `f32`, and read as the nearest; a switch is 0 or 1.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table<const N: usize = 4> {
+pub struct ParameterTable<const N: usize = 4> {
     image: Configuration<N>,
     now: Configuration<N>,
     count: u16,
 }
 
-impl<const N: usize> Table<N> {
+impl<const N: usize> ParameterTable<N> {
     /// Makes a table in which every parameter is as in the image.
     pub fn new(image: Configuration<N>) -> Self {
         let mut now = image.clone();
-        Table { count: now.parameters(), now, image }
+        ParameterTable { count: now.parameters(), now, image }
     }
 
     /// Returns the configuration to be flown, which makes a [`Flight`](crate::Flight) if the image's does.
@@ -41,7 +41,7 @@ impl<const N: usize> Table<N> {
     }
 
     /// Returns the parameter called `name`.
-    pub fn get(&self, name: Name) -> Option<Parameter> {
+    pub fn get(&self, name: RecordName) -> Option<Parameter> {
         self.now.clone().parameter(Key::Name(name))
     }
 
@@ -51,7 +51,7 @@ impl<const N: usize> Table<N> {
     }
 
     /// Returns the parameter called `name` as the image has it.
-    pub fn default_of(&self, name: Name) -> Option<Parameter> {
+    pub fn default_of(&self, name: RecordName) -> Option<Parameter> {
         self.image.clone().parameter(Key::Name(name))
     }
 
@@ -60,7 +60,7 @@ impl<const N: usize> Table<N> {
     /// # Errors
     /// The reason, and nothing has changed: no such parameter, a value out of its range, or one with which the vehicle
     /// could not fly ([`Prepared::new`]).
-    pub fn set(&mut self, name: Name, value: f32) -> Result<Parameter, Reason> {
+    pub fn set(&mut self, name: RecordName, value: f32) -> Result<Parameter, Reason> {
         let mut candidate = self.now.clone();
         let parameter = candidate.put(name, value)?;
         Prepared::new(&candidate).map_err(|error| Reason::together(name, &error))?;
@@ -68,11 +68,11 @@ impl<const N: usize> Table<N> {
         Ok(parameter)
     }
 
-    /// Changes one of several values, whatever the others are; to be followed by [`Table::check`].
+    /// Changes one of several values, whatever the others are; to be followed by [`ParameterTable::check`].
     ///
     /// # Errors
     /// The reason, and nothing has changed: no such parameter, or a value out of its range.
-    pub fn put(&mut self, name: Name, value: f32) -> Result<Parameter, Reason> {
+    pub fn put(&mut self, name: RecordName, value: f32) -> Result<Parameter, Reason> {
         self.now.put(name, value)
     }
 

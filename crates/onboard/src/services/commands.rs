@@ -1,9 +1,9 @@
 //! Answers to commands: each exactly once, to its sender.
 
 use afbc_flight_core::inbox::REQUESTS_MAX;
-use afbc_flight_core::{Asked, Request};
+use afbc_flight_core::{Request, TicketedRequest};
 use afbc_guidance::order::ORDERS_MAX;
-use afbc_guidance::{Declined, Given, Order};
+use afbc_guidance::{Order, OrderRefusal, TicketedOrder};
 use afbc_link::{Address, Answer, Downlink};
 use heapless::Deque;
 
@@ -22,7 +22,7 @@ pub const BUSY: i32 = 0;
 pub const NOT_IN_CONTROL: i32 = 64;
 /// Number of the reason "it is not known where the local frame is on the earth".
 pub const NO_ORIGIN: i32 = 65;
-/// Number of the reason "the message cannot be sent now: what it tells is not known".
+/// Number of the reason "the message cannot be sent now: its content is not known".
 pub const NOT_KNOWN: i32 = 66;
 
 /// Keeps track of the answers.
@@ -31,9 +31,10 @@ pub struct Commands {
     /// Requests that the flight core has not answered, indexed by ticket. The first place is reserved for
     /// [`Request::Kill`], so that it is always accepted. The flight core's inbox never overflows.
     asked: [Option<Open>; REQUESTS_MAX],
-    /// Orders that the guidance has not answered, indexed by ticket; neither does its queue overflow.
+    /// Orders that the guidance has not answered, indexed by ticket. The guidance's queue never
+    /// overflows either.
     ordered: [Option<Open>; ORDERS_MAX],
-    /// A command that takes its time, and when that was last told \[us\].
+    /// A command that is in progress, and when that was last reported \[us\].
     lasting: Option<(Open, u64)>,
     waiting: Deque<Told, ANSWERS_MAX>,
     unanswered: u32,
@@ -57,13 +58,13 @@ struct Open {
 
 impl Commands {
     /// Gives the flight core's request for a command; none if too many are open, which is answered.
-    pub fn ask(&mut self, request: Request, command: u16, from: Address, at_us: u64) -> Option<Asked> {
+    pub fn ask(&mut self, request: Request, command: u16, from: Address, at_us: u64) -> Option<TicketedRequest> {
         let kills = request == Request::Kill;
         let mut places = self.asked.iter_mut().zip(0..).filter(|(_, ticket)| (*ticket == 0) == kills);
         match places.find(|(place, _)| place.is_none()) {
             Some((place, ticket)) => {
                 *place = Some(Open { command: Some(command), from, at_us });
-                Some(Asked { request, ticket })
+                Some(TicketedRequest { request, ticket })
             }
             None => {
                 // The motors are about to be stopped already.
@@ -75,11 +76,11 @@ impl Commands {
 
     /// Gives the guidance's order for a command, or for a message without an answer; none if too many are open, which
     /// is answered.
-    pub fn order(&mut self, order: Order, command: Option<u16>, from: Address, at_us: u64) -> Option<Given> {
+    pub fn order(&mut self, order: Order, command: Option<u16>, from: Address, at_us: u64) -> Option<TicketedOrder> {
         match self.ordered.iter_mut().zip(0..).find(|(place, _)| place.is_none()) {
             Some((place, ticket)) => {
                 *place = Some(Open { command, from, at_us });
-                Some(Given { order, ticket })
+                Some(TicketedOrder { order, ticket })
             }
             None => {
                 command.into_iter().for_each(|command| self.answer(command, Answer::Refused(BUSY), from));
@@ -116,15 +117,15 @@ impl Commands {
     }
 
     /// Converts the flight core's answer to a message, to its sender.
-    pub fn settle(&mut self, answer: afbc_flight_core::Answer) -> Option<Downlink> {
+    pub fn settle(&mut self, answer: afbc_flight_core::RequestAnswer) -> Option<Downlink> {
         let open = self.asked.get_mut(usize::from(answer.ticket))?.take()?;
-        open.told(answer.result.map_or_else(|refusal| Answer::Refused(refusal as i32), |()| Answer::Accepted))
+        open.answered(answer.result.map_or_else(|refusal| Answer::Refused(refusal as i32), |()| Answer::Accepted))
     }
 
     /// Converts the guidance's answer to a message, to its sender.
-    pub fn settle_order(&mut self, ticket: u8, result: Result<(), Declined>) -> Option<Downlink> {
+    pub fn settle_order(&mut self, ticket: u8, result: Result<(), OrderRefusal>) -> Option<Downlink> {
         let open = self.ordered.get_mut(usize::from(ticket))?.take()?;
-        open.told(result.map_or_else(|declined| Answer::Refused(declined as i32), |()| Answer::Accepted))
+        open.answered(result.map_or_else(|declined| Answer::Refused(declined as i32), |()| Answer::Accepted))
     }
 
     /// Returns the next answer to be sent at `now_us`.
@@ -136,14 +137,14 @@ impl Commands {
         let mut open = self.asked.iter_mut().chain(&mut self.ordered);
         // A message without an answer is forgotten without one.
         while let Some(lost) = open.find_map(|place| place.take_if(forgotten)) {
-            if let Some(told) = lost.told(Answer::Failed) {
+            if let Some(told) = lost.answered(Answer::Failed) {
                 return Some(told);
             }
         }
         match &mut self.lasting {
             Some((open, told_us)) if now_us.saturating_sub(*told_us) >= IN_PROGRESS_US => {
                 *told_us = now_us;
-                open.told(Answer::InProgress)
+                open.answered(Answer::InProgress)
             }
             _ => None,
         }
@@ -156,7 +157,7 @@ impl Commands {
 }
 
 impl Open {
-    fn told(self, answer: Answer) -> Option<Downlink> {
+    fn answered(self, answer: Answer) -> Option<Downlink> {
         self.command.map(|command| Downlink::Answer { command, answer, to: self.from })
     }
 }
@@ -183,7 +184,7 @@ mod tests {
         assert_eq!(commands.next(0), told(21, Answer::Refused(BUSY), A));
         assert_eq!(commands.settle_order(1, Ok(())), told(21, Answer::Accepted, B));
         assert_eq!(commands.settle_order(1, Ok(())), None, "once");
-        let declined = Declined::NotArmed;
+        let declined = OrderRefusal::NotArmed;
         assert_eq!(commands.settle_order(0, Err(declined)), told(21, Answer::Refused(declined as i32), A));
         assert_eq!(commands.settle_order(77, Ok(())), None);
         assert_eq!(commands.next(FORGOTTEN_US), None);

@@ -3,7 +3,7 @@
 //! The first station that commands is in control, until it has been silent for a time or hands over. A station is its
 //! system and component: the link has no other proof of who it is (`docs/security.md`).
 
-use afbc_link::{Address, Command, Control as Wish, ControlAnswer};
+use afbc_link::{Address, Command, ControlAnswer, ControlRequest as Wish};
 
 /// Silence after which a station is no longer in control \[us\].
 pub const SILENT_US: u64 = 10_000_000;
@@ -12,7 +12,7 @@ const TOLD_MAX: usize = 4;
 
 /// Who is in control.
 #[derive(Clone, Copy, Debug)]
-pub struct Control {
+pub struct OperatorControl {
     silent_us: u64,
     /// The station in control, and when it was last heard \[us\].
     holder: Option<(Address, u64)>,
@@ -24,7 +24,7 @@ pub struct Control {
 
 /// The answer to a station that wants to command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Claim {
+pub enum ControlClaim {
     /// It is in control.
     Granted,
     /// This one is.
@@ -36,13 +36,13 @@ pub enum Claim {
     },
 }
 
-impl Default for Control {
+impl Default for OperatorControl {
     fn default() -> Self {
-        Control { silent_us: SILENT_US, holder: None, told: [None; TOLD_MAX], next: 0 }
+        OperatorControl { silent_us: SILENT_US, holder: None, told: [None; TOLD_MAX], next: 0 }
     }
 }
 
-impl Control {
+impl OperatorControl {
     /// Sets the silence after which a station is no longer in control \[us\].
     pub fn set_silence(&mut self, silent_us: u64) {
         self.silent_us = silent_us;
@@ -65,33 +65,33 @@ impl Control {
     }
 
     /// Answers a station that wants to command: it is in control from now on if nobody else is.
-    pub fn claim(&mut self, from: Address, now_us: u64) -> Claim {
+    pub fn claim(&mut self, from: Address, now_us: u64) -> ControlClaim {
         match self.holder(now_us) {
-            Some(holder) if holder != from => Claim::Refused { holder, first_time: self.tell(from) },
-            Some(_) => Claim::Granted,
+            Some(holder) if holder != from => ControlClaim::Refused { holder, first_time: self.is_first_refusal(from) },
+            Some(_) => ControlClaim::Granted,
             None => {
                 (self.holder, self.told, self.next) = (Some((from, now_us)), [None; TOLD_MAX], 0);
-                Claim::Granted
+                ControlClaim::Granted
             }
         }
     }
 
     /// Answers CHANGE_OPERATOR_CONTROL.
-    pub fn change(&mut self, wish: Wish, from: Address, now_us: u64) -> (ControlAnswer, Claim) {
+    pub fn change(&mut self, wish: Wish, from: Address, now_us: u64) -> (ControlAnswer, ControlClaim) {
         let claim = match (wish, self.holder(now_us)) {
-            (Wish::Release, None) => Claim::Granted,
+            (Wish::Release, None) => ControlClaim::Granted,
             (Wish::Release, Some(holder)) if holder == from => {
                 self.holder = None;
-                Claim::Granted
+                ControlClaim::Granted
             }
             _ => self.claim(from, now_us),
         };
-        let granted = claim == Claim::Granted;
+        let granted = claim == ControlClaim::Granted;
         (ControlAnswer { station: from.system, control: wish, granted }, claim)
     }
 
     /// Returns whether a station is told for the first time.
-    fn tell(&mut self, from: Address) -> bool {
+    fn is_first_refusal(&mut self, from: Address) -> bool {
         let first_time = !self.told.contains(&Some(from));
         if first_time {
             if let Some(place) = self.told.get_mut(self.next) {
@@ -143,25 +143,25 @@ mod tests {
 
     #[test]
     fn the_first_one_is_in_control_until_it_is_silent() {
-        let mut control = Control::default();
+        let mut control = OperatorControl::default();
         assert_eq!(control.holder(0), None);
-        assert_eq!(control.claim(A, 0), Claim::Granted);
-        assert_eq!(control.claim(B, 1), Claim::Refused { holder: A, first_time: true });
-        assert_eq!(control.claim(B, 2), Claim::Refused { holder: A, first_time: false });
+        assert_eq!(control.claim(A, 0), ControlClaim::Granted);
+        assert_eq!(control.claim(B, 1), ControlClaim::Refused { holder: A, first_time: true });
+        assert_eq!(control.claim(B, 2), ControlClaim::Refused { holder: A, first_time: false });
         assert!(control.hear(A, SILENT_US));
         assert!(!control.hear(B, SILENT_US));
-        assert_eq!(control.claim(B, 2 * SILENT_US), Claim::Refused { holder: A, first_time: false });
+        assert_eq!(control.claim(B, 2 * SILENT_US), ControlClaim::Refused { holder: A, first_time: false });
         let mut back = control;
         assert!(back.hear(A, 2 * SILENT_US + 1));
-        assert!(matches!(back.claim(B, 2 * SILENT_US + 2), Claim::Refused { holder: A, .. }));
-        assert_eq!(control.claim(B, 2 * SILENT_US + 1), Claim::Granted);
+        assert!(matches!(back.claim(B, 2 * SILENT_US + 2), ControlClaim::Refused { holder: A, .. }));
+        assert_eq!(control.claim(B, 2 * SILENT_US + 1), ControlClaim::Granted);
         assert!(!control.hear(A, 2 * SILENT_US + 2));
-        assert_eq!(control.claim(A, 2 * SILENT_US + 2), Claim::Refused { holder: B, first_time: true });
+        assert_eq!(control.claim(A, 2 * SILENT_US + 2), ControlClaim::Refused { holder: B, first_time: true });
     }
 
     #[test]
     fn control_is_handed_over_by_its_holder_alone() {
-        let mut control = Control::default();
+        let mut control = OperatorControl::default();
         let granted = |wish, from: Address| ControlAnswer { station: from.system, control: wish, granted: true };
         assert_eq!(control.change(Wish::Take, A, 0).0, granted(Wish::Take, A));
         assert!(!control.change(Wish::Take, B, 1).0.granted);
@@ -176,14 +176,14 @@ mod tests {
     /// Who lets go of what nobody holds does not take it.
     #[test]
     fn a_release_takes_nothing() {
-        let mut control = Control::default();
+        let mut control = OperatorControl::default();
         let (answer, claim) = control.change(Wish::Release, B, 0);
-        assert_eq!((answer.granted, answer.station, claim), (true, B.system, Claim::Granted));
+        assert_eq!((answer.granted, answer.station, claim), (true, B.system, ControlClaim::Granted));
         assert_eq!(control.holder(0), None);
-        assert_eq!(control.claim(A, 1), Claim::Granted);
+        assert_eq!(control.claim(A, 1), ControlClaim::Granted);
         // Nor does one of another station.
         let (answer, claim) = control.change(Wish::Release, B, 2);
-        assert_eq!((answer.granted, claim), (false, Claim::Refused { holder: A, first_time: true }));
+        assert_eq!((answer.granted, claim), (false, ControlClaim::Refused { holder: A, first_time: true }));
         assert_eq!(control.holder(2), Some(A));
     }
 
@@ -191,12 +191,12 @@ mod tests {
     /// of anew.
     #[test]
     fn stations_are_told_once() {
-        let mut control = Control::default();
+        let mut control = OperatorControl::default();
         control.claim(A, 0);
         let station = |system| Address { system, component: 1 };
-        let told = |control: &mut Control, system| match control.claim(station(system), 1) {
-            Claim::Refused { holder, first_time } => (holder, first_time),
-            Claim::Granted => (station(system), false),
+        let told = |control: &mut OperatorControl, system| match control.claim(station(system), 1) {
+            ControlClaim::Refused { holder, first_time } => (holder, first_time),
+            ControlClaim::Granted => (station(system), false),
         };
         for system in 1..=TOLD_MAX as u8 {
             assert_eq!(told(&mut control, system), (A, true));
@@ -217,9 +217,9 @@ mod tests {
 
     #[test]
     fn silence_is_as_long_as_it_is_set() {
-        let mut control = Control::default();
+        let mut control = OperatorControl::default();
         control.set_silence(500);
-        assert_eq!(control.claim(A, 1000), Claim::Granted);
+        assert_eq!(control.claim(A, 1000), ControlClaim::Granted);
         for (now_us, holder) in [(1000, Some(A)), (1500, Some(A)), (1501, None)] {
             assert_eq!(control.holder(now_us), holder);
         }

@@ -1,9 +1,9 @@
 //! Files, of which the vehicle has none: each operation is refused as an unknown one, so that clients stop at once.
 
-use afbc_link::{FileError, FileOperation, FileRefusal};
+use afbc_link::{FileOperation, FileRefusal, FtpError};
 
 /// Returns the answer to an operation.
 pub fn answer(asked: FileOperation) -> FileRefusal {
     let FileOperation { sequence, session, operation, offset } = asked;
-    FileRefusal { sequence: sequence.wrapping_add(1), session, operation, offset, error: FileError::UNKNOWN_COMMAND }
+    FileRefusal { sequence: sequence.wrapping_add(1), session, operation, offset, error: FtpError::UNKNOWN_COMMAND }
 }

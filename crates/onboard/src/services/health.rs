@@ -1,6 +1,6 @@
 //! The vehicle's health as stations read it.
 
-use crate::services::picture::Picture;
+use crate::services::status::VehicleStatus;
 use afbc_flight_core::{Mode, Reasons};
 use afbc_guidance::FlightMode;
 use afbc_link::telemetry::{EstimatorStatus, SystemStatus};
@@ -27,59 +27,59 @@ const TAKING_OFF: u8 = 3;
 const LANDING: u8 = 4;
 
 /// Returns SYS_STATUS.
-pub fn system(picture: &Picture) -> SystemStatus {
-    let surroundings = &picture.surroundings;
+pub fn system(status: &VehicleStatus) -> SystemStatus {
+    let aux = &status.aux;
     let inertial = sensor::GYROSCOPE | sensor::ACCELEROMETER | sensor::ATTITUDE;
-    let located = picture.is_located();
-    let fixed = surroundings.receiver.is_some_and(|receiver| receiver.kind >= 3);
-    let armable = picture.mode.armed() || picture.against.is_some_and(Reasons::is_empty);
+    let located = status.is_located();
+    let fixed = aux.receiver.is_some_and(|receiver| receiver.kind >= 3);
+    let armable = status.mode.armed() || status.against.is_some_and(Reasons::is_empty);
     let sets = [
-        (picture.senses, true, inertial),
-        (!picture.senses, located, sensor::TRACKER),
-        (surroundings.receiver.is_some(), fixed && located, sensor::SATELLITES),
-        (surroundings.battery.is_some(), true, sensor::BATTERY),
+        (status.senses, true, inertial),
+        (!status.senses, located, sensor::TRACKER),
+        (aux.receiver.is_some(), fixed && located, sensor::SATELLITES),
+        (aux.battery.is_some(), true, sensor::BATTERY),
         (true, true, sensor::MOTORS),
         (true, armable, sensor::ARMING),
     ];
-    let told = surroundings.sensors;
+    let told = aux.sensors;
     let present = sets.iter().filter(|(present, ..)| *present).fold(told.present, |all, (_, _, bits)| all | bits);
     let well = sets.iter().filter(|(present, healthy, _)| *present && *healthy);
     let healthy = well.fold(told.present & told.healthy, |all, (_, _, bits)| all | bits);
-    let battery = surroundings.battery;
+    let battery = aux.battery;
     SystemStatus {
         present,
         enabled: present,
         healthy,
         // Of a tick's millisecond.
-        load_permille: picture.tick_us.clamp(0.0, 1000.0) as u16,
+        load_permille: status.tick_us.clamp(0.0, 1000.0) as u16,
         voltage_mv: battery.map_or(u16::MAX, |battery| battery.voltage_mv),
         current_ca: battery.map_or(-1, |battery| battery.current_ca),
         remaining_percent: battery.map_or(-1, |battery| battery.remaining_percent),
-        dropped_frames: u16::try_from(picture.dropped_frames).unwrap_or(u16::MAX),
+        dropped_frames: u16::try_from(status.dropped_frames).unwrap_or(u16::MAX),
     }
 }
 
 /// Returns ESTIMATOR_STATUS. Uncertainties are those of the satellite receiver, where there is one.
-pub fn estimator(picture: &Picture) -> EstimatorStatus {
+pub fn estimator(status: &VehicleStatus) -> EstimatorStatus {
     /// ATTITUDE, VELOCITY_HORIZ, VELOCITY_VERT, POS_HORIZ_REL, POS_VERT_ABS.
     const MOTION: u16 = 1 | 2 | 4 | 8 | 32;
     /// POS_HORIZ_ABS.
     const ABSOLUTE: u16 = 16;
-    let located = picture.is_located();
-    let absolute = located && picture.surroundings.origin.is_some();
-    let attitude = u16::from(picture.senses);
+    let located = status.is_located();
+    let absolute = located && status.aux.origin.is_some();
+    let attitude = u16::from(status.senses);
     let flags = if located { MOTION } else { attitude } | if absolute { ABSOLUTE } else { 0 };
-    let sigma_m = picture.surroundings.receiver.map_or([f32::NAN; 2], |receiver| {
+    let sigma_m = status.aux.receiver.map_or([f32::NAN; 2], |receiver| {
         receiver.sigma_mm.map(|sigma_mm| if sigma_mm == 0 { f32::NAN } else { sigma_mm as f32 * 1e-3 })
     });
-    EstimatorStatus { time_us: picture.time_us, flags, sigma_m }
+    EstimatorStatus { time_us: status.time_us, flags, sigma_m }
 }
 
 /// Returns the `MAV_LANDED_STATE`.
-pub fn landed(picture: &Picture) -> u8 {
-    match (picture.mode, picture.guided.mode) {
+pub fn landed(status: &VehicleStatus) -> u8 {
+    match (status.mode, status.guided.mode) {
         (Mode::Disarmed, _) => ON_GROUND,
-        _ if !picture.is_airborne() => ON_GROUND,
+        _ if !status.is_airborne() => ON_GROUND,
         (Mode::Descending, _) | (_, FlightMode::Land) => LANDING,
         (_, FlightMode::Takeoff) => TAKING_OFF,
         _ => IN_AIR,
@@ -90,17 +90,17 @@ pub fn landed(picture: &Picture) -> u8 {
 #[allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 mod tests {
     use super::*;
-    use crate::services::picture::{Receiver, Sensors};
+    use crate::services::status::{GnssReceiver, SensorBits};
     use afbc_flight_core::Refusal;
     use afbc_types::State;
 
-    fn well() -> Picture {
-        let mut picture = Picture { state: Some(State::default()), senses: true, ..Picture::default() };
-        picture.against = Some(Reasons::NONE);
-        picture.surroundings.receiver = Some(Receiver { kind: 3, satellites: 12, sigma_mm: [500, 800] });
+    fn well() -> VehicleStatus {
+        let mut status = VehicleStatus { state: Some(State::default()), senses: true, ..VehicleStatus::default() };
+        status.against = Some(Reasons::NONE);
+        status.aux.receiver = Some(GnssReceiver { kind: 3, satellites: 12, sigma_mm: [500, 800] });
         let sensors = sensor::MAGNETOMETER | sensor::BAROMETER;
-        picture.surroundings.sensors = Sensors { present: sensors, healthy: sensors };
-        picture
+        status.aux.sensors = SensorBits { present: sensors, healthy: sensors };
+        status
     }
 
     /// What MAVSDK's `health` reads: gyroscope, accelerometer, magnetometer, position, arming.
@@ -117,33 +117,33 @@ mod tests {
 
     #[test]
     fn each_fault_takes_its_bit() {
-        type Case = (fn(&mut Picture), u32);
+        type Case = (fn(&mut VehicleStatus), u32);
         let cases: [Case; 4] = [
-            (|picture| picture.surroundings.sensors.healthy = sensor::BAROMETER, sensor::MAGNETOMETER),
-            (|picture| picture.surroundings.receiver = Some(Receiver::default()), sensor::SATELLITES),
-            (|picture| picture.against = Some(Refusal::NotAtRest.into()), sensor::ARMING),
-            (|picture| picture.against = None, sensor::ARMING),
+            (|status| status.aux.sensors.healthy = sensor::BAROMETER, sensor::MAGNETOMETER),
+            (|status| status.aux.receiver = Some(GnssReceiver::default()), sensor::SATELLITES),
+            (|status| status.against = Some(Refusal::NotAtRest.into()), sensor::ARMING),
+            (|status| status.against = None, sensor::ARMING),
         ];
         let all = system(&well()).healthy;
         for (spoil, bit) in cases {
-            let mut picture = well();
-            spoil(&mut picture);
-            assert_eq!(system(&picture).healthy, all & !bit, "{bit:#x}");
+            let mut status = well();
+            spoil(&mut status);
+            assert_eq!(system(&status).healthy, all & !bit, "{bit:#x}");
         }
     }
 
     #[test]
     fn the_landed_state_follows_modes() {
-        let mut picture = well();
-        assert_eq!(landed(&picture), ON_GROUND);
-        picture.mode = Mode::Flying;
-        assert_eq!(landed(&picture), ON_GROUND);
-        picture.guided.airborne = true;
-        assert_eq!(landed(&picture), IN_AIR);
-        picture.guided.mode = FlightMode::Takeoff;
-        assert_eq!(landed(&picture), TAKING_OFF);
-        picture.mode = Mode::Descending;
-        assert_eq!(landed(&picture), LANDING);
+        let mut status = well();
+        assert_eq!(landed(&status), ON_GROUND);
+        status.mode = Mode::Flying;
+        assert_eq!(landed(&status), ON_GROUND);
+        status.guided.airborne = true;
+        assert_eq!(landed(&status), IN_AIR);
+        status.guided.mode = FlightMode::Takeoff;
+        assert_eq!(landed(&status), TAKING_OFF);
+        status.mode = Mode::Descending;
+        assert_eq!(landed(&status), LANDING);
     }
 
     /// Every set of what there is and what is well, by the definition of each bit.
@@ -151,24 +151,24 @@ mod tests {
     fn every_bit_is_there_and_well_by_what_it_means() {
         for case in 0..128_u32 {
             let has = |bit: u32| case >> bit & 1 == 1;
-            let mut picture = well();
-            picture.senses = has(0);
+            let mut status = well();
+            status.senses = has(0);
             if !has(1) {
-                picture.health.state_age_us = u32::MAX;
+                status.health.state_age_us = u32::MAX;
             }
-            picture.surroundings.receiver =
-                has(2).then_some(Receiver { kind: if has(3) { 3 } else { 2 }, satellites: 9, sigma_mm: [0; 2] });
-            let battery = afbc_link::telemetry::Battery {
+            status.aux.receiver =
+                has(2).then_some(GnssReceiver { kind: if has(3) { 3 } else { 2 }, satellites: 9, sigma_mm: [0; 2] });
+            let battery = afbc_link::telemetry::BatteryStatus {
                 voltage_mv: 11_100,
                 current_ca: 250,
                 remaining_percent: 66,
                 consumed_mah: 5,
                 charge: 1,
             };
-            picture.surroundings.battery = has(4).then_some(battery);
-            picture.mode = if has(5) { Mode::Flying } else { Mode::Disarmed };
-            picture.against = Some(if has(6) { Refusal::NotAtRest.into() } else { Reasons::NONE });
-            (picture.tick_us, picture.dropped_frames) = (123.9, 77);
+            status.aux.battery = has(4).then_some(battery);
+            status.mode = if has(5) { Mode::Flying } else { Mode::Disarmed };
+            status.against = Some(if has(6) { Refusal::NotAtRest.into() } else { Reasons::NONE });
+            (status.tick_us, status.dropped_frames) = (123.9, 77);
             let inertial = sensor::GYROSCOPE | sensor::ACCELEROMETER | sensor::ATTITUDE;
             let others = sensor::MAGNETOMETER | sensor::BAROMETER | sensor::MOTORS;
             let present = others
@@ -179,36 +179,36 @@ mod tests {
             let ill = if !has(0) && !has(1) { sensor::TRACKER } else { 0 }
                 + if has(2) && !(has(1) && has(3)) { sensor::SATELLITES } else { 0 }
                 + if has(6) && !has(5) { sensor::ARMING } else { 0 };
-            let told = system(&picture);
+            let told = system(&status);
             assert_eq!((told.present, told.enabled, told.healthy), (present, present, present - ill), "{case:#b}");
             assert_eq!((told.load_permille, told.dropped_frames), (123, 77));
             let battery = if has(4) { (11_100, 250, 66) } else { (u16::MAX, -1, -1) };
             assert_eq!((told.voltage_mv, told.current_ca, told.remaining_percent), battery);
 
-            picture.surroundings.origin = has(6).then(|| {
-                let at = crate::services::origin::Origin::SIMULATED;
-                crate::services::origin::Origin::new(at).expect("possible")
+            status.aux.origin = has(6).then(|| {
+                let at = crate::services::origin::EarthOrigin::SIMULATED;
+                crate::services::origin::EarthOrigin::new(at).expect("possible")
             });
             let motion = if has(1) { 1 + 2 + 4 + 8 + 32 } else { u16::from(has(0)) };
             let absolute = if has(1) && has(6) { 16 } else { 0 };
-            assert_eq!(estimator(&picture).flags, motion + absolute, "{case:#b}");
-            assert!(estimator(&picture).sigma_m.iter().all(|sigma| sigma.is_nan()));
+            assert_eq!(estimator(&status).flags, motion + absolute, "{case:#b}");
+            assert!(estimator(&status).sigma_m.iter().all(|sigma| sigma.is_nan()));
         }
-        let mut picture = well();
-        picture.time_us = 42;
-        assert_eq!((estimator(&picture).time_us, estimator(&picture).sigma_m), (42, [0.5, 0.8]));
+        let mut status = well();
+        status.time_us = 42;
+        assert_eq!((estimator(&status).time_us, estimator(&status).sigma_m), (42, [0.5, 0.8]));
         // What the shell says is ill is ill, and what is not there is not well.
-        let sensors = Sensors { present: sensor::BAROMETER, healthy: sensor::MAGNETOMETER };
-        picture.surroundings.sensors = sensors;
-        let told = system(&picture);
+        let sensors = SensorBits { present: sensor::BAROMETER, healthy: sensor::MAGNETOMETER };
+        status.aux.sensors = sensors;
+        let told = system(&status);
         assert_eq!((told.present & 12, told.healthy & 12), (sensor::BAROMETER, 0));
-        (picture.tick_us, picture.dropped_frames) = (5e3, 70_000);
-        assert_eq!((system(&picture).load_permille, system(&picture).dropped_frames), (1000, u16::MAX));
+        (status.tick_us, status.dropped_frames) = (5e3, 70_000);
+        assert_eq!((system(&status).load_permille, system(&status).dropped_frames), (1000, u16::MAX));
     }
 
     #[test]
     fn landings_are_told_in_the_air_only() {
-        let mut picture = well();
+        let mut status = well();
         for (mode, flight_mode, airborne, expected) in [
             (Mode::Flying, FlightMode::Land, true, LANDING),
             (Mode::Flying, FlightMode::Land, false, ON_GROUND),
@@ -217,8 +217,8 @@ mod tests {
             (Mode::Coasting, FlightMode::Hold, true, IN_AIR),
             (Mode::Coasting, FlightMode::Takeoff, true, TAKING_OFF),
         ] {
-            (picture.mode, picture.guided.mode, picture.guided.airborne) = (mode, flight_mode, airborne);
-            assert_eq!(landed(&picture), expected, "{mode:?} {flight_mode:?} {airborne}");
+            (status.mode, status.guided.mode, status.guided.airborne) = (mode, flight_mode, airborne);
+            assert_eq!(landed(&status), expected, "{mode:?} {flight_mode:?} {airborne}");
         }
     }
 }

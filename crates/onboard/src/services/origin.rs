@@ -24,7 +24,7 @@ pub struct Global {
 
 /// Origin of the local frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Origin {
+pub struct EarthOrigin {
     at: Global,
     sine: f64,
     cosine: f64,
@@ -33,7 +33,7 @@ pub struct Origin {
     from_equator_m: f64,
 }
 
-impl Origin {
+impl EarthOrigin {
     /// Of simulators: PX4's usual place near Zurich.
     pub const SIMULATED: Global = Global { latitude_deg: 47.397_742, longitude_deg: 8.545_594, altitude_m: 488.0 };
 
@@ -43,7 +43,7 @@ impl Origin {
         let possible = latitude_deg.abs() < 89.99 && longitude_deg.abs() <= 180.0 && altitude_m.abs() <= 1e5;
         let (sine, cosine) = libm::sincos(latitude_deg * DEG);
         let [from_axis_m, from_equator_m] = meridian(sine, cosine, altitude_m);
-        possible.then_some(Origin { at, sine, cosine, from_axis_m, from_equator_m })
+        possible.then_some(EarthOrigin { at, sine, cosine, from_axis_m, from_equator_m })
     }
 
     /// Returns where it is.
@@ -116,7 +116,7 @@ impl Global {
 
 /// Returns a place of a station in the local frame \[m\], NaN where it is not given. Altitudes count from `home_m` or
 /// from `here_m`, if they are said to. A horizontal coordinate alone is not given.
-pub fn resolve(origin: &Origin, place: &Place, home_m: f32, here_m: f32) -> Vector3<f32> {
+pub fn resolve(origin: &EarthOrigin, place: &Place, home_m: f32, here_m: f32) -> Vector3<f32> {
     use afbc_link::Datum;
     let height = f64::from(place.height.metres);
     let z = match place.height.above {
@@ -141,9 +141,9 @@ mod tests {
     /// Axes: north is x, west is y.
     #[test]
     fn axes_point_north_and_west() {
-        let origin = Origin::new(Origin::SIMULATED).expect("possible");
-        let north = Global { latitude_deg: Origin::SIMULATED.latitude_deg + 0.001, ..Origin::SIMULATED };
-        let east = Global { longitude_deg: Origin::SIMULATED.longitude_deg + 0.001, ..Origin::SIMULATED };
+        let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
+        let north = Global { latitude_deg: EarthOrigin::SIMULATED.latitude_deg + 0.001, ..EarthOrigin::SIMULATED };
+        let east = Global { longitude_deg: EarthOrigin::SIMULATED.longitude_deg + 0.001, ..EarthOrigin::SIMULATED };
         // A thousandth of a degree at 47.4 degrees: 111.178 m and 75.46 m (Bureau international de l'heure).
         let [n, e] = [north, east].map(|place| origin.local(&place));
         assert!((n.x - 111.18).abs() < 0.05 && n.y.abs() < 1e-2, "{n}");
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn the_date_line_is_crossed() {
-        let origin = Origin::new(Global { latitude_deg: 0.0, longitude_deg: 179.9999, altitude_m: 0.0 });
+        let origin = EarthOrigin::new(Global { latitude_deg: 0.0, longitude_deg: 179.9999, altitude_m: 0.0 });
         let east = Global { latitude_deg: 0.0, longitude_deg: -179.9999, altitude_m: 0.0 };
         let local = origin.expect("possible").local(&east);
         assert!((local.y + 22.26).abs() < 0.05, "{local}");
@@ -161,13 +161,13 @@ mod tests {
     #[test]
     fn poles_and_nonsense_are_no_origins() {
         for (latitude_deg, longitude_deg) in [(90.0, 0.0), (f64::NAN, 0.0), (0.0, f64::INFINITY), (0.0, 181.0)] {
-            assert_eq!(Origin::new(Global { latitude_deg, longitude_deg, altitude_m: 0.0 }), None);
+            assert_eq!(EarthOrigin::new(Global { latitude_deg, longitude_deg, altitude_m: 0.0 }), None);
         }
     }
 
     #[test]
     fn heights_count_from_what_they_say() {
-        let origin = Origin::new(Origin::SIMULATED).expect("possible");
+        let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
         let z = |above| {
             let height = Height { metres: 490.0, above };
             let place = Place { latitude_e7: Place::AS_IT_IS, longitude_e7: 0, height };
@@ -182,7 +182,7 @@ mod tests {
     fn origins_reach_up_to_their_limits() {
         let at = |latitude_deg, longitude_deg, altitude_m| Global { latitude_deg, longitude_deg, altitude_m };
         for good in [at(89.98, 180.0, 1e5), at(-89.98, -180.0, -1e5), at(0.0, 0.0, 0.0)] {
-            assert_eq!(Origin::new(good).map(|origin| origin.at()), Some(good));
+            assert_eq!(EarthOrigin::new(good).map(|origin| origin.at()), Some(good));
         }
         for bad in [
             at(89.99, 0.0, 0.0),
@@ -191,7 +191,7 @@ mod tests {
             at(0.0, 0.0, 100_001.0),
             at(0.0, 0.0, -1e6),
         ] {
-            assert_eq!(Origin::new(bad), None, "{bad:?}");
+            assert_eq!(EarthOrigin::new(bad), None, "{bad:?}");
         }
     }
 
@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn units_are_those_of_the_wire() {
         for (altitude_m, mm) in [(488.0, 488_000), (-12.3456, -12_346), (0.0006, 1), (0.0004, 0)] {
-            assert_eq!(Global { altitude_m, ..Origin::SIMULATED }.altitude_mm(), mm);
+            assert_eq!(Global { altitude_m, ..EarthOrigin::SIMULATED }.altitude_mm(), mm);
         }
         let place = Global { latitude_deg: -12.345_678_94, longitude_deg: 123.456_789_06, altitude_m: 3.0 };
         assert_eq!(place.e7(), [-123_456_789, 1_234_567_891]);
@@ -211,20 +211,20 @@ mod tests {
     /// Heights above the origin, in both directions, and across the date line to the west too.
     #[test]
     fn heights_and_the_date_line_have_two_sides() {
-        let origin = Origin::new(Origin::SIMULATED).expect("possible");
+        let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
         let above = origin.global(&Vector3::new(0.0, 0.0, 12.5));
         assert_eq!(above.altitude_m, 500.5);
         assert_eq!(origin.local(&above).z, 12.5);
         let east = Global { latitude_deg: 0.0, longitude_deg: -179.9999, altitude_m: 0.0 };
         let west = Global { longitude_deg: 179.9999, ..east };
-        let local = Origin::new(east).expect("possible").local(&west);
+        let local = EarthOrigin::new(east).expect("possible").local(&west);
         assert!((local.y - 22.26).abs() < 0.05, "{local}");
     }
 
     /// A place with both coordinates is where it is, at the height that it says; with one alone it is nowhere.
     #[test]
     fn a_place_of_a_station_is_resolved() {
-        let origin = Origin::new(Origin::SIMULATED).expect("possible");
+        let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
         let there = Vector3::new(300.0, -200.0, 0.0);
         let [latitude_e7, longitude_e7] = origin.global(&there).e7();
         for (above, z) in [(Datum::Sea, 12.0), (Datum::Home, 505.0), (Datum::Here, 507.0)] {

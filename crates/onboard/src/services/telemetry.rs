@@ -2,10 +2,10 @@
 
 use crate::services::health;
 use crate::services::modes;
-use crate::services::origin::{Global, Origin};
-use crate::services::picture::Picture;
+use crate::services::origin::{EarthOrigin, Global};
+use crate::services::status::VehicleStatus;
 use crate::services::streams::id;
-use afbc_link::telemetry::{self, ActuatorOutputs, AttitudeQuaternion, Fix, GlobalPosition, Home, Summary, Version};
+use afbc_link::telemetry::{self, ActuatorOutputs, AttitudeQuaternion, Fix, GlobalPosition, Home, Version, VfrHud};
 use afbc_link::{Clock, Downlink, Telemetry};
 use nalgebra::Vector3;
 
@@ -15,46 +15,46 @@ const CAPABILITIES: u64 = 4 | 8 | 16 | 64 | 128 | 256 | 8192;
 const TAU: f32 = core::f32::consts::TAU;
 
 /// Returns the telemetry message numbered `message`, if what it tells is known.
-pub fn compose(message: u32, picture: &Picture) -> Option<Downlink> {
+pub fn compose(message: u32, status: &VehicleStatus) -> Option<Downlink> {
     let telemetry = |telemetry| Some(Downlink::Telemetry(telemetry));
-    let (time_ms, time_us) = (picture.time_ms(), picture.time_us);
+    let (time_ms, time_us) = (status.time_ms(), status.time_us);
     match message {
-        id::SYS_STATUS => telemetry(Telemetry::System(health::system(picture))),
+        id::SYS_STATUS => telemetry(Telemetry::System(health::system(status))),
         id::SYSTEM_TIME => {
-            let powered_up_us = picture.surroundings.powered_up_us;
+            let powered_up_us = status.aux.powered_up_us;
             let unix_us = if powered_up_us == 0 { 0 } else { powered_up_us.saturating_add(time_us) };
             Some(Downlink::Clock(Clock::Time { unix_us, boot_ms: time_ms }))
         }
-        id::GPS_RAW_INT => telemetry(Telemetry::Fix(fix(picture)?)),
+        id::GPS_RAW_INT => telemetry(Telemetry::Fix(fix(status)?)),
         id::ATTITUDE => {
-            let state = picture.state?;
+            let state = status.state?;
             let (attitude_rad, rates_rad_s) = (state.attitude_rad, state.rates_rad_s);
             Some(Downlink::Attitude { time_ms, attitude_rad, rates_rad_s })
         }
         id::ATTITUDE_QUATERNION => {
-            let state = picture.state?;
+            let state = status.state?;
             let attitude = quaternion(&state);
             telemetry(Telemetry::Attitude(AttitudeQuaternion { time_ms, attitude, rates_rad_s: state.rates_rad_s }))
         }
         id::LOCAL_POSITION_NED => {
-            let state = picture.state?;
+            let state = status.state?;
             let (position_m, velocity_m_s) = (state.position_m, state.velocity_m_s);
             Some(Downlink::Position { time_ms, position_m, velocity_m_s })
         }
-        id::GLOBAL_POSITION_INT => telemetry(Telemetry::Global(global(picture)?)),
+        id::GLOBAL_POSITION_INT => telemetry(Telemetry::Global(global(status)?)),
         id::GPS_GLOBAL_ORIGIN => {
-            let at = picture.surroundings.origin?.at();
+            let at = status.aux.origin?.at();
             let (place_e7, altitude_mm) = (at.e7(), at.altitude_mm());
-            telemetry(Telemetry::Origin(telemetry::Origin { place_e7, altitude_mm, time_us }))
+            telemetry(Telemetry::Origin(telemetry::GlobalOrigin { place_e7, altitude_mm, time_us }))
         }
-        id::VFR_HUD => telemetry(Telemetry::Summary(summary(picture)?)),
-        id::BATTERY_STATUS => telemetry(Telemetry::Battery(picture.surroundings.battery?)),
-        id::ESTIMATOR_STATUS => telemetry(Telemetry::Estimator(health::estimator(picture))),
-        id::HOME_POSITION => telemetry(Telemetry::Home(home(picture)?)),
-        id::EXTENDED_SYS_STATE => telemetry(Telemetry::Landed(health::landed(picture))),
+        id::VFR_HUD => telemetry(Telemetry::Summary(summary(status)?)),
+        id::BATTERY_STATUS => telemetry(Telemetry::Battery(status.aux.battery?)),
+        id::ESTIMATOR_STATUS => telemetry(Telemetry::Estimator(health::estimator(status))),
+        id::HOME_POSITION => telemetry(Telemetry::Home(home(status)?)),
+        id::EXTENDED_SYS_STATE => telemetry(Telemetry::Landed(health::landed(status))),
         id::ACTUATOR_OUTPUT_STATUS => {
-            let throttles = picture.throttles.map(throttle);
-            telemetry(Telemetry::Outputs(ActuatorOutputs { time_us, active: picture.rotors.into(), throttles }))
+            let throttles = status.throttles.map(throttle);
+            telemetry(Telemetry::Outputs(ActuatorOutputs { time_us, active: status.rotors.into(), throttles }))
         }
         id::AUTOPILOT_VERSION => {
             let software = [version(env!("CARGO_PKG_VERSION_MAJOR")), version(env!("CARGO_PKG_VERSION_MINOR"))];
@@ -63,7 +63,7 @@ pub fn compose(message: u32, picture: &Picture) -> Option<Downlink> {
             telemetry(Telemetry::Version(Version { capabilities: CAPABILITIES, uid: 0, software, commit: [0; 8] }))
         }
         id::PROTOCOL_VERSION => telemetry(Telemetry::Protocol),
-        id::CURRENT_MODE => Some(Downlink::CurrentMode(modes::current(picture.flight_mode(), picture.guided.mode))),
+        id::CURRENT_MODE => Some(Downlink::CurrentMode(modes::current(status.flight_mode(), status.guided.mode))),
         _ => None,
     }
 }
@@ -91,56 +91,56 @@ fn heading_deg(yaw_rad: f32) -> f32 {
 }
 
 /// Returns home, or the origin of the local frame while there is none.
-fn home_m(picture: &Picture) -> Vector3<f32> {
-    picture.guided.home_m.unwrap_or_default()
+fn home_m(status: &VehicleStatus) -> Vector3<f32> {
+    status.guided.home_m.unwrap_or_default()
 }
 
-fn place(picture: &Picture) -> Option<(Origin, Global, afbc_types::State)> {
-    let (origin, state) = (picture.surroundings.origin?, picture.state?);
-    picture.is_located().then(|| (origin, origin.global(&state.position_m), state))
+fn place(status: &VehicleStatus) -> Option<(EarthOrigin, Global, afbc_types::State)> {
+    let (origin, state) = (status.aux.origin?, status.state?);
+    status.is_located().then(|| (origin, origin.global(&state.position_m), state))
 }
 
-fn global(picture: &Picture) -> Option<GlobalPosition> {
-    let (_, place, state) = place(picture)?;
+fn global(status: &VehicleStatus) -> Option<GlobalPosition> {
+    let (_, place, state) = place(status)?;
     let cm_s = |speed_m_s: f32| (speed_m_s * 100.0) as i16;
     let v = state.velocity_m_s;
     Some(GlobalPosition {
-        time_ms: picture.time_ms(),
+        time_ms: status.time_ms(),
         place_e7: place.e7(),
         altitude_mm: place.altitude_mm(),
-        relative_mm: ((state.position_m.z - home_m(picture).z) * 1e3) as i32,
+        relative_mm: ((state.position_m.z - home_m(status).z) * 1e3) as i32,
         velocity_ned_cm_s: [cm_s(v.x), cm_s(-v.y), cm_s(-v.z)],
         heading_cdeg: ((heading_deg(state.attitude_rad.z) * 100.0) as u16).min(35_999),
     })
 }
 
-fn fix(picture: &Picture) -> Option<Fix> {
-    let receiver = picture.surroundings.receiver?;
-    let known = place(picture);
+fn fix(status: &VehicleStatus) -> Option<Fix> {
+    let receiver = status.aux.receiver?;
+    let known = place(status);
     let (place_e7, altitude_mm) = known.as_ref().map_or(([0; 2], 0), |(_, place, _)| (place.e7(), place.altitude_mm()));
     let (speed_cm_s, course_cdeg) = known.map_or((u16::MAX, u16::MAX), |(.., state)| {
         let v = state.velocity_m_s;
         let course = heading_deg(libm::atan2f(v.y, v.x)) * 100.0;
         ((libm::hypotf(v.x, v.y) * 100.0) as u16, (course as u16).min(35_999))
     });
-    let crate::services::picture::Receiver { kind, satellites, sigma_mm } = receiver;
-    Some(Fix { time_us: picture.time_us, place_e7, altitude_mm, kind, satellites, sigma_mm, speed_cm_s, course_cdeg })
+    let crate::services::status::GnssReceiver { kind, satellites, sigma_mm } = receiver;
+    Some(Fix { time_us: status.time_us, place_e7, altitude_mm, kind, satellites, sigma_mm, speed_cm_s, course_cdeg })
 }
 
-fn home(picture: &Picture) -> Option<Home> {
-    let (origin, position_m) = (picture.surroundings.origin?, picture.guided.home_m?);
+fn home(status: &VehicleStatus) -> Option<Home> {
+    let (origin, position_m) = (status.aux.origin?, status.guided.home_m?);
     let place = origin.global(&position_m);
     let (place_e7, altitude_mm, attitude) = (place.e7(), place.altitude_mm(), [1.0, 0.0, 0.0, 0.0]);
-    Some(Home { place_e7, altitude_mm, position_m, attitude, time_us: picture.time_us })
+    Some(Home { place_e7, altitude_mm, position_m, attitude, time_us: status.time_us })
 }
 
-fn summary(picture: &Picture) -> Option<Summary> {
-    let state = picture.state?;
+fn summary(status: &VehicleStatus) -> Option<VfrHud> {
+    let state = status.state?;
     let v = state.velocity_m_s;
-    let above_m = picture.surroundings.origin.map_or(0.0, |origin| origin.at().altitude_m as f32);
-    let rotors = usize::from(picture.rotors).max(1);
-    let throttles = picture.throttles.iter().take(rotors).map(|it| throttle(*it)).sum::<f32>() / rotors as f32;
-    Some(Summary {
+    let above_m = status.aux.origin.map_or(0.0, |origin| origin.at().altitude_m as f32);
+    let rotors = usize::from(status.rotors).max(1);
+    let throttles = status.throttles.iter().take(rotors).map(|it| throttle(*it)).sum::<f32>() / rotors as f32;
+    Some(VfrHud {
         speed_m_s: libm::hypotf(v.x, v.y),
         altitude_m: above_m + state.position_m.z,
         climb_m_s: v.z,
@@ -167,10 +167,10 @@ mod tests {
         assert_eq!(["0", "7", "12"].map(version), [0, 7, 12]);
     }
 
-    /// Nothing is told that is not known, and a vehicle that knows nothing tells that it is not well.
+    /// Telemetry contains no value that is not known; a vehicle without any reports that it is not healthy.
     #[test]
     fn what_is_not_known_is_not_told() {
-        let picture = Picture::default();
+        let status = VehicleStatus::default();
         for message in [
             id::GPS_RAW_INT,
             id::ATTITUDE,
@@ -181,33 +181,34 @@ mod tests {
             id::HOME_POSITION,
             id::VFR_HUD,
         ] {
-            assert_eq!(compose(message, &picture), None, "message {message}");
+            assert_eq!(compose(message, &status), None, "message {message}");
         }
         for message in [id::SYS_STATUS, id::ESTIMATOR_STATUS, id::EXTENDED_SYS_STATE, id::AUTOPILOT_VERSION] {
-            assert!(compose(message, &picture).is_some(), "message {message}");
+            assert!(compose(message, &status).is_some(), "message {message}");
         }
     }
 
     /// A vehicle that flies, of which everything is known.
-    fn flying() -> Picture {
+    fn flying() -> VehicleStatus {
         let state = afbc_types::State {
             position_m: Vector3::new(30.0, -20.0, 12.5),
             velocity_m_s: Vector3::new(3.0, -4.0, 1.25),
             attitude_rad: Vector3::new(0.1, -0.2, -0.5),
             rates_rad_s: Vector3::new(0.3, 0.4, -0.6),
         };
-        let mut picture = Picture { state: Some(state), time_us: 5_000_123, rotors: 4, ..Picture::default() };
-        picture.guided.home_m = Some(Vector3::new(1.0, 2.0, 2.5));
-        picture.throttles = [47, 1047, 2047, 1047, 0, 0, 0, 0];
-        picture.surroundings.origin = Origin::new(Origin::SIMULATED);
-        picture.surroundings.receiver =
-            Some(crate::services::picture::Receiver { kind: 3, satellites: 11, sigma_mm: [700, 900] });
-        picture.surroundings.powered_up_us = 1_700_000_000_000_000;
-        picture
+        let mut status =
+            VehicleStatus { state: Some(state), time_us: 5_000_123, rotors: 4, ..VehicleStatus::default() };
+        status.guided.home_m = Some(Vector3::new(1.0, 2.0, 2.5));
+        status.throttles = [47, 1047, 2047, 1047, 0, 0, 0, 0];
+        status.aux.origin = EarthOrigin::new(EarthOrigin::SIMULATED);
+        status.aux.receiver =
+            Some(crate::services::status::GnssReceiver { kind: 3, satellites: 11, sigma_mm: [700, 900] });
+        status.aux.powered_up_us = 1_700_000_000_000_000;
+        status
     }
 
-    fn told(message: u32, picture: &Picture) -> Telemetry {
-        match compose(message, picture) {
+    fn told(message: u32, status: &VehicleStatus) -> Telemetry {
+        match compose(message, status) {
             Some(Downlink::Telemetry(telemetry)) => telemetry,
             other => panic!("message {message}: {other:?}"),
         }
@@ -216,42 +217,45 @@ mod tests {
     /// The messages of the state, each number by its meaning: z up and y to the left here, down and to the right there.
     #[test]
     fn a_flying_vehicle_tells_its_state() {
-        let picture = flying();
-        let (origin, state) = (picture.surroundings.origin.expect("known"), picture.state.expect("known"));
+        let status = flying();
+        let (origin, state) = (status.aux.origin.expect("known"), status.state.expect("known"));
         let here = origin.global(&state.position_m);
-        let Telemetry::Global(global) = told(id::GLOBAL_POSITION_INT, &picture) else { panic!("another") };
+        let Telemetry::Global(global) = told(id::GLOBAL_POSITION_INT, &status) else { panic!("another") };
         assert_eq!((global.time_ms, global.place_e7, global.altitude_mm), (5_000, here.e7(), 500_500));
         assert_eq!((global.relative_mm, global.velocity_ned_cm_s), (10_000, [300, 400, -125]));
         // Half a radian to the right.
         assert_eq!(global.heading_cdeg, 2864);
-        let Telemetry::Fix(fix) = told(id::GPS_RAW_INT, &picture) else { panic!("another") };
+        let Telemetry::Fix(fix) = told(id::GPS_RAW_INT, &status) else { panic!("another") };
         assert_eq!((fix.time_us, fix.place_e7, fix.altitude_mm), (5_000_123, here.e7(), 500_500));
         assert_eq!((fix.kind, fix.satellites, fix.sigma_mm), (3, 11, [700, 900]));
         // 3 m/s north, 4 m/s east: 53.13 degrees.
         assert_eq!((fix.speed_cm_s, fix.course_cdeg), (500, 5313));
-        let Telemetry::Summary(summary) = told(id::VFR_HUD, &picture) else { panic!("another") };
+        let Telemetry::Summary(summary) = told(id::VFR_HUD, &status) else { panic!("another") };
         assert_eq!((summary.speed_m_s, summary.altitude_m, summary.climb_m_s), (5.0, 500.5, 1.25));
         // Nothing, half, full, half.
         assert_eq!((summary.heading_deg, summary.throttle_percent), (28, 50));
-        let Telemetry::Attitude(attitude) = told(id::ATTITUDE_QUATERNION, &picture) else { panic!("another") };
+        let Telemetry::Attitude(attitude) = told(id::ATTITUDE_QUATERNION, &status) else { panic!("another") };
         let q = state.quaternion().coords;
         assert_eq!((attitude.time_ms, attitude.rates_rad_s), (5_000, state.rates_rad_s));
         assert_eq!(attitude.attitude, [q.w, q.x, q.y, q.z]);
         let (attitude_rad, rates_rad_s) = (state.attitude_rad, state.rates_rad_s);
         assert_eq!(
-            compose(id::ATTITUDE, &picture),
+            compose(id::ATTITUDE, &status),
             Some(Downlink::Attitude { time_ms: 5_000, attitude_rad, rates_rad_s })
         );
         let (position_m, velocity_m_s) = (state.position_m, state.velocity_m_s);
         let position = Downlink::Position { time_ms: 5_000, position_m, velocity_m_s };
-        assert_eq!(compose(id::LOCAL_POSITION_NED, &picture), Some(position));
-        let Telemetry::Home(home) = told(id::HOME_POSITION, &picture) else { panic!("another") };
+        assert_eq!(compose(id::LOCAL_POSITION_NED, &status), Some(position));
+        let Telemetry::Home(home) = told(id::HOME_POSITION, &status) else { panic!("another") };
         let at = origin.global(&Vector3::new(1.0, 2.0, 2.5));
         assert_eq!((home.place_e7, home.altitude_mm, home.time_us), (at.e7(), 490_500, 5_000_123));
         assert_eq!((home.position_m, home.attitude), (Vector3::new(1.0, 2.0, 2.5), [1.0, 0.0, 0.0, 0.0]));
-        let Telemetry::Origin(place) = told(id::GPS_GLOBAL_ORIGIN, &picture) else { panic!("another") };
-        assert_eq!((place.place_e7, place.altitude_mm, place.time_us), (Origin::SIMULATED.e7(), 488_000, 5_000_123));
-        let Telemetry::Outputs(outputs) = told(id::ACTUATOR_OUTPUT_STATUS, &picture) else { panic!("another") };
+        let Telemetry::Origin(place) = told(id::GPS_GLOBAL_ORIGIN, &status) else { panic!("another") };
+        assert_eq!(
+            (place.place_e7, place.altitude_mm, place.time_us),
+            (EarthOrigin::SIMULATED.e7(), 488_000, 5_000_123)
+        );
+        let Telemetry::Outputs(outputs) = told(id::ACTUATOR_OUTPUT_STATUS, &status) else { panic!("another") };
         assert_eq!((outputs.time_us, outputs.active), (5_000_123, 4));
         assert_eq!(outputs.throttles, [0.0, 0.5, 1.0, 0.5, 0.0, 0.0, 0.0, 0.0]);
     }
@@ -259,31 +263,31 @@ mod tests {
     /// Without a place on the earth, or a position, only what is known is told.
     #[test]
     fn what_is_half_known_is_told_by_halves() {
-        let mut picture = flying();
-        picture.health.state_age_us = u32::MAX;
-        assert_eq!(compose(id::GLOBAL_POSITION_INT, &picture), None);
-        let Telemetry::Fix(fix) = told(id::GPS_RAW_INT, &picture) else { panic!("another") };
+        let mut status = flying();
+        status.health.state_age_us = u32::MAX;
+        assert_eq!(compose(id::GLOBAL_POSITION_INT, &status), None);
+        let Telemetry::Fix(fix) = told(id::GPS_RAW_INT, &status) else { panic!("another") };
         assert_eq!((fix.place_e7, fix.altitude_mm, fix.speed_cm_s, fix.course_cdeg), ([0; 2], 0, 65_535, 65_535));
-        let mut picture = flying();
-        picture.surroundings.origin = None;
-        let Telemetry::Summary(summary) = told(id::VFR_HUD, &picture) else { panic!("another") };
+        let mut status = flying();
+        status.aux.origin = None;
+        let Telemetry::Summary(summary) = told(id::VFR_HUD, &status) else { panic!("another") };
         assert_eq!(summary.altitude_m, 12.5);
-        assert_eq!([id::HOME_POSITION, id::GPS_GLOBAL_ORIGIN].map(|it| compose(it, &picture)), [None, None]);
+        assert_eq!([id::HOME_POSITION, id::GPS_GLOBAL_ORIGIN].map(|it| compose(it, &status)), [None, None]);
         // While there is no home, heights count from the origin.
-        let mut picture = flying();
-        picture.guided.home_m = None;
-        let Telemetry::Global(global) = told(id::GLOBAL_POSITION_INT, &picture) else { panic!("another") };
-        assert_eq!((global.relative_mm, compose(id::HOME_POSITION, &picture)), (12_500, None));
+        let mut status = flying();
+        status.guided.home_m = None;
+        let Telemetry::Global(global) = told(id::GLOBAL_POSITION_INT, &status) else { panic!("another") };
+        assert_eq!((global.relative_mm, compose(id::HOME_POSITION, &status)), (12_500, None));
     }
 
     #[test]
     fn clocks_versions_and_modes_are_told() {
-        let mut picture = flying();
+        let mut status = flying();
         let time = |unix_us| Some(Downlink::Clock(Clock::Time { unix_us, boot_ms: 5_000 }));
-        assert_eq!(compose(id::SYSTEM_TIME, &picture), time(1_700_000_005_000_123));
-        picture.surroundings.powered_up_us = 0;
-        assert_eq!(compose(id::SYSTEM_TIME, &picture), time(0));
-        let Telemetry::Version(version) = told(id::AUTOPILOT_VERSION, &picture) else { panic!("another") };
+        assert_eq!(compose(id::SYSTEM_TIME, &status), time(1_700_000_005_000_123));
+        status.aux.powered_up_us = 0;
+        assert_eq!(compose(id::SYSTEM_TIME, &status), time(0));
+        let Telemetry::Version(version) = told(id::AUTOPILOT_VERSION, &status) else { panic!("another") };
         // MISSION_INT, COMMAND_INT, PARAM_ENCODE_BYTEWISE; SET_ATTITUDE_TARGET, both SET_POSITION_TARGET; MAVLINK2; and
         // neither FTP nor logs.
         let bits = [2, 3, 4, 6, 7, 8, 13];
@@ -294,18 +298,18 @@ mod tests {
             assert_eq!(text(part), crate::services::texts::Words::of(digits));
         }
         assert_eq!(version.software[3], 255);
-        assert_eq!(told(id::PROTOCOL_VERSION, &picture), Telemetry::Protocol);
+        assert_eq!(told(id::PROTOCOL_VERSION, &status), Telemetry::Protocol);
         let mode = afbc_guidance::FlightMode::Hold;
-        assert_eq!(compose(id::CURRENT_MODE, &picture), Some(Downlink::CurrentMode(modes::current(mode, mode))));
+        assert_eq!(compose(id::CURRENT_MODE, &status), Some(Downlink::CurrentMode(modes::current(mode, mode))));
         for message in [id::SYS_STATUS, id::ESTIMATOR_STATUS, id::EXTENDED_SYS_STATE] {
             let expected = match message {
-                id::SYS_STATUS => Telemetry::System(health::system(&picture)),
-                id::ESTIMATOR_STATUS => Telemetry::Estimator(health::estimator(&picture)),
-                _ => Telemetry::Landed(health::landed(&picture)),
+                id::SYS_STATUS => Telemetry::System(health::system(&status)),
+                id::ESTIMATOR_STATUS => Telemetry::Estimator(health::estimator(&status)),
+                _ => Telemetry::Landed(health::landed(&status)),
             };
-            assert_eq!(told(message, &picture), expected);
+            assert_eq!(told(message, &status), expected);
         }
-        assert_eq!(compose(9_999, &picture), None);
+        assert_eq!(compose(9_999, &status), None);
     }
 
     #[test]
@@ -314,10 +318,10 @@ mod tests {
         for yaw in [1e-9, 1e-7, f32::MIN_POSITIVE, 0.0] {
             assert!((0.0..360.0).contains(&heading_deg(yaw)), "{yaw}");
         }
-        let mut picture = flying();
-        let state = picture.state.as_mut().expect("known");
+        let mut status = flying();
+        let state = status.state.as_mut().expect("known");
         state.attitude_rad.z = 1e-5;
-        let Telemetry::Global(global) = told(id::GLOBAL_POSITION_INT, &picture) else { panic!("another") };
+        let Telemetry::Global(global) = told(id::GLOBAL_POSITION_INT, &status) else { panic!("another") };
         assert!(global.heading_cdeg <= 35_999);
     }
 }

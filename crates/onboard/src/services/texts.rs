@@ -1,6 +1,6 @@
 //! Texts to be sent.
 
-use afbc_guidance::Declined;
+use afbc_guidance::OrderRefusal;
 use afbc_guidance::notice::Severity;
 use afbc_link::{Address, Downlink, MavSeverity, Text};
 use heapless::{Deque, String};
@@ -79,18 +79,18 @@ pub(crate) fn urgency(severity: Severity) -> MavSeverity {
 }
 
 /// Returns why an order is declined, in words.
-pub(crate) fn reason(declined: Declined) -> &'static str {
+pub(crate) fn reason(declined: OrderRefusal) -> &'static str {
     match declined {
-        Declined::NoPosition => "refused: position unknown",
-        Declined::NotArmed => "refused: not armed",
-        Declined::OnGround => "refused: on the ground",
-        Declined::InFlight => "refused: in flight",
-        Declined::NoTargets => "refused: no fresh targets",
-        Declined::NoSticks => "refused: no fresh sticks",
-        Declined::NoMission => "refused: no mission, or no such item",
-        Declined::OutsideFence => "refused: outside the geofence",
-        Declined::OutOfRange => "refused: out of range",
-        Declined::Failsafe => "refused: a failsafe is active",
+        OrderRefusal::NoPosition => "refused: position unknown",
+        OrderRefusal::NotArmed => "refused: not armed",
+        OrderRefusal::OnGround => "refused: on the ground",
+        OrderRefusal::InFlight => "refused: in flight",
+        OrderRefusal::NoTargets => "refused: no fresh targets",
+        OrderRefusal::NoSticks => "refused: no fresh sticks",
+        OrderRefusal::NoMission => "refused: no mission, or no such item",
+        OrderRefusal::OutsideFence => "refused: outside the geofence",
+        OrderRefusal::OutOfRange => "refused: out of range",
+        OrderRefusal::Failsafe => "refused: a failsafe is active",
         _ => "refused",
     }
 }
@@ -117,16 +117,16 @@ mod tests {
     #[test]
     fn every_reason_is_told_in_other_words() {
         let all = [
-            (Declined::NoPosition, "position"),
-            (Declined::NotArmed, "not armed"),
-            (Declined::OnGround, "on the ground"),
-            (Declined::InFlight, "in flight"),
-            (Declined::NoTargets, "targets"),
-            (Declined::NoSticks, "sticks"),
-            (Declined::NoMission, "mission"),
-            (Declined::OutsideFence, "geofence"),
-            (Declined::OutOfRange, "out of range"),
-            (Declined::Failsafe, "failsafe"),
+            (OrderRefusal::NoPosition, "position"),
+            (OrderRefusal::NotArmed, "not armed"),
+            (OrderRefusal::OnGround, "on the ground"),
+            (OrderRefusal::InFlight, "in flight"),
+            (OrderRefusal::NoTargets, "targets"),
+            (OrderRefusal::NoSticks, "sticks"),
+            (OrderRefusal::NoMission, "mission"),
+            (OrderRefusal::OutsideFence, "geofence"),
+            (OrderRefusal::OutOfRange, "out of range"),
+            (OrderRefusal::Failsafe, "failsafe"),
         ];
         for (declined, word) in all {
             let text = reason(declined);

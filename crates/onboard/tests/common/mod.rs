@@ -3,9 +3,9 @@
 
 use afbc_guidance::FlightMode;
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
-use afbc_onboard::parameters::{Change, Table};
+use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::services::modes;
-use afbc_onboard::{Comms, Configuration, Flight, Mail, Prepared, REPORT_MAX, Readings, Report};
+use afbc_onboard::{Comms, Configuration, ControlInputs, Flight, Prepared, REPORT_MAX, Readings, Report};
 use afbc_types::{PoseSigmas, Setpoint, State};
 
 pub const STATION: Address = Address { system: 255, component: 190 };
@@ -13,11 +13,11 @@ pub const STATION: Address = Address { system: 255, component: 190 };
 pub struct Bench {
     pub flight: Flight,
     pub comms: Comms,
-    pub table: Table,
+    pub table: ParameterTable,
     /// What has changed in the table.
-    pub changes: Vec<Change>,
-    pub mail: Mail,
-    pub taken: Mail,
+    pub changes: Vec<RecordChange>,
+    pub inputs: ControlInputs,
+    pub taken: ControlInputs,
     decoder: Decoder<Downlink>,
     pub now_us: u64,
 }
@@ -27,10 +27,10 @@ impl Bench {
         Bench {
             flight: Flight::new(&Configuration::default()).expect("valid"),
             comms: Comms::new(),
-            table: Table::new(Configuration::default()),
+            table: ParameterTable::new(Configuration::default()),
             changes: Vec::new(),
-            mail: Mail::EMPTY,
-            taken: Mail::EMPTY,
+            inputs: ControlInputs::EMPTY,
+            taken: ControlInputs::EMPTY,
             decoder: Decoder::new(STATION),
             now_us: 0,
         }
@@ -60,8 +60,8 @@ impl Bench {
     }
 
     pub fn hear_bytes(&mut self, bytes: &[u8]) {
-        let news = self.comms.receive(bytes);
-        self.mail.post(&news);
+        let update = self.comms.receive(bytes);
+        self.inputs.merge(&update);
     }
 
     pub fn hear(&mut self, message: Uplink) {
@@ -84,7 +84,7 @@ impl Bench {
     /// Runs a tick with what was received and these readings; returns its report and all messages.
     pub fn sense(&mut self, readings: &Readings) -> (Report, Vec<Downlink>) {
         self.now_us += 1000;
-        self.mail.take_into(&mut self.taken);
+        self.inputs.take_into(&mut self.taken);
         let report = self.flight.tick(self.now_us, &mut self.taken, readings);
         (report, self.said(&report))
     }

@@ -4,8 +4,8 @@
 
 pub(crate) mod steps;
 
-use afbc_control::{Action, FlightController, Screened, Settings};
-use afbc_plant::{Environment, Gust, GustKind, Model, Motion, ParameterChange, Plant, Quantity};
+use afbc_control::{Action, FlightController, Settings, Validated};
+use afbc_plant::{Environment, Gust, GustKind, Motion, ParameterChange, Plant, PlantModel, PlantParameter};
 use afbc_types::{Axis, Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use std::collections::VecDeque;
@@ -95,10 +95,10 @@ pub(crate) fn fly_on<C: FlightController>(
     initial: Motion,
     reference: impl Fn(f64) -> Setpoint,
     [settled_s, duration_s]: [f64; 2],
-) -> (Figures, Screened<C::Memory>) {
+) -> (Figures, Validated<C::Memory>) {
     let dt_s = 0.001;
-    let mut plant = Plant::new(Model::RigidBody, initial, environment);
-    let mut memory = Screened::<C::Memory>::default();
+    let mut plant = Plant::new(PlantModel::RigidBody, initial, environment);
+    let mut memory = Validated::<C::Memory>::default();
     let hover = libm::sqrt(0.486 * 9.81 / 4.0 / 2.984e-5);
     let mut rotors = Vector4::repeat(hover);
     let mut queue: VecDeque<Action> = VecDeque::new();
@@ -210,7 +210,7 @@ pub(crate) fn disturbed(inertia: f64, thrust: f64) -> Environment {
                 start_s,
                 end_s: f64::INFINITY,
             });
-    let changes = [(Quantity::Inertia, inertia), (Quantity::ThrustFactor, thrust)]
+    let changes = [(PlantParameter::Inertia, inertia), (PlantParameter::ThrustFactor, thrust)]
         .map(|(quantity, factor)| ParameterChange { quantity, factor, start_s: 20.0, end_s: 40.0 });
     Environment::new(Parameters::PAPER, changes.to_vec(), gusts.to_vec()).unwrap()
 }

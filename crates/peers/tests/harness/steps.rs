@@ -1,7 +1,7 @@
 //! The laws for single steps, and random scenes.
 
 use super::{Random, SETTINGS, vehicle};
-use afbc_control::{Action, FlightController, Screened, Trace};
+use afbc_control::{Action, FlightController, Trace, Validated};
 use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
 use afbc_types::{Setpoint, State};
 use nalgebra::{Rotation3, Vector3};
@@ -43,7 +43,7 @@ pub(crate) fn after<C: FlightController>(
     state: &State,
     setpoint: &Setpoint,
 ) -> (Action, Trace) {
-    let mut memory = Screened::<C::Memory>::default();
+    let mut memory = Validated::<C::Memory>::default();
     let mut action = Action::default();
     for _ in 0..steps {
         action = controller.step(&mut memory, Some(state), setpoint);

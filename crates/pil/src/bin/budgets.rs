@@ -5,7 +5,7 @@ use afbc_sim::in_the_loop::Station;
 use pil::beside::Beside;
 use pil::budget::{ESTIMATING_INSTRUCTIONS_MAX, FRAME_BYTES, LEVELS, Linked, TICK_INSTRUCTIONS_MAX};
 use pil::exercise::{TICKS, bytes_of_tick};
-use pil::worst::{Source, search};
+use pil::worst::{StateSource, search};
 use pil::{Emulator, Error, Image};
 use std::path::Path;
 use std::process::ExitCode;
@@ -88,8 +88,8 @@ fn run() -> Result<bool, Error> {
     }
 
     let [min, mean, max, stack] = fly()?;
-    let max = max.max(worst(Source::Link)?);
-    let estimating = worst(Source::Estimate)?;
+    let max = max.max(worst(StateSource::Link)?);
+    let estimating = worst(StateSource::Estimate)?;
     let beside = Beside::count(&Image::Flight.find()?)?;
     let line = |what, unit, measured, most| Budget { what, unit, measured, most };
     let budgets = [
@@ -125,7 +125,7 @@ fn run() -> Result<bool, Error> {
 }
 
 /// Returns the instructions of the worst tick of all searches.
-fn worst(source: Source) -> Result<u64, Error> {
+fn worst(source: StateSource) -> Result<u64, Error> {
     let mut worst = 0;
     for seed in 1..=SEARCHES {
         let found = search(Emulator::start(&Image::Pil.find()?)?, source, seed, CANDIDATES)?;

@@ -6,14 +6,15 @@
 //!
 //! ```
 //! use afbc_types::{Parameters, RotorSpeeds};
-//! use afbc_plant::instruments::{Imu, Tracker};
-//! use afbc_plant::{Environment, Instruments, Model, Motion, Plant, Suite};
+//! use afbc_plant::instruments::{Imu, TrackerModel};
+//! use afbc_plant::{Environment, InstrumentSuite, Instruments, Motion, Plant, PlantModel};
 //! use nalgebra::Vector4;
 //!
-//! let suite =
-//!     Suite { imu: Some(Imu::ICM_42688_P), tracker: Some(Tracker::MOCAP_100), ..Suite::default() };
+//! let mut suite = InstrumentSuite::default();
+//! suite.imu = Some(Imu::ICM_42688_P);
+//! suite.tracker = Some(TrackerModel::MOCAP_100);
 //! let mut instruments = Instruments::new(&suite, &[], 7, 0.001)?;
-//! let mut plant = Plant::new(Model::RigidBody, Motion::default(), Environment::calm(Parameters::PAPER)?);
+//! let mut plant = Plant::new(PlantModel::RigidBody, Motion::default(), Environment::calm(Parameters::PAPER)?);
 //! let mut poses = 0;
 //! for _ in 0..1000 {
 //!     let readings = instruments.measure(&plant.truth());
@@ -46,7 +47,7 @@ pub use imu::{Accelerometer, Gyroscope, Imu, ImuBias, ImuReading};
 pub use magnetometer::{FieldFix, Magnetometer};
 pub use mounting::Mounting;
 pub use presets::Preset;
-pub use tracker::{Tracker, TrackerFix};
+pub use tracker::{TrackerFix, TrackerModel};
 
 use crate::truth::Truth;
 use afbc_types::{Declared, OutOfRange};
@@ -61,11 +62,11 @@ use tracker::Tracking;
 /// The instruments that a vehicle has. The default is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Suite {
+pub struct InstrumentSuite {
     /// Inertial sensor.
     pub imu: Option<Imu>,
     /// Tracker.
-    pub tracker: Option<Tracker>,
+    pub tracker: Option<TrackerModel>,
     /// GNSS receiver.
     pub gnss: Option<Gnss>,
     /// Barometer.
@@ -74,7 +75,7 @@ pub struct Suite {
     pub magnetometer: Option<Magnetometer>,
 }
 
-impl Suite {
+impl InstrumentSuite {
     /// Checks every parameter of every instrument.
     ///
     /// # Errors
@@ -90,7 +91,7 @@ impl Suite {
 
 /// What reaches the vehicle in one step.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Readings {
+pub struct InstrumentReadings {
     /// Sample of this step; none without a sensor, or from a dead one.
     pub imu: Option<ImuReading>,
     /// Poses that arrive now, in the order of their arrival.
@@ -119,7 +120,12 @@ impl Instruments {
     ///
     /// # Errors
     /// The first setting out of range.
-    pub fn new(suite: &Suite, faults: &[InstrumentFault], seed: u64, step_s: f64) -> Result<Self, OutOfRange> {
+    pub fn new(
+        suite: &InstrumentSuite,
+        faults: &[InstrumentFault],
+        seed: u64,
+        step_s: f64,
+    ) -> Result<Self, OutOfRange> {
         suite.validate()?;
         faults.iter().try_for_each(InstrumentFault::validate)?;
         crate::realism::STEP.check(step_s)?;
@@ -134,14 +140,14 @@ impl Instruments {
     }
 
     /// Measures the vehicle; to be called once per step, the first time before the first step.
-    pub fn measure(&mut self, truth: &Truth) -> Readings {
+    pub fn measure(&mut self, truth: &Truth) -> InstrumentReadings {
         let (failures, height_m) = (&mut self.failures, truth.position_m.z);
         let imu = self.imu.as_mut().and_then(|imu| failures.imu(imu.sample(truth)));
         let tracker = self.tracker.as_mut().map(|it| it.measure(truth, |fix| failures.tracker(truth.time_s, fix)));
         let gnss = self.gnss.as_mut().map(|it| it.measure(truth, |fix| failures.gnss(fix)));
         let barometer = self.barometer.as_mut().map(|it| it.measure(truth, |fix| failures.barometer(height_m, fix)));
         let magnetometer = self.magnetometer.as_mut().map(|it| it.measure(truth, |fix| failures.magnetometer(fix)));
-        Readings {
+        InstrumentReadings {
             imu,
             tracker: tracker.unwrap_or_default(),
             gnss: gnss.unwrap_or_default(),
@@ -161,7 +167,7 @@ impl Instruments {
     }
 
     /// Ends all failures, also those to come.
-    pub fn heal(&mut self) {
+    pub fn clear_faults(&mut self) {
         self.failures.end();
     }
 

@@ -8,7 +8,7 @@ use super::barometer::Barometer;
 use super::gnss::Gnss;
 use super::imu::{Accelerometer, Gyroscope, Imu};
 use super::magnetometer::Magnetometer;
-use super::tracker::Tracker;
+use super::tracker::TrackerModel;
 use core::f64::consts::PI;
 
 /// One degree \[rad\].
@@ -135,10 +135,10 @@ impl Imu {
     ];
 }
 
-impl Tracker {
+impl TrackerModel {
     /// A motion-capture system of 100 Hz on a local network: 1 mm, 0.2 degrees, 10 +- 2 ms late. No product's figures;
     /// those that the estimator's accuracy is stated for.
-    pub const MOCAP_100: Self = Tracker {
+    pub const MOCAP_100: Self = TrackerModel {
         rate_hz: 100.0,
         delay_s: 0.01,
         jitter_s: 0.002,

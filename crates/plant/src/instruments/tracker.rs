@@ -14,7 +14,7 @@ parameters! {
     /// Properties of a tracker. The default is perfect and immediate.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    pub struct Tracker {
+    pub struct TrackerModel {
         /// Fixes per second.
         #[parameter(RATE, "Hz", 0.1..=1000.0)]
         pub rate_hz: f64 = 100.0,
@@ -74,7 +74,7 @@ pub struct TrackerFix {
 /// A tracker in simulation.
 #[derive(Clone, Debug)]
 pub(super) struct Tracking {
-    tracker: Tracker,
+    tracker: TrackerModel,
     clock: Clock,
     random: Noise,
     loss: Outage,
@@ -85,7 +85,7 @@ pub(super) struct Tracking {
 }
 
 impl Tracking {
-    pub(super) fn new(tracker: &Tracker, seed: u64, step_s: f64) -> Self {
+    pub(super) fn new(tracker: &TrackerModel, seed: u64, step_s: f64) -> Self {
         Tracking {
             tracker: *tracker,
             clock: Clock::new(tracker.rate_hz, step_s),
@@ -116,7 +116,7 @@ impl Tracking {
 
     /// Returns the pose of this step and when it arrives. Draws the same numbers whatever the settings.
     fn take(&mut self, truth: &Truth) -> (TrackerFix, f64) {
-        let Tracker { frame_m, frame_yaw_rad, .. } = self.tracker;
+        let TrackerModel { frame_m, frame_yaw_rad, .. } = self.tracker;
         let random = &mut self.random;
         let mut position = draw(random) * self.tracker.position_m;
         let mut turn = draw(random) * self.tracker.attitude_rad;

@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each test uses its part")]
 
 use afbc_plant::instruments::InstrumentFault;
-use afbc_plant::{Environment, Instruments, Model, Motion, Plant, Readings, Suite, Truth};
+use afbc_plant::{Environment, InstrumentReadings, InstrumentSuite, Instruments, Motion, Plant, PlantModel, Truth};
 use afbc_types::Parameters;
 use nalgebra::{Quaternion, Vector3};
 
@@ -11,7 +11,7 @@ pub(crate) const STEP_S: f64 = 1e-3;
 /// At rest in a hover, level, at the origin.
 pub(crate) fn rest() -> Truth {
     let environment = Environment::calm(Parameters::PAPER).unwrap();
-    Plant::new(Model::RigidBody, Motion::default(), environment).truth()
+    Plant::new(PlantModel::RigidBody, Motion::default(), environment).truth()
 }
 
 /// The same at step `k`.
@@ -19,22 +19,27 @@ pub(crate) fn at(truth: Truth, k: u32) -> Truth {
     Truth { time_s: f64::from(k) * STEP_S, ..truth }
 }
 
-pub(crate) fn instruments(suite: Suite, seed: u64) -> Instruments {
+pub(crate) fn instruments(suite: InstrumentSuite, seed: u64) -> Instruments {
     Instruments::new(&suite, &[], seed, STEP_S).unwrap()
 }
 
 /// Readings of `steps` steps of a motion.
-pub(crate) fn run(suite: Suite, seed: u64, steps: u32, truth: impl Fn(u32) -> Truth) -> Vec<Readings> {
+pub(crate) fn run(
+    suite: InstrumentSuite,
+    seed: u64,
+    steps: u32,
+    truth: impl Fn(u32) -> Truth,
+) -> Vec<InstrumentReadings> {
     run_with(suite, &[], seed, steps, truth)
 }
 
 pub(crate) fn run_with(
-    suite: Suite,
+    suite: InstrumentSuite,
     faults: &[InstrumentFault],
     seed: u64,
     steps: u32,
     truth: impl Fn(u32) -> Truth,
-) -> Vec<Readings> {
+) -> Vec<InstrumentReadings> {
     let mut instruments = Instruments::new(&suite, faults, seed, STEP_S).unwrap();
     (0..steps).map(|k| instruments.measure(&at(truth(k), k))).collect()
 }

@@ -133,7 +133,7 @@ impl Row {
         self.get("timestamp") as u64
     }
 
-    /// Returns the time at which it was true: that of its sample, if it is told, or else its own \[us\].
+    /// Returns the time at which it was true: that of its sample if the log has it, otherwise that of the row \[us\].
     pub(super) fn sampled_us(&self) -> u64 {
         let (sample, at) = (self.get("timestamp_sample"), self.get("timestamp"));
         if sample > 0.0 && sample <= at && at - sample < 1e6 { sample as u64 } else { at as u64 }

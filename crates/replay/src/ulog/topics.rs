@@ -7,7 +7,7 @@ use super::table::{
 use crate::aids::{self, Fix};
 use crate::earth::Field;
 use crate::order::rising;
-use crate::recording::{Aiding, LoggedReset, LoggedState, Recording, Sensor, Source, flip, flip_rotation};
+use crate::recording::{Aiding, LoggedReset, LoggedState, Recording, SampleSource, Sensor, flip, flip_rotation};
 use crate::{compass, earth, states};
 use afbc_estimator::{ImuSample, Origin};
 
@@ -63,7 +63,7 @@ pub(super) fn recording(tables: &Tables) -> Result<Recording, String> {
 
 /// Reads the samples of the inertial sensor. Each is the mean over its time of integration, so it was true in the
 /// middle of that.
-fn imu(tables: &Tables, samples: &mut Vec<ImuSample>) -> Result<Source, String> {
+fn imu(tables: &Tables, samples: &mut Vec<ImuSample>) -> Result<SampleSource, String> {
     let (topic, rows) = (SENSOR_COMBINED.0, tables.first(SENSOR_COMBINED));
     let sample = |row: &Row| {
         let integral = row.get("gyro_integral_dt");
@@ -94,7 +94,12 @@ fn imu(tables: &Tables, samples: &mut Vec<ImuSample>) -> Result<Source, String> 
         });
     }
     *samples = kept;
-    Ok(Source { sensor: Sensor::Imu, topic: topic.into(), used: samples.len(), skipped: rows.len() - samples.len() })
+    Ok(SampleSource {
+        sensor: Sensor::Imu,
+        topic: topic.into(),
+        used: samples.len(),
+        skipped: rows.len() - samples.len(),
+    })
 }
 
 /// Fixes of the receiver with the most of them.
@@ -171,7 +176,7 @@ fn own_origin(row: &Row) -> Option<Origin> {
 }
 
 /// Heights, from the first topic that has any.
-fn barometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> Source {
+fn barometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> SampleSource {
     let air = |row: &Row| {
         let height_m = row.get("baro_alt_meter");
         if height_m.is_finite() { height_m } else { height_of(row.get("baro_pressure_pa")) }
@@ -200,7 +205,7 @@ fn barometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> Source {
 }
 
 /// Fields, from the first topic that has any, less what EKF2 had learned of them before, where the log has it.
-fn magnetometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> Source {
+fn magnetometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> SampleSource {
     const GAUSS: [&str; 3] = ["magnetometer_ga[0]", "magnetometer_ga[1]", "magnetometer_ga[2]"];
     let learned = tables.parameter("EKF2_MAGBIAS_ID").is_some_and(|id| id != 0.0);
     let bias = ["EKF2_MAGBIAS_X", "EKF2_MAGBIAS_Y", "EKF2_MAGBIAS_Z"]
@@ -226,12 +231,12 @@ fn magnetometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> Source
 }
 
 /// Takes the first topic with a usable measurement; that of today is missing if none has.
-fn first_usable(candidates: &mut [(Topic, Vec<Aiding>)], all: &mut Vec<Aiding>, sensor: Sensor) -> Source {
+fn first_usable(candidates: &mut [(Topic, Vec<Aiding>)], all: &mut Vec<Aiding>, sensor: Sensor) -> SampleSource {
     let usable = |aiding: &Aiding| aiding.measurement.value.is_plausible();
     let found = candidates.iter().position(|(_, aiding)| aiding.iter().any(usable)).unwrap_or(0);
     match candidates.get_mut(found) {
         Some((topic, aiding)) => aids::collect(all, sensor, topic.0, aiding.len(), std::mem::take(aiding)),
-        None => Source { sensor, topic: String::new(), used: 0, skipped: 0 },
+        None => SampleSource { sensor, topic: String::new(), used: 0, skipped: 0 },
     }
 }
 
@@ -257,7 +262,7 @@ fn declination(tables: &Tables, earth: Option<&Field>, notes: &mut Vec<String>) 
     })
 }
 
-fn attitudes(tables: &Tables) -> (Vec<LoggedState>, Source) {
+fn attitudes(tables: &Tables) -> (Vec<LoggedState>, SampleSource) {
     let rows = tables.first(VEHICLE_ATTITUDE);
     let state = |row: &Row| {
         let q = flip_rotation(["q[0]", "q[1]", "q[2]", "q[3]"].map(|name| row.get(name)))?;
@@ -266,7 +271,7 @@ fn attitudes(tables: &Tables) -> (Vec<LoggedState>, Source) {
     states::collect(rows.iter().filter_map(state).collect(), rows.len(), Sensor::Attitude, VEHICLE_ATTITUDE.0)
 }
 
-fn motions(tables: &Tables, origin: Option<&Origin>) -> (Vec<LoggedState>, Source) {
+fn motions(tables: &Tables, origin: Option<&Origin>) -> (Vec<LoggedState>, SampleSource) {
     let rows = tables.first(VEHICLE_LOCAL_POSITION);
     let state = |row: &Row| {
         let valid = |names: [&str; 2]| names.iter().all(|name| row.get(name) > 0.0);

@@ -68,7 +68,7 @@ pub(super) fn marks(scenario: &Scenario, end_s: f64, width_px: f64) -> Marks {
     for gust in &mut gusts {
         gust.is_band = gust.end_s < end_s;
     }
-    tell_apart(&mut gusts.iter_mut().chain(&mut changes));
+    separate(&mut gusts.iter_mut().chain(&mut changes));
     placed(changes, gusts, end_s, width_px, " Thin line: onset of a gust.")
 }
 
@@ -125,7 +125,7 @@ fn merged(intervals: impl Iterator<Item = (String, f64, f64)>, axis_end_s: f64, 
 
 /// Assigns tints to bands: the same tint for the same label, different ones for different labels as far as possible,
 /// and never the same for two that overlap unless there are too few tints.
-fn tell_apart(marks: &mut dyn Iterator<Item = &mut Mark>) {
+fn separate(marks: &mut dyn Iterator<Item = &mut Mark>) {
     let mut labels: Vec<String> = Vec::new();
     let mut done: Vec<Mark> = Vec::new();
     for mark in marks.filter(|mark| mark.is_band) {

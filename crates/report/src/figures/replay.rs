@@ -7,7 +7,7 @@ use super::plotted::{LINE_PX, REFERENCE};
 use super::time_chart::{COLUMNS, Chart, Line, PLOT_PX, Panel};
 use super::{palette, reduce};
 use afbc_estimator::Estimate;
-use afbc_replay::{LoggedState, Recording, Replayed, Row};
+use afbc_replay::{LoggedState, Recording, ReplayRow, Replayed};
 use afbc_types::State;
 use nalgebra::{Quaternion, Vector3};
 use std::io;
@@ -35,7 +35,7 @@ const POSITION: [Pair; 3] = [
 ];
 
 /// A panel's label, the log's value less ours, our standard deviation, and whether our value is valid.
-type Difference = (&'static str, fn(&Row, &Estimate) -> Option<f64>, fn(&Estimate) -> f32, fn(&Estimate) -> bool);
+type Difference = (&'static str, fn(&ReplayRow, &Estimate) -> Option<f64>, fn(&Estimate) -> f32, fn(&Estimate) -> bool);
 
 const DIFFERENCE: [Difference; 9] = [
     ("x [m]", |r, e| position(r, e).map(|d| d.x), |e| e.sigmas.position_m.x, |e| e.validity.position),
@@ -55,15 +55,15 @@ fn angle(logged: &LoggedState, of: fn(&Vector3<f32>) -> f32) -> Option<f32> {
     Some(of(&state.attitude_rad).to_degrees())
 }
 
-fn position(row: &Row, ours: &Estimate) -> Option<Vector3<f64>> {
+fn position(row: &ReplayRow, ours: &Estimate) -> Option<Vector3<f64>> {
     row.logged.position_m.map(|position| (position - ours.state.position_m).cast())
 }
 
-fn velocity(row: &Row, ours: &Estimate) -> Option<Vector3<f64>> {
+fn velocity(row: &ReplayRow, ours: &Estimate) -> Option<Vector3<f64>> {
     row.logged.velocity_m_s.map(|velocity| (velocity - ours.state.velocity_m_s).cast())
 }
 
-fn turn(row: &Row, of: fn(&Vector3<f64>) -> f64) -> Option<f64> {
+fn turn(row: &ReplayRow, of: fn(&Vector3<f64>) -> f64) -> Option<f64> {
     row.turn_rad().map(|turn| of(&turn).to_degrees())
 }
 
@@ -73,7 +73,7 @@ pub(crate) fn draw(recording: &Recording, replayed: &Replayed) -> io::Result<Vec
     let end_s = rows.last().map_or(0.0, |row| row.time_s);
     let own = Ink::new(palette::color("afbc"), LINE_PX);
     let band = Ink { opacity: 1.0 / 3.0, ..Ink::new(palette::color("afbc"), REFERENCE.width_px) };
-    let line = |ink: Ink, is_reference: bool, value: &dyn Fn(&Row) -> Option<f64>| {
+    let line = |ink: Ink, is_reference: bool, value: &dyn Fn(&ReplayRow) -> Option<f64>| {
         let points = rows.iter().filter_map(|row| Some((row.time_s, value(row)?)));
         Line { ink, points: reduce::envelope(points, end_s, COLUMNS), lost_s: None, is_reference }
     };

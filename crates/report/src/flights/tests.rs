@@ -3,7 +3,7 @@
 use super::*;
 use crate::claims::Claim;
 use afbc::Profile;
-use afbc_plant::{Environment, Gust, GustKind, Model, ParameterChange, Quantity};
+use afbc_plant::{Environment, Gust, GustKind, ParameterChange, PlantModel, PlantParameter};
 use afbc_sim::case::{Case, Reading};
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::paper::scenario;
@@ -51,7 +51,7 @@ fn both(scenario: &Scenario) -> Vec<Flown> {
 
 fn paper(reading: Reading, duration_s: f64) -> Scenario {
     let case = Case { reading: Some(reading), ..Case::DEFAULT };
-    Scenario { duration_s, ..scenario(Model::RigidBody, case).unwrap() }
+    Scenario { duration_s, ..scenario(PlantModel::RigidBody, case).unwrap() }
 }
 
 fn claims() -> Vec<Claim> {
@@ -174,7 +174,7 @@ fn unusual_flights_have_figures() {
     // Many events at once, under a name that needs escapes in files and markup.
     let gust = |axis, size| Gust { axis, kind: GustKind::Force, size, start_s: 1.0, end_s: 1.5 };
     let gusts = afbc_types::Axis::ALL.map(|axis| gust(axis, 0.001)).to_vec();
-    let change = ParameterChange { quantity: Quantity::Mass, factor: 1.013, start_s: 0.5, end_s: f64::INFINITY };
+    let change = ParameterChange { quantity: PlantParameter::Mass, factor: 1.013, start_s: 0.5, end_s: f64::INFINITY };
     let stormy = Scenario {
         name: "../a <b> & \"c\" ⟨d⟩".into(),
         environment: Environment::new(calm.vehicle, vec![change], gusts).unwrap(),
@@ -221,7 +221,7 @@ fn a_loss_beyond_a_panel_is_told_and_not_marked_elsewhere() {
 #[test]
 fn file_names_stay_apart() {
     let rigid = paper(Reading::Persistent, 0.1);
-    let simple = Scenario { model: Model::Simplified, ..rigid.clone() };
+    let simple = Scenario { model: PlantModel::Simplified, ..rigid.clone() };
     let pulses = Scenario { name: "PAPER".into(), ..paper(Reading::Pulses, 0.1) };
     let longer = Scenario { duration_s: 0.2, ..rigid.clone() };
     let mut flown = Vec::new();

@@ -1,6 +1,6 @@
 //! Flights that were drawn and flown, and how the contenders stand.
 
-use afbc_campaign::random::{Flown, Random, Score, Seen, Standing, standings};
+use afbc_campaign::random::{FlownDraw, Random, Score, Seen, Standing, standings};
 use afbc_sim::contender::Contender;
 
 /// Flights that were drawn and flown, and how the contenders stand in them.
@@ -9,7 +9,7 @@ pub struct Judged<'a> {
     /// What was drawn.
     pub random: &'a Random,
     /// The flights.
-    pub flown: &'a [Flown],
+    pub flown: &'a [FlownDraw],
     /// Place of the contender that the others are compared with.
     against: usize,
     /// Each vehicle's flights and, if there are several vehicles, all.
@@ -32,7 +32,7 @@ pub(super) struct Group<'a> {
 
 impl<'a> Judged<'a> {
     /// Judges the flights; the contenders are compared with the one called `against`, or the first.
-    pub fn new(random: &'a Random, flown: &'a [Flown], against: &str) -> Self {
+    pub fn new(random: &'a Random, flown: &'a [FlownDraw], against: &str) -> Self {
         let mut judged = Judged { random, flown, against: 0, groups: Vec::new() };
         let contenders = judged.contenders();
         let against = contenders.iter().position(|contender| contender.name == against).unwrap_or_default();
@@ -83,8 +83,8 @@ impl Group<'_> {
     }
 }
 
-fn group<'a>(flown: &'a [Flown], vehicle: Option<&'a str>, against: usize) -> Group<'a> {
-    let of_group = |flown: &&Flown| vehicle.is_none_or(|vehicle| flown.flight.vehicle == vehicle);
+fn group<'a>(flown: &'a [FlownDraw], vehicle: Option<&'a str>, against: usize) -> Group<'a> {
+    let of_group = |flown: &&FlownDraw| vehicle.is_none_or(|vehicle| flown.flight.vehicle == vehicle);
     let (names, scores): (Vec<&str>, Vec<Score>) =
         flown.iter().filter(of_group).map(|flown| (flown.flight.scenario.name.as_str(), flown.score())).unzip();
     let named = |is: fn(&Score, usize) -> bool| {

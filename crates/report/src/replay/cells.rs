@@ -2,7 +2,7 @@
 
 use super::Replay;
 use afbc_estimator::{Aid, Resets};
-use afbc_replay::{Figure, Source, Start};
+use afbc_replay::{ErrorFigure, EstimatorStart, SampleSource};
 
 /// Heads of the columns.
 pub(super) const HEADS: [&str; 4] = ["RMS", "largest", "within 3σ", "valid"];
@@ -20,7 +20,7 @@ pub(super) fn rows(replay: &Replay<'_>) -> Vec<Row> {
     let f = &replay.replayed.figures;
     let number = |value: Option<f64>, unit: &str| value.map_or("-".into(), |value| format!("{value:.3} {unit}"));
     let percent = |share: Option<f64>| share.map_or("-".into(), |share| format!("{:.1} %", 100.0 * share));
-    let row = |name, figure: &Figure, unit: &str| Row {
+    let row = |name, figure: &ErrorFigure, unit: &str| Row {
         name,
         cells: [
             number(figure.rms(), unit),
@@ -55,7 +55,7 @@ pub(super) fn sentences(replay: &Replay<'_>) -> Vec<String> {
         format!("{} {} ({}{skipped})", source.used, source.sensor.title(), source.topic)
     });
     let mut said = vec![format!("Used: {}.", used.collect::<Vec<_>>().join("; "))];
-    let listed = |sources: Vec<&Source>| {
+    let listed = |sources: Vec<&SampleSource>| {
         let words = sources.iter().map(|source| format!("{} ({})", source.sensor.title(), source.topic));
         words.collect::<Vec<_>>().join("; ")
     };
@@ -124,14 +124,14 @@ pub(super) const AIDS: [(&str, Aid); 4] = [
 fn start(replay: &Replay<'_>) -> String {
     let from_s = replay.replayed.from_s;
     match replay.replayed.start {
-        Start::AtRest(at_s) => format!("Started at rest after {at_s:.1} s; compared from {from_s:.1} s on."),
-        Start::FromLog(at_s, None) => format!(
+        EstimatorStart::AtRest(at_s) => format!("Started at rest after {at_s:.1} s; compared from {from_s:.1} s on."),
+        EstimatorStart::FromLog(at_s, None) => format!(
             "The vehicle was in the air: started at {at_s:.1} s in the log's own state; compared from {from_s:.1} s on."
         ),
-        Start::FromLog(at_s, Some(why)) => format!(
+        EstimatorStart::FromLog(at_s, Some(why)) => format!(
             "Did not start by itself ({why}): started at {at_s:.1} s in the log's own state; compared from \
              {from_s:.1} s on."
         ),
-        Start::Never(why) => format!("Never started: {why}; and the log has no attitude to start from."),
+        EstimatorStart::Never(why) => format!("Never started: {why}; and the log has no attitude to start from."),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Replay, cells};
 use afbc_estimator::Estimate;
-use afbc_replay::{Figures, LoggedState, Start};
+use afbc_replay::{EstimatorStart, Figures, LoggedState};
 use afbc_types::State;
 use nalgebra::{Quaternion, Vector3};
 use serde::Serialize;
@@ -131,7 +131,7 @@ struct Parts {
 }
 
 impl Parts {
-    fn of(figures: &Figures, part: fn(&afbc_replay::Figure) -> Option<f64>) -> Self {
+    fn of(figures: &Figures, part: fn(&afbc_replay::ErrorFigure) -> Option<f64>) -> Self {
         let Figures { attitude, velocity, position, .. } = figures;
         Parts { attitude: part(attitude), velocity: part(velocity), position: part(position) }
     }
@@ -159,13 +159,13 @@ struct LoggedReset {
 pub fn json(out: &mut dyn Write, replay: &Replay<'_>) -> io::Result<()> {
     let Replay { name, recording, replayed } = replay;
     let (start, started_at_s, start_reason) = match replayed.start {
-        Start::AtRest(at_s) => ("at-rest", Some(at_s), None),
-        Start::FromLog(at_s, None) => ("from-log", Some(at_s), Some("the vehicle was in the air".to_owned())),
-        Start::FromLog(at_s, Some(why)) => ("from-log", Some(at_s), Some(why.to_string())),
-        Start::Never(why) => ("never", None, Some(why.to_string())),
+        EstimatorStart::AtRest(at_s) => ("at-rest", Some(at_s), None),
+        EstimatorStart::FromLog(at_s, None) => ("from-log", Some(at_s), Some("the vehicle was in the air".to_owned())),
+        EstimatorStart::FromLog(at_s, Some(why)) => ("from-log", Some(at_s), Some(why.to_string())),
+        EstimatorStart::Never(why) => ("never", None, Some(why.to_string())),
     };
     let figures = &replayed.figures;
-    let largest = |figure: &afbc_replay::Figure| figure.rms().map(|_| figure.largest);
+    let largest = |figure: &afbc_replay::ErrorFigure| figure.rms().map(|_| figure.largest);
     let first_us = recording.imu.first().map_or(0, |sample| sample.at_us);
     let resets = &replayed.resets;
     let summary = Summary {
@@ -198,8 +198,8 @@ pub fn json(out: &mut dyn Write, replay: &Replay<'_>) -> io::Result<()> {
             velocity_m_s: largest(&figures.velocity),
             position_m: largest(&figures.position),
         },
-        within_3_sigma_ratio: Parts::of(figures, afbc_replay::Figure::within_ratio),
-        valid_ratio: Parts::of(figures, afbc_replay::Figure::valid_ratio),
+        within_3_sigma_ratio: Parts::of(figures, afbc_replay::ErrorFigure::within_ratio),
+        valid_ratio: Parts::of(figures, afbc_replay::ErrorFigure::valid_ratio),
         aids: cells::AIDS
             .iter()
             .map(|(name, aid)| {

@@ -1,6 +1,6 @@
 //! `suite.csv` and `suite.json`.
 
-use super::Flown;
+use super::FlownSuite;
 use super::cells::FIGURES;
 use afbc_campaign::compare::{Entry, Outcome};
 use serde::Serialize;
@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 
 /// Writes a row for each flight of each contender. A lost flight's figures cover the time until the loss.
-pub(super) fn csv(out: &mut dyn Write, flown: Flown<'_>) -> io::Result<()> {
+pub(super) fn csv(out: &mut dyn Write, flown: FlownSuite<'_>) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     let inputs = (1..=4).map(|input| format!("mean_abs_delta_u{input}_n"));
     let head = ["flight", "contender", "controller", "seed", "rms_m", "largest_m", "rmse_psi_rad"].map(String::from);
@@ -67,7 +67,7 @@ struct Contender<'a> {
 ///
 /// # Errors
 /// If writing to `out` fails.
-pub fn json(out: &mut dyn Write, flown: Flown<'_>) -> io::Result<()> {
+pub fn json(out: &mut dyn Write, flown: FlownSuite<'_>) -> io::Result<()> {
     let sources = &flown.suite.sources;
     let flights = flown.rows().map(|(flight, comparison)| Flight {
         flight: &comparison.scenario.name,

@@ -1,20 +1,20 @@
 //! A suite and what flew.
 
 use afbc_campaign::compare::Comparison;
-use afbc_campaign::suite::{Flight, Suite};
+use afbc_campaign::suite::{Suite, SuiteFlight};
 
 /// A suite that was flown.
 #[derive(Clone, Copy, Debug)]
-pub struct Flown<'a> {
+pub struct FlownSuite<'a> {
     /// What was flown.
     pub suite: &'a Suite,
     /// Its flights under every contender, in the suite's order.
     pub comparisons: &'a [Comparison],
 }
 
-impl<'a> Flown<'a> {
+impl<'a> FlownSuite<'a> {
     /// Returns each flight with its results.
-    pub(crate) fn rows(self) -> impl Iterator<Item = (&'a Flight, &'a Comparison)> {
+    pub(crate) fn rows(self) -> impl Iterator<Item = (&'a SuiteFlight, &'a Comparison)> {
         self.suite.flights.iter().zip(self.comparisons)
     }
 }

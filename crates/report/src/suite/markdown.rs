@@ -1,6 +1,6 @@
 //! The suite's table for a document.
 
-use super::Flown;
+use super::FlownSuite;
 use super::cells::summary;
 use core::fmt::Write;
 
@@ -10,7 +10,7 @@ pub fn markers(name: &str) -> [String; 2] {
 }
 
 /// Formats as Markdown: the flights under each contender, and what others have published about them.
-pub fn markdown(flown: Flown<'_>) -> String {
+pub fn markdown(flown: FlownSuite<'_>) -> String {
     let mut page = String::new();
     let titles = flown.comparisons.first().map_or(Vec::new(), |comparison| {
         comparison.entries.iter().map(|entry| entry.contender().title()).collect::<Vec<_>>()

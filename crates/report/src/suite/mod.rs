@@ -8,7 +8,7 @@ mod page;
 mod table;
 
 pub use files::json;
-pub use flown::Flown;
+pub use flown::FlownSuite;
 pub use markdown::{markdown, markers};
 pub use table::table;
 
@@ -28,7 +28,7 @@ use std::path::PathBuf;
 ///
 /// # Errors
 /// The first file that could not be written, or is not the command's.
-pub fn write(folder: &Folder, flown: Flown<'_>) -> Result<Vec<PathBuf>, Error> {
+pub fn write(folder: &Folder, flown: FlownSuite<'_>) -> Result<Vec<PathBuf>, Error> {
     let drawn = flown.comparisons.iter().map(draw).collect::<io::Result<Vec<_>>>();
     let drawn = drawn.map_err(|source| folder.error("figures", source))?;
     let name = |comparison: &Comparison| format!("{}.svg", comparison.scenario.name);

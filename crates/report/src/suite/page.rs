@@ -1,15 +1,15 @@
 //! The report of a suite.
 
-use super::Flown;
+use super::FlownSuite;
 use super::cells::{FIGURES, Figure, lost, trip};
 use crate::figures::Picture;
 use crate::report::{picture, sheet};
 use crate::words;
-use afbc_campaign::suite::Flight;
+use afbc_campaign::suite::SuiteFlight;
 use afbc_sim::metrics::SETTLED_S;
 use maud::{Markup, html};
 
-pub(super) fn page(flown: Flown<'_>, pictures: &[Option<Picture>]) -> String {
+pub(super) fn page(flown: FlownSuite<'_>, pictures: &[Option<Picture>]) -> String {
     let suite = flown.suite;
     sheet(
         &format!("Suite {}", suite.name),
@@ -37,12 +37,12 @@ pub(super) fn page(flown: Flown<'_>, pictures: &[Option<Picture>]) -> String {
     )
 }
 
-fn tilt(flight: &Flight) -> String {
+fn tilt(flight: &SuiteFlight) -> String {
     flight.tilt_max_rad.map_or(String::new(), |tilt_rad| format!(", a tilt of up to {tilt_rad} rad"))
 }
 
 /// A row for each flight, a column for each contender.
-fn results(flown: Flown<'_>, figure: &Figure) -> Markup {
+fn results(flown: FlownSuite<'_>, figure: &Figure) -> Markup {
     html! {
         table {
             thead { tr {
@@ -74,7 +74,7 @@ fn results(flown: Flown<'_>, figure: &Figure) -> Markup {
 }
 
 /// What others have published about the flights.
-fn published(flown: Flown<'_>) -> Markup {
+fn published(flown: FlownSuite<'_>) -> Markup {
     let figures = flown.rows().flat_map(|(flight, _)| flight.published.iter().map(move |figure| (flight, figure)));
     html! {
         h2 { "Published" }

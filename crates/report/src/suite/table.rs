@@ -1,12 +1,12 @@
 //! The suite's table for the terminal.
 
-use super::Flown;
+use super::FlownSuite;
 use super::cells::{FIGURES, lost, trip};
 use crate::table::wrap;
 use afbc_sim::metrics::SETTLED_S;
 
 /// Formats the root mean square distances: a line for each flight, a column for each contender, then every trip.
-pub fn table(flown: Flown<'_>) -> String {
+pub fn table(flown: FlownSuite<'_>) -> String {
     let [rms, ..] = FIGURES;
     let mut rows: Vec<Vec<String>> = Vec::new();
     let mut trips = Vec::new();

@@ -3,7 +3,7 @@
 
 use afbc_campaign::{self as campaign, Drawn, FIGURES, Manifest, QUANTITIES, Row, Shard, Summary};
 use afbc_files::Folder;
-use afbc_plant::{CosineGust, Environment, Gust, GustKind, ParameterChange, Payload, Quantity, RotorFault};
+use afbc_plant::{CosineGust, Environment, Gust, GustKind, ParameterChange, Payload, PlantParameter, RotorFault};
 use afbc_sim::contender::{Contender, ControllerKind};
 use afbc_sim::flown::Flown;
 use afbc_sim::run::Run;
@@ -112,9 +112,9 @@ pub(crate) fn eventful() -> Scenario {
     let environment = Environment::new(
         calm.vehicle,
         vec![
-            change(Quantity::Mass, 1.1, 1.0, 8.0),
-            change(Quantity::Inertia, 0.9, 2.0, 9.0),
-            change(Quantity::ThrustFactor, 0.98, 3.0, 4.0),
+            change(PlantParameter::Mass, 1.1, 1.0, 8.0),
+            change(PlantParameter::Inertia, 0.9, 2.0, 9.0),
+            change(PlantParameter::ThrustFactor, 0.98, 3.0, 4.0),
         ],
         vec![gust(afbc_types::Axis::X, 2.5, 3.5), gust(afbc_types::Axis::Y, 3.0, f64::INFINITY)],
     );

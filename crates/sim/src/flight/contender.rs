@@ -1,7 +1,7 @@
 //! Flight of a scenario under one contender.
 
-use super::aboard::Aboard;
-use super::alone::Alone;
+use super::in_flight_core::InFlightCore;
+use super::law_only::LawOnly;
 use super::lockstep::{Lost, lockstep};
 use super::sample::Sample;
 use super::world::World;
@@ -40,10 +40,10 @@ impl<O: FnMut(&Sample)> Task for Fly<'_, O> {
             ControlFlow::Continue(())
         };
         let Ok(end) = if scenario.flight_core {
-            let mut aboard = Aboard::new(scenario.vehicle.to_f32(), controller)?;
+            let mut aboard = InFlightCore::new(scenario.vehicle.to_f32(), controller)?;
             lockstep(&mut world, &mut aboard, scenario.duration_s, observe)
         } else {
-            lockstep(&mut world, &mut Alone::new(controller), scenario.duration_s, observe)
+            lockstep(&mut world, &mut LawOnly::new(controller), scenario.duration_s, observe)
         };
         Ok(end.lost)
     }

@@ -1,9 +1,9 @@
 //! The vehicle's own estimate: instruments, the conversion of what they read, and the estimator.
 
 use super::sensing::{Sensing, still};
-use super::told;
+use super::sensor_model;
 use crate::scenario::Scenario;
-use afbc_estimator::{Aid, Easing, Estimate, Estimator, Memory};
+use afbc_estimator::{Aid, Estimate, Estimator, Memory, OutputFilter};
 use afbc_onboard::{Aged, pose};
 use afbc_plant::Truth;
 use afbc_plant::instruments::Imu;
@@ -60,11 +60,11 @@ pub struct Innovation {
 }
 
 /// Instruments and estimator of a vehicle.
-pub(super) struct Navigator {
+pub(super) struct SimulatedEstimator {
     sensing: Sensing,
     estimator: Estimator,
     memory: Memory,
-    easing: Easing,
+    output_filter: OutputFilter,
     step_s: f64,
     /// Steps since the beginning of settling, and how many of these there are before t = 0.
     steps: u64,
@@ -89,7 +89,7 @@ pub(super) struct Look {
     pub(super) estimated: Estimated,
 }
 
-impl Navigator {
+impl SimulatedEstimator {
     /// Creates the one of `scenario`, if it has an inertial sensor, which has settled in `truth`.
     ///
     /// # Errors
@@ -112,11 +112,11 @@ impl Navigator {
         let (Some(imu), Some(sensing)) = (scenario.instruments.imu, Sensing::new(scenario, step_s)?) else {
             return Ok(None);
         };
-        Ok(Some(Box::new(Navigator {
+        Ok(Some(Box::new(SimulatedEstimator {
             sensing,
             estimator: estimator(scenario, &imu, step_s)?,
             memory: Memory::default(),
-            easing: Easing::of(&scenario.vehicle.to_f32(), scenario.rotors.len()),
+            output_filter: OutputFilter::of(&scenario.vehicle.to_f32(), scenario.rotors.len()),
             step_s,
             steps: 0,
             settling: ((REST_S + waits_s + CARRIED_S) / step_s).round() as u64,
@@ -176,7 +176,7 @@ impl Navigator {
             valid,
             innovation: self.innovation(&judged),
         };
-        let state = Some(self.easing.step(&estimate));
+        let state = Some(self.output_filter.step(&estimate));
         let adrift = state.filter(|_| !valid && estimate.validity.attitude);
         let look = Look { state: state.filter(|_| valid), adrift, pose: self.pose, estimated };
         self.last = Some((truth.time_s, look));
@@ -206,7 +206,7 @@ impl Navigator {
         // The estimator's clock begins a step before settling: no time of it is zero.
         let at_us = |time_s: f64| ((time_s + (settling + 1.0) * step_s) * 1e6).round().max(0.0) as u64;
         let now_us = at_us(truth.time_s);
-        let Navigator { sensing, memory, works, pose: left, .. } = self;
+        let SimulatedEstimator { sensing, memory, works, pose: left, .. } = self;
         *left = None;
         let sample = sensing.read(truth, at_us, |measurement| {
             if *works {
@@ -248,7 +248,7 @@ fn is_valid(estimate: &Estimate) -> bool {
 /// The first setting out of range.
 pub(super) fn estimator(scenario: &Scenario, imu: &Imu, step_s: f64) -> Result<Estimator, OutOfRange> {
     let gravity_m_s2 = scenario.vehicle.gravity_m_s2;
-    Estimator::new(told::settings(&scenario.instruments, imu, scenario.rotors.len(), gravity_m_s2, step_s))
+    Estimator::new(sensor_model::settings(&scenario.instruments, imu, scenario.rotors.len(), gravity_m_s2, step_s))
 }
 
 /// Truth less estimate, in the order of the covariance: rotation about the axes of the earth frame \[rad\], velocity

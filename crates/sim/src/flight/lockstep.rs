@@ -17,7 +17,7 @@ pub struct Lost {
 
 /// End of a flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct End {
+pub struct FlightEnd {
     /// When and why the vehicle was lost, if it was.
     pub lost: Option<Lost>,
     /// True if the observer ended the flight.
@@ -36,7 +36,7 @@ pub fn lockstep<P: Pilot>(
     pilot: &mut P,
     duration_s: f64,
     mut observe: impl FnMut(&Sample) -> ControlFlow<()>,
-) -> Result<End, P::Error> {
+) -> Result<FlightEnd, P::Error> {
     let steps = (duration_s / world.dt_s()).round() as u64;
     let mut watch = Watch::new(world.faulty_from_s());
     for step in 0..=steps {
@@ -45,11 +45,11 @@ pub fn lockstep<P: Pilot>(
         let reason = watch.lost(&sample, pilot.descends()).or_else(|| pilot.gave_up());
         let lost = reason.map(|reason| Lost { time_s: sample.time_s, reason });
         if interrupted || lost.is_some() {
-            return Ok(End { lost, interrupted });
+            return Ok(FlightEnd { lost, interrupted });
         }
         if step < steps {
             world.advance(&sample.action.speeds);
         }
     }
-    Ok(End::default())
+    Ok(FlightEnd::default())
 }

@@ -2,8 +2,8 @@
 
 use super::estimation::Estimated;
 use crate::trajectory::Reference;
-use afbc_control::{Action, Estimate, Trace};
-use afbc_plant::{Measurement, Motion, Telemetry};
+use afbc_control::{Action, AdaptiveEstimate, Trace};
+use afbc_plant::{EffectsState, Motion, StateMeasurement};
 use afbc_types::{PerAxis, ROTORS_MAX};
 
 /// All quantities of one step.
@@ -14,11 +14,11 @@ pub struct Sample {
     /// True motion.
     pub motion: Motion,
     /// Measurement by the sensors; none if they are perfect.
-    pub measurement: Option<Measurement>,
+    pub measurement: Option<StateMeasurement>,
     /// The vehicle's own estimate against the truth; none without instruments.
     pub estimated: Option<Estimated>,
     /// State of rotors, air and ground after the previous step; none for an ideal plant.
-    pub telemetry: Option<Telemetry>,
+    pub telemetry: Option<EffectsState>,
     /// Reference at this time.
     pub reference: Reference,
     /// The controller's output; 0 for rotors that the vehicle does not have.
@@ -26,5 +26,5 @@ pub struct Sample {
     /// The controller's trace.
     pub trace: Trace,
     /// The law's estimates; zero for a law without adaptation.
-    pub estimates: PerAxis<Estimate>,
+    pub estimates: PerAxis<AdaptiveEstimate>,
 }

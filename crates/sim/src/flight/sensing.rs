@@ -1,11 +1,11 @@
 //! What a vehicle's own sensors say: the instruments' readings as an estimator is told them.
 
-use super::told::{self, Calibration};
+use super::sensor_model::{self, Calibration};
 use crate::scenario::{Outage, Scenario};
-use afbc_estimator::{ImuSample, Measurement, Timed};
+use afbc_estimator::{ImuSample, Measurement, Stamped};
 use afbc_onboard::{AIDS_MAX, Aged, Readings};
 use afbc_plant::instruments::Mounting;
-use afbc_plant::{Instruments, Suite, Truth};
+use afbc_plant::{InstrumentSuite, Instruments, Truth};
 use afbc_types::OutOfRange;
 use nalgebra::Vector3;
 use std::collections::VecDeque;
@@ -16,7 +16,7 @@ pub const STANDS_S: f64 = 4.0;
 /// Instruments of a vehicle, with what its software knows of them.
 pub(super) struct Sensing {
     instruments: Instruments,
-    suite: Suite,
+    suite: InstrumentSuite,
     calibration: Calibration,
     outages: Vec<Outage>,
 }
@@ -46,21 +46,21 @@ impl Sensing {
         &mut self,
         truth: &Truth,
         at_us: impl Fn(f64) -> u64,
-        mut offer: impl FnMut(&Timed<Measurement>),
+        mut offer: impl FnMut(&Stamped<Measurement>),
     ) -> Option<ImuSample> {
         let readings = self.instruments.measure(truth);
         let Sensing { suite, outages, .. } = self;
         // The tracker is on the ground: what it sends in an outage of the link is lost.
         let heard = !outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&truth.time_s));
         if let Some(tracker) = suite.tracker.filter(|_| heard) {
-            readings.tracker.iter().for_each(|fix| offer(&told::pose(fix, &tracker, &at_us)));
+            readings.tracker.iter().for_each(|fix| offer(&sensor_model::pose(fix, &tracker, &at_us)));
         }
-        readings.gnss.iter().for_each(|fix| offer(&told::gnss(fix, &at_us)));
+        readings.gnss.iter().for_each(|fix| offer(&sensor_model::gnss(fix, &at_us)));
         if let Some(barometer) = suite.barometer {
-            readings.barometer.iter().for_each(|fix| offer(&told::height(fix, &barometer, &at_us)));
+            readings.barometer.iter().for_each(|fix| offer(&sensor_model::height(fix, &barometer, &at_us)));
         }
         if let Some(magnetometer) = suite.magnetometer {
-            readings.magnetometer.iter().for_each(|fix| offer(&told::field(fix, &magnetometer, &at_us)));
+            readings.magnetometer.iter().for_each(|fix| offer(&sensor_model::field(fix, &magnetometer, &at_us)));
         }
         readings.imu.map(|reading| self.calibration.sample(&reading, at_us(reading.at_s)))
     }
@@ -93,7 +93,7 @@ pub(super) struct Wired {
     looks: u64,
     readings: Readings,
     /// Measurements that wait for a tick that takes them.
-    waiting: VecDeque<Timed<Measurement>>,
+    waiting: VecDeque<Stamped<Measurement>>,
 }
 
 impl Wired {
@@ -145,7 +145,7 @@ impl Wired {
         });
         readings.aids = [None; AIDS_MAX];
         for slot in &mut readings.aids {
-            *slot = waiting.pop_front().map(|Timed { value, at_us }| Aged { value, age_us: age_us(at_us) });
+            *slot = waiting.pop_front().map(|Stamped { value, at_us }| Aged { value, age_us: age_us(at_us) });
         }
     }
 }

@@ -1,23 +1,25 @@
 //! The plant with its disturbances and sensors.
 
-use super::estimation::{Estimated, Look, Navigator};
+use super::estimation::{Estimated, Look, SimulatedEstimator};
 use super::sample::Sample;
 use super::sensing::Wired;
 use crate::scenario::{Outage, Scenario};
 use crate::trajectory::{Reference, Trajectory};
-use afbc_control::{Action, Estimate, Trace};
+use afbc_control::{Action, AdaptiveEstimate, Trace};
 use afbc_onboard::{Aged, Readings};
-use afbc_plant::{Instruments, Measurement, Motion, Plant, SensorFaults, Sensors, Suite, Telemetry};
+use afbc_plant::{
+    EffectsState, InstrumentSuite, Instruments, Motion, Plant, SensorFaults, StateMeasurement, StateSensor,
+};
 use afbc_types::{OutOfRange, PerAxis, Pose, ROTORS_MAX, RotorSpeeds, State};
 
 /// Plant, sensors, link and reference of a scenario.
 pub struct World {
     plant: Plant,
     /// What the vehicle flies on if it has an inertial sensor; the sensors otherwise.
-    navigator: Option<Box<Navigator>>,
+    navigator: Option<Box<SimulatedEstimator>>,
     /// What a vehicle with its own estimator reads.
     wired: Option<Box<Wired>>,
-    sensors: Option<Sensors>,
+    sensors: Option<StateSensor>,
     faults: SensorFaults,
     outages: Vec<Outage>,
     trajectory: Trajectory,
@@ -33,11 +35,11 @@ pub struct View {
     /// True motion.
     pub motion: Motion,
     /// Measurement by the sensors; none if they are perfect.
-    pub measurement: Option<Measurement>,
+    pub measurement: Option<StateMeasurement>,
     /// The vehicle's own estimate against the truth; none without instruments.
     pub estimated: Option<Estimated>,
     /// State of rotors, air and ground after the previous step; none for an ideal plant.
-    pub telemetry: Option<Telemetry>,
+    pub telemetry: Option<EffectsState>,
     /// Reference at this time.
     pub reference: Reference,
     /// Newest state that has reached the pilot, held between samples; none in a dropout or an outage.
@@ -58,7 +60,7 @@ impl World {
     pub fn new(scenario: &Scenario, dt_s: f64) -> Result<Self, OutOfRange> {
         let plant = scenario.plant(dt_s)?;
         Ok(World {
-            navigator: Navigator::new(scenario, dt_s, &plant.truth())?,
+            navigator: SimulatedEstimator::new(scenario, dt_s, &plant.truth())?,
             wired: None,
             plant,
             sensors: scenario.sensors(dt_s)?,
@@ -77,7 +79,10 @@ impl World {
     /// The first setting of plant or sensors out of range.
     pub fn wired(scenario: &Scenario, dt_s: f64) -> Result<Self, OutOfRange> {
         let wired = Wired::new(scenario, dt_s)?;
-        Ok(World { wired, ..World::new(&Scenario { instruments: Suite::default(), ..scenario.clone() }, dt_s)? })
+        Ok(World {
+            wired,
+            ..World::new(&Scenario { instruments: InstrumentSuite::default(), ..scenario.clone() }, dt_s)?
+        })
     }
 
     /// Creates the [wired](Self::wired) world of a vehicle that is released at once, and stands on the ground by its
@@ -171,7 +176,12 @@ impl World {
 impl View {
     /// Returns the sample of this view and a pilot's output.
     #[inline(always)]
-    pub fn sample<const N: usize>(self, action: Action<N>, trace: Trace, estimates: PerAxis<Estimate>) -> Sample {
+    pub fn sample<const N: usize>(
+        self,
+        action: Action<N>,
+        trace: Trace,
+        estimates: PerAxis<AdaptiveEstimate>,
+    ) -> Sample {
         let View { time_s, motion, measurement, estimated, telemetry, reference, .. } = self;
         let action = action.padded();
         Sample { time_s, motion, measurement, estimated, telemetry, reference, action, trace, estimates }
@@ -181,7 +191,7 @@ impl View {
 /// Looks at the world with the vehicle's own instruments.
 // Not inlined, so that the step of an ideal flight stays short.
 #[inline(never)]
-fn navigated(navigator: &mut Navigator, plant: &Plant, motion: Motion, reference: Reference) -> View {
+fn navigated(navigator: &mut SimulatedEstimator, plant: &Plant, motion: Motion, reference: Reference) -> View {
     let (time_s, telemetry) = (plant.time_s(), plant.telemetry());
     let Look { state, adrift, pose, estimated } = navigator.look(&plant.truth());
     View {
@@ -207,7 +217,7 @@ fn is_lost(outages: &[Outage], time_s: f64) -> bool {
 /// Returns the state for a pilot, unless there is a dropout, and the measurement.
 // Not inlined, so that the step of an ideal flight stays short.
 #[inline(never)]
-fn measure(sensors: &mut Sensors, motion: &Motion) -> (Option<State>, Option<Measurement>) {
+fn measure(sensors: &mut StateSensor, motion: &Motion) -> (Option<State>, Option<StateMeasurement>) {
     let measurement = sensors.measure(motion);
     (Some(measurement.state).filter(|_| measurement.fresh), Some(measurement))
 }

@@ -1,6 +1,6 @@
 //! The closed loop over the link.
 
-use super::{Autopilot, Error, Heard, Pace, Station};
+use super::{Autopilot, Error, MessagePeriods, ReceivedMessages, Station};
 use crate::contender::{Contender, ControllerKind};
 use crate::flight::{Lost, Pilot, Sample, View, World, lockstep};
 use crate::scenario::Scenario;
@@ -85,7 +85,7 @@ pub fn fly(
     scenario: &Scenario,
     station: &mut Station,
     autopilot: &mut impl Autopilot,
-    pace: Pace,
+    pace: MessagePeriods,
     observe: impl FnMut(&Sample) -> ControlFlow<()>,
 ) -> Result<LoopEnd, Error> {
     check(scenario)?;
@@ -111,7 +111,7 @@ pub fn fly(
 struct Line<'a, A> {
     station: &'a mut Station,
     autopilot: &'a mut A,
-    pace: Pace,
+    pace: MessagePeriods,
     rotors: Vec<Rotor>,
     thrust_factor_n_s2: f32,
     now_ms: u64,
@@ -182,7 +182,7 @@ impl<A: Autopilot> Line<'_, A> {
         command: Command,
         world: &mut World,
         within_ms: u64,
-        done: fn(&Heard) -> bool,
+        done: fn(&ReceivedMessages) -> bool,
     ) -> Result<Option<View>, Error> {
         for waited_ms in 0..within_ms {
             if waited_ms.is_multiple_of(ASK_EVERY_MS) {
@@ -218,7 +218,7 @@ impl<A: Autopilot> Line<'_, A> {
 
     /// True if the vehicle confirms that it has disarmed.
     fn disarm(&mut self, world: &mut World) -> Result<bool, Error> {
-        let done = |heard: &Heard| heard.answer == Some(Answer::Accepted) && !heard.armed;
+        let done = |heard: &ReceivedMessages| heard.answer == Some(Answer::Accepted) && !heard.armed;
         Ok(self.ask(Command::Kill, world, DISARM_WITHIN_MS, done)?.is_some())
     }
 }

@@ -4,8 +4,10 @@ use super::{Autopilot, Error};
 use afbc::Profile;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
-use afbc_onboard::parameters::{Change, Kept, Reason, Table};
-use afbc_onboard::{ArmingLimits, Comms, Configuration, Flight, Link, Mail, Prepared, Readings, Report, Setup};
+use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
+use afbc_onboard::{
+    ArmingLimits, Comms, Configuration, ControlInputs, Flight, Link, Prepared, Readings, Report, Setup,
+};
 use afbc_store::Store;
 use afbc_types::{Airframe, OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_vehicles::Vehicle;
@@ -16,19 +18,25 @@ pub struct Host {
     flight: Box<dyn Core>,
     setup: Setup,
     comms: Comms,
-    mail: Mail,
+    mail: ControlInputs,
     /// What the last tick took of it.
-    taken: Mail,
+    taken: ControlInputs,
     readings: Readings,
     time_us: u64,
 }
 
 /// The half that decides, of a vehicle with any number of rotors, and its parameters.
 trait Core {
-    fn tick(&mut self, now_us: u64, mail: &mut Mail, readings: &Readings, tell: Tell<'_>) -> Report<ROTORS_MAX>;
+    fn tick(
+        &mut self,
+        now_us: u64,
+        mail: &mut ControlInputs,
+        readings: &Readings,
+        tell: Tell<'_>,
+    ) -> Report<ROTORS_MAX>;
 
     /// Does what stations want of the parameters, and flies what has changed.
-    fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<Change>;
+    fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange>;
 }
 
 /// What reports a tick that took so many cycles.
@@ -38,14 +46,20 @@ struct Tell<'a> {
     send: &'a mut dyn FnMut(&[u8]),
 }
 
-impl<const N: usize> Core for (Flight<N>, Table<N>) {
-    fn tick(&mut self, now_us: u64, mail: &mut Mail, readings: &Readings, tell: Tell<'_>) -> Report<ROTORS_MAX> {
+impl<const N: usize> Core for (Flight<N>, ParameterTable<N>) {
+    fn tick(
+        &mut self,
+        now_us: u64,
+        mail: &mut ControlInputs,
+        readings: &Readings,
+        tell: Tell<'_>,
+    ) -> Report<ROTORS_MAX> {
         let report = self.0.tick(now_us, mail, readings);
         tell.comms.report(&report, tell.cycles, tell.send);
         report.padded()
     }
 
-    fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<Change> {
+    fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange> {
         let (flight, table) = self;
         let change = comms.parameters(table, send)?;
         // Disarmed, and each change has been checked.
@@ -57,13 +71,13 @@ impl<const N: usize> Core for (Flight<N>, Table<N>) {
 
 /// Result of one control tick.
 #[derive(Clone, Debug)]
-pub struct Tick {
+pub struct HostTick {
     /// Report of the control tick.
     pub report: Report<ROTORS_MAX>,
     /// Bytes sent over the link.
     pub bytes: Vec<u8>,
     /// A parameter that has changed, to be kept.
-    pub change: Option<Change>,
+    pub change: Option<RecordChange>,
 }
 
 /// What the firmware's image for `vehicle` is told of it (`firmware/build.rs`).
@@ -106,10 +120,10 @@ impl Host {
     /// As of [`for_vehicle`](Self::for_vehicle).
     pub fn linked(vehicle: Option<&Vehicle>, link: Link) -> Result<Self, OutOfRange> {
         let Some(vehicle) = vehicle else {
-            return Self::of(Table::new(Configuration { link, ..Configuration::default() }));
+            return Self::of(ParameterTable::new(Configuration { link, ..Configuration::default() }));
         };
         with_rotors!(vehicle.rotors.len(), N => {
-            Self::of(Table::<N>::new(Configuration { link, ..configuration(vehicle)? }))
+            Self::of(ParameterTable::<N>::new(Configuration { link, ..configuration(vehicle)? }))
         })
     }
 
@@ -132,15 +146,15 @@ impl Host {
         })
     }
 
-    fn of<const N: usize>(table: Table<N>) -> Result<Self, OutOfRange> {
+    fn of<const N: usize>(table: ParameterTable<N>) -> Result<Self, OutOfRange> {
         let setup = Setup::of(&table.configuration().link);
         let flight = Flight::new(table.configuration())?;
         Ok(Host {
             flight: Box::new((flight, table)),
             setup,
             comms: Comms::with(setup),
-            mail: Mail::EMPTY,
-            taken: Mail::EMPTY,
+            mail: ControlInputs::EMPTY,
+            taken: ControlInputs::EMPTY,
             readings: Readings::NONE,
             time_us: 0,
         })
@@ -165,7 +179,7 @@ impl Host {
     /// Receives, for the next tick, the next bytes of one of several streams, each with a decoder of its own.
     pub fn hear(&mut self, decoder: &mut Decoder<Uplink>, bytes: &[u8]) {
         self.comms.exchange(decoder);
-        self.mail.post(&self.comms.receive(bytes));
+        self.mail.merge(&self.comms.receive(bytes));
         self.comms.exchange(decoder);
     }
 
@@ -176,8 +190,8 @@ impl Host {
 
     /// Runs one control tick at `time_us` since power-up, after `uplink` has reached the link. The tick reports a
     /// duration of `cycles` cycles of 168 MHz.
-    pub fn tick(&mut self, uplink: &[u8], time_us: u64, cycles: u32) -> Tick {
-        self.mail.post(&self.comms.receive(uplink));
+    pub fn tick(&mut self, uplink: &[u8], time_us: u64, cycles: u32) -> HostTick {
+        self.mail.merge(&self.comms.receive(uplink));
         self.mail.take_into(&mut self.taken);
         let readings = core::mem::take(&mut self.readings);
         let mut bytes = Vec::new();
@@ -186,11 +200,11 @@ impl Host {
         let report = self.flight.tick(time_us, &mut self.taken, &readings, tell);
         let change = self.flight.parameters(&mut self.comms, &mut send);
         self.time_us = time_us;
-        Tick { report, bytes, change }
+        HostTick { report, bytes, change }
     }
 
     /// Runs the tick a millisecond after the previous one, with a duration of zero.
-    pub fn next_tick(&mut self, uplink: &[u8]) -> Tick {
+    pub fn next_tick(&mut self, uplink: &[u8]) -> HostTick {
         self.tick(uplink, self.time_us + PERIOD_US, 0)
     }
 }
@@ -200,8 +214,8 @@ fn loaded<F: NorFlash, const N: usize>(
     image: Configuration<N>,
     store: &mut Store<F>,
     notice: &mut impl FnMut(&str),
-) -> Table<N> {
-    let mut table = Table::new(image);
+) -> ParameterTable<N> {
+    let mut table = ParameterTable::new(image);
     let loaded = Kept::NOW.load(&mut table, store, |unused: Reason| notice(unused.as_str()));
     loaded.unwrap_or_else(|error| notice(error.reason()));
     table

@@ -7,7 +7,7 @@
 //! 2. [`Host`]: the firmware's code in this process. Other implementations are an emulated processor, and a board on a
 //!    serial port.
 //! 3. [`Station`]: tracker, commander and ground station, at the other end of the link.
-//! 4. [`fly()`]: arms, releases the vehicle, flies a scenario, disarms. [`Pace`] sets the message rates.
+//! 4. [`fly()`]: arms, releases the vehicle, flies a scenario, disarms. [`MessagePeriods`] sets the message rates.
 //!
 //! The firmware has the paper's vehicle and its own law ([`firmware`]); a scenario with others is refused ([`check`]).
 //! Plant, gusts, true parameters, start and trajectory are the scenario's.
@@ -29,8 +29,8 @@ pub use autopilot::Autopilot;
 pub use error::Error;
 pub use extremes::Extremes;
 pub use flight::{LoopEnd, check, firmware, fly};
-pub use host::{Host, Tick, configuration};
+pub use host::{Host, HostTick, configuration};
 pub use log::Log;
-pub use pace::Pace;
+pub use pace::MessagePeriods;
 pub use report::tracking;
-pub use station::{Heard, Station};
+pub use station::{ReceivedMessages, Station};

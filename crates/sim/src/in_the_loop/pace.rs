@@ -18,7 +18,7 @@ const PING_PERIOD_MS: u64 = 100;
 
 /// Periods of messages \[ms\].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Pace {
+pub struct MessagePeriods {
     /// Period of states.
     pub state_ms: u64,
     /// Period of setpoints.
@@ -27,9 +27,9 @@ pub struct Pace {
     pub ping_ms: Option<u64>,
 }
 
-impl Pace {
+impl MessagePeriods {
     /// Both in every control tick, as without a link.
-    pub const LOCKSTEP: Pace = Pace { state_ms: 1, setpoint_ms: 1, ping_ms: None };
+    pub const LOCKSTEP: MessagePeriods = MessagePeriods { state_ms: 1, setpoint_ms: 1, ping_ms: None };
 
     /// Returns the rates for a serial line of `baud`: as many states as possible, with a period in whole milliseconds.
     ///
@@ -43,7 +43,7 @@ impl Pace {
             .map(|left| (STATE_BYTES * 1000).div_ceil(left));
         match state_ms {
             Some(state_ms @ ..=STATE_PERIOD_MAX_MS) => {
-                Ok(Pace { state_ms, setpoint_ms: SETPOINT_PERIOD_MS, ping_ms: Some(PING_PERIOD_MS) })
+                Ok(MessagePeriods { state_ms, setpoint_ms: SETPOINT_PERIOD_MS, ping_ms: Some(PING_PERIOD_MS) })
             }
             _ => Err(Error::Baud { given: baud, least: least_baud() }),
         }
@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn states_come_as_often_as_the_line_allows() {
-        let state_ms = |baud| Pace::at(baud).map(|pace| pace.state_ms).ok();
+        let state_ms = |baud| MessagePeriods::at(baud).map(|pace| pace.state_ms).ok();
         assert_eq!(state_ms(4_000_000), Some(1));
         assert_eq!(state_ms(921_600), Some(4));
         assert_eq!(state_ms(460_800), Some(8));

@@ -4,7 +4,7 @@ use super::Extremes;
 use afbc_flight_core::Refusal;
 use afbc_guidance::FlightMode;
 use afbc_link::{
-    Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, Health, MavCmd, Sender, Text, Uplink,
+    Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, HealthArray, MavCmd, Sender, Text, Uplink,
 };
 use afbc_onboard::BUSY;
 use afbc_onboard::services::modes;
@@ -27,7 +27,7 @@ pub struct Station {
     sender: Sender,
     uplink: Vec<u8>,
     decoder: Decoder<Downlink>,
-    heard: Heard,
+    heard: ReceivedMessages,
     pinged: Option<Instant>,
     pings: u64,
     round_trip_ms: Extremes,
@@ -35,7 +35,7 @@ pub struct Station {
 
 /// Messages received from the vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Heard {
+pub struct ReceivedMessages {
     /// Last commanded rotor speeds.
     pub speeds: RotorSpeeds<ROTORS_MAX>,
     /// True if the motors may turn, from the last rotor command.
@@ -45,7 +45,7 @@ pub struct Heard {
     /// Last position, in the vehicle's local frame \[m\].
     pub position_m: Option<Vector3<f32>>,
     /// Last health message.
-    pub health: Option<Health>,
+    pub health: Option<HealthArray>,
     /// Largest age of the state that it has reported while armed \[us\].
     pub state_age_max_us: f32,
     /// The answer to the last request to arm or disarm.
@@ -67,7 +67,7 @@ impl Station {
             sender: Sender::new(ADDRESS),
             uplink: Vec::new(),
             decoder: Decoder::new(ADDRESS),
-            heard: Heard::default(),
+            heard: ReceivedMessages::default(),
             pinged: None,
             pings: 0,
             round_trip_ms: Extremes::default(),
@@ -152,7 +152,7 @@ impl Station {
     }
 
     /// Returns what the vehicle has sent.
-    pub fn heard(&self) -> &Heard {
+    pub fn heard(&self) -> &ReceivedMessages {
         &self.heard
     }
 
@@ -172,7 +172,7 @@ impl Station {
     }
 }
 
-impl Heard {
+impl ReceivedMessages {
     /// Returns the reason for which the vehicle refused to arm.
     pub fn refusal(&self) -> Option<&'static str> {
         let Some(Answer::Refused(number)) = self.answer else { return None };

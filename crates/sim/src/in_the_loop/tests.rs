@@ -17,7 +17,7 @@ fn scenario(name: &str, duration_s: f64) -> Scenario {
 
 fn fly_host(scenario: &Scenario) -> (LoopEnd, Metrics) {
     let (mut station, mut host, mut metrics) = (Station::new(), Host::new().unwrap(), Accumulator::default());
-    let end = fly(scenario, &mut station, &mut host, Pace::LOCKSTEP, |sample| {
+    let end = fly(scenario, &mut station, &mut host, MessagePeriods::LOCKSTEP, |sample| {
         metrics.add(sample);
         ControlFlow::Continue(())
     });
@@ -66,8 +66,9 @@ fn what_the_firmware_does_not_hold_is_refused() {
 fn a_vehicle_that_does_not_arm_says_why() {
     let mut tilted = scenario("hover", 1.0);
     tilted.initial.attitude_rad.x = 0.5;
-    let error =
-        fly(&tilted, &mut Station::new(), &mut Host::new().unwrap(), Pace::LOCKSTEP, |_| ControlFlow::Continue(()));
+    let error = fly(&tilted, &mut Station::new(), &mut Host::new().unwrap(), MessagePeriods::LOCKSTEP, |_| {
+        ControlFlow::Continue(())
+    });
     assert_eq!(error.unwrap_err().to_string(), "the vehicle did not arm: arming refused: tilt too large");
 }
 
@@ -80,7 +81,8 @@ fn a_dead_line_is_noticed() {
         }
     }
     let scenario = scenario("hover", 1.0);
-    let error = fly(&scenario, &mut Station::new(), &mut Nobody, Pace::LOCKSTEP, |_| ControlFlow::Continue(()));
+    let error =
+        fly(&scenario, &mut Station::new(), &mut Nobody, MessagePeriods::LOCKSTEP, |_| ControlFlow::Continue(()));
     assert!(matches!(error, Err(Error::Silent)));
 }
 
@@ -94,7 +96,8 @@ fn instruments_that_nobody_reads_are_refused() {
         }
     }
     let scenario = scenario("mocap", 1.0);
-    let error = fly(&scenario, &mut Station::new(), &mut Elsewhere, Pace::LOCKSTEP, |_| ControlFlow::Continue(()));
+    let error =
+        fly(&scenario, &mut Station::new(), &mut Elsewhere, MessagePeriods::LOCKSTEP, |_| ControlFlow::Continue(()));
     assert!(error.unwrap_err().to_string().contains("[instruments]"));
 }
 
@@ -103,7 +106,7 @@ fn instruments_that_nobody_reads_are_refused() {
 fn the_firmware_flies_on_its_own_estimate() {
     let mut scenario = scenario("mocap", 8.0);
     let mut off_m: f64 = 0.0;
-    let end = fly(&scenario, &mut Station::new(), &mut Host::new().unwrap(), Pace::LOCKSTEP, |sample| {
+    let end = fly(&scenario, &mut Station::new(), &mut Host::new().unwrap(), MessagePeriods::LOCKSTEP, |sample| {
         let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
         off_m = if sample.time_s < 5.0 { 0.0 } else { off_m.max(distance_m) };
         ControlFlow::Continue(())
@@ -111,8 +114,9 @@ fn the_firmware_flies_on_its_own_estimate() {
     assert_eq!(end.unwrap(), LoopEnd { lost: None, interrupted: false, disarmed: true });
     assert!(off_m > 0.0 && off_m < 0.02, "{off_m} m");
     scenario.outages = vec![crate::scenario::Outage { start_s: -10.0, end_s: 20.0 }];
-    let error =
-        fly(&scenario, &mut Station::new(), &mut Host::new().unwrap(), Pace::LOCKSTEP, |_| ControlFlow::Continue(()));
+    let error = fly(&scenario, &mut Station::new(), &mut Host::new().unwrap(), MessagePeriods::LOCKSTEP, |_| {
+        ControlFlow::Continue(())
+    });
     assert_eq!(error.unwrap_err().to_string(), "the vehicle did not arm: arming refused: estimator has no heading");
 }
 
@@ -124,7 +128,7 @@ fn a_receiver_that_is_off_at_the_start_is_no_obstacle() {
     let outdoor = scenario("outdoor", 60.0);
     let arms_and_flies = |scenario: Scenario| {
         let mut off_m: f64 = 0.0;
-        let end = fly(&scenario, &mut Station::new(), &mut Host::new().unwrap(), Pace::LOCKSTEP, |sample| {
+        let end = fly(&scenario, &mut Station::new(), &mut Host::new().unwrap(), MessagePeriods::LOCKSTEP, |sample| {
             let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
             off_m = if sample.time_s < 5.0 { 0.0 } else { off_m.max(distance_m) };
             ControlFlow::Continue(())
@@ -154,7 +158,7 @@ fn the_firmwares_estimator_is_the_vehicle_files() {
         let vehicle = afbc_vehicles::parse("my.toml", &format!("{}\n{table}", paper.text), "my").unwrap();
         let scenario = scenario("mocap", 2.0).on(&vehicle, afbc::Profile::Flight).unwrap();
         let (mut station, mut host) = (Station::new(), Host::for_vehicle(&vehicle).unwrap());
-        let end = fly(&scenario, &mut station, &mut host, Pace::LOCKSTEP, |_| ControlFlow::Continue(()));
+        let end = fly(&scenario, &mut station, &mut host, MessagePeriods::LOCKSTEP, |_| ControlFlow::Continue(()));
         let without = Run::fly(&scenario, &firmware(&scenario).unwrap(), u64::MAX).unwrap().metrics;
         (end.map(|end| end.lost).map_err(|error| error.to_string()), without)
     };
@@ -168,7 +172,7 @@ fn the_firmwares_estimator_is_the_vehicle_files() {
 fn the_observer_can_break_off() {
     let scenario = scenario("hover", 5.0);
     let mut steps = 0;
-    let end = fly(&scenario, &mut Station::new(), &mut Host::new().unwrap(), Pace::LOCKSTEP, |_| {
+    let end = fly(&scenario, &mut Station::new(), &mut Host::new().unwrap(), MessagePeriods::LOCKSTEP, |_| {
         steps += 1;
         if steps == 100 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
@@ -195,7 +199,7 @@ fn the_log_has_the_columns_of_every_log() {
     let path = std::env::temp_dir().join(format!("afbc-loop-log-{}.csv", std::process::id()));
     let (mut station, mut host, mut log) = (Station::new(), Host::new().unwrap(), Log::create(&path, 4).unwrap());
     let mut logged = Vec::new();
-    let end = fly(&scenario, &mut station, &mut host, Pace::LOCKSTEP, |sample| {
+    let end = fly(&scenario, &mut station, &mut host, MessagePeriods::LOCKSTEP, |sample| {
         log.add(sample).unwrap();
         logged.push(*sample);
         ControlFlow::Continue(())

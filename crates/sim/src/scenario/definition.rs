@@ -8,7 +8,8 @@ use afbc_estimator::Settings;
 use afbc_flight_core::ArmingLimits;
 use afbc_plant::instruments::{Imu, InstrumentFault, Mounting};
 use afbc_plant::{
-    Environment, Frame, Instruments, Model, Motion, Plant, Realism, Rotors, Sensing, SensorFault, Sensors, Suite,
+    Environment, Frame, InstrumentSuite, Instruments, Motion, Plant, PlantModel, Realism, Rotors, Sensing, SensorFault,
+    StateSensor,
 };
 use afbc_reader::FileError;
 use afbc_reader::words::out_of_range;
@@ -49,7 +50,7 @@ pub struct Scenario {
     /// Length of the flight \[s\].
     pub duration_s: f64,
     /// Equations of motion.
-    pub model: Model,
+    pub model: PlantModel,
     /// Nominal parameters, known to the controllers.
     pub vehicle: Parameters<f64>,
     /// Its rotors, in the order of their numbers: four to eight.
@@ -65,12 +66,12 @@ pub struct Scenario {
     /// Faults of the measurement.
     pub sensor_faults: Vec<SensorFault>,
     /// Instruments of the vehicle, for its estimator; their mounting is the vehicle file's.
-    pub instruments: Suite,
+    pub instruments: InstrumentSuite,
     /// Failures of the instruments.
     pub instrument_faults: Vec<InstrumentFault>,
     /// Outages of the link.
     pub outages: Vec<Outage>,
-    /// Whether the controllers fly inside the [flight core](crate::flight::Aboard), as on board.
+    /// Whether the controllers fly inside the [flight core](crate::flight::InFlightCore), as on board.
     pub flight_core: bool,
     /// Seed of all random effects. The same seed gives the same flight.
     pub seed: u64,
@@ -164,7 +165,7 @@ impl Scenario {
     /// Returns the time from which on the scenario may take measurements away: by the first fault of a sensor or an
     /// instrument, the first outage, or from the start if any fail at random. Infinite if it takes none away \[s\].
     pub fn faulty_from_s(&self) -> f64 {
-        let Suite { imu: _, tracker, gnss, barometer: _, magnetometer: _ } = &self.instruments;
+        let InstrumentSuite { imu: _, tracker, gnss, barometer: _, magnetometer: _ } = &self.instruments;
         let lost =
             tracker.iter().flat_map(|tracker| [tracker.loss, tracker.freeze]).chain(gnss.iter().map(|it| it.loss));
         if lost.chain(self.sensing.dropouts).any(|dropouts| dropouts.rate_hz > 0.0) {
@@ -198,11 +199,11 @@ impl Scenario {
     ///
     /// # Errors
     /// The first setting out of range.
-    pub fn sensors(&self, step_s: f64) -> Result<Option<Sensors>, OutOfRange> {
+    pub fn sensors(&self, step_s: f64) -> Result<Option<StateSensor>, OutOfRange> {
         if self.sensing == Sensing::default() && self.sensor_faults.is_empty() {
             return Ok(None);
         }
-        Sensors::new(&self.sensing, self.seed, step_s).map(Some)
+        StateSensor::new(&self.sensing, self.seed, step_s).map(Some)
     }
 
     /// Returns the instruments, read every `step_s`; none if the vehicle has none.
@@ -210,11 +211,12 @@ impl Scenario {
     /// # Errors
     /// The first setting out of range.
     pub fn instruments(&self, step_s: f64) -> Result<Option<Instruments>, OutOfRange> {
-        if self.instruments == Suite::default() {
+        if self.instruments == InstrumentSuite::default() {
             return Ok(None);
         }
         let mounting = self.vehicle_file.as_ref().map_or(Mounting::DEFAULT, |file| file.imu);
-        let suite = Suite { imu: self.instruments.imu.map(|imu| Imu { mounting, ..imu }), ..self.instruments };
+        let suite =
+            InstrumentSuite { imu: self.instruments.imu.map(|imu| Imu { mounting, ..imu }), ..self.instruments };
         Instruments::new(&suite, &self.instrument_faults, self.seed, step_s).map(Some)
     }
 }

@@ -3,9 +3,9 @@
 use crate::cli::in_the_loop::{InTheLoop, Recorder, outcome};
 use crate::cli::terminal::{Failure, print};
 use afbc_sim::flight::Sample;
-use afbc_sim::in_the_loop::{self, Host, Pace, Station};
+use afbc_sim::in_the_loop::{self, Host, MessagePeriods, Station};
 use afbc_sim::scenario::Scenario;
-use pil::{Comparison, Emulator, Image, Twins};
+use pil::{Emulator, Image, TwinComparison, Twins};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -22,7 +22,7 @@ pub(super) fn fly(scenario: &Scenario, flying: &InTheLoop, image: Option<PathBuf
 
     let start = Instant::now();
     let observe = |sample: &Sample| recorder.observe(sample);
-    let end = in_the_loop::fly(scenario, &mut Station::new(), &mut twins, Pace::LOCKSTEP, observe)?;
+    let end = in_the_loop::fly(scenario, &mut Station::new(), &mut twins, MessagePeriods::LOCKSTEP, observe)?;
     let seconds = start.elapsed().as_secs_f64();
     let comparison = twins.comparison();
     let metrics = recorder.finish()?;
@@ -39,9 +39,9 @@ pub(super) fn fly(scenario: &Scenario, flying: &InTheLoop, image: Option<PathBuf
     Ok(ExitCode::from(u8::from(!good)))
 }
 
-fn figures(comparison: &Comparison, seconds: f64) -> String {
-    let Comparison { ticks, armed_ticks, bits, differing_ticks, differing_bits, .. } = comparison;
-    let Comparison { first_difference, instructions, late_ticks, stack_bytes, .. } = comparison;
+fn figures(comparison: &TwinComparison, seconds: f64) -> String {
+    let TwinComparison { ticks, armed_ticks, bits, differing_ticks, differing_bits, .. } = comparison;
+    let TwinComparison { first_difference, instructions, late_ticks, stack_bytes, .. } = comparison;
     let first = first_difference.map_or(String::new(), |tick| format!(", the first is tick {tick}"));
     let [min, mean, max] = [instructions.min(), instructions.mean(), instructions.max()];
     let rate = *ticks as f64 / seconds;

@@ -1,6 +1,6 @@
 //! Items of a mission: what is valid, and what the guidance makes of it.
 
-use crate::services::origin::{Origin, resolve};
+use crate::services::origin::{EarthOrigin, resolve};
 use afbc_guidance::Item;
 use afbc_link::{Datum, Height, MissionItem, MissionResult, Place};
 use nalgebra::Vector3;
@@ -80,7 +80,7 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
 
 /// Returns the item in the local frame; none for a place on the earth while the origin is unknown, or an invalid item.
 /// `home_m` is the height of home.
-pub fn to_guidance(item: &MissionItem, origin: Option<&Origin>, home_m: f32) -> Option<Item> {
+pub fn to_guidance(item: &MissionItem, origin: Option<&EarthOrigin>, home_m: f32) -> Option<Item> {
     let [first, second, _, fourth] = item.parameters;
     let or_zero = |number: f32| if number.is_nan() { 0.0 } else { number };
     let position_m = || resolve_item(item, origin, home_m);
@@ -125,7 +125,7 @@ fn place(item: &MissionItem) -> Option<Place> {
 /// MAV_FRAME_LOCAL_NED.
 const LOCAL_NED: u8 = 1;
 
-fn resolve_item(item: &MissionItem, origin: Option<&Origin>, home_m: f32) -> Option<Vector3<f32>> {
+fn resolve_item(item: &MissionItem, origin: Option<&EarthOrigin>, home_m: f32) -> Option<Vector3<f32>> {
     if item.frame == LOCAL_NED {
         return Some(Vector3::new(item.x as f32 * 1e-4, item.y as f32 * -1e-4, -item.z));
     }

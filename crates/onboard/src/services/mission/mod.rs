@@ -8,7 +8,7 @@ mod upload;
 
 pub use items::{ITEMS_MAX, Invalid, check, to_guidance};
 
-use crate::services::origin::Origin;
+use crate::services::origin::EarthOrigin;
 use crate::services::texts::Words;
 use afbc_guidance::Leg;
 use afbc_link::{Address, Mission, MissionCurrent, MissionItem, MissionResult, Plan};
@@ -102,7 +102,7 @@ impl Missions {
     }
 
     /// Returns the item that the guidance wants, in the local frame.
-    pub fn leg(&self, number: u16, origin: Option<&Origin>, home_m: f32) -> Option<Leg> {
+    pub fn leg(&self, number: u16, origin: Option<&EarthOrigin>, home_m: f32) -> Option<Leg> {
         let item = to_guidance(self.items.get(usize::from(number))?, origin, home_m)?;
         Some(Leg { number, upload: self.number, item, is_last: usize::from(number) + 1 == self.items.len() })
     }

@@ -166,8 +166,8 @@ fn each_invalid_number_is_named() {
 
 #[test]
 fn the_guidance_gets_items_in_the_local_frame() {
-    let at = Origin::SIMULATED;
-    let origin = Origin::new(at).expect("possible");
+    let at = EarthOrigin::SIMULATED;
+    let origin = EarthOrigin::new(at).expect("possible");
     let mut missions = Missions::default();
     let [latitude, longitude] = Global { altitude_m: 0.0, ..at }.e7();
     let take_off = MissionItem { command: 22, ..waypoint(0) };
@@ -258,7 +258,7 @@ fn items_reach_up_to_their_limits() {
 /// Each command is an item of the guidance, with its numbers; what is not given is zero, a heading is to the right.
 #[test]
 fn each_item_is_one_of_the_guidance() {
-    let origin = Origin::new(Origin::SIMULATED).expect("possible");
+    let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
     let place = |x: f32, y: f32| {
         let [x, y] = origin.global(&nalgebra::Vector3::new(x, y, 0.0)).e7();
         MissionItem { x, y, z: 7.0, frame: 3, ..waypoint(0) }

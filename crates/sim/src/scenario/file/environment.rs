@@ -2,7 +2,7 @@
 
 use crate::scenario::definition::Outage;
 use afbc_plant::{
-    Environment, Gust, GustKind, PAYLOAD_AHEAD, PAYLOAD_BELOW, PAYLOAD_LEFT, ParameterChange, Payload, Quantity,
+    Environment, Gust, GustKind, PAYLOAD_AHEAD, PAYLOAD_BELOW, PAYLOAD_LEFT, ParameterChange, Payload, PlantParameter,
 };
 use afbc_reader::words::out_of_range;
 use afbc_reader::{FileError, Table};
@@ -94,24 +94,25 @@ fn gust(mut table: Table<'_>) -> Result<Gust, FileError> {
 
 fn change(table: &mut Table<'_>) -> Result<ParameterChange, FileError> {
     let quantities = [
-        Quantity::Mass,
-        Quantity::Inertia,
-        Quantity::ThrustFactor,
-        Quantity::DragFactor,
-        Quantity::RollMoment,
-        Quantity::PitchMoment,
-        Quantity::YawMoment,
+        PlantParameter::Mass,
+        PlantParameter::Inertia,
+        PlantParameter::ThrustFactor,
+        PlantParameter::DragFactor,
+        PlantParameter::RollMoment,
+        PlantParameter::PitchMoment,
+        PlantParameter::YawMoment,
     ];
     let quantity = table.need_choice("parameter", &quantities, |quantity| match quantity {
-        Quantity::Mass => "mass",
-        Quantity::Inertia => "inertia",
-        Quantity::ThrustFactor => "thrust-factor",
-        Quantity::DragFactor => "drag-factor",
-        Quantity::RollMoment => "roll-moment",
-        Quantity::PitchMoment => "pitch-moment",
-        Quantity::YawMoment => "yaw-moment",
+        PlantParameter::Mass => "mass",
+        PlantParameter::Inertia => "inertia",
+        PlantParameter::ThrustFactor => "thrust-factor",
+        PlantParameter::DragFactor => "drag-factor",
+        PlantParameter::RollMoment => "roll-moment",
+        PlantParameter::PitchMoment => "pitch-moment",
+        PlantParameter::YawMoment => "yaw-moment",
     })?;
-    let is_moment = matches!(quantity, Quantity::RollMoment | Quantity::PitchMoment | Quantity::YawMoment);
+    let is_moment =
+        matches!(quantity, PlantParameter::RollMoment | PlantParameter::PitchMoment | PlantParameter::YawMoment);
     let factor = table.need_number(if is_moment { &MOMENT_FACTOR } else { &FACTOR })?;
     let [start_s, end_s] = interval(table)?;
     Ok(ParameterChange { quantity, factor, start_s, end_s })

@@ -1,17 +1,19 @@
 //! `[instruments]` and `[[instrument_fault]]`: the sensors of a real vehicle, for its estimator.
 
 use super::environment::interval;
-use afbc_plant::Suite;
-use afbc_plant::instruments::{Barometer, Failure, Gnss, Imu, InstrumentFault, Magnetometer, Preset, Tracker, limits};
+use afbc_plant::InstrumentSuite;
+use afbc_plant::instruments::{
+    Barometer, Failure, Gnss, Imu, InstrumentFault, Magnetometer, Preset, TrackerModel, limits,
+};
 use afbc_reader::{FileError, Table};
 use afbc_types::Declared;
 
 /// Reads the instruments of `table`; none without it.
-pub(super) fn read(table: Option<Table<'_>>) -> Result<Suite, FileError> {
-    let Some(mut table) = table else { return Ok(Suite::default()) };
-    let suite = Suite {
+pub(super) fn read(table: Option<Table<'_>>) -> Result<InstrumentSuite, FileError> {
+    let Some(mut table) = table else { return Ok(InstrumentSuite::default()) };
+    let suite = InstrumentSuite {
         imu: part(&mut table, "imu", &Imu::PRESETS, &["gyro", "accel"])?,
-        tracker: part(&mut table, "tracker", &Tracker::PRESETS, &["loss", "freeze"])?,
+        tracker: part(&mut table, "tracker", &TrackerModel::PRESETS, &["loss", "freeze"])?,
         gnss: part(&mut table, "gnss", &Gnss::PRESETS, &["loss"])?,
         barometer: part(&mut table, "barometer", &Barometer::PRESETS, &[])?,
         magnetometer: part(&mut table, "magnetometer", &Magnetometer::PRESETS, &[])?,
@@ -46,11 +48,11 @@ fn part<T: Declared + Default + Copy>(
 }
 
 /// Reads the failures of the instruments.
-pub(super) fn faults(root: &mut Table<'_>, suite: &Suite) -> Result<Vec<InstrumentFault>, FileError> {
+pub(super) fn faults(root: &mut Table<'_>, suite: &InstrumentSuite) -> Result<Vec<InstrumentFault>, FileError> {
     root.few_tables("instrument_fault")?.into_iter().map(|table| fault(table, suite)).collect()
 }
 
-fn fault(mut table: Table<'_>, suite: &Suite) -> Result<InstrumentFault, FileError> {
+fn fault(mut table: Table<'_>, suite: &InstrumentSuite) -> Result<InstrumentFault, FileError> {
     let kind = table.need_choice("failure", &Failure::ALL, Failure::name)?;
     let failure = match kind {
         Failure::ImuNoisy { .. } => Failure::ImuNoisy {

@@ -16,7 +16,7 @@ mod tests;
 use super::definition::{DURATION, Scenario};
 use crate::contender::Contender;
 use crate::trajectory::Trajectory;
-use afbc_plant::{Frame, Model, Realism, Sensing};
+use afbc_plant::{Frame, PlantModel, Realism, Sensing};
 use afbc_reader::words::out_of_range;
 use afbc_reader::{FileError, Table};
 use afbc_types::{PLUS, Range};
@@ -53,9 +53,9 @@ pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> 
 pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) -> Result<Scenario, FileError> {
     let [name, description] = afbc_reader::title(&mut root, name)?;
     let duration_s = root.number(&DURATION)?.unwrap_or(DURATION_S);
-    let models = [Model::Simplified, Model::RigidBody];
+    let models = [PlantModel::Simplified, PlantModel::RigidBody];
     let seed = root.whole(&SEED)?.unwrap_or(0);
-    let model = root.choice("plant", &models, Model::name)?.unwrap_or(Model::RigidBody);
+    let model = root.choice("plant", &models, PlantModel::name)?.unwrap_or(PlantModel::RigidBody);
 
     let (vehicle_file, vehicle) = vehicle::read(root.table("vehicle")?)?;
     let truth = parts::parameters(root.table("truth")?, vehicle)?;

@@ -8,7 +8,7 @@ use afbc_plant::{
 };
 use afbc_reader::{FileError, Table};
 use afbc_types::{Parameters, Range};
-use afbc_vehicles::parts::{self, Conditions};
+use afbc_vehicles::parts::{self, DragConditions};
 
 /// Accepted time from a gust's rise to its fall \[s\].
 const HOLD: Range = Range::new("hold_s", 0.0, LENGTH.max);
@@ -28,7 +28,7 @@ pub(super) fn read(
     if let Some(table) = root.table("battery")? {
         rotors.battery = Some(parts::battery(table, rotors.battery.unwrap_or(Battery::THREE_CELLS))?);
     }
-    let conditions = Conditions { parameters: truth, frame, rotor_max_rad_s: rotors.max_rad_s, step_s };
+    let conditions = DragConditions { parameters: truth, frame, rotor_max_rad_s: rotors.max_rad_s, step_s };
     let drag = match root.table("drag")? {
         Some(table) => Some(parts::drag(table, default.drag.unwrap_or(Drag::PAPER), "", &conditions)?),
         None => default.drag,

@@ -10,13 +10,13 @@ use crate::scenario::{BUILT_IN, Scenario, built_in};
 use afbc::Profile;
 use afbc::adaptive;
 use afbc_peers::pid;
-use afbc_plant::Model;
+use afbc_plant::PlantModel;
 use afbc_reader::FileError;
 
 #[test]
 fn built_in_paper_is_the_paper() {
     let from_file = built_in("paper").unwrap().read().unwrap();
-    let from_code = Scenario { case: None, ..paper::scenario(Model::Simplified, Case::DEFAULT).unwrap() };
+    let from_code = Scenario { case: None, ..paper::scenario(PlantModel::Simplified, Case::DEFAULT).unwrap() };
     assert_eq!(from_file, from_code);
 }
 

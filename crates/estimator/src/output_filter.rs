@@ -1,0 +1,210 @@
+//! What a controller shall not feel of an estimate: jumps of its corrections, and the rotors' vibration.
+
+use crate::estimate::Estimate;
+use afbc_control::math::{max, min, sqrt, tan};
+use afbc_types::{Parameters, State};
+use core::f32::consts::TAU;
+use nalgebra::Vector3;
+
+/// Time in which what is hidden decays to 1/e \[s\]: twice as long as a GNSS receiver's fixes are apart.
+const DECAY_S: f32 = 0.2;
+/// Fastest approach of position \[m/s\] and velocity \[m/s2\]: a receiver that jumps by metres must not look like a
+/// gale.
+const MOST_M_S: f32 = 1.0;
+const MOST_M_S2: f32 = 3.0;
+/// Quality of the notch: wide enough for rotors at different speeds and for a load of half the weight. It delays a slow
+/// change of the velocity by 1/(Q omega).
+const QUALITY: f32 = 1.0;
+/// Rotor speeds in hover that have a notch \[rad/s\]. Quicker rotors shake the velocity less, by the square of their
+/// speed as far as a law makes an attitude of it; slower ones would delay it by 16 ms or more.
+const NOTCH_MIN_RAD_S: f32 = 10.0 * TAU;
+const NOTCH_MAX_RAD_S: f32 = 100.0 * TAU;
+
+/// Hides the jumps of position and velocity that measurements make: the state goes on as the inertial sensor says, and
+/// approaches the estimate within 0.2 s, or at 1 m/s and 3 m/s2 from further away, as when an aid comes back. A law
+/// would answer each fix with a kick. A notch removes the rotors' vibration from the velocity, which a law would turn
+/// into commands of attitude and body rate. Attitude and rates pass unchanged.
+///
+/// The default has no notch, and is that before the first estimate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OutputFilter {
+    notch: Option<Notch>,
+    /// Time of the last estimate, if its position was valid \[us\].
+    last_us: Option<u64>,
+    /// Estimate less the state told.
+    position_m: Vector3<f32>,
+    velocity_m_s: Vector3<f32>,
+    /// The notch's two sums, once there was a velocity.
+    sums: Option<(Vector3<f32>, Vector3<f32>)>,
+}
+
+/// Notch filter of second order (bilinear transform) for one kilohertz.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Notch {
+    /// b0 = b2.
+    b0: f32,
+    /// b1 = a1.
+    b1: f32,
+    a2: f32,
+}
+
+impl Notch {
+    fn new(centre_rad_s: f32) -> Self {
+        let k = tan(0.5e-3 * centre_rad_s);
+        let norm = 1.0 / (1.0 + k / QUALITY + k * k);
+        Notch { b0: (1.0 + k * k) * norm, b1: 2.0 * (k * k - 1.0) * norm, a2: (1.0 - k / QUALITY + k * k) * norm }
+    }
+
+    /// Filters one more value; the first one passes as it is.
+    #[inline]
+    fn pass(&self, sums: &mut Option<(Vector3<f32>, Vector3<f32>)>, input: &Vector3<f32>) -> Vector3<f32> {
+        let Notch { b0, b1, a2 } = *self;
+        let (first, second) = sums.unwrap_or_else(|| (input * (b0 - a2), input * (b0 - a2)));
+        let output = input * b0 + first;
+        *sums = Some(((input - output) * b1 + second, input * b0 - output * a2));
+        output
+    }
+}
+
+impl OutputFilter {
+    /// Creates the one for a vehicle with these nominal parameters and this number of rotors.
+    #[must_use]
+    pub fn of(vehicle: &Parameters<f32>, rotors: usize) -> Self {
+        Self::new(sqrt(vehicle.weight_n() / (rotors as f32 * vehicle.thrust_factor_n_s2)))
+    }
+
+    /// Creates the one for rotors that turn at this speed in hover \[rad/s\].
+    fn new(hover_rad_s: f32) -> Self {
+        let has_notch = (NOTCH_MIN_RAD_S..=NOTCH_MAX_RAD_S).contains(&hover_rad_s);
+        OutputFilter { notch: has_notch.then(|| Notch::new(hover_rad_s)), ..OutputFilter::default() }
+    }
+
+    /// Returns the state to tell for this estimate; to be called every millisecond. Nothing is hidden of an estimate
+    /// whose position has not been valid before.
+    #[must_use = "the state is its result"]
+    #[inline]
+    pub fn step(&mut self, estimate: &Estimate) -> State {
+        let mut state = estimate.state;
+        if !estimate.validity.position {
+            *self = OutputFilter { notch: self.notch, ..OutputFilter::default() };
+            return state;
+        }
+        if let Some(last_us) = self.last_us {
+            // 32 bits, which the processor converts by itself; longer times count as DECAY_S too.
+            let since_us = u32::try_from(estimate.at_us.saturating_sub(last_us)).unwrap_or(u32::MAX);
+            let dt_s = min(since_us as f32 * 1e-6, DECAY_S);
+            let stays =
+                |hidden: &Vector3<f32>, most: f32| 1.0 - dt_s / max(DECAY_S, sqrt(hidden.norm_squared()) / most);
+            self.position_m = self.position_m * stays(&self.position_m, MOST_M_S) + estimate.moved_m;
+            self.velocity_m_s = self.velocity_m_s * stays(&self.velocity_m_s, MOST_M_S2) + estimate.moved_m_s;
+        }
+        self.last_us = Some(estimate.at_us);
+        state.position_m -= self.position_m;
+        state.velocity_m_s -= self.velocity_m_s;
+        if let Some(notch) = &self.notch {
+            state.velocity_m_s = notch.pass(&mut self.sums, &state.velocity_m_s);
+        }
+        state
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{NOTCH_MAX_RAD_S, OutputFilter};
+    use crate::estimate::{Estimate, Validity};
+    use afbc_types::Parameters;
+
+    /// An estimate of a vehicle at 1 m/s whose position is off by `error_m`, and was moved by `moved_m`.
+    fn estimate(ms: u64, error_m: f32, moved_m: f32) -> Estimate {
+        let mut estimate = Estimate { at_us: 1000 * ms, ..Estimate::default() };
+        estimate.validity = Validity { position: true, ..Validity::default() };
+        estimate.state.velocity_m_s.x = 1.0;
+        estimate.state.position_m.x = 1e-3 * ms as f32 + error_m;
+        estimate.moved_m.x = moved_m;
+        estimate
+    }
+
+    /// Largest velocity told, after eight seconds, of one that turns with 1 m/s at this speed.
+    fn told(output_filter: OutputFilter, rad_s: f32) -> f32 {
+        let mut output_filter = output_filter;
+        let told = (0..10_000).map(|ms: u64| {
+            let mut estimate = estimate(ms, 0.0, 0.0);
+            estimate.state.velocity_m_s.x = (rad_s * 1e-3 * ms as f32).sin();
+            output_filter.step(&estimate).velocity_m_s.x.abs()
+        });
+        told.skip(8_000).fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn a_return_is_eased_and_then_forgotten() {
+        let mut output_filter = OutputFilter::default();
+        for ms in 0..3000 {
+            let back = ms >= 1000;
+            let (error_m, moved_m) = if back { (0.0, if ms == 1000 { -0.1 } else { 0.0 }) } else { (0.1, 0.0) };
+            let told = output_filter.step(&estimate(ms, error_m, moved_m)).position_m.x - 1e-3 * ms as f32;
+            let expected = if back { 0.1 * (-1e-3 * (ms - 1000) as f32 / 0.2).exp() } else { 0.1 };
+            assert!((told - expected).abs() < 2e-3, "{ms} ms: {told} m, not {expected} m");
+        }
+    }
+
+    /// A return from far away is no gale: 1 m/s and no more.
+    #[test]
+    fn a_jump_of_metres_is_a_walk() {
+        let mut output_filter = OutputFilter::default();
+        let mut last = None;
+        for ms in 0..6000 {
+            let (error_m, moved_m) = if ms >= 100 { (4.0, if ms == 100 { 4.0 } else { 0.0 }) } else { (0.0, 0.0) };
+            let told = output_filter.step(&estimate(ms, error_m, moved_m)).position_m.x;
+            assert!(last.replace(told).is_none_or(|last| told - last < 2.01e-3), "{ms} ms: {told} m");
+        }
+        assert!(last.is_some_and(|last| (last - 9.999).abs() < 0.01), "{last:?}");
+    }
+
+    /// A vehicle that accelerates is told as it is.
+    #[test]
+    fn nothing_else_is_eased() {
+        let mut output_filter = OutputFilter::default();
+        for ms in 0..100 {
+            let mut estimate = estimate(ms, 0.0, 0.0);
+            estimate.state.velocity_m_s.z = 0.1 * ms as f32;
+            assert_eq!(output_filter.step(&estimate), estimate.state);
+        }
+    }
+
+    /// The first fix, and the first after the position was lost, are told at once.
+    #[test]
+    fn the_first_position_is_not_eased() {
+        for mut output_filter in [OutputFilter::default(), OutputFilter::new(200.0)] {
+            for ms in 0..100 {
+                let (error_m, moved_m) = if ms < 50 { (5.0, 0.0) } else { (0.0, if ms == 50 { -5.0 } else { 0.0 }) };
+                let mut estimate = estimate(ms, error_m, moved_m);
+                estimate.validity.position = ms >= 50;
+                let state = output_filter.step(&estimate);
+                assert!((state.position_m - estimate.state.position_m).norm() < 1e-6);
+                assert!((state.velocity_m_s - estimate.state.velocity_m_s).norm() < 1e-4);
+            }
+        }
+    }
+
+    /// Gain of the analogue notch, (omega^2 - x^2)/(omega^2 - x^2 + j x omega/Q), within 2 %.
+    #[test]
+    fn the_notch_hides_the_rotors_and_passes_the_flight() {
+        for hover_rad_s in [65.0, 195.0, 600.0_f32] {
+            for ratio in [0.1, 0.2, 0.5, 0.8, 1.0, 1.25, 2.0] {
+                let gain = told(OutputFilter::new(hover_rad_s), ratio * hover_rad_s);
+                // As the bilinear transform bends it.
+                let ratio_bent = (5e-4 * ratio * hover_rad_s).tan() / (5e-4 * hover_rad_s).tan();
+                let pole = 1.0 - ratio_bent * ratio_bent;
+                let expected = pole.abs() / pole.hypot(ratio_bent);
+                assert!((gain - expected).abs() < 0.02, "{hover_rad_s} rad/s, {ratio}: {gain}, not {expected}");
+            }
+        }
+        assert_eq!(
+            OutputFilter::of(&Parameters::PAPER.to_f32(), 4),
+            OutputFilter::new((0.486 * 9.81 / (4.0 * 2.984e-5_f32)).sqrt())
+        );
+        for hover_rad_s in [0.0, 30.0, NOTCH_MAX_RAD_S + 1.0, f32::NAN] {
+            assert_eq!(OutputFilter::new(hover_rad_s), OutputFilter::default());
+        }
+    }
+}

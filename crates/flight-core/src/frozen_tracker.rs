@@ -1,0 +1,83 @@
+//! Detection of a frozen tracker, which keeps sending states that no longer follow the vehicle. Not in the paper.
+//!
+//! | states sent | detected by |
+//! |---|---|
+//! | the same state again, bit for bit | measurements never repeat exactly in the air |
+//! | a constant pose with a changing twist | displacement compared with the twist's integral over 0.25 s |
+//! | a vehicle at rest in the air without thrust | [`crate::landing`] |
+//!
+//! A repeated state does not count as a measurement: its age increases. After either of the other two the tracker is
+//! distrusted for the rest of the flight. A constant pose with noise cannot be distinguished from a vehicle that
+//! hovers.
+
+use afbc_control::math::abs_max;
+use afbc_types::State;
+use nalgebra::Vector3;
+
+/// Time over which displacements are compared \[us\].
+pub const WINDOW_US: u32 = 250_000;
+/// Smallest displacement by the twist, along any axis, for a comparison \[m\].
+pub const TRAVEL_M: f32 = 0.15;
+/// Smallest rotation by the twist, about body x or y, for a comparison \[rad\].
+pub const TURN_RAD: f32 = 0.15;
+/// Share of that up to which a pose counts as constant.
+pub const STANDS_SHARE: f32 = 0.2;
+
+/// Compares pose and twist over windows of [`WINDOW_US`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrozenTrackerCheck {
+    /// Time of the last state \[us\].
+    last_us: u64,
+    /// Time since the window began \[us\].
+    window_us: u32,
+    /// Pose at its beginning.
+    position_m: Vector3<f32>,
+    attitude_rad: Vector3<f32>,
+    /// Integral of the velocity \[m\] and of the rates \[rad\] over the window.
+    travel_m: Vector3<f32>,
+    turn_rad: Vector3<f32>,
+}
+
+impl FrozenTrackerCheck {
+    /// Starts a window with a state measured at `at_us`.
+    pub fn new(state: &State, at_us: u64) -> Self {
+        let State { position_m, attitude_rad, .. } = *state;
+        let zero = Vector3::zeros();
+        FrozenTrackerCheck { last_us: at_us, window_us: 0, position_m, attitude_rad, travel_m: zero, turn_rad: zero }
+    }
+
+    /// Processes a state measured at `at_us`; true if the pose is constant although the twist is not zero.
+    #[inline]
+    pub fn contradicts(&mut self, state: &State, at_us: u64) -> bool {
+        // After a longer gap the motion in between is unknown.
+        let elapsed_us = u32::try_from(at_us.wrapping_sub(self.last_us)).unwrap_or(u32::MAX);
+        if elapsed_us > WINDOW_US {
+            *self = FrozenTrackerCheck::new(state, at_us);
+            return false;
+        }
+        let elapsed_s = elapsed_us as f32 * 1e-6;
+        self.last_us = at_us;
+        self.window_us += elapsed_us;
+        self.travel_m += state.velocity_m_s * elapsed_s;
+        self.turn_rad += state.rates_rad_s * elapsed_s;
+        if self.window_us < WINDOW_US {
+            return false;
+        }
+        let contradicts = self.stands(state);
+        *self = FrozenTrackerCheck::new(state, at_us);
+        contradicts
+    }
+
+    /// True if the pose is that of the window's beginning although the twist is not zero.
+    fn stands(&self, state: &State) -> bool {
+        let stands = |moved: Vector3<f32>, told: Vector3<f32>, least: f32| {
+            let told = abs_max(&told);
+            told > least && abs_max(&moved) < STANDS_SHARE * told
+        };
+        // Roll and pitch are constant in a tilted vehicle that rotates about its own z.
+        let level = |v: Vector3<f32>| Vector3::new(v.x, v.y, 0.0);
+        let (moved_m, turned_rad) = (state.position_m - self.position_m, state.attitude_rad - self.attitude_rad);
+        stands(moved_m, self.travel_m, TRAVEL_M)
+            || self.turn_rad.z.abs() < TURN_RAD && stands(level(turned_rad), level(self.turn_rad), TURN_RAD)
+    }
+}

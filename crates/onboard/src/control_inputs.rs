@@ -1,0 +1,103 @@
+//! What the link brings for a tick.
+
+use afbc_flight_core::Inbox;
+use afbc_guidance::{BatteryReading, Orders, TicketedOrder};
+
+/// Inputs of the flight core and of the guidance, written by [`Comms`](crate::Comms) and taken by the control tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ControlInputs {
+    /// For the flight core.
+    pub inbox: Inbox,
+    /// For the guidance.
+    pub orders: Orders,
+    /// The battery, if the shell measures it.
+    pub battery: Option<BatteryReading>,
+    /// True if there is something new in the orders: without it they are not copied.
+    fresh: bool,
+}
+
+impl Default for ControlInputs {
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
+impl ControlInputs {
+    /// Nothing.
+    pub const EMPTY: Self = {
+        let orders = Orders { target: None, sticks: None, leg: None, heard_us: None, given: [None; ORDERS] };
+        ControlInputs { inbox: Inbox::EMPTY, orders, battery: None, fresh: false }
+    };
+
+    /// Changes the orders.
+    pub(crate) fn order(&mut self) -> &mut Orders {
+        self.fresh = true;
+        &mut self.orders
+    }
+
+    /// Merges `news` into this mail.
+    pub fn merge(&mut self, update: &ControlInputs) {
+        self.inbox.merge(&update.inbox);
+        self.battery = update.battery.or(self.battery);
+        if !update.fresh {
+            return;
+        }
+        self.fresh = true;
+        let Orders { target, sticks, leg, heard_us, given } = &update.orders;
+        let mine = &mut self.orders;
+        mine.target = target.or(mine.target);
+        mine.sticks = sticks.or(mine.sticks);
+        mine.leg = leg.or(mine.leg);
+        mine.heard_us = heard_us.or(mine.heard_us);
+        given.iter().flatten().for_each(|given| give(mine, *given));
+    }
+
+    /// Brings the mail of the last tick up to date for the next one, and removes what is handed over only once.
+    #[inline]
+    pub fn take_into(&mut self, taken: &mut ControlInputs) {
+        self.inbox.take_into(&mut taken.inbox);
+        taken.battery = self.battery;
+        if self.fresh {
+            self.move_orders(&mut taken.orders);
+            self.fresh = false;
+        }
+    }
+
+    /// Copies what is new, and keeps nothing: the tick has it.
+    #[inline(never)]
+    fn move_orders(&mut self, taken: &mut Orders) {
+        let Orders { target, sticks, leg, heard_us, given } = &mut self.orders;
+        replace(&mut taken.target, target);
+        replace(&mut taken.sticks, sticks);
+        replace(&mut taken.leg, leg);
+        replace(&mut taken.heard_us, heard_us);
+        // Those that the tick has not answered yet stay.
+        given.iter_mut().filter_map(Option::take).for_each(|given| give(taken, given));
+    }
+
+    /// Removes and returns the oldest order.
+    #[inline(always)]
+    pub(crate) fn next_order(&mut self) -> Option<TicketedOrder> {
+        // By hand, as in the inbox.
+        let [first, second, third, fourth] = self.orders.given;
+        if first.is_some() {
+            self.orders.given = [second, third, fourth, None];
+        }
+        first
+    }
+}
+
+const ORDERS: usize = afbc_guidance::order::ORDERS_MAX;
+
+fn replace<T>(old: &mut Option<T>, new: &mut Option<T>) {
+    if new.is_some() {
+        *old = new.take();
+    }
+}
+
+/// Queues an order. [`Commands`](crate::services::commands::Commands) gives no more than there are places.
+pub(crate) fn give(orders: &mut Orders, given: TicketedOrder) {
+    if let Some(place) = orders.given.iter_mut().find(|place| place.is_none()) {
+        *place = Some(given);
+    }
+}

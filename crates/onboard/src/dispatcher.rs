@@ -1,0 +1,262 @@
+//! Hands each message to its service.
+
+mod commands;
+mod parameters;
+mod targets;
+
+use crate::control_inputs::ControlInputs;
+use crate::parameters::Service;
+use crate::services::commands::Commands;
+use crate::services::control::{ControlClaim, OperatorControl};
+use crate::services::mission::Missions;
+use crate::services::status::VehicleStatus;
+use crate::services::streams::{Requested, Streams, id};
+use crate::services::texts::{Texts, Words};
+use crate::services::{events, extended, files, logs, serial, timesync};
+use crate::setup::Setup;
+use afbc_guidance::Order;
+use afbc_link::{
+    Address, Clock, ControlAnswer, DataStream, Downlink, Interval, MavSeverity, Mission, ParameterError,
+    ParameterRequest, Question, QuestionRefusal, Uplink,
+};
+use afbc_types::Setpoint;
+use heapless::Deque;
+
+/// Most replies that wait, besides answers to commands. Further ones are dropped: askers repeat.
+const REPLIES_MAX: usize = 16;
+/// Most wishes about parameters that wait for the end of the tick. Further ones are dropped: askers repeat.
+const WISHES_MAX: usize = 32;
+/// Shortest time between reports of the station in control to the guidance \[us\].
+const HEARD_EVERY_US: u64 = 50_000;
+
+/// A reply to a message that is no command.
+#[derive(Clone, Copy, Debug)]
+enum Reply {
+    Clock(Clock),
+    Control(ControlAnswer),
+    Interval(Interval),
+    Stream(DataStream),
+    Reached(u16),
+    ParameterError(ParameterError, Address),
+    Refusal(QuestionRefusal, Address),
+}
+
+/// What a station wants of the parameters.
+#[derive(Clone, Copy, Debug)]
+enum ParameterTask {
+    Ask(ParameterRequest, Address),
+    Restore,
+}
+
+/// All services, and what they know.
+pub(crate) struct Dispatcher {
+    me: Address,
+    /// Start of the last tick \[us\], the time stamp of everything that arrives before the next one.
+    pub(crate) now_us: u64,
+    pub(crate) status: VehicleStatus,
+    pub(crate) commands: Commands,
+    pub(crate) control: OperatorControl,
+    pub(crate) missions: Missions,
+    pub(crate) streams: Streams,
+    pub(crate) texts: Texts,
+    replies: Deque<Reply, REPLIES_MAX>,
+    /// What stations want of the parameters.
+    wishes: Deque<ParameterTask, WISHES_MAX>,
+    pub(crate) parameters: Service,
+    /// The item and upload that the guidance has been given last.
+    given: Option<(u16, u16)>,
+    /// The item that was reached last.
+    reached: Option<u16>,
+    /// When the guidance was last told that the station in control is there \[us\].
+    heard_us: Option<u64>,
+    /// Wish to be told what speaks against arming, and whether one of the stations that have it may arm.
+    checks: Option<bool>,
+    /// True if the shell can reboot.
+    reboots: bool,
+    /// True if a station has asked for a reboot.
+    pub(crate) reboot: bool,
+}
+
+impl Dispatcher {
+    pub(crate) fn new(me: Address, setup: &Setup) -> Self {
+        Dispatcher {
+            me,
+            now_us: 0,
+            status: VehicleStatus::default(),
+            commands: Commands::default(),
+            control: OperatorControl::default(),
+            missions: Missions::default(),
+            streams: Streams::new(setup.bytes_per_s),
+            texts: Texts::default(),
+            replies: Deque::new(),
+            wishes: Deque::new(),
+            parameters: Service::default(),
+            given: None,
+            reached: None,
+            heard_us: None,
+            checks: None,
+            reboots: setup.reboots,
+            reboot: false,
+        }
+    }
+
+    /// Handles a message, except states and poses.
+    pub(crate) fn hear(&mut self, from: Address, message: Uplink, inputs: &mut ControlInputs) {
+        if from == self.me {
+            // Its own, sent back.
+            return;
+        }
+        if self.control.hear(from, self.now_us) {
+            self.report_heard(inputs);
+        }
+        match message {
+            Uplink::Command(command) => self.command(command, from, inputs),
+            Uplink::Setpoint(setpoint) => self.setpoint(setpoint, from, inputs),
+            Uplink::Target(target) => self.target(target, from, inputs),
+            Uplink::Mission(message) => self.mission(message, from, inputs),
+            Uplink::Parameter(request) => self.parameter(request, from, inputs),
+            Uplink::Stream(request) => {
+                let stream = self.streams.set_group(request, self.now_us);
+                self.reply(Reply::Stream(stream));
+            }
+            Uplink::Question(question) => self.question(question, from),
+            Uplink::Clock(clock) => {
+                let answer = timesync::answer(clock, from, self.me, self.now_us);
+                answer.into_iter().for_each(|answer| self.reply(Reply::Clock(answer)));
+            }
+            Uplink::Control(wish) => {
+                let (answer, claim) = self.control.change(wish, from, self.now_us);
+                self.reply(Reply::Control(answer));
+                self.warn_not_in_control(from, claim);
+            }
+            Uplink::Heartbeat | Uplink::State { .. } | Uplink::Pose { .. } => (),
+        }
+    }
+
+    /// Hands the guidance the item of the mission that it wants, if it does not have it.
+    pub(crate) fn hand_over(&mut self, inputs: &mut ControlInputs) {
+        if let Some(leg) = self.wanted_leg() {
+            self.given = Some((leg.number, leg.upload));
+            inputs.order().leg = Some(leg);
+        }
+    }
+
+    /// Returns the item of the mission that the guidance wants and does not have.
+    pub(crate) fn wanted_leg(&self) -> Option<afbc_guidance::Leg> {
+        let wanted = self.status.guided.wanted;
+        let home_m = self.status.guided.home_m.map_or(0.0, |home| home.z);
+        let leg = self.missions.leg(wanted, self.status.aux.origin.as_ref(), home_m)?;
+        (self.given != Some((leg.number, leg.upload))).then_some(leg)
+    }
+
+    /// Does what is due after a tick.
+    pub(crate) fn tick(&mut self) {
+        self.streams.tick();
+        self.report_checks();
+        if let Some(words) = self.missions.tick(self.now_us) {
+            self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &words);
+        }
+        if let Some(reached) = self.status.guided.reached {
+            self.reached = Some(reached);
+            self.reply(Reply::Reached(reached));
+        }
+    }
+
+    /// Returns the next reply.
+    pub(crate) fn next_reply(&mut self) -> Option<Downlink> {
+        let everyone = Address::default();
+        Some(match self.replies.pop_front() {
+            Some(Reply::Clock(clock)) => Downlink::Clock(clock),
+            Some(Reply::Control(answer)) => Downlink::Control(answer),
+            Some(Reply::Interval(interval)) => Downlink::Interval(interval),
+            Some(Reply::Stream(stream)) => Downlink::Stream(stream),
+            Some(Reply::ParameterError(error, to)) => Downlink::ParameterError { error, to },
+            Some(Reply::Refusal(refusal, to)) => Downlink::Refusal { refusal, to },
+            Some(Reply::Reached(number)) => Downlink::Mission { message: Mission::Reached(number), to: everyone },
+            None => {
+                let (message, to) = self.missions.next_message()?;
+                Downlink::Mission { message, to }
+            }
+        })
+    }
+
+    /// Returns the setpoint that an armed vehicle follows.
+    pub(crate) fn followed(&self) -> Option<&Setpoint> {
+        self.status.guided.setpoint.as_ref().filter(|_| self.status.mode.armed())
+    }
+
+    /// Returns MISSION_CURRENT.
+    pub(crate) fn mission_current(&self) -> Downlink {
+        let guided = &self.status.guided;
+        let flies = guided.mode == afbc_guidance::FlightMode::Mission && self.status.mode.armed();
+        let current = self.missions.current(Some(guided.wanted), self.reached, flies);
+        Downlink::Mission { message: Mission::Current(current), to: Address::default() }
+    }
+
+    /// True if `from` is in control, from now on if nobody was. Another one is told.
+    fn may(&mut self, from: Address, inputs: &mut ControlInputs) -> bool {
+        let claim = self.control.claim(from, self.now_us);
+        self.warn_not_in_control(from, claim);
+        let granted = claim == ControlClaim::Granted;
+        if granted {
+            self.report_heard(inputs);
+        }
+        granted
+    }
+
+    /// Tells a station once that another is in control.
+    fn warn_not_in_control(&mut self, from: Address, claim: ControlClaim) {
+        if let ControlClaim::Refused { holder, first_time: true } = claim {
+            let words = Words::default().station(from).and(" ignored: ").station(holder).and(" is in control");
+            self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &words);
+        }
+    }
+
+    /// Tells the guidance that the station in control is there.
+    fn report_heard(&mut self, inputs: &mut ControlInputs) {
+        if self.heard_us.is_none_or(|heard_us| self.now_us.saturating_sub(heard_us) >= HEARD_EVERY_US) {
+            self.heard_us = Some(self.now_us);
+            inputs.order().heard_us = Some(self.now_us);
+        }
+    }
+
+    fn reply(&mut self, reply: Reply) {
+        self.replies.push_back(reply).ok();
+    }
+
+    /// Answers a question about what the vehicle does not have.
+    fn question(&mut self, question: Question, from: Address) {
+        let refusal = match question {
+            Question::Log(request) => QuestionRefusal::Log(logs::answer(request)),
+            Question::File(operation) => QuestionRefusal::File(files::answer(operation)),
+            Question::Extended(request) => QuestionRefusal::Extended(extended::answer(request)),
+            Question::Event(request) => QuestionRefusal::Event(events::answer(request)),
+            Question::Serial(asked) => QuestionRefusal::Serial(serial::answer(asked)),
+            // The same place, with nothing known of it.
+            Question::Terrain(place) => QuestionRefusal::Terrain(place),
+            Question::Origin => {
+                // It is where the shell has it, or nowhere.
+                self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, "the origin is not set by stations");
+                self.streams.request(Requested { message: id::GPS_GLOBAL_ORIGIN, index: 0 });
+                return;
+            }
+        };
+        self.reply(Reply::Refusal(refusal, from));
+    }
+
+    fn mission(&mut self, message: Mission, from: Address, inputs: &mut ControlInputs) {
+        let changes = matches!(message, Mission::Count(..) | Mission::Clear(_) | Mission::SetCurrent(_));
+        let in_control = changes && self.may(from, inputs);
+        let heard = self.missions.hear(message, from, in_control, self.now_us);
+        if matches!(message, Mission::SetCurrent(_)) {
+            // After the tick in which the guidance takes it up.
+            self.streams.request(Requested { message: id::MISSION_CURRENT, index: 0 });
+        }
+        if let Some(words) = heard.text {
+            self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &words);
+        }
+        if let Some(number) = heard.resume {
+            self.order(Order::Resume(number), None, from, inputs);
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! What each command leads to.
+
+use super::{Dispatcher, Reply};
+use crate::control_inputs::{ControlInputs, give};
+use crate::services::commands::{BUSY, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN};
+use crate::services::origin::resolve;
+use crate::services::streams::{Requested, Streams, id};
+use crate::services::telemetry::compose;
+use crate::services::texts::Words;
+use crate::services::{control, modes};
+use afbc_flight_core::{Refusal, Request};
+use afbc_guidance::{FlightMode, Order, OrderRefusal};
+use afbc_link::{Address, Answer, Command, Height, Interval, MavSeverity, Place};
+use nalgebra::Vector3;
+
+impl Dispatcher {
+    /// Carries out a command, or leads to its being carried out: it is answered once, to `from`.
+    pub(super) fn command(&mut self, command: Command, from: Address, inputs: &mut ControlInputs) {
+        let id = command.id();
+        if control::is_needed_for(command) && !self.may(from, inputs) {
+            return self.commands.answer(id, Answer::Refused(NOT_IN_CONTROL), from);
+        }
+        let answer = match command {
+            Command::Arm => return self.ask(Request::Arm, id, from, inputs),
+            Command::Disarm => return self.ask(Request::Disarm, id, from, inputs),
+            Command::Kill => return self.ask(Request::Kill, id, from, inputs),
+            Command::Engage => return self.ask(Request::Engage, id, from, inputs),
+            Command::Denied(_) => Answer::Denied,
+            Command::Other(_) => Answer::Unsupported,
+            Command::SetInterval { message, interval_us } => {
+                if self.streams.set(message, interval_us, self.now_us) {
+                    Answer::Accepted
+                } else {
+                    Answer::Unsupported
+                }
+            }
+            Command::GetInterval(message) => {
+                self.reply(Reply::Interval(Interval { message, interval_us: self.streams.interval_us(message) }));
+                Answer::Accepted
+            }
+            Command::RequestMessage { message, index } => self.request(message, index),
+            Command::RequestProtocol => self.request(id::PROTOCOL_VERSION, 0),
+            Command::RequestCapabilities => self.request(id::AUTOPILOT_VERSION, 0),
+            Command::Reboot if !self.reboots => Answer::Unsupported,
+            Command::Reboot if self.status.mode.armed() => Answer::Refused(Refusal::AlreadyArmed as i32),
+            Command::Reboot => {
+                self.reboot = true;
+                Answer::Accepted
+            }
+            Command::Storage(storage) => self.storage(storage),
+            Command::CheckArming => {
+                self.check_arming(from);
+                Answer::Accepted
+            }
+            _ => match self.order_of(command) {
+                Ok(order) => {
+                    if let Command::Home(_) = command {
+                        // MAVLink wants it told whether it has changed or not.
+                        self.streams.request(Requested { message: id::HOME_POSITION, index: 0 });
+                    }
+                    if let Command::StartMission(number @ 1..) = command {
+                        self.order(Order::Resume(number), None, from, inputs);
+                    }
+                    return self.order(order, Some(id), from, inputs);
+                }
+                Err(answer) => answer,
+            },
+        };
+        self.commands.answer(id, answer, from);
+    }
+
+    /// Passes an order to the guidance.
+    pub(super) fn order(&mut self, order: Order, command: Option<u16>, from: Address, inputs: &mut ControlInputs) {
+        if let Some(given) = self.commands.order(order, command, from, self.now_us) {
+            give(inputs.order(), given);
+        }
+    }
+
+    fn ask(&mut self, request: Request, id: u16, from: Address, inputs: &mut ControlInputs) {
+        if let Some(asked) = self.commands.ask(request, id, from, self.now_us) {
+            inputs.inbox.request(asked);
+        }
+    }
+
+    /// Returns the order of a command, or the answer if there is none.
+    fn order_of(&self, command: Command) -> Result<Order, Answer> {
+        Ok(match command {
+            Command::TakeOff(height) => Order::TakeOff(self.take_off_height(height)?),
+            Command::Land => Order::Select(FlightMode::Land),
+            Command::Return => Order::Select(FlightMode::Return),
+            Command::SelectMode(custom) => Order::Select(modes::of_custom(custom).ok_or(Answer::Denied)?),
+            Command::SelectStandardMode(mode) => Order::Select(modes::of_standard(mode).ok_or(Answer::Denied)?),
+            Command::Reposition { place, yaw_rad, speed_m_s } => {
+                Order::GoTo { position_m: self.local(&place)?, yaw_rad, speed_m_s }
+            }
+            Command::Speed(speed_m_s) => Order::Speed(speed_m_s),
+            Command::Home(place) => Order::Home(place.map(|place| self.local(&place)).transpose()?),
+            Command::StartMission(number) | Command::SetCurrent(number) => {
+                if usize::from(number) >= self.missions.items().len() {
+                    return Err(Answer::Refused(OrderRefusal::NoMission as i32));
+                }
+                match command {
+                    Command::StartMission(_) => Order::Select(FlightMode::Mission),
+                    _ => Order::Resume(number),
+                }
+            }
+            // The other commands have nothing for the guidance.
+            _ => return Err(Answer::Unsupported),
+        })
+    }
+
+    /// Returns the height above where the vehicle stands \[m\].
+    fn take_off_height(&self, height: Height) -> Result<Option<f32>, Answer> {
+        if height.metres.is_nan() {
+            return Ok(None);
+        }
+        let place = Place { latitude_e7: Place::AS_IT_IS, longitude_e7: Place::AS_IT_IS, height };
+        let here_m = self.here().z;
+        Ok(Some(self.local(&place)?.z - here_m))
+    }
+
+    /// Returns a place in the local frame.
+    pub(super) fn local(&self, place: &Place) -> Result<Vector3<f32>, Answer> {
+        use afbc_link::Datum;
+        let home_m = self.status.guided.home_m.map_or(0.0, |home| home.z);
+        match &self.status.aux.origin {
+            Some(origin) => Ok(resolve(origin, place, home_m, self.here().z)),
+            // A height above home or here needs no origin.
+            None if place.latitude_e7 == Place::AS_IT_IS && place.height.above != Datum::Sea => {
+                let above_m = if place.height.above == Datum::Home { home_m } else { self.here().z };
+                Ok(Vector3::new(f32::NAN, f32::NAN, place.height.metres + above_m))
+            }
+            None => Err(Answer::Refused(NO_ORIGIN)),
+        }
+    }
+
+    pub(super) fn here(&self) -> Vector3<f32> {
+        self.status.state.map_or(Vector3::zeros(), |state| state.position_m)
+    }
+
+    /// Queues a message on request.
+    fn request(&mut self, message: u32, index: u32) -> Answer {
+        let known = match message {
+            id::HEARTBEAT | id::DEBUG_FLOAT_ARRAY | id::MISSION_CURRENT => true,
+            id::POSITION_TARGET_LOCAL_NED => self.followed().is_some(),
+            id::AVAILABLE_MODES => index <= modes::COUNT.into(),
+            _ => compose(message, &self.status).is_some(),
+        };
+        match (Streams::knows(message), known) {
+            (false, _) => Answer::Unsupported,
+            (_, false) if message == id::AVAILABLE_MODES => Answer::Denied,
+            (_, false) => Answer::Refused(NOT_KNOWN),
+            _ if self.streams.request(Requested { message, index }) => Answer::Accepted,
+            _ => Answer::Refused(BUSY),
+        }
+    }
+
+    /// Notes that a station wants to know what speaks against arming, and tells whether another is in control.
+    fn check_arming(&mut self, from: Address) {
+        let holder = self.control.holder(self.now_us).filter(|holder| *holder != from);
+        if let Some(holder) = holder {
+            let words = Words::default().station(from).and(" may not arm: ").station(holder).and(" is in control");
+            self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &words);
+        }
+        self.checks = Some(self.checks == Some(true) || holder.is_none());
+    }
+
+    /// Tells what spoke against arming in the tick before, as the flight core sees it: what it would have answered.
+    pub(super) fn report_checks(&mut self) {
+        let (Some(may), Some(against)) = (self.checks.take(), self.status.against) else { return };
+        if may && against.is_empty() {
+            self.texts.put(MavSeverity::MAV_SEVERITY_INFO, "ready to arm");
+        }
+        for reason in against.iter() {
+            self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, reason.reason());
+        }
+    }
+}

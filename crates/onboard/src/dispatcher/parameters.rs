@@ -1,0 +1,57 @@
+//! What stations want of the parameters, and who may want it.
+
+use super::{Dispatcher, ParameterTask, Reply};
+use crate::control_inputs::ControlInputs;
+use crate::parameters::{ParameterTable, RecordChange};
+use crate::services::commands::BUSY;
+use crate::services::texts::Words;
+use afbc_flight_core::Refusal;
+use afbc_link::{Address, Answer, MavSeverity, ParameterRequest, Storage};
+
+impl Dispatcher {
+    /// Notes a message about parameters. A station that is not in control is told the value that it has not set.
+    pub(super) fn parameter(&mut self, request: ParameterRequest, from: Address, inputs: &mut ControlInputs) {
+        let request = match request {
+            ParameterRequest::Set { name, .. } if !self.may(from, inputs) => ParameterRequest::ReadName(name),
+            request => request,
+        };
+        self.wishes.push_back(ParameterTask::Ask(request, from)).ok();
+    }
+
+    /// Answers MAV_CMD_PREFLIGHT_STORAGE. What is set is stored already, and what is stored is what is flown.
+    pub(super) fn storage(&mut self, storage: Storage) -> Answer {
+        match storage {
+            Storage::Load | Storage::Save => Answer::Accepted,
+            Storage::Reset if self.status.mode.armed() => Answer::Refused(Refusal::AlreadyArmed as i32),
+            Storage::Reset if self.wishes.push_back(ParameterTask::Restore).is_err() => Answer::Refused(BUSY),
+            Storage::Reset => Answer::Accepted,
+        }
+    }
+
+    /// Does what stations want, up to the first change of `table`, which it returns.
+    pub(crate) fn grant<const N: usize>(&mut self, table: &mut ParameterTable<N>) -> Option<RecordChange> {
+        let disarmed = !self.status.mode.armed();
+        while let Some(wish) = self.wishes.pop_front() {
+            let (change, refused) = match wish {
+                ParameterTask::Ask(request, from) => {
+                    let heard = self.parameters.hear(request, table, disarmed);
+                    if let Some(error) = heard.error {
+                        self.reply(Reply::ParameterError(error, from));
+                    }
+                    (heard.change, heard.refused)
+                }
+                ParameterTask::Restore => match self.parameters.restore(table, disarmed) {
+                    Ok(change) => (Some(change), None),
+                    Err(reason) => (None, Some(reason)),
+                },
+            };
+            if let Some(reason) = refused {
+                self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &Words::of(reason.as_str()));
+            }
+            if change.is_some() {
+                return change;
+            }
+        }
+        None
+    }
+}

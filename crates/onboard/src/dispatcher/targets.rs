@@ -1,0 +1,70 @@
+//! Targets of companion computers, and sticks.
+
+use super::Dispatcher;
+use crate::control_inputs::ControlInputs;
+use afbc_flight_core::Stamped;
+use afbc_guidance::{AttitudeTarget, MotionTarget};
+use afbc_link::{Address, Axes, ExternalTarget, PositionTarget};
+use afbc_types::Setpoint;
+use nalgebra::{Quaternion, UnitQuaternion};
+
+impl Dispatcher {
+    /// Takes a complete setpoint.
+    pub(super) fn setpoint(&mut self, setpoint: Setpoint, from: Address, inputs: &mut ControlInputs) {
+        if self.may(from, inputs) {
+            let at_us = self.now_us;
+            let value = afbc_guidance::OffboardTarget::Motion(motion(&PositionTarget::from(&setpoint), false));
+            inputs.order().target = Some(Stamped { value, at_us });
+        }
+    }
+
+    /// Takes any other target, or sticks.
+    pub(super) fn target(&mut self, target: ExternalTarget, from: Address, inputs: &mut ControlInputs) {
+        if !self.may(from, inputs) {
+            return;
+        }
+        let at_us = self.now_us;
+        let value = match target {
+            ExternalTarget::Motion(target) => {
+                let Some(target) = self.in_local_frame(&target) else { return };
+                afbc_guidance::OffboardTarget::Motion(target)
+            }
+            ExternalTarget::Place(place, target) => {
+                let Ok(position_m) = self.local(&place) else { return };
+                afbc_guidance::OffboardTarget::Motion(MotionTarget { position_m, ..motion(&target, false) })
+            }
+            ExternalTarget::Attitude(target) => {
+                let [w, x, y, z] = target.attitude;
+                let attitude = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+                let (yaw_rate_rad_s, thrust) = (target.yaw_rate_rad_s, target.thrust);
+                afbc_guidance::OffboardTarget::Attitude(AttitudeTarget { attitude, yaw_rate_rad_s, thrust })
+            }
+            ExternalTarget::Sticks(sticks) => {
+                let afbc_link::ManualControl { roll, pitch, throttle, yaw } = sticks;
+                let value = afbc_guidance::Sticks { roll, pitch, throttle, yaw };
+                inputs.order().sticks = Some(Stamped { value, at_us });
+                return;
+            }
+        };
+        inputs.order().target = Some(Stamped { value, at_us });
+    }
+
+    /// Returns a target as the guidance takes it; none if it needs a position that the vehicle does not know.
+    fn in_local_frame(&self, target: &PositionTarget) -> Option<MotionTarget> {
+        Some(match target.axes {
+            Axes::Local => motion(target, false),
+            Axes::Offset => {
+                let here = self.status.is_located().then(|| self.here())?;
+                MotionTarget { position_m: here + target.position_m, ..motion(target, false) }
+            }
+            // Either a place or a velocity: the link takes no other.
+            Axes::Body => motion(target, target.position_m.iter().all(|number| number.is_nan())),
+            Axes::BodyOffset => motion(target, true),
+        })
+    }
+}
+
+fn motion(target: &PositionTarget, body: bool) -> MotionTarget {
+    let PositionTarget { position_m, velocity_m_s, acceleration_m_s2, yaw_rad, yaw_rate_rad_s, .. } = *target;
+    MotionTarget { position_m, velocity_m_s, acceleration_m_s2, yaw_rad, yaw_rate_rad_s, body }
+}

@@ -1,0 +1,186 @@
+//! The vehicle's own estimate, and what of it the flight core is told.
+
+use crate::readings::{Aged, Readings};
+use afbc_control::math::{max, min};
+use afbc_estimator::{Estimate, Estimator, Measurement, Memory, OutputFilter, Stamped};
+use afbc_flight_core::{Inbox, Refusal};
+use afbc_types::{Pose, PoseSigmas, State};
+use nalgebra::Vector3;
+
+/// Number of fixes whose mean the local frame's origin is, at rest.
+const FIXES: f32 = 10.0;
+/// Standard deviations of a tracker's pose that does not say how good it is: a motion-capture system's \[m, rad\].
+const TRACKER: (f32, f32) = (0.003, 0.01);
+
+/// Estimator and memory of a vehicle. Until its first sample of an inertial sensor, the vehicle flies on the states
+/// that come over the link; from then on their poses, and poses that come alone, are measurements like others. While
+/// the inertial sensor has failed, poses are left to the flight core ([`afbc_flight_core::observer`]).
+///
+/// The local frame is that of the tracker's poses. Where there is none, its origin is where the vehicle stands at the
+/// first usable fix of its GNSS receiver: one that comes when the estimator runs, and is good enough for a valid
+/// position. All fixes are told in that frame; with a tracker, so that the first one agrees with the estimate. While
+/// the vehicle is at rest, further fixes tell where the origin is, not where the vehicle is: their error wanders by
+/// metres within minutes, which would be a motion of a vehicle that stands.
+#[derive(Clone, Debug)]
+pub struct EstimatorFrontEnd {
+    estimator: Estimator,
+    memory: Memory,
+    output_filter: OutputFilter,
+    /// True if there has been a sample.
+    senses: bool,
+    /// True if the inertial sensor worked in the last tick.
+    works: bool,
+    /// The local frame's origin in the receiver's frame, from the first usable fix on \[m\].
+    origin_m: Option<Vector3<f32>>,
+    /// Number of fixes that have told it, up to [`FIXES`].
+    fixes: f32,
+    /// Estimated position and velocity until then, zero as long as nobody has told a position \[m, m/s\].
+    told: [Vector3<f32>; 2],
+    /// Estimated position of a vehicle at rest \[m\].
+    stands_m: Option<Vector3<f32>>,
+}
+
+impl EstimatorFrontEnd {
+    /// Creates it with nothing read.
+    pub fn new(estimator: Estimator, output_filter: OutputFilter) -> Self {
+        EstimatorFrontEnd {
+            estimator,
+            memory: Memory::default(),
+            output_filter,
+            senses: false,
+            works: true,
+            origin_m: None,
+            fixes: 0.0,
+            told: [Vector3::zeros(); 2],
+            stands_m: None,
+        }
+    }
+
+    /// Tells whether the motors cannot carry the vehicle ([`Memory::set_on_ground`]).
+    pub fn set_on_ground(&mut self, on_ground: bool) {
+        self.memory.set_on_ground(on_ground);
+    }
+
+    /// Goes on with another estimator.
+    pub(crate) fn adopt(&mut self, estimator: &Estimator, output_filter: &OutputFilter) {
+        (self.estimator, self.output_filter) = (*estimator, *output_filter);
+    }
+
+    /// Takes the readings of a tick at `now_us`, tells `inbox` what the vehicle knows, and returns the estimated state;
+    /// none before the first sample.
+    #[inline(always)]
+    pub fn tick(&mut self, now_us: u64, readings: &Readings, inbox: &mut Inbox) -> Option<State> {
+        let sample = readings.sample(now_us);
+        self.senses |= sample.is_some();
+        if !self.senses {
+            return None;
+        }
+        for aid in readings.aids.iter().flatten() {
+            let Some(aid) = self.localized(*aid) else { continue };
+            let timed = aid.timed(now_us);
+            if self.works {
+                self.memory.offer(&timed);
+            } else {
+                leave(&timed, inbox);
+            }
+        }
+        if let Some(Stamped { value, at_us }) = inbox.pose().filter(|_| self.works) {
+            self.memory.offer(&Stamped { value: measurement(value), at_us: *at_us });
+            inbox.clear_pose();
+        }
+        let estimate = self.estimator.step(&mut self.memory, now_us, sample.as_ref());
+        self.works = estimate.imu.is_usable();
+        if self.origin_m.is_none() && estimate.resets.position > 0 {
+            self.told = [estimate.state.position_m, estimate.state.velocity_m_s];
+        }
+        self.stands_m = estimate.at_rest.then_some(estimate.state.position_m);
+        publish(&estimate, self.output_filter.step(&estimate), now_us, inbox);
+        Some(estimate.state)
+    }
+
+    /// Returns a measurement in the local frame; none for a fix before a usable one.
+    #[inline(always)]
+    fn localized(&mut self, aid: Aged<Measurement>) -> Option<Aged<Measurement>> {
+        if !matches!(aid.value, Measurement::Gnss { .. }) {
+            return Some(aid);
+        }
+        self.located(aid)
+    }
+
+    #[inline(never)]
+    fn located(&mut self, mut aid: Aged<Measurement>) -> Option<Aged<Measurement>> {
+        let sigmas_m = self.usable(&aid.value);
+        let Measurement::Gnss { position_m, .. } = &mut aid.value else { return Some(aid) };
+        if self.origin_m.is_none() {
+            let [here_m, velocity_m_s] = self.told;
+            let there_m = here_m - velocity_m_s * (aid.age_us as f32 * 1e-6);
+            self.origin_m = sigmas_m.map(|_| *position_m - there_m);
+        }
+        let origin_m = self.origin_m.as_mut()?;
+        *position_m -= *origin_m;
+        if let (Some(sigmas_m), Some(stands_m)) = (sigmas_m, self.stands_m) {
+            // A wild one moves it no more than others.
+            let by_m = (*position_m - stands_m).zip_map(&sigmas_m, |by_m, sigma_m| max(-sigma_m, min(by_m, sigma_m)));
+            self.fixes = (self.fixes + 1.0).min(FIXES);
+            *origin_m += by_m / self.fixes;
+            *position_m = stands_m;
+        }
+        Some(aid)
+    }
+
+    /// Returns the standard deviations of a usable fix \[m\].
+    fn usable(&self, fix: &Measurement) -> Option<Vector3<f32>> {
+        let Measurement::Gnss { horizontal_sigma_m, vertical_sigma_m, .. } = *fix else { return None };
+        let sigma_max_m = self.estimator.settings().position_sigma_max_m;
+        let is_good = horizontal_sigma_m <= sigma_max_m && vertical_sigma_m <= sigma_max_m;
+        let sigmas_m = Vector3::new(horizontal_sigma_m, horizontal_sigma_m, vertical_sigma_m);
+        (self.memory.runs() && is_good && fix.is_plausible()).then_some(sigmas_m)
+    }
+}
+
+/// Leaves a tracker's pose to the flight core.
+#[cold]
+#[inline(never)]
+fn leave(timed: &Stamped<Measurement>, inbox: &mut Inbox) {
+    if let Some(value) = pose(&timed.value) {
+        inbox.put_pose(Stamped { value, at_us: timed.at_us });
+    }
+}
+
+/// Tells `inbox` the eased `state` of an `estimate` as far as it is valid. What the link says of the state stands only
+/// while the estimate has no attitude: after the inertial sensor has failed.
+#[inline(always)]
+pub fn publish(estimate: &Estimate, state: State, now_us: u64, inbox: &mut Inbox) {
+    let stamped = Stamped { value: state, at_us: now_us };
+    let validity = &estimate.validity;
+    let missing = match (validity.attitude, validity.heading, validity.velocity && validity.position) {
+        (true, true, true) => None,
+        (false, ..) => Some(Refusal::AttitudeUnknown),
+        (_, false, _) => Some(Refusal::HeadingUnknown),
+        _ => Some(Refusal::PositionUnknown),
+    };
+    match missing {
+        None => inbox.locate(stamped),
+        Some(missing) => inbox.put_adrift(Some(stamped).filter(|_| validity.attitude), missing),
+    }
+}
+
+/// Returns the pose that a measurement tells, if it does.
+#[must_use]
+pub fn pose(measurement: &Measurement) -> Option<Pose> {
+    let Measurement::Pose { position_m, attitude, position_sigma_m, attitude_sigma_rad } = *measurement else {
+        return None;
+    };
+    let sigmas = PoseSigmas { position_m: Some(position_sigma_m), attitude_rad: Some(attitude_sigma_rad) };
+    Some(Pose { position_m, attitude, sigmas })
+}
+
+fn measurement(pose: &Pose) -> Measurement {
+    let (position_sigma_m, attitude_sigma_rad) = TRACKER;
+    Measurement::Pose {
+        position_m: pose.position_m,
+        attitude: pose.attitude,
+        position_sigma_m: pose.sigmas.position_m.unwrap_or(position_sigma_m),
+        attitude_sigma_rad: pose.sigmas.attitude_rad.unwrap_or(attitude_sigma_rad),
+    }
+}

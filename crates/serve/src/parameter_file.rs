@@ -1,0 +1,60 @@
+//! The parameters of a vehicle in a file, by the firmware's code.
+
+use afbc_files::{Flash, FlashError};
+use afbc_onboard::Link;
+use afbc_onboard::parameters::{Kept, RecordChange};
+use afbc_sim::in_the_loop::Host;
+use afbc_sim::scenario::Scenario;
+use afbc_store::{Error, Store, hash};
+use afbc_types::OutOfRange;
+use std::io::ErrorKind;
+use std::path::Path;
+
+/// Vehicle of a scenario without a vehicle file.
+const PAPER: &str = "paper";
+
+/// A store of parameters in a file.
+pub struct ParameterFile(Store<Flash>);
+
+impl ParameterFile {
+    /// Opens the file at `path` for the vehicle of `scenario`, or makes it.
+    ///
+    /// # Errors
+    /// One line that names the file.
+    pub fn open(path: &Path, scenario: &Scenario) -> Result<Self, String> {
+        let name = scenario.vehicle_file.as_ref().map_or(PAPER, |vehicle| &vehicle.name);
+        let flash = Flash::open(path).map_err(|error| match error.kind() {
+            ErrorKind::NotFound => format!("{}: its folder does not exist; make it first", path.display()),
+            _ => format!("{}: {error}", path.display()),
+        })?;
+        let store = Store::open(flash, 0, hash(name.as_bytes()));
+        Ok(ParameterFile(store.map_err(|error| format!("{}: {error}", path.display()))?))
+    }
+
+    /// Powers up the firmware of `scenario`'s vehicle with these parameters, by default these of the link; calls
+    /// `notice` with a line on each that is not used.
+    pub(crate) fn power_up(
+        &mut self,
+        scenario: &Scenario,
+        link: Link,
+        mut notice: impl FnMut(&str),
+    ) -> Result<Host, OutOfRange> {
+        // As on the board: erased at the start.
+        if let Err(error) = self.0.make_room() {
+            notice(error.reason());
+        }
+        Host::stored(scenario.vehicle_file.as_ref(), link, &mut self.0, notice)
+    }
+
+    /// Writes a change.
+    pub(crate) fn keep(&mut self, change: RecordChange) -> Result<(), Error<FlashError>> {
+        match Kept::NOW.keep(&mut self.0, change) {
+            // Nothing stands still meanwhile, as it would on the board.
+            Err(Error::NeedsErase) => {
+                self.0.make_room()?;
+                Kept::NOW.keep(&mut self.0, change)
+            }
+            done => done,
+        }
+    }
+}

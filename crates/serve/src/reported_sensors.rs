@@ -1,0 +1,86 @@
+//! What a vehicle's shell tells its services beside the control tick: receiver, battery, further sensors, and where on
+//! the earth it is.
+
+use afbc_estimator::Measurement;
+use afbc_link::telemetry::BatteryStatus;
+use afbc_onboard::services::health::sensor;
+use afbc_onboard::services::origin::EarthOrigin;
+use afbc_onboard::services::status::{GnssReceiver, SensorBits};
+use afbc_onboard::{AuxSensors, Readings};
+use afbc_plant::InstrumentSuite;
+use afbc_sim::flight::World;
+use afbc_sim::scenario::Scenario;
+
+/// Silence after which a sensor counts as failed \[ms\].
+const SILENT_MS: u32 = 1000;
+/// Kinds of a satellite receiver's fix.
+const NO_FIX: u8 = 1;
+const FIX_3D: u8 = 3;
+/// Satellites of a simulated receiver.
+const SATELLITES: u8 = 14;
+
+/// Watches the sensors of one vehicle.
+pub(crate) struct ReportedSensors {
+    suite: InstrumentSuite,
+    origin: Option<EarthOrigin>,
+    /// Time since the last reading of receiver, barometer and magnetometer \[ms\].
+    silent_ms: [u32; 3],
+    sigma_mm: [u32; 2],
+}
+
+impl ReportedSensors {
+    pub(crate) fn new(scenario: &Scenario) -> Self {
+        let suite = scenario.instruments;
+        // Indoors nobody knows where on the earth the frame is.
+        let origin = suite.gnss.and_then(|_| EarthOrigin::new(EarthOrigin::SIMULATED));
+        ReportedSensors { suite, origin, silent_ms: [SILENT_MS; 3], sigma_mm: [0; 2] }
+    }
+
+    /// Returns what is known after these readings.
+    pub(crate) fn look(&mut self, world: &World, readings: &Readings) -> AuxSensors {
+        for silent_ms in &mut self.silent_ms {
+            *silent_ms = silent_ms.saturating_add(1);
+        }
+        let [receiver, barometer, magnetometer] = &mut self.silent_ms;
+        for aid in readings.aids.iter().flatten() {
+            match aid.value {
+                Measurement::Gnss { horizontal_sigma_m, vertical_sigma_m, .. } => {
+                    *receiver = 0;
+                    self.sigma_mm = [horizontal_sigma_m, vertical_sigma_m].map(|sigma_m| (sigma_m * 1e3) as u32);
+                }
+                Measurement::Height { .. } => *barometer = 0,
+                Measurement::MagneticField { .. } => *magnetometer = 0,
+                _ => {}
+            }
+        }
+        let heard = self.silent_ms.map(|silent_ms| silent_ms < SILENT_MS);
+        let [receives, measures_height, measures_field] = heard;
+        let sets = [
+            (self.suite.barometer.is_some(), measures_height, sensor::BAROMETER),
+            (self.suite.magnetometer.is_some(), measures_field, sensor::MAGNETOMETER),
+        ];
+        let mut sensors = SensorBits::default();
+        for (_, well, bit) in sets.into_iter().filter(|(there, ..)| *there) {
+            sensors.present |= bit;
+            sensors.healthy |= if well { bit } else { 0 };
+        }
+        let charge = world.plant().telemetry().and_then(|telemetry| telemetry.battery);
+        AuxSensors {
+            origin: self.origin,
+            receiver: self.suite.gnss.map(|_| GnssReceiver {
+                kind: if receives { FIX_3D } else { NO_FIX },
+                satellites: if receives { SATELLITES } else { 0 },
+                sigma_mm: self.sigma_mm,
+            }),
+            battery: charge.map(|charge| BatteryStatus {
+                voltage_mv: (charge.voltage_v * 1e3) as u16,
+                current_ca: (charge.current_a * 1e2) as i16,
+                remaining_percent: (charge.charge * 1e2) as i8,
+                consumed_mah: -1,
+                charge: 0,
+            }),
+            sensors,
+            powered_up_us: 0,
+        }
+    }
+}

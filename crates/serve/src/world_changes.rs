@@ -1,0 +1,150 @@
+//! Weather and faults of one vehicle, as changed while it flies.
+
+use crate::command::WorldChange;
+use afbc_plant::instruments::InstrumentFault;
+use afbc_plant::{
+    CosineGust, Environment, Gust, GustKind, InstrumentSuite, ParameterChange, Payload, RotorFault, Wind,
+};
+use afbc_reader::words::out_of_range;
+use afbc_sim::flight::World;
+use afbc_sim::scenario::Scenario;
+use afbc_types::{Axis, OutOfRange};
+
+/// What a vehicle suffers now, and what its scenario has in store.
+pub(crate) struct WorldChanges {
+    suite: InstrumentSuite,
+    scenario_wind: Wind,
+    scenario_environment: Environment,
+    wind: Wind,
+    rotors: Vec<RotorFault>,
+    /// Failures of instruments, by command.
+    failures: Vec<InstrumentFault>,
+}
+
+impl WorldChanges {
+    pub(crate) fn new(scenario: &Scenario) -> Self {
+        WorldChanges {
+            suite: scenario.instruments,
+            scenario_wind: scenario.realism.wind.clone(),
+            scenario_environment: scenario.environment.clone(),
+            wind: scenario.realism.wind.clone(),
+            rotors: scenario.realism.rotors.faults.clone(),
+            failures: scenario.instrument_faults.clone(),
+        }
+    }
+
+    /// Changes `world` as `change` says, from now on.
+    ///
+    /// # Errors
+    /// One line; nothing has changed then.
+    pub(crate) fn apply(&mut self, change: &WorldChange, world: &mut World) -> Result<(), String> {
+        let now_s = world.plant().time_s();
+        let until = |seconds: Option<f64>| seconds.map_or(f64::INFINITY, |seconds| now_s + seconds);
+        match *change {
+            WorldChange::Wind(steady_m_s) => self.set_wind(world, |wind| wind.steady_m_s = steady_m_s),
+            WorldChange::Turbulence(turbulence) => self.set_wind(world, |wind| wind.turbulence = turbulence),
+            WorldChange::Gust { velocity_m_s, rise_s, hold_s } => self.set_wind(world, |wind| {
+                wind.gusts.retain(|gust| gust.start_s + 2.0 * gust.rise_s + gust.hold_s > now_s);
+                wind.gusts.push(CosineGust { velocity_m_s, start_s: now_s, rise_s, hold_s });
+            }),
+            WorldChange::Push { force_n, seconds } => {
+                // A positive gust of the paper pushes in the negative direction.
+                let sizes = [(Axis::X, -force_n.x), (Axis::Y, -force_n.y), (Axis::Z, -force_n.z)];
+                let [start_s, end_s] = [now_s, until(seconds)];
+                let gusts = sizes.map(|(axis, size)| Gust { axis, kind: GustKind::Force, size, start_s, end_s });
+                load(world, |gusts_now, _, _| gusts_now.extend(gusts.into_iter().filter(|gust| gust.size != 0.0)))
+            }
+            WorldChange::Change { quantity, factor, seconds } => load(world, |_, changes, _| {
+                changes.push(ParameterChange { quantity, factor, start_s: now_s, end_s: until(seconds) });
+            }),
+            WorldChange::Payload { mass_kg, below_m } => load(world, |_, _, payloads| {
+                payloads.retain(|payload| payload.start_s > now_s);
+                let [ahead_m, left_m] = [0.0; 2];
+                let end_s = f64::INFINITY;
+                payloads.push(Payload { mass_kg, below_m, ahead_m, left_m, start_s: now_s, end_s });
+            }),
+            WorldChange::Fault { failure, seconds } => {
+                let fault = InstrumentFault { failure, start_s: now_s, end_s: until(seconds) };
+                let (instrument, _) = failure.name().split_once('-').unwrap_or_default();
+                let absent = || format!("this vehicle has no {instrument}");
+                if !has(&self.suite, instrument) {
+                    return Err(absent());
+                }
+                world.instruments_mut().ok_or_else(absent)?.fail(fault).map_err(told)?;
+                self.failures.push(fault);
+                Ok(())
+            }
+            WorldChange::Rotor { rotor, efficiency } => {
+                let mut faults = self.rotors.clone();
+                faults.retain(|fault| fault.rotor != rotor);
+                faults.push(RotorFault { rotor, efficiency, start_s: now_s });
+                world.plant_mut().set_rotor_faults(faults.clone()).map_err(told)?;
+                self.rotors = faults;
+                Ok(())
+            }
+            WorldChange::Battery(share) => match world.plant_mut().set_charge(share).map_err(told)? {
+                true => Ok(()),
+                false => Err("this vehicle has no battery".into()),
+            },
+            WorldChange::Clear => {
+                let wind = self.scenario_wind.clone();
+                self.set_wind(world, |now| *now = wind)?;
+                world.plant_mut().set_rotor_faults(Vec::new()).map_err(told)?;
+                world.plant_mut().set_environment(self.scenario_environment.clone());
+                world.instruments_mut().into_iter().for_each(|instruments| instruments.clear_faults());
+                self.rotors.clear();
+                self.failures.clear();
+                Ok(())
+            }
+        }
+    }
+
+    /// Changes the wind.
+    fn set_wind(&mut self, world: &mut World, change: impl FnOnce(&mut Wind)) -> Result<(), String> {
+        let mut wind = self.wind.clone();
+        change(&mut wind);
+        world.plant_mut().set_wind(&wind).map_err(told)?;
+        self.wind = wind;
+        Ok(())
+    }
+
+    /// Returns the faults at `now_s` in words.
+    pub(crate) fn active_faults(&self, now_s: f64) -> Vec<String> {
+        let failures = self.failures.iter().filter(|fault| (fault.start_s..fault.end_s).contains(&now_s));
+        let rotors = self.rotors.iter().filter(|fault| fault.start_s <= now_s && fault.efficiency < 1.0);
+        failures
+            .map(|fault| fault.failure.name().to_owned())
+            .chain(rotors.map(|fault| format!("rotor {} at {}", fault.rotor, fault.efficiency)))
+            .collect()
+    }
+}
+
+/// Changes gusts, parameters and payloads.
+fn load(
+    world: &mut World,
+    change: impl FnOnce(&mut Vec<Gust>, &mut Vec<ParameterChange>, &mut Vec<Payload>),
+) -> Result<(), String> {
+    let now_s = world.plant().time_s();
+    let old = world.plant().environment();
+    let mut gusts: Vec<Gust> = old.gusts().iter().filter(|gust| gust.end_s > now_s).copied().collect();
+    let mut changes: Vec<ParameterChange> = old.changes().iter().filter(|it| it.end_s > now_s).copied().collect();
+    let mut payloads = old.payloads().to_vec();
+    change(&mut gusts, &mut changes, &mut payloads);
+    let new = Environment::new(*old.nominal(), changes, gusts).and_then(|new| new.with_payloads(payloads));
+    world.plant_mut().set_environment(new.map_err(told)?);
+    Ok(())
+}
+
+fn has(suite: &InstrumentSuite, instrument: &str) -> bool {
+    match instrument {
+        "imu" => suite.imu.is_some(),
+        "tracker" => suite.tracker.is_some(),
+        "gnss" => suite.gnss.is_some(),
+        "barometer" => suite.barometer.is_some(),
+        _ => suite.magnetometer.is_some(),
+    }
+}
+
+fn told(error: OutOfRange) -> String {
+    out_of_range(&error)
+}

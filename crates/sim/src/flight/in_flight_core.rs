@@ -1,0 +1,101 @@
+//! Any controller inside the flight core, as on board, but without board and link.
+
+use super::pilot::Pilot;
+use super::sample::Sample;
+use super::world::World;
+use afbc_control::{Action, FlightController, Mixer};
+use afbc_flight_core::rate::{PERIOD_US, WINDOW_US};
+use afbc_flight_core::{
+    ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TicketedRequest,
+};
+use afbc_onboard::Aged;
+use afbc_types::{OutOfRange, Parameters, Pose, Setpoint, State};
+use core::convert::Infallible;
+
+/// Ticks before the first step: the flight core arms after it has measured its rate.
+const TICKS_HELD: u64 = WINDOW_US as u64 / PERIOD_US + 1;
+
+/// A controller inside the flight core: without states it coasts blind, then descends.
+pub struct InFlightCore<C: FlightController<N>, const N: usize> {
+    vehicle: FlightCore<C, N>,
+    mixer: Mixer<N>,
+    memory: FlightCoreMemory<C::Memory>,
+    inbox: Inbox,
+    /// Time since power-up \[us\].
+    now_us: u64,
+}
+
+impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
+    /// Puts `controller`, which must be built for this vehicle, into a flight core without arming limits.
+    ///
+    /// # Errors
+    /// If the time step is not 1 ms, the flight core's.
+    pub fn new(vehicle: Parameters, controller: C) -> Result<Self, OutOfRange> {
+        let mixer = *controller.mixer();
+        let vehicle = FlightCore::new(vehicle, ArmingLimits::NONE, controller)?;
+        Ok(InFlightCore { vehicle, mixer, memory: FlightCoreMemory::default(), inbox: Inbox::default(), now_us: 0 })
+    }
+
+    /// Runs one tick with these inputs.
+    fn tick(
+        &mut self,
+        state: Option<State>,
+        adrift: Option<State>,
+        pose: Option<Aged<Pose>>,
+        setpoint: Setpoint,
+    ) -> Action<N> {
+        self.now_us += PERIOD_US;
+        let at_us = self.now_us;
+        let stamped = |value| Stamped { value, at_us };
+        if let Some(Aged { value, age_us }) = pose {
+            self.inbox.put_pose(Stamped { value, at_us: at_us.saturating_sub(age_us.into()) });
+        }
+        match (state, adrift) {
+            (Some(state), _) => self.inbox.locate(stamped(state)),
+            (None, Some(_)) => self.inbox.put_adrift(adrift.map(stamped), Refusal::PositionUnknown),
+            (None, None) => {}
+        }
+        self.inbox.put_setpoint(Stamped { value: setpoint, at_us });
+        let inbox = self.inbox.take();
+        let outcome = self.vehicle.tick(&mut self.memory, at_us, &inbox);
+        let given = self.mixer.inputs(&outcome.forces);
+        let mut action = Action::new(outcome.motors, outcome.forces, given, false);
+        action.health = outcome.health.control;
+        action
+    }
+
+    /// Powers up and arms a vehicle that is held in this `state`.
+    fn arm(&mut self, state: State, setpoint: Setpoint) {
+        for _ in 0..TICKS_HELD {
+            let _ = self.tick(Some(state), None, None, setpoint);
+        }
+        self.inbox.request(TicketedRequest { request: Request::Arm, ticket: 0 });
+        let _ = self.tick(Some(state), None, None, setpoint);
+    }
+}
+
+impl<C: FlightController<N>, const N: usize> Pilot for InFlightCore<C, N> {
+    type Error = Infallible;
+
+    /// Runs one tick. Before the first, once there is a state, the vehicle is held until it has armed.
+    fn step(&mut self, world: &mut World) -> Result<Sample, Infallible> {
+        let view = world.look();
+        let (state, setpoint) = (view.state.filter(State::is_plausible), view.reference.setpoint());
+        if let Some(state) = state.filter(|_| self.now_us == 0) {
+            self.arm(state, setpoint);
+        }
+        let mut action = if self.now_us > 0 {
+            self.tick(state.filter(|_| view.new), view.adrift, view.pose, setpoint)
+        } else {
+            Action::default()
+        };
+        action.health.state_rejected = state.is_none();
+        action.health.setpoint_rejected = !setpoint.is_plausible();
+        let estimates = self.memory.control().map(C::learnt).unwrap_or_default();
+        Ok(view.sample(action, self.memory.trace::<C, N>(), estimates))
+    }
+
+    fn descends(&self) -> bool {
+        self.memory.mode() == Mode::Descending
+    }
+}

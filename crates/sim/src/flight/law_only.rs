@@ -1,0 +1,33 @@
+//! A law without the flight core.
+
+use super::pilot::Pilot;
+use super::sample::Sample;
+use super::world::World;
+use afbc_control::{FlightController, Validated};
+use core::convert::Infallible;
+
+/// A controller that commands the rotors directly.
+pub struct LawOnly<C: FlightController<N>, const N: usize> {
+    controller: C,
+    memory: Validated<C::Memory>,
+}
+
+impl<C: FlightController<N>, const N: usize> LawOnly<C, N> {
+    /// Creates it with a controller that has not flown yet.
+    pub fn new(controller: C) -> Self {
+        LawOnly { controller, memory: Validated::default() }
+    }
+}
+
+impl<C: FlightController<N>, const N: usize> Pilot for LawOnly<C, N> {
+    type Error = Infallible;
+
+    // Always inlined: copying a sample in and out of calls costs a fifth of the loop.
+    #[inline(always)]
+    fn step(&mut self, world: &mut World) -> Result<Sample, Infallible> {
+        let view = world.look();
+        let action = self.controller.step(&mut self.memory, view.state.as_ref(), &view.reference.setpoint());
+        let Validated { control, .. } = &self.memory;
+        Ok(view.sample(action, C::trace(control), C::learnt(control)))
+    }
+}

@@ -1,0 +1,18 @@
+//! A value with its time.
+
+/// A value with its time on the vehicle's clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stamped<T> {
+    /// The value.
+    pub value: T,
+    /// Time since power-up \[us\].
+    pub at_us: u64,
+}
+
+impl<T> Stamped<T> {
+    /// Returns its age at `now_us`, at most `u32::MAX` (71 minutes). A stamp in the future is invalid and counts as
+    /// that old.
+    pub fn age_us(&self, now_us: u64) -> u32 {
+        u32::try_from(now_us.wrapping_sub(self.at_us)).unwrap_or(u32::MAX)
+    }
+}

@@ -1,0 +1,235 @@
+//! The vehicle on the server, and its stations.
+
+use super::{Tick, Truth};
+use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Mission, MissionItem, ParameterRequest, Plan, Sender};
+use afbc_link::{Datum, Height, Place, Uplink};
+use afbc_onboard::services::origin::EarthOrigin;
+use afbc_serve::{Server, fleet};
+use afbc_sim::scenario::{Scenario, built_in};
+use nalgebra::Vector3;
+
+pub const STATION: Address = Address { system: 255, component: 190 };
+pub const COMPANION: Address = Address { system: 245, component: 191 };
+/// HIL_ACTUATOR_CONTROLS: whether it is armed, and the commands to the rotors, every tick.
+const ROTORS: u32 = 93;
+/// `MAV_PARAM_TYPE_REAL32`.
+const REAL32: u8 = 9;
+/// Time between heartbeats of a station, and between targets of a stream \[ms\].
+const HEARTBEAT_MS: u32 = 500;
+const TARGET_MS: u32 = 50;
+/// Time between two tries to arm, and after which it is given up \[ms\].
+const TRY_MS: u32 = 250;
+const ARMS_MS: u32 = 30_000;
+
+/// A ground station or companion computer.
+struct Station {
+    address: Address,
+    sender: Sender,
+    /// False while nothing of it gets through.
+    reaches: bool,
+    /// Every so many of its frames are broken; 0: none.
+    breaks: u32,
+    frames: u32,
+    stream: Option<Uplink>,
+    mission: Vec<MissionItem>,
+    /// What it is about to send.
+    queue: Vec<Uplink>,
+}
+
+impl Station {
+    fn new(address: Address) -> Self {
+        Station {
+            address,
+            sender: Sender::new(address),
+            reaches: true,
+            breaks: 0,
+            frames: 0,
+            stream: None,
+            mission: Vec::new(),
+            queue: Vec::new(),
+        }
+    }
+}
+
+/// A vehicle, its stations, and their clock.
+pub struct Session {
+    server: Server,
+    stations: [Station; 2],
+    decoder: Decoder<Downlink>,
+    time_ms: u32,
+    garbage: Vec<u8>,
+}
+
+impl Session {
+    /// Powers it up, indoors in front of a tracker, or outdoors in a breeze.
+    pub fn new(indoors: bool, seed: u64) -> Self {
+        let scenario = built_in(if indoors { "mocap" } else { "outdoor" }).unwrap().read().unwrap();
+        let server = Server::new(&fleet(&Scenario { seed, ..scenario }, 1).unwrap(), 1).unwrap();
+        let stations = [STATION, COMPANION].map(Station::new);
+        let mut session = Session { server, stations, decoder: Decoder::new(STATION), time_ms: 0, garbage: Vec::new() };
+        session.say(STATION, Uplink::Command(Command::SetInterval { message: ROTORS, interval_us: 1000 }));
+        // Only the first station is there from the start.
+        session.station(COMPANION).reaches = false;
+        session
+    }
+
+    fn station(&mut self, address: Address) -> &mut Station {
+        self.stations.iter_mut().find(|station| station.address == address).unwrap()
+    }
+
+    pub fn time_s(&self) -> f64 {
+        f64::from(self.time_ms) * 1e-3
+    }
+
+    /// Queues a message of a station for the next tick.
+    pub fn say(&mut self, from: Address, message: Uplink) {
+        self.station(from).queue.push(message);
+    }
+
+    /// Sets a parameter.
+    pub fn set(&mut self, name: &str, value: f32) {
+        let mut letters = [0; 16];
+        letters.iter_mut().zip(name.bytes()).for_each(|(to, from)| *to = from);
+        let request = ParameterRequest::Set { name: letters, value: value.to_le_bytes(), kind: REAL32 };
+        self.say(STATION, Uplink::Parameter(request));
+    }
+
+    /// Lets a station fall silent, or be heard again.
+    pub fn reach(&mut self, of: Address, reaches: bool) {
+        self.station(of).reaches = reaches;
+    }
+
+    /// Sends a target again and again, or no more.
+    pub fn stream(&mut self, from: Address, target: Option<Uplink>) {
+        self.station(from).stream = target;
+    }
+
+    /// Breaks one of so many frames of a station; 0: none.
+    pub fn breaks(&mut self, of: Address, one_of: u32) {
+        self.station(of).breaks = one_of;
+    }
+
+    /// Sends bytes of no station.
+    pub fn noise(&mut self, bytes: &[u8]) {
+        self.garbage.extend_from_slice(bytes);
+    }
+
+    /// Begins the upload of a mission, whose items follow as they are asked for.
+    pub fn upload(&mut self, from: Address, items: Vec<MissionItem>) {
+        let count = Mission::Count(items.len() as u16, Plan::MISSION);
+        self.station(from).mission = items;
+        self.say(from, Uplink::Mission(count));
+    }
+
+    /// Changes weather or faults, by a line of the server's protocol.
+    pub fn line(&mut self, line: &str) {
+        assert_eq!(self.server.line(line).lines, [format!("ok {line}")]);
+    }
+
+    /// Runs a millisecond.
+    pub fn step(&mut self) -> Tick {
+        let time_ms = self.time_ms;
+        let mut sent = Vec::new();
+        for (peer, station) in (1..).zip(&mut self.stations) {
+            if station.reaches && time_ms.is_multiple_of(HEARTBEAT_MS) {
+                station.queue.push(Uplink::Heartbeat);
+            }
+            if time_ms.is_multiple_of(TARGET_MS) {
+                station.queue.extend(station.stream);
+            }
+            for message in station.queue.drain(..) {
+                let mut buffer = [0; FRAME_MAX];
+                let mut frame = station.sender.send(&message, &mut buffer).to_vec();
+                station.frames += 1;
+                if !station.reaches {
+                    continue;
+                }
+                if station.breaks > 0 && station.frames % station.breaks == 0 {
+                    let place = station.frames as usize * 31 % frame.len();
+                    frame[place] ^= 1 << (station.frames % 8);
+                } else {
+                    sent.push((station.address, message));
+                }
+                self.server.hear(0, peer, &frame);
+            }
+        }
+        if !self.garbage.is_empty() {
+            self.server.hear(0, 9, &std::mem::take(&mut self.garbage));
+        }
+        let mut heard = Vec::new();
+        let Session { server, decoder, .. } = self;
+        let _ = server.step(|_, bytes| decoder.feed(bytes, |_, message| heard.push(message)), |_| ());
+        for message in &heard {
+            if let Downlink::Mission { message: Mission::Request(number, Plan::MISSION), to } = *message {
+                let station = self.station(to);
+                let item = station.mission.get(usize::from(number)).copied();
+                station.queue.extend(item.map(|item| Uplink::Mission(Mission::Item(item, Plan::MISSION))));
+            }
+        }
+        self.time_ms += 1;
+        Tick { time_ms, sent, heard, truth: self.truth() }
+    }
+
+    /// Returns what is true of the vehicle.
+    pub fn truth(&self) -> Truth {
+        let plant = self.server.vehicles()[0].world().plant();
+        let (motion, telemetry) = (plant.motion(), plant.telemetry().unwrap());
+        let [[roll, pitch, _]] = motion.attitude_rad.data.0;
+        Truth {
+            position_m: motion.position_m,
+            velocity_m_s: motion.velocity_m_s,
+            tilt_rad: (roll.cos() * pitch.cos()).clamp(-1.0, 1.0).acos(),
+            on_ground: telemetry.on_ground,
+            rotor_rad_s: telemetry.rotor_speeds_rad_s.iter().copied().fold(0.0, f64::max),
+        }
+    }
+
+    /// Arms it as soon as that is possible. Passes each tick to `see`.
+    pub fn arm(&mut self, mut see: impl FnMut(&Tick)) {
+        let begin_ms = self.time_ms;
+        while self.time_ms < begin_ms + ARMS_MS {
+            if self.time_ms.is_multiple_of(TRY_MS) {
+                self.say(STATION, Uplink::Command(Command::Arm));
+            }
+            let tick = self.step();
+            see(&tick);
+            if is_armed(&tick) == Some(true) {
+                return;
+            }
+        }
+        panic!("not armed in {ARMS_MS} ms");
+    }
+}
+
+/// Returns whether the motors may turn, if the tick tells.
+pub fn is_armed(tick: &Tick) -> Option<bool> {
+    tick.heard.iter().find_map(|message| match message {
+        Downlink::Rotors { armed, .. } => Some(*armed),
+        _ => None,
+    })
+}
+
+/// A place of the local frame of the vehicle outdoors \[m\], as stations say it.
+pub fn global(x: f32, y: f32, z: f32) -> Place {
+    let origin = EarthOrigin::new(EarthOrigin::SIMULATED).unwrap();
+    let global = origin.global(&Vector3::new(x, y, z));
+    let [latitude_e7, longitude_e7] = global.e7();
+    let height = Height { metres: global.altitude_m as f32, above: Datum::Sea };
+    Place { latitude_e7, longitude_e7, height }
+}
+
+/// An item of a mission at a place of the local frame \[m\], north, west, up.
+pub fn item(number: u16, command: u16, [x, y, z]: [f32; 3]) -> MissionItem {
+    let e4 = |metres: f32| (metres * 1e4) as i32;
+    MissionItem {
+        number,
+        command,
+        frame: 1,
+        goes_on: true,
+        parameters: [0.0, 0.0, 0.0, f32::NAN],
+        x: e4(x),
+        y: e4(-y),
+        z: -z,
+        ..MissionItem::default()
+    }
+}
