@@ -1,0 +1,21 @@
+//! The link alone: a heartbeat as bytes, then out of a stream with noise around it:
+//! `cargo run -p afbc-link --example link_alone`.
+
+use afbc_link::{Address, Decoder, FRAME_MAX, Sender, Uplink};
+
+fn main() {
+    let (station, vehicle) = (Address { system: 255, component: 190 }, Address { system: 1, component: 1 });
+    let mut buffer = [0; FRAME_MAX];
+    let frame = Sender::new(station).send(&Uplink::Heartbeat, &mut buffer);
+    println!("a heartbeat: {frame:02x?}");
+
+    let mut stream = b"noise".to_vec();
+    stream.extend_from_slice(frame);
+    let mut decoder = Decoder::<Uplink>::new(vehicle);
+    // In pieces of any size, as a port delivers them.
+    for piece in stream.chunks(7) {
+        decoder.feed(piece, |from, message| println!("from {from:?}: {message:?}"));
+    }
+    println!("{:?}", decoder.counters());
+    assert_eq!(decoder.counters().received, 1);
+}
