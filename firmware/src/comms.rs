@@ -50,7 +50,7 @@ pub async fn run((comms, table): &mut Desk, receiver: &mut impl Receiver, transm
         match select(receiver.receive(&mut incoming), ticks::next()).await {
             Either::First(length) => {
                 let news = comms.receive(incoming.get(..length).unwrap_or_default());
-                control::with_mail(|mail| mail.merge(&news));
+                control::with_mail(|inputs| inputs.merge(&news));
                 BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
             }
             Either::Second(tick) => {
@@ -59,7 +59,7 @@ pub async fn run((comms, table): &mut Desk, receiver: &mut impl Receiver, transm
                 transmitter.transmit(&tick, &outgoing);
                 if comms.has_mail() {
                     let news = comms.receive(&[]);
-                    control::with_mail(|mail| mail.merge(&news));
+                    control::with_mail(|inputs| inputs.merge(&news));
                 }
                 leaving += u32::from(comms.wants_reboot());
                 if leaving >= FAREWELL && !control::armed() {

@@ -42,7 +42,7 @@ pub fn armed() -> bool {
 /// Changes the inputs of the next tick.
 pub fn with_mail(change: impl FnOnce(&mut ControlInputs)) {
     // Not borrowed elsewhere while it is locked; no panic in any case.
-    MAIL.lock(|mail| mail.try_borrow_mut().ok().map(|mut mail| change(&mut mail)));
+    MAIL.lock(|inputs| inputs.try_borrow_mut().ok().map(|mut inputs| change(&mut inputs)));
 }
 
 /// Creates the vehicle, disarmed, to be called once: in place, since a task would store a value twice and take the
@@ -61,13 +61,13 @@ pub fn make(configuration: &Configuration) -> &'static mut Flight {
 
 /// Runs the ticks.
 pub async fn run(flight: &mut Flight, board: &mut impl Board) -> ! {
-    let (mut mail, mut readings) = (ControlInputs::EMPTY, Readings::NONE);
+    let (mut inputs, mut readings) = (ControlInputs::EMPTY, Readings::NONE);
     loop {
         // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
         // are due, it would tick twice in every second period.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
-        let report = tick(flight, &mut mail, &mut readings, board);
+        let report = tick(flight, &mut inputs, &mut readings, board);
         ARMED.store(report.mode.armed(), Ordering::Relaxed);
         if !report.mode.armed() {
             adopt(flight);
@@ -94,16 +94,16 @@ fn adopt(flight: &mut Flight) {
 /// drives them; checks the rate. Out of line, so that its stack and its instructions can be counted
 /// (`docs/budgets.md`).
 #[inline(never)]
-fn tick<B: Board>(flight: &mut Flight, mail: &mut ControlInputs, readings: &mut Readings, board: &mut B) -> Report {
+fn tick<B: Board>(flight: &mut Flight, inputs: &mut ControlInputs, readings: &mut Readings, board: &mut B) -> Report {
     let now_us = Instant::now().as_micros();
     // Not borrowed elsewhere while it is locked; the tick has no panic.
-    MAIL.lock(|shared| shared.try_borrow_mut().ok().map(|mut shared| shared.take_into(mail)));
+    MAIL.lock(|shared| shared.try_borrow_mut().ok().map(|mut shared| shared.take_into(inputs)));
 
     if board.clock_has_failed() {
         flight.distrust_clock();
     }
     board.sense(readings);
-    let report = flight.tick(now_us, mail, readings);
+    let report = flight.tick(now_us, inputs, readings);
 
     board.drive(report.throttles);
     // A reset restarts a failed task, once it does not end a flight.

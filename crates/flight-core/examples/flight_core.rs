@@ -2,7 +2,7 @@
 //! `cargo run -p afbc-flight-core --example flight_core`.
 
 use afbc::{Adaptive, Controller, Profile};
-use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Request, Stamped, TicketedRequest};
+use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, Stamped, TicketedRequest};
 use afbc_types::{OutOfRange, Parameters, Setpoint, State};
 
 fn main() -> Result<(), OutOfRange> {
@@ -35,5 +35,6 @@ fn main() -> Result<(), OutOfRange> {
             last = outcome.mode;
         }
     }
+    assert_eq!(last, Mode::Descending);
     Ok(())
 }

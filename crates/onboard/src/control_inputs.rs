@@ -35,7 +35,7 @@ impl ControlInputs {
         &mut self.orders
     }
 
-    /// Merges `news` into this mail.
+    /// Merges `update` into these inputs.
     pub fn merge(&mut self, update: &ControlInputs) {
         self.inbox.merge(&update.inbox);
         self.battery = update.battery.or(self.battery);
@@ -52,7 +52,7 @@ impl ControlInputs {
         given.iter().flatten().for_each(|given| give(mine, *given));
     }
 
-    /// Brings the mail of the last tick up to date for the next one, and removes what is handed over only once.
+    /// Brings the inputs of the last tick up to date for the next one, and removes what is handed over only once.
     #[inline]
     pub fn take_into(&mut self, taken: &mut ControlInputs) {
         self.inbox.take_into(&mut taken.inbox);

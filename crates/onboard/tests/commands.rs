@@ -199,7 +199,7 @@ fn missions_begin_and_go_on_at_items_that_there_are() {
     refused(&mut bench, Command::SetCurrent(2), none);
 }
 
-/// The guidance is handed the item that it wants, once; then there is no mail without bytes.
+/// The guidance is handed the item that it wants, once; then there are no inputs without bytes.
 #[test]
 fn the_wanted_item_is_handed_over_once() {
     let mut bench = bench(true);

@@ -9,6 +9,8 @@ fn step(name: &str, controller: &impl FlightController) {
     let mut setpoint = Setpoint::default();
     setpoint.position_m.x = 0.2;
     let action = controller.step(&mut Validated::default(), Some(&State::default()), &setpoint);
+    // The vehicle shall pitch forward: the rear rotor gives more than the front one.
+    assert!(action.forces.0.w > action.forces.0.y);
     println!("{name:9}: rotor forces {:.3?} N", action.forces.0.as_slice());
 }
 

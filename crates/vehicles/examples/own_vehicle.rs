@@ -49,8 +49,8 @@ fn main() -> Result<(), FileError> {
     println!("gains of roll: {:?}", gains.roll);
     // A mistake is one line with place and cure.
     let wrong = FILE.replace("mass_kg = 0.8", "mass_kg = -0.8");
-    if let Err(mistake) = afbc_vehicles::parse("mine.toml", &wrong, "mine") {
-        println!("{mistake}");
-    }
+    let mistake = afbc_vehicles::parse("mine.toml", &wrong, "mine").err().map(|mistake| mistake.to_string());
+    println!("{}", mistake.as_deref().unwrap_or("no mistake found"));
+    assert!(mistake.is_some());
     Ok(())
 }

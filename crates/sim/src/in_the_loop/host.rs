@@ -18,7 +18,7 @@ pub struct Host {
     flight: Box<dyn Core>,
     setup: Setup,
     comms: Comms,
-    mail: ControlInputs,
+    inputs: ControlInputs,
     /// What the last tick took of it.
     taken: ControlInputs,
     readings: Readings,
@@ -30,7 +30,7 @@ trait Core {
     fn tick(
         &mut self,
         now_us: u64,
-        mail: &mut ControlInputs,
+        inputs: &mut ControlInputs,
         readings: &Readings,
         tell: Tell<'_>,
     ) -> Report<ROTORS_MAX>;
@@ -50,11 +50,11 @@ impl<const N: usize> Core for (Flight<N>, ParameterTable<N>) {
     fn tick(
         &mut self,
         now_us: u64,
-        mail: &mut ControlInputs,
+        inputs: &mut ControlInputs,
         readings: &Readings,
         tell: Tell<'_>,
     ) -> Report<ROTORS_MAX> {
-        let report = self.0.tick(now_us, mail, readings);
+        let report = self.0.tick(now_us, inputs, readings);
         tell.comms.report(&report, tell.cycles, tell.send);
         report.padded()
     }
@@ -153,7 +153,7 @@ impl Host {
             flight: Box::new((flight, table)),
             setup,
             comms: Comms::with(setup),
-            mail: ControlInputs::EMPTY,
+            inputs: ControlInputs::EMPTY,
             taken: ControlInputs::EMPTY,
             readings: Readings::NONE,
             time_us: 0,
@@ -179,7 +179,7 @@ impl Host {
     /// Receives, for the next tick, the next bytes of one of several streams, each with a decoder of its own.
     pub fn hear(&mut self, decoder: &mut Decoder<Uplink>, bytes: &[u8]) {
         self.comms.exchange(decoder);
-        self.mail.merge(&self.comms.receive(bytes));
+        self.inputs.merge(&self.comms.receive(bytes));
         self.comms.exchange(decoder);
     }
 
@@ -191,8 +191,8 @@ impl Host {
     /// Runs one control tick at `time_us` since power-up, after `uplink` has reached the link. The tick reports a
     /// duration of `cycles` cycles of 168 MHz.
     pub fn tick(&mut self, uplink: &[u8], time_us: u64, cycles: u32) -> HostTick {
-        self.mail.merge(&self.comms.receive(uplink));
-        self.mail.take_into(&mut self.taken);
+        self.inputs.merge(&self.comms.receive(uplink));
+        self.inputs.take_into(&mut self.taken);
         let readings = core::mem::take(&mut self.readings);
         let mut bytes = Vec::new();
         let mut send = |frame: &[u8]| bytes.extend_from_slice(frame);

@@ -1,4 +1,4 @@
-//! What the modes want in a given scene: sticks, targets, take-off, landing, return and missions, with thresholds on
+//! What the modes want with given inputs: sticks, targets, take-off, landing, return and missions, with thresholds on
 //! both sides. Their flights are in the crate's `tests`.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
