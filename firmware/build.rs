@@ -46,12 +46,15 @@ fn source(vehicle: &Vehicle) -> String {
          /// What its file says.\n\
          pub const CONFIGURATION: Configuration = afbc_onboard::Configuration {{\n\
          airframe: {airframe},\nsettings: {settings},\ngains: {gains},\ncurve: {curve},\n\
+         response: {response},\nimu: {imu},\n\
          estimation: {estimation},\n    arming: afbc_onboard::ArmingLimits::DEFAULT,\n\
          guidance: afbc_guidance::Settings::DEFAULT,\n    link: afbc_onboard::Link::DEFAULT,\n}};\n",
         name = vehicle.name,
         settings = literal(&settings),
         gains = literal(&gains),
         curve = literal(&vehicle.curve),
+        response = literal(&vehicle.response()),
+        imu = literal(&vehicle.imu.to_f32()),
         // The estimator calls its settings `Settings`; the image imports them as `Estimation`.
         estimation = literal(&vehicle.estimation).replace("Settings", "Estimation"),
     )

@@ -9,9 +9,9 @@ use afbc::reference::ReferenceModel;
 use afbc::{Limits, Safeguards, Settings, backstepping};
 use afbc_control::Smoothing;
 use afbc_control::drag::KnownDrag;
-use afbc_flight_core::motor::Curve;
+use afbc_flight_core::motor::{Curve, Response};
 use afbc_onboard::Estimation;
-use afbc_types::{Airframe, Parameters, PerAxis, Rotor};
+use afbc_types::{Airframe, Mounting, Parameters, PerAxis, Rotor};
 use nalgebra::Vector3;
 
 /// What the firmware is told of it.

@@ -5,10 +5,9 @@
 
 use afbc::Profile;
 use afbc_campaign::{self as campaign, Campaign, Course, Manifest, Shard, Spread};
-use afbc_plant::instruments::Mounting;
 use afbc_sim::contender::{Contender, ControllerKind, Law};
 use afbc_sim::scenario::{self, Scenario};
-use afbc_types::{Axis, Declaration, Declared, Parameters, Value};
+use afbc_types::{Axis, Declaration, Declared, Mounting, Parameters, Value};
 use afbc_vehicles::Vehicle;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};

@@ -4,6 +4,15 @@
 //! function states its largest error against `f64`, measured over the stated range by `tests/math.rs`. Those without a
 //! source are polynomials and quotients of least largest error, as short as their use allows: sine and cosine rotate
 //! the virtual controls by the yaw angle and scale thrust by the tilt, where 1e-4 is a gain error of 0.01 %.
+//!
+//! | function | from | why |
+//! |---|---|---|
+//! | [`exp2`], [`tanh`], [`atan`], [`tan`] | here | a fourth of libm's time at its precision |
+//! | [`sin`], [`cos`] | here | 1.7e-4 is enough for a projection; micromath's have 2e-3 |
+//! | `sin_cos` of the types crate | Cephes' polynomials | 1.3e-7, where an attitude is made of it |
+//! | [`sqrt`] | the FPU, libm without one | one instruction, correctly rounded; micromath's is off by 5 % |
+//! | [`exp`], and `atan2` where a heading is flown | libm | before flight, or not in every tick |
+//! | `floor` and `atan2` of what a station is shown | micromath | short; 0.16 degrees of a course that receivers know to some degrees |
 
 /// Powers of 2 between 1 and 2 that [`exp2`] looks up.
 const STEPS: usize = 64;

@@ -61,7 +61,7 @@
 //! * A **tracker** and a **GNSS receiver** both tell the position in the earth frame. Their origins must be the same
 //!   (on board `afbc_onboard::EstimatorFrontEnd` sees to that); whichever comes first sets the position, and one that
 //!   contradicts the other is rejected as long as the other is there. The receiver's antenna is taken to be at the
-//!   centre of mass, as is the IMU; measurements of sensors mounted elsewhere must be corrected before.
+//!   centre of mass, as is the IMU, whose samples [`ImuCalibration`] corrects where it is not.
 //! * Of the standard deviation that a receiver reports, [`Settings::gnss_noise_m`] is noise, and the rest an
 //!   [error that stays for minutes](slow), which further fixes do not average: the position is as good as the receiver.
 //! * A tracker that repeats its pose in every bit for [`Settings::frozen_s`] is frozen, and not believed.
@@ -95,7 +95,7 @@
 //!
 //! # Reading order
 //!
-//! [`measurement`], [`settings`], [`estimate`]: in and out. [`estimator`]: a step. [`align`]: the start. [`rest`]:
+//! [`measurement`], [`settings`], [`data_sheet`], [`estimate`]: in and out. [`calibration`]: samples to body axes. [`estimator`]: a step. [`align`]: the start. [`rest`]:
 //! rest. [`nominal`], [`errors`], [`covariance`]: prediction. [`history`], [`horizon`], [`queue`], [`fusion`],
 //! [`slow`]: measurements. [`aid`], [`restart`], [`imu`]: gates, resets, health. [`rotation`], [`geodetic`]: small
 //! mathematics.
@@ -104,7 +104,9 @@
 
 mod aid;
 mod align;
+mod calibration;
 mod covariance;
+mod data_sheet;
 mod errors;
 mod estimate;
 mod estimator;
@@ -127,6 +129,8 @@ mod slow;
 pub use afbc_types::Stamped;
 pub use aid::{Aid, AidRecord, Aids};
 pub use align::Unready;
+pub use calibration::ImuCalibration;
+pub use data_sheet::{DataSheet, Triad};
 pub use estimate::{Dropped, Estimate, Resets, Sigmas, Validity};
 pub use estimator::Estimator;
 pub use geodetic::Origin;

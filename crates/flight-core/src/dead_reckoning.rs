@@ -7,7 +7,8 @@
 //! d^2 x/dt^2 = (l/I) (U_a - U_trim),   lag dU_a/dt = U - U_a
 //! ```
 //!
-//! where U_a is what rotors with a lag have made of the inputs, and held by a critically damped law on the reckoned
+//! where U_a is what [rotors with a lag](crate::motor::Response) have made of the inputs (without it, laws whose inputs
+//! lead the rotors lose a vehicle whose states come every 10 ms), and held by a critically damped law on the reckoned
 //! angle, which stops the rotation measured last:
 //!
 //! ```text
@@ -21,15 +22,13 @@
 //! Errors of the trim make the true attitude diverge from the reckoned one as t^2, so this works for fractions of a
 //! second, and for the two seconds of the descent that follows.
 
+use crate::motor::Response;
 use afbc_control::math::{max, min, settled};
 use afbc_types::{Inputs, Parameters, State};
 use nalgebra::{Vector2, Vector3};
 
 /// w: bandwidth of the hold \[rad/s\].
 pub const HOLD_RAD_S: f32 = 10.0;
-/// Lag of the reckoned rotors \[s\]: that of the paper's vehicle. Without it, laws whose inputs lead the rotors lose a
-/// vehicle whose states come every 10 ms.
-pub const LAG_S: f32 = 0.02;
 /// Time constant of the trim \[s\].
 pub const TRIM_S: f32 = 1.0;
 /// Largest difference between measured and reckoned rate that the trim uses per measurement, to ignore jumps \[rad/s\].
@@ -50,6 +49,8 @@ pub struct DeadReckoning {
     pub(crate) weight_n: f32,
     pub(crate) gravity_m_s2: f32,
     pub(crate) dt_s: f32,
+    /// Share of the way from U_a to U that the rotors go in a step.
+    pub(crate) rotor_share: f32,
 }
 
 /// Dead-reckoned attitude and trim.
@@ -84,7 +85,7 @@ impl Reckoning {
 
 impl DeadReckoning {
     /// Creates it for a nominal vehicle with valid parameters, stepped every `dt_s` seconds.
-    pub fn new(vehicle: &Parameters, dt_s: f32) -> Self {
+    pub fn new(vehicle: &Parameters, rotors: &Response, dt_s: f32) -> Self {
         DeadReckoning {
             authority: vehicle.effectiveness().xy(),
             inverse_authority: vehicle.inertia_kg_m2.xy() / vehicle.arm_m,
@@ -92,6 +93,7 @@ impl DeadReckoning {
             gravity_m_s2: vehicle.gravity_m_s2,
             weight_n: vehicle.weight_n(),
             dt_s,
+            rotor_share: rotors.share(dt_s),
         }
     }
 
@@ -107,7 +109,7 @@ impl DeadReckoning {
     pub fn advance(&self, reckoning: &mut Reckoning, applied: &Inputs) {
         let asked_n = Vector2::new(applied.roll_n, applied.pitch_n);
         let acting_n = reckoning.acting_n;
-        reckoning.acting_n = (acting_n + (asked_n - acting_n) * (self.dt_s / LAG_S)).map(settled);
+        reckoning.acting_n = (acting_n + (asked_n - acting_n) * self.rotor_share).map(settled);
         let excess = reckoning.acting_n - Vector2::new(reckoning.trim.roll_n, reckoning.trim.pitch_n);
         reckoning.rate_rad_s += self.authority.component_mul(&excess) * self.dt_s;
         reckoning.angle_rad += reckoning.rate_rad_s * self.dt_s;

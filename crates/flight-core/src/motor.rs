@@ -1,6 +1,6 @@
 //! Throttle curve: converts rotor speed to throttle.
 
-use afbc_control::math::{max, sqrt};
+use afbc_control::math::{max, min, sqrt};
 use afbc_types::{Declared, OutOfRange, RotorSpeeds, parameters};
 
 /// Smallest throttle that turns a motor; 1 to 47 are commands, 0 stops it.
@@ -31,6 +31,26 @@ parameters! {
         /// Smallest throttle of an armed motor, which keeps it turning.
         #[parameter(IDLE, "1", 0.0..=0.3)]
         pub idle: f32 = 0.05,
+    }
+}
+
+parameters! {
+    /// How rotors follow their commands: d omega/dt = (omega_commanded - omega)/tau. Flight without measurements
+    /// ([`crate::dead_reckoning`]) and on poses alone ([`crate::observer`]) predicts with it; laws have gains of their
+    /// own for it. Not in the paper.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+    pub struct Response {
+        /// tau: time constant of the rotors. The default is that of the paper's vehicle.
+        #[parameter(LAG, "s", 0.001..=1.0)]
+        pub time_constant_s: f32 = 0.02,
+    }
+}
+
+impl Response {
+    /// Returns the share of the way to their command that rotors go in a step of `dt_s`.
+    pub(crate) fn share(&self, dt_s: f32) -> f32 {
+        min(dt_s / self.time_constant_s, 1.0)
     }
 }
 

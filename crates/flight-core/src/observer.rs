@@ -21,7 +21,7 @@
 //! of it: filters of the second and third order with a fading memory, all poles of which are at beta, whatever T.
 //! A single outlier counts little, and a tracker whose frame has jumped is followed.
 
-use crate::dead_reckoning::{DeadReckoning, LAG_S, Reckoning};
+use crate::dead_reckoning::{DeadReckoning, Reckoning};
 use afbc_control::math::{abs_max, max, min, settled, sqrt};
 use afbc_types::{Inputs, Pose, Stamped, State};
 use nalgebra::{Quaternion, Vector3};
@@ -114,11 +114,11 @@ impl PoseObserver {
     /// Predicts over one step with the inputs asked of the rotors. `reckoning` is that of the last step, which has
     /// [measured](DeadReckoning::measure) this observer's state.
     pub fn advance(&mut self, dead_reckoning: &DeadReckoning, reckoning: &Reckoning, applied: &Inputs) {
-        let dt_s = dead_reckoning.dt_s;
+        let DeadReckoning { dt_s, rotor_share, .. } = *dead_reckoning;
         let (least, most) = (TRIM_SHARE.0 * dead_reckoning.weight_n, TRIM_SHARE.1 * dead_reckoning.weight_n);
         let trim_n = min(max(reckoning.trim.thrust_n, least), most);
-        self.thrust_n = settled(self.thrust_n + (applied.thrust_n - self.thrust_n) * (dt_s / LAG_S));
-        self.yaw_n = settled(self.yaw_n + (applied.yaw_n - self.yaw_n) * (dt_s / LAG_S));
+        self.thrust_n = settled(self.thrust_n + (applied.thrust_n - self.thrust_n) * rotor_share);
+        self.yaw_n = settled(self.yaw_n + (applied.yaw_n - self.yaw_n) * rotor_share);
 
         let mut ahead = *reckoning;
         dead_reckoning.advance(&mut ahead, applied);

@@ -5,6 +5,7 @@ use crate::descent::{Descent, Drift};
 use crate::frozen_tracker::FrozenTrackerCheck;
 use crate::inbox::Inbox;
 use crate::landing::LandDetector;
+use crate::motor::Response;
 use crate::observer::{HOLD_US, PoseObserver};
 use crate::rate;
 use crate::reasons::Reasons;
@@ -186,11 +187,21 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         let weight_n = parameters.weight_n();
         controller.mixer().check_hover(weight_n)?;
         Ok(FlightCore {
-            dead_reckoning: DeadReckoning::new(&parameters, controller.dt_s()),
+            dead_reckoning: DeadReckoning::new(&parameters, &Response::DEFAULT, controller.dt_s()),
             controller,
             limits,
             weight_n,
         })
+    }
+
+    /// The same vehicle with rotors that respond like this.
+    ///
+    /// # Errors
+    /// The time constant, if it is out of range.
+    pub fn with_rotors(mut self, rotors: &Response) -> Result<Self, OutOfRange> {
+        rotors.validate()?;
+        self.dead_reckoning.rotor_share = rotors.share(self.controller.dt_s());
+        Ok(self)
     }
 
     /// Runs one tick, to be called every millisecond. `now_us` is the time since power-up, which never goes back.
@@ -202,9 +213,9 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         let dt_s = self.controller.dt_s();
         // Takes the newest inputs.
         memory.rate.tick(now_us);
-        let told = memory.take_state(inbox, now_us);
-        let observing = memory.observe(&self.dead_reckoning, inbox, now_us, told);
-        let measured = told || observing;
+        let is_new = memory.take_state(inbox, now_us);
+        let observing = memory.observe(&self.dead_reckoning, inbox, now_us, is_new);
+        let measured = is_new || observing;
         let state_age_us = memory.state.map_or(u32::MAX, |state| state.age_us(now_us));
         let fresh =
             memory.state.filter(|_| state_age_us <= COAST_US).map(|state| extrapolated(&state.value, state_age_us));
@@ -377,22 +388,22 @@ impl<M> FlightCoreMemory<M> {
         self.mode.armed() && self.flight.as_ref().is_some_and(|flight| flight.observer.is_some())
     }
 
-    /// Stores the state that is observed from poses which no estimator has taken; `told` if there is another. True if
-    /// there is one.
+    /// Stores the state that is observed from poses which no estimator has taken, unless the inbox had a newer one
+    /// (`is_new`). True if there is one.
     #[inline]
-    fn observe(&mut self, dead_reckoning: &DeadReckoning, inbox: &Inbox, now_us: u64, told: bool) -> bool {
+    fn observe(&mut self, dead_reckoning: &DeadReckoning, inbox: &Inbox, now_us: u64, is_new: bool) -> bool {
         // As long as an estimator works, it takes all poses.
-        (inbox.pose().is_some() || self.is_observing()) && self.observe_pose(dead_reckoning, inbox, now_us, told)
+        (inbox.pose().is_some() || self.is_observing()) && self.observe_pose(dead_reckoning, inbox, now_us, is_new)
     }
 
     /// The same, if there is a pose or an observer.
     #[cold]
     #[inline(never)]
-    fn observe_pose(&mut self, dead_reckoning: &DeadReckoning, inbox: &Inbox, now_us: u64, told: bool) -> bool {
+    fn observe_pose(&mut self, dead_reckoning: &DeadReckoning, inbox: &Inbox, now_us: u64, is_new: bool) -> bool {
         let armed = self.mode.armed();
         let (Some(flight), Some(held)) = (self.flight.as_mut().filter(|_| armed), self.state) else { return false };
         let age_us = held.age_us(now_us);
-        let is_linked = told || flight.observer.is_none() && !inbox.is_own() && age_us <= COAST_US;
+        let is_linked = is_new || flight.observer.is_none() && !inbox.is_own() && age_us <= COAST_US;
         if is_linked || flight.distrusts {
             flight.observer = None;
             return false;

@@ -5,6 +5,7 @@
 use afbc::monitor::Bounds;
 use afbc::{Guarded, Profile, guarded};
 use afbc_flight_core::dead_reckoning::{DeadReckoning, Reckoning};
+use afbc_flight_core::motor::Response;
 use afbc_flight_core::observer::{HOLD_US, LATE_US, PoseObserver};
 use afbc_flight_core::{
     ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TicketedRequest,
@@ -17,7 +18,7 @@ const WEIGHT_N: f32 = 0.486 * 9.81;
 const HOVER: Inputs = Inputs { thrust_n: WEIGHT_N, roll_n: 0.0, pitch_n: 0.0, yaw_n: 0.0 };
 
 fn dead_reckoning() -> DeadReckoning {
-    DeadReckoning::new(&Parameters::PAPER.to_f32(), 0.001)
+    DeadReckoning::new(&Parameters::PAPER.to_f32(), &Response::DEFAULT, 0.001)
 }
 
 /// Does as a control tick.

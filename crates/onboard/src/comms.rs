@@ -14,6 +14,7 @@ use crate::services::texts::{Words, reason, urgency};
 use crate::setup::Setup;
 use afbc::monitor::Norm;
 use afbc_control::Trip;
+use afbc_control::math::sqrt;
 use afbc_flight_core::rate;
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, Sighting};
@@ -326,7 +327,7 @@ impl Comms {
 
     fn health(&self) -> afbc_link::HealthArray {
         let status = &self.dispatcher.status;
-        let norm = |norm: &Norm| libm::sqrtf(norm.theta_squared);
+        let norm = |norm: &Norm| sqrt(norm.theta_squared);
         let Refused { overtaken, late, elsewhere } = *self.tracker.refused();
         let health = &status.health;
         afbc_link::HealthArray {

@@ -6,8 +6,8 @@ use afbc::{Profile, Settings};
 use afbc_control::drag::KnownDrag;
 use afbc_estimator::Settings as Estimation;
 use afbc_flight_core::ArmingLimits;
-use afbc_flight_core::motor::Curve;
-use afbc_types::{Airframe, Parameters, PerAxis};
+use afbc_flight_core::motor::{Curve, Response};
+use afbc_types::{Airframe, Mounting, Parameters, PerAxis};
 
 /// What the firmware is told of the vehicle that it flies; `vehicles/` has one for each.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +20,10 @@ pub struct Configuration<const N: usize = 4> {
     pub gains: PerAxis<Gains>,
     /// Throttle curve of the motors.
     pub curve: Curve,
+    /// How the rotors follow their commands.
+    pub response: Response,
+    /// Mounting of the inertial sensor.
+    pub imu: Mounting,
     /// Settings of the estimator.
     pub estimation: Estimation,
     /// Limits for arming.
@@ -38,6 +42,8 @@ impl Default for Configuration {
             settings: Profile::Flight.settings().with_drag(KnownDrag::PAPER),
             gains: Profile::Flight.gains(),
             curve: Curve::DEFAULT,
+            response: Response::DEFAULT,
+            imu: Mounting::PLAIN,
             estimation: Estimation::DEFAULT,
             arming: ArmingLimits::DEFAULT,
             guidance: afbc_guidance::Settings::DEFAULT,

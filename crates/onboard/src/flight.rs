@@ -8,7 +8,7 @@ use crate::readings::Readings;
 use crate::sensor_timeouts::SensorTimeouts;
 use afbc::monitor::{Bounds, Norm};
 use afbc::{Guarded, guarded};
-use afbc_estimator::{Estimator, OutputFilter};
+use afbc_estimator::{Estimator, ImuCalibration, OutputFilter};
 use afbc_flight_core::{EndReason, FlightCore, FlightCoreMemory, Mode, Motor, Reasons, RequestAnswer, TickHealth};
 use afbc_types::{Axis, Declared, OutOfRange, ROTORS_MAX, RotorSpeeds, State};
 use core::array;
@@ -35,6 +35,7 @@ pub struct Prepared<const N: usize = 4> {
     vehicle: FlightCore<Guarded<N>, N>,
     estimator: Estimator,
     output_filter: OutputFilter,
+    calibration: ImuCalibration,
     motor: Motor,
     guide: Guide,
 }
@@ -46,19 +47,21 @@ impl<const N: usize> Prepared<N> {
     /// The first parameter, setting or gain out of range, or the first that leaves the vehicle without a margin to
     /// hover.
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
-        let Configuration { airframe, settings, gains, curve, estimation, arming, guidance: _, link: _ } =
+        let Configuration { airframe, settings, gains, curve, response, imu, estimation, arming, guidance: _, link: _ } =
             configuration;
         // The controller checks what follows from these and assumes that each is in its range.
         let parameters = &airframe.parameters;
         parameters.validate()?;
         settings.validate()?;
         gains.validate()?;
+        imu.validate()?;
         let bounds = Bounds::new(gains, parameters, settings);
         let controller = Guarded::new(*airframe, *settings, *gains, bounds)?;
         Ok(Prepared {
-            vehicle: FlightCore::new(*parameters, *arming, controller)?,
+            vehicle: FlightCore::new(*parameters, *arming, controller)?.with_rotors(response)?,
             estimator: Estimator::new(*estimation)?,
             output_filter: OutputFilter::of(parameters, N),
+            calibration: ImuCalibration::new(imu),
             motor: Motor::new(*curve)?,
             guide: Guide::new(configuration)?,
         })
@@ -126,11 +129,11 @@ impl<const N: usize> Flight<N> {
     /// # Errors
     /// Those of [`Prepared::new`].
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
-        let Prepared { vehicle, estimator, output_filter, motor, guide } = Prepared::new(configuration)?;
+        let Prepared { vehicle, estimator, output_filter, calibration, motor, guide } = Prepared::new(configuration)?;
         Ok(Flight {
             vehicle,
             memory: FlightCoreMemory::default(),
-            front_end: EstimatorFrontEnd::new(estimator, output_filter),
+            front_end: EstimatorFrontEnd::new(estimator, output_filter, calibration),
             motor,
             guide,
             timeouts: SensorTimeouts::default(),
@@ -146,9 +149,9 @@ impl<const N: usize> Flight<N> {
     pub fn adopt(&mut self, prepared: &Prepared<N>) -> bool {
         let disarmed = !self.memory.mode().armed();
         if disarmed {
-            let Prepared { vehicle, estimator, output_filter, motor, guide } = prepared;
+            let Prepared { vehicle, estimator, output_filter, calibration, motor, guide } = prepared;
             self.vehicle.clone_from(vehicle);
-            self.front_end.adopt(estimator, output_filter);
+            self.front_end.adopt(estimator, output_filter, calibration);
             self.motor = *motor;
             self.guide.adopt(guide);
         }
@@ -187,7 +190,7 @@ impl<const N: usize> Flight<N> {
             mode: outcome.mode,
             motors: outcome.motors,
             throttles: self.motor.throttles(outcome.mode.armed(), &outcome.motors),
-            estimate: observed.or(estimate),
+            estimate: observed.or(estimate.map(|estimate| estimate.state)),
             health: outcome.health,
             saturated_ticks: self.saturated_ticks,
             learnt: self.memory.control().map(|control| control.figures().latest()),

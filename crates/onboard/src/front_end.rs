@@ -1,8 +1,9 @@
-//! The vehicle's own estimate, and what of it the flight core is told.
+//! What stands around the filter, on board and in simulation: which readings it gets when, the inertial sensor's
+//! mounting, the ground, the local frame's origin, and what of the estimate reaches the flight core.
 
 use crate::readings::{Aged, Readings};
 use afbc_control::math::{max, min};
-use afbc_estimator::{Estimate, Estimator, Measurement, Memory, OutputFilter, Stamped};
+use afbc_estimator::{Estimate, Estimator, ImuCalibration, Measurement, Memory, OutputFilter, Stamped};
 use afbc_flight_core::{Inbox, Refusal};
 use afbc_types::{Pose, PoseSigmas, State};
 use nalgebra::Vector3;
@@ -26,12 +27,15 @@ pub struct EstimatorFrontEnd {
     estimator: Estimator,
     memory: Memory,
     output_filter: OutputFilter,
+    calibration: ImuCalibration,
     /// True if there has been a sample.
     senses: bool,
     /// True if the inertial sensor worked in the last tick.
     works: bool,
     /// The local frame's origin in the receiver's frame, from the first usable fix on \[m\].
     origin_m: Option<Vector3<f32>>,
+    /// True if the receiver's frame is the local one, whatever the fixes say.
+    origin_is_known: bool,
     /// Number of fixes that have told it, up to [`FIXES`].
     fixes: f32,
     /// Estimated position and velocity until then, zero as long as nobody has told a position \[m, m/s\].
@@ -41,36 +45,49 @@ pub struct EstimatorFrontEnd {
 }
 
 impl EstimatorFrontEnd {
-    /// Creates it with nothing read.
-    pub fn new(estimator: Estimator, output_filter: OutputFilter) -> Self {
+    /// Creates it with nothing read, for an inertial sensor that is mounted as `calibration` says.
+    pub fn new(estimator: Estimator, output_filter: OutputFilter, calibration: ImuCalibration) -> Self {
         EstimatorFrontEnd {
             estimator,
             memory: Memory::default(),
             output_filter,
+            calibration,
             senses: false,
             works: true,
             origin_m: None,
+            origin_is_known: false,
             fixes: 0.0,
             told: [Vector3::zeros(); 2],
             stands_m: None,
         }
     }
 
-    /// Tells whether the motors cannot carry the vehicle ([`Memory::set_on_ground`]).
+    /// The same in a world whose map is the local frame: fixes are taken as they are.
+    #[must_use]
+    pub fn with_known_origin(self) -> Self {
+        EstimatorFrontEnd { origin_is_known: true, ..self }
+    }
+
+    /// Returns what the filter knows, for whoever judges it.
+    pub fn memory(&self) -> &Memory {
+        &self.memory
+    }
+
+    /// Sets whether the motors cannot carry the vehicle ([`Memory::set_on_ground`]).
     pub fn set_on_ground(&mut self, on_ground: bool) {
         self.memory.set_on_ground(on_ground);
     }
 
     /// Goes on with another estimator.
-    pub(crate) fn adopt(&mut self, estimator: &Estimator, output_filter: &OutputFilter) {
-        (self.estimator, self.output_filter) = (*estimator, *output_filter);
+    pub(crate) fn adopt(&mut self, estimator: &Estimator, output_filter: &OutputFilter, calibration: &ImuCalibration) {
+        (self.estimator, self.output_filter, self.calibration) = (*estimator, *output_filter, *calibration);
     }
 
-    /// Takes the readings of a tick at `now_us`, tells `inbox` what the vehicle knows, and returns the estimated state;
+    /// Takes the readings of a tick at `now_us`, puts what the vehicle knows into `inbox`, and returns the estimate;
     /// none before the first sample.
     #[inline(always)]
-    pub fn tick(&mut self, now_us: u64, readings: &Readings, inbox: &mut Inbox) -> Option<State> {
-        let sample = readings.sample(now_us);
+    pub fn tick(&mut self, now_us: u64, readings: &Readings, inbox: &mut Inbox) -> Option<Estimate> {
+        let sample = readings.sample(now_us).map(|sample| self.calibration.apply(sample));
         self.senses |= sample.is_some();
         if !self.senses {
             return None;
@@ -95,13 +112,13 @@ impl EstimatorFrontEnd {
         }
         self.stands_m = estimate.at_rest.then_some(estimate.state.position_m);
         publish(&estimate, self.output_filter.step(&estimate), now_us, inbox);
-        Some(estimate.state)
+        Some(estimate)
     }
 
     /// Returns a measurement in the local frame; none for a fix before a usable one.
     #[inline(always)]
     fn localized(&mut self, aid: Aged<Measurement>) -> Option<Aged<Measurement>> {
-        if !matches!(aid.value, Measurement::Gnss { .. }) {
+        if self.origin_is_known || !matches!(aid.value, Measurement::Gnss { .. }) {
             return Some(aid);
         }
         self.located(aid)

@@ -25,7 +25,8 @@ impl<T> Aged<T> {
 /// Readings for one tick. The default is that of a vehicle without sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Readings {
-    /// Rates \[rad/s\] and specific force \[m/s2\] in the body frame, if there is a new sample.
+    /// Rates \[rad/s\] and specific force \[m/s2\] in the sensor's axes ([`Mounting`](afbc_types::Mounting)), if there
+    /// is a new sample.
     pub imu: Option<Aged<[Vector3<f32>; 2]>>,
     /// Measurements, in the order of their arrival, without gaps.
     pub aids: [Option<Aged<Measurement>>; AIDS_MAX],
@@ -72,7 +73,7 @@ impl Readings {
         }
     }
 
-    /// Returns the sample with its time, for a tick at `now_us`.
+    /// Returns the sample, in the sensor's axes, with its time, for a tick at `now_us`.
     pub(crate) fn sample(&self, now_us: u64) -> Option<ImuSample> {
         let Stamped { value: [rates_rad_s, specific_force_m_s2], at_us } = self.imu?.timed(now_us);
         Some(ImuSample { at_us, rates_rad_s, specific_force_m_s2 })

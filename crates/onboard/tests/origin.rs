@@ -1,7 +1,7 @@
 //! The local frame of a vehicle with a GNSS receiver.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use afbc_estimator::{Estimator, Measurement, OutputFilter, Settings};
+use afbc_estimator::{Estimator, ImuCalibration, Measurement, OutputFilter, Settings};
 use afbc_flight_core::{Inbox, Refusal, Stamped};
 use afbc_onboard::{Aged, EstimatorFrontEnd, Readings};
 use afbc_types::{Pose, PoseSigmas, State};
@@ -39,7 +39,7 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         let front_end = Estimator::new(Settings::DEFAULT)
-            .map(|estimator| EstimatorFrontEnd::new(estimator, OutputFilter::default()))
+            .map(|estimator| EstimatorFrontEnd::new(estimator, OutputFilter::default(), ImuCalibration::default()))
             .expect("valid");
         Bench { front_end, inbox: Inbox::default(), missing: None, ms: 0 }
     }
@@ -56,7 +56,7 @@ impl Bench {
         let mut inbox = self.inbox.take();
         let state = self.front_end.tick(self.ms * 1000, &Readings { imu, aids }, &mut inbox);
         self.missing = inbox.missing();
-        state.expect("it has a sample")
+        state.expect("it has a sample").state
     }
 
     /// Stands for `time_ms` at `place_m` in the receiver's frame, with ten noisy fixes per second.

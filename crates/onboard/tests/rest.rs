@@ -1,7 +1,7 @@
 //! A vehicle that stands outdoors stays where it is, whatever its receiver's error does.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
-use afbc_estimator::{Estimator, Measurement, OutputFilter, Settings};
+use afbc_estimator::{Estimator, ImuCalibration, Measurement, OutputFilter, Settings};
 use afbc_flight_core::Inbox;
 use afbc_onboard::{Aged, Configuration, ControlInputs, EstimatorFrontEnd, Flight, Readings};
 use afbc_types::State;
@@ -67,7 +67,8 @@ fn stands(
 }
 
 fn navigation() -> EstimatorFrontEnd {
-    EstimatorFrontEnd::new(Estimator::new(Settings::DEFAULT).expect("valid"), OutputFilter::default())
+    let estimator = Estimator::new(Settings::DEFAULT).expect("valid");
+    EstimatorFrontEnd::new(estimator, OutputFilter::default(), ImuCalibration::default())
 }
 
 proptest! {
@@ -82,7 +83,7 @@ proptest! {
         let (mut navigation, mut inbox) = (navigation(), Inbox::default());
         navigation.set_on_ground(true);
         let (away_m, speed_m_s) = stands(place_m, wander_m, |ms, readings| {
-            navigation.tick(ms * 1000, readings, &mut inbox.take())
+            navigation.tick(ms * 1000, readings, &mut inbox.take()).map(|estimate| estimate.state)
         });
         prop_assert!(away_m < 0.15 && speed_m_s < 0.1, "{away_m} m, {speed_m_s} m/s");
     }
@@ -117,7 +118,7 @@ fn a_hand_moves_it() {
         velocity += acceleration * 1e-3;
         moved += velocity * 1e-3;
         let readings = readings(ms, Vector3::zeros(), Vector3::new(2.0, -2.0, 3.0), [acceleration, velocity, moved]);
-        let state = navigation.tick(ms * 1000, &readings, &mut inbox.take()).expect("it has samples");
+        let state = navigation.tick(ms * 1000, &readings, &mut inbox.take()).expect("it has samples").state;
         if ms == 30_000 {
             before = state.position_m;
         }

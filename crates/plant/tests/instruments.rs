@@ -4,10 +4,10 @@
 mod common;
 
 use afbc_plant::instruments::{
-    Barometer, Failure, Gnss, Gyroscope, Imu, InstrumentFault, Magnetometer, Mounting, Preset, TrackerModel,
+    Barometer, Failure, Gnss, Gyroscope, Imu, InstrumentFault, Magnetometer, Preset, TrackerModel,
 };
 use afbc_plant::{Dropouts, InstrumentReadings, InstrumentSuite, Instruments, Truth};
-use afbc_types::Declared;
+use afbc_types::{Declared, Mounting};
 use common::{STEP_S, rest, run, run_with};
 use nalgebra::{Quaternion, Vector3};
 

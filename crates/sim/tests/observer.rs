@@ -5,6 +5,7 @@
 use afbc_control::Mixer;
 use afbc_flight_core::Stamped;
 use afbc_flight_core::dead_reckoning::DeadReckoning;
+use afbc_flight_core::motor::Response;
 use afbc_flight_core::observer::PoseObserver;
 use afbc_sim::scenario::parse;
 use afbc_types::{Inputs, Parameters, Pose, PoseSigmas, State};
@@ -29,16 +30,22 @@ fn noise(seed: &mut u64) -> Vector3<f32> {
     Vector3::from_fn(|_, _| (0..12).map(|_| uniform()).sum())
 }
 
-/// Flies for 10 s under a law of the test's own, which knows the truth.
+/// Flies for 10 s under a law of the test's own, which knows the truth, on rotors of 20 ms.
 fn flown(scenario: &str, position_sigma_m: f32, attitude_sigma_rad: f32) -> Errors {
+    on_rotors(0.02, &Response::DEFAULT, scenario, [position_sigma_m, attitude_sigma_rad])
+}
+
+/// The same on rotors with this lag, which respond as `known` as far as flight software knows.
+fn on_rotors(lag_s: f32, known: &Response, scenario: &str, sigmas: [f32; 2]) -> Errors {
+    let [position_sigma_m, attitude_sigma_rad] = sigmas;
     let text = format!(
-        "rotors = {{ time_constant_s = 0.02, delay_s = 0.001, force_max_n = 3.0 }}\n{scenario}\n\
+        "rotors = {{ time_constant_s = {lag_s}, delay_s = 0.001, force_max_n = 3.0 }}\n{scenario}\n\
          [trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 20]\n[initial]\nposition_m = [0, 0, 20]\n"
     );
     let mut plant = parse("observer", &text, "observer").unwrap().plant(1e-3).unwrap();
     let nominal = Parameters::PAPER.to_f32();
     let mixer = Mixer::<4>::new(nominal, 3.0).unwrap();
-    let blind = DeadReckoning::new(&nominal, 1e-3);
+    let blind = DeadReckoning::new(&nominal, known, 1e-3);
     let hover = Inputs { thrust_n: nominal.weight_n(), ..Inputs::default() };
     let start = State { position_m: Vector3::new(0.0, 0.0, 20.0), ..State::default() };
     let (mut reckoning, mut observer) = (blind.start(&start), PoseObserver::new(&start, &hover, 0));
@@ -113,5 +120,15 @@ fn velocity_and_rates_are_those_of_the_plant() {
     for errors in [perfect, noisy, windy, weak] {
         assert!(errors.position_m < 0.01 && errors.velocity_m_s < 0.15, "{errors:?}");
         assert!(errors.attitude_rad < 0.007 && errors.rates_rad_s < 0.15, "{errors:?}");
+    }
+}
+
+/// Rotors of the Crazyflie's lag and of the racer's, reckoned with as they are, and as if they were the paper's.
+#[test]
+fn rates_are_observed_better_with_the_vehicles_own_rotors() {
+    for (lag_s, gain) in [(0.072, 1.3), (0.033, 1.04)] {
+        let rates = |time_constant_s| on_rotors(lag_s, &Response { time_constant_s }, "", [0.0, 0.0]).rates_rad_s;
+        let (own, papers) = (rates(lag_s), rates(Response::DEFAULT.time_constant_s));
+        assert!(own * gain < papers, "{lag_s} s: {own} rad/s, and {papers} rad/s with the paper's");
     }
 }

@@ -1,5 +1,6 @@
 //! Vehicle files.
 
+use crate::data_sheet;
 use crate::parts::{self, DragConditions, FORCE_MAX};
 use crate::vehicle::{CASCADE, Vehicle};
 use afbc::adaptive::Gains;
@@ -7,11 +8,11 @@ use afbc::{Profile, Settings};
 use afbc_control::drag::KnownDrag;
 use afbc_estimator::Settings as Estimation;
 use afbc_flight_core::motor::Curve;
-use afbc_plant::instruments::Mounting;
-use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, Realism, Rotors};
+use afbc_plant::instruments::Imu;
+use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, InstrumentSuite, Realism, Rotors};
 use afbc_reader::words::out_of_range;
 use afbc_reader::{FileError, Table};
-use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, ROTOR_POSITION, ROTORS, Range, Rotor};
+use afbc_types::{Axis, Declared, Mounting, OutOfRange, Parameters, PerAxis, ROTOR_POSITION, ROTORS, Range, Rotor};
 use nalgebra::Vector3;
 use std::path::Path;
 
@@ -70,6 +71,8 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
     let mut flight_gains = Profile::Flight.gains_for(&parameters.to_f32(), lag_s);
     let mut flight_settings = Profile::Flight.settings_for(force_max_n as f32, lag_s);
     gains(&mut root, &mut flight_gains, &mut flight_settings)?;
+    let (imu, part) = imu(&mut root)?;
+    let estimation = estimation(&mut root, &parameters, rotors.len(), part.as_ref())?;
     let mut vehicle = Vehicle {
         name,
         description,
@@ -78,8 +81,8 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
         force_max_n,
         realism: Realism { rotors: actuators, ..Realism::default() },
         curve,
-        imu: Mounting::DEFAULT,
-        estimation: estimation(&mut root, &parameters)?,
+        imu,
+        estimation,
         flight_gains,
         flight_settings,
         text: text.into(),
@@ -94,10 +97,6 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
         *known = known_drag(&drag, &vehicle.parameters, vehicle.rotors.len());
         let beyond = |error: OutOfRange| root.fault("drag", format!("per mass, {}; {CHECK}", out_of_range(&error)));
         known.validate().map_err(beyond)?;
-    }
-    if let Some(mut table) = root.table("imu")? {
-        table.declared(&mut vehicle.imu)?;
-        table.finish()?;
     }
     root.finish()?;
     Ok(vehicle)
@@ -198,11 +197,35 @@ fn motor(mut table: Table<'_>) -> Result<Curve, FileError> {
     Ok(curve)
 }
 
-/// Reads `[estimator]`. Gravity is that of the vehicle, or the nearest at which the estimator starts.
-fn estimation(root: &mut Table<'_>, parameters: &Parameters<f64>) -> Result<Estimation, FileError> {
+/// Reads `[imu]`: its mounting, and the part, if the table names one or its figures.
+fn imu(root: &mut Table<'_>) -> Result<(Mounting<f64>, Option<Imu>), FileError> {
+    let mut mounting = Mounting::DEFAULT;
+    let Some(mut table) = root.table("imu")? else { return Ok((mounting, None)) };
+    table.declared(&mut mounting)?;
+    let named = parts::preset(&mut table, &Imu::PRESETS)?;
+    let is_known = named.is_some() || parts::TRIADS.iter().any(|triad| table.holds_table(triad));
+    let mut part = named.unwrap_or_default();
+    if is_known {
+        table.declared(&mut part)?;
+        parts::groups(&mut table, &mut part, &parts::TRIADS)?;
+    }
+    table.finish()?;
+    Ok((mounting, is_known.then_some(part)))
+}
+
+/// Reads `[estimator]`: what it leaves out is as the data sheet of the inertial sensor asks for, if the vehicle's file
+/// has one, or else at its default. Gravity is that of the vehicle, or the nearest at which the estimator starts.
+fn estimation(
+    root: &mut Table<'_>,
+    parameters: &Parameters<f64>,
+    rotors: usize,
+    imu: Option<&Imu>,
+) -> Result<Estimation, FileError> {
     let gravity = Estimation::GRAVITY.range;
-    let gravity_m_s2 = parameters.gravity_m_s2.clamp(gravity.min, gravity.max) as f32;
-    let mut estimation = Estimation { gravity_m_s2, ..Estimation::DEFAULT };
+    let gravity_m_s2 = parameters.gravity_m_s2.clamp(gravity.min, gravity.max);
+    let default = Estimation { gravity_m_s2: gravity_m_s2 as f32, ..Estimation::DEFAULT };
+    let for_part = |imu| data_sheet::settings(&InstrumentSuite::default(), imu, rotors, gravity_m_s2, STEP_S);
+    let mut estimation = imu.map_or(default, for_part);
     if let Some(mut table) = root.table("estimator")? {
         table.forbid(gravity.name, "gravity is that of [vehicle]; take it out")?;
         table.declared(&mut estimation)?;

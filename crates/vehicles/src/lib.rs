@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 mod built_in;
+pub mod data_sheet;
 mod file;
 pub mod parts;
 mod vehicle;

@@ -1,6 +1,8 @@
-//! The tables that vehicle files and scenario files share: `[vehicle]`, `[rotors]`, `[battery]`, `[drag]`, `[ground]`.
+//! The tables that vehicle files and scenario files share: `[vehicle]`, `[rotors]`, `[battery]`, `[drag]`, `[ground]`,
+//! instruments.
 //! Each function takes what a table leaves out from a default.
 
+use afbc_plant::instruments::Preset;
 use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, Rotors, Sag, Start};
 use afbc_reader::words::out_of_range;
 use afbc_reader::{FileError, Table};
@@ -126,4 +128,48 @@ pub fn ground(
     let with_effect = table.boolean("ground_effect")?.unwrap_or(true);
     table.finish()?;
     Ok((contact, with_effect.then_some(effect)))
+}
+
+/// Groups of an inertial sensor.
+pub const TRIADS: [&str; 2] = ["gyro", "accel"];
+
+/// Reads an instrument by the name of a part, or as a table, with a table for each of its groups, that may name one.
+///
+/// # Errors
+/// As [`parameters`].
+pub fn instrument<T: Declared + Default + Copy>(
+    table: &mut Table<'_>,
+    key: &'static str,
+    presets: &[Preset<T>],
+    groups: &[&'static str],
+) -> Result<Option<T>, FileError> {
+    if !table.holds_table(key) {
+        return Ok(table.choice(key, presets, |preset| preset.name)?.map(|preset| preset.settings));
+    }
+    let Some(mut table) = table.table(key)? else { return Ok(None) };
+    let mut settings = preset(&mut table, presets)?.unwrap_or_default();
+    table.declared(&mut settings)?;
+    self::groups(&mut table, &mut settings, groups)?;
+    table.finish()?;
+    Ok(Some(settings))
+}
+
+/// The part that a table names, if it does.
+///
+/// # Errors
+/// As [`parameters`].
+pub fn preset<T: Copy>(table: &mut Table<'_>, presets: &[Preset<T>]) -> Result<Option<T>, FileError> {
+    Ok(table.choice("part", presets, |preset| preset.name)?.map(|preset| preset.settings))
+}
+
+/// The groups of a part, each a table.
+///
+/// # Errors
+/// As [`parameters`].
+pub fn groups<T: Declared>(table: &mut Table<'_>, part: &mut T, groups: &[&'static str]) -> Result<(), FileError> {
+    groups.iter().try_for_each(|group| {
+        let Some(mut table) = table.table(group)? else { return Ok(()) };
+        table.declared_in(group, part)?;
+        table.finish()
+    })
 }

@@ -5,11 +5,10 @@ use afbc::guarded::Guarded;
 use afbc::monitor::Bounds;
 use afbc::{Profile, Settings};
 use afbc_estimator::Settings as Estimation;
-use afbc_flight_core::motor::Curve;
+use afbc_flight_core::motor::{Curve, Response};
 use afbc_plant::Realism;
-use afbc_plant::instruments::Mounting;
 use afbc_reader::{FileError, Table};
-use afbc_types::{Airframe, OutOfRange, Parameters, PerAxis, Rotor, with_rotors};
+use afbc_types::{Airframe, Mounting, OutOfRange, Parameters, PerAxis, Rotor, with_rotors};
 
 /// Table of the settings of AFBC's cascade, beside those of the laws' gains.
 pub const CASCADE: &str = "cascade";
@@ -35,7 +34,7 @@ pub struct Vehicle {
     /// Throttle curve of the motors.
     pub curve: Curve,
     /// Mounting of the inertial sensor.
-    pub imu: Mounting,
+    pub imu: Mounting<f64>,
     /// Settings of the firmware's estimator.
     pub estimation: Estimation,
     /// Gains of AFBC in the profile `flight`: by rule ([`Profile::gains_for`]), or as the file says.
@@ -54,6 +53,12 @@ impl Vehicle {
     /// Lag of the rotors \[s\].
     pub fn lag_s(&self) -> f32 {
         self.realism.rotors.time_constant_s as f32
+    }
+
+    /// How the rotors respond, as flight software knows it: their [lag](Self::lag_s), or the nearest that is accepted.
+    pub fn response(&self) -> Response {
+        let range = Response::LAG.range;
+        Response { time_constant_s: self.realism.rotors.time_constant_s.clamp(range.min, range.max) as f32 }
     }
 
     /// Gains of AFBC in `profile`.

@@ -212,3 +212,46 @@ fn the_estimators_settings_are_the_files() {
     let differing = settings(&read).into_iter().zip(settings(&without)).filter(|(read, usual)| read != usual);
     assert_eq!(differing.count(), example.lines().count() - 1);
 }
+
+/// A part in `[imu]` tells the estimator its data sheet, and vibration as the file states it; `[estimator]` goes before.
+#[test]
+fn the_inertial_sensors_data_sheet_reaches_the_estimator() {
+    let iris = |imu: &str| changed("iris", "[imu]", &format!("[imu]\n{imu}"));
+    let read = |imu: &str| parse("my.toml", &iris(imu), "my").unwrap().estimation;
+    let usual = read("");
+    assert_eq!(usual, Estimation::DEFAULT);
+    let parts = ["icm-42688-p", "bmi270", "mpu-6000"].map(|part| read(&format!("part = \"{part}\"")));
+    let [fine, middling, poor] = parts.map(|it| it.gyro_noise_rad_s_rthz);
+    assert!(fine < poor && middling < poor && poor != usual.gyro_noise_rad_s_rthz, "{fine} {middling} {poor}");
+    assert_eq!(parts.map(|it| it.gyro_range_rad_s), [2000.0_f64.to_radians() as f32; 3]);
+    // What the part does not say stays.
+    assert_eq!(
+        parts.map(|it| (it.gnss_noise_m, it.mag_slow_rad, it.baro_walk_m_rts)),
+        [(usual.gnss_noise_m, usual.mag_slow_rad, usual.baro_walk_m_rts,); 3]
+    );
+    let shaken = read("part = \"icm-42688-p\"\ngyro = { vibration_rad_s = 0.5 }");
+    assert!(shaken.gyro_noise_rad_s_rthz > 2.0 * fine, "{shaken:?}");
+    let own = format!("{}\n[estimator]\ngyro_noise_rad_s_rthz = 0.03\n", iris("part = \"bmi270\""));
+    let own = parse("my.toml", &own, "my").unwrap().estimation;
+    assert_eq!(own, Estimation { gyro_noise_rad_s_rthz: 0.03, ..parts[1] });
+    for (line, named) in [
+        ("part = \"bmi720\"", "bmi270"),
+        ("gyro = { vibration = 1.0 }", "vibration_rad_s"),
+        ("harmonics = [1.0, 0.5, 0.25]", "harmonics"),
+    ] {
+        let error = refused(&iris(line));
+        assert!(error.contains(named), "{error}");
+    }
+}
+
+/// Where the inertial sensor is and how the rotors respond reach flight software as the file says.
+#[test]
+fn mounting_and_lag_are_the_files() {
+    for known in &BUILT_IN {
+        let vehicle = known.read().unwrap();
+        assert_eq!(vehicle.response().time_constant_s, vehicle.realism.rotors.time_constant_s as f32, "{}", known.name);
+    }
+    let turned = changed("iris", "attitude_rad = [0.0, 0.0, 0.0]", "attitude_rad = [0.0, 3.0, 1.5]");
+    let mounting = parse("my.toml", &turned, "my").unwrap().imu.to_f32();
+    assert_eq!(mounting.attitude_rad.as_slice(), [0.0, 3.0, 1.5]);
+}

@@ -4,10 +4,9 @@
 
 use super::std::vec;
 use crate::Stamped;
-use crate::dead_reckoning::{
-    DESCENT_THRUST, DeadReckoning, HOLD_RAD_S, INNOVATION_MAX_RAD_S, LAG_S, Reckoning, TRIM_S,
-};
+use crate::dead_reckoning::{DESCENT_THRUST, DeadReckoning, HOLD_RAD_S, INNOVATION_MAX_RAD_S, Reckoning, TRIM_S};
 use crate::descent::{Descent, Drift, SINK_M_S};
+use crate::motor::Response;
 use crate::observer::{
     ATTITUDE_RAD_S, LATE_US, OUTLIER, OUTLIERS_MAX, POSITION_RAD_S, PUSH_MAX_M_S2, PoseObserver, SIGMAS_MAX, TRIM_SHARE,
 };
@@ -23,7 +22,7 @@ fn parameters() -> Parameters<f32> {
 }
 
 fn dead_reckoning() -> DeadReckoning {
-    DeadReckoning::new(&parameters(), DT_S)
+    DeadReckoning::new(&parameters(), &Response::DEFAULT, DT_S)
 }
 
 fn weight_n() -> f32 {
@@ -77,15 +76,16 @@ proptest! {
     #[test]
     fn dead_reckoning_solves_its_equation(
         start in any_state(), asked_n in pair(0.5), trim_n in pair(0.3), ticks in 1..300u32,
+        lag in 0.005..0.2_f32,
     ) {
-        let dead_reckoning = dead_reckoning();
+        let dead_reckoning = DeadReckoning::new(&parameters(), &Response { time_constant_s: lag }, DT_S);
         let mut reckoning = dead_reckoning.start(&start);
         (reckoning.trim.roll_n, reckoning.trim.pitch_n) = (trim_n.x, trim_n.y);
         let applied = Inputs { roll_n: asked_n.x, pitch_n: asked_n.y, yaw_n: 9.0, thrust_n: 7.0 };
         for _ in 0..ticks {
             dead_reckoning.advance(&mut reckoning, &applied);
         }
-        let (t, lag) = (ticks as f32 * DT_S, LAG_S);
+        let t = ticks as f32 * DT_S;
         let lost = 1.0 - (-t / lag).exp();
         let a = authority().xy();
         let rate = (asked_n - trim_n) * t - asked_n * (lag * lost);

@@ -6,6 +6,7 @@ use super::std::vec::Vec;
 use crate::dead_reckoning::{DESCENT_THRUST, DeadReckoning};
 use crate::descent::SINK_M_S;
 use crate::landing::{STILL_US, USUAL_S};
+use crate::motor::Response;
 use crate::supervisor::{COAST_US, DESCEND_US, GIVE_UP_US};
 use crate::{
     ArmingLimits, EndReason, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TickOutcome,
@@ -203,7 +204,8 @@ fn late_states_are_carried_on_to_the_present() {
 fn between_states_roll_and_pitch_are_reckoned() {
     for own in [false, true] {
         let mut bench = Bench::flying(asks(1.0), own);
-        let (dead_reckoning, given) = (DeadReckoning::new(&Parameters::PAPER.to_f32(), 1e-3), asks(1.0));
+        let dead_reckoning = DeadReckoning::new(&Parameters::PAPER.to_f32(), &Response::DEFAULT, 1e-3);
+        let given = asks(1.0);
         let last = at(bench.now_us);
         // Inputs constant for long: the rotors give them, and the trim has learnt what the constant rates say.
         let mut reckoning = dead_reckoning.start(&last);

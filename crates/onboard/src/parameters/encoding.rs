@@ -2,11 +2,9 @@
 //!
 //! Numbers cross as REAL32, which has one encoding. Switches and whole numbers cross as INT32, of which there are two:
 //! *bytewise*, the integer's own four bytes, which this vehicle sends, and which PX4, QGroundControl and MAVSDK use;
-//! and
-//! the *C cast*, the number as a float, of ArduPilot. Both are understood: the float of a whole number other than zero
+//! and the *C cast*, the number as a float, of ArduPilot. Both are understood: the float of a whole number other than zero
 //! has bits that are, as an integer, beyond 1,065,000,000 either way, where no parameter is; and the bytes of an
-//! integer
-//! up to 8,388,607 either way are, as a float, no whole number but 0, which is the same in both.
+//! integer up to 8,388,607 either way are, as a float, no whole number but 0, which is the same in both.
 
 /// Type of a parameter on the link: MAV_PARAM_TYPE.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,8 +40,7 @@ impl Kind {
     }
 }
 
-/// Returns the value that `bytes` are, sent as the MAV_PARAM_TYPE `kind`; none for a type of more than four bytes, or
-/// an
+/// Returns the value that `bytes` are, sent as the MAV_PARAM_TYPE `kind`; none for a type of more than four bytes, or an
 /// integer beyond [`WHOLE_MAX`].
 pub(crate) fn decode(kind: u8, bytes: [u8; 4]) -> Option<f32> {
     let as_float = f32::from_le_bytes(bytes);
@@ -51,8 +48,8 @@ pub(crate) fn decode(kind: u8, bytes: [u8; 4]) -> Option<f32> {
         return Some(as_float);
     }
     let width = *WIDTHS.get(usize::from(kind).checked_sub(1)?)?;
-    let is_whole = |number: f32| number.is_normal() && libm::truncf(number) == number;
-    if is_whole(as_float) && libm::fabsf(as_float) <= WHOLE_MAX {
+    let is_whole = |number: f32| number.is_normal() && number as i32 as f32 == number;
+    if is_whole(as_float) && as_float.abs() <= WHOLE_MAX {
         return Some(as_float);
     }
     // The first bytes, whatever the others hold.
@@ -60,7 +57,7 @@ pub(crate) fn decode(kind: u8, bytes: [u8; 4]) -> Option<f32> {
     let shifted = u32::from_le_bytes(bytes) << unused;
     let is_signed = kind.is_multiple_of(2);
     let value = if is_signed { f64::from((shifted as i32) >> unused) } else { f64::from(shifted >> unused) };
-    (libm::fabs(value) <= f64::from(WHOLE_MAX)).then_some(value as f32)
+    (value.abs() <= f64::from(WHOLE_MAX)).then_some(value as f32)
 }
 
 #[cfg(test)]

@@ -48,9 +48,12 @@ impl<const N: usize> Configuration<N> {
     /// Places may change with the image, names do not.
     #[inline(never)]
     fn walk(&mut self, walk: &mut Walk) -> Result<(), Found> {
-        let Configuration { airframe, settings, gains, curve, estimation, arming, guidance, link } = self;
+        let Configuration { airframe, settings, gains, curve, response, imu, estimation, arming, guidance, link } =
+            self;
         walk.group("V_", &mut airframe.parameters)?;
         walk.group("MOT_", curve)?;
+        walk.group("MOT_", response)?;
+        walk.group("IMU_", imu)?;
         walk.group("ARM_", arming)?;
         walk.group("EST_", estimation)?;
         walk.group("", guidance)?;
@@ -118,7 +121,7 @@ impl Parameter {
     fn read_or_set(mut self, at: &mut Value<'_>, index: usize, value: Option<f32>) -> Result<Self, Reason> {
         if let Some(value) = value {
             self.range.check(value).map_err(|error| Reason::range(self.name, &error))?;
-            if self.kind == Kind::Int32 && libm::truncf(value) != value {
+            if self.kind == Kind::Int32 && value as i32 as f32 != value {
                 return Err(Reason::on(self.name, "must be a whole number"));
             }
             match at {

@@ -5,8 +5,10 @@ use crate::services::modes;
 use crate::services::origin::{EarthOrigin, Global};
 use crate::services::status::VehicleStatus;
 use crate::services::streams::id;
+use afbc_control::math::sqrt;
 use afbc_link::telemetry::{self, ActuatorOutputs, AttitudeQuaternion, Fix, GlobalPosition, Home, Version, VfrHud};
 use afbc_link::{Clock, Downlink, Telemetry};
+use micromath::F32Ext;
 use nalgebra::Vector3;
 
 /// `MAV_PROTOCOL_CAPABILITY`: commands and items with integers, encoding of parameters by bytes, targets of attitude
@@ -86,7 +88,7 @@ fn quaternion(state: &afbc_types::State) -> [f32; 4] {
 /// Returns the compass heading of a yaw to the left \[deg\], 0 to 360.
 fn heading_deg(yaw_rad: f32) -> f32 {
     let turns = -yaw_rad / TAU;
-    let heading = 360.0 * (turns - libm::floorf(turns));
+    let heading = 360.0 * (turns - F32Ext::floor(turns));
     if heading < 360.0 { heading } else { 0.0 }
 }
 
@@ -120,8 +122,9 @@ fn fix(status: &VehicleStatus) -> Option<Fix> {
     let (place_e7, altitude_mm) = known.as_ref().map_or(([0; 2], 0), |(_, place, _)| (place.e7(), place.altitude_mm()));
     let (speed_cm_s, course_cdeg) = known.map_or((u16::MAX, u16::MAX), |(.., state)| {
         let v = state.velocity_m_s;
-        let course = heading_deg(libm::atan2f(v.y, v.x)) * 100.0;
-        ((libm::hypotf(v.x, v.y) * 100.0) as u16, (course as u16).min(35_999))
+        // To 0.16 degrees; a receiver's own course is good to some degrees.
+        let course = heading_deg(F32Ext::atan2(v.y, v.x)) * 100.0;
+        ((sqrt(v.xy().norm_squared()) * 100.0) as u16, (course as u16).min(35_999))
     });
     let crate::services::status::GnssReceiver { kind, satellites, sigma_mm } = receiver;
     Some(Fix { time_us: status.time_us, place_e7, altitude_mm, kind, satellites, sigma_mm, speed_cm_s, course_cdeg })
@@ -141,7 +144,7 @@ fn summary(status: &VehicleStatus) -> Option<VfrHud> {
     let rotors = usize::from(status.rotors).max(1);
     let throttles = status.throttles.iter().take(rotors).map(|it| throttle(*it)).sum::<f32>() / rotors as f32;
     Some(VfrHud {
-        speed_m_s: libm::hypotf(v.x, v.y),
+        speed_m_s: sqrt(v.xy().norm_squared()),
         altitude_m: above_m + state.position_m.z,
         climb_m_s: v.z,
         heading_deg: heading_deg(state.attitude_rad.z) as i16,

@@ -1,11 +1,11 @@
 //! Inertial measurement unit: gyroscope and accelerometer.
 
-use super::mounting::{Mounted, Mounting};
+use super::mounting::Mounted;
 use super::triad::{Quality, Triad};
 use super::vibration::Vibration;
 use crate::noise::{Noise, Stream};
 use crate::truth::Truth;
-use afbc_types::parameters;
+use afbc_types::{Mounting, parameters};
 use nalgebra::Vector3;
 
 parameters! {
@@ -109,7 +109,7 @@ parameters! {
         #[parameter(HARMONICS, "1", 0.0..=10.0)]
         pub harmonics: Vector3<f64> = Vector3::new(1.0, 0.5, 0.25),
         /// Place on the vehicle.
-        pub mounting: Mounting = Mounting::DEFAULT,
+        pub mounting: Mounting<f64> = Mounting::DEFAULT,
     }
     together(imu) {
         imu.mounting.validate()

@@ -45,7 +45,6 @@ pub use failure::{Failure, InstrumentFault, limits};
 pub use gnss::{Gnss, GnssFix};
 pub use imu::{Accelerometer, Gyroscope, Imu, ImuBias, ImuReading};
 pub use magnetometer::{FieldFix, Magnetometer};
-pub use mounting::Mounting;
 pub use presets::Preset;
 pub use tracker::{TrackerFix, TrackerModel};
 

@@ -40,7 +40,7 @@ impl<O: FnMut(&Sample)> Task for Fly<'_, O> {
             ControlFlow::Continue(())
         };
         let Ok(end) = if scenario.flight_core {
-            let mut aboard = InFlightCore::new(scenario.vehicle.to_f32(), controller)?;
+            let mut aboard = InFlightCore::new(scenario.vehicle.to_f32(), &scenario.response(), controller)?;
             lockstep(&mut world, &mut aboard, scenario.duration_s, observe)
         } else {
             lockstep(&mut world, &mut LawOnly::new(controller), scenario.duration_s, observe)

@@ -1,12 +1,11 @@
-//! The vehicle's own estimate: instruments, the conversion of what they read, and the estimator.
+//! The vehicle's own estimate, by the [front end](EstimatorFrontEnd) that flies on board, and how good it is.
 
 use super::sensing::{Sensing, still};
-use super::sensor_model;
 use crate::scenario::Scenario;
-use afbc_estimator::{Aid, Estimate, Estimator, Memory, OutputFilter};
-use afbc_onboard::{Aged, pose};
+use afbc_estimator::{Aid, Estimate, Estimator, ImuCalibration, OutputFilter};
+use afbc_flight_core::{Inbox, Refusal};
+use afbc_onboard::{Aged, EstimatorFrontEnd};
 use afbc_plant::Truth;
-use afbc_plant::instruments::Imu;
 use afbc_types::{OutOfRange, Pose, State};
 use nalgebra::{Quaternion, SMatrix, SVector, Vector3};
 
@@ -62,28 +61,26 @@ pub struct Innovation {
 /// Instruments and estimator of a vehicle.
 pub(super) struct SimulatedEstimator {
     sensing: Sensing,
-    estimator: Estimator,
-    memory: Memory,
-    output_filter: OutputFilter,
+    front_end: EstimatorFrontEnd,
+    /// What the front end has put into it in this step.
+    inbox: Inbox,
     step_s: f64,
     /// Steps since the beginning of settling, and how many of these there are before t = 0.
     steps: u64,
     settling: u64,
-    /// True if the inertial sensor worked in the last step.
-    works: bool,
-    /// Pose that the estimator has left to the flight core.
-    pose: Option<Aged<Pose>>,
     /// Time and result of the last look \[s\].
     last: Option<(f64, Look)>,
 }
 
-/// What the pilot is told.
+/// What reaches the pilot.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Look {
     /// The state, if it is valid.
     pub(super) state: Option<State>,
     /// The state of a vehicle that knows its attitude, but not all of the rest.
     pub(super) adrift: Option<State>,
+    /// What the estimate misses for a valid state.
+    pub(super) missing: Option<Refusal>,
     /// A tracker's pose, once the inertial sensor has failed.
     pub(super) pose: Option<Aged<Pose>>,
     pub(super) estimated: Estimated,
@@ -112,16 +109,17 @@ impl SimulatedEstimator {
         let (Some(imu), Some(sensing)) = (scenario.instruments.imu, Sensing::new(scenario, step_s)?) else {
             return Ok(None);
         };
+        let settings = scenario.estimation(&imu, step_s);
+        let filter = OutputFilter::of(&scenario.vehicle.to_f32(), scenario.rotors.len());
+        let calibration = ImuCalibration::new(&scenario.mounting().to_f32());
+        let front_end = EstimatorFrontEnd::new(Estimator::new(settings)?, filter, calibration);
         Ok(Some(Box::new(SimulatedEstimator {
             sensing,
-            estimator: estimator(scenario, &imu, step_s)?,
-            memory: Memory::default(),
-            output_filter: OutputFilter::of(&scenario.vehicle.to_f32(), scenario.rotors.len()),
+            front_end: front_end.with_known_origin(),
+            inbox: Inbox::EMPTY,
             step_s,
             steps: 0,
             settling: ((REST_S + waits_s + CARRIED_S) / step_s).round() as u64,
-            works: true,
-            pose: None,
             last: None,
         })))
     }
@@ -136,7 +134,7 @@ impl SimulatedEstimator {
             let rests = moving_s == 0.0;
             let acceleration = start.velocity_m_s * if rests { 0.0 } else { 1.0 / CARRIED_S };
             let still_m = start.position_m - start.velocity_m_s * (0.5 * CARRIED_S);
-            self.memory.set_on_ground(rests);
+            self.front_end.set_on_ground(rests);
             let estimate = self.step(&Truth {
                 position_m: still_m + acceleration * (0.5 * moving_s * moving_s),
                 velocity_m_s: acceleration * moving_s,
@@ -145,11 +143,11 @@ impl SimulatedEstimator {
             });
             is_ready = is_valid(&estimate);
         }
-        self.memory.set_on_ground(false);
+        self.front_end.set_on_ground(false);
         is_ready
     }
 
-    /// Returns what the pilot is told, and how good it is. The same again as long as the vehicle is held.
+    /// Returns what reaches the pilot, and how good it is. The same again as long as the vehicle is held.
     pub(super) fn look(&mut self, truth: &Truth) -> Look {
         if let Some((time_s, look)) = self.last
             && time_s == truth.time_s
@@ -176,56 +174,47 @@ impl SimulatedEstimator {
             valid,
             innovation: self.innovation(&judged),
         };
-        let state = Some(self.output_filter.step(&estimate));
-        let adrift = state.filter(|_| !valid && estimate.validity.attitude);
-        let look = Look { state: state.filter(|_| valid), adrift, pose: self.pose, estimated };
+        let now_us = clock_us(self.settling, self.step_s)(truth.time_s);
+        let inbox = &self.inbox;
+        let pose = inbox.pose().map(|pose| Aged { value: pose.value, age_us: pose.age_us(now_us) });
+        let state = inbox.state().map(|state| state.value);
+        let adrift = inbox.adrift().map(|state| state.value);
+        let look = Look { state, adrift, missing: inbox.missing(), pose, estimated };
         self.last = Some((truth.time_s, look));
         look
     }
 
     /// Returns the numbers of measurements fused and rejected, by aid.
     fn judged(&self) -> [(u32, u32); Aid::ALL.len()] {
-        Aid::ALL.map(|aid| self.memory.aids().of(aid)).map(|record| (record.accepted, record.rejected))
+        Aid::ALL.map(|aid| self.front_end.memory().aids().of(aid)).map(|record| (record.accepted, record.rejected))
     }
 
     /// Returns the measurement that was judged since these were `before`. The filter judges one in a step; if it ever
     /// were two, the first counts.
     fn innovation(&self, before: &[(u32, u32); Aid::ALL.len()]) -> Option<Innovation> {
         let (aid, (accepted, _)) = Aid::ALL.into_iter().zip(before).find(|(aid, (accepted, rejected))| {
-            let record = self.memory.aids().of(*aid);
+            let record = self.front_end.memory().aids().of(*aid);
             (record.accepted, record.rejected) != (*accepted, *rejected)
         })?;
-        let record = self.memory.aids().of(aid);
+        let record = self.front_end.memory().aids().of(aid);
         let fused = record.accepted != *accepted;
         Some(Innovation { aid, nis: record.nis, scalars: record.scalars, fused })
     }
 
     /// Reads the instruments and runs the estimator.
     fn step(&mut self, truth: &Truth) -> Estimate {
-        let (settling, step_s) = (self.settling as f64, self.step_s);
-        // The estimator's clock begins a step before settling: no time of it is zero.
-        let at_us = |time_s: f64| ((time_s + (settling + 1.0) * step_s) * 1e6).round().max(0.0) as u64;
+        let at_us = clock_us(self.settling, self.step_s);
         let now_us = at_us(truth.time_s);
-        let SimulatedEstimator { sensing, memory, works, pose: left, .. } = self;
-        *left = None;
-        let sample = sensing.read(truth, at_us, |measurement| {
-            if *works {
-                memory.offer(measurement);
-            } else if let Some(value) = pose(&measurement.value) {
-                let age_us = u32::try_from(now_us.saturating_sub(measurement.at_us)).unwrap_or(u32::MAX);
-                *left = Some(Aged { value, age_us });
-            }
-        });
+        let readings = self.sensing.read(truth, at_us);
         self.steps += 1;
-        let estimate = self.estimator.step(&mut self.memory, now_us, sample.as_ref());
-        self.works = estimate.imu.is_usable();
-        estimate
+        self.inbox = Inbox::EMPTY;
+        self.front_end.tick(now_us, readings, &mut self.inbox).unwrap_or_default()
     }
 
     /// Returns the normalised estimation error squared of rotation, velocity and position; not a number if the
     /// covariance is not positive.
     fn nees(&self, estimate: &Estimate, truth: &Truth) -> f64 {
-        let rows = self.memory.covariance_of_motion();
+        let rows = self.front_end.memory().covariance_of_motion();
         let at = |i: usize, j: usize| rows.get(i).and_then(|row| row.get(j)).map_or(f64::NAN, |&cell| f64::from(cell));
         // Scaled, so that units do not matter.
         let covariance = SMatrix::<f64, 9, 9>::from_fn(at);
@@ -236,19 +225,16 @@ impl SimulatedEstimator {
     }
 }
 
+/// The clock of a vehicle that settles for so many steps. It begins a step before: no time of it is zero.
+fn clock_us(settling: u64, step_s: f64) -> impl Fn(f64) -> u64 {
+    let begins_s = (settling as f64 + 1.0) * step_s;
+    move |time_s| ((time_s + begins_s) * 1e6).round().max(0.0) as u64
+}
+
 /// True if a pilot may fly on it.
 fn is_valid(estimate: &Estimate) -> bool {
     let validity = &estimate.validity;
     validity.attitude && validity.heading && validity.velocity && validity.position
-}
-
-/// Returns the estimator for the instruments of `scenario`.
-///
-/// # Errors
-/// The first setting out of range.
-pub(super) fn estimator(scenario: &Scenario, imu: &Imu, step_s: f64) -> Result<Estimator, OutOfRange> {
-    let gravity_m_s2 = scenario.vehicle.gravity_m_s2;
-    Estimator::new(sensor_model::settings(&scenario.instruments, imu, scenario.rotors.len(), gravity_m_s2, step_s))
 }
 
 /// Truth less estimate, in the order of the covariance: rotation about the axes of the earth frame \[rad\], velocity

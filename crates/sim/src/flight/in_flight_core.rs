@@ -2,14 +2,13 @@
 
 use super::pilot::Pilot;
 use super::sample::Sample;
-use super::world::World;
+use super::world::{View, World};
 use afbc_control::{Action, FlightController, Mixer};
+use afbc_flight_core::motor::Response;
 use afbc_flight_core::rate::{PERIOD_US, WINDOW_US};
-use afbc_flight_core::{
-    ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TicketedRequest,
-};
+use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, Stamped, TicketedRequest};
 use afbc_onboard::Aged;
-use afbc_types::{OutOfRange, Parameters, Pose, Setpoint, State};
+use afbc_types::{OutOfRange, Parameters, Setpoint, State};
 use core::convert::Infallible;
 
 /// Ticks before the first step: the flight core arms after it has measured its rate.
@@ -26,33 +25,28 @@ pub struct InFlightCore<C: FlightController<N>, const N: usize> {
 }
 
 impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
-    /// Puts `controller`, which must be built for this vehicle, into a flight core without arming limits.
+    /// Puts `controller`, which must be built for this vehicle, whose rotors respond like this, into a flight core
+    /// without arming limits.
     ///
     /// # Errors
     /// If the time step is not 1 ms, the flight core's.
-    pub fn new(vehicle: Parameters, controller: C) -> Result<Self, OutOfRange> {
+    pub fn new(vehicle: Parameters, rotors: &Response, controller: C) -> Result<Self, OutOfRange> {
         let mixer = *controller.mixer();
-        let vehicle = FlightCore::new(vehicle, ArmingLimits::NONE, controller)?;
+        let vehicle = FlightCore::new(vehicle, ArmingLimits::NONE, controller)?.with_rotors(rotors)?;
         Ok(InFlightCore { vehicle, mixer, memory: FlightCoreMemory::default(), inbox: Inbox::default(), now_us: 0 })
     }
 
-    /// Runs one tick with these inputs.
-    fn tick(
-        &mut self,
-        state: Option<State>,
-        adrift: Option<State>,
-        pose: Option<Aged<Pose>>,
-        setpoint: Setpoint,
-    ) -> Action<N> {
+    /// Runs one tick with what reaches it of `view`.
+    fn tick(&mut self, view: &View, setpoint: Setpoint) -> Action<N> {
         self.now_us += PERIOD_US;
         let at_us = self.now_us;
         let stamped = |value| Stamped { value, at_us };
-        if let Some(Aged { value, age_us }) = pose {
+        if let Some(Aged { value, age_us }) = view.pose {
             self.inbox.put_pose(Stamped { value, at_us: at_us.saturating_sub(age_us.into()) });
         }
-        match (state, adrift) {
+        match (view.state.filter(|state| view.new && state.is_plausible()), view.missing) {
             (Some(state), _) => self.inbox.locate(stamped(state)),
-            (None, Some(_)) => self.inbox.put_adrift(adrift.map(stamped), Refusal::PositionUnknown),
+            (None, Some(missing)) => self.inbox.put_adrift(view.adrift.map(stamped), missing),
             (None, None) => {}
         }
         self.inbox.put_setpoint(Stamped { value: setpoint, at_us });
@@ -64,13 +58,13 @@ impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
         action
     }
 
-    /// Powers up and arms a vehicle that is held in this `state`.
-    fn arm(&mut self, state: State, setpoint: Setpoint) {
+    /// Powers up and arms a vehicle that is held in this state.
+    fn arm(&mut self, view: &View, setpoint: Setpoint) {
         for _ in 0..TICKS_HELD {
-            let _ = self.tick(Some(state), None, None, setpoint);
+            let _ = self.tick(view, setpoint);
         }
         self.inbox.request(TicketedRequest { request: Request::Arm, ticket: 0 });
-        let _ = self.tick(Some(state), None, None, setpoint);
+        let _ = self.tick(view, setpoint);
     }
 }
 
@@ -80,15 +74,12 @@ impl<C: FlightController<N>, const N: usize> Pilot for InFlightCore<C, N> {
     /// Runs one tick. Before the first, once there is a state, the vehicle is held until it has armed.
     fn step(&mut self, world: &mut World) -> Result<Sample, Infallible> {
         let view = world.look();
-        let (state, setpoint) = (view.state.filter(State::is_plausible), view.reference.setpoint());
-        if let Some(state) = state.filter(|_| self.now_us == 0) {
-            self.arm(state, setpoint);
+        let (is_held, setpoint) = (self.now_us == 0, view.reference.setpoint());
+        let state = view.state.filter(State::is_plausible);
+        if is_held && state.is_some() {
+            self.arm(&View { new: true, pose: None, ..view }, setpoint);
         }
-        let mut action = if self.now_us > 0 {
-            self.tick(state.filter(|_| view.new), view.adrift, view.pose, setpoint)
-        } else {
-            Action::default()
-        };
+        let mut action = if self.now_us > 0 { self.tick(&view, setpoint) } else { Action::default() };
         action.health.state_rejected = state.is_none();
         action.health.setpoint_rejected = !setpoint.is_plausible();
         let estimates = self.memory.control().map(C::learnt).unwrap_or_default();

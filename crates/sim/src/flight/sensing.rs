@@ -1,10 +1,9 @@
-//! What a vehicle's own sensors say: the instruments' readings as an estimator is told them.
+//! What a vehicle's own sensors say: the instruments' readings, as they reach its software.
 
-use super::sensor_model::{self, Calibration};
+use super::sensor_model;
 use crate::scenario::{Outage, Scenario};
-use afbc_estimator::{ImuSample, Measurement, Stamped};
+use afbc_estimator::{Measurement, Stamped};
 use afbc_onboard::{AIDS_MAX, Aged, Readings};
-use afbc_plant::instruments::Mounting;
 use afbc_plant::{InstrumentSuite, Instruments, Truth};
 use afbc_types::OutOfRange;
 use nalgebra::Vector3;
@@ -13,12 +12,14 @@ use std::collections::VecDeque;
 /// Time for which a vehicle with an estimator of its own stands at its start before t = 0 \[s\].
 pub const STANDS_S: f64 = 4.0;
 
-/// Instruments of a vehicle, with what its software knows of them.
+/// Instruments of a vehicle, and what of their readings has not reached a tick yet.
 pub(super) struct Sensing {
     instruments: Instruments,
     suite: InstrumentSuite,
-    calibration: Calibration,
     outages: Vec<Outage>,
+    readings: Readings,
+    /// Measurements that wait for a tick that takes them.
+    waiting: VecDeque<Stamped<Measurement>>,
 }
 
 impl Sensing {
@@ -28,12 +29,12 @@ impl Sensing {
     /// The first setting out of range.
     pub(super) fn new(scenario: &Scenario, step_s: f64) -> Result<Option<Self>, OutOfRange> {
         let instruments = scenario.instruments(step_s)?.filter(|_| scenario.instruments.imu.is_some());
-        let mounting = scenario.vehicle_file.as_ref().map_or(Mounting::DEFAULT, |file| file.imu);
         Ok(instruments.map(|instruments| Sensing {
             instruments,
             suite: scenario.instruments,
-            calibration: Calibration::new(&mounting, step_s),
             outages: scenario.outages.clone(),
+            readings: Readings::NONE,
+            waiting: VecDeque::new(),
         }))
     }
 
@@ -41,28 +42,38 @@ impl Sensing {
         &mut self.instruments
     }
 
-    /// Reads the instruments, and passes what arrives from the aiding ones to `offer`. `at_us` is the vehicle's clock.
-    pub(super) fn read(
-        &mut self,
-        truth: &Truth,
-        at_us: impl Fn(f64) -> u64,
-        mut offer: impl FnMut(&Stamped<Measurement>),
-    ) -> Option<ImuSample> {
-        let readings = self.instruments.measure(truth);
-        let Sensing { suite, outages, .. } = self;
+    /// Returns what was read last.
+    pub(super) fn readings(&self) -> &Readings {
+        &self.readings
+    }
+
+    /// Reads the instruments in `truth`, for a tick of that time. `at_us` is the vehicle's clock.
+    pub(super) fn read(&mut self, truth: &Truth, at_us: impl Fn(f64) -> u64) -> &Readings {
+        let Sensing { instruments, suite, outages, readings, waiting } = self;
+        let read = instruments.measure(truth);
         // The tracker is on the ground: what it sends in an outage of the link is lost.
         let heard = !outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&truth.time_s));
         if let Some(tracker) = suite.tracker.filter(|_| heard) {
-            readings.tracker.iter().for_each(|fix| offer(&sensor_model::pose(fix, &tracker, &at_us)));
+            waiting.extend(read.tracker.iter().map(|fix| sensor_model::pose(fix, &tracker, &at_us)));
         }
-        readings.gnss.iter().for_each(|fix| offer(&sensor_model::gnss(fix, &at_us)));
+        waiting.extend(read.gnss.iter().map(|fix| sensor_model::gnss(fix, &at_us)));
         if let Some(barometer) = suite.barometer {
-            readings.barometer.iter().for_each(|fix| offer(&sensor_model::height(fix, &barometer, &at_us)));
+            waiting.extend(read.barometer.iter().map(|fix| sensor_model::height(fix, &barometer, &at_us)));
         }
         if let Some(magnetometer) = suite.magnetometer {
-            readings.magnetometer.iter().for_each(|fix| offer(&sensor_model::field(fix, &magnetometer, &at_us)));
+            waiting.extend(read.magnetometer.iter().map(|fix| sensor_model::field(fix, &magnetometer, &at_us)));
         }
-        readings.imu.map(|reading| self.calibration.sample(&reading, at_us(reading.at_s)))
+        let now_us = at_us(truth.time_s);
+        let age_us = |at_us: u64| u32::try_from(now_us.saturating_sub(at_us)).unwrap_or(u32::MAX);
+        readings.imu = read.imu.map(|sample| Aged {
+            value: [sample.rates_rad_s.cast(), sample.specific_force_m_s2.cast()],
+            age_us: age_us(at_us(sample.at_s)),
+        });
+        readings.aids = [None; AIDS_MAX];
+        for slot in &mut readings.aids {
+            *slot = waiting.pop_front().map(|Stamped { value, at_us }| Aged { value, age_us: age_us(at_us) });
+        }
+        readings
     }
 }
 
@@ -91,9 +102,6 @@ pub(super) struct Wired {
     step_s: f64,
     /// Looks so far.
     looks: u64,
-    readings: Readings,
-    /// Measurements that wait for a tick that takes them.
-    waiting: VecDeque<Stamped<Measurement>>,
 }
 
 impl Wired {
@@ -102,8 +110,7 @@ impl Wired {
     /// # Errors
     /// The first setting out of range.
     pub(super) fn new(scenario: &Scenario, step_s: f64) -> Result<Option<Box<Self>>, OutOfRange> {
-        let wired =
-            |sensing| Box::new(Wired { sensing, step_s, looks: 0, readings: Readings::NONE, waiting: VecDeque::new() });
+        let wired = |sensing| Box::new(Wired { sensing, step_s, looks: 0 });
         Ok(Sensing::new(scenario, step_s)?.map(wired))
     }
 
@@ -124,7 +131,7 @@ impl Wired {
 
     /// Returns what was read in the last look.
     pub(super) fn readings(&self) -> &Readings {
-        &self.readings
+        self.sensing.readings()
     }
 
     /// Reads all sensors; before t = 0 those of a vehicle at rest.
@@ -135,17 +142,6 @@ impl Wired {
         self.looks += 1;
         // The clock begins a step before the first look: no time of it is zero.
         let at_us = |time_s: f64| ((time_s + STANDS_S + step_s) * 1e6).round().max(0.0) as u64;
-        let now_us = at_us(seen.time_s);
-        let age_us = |at_us: u64| u32::try_from(now_us.saturating_sub(at_us)).unwrap_or(u32::MAX);
-        let Wired { sensing, waiting, readings, .. } = self;
-        let sample = sensing.read(&seen, at_us, |measurement| waiting.push_back(*measurement));
-        readings.imu = sample.map(|sample| Aged {
-            value: [sample.rates_rad_s, sample.specific_force_m_s2],
-            age_us: age_us(sample.at_us),
-        });
-        readings.aids = [None; AIDS_MAX];
-        for slot in &mut readings.aids {
-            *slot = waiting.pop_front().map(|Stamped { value, at_us }| Aged { value, age_us: age_us(at_us) });
-        }
+        let _ = self.sensing.read(&seen, at_us);
     }
 }

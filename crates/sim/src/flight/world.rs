@@ -6,6 +6,7 @@ use super::sensing::Wired;
 use crate::scenario::{Outage, Scenario};
 use crate::trajectory::{Reference, Trajectory};
 use afbc_control::{Action, AdaptiveEstimate, Trace};
+use afbc_flight_core::Refusal;
 use afbc_onboard::{Aged, Readings};
 use afbc_plant::{
     EffectsState, InstrumentSuite, Instruments, Motion, Plant, SensorFaults, StateMeasurement, StateSensor,
@@ -16,7 +17,7 @@ use afbc_types::{OutOfRange, PerAxis, Pose, ROTORS_MAX, RotorSpeeds, State};
 pub struct World {
     plant: Plant,
     /// What the vehicle flies on if it has an inertial sensor; the sensors otherwise.
-    navigator: Option<Box<SimulatedEstimator>>,
+    estimator: Option<Box<SimulatedEstimator>>,
     /// What a vehicle with its own estimator reads.
     wired: Option<Box<Wired>>,
     sensors: Option<StateSensor>,
@@ -46,6 +47,8 @@ pub struct View {
     pub state: Option<State>,
     /// Estimate of a vehicle that knows its attitude, but not where it is.
     pub adrift: Option<State>,
+    /// What the vehicle's own estimate misses for a state; none without instruments.
+    pub missing: Option<Refusal>,
     /// Pose of a tracker in front of a vehicle whose inertial sensor has failed.
     pub pose: Option<Aged<Pose>>,
     /// Whether it has just arrived.
@@ -60,7 +63,7 @@ impl World {
     pub fn new(scenario: &Scenario, dt_s: f64) -> Result<Self, OutOfRange> {
         let plant = scenario.plant(dt_s)?;
         Ok(World {
-            navigator: SimulatedEstimator::new(scenario, dt_s, &plant.truth())?,
+            estimator: SimulatedEstimator::new(scenario, dt_s, &plant.truth())?,
             wired: None,
             plant,
             sensors: scenario.sensors(dt_s)?,
@@ -139,8 +142,8 @@ impl World {
         if let Some(wired) = &mut self.wired {
             wired.look(&self.plant.truth());
         }
-        if let Some(navigator) = &mut self.navigator {
-            return navigated(navigator, &self.plant, motion, self.trajectory.at(time_s));
+        if let Some(estimator) = &mut self.estimator {
+            return estimated(estimator, &self.plant, motion, self.trajectory.at(time_s));
         }
         let (state, measurement) = match &mut self.sensors {
             None => (Some(motion.measure()), None),
@@ -161,6 +164,7 @@ impl World {
             reference,
             state,
             adrift: None,
+            missing: None,
             pose: None,
             new,
         }
@@ -191,9 +195,9 @@ impl View {
 /// Looks at the world with the vehicle's own instruments.
 // Not inlined, so that the step of an ideal flight stays short.
 #[inline(never)]
-fn navigated(navigator: &mut SimulatedEstimator, plant: &Plant, motion: Motion, reference: Reference) -> View {
+fn estimated(estimator: &mut SimulatedEstimator, plant: &Plant, motion: Motion, reference: Reference) -> View {
     let (time_s, telemetry) = (plant.time_s(), plant.telemetry());
-    let Look { state, adrift, pose, estimated } = navigator.look(&plant.truth());
+    let Look { state, adrift, missing, pose, estimated } = estimator.look(&plant.truth());
     View {
         time_s,
         motion,
@@ -203,6 +207,7 @@ fn navigated(navigator: &mut SimulatedEstimator, plant: &Plant, motion: Motion, 
         reference,
         state,
         adrift,
+        missing,
         pose,
         new: true,
     }

@@ -90,6 +90,8 @@ pub fn configuration<const N: usize>(vehicle: &Vehicle) -> Result<Configuration<
         settings: vehicle.settings(Profile::Flight),
         gains: vehicle.gains(Profile::Flight),
         curve: vehicle.curve,
+        response: vehicle.response(),
+        imu: vehicle.imu.to_f32(),
         estimation: vehicle.estimation,
         arming: ArmingLimits::DEFAULT,
         guidance: afbc_guidance::Settings::DEFAULT,

@@ -6,15 +6,16 @@ use crate::trajectory::Trajectory;
 use afbc::Profile;
 use afbc_estimator::Settings;
 use afbc_flight_core::ArmingLimits;
-use afbc_plant::instruments::{Imu, InstrumentFault, Mounting};
+use afbc_flight_core::motor::Response;
+use afbc_plant::instruments::{Imu, InstrumentFault};
 use afbc_plant::{
     Environment, Frame, InstrumentSuite, Instruments, Motion, Plant, PlantModel, Realism, Rotors, Sensing, SensorFault,
     StateSensor,
 };
 use afbc_reader::FileError;
 use afbc_reader::words::out_of_range;
-use afbc_types::{OutOfRange, Parameters, Range, Rotor};
-use afbc_vehicles::Vehicle;
+use afbc_types::{Mounting, OutOfRange, Parameters, Range, Rotor};
+use afbc_vehicles::{Vehicle, data_sheet};
 
 /// Accepted length of a flight \[s\].
 pub const DURATION: Range = Range::new("duration_s", 0.1, 36_000.0);
@@ -206,6 +207,24 @@ impl Scenario {
         StateSensor::new(&self.sensing, self.seed, step_s).map(Some)
     }
 
+    /// Returns the estimator's settings: those that the data sheets of the instruments ask for.
+    #[must_use]
+    pub fn estimation(&self, imu: &Imu, step_s: f64) -> Settings {
+        data_sheet::settings(&self.instruments, imu, self.rotors.len(), self.vehicle.gravity_m_s2, step_s)
+    }
+
+    /// Returns how the inertial sensor is mounted, as the vehicle's file says.
+    #[must_use]
+    pub fn mounting(&self) -> Mounting<f64> {
+        self.vehicle_file.as_ref().map_or(Mounting::DEFAULT, |file| file.imu)
+    }
+
+    /// Returns how the rotors respond, as flight software knows it: as the vehicle's file says.
+    #[must_use]
+    pub fn response(&self) -> Response {
+        self.vehicle_file.as_ref().map_or(Response::DEFAULT, |file| file.response())
+    }
+
     /// Returns the instruments, read every `step_s`; none if the vehicle has none.
     ///
     /// # Errors
@@ -214,7 +233,7 @@ impl Scenario {
         if self.instruments == InstrumentSuite::default() {
             return Ok(None);
         }
-        let mounting = self.vehicle_file.as_ref().map_or(Mounting::DEFAULT, |file| file.imu);
+        let mounting = self.mounting();
         let suite =
             InstrumentSuite { imu: self.instruments.imu.map(|imu| Imu { mounting, ..imu }), ..self.instruments };
         Instruments::new(&suite, &self.instrument_faults, self.seed, step_s).map(Some)

@@ -2,49 +2,23 @@
 
 use super::environment::interval;
 use afbc_plant::InstrumentSuite;
-use afbc_plant::instruments::{
-    Barometer, Failure, Gnss, Imu, InstrumentFault, Magnetometer, Preset, TrackerModel, limits,
-};
+use afbc_plant::instruments::{Barometer, Failure, Gnss, Imu, InstrumentFault, Magnetometer, TrackerModel, limits};
 use afbc_reader::{FileError, Table};
-use afbc_types::Declared;
+use afbc_vehicles::parts;
 
 /// Reads the instruments of `table`; none without it.
 pub(super) fn read(table: Option<Table<'_>>) -> Result<InstrumentSuite, FileError> {
     let Some(mut table) = table else { return Ok(InstrumentSuite::default()) };
     let suite = InstrumentSuite {
-        imu: part(&mut table, "imu", &Imu::PRESETS, &["gyro", "accel"])?,
-        tracker: part(&mut table, "tracker", &TrackerModel::PRESETS, &["loss", "freeze"])?,
-        gnss: part(&mut table, "gnss", &Gnss::PRESETS, &["loss"])?,
-        barometer: part(&mut table, "barometer", &Barometer::PRESETS, &[])?,
-        magnetometer: part(&mut table, "magnetometer", &Magnetometer::PRESETS, &[])?,
+        imu: parts::instrument(&mut table, "imu", &Imu::PRESETS, &parts::TRIADS)?,
+        tracker: parts::instrument(&mut table, "tracker", &TrackerModel::PRESETS, &["loss", "freeze"])?,
+        gnss: parts::instrument(&mut table, "gnss", &Gnss::PRESETS, &["loss"])?,
+        barometer: parts::instrument(&mut table, "barometer", &Barometer::PRESETS, &[])?,
+        magnetometer: parts::instrument(&mut table, "magnetometer", &Magnetometer::PRESETS, &[])?,
     };
     let blind = table.fault("imu", "missing; add it, since the other instruments have no effect without it");
     table.finish()?;
     if suite.imu.is_some() { Ok(suite) } else { Err(blind) }
-}
-
-/// Reads an instrument by the name of a part, or as a table, with a table for each of its groups, that may name one.
-fn part<T: Declared + Default + Copy>(
-    table: &mut Table<'_>,
-    key: &'static str,
-    presets: &[Preset<T>],
-    groups: &[&'static str],
-) -> Result<Option<T>, FileError> {
-    if !table.holds_table(key) {
-        return Ok(table.choice(key, presets, |preset| preset.name)?.map(|preset| preset.settings));
-    }
-    let Some(mut table) = table.table(key)? else { return Ok(None) };
-    let preset = table.choice("part", presets, |preset| preset.name)?;
-    let mut settings = preset.map_or(T::default(), |preset| preset.settings);
-    table.declared(&mut settings)?;
-    for group in groups {
-        if let Some(mut table) = table.table(group)? {
-            table.declared_in(group, &mut settings)?;
-            table.finish()?;
-        }
-    }
-    table.finish()?;
-    Ok(Some(settings))
 }
 
 /// Reads the failures of the instruments.

@@ -1,0 +1,129 @@
+//! From the inertial sensor's own samples to those of a sensor at the centre of mass, along the body's axes.
+
+use crate::measurement::ImuSample;
+use afbc_types::{Mounting, sin_cos};
+use nalgebra::{Matrix3, Vector3};
+
+/// Longest time between two samples whose rates tell the angular acceleration \[us\]. With a longer one the lever arm's
+/// part of it, r times that acceleration, is left out.
+const LEVER_GAP_US: u64 = 10_000;
+
+/// Corrects the samples of a mounted inertial sensor. With R from sensor to body axes and the sensor at r,
+///
+/// ```text
+/// omega = R omega_s,   f = R f_s - d omega/dt x r - omega x (omega x r)
+/// ```
+///
+/// where d omega/dt is the difference from the last sample. The default is at the centre of mass, along the body's axes,
+/// and changes no bit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImuCalibration {
+    mounted: Option<Mounted>,
+    /// The last sample, body frame.
+    last: Option<ImuSample>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Mounted {
+    /// R
+    to_body: Matrix3<f32>,
+    /// r \[m\]
+    position_m: Vector3<f32>,
+}
+
+impl ImuCalibration {
+    /// Creates it for a sensor that is mounted like this; its numbers must be [valid](afbc_types::Declared::validate).
+    #[must_use]
+    pub fn new(mounting: &Mounting) -> Self {
+        let mounted = (!mounting.is_plain())
+            .then(|| Mounted { to_body: to_body(&mounting.attitude_rad), position_m: mounting.position_m });
+        ImuCalibration { mounted, last: None }
+    }
+
+    /// Returns what a sensor at the centre of mass would have measured.
+    #[inline(always)]
+    pub fn apply(&mut self, sample: ImuSample) -> ImuSample {
+        if self.mounted.is_none() { sample } else { self.mounted(sample) }
+    }
+
+    #[inline(never)]
+    fn mounted(&mut self, sample: ImuSample) -> ImuSample {
+        let Some(Mounted { to_body, position_m: r }) = &self.mounted else { return sample };
+        let rates_rad_s = to_body * sample.rates_rad_s;
+        let since = self.last.map(|last| (sample.at_us.saturating_sub(last.at_us), rates_rad_s - last.rates_rad_s));
+        let acceleration_rad_s2 = match since {
+            Some((us @ 1..=LEVER_GAP_US, change_rad_s)) => change_rad_s * (1e6 / us as f32),
+            _ => Vector3::zeros(),
+        };
+        let lever_m_s2 = acceleration_rad_s2.cross(r) + rates_rad_s.cross(&rates_rad_s.cross(r));
+        let specific_force_m_s2 = to_body * sample.specific_force_m_s2 - lever_m_s2;
+        *self.last.insert(ImuSample { at_us: sample.at_us, rates_rad_s, specific_force_m_s2 })
+    }
+}
+
+/// Returns R = Rz(yaw) Ry(pitch) Rx(roll).
+fn to_body(attitude_rad: &Vector3<f32>) -> Matrix3<f32> {
+    let [(sr, cr), (sp, cp), (sy, cy)] = [attitude_rad.x, attitude_rad.y, attitude_rad.z].map(sin_cos);
+    let x = Vector3::new(cy * cp, sy * cp, -sp);
+    let y = Vector3::new(cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr);
+    let z = Vector3::new(cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr);
+    Matrix3::from_columns(&[x, y, z])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ImuCalibration;
+    use crate::measurement::ImuSample;
+    use afbc_types::Mounting;
+    use nalgebra::{Rotation3, Vector3};
+    use proptest::prelude::*;
+
+    fn vector(most: f32) -> impl Strategy<Value = Vector3<f32>> {
+        prop::array::uniform3(-most..most).prop_map(Vector3::from)
+    }
+
+    proptest! {
+        /// What a rigid body feels elsewhere, in other axes, is brought back, whatever the mounting and the motion.
+        #[test]
+        fn a_sensor_anywhere_is_as_one_at_the_centre(
+            position_m in vector(0.3), attitude_rad in vector(3.0), omega in vector(8.0), force in vector(20.0),
+            change in vector(50.0), at_us in 1_000_u64..1_000_000_000, step_us in 200_u64..9_000,
+        ) {
+            let mounting = Mounting { position_m, attitude_rad };
+            let to_body = Rotation3::from_euler_angles(attitude_rad.x, attitude_rad.y, attitude_rad.z);
+            let mut calibration = ImuCalibration::new(&mounting);
+            let before = omega - change * (step_us as f32 * 1e-6);
+            let felt = |omega: Vector3<f32>, at_us: u64| {
+                let lever = change.cross(&position_m) + omega.cross(&omega.cross(&position_m));
+                ImuSample { at_us, rates_rad_s: to_body.inverse() * omega,
+                    specific_force_m_s2: to_body.inverse() * (force + lever) }
+            };
+            let _ = calibration.apply(felt(before, at_us));
+            let sample = calibration.apply(felt(omega, at_us + step_us));
+            prop_assert!((sample.rates_rad_s - omega).norm() < 1e-4);
+            prop_assert!((sample.specific_force_m_s2 - force).norm() < 2e-2, "{}", sample.specific_force_m_s2 - force);
+            prop_assert_eq!(sample.at_us, at_us + step_us);
+        }
+    }
+
+    #[test]
+    fn a_plain_mounting_changes_no_bit_and_a_gap_tells_no_acceleration() {
+        let odd = ImuSample {
+            at_us: 7,
+            rates_rad_s: Vector3::new(f32::NAN, 1e-40, -0.0),
+            specific_force_m_s2: Vector3::new(1.0, f32::INFINITY, 9.81),
+        };
+        let plain = ImuCalibration::new(&Mounting::PLAIN).apply(odd);
+        assert_eq!(plain.rates_rad_s.map(f32::to_bits), odd.rates_rad_s.map(f32::to_bits));
+        assert_eq!(plain.specific_force_m_s2.map(f32::to_bits), odd.specific_force_m_s2.map(f32::to_bits));
+
+        let mounting = Mounting { position_m: Vector3::new(0.1, 0.0, 0.0), ..Mounting::PLAIN };
+        let mut calibration = ImuCalibration::new(&mounting);
+        let turning = |at_us, z| ImuSample { at_us, rates_rad_s: Vector3::new(0.0, 0.0, z), ..ImuSample::default() };
+        for at_us in [1_000, 11_001, 11_001, 5_000] {
+            let rate = at_us as f32 * 1e-4;
+            let force = calibration.apply(turning(at_us, rate)).specific_force_m_s2;
+            assert!((force - Vector3::new(0.1 * rate * rate, 0.0, 0.0)).norm() < 1e-6, "{at_us}: {force}");
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! Place of a sensor on the vehicle.
+
+use crate::{Number, parameters};
+use nalgebra::Vector3;
+
+parameters! {
+    /// Mounting of the inertial sensor: the truth in `f64` in the plant, what flight software knows of it in `f32`.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+    #[cfg_attr(feature = "serde", serde(bound = "T: crate::Number + serde::Serialize"))]
+    pub struct Mounting<T = f32, f64> {
+        /// Position of the sensor, from the centre of mass, body frame.
+        #[parameter(POS, "m", -10.0..=10.0)]
+        pub position_m: Vector3<T> = Vector3::new(0.0, 0.0, 0.0),
+        /// Roll, pitch and yaw of the sensor in the body frame.
+        #[parameter(ATT, "rad", -7.0..=7.0)]
+        pub attitude_rad: Vector3<T> = Vector3::new(0.0, 0.0, 0.0),
+    }
+}
+
+impl Mounting {
+    /// At the centre of mass, along the body's axes.
+    pub const PLAIN: Self = {
+        let zero = Vector3::new(0.0, 0.0, 0.0);
+        Mounting { position_m: zero, attitude_rad: zero }
+    };
+}
+
+impl<T: Number> Mounting<T> {
+    /// True if it changes nothing: the sensor is at the centre of mass, along the body's axes.
+    #[must_use]
+    pub fn is_plain(&self) -> bool {
+        self.position_m.iter().chain(&self.attitude_rad).all(|&part| part.into() == 0.0)
+    }
+}
+
+impl Mounting<f64> {
+    /// The same mounting in flight software's precision.
+    #[must_use]
+    pub fn to_f32(&self) -> Mounting {
+        Mounting { position_m: self.position_m.cast(), attitude_rad: self.attitude_rad.cast() }
+    }
+}

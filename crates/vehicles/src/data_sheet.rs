@@ -1,0 +1,54 @@
+//! Parts of a vehicle, as their data sheets say: from what is simulated to what an estimator knows of it.
+
+use afbc_estimator::{DataSheet, Settings, Triad};
+use afbc_plant::InstrumentSuite;
+use afbc_plant::instruments::{Imu, Magnetometer};
+
+/// Returns the estimator's settings for an inertial sensor with these aids on a vehicle of so many rotors, if its
+/// samples are `step_s` apart.
+#[must_use]
+pub fn settings(suite: &InstrumentSuite, imu: &Imu, rotors: usize, gravity_m_s2: f64, step_s: f64) -> Settings {
+    let Imu { gyro, accel, harmonics, .. } = imu;
+    // Of all rotors in hover, if the first harmonic of one has this amplitude.
+    let vibration = |amplitude: f64| amplitude * libm::sqrt(0.5 * rotors as f64) * harmonics.norm();
+    Settings::for_parts(&DataSheet {
+        gyro: Triad {
+            noise_rthz: gyro.noise_rad_s_rthz,
+            walk: gyro.walk_rad_s2_rthz,
+            instability: gyro.instability_rad_s,
+            instability_time_s: gyro.instability_time_s,
+            bias: gyro.bias_rad_s,
+            scale: gyro.scale,
+            misalignment_rad: gyro.misalignment_rad,
+            range: gyro.range_rad_s,
+            lsb: gyro.lsb_rad_s,
+            vibration: vibration(gyro.vibration_rad_s),
+        },
+        accel: Triad {
+            noise_rthz: accel.noise_m_s2_rthz,
+            walk: accel.walk_m_s3_rthz,
+            instability: accel.instability_m_s2,
+            instability_time_s: accel.instability_time_s,
+            bias: accel.bias_m_s2,
+            scale: accel.scale,
+            misalignment_rad: accel.misalignment_rad,
+            range: accel.range_m_s2,
+            lsb: accel.lsb_m_s2,
+            vibration: vibration(accel.vibration_m_s2),
+        },
+        step_s,
+        gravity_m_s2,
+        barometer: suite.barometer.map(|part| (part.drift_m, part.drift_time_s)),
+        gnss: suite.gnss.map(|part| (part.noise_m, part.correlation_time_s)),
+        magnetometer: suite.magnetometer.map(|part| (iron(&part), part.declination_rad)),
+        differs: suite.tracker.is_none_or(|it| it.position_m > 0.0 || it.attitude_rad > 0.0)
+            && suite.magnetometer.is_none_or(|it| it.noise_ut > it.lsb_ut / 4.0),
+    })
+}
+
+/// Error of the heading by hard and soft iron and the motors' field \[rad\].
+fn iron(part: &Magnetometer) -> f64 {
+    let parts = [part.hard_iron_ut, part.soft_iron * part.strength_ut, part.motor_ut.xy().amax()];
+    let field_ut = libm::sqrt(parts.iter().map(|part| part * part).sum());
+    field_ut / (part.strength_ut * libm::cos(part.inclination_rad))
+}
