@@ -22,7 +22,7 @@ use nalgebra::Vector3;
 pub const VERTICAL_MIN: f32 = 0.3;
 
 /// Smallest and largest factor of U1..U3 for rotors that are weaker or stronger than the model's, as far as the learnt
-/// hover thrust over the weight tells: a heavier vehicle, which may be no harder to turn, takes more thrust as well.
+/// hover thrust over the weight shows: a heavier vehicle, which may be no harder to turn, takes more thrust as well.
 /// Not in the paper.
 pub const EFFORT_MIN: f32 = 0.7;
 /// See [`EFFORT_MIN`].

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! of x and of y, nine rules each, as (22) and (34) with the prediction's error in the place of e_2: f_hat is what the
-//! observer, which is told of the memory, still lacks. With f = Theta*' w and f_hat behind the observer's poles, which
+//! observer, which knows of the memory, still lacks. With f = Theta*' w and f_hat behind the observer's poles, which
 //! are far faster than gamma, V = |Theta* - Theta|^2/2 gamma falls by (Theta* - Theta)' w f_hat, about f_hat^2. The
 //! part of composite adaptation that learns from prediction: Slotine and Li, *Composite adaptive control of robot
 //! manipulators*, Automatica 25(4), 1989; used so by O'Connell et al., *Neural-Fly*, Science Robotics 7(66), 2022. The

@@ -22,7 +22,7 @@ parameters! {
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     #[cfg_attr(feature = "defmt", derive(defmt::Format))]
     pub struct KnownDrag {
-        /// k_r: drag of the rotors when hovering, per mass and speed; a vehicle's file tells it by `[drag]`.
+        /// k_r: drag of the rotors when hovering, per mass and speed; a vehicle's file states it in `[drag]`.
         #[parameter(DRAG_ROTOR, "1/s", 0.0..=10.0)]
         pub rotor_drag_1_s: f32 = 0.0,
         /// k_b: drag of the body along x and y, per mass and speed squared; likewise.

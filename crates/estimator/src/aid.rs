@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-/// What an aiding sensor tells. A fix of several kinds is judged kind by kind: a receiver whose position jumps may
+/// What an aiding sensor measures. A fix of several kinds is judged kind by kind: a receiver whose position jumps may
 /// still have a good velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Aid {
@@ -16,7 +16,7 @@ pub enum Aid {
     GnssVelocity,
     /// Height from a barometer.
     Height,
-    /// Heading, from a magnetometer or told.
+    /// Heading, from a magnetometer or given as such.
     Heading,
 }
 
@@ -129,7 +129,7 @@ impl Aids {
         }
     }
 
-    /// True if another aid than `aid` that tells the same was fused within the last `time_us`.
+    /// True if another aid than `aid` that measures the same was fused within the last `time_us`.
     pub(crate) fn has_other(&self, aid: Aid, now_us: u64, time_us: u64) -> bool {
         let live = |other: &AidRecord| other.is_live(now_us, time_us);
         match aid {

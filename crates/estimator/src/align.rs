@@ -1,4 +1,4 @@
-//! Start at rest: level from the specific force, bias of the gyroscope from its mean, heading from whoever tells it.
+//! Start at rest: level from the specific force, bias of the gyroscope from its mean, heading from whichever sensor measures it.
 
 use crate::measurement::{ImuSample, Measurement};
 use crate::rotation::{atan2, levelling, matrix, normalized, twist};
@@ -7,7 +7,7 @@ use afbc_control::math::{abs_max, sqrt, tilt_cosine};
 use core::fmt;
 use nalgebra::{Quaternion, Vector3};
 
-/// Variance of a heading from which on it counts as not told \[rad2\].
+/// Variance of a heading from which on it counts as unknown \[rad2\].
 pub(crate) const VAGUE: f32 = 0.25;
 
 /// Why the estimator has not started.
@@ -74,7 +74,7 @@ pub(crate) struct Align {
     field: (Vector3<f32>, f32, f32),
     /// Attitude of the tracker, and its standard deviation.
     pose: Option<(Quaternion<f32>, f32)>,
-    /// Heading told, and its standard deviation.
+    /// Heading given as such, and its standard deviation.
     heading: Option<(f32, f32)>,
     pub(crate) why: Unready,
 }
@@ -86,11 +86,11 @@ pub(crate) struct Aligned {
     pub(crate) gyro_bias: Vector3<f32>,
     /// Mean specific force, body frame \[m/s2\].
     pub(crate) force: Vector3<f32>,
-    /// Variance of the heading at the right tilt; none if nobody told it.
+    /// Variance of the heading at the right tilt; none if nothing has measured it.
     pub(crate) heading_variance: Option<f32>,
-    /// Heading per rotation about the earth's x and y, if a field told it: its dip makes of a tilt a heading.
+    /// Heading per rotation about the earth's x and y, if a magnetic field gave it: its dip makes of a tilt a heading.
     pub(crate) dip: (f32, f32),
-    /// Whether a field told the heading.
+    /// Whether a magnetic field gave the heading.
     pub(crate) by_field: bool,
     /// Mean field in the earth frame, if there was one.
     pub(crate) field: Option<Vector3<f32>>,
@@ -177,16 +177,16 @@ impl Align {
         let level = levelling(&(self.force.mean * (1.0 / norm)))?;
         let (sum, count, variance) = self.field;
         let field = (count > 0.0).then(|| matrix(&level) * (sum * (1.0 / count)));
-        // Turn about z that is missing, and its variance; the tracker before the told before the field.
+        // Turn about z that is missing, and its variance; the tracker before a given heading before the field.
         let nose = matrix(&level);
-        let told = self.heading.map(|(heading, sigma)| (heading - atan2(nose.m21, nose.m11), sigma * sigma, false));
+        let given = self.heading.map(|(heading, sigma)| (heading - atan2(nose.m21, nose.m11), sigma * sigma, false));
         let by_field = field.map(|field| {
             let horizontal = field.x * field.x + field.y * field.y;
             (-settings.declination_rad - atan2(field.y, field.x), variance / (count * horizontal), true)
         });
         let pose = self.pose.map(|(attitude, sigma)| (twist(&attitude, &level), sigma * sigma, false));
         let by_field = by_field.filter(|_| settings.mag_slow_rad * settings.mag_slow_rad < VAGUE);
-        let turn = pose.or(told).or(by_field).filter(|(turn, variance, _)| turn.is_finite() && *variance < VAGUE);
+        let turn = pose.or(given).or(by_field).filter(|(turn, variance, _)| turn.is_finite() && *variance < VAGUE);
         let about_z = crate::rotation::about_z(turn.map_or(0.0, |(turn, ..)| turn));
         let field = field.map(|field| matrix(&about_z) * field);
         let dip = field.filter(|_| turn.is_some_and(|(_, _, by_field)| by_field)).map_or((0.0, 0.0), |field| {

@@ -4,7 +4,7 @@ use crate::measurement::ImuSample;
 use afbc_types::{Mounting, sin_cos};
 use nalgebra::{Matrix3, Vector3};
 
-/// Longest time between two samples whose rates tell the angular acceleration \[us\]. With a longer one the lever arm's
+/// Longest time between two samples whose rates give the angular acceleration \[us\]. With a longer one the lever arm's
 /// part of it, r times that acceleration, is left out.
 const LEVER_GAP_US: u64 = 10_000;
 

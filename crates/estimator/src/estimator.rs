@@ -227,7 +227,7 @@ impl Estimator {
         }
     }
 
-    /// Before the start, hears who tells the heading.
+    /// Before the start, takes the heading from whichever sensor measures it.
     fn listen(&self, memory: &mut Memory, now_us: u64) {
         if memory.monitor.health(now_us, &self.settings, self.stuck_us).missing {
             memory.align.again(Unready::NoImu);

@@ -42,7 +42,7 @@ const STILL_SIGMAS: f32 = 3.0;
 const AGAIN_US: u64 = 10_000_000;
 /// Variance of the velocity after a tracker's jump: one position says nothing of it, the next two do \[m2/s2\].
 const JUMP_VARIANCE: f32 = 100.0;
-/// Variance of the velocity after a freeze, which has told for a while that the vehicle stands still: (0.1 m/s)^2,
+/// Variance of the velocity after a freeze, which has claimed for a while that the vehicle stands still: (0.1 m/s)^2,
 /// since faster ones contradict it \[m2/s2\].
 const FROZEN_VARIANCE: f32 = 0.01;
 
@@ -103,7 +103,7 @@ impl Estimator {
             (Measurement::Gnss { .. }, [Some(part), _]) => {
                 self.divide(memory, part, at_us.saturating_sub(fix_us.unwrap_or(0)));
             }
-            // A field of which the vehicle's own may be as large as the earth's tells no heading.
+            // A field of which the vehicle's own may be as large as the earth's gives no heading.
             (Measurement::MagneticField { .. }, _) if self.magnetic_variance >= VAGUE => {
                 count(&mut memory.dropped.disturbed);
                 return false;
@@ -228,7 +228,7 @@ impl Estimator {
             return false;
         }
         match part.target {
-            // The field corrects what it tells, the heading, and the gyroscope's bias that turned it: a disturbed one
+            // The field corrects what it measures, the heading, and the gyroscope's bias that turned it: a disturbed one
             // must not tilt the vehicle.
             Target::Field(_) => {
                 let zero = Vector3::zeros();

@@ -1,6 +1,6 @@
 //! Past states, so that a measurement meets the state of its own time.
 //!
-//! Corrections of the present hold for the past too: otherwise the next late measurement would tell the same error
+//! Corrections of the present hold for the past too: otherwise the next late measurement would report the same error
 //! again, and have it corrected twice. They are not written into every entry each time. The sum of all corrections is
 //! itself an error, (theta, v, p), that moves by the filter's equations ([`crate::horizon`]):
 //!

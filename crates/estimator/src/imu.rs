@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 /// Time without a sample after which the IMU is missing \[us\].
 pub const MISSING_US: u64 = 20_000;
-/// Time that clipping is told after a clipped sample \[us\].
+/// Time that clipping is reported after a clipped sample \[us\].
 const CLIPPED_US: u32 = 200_000;
 /// Share of the squared change that a sample replaces.
 const SHARE: f32 = 0.01;

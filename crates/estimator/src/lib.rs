@@ -22,7 +22,7 @@
 //! }
 //! let estimate = estimator.step(&mut memory, 2_001_000, None);
 //! assert!(estimate.validity.position && (estimate.state.position_m.y - 2.0).abs() < 0.01);
-//! // Nobody has told a heading.
+//! // Nothing has measured a heading.
 //! assert!(!estimate.validity.heading);
 //! ```
 //!
@@ -45,7 +45,7 @@
 //! for 100 ms, less than a tenth of any receiver's.
 //!
 //! **The rotation error is in the earth frame**, and is carried along when the attitude is corrected. Between
-//! corrections it has no transition of its own, which saves a sixth of the prediction; a heading that nobody has told
+//! corrections it has no transition of its own, which saves a sixth of the prediction; a heading that nothing has measured
 //! is one large variance, and the tilt's stay small. Carrying it along keeps tilt and accelerometer bias, which a
 //! hovering vehicle cannot tell apart, tied to one another in the body. Without that, every correction of the heading
 //! looks like a manoeuvre, and after hours at rest the filter is sure of a bias that it has never seen. A little of
@@ -58,7 +58,7 @@
 //!
 //! # Sensors
 //!
-//! * A **tracker** and a **GNSS receiver** both tell the position in the earth frame. Their origins must be the same
+//! * A **tracker** and a **GNSS receiver** both measure the position in the earth frame. Their origins must be the same
 //!   (on board `afbc_onboard::EstimatorFrontEnd` sees to that); whichever comes first sets the position, and one that
 //!   contradicts the other is rejected as long as the other is there. The receiver's antenna is taken to be at the
 //!   centre of mass, as is the IMU, whose samples [`ImuCalibration`] corrects where it is not.
@@ -73,17 +73,17 @@
 //!   the vehicle. What iron and currents of the vehicle add to the field, [`Settings::mag_slow_rad`], is a slow error
 //!   too: further fields do not average it, and the heading is as good as that. A field whose strength or inclination
 //!   is not that of the start is not used.
-//! * A **heading** that neither tracker nor magnetometer tells follows from the motion once the vehicle accelerates,
+//! * A **heading** that neither tracker nor magnetometer measures follows from the motion once the vehicle accelerates,
 //!   but never counts as valid: an error of nearly half a turn may stay, with a small standard deviation.
 //! * **At rest on the ground** the velocity is held at zero, as long as [the inertial sensor shows rest](rest) and the
-//!   motors are known not to carry the vehicle ([`Memory::set_on_ground`]), or nobody has told and it has not moved
+//!   motors are known not to carry the vehicle ([`Memory::set_on_ground`]), or that is unknown and it has not moved
 //!   since the alignment. A vehicle carried by hand is followed. In the air without any aid for [`Settings::coast_s`] a
 //!   weak zero (3 m/s) keeps roll and pitch level; velocity and position are then invalid.
 //!
 //! # For a controller
 //!
 //! Each fix makes position and velocity jump, those of an aid that comes back most, and the rotors shake the velocity.
-//! [`OutputFilter`] tells a controller the same state without either.
+//! [`OutputFilter`] gives a controller the same state without either.
 //!
 //! # When something is wrong
 //!

@@ -20,7 +20,7 @@ use nalgebra::{Matrix3, Quaternion, Vector3};
 pub struct Memory {
     /// True once the filter runs.
     pub(crate) runs: bool,
-    /// Whether the motors cannot carry the vehicle, if anyone has told.
+    /// Whether the motors cannot carry the vehicle, if that is known.
     pub(crate) on_ground: Option<bool>,
     pub(crate) rest: Rest,
     pub(crate) align: Align,
@@ -64,7 +64,7 @@ pub struct Memory {
     pub(crate) dropped: Dropped,
 }
 
-/// What has been told at all since the start.
+/// What has been measured at all since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Known {
     pub(crate) position: bool,
@@ -131,18 +131,18 @@ impl Memory {
 
     /// Tells whether the motors cannot carry the vehicle: they are off, or idle on the ground. While they cannot, the
     /// velocity is held at zero whenever the inertial sensor shows rest, which holds attitude, position and biases too;
-    /// a vehicle that is moved by hand is not held. As long as nobody has told, it is held from the alignment until it
+    /// a vehicle that is moved by hand is not held. As long as that is unknown, it is held from the alignment until it
     /// first moves: later, rest may be a hover in calm air.
     pub fn set_on_ground(&mut self, on_ground: bool) {
         self.on_ground = Some(on_ground);
     }
 
-    /// True if the vehicle stands, as far as motors and inertial sensor tell.
+    /// True if the vehicle stands, as far as motors and inertial sensor show.
     pub(crate) fn stands(&self) -> bool {
         self.rest.is_still() && self.on_ground.unwrap_or(self.rest.unmoved)
     }
 
-    /// Adds variances of attitude and velocity for a sample at `at_us` that tells less than usual.
+    /// Adds variances of attitude and velocity for a sample at `at_us` that says less than usual.
     #[cold]
     pub(crate) fn roughen(&mut self, at_us: u64, theta: f32, velocity: f32) {
         self.rough = (self.rough.0 + theta, self.rough.1 + velocity);

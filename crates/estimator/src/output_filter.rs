@@ -31,7 +31,7 @@ pub struct OutputFilter {
     notch: Option<Notch>,
     /// Time of the last estimate, if its position was valid \[us\].
     last_us: Option<u64>,
-    /// Estimate less the state told.
+    /// Estimate less the state that was output.
     position_m: Vector3<f32>,
     velocity_m_s: Vector3<f32>,
     /// The notch's two sums, once there was a velocity.
@@ -79,7 +79,7 @@ impl OutputFilter {
         OutputFilter { notch: has_notch.then(|| Notch::new(hover_rad_s)), ..OutputFilter::default() }
     }
 
-    /// Returns the state to tell for this estimate; to be called every millisecond. Nothing is hidden of an estimate
+    /// Returns the state to output for this estimate; to be called every millisecond. Nothing is hidden of an estimate
     /// whose position has not been valid before.
     #[must_use = "the state is its result"]
     #[inline]

@@ -20,7 +20,7 @@ use nalgebra::{Matrix3, Quaternion, Vector3};
 
 /// Variance of an angle that may be anything, pi^2/3.
 const ANY_ANGLE: f32 = 3.28;
-/// Standard deviations of velocity at rest \[m/s\], and of position before it is told \[m\].
+/// Standard deviations of velocity at rest \[m/s\], and of position before it is measured \[m\].
 const REST_M_S: f32 = 2e-3;
 const UNTOLD_M: f32 = 0.01;
 /// Variance of levelling besides its noise \[rad2\].
@@ -254,7 +254,7 @@ impl Memory {
         c.hold();
     }
 
-    /// Adds to the heading, which a field has told, the error of the vehicle's own.
+    /// Adds to the heading, which a magnetometer has measured, the error of the vehicle's own.
     fn point(&mut self, (x, y): (f32, f32)) {
         let row = magnetic(&self.nominal.rotation, &Vector3::new(x, y, 0.0));
         self.covariance.tt.m33 += self.covariance.slow.of_row(&row);

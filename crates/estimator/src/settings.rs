@@ -26,7 +26,7 @@ parameters! {
         /// Random walk of the accelerometer's bias, per root of a second.
         #[parameter(ACC_WALK, "m/s2/rts", 1e-7..=0.1)]
         pub accel_walk_m_s2_rts: f32 = 3e-4,
-        /// Standard deviation of the accelerometer's bias at the start, which levelling cannot tell from a tilt.
+        /// Standard deviation of the accelerometer's bias at the start, which levelling cannot distinguish from a tilt.
         #[parameter(ACC_BIAS, "m/s2", 1e-3..=1.0)]
         pub accel_bias_m_s2: f32 = 0.1,
         /// Largest bias of the gyroscope; alignment refuses a larger rate.
@@ -47,9 +47,9 @@ parameters! {
         #[parameter(GNSS_SLOW, "s", 1.0..=1e5)]
         pub gnss_slow_s: f32 = 120.0,
         /// Heading error by what iron, magnets and currents of the vehicle add to the field, standard deviation along
-        /// each of body x and y. It stays, and is not averaged; the standard deviation that a magnetometer tells is
+        /// each of body x and y. It stays, and is not averaged; the standard deviation that comes with its measurements is
         /// its noise alone. The default is for any that was calibrated once: 0.04 gauss, of 0.2 gauss. From
-        /// 0.5 rad on it tells no heading.
+        /// 0.5 rad on it gives no heading.
         #[parameter(MAG_SLOW, "rad", 0.0..=1.0)]
         pub mag_slow_rad: f32 = 0.2,
         /// Time of identical poses or positions after which a tracker counts as frozen, and is not believed; 0 for

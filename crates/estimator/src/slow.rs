@@ -5,7 +5,7 @@
 //! numbers f along body x and y, in shares of the earth's horizontal field, which stay. A filter that takes d or f for
 //! noise averages it, and is soon sure of what it does not know. Here both are consider states (Schmidt; Jazwinski,
 //! *Stochastic Processes and Filtering Theory*, 1970, section 8.4): d a first-order Gauss-Markov process per
-//! coordinate, f constant, of a variance D which is told and stays, and with zero for an estimate. What is kept is the
+//! coordinate, f constant, of a variance D which is given and stays, and with zero for an estimate. What is kept is the
 //! covariance X of the filter's errors with them. A fix then measures p + d + noise, a field the heading, f's share
 //! across it and noise, with what is known of both; a variance never falls to that of an average, and innovations have
 //! the noise alone, and what the slow error has changed by: for the heading, since the vehicle has turned.

@@ -40,10 +40,10 @@ const WAY_S: f32 = 1.0;
 /// Largest change of the estimated velocity in a tick that is a motion, and no correction \[m/s\].
 const STEP_MAX_M_S: f32 = 0.2;
 
-/// Horizontal motion of a vehicle that has lost its position, as the law is told it.
+/// Horizontal motion of a vehicle that has lost its position, as the law sees it.
 ///
 /// At first it is that of the estimate, so that the law brakes as usual. It fades within seconds, like the estimate's
-/// meaning: the law then sees no error, and holds what it has learnt of the wind. Were it told to stand at once, a
+/// meaning: the law then sees no error, and holds what it has learnt of the wind. Were the setpoint to stand at once, a
 /// velocity error that no tilt changes would make it lean, and learn, ever more.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {

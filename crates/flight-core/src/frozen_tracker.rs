@@ -70,9 +70,9 @@ impl FrozenTrackerCheck {
 
     /// True if the pose is that of the window's beginning although the twist is not zero.
     fn stands(&self, state: &State) -> bool {
-        let stands = |moved: Vector3<f32>, told: Vector3<f32>, least: f32| {
-            let told = abs_max(&told);
-            told > least && abs_max(&moved) < STANDS_SHARE * told
+        let stands = |moved: Vector3<f32>, claimed: Vector3<f32>, least: f32| {
+            let claimed = abs_max(&claimed);
+            claimed > least && abs_max(&moved) < STANDS_SHARE * claimed
         };
         // Roll and pitch are constant in a tilted vehicle that rotates about its own z.
         let level = |v: Vector3<f32>| Vector3::new(v.x, v.y, 0.0);

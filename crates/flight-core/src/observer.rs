@@ -1,6 +1,6 @@
 //! Flight on a tracker's poses, after the inertial sensor has failed. Not in the paper.
 //!
-//! A pose tells position and attitude of some milliseconds ago; a law needs velocity and body rates too, and all of
+//! A pose is position and attitude of some milliseconds ago; a law needs velocity and body rates too, and all of
 //! them now. An observer predicts them with the inputs commanded,
 //!
 //! ```text

@@ -528,7 +528,7 @@ impl<M> Armed<M> {
 }
 
 /// Returns the state of a vehicle that does not know where it is, if it is fresh: it stands over the origin as far as
-/// the law can tell, so that nothing drives it sideways but what the law has learnt of the wind.
+/// the law can see, so that nothing drives it sideways but what the law has learnt of the wind.
 fn upright(state: &Stamped<State>, now_us: u64) -> Option<State> {
     (state.age_us(now_us) <= COAST_US).then(|| {
         let State { position_m, velocity_m_s, .. } = state.value;

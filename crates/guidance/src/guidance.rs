@@ -256,13 +256,13 @@ impl Memory {
             self.disarmed(&mut notices);
         }
         self.was_armed = armed;
-        let mut told = None;
+        let mut announced = None;
         if let Some(next) = table::forced(self.mode, &seen) {
             self.change(next, ModeReason::Failsafe(cause), &mut notices);
-            (self.failsafe, told) = (Some(cause), Some(cause));
+            (self.failsafe, announced) = (Some(cause), Some(cause));
         }
         if new != 0 {
-            net::announce(&settings.net, new, told, &mut notices);
+            net::announce(&settings.net, new, announced, &mut notices);
         }
         let [first, ..] = &orders.given;
         let answer = first

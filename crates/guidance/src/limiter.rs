@@ -204,9 +204,9 @@ impl Limiter {
         let (target, jerk_m_s3, interval_s, fits) = match (&complete, aim.sent_us) {
             (Some(complete), Some(sent_us)) => {
                 let stream = Stream::next(self.stream, complete, sent_us, dt_s, self.limits.jerk_max_m_s3);
-                let told = (Some(stream.present), stream.jerk_m_s3, stream.interval_s, stream.fits);
+                let known = (Some(stream.present), stream.jerk_m_s3, stream.interval_s, stream.fits);
                 self.stream = Some(stream);
-                told
+                known
             }
             _ => {
                 self.stream = None;

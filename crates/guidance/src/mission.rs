@@ -55,7 +55,7 @@ impl Mission {
         (self.begun, self.hold) = (None, Hold::default());
     }
 
-    /// Advances by a tick; `inside` tells whether a place is inside the geofence.
+    /// Advances by a tick; `inside` returns whether a place is inside the geofence.
     pub(crate) fn fly(
         &mut self,
         leg: Option<&Leg>,

@@ -136,14 +136,14 @@ impl Shape {
         // g(x)/x and g'
         let root = sqrt(self.d * self.d + 2.0 * self.settling * sqrt(x.norm_squared()));
         let (gain, slope) = (2.0 * self.settling / (self.d + root), self.settling / root);
-        let told = if goal.velocity.is_some() { goal.acceleration } else { SVector::zeros() };
+        let given = if goal.velocity.is_some() { goal.acceleration } else { SVector::zeros() };
         let own = change + x * gain;
         let (own, rise) = if own.norm_squared() <= self.acceleration * self.acceleration {
-            (own, (change - (motion.acceleration - told)) * slope)
+            (own, (change - (motion.acceleration - given)) * slope)
         } else {
             (capped(own, self.acceleration), SVector::zeros())
         };
-        let wanted = capped(told + own, reach.acceleration);
+        let wanted = capped(given + own, reach.acceleration);
         let jerk = match self.guarded(wanted, motion, reach) {
             // What the goal says does not fit the limit of speed.
             Some((wanted, rise)) => rise + (wanted - motion.acceleration) * self.k3,

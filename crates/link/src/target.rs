@@ -323,7 +323,7 @@ pub(crate) fn write_motion(motion: &PositionTarget, payload: &mut [u8; PAYLOAD_M
     MOTION.write(&(0, vectors.map(Into::into), yaw, mask, Address::default(), frame), payload)
 }
 
-/// Format of POSITION_TARGET_LOCAL_NED (85), which tells what the vehicle follows.
+/// Format of POSITION_TARGET_LOCAL_NED (85), which reports what the vehicle follows.
 pub(crate) fn followed_format() -> MessageFormat {
     TARGET.format()
 }

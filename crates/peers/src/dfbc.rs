@@ -22,8 +22,8 @@
 //! * **Integral**, 0 in the source: its PD law keeps an error under every steady force. As in [`crate::geometric`].
 //! * **Desaturation**: the source allocates by a quadratic program that gives up thrust first, then yaw, then roll and
 //!   pitch. The mixer that all controllers share gives up yaw first, in closed form.
-//! * **Drag**: the source's model of the rotors' drag is [`KnownDrag`], as far as the vehicle's file tells it.
-//! * **What it is told of the rotors**: the time constant [`Gains::rotor_time_constant_s`], like INDI.
+//! * **Drag**: the source's model of the rotors' drag is [`KnownDrag`], as far as the vehicle's file states it.
+//! * **What it knows of the rotors**: the time constant [`Gains::rotor_time_constant_s`], like INDI.
 
 use crate::attitude::{r_earth_body, unit};
 use crate::body::{Body, Demand};

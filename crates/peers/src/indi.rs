@@ -29,9 +29,9 @@
 //!   reference's. Where jerk and snap are zero because nobody gives them, R_d follows s by feedback alone.
 //! * **Rotor model**: a first-order lag of the speed with the time constant [`Gains::rotor_time_constant_s`], initially
 //!   at hover. Its input is the command after rotor limits, so it cannot wind up.
-//! * **What it is told of the rotors**: that time constant, 20 ms by default, which is the lag of the rotors that all
-//!   gains here are for; [`crate::slowed`] scales it for others. It is not told of their delay. At lags from half to
-//!   twice what it is told it still flies (`tests/flights.rs`).
+//! * **What it knows of the rotors**: that time constant, 20 ms by default, which is the lag of the rotors that all
+//!   gains here are for; [`crate::slowed`] scales it for others. It does not know their delay. At lags from half to
+//!   twice what it assumes it still flies (`tests/flights.rs`).
 //! * **Not adaptive**: G is nominal. A true effectiveness of k times the nominal raises the loop gain by the factor k.
 //! * **Neglected**: the moment that accelerates the propellers (G2 of the 2016 paper), which this project's plant
 //!   models do not have.

@@ -22,7 +22,7 @@
 //!   ([`Gains::WU_2022`]).
 //! * **Frame**: s_v is in the earth frame. The source writes it along the body axes, which is the same, since it is
 //!   estimated anew in each step.
-//! * **Rotor lag**: the source takes the rotors for ideal. Here the predictor is told of their lag as INDI is
+//! * **Rotor lag**: the source takes the rotors for ideal. Here the predictor knows their lag as INDI is
 //!   ([`Gains::rotor_time_constant_s`], 20 ms); 0 is the source's.
 //! * **Bounds**: the estimates are bounded by +-20 m/s2 and +-100 rad/s2 per coordinate, so that a state that jumps, as
 //!   after an outage, does not shake the vehicle. Without a new measurement nothing advances, and the predictor starts

@@ -28,8 +28,8 @@
 //!   ([`Limits::apply`]), which couples the axes.
 //! * **The lag** is that of what feedback asks for: the reference's own turning is fed forward, as in [`crate::dfbc`].
 //!   a is the model's: fed back as measured, it trips over weak rotors with a large inertia.
-//! * **Drag** that the vehicle's file tells counts as in [`crate::dfbc`]; what else disturbs is observed.
-//! * **What it is told of the rotors**: the time constant [`Gains::rotor_time_constant_s`], like INDI.
+//! * **Drag** that the vehicle's file states counts as in [`crate::dfbc`]; what else disturbs is observed.
+//! * **What it knows of the rotors**: the time constant [`Gains::rotor_time_constant_s`], like INDI.
 
 use crate::attitude::{r_earth_body, unit};
 use crate::body::{Body, Demand};

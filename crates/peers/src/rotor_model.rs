@@ -1,4 +1,4 @@
-//! Model of the rotors' lag: what the rotors do now, as far as commands and a time constant tell.
+//! Model of the rotors' lag: what the rotors do now, as far as commands and a time constant show.
 //!
 //! ```text
 //! omega_i += (1 - exp(-dt/tau)) (omega_i commanded - omega_i)

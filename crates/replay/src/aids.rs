@@ -1,4 +1,4 @@
-//! Measurements as a log tells them, and what the estimator is told of their errors.
+//! Measurements as a log has them, and what the estimator assumes of their errors.
 
 use crate::recording::{Aiding, SampleSource, Sensor, flip};
 use afbc_estimator::{Measurement, Origin, Stamped};
@@ -9,12 +9,12 @@ use nalgebra::Vector3;
 const HORIZONTAL_M: (f64, f64) = (0.5, 100.0);
 const VERTICAL_M: (f64, f64) = (1.0, 100.0);
 const SPEED_M_S: (f64, f64) = (0.3, 10.0);
-/// What is taken for a velocity that is not told \[m/s\].
+/// What is taken for a velocity without one \[m/s\].
 const UNTOLD_M_S: f32 = 1e3;
 /// Noise of a barometer in flight \[m\], and of a magnetometer \[gauss\].
 const BAROMETER_M: f32 = 0.5;
 const FIELD_GAUSS: f32 = 0.05;
-/// Least time between two heights or two fields: more of them tell nothing new \[us\].
+/// Least time between two heights or two fields: more of them bring nothing new \[us\].
 const SPARSE_US: u64 = 15_000;
 /// Largest distance of a fix from the middle one \[degrees\]: 50 km are as far as the estimator goes.
 const FAR_DEG: f64 = 0.4;
@@ -25,7 +25,7 @@ pub(crate) struct Fix {
     pub(crate) arrived_us: u64,
     /// Latitude and longitude \[degrees\], altitude \[m\].
     pub(crate) place: [f64; 3],
-    /// North, east, down \[m/s\], if told.
+    /// North, east, down \[m/s\], if known.
     pub(crate) velocity_m_s: Option<[f64; 3]>,
     /// Standard deviations as the receiver states them; those that it does not are the smallest.
     pub(crate) horizontal_m: f64,
@@ -88,7 +88,7 @@ fn aided(value: Measurement, arrived_us: u64, at_us: u64, delay_us: u64) -> Aidi
     Aiding { arrived_us, measurement: Stamped { value, at_us: at_us.saturating_sub(delay_us) } }
 }
 
-/// Keeps usable measurements in order, heights and fields no more often than they tell anything; appends them to `all`
+/// Keeps usable measurements in order, heights and fields no more often than they bring anything new; appends them to `all`
 /// and says where they come from. `raw` is the number of samples in the log.
 pub(crate) fn collect(
     all: &mut Vec<Aiding>,

@@ -14,12 +14,12 @@ const FRESH_US: u64 = 100_000;
 const UNSEEN: f32 = 3.0;
 /// Least error of a heading by a magnetometer \[rad\].
 const LEAST_RAD: f32 = 0.05;
-/// Error of the heading from which on it is told \[rad\].
+/// Error of the heading from which on it is reported \[rad\].
 const TOLD_RAD: f32 = 0.35;
 
 /// Sets what the recording's magnetometer makes of the heading. Where its field differs from that of the `earth`, the
-/// two parts that the heading does not change, level and down, tell how large the third may be. One that nobody has
-/// calibrated, and that cannot be compared, tells no heading.
+/// two parts that the heading does not change, level and down, show how large the third may be. One that nobody has
+/// calibrated, and that cannot be compared, gives no heading.
 pub(crate) fn doubt(recording: &mut Recording, earth: Option<&Field>) {
     let most_rad = Settings::MAG_SLOW.range.max as f32;
     let (Some([level, down]), Some(earth)) = (parts(recording), earth) else {
@@ -34,7 +34,7 @@ pub(crate) fn doubt(recording: &mut Recording, earth: Option<&Field>) {
     if error_rad > TOLD_RAD {
         recording.notes.push(format!(
             "The magnetometer shows {level:.2} gauss level and {down:.2} down, the earth's field there has {:.2} and \
-             {:.2}: its heading tells nothing; calibrate it away from iron.",
+             {:.2}: its heading means nothing; calibrate it away from iron.",
             earth.horizontal_gauss, earth.down_gauss,
         ));
     }

@@ -175,7 +175,7 @@ fn entry(record: &csv::ByteRecord) -> Option<(String, (u64, Vec<f64>))> {
     Some((kind.to_owned(), (at_us, values.collect::<Option<Vec<f64>>>()?)))
 }
 
-/// Reads the estimate beside the log; that it is not there, or no estimate, is told.
+/// Reads the estimate beside the log; that it is not there, or no estimate, is reported.
 fn beside(path: &Path, recording: &mut Recording) {
     let file = estimate_path(path);
     let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();

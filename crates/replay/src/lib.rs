@@ -2,7 +2,7 @@
 //!
 //! [`read`] makes a [`Recording`] of a PX4 ULog or a PX4-ECL CSV, in this project's frames; [`fly`] runs the estimator
 //! over it, a step a millisecond, and compares. Whatever is in a file, nothing here panics: what cannot be used is
-//! skipped, counted and told.
+//! skipped, counted and reported.
 #![forbid(unsafe_code)]
 
 mod aids;

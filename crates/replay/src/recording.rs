@@ -1,4 +1,4 @@
-//! What a log tells, in this project's frames and units.
+//! What a log contains, in this project's frames and units.
 
 use afbc_estimator::{ImuSample, Measurement, Origin, Stamped};
 use nalgebra::Vector3;
@@ -102,16 +102,16 @@ pub struct Recording {
     pub disarmed: Vec<(u64, bool)>,
     /// Origin of all positions, if there is one.
     pub origin: Option<Origin>,
-    /// Whether the log's own positions are from there, or from an origin that it does not tell.
+    /// Whether the log's own positions are from there, or from an origin that it does not state.
     pub knows_origin: bool,
     /// Direction of magnetic north, positive to the east \[rad\].
     pub declination_rad: f32,
-    /// What the vehicle's own field makes of the heading, where it is told: standard deviation along each of body x and
+    /// What the vehicle's own field makes of the heading, where that is known: standard deviation along each of body x and
     /// y \[rad\].
     pub mag_slow_rad: Option<f32>,
     /// Where everything comes from.
     pub sources: Vec<SampleSource>,
-    /// What else is to be told, a sentence each.
+    /// What else is to be reported, a sentence each.
     pub notes: Vec<String>,
 }
 

@@ -18,9 +18,9 @@ const GRID_US: u64 = 20_000;
 const SETTLED_S: f64 = 10.0;
 /// Time at rest after which the start is taken from the log \[us\].
 const PATIENT_US: u64 = 5_000_000;
-/// Speed at which a vehicle flies, if the log does not tell when it has landed \[m/s\].
+/// Speed at which a vehicle flies, if the log does not say when it has landed \[m/s\].
 const FLIES_M_S: f32 = 1.0;
-/// Distance at which an origin that is not told must be another than the first fix \[m\].
+/// Distance at which an origin that is not stated must be another than the first fix \[m\].
 const ELSEWHERE_M: f32 = 10.0;
 /// Age of a state in the log from which a start is taken \[us\].
 const FRESH_US: u64 = 200_000;
@@ -65,7 +65,7 @@ pub struct Replayed {
     pub figures: Figures,
     /// Ten seconds after the start, or half of what is left then if that is less, or as asked for \[s\].
     pub from_s: f64,
-    /// By how much the log's positions were moved, which do not tell their origin, to agree at that time \[m\].
+    /// By how much the log's positions were moved, which do not state their origin, to agree at that time \[m\].
     pub moved_m: Option<Vector3<f32>>,
     /// How it started.
     pub start: EstimatorStart,
@@ -161,10 +161,10 @@ fn moved(rows: &mut [ReplayRow], from_s: f64) -> Option<Vector3<f32>> {
     Some(by)
 }
 
-/// Returns what was told last.
-fn last(told: &[(u64, bool)], now_us: u64) -> Option<bool> {
-    let until = told.partition_point(|(at_us, _)| *at_us <= now_us);
-    told.get(until.checked_sub(1)?).map(|(_, is)| *is)
+/// Returns the last of these values.
+fn last(values: &[(u64, bool)], now_us: u64) -> Option<bool> {
+    let until = values.partition_point(|(at_us, _)| *at_us <= now_us);
+    values.get(until.checked_sub(1)?).map(|(_, is)| *is)
 }
 
 /// The estimator in the middle of a recording.
@@ -201,8 +201,8 @@ impl Run<'_> {
     /// Whether the log says that the vehicle is on the ground or else, where it says nothing of that, disarmed.
     fn stands(&self, now_us: u64) -> Option<bool> {
         let Recording { landed, disarmed, .. } = self.recording;
-        let told = if landed.is_empty() { disarmed } else { landed };
-        last(told, now_us)
+        let values = if landed.is_empty() { disarmed } else { landed };
+        last(values, now_us)
     }
 
     fn time_s(&self, now_us: u64) -> f64 {

@@ -1,4 +1,4 @@
-//! What a newcomer is told: how to connect.
+//! What a newcomer needs to know: how to connect.
 
 use crate::ports::Addresses;
 use crate::systems::listed;

@@ -83,8 +83,8 @@ impl Ports {
         self.vehicles.iter().map(of).collect()
     }
 
-    /// Hands to `server` what has arrived by `now`, and tells of peers that come and go.
-    pub fn receive(&mut self, server: &mut Server, now: Duration, mut tell: impl FnMut(&str)) {
+    /// Hands to `server` what has arrived by `now`, and logs peers that come and go.
+    pub fn receive(&mut self, server: &mut Server, now: Duration, mut log: impl FnMut(&str)) {
         let Ports { vehicles, next } = self;
         let mut number = || {
             *next = next.wrapping_add(1);
@@ -94,10 +94,10 @@ impl Ports {
             let system = server.vehicles().get(place).map_or(0, |vehicle| vehicle.system());
             let now_s = server.now_s();
             let mut on = |event: Event<'_>, wire: &str| match event {
-                Event::New(from) => tell(&format!("{now_s:.3} vehicle {system}: {wire} {from} connected")),
+                Event::New(from) => log(&format!("{now_s:.3} vehicle {system}: {wire} {from} connected")),
                 Event::Sent(peer, bytes) => server.hear(place, peer, bytes),
                 Event::Gone(from, peer) => {
-                    tell(&format!("{now_s:.3} vehicle {system}: {wire} {from} gone"));
+                    log(&format!("{now_s:.3} vehicle {system}: {wire} {from} gone"));
                     server.forget(place, peer);
                 }
             };

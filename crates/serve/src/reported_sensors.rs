@@ -1,4 +1,4 @@
-//! What a vehicle's shell tells its services beside the control tick: receiver, battery, further sensors, and where on
+//! What a vehicle's shell reports to its services beside the control tick: receiver, battery, further sensors, and where on
 //! the earth it is.
 
 use afbc_estimator::Measurement;

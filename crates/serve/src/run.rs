@@ -38,7 +38,7 @@ pub struct Lines {
 /// Longest wait for a line between two looks at the stop flag.
 const NAP: Duration = Duration::from_millis(50);
 /// Least time between two lines about lost time.
-const TOLD_EVERY: Duration = Duration::from_secs(5);
+const REPORTED_EVERY: Duration = Duration::from_secs(5);
 
 impl Lines {
     /// Reads lines in a thread of their own.
@@ -72,18 +72,18 @@ impl Lines {
     }
 }
 
-/// Runs `server` until somebody says `quit` or `stop` is set; passes answers and events to `tell`, a line each.
+/// Runs `server` until somebody says `quit` or `stop` is set; passes answers and events to `log`, a line each.
 pub fn run(
     server: &mut Server,
     ports: &mut Ports,
     mut rate: TimeRate,
     lines: &mut Lines,
     stop: &AtomicBool,
-    mut tell: impl FnMut(&str),
+    mut log: impl FnMut(&str),
 ) -> RunEnd {
     let began = Instant::now();
     let mut pace = Pace::new(factor(rate), began.elapsed());
-    let mut told = None;
+    let mut reported = None;
     loop {
         // Lines first: in lockstep there is nothing else to do.
         loop {
@@ -102,7 +102,7 @@ pub fn run(
             match (reply.then, rate) {
                 (Then::Nothing, _) => {}
                 (Then::Quit, _) => {
-                    reply.lines.iter().for_each(|line| tell(line));
+                    reply.lines.iter().for_each(|line| log(line));
                     return RunEnd::Quit;
                 }
                 (Then::Step(steps), TimeRate::Lockstep) => {
@@ -110,7 +110,7 @@ pub fn run(
                         if stop.load(Ordering::Relaxed) {
                             return RunEnd::Stopped;
                         }
-                        if step(server, ports, began, &mut tell) == Then::Quit {
+                        if step(server, ports, began, &mut log) == Then::Quit {
                             return RunEnd::Quit;
                         }
                     }
@@ -126,9 +126,9 @@ pub fn run(
                     pace = Pace::new(speed, began.elapsed());
                 }
             }
-            reply.lines.iter().for_each(|line| tell(line));
+            reply.lines.iter().for_each(|line| log(line));
         }
-        match step(server, ports, began, &mut tell) {
+        match step(server, ports, began, &mut log) {
             Then::Quit => return RunEnd::Quit,
             Then::Speed(speed) => {
                 rate = TimeRate::Times(speed);
@@ -141,10 +141,10 @@ pub fn run(
             Wait::Not => {}
             Wait::For(ahead) => thread::sleep(ahead),
             Wait::Lost(lost) => {
-                if told.is_none_or(|told| now.saturating_sub(told) > TOLD_EVERY) {
+                if reported.is_none_or(|at| now.saturating_sub(at) > REPORTED_EVERY) {
                     let (now_s, lost_s) = (server.now_s(), lost.as_secs_f64());
-                    tell(&format!("{now_s:.3} behind: this machine was too slow or suspended; {lost_s:.1} s are lost"));
-                    told = Some(now);
+                    log(&format!("{now_s:.3} behind: this machine was too slow or suspended; {lost_s:.1} s are lost"));
+                    reported = Some(now);
                 }
             }
         }
@@ -152,9 +152,9 @@ pub fn run(
 }
 
 /// Runs a millisecond.
-fn step(server: &mut Server, ports: &mut Ports, began: Instant, mut tell: impl FnMut(&str)) -> Then {
-    ports.receive(server, began.elapsed(), &mut tell);
-    server.step(|vehicle, bytes| ports.send(vehicle, bytes), &mut tell)
+fn step(server: &mut Server, ports: &mut Ports, began: Instant, mut log: impl FnMut(&str)) -> Then {
+    ports.receive(server, began.elapsed(), &mut log);
+    server.step(|vehicle, bytes| ports.send(vehicle, bytes), &mut log)
 }
 
 fn factor(rate: TimeRate) -> f64 {

@@ -71,7 +71,7 @@ impl Server {
         self.vehicles.iter().map(ServedVehicle::system).collect()
     }
 
-    /// Returns a system id that several vehicles have: no station can tell them apart.
+    /// Returns a system id that several vehicles have: no station can distinguish them.
     pub fn ambiguous(&self) -> Option<u8> {
         let mut systems = self.systems();
         systems.sort_unstable();
@@ -93,32 +93,32 @@ impl Server {
         self.vehicles.get_mut(vehicle).into_iter().for_each(|it| it.forget(peer));
     }
 
-    /// Runs a millisecond. Passes to `send` what each vehicle has sent, whole frames, by its place, and to `tell` what
-    /// is worth telling, a line each.
-    pub fn step(&mut self, mut send: impl FnMut(usize, &[u8]), mut tell: impl FnMut(&str)) -> Then {
-        let then = self.turn_to_agenda(&mut tell);
+    /// Runs a millisecond. Passes to `send` what each vehicle has sent, whole frames, by its place, and to `log` what
+    /// is worth a line, one each.
+    pub fn step(&mut self, mut send: impl FnMut(usize, &[u8]), mut log: impl FnMut(&str)) -> Then {
+        let then = self.turn_to_agenda(&mut log);
         let (now_s, mut changed) = (self.now_s(), false);
         for (place, vehicle) in self.vehicles.iter_mut().enumerate() {
             let system = vehicle.system();
-            let bytes = vehicle.step(|text| tell(&format!("{now_s:.3} vehicle {system}: {text}")));
+            let bytes = vehicle.step(|text| log(&format!("{now_s:.3} vehicle {system}: {text}")));
             send(place, &bytes);
             changed |= vehicle.system() != system;
         }
         if let Some(system) = self.ambiguous().filter(|_| changed) {
-            tell(&format!("{now_s:.3} several vehicles have the system id {system}: set MAV_SYS_ID of one of them"));
+            log(&format!("{now_s:.3} several vehicles have the system id {system}: set MAV_SYS_ID of one of them"));
         }
         self.now_ms += 1;
         then
     }
 
     /// Carries out what is due.
-    fn turn_to_agenda(&mut self, tell: &mut impl FnMut(&str)) -> Then {
+    fn turn_to_agenda(&mut self, log: &mut impl FnMut(&str)) -> Then {
         let mut then = Then::Nothing;
         let due = self.agenda.partition_point(|(at_ms, ..)| *at_ms <= self.now_ms);
         for (_, line, text) in self.agenda.drain(..due).collect::<Vec<_>>() {
             let reply = self.carry_out(&line, &text);
             let now_s = self.now_s();
-            reply.lines.iter().for_each(|text| tell(&format!("{now_s:.3} {text}")));
+            reply.lines.iter().for_each(|text| log(&format!("{now_s:.3} {text}")));
             if reply.then != Then::Nothing {
                 then = reply.then;
             }
@@ -167,13 +167,13 @@ impl Server {
             ServerCommand::Status => {
                 let wanted = |vehicle: &&ServedVehicle| line.vehicle.is_none_or(|system| vehicle.system() == system);
                 let lines = self.vehicles.iter().filter(wanted).map(ServedVehicle::status);
-                Reply::told(lines.collect(), &format!("{text}, {:.3} s", self.now_s()))
+                Reply::with(lines.collect(), &format!("{text}, {:.3} s", self.now_s()))
             }
             ServerCommand::Help => {
                 let lines = COMMANDS
                     .iter()
                     .map(|[name, arguments, meaning]| format!("{:<46} {meaning}", format!("{name} {arguments}")));
-                Reply::told(lines.collect(), text)
+                Reply::with(lines.collect(), text)
             }
             ServerCommand::Step(steps) => Reply { then: Then::Step(*steps), ..Reply::accepted(text) },
             ServerCommand::Speed(speed) => Reply { then: Then::Speed(*speed), ..Reply::accepted(text) },
@@ -190,10 +190,10 @@ impl Server {
 
 impl Reply {
     fn accepted(what: &str) -> Self {
-        Self::told(Vec::new(), what)
+        Self::with(Vec::new(), what)
     }
 
-    fn told(mut lines: Vec<String>, what: &str) -> Self {
+    fn with(mut lines: Vec<String>, what: &str) -> Self {
         lines.push(format!("ok {what}"));
         Reply { lines, then: Then::Nothing }
     }

@@ -37,7 +37,7 @@ pub struct ServedVehicle {
     reported: ReportedSensors,
     scenario: Scenario,
     keeper: Option<ParameterFile>,
-    /// What is to be told of the parameters that were stored.
+    /// What is to be reported of the parameters that were stored.
     notices: Vec<String>,
 }
 
@@ -87,9 +87,9 @@ impl ServedVehicle {
         self.peers.remove(&peer);
     }
 
-    /// Runs a millisecond; returns the bytes that it has sent, whole frames. What is worth telling goes to `tell`.
-    pub fn step(&mut self, mut tell: impl FnMut(&str)) -> Vec<u8> {
-        self.notices.drain(..).for_each(|notice| tell(&notice));
+    /// Runs a millisecond; returns the bytes that it has sent, whole frames. What is worth a line goes to `log`.
+    pub fn step(&mut self, mut log: impl FnMut(&str)) -> Vec<u8> {
+        self.notices.drain(..).for_each(|notice| log(&notice));
         self.world.look();
         if let Some(readings) = self.world.readings() {
             self.host.sense(readings);
@@ -99,14 +99,14 @@ impl ServedVehicle {
         let HostTick { report, bytes, change } = self.host.next_tick(&[]);
         self.world.advance(&report.motors);
         if report.mode.armed() != self.mode.armed() {
-            tell(if report.mode.armed() { "armed" } else { "disarmed" });
+            log(if report.mode.armed() { "armed" } else { "disarmed" });
         }
         self.mode = report.mode;
-        frames(&bytes).filter_map(|frame| frame.text()).for_each(|text| tell(&text));
+        frames(&bytes).filter_map(|frame| frame.text()).for_each(|text| log(&text));
         if let (Some(keeper), Some(change)) = (&mut self.keeper, change)
             && let Err(error) = keeper.keep(change)
         {
-            // The reason is a text to the stations, and told with it.
+            // The reason is a text to the stations, and reported with it.
             self.host.comms().warn(error.reason());
         }
         // What was sent before has left.

@@ -70,7 +70,7 @@ impl WorldChanges {
                 if !has(&self.suite, instrument) {
                     return Err(absent());
                 }
-                world.instruments_mut().ok_or_else(absent)?.fail(fault).map_err(told)?;
+                world.instruments_mut().ok_or_else(absent)?.fail(fault).map_err(in_words)?;
                 self.failures.push(fault);
                 Ok(())
             }
@@ -78,18 +78,18 @@ impl WorldChanges {
                 let mut faults = self.rotors.clone();
                 faults.retain(|fault| fault.rotor != rotor);
                 faults.push(RotorFault { rotor, efficiency, start_s: now_s });
-                world.plant_mut().set_rotor_faults(faults.clone()).map_err(told)?;
+                world.plant_mut().set_rotor_faults(faults.clone()).map_err(in_words)?;
                 self.rotors = faults;
                 Ok(())
             }
-            WorldChange::Battery(share) => match world.plant_mut().set_charge(share).map_err(told)? {
+            WorldChange::Battery(share) => match world.plant_mut().set_charge(share).map_err(in_words)? {
                 true => Ok(()),
                 false => Err("this vehicle has no battery".into()),
             },
             WorldChange::Clear => {
                 let wind = self.scenario_wind.clone();
                 self.set_wind(world, |now| *now = wind)?;
-                world.plant_mut().set_rotor_faults(Vec::new()).map_err(told)?;
+                world.plant_mut().set_rotor_faults(Vec::new()).map_err(in_words)?;
                 world.plant_mut().set_environment(self.scenario_environment.clone());
                 world.instruments_mut().into_iter().for_each(|instruments| instruments.clear_faults());
                 self.rotors.clear();
@@ -103,7 +103,7 @@ impl WorldChanges {
     fn set_wind(&mut self, world: &mut World, change: impl FnOnce(&mut Wind)) -> Result<(), String> {
         let mut wind = self.wind.clone();
         change(&mut wind);
-        world.plant_mut().set_wind(&wind).map_err(told)?;
+        world.plant_mut().set_wind(&wind).map_err(in_words)?;
         self.wind = wind;
         Ok(())
     }
@@ -131,7 +131,7 @@ fn load(
     let mut payloads = old.payloads().to_vec();
     change(&mut gusts, &mut changes, &mut payloads);
     let new = Environment::new(*old.nominal(), changes, gusts).and_then(|new| new.with_payloads(payloads));
-    world.plant_mut().set_environment(new.map_err(told)?);
+    world.plant_mut().set_environment(new.map_err(in_words)?);
     Ok(())
 }
 
@@ -145,6 +145,6 @@ fn has(suite: &InstrumentSuite, instrument: &str) -> bool {
     }
 }
 
-fn told(error: OutOfRange) -> String {
+fn in_words(error: OutOfRange) -> String {
     out_of_range(&error)
 }

@@ -1,5 +1,5 @@
 //! Flights that gains have to survive, whatever they cost: what the training flights, all on the vehicle that the law
-//! was told of, do not show.
+//! knows of, do not show.
 
 use crate::fast;
 use crate::maker::{self, Maker, TrainingFlight};
@@ -126,7 +126,7 @@ pub fn conditions_on(vehicle: &Vehicle) -> Result<Vec<Condition>, Box<dyn Error>
     Ok(conditions)
 }
 
-/// A random flight in turbulence on a vehicle that differs from what its law is told: as the campaign `robustness`
+/// A random flight in turbulence on a vehicle that differs from what its law assumes: as the campaign `robustness`
 /// draws them on the paper's, but never beyond what the rotors carry.
 fn drawn(maker: &Maker<'_>, index: u64, time: f64) -> Result<Scenario, Box<dyn Error>> {
     let mut noise = Noise::new(SEED + index, Stream::Scenario);
@@ -164,7 +164,7 @@ fn drawn(maker: &Maker<'_>, index: u64, time: f64) -> Result<Scenario, Box<dyn E
     Ok(scenario)
 }
 
-/// A built-in scenario on another built-in vehicle, whose rotors lag `slower` times as much as its law is told; if they
+/// A built-in scenario on another built-in vehicle, whose rotors lag `slower` times as much as its law assumes; if they
 /// do, commands and states are late as well.
 fn vehicle(vehicle: &str, name: &str, slower: f64) -> Result<Condition, Box<dyn Error>> {
     let vehicle = afbc_vehicles::built_in(vehicle).ok_or("no vehicle")?.read()?;

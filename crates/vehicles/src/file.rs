@@ -102,7 +102,7 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
     Ok(vehicle)
 }
 
-/// Returns what laws are told of the drag of a vehicle with `count` rotors.
+/// Returns what laws know of the drag of a vehicle with `count` rotors.
 fn known_drag(drag: &Drag, vehicle: &Parameters<f64>, count: usize) -> KnownDrag {
     let Parameters { mass_kg, gravity_m_s2, thrust_factor_n_s2, .. } = *vehicle;
     let all_rad_s = libm::sqrt(count as f64 * mass_kg * gravity_m_s2 / thrust_factor_n_s2);

@@ -16,7 +16,7 @@ use std::process::ExitCode;
 /// Run a recorded flight through the estimator, and compare with the estimate in the log
 ///
 /// The log is a PX4 ULog, or the CSV of PX4-ECL's replay tests with its estimate beside it in <name>_ekf2.csv. What it
-/// lacks is told; only the inertial sensor's samples must be there.
+/// lacks is reported; only the inertial sensor's samples must be there.
 #[derive(Args, Debug)]
 pub(crate) struct Replay {
     /// Path of the log
@@ -27,7 +27,7 @@ pub(crate) struct Replay {
     from: Option<f64>,
 
     /// Error of the heading that the vehicle's own field makes, as a standard deviation; 0 for a magnetometer that is
-    /// calibrated perfectly [default: what the log's field tells]
+    /// calibrated perfectly [default: what the log's field shows]
     #[arg(long, value_name = "RAD", value_parser = compass_error)]
     compass_error: Option<f32>,
 

@@ -91,7 +91,7 @@ pub(crate) struct Serve {
 }
 
 impl Serve {
-    /// Serves until it is told to end.
+    /// Serves until it is asked to end.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let target = if self.indoors { Target::from("mocap") } else { self.scenario.clone() };
         let mut scenario = self.on.put(target.scenario()?)?;

@@ -70,7 +70,7 @@ pub(super) fn named(path: &Path) -> Result<Vehicle, FileError> {
         },
         None => afbc_vehicles::load(path),
     }?;
-    // Gains of every law, so that a slip in a table's name is told whoever flies.
+    // Gains of every law, so that a slip in a table's name is reported whoever flies.
     Law::on(ControllerKind::Afbc, &vehicle, Profile::Flight)?;
     Ok(vehicle)
 }

@@ -1,4 +1,4 @@
-//! What a vehicle's file does not tell: wind, a payload, a fault.
+//! What a vehicle's file does not state: wind, a payload, a fault.
 
 use super::bisection::largest;
 use afbc_plant::noise::Noise;
@@ -16,7 +16,7 @@ const WIND_M_S: f64 = 4.0;
 /// Largest additional age of the state \[s\].
 const AGE_S: f64 = 0.012;
 
-/// A difference between what flies and what the controllers are told.
+/// A difference between what flies and what the controllers know.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Change {
     /// None.

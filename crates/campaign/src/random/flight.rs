@@ -42,7 +42,7 @@ pub struct DrawnFlight {
     pub speed_m_s: f64,
     /// Largest acceleration of the reference \[m/s2\].
     pub acceleration_m_s2: f64,
-    /// What the vehicle's file does not tell.
+    /// What the vehicle's file does not state.
     pub change: Change,
     /// The flight.
     pub scenario: Scenario,

@@ -34,7 +34,7 @@ pub enum ExtendedRequest {
     },
 }
 
-/// What is told of them.
+/// What is reported of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExtendedAnswer {
     /// PARAM_EXT_VALUE (322).

@@ -27,7 +27,7 @@ pub enum LogRequest {
     },
 }
 
-/// What is told of the logs.
+/// What is reported of the logs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LogAnswer {
     /// LOG_ENTRY (118).

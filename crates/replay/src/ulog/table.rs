@@ -146,7 +146,7 @@ pub(super) struct Tables {
     /// Messages by topic and instance, in the order of the file.
     rows: HashMap<(&'static str, u8), Vec<Row>>,
     parameters: HashMap<String, f64>,
-    /// What is to be told of the file.
+    /// What is to be reported of the file.
     pub(super) notes: Vec<String>,
 }
 

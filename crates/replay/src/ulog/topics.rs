@@ -16,7 +16,7 @@ const GNSS_DELAY_MS: f64 = 110.0;
 /// A relative time of old layouts that says that there is nothing.
 const NOTHING: f64 = i32::MAX as f64;
 
-/// Returns what the tables tell.
+/// Returns what the tables contain.
 ///
 /// # Errors
 /// If there is no inertial sensor.
@@ -52,12 +52,12 @@ pub(super) fn recording(tables: &Tables) -> Result<Recording, String> {
     recording.states = states::merged(attitudes, motions);
     compass::doubt(&mut recording, earth.as_ref());
     recording.resets = resets(tables);
-    let told = |topic: Topic, of: &dyn Fn(&Row) -> bool| {
-        let told = tables.first(topic).iter().map(|row| (row.timestamp_us(), of(row))).collect();
-        rising(told, |(at_us, _)| *at_us).0
+    let flags = |topic: Topic, of: &dyn Fn(&Row) -> bool| {
+        let values = tables.first(topic).iter().map(|row| (row.timestamp_us(), of(row))).collect();
+        rising(values, |(at_us, _)| *at_us).0
     };
-    recording.landed = told(VEHICLE_LAND_DETECTED, &|row| row.get("landed") > 0.0);
-    recording.disarmed = told(ACTUATOR_ARMED, &|row| row.get("armed") == 0.0);
+    recording.landed = flags(VEHICLE_LAND_DETECTED, &|row| row.get("landed") > 0.0);
+    recording.disarmed = flags(ACTUATOR_ARMED, &|row| row.get("armed") == 0.0);
     Ok(recording)
 }
 
@@ -107,7 +107,7 @@ struct Fixes {
     topic: &'static str,
     fixes: Vec<Fix>,
     raw: usize,
-    /// Time of day of the last fix that tells it.
+    /// Time of day of the last fix that has it.
     utc_us: Option<f64>,
 }
 
@@ -152,11 +152,11 @@ fn fix(row: &Row) -> Option<Fix> {
         either("altitude_msl_m", "alt", 1e-3),
     ];
     let velocity_m_s = row.vector(["vel_n_m_s", "vel_e_m_s", "vel_d_m_s"]);
-    let told = velocity_m_s.iter().all(|speed| speed.is_finite()) && row.get("vel_ned_valid") != 0.0;
+    let is_valid = velocity_m_s.iter().all(|speed| speed.is_finite()) && row.get("vel_ned_valid") != 0.0;
     let fix = Fix {
         arrived_us: row.timestamp_us(),
         place,
-        velocity_m_s: told.then_some(velocity_m_s),
+        velocity_m_s: is_valid.then_some(velocity_m_s),
         horizontal_m: row.get("eph"),
         vertical_m: row.get("epv"),
         speed_m_s: row.get("s_variance_m_s"),
@@ -257,7 +257,7 @@ fn declination(tables: &Tables, earth: Option<&Field>, notes: &mut Vec<String>) 
     let stored = tables.parameter("EKF2_MAG_DECL").map(|degrees| degrees.to_radians() as f32);
     let modelled = earth.map(|field| field.declination_rad);
     modelled.or(stored.filter(|angle| angle.abs() <= core::f32::consts::PI)).unwrap_or_else(|| {
-        notes.push("Nobody tells the declination: the heading is magnetic.".into());
+        notes.push("The declination is unknown: the heading is magnetic.".into());
         0.0
     })
 }

@@ -118,7 +118,7 @@ struct Line<'a, A> {
     /// Time since the last rotor command.
     silent_ms: u64,
     has_armed: bool,
-    /// True if a tracker tells the vehicle its place in the scenario's frame.
+    /// True if a tracker gives the vehicle its place in the scenario's frame.
     is_placed: bool,
     /// What the setpoints are shifted by \[m\].
     shift_m: Vector3<f32>,

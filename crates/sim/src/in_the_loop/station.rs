@@ -96,7 +96,7 @@ impl Station {
         self.say(&Uplink::Setpoint(setpoint));
     }
 
-    /// Queues a heartbeat, which tells the vehicle that the station is there.
+    /// Queues a heartbeat, which shows the vehicle that the station is there.
     pub fn beat(&mut self) {
         self.say(&Uplink::Heartbeat);
     }
