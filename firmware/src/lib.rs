@@ -51,7 +51,7 @@ pub fn run<B: Board>(
     let (mut board, receiver, mut transmitter, memory) = B::start(executors.control);
     let (kept, table) = parameters::read(memory, B::STORE);
     // In range: a whole number.
-    transmitter.set_baud(table.configuration().link.baud as u32);
+    transmitter.set_baud(table.configuration().link.baud);
     let flight = control::make(table.configuration());
     let desk = comms::make(table);
     board.unleash_watchdog();

@@ -12,9 +12,9 @@ use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::{Configuration, Link};
 use afbc_plant::instruments::{Accelerometer, Barometer, Gnss, Gyroscope, Imu, Magnetometer, TrackerModel};
 use afbc_plant::{Battery, Contact, Deviations, Drag, Dropouts, GroundEffect, Rotors, Sensing, Turbulence, Wind};
-use afbc_reader::words::number;
+use afbc_reader::words::{self, number};
 use afbc_sim::contender::{ControllerKind, Law};
-use afbc_types::{Declaration, Declared, Mounting, OutOfRange, Parameters, Value};
+use afbc_types::{Declaration, Declared, Mounting, OutOfRange, Parameters, Range, Value};
 use core::convert::Infallible;
 use core::fmt::Write;
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,6 +26,8 @@ struct Row {
     name: String,
     /// Value in each of the group's columns.
     values: Vec<String>,
+    /// Accepted values, of a choice with their numbers.
+    accepted: String,
     declaration: Declaration,
 }
 
@@ -55,7 +57,23 @@ fn shown(value: &Value<'_>) -> Vec<String> {
     match value {
         Value::Single(numbers) => numbers.iter().map(|number| format!("{number:?}")).collect(),
         Value::Double(numbers) => numbers.iter().map(|number| format!("{number:?}")).collect(),
+        Value::Whole(number) => vec![number.to_string()],
         Value::Switch(on) => vec![on.to_string()],
+        Value::Choice(index, words) => vec![words[*index].to_owned()],
+    }
+}
+
+/// Returns what is accepted in place of a value.
+fn accepted(range: &Range, value: &Value<'_>) -> String {
+    match value {
+        Value::Switch(_) => "true, false".into(),
+        Value::Choice(_, words) => {
+            let numbered =
+                words.iter().enumerate().map(|(index, word)| format!("{} {word}", index + range.min as usize));
+            numbered.collect::<Vec<_>>().join(", ")
+        }
+        Value::Whole(_) => format!("{} to {}", range.min, range.max),
+        _ => format!("{:?} to {:?}", range.min, range.max),
     }
 }
 
@@ -68,12 +86,13 @@ fn columns<G: Declared, const N: usize>(
     for (_, parameters) in &columns {
         let mut at = 0;
         let Ok(()) = parameters.visit(&mut |declaration, value| {
-            let values = shown(&value);
+            let (values, accepted) = (shown(&value), accepted(&declaration.range, &value));
             let coordinates = if values.len() == 1 { vec![None] } else { vec![Some('X'), Some('Y'), Some('Z')] };
             for (coordinate, value) in coordinates.into_iter().zip(values) {
                 if rows.len() == at {
                     let name = declaration.name(prefix, coordinate).to_string();
-                    rows.push(Row { name, values: Vec::new(), declaration: *declaration });
+                    let accepted = accepted.clone();
+                    rows.push(Row { name, values: Vec::new(), accepted, declaration: *declaration });
                 }
                 rows[at].values.push(value);
                 at += 1;
@@ -165,10 +184,9 @@ fn page() -> String {
         write!(page, "\n## {title}\n\n{prefix}.\n\n").unwrap();
         writeln!(page, "| name | key | unit | range | {} | tuned | meaning |", columns.join(" | ")).unwrap();
         writeln!(page, "|---|---|---|---|{}---|---|", "---|".repeat(columns.len())).unwrap();
-        for Row { name, values, declaration: Declaration { group, range, unit, tuned, meaning, .. } } in rows {
+        for Row { name, values, accepted, declaration } in rows {
+            let Declaration { group, range, unit, tuned, meaning, .. } = declaration;
             let key = if group.is_empty() { range.name.to_owned() } else { format!("{group}.{}", range.name) };
-            let accepted =
-                if unit.is_empty() { "true, false".to_owned() } else { format!("{:?} to {:?}", range.min, range.max) };
             let (tuned, meaning) = (if tuned { "yes" } else { "" }, meaning.replace('|', "\\|"));
             let values = values.join("` | `");
             writeln!(page, "| `{name}` | `{key}` | {unit} | {accepted} | `{values}` | {tuned} | {meaning} |").unwrap();
@@ -184,11 +202,12 @@ fn keys(parameters: impl Declared) -> Vec<(&'static str, [String; 4])> {
         let Declaration { group, range, unit, meaning, .. } = *declaration;
         let values = shown(&value);
         let (each, default) = match values.as_slice() {
-            [value] => ("", value.clone()),
+            [_] => ("", words::value(&value)),
             values => (" each", format!("[{}]", values.join(", "))),
         };
         let accepted = match &value {
             Value::Switch(_) => "`true`, `false`".to_owned(),
+            Value::Choice(_, words) => words.iter().map(|word| format!("`\"{word}\"`")).collect::<Vec<_>>().join(", "),
             _ => format!("{} to {}{each}", number(range.min), number(range.max)),
         };
         // As a part of a sentence, unless it begins with a symbol or an abbreviation.

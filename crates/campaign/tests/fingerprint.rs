@@ -5,6 +5,7 @@
 
 use afbc::Profile;
 use afbc_campaign::{self as campaign, Campaign, Course, Manifest, Shard, Spread};
+use afbc_reader::words;
 use afbc_sim::contender::{Contender, ControllerKind, Law};
 use afbc_sim::scenario::{self, Scenario};
 use afbc_types::{Axis, Declaration, Declared, Mounting, Parameters, Value};
@@ -231,14 +232,7 @@ fn lines(parameters: &impl Declared, group: &str) -> String {
     let mut lines = String::new();
     let Ok(()) = parameters.visit(&mut |declaration: &Declaration, value: Value<'_>| {
         if declaration.group == group {
-            let key = declaration.range.name;
-            match value {
-                Value::Single([number]) => writeln!(lines, "{key} = {number:?}").unwrap(),
-                Value::Double([number]) => writeln!(lines, "{key} = {number:?}").unwrap(),
-                Value::Single(numbers) => writeln!(lines, "{key} = {numbers:?}").unwrap(),
-                Value::Double(numbers) => writeln!(lines, "{key} = {numbers:?}").unwrap(),
-                Value::Switch(switch) => writeln!(lines, "{key} = {switch}").unwrap(),
-            }
+            writeln!(lines, "{} = {}", declaration.range.name, words::value(&value)).unwrap();
         }
         Ok::<(), Infallible>(())
     });

@@ -18,7 +18,7 @@ pub struct BatteryReading {
 /// What is known of a battery's cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Cells {
-    pub(crate) number: f32,
+    pub(crate) number: u32,
     pub(crate) empty_v: f32,
     pub(crate) full_v: f32,
     pub(crate) resistance_ohm: f32,
@@ -29,13 +29,13 @@ impl Cells {
     fn charge(&self, reading: &BatteryReading) -> Option<f32> {
         let BatteryReading { voltage_v, current_a } = *reading;
         let plausible = voltage_v > 0.0 && voltage_v < 1e3 && current_a.abs() < 1e4;
-        let cell_v = voltage_v / self.number + current_a * self.resistance_ohm;
+        let cell_v = voltage_v / self.number as f32 + current_a * self.resistance_ohm;
         plausible.then(|| max(min((cell_v - self.empty_v) / (self.full_v - self.empty_v), 1.0), 0.0))
     }
 
     /// Updates a filtered charge; `None` stays so until the first plausible reading.
     pub(crate) fn update(&self, charge: &mut Option<f32>, reading: Option<&BatteryReading>, dt_s: f32) {
-        let Some(now) = reading.filter(|_| self.number >= 1.0).and_then(|reading| self.charge(reading)) else { return };
+        let Some(now) = reading.filter(|_| self.number > 0).and_then(|reading| self.charge(reading)) else { return };
         let before = charge.unwrap_or(now);
         *charge = Some(before + (now - before) * (dt_s / SMOOTH_S));
     }

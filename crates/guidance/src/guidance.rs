@@ -382,7 +382,7 @@ impl Memory {
     fn against(&self, settings: &Settings, given: &GuidanceInputs<'_>, state: Option<&State>) -> Reasons {
         let mut reasons = Reasons::NONE;
         // Without a number of cells the battery is not watched.
-        let watched = settings.net.cells >= 1.0;
+        let watched = settings.net.cells > 0;
         let known = given.battery.is_some() && self.watch.charge().is_some();
         reasons.note(watched && (!known || self.watch.holds(Cause::BatteryLow)), Refusal::BatteryLow);
         reasons.note(given.sensors.any(), Refusal::SensorFailed);

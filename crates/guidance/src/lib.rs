@@ -13,6 +13,7 @@
 //! 5. [`settings`]: the parameters.
 #![no_std]
 
+pub mod actions;
 pub mod battery;
 mod course;
 pub mod guidance;
@@ -31,6 +32,7 @@ mod sticks;
 pub mod table;
 mod targets;
 
+pub use actions::{BatteryAction, FenceAction, SensorsAction, StationAction, SticksAction, TargetsAction};
 pub use battery::BatteryReading;
 pub use guidance::{Guidance, GuidanceInputs, Guided};
 pub use lift::Lift;

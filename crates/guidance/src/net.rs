@@ -3,11 +3,12 @@
 //! The strongest action of all findings counts; of several findings with the same action the first in the order of
 //! [`Cause::ALL`] is named.
 
+use crate::actions::{BatteryAction, FenceAction, SensorsAction, StationAction, SticksAction, TargetsAction};
 use crate::battery::{BatteryReading, Cells};
 use crate::mode::FlightMode;
 use crate::notice::{Cause, Notice, Notices};
 use crate::table::FailsafeAction;
-use afbc_types::{Declaration, OutOfRange, Range, parameters};
+use afbc_types::{Range, parameters};
 use nalgebra::Vector3;
 
 /// Distance inside the geofence at which it no longer counts as left \[m\].
@@ -23,27 +24,27 @@ parameters! {
         /// Largest height above home; 0 for none.
         #[parameter(GF_MAX_VER_DIST, "m", 0.0..=10000.0)]
         pub fence_height_m: f32 = 0.0,
-        /// Outside the geofence: 0 nothing, 1 warn, 2 hold, 3 return, 4 and 5 land.
-        #[parameter(GF_ACTION, "number", 0.0..=5.0)]
-        pub fence_action: f32 = 2.0,
+        /// What follows outside the geofence; to terminate is to land.
+        #[choice(GF_ACTION)]
+        pub fence_action: FenceAction = FenceAction::Hold,
         /// Time after which a silent station counts as lost.
         #[parameter(COM_DL_LOSS_T, "s", 1.0..=300.0)]
         pub station_lost_s: f32 = 10.0,
-        /// Station lost: 0 nothing, 1 hold, 2 return, 3 land.
-        #[parameter(NAV_DLL_ACT, "number", 0.0..=3.0)]
-        pub station_action: f32 = 2.0,
-        /// Targets lost in offboard mode: 0 land, 1 hold, 2 return.
-        #[parameter(COM_OBL_ACT, "number", 0.0..=2.0)]
-        pub targets_action: f32 = 1.0,
-        /// Sticks lost in a mode that they fly: 1 hold, 2 return, 3 land.
-        #[parameter(NAV_RCL_ACT, "number", 1.0..=3.0)]
-        pub sticks_action: f32 = 1.0,
-        /// A sensor has failed: 0 nothing, 1 warn, 2 hold, 3 return, 4 land.
-        #[parameter(COM_SENS_ACT, "number", 0.0..=4.0)]
-        pub sensors_action: f32 = 1.0,
+        /// What follows from a lost station.
+        #[choice(NAV_DLL_ACT)]
+        pub station_action: StationAction = StationAction::Return,
+        /// What follows from lost targets in offboard mode.
+        #[choice(COM_OBL_ACT)]
+        pub targets_action: TargetsAction = TargetsAction::Hold,
+        /// What follows from lost sticks in a mode that they fly.
+        #[choice(NAV_RCL_ACT)]
+        pub sticks_action: SticksAction = SticksAction::Hold,
+        /// What follows from a failed sensor.
+        #[choice(COM_SENS_ACT)]
+        pub sensors_action: SensorsAction = SensorsAction::Warn,
         /// Number of the battery's cells; 0 if it is not to be watched.
         #[parameter(BAT1_N_CELLS, "number", 0.0..=24.0)]
-        pub cells: f32 = 0.0,
+        pub cells: u32 = 0,
         /// Voltage of an empty cell without load.
         #[parameter(BAT1_V_EMPTY, "V", 1.0..=10.0)]
         pub empty_v: f32 = 3.6,
@@ -62,33 +63,16 @@ parameters! {
         /// Charge below which it is almost empty, at most the critical one.
         #[parameter(BAT_EMERGEN_THR, "1", 0.0..=1.0)]
         pub emergency: f32 = 0.05,
-        /// Battery: 0 warn, 1 return if critical, 2 land if critical, 3 return if critical and land if almost empty.
-        #[parameter(COM_LOW_BAT_ACT, "number", 0.0..=3.0)]
-        pub battery_action: f32 = 3.0,
+        /// What follows from a critical battery; in `return-then-land`, the vehicle lands with an almost empty one.
+        #[choice(COM_LOW_BAT_ACT)]
+        pub battery_action: BatteryAction = BatteryAction::ReturnThenLand,
     }
     together(net) {
-        for (declaration, value) in [
-            (Net::GF_ACTION, net.fence_action),
-            (Net::NAV_DLL_ACT, net.station_action),
-            (Net::COM_OBL_ACT, net.targets_action),
-            (Net::NAV_RCL_ACT, net.sticks_action),
-            (Net::COM_SENS_ACT, net.sensors_action),
-            (Net::BAT1_N_CELLS, net.cells),
-            (Net::COM_LOW_BAT_ACT, net.battery_action),
-        ] {
-            whole(&declaration, value)?;
-        }
         let most = |range: Range, most: f32| Range { max: most.into(), ..range };
         most(Net::BAT1_V_EMPTY.range, net.full_v - 0.05).check(net.empty_v)?;
         most(Net::BAT_CRIT_THR.range, net.low).check(net.critical)?;
         most(Net::BAT_EMERGEN_THR.range, net.critical).check(net.emergency)
     }
-}
-
-/// Checks that a number in its range is a whole one.
-fn whole(declaration: &Declaration, value: f32) -> Result<(), OutOfRange> {
-    let whole = f64::from(value as i32);
-    Range { min: whole, max: whole, ..declaration.range }.check(value)
 }
 
 /// Sensors that have failed, one bit each.
@@ -216,18 +200,16 @@ pub(crate) fn announce(net: &Net, new: u16, but: Option<Cause>, notices: &mut No
 impl Net {
     /// Returns the action of a cause.
     pub fn action(&self, cause: Cause) -> FailsafeAction {
-        use FailsafeAction::{Hold, Land, None, Return, Warn};
-        let of = |number: f32, actions: &[FailsafeAction]| actions.get(number as usize).copied().unwrap_or(Land);
         match cause {
-            Cause::Descent => Land,
-            Cause::BatteryLow => Warn,
-            Cause::BatteryCritical => of(self.battery_action, &[Warn, Return, Land, Return]),
-            Cause::BatteryEmergency => of(self.battery_action, &[Warn, Return, Land, Land]),
-            Cause::Fence => of(self.fence_action, &[None, Warn, Hold, Return, Land, Land]),
-            Cause::Sensors => of(self.sensors_action, &[None, Warn, Hold, Return, Land]),
-            Cause::Station => of(self.station_action, &[None, Hold, Return, Land]),
-            Cause::Targets => of(self.targets_action, &[Land, Hold, Return]),
-            Cause::Sticks => of(self.sticks_action, &[Hold, Hold, Return, Land]),
+            Cause::Descent => FailsafeAction::Land,
+            Cause::BatteryLow => FailsafeAction::Warn,
+            Cause::BatteryEmergency if self.battery_action == BatteryAction::ReturnThenLand => FailsafeAction::Land,
+            Cause::BatteryCritical | Cause::BatteryEmergency => self.battery_action.action(),
+            Cause::Fence => self.fence_action.action(),
+            Cause::Sensors => self.sensors_action.action(),
+            Cause::Station => self.station_action.action(),
+            Cause::Targets => self.targets_action.action(),
+            Cause::Sticks => self.sticks_action.action(),
         }
     }
 

@@ -89,7 +89,7 @@ fn it_asks_to_disarm_on_the_ground() {
 #[test]
 fn what_bars_arming_has_its_limits() {
     let bars = |change: &dyn Fn(&mut Fixture)| {
-        let net = Net { cells: 3.0, fence_radius_m: 10.0, ..Net::DEFAULT };
+        let net = Net { cells: 3, fence_radius_m: 10.0, ..Net::DEFAULT };
         let mut fixture = Fixture::new(Settings { net, ..Settings::DEFAULT });
         fixture.battery = Some(BatteryReading { voltage_v: 11.7, current_a: 0.0 });
         fixture.run(1100);
@@ -113,7 +113,7 @@ fn what_bars_arming_has_its_limits() {
     assert_eq!(both, [Refusal::SensorFailed, Refusal::OutsideFence]);
     // Not watched without cells, and never known before the first reading.
     assert!(Fixture::new(Settings::DEFAULT).run(1100).against.is_empty());
-    let net = Net { cells: 3.0, ..Net::DEFAULT };
+    let net = Net { cells: 3, ..Net::DEFAULT };
     let mut fixture = Fixture::new(Settings { net, ..Settings::DEFAULT });
     fixture.battery = Some(BatteryReading { voltage_v: NAN, current_a: 0.0 });
     assert!(fixture.run(1100).against.iter().eq([Refusal::BatteryLow]));

@@ -167,7 +167,7 @@ proptest! {
 
     #[test]
     fn nothing_absurd_comes_out(spells in proptest::collection::vec(spell(), 1..40)) {
-        let settings = Settings { net: Net { cells: 3.0, ..Net::DEFAULT }, ..Settings::DEFAULT };
+        let settings = Settings { net: Net { cells: 3, ..Net::DEFAULT }, ..Settings::DEFAULT };
         let mut guidance = Guidance::new(settings).unwrap();
         let mut now_us = 5_000_000_u64;
         for spell in spells {

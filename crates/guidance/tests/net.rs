@@ -5,38 +5,38 @@ mod bench;
 
 use afbc_flight_core::{Mode, Refusal};
 use afbc_guidance::*;
-use afbc_types::{Declared, State};
+use afbc_types::{Choice, Declared, State};
 use bench::{Bench, motion, settings};
 use nalgebra::Vector3;
 
 /// Causes that a test can bring about in flight, with the numbers of their parameter and the mode of each.
-fn causes() -> Vec<(Cause, Vec<(f32, FailsafeAction)>)> {
+fn causes() -> Vec<(Cause, Vec<(usize, FailsafeAction)>)> {
     use FailsafeAction::{Hold, Land, None, Return, Warn};
     vec![
-        (Cause::Fence, vec![(0.0, None), (1.0, Warn), (2.0, Hold), (3.0, Return), (4.0, Land), (5.0, Land)]),
-        (Cause::Station, vec![(0.0, None), (1.0, Hold), (2.0, Return), (3.0, Land)]),
-        (Cause::Targets, vec![(0.0, Land), (1.0, Hold), (2.0, Return)]),
-        (Cause::Sensors, vec![(0.0, None), (1.0, Warn), (2.0, Hold), (3.0, Return), (4.0, Land)]),
-        (Cause::BatteryCritical, vec![(0.0, Warn), (1.0, Return), (2.0, Land), (3.0, Return)]),
-        (Cause::BatteryEmergency, vec![(0.0, Warn), (1.0, Return), (2.0, Land), (3.0, Land)]),
+        (Cause::Fence, vec![(0, None), (1, Warn), (2, Hold), (3, Return), (4, Land), (5, Land)]),
+        (Cause::Station, vec![(0, None), (1, Hold), (2, Return), (3, Land)]),
+        (Cause::Targets, vec![(0, Land), (1, Hold), (2, Return)]),
+        (Cause::Sensors, vec![(0, None), (1, Warn), (2, Hold), (3, Return), (4, Land)]),
+        (Cause::BatteryCritical, vec![(0, Warn), (1, Return), (2, Land), (3, Return)]),
+        (Cause::BatteryEmergency, vec![(0, Warn), (1, Return), (2, Land), (3, Land)]),
     ]
 }
 
-fn with(mut settings: Settings, cause: Cause, number: f32) -> Settings {
+fn with(mut settings: Settings, cause: Cause, number: usize) -> Settings {
     let net = &mut settings.net;
     match cause {
-        Cause::Fence => net.fence_action = number,
-        Cause::Station => net.station_action = number,
-        Cause::Targets => net.targets_action = number,
-        Cause::Sensors => net.sensors_action = number,
-        _ => net.battery_action = number,
+        Cause::Fence => net.fence_action = Choice::ALL[number],
+        Cause::Station => net.station_action = Choice::ALL[number],
+        Cause::Targets => net.targets_action = Choice::ALL[number],
+        Cause::Sensors => net.sensors_action = Choice::ALL[number],
+        _ => net.battery_action = Choice::ALL[number],
     }
     settings
 }
 
 fn quiet() -> Settings {
     let mut settings = settings();
-    settings.net = Net { cells: 3.0, fence_radius_m: 30.0, station_lost_s: 1.0, ..settings.net };
+    settings.net = Net { cells: 3, fence_radius_m: 30.0, station_lost_s: 1.0, ..settings.net };
     settings
 }
 
@@ -153,7 +153,7 @@ fn of_every_pair_the_stronger_action_counts() {
 
 #[test]
 fn a_failsafe_yields_to_stronger_modes_only_until_its_cause_is_over() {
-    let mut bench = offboard(with(quiet(), Cause::Station, 2.0));
+    let mut bench = offboard(with(quiet(), Cause::Station, 2));
     bring_about(&mut bench, Cause::Station);
     stream(&mut bench, 2.0);
     assert_eq!(bench.guidance.mode(), FlightMode::Return);
@@ -173,7 +173,7 @@ fn a_failsafe_yields_to_stronger_modes_only_until_its_cause_is_over() {
 
 #[test]
 fn on_the_ground_a_failsafe_disarms() {
-    for (number, disarms) in [(1.0, false), (2.0, true), (3.0, true)] {
+    for (number, disarms) in [(1, false), (2, true), (3, true)] {
         let mut bench = Bench::new(with(quiet(), Cause::Station, number));
         bench.battery = charge(0.8);
         bench.run(1.5);
@@ -270,7 +270,7 @@ fn the_charge_is_that_without_load() {
 
 #[test]
 fn a_battery_does_not_recover_in_flight() {
-    let mut bench = offboard(with(quiet(), Cause::BatteryCritical, 0.0));
+    let mut bench = offboard(with(quiet(), Cause::BatteryCritical, 0));
     bench.battery = charge(0.06);
     stream(&mut bench, 15.0);
     bench.battery = charge(0.9);
@@ -403,10 +403,7 @@ fn parameters_are_validated_by_name() {
     assert_eq!(Settings::DEFAULT.validate(), Ok(()));
     let net = Net::DEFAULT;
     for (net, name) in [
-        (Net { fence_action: 6.0, ..net }, "fence_action"),
-        (Net { station_action: 1.5, ..net }, "station_action"),
-        (Net { targets_action: f32::NAN, ..net }, "targets_action"),
-        (Net { cells: 2.5, ..net }, "cells"),
+        (Net { cells: 25, ..net }, "cells"),
         (Net { empty_v: 4.05, ..net }, "empty_v"),
         (Net { critical: 0.2, ..net }, "critical"),
         (Net { emergency: 0.08, ..net }, "emergency"),

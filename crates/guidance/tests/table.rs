@@ -239,7 +239,7 @@ proptest! {
     #[test]
     fn random_walks_follow_the_table(steps in steps()) {
         let mut settings = settings();
-        (settings.net.cells, settings.net.fence_radius_m, settings.net.fence_height_m) = (1.0, 35.0, 25.0);
+        (settings.net.cells, settings.net.fence_radius_m, settings.net.fence_height_m) = (1, 35.0, 25.0);
         let mut bench = Bench::new(settings);
         bench.battery = Some(BatteryReading { voltage_v: 4.0, current_a: 0.0 });
         bench.run(1.5);

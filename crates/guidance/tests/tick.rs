@@ -127,7 +127,7 @@ fn selecting_a_hold_again_stops() {
     assert!(fixture.place().x < 25.0, "{:?}", fixture.place());
     assert_eq!(fixture.said, [], "no other mode");
     // A failsafe's return stays one.
-    let net = Net { station_lost_s: 1.0, station_action: 2.0, ..Net::DEFAULT };
+    let net = Net { station_lost_s: 1.0, station_action: StationAction::Return, ..Net::DEFAULT };
     let mut fixture = Fixture::flying(Settings { net, ..Settings::DEFAULT });
     fixture.orders.heard_us = Some(fixture.now_us);
     let guided = fixture.run(1100);

@@ -8,10 +8,10 @@ parameters! {
     pub struct Link {
         /// MAVLink system id, from the next start on.
         #[parameter(MAV_SYS_ID, "number", 1.0..=250.0)]
-        pub system: f32 = 1.0,
+        pub system: u32 = 1,
         /// Baud rate of the serial line, and so what telemetry may take of it, from the next start on.
         #[parameter(SER_TEL1_BAUD, "number", 9600.0..=921600.0)]
-        pub baud: f32 = 921_600.0,
+        pub baud: u32 = 921_600,
     }
 }
 
@@ -30,9 +30,8 @@ pub struct Setup {
 impl Setup {
     /// What the parameters make of it: nine tenths of the line, whose bytes have ten bits; no reboot.
     pub fn of(link: &Link) -> Self {
-        // In range: a whole number each.
-        let (system, baud) = (link.system as u8, link.baud as u32);
-        Setup { system, bytes_per_s: baud / 100 * 9, reboots: false }
+        // In range: at most 250.
+        Setup { system: link.system as u8, bytes_per_s: link.baud / 100 * 9, reboots: false }
     }
 }
 

@@ -19,7 +19,7 @@ const ARM_DISARM: u16 = 400;
 
 /// One that watches its battery of three cells, and lies within its fence of 10 m.
 fn bench() -> Bench {
-    let net = Net { cells: 3.0, fence_radius_m: 10.0, ..Net::DEFAULT };
+    let net = Net { cells: 3, fence_radius_m: 10.0, ..Net::DEFAULT };
     let guidance = Settings { net, ..Settings::DEFAULT };
     let mut bench = Bench::new();
     bench.flight = Flight::new(&Configuration { guidance, ..Configuration::default() }).expect("valid");
@@ -227,7 +227,7 @@ fn stands() -> impl Strategy<Value = Stands> {
 
 /// One of random limits, whose link is wide enough for every text.
 fn limited(limits: &[f32; 4]) -> Bench {
-    let net = Net { cells: 3.0, fence_radius_m: 10.0, ..Net::DEFAULT };
+    let net = Net { cells: 3, fence_radius_m: 10.0, ..Net::DEFAULT };
     let [speed_max_m_s, rate_max_rad_s, tilt_max_rad, setpoint_distance_max_m] = *limits;
     let arming = afbc_onboard::ArmingLimits {
         tilt_max_rad: tilt_max_rad.clamp(0.01, 0.8),

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 const RING: usize = 1024;
 
 /// The vehicle on a line of so many baud.
-fn on(baud: f32) -> Bench {
+fn on(baud: u32) -> Bench {
     let mut bench = Bench::new();
     bench.table =
         ParameterTable::new(Configuration { link: Link { baud, ..Link::DEFAULT }, ..Configuration::default() });
@@ -38,7 +38,7 @@ struct Load {
 }
 
 fn load(baud: usize, seconds: usize) -> Load {
-    let mut bench = on(baud as f32);
+    let mut bench = on(baud as u32);
     let line_per_ms = baud as f64 / 10_000.0;
     for (message, _) in DEFAULTS {
         bench.hear(Uplink::Command(Command::SetInterval { message, interval_us: 1_000 }));
@@ -115,7 +115,7 @@ fn everything_at_full_rate_fits_the_line() {
 /// The rest of the line is for rotor commands, while they are sent.
 #[test]
 fn rotor_commands_have_the_rest_of_a_fast_line() {
-    let mut bench = on(921_600.0);
+    let mut bench = on(921_600);
     let wanted = DEFAULTS.iter().map(|(message, _)| *message).chain([id::HIL_ACTUATOR_CONTROLS]);
     for message in wanted {
         bench.hear(Uplink::Command(Command::SetInterval { message, interval_us: 1_000 }));

@@ -3,6 +3,7 @@
 
 mod common;
 
+use afbc_guidance::{BatteryAction, FenceAction, SticksAction};
 use afbc_link::{ParameterError, ParameterName, ParameterRequest, ParameterValue};
 use afbc_onboard::parameters::{
     Kept, Kind, LINK_SHARE, Parameter, ParameterTable, REASON_MAX, RecordChange, Service, VALUE_BYTES,
@@ -122,6 +123,35 @@ proptest! {
     }
 }
 
+/// Whole numbers, choices and switches are kept as the floats of their numbers, as they were when they were floats.
+#[test]
+fn what_was_kept_as_a_float_counts() {
+    let mut store = blank();
+    for (text, value) in [
+        ("GF_ACTION", 3.0_f32),
+        ("NAV_RCL_ACT", 2.0),
+        ("COM_LOW_BAT_ACT", 0.0),
+        ("BAT1_N_CELLS", 4.0),
+        ("MAV_SYS_ID", 7.0),
+        ("SER_TEL1_BAUD", 57_600.0),
+        ("C_BUMPLESS", 0.0),
+    ] {
+        store.set(name(text), 0, Some(value.to_bits())).unwrap();
+    }
+    let (table, _, notices) = restarted(store, &Kept::NOW);
+    assert_eq!(notices, [""; 0]);
+    let Configuration { settings, guidance, link, .. } = table.configuration();
+    let net = &guidance.net;
+    assert_eq!((net.fence_action, net.sticks_action), (FenceAction::Return, SticksAction::Return));
+    assert_eq!((net.battery_action, net.cells), (BatteryAction::Warn, 4));
+    assert_eq!((link.system, link.baud, settings.bumpless), (7, 57_600, false));
+    // And are sent as before.
+    for (text, value) in [("GF_ACTION", 3.0), ("NAV_RCL_ACT", 2.0), ("SER_TEL1_BAUD", 57_600.0)] {
+        let parameter = table.get(name(text)).unwrap();
+        assert_eq!((parameter.kind, parameter.value), (Kind::Int32, value));
+    }
+}
+
 #[test]
 fn refusals_say_what_to_change() {
     let mut table = table();
@@ -134,6 +164,9 @@ fn refusals_say_what_to_change() {
     assert_eq!(refused("V_INERTIA_X", 1.0), "V_INERTIA_X: hover_authority_rad_s2 below 80");
     assert_eq!(refused("C_BUMPLESS", 0.5), "C_BUMPLESS: must be a whole number");
     assert_eq!(refused("C_BUMPLESS", 2.0), "C_BUMPLESS: must be 0 to 1");
+    assert_eq!(refused("GF_ACTION", 2.5), "GF_ACTION: must be a whole number");
+    assert_eq!(refused("NAV_RCL_ACT", 0.0), "NAV_RCL_ACT: must be 1 to 3");
+    assert_eq!(refused("MAV_SYS_ID", 251.0), "MAV_SYS_ID: must be 1 to 250");
     assert_eq!(refused("C_DT", 0.002), "C_DT: dt_s above 0.001");
     assert_eq!(refused("EST_GYR_NOISE", 1.0), "EST_GYR_NOISE: must be 1e-6 to 0.1");
     assert_eq!(refused("EST_GRAVITY", 1.0), "EST_GRAVITY: must be 9.7 to 9.9");

@@ -174,7 +174,7 @@ fn receiver(sample: &Sample) -> Option<Address> {
 
 /// A vehicle at rest that knows where it is, on a line of so many baud, which is full: every stream but the answers
 /// among them is asked for each millisecond.
-fn on(baud: f32) -> Bench {
+fn on(baud: u32) -> Bench {
     let mut bench = Bench::new();
     bench.table =
         ParameterTable::new(Configuration { link: Link { baud, ..Link::DEFAULT }, ..Configuration::default() });
@@ -247,7 +247,7 @@ fn every_request_of_the_dialect_is_answered() {
         let message = MavMessage::default_message_from_id(sample.id).expect("of the dialect");
         let Expected::Answer(answers) = expected(&message) else { panic!("no request: {message:?}") };
         asked.insert(sample.id);
-        for baud in [57_600.0, 921_600.0] {
+        for baud in [57_600, 921_600] {
             for stations in [&[STATION][..], &[STATION, OTHER]] {
                 ask(&mut on(baud), stations, &sample, answers);
             }
@@ -269,7 +269,7 @@ fn nothing_else_is_answered() {
         let answers = sent.iter().filter(|sent| receiver(sent).is_some());
         assert_eq!(answers.count(), 0, "{sample:?}: {sent:?}");
     };
-    let mut bench = on(921_600.0);
+    let mut bench = on(921_600);
     for id in MavMessage::all_ids() {
         let message = MavMessage::default_message_from_id(*id).expect("of the dialect");
         if let Expected::None = expected(&message) {
@@ -306,7 +306,7 @@ fn nothing_else_is_answered() {
 /// Whoever asks for logs is told that there are none, of data that it ends.
 #[test]
 fn there_are_no_logs() {
-    let mut bench = on(921_600.0);
+    let mut bench = on(921_600);
     let list = at(&LOG_REQUEST_LIST_DATA { start: 0, end: 0xFFFF, ..LOG_REQUEST_LIST_DATA::DEFAULT }, 4, &[]);
     let told = ask(&mut bench, &[STATION], &list, &[118]);
     let entry = MavMessage::parse(MavlinkVersion::V2, 118, &told[0].payload).expect("an entry");
@@ -320,7 +320,7 @@ fn there_are_no_logs() {
 /// Every operation is refused with the next number, for the same session, with an error.
 #[test]
 fn every_file_operation_is_refused() {
-    let mut bench = on(921_600.0);
+    let mut bench = on(921_600);
     for operation in 0..128 {
         for (sequence, next) in [(0, 1), (777, 778), (u16::MAX, 0)] {
             let told = ask(&mut bench, &[OTHER], &file(sequence, operation, operation), &[110]);
@@ -337,7 +337,7 @@ fn every_file_operation_is_refused() {
 /// A name that there is not is an error that names it.
 #[test]
 fn what_there_is_not_is_named() {
-    let mut bench = on(921_600.0);
+    let mut bench = on(921_600);
     let mut name = [0; 16];
     name[..4].copy_from_slice(b"NONE");
     let read = at(&PARAM_REQUEST_READ_DATA { param_index: -1, param_id: name.into(), ..Default::default() }, 2, &[]);
@@ -364,7 +364,7 @@ fn what_there_is_not_is_named() {
 #[test]
 fn any_message_can_be_requested() {
     for message in MavMessage::all_ids() {
-        let mut bench = on(921_600.0);
+        let mut bench = on(921_600);
         bench.hear(Uplink::Command(Command::RequestMessage { message: *message, index: 0 }));
         let sent: Vec<_> = (0..WITHIN).flat_map(|_| step(&mut bench)).collect();
         let answer = sent.iter().find(|sent| sent.id == 77).expect("answered");
@@ -377,7 +377,7 @@ fn any_message_can_be_requested() {
 /// An upload by the messages of old, with numbers for places.
 #[test]
 fn a_mission_is_uploaded_by_messages_of_old() {
-    let mut bench = on(921_600.0);
+    let mut bench = on(921_600);
     let next = |told: &[Sample], number: u16| {
         let bytes = told[0].payload.clone();
         assert_eq!((told[0].id, bytes.first().copied()), (51, Some(number as u8)), "{told:?}");

@@ -4,7 +4,7 @@
 mod harness;
 
 use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
-use afbc_types::{Declaration, Declared, OutOfRange, Range, Value};
+use afbc_types::{Declaration, Declared, OutOfRange, Range, Value, ValueMut};
 use core::convert::Infallible;
 use harness::{SETTINGS, vehicle};
 use std::collections::BTreeMap;
@@ -40,7 +40,7 @@ fn gains_out_of_range_are_refused_by_name() {
             for index in 0..count {
                 let (mut gains, mut at, mut name) = (gains, 0, "");
                 let Ok(()) = gains.visit_mut(&mut |declaration, value| {
-                    if let (true, Value::Single([gain])) = (at == index, value) {
+                    if let (true, ValueMut::Single([gain])) = (at == index, value) {
                         (*gain, name) = (bad(&declaration.range), declaration.range.name);
                     }
                     at += 1;

@@ -5,7 +5,7 @@ mod harness;
 
 use afbc_control::{FlightController, Settings, Validated};
 use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
-use afbc_types::{Declared, Range, Setpoint, State, Value};
+use afbc_types::{Declared, Range, Setpoint, State, ValueMut};
 use core::convert::Infallible;
 use harness::{SETTINGS, vehicle};
 use nalgebra::Vector3;
@@ -51,7 +51,7 @@ fn motion() -> impl Strategy<Value = (State, Setpoint)> {
 fn anywhere(gains: &mut impl Declared, shares: &[f64]) {
     let mut shares = shares.iter();
     let Ok(()) = gains.visit_mut(&mut |declaration, value| {
-        let (Value::Single([gain]), Some(share)) = (value, shares.next()) else { panic!("{declaration:?}") };
+        let (ValueMut::Single([gain]), Some(share)) = (value, shares.next()) else { panic!("{declaration:?}") };
         let Range { min, max, .. } = declaration.range;
         *gain = (min + share * (max - min)) as f32;
         Ok::<(), Infallible>(())

@@ -33,7 +33,7 @@ fn power(key: &str) -> i32 {
     }
 }
 
-fn check(gains: &impl Declared) {
+fn check(gains: &(impl Declared + Clone)) {
     for (slowness, lag_s) in [(1.0_f32, 0.02_f32), (1.0, 0.01), (1.65, 0.033), (3.6, 0.072)] {
         let slow = numbers(&slowed(gains.clone(), slowness, lag_s));
         for ((key, before, [min, max]), (_, after, _)) in numbers(gains).into_iter().zip(slow) {

@@ -1,6 +1,6 @@
 //! A battery whose voltage sags under load and falls with its charge.
 
-use afbc_types::{OutOfRange, Range, parameters};
+use afbc_types::{Choice, OutOfRange, Range, parameters};
 use libm::sqrt;
 
 parameters! {
@@ -31,7 +31,8 @@ parameters! {
         /// Power that avionics and payload draw.
         #[parameter(AVIONICS, "W", 0.0..=10_000.0)]
         pub avionics_w: f64 = 3.0,
-        /// Effect of a low voltage on the rotors.
+        /// What a low voltage reduces: only the largest speed, or every speed.
+        #[choice(EFFECT)]
         pub effect: Sag = Sag::Ceiling,
     }
     together(battery) {
@@ -47,6 +48,11 @@ pub enum Sag {
     Ceiling,
     /// Reduces every speed: speed controllers apply a share of the voltage, without feedback of the speed.
     Speed,
+}
+
+impl Choice for Sag {
+    const ALL: &'static [Self] = &[Sag::Ceiling, Sag::Speed];
+    const WORDS: &'static [&'static str] = &["ceiling", "speed"];
 }
 
 impl Battery {

@@ -4,7 +4,7 @@ use crate::battery::{Battery, Charge, Discharge, Sag};
 use crate::delay::{DelayLine, whole_steps};
 use crate::frame;
 use crate::frame::{Frame, Lanes};
-use afbc_types::{Declared, OutOfRange, Parameters, ROTORS_MAX, Range, parameters};
+use afbc_types::{Choice, Declared, OutOfRange, Parameters, ROTORS_MAX, Range, parameters};
 use alloc::vec::Vec;
 use libm::exp;
 
@@ -28,7 +28,8 @@ parameters! {
         /// Largest speed.
         #[parameter(MAX, "rad/s", 1.0..=10_000.0)]
         pub max_rad_s: f64 = 10_000.0,
-        /// Speeds before the first command arrives.
+        /// Speeds before the first command arrives: those of hover, or the smallest.
+        #[choice(START)]
         pub start: Start = Start::Hover,
         /// Faults that reduce a rotor's thrust.
         pub faults: Vec<RotorFault> = Vec::new(),
@@ -50,6 +51,11 @@ pub enum Start {
     Hover,
     /// Smallest speed, for a flight that begins on the ground.
     Idle,
+}
+
+impl Choice for Start {
+    const ALL: &'static [Self] = &[Start::Hover, Start::Idle];
+    const WORDS: &'static [&'static str] = &["hover", "idle"];
 }
 
 /// A worn or broken rotor, whose thrust and drag moment are multiplied by `efficiency`.

@@ -2,7 +2,7 @@
 
 use super::error::{FileError, Source};
 use super::words::{self, nearest, one_of};
-use afbc_types::{Declaration, Declared, Range, Value};
+use afbc_types::{Declaration, Declared, Range, ValueMut};
 use nalgebra::Vector3;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -75,14 +75,19 @@ impl<'a> Table<'a> {
             }
             self.units.push((range.name, unit));
             match value {
-                Value::Single([number]) => self.number(range)?.into_iter().for_each(|read| *number = read as f32),
-                Value::Double([number]) => self.number(range)?.into_iter().for_each(|read| *number = read),
-                Value::Switch(switch) => self.boolean(range.name)?.into_iter().for_each(|read| *switch = read),
-                Value::Single(numbers) => {
+                ValueMut::Single([number]) => self.number(range)?.into_iter().for_each(|read| *number = read as f32),
+                ValueMut::Double([number]) => self.number(range)?.into_iter().for_each(|read| *number = read),
+                ValueMut::Whole(number) => self.whole(range)?.into_iter().for_each(|read| *number = read as u32),
+                ValueMut::Switch(switch) => self.boolean(range.name)?.into_iter().for_each(|read| *switch = read),
+                ValueMut::Choice(index, words) => {
+                    let read = self.choice(range.name, words, |word| word)?;
+                    *index = words.iter().position(|word| Some(*word) == read).unwrap_or(*index);
+                }
+                ValueMut::Single(numbers) => {
                     let read = self.vector(range.name, [range; 3])?;
                     numbers.iter_mut().zip(read.iter().flatten()).for_each(|(number, read)| *number = *read as f32);
                 }
-                Value::Double(numbers) => {
+                ValueMut::Double(numbers) => {
                     let read = self.vector(range.name, [range; 3])?;
                     numbers.iter_mut().zip(read.iter().flatten()).for_each(|(number, read)| *number = *read);
                 }

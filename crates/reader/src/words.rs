@@ -1,6 +1,6 @@
 //! Units, numbers and suggestions in messages.
 
-use afbc_types::OutOfRange;
+use afbc_types::{OutOfRange, Value};
 
 /// Smallest similarity of two words for "did you mean".
 const LIKENESS: f64 = 0.8;
@@ -46,6 +46,19 @@ pub fn unit(key: &str, symbol: &str) -> String {
 /// Formats a number, in decimal notation where that is short.
 pub fn number(value: f64) -> String {
     if value == 0.0 || (1e-4..1e7).contains(&value.abs()) { format!("{value}") } else { format!("{value:e}") }
+}
+
+/// Formats a declared value as a file writes it, to the last bit.
+pub fn value(value: &Value<'_>) -> String {
+    match *value {
+        Value::Single([number]) => format!("{number:?}"),
+        Value::Double([number]) => format!("{number:?}"),
+        Value::Single(numbers) => format!("{numbers:?}"),
+        Value::Double(numbers) => format!("{numbers:?}"),
+        Value::Whole(number) => number.to_string(),
+        Value::Switch(on) => on.to_string(),
+        Value::Choice(index, words) => format!("{:?}", words.get(index).unwrap_or(&"")),
+    }
 }
 
 /// Formats an out-of-range error of a controller or plant.

@@ -9,7 +9,7 @@ use afbc::{Guarded, LAG_S, Profile, Settings, adaptive, by_rule, slowness};
 use afbc_control::FlightController;
 use afbc_peers::slowed;
 use afbc_reader::FileError;
-use afbc_types::{Airframe, Declaration, Declared, OutOfRange, Parameters, PerAxis, Rotor, Value, with_rotors};
+use afbc_types::{Airframe, Declaration, Declared, OutOfRange, Parameters, PerAxis, Rotor, ValueMut, with_rotors};
 use afbc_vehicles::Vehicle;
 use core::convert::Infallible;
 
@@ -76,8 +76,8 @@ impl Contender {
         let limits = &mut self.settings.limits;
         limits.tilt_max_rad = limits.tilt_max_rad.max(tilt_max_rad);
         limits.acceleration_max_m_s2 = limits.acceleration_max_m_s2.max(G_M_S2 * libm::tanf(tilt_max_rad));
-        let Ok(()) = self.law.visit_mut(&mut |declaration: &Declaration, value: Value<'_>| {
-            if let (TILT_MAX, Value::Single([tilt])) = (declaration.range.name, value) {
+        let Ok(()) = self.law.visit_mut(&mut |declaration: &Declaration, value: ValueMut<'_>| {
+            if let (TILT_MAX, ValueMut::Single([tilt])) = (declaration.range.name, value) {
                 *tilt = tilt.max(tilt_max_rad).min(declaration.range.max as f32);
             }
             Ok::<(), Infallible>(())

@@ -1,8 +1,9 @@
 //! A contender's gains as coordinates of a search, and as text for a scenario file.
 
 use afbc::Profile;
+use afbc_reader::words;
 use afbc_sim::contender::{Contender, ControllerKind, Law};
-use afbc_types::{Axis, Declaration, Declared, Range, Value};
+use afbc_types::{Axis, Declaration, Declared, Range, Value, ValueMut};
 use afbc_vehicles::{CASCADE, Vehicle};
 use core::convert::Infallible;
 use core::fmt::Write;
@@ -47,7 +48,7 @@ fn each_of_group(law: &mut Law, group: &[Axis], visit: Visit) {
 /// Visits every gain of one axis.
 fn each_of_axis(law: &mut Law, axis: Axis, mut show: impl FnMut(&mut f32)) {
     let Ok(()) = law.visit_mut(&mut |declaration, value| {
-        if let (true, Value::Single([gain])) = (declaration.group == axis.name(), value) {
+        if let (true, ValueMut::Single([gain])) = (declaration.group == axis.name(), value) {
             show(gain);
         }
         Ok::<(), Infallible>(())
@@ -57,7 +58,7 @@ fn each_of_axis(law: &mut Law, axis: Axis, mut show: impl FnMut(&mut f32)) {
 /// Visits every parameter that is `wanted`, tuned and not 0.
 fn each_tuned(place: &str, parameters: &mut impl Declared, wanted: impl Fn(&Declaration) -> bool, visit: Visit) {
     let Ok(()) = parameters.visit_mut(&mut |declaration, value| {
-        if let (true, Value::Single([gain])) = (declaration.tuned && wanted(declaration), value)
+        if let (true, ValueMut::Single([gain])) = (declaration.tuned && wanted(declaration), value)
             && *gain > 0.0
         {
             visit(place, &declaration.range, gain);
@@ -194,12 +195,7 @@ fn keys(contender: &Contender) -> Vec<Key> {
     let mut keys = Vec::new();
     // Groups of a law's gains are tables within its own; the settings are a table next to them.
     let mut put = |table: String, key, value: Value<'_>, tuned| {
-        let value = match value {
-            Value::Single([number]) => format!("{number:?}"),
-            Value::Switch(on) => on.to_string(),
-            _ => return Ok(()),
-        };
-        keys.push(Key { table, key, value, tuned });
+        keys.push(Key { table, key, value: words::value(&value), tuned });
         Ok::<(), Infallible>(())
     };
     let Ok(()) = contender.law.visit(&mut |Declaration { group, range, tuned, .. }, value| {

@@ -3,7 +3,8 @@
 
 use crate::{Axis, OutOfRange, PerAxis, Range};
 use core::fmt::{self, Write};
-use core::ops::{Div, Mul};
+use core::ops::{Div, Mul, RangeInclusive};
+use core::slice;
 use nalgebra::Vector3;
 
 /// Metadata of one parameter.
@@ -15,7 +16,8 @@ pub struct Declaration {
     pub group: &'static str,
     /// Key with unit, as in scenario files, and accepted range.
     pub range: Range,
-    /// Unit symbol such as `m/s2`; `1` for a plain number, `number` for a whole one, empty for a switch.
+    /// Unit symbol such as `m/s2`; `1` for a plain number, `number` for a whole one and for a choice, empty for a
+    /// switch.
     pub unit: &'static str,
     /// True if the tuner may choose the value; otherwise the vehicle or its task determines it.
     pub tuned: bool,
@@ -24,15 +26,10 @@ pub struct Declaration {
 }
 
 impl Declaration {
-    /// Returns the same declaration in the group `group`; an empty name changes nothing.
+    /// Returns the same declaration in the group `group`.
     #[must_use]
     pub const fn in_group(self, group: &'static str) -> Self {
-        if group.is_empty() { self } else { Declaration { group, ..self } }
-    }
-
-    /// True if the value is a whole number, such as that of an action.
-    pub const fn is_whole(&self) -> bool {
-        matches!(self.unit.as_bytes(), b"number")
+        Declaration { group, ..self }
     }
 
     /// Returns the name on a ground station and in flash, at most 16 characters: `prefix`, group, id and, for a vector,
@@ -67,26 +64,46 @@ impl fmt::Display for Name {
     }
 }
 
-/// Mutable access to a parameter's value.
-#[derive(Debug, PartialEq)]
+/// Value of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value<'a> {
     /// One number, or the three of a vector, in `f32`.
-    Single(&'a mut [f32]),
+    Single(&'a [f32]),
     /// One number, or the three of a vector, in `f64`.
-    Double(&'a mut [f64]),
+    Double(&'a [f64]),
+    /// A whole number.
+    Whole(u32),
     /// On or off.
+    Switch(bool),
+    /// One of several words, by its index in them. Its number is the index above the smallest of the range.
+    Choice(usize, &'static [&'static str]),
+}
+
+/// Mutable access to a parameter's value.
+#[derive(Debug, PartialEq)]
+pub enum ValueMut<'a> {
+    /// See [`Value::Single`].
+    Single(&'a mut [f32]),
+    /// See [`Value::Double`].
+    Double(&'a mut [f64]),
+    /// See [`Value::Whole`].
+    Whole(&'a mut u32),
+    /// See [`Value::Switch`].
     Switch(&'a mut bool),
+    /// See [`Value::Choice`]. An index beyond the words changes nothing.
+    Choice(&'a mut usize, &'static [&'static str]),
 }
 
 impl Value<'_> {
-    /// Returns the one number, or the three of a vector; nothing for a switch.
+    /// Returns the one number, or the three of a vector; nothing for a switch or a choice.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
-        let (single, double): (&[f32], &[f64]) = match self {
-            Value::Single(numbers) => (numbers, &[]),
-            Value::Double(numbers) => (&[], numbers),
-            Value::Switch(_) => (&[], &[]),
+        let (single, double, whole): (&[f32], &[f64], _) = match *self {
+            Value::Single(numbers) => (numbers, &[], None),
+            Value::Double(numbers) => (&[], numbers, None),
+            Value::Whole(number) => (&[], &[], Some(f64::from(number))),
+            Value::Switch(_) | Value::Choice(..) => (&[], &[], None),
         };
-        single.iter().map(|&number| f64::from(number)).chain(double.iter().copied())
+        single.iter().map(|&number| f64::from(number)).chain(double.iter().copied()).chain(whole)
     }
 }
 
@@ -96,21 +113,47 @@ pub trait Visit<E>: FnMut(&Declaration, Value<'_>) -> Result<(), E> {}
 
 impl<E, F: FnMut(&Declaration, Value<'_>) -> Result<(), E>> Visit<E> for F {}
 
-/// A struct made by [`parameters!`](crate::parameters), or one such struct per axis.
-pub trait Declared: Clone {
-    /// Calls `visit` with every parameter, in the order of declaration, to read or to change it.
-    ///
-    /// # Errors
-    /// The first error that `visit` returns.
-    fn visit_mut<E>(&mut self, visit: &mut impl Visit<E>) -> Result<(), E>;
+/// As [`Visit`], with mutable access.
+pub trait VisitMut<E>: FnMut(&Declaration, ValueMut<'_>) -> Result<(), E> {}
 
-    /// Calls `visit` with every parameter; changes that `visit` makes are lost.
+impl<E, F: FnMut(&Declaration, ValueMut<'_>) -> Result<(), E>> VisitMut<E> for F {}
+
+/// Checks the range of a parameter. Out of line, and with the error put aside, since both would be there once for each
+/// parameter.
+#[inline(never)]
+fn in_range(declaration: &Declaration, value: &Value<'_>, refused: &mut Result<(), OutOfRange>) -> Result<(), ()> {
+    *refused = value.numbers().try_for_each(|number| declaration.range.check(number));
+    refused.as_ref().map(|()| ()).map_err(drop)
+}
+
+/// Calls `visit` with a parameter of a group. Out of line: copies of declarations, one for each parameter, would fill
+/// the flash.
+///
+/// # Errors
+/// That of `visit`.
+#[inline(never)]
+pub fn show_in_group<E>(
+    group: &'static str,
+    declaration: &Declaration,
+    value: Value<'_>,
+    visit: &mut impl Visit<E>,
+) -> Result<(), E> {
+    visit(&declaration.in_group(group), value)
+}
+
+/// A struct made by [`parameters!`](crate::parameters), or one such struct per axis.
+pub trait Declared {
+    /// Calls `visit` with every parameter, in the order of declaration.
     ///
     /// # Errors
     /// The first error that `visit` returns.
-    fn visit<E>(&self, visit: &mut impl Visit<E>) -> Result<(), E> {
-        self.clone().visit_mut(visit)
-    }
+    fn visit<E>(&self, visit: &mut impl Visit<E>) -> Result<(), E>;
+
+    /// As [`visit`](Self::visit), to change parameters.
+    ///
+    /// # Errors
+    /// The first error that `visit` returns.
+    fn visit_mut<E>(&mut self, visit: &mut impl VisitMut<E>) -> Result<(), E>;
 
     /// Checks parameters that limit one another; each must already be in its own range.
     ///
@@ -123,17 +166,27 @@ pub trait Declared: Clone {
     /// # Errors
     /// The first parameter out of range.
     fn validate(&self) -> Result<(), OutOfRange> {
-        self.visit(&mut |declaration, value| value.numbers().try_for_each(|number| declaration.range.check(number)))?;
+        let mut refused = Ok(());
+        let _ = self.visit(&mut |declaration, value| in_range(declaration, &value, &mut refused));
+        refused?;
         self.together()
     }
 }
 
 impl<G: Declared> Declared for PerAxis<G> {
-    fn visit_mut<E>(&mut self, visit: &mut impl Visit<E>) -> Result<(), E> {
+    fn visit<E>(&self, visit: &mut impl Visit<E>) -> Result<(), E> {
         Axis::ALL.into_iter().try_for_each(|axis| {
-            let in_axis =
-                &mut |declaration: &Declaration, value: Value<'_>| visit(&declaration.in_group(axis.name()), value);
-            self[axis].visit_mut(in_axis)
+            self[axis].visit(&mut |declaration: &Declaration, value: Value<'_>| {
+                show_in_group(axis.name(), declaration, value, visit)
+            })
+        })
+    }
+
+    fn visit_mut<E>(&mut self, visit: &mut impl VisitMut<E>) -> Result<(), E> {
+        Axis::ALL.into_iter().try_for_each(|axis| {
+            self[axis].visit_mut(&mut |declaration: &Declaration, value: ValueMut<'_>| {
+                visit(&declaration.in_group(axis.name()), value)
+            })
         })
     }
 
@@ -148,57 +201,124 @@ pub trait Field {
     ///
     /// # Errors
     /// The first error that `visit` returns.
-    fn show<E>(&mut self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E>;
+    fn show<E>(&self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E>;
+
+    /// As [`show`](Self::show), to change it.
+    ///
+    /// # Errors
+    /// The first error that `visit` returns.
+    fn show_mut<E>(&mut self, declaration: &Declaration, visit: &mut impl VisitMut<E>) -> Result<(), E>;
 }
 
 /// Number type of a parameter: `f32` in the controller, `f64` in the plant model.
 pub trait Number: nalgebra::Scalar + Copy + Into<f64> + Mul<Output = Self> + Div<Output = Self> {
     /// Wraps one number, or the three of a vector, as a [`Value`].
-    fn values(numbers: &mut [Self]) -> Value<'_>;
+    fn value(numbers: &[Self]) -> Value<'_>;
+
+    /// Wraps one number, or the three of a vector, as a [`ValueMut`].
+    fn value_mut(numbers: &mut [Self]) -> ValueMut<'_>;
 }
 
 impl Number for f32 {
-    fn values(numbers: &mut [Self]) -> Value<'_> {
+    fn value(numbers: &[Self]) -> Value<'_> {
         Value::Single(numbers)
+    }
+
+    fn value_mut(numbers: &mut [Self]) -> ValueMut<'_> {
+        ValueMut::Single(numbers)
     }
 }
 
 impl Number for f64 {
-    fn values(numbers: &mut [Self]) -> Value<'_> {
+    fn value(numbers: &[Self]) -> Value<'_> {
         Value::Double(numbers)
     }
-}
 
-impl<T: Number> Field for T {
-    fn show<E>(&mut self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E> {
-        visit(declaration, T::values(core::slice::from_mut(self)))
+    fn value_mut(numbers: &mut [Self]) -> ValueMut<'_> {
+        ValueMut::Double(numbers)
     }
 }
 
-impl<T: Number> Field for Vector3<T> {
-    fn show<E>(&mut self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E> {
-        visit(declaration, T::values(self.as_mut_slice()))
-    }
+/// Implements [`Field`] for a type with these values.
+macro_rules! field {
+    ([$($T:ident)?] $Type:ty, |$this:ident| $value:expr, $value_mut:expr) => {
+        impl $(<$T: Number>)? Field for $Type {
+            fn show<E>(&self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E> {
+                let $this = self;
+                visit(declaration, $value)
+            }
+
+            fn show_mut<E>(&mut self, declaration: &Declaration, visit: &mut impl VisitMut<E>) -> Result<(), E> {
+                let $this = self;
+                visit(declaration, $value_mut)
+            }
+        }
+    };
 }
 
-impl Field for bool {
-    fn show<E>(&mut self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E> {
-        visit(declaration, Value::Switch(self))
-    }
-}
+field!([T] T, |this| T::value(slice::from_ref(this)), T::value_mut(slice::from_mut(this)));
+field!([T] Vector3<T>, |this| T::value(this.as_slice()), T::value_mut(this.as_mut_slice()));
+field!([] u32, |this| Value::Whole(*this), ValueMut::Whole(this));
+field!([] bool, |this| Value::Switch(*this), ValueMut::Switch(this));
 
 impl<T: Field> Field for PerAxis<T> {
-    fn show<E>(&mut self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E> {
+    fn show<E>(&self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E> {
         Axis::ALL.into_iter().try_for_each(|axis| self[axis].show(&declaration.in_group(axis.name()), visit))
     }
+
+    fn show_mut<E>(&mut self, declaration: &Declaration, visit: &mut impl VisitMut<E>) -> Result<(), E> {
+        Axis::ALL.into_iter().try_for_each(|axis| self[axis].show_mut(&declaration.in_group(axis.name()), visit))
+    }
+}
+
+/// An enum of which a parameter may be: files write its words, stations and flash its numbers.
+pub trait Choice: Copy + PartialEq + 'static {
+    /// Every variant, in the order of the numbers.
+    const ALL: &'static [Self];
+    /// Word for each variant.
+    const WORDS: &'static [&'static str];
+    /// Number of the first variant.
+    const FIRST: u8 = 0;
+
+    /// Returns the place in [`ALL`](Self::ALL).
+    fn index(self) -> usize {
+        Self::ALL.iter().position(|one| *one == self).unwrap_or_default()
+    }
+
+    /// See [`Field::show`].
+    ///
+    /// # Errors
+    /// The first error that `visit` returns.
+    fn show<E>(self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E> {
+        visit(declaration, Value::Choice(self.index(), Self::WORDS))
+    }
+
+    /// See [`Field::show_mut`].
+    ///
+    /// # Errors
+    /// The first error that `visit` returns.
+    fn show_mut<E>(&mut self, declaration: &Declaration, visit: &mut impl VisitMut<E>) -> Result<(), E> {
+        let mut index = self.index();
+        let shown = visit(declaration, ValueMut::Choice(&mut index, Self::WORDS));
+        *self = Self::ALL.get(index).copied().unwrap_or(*self);
+        shown
+    }
+}
+
+/// Returns the numbers of a choice.
+pub const fn numbers<C: Choice>() -> RangeInclusive<f64> {
+    let first = C::FIRST as f64;
+    first..=first + C::ALL.len() as f64 - 1.0
 }
 
 /// Declares a struct of parameters: name, meaning, unit, accepted range and default of each, and whether it is
 /// tuned.
 ///
 /// * `#[parameter(ID, "unit", min..=max)]`, with `, tuned` at the end if the tuner may choose it: a number, a vector
-///   whose three numbers have the same range, or a [`PerAxis`](crate::PerAxis) of either.
+///   whose three numbers have the same range, or a [`PerAxis`](crate::PerAxis) of either; with the unit `number`, a
+///   `u32`.
 /// * `#[switch(ID)]`: a `bool`.
+/// * `#[choice(ID)]`: a [`Choice`](crate::Choice).
 /// * `#[group("")]`: a declared struct whose parameters join this struct's; with a name, they form a group.
 /// * A field without any of these attributes is not a parameter.
 ///
@@ -236,7 +356,8 @@ macro_rules! parameters {
                 $(#[doc = $doc:literal])*
                 $(#[parameter($id:ident, $unit:literal, $range:expr $(, $tuned:ident)?)])?
                 $(#[switch($switch:ident)])?
-                $(#[group($group:literal)])?
+                $(#[choice($choice:ident)])?
+                $(#[group($group:tt)])?
                 pub $field:ident: $type:ty = $default:expr,
             )*
         }
@@ -255,6 +376,7 @@ macro_rules! parameters {
             $(
                 $crate::parameters!(
                     @declare $field [$($doc)*] $($id, $unit, $range, [$($tuned)?])? $($switch, "", 0.0..=1.0, [])?
+                    $($choice, "number", $crate::numbers::<$type>(), [])?
                 );
             )*
         }
@@ -271,16 +393,22 @@ macro_rules! parameters {
         }
 
         impl $(<$T: $crate::Number>)? $crate::Declared for $Group $(<$T>)? {
-            fn visit_mut<E>(&mut self, visit: &mut impl $crate::Visit<E>) -> Result<(), E> {
+            fn visit<E>(&self, visit: &mut impl $crate::Visit<E>) -> Result<(), E> {
                 $(
-                    $( $crate::Field::show(&mut self.$field, &Self::$id, visit)?; )?
-                    $( $crate::Field::show(&mut self.$field, &Self::$switch, visit)?; )?
-                    $(
-                        let within = &mut |declaration: &$crate::Declaration, value: $crate::Value<'_>| {
-                            visit(&declaration.in_group($group), value)
-                        };
-                        $crate::Declared::visit_mut(&mut self.$field, within)?;
-                    )?
+                    $( $crate::Field::show(&self.$field, &Self::$id, visit)?; )?
+                    $( $crate::Field::show(&self.$field, &Self::$switch, visit)?; )?
+                    $( $crate::Choice::show(self.$field, &Self::$choice, visit)?; )?
+                    $( $crate::parameters!(@group $group, visit, &self.$field, visit); )?
+                )*
+                Ok(())
+            }
+
+            fn visit_mut<E>(&mut self, visit: &mut impl $crate::VisitMut<E>) -> Result<(), E> {
+                $(
+                    $( $crate::Field::show_mut(&mut self.$field, &Self::$id, visit)?; )?
+                    $( $crate::Field::show_mut(&mut self.$field, &Self::$switch, visit)?; )?
+                    $( $crate::Choice::show_mut(&mut self.$field, &Self::$choice, visit)?; )?
+                    $( $crate::parameters!(@group $group, visit_mut, &mut self.$field, visit); )?
                 )*
                 Ok(())
             }
@@ -291,6 +419,22 @@ macro_rules! parameters {
                 Ok(())
             }
         }
+    };
+    // Parameters that join.
+    (@group "", $visit:ident, $field:expr, $visitor:ident) => {
+        $crate::Declared::$visit($field, $visitor)?;
+    };
+    (@group $group:literal, visit, $field:expr, $visitor:ident) => {
+        let within = &mut |declaration: &$crate::Declaration, value: $crate::Value<'_>| {
+            $crate::show_in_group($group, declaration, value, $visitor)
+        };
+        $crate::Declared::visit($field, within)?;
+    };
+    (@group $group:literal, visit_mut, $field:expr, $visitor:ident) => {
+        let within = &mut |declaration: &$crate::Declaration, value: $crate::ValueMut<'_>| {
+            $visitor(&declaration.in_group($group), value)
+        };
+        $crate::Declared::visit_mut($field, within)?;
     };
     // A field without attribute: not a parameter.
     (@declare $field:ident [$($doc:literal)*]) => {};

@@ -42,7 +42,9 @@ mod trigonometry;
 pub use actuation::{Inputs, RotorForces, RotorSpeeds};
 pub use attitude::euler_angles;
 pub use axes::{Axis, PerAxis};
-pub use declared::{Declaration, Declared, Field, Name, Number, Value, Visit};
+pub use declared::{Choice, Declaration, Declared, Field, Name, Number, Value, ValueMut, Visit, VisitMut};
+#[doc(hidden)]
+pub use declared::{numbers, show_in_group};
 pub use frame::{Airframe, PLUS, ROTOR_POSITION, ROTORS, ROTORS_MAX, Rotor};
 pub use motion::{Setpoint, State};
 pub use mounting::Mounting;

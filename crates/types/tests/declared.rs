@@ -1,7 +1,7 @@
 //! Structs made by [`parameters!`].
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
-use afbc_types::{Axis, Declared, PerAxis, Range, Value, parameters};
+use afbc_types::{Axis, Choice, Declared, PerAxis, Range, Value, ValueMut, parameters};
 use core::convert::Infallible;
 use nalgebra::Vector3;
 
@@ -20,6 +20,23 @@ parameters! {
     together(inner) {
         Range { max: inner.first_m.into(), ..Inner::SECOND.range }.check(inner.second)
     }
+}
+
+/// Three ways, numbered from 1 on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Way {
+    /// Up.
+    Up,
+    /// Down.
+    Down,
+    /// Across.
+    Across,
+}
+
+impl Choice for Way {
+    const ALL: &'static [Self] = &[Way::Up, Way::Down, Way::Across];
+    const WORDS: &'static [&'static str] = &["up", "down", "across"];
+    const FIRST: u8 = 1;
 }
 
 parameters! {
@@ -43,6 +60,12 @@ parameters! {
         /// One per axis.
         #[parameter(EACH, "N", 0.0..=f64::INFINITY)]
         pub each_n: PerAxis<f32> = PerAxis { roll: 1.0, pitch: 2.0, yaw: 3.0, z: 4.0, x: 5.0, y: 6.0 },
+        /// Whole number.
+        #[parameter(COUNT, "number", 2.0..=9.0)]
+        pub count: u32 = 4,
+        /// One of three.
+        #[choice(WAY)]
+        pub way: Way = Way::Down,
     }
 }
 
@@ -63,8 +86,11 @@ parameters! {
 fn listed(group: &impl Declared) -> Vec<(String, &'static str, Vec<f64>)> {
     let mut list = Vec::new();
     let Ok(()) = group.visit(&mut |declaration, value| {
-        let numbers =
-            if let Value::Switch(on) = &value { vec![f64::from(u8::from(**on))] } else { value.numbers().collect() };
+        let numbers = match value {
+            Value::Switch(on) => vec![f64::from(u8::from(on))],
+            Value::Choice(index, _) => vec![declaration.range.min + index as f64],
+            value => value.numbers().collect(),
+        };
         list.push((declaration.name("P_", None).to_string(), declaration.range.name, numbers));
         Ok::<(), Infallible>(())
     });
@@ -77,7 +103,7 @@ fn a_visit_shows_every_parameter_in_order_of_declaration() {
     assert_eq!(
         names(&Outer::DEFAULT),
         "P_FLAG P_VECTOR P_FIRST P_SECOND P_APART_FIRST P_APART_SECOND \
-         P_ROLL_EACH P_PITCH_EACH P_YAW_EACH P_Z_EACH P_X_EACH P_Y_EACH"
+         P_ROLL_EACH P_PITCH_EACH P_YAW_EACH P_Z_EACH P_X_EACH P_Y_EACH P_COUNT P_WAY"
     );
     let list = listed(&Outer::DEFAULT);
     let single = |number: f32| vec![f64::from(number)];
@@ -86,6 +112,8 @@ fn a_visit_shows_every_parameter_in_order_of_declaration() {
     assert_eq!(list[2], ("P_FIRST".into(), "first_m", single(0.1)));
     assert_eq!(list[4], ("P_APART_FIRST".into(), "first_m", single(0.2)));
     assert_eq!(list[11], ("P_Y_EACH".into(), "each_n", single(6.0)));
+    assert_eq!(list[12..], [("P_COUNT".into(), "count", vec![4.0]), ("P_WAY".into(), "way", vec![2.0])]);
+    assert_eq!((Outer::WAY.range, Outer::WAY.unit), (Range::new("way", 1.0, 3.0), "number"));
     assert_eq!(Outer::VECTOR.name("V_", Some('X')).to_string(), "V_VECTOR_X");
 }
 
@@ -105,13 +133,14 @@ fn past(target: usize, coordinate: usize, above: bool) -> Option<(Outer, Range)>
     let Ok(()) = group.visit_mut(&mut |declaration, value| {
         let Range { min, max, .. } = declaration.range;
         let past = if above { max + 1.0 } else { min - 1.0 };
-        if at == target && past.is_finite() && value.numbers().nth(coordinate).is_some() {
-            match value {
-                Value::Single(numbers) => numbers[coordinate] = past as f32,
-                Value::Double(numbers) => numbers[coordinate] = past,
-                Value::Switch(_) => {}
-            }
-            found = Some(declaration.range);
+        if at == target && past.is_finite() {
+            let changed = match value {
+                ValueMut::Single(numbers) => numbers.get_mut(coordinate).map(|number| *number = past as f32),
+                ValueMut::Double(numbers) => numbers.get_mut(coordinate).map(|number| *number = past),
+                ValueMut::Whole(number) if coordinate == 0 => Some(*number = past as u32),
+                _ => None,
+            };
+            found = changed.map(|()| declaration.range);
         }
         at += 1;
         Ok::<(), Infallible>(())
@@ -122,14 +151,14 @@ fn past(target: usize, coordinate: usize, above: bool) -> Option<(Outer, Range)>
 #[test]
 fn every_number_out_of_range_is_named() {
     let mut checked = 0;
-    for (target, coordinate) in (0..12).flat_map(|target| (0..3).map(move |coordinate| (target, coordinate))) {
+    for (target, coordinate) in (0..14).flat_map(|target| (0..3).map(move |coordinate| (target, coordinate))) {
         for (group, range) in [true, false].into_iter().filter_map(|above| past(target, coordinate, above)) {
             assert_eq!(group.validate().unwrap_err().range, range);
             checked += 1;
         }
     }
-    // Three numbers of the vector and four of the nested structs, both ends; six axes, one end.
-    assert_eq!(checked, 2 * (3 + 4) + 6);
+    // Three numbers of the vector, four of the nested structs and a whole one, both ends; six axes, one end.
+    assert_eq!(checked, 2 * (3 + 4 + 1) + 6);
     let nan = Outer { vector_kg_m2: Vector3::new(1.0, f64::NAN, 1.0), ..Outer::DEFAULT };
     assert_eq!(nan.validate().unwrap_err().range, Outer::VECTOR.range);
 }
@@ -160,7 +189,7 @@ fn a_visitor_changes_what_it_is_shown_and_may_stop() {
     let stopped = axes.visit_mut(&mut |declaration, value| {
         seen += 1;
         match value {
-            Value::Single([number]) if declaration.group != "yaw" => *number = seen as f32,
+            ValueMut::Single([number]) if declaration.group != "yaw" => *number = seen as f32,
             _ => return Err(declaration.name("", None).to_string()),
         }
         Ok(())
@@ -168,6 +197,22 @@ fn a_visitor_changes_what_it_is_shown_and_may_stop() {
     assert_eq!((stopped, seen), (Err("YAW_FIRST".into()), 5));
     assert_eq!((axes.roll, axes.pitch.second), (Inner { first_m: 1.0, second: 2.0 }, 4.0));
     assert_eq!((axes.yaw, axes.z), (Inner::DEFAULT, Inner::DEFAULT));
+}
+
+/// Words have indices, of which one beyond them changes nothing.
+#[test]
+fn a_choice_is_one_of_its_words() {
+    let mut group = Outer::DEFAULT;
+    for (index, way) in [(0, Way::Up), (2, Way::Across), (3, Way::Across), (1, Way::Down)] {
+        let Ok(()) = group.visit_mut(&mut |_, value| {
+            if let ValueMut::Choice(at, words) = value {
+                assert_eq!(words, ["up", "down", "across"]);
+                *at = index;
+            }
+            Ok::<(), Infallible>(())
+        });
+        assert_eq!(group.way, way);
+    }
 }
 
 #[test]

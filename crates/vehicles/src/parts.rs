@@ -3,7 +3,7 @@
 //! Each function takes what a table leaves out from a default.
 
 use afbc_plant::instruments::Preset;
-use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, Rotors, Sag, Start};
+use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, Rotors};
 use afbc_reader::words::out_of_range;
 use afbc_reader::{FileError, Table};
 use afbc_types::{Declared, OutOfRange, Parameters, Range};
@@ -49,11 +49,6 @@ pub fn parameters(table: Option<Table<'_>>, default: Parameters<f64>) -> Result<
 pub fn rotors(table: Option<Table<'_>>, default: Rotors, truth: &Parameters<f64>) -> Result<Rotors, FileError> {
     let mut rotors = default;
     if let Some(mut table) = table {
-        let start = table.choice("start", &[Start::Hover, Start::Idle], |start| match start {
-            Start::Hover => "hover",
-            Start::Idle => "idle",
-        })?;
-        rotors.start = start.unwrap_or(rotors.start);
         table.declared(&mut rotors)?;
         max_by_force(&mut table, &mut rotors, truth)?;
         rotors.validate().map_err(together(&table))?;
@@ -81,11 +76,6 @@ fn max_by_force(table: &mut Table<'_>, rotors: &mut Rotors, truth: &Parameters<f
 /// As [`parameters`].
 pub fn battery(mut table: Table<'_>, default: Battery) -> Result<Battery, FileError> {
     let mut battery = default;
-    let effect = table.choice("effect", &[Sag::Ceiling, Sag::Speed], |effect| match effect {
-        Sag::Ceiling => "ceiling",
-        Sag::Speed => "speed",
-    })?;
-    battery.effect = effect.unwrap_or(battery.effect);
     table.declared(&mut battery)?;
     battery.validate().map_err(together(&table))?;
     table.finish()?;

@@ -4,7 +4,7 @@ use super::encoding::Kind;
 use super::reason::Reason;
 use crate::configuration::Configuration;
 use afbc_store::RecordName;
-use afbc_types::{Declaration, Declared, Range, Value};
+use afbc_types::{Airframe, Declaration, Declared, Range, Value, ValueMut};
 
 /// A parameter: one number of a configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,75 +28,110 @@ pub(crate) enum Key {
     Place(u16),
 }
 
-/// A walk over the list to one parameter, to read it or to change it.
+/// A walk over the list to one parameter.
 ///
 /// Not a visitor: a function for each of its uses, with every parameter in it, would take 100 KB of flash.
 struct Walk {
     key: Key,
-    /// Value to be set.
-    value: Option<f32>,
     /// Number of parameters passed.
     passed: u16,
-    found: Option<Result<Parameter, Reason>>,
+    found: Option<Parameter>,
 }
 
 /// The parameter has been found.
 struct Found;
 
-impl<const N: usize> Configuration<N> {
-    /// Walks over every parameter, in the order of the list, which is that of this function and of the declarations.
-    /// Places may change with the image, names do not.
-    #[inline(never)]
-    fn walk(&mut self, walk: &mut Walk) -> Result<(), Found> {
+/// Shows every group, in the order of the list, with its prefix.
+macro_rules! each_group {
+    ($configuration:expr, |$prefix:pat_param, $group:ident| $show:expr) => {{
         let Configuration { airframe, settings, gains, curve, response, imu, estimation, arming, guidance, link } =
-            self;
-        walk.group("V_", &mut airframe.parameters)?;
-        walk.group("MOT_", curve)?;
-        walk.group("MOT_", response)?;
-        walk.group("IMU_", imu)?;
-        walk.group("ARM_", arming)?;
-        walk.group("EST_", estimation)?;
-        walk.group("", guidance)?;
-        walk.group("", link)?;
-        walk.group("C_", settings)?;
-        walk.group("A_", gains)
+            $configuration;
+        let Airframe { parameters, rotors: _ } = airframe;
+        each_group!(@ $prefix, $group, $show, ["V_" parameters, "MOT_" curve, "MOT_" response, "IMU_" imu,
+            "ARM_" arming, "EST_" estimation, "" guidance, "" link, "C_" settings, "A_" gains]);
+    }};
+    (@ $prefix:pat_param, $group:ident, $show:expr, [$($name:literal $field:ident),*]) => {
+        $(
+            let ($prefix, $group) = ($name, $field);
+            $show?;
+        )*
+    };
+}
+
+impl<const N: usize> Configuration<N> {
+    /// Walks over every parameter, in the order of the list and of the declarations. Places may change with the image,
+    /// names do not.
+    #[inline(never)]
+    fn walk(&self, walk: &mut Walk) -> Result<(), Found> {
+        each_group!(self, |prefix, group| group
+            .visit(&mut |declaration: &Declaration, value: Value<'_>| { walk.value(prefix, declaration, value) }));
+        Ok(())
     }
 
     /// Returns the number of parameters.
-    pub(crate) fn parameters(&mut self) -> u16 {
-        let mut walk = Walk { key: Key::Place(u16::MAX), value: None, passed: 0, found: None };
+    pub(crate) fn parameters(&self) -> u16 {
+        let mut walk = Walk { key: Key::Place(u16::MAX), passed: 0, found: None };
         let _ = self.walk(&mut walk);
         walk.passed
     }
 
     /// Returns a parameter.
-    pub(crate) fn parameter(&mut self, key: Key) -> Option<Parameter> {
-        let mut walk = Walk { key, value: None, passed: 0, found: None };
+    pub(crate) fn parameter(&self, key: Key) -> Option<Parameter> {
+        let mut walk = Walk { key, passed: 0, found: None };
         let _ = self.walk(&mut walk);
-        walk.found?.ok()
+        walk.found
     }
 
     /// Sets a parameter, if the value is in its range; returns what it is then.
     pub(crate) fn put(&mut self, name: RecordName, value: f32) -> Result<Parameter, Reason> {
-        let mut walk = Walk { key: Key::Name(name), value: Some(value), passed: 0, found: None };
-        let _ = self.walk(&mut walk);
-        walk.found.unwrap_or_else(|| Err(Reason::on(name, "no such parameter")))
+        let parameter = self.parameter(Key::Name(name)).ok_or_else(|| Reason::on(name, "no such parameter"))?;
+        parameter.range.check(value).map_err(|error| Reason::range(name, &error))?;
+        if parameter.kind == Kind::Int32 && value as i32 as f32 != value {
+            return Err(Reason::on(name, "must be a whole number"));
+        }
+        let _ = self.write(parameter.place, value, parameter.range.min as f32);
+        // An f64 has the nearest value, and a whole number no -0.
+        self.parameter(Key::Place(parameter.place)).ok_or_else(|| Reason::on(name, "no such parameter"))
+    }
+
+    /// Writes the number at `place`; that of a choice counts from `first` on.
+    #[inline(never)]
+    fn write(&mut self, place: u16, value: f32, first: f32) -> Result<(), Found> {
+        let mut left = usize::from(place);
+        let mut show = |_: &Declaration, at: ValueMut<'_>| {
+            let length = match &at {
+                ValueMut::Single(numbers) => numbers.len(),
+                ValueMut::Double(numbers) => numbers.len(),
+                _ => 1,
+            };
+            if left >= length {
+                left -= length;
+                return Ok(());
+            }
+            match at {
+                ValueMut::Single(numbers) => numbers.get_mut(left).into_iter().for_each(|number| *number = value),
+                ValueMut::Double(numbers) => {
+                    numbers.get_mut(left).into_iter().for_each(|number| *number = value.into())
+                }
+                ValueMut::Whole(number) => *number = value as u32,
+                ValueMut::Switch(switch) => *switch = value != 0.0,
+                ValueMut::Choice(index, _) => *index = (value - first) as usize,
+            }
+            Err(Found)
+        };
+        each_group!(self, |_, group| group.visit_mut(&mut show));
+        Ok(())
     }
 }
 
 impl Walk {
-    /// Walks over a group.
-    fn group(&mut self, prefix: &'static str, group: &mut impl Declared) -> Result<(), Found> {
-        group.visit_mut(&mut |declaration: &Declaration, value: Value<'_>| self.value(prefix, declaration, value))
-    }
-
     /// Passes one number or the three of a vector.
     #[inline(never)]
-    fn value(&mut self, prefix: &'static str, declaration: &Declaration, mut value: Value<'_>) -> Result<(), Found> {
-        let length = match &value {
+    fn value(&mut self, prefix: &'static str, declaration: &Declaration, value: Value<'_>) -> Result<(), Found> {
+        let length = match value {
             Value::Single(numbers) => numbers.len(),
             Value::Double(numbers) => numbers.len(),
-            Value::Switch(_) => 1,
+            Value::Whole(_) | Value::Switch(_) | Value::Choice(..) => 1,
         };
         for (index, coordinate) in (0..length).zip(['X', 'Y', 'Z']) {
             let coordinate = (length > 1).then_some(coordinate);
@@ -105,36 +140,18 @@ impl Walk {
             let place = self.passed;
             self.passed += 1;
             if self.key == Key::Name(name) || self.key == Key::Place(place) {
-                let whole = matches!(value, Value::Switch(_)) || declaration.is_whole();
-                let kind = if whole { Kind::Int32 } else { Kind::Real32 };
-                let parameter = Parameter { name, place, kind, value: 0.0, range: declaration.range };
-                self.found = Some(parameter.read_or_set(&mut value, index, self.value));
+                let (kind, value) = match value {
+                    Value::Single(numbers) => (Kind::Real32, numbers.get(index).copied().unwrap_or_default()),
+                    Value::Double(numbers) => (Kind::Real32, numbers.get(index).copied().unwrap_or_default() as f32),
+                    // Below 2^24, all of them.
+                    Value::Whole(number) => (Kind::Int32, number as f32),
+                    Value::Switch(switch) => (Kind::Int32, f32::from(u8::from(switch))),
+                    Value::Choice(index, _) => (Kind::Int32, declaration.range.min as f32 + index as f32),
+                };
+                self.found = Some(Parameter { name, place, kind, value, range: declaration.range });
                 return Err(Found);
             }
         }
         Ok(())
-    }
-}
-
-impl Parameter {
-    /// Sets the number at `index`, if there is a value to be set that is in range; returns the parameter.
-    fn read_or_set(mut self, at: &mut Value<'_>, index: usize, value: Option<f32>) -> Result<Self, Reason> {
-        if let Some(value) = value {
-            self.range.check(value).map_err(|error| Reason::range(self.name, &error))?;
-            if self.kind == Kind::Int32 && value as i32 as f32 != value {
-                return Err(Reason::on(self.name, "must be a whole number"));
-            }
-            match at {
-                Value::Single(numbers) => numbers.get_mut(index).into_iter().for_each(|number| *number = value),
-                Value::Double(numbers) => numbers.get_mut(index).into_iter().for_each(|number| *number = value.into()),
-                Value::Switch(switch) => **switch = value != 0.0,
-            }
-        }
-        self.value = match at {
-            Value::Single(numbers) => numbers.get(index).copied().unwrap_or_default(),
-            Value::Double(numbers) => numbers.get(index).copied().unwrap_or_default() as f32,
-            Value::Switch(switch) => f32::from(u8::from(**switch)),
-        };
-        Ok(self)
     }
 }

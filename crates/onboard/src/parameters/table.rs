@@ -21,8 +21,7 @@ pub struct ParameterTable<const N: usize = 4> {
 impl<const N: usize> ParameterTable<N> {
     /// Makes a table in which every parameter is as in the image.
     pub fn new(image: Configuration<N>) -> Self {
-        let mut now = image.clone();
-        ParameterTable { count: now.parameters(), now, image }
+        ParameterTable { count: image.parameters(), now: image.clone(), image }
     }
 
     /// Returns the configuration to be flown, which makes a [`Flight`](crate::Flight) if the image's does.
@@ -42,17 +41,17 @@ impl<const N: usize> ParameterTable<N> {
 
     /// Returns the parameter called `name`.
     pub fn get(&self, name: RecordName) -> Option<Parameter> {
-        self.now.clone().parameter(Key::Name(name))
+        self.now.parameter(Key::Name(name))
     }
 
     /// Returns the parameter at `place`.
     pub fn at(&self, place: u16) -> Option<Parameter> {
-        self.now.clone().parameter(Key::Place(place))
+        self.now.parameter(Key::Place(place))
     }
 
     /// Returns the parameter called `name` as the image has it.
     pub fn default_of(&self, name: RecordName) -> Option<Parameter> {
-        self.image.clone().parameter(Key::Name(name))
+        self.image.parameter(Key::Name(name))
     }
 
     /// Changes a parameter; returns it as it is then.

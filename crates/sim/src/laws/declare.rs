@@ -105,7 +105,11 @@ macro_rules! laws {
 
         impl afbc_types::Declared for Law {
             /// Visits each gain; those of a law in the cascade in a group for each axis.
-            fn visit_mut<E>(&mut self, visit: &mut impl afbc_types::Visit<E>) -> Result<(), E> {
+            fn visit<E>(&self, visit: &mut impl afbc_types::Visit<E>) -> Result<(), E> {
+                match self { $( Law::$Law(gains) => gains.visit(visit), )* }
+            }
+
+            fn visit_mut<E>(&mut self, visit: &mut impl afbc_types::VisitMut<E>) -> Result<(), E> {
                 match self { $( Law::$Law(gains) => gains.visit_mut(visit), )* }
             }
 
