@@ -4,25 +4,28 @@
 use crate::ticks::Tick;
 use crate::vehicle::ROTORS;
 use afbc_onboard::Readings;
+use cortex_m::interrupt::InterruptNumber;
 use embassy_executor::SendSpawner;
 use embedded_storage::nor_flash::NorFlash;
 
-/// A board: motors, watchdog and health.
+/// A board: its clock, links, flash, motors, watchdog and health.
 pub trait Board: Sized + 'static {
-    /// Receiving side of the link.
-    type Receiver: Receiver + 'static;
-    /// Sending side of the link.
-    type Transmitter: Transmitter + 'static;
+    /// Interrupt lines of its chip.
+    type Interrupt: InterruptNumber;
+    /// Its links: `[Link<R, T>; N]`.
+    type Links: Links + 'static;
     /// Flash with two sectors for the parameters, from [`STORE`](Self::STORE) on.
     type Memory: NorFlash + Send + 'static;
-    /// Offset of these sectors \[bytes\].
+    /// Clock of the core and of SysTick \[Hz\], in whole MHz.
+    const CORE_HZ: u32;
+    /// Offset of the parameters' sectors \[bytes\].
     const STORE: u32;
     /// Most motors that it drives.
     const OUTPUTS: usize;
 
-    /// Brings up clocks and peripherals; the core runs at [`CORE_HZ`](crate::time::CORE_HZ) from then on. To be called
-    /// once. A board's task spawned on `control` runs right after the control tick.
-    fn start(control: SendSpawner) -> (Self, Self::Receiver, Self::Transmitter, Self::Memory);
+    /// Brings up clocks and peripherals; the core runs at [`CORE_HZ`](Self::CORE_HZ) from then on. To be called once. A
+    /// board's tasks spawned on `control` run right after the control tick.
+    fn start(control: SendSpawner) -> Parts<Self>;
 
     /// Starts the watchdog, if there is one; nothing is erased from now on.
     fn unleash_watchdog(&mut self);
@@ -48,13 +51,55 @@ pub trait Board: Sized + 'static {
     fn feed_watchdog(&mut self);
 }
 
-/// Receiving side of the link.
+/// What a board has brought up.
+pub struct Parts<B: Board> {
+    /// What the control tick uses.
+    pub board: B,
+    /// What the links' task uses.
+    pub links: B::Links,
+    /// Where the parameters are kept.
+    pub memory: B::Memory,
+}
+
+/// Both sides of a link.
+pub struct Link<R, T> {
+    /// Receiving side.
+    pub receiver: R,
+    /// Sending side.
+    pub transmitter: T,
+}
+
+/// The links of a board, of one kind: each is listened to, and all are told the same.
+pub trait Links {
+    /// Receiving side of each.
+    type Receiver: Receiver;
+    /// Sending side of each.
+    type Transmitter: Transmitter;
+    /// Number of links, at least one.
+    const COUNT: usize;
+
+    /// Returns them.
+    fn each(&mut self) -> &mut [Link<Self::Receiver, Self::Transmitter>];
+}
+
+impl<R: Receiver, T: Transmitter, const N: usize> Links for [Link<R, T>; N] {
+    type Receiver = R;
+    type Transmitter = T;
+    const COUNT: usize = N;
+
+    fn each(&mut self) -> &mut [Link<R, T>] {
+        self
+    }
+}
+
+/// Receiving side of a link.
 pub trait Receiver {
-    /// Reads the next bytes and returns their number; waits for at least one.
+    /// Reads the next bytes and returns their number; waits for at least one. Nothing is lost if the future is dropped
+    /// before it is ready.
     fn receive(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize> + Send;
 }
 
-/// Sending side of the link.
+/// Sending side of a link.
 pub trait Transmitter {
     /// Sets the baud rate of the line in both directions, before anything is sent; nothing if there is no such line.
     fn set_baud(&mut self, _baud: u32) {}

@@ -1,13 +1,17 @@
-//! The link: receives and sends messages, at a lower priority than the control tick.
+//! The links: receives and sends messages, at a lower priority than the control tick.
 
-use crate::board::{Receiver, Transmitter};
+use crate::board::{Board, Links, Receiver as _, Transmitter as _};
 use crate::control;
 use crate::parameters;
 use crate::ticks::{self, Tick};
 use crate::vehicle::ParameterTable;
 pub use afbc_onboard::Comms;
 use afbc_onboard::{REPORT_MAX, Setup};
+use core::array;
+use core::future::poll_fn;
+use core::pin::pin;
 use core::sync::atomic::{AtomicU32, Ordering};
+use core::task::Poll;
 use embassy_futures::select::{Either, select};
 use heapless::Vec;
 use static_cell::StaticCell;
@@ -27,7 +31,7 @@ const FAREWELL: u32 = 100;
 /// Text to the station when more changes of parameters are waiting for the flash than there is room for.
 const NOT_KEPT: &str = "parameter not kept: set it again";
 
-/// What the link's task has: the services for stations, and the parameters.
+/// What the links' task has: the services for stations, and the parameters.
 pub type Desk = (Comms, ParameterTable);
 
 /// Creates it, with nothing received, to be called once: in place, since a task would store a value twice and take the
@@ -41,22 +45,33 @@ pub fn make(table: ParameterTable) -> &'static mut Desk {
     })
 }
 
-/// Receives messages, and reports every tick.
-pub async fn run((comms, table): &mut Desk, receiver: &mut impl Receiver, transmitter: &mut impl Transmitter) -> ! {
+/// Receives messages, and reports every tick on every link, of which there are `OTHERS` beside the first.
+pub async fn run<B: Board, const OTHERS: usize>((comms, table): &mut Desk, links: &mut B::Links) -> ! {
+    // The first link's is in `comms`.
+    let mut decoders: [_; OTHERS] = array::from_fn(|_| comms.decoder());
     let mut incoming = [0; READ_MAX];
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     let mut leaving = 0;
     loop {
-        match select(receiver.receive(&mut incoming), ticks::next()).await {
-            Either::First(length) => {
-                let news = comms.receive(incoming.get(..length).unwrap_or_default());
+        match select(receive(links, &mut incoming), ticks::next()).await {
+            Either::First((link, length)) => {
+                let bytes = incoming.get(..length).unwrap_or_default();
+                let news = match link.checked_sub(1).and_then(|other| decoders.get_mut(other)) {
+                    Some(decoder) => {
+                        comms.exchange(decoder);
+                        let news = comms.receive(bytes);
+                        comms.exchange(decoder);
+                        news
+                    }
+                    None => comms.receive(bytes),
+                };
                 control::with_mail(|inputs| inputs.merge(&news));
                 BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
             }
             Either::Second(tick) => {
-                report(comms, &tick, &mut outgoing);
+                report(comms, &tick, B::CORE_HZ, &mut outgoing);
                 serve(comms, table, &mut outgoing);
-                transmitter.transmit(&tick, &outgoing);
+                links.each().iter_mut().for_each(|link| link.transmitter.transmit(&tick, &outgoing));
                 if comms.has_mail() {
                     let news = comms.receive(&[]);
                     control::with_mail(|inputs| inputs.merge(&news));
@@ -70,12 +85,25 @@ pub async fn run((comms, table): &mut Desk, receiver: &mut impl Receiver, transm
     }
 }
 
+/// Waits for bytes of any link; returns its index and their number.
+fn receive(links: &mut impl Links, buffer: &mut [u8]) -> impl Future<Output = (usize, usize)> {
+    poll_fn(|context| {
+        for (index, link) in links.each().iter_mut().enumerate() {
+            if let Poll::Ready(length) = pin!(link.receiver.receive(buffer)).poll(context) {
+                return Poll::Ready((index, length));
+            }
+        }
+        Poll::Pending
+    })
+}
+
 /// Sends all messages after a tick. Out of line, like the control tick, to be identified in the image.
 #[inline(never)]
-fn report(comms: &mut Comms, tick: &Tick, outgoing: &mut Vec<u8, REPORT_MAX>) {
+fn report(comms: &mut Comms, tick: &Tick, core_hz: u32, outgoing: &mut Vec<u8, REPORT_MAX>) {
     outgoing.clear();
+    let tick_us = tick.cycles as f32 / (core_hz / 1_000_000) as f32;
     // There is room for every frame.
-    comms.report(&tick.report, tick.cycles, |frame| drop(outgoing.extend_from_slice(frame)));
+    comms.report(&tick.report, tick_us, |frame| drop(outgoing.extend_from_slice(frame)));
 }
 
 /// Sends values of parameters, and passes on what has changed. Out of line like the report.

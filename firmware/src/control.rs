@@ -60,7 +60,7 @@ pub fn make(configuration: &Configuration) -> &'static mut Flight {
 }
 
 /// Runs the ticks.
-pub async fn run(flight: &mut Flight, board: &mut impl Board) -> ! {
+pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
     let (mut inputs, mut readings) = (ControlInputs::EMPTY, Readings::NONE);
     loop {
         // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
@@ -72,7 +72,7 @@ pub async fn run(flight: &mut Flight, board: &mut impl Board) -> ! {
         if !report.mode.armed() {
             adopt(flight);
         }
-        let cycles = stopwatch.cycles();
+        let cycles = stopwatch.cycles(B::CORE_HZ);
         CYCLES.store(cycles, Ordering::Relaxed);
         CYCLES_MAX.fetch_max(cycles, Ordering::Relaxed);
         ticks::push(Tick { report, cycles });

@@ -1,39 +1,41 @@
 //! Three interrupt executors, and the priorities of all interrupts.
 //!
-//! The executors use the interrupt lines of CAN2, which this firmware does not need.
+//! Each executor has an interrupt line that the board's peripherals leave unused; [`image!`](crate::image!) is told
+//! which.
 
+use core::sync::atomic::{AtomicU16, Ordering};
+use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::scb::{SystemHandler, VectActive};
 use embassy_executor::{InterruptExecutor, SendSpawner};
-use embassy_stm32::interrupt;
-use embassy_stm32::interrupt::{InterruptExt, Priority};
 
-/// Interrupt priorities; lower numbers preempt higher ones. The chip has sixteen.
+/// Interrupt priorities; lower numbers preempt higher ones. A chip has at least sixteen, in the upper four bits.
 pub mod priority {
-    use super::Priority;
     /// SysTick: [`crate::time`].
-    pub const TIME: Priority = Priority::P1;
-    /// Bytes of USART1.
-    pub const UART: Priority = Priority::P2;
+    pub const TIME: u8 = 1 << 4;
+    /// Bytes of the links.
+    pub const UART: u8 = 2 << 4;
     /// [`crate::control`].
-    pub const CONTROL: Priority = Priority::P4;
+    pub const CONTROL: u8 = 4 << 4;
     /// End of the motors' DMA transfer.
-    pub const MOTOR_DMA: Priority = Priority::P6;
+    pub const MOTOR_DMA: u8 = 6 << 4;
     /// [`crate::comms`].
-    pub const COMMS: Priority = Priority::P8;
+    pub const COMMS: u8 = 8 << 4;
     /// [`crate::housekeeping`].
-    pub const HOUSEKEEPING: Priority = Priority::P12;
+    pub const HOUSEKEEPING: u8 = 12 << 4;
 }
 
 static CONTROL: InterruptExecutor = InterruptExecutor::new();
 static COMMS: InterruptExecutor = InterruptExecutor::new();
 static HOUSEKEEPING: InterruptExecutor = InterruptExecutor::new();
 
-/// True in a task that is not needed in flight: the link's, and housekeeping.
+/// Interrupt lines of the tasks that are not needed in flight: the links', and housekeeping.
+static DISPENSABLE: [AtomicU16; 2] = [const { AtomicU16::new(u16::MAX) }; 2];
+
+/// True in a task that is not needed in flight.
 pub fn in_dispensable_task() -> bool {
-    let dispensable = [interrupt::CAN2_RX0, interrupt::CAN2_RX1];
     match SCB::vect_active() {
-        VectActive::Interrupt { irqn } => dispensable.into_iter().any(|line| line as u16 == irqn.into()),
+        VectActive::Interrupt { irqn } => DISPENSABLE.iter().any(|line| line.load(Ordering::Relaxed) == irqn.into()),
         _ => false,
     }
 }
@@ -46,38 +48,54 @@ pub struct Executors {
     pub housekeeping: SendSpawner,
 }
 
-/// Starts the executors and sets the time base's priority. To be called once.
+/// Starts the executors on the lines of control, links and housekeeping, and sets the time base's priority. To be
+/// called once.
 #[expect(unsafe_code, reason = "priorities are set by hand")]
-pub fn start(core: &mut cortex_m::Peripherals) -> Executors {
-    // SAFETY: SysTick is not running yet, and no critical section relies on its priority.
-    unsafe { core.SCB.set_priority(SystemHandler::SysTick, priority::TIME.into()) };
-    interrupt::CAN2_TX.set_priority(priority::CONTROL);
-    interrupt::CAN2_RX0.set_priority(priority::COMMS);
-    interrupt::CAN2_RX1.set_priority(priority::HOUSEKEEPING);
+pub(crate) fn start<I: InterruptNumber>(core: &mut cortex_m::Peripherals, lines: [I; 3]) -> Executors {
+    let [control, comms, housekeeping] = lines;
+    for (line, dispensable) in [comms, housekeeping].into_iter().zip(&DISPENSABLE) {
+        dispensable.store(line.number(), Ordering::Relaxed);
+    }
+    // SAFETY: none of them runs yet, and no critical section relies on a priority.
+    unsafe {
+        core.SCB.set_priority(SystemHandler::SysTick, priority::TIME);
+        core.NVIC.set_priority(control, priority::CONTROL);
+        core.NVIC.set_priority(comms, priority::COMMS);
+        core.NVIC.set_priority(housekeeping, priority::HOUSEKEEPING);
+    }
     Executors {
-        control: CONTROL.start(interrupt::CAN2_TX),
-        comms: COMMS.start(interrupt::CAN2_RX0),
-        housekeeping: HOUSEKEEPING.start(interrupt::CAN2_RX1),
+        control: CONTROL.start(control),
+        comms: COMMS.start(comms),
+        housekeeping: HOUSEKEEPING.start(housekeeping),
     }
 }
 
-#[interrupt]
-#[allow(unsafe_code, reason = "the executor must be polled from its own interrupt")]
-fn CAN2_TX() {
-    // SAFETY: this is the handler of the interrupt that CONTROL was started with, and start() enables it.
+/// Polls the control executor.
+///
+/// # Safety
+/// Only to be called by the interrupt that the executor was started with.
+#[expect(unsafe_code, reason = "an executor must be polled from its own interrupt")]
+pub unsafe fn on_control() {
+    // SAFETY: the caller's; `start` enables the interrupt.
     unsafe { CONTROL.on_interrupt() }
 }
 
-#[interrupt]
-#[allow(unsafe_code, reason = "the executor must be polled from its own interrupt")]
-fn CAN2_RX0() {
-    // SAFETY: as for CAN2_TX, with COMMS.
+/// Polls the links' executor.
+///
+/// # Safety
+/// As for [`on_control`].
+#[expect(unsafe_code, reason = "an executor must be polled from its own interrupt")]
+pub unsafe fn on_comms() {
+    // SAFETY: as for `on_control`.
     unsafe { COMMS.on_interrupt() }
 }
 
-#[interrupt]
-#[allow(unsafe_code, reason = "the executor must be polled from its own interrupt")]
-fn CAN2_RX1() {
-    // SAFETY: as for CAN2_TX, with HOUSEKEEPING.
+/// Polls housekeeping's executor.
+///
+/// # Safety
+/// As for [`on_control`].
+#[expect(unsafe_code, reason = "an executor must be polled from its own interrupt")]
+pub unsafe fn on_housekeeping() {
+    // SAFETY: as for `on_control`.
     unsafe { HOUSEKEEPING.on_interrupt() }
 }

@@ -1,10 +1,13 @@
 //! The image of a board: everything whose type depends on the board.
 
-/// Builds an image for a type that implements [`Board`](crate::board::Board): the program's entry, and the tasks whose
-/// type depends on the board. The board handles panics and faults.
+/// Builds an image for a type that implements [`Board`](crate::board::Board): the program's entry, the time base, the
+/// executors' interrupts and the tasks whose type depends on the board. The board handles panics and faults.
+///
+/// `control`, `comms` and `housekeeping` name an interrupt line each that the board leaves unused:
+/// `image!(board::Mine, control: LINE_A, comms: LINE_B, housekeeping: LINE_C)`.
 #[macro_export]
 macro_rules! image {
-    ($board:ty) => {
+    ($board:ty, control: $control:ident, comms: $comms:ident, housekeeping: $housekeeping:ident $(,)?) => {
         const _: () = assert!(
             $crate::vehicle::ROTORS <= <$board as $crate::board::Board>::OUTPUTS,
             "the vehicle has more rotors than this board has outputs for motors; choose another VEHICLE"
@@ -18,10 +21,10 @@ macro_rules! image {
         #[embassy_executor::task]
         async fn comms(
             desk: &'static mut $crate::comms::Desk,
-            mut receiver: <$board as $crate::board::Board>::Receiver,
-            mut transmitter: <$board as $crate::board::Board>::Transmitter,
+            mut links: <$board as $crate::board::Board>::Links,
         ) -> ! {
-            $crate::comms::run(desk, &mut receiver, &mut transmitter).await
+            const OTHERS: usize = <<$board as $crate::board::Board>::Links as $crate::board::Links>::COUNT - 1;
+            $crate::comms::run::<$board, OTHERS>(desk, &mut links).await
         }
 
         #[embassy_executor::task]
@@ -43,10 +46,9 @@ macro_rules! image {
         fn spawn_comms(
             spawner: embassy_executor::SendSpawner,
             desk: &'static mut $crate::comms::Desk,
-            receiver: <$board as $crate::board::Board>::Receiver,
-            transmitter: <$board as $crate::board::Board>::Transmitter,
+            links: <$board as $crate::board::Board>::Links,
         ) {
-            spawner.spawn(comms(desk, receiver, transmitter).expect("spawned once"));
+            spawner.spawn(comms(desk, links).expect("spawned once"));
         }
 
         #[inline(never)]
@@ -57,10 +59,38 @@ macro_rules! image {
             spawner.spawn(parameters(keeper).expect("spawned once"));
         }
 
+        $crate::time::time_driver_impl!(
+            static TIME: $crate::time::SysTickDriver<{ <$board as $crate::board::Board>::CORE_HZ / 1_000_000 }> =
+                $crate::time::SysTickDriver
+        );
+
+        #[allow(unsafe_code, reason = "an executor must be polled from its own interrupt")]
+        mod executors {
+            #[unsafe(no_mangle)]
+            extern "C" fn $control() {
+                // SAFETY: the executor is started with this line, below.
+                unsafe { $crate::executors::on_control() }
+            }
+
+            #[unsafe(no_mangle)]
+            extern "C" fn $comms() {
+                // SAFETY: as above.
+                unsafe { $crate::executors::on_comms() }
+            }
+
+            #[unsafe(no_mangle)]
+            extern "C" fn $housekeeping() {
+                // SAFETY: as above.
+                unsafe { $crate::executors::on_housekeeping() }
+            }
+        }
+
         #[cortex_m_rt::entry]
         fn main() -> ! {
+            type Line = <$board as $crate::board::Board>::Interrupt;
             let core = cortex_m::Peripherals::take().expect("taken once");
-            $crate::run(core, spawn_control, spawn_comms, spawn_parameters)
+            let lines = [Line::$control, Line::$comms, Line::$housekeeping];
+            $crate::run(core, lines, spawn_control, spawn_comms, spawn_parameters)
         }
     };
 }

@@ -1,12 +1,12 @@
-//! AFBC on an STM32F405 at 168 MHz: a thin shell around [`afbc_flight_core`] and [`afbc_onboard`], which hold all
+//! AFBC on a microcontroller: a thin shell around [`afbc_flight_core`] and [`afbc_onboard`], which hold all
 //! logic.
 //!
 //! # One firmware, an image per board
 //!
-//! The differences between boards are behind the trait [`board::Board`]; each crate in `boards/` implements it and
-//! builds an image. `boards/stm32f405` is the one that flies. `boards/emulated` has the same control tick, link,
-//! supervisor, executors and time base, but exchanges bytes with the host once per control tick, so that an emulator
-//! can fly it in lockstep.
+//! The differences between boards, of whatever chip, are behind the trait [`board::Board`]; each crate in `boards/`
+//! implements it and builds an image. `boards/emulated` has the same control tick, link, supervisor, executors and time
+//! base as the boards that fly, but exchanges bytes with the host once per control tick, so that an emulator can fly it
+//! in lockstep.
 //!
 //! # Priorities
 //!
@@ -16,13 +16,13 @@
 //! | | runs | duration |
 //! |---|---|---|
 //! | 1 | SysTick: the time base, starts the control tick | 1 us per millisecond |
-//! | 2 | USART1: bytes to and from their rings | 1 us per byte |
+//! | 2 | the links: bytes to and from their rings | 1 us per byte |
 //! | 4 | [`control`]: the control tick, then the motors' waveform | 50 us per millisecond |
 //! | 6 | end of the motors' DMA | 1 us per millisecond |
 //! | 8 | [`comms`]: the link's messages | |
 //! | 12 | [`housekeeping`]: logging, stack monitoring; [`parameters`]: writing to flash | |
 //!
-//! USART1 precedes the control tick because it buffers one byte, and the next comes within 11 us.
+//! The links precede the control tick because a UART may buffer one byte only, and the next comes within 11 us.
 #![no_std]
 
 pub mod board;
@@ -36,27 +36,30 @@ pub mod ticks;
 pub mod time;
 pub mod vehicle;
 
-use board::{Board, Transmitter as _};
+use board::{Board, Links as _, Parts, Transmitter as _};
 use embassy_executor::SendSpawner;
 
-/// Starts everything; the core then idles between interrupts. `control`, `comms` and `keeper` start the tasks that use
-/// the board; [`image!`] defines them.
+/// Starts everything; the core then idles between interrupts. `lines` are the interrupt lines of the executors of
+/// control, links and housekeeping; `control`, `comms` and `keeper` start the tasks that use the board. [`image!`]
+/// defines all of them.
 pub fn run<B: Board>(
     mut core: cortex_m::Peripherals,
+    lines: [B::Interrupt; 3],
     control: impl FnOnce(SendSpawner, &'static mut vehicle::Flight, B),
-    comms: impl FnOnce(SendSpawner, &'static mut comms::Desk, B::Receiver, B::Transmitter),
+    comms: impl FnOnce(SendSpawner, &'static mut comms::Desk, B::Links),
     keeper: impl FnOnce(SendSpawner, parameters::Keeper<B::Memory>),
 ) -> ! {
-    let executors = executors::start(&mut core);
-    let (mut board, receiver, mut transmitter, memory) = B::start(executors.control);
+    let executors = executors::start(&mut core, lines);
+    let Parts { mut board, mut links, memory } = B::start(executors.control);
     let (kept, table) = parameters::read(memory, B::STORE);
-    // In range: a whole number.
-    transmitter.set_baud(table.configuration().link.baud);
+    for link in links.each() {
+        link.transmitter.set_baud(table.configuration().link.baud);
+    }
     let flight = control::make(table.configuration());
     let desk = comms::make(table);
     board.unleash_watchdog();
-    time::start(core.SYST);
-    comms(executors.comms, desk, receiver, transmitter);
+    time::start(core.SYST, B::CORE_HZ);
+    comms(executors.comms, desk, links);
     control(executors.control, flight, board);
     keeper(executors.housekeeping, kept);
     housekeeping::spawn(executors.housekeeping);

@@ -1,9 +1,8 @@
 //! The vehicle's parameters: read from the board's flash at the start, written to it while disarmed.
 //!
-//! Sectors are erased at the start only, before the watchdog and the control tick run: while a sector of the chip's own
-//! flash is erased, up to half a second, every access to the flash stops the core. Writing stops it for 16 us a word,
-//! 100
-//! us at most, with the tick's interrupt served in between: a tick comes up to 0.1 ms late, which is within its
+//! Sectors are erased at the start only, before the watchdog and the control tick run: while a sector of a chip's own
+//! flash is erased, half a second and more, an access to the flash may stop the core. Writing may stop it for a word at
+//! a time, up to 0.1 ms, with the tick's interrupt served in between: a tick comes that much late, which is within its
 //! tolerance. No word is written while armed ([`Gate`]).
 
 use crate::control;

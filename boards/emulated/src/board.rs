@@ -11,13 +11,14 @@ use embassy_executor::SendSpawner;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
-use firmware::board::{self, Board};
+use firmware::board::{self, Board, Link, Parts};
 use firmware::housekeeping;
 use firmware::ticks::Tick;
 use firmware::vehicle::ROTORS;
 use semihosting::fs::File;
 use semihosting::io::{Read, Write};
 use semihosting::process::exit;
+use stm32_metapac::Interrupt;
 
 /// Bytes received by the link, at most this many per tick.
 static LINK: Pipe<CriticalSectionRawMutex, 4096> = Pipe::new();
@@ -32,21 +33,23 @@ static THROTTLES: Mutex<CriticalSectionRawMutex, Cell<[u16; ROTORS_MAX]>> = Mute
 pub(crate) struct Emulated;
 
 impl Board for Emulated {
-    type Receiver = Receiver;
-    type Transmitter = Transmitter;
+    type Interrupt = Interrupt;
+    type Links = [Link<Receiver, Transmitter>; 1];
     /// In RAM: QEMU's flash cannot be written, and every flight begins with the image's parameters.
     type Memory = Ram<1024>;
+    /// As QEMU's STM32F405 counts it: the host derives instructions from it.
+    const CORE_HZ: u32 = 168_000_000;
     const STORE: u32 = 0;
     const OUTPUTS: usize = ROTORS_MAX;
 
     /// Opens the FIFOs and waits for the first tick's bytes.
-    fn start(_control: SendSpawner) -> (Self, Receiver, Transmitter, Self::Memory) {
+    fn start(_control: SendSpawner) -> Parts<Self> {
         let mut transmitter = Transmitter {
             to_firmware: File::open(c"to_firmware").expect("the host made the FIFO"),
             from_firmware: File::create(c"from_firmware").expect("the host made the FIFO"),
         };
         transmitter.take_bytes();
-        (Emulated, Receiver, transmitter, Ram::BLANK)
+        Parts { board: Emulated, links: [Link { receiver: Receiver, transmitter }], memory: Ram::BLANK }
     }
 
     /// There is no watchdog.

@@ -9,7 +9,7 @@ use core::panic::PanicInfo;
 use defmt_rtt as _;
 use semihosting::process::exit;
 
-firmware::image!(board::Emulated);
+firmware::image!(board::Emulated, control: CAN2_TX, comms: CAN2_RX0, housekeeping: CAN2_RX1);
 
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {

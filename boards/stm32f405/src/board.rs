@@ -19,7 +19,7 @@ use embassy_executor::SendSpawner;
 use embassy_futures::poll_once;
 use embassy_stm32::flash::{Bank1Region1, Blocking, Flash};
 use embassy_stm32::gpio::OutputType;
-use embassy_stm32::interrupt::{self, InterruptExt};
+use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::peripherals::{DMA2_CH1, IWDG, TIM8, USART1};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::Channel;
@@ -32,7 +32,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Instant, with_deadline};
 use embedded_io_async::{BufRead, Write};
-use firmware::board::{self, Board};
+use firmware::board::{self, Board, Link, Parts};
 use firmware::executors::priority;
 use firmware::ticks::Tick;
 use firmware::vehicle::ROTORS;
@@ -52,7 +52,7 @@ const WATCHDOG_US: u32 = 20_000;
 /// Longest transfer of a frame to the motors before it is aborted \[us\].
 const TRANSFER_MAX_US: u64 = 2_000;
 /// Timers of the second peripheral bus run at the core's clock \[Hz\].
-const MOTOR_TIMER_HZ: u32 = firmware::time::CORE_HZ;
+const MOTOR_TIMER_HZ: u32 = clocks::CORE_HZ;
 
 bind_interrupts!(struct Irqs {
     USART1 => usart::BufferedInterruptHandler<USART1>;
@@ -72,13 +72,14 @@ pub(crate) struct Stm32f405 {
 }
 
 impl Board for Stm32f405 {
-    type Receiver = Receiver;
-    type Transmitter = Transmitter;
+    type Interrupt = pac::Interrupt;
+    type Links = [Link<Receiver, Transmitter>; 1];
     type Memory = Bank1Region1<'static, Blocking>;
+    const CORE_HZ: u32 = clocks::CORE_HZ;
     const STORE: u32 = STORE;
     const OUTPUTS: usize = OUTPUTS;
 
-    fn start(control: SendSpawner) -> (Self, Receiver, Transmitter, Self::Memory) {
+    fn start(control: SendSpawner) -> Parts<Self> {
         let p = clocks::start();
         reset::log();
 
@@ -86,7 +87,7 @@ impl Board for Stm32f405 {
         config.eager_reads = Some(READ_MIN);
         let uart = BufferedUart::new(p.USART1, p.PA10, p.PA9, TX.init([0; 1024]), RX.init([0; 1024]), Irqs, config);
         let (transmitter, receiver) = uart.expect("the baud rate divides the clock").split();
-        interrupt::USART1.set_priority(priority::UART);
+        interrupt::USART1.set_priority(Priority::from(priority::UART));
 
         let pin = OutputType::PushPull;
         let pwm = SimplePwm::new(
@@ -104,7 +105,7 @@ impl Board for Stm32f405 {
             timing: Timing::new(MOTOR_TIMER_HZ).expect("the timer's clock is within its range"),
             rows: Rows([[0; OUTPUTS]; 17]),
         };
-        interrupt::DMA2_STREAM1.set_priority(priority::MOTOR_DMA);
+        interrupt::DMA2_STREAM1.set_priority(Priority::from(priority::MOTOR_DMA));
         control.spawn(self::motors(motors).expect("spawned once"));
 
         // A debugger that halts the core halts the watchdog.
@@ -112,7 +113,8 @@ impl Board for Stm32f405 {
         let watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
         let memory = Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1;
 
-        (Stm32f405 { watchdog }, Receiver(receiver), Transmitter(transmitter), memory)
+        let link = Link { receiver: Receiver(receiver), transmitter: Transmitter(transmitter) };
+        Parts { board: Stm32f405 { watchdog }, links: [link], memory }
     }
 
     fn unleash_watchdog(&mut self) {

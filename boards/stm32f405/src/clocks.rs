@@ -13,6 +13,8 @@ use embassy_stm32::rcc::{
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
 
+/// Clock of the core \[Hz\].
+pub(crate) const CORE_HZ: u32 = 168_000_000;
 /// The crystal \[Hz\].
 const CRYSTAL: Hertz = Hertz(8_000_000);
 /// Longest start-up time of a crystal \[ms\]; usually 2.

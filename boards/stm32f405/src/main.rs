@@ -9,7 +9,8 @@ mod reset;
 use core::panic::PanicInfo;
 use defmt_rtt as _;
 
-firmware::image!(board::Stm32f405);
+// The interrupt lines of CAN2, which this firmware does not need.
+firmware::image!(board::Stm32f405, control: CAN2_TX, comms: CAN2_RX0, housekeeping: CAN2_RX1);
 
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {

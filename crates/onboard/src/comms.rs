@@ -160,6 +160,11 @@ impl Comms {
         core::mem::swap(&mut self.decoder, decoder);
     }
 
+    /// Returns the decoder of another stream, to be [exchanged](Self::exchange).
+    pub fn decoder(&self) -> Decoder<Uplink> {
+        Decoder::new(self.dispatcher.me)
+    }
+
     /// Returns the number of frames dropped since power-up, for any reason.
     pub fn bad_frames(&self) -> u32 {
         let c = self.decoder.counters();
@@ -168,11 +173,10 @@ impl Comms {
             .fold(0, u32::saturating_add)
     }
 
-    /// Sends all messages due after a tick, frame by frame, through `send`: at most [`REPORT_MAX`] bytes. `tick_cycles`
-    /// is the duration of the tick in cycles of 168 MHz.
-    pub fn report<const N: usize>(&mut self, report: &Report<N>, tick_cycles: u32, send: impl FnMut(&[u8])) {
+    /// Sends all messages due after a tick, frame by frame, through `send`: at most [`REPORT_MAX`] bytes. `tick_us` is
+    /// the duration of the tick.
+    pub fn report<const N: usize>(&mut self, report: &Report<N>, tick_us: f32, send: impl FnMut(&[u8])) {
         self.tick += 1;
-        let tick_us = tick_cycles as f32 / 168.0;
         self.tick_us_max = self.tick_us_max.max(tick_us);
         let dropped_frames = self.bad_frames();
         let dispatcher = &mut self.dispatcher;

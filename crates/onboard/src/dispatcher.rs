@@ -50,7 +50,7 @@ enum ParameterTask {
 
 /// All services, and what they know.
 pub(crate) struct Dispatcher {
-    me: Address,
+    pub(crate) me: Address,
     /// Start of the last tick \[us\], the time stamp of everything that arrives before the next one.
     pub(crate) now_us: u64,
     pub(crate) status: VehicleStatus,

@@ -17,7 +17,7 @@
 //! inputs.take_into(&mut taken);
 //! let report = flight.tick(1_000, &mut taken, &Readings::NONE);
 //! assert_eq!(report.throttles, [0; 4]); // disarmed
-//! comms.report(&report, 0, |_bytes| ());
+//! comms.report(&report, 0.0, |_bytes| ());
 //! # Ok::<(), afbc_types::OutOfRange>(())
 //! ```
 #![no_std]

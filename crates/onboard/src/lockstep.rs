@@ -11,7 +11,7 @@ use afbc_types::ROTORS_MAX;
 pub struct ReplyHead {
     /// Start of the tick, since power-up \[us\].
     pub time_us: u64,
-    /// Duration of the tick \[cycles of 168 MHz\].
+    /// Duration of the tick \[core cycles\].
     pub cycles: u32,
     /// Largest stack depth so far \[bytes\].
     pub stack_bytes: u32,

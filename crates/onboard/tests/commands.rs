@@ -496,14 +496,14 @@ fn heartbeats_come_once_per_second() {
 #[test]
 fn health_tells_counts_and_times() {
     let mut bench = Bench::new();
-    let health = |bench: &mut Bench, cycles: u32| {
+    let health = |bench: &mut Bench, tick_us: f32| {
         let mut decoder = afbc_link::Decoder::<Downlink>::new(STATION);
         bench.hear(Uplink::Command(Command::RequestMessage { message: id::DEBUG_FLOAT_ARRAY, index: 0 }));
         bench.now_us += 1000;
         bench.inputs.take_into(&mut bench.taken);
         let report: Report = bench.flight.tick(bench.now_us, &mut bench.taken, &afbc_onboard::Readings::NONE);
         let mut told = None;
-        bench.comms.report(&report, cycles, |bytes| {
+        bench.comms.report(&report, tick_us, |bytes| {
             decoder.feed(bytes, |_, message| {
                 if let Downlink::Health(health) = message {
                     told = Some(health);
@@ -512,9 +512,9 @@ fn health_tells_counts_and_times() {
         });
         told.expect("sent")
     };
-    let first = health(&mut bench, 168_000);
+    let first = health(&mut bench, 1000.0);
     assert_eq!((first.tick_us, first.tick_max_us, bench.comms.bad_frames()), (1000.0, 1000.0, 0));
-    let second = health(&mut bench, 16_800);
+    let second = health(&mut bench, 100.0);
     assert_eq!((second.tick_us, second.tick_max_us), (100.0, 1000.0));
     // A frame that is damaged, and one of an unknown message.
     let mut frame = [0; FRAME_MAX];

@@ -26,7 +26,7 @@ const REPLY_MAX: usize = 4096;
 pub struct TickReply {
     /// Start of the tick, since power-up \[us\].
     pub time_us: u64,
-    /// Duration in cycles of 168 MHz, as measured by the firmware.
+    /// Duration in core cycles, as measured by the firmware.
     pub cycles: u32,
     /// Duration in instructions, which is what the emulator counts.
     pub instructions: u32,
@@ -36,6 +36,13 @@ pub struct TickReply {
     pub throttles: [u16; ROTORS_MAX],
     /// Bytes sent over the link.
     pub bytes: Vec<u8>,
+}
+
+impl TickReply {
+    /// Returns the duration as the firmware reports it to stations \[us\].
+    pub fn tick_us(&self) -> f32 {
+        self.cycles as f32 / qemu::CORE_MHZ as f32
+    }
 }
 
 /// The `pil` image, running in lockstep with the host.

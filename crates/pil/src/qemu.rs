@@ -20,10 +20,13 @@ pub(crate) fn count_instructions(shift: u32) -> [String; 2] {
     ["-icount".into(), format!("shift={shift},sleep=off")]
 }
 
-/// Converts cycles of the 168 MHz core clock, as counted by SysTick, to instructions of 2^`shift` ns.
+/// Clock of this processor's core \[MHz\].
+pub(crate) const CORE_MHZ: u32 = 168;
+
+/// Converts core cycles, as counted by SysTick, to instructions of 2^`shift` ns.
 pub(crate) fn instructions(cycles: u32, shift: u32) -> u32 {
     // Rounded: an instruction of 8 ns is 1.344 cycles.
-    let cycles_per_thousand = 168 << shift;
+    let cycles_per_thousand = u64::from(CORE_MHZ << shift);
     ((u64::from(cycles) * 1000 + cycles_per_thousand / 2) / cycles_per_thousand) as u32
 }
 

@@ -58,7 +58,7 @@ impl Autopilot for Twins {
     fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error> {
         let reply = self.emulator.exchange(uplink).map_err(|error| Error::Autopilot(error.into()))?;
         // The times are the processor's, since they are measured, not computed.
-        let tick = self.host.tick(uplink, reply.time_us, reply.cycles);
+        let tick = self.host.tick(uplink, reply.time_us, reply.tick_us());
         self.comparison.add(&reply, &tick);
         hear(&reply.bytes);
         Ok(())

@@ -26,7 +26,7 @@ fn every_bit_is_the_hosts() {
     let mut modes = Vec::new();
     for (tick, reply) in replies.iter().enumerate() {
         let HostTick { report, bytes, .. } =
-            host.tick(&bytes_of_tick(&mut station, tick as u64), reply.time_us, reply.cycles);
+            host.tick(&bytes_of_tick(&mut station, tick as u64), reply.time_us, reply.tick_us());
         assert_eq!(report.throttles, reply.throttles, "throttles of tick {tick}");
         assert_eq!(bytes, reply.bytes, "bytes of tick {tick}");
         assert_eq!(report.health.rate.off_ticks(), 0, "tick {tick} came at the wrong time");

@@ -39,10 +39,10 @@ trait Core {
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange>;
 }
 
-/// What reports a tick that took so many cycles.
+/// What reports a tick that took so long.
 struct Tell<'a> {
     comms: &'a mut Comms,
-    cycles: u32,
+    tick_us: f32,
     send: &'a mut dyn FnMut(&[u8]),
 }
 
@@ -55,7 +55,7 @@ impl<const N: usize> Core for (Flight<N>, ParameterTable<N>) {
         tell: Tell<'_>,
     ) -> Report<ROTORS_MAX> {
         let report = self.0.tick(now_us, inputs, readings);
-        tell.comms.report(&report, tell.cycles, tell.send);
+        tell.comms.report(&report, tell.tick_us, tell.send);
         report.padded()
     }
 
@@ -191,14 +191,14 @@ impl Host {
     }
 
     /// Runs one control tick at `time_us` since power-up, after `uplink` has reached the link. The tick reports a
-    /// duration of `cycles` cycles of 168 MHz.
-    pub fn tick(&mut self, uplink: &[u8], time_us: u64, cycles: u32) -> HostTick {
+    /// duration of `tick_us`.
+    pub fn tick(&mut self, uplink: &[u8], time_us: u64, tick_us: f32) -> HostTick {
         self.inputs.merge(&self.comms.receive(uplink));
         self.inputs.take_into(&mut self.taken);
         let readings = core::mem::take(&mut self.readings);
         let mut bytes = Vec::new();
         let mut send = |frame: &[u8]| bytes.extend_from_slice(frame);
-        let tell = Tell { comms: &mut self.comms, cycles, send: &mut send };
+        let tell = Tell { comms: &mut self.comms, tick_us, send: &mut send };
         let report = self.flight.tick(time_us, &mut self.taken, &readings, tell);
         let change = self.flight.parameters(&mut self.comms, &mut send);
         self.time_us = time_us;
@@ -207,7 +207,7 @@ impl Host {
 
     /// Runs the tick a millisecond after the previous one, with a duration of zero.
     pub fn next_tick(&mut self, uplink: &[u8]) -> HostTick {
-        self.tick(uplink, self.time_us + PERIOD_US, 0)
+        self.tick(uplink, self.time_us + PERIOD_US, 0.0)
     }
 }
 
