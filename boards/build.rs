@@ -4,15 +4,21 @@
 use std::path::Path;
 
 fn main() {
-    // The board's own memory map or, without one, the default board's at the workspace's root.
     let board = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let folders = [board, board.ancestors().nth(2).expect("the workspace's root")];
-    let folder = folders.into_iter().find(|folder| folder.join("memory.x").is_file()).expect("memory.x at the root");
-    println!("cargo:rustc-link-search={}", folder.display());
-    for folder in folders {
-        println!("cargo:rerun-if-changed={}", folder.join("memory.x").display());
+    let [own, sections] = [board.join("memory.x"), board.with_file_name("link.x")];
+    let root = board.ancestors().nth(2).expect("the workspace's root");
+    for file in [&own, &sections, &root.join("memory.x")] {
+        println!("cargo:rerun-if-changed={}", file.display());
     }
-    for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
-        println!("cargo:rustc-link-arg-bins={argument}");
+    // The board's own memory map or, without one, that at the workspace's root, which cortex-m-rt's link.x includes.
+    let scripts = if own.is_file() {
+        [&own, &sections].map(|path| path.display().to_string()).to_vec()
+    } else {
+        println!("cargo:rustc-link-search={}", root.display());
+        vec!["link.x".to_owned()]
+    };
+    println!("cargo:rustc-link-arg-bins=--nmagic");
+    for script in scripts.into_iter().chain(["defmt.x".to_owned()]) {
+        println!("cargo:rustc-link-arg-bins=-T{script}");
     }
 }

@@ -25,7 +25,7 @@ pub trait Board: Sized + 'static {
 
     /// Brings up clocks and peripherals; the core runs at [`CORE_HZ`](Self::CORE_HZ) from then on. To be called once. A
     /// board's tasks spawned on `control` run right after the control tick.
-    fn start(control: SendSpawner) -> Parts<Self>;
+    fn start(core: &mut cortex_m::Peripherals, control: SendSpawner) -> Parts<Self>;
 
     /// Starts the watchdog, if there is one; nothing is erased from now on.
     fn unleash_watchdog(&mut self);

@@ -50,7 +50,7 @@ pub fn run<B: Board>(
     keeper: impl FnOnce(SendSpawner, parameters::Keeper<B::Memory>),
 ) -> ! {
     let executors = executors::start(&mut core, lines);
-    let Parts { mut board, mut links, memory } = B::start(executors.control);
+    let Parts { mut board, mut links, memory } = B::start(&mut core, executors.control);
     let (kept, table) = parameters::read(memory, B::STORE);
     for link in links.each() {
         link.transmitter.set_baud(table.configuration().link.baud);

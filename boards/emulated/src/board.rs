@@ -43,7 +43,7 @@ impl Board for Emulated {
     const OUTPUTS: usize = ROTORS_MAX;
 
     /// Opens the FIFOs and waits for the first tick's bytes.
-    fn start(_control: SendSpawner) -> Parts<Self> {
+    fn start(_core: &mut cortex_m::Peripherals, _control: SendSpawner) -> Parts<Self> {
         let mut transmitter = Transmitter {
             to_firmware: File::open(c"to_firmware").expect("the host made the FIFO"),
             from_firmware: File::create(c"from_firmware").expect("the host made the FIFO"),

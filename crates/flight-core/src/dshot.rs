@@ -66,14 +66,14 @@ impl Timing {
 
     /// Computes the compare values of several motors: a row for each bit, a column for each motor, each column a
     /// [waveform](Self::waveform).
-    pub fn rows<const N: usize>(&self, throttles: [u16; N], rows: &mut [[u16; N]; 17]) {
+    pub fn rows<const N: usize, W: Copy + From<u16>>(&self, throttles: [u16; N], rows: &mut [[W; N]; 17]) {
         let mut frames = throttles.map(|throttle| DshotFrame::new(throttle).bits());
         let [bits @ .., last] = rows;
         for row in bits {
-            *row = frames.map(|bits| self.pulse(bits & 0x8000 != 0));
+            *row = frames.map(|bits| W::from(self.pulse(bits & 0x8000 != 0)));
             frames = frames.map(|bits| bits << 1);
         }
-        *last = [0; N];
+        *last = [W::from(0); N];
     }
 
     /// Returns the length of a pulse.

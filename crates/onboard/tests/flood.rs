@@ -236,7 +236,7 @@ fn every_command_is_answered_once_to_its_sender() {
                 _ => (),
             });
         };
-        comms.report(&report, 0, &mut send);
+        comms.report(&report, 0.0, &mut send);
         let change = comms.parameters(&mut table, &mut send);
         assert!(change.is_none() || !report.mode.armed());
         assert!(bytes <= REPORT_MAX, "{bytes} bytes");

@@ -62,7 +62,7 @@ impl Bench {
                 Downlink::Answer { answer, .. } => answers.push(answer),
                 _ => (),
             };
-            comms.report(&report, 0, |bytes| decoder.feed(bytes, &mut hear));
+            comms.report(&report, 0.0, |bytes| decoder.feed(bytes, &mut hear));
         }
     }
 

@@ -208,7 +208,7 @@ fn step(bench: &mut Bench) -> Vec<Sample> {
         let id = u32::from_le_bytes([frame[7], frame[8], frame[9], 0]);
         sent.push(Sample { id, payload: frame[10..frame.len() - 2].to_vec() });
     };
-    comms.report(&report, 0, &mut send);
+    comms.report(&report, 0.0, &mut send);
     comms.parameters(table, &mut send);
     assert!(bytes <= afbc_onboard::REPORT_MAX, "{bytes} bytes");
     sent

@@ -34,7 +34,7 @@ impl Beside {
             linked.function_named(name).ok_or_else(|| Error::Protocol(format!("the image has no function {name}")))
         };
         let [encode, systick, byte, wake] =
-            [address("flight::board::encode")?, address("SysTick")?, address("USART1")?, address("CAN2_RX0")?];
+            [address("chip_stm32::motors::encode")?, address("SysTick")?, address("USART1")?, address("CAN2_RX0")?];
         let mut board = EmulatedBoard::boot(elf)?;
         let mut station = Station::default();
         for count in 1..=50_u32 {

@@ -68,7 +68,7 @@ const WAKER: [&str; 3] =
 /// Each executor's interrupt, and the tasks that it polls through a pointer, each identified by a function that only it
 /// calls.
 const EXECUTORS: [(&str, &[&str]); 3] = [
-    ("CAN2_TX", &["firmware::control::tick", "flight::board::encode"]),
+    ("CAN2_TX", &["firmware::control::tick", "chip_stm32::motors::encode"]),
     ("CAN2_RX0", &["firmware::comms::report"]),
     ("CAN2_RX1", &["firmware::housekeeping::deepest_stack", "firmware::parameters::keep"]),
 ];

@@ -106,7 +106,7 @@ impl Bench {
             (length, frames) = (length + bytes.len(), frames + 1);
             decoder.feed(bytes, |_, message| messages.push(message));
         };
-        comms.report(report, 0, &mut send);
+        comms.report(report, 0.0, &mut send);
         if let Some(change) = comms.parameters(table, &mut send) {
             assert!(flight.adopt(&Prepared::new(table.configuration()).expect("checked")), "changed while armed");
             changes.push(change);

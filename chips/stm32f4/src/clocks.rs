@@ -1,4 +1,4 @@
-//! Clocks of the board: 168 MHz, the chip's rated speed, from the crystal or, if that fails, from the chip's own
+//! Clocks: 168 MHz, the chip's rated speed, from the crystal or, if that fails, from the chip's own
 //! oscillator; and the flash settings for this speed.
 //!
 //! The internal oscillator is accurate to 1 % at room temperature. The vehicle can fly on it, with all times up to 1 %
@@ -14,9 +14,9 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
 
 /// Clock of the core \[Hz\].
-pub(crate) const CORE_HZ: u32 = 168_000_000;
-/// The crystal \[Hz\].
-const CRYSTAL: Hertz = Hertz(8_000_000);
+pub const CORE_HZ: u32 = 168_000_000;
+/// Input of the PLL \[Hz\]; a crystal has a multiple of it.
+const PLL_INPUT_HZ: u32 = 2_000_000;
 /// Longest start-up time of a crystal \[ms\]; usually 2.
 const CRYSTAL_START_MS: u32 = 100;
 /// Core cycles in a millisecond, before the clocks are set up.
@@ -27,18 +27,20 @@ const LOCK_LOOKS: u32 = 5_000;
 static FAILED: AtomicBool = AtomicBool::new(false);
 
 /// True if the crystal has failed, at the start or in flight, so that arming must be refused.
-pub(crate) fn have_failed() -> bool {
+pub fn have_failed() -> bool {
     FAILED.load(Ordering::Relaxed)
 }
 
-/// Sets up clocks and flash. To be called once after reset.
-pub(crate) fn start() -> Peripherals {
-    let crystal = crystal_starts();
-    FAILED.store(!crystal, Ordering::Relaxed);
-    let peripherals = embassy_stm32::init(config(crystal));
+/// Sets up clocks and flash of a board with a crystal of `CRYSTAL_HZ`: 4 to 26 MHz, in steps of 2 MHz. To be called once
+/// after reset.
+pub fn start<const CRYSTAL_HZ: u32>() -> Peripherals {
+    const { assert!(CRYSTAL_HZ.is_multiple_of(PLL_INPUT_HZ) && CRYSTAL_HZ >= 4_000_000 && CRYSTAL_HZ <= 26_000_000) }
+    let starts = crystal_starts();
+    FAILED.store(!starts, Ordering::Relaxed);
+    let peripherals = embassy_stm32::init(config::<CRYSTAL_HZ>(starts));
     speed_up_flash();
     // The clock security system switches to the chip's oscillator and raises an NMI if the crystal fails.
-    RCC.cr().modify(|cr| cr.set_csson(crystal));
+    RCC.cr().modify(|cr| cr.set_csson(starts));
     peripherals
 }
 
@@ -55,11 +57,11 @@ fn crystal_starts() -> bool {
 }
 
 /// 168 MHz; buses at 168, 42 and 84 MHz.
-fn config(crystal: bool) -> Config {
-    // Both give the PLL an input of 2 MHz.
-    let (source, prediv) = if crystal { (PllSource::HSE, PllPreDiv::DIV4) } else { (PllSource::HSI, PllPreDiv::DIV8) };
+fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
+    let source = if crystal { PllSource::HSE } else { PllSource::HSI };
+    let prediv = if crystal { PllPreDiv::from_bits((CRYSTAL_HZ / PLL_INPUT_HZ) as u8) } else { PllPreDiv::DIV8 };
     let mut config = Config::default();
-    config.rcc.hse = crystal.then_some(Hse { freq: CRYSTAL, mode: HseMode::Oscillator });
+    config.rcc.hse = crystal.then_some(Hse { freq: Hertz(CRYSTAL_HZ), mode: HseMode::Oscillator });
     config.rcc.pll_src = source;
     config.rcc.pll =
         Some(Pll { prediv, mul: PllMul::MUL168, divp: Some(PllPDiv::DIV2), divq: Some(PllQDiv::DIV7), divr: None });

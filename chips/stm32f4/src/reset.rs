@@ -9,7 +9,7 @@ const LEVEL_2_7_V: u8 = 0b00;
 const OFF: u8 = 0b11;
 
 /// Logs cause and level.
-pub(crate) fn log() {
+pub fn log() {
     let csr = RCC.csr().read();
     // The flags persist until cleared, also across resets.
     RCC.csr().modify(|csr| csr.set_rmvf(true));

@@ -1,0 +1,132 @@
+//! Links, motors and watchdog of an STM32H743VI with the pins of the Matek H743; `docs/firmware.md` shows the wiring.
+//!
+//! | what | where |
+//! |---|---|
+//! | crystal | 8 MHz on PH0, PH1 |
+//! | first link | UART7: TX on PE8, RX on PE7 |
+//! | second link | USART1: TX on PA9, RX on PA10 |
+//! | motors 1 to 4 (S3 to S6) | TIM5, channels 1 to 4: PA0, PA1, PA2, PA3; driven by DMA1's stream 0 |
+//! | motors 5 to 8 (S7 to S10) | TIM4, channels 1 to 4: PD12, PD13, PD14, PD15; driven by DMA1's stream 1 |
+//! | memory | `memory.x` beside this folder |
+//! | parameters | sectors 0 and 1 of the flash's second bank |
+//! | sensors | none yet, so no alignment: the state comes over a link |
+
+use chip_stm32::link::{self, Receiver, Transmitter};
+use chip_stm32::motors::{CHANNELS, Motors, Throttles, hold_low};
+use chip_stm32::{faults, watchdog};
+use chip_stm32h7::flash::Words;
+use chip_stm32h7::{clocks, reset};
+use embassy_executor::SendSpawner;
+use embassy_stm32::interrupt::{self, InterruptExt, Priority};
+use embassy_stm32::peripherals::{DMA1_CH0, DMA1_CH1, IWDG1, TIM4, TIM5, UART7, USART1};
+use embassy_stm32::usart::{self, BufferedUart};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{bind_interrupts, dma, pac};
+use firmware::board::{Board, Link, Parts};
+use firmware::executors::priority;
+use firmware::vehicle::ROTORS;
+use static_cell::StaticCell;
+
+/// The crystal \[Hz\].
+const CRYSTAL_HZ: u32 = 8_000_000;
+/// Motors: the channels of two timers.
+const OUTPUTS: usize = 2 * CHANNELS;
+
+bind_interrupts!(struct Irqs {
+    UART7 => usart::BufferedInterruptHandler<UART7>;
+    USART1 => usart::BufferedInterruptHandler<USART1>;
+    DMA1_STREAM0 => dma::InterruptHandler<DMA1_CH0>;
+    DMA1_STREAM1 => dma::InterruptHandler<DMA1_CH1>;
+});
+
+/// Ring buffers of the links.
+static RX: [StaticCell<[u8; 1024]>; 2] = [const { StaticCell::new() }; 2];
+static TX: [StaticCell<[u8; 1024]>; 2] = [const { StaticCell::new() }; 2];
+
+/// Newest throttles, for the motors' tasks.
+static THROTTLES: [Throttles; 2] = [const { Throttles::new() }; 2];
+
+/// The board after start-up.
+pub(crate) struct Stm32h743 {
+    watchdog: IndependentWatchdog<'static, IWDG1>,
+}
+
+impl Board for Stm32h743 {
+    type Interrupt = pac::Interrupt;
+    type Links = [Link<Receiver, Transmitter>; 2];
+    type Memory = Words;
+    const CORE_HZ: u32 = clocks::CORE_HZ;
+    const STORE: u32 = 0;
+    const OUTPUTS: usize = OUTPUTS;
+
+    fn start(core: &mut cortex_m::Peripherals, control: SendSpawner) -> Parts<Self> {
+        let p = clocks::start::<CRYSTAL_HZ>(&mut core.SCB);
+        reset::log();
+
+        let [tx, tx2] = TX.each_ref().map(|ring| ring.init([0; 1024]));
+        let [rx, rx2] = RX.each_ref().map(|ring| ring.init([0; 1024]));
+        let first = BufferedUart::new(p.UART7, p.PE7, p.PE8, tx, rx, Irqs, link::config());
+        let second = BufferedUart::new(p.USART1, p.PA10, p.PA9, tx2, rx2, Irqs, link::config());
+        let links = [first, second].map(|uart| link::new(uart.expect("the baud rate divides the clock")));
+        interrupt::UART7.set_priority(Priority::from(priority::UART));
+        interrupt::USART1.set_priority(Priority::from(priority::UART));
+
+        let motors = Motors::new(p.TIM5, p.PA0, p.PA1, p.PA2, p.PA3, p.DMA1_CH0, Irqs);
+        control.spawn(motors_1_to_4(motors).expect("spawned once"));
+        let motors = Motors::new(p.TIM4, p.PD12, p.PD13, p.PD14, p.PD15, p.DMA1_CH1, Irqs);
+        control.spawn(motors_5_to_8(motors).expect("spawned once"));
+        interrupt::DMA1_STREAM0.set_priority(Priority::from(priority::MOTOR_DMA));
+        interrupt::DMA1_STREAM1.set_priority(Priority::from(priority::MOTOR_DMA));
+
+        // A debugger that halts the core halts the watchdog.
+        pac::DBGMCU.apb4fzr1().modify(|freeze| freeze.set_iwdg1(true));
+        Parts { board: Stm32h743 { watchdog: watchdog(p.IWDG1) }, links, memory: Words::new(p.FLASH) }
+    }
+
+    fn unleash_watchdog(&mut self) {
+        self.watchdog.unleash();
+    }
+
+    /// Sleeps until the next interrupt.
+    fn idle() {
+        cortex_m::asm::wfi();
+    }
+
+    /// True if the crystal has failed and the chip's own oscillator has taken over.
+    fn clock_has_failed(&self) -> bool {
+        clocks::have_failed()
+    }
+
+    fn task_has_failed(&self) -> bool {
+        faults::task_has_failed()
+    }
+
+    fn drive(&mut self, throttles: [u16; ROTORS]) {
+        // An output without a motor stays at 0.
+        let mut outputs = [[0; CHANNELS]; 2];
+        outputs.as_flattened_mut().iter_mut().zip(throttles).for_each(|(output, throttle)| *output = throttle);
+        THROTTLES.iter().zip(outputs).for_each(|(throttles, outputs)| throttles.signal(outputs));
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.pet();
+    }
+}
+
+#[embassy_executor::task]
+async fn motors_1_to_4(mut motors: Motors<TIM5, DMA1_CH0, Irqs, u32>) {
+    let [throttles, _] = &THROTTLES;
+    motors.run(throttles).await
+}
+
+#[embassy_executor::task]
+async fn motors_5_to_8(mut motors: Motors<TIM4, DMA1_CH1, Irqs, u16>) {
+    let [_, throttles] = &THROTTLES;
+    motors.run(throttles).await
+}
+
+/// Stops the motors' signals, whatever state the program is in.
+pub(crate) fn stop_motors() {
+    hold_low(pac::GPIOA, 0..=3);
+    hold_low(pac::GPIOD, 12..=15);
+}

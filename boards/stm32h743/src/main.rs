@@ -1,0 +1,11 @@
+//! The image that flies, on an STM32H743VI. Pins, timers and memory are in [`board`].
+#![no_std]
+#![no_main]
+
+mod board;
+
+use defmt_rtt as _;
+
+// The interrupt lines of the display controller and of HDMI, which this firmware does not need.
+firmware::image!(board::Stm32h743, control: LTDC, comms: LTDC_ER, housekeeping: CEC);
+chip_stm32::faults!(board::stop_motors);

@@ -1,0 +1,18 @@
+//! What boards of all STM32 share. A chip's name is a feature of `embassy-stm32` that the board sets.
+#![no_std]
+
+pub mod faults;
+pub mod link;
+pub mod motors;
+
+use embassy_stm32::Peri;
+use embassy_stm32::wdg::{self, IndependentWatchdog};
+
+/// The watchdog resets the chip if it is not fed for this long \[us\], by its own oscillator, whose nominal 32 kHz may
+/// be 17 to 47. Motor controllers stop sooner if the processor hangs, after some 20 ms without a frame.
+const WATCHDOG_US: u32 = 20_000;
+
+/// Prepares the watchdog, which is yet to be unleashed.
+pub fn watchdog<T: wdg::Instance>(peripheral: Peri<'static, T>) -> IndependentWatchdog<'static, T> {
+    IndependentWatchdog::new(peripheral, WATCHDOG_US)
+}

@@ -1,0 +1,6 @@
+//! What boards with an STM32F405 or a relative (F407, F415, F427) share. The chip's name is a feature of
+//! `embassy-stm32` that the board sets.
+#![no_std]
+
+pub mod clocks;
+pub mod reset;

@@ -1,0 +1,109 @@
+//! Clocks: 400 MHz, which chips of every revision reach, from the crystal or, if that fails, from the chip's own
+//! oscillator; and the instruction cache. The data cache stays off, so that DMA and core see the same memory.
+//!
+//! The internal oscillator is accurate to 1 % at room temperature. The vehicle can fly on it, with all times up to 1 %
+//! too short or too long, but arming is refused ([`have_failed`]).
+
+use core::sync::atomic::{AtomicBool, Ordering};
+use cortex_m::peripheral::SCB;
+use embassy_stm32::pac::RCC;
+use embassy_stm32::pac::rcc::vals::{Pllm, Pllsrc, Sw};
+use embassy_stm32::rcc::{
+    AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk, VoltageScale,
+};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::{Config, Peripherals};
+
+/// Clock of the core \[Hz\].
+pub const CORE_HZ: u32 = 400_000_000;
+/// Input of the PLL \[Hz\], above the 2 MHz up to which its fast oscillator must not be used; a crystal has a multiple of
+/// it.
+const PLL_INPUT_HZ: u32 = 4_000_000;
+/// Longest start-up time of a crystal \[ms\]; usually 2.
+const CRYSTAL_START_MS: u32 = 100;
+/// Core cycles in a millisecond, before the clocks are set up.
+const START_UP_CYCLES_PER_MS: u32 = 64_000;
+/// Polls of the PLL until it counts as broken: at 64 MHz some 2 ms, of which it needs 0.2.
+const LOCK_LOOKS: u32 = 10_000;
+
+static FAILED: AtomicBool = AtomicBool::new(false);
+
+/// True if the crystal has failed, at the start or in flight, so that arming must be refused.
+pub fn have_failed() -> bool {
+    FAILED.load(Ordering::Relaxed)
+}
+
+/// Sets up the clocks of a board with a crystal of `CRYSTAL_HZ`: 4 to 48 MHz, in steps of 4 MHz. To be called once after
+/// reset.
+pub fn start<const CRYSTAL_HZ: u32>(scb: &mut SCB) -> Peripherals {
+    const { assert!(CRYSTAL_HZ.is_multiple_of(PLL_INPUT_HZ) && CRYSTAL_HZ >= 4_000_000 && CRYSTAL_HZ <= 48_000_000) }
+    let starts = crystal_starts();
+    FAILED.store(!starts, Ordering::Relaxed);
+    let peripherals = embassy_stm32::init(config::<CRYSTAL_HZ>(starts));
+    scb.enable_icache();
+    // The clock security system switches to the chip's oscillator and raises an NMI if the crystal fails.
+    RCC.cr().modify(|cr| cr.set_hsecsson(starts));
+    peripherals
+}
+
+/// Turns the crystal on; embassy's init would wait for it forever.
+fn crystal_starts() -> bool {
+    RCC.cr().modify(|cr| cr.set_hseon(true));
+    (0..CRYSTAL_START_MS).any(|_| {
+        let ready = RCC.cr().read().hserdy();
+        if !ready {
+            cortex_m::asm::delay(START_UP_CYCLES_PER_MS);
+        }
+        ready
+    })
+}
+
+/// 400 MHz; buses at 200 MHz, peripherals' at 100, timers at 200.
+fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
+    let source = if crystal { PllSource::HSE } else { PllSource::HSI };
+    let prediv = if crystal { PllPreDiv::from_bits((CRYSTAL_HZ / PLL_INPUT_HZ) as u8) } else { PllPreDiv::DIV16 };
+    let mut config = Config::default();
+    let rcc = &mut config.rcc;
+    rcc.hse = crystal.then_some(Hse { freq: Hertz(CRYSTAL_HZ), mode: HseMode::Oscillator });
+    rcc.hsi48 = None;
+    rcc.pll1 = Some(Pll {
+        source,
+        prediv,
+        mul: PllMul::MUL200,
+        fracn: None,
+        divp: Some(PllDiv::DIV2),
+        divq: None,
+        divr: None,
+    });
+    rcc.sys = Sysclk::PLL1_P;
+    rcc.voltage_scale = VoltageScale::Scale1;
+    rcc.ahb_pre = AHBPrescaler::DIV2;
+    rcc.apb1_pre = APBPrescaler::DIV2;
+    rcc.apb2_pre = APBPrescaler::DIV2;
+    rcc.apb3_pre = APBPrescaler::DIV2;
+    rcc.apb4_pre = APBPrescaler::DIV2;
+    config
+}
+
+/// Handles a failed crystal: the core runs at 64 MHz, and is set to 400 MHz again within a few control periods.
+#[allow(unsafe_code, reason = "required by the runtime: this interrupts critical sections")]
+#[cortex_m_rt::exception]
+unsafe fn NonMaskableInt() {
+    if !RCC.cifr().read().hsecssf() {
+        return;
+    }
+    FAILED.store(true, Ordering::Relaxed);
+    RCC.cicr().write(|cicr| cicr.set_hsecssc(true));
+    RCC.cr().modify(|cr| {
+        cr.set_hseon(false);
+        cr.set_pllon(0, false);
+    });
+    RCC.pllckselr().modify(|pll| {
+        pll.set_pllsrc(Pllsrc::HSI);
+        pll.set_divm(0, Pllm::DIV16);
+    });
+    RCC.cr().modify(|cr| cr.set_pllon(0, true));
+    if (0..LOCK_LOOKS).any(|_| RCC.cr().read().pllrdy(0)) {
+        RCC.cfgr().modify(|cfgr| cfgr.set_sw(Sw::PLL1_P));
+    }
+}
