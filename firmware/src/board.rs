@@ -1,17 +1,20 @@
 //! Interface between firmware and board. A crate in `boards/` implements it and builds an image by
 //! [`image!`](crate::image!), the only place where firmware and board meet.
 
+use crate::samples::Sample;
 use crate::ticks::Tick;
 use crate::vehicle::ROTORS;
-use afbc_onboard::Readings;
+use core::future::pending;
 use cortex_m::interrupt::InterruptNumber;
 use embassy_executor::SendSpawner;
 use embedded_storage::nor_flash::NorFlash;
 
-/// A board: its clock, links, flash, motors, watchdog and health.
+/// A board: its clock, sensors, links, flash, motors, watchdog and health.
 pub trait Board: Sized + 'static {
     /// Interrupt lines of its chip.
     type Interrupt: InterruptNumber;
+    /// Its sensors, or [`NoSensors`].
+    type Sampler: Sampler + Send + 'static;
     /// Its links: `[Link<R, T>; N]`.
     type Links: Links + 'static;
     /// Flash with two sectors for the parameters, from [`STORE`](Self::STORE) on.
@@ -39,11 +42,6 @@ pub trait Board: Sized + 'static {
     /// True if a task that is not needed in flight has panicked.
     fn task_has_failed(&self) -> bool;
 
-    /// Sets `readings` to what the sensors have read since the last tick; nothing from a board without them.
-    fn sense(&mut self, readings: &mut Readings) {
-        readings.clear();
-    }
-
     /// Outputs throttles to the motors: 0, or 48 to 2047.
     fn drive(&mut self, throttles: [u16; ROTORS]);
 
@@ -55,10 +53,32 @@ pub trait Board: Sized + 'static {
 pub struct Parts<B: Board> {
     /// What the control tick uses.
     pub board: B,
+    /// What the sampling task uses.
+    pub sampler: B::Sampler,
     /// What the links' task uses.
     pub links: B::Links,
     /// Where the parameters are kept.
     pub memory: B::Memory,
+}
+
+/// The sensors of a board.
+pub trait Sampler {
+    /// True if there are any.
+    const SENSES: bool = true;
+
+    /// Waits for the next sample of any sensor. Called again and again, at a higher priority than the control tick.
+    fn sample(&mut self) -> impl Future<Output = Sample> + Send;
+}
+
+/// The sensors of a board that has none: the state comes over the link.
+pub struct NoSensors;
+
+impl Sampler for NoSensors {
+    const SENSES: bool = false;
+
+    fn sample(&mut self) -> impl Future<Output = Sample> {
+        pending()
+    }
 }
 
 /// Both sides of a link.

@@ -1,4 +1,4 @@
-//! Three interrupt executors, and the priorities of all interrupts.
+//! Interrupt executors, and the priorities of all interrupts.
 //!
 //! Each executor has an interrupt line that the board's peripherals leave unused; [`image!`](crate::image!) is told
 //! which.
@@ -15,6 +15,8 @@ pub mod priority {
     pub const TIME: u8 = 1 << 4;
     /// Bytes of the links.
     pub const UART: u8 = 2 << 4;
+    /// [`crate::samples`].
+    pub const SAMPLING: u8 = 3 << 4;
     /// [`crate::control`].
     pub const CONTROL: u8 = 4 << 4;
     /// End of the motors' DMA transfer.
@@ -25,6 +27,7 @@ pub mod priority {
     pub const HOUSEKEEPING: u8 = 12 << 4;
 }
 
+static SAMPLING: InterruptExecutor = InterruptExecutor::new();
 static CONTROL: InterruptExecutor = InterruptExecutor::new();
 static COMMS: InterruptExecutor = InterruptExecutor::new();
 static HOUSEKEEPING: InterruptExecutor = InterruptExecutor::new();
@@ -43,15 +46,21 @@ pub fn in_dispensable_task() -> bool {
 /// Spawners of the executors.
 #[expect(missing_docs, reason = "named after the module whose tasks each takes")]
 pub struct Executors {
+    /// None on a board without sensors.
+    pub sampling: Option<SendSpawner>,
     pub control: SendSpawner,
     pub comms: SendSpawner,
     pub housekeeping: SendSpawner,
 }
 
-/// Starts the executors on the lines of control, links and housekeeping, and sets the time base's priority. To be
-/// called once.
+/// Starts the executors on the lines of control, links and housekeeping and, if there is one, of sampling, and sets the
+/// time base's priority. To be called once.
 #[expect(unsafe_code, reason = "priorities are set by hand")]
-pub(crate) fn start<I: InterruptNumber>(core: &mut cortex_m::Peripherals, lines: [I; 3]) -> Executors {
+pub(crate) fn start<I: InterruptNumber>(
+    core: &mut cortex_m::Peripherals,
+    lines: [I; 3],
+    sampling: Option<I>,
+) -> Executors {
     let [control, comms, housekeeping] = lines;
     for (line, dispensable) in [comms, housekeeping].into_iter().zip(&DISPENSABLE) {
         dispensable.store(line.number(), Ordering::Relaxed);
@@ -59,11 +68,15 @@ pub(crate) fn start<I: InterruptNumber>(core: &mut cortex_m::Peripherals, lines:
     // SAFETY: none of them runs yet, and no critical section relies on a priority.
     unsafe {
         core.SCB.set_priority(SystemHandler::SysTick, priority::TIME);
+        if let Some(sampling) = sampling {
+            core.NVIC.set_priority(sampling, priority::SAMPLING);
+        }
         core.NVIC.set_priority(control, priority::CONTROL);
         core.NVIC.set_priority(comms, priority::COMMS);
         core.NVIC.set_priority(housekeeping, priority::HOUSEKEEPING);
     }
     Executors {
+        sampling: sampling.map(|line| SAMPLING.start(line)),
         control: CONTROL.start(control),
         comms: COMMS.start(comms),
         housekeeping: HOUSEKEEPING.start(housekeeping),
@@ -78,6 +91,16 @@ pub(crate) fn start<I: InterruptNumber>(core: &mut cortex_m::Peripherals, lines:
 pub unsafe fn on_control() {
     // SAFETY: the caller's; `start` enables the interrupt.
     unsafe { CONTROL.on_interrupt() }
+}
+
+/// Polls the sampling executor.
+///
+/// # Safety
+/// As for [`on_control`].
+#[expect(unsafe_code, reason = "an executor must be polled from its own interrupt")]
+pub unsafe fn on_sampling() {
+    // SAFETY: as for `on_control`.
+    unsafe { SAMPLING.on_interrupt() }
 }
 
 /// Polls the links' executor.

@@ -3,15 +3,31 @@
 /// Builds an image for a type that implements [`Board`](crate::board::Board): the program's entry, the time base, the
 /// executors' interrupts and the tasks whose type depends on the board. The board handles panics and faults.
 ///
-/// `control`, `comms` and `housekeeping` name an interrupt line each that the board leaves unused:
-/// `image!(board::Mine, control: LINE_A, comms: LINE_B, housekeeping: LINE_C)`.
+/// `control`, `comms` and `housekeeping` name an interrupt line each that the board leaves unused, and so does `sampling`
+/// if it has sensors: `image!(board::Mine, control: LINE_A, comms: LINE_B, housekeeping: LINE_C, sampling: LINE_D)`.
 #[macro_export]
 macro_rules! image {
-    ($board:ty, control: $control:ident, comms: $comms:ident, housekeeping: $housekeeping:ident $(,)?) => {
+    (
+        $board:ty, control: $control:ident, comms: $comms:ident, housekeeping: $housekeeping:ident
+        $(, sampling: $sampling:ident)? $(,)?
+    ) => {
         const _: () = assert!(
             $crate::vehicle::ROTORS <= <$board as $crate::board::Board>::OUTPUTS,
             "the vehicle has more rotors than this board has outputs for motors; choose another VEHICLE"
         );
+
+        const _: () = {
+            let lines: &[&str] = &[$(stringify!($sampling))?];
+            assert!(
+                <<$board as $crate::board::Board>::Sampler as $crate::board::Sampler>::SENSES != lines.is_empty(),
+                "a board with sensors, and no other, names an interrupt line for their executor: sampling"
+            )
+        };
+
+        #[embassy_executor::task]
+        async fn sampling(mut sampler: <$board as $crate::board::Board>::Sampler) -> ! {
+            $crate::samples::run(&mut sampler).await
+        }
 
         #[embassy_executor::task]
         async fn control(flight: &'static mut $crate::vehicle::Flight, mut board: $board) -> ! {
@@ -30,6 +46,13 @@ macro_rules! image {
         #[embassy_executor::task]
         async fn parameters(mut keeper: $crate::parameters::Keeper<<$board as $crate::board::Board>::Memory>) -> ! {
             $crate::parameters::run(&mut keeper).await
+        }
+
+        fn spawn_sampling(
+            spawner: embassy_executor::SendSpawner,
+            sampler: <$board as $crate::board::Board>::Sampler,
+        ) {
+            spawner.spawn(sampling(sampler).expect("spawned once"));
         }
 
         // Out of line, so that their stacks are not used at the same time.
@@ -72,6 +95,14 @@ macro_rules! image {
                 unsafe { $crate::executors::on_control() }
             }
 
+            $(
+                #[unsafe(no_mangle)]
+                extern "C" fn $sampling() {
+                    // SAFETY: as above.
+                    unsafe { $crate::executors::on_sampling() }
+                }
+            )?
+
             #[unsafe(no_mangle)]
             extern "C" fn $comms() {
                 // SAFETY: as above.
@@ -90,7 +121,8 @@ macro_rules! image {
             type Line = <$board as $crate::board::Board>::Interrupt;
             let core = cortex_m::Peripherals::take().expect("taken once");
             let lines = [Line::$control, Line::$comms, Line::$housekeeping];
-            $crate::run(core, lines, spawn_control, spawn_comms, spawn_parameters)
+            let sampling = None::<Line>$(.or(Some(Line::$sampling)))?;
+            $crate::run(core, lines, sampling, spawn_sampling, spawn_control, spawn_comms, spawn_parameters)
         }
     };
 }

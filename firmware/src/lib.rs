@@ -17,6 +17,7 @@
 //! |---|---|---|
 //! | 1 | SysTick: the time base, starts the control tick | 1 us per millisecond |
 //! | 2 | the links: bytes to and from their rings | 1 us per byte |
+//! | 3 | [`samples`]: reading the sensors | |
 //! | 4 | [`control`]: the control tick, then the motors' waveform | 50 us per millisecond |
 //! | 6 | end of the motors' DMA | 1 us per millisecond |
 //! | 8 | [`comms`]: the link's messages | |
@@ -32,6 +33,7 @@ pub mod executors;
 pub mod housekeeping;
 mod image;
 pub mod parameters;
+pub mod samples;
 pub mod ticks;
 pub mod time;
 pub mod vehicle;
@@ -40,17 +42,19 @@ use board::{Board, Links as _, Parts, Transmitter as _};
 use embassy_executor::SendSpawner;
 
 /// Starts everything; the core then idles between interrupts. `lines` are the interrupt lines of the executors of
-/// control, links and housekeeping; `control`, `comms` and `keeper` start the tasks that use the board. [`image!`]
-/// defines all of them.
+/// control, links and housekeeping, `sampling` that of the sensors, if there are any; the functions start the tasks that
+/// use the board. [`image!`] defines all of them.
 pub fn run<B: Board>(
     mut core: cortex_m::Peripherals,
     lines: [B::Interrupt; 3],
+    sampling: Option<B::Interrupt>,
+    sample: impl FnOnce(SendSpawner, B::Sampler),
     control: impl FnOnce(SendSpawner, &'static mut vehicle::Flight, B),
     comms: impl FnOnce(SendSpawner, &'static mut comms::Desk, B::Links),
     keeper: impl FnOnce(SendSpawner, parameters::Keeper<B::Memory>),
 ) -> ! {
-    let executors = executors::start(&mut core, lines);
-    let Parts { mut board, mut links, memory } = B::start(&mut core, executors.control);
+    let executors = executors::start(&mut core, lines, sampling);
+    let Parts { mut board, sampler, mut links, memory } = B::start(&mut core, executors.control);
     let (kept, table) = parameters::read(memory, B::STORE);
     for link in links.each() {
         link.transmitter.set_baud(table.configuration().link.baud);
@@ -60,6 +64,9 @@ pub fn run<B: Board>(
     board.unleash_watchdog();
     time::start(core.SYST, B::CORE_HZ);
     comms(executors.comms, desk, links);
+    if let Some(spawner) = executors.sampling {
+        sample(spawner, sampler);
+    }
     control(executors.control, flight, board);
     keeper(executors.housekeeping, kept);
     housekeeping::spawn(executors.housekeeping);

@@ -3,16 +3,18 @@
 //!
 //! Two FIFOs, `to_firmware` and `from_firmware`, carry the wire of [`afbc_onboard::ReplyHead`].
 
-use afbc_onboard::{Readings, ReplyHead};
+use afbc_onboard::{Aged, Readings, ReplyHead};
 use afbc_store::Ram;
 use afbc_types::ROTORS_MAX;
-use core::cell::{Cell, RefCell};
+use core::cell::Cell;
 use embassy_executor::SendSpawner;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
+use embassy_sync::signal::Signal;
 use firmware::board::{self, Board, Link, Parts};
 use firmware::housekeeping;
+use firmware::samples::{Sample, SampleTime, SampleValue};
 use firmware::ticks::Tick;
 use firmware::vehicle::ROTORS;
 use semihosting::fs::File;
@@ -23,8 +25,8 @@ use stm32_metapac::Interrupt;
 /// Bytes received by the link, at most this many per tick.
 static LINK: Pipe<CriticalSectionRawMutex, 4096> = Pipe::new();
 
-/// Readings of the sensors for the next tick; none once they are taken.
-static READINGS: Mutex<CriticalSectionRawMutex, RefCell<Option<Readings>>> = Mutex::new(RefCell::new(None));
+/// Readings of the sensors for the next tick.
+static READINGS: Signal<CriticalSectionRawMutex, Readings> = Signal::new();
 
 /// Throttles of the last tick.
 static THROTTLES: Mutex<CriticalSectionRawMutex, Cell<[u16; ROTORS_MAX]>> = Mutex::new(Cell::new([0; ROTORS_MAX]));
@@ -34,6 +36,7 @@ pub(crate) struct Emulated;
 
 impl Board for Emulated {
     type Interrupt = Interrupt;
+    type Sampler = Sampler;
     type Links = [Link<Receiver, Transmitter>; 1];
     /// In RAM: QEMU's flash cannot be written, and every flight begins with the image's parameters.
     type Memory = Ram<1024>;
@@ -49,7 +52,8 @@ impl Board for Emulated {
             from_firmware: File::create(c"from_firmware").expect("the host made the FIFO"),
         };
         transmitter.take_bytes();
-        Parts { board: Emulated, links: [Link { receiver: Receiver, transmitter }], memory: Ram::BLANK }
+        let sampler = Sampler { left: Readings::NONE };
+        Parts { board: Emulated, sampler, links: [Link { receiver: Receiver, transmitter }], memory: Ram::BLANK }
     }
 
     /// There is no watchdog.
@@ -71,14 +75,6 @@ impl Board for Emulated {
         false
     }
 
-    /// Takes what the host has sent.
-    fn sense(&mut self, readings: &mut Readings) {
-        READINGS.lock(|cell| match &mut *cell.borrow_mut() {
-            Some(sent) if !sent.is_empty() => readings.take_from(sent),
-            _ => readings.clear(),
-        });
-    }
-
     /// Stores the throttles for the reply.
     fn drive(&mut self, throttles: [u16; ROTORS]) {
         let mut all = [0; ROTORS_MAX];
@@ -88,6 +84,27 @@ impl Board for Emulated {
 
     /// There is no watchdog.
     fn feed_watchdog(&mut self) {}
+}
+
+/// The host's sensors.
+pub(crate) struct Sampler {
+    /// What it has sent and is yet to be sampled.
+    left: Readings,
+}
+
+impl board::Sampler for Sampler {
+    async fn sample(&mut self) -> Sample {
+        loop {
+            let Readings { imu, aids } = &mut self.left;
+            if let Some(Aged { value, age_us }) = imu.take() {
+                return Sample { time: SampleTime::BeforeTick(age_us), value: SampleValue::Imu(value) };
+            }
+            if let Some(Aged { value, age_us }) = aids.iter_mut().find_map(Option::take) {
+                return Sample { time: SampleTime::BeforeTick(age_us), value: SampleValue::Aid(value) };
+            }
+            self.left = READINGS.wait().await;
+        }
+    }
 }
 
 /// Receiving side of the link.
@@ -128,7 +145,7 @@ impl Transmitter {
         if self.to_firmware.read_exact(&mut readings).is_err() {
             exit(0);
         }
-        READINGS.lock(|cell| cell.replace(Some(Readings::from_bytes(&readings))));
+        READINGS.signal(Readings::from_bytes(&readings));
         let mut length = [0; 4];
         self.to_firmware.read_exact(&mut length).expect("the host sends what it announced");
         let mut length = u32::from_le_bytes(length) as usize;

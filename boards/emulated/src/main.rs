@@ -9,7 +9,9 @@ use core::panic::PanicInfo;
 use defmt_rtt as _;
 use semihosting::process::exit;
 
-firmware::image!(board::Emulated, control: CAN2_TX, comms: CAN2_RX0, housekeeping: CAN2_RX1);
+firmware::image!(
+    board::Emulated, control: CAN2_TX, comms: CAN2_RX0, housekeeping: CAN2_RX1, sampling: CAN2_SCE
+);
 
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {

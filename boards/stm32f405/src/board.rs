@@ -20,7 +20,7 @@ use embassy_stm32::peripherals::{DMA2_CH1, IWDG, TIM8, USART1};
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, pac};
-use firmware::board::{Board, Link, Parts};
+use firmware::board::{Board, Link, NoSensors, Parts};
 use firmware::executors::priority;
 use firmware::vehicle::ROTORS;
 use static_cell::StaticCell;
@@ -47,6 +47,7 @@ pub(crate) struct Stm32f405 {
 
 impl Board for Stm32f405 {
     type Interrupt = pac::Interrupt;
+    type Sampler = NoSensors;
     type Links = [Link<Receiver, Transmitter>; 1];
     type Memory = Bank1Region1<'static, Blocking>;
     const CORE_HZ: u32 = clocks::CORE_HZ;
@@ -71,7 +72,12 @@ impl Board for Stm32f405 {
         // A debugger that halts the core halts the watchdog.
         pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
         let board = Stm32f405 { watchdog: watchdog(p.IWDG) };
-        Parts { board, links: [link], memory: Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1 }
+        Parts {
+            board,
+            sampler: NoSensors,
+            links: [link],
+            memory: Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
+        }
     }
 
     fn unleash_watchdog(&mut self) {

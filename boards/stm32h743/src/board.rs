@@ -22,7 +22,7 @@ use embassy_stm32::peripherals::{DMA1_CH0, DMA1_CH1, IWDG1, TIM4, TIM5, UART7, U
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, pac};
-use firmware::board::{Board, Link, Parts};
+use firmware::board::{Board, Link, NoSensors, Parts};
 use firmware::executors::priority;
 use firmware::vehicle::ROTORS;
 use static_cell::StaticCell;
@@ -53,6 +53,7 @@ pub(crate) struct Stm32h743 {
 
 impl Board for Stm32h743 {
     type Interrupt = pac::Interrupt;
+    type Sampler = NoSensors;
     type Links = [Link<Receiver, Transmitter>; 2];
     type Memory = Words;
     const CORE_HZ: u32 = clocks::CORE_HZ;
@@ -80,7 +81,8 @@ impl Board for Stm32h743 {
 
         // A debugger that halts the core halts the watchdog.
         pac::DBGMCU.apb4fzr1().modify(|freeze| freeze.set_iwdg1(true));
-        Parts { board: Stm32h743 { watchdog: watchdog(p.IWDG1) }, links, memory: Words::new(p.FLASH) }
+        let board = Stm32h743 { watchdog: watchdog(p.IWDG1) };
+        Parts { board, sampler: NoSensors, links, memory: Words::new(p.FLASH) }
     }
 
     fn unleash_watchdog(&mut self) {

@@ -1,0 +1,98 @@
+//! What the sensors have read, from the sampling task to the control tick.
+//!
+//! The task runs at a higher priority than the tick, so that a sample's time is that of its interrupt, and a transfer
+//! from a sensor goes on while the tick runs. The tick takes what has arrived.
+
+use crate::board::Sampler;
+use afbc_estimator::Measurement;
+use afbc_onboard::{Aged, Readings};
+use core::cell::RefCell;
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use heapless::Deque;
+use nalgebra::Vector3;
+
+/// Measurements that wait, at most; a tick takes [`AIDS_MAX`](afbc_onboard::AIDS_MAX).
+const WAITING: usize = 4;
+
+/// What a sensor has read.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample {
+    /// When it was true.
+    pub time: SampleTime,
+    /// What.
+    pub value: SampleValue,
+}
+
+/// When a sample was true.
+#[derive(Clone, Copy, Debug)]
+pub enum SampleTime {
+    /// On the vehicle's clock ([`embassy_time::Instant`]) \[us\].
+    At(u64),
+    /// So long before the tick that takes it begins \[us\]: from a host in lockstep, which does not know the clock.
+    BeforeTick(u32),
+}
+
+/// What a sensor has read.
+#[derive(Clone, Copy, Debug)]
+pub enum SampleValue {
+    /// Rates \[rad/s\] and specific force \[m/s2\] in the body frame.
+    Imu([Vector3<f32>; 2]),
+    /// A measurement of any other sensor.
+    Aid(Measurement),
+}
+
+/// What has arrived since the last tick.
+struct Arrived {
+    /// Newest sample of the inertial sensor: a faster one's driver averages.
+    imu: Option<(SampleTime, [Vector3<f32>; 2])>,
+    aids: Deque<(SampleTime, Measurement), WAITING>,
+}
+
+static ARRIVED: Mutex<CriticalSectionRawMutex, RefCell<Arrived>> =
+    Mutex::new(RefCell::new(Arrived { imu: None, aids: Deque::new() }));
+
+/// Reads the sensors.
+pub async fn run(sampler: &mut impl Sampler) -> ! {
+    loop {
+        let Sample { time, value } = sampler.sample().await;
+        ARRIVED.lock(|arrived| {
+            // Not borrowed elsewhere while it is locked; no panic in any case.
+            let Ok(mut arrived) = arrived.try_borrow_mut() else { return };
+            match value {
+                SampleValue::Imu(imu) => arrived.imu = Some((time, imu)),
+                SampleValue::Aid(aid) => {
+                    if arrived.aids.is_full() {
+                        arrived.aids.pop_front();
+                    }
+                    let _ = arrived.aids.push_back((time, aid));
+                }
+            }
+        });
+    }
+}
+
+/// Sets `readings` to what has arrived, for a tick that begins at `now_us`; further measurements wait for the next one.
+pub(crate) fn take(now_us: u64, readings: &mut Readings) {
+    readings.clear();
+    ARRIVED.lock(|arrived| {
+        let Ok(mut arrived) = arrived.try_borrow_mut() else { return };
+        if let Some((time, value)) = arrived.imu.take() {
+            readings.imu = Some(Aged { value, age_us: time.age_us(now_us) });
+        }
+        for slot in &mut readings.aids {
+            let Some((time, value)) = arrived.aids.pop_front() else { break };
+            *slot = Some(Aged { value, age_us: time.age_us(now_us) });
+        }
+    });
+}
+
+impl SampleTime {
+    /// Returns the age at `now_us`.
+    fn age_us(self, now_us: u64) -> u32 {
+        match self {
+            SampleTime::At(at_us) => now_us.saturating_sub(at_us).try_into().unwrap_or(u32::MAX),
+            SampleTime::BeforeTick(age_us) => age_us,
+        }
+    }
+}
