@@ -123,7 +123,7 @@ impl<E, F: FnMut(&Declaration, ValueMut<'_>) -> Result<(), E>> VisitMut<E> for F
 #[inline(never)]
 fn in_range(declaration: &Declaration, value: &Value<'_>, refused: &mut Result<(), OutOfRange>) -> Result<(), ()> {
     *refused = value.numbers().try_for_each(|number| declaration.range.check(number));
-    refused.as_ref().map(|()| ()).map_err(drop)
+    if refused.is_ok() { Ok(()) } else { Err(()) }
 }
 
 /// Calls `visit` with a parameter of a group. Out of line: copies of declarations, one for each parameter, would fill
