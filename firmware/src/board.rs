@@ -1,10 +1,9 @@
 //! Interface between firmware and board. A crate in `boards/` implements it and builds an image by
 //! [`image!`](crate::image!), the only place where firmware and board meet.
 
-use crate::samples::Sample;
+use crate::samples::Sampler;
 use crate::ticks::Tick;
 use crate::vehicle::ROTORS;
-use core::future::pending;
 use cortex_m::interrupt::InterruptNumber;
 use embassy_executor::SendSpawner;
 use embedded_storage::nor_flash::NorFlash;
@@ -13,9 +12,9 @@ use embedded_storage::nor_flash::NorFlash;
 pub trait Board: Sized + 'static {
     /// Interrupt lines of its chip.
     type Interrupt: InterruptNumber;
-    /// Its sensors, or [`NoSensors`].
+    /// Its sensors, or [`NoSensors`](crate::samples::NoSensors).
     type Sampler: Sampler + Send + 'static;
-    /// Its links: `[Link<R, T>; N]`.
+    /// Its links: `[BoardLink<R, T>; N]`.
     type Links: Links + 'static;
     /// Flash with two sectors for the parameters, from [`STORE`](Self::STORE) on.
     type Memory: NorFlash + Send + 'static;
@@ -61,28 +60,8 @@ pub struct Parts<B: Board> {
     pub memory: B::Memory,
 }
 
-/// The sensors of a board.
-pub trait Sampler {
-    /// True if there are any.
-    const SENSES: bool = true;
-
-    /// Waits for the next sample of any sensor. Called again and again, at a higher priority than the control tick.
-    fn sample(&mut self) -> impl Future<Output = Sample> + Send;
-}
-
-/// The sensors of a board that has none: the state comes over the link.
-pub struct NoSensors;
-
-impl Sampler for NoSensors {
-    const SENSES: bool = false;
-
-    fn sample(&mut self) -> impl Future<Output = Sample> {
-        pending()
-    }
-}
-
 /// Both sides of a link.
-pub struct Link<R, T> {
+pub struct BoardLink<R, T> {
     /// Receiving side.
     pub receiver: R,
     /// Sending side.
@@ -99,15 +78,15 @@ pub trait Links {
     const COUNT: usize;
 
     /// Returns them.
-    fn each(&mut self) -> &mut [Link<Self::Receiver, Self::Transmitter>];
+    fn each(&mut self) -> &mut [BoardLink<Self::Receiver, Self::Transmitter>];
 }
 
-impl<R: Receiver, T: Transmitter, const N: usize> Links for [Link<R, T>; N] {
+impl<R: Receiver, T: Transmitter, const N: usize> Links for [BoardLink<R, T>; N] {
     type Receiver = R;
     type Transmitter = T;
     const COUNT: usize = N;
 
-    fn each(&mut self) -> &mut [Link<R, T>] {
+    fn each(&mut self) -> &mut [BoardLink<R, T>] {
         self
     }
 }

@@ -1,7 +1,7 @@
 //! The control tick, 1000 times per second.
 
-use crate::board::{Board, Sampler as _};
-use crate::samples;
+use crate::board::Board;
+use crate::samples::{self, Sampler as _};
 use crate::ticks::{self, Tick};
 use crate::time::{self, Stopwatch};
 use crate::vehicle::{Configuration, Flight, Prepared, Report};

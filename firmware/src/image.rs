@@ -3,8 +3,9 @@
 /// Builds an image for a type that implements [`Board`](crate::board::Board): the program's entry, the time base, the
 /// executors' interrupts and the tasks whose type depends on the board. The board handles panics and faults.
 ///
-/// `control`, `comms` and `housekeeping` name an interrupt line each that the board leaves unused, and so does `sampling`
-/// if it has sensors: `image!(board::Mine, control: LINE_A, comms: LINE_B, housekeeping: LINE_C, sampling: LINE_D)`.
+/// `control`, `comms` and `housekeeping` name an interrupt line each that the board leaves unused, and so does
+/// `sampling` if it has sensors:
+/// `image!(board::Mine, control: LINE_A, comms: LINE_B, housekeeping: LINE_C, sampling: LINE_D)`.
 #[macro_export]
 macro_rules! image {
     (
@@ -19,7 +20,7 @@ macro_rules! image {
         const _: () = {
             let lines: &[&str] = &[$(stringify!($sampling))?];
             assert!(
-                <<$board as $crate::board::Board>::Sampler as $crate::board::Sampler>::SENSES != lines.is_empty(),
+                <<$board as $crate::board::Board>::Sampler as $crate::samples::Sampler>::SENSES != lines.is_empty(),
                 "a board with sensors, and no other, names an interrupt line for their executor: sampling"
             )
         };

@@ -42,8 +42,8 @@ use board::{Board, Links as _, Parts, Transmitter as _};
 use embassy_executor::SendSpawner;
 
 /// Starts everything; the core then idles between interrupts. `lines` are the interrupt lines of the executors of
-/// control, links and housekeeping, `sampling` that of the sensors, if there are any; the functions start the tasks that
-/// use the board. [`image!`] defines all of them.
+/// control, links and housekeeping, `sampling` that of the sensors, if there are any; the functions start the tasks
+/// that use the board. [`image!`] defines all of them.
 pub fn run<B: Board>(
     mut core: cortex_m::Peripherals,
     lines: [B::Interrupt; 3],

@@ -3,10 +3,10 @@
 //! The task runs at a higher priority than the tick, so that a sample's time is that of its interrupt, and a transfer
 //! from a sensor goes on while the tick runs. The tick takes what has arrived.
 
-use crate::board::Sampler;
 use afbc_estimator::Measurement;
 use afbc_onboard::{Aged, Readings};
 use core::cell::RefCell;
+use core::future::pending;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::Deque;
@@ -17,7 +17,7 @@ const WAITING: usize = 4;
 
 /// What a sensor has read.
 #[derive(Clone, Copy, Debug)]
-pub struct Sample {
+pub struct SensorSample {
     /// When it was true.
     pub time: SampleTime,
     /// What.
@@ -42,6 +42,26 @@ pub enum SampleValue {
     Aid(Measurement),
 }
 
+/// The sensors of a board.
+pub trait Sampler {
+    /// True if there are any.
+    const SENSES: bool = true;
+
+    /// Waits for the next sample of any sensor. Called again and again, at a higher priority than the control tick.
+    fn sample(&mut self) -> impl Future<Output = SensorSample> + Send;
+}
+
+/// The sensors of a board that has none: the state comes over the link.
+pub struct NoSensors;
+
+impl Sampler for NoSensors {
+    const SENSES: bool = false;
+
+    fn sample(&mut self) -> impl Future<Output = SensorSample> {
+        pending()
+    }
+}
+
 /// What has arrived since the last tick.
 struct Arrived {
     /// Newest sample of the inertial sensor: a faster one's driver averages.
@@ -55,7 +75,7 @@ static ARRIVED: Mutex<CriticalSectionRawMutex, RefCell<Arrived>> =
 /// Reads the sensors.
 pub async fn run(sampler: &mut impl Sampler) -> ! {
     loop {
-        let Sample { time, value } = sampler.sample().await;
+        let SensorSample { time, value } = sampler.sample().await;
         ARRIVED.lock(|arrived| {
             // Not borrowed elsewhere while it is locked; no panic in any case.
             let Ok(mut arrived) = arrived.try_borrow_mut() else { return };

@@ -39,12 +39,10 @@ fn pins(text: &str) -> BTreeSet<String> {
 fn every_board_is_a_folder_and_meets_the_firmware_once() {
     let boards: Vec<_> = fs::read_dir(root().join("boards")).unwrap().map(|entry| entry.unwrap().path()).collect();
     let boards: Vec<_> = boards.iter().filter(|path| path.is_dir()).collect();
-    assert!(boards.len() >= 2, "{boards:?}");
+    assert!(boards.len() >= 3, "{boards:?}");
     for board in boards {
         let files = sources(board);
-        for once in
-            ["firmware::image!(", "impl Board for ", "impl board::Receiver for ", "impl board::Transmitter for "]
-        {
+        for once in ["firmware::image!(", "impl Board for "] {
             let count: usize = files.iter().map(|(_, text)| text.matches(once).count()).sum();
             assert_eq!(count, 1, "{}: {once}", board.display());
         }
@@ -52,9 +50,10 @@ fn every_board_is_a_folder_and_meets_the_firmware_once() {
     }
 }
 
-/// No board is selected by `#[path]` or conditional compilation.
+/// No board is selected by `#[path]` or conditional compilation, and no chip is named.
 #[test]
 fn the_firmware_knows_no_board() {
+    let manifest = fs::read_to_string(root().join("firmware/Cargo.toml")).unwrap();
     let firmware = sources(&root().join("firmware"));
     assert!(firmware.len() >= 7, "{firmware:?}");
     for (path, text) in firmware {
@@ -62,8 +61,13 @@ fn the_firmware_knows_no_board() {
         for choice in ["cfg(", "cfg_attr", "peripherals::", "board_"] {
             assert!(!text.contains(choice), "{}: {choice}", path.display());
         }
+        for chip in ["stm32", "f405", "h743", "usart", "can2"] {
+            for text in [&text, &manifest] {
+                assert!(!text.to_lowercase().contains(chip), "{}: {chip}", path.display());
+            }
+        }
     }
-    for folder in ["boards", "crates", "firmware", "sitl", "tests"] {
+    for folder in ["boards", "chips", "crates", "firmware", "sitl", "tests"] {
         for (path, text) in sources(&root().join(folder)) {
             let is_moved = text.lines().any(|line| line.trim_start().starts_with("#[") && line.contains("path = "));
             assert!(!is_moved, "{}", path.display());
@@ -75,12 +79,14 @@ fn the_firmware_knows_no_board() {
 fn the_wiring_is_what_the_board_uses() {
     let page = fs::read_to_string(root().join("docs/firmware.md")).unwrap();
     let wiring = page.split("\n## ").find(|section| section.starts_with("Wiring")).unwrap();
-    let table = wiring.split("\n### ").next().unwrap();
-    let code = fs::read_to_string(root().join("boards/stm32f405/src/board.rs")).unwrap();
-    let (head, body) = code.split_once("\nuse ").unwrap();
-    assert_eq!(pins(body).len(), 6, "{:?}", pins(body));
-    // Those of crystal and debugger are fixed by the chip.
-    let fixed = ["PH0", "PH1", "PA13", "PA14"].map(str::to_owned).into();
-    assert_eq!(&pins(table) - &fixed, pins(body), "docs/firmware.md");
-    assert_eq!(&pins(head) - &fixed, pins(body), "the board's own table");
+    for (board, heading, count) in [("stm32f405", "Wiring", 6), ("stm32h743", "Matek H743", 12)] {
+        let table = wiring.split("\n### ").find(|section| section.starts_with(heading)).unwrap();
+        let code = fs::read_to_string(root().join("boards").join(board).join("src/board.rs")).unwrap();
+        let (head, body) = code.split_once("\nuse ").unwrap();
+        assert_eq!(pins(body).len(), count, "{board}: {:?}", pins(body));
+        // Those of crystal and debugger are fixed by the chip.
+        let fixed = ["PH0", "PH1", "PA13", "PA14"].map(str::to_owned).into();
+        assert_eq!(&pins(table) - &fixed, pins(body), "docs/firmware.md, {board}");
+        assert_eq!(&pins(head) - &fixed, pins(body), "the table of {board} itself");
+    }
 }

@@ -12,9 +12,9 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
 use embassy_sync::signal::Signal;
-use firmware::board::{self, Board, Link, Parts};
+use firmware::board::{self, Board, BoardLink, Parts};
 use firmware::housekeeping;
-use firmware::samples::{Sample, SampleTime, SampleValue};
+use firmware::samples::{self, SampleTime, SampleValue, SensorSample};
 use firmware::ticks::Tick;
 use firmware::vehicle::ROTORS;
 use semihosting::fs::File;
@@ -37,7 +37,7 @@ pub(crate) struct Emulated;
 impl Board for Emulated {
     type Interrupt = Interrupt;
     type Sampler = Sampler;
-    type Links = [Link<Receiver, Transmitter>; 1];
+    type Links = [BoardLink<Receiver, Transmitter>; 1];
     /// In RAM: QEMU's flash cannot be written, and every flight begins with the image's parameters.
     type Memory = Ram<1024>;
     /// As QEMU's STM32F405 counts it: the host derives instructions from it.
@@ -53,7 +53,7 @@ impl Board for Emulated {
         };
         transmitter.take_bytes();
         let sampler = Sampler { left: Readings::NONE };
-        Parts { board: Emulated, sampler, links: [Link { receiver: Receiver, transmitter }], memory: Ram::BLANK }
+        Parts { board: Emulated, sampler, links: [BoardLink { receiver: Receiver, transmitter }], memory: Ram::BLANK }
     }
 
     /// There is no watchdog.
@@ -92,15 +92,15 @@ pub(crate) struct Sampler {
     left: Readings,
 }
 
-impl board::Sampler for Sampler {
-    async fn sample(&mut self) -> Sample {
+impl samples::Sampler for Sampler {
+    async fn sample(&mut self) -> SensorSample {
         loop {
             let Readings { imu, aids } = &mut self.left;
             if let Some(Aged { value, age_us }) = imu.take() {
-                return Sample { time: SampleTime::BeforeTick(age_us), value: SampleValue::Imu(value) };
+                return SensorSample { time: SampleTime::BeforeTick(age_us), value: SampleValue::Imu(value) };
             }
             if let Some(Aged { value, age_us }) = aids.iter_mut().find_map(Option::take) {
-                return Sample { time: SampleTime::BeforeTick(age_us), value: SampleValue::Aid(value) };
+                return SensorSample { time: SampleTime::BeforeTick(age_us), value: SampleValue::Aid(value) };
             }
             self.left = READINGS.wait().await;
         }

@@ -20,8 +20,9 @@ use embassy_stm32::peripherals::{DMA2_CH1, IWDG, TIM8, USART1};
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, pac};
-use firmware::board::{Board, Link, NoSensors, Parts};
+use firmware::board::{Board, BoardLink, Parts};
 use firmware::executors::priority;
+use firmware::samples::NoSensors;
 use firmware::vehicle::ROTORS;
 use static_cell::StaticCell;
 
@@ -48,7 +49,7 @@ pub(crate) struct Stm32f405 {
 impl Board for Stm32f405 {
     type Interrupt = pac::Interrupt;
     type Sampler = NoSensors;
-    type Links = [Link<Receiver, Transmitter>; 1];
+    type Links = [BoardLink<Receiver, Transmitter>; 1];
     type Memory = Bank1Region1<'static, Blocking>;
     const CORE_HZ: u32 = clocks::CORE_HZ;
     /// Sectors 1 and 2, of 16 KiB each (`memory.x`).

@@ -22,8 +22,9 @@ use embassy_stm32::peripherals::{DMA1_CH0, DMA1_CH1, IWDG1, TIM4, TIM5, UART7, U
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, pac};
-use firmware::board::{Board, Link, NoSensors, Parts};
+use firmware::board::{Board, BoardLink, Parts};
 use firmware::executors::priority;
+use firmware::samples::NoSensors;
 use firmware::vehicle::ROTORS;
 use static_cell::StaticCell;
 
@@ -54,7 +55,7 @@ pub(crate) struct Stm32h743 {
 impl Board for Stm32h743 {
     type Interrupt = pac::Interrupt;
     type Sampler = NoSensors;
-    type Links = [Link<Receiver, Transmitter>; 2];
+    type Links = [BoardLink<Receiver, Transmitter>; 2];
     type Memory = Words;
     const CORE_HZ: u32 = clocks::CORE_HZ;
     const STORE: u32 = 0;

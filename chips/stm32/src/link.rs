@@ -6,7 +6,7 @@ use core::task::{Poll, ready};
 use embassy_futures::poll_once;
 use embassy_stm32::usart::{BufferedUart, BufferedUartRx, BufferedUartTx, Config};
 use embedded_io_async::{BufRead, Write};
-use firmware::board::{self, Link};
+use firmware::board::{self, BoardLink};
 use firmware::ticks::Tick;
 
 /// Bytes that wake the reader \[0.35 ms of a busy line\]. Fewer wake it when the line becomes idle, as after a message,
@@ -21,9 +21,9 @@ pub fn config() -> Config {
 }
 
 /// Makes a link of a UART.
-pub fn new(uart: BufferedUart<'static>) -> Link<Receiver, Transmitter> {
+pub fn new(uart: BufferedUart<'static>) -> BoardLink<Receiver, Transmitter> {
     let (transmitter, receiver) = uart.split();
-    Link { receiver: Receiver(receiver), transmitter: Transmitter(transmitter) }
+    BoardLink { receiver: Receiver(receiver), transmitter: Transmitter(transmitter) }
 }
 
 /// Receiving side.

@@ -31,8 +31,8 @@ pub fn have_failed() -> bool {
     FAILED.load(Ordering::Relaxed)
 }
 
-/// Sets up clocks and flash of a board with a crystal of `CRYSTAL_HZ`: 4 to 26 MHz, in steps of 2 MHz. To be called once
-/// after reset.
+/// Sets up clocks and flash of a board with a crystal of `CRYSTAL_HZ`: 4 to 26 MHz, in steps of 2 MHz. To be called
+/// once after reset.
 pub fn start<const CRYSTAL_HZ: u32>() -> Peripherals {
     const { assert!(CRYSTAL_HZ.is_multiple_of(PLL_INPUT_HZ) && CRYSTAL_HZ >= 4_000_000 && CRYSTAL_HZ <= 26_000_000) }
     let starts = crystal_starts();

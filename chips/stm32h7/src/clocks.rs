@@ -16,8 +16,8 @@ use embassy_stm32::{Config, Peripherals};
 
 /// Clock of the core \[Hz\].
 pub const CORE_HZ: u32 = 400_000_000;
-/// Input of the PLL \[Hz\], above the 2 MHz up to which its fast oscillator must not be used; a crystal has a multiple of
-/// it.
+/// Input of the PLL \[Hz\], above the 2 MHz up to which its fast oscillator must not be used; a crystal has a multiple
+/// of it.
 const PLL_INPUT_HZ: u32 = 4_000_000;
 /// Longest start-up time of a crystal \[ms\]; usually 2.
 const CRYSTAL_START_MS: u32 = 100;
@@ -33,8 +33,8 @@ pub fn have_failed() -> bool {
     FAILED.load(Ordering::Relaxed)
 }
 
-/// Sets up the clocks of a board with a crystal of `CRYSTAL_HZ`: 4 to 48 MHz, in steps of 4 MHz. To be called once after
-/// reset.
+/// Sets up the clocks of a board with a crystal of `CRYSTAL_HZ`: 4 to 48 MHz, in steps of 4 MHz. To be called
+/// once after reset.
 pub fn start<const CRYSTAL_HZ: u32>(scb: &mut SCB) -> Peripherals {
     const { assert!(CRYSTAL_HZ.is_multiple_of(PLL_INPUT_HZ) && CRYSTAL_HZ >= 4_000_000 && CRYSTAL_HZ <= 48_000_000) }
     let starts = crystal_starts();
