@@ -9,7 +9,7 @@ mod airborne;
 
 use afbc_guidance::FlightMode;
 use afbc_link::{Address, Answer, Command, ControlRequest, Datum, Downlink, Height, Mission, Plan, Storage, Uplink};
-use afbc_onboard::services::modes;
+use afbc_station::services::modes;
 use airborne::checker::{Bounds, End};
 use airborne::session::{global, item};
 use airborne::{COMPANION, Checker, STATION, Session, Tick, on_all_cores, place, velocity};

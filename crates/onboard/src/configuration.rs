@@ -1,6 +1,6 @@
 //! What makes the firmware that of one vehicle.
 
-use crate::setup::Link;
+use crate::link::Link;
 use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
 use afbc_control::drag::KnownDrag;

@@ -1,9 +1,9 @@
-//! What the link brings for a tick.
+//! What messages bring for a tick.
 
 use afbc_flight_core::Inbox;
 use afbc_guidance::{BatteryReading, Orders, TicketedOrder};
 
-/// Inputs of the flight core and of the guidance, written by [`Comms`](crate::Comms) and taken by the control tick.
+/// Inputs of the flight core and of the guidance, written by what receives messages and taken by the control tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControlInputs {
     /// For the flight core.
@@ -29,8 +29,8 @@ impl ControlInputs {
         ControlInputs { inbox: Inbox::EMPTY, orders, battery: None, fresh: false }
     };
 
-    /// Changes the orders.
-    pub(crate) fn order(&mut self) -> &mut Orders {
+    /// Returns the orders, to be changed.
+    pub fn order(&mut self) -> &mut Orders {
         self.fresh = true;
         &mut self.orders
     }
@@ -95,8 +95,8 @@ fn replace<T>(old: &mut Option<T>, new: &mut Option<T>) {
     }
 }
 
-/// Queues an order. [`Commands`](crate::services::commands::Commands) gives no more than there are places.
-pub(crate) fn give(orders: &mut Orders, given: TicketedOrder) {
+/// Queues an order; dropped if there is no place for it: whoever gives orders keeps count.
+pub fn give(orders: &mut Orders, given: TicketedOrder) {
     if let Some(place) = orders.given.iter_mut().find(|place| place.is_none()) {
         *place = Some(given);
     }

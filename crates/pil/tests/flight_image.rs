@@ -5,8 +5,8 @@ mod common;
 
 use afbc_flight_core::Refusal;
 use afbc_link::{Address, Answer, Command, Decoder, Downlink, HealthArray, Uplink};
-use afbc_onboard::CLOCK_FAILED;
 use afbc_sim::in_the_loop::Station;
+use afbc_station::CLOCK_FAILED;
 use common::start_or_skip;
 use pil::budget::Linked;
 use pil::clock_tree::{FLASH_ACR, RCC_CFGR, RCC_PLLCFGR};

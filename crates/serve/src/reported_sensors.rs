@@ -3,13 +3,14 @@
 
 use afbc_estimator::Measurement;
 use afbc_link::telemetry::BatteryStatus;
-use afbc_onboard::services::health::sensor;
-use afbc_onboard::services::origin::EarthOrigin;
-use afbc_onboard::services::status::{GnssReceiver, SensorBits};
-use afbc_onboard::{AuxSensors, Readings};
+use afbc_onboard::Readings;
 use afbc_plant::InstrumentSuite;
 use afbc_sim::flight::World;
 use afbc_sim::scenario::Scenario;
+use afbc_station::AuxSensors;
+use afbc_station::services::health::sensor;
+use afbc_station::services::origin::EarthOrigin;
+use afbc_station::services::status::{GnssReceiver, SensorBits};
 
 /// Silence after which a sensor counts as failed \[ms\].
 const SILENT_MS: u32 = 1000;

@@ -4,10 +4,10 @@
 use afbc_control::Trip;
 use afbc_guidance::FlightMode;
 use afbc_link::{Address, AttitudeAndThrust, Command, ExternalTarget, FRAME_MAX, Sender, Uplink};
-use afbc_onboard::services::modes;
 use afbc_plant::Motion;
 use afbc_serve::{Server, fleet};
 use afbc_sim::scenario::built_in;
+use afbc_station::services::modes;
 use afbc_types::Axis;
 use nalgebra::{UnitQuaternion, Vector3};
 

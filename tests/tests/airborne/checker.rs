@@ -6,7 +6,7 @@ use afbc_guidance::FlightMode;
 use afbc_link::{
     Address, Answer, Command, ControlRequest, Downlink, ExternalTarget, Mission, ParameterRequest, Uplink,
 };
-use afbc_onboard::services::modes;
+use afbc_station::services::modes;
 
 /// Time within which a command is answered \[ms\].
 const ANSWERED_MS: u32 = 1000;

@@ -7,7 +7,7 @@ use afbc_guidance::FlightMode;
 use afbc_link::{
     Address, AttitudeAndThrust, Command, Datum, ExternalTarget, Height, ManualControl, MissionItem, Uplink,
 };
-use afbc_onboard::services::modes;
+use afbc_station::services::modes;
 
 /// What happens.
 #[derive(Clone, Debug)]

@@ -42,7 +42,7 @@ impl Kind {
 
 /// Returns the value that `bytes` are, sent as the MAV_PARAM_TYPE `kind`; none for a type of more than four bytes, or an
 /// integer beyond [`WHOLE_MAX`].
-pub(crate) fn decode(kind: u8, bytes: [u8; 4]) -> Option<f32> {
+pub fn decode(kind: u8, bytes: [u8; 4]) -> Option<f32> {
     let as_float = f32::from_le_bytes(bytes);
     if kind == REAL32 {
         return Some(as_float);

@@ -22,7 +22,7 @@ impl Reason {
     }
 
     /// Makes the line on a parameter.
-    pub(crate) fn on(name: RecordName, text: &str) -> Self {
+    pub fn on(name: RecordName, text: &str) -> Self {
         Reason::new(name.as_str(), text)
     }
 
@@ -81,7 +81,7 @@ impl Line {
         if number < 0.0 {
             self.char('-');
         }
-        let size = libm::fabs(number);
+        let size = number.abs();
         let unit = match size {
             _ if size >= 1e5 || size > 0.0 && size < 1e-3 => return self.power(size),
             _ if size >= 100.0 => 10,

@@ -5,9 +5,8 @@ use afbc::Profile;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
-use afbc_onboard::{
-    ArmingLimits, Comms, Configuration, ControlInputs, Flight, Link, Prepared, Readings, Report, Setup,
-};
+use afbc_onboard::{ArmingLimits, Configuration, ControlInputs, Flight, Link, Prepared, Readings, Report};
+use afbc_station::{Comms, Setup};
 use afbc_store::Store;
 use afbc_types::{Airframe, OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_vehicles::Vehicle;

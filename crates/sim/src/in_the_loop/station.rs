@@ -6,8 +6,8 @@ use afbc_guidance::FlightMode;
 use afbc_link::{
     Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, HealthArray, MavCmd, Sender, Text, Uplink,
 };
-use afbc_onboard::BUSY;
-use afbc_onboard::services::modes;
+use afbc_station::BUSY;
+use afbc_station::services::modes;
 use afbc_types::{PoseSigmas, ROTORS_MAX, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 use std::time::Instant;

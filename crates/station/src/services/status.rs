@@ -1,12 +1,12 @@
 //! What the services know of the vehicle.
 
-use crate::flight::Report;
-use crate::guided::GuidanceResult;
 use crate::services::origin::EarthOrigin;
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::{Mode, Reasons, TickHealth};
 use afbc_guidance::FlightMode;
 use afbc_link::telemetry::BatteryStatus;
+use afbc_onboard::GuidanceResult;
+use afbc_onboard::Report;
 use afbc_types::{ROTORS_MAX, State};
 
 /// What the shell tells, since the control tick does not know it.

@@ -1,11 +1,8 @@
-//! MAVLink's parameter protocol.
+//! MAVLink's parameter protocol on the [parameters](afbc_onboard::parameters) of a vehicle that runs;
+//! [`Comms::parameters`](crate::Comms::parameters) is its place.
 
-use super::encoding::decode;
-use super::groups::Parameter;
-use super::kept::RecordChange;
-use super::reason::Reason;
-use super::table::ParameterTable;
 use afbc_link::{ParameterError, ParameterName, ParameterRequest, ParameterValue};
+use afbc_onboard::parameters::{Parameter, ParameterTable, Reason, RecordChange, decode};
 use afbc_store::RecordName;
 use heapless::Deque;
 

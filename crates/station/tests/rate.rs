@@ -3,7 +3,8 @@
 
 use afbc_flight_core::{Mode, Refusal};
 use afbc_link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
-use afbc_onboard::{CLOCK_FAILED, Comms, Configuration, ControlInputs, Flight, TICK_OFF};
+use afbc_onboard::{Configuration, ControlInputs, Flight};
+use afbc_station::{CLOCK_FAILED, Comms, TICK_OFF};
 use afbc_types::{PoseSigmas, Setpoint, State};
 
 const STATION: Address = Address { system: 255, component: 190 };

@@ -7,9 +7,10 @@ mod common;
 mod dialect;
 
 use afbc_link::{Address, Command, Uplink};
-use afbc_onboard::services::origin::{EarthOrigin, Global};
-use afbc_onboard::services::streams::{DEFAULTS, id};
-use afbc_onboard::{AuxSensors, Comms, Configuration, Link, Readings, Setup, parameters::ParameterTable};
+use afbc_onboard::{Configuration, Link, Readings, parameters::ParameterTable};
+use afbc_station::services::origin::{EarthOrigin, Global};
+use afbc_station::services::streams::{DEFAULTS, id};
+use afbc_station::{AuxSensors, Comms, Setup};
 use afbc_types::State;
 use common::{Bench, STATION};
 use dialect::{Expected, expected};
@@ -210,7 +211,7 @@ fn step(bench: &mut Bench) -> Vec<Sample> {
     };
     comms.report(&report, 0.0, &mut send);
     comms.parameters(table, &mut send);
-    assert!(bytes <= afbc_onboard::REPORT_MAX, "{bytes} bytes");
+    assert!(bytes <= afbc_station::REPORT_MAX, "{bytes} bytes");
     sent
 }
 

@@ -1,7 +1,6 @@
 //! What each command leads to.
 
 use super::{Dispatcher, Reply};
-use crate::control_inputs::{ControlInputs, give};
 use crate::services::commands::{BUSY, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN};
 use crate::services::origin::resolve;
 use crate::services::streams::{Requested, Streams, id};
@@ -11,6 +10,7 @@ use crate::services::{control, modes};
 use afbc_flight_core::{Refusal, Request};
 use afbc_guidance::{FlightMode, Order, OrderRefusal};
 use afbc_link::{Address, Answer, Command, Height, Interval, MavSeverity, Place};
+use afbc_onboard::{ControlInputs, give};
 use nalgebra::Vector3;
 
 impl Dispatcher {

@@ -1,10 +1,8 @@
 //! Communication: receives and sends messages.
 
-use crate::control_inputs::ControlInputs;
 use crate::dispatcher::Dispatcher;
 use crate::failsafes::Failsafes;
-use crate::flight::Report;
-use crate::parameters::{ParameterTable, RecordChange, VALUE_BYTES};
+use crate::parameters::VALUE_BYTES;
 use crate::services::commands::ANSWERS_PER_TICK;
 use crate::services::modes;
 use crate::services::status::AuxSensors;
@@ -21,6 +19,9 @@ use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, Sighting};
 use afbc_flight_core::{Mode, Stamped, Tracker};
 use afbc_guidance::{BatteryReading, Cause, ModeReason, Notice};
 use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, PositionTarget, Sender, StatesRefused, Uplink};
+use afbc_onboard::ControlInputs;
+use afbc_onboard::Report;
+use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_types::{PerAxis, Pose};
 
 /// Component of the vehicle: autopilot.
@@ -241,7 +242,7 @@ impl Comms {
     /// Does what stations want of the parameters, to be called after each [`report`](Self::report): sends values, frame
     /// by frame, through `send`, together with the report at most [`REPORT_MAX`] bytes. Returns what has changed in
     /// `table`, which is to be flown ([`Flight::adopt`](crate::Flight::adopt)) and kept
-    /// ([`Kept::keep`](crate::parameters::Kept::keep)). Nothing changes while the vehicle is armed.
+    /// ([`Kept::keep`](afbc_onboard::parameters::Kept::keep)). Nothing changes while the vehicle is armed.
     pub fn parameters<const N: usize>(
         &mut self,
         table: &mut ParameterTable<N>,

@@ -4,8 +4,9 @@
 use afbc_guidance::FlightMode;
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
-use afbc_onboard::services::modes;
-use afbc_onboard::{Comms, Configuration, ControlInputs, Flight, Prepared, REPORT_MAX, Readings, Report};
+use afbc_onboard::{Configuration, ControlInputs, Flight, Prepared, Readings, Report};
+use afbc_station::services::modes;
+use afbc_station::{Comms, REPORT_MAX};
 use afbc_types::{PoseSigmas, Setpoint, State};
 
 pub const STATION: Address = Address { system: 255, component: 190 };

@@ -8,8 +8,9 @@ use afbc_flight_core::Refusal;
 use afbc_guidance::{FlightMode, Net, Settings};
 use afbc_link::telemetry::BatteryStatus;
 use afbc_link::{Address, Answer, Command, Downlink, ParameterRequest, Telemetry, Text, Uplink};
-use afbc_onboard::services::{health::sensor, modes};
-use afbc_onboard::{Aged, AuxSensors, Comms, Configuration, Flight, Readings, Setup};
+use afbc_onboard::{Aged, Configuration, Flight, Readings};
+use afbc_station::services::{health::sensor, modes};
+use afbc_station::{AuxSensors, Comms, Setup};
 use afbc_types::State;
 use common::{Bench, STATION};
 use nalgebra::Vector3;
@@ -329,7 +330,7 @@ fn a_station_that_may_not_arm_is_not_told_that_it_may() {
     let mine = Text::from("ready to arm");
     let theirs = Text::from("245/190 may not arm: 255/190 is in control");
     let told = ask(&mut bench, OTHER, &spell);
-    assert_eq!(told.answer, Answer::Refused(afbc_onboard::NOT_IN_CONTROL));
+    assert_eq!(told.answer, Answer::Refused(afbc_station::NOT_IN_CONTROL));
     assert!(told.checks.contains(&theirs) && !told.checks.contains(&mine), "{:?}", told.checks);
     // Both at once: each is told.
     bench.hear_from(OTHER, Uplink::Command(Command::CheckArming));

@@ -8,7 +8,7 @@ mod common;
 use afbc_flight_core::Request;
 use afbc_guidance::Orders;
 use afbc_link::{Address, Answer, Command, Downlink, FRAME_MAX, Message, Mission, Plan, Sender, Uplink};
-use afbc_onboard::services::control::is_needed_for;
+use afbc_station::services::control::is_needed_for;
 use afbc_types::State;
 use common::{Bench, STATION};
 use proptest::prelude::*;
@@ -229,13 +229,13 @@ fn a_second_station_is_told_once_and_follows() {
     for times in 0..2 {
         bench.hear_from(second, Uplink::Command(Command::Arm));
         let (answers, texts) = heard(&mut bench);
-        assert_eq!(answers, [(Answer::Refused(afbc_onboard::NOT_IN_CONTROL), second)]);
+        assert_eq!(answers, [(Answer::Refused(afbc_station::NOT_IN_CONTROL), second)]);
         assert_eq!(texts.iter().filter(|text| *text == "245/190 ignored: 255/190 is in control").count(), 1 - times);
     }
     bench.hear_from(first, Uplink::Control(afbc_link::ControlRequest::Release));
     bench.hear_from(second, Uplink::Command(Command::Arm));
     let (answers, _) = heard(&mut bench);
-    assert!(!answers.contains(&(Answer::Refused(afbc_onboard::NOT_IN_CONTROL), second)), "{answers:?}");
+    assert!(!answers.contains(&(Answer::Refused(afbc_station::NOT_IN_CONTROL), second)), "{answers:?}");
     // The mission stays as it is for one that is not in control.
     bench.hear_from(first, Uplink::Mission(Mission::Clear(Plan::ALL)));
     let said: Vec<_> = (0..5).flat_map(|_| bench.step().1).collect();

@@ -4,7 +4,6 @@ mod commands;
 mod parameters;
 mod targets;
 
-use crate::control_inputs::ControlInputs;
 use crate::parameters::Service;
 use crate::services::commands::Commands;
 use crate::services::control::{ControlClaim, OperatorControl};
@@ -19,6 +18,7 @@ use afbc_link::{
     Address, Clock, ControlAnswer, DataStream, Downlink, Interval, MavSeverity, Mission, ParameterError,
     ParameterRequest, Question, QuestionRefusal, Uplink,
 };
+use afbc_onboard::ControlInputs;
 use afbc_types::Setpoint;
 use heapless::Deque;
 

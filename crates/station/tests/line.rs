@@ -5,8 +5,9 @@ mod common;
 
 use afbc_link::{Address, Command, Downlink, FRAME_MAX, ParameterRequest, Sender, Uplink};
 use afbc_onboard::parameters::ParameterTable;
-use afbc_onboard::services::streams::{DEFAULTS, id};
-use afbc_onboard::{Comms, Configuration, Link, Setup};
+use afbc_onboard::{Configuration, Link};
+use afbc_station::services::streams::{DEFAULTS, id};
+use afbc_station::{Comms, Setup};
 use afbc_types::State;
 use common::Bench;
 use std::collections::BTreeMap;

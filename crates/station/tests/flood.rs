@@ -10,11 +10,10 @@ use afbc_link::{
     ParameterRequest, Uplink,
 };
 use afbc_onboard::parameters::ParameterTable;
-use afbc_onboard::services::control::{SILENT_US, is_needed_for};
-use afbc_onboard::services::origin::EarthOrigin;
-use afbc_onboard::{
-    AuxSensors, Comms, Configuration, ControlInputs, Flight, GuidanceResult, REPORT_MAX, Readings, Report,
-};
+use afbc_onboard::{Configuration, ControlInputs, Flight, GuidanceResult, Readings, Report};
+use afbc_station::services::control::{SILENT_US, is_needed_for};
+use afbc_station::services::origin::EarthOrigin;
+use afbc_station::{AuxSensors, Comms, REPORT_MAX};
 use afbc_types::State;
 use std::collections::{BTreeMap, VecDeque};
 

@@ -1,10 +1,10 @@
 //! Targets of companion computers, and sticks.
 
 use super::Dispatcher;
-use crate::control_inputs::ControlInputs;
 use afbc_flight_core::Stamped;
 use afbc_guidance::{AttitudeTarget, MotionTarget};
 use afbc_link::{Address, Axes, ExternalTarget, PositionTarget};
+use afbc_onboard::ControlInputs;
 use afbc_types::Setpoint;
 use nalgebra::{Quaternion, UnitQuaternion};
 

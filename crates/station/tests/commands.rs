@@ -11,11 +11,12 @@ use afbc_link::{
     ManualControl, Mission, MissionItem, MissionResult, Place, Plan, PositionTarget, Sender, Storage, Telemetry,
     Uplink,
 };
+use afbc_onboard::Report;
 use afbc_onboard::parameters::RecordChange;
-use afbc_onboard::services::modes;
-use afbc_onboard::services::origin::{EarthOrigin, Global};
-use afbc_onboard::services::streams::id;
-use afbc_onboard::{AuxSensors, BUSY, Comms, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN, Report, Setup};
+use afbc_station::services::modes;
+use afbc_station::services::origin::{EarthOrigin, Global};
+use afbc_station::services::streams::id;
+use afbc_station::{AuxSensors, BUSY, Comms, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN, Setup};
 use afbc_types::{Setpoint, State};
 use common::{Bench, STATION};
 use nalgebra::Vector3;

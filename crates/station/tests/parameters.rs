@@ -5,10 +5,9 @@ mod common;
 
 use afbc_guidance::{BatteryAction, FenceAction, SticksAction};
 use afbc_link::{ParameterError, ParameterName, ParameterRequest, ParameterValue};
-use afbc_onboard::parameters::{
-    Kept, Kind, LINK_SHARE, Parameter, ParameterTable, REASON_MAX, RecordChange, Service, VALUE_BYTES,
-};
+use afbc_onboard::parameters::{Kept, Kind, Parameter, ParameterTable, REASON_MAX, RecordChange};
 use afbc_onboard::{Configuration, Flight, Prepared};
+use afbc_station::parameters::{LINK_SHARE, Service, VALUE_BYTES};
 use afbc_store::{Ram, RecordName, Store, hash};
 use afbc_types::State;
 use common::Bench;

@@ -4,7 +4,7 @@
 mod common;
 
 use afbc_link::{Command, Downlink, PositionTarget, Uplink};
-use afbc_onboard::services::streams::id;
+use afbc_station::services::streams::id;
 use afbc_types::{Setpoint, State};
 use common::Bench;
 use nalgebra::Vector3;
@@ -42,7 +42,7 @@ fn the_setpoint_that_is_followed_is_told() {
     bench.hear(Uplink::Command(Command::RequestMessage { message: id::POSITION_TARGET_LOCAL_NED, index: 0 }));
     let refused = bench.step().1.iter().any(|it| {
         matches!(it, Downlink::Answer { command: 512, answer, .. }
-        if *answer == afbc_link::Answer::Refused(afbc_onboard::NOT_KNOWN))
+        if *answer == afbc_link::Answer::Refused(afbc_station::NOT_KNOWN))
     });
     assert!(refused);
 }

@@ -1,8 +1,8 @@
 //! Reports of failsafes: each once as text, and all in the heartbeat, however short they are.
 
-use crate::flight::Report;
 use afbc_flight_core::{EndReason, Mode};
 use afbc_link::MavSeverity;
+use afbc_onboard::Report;
 
 /// Severity and text of a report.
 pub(crate) type Notice = (MavSeverity, &'static str);

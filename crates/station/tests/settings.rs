@@ -4,8 +4,9 @@
 mod common;
 
 use afbc_link::{Address, Answer, Command, Downlink, ParameterName, ParameterRequest, ParameterValue, Storage, Uplink};
-use afbc_onboard::parameters::{LINK_SHARE, RecordChange, VALUE_BYTES};
-use afbc_onboard::{Comms, Setup};
+use afbc_onboard::parameters::RecordChange;
+use afbc_station::parameters::{LINK_SHARE, VALUE_BYTES};
+use afbc_station::{Comms, Setup};
 use afbc_types::State;
 use common::Bench;
 use std::collections::BTreeSet;

@@ -1,12 +1,12 @@
 //! What stations want of the parameters, and who may want it.
 
 use super::{Dispatcher, ParameterTask, Reply};
-use crate::control_inputs::ControlInputs;
-use crate::parameters::{ParameterTable, RecordChange};
 use crate::services::commands::BUSY;
 use crate::services::texts::Words;
 use afbc_flight_core::Refusal;
 use afbc_link::{Address, Answer, MavSeverity, ParameterRequest, Storage};
+use afbc_onboard::ControlInputs;
+use afbc_onboard::parameters::{ParameterTable, RecordChange};
 
 impl Dispatcher {
     /// Notes a message about parameters. A station that is not in control is told the value that it has not set.

@@ -1,0 +1,32 @@
+//! Services of the vehicle for ground stations and companion computers: what stands between [`afbc_link`]'s messages and
+//! the control tick of [`afbc_onboard`].
+//!
+//! [`Comms`] receives and sends messages in the time that the control tick leaves. A host that runs both in turn with
+//! the same bytes and times gets the same bytes as the processor.
+//!
+//! ```
+//! use afbc_onboard::{Configuration, ControlInputs, Flight, Readings};
+//! use afbc_station::Comms;
+//!
+//! let mut flight = Flight::new(&Configuration::default())?;
+//! let (mut comms, mut inputs, mut taken) = (Comms::new(), ControlInputs::EMPTY, ControlInputs::EMPTY);
+//! inputs.merge(&comms.receive(b"MAVLink, or noise"));
+//! inputs.take_into(&mut taken);
+//! let report = flight.tick(1_000, &mut taken, &Readings::NONE);
+//! assert_eq!(report.throttles, [0; 4]); // disarmed
+//! comms.report(&report, 0.0, |_bytes| ());
+//! # Ok::<(), afbc_types::OutOfRange>(())
+//! ```
+#![no_std]
+
+mod comms;
+mod dispatcher;
+mod failsafes;
+pub mod parameters;
+pub mod services;
+mod setup;
+
+pub use comms::{CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
+pub use services::commands::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, FORGOTTEN_US, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN};
+pub use services::status::AuxSensors;
+pub use setup::Setup;
