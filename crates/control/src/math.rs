@@ -12,7 +12,7 @@
 //! | `sin_cos` of the types crate | Cephes' polynomials | 1.3e-7, where an attitude is made of it |
 //! | [`sqrt`] | the FPU, libm without one | one instruction, correctly rounded; micromath's is off by 5 % |
 //! | [`exp`], and `atan2` where a heading is flown | libm | before flight, or not in every tick |
-//! | `floor` and `atan2` of what a station is shown | micromath | short; 0.16 degrees of a course that receivers know to some degrees |
+//! | `floor`, `atan2` of what a station is shown | micromath | short; 0.16 degrees, of a course good to some degrees |
 
 /// Powers of 2 between 1 and 2 that [`exp2`] looks up.
 const STEPS: usize = 64;

@@ -1,4 +1,5 @@
-//! Start at rest: level from the specific force, bias of the gyroscope from its mean, heading from whichever sensor measures it.
+//! Start at rest: level from the specific force, bias of the gyroscope from its mean, heading from whichever sensor
+//! measures it.
 
 use crate::measurement::{ImuSample, Measurement};
 use crate::rotation::{atan2, levelling, matrix, normalized, twist};

@@ -14,8 +14,8 @@ const LEVER_GAP_US: u64 = 10_000;
 /// omega = R omega_s,   f = R f_s - d omega/dt x r - omega x (omega x r)
 /// ```
 ///
-/// where d omega/dt is the difference from the last sample. The default is at the centre of mass, along the body's axes,
-/// and changes no bit.
+/// where d omega/dt is the difference from the last sample. The default is at the centre of mass, along the body's
+/// axes, and changes no bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImuCalibration {
     mounted: Option<Mounted>,

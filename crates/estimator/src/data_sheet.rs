@@ -95,8 +95,8 @@ impl Settings {
     pub fn for_parts(parts: &DataSheet) -> Self {
         let DataSheet { gyro, accel, step_s, gravity_m_s2, barometer, gnss, magnetometer, differs } = parts;
         let gyro_walk = root(&[gyro.walk, markov(gyro.instability, gyro.instability_time_s)]);
-        // Misaligned axes make of a turn about the vertical a tilt, the same at each turn, which cannot be distinguished from
-        // a bias of the accelerometer.
+        // Misaligned axes make of a turn about the vertical a tilt, the same at each turn, which cannot be
+        // distinguished from a bias of the accelerometer.
         let leaning = markov(gyro.misalignment_rad * gravity_m_s2, LEANING_S);
         let accel_walk = root(&[accel.walk, markov(accel.instability, accel.instability_time_s), leaning]);
         let accel_bias = root(&[accel.bias, accel.instability, accel.scale * gravity_m_s2]);

@@ -228,8 +228,8 @@ impl Estimator {
             return false;
         }
         match part.target {
-            // The field corrects what it measures, the heading, and the gyroscope's bias that turned it: a disturbed one
-            // must not tilt the vehicle.
+            // The field corrects what it measures, the heading, and the gyroscope's bias that turned it: a disturbed
+            // one must not tilt the vehicle.
             Target::Field(_) => {
                 let zero = Vector3::zeros();
                 let k = Errors {

@@ -124,7 +124,8 @@ impl Horizon {
             }
             Target::Field(field) => {
                 let field = self.field(field);
-                // The Jacobian of the expected field: that of the measured one has its noise, which would look like a tilt.
+                // The Jacobian of the expected field: that of the measured one has its noise, which would look like a
+                // tilt.
                 let theta = upright(&expected.field)?;
                 let north = atan2(expected.field.y, expected.field.x);
                 let (innovation, row) = angle(wrap_angle(north - atan2(field.y, field.x)), theta);

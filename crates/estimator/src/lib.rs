@@ -45,13 +45,13 @@
 //! for 100 ms, less than a tenth of any receiver's.
 //!
 //! **The rotation error is in the earth frame**, and is carried along when the attitude is corrected. Between
-//! corrections it has no transition of its own, which saves a sixth of the prediction; a heading that nothing has measured
-//! is one large variance, and the tilt's stay small. Carrying it along keeps tilt and accelerometer bias, which a
-//! hovering vehicle cannot tell apart, tied to one another in the body. Without that, every correction of the heading
-//! looks like a manoeuvre, and after hours at rest the filter is sure of a bias that it has never seen. A little of
-//! this remains if the settings are those of the bare part: in ten hours at rest outdoors the standard deviation of a
-//! horizontal bias falls from 0.1 to 0.05 m/s2, where it should stay, and errors reach three of it. With the default
-//! settings they do not reach two (`tests/soundness.rs`).
+//! corrections it has no transition of its own, which saves a sixth of the prediction; a heading that nothing has
+//! measured is one large variance, and the tilt's stay small. Carrying it along keeps tilt and accelerometer bias,
+//! which a hovering vehicle cannot tell apart, tied to one another in the body. Without that, every correction of the
+//! heading looks like a manoeuvre, and after hours at rest the filter is sure of a bias that it has never seen. A
+//! little of this remains if the settings are those of the bare part: in ten hours at rest outdoors the standard
+//! deviation of a horizontal bias falls from 0.1 to 0.05 m/s2, where it should stay, and errors reach three of it. With
+//! the default settings they do not reach two (`tests/soundness.rs`).
 //!
 //! **Scalars are fused one by one**, [one per step](fusion), two if measurements pile up, none in a step that predicts:
 //! that bounds the worst step.
@@ -95,10 +95,10 @@
 //!
 //! # Reading order
 //!
-//! [`measurement`], [`settings`], [`data_sheet`], [`estimate`]: in and out. [`calibration`]: samples to body axes. [`estimator`]: a step. [`align`]: the start. [`rest`]:
-//! rest. [`nominal`], [`errors`], [`covariance`]: prediction. [`history`], [`horizon`], [`queue`], [`fusion`],
-//! [`slow`]: measurements. [`aid`], [`restart`], [`imu`]: gates, resets, health. [`rotation`], [`geodetic`]: small
-//! mathematics.
+//! [`measurement`], [`settings`], [`data_sheet`], [`estimate`]: in and out. [`calibration`]: samples to body axes.
+//! [`estimator`]: a step. [`align`]: the start. [`rest`]: rest. [`nominal`], [`errors`], [`covariance`]: prediction.
+//! [`history`], [`horizon`], [`queue`], [`fusion`], [`slow`]: measurements. [`aid`], [`restart`], [`imu`]: gates,
+//! resets, health. [`rotation`], [`geodetic`]: small mathematics.
 #![no_std]
 #![allow(rustdoc::private_intra_doc_links, reason = "the modules' documentation is for their reader")]
 

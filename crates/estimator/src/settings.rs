@@ -47,8 +47,8 @@ parameters! {
         #[parameter(GNSS_SLOW, "s", 1.0..=1e5)]
         pub gnss_slow_s: f32 = 120.0,
         /// Heading error by what iron, magnets and currents of the vehicle add to the field, standard deviation along
-        /// each of body x and y. It stays, and is not averaged; the standard deviation that comes with its measurements is
-        /// its noise alone. The default is for any that was calibrated once: 0.04 gauss, of 0.2 gauss. From
+        /// each of body x and y. It stays, and is not averaged; the standard deviation that comes with its measurements
+        /// is its noise alone. The default is for any that was calibrated once: 0.04 gauss, of 0.2 gauss. From
         /// 0.5 rad on it gives no heading.
         #[parameter(MAG_SLOW, "rad", 0.0..=1.0)]
         pub mag_slow_rad: f32 = 0.2,

@@ -47,8 +47,7 @@ impl<const N: usize> Prepared<N> {
     /// The first parameter, setting or gain out of range, or the first that leaves the vehicle without a margin to
     /// hover.
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
-        let Configuration { airframe, settings, gains, curve, response, imu, estimation, arming, guidance: _, link: _ } =
-            configuration;
+        let Configuration { airframe, settings, gains, curve, response, imu, estimation, arming, .. } = configuration;
         // The controller checks what follows from these and assumes that each is in its range.
         let parameters = &airframe.parameters;
         parameters.validate()?;

@@ -53,25 +53,7 @@ impl Readings {
         }
     }
 
-<<<<<<< HEAD
-    /// Moves all readings of `other` here. Copies only those that are there.
-    pub fn take_from(&mut self, other: &mut Readings) {
-        self.imu = other.imu.take();
-        for (to, from) in self.aids.iter_mut().zip(&mut other.aids) {
-            match from {
-                Some(aid) => {
-                    *to = Some(*aid);
-                    *from = None;
-                }
-                None => *to = None,
-            }
-        }
-    }
-
     /// Returns the sample, in the sensor's axes, with its time, for a tick at `now_us`.
-=======
-    /// Returns the sample with its time, for a tick at `now_us`.
->>>>>>> 7cc84a2 (twin: the STM32H743's image boots on register-level models (issue 28, item 4))
     pub(crate) fn sample(&self, now_us: u64) -> Option<ImuSample> {
         let Stamped { value: [rates_rad_s, specific_force_m_s2], at_us } = self.imu?.timed(now_us);
         Some(ImuSample { at_us, rates_rad_s, specific_force_m_s2 })

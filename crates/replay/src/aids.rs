@@ -88,8 +88,8 @@ fn aided(value: Measurement, arrived_us: u64, at_us: u64, delay_us: u64) -> Aidi
     Aiding { arrived_us, measurement: Stamped { value, at_us: at_us.saturating_sub(delay_us) } }
 }
 
-/// Keeps usable measurements in order, heights and fields no more often than they bring anything new; appends them to `all`
-/// and says where they come from. `raw` is the number of samples in the log.
+/// Keeps usable measurements in order, heights and fields no more often than they bring anything new; appends them to
+/// `all` and says where they come from. `raw` is the number of samples in the log.
 pub(crate) fn collect(
     all: &mut Vec<Aiding>,
     sensor: Sensor,

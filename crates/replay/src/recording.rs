@@ -106,8 +106,8 @@ pub struct Recording {
     pub knows_origin: bool,
     /// Direction of magnetic north, positive to the east \[rad\].
     pub declination_rad: f32,
-    /// What the vehicle's own field makes of the heading, where that is known: standard deviation along each of body x and
-    /// y \[rad\].
+    /// What the vehicle's own field makes of the heading, where that is known: standard deviation along each of body x
+    /// and y \[rad\].
     pub mag_slow_rad: Option<f32>,
     /// Where everything comes from.
     pub sources: Vec<SampleSource>,

@@ -1,5 +1,5 @@
-//! What a vehicle's shell reports to its services beside the control tick: receiver, battery, further sensors, and where on
-//! the earth it is.
+//! What a vehicle's shell reports to its services beside the control tick: receiver, battery, further sensors, and
+//! where on the earth it is.
 
 use afbc_estimator::Measurement;
 use afbc_link::telemetry::BatteryStatus;

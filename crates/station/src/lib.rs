@@ -1,5 +1,5 @@
-//! Services of the vehicle for ground stations and companion computers: what stands between [`afbc_link`]'s messages and
-//! the control tick of [`afbc_onboard`].
+//! Services of the vehicle for ground stations and companion computers: what stands between [`afbc_link`]'s messages
+//! and the control tick of [`afbc_onboard`].
 //!
 //! [`Comms`] receives and sends messages in the time that the control tick leaves. A host that runs both in turn with
 //! the same bytes and times gets the same bytes as the processor.

@@ -137,7 +137,10 @@ fn past(target: usize, coordinate: usize, above: bool) -> Option<(Outer, Range)>
             let changed = match value {
                 ValueMut::Single(numbers) => numbers.get_mut(coordinate).map(|number| *number = past as f32),
                 ValueMut::Double(numbers) => numbers.get_mut(coordinate).map(|number| *number = past),
-                ValueMut::Whole(number) if coordinate == 0 => Some(*number = past as u32),
+                ValueMut::Whole(number) if coordinate == 0 => {
+                    *number = past as u32;
+                    Some(())
+                }
                 _ => None,
             };
             found = changed.map(|()| declaration.range);

@@ -213,7 +213,8 @@ fn the_estimators_settings_are_the_files() {
     assert_eq!(differing.count(), example.lines().count() - 1);
 }
 
-/// A part in `[imu]` tells the estimator its data sheet, and vibration as the file states it; `[estimator]` goes before.
+/// A part in `[imu]` tells the estimator its data sheet, and vibration as the file states it; `[estimator]` goes
+/// before.
 #[test]
 fn the_inertial_sensors_data_sheet_reaches_the_estimator() {
     let iris = |imu: &str| changed("iris", "[imu]", &format!("[imu]\n{imu}"));

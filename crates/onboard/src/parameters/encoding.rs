@@ -2,8 +2,8 @@
 //!
 //! Numbers cross as REAL32, which has one encoding. Switches and whole numbers cross as INT32, of which there are two:
 //! *bytewise*, the integer's own four bytes, which this vehicle sends, and which PX4, QGroundControl and MAVSDK use;
-//! and the *C cast*, the number as a float, of ArduPilot. Both are understood: the float of a whole number other than zero
-//! has bits that are, as an integer, beyond 1,065,000,000 either way, where no parameter is; and the bytes of an
+//! and the *C cast*, the number as a float, of ArduPilot. Both are understood: the float of a whole number other than
+//! zero has bits that are, as an integer, beyond 1,065,000,000 either way, where no parameter is; and the bytes of an
 //! integer up to 8,388,607 either way are, as a float, no whole number but 0, which is the same in both.
 
 /// Type of a parameter on the link: MAV_PARAM_TYPE.
@@ -40,8 +40,8 @@ impl Kind {
     }
 }
 
-/// Returns the value that `bytes` are, sent as the MAV_PARAM_TYPE `kind`; none for a type of more than four bytes, or an
-/// integer beyond [`WHOLE_MAX`].
+/// Returns the value that `bytes` are, sent as the MAV_PARAM_TYPE `kind`; none for a type of more than four bytes, or
+/// an integer beyond [`WHOLE_MAX`].
 pub fn decode(kind: u8, bytes: [u8; 4]) -> Option<f32> {
     let as_float = f32::from_le_bytes(bytes);
     if kind == REAL32 {

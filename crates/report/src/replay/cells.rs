@@ -77,8 +77,8 @@ pub(super) fn sentences(replay: &Replay<'_>) -> Vec<String> {
     said.push(start(replay));
     if let Some(by) = replayed.moved_m {
         said.push(format!(
-            "The log does not state the origin of its positions: they were moved by ({:.1}, {:.1}, {:.1}) m to agree at \
-             the first time compared.",
+            "The log does not state the origin of its positions: they were moved by ({:.1}, {:.1}, {:.1}) m to agree \
+             at the first time compared.",
             by.x, by.y, by.z
         ));
     }
