@@ -2,16 +2,7 @@
 //!
 //! Which one it is, is decided when the image is built, and everything about it is checked there.
 
-use afbc::adaptive::Gains;
-use afbc::disturbance::DisturbanceObserver;
-use afbc::fuzzy::Membership;
-use afbc::reference::ReferenceModel;
-use afbc::{Limits, Safeguards, Settings, backstepping};
-use afbc_control::Smoothing;
-use afbc_control::drag::KnownDrag;
-use afbc_flight_core::motor::{Curve, Response};
-use afbc_onboard::Estimation;
-use afbc_types::{Airframe, Mounting, Parameters, PerAxis, Rotor};
+use afbc_types::{Airframe, Choice, Parameters, Rotor};
 use nalgebra::Vector3;
 
 /// What the firmware is told of it.
@@ -26,3 +17,34 @@ pub type Flight = afbc_onboard::Flight<ROTORS>;
 pub type Report = afbc_onboard::Report<ROTORS>;
 
 include!(concat!(env!("OUT_DIR"), "/vehicle.rs"));
+
+/// Where the vehicle's values are put. Each of these is replaced.
+const PLAIN: Configuration = Configuration::plain(Airframe {
+    parameters: Parameters {
+        mass_kg: 0.0,
+        arm_m: 0.0,
+        inertia_kg_m2: Vector3::new(0.0, 0.0, 0.0),
+        rotor_inertia_kg_m2: 0.0,
+        thrust_factor_n_s2: 0.0,
+        drag_factor_n_m_s2: 0.0,
+        gravity_m_s2: 0.0,
+    },
+    rotors: [Rotor { x: 0.0, y: 0.0, pushes_left: false }; ROTORS],
+});
+
+/// Returns the choice that files call `word`.
+const fn choice<C: Choice>(word: &str) -> C {
+    let mut index = 0;
+    while !same(C::WORDS[index].as_bytes(), word.as_bytes()) {
+        index += 1;
+    }
+    C::ALL[index]
+}
+
+const fn same(one: &[u8], other: &[u8]) -> bool {
+    let mut at = 0;
+    while at < one.len() && at < other.len() && one[at] == other[at] {
+        at += 1;
+    }
+    at == one.len() && at == other.len()
+}

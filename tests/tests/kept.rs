@@ -6,7 +6,6 @@ use afbc_files::Flash;
 use afbc_onboard::parameters::{Kept, ParameterTable, RecordChange};
 use afbc_onboard::{Configuration, Prepared};
 use afbc_reader::params::{Format, read, written};
-use afbc_sim::in_the_loop::configuration;
 use afbc_store::{RecordName, Store, hash};
 use afbc_types::with_rotors;
 use afbc_vehicles::{BUILT_IN, Vehicle};
@@ -14,7 +13,7 @@ use std::fs;
 use std::path::Path;
 
 fn kept<const N: usize>(vehicle: &Vehicle, rotors: Configuration<N>, format: Format) {
-    let original: Configuration<N> = configuration(vehicle).unwrap();
+    let original: Configuration<N> = vehicle.configuration().unwrap();
     let all = ParameterTable::new(original.clone());
     let text = written(format, &vehicle.name, all.iter().map(|it| (it.name, it.value, it.kind.number())));
     // Into the store of an image with other values: all that the file says has to be kept.
@@ -46,7 +45,7 @@ fn from_a_vehicles_file_through_parameters_and_store_nothing_changes() {
     for vehicle in &vehicles {
         with_rotors!(vehicle.rotors.len(), N => {
             // Another image with the same rotors: where they are is no parameter.
-            let mut other: Configuration<N> = configuration(vehicle).unwrap();
+            let mut other: Configuration<N> = vehicle.configuration().unwrap();
             other.airframe.parameters.mass_kg *= 0.97;
             other.settings.bumpless = !other.settings.bumpless;
             other.estimation.gyro_noise_rad_s_rthz *= 2.0;

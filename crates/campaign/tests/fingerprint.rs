@@ -5,6 +5,7 @@
 
 use afbc::Profile;
 use afbc_campaign::{self as campaign, Campaign, Course, Manifest, Shard, Spread};
+use afbc_plant::instruments::{Accelerometer, Gyroscope, Imu};
 use afbc_reader::words;
 use afbc_sim::contender::{Contender, ControllerKind, Law};
 use afbc_sim::scenario::{self, Scenario};
@@ -158,6 +159,9 @@ fn is_title(leaf: &Leaf) -> bool {
     ["", "scenario"].contains(&leaf.table.as_str()) && ["name", "description"].contains(&leaf.key.as_str())
 }
 
+/// Figures of the inertial sensor in a vehicle's file that its estimator is not told.
+const UNUSED: [(&str, &str); 2] = [("imu.gyro", "cutoff_hz"), ("imu.accel", "cutoff_hz")];
+
 /// Changes every value of `text`, and returns for each table the keys that it has.
 fn each_value_counts(text: &str, read: Read) -> BTreeMap<String, BTreeSet<String>> {
     let plain = read(text).unwrap_or_else(|error| panic!("{error} in\n{text}"));
@@ -170,6 +174,9 @@ fn each_value_counts(text: &str, read: Read) -> BTreeMap<String, BTreeSet<String
         });
         match accepted {
             Some((other, fingerprint)) if is_title(leaf) => assert_eq!(fingerprint, plain, "{other}: {}", what()),
+            Some((_, fingerprint)) if UNUSED.contains(&(&*leaf.table, &*leaf.key)) => {
+                assert_eq!(fingerprint, plain, "it counts: {}", what());
+            }
             Some((other, fingerprint)) => assert_ne!(fingerprint, plain, "{other} counts for nothing: {}", what()),
             // A kind of which every other needs other keys, a name that is listed already, a switch that only goes on.
             None => assert!(matches!(leaf.kind, Kind::Text | Kind::Switch), "no other value of {}", what()),
@@ -301,6 +308,7 @@ fn every_key_of_a_vehicle_file_counts() {
     ] {
         all = all.replace(table, &format!("{table}{keys}"));
     }
+    write!(all, "[arming]\n{}[guidance]\n{}", lines(&vehicle.arming, ""), lines(&vehicle.guidance, "")).unwrap();
     write!(all, "[estimator]\n{}", lines_but(&["gravity_m_s2"], &vehicle.estimation, "")).unwrap();
     for kind in ControllerKind::ALL {
         let law = Law::on(kind, &vehicle, Profile::Flight).unwrap();
@@ -312,8 +320,17 @@ fn every_key_of_a_vehicle_file_counts() {
     let settings = vehicle.settings(Profile::Flight);
     let cascade = lines_but(&["dt_s", "rotor_force_max_n"], &settings, "") + &lines(&settings, "limits");
     write!(all, "[gains.flight.cascade]\n{cascade}").unwrap();
+    // Parts, of which the estimator's settings follow where the file has none.
+    let part = bare.replace("[imu]\n", "[imu]\npart = \"bmi270\"\n");
+    let imu = Imu::PRESETS[0].settings;
+    // Large enough to be told from the other errors, and from the least that is accepted.
+    let gyro = Gyroscope { vibration_rad_s: 0.02, bias_rad_s: 0.1, ..imu.gyro };
+    let accel = Accelerometer { vibration_m_s2: 0.5, lsb_m_s2: 0.5, ..imu.accel };
+    let imu = Imu { gyro, accel, ..imu };
+    let mut figures = bare.replace("[imu]\n", &format!("[imu]\n{}", lines(&imu, "")));
+    write!(figures, "[imu.gyro]\n{}[imu.accel]\n{}", lines(&imu, "gyro"), lines(&imu, "accel")).unwrap();
     let texts = afbc_vehicles::BUILT_IN.iter().map(|known| known.text);
-    each_key_counts(texts.chain([all.as_str()]), vehicle_file);
+    each_key_counts(texts.chain([all.as_str(), &part, &figures]), vehicle_file);
 }
 
 #[test]

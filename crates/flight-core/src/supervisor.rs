@@ -93,6 +93,7 @@ pub enum EndReason {
 parameters! {
     /// Limits of setpoint distance, tilt and motion for arming. Not in the paper.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct ArmingLimits {
         /// Largest roll, and largest pitch: 15 degrees.
         #[parameter(TILT_MAX, "rad", 0.01..=0.8)]

@@ -17,6 +17,7 @@ const FENCE_MARGIN_M: f32 = 1.0;
 parameters! {
     /// Parameters of the safety net.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Net {
         /// Largest horizontal distance from home; 0 for none.
         #[parameter(GF_MAX_HOR_DIST, "m", 0.0..=10000.0)]

@@ -6,6 +6,7 @@ use afbc_types::{Range, parameters};
 parameters! {
     /// Limits of the trajectory limiter.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Limits {
         /// Largest horizontal speed.
         #[parameter(MPC_XY_VEL_MAX, "m/s", 0.1..=40.0)]
@@ -48,6 +49,7 @@ parameters! {
 parameters! {
     /// How the modes fly.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Flying {
         /// Height of take-off above where the vehicle stands.
         #[parameter(MIS_TAKEOFF_ALT, "m", 0.3..=100.0)]
@@ -94,6 +96,7 @@ parameters! {
 parameters! {
     /// All parameters of the guidance.
     #[derive(Clone, Copy, Debug, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Settings {
         /// Limits of the trajectory limiter.
         #[group("")]

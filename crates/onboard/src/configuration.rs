@@ -34,13 +34,15 @@ pub struct Configuration<const N: usize = 4> {
     pub link: Link,
 }
 
-impl Default for Configuration {
-    /// The paper's vehicle in the profile `flight`.
-    fn default() -> Self {
+impl<const N: usize> Configuration<N> {
+    /// Returns the configuration of this airframe in which everything else is at its declared default.
+    #[must_use]
+    pub const fn plain(airframe: Airframe<N>) -> Self {
+        const GAINS: Gains = Gains::DEFAULT;
         Configuration {
-            airframe: Parameters::PAPER.to_f32().into(),
-            settings: Profile::Flight.settings().with_drag(KnownDrag::PAPER),
-            gains: Profile::Flight.gains(),
+            airframe,
+            settings: Settings::DEFAULT,
+            gains: PerAxis { roll: GAINS, pitch: GAINS, yaw: GAINS, z: GAINS, x: GAINS, y: GAINS },
             curve: Curve::DEFAULT,
             response: Response::DEFAULT,
             imu: Mounting::PLAIN,
@@ -48,6 +50,17 @@ impl Default for Configuration {
             arming: ArmingLimits::DEFAULT,
             guidance: afbc_guidance::Settings::DEFAULT,
             link: Link::DEFAULT,
+        }
+    }
+}
+
+impl Default for Configuration {
+    /// The paper's vehicle in the profile `flight`.
+    fn default() -> Self {
+        Configuration {
+            settings: Profile::Flight.settings().with_drag(KnownDrag::PAPER),
+            gains: Profile::Flight.gains(),
+            ..Configuration::plain(Parameters::PAPER.to_f32().into())
         }
     }
 }

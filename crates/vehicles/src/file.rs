@@ -7,6 +7,7 @@ use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
 use afbc_control::drag::KnownDrag;
 use afbc_estimator::Settings as Estimation;
+use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Curve;
 use afbc_plant::instruments::Imu;
 use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, InstrumentSuite, Realism, Rotors};
@@ -73,6 +74,9 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
     gains(&mut root, &mut flight_gains, &mut flight_settings)?;
     let (imu, part) = imu(&mut root)?;
     let estimation = estimation(&mut root, &parameters, rotors.len(), part.as_ref())?;
+    let (mut arming, mut guidance) = (ArmingLimits::DEFAULT, afbc_guidance::Settings::DEFAULT);
+    parts::declared(root.table("arming")?, &mut arming)?;
+    parts::declared(root.table("guidance")?, &mut guidance)?;
     let mut vehicle = Vehicle {
         name,
         description,
@@ -83,6 +87,8 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
         curve,
         imu,
         estimation,
+        arming,
+        guidance,
         flight_gains,
         flight_settings,
         text: text.into(),

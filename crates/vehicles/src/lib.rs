@@ -6,6 +6,7 @@
 mod built_in;
 pub mod data_sheet;
 mod file;
+mod image;
 pub mod parts;
 mod vehicle;
 

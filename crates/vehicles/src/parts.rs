@@ -29,6 +29,17 @@ fn together(table: &Table<'_>) -> impl Fn(OutOfRange) -> FileError {
     |error| table.fault_at(error.range.name, format!("{}; change it", out_of_range(&error)))
 }
 
+/// What `table` says of `parameters`, each in its range and all together.
+///
+/// # Errors
+/// One line on the first thing that is wrong, here and below.
+pub fn declared(table: Option<Table<'_>>, parameters: &mut impl Declared) -> Result<(), FileError> {
+    let Some(mut table) = table else { return Ok(()) };
+    table.declared(parameters)?;
+    parameters.validate().map_err(together(&table))?;
+    table.finish()
+}
+
 /// Masses, arm, inertia and rotor factors.
 ///
 /// # Errors

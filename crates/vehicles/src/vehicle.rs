@@ -5,7 +5,9 @@ use afbc::guarded::Guarded;
 use afbc::monitor::Bounds;
 use afbc::{Profile, Settings};
 use afbc_estimator::Settings as Estimation;
+use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
+use afbc_onboard::{Configuration, Link};
 use afbc_plant::Realism;
 use afbc_reader::{FileError, Table};
 use afbc_types::{Airframe, Mounting, OutOfRange, Parameters, PerAxis, Rotor, with_rotors};
@@ -37,6 +39,10 @@ pub struct Vehicle {
     pub imu: Mounting<f64>,
     /// Settings of the firmware's estimator.
     pub estimation: Estimation,
+    /// Limits for arming the firmware.
+    pub arming: ArmingLimits,
+    /// Settings of the firmware's modes, limits and safety net.
+    pub guidance: afbc_guidance::Settings,
     /// Gains of AFBC in the profile `flight`: by rule ([`Profile::gains_for`]), or as the file says.
     pub flight_gains: PerAxis<Gains>,
     /// Settings of AFBC's cascade in the profile `flight`: by rule ([`Profile::settings_for`]), or as the file says.
@@ -75,6 +81,26 @@ impl Vehicle {
             return self.flight_settings;
         }
         profile.settings_for(self.force_max_n as f32, self.lag_s())
+    }
+
+    /// Returns what flight software is told of the vehicle: the firmware's image, the same code in simulation, and a
+    /// station's file of parameters.
+    ///
+    /// # Errors
+    /// If it does not have `N` rotors.
+    pub fn configuration<const N: usize>(&self) -> Result<Configuration<N>, OutOfRange> {
+        Ok(Configuration {
+            airframe: Airframe::new(&self.parameters, &self.rotors)?,
+            settings: self.settings(Profile::Flight),
+            gains: self.gains(Profile::Flight),
+            curve: self.curve,
+            response: self.response(),
+            imu: self.imu.to_f32(),
+            estimation: self.estimation,
+            arming: self.arming,
+            guidance: self.guidance,
+            link: Link::DEFAULT,
+        })
     }
 
     /// Calls `read` with the gains of the profile `flight` in the file, a table per law, if there are any.

@@ -161,6 +161,59 @@ fn settings(estimation: &Estimation) -> Vec<(&'static str, f32)> {
     settings
 }
 
+/// Limits for arming and the guidance are the file's, with words for choices, and are checked together.
+#[test]
+fn arming_and_guidance_are_the_files() {
+    let with = |tables: &str| format!("{}\n{tables}\n", text("iris"));
+    let plain = parse("my.toml", text("iris"), "my").unwrap();
+    let guidance = afbc_guidance::Settings::DEFAULT;
+    assert_eq!((plain.arming, plain.guidance), (afbc_flight_core::ArmingLimits::DEFAULT, guidance));
+    let tables = "[arming]\ntilt_max_rad = 0.1\n[guidance]\nland_m_s = 0.4\nfence_action = \"land\"\ncells = 3\n";
+    let vehicle = parse("my.toml", &with(tables), "my").unwrap();
+    let configuration = vehicle.configuration::<4>().unwrap();
+    assert_eq!(configuration.arming, afbc_flight_core::ArmingLimits { tilt_max_rad: 0.1, ..plain.arming });
+    let flying = afbc_guidance::Flying { land_m_s: 0.4, ..guidance.flying };
+    let fence_action = afbc_guidance::FenceAction::Land;
+    let net = afbc_guidance::Net { fence_action, cells: 3, ..guidance.net };
+    assert_eq!(configuration.guidance, afbc_guidance::Settings { flying, net, ..guidance });
+    for (tables, key, why) in [
+        ("[guidance]\nfence_action = \"circle\"", "guidance.fence_action", "it must be \"nothing\", \"warn\""),
+        ("[guidance]\nfence_action = 2", "guidance.fence_action", "a string"),
+        ("[guidance]\ncells = 2.5", "guidance.cells", "not a whole number"),
+        ("[guidance]\nlow = 0.0625", "guidance.critical", "within 0 to 0.0625"),
+        ("[arming]\ntilt_max_rad = 1.0", "arming.tilt_max_rad", "within 0.01 to 0.8"),
+        ("[arming]\ntilt_rad = 0.2", "arming.tilt_rad", "did you mean tilt_max_rad"),
+    ] {
+        let error = refused(&with(tables));
+        assert!(error.contains(key) && error.contains(why), "{error}");
+    }
+}
+
+/// The image is told each declared value of the configuration, and the rotors.
+#[test]
+fn an_image_holds_each_value_of_the_configuration() {
+    fn count(group: &impl Declared) -> usize {
+        let mut count = 0;
+        let Ok(()) = group.visit(&mut |_, _| {
+            count += 1;
+            Ok::<(), core::convert::Infallible>(())
+        });
+        count
+    }
+    for known in &BUILT_IN {
+        let vehicle = known.read().unwrap();
+        let declared = afbc_types::with_rotors!(vehicle.rotors.len(), N => {
+            let it = vehicle.configuration::<N>().unwrap();
+            let parts = count(&it.curve) + count(&it.response) + count(&it.imu) + count(&it.estimation);
+            let modes = count(&it.arming) + count(&it.guidance);
+            count(&it.airframe.parameters) + parts + modes + count(&it.settings) + count(&it.gains)
+        });
+        let image = vehicle.image();
+        assert_eq!(image.matches("\n    it.").count(), declared + 3 * vehicle.rotors.len(), "{image}");
+        assert!(!image.contains("null"), "{image}");
+    }
+}
+
 /// Each setting of the estimator can be given alone, up to the ends of its range, and beyond them is refused. Gravity
 /// is the vehicle's.
 #[test]

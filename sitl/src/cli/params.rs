@@ -7,7 +7,6 @@ use afbc_onboard::parameters::{Kept, Parameter, ParameterTable, RecordChange};
 use afbc_reader::params::{Format, ParameterEntry, read, written};
 use afbc_reader::words::out_of_range;
 use afbc_reader::{FileError, Source};
-use afbc_sim::in_the_loop::configuration;
 use afbc_store::{Error, RecordName, Store, hash};
 use afbc_types::with_rotors;
 use afbc_vehicles::Vehicle;
@@ -82,7 +81,7 @@ impl Params {
 }
 
 fn act<const N: usize>(action: &Action, vehicle: &Vehicle) -> Result<(), Failure> {
-    let mut table = ParameterTable::<N>::new(configuration(vehicle)?);
+    let mut table = ParameterTable::<N>::new(vehicle.configuration()?);
     match action {
         Action::Export { of, out, format } => {
             if let Some(path) = &of.store {

@@ -1,14 +1,13 @@
 //! The firmware's code in this process.
 
 use super::{Autopilot, Error};
-use afbc::Profile;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
-use afbc_onboard::{ArmingLimits, Configuration, ControlInputs, Flight, Link, Prepared, Readings, Report};
+use afbc_onboard::{Configuration, ControlInputs, Flight, Link, Prepared, Readings, Report};
 use afbc_station::{Comms, Setup};
 use afbc_store::Store;
-use afbc_types::{Airframe, OutOfRange, ROTORS_MAX, with_rotors};
+use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_vehicles::Vehicle;
 use embedded_storage::nor_flash::NorFlash;
 
@@ -79,25 +78,6 @@ pub struct HostTick {
     pub change: Option<RecordChange>,
 }
 
-/// What the firmware's image for `vehicle` is told of it (`firmware/build.rs`).
-///
-/// # Errors
-/// If it does not have `N` rotors.
-pub fn configuration<const N: usize>(vehicle: &Vehicle) -> Result<Configuration<N>, OutOfRange> {
-    Ok(Configuration {
-        airframe: Airframe::new(&vehicle.parameters, &vehicle.rotors)?,
-        settings: vehicle.settings(Profile::Flight),
-        gains: vehicle.gains(Profile::Flight),
-        curve: vehicle.curve,
-        response: vehicle.response(),
-        imu: vehicle.imu.to_f32(),
-        estimation: vehicle.estimation,
-        arming: ArmingLimits::DEFAULT,
-        guidance: afbc_guidance::Settings::DEFAULT,
-        link: Link::DEFAULT,
-    })
-}
-
 impl Host {
     /// Creates the firmware of the paper's vehicle, powered up and disarmed.
     ///
@@ -124,7 +104,7 @@ impl Host {
             return Self::of(ParameterTable::new(Configuration { link, ..Configuration::default() }));
         };
         with_rotors!(vehicle.rotors.len(), N => {
-            Self::of(ParameterTable::<N>::new(Configuration { link, ..configuration(vehicle)? }))
+            Self::of(ParameterTable::<N>::new(Configuration { link, ..vehicle.configuration()? }))
         })
     }
 
@@ -143,7 +123,7 @@ impl Host {
             return Self::of(loaded(Configuration { link, ..Configuration::default() }, store, &mut notice));
         };
         with_rotors!(vehicle.rotors.len(), N => {
-            Self::of(loaded::<F, N>(Configuration { link, ..configuration(vehicle)? }, store, &mut notice))
+            Self::of(loaded::<F, N>(Configuration { link, ..vehicle.configuration()? }, store, &mut notice))
         })
     }
 

@@ -29,7 +29,7 @@ pub use autopilot::Autopilot;
 pub use error::Error;
 pub use extremes::Extremes;
 pub use flight::{LoopEnd, check, firmware, fly};
-pub use host::{Host, HostTick, configuration};
+pub use host::{Host, HostTick};
 pub use log::Log;
 pub use pace::MessagePeriods;
 pub use report::tracking;
