@@ -33,6 +33,7 @@ const PLAIN: Configuration = Configuration::plain(Airframe {
 });
 
 /// Returns the choice that files call `word`.
+#[expect(clippy::indexing_slicing, reason = "evaluated by the compiler, which refuses an unknown word")]
 const fn choice<C: Choice>(word: &str) -> C {
     let mut index = 0;
     while !same(C::WORDS[index].as_bytes(), word.as_bytes()) {
@@ -41,6 +42,7 @@ const fn choice<C: Choice>(word: &str) -> C {
     C::ALL[index]
 }
 
+#[expect(clippy::indexing_slicing, reason = "within both lengths")]
 const fn same(one: &[u8], other: &[u8]) -> bool {
     let mut at = 0;
     while at < one.len() && at < other.len() && one[at] == other[at] {

@@ -257,5 +257,5 @@ fn a_stack_that_overflows_ends_in_the_fault_handler() {
     while !board.receive().unwrap().is_empty() {
         assert!(start.elapsed() < PATIENCE, "the link still sends");
     }
-    assert_eq!(board.receive().unwrap(), [], "it is silent until the watchdog resets it");
+    assert_eq!(board.receive().unwrap(), [0_u8; 0], "it is silent until the watchdog resets it");
 }
