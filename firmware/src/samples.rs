@@ -36,7 +36,7 @@ pub enum SampleTime {
 /// What a sensor has read.
 #[derive(Clone, Copy, Debug)]
 pub enum SampleValue {
-    /// Rates \[rad/s\] and specific force \[m/s2\] in the body frame.
+    /// Rates \[rad/s\] and specific force \[m/s2\] in the sensor's axes.
     Imu([Vector3<f32>; 2]),
     /// A measurement of any other sensor.
     Aid(Measurement),

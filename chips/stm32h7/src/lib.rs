@@ -1,5 +1,5 @@
-//! What boards with an STM32H743 or a relative (H750, H753) share. The chip's name is a feature of `embassy-stm32` that
-//! the board sets.
+//! What boards with an STM32H743 share, in whatever package. The chip's name is a feature of `embassy-stm32` that the
+//! board sets.
 #![no_std]
 
 pub mod clocks;
