@@ -75,6 +75,8 @@ impl<const N: usize> Guarded<N> {
     /// The first parameter, setting, gain or bound out of range; also `rotor_force_max_n` if the rotors cannot lift the
     /// vehicle [with a margin](afbc_control::mixer::HOVER_MARGIN), `theta_max` of z if it leaves no room
     /// for hover on weak rotors, and [`HOVER_AUTHORITY`] if the rotors turn the vehicle too slowly.
+    // Always: out of line, its result is on the stack of the firmware's start-up twice.
+    #[inline(always)]
     pub fn new(
         vehicle: impl Into<Airframe<N>>,
         settings: Settings,

@@ -175,33 +175,40 @@ pub struct TickOutcome<const N: usize = 4> {
 }
 
 impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
-    /// Creates a vehicle with these nominal parameters and `controller`, which must be built for them.
+    /// Creates a vehicle with these nominal parameters, the paper's rotors, and `controller`, which must be built for
+    /// them.
     ///
     /// # Errors
     /// The first parameter or limit out of range; also if the controller's time step is not 1 ms, or its rotors cannot
     /// lift the vehicle [with a margin](afbc_control::mixer::HOVER_MARGIN).
     pub fn new(parameters: Parameters, limits: ArmingLimits, controller: C) -> Result<Self, OutOfRange> {
+        Self::with_rotors(parameters, &Response::DEFAULT, limits, controller)
+    }
+
+    /// The same with rotors that respond like this.
+    ///
+    /// # Errors
+    /// Likewise, and the rotors' time constant.
+    // Always: out of line, its result is on the stack of the firmware's start-up twice.
+    #[inline(always)]
+    pub fn with_rotors(
+        parameters: Parameters,
+        rotors: &Response,
+        limits: ArmingLimits,
+        controller: C,
+    ) -> Result<Self, OutOfRange> {
         parameters.validate()?;
+        rotors.validate()?;
         limits.validate()?;
         DT.check(controller.dt_s())?;
         let weight_n = parameters.weight_n();
         controller.mixer().check_hover(weight_n)?;
         Ok(FlightCore {
-            dead_reckoning: DeadReckoning::new(&parameters, &Response::DEFAULT, controller.dt_s()),
+            dead_reckoning: DeadReckoning::new(&parameters, rotors, controller.dt_s()),
             controller,
             limits,
             weight_n,
         })
-    }
-
-    /// The same vehicle with rotors that respond like this.
-    ///
-    /// # Errors
-    /// The time constant, if it is out of range.
-    pub fn with_rotors(mut self, rotors: &Response) -> Result<Self, OutOfRange> {
-        rotors.validate()?;
-        self.dead_reckoning.rotor_share = rotors.share(self.controller.dt_s());
-        Ok(self)
     }
 
     /// Runs one tick, to be called every millisecond. `now_us` is the time since power-up, which never goes back.

@@ -57,7 +57,7 @@ impl<const N: usize> Prepared<N> {
         let bounds = Bounds::new(gains, parameters, settings);
         let controller = Guarded::new(*airframe, *settings, *gains, bounds)?;
         Ok(Prepared {
-            vehicle: FlightCore::new(*parameters, *arming, controller)?.with_rotors(response)?,
+            vehicle: FlightCore::with_rotors(*parameters, response, *arming, controller)?,
             estimator: Estimator::new(*estimation)?,
             output_filter: OutputFilter::of(parameters, N),
             calibration: ImuCalibration::new(imu),

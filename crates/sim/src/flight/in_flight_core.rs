@@ -32,7 +32,7 @@ impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
     /// If the time step is not 1 ms, the flight core's.
     pub fn new(vehicle: Parameters, rotors: &Response, controller: C) -> Result<Self, OutOfRange> {
         let mixer = *controller.mixer();
-        let vehicle = FlightCore::new(vehicle, ArmingLimits::NONE, controller)?.with_rotors(rotors)?;
+        let vehicle = FlightCore::with_rotors(vehicle, rotors, ArmingLimits::NONE, controller)?;
         Ok(InFlightCore { vehicle, mixer, memory: FlightCoreMemory::default(), inbox: Inbox::default(), now_us: 0 })
     }
 
