@@ -8,7 +8,8 @@ use std::fmt::Write;
 
 impl Vehicle {
     /// Returns the constants `NAME`, `ROTORS` and `CONFIGURATION` as Rust: what the
-    /// [configuration](Self::configuration) holds, value by value. The link is left at its defaults, since it is not the vehicle's.
+    /// [configuration](Self::configuration) holds, value by value. The link is left at its defaults, since it is not
+    /// the vehicle's.
     pub fn image(&self) -> String {
         let (name, count) = (&self.name, self.rotors.len());
         let mut text = format!(
