@@ -241,7 +241,7 @@ impl Comms {
 
     /// Does what stations want of the parameters, to be called after each [`report`](Self::report): sends values, frame
     /// by frame, through `send`, together with the report at most [`REPORT_MAX`] bytes. Returns what has changed in
-    /// `table`, which is to be flown ([`Flight::adopt`](crate::Flight::adopt)) and kept
+    /// `table`, which is to be flown ([`Flight::adopt`](afbc_onboard::Flight::adopt)) and kept
     /// ([`Kept::keep`](afbc_onboard::parameters::Kept::keep)). Nothing changes while the vehicle is armed.
     pub fn parameters<const N: usize>(
         &mut self,

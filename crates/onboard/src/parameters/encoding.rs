@@ -41,7 +41,7 @@ impl Kind {
 }
 
 /// Returns the value that `bytes` are, sent as the MAV_PARAM_TYPE `kind`; none for a type of more than four bytes, or
-/// an integer beyond [`WHOLE_MAX`].
+/// an integer beyond 8,388,607.
 pub fn decode(kind: u8, bytes: [u8; 4]) -> Option<f32> {
     let as_float = f32::from_le_bytes(bytes);
     if kind == REAL32 {
