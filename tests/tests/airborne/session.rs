@@ -64,7 +64,12 @@ impl Session {
     /// Powers it up, indoors in front of a tracker, or outdoors in a breeze.
     pub fn new(indoors: bool, seed: u64) -> Self {
         let scenario = built_in(if indoors { "mocap" } else { "outdoor" }).unwrap().read().unwrap();
-        let server = Server::new(&fleet(&Scenario { seed, ..scenario }, 1).unwrap(), 1).unwrap();
+        Session::of(&Scenario { seed, ..scenario })
+    }
+
+    /// Powers up the vehicle of a scenario.
+    pub fn of(scenario: &Scenario) -> Self {
+        let server = Server::new(&fleet(scenario, 1).unwrap(), 1).unwrap();
         let stations = [STATION, COMPANION].map(Station::new);
         let mut session = Session { server, stations, decoder: Decoder::new(STATION), time_ms: 0, garbage: Vec::new() };
         session.say(STATION, Uplink::Command(Command::SetInterval { message: ROTORS, interval_us: 1000 }));

@@ -1,0 +1,118 @@
+//! A file of a kind, of which each value is changed.
+
+use super::document::{Case, Document};
+use crate::airborne;
+use afbc_campaign::{self as campaign, Campaign, Course, Manifest, Shard};
+use afbc_sim::scenario::Scenario;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// What a subject of this test is: a file of a kind.
+pub(crate) trait Subject: Sized + serde::Serialize + Sync {
+    /// Reads it from the text of a file.
+    fn read(text: &str) -> Result<Self, String>;
+
+    /// Writes it as a file.
+    fn document(&self) -> Document;
+
+    /// A scenario with it.
+    fn scenario(&self) -> Scenario;
+
+    /// Checks what the image and a station have of it.
+    fn check_on_board(&self, _base: &Self, _case: &Case, _changed: &str) {}
+
+    /// True if a flight with it differs from one with `base`.
+    fn responds(&self, base: &Self, case: &Case) -> bool;
+}
+
+/// Values with which a flight is tried before none is said to respond.
+const TRIES: usize = 4;
+
+/// Whether a flight has responded to a key.
+pub(crate) type Responses = BTreeMap<String, bool>;
+
+/// Changes every value of the file of `base`; returns which fields a change of a key has changed. Adds whether a flight
+/// has responded to `responses`.
+pub(crate) fn change_each<S: Subject>(base: &S, responses: &mut Responses) -> BTreeSet<String> {
+    let text = base.document().text();
+    let again = S::read(&text).unwrap_or_else(|error| panic!("{error} in\n{text}"));
+    assert_eq!(again.document().differing(&base.document()), [], "the file does not hold what it was made of");
+    let kept = fields(&again);
+    let lost: Vec<_> = fields(base).into_iter().filter(|(path, value)| kept.get(path) != Some(value)).collect();
+    assert_eq!(lost, [], "the file does not hold what it was made of");
+    let (base, fields, mark) = (again, kept, fingerprint(base));
+    assert_eq!(fingerprint(&base), mark);
+    let document = base.document();
+    let results = airborne::on_all_cores(&document.cases(), |case| {
+        let mut changed = BTreeSet::new();
+        let mut responds = false;
+        let (mut accepted, mut refused) = (0, Vec::new());
+        for other in &case.others {
+            let text = document.with(case, other);
+            let subject = match S::read(&text) {
+                Ok(subject) => subject,
+                Err(error) => {
+                    refused.push(error);
+                    continue;
+                }
+            };
+            let what = || format!("{case}: {other}");
+            accepted += 1;
+            // This value alone, if it is a declared one.
+            let read = document.differing(&subject.document());
+            let expected = case.declaration.map(|_| (format!("[{}] {}", case.header, case.key), other.clone()));
+            assert_eq!(read, Vec::from_iter(expected), "{}", what());
+            assert_ne!(fingerprint(&subject), mark, "{} has the same fingerprint", what());
+            let now = self::fields(&subject);
+            let different = now.iter().filter(|(path, value)| fields.get(*path) != Some(value));
+            changed.extend(different.map(|(path, _)| path.clone()));
+            subject.check_on_board(&base, case, other);
+            responds = subject.responds(&base, case);
+            if responds || accepted == TRIES {
+                break;
+            }
+        }
+        assert!(accepted > 0, "{case}: no other value is accepted: {refused:#?}");
+        (changed, case.to_string(), responds)
+    });
+    for (_, case, responds) in &results {
+        *responses.entry(case.clone()).or_default() |= *responds;
+    }
+    results.into_iter().flat_map(|(changed, ..)| changed).collect()
+}
+
+/// Asks that the keys without response are those listed, each with a reason.
+pub(crate) fn compare(responses: &Responses, listed: &[(&str, &[&str])]) {
+    let listed: BTreeSet<&str> = listed.iter().flat_map(|(_, keys)| keys.iter().copied()).collect();
+    let idle = responses.iter().filter(|(_, responds)| !**responds).map(|(key, _)| key.as_str()).collect();
+    let unlisted: Vec<_> = BTreeSet::difference(&idle, &listed).collect();
+    let active: Vec<_> = listed.difference(&idle).collect();
+    assert!(unlisted.is_empty(), "no flight responds to {unlisted:#?}");
+    assert!(active.is_empty(), "a flight responds to what is listed as without effect: {active:#?}");
+}
+
+/// Every field that serde writes, by path; places of lists are left out.
+pub(crate) fn fields(subject: &impl serde::Serialize) -> BTreeMap<String, String> {
+    fn walk(path: &str, value: &serde_json::Value, fields: &mut BTreeMap<String, String>) {
+        let join = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+        match value {
+            serde_json::Value::Object(entries) => entries.iter().for_each(|(key, it)| walk(&join(key), it, fields)),
+            serde_json::Value::Array(items) if items.iter().any(|item| !item.is_number()) => {
+                items.iter().for_each(|item| walk(path, item, fields));
+            }
+            value => fields.entry(path.to_owned()).or_default().push_str(&format!("{value} ")),
+        }
+    }
+    let mut fields = BTreeMap::new();
+    walk("", &serde_json::to_value(subject).unwrap(), &mut fields);
+    fields
+}
+
+/// The fingerprint of a campaign with it.
+fn fingerprint(subject: &impl Subject) -> String {
+    let plain = campaign::parse("f", "flights = 1\nscenario = \"hover\"", "f", Path::new("")).unwrap();
+    let scenario = subject.scenario();
+    let Scenario { trajectory, initial, .. } = scenario.clone();
+    let courses = vec![Course { name: "own".into(), trajectory, initial }];
+    Manifest::new(&Campaign { courses, scenario, ..plain }, Shard::WHOLE).fingerprint
+}
