@@ -33,7 +33,9 @@ pub trait Board: Sized + 'static {
     fn unleash_watchdog(&mut self);
 
     /// Waits for the next interrupt, or a part of that time.
-    fn idle();
+    fn idle() {
+        cortex_m::asm::wfi();
+    }
 
     /// True if the crystal has failed and another clock has taken over.
     fn clock_has_failed(&self) -> bool;

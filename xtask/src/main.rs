@@ -5,37 +5,66 @@
 //! ```
 #![forbid(unsafe_code)]
 
+use clap::Parser;
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
-use std::{env, fs, io};
+use std::{env, fs};
 
-const HELP: &str = "\
-Builds the firmware of a board.
-
-Usage: cargo xtask fw BOARD [--vehicle VEHICLE] [--run] [-- CARGO-OPTIONS...]
-
-  BOARD              a folder in boards/, listed below
-  --vehicle VEHICLE  a name in vehicles/, or a path; without it VEHICLE of the environment, or the paper's
-  --run              flashes and runs it by probe-rs, and shows its log
-  -h, --help         shows this
-
-RUSTUP_TOOLCHAIN=$(scripts/thumb-toolchain.sh) selects a compiler where rustup has no target for microcontrollers.
-";
 const TARGET: &str = "thumbv7em-none-eabihf";
 
-fn main() -> ExitCode {
-    match run(env::args().skip(1)) {
-        Ok(code) => code,
-        Err(error) => {
-            eprintln!("xtask: {error}");
-            ExitCode::FAILURE
-        }
-    }
+/// Work on the firmware.
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", arg_required_else_help = true)]
+enum Task {
+    Fw(Build),
 }
 
-/// A board, as its folder describes it.
+/// Build the image of a board, and flash it.
+///
+/// RUSTUP_TOOLCHAIN=$(scripts/thumb-toolchain.sh) selects a compiler where rustup has no target for microcontrollers.
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment, arg_required_else_help = true)]
+struct Build {
+    /// A folder in boards/.
+    #[arg(value_parser = named())]
+    board: String,
+    /// A name in vehicles/, or a path [default: VEHICLE of the environment, or the paper's].
+    #[arg(long)]
+    vehicle: Option<String>,
+    /// Flash and run it by probe-rs, and show its log.
+    #[arg(long)]
+    run: bool,
+    /// Further options of cargo.
+    #[arg(last = true)]
+    options: Vec<String>,
+}
+
+fn main() -> ExitCode {
+    let Task::Fw(build) = Task::parse();
+    build.run().unwrap_or_else(|error| {
+        eprintln!("xtask: {error}");
+        ExitCode::FAILURE
+    })
+}
+
+/// Accepts the name of a board.
+fn named() -> PossibleValuesParser {
+    // clap keeps names for as long as the program runs.
+    PossibleValuesParser::new(boards().into_iter().map(|name| PossibleValue::new(&*name.leak())))
+}
+
+/// Returns the names of all boards.
+fn boards() -> Vec<String> {
+    let folders = fs::read_dir(root().join("boards")).into_iter().flatten().flatten();
+    let folders = folders.filter(|folder| folder.path().join("Cargo.toml").is_file());
+    let mut names: Vec<_> = folders.map(|folder| folder.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// A board, as its manifest describes it.
 struct Board {
-    name: String,
     /// Name of its package.
     package: String,
     /// Name of its image.
@@ -44,106 +73,50 @@ struct Board {
     chip: Option<String>,
 }
 
-/// What is asked for.
-#[derive(Debug, Default, PartialEq)]
-struct Wish {
-    board: String,
-    vehicle: Option<String>,
-    run: bool,
-    /// Further options of cargo.
-    options: Vec<String>,
+impl Board {
+    fn read(name: &str) -> Result<Self, String> {
+        let path = root().join("boards").join(name).join("Cargo.toml");
+        let of = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
+        let text = fs::read_to_string(&path).map_err(|error| of(&error))?;
+        let manifest: toml::Table = text.parse().map_err(|error| of(&error))?;
+        let text = |value: Option<&toml::Value>| value.and_then(toml::Value::as_str).map(str::to_owned);
+        let package = manifest.get("package").ok_or_else(|| of(&"no [package]"))?;
+        let image = manifest.get("bin").and_then(|bins| bins.get(0)).and_then(|bin| bin.get("name"));
+        Ok(Board {
+            package: text(package.get("name")).ok_or_else(|| of(&"no name"))?,
+            image: text(image).ok_or_else(|| of(&"no [[bin]] with a name"))?,
+            chip: text(package.get("metadata").and_then(|of| of.get("board")).and_then(|of| of.get("chip"))),
+        })
+    }
 }
 
-fn run(arguments: impl Iterator<Item = String>) -> Result<ExitCode, String> {
-    let boards = boards().map_err(|error| format!("boards/: {error}"))?;
-    let names = || boards.iter().map(|board| board.name.as_str()).collect::<Vec<_>>().join(", ");
-    let Some(wish) = Wish::read(arguments)? else {
-        print!("{HELP}\nBoards: {}\n", names());
-        return Ok(ExitCode::SUCCESS);
-    };
-    let board = boards.iter().find(|board| board.name == wish.board);
-    let board = board.ok_or_else(|| format!("no board is called \"{}\"; there are {}", wish.board, names()))?;
-    let chip = match (&board.chip, wish.run) {
-        (None, true) => return Err(format!("{} is emulated: fly it by `cargo run --release -- pil`", board.name)),
-        (chip, run) => chip.as_ref().filter(|_| run),
-    };
-
-    let mut cargo = Command::new(env::var_os("CARGO").unwrap_or("cargo".into()));
-    cargo.current_dir(root()).args(["build", "--profile", "firmware", "--target", TARGET, "--package"]);
-    cargo.args([&board.package, "--bin", &board.image]).args(&wish.options);
-    if let Some(vehicle) = &wish.vehicle {
-        cargo.env("VEHICLE", vehicle);
+impl Build {
+    fn run(&self) -> Result<ExitCode, String> {
+        let Board { package, image, chip } = Board::read(&self.board)?;
+        if self.run && chip.is_none() {
+            return Err(format!("{} is emulated: fly it by `cargo run --release -- pil`", self.board));
+        }
+        let mut cargo = Command::new(env::var_os("CARGO").unwrap_or("cargo".into()));
+        cargo.current_dir(root()).args(["build", "--profile", "firmware", "--target", TARGET]);
+        cargo.args(["--package", &package, "--bin", &image]).args(&self.options);
+        if let Some(vehicle) = &self.vehicle {
+            cargo.env("VEHICLE", vehicle);
+        }
+        if !succeeds(&mut cargo, "cargo")? {
+            return Ok(ExitCode::FAILURE);
+        }
+        let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
+        let image = target.join(TARGET).join("firmware").join(&image);
+        println!("{}", image.display());
+        let Some(chip) = chip.filter(|_| self.run) else { return Ok(ExitCode::SUCCESS) };
+        let flashed = succeeds(Command::new("probe-rs").args(["run", "--chip", &chip]).arg(&image), "probe-rs")?;
+        Ok(if flashed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
     }
-    if !succeeds(&mut cargo, "cargo")? {
-        return Ok(ExitCode::FAILURE);
-    }
-    let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
-    let image = target.join(TARGET).join("firmware").join(&board.image);
-    println!("{}", image.display());
-    let Some(chip) = chip else { return Ok(ExitCode::SUCCESS) };
-    let flashed = succeeds(Command::new("probe-rs").args(["run", "--chip", chip]).arg(&image), "probe-rs")?;
-    Ok(if flashed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// Runs a command; true if it succeeds.
 fn succeeds(command: &mut Command, name: &str) -> Result<bool, String> {
     command.status().map(|status| status.success()).map_err(|error| format!("{name}: {error}"))
-}
-
-impl Wish {
-    /// Reads the arguments; none if they ask for help.
-    fn read(mut arguments: impl Iterator<Item = String>) -> Result<Option<Self>, String> {
-        let mut wish = Wish::default();
-        match arguments.next().as_deref() {
-            Some("fw") => (),
-            Some("-h" | "--help") | None => return Ok(None),
-            Some(other) => return Err(format!("\"{other}\" is no command; cargo xtask --help")),
-        }
-        while let Some(argument) = arguments.next() {
-            match argument.as_str() {
-                "-h" | "--help" => return Ok(None),
-                "--run" => wish.run = true,
-                "--vehicle" => wish.vehicle = Some(arguments.next().ok_or("--vehicle: a name or a path is missing")?),
-                "--" => wish.options.extend(arguments.by_ref()),
-                option if option.starts_with('-') => return Err(format!("{option} is no option; cargo xtask --help")),
-                _ if wish.board.is_empty() => wish.board = argument,
-                _ => return Err(format!("one board at a time: \"{argument}\" is one too many")),
-            }
-        }
-        if wish.board.is_empty() { Ok(None) } else { Ok(Some(wish)) }
-    }
-}
-
-/// Returns all boards by name.
-fn boards() -> io::Result<Vec<Board>> {
-    let mut boards = Vec::new();
-    for entry in fs::read_dir(root().join("boards"))? {
-        let folder = entry?.path();
-        let manifest = folder.join("Cargo.toml");
-        if let (Some(name), true) = (folder.file_name(), manifest.is_file()) {
-            boards.push(Board::read(&name.to_string_lossy(), &fs::read_to_string(manifest)?));
-        }
-    }
-    boards.sort_by(|a, b| a.name.cmp(&b.name));
-    Ok(boards)
-}
-
-impl Board {
-    fn read(name: &str, manifest: &str) -> Self {
-        // The manifests are ours: a key, " = " and a text stand on one line.
-        let value = |section: &str, key: &str| {
-            let lines =
-                manifest.lines().skip_while(|line| *line != section).skip(1).take_while(|line| !line.starts_with('['));
-            let texts = lines.filter_map(|line| line.strip_prefix(key)?.strip_prefix(" = \"")?.strip_suffix('"'));
-            texts.map(str::to_owned).next()
-        };
-        Board {
-            name: name.to_owned(),
-            package: value("[package]", "name").unwrap_or_default(),
-            image: value("[[bin]]", "name").unwrap_or_default(),
-            chip: value("[package.metadata.board]", "chip"),
-        }
-    }
 }
 
 /// The workspace's root.
@@ -155,39 +128,35 @@ fn root() -> &'static Path {
 #[allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
 
-    fn read(line: &str) -> Result<Option<Wish>, String> {
-        Wish::read(line.split_whitespace().map(str::to_owned))
+    fn read(line: &str) -> Result<Build, String> {
+        let words = ["xtask"].into_iter().chain(line.split_whitespace());
+        Task::try_parse_from(words).map(|Task::Fw(build)| build).map_err(|error| error.to_string())
     }
 
     #[test]
     fn every_board_has_a_package_and_an_image_of_its_own() {
-        let boards = boards().expect("readable");
-        assert!(boards.len() >= 3);
-        for board in &boards {
-            assert_eq!(board.package, format!("board-{}", board.name));
-            let same = boards.iter().filter(|other| other.image == board.image).count();
-            assert!(!board.image.is_empty() && same == 1, "{}: {}", board.name, board.image);
-            assert_eq!(board.chip.is_none(), board.name == "emulated");
+        let mut images = BTreeSet::new();
+        for name in boards() {
+            let board = Board::read(&name).expect("complete");
+            assert_eq!(board.package, format!("board-{name}"));
+            assert_eq!(board.chip.is_none(), name == "emulated");
+            assert!(images.insert(board.image), "{name}");
         }
+        assert!(images.len() >= 3);
     }
 
     #[test]
-    fn wishes_are_read() {
-        let wish = read("fw stm32h743 --vehicle racer --run -- --locked").expect("valid").expect("no help");
-        let options = vec!["--locked".to_owned()];
-        assert_eq!(wish, Wish { board: "stm32h743".into(), vehicle: Some("racer".into()), run: true, options });
-        for help in ["", "--help", "fw", "fw --help", "fw stm32h743 -h"] {
-            assert_eq!(read(help), Ok(None), "{help}");
-        }
-        for wrong in ["flash", "fw a b", "fw a --fast", "fw a --vehicle"] {
+    fn arguments_are_read_or_refused_by_name() {
+        let build = read("fw stm32h743 --vehicle racer --run -- --locked").expect("valid");
+        assert_eq!((build.board.as_str(), build.vehicle.as_deref(), build.run), ("stm32h743", Some("racer"), true));
+        assert_eq!(build.options, ["--locked"]);
+        for wrong in ["", "flash", "fw", "fw stm32f405 stm32h743", "fw stm32f405 --fast", "fw stm32f405 --vehicle"] {
             assert!(read(wrong).is_err(), "{wrong}");
         }
-    }
-
-    #[test]
-    fn an_unknown_board_is_answered_by_a_list() {
-        let error = run(["fw", "stm32f1"].map(str::to_owned).into_iter()).expect_err("unknown");
-        assert!(error.contains("\"stm32f1\"") && error.contains("emulated, stm32f405, stm32h743"), "{error}");
+        let error = read("fw stm32f1").expect_err("unknown");
+        assert!(error.contains("stm32f1") && error.contains("emulated, stm32f405, stm32h743"), "{error}");
+        assert!(read("fw emulated --run").expect("read").run().is_err());
     }
 }

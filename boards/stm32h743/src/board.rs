@@ -13,7 +13,7 @@
 
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{CHANNELS, Motors, Throttles, hold_low};
-use chip_stm32::{faults, watchdog};
+use chip_stm32::{crystal, faults, watchdog};
 use chip_stm32h7::flash::Words;
 use chip_stm32h7::{clocks, reset};
 use embassy_executor::SendSpawner;
@@ -90,14 +90,9 @@ impl Board for Stm32h743 {
         self.watchdog.unleash();
     }
 
-    /// Sleeps until the next interrupt.
-    fn idle() {
-        cortex_m::asm::wfi();
-    }
-
     /// True if the crystal has failed and the chip's own oscillator has taken over.
     fn clock_has_failed(&self) -> bool {
-        clocks::have_failed()
+        crystal::has_failed()
     }
 
     fn task_has_failed(&self) -> bool {

@@ -2,9 +2,9 @@
 //! oscillator; and the instruction cache. The data cache stays off, so that DMA and core see the same memory.
 //!
 //! The internal oscillator is accurate to 1 % at room temperature. The vehicle can fly on it, with all times up to 1 %
-//! too short or too long, but arming is refused ([`have_failed`]).
+//! too short or too long, but arming is refused ([`crystal::has_failed`]).
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use chip_stm32::crystal;
 use cortex_m::peripheral::SCB;
 use embassy_stm32::pac::RCC;
 use embassy_stm32::pac::rcc::vals::{Pllm, Pllsrc, Sw};
@@ -19,43 +19,22 @@ pub const CORE_HZ: u32 = 400_000_000;
 /// Input of the PLL \[Hz\], above the 2 MHz up to which its fast oscillator must not be used; a crystal has a multiple
 /// of it.
 const PLL_INPUT_HZ: u32 = 4_000_000;
-/// Longest start-up time of a crystal \[ms\]; usually 2.
-const CRYSTAL_START_MS: u32 = 100;
 /// Core cycles in a millisecond, before the clocks are set up.
 const START_UP_CYCLES_PER_MS: u32 = 64_000;
 /// Polls of the PLL until it counts as broken: at 64 MHz some 2 ms, of which it needs 0.2.
 const LOCK_LOOKS: u32 = 10_000;
 
-static FAILED: AtomicBool = AtomicBool::new(false);
-
-/// True if the crystal has failed, at the start or in flight, so that arming must be refused.
-pub fn have_failed() -> bool {
-    FAILED.load(Ordering::Relaxed)
-}
-
 /// Sets up the clocks of a board with a crystal of `CRYSTAL_HZ`: 4 to 48 MHz, in steps of 4 MHz. To be called
 /// once after reset.
 pub fn start<const CRYSTAL_HZ: u32>(scb: &mut SCB) -> Peripherals {
     const { assert!(CRYSTAL_HZ.is_multiple_of(PLL_INPUT_HZ) && CRYSTAL_HZ >= 4_000_000 && CRYSTAL_HZ <= 48_000_000) }
-    let starts = crystal_starts();
-    FAILED.store(!starts, Ordering::Relaxed);
+    RCC.cr().modify(|cr| cr.set_hseon(true));
+    let starts = crystal::starts(START_UP_CYCLES_PER_MS, || RCC.cr().read().hserdy());
     let peripherals = embassy_stm32::init(config::<CRYSTAL_HZ>(starts));
     scb.enable_icache();
     // The clock security system switches to the chip's oscillator and raises an NMI if the crystal fails.
     RCC.cr().modify(|cr| cr.set_hsecsson(starts));
     peripherals
-}
-
-/// Turns the crystal on; embassy's init would wait for it forever.
-fn crystal_starts() -> bool {
-    RCC.cr().modify(|cr| cr.set_hseon(true));
-    (0..CRYSTAL_START_MS).any(|_| {
-        let ready = RCC.cr().read().hserdy();
-        if !ready {
-            cortex_m::asm::delay(START_UP_CYCLES_PER_MS);
-        }
-        ready
-    })
 }
 
 /// 400 MHz; buses at 200 MHz, peripherals' at 100, timers at 200.
@@ -92,7 +71,7 @@ unsafe fn NonMaskableInt() {
     if !RCC.cifr().read().hsecssf() {
         return;
     }
-    FAILED.store(true, Ordering::Relaxed);
+    crystal::fail();
     RCC.cicr().write(|cicr| cicr.set_hsecssc(true));
     RCC.cr().modify(|cr| {
         cr.set_hseon(false);

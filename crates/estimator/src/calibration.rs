@@ -19,7 +19,7 @@ const LEVER_GAP_US: u64 = 10_000;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImuCalibration {
     mounted: Option<Mounted>,
-    /// The last sample, body frame.
+    /// The last sample, body frame, if its rates are finite.
     last: Option<ImuSample>,
 }
 
@@ -40,6 +40,12 @@ impl ImuCalibration {
         ImuCalibration { mounted, last: None }
     }
 
+    /// True if both are for the same mounting.
+    #[must_use]
+    pub fn has_mounting_of(&self, other: &Self) -> bool {
+        self.mounted == other.mounted
+    }
+
     /// Returns what a sensor at the centre of mass would have measured.
     #[inline(always)]
     pub fn apply(&mut self, sample: ImuSample) -> ImuSample {
@@ -57,7 +63,10 @@ impl ImuCalibration {
         };
         let lever_m_s2 = acceleration_rad_s2.cross(r) + rates_rad_s.cross(&rates_rad_s.cross(r));
         let specific_force_m_s2 = to_body * sample.specific_force_m_s2 - lever_m_s2;
-        *self.last.insert(ImuSample { at_us: sample.at_us, rates_rad_s, specific_force_m_s2 })
+        let corrected = ImuSample { at_us: sample.at_us, rates_rad_s, specific_force_m_s2 };
+        // A sample that is no number spoils no other.
+        self.last = Some(corrected).filter(|_| rates_rad_s.norm_squared().is_finite());
+        corrected
     }
 }
 
@@ -103,6 +112,19 @@ mod tests {
             prop_assert!((sample.rates_rad_s - omega).norm() < 1e-4);
             prop_assert!((sample.specific_force_m_s2 - force).norm() < 2e-2, "{}", sample.specific_force_m_s2 - force);
             prop_assert_eq!(sample.at_us, at_us + step_us);
+        }
+    }
+
+    #[test]
+    fn a_sample_that_is_no_number_spoils_no_other() {
+        let mounting = Mounting { position_m: Vector3::new(0.1, 0.2, 0.0), ..Mounting::PLAIN };
+        let at = |at_us| ImuSample { at_us, rates_rad_s: Vector3::repeat(1.0), ..ImuSample::default() };
+        for odd in [f32::NAN, f32::INFINITY, f32::MAX] {
+            let mut calibration = ImuCalibration::new(&mounting);
+            let _ = calibration.apply(at(1_000));
+            let _ = calibration.apply(ImuSample { rates_rad_s: Vector3::new(0.0, odd, 0.0), ..at(2_000) });
+            let next = calibration.apply(at(3_000));
+            assert!(next.specific_force_m_s2.norm() < 1.0, "{odd}: {}", next.specific_force_m_s2);
         }
     }
 

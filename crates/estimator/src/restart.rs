@@ -153,6 +153,12 @@ impl Memory {
         self.run(now_us, nominal);
     }
 
+    /// Waits for rest again, and starts from there: what is known was measured in other axes.
+    pub fn align_again(&mut self) {
+        self.runs = false;
+        self.align.again(crate::align::Unready::Moving);
+    }
+
     fn run(&mut self, now_us: u64, nominal: Nominal) {
         self.runs = true;
         self.nominal = nominal;

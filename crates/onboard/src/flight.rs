@@ -142,8 +142,8 @@ impl<const N: usize> Flight<N> {
         })
     }
 
-    /// Flies with another configuration from the next tick on; what the estimator knows stays. False, and without
-    /// effect, while armed.
+    /// Flies with another configuration from the next tick on; what the estimator knows stays, unless the inertial
+    /// sensor is mounted otherwise. False, and without effect, while armed.
     #[must_use = "an armed vehicle keeps its configuration"]
     pub fn adopt(&mut self, prepared: &Prepared<N>) -> bool {
         let disarmed = !self.memory.mode().armed();

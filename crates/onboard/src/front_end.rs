@@ -78,9 +78,14 @@ impl EstimatorFrontEnd {
         self.memory.set_on_ground(on_ground);
     }
 
-    /// Goes on with another estimator.
+    /// Goes on with another estimator. If the inertial sensor is mounted otherwise, the estimate starts again from rest.
     pub(crate) fn adopt(&mut self, estimator: &Estimator, output_filter: &OutputFilter, calibration: &ImuCalibration) {
-        (self.estimator, self.output_filter, self.calibration) = (*estimator, *output_filter, *calibration);
+        (self.estimator, self.output_filter) = (*estimator, *output_filter);
+        if !self.calibration.has_mounting_of(calibration) {
+            self.calibration = *calibration;
+            self.memory.align_again();
+            self.stands_m = None;
+        }
     }
 
     /// Takes the readings of a tick at `now_us`, puts what the vehicle knows into `inbox`, and returns the estimate;
@@ -164,10 +169,10 @@ fn leave(timed: &Stamped<Measurement>, inbox: &mut Inbox) {
     }
 }
 
-/// Tells `inbox` the eased `state` of an `estimate` as far as it is valid. What the link says of the state stands only
+/// Puts the filtered `state` of an `estimate` into `inbox` as far as it is valid. The link's state stands only
 /// while the estimate has no attitude: after the inertial sensor has failed.
 #[inline(always)]
-pub fn publish(estimate: &Estimate, state: State, now_us: u64, inbox: &mut Inbox) {
+fn publish(estimate: &Estimate, state: State, now_us: u64, inbox: &mut Inbox) {
     let stamped = Stamped { value: state, at_us: now_us };
     let validity = &estimate.validity;
     let missing = match (validity.attitude, validity.heading, validity.velocity && validity.position) {
@@ -182,9 +187,8 @@ pub fn publish(estimate: &Estimate, state: State, now_us: u64, inbox: &mut Inbox
     }
 }
 
-/// Returns the pose that a measurement tells, if it does.
-#[must_use]
-pub fn pose(measurement: &Measurement) -> Option<Pose> {
+/// Returns the pose that a measurement is, if it is one.
+fn pose(measurement: &Measurement) -> Option<Pose> {
     let Measurement::Pose { position_m, attitude, position_sigma_m, attitude_sigma_rad } = *measurement else {
         return None;
     };

@@ -32,7 +32,7 @@ pub use afbc_flight_core::ArmingLimits;
 pub use configuration::Configuration;
 pub use control_inputs::{ControlInputs, give};
 pub use flight::{Flight, Prepared, Report};
-pub use front_end::{EstimatorFrontEnd, pose, publish};
+pub use front_end::EstimatorFrontEnd;
 pub use guided::GuidanceResult;
 pub use link::Link;
 pub use lockstep::ReplyHead;

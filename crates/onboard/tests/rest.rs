@@ -3,9 +3,9 @@
 
 use afbc_estimator::{Estimator, ImuCalibration, Measurement, OutputFilter, Settings};
 use afbc_flight_core::Inbox;
-use afbc_onboard::{Aged, Configuration, ControlInputs, EstimatorFrontEnd, Flight, Readings};
-use afbc_types::State;
-use nalgebra::Vector3;
+use afbc_onboard::{Aged, Configuration, ControlInputs, EstimatorFrontEnd, Flight, Prepared, Readings};
+use afbc_types::{Mounting, State};
+use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
 
 /// Time without and with fixes \[ms\].
@@ -98,6 +98,42 @@ fn a_disarmed_vehicle_stays_where_it_stands() {
         flight.tick(ms * 1000, &mut inputs, readings).estimate
     });
     assert!(away_m < 0.15 && speed_m_s < 0.1, "{away_m} m, {speed_m_s} m/s");
+}
+
+/// A station corrects the mounting of a sensor that is turned: the estimate starts again in the new axes, at once
+/// right, instead of taking the change for a motion.
+#[test]
+fn another_mounting_starts_the_estimate_again() {
+    let turned = Vector3::new(0.0, 0.2, 1.0);
+    let configuration =
+        Configuration { imu: Mounting { attitude_rad: turned, ..Mounting::PLAIN }, ..Default::default() };
+    let mut flight: Flight = Flight::new(&Configuration::default()).expect("valid");
+    let mut inputs = ControlInputs::default();
+    let to_sensor = Rotation3::from_euler_angles(turned.x, turned.y, turned.z).inverse();
+    let mut stood_m = Vector3::zeros();
+    for ms in 1..40_000 {
+        if ms == 20_000 {
+            assert!(flight.adopt(&Prepared::new(&configuration).expect("valid")));
+        }
+        let mut readings = readings(ms, Vector3::zeros(), Vector3::zeros(), STILL);
+        readings.imu = readings.imu.map(|imu| Aged { value: imu.value.map(|value| to_sensor * value), ..imu });
+        let report = flight.tick(ms * 1000, &mut inputs, &readings);
+        let estimate = report.estimate.expect("it has samples");
+        match ms {
+            19_999 => {
+                assert!((estimate.attitude_rad.y - 0.2).abs() < 0.05, "{}", estimate.attitude_rad);
+                stood_m = estimate.position_m;
+            }
+            22_000.. => {
+                assert!(estimate.attitude_rad.xy().amax() < 0.02, "{ms} ms: {}", estimate.attitude_rad);
+                assert!(estimate.velocity_m_s.amax() < 0.1, "{ms} ms: {}", estimate.velocity_m_s);
+            }
+            _ => (),
+        }
+        if ms == 39_999 {
+            assert!((estimate.position_m - stood_m).amax() < 1.0, "{} and {stood_m}", estimate.position_m);
+        }
+    }
 }
 
 /// Disarmed, but lifted onto a table by 1 m and pushed aside by 2 m, within two seconds: it is followed, stands there,
