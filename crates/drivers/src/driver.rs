@@ -1,0 +1,211 @@
+//! Runs the scripts of a part, watches it, and sets it up again after faults.
+
+use crate::bus::{BusError, Registers};
+use crate::part::{Fault, Part, READ_MAX, Step};
+use afbc_types::Stamped;
+use embassy_futures::select::{Either, select};
+
+/// Faults in a row after which a part is set up again.
+pub const FAULTS_MAX: u32 = 10;
+/// Pause before a part is set up again \[us\].
+pub const PAUSE_US: u32 = 100_000;
+/// Longest transfer \[us\]: 8 KiB at 10 MHz.
+const TRANSFER_US: u32 = 10_000;
+/// Cycles in a row without a reading.
+const CYCLES_MAX: u32 = 100;
+/// Cycles between two looks at a register that was set.
+const CYCLES_A_LOOK: u32 = 16;
+/// Time between two looks at a register for which a script waits \[us\].
+const AWAIT_US: u32 = 1_000;
+
+/// Time and the interrupt of a part, as its board has them.
+#[allow(async_fn_in_trait, reason = "used generically, never boxed")]
+pub trait Timing {
+    /// Time since power-up \[us\].
+    fn now_us(&self) -> u64;
+
+    /// Waits for at least so long.
+    async fn wait(&self, us: u32);
+
+    /// Waits for the part's interrupt, at most so long, and returns true if it has come. A part whose interrupt is not
+    /// wired waits that long and returns true.
+    async fn ready(&mut self, us: u32) -> bool {
+        self.wait(us).await;
+        true
+    }
+}
+
+/// A part on a bus.
+#[derive(Debug)]
+pub struct Driver<P, B, T> {
+    part: P,
+    bus: B,
+    timing: T,
+    /// True if it has been set up.
+    is_up: bool,
+    /// Faults in a row.
+    faults: u32,
+    /// Cycles since the last look, and number of registers looked at.
+    cycles: u32,
+    looks: usize,
+    last: [u8; READ_MAX],
+    /// Equal answers in a row.
+    equals: u32,
+}
+
+impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
+    /// A part that is yet to be set up, by the first [`Driver::reading`].
+    pub fn new(part: P, bus: B, timing: T) -> Self {
+        Driver { part, bus, timing, is_up: false, faults: 0, cycles: 0, looks: 0, last: [0; READ_MAX], equals: 0 }
+    }
+
+    /// True if it has been set up and reads without a fault.
+    pub fn works(&self) -> bool {
+        self.is_up && self.faults == 0
+    }
+
+    /// Returns the next reading, with the time of the part's interrupt or, without one, of the beginning of the
+    /// transfer. Sets the part up before the first one and, after a pause, after [`FAULTS_MAX`] faults in a row.
+    ///
+    /// # Errors
+    /// The fault that this cycle, or the set-up, met. Call it again.
+    pub async fn reading(&mut self) -> Result<Stamped<P::Reading>, Fault> {
+        let result = self.attempt().await;
+        match &result {
+            Ok(_) => self.faults = 0,
+            Err(_) => {
+                self.faults = self.faults.saturating_add(1);
+                self.is_up &= self.faults < FAULTS_MAX;
+            }
+        }
+        result
+    }
+
+    async fn attempt(&mut self) -> Result<Stamped<P::Reading>, Fault> {
+        if !self.is_up {
+            if self.faults > 0 {
+                self.timing.wait(PAUSE_US).await;
+            }
+            self.set_up().await?;
+        }
+        for _ in 0..CYCLES_MAX {
+            if let Some(reading) = self.cycle().await? {
+                return Ok(reading);
+            }
+        }
+        Err(Fault::Late)
+    }
+
+    /// Runs the set-up, and reads back what was set.
+    async fn set_up(&mut self) -> Result<(), Fault> {
+        for step in P::SETUP {
+            self.step(step).await?;
+        }
+        for at in 0..P::SETUP.len() {
+            self.look(at).await?;
+        }
+        // It works when it reads. What has stuck stays so until its reading changes.
+        (self.is_up, self.faults, self.cycles) = (true, self.faults.min(1), 0);
+        Ok(())
+    }
+
+    async fn cycle(&mut self) -> Result<Option<Stamped<P::Reading>>, Fault> {
+        self.cycles += 1;
+        if self.cycles == CYCLES_A_LOOK {
+            self.cycles = 0;
+            self.looks = (self.looks + 1) % P::SETUP.len().max(1);
+            self.look(self.looks).await?;
+        }
+        let mut complete = None;
+        for step in P::CYCLE {
+            complete = self.step(step).await?.or(complete);
+        }
+        Ok(complete)
+    }
+
+    /// Reads back the register that a step of the set-up set, if it did.
+    async fn look(&mut self, at: usize) -> Result<(), Fault> {
+        let Some(Step::Set(register, value)) = P::SETUP.get(at).copied() else { return Ok(()) };
+        // A script may set a register twice.
+        let later = P::SETUP.iter().skip(at + 1);
+        if later.into_iter().any(|step| matches!(step, Step::Set(again, _) if *again == register)) {
+            return Ok(());
+        }
+        if self.byte(register).await? == value { Ok(()) } else { Err(Fault::Register(register)) }
+    }
+
+    async fn step(&mut self, step: &Step) -> Result<Option<Stamped<P::Reading>>, Fault> {
+        match *step {
+            Step::Identify(register, identities) => {
+                let identity = self.byte(register).await?;
+                match identity {
+                    _ if identities.contains(&identity) => (),
+                    0x00 | 0xFF => return Err(Fault::Silent),
+                    _ => return Err(Fault::Identity(identity)),
+                }
+            }
+            Step::Set(register, value) | Step::Write(register, value) => self.write(register, &[value]).await?,
+            Step::WriteAll(register, bytes) => self.write(register, bytes).await?,
+            Step::Read(register, length) => return self.read(register, length).await,
+            Step::Await(register, mask, value, ms) => {
+                let mut looks = ms;
+                while self.byte(register).await? & mask != value {
+                    looks = looks.checked_sub(1).ok_or(Fault::Late)?;
+                    self.timing.wait(AWAIT_US).await;
+                }
+            }
+            Step::Wait(us) => self.timing.wait(us).await,
+            Step::Ready(us) => {
+                if !self.timing.ready(us).await {
+                    return Err(Fault::Late);
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    async fn write(&mut self, register: u8, bytes: &[u8]) -> Result<(), Fault> {
+        transfer(&self.timing, self.bus.write(register, bytes)).await
+    }
+
+    async fn byte(&mut self, register: u8) -> Result<u8, Fault> {
+        let mut answer = [0];
+        transfer(&self.timing, self.bus.read(register, &mut answer)).await?;
+        let [byte] = answer;
+        Ok(byte)
+    }
+
+    async fn read(&mut self, register: u8, length: usize) -> Result<Option<Stamped<P::Reading>>, Fault> {
+        let at_us = self.timing.now_us();
+        let mut answer = [0; READ_MAX];
+        let answer = answer.get_mut(..length).ok_or(Fault::Bus)?;
+        transfer(&self.timing, self.bus.read(register, answer)).await?;
+        if [0x00, 0xFF].iter().any(|idle| answer.iter().all(|byte| byte == idle)) {
+            return Err(Fault::Silent);
+        }
+        let reading = self.part.take(register, answer)?;
+        if reading.is_some() {
+            let last = self.last.get_mut(..length).ok_or(Fault::Bus)?;
+            self.equals = if last == answer { self.equals.saturating_add(1) } else { 0 };
+            last.copy_from_slice(answer);
+            if self.equals >= P::STUCK_AFTER {
+                return Err(Fault::Stuck);
+            }
+        }
+        Ok(reading.map(|value| Stamped { value, at_us }))
+    }
+}
+
+/// Waits for a transfer, but not for one that never ends.
+async fn transfer(timing: &impl Timing, transfer: impl Future<Output = Result<(), BusError>>) -> Result<(), Fault> {
+    match select(transfer, timing.wait(TRANSFER_US)).await {
+        Either::First(result) => Ok(result?),
+        Either::Second(()) => Err(Fault::Bus),
+    }
+}
+
+impl From<BusError> for Fault {
+    fn from(_: BusError) -> Self {
+        Fault::Bus
+    }
+}

@@ -1,0 +1,76 @@
+//! TDK ICM-42688-P and ICM-42605, by SPI (DS-000347 and DS-000292, both with the same registers).
+//!
+//! +-2000 deg/s and +-16 g at 1 kHz, each behind the part's own second-order filter of a quarter of that (250 Hz), which
+//! is also the anti-alias filter for readings at 1 kHz. The interrupt INT1 is a pulse, active high, for each sample.
+
+use crate::bus::SpiFormat;
+use crate::part::{Fault, Part, Step};
+use crate::reading::{InertialReading, big};
+
+/// ICM-42688-P.
+pub type Icm42688p = Icm426xx<0x47>;
+/// ICM-42605.
+pub type Icm42605 = Icm426xx<0x42>;
+
+/// A part of the family, by what its register WHO_AM_I says.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Icm426xx<const IDENTITY: u8>;
+
+// Registers of bank 0.
+const DEVICE_CONFIG: u8 = 0x11;
+const INT_CONFIG: u8 = 0x14;
+const TEMP_DATA1: u8 = 0x1D;
+const INTF_CONFIG0: u8 = 0x4C;
+const PWR_MGMT0: u8 = 0x4E;
+const GYRO_CONFIG0: u8 = 0x4F;
+const ACCEL_CONFIG0: u8 = 0x50;
+const GYRO_ACCEL_CONFIG0: u8 = 0x52;
+const INT_CONFIG1: u8 = 0x64;
+const INT_SOURCE0: u8 = 0x65;
+const WHO_AM_I: u8 = 0x75;
+const REG_BANK_SEL: u8 = 0x76;
+
+/// Length of temperature, specific force and rates.
+const LENGTH: usize = 14;
+/// What an axis reads that has not been measured yet.
+const INVALID: f32 = -32768.0;
+const RAD_S_PER_LSB: f32 = 2000.0 / 32768.0 * core::f32::consts::PI / 180.0;
+const M_S2_PER_LSB: f32 = 16.0 / 32768.0 * 9.806_65;
+
+impl<const IDENTITY: u8> Part for Icm426xx<IDENTITY> {
+    type Reading = InertialReading;
+    const NAME: &'static str = if IDENTITY == 0x47 { "ICM-42688-P" } else { "ICM-42605" };
+    const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0x80, write: 0, dummies: 0, clock_hz: 24_000_000 });
+    const I2C: &'static [u8] = &[];
+    const STUCK_AFTER: u32 = 20;
+    const SETUP: &'static [Step] = &[
+        Step::Write(REG_BANK_SEL, 0),
+        Step::Write(DEVICE_CONFIG, 1), // soft reset, of which the mode of SPI stays
+        Step::Wait(2_000),
+        Step::Identify(WHO_AM_I, &[IDENTITY]),
+        Step::Set(INTF_CONFIG0, 0x30), // big endian, nothing held: as after a reset
+        Step::Set(INT_CONFIG, 0b011),  // INT1 pulsed, push-pull, active high
+        Step::Set(INT_CONFIG1, 0),     // INT_ASYNC_RESET off, as the data sheet demands
+        Step::Set(INT_SOURCE0, 0b1000),
+        Step::Set(GYRO_CONFIG0, 0x06),       // 2000 deg/s, 1 kHz
+        Step::Set(ACCEL_CONFIG0, 0x06),      // 16 g, 1 kHz
+        Step::Set(GYRO_ACCEL_CONFIG0, 0x11), // both at a quarter of the rate
+        Step::Set(PWR_MGMT0, 0x0F),          // both in low-noise mode
+        Step::Wait(45_000),                  // until the gyroscope turns steadily
+    ];
+    const CYCLE: &'static [Step] = &[Step::Ready(2_000), Step::Read(TEMP_DATA1, LENGTH)];
+
+    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<InertialReading>, Fault> {
+        let &[t1, t0, ref force @ .., r5, r4, r3, r2, r1, r0] = answer else { return Err(Fault::Bus) };
+        let force = big(force.try_into().map_err(|_| Fault::Bus)?);
+        let rates = big([r5, r4, r3, r2, r1, r0]);
+        if force.iter().chain(&rates).any(|&axis| axis == INVALID) {
+            return Ok(None);
+        }
+        Ok(Some(InertialReading {
+            rates_rad_s: rates * RAD_S_PER_LSB,
+            specific_force_m_s2: force * M_S2_PER_LSB,
+            temperature_c: f32::from(i16::from_be_bytes([t1, t0])) / 132.48 + 25.0,
+        }))
+    }
+}

@@ -1,0 +1,34 @@
+//! Drivers of the sensors that flight controllers have.
+//!
+//! A [`Part`] is data and arithmetic: the scripts that set it up and read it, as [`Step`]s on its registers, and what the
+//! answers mean. A [`Driver`] runs the scripts over any `embedded-hal-async` bus ([`SpiRegisters`], [`I2cRegisters`]),
+//! stamps each reading with the time of the part's interrupt, and watches the part:
+//!
+//! | fault | found by | then |
+//! |---|---|---|
+//! | another part | identity, at set-up | set-up again after 0.1 s |
+//! | nothing answers | all bits of an answer are equal | set-up after 10 faults |
+//! | set-up lost (reset, brown-out) | one register that was set is read back every 16 readings | the same |
+//! | transfer fails or never ends | the bus, 10 ms | the same |
+//! | no interrupt, or never ready | twice the time of a sample, or 100 cycles | the same |
+//! | readings do not change | [`Part::STUCK_AFTER`] equal answers | the same |
+//! | answers that no working part gives | [`Part::take`] | the same |
+//!
+//! Every fault is returned; none is hidden by a repeated reading.
+//!
+//! | what | parts |
+//! |---|---|
+//! | IMU | [`icm426xx`] |
+#![no_std]
+#![forbid(unsafe_code)]
+
+mod bus;
+mod driver;
+pub mod icm426xx;
+mod part;
+mod reading;
+
+pub use bus::{BusError, I2cRegisters, Registers, SpiFormat, SpiRegisters};
+pub use driver::{Driver, FAULTS_MAX, PAUSE_US, Timing};
+pub use part::{Fault, Part, READ_MAX, Step};
+pub use reading::{InertialReading, MagneticReading, PressureReading};

@@ -1,0 +1,95 @@
+//! What a part is: scripts of register accesses, and arithmetic on what they read. No I/O.
+
+use crate::bus::SpiFormat;
+use core::fmt;
+
+/// Longest answer to a [`Step::Read`] \[bytes\].
+pub const READ_MAX: usize = 32;
+
+/// A step of a script.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Expects one of the values in a register: the part's identity.
+    Identify(u8, &'static [u8]),
+    /// Writes a byte to a register whose value is read back, after the script and then again and again in flight: a part
+    /// that was reset meanwhile has lost it.
+    Set(u8, u8),
+    /// Writes a byte to a register that is not read back.
+    Write(u8, u8),
+    /// Writes bytes from a register on, in one transfer; none are a command.
+    WriteAll(u8, &'static [u8]),
+    /// Reads so many bytes from a register on, at most [`READ_MAX`], for [`Part::take`].
+    Read(u8, usize),
+    /// Waits until the bits of a mask in a register have a value: register, mask, value, at most so many milliseconds.
+    Await(u8, u8, u8, u32),
+    /// Waits so long \[us\].
+    Wait(u32),
+    /// Waits for the part's interrupt, at most so long \[us\]; without one, for that time.
+    Ready(u32),
+}
+
+/// A part of a data sheet.
+pub trait Part {
+    /// What it reads.
+    type Reading: Copy;
+    /// Its name.
+    const NAME: &'static str;
+    /// How it is read over SPI; `None` if it has I2C alone.
+    const SPI: Option<SpiFormat>;
+    /// Its addresses on I2C, of seven bits, the usual one first; none if it has SPI alone.
+    const I2C: &'static [u8];
+    /// Sets it up from any state that it may be in.
+    const SETUP: &'static [Step];
+    /// Takes one reading, or a part of it.
+    const CYCLE: &'static [Step];
+    /// So many equal readings in a row are a stuck part.
+    const STUCK_AFTER: u32;
+
+    /// Takes the answer to a [`Step::Read`] of `register`, and returns the reading that it completes.
+    ///
+    /// # Errors
+    /// The answer is not one that a working part gives.
+    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<Self::Reading>, Fault>;
+}
+
+/// What is wrong with a part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// A transfer has failed.
+    Bus,
+    /// Nothing answers: every bit reads the same.
+    Silent,
+    /// Another part answers: what it says it is.
+    Identity(u8),
+    /// A register does not hold what was written to it.
+    Register(u8),
+    /// The part does not become ready.
+    Late,
+    /// What it reads does not change.
+    Stuck,
+    /// What it reads is outside of what it can measure.
+    Range,
+    /// Its factory calibration is damaged, or is none.
+    Calibration,
+    /// It has failed its own test.
+    SelfTest,
+    /// It has lost readings: its buffer is full.
+    Overflow,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Fault::Bus => f.write_str("a transfer failed: check wiring and address"),
+            Fault::Silent => f.write_str("no answer: check wiring and power"),
+            Fault::Identity(identity) => write!(f, "another part answers, with identity {identity:#04x}"),
+            Fault::Register(register) => write!(f, "register {register:#04x} does not keep its value"),
+            Fault::Late => f.write_str("it does not become ready"),
+            Fault::Stuck => f.write_str("its readings do not change"),
+            Fault::Range => f.write_str("its readings are outside of its range"),
+            Fault::Calibration => f.write_str("its factory calibration is damaged"),
+            Fault::SelfTest => f.write_str("it failed its self-test"),
+            Fault::Overflow => f.write_str("it lost readings"),
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! ICM-42688-P and ICM-42605 against their registers, as DS-000347 has them.
+#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
+
+mod rig;
+
+use afbc_drivers::InertialReading;
+use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
+use nalgebra::Vector3;
+use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
+
+/// Bank 0; other banks are selected and then left alone.
+struct Registers {
+    identity: u8,
+    bank: u8,
+    registers: [u8; 128],
+    /// Since when gyroscope and accelerometer run.
+    on_us: [Option<u64>; 2],
+    rates_deg_s: [f64; 3],
+    force_g: [f64; 3],
+}
+
+impl Registers {
+    fn new(identity: u8) -> Self {
+        let (rates_deg_s, force_g) = ([10.0, -250.0, 0.5], [0.1, -0.2, 1.0]);
+        let mut part = Registers { identity, bank: 0, registers: [0; 128], on_us: [None; 2], rates_deg_s, force_g };
+        part.reset(0);
+        part
+    }
+
+    fn scale(config: u8, full: f64) -> f64 {
+        32768.0 / (full / f64::from(1 << (config >> 5)))
+    }
+
+    /// Period of the output \[us\].
+    fn period_us(&self) -> u64 {
+        match self.registers[0x4F] & 0xF {
+            0x3 => 125,
+            0x4 => 250,
+            0x5 => 500,
+            0x6 => 1_000,
+            0x7 => 5_000,
+            other => panic!("rate {other:#x}"),
+        }
+    }
+
+    fn data(&self, now_us: u64) -> [u8; 14] {
+        let now_us = now_us / self.period_us() * self.period_us();
+        let mut numbers = [-32768_i16; 7];
+        numbers[0] = ((31.0 - 25.0) * 132.48 + 4.0 * noise(now_us, 9)) as i16;
+        let on = |at: usize, start_us: u64| self.on_us[at].is_some_and(|on_us| now_us >= on_us + start_us);
+        for axis in 0..3 {
+            if on(1, 10_000) {
+                let lsb = self.force_g[axis] * Self::scale(self.registers[0x50], 16.0);
+                numbers[1 + axis] = (lsb + 8.0 * noise(now_us, axis as u64)).round().clamp(-32767.0, 32767.0) as i16;
+            }
+            if on(0, 30_000) {
+                let lsb = self.rates_deg_s[axis] * Self::scale(self.registers[0x4F], 2000.0);
+                numbers[4 + axis] =
+                    (lsb + 2.0 * noise(now_us, 4 + axis as u64)).round().clamp(-32767.0, 32767.0) as i16;
+            }
+        }
+        let mut bytes = [0; 14];
+        for (pair, number) in bytes.chunks_exact_mut(2).zip(numbers) {
+            pair.copy_from_slice(&if self.registers[0x4C] & 0x10 != 0 {
+                number.to_be_bytes()
+            } else {
+                number.to_le_bytes()
+            });
+        }
+        bytes
+    }
+}
+
+impl Model for Registers {
+    fn read(&mut self, now_us: u64, register: u8, into: &mut [u8]) {
+        for (register, byte) in (usize::from(register)..).zip(into) {
+            *byte = match (register, self.bank) {
+                (0x76, _) => self.bank,
+                (0x75, 0) => self.identity,
+                (0x1D..=0x2A, 0) => self.data(now_us)[register - 0x1D],
+                (_, 0) => self.registers[register],
+                _ => 0,
+            };
+        }
+    }
+
+    fn write(&mut self, now_us: u64, register: u8, bytes: &[u8]) {
+        for (register, byte) in (usize::from(register)..).zip(bytes) {
+            match (register, self.bank) {
+                (0x76, _) => self.bank = byte & 7,
+                (0x11, 0) if byte & 1 != 0 => self.reset(now_us),
+                (0x1D..=0x2A | 0x75, 0) => (),
+                (0x4E, 0) => {
+                    self.registers[register] = *byte;
+                    for (at, on_us) in self.on_us.iter_mut().enumerate() {
+                        let on = byte >> (2 * (1 - at) as u8) & 3 == 3 || at == 0 && byte >> 2 & 3 == 3;
+                        let on = if at == 1 { byte & 3 == 3 } else { on };
+                        *on_us = if on { on_us.or(Some(now_us)) } else { None };
+                    }
+                }
+                (_, 0) => self.registers[register] = *byte,
+                _ => (),
+            }
+        }
+    }
+
+    fn reset(&mut self, _: u64) {
+        self.registers = [0; 128];
+        for (register, value) in [(0x4C, 0x30), (0x4F, 0x06), (0x50, 0x06), (0x52, 0x11), (0x64, 0x10), (0x65, 0x10)] {
+            self.registers[register] = value;
+        }
+        (self.bank, self.on_us) = (0, [None; 2]);
+    }
+
+    fn next_interrupt_us(&self, now_us: u64) -> Option<u64> {
+        let routed = self.registers[0x65] & 8 != 0 && self.registers[0x14] & 3 == 3 && self.registers[0x64] & 0x10 == 0;
+        let on = self.on_us.iter().any(Option::is_some);
+        (routed && on).then(|| (now_us / self.period_us() + 1) * self.period_us())
+    }
+}
+
+fn right(reading: &InertialReading) -> bool {
+    let rates = Vector3::new(10.0, -250.0, 0.5) * core::f32::consts::PI / 180.0;
+    let force = Vector3::new(0.1, -0.2, 1.0) * 9.80665;
+    (reading.rates_rad_s - rates).amax() < 5e-3
+        && (reading.specific_force_m_s2 - force).amax() < 0.06
+        && (reading.temperature_c - 31.0).abs() < 0.1
+}
+
+#[test]
+fn every_fault_is_noticed_and_survived() {
+    survives_all_troubles(|| Icm42688p {}, || Registers::new(0x47), true, 60_000, right);
+    survives_all_troubles(|| Icm42605 {}, || Registers::new(0x42), true, 60_000, right);
+}
+
+#[test]
+fn another_part_is_named() {
+    refuses_another(Icm42688p {}, Registers::new(0x42), 0x42);
+    refuses_another(Icm42605 {}, Registers::new(0x47), 0x47);
+}
+
+#[test]
+fn there_is_a_reading_every_millisecond_at_its_interrupt() {
+    let rig = Rig::new(Registers::new(0x47));
+    let mut driver = rig.driver(Icm42688p {});
+    let (readings, _) = run(&mut driver, &rig, 1_000_000);
+    let times: Vec<u64> = readings.iter().map(|reading| reading.at_us).collect();
+    assert!(times.len() > 900 && times.windows(2).all(|pair| pair[1] - pair[0] == 1_000), "{times:?}");
+}
+
+#[test]
+fn its_full_range_is_read() {
+    let rig = Rig::new(Registers::new(0x47));
+    let mut driver = rig.driver(Icm42688p {});
+    for (rate, force) in [(1990.0, 15.9), (-1990.0, -15.9), (2500.0, 20.0)] {
+        rig.with(|part| (part.rates_deg_s, part.force_g) = ([rate; 3], [force; 3]));
+        let _ = run(&mut driver, &rig, 100_000);
+        let (readings, _) = run(&mut driver, &rig, 10_000);
+        let InertialReading { rates_rad_s, specific_force_m_s2, .. } = readings.last().expect("readings").value;
+        let [rate, force] = [rate.clamp(-2000.0, 2000.0).to_radians(), force.clamp(-16.0, 16.0) * 9.80665];
+        assert!((rates_rad_s.x - rate as f32).abs() < 0.02, "{rates_rad_s}");
+        assert!((specific_force_m_s2.x - force as f32).abs() < 0.05, "{specific_force_m_s2}");
+    }
+}

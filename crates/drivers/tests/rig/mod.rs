@@ -1,0 +1,267 @@
+//! A bus with the register-level model of a part, whose time passes while a driver waits, and everything that can go
+//! wrong between them.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    unreachable_pub,
+    reason = "a test that cannot go on should say why"
+)]
+#![allow(dead_code, reason = "not every test uses everything")]
+
+use afbc_drivers::{BusError, Driver, Fault, Part, Registers, Timing};
+use afbc_types::Stamped;
+use core::future::pending;
+use embassy_futures::block_on;
+use std::cell::RefCell;
+use std::rc::Rc;
+
+/// The registers of a part, as its data sheet has them.
+pub trait Model {
+    /// Reads from a register on.
+    fn read(&mut self, now_us: u64, register: u8, into: &mut [u8]);
+    /// Writes from a register on.
+    fn write(&mut self, now_us: u64, register: u8, bytes: &[u8]);
+    /// Forgets everything, as after a dip of the supply.
+    fn reset(&mut self, now_us: u64);
+    /// Time of the next interrupt after `now_us`; none if its pin is not set up.
+    fn next_interrupt_us(&self, _now_us: u64) -> Option<u64> {
+        None
+    }
+}
+
+/// What goes wrong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Trouble {
+    /// Nothing.
+    None,
+    /// Every byte reads like this: a wire is off, or the part is dead.
+    Reads(u8),
+    /// The bus reports errors.
+    BusErrors,
+    /// Transfers never end.
+    Hangs,
+    /// Answers repeat themselves.
+    Frozen,
+    /// The part was reset.
+    Reset,
+    /// The interrupt is missing.
+    NoInterrupt,
+    /// One bit of a transaction's answer is flipped, one transaction in so many.
+    Flips(u32),
+}
+
+/// All troubles that a driver must notice.
+pub const NOTICED: [Trouble; 7] = [
+    Trouble::Reads(0x00),
+    Trouble::Reads(0xFF),
+    Trouble::BusErrors,
+    Trouble::Hangs,
+    Trouble::Frozen,
+    Trouble::Reset,
+    Trouble::NoInterrupt,
+];
+
+struct World<M> {
+    model: M,
+    now_us: u64,
+    trouble: Trouble,
+    answers: Vec<(u8, Vec<u8>)>,
+    transactions: u32,
+    random: u64,
+}
+
+/// Bus, interrupt and clock of a part.
+pub struct Rig<M>(Rc<RefCell<World<M>>>);
+
+impl<M> Clone for Rig<M> {
+    fn clone(&self) -> Self {
+        Rig(self.0.clone())
+    }
+}
+
+impl<M: Model> Rig<M> {
+    /// A rig with a part.
+    pub fn new(model: M) -> Self {
+        let (now_us, trouble, answers) = (1_000, Trouble::None, Vec::new());
+        Rig(Rc::new(RefCell::new(World { model, now_us, trouble, answers, transactions: 0, random: 7 })))
+    }
+
+    /// A driver of the part.
+    pub fn driver<P: Part>(&self, part: P) -> Driver<P, Rig<M>, Rig<M>> {
+        Driver::new(part, self.clone(), self.clone())
+    }
+
+    /// What goes wrong from now on.
+    pub fn set(&self, trouble: Trouble) {
+        let mut world = self.0.borrow_mut();
+        if trouble == Trouble::Reset {
+            let now_us = world.now_us;
+            world.model.reset(now_us);
+        }
+        world.trouble = trouble;
+    }
+
+    /// Changes the part.
+    pub fn with<T>(&self, change: impl FnOnce(&mut M) -> T) -> T {
+        change(&mut self.0.borrow_mut().model)
+    }
+
+    /// The time \[us\].
+    pub fn now_us(&self) -> u64 {
+        self.0.borrow().now_us
+    }
+}
+
+impl<M: Model> Registers for Rig<M> {
+    async fn read(&mut self, register: u8, into: &mut [u8]) -> Result<(), BusError> {
+        if self.0.borrow().trouble == Trouble::Hangs {
+            return pending().await;
+        }
+        let mut world = self.0.borrow_mut();
+        let World { model, now_us, trouble, answers, transactions, random } = &mut *world;
+        *now_us += 2 + into.len() as u64;
+        *transactions += 1;
+        let before = answers.iter_mut().find(|(of, answer)| *of == register && answer.len() == into.len());
+        match (&trouble, before) {
+            (Trouble::BusErrors, _) => return Err(BusError),
+            (Trouble::Reads(byte), _) => into.fill(*byte),
+            (Trouble::Frozen, Some((_, answer))) => into.copy_from_slice(answer),
+            (_, before) => {
+                model.read(*now_us, register, into);
+                match before {
+                    Some((_, answer)) => answer.copy_from_slice(into),
+                    None => answers.push((register, into.to_vec())),
+                }
+                if let Trouble::Flips(one_in) = trouble
+                    && *transactions % *one_in == 0
+                {
+                    *random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                    let bit = (*random >> 33) as usize % (8 * into.len());
+                    into[bit / 8] ^= 1 << (bit % 8);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    async fn write(&mut self, register: u8, bytes: &[u8]) -> Result<(), BusError> {
+        if self.0.borrow().trouble == Trouble::Hangs {
+            return pending().await;
+        }
+        let mut world = self.0.borrow_mut();
+        let World { model, now_us, trouble, .. } = &mut *world;
+        *now_us += 2 + bytes.len() as u64;
+        match trouble {
+            Trouble::BusErrors => return Err(BusError),
+            Trouble::Reads(_) => (),
+            _ => model.write(*now_us, register, bytes),
+        }
+        Ok(())
+    }
+}
+
+impl<M: Model> Timing for Rig<M> {
+    fn now_us(&self) -> u64 {
+        self.0.borrow().now_us
+    }
+
+    async fn wait(&self, us: u32) {
+        self.0.borrow_mut().now_us += u64::from(us);
+    }
+
+    async fn ready(&mut self, us: u32) -> bool {
+        let mut world = self.0.borrow_mut();
+        let limit_us = world.now_us + u64::from(us);
+        let due_us = world.model.next_interrupt_us(world.now_us).filter(|_| world.trouble != Trouble::NoInterrupt);
+        world.now_us = due_us.unwrap_or(u64::MAX).min(limit_us);
+        due_us.is_some_and(|due_us| due_us <= limit_us)
+    }
+}
+
+/// Reads until so much time has passed; returns readings and faults.
+pub fn run<P: Part, M: Model>(
+    driver: &mut Driver<P, Rig<M>, Rig<M>>,
+    rig: &Rig<M>,
+    us: u64,
+) -> (Vec<Stamped<P::Reading>>, Vec<Fault>) {
+    let (mut readings, mut faults) = (Vec::new(), Vec::new());
+    let end_us = rig.now_us() + us;
+    while rig.now_us() < end_us {
+        match block_on(driver.reading()) {
+            Ok(reading) => readings.push(reading),
+            Err(fault) => faults.push(fault),
+        }
+    }
+    (readings, faults)
+}
+
+/// The table of faults: each is noticed within `notice_us`, no reading of a part that answers nothing passes for one,
+/// and within a second after its end the part reads right again. `interrupts` is true if the part's interrupt is used,
+/// `right` tells a right reading.
+pub fn survives_all_troubles<P: Part, M: Model>(
+    part: impl Fn() -> P,
+    model: impl Fn() -> M,
+    interrupts: bool,
+    notice_us: u64,
+    right: impl Fn(&P::Reading) -> bool,
+) {
+    for trouble in NOTICED {
+        if trouble == Trouble::NoInterrupt && !interrupts {
+            continue;
+        }
+        let rig = Rig::new(model());
+        let mut driver = rig.driver(part());
+        let (readings, faults) = run(&mut driver, &rig, 1_000_000);
+        assert!(faults.is_empty(), "{}, healthy: {faults:?}", P::NAME);
+        assert!(readings.len() >= 5 && readings.iter().all(|reading| right(&reading.value)), "{}, healthy", P::NAME);
+        assert!(driver.works());
+
+        rig.set(trouble);
+        let (readings, faults) = run(&mut driver, &rig, notice_us);
+        assert!(!faults.is_empty(), "{}: {trouble:?} is not noticed: {} readings", P::NAME, readings.len());
+        if matches!(trouble, Trouble::Reads(_) | Trouble::BusErrors | Trouble::Hangs) {
+            assert!(
+                readings.iter().all(|reading| right(&reading.value)),
+                "{}: {trouble:?} is taken for a reading",
+                P::NAME
+            );
+        }
+        let (_, faults) = run(&mut driver, &rig, 2_000_000);
+        assert!(trouble == Trouble::Reset || !faults.is_empty() && !driver.works(), "{}: {trouble:?}", P::NAME);
+
+        rig.set(Trouble::None);
+        let _ = run(&mut driver, &rig, 1_000_000);
+        let (readings, faults) = run(&mut driver, &rig, 500_000);
+        assert!(faults.is_empty(), "{}: after {trouble:?}: {faults:?}", P::NAME);
+        assert!(
+            readings.len() >= 3 && readings.iter().all(|reading| right(&reading.value)),
+            "{}: {trouble:?}",
+            P::NAME
+        );
+    }
+    // Single flipped bits cannot all be seen; they must not stop it.
+    for one_in in [3, 10, 100] {
+        let rig = Rig::new(model());
+        let mut driver = rig.driver(part());
+        rig.set(Trouble::Flips(one_in));
+        let _ = run(&mut driver, &rig, 5_000_000);
+        rig.set(Trouble::None);
+        let _ = run(&mut driver, &rig, 1_000_000);
+        let (readings, faults) = run(&mut driver, &rig, 500_000);
+        assert!(faults.is_empty() && readings.len() >= 3, "{}: after flips: {faults:?}", P::NAME);
+    }
+}
+
+/// Another part's answers are refused by name.
+pub fn refuses_another<P: Part, M: Model>(part: P, model: M, identity: u8) {
+    let rig = Rig::new(model);
+    let (readings, faults) = run(&mut rig.driver(part), &rig, 500_000);
+    assert!(readings.is_empty() && faults.iter().all(|fault| *fault == Fault::Identity(identity)), "{faults:?}");
+}
+
+/// Numbers that differ from one time to the next, in -1..1, as noise.
+pub fn noise(now_us: u64, axis: u64) -> f64 {
+    let x = (now_us.wrapping_mul(31) + axis).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    ((x ^ (x >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
