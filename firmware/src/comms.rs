@@ -1,8 +1,10 @@
 //! The links: receives and sends messages, at a lower priority than the control tick.
 
+use crate::aux_sensors;
 use crate::board::{Board, Links, Receiver as _, Transmitter as _};
 use crate::control;
 use crate::parameters;
+use crate::samples::Sampler as _;
 use crate::ticks::{self, Tick};
 use crate::vehicle::ParameterTable;
 pub use afbc_station::Comms;
@@ -69,6 +71,9 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table): &mut Desk, links
                 BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
             }
             Either::Second(tick) => {
+                if B::Sampler::SENSES {
+                    comms.set_aux_sensors(aux_sensors::known(tick.report.time_us));
+                }
                 report(comms, &tick, B::CORE_HZ, &mut outgoing);
                 serve(comms, table, &mut outgoing);
                 links.each().iter_mut().for_each(|link| link.transmitter.transmit(&tick, &outgoing));

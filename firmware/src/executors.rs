@@ -7,7 +7,7 @@ use core::sync::atomic::{AtomicU16, Ordering};
 use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::scb::{SystemHandler, VectActive};
-use embassy_executor::{InterruptExecutor, SendSpawner};
+use embassy_executor::{InterruptExecutor, SendSpawner, Spawner};
 
 /// Interrupt priorities; lower numbers preempt higher ones. A chip has at least sixteen, in the upper four bits.
 pub mod priority {
@@ -51,6 +51,13 @@ pub struct Executors {
     pub control: SendSpawner,
     pub comms: SendSpawner,
     pub housekeeping: SendSpawner,
+}
+
+/// Returns the spawner of the executor whose task calls this, for tasks that stay on it. Only tasks may call it.
+#[expect(unsafe_code, reason = "an interrupt executor has no other spawner for tasks that are not Send")]
+pub async fn spawner() -> Spawner {
+    // SAFETY: polled by an executor, as every task of this program is.
+    unsafe { Spawner::for_current_executor() }.await
 }
 
 /// Starts the executors on the lines of control, links and housekeeping and, if there is one, of sampling, and sets the

@@ -26,8 +26,8 @@ macro_rules! image {
         };
 
         #[embassy_executor::task]
-        async fn sampling(mut sampler: <$board as $crate::board::Board>::Sampler) -> ! {
-            $crate::samples::run(&mut sampler).await
+        async fn sampling(sampler: <$board as $crate::board::Board>::Sampler) {
+            $crate::samples::Sampler::run(sampler).await
         }
 
         #[embassy_executor::task]
@@ -49,11 +49,18 @@ macro_rules! image {
             $crate::parameters::run(&mut keeper).await
         }
 
+        // Spawned from within its executor, where futures need not be Send, as those of transfers are not.
+        #[embassy_executor::task]
+        async fn start_sampling(sampler: <$board as $crate::board::Board>::Sampler) {
+            let task = sampling(sampler).expect("spawned once");
+            $crate::executors::spawner().await.spawn(task);
+        }
+
         fn spawn_sampling(
             spawner: embassy_executor::SendSpawner,
             sampler: <$board as $crate::board::Board>::Sampler,
         ) {
-            spawner.spawn(sampling(sampler).expect("spawned once"));
+            spawner.spawn(start_sampling(sampler).expect("spawned once"));
         }
 
         // Out of line, so that their stacks are not used at the same time.

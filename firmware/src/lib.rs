@@ -26,6 +26,7 @@
 //! The links precede the control tick because a UART may buffer one byte only, and the next comes within 11 us.
 #![no_std]
 
+pub mod aux_sensors;
 pub mod board;
 pub mod comms;
 pub mod control;

@@ -4,9 +4,9 @@
 //! from a sensor goes on while the tick runs. The tick takes what has arrived.
 
 use afbc_estimator::Measurement;
-use afbc_onboard::{Aged, Readings};
+use afbc_onboard::{Aged, ImuSelector, Readings};
 use core::cell::RefCell;
-use core::future::pending;
+use core::future::ready;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::Deque;
@@ -14,15 +14,6 @@ use nalgebra::Vector3;
 
 /// Measurements that wait, at most; a tick takes [`AIDS_MAX`](afbc_onboard::AIDS_MAX).
 const WAITING: usize = 4;
-
-/// What a sensor has read.
-#[derive(Clone, Copy, Debug)]
-pub struct SensorSample {
-    /// When it was true.
-    pub time: SampleTime,
-    /// What.
-    pub value: SampleValue,
-}
 
 /// When a sample was true.
 #[derive(Clone, Copy, Debug)]
@@ -47,8 +38,8 @@ pub trait Sampler {
     /// True if there are any.
     const SENSES: bool = true;
 
-    /// Waits for the next sample of any sensor. Called again and again, at a higher priority than the control tick.
-    fn sample(&mut self) -> impl Future<Output = SensorSample> + Send;
+    /// Reads them for ever, at a higher priority than the control tick, and [`put`]s what they have read.
+    fn run(self) -> impl Future<Output = ()>;
 }
 
 /// The sensors of a board that has none: the state comes over the link.
@@ -57,8 +48,8 @@ pub struct NoSensors;
 impl Sampler for NoSensors {
     const SENSES: bool = false;
 
-    fn sample(&mut self) -> impl Future<Output = SensorSample> {
-        pending()
+    fn run(self) -> impl Future<Output = ()> {
+        ready(())
     }
 }
 
@@ -69,26 +60,42 @@ struct Arrived {
     aids: Deque<(SampleTime, Measurement), WAITING>,
 }
 
+static SELECTOR: Mutex<CriticalSectionRawMutex, RefCell<ImuSelector>> = Mutex::new(RefCell::new(ImuSelector::NEW));
+
 static ARRIVED: Mutex<CriticalSectionRawMutex, RefCell<Arrived>> =
     Mutex::new(RefCell::new(Arrived { imu: None, aids: Deque::new() }));
 
-/// Reads the sensors.
-pub async fn run(sampler: &mut impl Sampler) -> ! {
-    loop {
-        let SensorSample { time, value } = sampler.sample().await;
-        ARRIVED.lock(|arrived| {
-            // Not borrowed elsewhere while it is locked; no panic in any case.
-            let Ok(mut arrived) = arrived.try_borrow_mut() else { return };
-            match value {
-                SampleValue::Imu(imu) => arrived.imu = Some((time, imu)),
-                SampleValue::Aid(aid) => {
-                    if arrived.aids.is_full() {
-                        arrived.aids.pop_front();
-                    }
-                    let _ = arrived.aids.push_back((time, aid));
+/// Puts what a sensor has read where the next tick takes it.
+pub fn put(time: SampleTime, value: SampleValue) {
+    ARRIVED.lock(|arrived| {
+        // Not borrowed elsewhere while it is locked; no panic in any case.
+        let Ok(mut arrived) = arrived.try_borrow_mut() else { return };
+        match value {
+            SampleValue::Imu(imu) => arrived.imu = Some((time, imu)),
+            SampleValue::Aid(aid) => {
+                if arrived.aids.is_full() {
+                    arrived.aids.pop_front();
                 }
+                let _ = arrived.aids.push_back((time, aid));
             }
-        });
+        }
+    });
+}
+
+/// Puts a sample of the first of two inertial sensors, in the body's axes; [`ImuSelector`] says which flies.
+pub fn put_first_imu(at_us: u64, sample: [Vector3<f32>; 2]) {
+    put_selected(at_us, |selector| selector.take_first(at_us, sample));
+}
+
+/// Puts a sample of the second.
+pub fn put_second_imu(at_us: u64, sample: [Vector3<f32>; 2]) {
+    put_selected(at_us, |selector| selector.take_second(at_us, sample));
+}
+
+fn put_selected(at_us: u64, select: impl FnOnce(&mut ImuSelector) -> Option<[Vector3<f32>; 2]>) {
+    let flies = SELECTOR.lock(|selector| selector.try_borrow_mut().ok().and_then(|mut selector| select(&mut selector)));
+    if let Some(sample) = flies {
+        put(SampleTime::At(at_us), SampleValue::Imu(sample));
     }
 }
 

@@ -14,7 +14,7 @@ use embassy_sync::pipe::Pipe;
 use embassy_sync::signal::Signal;
 use firmware::board::{self, Board, BoardLink, Parts};
 use firmware::housekeeping;
-use firmware::samples::{self, SampleTime, SampleValue, SensorSample};
+use firmware::samples::{self, SampleTime, SampleValue};
 use firmware::ticks::Tick;
 use firmware::vehicle::ROTORS;
 use semihosting::fs::File;
@@ -52,8 +52,12 @@ impl Board for Emulated {
             from_firmware: File::create(c"from_firmware").expect("the host made the FIFO"),
         };
         transmitter.take_bytes();
-        let sampler = Sampler { left: Readings::NONE };
-        Parts { board: Emulated, sampler, links: [BoardLink { receiver: Receiver, transmitter }], memory: Ram::BLANK }
+        Parts {
+            board: Emulated,
+            sampler: Sampler,
+            links: [BoardLink { receiver: Receiver, transmitter }],
+            memory: Ram::BLANK,
+        }
     }
 
     /// There is no watchdog.
@@ -87,22 +91,18 @@ impl Board for Emulated {
 }
 
 /// The host's sensors.
-pub(crate) struct Sampler {
-    /// What it has sent and is yet to be sampled.
-    left: Readings,
-}
+pub(crate) struct Sampler;
 
 impl samples::Sampler for Sampler {
-    async fn sample(&mut self) -> SensorSample {
+    async fn run(self) {
         loop {
-            let Readings { imu, aids } = &mut self.left;
-            if let Some(Aged { value, age_us }) = imu.take() {
-                return SensorSample { time: SampleTime::BeforeTick(age_us), value: SampleValue::Imu(value) };
+            let Readings { imu, aids } = READINGS.wait().await;
+            if let Some(Aged { value, age_us }) = imu {
+                samples::put(SampleTime::BeforeTick(age_us), SampleValue::Imu(value));
             }
-            if let Some(Aged { value, age_us }) = aids.iter_mut().find_map(Option::take) {
-                return SensorSample { time: SampleTime::BeforeTick(age_us), value: SampleValue::Aid(value) };
+            for Aged { value, age_us } in aids.into_iter().flatten() {
+                samples::put(SampleTime::BeforeTick(age_us), SampleValue::Aid(value));
             }
-            self.left = READINGS.wait().await;
         }
     }
 }

@@ -9,27 +9,46 @@
 //! | motors 5 to 8 (S7 to S10) | TIM4, channels 1 to 4: PD12, PD13, PD14, PD15; driven by DMA1's stream 1 |
 //! | memory | `memory.x` beside this folder |
 //! | parameters | sectors 0 and 1 of the flash's second bank |
-//! | sensors | none yet, so no alignment: the state comes over a link |
+//! | first IMU | ICM-42688-P on SPI1: SCK on PA5, MISO on PA6, MOSI on PD7, select PC15; turned by 180 degrees |
+//! | second IMU | ICM-42605 on SPI4: SCK on PE12, MISO on PE13, MOSI on PE14, select PC13; turned by 270 degrees |
+//! | barometer | DPS310 on I2C2 at 0x76: SCL on PB10, SDA on PB11 |
+//! | compass | QMC5883L on I2C1, outside: SCL on PB6, SDA on PB7 |
+//! | GNSS receiver | NMEA on USART2, outside: TX on PD5, RX on PD6 |
 
+use crate::sensors::Sensors;
+use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
+use afbc_drivers::{Driver, Part, SpiRegisters};
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{CHANNELS, Motors, Throttles, hold_low};
+use chip_stm32::sensors::{Device, Polled};
 use chip_stm32::{crystal, faults, watchdog};
 use chip_stm32h7::flash::Words;
 use chip_stm32h7::{clocks, reset};
 use embassy_executor::SendSpawner;
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
-use embassy_stm32::peripherals::{DMA1_CH0, DMA1_CH1, IWDG1, TIM4, TIM5, UART7, USART1};
+use embassy_stm32::peripherals::{
+    DMA1_CH0, DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, IWDG1, TIM4, TIM5, UART7, USART1, USART2,
+};
+use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, pac};
 use firmware::board::{Board, BoardLink, Parts};
 use firmware::executors::priority;
-use firmware::samples::NoSensors;
 use firmware::vehicle::ROTORS;
 use static_cell::StaticCell;
 
 /// The crystal \[Hz\].
 const CRYSTAL_HZ: u32 = 8_000_000;
+/// Clock of the IMUs' buses \[Hz\]; the parts allow 24 MHz.
+const SPI_HZ: u32 = 10_000_000;
+/// Interrupts at the end of the sensors' transfers.
+const SENSOR_DMA: [interrupt::Interrupt; 4] = [
+    interrupt::Interrupt::DMA1_STREAM2,
+    interrupt::Interrupt::DMA1_STREAM3,
+    interrupt::Interrupt::DMA1_STREAM4,
+    interrupt::Interrupt::DMA1_STREAM5,
+];
 /// Motors: the channels of two timers.
 const OUTPUTS: usize = 2 * CHANNELS;
 
@@ -38,14 +57,24 @@ bind_interrupts!(struct Irqs {
     USART1 => usart::BufferedInterruptHandler<USART1>;
     DMA1_STREAM0 => dma::InterruptHandler<DMA1_CH0>;
     DMA1_STREAM1 => dma::InterruptHandler<DMA1_CH1>;
+    USART2 => usart::BufferedInterruptHandler<USART2>;
+    DMA1_STREAM2 => dma::InterruptHandler<DMA1_CH2>;
+    DMA1_STREAM3 => dma::InterruptHandler<DMA1_CH3>;
+    DMA1_STREAM4 => dma::InterruptHandler<DMA1_CH4>;
+    DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
 });
 
-/// Ring buffers of the links.
-static RX: [StaticCell<[u8; 1024]>; 2] = [const { StaticCell::new() }; 2];
-static TX: [StaticCell<[u8; 1024]>; 2] = [const { StaticCell::new() }; 2];
+/// Ring buffers of the links and of the GNSS receiver.
+static RX: [StaticCell<[u8; 1024]>; 3] = [const { StaticCell::new() }; 3];
+static TX: [StaticCell<[u8; 1024]>; 3] = [const { StaticCell::new() }; 3];
 
 /// Newest throttles, for the motors' tasks.
 static THROTTLES: [Throttles; 2] = [const { Throttles::new() }; 2];
+
+/// An IMU that is read at the start of every control period.
+fn imu<P: Part>(part: P, device: Device) -> Driver<P, SpiRegisters<Device>, Polled> {
+    Driver::new(part, SpiRegisters::new(device, P::SPI.expect("an IMU on SPI")), Polled)
+}
 
 /// The board after start-up.
 pub(crate) struct Stm32h743 {
@@ -54,7 +83,7 @@ pub(crate) struct Stm32h743 {
 
 impl Board for Stm32h743 {
     type Interrupt = pac::Interrupt;
-    type Sampler = NoSensors;
+    type Sampler = Sensors;
     type Links = [BoardLink<Receiver, Transmitter>; 2];
     type Memory = Words;
     const CORE_HZ: u32 = clocks::CORE_HZ;
@@ -65,13 +94,27 @@ impl Board for Stm32h743 {
         let p = clocks::start::<CRYSTAL_HZ>(&mut core.SCB);
         reset::log();
 
-        let [tx, tx2] = TX.each_ref().map(|ring| ring.init([0; 1024]));
-        let [rx, rx2] = RX.each_ref().map(|ring| ring.init([0; 1024]));
+        let [tx, tx2, tx3] = TX.each_ref().map(|ring| ring.init([0; 1024]));
+        let [rx, rx2, rx3] = RX.each_ref().map(|ring| ring.init([0; 1024]));
         let first = BufferedUart::new(p.UART7, p.PE7, p.PE8, tx, rx, Irqs, link::config());
         let second = BufferedUart::new(p.USART1, p.PA10, p.PA9, tx2, rx2, Irqs, link::config());
         let links = [first, second].map(|uart| link::new(uart.expect("the baud rate divides the clock")));
         interrupt::UART7.set_priority(Priority::from(priority::UART));
         interrupt::USART1.set_priority(Priority::from(priority::UART));
+
+        let config = chip_stm32::sensors::spi(SPI_HZ);
+        let first = Spi::new(p.SPI1, p.PA5, p.PD7, p.PA6, p.DMA1_CH3, p.DMA1_CH2, Irqs, config);
+        let second = Spi::new(p.SPI4, p.PE12, p.PE14, p.PE13, p.DMA1_CH5, p.DMA1_CH4, Irqs, config);
+        let receiver = BufferedUart::new(p.USART2, p.PD6, p.PD5, tx3, rx3, Irqs, usart::Config::default());
+        let sensors = Sensors {
+            first: imu(Icm42688p {}, Device::new(first, p.PC15)),
+            second: imu(Icm42605 {}, Device::new(second, p.PC13)),
+            receiver: receiver.expect("the baud rate divides the clock"),
+        };
+        for line in SENSOR_DMA {
+            line.set_priority(Priority::from(priority::SAMPLING));
+        }
+        interrupt::USART2.set_priority(Priority::from(priority::UART));
 
         let motors = Motors::new(p.TIM5, p.PA0, p.PA1, p.PA2, p.PA3, p.DMA1_CH0, Irqs);
         control.spawn(motors_1_to_4(motors).expect("spawned once"));
@@ -83,7 +126,7 @@ impl Board for Stm32h743 {
         // A debugger that halts the core halts the watchdog.
         pac::DBGMCU.apb4fzr1().modify(|freeze| freeze.set_iwdg1(true));
         let board = Stm32h743 { watchdog: watchdog(p.IWDG1) };
-        Parts { board, sampler: NoSensors, links, memory: Words::new(p.FLASH) }
+        Parts { board, sampler: sensors, links, memory: Words::new(p.FLASH) }
     }
 
     fn unleash_watchdog(&mut self) {

@@ -3,9 +3,10 @@
 #![no_main]
 
 mod board;
+mod sensors;
 
 use defmt_rtt as _;
 
-// The interrupt lines of the display controller and of HDMI, which this firmware does not need.
-firmware::image!(board::Stm32h743, control: LTDC, comms: LTDC_ER, housekeeping: CEC);
+// The interrupt lines of the display controller, of HDMI and of the JPEG codec, which this firmware does not need.
+firmware::image!(board::Stm32h743, control: LTDC, comms: LTDC_ER, housekeeping: CEC, sampling: JPEG);
 chip_stm32::faults!(board::stop_motors);

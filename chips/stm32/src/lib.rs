@@ -5,6 +5,8 @@ pub mod crystal;
 pub mod faults;
 pub mod link;
 pub mod motors;
+pub mod receiver;
+pub mod sensors;
 
 use embassy_stm32::Peri;
 use embassy_stm32::wdg::{self, IndependentWatchdog};

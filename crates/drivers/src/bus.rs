@@ -1,5 +1,6 @@
 //! Registers behind SPI or I2C.
 
+use crate::part::READ_MAX;
 use embedded_hal_async::i2c::I2c;
 use embedded_hal_async::spi::{Operation, SpiDevice};
 
@@ -55,16 +56,24 @@ impl<D> SpiRegisters<D> {
 
 impl<D: SpiDevice> Registers for SpiRegisters<D> {
     async fn read(&mut self, register: u8, into: &mut [u8]) -> Result<(), BusError> {
-        let head = [register | self.format.read, 0];
-        let head = if self.format.dummies == 0 { &head[..1] } else { &head[..] };
-        self.device.transaction(&mut [Operation::Write(head), Operation::Read(into)]).await.map_err(|_| BusError)
+        // One transfer, since each costs a DMA's set-up.
+        let mut frame = [0; 2 + READ_MAX];
+        let head = 1 + self.format.dummies;
+        let frame = frame.get_mut(..head + into.len()).ok_or(BusError)?;
+        frame.iter_mut().take(1).for_each(|first| *first = register | self.format.read);
+        self.device.transfer_in_place(frame).await.map_err(|_| BusError)?;
+        into.iter_mut().zip(frame.iter().skip(head)).for_each(|(to, from)| *to = *from);
+        Ok(())
     }
 
     async fn write(&mut self, register: u8, bytes: &[u8]) -> Result<(), BusError> {
         let head = [register | self.format.write];
-        let mut parts = [Operation::Write(&head), Operation::Write(bytes)];
-        let parts = if bytes.is_empty() { &mut parts[..1] } else { &mut parts[..] };
-        self.device.transaction(parts).await.map_err(|_| BusError)
+        match *bytes {
+            [] => self.device.write(&head).await,
+            [byte] => self.device.write(&[register, byte]).await,
+            _ => self.device.transaction(&mut [Operation::Write(&head), Operation::Write(bytes)]).await,
+        }
+        .map_err(|_| BusError)
     }
 }
 

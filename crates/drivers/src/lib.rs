@@ -19,16 +19,18 @@
 //! | what | parts |
 //! |---|---|
 //! | IMU | [`icm426xx`] |
+//! | GNSS receiver | [`nmea`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
 mod bus;
 mod driver;
 pub mod icm426xx;
+pub mod nmea;
 mod part;
 mod reading;
 
 pub use bus::{BusError, I2cRegisters, Registers, SpiFormat, SpiRegisters};
 pub use driver::{Driver, FAULTS_MAX, PAUSE_US, Timing};
 pub use part::{Fault, Part, READ_MAX, Step};
-pub use reading::{InertialReading, MagneticReading, PressureReading};
+pub use reading::{FixReading, InertialReading, MagneticReading, PressureReading};

@@ -29,6 +29,27 @@ pub struct MagneticReading {
     pub field_ut: Vector3<f32>,
 }
 
+/// What a GNSS receiver reads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FixReading {
+    /// Latitude, north positive \[degrees\].
+    pub latitude_deg: f64,
+    /// Longitude, east positive \[degrees\].
+    pub longitude_deg: f64,
+    /// Altitude above mean sea level \[m\].
+    pub altitude_m: f64,
+    /// Velocity to the north, east and down \[m/s\].
+    pub velocity_ned_m_s: Vector3<f32>,
+    /// Standard deviation of the position to the north, and to the east \[m\].
+    pub horizontal_sigma_m: f32,
+    /// Standard deviation of the altitude \[m\].
+    pub vertical_sigma_m: f32,
+    /// Standard deviation of each coordinate of the velocity \[m/s\].
+    pub speed_sigma_m_s: f32,
+    /// Satellites in use.
+    pub satellites: u8,
+}
+
 /// Returns three numbers of two bytes each, the higher first.
 pub(crate) fn big(bytes: [u8; 6]) -> Vector3<f32> {
     let [a, b, c, d, e, f] = bytes;

@@ -129,20 +129,21 @@ fn right(reading: &InertialReading) -> bool {
 
 #[test]
 fn every_fault_is_noticed_and_survived() {
-    survives_all_troubles(|| Icm42688p {}, || Registers::new(0x47), true, 60_000, right);
-    survives_all_troubles(|| Icm42605 {}, || Registers::new(0x42), true, 60_000, right);
+    survives_all_troubles(|| Icm42688p::<false> {}, || Registers::new(0x47), true, 60_000, right);
+    survives_all_troubles(|| Icm42605::<false> {}, || Registers::new(0x42), true, 60_000, right);
+    survives_all_troubles(|| Icm42688p::<true> {}, || Registers::new(0x47), true, 60_000, right);
 }
 
 #[test]
 fn another_part_is_named() {
-    refuses_another(Icm42688p {}, Registers::new(0x42), 0x42);
-    refuses_another(Icm42605 {}, Registers::new(0x47), 0x47);
+    refuses_another(Icm42688p::<false> {}, Registers::new(0x42), 0x42);
+    refuses_another(Icm42605::<false> {}, Registers::new(0x47), 0x47);
 }
 
 #[test]
 fn there_is_a_reading_every_millisecond_at_its_interrupt() {
     let rig = Rig::new(Registers::new(0x47));
-    let mut driver = rig.driver(Icm42688p {});
+    let mut driver = rig.driver(Icm42688p::<false> {});
     let (readings, _) = run(&mut driver, &rig, 1_000_000);
     let times: Vec<u64> = readings.iter().map(|reading| reading.at_us).collect();
     assert!(times.len() > 900 && times.windows(2).all(|pair| pair[1] - pair[0] == 1_000), "{times:?}");
@@ -151,7 +152,7 @@ fn there_is_a_reading_every_millisecond_at_its_interrupt() {
 #[test]
 fn its_full_range_is_read() {
     let rig = Rig::new(Registers::new(0x47));
-    let mut driver = rig.driver(Icm42688p {});
+    let mut driver = rig.driver(Icm42688p::<false> {});
     for (rate, force) in [(1990.0, 15.9), (-1990.0, -15.9), (2500.0, 20.0)] {
         rig.with(|part| (part.rates_deg_s, part.force_g) = ([rate; 3], [force; 3]));
         let _ = run(&mut driver, &rig, 100_000);

@@ -1,0 +1,134 @@
+//! Buses and clock of sensors.
+
+use afbc_drivers::{Driver, Fault, Part, Registers, Timing};
+use afbc_types::Stamped;
+use embassy_futures::select::{Either, select};
+use embassy_stm32::exti::ExtiInput;
+use embassy_stm32::gpio::{Level, Output, Pin, Speed};
+use embassy_stm32::mode::Async;
+use embassy_stm32::spi::mode::Master;
+use embassy_stm32::spi::{self, MODE_3, Spi};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::{Peri, i2c};
+use embassy_time::{Duration, Instant, Timer};
+use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
+
+/// A part that is alone on its SPI.
+pub struct Device {
+    spi: Spi<'static, Async, Master>,
+    select: Output<'static>,
+}
+
+impl Device {
+    /// The part behind a select pin, which is high from now on.
+    pub fn new(spi: Spi<'static, Async, Master>, select: Peri<'static, impl Pin>) -> Self {
+        Device { spi, select: Output::new(select, Level::High, Speed::VeryHigh) }
+    }
+}
+
+/// A part's select pin while it is low; a transfer that is given up ends it too.
+struct Selected<'a>(&'a mut Output<'static>);
+
+impl Drop for Selected<'_> {
+    fn drop(&mut self) {
+        self.0.set_high();
+    }
+}
+
+impl ErrorType for Device {
+    type Error = spi::Error;
+}
+
+impl SpiDevice for Device {
+    async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), spi::Error> {
+        self.select.set_low();
+        let _selected = Selected(&mut self.select);
+        for operation in operations {
+            match operation {
+                Operation::Read(into) => self.spi.read(into).await?,
+                Operation::Write(bytes) => self.spi.write(bytes).await?,
+                Operation::Transfer(into, bytes) => self.spi.transfer(into, bytes).await?,
+                Operation::TransferInPlace(bytes) => self.spi.transfer_in_place(bytes).await?,
+                Operation::DelayNs(ns) => Timer::after(Duration::from_micros(u64::from(*ns).div_ceil(1000))).await,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Reads a part for ever, passes on each reading with its time, and logs when it fails and when it works again.
+pub async fn run<P: Part, B: Registers, T: Timing>(
+    mut driver: Driver<P, B, T>,
+    mut take: impl FnMut(Stamped<P::Reading>),
+) {
+    let mut last: Option<Fault> = None;
+    loop {
+        match driver.reading().await {
+            Ok(reading) => {
+                if last.take().is_some() {
+                    defmt::info!("{=str}: works", P::NAME);
+                }
+                take(reading);
+            }
+            Err(fault) => {
+                if last != Some(fault) {
+                    defmt::warn!("{=str}: {}", P::NAME, defmt::Display2Format(&fault));
+                }
+                last = Some(fault);
+            }
+        }
+    }
+}
+
+/// Returns how SPI is set up for a part, at no more than `clock_hz`.
+pub fn spi(clock_hz: u32) -> spi::Config {
+    let mut config = spi::Config::default();
+    config.mode = MODE_3;
+    config.frequency = Hertz(clock_hz);
+    config
+}
+
+/// Returns how I2C is set up: fast mode, with a time for each transfer that a part which holds the line does not
+/// outlast.
+pub fn i2c() -> i2c::Config {
+    let mut config = i2c::Config::default();
+    config.frequency = Hertz(400_000);
+    config.timeout = Duration::from_millis(5);
+    config
+}
+
+/// The clock of a part whose interrupt is not wired: it is read at the start of every control period.
+pub struct Polled;
+
+impl Timing for Polled {
+    fn now_us(&self) -> u64 {
+        Instant::now().as_micros()
+    }
+
+    async fn wait(&self, us: u32) {
+        Timer::after(Duration::from_micros(us.into())).await;
+    }
+
+    async fn ready(&mut self, _us: u32) -> bool {
+        Timer::at(firmware::time::next_period()).await;
+        true
+    }
+}
+
+/// The clock of a part with its interrupt.
+pub struct Interrupted(pub ExtiInput<'static, Async>);
+
+impl Timing for Interrupted {
+    fn now_us(&self) -> u64 {
+        Polled.now_us()
+    }
+
+    async fn wait(&self, us: u32) {
+        Polled.wait(us).await;
+    }
+
+    async fn ready(&mut self, us: u32) -> bool {
+        let late = Timer::after(Duration::from_micros(us.into()));
+        matches!(select(self.0.wait_for_rising_edge(), late).await, Either::First(()))
+    }
+}

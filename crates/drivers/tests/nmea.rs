@@ -1,0 +1,96 @@
+//! Fixes of a receiver, from sentences written by hand.
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
+
+use afbc_drivers::FixReading;
+use afbc_drivers::nmea::{NmeaDecoder, RANGE_SIGMA_M};
+use proptest::prelude::*;
+
+/// A sentence with its checksum.
+fn sentence(text: &str) -> String {
+    format!("${text}*{:02X}\r\n", text.bytes().fold(0, |sum, byte| sum ^ byte))
+}
+
+/// An angle as NMEA writes it, with the sign's letter.
+fn angle(degrees: f64, digits: usize, letters: [char; 2]) -> String {
+    let ten_thousandths = (degrees.abs() * 60.0 * 1e5).round() as u64;
+    let (whole, minutes) = (ten_thousandths / 6_000_000, ten_thousandths % 6_000_000);
+    let letter = letters[usize::from(degrees < 0.0)];
+    format!("{whole:0digits$}{:02}.{:05},{letter}", minutes / 100_000, minutes % 100_000)
+}
+
+fn epoch(time_s: f64, [latitude, longitude, altitude]: [f64; 3], speed_m_s: f64, course_deg: f64) -> String {
+    let (h, m, s) = ((time_s / 3600.0) as u32, (time_s / 60.0) as u32 % 60, time_s % 60.0);
+    let time = format!("{h:02}{m:02}{s:05.2}");
+    let place = [angle(latitude, 2, ['N', 'S']), angle(longitude, 3, ['E', 'W'])].join(",");
+    let knots = speed_m_s / 0.514_444;
+    sentence(&format!("GNGGA,{time},{place},1,10,0.90,{altitude:.3},M,0.0,M,,"))
+        + &sentence("GPGSV,1,1,01,05,45,120,40")
+        + &sentence(&format!("GNRMC,{time},A,{place},{knots:.3},{course_deg:.2},251126,,,A"))
+        + &sentence(&format!("GNVTG,{course_deg:.2},T,,M,{knots:.3},N,,K,A"))
+}
+
+fn fixes(decoder: &mut NmeaDecoder, text: &str) -> Vec<Option<FixReading>> {
+    text.bytes().filter_map(|byte| decoder.take(byte)).collect()
+}
+
+proptest! {
+    /// Any place, speed and course is read back.
+    #[test]
+    fn what_is_sent_is_read(
+        latitude in -89.0..89.0_f64, longitude in -179.9..179.9_f64, altitude in -400.0..8000.0_f64, speed in 0.0..50.0_f64,
+        course in 0.0..359.9_f64, climb in -5.0..5.0_f64, time_s in 0.0..86_390.0,
+    ) {
+        let time_s = f64::round(time_s);
+        let mut decoder = NmeaDecoder::new();
+        let before = epoch(time_s, [latitude, longitude, altitude], speed, course);
+        prop_assert_eq!(fixes(&mut decoder, &before).len(), 1);
+        let after = epoch(time_s + 0.2, [latitude, longitude, altitude + 0.2 * climb], speed, course);
+        let read = fixes(&mut decoder, &after);
+        prop_assert_eq!(read.len(), 1);
+        let fix = read[0].expect("a fix");
+        prop_assert!((fix.latitude_deg - latitude).abs() < 1.1e-7 && (fix.longitude_deg - longitude).abs() < 1.1e-7);
+        prop_assert!((fix.altitude_m - altitude - 0.2 * climb).abs() < 2e-3);
+        let (east, north) = course.to_radians().sin_cos();
+        prop_assert!((f64::from(fix.velocity_ned_m_s.x) - speed * north).abs() < 0.02);
+        prop_assert!((f64::from(fix.velocity_ned_m_s.y) - speed * east).abs() < 0.02);
+        prop_assert!((f64::from(fix.velocity_ned_m_s.z) + climb).abs() < 0.15, "{} and {climb}", fix.velocity_ned_m_s.z);
+        prop_assert!((fix.horizontal_sigma_m - 0.9 * RANGE_SIGMA_M).abs() < 1e-6);
+        prop_assert_eq!((fix.satellites, decoder.bad_sentences()), (10, 0));
+    }
+
+    /// A wire garbled anyhow gives no panic, and no fix with a number that is none.
+    #[test]
+    fn noise_is_survived(mut bytes in prop::collection::vec(any::<u8>(), 0..400), start in 0_usize..300, flip in any::<u8>()) {
+        let good = epoch(45_000.0, [47.0, -8.5, 500.0], 3.0, 90.0);
+        bytes.splice(start.min(bytes.len())..start.min(bytes.len()), good.bytes());
+        let at = start % bytes.len();
+        bytes[at] ^= flip;
+        let mut decoder = NmeaDecoder::new();
+        for fix in bytes.iter().filter_map(|byte| decoder.take(*byte)).flatten() {
+            prop_assert!(fix.latitude_deg.abs() <= 90.0 && fix.longitude_deg.abs() <= 180.0 && fix.altitude_m.is_finite());
+        }
+        // And a line that is good again is read.
+        let _ = fixes(&mut decoder, "\r\n");
+        let again = epoch(45_001.0, [47.0, -8.5, 500.0], 3.0, 90.0) + &epoch(45_002.0, [47.0, -8.5, 500.0], 3.0, 90.0);
+        prop_assert!(!fixes(&mut decoder, &again).is_empty());
+    }
+
+    /// Fields of any content, with a right checksum.
+    #[test]
+    fn odd_fields_are_survived(text in "[0-9A-Z.,*$ -]{0,80}", kind in 0_usize..4) {
+        let head = ["GNGGA", "GNRMC", "GPVTG", "GP"][kind];
+        let mut decoder = NmeaDecoder::new();
+        let _ = fixes(&mut decoder, &sentence(&format!("{head},{text}")));
+        let _ = fixes(&mut decoder, &sentence(&format!("{head}{text}")));
+    }
+}
+
+#[test]
+fn epochs_that_do_not_belong_together_are_no_fix() {
+    let mut decoder = NmeaDecoder::new();
+    assert_eq!(fixes(&mut decoder, &sentence("GNGGA,,,,,,0,00,99.99,,,,,,")), [None]);
+    let [early, late] = [1000.0, 1000.2].map(|time_s| epoch(time_s, [47.0, 8.0, 400.0], 1.0, 0.0));
+    let (fix, _) = early.split_once("$GNRMC").expect("two halves");
+    let (_, motion) = late.split_once("$GPGSV").expect("two halves");
+    assert_eq!(fixes(&mut decoder, &format!("{fix}$GPGSV{motion}")), []);
+}

@@ -1,0 +1,116 @@
+//! Which of two inertial sensors flies.
+
+use nalgebra::Vector3;
+
+/// Time without a sample after which the other sensor flies \[us\]: less than the estimator bridges without a trace.
+const SILENT_US: u64 = 3_000;
+/// Samples in which the difference of both sensors is averaged, at least.
+const AVERAGED: f32 = 5_000.0;
+
+/// Chooses between two inertial sensors: whichever reads first, usually the first, flies until it is silent, as a driver
+/// makes one whose readings are wrong; then the other does. It stays, since a sensor that failed once may fail again. So that the estimate does not
+/// jump, the second's samples are corrected by its mean difference from the first while both worked.
+#[derive(Clone, Debug)]
+pub struct ImuSelector {
+    second_flies: bool,
+    /// Time of the newest sample of each \[us\].
+    last_us: [Option<u64>; 2],
+    /// Newest sample of the first: rates \[rad/s\] and specific force \[m/s2\].
+    first: [Vector3<f32>; 2],
+    /// Second less first, on average.
+    difference: [Vector3<f32>; 2],
+    averaged: f32,
+}
+
+impl ImuSelector {
+    /// One that has seen no sample.
+    pub const NEW: Self = {
+        let zero = [Vector3::new(0.0, 0.0, 0.0); 2];
+        ImuSelector { second_flies: false, last_us: [None; 2], first: zero, difference: zero, averaged: 0.0 }
+    };
+
+    /// Takes a sample of the first sensor, in the body's axes, and returns what flies.
+    pub fn take_first(&mut self, at_us: u64, sample: [Vector3<f32>; 2]) -> Option<[Vector3<f32>; 2]> {
+        let [first_us, second_us] = &mut self.last_us;
+        *first_us = Some(at_us);
+        self.first = sample;
+        self.second_flies &= !is_silent(*second_us, at_us);
+        (!self.second_flies).then_some(sample)
+    }
+
+    /// Takes a sample of the second.
+    pub fn take_second(&mut self, at_us: u64, sample: [Vector3<f32>; 2]) -> Option<[Vector3<f32>; 2]> {
+        let [first_us, second_us] = &mut self.last_us;
+        *second_us = Some(at_us);
+        self.second_flies |= is_silent(*first_us, at_us);
+        let (difference, from) = (&mut self.difference, &self.first);
+        if !self.second_flies && first_us.is_some() {
+            self.averaged = (self.averaged + 1.0).min(AVERAGED);
+            for ((mean, second), first) in difference.iter_mut().zip(&sample).zip(from) {
+                *mean += (second - first - *mean) / self.averaged;
+            }
+        }
+        let [rates, force] = sample;
+        let [of_rates, of_force] = *difference;
+        self.second_flies.then(|| [rates - of_rates, force - of_force])
+    }
+
+    /// True if the second flies.
+    pub fn second_flies(&self) -> bool {
+        self.second_flies
+    }
+}
+
+fn is_silent(last_us: Option<u64>, now_us: u64) -> bool {
+    last_us.is_none_or(|last_us| now_us.saturating_sub(last_us) > SILENT_US)
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use std::vec::Vec;
+
+    fn motion(ms: u64) -> [Vector3<f32>; 2] {
+        let t = ms as f32 * 1e-3;
+        [Vector3::new((3.0 * t).sin(), (2.0 * t).cos(), 0.5), Vector3::new(0.0, t.sin(), 9.81)]
+    }
+
+    /// Whichever sensor fails, and whenever, what flies has no gap over 4 ms and no jump by the sensors' biases.
+    #[test]
+    fn a_failure_leaves_no_gap_and_no_jump() {
+        let bias = [Vector3::new(0.05, -0.03, 0.02), Vector3::new(0.3, -0.2, 0.4)];
+        for fails_ms in [7_000, 20_003, 59_999_u64] {
+            let mut selector = ImuSelector::NEW;
+            let mut last_ms = 0;
+            for ms in 1..70_000_u64 {
+                let at_us = ms * 1_000;
+                let [rates, force] = motion(ms);
+                let flown = [
+                    (ms < fails_ms).then(|| selector.take_first(at_us, [rates, force])).flatten(),
+                    selector.take_second(at_us + 300, [rates + bias[0], force + bias[1]]),
+                ];
+                let all: Vec<_> = flown.into_iter().flatten().collect();
+                assert!(all.len() <= 1, "one flies");
+                for [flown_rates, flown_force] in all {
+                    assert!(ms - last_ms <= 4, "{last_ms} to {ms} ms");
+                    last_ms = ms;
+                    assert!((flown_rates - rates).norm() < 1e-3 && (flown_force - force).norm() < 1e-2, "{ms} ms");
+                }
+            }
+            assert!(selector.second_flies() && last_ms == 69_999);
+        }
+    }
+
+    #[test]
+    fn one_alone_flies_and_the_first_takes_over_again() {
+        let mut selector = ImuSelector::NEW;
+        assert_eq!(selector.take_second(1_000, motion(1)), Some(motion(1)));
+        assert_eq!(selector.take_first(1_300, motion(1)), None);
+        assert_eq!(selector.take_second(2_000, motion(2)), Some(motion(2)));
+        assert_eq!(selector.take_first(6_000, motion(6)), Some(motion(6)));
+        assert!(!selector.second_flies());
+        assert_eq!(selector.take_second(6_300, motion(6)), None);
+    }
+}

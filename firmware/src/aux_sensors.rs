@@ -1,0 +1,92 @@
+//! Barometer, magnetometer and GNSS receiver: their readings as measurements, and what stations are to know of them.
+
+use crate::samples::{self, SampleTime, SampleValue};
+use afbc_drivers::{FixReading, MagneticReading, PressureReading};
+use afbc_onboard::sensors::{FixFrame, field, height};
+use afbc_station::AuxSensors;
+use afbc_station::services::health::sensor;
+use afbc_station::services::origin::{EarthOrigin, Global};
+use afbc_station::services::status::{GnssReceiver, SensorBits};
+use afbc_types::Stamped;
+use core::cell::RefCell;
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use nalgebra::Matrix3;
+
+/// Time without a reading after which a sensor has failed \[us\].
+const SILENT_US: u64 = 2_000_000;
+/// `GPS_FIX_TYPE`.
+const NO_FIX: u8 = 1;
+const FIX_3D: u8 = 3;
+
+struct Known {
+    frame: FixFrame,
+    origin: Option<EarthOrigin>,
+    /// Newest epoch of the receiver, with its time \[us\].
+    receiver: Option<(u64, GnssReceiver)>,
+    /// Time of the newest reading \[us\].
+    barometer: Option<u64>,
+    magnetometer: Option<u64>,
+}
+
+static KNOWN: Mutex<CriticalSectionRawMutex, RefCell<Known>> = Mutex::new(RefCell::new(Known {
+    frame: FixFrame::NEW,
+    origin: None,
+    receiver: None,
+    barometer: None,
+    magnetometer: None,
+}));
+
+/// Not borrowed elsewhere while it is locked; no panic in any case.
+fn with<T>(change: impl FnOnce(&mut Known) -> T) -> Option<T> {
+    KNOWN.lock(|known| known.try_borrow_mut().ok().map(|mut known| change(&mut known)))
+}
+
+/// Puts what a barometer has read.
+pub fn put_pressure(reading: &Stamped<PressureReading>) {
+    let _ = with(|known| known.barometer = Some(reading.at_us));
+    samples::put(SampleTime::At(reading.at_us), SampleValue::Aid(height(&reading.value)));
+}
+
+/// Puts what a magnetometer has read, whose axes `to_body` turns into the body's.
+pub fn put_field(reading: &Stamped<MagneticReading>, to_body: &Matrix3<f32>) {
+    let _ = with(|known| known.magnetometer = Some(reading.at_us));
+    samples::put(SampleTime::At(reading.at_us), SampleValue::Aid(field(&reading.value, to_body)));
+}
+
+/// Puts a GNSS receiver's fix; none for an epoch without one.
+pub fn put_fix(at_us: u64, fix: Option<FixReading>) {
+    let measurement = with(|known| {
+        let receiver = fix.map_or(GnssReceiver { kind: NO_FIX, ..GnssReceiver::default() }, |fix| GnssReceiver {
+            kind: FIX_3D,
+            satellites: fix.satellites,
+            sigma_mm: [fix.horizontal_sigma_m, fix.vertical_sigma_m].map(|sigma_m| (sigma_m * 1e3) as u32),
+        });
+        known.receiver = Some((at_us, receiver));
+        let (measurement, is_first) = known.frame.measure(&fix?)?;
+        if is_first {
+            let FixReading { latitude_deg, longitude_deg, altitude_m, .. } = fix?;
+            known.origin = EarthOrigin::new(Global { latitude_deg, longitude_deg, altitude_m });
+        }
+        Some(measurement)
+    });
+    if let Some(measurement) = measurement.flatten() {
+        samples::put(SampleTime::At(at_us), SampleValue::Aid(measurement));
+    }
+}
+
+/// Returns what stations are to know at `now_us`.
+pub(crate) fn known(now_us: u64) -> AuxSensors {
+    let works = |at_us: u64| now_us.saturating_sub(at_us) < SILENT_US;
+    let aux = with(|known| {
+        let mut sensors = SensorBits::default();
+        for (at_us, bit) in [(known.barometer, sensor::BAROMETER), (known.magnetometer, sensor::MAGNETOMETER)] {
+            sensors.present |= if at_us.is_some() { bit } else { 0 };
+            sensors.healthy |= if at_us.is_some_and(works) { bit } else { 0 };
+        }
+        let silent = GnssReceiver { kind: NO_FIX, ..GnssReceiver::default() };
+        let receiver = known.receiver.map(|(at_us, receiver)| if works(at_us) { receiver } else { silent });
+        AuxSensors { origin: known.origin, receiver, sensors, ..AuxSensors::default() }
+    });
+    aux.unwrap_or_default()
+}
