@@ -19,10 +19,12 @@
 //! | what | parts |
 //! |---|---|
 //! | IMU | [`icm426xx`] |
+//! | barometer | [`dps310`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
 mod bus;
+pub mod dps310;
 mod driver;
 pub mod icm426xx;
 mod part;
