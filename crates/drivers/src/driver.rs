@@ -15,6 +15,8 @@ const TRANSFER_US: u32 = 10_000;
 const CYCLES_MAX: u32 = 100;
 /// Cycles between two looks at a register that was set.
 const CYCLES_A_LOOK: u32 = 16;
+/// Shortest answer of equal bits that is none \[bytes\].
+const SILENCE_LENGTH: usize = 3;
 /// Time between two looks at a register for which a script waits \[us\].
 const AWAIT_US: u32 = 1_000;
 
@@ -111,10 +113,11 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
 
     async fn cycle(&mut self) -> Result<Option<Stamped<P::Reading>>, Fault> {
         self.cycles += 1;
-        if self.cycles == CYCLES_A_LOOK {
-            self.cycles = 0;
-            self.looks = (self.looks + 1) % P::SETUP.len().max(1);
-            self.look(self.looks).await?;
+        if self.cycles >= CYCLES_A_LOOK {
+            let at = (self.looks + 1) % P::SETUP.len().max(1);
+            // What differs is looked at again in the next cycle, for a part may read on with a lost set-up.
+            self.look(at).await?;
+            (self.cycles, self.looks) = (0, at);
         }
         let mut complete = None;
         for step in P::CYCLE {
@@ -125,13 +128,23 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
 
     /// Reads back the register that a step of the set-up set, if it did.
     async fn look(&mut self, at: usize) -> Result<(), Fault> {
-        let Some(Step::Set(register, value)) = P::SETUP.get(at).copied() else { return Ok(()) };
+        let Some(step) = P::SETUP.get(at) else { return Ok(()) };
+        let Some(register) = register_set_by(step) else { return Ok(()) };
         // A script may set a register twice.
-        let later = P::SETUP.iter().skip(at + 1);
-        if later.into_iter().any(|step| matches!(step, Step::Set(again, _) if *again == register)) {
+        if P::SETUP.iter().skip(at + 1).any(|later| register_set_by(later) == Some(register)) {
             return Ok(());
         }
+        let value = self.value(step).await?;
         if self.byte(register).await? == value { Ok(()) } else { Err(Fault::Register(register)) }
+    }
+
+    /// Returns the value that a step of the set-up gives its register.
+    async fn value(&mut self, step: &Step) -> Result<u8, Fault> {
+        Ok(match *step {
+            Step::Set(_, value) => value,
+            Step::SetLike(_, value, mask, other) => value | self.byte(other).await? & mask,
+            _ => 0,
+        })
     }
 
     async fn step(&mut self, step: &Step) -> Result<Option<Stamped<P::Reading>>, Fault> {
@@ -145,6 +158,10 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
                 }
             }
             Step::Set(register, value) | Step::Write(register, value) => self.write(register, &[value]).await?,
+            Step::SetLike(register, ..) => {
+                let value = self.value(step).await?;
+                self.write(register, &[value]).await?;
+            }
             Step::WriteAll(register, bytes) => self.write(register, bytes).await?,
             Step::Read(register, length) => return self.read(register, length).await,
             Step::Await(register, mask, value, ms) => {
@@ -180,7 +197,7 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
         let mut answer = [0; READ_MAX];
         let answer = answer.get_mut(..length).ok_or(Fault::Bus)?;
         transfer(&self.timing, self.bus.read(register, answer)).await?;
-        if [0x00, 0xFF].iter().any(|idle| answer.iter().all(|byte| byte == idle)) {
+        if answer.len() >= SILENCE_LENGTH && [0x00, 0xFF].iter().any(|idle| answer.iter().all(|byte| byte == idle)) {
             return Err(Fault::Silent);
         }
         let reading = self.part.take(register, answer)?;
@@ -193,6 +210,14 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
             }
         }
         Ok(reading.map(|value| Stamped { value, at_us }))
+    }
+}
+
+/// Returns the register that a step sets and that is read back, if it does.
+fn register_set_by(step: &Step) -> Option<u8> {
+    match *step {
+        Step::Set(register, _) | Step::SetLike(register, ..) => Some(register),
+        _ => None,
     }
 }
 

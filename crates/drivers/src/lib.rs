@@ -7,7 +7,7 @@
 //! | fault | found by | then |
 //! |---|---|---|
 //! | another part | identity, at set-up | set-up again after 0.1 s |
-//! | nothing answers | all bits of an answer are equal | set-up after 10 faults |
+//! | nothing answers | all bits of an answer of three bytes or more are equal | set-up after 10 faults |
 //! | set-up lost (reset, brown-out) | one register that was set is read back every 16 readings | the same |
 //! | transfer fails or never ends | the bus, 10 ms | the same |
 //! | no interrupt, or never ready | twice the time of a sample, or 100 cycles | the same |
@@ -20,10 +20,12 @@
 //! |---|---|
 //! | IMU | [`icm426xx`] |
 //! | GNSS receiver | [`nmea`] |
+//! | barometer | [`dps310`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
 mod bus;
+pub mod dps310;
 mod driver;
 pub mod icm426xx;
 pub mod nmea;

@@ -14,11 +14,15 @@ pub enum Step {
     /// Writes a byte to a register whose value is read back, after the script and then again and again in flight: a part
     /// that was reset meanwhile has lost it.
     Set(u8, u8),
+    /// Sets a register, as [`Step::Set`], to a value and those bits of a mask that another register, or it itself,
+    /// holds: register, value, mask, the other register.
+    SetLike(u8, u8, u8, u8),
     /// Writes a byte to a register that is not read back.
     Write(u8, u8),
     /// Writes bytes from a register on, in one transfer; none are a command.
     WriteAll(u8, &'static [u8]),
-    /// Reads so many bytes from a register on, at most [`READ_MAX`], for [`Part::take`].
+    /// Reads so many bytes from a register on, at most [`READ_MAX`], for [`Part::take`]. Three and more whose bits are
+    /// all equal are no answer; one or two may well be.
     Read(u8, usize),
     /// Waits until the bits of a mask in a register have a value: register, mask, value, at most so many milliseconds.
     Await(u8, u8, u8, u32),

@@ -1,5 +1,6 @@
 //! What parts read, in SI units and the part's own axes.
 
+use crate::part::Fault;
 use nalgebra::Vector3;
 
 /// What an IMU reads.
@@ -54,4 +55,15 @@ pub struct FixReading {
 pub(crate) fn big(bytes: [u8; 6]) -> Vector3<f32> {
     let [a, b, c, d, e, f] = bytes;
     Vector3::new(i16::from_be_bytes([a, b]), i16::from_be_bytes([c, d]), i16::from_be_bytes([e, f])).map(f32::from)
+}
+
+/// Passes a barometer's reading that is within the ranges of its data sheet.
+pub(crate) fn in_range(
+    reading: PressureReading,
+    [min_pa, max_pa]: [f32; 2],
+    [min_c, max_c]: [f32; 2],
+) -> Result<Option<PressureReading>, Fault> {
+    let PressureReading { pressure_pa, temperature_c } = reading;
+    let is_right = (min_pa..=max_pa).contains(&pressure_pa) && (min_c..=max_c).contains(&temperature_c);
+    if is_right { Ok(Some(reading)) } else { Err(Fault::Range) }
 }

@@ -1,0 +1,164 @@
+//! Infineon DPS310 (data sheet V1.2) and Goertek SPL06-001, by SPI or I2C. Both have the same core and say that they are
+//! the same part, so a board has to know which one it has.
+//!
+//! 300 to 1200 hPa and -40 to 85 degrees C. Pressure at 32 Hz, each the mean of 16 samples (about 0.35 Pa rms);
+//! temperature at 8 Hz, of 4 samples: 0.95 s of measuring a second, within the 1 s of section 4.4. No filter beyond that
+//! mean. The interrupt is not used, the ready flag is. The coefficients have no checksum, so they are read twice.
+//!
+//! | | DPS310 | SPL06-001 |
+//! |---|---|---|
+//! | sensor that the coefficients are for | as TMP_COEF_SRCE says | that of the pressure element |
+//! | temperature fuses | enabled by five writes, as Infineon's library does | |
+
+use crate::bus::SpiFormat;
+use crate::part::{Fault, Part, Step};
+use crate::reading::{PressureReading, in_range};
+
+/// DPS310.
+pub type Dps310 = Dps3xx<false>;
+/// SPL06-001.
+pub type Spl06 = Dps3xx<true>;
+
+/// One of the two, a SPL06-001 if that is true.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Dps3xx<const IS_SPL06: bool> {
+    /// The coefficients as they were read last.
+    raw: [u8; COEF_LENGTH],
+    /// What they mean, if they were read twice alike.
+    coefficients: Option<Coefficients>,
+}
+
+/// As sections 4.9.1 and 4.9.2 name them.
+#[derive(Clone, Copy, Debug)]
+struct Coefficients {
+    c0: f32,
+    c1: f32,
+    c00: f32,
+    c10: f32,
+    c01: f32,
+    c11: f32,
+    c20: f32,
+    c21: f32,
+    c30: f32,
+}
+
+const PSR_B2: u8 = 0x00;
+const PRS_CFG: u8 = 0x06;
+const TMP_CFG: u8 = 0x07;
+const MEAS_CFG: u8 = 0x08;
+const CFG_REG: u8 = 0x09;
+const RESET: u8 = 0x0C;
+const ID: u8 = 0x0D;
+const COEF: u8 = 0x10;
+const COEF_SRCE: u8 = 0x28;
+
+const PROD_ID: u8 = 0x10;
+const COEF_LENGTH: usize = 18;
+/// 32 a second, each of 16 samples.
+const PRS_CFG_VALUE: u8 = 0x54;
+/// 8 a second, each of 4 samples.
+const TMP_CFG_VALUE: u8 = 0x32;
+/// The sensor in the pressure element; in COEF_SRCE, the one that the coefficients are for.
+const TMP_EXT: u8 = 0x80;
+/// Demanded of pressures of more than 8 samples.
+const P_SHIFT: u8 = 0x04;
+const COEF_RDY: u8 = 0x80;
+const SENSOR_RDY: u8 = 0x40;
+const TMP_RDY: u8 = 0x20;
+const PRS_RDY: u8 = 0x10;
+/// Pressure and temperature, again and again.
+const CONTINUOUS: u8 = 0x07;
+const SOFT_RST: u8 = 0x09;
+/// Table 9 for 16 and for 4 samples.
+const KP: f32 = 253_952.0;
+const KT: f32 = 3_670_016.0;
+const RANGE_PA: [f32; 2] = [30_000.0, 120_000.0];
+const RANGE_C: [f32; 2] = [-40.0, 85.0];
+
+const DPS310: &[Step] = &[
+    Step::Write(RESET, SOFT_RST),
+    Step::Wait(3_000), // it answers nothing before
+    Step::Identify(ID, &[PROD_ID]),
+    Step::Await(MEAS_CFG, COEF_RDY | SENSOR_RDY, COEF_RDY | SENSOR_RDY, 100),
+    Step::Read(COEF, COEF_LENGTH),
+    Step::Read(COEF, COEF_LENGTH),
+    // Undocumented: some parts read a wrong temperature without.
+    Step::Write(0x0E, 0xA5),
+    Step::Write(0x0F, 0x96),
+    Step::Write(0x62, 0x02),
+    Step::Write(0x0E, 0x00),
+    Step::Write(0x0F, 0x00),
+    Step::Set(PRS_CFG, PRS_CFG_VALUE),
+    Step::SetLike(TMP_CFG, TMP_CFG_VALUE, TMP_EXT, COEF_SRCE),
+    Step::Set(CFG_REG, P_SHIFT),
+    Step::Write(MEAS_CFG, CONTINUOUS), // reads back with flags
+    Step::Await(MEAS_CFG, TMP_RDY, TMP_RDY, 100),
+];
+const SPL06: &[Step] = &[
+    Step::Write(RESET, SOFT_RST),
+    Step::Wait(3_000),
+    Step::Identify(ID, &[PROD_ID]),
+    Step::Await(MEAS_CFG, COEF_RDY | SENSOR_RDY, COEF_RDY | SENSOR_RDY, 100),
+    Step::Read(COEF, COEF_LENGTH),
+    Step::Read(COEF, COEF_LENGTH),
+    Step::Set(PRS_CFG, PRS_CFG_VALUE),
+    Step::Set(TMP_CFG, TMP_CFG_VALUE | TMP_EXT),
+    Step::Set(CFG_REG, P_SHIFT),
+    Step::Write(MEAS_CFG, CONTINUOUS),
+    Step::Await(MEAS_CFG, TMP_RDY, TMP_RDY, 100),
+];
+
+impl<const IS_SPL06: bool> Part for Dps3xx<IS_SPL06> {
+    type Reading = PressureReading;
+    const NAME: &'static str = if IS_SPL06 { "SPL06-001" } else { "DPS310" };
+    const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0x80, write: 0, dummies: 0, clock_hz: 10_000_000 });
+    const I2C: &'static [u8] = &[0x76, 0x77];
+    const STUCK_AFTER: u32 = 20;
+    const SETUP: &'static [Step] = if IS_SPL06 { SPL06 } else { DPS310 };
+    const CYCLE: &'static [Step] =
+        &[Step::Wait(28_000), Step::Await(MEAS_CFG, PRS_RDY, PRS_RDY, 35), Step::Read(PSR_B2, 6)];
+
+    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<PressureReading>, Fault> {
+        if register == COEF {
+            let answer = answer.try_into().map_err(|_| Fault::Bus)?;
+            self.coefficients = (self.raw == answer).then(|| Coefficients::new(answer));
+            self.raw = answer;
+            return Ok(None);
+        }
+        let &[p2, p1, p0, t2, t1, t0] = answer else { return Err(Fault::Bus) };
+        let coefficients = self.coefficients.ok_or(Fault::Calibration)?;
+        in_range(coefficients.compensate(signed([p2, p1, p0, 0], 24), signed([t2, t1, t0, 0], 24)), RANGE_PA, RANGE_C)
+    }
+}
+
+impl Coefficients {
+    /// As table 18 packs them.
+    fn new(raw: [u8; COEF_LENGTH]) -> Self {
+        let [b0, b1, b2, b3, b4, b5, b6, b7, b8, b9, b10, b11, b12, b13, b14, b15, b16, b17] = raw;
+        Coefficients {
+            c0: signed([b0, b1, 0, 0], 12),
+            c1: signed([b1 << 4 | b2 >> 4, b2 << 4, 0, 0], 12),
+            c00: signed([b3, b4, b5, 0], 20),
+            c10: signed([b5 << 4 | b6 >> 4, b6 << 4 | b7 >> 4, b7 << 4, 0], 20),
+            c01: signed([b8, b9, 0, 0], 16),
+            c11: signed([b10, b11, 0, 0], 16),
+            c20: signed([b12, b13, 0, 0], 16),
+            c21: signed([b14, b15, 0, 0], 16),
+            c30: signed([b16, b17, 0, 0], 16),
+        }
+    }
+
+    fn compensate(&self, pressure: f32, temperature: f32) -> PressureReading {
+        let Coefficients { c0, c1, c00, c10, c01, c11, c20, c21, c30 } = *self;
+        let (p, t) = (pressure / KP, temperature / KT);
+        PressureReading {
+            pressure_pa: c00 + p * (c10 + p * (c20 + p * c30)) + t * (c01 + p * (c11 + p * c21)),
+            temperature_c: c0 / 2.0 + c1 * t,
+        }
+    }
+}
+
+/// Returns the number, in two's complement, that the highest bits of four bytes are.
+fn signed(bytes: [u8; 4], bits: u32) -> f32 {
+    (i32::from_be_bytes(bytes) >> (32 - bits)) as f32
+}
