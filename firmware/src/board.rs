@@ -12,8 +12,10 @@ use embedded_storage::nor_flash::NorFlash;
 pub trait Board: Sized + 'static {
     /// Interrupt lines of its chip.
     type Interrupt: InterruptNumber;
-    /// Its sensors, or [`NoSensors`](crate::samples::NoSensors).
+    /// Its inertial sensors, or [`NoSensors`](crate::samples::NoSensors).
     type Sampler: Sampler + Send + 'static;
+    /// Its slow sensors: whatever aids the estimate.
+    type Aids: Sampler + Send + 'static;
     /// Its links: `[BoardLink<R, T>; N]`.
     type Links: Links + 'static;
     /// Flash with two sectors for the parameters, from [`STORE`](Self::STORE) on.
@@ -56,6 +58,8 @@ pub struct Parts<B: Board> {
     pub board: B,
     /// What the sampling task uses.
     pub sampler: B::Sampler,
+    /// What the slow sensors' task uses.
+    pub aids: B::Aids,
     /// What the links' task uses.
     pub links: B::Links,
     /// Where the parameters are kept.

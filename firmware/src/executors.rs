@@ -21,6 +21,8 @@ pub mod priority {
     pub const CONTROL: u8 = 4 << 4;
     /// End of the motors' DMA transfer.
     pub const MOTOR_DMA: u8 = 6 << 4;
+    /// [`crate::samples`] of slow sensors, whose drivers may wait for their bus.
+    pub const AIDING: u8 = 7 << 4;
     /// [`crate::comms`].
     pub const COMMS: u8 = 8 << 4;
     /// [`crate::housekeeping`].
@@ -29,11 +31,12 @@ pub mod priority {
 
 static SAMPLING: InterruptExecutor = InterruptExecutor::new();
 static CONTROL: InterruptExecutor = InterruptExecutor::new();
+static AIDING: InterruptExecutor = InterruptExecutor::new();
 static COMMS: InterruptExecutor = InterruptExecutor::new();
 static HOUSEKEEPING: InterruptExecutor = InterruptExecutor::new();
 
-/// Interrupt lines of the tasks that are not needed in flight: the links', and housekeeping.
-static DISPENSABLE: [AtomicU16; 2] = [const { AtomicU16::new(u16::MAX) }; 2];
+/// Interrupt lines of the tasks without which a flight goes on: the links', housekeeping, and slow sensors'.
+static DISPENSABLE: [AtomicU16; 3] = [const { AtomicU16::new(u16::MAX) }; 3];
 
 /// True in a task that is not needed in flight.
 pub fn in_dispensable_task() -> bool {
@@ -48,6 +51,8 @@ pub fn in_dispensable_task() -> bool {
 pub struct Executors {
     /// None on a board without sensors.
     pub sampling: Option<SendSpawner>,
+    /// None on a board without slow sensors.
+    pub aiding: Option<SendSpawner>,
     pub control: SendSpawner,
     pub comms: SendSpawner,
     pub housekeeping: SendSpawner,
@@ -60,31 +65,45 @@ pub async fn spawner() -> Spawner {
     unsafe { Spawner::for_current_executor() }.await
 }
 
-/// Starts the executors on the lines of control, links and housekeeping and, if there is one, of sampling, and sets the
-/// time base's priority. To be called once.
+/// The interrupt lines of the executors, each named after the module whose tasks it takes.
+#[expect(missing_docs, reason = "as above")]
+pub struct Lines<I> {
+    pub control: I,
+    pub comms: I,
+    pub housekeeping: I,
+    /// None on a board without sensors.
+    pub sampling: Option<I>,
+    /// None on a board without slow sensors.
+    pub aiding: Option<I>,
+}
+
+/// Starts the executors and sets the time base's priority. To be called once.
 #[expect(unsafe_code, reason = "priorities are set by hand")]
-pub(crate) fn start<I: InterruptNumber>(
-    core: &mut cortex_m::Peripherals,
-    lines: [I; 3],
-    sampling: Option<I>,
-) -> Executors {
-    let [control, comms, housekeeping] = lines;
-    for (line, dispensable) in [comms, housekeeping].into_iter().zip(&DISPENSABLE) {
+pub(crate) fn start<I: InterruptNumber>(core: &mut cortex_m::Peripherals, lines: Lines<I>) -> Executors {
+    let Lines { control, comms, housekeeping, sampling, aiding } = lines;
+    for (line, dispensable) in [Some(comms), Some(housekeeping), aiding].into_iter().flatten().zip(&DISPENSABLE) {
         dispensable.store(line.number(), Ordering::Relaxed);
     }
+    let all = [
+        (sampling, priority::SAMPLING),
+        (Some(control), priority::CONTROL),
+        (aiding, priority::AIDING),
+        (Some(comms), priority::COMMS),
+        (Some(housekeeping), priority::HOUSEKEEPING),
+    ];
     // SAFETY: none of them runs yet, and no critical section relies on a priority.
     unsafe {
         core.SCB.set_priority(SystemHandler::SysTick, priority::TIME);
-        if let Some(sampling) = sampling {
-            core.NVIC.set_priority(sampling, priority::SAMPLING);
+        for (line, priority) in all {
+            if let Some(line) = line {
+                core.NVIC.set_priority(line, priority);
+            }
         }
-        core.NVIC.set_priority(control, priority::CONTROL);
-        core.NVIC.set_priority(comms, priority::COMMS);
-        core.NVIC.set_priority(housekeeping, priority::HOUSEKEEPING);
     }
     Executors {
         sampling: sampling.map(|line| SAMPLING.start(line)),
         control: CONTROL.start(control),
+        aiding: aiding.map(|line| AIDING.start(line)),
         comms: COMMS.start(comms),
         housekeeping: HOUSEKEEPING.start(housekeeping),
     }
@@ -108,6 +127,16 @@ pub unsafe fn on_control() {
 pub unsafe fn on_sampling() {
     // SAFETY: as for `on_control`.
     unsafe { SAMPLING.on_interrupt() }
+}
+
+/// Polls the executor of slow sensors.
+///
+/// # Safety
+/// As for [`on_control`].
+#[expect(unsafe_code, reason = "an executor must be polled from its own interrupt")]
+pub unsafe fn on_aiding() {
+    // SAFETY: as for `on_control`.
+    unsafe { AIDING.on_interrupt() }
 }
 
 /// Polls the links' executor.

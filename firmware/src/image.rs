@@ -3,14 +3,14 @@
 /// Builds an image for a type that implements [`Board`](crate::board::Board): the program's entry, the time base, the
 /// executors' interrupts and the tasks whose type depends on the board. The board handles panics and faults.
 ///
-/// `control`, `comms` and `housekeeping` name an interrupt line each that the board leaves unused, and so does
-/// `sampling` if it has sensors:
-/// `image!(board::Mine, control: LINE_A, comms: LINE_B, housekeeping: LINE_C, sampling: LINE_D)`.
+/// `control`, `comms` and `housekeeping` name an interrupt line each that the board leaves unused, and so do `sampling`
+/// if it has inertial sensors and `aiding` if it has slow ones:
+/// `image!(board::Mine, control: LINE_A, comms: LINE_B, housekeeping: LINE_C, sampling: LINE_D, aiding: LINE_E)`.
 #[macro_export]
 macro_rules! image {
     (
         $board:ty, control: $control:ident, comms: $comms:ident, housekeeping: $housekeeping:ident
-        $(, sampling: $sampling:ident)? $(,)?
+        $(, sampling: $sampling:ident)? $(, aiding: $aiding:ident)? $(,)?
     ) => {
         const _: () = assert!(
             $crate::vehicle::ROTORS <= <$board as $crate::board::Board>::OUTPUTS,
@@ -18,10 +18,11 @@ macro_rules! image {
         );
 
         const _: () = {
-            let lines: &[&str] = &[$(stringify!($sampling))?];
+            let (sampling, aiding): (&[&str], &[&str]) = (&[$(stringify!($sampling))?], &[$(stringify!($aiding))?]);
             assert!(
-                <<$board as $crate::board::Board>::Sampler as $crate::samples::Sampler>::SENSES != lines.is_empty(),
-                "a board with sensors, and no other, names an interrupt line for their executor: sampling"
+                <<$board as $crate::board::Board>::Sampler as $crate::samples::Sampler>::SENSES != sampling.is_empty()
+                    && <<$board as $crate::board::Board>::Aids as $crate::samples::Sampler>::SENSES != aiding.is_empty(),
+                "a board with sensors, and no other, names interrupt lines for their executors: sampling, aiding"
             )
         };
 
@@ -54,6 +55,21 @@ macro_rules! image {
         async fn start_sampling(sampler: <$board as $crate::board::Board>::Sampler) {
             let task = sampling(sampler).expect("spawned once");
             $crate::executors::spawner().await.spawn(task);
+        }
+
+        #[embassy_executor::task]
+        async fn aiding(aids: <$board as $crate::board::Board>::Aids) {
+            $crate::samples::Sampler::run(aids).await
+        }
+
+        #[embassy_executor::task]
+        async fn start_aiding(aids: <$board as $crate::board::Board>::Aids) {
+            let task = aiding(aids).expect("spawned once");
+            $crate::executors::spawner().await.spawn(task);
+        }
+
+        fn spawn_aiding(spawner: embassy_executor::SendSpawner, aids: <$board as $crate::board::Board>::Aids) {
+            spawner.spawn(start_aiding(aids).expect("spawned once"));
         }
 
         fn spawn_sampling(
@@ -111,6 +127,14 @@ macro_rules! image {
                 }
             )?
 
+            $(
+                #[unsafe(no_mangle)]
+                extern "C" fn $aiding() {
+                    // SAFETY: as above.
+                    unsafe { $crate::executors::on_aiding() }
+                }
+            )?
+
             #[unsafe(no_mangle)]
             extern "C" fn $comms() {
                 // SAFETY: as above.
@@ -128,9 +152,14 @@ macro_rules! image {
         fn main() -> ! {
             type Line = <$board as $crate::board::Board>::Interrupt;
             let core = cortex_m::Peripherals::take().expect("taken once");
-            let lines = [Line::$control, Line::$comms, Line::$housekeeping];
-            let sampling = None::<Line>$(.or(Some(Line::$sampling)))?;
-            $crate::run(core, lines, sampling, spawn_sampling, spawn_control, spawn_comms, spawn_parameters)
+            let lines = $crate::executors::Lines {
+                control: Line::$control,
+                comms: Line::$comms,
+                housekeeping: Line::$housekeeping,
+                sampling: None::<Line>$(.or(Some(Line::$sampling)))?,
+                aiding: None::<Line>$(.or(Some(Line::$aiding)))?,
+            };
+            $crate::run(core, lines, spawn_sampling, spawn_aiding, spawn_control, spawn_comms, spawn_parameters)
         }
     };
 }

@@ -17,9 +17,10 @@
 //! |---|---|---|
 //! | 1 | SysTick: the time base, starts the control tick | 1 us per millisecond |
 //! | 2 | the links: bytes to and from their rings | 1 us per byte |
-//! | 3 | [`samples`]: reading the sensors | |
+//! | 3 | [`samples`]: reading the inertial sensors | |
 //! | 4 | [`control`]: the control tick, then the motors' waveform | 50 us per millisecond |
 //! | 6 | end of the motors' DMA | 1 us per millisecond |
+//! | 7 | [`aux_sensors`]: reading the slow ones, whose drivers may wait for their bus | |
 //! | 8 | [`comms`]: the link's messages | |
 //! | 12 | [`housekeeping`]: logging, stack monitoring; [`parameters`]: writing to flash | |
 //!
@@ -42,20 +43,19 @@ pub mod vehicle;
 use board::{Board, Links as _, Parts, Transmitter as _};
 use embassy_executor::SendSpawner;
 
-/// Starts everything; the core then idles between interrupts. `lines` are the interrupt lines of the executors of
-/// control, links and housekeeping, `sampling` that of the sensors, if there are any; the functions start the tasks
-/// that use the board. [`image!`] defines all of them.
+/// Starts everything; the core then idles between interrupts. The functions start the tasks that use the board.
+/// [`image!`] defines all of them.
 pub fn run<B: Board>(
     mut core: cortex_m::Peripherals,
-    lines: [B::Interrupt; 3],
-    sampling: Option<B::Interrupt>,
+    lines: executors::Lines<B::Interrupt>,
     sample: impl FnOnce(SendSpawner, B::Sampler),
+    aid: impl FnOnce(SendSpawner, B::Aids),
     control: impl FnOnce(SendSpawner, &'static mut vehicle::Flight, B),
     comms: impl FnOnce(SendSpawner, &'static mut comms::Desk, B::Links),
     keeper: impl FnOnce(SendSpawner, parameters::Keeper<B::Memory>),
 ) -> ! {
-    let executors = executors::start(&mut core, lines, sampling);
-    let Parts { mut board, sampler, mut links, memory } = B::start(&mut core, executors.control);
+    let executors = executors::start(&mut core, lines);
+    let Parts { mut board, sampler, aids, mut links, memory } = B::start(&mut core, executors.control);
     let (kept, table) = parameters::read(memory, B::STORE);
     for link in links.each() {
         link.transmitter.set_baud(table.configuration().link.baud);
@@ -67,6 +67,9 @@ pub fn run<B: Board>(
     comms(executors.comms, desk, links);
     if let Some(spawner) = executors.sampling {
         sample(spawner, sampler);
+    }
+    if let Some(spawner) = executors.aiding {
+        aid(spawner, aids);
     }
     control(executors.control, flight, board);
     keeper(executors.housekeeping, kept);

@@ -14,7 +14,7 @@ use embassy_sync::pipe::Pipe;
 use embassy_sync::signal::Signal;
 use firmware::board::{self, Board, BoardLink, Parts};
 use firmware::housekeeping;
-use firmware::samples::{self, SampleTime, SampleValue};
+use firmware::samples::{self, NoSensors, SampleTime, SampleValue};
 use firmware::ticks::Tick;
 use firmware::vehicle::ROTORS;
 use semihosting::fs::File;
@@ -37,6 +37,7 @@ pub(crate) struct Emulated;
 impl Board for Emulated {
     type Interrupt = Interrupt;
     type Sampler = Sampler;
+    type Aids = NoSensors;
     type Links = [BoardLink<Receiver, Transmitter>; 1];
     /// In RAM: QEMU's flash cannot be written, and every flight begins with the image's parameters.
     type Memory = Ram<1024>;
@@ -55,6 +56,7 @@ impl Board for Emulated {
         Parts {
             board: Emulated,
             sampler: Sampler,
+            aids: NoSensors,
             links: [BoardLink { receiver: Receiver, transmitter }],
             memory: Ram::BLANK,
         }

@@ -49,6 +49,7 @@ pub(crate) struct Stm32f405 {
 impl Board for Stm32f405 {
     type Interrupt = pac::Interrupt;
     type Sampler = NoSensors;
+    type Aids = NoSensors;
     type Links = [BoardLink<Receiver, Transmitter>; 1];
     type Memory = Bank1Region1<'static, Blocking>;
     const CORE_HZ: u32 = clocks::CORE_HZ;
@@ -76,6 +77,7 @@ impl Board for Stm32f405 {
         Parts {
             board,
             sampler: NoSensors,
+            aids: NoSensors,
             links: [link],
             memory: Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
         }

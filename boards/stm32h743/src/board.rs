@@ -15,9 +15,10 @@
 //! | compass | QMC5883L on I2C1, outside: SCL on PB6, SDA on PB7 |
 //! | GNSS receiver | NMEA on USART2, outside: TX on PD5, RX on PD6 |
 
-use crate::sensors::Sensors;
+use crate::sensors::{Aids, Imus};
+use afbc_drivers::dps310::Dps310;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
-use afbc_drivers::{Driver, Part, SpiRegisters};
+use afbc_drivers::{Driver, I2cRegisters, Part, SpiRegisters};
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{CHANNELS, Motors, Throttles, hold_low};
 use chip_stm32::sensors::{Device, Polled};
@@ -25,9 +26,11 @@ use chip_stm32::{crystal, faults, watchdog};
 use chip_stm32h7::flash::Words;
 use chip_stm32h7::{clocks, reset};
 use embassy_executor::SendSpawner;
-use embassy_stm32::interrupt::{self, InterruptExt, Priority};
+use embassy_stm32::i2c::{self, I2c};
+use embassy_stm32::interrupt::{self, Interrupt, InterruptExt, Priority};
 use embassy_stm32::peripherals::{
-    DMA1_CH0, DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, IWDG1, TIM4, TIM5, UART7, USART1, USART2,
+    DMA1_CH0, DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA2_CH0, DMA2_CH1, I2C2, IWDG1, TIM4, TIM5, UART7,
+    USART1, USART2,
 };
 use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{self, BufferedUart};
@@ -40,15 +43,13 @@ use static_cell::StaticCell;
 
 /// The crystal \[Hz\].
 const CRYSTAL_HZ: u32 = 8_000_000;
-/// Clock of the IMUs' buses \[Hz\]; the parts allow 24 MHz.
-const SPI_HZ: u32 = 10_000_000;
-/// Interrupts at the end of the sensors' transfers.
-const SENSOR_DMA: [interrupt::Interrupt; 4] = [
-    interrupt::Interrupt::DMA1_STREAM2,
-    interrupt::Interrupt::DMA1_STREAM3,
-    interrupt::Interrupt::DMA1_STREAM4,
-    interrupt::Interrupt::DMA1_STREAM5,
-];
+/// Clock of the IMUs' buses \[Hz\], an eighth of their kernel's; the parts allow 24 MHz.
+const SPI_HZ: u32 = 12_500_000;
+/// Interrupts of the sensors' transfers.
+const IMU_INTERRUPTS: [Interrupt; 4] =
+    [Interrupt::DMA1_STREAM2, Interrupt::DMA1_STREAM3, Interrupt::DMA1_STREAM4, Interrupt::DMA1_STREAM5];
+const AID_INTERRUPTS: [Interrupt; 4] =
+    [Interrupt::DMA2_STREAM0, Interrupt::DMA2_STREAM1, Interrupt::I2C2_EV, Interrupt::I2C2_ER];
 /// Motors: the channels of two timers.
 const OUTPUTS: usize = 2 * CHANNELS;
 
@@ -62,6 +63,10 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM3 => dma::InterruptHandler<DMA1_CH3>;
     DMA1_STREAM4 => dma::InterruptHandler<DMA1_CH4>;
     DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
+    DMA2_STREAM0 => dma::InterruptHandler<DMA2_CH0>;
+    DMA2_STREAM1 => dma::InterruptHandler<DMA2_CH1>;
+    I2C2_EV => i2c::EventInterruptHandler<I2C2>;
+    I2C2_ER => i2c::ErrorInterruptHandler<I2C2>;
 });
 
 /// Ring buffers of the links and of the GNSS receiver.
@@ -83,7 +88,8 @@ pub(crate) struct Stm32h743 {
 
 impl Board for Stm32h743 {
     type Interrupt = pac::Interrupt;
-    type Sampler = Sensors;
+    type Sampler = Imus;
+    type Aids = Aids;
     type Links = [BoardLink<Receiver, Transmitter>; 2];
     type Memory = Words;
     const CORE_HZ: u32 = clocks::CORE_HZ;
@@ -106,13 +112,21 @@ impl Board for Stm32h743 {
         let first = Spi::new(p.SPI1, p.PA5, p.PD7, p.PA6, p.DMA1_CH3, p.DMA1_CH2, Irqs, config);
         let second = Spi::new(p.SPI4, p.PE12, p.PE14, p.PE13, p.DMA1_CH5, p.DMA1_CH4, Irqs, config);
         let receiver = BufferedUart::new(p.USART2, p.PD6, p.PD5, tx3, rx3, Irqs, usart::Config::default());
-        let sensors = Sensors {
+        let config = chip_stm32::sensors::i2c();
+        let inside = I2c::new(p.I2C2, p.PB10, p.PB11, p.DMA2_CH0, p.DMA2_CH1, Irqs, config);
+        let sampler = Imus {
             first: imu(Icm42688p {}, Device::new(first, p.PC15)),
             second: imu(Icm42605 {}, Device::new(second, p.PC13)),
+        };
+        let aids = Aids {
+            barometer: Driver::new(Dps310::default(), I2cRegisters::new(inside, 0x76), Polled),
             receiver: receiver.expect("the baud rate divides the clock"),
         };
-        for line in SENSOR_DMA {
+        for line in IMU_INTERRUPTS {
             line.set_priority(Priority::from(priority::SAMPLING));
+        }
+        for line in AID_INTERRUPTS {
+            line.set_priority(Priority::from(priority::AIDING));
         }
         interrupt::USART2.set_priority(Priority::from(priority::UART));
 
@@ -126,7 +140,7 @@ impl Board for Stm32h743 {
         // A debugger that halts the core halts the watchdog.
         pac::DBGMCU.apb4fzr1().modify(|freeze| freeze.set_iwdg1(true));
         let board = Stm32h743 { watchdog: watchdog(p.IWDG1) };
-        Parts { board, sampler: sensors, links, memory: Words::new(p.FLASH) }
+        Parts { board, sampler, aids, links, memory: Words::new(p.FLASH) }
     }
 
     fn unleash_watchdog(&mut self) {

@@ -7,6 +7,9 @@ mod sensors;
 
 use defmt_rtt as _;
 
-// The interrupt lines of the display controller, of HDMI and of the JPEG codec, which this firmware does not need.
-firmware::image!(board::Stm32h743, control: LTDC, comms: LTDC_ER, housekeeping: CEC, sampling: JPEG);
+// The interrupt lines of the display controller, of HDMI, of the JPEG codec and of the camera, which this firmware does
+// not need.
+firmware::image!(
+    board::Stm32h743, control: LTDC, comms: LTDC_ER, housekeeping: CEC, sampling: JPEG, aiding: DCMI
+);
 chip_stm32::faults!(board::stop_motors);

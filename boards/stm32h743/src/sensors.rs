@@ -1,12 +1,16 @@
 //! The sensors of the Matek H743. Both IMUs face down; their axes, and the compass's, are turned to the body's (x
 //! forward, y left, z up) here.
 
+use afbc_drivers::dps310::Dps310;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
-use afbc_drivers::{Driver, InertialReading, SpiRegisters};
+use afbc_drivers::{Driver, I2cRegisters, InertialReading, SpiRegisters};
 use chip_stm32::receiver;
 use chip_stm32::sensors::{Device, Polled, run};
-use embassy_futures::join::join3;
+use embassy_futures::join::join;
+use embassy_stm32::i2c::{I2c, Master};
+use embassy_stm32::mode::Async;
 use embassy_stm32::usart::BufferedUart;
+use firmware::samples::Sampler;
 use firmware::{aux_sensors, samples};
 use nalgebra::{Matrix3, Vector3};
 
@@ -15,19 +19,20 @@ const FIRST: Matrix3<f32> = Matrix3::new(-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
 /// From the second IMU's axes, turned by 270 degrees.
 const SECOND: Matrix3<f32> = Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0);
 
-/// The sensors.
-pub(crate) struct Sensors {
+/// A bus of sensors.
+type Bus = I2c<'static, Async, Master>;
+
+/// The inertial sensors.
+pub(crate) struct Imus {
     pub(crate) first: Driver<Icm42688p<true>, SpiRegisters<Device>, Polled>,
     pub(crate) second: Driver<Icm42605<true>, SpiRegisters<Device>, Polled>,
-    pub(crate) receiver: BufferedUart<'static>,
 }
 
-impl samples::Sampler for Sensors {
+impl Sampler for Imus {
     async fn run(self) {
-        join3(
+        join(
             run(self.first, |reading| samples::put_first_imu(reading.at_us, turned(&reading.value, &FIRST))),
             run(self.second, |reading| samples::put_second_imu(reading.at_us, turned(&reading.value, &SECOND))),
-            receiver::run(self.receiver, aux_sensors::put_fix),
         )
         .await;
     }
@@ -36,4 +41,20 @@ impl samples::Sampler for Sensors {
 /// Returns rates and specific force in the body's axes.
 fn turned(reading: &InertialReading, to_body: &Matrix3<f32>) -> [Vector3<f32>; 2] {
     [reading.rates_rad_s, reading.specific_force_m_s2].map(|value| to_body * value)
+}
+
+/// The slow sensors.
+pub(crate) struct Aids {
+    pub(crate) barometer: Driver<Dps310, I2cRegisters<Bus>, Polled>,
+    pub(crate) receiver: BufferedUart<'static>,
+}
+
+impl Sampler for Aids {
+    async fn run(self) {
+        join(
+            run(self.barometer, |reading| aux_sensors::put_pressure(&reading)),
+            receiver::run(self.receiver, aux_sensors::put_fix),
+        )
+        .await;
+    }
 }

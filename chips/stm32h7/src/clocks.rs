@@ -37,7 +37,7 @@ pub fn start<const CRYSTAL_HZ: u32>(scb: &mut SCB) -> Peripherals {
     peripherals
 }
 
-/// 400 MHz; buses at 200 MHz, peripherals' at 100, timers at 200.
+/// 400 MHz; buses at 200 MHz, peripherals' and SPI at 100, timers at 200.
 fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
     let source = if crystal { PllSource::HSE } else { PllSource::HSI };
     let prediv = if crystal { PllPreDiv::from_bits((CRYSTAL_HZ / PLL_INPUT_HZ) as u8) } else { PllPreDiv::DIV16 };
@@ -51,7 +51,7 @@ fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
         mul: PllMul::MUL200,
         fracn: None,
         divp: Some(PllDiv::DIV2),
-        divq: None,
+        divq: Some(PllDiv::DIV8),
         divr: None,
     });
     rcc.sys = Sysclk::PLL1_P;

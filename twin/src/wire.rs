@@ -1,0 +1,47 @@
+//! Both ends of the telemetry UART.
+
+use rigless::chip::Timeline;
+use rigless::chip::uart::Peer;
+use rigless::snapshot::Store;
+use rigless::time::VirtualNanos;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex};
+
+/// What is on its way, to and from the board.
+#[derive(Debug, Default)]
+struct Bytes {
+    to_board: VecDeque<u8>,
+    from_board: Vec<u8>,
+}
+
+/// A wire, whose bytes move at the pace of the board's UART. Clones are the same wire.
+#[derive(Clone, Debug, Default)]
+pub struct Telemetry(Arc<Mutex<Bytes>>);
+
+impl Telemetry {
+    fn with<T>(&self, change: impl FnOnce(&mut Bytes) -> T) -> T {
+        change(&mut self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
+    }
+
+    /// Sends bytes to the board.
+    pub fn send(&self, bytes: &[u8]) {
+        self.with(|wire| wire.to_board.extend(bytes));
+    }
+
+    /// Takes what the board has sent.
+    pub fn take(&self) -> Vec<u8> {
+        self.with(|wire| std::mem::take(&mut wire.from_board))
+    }
+}
+
+impl Store for Telemetry {}
+
+impl Peer for Telemetry {
+    fn receive(&mut self, word: u16, _: &mut Timeline<'_, '_>) {
+        self.with(|wire| wire.from_board.push(word as u8));
+    }
+
+    fn transmit(&mut self, _: VirtualNanos) -> Option<u16> {
+        self.with(|wire| wire.to_board.pop_front()).map(u16::from)
+    }
+}

@@ -1,0 +1,69 @@
+//! The plant with its instruments, as the board's transducers feel it.
+
+use afbc_estimator::{Measurement, Origin};
+use afbc_onboard::Readings;
+use nalgebra::Vector3;
+use rigless::chip::nmea::Position;
+use rigless::machine::flight::{AT_REST, Signals};
+
+/// Where the local frame's origin is: PX4's usual place near Zurich \[degrees, m\].
+const PLACE: [f64; 3] = [47.397_742, 8.545_594, 488.0];
+/// The standard atmosphere's, of which the barometer's driver makes a height.
+const SEA_LEVEL_PA: f64 = 101_325.0;
+const GRAVITY_M_S2: f64 = 9.806_65;
+
+/// Keeps what the transducers feel between two readings of an instrument.
+pub struct Transducers {
+    signals: Signals,
+    /// Metres per ten-millionth of a degree to the north and to the east.
+    scale: [f64; 2],
+}
+
+impl Transducers {
+    pub fn new() -> Self {
+        let [latitude, longitude, altitude] = PLACE;
+        let origin = Origin::new(latitude, longitude, altitude).expect("a place");
+        let step = origin.local(latitude + 1e-3, longitude + 1e-3, altitude) * 1e-4;
+        Transducers { signals: AT_REST, scale: [step.x.into(), (-step.y).into()] }
+    }
+
+    /// Returns what the transducers feel when the instruments read this.
+    pub fn feel(&mut self, readings: &Readings) -> Signals {
+        if let Some(imu) = &readings.imu {
+            let [rates, force] = imu.value.map(frd);
+            self.signals.angular_rate = rates.map(|rate| (rate.to_degrees() * 1e3).round() as i32);
+            self.signals.specific_force = force.map(|force| (force / GRAVITY_M_S2 * 1e6).round() as i32);
+        }
+        for aid in readings.aids.iter().flatten() {
+            match aid.value {
+                Measurement::Height { height_m, .. } => {
+                    let height_m = f64::from(height_m) + PLACE[2];
+                    let pressure_pa = SEA_LEVEL_PA * (1.0 - height_m / 44_330.77).powf(1.0 / 0.190_263_2);
+                    self.signals.pressure = pressure_pa.round() as u32;
+                }
+                // In units of the earth's field near Zurich \[nT\].
+                Measurement::MagneticField { field, .. } => {
+                    self.signals.magnetic_field = frd(field).map(|field| (field * 1e3).round() as i32);
+                }
+                Measurement::Gnss { position_m, velocity_m_s, .. } => {
+                    let [north, down] = [position_m.x, -position_m.z].map(f64::from);
+                    let east = f64::from(-position_m.y);
+                    let [latitude, longitude, altitude] = PLACE;
+                    self.signals.position = Position {
+                        latitude: (latitude * 1e7 + north / self.scale[0]).round() as i32,
+                        longitude: (longitude * 1e7 + east / self.scale[1]).round() as i32,
+                        altitude: ((altitude - down) * 1e3).round() as i32,
+                    };
+                    self.signals.velocity = frd(velocity_m_s).map(|speed| (speed * 1e3).round() as i32);
+                }
+                _ => {}
+            }
+        }
+        self.signals
+    }
+}
+
+/// Returns a vector with y right (east) and z down.
+fn frd(vector: Vector3<f32>) -> [f64; 3] {
+    [vector.x.into(), (-vector.y).into(), (-vector.z).into()]
+}
