@@ -20,6 +20,7 @@
 //! |---|---|
 //! | IMU | [`icm426xx`] |
 //! | barometer | [`dps310`] |
+//! | magnetometer | [`qmc5883l`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -28,6 +29,7 @@ pub mod dps310;
 mod driver;
 pub mod icm426xx;
 mod part;
+pub mod qmc5883l;
 mod reading;
 
 pub use bus::{BusError, I2cRegisters, Registers, SpiFormat, SpiRegisters};
