@@ -19,7 +19,7 @@
 //! | what | parts |
 //! |---|---|
 //! | IMU | [`icm426xx`] |
-//! | barometer | [`dps310`] |
+//! | barometer | [`dps310`], [`ms5611`] |
 //! | magnetometer | [`qmc5883l`] |
 #![no_std]
 #![forbid(unsafe_code)]
@@ -28,6 +28,7 @@ mod bus;
 pub mod dps310;
 mod driver;
 pub mod icm426xx;
+pub mod ms5611;
 mod part;
 pub mod qmc5883l;
 mod reading;
