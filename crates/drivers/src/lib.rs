@@ -19,11 +19,12 @@
 //! | what | parts |
 //! |---|---|
 //! | IMU | [`icm426xx`] |
-//! | barometer | [`dps310`], [`ms5611`] |
+//! | barometer | [`bmp3`], [`dps310`], [`ms5611`] |
 //! | magnetometer | [`qmc5883l`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod bmp3;
 mod bus;
 pub mod dps310;
 mod driver;
