@@ -20,7 +20,7 @@
 //! |---|---|
 //! | IMU | [`icm426xx`] |
 //! | barometer | [`bmp3`], [`dps310`], [`ms5611`] |
-//! | magnetometer | [`qmc5883l`] |
+//! | magnetometer | [`ist8310`], [`lis3mdl`], [`qmc5883l`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -29,6 +29,8 @@ mod bus;
 pub mod dps310;
 mod driver;
 pub mod icm426xx;
+pub mod ist8310;
+pub mod lis3mdl;
 pub mod ms5611;
 mod part;
 pub mod qmc5883l;
