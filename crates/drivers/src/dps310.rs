@@ -1,9 +1,9 @@
-//! Infineon DPS310 (data sheet V1.2) and Goertek SPL06-001, by SPI or I2C. Both have the same core and say that they are
-//! the same part, so a board has to know which one it has.
+//! Infineon DPS310 (data sheet V1.2) and Goertek SPL06-001, by SPI or I2C. Both have the same core and the same
+//! identity, so a board has to know which one it has.
 //!
 //! 300 to 1200 hPa and -40 to 85 degrees C. Pressure at 32 Hz, each the mean of 16 samples (about 0.35 Pa rms);
-//! temperature at 8 Hz, of 4 samples: 0.95 s of measuring a second, within the 1 s of section 4.4. No filter beyond that
-//! mean. The interrupt is not used, the ready flag is. The coefficients have no checksum, so they are read twice.
+//! temperature at 8 Hz, of 4 samples: 0.95 s of measuring a second, within the 1 s of section 4.4. No filter beyond
+//! that mean. The interrupt is not used, the ready flag is. The coefficients have no checksum, so they are read twice.
 //!
 //! | | DPS310 | SPL06-001 |
 //! |---|---|---|

@@ -21,15 +21,22 @@
 //! | IMU | [`icm426xx`] |
 //! | GNSS receiver | [`nmea`] |
 //! | barometer | [`dps310`] |
+//! | barometer | [`bmp3`], [`dps310`], [`ms5611`] |
+//! | magnetometer | [`ist8310`], [`lis3mdl`], [`qmc5883l`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod bmp3;
 mod bus;
 pub mod dps310;
 mod driver;
 pub mod icm426xx;
 pub mod nmea;
+pub mod ist8310;
+pub mod lis3mdl;
+pub mod ms5611;
 mod part;
+pub mod qmc5883l;
 mod reading;
 
 pub use bus::{BusError, I2cRegisters, Registers, SpiFormat, SpiRegisters};

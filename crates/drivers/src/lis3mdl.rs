@@ -1,0 +1,56 @@
+//! ST LIS3MDL, by SPI or I2C (DS9463).
+//!
+//! +-4 gauss (400 uT) at 80 Hz in ultra-high-performance mode, the quietest. Its temperature is not used, nor is DRDY:
+//! the flag of its register is. A field beyond the range is a fault ([`Fault::Range`]).
+
+use crate::bus::SpiFormat;
+use crate::part::{Fault, Part, Step};
+use crate::reading::{MagneticReading, little};
+
+/// The part.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Lis3mdl;
+
+const WHO_AM_I: u8 = 0x0F;
+const CTRL_REG1: u8 = 0x20;
+const CTRL_REG2: u8 = 0x21;
+const CTRL_REG3: u8 = 0x22;
+const CTRL_REG4: u8 = 0x23;
+const CTRL_REG5: u8 = 0x24;
+const STATUS_REG: u8 = 0x27;
+const OUT_X_L: u8 = 0x28;
+
+/// Makes I2C count the address up; on SPI it is the bit of a read, which is set anyway.
+const INCREMENT: u8 = 0x80;
+const SOFT_RST: u8 = 0x04;
+const ZYXDA: u8 = 0x08;
+const UT_PER_LSB: f32 = 100.0 / 6842.0;
+const RANGE_UT: f32 = 400.0;
+
+impl Part for Lis3mdl {
+    type Reading = MagneticReading;
+    const NAME: &'static str = "LIS3MDL";
+    const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0xC0, write: 0x40, dummies: 0, clock_hz: 10_000_000 });
+    const I2C: &'static [u8] = &[0x1E, 0x1C];
+    const STUCK_AFTER: u32 = 20;
+    const SETUP: &'static [Step] = &[
+        Step::Write(CTRL_REG2, SOFT_RST),
+        Step::Wait(10_000),
+        Step::Identify(WHO_AM_I, &[0x3D]),
+        Step::Set(CTRL_REG1, 0b0111_1100), // x and y ultra-high-performance, 80 Hz
+        Step::Set(CTRL_REG2, 0b0000_0000), // 4 gauss
+        Step::Set(CTRL_REG4, 0b0000_1100), // z ultra-high-performance, low byte first
+        Step::Set(CTRL_REG5, 0b0100_0000), // bytes of one measurement
+        Step::Set(CTRL_REG3, 0b0000_0000), // continuous
+    ];
+    const CYCLE: &'static [Step] =
+        &[Step::Wait(10_000), Step::Await(STATUS_REG, ZYXDA, ZYXDA, 15), Step::Read(OUT_X_L | INCREMENT, 6)];
+
+    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<MagneticReading>, Fault> {
+        let field_ut = little(answer.try_into().map_err(|_| Fault::Bus)?) * UT_PER_LSB;
+        if field_ut.amax() > RANGE_UT {
+            return Err(Fault::Range);
+        }
+        Ok(Some(MagneticReading { field_ut }))
+    }
+}

@@ -1,0 +1,146 @@
+//! TE Connectivity MS5611-01BA03, by SPI or I2C (ENG_DS_MS5611-01BA03_B3).
+//!
+//! 10 to 1200 mbar and -40 to 85 degrees C, some 50 times a second: a temperature and a pressure, each of 4096 samples
+//! (1.2 Pa rms), with the second-order compensation of cold. It has no interrupt, no identity and no registers, only
+//! commands. Its PROM has a CRC-4, and the word with it is read in each cycle: after a reset that nobody asked for it
+//! reads differently. A MS5607 has the same commands, but reads a quite different pressure.
+
+use crate::bus::SpiFormat;
+use crate::part::{Fault, Part, Step};
+use crate::reading::{PressureReading, in_range};
+
+/// The part.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ms5611 {
+    prom: [u16; 8],
+    /// C1 to C6 of a PROM whose CRC is right.
+    coefficients: Option<[i64; 6]>,
+    /// This cycle's D2.
+    d2: Option<i64>,
+}
+
+// Commands.
+const ADC_READ: u8 = 0x00;
+const RESET: u8 = 0x1E;
+const CONVERT_D1_4096: u8 = 0x48;
+const CONVERT_D2_4096: u8 = 0x58;
+const PROM_READ: u8 = 0xA0;
+const PROM_READ_LAST: u8 = 0xAE;
+
+/// Longest conversion of 4096 samples, 9.04 ms, and a clock's error \[us\].
+const CONVERSION_US: u32 = 9_300;
+const RANGE_PA: [f32; 2] = [1_000.0, 120_000.0];
+const RANGE_C: [f32; 2] = [-40.0, 85.0];
+
+impl Part for Ms5611 {
+    type Reading = PressureReading;
+    const NAME: &'static str = "MS5611";
+    const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0, write: 0, dummies: 0, clock_hz: 20_000_000 });
+    const I2C: &'static [u8] = &[0x77, 0x76];
+    const STUCK_AFTER: u32 = 20;
+    const SETUP: &'static [Step] = &[
+        Step::Wait(CONVERSION_US), // a conversion may be under way
+        Step::WriteAll(RESET, &[]),
+        Step::Wait(5_000), // it reloads its PROM in 2.8 ms
+        Step::Read(PROM_READ, 2),
+        Step::Read(PROM_READ + 2, 2),
+        Step::Read(PROM_READ + 4, 2),
+        Step::Read(PROM_READ + 6, 2),
+        Step::Read(PROM_READ + 8, 2),
+        Step::Read(PROM_READ + 10, 2),
+        Step::Read(PROM_READ + 12, 2),
+        Step::Read(PROM_READ_LAST, 2),
+    ];
+    const CYCLE: &'static [Step] = &[
+        Step::Read(PROM_READ_LAST, 2),
+        Step::WriteAll(CONVERT_D2_4096, &[]),
+        Step::Wait(CONVERSION_US),
+        Step::Read(ADC_READ, 3),
+        Step::WriteAll(CONVERT_D1_4096, &[]),
+        Step::Wait(CONVERSION_US),
+        Step::Read(ADC_READ, 3),
+    ];
+
+    fn take(&mut self, command: u8, answer: &[u8]) -> Result<Option<PressureReading>, Fault> {
+        match *answer {
+            [high, low] => self.take_prom(command, u16::from_be_bytes([high, low])).map(|()| None),
+            [high, middle, low] => self.take_adc(i64::from(u32::from_be_bytes([0, high, middle, low]))),
+            _ => Err(Fault::Bus),
+        }
+    }
+}
+
+impl Ms5611 {
+    fn take_prom(&mut self, command: u8, value: u16) -> Result<(), Fault> {
+        self.d2 = None;
+        let at = usize::from(command.wrapping_sub(PROM_READ) / 2);
+        let word = self.prom.get_mut(at).ok_or(Fault::Bus)?;
+        let is_known = self.coefficients.is_some();
+        match command {
+            PROM_READ_LAST if is_known && *word == value => return Ok(()),
+            PROM_READ_LAST if is_known => return Err(Fault::Calibration),
+            PROM_READ => self.coefficients = None, // set up again
+            _ => (),
+        }
+        *word = value;
+        if command == PROM_READ_LAST {
+            self.coefficients = Some(coefficients(self.prom)?);
+        }
+        Ok(())
+    }
+
+    fn take_adc(&mut self, value: i64) -> Result<Option<PressureReading>, Fault> {
+        let coefficients = self.coefficients.ok_or(Fault::Calibration)?;
+        // What an interrupted or missing conversion gives.
+        if value == 0 {
+            return Err(Fault::Silent);
+        }
+        let Some(d2) = self.d2.take() else {
+            self.d2 = Some(value);
+            return Ok(None);
+        };
+        in_range(compensate(coefficients, value, d2), RANGE_PA, RANGE_C)
+    }
+}
+
+/// Returns C1 to C6 of a sound PROM.
+fn coefficients(prom: [u16; 8]) -> Result<[i64; 6], Fault> {
+    let [first, c1, c2, c3, c4, c5, c6, last] = prom;
+    if prom.iter().all(|&word| word == 0) || prom.iter().all(|&word| word == 0xFFFF) {
+        return Err(Fault::Silent);
+    }
+    let mut remainder = 0;
+    for byte in [first, c1, c2, c3, c4, c5, c6, last & 0xFF00].into_iter().flat_map(u16::to_be_bytes) {
+        remainder = (0..8).fold(remainder ^ u16::from(byte), |remainder: u16, _| {
+            remainder << 1 ^ if remainder & 0x8000 == 0 { 0 } else { 0x3000 }
+        });
+    }
+    if remainder >> 12 != last & 0xF || [c1, c2, c3, c4, c5, c6].contains(&0) {
+        return Err(Fault::Calibration);
+    }
+    Ok([c1, c2, c3, c4, c5, c6].map(i64::from))
+}
+
+/// The data sheet's figures 2 and 3, in the whole numbers that they are in.
+fn compensate([c1, c2, c3, c4, c5, c6]: [i64; 6], d1: i64, d2: i64) -> PressureReading {
+    let dt = d2 - (c5 << 8);
+    let mut temp = 2_000 + ((dt * c6) >> 23);
+    let mut off = (c2 << 16) + ((c4 * dt) >> 7);
+    let mut sens = (c1 << 15) + ((c3 * dt) >> 8);
+    if temp < 2_000 {
+        let below_20_c = (temp - 2_000).pow(2);
+        off -= (5 * below_20_c) >> 1;
+        sens -= (5 * below_20_c) >> 2;
+        if temp < -1_500 {
+            let below_minus_15_c = (temp + 1_500).pow(2);
+            off -= 7 * below_minus_15_c;
+            sens -= (11 * below_minus_15_c) >> 1;
+        }
+        temp -= (dt * dt) >> 31;
+    }
+    PressureReading {
+        // The data sheet cuts it to whole pascals.
+        pressure_pa: (((d1 * sens) >> 21) - off) as f32 / 32_768.0,
+        temperature_c: temp as f32 / 100.0,
+    }
+}

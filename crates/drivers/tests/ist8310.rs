@@ -1,0 +1,149 @@
+//! IST8310 against its registers, as its data sheet has them.
+#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
+
+mod rig;
+
+use afbc_drivers::ist8310::Ist8310;
+use afbc_drivers::{Fault, MagneticReading};
+use nalgebra::Vector3;
+use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
+
+/// Forward, right, down.
+const FIELD_UT: [f64; 3] = [22.0, -3.0, 42.0];
+
+struct Registers {
+    identity: u8,
+    registers: [u8; 128],
+    up_us: u64,
+    /// When the measurement under way is complete.
+    done_us: Option<u64>,
+    data: [u8; 6],
+    is_ready: bool,
+    field_ut: [f64; 3],
+}
+
+impl Registers {
+    fn new() -> Self {
+        let (data, field_ut) = ([0; 6], FIELD_UT);
+        let mut part =
+            Registers { identity: 0x10, registers: [0; 128], up_us: 0, done_us: None, data, is_ready: false, field_ut };
+        part.reset(0);
+        part
+    }
+
+    fn measure(&mut self, now_us: u64) {
+        let Some(done_us) = self.done_us.filter(|done_us| *done_us <= now_us) else { return };
+        (self.done_us, self.is_ready) = (None, true);
+        let [x, y, down] = self.field_ut;
+        let averages = [self.registers[0x41] & 7, self.registers[0x41] >> 3 & 7, self.registers[0x41] & 7];
+        for (axis, ut) in [x, y, -down].into_iter().enumerate() {
+            let lsb_per_ut = if self.registers[0x0D] & (0x10 << axis) == 0 { 3.3 } else { 13.2 };
+            // With fewer samples it is noisier, and with other pulses wrong.
+            let noise_ut = 0.2 * f64::from(1 << (4 - averages[axis])) * noise(done_us, axis as u64);
+            let gain = if self.registers[0x42] & 0xC0 == 0xC0 { 1.0 } else { 0.9 };
+            let lsb = ((gain * ut + noise_ut) * lsb_per_ut).round().clamp(-32768.0, 32767.0) as i16;
+            self.data[2 * axis..2 * axis + 2].copy_from_slice(&lsb.to_le_bytes());
+        }
+    }
+}
+
+impl Model for Registers {
+    fn read(&mut self, now_us: u64, register: u8, into: &mut [u8]) {
+        self.measure(now_us);
+        for (register, byte) in (usize::from(register)..).zip(into) {
+            *byte = match register {
+                0x0B if now_us < self.up_us => 1,
+                _ if now_us < self.up_us => 0,
+                0x00 => self.identity,
+                0x02 => u8::from(self.is_ready),
+                0x03..=0x08 => {
+                    self.is_ready = false;
+                    self.data[register - 0x03]
+                }
+                _ => self.registers[register],
+            };
+        }
+    }
+
+    fn write(&mut self, now_us: u64, register: u8, bytes: &[u8]) {
+        self.measure(now_us);
+        for (register, &byte) in (usize::from(register)..).zip(bytes) {
+            match register {
+                _ if now_us < self.up_us => (),
+                0x0A if byte & 0xF == 1 => {
+                    // 16 samples at most 166 times a second.
+                    let samples = 1_u64 << (self.registers[0x41] & 7).max(self.registers[0x41] >> 3 & 7);
+                    self.done_us = Some(now_us + 1_000 + 312 * samples);
+                }
+                0x0B if byte & 1 != 0 => self.reset(now_us),
+                0x0A | 0x0B | 0x0D | 0x41 | 0x42 => self.registers[register] = byte,
+                _ => panic!("writes to {register:#x}"),
+            }
+        }
+    }
+
+    fn reset(&mut self, now_us: u64) {
+        self.registers = [0; 128];
+        // Bits that are nobody's, and those of a reset.
+        (self.registers[0x0D], self.registers[0x42]) = (0x02, 0x41);
+        (self.up_us, self.done_us, self.is_ready) = (now_us + 15_000, None, false);
+    }
+}
+
+fn is_field(reading: &MagneticReading, field_ut: [f64; 3]) -> bool {
+    (reading.field_ut - Vector3::from(field_ut.map(|ut| ut as f32))).amax() < 0.3
+}
+
+fn right(reading: &MagneticReading) -> bool {
+    is_field(reading, FIELD_UT)
+}
+
+#[test]
+fn every_fault_is_noticed_and_survived() {
+    // After a reset it measures on, worse: its registers tell, of which one is read every 16 cycles.
+    survives_all_troubles(|| Ist8310, Registers::new, false, 1_500_000, right);
+}
+
+#[test]
+fn after_a_reset_it_soon_measures_as_before() {
+    let rig = Rig::new(Registers::new());
+    let mut driver = rig.driver(Ist8310);
+    let _ = run(&mut driver, &rig, 500_000);
+    rig.set(rig::Trouble::Reset);
+    let (_, faults) = run(&mut driver, &rig, 2_000_000);
+    assert!(faults.iter().any(|fault| matches!(fault, Fault::Register(_))), "{faults:?}");
+    let (readings, faults) = run(&mut driver, &rig, 2_000_000);
+    assert!(faults.is_empty() && readings.iter().all(|reading| right(&reading.value)), "{faults:?}");
+}
+
+#[test]
+fn another_part_is_named() {
+    refuses_another(Ist8310, Registers { identity: 0x08, ..Registers::new() }, 0x08);
+}
+
+#[test]
+fn there_are_some_95_readings_a_second() {
+    let rig = Rig::new(Registers::new());
+    let mut driver = rig.driver(Ist8310);
+    let _ = run(&mut driver, &rig, 100_000);
+    let (readings, faults) = run(&mut driver, &rig, 10_000_000);
+    assert!(faults.is_empty() && (950..=1_000).contains(&readings.len()), "{} readings, {faults:?}", readings.len());
+}
+
+#[test]
+fn fields_of_the_whole_range_are_read_and_none_beyond() {
+    let rig = Rig::new(Registers::new());
+    let mut driver = rig.driver(Ist8310);
+    for field_ut in [[1_599.0, -1_599.0, 2_479.0], [-1_599.0, 1_599.0, -2_479.0], [0.5, -0.5, 1.0]] {
+        rig.with(|part| part.field_ut = field_ut);
+        let _ = run(&mut driver, &rig, 100_000);
+        let (readings, faults) = run(&mut driver, &rig, 200_000);
+        assert!(faults.is_empty() && readings.iter().all(|reading| is_field(&reading.value, field_ut)), "{readings:?}");
+    }
+    for field_ut in [[1_610.0, 0.0, 0.0], [0.0, -1_610.0, 0.0], [0.0, 0.0, 2_490.0], [0.0, 0.0, -2_600.0]] {
+        rig.with(|part| part.field_ut = field_ut);
+        let _ = run(&mut driver, &rig, 100_000);
+        let (readings, faults) = run(&mut driver, &rig, 500_000);
+        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == Fault::Range), "{readings:?}");
+    }
+}

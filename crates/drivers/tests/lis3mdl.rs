@@ -1,0 +1,132 @@
+//! LIS3MDL against its registers, as DS9463 has them.
+#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
+
+mod rig;
+
+use afbc_drivers::lis3mdl::Lis3mdl;
+use afbc_drivers::{Fault, MagneticReading};
+use nalgebra::Vector3;
+use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
+
+const FIELD_UT: [f64; 3] = [22.0, -3.0, -42.0];
+
+struct Registers {
+    identity: u8,
+    registers: [u8; 64],
+    since_us: u64,
+    measured: u64,
+    field_ut: [f64; 3],
+}
+
+impl Registers {
+    fn new() -> Self {
+        let mut part = Registers { identity: 0x3D, registers: [0; 64], since_us: 0, measured: 0, field_ut: FIELD_UT };
+        part.reset(0);
+        part
+    }
+
+    fn measure(&mut self, now_us: u64) {
+        if self.registers[0x22] & 3 != 0 {
+            return;
+        }
+        assert!(self.registers[0x20] & 2 == 0 && self.registers[0x22] & 0x20 == 0, "rates of tables 19 and 26");
+        let period_us = 1_600_000 >> (self.registers[0x20] >> 2 & 7);
+        let measured = (now_us - self.since_us) / period_us;
+        if measured == self.measured {
+            return;
+        }
+        self.measured = measured;
+        let lsb_per_gauss = [6_842.0, 3_421.0, 2_281.0, 1_711.0][usize::from(self.registers[0x21] >> 5 & 3)];
+        for axis in 0..3 {
+            // Worse modes are noisier.
+            let mode = if axis == 2 { self.registers[0x23] >> 2 } else { self.registers[0x20] >> 5 } & 3;
+            let noise_ut = 0.4 * f64::from(4 - mode) * noise(now_us, axis as u64);
+            let lsb = ((self.field_ut[axis] + noise_ut) / 100.0 * lsb_per_gauss).round();
+            let lsb = lsb.clamp(-32768.0, 32767.0) as i16;
+            let bytes = if self.registers[0x23] & 2 == 0 { lsb.to_le_bytes() } else { lsb.to_be_bytes() };
+            self.registers[0x28 + 2 * axis..0x2A + 2 * axis].copy_from_slice(&bytes);
+        }
+        self.registers[0x27] |= if self.registers[0x27] & 8 == 0 { 0x0F } else { 0xF0 };
+    }
+}
+
+impl Model for Registers {
+    fn read(&mut self, now_us: u64, register: u8, into: &mut [u8]) {
+        self.measure(now_us);
+        // Without the bit that I2C demands, the address stays.
+        let counts = register & 0x80 != 0;
+        let mut register = usize::from(register & 0x3F);
+        for byte in into {
+            *byte = if register == 0x0F { self.identity } else { self.registers[register] };
+            if register == 0x2D {
+                self.registers[0x27] = 0;
+            }
+            if counts {
+                register = if register == 0x2D { 0x28 } else { (register + 1) & 0x3F };
+            }
+        }
+    }
+
+    fn write(&mut self, now_us: u64, register: u8, bytes: &[u8]) {
+        self.measure(now_us);
+        let &[byte] = bytes else { panic!("one register at a time") };
+        match register {
+            0x21 if byte & 4 != 0 => self.reset(now_us),
+            0x20..=0x24 => {
+                self.registers[usize::from(register)] = byte;
+                (self.since_us, self.measured) = (now_us, 0);
+            }
+            _ => panic!("writes to {register:#x}, which may damage it"),
+        }
+    }
+
+    fn reset(&mut self, _: u64) {
+        self.registers = [0; 64];
+        (self.registers[0x20], self.registers[0x22]) = (0x10, 0x03);
+    }
+}
+
+fn is_field(reading: &MagneticReading, field_ut: [f64; 3]) -> bool {
+    (reading.field_ut - Vector3::from(field_ut.map(|ut| ut as f32))).amax() < 0.45
+}
+
+fn right(reading: &MagneticReading) -> bool {
+    is_field(reading, FIELD_UT)
+}
+
+#[test]
+fn every_fault_is_noticed_and_survived() {
+    survives_all_troubles(|| Lis3mdl, Registers::new, false, 500_000, right);
+}
+
+#[test]
+fn another_part_is_named() {
+    refuses_another(Lis3mdl, Registers { identity: 0x40, ..Registers::new() }, 0x40);
+}
+
+#[test]
+fn a_field_is_read_once_80_times_a_second() {
+    let rig = Rig::new(Registers::new());
+    let mut driver = rig.driver(Lis3mdl);
+    let _ = run(&mut driver, &rig, 100_000);
+    let (readings, faults) = run(&mut driver, &rig, 10_000_000);
+    assert!(faults.is_empty() && (798..=802).contains(&readings.len()), "{} readings, {faults:?}", readings.len());
+}
+
+#[test]
+fn fields_of_the_whole_range_are_read_and_none_beyond() {
+    let rig = Rig::new(Registers::new());
+    let mut driver = rig.driver(Lis3mdl);
+    for field_ut in [[399.0, -399.0, 0.5], [-399.0, 399.0, -0.5], [0.2, 0.5, 399.0], [48.0, 16.0, -30.0]] {
+        rig.with(|part| part.field_ut = field_ut);
+        let _ = run(&mut driver, &rig, 50_000);
+        let (readings, faults) = run(&mut driver, &rig, 200_000);
+        assert!(faults.is_empty() && readings.iter().all(|reading| is_field(&reading.value, field_ut)), "{readings:?}");
+    }
+    for field_ut in [[402.0, 0.0, 0.0], [0.0, -470.0, 0.0], [0.0, 0.0, 900.0]] {
+        rig.with(|part| part.field_ut = field_ut);
+        let _ = run(&mut driver, &rig, 50_000);
+        let (readings, faults) = run(&mut driver, &rig, 500_000);
+        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == Fault::Range), "{readings:?}");
+    }
+}

@@ -1,0 +1,156 @@
+//! QMC5883L against its registers, as its data sheet 1.0 has them.
+#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
+
+mod rig;
+
+use afbc_drivers::qmc5883l::Qmc5883l;
+use afbc_drivers::{Fault, MagneticReading};
+use nalgebra::Vector3;
+use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
+
+const FIELD_UT: [f64; 3] = [22.0, -3.0, -42.0];
+
+struct Registers {
+    identity: u8,
+    data: [u8; 6],
+    /// DOR, OVL, DRDY.
+    status: u8,
+    control: [u8; 3],
+    /// Data are protected from their first byte read until their last.
+    is_locked: bool,
+    since_us: u64,
+    /// Measurements since then.
+    measured: u64,
+    field_ut: [f64; 3],
+}
+
+impl Registers {
+    fn new() -> Self {
+        let (data, control, field_ut) = ([0; 6], [0; 3], FIELD_UT);
+        Registers { identity: 0xFF, data, status: 0, control, is_locked: false, since_us: 0, measured: 0, field_ut }
+    }
+
+    fn measure(&mut self, now_us: u64) {
+        if self.control[0] & 3 != 1 {
+            return;
+        }
+        let period_us = [100_000, 20_000, 10_000, 5_000][usize::from(self.control[0] >> 2 & 3)];
+        let measured = (now_us - self.since_us) / period_us;
+        if measured == self.measured {
+            return;
+        }
+        self.measured = measured;
+        if self.is_locked {
+            self.status |= 4;
+            return;
+        }
+        let lsb_per_gauss = if self.control[0] & 0x10 == 0 { 12_000.0 } else { 3_000.0 };
+        // Without the pulses of its period an old magnetisation stays.
+        let offset_ut = if self.control[2] == 1 { 0.0 } else { 15.0 };
+        let lsb = std::array::from_fn::<f64, 3, _>(|axis| {
+            let lsb = (self.field_ut[axis] + offset_ut) / 100.0 * lsb_per_gauss;
+            (lsb + 4.0 * noise(now_us, axis as u64)).round()
+        });
+        for (bytes, &lsb) in self.data.chunks_exact_mut(2).zip(&lsb) {
+            bytes.copy_from_slice(&(lsb.clamp(-32768.0, 32767.0) as i16).to_le_bytes());
+        }
+        let is_over = lsb.iter().any(|&lsb| !(-32768.0..=32767.0).contains(&lsb));
+        self.status = self.status & 4 | if self.status & 1 != 0 { 4 } else { 0 } | if is_over { 3 } else { 1 };
+    }
+}
+
+impl Model for Registers {
+    fn read(&mut self, now_us: u64, register: u8, into: &mut [u8]) {
+        self.measure(now_us);
+        for (register, byte) in (usize::from(register)..).zip(into) {
+            *byte = match register {
+                0x00..=0x05 => {
+                    if !self.is_locked {
+                        self.status &= !5;
+                    }
+                    self.is_locked = register != 0x05;
+                    self.data[register]
+                }
+                0x06 => {
+                    let status = self.status;
+                    self.status &= !4;
+                    status
+                }
+                0x09..=0x0B => self.control[register - 0x09],
+                0x0C => 0x01,
+                0x0D => self.identity,
+                _ => 0,
+            };
+        }
+    }
+
+    fn write(&mut self, now_us: u64, register: u8, bytes: &[u8]) {
+        self.measure(now_us);
+        for (register, &byte) in (register..).zip(bytes) {
+            match register {
+                0x09 => (self.control[0], self.since_us, self.measured) = (byte, now_us, 0),
+                0x0A if byte & 0x80 != 0 => self.reset(now_us),
+                0x0A => self.control[1] = byte & 0x41,
+                0x0B => self.control[2] = byte,
+                _ => (),
+            }
+        }
+    }
+
+    fn reset(&mut self, _: u64) {
+        (self.status, self.control, self.is_locked) = (0, [0; 3], false);
+    }
+}
+
+fn is_field(reading: &MagneticReading, field_ut: [f64; 3]) -> bool {
+    // Four and a half bits.
+    (reading.field_ut - Vector3::from(field_ut.map(|ut| ut as f32))).amax() < 0.16
+}
+
+fn right(reading: &MagneticReading) -> bool {
+    is_field(reading, FIELD_UT)
+}
+
+#[test]
+fn every_fault_is_noticed_and_survived() {
+    survives_all_troubles(|| Qmc5883l, Registers::new, false, 500_000, right);
+}
+
+#[test]
+fn another_part_is_named() {
+    refuses_another(Qmc5883l, Registers { identity: 0x80, ..Registers::new() }, 0x80);
+}
+
+#[test]
+fn a_field_is_read_once_100_times_a_second() {
+    let rig = Rig::new(Registers::new());
+    let mut driver = rig.driver(Qmc5883l);
+    let _ = run(&mut driver, &rig, 100_000);
+    let (readings, faults) = run(&mut driver, &rig, 10_000_000);
+    assert!(faults.is_empty() && (995..=1_005).contains(&readings.len()), "{} readings, {faults:?}", readings.len());
+}
+
+#[test]
+fn fields_of_the_whole_range_are_read_and_none_beyond() {
+    let rig = Rig::new(Registers::new());
+    let mut driver = rig.driver(Qmc5883l);
+    for field_ut in [[799.0, -799.0, 0.5], [-799.0, 799.0, -0.5], [0.2, 0.5, 799.0], [48.0, 16.0, -30.0]] {
+        rig.with(|part| part.field_ut = field_ut);
+        let _ = run(&mut driver, &rig, 50_000);
+        let (readings, faults) = run(&mut driver, &rig, 200_000);
+        assert!(faults.is_empty() && readings.iter().all(|reading| is_field(&reading.value, field_ut)), "{readings:?}");
+    }
+    // 8 to 10.9 gauss fit into its words; beyond, it flags an overflow.
+    for ut in [820.0, -1_050.0, 1_200.0, -5_000.0] {
+        for axis in 0..3 {
+            rig.with(|part| part.field_ut[axis] = ut);
+            let _ = run(&mut driver, &rig, 50_000);
+            let (readings, faults) = run(&mut driver, &rig, 500_000);
+            assert!(readings.is_empty() && faults.iter().all(|fault| *fault == Fault::Range), "{readings:?}");
+            rig.with(|part| part.field_ut = FIELD_UT);
+            let _ = run(&mut driver, &rig, 300_000);
+            let (readings, faults) = run(&mut driver, &rig, 200_000);
+            assert!(faults.is_empty() && readings.iter().all(|reading| right(&reading.value)), "{faults:?}");
+        }
+    }
+}
