@@ -9,8 +9,9 @@ use embassy_futures::select::{Either, select};
 pub const FAULTS_MAX: u32 = 10;
 /// Pause before a part is set up again \[us\].
 pub const PAUSE_US: u32 = 100_000;
-/// Longest transfer \[us\]: 8 KiB at 10 MHz.
+/// Longest transfer \[us\], and what each of its bytes adds \[us\]: 1 MHz.
 const TRANSFER_US: u32 = 10_000;
+const BYTE_US: u32 = 8;
 /// Cycles in a row without a reading.
 const CYCLES_MAX: u32 = 100;
 /// Cycles between two looks at a register that was set.
@@ -165,12 +166,12 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
     }
 
     async fn write(&mut self, register: u8, bytes: &[u8]) -> Result<(), Fault> {
-        transfer(&self.timing, self.bus.write(register, bytes)).await
+        transfer(&self.timing, bytes.len(), self.bus.write(register, bytes)).await
     }
 
     async fn byte(&mut self, register: u8) -> Result<u8, Fault> {
         let mut answer = [0];
-        transfer(&self.timing, self.bus.read(register, &mut answer)).await?;
+        transfer(&self.timing, answer.len(), self.bus.read(register, &mut answer)).await?;
         let [byte] = answer;
         Ok(byte)
     }
@@ -179,8 +180,9 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
         let at_us = self.timing.now_us();
         let mut answer = [0; READ_MAX];
         let answer = answer.get_mut(..length).ok_or(Fault::Bus)?;
-        transfer(&self.timing, self.bus.read(register, answer)).await?;
-        if [0x00, 0xFF].iter().any(|idle| answer.iter().all(|byte| byte == idle)) {
+        transfer(&self.timing, length, self.bus.read(register, answer)).await?;
+        // A single byte may well be 0.
+        if length > 1 && [0x00, 0xFF].iter().any(|idle| answer.iter().all(|byte| byte == idle)) {
             return Err(Fault::Silent);
         }
         let reading = self.part.take(register, answer)?;
@@ -197,8 +199,13 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
 }
 
 /// Waits for a transfer, but not for one that never ends.
-async fn transfer(timing: &impl Timing, transfer: impl Future<Output = Result<(), BusError>>) -> Result<(), Fault> {
-    match select(transfer, timing.wait(TRANSFER_US)).await {
+async fn transfer(
+    timing: &impl Timing,
+    length: usize,
+    transfer: impl Future<Output = Result<(), BusError>>,
+) -> Result<(), Fault> {
+    let limit_us = TRANSFER_US.saturating_add(BYTE_US.saturating_mul(u32::try_from(length).unwrap_or(u32::MAX)));
+    match select(transfer, timing.wait(limit_us)).await {
         Either::First(result) => Ok(result?),
         Either::Second(()) => Err(Fault::Bus),
     }

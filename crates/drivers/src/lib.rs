@@ -7,9 +7,9 @@
 //! | fault | found by | then |
 //! |---|---|---|
 //! | another part | identity, at set-up | set-up again after 0.1 s |
-//! | nothing answers | all bits of an answer are equal | set-up after 10 faults |
+//! | nothing answers | all bits of an answer of several bytes are equal | set-up after 10 faults |
 //! | set-up lost (reset, brown-out) | one register that was set is read back every 16 readings | the same |
-//! | transfer fails or never ends | the bus, 10 ms | the same |
+//! | transfer fails or never ends | the bus, 10 ms and 8 us a byte | the same |
 //! | no interrupt, or never ready | twice the time of a sample, or 100 cycles | the same |
 //! | readings do not change | [`Part::STUCK_AFTER`] equal answers | the same |
 //! | answers that no working part gives | [`Part::take`] | the same |
