@@ -18,10 +18,11 @@
 //!
 //! | what | parts |
 //! |---|---|
-//! | IMU | [`icm426xx`] |
+//! | IMU | [`bmi270`], [`icm426xx`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod bmi270;
 mod bus;
 mod driver;
 pub mod icm426xx;

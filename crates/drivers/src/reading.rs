@@ -34,3 +34,9 @@ pub(crate) fn big(bytes: [u8; 6]) -> Vector3<f32> {
     let [a, b, c, d, e, f] = bytes;
     Vector3::new(i16::from_be_bytes([a, b]), i16::from_be_bytes([c, d]), i16::from_be_bytes([e, f])).map(f32::from)
 }
+
+/// Returns three numbers of two bytes each, the lower first.
+pub(crate) fn little(bytes: [u8; 6]) -> Vector3<f32> {
+    let [a, b, c, d, e, f] = bytes;
+    Vector3::new(i16::from_le_bytes([a, b]), i16::from_le_bytes([c, d]), i16::from_le_bytes([e, f])).map(f32::from)
+}
