@@ -18,7 +18,7 @@
 //!
 //! | what | parts |
 //! |---|---|
-//! | IMU | [`bmi270`], [`icm426xx`] |
+//! | IMU | [`bmi270`], [`icm426xx`], [`mpu`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -26,6 +26,7 @@ pub mod bmi270;
 mod bus;
 mod driver;
 pub mod icm426xx;
+pub mod mpu;
 mod part;
 mod reading;
 
