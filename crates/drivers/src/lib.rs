@@ -19,9 +19,11 @@
 //! | what | parts |
 //! |---|---|
 //! | IMU | [`bmi270`], [`icm426xx`], [`mpu`] |
+//! | IMU and magnetometer | [`ak8963`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod ak8963;
 pub mod bmi270;
 mod bus;
 mod driver;

@@ -12,8 +12,8 @@
 //! | ICM-20689 | DS-000143 | 176 Hz | 218 Hz | 8 MHz |
 //!
 //! The filters are the widest that each part has at 1 kHz (DLPF_CFG). The MPU-6000 alone divides the 8 kHz of its
-//! widest one; the others give samples at 8 kHz with theirs (250 Hz), which is why they are slower here. Above 1 MHz the
-//! parts called MPU let only their readings be read, so that a reading of theirs takes 0.12 ms.
+//! widest one; the others give samples at 8 kHz with theirs (250 Hz), which is why they are slower here. The parts
+//! called MPU allow more than 1 MHz for their readings alone: here a reading of theirs takes 0.12 ms.
 //!
 //! The interface I2C is switched off, lest the traffic of other parts on the bus be taken for it: in USER_CTRL, in the
 //! ICM-20602 in I2C_IF. Early MPU-6000 (revision C, of 2011) read half of the force and are not told from others.
@@ -26,7 +26,7 @@ use crate::reading::{InertialReading, big};
 pub type Mpu6000 = Mpu<0x68>;
 /// MPU-6500.
 pub type Mpu6500 = Mpu<0x70>;
-/// MPU-9250 without its magnetometer, which it leaves alone.
+/// MPU-9250 without its magnetometer, for which there is [`crate::ak8963::Mpu9250Ak8963`].
 pub type Mpu9250 = Mpu<0x71>;
 /// ICM-20602.
 pub type Icm20602 = Mpu<0x12>;
