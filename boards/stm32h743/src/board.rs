@@ -18,7 +18,8 @@
 use crate::sensors::{Aids, Imus};
 use afbc_drivers::dps310::Dps310;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
-use afbc_drivers::{Driver, I2cRegisters, Part, SpiRegisters};
+use afbc_drivers::qmc5883l::Qmc5883l;
+use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{CHANNELS, Motors, Throttles, hold_low};
 use chip_stm32::sensors::{Device, Polled};
@@ -29,8 +30,8 @@ use embassy_executor::SendSpawner;
 use embassy_stm32::i2c::{self, I2c};
 use embassy_stm32::interrupt::{self, Interrupt, InterruptExt, Priority};
 use embassy_stm32::peripherals::{
-    DMA1_CH0, DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA2_CH0, DMA2_CH1, I2C2, IWDG1, TIM4, TIM5, UART7,
-    USART1, USART2,
+    DMA1_CH0, DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA1_CH6, DMA1_CH7, DMA2_CH0, DMA2_CH1, I2C1, I2C2,
+    IWDG1, TIM4, TIM5, UART7, USART1, USART2,
 };
 use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{self, BufferedUart};
@@ -48,8 +49,16 @@ const SPI_HZ: u32 = 12_500_000;
 /// Interrupts of the sensors' transfers.
 const IMU_INTERRUPTS: [Interrupt; 4] =
     [Interrupt::DMA1_STREAM2, Interrupt::DMA1_STREAM3, Interrupt::DMA1_STREAM4, Interrupt::DMA1_STREAM5];
-const AID_INTERRUPTS: [Interrupt; 4] =
-    [Interrupt::DMA2_STREAM0, Interrupt::DMA2_STREAM1, Interrupt::I2C2_EV, Interrupt::I2C2_ER];
+const AID_INTERRUPTS: [Interrupt; 8] = [
+    Interrupt::DMA1_STREAM6,
+    Interrupt::DMA1_STREAM7,
+    Interrupt::DMA2_STREAM0,
+    Interrupt::DMA2_STREAM1,
+    Interrupt::I2C1_EV,
+    Interrupt::I2C1_ER,
+    Interrupt::I2C2_EV,
+    Interrupt::I2C2_ER,
+];
 /// Motors: the channels of two timers.
 const OUTPUTS: usize = 2 * CHANNELS;
 
@@ -65,6 +74,10 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
     DMA2_STREAM0 => dma::InterruptHandler<DMA2_CH0>;
     DMA2_STREAM1 => dma::InterruptHandler<DMA2_CH1>;
+    DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
+    DMA1_STREAM7 => dma::InterruptHandler<DMA1_CH7>;
+    I2C1_EV => i2c::EventInterruptHandler<I2C1>;
+    I2C1_ER => i2c::ErrorInterruptHandler<I2C1>;
     I2C2_EV => i2c::EventInterruptHandler<I2C2>;
     I2C2_ER => i2c::ErrorInterruptHandler<I2C2>;
 });
@@ -77,7 +90,7 @@ static TX: [StaticCell<[u8; 1024]>; 3] = [const { StaticCell::new() }; 3];
 static THROTTLES: [Throttles; 2] = [const { Throttles::new() }; 2];
 
 /// An IMU that is read at the start of every control period.
-fn imu<P: Part>(part: P, device: Device) -> Driver<P, SpiRegisters<Device>, Polled> {
+fn imu<P: SensorPart>(part: P, device: Device) -> Driver<P, SpiRegisters<Device>, Polled> {
     Driver::new(part, SpiRegisters::new(device, P::SPI.expect("an IMU on SPI")), Polled)
 }
 
@@ -114,11 +127,13 @@ impl Board for Stm32h743 {
         let receiver = BufferedUart::new(p.USART2, p.PD6, p.PD5, tx3, rx3, Irqs, usart::Config::default());
         let config = chip_stm32::sensors::i2c();
         let inside = I2c::new(p.I2C2, p.PB10, p.PB11, p.DMA2_CH0, p.DMA2_CH1, Irqs, config);
+        let outside = I2c::new(p.I2C1, p.PB6, p.PB7, p.DMA1_CH6, p.DMA1_CH7, Irqs, config);
         let sampler = Imus {
             first: imu(Icm42688p {}, Device::new(first, p.PC15)),
             second: imu(Icm42605 {}, Device::new(second, p.PC13)),
         };
         let aids = Aids {
+            compass: Driver::new(Qmc5883l, I2cRegisters::new(outside, 0x0D), Polled),
             barometer: Driver::new(Dps310::default(), I2cRegisters::new(inside, 0x76), Polled),
             receiver: receiver.expect("the baud rate divides the clock"),
         };

@@ -3,10 +3,11 @@
 
 use afbc_drivers::dps310::Dps310;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
+use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, InertialReading, SpiRegisters};
 use chip_stm32::receiver;
 use chip_stm32::sensors::{Device, Polled, run};
-use embassy_futures::join::join;
+use embassy_futures::join::{join, join3};
 use embassy_stm32::i2c::{I2c, Master};
 use embassy_stm32::mode::Async;
 use embassy_stm32::usart::BufferedUart;
@@ -43,15 +44,20 @@ fn turned(reading: &InertialReading, to_body: &Matrix3<f32>) -> [Vector3<f32>; 2
     [reading.rates_rad_s, reading.specific_force_m_s2].map(|value| to_body * value)
 }
 
+/// From the axes of the compass beside the receiver, which faces down and is turned by 90 degrees.
+const COMPASS: Matrix3<f32> = Matrix3::new(0.0, -1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, -1.0);
+
 /// The slow sensors.
 pub(crate) struct Aids {
+    pub(crate) compass: Driver<Qmc5883l, I2cRegisters<Bus>, Polled>,
     pub(crate) barometer: Driver<Dps310, I2cRegisters<Bus>, Polled>,
     pub(crate) receiver: BufferedUart<'static>,
 }
 
 impl Sampler for Aids {
     async fn run(self) {
-        join(
+        join3(
+            run(self.compass, |reading| aux_sensors::put_field(&reading, &COMPASS)),
             run(self.barometer, |reading| aux_sensors::put_pressure(&reading)),
             receiver::run(self.receiver, aux_sensors::put_fix),
         )

@@ -1,6 +1,6 @@
 //! Buses and clock of sensors.
 
-use afbc_drivers::{Driver, Fault, Part, Registers, Timing};
+use afbc_drivers::{Driver, PartTiming, Registers, SensorFault, SensorPart};
 use afbc_types::Stamped;
 use embassy_futures::select::{Either, select};
 use embassy_stm32::exti::ExtiInput;
@@ -57,11 +57,11 @@ impl SpiDevice for Device {
 }
 
 /// Reads a part for ever, passes on each reading with its time, and logs when it fails and when it works again.
-pub async fn run<P: Part, B: Registers, T: Timing>(
+pub async fn run<P: SensorPart, B: Registers, T: PartTiming>(
     mut driver: Driver<P, B, T>,
     mut take: impl FnMut(Stamped<P::Reading>),
 ) {
-    let mut last: Option<Fault> = None;
+    let mut last: Option<SensorFault> = None;
     loop {
         match driver.reading().await {
             Ok(reading) => {
@@ -100,7 +100,7 @@ pub fn i2c() -> i2c::Config {
 /// The clock of a part whose interrupt is not wired: it is read at the start of every control period.
 pub struct Polled;
 
-impl Timing for Polled {
+impl PartTiming for Polled {
     fn now_us(&self) -> u64 {
         Instant::now().as_micros()
     }
@@ -118,7 +118,7 @@ impl Timing for Polled {
 /// The clock of a part with its interrupt.
 pub struct Interrupted(pub ExtiInput<'static, Async>);
 
-impl Timing for Interrupted {
+impl PartTiming for Interrupted {
     fn now_us(&self) -> u64 {
         Polled.now_us()
     }

@@ -5,7 +5,7 @@
 //! flags are. The coefficients have a CRC-8 in the register before them, which the maker's self-test checks.
 
 use crate::bus::SpiFormat;
-use crate::part::{Fault, Part, Step};
+use crate::part::{SensorFault, SensorPart, Step};
 use crate::reading::{PressureReading, in_range};
 
 /// BMP388.
@@ -57,7 +57,7 @@ const DRDY: u8 = 0x60;
 const RANGE_PA: [f32; 2] = [30_000.0, 125_000.0];
 const RANGE_C: [f32; 2] = [-40.0, 85.0];
 
-impl<const IDENTITY: u8> Part for Bmp3<IDENTITY> {
+impl<const IDENTITY: u8> SensorPart for Bmp3<IDENTITY> {
     type Reading = PressureReading;
     const NAME: &'static str = if IDENTITY == 0x50 { "BMP388" } else { "BMP390" };
     const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0x80, write: 0, dummies: 1, clock_hz: 10_000_000 });
@@ -75,18 +75,18 @@ impl<const IDENTITY: u8> Part for Bmp3<IDENTITY> {
     ];
     const CYCLE: &'static [Step] = &[Step::Wait(17_000), Step::Await(STATUS, DRDY, DRDY, 23), Step::Read(DATA_0, 6)];
 
-    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<PressureReading>, Fault> {
+    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<PressureReading>, SensorFault> {
         if register == CALIBRATION {
             self.coefficients = None;
-            let (&check, trim) = answer.split_first().ok_or(Fault::Bus)?;
+            let (&check, trim) = answer.split_first().ok_or(SensorFault::Bus)?;
             if crc(trim) != check {
-                return Err(Fault::Calibration);
+                return Err(SensorFault::Calibration);
             }
-            self.coefficients = Some(Coefficients::new(trim.try_into().map_err(|_| Fault::Bus)?));
+            self.coefficients = Some(Coefficients::new(trim.try_into().map_err(|_| SensorFault::Bus)?));
             return Ok(None);
         }
-        let &[p0, p1, p2, t0, t1, t2] = answer else { return Err(Fault::Bus) };
-        let coefficients = self.coefficients.ok_or(Fault::Calibration)?;
+        let &[p0, p1, p2, t0, t1, t2] = answer else { return Err(SensorFault::Bus) };
+        let coefficients = self.coefficients.ok_or(SensorFault::Calibration)?;
         let [pressure, temperature] = [[p0, p1, p2, 0], [t0, t1, t2, 0]].map(|raw| u32::from_le_bytes(raw) as f32);
         in_range(coefficients.compensate(pressure, temperature), RANGE_PA, RANGE_C)
     }

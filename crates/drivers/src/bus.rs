@@ -67,11 +67,11 @@ impl<D: SpiDevice> Registers for SpiRegisters<D> {
     }
 
     async fn write(&mut self, register: u8, bytes: &[u8]) -> Result<(), BusError> {
-        let head = [register | self.format.write];
+        let head = register | self.format.write;
         match *bytes {
-            [] => self.device.write(&head).await,
-            [byte] => self.device.write(&[register, byte]).await,
-            _ => self.device.transaction(&mut [Operation::Write(&head), Operation::Write(bytes)]).await,
+            [] => self.device.write(&[head]).await,
+            [byte] => self.device.write(&[head, byte]).await,
+            _ => self.device.transaction(&mut [Operation::Write(&[head]), Operation::Write(bytes)]).await,
         }
         .map_err(|_| BusError)
     }

@@ -1,7 +1,7 @@
 //! Runs the scripts of a part, watches it, and sets it up again after faults.
 
 use crate::bus::{BusError, Registers};
-use crate::part::{Fault, Part, READ_MAX, Step};
+use crate::part::{READ_MAX, SensorFault, SensorPart, Step};
 use afbc_types::Stamped;
 use embassy_futures::select::{Either, select};
 
@@ -9,8 +9,9 @@ use embassy_futures::select::{Either, select};
 pub const FAULTS_MAX: u32 = 10;
 /// Pause before a part is set up again \[us\].
 pub const PAUSE_US: u32 = 100_000;
-/// Longest transfer \[us\]: 8 KiB at 10 MHz.
+/// Longest transfer \[us\], and what each of its bytes adds \[us\]: 1 MHz.
 const TRANSFER_US: u32 = 10_000;
+const BYTE_US: u32 = 8;
 /// Cycles in a row without a reading.
 const CYCLES_MAX: u32 = 100;
 /// Cycles between two looks at a register that was set.
@@ -22,7 +23,7 @@ const AWAIT_US: u32 = 1_000;
 
 /// Time and the interrupt of a part, as its board has them.
 #[allow(async_fn_in_trait, reason = "used generically, never boxed")]
-pub trait Timing {
+pub trait PartTiming {
     /// Time since power-up \[us\].
     fn now_us(&self) -> u64;
 
@@ -55,7 +56,7 @@ pub struct Driver<P, B, T> {
     equals: u32,
 }
 
-impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
+impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     /// A part that is yet to be set up, by the first [`Driver::reading`].
     pub fn new(part: P, bus: B, timing: T) -> Self {
         Driver { part, bus, timing, is_up: false, faults: 0, cycles: 0, looks: 0, last: [0; READ_MAX], equals: 0 }
@@ -71,7 +72,7 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
     ///
     /// # Errors
     /// The fault that this cycle, or the set-up, met. Call it again.
-    pub async fn reading(&mut self) -> Result<Stamped<P::Reading>, Fault> {
+    pub async fn reading(&mut self) -> Result<Stamped<P::Reading>, SensorFault> {
         let result = self.attempt().await;
         match &result {
             Ok(_) => self.faults = 0,
@@ -83,7 +84,7 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
         result
     }
 
-    async fn attempt(&mut self) -> Result<Stamped<P::Reading>, Fault> {
+    async fn attempt(&mut self) -> Result<Stamped<P::Reading>, SensorFault> {
         if !self.is_up {
             if self.faults > 0 {
                 self.timing.wait(PAUSE_US).await;
@@ -95,11 +96,11 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
                 return Ok(reading);
             }
         }
-        Err(Fault::Late)
+        Err(SensorFault::Late)
     }
 
     /// Runs the set-up, and reads back what was set.
-    async fn set_up(&mut self) -> Result<(), Fault> {
+    async fn set_up(&mut self) -> Result<(), SensorFault> {
         for step in P::SETUP {
             self.step(step).await?;
         }
@@ -111,7 +112,7 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
         Ok(())
     }
 
-    async fn cycle(&mut self) -> Result<Option<Stamped<P::Reading>>, Fault> {
+    async fn cycle(&mut self) -> Result<Option<Stamped<P::Reading>>, SensorFault> {
         self.cycles += 1;
         if self.cycles >= CYCLES_A_LOOK {
             let at = (self.looks + 1) % P::SETUP.len().max(1);
@@ -127,7 +128,7 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
     }
 
     /// Reads back the register that a step of the set-up set, if it did.
-    async fn look(&mut self, at: usize) -> Result<(), Fault> {
+    async fn look(&mut self, at: usize) -> Result<(), SensorFault> {
         let Some(step) = P::SETUP.get(at) else { return Ok(()) };
         let Some(register) = register_set_by(step) else { return Ok(()) };
         // A script may set a register twice.
@@ -135,11 +136,11 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
             return Ok(());
         }
         let value = self.value(step).await?;
-        if self.byte(register).await? == value { Ok(()) } else { Err(Fault::Register(register)) }
+        if self.byte(register).await? == value { Ok(()) } else { Err(SensorFault::Register(register)) }
     }
 
     /// Returns the value that a step of the set-up gives its register.
-    async fn value(&mut self, step: &Step) -> Result<u8, Fault> {
+    async fn value(&mut self, step: &Step) -> Result<u8, SensorFault> {
         Ok(match *step {
             Step::Set(_, value) => value,
             Step::SetLike(_, value, mask, other) => value | self.byte(other).await? & mask,
@@ -147,14 +148,14 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
         })
     }
 
-    async fn step(&mut self, step: &Step) -> Result<Option<Stamped<P::Reading>>, Fault> {
+    async fn step(&mut self, step: &Step) -> Result<Option<Stamped<P::Reading>>, SensorFault> {
         match *step {
             Step::Identify(register, identities) => {
                 let identity = self.byte(register).await?;
                 match identity {
                     _ if identities.contains(&identity) => (),
-                    0x00 | 0xFF => return Err(Fault::Silent),
-                    _ => return Err(Fault::Identity(identity)),
+                    0x00 | 0xFF => return Err(SensorFault::Silent),
+                    _ => return Err(SensorFault::Identity(identity)),
                 }
             }
             Step::Set(register, value) | Step::Write(register, value) => self.write(register, &[value]).await?,
@@ -167,46 +168,46 @@ impl<P: Part, B: Registers, T: Timing> Driver<P, B, T> {
             Step::Await(register, mask, value, ms) => {
                 let mut looks = ms;
                 while self.byte(register).await? & mask != value {
-                    looks = looks.checked_sub(1).ok_or(Fault::Late)?;
+                    looks = looks.checked_sub(1).ok_or(SensorFault::Late)?;
                     self.timing.wait(AWAIT_US).await;
                 }
             }
             Step::Wait(us) => self.timing.wait(us).await,
             Step::Ready(us) => {
                 if !self.timing.ready(us).await {
-                    return Err(Fault::Late);
+                    return Err(SensorFault::Late);
                 }
             }
         }
         Ok(None)
     }
 
-    async fn write(&mut self, register: u8, bytes: &[u8]) -> Result<(), Fault> {
-        transfer(&self.timing, self.bus.write(register, bytes)).await
+    async fn write(&mut self, register: u8, bytes: &[u8]) -> Result<(), SensorFault> {
+        transfer(&self.timing, bytes.len(), self.bus.write(register, bytes)).await
     }
 
-    async fn byte(&mut self, register: u8) -> Result<u8, Fault> {
+    async fn byte(&mut self, register: u8) -> Result<u8, SensorFault> {
         let mut answer = [0];
-        transfer(&self.timing, self.bus.read(register, &mut answer)).await?;
+        transfer(&self.timing, answer.len(), self.bus.read(register, &mut answer)).await?;
         let [byte] = answer;
         Ok(byte)
     }
 
-    async fn read(&mut self, register: u8, length: usize) -> Result<Option<Stamped<P::Reading>>, Fault> {
+    async fn read(&mut self, register: u8, length: usize) -> Result<Option<Stamped<P::Reading>>, SensorFault> {
         let at_us = self.timing.now_us();
         let mut answer = [0; READ_MAX];
-        let answer = answer.get_mut(..length).ok_or(Fault::Bus)?;
-        transfer(&self.timing, self.bus.read(register, answer)).await?;
-        if answer.len() >= SILENCE_LENGTH && [0x00, 0xFF].iter().any(|idle| answer.iter().all(|byte| byte == idle)) {
-            return Err(Fault::Silent);
+        let answer = answer.get_mut(..length).ok_or(SensorFault::Bus)?;
+        transfer(&self.timing, length, self.bus.read(register, answer)).await?;
+        if length >= SILENCE_LENGTH && [0x00, 0xFF].iter().any(|idle| answer.iter().all(|byte| byte == idle)) {
+            return Err(SensorFault::Silent);
         }
         let reading = self.part.take(register, answer)?;
         if reading.is_some() {
-            let last = self.last.get_mut(..length).ok_or(Fault::Bus)?;
+            let last = self.last.get_mut(..length).ok_or(SensorFault::Bus)?;
             self.equals = if last == answer { self.equals.saturating_add(1) } else { 0 };
             last.copy_from_slice(answer);
             if self.equals >= P::STUCK_AFTER {
-                return Err(Fault::Stuck);
+                return Err(SensorFault::Stuck);
             }
         }
         Ok(reading.map(|value| Stamped { value, at_us }))
@@ -222,15 +223,20 @@ fn register_set_by(step: &Step) -> Option<u8> {
 }
 
 /// Waits for a transfer, but not for one that never ends.
-async fn transfer(timing: &impl Timing, transfer: impl Future<Output = Result<(), BusError>>) -> Result<(), Fault> {
-    match select(transfer, timing.wait(TRANSFER_US)).await {
+async fn transfer(
+    timing: &impl PartTiming,
+    length: usize,
+    transfer: impl Future<Output = Result<(), BusError>>,
+) -> Result<(), SensorFault> {
+    let limit_us = TRANSFER_US.saturating_add(BYTE_US.saturating_mul(u32::try_from(length).unwrap_or(u32::MAX)));
+    match select(transfer, timing.wait(limit_us)).await {
         Either::First(result) => Ok(result?),
-        Either::Second(()) => Err(Fault::Bus),
+        Either::Second(()) => Err(SensorFault::Bus),
     }
 }
 
-impl From<BusError> for Fault {
+impl From<BusError> for SensorFault {
     fn from(_: BusError) -> Self {
-        Fault::Bus
+        SensorFault::Bus
     }
 }

@@ -1,11 +1,11 @@
 //! TDK ICM-42688-P and ICM-42605, by SPI (DS-000347 and DS-000292, both with the same registers).
 //!
-//! +-2000 deg/s and +-16 g, each behind the part's own second-order filter of 250 Hz, which is also the anti-alias filter
-//! for readings at 1 kHz. With the interrupt INT1, a pulse, active high, for each sample, the part measures at 1 kHz; one
-//! that is read without it, by the board's clock, at 4 kHz, so that a reading is never older than 0.25 ms.
+//! +-2000 deg/s and +-16 g, each behind the part's own second-order filter of 250 Hz, which is also the anti-alias
+//! filter for readings at 1 kHz. With the interrupt INT1, a pulse, active high, for each sample, the part measures at
+//! 1 kHz; one that is read without it, by the board's clock, at 4 kHz, so that a reading is never older than 0.25 ms.
 
 use crate::bus::SpiFormat;
-use crate::part::{Fault, Part, Step};
+use crate::part::{SensorFault, SensorPart, Step};
 use crate::reading::{InertialReading, big};
 
 /// ICM-42688-P.
@@ -38,7 +38,7 @@ const INVALID: f32 = -32768.0;
 const RAD_S_PER_LSB: f32 = 2000.0 / 32768.0 * core::f32::consts::PI / 180.0;
 const M_S2_PER_LSB: f32 = 16.0 / 32768.0 * 9.806_65;
 
-impl<const IDENTITY: u8, const POLLED: bool> Part for Icm426xx<IDENTITY, POLLED> {
+impl<const IDENTITY: u8, const POLLED: bool> SensorPart for Icm426xx<IDENTITY, POLLED> {
     type Reading = InertialReading;
     const NAME: &'static str = if IDENTITY == 0x47 { "ICM-42688-P" } else { "ICM-42605" };
     const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0x80, write: 0, dummies: 0, clock_hz: 24_000_000 });
@@ -62,9 +62,9 @@ impl<const IDENTITY: u8, const POLLED: bool> Part for Icm426xx<IDENTITY, POLLED>
     ];
     const CYCLE: &'static [Step] = &[Step::Ready(2_000), Step::Read(TEMP_DATA1, LENGTH)];
 
-    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<InertialReading>, Fault> {
-        let &[t1, t0, ref force @ .., r5, r4, r3, r2, r1, r0] = answer else { return Err(Fault::Bus) };
-        let force = big(force.try_into().map_err(|_| Fault::Bus)?);
+    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<InertialReading>, SensorFault> {
+        let &[t1, t0, ref force @ .., r5, r4, r3, r2, r1, r0] = answer else { return Err(SensorFault::Bus) };
+        let force = big(force.try_into().map_err(|_| SensorFault::Bus)?);
         let rates = big([r5, r4, r3, r2, r1, r0]);
         if force.iter().chain(&rates).any(|&axis| axis == INVALID) {
             return Ok(None);

@@ -6,7 +6,7 @@
 //! alone: a calibration of the compass covers it.
 
 use crate::bus::SpiFormat;
-use crate::part::{Fault, Part, Step};
+use crate::part::{SensorFault, SensorPart, Step};
 use crate::reading::{MagneticReading, little};
 use nalgebra::Vector3;
 
@@ -38,7 +38,7 @@ const OTHERS_OF_PDCNTL: u8 = 0x3F;
 const UT_PER_LSB: f32 = 1.0 / 13.2;
 const RANGE_UT: Vector3<f32> = Vector3::new(1_600.0, 1_600.0, 2_480.0);
 
-impl Part for Ist8310 {
+impl SensorPart for Ist8310 {
     type Reading = MagneticReading;
     const NAME: &'static str = "IST8310";
     const SPI: Option<SpiFormat> = None;
@@ -61,11 +61,11 @@ impl Part for Ist8310 {
         Step::Read(DATAXL, 6),
     ];
 
-    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<MagneticReading>, Fault> {
-        let field_ut = little(answer.try_into().map_err(|_| Fault::Bus)?) * UT_PER_LSB;
+    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<MagneticReading>, SensorFault> {
+        let field_ut = little(answer.try_into().map_err(|_| SensorFault::Bus)?) * UT_PER_LSB;
         let field_ut = field_ut.component_mul(&Vector3::new(1.0, 1.0, -1.0));
         if field_ut.abs().iter().zip(&RANGE_UT).any(|(ut, max_ut)| ut > max_ut) {
-            return Err(Fault::Range);
+            return Err(SensorFault::Range);
         }
         Ok(Some(MagneticReading { field_ut }))
     }

@@ -1,10 +1,10 @@
 //! ST LIS3MDL, by SPI or I2C (DS9463).
 //!
 //! +-4 gauss (400 uT) at 80 Hz in ultra-high-performance mode, the quietest. Its temperature is not used, nor is DRDY:
-//! the flag of its register is. A field beyond the range is a fault ([`Fault::Range`]).
+//! the flag of its register is. A field beyond the range is a fault ([`SensorFault::Range`]).
 
 use crate::bus::SpiFormat;
-use crate::part::{Fault, Part, Step};
+use crate::part::{SensorFault, SensorPart, Step};
 use crate::reading::{MagneticReading, little};
 
 /// The part.
@@ -27,7 +27,7 @@ const ZYXDA: u8 = 0x08;
 const UT_PER_LSB: f32 = 100.0 / 6842.0;
 const RANGE_UT: f32 = 400.0;
 
-impl Part for Lis3mdl {
+impl SensorPart for Lis3mdl {
     type Reading = MagneticReading;
     const NAME: &'static str = "LIS3MDL";
     const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0xC0, write: 0x40, dummies: 0, clock_hz: 10_000_000 });
@@ -46,10 +46,10 @@ impl Part for Lis3mdl {
     const CYCLE: &'static [Step] =
         &[Step::Wait(10_000), Step::Await(STATUS_REG, ZYXDA, ZYXDA, 15), Step::Read(OUT_X_L | INCREMENT, 6)];
 
-    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<MagneticReading>, Fault> {
-        let field_ut = little(answer.try_into().map_err(|_| Fault::Bus)?) * UT_PER_LSB;
+    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<MagneticReading>, SensorFault> {
+        let field_ut = little(answer.try_into().map_err(|_| SensorFault::Bus)?) * UT_PER_LSB;
         if field_ut.amax() > RANGE_UT {
-            return Err(Fault::Range);
+            return Err(SensorFault::Range);
         }
         Ok(Some(MagneticReading { field_ut }))
     }

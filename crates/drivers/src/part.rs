@@ -11,8 +11,8 @@ pub const READ_MAX: usize = 32;
 pub enum Step {
     /// Expects one of the values in a register: the part's identity.
     Identify(u8, &'static [u8]),
-    /// Writes a byte to a register whose value is read back, after the script and then again and again in flight: a part
-    /// that was reset meanwhile has lost it.
+    /// Writes a byte to a register whose value is read back, after the script and then again and again in flight: a
+    /// part that was reset meanwhile has lost it.
     Set(u8, u8),
     /// Sets a register, as [`Step::Set`], to a value and those bits of a mask that another register, or it itself,
     /// holds: register, value, mask, the other register.
@@ -21,8 +21,8 @@ pub enum Step {
     Write(u8, u8),
     /// Writes bytes from a register on, in one transfer; none are a command.
     WriteAll(u8, &'static [u8]),
-    /// Reads so many bytes from a register on, at most [`READ_MAX`], for [`Part::take`]. Three and more whose bits are
-    /// all equal are no answer; one or two may well be.
+    /// Reads so many bytes from a register on, at most [`READ_MAX`], for [`SensorPart::take`]. Three and more whose bits
+    /// are all equal are no answer; one or two may well be.
     Read(u8, usize),
     /// Waits until the bits of a mask in a register have a value: register, mask, value, at most so many milliseconds.
     Await(u8, u8, u8, u32),
@@ -33,7 +33,7 @@ pub enum Step {
 }
 
 /// A part of a data sheet.
-pub trait Part {
+pub trait SensorPart {
     /// What it reads.
     type Reading: Copy;
     /// Its name.
@@ -53,12 +53,12 @@ pub trait Part {
     ///
     /// # Errors
     /// The answer is not one that a working part gives.
-    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<Self::Reading>, Fault>;
+    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<Self::Reading>, SensorFault>;
 }
 
 /// What is wrong with a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
+pub enum SensorFault {
     /// A transfer has failed.
     Bus,
     /// Nothing answers: every bit reads the same.
@@ -81,19 +81,19 @@ pub enum Fault {
     Overflow,
 }
 
-impl fmt::Display for Fault {
+impl fmt::Display for SensorFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Fault::Bus => f.write_str("a transfer failed: check wiring and address"),
-            Fault::Silent => f.write_str("no answer: check wiring and power"),
-            Fault::Identity(identity) => write!(f, "another part answers, with identity {identity:#04x}"),
-            Fault::Register(register) => write!(f, "register {register:#04x} does not keep its value"),
-            Fault::Late => f.write_str("it does not become ready"),
-            Fault::Stuck => f.write_str("its readings do not change"),
-            Fault::Range => f.write_str("its readings are outside of its range"),
-            Fault::Calibration => f.write_str("its factory calibration is damaged"),
-            Fault::SelfTest => f.write_str("it failed its self-test"),
-            Fault::Overflow => f.write_str("it lost readings"),
+            SensorFault::Bus => f.write_str("a transfer failed: check wiring and address"),
+            SensorFault::Silent => f.write_str("no answer: check wiring and power"),
+            SensorFault::Identity(identity) => write!(f, "another part answers, with identity {identity:#04x}"),
+            SensorFault::Register(register) => write!(f, "register {register:#04x} does not keep its value"),
+            SensorFault::Late => f.write_str("it does not become ready"),
+            SensorFault::Stuck => f.write_str("its readings do not change"),
+            SensorFault::Range => f.write_str("its readings are outside of its range"),
+            SensorFault::Calibration => f.write_str("its factory calibration is damaged"),
+            SensorFault::SelfTest => f.write_str("it failed its self-test"),
+            SensorFault::Overflow => f.write_str("it lost readings"),
         }
     }
 }

@@ -8,14 +8,14 @@ use afbc_drivers::ist8310::Ist8310;
 use afbc_drivers::lis3mdl::Lis3mdl;
 use afbc_drivers::ms5611::Ms5611;
 use afbc_drivers::qmc5883l::Qmc5883l;
-use afbc_drivers::{Fault, MagneticReading, Part, PressureReading, Step};
+use afbc_drivers::{MagneticReading, PressureReading, SensorFault, SensorPart, Step};
 use nalgebra::Vector3;
 use proptest::array::uniform8;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
 /// Registers and answers of any length, many of them those of a script.
-fn answers<P: Part>() -> impl Strategy<Value = Vec<(u8, Vec<u8>)>> {
+fn answers<P: SensorPart>() -> impl Strategy<Value = Vec<(u8, Vec<u8>)>> {
     let reads = P::SETUP.iter().chain(P::CYCLE).filter_map(|step| match step {
         Step::Read(register, length) => Some((*register, *length)),
         _ => None,
@@ -26,7 +26,7 @@ fn answers<P: Part>() -> impl Strategy<Value = Vec<(u8, Vec<u8>)>> {
     vec(prop_oneof![4 => of_a_script, 1 => (any::<u8>(), vec(any::<u8>(), 0..=32))], 1..40)
 }
 
-fn give<P: Part>(part: &mut P, answers: &[(u8, Vec<u8>)]) -> Vec<P::Reading> {
+fn give<P: SensorPart>(part: &mut P, answers: &[(u8, Vec<u8>)]) -> Vec<P::Reading> {
     answers.iter().filter_map(|(register, answer)| part.take(*register, answer).ok().flatten()).collect()
 }
 
@@ -43,7 +43,7 @@ fn fields(readings: &[MagneticReading], max_ut: [f32; 3]) {
 }
 
 /// Gives an answer with each value of the bits of a mask in one of its bytes, until the part takes its checksum.
-fn with_checksum<P: Part>(part: &mut P, register: u8, answer: &mut [u8], at: usize, mask: u8) {
+fn with_checksum<P: SensorPart>(part: &mut P, register: u8, answer: &mut [u8], at: usize, mask: u8) {
     let is_taken = (0..=mask).any(|check| {
         answer[at] = answer[at] & !mask | check;
         matches!(part.take(register, answer), Ok(None))
@@ -120,7 +120,7 @@ fn the_largest_numbers_of_a_ms5611_fit() {
         for (d2, d1) in [(1_u32, 1_u32), (1, 0xFF_FFFF), (0xFF_FFFF, 1), (0xFF_FFFF, 0xFF_FFFF)] {
             assert_eq!(part.take(0x00, &d2.to_be_bytes()[1..]), Ok(None));
             let reading = part.take(0x00, &d1.to_be_bytes()[1..]);
-            assert!(matches!(reading, Ok(Some(_)) | Err(Fault::Range)), "{reading:?}");
+            assert!(matches!(reading, Ok(Some(_)) | Err(SensorFault::Range)), "{reading:?}");
         }
     }
 }

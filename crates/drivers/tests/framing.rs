@@ -5,7 +5,7 @@ use afbc_drivers::bmp3::Bmp388;
 use afbc_drivers::dps310::Dps310;
 use afbc_drivers::lis3mdl::Lis3mdl;
 use afbc_drivers::ms5611::Ms5611;
-use afbc_drivers::{I2cRegisters, Part, Registers, SpiRegisters};
+use afbc_drivers::{I2cRegisters, Registers, SensorPart, SpiRegisters};
 use embassy_futures::block_on;
 use embedded_hal_async::i2c::{self, I2c};
 use embedded_hal_async::spi::{self, SpiDevice};
@@ -32,7 +32,12 @@ impl SpiDevice for &mut Wires {
         for operation in operations {
             match operation {
                 spi::Operation::Write(bytes) => self.0.last_mut().expect("pushed").0.extend(&**bytes),
-                spi::Operation::Read(into) => self.fill(into),
+                // The last two bytes are the answer.
+                spi::Operation::TransferInPlace(bytes) => {
+                    let (head, answer) = bytes.split_at_mut(bytes.len() - 2);
+                    self.0.last_mut().expect("pushed").0.extend(&*head);
+                    self.fill(answer);
+                }
                 _ => panic!("{operation:?}"),
             }
         }
@@ -66,7 +71,7 @@ fn crossing(mut registers: impl Registers, register: u8) {
     block_on(registers.write(register, &[])).expect("no errors");
 }
 
-fn on_spi<P: Part>(register: u8) -> Vec<(Vec<u8>, usize)> {
+fn on_spi<P: SensorPart>(register: u8) -> Vec<(Vec<u8>, usize)> {
     let mut wires = Wires::default();
     crossing(SpiRegisters::new(&mut wires, P::SPI.expect("on SPI")), register);
     wires.0

@@ -1,5 +1,10 @@
 //! Fixes of a receiver, from sentences written by hand.
-#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    reason = "a test that cannot go on should say why"
+)]
 
 use afbc_drivers::FixReading;
 use afbc_drivers::nmea::{NmeaDecoder, RANGE_SIGMA_M};
@@ -37,8 +42,8 @@ proptest! {
     /// Any place, speed and course is read back.
     #[test]
     fn what_is_sent_is_read(
-        latitude in -89.0..89.0_f64, longitude in -179.9..179.9_f64, altitude in -400.0..8000.0_f64, speed in 0.0..50.0_f64,
-        course in 0.0..359.9_f64, climb in -5.0..5.0_f64, time_s in 0.0..86_390.0,
+        latitude in -89.0..89.0_f64, longitude in -179.9..179.9_f64, altitude in -400.0..8000.0_f64,
+        speed in 0.0..50.0_f64, course in 0.0..359.9_f64, climb in -5.0..5.0_f64, time_s in 0.0..86_390.0,
     ) {
         let time_s = f64::round(time_s);
         let mut decoder = NmeaDecoder::new();
@@ -53,21 +58,25 @@ proptest! {
         let (east, north) = course.to_radians().sin_cos();
         prop_assert!((f64::from(fix.velocity_ned_m_s.x) - speed * north).abs() < 0.02);
         prop_assert!((f64::from(fix.velocity_ned_m_s.y) - speed * east).abs() < 0.02);
-        prop_assert!((f64::from(fix.velocity_ned_m_s.z) + climb).abs() < 0.15, "{} and {climb}", fix.velocity_ned_m_s.z);
+        let down = f64::from(fix.velocity_ned_m_s.z);
+        prop_assert!((down + climb).abs() < 0.15, "{down} and {climb}");
         prop_assert!((fix.horizontal_sigma_m - 0.9 * RANGE_SIGMA_M).abs() < 1e-6);
         prop_assert_eq!((fix.satellites, decoder.bad_sentences()), (10, 0));
     }
 
     /// A wire garbled anyhow gives no panic, and no fix with a number that is none.
     #[test]
-    fn noise_is_survived(mut bytes in prop::collection::vec(any::<u8>(), 0..400), start in 0_usize..300, flip in any::<u8>()) {
+    fn noise_is_survived(
+        mut bytes in prop::collection::vec(any::<u8>(), 0..400), start in 0_usize..300, flip in any::<u8>(),
+    ) {
         let good = epoch(45_000.0, [47.0, -8.5, 500.0], 3.0, 90.0);
         bytes.splice(start.min(bytes.len())..start.min(bytes.len()), good.bytes());
         let at = start % bytes.len();
         bytes[at] ^= flip;
         let mut decoder = NmeaDecoder::new();
         for fix in bytes.iter().filter_map(|byte| decoder.take(*byte)).flatten() {
-            prop_assert!(fix.latitude_deg.abs() <= 90.0 && fix.longitude_deg.abs() <= 180.0 && fix.altitude_m.is_finite());
+            prop_assert!(fix.latitude_deg.abs() <= 90.0 && fix.longitude_deg.abs() <= 180.0);
+            prop_assert!(fix.altitude_m.is_finite());
         }
         // And a line that is good again is read.
         let _ = fixes(&mut decoder, "\r\n");

@@ -9,7 +9,7 @@
 )]
 #![allow(dead_code, reason = "not every test uses everything")]
 
-use afbc_drivers::{BusError, Driver, Fault, Part, Registers, Timing};
+use afbc_drivers::{BusError, Driver, PartTiming, Registers, SensorFault, SensorPart};
 use afbc_types::Stamped;
 use core::future::pending;
 use embassy_futures::block_on;
@@ -88,7 +88,7 @@ impl<M: Model> Rig<M> {
     }
 
     /// A driver of the part.
-    pub fn driver<P: Part>(&self, part: P) -> Driver<P, Rig<M>, Rig<M>> {
+    pub fn driver<P: SensorPart>(&self, part: P) -> Driver<P, Rig<M>, Rig<M>> {
         Driver::new(part, self.clone(), self.clone())
     }
 
@@ -161,7 +161,7 @@ impl<M: Model> Registers for Rig<M> {
     }
 }
 
-impl<M: Model> Timing for Rig<M> {
+impl<M: Model> PartTiming for Rig<M> {
     fn now_us(&self) -> u64 {
         self.0.borrow().now_us
     }
@@ -180,11 +180,11 @@ impl<M: Model> Timing for Rig<M> {
 }
 
 /// Reads until so much time has passed; returns readings and faults.
-pub fn run<P: Part, M: Model>(
+pub fn run<P: SensorPart, M: Model>(
     driver: &mut Driver<P, Rig<M>, Rig<M>>,
     rig: &Rig<M>,
     us: u64,
-) -> (Vec<Stamped<P::Reading>>, Vec<Fault>) {
+) -> (Vec<Stamped<P::Reading>>, Vec<SensorFault>) {
     let (mut readings, mut faults) = (Vec::new(), Vec::new());
     let end_us = rig.now_us() + us;
     while rig.now_us() < end_us {
@@ -199,7 +199,7 @@ pub fn run<P: Part, M: Model>(
 /// The table of faults: each is noticed within `notice_us`, no reading of a part that answers nothing passes for one,
 /// and within a second after its end the part reads right again. `interrupts` is true if the part's interrupt is used,
 /// `right` tells a right reading.
-pub fn survives_all_troubles<P: Part, M: Model>(
+pub fn survives_all_troubles<P: SensorPart, M: Model>(
     part: impl Fn() -> P,
     model: impl Fn() -> M,
     interrupts: bool,
@@ -254,10 +254,10 @@ pub fn survives_all_troubles<P: Part, M: Model>(
 }
 
 /// Another part's answers are refused by name.
-pub fn refuses_another<P: Part, M: Model>(part: P, model: M, identity: u8) {
+pub fn refuses_another<P: SensorPart, M: Model>(part: P, model: M, identity: u8) {
     let rig = Rig::new(model);
     let (readings, faults) = run(&mut rig.driver(part), &rig, 500_000);
-    assert!(readings.is_empty() && faults.iter().all(|fault| *fault == Fault::Identity(identity)), "{faults:?}");
+    assert!(readings.is_empty() && faults.iter().all(|fault| *fault == SensorFault::Identity(identity)), "{faults:?}");
 }
 
 /// Numbers that differ from one time to the next, in -1..1, as noise.

@@ -1,0 +1,204 @@
+//! MPU-9250 with the magnetometer AK8963 in its package, by SPI (RM-MPU-9250A, MS1356).
+//!
+//! The MPU-9250 is as in [`crate::mpu`]. It is the master of a bus of its own, on which it has the AK8963 measure 100
+//! times a second (every tenth sample: it reads the last measurement, then writes CNTL1 for the next), +-4912 uT in 16
+//! bits. A measurement takes 7 to 9 ms, so the field is up to 11 ms older than the reading that has it. As each
+//! measurement is ordered anew, a magnetometer that was reset goes on by itself.
+//!
+//! One transfer reads both. A magnetometer that is missing, damaged or saturated is told in
+//! [`Mpu9250Reading::magnetic`], and never costs a reading of the IMU; its sensitivity is read at set-up alone.
+
+use crate::bus::SpiFormat;
+use crate::mpu::{ACCEL_XOUT_H, I2C_IF_DIS, LENGTH, Mpu9250, USER_CTRL};
+use crate::part::{SensorFault, SensorPart, Step};
+use crate::reading::{InertialReading, MagneticReading, little};
+use nalgebra::Vector3;
+
+/// MPU-9250 with AK8963.
+#[derive(Clone, Copy, Debug)]
+pub struct Mpu9250Ak8963 {
+    /// Factors of the magnetometer's axes, or why there are none.
+    adjustment: Result<Vector3<f32>, SensorFault>,
+    last: [u8; MAGNETIC_LENGTH],
+    /// Readings since the last measurement of the field.
+    age: u32,
+}
+
+/// What both read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mpu9250Reading {
+    /// Rates, specific force and temperature.
+    pub inertial: InertialReading,
+    /// Field along the axes of the IMU, if it was measured anew, or what is wrong with the magnetometer.
+    pub magnetic: Result<Option<MagneticReading>, SensorFault>,
+}
+
+// Registers of the MPU-9250.
+const I2C_MST_CTRL: u8 = 0x24;
+const I2C_SLV0_ADDR: u8 = 0x25;
+const I2C_SLV0_REG: u8 = 0x26;
+const I2C_SLV0_CTRL: u8 = 0x27;
+const I2C_SLV1_ADDR: u8 = 0x28;
+const I2C_SLV1_REG: u8 = 0x29;
+const I2C_SLV1_CTRL: u8 = 0x2A;
+const I2C_SLV4_ADDR: u8 = 0x31;
+const I2C_SLV4_REG: u8 = 0x32;
+const I2C_SLV4_DO: u8 = 0x33;
+const I2C_SLV4_CTRL: u8 = 0x34;
+const I2C_SLV1_DO: u8 = 0x64;
+const I2C_MST_DELAY_CTRL: u8 = 0x67;
+
+/// Bit of USER_CTRL.
+const I2C_MST_EN: u8 = 0x20;
+/// Bit of I2C_SLVx_CTRL, beside the number of bytes.
+const EN: u8 = 0x80;
+/// Bit of I2C_SLVx_ADDR.
+const READ: u8 = 0x80;
+
+// Registers of the AK8963.
+const ADDRESS: u8 = 0x0C;
+const WIA: u8 = 0x00;
+const ST1: u8 = 0x02;
+const CNTL1: u8 = 0x0A;
+const CNTL2: u8 = 0x0B;
+const ASAX: u8 = 0x10;
+
+const IDENTITY: u8 = 0x48;
+/// Bit of ST1: a measurement has not been read.
+const DRDY: u8 = 0x01;
+/// Bits of ST2: the field is too strong, the measurement has 16 bits.
+const HOFL: u8 = 0x08;
+const BITM: u8 = 0x10;
+/// Values of CNTL1, with 16 bits.
+const POWER_DOWN: u8 = 0x10;
+const SINGLE: u8 = 0x11;
+const FUSE_ROM: u8 = 0x1F;
+/// Length of ST1, the field and ST2.
+const MAGNETIC_LENGTH: usize = 8;
+/// Strongest field that it reads.
+const LSB_MAX: f32 = 32760.0;
+const UT_PER_LSB: f32 = 0.15;
+/// Readings without a measurement after which the magnetometer is late.
+const AGE_MAX: u32 = 100;
+
+/// Joins two scripts whose lengths add up to `N`.
+const fn join<const N: usize>(first: &[Step], second: &[Step]) -> [Step; N] {
+    let mut all = [Step::Wait(0); N];
+    let (mut places, mut steps, mut others) = (all.as_mut_slice(), first, second);
+    while let Some((place, more_places)) = places.split_first_mut() {
+        if steps.is_empty() {
+            (steps, others) = (others, &[]);
+        }
+        if let Some((step, more_steps)) = steps.split_first() {
+            (*place, steps) = (*step, more_steps);
+        }
+        places = more_places;
+    }
+    all
+}
+
+/// The magnetometer's part of the set-up, register by register: those of the bus do not take blocks.
+const MAGNETOMETER: &[Step] = &[
+    Step::Write(USER_CTRL, I2C_MST_EN | I2C_IF_DIS),
+    Step::Set(I2C_MST_CTRL, 0x1D), // 400 kHz, a stop between reads
+    // Single writes to it: reset, then access to its fuses.
+    Step::Set(I2C_SLV4_ADDR, ADDRESS),
+    Step::Write(I2C_SLV4_REG, CNTL2),
+    Step::Write(I2C_SLV4_DO, 1),
+    Step::Write(I2C_SLV4_CTRL, EN),
+    Step::Wait(5_000),
+    Step::Set(I2C_SLV4_REG, CNTL1),
+    Step::Write(I2C_SLV4_DO, FUSE_ROM),
+    Step::Write(I2C_SLV4_CTRL, EN),
+    Step::Wait(5_000),
+    // Sensitivity and identity.
+    Step::Write(I2C_SLV0_ADDR, READ | ADDRESS),
+    Step::Write(I2C_SLV0_REG, ASAX),
+    Step::Write(I2C_SLV1_ADDR, READ | ADDRESS),
+    Step::Write(I2C_SLV1_REG, WIA),
+    Step::Write(I2C_SLV0_CTRL, EN | 3),
+    Step::Write(I2C_SLV1_CTRL, EN | 1),
+    Step::Wait(5_000),
+    Step::Read(ACCEL_XOUT_H, LENGTH + 4),
+    // None is enabled: where they put their answers is forgotten.
+    Step::Write(I2C_SLV0_CTRL, 0),
+    Step::Write(I2C_SLV1_CTRL, 0),
+    Step::Set(I2C_SLV4_DO, POWER_DOWN),
+    Step::Write(I2C_SLV4_CTRL, EN),
+    Step::Wait(5_000),
+    // Every tenth sample reads a measurement and orders the next.
+    Step::Set(I2C_SLV4_CTRL, 9),
+    Step::Set(I2C_MST_DELAY_CTRL, 0b11),
+    Step::Set(I2C_SLV0_ADDR, READ | ADDRESS),
+    Step::Set(I2C_SLV0_REG, ST1),
+    Step::Set(I2C_SLV1_ADDR, ADDRESS),
+    Step::Set(I2C_SLV1_REG, CNTL1),
+    Step::Set(I2C_SLV1_DO, SINGLE),
+    // Not read back: the part may stop a slave that does not acknowledge.
+    Step::Write(I2C_SLV0_CTRL, EN | 8),
+    Step::Write(I2C_SLV1_CTRL, EN | 1),
+];
+
+impl Default for Mpu9250Ak8963 {
+    fn default() -> Self {
+        Mpu9250Ak8963 { adjustment: Err(SensorFault::Calibration), last: [0; MAGNETIC_LENGTH], age: 0 }
+    }
+}
+
+impl SensorPart for Mpu9250Ak8963 {
+    type Reading = Mpu9250Reading;
+    const NAME: &'static str = "MPU-9250 with AK8963";
+    const SPI: Option<SpiFormat> = Mpu9250::SPI;
+    const I2C: &'static [u8] = &[];
+    const STUCK_AFTER: u32 = Mpu9250::STUCK_AFTER;
+    const SETUP: &'static [Step] = &join::<{ Mpu9250::SETUP.len() + MAGNETOMETER.len() }>(Mpu9250::SETUP, MAGNETOMETER);
+    const CYCLE: &'static [Step] = &[Step::Ready(2_000), Step::Read(ACCEL_XOUT_H, LENGTH + MAGNETIC_LENGTH)];
+
+    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<Mpu9250Reading>, SensorFault> {
+        let (inertial, external) = answer.split_at_checked(LENGTH).ok_or(SensorFault::Bus)?;
+        if let &[x, y, z, identity] = external {
+            (self.adjustment, self.age) = (adjustment([x, y, z], identity), 0);
+            return Ok(None);
+        }
+        let external = external.try_into().map_err(|_| SensorFault::Bus)?;
+        let inertial = Mpu9250 {}.take(register, inertial)?;
+        Ok(inertial.map(|inertial| Mpu9250Reading { inertial, magnetic: self.magnetic(external) }))
+    }
+}
+
+impl Mpu9250Ak8963 {
+    /// Takes ST1, the field and ST2, as they were read for the last time.
+    fn magnetic(&mut self, answer: [u8; MAGNETIC_LENGTH]) -> Result<Option<MagneticReading>, SensorFault> {
+        let adjustment = self.adjustment?;
+        let [st1, field @ .., st2] = answer;
+        // An answer stands until the next one; noise makes them differ.
+        let is_new = st1 & DRDY != 0 && answer != self.last;
+        (self.last, self.age) = (answer, if is_new { 0 } else { self.age.saturating_add(1) });
+        if !is_new {
+            return if self.age < AGE_MAX { Ok(None) } else { Err(SensorFault::Late) };
+        }
+        if st2 & BITM == 0 {
+            return Err(SensorFault::Register(CNTL1));
+        }
+        let field = little(field);
+        if st2 & HOFL != 0 || field.amax() > LSB_MAX {
+            return Err(SensorFault::Range);
+        }
+        let field = field.component_mul(&adjustment) * UT_PER_LSB;
+        // Its x is the IMU's y, its y the IMU's x, and its z points the other way.
+        Ok(Some(MagneticReading { field_ut: Vector3::new(field.y, field.x, -field.z) }))
+    }
+}
+
+/// Returns the factors of the axes.
+fn adjustment(asa: [u8; 3], identity: u8) -> Result<Vector3<f32>, SensorFault> {
+    match identity {
+        IDENTITY => (),
+        0x00 | 0xFF => return Err(SensorFault::Silent),
+        _ => return Err(SensorFault::Identity(identity)),
+    }
+    if asa.iter().any(|&asa| matches!(asa, 0x00 | 0xFF)) {
+        return Err(SensorFault::Calibration);
+    }
+    Ok(Vector3::from(asa).map(|asa| (f32::from(asa) - 128.0) * 0.5 / 128.0 + 1.0))
+}

@@ -1,0 +1,139 @@
+//! TDK InvenSense's family of the MPU-6000, by SPI.
+//!
+//! +-2000 deg/s and +-16 g at 1 kHz. The interrupt INT is a pulse of 50 us, active high, for each sample.
+//!
+//! | part | register map | filter of the rates | of the forces | clock of SPI |
+//! |---|---|---|---|---|
+//! | MPU-6000 | RM-MPU-6000A | 256 Hz, 0.98 ms | 260 Hz | 1 MHz |
+//! | MPU-6500 | RM-MPU-6500A | 184 Hz, 2.9 ms | 218 Hz, 1.9 ms | 1 MHz |
+//! | MPU-9250 | RM-MPU-9250A | 184 Hz, 2.9 ms | 218 Hz, 1.9 ms | 1 MHz |
+//! | ICM-20602 | DS-000176 | 176 Hz | 218 Hz | 10 MHz |
+//! | ICM-20608-G | RM-000030 | 176 Hz | 218 Hz | 8 MHz |
+//! | ICM-20689 | DS-000143 | 176 Hz | 218 Hz | 8 MHz |
+//!
+//! The filters are the widest that each part has at 1 kHz (DLPF_CFG). The MPU-6000 alone divides the 8 kHz of its
+//! widest one; the others give samples at 8 kHz with theirs (250 Hz), which is why they are slower here. The parts
+//! called MPU allow more than 1 MHz for their readings alone: here a reading of theirs takes 0.12 ms.
+//!
+//! The interface I2C is switched off, lest the traffic of other parts on the bus be taken for it: in USER_CTRL, in the
+//! ICM-20602 in I2C_IF. Early MPU-6000 (revision C, of 2011) read half of the force and are not told from others.
+
+use crate::bus::SpiFormat;
+use crate::part::{SensorFault, SensorPart, Step};
+use crate::reading::{InertialReading, big};
+
+/// MPU-6000.
+pub type Mpu6000 = Mpu<0x68>;
+/// MPU-6500.
+pub type Mpu6500 = Mpu<0x70>;
+/// MPU-9250 without its magnetometer, for which there is [`crate::ak8963::Mpu9250Ak8963`].
+pub type Mpu9250 = Mpu<0x71>;
+/// ICM-20602.
+pub type Icm20602 = Mpu<0x12>;
+/// ICM-20608-G.
+pub type Icm20608 = Mpu<0xAF>;
+/// ICM-20689.
+pub type Icm20689 = Mpu<0x98>;
+
+/// A part of the family, by what its register WHO_AM_I says.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Mpu<const IDENTITY: u8>;
+
+/// Without a name. ICM-20602 and ICM-20608 measure y of the force wrongly by up to 2.7 m/s2 when it holds another
+/// value, says ArduPilot's driver.
+const REGISTER_17: u8 = 0x11;
+const SMPLRT_DIV: u8 = 0x19;
+const CONFIG: u8 = 0x1A;
+const GYRO_CONFIG: u8 = 0x1B;
+const ACCEL_CONFIG: u8 = 0x1C;
+const ACCEL_CONFIG_2: u8 = 0x1D;
+const INT_PIN_CFG: u8 = 0x37;
+const INT_ENABLE: u8 = 0x38;
+pub(crate) const ACCEL_XOUT_H: u8 = 0x3B;
+const SIGNAL_PATH_RESET: u8 = 0x68;
+pub(crate) const USER_CTRL: u8 = 0x6A;
+const PWR_MGMT_1: u8 = 0x6B;
+const PWR_MGMT_2: u8 = 0x6C;
+const I2C_IF: u8 = 0x70;
+const WHO_AM_I: u8 = 0x75;
+
+/// Bit of USER_CTRL that switches I2C off. Some parts clear it when that is done: it is not read back.
+pub(crate) const I2C_IF_DIS: u8 = 0x10;
+/// Length of specific force, temperature and rates.
+pub(crate) const LENGTH: usize = 14;
+const RAD_S_PER_LSB: f32 = 2000.0 / 32768.0 * core::f32::consts::PI / 180.0;
+const M_S2_PER_LSB: f32 = 16.0 / 32768.0 * 9.806_65;
+
+/// Returns the step if it applies.
+const fn only(applies: bool, step: Step) -> Step {
+    if applies { step } else { Step::Wait(0) }
+}
+
+impl<const IDENTITY: u8> Mpu<IDENTITY> {
+    const IS_6000: bool = IDENTITY == 0x68;
+    const IS_20602: bool = IDENTITY == 0x12;
+    const IS_20608: bool = IDENTITY == 0xAF;
+    const IS_ICM: bool = Self::IS_20602 || Self::IS_20608 || IDENTITY == 0x98;
+    const I2C_OFF: Step = if Self::IS_20602 { Step::Write(I2C_IF, 0x40) } else { Step::Write(USER_CTRL, I2C_IF_DIS) };
+    /// What the thermometer counts \[1/K\], and the temperature at which it reads 0 \[degrees C\].
+    const THERMOMETER: (f32, f32) = match IDENTITY {
+        0x68 => (340.0, 36.53),
+        0x70 | 0x71 => (333.87, 21.0),
+        _ => (326.8, 25.0),
+    };
+}
+
+impl<const IDENTITY: u8> SensorPart for Mpu<IDENTITY> {
+    type Reading = InertialReading;
+    const NAME: &'static str = match IDENTITY {
+        0x68 => "MPU-6000",
+        0x70 => "MPU-6500",
+        0x71 => "MPU-9250",
+        0x12 => "ICM-20602",
+        0xAF => "ICM-20608-G",
+        0x98 => "ICM-20689",
+        _ => unreachable!(), // it does not compile
+    };
+    const SPI: Option<SpiFormat> = {
+        let clock_hz = if Self::IS_20602 { 10_000_000 } else { 8_000_000 };
+        let clock_hz = if Self::IS_ICM { clock_hz } else { 1_000_000 };
+        Some(SpiFormat { read: 0x80, write: 0, dummies: 0, clock_hz })
+    };
+    const I2C: &'static [u8] = &[];
+    const STUCK_AFTER: u32 = 20;
+    const SETUP: &'static [Step] = &[
+        Self::I2C_OFF, // which ends what the part may be doing as a master, too
+        Step::Wait(10_000),
+        Step::Write(PWR_MGMT_1, 0x80), // reset
+        Step::Wait(100_000),
+        Step::Identify(WHO_AM_I, &[IDENTITY]),
+        only(!Self::IS_ICM, Step::Write(SIGNAL_PATH_RESET, 0b111)),
+        only(!Self::IS_ICM, Step::Wait(100_000)),
+        Self::I2C_OFF,
+        Step::Set(PWR_MGMT_1, 1), // awake, by the clock of the gyroscope
+        Step::Wait(10_000),
+        Self::I2C_OFF, // an ICM that slept has lost it
+        Step::Set(PWR_MGMT_2, 0),
+        Step::Set(CONFIG, if Self::IS_6000 { 0 } else { 1 }), // the filter of the rates
+        Step::Set(SMPLRT_DIV, if Self::IS_6000 { 7 } else { 0 }),
+        Step::Set(GYRO_CONFIG, 0x18),                       // 2000 deg/s, filtered
+        Step::Set(ACCEL_CONFIG, 0x18),                      // 16 g
+        only(!Self::IS_6000, Step::Set(ACCEL_CONFIG_2, 1)), // the filter of the forces
+        only(Self::IS_20602 || Self::IS_20608, Step::Set(REGISTER_17, 0xC9)),
+        Step::Set(INT_PIN_CFG, 0), // pulsed, push-pull, active high
+        Step::Set(INT_ENABLE, 1),  // data ready
+        Step::Wait(50_000),        // until the gyroscope turns steadily
+    ];
+    const CYCLE: &'static [Step] = &[Step::Ready(2_000), Step::Read(ACCEL_XOUT_H, LENGTH)];
+
+    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<InertialReading>, SensorFault> {
+        let &[ref force @ .., t1, t0, r5, r4, r3, r2, r1, r0] = answer else { return Err(SensorFault::Bus) };
+        let force = big(force.try_into().map_err(|_| SensorFault::Bus)?);
+        let (lsb_per_k, zero_c) = Self::THERMOMETER;
+        Ok(Some(InertialReading {
+            rates_rad_s: big([r5, r4, r3, r2, r1, r0]) * RAD_S_PER_LSB,
+            specific_force_m_s2: force * M_S2_PER_LSB,
+            temperature_c: f32::from(i16::from_be_bytes([t1, t0])) / lsb_per_k + zero_c,
+        }))
+    }
+}

@@ -1,0 +1,84 @@
+//! The family of the MPU-6000 against its registers.
+#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
+
+#[path = "models/mpu.rs"]
+mod model;
+mod rig;
+
+use afbc_drivers::mpu::{Icm20602, Icm20608, Icm20689, Mpu, Mpu6000, Mpu6500, Mpu9250};
+use afbc_drivers::{InertialReading, SensorPart};
+use model::Registers;
+use nalgebra::Vector3;
+use rig::{Rig, refuses_another, run, survives_all_troubles};
+
+fn right(reading: &InertialReading) -> bool {
+    let rates = Vector3::new(10.0, -250.0, 0.5) * core::f32::consts::PI / 180.0;
+    let force = Vector3::new(0.1, -0.2, 1.0) * 9.80665;
+    (reading.rates_rad_s - rates).amax() < 5e-3
+        && (reading.specific_force_m_s2 - force).amax() < 0.06
+        && (reading.temperature_c - 31.0).abs() < 0.1
+}
+
+fn is_right<const IDENTITY: u8>() {
+    let part = || Mpu::<IDENTITY> {};
+    survives_all_troubles(part, || Registers::new(IDENTITY), true, 60_000, right);
+    refuses_another(part(), Registers::new(IDENTITY ^ 0x55), IDENTITY ^ 0x55);
+
+    let rig = Rig::new(Registers::new(IDENTITY));
+    let mut driver = rig.driver(part());
+    let (readings, faults) = run(&mut driver, &rig, 1_000_000);
+    let times: Vec<u64> = readings.iter().map(|reading| reading.at_us).collect();
+    assert!(faults.is_empty() && times.len() > 600 && times.windows(2).all(|pair| pair[1] - pair[0] == 1_000));
+    assert!(rig.with(|part| part.is_i2c_off), "{}", Mpu::<IDENTITY>::NAME);
+
+    let cases = [(1990.0, 15.9, -39.0), (-1990.0, -15.9, 85.0), (2500.0, 15.0, 25.0), (-1900.0, -20.0, 0.0)];
+    for (rate, force, temperature) in cases {
+        rig.with(|part| {
+            (part.rates_deg_s, part.force_g, part.temperature_c) = ([rate; 3], [force; 3], temperature);
+        });
+        let _ = run(&mut driver, &rig, 5_000);
+        let (readings, _) = run(&mut driver, &rig, 10_000);
+        let reading = readings.last().expect("readings").value;
+        let [rate, force] = [rate.clamp(-2000.0, 2000.0).to_radians(), force.clamp(-16.0, 16.0) * 9.80665];
+        let InertialReading { rates_rad_s, specific_force_m_s2, temperature_c } = reading;
+        assert!((rates_rad_s - Vector3::from_element(rate as f32)).amax() < 0.02, "{rates_rad_s}");
+        assert!((specific_force_m_s2 - Vector3::from_element(force as f32)).amax() < 0.05, "{specific_force_m_s2}");
+        assert!((temperature_c - temperature as f32).abs() < 0.02, "{temperature_c}");
+    }
+}
+
+#[test]
+fn mpu_6000() {
+    is_right::<0x68>();
+    assert_eq!((Mpu6000::NAME, Mpu6000::SPI.map(|spi| spi.clock_hz)), ("MPU-6000", Some(1_000_000)));
+}
+
+#[test]
+fn mpu_6500() {
+    is_right::<0x70>();
+    assert_eq!((Mpu6500::NAME, Mpu6500::SPI.map(|spi| spi.clock_hz)), ("MPU-6500", Some(1_000_000)));
+}
+
+#[test]
+fn mpu_9250() {
+    is_right::<0x71>();
+    assert_eq!((Mpu9250::NAME, Mpu9250::SPI.map(|spi| spi.clock_hz)), ("MPU-9250", Some(1_000_000)));
+}
+
+#[test]
+fn icm_20602() {
+    is_right::<0x12>();
+    assert_eq!((Icm20602::NAME, Icm20602::SPI.map(|spi| spi.clock_hz)), ("ICM-20602", Some(10_000_000)));
+}
+
+#[test]
+fn icm_20608() {
+    is_right::<0xAF>();
+    assert_eq!((Icm20608::NAME, Icm20608::SPI.map(|spi| spi.clock_hz)), ("ICM-20608-G", Some(8_000_000)));
+}
+
+#[test]
+fn icm_20689() {
+    is_right::<0x98>();
+    assert_eq!((Icm20689::NAME, Icm20689::SPI.map(|spi| spi.clock_hz)), ("ICM-20689", Some(8_000_000)));
+}
