@@ -233,7 +233,7 @@ fn shaken_twice_as_much() {
             let mut trips = false;
             let lost = fly(&Scenario { seed, ..scenario.clone() }, &contender, |sample| {
                 metrics.add(sample);
-                trips |= sample.action.health.trip.is_some();
+                trips |= sample.action.health.fallback.is_some();
             });
             let [roll, pitch, yaw, thrust] = metrics.finish().mean_abs_delta_u.map(|change_n| 1e3 * change_n).into();
             println!("{name}, seed {seed}: {roll:.1}, {pitch:.1}, {yaw:.1}, {thrust:.1} mN a step");

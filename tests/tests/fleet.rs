@@ -37,7 +37,7 @@ fn fault(scenario: &Scenario, contender: &Contender) -> Option<String> {
     let fault = if let Some(lost) = run.lost {
         format!("lost after {} s: {}", lost.time_s, lost.reason)
     } else if let Some(tripped) = run.tripped {
-        format!("tripped after {} s: {}", tripped.time_s, tripped.trip)
+        format!("tripped after {} s: {}", tripped.time_s, tripped.reason)
     } else if rms_m > bounds.rms_m {
         format!("{rms_m} m RMS")
     } else if calm && end_m > bounds.end_m {

@@ -5,8 +5,8 @@ use afbc::adaptive::{self};
 use afbc::fuzzy::{Basis, Membership};
 use afbc::law::Context;
 use afbc::law::Tracking;
-use afbc::{Adaptive, Backstepping, Cascade, Controller, Law, Profile, Settings};
-use afbc_control::{AdaptiveEstimate, Errors, FlightController, Validated};
+use afbc::{Adaptive, AdaptiveEstimate, Backstepping, Cascade, Controller, Law, Profile, Settings};
+use afbc_control::{Errors, FlightController, Validated};
 use afbc_plant::{Environment, Motion, Plant, PlantModel};
 use afbc_sim::case::{Case, Reading};
 use afbc_sim::contender::{self, Contender, ControllerKind};
@@ -47,10 +47,6 @@ impl<L: Law> Law for Rateless<L> {
 
     fn approach(&self, axis: Axis, known: Option<&afbc::model::ModelConstants>) -> f32 {
         self.0.approach(axis, known)
-    }
-
-    fn learnt(estimate: &L::Estimate) -> AdaptiveEstimate {
-        L::learnt(estimate)
     }
 }
 

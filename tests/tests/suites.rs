@@ -138,10 +138,10 @@ fn a_suites_figures_are_those_of_the_flight() {
                     count += 1.0;
                     largest_m = largest_m.max(distance_m);
                 }
-                tripped = tripped.or(sample.action.health.trip.map(|trip| (sample.time_s, trip)));
+                tripped = tripped.or(sample.action.health.fallback.map(|reason| (sample.time_s, reason)));
             });
             let [flight] = entry.flights.as_slice() else { panic!("one seed") };
-            assert_eq!((flight.lost, flight.tripped.map(|t| (t.time_s, t.trip))), (lost.unwrap(), tripped));
+            assert_eq!((flight.lost, flight.tripped.map(|t| (t.time_s, t.reason))), (lost.unwrap(), tripped));
             let rms_m: f64 = (squares / count).sqrt();
             assert!((flight.metrics.rmse.xyz().norm() - rms_m).abs() < 1e-9 * (1.0 + rms_m));
             assert!((flight.metrics.max_distance_m - largest_m).abs() < 1e-12);

@@ -14,7 +14,7 @@ use afbc_flight_core::{
 use afbc_types::{Inputs, Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 
-type Adapted = afbc::Cascade<afbc_control::AdaptiveEstimate>;
+type Adapted = afbc::Cascade<afbc::AdaptiveEstimate>;
 
 fn controller() -> Controller<Adaptive> {
     let settings = Settings { reference: ReferenceModel::DEFAULT, ..Profile::Flight.settings() };

@@ -14,7 +14,7 @@ use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
 
-type Adapted = afbc::Cascade<afbc_control::AdaptiveEstimate>;
+type Adapted = afbc::Cascade<afbc::AdaptiveEstimate>;
 
 /// Without a reference model, errors are distances from the setpoint.
 fn settings() -> Settings {

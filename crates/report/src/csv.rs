@@ -130,7 +130,7 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
         add("lyapunov_sum".into(), Box::new(move |row| Single(sum(row))));
     }
     if contender.monitored {
-        add("tripped".into(), Box::new(|row| Flag(row.sample.action.health.trip.is_some())));
+        add("tripped".into(), Box::new(|row| Flag(row.sample.action.health.fallback.is_some())));
     }
     columns.extend(real(scenario));
     columns

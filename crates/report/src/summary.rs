@@ -124,7 +124,7 @@ fn summary(Flown { scenario, run }: &Flown) -> Summary<'_> {
         lost_at_s: run.lost.map(|lost| lost.time_s),
         lost_reason: run.lost.map(|lost| lost.reason),
         tripped_at_s: run.tripped.map(|tripped| tripped.time_s),
-        tripped_reason: run.tripped.map(|tripped| tripped.trip.reason()),
+        tripped_reason: run.tripped.map(|tripped| tripped.reason),
         seed: scenario.seed,
         measured_from_s: SETTLED_S,
         rmse: measured(run.metrics.rmse).map(Outputs::from),

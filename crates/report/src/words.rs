@@ -232,7 +232,7 @@ pub(super) fn estimate(estimate: &EstimateMetrics) -> String {
 
 /// Example: "the monitor switched to backstepping at t = 15.625 s: rotors stay saturated".
 pub(super) fn tripped(tripped: &Tripped) -> String {
-    let reason = tripped.trip.reason();
+    let reason = tripped.reason;
     let reason = reason.strip_prefix("AFBC off: ").unwrap_or(reason);
     format!("the monitor switched to backstepping at t = {:.3} s: {reason}", tripped.time_s)
 }

@@ -3,7 +3,7 @@
 
 mod common;
 
-use afbc_control::Trip;
+use afbc::Trip;
 use afbc_flight_core::inbox::REQUESTS_MAX;
 use afbc_flight_core::{EndReason, Mode, Refusal, Request};
 use afbc_link::{Address, Answer, Command, Downlink, FRAME_MAX, MavSeverity, Sender, Text, Uplink};
@@ -285,7 +285,7 @@ fn the_largest_output_of_a_tick_is_sent_completely() {
         let mode = if odd { Mode::Coasting } else { Mode::Disarmed };
         let ended = odd.then_some(EndReason::StateLost);
         let mut report = Report { mode, ended, answer: Some(answer), time_us: bench.now_us, ..idle };
-        report.health.control.trip = odd.then_some(Trip::Theta(Axis::Pitch));
+        report.health.control.fallback = odd.then_some(Trip::Theta(Axis::Pitch).reason());
         report.health.rate.clock_failed = odd;
         report.motors.0.fill(1.234);
         let said = bench.said(&report);

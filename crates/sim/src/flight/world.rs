@@ -5,7 +5,8 @@ use super::sample::Sample;
 use super::sensing::Wired;
 use crate::scenario::{Outage, Scenario};
 use crate::trajectory::{Reference, Trajectory};
-use afbc_control::{Action, AdaptiveEstimate, Trace};
+use afbc::AdaptiveEstimate;
+use afbc_control::{Action, Trace};
 use afbc_flight_core::Refusal;
 use afbc_onboard::{Aged, Readings};
 use afbc_plant::{
