@@ -3,11 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // what cannot be flown must stop the test
 
 use afbc_plant::instruments::{Failure, InstrumentFault};
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::trajectory::Trajectory;
+use afbc_scenario::{Outage, Scenario, built_in};
 use afbc_sim::flight::{Estimated, Sample, World, fly};
 use afbc_sim::metrics::{Accumulator, Aid, EstimateMetrics, Metrics, SETTLED_S};
-use afbc_sim::scenario::{Outage, Scenario, built_in};
-use afbc_sim::trajectory::Trajectory;
 use nalgebra::{Vector3, Vector4};
 
 fn scenario(name: &str) -> Scenario {

@@ -8,8 +8,8 @@ use afbc_control::{Action, FlightController, Trace, Validated};
 use afbc_plant::{
     Deviations, Drag, Environment, Motion, Plant, PlantModel, Realism, Rotors, Sensing, StateSensor, Turbulence, Wind,
 };
-use afbc_sim::case::Case;
-use afbc_sim::paper;
+use afbc_scenario::case::Case;
+use afbc_scenario::paper;
 use afbc_types::{Axis, Inputs, Parameters, PerAxis, Setpoint};
 use nalgebra::{Vector2, Vector3, Vector4};
 

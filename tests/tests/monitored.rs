@@ -6,10 +6,10 @@ use afbc::Trip;
 use afbc_campaign::suite::{SUITES, Suite};
 use afbc_plant::{Drag, Environment, ParameterChange, PlantParameter, Turbulence};
 use afbc_reader::BuiltIn;
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::trajectory::Trajectory;
+use afbc_scenario::{Scenario, built_in};
 use afbc_sim::flight::fly;
-use afbc_sim::scenario::{Scenario, built_in};
-use afbc_sim::trajectory::Trajectory;
 use afbc_types::Axis;
 use nalgebra::Vector3;
 

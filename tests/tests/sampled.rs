@@ -11,8 +11,8 @@ use afbc::Profile;
 use afbc_control::FlightController;
 use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, Stamped, TicketedRequest};
 use afbc_plant::Sensing;
-use afbc_sim::contender::{Contender, ControllerKind, Task};
-use afbc_sim::scenario::{Scenario, built_in};
+use afbc_scenario::contender::{Contender, ControllerKind, Task};
+use afbc_scenario::{Scenario, built_in};
 use afbc_types::{OutOfRange, State};
 use std::collections::VecDeque;
 

@@ -8,7 +8,7 @@ use afbc_plant::{Misreading, PlantParameter};
 use afbc_reader::BuiltIn;
 use afbc_report::markers;
 use afbc_report::suite::{self, FlownSuite};
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_sim::flight::fly;
 use afbc_types::{Axis, Declared, Value};
 use core::convert::Infallible;
@@ -153,7 +153,7 @@ fn a_suites_figures_are_those_of_the_flight() {
 #[test]
 fn the_flights_of_the_field_are_those_it_names() {
     let suite = built_in("field");
-    let peak = |flight: &SuiteFlight, derivative: fn(&afbc_sim::trajectory::Reference) -> f64| {
+    let peak = |flight: &SuiteFlight, derivative: fn(&afbc_scenario::trajectory::Reference) -> f64| {
         let times = (0..(flight.scenario.duration_s * 1e3) as u32).map(|k| 1e-3 * f64::from(k));
         times.map(|t| derivative(&flight.scenario.trajectory.at(t))).fold(0.0, f64::max)
     };

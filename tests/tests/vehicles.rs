@@ -3,9 +3,9 @@
 
 use afbc::{Guarded, Profile};
 use afbc_plant::Environment;
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::{Scenario, built_in};
 use afbc_sim::flight::fly;
-use afbc_sim::scenario::{Scenario, built_in};
 use afbc_types::{Axis, Parameters};
 use nalgebra::Vector3;
 use proptest::prelude::*;

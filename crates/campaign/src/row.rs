@@ -1,10 +1,10 @@
 //! Result of one flight of one contender.
 
 use crate::plan::Campaign;
-use afbc_sim::contender::Contender;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
 use afbc_sim::flight::{Lost, fly};
 use afbc_sim::metrics::{Accumulator, Metrics, is_settled, tracking_error};
-use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 
 /// Result of one flight of one contender: a row of the results.

@@ -1,7 +1,7 @@
 //! `summary.json`: the figures of merit of each run.
 
 use afbc::Profile;
-use afbc_sim::case::{Reading, Sign};
+use afbc_scenario::case::{Reading, Sign};
 use afbc_sim::flown::Flown;
 use afbc_sim::metrics::{Aid, AidMetrics, EstimateMetrics, SETTLED_S};
 use nalgebra::Vector4;

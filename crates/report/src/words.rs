@@ -5,11 +5,11 @@ use afbc_plant::{
     CosineGust, Gust, GustKind, Misreading, ParameterChange, Payload, PlantParameter, Realism, RotorFault, Rotors,
     Sensing, SensorFault, Wind,
 };
-use afbc_sim::case::{Reading, Sign};
-use afbc_sim::contender::Contender;
+use afbc_scenario::Scenario;
+use afbc_scenario::case::{Reading, Sign};
+use afbc_scenario::contender::Contender;
 use afbc_sim::metrics::EstimateMetrics;
 use afbc_sim::run::Tripped;
-use afbc_sim::scenario::Scenario;
 use afbc_types::Axis;
 
 /// Returns a file name without extension: letters, digits, `-` and `_` of `name`, and `-` for anything else.

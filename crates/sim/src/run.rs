@@ -1,9 +1,9 @@
 //! One flight with its log and metrics.
 
-use crate::contender::Contender;
 use crate::flight::{Lost, Sample, fly};
 use crate::metrics::{Accumulator, Metrics, SETTLED_S, inputs};
-use crate::scenario::Scenario;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
 use afbc_types::OutOfRange;
 use nalgebra::Vector4;
 

@@ -137,7 +137,7 @@ pub fn json(out: &mut dyn Write, judged: &Judged<'_>) -> io::Result<()> {
 }
 
 fn of_group<'a>(judged: &Judged<'a>, group: &'a Group<'a>) -> GroupWords<'a> {
-    let words = |(contender, standing): (&'a afbc_sim::contender::Contender, &Standing)| {
+    let words = |(contender, standing): (&'a afbc_scenario::contender::Contender, &Standing)| {
         let Standing { wins, lost, lost_alone, median_m, geometric_m, difference } = *standing;
         Words {
             name: &contender.name,

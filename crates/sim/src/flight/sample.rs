@@ -1,10 +1,10 @@
 //! Record of one step of a flight.
 
 use super::estimation::Estimated;
-use crate::trajectory::Reference;
 use afbc::{AdaptiveEstimate, Cascade, guarded};
 use afbc_control::{Action, Trace};
 use afbc_plant::{EffectsState, Motion, StateMeasurement};
+use afbc_scenario::trajectory::Reference;
 use afbc_types::{PerAxis, ROTORS_MAX};
 use core::any::Any;
 
