@@ -6,7 +6,7 @@ use super::world::{View, World};
 use afbc_control::{Action, FlightController, Mixer};
 use afbc_flight_core::motor::Response;
 use afbc_flight_core::rate::{PERIOD_US, WINDOW_US};
-use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, Stamped, TicketedRequest};
+use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, Stamped, Ticketed};
 use afbc_onboard::Aged;
 use afbc_types::{OutOfRange, Parameters, Setpoint, State};
 use core::convert::Infallible;
@@ -63,7 +63,7 @@ impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
         for _ in 0..TICKS_HELD {
             let _ = self.tick(view, setpoint);
         }
-        self.inbox.request(TicketedRequest { request: Request::Arm, ticket: 0 });
+        self.inbox.request(Ticketed { value: Request::Arm, ticket: 0 });
         let _ = self.tick(view, setpoint);
     }
 }
